@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise: see README.md. `make help` lists the targets.
+#
+#   O=DIR          build there instead of build/
+#   prefix, DESTDIR, bindir, libdir, includedir, mandir …   as usual
+#   CFLAGS, LDFLAGS, CPPFLAGS   yours; the project's own flags are kept apart
+#   DEPS=no        let `make demo` and `make check` install no packages
+
+O ?= build
+prefix ?= /usr/local
+bindir ?= $(prefix)/bin
+libdir ?= $(prefix)/lib
+includedir ?= $(prefix)/include
+datadir ?= $(prefix)/share
+mandir ?= $(datadir)/man
+completiondir ?= $(datadir)/bash-completion/completions
+
+CFLAGS ?= -O2 -g
+PKG_CONFIG ?= pkg-config
+INSTALL ?= install
+
+version := $(shell sed -n 's/^\#define INCISE_VERSION "\(.*\)"/\1/p' lib/include/incise/version.h)
+# Changes when the binary interface does.
+soversion := 1
+
+cppflags := -D_GNU_SOURCE -Ilib/include
+warnings := -Wall -Wextra -Wmissing-prototypes -Wstrict-prototypes -Wvla -Wno-unused-parameter
+cflags := -std=gnu11 -fPIC -fvisibility=hidden -fno-math-errno -ffp-contract=off $(warnings)
+
+# One shared object per group of rooms; a process maps only the ones it uses.
+libraries := incise incise-learn incise-record
+rooms_incise := base fixed model tissue scene loop sim device
+rooms_incise-learn := learn
+rooms_incise-record := record
+pc_incise := libconfig
+pc_incise-learn := lapacke lapack blas
+pc_incise-record := sqlite3
+libs_incise := -lm
+libs_incise-learn := -lm
+libs_incise-record := -lm
+needs_incise :=
+needs_incise-learn := incise
+needs_incise-record := incise
+
+# One program per verb, and the libraries it is linked to.
+verbs := $(patsubst tools/incise-%.c,%,$(wildcard tools/incise-*.c))
+uses_capture := incise incise-record
+uses_export := incise incise-record
+uses_train := incise incise-learn
+uses_eval := incise
+uses_info := incise incise-record
+uses_haptic := incise
+uses_demo := incise incise-learn
+uses_bench := incise
+
+all: libs tools $(O)/incise.pc
+
+.DEFAULT_GOAL := all
+.DELETE_ON_ERROR:
+.SUFFIXES:
+
+include mk/lib.mk
+include mk/tools.mk
+include mk/test.mk
+include mk/install.mk
+
+help:
+	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1  /p' $(MAKEFILE_LIST) | sort | \
+		awk '{ name = $$1; $$1 = ""; printf "%-14s%s\n", name, $$0 }'
+
+clean: ## remove what was built
+	rm -rf $(O)
+
+-include $(shell find $(O) -name '*.d' 2>/dev/null)
+
+.PHONY: all help clean

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Files that appear whole or not at all; see incise/outfile.h.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <libgen.h>
+#include <limits.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <incise/outfile.h>
+
+struct incise_outfile {
+	char *path;
+	char *temp;  /* hidden name beside path; NULL when written directly */
+	bool linked; /* temp exists in the file system */
+	FILE *stream;
+};
+
+static void outfile_free(struct incise_outfile *file)
+{
+	free(file->path);
+	free(file->temp);
+	free(file);
+}
+
+/* ".NAME.XXXXXX" in the folder of path: rename(2) does not cross file systems. */
+static char *temp_name(const char *path)
+{
+	const char *slash = strrchr(path, '/');
+	int dir = slash ? (int)(slash - path) + 1 : 0;
+	char *name = NULL;
+
+	if (asprintf(&name, "%.*s.%s.XXXXXX", dir, path, path + dir) < 0)
+		return NULL;
+	return name;
+}
+
+static int open_temp(struct incise_outfile *file)
+{
+	char *dir = strdup(file->temp);
+	mode_t mask = umask(0);
+	int fd;
+
+	umask(mask);
+	if (!dir)
+		return -1;
+	fd = open(dirname(dir), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
+	free(dir);
+	if (fd >= 0)
+		return fd;
+	fd = mkostemp(file->temp, O_CLOEXEC);
+	if (fd >= 0) {
+		file->linked = true;
+		fchmod(fd, 0666 & ~mask);
+	}
+	return fd;
+}
+
+struct incise_outfile *incise_outfile_open(const char *path, struct incise_error *err)
+{
+	struct incise_outfile *file = calloc(1, sizeof(*file));
+	struct stat st;
+	int fd;
+
+	if (!file)
+		goto fail;
+	file->path = strdup(path);
+	if (!file->path)
+		goto fail;
+	if (!strcmp(path, "-")) {
+		file->stream = stdout;
+		return file;
+	}
+	if (!*path || (!stat(path, &st) && S_ISDIR(st.st_mode))) {
+		errno = *path ? EISDIR : ENOENT;
+		goto fail;
+	}
+	if (!stat(path, &st) && !S_ISREG(st.st_mode)) {
+		fd = open(path, O_WRONLY | O_CLOEXEC);
+	} else {
+		file->temp = temp_name(path);
+		fd = file->temp ? open_temp(file) : -1;
+	}
+	if (fd < 0)
+		goto fail;
+	file->stream = fdopen(fd, "w");
+	if (!file->stream) {
+		close(fd);
+		goto fail;
+	}
+	return file;
+fail:
+	incise_error_set(err, errno,
+			 "%s: cannot be written: %s; give another path with -o", path,
+			 strerror(errno));
+	if (file) {
+		fd = errno;
+		outfile_free(file);
+		errno = fd;
+	}
+	return NULL;
+}
+
+FILE *incise_outfile_stream(struct incise_outfile *file)
+{
+	return file->stream;
+}
+
+/* Give the nameless file a hidden name, so that rename(2) can put it in its place. */
+static int link_temp(struct incise_outfile *file, int fd)
+{
+	char proc[32];
+
+	if (file->linked)
+		return 0;
+	snprintf(proc, sizeof(proc), "/proc/self/fd/%d", fd);
+	for (int tries = 0; tries < 100; tries++) {
+		snprintf(strrchr(file->temp, '.') + 1, 7, "%06u",
+			 (unsigned int)(getpid() + tries) % 1000000u);
+		if (!linkat(AT_FDCWD, proc, AT_FDCWD, file->temp, AT_SYMLINK_FOLLOW)) {
+			file->linked = true;
+			return 0;
+		}
+		if (errno != EEXIST)
+			break;
+	}
+	return -errno;
+}
+
+int incise_outfile_commit(struct incise_outfile *file, struct incise_error *err)
+{
+	int fd = fileno(file->stream);
+	int rc = 0;
+
+	if (ferror(file->stream) || fflush(file->stream))
+		rc = errno ? -errno : -EIO;
+	if (!rc && file->temp && fsync(fd))
+		rc = -errno;
+	if (!rc && file->temp)
+		rc = link_temp(file, fd);
+	if (!rc && file->temp && rename(file->temp, file->path))
+		rc = -errno;
+	if (rc) {
+		rc = incise_error_set(err, -rc,
+				      "%s: not written: %s; what stood there before is "
+				      "unchanged",
+				      strcmp(file->path, "-") ? file->path
+							      : "standard output",
+				      strerror(-rc));
+		incise_outfile_abort(file);
+		return rc;
+	}
+	if (file->stream != stdout)
+		fclose(file->stream);
+	outfile_free(file);
+	return 0;
+}
+
+void incise_outfile_abort(struct incise_outfile *file)
+{
+	if (!file)
+		return;
+	if (file->stream != stdout)
+		fclose(file->stream);
+	if (file->linked)
+		unlink(file->temp);
+	outfile_free(file);
+}

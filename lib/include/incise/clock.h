@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Time. Every device, recording and loop takes its time from a clock, so that the same
+ * code runs in real time and, on the virtual rig, in simulated time as fast as it goes.
+ *
+ *   real:       now() = CLOCK_MONOTONIC        wait_until(t) sleeps
+ *   simulated:  now() = what was waited for    wait_until(t) sets the time to t
+ */
+#ifndef INCISE_CLOCK_H
+#define INCISE_CLOCK_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+#define INCISE_NS_PER_S 1000000000LL
+
+struct incise_clock;
+
+/**
+ * A clock that reads CLOCK_MONOTONIC.
+ *
+ * @return clock, to be freed with incise_clock_free(); NULL with errno ENOMEM.
+ */
+INCISE_API struct incise_clock *incise_clock_new_real(void);
+
+/**
+ * A clock that stands still until it is waited upon.
+ *
+ * @param start_ns the first value of incise_clock_now(), ns
+ * @return clock, to be freed with incise_clock_free(); NULL with errno ENOMEM.
+ */
+INCISE_API struct incise_clock *incise_clock_new_simulated(int64_t start_ns);
+
+INCISE_API void incise_clock_free(struct incise_clock *clock);
+
+/** Nanoseconds since an arbitrary start. Real-time safe (vDSO). */
+INCISE_API int64_t incise_clock_now(const struct incise_clock *clock);
+
+/** Whether time passes by itself. Real-time safe. */
+INCISE_API bool incise_clock_is_real(const struct incise_clock *clock);
+
+/**
+ * Wait until an absolute time; a time that has passed returns at once.
+ *
+ * @return 0, or -EINTR when a signal handler ran. Makes one system call on a real clock.
+ */
+INCISE_API int incise_clock_wait_until(struct incise_clock *clock, int64_t t_ns);
+
+INCISE_END_DECLS
+#endif

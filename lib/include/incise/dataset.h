@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * A table of numbers with named columns, read from CSV: the training data. A header row
+ * names the columns (with units); one column may hold text, the group (cut) a row
+ * belongs to. Part of libincise-learn.
+ */
+#ifndef INCISE_DATASET_H
+#define INCISE_DATASET_H
+
+#include <stddef.h>
+#include <incise/error.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+struct incise_dataset;
+
+/**
+ * Read the named columns of a CSV file. Fields may be quoted; lines may end in CR LF; a
+ * line that starts with '#' and an empty line are passed over.
+ *
+ * @param path    file, or "-" for standard input
+ * @param columns n names; "" matches nothing
+ * @param group   name of the column whose text tells which cut a row belongs to, or NULL
+ * @return dataset with the n columns in the order asked for, to be freed with
+ *         incise_dataset_free(); NULL with errno of fopen(3), EINVAL (a field that is no
+ *         finite number, a row with too few fields: line and column are named; a column
+ *         that does not exist: the ones that do are listed), ENODATA (no rows), ENOMEM.
+ */
+INCISE_API struct incise_dataset *incise_dataset_read(const char *path,
+						      const char *const *columns, int n,
+						      const char *group,
+						      struct incise_error *err);
+
+INCISE_API void incise_dataset_free(struct incise_dataset *data);
+
+INCISE_API size_t incise_dataset_rows(const struct incise_dataset *data);
+
+/** Row @row: one value per column, in the order asked for; owned by the dataset. */
+INCISE_API const double *incise_dataset_row(const struct incise_dataset *data,
+					    size_t row);
+
+/** Number of distinct groups; 0 without a group column. */
+INCISE_API int incise_dataset_n_groups(const struct incise_dataset *data);
+
+/** Group of a row, 0 … n_groups-1 in order of appearance; -1 without a group column. */
+INCISE_API int incise_dataset_group(const struct incise_dataset *data, size_t row);
+
+/** The text of a group; owned by the dataset. */
+INCISE_API const char *incise_dataset_group_name(const struct incise_dataset *data,
+						 int group);
+
+INCISE_END_DECLS
+#endif

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * An error as a value: a code for programs and one line for people. The line is made
+ * once, where the cause is known, and handed up unchanged.
+ */
+#ifndef INCISE_ERROR_H
+#define INCISE_ERROR_H
+
+#include <stdarg.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+/** An error that a person can act on. Set it to {0} before use. */
+struct incise_error {
+	int code;	/**< positive errno, 0 for none */
+	char text[500]; /**< one line without a newline: what, where, what to do */
+};
+
+/**
+ * Fill in an error and return its code as the callers of the library expect it.
+ *
+ * Control characters are replaced by '?', so that text from a file cannot break the line.
+ *
+ * @param err  where to leave the line, or NULL
+ * @param code positive errno
+ * @return -code; errno is set to code as well, for functions that return pointers.
+ */
+INCISE_API int incise_error_set(struct incise_error *err, int code, const char *fmt, ...)
+	INCISE_PRINTF(3, 4);
+
+/** As incise_error_set(), with a va_list. */
+INCISE_API int incise_error_vset(struct incise_error *err, int code, const char *fmt,
+				 va_list args) INCISE_PRINTF(3, 0);
+
+INCISE_END_DECLS
+#endif

@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * What every public header needs: C++ linkage, visibility, printf checking.
+ *
+ * Conventions of the whole library, not repeated at each function:
+ *
+ *  - Lengths are millimetres, forces newtons, times seconds in double or nanoseconds of
+ *    CLOCK_MONOTONIC in int64_t.
+ *  - A function returns 0 or a negative errno, or a pointer and NULL with errno set.
+ *  - `struct incise_error *err` may be NULL; when it is not, a failing call leaves there
+ *    one line that says what, where and what to do.
+ *  - `_free` and `_close` accept NULL.
+ *  - There is no global state. Different objects may be used from different threads; one
+ *    object from one thread at a time. "Real-time safe" means: no allocation, no lock,
+ *    no system call.
+ */
+#ifndef INCISE_EXPORT_H
+#define INCISE_EXPORT_H
+
+#ifdef __cplusplus
+#define INCISE_BEGIN_DECLS extern "C" {
+#define INCISE_END_DECLS }
+#else
+#define INCISE_BEGIN_DECLS
+#define INCISE_END_DECLS
+#endif
+
+#if defined(__GNUC__)
+#define INCISE_API __attribute__((visibility("default")))
+#define INCISE_PRINTF(fmt, args) __attribute__((format(printf, fmt, args)))
+#else
+#define INCISE_API
+#define INCISE_PRINTF(fmt, args)
+#endif
+
+#endif

@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The real-time loop: runs a plan at the times start + n·period of CLOCK_MONOTONIC.
+ *
+ * The next wake-up follows from the previous one, never from now. A tick that would
+ * start more than a period late is skipped and counted, so that a stall is not followed
+ * by a burst.
+ */
+#ifndef INCISE_LOOP_H
+#define INCISE_LOOP_H
+
+#include <signal.h>
+#include <stdint.h>
+#include <incise/clock.h>
+#include <incise/error.h>
+#include <incise/export.h>
+#include <incise/scene.h>
+
+INCISE_BEGIN_DECLS
+
+/** Histogram of latenesses: bin i counts [i, i+1) µs, the last one all above. */
+#define INCISE_LOOP_BINS 20001
+
+struct incise_loop_options {
+	double rate_hz;	     /**< 1 … 20000 */
+	int64_t duration_ns; /**< 0: until stopped */
+	/** Where every tick is written, or NULL: room for log_size; more are not kept. */
+	struct incise_tick *log;
+	size_t log_size;
+	/** Set by a signal handler to end the loop, or NULL. */
+	const volatile sig_atomic_t *stop;
+};
+
+/** Statistics of a run. */
+struct incise_loop_stats {
+	uint64_t ticks;	  /**< run */
+	uint64_t skipped; /**< not run because they would have been a period late */
+	uint64_t contact, extrapolated, stale, limited; /**< ticks with the flag */
+	size_t logged;
+	uint64_t lateness_us[INCISE_LOOP_BINS]; /**< of the wake-up */
+	int64_t lateness_max_ns;
+	int64_t tick_max_ns;		       /**< cost of the plan */
+	uint64_t tick_100ns[INCISE_LOOP_BINS]; /**< cost of the plan, bins of 100 ns */
+	double force_max_N;
+};
+
+/**
+ * Run a plan. Makes no allocation and no system call but the clock's.
+ *
+ * @param stats caller's memory, 320 KiB; zeroed here
+ * @return 0 at the end of the time or when stopped; -EINVAL (options), or the errno of
+ *         the device that failed.
+ */
+INCISE_API int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
+			       const struct incise_loop_options *options,
+			       struct incise_loop_stats *stats, struct incise_error *err);
+
+/**
+ * The value below which a share of a histogram lies, in bins (its upper edge).
+ *
+ * @param share 0 … 1
+ * @return bins; INCISE_LOOP_BINS when it lies in the last, open one; 0 when empty.
+ */
+INCISE_API double incise_loop_quantile(const uint64_t *histogram, double share);
+
+INCISE_END_DECLS
+#endif

@@ -1,0 +1,176 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The Takagi–Sugeno fuzzy model of paper 1, eq. (1)–(3), in double precision, and its
+ * file, MATLAB's .fis.
+ *
+ *   rule r:  if x1 is A(1,r) and x2 is A(2,r) then  y = p(r,0) + p(r,1) x1 + p(r,2) x2
+ *   output:  Σ w(r) y(r) / Σ w(r),  w(r) = Π A(i,r)(x(i))
+ *
+ * A cutting model has the inputs depth_mm and velocity_mm_s and the output force_N, but
+ * nothing here depends on that: units are those of the data it was trained on.
+ *
+ * The paper writes the Gaussian as exp(-(x-m)²/σ²). Files, and this interface, hold
+ * MATLAB's form exp(-(x-c)²/(2 s²)): s = σ/√2.
+ */
+#ifndef INCISE_MODEL_H
+#define INCISE_MODEL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <incise/error.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+#define INCISE_MODEL_INPUTS_MAX 8
+#define INCISE_MODEL_MFS_MAX 32 /**< membership functions of one input */
+#define INCISE_MODEL_RULES_MAX 256
+#define INCISE_MODEL_NAME_MAX 64 /**< bytes, the final NUL included */
+
+/** Kinds of membership functions; the name in a .fis file stands behind each. */
+enum incise_mf_type {
+	INCISE_MF_GAUSS, /**< gaussmf [s c]: exp(-(x-c)²/(2 s²)), s > 0 */
+	INCISE_MF_GBELL, /**< gbellmf [a b c]: 1/(1 + |(x-c)/a|^(2b)), a > 0 */
+};
+
+/** One membership function. Parameters in the order of MATLAB's file. */
+struct incise_mf {
+	enum incise_mf_type type;
+	char name[INCISE_MODEL_NAME_MAX];
+	double p[4];
+};
+
+/** One input or output: its name (with unit) and the range it was trained on. */
+struct incise_variable {
+	char name[INCISE_MODEL_NAME_MAX];
+	double min, max; /**< support; min < max, both finite */
+};
+
+/** What an evaluation says beside its value. */
+enum incise_model_flag {
+	INCISE_MODEL_EXTRAPOLATED = 1, /**< an input lay outside its range, or was NaN */
+};
+
+struct incise_model;
+
+/**
+ * A model whose rules form the full grid of the inputs' membership functions. Inputs get
+ * evenly spaced functions over their range, neighbours crossing at 0.5 (genfis1);
+ * consequents are zero.
+ *
+ * @param n_inputs  1 … INCISE_MODEL_INPUTS_MAX
+ * @param inputs    n_inputs names and ranges
+ * @param n_mfs     n_inputs counts, each 1 … INCISE_MODEL_MFS_MAX
+ * @param type      kind of all functions
+ * @param output    name and range of the output
+ * @return model, to be freed with incise_model_free(); NULL with errno EINVAL (a range or
+ *         count), E2BIG (more than INCISE_MODEL_RULES_MAX rules), ENOMEM.
+ */
+INCISE_API struct incise_model *incise_model_new_grid(
+	int n_inputs, const struct incise_variable *inputs, const int *n_mfs,
+	enum incise_mf_type type, const struct incise_variable *output,
+	struct incise_error *err);
+
+/**
+ * Read a .fis file: Sugeno, first or zero order, prod, wtaver.
+ *
+ * The content is not trusted: every number is checked, and an error names file and line.
+ *
+ * @param path file, or "-" for standard input
+ * @return model; NULL with errno of fopen(3), EINVAL (malformed), ENOTSUP (Mamdani, an
+ *         unknown membership function or method), E2BIG, ENOMEM.
+ */
+INCISE_API struct incise_model *incise_model_load(const char *path,
+						  struct incise_error *err);
+
+/**
+ * Write a .fis file with 17 significant digits; whole or not at all.
+ *
+ * @return 0, or a negative errno of incise_outfile_open() and incise_outfile_commit().
+ */
+INCISE_API int incise_model_save(const struct incise_model *model, const char *path,
+				 struct incise_error *err);
+
+/** @return a model of its own; NULL with errno ENOMEM. */
+INCISE_API struct incise_model *incise_model_copy(const struct incise_model *model);
+
+/** Make @to equal to @from, without an allocation. */
+INCISE_API void incise_model_assign(struct incise_model *to,
+				    const struct incise_model *from);
+INCISE_API void incise_model_free(struct incise_model *model);
+
+INCISE_API const char *incise_model_name(const struct incise_model *model);
+INCISE_API void incise_model_set_name(struct incise_model *model, const char *name);
+INCISE_API int incise_model_n_inputs(const struct incise_model *model);
+INCISE_API int incise_model_n_rules(const struct incise_model *model);
+INCISE_API int incise_model_n_mfs(const struct incise_model *model, int input);
+
+/** Input @input, 0 … n_inputs-1; owned by the model. */
+INCISE_API const struct incise_variable *incise_model_input(
+	const struct incise_model *model, int input);
+INCISE_API const struct incise_variable *incise_model_output(
+	const struct incise_model *model);
+
+/** Membership function @mf of input @input; owned by the model. */
+INCISE_API const struct incise_mf *incise_model_mf(const struct incise_model *model,
+						   int input, int mf);
+
+/**
+ * Replace the parameters of a membership function; kind and name stay.
+ *
+ * @return 0, or -EINVAL when a parameter is not finite or a width is not positive.
+ */
+INCISE_API int incise_model_set_mf(struct incise_model *model, int input, int mf,
+				   const double p[4]);
+
+/** The membership function of @input that rule @rule uses, or -1 for none. */
+INCISE_API int incise_model_rule_mf(const struct incise_model *model, int rule,
+				    int input);
+
+/** Consequent of rule @rule: n_inputs+1 coefficients, the constant first. */
+INCISE_API const double *incise_model_consequent(const struct incise_model *model,
+						 int rule);
+
+/**
+ * Replace a consequent.
+ *
+ * @param p n_inputs+1 coefficients, the constant first
+ * @return 0, or -EINVAL when one is not finite.
+ */
+INCISE_API int incise_model_set_consequent(struct incise_model *model, int rule,
+					   const double *p);
+
+/**
+ * Whether inputs outside their range are taken as its nearest end (default on). Off, the
+ * consequents extrapolate linearly.
+ */
+INCISE_API void incise_model_set_clamp(struct incise_model *model, bool clamp);
+
+/** Degree of membership in [0, 1]. Real-time safe. */
+INCISE_API double incise_mf_eval(const struct incise_mf *mf, double x);
+
+/** Name of a kind as .fis files spell it, e.g. "gaussmf". */
+INCISE_API const char *incise_mf_type_name(enum incise_mf_type type);
+
+/**
+ * Evaluate eq. (3). Firing strengths are normalised in the log domain: where all of them
+ * underflow, the nearest rule takes over. A NaN input counts as the middle of its range.
+ *
+ * @param x     n_inputs values
+ * @param flags where to leave incise_model_flag bits, or NULL
+ * @return finite output. Real-time safe.
+ */
+INCISE_API double incise_model_eval(const struct incise_model *model, const double *x,
+				    unsigned int *flags);
+
+/**
+ * Normalised firing strengths w(r)/Σw of all rules; they add up to 1.
+ *
+ * @param x n_inputs values
+ * @param w n_rules results
+ */
+INCISE_API void incise_model_firing(const struct incise_model *model, const double *x,
+				    double *w);
+
+INCISE_END_DECLS
+#endif

@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Reading a recording, and making a dataset of it (paper 1, §4.1). Part of
+ * libincise-record.
+ */
+#ifndef INCISE_RECORDING_H
+#define INCISE_RECORDING_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <incise/error.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+struct incise_recording;
+
+/** What a recording holds. */
+struct incise_recording_info {
+	bool complete; /**< closed by its recorder; false: readable up to the last commit */
+	int64_t start_ns, end_ns; /**< first and last force sample, CLOCK_MONOTONIC */
+	char started[32];	  /**< wall clock at the start, ISO 8601 UTC */
+	char rig[256];		  /**< what was given as rig */
+	uint64_t force, tracker, depth; /**< rows */
+	uint64_t force_lost, tracker_lost, force_clipped;
+	int bits;
+	double full_scale_V;
+	double force_mV_N, zero_mV, depth_mm_px; /**< calibration it was made with */
+	double surface_normal[3], surface_point_mm[3];
+	int cuts; /**< stretches with the blade in the tissue */
+	double depth_max_mm, force_max_N;
+};
+
+/**
+ * Open a recording for reading. Where NAME.rec is absent but NAME.rec.part was left by a
+ * crash or a full disk, that one is opened.
+ *
+ * @return recording, to be closed with incise_recording_close(); NULL with errno ENOENT,
+ *         EINVAL (no recording, a damaged one, or of a newer version), EIO, ENOMEM.
+ */
+INCISE_API struct incise_recording *incise_recording_open(const char *path,
+							  struct incise_error *err);
+INCISE_API void incise_recording_close(struct incise_recording *recording);
+
+/** @return 0, -EINVAL (a row that cannot be), -EIO. */
+INCISE_API int incise_recording_info(struct incise_recording *recording,
+				     struct incise_recording_info *info,
+				     struct incise_error *err);
+
+/** How to export. */
+struct incise_export_options {
+	double rate_hz; /**< rows per second of raw export, averaged over the force samples
+			     they stand for; 0: every force sample */
+	int depth_bins; /**< 0: raw; else averaged over depth_bins × velocity_bins */
+	int velocity_bins;
+	double depth_max_mm; /**< upper end of the bins; 0: the largest in the data */
+	double velocity_max_mm_s;
+	bool by_cut;   /**< average each cut by itself, giving a cut column */
+	int min_count; /**< bins with fewer force samples are left out; default 50 */
+};
+
+INCISE_API void incise_export_options_init(struct incise_export_options *options);
+
+/** What was exported. */
+struct incise_export_report {
+	uint64_t rows;
+	int cuts;
+	uint64_t
+		clipped; /**< force samples at either end of the converter, left out of averages */
+	double depth_max_mm, velocity_max_mm_s;
+};
+
+/**
+ * Write the cuts of some recordings as CSV. Raw: cut,t_s,depth_mm,velocity_mm_s,force_N,
+ * clipped. Averaged: [cut,]depth_mm,velocity_mm_s,force_N,sd_N,count,cuts. Depth and
+ * velocity are interpolated at the times of the force samples.
+ *
+ * @param recordings n of them
+ * @param out        stream to write to
+ * @param report     or NULL
+ * @return 0; -ENODATA (no cut in any recording), -EINVAL, -EIO, -ENOSPC, -ENOMEM.
+ */
+INCISE_API int incise_export_csv(struct incise_recording *const *recordings, int n,
+				 const struct incise_export_options *options, FILE *out,
+				 struct incise_export_report *report,
+				 struct incise_error *err);
+
+INCISE_END_DECLS
+#endif

@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * A rig: the devices that stand on one table, with their common clock, as rig.conf names
+ * them. Each device is a string, `BACKEND:ARGUMENTS`; `sim:` is the virtual rig.
+ *
+ *     clock   = "real";          # or "simulated"
+ *     tracker = "sim:";
+ *     force   = "sim:";
+ *     camera  = "sim:";
+ *     stepper = "sim:";
+ *     surface = { point_mm = [0.0, 0.0, 0.0]; normal = [0.0, 0.0, 1.0]; };
+ *     sim     = { seed = 1; };   # see incise/sim.h
+ */
+#ifndef INCISE_RIG_H
+#define INCISE_RIG_H
+
+#include <incise/camera.h>
+#include <incise/clock.h>
+#include <incise/error.h>
+#include <incise/export.h>
+#include <incise/force.h>
+#include <incise/stepper.h>
+#include <incise/tracker.h>
+
+INCISE_BEGIN_DECLS
+
+struct incise_rig;
+struct incise_sim;
+
+/** Kinds of devices, as bits. */
+enum incise_rig_device {
+	INCISE_RIG_TRACKER = 1,
+	INCISE_RIG_FORCE = 2,
+	INCISE_RIG_CAMERA = 4,
+	INCISE_RIG_STEPPER = 8,
+};
+
+/**
+ * Open a rig.
+ *
+ * @param spec    path of a rig.conf, or "sim:KEY=VALUE,…" for a virtual rig with the
+ *                scalar keys of the `sim` group and `clock`; "sim:" for its defaults
+ * @param devices incise_rig_device bits: the only ones that are opened
+ * @return rig, to be closed with incise_rig_close(); NULL with errno of fopen(3), EINVAL
+ *         (syntax, unknown key, value out of range: file and line are named), ENODEV (a
+ *         device that the file does not name, or a backend that does not exist), ENOMEM.
+ */
+INCISE_API struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
+					      struct incise_error *err);
+
+INCISE_API void incise_rig_close(struct incise_rig *rig);
+
+/** What was given as @spec. */
+INCISE_API const char *incise_rig_spec(const struct incise_rig *rig);
+
+/** The rig's clock; owned by it. */
+INCISE_API struct incise_clock *incise_rig_clock(struct incise_rig *rig);
+
+/** A device that was opened, else NULL; owned by the rig. */
+INCISE_API struct incise_tracker *incise_rig_tracker(struct incise_rig *rig);
+INCISE_API struct incise_force *incise_rig_force(struct incise_rig *rig);
+INCISE_API struct incise_camera *incise_rig_camera(struct incise_rig *rig);
+INCISE_API struct incise_stepper *incise_rig_stepper(struct incise_rig *rig);
+
+/** The virtual rig behind the `sim:` devices, or NULL when there is none. */
+INCISE_API struct incise_sim *incise_rig_sim(struct incise_rig *rig);
+
+/** The tissue's surface: a point on it and the outward unit normal. */
+INCISE_API void incise_rig_surface(const struct incise_rig *rig, double point_mm[3],
+				   double normal[3]);
+
+INCISE_END_DECLS
+#endif

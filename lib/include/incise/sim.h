@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The virtual rig: a slab of liver with known truth, a surgeon who cuts it, and the
+ * devices that watch. For demos, tests and development. Deterministic by seed: the same
+ * configuration gives the same samples, in real and in simulated time.
+ *
+ * Frame: z is the outward normal of the surface, which lies at z = 0; the cut runs along
+ * +x from the fixed end at x = 0 towards the free end. Depth is -z of the blade's tip.
+ */
+#ifndef INCISE_SIM_H
+#define INCISE_SIM_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <incise/clock.h>
+#include <incise/error.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+#define INCISE_SIM_DEPTHS_MAX 8
+
+/**
+ * Everything that can be set. The names are the keys of the `sim` group in rig.conf.
+ * incise_sim_config_init() gives the defaults named here.
+ */
+struct incise_sim_config {
+	uint64_t seed; /**< 1 */
+
+	/* The surgeon: a list of cuts, each nominal depth repeated, then rest. */
+	int n_depths;				/**< 4 */
+	double depth_mm[INCISE_SIM_DEPTHS_MAX]; /**< 5 10 15 20 (paper 1) */
+	int times[INCISE_SIM_DEPTHS_MAX];	/**< 3 4 4 3 */
+	double cut_s;				/**< 8; duration of one cut */
+	double pause_s;	    /**< 1; in the air before each cut and after the last */
+	double speed_mm_s;  /**< 25; mean speed along the cut */
+	double speed_swing; /**< 0.9; relative amplitude of its variation, 0 … 0.95 */
+
+	/* The tissue: F(d, v) = (e1 d + e2 d²) (1 + c v/(v + v0)), times tooth and bound. */
+	double elastic1_N_mm;  /**< 0.045; e1 */
+	double elastic2_N_mm2; /**< 0.0028; e2 */
+	double viscous;	       /**< 0.35; c */
+	double viscous_mm_s;   /**< 15; v0 */
+	double tooth;	       /**< 0.2; saw-tooth amplitude, relative; 0 … 0.9 */
+	double tooth_mm;       /**< 1.5; mean path between fractures */
+	double boundary;       /**< 0.1; sd of the factor between cuts; its drift along
+				       the slab has the same size */
+
+	/* Tracker. */
+	double tracker_hz;	   /**< 120 */
+	double tracker_noise_mm;   /**< 0.02; sd per axis */
+	double tracker_latency_ms; /**< 4.2 */
+	double tracker_jitter_ms;  /**< 0.2; sd of extra latency, never negative */
+	double tracker_drift_ppm;  /**< 50; its clock runs this much fast */
+
+	/* Force channel. */
+	double force_hz;       /**< 10000 */
+	double force_mV_N;     /**< 1240 */
+	double force_zero_mV;  /**< 180; offset of the bridge times gain */
+	double force_noise_mV; /**< 3; sd */
+
+	/* Camera. */
+	double camera_hz;    /**< 50 */
+	double camera_mm_px; /**< 0.11875 = 47.5 mm / 400 px */
+
+	/* Actuator: see incise/stepper.h. */
+	double spring_N_mm;	  /**< 2 */
+	double lead_mm;		  /**< 2; per turn */
+	int steps_per_turn;	  /**< 3200; microsteps */
+	double travel_mm;	  /**< 20 */
+	double screw_mm_s;	  /**< 30; largest speed of the nut */
+	double screw_mm_s2;	  /**< 3000; largest acceleration */
+	double handle_kg;	  /**< 0.05; moved by the spring */
+	double handle_friction_N; /**< 0.01; Coulomb */
+	double hand_N_mm;	  /**< 1; stiffness of the hand's grip */
+	double hand_N_s_mm;	  /**< 0.01; damping of the hand's grip */
+};
+
+/** What is true at one instant, which no device shows undisturbed. */
+struct incise_sim_truth {
+	int64_t t_ns;
+	int cut;	       /**< 0 … of the cut under way, -1 between cuts */
+	double position_mm[3]; /**< tip of the blade */
+	double quaternion[4];  /**< w first */
+	double depth_mm;       /**< ≥ 0; 0 in the air */
+	double velocity_mm_s;  /**< speed of the tip */
+	double force_N;	       /**< on the blade, saw-tooth and boundary included */
+};
+
+struct incise_sim;
+
+INCISE_API void incise_sim_config_init(struct incise_sim_config *config);
+
+/**
+ * Make a virtual rig; time 0 of its script is the clock's time at this call.
+ *
+ * @return sim, to be freed with incise_sim_free() after the devices that use it; NULL
+ *         with errno EINVAL (a value out of range: the message names key and range), ENOMEM.
+ */
+INCISE_API struct incise_sim *incise_sim_new(const struct incise_sim_config *config,
+					     struct incise_clock *clock,
+					     struct incise_error *err);
+
+INCISE_API void incise_sim_free(struct incise_sim *sim);
+
+/** The configuration in use; owned by @sim. */
+INCISE_API const struct incise_sim_config *incise_sim_config(
+	const struct incise_sim *sim);
+
+/** Length of the script: all cuts with their pauses, ns. */
+INCISE_API int64_t incise_sim_duration(const struct incise_sim *sim);
+
+/** The truth at the clock's present time. */
+INCISE_API void incise_sim_truth(struct incise_sim *sim, struct incise_sim_truth *truth);
+
+/** Force without saw-tooth and boundary effect: what a model can at best learn. */
+INCISE_API double incise_sim_mean_force(const struct incise_sim_config *config,
+					double depth_mm, double velocity_mm_s);
+
+INCISE_END_DECLS
+#endif

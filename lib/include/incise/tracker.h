@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Position and orientation of the scalpel, from a magnetic tracker.
+ */
+#ifndef INCISE_TRACKER_H
+#define INCISE_TRACKER_H
+
+#include <stdint.h>
+#include <incise/error.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+/** One record of one station. */
+struct incise_tracker_sample {
+	int64_t t_ns; /**< arrival at the host; acquisition is latency_ns earlier */
+	uint64_t seq; /**< counts from 0; a gap is a lost record */
+	double position_mm[3]; /**< tip of the blade, in the tracker's frame */
+	double quaternion[4];  /**< unit, w first; rotates the scalpel's frame into it */
+	char status;	       /**< the device's error character, ' ' when all is well */
+};
+
+/** What a tracker says of itself. */
+struct incise_tracker_info {
+	char name[64];
+	double rate_hz;	    /**< nominal */
+	int64_t latency_ns; /**< nominal, acquisition to arrival */
+};
+
+struct incise_tracker;
+
+/**
+ * Take records that have arrived, without waiting.
+ *
+ * @param samples room for @n records, oldest first
+ * @return how many were taken, 0 … n; -EIO, -ENODEV (unplugged). Real-time safe for the
+ *         virtual rig; a real backend says so itself.
+ */
+INCISE_API int incise_tracker_read(struct incise_tracker *tracker,
+				   struct incise_tracker_sample *samples, int n);
+
+INCISE_API void incise_tracker_info(const struct incise_tracker *tracker,
+				    struct incise_tracker_info *info);
+
+/** Records lost so far, in the device or for want of room. */
+INCISE_API uint64_t incise_tracker_lost(const struct incise_tracker *tracker);
+
+INCISE_END_DECLS
+#endif

@@ -1,0 +1,129 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Learning a model from data: Jang's ANFIS hybrid rule (paper 1, §4.3), and the
+ * baselines it has to beat. Part of libincise-learn.
+ *
+ * Data are plain arrays, row by row: n_inputs inputs, then the output.
+ */
+#ifndef INCISE_TRAIN_H
+#define INCISE_TRAIN_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stddef.h>
+#include <incise/error.h>
+#include <incise/export.h>
+#include <incise/model.h>
+
+INCISE_BEGIN_DECLS
+
+/** Rows of inputs and output, row-major, n × (n_inputs + 1); not owned. */
+struct incise_pairs {
+	const double *rows;
+	size_t n;
+	int n_inputs;
+};
+
+/** Called after each epoch with the epoch (from 1) and the RMSE; check is NaN without check data. */
+typedef void (*incise_train_progress)(void *user, int epoch, double train_rmse,
+				      double check_rmse);
+
+struct incise_train_options {
+	int epochs;  /**< 1 …; default 80, the paper's */
+	double step; /**< initial step of the premises, default 0.01 */
+	/**
+	 * Ridge of the least squares: penalty ridge·Σp² on inputs scaled to [0, 1] and the
+	 * output to its standard deviation; NAN chooses it by cross-validation.
+	 * Ignored when classic.
+	 */
+	double ridge;
+	/**
+	 * As MATLAB does it: inputs unscaled, ridge 1e-6 (that is what recursive least
+	 * squares with S0 = 1e6 I amounts to), the best epoch by check error (by training
+	 * error without check data).
+	 */
+	bool classic;
+	/**
+	 * Group of each training pair (n ints), or NULL. Cross-validation leaves whole
+	 * groups out, because pairs of one cut are not independent.
+	 */
+	const int *groups;
+	uint64_t seed;			/**< of the folds */
+	incise_train_progress progress; /**< or NULL */
+	void *user;
+};
+
+/** What training did. */
+struct incise_train_report {
+	int epochs;	/**< run */
+	int best_epoch; /**< from 1: the one whose parameters were kept */
+	double ridge;	/**< used */
+	double train_rmse,
+		check_rmse; /**< of the kept parameters; check NaN without data */
+	double condition;   /**< of the scaled least-squares problem, ridge excluded */
+	int parameters;	    /**< linear + premise */
+	int rules_unfired; /**< rules whose firing strength never exceeds 0.05 in the data */
+};
+
+/** Defaults as documented above. */
+INCISE_API void incise_train_options_init(struct incise_train_options *options);
+
+/**
+ * Train the consequents and the membership functions of a grid model in place.
+ *
+ * The epochs, the ridge and everything else are chosen from the training pairs; check
+ * pairs take part only when @options->classic (as in MATLAB's anfis), where they choose
+ * the epoch. So in the default mode the check error is one on unseen data.
+ *
+ * @param model   initial premises; its ranges should cover the data
+ * @param check   or NULL
+ * @param report  or NULL
+ * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs), -ENODATA
+ *         (fewer pairs than consequent parameters), -EDOM (LAPACK failed),
+ *         -ENOMEM. On error the model is unchanged.
+ */
+INCISE_API int incise_train(struct incise_model *model, const struct incise_pairs *train,
+			    const struct incise_pairs *check,
+			    const struct incise_train_options *options,
+			    struct incise_train_report *report, struct incise_error *err);
+
+/** RMSE of a model over pairs; inputs are not clamped. */
+INCISE_API double incise_train_rmse(const struct incise_model *model,
+				    const struct incise_pairs *pairs);
+
+/** RMSE over @on of predictors fitted on @train. */
+struct incise_baselines {
+	double mean;   /**< the mean of the training outputs */
+	double linear; /**< linear regression with a constant */
+	double knn;    /**< mean of the k nearest, inputs scaled to unit variance */
+	int k;	       /**< chosen by leave-one-out over groups on the training pairs */
+};
+
+/**
+ * The predictors that a model must beat to be worth its rules.
+ *
+ * @param groups group of each training pair, or NULL
+ * @return 0, -EINVAL, -ENOMEM, -EDOM.
+ */
+INCISE_API int incise_baselines(const struct incise_pairs *train, const int *groups,
+				const struct incise_pairs *on,
+				struct incise_baselines *result,
+				struct incise_error *err);
+
+/**
+ * Choose which rows are kept back for checking: by whole groups where there are groups,
+ * else by single rows. The share of rows is met as nearly as groups allow; both sides
+ * keep at least one group.
+ *
+ * @param n       rows
+ * @param groups  group of each row, or NULL
+ * @param share   0 < share < 1
+ * @param seed    same seed, same split
+ * @param check   n results
+ * @return 0, -EINVAL (share, or fewer than two groups or rows), -ENOMEM.
+ */
+INCISE_API int incise_split(size_t n, const int *groups, double share, uint64_t seed,
+			    bool *check, struct incise_error *err);
+
+INCISE_END_DECLS
+#endif

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# install, uninstall, dist.
+
+headers := $(wildcard lib/include/incise/*.h)
+man_pages := $(wildcard man/*.[1-8])
+scenes := $(wildcard scenes/*.scene)
+
+# Every file that `install` makes, relative to nothing: uninstall removes just these.
+installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
+	$(foreach lib,$(libraries),$(addprefix $(libdir)/lib$(lib).so,.$(version) .$(soversion)) \
+		$(libdir)/lib$(lib).so) \
+	$(addprefix $(includedir)/incise/,$(notdir $(headers))) \
+	$(libdir)/pkgconfig/incise.pc \
+	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
+	$(addprefix $(datadir)/incise/scenes/,$(notdir $(scenes))) \
+	$(completiondir)/incise
+
+install: all ## install below $(DESTDIR)$(prefix)
+	$(INSTALL) -d $(addprefix $(DESTDIR),$(sort $(dir $(installed))))
+	$(INSTALL) -m 755 $(programs) $(DESTDIR)$(bindir)
+	for lib in $(libraries); do \
+		$(INSTALL) -m 644 $(O)/lib/lib$$lib.so.$(version) $(DESTDIR)$(libdir) && \
+		ln -sf lib$$lib.so.$(version) $(DESTDIR)$(libdir)/lib$$lib.so.$(soversion) && \
+		ln -sf lib$$lib.so.$(soversion) $(DESTDIR)$(libdir)/lib$$lib.so || exit 1; \
+	done
+	$(INSTALL) -m 644 $(headers) $(DESTDIR)$(includedir)/incise
+	$(INSTALL) -m 644 $(O)/incise.pc $(DESTDIR)$(libdir)/pkgconfig
+	for page in $(man_pages); do \
+		$(INSTALL) -m 644 $$page $(DESTDIR)$(mandir)/man$${page##*.} || exit 1; \
+	done
+	$(INSTALL) -m 644 $(scenes) $(DESTDIR)$(datadir)/incise/scenes
+	$(INSTALL) -m 644 tools/incise.bash $(DESTDIR)$(completiondir)/incise
+
+uninstall: ## remove what install installed
+	rm -f $(addprefix $(DESTDIR),$(installed))
+	for dir in $(includedir)/incise $(datadir)/incise/scenes $(datadir)/incise; do \
+		rmdir "$(DESTDIR)$$dir" 2>/dev/null || :; \
+	done
+
+dist: ## a tarball of the committed tree
+	@mkdir -p $(O)
+	git archive --prefix=incise-$(version)/ -o $(O)/incise-$(version).tar.gz HEAD
+	@echo $(O)/incise-$(version).tar.gz
+
+.PHONY: install uninstall dist

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# The shared objects.
+
+sources = $(sort $(foreach room,$(rooms_$1),$(wildcard lib/$(room)/*.c)))
+objects = $(patsubst %.c,$(O)/obj/%.o,$(call sources,$1))
+
+$(O)/obj/%.o: %.c
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
+
+# The integer core builds without any library and, where the compiler can be told so,
+# without floating-point registers: it will be linked into a kernel.
+fixed_cflags := -ffreestanding
+fixed_cflags += $(if $(filter x86_64-%,$(shell $(CC) -dumpmachine)),-mgeneral-regs-only)
+$(O)/obj/lib/fixed/%.o: cflags += $(fixed_cflags)
+
+define library
+pc_flags_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --cflags $$(pc_$1)))
+pc_libs_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1)))
+$$(call objects,$1): pc_cflags = $$(pc_flags_$1)
+
+$(O)/lib/lib$1.so.$(version): $$(call objects,$1) lib/lib$1.map \
+		$$(foreach lib,$$(needs_$1),$(O)/lib/lib$$(lib).so)
+	@mkdir -p $$(@D)
+	$$(CC) -shared -Wl,-soname,lib$1.so.$(soversion) -Wl,-z,defs -Wl,--as-needed \
+		-Wl,--version-script,lib/lib$1.map -Wl,-rpath,'$$$$ORIGIN' \
+		-L$(O)/lib $$(CFLAGS) $$(LDFLAGS) -o $$@ $$(call objects,$1) \
+		$$(addprefix -l,$$(needs_$1)) $$(pc_libs_$1) $$(libs_$1)
+
+$(O)/lib/lib$1.so.$(soversion): $(O)/lib/lib$1.so.$(version)
+	ln -sf $$(<F) $$@
+
+$(O)/lib/lib$1.so: $(O)/lib/lib$1.so.$(soversion)
+	ln -sf $$(<F) $$@
+
+libs: $(O)/lib/lib$1.so
+endef
+$(foreach lib,$(libraries),$(eval $(call library,$(lib))))
+
+# For unit tests, which reach into what the shared objects hide.
+$(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib)))
+	@mkdir -p $(@D)
+	@rm -f $@
+	$(AR) rcs $@ $^
+
+all_libs = $(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
+
+$(O)/incise.pc: mk/incise.pc.in Makefile lib/include/incise/version.h
+	@mkdir -p $(@D)
+	sed -e 's|@prefix@|$(prefix)|' -e 's|@libdir@|$(libdir)|' \
+		-e 's|@includedir@|$(includedir)|' -e 's|@version@|$(version)|' $< >$@
+
+.PHONY: libs

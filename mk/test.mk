@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# Tests. tests/unit/ROOM/NAME.c tests lib/ROOM/NAME.c; tests/cli runs the real programs.
+
+unit_sources := $(wildcard tests/unit/*/*.c)
+unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
+
+$(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
+		-Wno-missing-prototypes $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
+		-MMD -MP -MF $@.d $(LDFLAGS) -o $@ $< $(O)/lib/libincise-tests.a \
+		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm
+
+check: ## install what is missing, build, and run all tests
+	@mk/deps build check demo
+	+@$(MAKE) --no-print-directory all
+	+@$(MAKE) --no-print-directory check-unit check-cli check-sanitize check-style
+
+check-unit: $(unit_programs) ## unit tests
+	@tests/unit/run $(unit_programs)
+
+check-cli: all ## command-line tests of the real programs
+	INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli
+
+# The unit tests once more, on a build that stops at any bad access or undefined operation.
+sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all
+check-sanitize: ## unit tests under AddressSanitizer and UBSan
+	+@$(MAKE) --no-print-directory O=$(O)/sanitize CFLAGS="-O1 -g $(sanitize_flags)" \
+		LDFLAGS="$(sanitize_flags)" check-unit
+
+style_sources := $(shell find lib tools tests driver -name '*.[ch]' 2>/dev/null)
+check-style: ## the house's form: clang-format, an SPDX line in every file
+	@tests/style $(style_sources)
+
+.PHONY: check check-unit check-cli check-sanitize check-style

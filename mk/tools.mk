@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# The programs. They use public headers only, and find their libraries beside them, in
+# the build tree as after installation.
+
+programs := $(O)/bin/incise $(addprefix $(O)/bin/incise-,$(verbs))
+tool_shared := $(addprefix $(O)/obj/tools/,cli.o json.o)
+
+$(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
+
+extra_demo := $(O)/obj/tools/picture.o
+
+link_tool = $(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed -Wl,-rpath,'$$ORIGIN/../lib' \
+	-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $(filter %.o,$^) $1 \
+	$(shell $(PKG_CONFIG) --libs jansson) -lm
+
+define verb_program
+$(O)/bin/incise-$1: $(O)/obj/tools/incise-$1.o $$(extra_$1) $(tool_shared) \
+		$$(foreach lib,$$(uses_$1),$(O)/lib/lib$$(lib).so)
+	@mkdir -p $$(@D)
+	$$(call link_tool,$$(addprefix -l,$$(uses_$1)))
+endef
+$(foreach verb,$(verbs),$(eval $(call verb_program,$(verb))))
+
+$(O)/bin/incise: $(O)/obj/tools/incise.o $(tool_shared) $(O)/lib/libincise.so
+	@mkdir -p $(@D)
+	$(call link_tool,-lincise)
+
+tools: $(programs)
+
+DEMO ?= demo.out
+
+deps: ## install the packages that building, testing and the demo need
+	@mk/deps build check demo
+
+# The second make sees the packages that the first step brought.
+demo: ## walk paper 1 on the virtual rig; pictures and summary in demo.out/
+	@mk/deps build demo
+	+@$(MAKE) --no-print-directory all
+	$(O)/bin/incise demo -o $(DEMO) --force
+
+bench: ## measure error against run time on this machine
+	@mk/deps build
+	+@$(MAKE) --no-print-directory all
+	$(O)/bin/incise bench precision
+
+.PHONY: tools deps demo bench

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Real and simulated clocks.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <signal.h>
+#include <sys/time.h>
+#include <time.h>
+#include <incise/clock.h>
+
+static void test_simulated_time_stands_still(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_simulated(5);
+
+	assert_false(incise_clock_is_real(clock));
+	assert_int_equal(incise_clock_now(clock), 5);
+	assert_int_equal(incise_clock_wait_until(clock, 1000), 0);
+	assert_int_equal(incise_clock_now(clock), 1000);
+	/* Time does not go back. */
+	assert_int_equal(incise_clock_wait_until(clock, 10), 0);
+	assert_int_equal(incise_clock_now(clock), 1000);
+	incise_clock_free(clock);
+}
+
+static void test_real_time_is_monotonic_clock(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_real();
+	struct timespec before, after;
+	int64_t now;
+
+	assert_true(incise_clock_is_real(clock));
+	clock_gettime(CLOCK_MONOTONIC, &before);
+	now = incise_clock_now(clock);
+	clock_gettime(CLOCK_MONOTONIC, &after);
+	assert_true(now >= before.tv_sec * INCISE_NS_PER_S + before.tv_nsec);
+	assert_true(now <= after.tv_sec * INCISE_NS_PER_S + after.tv_nsec);
+	/* Waiting ends at the time or later, never before; the past does not wait. */
+	assert_int_equal(incise_clock_wait_until(clock, now + 2000000), 0);
+	assert_true(incise_clock_now(clock) >= now + 2000000);
+	assert_int_equal(incise_clock_wait_until(clock, now), 0);
+	assert_int_equal(incise_clock_wait_until(clock, -5), 0);
+	incise_clock_free(clock);
+}
+
+static void on_alarm(int number)
+{
+}
+
+static void test_a_signal_ends_the_wait(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_real();
+	/* Again every 5 ms, should the first one come before the wait has begun. */
+	struct itimerval soon = {{0, 5000}, {0, 5000}}, never = {{0, 0}, {0, 0}};
+	struct sigaction action = {.sa_handler = on_alarm};
+
+	sigaction(SIGALRM, &action, NULL);
+	setitimer(ITIMER_REAL, &soon, NULL);
+	assert_int_equal(incise_clock_wait_until(clock, incise_clock_now(clock) +
+								20 * INCISE_NS_PER_S),
+			 -EINTR);
+	setitimer(ITIMER_REAL, &never, NULL);
+	incise_clock_free(clock);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_simulated_time_stands_still),
+		cmocka_unit_test(test_real_time_is_monotonic_clock),
+		cmocka_unit_test(test_a_signal_ends_the_wait),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

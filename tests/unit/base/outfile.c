@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Files that appear whole or not at all.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <signal.h>
+#include <unistd.h>
+#include <incise/outfile.h>
+
+static char folder[] = "/tmp/incise-outfile-XXXXXX";
+static char path[64];
+
+static int set_up(void **state)
+{
+	strcpy(strrchr(folder, '-') + 1, "XXXXXX");
+	if (!mkdtemp(folder))
+		return -1;
+	snprintf(path, sizeof(path), "%s/file", folder);
+	return 0;
+}
+
+/* Names in the folder, hidden ones included. */
+static int entries(void)
+{
+	DIR *dir = opendir(folder);
+	int n = -2;
+
+	while (readdir(dir))
+		n++;
+	closedir(dir);
+	return n;
+}
+
+static int tear_down(void **state)
+{
+	char command[100];
+
+	snprintf(command, sizeof(command), "rm -rf %s", folder);
+	return system(command);
+}
+
+static const char *content(void)
+{
+	static char text[100];
+	FILE *file = fopen(path, "r");
+	size_t n;
+
+	if (!file)
+		return NULL;
+	n = fread(text, 1, sizeof(text) - 1, file);
+	text[n] = 0;
+	fclose(file);
+	return text;
+}
+
+static void test_appears_at_commit(void **state)
+{
+	struct incise_outfile *file = incise_outfile_open(path, NULL);
+	struct stat st;
+	mode_t mask = umask(0);
+
+	umask(mask);
+	assert_non_null(file);
+	fputs("whole", incise_outfile_stream(file));
+	fflush(incise_outfile_stream(file));
+	assert_null(content());
+	assert_int_equal(incise_outfile_commit(file, NULL), 0);
+	assert_string_equal(content(), "whole");
+	assert_int_equal(entries(), 1);
+	assert_int_equal(stat(path, &st), 0);
+	assert_int_equal(st.st_mode & 0777, 0666 & ~mask);
+}
+
+static void test_abort_keeps_the_old(void **state)
+{
+	struct incise_outfile *file;
+
+	file = incise_outfile_open(path, NULL);
+	fputs("old", incise_outfile_stream(file));
+	assert_int_equal(incise_outfile_commit(file, NULL), 0);
+	file = incise_outfile_open(path, NULL);
+	fputs("new", incise_outfile_stream(file));
+	incise_outfile_abort(file);
+	assert_string_equal(content(), "old");
+	assert_int_equal(entries(), 1);
+	file = incise_outfile_open(path, NULL);
+	fputs("newer", incise_outfile_stream(file));
+	assert_int_equal(incise_outfile_commit(file, NULL), 0);
+	assert_string_equal(content(), "newer");
+	assert_int_equal(entries(), 1);
+}
+
+/* kill -9 with half of it written: the old file stands, and nothing else. */
+static void test_killed_writer(void **state)
+{
+	struct incise_outfile *file = incise_outfile_open(path, NULL);
+	pid_t child;
+	int status;
+
+	fputs("old", incise_outfile_stream(file));
+	assert_int_equal(incise_outfile_commit(file, NULL), 0);
+	child = fork();
+	if (!child) {
+		file = incise_outfile_open(path, NULL);
+		fputs("half", incise_outfile_stream(file));
+		fflush(incise_outfile_stream(file));
+		raise(SIGKILL);
+	}
+	assert_int_equal(waitpid(child, &status, 0), child);
+	assert_true(WIFSIGNALED(status));
+	assert_string_equal(content(), "old");
+}
+
+/* A file size limit fails writes as a full disk does (EFBIG in place of ENOSPC). */
+static void test_failed_write(void **state)
+{
+	struct rlimit before, small;
+	struct incise_error err = {0};
+	struct incise_outfile *file = incise_outfile_open(path, NULL);
+	char block[4096] = {0};
+	int rc;
+
+	signal(SIGXFSZ, SIG_IGN);
+	getrlimit(RLIMIT_FSIZE, &before);
+	small = (struct rlimit){8192, before.rlim_max};
+	setrlimit(RLIMIT_FSIZE, &small);
+	for (int i = 0; i < 10; i++)
+		fwrite(block, 1, sizeof(block), incise_outfile_stream(file));
+	rc = incise_outfile_commit(file, &err);
+	setrlimit(RLIMIT_FSIZE, &before);
+	assert_true(rc < 0);
+	assert_non_null(strstr(err.text, "not written"));
+	assert_null(content());
+	assert_int_equal(entries(), 0);
+}
+
+static void test_refusals(void **state)
+{
+	static const struct {
+		const char *path;
+		int code;
+	} cases[] = {{"/nonexistent/x", ENOENT}, {"/tmp", EISDIR}, {"", ENOENT}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		assert_null(incise_outfile_open(cases[i].path, &err));
+		assert_int_equal(err.code, cases[i].code);
+	}
+}
+
+/* Devices and pipes are written in place: there is nothing to rename. */
+static void test_special_files(void **state)
+{
+	struct incise_error err = {0};
+	struct incise_outfile *file = incise_outfile_open("/dev/null", NULL);
+	struct stat st;
+
+	fputs("gone", incise_outfile_stream(file));
+	assert_int_equal(incise_outfile_commit(file, NULL), 0);
+	assert_int_equal(stat("/dev/null", &st), 0);
+	assert_true(S_ISCHR(st.st_mode));
+	file = incise_outfile_open("/dev/full", NULL);
+	fputs("lost", incise_outfile_stream(file));
+	assert_int_equal(incise_outfile_commit(file, &err), -ENOSPC);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(test_appears_at_commit, set_up,
+						tear_down),
+		cmocka_unit_test_setup_teardown(test_abort_keeps_the_old, set_up,
+						tear_down),
+		cmocka_unit_test_setup_teardown(test_killed_writer, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(test_failed_write, set_up, tear_down),
+		cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_special_files),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The habits that all verbs share; see cli.h.
+ */
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <incise/version.h>
+#include "cli.h"
+
+#define OPTIONS_MAX 40
+
+static const struct cli_verb *current;
+static bool status_line;
+
+volatile sig_atomic_t cli_stop;
+
+static void print_help(const struct cli_verb *verb)
+{
+	printf("Usage: incise %s %s\n\n%s\n\nOptions:\n", verb->name, verb->synopsis,
+	       verb->summary);
+	for (const struct cli_option *opt = verb->options; opt->name; opt++) {
+		char left[64];
+		const char *help = opt->help;
+
+		snprintf(left, sizeof(left), "  %c%c%s--%s%s%s",
+			 opt->id < CLI_LONG ? '-' : ' ',
+			 opt->id < CLI_LONG ? opt->id : ' ',
+			 opt->id < CLI_LONG ? ", " : "  ", opt->name, opt->arg ? " " : "",
+			 opt->arg ? opt->arg : "");
+		printf("%-30s", left);
+		if (strlen(left) >= 30)
+			printf("\n%-30s", "");
+		for (const char *c = help; *c; c++)
+			*c == '\n' ? printf("\n%-30s", "") : putchar(*c);
+		putchar('\n');
+	}
+	printf("  -h, --help                  show this\n"
+	       "  -V, --version               show the version\n");
+	if (verb->notes)
+		printf("\n%s\n", verb->notes);
+}
+
+int cli_next(const struct cli_verb *verb, int argc, char **argv)
+{
+	struct option longs[OPTIONS_MAX + 3] = {0};
+	char shorts[3 * OPTIONS_MAX + 8] = ":hV";
+	char *s = shorts + strlen(shorts);
+	int n = 0;
+	int id;
+
+	current = verb;
+	for (const struct cli_option *opt = verb->options; opt->name; opt++) {
+		if (n == OPTIONS_MAX)
+			abort();
+		longs[n++] = (struct option){opt->name,
+					     opt->arg ? required_argument : no_argument,
+					     NULL, opt->id};
+		if (opt->id < CLI_LONG) {
+			*s++ = opt->id;
+			if (opt->arg)
+				*s++ = ':';
+		}
+	}
+	longs[n++] = (struct option){"help", no_argument, NULL, 'h'};
+	longs[n++] = (struct option){"version", no_argument, NULL, 'V'};
+	opterr = 0;
+	id = getopt_long(argc, argv, shorts, longs, NULL);
+	switch (id) {
+	case 'h':
+		print_help(verb);
+		cli_finish();
+		exit(0);
+	case 'V':
+		printf("incise %s\n", incise_version());
+		cli_finish();
+		exit(0);
+	case ':':
+		cli_usage("option %s needs an argument", argv[optind - 1]);
+	case '?':
+		if (optopt && optopt < CLI_LONG && !strchr(shorts, optopt))
+			cli_usage("there is no option -%c", optopt);
+		cli_usage(
+			"option %s is not known, or was given an argument it does not take",
+			argv[optind - 1]);
+	}
+	return id;
+}
+
+static void say(const char *level, const char *fmt, va_list args)
+{
+	char text[700];
+
+	cli_progress_end();
+	vsnprintf(text, sizeof(text), fmt, args);
+	fflush(stdout);
+	fprintf(stderr, "incise%s%s: %s%s\n", current ? " " : "",
+		current ? current->name : "", level, text);
+}
+
+void cli_fail(const char *fmt, ...)
+{
+	va_list args;
+
+	va_start(args, fmt);
+	say("", fmt, args);
+	va_end(args);
+	exit(1);
+}
+
+void cli_fail_with(const struct incise_error *err)
+{
+	cli_fail("%s", err->text);
+}
+
+void cli_usage(const char *fmt, ...)
+{
+	va_list args;
+
+	va_start(args, fmt);
+	say("", fmt, args);
+	va_end(args);
+	fprintf(stderr, "Try 'incise %s --help'.\n", current ? current->name : "");
+	exit(2);
+}
+
+void cli_warn(const char *fmt, ...)
+{
+	va_list args;
+
+	va_start(args, fmt);
+	say("warning: ", fmt, args);
+	va_end(args);
+}
+
+double cli_number(const char *option, const char *text, double min, double max)
+{
+	char *end;
+	double value = strtod(text, &end);
+
+	if (end == text || *end || !isfinite(value))
+		cli_usage("--%s: '%s' is not a number", option, text);
+	if (value < min || value > max)
+		cli_usage("--%s: %s is not within %g to %g", option, text, min, max);
+	return value;
+}
+
+long cli_integer(const char *option, const char *text, long min, long max)
+{
+	char *end;
+	long value;
+
+	errno = 0;
+	value = strtol(text, &end, 10);
+	if (end == text || *end)
+		cli_usage("--%s: '%s' is not a whole number", option, text);
+	if (errno || value < min || value > max)
+		cli_usage("--%s: %s is not within %ld to %ld", option, text, min, max);
+	return value;
+}
+
+double cli_duration(const char *option, const char *text, double min, double max)
+{
+	static const struct {
+		const char *unit;
+		double s;
+	} units[] = {{"", 1}, {"s", 1}, {"ms", 1e-3}, {"min", 60}, {"h", 3600}};
+	char *end;
+	double value = strtod(text, &end);
+
+	for (size_t i = 0; i < sizeof(units) / sizeof(*units) && end != text; i++) {
+		if (strcmp(end, units[i].unit))
+			continue;
+		value *= units[i].s;
+		if (!(value >= min && value <= max))
+			cli_usage("--%s: %s is not within %g s to %g s", option, text,
+				  min, max);
+		return value;
+	}
+	cli_usage("--%s: '%s' is not a duration such as 10s, 500ms, 2min or 1h", option,
+		  text);
+}
+
+int cli_list(const char *option, char *text, char **items, int max)
+{
+	int n = 0;
+
+	for (char *save, *item = strtok_r(text, ",", &save); item;
+	     item = strtok_r(NULL, ",", &save)) {
+		if (n == max)
+			cli_usage("--%s: more than %d items", option, max);
+		items[n++] = item;
+	}
+	if (!n)
+		cli_usage("--%s: the list is empty", option);
+	return n;
+}
+
+const char *cli_rig(const char *given)
+{
+	static const char *const places[] = {"rig.conf", "/etc/incise/rig.conf"};
+
+	if (given)
+		return given;
+	for (size_t i = 0; i < sizeof(places) / sizeof(*places); i++)
+		if (!access(places[i], F_OK))
+			return places[i];
+	cli_fail(
+		"there is neither ./rig.conf nor /etc/incise/rig.conf; name the rig with "
+		"--rig FILE, or try the virtual one: --rig sim:");
+}
+
+void cli_progress(const char *fmt, ...)
+{
+	va_list args;
+
+	if (!isatty(STDERR_FILENO))
+		return;
+	fputs("\r\033[K", stderr);
+	va_start(args, fmt);
+	vfprintf(stderr, fmt, args);
+	va_end(args);
+	fflush(stderr);
+	status_line = true;
+}
+
+void cli_progress_end(void)
+{
+	if (status_line)
+		fputs("\r\033[K", stderr);
+	status_line = false;
+}
+
+static void on_signal(int number)
+{
+	cli_stop = number;
+}
+
+void cli_catch_signals(void)
+{
+	struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESETHAND};
+
+	sigaction(SIGINT, &action, NULL);
+	sigaction(SIGTERM, &action, NULL);
+	sigaction(SIGHUP, &action, NULL);
+}
+
+void cli_finish(void)
+{
+	cli_progress_end();
+	errno = 0;
+	if (!ferror(stdout) && !fflush(stdout))
+		return;
+	if (errno == EPIPE)
+		exit(1);
+	cli_fail("standard output: %s", strerror(errno ? errno : EIO));
+}

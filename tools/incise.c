@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise VERB …: runs incise-VERB, the one beside this program first, then the one on
+ * PATH, so that anyone can add a verb.
+ */
+#include <dirent.h>
+#include <errno.h>
+#include <libgen.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <incise/version.h>
+
+static const struct {
+	const char *name, *does;
+} verbs[] = {
+	{"capture", "record tracker and force channel in sync"},
+	{"export", "make a dataset of recordings, raw or averaged"},
+	{"train", "learn a fuzzy force model from a dataset"},
+	{"eval", "print the force of a model at given depth and velocity"},
+	{"info", "say what a recording or model holds"},
+	{"haptic", "run the real-time loop of a scene"},
+	{"bench", "measure error against run time"},
+	{"demo", "walk the whole path on the virtual rig"},
+};
+
+static void help(void)
+{
+	printf("Usage: incise VERB [ARGUMENTS]\n\n"
+	       "A toolkit for haptic cutting: record, model and render how tissue resists a "
+	       "scalpel.\n\nVerbs:\n");
+	for (size_t i = 0; i < sizeof(verbs) / sizeof(*verbs); i++)
+		printf("  %-10s %s\n", verbs[i].name, verbs[i].does);
+	printf("\n'incise VERB --help' lists a verb's options, 'incise help VERB' opens its "
+	       "manual.\n'incise demo' is a good start.\n");
+}
+
+/* The folder this program stands in. */
+static void own_folder(char *folder, size_t size)
+{
+	char path[PATH_MAX];
+	ssize_t n = readlink("/proc/self/exe", path, sizeof(path) - 1);
+
+	path[n > 0 ? n : 0] = 0;
+	snprintf(folder, size, "%s", dirname(path));
+}
+
+/* The manual page, from the source tree when this runs in a build tree. */
+static int manual(const char *verb)
+{
+	char folder[PATH_MAX];
+	char *name, *page;
+
+	own_folder(folder, sizeof(folder));
+	if (asprintf(&name, "incise%s%s", verb ? "-" : "", verb ? verb : "") < 0 ||
+	    asprintf(&page, "%s/../../man/%s.1", folder, name) < 0)
+		return 1;
+	if (!access(page, R_OK))
+		execlp("man", "man", page, (char *)NULL);
+	else
+		execlp("man", "man", name, (char *)NULL);
+	fprintf(stderr, "incise: man: %s; try 'incise %s --help'\n", strerror(errno),
+		verb ? verb : "");
+	return 1;
+}
+
+int main(int argc, char **argv)
+{
+	const char *verb = argv[1];
+	char folder[PATH_MAX], program[PATH_MAX + 80];
+
+	if (argc < 2) {
+		fprintf(stderr, "incise: which verb? 'incise --help' lists them\n");
+		return 2;
+	}
+	if (!strcmp(verb, "-h") || !strcmp(verb, "--help")) {
+		help();
+		return fflush(stdout) ? 1 : 0;
+	}
+	if (!strcmp(verb, "-V") || !strcmp(verb, "--version")) {
+		printf("incise %s\n", incise_version());
+		return fflush(stdout) ? 1 : 0;
+	}
+	if (!strcmp(verb, "help")) {
+		if (argc > 2)
+			return manual(argv[2]);
+		help();
+		return fflush(stdout) ? 1 : 0;
+	}
+	if (strchr(verb, '/') || *verb == '-' || strlen(verb) > 64) {
+		fprintf(stderr,
+			"incise: '%.64s' is no verb; 'incise --help' lists them\n", verb);
+		return 2;
+	}
+	own_folder(folder, sizeof(folder));
+	snprintf(program, sizeof(program), "%s/incise-%s", folder, verb);
+	execv(program, argv + 1);
+	snprintf(program, sizeof(program), "incise-%s", verb);
+	if (errno == ENOENT)
+		execvp(program, argv + 1);
+	if (errno == ENOENT) {
+		fprintf(stderr,
+			"incise: there is no verb '%s'; 'incise --help' lists them\n",
+			verb);
+		return 2;
+	}
+	fprintf(stderr, "incise: %s: %s\n", program, strerror(errno));
+	return 1;
+}

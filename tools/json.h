@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Reports as JSON: what --json prints. Numbers that are not finite become null.
+ */
+#ifndef INCISE_JSON_H
+#define INCISE_JSON_H
+
+#include <jansson.h>
+
+/* A real number, or null when it is not finite. */
+json_t *json_number(double value);
+
+/* {"NAME": value}, for the nested objects of a report. */
+json_t *json_one(const char *name, double value);
+
+/* Print one object to standard output and release it. */
+void json_print(json_t *object);
+
+#endif
