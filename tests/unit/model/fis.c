@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * .fis files: exact round trips, errors by line, and files that were tampered with.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <locale.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "paper_model.h"
+
+static char path[] = "/tmp/incise-fis-XXXXXX";
+
+static int set_up(void **state)
+{
+	int fd;
+
+	strcpy(strrchr(path, '-') + 1, "XXXXXX");
+	fd = mkstemp(path);
+	return fd < 0 ? -1 : close(fd);
+}
+
+static int tear_down(void **state)
+{
+	return unlink(path);
+}
+
+static void put(const char *text, size_t n)
+{
+	FILE *file = fopen(path, "w");
+
+	assert_int_equal(fwrite(text, 1, n, file), n);
+	assert_int_equal(fclose(file), 0);
+}
+
+static char *get(size_t *n)
+{
+	FILE *file = fopen(path, "r");
+	char *text = calloc(1, 65536);
+
+	*n = fread(text, 1, 65535, file);
+	fclose(file);
+	return text;
+}
+
+static void assert_same(const struct incise_model *a, const struct incise_model *b)
+{
+	assert_int_equal(incise_model_n_rules(a), incise_model_n_rules(b));
+	assert_string_equal(incise_model_name(a), incise_model_name(b));
+	for (int i = 0; i < 2; i++) {
+		assert_string_equal(incise_model_input(a, i)->name,
+				    incise_model_input(b, i)->name);
+		assert_true(incise_model_input(a, i)->min ==
+			    incise_model_input(b, i)->min);
+		assert_true(incise_model_input(a, i)->max ==
+			    incise_model_input(b, i)->max);
+		for (int k = 0; k < incise_model_n_mfs(a, i); k++) {
+			const struct incise_mf *f = incise_model_mf(a, i, k);
+			const struct incise_mf *g = incise_model_mf(b, i, k);
+
+			assert_int_equal(f->type, g->type);
+			assert_string_equal(f->name, g->name);
+			assert_memory_equal(f->p, g->p,
+					    (f->type == INCISE_MF_GAUSS ? 2 : 3) *
+						    sizeof(double));
+		}
+	}
+	for (int r = 0; r < incise_model_n_rules(a); r++)
+		assert_memory_equal(incise_model_consequent(a, r),
+				    incise_model_consequent(b, r), 3 * sizeof(double));
+}
+
+/* 17 digits carry every bit of a double. */
+static void test_round_trip_is_exact(void **state)
+{
+	for (int type = 0; type < 2; type++)
+		for (uint64_t seed = 1; seed < 10; seed++) {
+			struct incise_model *model =
+				paper_model(type, seed, 1e-9 * pow(1e3, seed));
+			struct incise_model *back;
+
+			paper_disturb(model, seed, 0.4);
+			incise_model_set_name(model, "pig's liver");
+			assert_int_equal(incise_model_save(model, path, NULL), 0);
+			back = incise_model_load(path, NULL);
+			assert_non_null(back);
+			/* A quote would end the name early: it is replaced. */
+			incise_model_set_name(model, "pig_s liver");
+			assert_same(model, back);
+			incise_model_free(model);
+			incise_model_free(back);
+		}
+}
+
+/* A program that has set a locale with a decimal comma writes and reads the same file. */
+static void test_locale_does_not_matter(void **state)
+{
+	static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8",
+					    "nb_NO.UTF-8"};
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1), *back;
+	const char *set = NULL;
+
+	for (size_t i = 0; i < 4 && !set; i++)
+		set = setlocale(LC_NUMERIC, names[i]);
+	if (!set) {
+		incise_model_free(model);
+		print_message("skipped: no locale with a decimal comma is installed\n");
+		skip();
+	}
+	assert_int_equal(incise_model_save(model, path, NULL), 0);
+	back = incise_model_load(path, NULL);
+	setlocale(LC_NUMERIC, "C");
+	assert_non_null(back);
+	assert_same(model, back);
+	incise_model_free(model);
+	incise_model_free(back);
+}
+
+/* As MATLAB writes it: other keys, comments, weights, constants, free rule lists. */
+static const char matlab[] =
+	"[System]\nName='tipper'\nType='sugeno'\nVersion=2.0\nNumInputs=2\nNumOutputs=1\n"
+	"NumRules=3\nAndMethod='prod'\nOrMethod='probor'\nImpMethod='prod'\nAggMethod='sum'\n"
+	"DefuzzMethod='wtaver'\n\n"
+	"[Input1]\nName='depth'\nRange=[0 10]\nNumMFs=2\n"
+	"MF1='low':'gaussmf',[2.5 0]\nMF2='high':'gbellmf',[2.5 2 10]\n\n"
+	"% a comment\n"
+	"[Input2]\r\nName='speed'\nRange=[-5 5]\nNumMFs=1\nMF1='any':'gaussmf',[4 0]\n\n"
+	"[Output1]\nName='force'\nRange=[0 30]\nNumMFs=2\n"
+	"MF1='weak':'constant',[3]\nMF2='strong':'linear',[1 2 0.5]\n\n"
+	"[Rules]\n1 1, 1 (1) : 1\n2 0, 2 (0.5) : 1\n0 1, 2 (1) : 1\n";
+
+static void test_matlab_file(void **state)
+{
+	struct incise_model *model;
+	const double x[] = {4, 1};
+	double low = exp(-16 / 12.5), high = 1 / (1 + pow(6 / 2.5, 4)),
+	       any = exp(-1 / 32.0);
+	double strong = 1 * 4 + 2 * 1 + 0.5;
+	double want = (low * any * 3 + 0.5 * high * strong + any * strong) /
+		      (low * any + 0.5 * high + any);
+
+	put(matlab, strlen(matlab));
+	model = incise_model_load(path, NULL);
+	assert_non_null(model);
+	assert_string_equal(incise_model_name(model), "tipper");
+	assert_true(fabs(incise_model_eval(model, x, NULL) - want) < 1e-14);
+	/* A second generation says the same. */
+	assert_int_equal(incise_model_save(model, path, NULL), 0);
+	incise_model_free(model);
+	model = incise_model_load(path, NULL);
+	assert_true(fabs(incise_model_eval(model, x, NULL) - want) < 1e-14);
+	incise_model_free(model);
+}
+
+/* Replace the first occurrence and load. */
+static void load_changed(const char *from, const char *to, struct incise_error *err)
+{
+	const char *at = strstr(matlab, from);
+	char text[2048];
+
+	assert_non_null(at);
+	snprintf(text, sizeof(text), "%.*s%s%s", (int)(at - matlab), matlab, to,
+		 at + strlen(from));
+	put(text, strlen(text));
+	*err = (struct incise_error){0};
+	assert_null(incise_model_load(path, err));
+}
+
+static void test_refusals_name_line_and_word(void **state)
+{
+	static const struct {
+		const char *from, *to;
+		int code, line;
+		const char *word;
+	} cases[] = {
+		{"'sugeno'", "'mamdani'", ENOTSUP, 3, "mamdani"},
+		{"'gbellmf'", "'pimf'", ENOTSUP, 19, "pimf"},
+		{"AndMethod='prod'", "AndMethod='min'", ENOTSUP, 8, "min"},
+		{"'wtaver'", "'wtsum'", ENOTSUP, 12, "wtsum"},
+		{"NumOutputs=1", "NumOutputs=2", E2BIG, 6, "NumOutputs"},
+		{"NumInputs=2", "NumInputs=9", E2BIG, 5, "NumInputs"},
+		{"NumRules=3", "NumRules=2", EINVAL, 38, "more rules"},
+		{"NumRules=3", "NumRules=4", EINVAL, 38, "truncated"},
+		{"[2.5 0]", "[2.5]", EINVAL, 18, "number 2"},
+		{"[2.5 0]", "[2.5 0 1]", EINVAL, 18, "expected ']'"},
+		{"[2.5 0]", "[0 0]", EINVAL, 18, "positive"},
+		{"[2.5 0]", "[nan 0]", EINVAL, 18, "not finite"},
+		{"[2.5 0]", "[2.5 1e999]", EINVAL, 18, "not finite"},
+		{"Range=[0 10]", "Range=[10 0]", EINVAL, 16, "smaller"},
+		{"1 1, 1 (1)", "1 2, 1 (1)", EINVAL, 36, "rule 1"},
+		{"1 1, 1 (1)", "1 -1, 1 (1)", ENOTSUP, 36, "not"},
+		{"1 1, 1 (1) : 1", "1 1, 1 (1) : 2", ENOTSUP, 36, "or"},
+		{"1 1, 1 (1)", "1 1, 7 (1)", EINVAL, 36, "consequent"},
+		{"(0.5)", "(1.5)", EINVAL, 37, "weight"},
+		{"MF1='any'", "MF3='any'", E2BIG, 26, "MF"},
+		{"[Output1]", "[Output2]", ENOTSUP, 28, "[Output2]"},
+		{"[Input2]", "[Input7]", EINVAL, 22, "NumInputs"},
+		{"'linear'", "'quadratic'", ENOTSUP, 33, "quadratic"},
+		{"[System]", "hello", EINVAL, 1, ".fis"},
+		{"NumMFs=2\nMF1='low'", "MF1='low'", EINVAL, 17, "before NumMFs"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err;
+		char where[40];
+
+		load_changed(cases[i].from, cases[i].to, &err);
+		snprintf(where, sizeof(where), ":%d: ", cases[i].line);
+		if (err.code != cases[i].code || !strstr(err.text, where) ||
+		    !strstr(err.text, cases[i].word))
+			fail_msg("%s → %s gave %d '%s'", cases[i].from, cases[i].to,
+				 err.code, err.text);
+	}
+}
+
+static void test_missing_file(void **state)
+{
+	struct incise_error err = {0};
+
+	assert_null(incise_model_load("/nonexistent/m.fis", &err));
+	assert_int_equal(err.code, ENOENT);
+	assert_non_null(strstr(err.text, "/nonexistent/m.fis"));
+}
+
+/* Cut anywhere but before the last line's end, a file is refused. */
+static void test_truncation(void **state)
+{
+	size_t n = strlen(matlab);
+
+	for (size_t k = 0; k + 1 < n; k++) {
+		put(matlab, k);
+		assert_null(incise_model_load(path, NULL));
+	}
+}
+
+/* Random damage is refused or gives a model that evaluates to a number; never worse. */
+static void test_random_damage(void **state)
+{
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 5, 3);
+	uint64_t seed = 42;
+	char *text, *copy;
+	size_t n;
+	int loaded = 0;
+
+	assert_int_equal(incise_model_save(model, path, NULL), 0);
+	incise_model_free(model);
+	text = get(&n);
+	copy = malloc(n);
+	for (int round = 0; round < 3000; round++) {
+		memcpy(copy, text, n);
+		for (int hit = 0; hit < 1 + round % 4; hit++) {
+			size_t at = (size_t)((paper_random(&seed) + 1) / 2 * (n - 1));
+
+			copy[at] = round % 2 ? (char)(paper_random(&seed) * 128)
+					     : text[(at * 7) % n];
+		}
+		put(copy, n);
+		model = incise_model_load(path, NULL);
+		if (!model)
+			continue;
+		loaded++;
+		assert_true(isfinite(incise_model_eval(model, (double[8]){5, 20}, NULL)));
+		incise_model_free(model);
+	}
+	/* Many hits land in digits and leave a model: both ways out were taken. */
+	assert_true(loaded > 0 && loaded < 3000);
+	free(copy);
+	free(text);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_round_trip_is_exact),
+		cmocka_unit_test(test_locale_does_not_matter),
+		cmocka_unit_test(test_matlab_file),
+		cmocka_unit_test(test_refusals_name_line_and_word),
+		cmocka_unit_test(test_missing_file),
+		cmocka_unit_test(test_truncation),
+		cmocka_unit_test(test_random_damage),
+	};
+
+	return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise eval MODEL.fis: reads lines of inputs (depth velocity), prints the force.
+ */
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/fixed.h>
+#include <incise/model.h>
+#include "cli.h"
+
+enum { OPT_ARITH = CLI_LONG, OPT_NO_CLAMP, OPT_GRID };
+
+static const struct cli_option options[] = {
+	{OPT_ARITH, "arith", "KIND", "double (default) or fixed"},
+	{OPT_NO_CLAMP, "no-clamp", NULL, "extrapolate outside the support (double only)"},
+	{OPT_GRID, "grid", "NxM",
+	 "evaluate on a grid over the support instead of reading;\n"
+	 "prints inputs and output, an empty line after each row"},
+	{0},
+};
+
+static const struct cli_verb verb = {
+	.name = "eval",
+	.synopsis = "MODEL.fis [FILE] [OPTIONS]",
+	.summary =
+		"Evaluate a model: one line of inputs in (depth_mm velocity_mm_s), one force "
+		"out.\nReads FILE, or standard input. Inputs outside the support are taken as "
+		"its\nnearest end, and counted in a warning.",
+	.options = options,
+	.notes = "Example:\n  echo '5 20' | incise eval liver.fis\n\n"
+		 "Exit: 0 evaluated, 1 failed, 2 bad usage. See incise-eval(1).",
+};
+
+struct evaluator {
+	struct incise_model *model;
+	struct incise_fixed *fixed; /* NULL: double */
+	unsigned long outside;
+};
+
+static double evaluate(struct evaluator *e, const double *x)
+{
+	unsigned int flags;
+	double y = incise_model_eval(e->model, x, &flags);
+
+	e->outside += flags & INCISE_MODEL_EXTRAPOLATED;
+	return e->fixed ? incise_fixed_eval_double(e->fixed, x) : y;
+}
+
+static void parse_line(const struct evaluator *e, const char *path, unsigned long line,
+		       char *text, double *x)
+{
+	int n = incise_model_n_inputs(e->model);
+	char *at = text;
+
+	for (int i = 0; i < n; i++) {
+		const char *name = incise_model_input(e->model, i)->name;
+		char *end;
+
+		at += strspn(at, " \t,;");
+		x[i] = strtod(at, &end);
+		if (end == at)
+			cli_fail(
+				"%s:%lu: column %d (%s): '%.20s' is not a number; a line needs "
+				"%d numbers",
+				path, line, i + 1, name, at, n);
+		if (!isfinite(x[i]))
+			cli_fail("%s:%lu: column %d (%s): %.*s is not finite", path, line,
+				 i + 1, name, (int)(end - at), at);
+		at = end;
+	}
+	if (at[strspn(at, " \t,;")])
+		cli_fail("%s:%lu: column %d: '%.20s': a line needs just %d numbers", path,
+			 line, n + 1, at + strspn(at, " \t,;"), n);
+}
+
+static void eval_stream(struct evaluator *e, FILE *in, const char *path)
+{
+	double x[INCISE_MODEL_INPUTS_MAX];
+	unsigned long line = 0;
+	char *text = NULL;
+	size_t size = 0;
+	ssize_t n;
+
+	while ((n = getline(&text, &size, in)) >= 0) {
+		line++;
+		while (n > 0 && strchr("\r\n", text[n - 1]))
+			text[--n] = 0;
+		if (!text[strspn(text, " \t")] || *text == '#')
+			continue;
+		parse_line(e, path, line, text, x);
+		printf("%.10g\n", evaluate(e, x));
+	}
+	if (ferror(in))
+		cli_fail("%s: %s", path, strerror(errno));
+	free(text);
+}
+
+static void eval_grid(struct evaluator *e, const char *size)
+{
+	const struct incise_variable *a = incise_model_input(e->model, 0);
+	const struct incise_variable *b = incise_model_input(e->model, 1);
+	int n, m, end = 0;
+
+	if (incise_model_n_inputs(e->model) != 2)
+		cli_fail("--grid needs a model of two inputs, this one has %d",
+			 incise_model_n_inputs(e->model));
+	if (sscanf(size, "%dx%d%n", &n, &m, &end) != 2 || size[end] || n < 2 || m < 2 ||
+	    n > 10000 || m > 10000)
+		cli_usage("--grid: '%s' is not NxM with 2 to 10000 each", size);
+	for (int i = 0; i < n; i++, putchar('\n'))
+		for (int j = 0; j < m; j++) {
+			/* Weighted so that both ends are met to the digit. */
+			double u = (double)i / (n - 1), v = (double)j / (m - 1);
+			double x[] = {a->min * (1 - u) + a->max * u,
+				      b->min * (1 - v) + b->max * v};
+
+			printf("%.10g %.10g %.10g\n", x[0], x[1], evaluate(e, x));
+		}
+}
+
+int main(int argc, char **argv)
+{
+	const char *arith = "double", *grid = NULL, *path = "-";
+	struct incise_error err = {0};
+	struct evaluator e = {0};
+	struct incise_fixed fixed;
+	bool clamp = true;
+	FILE *in;
+	int opt;
+
+	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+		switch (opt) {
+		case OPT_ARITH:
+			arith = optarg;
+			if (strcmp(arith, "double") && strcmp(arith, "fixed"))
+				cli_usage("--arith: '%s' is neither double nor fixed",
+					  arith);
+			break;
+		case OPT_NO_CLAMP:
+			clamp = false;
+			break;
+		case OPT_GRID:
+			grid = optarg;
+			break;
+		}
+	if (optind >= argc || argc - optind > 2)
+		cli_usage("expected a model and at most one file of inputs");
+	if (!clamp && !strcmp(arith, "fixed"))
+		cli_usage(
+			"--no-clamp needs --arith double: fixed point ends at the support");
+	if (argc - optind == 2)
+		path = argv[optind + 1];
+	e.model = incise_model_load(argv[optind], &err);
+	if (!e.model)
+		cli_fail_with(&err);
+	incise_model_set_clamp(e.model, clamp);
+	if (!strcmp(arith, "fixed")) {
+		if (incise_fixed_compile(e.model, &fixed, &err))
+			cli_fail("%s: %s", argv[optind], err.text);
+		e.fixed = &fixed;
+	}
+	if (grid) {
+		eval_grid(&e, grid);
+	} else {
+		in = strcmp(path, "-") ? fopen(path, "re") : stdin;
+		if (!in)
+			cli_fail("%s: %s; give a file of lines 'depth velocity'", path,
+				 strerror(errno));
+		eval_stream(&e, in, strcmp(path, "-") ? path : "standard input");
+		if (in != stdin)
+			fclose(in);
+	}
+	cli_finish();
+	if (e.outside)
+		cli_warn("%lu inputs lay outside the model's support and were %s",
+			 e.outside, clamp ? "taken as its nearest end" : "extrapolated");
+	incise_model_free(e.model);
+	return 0;
+}
