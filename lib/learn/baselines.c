@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * What a model must beat: the mean, linear regression and k nearest neighbours; see
+ * incise/train.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <incise/train.h>
+#include "lsq.h"
+
+static const int ks[] = {1, 3, 5, 10, 20, 50};
+#define N_KS ((int)(sizeof(ks) / sizeof(*ks)))
+#define K_MAX 50
+
+/* Queries by which k is chosen: enough to tell ks apart, few enough to be quick. */
+#define CHOOSERS 2000
+
+struct column {
+	double mean, sd;
+};
+
+static void find_columns(const struct incise_pairs *pairs, struct column *columns)
+{
+	int width = pairs->n_inputs + 1;
+
+	for (int c = 0; c < width; c++) {
+		double mean = 0, sum = 0;
+
+		for (size_t n = 0; n < pairs->n; n++)
+			mean += pairs->rows[n * width + c] / pairs->n;
+		for (size_t n = 0; n < pairs->n; n++) {
+			double e = pairs->rows[n * width + c] - mean;
+
+			sum += e * e / pairs->n;
+		}
+		columns[c] = (struct column){mean, sum > 0 ? sqrt(sum) : 1};
+	}
+}
+
+static int linear_rmse(const struct incise_pairs *train, const struct incise_pairs *on,
+		       const struct column *columns, double *rmse)
+{
+	int d = train->n_inputs;
+	struct incise_lsq *lsq = incise_lsq_new(d + 1);
+	double p[INCISE_MODEL_INPUTS_MAX + 1], sum = 0;
+	int rc = lsq ? 0 : -ENOMEM;
+
+	for (size_t n = 0; n < train->n && !rc; n++) {
+		const double *x = train->rows + n * (d + 1);
+		double *row = incise_lsq_row(lsq);
+
+		for (int i = 0; i < d; i++)
+			row[i] = (x[i] - columns[i].mean) / columns[i].sd;
+		row[d] = 1;
+		rc = incise_lsq_add(lsq, (x[d] - columns[d].mean) / columns[d].sd);
+	}
+	/* Just enough ridge to be defined where inputs depend on each other. */
+	if (!rc)
+		rc = incise_lsq_solve(lsq, 1e-9 * train->n, p);
+	for (size_t n = 0; n < on->n && !rc; n++) {
+		const double *x = on->rows + n * (d + 1);
+		double e = p[d] - (x[d] - columns[d].mean) / columns[d].sd;
+
+		for (int i = 0; i < d; i++)
+			e += p[i] * (x[i] - columns[i].mean) / columns[i].sd;
+		sum += e * e / on->n;
+	}
+	*rmse = sqrt(sum) * columns[d].sd;
+	incise_lsq_free(lsq);
+	return rc;
+}
+
+/*
+ * Predictions of the output at x for all ks, from pairs of other groups (or rows) than
+ * the excluded one; a k larger than there are pairs takes them all.
+ */
+static void knn_predict(const struct incise_pairs *train, const int *groups,
+			const struct column *columns, const double *x, long excluded,
+			double *y)
+{
+	double near[K_MAX], value[K_MAX];
+	int width = train->n_inputs + 1, found = 0;
+
+	for (size_t n = 0; n < train->n; n++) {
+		const double *row = train->rows + n * width;
+		double distance = 0;
+		int i;
+
+		if (excluded >= 0 && excluded == (groups ? groups[n] : (long)n))
+			continue;
+		for (int c = 0; c < train->n_inputs; c++) {
+			double e = (row[c] - x[c]) / columns[c].sd;
+
+			distance += e * e;
+		}
+		if (found == K_MAX && distance >= near[K_MAX - 1])
+			continue;
+		found += found < K_MAX;
+		for (i = found - 1; i > 0 && near[i - 1] > distance; i--) {
+			near[i] = near[i - 1];
+			value[i] = value[i - 1];
+		}
+		near[i] = distance;
+		value[i] = row[train->n_inputs];
+	}
+	for (int i = 0; i < N_KS; i++) {
+		int k = ks[i] < found ? ks[i] : found;
+
+		y[i] = found ? 0 : columns[train->n_inputs].mean;
+		for (int j = 0; j < k; j++)
+			y[i] += value[j] / k;
+	}
+}
+
+/* Index of the k with the least error when each pair is predicted without its own group. */
+static int choose_k(const struct incise_pairs *train, const int *groups,
+		    const struct column *columns)
+{
+	int width = train->n_inputs + 1, best = 0;
+	size_t stride = train->n / CHOOSERS + 1;
+	double sum[N_KS] = {0}, y[N_KS];
+
+	for (size_t n = 0; n < train->n; n += stride) {
+		const double *x = train->rows + n * width;
+
+		knn_predict(train, groups, columns, x, groups ? groups[n] : (long)n, y);
+		for (int i = 0; i < N_KS; i++) {
+			double e = (y[i] - x[width - 1]) / columns[width - 1].sd;
+
+			sum[i] += e * e;
+		}
+	}
+	for (int i = 1; i < N_KS; i++)
+		if (sum[i] < sum[best])
+			best = i;
+	return best;
+}
+
+int incise_baselines(const struct incise_pairs *train, const int *groups,
+		     const struct incise_pairs *on, struct incise_baselines *result,
+		     struct incise_error *err)
+{
+	struct column columns[INCISE_MODEL_INPUTS_MAX + 1];
+	int d = train->n_inputs, best, rc;
+	double mean = 0, knn = 0, y[N_KS];
+
+	if (!train->n || !on->n || on->n_inputs != d || d > INCISE_MODEL_INPUTS_MAX)
+		return incise_error_set(err, EINVAL,
+					"baselines: no pairs, or pairs of "
+					"different width");
+	find_columns(train, columns);
+	rc = linear_rmse(train, on, columns, &result->linear);
+	if (rc)
+		return incise_error_set(err, -rc, "baselines: linear regression failed");
+	best = choose_k(train, groups, columns);
+	for (size_t n = 0; n < on->n; n++) {
+		const double *x = on->rows + n * (d + 1);
+		double e = (x[d] - columns[d].mean) / columns[d].sd;
+
+		mean += e * e / on->n;
+		/* A pair that was fitted on must not be its own neighbour. */
+		knn_predict(train, groups, columns, x,
+			    on->rows != train->rows ? -1
+			    : groups		    ? groups[n]
+						    : (long)n,
+			    y);
+		e = (x[d] - y[best]) / columns[d].sd;
+		knn += e * e / on->n;
+	}
+	result->mean = sqrt(mean) * columns[d].sd;
+	result->knn = sqrt(knn) * columns[d].sd;
+	result->k = ks[best];
+	return 0;
+}

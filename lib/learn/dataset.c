@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Reading CSV with named columns; see incise/dataset.h. An error names line and column.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/dataset.h>
+#include "../base/c_locale.h"
+
+#define FIELDS_MAX 256
+
+struct incise_dataset {
+	size_t rows, room;
+	int columns;
+	double *values; /* row by row */
+	int *group;	/* per row, or NULL */
+	int n_groups, group_room;
+	char **names; /* of groups */
+};
+
+struct reader {
+	FILE *file;
+	const char *path;
+	int line;
+	char *text;
+	size_t size;
+	char *field[FIELDS_MAX]; /* into text */
+	int n_fields;
+	struct incise_error *err;
+};
+
+static int fail(struct reader *in, int code, const char *fmt, ...) INCISE_PRINTF(3, 4);
+static int fail(struct reader *in, int code, const char *fmt, ...)
+{
+	char what[400];
+	va_list args;
+
+	va_start(args, fmt);
+	vsnprintf(what, sizeof(what), fmt, args);
+	va_end(args);
+	return incise_error_set(in->err, code, "%s:%d: %s", in->path, in->line, what);
+}
+
+/* The end of the field at *c; a quoted one ("" stands for ") is unquoted in place. */
+static int field_end(struct reader *in, char **c)
+{
+	char *from = *c + 1, *to = *c;
+
+	if (**c != '"') {
+		*c += strcspn(*c, ",");
+		return 0;
+	}
+	while (*from && (*from != '"' || from[1] == '"')) {
+		if (*from == '"')
+			from++;
+		*to++ = *from++;
+	}
+	if (*from != '"')
+		return fail(in, EINVAL, "field %d: a quote is not closed",
+			    in->n_fields + 1);
+	*to = 0;
+	*c = from + 1;
+	if (**c && **c != ',')
+		return fail(in, EINVAL, "field %d: text after the closing quote",
+			    in->n_fields + 1);
+	return 0;
+}
+
+/* Next row that is not empty or a comment: 1, or 0 at the end. */
+static int next_row(struct reader *in)
+{
+	ssize_t n;
+
+	while ((n = getline(&in->text, &in->size, in->file)) >= 0) {
+		char *c = in->text;
+
+		in->line++;
+		if (memchr(in->text, 0, n))
+			return fail(in, EINVAL, "a NUL byte: not a CSV file");
+		if (in->line == 1 && !strncmp(c, "\xef\xbb\xbf", 3))
+			c += 3;
+		while (n > 0 && (in->text[n - 1] == '\n' || in->text[n - 1] == '\r'))
+			in->text[--n] = 0;
+		if (!*c || *c == '#')
+			continue;
+		for (in->n_fields = 0;; c++) {
+			int rc;
+
+			if (in->n_fields == FIELDS_MAX)
+				return fail(in, E2BIG, "more than %d columns",
+					    FIELDS_MAX);
+			in->field[in->n_fields] = c;
+			rc = field_end(in, &c);
+			if (rc)
+				return rc;
+			in->n_fields++;
+			if (!*c)
+				return 1;
+			*c = 0;
+		}
+	}
+	if (ferror(in->file))
+		return fail(in, errno ? errno : EIO, "%s", strerror(errno ? errno : EIO));
+	return 0;
+}
+
+static int find_column(struct reader *in, const char *name)
+{
+	char list[300] = "";
+	size_t used = 0;
+
+	for (int i = 0; i < in->n_fields; i++)
+		if (!strcmp(in->field[i], name))
+			return i;
+	for (int i = 0; i < in->n_fields && used < sizeof(list); i++)
+		used += snprintf(list + used, sizeof(list) - used, "%s%s", i ? ", " : "",
+				 in->field[i]);
+	return fail(in, EINVAL, "there is no column '%s'; the columns are: %s", name,
+		    list);
+}
+
+static int number(struct reader *in, int field, const char *column, double *value)
+{
+	const char *text = in->field[field];
+	char *end;
+
+	*value = strtod(text, &end);
+	if (end == text || end[strspn(end, " \t")])
+		return fail(in, EINVAL, "column %d (%s): '%.40s' is not a number",
+			    field + 1, column, text);
+	if (!isfinite(*value))
+		return fail(
+			in, EINVAL,
+			"column %d (%s): %.40s is not finite; remove the row or mend it",
+			field + 1, column, text);
+	return 0;
+}
+
+/* Most rows belong to the group of the row before, or to the last few. */
+static int find_group(struct incise_dataset *data, const char *name)
+{
+	char **names;
+
+	for (int i = data->n_groups - 1; i >= 0; i--)
+		if (!strcmp(data->names[i], name))
+			return i;
+	if (data->n_groups == data->group_room) {
+		int room = data->group_room ? 2 * data->group_room : 64;
+
+		names = realloc(data->names, room * sizeof(*names));
+		if (!names)
+			return -ENOMEM;
+		data->names = names;
+		data->group_room = room;
+	}
+	data->names[data->n_groups] = strdup(name);
+	return data->names[data->n_groups] ? data->n_groups++ : -ENOMEM;
+}
+
+static int grow(struct incise_dataset *data, bool groups)
+{
+	size_t room = data->room ? 2 * data->room : 1024;
+	double *values = realloc(data->values, room * data->columns * sizeof(*values));
+	int *group;
+
+	if (!values)
+		return -ENOMEM;
+	data->values = values;
+	if (groups) {
+		group = realloc(data->group, room * sizeof(*group));
+		if (!group)
+			return -ENOMEM;
+		data->group = group;
+	}
+	data->room = room;
+	return 0;
+}
+
+static int read_rows(struct reader *in, const char *const *columns, const char *group,
+		     struct incise_dataset *data)
+{
+	int at[FIELDS_MAX], group_at = -1, rc;
+
+	rc = next_row(in);
+	if (rc < 0)
+		return rc;
+	if (!rc)
+		return fail(in, ENODATA,
+			    "the file is empty: expected a header row with "
+			    "column names");
+	for (int i = 0; i < data->columns; i++) {
+		at[i] = find_column(in, columns[i]);
+		if (at[i] < 0)
+			return at[i];
+	}
+	if (group) {
+		group_at = find_column(in, group);
+		if (group_at < 0)
+			return group_at;
+	}
+	rc = in->n_fields;
+	for (int header = rc; (rc = next_row(in)) > 0; data->rows++) {
+		if (in->n_fields != header)
+			return fail(in, EINVAL,
+				    "column %d: the row has %d fields, the header has %d",
+				    in->n_fields < header ? in->n_fields + 1 : header + 1,
+				    in->n_fields, header);
+		if (data->rows == data->room && grow(data, group))
+			return fail(in, ENOMEM, "no memory for more rows");
+		for (int i = 0; i < data->columns; i++) {
+			rc = number(in, at[i], columns[i],
+				    &data->values[data->rows * data->columns + i]);
+			if (rc)
+				return rc;
+		}
+		if (!group)
+			continue;
+		rc = find_group(data, in->field[group_at]);
+		if (rc < 0)
+			return fail(in, ENOMEM, "no memory for more groups");
+		data->group[data->rows] = rc;
+	}
+	if (!rc && !data->rows)
+		rc = fail(in, ENODATA, "there are no rows below the header");
+	return rc;
+}
+
+struct incise_dataset *incise_dataset_read(const char *path, const char *const *columns,
+					   int n, const char *group,
+					   struct incise_error *err)
+{
+	struct incise_dataset *data = calloc(1, sizeof(*data));
+	struct reader in = {.path = path, .err = err};
+	struct incise_c_locale locale;
+	int rc;
+
+	if (!data || n < 1 || n > FIELDS_MAX) {
+		incise_error_set(err, data ? EINVAL : ENOMEM,
+				 "%s: cannot read %d columns", path, n);
+		free(data);
+		return NULL;
+	}
+	data->columns = n;
+	in.file = strcmp(path, "-") ? fopen(path, "re") : stdin;
+	if (!in.file) {
+		incise_error_set(err, errno, "%s: %s; give a CSV file with a header row",
+				 path, strerror(errno));
+		free(data);
+		return NULL;
+	}
+	locale = incise_c_locale_begin();
+	rc = read_rows(&in, columns, group, data);
+	incise_c_locale_end(locale);
+	if (in.file != stdin)
+		fclose(in.file);
+	free(in.text);
+	if (rc < 0) {
+		incise_dataset_free(data);
+		errno = -rc;
+		return NULL;
+	}
+	return data;
+}
+
+void incise_dataset_free(struct incise_dataset *data)
+{
+	if (!data)
+		return;
+	for (int i = 0; i < data->n_groups; i++)
+		free(data->names[i]);
+	free(data->names);
+	free(data->group);
+	free(data->values);
+	free(data);
+}
+
+size_t incise_dataset_rows(const struct incise_dataset *data)
+{
+	return data->rows;
+}
+
+const double *incise_dataset_row(const struct incise_dataset *data, size_t row)
+{
+	return data->values + row * data->columns;
+}
+
+int incise_dataset_n_groups(const struct incise_dataset *data)
+{
+	return data->n_groups;
+}
+
+int incise_dataset_group(const struct incise_dataset *data, size_t row)
+{
+	return data->group ? data->group[row] : -1;
+}
+
+const char *incise_dataset_group_name(const struct incise_dataset *data, int group)
+{
+	return data->names[group];
+}

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Reading CSV: values, groups, and errors that name line and column.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <string.h>
+#include <incise/dataset.h>
+#include "../base/temp_file.h"
+
+static const char *const columns[] = {"force_N", "depth_mm"};
+
+static struct incise_dataset *read_text(const char *text, const char *group,
+					struct incise_error *err)
+{
+	struct temp_file file = temp_file_new("d.csv", text);
+	struct incise_dataset *data =
+		incise_dataset_read(file.path, columns, 2, group, err);
+
+	temp_file_free(&file);
+	return data;
+}
+
+static void test_values_in_the_order_asked_for(void **state)
+{
+	/* Byte-order mark, CR LF, comments, quotes, an empty line, no final newline. */
+	struct incise_dataset *data = read_text("\xef\xbb\xbf# liver\r\n"
+						"cut,depth_mm,other,force_N\r\n"
+						"\"a, \"\"1\"\"\",1.5,x,-2e-3\r\n"
+						"\r\n"
+						"b,2,y, 4 \n"
+						"\"a, \"\"1\"\"\",3,,5",
+						"cut", NULL);
+
+	assert_non_null(data);
+	assert_int_equal(incise_dataset_rows(data), 3);
+	assert_true(incise_dataset_row(data, 0)[0] == -2e-3);
+	assert_true(incise_dataset_row(data, 0)[1] == 1.5);
+	assert_true(incise_dataset_row(data, 2)[0] == 5);
+	assert_int_equal(incise_dataset_n_groups(data), 2);
+	assert_int_equal(incise_dataset_group(data, 0), 0);
+	assert_int_equal(incise_dataset_group(data, 1), 1);
+	assert_int_equal(incise_dataset_group(data, 2), 0);
+	assert_string_equal(incise_dataset_group_name(data, 0), "a, \"1\"");
+	incise_dataset_free(data);
+}
+
+static void test_without_groups(void **state)
+{
+	struct incise_dataset *data = read_text("depth_mm,force_N\n1,2\n", NULL, NULL);
+
+	assert_int_equal(incise_dataset_n_groups(data), 0);
+	assert_int_equal(incise_dataset_group(data, 0), -1);
+	incise_dataset_free(data);
+}
+
+/* More rows and groups than the first allocation has room for. */
+static void test_many_rows(void **state)
+{
+	static char text[200000];
+	size_t used = sprintf(text, "cut,depth_mm,force_N\n");
+	struct incise_dataset *data;
+
+	for (int i = 0; i < 5000; i++)
+		used += sprintf(text + used, "c%d,%d,%d\n", i / 10, i, -i);
+	data = read_text(text, "cut", NULL);
+	assert_int_equal(incise_dataset_rows(data), 5000);
+	assert_int_equal(incise_dataset_n_groups(data), 500);
+	for (int i = 0; i < 5000; i++) {
+		assert_true(incise_dataset_row(data, i)[0] == -i);
+		assert_true(incise_dataset_row(data, i)[1] == i);
+		assert_int_equal(incise_dataset_group(data, i), i / 10);
+	}
+	incise_dataset_free(data);
+}
+
+static void test_errors_say_where(void **state)
+{
+	static const struct {
+		const char *text, *group;
+		int code;
+		const char *says[2];
+	} cases[] = {
+		{"", NULL, ENODATA, {"d.csv", "empty"}},
+		{"# only a comment\n", NULL, ENODATA, {"d.csv", "empty"}},
+		{"depth_mm,force_N\n", NULL, ENODATA, {":1:", "no rows"}},
+		{"depth_mm,force\n1,2\n", NULL, EINVAL, {"'force_N'", "depth_mm, force"}},
+		{"depth_mm,force_N\n1,2\n",
+		 "cut",
+		 EINVAL,
+		 {"'cut'", "depth_mm, force_N"}},
+		{"depth_mm,force_N\n1,2\n3,four\n",
+		 NULL,
+		 EINVAL,
+		 {":3: column 2", "'four'"}},
+		{"depth_mm,force_N\n1,2\n3,4x\n", NULL, EINVAL, {":3: column 2", "'4x'"}},
+		{"depth_mm,force_N\n1,2\n,4\n",
+		 NULL,
+		 EINVAL,
+		 {":3: column 1", "not a number"}},
+		{"depth_mm,force_N\nnan,2\n",
+		 NULL,
+		 EINVAL,
+		 {":2: column 1", "not finite"}},
+		{"depth_mm,force_N\n1,-inf\n",
+		 NULL,
+		 EINVAL,
+		 {":2: column 2", "not finite"}},
+		{"depth_mm,force_N\n1,1e999\n",
+		 NULL,
+		 EINVAL,
+		 {":2: column 2", "not finite"}},
+		{"depth_mm,force_N\n1,2\n3\n",
+		 NULL,
+		 EINVAL,
+		 {":3: column 2", "1 fields"}},
+		{"depth_mm,force_N\n1,2,3\n", NULL, EINVAL, {":2: column 3", "3 fields"}},
+		{"depth_mm,force_N\n\"1,2\n", NULL, EINVAL, {":2:", "not closed"}},
+		{"depth_mm,force_N\n\"1\"2,3\n", NULL, EINVAL, {":2:", "closing quote"}},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		errno = 0;
+		assert_null(read_text(cases[i].text, cases[i].group, &err));
+		if (err.code != cases[i].code || errno != cases[i].code ||
+		    !strstr(err.text, cases[i].says[0]) ||
+		    !strstr(err.text, cases[i].says[1]))
+			fail_msg("case %zu gave %d '%s'", i, err.code, err.text);
+	}
+}
+
+static void test_missing_and_binary_files(void **state)
+{
+	struct incise_error err = {0};
+	struct temp_file file = temp_file_new("d.csv", "");
+	FILE *out = fopen(file.path, "w");
+
+	assert_null(incise_dataset_read("/nonexistent.csv", columns, 2, NULL, &err));
+	assert_int_equal(err.code, ENOENT);
+	fwrite("SQLite format 3\0\0\0", 1, 18, out);
+	fclose(out);
+	assert_null(incise_dataset_read(file.path, columns, 2, NULL, &err));
+	assert_int_equal(err.code, EINVAL);
+	assert_non_null(strstr(err.text, "NUL"));
+	assert_null(incise_dataset_read(file.dir, columns, 2, NULL, &err));
+	assert_int_equal(err.code, EISDIR);
+	temp_file_free(&file);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_values_in_the_order_asked_for),
+		cmocka_unit_test(test_without_groups),
+		cmocka_unit_test(test_many_rows),
+		cmocka_unit_test(test_errors_say_where),
+		cmocka_unit_test(test_missing_and_binary_files),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
