@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Strict reading of libconfig files; see conf.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include "conf.h"
+
+/* "sim.seed": the setting's name with those of the groups around it. */
+static void setting_name(const config_setting_t *setting, const char *key, char *name,
+			 size_t size)
+{
+	const char *own = setting ? config_setting_name(setting) : NULL;
+	size_t length = 0;
+
+	if (own) {
+		setting_name(config_setting_parent(setting), NULL, name, size);
+		length = strlen(name);
+		snprintf(name + length, size - length, "%s%s", length ? "." : "", own);
+	} else {
+		name[0] = '\0';
+	}
+	length = strlen(name);
+	if (key)
+		snprintf(name + length, size - length, "%s%s", length ? "." : "", key);
+}
+
+/* What a person wrote, as far as one line can show it. */
+static void setting_value(const config_setting_t *setting, char *text, size_t size)
+{
+	switch (config_setting_type(setting)) {
+	case CONFIG_TYPE_INT:
+	case CONFIG_TYPE_INT64:
+		snprintf(text, size, "%lld", config_setting_get_int64(setting));
+		break;
+	case CONFIG_TYPE_FLOAT:
+		snprintf(text, size, "%.10g", config_setting_get_float(setting));
+		break;
+	case CONFIG_TYPE_STRING:
+		snprintf(text, size, "\"%.40s\"", config_setting_get_string(setting));
+		break;
+	case CONFIG_TYPE_BOOL:
+		snprintf(text, size, "%s",
+			 config_setting_get_bool(setting) ? "true" : "false");
+		break;
+	case CONFIG_TYPE_GROUP:
+		snprintf(text, size, "a group");
+		break;
+	default:
+		snprintf(text, size, "%d values", config_setting_length(setting));
+		break;
+	}
+}
+
+static bool is_number(const config_setting_t *setting)
+{
+	int type = config_setting_type(setting);
+
+	return type == CONFIG_TYPE_INT || type == CONFIG_TYPE_INT64 ||
+	       type == CONFIG_TYPE_FLOAT;
+}
+
+static double number_of(const config_setting_t *setting)
+{
+	if (config_setting_type(setting) == CONFIG_TYPE_FLOAT)
+		return config_setting_get_float(setting);
+	return (double)config_setting_get_int64(setting);
+}
+
+/* An included file is named instead of the one that includes it. */
+static const char *file_of(const config_setting_t *setting, const char *path)
+{
+	const char *file = config_setting_source_file(setting);
+
+	return file ? file : path;
+}
+
+static int INCISE_PRINTF(5, 6)
+	setting_error(const config_setting_t *setting, const char *path, int code,
+		      struct incise_error *err, const char *fmt, ...)
+{
+	char name[120], found[64], expected[200];
+	va_list args;
+
+	va_start(args, fmt);
+	vsnprintf(expected, sizeof(expected), fmt, args);
+	va_end(args);
+	setting_name(setting, NULL, name, sizeof(name));
+	setting_value(setting, found, sizeof(found));
+	return incise_error_set(err, code,
+				"%.100s:%d: %s: expected %s, found %s; correct it",
+				file_of(setting, path),
+				config_setting_source_line(setting), name, expected,
+				found);
+}
+
+int incise_conf_read(config_t *config, const char *path, struct incise_error *err)
+{
+	struct stat st;
+	FILE *stream = fopen(path, "re");
+	int rc = 0;
+
+	/* fopen(3) takes folders, on which the parser would end the process. */
+	if (stream && !fstat(fileno(stream), &st) && S_ISDIR(st.st_mode)) {
+		fclose(stream);
+		stream = NULL;
+		errno = EISDIR;
+	}
+	if (!stream)
+		return incise_error_set(err, errno,
+					"%.200s: cannot be read: %s; give the path of a "
+					"configuration file",
+					path, strerror(errno));
+	config_init(config);
+	if (!config_read(config, stream)) {
+		const char *file = config_error_file(config);
+		const char *text = config_error_text(config);
+		bool syntax = !strcmp(text, "syntax error");
+
+		rc = incise_error_set(err, EINVAL, "%.200s:%d: %s%s; correct it",
+				      file ? file : path, config_error_line(config), text,
+				      syntax ? ": expected `key = value;`" : "");
+		config_destroy(config);
+	}
+	fclose(stream);
+	return rc;
+}
+
+int incise_conf_known(const config_setting_t *group, const char *path,
+		      const char *const *keys, struct incise_error *err)
+{
+	for (int i = 0; i < config_setting_length(group); i++) {
+		const config_setting_t *setting = config_setting_get_elem(group, i);
+		const char *own = config_setting_name(setting);
+		char name[120], known[240] = "";
+		size_t length = 0;
+		int found = 0;
+
+		for (const char *const *key = keys; *key; key++) {
+			found |= !strcmp(own, *key);
+			length += snprintf(known + length, sizeof(known) - length, "%s%s",
+					   key == keys ? "" : ", ", *key);
+			if (length >= sizeof(known))
+				length = sizeof(known) - 1;
+		}
+		if (found)
+			continue;
+		setting_name(setting, NULL, name, sizeof(name));
+		return incise_error_set(err, EINVAL,
+					"%.100s:%d: %s: unknown key; expected one of %s",
+					file_of(setting, path),
+					config_setting_source_line(setting), name, known);
+	}
+	return 0;
+}
+
+int incise_conf_number(const config_setting_t *group, const char *path, const char *key,
+		       double min, double max, double *value, struct incise_error *err)
+{
+	const config_setting_t *setting = config_setting_get_member(group, key);
+	double number;
+
+	if (!setting)
+		return 0;
+	if (!is_number(setting))
+		return setting_error(setting, path, EINVAL, err,
+				     "a number from %.10g to %.10g", min, max);
+	number = number_of(setting);
+	if (!(number >= min && number <= max))
+		return setting_error(setting, path, ERANGE, err,
+				     "a number from %.10g to %.10g", min, max);
+	*value = number;
+	return 0;
+}
+
+int incise_conf_string(const config_setting_t *group, const char *path, const char *key,
+		       const char **value, struct incise_error *err)
+{
+	const config_setting_t *setting = config_setting_get_member(group, key);
+
+	if (!setting)
+		return 0;
+	if (config_setting_type(setting) != CONFIG_TYPE_STRING)
+		return setting_error(setting, path, EINVAL, err, "text in quotes");
+	*value = config_setting_get_string(setting);
+	return 0;
+}
+
+/* Three finite numbers [x, y, z], if the key is there. */
+static int conf_vector(const config_setting_t *group, const char *path, const char *key,
+		       double value[3], struct incise_error *err)
+{
+	const config_setting_t *setting = config_setting_get_member(group, key);
+	double number[3];
+
+	if (!setting)
+		return 0;
+	if (!(config_setting_is_array(setting) || config_setting_is_list(setting)) ||
+	    config_setting_length(setting) != 3)
+		return setting_error(setting, path, EINVAL, err,
+				     "three numbers [x, y, z]");
+	for (int i = 0; i < 3; i++) {
+		const config_setting_t *element = config_setting_get_elem(setting, i);
+
+		if (!is_number(element) || !(fabs(number_of(element)) <= 1e6))
+			return setting_error(setting, path, EINVAL, err,
+					     "three numbers [x, y, z] of at most 1e6");
+		number[i] = number_of(element);
+	}
+	memcpy(value, number, sizeof(number));
+	return 0;
+}
+
+int incise_conf_surface(const config_setting_t *group, const char *path,
+			double point_mm[3], double normal[3], struct incise_error *err)
+{
+	static const char *const keys[] = {"point_mm", "normal", NULL};
+	const config_setting_t *surface = config_setting_get_member(group, "surface");
+	double unit[3] = {normal[0], normal[1], normal[2]};
+	double length;
+	int rc;
+
+	if (!surface)
+		return 0;
+	if (!config_setting_is_group(surface))
+		return setting_error(
+			surface, path, EINVAL, err,
+			"a group { point_mm = [x, y, z]; normal = [x, y, z]; }");
+	rc = incise_conf_known(surface, path, keys, err);
+	if (!rc)
+		rc = conf_vector(surface, path, "normal", unit, err);
+	if (rc)
+		return rc;
+	length = sqrt(unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2]);
+	/* Shorter than this, its direction is more rounding than intent. */
+	if (length < 1e-6) {
+		const config_setting_t *at = config_setting_get_member(surface, "normal");
+
+		return setting_error(at ? at : surface, path, ERANGE, err,
+				     "a normal of length 1e-6 or more");
+	}
+	rc = conf_vector(surface, path, "point_mm", point_mm, err);
+	if (rc)
+		return rc;
+	for (int i = 0; i < 3; i++)
+		normal[i] = unit[i] / length;
+	return 0;
+}

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Reading libconfig files strictly: every key is known, every number in its range, and
+ * an error names file and line. Used by rig.conf, *.scene and calibration.conf.
+ */
+#ifndef INCISE_CONF_H
+#define INCISE_CONF_H
+
+#include <libconfig.h>
+#include <incise/error.h>
+
+/* Parse a file. Returns 0 or a negative errno; on 0 the caller owes config_destroy(). */
+int incise_conf_read(config_t *config, const char *path, struct incise_error *err);
+
+/* Fail unless every key of the group is in the NULL-terminated list. */
+int incise_conf_known(const config_setting_t *group, const char *path,
+		      const char *const *keys, struct incise_error *err);
+
+/*
+ * Read a number if the key is there; integers are taken as numbers too. Returns 0 (value
+ * untouched when the key is absent), -EINVAL (no number), -ERANGE (outside min … max).
+ */
+int incise_conf_number(const config_setting_t *group, const char *path, const char *key,
+		       double min, double max, double *value, struct incise_error *err);
+
+/* Read a string if the key is there; it lives as long as the config. */
+int incise_conf_string(const config_setting_t *group, const char *path, const char *key,
+		       const char **value, struct incise_error *err);
+
+/*
+ * Read `point_mm` and `normal` of the group `surface` within @group, if it is there; the
+ * normal is made unit.
+ */
+int incise_conf_surface(const config_setting_t *group, const char *path,
+			double point_mm[3], double normal[3], struct incise_error *err);
+
+#endif

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A force channel, whatever stands behind it; see incise/force.h.
+ */
+#include "backend.h"
+
+int incise_force_read(struct incise_force *force, struct incise_force_sample *samples,
+		      int n)
+{
+	return force->ops->read(force, samples, n);
+}
+
+void incise_force_info(const struct incise_force *force, struct incise_force_info *info)
+{
+	force->ops->info(force, info);
+}
+
+uint64_t incise_force_lost(const struct incise_force *force)
+{
+	return force->ops->lost(force);
+}

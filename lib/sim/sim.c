@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The virtual rig's world, on which its devices stand; see incise/sim.h and world.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "sim.h"
+#include "world.h"
+
+#define NS 1e-9
+
+struct incise_sim *incise_sim_new(const struct incise_sim_config *config,
+				  struct incise_clock *clock, struct incise_error *err)
+{
+	struct incise_sim *sim;
+
+	if (incise_sim_config_check(config, err))
+		return NULL;
+	sim = calloc(1, sizeof(*sim));
+	if (!sim) {
+		incise_error_set(err, ENOMEM, "virtual rig: %s; free some memory",
+				 strerror(ENOMEM));
+		return NULL;
+	}
+	sim->config = *config;
+	sim->clock = clock;
+	sim->start_ns = incise_clock_now(clock);
+	incise_surgeon_init(&sim->surgeon, &sim->config);
+	incise_tissue_init(&sim->tissue, &sim->config);
+	incise_surgeon_blade(&sim->surgeon, 0, &sim->blade);
+	return sim;
+}
+
+void incise_sim_free(struct incise_sim *sim)
+{
+	free(sim);
+}
+
+const struct incise_sim_config *incise_sim_config(const struct incise_sim *sim)
+{
+	return &sim->config;
+}
+
+int64_t incise_sim_duration(const struct incise_sim *sim)
+{
+	return incise_surgeon_duration(&sim->surgeon);
+}
+
+void incise_sim_listen(struct incise_sim *sim, struct incise_sim_stream *stream)
+{
+	stream->next = sim->streams;
+	sim->streams = stream;
+}
+
+void incise_sim_unlisten(struct incise_sim *sim, struct incise_sim_stream *stream)
+{
+	struct incise_sim_stream **at = &sim->streams;
+
+	while (*at && *at != stream)
+		at = &(*at)->next;
+	if (*at)
+		*at = stream->next;
+}
+
+uint64_t incise_sim_first(const struct incise_sim *sim, double hz)
+{
+	uint64_t n = (uint64_t)(sim->t_ns * NS * hz);
+
+	/* The estimate may be one off to either side: start below and search. */
+	n -= n > 0;
+	while (incise_sim_time(n, hz) < sim->t_ns)
+		n++;
+	return n;
+}
+
+int64_t incise_sim_time(uint64_t n, double hz)
+{
+	return llround((double)n * (INCISE_NS_PER_S / hz));
+}
+
+void incise_sim_sense(const struct incise_sim *sim, int64_t t_ns,
+		      struct incise_blade *blade, double *force_N)
+{
+	if (t_ns == sim->t_ns)
+		*blade = sim->blade;
+	else
+		incise_surgeon_blade(&sim->surgeon, t_ns, blade);
+	*force_N = incise_tissue_force(&sim->tissue, blade, (t_ns - sim->t_ns) * NS);
+}
+
+void incise_sim_advance(struct incise_sim *sim)
+{
+	int64_t now = incise_clock_now(sim->clock) - sim->start_ns;
+
+	while (sim->t_ns + INCISE_SIM_TICK_NS <= now) {
+		int64_t next = sim->t_ns + INCISE_SIM_TICK_NS;
+
+		for (struct incise_sim_stream *s = sim->streams; s; s = s->next)
+			while (s->t_ns < next)
+				s->sample(s, sim);
+		incise_tissue_advance(&sim->tissue, &sim->blade, INCISE_SIM_TICK_NS * NS);
+		sim->t_ns = next;
+		incise_surgeon_blade(&sim->surgeon, next, &sim->blade);
+	}
+}
+
+void incise_sim_truth(struct incise_sim *sim, struct incise_sim_truth *truth)
+{
+	struct incise_blade blade;
+	double force_N;
+	int64_t now;
+
+	incise_sim_advance(sim);
+	/* On a real clock some time has passed; the tick reached is what can be told. */
+	now = incise_clock_now(sim->clock) - sim->start_ns;
+	if (now >= sim->t_ns + INCISE_SIM_TICK_NS)
+		now = sim->t_ns + INCISE_SIM_TICK_NS - 1;
+	incise_sim_sense(sim, now, &blade, &force_N);
+	*truth = (struct incise_sim_truth){
+		.t_ns = sim->start_ns + now,
+		.cut = blade.cut,
+		.depth_mm = blade.depth_mm,
+		.velocity_mm_s = blade.speed_mm_s,
+		.force_N = force_N,
+	};
+	memcpy(truth->position_mm, blade.position_mm, sizeof(truth->position_mm));
+	incise_surgeon_grip(&sim->surgeon, now, truth->quaternion);
+}

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The virtual rig's devices, for incise_rig_open(). Each belongs to the caller and must
+ * be closed before the sim is freed.
+ */
+#ifndef INCISE_SIM_DEVICES_H
+#define INCISE_SIM_DEVICES_H
+
+#include <incise/sim.h>
+#include "../device/backend.h"
+
+/* All return NULL with errno ENOMEM. */
+struct incise_tracker *incise_sim_tracker_new(struct incise_sim *sim);
+struct incise_force *incise_sim_force_new(struct incise_sim *sim);
+struct incise_camera *incise_sim_camera_new(struct incise_sim *sim);
+struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim);
+
+/*
+ * Set a key of the configuration from a number; arrays (depth_mm, times) take an index:
+ * "depth_mm[2]". Without one the protocol becomes that single depth.
+ * Returns 0, -ENOENT (no such key), -ERANGE (err says which range).
+ */
+int incise_sim_config_set(struct incise_sim_config *config, const char *key, double value,
+			  struct incise_error *err);
+
+/* Whether every value is within its range. Returns 0 or -EINVAL. */
+int incise_sim_config_check(const struct incise_sim_config *config,
+			    struct incise_error *err);
+
+/* True length of the scalpel in a picture of time t_ns (the clock's), pixels. */
+double incise_sim_camera_exposed_px(const struct incise_sim *sim, int64_t t_ns);
+
+#endif

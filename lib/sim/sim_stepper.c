@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The virtual actuator: a nut that follows targets within its limits, and a handle
+ * between its spring and the hand that grips it. Goes forward in ticks of 100 µs.
+ *
+ *      nut ─/\/\ spring /\/\─ handle ─/\/\ hand, damper /\/\─ standing still
+ *
+ * A target given at t acts from the first tick at or after t. Going to it:
+ *
+ *   speed   limit  ____________
+ *                 /            \         slopes: the largest acceleration
+ *           _____/              \_____
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include "sim.h"
+#include "world.h"
+
+#define NS 1e-9
+#define TICK_S (INCISE_SIM_TICK_NS * NS)
+#define DEADMAN_NS 100000000
+
+struct sim_stepper {
+	struct incise_stepper stepper;
+	struct incise_sim *sim;
+	int64_t t_ns;	/* script time that has been reached: a whole tick */
+	int64_t set_ns; /* of the last target */
+	unsigned int faults;
+	bool watched; /* by the deadman: from the first target on */
+	double step_mm;
+	long steps_max; /* whole microsteps in the travel */
+	double target_mm, nut_mm, nut_mm_s;
+	double handle_mm, handle_mm_s;
+};
+
+static struct sim_stepper *of_stepper(const struct incise_stepper *stepper)
+{
+	return (struct sim_stepper *)stepper;
+}
+
+/* Where the motor holds the nut: the nearest microstep within the travel. */
+static double nut_held(const struct sim_stepper *s)
+{
+	long steps = lround(s->nut_mm / s->step_mm);
+
+	return fmax(0, fmin(s->steps_max, steps)) * s->step_mm;
+}
+
+/*
+ * The fastest speed for the coming tick from which the nut comes to rest just at a
+ * distance, losing aT in each tick. With lengths in aT² and speeds in aT, n ticks cover
+ *
+ *     v + (v-1) + … + (v-n+1) = n·v - n(n-1)/2,    n - 1 ≤ v ≤ n
+ */
+static double stopping_speed(double distance, double a)
+{
+	double units = fabs(distance) / (a * TICK_S * TICK_S);
+	double n = fmax(1, ceil((sqrt(1 + 8 * units) - 1) / 2));
+
+	return copysign((units / n + (n - 1) / 2) * a * TICK_S, distance);
+}
+
+static void move_nut(struct sim_stepper *s)
+{
+	const struct incise_sim_config *config = &s->sim->config;
+	double change = config->screw_mm_s2 * TICK_S;
+	double v = stopping_speed(s->target_mm - s->nut_mm, config->screw_mm_s2);
+
+	v = fmax(-config->screw_mm_s, fmin(config->screw_mm_s, v));
+	v = fmax(s->nut_mm_s - change, fmin(s->nut_mm_s + change, v));
+	s->nut_mm += v * TICK_S;
+	s->nut_mm_s = v;
+}
+
+/*
+ * Implicit midpoint rule: its energy never grows by itself, however stiff the springs are,
+ * and friction, taken at the midpoint too, holds a handle that rests still.
+ */
+static void move_handle(struct sim_stepper *s, double nut_mm)
+{
+	const struct incise_sim_config *config = &s->sim->config;
+	double mass = config->handle_kg / 1000; /* N s²/mm */
+	double stiffness = config->spring_N_mm + config->hand_N_mm;
+	double push = 2 * mass / TICK_S * s->handle_mm_s - stiffness * s->handle_mm +
+		      config->spring_N_mm * nut_mm;
+	double middle;
+
+	if (fabs(push) <= config->handle_friction_N) {
+		s->handle_mm_s = 0;
+		return;
+	}
+	middle = (push - copysign(config->handle_friction_N, push)) /
+		 (2 * mass / TICK_S + stiffness * TICK_S / 2 + config->hand_N_s_mm);
+	s->handle_mm += middle * TICK_S;
+	s->handle_mm_s = 2 * middle - s->handle_mm_s;
+}
+
+static void advance(struct sim_stepper *s, int64_t now)
+{
+	while (s->t_ns + INCISE_SIM_TICK_NS <= now) {
+		double before = nut_held(s);
+
+		if (s->watched && s->t_ns - s->set_ns >= DEADMAN_NS) {
+			s->target_mm = 0;
+			s->faults |= INCISE_STEPPER_DEADMAN;
+		}
+		move_nut(s);
+		move_handle(s, (before + nut_held(s)) / 2);
+		s->t_ns += INCISE_SIM_TICK_NS;
+	}
+}
+
+static int64_t script_now(const struct sim_stepper *s)
+{
+	return incise_clock_now(s->sim->clock) - s->sim->start_ns;
+}
+
+static int sim_stepper_set(struct incise_stepper *stepper, double position_mm)
+{
+	struct sim_stepper *s = of_stepper(stepper);
+	double most = s->steps_max * s->step_mm;
+	int64_t now = script_now(s);
+
+	advance(s, now);
+	/* Neither a target nor a sign of life. */
+	if (!isfinite(position_mm))
+		return -EDOM;
+	s->faults = position_mm < 0 || position_mm > s->sim->config.travel_mm
+			    ? INCISE_STEPPER_TRAVEL
+			    : 0;
+	position_mm = fmax(0, fmin(most, position_mm));
+	s->target_mm = round(position_mm / s->step_mm) * s->step_mm;
+	s->set_ns = now;
+	s->watched = true;
+	return 0;
+}
+
+static int sim_stepper_status(struct incise_stepper *stepper,
+			      struct incise_stepper_status *status)
+{
+	struct sim_stepper *s = of_stepper(stepper);
+	double nut;
+
+	advance(s, script_now(s));
+	nut = nut_held(s);
+	*status = (struct incise_stepper_status){
+		.t_ns = s->sim->start_ns + s->t_ns,
+		.position_mm = nut,
+		.handle_mm = s->handle_mm,
+		.force_N = s->sim->config.spring_N_mm * (nut - s->handle_mm),
+		.faults = s->faults,
+	};
+	return 0;
+}
+
+static void sim_stepper_info(const struct incise_stepper *stepper,
+			     struct incise_stepper_info *info)
+{
+	const struct sim_stepper *s = of_stepper(stepper);
+	const struct incise_sim_config *config = &s->sim->config;
+
+	*info = (struct incise_stepper_info){
+		.spring_N_mm = config->spring_N_mm,
+		.travel_mm = config->travel_mm,
+		.step_mm = s->step_mm,
+		.velocity_mm_s = config->screw_mm_s,
+		.acceleration_mm_s2 = config->screw_mm_s2,
+	};
+	snprintf(info->name, sizeof(info->name), "virtual haptic scalpel");
+}
+
+static void sim_stepper_close(struct incise_stepper *stepper)
+{
+	free(of_stepper(stepper));
+}
+
+static const struct incise_stepper_ops ops = {
+	.set = sim_stepper_set,
+	.status = sim_stepper_status,
+	.info = sim_stepper_info,
+	.close = sim_stepper_close,
+};
+
+struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim)
+{
+	const struct incise_sim_config *config = &sim->config;
+	struct sim_stepper *s = calloc(1, sizeof(*s));
+
+	if (!s) {
+		errno = ENOMEM;
+		return NULL;
+	}
+	s->stepper.ops = &ops;
+	s->sim = sim;
+	s->step_mm = config->lead_mm / config->steps_per_turn;
+	/* A travel of whole steps must not lose one to the rounding of the division. */
+	s->steps_max = (long)(config->travel_mm / s->step_mm * (1 + 1e-12));
+	s->t_ns = script_now(s) / INCISE_SIM_TICK_NS * INCISE_SIM_TICK_NS;
+	return &s->stepper;
+}

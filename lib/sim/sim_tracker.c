@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The virtual magnetic tracker: tip position, mm, and attitude, with noise, a clock that
+ * drifts and a way to the host that takes its time.
+ *
+ *   acquisition   |           |           |        every 1 / (hz · (1 + drift))
+ *   arrival       '-latency-|~|           '-latency-|~~|   + a jitter ≥ 0
+ *
+ * A record carries its arrival and is there to be read from then on.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include "random.h"
+#include "sim.h"
+#include "world.h"
+
+/* Attitude noise, rad: FASTRAK's 0.025° static accuracy (paper 1, §2). */
+#define ATTITUDE_NOISE (0.025 * M_PI / 180)
+
+#define DRAWS 8 /* random numbers kept for one record: 3 position, 3 attitude, jitter */
+
+struct sim_tracker {
+	struct incise_tracker tracker;
+	struct incise_sim_stream stream;
+	struct incise_sim_ring ring;
+	struct incise_sim *sim;
+	uint64_t key;
+	double hz;	    /* true, by the host's clock */
+	uint64_t n, first;  /* next record by the world's count; where seq 0 is */
+	int64_t arrival_ns; /* of the last record */
+};
+
+static struct sim_tracker *of_tracker(const struct incise_tracker *tracker)
+{
+	return (struct sim_tracker *)tracker;
+}
+
+/* q = q · (1, r/2), made unit: a small turn in the scalpel's own frame. */
+static void turn(double q[4], const double r[3])
+{
+	double w = q[0], x = q[1], y = q[2], z = q[3];
+	double a = r[0] / 2, b = r[1] / 2, c = r[2] / 2;
+	double norm;
+
+	q[0] = w - x * a - y * b - z * c;
+	q[1] = x + w * a + y * c - z * b;
+	q[2] = y + w * b + z * a - x * c;
+	q[3] = z + w * c + x * b - y * a;
+	norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+	for (int i = 0; i < 4; i++)
+		q[i] /= norm;
+}
+
+static void sim_tracker_sample(struct incise_sim_stream *stream,
+			       const struct incise_sim *sim)
+{
+	struct sim_tracker *t =
+		(struct sim_tracker *)((char *)stream -
+				       offsetof(struct sim_tracker, stream));
+	const struct incise_sim_config *config = &sim->config;
+	struct incise_tracker_sample sample = {.status = ' '};
+	struct incise_blade blade;
+	double draw[7], shake[3], delay_ms;
+
+	for (int i = 0; i < 7; i++)
+		draw[i] = incise_random_normal(t->key, t->n * DRAWS + i);
+	incise_surgeon_blade(&sim->surgeon, stream->t_ns, &blade);
+	incise_surgeon_grip(&sim->surgeon, stream->t_ns, sample.quaternion);
+	for (int i = 0; i < 3; i++) {
+		sample.position_mm[i] =
+			blade.position_mm[i] + config->tracker_noise_mm * draw[i];
+		shake[i] = ATTITUDE_NOISE * draw[3 + i];
+	}
+	turn(sample.quaternion, shake);
+	delay_ms = config->tracker_latency_ms + config->tracker_jitter_ms * fabs(draw[6]);
+	sample.t_ns = sim->start_ns + stream->t_ns + llround(delay_ms * 1e6);
+	/* One wire: a record cannot overtake the one before it. */
+	if (sample.t_ns < t->arrival_ns)
+		sample.t_ns = t->arrival_ns;
+	t->arrival_ns = sample.t_ns;
+	sample.seq = t->n - t->first;
+	incise_sim_ring_push(&t->ring, &sample);
+	stream->t_ns = incise_sim_time(++t->n, t->hz);
+}
+
+static int sim_tracker_read(struct incise_tracker *tracker,
+			    struct incise_tracker_sample *samples, int n)
+{
+	struct sim_tracker *t = of_tracker(tracker);
+	const struct incise_tracker_sample *oldest;
+	int64_t now;
+	int taken = 0;
+
+	incise_sim_advance(t->sim);
+	now = incise_clock_now(t->sim->clock);
+	while (taken < n && (oldest = incise_sim_ring_peek(&t->ring)) &&
+	       oldest->t_ns <= now) {
+		samples[taken++] = *oldest;
+		incise_sim_ring_pop(&t->ring);
+	}
+	return taken;
+}
+
+static void sim_tracker_info(const struct incise_tracker *tracker,
+			     struct incise_tracker_info *info)
+{
+	const struct incise_sim_config *config = &of_tracker(tracker)->sim->config;
+
+	*info = (struct incise_tracker_info){
+		.rate_hz = config->tracker_hz,
+		.latency_ns = llround(config->tracker_latency_ms * 1e6),
+	};
+	snprintf(info->name, sizeof(info->name), "virtual tracker");
+}
+
+static uint64_t sim_tracker_lost(const struct incise_tracker *tracker)
+{
+	return of_tracker(tracker)->ring.lost;
+}
+
+static void sim_tracker_close(struct incise_tracker *tracker)
+{
+	struct sim_tracker *t = of_tracker(tracker);
+
+	incise_sim_unlisten(t->sim, &t->stream);
+	incise_sim_ring_free(&t->ring);
+	free(t);
+}
+
+static const struct incise_tracker_ops ops = {
+	.read = sim_tracker_read,
+	.info = sim_tracker_info,
+	.lost = sim_tracker_lost,
+	.close = sim_tracker_close,
+};
+
+struct incise_tracker *incise_sim_tracker_new(struct incise_sim *sim)
+{
+	const struct incise_sim_config *config = &sim->config;
+	double hz = config->tracker_hz * (1 + config->tracker_drift_ppm * 1e-6);
+	/* What is on its way needs room as well; no deviate exceeds 7 sd. */
+	double way_s =
+		(config->tracker_latency_ms + 7 * config->tracker_jitter_ms) * 1e-3;
+	struct sim_tracker *t = calloc(1, sizeof(*t));
+
+	if (!t || incise_sim_ring_init(&t->ring, sizeof(struct incise_tracker_sample), hz,
+				       way_s)) {
+		free(t);
+		errno = ENOMEM;
+		return NULL;
+	}
+	t->tracker.ops = &ops;
+	t->sim = sim;
+	t->key = incise_random_key(config->seed, INCISE_RANDOM_TRACKER);
+	t->hz = hz;
+	t->n = t->first = incise_sim_first(sim, hz);
+	t->stream.t_ns = incise_sim_time(t->n, hz);
+	t->stream.sample = sim_tracker_sample;
+	t->arrival_ns = INT64_MIN;
+	incise_sim_listen(sim, &t->stream);
+	return &t->tracker;
+}

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * lib/device/force.c: every call reaches the backend with its arguments, and what the
+ * backend says comes back.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include "../../../lib/device/backend.h"
+
+/* A backend that remembers what it was called with. */
+struct fake {
+	struct incise_force force;
+	struct incise_force_sample *samples;
+	int n;
+};
+
+static int fake_read(struct incise_force *force, struct incise_force_sample *samples,
+		     int n)
+{
+	struct fake *fake = (struct fake *)force;
+
+	fake->samples = samples;
+	fake->n = n;
+	return -EIO;
+}
+
+static void fake_info(const struct incise_force *force, struct incise_force_info *info)
+{
+	info->rate_hz = ((const struct fake *)force)->n;
+}
+
+static uint64_t fake_lost(const struct incise_force *force)
+{
+	return ((const struct fake *)force)->n * 10000000000ULL;
+}
+
+static void calls_reach_the_backend(void **state)
+{
+	static const struct incise_force_ops ops = {
+		.read = fake_read, .info = fake_info, .lost = fake_lost};
+	struct fake fake = {.force.ops = &ops};
+	struct incise_force_sample samples[3];
+	struct incise_force_info info = {0};
+
+	assert_int_equal(incise_force_read(&fake.force, samples, 3), -EIO);
+	assert_ptr_equal(fake.samples, samples);
+	assert_int_equal(fake.n, 3);
+	incise_force_info(&fake.force, &info);
+	assert_true(info.rate_hz == 3);
+	assert_true(incise_force_lost(&fake.force) == 30000000000ULL);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(calls_reach_the_backend),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * lib/sim/config.c: defaults, setting by name, ranges.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include "../../../lib/sim/sim.h"
+
+static void defaults_are_those_of_the_header(void **state)
+{
+	struct incise_sim_config c;
+
+	incise_sim_config_init(&c);
+	assert_int_equal(c.seed, 1);
+	assert_int_equal(c.n_depths, 4);
+	for (int i = 0; i < 4; i++) {
+		assert_true(c.depth_mm[i] == 5 * (i + 1));
+		assert_int_equal(c.times[i], i == 1 || i == 2 ? 4 : 3);
+	}
+	assert_true(c.cut_s == 8 && c.pause_s == 1 && c.speed_mm_s == 25);
+	assert_true(c.speed_swing == 0.9 && c.elastic1_N_mm == 0.045);
+	assert_true(c.elastic2_N_mm2 == 0.0028 && c.viscous == 0.35 &&
+		    c.viscous_mm_s == 15);
+	assert_true(c.tooth == 0.2 && c.tooth_mm == 1.5 && c.boundary == 0.1);
+	assert_true(c.tracker_hz == 120 && c.tracker_noise_mm == 0.02);
+	assert_true(c.tracker_latency_ms == 4.2 && c.tracker_jitter_ms == 0.2);
+	assert_true(c.tracker_drift_ppm == 50 && c.force_hz == 10000 &&
+		    c.force_mV_N == 1240);
+	assert_true(c.force_zero_mV == 180 && c.force_noise_mV == 3 && c.camera_hz == 50);
+	assert_true(c.camera_mm_px == 0.11875 && c.spring_N_mm == 2 && c.lead_mm == 2);
+	assert_int_equal(c.steps_per_turn, 3200);
+	assert_true(c.travel_mm == 20 && c.screw_mm_s == 30 && c.screw_mm_s2 == 3000);
+	assert_true(c.handle_kg == 0.05 && c.handle_friction_N == 0.01);
+	assert_true(c.hand_N_mm == 1 && c.hand_N_s_mm == 0.01);
+	assert_int_equal(incise_sim_config_check(&c, NULL), 0);
+}
+
+static void set_reaches_its_field(void **state)
+{
+	struct incise_sim_config c;
+
+	incise_sim_config_init(&c);
+	assert_int_equal(incise_sim_config_set(&c, "seed", 2147483647.0, NULL), 0);
+	assert_int_equal(c.seed, 2147483647u);
+	assert_int_equal(incise_sim_config_set(&c, "steps_per_turn", 400, NULL), 0);
+	assert_int_equal(c.steps_per_turn, 400);
+	assert_int_equal(incise_sim_config_set(&c, "hand_N_s_mm", 0.5, NULL), 0);
+	assert_true(c.hand_N_s_mm == 0.5);
+	assert_int_equal(incise_sim_config_set(&c, "depth_mm[4]", 3.5, NULL), 0);
+	assert_true(c.depth_mm[4] == 3.5);
+	assert_int_equal(c.n_depths, 5);
+	assert_int_equal(incise_sim_config_set(&c, "depth_mm", 7, NULL), 0);
+	assert_int_equal(incise_sim_config_set(&c, "times", 2, NULL), 0);
+	assert_true(c.depth_mm[0] == 7);
+	assert_int_equal(c.times[0], 2);
+	assert_int_equal(c.n_depths, 1);
+}
+
+static void set_refuses(void **state)
+{
+	static const struct {
+		const char *key;
+		double value;
+		int rc;
+		const char *text;
+	} row[] = {
+		{"sede", 1, -ENOENT, "sim.sede: unknown key; rig.conf(5) lists them"},
+		{"", 1, -ENOENT, "sim.: unknown key; rig.conf(5) lists them"},
+		{"n_depths", 1, -ENOENT,
+		 "sim.n_depths: unknown key; rig.conf(5) lists them"},
+		{"depth_mm[8]", 5, -ENOENT,
+		 "sim.depth_mm[8]: unknown key; rig.conf(5) lists them"},
+		{"depth_mm[-1]", 5, -ENOENT,
+		 "sim.depth_mm[-1]: unknown key; rig.conf(5) lists them"},
+		{"depth_mm[1", 5, -ENOENT,
+		 "sim.depth_mm[1: unknown key; rig.conf(5) lists them"},
+		{"cut_s[0]", 5, -ENOENT,
+		 "sim.cut_s[0]: unknown key; rig.conf(5) lists them"},
+		{"cut_s", 0.1, -ERANGE,
+		 "sim.cut_s: expected a number from 0.5 to 3600, found 0.1; correct it"},
+		{"cut_s", NAN, -ERANGE,
+		 "sim.cut_s: expected a number from 0.5 to 3600, found nan; correct it"},
+		{"cut_s", INFINITY, -ERANGE,
+		 "sim.cut_s: expected a number from 0.5 to 3600, found inf; correct it"},
+		{"times", 1.5, -ERANGE,
+		 "sim.times: expected a whole number from 1 to 1000, found 1.5; correct it"},
+		{"seed", -1, -ERANGE,
+		 "sim.seed: expected a whole number from 0 to 2147483647, found -1; correct it"},
+	};
+	struct incise_sim_config c;
+
+	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
+		struct incise_error err = {0};
+
+		incise_sim_config_init(&c);
+		assert_int_equal(incise_sim_config_set(&c, row[i].key, row[i].value,
+						       &err),
+				 row[i].rc);
+		assert_string_equal(err.text, row[i].text);
+		assert_int_equal(c.n_depths, 4);
+		assert_int_equal(incise_sim_config_check(&c, NULL), 0);
+	}
+}
+
+static void check_finds_what_was_put_past_set(void **state)
+{
+	struct incise_error err = {0};
+	struct incise_sim_config c;
+
+	incise_sim_config_init(&c);
+	c.n_depths = 0;
+	assert_int_equal(incise_sim_config_check(&c, &err), -EINVAL);
+	assert_string_equal(err.text,
+			    "sim.depth_mm: expected 1 to 8 depths, found 0; correct it");
+	c.n_depths = 9;
+	assert_int_equal(incise_sim_config_check(&c, &err), -EINVAL);
+	incise_sim_config_init(&c);
+	c.depth_mm[3] = NAN;
+	assert_int_equal(incise_sim_config_check(&c, &err), -EINVAL);
+	assert_string_equal(err.text,
+			    "sim.depth_mm: expected a number from 0.1 to 40, found "
+			    "nan; correct it");
+	c.n_depths = 3; /* the bad one is no longer in use */
+	assert_int_equal(incise_sim_config_check(&c, &err), 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(defaults_are_those_of_the_header),
+		cmocka_unit_test(set_reaches_its_field),
+		cmocka_unit_test(set_refuses),
+		cmocka_unit_test(check_finds_what_was_put_past_set),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * lib/sim/sim.c: one world, whoever looks at it, however often and by which clock.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include "../../../lib/sim/sim.h"
+#include "../../../lib/sim/world.h"
+
+#define START_NS INCISE_NS_PER_S
+#define MAX 120000
+
+/* All that a run of some seconds gave. */
+struct log {
+	struct incise_force_sample force[MAX];
+	struct incise_tracker_sample tracker[MAX];
+	int n_force, n_tracker;
+	uint64_t lost;
+};
+
+static struct log first, second;
+
+/* A way to read: which devices are open, how long between reads, how many at a time. */
+struct manner {
+	bool force, tracker, camera;
+	int64_t step_ns[3]; /* in turn */
+	int portion;
+};
+
+static const struct manner plain = {
+	true, true, false, {10000000, 10000000, 10000000}, 1000};
+
+static void run(uint64_t seed, double seconds, const struct manner *manner,
+		struct log *log)
+{
+	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
+	struct incise_sim_config config;
+	struct incise_sim *sim;
+	struct incise_force *force = NULL;
+	struct incise_tracker *tracker = NULL;
+	struct incise_camera *camera = NULL;
+	int64_t end = START_NS + llround(seconds * 1e9), t = START_NS;
+
+	incise_sim_config_init(&config);
+	config.seed = seed;
+	sim = incise_sim_new(&config, clock, NULL);
+	assert_non_null(sim);
+	if (manner->force)
+		force = incise_sim_force_new(sim);
+	if (manner->tracker)
+		tracker = incise_sim_tracker_new(sim);
+	if (manner->camera)
+		camera = incise_sim_camera_new(sim);
+	memset(log, 0, sizeof(*log));
+	for (int turn = 0; t < end; turn++) {
+		struct incise_camera_frame frame;
+		int n;
+
+		t += manner->step_ns[turn % 3];
+		incise_clock_wait_until(clock, t < end ? t : end);
+		if (camera)
+			assert_true(incise_camera_read(camera, &frame) >= 0);
+		do {
+			n = force ? incise_force_read(force, log->force + log->n_force,
+						      manner->portion)
+				  : 0;
+			log->n_force += n;
+		} while (n);
+		do {
+			n = tracker ? incise_tracker_read(tracker,
+							  log->tracker + log->n_tracker,
+							  manner->portion)
+				    : 0;
+			log->n_tracker += n;
+		} while (n);
+	}
+	log->lost = (force ? incise_force_lost(force) : 0) +
+		    (tracker ? incise_tracker_lost(tracker) : 0);
+	if (force)
+		force->ops->close(force);
+	if (tracker)
+		tracker->ops->close(tracker);
+	if (camera)
+		camera->ops->close(camera);
+	incise_sim_free(sim);
+	incise_clock_free(clock);
+}
+
+/* Field by field: what lies between the fields is no part of a sample. */
+static bool force_equal(const struct log *a, const struct log *b, int n)
+{
+	for (int i = 0; i < n; i++)
+		if (a->force[i].t_ns != b->force[i].t_ns ||
+		    a->force[i].seq != b->force[i].seq ||
+		    a->force[i].code != b->force[i].code)
+			return false;
+	return true;
+}
+
+static bool tracker_equal(const struct log *a, const struct log *b, int n)
+{
+	for (int i = 0; i < n; i++) {
+		const struct incise_tracker_sample *x = &a->tracker[i],
+						   *y = &b->tracker[i];
+
+		if (x->t_ns != y->t_ns || x->seq != y->seq || x->status != y->status ||
+		    memcmp(x->position_mm, y->position_mm, sizeof(x->position_mm)) ||
+		    memcmp(x->quaternion, y->quaternion, sizeof(x->quaternion)))
+			return false;
+	}
+	return true;
+}
+
+static void same_seed_same_samples(void **state)
+{
+	run(1, 4, &plain, &first);
+	run(1, 4, &plain, &second);
+	assert_int_equal(first.n_force, 40000);
+	assert_int_equal(second.n_force, 40000);
+	assert_int_equal(first.n_tracker, second.n_tracker);
+	assert_true(force_equal(&first, &second, 40000));
+	assert_true(tracker_equal(&first, &second, first.n_tracker));
+	run(2, 4, &plain, &second);
+	assert_false(force_equal(&first, &second, 40000));
+	assert_false(tracker_equal(&first, &second, first.n_tracker));
+}
+
+static void reading_changes_nothing(void **state)
+{
+	static const struct manner row[] = {
+		{true, false, false, {10000000, 10000000, 10000000}, 1000},
+		{false, true, false, {10000000, 10000000, 10000000}, 1000},
+		{true, true, false, {1, 99999, 250001}, 7},
+		{true, true, false, {2400000000, 1, 33333}, MAX},
+		{true, true, true, {777777, 40000000, 5}, 1},
+	};
+
+	run(1, 4, &plain, &first);
+	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
+		run(1, 4, &row[i], &second);
+		assert_int_equal(second.lost, 0);
+		assert_int_equal(second.n_force, row[i].force ? first.n_force : 0);
+		assert_int_equal(second.n_tracker, row[i].tracker ? first.n_tracker : 0);
+		assert_true(force_equal(&first, &second, second.n_force));
+		assert_true(tracker_equal(&first, &second, second.n_tracker));
+	}
+}
+
+static void what_is_not_taken_is_lost_and_counted(void **state)
+{
+	static const struct manner late = {
+		true, true, false, {10000000000, 10000000000, 10000000000}, MAX};
+
+	run(1, 10, &late, &first);
+	/* The newest 2.5 s or a little more are there, and end where the run does. */
+	assert_true(first.n_force >= 25000 && first.n_force < 25010);
+	assert_int_equal(first.force[first.n_force - 1].seq, 99999);
+	assert_true(first.n_tracker >= 300 && first.n_tracker < 310);
+	assert_int_equal(first.lost, first.force[0].seq + first.tracker[0].seq);
+	assert_true(first.force[0].seq > 0 && first.tracker[0].seq > 0);
+	for (int i = 1; i < first.n_force; i++)
+		assert_int_equal(first.force[i].seq, first.force[i - 1].seq + 1);
+}
+
+static void real_time_gives_the_same_samples(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_real();
+	struct incise_sim_config config;
+	struct incise_sim *sim;
+	struct incise_force *force;
+	int64_t start;
+	int n = 0;
+
+	incise_sim_config_init(&config);
+	sim = incise_sim_new(&config, clock, NULL);
+	force = incise_sim_force_new(sim);
+	start = sim->start_ns;
+	memset(&second, 0, sizeof(second));
+	while (n < 2000) {
+		incise_clock_wait_until(clock, incise_clock_now(clock) + 3000000);
+		n += incise_force_read(force, second.force + n, 1000);
+	}
+	run(1, 4, &plain, &first);
+	for (int i = 0; i < n; i++) {
+		assert_int_equal(second.force[i].seq, i);
+		assert_int_equal(second.force[i].code, first.force[i].code);
+		assert_int_equal(second.force[i].t_ns - start,
+				 first.force[i].t_ns - START_NS);
+	}
+	force->ops->close(force);
+	incise_sim_free(sim);
+	incise_clock_free(clock);
+}
+
+static void late_device_counts_from_0_in_the_same_world(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
+	struct incise_sim_config config;
+	struct incise_sim_truth truth;
+	struct incise_sim *sim;
+	struct incise_force *force;
+	int n;
+
+	run(1, 4, &plain, &first);
+	incise_sim_config_init(&config);
+	sim = incise_sim_new(&config, clock, NULL);
+	incise_clock_wait_until(clock, START_NS + 3 * INCISE_NS_PER_S);
+	incise_sim_truth(sim, &truth); /* the world has gone on */
+	force = incise_sim_force_new(sim);
+	incise_clock_wait_until(clock, START_NS + 4 * INCISE_NS_PER_S);
+	n = incise_force_read(force, second.force, MAX);
+	assert_int_equal(n, 10000);
+	for (int i = 0; i < n; i++) {
+		assert_int_equal(second.force[i].seq, i);
+		assert_int_equal(second.force[i].t_ns, first.force[30000 + i].t_ns);
+		assert_int_equal(second.force[i].code, first.force[30000 + i].code);
+	}
+	assert_int_equal(incise_force_lost(force), 0);
+	force->ops->close(force);
+	incise_sim_free(sim);
+	incise_clock_free(clock);
+}
+
+static void truth_is_the_law_without_disturbance(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
+	struct incise_sim_config config;
+	struct incise_sim_truth truth, before = {0};
+	struct incise_sim *sim;
+	int cutting = 0;
+
+	incise_sim_config_init(&config);
+	config.tooth = 0;
+	config.boundary = 0;
+	sim = incise_sim_new(&config, clock, NULL);
+	for (int64_t t = 0; t < 20 * INCISE_NS_PER_S; t += 1034567) {
+		double moved;
+
+		incise_clock_wait_until(clock, START_NS + t);
+		incise_sim_truth(sim, &truth);
+		assert_int_equal(truth.t_ns, START_NS + t);
+		assert_true(truth.depth_mm == fmax(0, -truth.position_mm[2]));
+		assert_true(truth.force_N == incise_sim_mean_force(&config,
+								   truth.depth_mm,
+								   truth.velocity_mm_s) ||
+			    /* two roundings of products with 1 */
+			    fabs(truth.force_N -
+				 incise_sim_mean_force(&config, truth.depth_mm,
+						       truth.velocity_mm_s)) < 1e-15);
+		cutting += truth.force_N > 0;
+		moved = 0;
+		for (int i = 0; i < 3; i++)
+			moved += pow(truth.position_mm[i] - before.position_mm[i], 2);
+		/* Way over 1 ms against the speeds at its ends: they differ by 3 mm/s at most
+		   (3000 mm/s² in the pause's return). */
+		if (t)
+			assert_true(fabs(sqrt(moved) / 1034567e-9 -
+					 (truth.velocity_mm_s + before.velocity_mm_s) /
+						 2) < 3);
+		before = truth;
+	}
+	assert_true(cutting > 10000); /* of 15 s in two cuts, the most */
+	incise_sim_free(sim);
+	incise_clock_free(clock);
+}
+
+static void tooth_goes_on_between_ticks(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
+	struct incise_sim_config config;
+	struct incise_sim_truth truth;
+	struct incise_sim *sim;
+	double before = 0;
+
+	incise_sim_config_init(&config);
+	config.boundary = 0;
+	config.tooth = 0.9;
+	config.tooth_mm = 1000; /* no fracture in sight: the factor only rises */
+	sim = incise_sim_new(&config, clock, NULL);
+	for (int i = 0; i < 100; i++) {
+		double factor;
+
+		/* A quarter of a tick each, in the middle of the first cut. */
+		incise_clock_wait_until(clock,
+					START_NS + 5 * INCISE_NS_PER_S + i * 25000);
+		incise_sim_truth(sim, &truth);
+		factor = truth.force_N / incise_sim_mean_force(&config, truth.depth_mm,
+							       truth.velocity_mm_s);
+		assert_true(i == 0 || factor > before);
+		before = factor;
+	}
+	incise_sim_free(sim);
+	incise_clock_free(clock);
+}
+
+static void bad_configuration_is_refused(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
+	struct incise_error err = {0};
+	struct incise_sim_config config;
+
+	incise_sim_config_init(&config);
+	config.force_hz = 0;
+	assert_null(incise_sim_new(&config, clock, &err));
+	assert_int_equal(errno, EINVAL);
+	assert_string_equal(err.text,
+			    "sim.force_hz: expected a number from 1 to 20000, found "
+			    "0; correct it");
+	incise_sim_free(NULL);
+	incise_clock_free(clock);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(same_seed_same_samples),
+		cmocka_unit_test(reading_changes_nothing),
+		cmocka_unit_test(what_is_not_taken_is_lost_and_counted),
+		cmocka_unit_test(real_time_gives_the_same_samples),
+		cmocka_unit_test(late_device_counts_from_0_in_the_same_world),
+		cmocka_unit_test(truth_is_the_law_without_disturbance),
+		cmocka_unit_test(tooth_goes_on_between_ticks),
+		cmocka_unit_test(bad_configuration_is_refused),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

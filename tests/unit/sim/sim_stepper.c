@@ -1,0 +1,361 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * lib/sim/sim_stepper.c: limits kept, faults told, and a handle that moves as the
+ * equation of motion says, however stiff.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include "../../../lib/sim/random.h"
+#include "../../../lib/sim/sim.h"
+
+#define START_NS INCISE_NS_PER_S
+#define TICK_NS 100000
+
+struct rig {
+	struct incise_clock *clock;
+	struct incise_sim *sim;
+	struct incise_stepper *stepper;
+	int64_t now;
+};
+
+static struct rig rig_new(const struct incise_sim_config *config)
+{
+	struct rig rig = {.clock = incise_clock_new_simulated(START_NS), .now = START_NS};
+
+	rig.sim = incise_sim_new(config, rig.clock, NULL);
+	assert_non_null(rig.sim);
+	rig.stepper = incise_sim_stepper_new(rig.sim);
+	return rig;
+}
+
+static void rig_free(struct rig *rig)
+{
+	rig->stepper->ops->close(rig->stepper);
+	incise_sim_free(rig->sim);
+	incise_clock_free(rig->clock);
+}
+
+static struct incise_stepper_status rig_after(struct rig *rig, int64_t ns)
+{
+	struct incise_stepper_status status;
+
+	rig->now += ns;
+	incise_clock_wait_until(rig->clock, rig->now);
+	assert_int_equal(incise_stepper_status(rig->stepper, &status), 0);
+	return status;
+}
+
+/* Hold a target for some time, renewed before the deadman misses it. */
+static struct incise_stepper_status rig_hold(struct rig *rig, double mm, double seconds)
+{
+	for (int i = 0; i < seconds * 20; i++) {
+		incise_stepper_set(rig->stepper, mm);
+		rig_after(rig, 50000000);
+	}
+	return rig_after(rig, 0);
+}
+
+static void spring_law_at_rest(void **state)
+{
+	static const double target_mm[] = {0, 0.5, 5, 12.3456789, 20};
+	struct incise_sim_config config;
+
+	incise_sim_config_init(&config);
+	for (size_t i = 0; i < sizeof(target_mm) / sizeof(target_mm[0]); i++) {
+		struct rig rig = rig_new(&config);
+		struct incise_stepper_status s = rig_hold(&rig, target_mm[i], 2);
+
+		/* To the nearest microstep. */
+		assert_true(fabs(s.position_mm - target_mm[i]) <= 2.0 / 3200 / 2 + 1e-12);
+		assert_true(s.force_N == 2 * (s.position_mm - s.handle_mm));
+		/* Springs 2 and 1 N/mm in series, less what friction of 0.01 N holds. */
+		assert_true(fabs(s.handle_mm - s.position_mm * 2 / 3) <= 0.01 / 3 + 1e-9);
+		assert_int_equal(s.faults, 0);
+		rig_free(&rig);
+	}
+}
+
+static void limits_are_never_exceeded(void **state)
+{
+	/* screw_mm_s, screw_mm_s2, steps_per_turn */
+	static const double row[][3] = {
+		{30, 3000, 3200},
+		{30, 100, 200},
+		{10000, 1e7, 1000000},
+		{0.1, 1e7, 3200},
+	};
+	uint64_t key = incise_random_key(9, INCISE_RANDOM_SURGEON);
+
+	for (size_t k = 0; k < sizeof(row) / sizeof(row[0]); k++) {
+		double step = 2 / row[k][2], v = row[k][0] * 1e-4, dv = row[k][1] * 1e-8;
+		double before = 0, moved = 0;
+		struct incise_sim_config config;
+		struct rig rig;
+
+		incise_sim_config_init(&config);
+		config.screw_mm_s = row[k][0];
+		config.screw_mm_s2 = row[k][1];
+		config.steps_per_turn = (int)row[k][2];
+		rig = rig_new(&config);
+		for (int i = 0; i < 20000; i++) {
+			struct incise_stepper_status s;
+
+			/* Targets in and out of the travel, often while it still moves. */
+			if (i % 97 == 0)
+				incise_stepper_set(rig.stepper,
+						   40 * incise_random_uniform(key, i) -
+							   10);
+			s = rig_after(&rig, TICK_NS);
+			assert_true(s.position_mm >= 0 && s.position_mm <= 20);
+			/* A position is off by half a step: a difference by one, a second by two. */
+			assert_true(fabs(s.position_mm - before) <= v + step + 1e-12);
+			assert_true(fabs(s.position_mm - before - moved) <=
+				    dv + 2 * step + 1e-12);
+			moved = s.position_mm - before;
+			before = s.position_mm;
+		}
+		rig_free(&rig);
+	}
+}
+
+static void target_is_reached_in_the_time_of_a_trapezoid(void **state)
+{
+	struct incise_sim_config config;
+	struct rig rig;
+	int ticks = 0;
+
+	incise_sim_config_init(&config);
+	rig = rig_new(&config);
+	for (double mm = 0; mm != 10; ticks++) {
+		double last = mm;
+
+		if (ticks % 500 == 0)
+			incise_stepper_set(rig.stepper, 10);
+		mm = rig_after(&rig, TICK_NS).position_mm;
+		assert_true(mm >= last && mm <= 10); /* neither back nor beyond */
+	}
+	/*
+	 * 10 mm at 30 mm/s and 3000 mm/s²: 333.3 + 10 ms. The last half microstep, 0.3 µm,
+	 * shows before it is gone, √(2·0.3 µm/3000 mm/s²) = 0.5 ms early.
+	 */
+	assert_true(fabs(ticks * 0.1 - 343.3) < 0.7);
+	assert_true(rig_after(&rig, 10000000).position_mm == 10);
+	rig_free(&rig);
+}
+
+static void faults_are_told(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_stepper_status s;
+	struct rig rig;
+
+	incise_sim_config_init(&config);
+	rig = rig_new(&config);
+	/* Not yet in use. */
+	assert_int_equal(rig_after(&rig, INCISE_NS_PER_S).faults, 0);
+	s = rig_hold(&rig, 25, 1);
+	assert_int_equal(s.faults, INCISE_STEPPER_TRAVEL);
+	assert_true(s.position_mm == 20);
+	s = rig_hold(&rig, -1, 1);
+	assert_int_equal(s.faults, INCISE_STEPPER_TRAVEL);
+	assert_true(s.position_mm == 0);
+	s = rig_hold(&rig, 1, 1);
+	assert_int_equal(s.faults, 0);
+	/* No number is no target, and no sign of life either. */
+	assert_int_equal(incise_stepper_set(rig.stepper, 1), 0);
+	rig_after(&rig, 60000000);
+	assert_int_equal(incise_stepper_set(rig.stepper, NAN), -EDOM);
+	assert_int_equal(incise_stepper_set(rig.stepper, INFINITY), -EDOM);
+	assert_int_equal(incise_stepper_set(rig.stepper, -INFINITY), -EDOM);
+	s = rig_after(&rig, 39900000);
+	assert_int_equal(s.faults, 0);
+	assert_true(s.position_mm == 1);
+	/* The tick that begins 100 ms after the target is the first to act. */
+	assert_int_equal(rig_after(&rig, 100000).faults, 0);
+	assert_int_equal(rig_after(&rig, 100000).faults, INCISE_STEPPER_DEADMAN);
+	s = rig_after(&rig, INCISE_NS_PER_S);
+	assert_int_equal(s.faults, INCISE_STEPPER_DEADMAN);
+	assert_true(s.position_mm == 0);
+	/* What friction of 0.01 N holds against both springs. */
+	assert_true(fabs(s.handle_mm) <= 0.01 / 3 + 1e-9);
+	assert_int_equal(incise_stepper_set(rig.stepper, 2), 0);
+	assert_int_equal(rig_after(&rig, 0).faults, 0);
+	rig_free(&rig);
+}
+
+/* Handle in mm and mm/s under m x'' = k (nut - x) - k_h x - b x'. */
+static void rates(const struct incise_sim_config *c, double nut, const double y[2],
+		  double dy[2])
+{
+	dy[0] = y[1];
+	dy[1] = (c->spring_N_mm * (nut - y[0]) - c->hand_N_mm * y[0] -
+		 c->hand_N_s_mm * y[1]) *
+		1000 / c->handle_kg;
+}
+
+static void runge_kutta(const struct incise_sim_config *c, double nut, double h,
+			double y[2])
+{
+	double k[4][2], at[2];
+
+	rates(c, nut, y, k[0]);
+	for (int i = 1; i < 4; i++) {
+		for (int j = 0; j < 2; j++)
+			at[j] = y[j] + h * (i < 3 ? 0.5 : 1) * k[i - 1][j];
+		rates(c, nut, at, k[i]);
+	}
+	for (int j = 0; j < 2; j++)
+		y[j] += h / 6 * (k[0][j] + 2 * k[1][j] + 2 * k[2][j] + k[3][j]);
+}
+
+static void handle_moves_as_the_equation_says(void **state)
+{
+	struct incise_sim_config config;
+	double y[2] = {0}, before = 0, farthest = 0;
+	struct rig rig;
+
+	incise_sim_config_init(&config);
+	config.handle_friction_N = 0;
+	rig = rig_new(&config);
+	for (int i = 0; i < 6000; i++) {
+		struct incise_stepper_status s;
+
+		if (i % 500 == 0)
+			incise_stepper_set(rig.stepper, i < 3000 ? 8 : 2);
+		s = rig_after(&rig, TICK_NS);
+		/* Ten steps a tick: its own error is 1e-4 of what is looked for. */
+		for (int k = 0; k < 10; k++)
+			runge_kutta(&config, (before + s.position_mm) / 2, 1e-5, y);
+		/*
+		 * The midpoint rule's period is (ωT)²/12 = 5e-5 too long, ω = 245/s: over
+		 * a decay time of 10 ms a phase of 1.2e-4. The nut's 30 mm/s excite
+		 * 2/3·30/ω = 0.08 mm: an error of 1e-5 mm. Ten times that is allowed.
+		 */
+		assert_true(fabs(y[0] - s.handle_mm) < 1e-4);
+		farthest = fmax(farthest, s.handle_mm);
+		before = s.position_mm;
+	}
+	assert_true(farthest > 5.3); /* 2/3 of 8 mm: it has moved at all */
+	rig_free(&rig);
+}
+
+static void friction_holds(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_stepper_status s;
+	struct rig rig;
+
+	incise_sim_config_init(&config);
+	config.handle_friction_N = 1;
+	rig = rig_new(&config);
+	s = rig_hold(&rig, 0.4, 1); /* 0.8 N */
+	assert_true(s.handle_mm == 0);
+	assert_true(s.force_N == 2 * s.position_mm);
+	s = rig_hold(&rig, 0.6, 1); /* 1.2 N: away, until within 1 N of balance */
+	assert_true(s.handle_mm > 0);
+	assert_true(fabs(2 * (s.position_mm - s.handle_mm) - s.handle_mm) <= 1 + 1e-9);
+	rig_free(&rig);
+}
+
+static void bounded_however_stiff(void **state)
+{
+	/* spring, hand N/mm; hand N s/mm; kg; friction N */
+	static const double row[][5] = {
+		{1000, 1000, 0.0001, 0.001, 0},	  {1000, 0, 0.0001, 0.001, 0},
+		{1000, 1000, 10, 0.001, 0},	  {0.001, 0, 0.0001, 100, 0},
+		{1000, 1000, 0.0001, 0.001, 100}, {1000, 0, 0.0001, 100, 0.01},
+	};
+
+	for (size_t k = 0; k < sizeof(row) / sizeof(row[0]); k++) {
+		struct incise_sim_config config;
+		struct rig rig;
+
+		incise_sim_config_init(&config);
+		config.spring_N_mm = row[k][0];
+		config.hand_N_mm = row[k][1];
+		config.hand_N_s_mm = row[k][2];
+		config.handle_kg = row[k][3];
+		config.handle_friction_N = row[k][4];
+		config.screw_mm_s = 10000;
+		config.screw_mm_s2 = 1e7;
+		rig = rig_new(&config);
+		for (int i = 0; i < 20000; i++) {
+			struct incise_stepper_status s;
+
+			/* Ten moves in all over the whole travel. */
+			if (i % 500 == 0)
+				incise_stepper_set(rig.stepper, i / 2000 % 2 ? 0 : 20);
+			s = rig_after(&rig, TICK_NS);
+			/*
+			 * Without any damping, each move adds an oscillation no larger than
+			 * the travel about a rest within it: (10 + 1)·20 mm. An unstable
+			 * method leaves that behind in a few ticks.
+			 */
+			assert_true(fabs(s.handle_mm) <= 11 * 20);
+		}
+		rig_free(&rig);
+	}
+}
+
+static void asking_changes_nothing(void **state)
+{
+	struct incise_stepper_status end[2];
+
+	for (int k = 0; k < 2; k++) {
+		struct incise_sim_config config;
+		struct rig rig;
+
+		incise_sim_config_init(&config);
+		rig = rig_new(&config);
+		for (int i = 0; i < 300; i++) {
+			incise_stepper_set(rig.stepper, i % 40);
+			/* 1.2345 ms at once, or in parts. */
+			for (int part = 0; k && part < 5; part++)
+				rig_after(&rig, 200000);
+			rig_after(&rig, k ? 234500 : 1234500);
+		}
+		end[k] = rig_after(&rig, 0);
+		rig_free(&rig);
+	}
+	assert_true(end[0].handle_mm == end[1].handle_mm && end[0].handle_mm != 0);
+	assert_true(end[0].position_mm == end[1].position_mm);
+	assert_int_equal(end[0].t_ns, end[1].t_ns);
+}
+
+static void info_is_the_configuration(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_stepper_info info;
+	struct rig rig;
+
+	incise_sim_config_init(&config);
+	rig = rig_new(&config);
+	incise_stepper_info(rig.stepper, &info);
+	assert_true(info.spring_N_mm == 2 && info.travel_mm == 20);
+	assert_true(info.step_mm == 2.0 / 3200);
+	assert_true(info.velocity_mm_s == 30 && info.acceleration_mm_s2 == 3000);
+	assert_string_equal(info.name, "virtual haptic scalpel");
+	rig_free(&rig);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(spring_law_at_rest),
+		cmocka_unit_test(limits_are_never_exceeded),
+		cmocka_unit_test(target_is_reached_in_the_time_of_a_trapezoid),
+		cmocka_unit_test(faults_are_told),
+		cmocka_unit_test(handle_moves_as_the_equation_says),
+		cmocka_unit_test(friction_holds),
+		cmocka_unit_test(bounded_however_stiff),
+		cmocka_unit_test(asking_changes_nothing),
+		cmocka_unit_test(info_is_the_configuration),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * lib/sim/sim_tracker.c: rate, drift, latency and noise against what was configured.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <math.h>
+#include "../../../lib/sim/sim.h"
+#include "../../../lib/sim/world.h"
+
+#define START_NS INCISE_NS_PER_S
+#define MAX 20000
+
+static struct incise_tracker_sample sample[MAX];
+
+/* A virtual rig with its tracker only. */
+struct rig {
+	struct incise_clock *clock;
+	struct incise_sim *sim;
+	struct incise_tracker *tracker;
+};
+
+static struct rig rig_new(const struct incise_sim_config *config)
+{
+	struct rig rig = {.clock = incise_clock_new_simulated(START_NS)};
+
+	rig.sim = incise_sim_new(config, rig.clock, NULL);
+	assert_non_null(rig.sim);
+	rig.tracker = incise_sim_tracker_new(rig.sim);
+	return rig;
+}
+
+static void rig_free(struct rig *rig)
+{
+	rig->tracker->ops->close(rig->tracker);
+	incise_sim_free(rig->sim);
+	incise_clock_free(rig->clock);
+}
+
+static int rig_read(struct rig *rig, int seconds)
+{
+	int n = 0;
+
+	for (int i = 1; i <= seconds; i++) {
+		incise_clock_wait_until(rig->clock, START_NS + i * INCISE_NS_PER_S);
+		n += incise_tracker_read(rig->tracker, sample + n, MAX - n);
+	}
+	assert_int_equal(incise_tracker_lost(rig->tracker), 0);
+	return n;
+}
+
+static int64_t acquired_ns(int i)
+{
+	return START_NS + llround(i * (1e9 / (120 * (1 + 50e-6))));
+}
+
+static void rate_drifts_and_latency_is_exact_without_jitter(void **state)
+{
+	struct incise_sim_config config;
+	struct rig rig;
+	int n;
+
+	incise_sim_config_init(&config);
+	config.tracker_jitter_ms = 0;
+	rig = rig_new(&config);
+	n = rig_read(&rig, 100);
+	/* 100 s of 120 Hz that runs 50 ppm fast, and of which the last is on its way. */
+	assert_in_range(n, 12000, 12001);
+	for (int i = 0; i < n; i++) {
+		assert_int_equal(sample[i].seq, i);
+		assert_int_equal(sample[i].t_ns, acquired_ns(i) + 4200000);
+		assert_int_equal(sample[i].status, ' ');
+	}
+	rig_free(&rig);
+}
+
+static void jitter_only_adds(void **state)
+{
+	struct incise_sim_config config;
+	double mean_ms = 0;
+	struct rig rig;
+	int n;
+
+	incise_sim_config_init(&config);
+	rig = rig_new(&config);
+	n = rig_read(&rig, 100);
+	for (int i = 0; i < n; i++) {
+		double extra_ms = (double)(sample[i].t_ns - acquired_ns(i)) * 1e-6 - 4.2;
+
+		assert_true(extra_ms >= -1e-6); /* a nanosecond's rounding */
+		mean_ms += extra_ms / n;
+	}
+	/* |normal| of sd 0.2: mean 0.2·√(2/π), sd 0.2·√(1 - 2/π); 5 sd of the mean. */
+	assert_true(fabs(mean_ms - 0.2 * sqrt(2 / M_PI)) <
+		    5 * 0.2 * sqrt((1 - 2 / M_PI) / n));
+	rig_free(&rig);
+}
+
+static void records_come_when_they_arrive_and_in_order(void **state)
+{
+	/* Jitter below and far above the time between records. */
+	static const double jitter_ms[] = {0.2, 100};
+	struct incise_sim_config config;
+
+	for (int k = 0; k < 2; k++) {
+		int64_t before = START_NS, arrival = 0;
+		uint64_t seq = 0;
+		struct rig rig;
+
+		incise_sim_config_init(&config);
+		config.tracker_jitter_ms = jitter_ms[k];
+		rig = rig_new(&config);
+		for (int64_t t = START_NS; t < START_NS + 3 * INCISE_NS_PER_S;
+		     t += 130000) {
+			int n;
+
+			incise_clock_wait_until(rig.clock, t);
+			n = incise_tracker_read(rig.tracker, sample, MAX);
+			for (int i = 0; i < n; i++) {
+				assert_true(sample[i].t_ns <= t &&
+					    sample[i].t_ns > before);
+				assert_true(sample[i].t_ns >= arrival);
+				assert_int_equal(sample[i].seq, seq++);
+				arrival = sample[i].t_ns;
+			}
+			before = t;
+		}
+		/* All but those that are on their way: at most 700 ms of 120 Hz. */
+		assert_true(seq >= 3 * 120 - 84 - 2);
+		rig_free(&rig);
+	}
+}
+
+static void noise_is_as_configured(void **state)
+{
+	struct incise_sim_config config;
+	double mean[3] = {0}, squares[3] = {0}, angle2 = 0, angle_sd;
+	struct rig rig;
+	int n;
+
+	incise_sim_config_init(&config);
+	rig = rig_new(&config);
+	n = rig_read(&rig, 100);
+	for (int i = 0; i < n; i++) {
+		struct incise_blade blade;
+		double q[4], dot = 0, norm = 0;
+
+		incise_surgeon_blade(&rig.sim->surgeon, acquired_ns(i) - START_NS,
+				     &blade);
+		incise_surgeon_grip(&rig.sim->surgeon, acquired_ns(i) - START_NS, q);
+		for (int k = 0; k < 3; k++) {
+			double e = sample[i].position_mm[k] - blade.position_mm[k];
+
+			mean[k] += e / n;
+			squares[k] += e * e / n;
+		}
+		for (int k = 0; k < 4; k++) {
+			dot += q[k] * sample[i].quaternion[k];
+			norm += sample[i].quaternion[k] * sample[i].quaternion[k];
+		}
+		assert_true(fabs(norm - 1) < 1e-14); /* a few roundings */
+		angle2 += 8 * (1 - fabs(dot)) / n;   /* angle²; 1 - cos(a/2) ≈ a²/8 */
+	}
+	for (int k = 0; k < 3; k++) {
+		/* sd/√n of a mean, sd/√(2n) of a standard deviation; 5 of each. */
+		assert_true(fabs(mean[k]) < 5 * 0.02 / sqrt(n));
+		assert_true(fabs(sqrt(squares[k]) - 0.02) < 5 * 0.02 / sqrt(2 * n));
+	}
+	/* Three axes of 0.025° each; 3n squares in the mean. */
+	angle_sd = 0.025 * M_PI / 180 * sqrt(3);
+	assert_true(fabs(sqrt(angle2) / angle_sd - 1) < 5 / sqrt(6 * n));
+	rig_free(&rig);
+}
+
+static void info_is_nominal(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_tracker_info info;
+	struct rig rig;
+
+	incise_sim_config_init(&config);
+	rig = rig_new(&config);
+	incise_tracker_info(rig.tracker, &info);
+	assert_true(info.rate_hz == 120); /* drift is for the reader to find out */
+	assert_int_equal(info.latency_ns, 4200000);
+	assert_string_equal(info.name, "virtual tracker");
+	rig_free(&rig);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(rate_drifts_and_latency_is_exact_without_jitter),
+		cmocka_unit_test(jitter_only_adds),
+		cmocka_unit_test(records_come_when_they_arrive_and_in_order),
+		cmocka_unit_test(noise_is_as_configured),
+		cmocka_unit_test(info_is_nominal),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
