@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The form of recording.db; see schema.h.
+ */
+#include <errno.h>
+#include <string.h>
+#include "schema.h"
+
+/*
+ * The text that SQLite keeps of each table is compared when a recording is opened, so a
+ * view, a virtual table or a generated column cannot pass for one of ours. Anything
+ * added beside these tables is left alone.
+ */
+static const struct {
+	const char *name, *sql;
+} tables[] = {
+	{"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY NOT NULL, value)"},
+	{"force", "CREATE TABLE force(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
+		  "code INTEGER NOT NULL)"},
+	{"tracker",
+	 "CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
+	 "arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "
+	 "z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "
+	 "qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL)"},
+	{"depth", "CREATE TABLE depth(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
+		  "depth_mm REAL NOT NULL, velocity_mm_s REAL NOT NULL)"},
+	{"events", "CREATE TABLE events(t_ns INTEGER NOT NULL, kind TEXT NOT NULL, "
+		   "text TEXT NOT NULL)"},
+};
+
+#define TABLES (sizeof(tables) / sizeof(*tables))
+#define TEXT_OF(x) TEXT_OF_(x)
+#define TEXT_OF_(x) #x
+
+int incise_schema_create(sqlite3 *db)
+{
+	int rc = sqlite3_exec(
+		db,
+		"PRAGMA application_id=" TEXT_OF(
+			INCISE_SCHEMA_APPLICATION) ";"
+						   "PRAGMA user_version=" TEXT_OF(
+							   INCISE_SCHEMA_VERSION) ";",
+		NULL, NULL, NULL);
+
+	for (size_t i = 0; i < TABLES && rc == SQLITE_OK; i++)
+		rc = sqlite3_exec(db, tables[i].sql, NULL, NULL, NULL);
+	return rc;
+}
+
+int incise_schema_errno(sqlite3 *db)
+{
+	int cause =
+		errno; /* SQLite's own sqlite3_system_errno() is 0 after a failed COMMIT */
+
+	switch (db ? sqlite3_errcode(db) & 0xff : SQLITE_NOMEM) {
+	case SQLITE_FULL:
+		return ENOSPC;
+	case SQLITE_NOMEM:
+		return ENOMEM;
+	case SQLITE_IOERR:
+		/* SQLite takes only ENOSPC for a full disk; a quota and a limit on the
+		 * size of files are no different to who has to make room. */
+		return cause == EDQUOT || cause == EFBIG || cause == ENOSPC ? ENOSPC
+									    : EIO;
+	case SQLITE_CANTOPEN:
+	case SQLITE_PERM:
+	case SQLITE_READONLY:
+	case SQLITE_AUTH:
+		cause = sqlite3_system_errno(db);
+		return cause ? cause : EACCES;
+	case SQLITE_BUSY:
+	case SQLITE_LOCKED:
+		return EBUSY;
+	case SQLITE_CORRUPT:
+	case SQLITE_NOTADB:
+	case SQLITE_ERROR: /* a table or column that is not there */
+	case SQLITE_FORMAT:
+	case SQLITE_SCHEMA:
+	case SQLITE_CONSTRAINT:
+	case SQLITE_MISMATCH:
+	case SQLITE_TOOBIG:
+		return EINVAL;
+	default:
+		return EIO;
+	}
+}
+
+int incise_schema_fail(sqlite3 *db, const char *path, struct incise_error *err)
+{
+	int code = incise_schema_errno(db);
+
+	if (code == EINVAL)
+		return incise_error_set(
+			err, code,
+			"%s: damaged (%s); take a copy of it, `sqlite3 %s/%s "
+			".recover` may save rows",
+			path, sqlite3_errmsg(db), path, INCISE_SCHEMA_DB);
+	if (code == EACCES || code == EROFS)
+		return incise_error_set(
+			err, code,
+			"%s: cannot be opened (%s); an interrupted recording "
+			"needs a folder that can be written: copy it to one",
+			path, sqlite3_errmsg(db));
+	return incise_error_set(err, code, "%s: cannot be read: %s", path,
+				db ? sqlite3_errmsg(db) : strerror(ENOMEM));
+}
+
+/* The one number that a PRAGMA answers. */
+static int pragma(sqlite3 *db, const char *sql, sqlite3_int64 *value)
+{
+	sqlite3_stmt *stmt;
+	int rc = sqlite3_prepare_v2(db, sql, -1, &stmt, NULL);
+
+	if (rc != SQLITE_OK)
+		return rc;
+	*value = sqlite3_step(stmt) == SQLITE_ROW ? sqlite3_column_int64(stmt, 0) : 0;
+	return sqlite3_finalize(stmt); /* tells of a failed step as well */
+}
+
+static int check_tables(sqlite3 *db, const char *path, struct incise_error *err)
+{
+	sqlite3_stmt *stmt;
+	int rc = 0;
+
+	if (sqlite3_prepare_v2(
+		    db, "SELECT sql FROM sqlite_master WHERE name = ? AND type = 'table'",
+		    -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(db, path, err);
+	for (size_t i = 0; i < TABLES && !rc; i++) {
+		const char *sql;
+		int step;
+
+		sqlite3_reset(stmt);
+		sqlite3_bind_text(stmt, 1, tables[i].name, -1, SQLITE_STATIC);
+		step = sqlite3_step(stmt);
+		sql = step == SQLITE_ROW ? (const char *)sqlite3_column_text(stmt, 0)
+					 : NULL;
+		if (step != SQLITE_ROW && step != SQLITE_DONE)
+			rc = incise_schema_fail(db, path, err);
+		else if (!sql || strcmp(sql, tables[i].sql))
+			rc = incise_error_set(err, EINVAL,
+					      "%s: damaged or altered: table '%s' is %s",
+					      path, tables[i].name,
+					      sql ? "not as incise makes it" : "missing");
+	}
+	sqlite3_finalize(stmt);
+	return rc;
+}
+
+int incise_schema_check(sqlite3 *db, const char *path, struct incise_error *err)
+{
+	sqlite3_int64 application, version;
+
+	if (pragma(db, "PRAGMA application_id", &application) != SQLITE_OK ||
+	    pragma(db, "PRAGMA user_version", &version) != SQLITE_OK)
+		return incise_schema_fail(db, path, err);
+	if (application != INCISE_SCHEMA_APPLICATION)
+		return incise_error_set(err, EINVAL,
+					"%s: no recording: its %s was not made by incise",
+					path, INCISE_SCHEMA_DB);
+	if (version > INCISE_SCHEMA_VERSION)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: made by a newer incise (form %lld, this one reads up "
+			"to %d); use that version",
+			path, (long long)version, INCISE_SCHEMA_VERSION);
+	if (version < 1)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: damaged: its form has the impossible number %lld", path,
+			(long long)version);
+	return check_tables(db, path, err);
+}

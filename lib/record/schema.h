@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The form of recording.db: its tables, how it is known to be one, and what SQLite's
+ * errors mean to a person. Described for users in incise-recording(5).
+ */
+#ifndef INCISE_SCHEMA_H
+#define INCISE_SCHEMA_H
+
+#include <sqlite3.h>
+#include <incise/error.h>
+
+#define INCISE_SCHEMA_DB "recording.db"	     /* inside the folder NAME.rec */
+#define INCISE_SCHEMA_APPLICATION 0x494e4349 /* "INCI", SQLite's application_id */
+#define INCISE_SCHEMA_VERSION 1		     /* SQLite's user_version */
+
+/* Make the tables in an empty database. Returns an SQLite code. */
+int incise_schema_create(sqlite3 *db);
+
+/*
+ * Whether an opened database is a recording of this or an older version, with just the
+ * tables this library makes. Returns 0, -EINVAL, or as incise_schema_fail().
+ */
+int incise_schema_check(sqlite3 *db, const char *path, struct incise_error *err);
+
+/* The errno that the last SQLite error amounts to: EINVAL for a damaged file. */
+int incise_schema_errno(sqlite3 *db);
+
+/* Report a failed read of a recording; @path names it. Returns -errno. */
+int incise_schema_fail(sqlite3 *db, const char *path, struct incise_error *err);
+
+#endif

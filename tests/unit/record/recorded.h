@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * A recording of the virtual rig in a folder of its own, for the tests of lib/record.
+ */
+#ifndef TEST_RECORDED_H
+#define TEST_RECORDED_H
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <errno.h>
+#include <ftw.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <cmocka.h>
+#include <sqlite3.h>
+#include <incise/calibration.h>
+#include <incise/recorder.h>
+#include <incise/recording.h>
+#include <incise/rig.h>
+#include <incise/sim.h>
+
+/* All 14 cuts of the paper, but short: 43 s. */
+#define SHORT_SCRIPT "sim:clock=simulated,cut_s=2,pause_s=1"
+#define BOTH (INCISE_RIG_TRACKER | INCISE_RIG_FORCE)
+#define POLL_NS 10000000LL
+#define MS 1000000LL
+
+__attribute__((unused)) static int remove_entry(const char *path, const struct stat *st,
+						int type, struct FTW *walk)
+{
+	return remove(path);
+}
+
+/* For setup and teardown: a folder as the working folder, so that paths are short. */
+__attribute__((unused)) static int enter_folder(void **state)
+{
+	char path[] = "/tmp/incise-record-XXXXXX";
+
+	if (!mkdtemp(path) || chdir(path))
+		return -1;
+	*state = strdup(path);
+	return 0;
+}
+
+__attribute__((unused)) static int leave_folder(void **state)
+{
+	int rc = chdir("/") || nftw(*state, remove_entry, 8, FTW_DEPTH | FTW_PHYS);
+
+	free(*state);
+	return rc;
+}
+
+__attribute__((unused)) static struct incise_rig *open_rig(const char *spec)
+{
+	struct incise_error err = {0};
+	struct incise_rig *rig = incise_rig_open(spec, BOTH, &err);
+
+	if (!rig)
+		fail_msg("%s", err.text);
+	return rig;
+}
+
+/* Poll until the rig's clock has gone on by so much; stops at a failure. */
+__attribute__((unused)) static int poll_for(struct incise_recorder *recorder,
+					    struct incise_rig *rig, int64_t duration_ns,
+					    struct incise_error *err)
+{
+	struct incise_clock *clock = incise_rig_clock(rig);
+	int64_t end = incise_clock_now(clock) + duration_ns;
+	int rc = 0;
+
+	while (!rc && incise_clock_now(clock) < end) {
+		incise_clock_wait_until(clock, incise_clock_now(clock) + POLL_NS);
+		rc = incise_recorder_poll(recorder, err);
+	}
+	return rc;
+}
+
+/* Record a whole script, or the first duration_ns of it. */
+__attribute__((unused)) static void record(const char *path, const char *spec,
+					   int64_t duration_ns)
+{
+	struct incise_rig *rig = open_rig(spec);
+	struct incise_calibration calibration;
+	struct incise_error err = {0};
+	struct incise_recorder *recorder;
+
+	incise_calibration_nominal(&calibration);
+	recorder = incise_recorder_new(path, rig, &calibration, &err);
+	if (!recorder)
+		fail_msg("%s", err.text);
+	if (!duration_ns)
+		duration_ns = incise_sim_duration(incise_rig_sim(rig));
+	if (poll_for(recorder, rig, duration_ns, &err) ||
+	    incise_recorder_close(recorder, &err))
+		fail_msg("%s", err.text);
+	incise_rig_close(rig);
+}
+
+/* Run SQL on a database, as a stranger would. */
+__attribute__((unused)) static void change(const char *file, const char *sql)
+{
+	char *text = NULL;
+	sqlite3 *db;
+
+	assert_int_equal(sqlite3_open(file, &db), SQLITE_OK);
+	if (sqlite3_exec(db, sql, NULL, NULL, &text) != SQLITE_OK)
+		fail_msg("%s: %s", sql, text);
+	sqlite3_close(db);
+}
+
+/* One number by SQL. */
+__attribute__((unused)) static double ask(const char *file, const char *sql)
+{
+	sqlite3_stmt *stmt;
+	sqlite3 *db;
+	double value;
+
+	assert_int_equal(sqlite3_open_v2(file, &db, SQLITE_OPEN_READONLY, NULL),
+			 SQLITE_OK);
+	if (sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) != SQLITE_OK ||
+	    sqlite3_step(stmt) != SQLITE_ROW)
+		fail_msg("%s: %s", sql, sqlite3_errmsg(db));
+	value = sqlite3_column_double(stmt, 0);
+	sqlite3_finalize(stmt);
+	sqlite3_close(db);
+	return value;
+}
+
+#endif

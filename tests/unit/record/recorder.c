@@ -1,0 +1,639 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Tests of lib/record/recorder.c: on the virtual rig, whose devices are made to fail by
+ * putting other functions before theirs.
+ */
+#include "recorded.h"
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include "../../../lib/device/backend.h"
+#include "../../../lib/record/cut.h"
+
+#define SIM "sim:clock=simulated"
+#define DB "a.rec/recording.db"
+
+static struct incise_recorder *start(const char *path, struct incise_rig *rig)
+{
+	struct incise_calibration calibration;
+	struct incise_error err = {0};
+	struct incise_recorder *recorder;
+
+	incise_calibration_nominal(&calibration);
+	recorder = incise_recorder_new(path, rig, &calibration, &err);
+	if (!recorder)
+		fail_msg("%s", err.text);
+	return recorder;
+}
+
+/* --- values ------------------------------------------------------------------------ */
+
+static void rows_are_the_samples(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_tracker_info info;
+	struct incise_tracker_sample tracker[200];
+	struct incise_force_sample force[12000];
+	sqlite3_stmt *stmt;
+	sqlite3 *db;
+	int n_force, n_tracker, n = 0;
+
+	record("a.rec", SIM, 1000 * MS);
+	/* The same rig gives the same samples again. */
+	incise_clock_wait_until(incise_rig_clock(rig),
+				incise_clock_now(incise_rig_clock(rig)) + 1000 * MS);
+	n_force = incise_force_read(incise_rig_force(rig), force, 12000);
+	n_tracker = incise_tracker_read(incise_rig_tracker(rig), tracker, 200);
+	incise_tracker_info(incise_rig_tracker(rig), &info);
+	assert_true(n_force >= 10000 &&
+		    n_tracker >= 118); /* 10 kHz, 120 Hz less latency */
+
+	assert_int_equal(sqlite3_open(DB, &db), SQLITE_OK);
+	sqlite3_prepare_v2(db, "SELECT * FROM force", -1, &stmt, NULL);
+	for (; sqlite3_step(stmt) == SQLITE_ROW; n++) {
+		assert_int_equal(sqlite3_column_int64(stmt, 0), force[n].seq);
+		assert_int_equal(sqlite3_column_int64(stmt, 1), force[n].t_ns);
+		assert_int_equal(sqlite3_column_int(stmt, 2), force[n].code);
+	}
+	sqlite3_finalize(stmt);
+	assert_int_equal(n, n_force);
+	n = 0;
+	sqlite3_prepare_v2(db,
+			   "SELECT t.*, depth_mm, velocity_mm_s FROM tracker t "
+			   "JOIN depth USING(seq) ORDER BY seq",
+			   -1, &stmt, NULL);
+	for (; sqlite3_step(stmt) == SQLITE_ROW; n++) {
+		assert_int_equal(sqlite3_column_int64(stmt, 0), tracker[n].seq);
+		assert_int_equal(sqlite3_column_int64(stmt, 1),
+				 tracker[n].t_ns - info.latency_ns);
+		assert_int_equal(sqlite3_column_int64(stmt, 2), tracker[n].t_ns);
+		/* doubles are kept bit by bit */
+		for (int i = 0; i < 3; i++)
+			assert_true(sqlite3_column_double(stmt, 3 + i) ==
+				    tracker[n].position_mm[i]);
+		for (int i = 0; i < 4; i++)
+			assert_true(sqlite3_column_double(stmt, 6 + i) ==
+				    tracker[n].quaternion[i]);
+		assert_string_equal(sqlite3_column_text(stmt, 10), " ");
+		/* the default surface is z = 0 */
+		assert_true(sqlite3_column_double(stmt, 11) ==
+			    -tracker[n].position_mm[2]);
+		assert_true(sqlite3_column_double(stmt, 12) >= 0);
+	}
+	sqlite3_finalize(stmt);
+	sqlite3_close(db);
+	assert_int_equal(n, n_tracker);
+	incise_rig_close(rig);
+}
+
+static void closed_recording_is_one_file(void **state)
+{
+	record("a.rec", SIM, 700 * MS);
+	assert_int_equal(access("a.rec.part", F_OK), -1);
+	assert_int_equal(access(DB "-wal", F_OK), -1);
+	assert_int_equal(access(DB "-shm", F_OK), -1);
+	assert_int_equal((int)ask(DB, "SELECT value FROM meta WHERE key='complete'"), 1);
+	assert_int_equal((int)ask(DB, "SELECT count(*) FROM events WHERE kind IN "
+				      "('start', 'zero', 'end')"),
+			 3);
+	assert_int_equal((int)ask(DB, "SELECT count(*) FROM pragma_integrity_check "
+				      "WHERE integrity_check = 'ok'"),
+			 1);
+}
+
+static void zero_is_the_mean_at_rest(void **state)
+{
+	record("a.rec", SIM, 1500 * MS);
+	/* Noise of 3 mV over 5000 samples: sd of the mean 0.042 mV; five of them, and the
+	 * converter's rounding, which noise of 2.5 LSB spreads out evenly. */
+	assert_true(fabs(ask(DB, "SELECT value FROM meta WHERE key='force_zero_mV'") -
+			 180) < 0.22);
+	assert_int_equal(
+		(int)ask(DB, "SELECT value FROM meta WHERE key='force_zero_samples'"),
+		5000);
+	/* and it is that mean to the last digits */
+	assert_true(
+		fabs(ask(DB,
+			 "SELECT value - (SELECT avg(code) * 5000.0 / 4096 FROM force "
+			 "WHERE seq < 5000) FROM meta WHERE key='force_zero_mV'")) <
+		1e-9);
+}
+
+static void given_zero_is_taken(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_calibration calibration = {
+		.force_mV_N = 1000, .force_zero_mV = 200, .depth_mm_px = 0.1};
+	struct incise_error err = {0};
+	struct incise_recorder *rec =
+		incise_recorder_new("a.rec", rig, &calibration, &err);
+	struct incise_recorder_stats stats;
+
+	assert_non_null(rec);
+	incise_recorder_stats(rec, &stats);
+	assert_true(stats.zero_mV == 200);
+	assert_int_equal(poll_for(rec, rig, 100 * MS, &err), 0);
+	incise_recorder_stats(rec, &stats);
+	/* 180 mV with noise of 3 mV, rounded to 1.2 mV: five sd and a half LSB */
+	assert_true(fabs(stats.force_N - (180 - 200) / 1000.0) < 0.016);
+	assert_int_equal(incise_recorder_close(rec, &err), 0);
+	assert_int_equal((int)ask(DB, "SELECT value FROM meta WHERE key='force_mV_N'"),
+			 1000);
+	incise_rig_close(rig);
+}
+
+static void short_recording_makes_do(void **state)
+{
+	record("a.rec", SIM, 100 * MS);
+	/* 1000 samples: sd of the mean 0.095 mV, five of them */
+	assert_true(fabs(ask(DB, "SELECT value FROM meta WHERE key='force_zero_mV'") -
+			 180) < 0.5);
+}
+
+static void stats_count_what_is_written(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recorder_stats stats;
+	struct incise_error err = {0};
+
+	incise_recorder_stats(rec, &stats);
+	assert_true(!stats.force && !stats.tracker && isnan(stats.zero_mV));
+	assert_int_equal(poll_for(rec, rig, 4000 * MS, &err), 0);
+	incise_recorder_stats(rec, &stats);
+	assert_true(stats.depth_mm > INCISE_CUT_BEGIN_MM); /* a cut is under way */
+	assert_true(stats.force_N > 0);
+	assert_int_equal(stats.force_lost + stats.tracker_lost, 0);
+	assert_int_equal(incise_recorder_close(rec, &err), 0);
+	assert_int_equal(stats.force, (int)ask(DB, "SELECT count(*) FROM force"));
+	assert_int_equal(stats.tracker, (int)ask(DB, "SELECT count(*) FROM tracker"));
+	assert_int_equal(stats.depth, (int)ask(DB, "SELECT count(*) FROM depth"));
+	incise_rig_close(rig);
+}
+
+/* --- names -------------------------------------------------------------------------- */
+
+static void refused(const char *path, struct incise_rig *rig, int code, const char *text)
+{
+	struct incise_calibration calibration;
+	struct incise_error err = {0};
+
+	incise_calibration_nominal(&calibration);
+	errno = 0;
+	assert_null(incise_recorder_new(path, rig, &calibration, &err));
+	if (errno != code || err.code != code || !strstr(err.text, text))
+		fail_msg("%s: errno %d, %d: %s", path, errno, err.code, err.text);
+}
+
+static void existing_names_are_refused(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_rig *bare = incise_rig_open(SIM, INCISE_RIG_FORCE, NULL);
+
+	assert_non_null(bare);
+	mkdir("there.rec", 0777);
+	mkdir("left.rec.part", 0777);
+	fclose(fopen("file.rec", "w"));
+	symlink("nowhere", "link.rec");
+	refused("there.rec", rig, EEXIST, "there.rec: exists already");
+	refused("there.rec///", rig, EEXIST, "there.rec: exists already");
+	refused("file.rec", rig, EEXIST, "exists already");
+	refused("link.rec", rig, EEXIST, "exists already");
+	refused("left.rec", rig, EEXIST,
+		"left.rec.part: left by an interrupted recording");
+	refused("no/such/a.rec", rig, ENOENT, "no/such/");
+	refused("file.rec/a.rec", rig, ENOTDIR, "file.rec/");
+	refused("", rig, EINVAL, "no name");
+	refused("..", rig, EINVAL, "no name");
+	refused("a.rec", bare, ENODEV, "needs a tracker");
+	assert_int_equal(access("a.rec.part", F_OK), -1);
+	assert_int_equal(access("there.rec.part", F_OK), -1);
+	incise_rig_close(rig);
+	incise_rig_close(bare);
+}
+
+static void name_taken_meanwhile_is_kept(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_error err = {0};
+	struct incise_recording *recording;
+
+	assert_int_equal(poll_for(rec, rig, 600 * MS, &err), 0);
+	mkdir("a.rec", 0777);
+	assert_int_equal(incise_recorder_close(rec, &err), -EEXIST);
+	assert_non_null(strstr(err.text, "stays under the name a.rec.part"));
+	recording = incise_recording_open("a.rec.part", &err);
+	assert_non_null(recording);
+	incise_recording_close(recording);
+	incise_rig_close(rig);
+}
+
+/* --- kills -------------------------------------------------------------------------- */
+
+/* Record in another process; it tells the start of each poll and never closes. */
+static pid_t record_forever(const char *spec, int64_t duration_ns, int *polls)
+{
+	int pipes[2];
+	pid_t pid;
+
+	assert_int_equal(pipe(pipes), 0);
+	pid = fork();
+	if (!pid) {
+		struct incise_rig *rig = open_rig(spec);
+		struct incise_clock *clock = incise_rig_clock(rig);
+		struct incise_recorder *rec = start("a.rec", rig);
+		int64_t end = incise_clock_now(clock) + duration_ns;
+
+		while (incise_clock_now(clock) < end) {
+			int64_t now;
+
+			incise_clock_wait_until(clock, incise_clock_now(clock) + POLL_NS);
+			now = incise_clock_now(clock);
+			if (incise_recorder_poll(rec, NULL) ||
+			    write(pipes[1], &now, sizeof(now)) != sizeof(now))
+				_exit(1);
+		}
+		_exit(0);
+	}
+	close(pipes[1]);
+	*polls = pipes[0];
+	return pid;
+}
+
+static void killed_recording_is_readable(const char *spec, int64_t duration_ns,
+					 int signal)
+{
+	int64_t first = 0, last = 0, t;
+	struct incise_recording_info info;
+	struct incise_recording *recording;
+	struct incise_error err = {0};
+	int status, polls;
+	pid_t pid = record_forever(spec, duration_ns, &polls);
+
+	while (read(polls, &t, sizeof(t)) == sizeof(t)) {
+		first = first ? first : t;
+		last = t;
+		if (signal && last - first > 800 * MS)
+			break;
+	}
+	if (signal)
+		kill(pid, signal);
+	assert_int_equal(waitpid(pid, &status, 0), pid);
+	assert_true(signal ? WIFSIGNALED(status) : WEXITSTATUS(status) == 0);
+	while (read(polls, &t, sizeof(t)) == sizeof(t))
+		last = t;
+	close(polls);
+
+	assert_int_equal(access("a.rec", F_OK), -1);
+	recording = incise_recording_open("a.rec", &err); /* finds a.rec.part */
+	if (!recording || incise_recording_info(recording, &info, &err))
+		fail_msg("%s", err.text);
+	assert_false(info.complete);
+	assert_int_equal(info.force_lost, 0);
+	/* One commit per 100 ms, one more force period because samples lie on a grid. */
+	if (last - info.end_ns > 100 * MS + 100000)
+		fail_msg("%.1f ms lost", (last - info.end_ns) * 1e-6);
+	assert_true(info.tracker > 0 && fabs(info.zero_mV - 180) < 0.22);
+	incise_recording_close(recording);
+}
+
+static void exit_without_close(void **state)
+{
+	killed_recording_is_readable(SIM, 3050 * MS, 0);
+}
+
+static void sigkill(void **state)
+{
+	killed_recording_is_readable("sim:clock=real", 20000 * MS, SIGKILL);
+}
+
+static void interrupted_recording_knows_its_losses(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recording_info info;
+	struct incise_recording *recording;
+	struct incise_error err = {0};
+	pid_t pid = fork();
+
+	if (!pid) {
+		poll_for(rec, rig, 1000 * MS, &err);
+		/* The virtual devices hold some seconds; a minute is too much for them. */
+		incise_clock_wait_until(incise_rig_clock(rig),
+					incise_clock_now(incise_rig_clock(rig)) +
+						60000 * MS);
+		poll_for(rec, rig, 200 * MS, &err);
+		_exit(0);
+	}
+	waitpid(pid, NULL, 0);
+	recording = incise_recording_open("a.rec", &err);
+	if (!recording || incise_recording_info(recording, &info, &err))
+		fail_msg("%s", err.text);
+	/* At least half of the 600000 and 7200. */
+	assert_true(info.force_lost > 300000 && info.tracker_lost > 3600);
+	/* The numbers tell the same. */
+	assert_int_equal(info.force_lost,
+			 (int)ask("a.rec.part/recording.db",
+				  "SELECT max(seq) + 1 - count(*) FROM force"));
+	assert_int_equal((int)ask("a.rec.part/recording.db",
+				  "SELECT count(*) FROM events WHERE kind = 'lost'"),
+			 2);
+	incise_recording_close(recording);
+	incise_recorder_close(rec, NULL); /* the parent's own, of no further use */
+	incise_rig_close(rig);
+}
+
+/* --- faults of devices --------------------------------------------------------------- */
+
+/* What a fault does to the samples of one read; returns how many, or -errno. */
+static int (*force_fault)(struct incise_force_sample *samples, int n);
+static int (*tracker_fault)(struct incise_tracker_sample *samples, int n);
+static struct incise_force_ops force_ops;
+static struct incise_tracker_ops tracker_ops;
+static const struct incise_force_ops *force_real;
+static const struct incise_tracker_ops *tracker_real;
+
+static int faulty_force(struct incise_force *force, struct incise_force_sample *samples,
+			int n)
+{
+	n = force_real->read(force, samples, n);
+	return n > 0 && force_fault ? force_fault(samples, n) : n;
+}
+
+static int faulty_tracker(struct incise_tracker *tracker,
+			  struct incise_tracker_sample *samples, int n)
+{
+	n = tracker_real->read(tracker, samples, n);
+	return n > 0 && tracker_fault ? tracker_fault(samples, n) : n;
+}
+
+static struct incise_rig *faulty_rig(void)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_force *force = incise_rig_force(rig);
+	struct incise_tracker *tracker = incise_rig_tracker(rig);
+
+	force_real = force->ops;
+	tracker_real = tracker->ops;
+	force_ops = *force_real;
+	tracker_ops = *tracker_real;
+	force_ops.read = faulty_force;
+	tracker_ops.read = faulty_tracker;
+	force->ops = &force_ops;
+	tracker->ops = &tracker_ops;
+	force_fault = NULL;
+	tracker_fault = NULL;
+	return rig;
+}
+
+static int gone(struct incise_force_sample *samples, int n)
+{
+	return samples[0].seq > 8000 ? -ENODEV : n;
+}
+
+static int repeated(struct incise_force_sample *samples, int n)
+{
+	if (samples[0].seq > 8000)
+		samples[0].seq = 5;
+	return n;
+}
+
+static int too_large(struct incise_force_sample *samples, int n)
+{
+	if (samples[0].seq > 8000)
+		samples[0].code = 4096;
+	return n;
+}
+
+static int broken_wire(struct incise_force_sample *samples, int n)
+{
+	for (int i = 0; i < n; i++)
+		samples[i].code = 4095;
+	return n;
+}
+
+static int shaken(struct incise_force_sample *samples, int n)
+{
+	/* ±0.1 N at 1240 mV/N are ±102 codes */
+	for (int i = 0; i < n; i++)
+		samples[i].code += samples[i].seq / 100 % 2 ? 102 : -102;
+	return n;
+}
+
+static int in_tissue(struct incise_tracker_sample *samples, int n)
+{
+	for (int i = 0; i < n; i++)
+		samples[i].position_mm[2] = -2;
+	return n;
+}
+
+static void failures_of_devices(void **state)
+{
+	static const struct {
+		const char *what;
+		int (*force)(struct incise_force_sample *samples, int n);
+		int (*tracker)(struct incise_tracker_sample *samples, int n);
+		int rc;
+		const char *text;
+		bool kept; /* a .part stays */
+	} cases[] = {
+		{"unplugged", gone, NULL, -ENODEV, "is gone", true},
+		{"number twice", repeated, NULL, -EIO, "came after", true},
+		{"code out of range", too_large, NULL, -EIO, "4096 is not within", true},
+		{"clipping at rest", broken_wire, NULL, -EBUSY, "end of its range",
+		 false},
+		{"shaken at rest", shaken, NULL, -EBUSY, "the force varied by 0.10",
+		 false},
+		{"blade in the tissue", NULL, in_tissue, -EBUSY, "2.0 mm deep", false},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_rig *rig = faulty_rig();
+		struct incise_recorder *rec = start("a.rec", rig);
+		struct incise_recording *recording;
+		struct incise_error err = {0};
+
+		force_fault = cases[i].force;
+		tracker_fault = cases[i].tracker;
+		if (poll_for(rec, rig, 2000 * MS, &err) != cases[i].rc ||
+		    !strstr(err.text, cases[i].text))
+			fail_msg("%s: %s", cases[i].what, err.text);
+		assert_int_equal(incise_recorder_poll(rec, &err), cases[i].rc);
+		assert_int_equal(incise_recorder_close(rec, &err), cases[i].rc);
+		assert_int_equal(access("a.rec", F_OK), -1);
+		assert_int_equal(access("a.rec.part", F_OK), cases[i].kept ? 0 : -1);
+		if (cases[i].kept) {
+			recording = incise_recording_open("a.rec", &err);
+			if (!recording)
+				fail_msg("%s: %s", cases[i].what, err.text);
+			incise_recording_close(recording);
+			assert_int_equal(system("rm -r a.rec.part"), 0);
+		}
+		incise_rig_close(rig);
+	}
+}
+
+static int lossy(struct incise_force_sample *samples, int n)
+{
+	memmove(samples + 20, samples + 23, (n - 23) * sizeof(*samples));
+	return n - 3;
+}
+
+static int doubtful(struct incise_tracker_sample *samples, int n)
+{
+	for (int i = 0; i < n; i++) {
+		if (samples[i].seq == 50)
+			samples[i].position_mm[1] = NAN;
+		if (samples[i].seq == 60) {
+			samples[i].status = 'x';
+			samples[i].position_mm[2] = 1e3;
+		}
+	}
+	return n;
+}
+
+static void losses_are_counted_and_doubts_kept(void **state)
+{
+	struct incise_rig *rig = faulty_rig();
+	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recorder_stats stats;
+	struct incise_error err = {0};
+
+	force_fault = lossy;
+	tracker_fault = doubtful;
+	assert_int_equal(poll_for(rec, rig, 1000 * MS, &err), 0);
+	incise_recorder_stats(rec, &stats);
+	assert_int_equal(incise_recorder_close(rec, &err), 0);
+	assert_int_equal(stats.force_lost, 300); /* 3 in each of 100 polls */
+	assert_int_equal(stats.tracker_lost, 1);
+	assert_int_equal((int)ask(DB, "SELECT value FROM meta WHERE key='force_lost'"),
+			 300);
+	assert_int_equal((int)ask(DB, "SELECT count(*) FROM tracker WHERE seq = 50"), 0);
+	assert_int_equal((int)ask(DB, "SELECT count(*) FROM tracker WHERE status = 'x'"),
+			 1);
+	assert_int_equal((int)ask(DB, "SELECT count(*) FROM depth WHERE seq IN (50, 60)"),
+			 0);
+	incise_rig_close(rig);
+}
+
+/* --- full disk ----------------------------------------------------------------------- */
+
+/*
+ * A limit on the size of files stands in for a full disk, which needs a mount: write(2)
+ * fails with EFBIG instead of ENOSPC, and the recorder takes both for the same. That
+ * SQLITE_FULL becomes ENOSPC is tested in schema.c.
+ */
+static void full_disk_keeps_what_was_committed(void **state)
+{
+	struct rlimit before, limit;
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recording_info info;
+	struct incise_recording *recording;
+	struct incise_error err = {0}, second = {0};
+
+	signal(SIGXFSZ, SIG_IGN);
+	getrlimit(RLIMIT_FSIZE, &before);
+	limit = before;
+	limit.rlim_cur = 400000;
+	setrlimit(RLIMIT_FSIZE, &limit);
+	assert_int_equal(poll_for(rec, rig, 60000 * MS, &err), -ENOSPC);
+	assert_int_equal(incise_recorder_close(rec, &second), -ENOSPC);
+	setrlimit(RLIMIT_FSIZE, &before);
+	assert_non_null(strstr(err.text, "a.rec: disk full"));
+	assert_non_null(strstr(err.text, "a.rec.part: `incise info` reads it"));
+
+	recording = incise_recording_open("a.rec", &err);
+	if (!recording || incise_recording_info(recording, &info, &err))
+		fail_msg("%s", err.text);
+	assert_false(info.complete);
+	assert_true(info.force >= 1000); /* at least one commit of 100 ms */
+	incise_recording_close(recording);
+	incise_rig_close(rig);
+}
+
+/* The script that records most: what is full only at the end fails there, and stays. */
+static void full_disk_at_the_end(void **state)
+{
+	struct rlimit before, limit;
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recording *recording;
+	struct incise_error err = {0};
+	struct stat st;
+
+	signal(SIGXFSZ, SIG_IGN);
+	assert_int_equal(poll_for(rec, rig, 1000 * MS, &err), 0);
+	assert_int_equal(stat("a.rec.part/recording.db-wal", &st), 0);
+	getrlimit(RLIMIT_FSIZE, &before);
+	limit = before;
+	limit.rlim_cur = st.st_size;
+	setrlimit(RLIMIT_FSIZE, &limit);
+	assert_int_equal(incise_recorder_close(rec, &err), -ENOSPC);
+	setrlimit(RLIMIT_FSIZE, &before);
+	assert_int_equal(access("a.rec", F_OK), -1);
+	recording = incise_recording_open("a.rec", &err);
+	if (!recording)
+		fail_msg("%s", err.text);
+	incise_recording_close(recording);
+	incise_rig_close(rig);
+}
+
+static void reader_does_not_stop_the_end(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recording_info info;
+	struct incise_recording *recording;
+	struct incise_error err = {0};
+
+	assert_int_equal(poll_for(rec, rig, 600 * MS, &err), 0);
+	recording = incise_recording_open("a.rec", &err); /* live */
+	if (!recording || incise_recording_info(recording, &info, &err))
+		fail_msg("%s", err.text);
+	assert_false(info.complete);
+	assert_int_equal(poll_for(rec, rig, 600 * MS, &err), 0);
+	if (incise_recorder_close(rec, &err))
+		fail_msg("%s", err.text);
+	incise_recording_close(recording);
+	recording = incise_recording_open("a.rec", &err);
+	if (!recording || incise_recording_info(recording, &info, &err))
+		fail_msg("%s", err.text);
+	assert_true(info.complete);
+	assert_true(info.force >= 12000); /* 1.2 s */
+	incise_recording_close(recording);
+	incise_rig_close(rig);
+}
+
+static void closing_nothing(void **state)
+{
+	assert_int_equal(incise_recorder_close(NULL, NULL), 0);
+}
+
+#define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, enter_folder, leave_folder)
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		IN_FOLDER(rows_are_the_samples),
+		IN_FOLDER(closed_recording_is_one_file),
+		IN_FOLDER(zero_is_the_mean_at_rest),
+		IN_FOLDER(given_zero_is_taken),
+		IN_FOLDER(short_recording_makes_do),
+		IN_FOLDER(stats_count_what_is_written),
+		IN_FOLDER(existing_names_are_refused),
+		IN_FOLDER(name_taken_meanwhile_is_kept),
+		IN_FOLDER(exit_without_close),
+		IN_FOLDER(sigkill),
+		IN_FOLDER(interrupted_recording_knows_its_losses),
+		IN_FOLDER(failures_of_devices),
+		IN_FOLDER(losses_are_counted_and_doubts_kept),
+		IN_FOLDER(full_disk_keeps_what_was_committed),
+		IN_FOLDER(full_disk_at_the_end),
+		IN_FOLDER(reader_does_not_stop_the_end),
+		cmocka_unit_test(closing_nothing),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

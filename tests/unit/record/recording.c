@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Tests of lib/record/recording.c: what a recording says of itself, and that no damaged
+ * one is believed.
+ */
+#include "recorded.h"
+#include <fcntl.h>
+
+#define DB "a.rec/recording.db"
+
+/* Open and read all of it. Returns 0 or the negative errno; err has the line. */
+static int read_all(const char *path, struct incise_recording_info *info,
+		    struct incise_error *err)
+{
+	struct incise_recording *recording = incise_recording_open(path, err);
+	int rc;
+
+	if (!recording) {
+		assert_int_equal(errno, err->code);
+		return -errno;
+	}
+	rc = incise_recording_info(recording, info, err);
+	incise_recording_close(recording);
+	return rc;
+}
+
+static void info_tells_what_the_tables_hold(void **state)
+{
+	struct incise_recording_info info;
+	struct incise_error err = {0};
+
+	record("a.rec", SHORT_SCRIPT, 0);
+	if (read_all("a.rec", &info, &err))
+		fail_msg("%s", err.text);
+	assert_true(info.complete);
+	assert_int_equal(info.force, (int)ask(DB, "SELECT count(*) FROM force"));
+	assert_int_equal(info.tracker, (int)ask(DB, "SELECT count(*) FROM tracker"));
+	assert_int_equal(info.depth, info.tracker);
+	assert_true(info.start_ns == ask(DB, "SELECT min(t_ns) FROM force"));
+	assert_true(info.end_ns == ask(DB, "SELECT max(t_ns) FROM force"));
+	assert_int_equal(info.force_lost + info.tracker_lost + info.force_clipped, 0);
+	assert_string_equal(info.rig, SHORT_SCRIPT);
+	assert_int_equal(strlen(info.started), strlen("2026-01-01T00:00:00Z"));
+	assert_int_equal(info.bits, 12);
+	assert_true(info.full_scale_V == 5 && info.force_mV_N == 1240);
+	assert_true(info.depth_mm_px == 0.11875);
+	assert_true(info.surface_normal[2] == 1 && info.surface_point_mm[2] == 0);
+	assert_int_equal(info.cuts, 14); /* 3 + 4 + 4 + 3 */
+	/* A sample lies between two rows, so it is at most as deep as the deepest row. */
+	assert_true(info.depth_max_mm <= ask(DB, "SELECT max(depth_mm) FROM depth"));
+	assert_true(info.depth_max_mm > 19 && info.depth_max_mm < 22); /* 20 nominal */
+	assert_true(info.force_max_N > 1); /* 2.6 N by the model at 20 mm and 25 mm/s */
+}
+
+static void paths_that_lead_to_a_recording(void **state)
+{
+	struct incise_recording_info info;
+	struct incise_error err = {0};
+	char path[300];
+
+	record("a.rec", "sim:clock=simulated", 100 * MS);
+	snprintf(path, sizeof(path), "%s/a.rec//", (char *)*state);
+	assert_int_equal(read_all("a.rec/", &info, &err), 0);
+	assert_int_equal(read_all("./a.rec", &info, &err), 0);
+	assert_int_equal(read_all(path, &info, &err), 0);
+	assert_int_equal(rename("a.rec", "a.rec.part"), 0);
+	assert_int_equal(read_all("a.rec", &info, &err), 0);
+	assert_int_equal(read_all("a.rec/", &info, &err), 0);
+	assert_int_equal(read_all("a.rec.part", &info, &err), 0);
+}
+
+static void no_recording(void **state)
+{
+	static const struct {
+		const char *path;
+		int rc;
+		const char *text;
+	} cases[] = {
+		{"none.rec", -ENOENT, "none.rec: there is no such recording"},
+		{"", -ENOENT, "no such recording"},
+		{"file.rec", -EINVAL, "no recording.db"},
+		{"empty.rec", -EINVAL, "no recording.db"},
+		{"folder.rec", -EINVAL, "is no file"},
+		{"garbage.rec", -EINVAL, "file is not a database"},
+		{"nothing.rec", -EINVAL, "not made by incise"},
+		{"text\nfile.rec", -ENOENT, "text?file.rec"},
+	};
+	struct incise_recording_info info;
+	FILE *file;
+
+	mkdir("empty.rec", 0777);
+	mkdir("folder.rec", 0777);
+	mkdir("folder.rec/recording.db", 0777);
+	mkdir("garbage.rec", 0777);
+	mkdir("nothing.rec", 0777);
+	fclose(fopen("file.rec", "w"));
+	fclose(fopen("nothing.rec/recording.db", "w"));
+	file = fopen("garbage.rec/recording.db", "w");
+	for (int i = 0; i < 5000; i++)
+		fputs("garbage ", file);
+	fclose(file);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		if (read_all(cases[i].path, &info, &err) != cases[i].rc ||
+		    !strstr(err.text, cases[i].text))
+			fail_msg("%s: %d, %s", cases[i].path, err.code, err.text);
+	}
+}
+
+/* Each change alone, on a fresh copy of a good recording. */
+static void damage_is_found(void **state)
+{
+	static const struct {
+		const char *sql, *text;
+	} cases[] = {
+		{"UPDATE force SET code = -1 WHERE seq = 100",
+		 "table force, row 100: code"},
+		{"UPDATE force SET code = 4096 WHERE seq = 100",
+		 "table force, row 100: code"},
+		{"UPDATE force SET code = 99999999999 WHERE seq = 100", "row 100: code"},
+		{"UPDATE force SET code = 'NaN' WHERE seq = 100", "row 100: code"},
+		{"UPDATE force SET code = 1.5 WHERE seq = 100", "row 100: code"},
+		{"UPDATE force SET code = x'00' WHERE seq = 100", "row 100: code"},
+		{"UPDATE force SET t_ns = 'soon' WHERE seq = 100",
+		 "row 100: t_ns is no time"},
+		{"UPDATE force SET t_ns = -1 WHERE seq = 0", "row 0: t_ns is no time"},
+		{"UPDATE force SET t_ns = 5 WHERE seq = 100",
+		 "row 100: t_ns does not increase"},
+		{"UPDATE force SET t_ns = (SELECT t_ns FROM force WHERE seq = 99) WHERE seq = 100",
+		 "row 100: t_ns does not increase"},
+		{"DELETE FROM force WHERE seq = 100", "table force has"},
+		{"DELETE FROM depth WHERE seq = 10", "table depth has"},
+		{"DELETE FROM depth WHERE seq > 10", "table depth has 11 rows"},
+		{"DELETE FROM tracker", "table tracker has 0 rows"},
+		{"UPDATE depth SET depth_mm = 'NaN' WHERE seq = 10", "row 10: depth_mm"},
+		{"UPDATE depth SET depth_mm = 9e999 WHERE seq = 10", "row 10: depth_mm"},
+		{"UPDATE depth SET velocity_mm_s = -1.0 WHERE seq = 10",
+		 "row 10: velocity"},
+		{"UPDATE depth SET velocity_mm_s = 9e999 WHERE seq = 10",
+		 "row 10: velocity"},
+		{"UPDATE depth SET t_ns = 0 WHERE seq = 10",
+		 "row 10: t_ns does not increase"},
+		/* the last one, after the last force sample */
+		{"UPDATE depth SET t_ns = 0 WHERE seq = (SELECT max(seq) FROM depth)",
+		 "t_ns does not increase"},
+		{"UPDATE tracker SET x_mm = 'here' WHERE seq = 7",
+		 "table tracker, row 7"},
+		{"UPDATE tracker SET qw = 9e999 WHERE seq = 7", "table tracker, row 7"},
+		{"UPDATE tracker SET t_ns = 1 WHERE seq = 7", "table tracker, row 7"},
+		{"DELETE FROM meta WHERE key = 'rig'", "'rig' in table meta is missing"},
+		{"UPDATE meta SET value = 7 WHERE key = 'rig'",
+		 "'rig' in table meta is no value"},
+		{"UPDATE meta SET value = -7 WHERE key = 'force_rows'", "'force_rows'"},
+		{"UPDATE meta SET value = 1 WHERE key = 'force_rows'", "table force has"},
+		{"UPDATE meta SET value = 0 WHERE key = 'force_bits'", "0 bits"},
+		{"UPDATE meta SET value = 64 WHERE key = 'force_bits'", "64 bits"},
+		{"UPDATE meta SET value = 0.0 WHERE key = 'force_mV_N'", "0 mV/N"},
+		{"UPDATE meta SET value = 9e999 WHERE key = 'force_mV_N'",
+		 "'force_mV_N'"},
+		{"UPDATE meta SET value = -5.0 WHERE key = 'force_full_scale_V'", "-5 V"},
+		{"UPDATE meta SET value = 'x' WHERE key = 'force_zero_mV'",
+		 "'force_zero_mV'"},
+		{"PRAGMA application_id = 7", "not made by incise"},
+		{"PRAGMA user_version = 99", "newer incise"},
+		{"DROP TABLE depth; CREATE VIEW depth AS SELECT seq, t_ns, 1.0 AS depth_mm, 1.0 "
+		 "AS velocity_mm_s FROM tracker",
+		 "table 'depth' is missing"},
+		{"DROP TABLE events", "table 'events' is missing"},
+	};
+	struct incise_recording_info info;
+
+	record("good.rec", "sim:clock=simulated", 300 * MS);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
+		change(DB, cases[i].sql);
+		if (read_all("a.rec", &info, &err) != -EINVAL ||
+		    !strstr(err.text, cases[i].text) || strchr(err.text, '\n'))
+			fail_msg("%s: %d, %s", cases[i].sql, err.code, err.text);
+	}
+}
+
+static void truncated_file_is_found(void **state)
+{
+	struct incise_recording_info info;
+	struct stat st;
+
+	record("a.rec", "sim:clock=simulated", 1000 * MS);
+	assert_int_equal(stat(DB, &st), 0);
+	/* Any length short of the whole: odd ones, whole pages, the bare header. */
+	for (off_t size = st.st_size - 1; size > 0;
+	     size = size > 8192 ? size - 8191 : size - 97) {
+		struct incise_error err = {0};
+		int rc;
+
+		assert_int_equal(truncate(DB, size), 0);
+		rc = read_all("a.rec", &info, &err);
+		if (rc != -EINVAL)
+			fail_msg("%ld bytes: %d, %s", (long)size, rc, err.text);
+	}
+}
+
+/*
+ * Bytes at random places: often harmless (unused space, a digit of a number), but never
+ * a crash, an endless loop or a number that is not finite. Run under sanitizers too.
+ */
+static void flipped_bytes_do_no_harm(void **state)
+{
+	uint32_t seed = 7;
+	struct stat st;
+	int found = 0;
+
+	record("good.rec", "sim:clock=simulated", 300 * MS);
+	assert_int_equal(stat("good.rec/recording.db", &st), 0);
+	for (int round = 0; round < 200; round++) {
+		struct incise_recording_info info;
+		struct incise_error err = {0};
+		int fd, rc;
+
+		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
+		fd = open(DB, O_WRONLY);
+		for (int i = 0; i < 4; i++) {
+			unsigned char byte = seed >> 24;
+
+			seed = seed * 1664525 + 1013904223;
+			assert_int_equal(pwrite(fd, &byte, 1,
+						(uint64_t)seed * st.st_size >> 32),
+					 1);
+			seed = seed * 1664525 + 1013904223;
+		}
+		close(fd);
+		rc = read_all("a.rec", &info, &err);
+		if (rc && (rc != -EINVAL || !err.text[0]))
+			fail_msg("round %d: %d, %s", round, rc, err.text);
+		if (!rc)
+			assert_true(isfinite(info.depth_max_mm) &&
+				    isfinite(info.force_max_N));
+		found += rc != 0;
+	}
+	assert_true(found > 20); /* the check itself works: most bytes matter */
+}
+
+static void text_of_a_stranger_is_harmless(void **state)
+{
+	struct incise_recording_info info;
+	struct incise_error err = {0};
+
+	record("a.rec", "sim:clock=simulated", 100 * MS);
+	change(DB, "UPDATE meta SET value = 'sim:' || char(27) || '[2J' || char(10) || "
+		   "replace(hex(zeroblob(5000)), '0', 'x') WHERE key = 'rig'");
+	assert_int_equal(read_all("a.rec", &info, &err), 0);
+	assert_int_equal(strncmp(info.rig, "sim:?[2J?xxx", 12), 0);
+	assert_int_equal(strlen(info.rig), sizeof(info.rig) - 1);
+}
+
+static void interrupted_before_the_zero(void **state)
+{
+	struct incise_recording_info info;
+	struct incise_error err = {0};
+
+	record("a.rec", "sim:clock=simulated", 100 * MS);
+	change(DB, "UPDATE meta SET value = NULL WHERE key = 'force_zero_mV'");
+	assert_int_equal(read_all("a.rec", &info, &err), 0);
+	assert_true(isnan(info.zero_mV) && info.force_max_N == 0);
+}
+
+static void read_only_medium(void **state)
+{
+	struct incise_recording_info info;
+	struct incise_error err = {0};
+	int rc;
+
+	record("a.rec", "sim:clock=simulated", 100 * MS);
+	chmod(DB, 0444);
+	chmod("a.rec", 0555);
+	rc = read_all("a.rec", &info, &err);
+	chmod("a.rec", 0755);
+	assert_int_equal(rc, 0);
+}
+
+static void closing_nothing(void **state)
+{
+	incise_recording_close(NULL);
+}
+
+#define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, enter_folder, leave_folder)
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		IN_FOLDER(info_tells_what_the_tables_hold),
+		IN_FOLDER(paths_that_lead_to_a_recording),
+		IN_FOLDER(no_recording),
+		IN_FOLDER(damage_is_found),
+		IN_FOLDER(truncated_file_is_found),
+		IN_FOLDER(flipped_bytes_do_no_harm),
+		IN_FOLDER(text_of_a_stranger_is_harmless),
+		IN_FOLDER(interrupted_before_the_zero),
+		IN_FOLDER(read_only_medium),
+		cmocka_unit_test(closing_nothing),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Tests of lib/record/schema.c.
+ */
+#include "recorded.h"
+#include "../../../lib/record/schema.h"
+
+/* A new schema, changed by some SQL, is checked. */
+static void check(const char *sql, int expected, const char *text)
+{
+	struct incise_error err = {0};
+	sqlite3 *db;
+	int rc;
+
+	assert_int_equal(sqlite3_open(":memory:", &db), SQLITE_OK);
+	assert_int_equal(incise_schema_create(db), SQLITE_OK);
+	assert_int_equal(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
+	rc = incise_schema_check(db, "x.rec", &err);
+	if (rc != expected || !strstr(err.text, text))
+		fail_msg("%s: %d, %s", sql, rc, err.text);
+	sqlite3_close(db);
+}
+
+static void only_the_own_form_is_taken(void **state)
+{
+	static const struct {
+		const char *sql;
+		int rc;
+		const char *text;
+	} cases[] = {
+		{"", 0, ""},
+		/* what others add does not hurt */
+		{"CREATE TABLE mine(a); CREATE INDEX i ON force(t_ns)", 0, ""},
+		{"PRAGMA application_id=1", -EINVAL, "not made by incise"},
+		{"PRAGMA user_version=2", -EINVAL, "newer incise"},
+		{"PRAGMA user_version=0", -EINVAL, "damaged"},
+		{"PRAGMA user_version=-1", -EINVAL, "damaged"},
+		{"DROP TABLE force", -EINVAL, "table 'force' is missing"},
+		{"ALTER TABLE force ADD COLUMN x", -EINVAL, "not as incise makes it"},
+		{"DROP TABLE depth; CREATE VIEW depth AS SELECT 1 AS seq, 2 AS t_ns",
+		 -EINVAL, "table 'depth' is missing"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
+		check(cases[i].sql, cases[i].rc, cases[i].text);
+}
+
+static void errors_have_their_errno(void **state)
+{
+	sqlite3_stmt *stmt;
+	sqlite3 *db;
+
+	assert_int_equal(incise_schema_errno(NULL), ENOMEM);
+
+	/* SQLite's own limit of pages gives SQLITE_FULL, as a full disk does. */
+	assert_int_equal(sqlite3_open(":memory:", &db), SQLITE_OK);
+	sqlite3_exec(db, "PRAGMA max_page_count=4; CREATE TABLE t(x)", NULL, NULL, NULL);
+	assert_int_equal(sqlite3_exec(db, "INSERT INTO t VALUES(zeroblob(1000000))", NULL,
+				      NULL, NULL),
+			 SQLITE_FULL);
+	assert_int_equal(incise_schema_errno(db), ENOSPC);
+	assert_int_equal(sqlite3_prepare_v2(db, "SELECT nothing FROM t", -1, &stmt, NULL),
+			 SQLITE_ERROR);
+	assert_int_equal(incise_schema_errno(db), EINVAL);
+	sqlite3_close(db);
+
+	assert_int_equal(sqlite3_open_v2("/nowhere/at/all", &db, SQLITE_OPEN_READONLY,
+					 NULL),
+			 SQLITE_CANTOPEN);
+	assert_int_equal(incise_schema_errno(db), ENOENT);
+	sqlite3_close(db);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(only_the_own_form_is_taken),
+		cmocka_unit_test(errors_have_their_errno),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
