@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The real-time loop; see incise/loop.h.
+ *
+ *   due     |      |      |      |      |      |      |
+ *   wake    |.     |..    |.....................|.    |
+ *   tick    ▐█     ▐█     (late)  skip   skip   ▐█    ▐█
+ *             ╰ lateness
+ */
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include <incise/loop.h>
+
+static void count(uint64_t *histogram, int64_t value)
+{
+	if (value < 0)
+		value = 0;
+	histogram[value < INCISE_LOOP_BINS - 1 ? value : INCISE_LOOP_BINS - 1]++;
+}
+
+static void count_tick(struct incise_loop_stats *stats, const struct incise_tick *tick)
+{
+	double force = 0;
+
+	for (int i = 0; i < 3; i++)
+		force += tick->command_N[i] * tick->command_N[i];
+	stats->force_max_N = fmax(stats->force_max_N, sqrt(force));
+	stats->ticks++;
+	stats->contact += !!(tick->flags & INCISE_TICK_CONTACT);
+	stats->extrapolated += !!(tick->flags & INCISE_TICK_EXTRAPOLATED);
+	stats->stale += !!(tick->flags & INCISE_TICK_STALE);
+	stats->limited += !!(tick->flags & INCISE_TICK_LIMITED);
+}
+
+/* One tick with its statistics; start_ns is when it began. */
+static int run_tick(struct incise_plan *plan, const struct incise_clock *clock,
+		    const struct incise_loop_options *options,
+		    struct incise_loop_stats *stats, int64_t start_ns)
+{
+	struct incise_tick own, *tick = &own;
+	int64_t cost_ns;
+	int rc;
+
+	if (stats->logged < options->log_size)
+		tick = &options->log[stats->logged++];
+	rc = incise_plan_tick(plan, start_ns, tick);
+	cost_ns = incise_clock_now(clock) - start_ns;
+	if (cost_ns > stats->tick_max_ns)
+		stats->tick_max_ns = cost_ns;
+	count(stats->tick_100ns, cost_ns / 100);
+	count_tick(stats, tick);
+	return rc;
+}
+
+int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
+		    const struct incise_loop_options *options,
+		    struct incise_loop_stats *stats, struct incise_error *err)
+{
+	int64_t period_ns, due_ns, end_ns;
+	int rc;
+
+	memset(stats, 0, sizeof(*stats));
+	if (!(options->rate_hz >= 1 && options->rate_hz <= 20000) ||
+	    options->duration_ns < 0)
+		return incise_error_set(err, EINVAL,
+					"the loop's rate is %g Hz: expected 1 to 20000",
+					options->rate_hz);
+	period_ns = llrint(INCISE_NS_PER_S / options->rate_hz);
+	due_ns = incise_clock_now(clock) + period_ns;
+	end_ns = options->duration_ns ? due_ns + options->duration_ns : INT64_MAX;
+	while (due_ns < end_ns && !(options->stop && *options->stop)) {
+		int64_t now_ns, late_ns;
+
+		if (incise_clock_wait_until(clock, due_ns) == -EINTR)
+			continue;
+		now_ns = incise_clock_now(clock);
+		late_ns = now_ns - due_ns;
+		if (late_ns > stats->lateness_max_ns)
+			stats->lateness_max_ns = late_ns;
+		count(stats->lateness_us, late_ns / 1000);
+		if (late_ns >= period_ns) {
+			stats->skipped += late_ns / period_ns;
+			due_ns += late_ns / period_ns * period_ns;
+		}
+		rc = run_tick(plan, clock, options, stats, now_ns);
+		if (rc)
+			return incise_error_set(
+				err, -rc,
+				"a device failed at tick %llu: %s; the force is "
+				"zero",
+				(unsigned long long)stats->ticks, strerror(-rc));
+		due_ns += period_ns;
+	}
+	return 0;
+}
+
+double incise_loop_quantile(const uint64_t *histogram, double share)
+{
+	uint64_t total = 0, seen = 0;
+
+	for (int i = 0; i < INCISE_LOOP_BINS; i++)
+		total += histogram[i];
+	if (!total)
+		return 0;
+	for (int i = 0; i < INCISE_LOOP_BINS; i++) {
+		seen += histogram[i];
+		if (seen >= share * total)
+			return i + 1;
+	}
+	return INCISE_LOOP_BINS;
+}

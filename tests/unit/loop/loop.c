@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The loop on a simulated clock: number of ticks, overruns, stopping, statistics. On a
+ * real one only order is asserted: times belong to benches.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include <incise/loop.h>
+#include "../scene/felt.h"
+
+static struct incise_loop_stats stats;
+
+static void test_number_of_ticks(void **state)
+{
+	static const double rates[] = {1, 333, 1000, 8000};
+
+	for (size_t i = 0; i < 4; i++) {
+		struct incise_loop_options options = {.rate_hz = rates[i],
+						      .duration_ns = 2 * INCISE_NS_PER_S};
+		struct felt f;
+
+		felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+		assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig),
+						 &options, &stats, NULL),
+				 0);
+		/* A period of whole ns: 333 Hz is 3003003 ns, one tick more fits in. */
+		assert_int_equal(stats.ticks, llrint(ceil(2e9 / rint(1e9 / rates[i]))));
+		assert_int_equal(stats.skipped, 0);
+		assert_int_equal(stats.lateness_max_ns, 0);
+		assert_int_equal(stats.lateness_us[0], stats.ticks);
+		felt_end(&f);
+	}
+}
+
+static void test_log_and_times(void **state)
+{
+	static struct incise_tick log[300];
+	struct incise_loop_options options = {.rate_hz = 1000,
+					      .duration_ns = INCISE_NS_PER_S / 2,
+					      .log = log,
+					      .log_size = 300};
+	struct felt f;
+	int64_t begin;
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	begin = incise_clock_now(incise_rig_clock(f.rig));
+	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
+					 &stats, NULL),
+			 0);
+	/* More ticks than the log holds: it keeps the first. */
+	assert_int_equal(stats.ticks, 500);
+	assert_int_equal(stats.logged, 300);
+	for (int i = 0; i < 300; i++)
+		assert_int_equal(log[i].t_ns, begin + (i + 1) * 1000000LL);
+	felt_end(&f);
+}
+
+static struct incise_clock *stalled;
+static int calls;
+
+/* Takes 3.4 periods at the tenth tick: as a stall of the machine would. */
+static int slow_tracker(struct incise_tracker *tracker,
+			struct incise_tracker_sample *samples, int n)
+{
+	if (++calls == 10)
+		incise_clock_wait_until(stalled, incise_clock_now(stalled) + 3400000);
+	return 0;
+}
+
+static void test_overrun_skips_and_counts(void **state)
+{
+	static struct incise_tick log[100];
+	struct incise_loop_options options = {
+		.rate_hz = 1000, .duration_ns = 50000000, .log = log, .log_size = 100};
+	struct incise_tracker_ops ops;
+	struct felt f;
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	ops = *f.tracker_ops;
+	ops.read = slow_tracker;
+	incise_rig_tracker(f.rig)->ops = &ops;
+	stalled = incise_rig_clock(f.rig);
+	calls = 0;
+	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, NULL), 0);
+	/* Tick 10 ends 3.4 periods on. The next, 2.4 late, skips two and runs; the one after
+	 * is on time again. 50 were due. */
+	assert_int_equal(stats.skipped, 2);
+	assert_int_equal(stats.ticks, 48);
+	assert_int_equal(stats.lateness_max_ns, 2400000);
+	assert_int_equal(stats.tick_max_ns, 3400000);
+	assert_int_equal(log[10].t_ns - log[9].t_ns, 3400000);
+	assert_int_equal(log[11].t_ns - log[9].t_ns, 4000000);
+	assert_int_equal(stats.stale, 48);
+	felt_end(&f);
+}
+
+static volatile sig_atomic_t stop;
+
+static int stopping_tracker(struct incise_tracker *tracker,
+			    struct incise_tracker_sample *samples, int n)
+{
+	stop = ++calls == 25;
+	return 0;
+}
+
+static void test_stop_flag(void **state)
+{
+	struct incise_loop_options options = {.rate_hz = 1000, .stop = &stop};
+	struct incise_tracker_ops ops;
+	struct felt f;
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	ops = *f.tracker_ops;
+	ops.read = stopping_tracker;
+	incise_rig_tracker(f.rig)->ops = &ops;
+	calls = stop = 0;
+	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
+					 &stats, NULL),
+			 0);
+	assert_int_equal(stats.ticks, 25);
+	felt_end(&f);
+}
+
+static int failing_tracker(struct incise_tracker *tracker,
+			   struct incise_tracker_sample *samples, int n)
+{
+	return ++calls == 5 ? -ENODEV : 0;
+}
+
+static void test_device_failure_ends_the_loop(void **state)
+{
+	struct incise_loop_options options = {.rate_hz = 1000, .duration_ns = 50000000};
+	struct incise_error err = {0};
+	struct incise_tracker_ops ops;
+	struct felt f;
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	ops = *f.tracker_ops;
+	ops.read = failing_tracker;
+	incise_rig_tracker(f.rig)->ops = &ops;
+	calls = 0;
+	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
+					 &stats, &err),
+			 -ENODEV);
+	assert_int_equal(stats.ticks, 5);
+	assert_non_null(strstr(err.text, "tick 5"));
+	felt_end(&f);
+}
+
+static void test_refused_options(void **state)
+{
+	static const double rates[] = {0, -1, 0.5, 20001, NAN, INFINITY};
+	struct incise_loop_options options = {.duration_ns = 1000000};
+	struct felt f;
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	for (size_t i = 0; i < sizeof(rates) / sizeof(*rates); i++) {
+		options.rate_hz = rates[i];
+		assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig),
+						 &options, &stats, NULL),
+				 -EINVAL);
+	}
+	felt_end(&f);
+}
+
+/* In real time ticks come in order and none before its time. */
+static void test_real_clock(void **state)
+{
+	static struct incise_tick log[200];
+	struct incise_loop_options options = {
+		.rate_hz = 1000, .duration_ns = 100000000, .log = log, .log_size = 200};
+	struct incise_clock *clock = incise_clock_new_real();
+	struct felt f;
+	int64_t begin = incise_clock_now(clock);
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	assert_int_equal(incise_loop_run(f.plan, clock, &options, &stats, NULL), 0);
+	assert_int_equal(stats.ticks + stats.skipped, 100);
+	for (size_t i = 0; i < stats.logged; i++)
+		assert_true(log[i].t_ns >= begin + ((int64_t)i + 1) * 1000000);
+	for (size_t i = 1; i < stats.logged; i++)
+		assert_true(log[i].t_ns > log[i - 1].t_ns);
+	incise_clock_free(clock);
+	felt_end(&f);
+}
+
+static void test_quantile(void **state)
+{
+	static uint64_t histogram[INCISE_LOOP_BINS];
+
+	assert_true(incise_loop_quantile(histogram, 0.5) == 0);
+	histogram[3] = 50;
+	histogram[7] = 49;
+	histogram[INCISE_LOOP_BINS - 1] = 1;
+	assert_true(incise_loop_quantile(histogram, 0.5) == 4);
+	assert_true(incise_loop_quantile(histogram, 0.51) == 8);
+	assert_true(incise_loop_quantile(histogram, 0.99) == 8);
+	assert_true(incise_loop_quantile(histogram, 1) == INCISE_LOOP_BINS);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_number_of_ticks),
+		cmocka_unit_test(test_log_and_times),
+		cmocka_unit_test(test_overrun_skips_and_counts),
+		cmocka_unit_test(test_stop_flag),
+		cmocka_unit_test(test_device_failure_ends_the_loop),
+		cmocka_unit_test(test_refused_options),
+		cmocka_unit_test(test_real_clock),
+		cmocka_unit_test(test_quantile),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

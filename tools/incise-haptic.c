@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise haptic SCENE: the real-time loop, tracker in, force out, with tick statistics.
+ */
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <sched.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <incise/loop.h>
+#include <incise/outfile.h>
+#include <incise/scene.h>
+#include "cli.h"
+#include "json.h"
+
+enum { OPT_MODEL = CLI_LONG, OPT_ARITH, OPT_DURATION, OPT_LOG, OPT_JSON };
+
+/* Ticks whose rendered force is not compared: the actuator starts from rest. */
+#define SETTLE 100
+
+static const struct cli_option options[] = {
+	{'r', "rig", "RIG",
+	 "file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n"
+	 "(default: ./rig.conf, else /etc/incise/rig.conf)"},
+	{OPT_MODEL, "model", "FILE", "use this model instead of the scene's"},
+	{OPT_ARITH, "arith", "KIND", "fixed or double, instead of the scene's"},
+	{OPT_DURATION, "duration", "TIME",
+	 "stop after this time, e.g. 10s (default: at SIGINT)"},
+	{OPT_LOG, "log", "FILE", "write every tick as CSV at the end; needs --duration"},
+	{OPT_JSON, "json", NULL, "report as JSON"},
+	{0},
+};
+
+static const struct cli_verb verb = {
+	.name = "haptic",
+	.synopsis = "SCENE [OPTIONS]",
+	.summary =
+		"Run the haptic loop of a scene: read the pose, evaluate the force, drive the\n"
+		"actuator, at the scene's rate. Not a safety device, not a medical device.",
+	.options = options,
+	.notes =
+		"Example:\n  incise haptic scenes/liver.scene --rig sim: --duration 10s\n\n"
+		"Exit: 0 ended as asked, 1 failed, 2 bad usage. See incise-haptic(1).",
+};
+
+struct job {
+	const char *scene, *rig, *model, *arith, *log;
+	double duration;
+	bool json;
+};
+
+static void parse(struct job *job, int argc, char **argv)
+{
+	int opt;
+
+	*job = (struct job){0};
+	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+		switch (opt) {
+		case 'r':
+			job->rig = optarg;
+			break;
+		case OPT_MODEL:
+			job->model = optarg;
+			break;
+		case OPT_ARITH:
+			job->arith = optarg;
+			if (strcmp(optarg, "double") && strcmp(optarg, "fixed"))
+				cli_usage("--arith: '%s' is neither double nor fixed",
+					  optarg);
+			break;
+		case OPT_DURATION:
+			job->duration = cli_duration("duration", optarg, 0.01, 86400);
+			break;
+		case OPT_LOG:
+			job->log = optarg;
+			break;
+		case OPT_JSON:
+			job->json = true;
+			break;
+		}
+	if (optind + 1 != argc)
+		cli_usage("expected one scene, got %d", argc - optind);
+	job->scene = argv[optind];
+	if (job->log && !job->duration)
+		cli_usage("--log keeps all ticks in memory: it needs --duration");
+	if (job->json && job->log && !strcmp(job->log, "-"))
+		cli_usage("--json and --log - would both write to standard output");
+}
+
+static const char *flags_text(unsigned int flags, char *text)
+{
+	static const char letters[] =
+		"cesof"; /* contact extrapolated stale overlimit fault */
+
+	for (int i = 0; letters[i]; i++)
+		text[i] = flags & 1u << i ? letters[i] : '-';
+	text[strlen(letters)] = 0;
+	return text;
+}
+
+static void write_log(const struct job *job, const struct incise_tick *ticks, size_t n)
+{
+	struct incise_error err = {0};
+	struct incise_outfile *file = incise_outfile_open(job->log, &err);
+	char flags[8];
+	FILE *out;
+
+	if (!file)
+		cli_fail_with(&err);
+	out = incise_outfile_stream(file);
+	fputs("t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags\n",
+	      out);
+	for (size_t i = 0; i < n; i++) {
+		const struct incise_tick *t = &ticks[i];
+
+		fprintf(out, "%.6f,%.4f,%.4f,%.4f,%.4f,%.3f,%.5f,%.5f,%s\n",
+			(t->t_ns - ticks[0].t_ns) * 1e-9, t->position_mm[0],
+			t->position_mm[1], t->position_mm[2], t->depth_mm,
+			t->velocity_mm_s,
+			sqrt(t->command_N[0] * t->command_N[0] +
+			     t->command_N[1] * t->command_N[1] +
+			     t->command_N[2] * t->command_N[2]),
+			t->rendered_N, flags_text(t->flags, flags));
+	}
+	if (incise_outfile_commit(file, &err))
+		cli_fail_with(&err);
+}
+
+/* How far the actuator's force was from the one commanded at the tick before, rms. */
+static double render_error(const struct incise_tick *ticks, size_t n)
+{
+	double sum = 0;
+
+	if (n <= SETTLE)
+		return NAN;
+	for (size_t i = SETTLE; i < n; i++) {
+		const double *c = ticks[i - 1].command_N;
+		double e = ticks[i].rendered_N -
+			   sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+
+		sum += e * e;
+	}
+	return sqrt(sum / (n - SETTLE));
+}
+
+/* Bins of 1 µs or 100 ns as a quantile in their unit; null in the open last bin. */
+static double quantile(const uint64_t *histogram, double share, double unit)
+{
+	double bin = incise_loop_quantile(histogram, share);
+
+	return bin < INCISE_LOOP_BINS ? bin * unit : INFINITY;
+}
+
+static const char *scheduling(void)
+{
+	int policy = sched_getscheduler(0);
+
+	return policy == SCHED_FIFO ? "SCHED_FIFO"
+	       : policy == SCHED_RR ? "SCHED_RR"
+				    : "SCHED_OTHER";
+}
+
+static json_t *histogram_json(const uint64_t *histogram)
+{
+	json_t *list = json_array();
+
+	for (int i = 0; i < INCISE_LOOP_BINS; i++)
+		if (histogram[i])
+			json_array_append_new(list, json_pack("[iI]", i,
+							      (json_int_t)histogram[i]));
+	return list;
+}
+
+static void report_json(const struct incise_loop_stats *s, const struct incise_plan *plan,
+			double rate_hz, double rms_N)
+{
+	json_t *stages = json_array();
+
+	for (int i = 0; incise_plan_stage(plan, i); i++)
+		json_array_append_new(stages, json_string(incise_plan_stage(plan, i)));
+	json_print(json_pack(
+		"{sI sI sf s{so so so so so} s{so so so} sI sI sI sI sf so ss so so}",
+		"ticks", (json_int_t)s->ticks, "skipped", (json_int_t)s->skipped,
+		"rate_hz", rate_hz, "lateness_us", "median",
+		json_number(quantile(s->lateness_us, 0.5, 1)), "p99",
+		json_number(quantile(s->lateness_us, 0.99, 1)), "p999",
+		json_number(quantile(s->lateness_us, 0.999, 1)), "max",
+		json_number(s->lateness_max_ns * 1e-3), "histogram",
+		histogram_json(s->lateness_us), "tick_ns", "median",
+		json_number(quantile(s->tick_100ns, 0.5, 100)), "p999",
+		json_number(quantile(s->tick_100ns, 0.999, 100)), "max",
+		json_number(s->tick_max_ns), "contact", (json_int_t)s->contact,
+		"extrapolated", (json_int_t)s->extrapolated, "stale",
+		(json_int_t)s->stale, "limited", (json_int_t)s->limited, "force_max_N",
+		s->force_max_N, "rendered_rms_error_N", json_number(rms_N), "scheduling",
+		scheduling(), "stages", stages, "stopped_by",
+		cli_stop ? json_string(strsignal(cli_stop)) : json_null()));
+}
+
+static void report_text(const struct incise_loop_stats *s, const struct incise_plan *plan,
+			double rate_hz, double rms_N)
+{
+	printf("%llu ticks at %g Hz, %llu skipped (%s)\nstages    ",
+	       (unsigned long long)s->ticks, rate_hz, (unsigned long long)s->skipped,
+	       scheduling());
+	for (int i = 0; incise_plan_stage(plan, i); i++)
+		printf(" %s", incise_plan_stage(plan, i));
+	printf("\nlateness   median < %g us, 99 %% < %g us, 99.9 %% < %g us, max %.0f us\n",
+	       quantile(s->lateness_us, 0.5, 1), quantile(s->lateness_us, 0.99, 1),
+	       quantile(s->lateness_us, 0.999, 1), s->lateness_max_ns * 1e-3);
+	printf("tick       median < %g us, 99.9%% < %g us, max %.1f us\n",
+	       quantile(s->tick_100ns, 0.5, 0.1), quantile(s->tick_100ns, 0.999, 0.1),
+	       s->tick_max_ns * 1e-3);
+	printf("force      largest %.3f N", s->force_max_N);
+	if (!isnan(rms_N))
+		printf(", actuator off by %.4f N rms", rms_N);
+	printf("\nticks      %llu in contact, %llu outside the model's support, %llu without a "
+	       "fresh pose, %llu limited\n",
+	       (unsigned long long)s->contact, (unsigned long long)s->extrapolated,
+	       (unsigned long long)s->stale, (unsigned long long)s->limited);
+}
+
+int main(int argc, char **argv)
+{
+	struct incise_loop_options loop = {.stop = &cli_stop};
+	static struct incise_loop_stats stats;
+	struct incise_error err = {0};
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+	struct incise_rig *rig;
+	struct job job;
+	double rms_N;
+	int rc;
+
+	parse(&job, argc, argv);
+	scene = incise_scene_load(job.scene, job.model, &err);
+	if (!scene)
+		cli_fail_with(&err);
+	if (job.arith && incise_scene_set_arithmetic(scene, job.arith, &err))
+		cli_fail_with(&err);
+	rig = incise_rig_open(cli_rig(job.rig), INCISE_RIG_TRACKER | INCISE_RIG_STEPPER,
+			      &err);
+	if (!rig)
+		cli_fail_with(&err);
+	plan = incise_plan_new(scene, rig, &err);
+	if (!plan)
+		cli_fail_with(&err);
+	loop.rate_hz = incise_scene_rate_hz(scene);
+	loop.duration_ns = (int64_t)(job.duration * INCISE_NS_PER_S);
+	if (job.duration) {
+		loop.log_size = (size_t)ceil(job.duration * loop.rate_hz) + 1;
+		loop.log = calloc(loop.log_size, sizeof(*loop.log));
+		if (!loop.log)
+			cli_fail("no memory for %zu ticks; give a shorter --duration",
+				 loop.log_size);
+		/* Touch the pages now: a fault in the loop is a late tick. */
+		memset(loop.log, 0xff, loop.log_size * sizeof(*loop.log));
+	}
+	cli_catch_signals();
+	cli_progress("%s: %g Hz, Ctrl-C ends", job.scene, loop.rate_hz);
+	rc = incise_loop_run(plan, incise_rig_clock(rig), &loop, &stats, &err);
+	cli_progress_end();
+	rms_N = incise_rig_stepper(rig) ? render_error(loop.log, stats.logged) : NAN;
+	if (job.log)
+		write_log(&job, loop.log, stats.logged);
+	if (job.json)
+		report_json(&stats, plan, loop.rate_hz, rms_N);
+	else if (!job.log || strcmp(job.log, "-"))
+		report_text(&stats, plan, loop.rate_hz, rms_N);
+	cli_finish();
+	incise_plan_free(plan);
+	incise_rig_close(rig);
+	incise_scene_free(scene);
+	free(loop.log);
+	if (rc)
+		cli_fail("%s: %s", job.scene, err.text);
+	return 0;
+}
