@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Pictures by gnuplot; see picture.h.
+ */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include "cli.h"
+#include "picture.h"
+
+static char *plot_path(const char *folder, const char *name, const char *suffix)
+{
+	char *path;
+
+	if (asprintf(&path, "%s/plot/%s%s", folder, name, suffix) < 0)
+		cli_fail("no memory");
+	return path;
+}
+
+bool picture_possible(void)
+{
+	return !system("command -v gnuplot >/dev/null 2>&1");
+}
+
+static FILE *open_plot(const char *folder, const char *name, const char *suffix)
+{
+	char *path = plot_path(folder, name, suffix);
+	FILE *file = fopen(path, "we");
+
+	if (!file)
+		cli_fail("%s: %s", path, strerror(errno));
+	free(path);
+	return file;
+}
+
+FILE *picture_data(const char *folder, const char *name)
+{
+	return open_plot(folder, name, "");
+}
+
+FILE *picture_begin(const char *folder, const char *name, int width, int height)
+{
+	FILE *script = open_plot(folder, name, ".gp");
+
+	fprintf(script,
+		"# gnuplot -e \"ext='png'\" %s.gp\n"
+		"if (ext eq 'png') { set terminal pngcairo size %d,%d font 'DejaVu Sans,11' } \\\n"
+		"else { set terminal svg size %d,%d font 'DejaVu Sans,11' background 'white' }\n"
+		"set output '../%s.'.ext\n"
+		"set style line 1 lc rgb '#1b6ca8' lw 1.5\n"
+		"set style line 2 lc rgb '#c0392b' lw 1.5\n"
+		"set style line 3 lc rgb '#2e8b57' lw 1.5\n"
+		"set style line 4 lc rgb '#8e44ad' lw 1.5\n"
+		"set style line 5 lc rgb '#d68910' lw 1.5\n"
+		"set termoption noenhanced\nset grid lc rgb '#dddddd'\nset key noautotitle\n",
+		name, width, height, width, height, name);
+	return script;
+}
+
+static bool draw(const char *folder, const char *name, const char *ext)
+{
+	char *command;
+	int status;
+
+	/* A folder's name goes through the environment: it may hold any character. */
+	setenv("INCISE_PICTURE_FOLDER", folder, 1);
+	if (asprintf(
+		    &command,
+		    "cd \"$INCISE_PICTURE_FOLDER/plot\" && gnuplot -e \"ext='%s'\" %s.gp",
+		    ext, name) < 0)
+		cli_fail("no memory");
+	status = system(command);
+	free(command);
+	return status == 0;
+}
+
+bool picture_draw(FILE *script, const char *folder, const char *name)
+{
+	fputs("\nunset output\n", script);
+	if (fclose(script))
+		cli_fail("%s/plot/%s.gp: %s", folder, name, strerror(errno));
+	return draw(folder, name, "png") && draw(folder, name, "svg");
+}
