@@ -3,7 +3,7 @@
 
 headers := $(wildcard lib/include/incise/*.h)
 man_pages := $(wildcard man/*.[1-8])
-scenes := $(wildcard scenes/*.scene)
+scenes := $(wildcard scenes/*.scene scenes/*.fis)
 
 # Every file that `install` makes, relative to nothing: uninstall removes just these.
 installed = $(addprefix $(bindir)/,$(notdir $(programs))) \

@@ -154,10 +154,12 @@ static double quantile(const uint64_t *histogram, double share, double unit)
 	return bin < INCISE_LOOP_BINS ? bin * unit : INFINITY;
 }
 
-static const char *scheduling(void)
+static const char *scheduling(bool real)
 {
 	int policy = sched_getscheduler(0);
 
+	if (!real)
+		return "simulated time";
 	return policy == SCHED_FIFO ? "SCHED_FIFO"
 	       : policy == SCHED_RR ? "SCHED_RR"
 				    : "SCHED_OTHER";
@@ -174,46 +176,76 @@ static json_t *histogram_json(const uint64_t *histogram)
 	return list;
 }
 
+static json_t *lateness_json(const struct incise_loop_stats *s)
+{
+	return json_pack("{so so so so so}", "median",
+			 json_number(quantile(s->lateness_us, 0.5, 1)), "p99",
+			 json_number(quantile(s->lateness_us, 0.99, 1)), "p999",
+			 json_number(quantile(s->lateness_us, 0.999, 1)), "max",
+			 json_number(s->lateness_max_ns * 1e-3), "histogram",
+			 histogram_json(s->lateness_us));
+}
+
+static json_t *cost_json(const struct incise_loop_stats *s)
+{
+	return json_pack("{so so so}", "median",
+			 json_number(quantile(s->tick_100ns, 0.5, 100)), "p999",
+			 json_number(quantile(s->tick_100ns, 0.999, 100)), "max",
+			 json_number(s->tick_max_ns));
+}
+
 static void report_json(const struct incise_loop_stats *s, const struct incise_plan *plan,
-			double rate_hz, double rms_N)
+			bool real, double rate_hz, double rms_N)
 {
 	json_t *stages = json_array();
 
 	for (int i = 0; incise_plan_stage(plan, i); i++)
 		json_array_append_new(stages, json_string(incise_plan_stage(plan, i)));
 	json_print(json_pack(
-		"{sI sI sf s{so so so so so} s{so so so} sI sI sI sI sf so ss so so}",
-		"ticks", (json_int_t)s->ticks, "skipped", (json_int_t)s->skipped,
-		"rate_hz", rate_hz, "lateness_us", "median",
-		json_number(quantile(s->lateness_us, 0.5, 1)), "p99",
-		json_number(quantile(s->lateness_us, 0.99, 1)), "p999",
-		json_number(quantile(s->lateness_us, 0.999, 1)), "max",
-		json_number(s->lateness_max_ns * 1e-3), "histogram",
-		histogram_json(s->lateness_us), "tick_ns", "median",
-		json_number(quantile(s->tick_100ns, 0.5, 100)), "p999",
-		json_number(quantile(s->tick_100ns, 0.999, 100)), "max",
-		json_number(s->tick_max_ns), "contact", (json_int_t)s->contact,
+		"{sI sI sf so so sI sI sI sI sf so ss so so}", "ticks",
+		(json_int_t)s->ticks, "skipped", (json_int_t)s->skipped, "rate_hz",
+		rate_hz, "lateness_us", real ? lateness_json(s) : json_null(), "tick_ns",
+		real ? cost_json(s) : json_null(), "contact", (json_int_t)s->contact,
 		"extrapolated", (json_int_t)s->extrapolated, "stale",
 		(json_int_t)s->stale, "limited", (json_int_t)s->limited, "force_max_N",
 		s->force_max_N, "rendered_rms_error_N", json_number(rms_N), "scheduling",
-		scheduling(), "stages", stages, "stopped_by",
+		scheduling(real), "stages", stages, "stopped_by",
 		cli_stop ? json_string(strsignal(cli_stop)) : json_null()));
 }
 
-static void report_text(const struct incise_loop_stats *s, const struct incise_plan *plan,
-			double rate_hz, double rms_N)
+/* "< 74 us", or that it lies beyond the histogram; text is the caller's. */
+static const char *below(char *text, size_t size, double us)
 {
+	if (isfinite(us))
+		snprintf(text, size, "< %g us", us);
+	else
+		snprintf(text, size, "beyond the histogram");
+	return text;
+}
+
+static void report_text(const struct incise_loop_stats *s, const struct incise_plan *plan,
+			bool real, double rate_hz, double rms_N)
+{
+	char a[32], b[32], c[32];
+
 	printf("%llu ticks at %g Hz, %llu skipped (%s)\nstages    ",
 	       (unsigned long long)s->ticks, rate_hz, (unsigned long long)s->skipped,
-	       scheduling());
+	       scheduling(real));
 	for (int i = 0; incise_plan_stage(plan, i); i++)
 		printf(" %s", incise_plan_stage(plan, i));
-	printf("\nlateness   median < %g us, 99 %% < %g us, 99.9 %% < %g us, max %.0f us\n",
-	       quantile(s->lateness_us, 0.5, 1), quantile(s->lateness_us, 0.99, 1),
-	       quantile(s->lateness_us, 0.999, 1), s->lateness_max_ns * 1e-3);
-	printf("tick       median < %g us, 99.9%% < %g us, max %.1f us\n",
-	       quantile(s->tick_100ns, 0.5, 0.1), quantile(s->tick_100ns, 0.999, 0.1),
-	       s->tick_max_ns * 1e-3);
+	putchar('\n');
+	/* In simulated time a tick takes none and is never late. */
+	if (real) {
+		printf("lateness   median %s, 99 %% %s, 99.9 %% %s, max %.0f us\n",
+		       below(a, sizeof(a), quantile(s->lateness_us, 0.5, 1)),
+		       below(b, sizeof(b), quantile(s->lateness_us, 0.99, 1)),
+		       below(c, sizeof(c), quantile(s->lateness_us, 0.999, 1)),
+		       s->lateness_max_ns * 1e-3);
+		printf("tick       median %s, 99.9 %% %s, max %.1f us\n",
+		       below(a, sizeof(a), quantile(s->tick_100ns, 0.5, 0.1)),
+		       below(b, sizeof(b), quantile(s->tick_100ns, 0.999, 0.1)),
+		       s->tick_max_ns * 1e-3);
+	}
 	printf("force      largest %.3f N", s->force_max_N);
 	if (!isnan(rms_N))
 		printf(", actuator off by %.4f N rms", rms_N);
@@ -233,6 +265,7 @@ int main(int argc, char **argv)
 	struct incise_rig *rig;
 	struct job job;
 	double rms_N;
+	bool real;
 	int rc;
 
 	parse(&job, argc, argv);
@@ -259,6 +292,7 @@ int main(int argc, char **argv)
 		/* Touch the pages now: a fault in the loop is a late tick. */
 		memset(loop.log, 0xff, loop.log_size * sizeof(*loop.log));
 	}
+	real = incise_clock_is_real(incise_rig_clock(rig));
 	cli_catch_signals();
 	cli_progress("%s: %g Hz, Ctrl-C ends", job.scene, loop.rate_hz);
 	rc = incise_loop_run(plan, incise_rig_clock(rig), &loop, &stats, &err);
@@ -267,9 +301,9 @@ int main(int argc, char **argv)
 	if (job.log)
 		write_log(&job, loop.log, stats.logged);
 	if (job.json)
-		report_json(&stats, plan, loop.rate_hz, rms_N);
+		report_json(&stats, plan, real, loop.rate_hz, rms_N);
 	else if (!job.log || strcmp(job.log, "-"))
-		report_text(&stats, plan, loop.rate_hz, rms_N);
+		report_text(&stats, plan, real, loop.rate_hz, rms_N);
 	cli_finish();
 	incise_plan_free(plan);
 	incise_rig_close(rig);
