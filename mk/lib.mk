@@ -11,7 +11,7 @@ $(O)/obj/%.o: %.c
 # The integer core builds without any library and, where the compiler can be told so,
 # without floating-point registers: it will be linked into a kernel.
 fixed_cflags := -ffreestanding
-fixed_cflags += $(if $(filter x86_64-%,$(shell $(CC) -dumpmachine)),-mgeneral-regs-only)
+fixed_cflags += $(if $(filter x86_64-%,$(shell $(CC) -dumpmachine 2>/dev/null)),-mgeneral-regs-only)
 $(O)/obj/lib/fixed/%.o: cflags += $(fixed_cflags)
 
 define library

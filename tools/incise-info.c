@@ -29,11 +29,6 @@ static const struct cli_verb verb = {
 	.notes = "Exit: 0 shown, 1 failed, 2 bad usage. See incise-info(1).",
 };
 
-static int mf_params(const struct incise_mf *mf)
-{
-	return mf->type == INCISE_MF_GBELL ? 3 : 2;
-}
-
 static json_t *input_json(const struct incise_model *model, int i)
 {
 	const struct incise_variable *v = incise_model_input(model, i);
@@ -43,7 +38,7 @@ static json_t *input_json(const struct incise_model *model, int i)
 		const struct incise_mf *mf = incise_model_mf(model, i, k);
 		json_t *params = json_array();
 
-		for (int j = 0; j < mf_params(mf); j++)
+		for (int j = 0; j < incise_mf_n_params(mf->type); j++)
 			json_array_append_new(params, json_real(mf->p[j]));
 		json_array_append_new(
 			mfs, json_pack("{ss ss so}", "name", mf->name, "type",
@@ -94,7 +89,7 @@ static void model_text(const struct incise_model *model, const char *refused)
 			const struct incise_mf *mf = incise_model_mf(model, i, k);
 
 			printf("  %-10s %s", mf->name, incise_mf_type_name(mf->type));
-			for (int j = 0; j < mf_params(mf); j++)
+			for (int j = 0; j < incise_mf_n_params(mf->type); j++)
 				printf(" %.6g", mf->p[j]);
 			putchar('\n');
 		}

@@ -38,18 +38,13 @@ struct state {
 	int raised, lowered;
 };
 
-static int n_params(const struct incise_mf *mf)
-{
-	return mf->type == INCISE_MF_GBELL ? 3 : 2;
-}
-
 int incise_anfis_n_premises(const struct incise_model *model)
 {
 	int n = 0;
 
 	for (int i = 0; i < incise_model_n_inputs(model); i++)
 		for (int k = 0; k < incise_model_n_mfs(model, i); k++)
-			n += n_params(incise_model_mf(model, i, k));
+			n += incise_mf_n_params(incise_model_mf(model, i, k)->type);
 	return n;
 }
 
@@ -310,7 +305,7 @@ int incise_anfis_run(struct incise_model *model, struct incise_anfis *anfis)
 		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
 			const struct incise_mf *mf = incise_model_mf(model, i, k);
 
-			s->premise[i][k].n_params = n_params(mf);
+			s->premise[i][k].n_params = incise_mf_n_params(mf->type);
 			memcpy(s->premise[i][k].first, mf->p, sizeof(mf->p));
 		}
 	anfis->best_epoch = 0;

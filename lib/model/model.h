@@ -28,8 +28,7 @@ struct incise_model {
 	struct incise_rule rule[INCISE_MODEL_RULES_MAX];
 };
 
-/* Parameters a kind of function has in a file, and whether they make one. */
-int incise_mf_n_params(enum incise_mf_type type);
+/* Whether parameters make a function of this kind. */
 bool incise_mf_valid(enum incise_mf_type type, const double *p);
 
 /* The natural log of the degree of membership: finite, ≤ 0. */

@@ -149,6 +149,9 @@ INCISE_API void incise_model_set_clamp(struct incise_model *model, bool clamp);
 /** Degree of membership in [0, 1]. Real-time safe. */
 INCISE_API double incise_mf_eval(const struct incise_mf *mf, double x);
 
+/** How many of incise_mf.p a kind uses: 2 or 3. */
+INCISE_API int incise_mf_n_params(enum incise_mf_type type);
+
 /** Name of a kind as .fis files spell it, e.g. "gaussmf". */
 INCISE_API const char *incise_mf_type_name(enum incise_mf_type type);
 
