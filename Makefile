@@ -53,7 +53,7 @@ uses_haptic := incise
 uses_demo := incise incise-learn
 uses_bench := incise
 
-all: libs tools $(O)/incise.pc
+all: libs tools
 
 .DEFAULT_GOAL := all
 .DELETE_ON_ERROR:

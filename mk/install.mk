@@ -24,7 +24,9 @@ install: all ## install below $(DESTDIR)$(prefix)
 		ln -sf lib$$lib.so.$(soversion) $(DESTDIR)$(libdir)/lib$$lib.so || exit 1; \
 	done
 	$(INSTALL) -m 644 $(headers) $(DESTDIR)$(includedir)/incise
-	$(INSTALL) -m 644 $(O)/incise.pc $(DESTDIR)$(libdir)/pkgconfig
+	sed -e 's|@prefix@|$(prefix)|' -e 's|@libdir@|$(libdir)|' \
+		-e 's|@includedir@|$(includedir)|' -e 's|@version@|$(version)|' \
+		mk/incise.pc.in >$(DESTDIR)$(libdir)/pkgconfig/incise.pc
 	for page in $(man_pages); do \
 		$(INSTALL) -m 644 $$page $(DESTDIR)$(mandir)/man$${page##*.} || exit 1; \
 	done

@@ -45,9 +45,4 @@ $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib)))
 
 all_libs = $(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
 
-$(O)/incise.pc: mk/incise.pc.in Makefile lib/include/incise/version.h
-	@mkdir -p $(@D)
-	sed -e 's|@prefix@|$(prefix)|' -e 's|@libdir@|$(libdir)|' \
-		-e 's|@includedir@|$(includedir)|' -e 's|@version@|$(version)|' $< >$@
-
 .PHONY: libs

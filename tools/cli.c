@@ -258,5 +258,8 @@ void cli_finish(void)
 		return;
 	if (errno == EPIPE)
 		exit(1);
-	cli_fail("standard output: %s", strerror(errno ? errno : EIO));
+	/* An earlier write has failed, and its errno is gone. */
+	if (!errno)
+		cli_fail("standard output: writing failed; is the disk full?");
+	cli_fail("standard output: %s", strerror(errno));
 }

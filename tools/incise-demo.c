@@ -150,8 +150,8 @@ static char *quantile_us(const json_t *haptic, const char *what, const char *nam
 {
 	const json_t *value = json_object_get(json_object_get(haptic, what), name);
 
-	return json_is_number(value) ? text("%g", json_number_value(value) * unit)
-				     : text("(beyond the histogram)");
+	return json_is_number(value) ? text("< %g us", json_number_value(value) * unit)
+				     : text("beyond the histogram");
 }
 
 static void step(const char *what)
@@ -585,8 +585,8 @@ static void print_summary(FILE *out, double seconds)
 		"model against a new cut at 5 mm              %.4f N rms\n"
 		"fixed point against double                   %.4f mN largest, %d points\n\n"
 		"haptic loop        %.0f ticks at %g Hz, %.0f skipped (%s)\n"
-		"  lateness         median < %s us, 99.9 %% < %s us, largest %.0f us\n"
-		"  tick             median < %s us, 99.9 %% < %s us\n"
+		"  lateness         median %s, 99.9 %% %s, largest %.0f us\n"
+		"  tick             median %s, 99.9 %% %s\n"
 		"  force            largest %.3f N, actuator off by %.4f N rms\n\n"
 		"took               %.0f s\n",
 		incise_version(), seed, get(capture, "seconds", NULL),

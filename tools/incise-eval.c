@@ -152,6 +152,8 @@ int main(int argc, char **argv)
 	if (!clamp && !strcmp(arith, "fixed"))
 		cli_usage(
 			"--no-clamp needs --arith double: fixed point ends at the support");
+	if (grid && argc - optind == 2)
+		cli_usage("--grid evaluates its own points: it takes no file of inputs");
 	if (argc - optind == 2)
 		path = argv[optind + 1];
 	e.model = incise_model_load(argv[optind], &err);

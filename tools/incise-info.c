@@ -188,6 +188,15 @@ static bool is_recording(const char *path)
 	return n >= 4 && !strncmp(path + n - 4, ".rec", 4);
 }
 
+static void check_exists(const char *path)
+{
+	struct stat st;
+
+	if (strcmp(path, "-") && stat(path, &st))
+		cli_fail("%s: %s; give a model (.fis) or a recording (NAME.rec)", path,
+			 strerror(errno));
+}
+
 int main(int argc, char **argv)
 {
 	bool json = false;
@@ -201,7 +210,7 @@ int main(int argc, char **argv)
 	if (is_recording(argv[optind]))
 		show_recording(argv[optind], json);
 	else
-		show_model(argv[optind], json);
+		check_exists(argv[optind]), show_model(argv[optind], json);
 	cli_finish();
 	return 0;
 }

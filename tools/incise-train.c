@@ -180,7 +180,7 @@ static void parse(struct job *job, int argc, char **argv)
 		}
 	if (optind + 1 != argc)
 		cli_usage("expected one data file, got %d", argc - optind);
-	if (!job->model)
+	if (!job->model || !*job->model)
 		cli_usage("where should the model go? Give -o MODEL.fis");
 	if (job->json && !strcmp(job->model, "-"))
 		cli_usage("--json and -o - would both write to standard output");
@@ -268,6 +268,17 @@ static void on_epoch(void *user, int epoch, double train_rmse, double check_rmse
 	fputc('\n', history->csv);
 }
 
+/* Training takes time: a place that cannot be written is told before, not after. */
+static void check_writable(const char *path)
+{
+	struct incise_error err = {0};
+	struct incise_outfile *file = incise_outfile_open(path, &err);
+
+	if (!file)
+		cli_fail_with(&err);
+	incise_outfile_abort(file);
+}
+
 static void train(struct job *job, struct incise_model *model, const struct side *fit,
 		  const struct side *check, struct incise_train_report *report)
 {
@@ -345,6 +356,10 @@ static json_t *warnings(const struct job *job, const struct incise_model *model,
 		{"linear regression", baselines->linear},
 		{"k nearest neighbours", baselines->knn},
 	};
+	/* In the classic way the check data have chosen the epoch: they were seen. */
+	const char *data = !job->check		? "its own"
+			   : job->train.classic ? "the check"
+						: "unseen";
 	json_t *list = json_array();
 
 	for (size_t i = 0; i < sizeof(others) / sizeof(*others); i++)
@@ -352,8 +367,7 @@ static json_t *warnings(const struct job *job, const struct incise_model *model,
 			warn(list,
 			     "%s predicts %s data better than this model: RMSE %.4g against "
 			     "%.4g; try fewer rules or more data",
-			     others[i].name, job->check > 0 ? "unseen" : "its own",
-			     others[i].rmse, rmse);
+			     others[i].name, data, others[i].rmse, rmse);
 	if (report->rules_unfired)
 		warn(list,
 		     "%d of %d rules never fire in the data: the model is a guess there; "
@@ -416,7 +430,9 @@ static void print_text(const struct job *job, const struct incise_model *model,
 		       const struct incise_train_report *report,
 		       const struct incise_baselines *baselines)
 {
-	const char *unseen = job->group ? "unseen cuts" : "unseen pairs";
+	const char *unseen = job->train.classic ? "check"
+			     : job->group	? "unseen cuts"
+						: "unseen pairs";
 	char knn[40];
 
 	printf("%s: %zu pairs to train", job->data, fit->pairs.n);
@@ -462,6 +478,7 @@ int main(int argc, char **argv)
 	for (int i = 0; i < job.n_inputs; i++)
 		columns[i] = job.inputs[i];
 	columns[job.n_inputs] = job.output;
+	check_writable(job.model);
 	data = incise_dataset_read(job.data, columns, job.n_inputs + 1, job.group, &err);
 	if (!data)
 		cli_fail_with(&err);

@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <libgen.h>
 #include <limits.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,6 +48,25 @@ static void own_folder(char *folder, size_t size)
 	snprintf(folder, size, "%s", dirname(path));
 }
 
+/* Whether PATH leads to a file of this name, runnable or not. */
+static bool on_path(const char *name)
+{
+	const char *path = getenv("PATH");
+	char *folders = strdup(path ? path : ""), *save, *file;
+	bool found = false;
+
+	for (char *folder = strtok_r(folders, ":", &save); folder && !found;
+	     folder = strtok_r(NULL, ":", &save)) {
+		if (asprintf(&file, "%s/%s", folder, name) < 0)
+			break;
+		found = !access(file, F_OK);
+		free(file);
+	}
+	free(folders);
+	errno = EACCES;
+	return found;
+}
+
 /* The manual page, from the source tree when this runs in a build tree. */
 static int manual(const char *verb)
 {
@@ -66,6 +86,14 @@ static int manual(const char *verb)
 	return 1;
 }
 
+static int finish(void)
+{
+	if (!fflush(stdout))
+		return 0;
+	fprintf(stderr, "incise: standard output: %s\n", strerror(errno));
+	return 1;
+}
+
 int main(int argc, char **argv)
 {
 	const char *verb = argv[1];
@@ -77,17 +105,17 @@ int main(int argc, char **argv)
 	}
 	if (!strcmp(verb, "-h") || !strcmp(verb, "--help")) {
 		help();
-		return fflush(stdout) ? 1 : 0;
+		return finish();
 	}
 	if (!strcmp(verb, "-V") || !strcmp(verb, "--version")) {
 		printf("incise %s\n", incise_version());
-		return fflush(stdout) ? 1 : 0;
+		return finish();
 	}
 	if (!strcmp(verb, "help")) {
 		if (argc > 2)
 			return manual(argv[2]);
 		help();
-		return fflush(stdout) ? 1 : 0;
+		return finish();
 	}
 	if (strchr(verb, '/') || *verb == '-' || strlen(verb) > 64) {
 		fprintf(stderr,
@@ -100,7 +128,8 @@ int main(int argc, char **argv)
 	snprintf(program, sizeof(program), "incise-%s", verb);
 	if (errno == ENOENT)
 		execvp(program, argv + 1);
-	if (errno == ENOENT) {
+	/* A folder on PATH that may not be searched makes execvp say EACCES as well. */
+	if (errno == ENOENT || (errno == EACCES && !on_path(program))) {
 		fprintf(stderr,
 			"incise: there is no verb '%s'; 'incise --help' lists them\n",
 			verb);

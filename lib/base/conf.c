@@ -134,6 +134,9 @@ int incise_conf_read(config_t *config, const char *path, struct incise_error *er
 int incise_conf_known(const config_setting_t *group, const char *path,
 		      const char *const *keys, struct incise_error *err)
 {
+	if (!config_setting_is_group(group))
+		return setting_error(group, path, EINVAL, err,
+				     "a group { KEY = VALUE; … }");
 	for (int i = 0; i < config_setting_length(group); i++) {
 		const config_setting_t *setting = config_setting_get_elem(group, i);
 		const char *own = config_setting_name(setting);

@@ -145,12 +145,11 @@ int incise_outfile_commit(struct incise_outfile *file, struct incise_error *err)
 	if (!rc && file->temp && rename(file->temp, file->path))
 		rc = -errno;
 	if (rc) {
-		rc = incise_error_set(err, -rc,
-				      "%s: not written: %s; what stood there before is "
-				      "unchanged",
-				      strcmp(file->path, "-") ? file->path
-							      : "standard output",
-				      strerror(-rc));
+		rc = incise_error_set(
+			err, -rc, "%s: not written: %s%s",
+			strcmp(file->path, "-") ? file->path : "standard output",
+			strerror(-rc),
+			file->temp ? "; what stood there before is unchanged" : "");
 		incise_outfile_abort(file);
 		return rc;
 	}

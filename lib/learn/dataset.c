@@ -104,7 +104,9 @@ static int next_row(struct reader *in)
 		}
 	}
 	if (ferror(in->file))
-		return fail(in, errno ? errno : EIO, "%s", strerror(errno ? errno : EIO));
+		return incise_error_set(in->err, errno ? errno : EIO,
+					"%s: %s; give a CSV file with a header row",
+					in->path, strerror(errno ? errno : EIO));
 	return 0;
 }
 

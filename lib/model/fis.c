@@ -73,7 +73,9 @@ static int next_line(struct reader *in)
 			return 1;
 	}
 	if (ferror(in->file))
-		return fail(in, errno ? errno : EIO, "%s", strerror(errno ? errno : EIO));
+		return incise_error_set(in->err, errno ? errno : EIO,
+					"%s: %s; give a .fis file", in->path,
+					strerror(errno ? errno : EIO));
 	return 0;
 }
 

@@ -29,6 +29,7 @@ static char *beside(const char *scene, const char *name)
 static int read_model(struct incise_scene *scene, const config_setting_t *root,
 		      const char *override, struct incise_error *err)
 {
+	struct incise_error why = {0};
 	const char *name = NULL;
 	char *path;
 	int rc = incise_conf_string(root, scene->path, "model", &name, err);
@@ -44,10 +45,11 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	path = override ? strdup(override) : beside(scene->path, name);
 	if (!path)
 		return incise_error_set(err, ENOMEM, "%s: no memory", scene->path);
-	scene->model = incise_model_load(path, err);
+	scene->model = incise_model_load(path, &why);
 	free(path);
 	if (!scene->model)
-		return -errno;
+		return incise_error_set(err, why.code, "%s: its model %s", scene->path,
+					why.text);
 	if (incise_model_n_inputs(scene->model) != 2)
 		return incise_error_set(
 			err, EINVAL,

@@ -10,6 +10,7 @@
 #define INCISE_LOOP_H
 
 #include <signal.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <incise/clock.h>
 #include <incise/error.h>

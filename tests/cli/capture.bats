@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise capture, as a user meets it. The virtual rig in simulated time runs as fast as it
+# goes; where a capture is to be caught in the act it runs in real time.
+
+bats_require_minimum_version 1.5.0
+
+setup() {
+	PATH=$INCISE_BUILD/bin:$PATH
+	mkdir "$BATS_TEST_TMPDIR/work" # bats keeps files of its own beside it
+	cd "$BATS_TEST_TMPDIR/work"
+	quick=sim:clock=simulated
+}
+
+teardown() {
+	[ -z "$mounted" ] || umount "$mounted"
+}
+
+# One value of recording.db.
+ask() {
+	sqlite3 "$1/recording.db" "$2"
+}
+
+# One value of a JSON report; fails when the file is no JSON.
+key() {
+	[ "$(sqlite3 :memory: "SELECT json_valid(readfile('$1'))")" = 1 ]
+	sqlite3 :memory: "SELECT json_extract(readfile('$1'), '\$.$2')"
+}
+
+# The last run failed with 1 and one line on stderr that holds this text.
+failed_with() {
+	[ "$status" -eq 1 ]
+	[ "${#stderr_lines[@]}" -eq 1 ]
+	[[ "$stderr" == "incise capture: "*"$1"* ]] || { echo "$stderr"; false; }
+}
+
+# Wait until a capture in the background has written something.
+until_it_runs() {
+	for _ in $(seq 100); do
+		[ "$(sqlite3 -readonly "$1/recording.db" 'SELECT count(*) FROM force' 2>&1)" -gt \
+			"${2:-0}" ] 2>/dev/null && return
+		sleep 0.1
+	done
+	echo "$1: no rows after 10 s"
+	false
+}
+
+@test "capture --help lists the options" {
+	run -0 --separate-stderr incise capture --help
+	for option in --output --rig --calibration --duration --force --json; do
+		[[ "$output" == *"$option"* ]]
+	done
+	[ -z "$stderr" ]
+}
+
+@test "capture records a given time" {
+	run -0 --separate-stderr incise capture -o a.rec --rig $quick --duration 1500ms
+	[ -z "$stderr" ]
+	[ "${#lines[@]}" -eq 1 ]
+	[[ "$output" == "a.rec: 1.5 s, "*" 0 lost"* ]]
+	[ ! -e a.rec.part ]
+	[ "$(ls a.rec)" = recording.db ]
+	[ "$(ask a.rec "SELECT value FROM meta WHERE key='complete'")" = 1 ]
+	# 10 kHz for 1.5 s, and one more at the very end of it
+	n=$(ask a.rec 'SELECT count(*) FROM force')
+	[ "$n" -ge 15000 ]
+	[ "$n" -le 15001 ]
+}
+
+@test "capture on the virtual rig ends with its cuts" {
+	incise capture -o a.rec --rig $quick,cut_s=1,pause_s=0.6
+	# 14 cuts of 1 s, 15 pauses of 0.6 s: 23 s
+	n=$(ask a.rec 'SELECT count(*) FROM force')
+	[ "$n" -ge 230000 ]
+	[ "$n" -le 230001 ]
+}
+
+@test "capture reports as JSON" {
+	incise capture -o a.rec --rig $quick --duration 2s --json >report.json
+	[ "$(key report.json path)" = a.rec ]
+	[ "$(key report.json seconds)" = 2.0 ]
+	[ "$(key report.json force)" = "$(ask a.rec 'SELECT count(*) FROM force')" ]
+	[ "$(key report.json tracker)" = "$(ask a.rec 'SELECT count(*) FROM tracker')" ]
+	[ "$(key report.json depth)" = "$(ask a.rec 'SELECT count(*) FROM depth')" ]
+	[ "$(key report.json lost)" = 0 ]
+	[ "$(key report.json clipped)" = 0 ]
+	[[ "$(key report.json zero_mV)" == 1[78]?.* ]]
+}
+
+@test "capture of the same seed records the same samples" {
+	incise capture -o a.rec --rig $quick,seed=7 --duration 3s
+	incise capture -o b.rec --rig $quick,seed=7 --duration 3s
+	for table in force tracker depth; do
+		cmp <(ask a.rec "SELECT * FROM $table") <(ask b.rec "SELECT * FROM $table")
+	done
+}
+
+@test "capture runs in real time and ends at SIGINT with a whole recording" {
+	incise capture -o a.rec --rig sim:clock=real >out 2>err 3>&- &
+	pid=$!
+	until_it_runs a.rec.part 6000
+	kill -INT $pid
+	wait $pid
+	[ ! -s err ]
+	grep -q '^a.rec: ' out
+	[ ! -e a.rec.part ]
+	[ "$(ask a.rec "SELECT value FROM meta WHERE key='complete'")" = 1 ]
+}
+
+@test "capture ends at SIGTERM too" {
+	incise capture -o a.rec --rig sim:clock=real >out 2>err 3>&- &
+	pid=$!
+	until_it_runs a.rec.part
+	kill -TERM $pid
+	wait $pid
+	[ -d a.rec ]
+}
+
+@test "capture killed in mid recording leaves a readable .part" {
+	incise capture -o a.rec --rig sim:clock=real >out 2>err 3>&- &
+	pid=$!
+	until_it_runs a.rec.part 6000
+	kill -KILL $pid
+	wait $pid || true
+	[ ! -e a.rec ]
+	[ "$(ask a.rec.part 'PRAGMA integrity_check')" = ok ]
+	[ "$(ask a.rec.part 'SELECT count(*) FROM force')" -gt 6000 ]
+	[ "$(ask a.rec.part "SELECT value FROM meta WHERE key='force_rows'")" = \
+		"$(ask a.rec.part 'SELECT count(*) FROM force')" ]
+
+	# It is not lost by the next capture of that name, only by --force.
+	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s
+	failed_with "a.rec.part: left by an interrupted recording"
+	[ -d a.rec.part ]
+	incise capture -o a.rec --rig $quick --duration 1s --force
+	[ -d a.rec ]
+	[ ! -e a.rec.part ]
+}
+
+@test "capture --force keeps its hands off a recording under way" {
+	incise capture -o a.rec --rig sim:clock=real >out 2>err 3>&- &
+	pid=$!
+	until_it_runs a.rec.part
+	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s --force
+	failed_with "another incise capture is writing it"
+	kill -INT $pid
+	wait $pid
+	[ -d a.rec ]
+}
+
+@test "capture refuses an existing recording, --force replaces it" {
+	incise capture -o a.rec --rig $quick --duration 1s
+	before=$(sha256sum <a.rec/recording.db)
+	run --separate-stderr incise capture -o a.rec --rig $quick --duration 2s
+	failed_with "a.rec: exists already"
+	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
+	incise capture -o a.rec --rig $quick --duration 2s --force
+	[ "$(ask a.rec 'SELECT count(*) FROM force')" -ge 20000 ]
+	[ "$(ls)" = a.rec ]
+}
+
+@test "capture --force that fails leaves the old recording" {
+	incise capture -o a.rec --rig $quick --duration 1s
+	before=$(sha256sum <a.rec/recording.db)
+	run --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1,pause_s=0.1 --force
+	failed_with "deep while the zero"
+	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
+}
+
+@test "capture --force replaces nothing but recordings" {
+	mkdir a.rec && touch a.rec/thesis.txt
+	touch b.rec
+	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s --force
+	failed_with "is no recording"
+	[ -e a.rec/thesis.txt ]
+	run --separate-stderr incise capture -o b.rec --rig $quick --duration 1s --force
+	failed_with "is no recording"
+	[ -f b.rec ]
+}
+
+@test "capture with the blade in the tissue fails and leaves nothing" {
+	run --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1,pause_s=0.1
+	failed_with "hold the tool free for the first 0.5 s"
+	[ -z "$(ls)" ]
+}
+
+@test "capture without a rig says how to get one" {
+	[ ! -e /etc/incise/rig.conf ] || skip "this machine has /etc/incise/rig.conf"
+	run --separate-stderr incise capture -o a.rec
+	failed_with "--rig sim:"
+	[ -z "$(ls)" ]
+}
+
+@test "capture takes ./rig.conf" {
+	cat >rig.conf <<-'EOF'
+		clock = "simulated";
+		tracker = "sim:";
+		force = "sim:";
+		surface = { point_mm = [0.0, 0.0, -1.0]; normal = [0.0, 0.0, 1.0]; };
+	EOF
+	incise capture -o a.rec --duration 1s
+	[ "$(ask a.rec "SELECT value FROM meta WHERE key='rig'")" = rig.conf ]
+	[ "$(ask a.rec "SELECT value FROM meta WHERE key='surface_point_z_mm'")" = -1.0 ]
+	# one below the default surface: one less of depth
+	[ "$(ask a.rec 'SELECT max(abs(depth_mm + 1 + z_mm)) < 1e-12 FROM depth JOIN tracker
+		USING(seq)')" = 1 ]
+}
+
+@test "capture with a bad rig names the fault" {
+	run --separate-stderr incise capture -o a.rec --rig nowhere.conf
+	failed_with nowhere.conf
+	echo 'tracker = ' >bad.conf
+	run --separate-stderr incise capture -o a.rec --rig bad.conf
+	failed_with bad.conf:
+	run --separate-stderr incise capture -o a.rec --rig sim:colour=red
+	failed_with colour
+	[ ! -e a.rec.part ]
+}
+
+@test "capture takes a calibration and names a bad one" {
+	printf 'force_mV_N = 1000.0;\nforce_zero_mV = 180.0;\n' >calibration.conf
+	incise capture -o a.rec --rig $quick --duration 1s --calibration calibration.conf
+	[ "$(ask a.rec "SELECT value FROM meta WHERE key='force_mV_N'")" = 1000.0 ]
+	[ "$(ask a.rec "SELECT value FROM meta WHERE key='force_zero_mV'")" = 180.0 ]
+	run --separate-stderr incise capture -o b.rec --rig $quick --calibration none.conf
+	failed_with none.conf
+}
+
+@test "capture: bad usage is 2" {
+	for arguments in "" "-o" "-o a.csv" "-o .rec" "-o a.rec more" "-o a.rec --no-such" \
+		"-o a.rec --duration never" "-o a.rec --duration -1s" "-o a.rec --duration 0"; do
+		# shellcheck disable=SC2086
+		run -2 --separate-stderr incise capture $arguments
+		[ -z "$output" ]
+		[ "${#stderr_lines[@]}" -eq 2 ] # what is wrong, and where help is
+		[[ "${stderr_lines[1]}" == *"incise capture --help"* ]]
+	done
+	[ -z "$(ls)" ]
+}
+
+@test "capture into a folder that is not there" {
+	run --separate-stderr incise capture -o no/such/a.rec --rig $quick --duration 1s
+	failed_with "no/such"
+}
+
+@test "capture into a folder that cannot be written" {
+	[ "$(id -u)" != 0 ] || skip "root writes everywhere"
+	mkdir shut && chmod 555 shut
+	run --separate-stderr incise capture -o shut/a.rec --rig $quick --duration 1s
+	failed_with "shut/a.rec.part"
+}
+
+@test "capture on a full disk says so and keeps what was committed" {
+	mkdir disk
+	if mount -t tmpfs -o size=2m tmpfs disk 2>/dev/null; then
+		mounted=$PWD/disk
+	else
+		skip "mounting a small tmpfs is not permitted; the next test stands in"
+	fi
+	run --separate-stderr incise capture -o disk/a.rec --rig $quick
+	failed_with "disk/a.rec: disk full"
+	[ ! -e disk/a.rec ]
+	[ "$(ask disk/a.rec.part 'PRAGMA integrity_check')" = ok ]
+	[ "$(ask disk/a.rec.part 'SELECT count(*) FROM force')" -gt 1000 ]
+}
+
+@test "capture at the limit on the size of files" {
+	run --separate-stderr bash -c "trap '' XFSZ; ulimit -f 1000
+		incise capture -o a.rec --rig $quick"
+	failed_with "a.rec: disk full"
+	[ ! -e a.rec ]
+	[ "$(ask a.rec.part 'PRAGMA integrity_check')" = ok ]
+	[ "$(ask a.rec.part 'SELECT count(*) FROM force')" -gt 1000 ]
+}
+
+@test "capture takes names with spaces and signs" {
+	incise capture -o "my liver, 'old' 100% ?#.rec/" --rig $quick --duration 1s
+	[ -f "my liver, 'old' 100% ?#.rec/recording.db" ]
+}
+
+@test "capture to a closed standard output is 1" {
+	run -1 --separate-stderr bash -c \
+		"incise capture -o a.rec --rig $quick --duration 1s >/dev/full"
+	[[ "$stderr" == *"standard output"* ]]
+	[ -d a.rec ] # the recording itself is whole
+}

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# What the command-line tests share: `load cli`. Variables: root, the source tree.
+# shellcheck shell=bash
+
+bats_require_minimum_version 1.5.0
+
+: "${INCISE_BUILD:?is the build folder; run make check-cli}"
+root=$(cd "$BATS_TEST_DIRNAME/../.." && pwd)
+PATH=$INCISE_BUILD/bin:$PATH
+
+# A folder to work in that is empty; bats keeps files of its own beside it.
+work_folder() {
+	mkdir "$BATS_TEST_TMPDIR/work"
+	cd "$BATS_TEST_TMPDIR/work"
+}
+
+complain() {
+	echo "$*"
+	return 1
+}
+
+# The last run (with --separate-stderr) failed with 1 and one line that holds these texts.
+failed_with() {
+	[ "$status" -eq 1 ] || complain "exit $status: $stderr" || return
+	[ "${#stderr_lines[@]}" -eq 1 ] || complain "more than one line: $stderr" || return
+	[[ "$stderr" == "incise "*": "* ]] || complain "no verb is named: $stderr" || return
+	for text; do
+		[[ "$stderr" == *"$text"* ]] || complain "no '$text' in: $stderr" || return
+	done
+}
+
+# The last run was bad usage: 2, one line that holds the text, and where help is.
+bad_usage() {
+	[ "$status" -eq 2 ] || complain "exit $status: $stderr" || return
+	[ "${#stderr_lines[@]}" -eq 2 ] || complain "not two lines: $stderr" || return
+	[[ "${stderr_lines[0]}" == "incise "*"$1"* ]] || complain "no '$1' in: $stderr" || return
+	[[ "${stderr_lines[1]}" == "Try 'incise "*" --help'." ]] || complain "$stderr"
+}
+
+# One value of a JSON file, by path: key report.json check.rmse_N. Fails without it.
+key() {
+	local type
+	[ "$(sqlite3 :memory: "SELECT json_valid(readfile('$1'))")" = 1 ] ||
+		complain "$1 is no JSON" || return
+	type=$(sqlite3 :memory: "SELECT json_type(readfile('$1'), '\$.$2')")
+	[ -n "$type" ] || complain "$1 has no key $2" || return
+	sqlite3 :memory: "SELECT json_extract(readfile('$1'), '\$.$2')"
+}
+
+# Whether a comparison of numbers holds: holds "$a < 0.1". An empty value is an error.
+holds() {
+	awk "BEGIN { exit !($1) }" || complain "does not hold: $1"
+}
+
+# Training pairs of 6 cuts over 0-20 mm and 0-50 mm/s; the force is smooth, differs by a
+# few percent between cuts and carries up to 5 mN of noise (no rand(): awks differ).
+made_pairs() {
+	awk 'BEGIN {
+		print "cut,depth_mm,velocity_mm_s,force_N"
+		for (c = 1; c <= 6; c++)
+			for (i = 0; i < 8; i++)
+				for (j = 0; j < 6; j++) {
+					d = i * 20 / 7; v = 10 * j
+					noise = (c * 7919 + i * 104729 + j * 1299709) % 1000 / 1000 - 0.5
+					f = (0.045 * d + 0.0028 * d * d) * (1 + 0.35 * v / (v + 15))
+					printf "c%d,%.6f,%g,%.6f\n", c, d, v,
+						f * (1 + 0.02 * (c - 3.5)) + 0.01 * noise
+				}
+	}'
+}
+
+# The file between .Bd -literal and .Ed of a manual page that holds a word.
+example_in() {
+	awk -v word="$2" '
+		/^\.Bd -literal/ { inside = 1; text = ""; next }
+		/^\.Ed/ { if (inside && index(text, word)) { printf "%s", text; exit }; inside = 0 }
+		inside { text = text $0 "\n" }' "$1" | sed 's/\\e/\\/g; s/\\-/-/g'
+}

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# tools/incise.bash: what bash offers after a tab.
+
+load cli
+
+setup() {
+	work_folder
+	# shellcheck source=../../tools/incise.bash
+	source "$root/tools/incise.bash"
+}
+
+# complete_words WORD… : what is offered for the last word.
+complete_words() {
+	COMP_WORDS=("$@")
+	COMP_CWORD=$(($# - 1))
+	COMPREPLY=()
+	_incise
+}
+
+@test "bash knows what completes incise" {
+	[[ "$(complete -p incise)" == *"-F _incise incise" ]]
+}
+
+@test "verbs are completed" {
+	complete_words incise ""
+	for verb in capture export train eval info haptic bench demo help; do
+		[[ " ${COMPREPLY[*]} " == *" $verb "* ]]
+	done
+	complete_words incise tr
+	[ "${COMPREPLY[*]}" = train ]
+	complete_words incise help ev
+	[ "${COMPREPLY[*]}" = eval ]
+	complete_words incise nosuch
+	[ "${#COMPREPLY[@]}" -eq 0 ]
+}
+
+@test "options are those of --help" {
+	complete_words incise train --m
+	[ "${COMPREPLY[*]}" = "--mf --mf-type" ]
+	complete_words incise haptic --lo
+	[ "${COMPREPLY[*]}" = --log ]
+	for verb in capture export train eval info haptic bench demo; do
+		complete_words incise "$verb" --
+		for option in "${COMPREPLY[@]}"; do
+			"incise-$verb" --help | grep -qE -- "^ .*$option( |\$)"
+		done
+		[[ " ${COMPREPLY[*]} " == *" --help "* ]]
+		# not one is missing
+		[ "${#COMPREPLY[@]}" -eq "$("incise-$verb" --help |
+			grep -cE '^  (-[A-Za-z],|   ) --[a-z]')" ]
+	done
+}
+
+@test "files are completed otherwise" {
+	touch data.csv "two words.csv"
+	mkdir data.rec
+	complete_words incise train da
+	[ "${COMPREPLY[*]}" = "data.csv data.rec" ] || [ "${COMPREPLY[*]}" = "data.rec data.csv" ]
+	complete_words incise train two
+	[ "${COMPREPLY[0]}" = "two words.csv" ]
+	complete_words incise train -o da
+	[ "${#COMPREPLY[@]}" -eq 2 ]
+}
+
+@test "options of a verb that does not exist are none" {
+	complete_words incise nosuch --
+	[ "${#COMPREPLY[@]}" -eq 0 ]
+}

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise demo, once, and what it leaves. The loop just reaches the tissue.
+
+load cli
+
+setup_file() {
+	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the pictures"
+	cd "$BATS_FILE_TMPDIR"
+	# from a folder of its own, into one whose name is awkward
+	incise demo -o "my demo's" --loop 3s --seed 3 >printed 2>warned
+}
+
+setup() {
+	work_folder
+	demo="$BATS_FILE_TMPDIR/my demo's"
+}
+
+pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-lateness camera"
+
+@test "demo draws every picture, as PNG and SVG" {
+	for name in $pictures; do
+		# the fewest bytes that a picture with axes, labels and curves came to is 20 KB
+		for ext in png svg; do
+			[ "$(stat -c %s "$demo/$name.$ext")" -gt 5000 ]
+		done
+		[ "$(head -c 8 "$demo/$name.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
+		# its last chunk: the file is whole
+		[ "$(tail -c 8 "$demo/$name.png" | head -c 4)" = IEND ]
+		grep -q '<svg' "$demo/$name.svg"
+		[[ "$(tail -c 20 "$demo/$name.svg" | tr -d '\n ')" == *"</svg>" ]]
+	done
+}
+
+@test "demo leaves a summary for programs" {
+	file=summary.json
+	cp "$demo/summary.json" .
+	[ "$(key $file version)" = "$(incise --version | cut -d' ' -f2)" ]
+	[ "$(key $file seed)" = 3 ]
+	[ "$(key $file pictures)" = "[\"${pictures// /\",\"}\"]" ]
+	[ "$(key $file export_averaged.rows)" = 120 ] # the paper's number of pairs
+	[ "$(key $file capture.lost)" = 0 ]
+	[ "$(key $file capture.seconds)" = 127.0 ] # 14 cuts of 8 s with 15 pauses of 1 s
+	[ "$(key $file train_random_halves.train.pairs)" = 60 ]
+	holds "$(key $file train_random_halves.train.mse_N2) > 0"
+	holds "$(key $file train_unseen_cuts.check.rmse_N) < \
+		$(key $file train_unseen_cuts.baselines.mean.rmse_N)"
+	holds "$(key $file fixed_point.max_difference_N) < 1e-3"
+	# the tissue's mean force is known; cuts differ by 10 % of at most 2.7 N
+	holds "$(key $file truth_rmse_N) > 0 && $(key $file truth_rmse_N) < 0.27"
+	holds "$(key $file new_cut_rmse_N) > 0"
+	holds "$(key $file haptic.ticks) + $(key $file haptic.skipped) >= 2990"
+	holds "$(key $file haptic.contact) > 0"
+	holds "$(key $file seconds) > 2"
+	for name in note paper.mse_train paper.mse_check export_raw export_by_cut \
+		capture_new_cut export_new_cut haptic.lateness_us.p999; do
+		[ -n "$(key $file $name)" ]
+	done
+}
+
+@test "demo leaves a summary for people, and prints it" {
+	grep -q "virtual rig with seed 3" "$demo/summary.txt"
+	run ! grep -qiE '\bnan\b|\binf\b' "$demo/summary.txt"
+	# all of it is in what was printed
+	while IFS= read -r line; do
+		grep -qF -- "$line" "$BATS_FILE_TMPDIR/printed"
+	done < <(grep . "$demo/summary.txt")
+}
+
+@test "demo leaves data that the other verbs take" {
+	[ "$(wc -l <"$demo/pairs.csv")" -eq 121 ]
+	incise info "$demo/liver.rec" --json >r.json
+	[ "$(key r.json cuts)" = 14 ]
+	[ "$(key r.json complete)" = 1 ]
+	holds "$(echo '10 20' | incise eval "$demo/liver.fis") > 0.3"
+	incise haptic "$demo/liver.scene" --rig sim:clock=simulated --duration 100ms >/dev/null
+	incise train "$demo/pairs-by-cut.csv" --group cut --check 0.3 --seed 3 -o m.fis 2>/dev/null
+	cmp m.fis "$demo/liver.fis"
+}
+
+@test "the commands that demo prints are those that it ran" {
+	for verb in capture export train haptic; do
+		grep -q "^\$ incise $verb " "$BATS_FILE_TMPDIR/printed"
+	done
+}
+
+@test "a picture can be drawn again from what is left" {
+	cp -r "$demo" copy
+	rm copy/fig3b-surface.png
+	cd copy/plot
+	gnuplot -e "ext='png'" fig3b-surface.gp
+	[ "$(stat -c %s ../fig3b-surface.png)" -gt 5000 ]
+}
+
+@test "demo does not write into a folder that exists" {
+	before=$(sha256sum <"$demo/summary.json")
+	run --separate-stderr incise demo -o "$demo" --loop 1s
+	failed_with "my demo's" "File exists" --force
+	[ -z "$output" ]
+	[ "$(sha256sum <"$demo/summary.json")" = "$before" ]
+}
+
+@test "demo without gnuplot says what to install, and leaves nothing" {
+	mkdir empty
+	run --separate-stderr env PATH="$PWD/empty" "$INCISE_BUILD/bin/incise" demo -o x
+	failed_with gnuplot-nox
+	[ ! -e x ]
+}
+
+@test "demo where it cannot write" {
+	run --separate-stderr incise demo -o no/such/folder
+	failed_with no/such/folder "No such file"
+	touch file
+	run --separate-stderr incise demo -o file
+	failed_with file
+	run --separate-stderr incise demo -o file --force
+	failed_with file
+}
+
+@test "demo: bad usage" {
+	run --separate-stderr incise demo somewhere
+	bad_usage "'somewhere'"
+	for wrong in "--loop 1ms" "--loop long" "--seed -1" "--seed x"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise demo -o x $wrong
+		bad_usage "${wrong%% *}"
+	done
+	[ ! -e x ]
+}

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise itself: finding and running verbs.
+
+load cli
+
+setup() {
+	work_folder
+}
+
+@test "--help and help list the verbs" {
+	run -0 --separate-stderr incise --help
+	[ -z "$stderr" ]
+	help=$output
+	for verb in capture export train eval info haptic bench demo; do
+		grep -q "^  $verb  *[a-z]" <<<"$help"
+		[ -x "$INCISE_BUILD/bin/incise-$verb" ]
+	done
+	run -0 incise help
+	[ "$output" = "$help" ]
+	run -0 incise -h
+	[ "$output" = "$help" ]
+}
+
+@test "every program that is built is a verb of --help" {
+	for program in "$INCISE_BUILD"/bin/incise-*; do
+		incise --help | grep -q "^  ${program##*/incise-} "
+	done
+}
+
+@test "--version is the header's" {
+	header=$(sed -n 's/^#define INCISE_VERSION "\(.*\)"/\1/p' \
+		"$root/lib/include/incise/version.h")
+	[ -n "$header" ]
+	run -0 --separate-stderr incise --version
+	[ "$output" = "incise $header" ]
+	[ -z "$stderr" ]
+	run -0 incise -V
+	[ "$output" = "incise $header" ]
+	for program in "$INCISE_BUILD"/bin/incise-*; do
+		run -0 "$program" --version
+		[ "$output" = "incise $header" ]
+	done
+}
+
+@test "no verb, and words that are none" {
+	# a folder that may not be searched would be another error
+	PATH=$INCISE_BUILD/bin:/usr/bin:/bin
+	run -2 --separate-stderr incise
+	[ -z "$output" ]
+	[ "${#stderr_lines[@]}" -eq 1 ]
+	for word in nosuch --nosuch ../bin/incise-train "" "$(printf 'x%.0s' {1..5000})"; do
+		run -2 --separate-stderr incise "$word"
+		[ -z "$output" ]
+		[ "${#stderr_lines[@]}" -eq 1 ]
+		[[ "$stderr" == *"incise --help"* ]]
+	done
+}
+
+@test "a verb of someone else's on PATH runs with its arguments" {
+	mkdir bin
+	printf '#!/bin/sh\nprintf "%%s|" "$0" "$@"\nexit 7\n' >bin/incise-weigh
+	chmod +x bin/incise-weigh
+	PATH=$PWD/bin:$PATH run -7 incise weigh "a b" --x ""
+	[ "$output" = "$PWD/bin/incise-weigh|a b|--x||" ]
+}
+
+@test "a verb on PATH does not hide the one beside incise" {
+	mkdir bin
+	printf '#!/bin/sh\necho false friend\n' >bin/incise-train
+	chmod +x bin/incise-train
+	PATH=$PWD/bin:$PATH run -0 incise train --version
+	[[ "$output" == "incise "[0-9]* ]]
+}
+
+@test "a verb that may not be run is 1" {
+	mkdir bin
+	echo nonsense >bin/incise-weigh
+	PATH=$PWD/bin:$PATH run -1 --separate-stderr incise weigh
+	[ "${#stderr_lines[@]}" -eq 1 ]
+	[[ "$stderr" == *incise-weigh* ]]
+}
+
+@test "incise runs from anywhere, and through a link" {
+	cd /
+	run -0 "$INCISE_BUILD/bin/incise" train --version
+	ln -s "$INCISE_BUILD/bin/incise" "$BATS_TEST_TMPDIR/work/link"
+	PATH=/usr/bin:/bin run -0 "$BATS_TEST_TMPDIR/work/link" train --version
+	[[ "$output" == "incise "* ]]
+}
+
+@test "help VERB opens the manual of the source tree" {
+	[ -e "$INCISE_BUILD/../man/incise-train.1" ] ||
+		skip "the build folder does not lie in the source tree"
+	mkdir bin
+	printf '#!/bin/sh\necho "man $*"\n' >bin/man
+	chmod +x bin/man
+	PATH=$PWD/bin:$PATH run -0 incise help train
+	[ "$(realpath "${output#man }")" = "$root/man/incise-train.1" ]
+}
+
+@test "help on a full disk says so" {
+	for word in --help --version help; do
+		run --separate-stderr bash -c "incise $word >/dev/full"
+		[ "$status" -eq 1 ]
+		[ "${#stderr_lines[@]}" -eq 1 ]
+	done
+}

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise eval, and what it takes as a model.
+
+load cli
+
+setup_file() {
+	made_pairs >"$BATS_FILE_TMPDIR/pairs.csv"
+	incise train "$BATS_FILE_TMPDIR/pairs.csv" -o "$BATS_FILE_TMPDIR/m.fis" 2>/dev/null
+	incise train "$BATS_FILE_TMPDIR/pairs.csv" --mf-type gbellmf \
+		-o "$BATS_FILE_TMPDIR/bell.fis" 2>/dev/null
+}
+
+setup() {
+	work_folder
+	cp "$BATS_FILE_TMPDIR"/*.fis .
+}
+
+# The model in the file bad.fis is refused with these texts.
+refuses() {
+	run --separate-stderr incise eval bad.fis <<<'5 20'
+	failed_with bad.fis "$@" || return
+	[ -z "$output" ] || complain "printed: $output"
+}
+
+@test "eval computes equation (3)" {
+	# an independent evaluation of the example in incise-fis(5)
+	example_in "$root/man/incise-fis.5" "[Rules]" >small.fis
+	grep -q NumRules=2 small.fis
+	printf '%s\n' "0 0" "5 20" "20 50" "7.5 31.25" >points
+	incise eval small.fis points >got
+	awk '{ a = exp(-$2^2 / 800); b = exp(-($2 - 50)^2 / 800)
+		printf "%.10g\n", (a * 0.1 * $1 + b * 0.15 * $1) / (a + b) }' points >want
+	paste got want | awk '($1 - $2)^2 > 1e-18 { bad = 1; print } END { exit bad || NR != 4 }'
+}
+
+@test "eval weighs rules and takes the bell" {
+	cat >bell2.fis <<-'EOF'
+		[System]
+		Type='sugeno'
+		NumInputs=1
+		NumRules=2
+		[Input1]
+		Name='depth_mm'
+		Range=[0 10]
+		NumMFs=2
+		MF1='a':'gbellmf',[5 2 0]
+		MF2='b':'gbellmf',[5 3 10]
+		[Output1]
+		NumMFs=2
+		MF1='low':'constant',[1]
+		MF2='high':'linear',[2 3]
+		[Rules]
+		1, 1 (1) : 1
+		2, 2 (0.5) : 1
+	EOF
+	seq 0 10 >points
+	incise eval bell2.fis points >got
+	awk '{ a = 1 / (1 + ($1 / 5)^4); b = 0.5 / (1 + (($1 - 10) / 5)^6)
+		printf "%.10g\n", (a + b * (2 * $1 + 3)) / (a + b) }' points >want
+	# ten digits of values up to 23 are printed
+	paste got want | awk '($1 - $2)^2 > 1e-16 { bad = 1; print } END { exit bad || NR != 11 }'
+}
+
+@test "fixed point agrees with double within 1 mN on the support" {
+	incise eval m.fis --grid 101x101 >double
+	incise eval m.fis --grid 101x101 --arith fixed >fixed
+	# 1 mN is what was promised, one step of the 12-bit force channel; that they differ at
+	# all shows that two arithmetics ran
+	paste double fixed | awk '
+		!NF { next }
+		$1 != $4 || $2 != $5 { exit 1 }
+		{ e = $3 - $6; if (e < 0) e = -e; if (e > largest) largest = e; n++ }
+		END { print n, largest; exit !(n == 10201 && largest < 1e-3 && largest > 0) }'
+}
+
+@test "eval reads standard input, - and a file alike" {
+	printf '5 20\n\n# note\n  1,2\r\n3;4\n5\t6\n7, 8' >points
+	incise eval m.fis points >a
+	incise eval m.fis <points >b
+	incise eval m.fis - <points >c
+	[ "$(wc -l <a)" -eq 5 ]
+	cmp a b
+	cmp a c
+	[ "$(head -n 1 a)" = "$(echo '5 20' | incise eval m.fis)" ]
+}
+
+@test "eval takes the model from standard input" {
+	echo '5 20' >points
+	run -0 incise eval - points <m.fis
+	[ "$output" = "$(incise eval m.fis points)" ]
+}
+
+@test "eval answers up to the bad line, then names it" {
+	for bad in "1 x" "1" "nan 1" "1 inf" "1 2 3" "1 2 x" "1e999 2"; do
+		printf '5 20\n# note\n%s\n5 20\n' "$bad" >points
+		run --separate-stderr incise eval m.fis points
+		failed_with "points:3: column "
+		[ "${#lines[@]}" -eq 1 ]
+	done
+	printf '5 20\n1 x\n' >points
+	run --separate-stderr incise eval m.fis points
+	failed_with "points:2: column 2 (velocity_mm_s)" "'x'"
+	run --separate-stderr incise eval m.fis <points
+	failed_with "standard input:2: column 2"
+}
+
+@test "eval outside the support takes its nearest end and says so" {
+	run -0 --separate-stderr incise eval m.fis <<<$'-3 20\n25 20\n5 60\n5 20'
+	[ "${#stderr_lines[@]}" -eq 1 ]
+	[[ "$stderr" == "incise eval: warning: 3 inputs lay outside"* ]]
+	[ "${lines[0]}" = "$(echo '0 20' | incise eval m.fis)" ]
+	[ "${lines[1]}" = "$(echo '20 20' | incise eval m.fis)" ]
+	[ "${lines[2]}" = "$(echo '5 50' | incise eval m.fis)" ]
+	run -0 --separate-stderr incise eval m.fis <<<'0 0'
+	[ -z "$stderr" ]
+}
+
+@test "eval --no-clamp extrapolates" {
+	run -0 --separate-stderr incise eval m.fis --no-clamp <<<'30 20'
+	[ "${#stderr_lines[@]}" -eq 1 ]
+	[[ "$stderr" == *extrapolated ]]
+	[ "$output" != "$(echo '20 20' | incise eval m.fis)" ]
+	# within the support it changes nothing
+	[ "$(echo '5 20' | incise eval m.fis --no-clamp)" = "$(echo '5 20' | incise eval m.fis)" ]
+	run --separate-stderr incise eval m.fis --no-clamp --arith fixed
+	bad_usage --no-clamp
+}
+
+@test "eval stays finite wherever it is asked" {
+	printf '%s\n' "1e308 1e308" "-1e308 1e-308" "0 -1e300" "1e15 20" >points
+	for arithmetic in double fixed; do
+		incise eval m.fis points --arith $arithmetic 2>/dev/null >out
+		[ "$(grep -cE '^-?[0-9.]+(e[-+][0-9]+)?$' out)" -eq 4 ]
+	done
+}
+
+@test "eval --grid covers the support to its ends" {
+	run -0 incise eval m.fis --grid 3x2
+	[ "$(awk 'NF { printf "%s,%s ", $1, $2 }' <<<"$output")" = "0,0 0,50 10,0 10,50 20,0 20,50 " ]
+	incise eval m.fis --grid 3x2 >grid
+	[ "$(grep -c '^$' grid)" -eq 3 ]
+	[ "$(awk 'NR == 4 { print $3 }' grid)" = "$(echo '10 0' | incise eval m.fis)" ]
+	for wrong in 3 3x 1x5 x 3x3x3 99999x2 -2x3; do
+		run --separate-stderr incise eval m.fis --grid $wrong
+		bad_usage --grid
+	done
+	run --separate-stderr incise eval m.fis points --grid 3x3
+	bad_usage # a grid reads nothing
+}
+
+@test "eval: bad usage, and files that are not there" {
+	run --separate-stderr incise eval
+	bad_usage "a model"
+	run --separate-stderr incise eval m.fis a b
+	bad_usage "at most one file"
+	run --separate-stderr incise eval m.fis --arith float
+	bad_usage "neither double nor fixed"
+	run --separate-stderr incise eval none.fis
+	failed_with none.fis "No such file"
+	run --separate-stderr incise eval m.fis none.txt
+	failed_with none.txt "No such file"
+	run --separate-stderr incise eval m.fis .
+	failed_with "Is a directory"
+	run --separate-stderr incise eval .
+	failed_with "Is a directory"
+	[[ "$stderr" != *:0:* ]] # there is no line 0
+}
+
+@test "eval to a full disk fails, to a closed pipe is quiet" {
+	run --separate-stderr bash -c "echo '5 20' | incise eval m.fis >/dev/full"
+	failed_with "No space left"
+	bash -c "incise eval m.fis --grid 1000x1000 2>err | head -n 1" >out
+	[ "$(wc -l <out)" -eq 1 ]
+	[ ! -s err ]
+}
+
+@test "a model cut at any line is refused" {
+	total=$(wc -l <m.fis)
+	[ "$total" -gt 60 ]
+	for ((k = 0; k < total; k++)); do
+		head -n $k m.fis >bad.fis
+		refuses || complain "cut to $k lines"
+	done
+}
+
+@test "a model cut at any of 20 bytes is refused" {
+	size=$(stat -c %s m.fis)
+	for ((k = 1; k <= 20; k++)); do
+		head -c $((size * k / 21)) m.fis >bad.fis
+		refuses || complain "cut to $((size * k / 21)) bytes"
+	done
+	head -c -2 m.fis >bad.fis # the last rule lacks its last character
+	refuses
+	head -c -1 m.fis >bad.fis # the last line lacks its end: whole
+	[ "$(echo '5 20' | incise eval bad.fis)" = "$(echo '5 20' | incise eval m.fis)" ]
+}
+
+@test "a Mamdani model is refused by name and line" {
+	sed "s/^Type='sugeno'/Type='mamdani'/" m.fis >bad.fis
+	refuses "bad.fis:3: Type='mamdani'" Sugeno
+}
+
+@test "what a .fis may hold and incise does not know is refused by name and line" {
+	line=$(grep -n "^MF1='in1mf1'" m.fis | cut -d: -f1)
+	sed "${line}s/gaussmf/trimf/" m.fis >bad.fis
+	refuses "bad.fis:$line: " "'trimf'" "gaussmf and gbellmf"
+	sed "s/^AndMethod='prod'/AndMethod='min'/" m.fis >bad.fis
+	refuses "AndMethod='min'"
+	sed "s/^DefuzzMethod='wtaver'/DefuzzMethod='centroid'/" m.fis >bad.fis
+	refuses "DefuzzMethod='centroid'"
+	sed '$s/^5/-5/' m.fis >bad.fis
+	refuses "not"
+	sed '$s/: 1$/: 2/' m.fis >bad.fis
+	refuses "or"
+	sed "s/'linear'/'cubic'/" m.fis >bad.fis
+	refuses "'cubic'"
+}
+
+@test "numbers in a .fis that cannot be are refused" {
+	line=$(grep -n "^MF1='in1mf1'" m.fis | cut -d: -f1)
+	for numbers in "[0 5]" "[-1 5]" "[nan 5]" "[1 inf]" "[1e999 5]" "[1]" "[1 2 3]" "[a b]" "1 2" "[]" "[1 2"; do
+		sed "${line}s/\[.*/$numbers/" m.fis >bad.fis
+		refuses "bad.fis:$line: "
+	done
+	for range in "[5 5]" "[5 4]" "[0 inf]" "[nan 1]" "[-1e308 1e308]"; do
+		sed "0,/^Range=/s/^Range=.*/Range=$range/" m.fis >bad.fis
+		refuses "bad.fis:$(grep -n -m 1 '^Range=' m.fis | cut -d: -f1): "
+	done
+	for rules in 0 -1 257 99999999999999999999 x "" 19 21; do
+		sed "s/^NumRules=.*/NumRules=$rules/" m.fis >bad.fis
+		refuses
+	done
+	for n in 0 9 -1 1 3; do
+		sed "s/^NumInputs=.*/NumInputs=$n/" m.fis >bad.fis
+		refuses
+	done
+	sed '$s/^5 4/6 4/' m.fis >bad.fis
+	refuses
+	sed '$s/, 20/, 21/' m.fis >bad.fis
+	refuses
+	sed '$s/(1)/(0)/' m.fis >bad.fis
+	refuses weight
+}
+
+@test "what is no .fis is refused" {
+	: >bad.fis
+	refuses empty
+	echo "depth_mm,force_N" >bad.fis
+	refuses ".fis"
+	head -c 5000 "$INCISE_BUILD/bin/incise" >bad.fis
+	refuses
+	printf 'x%.0s' {1..100000} >bad.fis
+	refuses
+}
+
+@test "the bell evaluates in double, and is refused in fixed point by name" {
+	incise eval bell.fis <<<'5 20' >out
+	holds "$(cat out) > 0"
+	run --separate-stderr incise eval bell.fis --arith fixed <<<'5 20'
+	failed_with bell.fis gbellmf depth_mm in1mf1
+}
+
+@test "a model that fixed point cannot hold is refused by name" {
+	# the last consequent is beyond any format of 64 bits with 1 mN left
+	sed "s/^MF20='out1mf20':'linear',.*/MF20='out1mf20':'linear',[1e9 1e9 1e9]/" m.fis >big.fis
+	incise eval big.fis <<<'5 20' >out
+	[ -s out ]
+	run --separate-stderr incise eval big.fis --arith fixed <<<'5 20'
+	failed_with big.fis "too large"
+	sed "s/^MF1='in1mf1':'gaussmf',.*/MF1='in1mf1':'gaussmf',[1e-9 0]/" m.fis >thin.fis
+	run --separate-stderr incise eval thin.fis --arith fixed <<<'5 20'
+	failed_with thin.fis in1mf1
+}

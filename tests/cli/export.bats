@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise export, as a user meets it.
+
+bats_require_minimum_version 1.5.0
+
+setup_file() {
+	cd "$BATS_FILE_TMPDIR"
+	"$INCISE_BUILD/bin/incise" capture -o liver.rec \
+		--rig sim:clock=simulated,cut_s=2,pause_s=1 >/dev/null
+}
+
+setup() {
+	PATH=$INCISE_BUILD/bin:$PATH
+	mkdir "$BATS_TEST_TMPDIR/work" # bats keeps files of its own beside it
+	cd "$BATS_TEST_TMPDIR/work"
+	ln -s "$BATS_FILE_TMPDIR/liver.rec" liver.rec
+}
+
+key() {
+	[ "$(sqlite3 :memory: "SELECT json_valid(readfile('$1'))")" = 1 ]
+	sqlite3 :memory: "SELECT json_extract(readfile('$1'), '\$.$2')"
+}
+
+failed_with() {
+	[ "$status" -eq 1 ]
+	[ "${#stderr_lines[@]}" -eq 1 ]
+	[[ "$stderr" == "incise export: "*"$1"* ]] || { echo "$stderr"; false; }
+}
+
+# Every line has so many fields, all but the first column's numbers that are finite.
+well_formed() {
+	awk -F, -v fields="$2" -v from="$3" '
+		NF != fields { print "line " NR ": " $0; bad = 1 }
+		NR > 1 { for (i = from; i <= NF; i++)
+			if ($i !~ /^-?[0-9.]+(e[-+][0-9]+)?$/) { print "line " NR ": " $i; bad = 1 } }
+		END { exit bad || NR < 2 }' "$1"
+}
+
+@test "export --help lists the options" {
+	run -0 --separate-stderr incise export --help
+	for option in --output --rate --average --by-cut --depth-max --velocity-max \
+		--min-count --json; do
+		[[ "$output" == *"$option"* ]]
+	done
+}
+
+@test "export raw at a rate, to standard output" {
+	run -0 --separate-stderr incise export liver.rec --rate 100
+	[ -z "$stderr" ]
+	[ "${lines[0]}" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped ]
+	[[ "${lines[1]}" == liver-01,* ]]
+	printf '%s\n' "${lines[@]}" >out.csv
+	well_formed out.csv 6 2
+	[ "$(cut -d, -f1 out.csv | sort -u | grep -c liver-)" -eq 14 ]
+	# 14 cuts of not quite 2 s at 100 rows a second
+	[ "${#lines[@]}" -gt 1400 ]
+	[ "${#lines[@]}" -lt 2900 ]
+}
+
+@test "export of all samples" {
+	incise export liver.rec -o all.csv
+	well_formed all.csv 6 2
+	# as many as lie in the tissue, nearly: depth is interpolated between the table's rows
+	awk -F, 'NR > 1 && $3 <= 0 { bad = 1 } END { exit bad }' all.csv
+	[ "$(wc -l <all.csv)" -gt 140000 ]
+}
+
+@test "export averaged" {
+	run -0 --separate-stderr incise export liver.rec --average 12x10 -o a.csv
+	[[ "$output" == "a.csv: "*" rows from 14 cuts" ]]
+	[ "$(head -n 1 a.csv)" = depth_mm,velocity_mm_s,force_N,sd_N,count,cuts ]
+	well_formed a.csv 6 1
+	[ "$(wc -l <a.csv)" -le 121 ]
+	# the force rises with depth: rows are in order of depth
+	awk -F, 'NR == 2 { first = $3 } { last = $3 } END { exit !(last > 5 * first) }' a.csv
+	awk -F, 'NR > 1 && ($5 < 50 || $6 < 1 || $6 > 14) { bad = 1 } END { exit bad }' a.csv
+}
+
+@test "export averaged by cut" {
+	incise export liver.rec -a 12x10 --by-cut -o a.csv
+	[ "$(head -n 1 a.csv)" = cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts ]
+	well_formed a.csv 7 2
+	[ "$(tail -n +2 a.csv | cut -d, -f1 | uniq | wc -l)" -eq 14 ]
+}
+
+@test "export keeps to the upper ends of the bins" {
+	incise export liver.rec -a 5x5 --depth-max 8 --velocity-max 30 -o a.csv
+	awk -F, 'NR > 1 && ($1 > 8 || $2 > 30) { bad = 1 } END { exit bad }' a.csv
+}
+
+@test "export --min-count leaves out what is thin" {
+	incise export liver.rec -a 12x10 --min-count 2000 -o a.csv
+	awk -F, 'NR > 1 && $5 < 2000 { bad = 1 } END { exit bad }' a.csv
+	run --separate-stderr incise export liver.rec -a 12x10 --min-count 999999999 -o b.csv
+	failed_with "no bin holds 999999999 samples"
+	[ ! -e b.csv ]
+}
+
+@test "export reports as JSON" {
+	incise export liver.rec -a 12x10 -o a.csv --json >report.json
+	[ "$(key report.json path)" = a.csv ]
+	[ "$(key report.json rows)" -eq $(($(wc -l <a.csv) - 1)) ]
+	[ "$(key report.json cuts)" = 14 ]
+	[ "$(key report.json clipped)" = 0 ]
+	[ "$(sqlite3 :memory: "SELECT json_extract(readfile('report.json'),
+		'\$.depth_max_mm') BETWEEN 19 AND 22")" = 1 ]
+	[ "$(sqlite3 :memory: "SELECT json_extract(readfile('report.json'),
+		'\$.velocity_max_mm_s') BETWEEN 40 AND 200")" = 1 ]
+}
+
+@test "export of several recordings" {
+	mkdir b && ln -s "$BATS_FILE_TMPDIR/liver.rec" b/liver.rec
+	incise export liver.rec b/liver.rec -a 3x3 --json -o a.csv >report.json
+	[ "$(key report.json cuts)" = 28 ]
+	incise export liver.rec b/liver.rec --rate 10 -o raw.csv
+	[ "$(tail -n +2 raw.csv | cut -d, -f1 | sort -u | wc -l)" -eq 28 ]
+}
+
+@test "export is the same every time" {
+	incise export liver.rec -a 12x10 -o a.csv
+	incise export liver.rec -a 12x10 -o b.csv
+	cmp a.csv b.csv
+}
+
+@test "export of an interrupted recording" {
+	incise capture -o cut.rec --rig sim:clock=simulated --duration 6s >/dev/null
+	mv cut.rec cut.rec.part
+	incise export cut.rec -a 3x3 -o a.csv
+	well_formed a.csv 6 1
+}
+
+@test "export replaces an old dataset, and leaves it where it fails" {
+	echo old >a.csv
+	run --separate-stderr incise export none.rec -o a.csv
+	failed_with "none.rec: there is no such recording"
+	[ "$(cat a.csv)" = old ]
+	incise export liver.rec -a 3x3 -o a.csv
+	[ "$(wc -l <a.csv)" -gt 3 ]
+}
+
+@test "export of a recording without a cut" {
+	incise capture -o air.rec --rig sim:clock=simulated --duration 800ms >/dev/null
+	run --separate-stderr incise export air.rec -o a.csv
+	failed_with "air.rec: no cut"
+	[ ! -e a.csv ]
+	run --separate-stderr incise export air.rec
+	failed_with "air.rec: no cut"
+	[ -z "$output" ]
+}
+
+@test "export of what is no recording" {
+	echo text >file.rec
+	mkdir empty.rec garbage.rec
+	seq 10000 >garbage.rec/recording.db
+	for path in file.rec empty.rec garbage.rec none.rec; do
+		run --separate-stderr incise export $path -o a.csv
+		failed_with $path
+	done
+	[ ! -e a.csv ]
+}
+
+@test "export of a damaged recording" {
+	cp -r liver.rec/ hurt.rec
+	truncate -s 100000 hurt.rec/recording.db
+	run --separate-stderr incise export hurt.rec -o a.csv
+	failed_with "hurt.rec: damaged"
+	[ ! -e a.csv ]
+}
+
+@test "export: bad usage is 2" {
+	for arguments in "" "liver.rec --average 12" "liver.rec --average x" \
+		"liver.rec --average 0x5" "liver.rec --average 5x99999" \
+		"liver.rec --average 5x5x5" "liver.rec --rate 0" "liver.rec --rate fast" \
+		"liver.rec --rate 10 --average 3x3" "liver.rec --by-cut" \
+		"liver.rec --min-count 3" "liver.rec --json" "liver.rec --json -o -" \
+		"liver.rec --average 3x3 --depth-max -1" "liver.rec --no-such"; do
+		# shellcheck disable=SC2086
+		run -2 --separate-stderr incise export $arguments
+		[ -z "$output" ]
+		[ "${#stderr_lines[@]}" -eq 2 ]
+		[[ "${stderr_lines[1]}" == *"incise export --help"* ]]
+	done
+}
+
+@test "export to a full disk" {
+	run --separate-stderr bash -c "incise export liver.rec --rate 100 >/dev/full"
+	failed_with "No space left"
+	run --separate-stderr incise export liver.rec -o /dev/full
+	failed_with "No space left"
+}
+
+@test "export killed by a closed pipe is quiet" {
+	bash -c "set -o pipefail; incise export liver.rec 2>err | head -n 1" >out || true
+	[ "$(cat out)" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped ]
+	[ ! -s err ]
+}
+
+@test "export feeds incise train" {
+	[ -x "$INCISE_BUILD/bin/incise-train" ] || skip "incise train is not built"
+	incise export liver.rec -a 12x10 -o a.csv
+	incise train a.csv -o a.fis
+	[ -s a.fis ]
+}

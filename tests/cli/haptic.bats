@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise haptic, as a user meets it. In simulated time it runs as fast as it goes.
+
+load cli
+
+setup_file() {
+	cd "$BATS_FILE_TMPDIR"
+	made_pairs >pairs.csv
+	incise train pairs.csv -o liver.fis 2>/dev/null
+}
+
+setup() {
+	work_folder
+	cp "$BATS_FILE_TMPDIR/liver.fis" .
+	cp "$root/scenes/liver.scene" .
+	# contact from 0.1 s on
+	quick=sim:clock=simulated,depth_mm=10,times=1,pause_s=0.1,cut_s=4
+}
+
+teardown() {
+	[ -z "$pid" ] || kill -9 "$pid" 2>/dev/null || :
+}
+
+# The scene bad.scene is refused with these texts; nothing is printed.
+refuses() {
+	run --separate-stderr incise haptic bad.scene --rig $quick --duration 1s --log l.csv
+	failed_with "$@" || return
+	[ -z "$output" ] || complain "printed: $output" || return
+	[ ! -e l.csv ] || complain "wrote a log"
+}
+
+@test "haptic runs a scene in simulated time" {
+	run -0 --separate-stderr incise haptic liver.scene --rig $quick --duration 3s
+	[ -z "$stderr" ]
+	[[ "${lines[0]}" == "3000 ticks at 1000 Hz, 0 skipped"* ]]
+	[[ "${lines[1]}" =~ ^stages\ +pose\ predict\ contact\ reaction\ limit\ actuate$ ]]
+}
+
+@test "haptic reports as JSON" {
+	incise haptic liver.scene --rig $quick --duration 3s --json --log l.csv >r.json
+	[ "$(key r.json ticks)" = 3000 ]
+	[ "$(key r.json skipped)" = 0 ]
+	[ "$(key r.json rate_hz)" = 1000.0 ]
+	[ "$(key r.json stages)" = '["pose","predict","contact","reaction","limit","actuate"]' ]
+	[ -z "$(key r.json stopped_by)" ]
+	[ "$(key r.json scheduling)" = "simulated time" ]
+	for name in lateness_us tick_ns; do # time stands still during a tick: null
+		run -0 key r.json $name
+		[ -z "$output" ]
+	done
+	[ "$(key r.json extrapolated)" = "$(cut -d, -f9 l.csv | grep -c '^.e')" ]
+	[ "$(key r.json stale)" = "$(cut -d, -f9 l.csv | grep -c '^..s')" ]
+	# the report is that of the log
+	[ "$(key r.json contact)" = "$(cut -d, -f9 l.csv | grep -c ^c)" ]
+	[ "$(key r.json limited)" = "$(cut -d, -f9 l.csv | grep -c '^...o')" ]
+	holds "$(key r.json contact) > 1000"
+	largest=$(awk -F, 'NR > 1 && $7 > m { m = $7 } END { print m }' l.csv)
+	# the log has five decimals
+	holds "($(key r.json force_max_N) - $largest)^2 < 1e-10"
+	# a spring of 2 N/mm and a nut with 0.6 um steps: it follows within a few percent
+	holds "$(key r.json rendered_rms_error_N) < 0.05 * $largest"
+}
+
+@test "the log has every tick, and its forces are the model's" {
+	incise haptic liver.scene --rig $quick --duration 3s --arith double --log l.csv
+	[ "$(head -n 1 l.csv)" = \
+		t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags ]
+	[ "$(wc -l <l.csv)" -eq 3001 ]
+	awk -F, 'NR > 1 && ((NR - 2) / 1000 - $1)^2 > 1e-12 { exit 1 }' l.csv
+	# depth below the plane z = 0; at no depth no force but what the slew takes away
+	awk -F, 'NR > 1 && $9 ~ /^c/ && ($5 + $4)^2 > 1e-8 { exit 1 }' l.csv
+	awk -F, '$9 ~ /^c-/ && $9 !~ /o/ { print $5, $6, $7 }' l.csv >contact
+	[ "$(wc -l <contact)" -gt 1000 ]
+	cut -d' ' -f1,2 contact | incise eval liver.fis 2>/dev/null | paste -d' ' contact - |
+		awk '{ want = $4 < 0 ? 0 : $4; e = $3 - want
+			# depth and velocity are logged to 0.1 um and 1 um/s
+			if (e < -1e-4 || e > 1e-4) { print; exit 1 } }'
+}
+
+@test "fixed point and double feel alike" {
+	incise haptic liver.scene --rig $quick --duration 2s --arith double --log double.csv
+	incise haptic liver.scene --rig $quick --duration 2s --arith fixed --log fixed.csv
+	# what was promised is 1 mN; they are not the same, so two arithmetics ran
+	paste -d, double.csv fixed.csv | awk -F, '
+		NR > 1 { e = $7 - $16; if (e < 0) e = -e; if (e > m) m = e }
+		END { print m; exit !(m < 1e-3 && m > 0) }'
+	# the scene says fixed
+	incise haptic liver.scene --rig $quick --duration 2s --log scene.csv
+	cmp fixed.csv scene.csv
+}
+
+@test "haptic is the same every time" {
+	incise haptic liver.scene --rig $quick --duration 2s --log a.csv
+	incise haptic liver.scene --rig $quick --duration 2s --log b.csv
+	cmp a.csv b.csv
+	incise haptic liver.scene --rig $quick,seed=2 --duration 2s --log c.csv
+	run ! cmp -s a.csv c.csv
+}
+
+@test "no force is over the limit, and none changes faster than it may" {
+	incise haptic liver.scene --rig $quick --duration 3s --log free.csv
+	cat >tight.scene <<-'EOF'
+		model = "liver.fis";
+		limits = { force_N = 0.2; slew_N_s = 5.0; };
+	EOF
+	incise haptic tight.scene --rig $quick --duration 3s --log l.csv --json >r.json
+	# five decimals are printed; the slew is 5 mN a tick
+	awk -F, 'NR > 1 { if ($7 > 0.200005 || $7 < 0) exit 1
+		d = $7 - last; if (d > 0.00501 || d < -0.00501) exit 1; last = $7 }' l.csv
+	# both limits were needed
+	awk -F, '$7 > m { m = $7 } NR > 2 && $7 - last > s { s = $7 - last } { last = $7 }
+		END { exit !(m > 0.3 && s > 0.006) }' free.csv
+	holds "$(key r.json limited) > 100"
+	holds "($(key r.json force_max_N) - 0.2)^2 < 1e-12"
+}
+
+@test "haptic runs at the scene's rate, with another model" {
+	printf 'rate_hz = 250;\nmodel = "none.fis";\n' >slow.scene
+	incise haptic slow.scene --rig $quick --duration 2s --model liver.fis --json >r.json
+	[ "$(key r.json ticks)" = 500 ]
+	[ "$(key r.json rate_hz)" = 250.0 ]
+}
+
+@test "a scene's model lies beside it; a scene may leave all else out" {
+	mkdir there
+	mv liver.fis there
+	echo 'model = "liver.fis";' >there/small.scene
+	incise haptic there/small.scene --rig $quick --duration 100ms
+	echo '# nothing' >there/empty.scene
+	incise haptic there/empty.scene --rig $quick --duration 100ms --model there/liver.fis
+	run --separate-stderr incise haptic there/empty.scene --rig $quick --duration 100ms
+	failed_with there/empty.scene model
+}
+
+@test "the surface may lie anywhere and face anywhere" {
+	cat >deep.scene <<-'EOF'
+		model = "liver.fis";
+		surface = { point_mm = [0.0, 0.0, -2.0]; normal = [0, 0, 7]; };
+	EOF
+	incise haptic liver.scene --rig $quick --duration 2s --log a.csv
+	incise haptic deep.scene --rig $quick --duration 2s --log b.csv
+	# 2 mm lower: where it is touched, depth is 2 mm less, to the printed 0.1 um
+	paste -d, a.csv b.csv | awk -F, '$18 ~ /^c/ { n++; if (($5 - $14 - 2)^2 > 4.1e-8) exit 1 }
+		END { exit n < 500 }'
+}
+
+@test "in real time it keeps to the clock, and SIGINT ends it with the report" {
+	incise haptic liver.scene --rig sim: --json >r.json 2>err 3>&- &
+	pid=$!
+	# a signal before the program listens would not be the case in question
+	for ((i = 0; i < 100; i++)); do
+		mask=$(awk '/^SigCgt/ { print $2 }' /proc/$pid/status)
+		((0x$mask & 2)) && break
+		sleep 0.05
+	done
+	begin=$(date +%s%N)
+	sleep 0.5
+	kill -INT $pid
+	wait $pid # its exit status is 0
+	pid=
+	elapsed=$(($(date +%s%N) - begin))
+	[ ! -s err ]
+	[ "$(key r.json stopped_by)" = Interrupt ]
+	# due ticks run or are skipped; 50 ms are left for the start and the end of the program
+	due=$(($(key r.json ticks) + $(key r.json skipped)))
+	holds "$due >= 450 && $due <= $elapsed / 1e6 + 100"
+	holds "$(key r.json ticks) > 50"
+	[ "$(sqlite3 :memory: "SELECT sum(json_extract(value, '\$[1]')) FROM
+		json_each(readfile('r.json'), '\$.lateness_us.histogram')")" = "$(key r.json ticks)" ]
+	holds "$(key r.json lateness_us.max) > 0 && $(key r.json tick_ns.max) > 0"
+	for name in lateness_us.median lateness_us.p99 lateness_us.p999 tick_ns.median \
+		tick_ns.p999; do
+		key r.json $name # there; null on a machine that is later than its histogram
+	done
+	[[ "$(key r.json scheduling)" == SCHED_* ]]
+}
+
+@test "SIGTERM ends it as well" {
+	incise haptic liver.scene --rig sim: --json >r.json 2>err 3>&- &
+	pid=$!
+	for ((i = 0; i < 100; i++)); do
+		mask=$(awk '/^SigCgt/ { print $2 }' /proc/$pid/status)
+		((0x$mask & 0x4000)) && break
+		sleep 0.05
+	done
+	kill -TERM $pid
+	wait $pid
+	pid=
+	[ "$(key r.json stopped_by)" = Terminated ]
+}
+
+@test "a scene with an unknown key names file, line and the keys there are" {
+	printf 'model = "liver.fis";\nrate = 50;\n' >bad.scene
+	refuses bad.scene:2: rate rate_hz
+	printf 'model = "liver.fis";\nlimits = {\n  force = 3.0;\n};\n' >bad.scene
+	refuses bad.scene:3: limits.force force_N
+	printf 'model = "liver.fis";\nsurface = {\n  up = 3.0;\n};\n' >bad.scene
+	refuses bad.scene:3: surface.up normal
+}
+
+@test "a scene with a value out of range names the range" {
+	while read -r key value range; do
+		case $key in
+		rate_hz) printf 'model = "liver.fis";\n%s = %s;\n' "$key" "$value" ;;
+		*) printf 'model = "liver.fis";\nlimits = { %s = %s; };\n' "$key" "$value" ;;
+		esac >bad.scene
+		refuses bad.scene:2: "$key" "from ${range/-/ to }"
+	done <<-'EOF'
+		rate_hz 99 100-20000
+		rate_hz 20001 100-20000
+		rate_hz -1000 100-20000
+		force_N 0 0.01-100
+		force_N 101.0 0.01-100
+		slew_N_s 0 1-100000
+		slew_N_s 1e300 1-100000
+		pose_age_ms 0 1-1000
+		pose_age_ms 1001 1-1000
+	EOF
+}
+
+@test "a scene with a value of another kind names file and line" {
+	for line in 'rate_hz = "fast";' 'arithmetic = "float";' 'arithmetic = 3;' \
+		'limits = 4.0;' 'limits = [1, 2];' 'limits = { force_N = "4"; };' 'surface = 3;' \
+		'surface = { normal = [0, 0, 0]; };' 'surface = { normal = [0, 0]; };' \
+		'surface = { point_mm = [0.0, 0.0, 1e9]; };' 'surface = { point_mm = "here"; };'; do
+		printf 'model = "liver.fis";\n%s\n' "$line" >bad.scene
+		refuses bad.scene || complain "for $line"
+	done
+	printf 'model = 7;\n' >bad.scene
+	refuses bad.scene:1: model
+	printf 'model = "liver.fis"\nrate_hz == 7;\n' >bad.scene
+	refuses bad.scene:2: syntax
+	head -c 4000 "$INCISE_BUILD/bin/incise" >bad.scene
+	refuses bad.scene
+}
+
+@test "haptic: files that are not there, or not what they should be" {
+	run --separate-stderr incise haptic none.scene --rig $quick
+	failed_with none.scene "No such file"
+	run --separate-stderr incise haptic . --rig $quick
+	failed_with "Is a directory"
+	printf 'model = "none.fis";\n' >bad.scene
+	refuses none.fis "No such file"
+	head -n 30 liver.fis >cut.fis
+	printf 'model = "cut.fis";\n' >bad.scene
+	refuses cut.fis
+	# one input only
+	awk 'BEGIN { print "depth_mm,force_N"; for (i = 0; i < 40; i++) print i ",", i }' |
+		tr -d ' ' | sed 's/,,/,/' >one.csv
+	incise train one.csv --inputs depth_mm -o one.fis 2>/dev/null
+	printf 'model = "one.fis";\n' >bad.scene
+	refuses bad.scene "1 inputs"
+}
+
+@test "haptic: a model that fixed point cannot hold is refused before it runs" {
+	incise train "$BATS_FILE_TMPDIR/pairs.csv" --mf-type gbellmf -o bell.fis 2>/dev/null
+	printf 'model = "bell.fis";\n' >bad.scene
+	refuses gbellmf
+	run -0 incise haptic bad.scene --rig $quick --duration 100ms --arith double
+}
+
+@test "haptic: rigs that cannot be" {
+	run --separate-stderr incise haptic liver.scene --rig sim:colour=red
+	failed_with colour
+	run --separate-stderr incise haptic liver.scene --rig none.conf
+	failed_with none.conf "No such file"
+	printf 'clock = "simulated";\ntracker = "sim:";\n' >rig.conf
+	run --separate-stderr incise haptic liver.scene --duration 100ms
+	failed_with rig.conf stepper
+	echo 'stepper = "sim:";' >>rig.conf
+	incise haptic liver.scene --duration 100ms # ./rig.conf is the default
+	rm rig.conf
+	[ ! -e /etc/incise/rig.conf ] || skip "this machine has /etc/incise/rig.conf"
+	run --separate-stderr incise haptic liver.scene
+	failed_with "--rig sim:"
+}
+
+@test "haptic: bad usage" {
+	run --separate-stderr incise haptic
+	bad_usage "one scene, got 0"
+	run --separate-stderr incise haptic liver.scene more.scene
+	bad_usage "one scene, got 2"
+	run --separate-stderr incise haptic liver.scene --rig $quick --log l.csv
+	bad_usage --duration
+	run --separate-stderr incise haptic liver.scene --rig $quick --duration 1s --json --log -
+	bad_usage "standard output"
+	for time in 0 -1s never 10x 1e9h 1ms nan inf ""; do
+		run --separate-stderr incise haptic liver.scene --rig $quick --duration "$time"
+		bad_usage --duration
+	done
+	run --separate-stderr incise haptic liver.scene --rig $quick --arith float
+	bad_usage "neither double nor fixed"
+}
+
+@test "haptic: a log that cannot be written" {
+	for place in no/such.csv /dev/full .; do
+		run --separate-stderr incise haptic liver.scene --rig $quick --duration 100ms --log $place
+		failed_with "$place"
+	done
+	echo old >l.csv
+	run --separate-stderr bash -c "trap '' XFSZ; ulimit -f 1
+		incise haptic liver.scene --rig $quick --duration 1s --log l.csv"
+	failed_with l.csv
+	[ "$(cat l.csv)" = old ]
+}
+
+@test "the log to standard output is all that is there" {
+	incise haptic liver.scene --rig $quick --duration 200ms --log - >out
+	incise haptic liver.scene --rig $quick --duration 200ms --log l.csv >report
+	cmp out l.csv
+	[ -s report ]
+}

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# --help of every verb, and its manual page beside it.
+
+load cli
+
+setup() {
+	verbs=$(incise --help | awk '/^Verbs:/ { on = 1; next } on && !NF { exit } on { print $1 }')
+	[ "$(wc -w <<<"$verbs")" -ge 8 ]
+}
+
+# Options that lines of --help begin with, long and short.
+options_of_help() {
+	"incise-$1" --help | awk '/^  +-/ { sub(/  [^ -].*/, ""); print }' |
+		grep -oE -- '(^|[ ,])--?[A-Za-z][a-z-]*' | tr -d ' ,' | sort -u
+}
+
+# Options that items of the page's lists are headed by: ".It Fl o , Fl -output Ar FILE".
+options_of_page() {
+	sed -n 's/^\.It Fl/ Fl/p' "$root/man/incise-$1.1" | grep -oE ' Fl [-A-Za-z][a-z-]*' |
+		sed 's/ Fl /-/' | sort -u
+}
+
+@test "every verb explains itself" {
+	for verb in $verbs; do
+		run -0 --separate-stderr incise "$verb" --help
+		[ -z "$stderr" ]
+		[[ "${lines[0]}" == "Usage: incise $verb "* ]]
+		[[ "$output" == *"Options:"* ]]
+		help=$output
+		run -0 incise "$verb" -h
+		[ "$output" = "$help" ]
+		run -1 --separate-stderr bash -c "incise $verb --help >/dev/full"
+		[ "${#stderr_lines[@]}" -eq 1 ]
+	done
+}
+
+@test "help and manual name the same options" {
+	for verb in $verbs; do
+		[ -f "$root/man/incise-$verb.1" ]
+		# at least --help, -h, --version, -V: the patterns found something
+		[ "$(options_of_help "$verb" | wc -l)" -ge 4 ]
+		diff <(options_of_help "$verb") <(options_of_page "$verb")
+	done
+}
+
+@test "manual pages are well formed" {
+	command -v mandoc >/dev/null || skip "mandoc is not installed"
+	cd "$root/man"
+	run -0 mandoc -Tlint -W warning ./*.[1-8]
+	[ -z "$output" ]
+	for page in *.[1-8]; do
+		[[ "$(head -n 1 "$page")" == '.\" SPDX-License-Identifier: '* ]]
+	done
+}
+
+@test "manual pages of ours that others refer to exist" {
+	grep -hoE '^\.Xr (incise|libincise|rig|calibration)[a-z.-]* [1-8]' "$root"/man/*.[1-8] |
+		sort -u >"$BATS_TEST_TMPDIR/references"
+	[ "$(wc -l <"$BATS_TEST_TMPDIR/references")" -ge 10 ]
+	while read -r _ name section; do
+		[ -f "$root/man/$name.$section" ] || complain "$name($section) does not exist"
+	done <"$BATS_TEST_TMPDIR/references"
+}
+
+@test "a wrong option is named, and where help is" {
+	for verb in $verbs; do
+		run --separate-stderr incise "$verb" --no-such-option
+		bad_usage --no-such-option
+		[ -z "$output" ]
+		run --separate-stderr incise "$verb" -%
+		bad_usage "-%"
+	done
+}
+
+@test "an option without its argument, and with one it does not take" {
+	run --separate-stderr incise train --mf
+	bad_usage "--mf needs an argument"
+	run --separate-stderr incise train d.csv -o
+	bad_usage "-o needs an argument"
+	run --separate-stderr incise train --json=yes
+	bad_usage "--json=yes"
+}

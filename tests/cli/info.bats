@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise info, as a user meets it.
+
+load cli
+
+setup_file() {
+	cd "$BATS_FILE_TMPDIR"
+	made_pairs >pairs.csv
+	incise train pairs.csv -o m.fis 2>/dev/null
+	incise train pairs.csv --mf-type gbellmf --mf 2,2 -o bell.fis 2>/dev/null
+	incise capture -o a.rec --rig sim:clock=simulated,depth_mm=5,times=2,cut_s=1,pause_s=0.6 \
+		>/dev/null
+}
+
+setup() {
+	work_folder
+	ln -s "$BATS_FILE_TMPDIR"/*.fis "$BATS_FILE_TMPDIR/a.rec" .
+}
+
+@test "info of a model" {
+	run -0 --separate-stderr incise info m.fis
+	[ -z "$stderr" ]
+	[[ "${lines[0]}" == "model incise: 20 rules, 2 inputs, output force_N "* ]]
+	[[ "$output" == *"input depth_mm, support 0 to 20"* ]]
+	[[ "$output" == *"input velocity_mm_s, support 0 to 50"* ]]
+	[[ "${lines[-1]}" == "fixed point: fits" ]]
+	[ "$(grep -c gaussmf <<<"$output")" -eq 9 ]
+}
+
+@test "info of a model as JSON" {
+	incise info --json m.fis >r.json
+	[ "$(key r.json kind)" = model ]
+	[ "$(key r.json 'inputs[0].name')" = depth_mm ]
+	[ "$(key r.json 'inputs[1].max')" = 50.0 ]
+	[ "$(key r.json 'inputs[1].mfs[3].type')" = gaussmf ]
+	[ "$(key r.json output.name)" = force_N ]
+	[ "$(key r.json fixed_point)" = 1 ] # true
+	[ -z "$(key r.json fixed_point_refused)" ]
+	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '\$.rules')")" = 20 ]
+	# the file's last rule: functions 5 and 4, the constant first (12 digits are printed)
+	[ "$(key r.json 'rules[19].mfs')" = "[5,4]" ]
+	constant=$(sed -n "s/^MF20='out1mf20':'linear',\[.* \(.*\)\]/\1/p" m.fis)
+	holds "($(key r.json 'rules[19].consequent[0]') / $constant - 1)^2 < 1e-20"
+	# and the width of its first function
+	width=$(sed -n "s/^MF1='in1mf1':'gaussmf',\[\(.*\) .*\]/\1/p" m.fis)
+	holds "($(key r.json 'inputs[0].mfs[0].params[0]') / $width - 1)^2 < 1e-20"
+}
+
+@test "info says why a model has no fixed point" {
+	run -0 incise info bell.fis
+	[[ "${lines[-1]}" == "fixed point: "*gbellmf* ]]
+	incise info bell.fis --json >r.json
+	[ "$(key r.json fixed_point)" = 0 ]
+	[[ "$(key r.json fixed_point_refused)" == *gbellmf* ]]
+	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'),
+		'\$.inputs[0].mfs[0].params')")" = 3 ]
+}
+
+@test "info of a recording" {
+	run -0 --separate-stderr incise info a.rec/
+	[ -z "$stderr" ]
+	[[ "${lines[0]}" == "recording a.rec/: "* ]]
+	[[ "$output" == *"cuts     2"* ]]
+	[[ "$output" != *incomplete* ]]
+}
+
+@test "info of a recording as JSON is what the database holds" {
+	incise info --json a.rec >r.json
+	[ "$(key r.json kind)" = recording ]
+	[ "$(key r.json complete)" = 1 ]
+	[ "$(key r.json cuts)" = 2 ]
+	for table in force tracker depth; do
+		[ "$(key r.json rows.$table)" = \
+			"$(sqlite3 -readonly a.rec/recording.db "SELECT count(*) FROM $table")" ]
+	done
+	[ "$(key r.json lost.force)" = 0 ]
+	[ "$(key r.json adc.bits)" = 12 ]
+	[ "$(key r.json adc.full_scale_V)" = 5.0 ]
+	[ "$(key r.json calibration.force_mV_N)" = 1240.0 ]
+	[ "$(key r.json rig)" = "sim:clock=simulated,depth_mm=5,times=2,cut_s=1,pause_s=0.6" ]
+	# two cuts of 1 s and three pauses of 0.6 s
+	holds "($(key r.json seconds) - 3.8)^2 < 0.05^2"
+	# nominally 5 mm
+	holds "$(key r.json depth_max_mm) > 4 && $(key r.json depth_max_mm) < 6.5"
+	holds "$(key r.json force_max_N) > 0.1 && $(key r.json force_max_N) < 2"
+}
+
+@test "info of an interrupted recording" {
+	incise capture -o b.rec --rig sim: 2>/dev/null 3>&- &
+	pid=$!
+	# rows are committed every 100 ms
+	for ((i = 0; i < 100; i++)); do
+		sleep 0.1
+		rows=$(sqlite3 -readonly b.rec.part/recording.db "SELECT count(*) FROM force" \
+			2>/dev/null) || continue
+		[ "$rows" -eq 0 ] || break
+	done
+	kill -9 $pid
+	wait $pid || [ $? -eq 137 ]
+	[ ! -e b.rec ]
+	run -0 incise info b.rec
+	[[ "$output" == *incomplete* ]]
+	incise info b.rec --json >r.json
+	[ "$(key r.json complete)" = 0 ]
+	holds "$(key r.json rows.force) >= $rows"
+}
+
+@test "info of what is neither" {
+	echo text >a.txt
+	: >empty.fis
+	mkdir folder
+	seq 1000 >folder/recording.db
+	head -c 5000 "$INCISE_BUILD/bin/incise" >binary
+	for file in a.txt empty.fis folder binary none none.rec none.fis; do
+		run --separate-stderr incise info $file
+		failed_with $file
+		[ -z "$output" ]
+		run --separate-stderr incise info --json $file
+		failed_with $file
+		[ -z "$output" ]
+	done
+}
+
+@test "info: bad usage" {
+	run --separate-stderr incise info
+	bad_usage "one file, got 0"
+	run --separate-stderr incise info m.fis a.rec
+	bad_usage "one file, got 2"
+}
+
+@test "info to a full disk" {
+	run --separate-stderr bash -c "incise info m.fis >/dev/full"
+	failed_with "is the disk full"
+	run --separate-stderr bash -c "incise info --json m.fis >/dev/full"
+	failed_with "is the disk full"
+}

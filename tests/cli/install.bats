@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# make: installing, removing, doing nothing twice.
+
+load cli
+
+# The project's make on this build, apart from the make that may be running this test.
+project() {
+	env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u DESTDIR -u LD_LIBRARY_PATH \
+		make --no-print-directory -C "$root" O="$INCISE_BUILD" "$@"
+}
+
+setup() {
+	work_folder
+	dest=$PWD/dest
+}
+
+@test "a second make has nothing to do" {
+	project all
+	touch mark
+	run -0 project all
+	[[ "$output" == *"Nothing to be done"* ]]
+	[ -z "$(find "$INCISE_BUILD" -newer mark -type f)" ]
+}
+
+@test "what is installed runs without LD_LIBRARY_PATH" {
+	project -s install DESTDIR="$dest" prefix=/usr
+	unset LD_LIBRARY_PATH
+	PATH=/usr/bin:/bin
+	run -0 "$dest/usr/bin/incise" --version
+	[ "$output" = "$("$INCISE_BUILD/bin/incise" --version)" ]
+	made_pairs >pairs.csv
+	"$dest/usr/bin/incise" train pairs.csv -o m.fis 2>/dev/null
+	"$dest/usr/bin/incise" info m.fis >/dev/null
+	# the libraries are the installed ones
+	for program in "$dest"/usr/bin/incise-*; do
+		ldd "$program" | grep libincise >mapped
+		run ! grep -v "$(realpath "$dest")/usr/" mapped
+	done
+}
+
+@test "all is where it belongs" {
+	project -s install DESTDIR="$dest" prefix=/usr
+	for page in "$root"/man/*.[1-8]; do
+		[ -f "$dest/usr/share/man/man${page##*.}/${page##*/}" ]
+	done
+	for header in "$root"/lib/include/incise/*.h; do
+		cmp "$header" "$dest/usr/include/incise/${header##*/}"
+	done
+	cmp "$root/scenes/liver.scene" "$dest/usr/share/incise/scenes/liver.scene"
+	cmp "$root/tools/incise.bash" "$dest/usr/share/bash-completion/completions/incise"
+	for lib in incise incise-learn incise-record; do
+		[ -f "$dest/usr/lib/lib$lib.so" ]
+		[ "$(readlink "$dest/usr/lib/lib$lib.so")" = lib$lib.so.1 ]
+	done
+	# nothing but /usr was made
+	[ "$(ls -A "$dest")" = usr ]
+}
+
+@test "folders can be chosen one by one" {
+	project -s install DESTDIR="$dest" prefix=/opt/x bindir=/opt/x/verbs mandir=/opt/pages
+	[ -x "$dest/opt/x/verbs/incise" ]
+	[ -f "$dest/opt/pages/man1/incise.1" ]
+	[ ! -e "$dest/opt/x/bin" ]
+}
+
+@test "pkg-config finds what was installed, and a program builds with it" {
+	command -v pkg-config >/dev/null || skip "pkg-config is not installed"
+	project -s install DESTDIR="$dest" prefix=/usr
+	export PKG_CONFIG_SYSROOT_DIR=$dest PKG_CONFIG_LIBDIR=$dest/usr/lib/pkgconfig
+	# /usr/include is no folder of the system's here
+	export PKG_CONFIG_ALLOW_SYSTEM_CFLAGS=1 PKG_CONFIG_ALLOW_SYSTEM_LIBS=1
+	[ "incise $(pkg-config --modversion incise)" = "$(incise --version)" ]
+	[[ " $(pkg-config --cflags incise) " == *" -I$dest/usr/include "* ]]
+	[[ " $(pkg-config --libs incise) " == *" -L$dest/usr/lib "*"-lincise "* ]]
+	example_in "$root/man/libincise.3" "int main" >program.c
+	# shellcheck disable=SC2046
+	${CC:-cc} program.c -o program $(pkg-config --cflags --libs incise) \
+		-Wl,-rpath,"$dest/usr/lib"
+	example_in "$root/man/incise-fis.5" "[Rules]" >m.fis
+	run -0 ./program m.fis
+	[[ "$output" == *"N in double"* ]]
+}
+
+@test "the prefix is that of the installation, not of the build" {
+	project all
+	project -s install DESTDIR="$dest" prefix=/opt/incise
+	grep -qx prefix=/opt/incise "$dest/opt/incise/lib/pkgconfig/incise.pc"
+	project -s install DESTDIR="$dest" prefix=/usr
+	grep -qx prefix=/usr "$dest/usr/lib/pkgconfig/incise.pc"
+}
+
+@test "uninstall leaves nothing, and nothing of others' goes" {
+	project -s install DESTDIR="$dest" prefix=/usr
+	touch "$dest/usr/bin/other" "$dest/usr/lib/other.so"
+	project -s uninstall DESTDIR="$dest" prefix=/usr
+	[ "$(find "$dest" ! -type d | sort)" = \
+		"$(printf '%s\n' "$dest/usr/bin/other" "$dest/usr/lib/other.so")" ]
+	[ -z "$(find "$dest" -type d -name '*incise*')" ]
+}
+
+@test "uninstall leaves a folder that holds a file of mine" {
+	project -s install DESTDIR="$dest" prefix=/usr
+	touch "$dest/usr/share/incise/scenes/mine.scene"
+	project -s uninstall DESTDIR="$dest" prefix=/usr
+	[ -f "$dest/usr/share/incise/scenes/mine.scene" ]
+}
+
+@test "dist makes a tarball of the source" {
+	git -C "$root" rev-parse -q --verify HEAD >/dev/null 2>&1 ||
+		skip "the source is no git repository with a commit"
+	version=$(incise --version | cut -d' ' -f2)
+	run -0 project dist
+	[ "${lines[-1]}" = "$INCISE_BUILD/incise-$version.tar.gz" ]
+	tar tzf "${lines[-1]}" >list
+	rm "${lines[-1]}"
+	for file in README.md Makefile lib/include/incise/version.h man/incise.1; do
+		grep -qx "incise-$version/$file" list
+	done
+	run ! grep -v "^incise-$version/" list
+}

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# The shared objects and headers, as a program that links to them meets them.
+
+load cli
+
+setup() {
+	work_folder
+	CC=${CC:-cc}
+	CXX=${CXX:-c++}
+	include=$root/lib/include
+}
+
+parts="libincise libincise-learn libincise-record"
+
+# Functions that a shared object gives to others.
+exported_by() {
+	nm -D --defined-only "$INCISE_BUILD/lib/$1.so" |
+		awk '$2 != "A" { sub(/@.*/, "", $3); print $3 }' | sort
+}
+
+# The part of the library that a header belongs to, by its own words.
+part_of() {
+	local part
+	part=$(tr -s ' *\n' ' ' <"$1" | grep -o 'Part of libincise-[a-z]*' | head -n 1)
+	echo "${part:+${part#Part of }}" | sed 's/^$/libincise/'
+}
+
+# Functions that a header itself declares for export.
+declared_by() {
+	# a name in front of the first parenthesis, behind INCISE_API and the type
+	tr '\n\t' '  ' <"$1" | sed 's|/\*[^*]*\*\+\([^/*][^*]*\*\+\)*/||g' |
+		grep -oE 'INCISE_API [^(;]*\(' | grep -oE 'incise_[a-z0-9_]+ *\($' | tr -d ' ('
+}
+
+@test "each part exports what its map lists and its headers declare" {
+	for part in $parts; do
+		sed -n '/^global:/,/^local:/s/^\t\(.*\);$/\1/p' "$root/lib/$part.map" |
+			grep -v '\*' | sort >map
+		for header in "$include"/incise/*.h; do
+			[ "$(part_of "$header")" != $part ] || declared_by "$header"
+		done | sort >declared
+		exported_by $part >exported
+		[ "$(wc -l <exported)" -gt 8 ]
+		diff map exported
+		diff declared exported
+	done
+}
+
+@test "every export has the library's symbol version" {
+	for part in $parts; do
+		nm -D --defined-only --with-symbol-versions "$INCISE_BUILD/lib/$part.so" |
+			awk '$2 != "A"' >symbols
+		[ -s symbols ]
+		run ! grep -v '@@INCISE_1$' symbols
+	done
+}
+
+@test "each part has its soname, and the link to it" {
+	for part in $parts; do
+		soname=$(readelf -d "$INCISE_BUILD/lib/$part.so" |
+			sed -n 's/.*(SONAME).*\[\(.*\)\]/\1/p')
+		[ "$soname" = $part.so.1 ]
+		[ "$(readlink "$INCISE_BUILD/lib/$part.so")" = $soname ]
+		[ -e "$INCISE_BUILD/lib/$soname" ]
+	done
+}
+
+@test "each header compiles alone, as pedantic C11 and as C++" {
+	for header in "$include"/incise/*.h; do
+		name=incise/${header##*/}
+		# the second inclusion must be harmless
+		printf '#include <%s>\n#include <%s>\nint incise_test;\n' $name $name >one.c
+		cp one.c one.cc
+		$CC -std=c11 -pedantic-errors -Wall -Wextra -Werror -I"$include" -fsyntax-only one.c
+		$CXX -std=c++11 -pedantic-errors -Wall -Wextra -Werror -I"$include" -fsyntax-only one.cc
+	done
+}
+
+@test "the public headers say nothing of heavy libraries" {
+	run grep -rnE '#include <(sqlite3|lapacke|libconfig|jansson|libav|SDL|epoxy|opencv)' "$include"
+	[ "$status" -eq 1 ] # no match; 2 would be an error
+}
+
+@test "tools use public headers only" {
+	for file in "$root"/tools/*.[ch]; do
+		for name in $(sed -n 's/^#include "\(.*\)"/\1/p' "$file"); do
+			[[ "$name" != */* ]] || complain "$file: $name"
+			[ -f "$root/tools/$name" ] || complain "$file: $name"
+		done
+		for name in $(sed -n 's/^#include <\(incise\/.*\)>/\1/p' "$file"); do
+			[ -f "$include/$name" ] || complain "$file: $name"
+		done
+		run grep -nE '^#include <[^>]*\.\.' "$file"
+		[ "$status" -eq 1 ]
+	done
+}
+
+@test "the haptic loop maps no heavy library" {
+	heavy='sqlite|lapack|blas|gfortran|opencv|libav|hdf5|libGL|epoxy|SDL'
+	ldd "$INCISE_BUILD/bin/incise-haptic" >haptic
+	grep -q libincise.so haptic
+	run grep -E "$heavy" haptic
+	[ "$status" -eq 1 ]
+	# what needs them has them: the pattern finds what it looks for
+	ldd "$INCISE_BUILD/bin/incise-train" | grep -q lapack
+	ldd "$INCISE_BUILD/bin/incise-export" | grep -q sqlite
+	for program in incise incise-eval incise-bench; do
+		ldd "$INCISE_BUILD/bin/$program" >mapped
+		run grep -E "$heavy" mapped
+		[ "$status" -eq 1 ]
+	done
+}
+
+@test "nothing is left unresolved" {
+	for part in $parts; do
+		run -0 ldd -r "$INCISE_BUILD/lib/$part.so"
+		[[ "$output" != *"not found"* ]]
+		[[ "$output" != *"undefined symbol"* ]]
+	done
+}
+
+@test "the example in libincise(3) compiles and runs" {
+	example_in "$root/man/libincise.3" "int main" >program.c
+	grep -q incise_model_load program.c
+	$CC -std=c11 -Wall -Wextra -Werror -I"$include" program.c -o program \
+		-L"$INCISE_BUILD/lib" -Wl,-rpath,"$INCISE_BUILD/lib" -lincise
+	example_in "$root/man/incise-fis.5" "[Rules]" >m.fis
+	run -0 ./program m.fis
+	for arithmetic in double fixed; do
+		force=$(echo '5 20' | incise eval m.fis --arith $arithmetic)
+		[[ "$output" == *"$(printf %.4f "$force") N in "$arithmetic* ]]
+	done
+	run -1 ./program none.fis
+	[[ "$output" == none.fis:* ]]
+	run -2 ./program
+}
+
+@test "a C++ program links" {
+	cat >program.cc <<-'EOF'
+		#include <cstdio>
+		#include <incise/model.h>
+		#include <incise/version.h>
+		int main() { std::puts(incise_version()); return incise_model_load("none", nullptr) != nullptr; }
+	EOF
+	$CXX -std=c++11 -I"$include" program.cc -o program \
+		-L"$INCISE_BUILD/lib" -Wl,-rpath,"$INCISE_BUILD/lib" -lincise
+	run -0 ./program
+	[ "incise $output" = "$(incise --version)" ]
+}

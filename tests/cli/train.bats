@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise train, as a user meets it.
+
+load cli
+
+setup() {
+	work_folder
+	made_pairs >pairs.csv
+}
+
+# Training on the file bad.csv fails, says these texts, and leaves nothing.
+refuses() {
+	run --separate-stderr incise train bad.csv -o m.fis
+	failed_with bad.csv "$@" || return
+	[ -z "$output" ] || complain "printed: $output" || return
+	[ "$(ls -A)" = "$(printf '%s\n' bad.csv pairs.csv)" ] || complain "left: $(ls -A)"
+}
+
+@test "train learns, and says how well" {
+	run -0 --separate-stderr incise train pairs.csv --group cut --check 0.3 -o m.fis
+	[ "${lines[0]}" = "pairs.csv: 192 pairs to train (4 cuts), 96 to check (2 cuts)" ]
+	[ "${lines[-1]}" = "wrote m.fis" ]
+	grep -q "^Type='sugeno'" m.fis
+	[ "$(grep -c "gaussmf" m.fis)" -eq 9 ]
+	[ "$(grep -c "'linear'" m.fis)" -eq 20 ]
+	# the model of a known force: 0.45 + 0.28 N at 10 mm, times 1 + 0.35·20/35. The
+	# cuts used may all lie on one side, by up to 5 %, and the fit adds some.
+	force=$(echo '10 20' | incise eval m.fis)
+	holds "$force > 0.73 * 1.2 * 0.93 && $force < 0.73 * 1.2 * 1.07"
+}
+
+@test "train reports as JSON" {
+	incise train pairs.csv --group cut --check 0.3 --seed 1 -o m.fis --json >r.json 2>warned
+	[ "$(key r.json pairs)" = 288 ]
+	[ "$(key r.json train.pairs)" = 192 ]
+	[ "$(key r.json check.pairs)" = 96 ]
+	[ "$(key r.json train_groups)" = 4 ]
+	[ "$(key r.json check_groups)" = 2 ]
+	[ "$(key r.json rules)" = 20 ]
+	[ "$(key r.json parameters)" = 78 ] # 20·3 consequents, 9·2 premises
+	[ "$(key r.json model)" = m.fis ]
+	[ "$(key r.json rules_unfired)" = 0 ]
+	train=$(key r.json train.rmse_N)
+	check=$(key r.json check.rmse_N)
+	# cuts differ by up to 5 % of at most 2.6 N
+	holds "0 < $train && $train < 0.13"
+	holds "0 < $check && $check < 0.2"
+	holds "($check - sqrt($(key r.json check.mse_N2)))^2 < 1e-16"
+	holds "$check < $(key r.json baselines.mean.rmse_N)"
+	holds "$check < $(key r.json baselines.linear.rmse_N)"
+	holds "$(key r.json baselines.knn.rmse_N) > 0"
+	holds "$(key r.json knn_k) >= 1"
+	holds "$(key r.json best_epoch) <= $(key r.json epochs)"
+	holds "$(key r.json ridge) >= 0"
+	holds "$(key r.json condition) > 1"
+	# what was warned of is in the report
+	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '\$.warnings')")" \
+		-eq "$(grep -c '^incise train: warning: ' warned)" ]
+}
+
+@test "the reported check error is the model's on the pairs kept back" {
+	# no group: the pairs kept back are those of a split we do not know, so keep one
+	# cut's worth by group of two: the model's error on one of them is the one reported
+	grep -E '^(cut|c1|c6),' pairs.csv >two.csv
+	incise train two.csv --group cut --check 0.5 --mf 3,2 -o m.fis --json >r.json 2>/dev/null
+	for cut in c1 c6; do
+		grep "^$cut," two.csv | cut -d, -f2,3 | incise eval m.fis >$cut.out
+		paste -d, <(grep "^$cut," two.csv | cut -d, -f4) $cut.out |
+			awk -F, '{ s += ($1 - $2)^2; n++ } END { printf "%.12g\n", sqrt(s / n) }'
+	done >errors
+	# 10 digits are printed: errors agree to 1e-9
+	awk -v train="$(key r.json train.rmse_N)" -v check="$(key r.json check.rmse_N)" '
+		{ e[NR] = $1 }
+		function near(a, b) { return (a - b)^2 < 1e-18 }
+		END { exit !(near(e[1], train) && near(e[2], check) ||
+			     near(e[2], train) && near(e[1], check)) }' errors
+}
+
+@test "train without check pairs" {
+	incise train pairs.csv -o m.fis --json >r.json 2>/dev/null
+	[ "$(key r.json train.pairs)" = 288 ]
+	[ -z "$(key r.json check)" ] # null
+	[ "$(key r.json train_groups)" = 0 ]
+}
+
+@test "train gives the same model for the same seed" {
+	incise train pairs.csv --group cut --check 0.3 --seed 5 -o a.fis 2>/dev/null
+	incise train pairs.csv --group cut --check 0.3 --seed 5 -o b.fis 2>/dev/null
+	cmp a.fis b.fis
+	for seed in 6 7 8 9; do
+		incise train pairs.csv --group cut --check 0.3 --seed $seed -o s.fis 2>/dev/null
+		cmp -s a.fis s.fis || return 0
+	done
+	complain "no other seed gives another model"
+}
+
+@test "train reads standard input and writes standard output" {
+	incise train pairs.csv --seed 2 -o a.fis 2>/dev/null
+	incise train - --seed 2 -o - <pairs.csv >b.fis 2>/dev/null
+	cmp a.fis b.fis
+}
+
+@test "train takes CR LF, quotes, comments and other columns" {
+	incise train pairs.csv --group cut -o a.fis 2>/dev/null
+	awk -F, 'NR == 1 { printf "# made\r\n\r\nnote,\"%s\",%s,\"%s\",%s\r\n", $1, $2, $3, $4; next }
+		{ printf "\"a, \"\"b\"\"\",\"%s\",%s,\"%s\",%s\r\n", $1, $2, $3, $4 }' \
+		pairs.csv >odd.csv
+	incise train odd.csv --group cut -o b.fis 2>/dev/null
+	cmp a.fis b.fis
+}
+
+@test "train writes the first model and the history" {
+	incise train pairs.csv --classic --check 0.5 --epochs 7 -o m.fis --initial first.fis \
+		--history epochs.csv --json >r.json 2>/dev/null
+	[ "$(head -n 1 epochs.csv)" = epoch,train_rmse,check_rmse ]
+	[ "$(tail -n 1 epochs.csv | cut -d, -f1)" = "$(key r.json epochs)" ]
+	# the report's errors are those of the epoch that was kept
+	row=$(awk -F, -v best="$(key r.json best_epoch)" '$1 == best' epochs.csv)
+	holds "($(cut -d, -f2 <<<"$row") / $(key r.json train.rmse_N) - 1)^2 < 1e-18"
+	holds "($(cut -d, -f3 <<<"$row") / $(key r.json check.rmse_N) - 1)^2 < 1e-18"
+	# evenly spaced centres, no consequents yet
+	[ "$(sed -n "s/^MF[0-9]='in2mf[0-9]':'gaussmf',\[[^ ]* \(.*\)\]/\1/p" first.fis |
+		awk '{ printf "%.3f ", $1 }')" = "0.000 16.667 33.333 50.000 " ]
+	[ "$(grep -c "'linear',\[0 0 0\]" first.fis)" -eq 20 ]
+	run ! cmp -s first.fis m.fis
+}
+
+@test "train takes other columns, shapes and kinds" {
+	sed '1s/.*/cut,a,b,torque_mNm/' pairs.csv >other.csv
+	incise train other.csv --inputs b,a --output torque_mNm --mf 2,3 --mf-type gbellmf \
+		-o m.fis --json >r.json 2>/dev/null
+	[ "$(key r.json rules)" = 6 ]
+	holds "$(key r.json train.rmse_mNm) > 0"
+	holds "$(key r.json train.mse_mNm2) > 0"
+	[ "$(grep -c gbellmf m.fis)" -eq 5 ]
+	[ "$(sed -n "s/^Name='\(.*\)'/\1/p" m.fis | tail -n 3 | tr '\n' ' ')" = "b a torque_mNm " ]
+	incise train other.csv --inputs a --output torque_mNm -o one.fis 2>/dev/null
+	[ "$(grep -c gaussmf one.fis)" -eq 3 ]
+}
+
+@test "train warns where a baseline is better and where data are thin" {
+	# a plane with noise: linear regression is right, and 78 parameters are too many
+	awk -v OFS=, 'BEGIN { print "depth_mm,velocity_mm_s,force_N"
+		for (i = 0; i < 90; i++) { x = i * 37 % 90; y = i * 53 % 90
+			print x, y, x + 2 * y + 30 * ((i * 7919 % 1000) / 1000 - 0.5) } }' >flat.csv
+	run -0 --separate-stderr incise train flat.csv --check 0.3 --classic -o m.fis
+	[[ "$stderr" == *"warning: linear regression predicts the check data better"* ]]
+	[[ "$stderr" == *"training pairs for 78 parameters"* ]]
+	[ -s m.fis ]
+}
+
+@test "train warns of rules that the data never reach" {
+	# depth and velocity in step: half of the grid is empty
+	awk -v OFS=, 'BEGIN { print "depth_mm,velocity_mm_s,force_N"
+		for (i = 0; i < 400; i++) print i / 20, i / 8, i / 200 }' >step.csv
+	incise train step.csv -o m.fis --json >r.json 2>err
+	grep -q "rules never fire in the data" err
+	holds "$(key r.json rules_unfired) >= 5"
+}
+
+@test "train on recordings made by others beats the mean on unseen cuts" {
+	data=$root/../shared/data/meniscus.csv
+	[ -f "$data" ] || skip "no $data: real data do not come with the source"
+	incise train "$data" --inputs depth_deg,velocity_deg_s --group cut --check 0.3 --seed 1 \
+		-o m.fis --json >r.json
+	holds "$(key r.json check.rmse_N) < $(key r.json baselines.mean.rmse_N)"
+	holds "$(key r.json check_groups) >= 2"
+}
+
+@test "train: a file that is not there, or is a folder" {
+	run --separate-stderr incise train none.csv -o m.fis
+	failed_with none.csv "No such file"
+	mkdir folder
+	run --separate-stderr incise train folder -o m.fis
+	failed_with folder "Is a directory"
+	[[ "$stderr" != *:0:* ]] # there is no line 0
+	[ ! -e m.fis ]
+}
+
+@test "train: a file that may not be read" {
+	[ "$(id -u)" != 0 ] || skip "root reads everything"
+	chmod 000 pairs.csv
+	run --separate-stderr incise train pairs.csv -o m.fis
+	failed_with pairs.csv "Permission denied"
+}
+
+@test "train: fields that are no finite number are named by line and column" {
+	for value in nan NaN -inf infinity 1e999 "" abc "1 2" 1.2.3 0x; do
+		awk -F, -v value="$value" 'NR == 5 { $3 = value } 1' OFS=, pairs.csv >bad.csv
+		refuses "bad.csv:5: column 3" velocity_mm_s
+	done
+}
+
+@test "train: rows with too few or too many fields" {
+	sed '7s/,[^,]*$//' pairs.csv >bad.csv
+	refuses "bad.csv:7: column 4"
+	sed '7s/$/,1/' pairs.csv >bad.csv
+	refuses "bad.csv:7: column 5"
+	head -c 1000 pairs.csv | sed '$s/,[^,]*$//' >bad.csv
+	refuses "bad.csv:$(grep -c '' bad.csv)"
+	sed '7s/^/"/' pairs.csv >bad.csv
+	refuses "bad.csv:7" quote
+}
+
+@test "train: what is no table" {
+	: >bad.csv
+	refuses empty
+	head -n 1 pairs.csv >bad.csv
+	refuses "no rows"
+	printf 'depth_mm,velocity_mm_s,force_N\n1,2,3\n\0\0\n' >bad.csv
+	refuses "bad.csv:3" NUL
+	head -c 4000 "$INCISE_BUILD/bin/incise" >bad.csv
+	refuses
+}
+
+@test "train: a column that is not there lists those that are" {
+	sed '1s/.*/cut,depth,velocity_mm_s,force_N/' pairs.csv >bad.csv
+	refuses "'depth_mm'" "cut, depth, velocity_mm_s, force_N"
+	run --separate-stderr incise train pairs.csv --group stroke -o m.fis
+	failed_with "'stroke'" "cut, depth_mm"
+}
+
+@test "train: a constant input" {
+	awk -F, 'NR > 1 { $2 = 5 } 1' OFS=, pairs.csv >bad.csv
+	refuses depth_mm constant
+}
+
+@test "train: a constant output is learnt" {
+	awk -F, 'NR > 1 { $4 = 0.7 } 1' OFS=, pairs.csv >flat.csv
+	incise train flat.csv -o m.fis 2>/dev/null
+	# consequents are shrunk by the ridge towards the mean, which is the constant
+	force=$(echo '7 13' | incise eval m.fis)
+	holds "($force - 0.7)^2 < 1e-12"
+}
+
+@test "train: fewer pairs than parameters" {
+	head -n 60 pairs.csv >bad.csv # 59 pairs, 60 consequent parameters
+	refuses "59 training pairs" "60 consequent parameters"
+	head -n 61 pairs.csv >enough.csv
+	incise train enough.csv -o m.fis 2>/dev/null
+	[ -s m.fis ]
+}
+
+@test "train: too few cuts to keep one back" {
+	grep -E '^(cut|c1),' pairs.csv >bad.csv
+	run --separate-stderr incise train bad.csv --group cut --check 0.3 --mf 2,2 -o m.fis
+	failed_with bad.csv
+	[ ! -e m.fis ]
+}
+
+@test "train: bad usage" {
+	run --separate-stderr incise train pairs.csv
+	bad_usage "-o MODEL.fis"
+	run --separate-stderr incise train -o m.fis
+	bad_usage "one data file"
+	run --separate-stderr incise train pairs.csv more.csv -o m.fis
+	bad_usage "one data file, got 2"
+	for wrong in "--check 0" "--check 1" "--check half" "--mf 0,3" "--mf 3" "--mf 3,3,3" \
+		"--mf 33,2" "--mf ," "--mf-type trimf" "--epochs 0" "--epochs 1.5" "--step 0" \
+		"--ridge -1" "--ridge nan" "--seed -1" "--seed x" "--inputs ,"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise train pairs.csv -o m.fis $wrong
+		bad_usage "${wrong%% *}"
+	done
+	run --separate-stderr incise train pairs.csv -o - --json
+	bad_usage "standard output"
+	run --separate-stderr incise train pairs.csv -o ""
+	bad_usage "-o"
+	[ ! -e m.fis ]
+}
+
+@test "train: more rules than there may be" {
+	run --separate-stderr incise train pairs.csv --mf 32,32 -o m.fis
+	failed_with 1024 256
+}
+
+@test "train: places that cannot be written" {
+	mkdir folder
+	for place in folder no/such/m.fis /dev/full; do
+		run --separate-stderr incise train pairs.csv --mf 2,2 -o $place
+		[ "$status" -eq 1 ]
+		# warnings may come before
+		[[ "${stderr_lines[-1]}" == "incise train: $place: "* ]]
+	done
+	run --separate-stderr bash -c "incise train pairs.csv --mf 2,2 -o - >/dev/full"
+	[ "$status" -eq 1 ]
+	[[ "${stderr_lines[-1]}" == *"No space left"* ]]
+	[ "$(ls -A)" = "$(printf '%s\n' folder pairs.csv)" ]
+	[ -z "$(ls -A folder)" ]
+}
+
+@test "train: a full disk leaves the old model and nothing else" {
+	echo old >m.fis
+	run --separate-stderr bash -c "trap '' XFSZ; ulimit -f 1
+		incise train pairs.csv -o m.fis"
+	[ "$status" -eq 1 ]
+	[[ "${stderr_lines[-1]}" == "incise train: m.fis: not written: "* ]]
+	[ "$(cat m.fis)" = old ]
+	[ "$(ls -A)" = "$(printf '%s\n' m.fis pairs.csv)" ]
+}
+
+@test "train: bad data leave the old model" {
+	echo old >m.fis
+	sed '9s/,[^,]*$/,nan/' pairs.csv >bad.csv
+	run --separate-stderr incise train bad.csv -o m.fis
+	failed_with "bad.csv:9: column 4"
+	[ "$(cat m.fis)" = old ]
+}
+
+@test "train replaces the data's neighbour and keeps odd names" {
+	cp pairs.csv "my pairs, 100% #1.csv"
+	incise train "my pairs, 100% #1.csv" --mf 2,2 -o "my model's.fis" 2>/dev/null
+	[ -s "my model's.fis" ]
+}
+
+@test "train in another language reads and writes the same numbers" {
+	locale -a | grep -qi '^de_DE.utf-\?8$' || skip "no locale with a decimal comma here"
+	incise train pairs.csv -o a.fis 2>/dev/null
+	LC_ALL=de_DE.UTF-8 incise train pairs.csv -o b.fis 2>/dev/null
+	cmp a.fis b.fis
+}

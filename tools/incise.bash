@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# bash completion for incise. Verbs and options are what the programs say of themselves
+# when a word is completed, so there is no list here to keep.
+# shellcheck shell=bash
+
+# The verbs of `incise --help`.
+_incise_verbs()
+{
+	"$1" --help 2>/dev/null | awk '
+		/^Verbs:/ { list = 1; next }
+		list && /^  [a-z]/ { print $1; next }
+		{ list = 0 }'
+}
+
+# The options of `incise VERB --help`: the words with dashes that begin a line.
+_incise_options()
+{
+	"$1" "$2" --help 2>/dev/null | awk '
+		/^Options:/ { list = 1; next }
+		/^[^ ]/ { list = 0 }
+		list && /^ +-/ {
+			sub(/  [^ -].*/, "")
+			while (match($0, /(^|[ ,])--?[a-zA-Z][a-z-]*/)) {
+				option = substr($0, RSTART, RLENGTH)
+				gsub(/[ ,]/, "", option)
+				print option
+				$0 = substr($0, RSTART + RLENGTH)
+			}
+		}'
+}
+
+_incise_files()
+{
+	compopt -o filenames 2>/dev/null || : # not within a completion: a test
+	mapfile -t COMPREPLY < <(compgen -f -- "$1")
+}
+
+_incise()
+{
+	local word=${COMP_WORDS[COMP_CWORD]}
+	local program=${COMP_WORDS[0]} verb=${COMP_WORDS[1]}
+
+	COMPREPLY=()
+	if ((COMP_CWORD == 1)); then
+		mapfile -t COMPREPLY < <(compgen -W \
+			"$(_incise_verbs "$program") help --help --version" -- "$word")
+	elif [[ $verb == help ]]; then
+		mapfile -t COMPREPLY < <(compgen -W "$(_incise_verbs "$program")" -- "$word")
+	elif [[ $word == -* ]]; then
+		mapfile -t COMPREPLY < <(compgen -W \
+			"$(_incise_options "$program" "$verb")" -- "$word")
+	else
+		_incise_files "$word"
+	fi
+}
+
+complete -F _incise incise
