@@ -130,7 +130,7 @@ setup() {
 
 @test "info to a full disk" {
 	run --separate-stderr bash -c "incise info m.fis >/dev/full"
-	failed_with "is the disk full"
+	failed_with "standard output: "
 	run --separate-stderr bash -c "incise info --json m.fis >/dev/full"
-	failed_with "is the disk full"
+	failed_with "standard output: "
 }
