@@ -16,11 +16,17 @@ check: ## install what is missing, build, and run all tests
 	+@$(MAKE) --no-print-directory all
 	+@$(MAKE) --no-print-directory check-unit check-cli check-sanitize check-style
 
-check-unit: $(unit_programs) ## unit tests
-	@tests/unit/run $(unit_programs)
+# A locale with a decimal comma, to show that files do not depend on it.
+locale := $(O)/locale/de_DE.UTF-8
+$(locale):
+	@mkdir -p $(@D)
+	localedef -i de_DE -f UTF-8 $@
 
-check-cli: all ## command-line tests of the real programs
-	INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli
+check-unit: $(unit_programs) $(locale) ## unit tests
+	@LOCPATH=$(abspath $(O)/locale) tests/unit/run $(unit_programs)
+
+check-cli: all $(locale) ## command-line tests of the real programs
+	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
 sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all

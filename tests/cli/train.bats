@@ -314,7 +314,7 @@ refuses() {
 }
 
 @test "train in another language reads and writes the same numbers" {
-	locale -a | grep -qi '^de_DE.utf-\?8$' || skip "no locale with a decimal comma here"
+	[ "$(LC_ALL=de_DE.UTF-8 locale decimal_point 2>/dev/null)" = , ] || skip "no locale with a decimal comma here"
 	incise train pairs.csv -o a.fis 2>/dev/null
 	LC_ALL=de_DE.UTF-8 incise train pairs.csv -o b.fis 2>/dev/null
 	cmp a.fis b.fis

@@ -74,7 +74,7 @@ static void rows_are_the_samples(void **state)
 		for (int i = 0; i < 4; i++)
 			assert_true(sqlite3_column_double(stmt, 6 + i) ==
 				    tracker[n].quaternion[i]);
-		assert_string_equal(sqlite3_column_text(stmt, 10), " ");
+		assert_string_equal((const char *)sqlite3_column_text(stmt, 10), " ");
 		/* the default surface is z = 0 */
 		assert_true(sqlite3_column_double(stmt, 11) ==
 			    -tracker[n].position_mm[2]);
