@@ -30,7 +30,7 @@
 #include "json.h"
 #include "picture.h"
 
-enum { OPT_SEED = CLI_LONG, OPT_LOOP, OPT_FORCE };
+enum { OPT_SEED = CLI_LONG, OPT_LOOP, OPT_FORCE, OPT_JSON };
 
 /* What the paper reports after 80 epochs, §4.3. Its data are not published. */
 #define PAPER_MSE_TRAIN 0.036
@@ -46,6 +46,7 @@ static const struct cli_option options[] = {
 	{OPT_SEED, "seed", "N", "of the virtual rig (default 1)"},
 	{OPT_LOOP, "loop", "TIME", "length of the haptic loop (default 10s)"},
 	{OPT_FORCE, "force", NULL, "write into a folder that exists"},
+	{OPT_JSON, "json", NULL, "print the summary as JSON, and nothing else"},
 	{0},
 };
 
@@ -61,6 +62,7 @@ static const struct cli_verb verb = {
 
 static const char *folder = "demo.out";
 static long seed = 1;
+static bool quiet; /* --json: no steps and commands */
 static json_t *summary;
 static json_t *pictures;
 
@@ -99,10 +101,12 @@ static json_t *run(char *const *argv)
 
 	self[n > 0 ? n : 0] = 0;
 	program = text("%s/incise-%s", dirname(self), argv[0]);
-	printf("$ incise");
-	for (char *const *arg = argv; *arg; arg++)
-		printf(" %s", *arg);
-	putchar('\n');
+	if (!quiet) {
+		printf("$ incise");
+		for (char *const *arg = argv; *arg; arg++)
+			printf(" %s", *arg);
+		putchar('\n');
+	}
 	fflush(stdout);
 	if (pipe(pipe_fd))
 		cli_fail("pipe: %s", strerror(errno));
@@ -158,7 +162,8 @@ static void step(const char *what)
 {
 	static int number;
 
-	printf("\n[%d] %s\n", ++number, what);
+	if (!quiet)
+		printf("\n[%d] %s\n", ++number, what);
 }
 
 static void draw(FILE *script, const char *name)
@@ -734,6 +739,9 @@ int main(int argc, char **argv)
 		case OPT_FORCE:
 			force = true;
 			break;
+		case OPT_JSON:
+			quiet = true;
+			break;
 		}
 	if (optind != argc)
 		cli_usage("'%s': demo takes options only", argv[optind]);
@@ -767,10 +775,15 @@ int main(int argc, char **argv)
 	seconds = end.tv_sec - begin.tv_sec + (end.tv_nsec - begin.tv_nsec) * 1e-9;
 	json_object_set_new(summary, "seconds", json_number(seconds));
 	save_summary(seconds);
-	putchar('\n');
-	print_summary(stdout, seconds);
-	printf("left in            %s: summary.json, pictures (*.png, *.svg), data, models\n",
-	       folder);
+	if (quiet) {
+		json_print(json_incref(summary));
+	} else {
+		putchar('\n');
+		print_summary(stdout, seconds);
+		printf("left in            %s: summary.json, pictures (*.png, *.svg), data, "
+		       "models\n",
+		       folder);
+	}
 	cli_finish();
 	incise_model_free(model);
 	json_decref(summary);

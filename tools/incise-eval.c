@@ -11,8 +11,9 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include "cli.h"
+#include "json.h"
 
-enum { OPT_ARITH = CLI_LONG, OPT_NO_CLAMP, OPT_GRID };
+enum { OPT_ARITH = CLI_LONG, OPT_NO_CLAMP, OPT_GRID, OPT_JSON };
 
 static const struct cli_option options[] = {
 	{OPT_ARITH, "arith", "KIND", "double (default) or fixed"},
@@ -20,6 +21,7 @@ static const struct cli_option options[] = {
 	{OPT_GRID, "grid", "NxM",
 	 "evaluate on a grid over the support instead of reading;\n"
 	 "prints inputs and output, an empty line after each row"},
+	{OPT_JSON, "json", NULL, "report as JSON: a row per evaluation"},
 	{0},
 };
 
@@ -39,15 +41,37 @@ struct evaluator {
 	struct incise_model *model;
 	struct incise_fixed *fixed; /* NULL: double */
 	unsigned long outside;
+	json_t *rows; /* NULL: text */
 };
 
-static double evaluate(struct evaluator *e, const double *x)
+static void add_row(struct evaluator *e, const double *x, double y, bool outside)
+{
+	json_t *row = json_object();
+
+	for (int i = 0; i < incise_model_n_inputs(e->model); i++)
+		json_object_set_new(row, incise_model_input(e->model, i)->name,
+				    json_number(x[i]));
+	json_object_set_new(row, incise_model_output(e->model)->name, json_number(y));
+	json_object_set_new(row, "extrapolated", json_boolean(outside));
+	json_array_append_new(e->rows, row);
+}
+
+/* Evaluate and print; a grid's text has its inputs in front. */
+static void evaluate(struct evaluator *e, const double *x, bool inputs)
 {
 	unsigned int flags;
 	double y = incise_model_eval(e->model, x, &flags);
 
+	if (e->fixed)
+		y = incise_fixed_eval_double(e->fixed, x);
 	e->outside += flags & INCISE_MODEL_EXTRAPOLATED;
-	return e->fixed ? incise_fixed_eval_double(e->fixed, x) : y;
+	if (e->rows) {
+		add_row(e, x, y, flags & INCISE_MODEL_EXTRAPOLATED);
+		return;
+	}
+	for (int i = 0; inputs && i < incise_model_n_inputs(e->model); i++)
+		printf("%.10g ", x[i]);
+	printf("%.10g\n", y);
 }
 
 static void parse_line(const struct evaluator *e, const char *path, unsigned long line,
@@ -92,7 +116,7 @@ static void eval_stream(struct evaluator *e, FILE *in, const char *path)
 		if (!text[strspn(text, " \t")] || *text == '#')
 			continue;
 		parse_line(e, path, line, text, x);
-		printf("%.10g\n", evaluate(e, x));
+		evaluate(e, x, false);
 	}
 	if (ferror(in))
 		cli_fail("%s: %s", path, strerror(errno));
@@ -111,15 +135,18 @@ static void eval_grid(struct evaluator *e, const char *size)
 	if (sscanf(size, "%dx%d%n", &n, &m, &end) != 2 || size[end] || n < 2 || m < 2 ||
 	    n > 10000 || m > 10000)
 		cli_usage("--grid: '%s' is not NxM with 2 to 10000 each", size);
-	for (int i = 0; i < n; i++, putchar('\n'))
+	for (int i = 0; i < n; i++) {
 		for (int j = 0; j < m; j++) {
 			/* Weighted so that both ends are met to the digit. */
 			double u = (double)i / (n - 1), v = (double)j / (m - 1);
 			double x[] = {a->min * (1 - u) + a->max * u,
 				      b->min * (1 - v) + b->max * v};
 
-			printf("%.10g %.10g %.10g\n", x[0], x[1], evaluate(e, x));
+			evaluate(e, x, true);
 		}
+		if (!e->rows)
+			putchar('\n');
+	}
 }
 
 int main(int argc, char **argv)
@@ -145,6 +172,9 @@ int main(int argc, char **argv)
 			break;
 		case OPT_GRID:
 			grid = optarg;
+			break;
+		case OPT_JSON:
+			e.rows = json_array();
 			break;
 		}
 	if (optind >= argc || argc - optind > 2)
@@ -176,6 +206,8 @@ int main(int argc, char **argv)
 		if (in != stdin)
 			fclose(in);
 	}
+	if (e.rows)
+		json_print(json_pack("{so}", "rows", e.rows));
 	cli_finish();
 	if (e.outside)
 		cli_warn("%lu inputs lay outside the model's support and were %s",

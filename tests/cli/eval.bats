@@ -271,3 +271,13 @@ refuses() {
 	run --separate-stderr incise eval thin.fis --arith fixed <<<'5 20'
 	failed_with thin.fis in1mf1
 }
+
+@test "eval reports as JSON" {
+	printf '5 20\n999 20\n' | incise eval m.fis --json >r.json 2>/dev/null
+	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '$.rows')")" = 2 ]
+	[ "$(sqlite3 :memory: "SELECT json_extract(readfile('r.json'), '$.rows[0].depth_mm')")" = 5.0 ]
+	[ "$(sqlite3 :memory: "SELECT json_extract(readfile('r.json'), '$.rows[0].extrapolated')")" = 0 ]
+	[ "$(sqlite3 :memory: "SELECT json_extract(readfile('r.json'), '$.rows[1].extrapolated')")" = 1 ]
+	force=$(sqlite3 :memory: "SELECT json_extract(readfile('r.json'), '$.rows[0].force_N')")
+	[ "$(printf '%.9g' "$force")" = "$(echo 5 20 | incise eval m.fis | xargs printf '%.9g')" ]
+}
