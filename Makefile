@@ -24,7 +24,7 @@ version := $(shell sed -n 's/^\#define INCISE_VERSION "\(.*\)"/\1/p' lib/include
 soversion := 1
 
 cppflags := -D_GNU_SOURCE -Ilib/include
-warnings := -Wall -Wextra -Wmissing-prototypes -Wstrict-prototypes -Wvla -Wno-unused-parameter
+warnings := -Wall -Wextra -Wmissing-prototypes -Wstrict-prototypes -Wvla
 cflags := -std=gnu11 -fPIC -fvisibility=hidden -fno-math-errno -ffp-contract=off $(warnings)
 
 # One shared object per group of rooms; a process maps only the ones it uses.
@@ -38,6 +38,9 @@ pc_incise-record := sqlite3
 libs_incise := -lm
 libs_incise-learn := -lm
 libs_incise-record := -lm
+about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop
+about_incise-learn := haptic cutting: learning models from data
+about_incise-record := haptic cutting: recordings and what is exported of them
 needs_incise :=
 needs_incise-learn := incise
 needs_incise-record := incise

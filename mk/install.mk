@@ -10,7 +10,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach lib,$(libraries),$(addprefix $(libdir)/lib$(lib).so,.$(version) .$(soversion)) \
 		$(libdir)/lib$(lib).so) \
 	$(addprefix $(includedir)/incise/,$(notdir $(headers))) \
-	$(libdir)/pkgconfig/incise.pc \
+	$(foreach lib,$(libraries),$(libdir)/pkgconfig/$(lib).pc) \
 	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
 	$(addprefix $(datadir)/incise/scenes/,$(notdir $(scenes))) \
 	$(completiondir)/incise
@@ -24,9 +24,11 @@ install: all ## install below $(DESTDIR)$(prefix)
 		ln -sf lib$$lib.so.$(soversion) $(DESTDIR)$(libdir)/lib$$lib.so || exit 1; \
 	done
 	$(INSTALL) -m 644 $(headers) $(DESTDIR)$(includedir)/incise
-	sed -e 's|@prefix@|$(prefix)|' -e 's|@libdir@|$(libdir)|' \
+	$(foreach lib,$(libraries),sed -e 's|@prefix@|$(prefix)|' -e 's|@libdir@|$(libdir)|' \
 		-e 's|@includedir@|$(includedir)|' -e 's|@version@|$(version)|' \
-		mk/incise.pc.in >$(DESTDIR)$(libdir)/pkgconfig/incise.pc
+		-e 's|@name@|$(lib)|' -e 's|@about@|$(about_$(lib))|' \
+		-e 's|@requires@|$(needs_$(lib))|' \
+		mk/library.pc.in >$(DESTDIR)$(libdir)/pkgconfig/$(lib).pc &&) :
 	for page in $(man_pages); do \
 		$(INSTALL) -m 644 $$page $(DESTDIR)$(mandir)/man$${page##*.} || exit 1; \
 	done

@@ -7,7 +7,7 @@ unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
-		-Wno-missing-prototypes $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
+		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
 		-MMD -MP -MF $@.d $(LDFLAGS) -o $@ $< $(O)/lib/libincise-tests.a \
 		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm
 

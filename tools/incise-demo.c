@@ -36,6 +36,10 @@ enum { OPT_SEED = CLI_LONG, OPT_LOOP, OPT_FORCE, OPT_JSON };
 #define PAPER_MSE_TRAIN 0.036
 #define PAPER_MSE_CHECK 0.0804
 
+/* Added to the seed for a liver that no training saw; seeds of a rig end at 2^31 - 1. */
+#define OTHER_LIVER 1000
+#define SEED_MAX (INT32_MAX - OTHER_LIVER)
+
 /* Depths of the paper's cuts, and the bins that make its 120 pairs. */
 #define BINS "12x10"
 #define N_NOMINAL 4
@@ -250,7 +254,7 @@ static void figure_force(void)
 		fputs("\n\n", data);
 		first = i + 1;
 	}
-	fclose(data);
+	picture_data_end(data, folder);
 	data = picture_data(folder, "force-averaged.dat");
 	for (int d = 0; d < N_NOMINAL; d++) {
 		for (int s = 0; s < SLOTS; s++)
@@ -259,12 +263,12 @@ static void figure_force(void)
 					sum[d][s] / count[d][s]);
 		fputs("\n\n", data);
 	}
-	fclose(data);
+	picture_data_end(data, folder);
 	script = picture_begin(folder, "fig2-force", 1200, 800);
 	fputs("set multiplot layout 2,1 title 'Cutting force, virtual liver (as paper 1, fig. 2)'\n"
 	      "set xlabel 'time in the recording / s'\nset ylabel 'force / N'\n"
 	      "set title '(a) raw: cuts at 5, 10, 15 and 20 mm'\n"
-	      "set key top left\n"
+	      "set key top left Left reverse samplen 2\n"
 	      "plot 'force-raw.dat' using 1:($3==5?$2:NaN) with lines ls 1 title '5 mm', \\\n"
 	      "  '' using 1:($3==10?$2:NaN) with lines ls 2 title '10 mm', \\\n"
 	      "  '' using 1:($3==15?$2:NaN) with lines ls 3 title '15 mm', \\\n"
@@ -298,7 +302,7 @@ static void write_mfs(const char *name, const struct incise_model *model)
 			fputs("\n\n", data);
 		}
 	}
-	fclose(data);
+	picture_data_end(data, folder);
 }
 
 static void figure_membership(const struct incise_model *model)
@@ -311,18 +315,20 @@ static void figure_membership(const struct incise_model *model)
 	write_mfs("membership-after.dat", model);
 	script = picture_begin(folder, "fig3a-membership", 1200, 700);
 	fputs("set multiplot layout 2,2 title 'Membership functions before and after training "
-	      "(as paper 1, fig. 3a)'\nset yrange [0:1.1]\nset ylabel 'degree'\n",
+	      "(as paper 1, fig. 3a)'\nset yrange [0:1.1]\nset ylabel 'degree'\n"
+	      "set key outside right center\n"
+	      "depth = 'NB NS Z PS PB'\nvelocity = 'NB NS PS PB'\n",
 	      script);
 	for (int after = 0; after < 2; after++)
 		for (int i = 0; i < 2; i++)
 			fprintf(script,
 				"set title '%s training'\nset xlabel '%s'\n"
 				"plot for [k=%d:%d] 'membership-%s.dat' index k using 1:2 with "
-				"lines ls (k-%d+1) lw 2\n",
+				"lines ls (k-%d+1) lw 2 title word(%s, k-%d+1)\n",
 				after ? "after" : "before",
 				i ? "velocity / (mm/s)" : "depth / mm", i ? n : 0,
 				i ? n + m - 1 : n - 1, after ? "after" : "before",
-				i ? n : 0);
+				i ? n : 0, i ? "velocity" : "depth", i ? n : 0);
 	fputs("unset multiplot\n", script);
 	draw(script, "fig3a-membership");
 	incise_model_free(before);
@@ -343,7 +349,7 @@ static void figure_surface(const struct incise_model *model)
 			fprintf(data, "%g %g %g\n", x[0], x[1],
 				incise_model_eval(model, x, NULL));
 		}
-	fclose(data);
+	picture_data_end(data, folder);
 	script = picture_begin(folder, "fig3b-surface", 1000, 800);
 	fputs("set title 'Force of the trained model (as paper 1, fig. 3b); dots: the averaged "
 	      "pairs'\nset xlabel 'depth / mm'\nset ylabel 'velocity / (mm/s)'\n"
@@ -367,7 +373,7 @@ static void write_pairs(void)
 
 		fprintf(data, "%g %g %g\n", row[0], row[1], row[2]);
 	}
-	fclose(data);
+	picture_data_end(data, folder);
 	incise_dataset_free(pairs);
 }
 
@@ -392,7 +398,7 @@ static double figure_prediction(const struct incise_model *model)
 		fprintf(data, "%.4f %.5f %.5f\n", row[0] - incise_dataset_row(cut, 0)[0],
 			row[3], y);
 	}
-	fclose(data);
+	picture_data_end(data, folder);
 	/* Both begin where the blade meets the tissue. */
 	data = picture_data(folder, "rendered.dat");
 	for (size_t i = 0; i < incise_dataset_rows(log); i++) {
@@ -407,7 +413,7 @@ static double figure_prediction(const struct incise_model *model)
 	}
 	if (contact < 0)
 		fputs("0 0 0\n", data);
-	fclose(data);
+	picture_data_end(data, folder);
 	script = picture_begin(folder, "fig5-prediction", 1200, 800);
 	fputs("set multiplot layout 2,1 title 'A new cut at 5 mm (as paper 1, fig. 5)'\n"
 	      "set xlabel 'time in the cut / s'\nset ylabel 'force / N'\nset key top right\n"
@@ -417,8 +423,8 @@ static double figure_prediction(const struct incise_model *model)
 	      "  '' using 1:3 with lines ls 2 lw 2 title 'predicted'\n"
 	      "set title '(b) rendered by the haptic loop, and recorded'\n"
 	      "plot 'prediction.dat' using 1:2 with lines lc rgb '#999999' title 'recorded', \\\n"
-	      "  'rendered.dat' using 1:2 with lines ls 1 lw 2 title 'commanded', \\\n"
-	      "  '' using 1:3 with lines ls 3 title 'on the hand'\n"
+	      "  'rendered.dat' using 1:3 with lines ls 3 lw 2.5 title 'on the hand', \\\n"
+	      "  '' using 1:2 with lines lc rgb 'black' dt 2 title 'commanded'\n"
 	      "unset multiplot\n",
 	      script);
 	draw(script, "fig5-prediction");
@@ -441,7 +447,7 @@ static void figure_lateness(const json_t *haptic)
 	json_array_foreach(histogram, i, bin)
 		fprintf(data, "%g %g\n", json_number_value(json_array_get(bin, 0)) + 0.5,
 			json_number_value(json_array_get(bin, 1)));
-	fclose(data);
+	picture_data_end(data, folder);
 	script = picture_begin(folder, "tick-lateness", 1000, 500);
 	fprintf(script,
 		"set title 'Lateness of %g ticks at 1 kHz (this machine, %s): median %s, "
@@ -479,7 +485,7 @@ static void figure_camera(void)
 	data = picture_data(folder, "camera.rgb");
 	for (int y = 0; y < frame.height; y++)
 		fwrite(frame.rgb + (size_t)y * frame.stride, 3, frame.width, data);
-	fclose(data);
+	picture_data_end(data, folder);
 	script = picture_begin(folder, "camera", frame.width + 160, frame.height + 120);
 	fprintf(script,
 		"set title 'Virtual camera: %g mm/px, scalpel 10 mm deep'\nset size ratio -1\n"
@@ -550,7 +556,6 @@ static void write_scene(void)
 		cli_fail("%s: %s", path, strerror(errno));
 	fputs("# Written by incise demo; see incise-scene(5).\n"
 	      "rate_hz = 1000.0;\nmodel = \"liver.fis\";\narithmetic = \"fixed\";\n"
-	      "surface = { point_mm = [0.0, 0.0, 0.0]; normal = [0.0, 0.0, 1.0]; };\n"
 	      "limits = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };\n",
 	      out);
 	if (fclose(out))
@@ -659,9 +664,10 @@ static void walk(const char *loop_time)
 	char *sim = text("sim:seed=%ld,clock=simulated", seed);
 	char *seed_text = text("%ld", seed);
 	/* Another liver: the boundary effect of its cut is not that of any cut above. */
-	char *new_sim =
-		text("sim:seed=%ld,clock=simulated,depth_mm=5,times=1", seed + 1000);
-	char *live = text("sim:seed=%ld,clock=real,depth_mm=5,times=1", seed + 1000);
+	char *new_sim = text("sim:seed=%ld,clock=simulated,depth_mm=5,times=1",
+			     seed + OTHER_LIVER);
+	char *live =
+		text("sim:seed=%ld,clock=real,depth_mm=5,times=1", seed + OTHER_LIVER);
 	char *duration = text("%s", loop_time);
 
 	step("Cut the virtual liver: 3, 4, 4 and 3 times at 5, 10, 15 and 20 mm");
@@ -730,7 +736,7 @@ int main(int argc, char **argv)
 			folder = optarg;
 			break;
 		case OPT_SEED:
-			seed = cli_integer("seed", optarg, 0, 1L << 40);
+			seed = cli_integer("seed", optarg, 0, SEED_MAX);
 			break;
 		case OPT_LOOP:
 			cli_duration("loop", optarg, 0.2, 3600);

@@ -111,6 +111,8 @@ static void eval_stream(struct evaluator *e, FILE *in, const char *path)
 
 	while ((n = getline(&text, &size, in)) >= 0) {
 		line++;
+		if (memchr(text, 0, n))
+			cli_fail("%s:%lu: a NUL byte: not a text file", path, line);
 		while (n > 0 && strchr("\r\n", text[n - 1]))
 			text[--n] = 0;
 		if (!text[strspn(text, " \t")] || *text == '#')

@@ -18,9 +18,6 @@
 
 enum { OPT_MODEL = CLI_LONG, OPT_ARITH, OPT_DURATION, OPT_LOG, OPT_JSON };
 
-/* Ticks whose rendered force is not compared: the actuator starts from rest. */
-#define SETTLE 100
-
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
 	 "file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n"
@@ -130,20 +127,9 @@ static void write_log(const struct job *job, const struct incise_tick *ticks, si
 }
 
 /* How far the actuator's force was from the one commanded at the tick before, rms. */
-static double render_error(const struct incise_tick *ticks, size_t n)
+static double render_error(const struct incise_loop_stats *stats)
 {
-	double sum = 0;
-
-	if (n <= SETTLE)
-		return NAN;
-	for (size_t i = SETTLE; i < n; i++) {
-		const double *c = ticks[i - 1].command_N;
-		double e = ticks[i].rendered_N -
-			   sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
-
-		sum += e * e;
-	}
-	return sqrt(sum / (n - SETTLE));
+	return stats->ticks > 1 ? sqrt(stats->rendered_off2 / (stats->ticks - 1)) : NAN;
 }
 
 /* Bins of 1 µs or 100 ns as a quantile in their unit; null in the open last bin. */
@@ -283,7 +269,7 @@ int main(int argc, char **argv)
 		cli_fail_with(&err);
 	loop.rate_hz = incise_scene_rate_hz(scene);
 	loop.duration_ns = (int64_t)(job.duration * INCISE_NS_PER_S);
-	if (job.duration) {
+	if (job.log) {
 		loop.log_size = (size_t)ceil(job.duration * loop.rate_hz) + 1;
 		loop.log = calloc(loop.log_size, sizeof(*loop.log));
 		if (!loop.log)
@@ -297,7 +283,7 @@ int main(int argc, char **argv)
 	cli_progress("%s: %g Hz, Ctrl-C ends", job.scene, loop.rate_hz);
 	rc = incise_loop_run(plan, incise_rig_clock(rig), &loop, &stats, &err);
 	cli_progress_end();
-	rms_N = incise_rig_stepper(rig) ? render_error(loop.log, stats.logged) : NAN;
+	rms_N = incise_rig_stepper(rig) ? render_error(&stats) : NAN;
 	if (job.log)
 		write_log(&job, loop.log, stats.logged);
 	if (job.json)

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <incise/dataset.h>
 #include <incise/outfile.h>
 #include <incise/train.h>
@@ -222,30 +223,30 @@ static void take_side(struct side *side, const struct incise_dataset *data,
 	side->pairs = (struct incise_pairs){side->rows, taken, job->n_inputs};
 }
 
-/* Range of a column over the whole dataset: the support also covers the unseen pairs. */
-static void variable(struct incise_variable *v, const struct incise_dataset *data,
+/* Range of a column over the training pairs: unseen ones shape nothing. */
+static void variable(struct incise_variable *v, const struct incise_pairs *pairs,
 		     int column, const char *name)
 {
-	size_t n = incise_dataset_rows(data);
+	size_t width = pairs->n_inputs + 1;
 
 	snprintf(v->name, sizeof(v->name), "%s", name);
-	v->min = v->max = incise_dataset_row(data, 0)[column];
-	for (size_t i = 1; i < n; i++) {
-		v->min = fmin(v->min, incise_dataset_row(data, i)[column]);
-		v->max = fmax(v->max, incise_dataset_row(data, i)[column]);
+	v->min = v->max = pairs->rows[column];
+	for (size_t i = 1; i < pairs->n; i++) {
+		v->min = fmin(v->min, pairs->rows[i * width + column]);
+		v->max = fmax(v->max, pairs->rows[i * width + column]);
 	}
 }
 
 static struct incise_model *first_model(const struct job *job,
-					const struct incise_dataset *data)
+					const struct incise_pairs *pairs)
 {
 	struct incise_variable in[INCISE_MODEL_INPUTS_MAX], out;
 	struct incise_error err = {0};
 	struct incise_model *model;
 
 	for (int i = 0; i < job->n_inputs; i++)
-		variable(&in[i], data, i, job->inputs[i]);
-	variable(&out, data, job->n_inputs, job->output);
+		variable(&in[i], pairs, i, job->inputs[i]);
+	variable(&out, pairs, job->n_inputs, job->output);
 	if (!(out.min < out.max))
 		out.max = out.min + fmax(fabs(out.min), 1) * 1e-6;
 	model = incise_model_new_grid(job->n_inputs, in, job->mfs, job->type, &out, &err);
@@ -268,12 +269,23 @@ static void on_epoch(void *user, int epoch, double train_rmse, double check_rmse
 	fputc('\n', history->csv);
 }
 
-/* Training takes time: a place that cannot be written is told before, not after. */
-static void check_writable(const char *path)
+/*
+ * Training takes time: a place that cannot be written is told before, not after. The data
+ * themselves are no such place.
+ */
+static void check_writable(const struct job *job, const char *path)
 {
 	struct incise_error err = {0};
-	struct incise_outfile *file = incise_outfile_open(path, &err);
+	struct incise_outfile *file;
+	struct stat data, out;
 
+	if (!path)
+		return;
+	if (!stat(job->data, &data) && !stat(path, &out) && data.st_dev == out.st_dev &&
+	    data.st_ino == out.st_ino && S_ISREG(out.st_mode))
+		cli_fail("%s: is the data to train from; give another file to write",
+			 path);
+	file = incise_outfile_open(path, &err);
 	if (!file)
 		cli_fail_with(&err);
 	incise_outfile_abort(file);
@@ -478,7 +490,9 @@ int main(int argc, char **argv)
 	for (int i = 0; i < job.n_inputs; i++)
 		columns[i] = job.inputs[i];
 	columns[job.n_inputs] = job.output;
-	check_writable(job.model);
+	check_writable(&job, job.model);
+	check_writable(&job, job.initial);
+	check_writable(&job, job.history);
 	data = incise_dataset_read(job.data, columns, job.n_inputs + 1, job.group, &err);
 	if (!data)
 		cli_fail_with(&err);
@@ -497,7 +511,7 @@ int main(int argc, char **argv)
 		take_side(&check, data, &job, split, true);
 	}
 	take_side(&fit, data, &job, split, false);
-	model = first_model(&job, data);
+	model = first_model(&job, &fit.pairs);
 	if (job.initial && incise_model_save(model, job.initial, &err))
 		cli_fail_with(&err);
 	train(&job, model, &fit, split ? &check : NULL, &report);

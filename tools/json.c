@@ -12,11 +12,6 @@ json_t *json_number(double value)
 	return isfinite(value) ? json_real(value) : json_null();
 }
 
-json_t *json_one(const char *name, double value)
-{
-	return json_pack("{so}", name, json_number(value));
-}
-
 void json_print(json_t *object)
 {
 	json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(12));

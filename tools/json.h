@@ -10,9 +10,6 @@
 /* A real number, or null when it is not finite. */
 json_t *json_number(double value);
 
-/* {"NAME": value}, for the nested objects of a report. */
-json_t *json_one(const char *name, double value);
-
 /* Print one object to standard output and release it. */
 void json_print(json_t *object);
 

@@ -38,6 +38,16 @@ FILE *picture_data(const char *folder, const char *name)
 	return open_plot(folder, name, "");
 }
 
+void picture_data_end(FILE *data, const char *folder)
+{
+	bool failed = ferror(data);
+
+	errno = 0;
+	if (fclose(data) || failed)
+		cli_fail("%s/plot: %s; make room and run it again", folder,
+			 strerror(errno ? errno : EIO));
+}
+
 FILE *picture_begin(const char *folder, const char *name, int width, int height)
 {
 	FILE *script = open_plot(folder, name, ".gp");

@@ -17,6 +17,9 @@ bool picture_possible(void);
 /* Open FOLDER/plot/NAME for writing data; fails the program when that cannot be. */
 FILE *picture_data(const char *folder, const char *name);
 
+/* Close it; fails the program when not all of it was written. */
+void picture_data_end(FILE *data, const char *folder);
+
 /* Begin the script of a picture of width × height pixels; gnuplot commands follow. */
 FILE *picture_begin(const char *folder, const char *name, int width, int height);
 

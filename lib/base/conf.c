@@ -175,7 +175,7 @@ int incise_conf_number(const config_setting_t *group, const char *path, const ch
 				     "a number from %.10g to %.10g", min, max);
 	number = number_of(setting);
 	if (!(number >= min && number <= max))
-		return setting_error(setting, path, ERANGE, err,
+		return setting_error(setting, path, EINVAL, err,
 				     "a number from %.10g to %.10g", min, max);
 	*value = number;
 	return 0;
@@ -244,7 +244,7 @@ int incise_conf_surface(const config_setting_t *group, const char *path,
 	if (length < 1e-6) {
 		const config_setting_t *at = config_setting_get_member(surface, "normal");
 
-		return setting_error(at ? at : surface, path, ERANGE, err,
+		return setting_error(at ? at : surface, path, EINVAL, err,
 				     "a normal of length 1e-6 or more");
 	}
 	rc = conf_vector(surface, path, "point_mm", point_mm, err);

@@ -18,7 +18,7 @@ int incise_conf_known(const config_setting_t *group, const char *path,
 
 /*
  * Read a number if the key is there; integers are taken as numbers too. Returns 0 (value
- * untouched when the key is absent), -EINVAL (no number), -ERANGE (outside min … max).
+ * untouched when the key is absent), -EINVAL (no number, or outside min … max).
  */
 int incise_conf_number(const config_setting_t *group, const char *path, const char *key,
 		       double min, double max, double *value, struct incise_error *err);

@@ -13,16 +13,21 @@
 #include <unistd.h>
 #include <incise/outfile.h>
 
+/* Names to try before giving up: more writers of one file at once there will not be. */
+#define TRIES 100
+
 struct incise_outfile {
-	char *path;
-	char *temp;  /* hidden name beside path; NULL when written directly */
-	bool linked; /* temp exists in the file system */
+	char *path;   /* as given, for messages */
+	char *target; /* where it leads */
+	char *temp;   /* hidden name beside path; NULL when written directly */
+	bool linked;  /* temp exists in the file system */
 	FILE *stream;
 };
 
 static void outfile_free(struct incise_outfile *file)
 {
 	free(file->path);
+	free(file->target);
 	free(file->temp);
 	free(file);
 }
@@ -39,23 +44,28 @@ static char *temp_name(const char *path)
 	return name;
 }
 
+/* The hidden name for a try: ".NAME.123456". */
+static void try_name(struct incise_outfile *file, unsigned int n)
+{
+	snprintf(strrchr(file->temp, '.') + 1, 7, "%06u",
+		 ((unsigned int)getpid() + n) % 1000000u);
+}
+
 static int open_temp(struct incise_outfile *file)
 {
 	char *dir = strdup(file->temp);
-	mode_t mask = umask(0);
 	int fd;
 
-	umask(mask);
 	if (!dir)
 		return -1;
 	fd = open(dirname(dir), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
 	free(dir);
-	if (fd >= 0)
-		return fd;
-	fd = mkostemp(file->temp, O_CLOEXEC);
-	if (fd >= 0) {
-		file->linked = true;
-		fchmod(fd, 0666 & ~mask);
+	for (unsigned int n = 0; fd < 0 && n < TRIES; n++) {
+		try_name(file, n);
+		fd = open(file->temp, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
+		file->linked = fd >= 0;
+		if (fd < 0 && errno != EEXIST)
+			break;
 	}
 	return fd;
 }
@@ -69,7 +79,11 @@ struct incise_outfile *incise_outfile_open(const char *path, struct incise_error
 	if (!file)
 		goto fail;
 	file->path = strdup(path);
-	if (!file->path)
+	/* A link is written through, not replaced. */
+	file->target = realpath(path, NULL);
+	if (!file->target)
+		file->target = strdup(path);
+	if (!file->path || !file->target)
 		goto fail;
 	if (!strcmp(path, "-")) {
 		file->stream = stdout;
@@ -82,7 +96,7 @@ struct incise_outfile *incise_outfile_open(const char *path, struct incise_error
 	if (!stat(path, &st) && !S_ISREG(st.st_mode)) {
 		fd = open(path, O_WRONLY | O_CLOEXEC);
 	} else {
-		file->temp = temp_name(path);
+		file->temp = temp_name(file->target);
 		fd = file->temp ? open_temp(file) : -1;
 	}
 	if (fd < 0)
@@ -118,9 +132,8 @@ static int link_temp(struct incise_outfile *file, int fd)
 	if (file->linked)
 		return 0;
 	snprintf(proc, sizeof(proc), "/proc/self/fd/%d", fd);
-	for (int tries = 0; tries < 100; tries++) {
-		snprintf(strrchr(file->temp, '.') + 1, 7, "%06u",
-			 (unsigned int)(getpid() + tries) % 1000000u);
+	for (unsigned int n = 0; n < TRIES; n++) {
+		try_name(file, n);
 		if (!linkat(AT_FDCWD, proc, AT_FDCWD, file->temp, AT_SYMLINK_FOLLOW)) {
 			file->linked = true;
 			return 0;
@@ -142,7 +155,7 @@ int incise_outfile_commit(struct incise_outfile *file, struct incise_error *err)
 		rc = -errno;
 	if (!rc && file->temp)
 		rc = link_temp(file, fd);
-	if (!rc && file->temp && rename(file->temp, file->path))
+	if (!rc && file->temp && rename(file->temp, file->target))
 		rc = -errno;
 	if (rc) {
 		rc = incise_error_set(

@@ -323,7 +323,7 @@ struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
 		rc = plan_file(&plan, spec, devices, err);
 	if (rc) {
 		/* A value out of range is the file's fault like any other. */
-		errno = rc == -ERANGE ? EINVAL : -rc;
+		errno = -rc;
 		if (err)
 			err->code = errno;
 		return NULL;

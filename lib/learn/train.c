@@ -257,6 +257,7 @@ static void add_epoch_error(void *user, int epoch, double train_rmse, double che
 {
 	struct epoch_errors *errors = user;
 
+	(void)train_rmse; /* callbacks share one form */
 	errors->sum[epoch - 1] += check_rmse * check_rmse * errors->held;
 }
 

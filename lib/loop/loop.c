@@ -21,11 +21,15 @@ static void count(uint64_t *histogram, int64_t value)
 
 static void count_tick(struct incise_loop_stats *stats, const struct incise_tick *tick)
 {
-	double force = 0;
+	double force = 0, off = tick->rendered_N - stats->force_N;
 
 	for (int i = 0; i < 3; i++)
 		force += tick->command_N[i] * tick->command_N[i];
-	stats->force_max_N = fmax(stats->force_max_N, sqrt(force));
+	/* What a tick reads of the actuator answers to the command of the one before. */
+	if (stats->ticks)
+		stats->rendered_off2 += off * off;
+	stats->force_N = sqrt(force);
+	stats->force_max_N = fmax(stats->force_max_N, stats->force_N);
 	stats->ticks++;
 	stats->contact += !!(tick->flags & INCISE_TICK_CONTACT);
 	stats->extrapolated += !!(tick->flags & INCISE_TICK_EXTRAPOLATED);
@@ -58,11 +62,12 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		    struct incise_loop_stats *stats, struct incise_error *err)
 {
 	int64_t period_ns, due_ns, end_ns;
-	int rc;
+	int rc = 0;
 
 	memset(stats, 0, sizeof(*stats));
-	if (!(options->rate_hz >= 1 && options->rate_hz <= 20000) ||
-	    options->duration_ns < 0)
+	if (options->duration_ns < 0)
+		return incise_error_set(err, EINVAL, "the loop's duration is negative");
+	if (!(options->rate_hz >= 1 && options->rate_hz <= 20000))
 		return incise_error_set(err, EINVAL,
 					"the loop's rate is %g Hz: expected 1 to 20000",
 					options->rate_hz);
@@ -85,14 +90,16 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		}
 		rc = run_tick(plan, clock, options, stats, now_ns);
 		if (rc)
-			return incise_error_set(
-				err, -rc,
-				"a device failed at tick %llu: %s; the force is "
-				"zero",
-				(unsigned long long)stats->ticks, strerror(-rc));
+			break;
 		due_ns += period_ns;
 	}
-	return 0;
+	incise_plan_release(plan);
+	if (rc)
+		incise_error_set(
+			err, -rc,
+			"a device failed at tick %llu: %s; the force was taken away",
+			(unsigned long long)stats->ticks, strerror(-rc));
+	return rc;
 }
 
 double incise_loop_quantile(const uint64_t *histogram, double share)

@@ -508,8 +508,11 @@ static void write_model(const struct incise_model *model, FILE *out)
 	}
 	fputs("\n[Output1]\n", out);
 	write_name(out, "Name", model->output.name);
-	fprintf(out, "\nRange=[%.17g %.17g]\nNumMFs=%d\n", model->output.min,
-		model->output.max, model->n_rules);
+	/* A file need not name the range of its output. */
+	if (model->output.min < model->output.max)
+		fprintf(out, "\nRange=[%.17g %.17g]", model->output.min,
+			model->output.max);
+	fprintf(out, "\nNumMFs=%d\n", model->n_rules);
 	for (int r = 0; r < model->n_rules; r++) {
 		const struct incise_rule *rule = &model->rule[r];
 

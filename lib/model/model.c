@@ -196,6 +196,8 @@ int incise_model_set_consequent(struct incise_model *model, int rule, const doub
 		if (!isfinite(p[i]))
 			return -EINVAL;
 	memcpy(model->rule[rule].p, p, (model->n_inputs + 1) * sizeof(*p));
+	for (int i = 1; i <= model->n_inputs; i++)
+		model->rule[rule].constant &= p[i] == 0;
 	return 0;
 }
 

@@ -126,9 +126,10 @@ static int check_out(struct export *export)
 {
 	if (!ferror(export->out))
 		return 0;
-	return incise_error_set(export->err, errno ? errno : EIO,
-				"the dataset cannot be written: %s",
-				strerror(errno ? errno : EIO));
+	return incise_error_set(
+		export->err, errno ? errno : EIO,
+		"the dataset cannot be written: %s; make room, or give another -o",
+		strerror(errno ? errno : EIO));
 }
 
 /* Welford's way: one pass, no cancellation. */
@@ -282,6 +283,7 @@ static void visit_extent(struct export *export, const struct incise_cut_sample *
 	const struct incise_export_options *o = export->options;
 	struct incise_export_report *report = &export->report;
 
+	(void)t_s; /* visitors share one form */
 	if (sample->clipped)
 		return;
 	if (!(o->depth_max_mm > 0))
@@ -302,6 +304,7 @@ static void visit_raw(struct export *export, const struct incise_cut_sample *sam
 static void visit_binned(struct export *export, const struct incise_cut_sample *sample,
 			 double t_s)
 {
+	(void)t_s;
 	if (sample->clipped)
 		export->report.clipped++;
 	else

@@ -171,8 +171,11 @@ struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 	incise_tracker_info(plan->tracker, &tracker);
 	incise_predict_init(&plan->predict, &tracker);
 	plan->pose_age_ns = (int64_t)(scene->pose_age_ms * 1e6);
-	memcpy(plan->point_mm, scene->point_mm, sizeof(plan->point_mm));
-	memcpy(plan->normal, scene->normal, sizeof(plan->normal));
+	incise_rig_surface(rig, plan->point_mm, plan->normal);
+	if (scene->own_surface) {
+		memcpy(plan->point_mm, scene->point_mm, sizeof(plan->point_mm));
+		memcpy(plan->normal, scene->normal, sizeof(plan->normal));
+	}
 	plan->limit = (struct incise_limit){scene->force_N,
 					    scene->slew_N_s / scene->rate_hz, 0};
 	add_stage(plan, "pose", pose);
@@ -207,6 +210,13 @@ const char *incise_plan_stage(const struct incise_plan *plan, int index)
 	return index >= 0 && index < plan->n_stages ? plan->stage[index].name : NULL;
 }
 
+void incise_plan_release(struct incise_plan *plan)
+{
+	/* If this fails, the actuator's own deadman does it. */
+	if (plan->stepper)
+		incise_stepper_set(plan->stepper, 0);
+}
+
 /* Take the force away, and keep why. */
 static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 {
@@ -214,9 +224,7 @@ static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 	incise_limit_zero(&plan->limit);
 	memset(tick->command_N, 0, sizeof(tick->command_N));
 	tick->flags |= INCISE_TICK_FAULT;
-	/* If this fails too, the actuator's own deadman remains. */
-	if (plan->stepper)
-		incise_stepper_set(plan->stepper, 0);
+	incise_plan_release(plan);
 	return rc;
 }
 

@@ -77,6 +77,7 @@ static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 	if (!rc)
 		rc = incise_conf_surface(root, scene->path, scene->point_mm,
 					 scene->normal, err);
+	scene->own_surface = config_setting_lookup((config_setting_t *)root, "surface");
 	limits = config_setting_lookup((config_setting_t *)root, "limits");
 	if (!rc && limits) {
 		rc = incise_conf_known(limits, scene->path, limit_keys, err);

@@ -14,6 +14,7 @@ struct incise_scene {
 	double rate_hz;
 	bool fixed;
 	struct incise_model *model;
+	bool own_surface; /* else the rig's */
 	double point_mm[3], normal[3];
 	double force_N, slew_N_s, pose_age_ms;
 };

@@ -161,7 +161,7 @@ int incise_sim_config_set(struct incise_sim_config *config, const char *name,
 		return incise_error_set(err, ENOENT,
 					"sim.%.60s: unknown key; rig.conf(5) lists them",
 					name);
-	rc = key_check(key, value, ERANGE, err);
+	rc = key_check(key, value, EINVAL, err);
 	if (rc)
 		return rc;
 	key_put(config, key, index, value);

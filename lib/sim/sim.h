@@ -18,7 +18,7 @@ struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim);
 /*
  * Set a key of the configuration from a number; arrays (depth_mm, times) take an index:
  * "depth_mm[2]". Without one the protocol becomes that single depth.
- * Returns 0, -ENOENT (no such key), -ERANGE (err says which range).
+ * Returns 0, -ENOENT (no such key), -EINVAL (err says which range).
  */
 int incise_sim_config_set(struct incise_sim_config *config, const char *key, double value,
 			  struct incise_error *err);

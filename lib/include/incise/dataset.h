@@ -25,7 +25,8 @@ struct incise_dataset;
  * @return dataset with the n columns in the order asked for, to be freed with
  *         incise_dataset_free(); NULL with errno of fopen(3), EINVAL (a field that is no
  *         finite number, a row with too few fields: line and column are named; a column
- *         that does not exist: the ones that do are listed), ENODATA (no rows), ENOMEM.
+ *         that does not exist: the ones that do are listed), E2BIG (too many columns),
+ *         ENODATA (no rows), ENOMEM.
  */
 INCISE_API struct incise_dataset *incise_dataset_read(const char *path,
 						      const char *const *columns, int n,

@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
  * What every public header needs: C++ linkage, visibility, printf checking.
  *

@@ -42,13 +42,16 @@ struct incise_loop_stats {
 	int64_t lateness_max_ns;
 	int64_t tick_max_ns;		       /**< cost of the plan */
 	uint64_t tick_100ns[INCISE_LOOP_BINS]; /**< cost of the plan, bins of 100 ns */
-	double force_max_N;
+	double force_N;			       /**< commanded at the last tick */
+	double force_max_N;		       /**< largest commanded */
+	double rendered_off2; /**< Σ (rendered - commanded a tick before)², N² */
 };
 
 /**
- * Run a plan. Makes no allocation and no system call but the clock's.
+ * Run a plan, and let go of the actuator at the end, however it comes. Makes no
+ * allocation and no system call but the clock's.
  *
- * @param stats caller's memory, 320 KiB; zeroed here
+ * @param stats caller's memory, some 300 KiB; zeroed here
  * @return 0 at the end of the time or when stopped; -EINVAL (options), or the errno of
  *         the device that failed.
  */

@@ -18,7 +18,7 @@ struct incise_outfile;
 
 /**
  * Open a file for writing. "-" is standard output; a path that exists and is not a
- * regular file (a pipe, /dev/null) is written directly.
+ * regular file (a pipe, /dev/null) is written directly; a symbolic link is followed.
  *
  * @return file, to be ended with incise_outfile_commit() or incise_outfile_abort(); NULL
  *         with errno of open(2), ENOMEM, EISDIR.

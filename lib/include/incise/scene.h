@@ -11,7 +11,7 @@
  *     rate_hz = 1000.0;
  *     model = "liver.fis";          # path, relative to the scene's folder
  *     arithmetic = "fixed";         # or "double"
- *     surface = { point_mm = [0.0, 0.0, 0.0]; normal = [0.0, 0.0, 1.0]; };
+ *     surface = { point_mm = [0.0, 0.0, 0.0]; normal = [0.0, 0.0, 1.0]; };  # or the rig's
  *     limits = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };
  */
 #ifndef INCISE_SCENE_H
@@ -85,11 +85,18 @@ enum incise_tick_flag {
 };
 
 /**
+ * Let go: the actuator's nut is sent to 0, where nut and handle are at rest, as fast as
+ * it can go. To be called when no more ticks follow.
+ */
+INCISE_API void incise_plan_release(struct incise_plan *plan);
+
+/**
  * Run all stages once, in order. Real-time safe as far as the devices are.
  *
  * @param t_ns time of the tick, not before the last one's
  * @param tick result: finite, and within the scene's limits, whatever the devices say
- * @return 0, or a negative errno of a device; the force is then zero and stays so.
+ * @return 0, or a negative errno of a device: the force commanded is then zero and stays
+ *         so; the one on the hand follows as fast as the actuator can.
  */
 INCISE_API int incise_plan_tick(struct incise_plan *plan, int64_t t_ns,
 				struct incise_tick *tick);

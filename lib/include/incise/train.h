@@ -75,7 +75,7 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  * pairs take part only when @options->classic (as in MATLAB's anfis), where they choose
  * the epoch. So in the default mode the check error is one on unseen data.
  *
- * @param model   initial premises; its ranges should cover the data
+ * @param model   initial premises; its ranges should be those of the training pairs
  * @param check   or NULL
  * @param report  or NULL
  * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs), -ENODATA

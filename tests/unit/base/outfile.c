@@ -161,6 +161,25 @@ static void test_refusals(void **state)
 	}
 }
 
+/* A link goes on being one; the file it leads to is replaced. */
+static void test_link_is_written_through(void **state)
+{
+	struct incise_outfile *file = incise_outfile_open(path, NULL);
+	char link[80], to[80];
+	ssize_t n;
+
+	fputs("old", incise_outfile_stream(file));
+	assert_int_equal(incise_outfile_commit(file, NULL), 0);
+	snprintf(link, sizeof(link), "%s/link", folder);
+	assert_int_equal(symlink("file", link), 0);
+	file = incise_outfile_open(link, NULL);
+	fputs("new", incise_outfile_stream(file));
+	assert_int_equal(incise_outfile_commit(file, NULL), 0);
+	n = readlink(link, to, sizeof(to));
+	assert_int_equal(n, 4);
+	assert_string_equal(content(), "new");
+}
+
 /* Devices and pipes are written in place: there is nothing to rename. */
 static void test_special_files(void **state)
 {
@@ -186,6 +205,8 @@ int main(void)
 						tear_down),
 		cmocka_unit_test_setup_teardown(test_killed_writer, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(test_failed_write, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(test_link_is_written_through, set_up,
+						tear_down),
 		cmocka_unit_test(test_refusals),
 		cmocka_unit_test(test_special_files),
 	};

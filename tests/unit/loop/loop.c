@@ -132,6 +132,26 @@ static int failing_tracker(struct incise_tracker *tracker,
 	return ++calls == 5 ? -ENODEV : 0;
 }
 
+/* However a run ends, the actuator is let go. */
+static void test_end_lets_go(void **state)
+{
+	struct incise_loop_options options = {.rate_hz = 1000,
+					      .duration_ns = 5 * INCISE_NS_PER_S};
+	struct incise_stepper_status status;
+	struct incise_clock *clock;
+	struct felt f;
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER);
+	clock = incise_rig_clock(f.rig);
+	assert_int_equal(incise_loop_run(f.plan, clock, &options, &stats, NULL), 0);
+	assert_true(stats.force_N > 0.1);
+	/* Before the device's own deadman of 100 ms could do it. */
+	incise_clock_wait_until(clock, incise_clock_now(clock) + 90000000);
+	assert_int_equal(incise_stepper_status(incise_rig_stepper(f.rig), &status), 0);
+	assert_true(fabs(status.force_N) < 0.1 * stats.force_N);
+	felt_end(&f);
+}
+
 static void test_device_failure_ends_the_loop(void **state)
 {
 	struct incise_loop_options options = {.rate_hz = 1000, .duration_ns = 50000000};
@@ -210,6 +230,7 @@ int main(void)
 		cmocka_unit_test(test_log_and_times),
 		cmocka_unit_test(test_overrun_skips_and_counts),
 		cmocka_unit_test(test_stop_flag),
+		cmocka_unit_test(test_end_lets_go),
 		cmocka_unit_test(test_device_failure_ends_the_loop),
 		cmocka_unit_test(test_refused_options),
 		cmocka_unit_test(test_real_clock),

@@ -11,7 +11,9 @@
 #include <errno.h>
 #include <float.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include "paper_model.h"
 
 /* Eq. (1)–(3) as printed, with σ = √2 s. */
@@ -197,6 +199,33 @@ static void test_setters_refuse_what_is_no_number(void **state)
 	incise_model_free(copy);
 }
 
+/* A zero-order rule that is given slopes is one of first order, in the file too. */
+static void test_constant_rule_takes_slopes(void **state)
+{
+	char path[] = "/tmp/incise-model-XXXXXX";
+	static const char text[] =
+		"[System]\nName='c'\nType='sugeno'\nNumInputs=1\nNumOutputs=1\nNumRules=1\n"
+		"[Input1]\nName='x'\nRange=[0 10]\nNumMFs=1\nMF1='a':'gaussmf',[1 0]\n"
+		"[Output1]\nName='y'\nNumMFs=1\nMF1='c':'constant',[1]\n"
+		"[Rules]\n1, 1 (1) : 1\n";
+	struct incise_model *model;
+	int fd = mkstemp(path);
+
+	assert_int_equal(write(fd, text, sizeof(text) - 1), sizeof(text) - 1);
+	close(fd);
+	model = incise_model_load(path, NULL);
+	assert_non_null(model);
+	assert_int_equal(incise_model_set_consequent(model, 0, (double[]){1, 2}), 0);
+	assert_int_equal(incise_model_save(model, path, NULL), 0);
+	incise_model_free(model);
+	/* The output has no range: neither had it in the first file. */
+	model = incise_model_load(path, NULL);
+	assert_non_null(model);
+	assert_true(incise_model_eval(model, (double[]){5}, NULL) == 11);
+	incise_model_free(model);
+	unlink(path);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -206,6 +235,7 @@ int main(void)
 		cmocka_unit_test(test_no_input_yields_nan),
 		cmocka_unit_test(test_grid_shape),
 		cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_constant_rule_takes_slopes),
 		cmocka_unit_test(test_setters_refuse_what_is_no_number),
 	};
 
