@@ -68,6 +68,9 @@ static void log_gradient(const struct incise_mf *mf, double x, double *g)
 		g[1] = z > 0 ? -2 * log(z) * off : 0;
 		g[2] = d != 0 ? 2 * p[1] / d * off : 0;
 		break;
+	default: /* incise_train() has refused it */
+		memset(g, 0, PARAMS_MAX * sizeof(*g));
+		break;
 	}
 }
 

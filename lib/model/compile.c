@@ -36,6 +36,10 @@ static int check_shape(const struct incise_model *model, struct incise_error *er
 			err, E2BIG,
 			"fixed point: the model has %d inputs, at most %d fit",
 			model->n_inputs, INCISE_FIXED_INPUTS_MAX);
+	if (model->and_method != INCISE_AND_PROD)
+		return incise_error_set(err, ENOTSUP,
+					"fixed point: the model's AndMethod is min, only "
+					"prod has a fixed form; use double");
 	for (int i = 0; i < model->n_inputs; i++) {
 		if (model->n_mfs[i] > INCISE_FIXED_MFS_MAX)
 			return incise_error_set(

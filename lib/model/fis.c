@@ -140,7 +140,6 @@ static int system_key(struct reader *in, const char *key, const char *value)
 		const char *key, *value;
 	} must[] = {
 		{"Type", "sugeno"},
-		{"AndMethod", "prod"},
 		{"DefuzzMethod", "wtaver"},
 	};
 	struct incise_model *model = in->model;
@@ -156,6 +155,16 @@ static int system_key(struct reader *in, const char *key, const char *value)
 		return whole(in, key, value, 1, 1, &n);
 	if (!strcmp(key, "NumRules"))
 		return whole(in, key, value, 1, INCISE_MODEL_RULES_MAX, &in->n_rules);
+	if (!strcmp(key, "AndMethod")) {
+		rc = quoted(in, &value, word);
+		if (!rc && strcmp(word, "prod") && strcmp(word, "min"))
+			rc = fail(in, ENOTSUP,
+				  "AndMethod='%s': only 'prod' and 'min' are supported",
+				  word);
+		model->and_method =
+			!rc && !strcmp(word, "min") ? INCISE_AND_MIN : INCISE_AND_PROD;
+		return rc;
+	}
 	for (size_t i = 0; i < sizeof(must) / sizeof(*must); i++) {
 		if (strcmp(key, must[i].key))
 			continue;
@@ -163,7 +172,7 @@ static int system_key(struct reader *in, const char *key, const char *value)
 		if (!rc && strcmp(word, must[i].value))
 			rc = fail(in, ENOTSUP,
 				  "%s='%s': only '%s' is supported; convert the model to "
-				  "Sugeno with prod and wtaver",
+				  "Sugeno with wtaver",
 				  key, word, must[i].value);
 		return rc;
 	}
@@ -218,6 +227,7 @@ static int input_key(struct reader *in, int i, const char *key, const char *valu
 	struct incise_model *model = in->model;
 	char name[INCISE_MODEL_NAME_MAX], kind[INCISE_MODEL_NAME_MAX];
 	struct incise_mf *mf;
+	const char *fault;
 	int k, type, rc;
 
 	if (!strcmp(key, "Range"))
@@ -233,15 +243,16 @@ static int input_key(struct reader *in, int i, const char *key, const char *valu
 	if (type < 0)
 		return fail(
 			in, ENOTSUP,
-			"membership function '%s' is not supported; gaussmf and gbellmf are",
+			"membership function '%s' is not supported; gaussmf, gauss2mf, "
+			"gbellmf, trimf, trapmf and sigmf are",
 			kind);
 	mf = &model->mf[i][k];
 	mf->type = type;
 	strcpy(mf->name, name);
 	rc = numbers(in, value, mf->p, incise_mf_n_params(type));
-	if (!rc && !incise_mf_valid(type, mf->p))
-		rc = fail(in, EINVAL, "function %s: its width and slope must be positive",
-			  name);
+	fault = rc ? NULL : incise_mf_fault(type, mf->p);
+	if (fault)
+		rc = fail(in, EINVAL, "function %s, a %s: %s", name, kind, fault);
 	in->mfs_seen[i] |= 1ull << k;
 	return rc;
 }
@@ -284,6 +295,7 @@ static int rule_line(struct reader *in)
 	struct incise_model *model = in->model;
 	struct incise_rule *rule = &model->rule[model->n_rules];
 	const char *text = in->text;
+	int n_used = 0;
 	long v;
 	char *end;
 
@@ -299,6 +311,7 @@ static int rule_line(struct reader *in)
 			return fail(in, ENOTSUP, "rule %d: 'not' (%ld) is not supported",
 				    model->n_rules + 1, v);
 		rule->mf[i] = v - 1;
+		n_used += v > 0;
 		text = end;
 	}
 	text += strspn(text, " \t");
@@ -319,8 +332,8 @@ static int rule_line(struct reader *in)
 		return fail(in, EINVAL, "rule %d: expected a weight in parentheses",
 			    model->n_rules + 1);
 	rule->weight = strtod(text, &end);
-	if (end == text || *end != ')' || !(rule->weight > 0 && rule->weight <= 1))
-		return fail(in, EINVAL, "rule %d: expected a weight above 0, up to 1",
+	if (end == text || *end != ')' || !(rule->weight >= 0 && rule->weight <= 1))
+		return fail(in, EINVAL, "rule %d: expected a weight from 0 to 1",
 			    model->n_rules + 1);
 	text = end + 1 + strspn(end + 1, " \t");
 	if (*text++ != ':')
@@ -330,7 +343,8 @@ static int rule_line(struct reader *in)
 	if (end == text || *end || (v != 1 && v != 2))
 		return fail(in, EINVAL, "rule %d: expected ': 1' at the end",
 			    model->n_rules + 1);
-	if (v == 2 && model->n_inputs > 1)
+	/* Of one input, 'or' and 'and' are the same. */
+	if (v == 2 && n_used != 1)
 		return fail(in, ENOTSUP, "rule %d: 'or' (: 2) is not supported",
 			    model->n_rules + 1);
 	model->n_rules++;
@@ -428,7 +442,10 @@ static int read_file(struct reader *in)
 			in, EINVAL,
 			"the file ends after %d of %d rules: it is truncated; write it again",
 			in->model->n_rules, in->n_rules);
-	return 0;
+	for (int r = 0; r < in->n_rules; r++)
+		if (in->model->rule[r].weight > 0)
+			return 0;
+	return fail(in, EINVAL, "all rules have weight 0: none ever fires");
 }
 
 struct incise_model *incise_model_load(const char *path, struct incise_error *err)
@@ -463,6 +480,7 @@ out:
 		errno = -rc;
 		return NULL;
 	}
+	incise_model_classify(model);
 	return model;
 }
 
@@ -493,9 +511,10 @@ static void write_model(const struct incise_model *model, FILE *out)
 	write_name(out, "Name", model->name);
 	fprintf(out,
 		"\nType='sugeno'\nVersion=2.0\nNumInputs=%d\nNumOutputs=1\nNumRules=%d\n"
-		"AndMethod='prod'\nOrMethod='probor'\nImpMethod='prod'\nAggMethod='sum'\n"
+		"AndMethod='%s'\nOrMethod='probor'\nImpMethod='prod'\nAggMethod='sum'\n"
 		"DefuzzMethod='wtaver'\n",
-		model->n_inputs, model->n_rules);
+		model->n_inputs, model->n_rules,
+		model->and_method == INCISE_AND_MIN ? "min" : "prod");
 	for (int i = 0; i < model->n_inputs; i++) {
 		const struct incise_variable *v = &model->input[i];
 

@@ -11,13 +11,17 @@
 #include <string.h>
 #include "model.h"
 
-/* Evenly spaced functions over the range, neighbours crossing at 0.5 (MATLAB's genfis1). */
+/*
+ * Evenly spaced functions over the range, neighbours crossing at 0.5, shoulders where
+ * MATLAB's genfis1 has them: 0.3 of the spacing from the centre.
+ */
 static void grid_mf(struct incise_mf *mf, enum incise_mf_type type,
 		    const struct incise_variable *input, int index, int k, int n)
 {
 	double range = input->max - input->min;
 	double half = n > 1 ? range / (n - 1) / 2 : range / 2;
 	double centre = n > 1 ? input->min + range * k / (n - 1) : input->min + range / 2;
+	double shoulder = 0.6 * half;
 
 	mf->type = type;
 	snprintf(mf->name, sizeof(mf->name), "in%dmf%d", index + 1, k + 1);
@@ -30,6 +34,24 @@ static void grid_mf(struct incise_mf *mf, enum incise_mf_type type,
 		mf->p[0] = half;
 		mf->p[1] = 2;
 		mf->p[2] = centre;
+		break;
+	case INCISE_MF_GAUSS2:
+		mf->p[0] = mf->p[2] = (half - shoulder) / sqrt(2 * M_LN2);
+		mf->p[1] = centre - shoulder;
+		mf->p[3] = centre + shoulder;
+		break;
+	case INCISE_MF_TRI:
+		mf->p[0] = centre - 2 * half;
+		mf->p[1] = centre;
+		mf->p[2] = centre + 2 * half;
+		break;
+	case INCISE_MF_TRAP:
+		mf->p[0] = centre - (2 * half - shoulder);
+		mf->p[1] = centre - shoulder;
+		mf->p[2] = centre + shoulder;
+		mf->p[3] = centre + (2 * half - shoulder);
+		break;
+	case INCISE_MF_SIG:
 		break;
 	}
 }
@@ -59,6 +81,11 @@ struct incise_model *incise_model_new_grid(int n_inputs,
 	if (n_inputs < 1 || n_inputs > INCISE_MODEL_INPUTS_MAX) {
 		incise_error_set(err, EINVAL, "%d inputs: a model has 1 to %d", n_inputs,
 				 INCISE_MODEL_INPUTS_MAX);
+		return NULL;
+	}
+	if (!incise_mf_type_known(type) || type == INCISE_MF_SIG) {
+		incise_error_set(err, EINVAL, "%s does not make a grid: it has no centre",
+				 type == INCISE_MF_SIG ? "sigmf" : "an unknown function");
 		return NULL;
 	}
 	for (int i = 0; i < n_inputs; i++) {
@@ -102,11 +129,58 @@ struct incise_model *incise_model_new_grid(int n_inputs,
 	for (int i = 0; i < n_inputs; i++) {
 		model->input[i] = inputs[i];
 		model->n_mfs[i] = n_mfs[i];
-		for (int k = 0; k < n_mfs[i]; k++)
+		for (int k = 0; k < n_mfs[i]; k++) {
 			grid_mf(&model->mf[i][k], type, &inputs[i], i, k, n_mfs[i]);
+			if (!incise_mf_fault(type, model->mf[i][k].p))
+				continue;
+			incise_error_set(err, EINVAL,
+					 "input %s: functions over its range, %g to %g, "
+					 "cannot be held in a double",
+					 inputs[i].name, inputs[i].min, inputs[i].max);
+			free(model);
+			return NULL;
+		}
 	}
 	grid_rules(model);
+	incise_model_classify(model);
 	return model;
+}
+
+static bool is_grid(const struct incise_model *model)
+{
+	bool seen[INCISE_MODEL_RULES_MAX] = {0};
+	int n_rules = 1;
+
+	for (int i = 0; i < model->n_inputs && n_rules <= model->n_rules; i++)
+		n_rules *= model->n_mfs[i];
+	if (model->n_rules != n_rules || model->and_method != INCISE_AND_PROD)
+		return false;
+	for (int r = 0; r < n_rules; r++) {
+		const struct incise_rule *rule = &model->rule[r];
+		int place = 0;
+
+		for (int i = 0; i < model->n_inputs; i++) {
+			if (rule->mf[i] < 0)
+				return false;
+			place = place * model->n_mfs[i] + rule->mf[i];
+		}
+		if (seen[place] || rule->weight != 1)
+			return false;
+		seen[place] = true;
+	}
+	return true;
+}
+
+void incise_model_classify(struct incise_model *model)
+{
+	model->is_grid = is_grid(model);
+	for (int r = 0; r < model->n_rules; r++)
+		model->rule[r].log_weight = log(model->rule[r].weight);
+	for (int i = 0; i < model->n_inputs; i++) {
+		model->in_all[i] = model->and_method == INCISE_AND_PROD;
+		for (int r = 0; r < model->n_rules; r++)
+			model->in_all[i] &= model->rule[r].mf[i] >= 0;
+	}
 }
 
 struct incise_model *incise_model_copy(const struct incise_model *model)
@@ -174,15 +248,25 @@ int incise_model_set_mf(struct incise_model *model, int input, int mf, const dou
 {
 	struct incise_mf *f = &model->mf[input][mf];
 
-	if (!incise_mf_valid(f->type, p))
+	if (incise_mf_fault(f->type, p))
 		return -EINVAL;
 	memcpy(f->p, p, incise_mf_n_params(f->type) * sizeof(*p));
 	return 0;
 }
 
+enum incise_and_method incise_model_and_method(const struct incise_model *model)
+{
+	return model->and_method;
+}
+
 int incise_model_rule_mf(const struct incise_model *model, int rule, int input)
 {
 	return model->rule[rule].mf[input];
+}
+
+double incise_model_rule_weight(const struct incise_model *model, int rule)
+{
+	return model->rule[rule].weight;
 }
 
 const double *incise_model_consequent(const struct incise_model *model, int rule)
@@ -196,6 +280,7 @@ int incise_model_set_consequent(struct incise_model *model, int rule, const doub
 		if (!isfinite(p[i]))
 			return -EINVAL;
 	memcpy(model->rule[rule].p, p, (model->n_inputs + 1) * sizeof(*p));
+	/* With a slope it would lose it in the file, were it still called constant. */
 	for (int i = 1; i <= model->n_inputs; i++)
 		model->rule[rule].constant &= p[i] == 0;
 	return 0;
@@ -206,31 +291,149 @@ void incise_model_set_clamp(struct incise_model *model, bool clamp)
 	model->clamp = clamp;
 }
 
-void incise_model_firing(const struct incise_model *model, const double *x, double *w)
+/* Logs of the degrees of one input's functions, and gaps; see incise_mf_log(). */
+struct degrees {
+	double log[INCISE_MODEL_MFS_MAX], gap[INCISE_MODEL_MFS_MAX];
+	double log_max, gap_min; /* the log of those with the least gap */
+};
+
+static void degrees(const struct incise_model *model, int i, double x, struct degrees *d)
 {
-	double logs[INCISE_MODEL_INPUTS_MAX][INCISE_MODEL_MFS_MAX];
-	double largest = -INFINITY;
-	double sum = 0;
+	int n = model->n_mfs[i];
 
-	for (int i = 0; i < model->n_inputs; i++)
+	/* Comparisons, not fmax(): without NaN they agree, and they need no call. */
+	d->gap_min = INFINITY;
+	for (int k = 0; k < n; k++) {
+		d->log[k] = incise_mf_log(&model->mf[i][k], x, &d->gap[k]);
+		d->gap_min = d->gap[k] < d->gap_min ? d->gap[k] : d->gap_min;
+	}
+	d->log_max = -INFINITY;
+	for (int k = 0; k < n; k++)
+		if (d->gap[k] == d->gap_min && d->log[k] > d->log_max)
+			d->log_max = d->log[k];
+}
+
+/*
+ * Of a grid, Σ w = Π(i) Σ(k) A(i,k): normalising each input's degrees alone normalises
+ * all products of them, with an exp() per function rather than per rule.
+ */
+bool incise_model_firing_grid(const struct incise_model *model, const double *x,
+			      double *w)
+{
+	double share[INCISE_MODEL_INPUTS_MAX][INCISE_MODEL_MFS_MAX];
+	double log = 0, gap = 0;
+	int n_inputs = model->n_inputs;
+
+	for (int i = 0; i < n_inputs; i++) {
+		struct degrees d;
+		double sum = 0;
+
+		degrees(model, i, x[i], &d);
+		log += d.log_max;
+		gap += d.gap_min;
+		for (int k = 0; k < model->n_mfs[i]; k++) {
+			share[i][k] =
+				d.gap[k] > d.gap_min ? 0 : exp(d.log[k] - d.log_max);
+			sum += share[i][k];
+		}
+		/* The largest is exp(0): sum ≥ 1. One division, for it takes as long as exp(). */
+		sum = 1 / sum;
 		for (int k = 0; k < model->n_mfs[i]; k++)
-			logs[i][k] = incise_mf_log(&model->mf[i][k], x[i]);
-	for (int r = 0; r < model->n_rules; r++) {
-		const struct incise_rule *rule = &model->rule[r];
-
-		w[r] = log(rule->weight);
-		for (int i = 0; i < model->n_inputs; i++)
-			if (rule->mf[i] >= 0)
-				w[r] += logs[i][rule->mf[i]];
-		largest = fmax(largest, w[r]);
+			share[i][k] *= sum;
 	}
 	for (int r = 0; r < model->n_rules; r++) {
-		w[r] = exp(w[r] - largest);
+		const int8_t *mf = model->rule[r].mf;
+		double product = share[0][mf[0]];
+
+		for (int i = 1; i < n_inputs; i++)
+			product *= share[i][mf[i]];
+		w[r] = product;
+	}
+	return gap == 0 && log >= MODEL_LOG_FIRES;
+}
+
+/* A rule's log strength and gap, by its AND method and weight. */
+static double rule_log(const struct incise_model *model, const struct incise_rule *rule,
+		       const struct degrees *d, double *gap)
+{
+	double sum = 0;
+
+	*gap = 0;
+	for (int i = 0; i < model->n_inputs; i++) {
+		int k = rule->mf[i];
+
+		if (k < 0)
+			continue;
+		if (model->and_method == INCISE_AND_MIN) {
+			sum = fmin(sum, d[i].log[k]);
+			*gap = fmax(*gap, d[i].gap[k]);
+		} else {
+			sum += d[i].log[k];
+			*gap += d[i].gap[k];
+		}
+	}
+	return sum + rule->log_weight;
+}
+
+bool incise_model_firing_rules(const struct incise_model *model, const double *x,
+			       double *w)
+{
+	struct degrees d[INCISE_MODEL_INPUTS_MAX];
+	double gap[INCISE_MODEL_RULES_MAX];
+	double largest = -INFINITY, nearest = INFINITY, log = 0, gaps = 0, sum = 0;
+
+	for (int i = 0; i < model->n_inputs; i++) {
+		degrees(model, i, x[i], &d[i]);
+		if (!model->in_all[i])
+			continue;
+		/*
+		 * What all rules have in common cancels; left in, a far input's large
+		 * number would swallow what the others say.
+		 */
+		log += d[i].log_max;
+		gaps += d[i].gap_min;
+		for (int k = 0; k < model->n_mfs[i]; k++) {
+			d[i].log[k] -= d[i].log_max;
+			d[i].gap[k] -= d[i].gap_min;
+		}
+	}
+	for (int r = 0; r < model->n_rules; r++) {
+		w[r] = rule_log(model, &model->rule[r], d, &gap[r]);
+		/* Of weight 0, it does not even stand in. */
+		if (model->rule[r].weight > 0)
+			nearest = fmin(nearest, gap[r]);
+	}
+	for (int r = 0; r < model->n_rules; r++)
+		if (gap[r] == nearest)
+			largest = fmax(largest, w[r]);
+	for (int r = 0; r < model->n_rules; r++) {
+		w[r] = gap[r] > nearest ? 0 : exp(w[r] - largest);
 		sum += w[r];
 	}
 	/* The largest is exp(0): sum ≥ 1. */
 	for (int r = 0; r < model->n_rules; r++)
 		w[r] /= sum;
+	return gaps + nearest == 0 && log + largest >= MODEL_LOG_FIRES;
+}
+
+static bool firing(const struct incise_model *model, const double *x, double *w)
+{
+	return model->is_grid ? incise_model_firing_grid(model, x, w)
+			      : incise_model_firing_rules(model, x, w);
+}
+
+static double middle(const struct incise_variable *v)
+{
+	return v->min + (v->max - v->min) / 2;
+}
+
+void incise_model_firing(const struct incise_model *model, const double *x, double *w)
+{
+	double in[INCISE_MODEL_INPUTS_MAX];
+
+	for (int i = 0; i < model->n_inputs; i++)
+		in[i] = isnan(x[i]) ? middle(&model->input[i]) : x[i];
+	firing(model, in, w);
 }
 
 double incise_model_eval(const struct incise_model *model, const double *x,
@@ -249,13 +452,14 @@ double incise_model_eval(const struct incise_model *model, const double *x,
 			continue;
 		seen |= INCISE_MODEL_EXTRAPOLATED;
 		if (isnan(x[i]))
-			in[i] = v->min + (v->max - v->min) / 2;
+			in[i] = middle(v);
 		else if (model->clamp)
 			in[i] = x[i] < v->min ? v->min : v->max;
 		else
 			in[i] = fmax(-DBL_MAX, fmin(DBL_MAX, x[i]));
 	}
-	incise_model_firing(model, in, w);
+	if (!firing(model, in, w))
+		seen |= INCISE_MODEL_EXTRAPOLATED;
 	for (int r = 0; r < model->n_rules; r++) {
 		const double *p = model->rule[r].p;
 		double yr = p[0];

@@ -8,33 +8,63 @@
 #include <stdint.h>
 #include <incise/model.h>
 
-/* Log of a membership degree below which it is held: exp() of it is 0, sums stay finite. */
-#define MODEL_LOG_MIN (-1e300)
+/* No log of a degree is below this: the sum over all inputs stays finite. */
+#define MODEL_LOG_MIN (-2e306)
+
+/* exp() of less than this is 0: a rule whose strength has this log does not fire. */
+#define MODEL_LOG_FIRES (-745.0)
 
 struct incise_rule {
 	int8_t mf[INCISE_MODEL_INPUTS_MAX];    /* -1: this input does not matter */
 	bool constant;			       /* zero order, as the file had it */
-	double weight;			       /* 0 < weight ≤ 1 */
+	double weight;			       /* 0 … 1; not 0 in all rules */
+	double log_weight;		       /* by incise_model_classify() */
 	double p[INCISE_MODEL_INPUTS_MAX + 1]; /* the constant first */
 };
 
 struct incise_model {
 	char name[INCISE_MODEL_NAME_MAX];
 	int n_inputs, n_rules;
+	enum incise_and_method and_method;
 	bool clamp;
+	/*
+	 * What the rules look like, which decides how they are evaluated; see
+	 * incise_model_classify(). Rules, weights and kinds never change afterwards.
+	 */
+	bool is_grid; /* each combination once, prod, weights 1 */
+	bool in_all
+		[INCISE_MODEL_INPUTS_MAX]; /* prod, and no rule leaves this input out */
 	struct incise_variable input[INCISE_MODEL_INPUTS_MAX], output;
 	int n_mfs[INCISE_MODEL_INPUTS_MAX];
 	struct incise_mf mf[INCISE_MODEL_INPUTS_MAX][INCISE_MODEL_MFS_MAX];
 	struct incise_rule rule[INCISE_MODEL_RULES_MAX];
 };
 
-/* Whether parameters make a function of this kind. */
-bool incise_mf_valid(enum incise_mf_type type, const double *p);
+/* What keeps parameters from making a function of this kind, for a person, or NULL. */
+const char *incise_mf_fault(enum incise_mf_type type, const double *p);
 
-/* The natural log of the degree of membership: finite, ≤ 0. */
-double incise_mf_log(const struct incise_mf *mf, double x);
+/*
+ * The natural log of the degree of membership: MODEL_LOG_MIN … 0. Where a triangle or
+ * trapezoid is zero, its log is given as 0 and *gap is the distance to its nearer foot in
+ * widths (foot to foot), above 0; everywhere else *gap is 0. x is not NaN.
+ */
+double incise_mf_log(const struct incise_mf *mf, double x, double *gap);
+
+bool incise_mf_type_known(enum incise_mf_type type);
 
 /* The kind a .fis file's word stands for, or -1. */
 int incise_mf_type_find(const char *word);
+
+/* Find what is kept about the rules; call it once they are all there. */
+void incise_model_classify(struct incise_model *model);
+
+/*
+ * Firing strengths in two ways, the second for is_grid only; x without NaN. Both return
+ * whether a rule fires at all, rather than the nearest one standing in.
+ */
+bool incise_model_firing_rules(const struct incise_model *model, const double *x,
+			       double *w);
+bool incise_model_firing_grid(const struct incise_model *model, const double *x,
+			      double *w);
 
 #endif

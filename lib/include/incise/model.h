@@ -4,7 +4,10 @@
  * file, MATLAB's .fis.
  *
  *   rule r:  if x1 is A(1,r) and x2 is A(2,r) then  y = p(r,0) + p(r,1) x1 + p(r,2) x2
- *   output:  Σ w(r) y(r) / Σ w(r),  w(r) = Π A(i,r)(x(i))
+ *   output:  Σ w(r) y(r) / Σ w(r),  w(r) = weight(r) · Π A(i,r)(x(i))
+ *
+ * With the AND method min the least degree takes the place of their product. A rule may
+ * leave inputs out, and rules may be any list, not only the full grid.
  *
  * A cutting model has the inputs depth_mm and velocity_mm_s and the output force_N, but
  * nothing here depends on that: units are those of the data it was trained on.
@@ -27,10 +30,32 @@ INCISE_BEGIN_DECLS
 #define INCISE_MODEL_RULES_MAX 256
 #define INCISE_MODEL_NAME_MAX 64 /**< bytes, the final NUL included */
 
-/** Kinds of membership functions; the name in a .fis file stands behind each. */
+/**
+ * Kinds of membership functions; the name in a .fis file stands behind each. All
+ * parameters are finite. Edges may be upright (trimf with a = b or b = c, trapmf with
+ * a = b or c = d): the degree is 1 on such an edge.
+ */
 enum incise_mf_type {
 	INCISE_MF_GAUSS, /**< gaussmf [s c]: exp(-(x-c)²/(2 s²)), s > 0 */
-	INCISE_MF_GBELL, /**< gbellmf [a b c]: 1/(1 + |(x-c)/a|^(2b)), a > 0 */
+	INCISE_MF_GBELL, /**< gbellmf [a b c]: 1/(1 + |(x-c)/a|^(2b)), a > 0, b > 0 */
+	/**
+	 * gauss2mf [s1 c1 s2 c2]: gaussmf [s1 c1] left of c1 times gaussmf [s2 c2] right of
+	 * c2, each 1 on its other side; s1 > 0, s2 > 0. With c1 > c2 the peak is below 1.
+	 */
+	INCISE_MF_GAUSS2,
+	INCISE_MF_TRI, /**< trimf [a b c]: feet a and c, peak b; a ≤ b ≤ c */
+	/**
+	 * trapmf [a b c d]: the lesser of a rise from a to b and a fall from c to d; a ≤ b,
+	 * c ≤ d, a ≤ d. With b > c the slopes cross below 1; then a < d.
+	 */
+	INCISE_MF_TRAP,
+	INCISE_MF_SIG, /**< sigmf [a c]: 1/(1 + exp(-a(x-c))); a may be negative or 0 */
+};
+
+/** How the degrees of a rule's inputs make its firing strength. */
+enum incise_and_method {
+	INCISE_AND_PROD, /**< their product */
+	INCISE_AND_MIN,	 /**< the least of them */
 };
 
 /** One membership function. Parameters in the order of MATLAB's file. */
@@ -48,7 +73,11 @@ struct incise_variable {
 
 /** What an evaluation says beside its value. */
 enum incise_model_flag {
-	INCISE_MODEL_EXTRAPOLATED = 1, /**< an input lay outside its range, or was NaN */
+	/**
+	 * An input lay outside its range, or was NaN; or no rule fires there (all firing
+	 * strengths are 0, or too small for a double) and the nearest ones answered.
+	 */
+	INCISE_MODEL_EXTRAPOLATED = 1,
 };
 
 struct incise_model;
@@ -61,10 +90,10 @@ struct incise_model;
  * @param n_inputs  1 … INCISE_MODEL_INPUTS_MAX
  * @param inputs    n_inputs names and ranges
  * @param n_mfs     n_inputs counts, each 1 … INCISE_MODEL_MFS_MAX
- * @param type      kind of all functions
+ * @param type      kind of all functions; not INCISE_MF_SIG, which has two sides only
  * @param output    name and range of the output
- * @return model, to be freed with incise_model_free(); NULL with errno EINVAL (a range or
- *         count), E2BIG (more than INCISE_MODEL_RULES_MAX rules), ENOMEM.
+ * @return model, to be freed with incise_model_free(); NULL with errno EINVAL (a range,
+ *         a count, the kind), E2BIG (more than INCISE_MODEL_RULES_MAX rules), ENOMEM.
  */
 INCISE_API struct incise_model *incise_model_new_grid(
 	int n_inputs, const struct incise_variable *inputs, const int *n_mfs,
@@ -72,13 +101,14 @@ INCISE_API struct incise_model *incise_model_new_grid(
 	struct incise_error *err);
 
 /**
- * Read a .fis file: Sugeno, first or zero order, prod, wtaver.
+ * Read a .fis file: Sugeno, first or zero order, all kinds of incise_mf_type, prod or min,
+ * wtaver, rule weights.
  *
  * The content is not trusted: every number is checked, and an error names file and line.
  *
  * @param path file, or "-" for standard input
  * @return model; NULL with errno of fopen(3), EINVAL (malformed), ENOTSUP (Mamdani, an
- *         unknown membership function or method), E2BIG, ENOMEM.
+ *         unknown membership function or method, 'or' and 'not' in a rule), E2BIG, ENOMEM.
  */
 INCISE_API struct incise_model *incise_model_load(const char *path,
 						  struct incise_error *err);
@@ -118,14 +148,21 @@ INCISE_API const struct incise_mf *incise_model_mf(const struct incise_model *mo
 /**
  * Replace the parameters of a membership function; kind and name stay.
  *
- * @return 0, or -EINVAL when a parameter is not finite or a width is not positive.
+ * @param p as many as incise_mf_n_params() says
+ * @return 0, or -EINVAL when they do not make such a function; see incise_mf_type.
  */
 INCISE_API int incise_model_set_mf(struct incise_model *model, int input, int mf,
 				   const double p[4]);
 
+INCISE_API enum incise_and_method incise_model_and_method(
+	const struct incise_model *model);
+
 /** The membership function of @input that rule @rule uses, or -1 for none. */
 INCISE_API int incise_model_rule_mf(const struct incise_model *model, int rule,
 				    int input);
+
+/** Weight of rule @rule, 0 … 1; one of weight 0 never fires. At least one is not 0. */
+INCISE_API double incise_model_rule_weight(const struct incise_model *model, int rule);
 
 /** Consequent of rule @rule: n_inputs+1 coefficients, the constant first. */
 INCISE_API const double *incise_model_consequent(const struct incise_model *model,
@@ -146,10 +183,10 @@ INCISE_API int incise_model_set_consequent(struct incise_model *model, int rule,
  */
 INCISE_API void incise_model_set_clamp(struct incise_model *model, bool clamp);
 
-/** Degree of membership in [0, 1]. Real-time safe. */
+/** Degree of membership in [0, 1]; of NaN it is 0. Real-time safe. */
 INCISE_API double incise_mf_eval(const struct incise_mf *mf, double x);
 
-/** How many of incise_mf.p a kind uses: 2 or 3. */
+/** How many of incise_mf.p a kind uses: 2 to 4. */
 INCISE_API int incise_mf_n_params(enum incise_mf_type type);
 
 /** Name of a kind as .fis files spell it, e.g. "gaussmf". */
@@ -157,7 +194,15 @@ INCISE_API const char *incise_mf_type_name(enum incise_mf_type type);
 
 /**
  * Evaluate eq. (3). Firing strengths are normalised in the log domain: where all of them
- * underflow, the nearest rule takes over. A NaN input counts as the middle of its range.
+ * underflow, the rule with the largest one takes over as if it did not.
+ *
+ * A strength can also be exactly 0, outside a triangle or trapezoid. Any rule that is not
+ * goes before all that are. Where all are, the nearest answers: the one with the least
+ * distance to the feet, in widths (foot to foot), added over the inputs (with min: the
+ * largest over the inputs). Rules that are equally near share the answer by the degrees
+ * of their other inputs.
+ *
+ * A NaN input counts as the middle of its range.
  *
  * @param x     n_inputs values
  * @param flags where to leave incise_model_flag bits, or NULL
@@ -167,9 +212,10 @@ INCISE_API double incise_model_eval(const struct incise_model *model, const doub
 				    unsigned int *flags);
 
 /**
- * Normalised firing strengths w(r)/Σw of all rules; they add up to 1.
+ * Normalised firing strengths w(r)/Σw of all rules, as incise_model_eval() weighs them;
+ * they add up to 1. Inputs are not clamped to their ranges.
  *
- * @param x n_inputs values
+ * @param x n_inputs values; NaN counts as the middle of the range
  * @param w n_rules results
  */
 INCISE_API void incise_model_firing(const struct incise_model *model, const double *x,

@@ -11,6 +11,7 @@
 #include <math.h>
 #include <string.h>
 #include <incise/fixed.h>
+#include "../../../lib/model/model.h"
 #include "paper_model.h"
 
 /*
@@ -75,6 +76,19 @@ static void test_refusals(void **state)
 
 	assert_int_equal(incise_fixed_compile(model, &fixed, &err), -ENOTSUP);
 	assert_non_null(strstr(err.text, "in1mf1 is a gbellmf"));
+	incise_model_free(model);
+
+	/* Each other kind by its name, and min. */
+	for (int type = INCISE_MF_GAUSS2; type < INCISE_MF_SIG; type++) {
+		model = paper_model(type, 1, 1);
+		assert_int_equal(incise_fixed_compile(model, &fixed, &err), -ENOTSUP);
+		assert_non_null(strstr(err.text, incise_mf_type_name(type)));
+		incise_model_free(model);
+	}
+	model = paper_model(INCISE_MF_GAUSS, 1, 1);
+	model->and_method = INCISE_AND_MIN;
+	assert_int_equal(incise_fixed_compile(model, &fixed, &err), -ENOTSUP);
+	assert_non_null(strstr(err.text, "AndMethod is min"));
 	incise_model_free(model);
 
 	model = paper_model(INCISE_MF_GAUSS, 1, 1e9);
