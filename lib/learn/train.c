@@ -67,6 +67,29 @@ static int check_pairs(const struct incise_model *model, const struct incise_pai
 	return 0;
 }
 
+/* The gradients and scalings here are those of two kinds, and of a product of degrees. */
+static int check_trainable(const struct incise_model *model, struct incise_error *err)
+{
+	if (incise_model_and_method(model) != INCISE_AND_PROD)
+		return incise_error_set(
+			err, ENOTSUP,
+			"the model joins degrees by min: only models with "
+			"the AND method prod can be trained");
+	for (int i = 0; i < incise_model_n_inputs(model); i++)
+		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+			const struct incise_mf *mf = incise_model_mf(model, i, k);
+
+			if (mf->type != INCISE_MF_GAUSS && mf->type != INCISE_MF_GBELL)
+				return incise_error_set(
+					err, ENOTSUP,
+					"input %s, function %s is a %s: only gaussmf and "
+					"gbellmf can be trained",
+					incise_model_input(model, i)->name, mf->name,
+					incise_mf_type_name(mf->type));
+		}
+	return 0;
+}
+
 static void find_scaling(struct scaling *s, const struct incise_model *model,
 			 const struct incise_pairs *pairs)
 {
@@ -429,8 +452,10 @@ int incise_train(struct incise_model *model, const struct incise_pairs *train,
 	struct incise_model *work;
 	struct scaling scaling;
 	size_t n_linear;
-	int rc = check_pairs(model, train, "training", err);
+	int rc = check_trainable(model, err);
 
+	if (!rc)
+		rc = check_pairs(model, train, "training", err);
 	if (!rc && check)
 		rc = check_pairs(model, check, "check", err);
 	if (rc)

@@ -78,8 +78,9 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  * @param model   initial premises; its ranges should be those of the training pairs
  * @param check   or NULL
  * @param report  or NULL
- * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs), -ENODATA
- *         (fewer pairs than consequent parameters), -EDOM (LAPACK failed),
+ * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs), -ENOTSUP (a
+ *         membership function other than gaussmf and gbellmf, or the AND method min),
+ *         -ENODATA (fewer pairs than consequent parameters), -EDOM (LAPACK failed),
  *         -ENOMEM. On error the model is unchanged.
  */
 INCISE_API int incise_train(struct incise_model *model, const struct incise_pairs *train,

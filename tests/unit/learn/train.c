@@ -12,6 +12,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/train.h>
 
 static struct incise_model *grid(int n_inputs, const double *min, const double *max,
@@ -348,6 +349,70 @@ static void test_refusals(void **state)
 	incise_model_free(before);
 }
 
+/* Kinds without a gradient here, and min, are refused by name before anything moves. */
+static void test_kinds_that_cannot_be_trained(void **state)
+{
+	static const struct {
+		enum incise_mf_type type;
+		const char *word;
+	} cases[] = {
+		{INCISE_MF_GAUSS2, "gauss2mf"},
+		{INCISE_MF_TRI, "trimf"},
+		{INCISE_MF_TRAP, "trapmf"},
+	};
+	double rows[40 * 2];
+	struct incise_pairs pairs = {rows, 40, 1};
+	struct incise_train_options options;
+
+	for (int i = 0; i < 40; i++)
+		rows[2 * i] = rows[2 * i + 1] = i;
+	incise_train_options_init(&options);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
+		for (int classic = 0; classic < 2; classic++) {
+			struct incise_model *model =
+				grid(1, (double[]){0}, (double[]){39}, (int[]){2},
+				     cases[i].type);
+			struct incise_error err = {0};
+
+			options.classic = classic;
+			assert_int_equal(incise_train(model, &pairs, NULL, &options, NULL,
+						      &err),
+					 -ENOTSUP);
+			assert_non_null(strstr(err.text, cases[i].word));
+			assert_non_null(strstr(err.text, "in1mf1"));
+			assert_true(incise_model_consequent(model, 0)[0] == 0);
+			incise_model_free(model);
+		}
+}
+
+/* A model that joins by min comes from a file only. */
+static void test_min_cannot_be_trained(void **state)
+{
+	static const char text[] =
+		"[System]\nType='sugeno'\nNumInputs=1\nNumOutputs=1\nNumRules=1\n"
+		"AndMethod='min'\n[Input1]\nRange=[0 1]\nNumMFs=1\n"
+		"MF1='a':'gaussmf',[1 0]\n[Output1]\nNumMFs=1\nMF1='c':'constant',[0]\n"
+		"[Rules]\n1, 1 (1) : 1\n";
+	static const double rows[] = {0, 0, 0.5, 1, 1, 2};
+	struct incise_pairs pairs = {rows, 3, 1};
+	char path[] = "/tmp/incise-train-XXXXXX";
+	struct incise_train_options options;
+	struct incise_error err = {0};
+	struct incise_model *model;
+	int fd = mkstemp(path);
+
+	assert_int_equal(write(fd, text, sizeof(text) - 1), sizeof(text) - 1);
+	close(fd);
+	model = incise_model_load(path, NULL);
+	unlink(path);
+	assert_non_null(model);
+	incise_train_options_init(&options);
+	assert_int_equal(incise_train(model, &pairs, NULL, &options, NULL, &err),
+			 -ENOTSUP);
+	assert_non_null(strstr(err.text, "min"));
+	incise_model_free(model);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -358,6 +423,8 @@ int main(void)
 		cmocka_unit_test(test_default_holds_on_unseen_cut),
 		cmocka_unit_test(test_deterministic_and_scale_free),
 		cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_kinds_that_cannot_be_trained),
+		cmocka_unit_test(test_min_cannot_be_trained),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
