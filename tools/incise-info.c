@@ -48,6 +48,12 @@ static json_t *input_json(const struct incise_model *model, int i)
 			 "mfs", mfs);
 }
 
+/* As .fis files spell it. */
+static const char *and_method(const struct incise_model *model)
+{
+	return incise_model_and_method(model) == INCISE_AND_MIN ? "min" : "prod";
+}
+
 static void model_json(const struct incise_model *model, const char *refused)
 {
 	const struct incise_variable *out = incise_model_output(model);
@@ -64,12 +70,14 @@ static void model_json(const struct incise_model *model, const char *refused)
 		for (int i = 0; i <= incise_model_n_inputs(model); i++)
 			json_array_append_new(
 				p, json_real(incise_model_consequent(model, r)[i]));
-		json_array_append_new(rules,
-				      json_pack("{so so}", "mfs", mfs, "consequent", p));
+		json_array_append_new(
+			rules, json_pack("{so so sf}", "mfs", mfs, "consequent", p,
+					 "weight", incise_model_rule_weight(model, r)));
 	}
-	json_print(json_pack("{ss ss so s{ss sf sf} so sb so}", "kind", "model", "name",
-			     incise_model_name(model), "inputs", inputs, "output", "name",
-			     out->name, "min", out->min, "max", out->max, "rules", rules,
+	json_print(json_pack("{ss ss so s{ss sf sf} ss so sb so}", "kind", "model",
+			     "name", incise_model_name(model), "inputs", inputs, "output",
+			     "name", out->name, "min", out->min, "max", out->max,
+			     "and_method", and_method(model), "rules", rules,
 			     "fixed_point", !refused, "fixed_point_refused",
 			     refused ? json_string(refused) : json_null()));
 }
@@ -94,7 +102,8 @@ static void model_text(const struct incise_model *model, const char *refused)
 			putchar('\n');
 		}
 	}
-	printf("rules (functions: constant, then a coefficient per input)\n");
+	printf("rules by %s (functions: constant, then a coefficient per input)\n",
+	       and_method(model));
 	for (int r = 0; r < incise_model_n_rules(model); r++) {
 		const double *p = incise_model_consequent(model, r);
 
@@ -104,6 +113,8 @@ static void model_text(const struct incise_model *model, const char *refused)
 		printf(":");
 		for (int i = 0; i <= n; i++)
 			printf(" %12.6g", p[i]);
+		if (incise_model_rule_weight(model, r) != 1)
+			printf("  weight %.6g", incise_model_rule_weight(model, r));
 		putchar('\n');
 	}
 	printf("fixed point: %s\n", refused ? refused : "fits");

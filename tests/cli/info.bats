@@ -25,6 +25,22 @@ setup() {
 	[[ "$output" == *"input velocity_mm_s, support 0 to 50"* ]]
 	[[ "${lines[-1]}" == "fixed point: fits" ]]
 	[ "$(grep -c gaussmf <<<"$output")" -eq 9 ]
+	[[ "$output" == *"rules by prod "* ]]
+	[[ "$output" != *weight* ]] # all are 1
+}
+
+@test "info of a model with min and weights" {
+	sed "s/^AndMethod='prod'/AndMethod='min'/; s/^5 4, 20 (1)/5 0, 20 (0.25)/" m.fis >min.fis
+	run -0 --separate-stderr incise info min.fis
+	[[ "$output" == *"rules by min "* ]]
+	[ "$(grep -c weight <<<"$output")" -eq 1 ]
+	[[ "${lines[-2]}" == "   5  0:"*"  weight 0.25" ]]
+	incise info min.fis --json >r.json
+	[ "$(key r.json and_method)" = min ]
+	[ "$(key r.json 'rules[19].weight')" = 0.25 ]
+	[ "$(key r.json 'rules[18].weight')" = 1.0 ]
+	[ "$(key r.json 'rules[19].mfs')" = "[5,0]" ]
+	[[ "$(key r.json fixed_point_refused)" == *min* ]]
 }
 
 @test "info of a model as JSON" {
@@ -34,6 +50,7 @@ setup() {
 	[ "$(key r.json 'inputs[1].max')" = 50.0 ]
 	[ "$(key r.json 'inputs[1].mfs[3].type')" = gaussmf ]
 	[ "$(key r.json output.name)" = force_N ]
+	[ "$(key r.json and_method)" = prod ]
 	[ "$(key r.json fixed_point)" = 1 ] # true
 	[ -z "$(key r.json fixed_point_refused)" ]
 	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '\$.rules')")" = 20 ]
