@@ -40,8 +40,9 @@ static const struct cli_verb verb = {
 struct evaluator {
 	struct incise_model *model;
 	struct incise_fixed *fixed; /* NULL: double */
-	unsigned long outside;
-	json_t *rows; /* NULL: text */
+	unsigned long outside;	    /* of the support */
+	unsigned long unfired;	    /* inside, where no rule fires */
+	json_t *rows;		    /* NULL: text */
 };
 
 static void add_row(struct evaluator *e, const double *x, double y, bool outside)
@@ -56,6 +57,17 @@ static void add_row(struct evaluator *e, const double *x, double y, bool outside
 	json_array_append_new(e->rows, row);
 }
 
+static bool in_support(const struct evaluator *e, const double *x)
+{
+	for (int i = 0; i < incise_model_n_inputs(e->model); i++) {
+		const struct incise_variable *v = incise_model_input(e->model, i);
+
+		if (!(x[i] >= v->min && x[i] <= v->max))
+			return false;
+	}
+	return true;
+}
+
 /* Evaluate and print; a grid's text has its inputs in front. */
 static void evaluate(struct evaluator *e, const double *x, bool inputs)
 {
@@ -64,7 +76,8 @@ static void evaluate(struct evaluator *e, const double *x, bool inputs)
 
 	if (e->fixed)
 		y = incise_fixed_eval_double(e->fixed, x);
-	e->outside += flags & INCISE_MODEL_EXTRAPOLATED;
+	if (flags & INCISE_MODEL_EXTRAPOLATED)
+		*(in_support(e, x) ? &e->unfired : &e->outside) += 1;
 	if (e->rows) {
 		add_row(e, x, y, flags & INCISE_MODEL_EXTRAPOLATED);
 		return;
@@ -214,6 +227,11 @@ int main(int argc, char **argv)
 	if (e.outside)
 		cli_warn("%lu inputs lay outside the model's support and were %s",
 			 e.outside, clamp ? "taken as its nearest end" : "extrapolated");
+	if (e.unfired)
+		cli_warn(
+			"%lu inputs lay where no rule of the model fires; the nearest rule "
+			"answered",
+			e.unfired);
 	incise_model_free(e.model);
 	return 0;
 }

@@ -61,6 +61,86 @@ refuses() {
 	paste got want | awk '($1 - $2)^2 > 1e-16 { bad = 1; print } END { exit bad || NR != 11 }'
 }
 
+# A model of one input over 0-10 with one function, of which the degree is seen: the rule
+# without it says 0 at the same weight, so the output is degree/(1 + degree).
+degree_model() {
+	cat <<-EOF
+		[System]
+		Type='sugeno'
+		NumInputs=1
+		NumRules=2
+		[Input1]
+		Name='depth_mm'
+		Range=[0 10]
+		NumMFs=1
+		MF1='a':'$1',[$2]
+		[Output1]
+		NumMFs=2
+		MF1='one':'constant',[1]
+		MF2='zero':'constant',[0]
+		[Rules]
+		1, 1 (1) : 1
+		0, 2 (1) : 1
+	EOF
+}
+
+@test "eval takes every kind of membership function" {
+	seq 0 0.5 10 >points
+	while read -r kind params degree; do
+		degree_model "$kind" "${params//,/ }" >one.fis
+		run -0 --separate-stderr incise eval one.fis points
+		[ -z "$stderr" ] || complain "$kind: $stderr"
+		echo "$output" >got
+		awk "function low(a, b) { return a < b ? a : b }
+			function high(a, b) { return a > b ? a : b }
+			{ x = \$1; d = $degree; printf \"%.12g\n\", d / (1 + d) }" points >want
+		# ten digits of values up to 0.5 are printed
+		paste got want | awk '($1 - $2)^2 > 1e-19 { bad = 1; print } END { exit bad || NR != 21 }' ||
+			complain "$kind [$params]"
+	done <<-'EOF'
+		gaussmf 2,4 exp(-(x-4)^2/8)
+		gauss2mf 1,3,2,5 (x<3?exp(-(x-3)^2/2):1)*(x>5?exp(-(x-5)^2/8):1)
+		gauss2mf 1,5,2,3 (x<5?exp(-(x-5)^2/2):1)*(x>3?exp(-(x-3)^2/8):1)
+		gbellmf 2,3,5 1/(1+((x-5)/2)^6)
+		trimf 1,4,9 high(0,low((x-1)/3,(9-x)/5))
+		trimf 2,2,6 (x<2?0:high(0,(6-x)/4))
+		trimf 2,6,6 (x>6?0:high(0,(x-2)/4))
+		trapmf 1,3,5,9 high(0,low(1,low((x-1)/2,(9-x)/4)))
+		trapmf 2,2,6,6 (x>=2&&x<=6)
+		trapmf 0,8,5,10 high(0,low(low(1,x/8),low(1,(10-x)/5)))
+		sigmf 2,4 1/(1+exp(-2*(x-4)))
+		sigmf -1,6 1/(1+exp(x-6))
+		sigmf 0,6 0.5
+	EOF
+}
+
+@test "eval joins by min, and takes rules of a list" {
+	example_in "$root/man/incise-fis.5" "[Rules]" |
+		sed "s/^AndMethod='prod'/AndMethod='min'/; s/^1 2, 2 (1)/0 2, 2 (0.5)/" >min.fis
+	printf '%s\n' "0 0" "5 20" "20 50" "7.5 31.25" >points
+	incise eval min.fis points >got
+	awk 'function low(a, b) { return a < b ? a : b }
+		{ a = low(exp(-($1 - 10)^2 / 800), exp(-$2^2 / 800)); b = 0.5 * exp(-($2 - 50)^2 / 800)
+		printf "%.10g\n", (a * 0.1 * $1 + b * 0.15 * $1) / (a + b) }' points >want
+	paste got want | awk '($1 - $2)^2 > 1e-18 { bad = 1; print } END { exit bad || NR != 4 }'
+	run --separate-stderr incise eval min.fis --arith fixed <<<'5 20'
+	failed_with min.fis "AndMethod is min"
+}
+
+@test "where no triangle is, the nearest rule answers and eval says so" {
+	degree_model trimf "0 1 2" |
+		sed "s/^NumMFs=1/NumMFs=2/; s/^MF1='a'.*/&\nMF2='b':'trimf',[8 9 10]/; s/^0, 2/2, 2/" >gap.fis
+	run -0 --separate-stderr incise eval gap.fis <<<$'1\n4.9\n5.1\n9'
+	[ "${lines[*]}" = "1 1 0 0" ]
+	[ "${#stderr_lines[@]}" -eq 1 ]
+	[[ "$stderr" == "incise eval: warning: 2 inputs lay where no rule"* ]]
+	run -0 --separate-stderr incise eval gap.fis --json <<<$'4.9\n11'
+	[ "${#stderr_lines[@]}" -eq 2 ]
+	[[ "${stderr_lines[0]}" == *"warning: 1 inputs lay outside"* ]]
+	echo "$output" >r.json
+	[ "$(key r.json 'rows[0].extrapolated')" = 1 ]
+}
+
 @test "fixed point agrees with double within 1 mN on the support" {
 	incise eval m.fis --grid 101x101 >double
 	incise eval m.fis --grid 101x101 --arith fixed >fixed
@@ -202,10 +282,10 @@ refuses() {
 
 @test "what a .fis may hold and incise does not know is refused by name and line" {
 	line=$(grep -n "^MF1='in1mf1'" m.fis | cut -d: -f1)
-	sed "${line}s/gaussmf/trimf/" m.fis >bad.fis
-	refuses "bad.fis:$line: " "'trimf'" "gaussmf and gbellmf"
-	sed "s/^AndMethod='prod'/AndMethod='min'/" m.fis >bad.fis
-	refuses "AndMethod='min'"
+	sed "${line}s/gaussmf/pimf/" m.fis >bad.fis
+	refuses "bad.fis:$line: " "'pimf'" gauss2mf
+	sed "s/^AndMethod='prod'/AndMethod='max'/" m.fis >bad.fis
+	refuses "AndMethod='max'"
 	sed "s/^DefuzzMethod='wtaver'/DefuzzMethod='centroid'/" m.fis >bad.fis
 	refuses "DefuzzMethod='centroid'"
 	sed '$s/^5/-5/' m.fis >bad.fis
@@ -238,8 +318,10 @@ refuses() {
 	refuses
 	sed '$s/, 20/, 21/' m.fis >bad.fis
 	refuses
-	sed '$s/(1)/(0)/' m.fis >bad.fis
+	sed '$s/(1)/(-1)/' m.fis >bad.fis
 	refuses weight
+	sed 's/ (1) : 1$/ (0) : 1/' m.fis >bad.fis # every rule
+	refuses "weight 0"
 }
 
 @test "what is no .fis is refused" {
