@@ -41,7 +41,7 @@ struct row {
 
 struct bench {
 	struct incise_model *model;
-	struct incise_fixed fixed;
+	struct incise_fixed *fixed;
 	double x[POINTS][INCISE_MODEL_INPUTS_MAX];
 	int32_t q[POINTS][INCISE_FIXED_INPUTS_MAX];
 	double truth[POINTS];
@@ -126,7 +126,7 @@ static double eval_double(const struct bench *b, int k)
 
 static double eval_fixed(const struct bench *b, int k)
 {
-	return incise_fixed_eval(&b->fixed, b->q[k]) / (double)INCISE_FIXED_ONE;
+	return incise_fixed_eval(b->fixed, b->q[k]) / (double)INCISE_FIXED_ONE;
 }
 
 static int by_value(const void *a, const void *b)
@@ -158,7 +158,10 @@ int main(int argc, char **argv)
 		cli_fail("no memory");
 	b->model = argc - optind == 2 ? incise_model_load(argv[optind + 1], &err)
 				      : own_model();
-	if (!b->model || incise_fixed_compile(b->model, &b->fixed, &err))
+	if (!b->model)
+		cli_fail_with(&err);
+	b->fixed = incise_fixed_compile(b->model, NULL, &err);
+	if (!b->fixed)
 		cli_fail_with(&err);
 	fill(b);
 	for (int i = 0; i < 2; i++) {

@@ -507,10 +507,10 @@ static void figure_camera(void)
 static double fixed_difference(const struct incise_model *model)
 {
 	struct incise_error err = {0};
-	struct incise_fixed fixed;
+	struct incise_fixed *fixed = incise_fixed_compile(model, NULL, &err);
 	double largest = 0;
 
-	if (incise_fixed_compile(model, &fixed, &err))
+	if (!fixed)
 		cli_fail_with(&err);
 	for (int i = 0; i <= GRID; i++)
 		for (int j = 0; j <= GRID; j++) {
@@ -519,10 +519,10 @@ static double fixed_difference(const struct incise_model *model)
 			double x[] = {d->min + (d->max - d->min) * i / GRID,
 				      v->min + (v->max - v->min) * j / GRID};
 
-			largest =
-				fmax(largest, fabs(incise_model_eval(model, x, NULL) -
-						   incise_fixed_eval_double(&fixed, x)));
+			largest = fmax(largest, fabs(incise_model_eval(model, x, NULL) -
+						     incise_fixed_eval_double(fixed, x)));
 		}
+	incise_fixed_free(fixed);
 	return largest;
 }
 

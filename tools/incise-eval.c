@@ -169,7 +169,6 @@ int main(int argc, char **argv)
 	const char *arith = "double", *grid = NULL, *path = "-";
 	struct incise_error err = {0};
 	struct evaluator e = {0};
-	struct incise_fixed fixed;
 	bool clamp = true;
 	FILE *in;
 	int opt;
@@ -206,9 +205,9 @@ int main(int argc, char **argv)
 		cli_fail_with(&err);
 	incise_model_set_clamp(e.model, clamp);
 	if (!strcmp(arith, "fixed")) {
-		if (incise_fixed_compile(e.model, &fixed, &err))
+		e.fixed = incise_fixed_compile(e.model, NULL, &err);
+		if (!e.fixed)
 			cli_fail("%s: %s", argv[optind], err.text);
-		e.fixed = &fixed;
 	}
 	if (grid) {
 		eval_grid(&e, grid);
@@ -233,5 +232,6 @@ int main(int argc, char **argv)
 			"answered",
 			e.unfired);
 	incise_model_free(e.model);
+	incise_fixed_free(e.fixed);
 	return 0;
 }

@@ -124,11 +124,12 @@ static void show_model(const char *path, bool json)
 {
 	struct incise_error err = {0}, refused = {0};
 	struct incise_model *model = incise_model_load(path, &err);
-	struct incise_fixed fixed;
+	struct incise_fixed *fixed;
 
 	if (!model)
 		cli_fail_with(&err);
-	incise_fixed_compile(model, &fixed, &refused);
+	fixed = incise_fixed_compile(model, NULL, &refused);
+	incise_fixed_free(fixed);
 	if (json)
 		model_json(model, refused.code ? refused.text : NULL);
 	else

@@ -31,8 +31,8 @@ struct incise_plan {
 	struct incise_predict predict;
 	int64_t pose_age_ns;
 	double point_mm[3], normal[3];
-	struct incise_model *model; /* or NULL: fixed */
-	struct incise_fixed fixed;
+	struct incise_model *model; /* one of these */
+	struct incise_fixed *fixed;
 	double reaction_N; /* along the normal */
 	struct incise_limit limit;
 	double spring_N_mm;
@@ -92,10 +92,10 @@ static int reaction(struct incise_plan *plan, struct incise_tick *tick)
 		plan->reaction_N = incise_model_eval(plan->model, x, &flags);
 	} else {
 		for (int i = 0; i < 2; i++)
-			if (x[i] * INCISE_FIXED_ONE < plan->fixed.input[i].min ||
-			    x[i] * INCISE_FIXED_ONE > plan->fixed.input[i].max)
+			if (x[i] * INCISE_FIXED_ONE < plan->fixed->input[i].min ||
+			    x[i] * INCISE_FIXED_ONE > plan->fixed->input[i].max)
 				flags = INCISE_MODEL_EXTRAPOLATED;
-		plan->reaction_N = incise_fixed_eval_double(&plan->fixed, x);
+		plan->reaction_N = incise_fixed_eval_double(plan->fixed, x);
 	}
 	if (flags)
 		tick->flags |= INCISE_TICK_EXTRAPOLATED;
@@ -160,7 +160,8 @@ struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 		goto out;
 	}
 	if (scene->fixed) {
-		rc = incise_fixed_compile(scene->model, &plan->fixed, err);
+		plan->fixed = incise_fixed_compile(scene->model, NULL, err);
+		rc = plan->fixed ? 0 : -errno;
 	} else {
 		plan->model = incise_model_copy(scene->model);
 		if (!plan->model)
@@ -202,6 +203,7 @@ void incise_plan_free(struct incise_plan *plan)
 	if (!plan)
 		return;
 	incise_model_free(plan->model);
+	incise_fixed_free(plan->fixed);
 	free(plan);
 }
 

@@ -1,10 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
  * The fuzzy model in integers: what the 1 kHz loop evaluates, and what a kernel or a
- * microcontroller can. Compiled from an incise_model by incise_fixed_compile(), evaluated
- * by incise_fixed_eval(), which uses 64-bit integers only: no float, no libc.
+ * microcontroller can. A model is compiled to a blob with a certified bound of its
+ * error; the blob is the file MODEL.fx, byte for byte. Evaluation uses 64-bit integers
+ * only: no float, no libc, no allocation.
  *
- *   inputs   Q16.16 of the model's unit (1 LSB = 15 nm for mm)
+ *   model ─▶ incise_fixed_compile() ─▶ blob ─▶ incise_fixed_open() ─▶ incise_fixed_eval()
+ *                                       │ ▲
+ *                                     MODEL.fx
+ *
+ *   inputs   Q16.16 of the model's unit (1 LSB = 15 nm for mm), clamped to the support
  *   output   Q16.16 of the model's unit (1 LSB = 15 µN for N)
  */
 #ifndef INCISE_FIXED_H
@@ -14,52 +19,69 @@
 #ifdef __KERNEL__
 #include <linux/types.h>
 #else
+#include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
 #endif
 
 INCISE_BEGIN_DECLS
 
-#define INCISE_FIXED_INPUTS_MAX 4
-#define INCISE_FIXED_MFS_MAX 16
-#define INCISE_FIXED_RULES_MAX 64
+#define INCISE_FIXED_INPUTS_MAX 2
+#define INCISE_FIXED_MFS_MAX 32
+#define INCISE_FIXED_RULES_MAX 256
+#define INCISE_FIXED_SIZE_MAX (1 << 22) /**< bytes of a blob */
 
 #define INCISE_FIXED_ONE (1 << 16) /**< 1.0 as input or output */
 
-/** One Gaussian as 2^-z², z = (x - centre) · slope · 2^-shift - offset in Q24. */
-struct incise_fixed_mf {
-	int32_t centre; /**< Q16.16 */
-	int32_t slope;	/**< mantissa, 2^29 … 2^30 */
-	int32_t shift;	/**< right shift that brings the product to Q24, 0 … 62 */
-	int32_t offset; /**< what centre lost by rounding, as z, Q24 */
+/** How a blob computes its output; see lib/fixed. */
+enum incise_fixed_arithmetic {
+	INCISE_FIXED_DIRECT, /**< exponentials by polynomial, one division */
+	INCISE_FIXED_TABLE, /**< tables of normalised weights: no exponential, no division */
+	INCISE_FIXED_FORCE, /**< a table of the output itself */
 };
 
-/** One input: its support and its membership functions. */
+/** One input of a compiled model. */
 struct incise_fixed_input {
-	int32_t min, max; /**< Q16.16; inputs are clamped to this */
-	int32_t n_mfs;
-	struct incise_fixed_mf mf[INCISE_FIXED_MFS_MAX];
+	int32_t min, max;      /**< support, Q16.16 */
+	int32_t n_mfs;	       /**< membership functions */
+	int32_t cell_shift;    /**< tables: a cell is 2^cell_shift LSB wide */
+	int32_t cells;	       /**< tables: cells; there is one more knot */
+	const int32_t *values; /**< into the blob, little-endian */
 };
 
 /**
- * A compiled model: no pointers, owned by the caller. Made by incise_fixed_compile();
- * a hand-made one is not checked.
+ * A view of a validated blob. Its fields may be read; they are set by incise_fixed_open()
+ * and the functions that call it, and by nobody else.
  */
 struct incise_fixed {
+	enum incise_fixed_arithmetic arithmetic;
 	int32_t n_inputs;
 	int32_t n_rules;
+	int32_t shift_a, shift_b; /**< formats, see lib/fixed/layout.h */
+	uint64_t bound;		  /**< certified error, 2^-32 of the output's unit */
 	struct incise_fixed_input input[INCISE_FIXED_INPUTS_MAX];
-	int32_t p_shift; /**< p is in Q(p_shift) */
-	int32_t y_shift; /**< a rule's output is held in Q(y_shift) */
-	/** Consequents, grid order (last input fastest), the constant first. */
-	int64_t p[INCISE_FIXED_RULES_MAX][INCISE_FIXED_INPUTS_MAX + 1];
+	const void *data; /**< into the blob: consequents or table */
+	const void *blob;
+	uint32_t size; /**< of the blob, bytes */
 };
+
+/**
+ * Validate a blob in full and make a view of it: magic, version, checksum, sizes, and
+ * that no input whatever can make the evaluation read outside of it or overflow. For
+ * blobs from files, and for kernels.
+ *
+ * @param fx   result
+ * @param blob aligned to 8 bytes; must outlive @fx
+ * @return 0; -22 (EINVAL: not a blob, damaged, or would overflow), -95 (ENOTSUP: another
+ *         version or arithmetic). Builds in a kernel.
+ */
+INCISE_API int incise_fixed_open(struct incise_fixed *fx, const void *blob,
+				 uint32_t size);
 
 /**
  * Evaluate. Inputs outside their support are clamped to it.
  *
- * @param fx a compiled model
- * @param x  n_inputs values, Q16.16
+ * @param x n_inputs values, Q16.16
  * @return output, Q16.16, saturated. Real-time safe; builds in a kernel.
  */
 INCISE_API int32_t incise_fixed_eval(const struct incise_fixed *fx, const int32_t *x);
@@ -67,21 +89,59 @@ INCISE_API int32_t incise_fixed_eval(const struct incise_fixed *fx, const int32_
 #ifndef __KERNEL__
 struct incise_model;
 
-/**
- * Compile a model to fixed point, choosing number formats by its parameters.
- *
- * @param model grid of Gaussians; others are refused by name
- * @param fx    result
- * @return 0; -ENOTSUP (not a grid, a kind without a fixed form), -E2BIG (more inputs,
- *         functions or rules than fit), -ERANGE (support, width or consequent that no
- *         format holds; the message says which).
- */
-INCISE_API int incise_fixed_compile(const struct incise_model *model,
-				    struct incise_fixed *fx, struct incise_error *err);
+/** What to compile to. */
+struct incise_fixed_options {
+	/** Largest error, output's unit: the cheapest arithmetic within it is taken; 0: none. */
+	double budget;
+	int arithmetic; /**< enum incise_fixed_arithmetic to insist on one, or -1 */
+	int cells;	/**< least number of cells per input of tables, or 0 */
+};
+
+/** Budget 1e-4 (0.1 mN), any arithmetic, any number of cells. */
+INCISE_API void incise_fixed_options_init(struct incise_fixed_options *options);
 
 /**
- * Evaluate with inputs and output in double, for tools and tests. NaN counts as the
- * middle of the support, as in incise_model_eval().
+ * Compile a model to fixed point and certify its error.
+ *
+ * The bound holds for every real input within the support, its rounding to Q16.16
+ * included: interval arithmetic over the whole support, not a sample.
+ *
+ * @param model  full grid of Gaussians over one or two inputs; others are refused by name
+ * @param options or NULL for the defaults
+ * @return compiled model, to be freed with incise_fixed_free(); NULL with errno ENOTSUP
+ *         (a kind or shape without a fixed form), E2BIG, ERANGE (support, width or
+ *         consequent that no format holds, or a budget that no arithmetic holds; the
+ *         message says which), EINVAL, ENOMEM.
+ */
+INCISE_API struct incise_fixed *incise_fixed_compile(
+	const struct incise_model *model, const struct incise_fixed_options *options,
+	struct incise_error *err);
+
+/**
+ * Read and validate a MODEL.fx.
+ *
+ * @return as incise_fixed_compile(); NULL with errno of fopen(3), EINVAL, ENOTSUP, ENOMEM.
+ */
+INCISE_API struct incise_fixed *incise_fixed_load(const char *path,
+						  struct incise_error *err);
+
+/** Write a MODEL.fx, whole or not at all. @return 0 or as incise_outfile_commit(). */
+INCISE_API int incise_fixed_save(const struct incise_fixed *fx, const char *path,
+				 struct incise_error *err);
+
+/** Free what incise_fixed_compile() or incise_fixed_load() made. */
+INCISE_API void incise_fixed_free(struct incise_fixed *fx);
+
+/** The certified bound of the error, output's unit. */
+INCISE_API double incise_fixed_bound(const struct incise_fixed *fx);
+
+/** "direct", "table" or "force". */
+INCISE_API const char *incise_fixed_arithmetic_name(
+	enum incise_fixed_arithmetic arithmetic);
+
+/**
+ * Evaluate with inputs and output in double. NaN counts as the middle of the support, as
+ * in incise_model_eval(). Real-time safe.
  */
 INCISE_API double incise_fixed_eval_double(const struct incise_fixed *fx,
 					   const double *x);

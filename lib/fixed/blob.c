@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
+/*
+ * Validating a blob in full: after this no input can make an evaluator read outside of
+ * it, shift by a wrong amount or overflow. Blobs come from files and go to kernels.
+ */
+#include "layout.h"
+
+/* Without errno.h, which a kernel does not have in this form. */
+#define BAD (-22)	  /* -EINVAL */
+#define UNSUPPORTED (-95) /* -ENOTSUP */
+
+uint32_t incise_fx_crc(const uint8_t *bytes, uint32_t n)
+{
+	uint32_t crc = ~0u;
+
+	for (uint32_t i = 0; i < n; i++) {
+		crc ^= bytes[i];
+		for (int bit = 0; bit < 8; bit++)
+			crc = (crc >> 1) ^ (crc & 1 ? 0x82f63b78u : 0);
+	}
+	return ~crc;
+}
+
+static uint64_t magnitude(int64_t v)
+{
+	return v < 0 ? -(uint64_t)v : (uint64_t)v;
+}
+
+/* Whether n bytes at offset lie within the blob, behind the header, aligned. */
+static int within(uint64_t offset, uint64_t n, uint32_t size, uint32_t align)
+{
+	return offset >= sizeof(struct incise_fx_header) && offset % align == 0 &&
+	       offset <= size && n <= size - offset;
+}
+
+static int32_t get32(const int32_t *values, uint64_t i)
+{
+	return (int32_t)incise_fx_le32((uint32_t)values[i]);
+}
+
+/* Supports, counts, and for tables that the cells reach over the whole support. */
+static int check_inputs(const struct incise_fixed *fx)
+{
+	int32_t n_rules = 1;
+
+	for (int i = 0; i < fx->n_inputs; i++) {
+		const struct incise_fixed_input *in = &fx->input[i];
+		int64_t range = (int64_t)in->max - in->min;
+
+		/* The distance from min must fit in 31 bits. */
+		if (range < 1 || range > INT32_MAX)
+			return BAD;
+		if (in->n_mfs < 1 || in->n_mfs > INCISE_FIXED_MFS_MAX)
+			return BAD;
+		n_rules *= in->n_mfs;
+		if (fx->arithmetic == INCISE_FIXED_DIRECT) {
+			if (in->cell_shift || in->cells)
+				return BAD;
+			continue;
+		}
+		/* Few enough cells that products of sizes cannot wrap. */
+		if (in->cell_shift < 0 || in->cell_shift > 30 ||
+		    in->cells != (range >> in->cell_shift) + 1 ||
+		    in->cells > INCISE_FIXED_SIZE_MAX)
+			return BAD;
+	}
+	return fx->n_rules == n_rules && n_rules <= INCISE_FIXED_RULES_MAX ? 0 : BAD;
+}
+
+static int check_mfs(const struct incise_fixed *fx, int i, uint32_t offset)
+{
+	const struct incise_fixed_input *in = &fx->input[i];
+	const struct incise_fx_mf *mf = (const struct incise_fx_mf *)in->values;
+
+	if (!within(offset, (uint64_t)in->n_mfs * sizeof(*mf), fx->size, 4))
+		return BAD;
+	for (int k = 0; k < in->n_mfs; k++) {
+		int32_t slope = get32(&mf[k].slope, 0), shift = get32(&mf[k].shift, 0);
+
+		/* (x - centre)·slope: 32 + 30 bits. */
+		if (slope < 0 || slope > 1 << 30 || shift < 0 || shift > 62)
+			return BAD;
+	}
+	return 0;
+}
+
+/* No consequent may overflow the sums of incise_fx_direct() anywhere in the support. */
+static int check_direct(const struct incise_fixed *fx)
+{
+	const int64_t *p = fx->data;
+	int n = fx->n_inputs, shift = fx->shift_a + 16 - fx->shift_b;
+	uint64_t largest = 0;
+
+	if (fx->shift_a < 0 || fx->shift_a > 40 || fx->shift_b < 17 || fx->shift_b > 40 ||
+	    shift < 0 || shift > 62)
+		return BAD;
+	for (int r = 0; r < fx->n_rules; r++, p += n + 1) {
+		uint64_t sum = 0;
+
+		for (int i = 0; i <= n; i++) {
+			uint64_t c = magnitude((int64_t)incise_fx_le64((uint64_t)p[i]));
+			uint64_t x = INCISE_FIXED_ONE;
+
+			if (i) {
+				uint64_t low = magnitude(fx->input[i - 1].min);
+
+				x = magnitude(fx->input[i - 1].max);
+				x = x > low ? x : low;
+			}
+			if (x && c > ((uint64_t)1 << 62) / x)
+				return BAD;
+			sum += c * x;
+			if (sum > (uint64_t)1 << 62)
+				return BAD;
+		}
+		/* One more, for the floor of a negative number. */
+		sum = (sum >> shift) + 1;
+		largest = largest > sum ? largest : sum;
+	}
+	/* Σ w·y with w ≤ 2^30. */
+	return largest <= ((uint64_t)1 << 62 >> 30) / (uint32_t)fx->n_rules ? 0 : BAD;
+}
+
+/* Weights are not negative and add up to 1 within rounding, in every row. */
+static int check_weights(const struct incise_fixed *fx)
+{
+	const struct incise_fixed_input *a = &fx->input[0];
+
+	for (int64_t row = 0; row <= a->cells; row++) {
+		int64_t sum = 0;
+
+		for (int i = 0; i < a->n_mfs; i++) {
+			int32_t w = get32(a->values, row * a->n_mfs + i);
+
+			if (w < 0)
+				return BAD;
+			sum += w;
+		}
+		if (sum < (1 << 30) - 64 || sum > (1 << 30) + 64)
+			return BAD;
+	}
+	return 0;
+}
+
+/* Rule outputs g + x·h stay within 2^31, so that Σ w·(…) does within 2^62. */
+static int check_fold(const struct incise_fixed *fx)
+{
+	const int32_t *fold = fx->data;
+	int n = fx->input[0].n_mfs, to_g = 16 + fx->shift_b - fx->shift_a;
+	uint64_t reach =
+		((uint64_t)((int64_t)fx->input[0].max - fx->input[0].min) >> 1) + 1;
+
+	if (fx->shift_a < 17 || fx->shift_a > 30 || to_g < 0 || to_g > 62)
+		return BAD;
+	for (int64_t row = 0; row <= fx->input[1].cells; row++)
+		for (int i = 0; i < n; i++) {
+			uint64_t g = magnitude(get32(fold, 2 * (row * n + i)));
+			uint64_t h = magnitude(get32(fold, 2 * (row * n + i) + 1));
+
+			if (g + (h * reach >> to_g) + 2 > INT32_MAX)
+				return BAD;
+		}
+	return 0;
+}
+
+/* The sections of a blob: where they are, and what is in them. */
+static int check_data(const struct incise_fixed *fx, const struct incise_fx_header *head)
+{
+	uint32_t data = incise_fx_le32(head->data), n = (uint32_t)fx->n_inputs;
+	uint64_t a = (uint64_t)fx->input[0].cells + 1, b = 1;
+	int rc;
+
+	if (n > 1)
+		b = (uint64_t)fx->input[1].cells + 1;
+	switch (fx->arithmetic) {
+	case INCISE_FIXED_DIRECT:
+		for (uint32_t i = 0; i < n; i++) {
+			rc = check_mfs(fx, (int)i, incise_fx_le32(head->input[i].offset));
+			if (rc)
+				return rc;
+		}
+		if (!within(data, (uint64_t)fx->n_rules * (n + 1) * 8, fx->size, 8))
+			return BAD;
+		return check_direct(fx);
+	case INCISE_FIXED_TABLE:
+		if (n == 1)
+			return within(data, a * 4, fx->size, 4) && fx->shift_a >= 17 &&
+					       fx->shift_a <= 30
+				       ? 0
+				       : BAD;
+		if (!within(incise_fx_le32(head->input[0].offset),
+			    a * (uint32_t)fx->input[0].n_mfs * 4, fx->size, 4) ||
+		    !within(data, b * (uint32_t)fx->input[0].n_mfs * 8, fx->size, 4))
+			return BAD;
+		rc = check_weights(fx);
+		return rc ? rc : check_fold(fx);
+	case INCISE_FIXED_FORCE:
+		return within(data, a * b * 4, fx->size, 4) && fx->shift_a >= 17 &&
+				       fx->shift_a <= 30
+			       ? 0
+			       : BAD;
+	}
+	return UNSUPPORTED;
+}
+
+int incise_fixed_open(struct incise_fixed *fx, const void *blob, uint32_t size)
+{
+	const struct incise_fx_header *head = blob;
+	const uint8_t *bytes = blob;
+
+	if (size < sizeof(*head) || size > INCISE_FIXED_SIZE_MAX)
+		return BAD;
+	for (int i = 0; i < 8; i++)
+		if (head->magic[i] != INCISE_FX_MAGIC[i])
+			return BAD;
+	if (incise_fx_le32(head->version) != INCISE_FX_VERSION)
+		return UNSUPPORTED;
+	if (incise_fx_le32(head->size) != size ||
+	    incise_fx_le32(head->crc) !=
+		    incise_fx_crc(bytes + INCISE_FX_CRC_FROM, size - INCISE_FX_CRC_FROM))
+		return BAD;
+	if (incise_fx_le32(head->arithmetic) > INCISE_FIXED_FORCE)
+		return UNSUPPORTED;
+	*fx = (struct incise_fixed){
+		.arithmetic =
+			(enum incise_fixed_arithmetic)incise_fx_le32(head->arithmetic),
+		.n_inputs = (int32_t)incise_fx_le32(head->n_inputs),
+		.n_rules = (int32_t)incise_fx_le32(head->n_rules),
+		.shift_a = (int32_t)incise_fx_le32((uint32_t)head->shift_a),
+		.shift_b = (int32_t)incise_fx_le32((uint32_t)head->shift_b),
+		.bound = incise_fx_le64(head->bound),
+		.blob = blob,
+		.size = size,
+	};
+	if (fx->n_inputs < 1 || fx->n_inputs > INCISE_FIXED_INPUTS_MAX ||
+	    head->name[sizeof(head->name) - 1])
+		return BAD;
+	for (int i = 0; i < fx->n_inputs; i++) {
+		const struct incise_fx_input *in = &head->input[i];
+
+		fx->input[i] = (struct incise_fixed_input){
+			.min = (int32_t)incise_fx_le32((uint32_t)in->min),
+			.max = (int32_t)incise_fx_le32((uint32_t)in->max),
+			.n_mfs = (int32_t)incise_fx_le32(in->n_mfs),
+			.cell_shift = (int32_t)incise_fx_le32(in->cell_shift),
+			.cells = (int32_t)incise_fx_le32(in->cells),
+			/* A pointer beyond the blob must not even be formed. */
+			.values = (const int32_t *)(bytes +
+						    (incise_fx_le32(in->offset) <= size
+							     ? incise_fx_le32(in->offset)
+							     : 0)),
+		};
+	}
+	fx->data = bytes +
+		   (incise_fx_le32(head->data) <= size ? incise_fx_le32(head->data) : 0);
+	if (check_inputs(fx))
+		return BAD;
+	return check_data(fx, head);
+}
