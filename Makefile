@@ -51,6 +51,7 @@ uses_capture := incise incise-record
 uses_export := incise incise-record
 uses_train := incise incise-learn
 uses_eval := incise
+uses_compile := incise
 uses_info := incise incise-record
 uses_haptic := incise
 uses_demo := incise incise-learn

@@ -16,7 +16,7 @@
 enum { OPT_ARITH = CLI_LONG, OPT_NO_CLAMP, OPT_GRID, OPT_JSON };
 
 static const struct cli_option options[] = {
-	{OPT_ARITH, "arith", "KIND", "double (default) or fixed"},
+	{OPT_ARITH, "arith", "KIND", "double (default) or fixed; a .fx is fixed already"},
 	{OPT_NO_CLAMP, "no-clamp", NULL, "extrapolate outside the support (double only)"},
 	{OPT_GRID, "grid", "NxM",
 	 "evaluate on a grid over the support instead of reading;\n"
@@ -27,7 +27,7 @@ static const struct cli_option options[] = {
 
 static const struct cli_verb verb = {
 	.name = "eval",
-	.synopsis = "MODEL.fis [FILE] [OPTIONS]",
+	.synopsis = "MODEL.fis|MODEL.fx [FILE] [OPTIONS]",
 	.summary =
 		"Evaluate a model: one line of inputs in (depth_mm velocity_mm_s), one force "
 		"out.\nReads FILE, or standard input. Inputs outside the support are taken as "
@@ -38,51 +38,50 @@ static const struct cli_verb verb = {
 };
 
 struct evaluator {
-	struct incise_model *model;
+	struct incise_model *model; /* NULL: only the compiled form is there */
 	struct incise_fixed *fixed; /* NULL: double */
-	unsigned long outside;	    /* of the support */
-	unsigned long unfired;	    /* inside, where no rule fires */
-	json_t *rows;		    /* NULL: text */
+	int n_inputs;
+	const char *input[INCISE_MODEL_INPUTS_MAX], *output;
+	double min[INCISE_MODEL_INPUTS_MAX], max[INCISE_MODEL_INPUTS_MAX];
+	unsigned long outside; /* of the support */
+	unsigned long unfired; /* inside, where no rule fires */
+	json_t *rows;	       /* NULL: text */
 };
 
 static void add_row(struct evaluator *e, const double *x, double y, bool outside)
 {
 	json_t *row = json_object();
 
-	for (int i = 0; i < incise_model_n_inputs(e->model); i++)
-		json_object_set_new(row, incise_model_input(e->model, i)->name,
-				    json_number(x[i]));
-	json_object_set_new(row, incise_model_output(e->model)->name, json_number(y));
+	for (int i = 0; i < e->n_inputs; i++)
+		json_object_set_new(row, e->input[i], json_number(x[i]));
+	json_object_set_new(row, e->output, json_number(y));
 	json_object_set_new(row, "extrapolated", json_boolean(outside));
 	json_array_append_new(e->rows, row);
 }
 
-static bool in_support(const struct evaluator *e, const double *x)
-{
-	for (int i = 0; i < incise_model_n_inputs(e->model); i++) {
-		const struct incise_variable *v = incise_model_input(e->model, i);
-
-		if (!(x[i] >= v->min && x[i] <= v->max))
-			return false;
-	}
-	return true;
+return true;
 }
 
 /* Evaluate and print; a grid's text has its inputs in front. */
 static void evaluate(struct evaluator *e, const double *x, bool inputs)
 {
-	unsigned int flags;
-	double y = incise_model_eval(e->model, x, &flags);
+	unsigned int flags = 0;
+	bool outside = false;
+	double y;
 
+	for (int i = 0; i < e->n_inputs; i++)
+		outside |= !(x[i] >= e->min[i] && x[i] <= e->max[i]);
+	y = e->model ? incise_model_eval(e->model, x, &flags) : 0;
 	if (e->fixed)
 		y = incise_fixed_eval_double(e->fixed, x);
-	if (flags & INCISE_MODEL_EXTRAPOLATED)
-		*(in_support(e, x) ? &e->unfired : &e->outside) += 1;
+	e->outside += outside;
+	e->unfired += !outside && flags & INCISE_MODEL_EXTRAPOLATED;
+	outside |= flags & INCISE_MODEL_EXTRAPOLATED;
 	if (e->rows) {
-		add_row(e, x, y, flags & INCISE_MODEL_EXTRAPOLATED);
+		add_row(e, x, y, outside);
 		return;
 	}
-	for (int i = 0; inputs && i < incise_model_n_inputs(e->model); i++)
+	for (int i = 0; inputs && i < e->n_inputs; i++)
 		printf("%.10g ", x[i]);
 	printf("%.10g\n", y);
 }
@@ -90,11 +89,11 @@ static void evaluate(struct evaluator *e, const double *x, bool inputs)
 static void parse_line(const struct evaluator *e, const char *path, unsigned long line,
 		       char *text, double *x)
 {
-	int n = incise_model_n_inputs(e->model);
+	int n = e->n_inputs;
 	char *at = text;
 
 	for (int i = 0; i < n; i++) {
-		const char *name = incise_model_input(e->model, i)->name;
+		const char *name = e->input[i];
 		char *end;
 
 		at += strspn(at, " \t,;");
@@ -140,13 +139,11 @@ static void eval_stream(struct evaluator *e, FILE *in, const char *path)
 
 static void eval_grid(struct evaluator *e, const char *size)
 {
-	const struct incise_variable *a = incise_model_input(e->model, 0);
-	const struct incise_variable *b = incise_model_input(e->model, 1);
 	int n, m, end = 0;
 
-	if (incise_model_n_inputs(e->model) != 2)
+	if (e->n_inputs != 2)
 		cli_fail("--grid needs a model of two inputs, this one has %d",
-			 incise_model_n_inputs(e->model));
+			 e->n_inputs);
 	if (sscanf(size, "%dx%d%n", &n, &m, &end) != 2 || size[end] || n < 2 || m < 2 ||
 	    n > 10000 || m > 10000)
 		cli_usage("--grid: '%s' is not NxM with 2 to 10000 each", size);
@@ -154,8 +151,8 @@ static void eval_grid(struct evaluator *e, const char *size)
 		for (int j = 0; j < m; j++) {
 			/* Weighted so that both ends are met to the digit. */
 			double u = (double)i / (n - 1), v = (double)j / (m - 1);
-			double x[] = {a->min * (1 - u) + a->max * u,
-				      b->min * (1 - v) + b->max * v};
+			double x[] = {e->min[0] * (1 - u) + e->max[0] * u,
+				      e->min[1] * (1 - v) + e->max[1] * v};
 
 			evaluate(e, x, true);
 		}
@@ -164,10 +161,65 @@ static void eval_grid(struct evaluator *e, const char *size)
 	}
 }
 
+static bool ends_with(const char *text, const char *end)
+{
+	size_t n = strlen(text), m = strlen(end);
+
+	return n >= m && !strcmp(text + n - m, end);
+}
+
+/* A compiled model has its fixed form only. */
+static void open_compiled(struct evaluator *e, const char *path)
+{
+	struct incise_error err = {0};
+
+	e->fixed = incise_fixed_load(path, &err);
+	if (!e->fixed)
+		cli_fail_with(&err);
+	e->n_inputs = e->fixed->n_inputs;
+	e->output = e->fixed->output;
+	for (int i = 0; i < e->n_inputs; i++) {
+		e->input[i] = e->fixed->input[i].name;
+		e->min[i] = e->fixed->input[i].min / (double)INCISE_FIXED_ONE;
+		e->max[i] = e->fixed->input[i].max / (double)INCISE_FIXED_ONE;
+	}
+}
+
+static void open_model(struct evaluator *e, const char *path, const char *arith,
+		       bool clamp)
+{
+	struct incise_error err = {0};
+
+	if (ends_with(path, ".fx")) {
+		if (arith && !strcmp(arith, "double"))
+			cli_usage("--arith double: %s is compiled to fixed point", path);
+		if (!clamp)
+			cli_usage("--no-clamp: %s is compiled and ends at its support",
+				  path);
+		open_compiled(e, path);
+		return;
+	}
+	e->model = incise_model_load(path, &err);
+	if (!e->model)
+		cli_fail_with(&err);
+	incise_model_set_clamp(e->model, clamp);
+	e->n_inputs = incise_model_n_inputs(e->model);
+	e->output = incise_model_output(e->model)->name;
+	for (int i = 0; i < e->n_inputs; i++) {
+		e->input[i] = incise_model_input(e->model, i)->name;
+		e->min[i] = incise_model_input(e->model, i)->min;
+		e->max[i] = incise_model_input(e->model, i)->max;
+	}
+	if (!arith || strcmp(arith, "fixed"))
+		return;
+	e->fixed = incise_fixed_compile(e->model, NULL, &err);
+	if (!e->fixed)
+		cli_fail("%s: %s", path, err.text);
+}
+
 int main(int argc, char **argv)
 {
-	const char *arith = "double", *grid = NULL, *path = "-";
-	struct incise_error err = {0};
+	const char *arith = NULL, *grid = NULL, *path = "-";
 	struct evaluator e = {0};
 	bool clamp = true;
 	FILE *in;
@@ -193,22 +245,14 @@ int main(int argc, char **argv)
 		}
 	if (optind >= argc || argc - optind > 2)
 		cli_usage("expected a model and at most one file of inputs");
-	if (!clamp && !strcmp(arith, "fixed"))
+	if (!clamp && arith && !strcmp(arith, "fixed"))
 		cli_usage(
 			"--no-clamp needs --arith double: fixed point ends at the support");
 	if (grid && argc - optind == 2)
 		cli_usage("--grid evaluates its own points: it takes no file of inputs");
 	if (argc - optind == 2)
 		path = argv[optind + 1];
-	e.model = incise_model_load(argv[optind], &err);
-	if (!e.model)
-		cli_fail_with(&err);
-	incise_model_set_clamp(e.model, clamp);
-	if (!strcmp(arith, "fixed")) {
-		e.fixed = incise_fixed_compile(e.model, NULL, &err);
-		if (!e.fixed)
-			cli_fail("%s: %s", argv[optind], err.text);
-	}
+	open_model(&e, argv[optind], arith, clamp);
 	if (grid) {
 		eval_grid(&e, grid);
 	} else {

@@ -20,6 +20,7 @@ static const struct {
 	{"capture", "record tracker and force channel in sync"},
 	{"export", "make a dataset of recordings, raw or averaged"},
 	{"train", "learn a fuzzy force model from a dataset"},
+	{"compile", "turn a model into integers with a certified error bound"},
 	{"eval", "print the force of a model at given depth and velocity"},
 	{"info", "say what a recording or model holds"},
 	{"haptic", "run the real-time loop of a scene"},

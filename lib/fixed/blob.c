@@ -229,16 +229,21 @@ int incise_fixed_open(struct incise_fixed *fx, const void *blob, uint32_t size)
 		.shift_a = (int32_t)incise_fx_le32((uint32_t)head->shift_a),
 		.shift_b = (int32_t)incise_fx_le32((uint32_t)head->shift_b),
 		.bound = incise_fx_le64(head->bound),
+		.name = head->name,
+		.output = head->output,
 		.blob = blob,
 		.size = size,
 	};
 	if (fx->n_inputs < 1 || fx->n_inputs > INCISE_FIXED_INPUTS_MAX ||
-	    head->name[sizeof(head->name) - 1])
+	    head->name[sizeof(head->name) - 1] || head->output[sizeof(head->output) - 1])
 		return BAD;
 	for (int i = 0; i < fx->n_inputs; i++) {
 		const struct incise_fx_input *in = &head->input[i];
 
+		if (in->name[sizeof(in->name) - 1])
+			return BAD;
 		fx->input[i] = (struct incise_fixed_input){
+			.name = in->name,
 			.min = (int32_t)incise_fx_le32((uint32_t)in->min),
 			.max = (int32_t)incise_fx_le32((uint32_t)in->max),
 			.n_mfs = (int32_t)incise_fx_le32(in->n_mfs),

@@ -3,7 +3,7 @@
  * The bytes of a blob, all little-endian:
  *
  *   0    struct incise_fx_header
- *   192  data, by arithmetic:
+ *   288  data, by arithmetic:
  *
  *   direct  per input, at its offset: n_mfs × struct incise_fx_mf
  *           at data: n_rules × (n_inputs + 1) consequents, int64 in Q(shift_a), the
@@ -36,6 +36,7 @@ struct incise_fx_input {
 	uint32_t cells;
 	uint32_t offset;
 	uint32_t reserved[2]; /* zero */
+	char name[32];	      /* zero-padded, as all names */
 };
 
 struct incise_fx_header {
@@ -51,7 +52,8 @@ struct incise_fx_header {
 	uint64_t bound;	      /* 2^-32 of the output's unit */
 	uint32_t data;	      /* offset */
 	uint32_t reserved[3]; /* zero */
-	char name[64];	      /* of the model, zero-padded */
+	char name[64];	      /* of the model */
+	char output[32];
 	struct incise_fx_input input[INCISE_FIXED_INPUTS_MAX];
 };
 

@@ -19,12 +19,25 @@
 #include "grid.h"
 
 /* Blocks per input: more give a tighter bound and take time, with the square. */
-#define BLOCKS 200
+#define BLOCKS 128
 
 /* Rounding an input to Q16.16. */
 #define HALF_LSB (0.5 / INCISE_FIXED_ONE)
 
 #define N INCISE_FIXED_MFS_MAX
+
+/* What one patch of the support says of errors. */
+struct spot {
+	double input;			/* rounding of the inputs */
+	double f11, f22;		/* second derivatives */
+	double weights, outputs, cross; /* tables: times wa²/8, wb²/8 and both */
+	double direct;
+};
+
+struct incise_survey {
+	size_t n;
+	struct spot *at;
+};
 
 /* A part of one input's support. */
 struct block {
@@ -48,9 +61,11 @@ struct patch {
 	double f1, f2, f11, f22; /* magnitudes of F's derivatives */
 };
 
-static int make_blocks(struct blocks *blocks, const struct incise_axis *axis, double from,
-		       double to, bool trivial)
+static int make_blocks(struct blocks *blocks, const struct incise_axis *axis,
+		       bool trivial)
 {
+	double from = axis->min;
+	double to = axis->max + (axis->max - axis->min) / (INCISE_SURVEY_CELLS - 2);
 	long double at[N];
 
 	blocks->n = trivial ? 1 : BLOCKS;
@@ -111,8 +126,8 @@ static void rule_sums(const struct incise_grid *grid, const struct block *a,
 	}
 }
 
-static void survey(const struct incise_grid *grid, const struct block *a,
-		   const struct block *b, struct patch *patch)
+static void inspect(const struct incise_grid *grid, const struct block *a,
+		    const struct block *b, struct patch *patch)
 {
 	const struct incise_axis_range *ra = &a->range;
 	struct interval f1 = iv(0), f2 = iv(0), f11 = iv(0), f22 = iv(0);
@@ -138,28 +153,25 @@ static void survey(const struct incise_grid *grid, const struct block *a,
 	patch->f22 = iv_mag(f22);
 }
 
-/* Of the weights' table and the folded one: see lib/fixed/table.c. */
-static double table_error(const struct incise_grid *grid, const struct block *a,
-			  const struct patch *patch, double wa, double wb)
+/* Of the weights' table and the folded one, by wa²/8 and wb²/8: lib/fixed/table.c. */
+static void table_errors(const struct incise_grid *grid, const struct block *a,
+			 const struct patch *patch, struct spot *at)
 {
 	struct interval of_a = iv(0), of_b = iv(0);
-	double cross = 0, worst = 0;
+	double weights = 0, worst = 0;
 
 	for (int i = 0; i < grid->a.n; i++) {
-		double e = iv_mag(patch->t2[i]) * wb * wb / 8;
+		double e = iv_mag(patch->t2[i]);
 
 		of_a = iv_add(of_a, iv_mul(a->range.d2[i], patch->t[i]));
 		of_b = iv_add(of_b, iv_mul(a->range.a[i], (struct interval){0, e}));
-		/* Weights that are off meet rule outputs that are off. */
-		cross += iv_mag(a->range.d2[i]) * wa * wa / 8;
+		weights += iv_mag(a->range.d2[i]);
 		worst = fmax(worst, e);
 	}
-	return iv_mag(of_a) * wa * wa / 8 + of_b.hi + cross * worst;
-}
-
-static double force_error(const struct patch *patch, double wa, double wb)
-{
-	return patch->f11 * wa * wa / 8 + patch->f22 * wb * wb / 8;
+	at->weights = iv_mag(of_a);
+	at->outputs = of_b.hi;
+	/* Weights that are off meet rule outputs that are off. */
+	at->cross = weights * worst;
 }
 
 /*
@@ -220,55 +232,91 @@ static double direct_error(const struct incise_grid *grid, const struct block *a
 	return sum * 1.001;
 }
 
-enum kind { TABLE, FORCE, DIRECT };
-
-static double bound(const struct incise_grid *grid, enum kind kind,
-		    const struct incise_cells *a, const struct incise_cells *b)
+struct incise_survey *incise_survey_new(const struct incise_grid *grid)
 {
-	double a_to = kind == DIRECT ? grid->a.max : a->from + a->width * a->n;
-	double b_to = kind == DIRECT ? grid->b.max : b->from + b->width * b->n;
+	struct incise_survey *survey = calloc(1, sizeof(*survey));
 	struct blocks ba = {0}, bb = {0};
-	double largest = 0;
+	size_t n;
 
-	if (make_blocks(&ba, &grid->a, grid->a.min, a_to, grid->one) ||
-	    make_blocks(&bb, &grid->b, grid->b.min, b_to, false))
-		largest = INFINITY;
-	for (int i = 0; i < ba.n && isfinite(largest); i++)
-		for (int j = 0; j < bb.n; j++) {
-			struct patch patch;
-			double e;
+	if (!survey || make_blocks(&ba, &grid->a, grid->one) ||
+	    make_blocks(&bb, &grid->b, false))
+		goto out;
+	n = (size_t)ba.n * bb.n;
+	survey->at = malloc(n * sizeof(*survey->at));
+	if (!survey->at)
+		goto out;
+	survey->n = n;
+	for (size_t k = 0; k < n; k++) {
+		const struct block *a = &ba.block[k / bb.n], *b = &bb.block[k % bb.n];
+		struct patch patch;
 
-			survey(grid, &ba.block[i], &bb.block[j], &patch);
-			e = (patch.f1 + patch.f2) * HALF_LSB;
-			if (kind == TABLE)
-				e += table_error(grid, &ba.block[i], &patch, a->width,
-						 b->width);
-			else if (kind == FORCE)
-				e += force_error(&patch, a->width, b->width);
-			else
-				e += direct_error(grid, &ba.block[i], &bb.block[j]);
-			/* Not fmax: a NaN must not be lost. */
-			if (!(e <= largest))
-				largest = isnan(e) ? INFINITY : e;
-		}
+		inspect(grid, a, b, &patch);
+		survey->at[k].input = (patch.f1 + patch.f2) * HALF_LSB;
+		survey->at[k].f11 = patch.f11;
+		survey->at[k].f22 = patch.f22;
+		survey->at[k].direct = direct_error(grid, a, b);
+		table_errors(grid, a, &patch, &survey->at[k]);
+	}
+out:
 	free(ba.block);
 	free(bb.block);
-	return largest * (1 + 1e-9);
+	if (survey && !survey->at) {
+		free(survey);
+		survey = NULL;
+	}
+	return survey;
 }
 
-double incise_bound_table(const struct incise_grid *grid, const struct incise_cells *a,
-			  const struct incise_cells *b)
+void incise_survey_free(struct incise_survey *survey)
 {
-	return bound(grid, TABLE, a, b);
+	if (!survey)
+		return;
+	free(survey->at);
+	free(survey);
 }
 
-double incise_bound_force(const struct incise_grid *grid, const struct incise_cells *a,
-			  const struct incise_cells *b)
+/* The larger; a NaN counts as endless. */
+static double larger(double largest, double e)
 {
-	return bound(grid, FORCE, a, b);
+	if (isnan(e))
+		return INFINITY;
+	return e > largest ? e : largest;
 }
 
-double incise_bound_direct(const struct incise_grid *grid)
+/* Sums of a few doubles, each rounded: 1e-12 covers them. */
+#define SLACK (1 + 1e-12)
+
+double incise_survey_table(const struct incise_survey *survey, double wa, double wb)
 {
-	return bound(grid, DIRECT, NULL, NULL);
+	double a2 = wa * wa / 8, b2 = wb * wb / 8, largest = 0;
+
+	for (size_t k = 0; k < survey->n; k++) {
+		const struct spot *at = &survey->at[k];
+
+		largest = larger(largest, at->input + at->weights * a2 +
+						  at->outputs * b2 + at->cross * a2 * b2);
+	}
+	return largest * SLACK;
+}
+
+double incise_survey_force(const struct incise_survey *survey, double wa, double wb)
+{
+	double largest = 0;
+
+	for (size_t k = 0; k < survey->n; k++) {
+		const struct spot *at = &survey->at[k];
+
+		largest = larger(largest, at->input + at->f11 * wa * wa / 8 +
+						  at->f22 * wb * wb / 8);
+	}
+	return largest * SLACK;
+}
+
+double incise_survey_direct(const struct incise_survey *survey)
+{
+	double largest = 0;
+
+	for (size_t k = 0; k < survey->n; k++)
+		largest = larger(largest, survey->at[k].input + survey->at[k].direct);
+	return largest * SLACK;
 }

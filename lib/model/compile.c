@@ -6,6 +6,7 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,11 +19,15 @@
 #define DEFAULT_BUDGET 1e-4
 
 /* Cells per input that are tried, from coarse to fine. */
-static const int cell_counts[] = {32, 64, 128, 256, 512, 1024, 2048, 4096};
+static const int cell_counts[] = {
+	INCISE_SURVEY_CELLS, 64, 128, 256, 512, 1024, 2048, 4096};
 #define N_COUNTS ((int)(sizeof(cell_counts) / sizeof(*cell_counts)))
 
 /* A force table is the cheapest only while it stays in the cache beside all else. */
 #define FORCE_SIZE_MAX (256 << 10)
+
+/* Terms of a rule beyond which no format holds it: Q16.16 ends at 32768. */
+#define LARGEST 1e12
 
 /* A blob under construction. */
 struct image {
@@ -31,6 +36,13 @@ struct image {
 	uint8_t *data; /* behind the header */
 	size_t size;
 	double bound;
+};
+
+/* Cells of one input. */
+struct incise_cells {
+	double from;  /* lower end of the support */
+	double width; /* of a cell */
+	int n;
 };
 
 struct owned {
@@ -75,8 +87,15 @@ static int n_inputs(const struct incise_grid *grid)
 	return grid->one ? 1 : 2;
 }
 
+/* A name cut to fit, and zero-padded: the header was zeroed. */
+static void put_name(char *to, size_t size, const char *name)
+{
+	memcpy(to, name, strnlen(name, size - 1));
+}
+
 static void begin(struct image *image, const struct incise_grid *grid,
-		  enum incise_fixed_arithmetic arithmetic, const char *name)
+		  enum incise_fixed_arithmetic arithmetic,
+		  const struct incise_model *model)
 {
 	memset(image, 0, sizeof(*image));
 	image->grid = grid;
@@ -85,13 +104,17 @@ static void begin(struct image *image, const struct incise_grid *grid,
 	image->head.arithmetic = arithmetic;
 	image->head.n_inputs = n_inputs(grid);
 	image->head.n_rules = grid->a.n * grid->b.n;
-	snprintf(image->head.name, sizeof(image->head.name), "%s", name);
+	put_name(image->head.name, sizeof(image->head.name), incise_model_name(model));
+	put_name(image->head.output, sizeof(image->head.output),
+		 incise_model_output(model)->name);
 	for (int i = 0; i < n_inputs(grid); i++) {
 		const struct incise_axis *axis = input_axis(grid, i);
 
 		image->head.input[i].min = to_q16(axis->min);
 		image->head.input[i].max = to_q16(axis->max);
 		image->head.input[i].n_mfs = axis->n;
+		put_name(image->head.input[i].name, sizeof(image->head.input[i].name),
+			 incise_model_input(model, i)->name);
 	}
 }
 
@@ -232,13 +255,15 @@ static double table_rounding(const struct image *image,
 	return output + 3 * lsb_g + 2 * lsb_h * reach + weights * size->rule;
 }
 
-static int build_table(struct image *image, const struct incise_grid *grid, int cells,
-		       const struct incise_grid_size *size, const char *name)
+static int build_table(struct image *image, const struct incise_grid *grid,
+		       const struct incise_survey *survey, int cells,
+		       const struct incise_grid_size *size,
+		       const struct incise_model *model)
 {
 	struct incise_cells a, b;
 	int rc = 0;
 
-	begin(image, grid, INCISE_FIXED_TABLE, name);
+	begin(image, grid, INCISE_FIXED_TABLE, model);
 	for (int i = 0; i < n_inputs(grid); i++)
 		set_cells(image, i, cells);
 	/* g + x·h within 2^31 with one bit to spare: knots lie beyond the support, too. */
@@ -255,21 +280,23 @@ static int build_table(struct image *image, const struct incise_grid *grid, int 
 	if (!rc)
 		rc = put_fold(image, &b);
 	if (!rc)
-		image->bound =
-			incise_bound_table(grid, &a, &b) + table_rounding(image, size);
+		image->bound = incise_survey_table(survey, a.width, b.width) +
+			       table_rounding(image, size);
 	return rc;
 }
 
 /* ---- force ---- */
 
-static int build_force(struct image *image, const struct incise_grid *grid, int cells,
-		       const struct incise_grid_size *size, const char *name)
+static int build_force(struct image *image, const struct incise_grid *grid,
+		       const struct incise_survey *survey, int cells,
+		       const struct incise_grid_size *size,
+		       const struct incise_model *model)
 {
 	long double at_a[INCISE_FIXED_MFS_MAX], at_b[INCISE_FIXED_MFS_MAX];
 	struct incise_cells a, b;
 	int32_t *to;
 
-	begin(image, grid, INCISE_FIXED_FORCE, name);
+	begin(image, grid, INCISE_FIXED_FORCE, model);
 	for (int i = 0; i < n_inputs(grid); i++)
 		set_cells(image, i, cells);
 	image->head.shift_a = (int)fmin(28, 30 - bits(1.25 * size->rule));
@@ -302,7 +329,7 @@ static int build_force(struct image *image, const struct incise_grid *grid, int 
 		}
 	}
 	/* Half an LSB in the table, two floored between knots, half one of the output. */
-	image->bound = incise_bound_force(grid, &a, &b) +
+	image->bound = incise_survey_force(survey, a.width, b.width) +
 		       ldexp(2.5, -image->head.shift_a) + 0.5 / INCISE_FIXED_ONE;
 	return 0;
 }
@@ -362,13 +389,15 @@ static bool covered(const struct incise_axis *axis)
 }
 
 static int build_direct(struct image *image, const struct incise_grid *grid,
-			const struct incise_grid_size *size, const char *name)
+			const struct incise_survey *survey,
+			const struct incise_grid_size *size,
+			const struct incise_model *model)
 {
 	int n = n_inputs(grid);
 	double reach = 1;
 	int64_t *p;
 
-	begin(image, grid, INCISE_FIXED_DIRECT, name);
+	begin(image, grid, INCISE_FIXED_DIRECT, model);
 	for (int i = 0; i < n; i++) {
 		const struct incise_axis *axis = input_axis(grid, i);
 		struct incise_fx_mf *mf = extend(image, axis->n * sizeof(*mf),
@@ -403,7 +432,7 @@ static int build_direct(struct image *image, const struct incise_grid *grid,
 		}
 	/* A consequent's half LSB times the inputs; a rule's floor and the quotient's; half
 	 * an LSB of the output. */
-	image->bound = incise_bound_direct(grid) +
+	image->bound = incise_survey_direct(survey) +
 		       ldexp(0.5 * reach, -image->head.shift_a) +
 		       ldexp(2, -image->head.shift_b) + 0.5 / INCISE_FIXED_ONE;
 	return 0;
@@ -460,20 +489,21 @@ static struct incise_fixed *finish(struct image *image, struct incise_error *err
 }
 
 /* Build one candidate; 0, or -errno when it cannot be. */
-static int build(struct image *image, const struct incise_grid *grid, int arithmetic,
-		 int cells, const struct incise_grid_size *size, const char *name)
+static int build(struct image *image, const struct incise_grid *grid,
+		 const struct incise_survey *survey, int arithmetic, int cells,
+		 const struct incise_grid_size *size, const struct incise_model *model)
 {
 	int rc;
 
 	switch (arithmetic) {
 	case INCISE_FIXED_FORCE:
-		rc = build_force(image, grid, cells, size, name);
+		rc = build_force(image, grid, survey, cells, size, model);
 		break;
 	case INCISE_FIXED_TABLE:
-		rc = build_table(image, grid, cells, size, name);
+		rc = build_table(image, grid, survey, cells, size, model);
 		break;
 	default:
-		rc = build_direct(image, grid, size, name);
+		rc = build_direct(image, grid, survey, size, model);
 	}
 	if (!rc && !(ldexp(image->bound, 32) < 0x1p62))
 		rc = -ERANGE;
@@ -487,15 +517,22 @@ static int build(struct image *image, const struct incise_grid *grid, int arithm
 /* The first candidate, from cheap to dear, whose bound is within the budget; else the one
  * of the least bound is left in *best. */
 static int choose(struct image *best, const struct incise_grid *grid,
-		  const struct incise_fixed_options *o, const char *name)
+		  const struct incise_fixed_options *o, const struct incise_model *model)
 {
 	static const int order[] = {INCISE_FIXED_FORCE, INCISE_FIXED_TABLE,
 				    INCISE_FIXED_DIRECT};
+	struct incise_survey *survey;
 	struct incise_grid_size size;
 	int rc = -ERANGE;
 
 	incise_grid_size(grid, &size);
 	*best = (struct image){.bound = INFINITY};
+	/* Nothing of that size has a format; what follows may count on finite numbers. */
+	if (!(size.parts < LARGEST))
+		return rc;
+	survey = incise_survey_new(grid);
+	if (!survey)
+		return -ENOMEM;
 	for (int k = 0; k < 3; k++)
 		for (int c = 0; c < N_COUNTS; c++) {
 			struct image image;
@@ -506,10 +543,12 @@ static int choose(struct image *best, const struct incise_grid *grid,
 			    (order[k] != INCISE_FIXED_DIRECT &&
 			     cell_counts[c] < o->cells))
 				continue;
-			built = build(&image, grid, order[k], cell_counts[c], &size,
-				      name);
-			if (built == -ENOMEM)
-				return built;
+			built = build(&image, grid, survey, order[k], cell_counts[c],
+				      &size, model);
+			if (built == -ENOMEM) {
+				rc = built;
+				goto out;
+			}
 			if (built)
 				continue;
 			rc = 0;
@@ -520,8 +559,10 @@ static int choose(struct image *best, const struct incise_grid *grid,
 			free(best->data);
 			*best = image;
 			if (!(o->budget > 0) || image.bound <= o->budget)
-				return 0;
+				goto out;
 		}
+out:
+	incise_survey_free(survey);
 	return rc;
 }
 
@@ -552,7 +593,7 @@ struct incise_fixed *incise_fixed_compile(const struct incise_model *model,
 	}
 	if (incise_grid_init(grid, model, err))
 		goto out;
-	rc = choose(&best, grid, &o, incise_model_name(model));
+	rc = choose(&best, grid, &o, model);
 	if (rc == -ENOMEM)
 		incise_error_set(err, ENOMEM, "no memory to compile a model");
 	else if (rc)
@@ -626,6 +667,18 @@ int incise_fixed_save(const struct incise_fixed *fx, const char *path,
 		return -errno;
 	fwrite(fx->blob, 1, fx->size, incise_outfile_stream(file));
 	return incise_outfile_commit(file, err);
+}
+
+struct incise_fixed *incise_fixed_copy(const struct incise_fixed *fx)
+{
+	struct owned *owned = malloc(sizeof(*owned) + fx->size);
+
+	if (!owned)
+		return NULL;
+	memcpy(owned->blob, fx->blob, fx->size);
+	/* It was valid: it is again. */
+	incise_fixed_open(&owned->fx, owned->blob, fx->size);
+	return &owned->fx;
 }
 
 void incise_fixed_free(struct incise_fixed *fx)

@@ -68,6 +68,11 @@ int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
 			"fixed point: the model has %d inputs, at most %d fit; "
 			"use double",
 			n, INCISE_FIXED_INPUTS_MAX);
+	if (model->and_method != INCISE_AND_PROD)
+		return incise_error_set(
+			err, ENOTSUP,
+			"fixed point: the model's AndMethod is min, only prod has a "
+			"fixed form; use double");
 	for (int i = 0; i < n; i++) {
 		rc = check_input(model, i, err);
 		if (rc)

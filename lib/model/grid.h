@@ -22,24 +22,27 @@ struct incise_grid {
 int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
 		     struct incise_error *err);
 
-/* What a table's or an evaluation's error depends on. */
-struct incise_cells {
-	double from;  /* lower end of the support */
-	double width; /* of a cell */
-	int n;
-};
+/*
+ * What a model's fixed-point error depends on, patch by patch over the whole support and
+ * one cell beyond, enclosed by interval arithmetic. Made once, asked for many tables.
+ */
+struct incise_survey;
+
+/* Fewest cells per input that a table may have: how far one cell may reach. */
+#define INCISE_SURVEY_CELLS 32
+
+/* NULL without memory. */
+struct incise_survey *incise_survey_new(const struct incise_grid *grid);
+void incise_survey_free(struct incise_survey *survey);
 
 /*
- * Certified bounds of the error that comes of linear interpolation between knots and of
- * the inputs' rounding, over the whole support. Rounding of the arithmetic is not in it.
+ * Certified bounds of the error that comes of linear interpolation over cells of width wa
+ * and wb, or of the direct arithmetic's degrees, and of the inputs' rounding. Rounding on
+ * the rest of the way is not in it. HUGE_VAL where nothing can be certified.
  */
-double incise_bound_table(const struct incise_grid *grid, const struct incise_cells *a,
-			  const struct incise_cells *b);
-double incise_bound_force(const struct incise_grid *grid, const struct incise_cells *a,
-			  const struct incise_cells *b);
-
-/* The same for the direct arithmetic: error of the degrees, and the inputs' rounding. */
-double incise_bound_direct(const struct incise_grid *grid);
+double incise_survey_table(const struct incise_survey *survey, double wa, double wb);
+double incise_survey_force(const struct incise_survey *survey, double wa, double wb);
+double incise_survey_direct(const struct incise_survey *survey);
 
 /* Largest magnitude of any rule's output over the support, of its parts before they
  * cancel, and of a rule's slope by input a. */

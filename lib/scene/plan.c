@@ -159,7 +159,16 @@ struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 				      scene->path);
 		goto out;
 	}
-	if (scene->fixed) {
+	if (scene->compiled && !scene->fixed) {
+		rc = incise_error_set(err, EINVAL,
+				      "%s: its model is compiled: it cannot run in double; use the "
+				      ".fis it was made of",
+				      scene->path);
+	} else if (scene->compiled) {
+		plan->fixed = incise_fixed_copy(scene->compiled);
+		if (!plan->fixed)
+			rc = incise_error_set(err, ENOMEM, "no memory for a plan");
+	} else if (scene->fixed) {
 		plan->fixed = incise_fixed_compile(scene->model, NULL, err);
 		rc = plan->fixed ? 0 : -errno;
 	} else {

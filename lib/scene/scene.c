@@ -26,11 +26,19 @@ static char *beside(const char *scene, const char *name)
 	return path;
 }
 
+static bool ends_with(const char *text, const char *end)
+{
+	size_t n = strlen(text), m = strlen(end);
+
+	return n >= m && !strcmp(text + n - m, end);
+}
+
 static int read_model(struct incise_scene *scene, const config_setting_t *root,
 		      const char *override, struct incise_error *err)
 {
 	struct incise_error why = {0};
 	const char *name = NULL;
+	int n_inputs;
 	char *path;
 	int rc = incise_conf_string(root, scene->path, "model", &name, err);
 
@@ -45,17 +53,22 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	path = override ? strdup(override) : beside(scene->path, name);
 	if (!path)
 		return incise_error_set(err, ENOMEM, "%s: no memory", scene->path);
-	scene->model = incise_model_load(path, &why);
+	if (ends_with(path, ".fx"))
+		scene->compiled = incise_fixed_load(path, &why);
+	else
+		scene->model = incise_model_load(path, &why);
 	free(path);
-	if (!scene->model)
+	if (!scene->model && !scene->compiled)
 		return incise_error_set(err, why.code, "%s: its model %s", scene->path,
 					why.text);
-	if (incise_model_n_inputs(scene->model) != 2)
+	n_inputs = scene->model ? incise_model_n_inputs(scene->model)
+				: scene->compiled->n_inputs;
+	if (n_inputs != 2)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: its model has %d inputs, a cutting model has 2: "
 			"depth_mm and velocity_mm_s",
-			scene->path, incise_model_n_inputs(scene->model));
+			scene->path, n_inputs);
 	return 0;
 }
 
@@ -144,6 +157,7 @@ void incise_scene_free(struct incise_scene *scene)
 	if (!scene)
 		return;
 	incise_model_free(scene->model);
+	incise_fixed_free(scene->compiled);
 	free(scene->path);
 	free(scene);
 }

@@ -6,6 +6,7 @@
 #define INCISE_SCENE_INTERNAL_H
 
 #include <stdbool.h>
+#include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/scene.h>
 
@@ -13,7 +14,8 @@ struct incise_scene {
 	char *path;
 	double rate_hz;
 	bool fixed;
-	struct incise_model *model;
+	struct incise_model *model;  /* one of these */
+	struct incise_fixed *compiled;
 	bool own_surface; /* else the rig's */
 	double point_mm[3], normal[3];
 	double force_N, slew_N_s, pose_age_ms;

@@ -42,6 +42,7 @@ enum incise_fixed_arithmetic {
 
 /** One input of a compiled model. */
 struct incise_fixed_input {
+	const char *name;      /**< into the blob */
 	int32_t min, max;      /**< support, Q16.16 */
 	int32_t n_mfs;	       /**< membership functions */
 	int32_t cell_shift;    /**< tables: a cell is 2^cell_shift LSB wide */
@@ -60,7 +61,8 @@ struct incise_fixed {
 	int32_t shift_a, shift_b; /**< formats, see lib/fixed/layout.h */
 	uint64_t bound;		  /**< certified error, 2^-32 of the output's unit */
 	struct incise_fixed_input input[INCISE_FIXED_INPUTS_MAX];
-	const void *data; /**< into the blob: consequents or table */
+	const char *name, *output; /**< of the model and its output, into the blob */
+	const void *data;	   /**< into the blob: consequents or table */
 	const void *blob;
 	uint32_t size; /**< of the blob, bytes */
 };
@@ -129,7 +131,10 @@ INCISE_API struct incise_fixed *incise_fixed_load(const char *path,
 INCISE_API int incise_fixed_save(const struct incise_fixed *fx, const char *path,
 				 struct incise_error *err);
 
-/** Free what incise_fixed_compile() or incise_fixed_load() made. */
+/** A copy with a blob of its own. @return copy; NULL with errno ENOMEM. */
+INCISE_API struct incise_fixed *incise_fixed_copy(const struct incise_fixed *fx);
+
+/** Free what incise_fixed_compile(), incise_fixed_copy() or incise_fixed_load() made. */
 INCISE_API void incise_fixed_free(struct incise_fixed *fx);
 
 /** The certified bound of the error, output's unit. */

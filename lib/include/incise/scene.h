@@ -9,7 +9,7 @@
  * A .scene file (libconfig):
  *
  *     rate_hz = 1000.0;
- *     model = "liver.fis";          # path, relative to the scene's folder
+ *     model = "liver.fis";          # or .fx; path, relative to the scene's folder
  *     arithmetic = "fixed";         # or "double"
  *     surface = { point_mm = [0.0, 0.0, 0.0]; normal = [0.0, 0.0, 1.0]; };  # or the rig's
  *     limits = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };

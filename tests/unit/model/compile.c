@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Compiling to fixed point: accuracy over the support, and what is refused by name.
+ * Compiling: the cheapest arithmetic within the budget, refusals, and files.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,149 +9,156 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
-#include <incise/fixed.h>
-#include "../../../lib/model/model.h"
-#include "paper_model.h"
+#include <unistd.h>
+#include "../base/temp_file.h"
+#include "../fixed/compiled.h"
 
-/*
- * Largest difference from double on a grid and at random points. With rounded, both get
- * inputs that Q16.16 holds exactly, which leaves the arithmetic's own error.
- */
-static double difference(const struct incise_model *model, bool rounded)
+static struct incise_model *smooth_model(void)
 {
-	struct incise_fixed fixed;
-	uint64_t seed = 9;
-	double largest = 0;
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 
-	assert_int_equal(incise_fixed_compile(model, &fixed, NULL), 0);
-	for (int n = 0; n < 101 * 101 + 10000; n++) {
-		double u = n < 10201 ? n / 101 / 100.0 : (paper_random(&seed) + 1) / 2;
-		double w = n < 10201 ? n % 101 / 100.0 : (paper_random(&seed) + 1) / 2;
-		double x[] = {u * 20, w * 50};
-
-		for (int i = 0; i < 2 && rounded; i++)
-			x[i] = rint(x[i] * INCISE_FIXED_ONE) / INCISE_FIXED_ONE;
-		largest = fmax(largest, fabs(incise_fixed_eval_double(&fixed, x) -
-					     incise_model_eval(model, x, NULL)));
-	}
-	return largest;
+	for (int r = 0; r < 20; r++)
+		incise_model_set_consequent(model, r,
+					    (double[]){0.02 * (r % 4),
+						       0.05 + 0.002 * (r / 4), 0.005});
+	return model;
 }
 
-/*
- * Issue 2 asks for 1 mN on models of the paper's size. The arithmetic's part: half an LSB
- * of the output (7.6 µN), and degrees and distances that are off by some 1e-7, times the
- * 12 N that neighbouring rules of these models can differ by: 10 µN.
- */
-static void test_within_tolerance_of_double(void **state)
+/* A looser budget takes a cheaper form; a tighter one a finer. */
+static void test_budget_chooses(void **state)
 {
-	for (uint64_t seed = 1; seed <= 30; seed++) {
-		struct incise_model *model = paper_model(INCISE_MF_GAUSS, seed, 4);
+	static const struct {
+		double budget;
+		enum incise_fixed_arithmetic arithmetic;
+	} cases[] = {{1e-2, INCISE_FIXED_FORCE},
+		     {1e-3, INCISE_FIXED_FORCE},
+		     {2e-5, INCISE_FIXED_TABLE}};
+	struct incise_model *model = smooth_model();
 
-		paper_disturb(model, seed, 0.5);
-		assert_true(difference(model, true) < 10e-6);
-		assert_true(difference(model, false) < 1e-3);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_fixed_options o = {.budget = cases[i].budget,
+						 .arithmetic = -1};
+		struct incise_fixed *fx = incise_fixed_compile(model, &o, NULL);
+
+		assert_non_null(fx);
+		assert_int_equal(fx->arithmetic, cases[i].arithmetic);
+		assert_true(incise_fixed_bound(fx) <= cases[i].budget);
+		incise_fixed_free(fx);
+	}
+	incise_model_free(model);
+}
+
+/* Issue 3: 0.1 mN is certified for models of the paper's size over 0–20 mm × 0–50 mm/s. */
+static void test_default_budget_holds(void **state)
+{
+	for (uint64_t seed = 1; seed <= 10; seed++) {
+		struct incise_model *model = paper_model(INCISE_MF_GAUSS, seed, 3);
+		struct incise_fixed *fx;
+
+		paper_disturb(model, seed, 0.3);
+		fx = incise_fixed_compile(model, NULL, NULL);
+		assert_non_null(fx);
+		assert_true(incise_fixed_bound(fx) <= 1e-4);
+		incise_fixed_free(fx);
 		incise_model_free(model);
 	}
-}
-
-/*
- * Consequents that nearly cancel, as unregularised training leaves them: up to 600 N.
- * The error grows with them, and the inputs' rounding most.
- */
-static void test_large_consequents(void **state)
-{
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 3, 200);
-
-	assert_true(difference(model, true) < 50 * 10e-6);
-	assert_true(difference(model, false) < 50 * 50e-6);
-	incise_model_free(model);
 }
 
 static void test_refusals(void **state)
 {
-	struct incise_model *model = paper_model(INCISE_MF_GBELL, 1, 1);
+	struct incise_fixed_options o = {.budget = 1e-6, .arithmetic = -1};
+	struct incise_model *model = smooth_model();
 	struct incise_error err = {0};
-	struct incise_fixed fixed;
 
-	assert_int_equal(incise_fixed_compile(model, &fixed, &err), -ENOTSUP);
-	assert_non_null(strstr(err.text, "in1mf1 is a gbellmf"));
+	/* Half an LSB of the output is 7.6 µN. */
+	assert_null(incise_fixed_compile(model, &o, &err));
+	assert_int_equal(err.code, ERANGE);
+	assert_non_null(strstr(err.text, "is certain to"));
+	o = (struct incise_fixed_options){.arithmetic = 3};
+	assert_null(incise_fixed_compile(model, &o, &err));
+	assert_int_equal(err.code, EINVAL);
 	incise_model_free(model);
+}
 
-	/* Each other kind by its name, and min. */
-	for (int type = INCISE_MF_GAUSS2; type < INCISE_MF_SIG; type++) {
-		model = paper_model(type, 1, 1);
-		assert_int_equal(incise_fixed_compile(model, &fixed, &err), -ENOTSUP);
-		assert_non_null(strstr(err.text, incise_mf_type_name(type)));
-		incise_model_free(model);
-	}
-	model = paper_model(INCISE_MF_GAUSS, 1, 1);
-	model->and_method = INCISE_AND_MIN;
-	assert_int_equal(incise_fixed_compile(model, &fixed, &err), -ENOTSUP);
-	assert_non_null(strstr(err.text, "AndMethod is min"));
-	incise_model_free(model);
+/* Sizes that no format holds, up to those that are not even finite once added up. */
+static void test_extreme_consequents(void **state)
+{
+	static const double sizes[] = {1e6, 1e12, 1e100, 1e308, 1.7e308};
 
-	model = paper_model(INCISE_MF_GAUSS, 1, 1e9);
-	assert_int_equal(incise_fixed_compile(model, &fixed, &err), -ERANGE);
-	assert_non_null(strstr(err.text, "too large"));
-	incise_model_free(model);
+	for (size_t i = 0; i < sizeof(sizes) / sizeof(*sizes); i++)
+		for (int a = -1; a < ARITHMETICS; a++) {
+			struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
+			struct incise_error err = {0};
+			struct incise_fixed_options o = {.arithmetic = a};
 
-	model = paper_model(INCISE_MF_GAUSS, 1, 1);
+			incise_model_set_consequent(model, 3,
+						    (double[]){sizes[i], sizes[i], 2});
+			assert_null(incise_fixed_compile(model, &o, &err));
+			assert_int_equal(err.code, ERANGE);
+			incise_model_free(model);
+		}
+}
+
+/* Functions so narrow that between them the nearest cannot be told by 128 widths. */
+static void test_narrow_functions(void **state)
+{
+	struct incise_fixed_options o = {.arithmetic = INCISE_FIXED_DIRECT};
+	struct incise_model *model = smooth_model();
+
 	for (int k = 0; k < 5; k++)
 		incise_model_set_mf(model, 0, k,
 				    (double[4]){1e-3,
 						incise_model_mf(model, 0, k)->p[1]});
-	assert_int_equal(incise_fixed_compile(model, &fixed, &err), -ERANGE);
-	assert_non_null(strstr(err.text, "within 150 widths"));
-	for (int k = 0; k < 5; k++)
-		incise_model_set_mf(model, 0, k,
-				    (double[4]){1e-12,
-						incise_model_mf(model, 0, k)->p[1]});
-	assert_int_equal(incise_fixed_compile(model, &fixed, &err), -ERANGE);
-	assert_non_null(strstr(err.text, "too small"));
-	incise_model_set_mf(model, 0, 0, (double[4]){1, 1e9});
-	assert_int_equal(incise_fixed_compile(model, &fixed, &err), -ERANGE);
+	assert_null(incise_fixed_compile(model, &o, NULL));
+	assert_int_equal(errno, ERANGE);
 	incise_model_free(model);
 }
 
-static void test_refuses_what_does_not_fit(void **state)
+static void test_files(void **state)
 {
-	static const struct {
-		int n_inputs, mfs;
-		double max;
-		int code;
-	} cases[] = {{5, 2, 1, -E2BIG},
-		     {1, 17, 1, -E2BIG},
-		     {2, 9, 1, -E2BIG},
-		     {1, 2, 40000, -ERANGE},
-		     {1, 2, 1e-4, -ERANGE}};
-	static const struct incise_variable out = {"y", 0, 1};
+	struct temp_file file = temp_file_new("m.fx", "");
+	struct incise_model *model = smooth_model();
+	struct incise_fixed *fx, *back;
+	struct incise_error err = {0};
 
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_variable in[5];
-		struct incise_fixed fixed;
-		struct incise_model *model;
-		int mfs[5];
-
-		for (int k = 0; k < 5; k++) {
-			in[k] = (struct incise_variable){"x", 0, cases[i].max};
-			mfs[k] = cases[i].mfs;
-		}
-		model = incise_model_new_grid(cases[i].n_inputs, in, mfs, INCISE_MF_GAUSS,
-					      &out, NULL);
-		assert_int_equal(incise_fixed_compile(model, &fixed, NULL),
-				 cases[i].code);
-		incise_model_free(model);
+	for (int a = 0; a < ARITHMETICS; a++) {
+		fx = compiled(model, a, 32);
+		assert_int_equal(incise_fixed_save(fx, file.path, NULL), 0);
+		back = incise_fixed_load(file.path, NULL);
+		assert_non_null(back);
+		assert_int_equal(back->size, fx->size);
+		assert_memory_equal(back->blob, fx->blob, fx->size);
+		incise_fixed_free(back);
+		back = incise_fixed_copy(fx);
+		incise_fixed_free(fx);
+		assert_true(incise_fixed_eval_double(back, (double[]){5, 20}) > 0);
+		incise_fixed_free(back);
 	}
+	assert_int_equal(truncate(file.path, 100), 0);
+	assert_null(incise_fixed_load(file.path, &err));
+	assert_int_equal(err.code, EINVAL);
+	assert_non_null(strstr(err.text, "damaged"));
+	/* Larger than any blob: read no further than that. */
+	assert_int_equal(truncate(file.path, 100 << 20), 0);
+	assert_null(incise_fixed_load(file.path, &err));
+	assert_int_equal(err.code, EINVAL);
+	temp_file_free(&file);
+	assert_null(incise_fixed_load(file.path, &err));
+	assert_int_equal(err.code, ENOENT);
+	incise_model_free(model);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_within_tolerance_of_double),
-		cmocka_unit_test(test_large_consequents),
+		cmocka_unit_test(test_budget_chooses),
+		cmocka_unit_test(test_default_budget_holds),
 		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_refuses_what_does_not_fit),
+		cmocka_unit_test(test_extreme_consequents),
+		cmocka_unit_test(test_narrow_functions),
+		cmocka_unit_test(test_files),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

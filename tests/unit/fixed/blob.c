@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Blobs from strangers: refused, or harmless. The sanitizers' run of this test sees any
+ * read outside of the blob, which stands at the end of its memory, and any overflow.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../../../lib/fixed/layout.h"
+#include "compiled.h"
+
+static const struct {
+	int arithmetic, one;
+} kinds[] = {{INCISE_FIXED_DIRECT, 0}, {INCISE_FIXED_TABLE, 0}, {INCISE_FIXED_FORCE, 0},
+	     {INCISE_FIXED_DIRECT, 1}, {INCISE_FIXED_TABLE, 1}, {INCISE_FIXED_FORCE, 1}};
+#define KINDS (sizeof(kinds) / sizeof(*kinds))
+
+/* A blob of some kind in memory of just its size. */
+static void *blob_of(int kind, uint32_t *size)
+{
+	struct incise_model *model =
+		kinds[kind].one ? line_model(1) : paper_model(INCISE_MF_GAUSS, 1, 2);
+	struct incise_fixed *fx = compiled(model, kinds[kind].arithmetic, 8);
+	void *blob;
+
+	assert_non_null(fx);
+	*size = fx->size;
+	blob = malloc(fx->size);
+	memcpy(blob, fx->blob, fx->size);
+	incise_fixed_free(fx);
+	incise_model_free(model);
+	return blob;
+}
+
+static void seal(void *blob, uint32_t size)
+{
+	struct incise_fx_header *head = blob;
+
+	head->crc = incise_fx_le32(incise_fx_crc((uint8_t *)blob + INCISE_FX_CRC_FROM,
+						 size - INCISE_FX_CRC_FROM));
+}
+
+/* CRC-32C's check value, from its specification. */
+static void test_crc(void **state)
+{
+	assert_int_equal(incise_fx_crc((const uint8_t *)"123456789", 9), 0xe3069283);
+}
+
+static void test_good_blobs_open(void **state)
+{
+	for (size_t k = 0; k < KINDS; k++) {
+		struct incise_fixed fx;
+		uint32_t size;
+		void *blob = blob_of(k, &size);
+
+		assert_int_equal(incise_fixed_open(&fx, blob, size), 0);
+		assert_int_equal(fx.arithmetic, kinds[k].arithmetic);
+		assert_int_equal(fx.n_inputs, kinds[k].one ? 1 : 2);
+		assert_string_equal(fx.input[0].name, "depth_mm");
+		assert_string_equal(fx.output, "force_N");
+		free(blob);
+	}
+}
+
+static void test_any_single_damage_is_seen(void **state)
+{
+	for (size_t k = 0; k < KINDS; k++) {
+		struct incise_fixed fx;
+		uint32_t size;
+		uint8_t *blob = blob_of(k, &size);
+
+		for (uint32_t at = 0; at < size; at += 1 + at / 64) {
+			blob[at] ^= 1 << at % 8;
+			assert_int_not_equal(incise_fixed_open(&fx, blob, size), 0);
+			blob[at] ^= 1 << at % 8;
+		}
+		for (uint32_t n = 0; n < size; n += 1 + n / 16)
+			assert_int_not_equal(incise_fixed_open(&fx, blob, n), 0);
+		assert_int_equal(incise_fixed_open(&fx, blob, size), 0);
+		free(blob);
+	}
+}
+
+static void test_versions(void **state)
+{
+	struct incise_fixed fx;
+	uint32_t size;
+	struct incise_fx_header *head = blob_of(0, &size);
+
+	head->version = incise_fx_le32(2);
+	seal(head, size);
+	assert_int_equal(incise_fixed_open(&fx, head, size), -ENOTSUP);
+	head->version = incise_fx_le32(1);
+	head->arithmetic = incise_fx_le32(7);
+	seal(head, size);
+	assert_int_equal(incise_fixed_open(&fx, head, size), -ENOTSUP);
+	free(head);
+}
+
+/* Values that are likely to hurt: ends of types, sizes, zero, one off. */
+static uint32_t nasty(uint64_t random)
+{
+	static const uint32_t values[] = {0,	      1,	  2,	      16,
+					  17,	      31,	  32,	      63,
+					  64,	      255,	  0x7fff,     0xffff,
+					  0x10000,    1u << 22,	  1u << 30,   0x3fffffff,
+					  0x7fffffff, 0x80000000, 0x80000001, 0xffffffff};
+
+	return random % 3 ? values[random / 3 % 20] : (uint32_t)(random >> 32);
+}
+
+/*
+ * Whoever can compute a checksum can sign anything: random fields and data under a right
+ * checksum are refused, or evaluate without harm at every extreme.
+ */
+static void test_signed_nonsense(void **state)
+{
+	static const int32_t extremes[] = {INT32_MIN, -1, 0, 1, 12345678, INT32_MAX};
+	uint64_t seed = 1;
+	int opened = 0, refused = 0;
+
+	for (size_t k = 0; k < KINDS; k++) {
+		uint32_t size;
+		uint8_t *good = blob_of(k, &size), *blob = malloc(size);
+
+		for (int round = 0; round < 3000; round++) {
+			struct incise_fixed fx;
+
+			memcpy(blob, good, size);
+			for (int hit = 0; hit <= round % 3; hit++) {
+				uint32_t at, value;
+
+				seed = seed * 6364136223846793005u + 1442695040888963407u;
+				/* Half of the hits in the header, which is small. */
+				at = (uint32_t)(seed >> 33) %
+				     (seed >> 20 & 1
+					      ? (uint32_t)sizeof(struct incise_fx_header)
+					      : size);
+				at &= ~3u;
+				seed = seed * 6364136223846793005u + 1442695040888963407u;
+				value = incise_fx_le32(nasty(seed >> 5));
+				if (at + 4 <= size)
+					memcpy(blob + at, &value, 4);
+			}
+			seal(blob, size);
+			if (incise_fixed_open(&fx, blob, size)) {
+				refused++;
+				continue;
+			}
+			opened++;
+			for (int n = 0; n < 36; n++)
+				incise_fixed_eval(&fx, (int32_t[]){extremes[n / 6],
+								   extremes[n % 6]});
+			for (int n = 0; n < 20; n++) {
+				int32_t x[2];
+
+				for (int i = 0; i < 2; i++) {
+					seed = seed * 6364136223846793005u +
+					       1442695040888963407u;
+					x[i] = (int32_t)(seed >> 32);
+				}
+				incise_fixed_eval(&fx, x);
+			}
+		}
+		free(good);
+		free(blob);
+	}
+	/* Both ways out were taken often. */
+	assert_true(opened > 1000 && refused > 1000);
+}
+
+/* Sizes that wrap when multiplied must not pass for small ones. */
+static void test_huge_counts(void **state)
+{
+	struct incise_fixed fx;
+	uint32_t size;
+	struct incise_fx_header *head = blob_of(2, &size);
+
+	for (int i = 0; i < 2; i++) {
+		head->input[i].min = (int32_t)incise_fx_le32(0);
+		head->input[i].max = (int32_t)incise_fx_le32(0x7fffffff);
+		head->input[i].cell_shift = incise_fx_le32(0);
+		head->input[i].cells = incise_fx_le32(0x80000000);
+	}
+	seal(head, size);
+	assert_int_equal(incise_fixed_open(&fx, head, size), -EINVAL);
+	free(head);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_crc),
+		cmocka_unit_test(test_good_blobs_open),
+		cmocka_unit_test(test_any_single_damage_is_seen),
+		cmocka_unit_test(test_versions),
+		cmocka_unit_test(test_signed_nonsense),
+		cmocka_unit_test(test_huge_counts),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
