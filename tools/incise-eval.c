@@ -59,9 +59,6 @@ static void add_row(struct evaluator *e, const double *x, double y, bool outside
 	json_array_append_new(e->rows, row);
 }
 
-return true;
-}
-
 /* Evaluate and print; a grid's text has its inputs in front. */
 static void evaluate(struct evaluator *e, const double *x, bool inputs)
 {

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise compile, and compiled models in other verbs.
+
+load cli
+
+setup() {
+	work_folder
+	cp "$root/scenes/liver.fis" m.fis
+}
+
+@test "compile holds the default budget and says so" {
+	run -0 --separate-stderr incise compile m.fis -o m.fx
+	[[ "${lines[0]}" == "m.fis: "*"certified to "*" mN" ]]
+	[ "$(head -c 8 m.fx)" = INCISEFX ]
+	incise compile m.fis -o m.fx --json >r.json
+	# 0.1 mN, in N
+	holds "$(key r.json bound_N) <= 1e-4"
+	[ "$(key r.json size_bytes)" = "$(stat -c %s m.fx)" ]
+}
+
+@test "a compiled model is within its bound of double" {
+	for kind in direct table force; do
+		incise compile m.fis -o m.fx --arith $kind --budget 1mN --json >r.json
+		[ "$(key r.json arithmetic)" = $kind ]
+		incise eval m.fis --grid 97x89 >double
+		awk 'NF { print $1, $2 }' double >points
+		incise eval m.fx points >fixed 2>/dev/null
+		awk 'NF { print $3 }' double | paste - fixed |
+			awk -v bound="$(key r.json bound_N)" '
+				{ e = $1 - $2; if (e < 0) e = -e; if (e > bound) exit 1 }
+				END { if (NR != 97 * 89) exit 1 }'
+	done
+}
+
+@test "a tighter budget makes a finer model, too tight a one is refused" {
+	incise compile m.fis -o a.fx --budget 0.09mN --json >a.json
+	incise compile m.fis -o b.fx --budget 20uN --json >b.json
+	holds "$(key b.json bound_N) <= 20e-6"
+	holds "$(key b.json size_bytes) > $(key a.json size_bytes)"
+	cp b.fx before.fx
+	run --separate-stderr incise compile m.fis -o b.fx --budget 1uN
+	failed_with "m.fis: " "is certain to"
+	cmp b.fx before.fx
+}
+
+@test "the haptic loop runs a compiled model" {
+	incise compile m.fis -o m.fx
+	run -0 incise haptic "$root/scenes/liver.scene" --model m.fx --rig sim:clock=simulated \
+		--duration 3s
+	run --separate-stderr incise haptic "$root/scenes/liver.scene" --model m.fx \
+		--arith double --rig sim:clock=simulated --duration 1s
+	failed_with compiled .fis
+}
+
+@test "damaged compiled models are refused" {
+	incise compile m.fis -o m.fx
+	size=$(stat -c %s m.fx)
+	for n in 0 7 100 287 288 $((size - 1)); do
+		head -c $n m.fx >bad.fx
+		run --separate-stderr incise eval bad.fx <<<"5 20"
+		failed_with bad.fx damaged
+	done
+	for at in 9 17 40 300 $((size - 3)); do
+		cp m.fx bad.fx
+		printf '\xa5' | dd of=bad.fx bs=1 seek=$at conv=notrunc 2>/dev/null
+		run --separate-stderr incise eval bad.fx <<<"5 20"
+		failed_with bad.fx
+	done
+}
+
+@test "compile refuses by name" {
+	sed "s/'gaussmf',\[[^]]*\]/'gbellmf',[2 2 5]/" m.fis >bell.fis
+	run --separate-stderr incise compile bell.fis -o x.fx
+	failed_with bell.fis gbellmf
+	[ ! -e x.fx ]
+	run --separate-stderr incise compile absent.fis -o x.fx
+	failed_with absent.fis
+}
+
+@test "compile: bad usage" {
+	for args in "" "m.fis" "m.fis -o" "m.fis -o x.fx --arith float" "m.fis -o x.fx --cells 0" \
+		"m.fis -o x.fx --budget 0.1kN" "m.fis -o x.fx --budget -1" "m.fis m.fis -o x.fx" \
+		"m.fis -o - --json" "m.fis -o x.fx --cells 5000"; do
+		run -2 --separate-stderr incise compile $args
+		[ "${#stderr_lines[@]}" -eq 2 ]
+	done
+	[ ! -e x.fx ]
+}
+
+@test "the integer core builds without a library, for a kernel" {
+	# what the kernel has in place of stdint.h
+	mkdir -p "$BATS_TEST_TMPDIR/kernel/linux"
+	printf '%s\n' '#include <stddef.h>' '#include <stdint.h>' \
+		>"$BATS_TEST_TMPDIR/kernel/linux/types.h"
+	# its own sources, no headers but the compiler's, no float, nothing undefined
+	for source in "$root"/lib/fixed/*.c; do
+		${CC:-cc} -std=gnu11 -ffreestanding -nostdinc \
+			-isystem "$(${CC:-cc} -print-file-name=include)" -O2 -Wall -Wextra -Werror \
+			$([ "$(uname -m)" != x86_64 ] || echo -mgeneral-regs-only) \
+			-I"$root/lib/include" -D__KERNEL__ -I"$BATS_TEST_TMPDIR/kernel" -c "$source" \
+			-o "$(basename "$source" .c).o"
+	done
+	${LD:-ld} -r -o all.o ./*.o
+	run -0 nm -u all.o
+	[ -z "$(echo "$output" | grep -v '^ *U *$' | grep -v '^$')" ] || complain "$output"
+}
