@@ -98,6 +98,10 @@ static void say(const char *level, const char *fmt, va_list args)
 
 	cli_progress_end();
 	vsnprintf(text, sizeof(text), fmt, args);
+	/* A name from outside must not break the line or steer the terminal. */
+	for (char *c = text; *c; c++)
+		if ((unsigned char)*c < ' ' || *c == 0x7f)
+			*c = '?';
 	fflush(stdout);
 	fprintf(stderr, "incise%s%s: %s%s\n", current ? " " : "",
 		current ? current->name : "", level, text);

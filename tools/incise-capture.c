@@ -189,9 +189,9 @@ static void report(const char *path, const struct incise_recorder_stats *stats,
 	uint64_t lost = stats->force_lost + stats->tracker_lost;
 
 	if (json) {
-		json_print(json_pack("{ss so sI sI sI sI sI sI sI so}", "path", path,
-				     "seconds", json_number(seconds), "force",
-				     (json_int_t)stats->force, "tracker",
+		json_print(json_pack("{so so sI sI sI sI sI sI sI so}", "path",
+				     json_text(path), "seconds", json_number(seconds),
+				     "force", (json_int_t)stats->force, "tracker",
 				     (json_int_t)stats->tracker, "depth",
 				     (json_int_t)stats->depth, "lost", (json_int_t)lost,
 				     "force_lost", (json_int_t)stats->force_lost,
@@ -200,12 +200,14 @@ static void report(const char *path, const struct incise_recorder_stats *stats,
 				     "zero_mV", json_number(stats->zero_mV)));
 		return;
 	}
-	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker records, %llu lost, "
-	       "zero %.1f mV\n",
+	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker records, %llu lost",
 	       path, seconds, (unsigned long long)stats->force,
 	       (unsigned long long)stats->force_clipped,
-	       (unsigned long long)stats->tracker, (unsigned long long)lost,
-	       stats->zero_mV);
+	       (unsigned long long)stats->tracker, (unsigned long long)lost);
+	/* A short recording gets its zero when it is closed. */
+	if (!isnan(stats->zero_mV))
+		printf(", zero %.1f mV", stats->zero_mV);
+	putchar('\n');
 	cli_finish();
 }
 

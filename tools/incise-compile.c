@@ -76,9 +76,9 @@ static void report(const struct incise_fixed *fx, const char *model, const char 
 	for (int i = 0; i < fx->n_inputs; i++)
 		json_array_append_new(cells, json_integer(fx->input[i].cells));
 	if (json) {
-		json_print(json_pack("{ss ss ss so si sf}", "model", model, "output",
-				     path, "arithmetic", name, "cells", cells,
-				     "size_bytes", fx->size, "bound_N",
+		json_print(json_pack("{so so ss so si sf}", "model", json_text(model),
+				     "output", json_text(path), "arithmetic", name,
+				     "cells", cells, "size_bytes", fx->size, "bound_N",
 				     incise_fixed_bound(fx)));
 		return;
 	}

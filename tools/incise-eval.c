@@ -129,7 +129,8 @@ static void eval_stream(struct evaluator *e, FILE *in, const char *path)
 		parse_line(e, path, line, text, x);
 		evaluate(e, x, false);
 	}
-	if (ferror(in))
+	/* getline(3) fails without memory, too. */
+	if (!feof(in))
 		cli_fail("%s: %s", path, strerror(errno));
 	free(text);
 }

@@ -11,7 +11,7 @@
 #include "cli.h"
 #include "json.h"
 
-#define BINS_MAX 10000
+#define BINS_MAX 1000
 
 enum { OPT_BY_CUT = CLI_LONG, OPT_DEPTH_MAX, OPT_VELOCITY_MAX, OPT_MIN_COUNT, OPT_JSON };
 
@@ -58,7 +58,7 @@ static void parse_bins(const char *text, int *depth, int *velocity)
 
 static void print_report(const struct incise_export_report *report, const char *output)
 {
-	json_print(json_pack("{ss sI si sI so so}", "path", output, "rows",
+	json_print(json_pack("{so sI si sI so so}", "path", json_text(output), "rows",
 			     (json_int_t)report->rows, "cuts", report->cuts, "clipped",
 			     (json_int_t)report->clipped, "depth_max_mm",
 			     json_number(report->depth_max_mm), "velocity_max_mm_s",

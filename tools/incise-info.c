@@ -41,11 +41,11 @@ static json_t *input_json(const struct incise_model *model, int i)
 		for (int j = 0; j < incise_mf_n_params(mf->type); j++)
 			json_array_append_new(params, json_real(mf->p[j]));
 		json_array_append_new(
-			mfs, json_pack("{ss ss so}", "name", mf->name, "type",
+			mfs, json_pack("{so ss so}", "name", json_text(mf->name), "type",
 				       incise_mf_type_name(mf->type), "params", params));
 	}
-	return json_pack("{ss sf sf so}", "name", v->name, "min", v->min, "max", v->max,
-			 "mfs", mfs);
+	return json_pack("{so sf sf so}", "name", json_text(v->name), "min", v->min,
+			 "max", v->max, "mfs", mfs);
 }
 
 /* As .fis files spell it. */
@@ -74,12 +74,12 @@ static void model_json(const struct incise_model *model, const char *refused)
 			rules, json_pack("{so so sf}", "mfs", mfs, "consequent", p,
 					 "weight", incise_model_rule_weight(model, r)));
 	}
-	json_print(json_pack("{ss ss so s{ss sf sf} ss so sb so}", "kind", "model",
-			     "name", incise_model_name(model), "inputs", inputs, "output",
-			     "name", out->name, "min", out->min, "max", out->max,
-			     "and_method", and_method(model), "rules", rules,
-			     "fixed_point", !refused, "fixed_point_refused",
-			     refused ? json_string(refused) : json_null()));
+	json_print(json_pack(
+		"{ss so so s{so sf sf} ss so sb so}", "kind", "model", "name",
+		json_text(incise_model_name(model)), "inputs", inputs, "output", "name",
+		json_text(out->name), "min", out->min, "max", out->max, "and_method",
+		and_method(model), "rules", rules, "fixed_point", !refused,
+		"fixed_point_refused", refused ? json_text(refused) : json_null()));
 }
 
 static void model_text(const struct incise_model *model, const char *refused)
@@ -140,13 +140,13 @@ static void show_model(const char *path, bool json)
 static void recording_json(const struct incise_recording_info *info)
 {
 	json_print(json_pack(
-		"{ss sb sf ss ss s{sI sI sI} s{sI sI} sI s{si sf} s{sf so sf} si sf sf}",
+		"{ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf} s{sf so sf} si sf sf}",
 		"kind", "recording", "complete", info->complete, "seconds",
-		(info->end_ns - info->start_ns) * 1e-9, "started", info->started, "rig",
-		info->rig, "rows", "force", (json_int_t)info->force, "tracker",
-		(json_int_t)info->tracker, "depth", (json_int_t)info->depth, "lost",
-		"force", (json_int_t)info->force_lost, "tracker",
-		(json_int_t)info->tracker_lost, "force_clipped",
+		(info->end_ns - info->start_ns) * 1e-9, "started",
+		json_text(info->started), "rig", json_text(info->rig), "rows", "force",
+		(json_int_t)info->force, "tracker", (json_int_t)info->tracker, "depth",
+		(json_int_t)info->depth, "lost", "force", (json_int_t)info->force_lost,
+		"tracker", (json_int_t)info->tracker_lost, "force_clipped",
 		(json_int_t)info->force_clipped, "adc", "bits", info->bits,
 		"full_scale_V", info->full_scale_V, "calibration", "force_mV_N",
 		info->force_mV_N, "force_zero_mV", json_number(info->zero_mV),

@@ -68,6 +68,14 @@ static bool on_path(const char *name)
 	return found;
 }
 
+static bool known(const char *verb)
+{
+	for (size_t i = 0; i < sizeof(verbs) / sizeof(*verbs); i++)
+		if (!strcmp(verb, verbs[i].name))
+			return true;
+	return false;
+}
+
 /* The manual page, from the source tree when this runs in a build tree. */
 static int manual(const char *verb)
 {
@@ -75,6 +83,12 @@ static int manual(const char *verb)
 	char *name, *page;
 
 	own_folder(folder, sizeof(folder));
+	if (verb && !known(verb)) {
+		fprintf(stderr,
+			"incise: there is no verb '%.64s'; 'incise --help' lists them\n",
+			verb);
+		return 2;
+	}
 	if (asprintf(&name, "incise%s%s", verb ? "-" : "", verb ? verb : "") < 0 ||
 	    asprintf(&page, "%s/../../man/%s.1", folder, name) < 0)
 		return 1;

@@ -10,6 +10,9 @@
 /* A real number, or null when it is not finite. */
 json_t *json_number(double value);
 
+/* Text that may hold any bytes: those that are not UTF-8 become '?'. */
+json_t *json_text(const char *text);
+
 /* Print one object to standard output and release it. */
 void json_print(json_t *object);
 

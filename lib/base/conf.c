@@ -7,6 +7,7 @@
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include "conf.h"
@@ -99,11 +100,30 @@ static int INCISE_PRINTF(5, 6)
 				found);
 }
 
+/*
+ * The line of an @include, or 0. They are refused: a configuration is one file, and
+ * libconfig's parser ends the process on one that names a folder.
+ */
+static int include_line(FILE *stream)
+{
+	char *text = NULL;
+	size_t size = 0;
+	int line = 0, found = 0;
+
+	while (!found && getline(&text, &size, stream) >= 0) {
+		line++;
+		if (!strncmp(text + strspn(text, " \t"), "@include", 8))
+			found = line;
+	}
+	free(text);
+	return found;
+}
+
 int incise_conf_read(config_t *config, const char *path, struct incise_error *err)
 {
 	struct stat st;
 	FILE *stream = fopen(path, "re");
-	int rc = 0;
+	int rc = 0, line;
 
 	/* fopen(3) takes folders, on which the parser would end the process. */
 	if (stream && !fstat(fileno(stream), &st) && S_ISDIR(st.st_mode)) {
@@ -116,6 +136,17 @@ int incise_conf_read(config_t *config, const char *path, struct incise_error *er
 					"%.200s: cannot be read: %s; give the path of a "
 					"configuration file",
 					path, strerror(errno));
+	line = include_line(stream);
+	if (line || fseek(stream, 0, SEEK_SET)) {
+		fclose(stream);
+		return incise_error_set(
+			err, EINVAL,
+			line ? "%.200s:%d: @include is not supported: write it "
+			       "all in one file"
+			     : "%.200s:%d: cannot be read twice: give a regular "
+			       "file",
+			path, line);
+	}
 	config_init(config);
 	if (!config_read(config, stream)) {
 		const char *file = config_error_file(config);

@@ -79,8 +79,10 @@ struct incise_outfile *incise_outfile_open(const char *path, struct incise_error
 	if (!file)
 		goto fail;
 	file->path = strdup(path);
-	/* A link is written through, not replaced. */
+	/* A link is written through, not replaced; one that leads nowhere is refused. */
 	file->target = realpath(path, NULL);
+	if (!file->target && !lstat(path, &st) && S_ISLNK(st.st_mode))
+		goto fail;
 	if (!file->target)
 		file->target = strdup(path);
 	if (!file->path || !file->target)

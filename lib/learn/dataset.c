@@ -103,7 +103,8 @@ static int next_row(struct reader *in)
 			*c = 0;
 		}
 	}
-	if (ferror(in->file))
+	/* getline(3) fails without memory, too. */
+	if (!feof(in->file))
 		return incise_error_set(in->err, errno ? errno : EIO,
 					"%s: %s; give a CSV file with a header row",
 					in->path, strerror(errno ? errno : EIO));

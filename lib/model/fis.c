@@ -72,7 +72,8 @@ static int next_line(struct reader *in)
 		if (*in->text && *in->text != '%' && *in->text != '#')
 			return 1;
 	}
-	if (ferror(in->file))
+	/* getline(3) fails without memory, too. */
+	if (!feof(in->file))
 		return incise_error_set(in->err, errno ? errno : EIO,
 					"%s: %s; give a .fis file", in->path,
 					strerror(errno ? errno : EIO));

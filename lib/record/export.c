@@ -15,7 +15,7 @@
 #include "cut.h"
 #include "recording.h"
 
-#define BINS_MAX 10000 /* in one direction */
+#define BINS_MAX 1000 /* in one direction; all of them are held in memory */
 
 /* Force samples of one bin, or of one row of a raw export. */
 struct bin {
@@ -97,8 +97,9 @@ static char *cut_name(struct incise_recording *const *recordings, int at)
 		*to++ = (unsigned char)*c < ' ' || *c == 0x7f ? '_' : *c;
 	}
 	*to = 0;
+	/* '~' stands in no recording's own suffix of this kind. */
 	if (same > 1)
-		sprintf(to, ".%d", same);
+		sprintf(to, "~%d", same);
 	return text;
 }
 

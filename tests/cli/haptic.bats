@@ -310,3 +310,10 @@ refuses() {
 	cmp out l.csv
 	[ -s report ]
 }
+
+@test "an @include is refused by line, a folder's too" {
+	mkdir folder
+	printf 'rate_hz = 1000.0;\n  @include "folder"\n' >inc.scene
+	run --separate-stderr incise haptic inc.scene --rig sim:
+	failed_with "inc.scene:2: " "@include"
+}

@@ -151,3 +151,10 @@ setup() {
 	run --separate-stderr bash -c "incise info --json m.fis >/dev/full"
 	failed_with "standard output: "
 }
+
+@test "info --json of a name that is not UTF-8 is still JSON" {
+	printf "a\xff" >odd
+	sed "s/^Name='incise'/Name='$(cat odd)'/" m.fis >bad8.fis
+	incise info bad8.fis --json >r.json
+	[ "$(key r.json name)" = "a?" ]
+}

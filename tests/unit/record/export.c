@@ -452,7 +452,7 @@ static void recordings_are_pooled_and_kept_apart(void **state)
 	text = export(paths, 3, &how, &three, &err);
 	assert_non_null(text);
 	assert_non_null(strstr(text, "\nliver-01,"));
-	assert_non_null(strstr(text, "\nliver.2-01,"));
+	assert_non_null(strstr(text, "\nliver~2-01,"));
 	assert_non_null(strstr(text, "\n\"a \"\"b\"\", c-14\","));
 	free(text);
 }
