@@ -88,11 +88,13 @@ static int check_mfs(const struct incise_fixed *fx, int i, uint32_t offset)
 static int check_direct(const struct incise_fixed *fx)
 {
 	const int64_t *p = fx->data;
-	int n = fx->n_inputs, shift = fx->shift_a + 16 - fx->shift_b;
+	int n = fx->n_inputs, shift;
 	uint64_t largest = 0;
 
-	if (fx->shift_a < 0 || fx->shift_a > 40 || fx->shift_b < 17 || fx->shift_b > 40 ||
-	    shift < 0 || shift > 62)
+	if (fx->shift_a < 0 || fx->shift_a > 40 || fx->shift_b < 17 || fx->shift_b > 40)
+		return BAD;
+	shift = fx->shift_a + 16 - fx->shift_b;
+	if (shift < 0)
 		return BAD;
 	for (int r = 0; r < fx->n_rules; r++, p += n + 1) {
 		uint64_t sum = 0;
@@ -146,11 +148,14 @@ static int check_weights(const struct incise_fixed *fx)
 static int check_fold(const struct incise_fixed *fx)
 {
 	const int32_t *fold = fx->data;
-	int n = fx->input[0].n_mfs, to_g = 16 + fx->shift_b - fx->shift_a;
+	int n = fx->input[0].n_mfs, to_g;
 	uint64_t reach =
 		((uint64_t)((int64_t)fx->input[0].max - fx->input[0].min) >> 1) + 1;
 
-	if (fx->shift_a < 17 || fx->shift_a > 30 || to_g < 0 || to_g > 62)
+	if (fx->shift_a < 17 || fx->shift_a > 30 || fx->shift_b < -16 || fx->shift_b > 76)
+		return BAD;
+	to_g = 16 + fx->shift_b - fx->shift_a;
+	if (to_g < 0 || to_g > 62)
 		return BAD;
 	for (int64_t row = 0; row <= fx->input[1].cells; row++)
 		for (int i = 0; i < n; i++) {
