@@ -12,223 +12,124 @@
 #include <stdlib.h>
 #include <string.h>
 #include "anfis.h"
+#include "basis.h"
 #include "lsq.h"
 
-#define PARAMS_MAX 3
-
-/* Per membership function: its parameters' count, first values and gradient. */
-struct premise {
-	int n_params;
-	double first[4];
-	double gradient[PARAMS_MAX];
-	double share; /* Σ over its rules, within one pair */
-};
+/* Firing strengths are kept from the fit to the gradient for so many numbers: 8 MB. */
+#define KEPT_MAX (1 << 20)
 
 struct state {
-	struct incise_model *model;
+	struct incise_basis basis, best;
 	struct incise_lsq *lsq;
-	int n_inputs, n_rules;
-	double *x;	/* solution of the consequents */
-	double *w;	/* firing strengths */
-	double *output; /* of each rule */
-	struct premise premise[INCISE_MODEL_INPUTS_MAX][INCISE_MODEL_MFS_MAX];
+	int n_linear;
+	size_t n_kept; /* pairs whose firing strengths are kept */
+	double *kept;
+	double *x, *best_x; /* consequents */
+	double *gradient;   /* of the premises */
 	double step;
 	/* The last five RMSEs, newest first, and when the step last changed. */
 	double rmse[5];
 	int raised, lowered;
 };
 
-int incise_anfis_n_premises(const struct incise_model *model)
+/* Firing strengths of pair n: kept, or computed into w. */
+static const double *strengths(const struct state *s, size_t n, const double *x,
+			       double *w)
 {
-	int n = 0;
-
-	for (int i = 0; i < incise_model_n_inputs(model); i++)
-		for (int k = 0; k < incise_model_n_mfs(model, i); k++)
-			n += incise_mf_n_params(incise_model_mf(model, i, k)->type);
-	return n;
+	if (n < s->n_kept)
+		return s->kept + n * s->basis.n_rules;
+	incise_basis_firing(&s->basis, x, w);
+	return w;
 }
 
-/* ∂log A/∂p */
-static void log_gradient(const struct incise_mf *mf, double x, double *g)
+static int solve(struct state *s, const struct incise_pairs *pairs, double ridge)
 {
-	const double *p = mf->p;
-	double d, z, off;
-
-	switch (mf->type) {
-	case INCISE_MF_GAUSS:
-		d = x - p[1];
-		g[0] = d * d / (p[0] * p[0] * p[0]);
-		g[1] = d / (p[0] * p[0]);
-		break;
-	case INCISE_MF_GBELL:
-		d = x - p[2];
-		z = fabs(d / p[0]);
-		off = 1 - incise_mf_eval(mf, x);
-		g[0] = 2 * p[1] / p[0] * off;
-		g[1] = z > 0 ? -2 * log(z) * off : 0;
-		g[2] = d != 0 ? 2 * p[1] / d * off : 0;
-		break;
-	default: /* incise_train() has refused it */
-		memset(g, 0, PARAMS_MAX * sizeof(*g));
-		break;
-	}
-}
-
-int incise_anfis_fold(const struct incise_model *model, const struct incise_pairs *pairs,
-		      struct incise_lsq *lsq)
-{
-	int n_inputs = pairs->n_inputs, n_rules = incise_model_n_rules(model);
 	double w[INCISE_MODEL_RULES_MAX];
+	int d = pairs->n_inputs;
+
+	incise_lsq_reset(s->lsq);
+	for (size_t n = 0; n < pairs->n; n++) {
+		const double *x = pairs->rows + n * (d + 1);
+		double *to = n < s->n_kept ? s->kept + n * s->basis.n_rules : w;
+
+		incise_basis_firing(&s->basis, x, to);
+		incise_basis_row(&s->basis, to, x, incise_lsq_row(s->lsq));
+		incise_lsq_add(s->lsq, x[d]);
+	}
+	return incise_lsq_solve(s->lsq, ridge, s->x);
+}
+
+static double check_rmse(const struct state *s, const struct incise_pairs *pairs)
+{
+	double w[INCISE_MODEL_RULES_MAX], f[INCISE_MODEL_RULES_MAX], sum = 0;
+	int d = pairs->n_inputs;
 
 	for (size_t n = 0; n < pairs->n; n++) {
-		const double *x = pairs->rows + n * (n_inputs + 1);
-		double *row = incise_lsq_row(lsq);
+		const double *x = pairs->rows + n * (d + 1);
+		double e;
 
-		incise_model_firing(model, x, w);
-		for (int r = 0; r < n_rules; r++) {
-			*row++ = w[r];
-			for (int i = 0; i < n_inputs; i++)
-				*row++ = w[r] * x[i];
-		}
-		if (incise_lsq_add(lsq, x[n_inputs]))
-			return -EDOM;
-	}
-	return 0;
-}
-
-void incise_anfis_set_consequents(struct incise_model *model, const double *x)
-{
-	int n = incise_model_n_inputs(model) + 1;
-
-	for (int r = 0; r < incise_model_n_rules(model); r++)
-		incise_model_set_consequent(model, r, x + r * n);
-}
-
-/* Output of the model at x without clamping; leaves w and the rules' outputs in s. */
-static double predict(struct state *s, const double *x)
-{
-	double y = 0;
-
-	incise_model_firing(s->model, x, s->w);
-	for (int r = 0; r < s->n_rules; r++) {
-		const double *p = incise_model_consequent(s->model, r);
-
-		s->output[r] = p[0];
-		for (int i = 0; i < s->n_inputs; i++)
-			s->output[r] += p[i + 1] * x[i];
-		y += s->w[r] * s->output[r];
-	}
-	return y;
-}
-
-static double rmse(struct state *s, const struct incise_pairs *pairs)
-{
-	double sum = 0;
-
-	for (size_t n = 0; n < pairs->n; n++) {
-		const double *x = pairs->rows + n * (s->n_inputs + 1);
-		double e = predict(s, x) - x[s->n_inputs];
-
+		incise_basis_firing(&s->basis, x, w);
+		e = incise_basis_output(&s->basis, w, x, s->x, f) - x[d];
 		sum += e * e;
 	}
-	return pairs->n ? sqrt(sum / pairs->n) : NAN;
+	return sqrt(sum / pairs->n);
 }
 
 /* One pair's part in the gradient. */
-static void add_gradient(struct state *s, const double *x, double y)
+static void add_gradient(struct state *s, const double *x, const double *w,
+			 const double *f, double y, double error)
 {
-	double g[PARAMS_MAX], e = y - x[s->n_inputs];
+	double slopes[INCISE_MODEL_INPUTS_MAX * INCISE_MODEL_MFS_MAX * BASIS_PARAMS_MAX];
+	double shares[INCISE_MODEL_INPUTS_MAX * INCISE_MODEL_MFS_MAX];
+	const double *slope = slopes, *share = shares;
+	double *g = s->gradient;
 
-	for (int i = 0; i < s->n_inputs; i++)
-		for (int k = 0; k < incise_model_n_mfs(s->model, i); k++)
-			s->premise[i][k].share = 0;
-	for (int r = 0; r < s->n_rules; r++)
-		for (int i = 0; i < s->n_inputs; i++) {
-			int k = incise_model_rule_mf(s->model, r, i);
-
-			if (k >= 0)
-				s->premise[i][k].share += s->w[r] * (s->output[r] - y);
-		}
-	for (int i = 0; i < s->n_inputs; i++)
-		for (int k = 0; k < incise_model_n_mfs(s->model, i); k++) {
-			struct premise *p = &s->premise[i][k];
-
-			log_gradient(incise_model_mf(s->model, i, k), x[i], g);
-			for (int j = 0; j < p->n_params; j++)
-				p->gradient[j] += 2 * e * p->share * g[j];
-		}
+	incise_basis_slopes(&s->basis, x, slopes);
+	incise_basis_shares(&s->basis, w, f, y, shares);
+	for (int i = 0; i < s->basis.n_inputs; i++)
+		for (int k = 0; k < s->basis.n_mfs[i]; k++, share++)
+			for (int j = incise_mf_n_params(s->basis.type[i][k]); j > 0; j--)
+				*g++ += 2 * error * *share * *slope++;
 }
 
 /* Training RMSE, and the gradient on the way. */
 static double gradient(struct state *s, const struct incise_pairs *pairs)
 {
-	double sum = 0;
+	double buffer[INCISE_MODEL_RULES_MAX], f[INCISE_MODEL_RULES_MAX], sum = 0;
+	int d = pairs->n_inputs;
 
-	for (int i = 0; i < s->n_inputs; i++)
-		for (int k = 0; k < incise_model_n_mfs(s->model, i); k++)
-			memset(s->premise[i][k].gradient, 0,
-			       sizeof(s->premise[i][k].gradient));
+	memset(s->gradient, 0, s->basis.n_premises * sizeof(double));
 	for (size_t n = 0; n < pairs->n; n++) {
-		const double *x = pairs->rows + n * (s->n_inputs + 1);
-		double y = predict(s, x);
-		double e = y - x[s->n_inputs];
+		const double *x = pairs->rows + n * (d + 1);
+		const double *w = strengths(s, n, x, buffer);
+		double y = incise_basis_output(&s->basis, w, x, s->x, f);
 
-		sum += e * e;
-		add_gradient(s, x, y);
+		sum += (y - x[d]) * (y - x[d]);
+		add_gradient(s, x, w, f, y, y - x[d]);
 	}
 	return sqrt(sum / pairs->n);
 }
 
-static double clamp(double x, double min, double max)
-{
-	return fmax(min, fmin(max, x));
-}
-
-/* Hold widths and slopes near where they began, and centres in order. */
-static void hold_shape(struct state *s, int i, int k, double *p)
-{
-	const struct premise *m = &s->premise[i][k];
-	int c = m->n_params - 1; /* the centre is the last parameter of both kinds */
-	int n = incise_model_n_mfs(s->model, i);
-
-	p[0] = clamp(p[0], m->first[0] / 2, m->first[0] * 2);
-	if (m->n_params == 3)
-		p[1] = clamp(p[1], m->first[1] / 2, m->first[1] * 4);
-	if (k > 0) {
-		double least = 0.25 * (m->first[c] - s->premise[i][k - 1].first[c]);
-
-		p[c] = fmax(p[c], incise_model_mf(s->model, i, k - 1)->p[c] + least);
-	}
-	if (k + 1 < n) {
-		double least = 0.25 * (s->premise[i][k + 1].first[c] - m->first[c]);
-
-		p[c] = fmin(p[c], incise_model_mf(s->model, i, k + 1)->p[c] - least);
-	}
-}
-
 /* A step of length s->step down the gradient. */
-static void move_premises(struct state *s, bool keep_shape)
+static void move_premises(struct state *s)
 {
-	double norm = 0;
+	double norm = 0, p[BASIS_PARAMS_MAX];
 
-	for (int i = 0; i < s->n_inputs; i++)
-		for (int k = 0; k < incise_model_n_mfs(s->model, i); k++)
-			for (int j = 0; j < s->premise[i][k].n_params; j++)
-				norm = hypot(norm, s->premise[i][k].gradient[j]);
+	for (int i = 0; i < s->basis.n_premises; i++)
+		norm = hypot(norm, s->gradient[i]);
 	if (!(norm > 0) || !isfinite(norm))
 		return;
-	for (int i = 0; i < s->n_inputs; i++)
-		for (int k = 0; k < incise_model_n_mfs(s->model, i); k++) {
-			const struct incise_mf *mf = incise_model_mf(s->model, i, k);
-			double p[4];
+	for (int i = 0; i < s->basis.n_inputs; i++)
+		for (int k = 0; k < s->basis.n_mfs[i]; k++) {
+			int at = s->basis.at[i][k];
+			int n = incise_mf_n_params(s->basis.type[i][k]);
 
-			memcpy(p, mf->p, sizeof(p));
-			for (int j = 0; j < s->premise[i][k].n_params; j++)
-				p[j] -= s->step * s->premise[i][k].gradient[j] / norm;
-			if (keep_shape)
-				hold_shape(s, i, k, p);
-			/* A step that would turn a width negative is not taken. */
-			incise_model_set_mf(s->model, i, k, p);
+			for (int j = 0; j < n; j++)
+				p[j] = s->basis.p[at + j] -
+				       s->step * s->gradient[at + j] / norm;
+			/* A step that would turn a width or slope negative is not taken. */
+			if (p[0] > 0 && (n == 2 || p[1] > 0))
+				memcpy(s->basis.p + at, p, n * sizeof(*p));
 		}
 }
 
@@ -252,79 +153,74 @@ static void adapt_step(struct state *s, int epoch)
 	}
 }
 
-static int epoch(struct state *s, struct incise_anfis *anfis, int number,
-		 struct incise_model *best)
+static int epoch(struct state *s, struct incise_anfis *anfis, int number)
 {
 	double train, check, score;
-	int rc;
+	int rc = solve(s, anfis->train, anfis->ridge);
 
-	incise_lsq_reset(s->lsq);
-	rc = incise_anfis_fold(s->model, anfis->train, s->lsq);
-	if (!rc)
-		rc = incise_lsq_solve(s->lsq, anfis->ridge, s->x);
 	if (rc)
 		return rc;
-	incise_anfis_set_consequents(s->model, s->x);
 	train = gradient(s, anfis->train);
-	check = anfis->check ? rmse(s, anfis->check) : NAN;
+	check = anfis->check ? check_rmse(s, anfis->check) : NAN;
 	score = anfis->check ? check : train;
 	if (anfis->progress)
 		anfis->progress(anfis->user, number + 1, train, check);
-	if (!anfis->best_epoch || !anfis->keep_best ||
+	if (!anfis->best_epoch ||
 	    score < (anfis->check ? anfis->check_rmse : anfis->train_rmse)) {
 		anfis->best_epoch = number + 1;
 		anfis->train_rmse = train;
 		anfis->check_rmse = check;
-		incise_model_assign(best, s->model);
+		s->best = s->basis;
+		memcpy(s->best_x, s->x, s->n_linear * sizeof(double));
 	}
 	memmove(s->rmse + 1, s->rmse, 4 * sizeof(*s->rmse));
 	s->rmse[0] = train;
-	move_premises(s, anfis->keep_shape);
+	move_premises(s);
 	adapt_step(s, number);
 	return 0;
 }
 
+static void state_free(struct state *s)
+{
+	if (!s)
+		return;
+	incise_lsq_free(s->lsq);
+	free(s->kept);
+	free(s->x);
+	free(s->best_x);
+	free(s->gradient);
+	free(s);
+}
+
 int incise_anfis_run(struct incise_model *model, struct incise_anfis *anfis)
 {
-	int n_rules = incise_model_n_rules(model);
-	int n = n_rules * (incise_model_n_inputs(model) + 1);
-	struct incise_model *best = incise_model_copy(model);
 	struct state *s = calloc(1, sizeof(*s));
-	int rc = -ENOMEM;
+	int rc = s ? incise_basis_init(&s->basis, model) : -ENOMEM;
 
-	if (!s || !best)
+	if (rc)
 		goto out;
-	s->model = model;
-	s->n_inputs = incise_model_n_inputs(model);
-	s->n_rules = n_rules;
 	s->step = anfis->step;
-	s->lsq = incise_lsq_new(n);
-	s->x = malloc(n * sizeof(double));
-	s->w = malloc(n_rules * sizeof(double));
-	s->output = malloc(n_rules * sizeof(double));
-	if (!s->lsq || !s->x || !s->w || !s->output)
+	s->n_linear = s->basis.n_rules * (s->basis.n_inputs + 1);
+	s->n_kept = KEPT_MAX / s->basis.n_rules;
+	if (s->n_kept > anfis->train->n)
+		s->n_kept = anfis->train->n;
+	rc = -ENOMEM;
+	s->lsq = incise_lsq_new(s->n_linear);
+	s->kept = malloc(s->n_kept * s->basis.n_rules * sizeof(double));
+	s->x = malloc(s->n_linear * sizeof(double));
+	s->best_x = malloc(s->n_linear * sizeof(double));
+	s->gradient = malloc(s->basis.n_premises * sizeof(double));
+	if (!s->lsq || !s->kept || !s->x || !s->best_x || !s->gradient)
 		goto out;
-	for (int i = 0; i < s->n_inputs; i++)
-		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
-			const struct incise_mf *mf = incise_model_mf(model, i, k);
-
-			s->premise[i][k].n_params = incise_mf_n_params(mf->type);
-			memcpy(s->premise[i][k].first, mf->p, sizeof(mf->p));
-		}
 	anfis->best_epoch = 0;
 	rc = 0;
 	for (int e = 0; e < anfis->epochs && !rc; e++)
-		rc = epoch(s, anfis, e, best);
-	if (!rc)
-		incise_model_assign(model, best);
+		rc = epoch(s, anfis, e);
+	if (rc)
+		goto out;
+	incise_basis_store(&s->best, model);
+	rc = incise_basis_set_consequents(model, s->best_x);
 out:
-	if (s) {
-		incise_lsq_free(s->lsq);
-		free(s->x);
-		free(s->w);
-		free(s->output);
-	}
-	free(s);
-	incise_model_free(best);
+	state_free(s);
 	return rc;
 }

@@ -53,7 +53,7 @@ static int linear_rmse(const struct incise_pairs *train, const struct incise_pai
 		for (int i = 0; i < d; i++)
 			row[i] = (x[i] - columns[i].mean) / columns[i].sd;
 		row[d] = 1;
-		rc = incise_lsq_add(lsq, (x[d] - columns[d].mean) / columns[d].sd);
+		incise_lsq_add(lsq, (x[d] - columns[d].mean) / columns[d].sd);
 	}
 	/* Just enough ridge to be defined where inputs depend on each other. */
 	if (!rc)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Random order by seed; see shuffle.h.
+ * Random numbers and order by seed; see shuffle.h.
  */
 #include "shuffle.h"
 
@@ -11,6 +11,11 @@ static uint64_t splitmix(uint64_t *state)
 	z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
 	z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
 	return z ^ (z >> 31);
+}
+
+double incise_random(uint64_t *state)
+{
+	return (splitmix(state) >> 11) * 0x1p-52 - 1;
 }
 
 void incise_shuffle(size_t *order, size_t n, uint64_t seed)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Learning a model from data: Jang's ANFIS hybrid rule (paper 1, §4.3), and the
+ * Learning a model from data: as MATLAB's anfis does (paper 1, §4.3) or better, and the
  * baselines it has to beat. Part of libincise-learn.
  *
  * Data are plain arrays, row by row: n_inputs inputs, then the output.
@@ -14,6 +14,7 @@
 #include <incise/error.h>
 #include <incise/export.h>
 #include <incise/model.h>
+#include <incise/uncertainty.h>
 
 INCISE_BEGIN_DECLS
 
@@ -24,38 +25,48 @@ struct incise_pairs {
 	int n_inputs;
 };
 
-/** Called after each epoch with the epoch (from 1) and the RMSE; check is NaN without check data. */
+/**
+ * Called after each epoch of the final training with the epoch (from 1, the premises
+ * given) and the RMSE; check is NaN without check data.
+ */
 typedef void (*incise_train_progress)(void *user, int epoch, double train_rmse,
 				      double check_rmse);
 
 struct incise_train_options {
-	int epochs;  /**< 1 …; default 80, the paper's */
-	double step; /**< initial step of the premises, default 0.01 */
+	int epochs;  /**< at most, 1 …; default 80, the paper's */
+	double step; /**< initial step of the premises, default 0.01; classic only */
 	/**
 	 * Ridge of the least squares: penalty ridge·Σp² on inputs scaled to [0, 1] and the
-	 * output to its standard deviation; NAN chooses it by cross-validation.
+	 * output to its standard deviations; NAN (default) chooses it by cross-validation.
 	 * Ignored when classic.
 	 */
 	double ridge;
 	/**
 	 * As MATLAB does it: inputs unscaled, ridge 1e-6 (that is what recursive least
-	 * squares with S0 = 1e6 I amounts to), the best epoch by check error (by training
-	 * error without check data).
+	 * squares with S0 = 1e6 I amounts to), premises down the gradient, the best epoch
+	 * by check error (by training error without check data).
 	 */
 	bool classic;
 	/**
-	 * Group of each training pair (n ints), or NULL. Cross-validation leaves whole
-	 * groups out, because pairs of one cut are not independent.
+	 * Group of each training pair (n ints, from 0), or NULL. Cross-validation leaves
+	 * whole groups out, because pairs of one cut are not independent.
 	 */
 	const int *groups;
-	uint64_t seed;			/**< of the folds */
+	uint64_t seed;			/**< of the folds and the starts */
 	incise_train_progress progress; /**< or NULL */
 	void *user;
+	/** Premises to start from: those given, and others near them; default 3. */
+	int starts;
+	/**
+	 * Where to leave the predictive standard deviation, to be freed with
+	 * incise_uncertainty_free(), or NULL. On error nothing is left there.
+	 */
+	struct incise_uncertainty **uncertainty;
 };
 
 /** What training did. */
 struct incise_train_report {
-	int epochs;	/**< run */
+	int epochs;	/**< run in the final training */
 	int best_epoch; /**< from 1: the one whose parameters were kept */
 	double ridge;	/**< used */
 	double train_rmse,
@@ -63,6 +74,15 @@ struct incise_train_report {
 	double condition;   /**< of the scaled least-squares problem, ridge excluded */
 	int parameters;	    /**< linear + premise */
 	int rules_unfired; /**< rules whose firing strength never exceeds 0.05 in the data */
+	/** 1 - (squared error)/(spread about the side's own mean); NaN for a constant. */
+	double train_r2, check_r2;
+	/** RMSE on held-out pairs in cross-validation; NaN when classic. */
+	double crossval_rmse;
+	int start; /**< whose premises were kept: 0 for those given */
+	/** Pairs that cross-validation and the search for premises used: where there are
+	 *  very many, a random part; the consequents come from all. 0 when classic. */
+	size_t pairs_tuned;
+	bool unfired[INCISE_MODEL_RULES_MAX]; /**< which rules rules_unfired counts */
 };
 
 /** Defaults as documented above. */
@@ -71,22 +91,45 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
 /**
  * Train the consequents and the membership functions of a grid model in place.
  *
- * The epochs, the ridge and everything else are chosen from the training pairs; check
- * pairs take part only when @options->classic (as in MATLAB's anfis), where they choose
- * the epoch. So in the default mode the check error is one on unseen data.
+ * The default scales the data, and searches the premises by Levenberg–Marquardt on the
+ * variable-projected problem (consequents always the best for the premises), with
+ * functions kept in order and overlapping. Ridge, start and number of epochs are those
+ * with the least error on held-out groups of the training pairs; check pairs take part
+ * only when @options->classic (as in MATLAB's anfis), where they choose the epoch. So in
+ * the default mode the check error is one on unseen data.
  *
- * @param model   initial premises; its ranges should be those of the training pairs
+ * @param model   initial premises, Gaussians or bells; its ranges should be those of the
+ *                training pairs
  * @param check   or NULL
  * @param report  or NULL
- * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs), -ENOTSUP (a
- *         membership function other than gaussmf and gbellmf, or the AND method min),
- *         -ENODATA (fewer pairs than consequent parameters), -EDOM (LAPACK failed),
- *         -ENOMEM. On error the model is unchanged.
+ * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs, an input that
+ *         has one value only), -ENODATA (fewer pairs than consequent parameters), -ENOTSUP
+ *         (the rules are no plain grid, the AND method is min, or another kind of
+ *         membership function), -EDOM
+ *         (least squares failed), -ENOMEM. On error the model is unchanged.
  */
 INCISE_API int incise_train(struct incise_model *model, const struct incise_pairs *train,
 			    const struct incise_pairs *check,
 			    const struct incise_train_options *options,
 			    struct incise_train_report *report, struct incise_error *err);
+
+/**
+ * Choose how many membership functions each input should have: the fewest rules whose
+ * error on held-out groups is within one standard error of the best, the standard error
+ * being that of their difference. Grids grow by one function at a time from one function
+ * each, to 6 per input, with no more consequent parameters than half the pairs.
+ *
+ * @param inputs  pairs->n_inputs ranges
+ * @param type    kind of all functions
+ * @param options groups and seed are used
+ * @param n_mfs   pairs->n_inputs results
+ * @return 0; -EINVAL, -ENODATA (too few pairs to compare anything), -EDOM, -ENOMEM.
+ */
+INCISE_API int incise_train_choose_grid(const struct incise_pairs *pairs,
+					const struct incise_variable *inputs,
+					enum incise_mf_type type,
+					const struct incise_train_options *options,
+					int *n_mfs, struct incise_error *err);
 
 /** RMSE of a model over pairs; inputs are not clamped. */
 INCISE_API double incise_train_rmse(const struct incise_model *model,

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Premises of a grid model, for learning; see basis.h.
+ *
+ * In a grid Σ_r w(r) = Π_i Σ_k A(i,k): each input's degrees are normalised alone, and a
+ * rule's normalised strength is their product. Degrees are divided by the largest in the
+ * log domain first, so they never all vanish.
+ *
+ * Rules count through the grid with the last input fastest, as incise_model_new_grid()
+ * makes them.
+ */
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include "basis.h"
+
+/* As lib/model has them: distances beyond are not told apart, sums stay finite. */
+#define Z_MAX 1e150
+#define LOG_MIN (-1e300)
+
+/* Firing strengths computed in two ways agree to rounding, or the model is no grid. */
+#define SAME 1e-9
+
+static bool is_grid(const struct incise_basis *basis, const struct incise_model *model)
+{
+	double x[INCISE_MODEL_INPUTS_MAX];
+	double a[INCISE_MODEL_RULES_MAX], b[INCISE_MODEL_RULES_MAX];
+	int n = 1;
+
+	for (int i = 0; i < basis->n_inputs; i++)
+		n *= basis->n_mfs[i];
+	if (n != basis->n_rules)
+		return false;
+	for (int r = 0; r < n; r++)
+		for (int i = basis->n_inputs - 1, rest = r; i >= 0; i--) {
+			if (incise_model_rule_mf(model, r, i) != rest % basis->n_mfs[i])
+				return false;
+			rest /= basis->n_mfs[i];
+		}
+	/* Weights and other ways to say 'and' show in the strengths. */
+	for (int t = 0; t < 3; t++) {
+		for (int i = 0; i < basis->n_inputs; i++) {
+			const struct incise_variable *v = incise_model_input(model, i);
+			double u = (0.3 + t + 0.1 * i) / 3.5;
+
+			x[i] = v->min + (u - floor(u)) * (v->max - v->min);
+		}
+		incise_basis_firing(basis, x, a);
+		incise_model_firing(model, x, b);
+		for (int r = 0; r < n; r++)
+			if (!(fabs(a[r] - b[r]) < SAME))
+				return false;
+	}
+	return true;
+}
+
+int incise_basis_init(struct incise_basis *basis, const struct incise_model *model)
+{
+	memset(basis, 0, sizeof(*basis));
+	basis->n_inputs = incise_model_n_inputs(model);
+	basis->n_rules = incise_model_n_rules(model);
+	for (int i = 0; i < basis->n_inputs; i++) {
+		basis->n_mfs[i] = incise_model_n_mfs(model, i);
+		for (int k = 0; k < basis->n_mfs[i]; k++) {
+			const struct incise_mf *mf = incise_model_mf(model, i, k);
+			int n = incise_mf_n_params(mf->type);
+
+			if (mf->type != INCISE_MF_GAUSS && mf->type != INCISE_MF_GBELL)
+				return -ENOTSUP;
+			basis->type[i][k] = mf->type;
+			basis->at[i][k] = basis->n_premises;
+			memcpy(basis->p + basis->n_premises, mf->p, n * sizeof(double));
+			basis->n_premises += n;
+		}
+	}
+	return is_grid(basis, model) ? 0 : -ENOTSUP;
+}
+
+void incise_basis_store(const struct incise_basis *basis, struct incise_model *model)
+{
+	for (int i = 0; i < basis->n_inputs; i++)
+		for (int k = 0; k < basis->n_mfs[i]; k++) {
+			const double *from = basis->p + basis->at[i][k];
+			double p[4] = {from[0], from[1]};
+
+			if (basis->type[i][k] == INCISE_MF_GBELL)
+				p[2] = from[2];
+			incise_model_set_mf(model, i, k, p);
+		}
+}
+
+int incise_basis_centre(const struct incise_basis *basis, int input, int mf)
+{
+	return basis->at[input][mf] + (basis->type[input][mf] == INCISE_MF_GBELL ? 2 : 1);
+}
+
+static double log_degree(enum incise_mf_type type, const double *p, double x)
+{
+	double z, t;
+
+	if (type == INCISE_MF_GAUSS) {
+		z = fmin(fabs((x - p[1]) / p[0]), Z_MAX);
+		return -0.5 * z * z;
+	}
+	z = fmin(fabs((x - p[2]) / p[0]), Z_MAX);
+	t = 2 * p[1] * log(z);
+	return fmax(t > 40 ? -t : -log1p(exp(t)), LOG_MIN);
+}
+
+void incise_basis_firing(const struct incise_basis *basis, const double *x, double *w)
+{
+	double degree[INCISE_MODEL_MFS_MAX];
+	int n = 1;
+
+	w[0] = 1;
+	for (int i = 0; i < basis->n_inputs; i++) {
+		int n_mfs = basis->n_mfs[i];
+		double largest = -INFINITY, sum = 0;
+
+		for (int k = 0; k < n_mfs; k++) {
+			degree[k] = log_degree(basis->type[i][k],
+					       basis->p + basis->at[i][k], x[i]);
+			largest = fmax(largest, degree[k]);
+		}
+		for (int k = 0; k < n_mfs; k++) {
+			degree[k] = exp(degree[k] - largest);
+			sum += degree[k];
+		}
+		for (int k = 0; k < n_mfs; k++)
+			degree[k] /= sum;
+		/* From the last, because the results grow over their sources. */
+		for (int r = n - 1; r >= 0; r--) {
+			double above = w[r];
+
+			for (int k = n_mfs - 1; k >= 0; k--)
+				w[r * n_mfs + k] = above * degree[k];
+		}
+		n *= n_mfs;
+	}
+}
+
+void incise_basis_slopes(const struct incise_basis *basis, const double *x,
+			 double *slopes)
+{
+	for (int i = 0; i < basis->n_inputs; i++)
+		for (int k = 0; k < basis->n_mfs[i]; k++) {
+			const double *p = basis->p + basis->at[i][k];
+			double *g = slopes + basis->at[i][k];
+			double d, z, off;
+
+			if (basis->type[i][k] == INCISE_MF_GAUSS) {
+				z = (x[i] - p[1]) / p[0];
+				g[0] = z * z / p[0];
+				g[1] = z / p[0];
+				continue;
+			}
+			d = x[i] - p[2];
+			z = fabs(d / p[0]);
+			/* 1 - A */
+			off = -expm1(log_degree(INCISE_MF_GBELL, p, x[i]));
+			g[0] = 2 * p[1] / p[0] * off;
+			g[1] = z > 0 ? -2 * log(z) * off : 0;
+			g[2] = d != 0 ? 2 * p[1] / d * off : 0;
+		}
+}
+
+void incise_basis_shares(const struct incise_basis *basis, const double *w,
+			 const double *f, double y, double *shares)
+{
+	double part[INCISE_MODEL_RULES_MAX];
+	int inner = basis->n_rules;
+
+	for (int r = 0; r < basis->n_rules; r++)
+		part[r] = w[r] * (f[r] - y);
+	for (int i = 0; i < basis->n_inputs; i++) {
+		int n_mfs = basis->n_mfs[i];
+
+		inner /= n_mfs;
+		for (int k = 0; k < n_mfs; k++) {
+			double sum = 0;
+
+			for (int r = k * inner; r < basis->n_rules; r += n_mfs * inner)
+				for (int j = 0; j < inner; j++)
+					sum += part[r + j];
+			*shares++ = sum;
+		}
+	}
+}
+
+void incise_basis_row(const struct incise_basis *basis, const double *w, const double *x,
+		      double *row)
+{
+	int d = basis->n_inputs;
+
+	for (int r = 0; r < basis->n_rules; r++, row += d + 1) {
+		row[0] = w[r];
+		for (int i = 0; i < d; i++)
+			row[i + 1] = w[r] * x[i];
+	}
+}
+
+double incise_basis_output(const struct incise_basis *basis, const double *w,
+			   const double *x, const double *consequents, double *f)
+{
+	int d = basis->n_inputs;
+	double y = 0;
+
+	for (int r = 0; r < basis->n_rules; r++, consequents += d + 1) {
+		f[r] = consequents[0];
+		for (int i = 0; i < d; i++)
+			f[r] += consequents[i + 1] * x[i];
+		y += w[r] * f[r];
+	}
+	return y;
+}
+
+int incise_basis_set_consequents(struct incise_model *model, const double *consequents)
+{
+	int n = incise_model_n_inputs(model) + 1;
+
+	for (int r = 0; r < incise_model_n_rules(model); r++)
+		if (incise_model_set_consequent(model, r, consequents + r * n))
+			return -EDOM;
+	return 0;
+}

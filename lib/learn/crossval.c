@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Cross-validation over groups; see crossval.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "crossval.h"
+#include "lsq.h"
+#include "shuffle.h"
+#include "varpro.h"
+
+/* Which unit and fold each pair is in: by group where there are at least two. */
+static int assign(struct incise_folds *folds, size_t n, const int *groups, uint64_t seed,
+		  int *fold, int *unit)
+{
+	size_t n_groups = 0, *order;
+
+	for (size_t i = 0; groups && i < n; i++)
+		if ((size_t)groups[i] + 1 > n_groups)
+			n_groups = (size_t)groups[i] + 1;
+	/* Numbers of groups that lie on the check side are absent here: count afresh. */
+	if (n_groups) {
+		int *number = malloc(n_groups * sizeof(*number)), next = 0;
+
+		if (!number)
+			return -ENOMEM;
+		for (size_t g = 0; g < n_groups; g++)
+			number[g] = -1;
+		for (size_t i = 0; i < n; i++) {
+			if (number[groups[i]] < 0)
+				number[groups[i]] = next++;
+			unit[i] = number[groups[i]];
+		}
+		free(number);
+		n_groups = next;
+	}
+	if (n_groups < 2)
+		n_groups = 0;
+	order = malloc((n_groups ? n_groups : n) * sizeof(*order));
+	if (!order)
+		return -ENOMEM;
+	incise_shuffle(order, n_groups ? n_groups : n, seed);
+	folds->n = n_groups && n_groups < CROSSVAL_FOLDS ? (int)n_groups
+		   : n < CROSSVAL_FOLDS			 ? (int)n
+							 : CROSSVAL_FOLDS;
+	for (size_t i = 0; i < n; i++) {
+		fold[i] = (int)(order[n_groups ? (size_t)unit[i] : i] % folds->n);
+		if (!n_groups)
+			unit[i] = fold[i];
+	}
+	folds->n_units = n_groups ? (int)n_groups : folds->n;
+	free(order);
+	return 0;
+}
+
+int incise_folds_init(struct incise_folds *folds, const struct incise_pairs *pairs,
+		      const int *groups, uint64_t seed)
+{
+	size_t width = pairs->n_inputs + 1;
+	int *fold = malloc(pairs->n * sizeof(*fold));
+	int *unit = malloc(pairs->n * sizeof(*unit));
+	int rc = fold && unit ? 0 : -ENOMEM;
+
+	memset(folds, 0, sizeof(*folds));
+	folds->n_pairs = pairs->n;
+	if (!rc)
+		rc = assign(folds, pairs->n, groups, seed, fold, unit);
+	for (int f = 0; f < folds->n && !rc; f++) {
+		double *fit = malloc(pairs->n * width * sizeof(*fit));
+		double *held = malloc(pairs->n * width * sizeof(*held));
+		size_t n_fit = 0, n_held = 0;
+
+		folds->fit[f].rows = fit;
+		folds->held[f].rows = held;
+		folds->unit[f] = malloc(pairs->n * sizeof(*unit));
+		if (!fit || !held || !folds->unit[f]) {
+			rc = -ENOMEM;
+			break;
+		}
+		for (size_t i = 0; i < pairs->n; i++) {
+			const double *row = pairs->rows + width * i;
+
+			if (fold[i] != f) {
+				memcpy(fit + width * n_fit++, row, width * sizeof(*row));
+				continue;
+			}
+			folds->unit[f][n_held] = unit[i];
+			memcpy(held + width * n_held++, row, width * sizeof(*row));
+		}
+		folds->fit[f] = (struct incise_pairs){fit, n_fit, pairs->n_inputs};
+		folds->held[f] = (struct incise_pairs){held, n_held, pairs->n_inputs};
+	}
+	free(fold);
+	free(unit);
+	return rc;
+}
+
+void incise_folds_free(struct incise_folds *folds)
+{
+	for (int f = 0; f < CROSSVAL_FOLDS; f++) {
+		free((void *)folds->fit[f].rows);
+		free((void *)folds->held[f].rows);
+		free(folds->unit[f]);
+	}
+}
+
+/* Add the squared errors of fold f's held pairs. */
+static void add_errors(const struct incise_folds *folds, int f,
+		       const struct incise_basis *basis, const double *consequents,
+		       double *error)
+{
+	const struct incise_pairs *held = &folds->held[f];
+	double w[INCISE_MODEL_RULES_MAX], out[INCISE_MODEL_RULES_MAX];
+	int d = held->n_inputs;
+
+	for (size_t i = 0; i < held->n; i++) {
+		const double *x = held->rows + i * (d + 1);
+		double e;
+
+		incise_basis_firing(basis, x, w);
+		e = incise_basis_output(basis, w, x, consequents, out) - x[d];
+		error[folds->unit[f][i]] += e * e;
+	}
+}
+
+static void fold_pairs(struct incise_lsq *lsq, const struct incise_basis *basis,
+		       const struct incise_pairs *pairs)
+{
+	double w[INCISE_MODEL_RULES_MAX];
+	int d = pairs->n_inputs;
+
+	incise_lsq_reset(lsq);
+	for (size_t i = 0; i < pairs->n; i++) {
+		const double *x = pairs->rows + i * (d + 1);
+
+		incise_basis_firing(basis, x, w);
+		incise_basis_row(basis, w, x, incise_lsq_row(lsq));
+		incise_lsq_add(lsq, x[d]);
+	}
+}
+
+int incise_crossval_ridges(const struct incise_basis *basis,
+			   const struct incise_folds *folds, const double *ridges, int n,
+			   double *error)
+{
+	int n_linear = basis->n_rules * (basis->n_inputs + 1);
+	struct incise_lsq *lsq = incise_lsq_new(n_linear);
+	double *x = malloc(n_linear * sizeof(*x));
+	int rc = lsq && x ? 0 : -ENOMEM;
+
+	memset(error, 0, (size_t)n * folds->n_units * sizeof(*error));
+	for (int f = 0; f < folds->n && !rc; f++) {
+		fold_pairs(lsq, basis, &folds->fit[f]);
+		for (int i = 0; i < n && !rc; i++) {
+			rc = incise_lsq_solve(lsq, ridges[i], x);
+			if (!rc)
+				add_errors(folds, f, basis, x,
+					   error + (size_t)i * folds->n_units);
+		}
+	}
+	incise_lsq_free(lsq);
+	free(x);
+	return rc;
+}
+
+struct search {
+	const struct incise_folds *folds;
+	int fold;
+	double *error;
+};
+
+static bool add_epoch(void *user, int epoch, const struct incise_basis *basis,
+		      const double *consequents)
+{
+	struct search *s = user;
+
+	add_errors(s->folds, s->fold, basis, consequents,
+		   s->error + (size_t)(epoch - 1) * s->folds->n_units);
+	return true;
+}
+
+/* The errors of fold f's units at an epoch, again at the later ones. */
+static void repeat(const struct incise_folds *folds, int f, double *error, int epoch,
+		   int epochs, bool *mine)
+{
+	memset(mine, 0, folds->n_units * sizeof(*mine));
+	for (size_t i = 0; i < folds->held[f].n; i++)
+		mine[folds->unit[f][i]] = true;
+	for (int e = epoch; e < epochs; e++)
+		for (int u = 0; u < folds->n_units; u++)
+			if (mine[u])
+				error[(size_t)e * folds->n_units + u] =
+					error[(size_t)(epoch - 1) * folds->n_units + u];
+}
+
+static int find_ratios(const struct incise_folds *folds, int f,
+		       const struct incise_basis *basis, const double *consequents,
+		       double ridge, double *ratios)
+{
+	const struct incise_pairs *held = &folds->held[f];
+	double w[INCISE_MODEL_RULES_MAX], out[INCISE_MODEL_RULES_MAX];
+	int d = held->n_inputs, n = basis->n_rules * (d + 1), stride, rc = -ENOMEM;
+	struct incise_lsq *lsq = incise_lsq_new(n);
+	double *phi = malloc(n * sizeof(*phi));
+	const double *factor;
+
+	if (!lsq || !phi)
+		goto out;
+	rc = -EDOM;
+	fold_pairs(lsq, basis, &folds->fit[f]);
+	factor = incise_lsq_factor(lsq, ridge, n, &stride);
+	if (!factor)
+		goto out;
+	rc = 0;
+	for (size_t i = 0; i < held->n; i++) {
+		const double *x = held->rows + i * (d + 1);
+		double e;
+
+		incise_basis_firing(basis, x, w);
+		e = incise_basis_output(basis, w, x, consequents, out) - x[d];
+		incise_basis_row(basis, w, x, phi);
+		ratios[i] =
+			fabs(e) / sqrt(1 + incise_lsq_leverage(factor, stride, n, phi));
+	}
+out:
+	incise_lsq_free(lsq);
+	free(phi);
+	return rc;
+}
+
+int incise_crossval_search(const struct incise_basis *basis,
+			   const struct incise_folds *folds, double ridge, int epochs,
+			   double *error, double *ratios)
+{
+	int n = basis->n_rules * (basis->n_inputs + 1);
+	double *consequents = malloc(n * sizeof(*consequents));
+	bool *mine = malloc(folds->n_units * sizeof(*mine));
+	int rc = consequents && mine ? 0 : -ENOMEM;
+
+	memset(error, 0, (size_t)epochs * folds->n_units * sizeof(*error));
+	for (int f = 0; f < folds->n && !rc; f++) {
+		struct search search = {folds, f, error};
+		struct incise_varpro varpro = {.pairs = &folds->fit[f],
+					       .ridge = ridge,
+					       .epochs = epochs,
+					       .each = add_epoch,
+					       .user = &search};
+		struct incise_basis trial = *basis;
+
+		rc = incise_varpro_run(&trial, consequents, &varpro);
+		if (rc)
+			break;
+		repeat(folds, f, error, varpro.run, epochs, mine);
+		if (!ratios)
+			continue;
+		rc = find_ratios(folds, f, &trial, consequents, ridge, ratios);
+		ratios += folds->held[f].n;
+	}
+	free(consequents);
+	free(mine);
+	return rc;
+}
+
+double incise_crossval_total(const struct incise_folds *folds, const double *error)
+{
+	double sum = 0;
+
+	for (int u = 0; u < folds->n_units; u++)
+		sum += error[u];
+	return sum;
+}
+
+double incise_crossval_spread(const struct incise_folds *folds, const double *a,
+			      const double *b)
+{
+	double mean = 0, sum = 0;
+	int n = folds->n_units;
+
+	if (n < 2)
+		return 0;
+	for (int u = 0; u < n; u++)
+		mean += (a[u] - b[u]) / n;
+	for (int u = 0; u < n; u++)
+		sum += pow(a[u] - b[u] - mean, 2);
+	return sqrt(sum * n / (n - 1));
+}

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Errors on pairs that a fit has not seen, out of the training pairs alone: five folds
+ * that leave whole groups out (cuts), because pairs of one group are not independent.
+ * Errors are kept by unit (group; fold where there are no groups), so that two settings
+ * can be compared pair by pair. Pairs are scaled.
+ */
+#ifndef INCISE_CROSSVAL_H
+#define INCISE_CROSSVAL_H
+
+#include "basis.h"
+
+#define CROSSVAL_FOLDS 5
+
+struct incise_folds {
+	int n; /* below 2: nothing can be held out */
+	int n_units;
+	size_t n_pairs;
+	struct incise_pairs fit[CROSSVAL_FOLDS], held[CROSSVAL_FOLDS];
+	int *unit[CROSSVAL_FOLDS]; /* of each held pair */
+};
+
+/* Returns 0 or -ENOMEM; incise_folds_free() in either case. */
+int incise_folds_init(struct incise_folds *folds, const struct incise_pairs *pairs,
+		      const int *groups, uint64_t seed);
+void incise_folds_free(struct incise_folds *folds);
+
+/*
+ * Held-out squared errors of n ridges at fixed premises: error[i·n_units + unit] for ridge
+ * i. Returns 0, -EDOM, -ENOMEM.
+ */
+int incise_crossval_ridges(const struct incise_basis *basis,
+			   const struct incise_folds *folds, const double *ridges, int n,
+			   double *error);
+
+/*
+ * Held-out squared errors while premises are searched (varpro.h), by epoch:
+ * error[e·n_units + unit] for epoch e+1. Where a fold's search ends early its last error
+ * stands for the epochs left. With ratios, n_pairs of them, |error|/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each held pair
+ * after the last epoch: what the error is in units of the noise.
+ */
+int incise_crossval_search(const struct incise_basis *basis,
+			   const struct incise_folds *folds, double ridge, int epochs,
+			   double *error, double *ratios);
+
+/* Sum over units. */
+double incise_crossval_total(const struct incise_folds *folds, const double *error);
+
+/*
+ * Standard error of the difference of two totals, from the differences by unit; 0 where
+ * there is one unit.
+ */
+double incise_crossval_spread(const struct incise_folds *folds, const double *a,
+			      const double *b);
+
+#endif

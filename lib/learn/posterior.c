@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Noise of the predictive standard deviation; see posterior.h.
+ *
+ * Within a cut residuals are small and alike; between cuts tissue differs. An error on a
+ * new cut has both, so the noise is taken from whole groups left out. It is set by the
+ * 95 % quantile rather than the mean square: errors of cuts have heavier tails than a
+ * normal distribution, and the interval is what a user reads off.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include "posterior.h"
+
+static int ascending(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+
+	return (x > y) - (x < y);
+}
+
+int incise_posterior_noise(const struct incise_basis *basis,
+			   const struct incise_folds *folds, double ridge, int epochs,
+			   double *noise)
+{
+	double *error = malloc((size_t)epochs * folds->n_units * sizeof(*error));
+	double *ratios = malloc(folds->n_pairs * sizeof(*ratios));
+	int rc = error && ratios ? incise_crossval_search(basis, folds, ridge, epochs,
+							  error, ratios)
+				 : -ENOMEM;
+
+	if (!rc) {
+		/* The quantile that also holds the pair to come: (n+1)·0.95 from below. */
+		double rank = ceil(0.95 * (folds->n_pairs + 1.0));
+		size_t at = fmin(rank, folds->n_pairs) - 1;
+
+		qsort(ratios, folds->n_pairs, sizeof(*ratios), ascending);
+		*noise = ratios[at] / INCISE_INTERVAL95;
+	}
+	free(error);
+	free(ratios);
+	return rc;
+}

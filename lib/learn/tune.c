@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Choosing ridge, start and epochs; see tune.h.
+ *
+ *   ridge of the first premises ─▶ search with it and its neighbours ─▶ other starts
+ *
+ * Of two settings the one that moves the premises less is kept unless the other's
+ * held-out error is clearly less: held-out errors of many settings have a winner by chance.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "premises.h"
+#include "tune.h"
+
+const double incise_tune_ridges[TUNE_N_RIDGES] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
+						  1,	10,   100,  1e3,  1e4};
+
+/* Epochs of a search in cross-validation, at most. */
+#define EPOCHS_MAX 15
+
+/* Multiplications that all searches may cost together: half a minute for large grids. */
+#define BUDGET 1e11
+
+/* Standard errors by which a search has to win. */
+#ifndef CLEAR
+#define CLEAR 0.0
+#endif
+
+struct tuner {
+	const struct incise_folds *folds;
+	int epochs;
+	double *error; /* epochs × units, of the search at hand */
+	double *best;  /* units, of the setting kept */
+	double best_total;
+	struct incise_tuning *tuning;
+};
+
+static int try_search(struct tuner *t, const struct incise_basis *basis, int start,
+		      double ridge)
+{
+	int rc =
+		incise_crossval_search(basis, t->folds, ridge, t->epochs, t->error, NULL);
+
+	for (int e = 0; e < t->epochs && !rc; e++) {
+		const double *error = t->error + (size_t)e * t->folds->n_units;
+		double total = incise_crossval_total(t->folds, error);
+
+		if (total >= t->best_total - CLEAR * incise_crossval_spread(
+							     t->folds, error, t->best))
+			continue;
+		t->best_total = total;
+		memcpy(t->best, error, t->folds->n_units * sizeof(*error));
+		t->tuning->ridge = ridge;
+		t->tuning->start = start;
+		t->tuning->epochs = e + 1;
+		t->tuning->basis = *basis;
+	}
+	return rc;
+}
+
+/* The ridge with the least held-out error at the premises given. */
+static int choose_ridge(struct tuner *t, const struct incise_basis *basis, int *chosen)
+{
+	size_t size = (size_t)TUNE_N_RIDGES * t->folds->n_units;
+	double *error = malloc(size * sizeof(*error));
+	int rc = error ? incise_crossval_ridges(basis, t->folds, incise_tune_ridges,
+						TUNE_N_RIDGES, error)
+		       : -ENOMEM;
+
+	*chosen = -1;
+	for (int i = 0; i < TUNE_N_RIDGES && !rc; i++) {
+		double total = incise_crossval_total(
+			t->folds, error + (size_t)i * t->folds->n_units);
+
+		if (*chosen >= 0 && total >= t->best_total)
+			continue;
+		*chosen = i;
+		t->best_total = total;
+		memcpy(t->best, error + (size_t)i * t->folds->n_units,
+		       t->folds->n_units * sizeof(*error));
+	}
+	if (!rc)
+		t->tuning->ridge = incise_tune_ridges[*chosen];
+	free(error);
+	return rc;
+}
+
+/* Multiplications of one epoch in all folds. */
+static double cost(const struct incise_basis *basis, const struct incise_folds *folds)
+{
+	double n = basis->n_rules * (basis->n_inputs + 1), m = n + basis->n_premises;
+
+	return 2.0 * (CROSSVAL_FOLDS - 1) * folds->n_pairs * (n * n + m * m);
+}
+
+static int search_all(struct tuner *t, const struct incise_basis *basis, int ridge_index,
+		      int starts, uint64_t seed)
+{
+	int rc = 0;
+
+	if (ridge_index < 0) {
+		rc = try_search(t, basis, 0, t->tuning->ridge);
+	} else {
+		for (int i = ridge_index - 1; i <= ridge_index + 1 && !rc; i++)
+			if (i >= 0 && i < TUNE_N_RIDGES)
+				rc = try_search(t, basis, 0, incise_tune_ridges[i]);
+	}
+	for (int start = 1; start < starts && !rc; start++) {
+		struct incise_basis other = *basis;
+
+		incise_premises_jitter(&other, seed * 1000003 + start);
+		rc = try_search(t, &other, start, t->tuning->ridge);
+	}
+	return rc;
+}
+
+int incise_tune(const struct incise_basis *basis, const struct incise_folds *folds,
+		const struct incise_train_options *options, struct incise_tuning *tuning)
+{
+	struct tuner t = {.folds = folds, .best_total = HUGE_VAL, .tuning = tuning};
+	struct incise_basis first = *basis;
+	int rc = -ENOMEM, ridge_index = -1, starts = options->starts;
+	double epochs = BUDGET / cost(basis, folds);
+
+	*tuning =
+		(struct incise_tuning){.ridge = options->ridge, .epochs = 1, .rmse = NAN};
+	incise_premises_project(&first);
+	tuning->basis = first;
+	if (folds->n < 2) {
+		if (isnan(options->ridge))
+			tuning->ridge = TUNE_RIDGE;
+		return 0;
+	}
+	t.epochs = options->epochs < EPOCHS_MAX ? options->epochs : EPOCHS_MAX;
+	/* Where all cannot be afforded, other starts are the first to go. */
+	if (epochs < (starts + 2.0) * t.epochs)
+		starts = 1;
+	if (epochs < 3.0 * t.epochs)
+		t.epochs = fmax(1, epochs / 3);
+	t.error = malloc((size_t)t.epochs * folds->n_units * sizeof(*t.error));
+	t.best = calloc(folds->n_units, sizeof(*t.best));
+	if (!t.error || !t.best)
+		goto out;
+	rc = 0;
+	if (isnan(options->ridge))
+		rc = choose_ridge(&t, &first, &ridge_index);
+	if (!rc)
+		rc = search_all(&t, &first, ridge_index, starts, options->seed);
+	if (!rc)
+		tuning->rmse = sqrt(t.best_total / folds->n_pairs);
+out:
+	free(t.error);
+	free(t.best);
+	return rc;
+}

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Variable projection; see varpro.h.
+ *
+ * With Φ the rows of the consequents' least squares (ridge rows below), p its solution and
+ * D = ∂(Φp)/∂u the change of the output by a step u of the premises, p held, Kaufman's
+ * approximation of the projected residual's Jacobian is -P⊥D, P⊥ = 1 - ΦΦ⁺. One QR has it
+ * all, so neither Q nor normal equations are formed and memory does not grow with rows:
+ *
+ *        Φ    D    t            n    q    1
+ *      ┌────┬────┬───┐        ┌────┬────┬───┐
+ *      │    │    │   │  ──▶   │ R₁ │ S  │ z │   R₁ p = z
+ *      │    │    │   │        │    │ R₂ │ g │   |P⊥(t - D u)|² = |g - R₂ u|² + ρ²
+ *      └────┴────┴───┘        └────┴────┴─ρ─┘
+ *
+ * A step solves [R₂; √μ c] u = [g; 0], c the largest column of R₂, by LAPACK's QR (dgels).
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <lapacke.h>
+#include "lsq.h"
+#include "premises.h"
+#include "varpro.h"
+
+/* Damping: first, by success and failure, and where a search ends. */
+#define MU_FIRST 0.1
+#define MU_DOWN 0.3
+#define MU_UP 5.0
+#define MU_MAX 1e6
+
+/* Longest move of a premise in one step, in spacings or logarithms. */
+#define STEP_MAX 0.5
+
+/* A fall of the squared error below this share is the end. */
+#define TOLERANCE 1e-7
+
+struct state {
+	const struct incise_pairs *pairs;
+	double ridge;
+	int n, q;			 /* consequents, premises */
+	struct incise_lsq *linear, *all; /* of n and of n + q unknowns */
+	double *kept;			 /* firing strengths of the last solution */
+	double *matrix;			 /* 2q × q, of a step */
+	double *right;			 /* 2q */
+	double *scale;			 /* q */
+};
+
+/* The best consequents for some premises; *error is the penalised squared error. */
+static int solve(struct state *s, const struct incise_basis *basis, double *consequents,
+		 double *error)
+{
+	int d = s->pairs->n_inputs, stride;
+	const double *factor;
+
+	incise_lsq_reset(s->linear);
+	for (size_t i = 0; i < s->pairs->n; i++) {
+		const double *x = s->pairs->rows + i * (d + 1);
+		double *w = s->kept + i * basis->n_rules;
+
+		incise_basis_firing(basis, x, w);
+		incise_basis_row(basis, w, x, incise_lsq_row(s->linear));
+		incise_lsq_add(s->linear, x[d]);
+	}
+	factor = incise_lsq_factor(s->linear, s->ridge, s->n, &stride);
+	if (!factor)
+		return -EDOM;
+	*error = pow(factor[(size_t)s->n * (stride + 1)], 2);
+	return incise_lsq_back(factor, stride, s->n, s->n, consequents);
+}
+
+/* ∂output/∂step of all premises, at a pair. */
+static void derivative(const struct state *s, const struct incise_basis *basis,
+		       const double *w, const double *x, const double *consequents,
+		       double *to)
+{
+	double shares[INCISE_MODEL_INPUTS_MAX * INCISE_MODEL_MFS_MAX];
+	double f[INCISE_MODEL_RULES_MAX];
+	const double *share = shares, *scale = s->scale;
+	double y = incise_basis_output(basis, w, x, consequents, f);
+
+	incise_basis_slopes(basis, x, to);
+	incise_basis_shares(basis, w, f, y, shares);
+	for (int i = 0; i < basis->n_inputs; i++)
+		for (int k = 0; k < basis->n_mfs[i]; k++, share++)
+			for (int j = incise_mf_n_params(basis->type[i][k]); j > 0; j--)
+				*to++ *= *share * *scale++;
+}
+
+/* R₂ and g, for the strengths and consequents of the last solution: g in column q. */
+static const double *project(struct state *s, const struct incise_basis *basis,
+			     const double *consequents, int *stride)
+{
+	int d = s->pairs->n_inputs;
+	const double *factor;
+
+	incise_premises_scale(basis, s->scale);
+	incise_lsq_reset(s->all);
+	for (size_t i = 0; i < s->pairs->n; i++) {
+		const double *x = s->pairs->rows + i * (d + 1);
+		const double *w = s->kept + i * basis->n_rules;
+		double *row = incise_lsq_row(s->all);
+
+		incise_basis_row(basis, w, x, row);
+		derivative(s, basis, w, x, consequents, row + s->n);
+		incise_lsq_add(s->all, x[d]);
+	}
+	factor = incise_lsq_factor(s->all, s->ridge, s->n, stride);
+	return factor ? factor + (size_t)s->n * (*stride + 1) : NULL;
+}
+
+static double largest_column(const double *r, int stride, int q)
+{
+	double largest = 0;
+
+	for (int k = 0; k < q; k++) {
+		double sum = 0;
+
+		for (int i = 0; i <= k; i++)
+			sum += r[(size_t)i * stride + k] * r[(size_t)i * stride + k];
+		largest = fmax(largest, sqrt(sum));
+	}
+	return largest;
+}
+
+/* The damped step into s->right. */
+static int find_step(struct state *s, const double *r, int stride, double damping)
+{
+	int q = s->q;
+
+	memset(s->matrix, 0, (size_t)2 * q * q * sizeof(double));
+	for (int k = 0; k < q; k++) {
+		double *column = s->matrix + (size_t)k * 2 * q;
+
+		for (int i = 0; i <= k; i++)
+			column[i] = r[(size_t)i * stride + k];
+		column[q + k] = damping;
+		s->right[k] = r[(size_t)k * stride + q];
+		s->right[q + k] = 0;
+	}
+	if (LAPACKE_dgels(LAPACK_COL_MAJOR, 'N', 2 * q, q, 1, s->matrix, 2 * q, s->right,
+			  2 * q))
+		return -EDOM;
+	for (int k = 0; k < q; k++) {
+		if (!isfinite(s->right[k]))
+			return -EDOM;
+		s->right[k] = fmax(-STEP_MAX, fmin(STEP_MAX, s->right[k]));
+	}
+	return 0;
+}
+
+/* One step downhill; false where there is none. */
+static bool improve(struct state *s, struct incise_basis *basis, double *consequents,
+		    double *trial_consequents, double *error, double *mu)
+{
+	int stride;
+	const double *r = project(s, basis, consequents, &stride);
+	double norm = r ? largest_column(r, stride, s->q) : 0;
+
+	if (!(norm > 0))
+		return false;
+	for (; *mu < MU_MAX; *mu *= MU_UP) {
+		struct incise_basis trial = *basis;
+		double trial_error;
+
+		if (find_step(s, r, stride, sqrt(*mu) * norm))
+			continue;
+		incise_premises_step(&trial, s->right);
+		if (solve(s, &trial, trial_consequents, &trial_error) ||
+		    !(trial_error < *error * (1 - TOLERANCE)))
+			continue;
+		*basis = trial;
+		*error = trial_error;
+		memcpy(consequents, trial_consequents, s->n * sizeof(double));
+		*mu *= MU_DOWN;
+		return true;
+	}
+	return false;
+}
+
+static void state_free(struct state *s)
+{
+	incise_lsq_free(s->linear);
+	incise_lsq_free(s->all);
+	free(s->kept);
+	free(s->matrix);
+	free(s->right);
+	free(s->scale);
+}
+
+int incise_varpro_run(struct incise_basis *basis, double *consequents,
+		      struct incise_varpro *varpro)
+{
+	int q = basis->n_premises, n = basis->n_rules * (basis->n_inputs + 1);
+	struct state s = {.pairs = varpro->pairs, .ridge = varpro->ridge, .n = n, .q = q};
+	double *trial = malloc(n * sizeof(double)), error, mu = MU_FIRST;
+	int rc = -ENOMEM;
+
+	s.linear = incise_lsq_new(n);
+	s.all = incise_lsq_new(n + q);
+	s.kept = malloc((varpro->pairs->n + 1) * basis->n_rules * sizeof(double));
+	s.matrix = malloc((size_t)2 * q * q * sizeof(double));
+	s.right = malloc((size_t)2 * q * sizeof(double));
+	s.scale = malloc(q * sizeof(double));
+	if (!trial || !s.linear || !s.all || !s.kept || !s.matrix || !s.right || !s.scale)
+		goto out;
+	rc = solve(&s, basis, consequents, &error);
+	if (rc)
+		goto out;
+	for (varpro->run = 1;; varpro->run++) {
+		if (varpro->each &&
+		    !varpro->each(varpro->user, varpro->run, basis, consequents))
+			break;
+		if (varpro->run == varpro->epochs ||
+		    !improve(&s, basis, consequents, trial, &error, &mu))
+			break;
+	}
+out:
+	state_free(&s);
+	free(trial);
+	return rc;
+}

@@ -1,0 +1,395 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The predictive standard deviation and its file; see incise/uncertainty.h and
+ * incise-sd(5).
+ */
+#include <errno.h>
+#include <float.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/outfile.h>
+#include <incise/uncertainty.h>
+#include "../base/c_locale.h"
+#include "model.h"
+
+#define VERSION 1
+
+#define UNKNOWNS_MAX (INCISE_MODEL_RULES_MAX * (INCISE_MODEL_INPUTS_MAX + 1))
+
+struct incise_uncertainty {
+	uint64_t checksum; /* of the model */
+	int n;
+	double noise;
+	double *factor; /* upper triangle, row by row, packed */
+};
+
+/* FNV-1a of what the output depends on, in the machine's double format. */
+static void sum(uint64_t *hash, double value)
+{
+	unsigned char bytes[sizeof(value)];
+
+	memcpy(bytes, &value, sizeof(value));
+	for (size_t i = 0; i < sizeof(value); i++) {
+#if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
+		*hash ^= bytes[sizeof(value) - 1 - i];
+#else
+		*hash ^= bytes[i];
+#endif
+		*hash *= 0x100000001b3;
+	}
+}
+
+static uint64_t checksum(const struct incise_model *model)
+{
+	int d = incise_model_n_inputs(model), n_rules = incise_model_n_rules(model);
+	uint64_t hash = 0xcbf29ce484222325;
+
+	sum(&hash, d);
+	for (int i = 0; i < d; i++) {
+		const struct incise_variable *v = incise_model_input(model, i);
+
+		sum(&hash, v->min);
+		sum(&hash, v->max);
+		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+			const struct incise_mf *mf = incise_model_mf(model, i, k);
+
+			for (const char *c = incise_mf_type_name(mf->type); *c; c++)
+				sum(&hash, *c);
+			for (int j = 0; j < incise_mf_n_params(mf->type); j++)
+				sum(&hash, mf->p[j]);
+		}
+	}
+	for (int r = 0; r < n_rules; r++) {
+		sum(&hash, model->rule[r].weight);
+		for (int i = 0; i < d; i++)
+			sum(&hash, incise_model_rule_mf(model, r, i));
+		for (int i = 0; i <= d; i++)
+			sum(&hash, incise_model_consequent(model, r)[i]);
+	}
+	return hash;
+}
+
+static int unknowns(const struct incise_model *model)
+{
+	return incise_model_n_rules(model) * (incise_model_n_inputs(model) + 1);
+}
+
+static struct incise_uncertainty *make(const struct incise_model *model)
+{
+	struct incise_uncertainty *u = calloc(1, sizeof(*u));
+	size_t n = unknowns(model);
+
+	if (!u)
+		return NULL;
+	u->n = (int)n;
+	u->checksum = checksum(model);
+	u->factor = malloc(n * (n + 1) / 2 * sizeof(*u->factor));
+	if (!u->factor) {
+		free(u);
+		errno = ENOMEM;
+		return NULL;
+	}
+	return u;
+}
+
+struct incise_uncertainty *incise_uncertainty_new(const struct incise_model *model,
+						  double noise, const double *factor,
+						  size_t stride, struct incise_error *err)
+{
+	struct incise_uncertainty *u = make(model);
+	bool good = isfinite(noise) && noise >= 0;
+	double *to;
+
+	if (!u) {
+		incise_error_set(err, ENOMEM, "no memory for the standard deviation");
+		return NULL;
+	}
+	u->noise = noise;
+	to = u->factor;
+	for (int i = 0; i < u->n; i++)
+		for (int k = i; k < u->n; k++) {
+			*to = factor[i * stride + k];
+			good &= isfinite(*to) && (k > i || *to != 0);
+			to++;
+		}
+	if (!good) {
+		incise_uncertainty_free(u);
+		incise_error_set(err, EINVAL,
+				 "the standard deviation cannot be told: its factor is "
+				 "singular or not finite; use a ridge");
+		return NULL;
+	}
+	return u;
+}
+
+void incise_uncertainty_free(struct incise_uncertainty *uncertainty)
+{
+	if (!uncertainty)
+		return;
+	free(uncertainty->factor);
+	free(uncertainty);
+}
+
+double incise_uncertainty_noise(const struct incise_uncertainty *uncertainty)
+{
+	return uncertainty->noise;
+}
+
+double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
+			     const struct incise_model *model, const double *x)
+{
+	double in[INCISE_MODEL_INPUTS_MAX], phi[UNKNOWNS_MAX];
+	double w[INCISE_MODEL_RULES_MAX], sum = 0, *at = phi;
+	const double *row = uncertainty->factor;
+
+	for (int i = 0; i < model->n_inputs; i++) {
+		const struct incise_variable *v = &model->input[i];
+
+		in[i] = x[i];
+		if (isnan(x[i]))
+			in[i] = v->min + (v->max - v->min) / 2;
+		else if (model->clamp)
+			in[i] = fmax(v->min, fmin(v->max, x[i]));
+		else
+			in[i] = fmax(-DBL_MAX, fmin(DBL_MAX, x[i]));
+	}
+	incise_model_firing(model, in, w);
+	for (int r = 0; r < model->n_rules; r++) {
+		*at++ = w[r];
+		for (int i = 0; i < model->n_inputs; i++) {
+			const struct incise_variable *v = &model->input[i];
+
+			*at++ = w[r] > 0 ? w[r] * ((in[i] - v->min) / (v->max - v->min))
+					 : 0;
+		}
+	}
+	/* Forward substitution with Rᵀ, a row of R at a time. */
+	for (int i = 0; i < uncertainty->n; i++) {
+		double v = phi[i] / *row++;
+
+		sum += v * v;
+		for (int k = i + 1; k < uncertainty->n; k++)
+			phi[k] -= *row++ * v;
+	}
+	sum = uncertainty->noise * sqrt(1 + sum);
+	/* Only far outside can it overflow, or be inf - inf. */
+	return isfinite(sum) ? sum : DBL_MAX;
+}
+
+struct reader {
+	FILE *file;
+	const char *path;
+	int line;
+	char *text;
+	size_t size;
+	struct incise_error *err;
+};
+
+static int fail(struct reader *in, int code, const char *fmt, ...) INCISE_PRINTF(3, 4);
+static int fail(struct reader *in, int code, const char *fmt, ...)
+{
+	char what[400];
+	va_list args;
+
+	va_start(args, fmt);
+	vsnprintf(what, sizeof(what), fmt, args);
+	va_end(args);
+	return incise_error_set(in->err, code, "%s:%d: %s", in->path, in->line, what);
+}
+
+/* Next line that is not empty or a comment: 1, or 0 at the end. */
+static int next_line(struct reader *in)
+{
+	ssize_t n;
+
+	while ((n = getline(&in->text, &in->size, in->file)) >= 0) {
+		in->line++;
+		if (memchr(in->text, 0, n))
+			return fail(in, EINVAL, "a NUL byte: not a .sd file");
+		while (n > 0 && strchr("\r\n \t", in->text[n - 1]))
+			in->text[--n] = 0;
+		if (*in->text && *in->text != '#')
+			return 1;
+	}
+	if (ferror(in->file))
+		return incise_error_set(in->err, errno ? errno : EIO, "%s: %s", in->path,
+					strerror(errno ? errno : EIO));
+	return 0;
+}
+
+/* The line "KEY VALUE": its value, or NULL. */
+static char *value_of(struct reader *in, const char *key)
+{
+	size_t length = strlen(key);
+	int rc = next_line(in);
+
+	if (rc < 0)
+		return NULL;
+	if (!rc || strncmp(in->text, key, length) || in->text[length] != ' ') {
+		fail(in, EINVAL, "expected '%s', found '%.40s': is this a .sd file?", key,
+		     rc ? in->text : "the end");
+		return NULL;
+	}
+	return in->text + length + 1;
+}
+
+static int integer_of(struct reader *in, const char *key, long *value)
+{
+	char *text = value_of(in, key), *end;
+
+	if (!text)
+		return -errno;
+	errno = 0;
+	*value = strtol(text, &end, 10);
+	if (end == text || *end || errno)
+		return fail(in, EINVAL, "%s: '%.40s' is not a whole number", key, text);
+	return 0;
+}
+
+/* A finite number at *at, behind one space for all but the first. */
+static int number(struct reader *in, char **at, double *value)
+{
+	char *end;
+
+	*value = strtod(*at, &end);
+	if (end == *at || (*end && *end != ' '))
+		return fail(in, EINVAL, "'%.30s' is not a number", *at);
+	if (!isfinite(*value))
+		return fail(in, EINVAL, "'%.*s' is not finite", (int)(end - *at), *at);
+	*at = end;
+	return 0;
+}
+
+static int read_row(struct reader *in, double *to, int n, int row)
+{
+	int rc = next_line(in);
+	char *at = in->text;
+
+	if (rc < 0)
+		return rc;
+	if (!rc)
+		return fail(in, EINVAL,
+			    "the file ends after %d of %d rows: it is truncated; train "
+			    "again",
+			    row, n);
+	for (int k = row; k < n; k++) {
+		rc = number(in, &at, to + k - row);
+		if (rc)
+			return rc;
+	}
+	if (*at)
+		return fail(in, EINVAL, "row %d holds more than its %d numbers", row + 1,
+			    n - row);
+	if (*to == 0)
+		return fail(in, EINVAL, "row %d begins with 0: the factor is singular",
+			    row + 1);
+	return 0;
+}
+
+static int read_file(struct reader *in, struct incise_uncertainty *u)
+{
+	double *to = u->factor;
+	char *text, *end;
+	uint64_t sum;
+	long value;
+	int rc = integer_of(in, "incise-sd", &value);
+
+	if (rc)
+		return rc;
+	if (value != VERSION)
+		return fail(in, EINVAL, "version %ld: this incise reads version %d",
+			    value, VERSION);
+	text = value_of(in, "model");
+	if (!text)
+		return -errno;
+	sum = strtoull(text, &end, 16);
+	if (strspn(text, "0123456789abcdef") != 16 || *end)
+		return fail(in, EINVAL, "model: '%.40s' is no checksum of 16 digits",
+			    text);
+	if (sum != u->checksum)
+		return fail(in, ESTALE,
+			    "made for a model of other parameters: it is stale; train "
+			    "again, or remove it");
+	rc = integer_of(in, "unknowns", &value);
+	if (rc)
+		return rc;
+	if (value != u->n)
+		return fail(in, EINVAL, "unknowns: %ld, the model has %d", value, u->n);
+	text = value_of(in, "noise");
+	if (!text)
+		return -errno;
+	rc = number(in, &text, &u->noise);
+	if (rc)
+		return rc;
+	if (*text || u->noise < 0)
+		return fail(in, EINVAL,
+			    "noise: expected one number that is not negative");
+	for (int row = 0; row < u->n && !rc; to += u->n - row, row++)
+		rc = read_row(in, to, u->n, row);
+	if (rc)
+		return rc;
+	rc = next_line(in);
+	if (rc > 0)
+		return fail(in, EINVAL, "'%.20s' behind the last row", in->text);
+	return rc;
+}
+
+struct incise_uncertainty *incise_uncertainty_load(const char *path,
+						   const struct incise_model *model,
+						   struct incise_error *err)
+{
+	struct incise_uncertainty *u = make(model);
+	struct reader in = {.path = path, .err = err};
+	struct incise_c_locale locale;
+	int rc;
+
+	if (!u) {
+		incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
+		return NULL;
+	}
+	in.file = strcmp(path, "-") ? fopen(path, "re") : stdin;
+	if (!in.file) {
+		rc = incise_error_set(err, errno,
+				      "%s: %s; it lies beside a model that 'incise "
+				      "train' wrote",
+				      path, strerror(errno));
+	} else {
+		locale = incise_c_locale_begin();
+		rc = read_file(&in, u);
+		incise_c_locale_end(locale);
+		if (in.file != stdin)
+			fclose(in.file);
+		free(in.text);
+	}
+	if (rc) {
+		incise_uncertainty_free(u);
+		errno = -rc;
+		return NULL;
+	}
+	return u;
+}
+
+int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
+			    const char *path, struct incise_error *err)
+{
+	struct incise_outfile *file = incise_outfile_open(path, err);
+	const double *from = uncertainty->factor;
+	struct incise_c_locale locale;
+	FILE *out;
+
+	if (!file)
+		return -errno;
+	locale = incise_c_locale_begin();
+	out = incise_outfile_stream(file);
+	fprintf(out, "incise-sd %d\nmodel %016" PRIx64 "\nunknowns %d\nnoise %.17g\n",
+		VERSION, uncertainty->checksum, uncertainty->n, uncertainty->noise);
+	for (int i = 0; i < uncertainty->n; i++)
+		for (int k = i; k < uncertainty->n; k++)
+			fprintf(out, "%.17g%c", *from++,
+				k + 1 < uncertainty->n ? ' ' : '\n');
+	incise_c_locale_end(locale);
+	return incise_outfile_commit(file, err);
+}
