@@ -10,10 +10,11 @@
 #include <string.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
+#include <incise/uncertainty.h>
 #include "cli.h"
 #include "json.h"
 
-enum { OPT_ARITH = CLI_LONG, OPT_NO_CLAMP, OPT_GRID, OPT_JSON };
+enum { OPT_ARITH = CLI_LONG, OPT_NO_CLAMP, OPT_GRID, OPT_SD, OPT_JSON };
 
 static const struct cli_option options[] = {
 	{OPT_ARITH, "arith", "KIND", "double (default) or fixed; a .fx is fixed already"},
@@ -21,6 +22,9 @@ static const struct cli_option options[] = {
 	{OPT_GRID, "grid", "NxM",
 	 "evaluate on a grid over the support instead of reading;\n"
 	 "prints inputs and output, an empty line after each row"},
+	{OPT_SD, "sd", NULL,
+	 "print the standard deviation of an unseen value behind\n"
+	 "the force; from MODEL.fis.sd, which train writes"},
 	{OPT_JSON, "json", NULL, "report as JSON: a row per evaluation"},
 	{0},
 };
@@ -40,6 +44,7 @@ static const struct cli_verb verb = {
 struct evaluator {
 	struct incise_model *model; /* NULL: only the compiled form is there */
 	struct incise_fixed *fixed; /* NULL: double */
+	struct incise_uncertainty *uncertainty; /* NULL: not asked for */
 	int n_inputs;
 	const char *input[INCISE_MODEL_INPUTS_MAX], *output;
 	double min[INCISE_MODEL_INPUTS_MAX], max[INCISE_MODEL_INPUTS_MAX];
@@ -55,6 +60,10 @@ static void add_row(struct evaluator *e, const double *x, double y, bool outside
 	for (int i = 0; i < e->n_inputs; i++)
 		json_object_set_new(row, e->input[i], json_number(x[i]));
 	json_object_set_new(row, e->output, json_number(y));
+	if (e->uncertainty)
+		json_object_set_new(
+			row, "sd",
+			json_number(incise_uncertainty_sd(e->uncertainty, e->model, x)));
 	json_object_set_new(row, "extrapolated", json_boolean(outside));
 	json_array_append_new(e->rows, row);
 }
@@ -80,7 +89,10 @@ static void evaluate(struct evaluator *e, const double *x, bool inputs)
 	}
 	for (int i = 0; inputs && i < e->n_inputs; i++)
 		printf("%.10g ", x[i]);
-	printf("%.10g\n", y);
+	printf("%.10g", y);
+	if (e->uncertainty)
+		printf(" %.10g", incise_uncertainty_sd(e->uncertainty, e->model, x));
+	putchar('\n');
 }
 
 static void parse_line(const struct evaluator *e, const char *path, unsigned long line,
@@ -133,6 +145,25 @@ static void eval_stream(struct evaluator *e, FILE *in, const char *path)
 	if (!feof(in))
 		cli_fail("%s: %s", path, strerror(errno));
 	free(text);
+}
+
+static void load_uncertainty(struct evaluator *e, const char *model)
+{
+	struct incise_error err = {0};
+	char *path;
+
+	if (!e->model)
+		cli_usage("--sd: %s is compiled; give the .fis it was made of", model);
+	if (!strcmp(model, "-"))
+		cli_fail(
+			"--sd needs a model in a file: its standard deviation lies beside "
+			"it");
+	if (asprintf(&path, "%s.sd", model) < 0)
+		cli_fail("%s: no memory for its standard deviation", model);
+	e->uncertainty = incise_uncertainty_load(path, e->model, &err);
+	if (!e->uncertainty)
+		cli_fail_with(&err);
+	free(path);
 }
 
 static void eval_grid(struct evaluator *e, const char *size)
@@ -219,7 +250,7 @@ int main(int argc, char **argv)
 {
 	const char *arith = NULL, *grid = NULL, *path = "-";
 	struct evaluator e = {0};
-	bool clamp = true;
+	bool clamp = true, sd = false;
 	FILE *in;
 	int opt;
 
@@ -237,6 +268,9 @@ int main(int argc, char **argv)
 		case OPT_GRID:
 			grid = optarg;
 			break;
+		case OPT_SD:
+			sd = true;
+			break;
 		case OPT_JSON:
 			e.rows = json_array();
 			break;
@@ -251,6 +285,8 @@ int main(int argc, char **argv)
 	if (argc - optind == 2)
 		path = argv[optind + 1];
 	open_model(&e, argv[optind], arith, clamp);
+	if (sd)
+		load_uncertainty(&e, argv[optind]);
 	if (grid) {
 		eval_grid(&e, grid);
 	} else {
@@ -273,6 +309,7 @@ int main(int argc, char **argv)
 			"%lu inputs lay where no rule of the model fires; the nearest rule "
 			"answered",
 			e.unfired);
+	incise_uncertainty_free(e.uncertainty);
 	incise_model_free(e.model);
 	incise_fixed_free(e.fixed);
 	return 0;

@@ -34,6 +34,7 @@ enum {
 	OPT_EPOCHS,
 	OPT_STEP,
 	OPT_RIDGE,
+	OPT_STARTS,
 	OPT_CLASSIC,
 	OPT_INITIAL,
 	OPT_HISTORY,
@@ -50,11 +51,14 @@ static const struct cli_option options[] = {
 	{OPT_CHECK, "check", "SHARE", "keep this share back as unseen data, e.g. 0.3"},
 	{OPT_SEED, "seed", "N", "of every random choice (default 1)"},
 	{OPT_MF, "mf", "N,M",
-	 "membership functions per input (default 5,4; else 3 each)"},
+	 "membership functions per input (default 5,4; else 3 each),\n"
+	 "or 'auto': chosen by cross-validation"},
 	{OPT_MF_TYPE, "mf-type", "KIND", "gaussmf (default) or gbellmf"},
 	{OPT_EPOCHS, "epochs", "N", "epochs, at most (default 80)"},
-	{OPT_STEP, "step", "K", "initial step of the premises (default 0.01)"},
+	{OPT_STEP, "step", "K",
+	 "initial step of the premises (default 0.01); --classic only"},
 	{OPT_RIDGE, "ridge", "R", "ridge on scaled data (default: by cross-validation)"},
+	{OPT_STARTS, "starts", "N", "premises to start from (default 3)"},
 	{OPT_CLASSIC, "classic", NULL,
 	 "as MATLAB's anfis: no scaling, no ridge but 1e-6;\n"
 	 "the check data choose the epoch"},
@@ -83,6 +87,7 @@ struct job {
 	double check;
 	int mfs[INCISE_MODEL_INPUTS_MAX];
 	int n_mfs;
+	bool auto_mfs;
 	enum incise_mf_type type;
 	bool json;
 	struct incise_train_options train;
@@ -105,6 +110,10 @@ static void parse_mfs(struct job *job, char *text)
 {
 	char *items[INCISE_MODEL_INPUTS_MAX];
 
+	job->n_mfs = 0;
+	job->auto_mfs = !strcmp(text, "auto");
+	if (job->auto_mfs)
+		return;
 	job->n_mfs = cli_list("mf", text, items, INCISE_MODEL_INPUTS_MAX);
 	for (int i = 0; i < job->n_mfs; i++)
 		job->mfs[i] = cli_integer("mf", items[i], 1, INCISE_MODEL_MFS_MAX);
@@ -165,6 +174,9 @@ static void parse(struct job *job, int argc, char **argv)
 			break;
 		case OPT_RIDGE:
 			job->train.ridge = cli_number("ridge", optarg, 0, 1e12);
+			break;
+		case OPT_STARTS:
+			job->train.starts = cli_integer("starts", optarg, 1, 100);
 			break;
 		case OPT_CLASSIC:
 			job->train.classic = true;
@@ -237,18 +249,22 @@ static void variable(struct incise_variable *v, const struct incise_pairs *pairs
 	}
 }
 
-static struct incise_model *first_model(const struct job *job,
-					const struct incise_pairs *pairs)
+/* The model as it is before training; with --mf auto its shape is learnt from `fit`. */
+static struct incise_model *first_model(struct job *job, const struct side *fit)
 {
 	struct incise_variable in[INCISE_MODEL_INPUTS_MAX], out;
 	struct incise_error err = {0};
 	struct incise_model *model;
 
 	for (int i = 0; i < job->n_inputs; i++)
-		variable(&in[i], pairs, i, job->inputs[i]);
-	variable(&out, pairs, job->n_inputs, job->output);
+		variable(&in[i], &fit->pairs, i, job->inputs[i]);
+	variable(&out, &fit->pairs, job->n_inputs, job->output);
 	if (!(out.min < out.max))
 		out.max = out.min + fmax(fabs(out.min), 1) * 1e-6;
+	job->train.groups = fit->groups;
+	if (job->auto_mfs && incise_train_choose_grid(&fit->pairs, in, job->type,
+						      &job->train, job->mfs, &err))
+		cli_fail("%s: %s", job->data, err.text);
 	model = incise_model_new_grid(job->n_inputs, in, job->mfs, job->type, &out, &err);
 	if (!model)
 		cli_fail("%s: %s", job->data, err.text);
@@ -291,8 +307,50 @@ static void check_writable(const struct job *job, const char *path)
 	incise_outfile_abort(file);
 }
 
+/* What the standard deviation says, and how often it is right on the pairs kept back. */
+struct interval {
+	struct incise_uncertainty *uncertainty;
+	double noise;
+	double coverage; /* NAN without check pairs */
+};
+
+static void judge_interval(struct interval *interval, const struct incise_model *model,
+			   const struct side *check)
+{
+	size_t inside = 0;
+
+	interval->noise = incise_uncertainty_noise(interval->uncertainty);
+	interval->coverage = NAN;
+	for (size_t i = 0; check && i < check->pairs.n; i++) {
+		const double *x = check->rows + i * (check->pairs.n_inputs + 1);
+		double e = incise_model_eval(model, x, NULL) - x[check->pairs.n_inputs];
+		double sd = incise_uncertainty_sd(interval->uncertainty, model, x);
+
+		inside += fabs(e) <= INCISE_INTERVAL95 * sd;
+	}
+	if (check)
+		interval->coverage = (double)inside / check->pairs.n;
+}
+
+/* Beside the model, unless that is no file; a name of its own would be a surprise there. */
+static void save_uncertainty(const struct interval *interval, const char *model)
+{
+	struct incise_error err = {0};
+	struct stat st;
+	char *path;
+
+	if (!strcmp(model, "-") || stat(model, &st) || !S_ISREG(st.st_mode))
+		return;
+	if (asprintf(&path, "%s.sd", model) < 0)
+		cli_fail("%s: no memory for its standard deviation", model);
+	if (incise_uncertainty_save(interval->uncertainty, path, &err))
+		cli_fail_with(&err);
+	free(path);
+}
+
 static void train(struct job *job, struct incise_model *model, const struct side *fit,
-		  const struct side *check, struct incise_train_report *report)
+		  const struct side *check, struct incise_train_report *report,
+		  struct interval *interval)
 {
 	struct incise_error err = {0};
 	struct incise_outfile *file = NULL;
@@ -305,15 +363,16 @@ static void train(struct job *job, struct incise_model *model, const struct side
 		history.csv = incise_outfile_stream(file);
 		fprintf(history.csv, "epoch,train_rmse,check_rmse\n");
 	}
-	job->train.groups = fit->groups;
 	job->train.progress = on_epoch;
 	job->train.user = &history;
+	job->train.uncertainty = &interval->uncertainty;
 	if (incise_train(model, &fit->pairs, check ? &check->pairs : NULL, &job->train,
 			 report, &err)) {
 		incise_outfile_abort(file);
 		cli_fail("%s: %s", job->data, err.text);
 	}
 	cli_progress_end();
+	judge_interval(interval, model, check);
 	if (file && incise_outfile_commit(file, &err))
 		cli_fail_with(&err);
 }
@@ -326,7 +385,7 @@ static const char *unit_of(const char *column)
 	return score ? score + 1 : "";
 }
 
-static json_t *error_object(const struct job *job, double rmse, size_t pairs)
+static json_t *error_object(const struct job *job, double rmse, double r2, size_t pairs)
 {
 	const char *unit = unit_of(job->output);
 	json_t *object = json_object();
@@ -338,6 +397,7 @@ static json_t *error_object(const struct job *job, double rmse, size_t pairs)
 		return object;
 	snprintf(key, sizeof(key), "mse%s%s%s", *unit ? "_" : "", unit, *unit ? "2" : "");
 	json_object_set_new(object, key, json_number(rmse * rmse));
+	json_object_set_new(object, "r2", json_number(r2));
 	json_object_set_new(object, "pairs", json_integer(pairs));
 	return object;
 }
@@ -398,22 +458,27 @@ static json_t *warnings(const struct job *job, const struct incise_model *model,
 static void print_json(const struct job *job, const struct incise_model *model,
 		       const struct side *fit, const struct side *check,
 		       const struct incise_train_report *report,
-		       const struct incise_baselines *baselines, json_t *warned)
+		       const struct incise_baselines *baselines,
+		       const struct interval *interval, json_t *warned)
 {
-	json_t *object = json_object();
+	json_t *object = json_object(), *unfired = json_array(), *mfs = json_array();
+	const char *unit = unit_of(job->output);
+	char key[80];
 
 	json_object_set_new(object, "pairs",
 			    json_integer(fit->pairs.n + (check ? check->pairs.n : 0)));
 	json_object_set_new(object, "train",
-			    error_object(job, report->train_rmse, fit->pairs.n));
+			    error_object(job, report->train_rmse, report->train_r2,
+					 fit->pairs.n));
 	json_object_set_new(object, "check",
-			    check ? error_object(job, report->check_rmse, check->pairs.n)
+			    check ? error_object(job, report->check_rmse,
+						 report->check_r2, check->pairs.n)
 				  : json_null());
 	json_object_set_new(object, "baselines",
 			    json_pack("{sososo}", "mean",
-				      error_object(job, baselines->mean, 0), "linear",
-				      error_object(job, baselines->linear, 0), "knn",
-				      error_object(job, baselines->knn, 0)));
+				      error_object(job, baselines->mean, 0, 0), "linear",
+				      error_object(job, baselines->linear, 0, 0), "knn",
+				      error_object(job, baselines->knn, 0, 0)));
 	json_object_set_new(object, "knn_k", json_integer(baselines->k));
 	json_object_set_new(object, "train_groups", json_integer(fit->n_groups));
 	json_object_set_new(object, "check_groups",
@@ -425,6 +490,21 @@ static void print_json(const struct job *job, const struct incise_model *model,
 	json_object_set_new(object, "ridge", json_number(report->ridge));
 	json_object_set_new(object, "condition", json_number(report->condition));
 	json_object_set_new(object, "rules_unfired", json_integer(report->rules_unfired));
+	for (int r = 0; r < incise_model_n_rules(model); r++)
+		if (report->unfired[r])
+			json_array_append_new(unfired, json_integer(r + 1));
+	json_object_set_new(object, "unfired_rules", unfired);
+	for (int i = 0; i < job->n_inputs; i++)
+		json_array_append_new(mfs, json_integer(job->mfs[i]));
+	json_object_set_new(object, "mf", mfs);
+	json_object_set_new(object, "start", json_integer(report->start));
+	json_object_set_new(object, "pairs_tuned", json_integer(report->pairs_tuned));
+	snprintf(key, sizeof(key), "crossval_rmse%s%s", *unit ? "_" : "", unit);
+	json_object_set_new(object, key, json_number(report->crossval_rmse));
+	snprintf(key, sizeof(key), "noise%s%s", *unit ? "_" : "", unit);
+	json_object_set_new(object, key, json_number(interval->noise));
+	json_object_set_new(object, "interval95_coverage",
+			    json_number(interval->coverage));
 	json_object_set_new(object, "warnings", warned);
 	json_object_set_new(object, "model", json_string(job->model));
 	json_print(object);
@@ -440,7 +520,8 @@ static void print_row(const char *name, double train, double check)
 static void print_text(const struct job *job, const struct incise_model *model,
 		       const struct side *fit, const struct side *check,
 		       const struct incise_train_report *report,
-		       const struct incise_baselines *baselines)
+		       const struct incise_baselines *baselines,
+		       const struct interval *interval)
 {
 	const char *unseen = job->train.classic ? "check"
 			     : job->group	? "unseen cuts"
@@ -468,6 +549,15 @@ static void print_text(const struct job *job, const struct incise_model *model,
 	       report->train_rmse * report->train_rmse);
 	check ? printf("%14.5g\n", report->check_rmse * report->check_rmse)
 	      : printf("\n");
+	print_row("R² of this model", report->train_r2, report->check_r2);
+	printf("  95 %% interval: noise %.4g %s", interval->noise, unit_of(job->output));
+	if (check)
+		printf(", holds %.1f %% of the %s", 100 * interval->coverage, unseen);
+	printf("\n");
+	if (report->pairs_tuned && report->pairs_tuned < fit->pairs.n)
+		printf("  membership functions from a random %zu of the pairs, consequents "
+		       "from all\n",
+		       report->pairs_tuned);
 	if (strcmp(job->model, "-"))
 		printf("wrote %s\n", job->model);
 }
@@ -478,6 +568,7 @@ int main(int argc, char **argv)
 	struct side fit = {0}, check = {0};
 	struct incise_train_report report;
 	struct incise_baselines baselines;
+	struct interval interval = {0};
 	struct incise_error err = {0};
 	struct incise_dataset *data;
 	struct incise_model *model;
@@ -511,26 +602,29 @@ int main(int argc, char **argv)
 		take_side(&check, data, &job, split, true);
 	}
 	take_side(&fit, data, &job, split, false);
-	model = first_model(&job, &fit.pairs);
+	model = first_model(&job, &fit);
 	if (job.initial && incise_model_save(model, job.initial, &err))
 		cli_fail_with(&err);
-	train(&job, model, &fit, split ? &check : NULL, &report);
+	train(&job, model, &fit, split ? &check : NULL, &report, &interval);
 	if (incise_baselines(&fit.pairs, fit.groups, split ? &check.pairs : &fit.pairs,
 			     &baselines, &err))
 		cli_fail("%s: %s", job.data, err.text);
 	if (incise_model_save(model, job.model, &err))
 		cli_fail_with(&err);
+	save_uncertainty(&interval, job.model);
 	warned = warnings(&job, model, &fit, &report,
 			  split ? report.check_rmse : report.train_rmse, &baselines);
 	if (job.json)
 		print_json(&job, model, &fit, split ? &check : NULL, &report, &baselines,
-			   warned);
+			   &interval, warned);
 	else if (strcmp(job.model, "-"))
-		print_text(&job, model, &fit, split ? &check : NULL, &report, &baselines);
+		print_text(&job, model, &fit, split ? &check : NULL, &report, &baselines,
+			   &interval);
 	if (!job.json)
 		json_decref(warned);
 	cli_finish();
 	incise_model_free(model);
+	incise_uncertainty_free(interval.uncertainty);
 	incise_dataset_free(data);
 	free(split);
 	free(fit.rows);

@@ -45,6 +45,7 @@ static const double *strengths(const struct state *s, size_t n, const double *x,
 static int solve(struct state *s, const struct incise_pairs *pairs, double ridge)
 {
 	double w[INCISE_MODEL_RULES_MAX];
+	struct incise_ridge plain = {ridge, 1, s->n_linear, 1};
 	int d = pairs->n_inputs;
 
 	incise_lsq_reset(s->lsq);
@@ -56,7 +57,7 @@ static int solve(struct state *s, const struct incise_pairs *pairs, double ridge
 		incise_basis_row(&s->basis, to, x, incise_lsq_row(s->lsq));
 		incise_lsq_add(s->lsq, x[d]);
 	}
-	return incise_lsq_solve(s->lsq, ridge, s->x);
+	return incise_lsq_solve(s->lsq, &plain, s->x);
 }
 
 static double check_rmse(const struct state *s, const struct incise_pairs *pairs)

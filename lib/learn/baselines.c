@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <incise/train.h>
 #include "lsq.h"
+#include "shuffle.h"
 
 static const int ks[] = {1, 3, 5, 10, 20, 50};
 #define N_KS ((int)(sizeof(ks) / sizeof(*ks)))
@@ -15,6 +16,11 @@ static const int ks[] = {1, 3, 5, 10, 20, 50};
 
 /* Queries by which k is chosen: enough to tell ks apart, few enough to be quick. */
 #define CHOOSERS 2000
+
+/* Neighbours are looked for among so many pairs, for so many queries, at most: by chance
+ * from more, where another neighbour would be no nearer than the noise. */
+#define POOL_MAX 20000
+#define QUERIES_MAX 5000
 
 struct column {
 	double mean, sd;
@@ -43,6 +49,8 @@ static int linear_rmse(const struct incise_pairs *train, const struct incise_pai
 {
 	int d = train->n_inputs;
 	struct incise_lsq *lsq = incise_lsq_new(d + 1);
+	/* Just enough ridge to be defined where inputs depend on each other. */
+	struct incise_ridge ridge = {1e-9 * train->n, 1, d + 1, 1};
 	double p[INCISE_MODEL_INPUTS_MAX + 1], sum = 0;
 	int rc = lsq ? 0 : -ENOMEM;
 
@@ -55,9 +63,8 @@ static int linear_rmse(const struct incise_pairs *train, const struct incise_pai
 		row[d] = 1;
 		incise_lsq_add(lsq, (x[d] - columns[d].mean) / columns[d].sd);
 	}
-	/* Just enough ridge to be defined where inputs depend on each other. */
 	if (!rc)
-		rc = incise_lsq_solve(lsq, 1e-9 * train->n, p);
+		rc = incise_lsq_solve(lsq, &ridge, p);
 	for (size_t n = 0; n < on->n && !rc; n++) {
 		const double *x = on->rows + n * (d + 1);
 		double e = p[d] - (x[d] - columns[d].mean) / columns[d].sd;
@@ -71,23 +78,50 @@ static int linear_rmse(const struct incise_pairs *train, const struct incise_pai
 	return rc;
 }
 
+/* The pairs among which neighbours are looked for. */
+struct pool {
+	const struct incise_pairs *train;
+	const int *groups;
+	const struct column *columns;
+	size_t *pairs; /* n of them, in random order */
+	size_t n;
+};
+
+/* At most so many of n numbers from 0, in random order; NULL with errno ENOMEM. */
+static size_t *some_of(size_t n, size_t most, size_t *count)
+{
+	size_t *order = malloc(n * sizeof(*order));
+
+	if (order)
+		incise_shuffle(order, n, 1);
+	*count = n < most ? n : most;
+	return order;
+}
+
+/* The group of a pair, or itself. */
+static long unit_of(const struct pool *pool, size_t pair)
+{
+	return pool->groups ? pool->groups[pair] : (long)pair;
+}
+
 /*
- * Predictions of the output at x for all ks, from pairs of other groups (or rows) than
- * the excluded one; a k larger than there are pairs takes them all.
+ * Predictions of the output at x for all ks, from pairs of other units than the excluded
+ * one; a k larger than there are pairs takes them all.
  */
-static void knn_predict(const struct incise_pairs *train, const int *groups,
-			const struct column *columns, const double *x, long excluded,
+static void knn_predict(const struct pool *pool, const double *x, long excluded,
 			double *y)
 {
+	const struct incise_pairs *train = pool->train;
+	const struct column *columns = pool->columns;
 	double near[K_MAX], value[K_MAX];
 	int width = train->n_inputs + 1, found = 0;
 
-	for (size_t n = 0; n < train->n; n++) {
-		const double *row = train->rows + n * width;
+	for (size_t n = 0; n < pool->n; n++) {
+		const double *row = train->rows + pool->pairs[n] * width;
 		double distance = 0;
 		int i;
 
-		if (excluded >= 0 && excluded == (groups ? groups[n] : (long)n))
+		if (excluded >= 0 && excluded == unit_of(pool, pool->pairs[n]))
 			continue;
 		for (int c = 0; c < train->n_inputs; c++) {
 			double e = (row[c] - x[c]) / columns[c].sd;
@@ -113,20 +147,19 @@ static void knn_predict(const struct incise_pairs *train, const int *groups,
 	}
 }
 
-/* Index of the k with the least error when each pair is predicted without its own group. */
-static int choose_k(const struct incise_pairs *train, const int *groups,
-		    const struct column *columns)
+/* Index of the k with the least error when each pair is predicted without its own unit. */
+static int choose_k(const struct pool *pool)
 {
-	int width = train->n_inputs + 1, best = 0;
-	size_t stride = train->n / CHOOSERS + 1;
+	int width = pool->train->n_inputs + 1, best = 0;
+	const struct column *output = &pool->columns[width - 1];
 	double sum[N_KS] = {0}, y[N_KS];
 
-	for (size_t n = 0; n < train->n; n += stride) {
-		const double *x = train->rows + n * width;
+	for (size_t n = 0; n < pool->n && n < CHOOSERS; n++) {
+		const double *x = pool->train->rows + pool->pairs[n] * width;
 
-		knn_predict(train, groups, columns, x, groups ? groups[n] : (long)n, y);
+		knn_predict(pool, x, unit_of(pool, pool->pairs[n]), y);
 		for (int i = 0; i < N_KS; i++) {
-			double e = (y[i] - x[width - 1]) / columns[width - 1].sd;
+			double e = (y[i] - x[width - 1]) / output->sd;
 
 			sum[i] += e * e;
 		}
@@ -137,13 +170,46 @@ static int choose_k(const struct incise_pairs *train, const int *groups,
 	return best;
 }
 
+static int knn_rmse(struct pool *pool, const struct incise_pairs *on,
+		    struct incise_baselines *result)
+{
+	int d = on->n_inputs, best;
+	const struct column *output = &pool->columns[d];
+	double sum = 0, y[N_KS];
+	size_t n_queries, *queries = some_of(on->n, QUERIES_MAX, &n_queries);
+
+	pool->pairs = some_of(pool->train->n, POOL_MAX, &pool->n);
+	if (!pool->pairs || !queries) {
+		free(queries);
+		return -ENOMEM;
+	}
+	best = choose_k(pool);
+	for (size_t n = 0; n < n_queries; n++) {
+		const double *x = on->rows + queries[n] * (d + 1);
+		double e;
+
+		/* A pair that was fitted on must not be its own neighbour. */
+		knn_predict(pool, x,
+			    on->rows == pool->train->rows ? unit_of(pool, queries[n])
+							  : -1,
+			    y);
+		e = (x[d] - y[best]) / output->sd;
+		sum += e * e / n_queries;
+	}
+	result->knn = sqrt(sum) * output->sd;
+	result->k = ks[best];
+	free(queries);
+	return 0;
+}
+
 int incise_baselines(const struct incise_pairs *train, const int *groups,
 		     const struct incise_pairs *on, struct incise_baselines *result,
 		     struct incise_error *err)
 {
 	struct column columns[INCISE_MODEL_INPUTS_MAX + 1];
-	int d = train->n_inputs, best, rc;
-	double mean = 0, knn = 0, y[N_KS];
+	struct pool pool = {.train = train, .groups = groups, .columns = columns};
+	int d = train->n_inputs, rc;
+	double mean = 0;
 
 	if (!train->n || !on->n || on->n_inputs != d || d > INCISE_MODEL_INPUTS_MAX)
 		return incise_error_set(err, EINVAL,
@@ -151,25 +217,20 @@ int incise_baselines(const struct incise_pairs *train, const int *groups,
 					"different width");
 	find_columns(train, columns);
 	rc = linear_rmse(train, on, columns, &result->linear);
+	if (!rc)
+		rc = knn_rmse(&pool, on, result);
+	free(pool.pairs);
 	if (rc)
-		return incise_error_set(err, -rc, "baselines: linear regression failed");
-	best = choose_k(train, groups, columns);
+		return incise_error_set(err, -rc,
+					rc == -ENOMEM
+						? "baselines: no memory"
+						: "baselines: linear regression failed");
 	for (size_t n = 0; n < on->n; n++) {
 		const double *x = on->rows + n * (d + 1);
 		double e = (x[d] - columns[d].mean) / columns[d].sd;
 
 		mean += e * e / on->n;
-		/* A pair that was fitted on must not be its own neighbour. */
-		knn_predict(train, groups, columns, x,
-			    on->rows != train->rows ? -1
-			    : groups		    ? groups[n]
-						    : (long)n,
-			    y);
-		e = (x[d] - y[best]) / columns[d].sd;
-		knn += e * e / on->n;
 	}
 	result->mean = sqrt(mean) * columns[d].sd;
-	result->knn = sqrt(knn) * columns[d].sd;
-	result->k = ks[best];
 	return 0;
 }

@@ -11,95 +11,96 @@
 #include "shuffle.h"
 #include "varpro.h"
 
-/* Which unit and fold each pair is in: by group where there are at least two. */
-static int assign(struct incise_folds *folds, size_t n, const int *groups, uint64_t seed,
-		  int *fold, int *unit)
-{
-	size_t n_groups = 0, *order;
+/* Up to so many pairs the division into folds is repeated. */
+#define REPEATED_MAX 1000
 
-	for (size_t i = 0; groups && i < n; i++)
+/* Number the groups that occur from 0, in order; returns how many, or -ENOMEM. */
+static int count_groups(const int *groups, size_t n, int *unit)
+{
+	size_t n_groups = 0;
+	int *number, next = 0;
+
+	for (size_t i = 0; i < n; i++)
 		if ((size_t)groups[i] + 1 > n_groups)
 			n_groups = (size_t)groups[i] + 1;
-	/* Numbers of groups that lie on the check side are absent here: count afresh. */
-	if (n_groups) {
-		int *number = malloc(n_groups * sizeof(*number)), next = 0;
-
-		if (!number)
-			return -ENOMEM;
-		for (size_t g = 0; g < n_groups; g++)
-			number[g] = -1;
-		for (size_t i = 0; i < n; i++) {
-			if (number[groups[i]] < 0)
-				number[groups[i]] = next++;
-			unit[i] = number[groups[i]];
-		}
-		free(number);
-		n_groups = next;
-	}
-	if (n_groups < 2)
-		n_groups = 0;
-	order = malloc((n_groups ? n_groups : n) * sizeof(*order));
-	if (!order)
+	number = malloc(n_groups * sizeof(*number));
+	if (!number)
 		return -ENOMEM;
-	incise_shuffle(order, n_groups ? n_groups : n, seed);
-	folds->n = n_groups && n_groups < CROSSVAL_FOLDS ? (int)n_groups
-		   : n < CROSSVAL_FOLDS			 ? (int)n
-							 : CROSSVAL_FOLDS;
+	for (size_t g = 0; g < n_groups; g++)
+		number[g] = -1;
 	for (size_t i = 0; i < n; i++) {
-		fold[i] = (int)(order[n_groups ? (size_t)unit[i] : i] % folds->n);
-		if (!n_groups)
-			unit[i] = fold[i];
+		if (number[groups[i]] < 0)
+			number[groups[i]] = next++;
+		unit[i] = number[groups[i]];
 	}
-	folds->n_units = n_groups ? (int)n_groups : folds->n;
-	free(order);
+	free(number);
+	return next;
+}
+
+/* Hold out the pairs whose element (group, or the pair itself) falls into fold f. */
+static int fill_fold(struct incise_folds *folds, int at, const struct incise_pairs *pairs,
+		     const size_t *place, const int *unit, bool grouped, int n_folds,
+		     int f)
+{
+	size_t width = pairs->n_inputs + 1, n_fit = 0, n_held = 0;
+	double *fit = malloc(pairs->n * width * sizeof(*fit));
+	double *held = malloc(pairs->n * width * sizeof(*held));
+
+	folds->fit[at].rows = fit;
+	folds->held[at].rows = held;
+	folds->unit[at] = malloc(pairs->n * sizeof(*unit));
+	if (!fit || !held || !folds->unit[at])
+		return -ENOMEM;
+	for (size_t i = 0; i < pairs->n; i++) {
+		const double *row = pairs->rows + width * i;
+
+		if (place[grouped ? (size_t)unit[i] : i] % n_folds != (size_t)f) {
+			memcpy(fit + width * n_fit++, row, width * sizeof(*row));
+			continue;
+		}
+		folds->unit[at][n_held] = grouped ? unit[i] : at;
+		memcpy(held + width * n_held++, row, width * sizeof(*row));
+	}
+	folds->fit[at] = (struct incise_pairs){fit, n_fit, pairs->n_inputs};
+	folds->held[at] = (struct incise_pairs){held, n_held, pairs->n_inputs};
+	folds->n_held += n_held;
 	return 0;
 }
 
 int incise_folds_init(struct incise_folds *folds, const struct incise_pairs *pairs,
 		      const int *groups, uint64_t seed)
 {
-	size_t width = pairs->n_inputs + 1;
-	int *fold = malloc(pairs->n * sizeof(*fold));
 	int *unit = malloc(pairs->n * sizeof(*unit));
-	int rc = fold && unit ? 0 : -ENOMEM;
+	size_t *place = malloc(pairs->n * sizeof(*place));
+	int n_groups = 0, n_folds, repeats, rc = unit && place ? 0 : -ENOMEM;
+	size_t elements = pairs->n;
 
 	memset(folds, 0, sizeof(*folds));
-	folds->n_pairs = pairs->n;
-	if (!rc)
-		rc = assign(folds, pairs->n, groups, seed, fold, unit);
-	for (int f = 0; f < folds->n && !rc; f++) {
-		double *fit = malloc(pairs->n * width * sizeof(*fit));
-		double *held = malloc(pairs->n * width * sizeof(*held));
-		size_t n_fit = 0, n_held = 0;
-
-		folds->fit[f].rows = fit;
-		folds->held[f].rows = held;
-		folds->unit[f] = malloc(pairs->n * sizeof(*unit));
-		if (!fit || !held || !folds->unit[f]) {
-			rc = -ENOMEM;
-			break;
-		}
-		for (size_t i = 0; i < pairs->n; i++) {
-			const double *row = pairs->rows + width * i;
-
-			if (fold[i] != f) {
-				memcpy(fit + width * n_fit++, row, width * sizeof(*row));
-				continue;
-			}
-			folds->unit[f][n_held] = unit[i];
-			memcpy(held + width * n_held++, row, width * sizeof(*row));
-		}
-		folds->fit[f] = (struct incise_pairs){fit, n_fit, pairs->n_inputs};
-		folds->held[f] = (struct incise_pairs){held, n_held, pairs->n_inputs};
+	if (!rc && groups) {
+		n_groups = count_groups(groups, pairs->n, unit);
+		rc = n_groups < 0 ? n_groups : 0;
 	}
-	free(fold);
+	if (n_groups >= 2)
+		elements = n_groups;
+	n_folds = elements < CROSSVAL_FOLDS ? (int)elements : CROSSVAL_FOLDS;
+	/* With no more elements than folds there is one division only. */
+	repeats = elements > CROSSVAL_FOLDS && pairs->n <= REPEATED_MAX ? CROSSVAL_REPEATS
+									: 1;
+	for (int repeat = 0; repeat < repeats && !rc; repeat++) {
+		incise_shuffle(place, elements, seed + repeat);
+		for (int f = 0; f < n_folds && !rc; f++)
+			rc = fill_fold(folds, folds->n++, pairs, place, unit,
+				       n_groups >= 2, n_folds, f);
+	}
+	folds->n_units = n_groups >= 2 ? n_groups : folds->n;
 	free(unit);
+	free(place);
 	return rc;
 }
 
 void incise_folds_free(struct incise_folds *folds)
 {
-	for (int f = 0; f < CROSSVAL_FOLDS; f++) {
+	for (int f = 0; f < CROSSVAL_MAX; f++) {
 		free((void *)folds->fit[f].rows);
 		free((void *)folds->held[f].rows);
 		free(folds->unit[f]);
@@ -142,8 +143,8 @@ static void fold_pairs(struct incise_lsq *lsq, const struct incise_basis *basis,
 }
 
 int incise_crossval_ridges(const struct incise_basis *basis,
-			   const struct incise_folds *folds, const double *ridges, int n,
-			   double *error)
+			   const struct incise_folds *folds,
+			   const struct incise_ridge *ridges, int n, double *error)
 {
 	int n_linear = basis->n_rules * (basis->n_inputs + 1);
 	struct incise_lsq *lsq = incise_lsq_new(n_linear);
@@ -154,7 +155,7 @@ int incise_crossval_ridges(const struct incise_basis *basis,
 	for (int f = 0; f < folds->n && !rc; f++) {
 		fold_pairs(lsq, basis, &folds->fit[f]);
 		for (int i = 0; i < n && !rc; i++) {
-			rc = incise_lsq_solve(lsq, ridges[i], x);
+			rc = incise_lsq_solve(lsq, &ridges[i], x);
 			if (!rc)
 				add_errors(folds, f, basis, x,
 					   error + (size_t)i * folds->n_units);
@@ -197,7 +198,7 @@ static void repeat(const struct incise_folds *folds, int f, double *error, int e
 
 static int find_ratios(const struct incise_folds *folds, int f,
 		       const struct incise_basis *basis, const double *consequents,
-		       double ridge, double *ratios)
+		       const struct incise_ridge *ridge, double *ratios)
 {
 	const struct incise_pairs *held = &folds->held[f];
 	double w[INCISE_MODEL_RULES_MAX], out[INCISE_MODEL_RULES_MAX];
@@ -210,7 +211,7 @@ static int find_ratios(const struct incise_folds *folds, int f,
 		goto out;
 	rc = -EDOM;
 	fold_pairs(lsq, basis, &folds->fit[f]);
-	factor = incise_lsq_factor(lsq, ridge, n, &stride);
+	factor = incise_lsq_factor(lsq, ridge, &stride);
 	if (!factor)
 		goto out;
 	rc = 0;
@@ -231,8 +232,9 @@ out:
 }
 
 int incise_crossval_search(const struct incise_basis *basis,
-			   const struct incise_folds *folds, double ridge, int epochs,
-			   double *error, double *ratios)
+			   const struct incise_folds *folds,
+			   const struct incise_ridge *ridge, int epochs, double *error,
+			   double *ratios)
 {
 	int n = basis->n_rules * (basis->n_inputs + 1);
 	double *consequents = malloc(n * sizeof(*consequents));

@@ -9,15 +9,22 @@
 #define INCISE_CROSSVAL_H
 
 #include "basis.h"
+#include "lsq.h"
 
 #define CROSSVAL_FOLDS 5
+#define CROSSVAL_REPEATS 4
+#define CROSSVAL_MAX (CROSSVAL_FOLDS * CROSSVAL_REPEATS)
 
+/*
+ * Few cuts make one division into folds a game of chance: it is repeated with others
+ * where the pairs are few enough, and n counts the folds of all of them.
+ */
 struct incise_folds {
 	int n; /* below 2: nothing can be held out */
 	int n_units;
-	size_t n_pairs;
-	struct incise_pairs fit[CROSSVAL_FOLDS], held[CROSSVAL_FOLDS];
-	int *unit[CROSSVAL_FOLDS]; /* of each held pair */
+	size_t n_held; /* pairs, over all folds */
+	struct incise_pairs fit[CROSSVAL_MAX], held[CROSSVAL_MAX];
+	int *unit[CROSSVAL_MAX]; /* of each held pair */
 };
 
 /* Returns 0 or -ENOMEM; incise_folds_free() in either case. */
@@ -30,18 +37,19 @@ void incise_folds_free(struct incise_folds *folds);
  * i. Returns 0, -EDOM, -ENOMEM.
  */
 int incise_crossval_ridges(const struct incise_basis *basis,
-			   const struct incise_folds *folds, const double *ridges, int n,
-			   double *error);
+			   const struct incise_folds *folds,
+			   const struct incise_ridge *ridges, int n, double *error);
 
 /*
  * Held-out squared errors while premises are searched (varpro.h), by epoch:
  * error[e·n_units + unit] for epoch e+1. Where a fold's search ends early its last error
- * stands for the epochs left. With ratios, n_pairs of them, |error|/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each held pair
+ * stands for the epochs left. With ratios, n_held of them, |error|/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each held pair
  * after the last epoch: what the error is in units of the noise.
  */
 int incise_crossval_search(const struct incise_basis *basis,
-			   const struct incise_folds *folds, double ridge, int epochs,
-			   double *error, double *ratios);
+			   const struct incise_folds *folds,
+			   const struct incise_ridge *ridge, int epochs, double *error,
+			   double *ratios);
 
 /* Sum over units. */
 double incise_crossval_total(const struct incise_folds *folds, const double *error);

@@ -73,6 +73,7 @@ static int visit(struct race *race, const int *n_mfs)
 	struct incise_model *model = incise_model_new_grid(
 		race->n_inputs, race->inputs, n_mfs, race->type, &output, NULL);
 	struct grid *grid = &race->visited[race->n];
+	struct incise_ridge ridges[TUNE_RIDGES];
 	struct incise_basis basis;
 	int rc = model ? incise_basis_init(&basis, model) : -errno;
 
@@ -80,8 +81,9 @@ static int visit(struct race *race, const int *n_mfs)
 	if (rc)
 		return rc;
 	incise_scaling_premises(&race->scaling, &basis, false);
-	rc = incise_crossval_ridges(&basis, &race->folds, incise_tune_ridges,
-				    TUNE_N_RIDGES, race->errors);
+	incise_tune_ridges(&basis, ridges);
+	rc = incise_crossval_ridges(&basis, &race->folds, ridges, TUNE_RIDGES,
+				    race->errors);
 	if (rc)
 		return rc;
 	grid->error = malloc(race->folds.n_units * sizeof(double));
@@ -91,7 +93,7 @@ static int visit(struct race *race, const int *n_mfs)
 	memcpy(grid->n_mfs, n_mfs, race->n_inputs * sizeof(*n_mfs));
 	grid->rules = basis.n_rules;
 	grid->total = HUGE_VAL;
-	for (int i = 0; i < TUNE_N_RIDGES; i++) {
+	for (int i = 0; i < TUNE_RIDGES; i++) {
 		const double *error = race->errors + (size_t)i * race->folds.n_units;
 		double total = incise_crossval_total(&race->folds, error);
 
@@ -168,8 +170,8 @@ static int run(struct race *race, const struct incise_pairs *pairs,
 				       race->sample.groups, options->seed);
 	if (rc)
 		return rc;
-	race->errors = malloc((size_t)TUNE_N_RIDGES * race->folds.n_units *
-			      sizeof(*race->errors));
+	race->errors =
+		malloc((size_t)TUNE_RIDGES * race->folds.n_units * sizeof(*race->errors));
 	if (!race->errors)
 		return -ENOMEM;
 	for (int i = 0; i < race->n_inputs; i++)

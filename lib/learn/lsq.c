@@ -279,7 +279,55 @@ void incise_lsq_add(struct incise_lsq *lsq, double target)
 		fold_waiting(lsq);
 }
 
-const double *incise_lsq_factor(struct incise_lsq *lsq, double ridge, int n_ridged,
+/*
+ * Rows that penalise what sets the blocks apart: orthonormal contrasts of block b against
+ * the mean of those behind it, a staircase from column b·width on.
+ *
+ *     b:  √(m/(m+1))·p_b - √(1/(m(m+1)))·Σ p_after,   m blocks behind it
+ */
+static void contrast_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+{
+	int width = ridge->n / ridge->blocks;
+
+	for (int i = 0; i < ridge->n - width; i++) {
+		double *row = lsq->ridge + (size_t)i * lsq->stride;
+		double m = ridge->blocks - 1 - i / width;
+		double scale = sqrt(ridge->ridge / (m * (m + 1)));
+
+		row[i] = m * scale;
+		for (int k = i + width; k < ridge->n; k += width)
+			row[k] = -scale;
+	}
+}
+
+/* Rows that penalise the blocks' mean. */
+static void mean_rows(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+{
+	int width = ridge->n / ridge->blocks;
+
+	for (int i = 0; i < width; i++)
+		for (int k = i; k < ridge->n; k += width)
+			lsq->ridge[(size_t)i * lsq->stride + k] =
+				sqrt(ridge->ridge * ridge->mean / ridge->blocks);
+}
+
+static void fold_ridge(struct incise_lsq *lsq, const struct incise_ridge *ridge)
+{
+	int width = ridge->n / ridge->blocks;
+
+	if (ridge->mean == 1) {
+		for (int i = 0; i < ridge->n; i++)
+			lsq->ridge[(size_t)i * (lsq->stride + 1)] = sqrt(ridge->ridge);
+		fold(lsq->work, lsq->ridge, lsq->v, lsq->n, lsq->stride, ridge->n, true);
+		return;
+	}
+	contrast_rows(lsq, ridge);
+	fold(lsq->work, lsq->ridge, lsq->v, lsq->n, lsq->stride, ridge->n - width, true);
+	mean_rows(lsq, ridge);
+	fold(lsq->work, lsq->ridge, lsq->v, lsq->n, lsq->stride, width, false);
+}
+
+const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridge *ridge,
 				int *stride)
 {
 	size_t size = (size_t)(lsq->n + 1) * lsq->stride;
@@ -287,7 +335,7 @@ const double *incise_lsq_factor(struct incise_lsq *lsq, double ridge, int n_ridg
 
 	fold_waiting(lsq);
 	*stride = lsq->stride;
-	if (ridge > 0) {
+	if (ridge && ridge->ridge > 0) {
 		if (!lsq->work)
 			lsq->work = matrix(lsq->n + 1, lsq->stride);
 		if (!lsq->ridge)
@@ -295,9 +343,7 @@ const double *incise_lsq_factor(struct incise_lsq *lsq, double ridge, int n_ridg
 		if (!lsq->work || !lsq->ridge)
 			return NULL;
 		memcpy(lsq->work, lsq->r, size * sizeof(double));
-		for (int i = 0; i < n_ridged; i++)
-			lsq->ridge[(size_t)i * (lsq->stride + 1)] = sqrt(ridge);
-		fold(lsq->work, lsq->ridge, lsq->v, lsq->n, lsq->stride, n_ridged, true);
+		fold_ridge(lsq, ridge);
 		factor = lsq->work;
 	}
 	for (int i = 0; i <= lsq->n; i++)
@@ -338,10 +384,10 @@ double incise_lsq_leverage(const double *factor, int stride, int n, double *a)
 	return sum;
 }
 
-int incise_lsq_solve(struct incise_lsq *lsq, double ridge, double *x)
+int incise_lsq_solve(struct incise_lsq *lsq, const struct incise_ridge *ridge, double *x)
 {
 	int stride;
-	const double *factor = incise_lsq_factor(lsq, ridge, lsq->n, &stride);
+	const double *factor = incise_lsq_factor(lsq, ridge, &stride);
 
 	return factor ? incise_lsq_back(factor, stride, lsq->n, lsq->n, x) : -EDOM;
 }
@@ -349,7 +395,7 @@ int incise_lsq_solve(struct incise_lsq *lsq, double ridge, double *x)
 int incise_lsq_condition(struct incise_lsq *lsq, double *condition)
 {
 	int n = lsq->n, stride, rc = -ENOMEM;
-	const double *factor = incise_lsq_factor(lsq, 0, 0, &stride);
+	const double *factor = incise_lsq_factor(lsq, NULL, &stride);
 	double *copy, *values, dummy;
 
 	if (!factor)

@@ -14,6 +14,17 @@
 
 struct incise_lsq;
 
+/*
+ * The ridge: ridge·|p|² over the first n unknowns. Where these are `blocks` alike ones
+ * after each other (the consequents of rules), the part of it that holds their mean down
+ * can be less: ridge·(Σ|p_b - p̄|² + mean·Σ|p̄|²) over the blocks b. With mean = 1 that is
+ * the plain ridge, with 0 a large one leads to equal blocks.
+ */
+struct incise_ridge {
+	double ridge, mean;
+	int n, blocks;
+};
+
 /* For n unknowns; NULL with errno ENOMEM. */
 struct incise_lsq *incise_lsq_new(int n);
 void incise_lsq_free(struct incise_lsq *lsq);
@@ -28,15 +39,14 @@ double *incise_lsq_row(struct incise_lsq *lsq);
 void incise_lsq_add(struct incise_lsq *lsq, double target);
 
 /*
- * The factor [R z; 0 ρ] of all rows and of ridge on the first n_ridged unknowns: row i of
- * its n+1 begins at i·*stride. Only the upper triangle means something. It belongs to the
+ * The factor [R z; 0 ρ] of all rows and of a ridge (or NULL): row i of its n+1 begins at i·*stride. Only the upper triangle means something. It belongs to the
  * lsq and is good until its next use. NULL where the rows overflow.
  */
-const double *incise_lsq_factor(struct incise_lsq *lsq, double ridge, int n_ridged,
+const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridge *ridge,
 				int *stride);
 
-/* Minimise |A x - t|² + ridge |x|². Returns 0 or -EDOM (singular, or overflow). */
-int incise_lsq_solve(struct incise_lsq *lsq, double ridge, double *x);
+/* Minimise |A x - t|² and the ridge, or NULL. Returns 0 or -EDOM (singular, overflow). */
+int incise_lsq_solve(struct incise_lsq *lsq, const struct incise_ridge *ridge, double *x);
 
 /* Solve R x = z for the first n unknowns of a factor whose column `right` is z. */
 int incise_lsq_back(const double *factor, int stride, int n, int right, double *x);

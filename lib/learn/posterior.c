@@ -20,21 +20,21 @@ static int ascending(const void *a, const void *b)
 }
 
 int incise_posterior_noise(const struct incise_basis *basis,
-			   const struct incise_folds *folds, double ridge, int epochs,
-			   double *noise)
+			   const struct incise_folds *folds,
+			   const struct incise_ridge *ridge, int epochs, double *noise)
 {
 	double *error = malloc((size_t)epochs * folds->n_units * sizeof(*error));
-	double *ratios = malloc(folds->n_pairs * sizeof(*ratios));
+	double *ratios = malloc(folds->n_held * sizeof(*ratios));
 	int rc = error && ratios ? incise_crossval_search(basis, folds, ridge, epochs,
 							  error, ratios)
 				 : -ENOMEM;
 
 	if (!rc) {
 		/* The quantile that also holds the pair to come: (n+1)·0.95 from below. */
-		double rank = ceil(0.95 * (folds->n_pairs + 1.0));
-		size_t at = fmin(rank, folds->n_pairs) - 1;
+		double rank = ceil(0.95 * (folds->n_held + 1.0));
+		size_t at = fmin(rank, folds->n_held) - 1;
 
-		qsort(ratios, folds->n_pairs, sizeof(*ratios), ascending);
+		qsort(ratios, folds->n_held, sizeof(*ratios), ascending);
 		*noise = ratios[at] / INCISE_INTERVAL95;
 	}
 	free(error);

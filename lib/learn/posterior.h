@@ -14,7 +14,7 @@
  * premises are searched from those in basis for so many epochs. Returns 0, -EDOM, -ENOMEM.
  */
 int incise_posterior_noise(const struct incise_basis *basis,
-			   const struct incise_folds *folds, double ridge, int epochs,
-			   double *noise);
+			   const struct incise_folds *folds,
+			   const struct incise_ridge *ridge, int epochs, double *noise);
 
 #endif

@@ -162,8 +162,9 @@ static int train_classic(struct learner *l, struct incise_tuning *tuning)
 		return rc;
 	incise_scaling_premises(&l->scaling, &l->basis, false);
 	fold_all(l);
-	*tuning = (struct incise_tuning){
-		.ridge = CLASSIC_RIDGE, .epochs = 1, .basis = l->basis, .rmse = NAN};
+	*tuning = (struct incise_tuning){.epochs = 1, .basis = l->basis, .rmse = NAN};
+	tuning->ridge = (struct incise_ridge){
+		CLASSIC_RIDGE, 1, l->basis.n_rules * (l->basis.n_inputs + 1), 1};
 	l->report->epochs = anfis.epochs;
 	l->report->best_epoch = anfis.best_epoch;
 	return 0;
@@ -178,14 +179,14 @@ static int train_default(struct learner *l, struct incise_tuning *tuning)
 
 	if (rc)
 		return rc;
-	varpro.ridge = tuning->ridge;
+	varpro.ridge = &tuning->ridge;
 	varpro.epochs = tuning->epochs;
 	l->basis = tuning->basis;
 	rc = incise_varpro_run(&l->basis, l->consequents, &varpro);
 	if (rc)
 		return rc;
 	fold_all(l);
-	rc = incise_lsq_solve(l->lsq, tuning->ridge, l->consequents);
+	rc = incise_lsq_solve(l->lsq, &tuning->ridge, l->consequents);
 	if (!rc)
 		rc = incise_scaling_consequents(&l->scaling, l->basis.n_rules,
 						l->consequents);
@@ -205,15 +206,17 @@ static int train_default(struct learner *l, struct incise_tuning *tuning)
 /* The standard deviation, from the factor of all pairs and the noise of held-out ones. */
 static int find_uncertainty(struct learner *l, const struct incise_tuning *tuning)
 {
-	int n = l->basis.n_rules * (l->basis.n_inputs + 1), stride, rc;
-	double ridge = fmax(tuning->ridge, LEAST_RIDGE), noise;
+	struct incise_ridge ridge = tuning->ridge;
+	double noise;
+	int stride, rc;
 	const double *factor;
 
-	rc = incise_posterior_noise(&tuning->basis, &l->folds, ridge, tuning->epochs,
+	ridge.ridge = fmax(ridge.ridge, LEAST_RIDGE);
+	rc = incise_posterior_noise(&tuning->basis, &l->folds, &ridge, tuning->epochs,
 				    &noise);
 	if (rc)
 		return rc;
-	factor = incise_lsq_factor(l->lsq, ridge, n, &stride);
+	factor = incise_lsq_factor(l->lsq, &ridge, &stride);
 	if (!factor)
 		return -EDOM;
 	*l->options->uncertainty =
@@ -252,7 +255,7 @@ static int learn(struct learner *l)
 		rc = incise_lsq_condition(l->lsq, &report->condition);
 	if (rc)
 		return rc;
-	report->ridge = tuning.ridge;
+	report->ridge = tuning.ridge.ridge;
 	report->crossval_rmse = tuning.rmse * l->scaling.scale[l->basis.n_inputs];
 	report->parameters = n + l->basis.n_premises;
 	report->train_rmse = incise_train_rmse(l->model, l->train);

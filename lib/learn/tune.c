@@ -14,8 +14,17 @@
 #include "premises.h"
 #include "tune.h"
 
-const double incise_tune_ridges[TUNE_N_RIDGES] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
-						  1,	10,   100,  1e3,  1e4};
+static const double sizes[TUNE_SIZES] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
+					 1,    10,   100,  1e3,	 1e4};
+
+/*
+ * Held down fully, a large ridge leads to the mean of the output. Hardly, it leads to a
+ * plane: rules differ only where the data insist. (Not 0: a plane may be undefined.)
+ */
+static const double means[TUNE_MEANS] = {1, 1e-3};
+
+/* Where there is nothing to cross-validate with; good on real tissue data. */
+#define DEFAULT_RIDGE 1.0
 
 /* Epochs of a search in cross-validation, at most. */
 #define EPOCHS_MAX 15
@@ -24,9 +33,7 @@ const double incise_tune_ridges[TUNE_N_RIDGES] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
 #define BUDGET 1e11
 
 /* Standard errors by which a search has to win. */
-#ifndef CLEAR
-#define CLEAR 0.0
-#endif
+#define CLEAR 1.0
 
 struct tuner {
 	const struct incise_folds *folds;
@@ -38,7 +45,7 @@ struct tuner {
 };
 
 static int try_search(struct tuner *t, const struct incise_basis *basis, int start,
-		      double ridge)
+		      const struct incise_ridge *ridge)
 {
 	int rc =
 		incise_crossval_search(basis, t->folds, ridge, t->epochs, t->error, NULL);
@@ -52,7 +59,7 @@ static int try_search(struct tuner *t, const struct incise_basis *basis, int sta
 			continue;
 		t->best_total = total;
 		memcpy(t->best, error, t->folds->n_units * sizeof(*error));
-		t->tuning->ridge = ridge;
+		t->tuning->ridge = *ridge;
 		t->tuning->start = start;
 		t->tuning->epochs = e + 1;
 		t->tuning->basis = *basis;
@@ -60,17 +67,29 @@ static int try_search(struct tuner *t, const struct incise_basis *basis, int sta
 	return rc;
 }
 
-/* The ridge with the least held-out error at the premises given. */
-static int choose_ridge(struct tuner *t, const struct incise_basis *basis, int *chosen)
+void incise_tune_ridges(const struct incise_basis *basis, struct incise_ridge *ridges)
 {
-	size_t size = (size_t)TUNE_N_RIDGES * t->folds->n_units;
+	for (int i = 0; i < TUNE_RIDGES; i++)
+		ridges[i] = (struct incise_ridge){
+			.ridge = sizes[i % TUNE_SIZES],
+			.mean = means[i / TUNE_SIZES],
+			.n = basis->n_rules * (basis->n_inputs + 1),
+			.blocks = basis->n_rules,
+		};
+}
+
+/* The ridge with the least held-out error at the premises given. */
+static int choose_ridge(struct tuner *t, const struct incise_basis *basis,
+			const struct incise_ridge *ridges, int *chosen)
+{
+	size_t size = (size_t)TUNE_RIDGES * t->folds->n_units;
 	double *error = malloc(size * sizeof(*error));
-	int rc = error ? incise_crossval_ridges(basis, t->folds, incise_tune_ridges,
-						TUNE_N_RIDGES, error)
+	int rc = error ? incise_crossval_ridges(basis, t->folds, ridges, TUNE_RIDGES,
+						error)
 		       : -ENOMEM;
 
 	*chosen = -1;
-	for (int i = 0; i < TUNE_N_RIDGES && !rc; i++) {
+	for (int i = 0; i < TUNE_RIDGES && !rc; i++) {
 		double total = incise_crossval_total(
 			t->folds, error + (size_t)i * t->folds->n_units);
 
@@ -82,7 +101,7 @@ static int choose_ridge(struct tuner *t, const struct incise_basis *basis, int *
 		       t->folds->n_units * sizeof(*error));
 	}
 	if (!rc)
-		t->tuning->ridge = incise_tune_ridges[*chosen];
+		t->tuning->ridge = ridges[*chosen];
 	free(error);
 	return rc;
 }
@@ -92,26 +111,30 @@ static double cost(const struct incise_basis *basis, const struct incise_folds *
 {
 	double n = basis->n_rules * (basis->n_inputs + 1), m = n + basis->n_premises;
 
-	return 2.0 * (CROSSVAL_FOLDS - 1) * folds->n_pairs * (n * n + m * m);
+	double rows = 0;
+
+	for (int f = 0; f < folds->n; f++)
+		rows += folds->fit[f].n;
+	return 2 * rows * (n * n + m * m);
 }
 
-static int search_all(struct tuner *t, const struct incise_basis *basis, int ridge_index,
-		      int starts, uint64_t seed)
+static int search_all(struct tuner *t, const struct incise_basis *basis,
+		      const struct incise_ridge *ridges, int chosen, int starts,
+		      uint64_t seed)
 {
-	int rc = 0;
+	struct incise_ridge ridge = t->tuning->ridge;
+	int rc = try_search(t, basis, 0, &ridge);
 
-	if (ridge_index < 0) {
-		rc = try_search(t, basis, 0, t->tuning->ridge);
-	} else {
-		for (int i = ridge_index - 1; i <= ridge_index + 1 && !rc; i++)
-			if (i >= 0 && i < TUNE_N_RIDGES)
-				rc = try_search(t, basis, 0, incise_tune_ridges[i]);
-	}
+	/* The neighbours in size. */
+	for (int i = chosen - 1; i <= chosen + 1 && !rc && chosen >= 0; i += 2)
+		if (i >= 0 && i < TUNE_RIDGES && i / TUNE_SIZES == chosen / TUNE_SIZES)
+			rc = try_search(t, basis, 0, &ridges[i]);
+	ridge = t->tuning->ridge;
 	for (int start = 1; start < starts && !rc; start++) {
 		struct incise_basis other = *basis;
 
 		incise_premises_jitter(&other, seed * 1000003 + start);
-		rc = try_search(t, &other, start, t->tuning->ridge);
+		rc = try_search(t, &other, start, &ridge);
 	}
 	return rc;
 }
@@ -120,19 +143,18 @@ int incise_tune(const struct incise_basis *basis, const struct incise_folds *fol
 		const struct incise_train_options *options, struct incise_tuning *tuning)
 {
 	struct tuner t = {.folds = folds, .best_total = HUGE_VAL, .tuning = tuning};
+	struct incise_ridge ridges[TUNE_RIDGES];
 	struct incise_basis first = *basis;
-	int rc = -ENOMEM, ridge_index = -1, starts = options->starts;
+	int rc = -ENOMEM, chosen = -1, starts = options->starts;
 	double epochs = BUDGET / cost(basis, folds);
 
-	*tuning =
-		(struct incise_tuning){.ridge = options->ridge, .epochs = 1, .rmse = NAN};
+	incise_tune_ridges(basis, ridges);
+	*tuning = (struct incise_tuning){.ridge = ridges[0], .epochs = 1, .rmse = NAN};
+	tuning->ridge.ridge = isnan(options->ridge) ? DEFAULT_RIDGE : options->ridge;
 	incise_premises_project(&first);
 	tuning->basis = first;
-	if (folds->n < 2) {
-		if (isnan(options->ridge))
-			tuning->ridge = TUNE_RIDGE;
+	if (folds->n < 2)
 		return 0;
-	}
 	t.epochs = options->epochs < EPOCHS_MAX ? options->epochs : EPOCHS_MAX;
 	/* Where all cannot be afforded, other starts are the first to go. */
 	if (epochs < (starts + 2.0) * t.epochs)
@@ -145,11 +167,11 @@ int incise_tune(const struct incise_basis *basis, const struct incise_folds *fol
 		goto out;
 	rc = 0;
 	if (isnan(options->ridge))
-		rc = choose_ridge(&t, &first, &ridge_index);
+		rc = choose_ridge(&t, &first, ridges, &chosen);
 	if (!rc)
-		rc = search_all(&t, &first, ridge_index, starts, options->seed);
+		rc = search_all(&t, &first, ridges, chosen, starts, options->seed);
 	if (!rc)
-		tuning->rmse = sqrt(t.best_total / folds->n_pairs);
+		tuning->rmse = sqrt(t.best_total / folds->n_held);
 out:
 	free(t.error);
 	free(t.best);

@@ -11,7 +11,7 @@
 #include "crossval.h"
 
 struct incise_tuning {
-	double ridge;
+	struct incise_ridge ridge;
 	int start;		   /* from 0: the premises given */
 	int epochs;		   /* of varpro.h: 1 keeps the premises of the start */
 	struct incise_basis basis; /* premises of that start */
@@ -22,11 +22,10 @@ struct incise_tuning {
 int incise_tune(const struct incise_basis *basis, const struct incise_folds *folds,
 		const struct incise_train_options *options, struct incise_tuning *tuning);
 
-/* Where there is nothing to cross-validate with; good on real tissue data. */
-#define TUNE_RIDGE 1.0
-
-/* The ridges tried. */
-#define TUNE_N_RIDGES 10
-extern const double incise_tune_ridges[TUNE_N_RIDGES];
+/* The ridges tried for a grid: of every size, with a mean held down fully or hardly. */
+#define TUNE_SIZES 10
+#define TUNE_MEANS 2
+#define TUNE_RIDGES (TUNE_SIZES * TUNE_MEANS)
+void incise_tune_ridges(const struct incise_basis *basis, struct incise_ridge *ridges);
 
 #endif

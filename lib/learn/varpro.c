@@ -20,7 +20,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <lapacke.h>
-#include "lsq.h"
 #include "premises.h"
 #include "varpro.h"
 
@@ -38,7 +37,7 @@
 
 struct state {
 	const struct incise_pairs *pairs;
-	double ridge;
+	const struct incise_ridge *ridge;
 	int n, q;			 /* consequents, premises */
 	struct incise_lsq *linear, *all; /* of n and of n + q unknowns */
 	double *kept;			 /* firing strengths of the last solution */
@@ -63,7 +62,7 @@ static int solve(struct state *s, const struct incise_basis *basis, double *cons
 		incise_basis_row(basis, w, x, incise_lsq_row(s->linear));
 		incise_lsq_add(s->linear, x[d]);
 	}
-	factor = incise_lsq_factor(s->linear, s->ridge, s->n, &stride);
+	factor = incise_lsq_factor(s->linear, s->ridge, &stride);
 	if (!factor)
 		return -EDOM;
 	*error = pow(factor[(size_t)s->n * (stride + 1)], 2);
@@ -106,7 +105,7 @@ static const double *project(struct state *s, const struct incise_basis *basis,
 		derivative(s, basis, w, x, consequents, row + s->n);
 		incise_lsq_add(s->all, x[d]);
 	}
-	factor = incise_lsq_factor(s->all, s->ridge, s->n, stride);
+	factor = incise_lsq_factor(s->all, s->ridge, stride);
 	return factor ? factor + (size_t)s->n * (*stride + 1) : NULL;
 }
 

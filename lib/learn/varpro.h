@@ -8,10 +8,11 @@
 #define INCISE_VARPRO_H
 
 #include "basis.h"
+#include "lsq.h"
 
 struct incise_varpro {
 	const struct incise_pairs *pairs;
-	double ridge;
+	const struct incise_ridge *ridge; /* of the consequents */
 	int epochs; /* solutions at most; the first is that of the premises given */
 	/*
 	 * Called after each epoch, from 1, with its premises and consequents; false ends
