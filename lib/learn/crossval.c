@@ -58,7 +58,7 @@ static int fill_fold(struct incise_folds *folds, int at, const struct incise_pai
 			memcpy(fit + width * n_fit++, row, width * sizeof(*row));
 			continue;
 		}
-		folds->unit[at][n_held] = grouped ? unit[i] : at;
+		folds->unit[at][n_held] = grouped ? unit[i] : (int)i;
 		memcpy(held + width * n_held++, row, width * sizeof(*row));
 	}
 	folds->fit[at] = (struct incise_pairs){fit, n_fit, pairs->n_inputs};
@@ -92,7 +92,7 @@ int incise_folds_init(struct incise_folds *folds, const struct incise_pairs *pai
 			rc = fill_fold(folds, folds->n++, pairs, place, unit,
 				       n_groups >= 2, n_folds, f);
 	}
-	folds->n_units = n_groups >= 2 ? n_groups : folds->n;
+	folds->n_units = (int)elements;
 	free(unit);
 	free(place);
 	return rc;

@@ -2,8 +2,8 @@
 /*
  * Errors on pairs that a fit has not seen, out of the training pairs alone: five folds
  * that leave whole groups out (cuts), because pairs of one group are not independent.
- * Errors are kept by unit (group; fold where there are no groups), so that two settings
- * can be compared pair by pair. Pairs are scaled.
+ * Errors are kept by unit (group, or pair where there are no groups), so that two settings
+ * can be compared unit by unit. Pairs are scaled.
  */
 #ifndef INCISE_CROSSVAL_H
 #define INCISE_CROSSVAL_H

@@ -54,9 +54,30 @@ static void test_fair(void **state)
 		assert_true(fabs(count[i / n][i % n] - rounds / (double)n) < 5 * sigma);
 }
 
+/* Uniform in [-1, 1): mean and variance within five standard errors, and by seed. */
+static void test_random(void **state)
+{
+	uint64_t a = 5, b = 5;
+	double mean = 0, square = 0;
+	const int n = 100000;
+
+	for (int i = 0; i < n; i++) {
+		double x = incise_random(&a);
+
+		assert_true(x >= -1 && x < 1);
+		assert_true(x == incise_random(&b));
+		mean += x / n;
+		square += x * x / n;
+	}
+	assert_true(fabs(mean) < 5 * sqrt(1.0 / 3 / n));
+	/* The variance of x² is 4/45. */
+	assert_true(fabs(square - 1.0 / 3) < 5 * sqrt(4.0 / 45 / n));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_random),
 		cmocka_unit_test(test_is_a_permutation),
 		cmocka_unit_test(test_depends_on_the_seed_only),
 		cmocka_unit_test(test_fair),

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Cross-validation: whole groups are held out, and errors are those of fits without them.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../../../lib/learn/crossval.h"
+#include "../../../lib/learn/shuffle.h"
+
+#define PAIRS 240
+
+static double rows[PAIRS * 2];
+static int groups[PAIRS];
+static const struct incise_pairs pairs = {rows, PAIRS, 1};
+
+static void fill(int per_group)
+{
+	uint64_t seed = 5;
+
+	for (int i = 0; i < PAIRS; i++) {
+		rows[2 * i] = (1 + incise_random(&seed)) / 2;
+		rows[2 * i + 1] = sin(5 * rows[2 * i]) + 0.1 * incise_random(&seed);
+		/* With gaps, as when others lie on the check side. */
+		groups[i] = 3 * (i / per_group) + 2;
+	}
+}
+
+static void one_rule(struct incise_basis *basis, int n)
+{
+	static const struct incise_variable in = {"x", 0, 1};
+	struct incise_model *model =
+		incise_model_new_grid(1, &in, &n, INCISE_MF_GAUSS, &in, NULL);
+
+	assert_int_equal(incise_basis_init(basis, model), 0);
+	incise_model_free(model);
+}
+
+static int group_of(const double *row)
+{
+	for (int i = 0; i < PAIRS; i++)
+		if (rows[2 * i] == row[0])
+			return groups[i];
+	fail();
+	return -1;
+}
+
+/* Every pair is held out as often as there are divisions, never beside its own group. */
+static void test_groups_stay_together(void **state)
+{
+	static const struct {
+		int per_group, n, units;
+	} cases[] = {{10, 20, 24}, {60, 4, 4}, {120, 2, 2}, {48, 5, 5}, {1000, 20, 240}};
+
+	for (size_t c = 0; c < sizeof(cases) / sizeof(*cases); c++) {
+		struct incise_folds folds;
+		size_t held = 0;
+
+		fill(cases[c].per_group);
+		assert_int_equal(incise_folds_init(&folds, &pairs, groups, 3), 0);
+		assert_int_equal(folds.n, cases[c].n);
+		assert_int_equal(folds.n_units, cases[c].units);
+		for (int f = 0; f < folds.n; f++) {
+			held += folds.held[f].n;
+			assert_int_equal(folds.held[f].n + folds.fit[f].n, PAIRS);
+			assert_true(folds.held[f].n > 0);
+			/* One group only is split by pairs. */
+			if (cases[c].units == PAIRS)
+				continue;
+			for (size_t i = 0; i < folds.held[f].n; i++)
+				for (size_t k = 0; k < folds.fit[f].n; k++)
+					if (group_of(folds.held[f].rows + 2 * i) ==
+					    group_of(folds.fit[f].rows + 2 * k))
+						fail_msg("a group is on both sides");
+		}
+		incise_folds_free(&folds);
+		assert_int_equal(held, (cases[c].n == 20 ? 4 : 1) * PAIRS);
+		assert_int_equal(held, folds.n_held);
+	}
+}
+
+/* One rule is a line: held-out errors are those of lines through the other pairs. */
+static void test_errors(void **state)
+{
+	struct incise_ridge ridge = {1e-12, 1, 2, 1};
+	struct incise_folds folds;
+	struct incise_basis basis;
+	double want = 0, *error;
+
+	fill(10);
+	one_rule(&basis, 1);
+	assert_int_equal(incise_folds_init(&folds, &pairs, groups, 3), 0);
+	error = malloc(folds.n_units * sizeof(*error));
+	assert_int_equal(incise_crossval_ridges(&basis, &folds, &ridge, 1, error), 0);
+	for (int f = 0; f < folds.n; f++) {
+		const struct incise_pairs *fit = &folds.fit[f];
+		double mx = 0, my = 0, xy = 0, xx = 0;
+
+		for (size_t i = 0; i < fit->n; i++) {
+			mx += fit->rows[2 * i] / fit->n;
+			my += fit->rows[2 * i + 1] / fit->n;
+		}
+		for (size_t i = 0; i < fit->n; i++) {
+			xy += (fit->rows[2 * i] - mx) * (fit->rows[2 * i + 1] - my);
+			xx += pow(fit->rows[2 * i] - mx, 2);
+		}
+		for (size_t i = 0; i < folds.held[f].n; i++) {
+			const double *row = folds.held[f].rows + 2 * i;
+
+			want += pow(my + xy / xx * (row[0] - mx) - row[1], 2);
+		}
+	}
+	assert_true(fabs(incise_crossval_total(&folds, error) / want - 1) < 1e-9);
+	free(error);
+	incise_folds_free(&folds);
+}
+
+/* The first epoch of a search is the fixed premises; ratios are errors, a bit shrunk. */
+static void test_search(void **state)
+{
+	struct incise_ridge ridge = {0.01, 1, 8, 4};
+	double *error, *fixed, *ratios, sum = 0, total;
+	struct incise_folds folds;
+	struct incise_basis basis;
+	size_t size;
+
+	fill(10);
+	one_rule(&basis, 4);
+	assert_int_equal(incise_folds_init(&folds, &pairs, groups, 3), 0);
+	size = folds.n_units * sizeof(double);
+	error = malloc(4 * size);
+	fixed = malloc(size);
+	ratios = malloc(folds.n_held * sizeof(*ratios));
+	assert_int_equal(incise_crossval_ridges(&basis, &folds, &ridge, 1, fixed), 0);
+	assert_int_equal(incise_crossval_search(&basis, &folds, &ridge, 4, error, ratios),
+			 0);
+	for (int u = 0; u < folds.n_units; u++)
+		assert_true(fabs(error[u] - fixed[u]) < 1e-12);
+	assert_true(incise_crossval_total(&folds, error + folds.n_units) !=
+		    incise_crossval_total(&folds, error));
+	total = incise_crossval_total(&folds, error + 3 * folds.n_units);
+	for (size_t i = 0; i < folds.n_held; i++)
+		sum += ratios[i] * ratios[i];
+	/* 8 parameters over 190 pairs: the leverage is some percent. */
+	assert_true(sum < total && sum > 0.8 * total);
+	free(error);
+	free(fixed);
+	free(ratios);
+	incise_folds_free(&folds);
+}
+
+static void test_spread(void **state)
+{
+	struct incise_folds folds = {.n_units = 4};
+	const double a[] = {3, 5, 4, 8}, b[] = {1, 4, 4, 5};
+
+	/* Differences 2 1 0 3: mean 1.5, Σ(d-1.5)² = 5, times 4/3. */
+	assert_true(fabs(incise_crossval_spread(&folds, a, b) - sqrt(20.0 / 3)) < 1e-15);
+	assert_true(incise_crossval_spread(&folds, a, a) == 0);
+	assert_true(incise_crossval_total(&folds, a) == 20);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_groups_stay_together),
+		cmocka_unit_test(test_errors),
+		cmocka_unit_test(test_search),
+		cmocka_unit_test(test_spread),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Choosing how many membership functions there should be: as many as the data need.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include <incise/train.h>
+#include "../../../lib/learn/shuffle.h"
+
+static double rows[400 * 3];
+
+/* A force that bends so often with the first input and is a line in the second. */
+static void choose(double bends, double noise, size_t n, int *n_mfs, int want)
+{
+	static const struct incise_variable in[] = {{"a", 0, 1}, {"b", 0, 1}};
+	struct incise_pairs pairs = {rows, n, 2};
+	struct incise_train_options options;
+	struct incise_error err = {0};
+	uint64_t seed = 4;
+
+	for (size_t i = 0; i < n; i++) {
+		double *x = rows + 3 * i;
+
+		x[0] = (1 + incise_random(&seed)) / 2;
+		x[1] = (1 + incise_random(&seed)) / 2;
+		x[2] = sin(bends * M_PI * x[0]) + x[1] + noise * incise_random(&seed);
+	}
+	incise_train_options_init(&options);
+	assert_int_equal(incise_train_choose_grid(&pairs, in, INCISE_MF_GAUSS, &options,
+						  n_mfs, &err),
+			 want);
+	if (want)
+		assert_non_null(strstr(err.text, "pairs"));
+}
+
+static void test_as_many_as_needed(void **state)
+{
+	int flat[2], wavy[2], noise[2];
+
+	choose(0.2, 0.3, 400, flat, 0);
+	choose(4, 0.1, 400, wavy, 0);
+	choose(0, 30, 400, noise, 0);
+	assert_true(flat[0] <= 2 && flat[1] == 1);
+	/* Four bends: a rule is a line, two cannot follow. */
+	assert_true(wavy[0] >= 4 && wavy[1] == 1);
+	assert_true(noise[0] * noise[1] == 1);
+}
+
+static void test_few_pairs(void **state)
+{
+	int n_mfs[2];
+
+	/* Two pairs a parameter: at most a rule. */
+	choose(4, 0.1, 11, n_mfs, 0);
+	assert_true(n_mfs[0] == 1 && n_mfs[1] == 1);
+	choose(4, 0.1, 5, n_mfs, -ENODATA);
+	choose(4, 0.1, 3, n_mfs, -ENODATA);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_as_many_as_needed),
+		cmocka_unit_test(test_few_pairs),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The standard deviation: its formula, and a file that is the same to the bit or refused.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <incise/uncertainty.h>
+#include "paper_model.h"
+
+#define N 60
+
+static char path[] = "/tmp/incise-sd-XXXXXX";
+static double factor[N * N];
+
+static struct incise_uncertainty *make(const struct incise_model *model)
+{
+	uint64_t seed = 3;
+
+	for (int i = 0; i < N; i++)
+		for (int k = 0; k < N; k++)
+			factor[i * N + k] = k == i  ? 2 + paper_random(&seed)
+					    : k < i ? NAN /* is not read */
+						    : 0.1 * paper_random(&seed);
+	return incise_uncertainty_new(model, 0.25, factor, N, NULL);
+}
+
+/* noise²(1 + |R⁻ᵀφ|²), with R inverted column by column. */
+static double by_formula(const struct incise_model *model, const double *x)
+{
+	static double inverse[N][N];
+	double w[20], phi[N], sum = 1;
+
+	for (int c = 0; c < N; c++)
+		for (int i = N - 1; i >= 0; i--) {
+			double v = i == c;
+
+			for (int k = i + 1; k < N; k++)
+				v -= factor[i * N + k] * inverse[k][c];
+			inverse[i][c] = v / factor[i * N + i];
+		}
+	incise_model_firing(model, x, w);
+	for (int r = 0; r < 20; r++) {
+		phi[3 * r] = w[r];
+		phi[3 * r + 1] = w[r] * x[0] / 20;
+		phi[3 * r + 2] = w[r] * x[1] / 50;
+	}
+	for (int c = 0; c < N; c++) {
+		double v = 0;
+
+		for (int i = 0; i < N; i++)
+			v += inverse[i][c] * phi[i];
+		sum += v * v;
+	}
+	return 0.25 * sqrt(sum);
+}
+
+static void test_formula(void **state)
+{
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
+	struct incise_uncertainty *u = make(model);
+	uint64_t seed = 8;
+
+	assert_non_null(u);
+	assert_true(incise_uncertainty_noise(u) == 0.25);
+	for (int i = 0; i < 50; i++) {
+		double x[] = {10 + 10 * paper_random(&seed),
+			      25 + 25 * paper_random(&seed)};
+
+		assert_true(fabs(incise_uncertainty_sd(u, model, x) -
+				 by_formula(model, x)) < 1e-13);
+	}
+	incise_uncertainty_free(u);
+	incise_model_free(model);
+}
+
+static void test_any_input(void **state)
+{
+	static const double odd[] = {0, -1e308, 1e308, 1e-310, NAN, INFINITY, -INFINITY};
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
+	struct incise_uncertainty *u = make(model);
+	const double corner[] = {20, 0}, outside[] = {1e9, -5}, middle[] = {10, 25},
+		     none[] = {NAN, NAN};
+
+	for (int clamp = 0; clamp < 2; clamp++) {
+		incise_model_set_clamp(model, clamp);
+		for (int i = 0; i < 49; i++) {
+			double x[] = {odd[i % 7], odd[i / 7]};
+			double sd = incise_uncertainty_sd(u, model, x);
+
+			assert_true(isfinite(sd) && sd >= 0.25);
+		}
+		assert_true(incise_uncertainty_sd(u, model, none) ==
+			    incise_uncertainty_sd(u, model, middle));
+	}
+	assert_true(incise_uncertainty_sd(u, model, outside) ==
+		    incise_uncertainty_sd(u, model, corner));
+	incise_uncertainty_free(u);
+	incise_model_free(model);
+}
+
+static void test_what_is_no_factor(void **state)
+{
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
+
+	incise_uncertainty_free(make(model));
+	assert_null(incise_uncertainty_new(model, -1, factor, N, NULL));
+	assert_null(incise_uncertainty_new(model, NAN, factor, N, NULL));
+	factor[5] = INFINITY;
+	assert_null(incise_uncertainty_new(model, 1, factor, N, NULL));
+	incise_uncertainty_free(make(model));
+	factor[7 * N + 7] = 0;
+	assert_null(incise_uncertainty_new(model, 1, factor, N, NULL));
+	assert_int_equal(errno, EINVAL);
+	incise_model_free(model);
+}
+
+static void test_round_trip(void **state)
+{
+	struct incise_model *model = paper_model(INCISE_MF_GBELL, 1, 1e-9);
+	struct incise_uncertainty *a = make(model), *b;
+	struct incise_error err = {0};
+	uint64_t seed = 8;
+
+	assert_int_equal(incise_uncertainty_save(a, path, &err), 0);
+	b = incise_uncertainty_load(path, model, &err);
+	assert_non_null(b);
+	for (int i = 0; i < 50; i++) {
+		double x[] = {10 + 10 * paper_random(&seed),
+			      25 + 25 * paper_random(&seed)};
+
+		assert_true(incise_uncertainty_sd(a, model, x) ==
+			    incise_uncertainty_sd(b, model, x));
+	}
+	incise_uncertainty_free(a);
+	incise_uncertainty_free(b);
+	incise_model_free(model);
+}
+
+/* One bit of one parameter, and it is another model. */
+static void test_stale(void **state)
+{
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
+	struct incise_uncertainty *u = make(model);
+	struct incise_error err = {0};
+	double p[3];
+
+	assert_int_equal(incise_uncertainty_save(u, path, NULL), 0);
+	incise_uncertainty_free(u);
+	memcpy(p, incise_model_consequent(model, 19), sizeof(p));
+	p[2] = nextafter(p[2], 10);
+	incise_model_set_consequent(model, 19, p);
+	assert_null(incise_uncertainty_load(path, model, &err));
+	assert_int_equal(errno, ESTALE);
+	assert_non_null(strstr(err.text, path));
+	assert_non_null(strstr(err.text, "stale"));
+	incise_model_free(model);
+	model = paper_model(INCISE_MF_GAUSS, 1, 1);
+	incise_model_set_mf(model, 1, 3, (double[]){9, 50, 0, 0});
+	assert_null(incise_uncertainty_load(path, model, NULL));
+	assert_int_equal(errno, ESTALE);
+	incise_model_free(model);
+}
+
+static char *read_all(size_t *size)
+{
+	FILE *file = fopen(path, "r");
+	char *text = malloc(1 << 17);
+
+	*size = fread(text, 1, 1 << 17, file);
+	fclose(file);
+	return text;
+}
+
+static void refused(const struct incise_model *model, const char *text, size_t size)
+{
+	struct incise_error err = {0};
+	FILE *file = fopen(path, "w");
+
+	fwrite(text, 1, size, file);
+	fclose(file);
+	assert_null(incise_uncertainty_load(path, model, &err));
+	assert_int_equal(err.code, EINVAL);
+	assert_non_null(strstr(err.text, path));
+}
+
+/* Cut anywhere but in the last digits and line end; changed in any of its parts. */
+static void test_damage_is_refused(void **state)
+{
+	static const struct {
+		const char *from, *to;
+	} changes[] = {
+		{"incise-sd 1", "incise-sd 2"},
+		{"incise-sd 1", "incise-xd 1"},
+		{"model ", "model 0"},
+		{"model ", "model x"},
+		{"unknowns 60", "unknowns 59"},
+		{"unknowns 60", "unknowns 6e1"},
+		{"noise 0.25", "noise -0.25"},
+		{"noise 0.25", "noise nan"},
+		{"noise 0.25", "noise 0.25 1"},
+		{"noise 0.25", "noise 1e999"},
+		{"noise 0.25\n", "noise 0.25\n0 "},
+		{"noise 0.25\n", "noise 0.25\n1 "},
+		{"noise 0.25\n", "noise 0.25\nx "},
+	};
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
+	struct incise_uncertainty *u = make(model);
+	size_t size;
+	char *text, *changed = malloc(1 << 17);
+
+	assert_int_equal(incise_uncertainty_save(u, path, NULL), 0);
+	incise_uncertainty_free(u);
+	text = read_all(&size);
+	for (size_t cut = 0; cut + 30 < size; cut += 97)
+		refused(model, text, cut);
+	for (size_t i = 0; i < sizeof(changes) / sizeof(*changes); i++) {
+		char *at = memmem(text, size, changes[i].from, strlen(changes[i].from));
+		size_t before = at - text, skip = strlen(changes[i].from);
+
+		assert_non_null(at);
+		memcpy(changed, text, before);
+		strcpy(changed + before, changes[i].to);
+		memcpy(changed + before + strlen(changes[i].to), at + skip,
+		       size - before - skip);
+		refused(model, changed, size + strlen(changes[i].to) - skip);
+	}
+	memcpy(changed, text, size);
+	strcpy(changed + size, "1\n");
+	refused(model, changed, size + 2);
+	changed[size] = 0;
+	refused(model, changed, size + 1);
+	free(text);
+	free(changed);
+	incise_model_free(model);
+}
+
+static int make_path(void **state)
+{
+	int fd = mkstemp(path);
+
+	return fd < 0 ? -1 : close(fd);
+}
+
+static int remove_path(void **state)
+{
+	return unlink(path);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_formula),
+		cmocka_unit_test(test_any_input),
+		cmocka_unit_test(test_what_is_no_factor),
+		cmocka_unit_test(test_round_trip),
+		cmocka_unit_test(test_stale),
+		cmocka_unit_test(test_damage_is_refused),
+	};
+
+	return cmocka_run_group_tests(tests, make_path, remove_path);
+}
