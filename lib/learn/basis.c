@@ -37,18 +37,18 @@ static bool is_grid(const struct incise_basis *basis, const struct incise_model 
 				return false;
 			rest /= basis->n_mfs[i];
 		}
-	/* Weights and other ways to say 'and' show in the strengths. */
-	for (int t = 0; t < 3; t++) {
-		for (int i = 0; i < basis->n_inputs; i++) {
-			const struct incise_variable *v = incise_model_input(model, i);
-			double u = (0.3 + t + 0.1 * i) / 3.5;
-
-			x[i] = v->min + (u - floor(u)) * (v->max - v->min);
-		}
+	/*
+	 * Weights and other ways to say 'and' show in the strengths. At the centres of each
+	 * rule its own exponent is 0: nothing is lost to rounding, however thin functions are.
+	 */
+	for (int r = 0; r < n; r++) {
+		for (int i = 0; i < basis->n_inputs; i++)
+			x[i] = basis->p[incise_basis_centre(
+				basis, i, incise_model_rule_mf(model, r, i))];
 		incise_basis_firing(basis, x, a);
 		incise_model_firing(model, x, b);
-		for (int r = 0; r < n; r++)
-			if (!(fabs(a[r] - b[r]) < SAME))
+		for (int k = 0; k < n; k++)
+			if (!(fabs(a[k] - b[k]) < SAME))
 				return false;
 	}
 	return true;
@@ -73,6 +73,8 @@ int incise_basis_init(struct incise_basis *basis, const struct incise_model *mod
 			basis->n_premises += n;
 		}
 	}
+	if (incise_model_and_method(model) != INCISE_AND_PROD)
+		return -ENOTSUP;
 	return is_grid(basis, model) ? 0 : -ENOTSUP;
 }
 

@@ -19,6 +19,9 @@
 /* Rounds of growth without a better grid before it ends. */
 #define PATIENCE 3
 
+/* Share of the squared error that is no matter: half a percent of the RMSE. */
+#define ALIKE 0.01
+
 /* Pairs per consequent parameter, at least. */
 #define PAIRS_PER_PARAMETER 2
 
@@ -135,7 +138,10 @@ static int grow(struct race *race, int *at, size_t n_pairs)
 	return rc;
 }
 
-/* The fewest rules within a standard error of the best; of as many, the best. */
+/*
+ * The fewest rules within a standard error of the best, or as good as alike; of as many
+ * rules, the best.
+ */
 static const struct grid *winner(const struct race *race)
 {
 	const struct grid *best = &race->visited[0], *chosen;
@@ -149,7 +155,7 @@ static const struct grid *winner(const struct race *race)
 		double spread =
 			incise_crossval_spread(&race->folds, grid->error, best->error);
 
-		if (grid->total - best->total <= spread &&
+		if (grid->total - best->total <= fmax(spread, ALIKE * best->total) &&
 		    (grid->rules < chosen->rules ||
 		     (grid->rules == chosen->rules && grid->total < chosen->total)))
 			chosen = grid;

@@ -89,6 +89,29 @@ static int check_all(const struct incise_model *model,
 	return incise_pairs_check_inputs(train, inputs, err);
 }
 
+/* The gradients and scalings here are those of two kinds, and of a product of degrees. */
+static int check_trainable(const struct incise_model *model, struct incise_error *err)
+{
+	if (incise_model_and_method(model) != INCISE_AND_PROD)
+		return incise_error_set(
+			err, ENOTSUP,
+			"the model joins degrees by min: only models with the AND "
+			"method prod can be trained");
+	for (int i = 0; i < incise_model_n_inputs(model); i++)
+		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+			const struct incise_mf *mf = incise_model_mf(model, i, k);
+
+			if (mf->type != INCISE_MF_GAUSS && mf->type != INCISE_MF_GBELL)
+				return incise_error_set(
+					err, ENOTSUP,
+					"input %s, function %s is a %s: only gaussmf and "
+					"gbellmf can be trained",
+					incise_model_input(model, i)->name, mf->name,
+					incise_mf_type_name(mf->type));
+		}
+	return 0;
+}
+
 /* RMSE in the output's unit of scaled parameters over raw pairs. */
 static double rmse_of(const struct learner *l, const struct incise_basis *basis,
 		      const double *consequents, const struct incise_pairs *pairs)
@@ -293,6 +316,8 @@ int incise_train(struct incise_model *model, const struct incise_pairs *train,
 	for (int i = 0; i < incise_model_n_inputs(model); i++)
 		inputs[i] = *incise_model_input(model, i);
 	rc = check_all(model, inputs, train, check, options, err);
+	if (!rc)
+		rc = check_trainable(model, err);
 	if (rc)
 		return rc;
 	l = calloc(1, sizeof(*l));

@@ -116,7 +116,7 @@ INCISE_API int incise_train(struct incise_model *model, const struct incise_pair
 /**
  * Choose how many membership functions each input should have: the fewest rules whose
  * error on held-out groups is within one standard error of the best, the standard error
- * being that of their difference. Grids grow by one function at a time from one function
+ * being that of their difference, or whose squared error is within 1 % of it. Grids grow by one function at a time from one function
  * each, to 6 per input, with no more consequent parameters than half the pairs.
  *
  * @param inputs  pairs->n_inputs ranges

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Training held against published tables (MATLAB's and Jang's), and against data where
- * the right answer is known.
+ * Training held against published tables (MATLAB's and Jang's), against a second
+ * implementation of Jang's rule, against data where the right answer is known, and against
+ * data where there is none.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -121,7 +122,7 @@ static void test_matlab_mackey_glass(void **state)
 	struct curve curve;
 
 	train_mackey_glass(117, 10, &curve, &report);
-	/* Half a unit of the last printed digit; issue 2 asks for 1e-7. */
+	/* Half a unit of the last printed digit: all that is known of MATLAB's figures. */
 	for (int e = 0; e < 10; e++)
 		assert_true(fabs(curve.train[e] - want[e]) <= 0.5e-8 * 1.001);
 	assert_true(fabs(curve.check[0] - .00292488) <= 0.5e-8 * 1.001);
@@ -129,6 +130,157 @@ static void test_matlab_mackey_glass(void **state)
 	assert_int_equal(report.best_epoch, 10);
 	assert_true(fabs(report.train_rmse - curve.train[9]) < 1e-12);
 	assert_int_equal(report.parameters, 16 * 5 + 8 * 3);
+}
+
+/*
+ * Jang's rule a second time, from the paper's equations and as MATLAB works: recursive
+ * least squares that starts with S = 1e6·I, bells and products written out. It shares no
+ * code with the library.
+ */
+#define MG_RULES 16
+#define MG_UNKNOWNS (MG_RULES * 5)
+
+struct second {
+	double bell[4][2][3];
+	double s[MG_UNKNOWNS][MG_UNKNOWNS], p[MG_UNKNOWNS];
+	double step, rmse[5];
+	int changed[2]; /* epoch of the last growth and shrinking */
+};
+
+static double bell(const double *p, double x)
+{
+	return 1 / (1 + pow((x - p[2]) / p[0] * ((x - p[2]) / p[0]), p[1]));
+}
+
+static double strengths(const struct second *a, const double *x, double *w)
+{
+	double sum = 0;
+
+	for (int r = 0; r < MG_RULES; r++) {
+		w[r] = 1;
+		for (int i = 0; i < 4; i++)
+			w[r] *= bell(a->bell[i][r >> (3 - i) & 1], x[i]);
+		sum += w[r];
+	}
+	return sum;
+}
+
+static void recursive_least_squares(struct second *a, const double *rows, int n)
+{
+	static double sa[MG_UNKNOWNS];
+
+	memset(a->p, 0, sizeof(a->p));
+	memset(a->s, 0, sizeof(a->s));
+	for (int k = 0; k < MG_UNKNOWNS; k++)
+		a->s[k][k] = 1e6;
+	for (int t = 0; t < n; t++) {
+		const double *x = rows + 5 * t;
+		double w[MG_RULES], v[MG_UNKNOWNS], sum = strengths(a, x, w);
+		double gain = 1, error = x[4];
+
+		for (int k = 0; k < MG_UNKNOWNS; k++)
+			v[k] = w[k / 5] / sum * (k % 5 ? x[k % 5 - 1] : 1);
+		for (int k = 0; k < MG_UNKNOWNS; k++) {
+			sa[k] = 0;
+			for (int j = 0; j < MG_UNKNOWNS; j++)
+				sa[k] += a->s[k][j] * v[j];
+			gain += v[k] * sa[k];
+			error -= v[k] * a->p[k];
+		}
+		for (int k = 0; k < MG_UNKNOWNS; k++) {
+			for (int j = 0; j < MG_UNKNOWNS; j++)
+				a->s[k][j] -= sa[k] * sa[j] / gain;
+			a->p[k] += sa[k] / gain * error;
+		}
+	}
+}
+
+/* RMSE, and ∂E/∂(a, b, c) of each bell from ∂A/∂(a, b, c), rule by rule. */
+static double back_propagate(const struct second *a, const double *rows, int n,
+			     double g[4][2][3])
+{
+	double total = 0;
+
+	memset(g, 0, 4 * 2 * 3 * sizeof(double));
+	for (int t = 0; t < n; t++) {
+		const double *x = rows + 5 * t;
+		double w[MG_RULES], f[MG_RULES], sum = strengths(a, x, w), y = 0;
+
+		for (int r = 0; r < MG_RULES; r++) {
+			f[r] = a->p[5 * r];
+			for (int i = 0; i < 4; i++)
+				f[r] += a->p[5 * r + 1 + i] * x[i];
+			y += w[r] / sum * f[r];
+		}
+		total += (y - x[4]) * (y - x[4]);
+		for (int r = 0; r < MG_RULES; r++)
+			for (int i = 0; i < 4; i++) {
+				int k = r >> (3 - i) & 1;
+				const double *q = a->bell[i][k];
+				double d = x[i] - q[2], u = bell(q, x[i]);
+				/* ∂E/∂A */
+				double e = 2 * (y - x[4]) * (f[r] - y) / sum * w[r] / u;
+
+				if (d == 0)
+					continue;
+				g[i][k][0] += e * 2 * q[1] / q[0] * u * (1 - u);
+				g[i][k][1] -=
+					e * log(d * d / (q[0] * q[0])) * u * (1 - u);
+				g[i][k][2] += e * 2 * q[1] / d * u * (1 - u);
+			}
+	}
+	return sqrt(total / n);
+}
+
+static void move(struct second *a, double g[4][2][3], int epoch)
+{
+	const double *e = a->rmse;
+	double norm = 0;
+
+	for (int k = 0; k < 24; k++)
+		norm += pow(g[k / 6][k / 3 % 2][k % 3], 2);
+	for (int k = 0; k < 24; k++)
+		a->bell[k / 6][k / 3 % 2][k % 3] -=
+			a->step * g[k / 6][k / 3 % 2][k % 3] / sqrt(norm);
+	if (epoch - a->changed[1] >= 4 && e[0] < e[1] && e[1] > e[2] && e[2] < e[3] &&
+	    e[3] > e[4]) {
+		a->step *= 0.9;
+		a->changed[1] = epoch;
+	}
+	if (epoch - a->changed[0] >= 4 && e[0] < e[1] && e[1] < e[2] && e[2] < e[3] &&
+	    e[3] < e[4]) {
+		a->step *= 1.1;
+		a->changed[0] = epoch;
+	}
+}
+
+/* Two ways to the same 30 training errors, to 1e-9; the step has changed by then. */
+static void test_second_implementation(void **state)
+{
+	static double rows[500 * 5];
+	static struct second a;
+	static struct curve curve;
+	struct incise_train_report report;
+	double min[4], max[4], g[4][2][3];
+
+	train_mackey_glass(117, 30, &curve, &report);
+	mackey_glass_pairs(rows, 117, 500);
+	ranges(rows, 500, 4, min, max);
+	a.step = 0.01;
+	for (int i = 0; i < 4; i++)
+		for (int k = 0; k < 2; k++) {
+			a.bell[i][k][0] = (max[i] - min[i]) / 2;
+			a.bell[i][k][1] = 2;
+			a.bell[i][k][2] = k ? max[i] : min[i];
+		}
+	for (int e = 0; e < 30; e++) {
+		recursive_least_squares(&a, rows, 500);
+		memmove(a.rmse + 1, a.rmse, 4 * sizeof(double));
+		a.rmse[0] = back_propagate(&a, rows, 500, g);
+		assert_true(fabs(a.rmse[0] - curve.train[e]) < 1e-9);
+		move(&a, g, e);
+	}
+	assert_true(a.step > 0.0101);
 }
 
 /* Jang 1993, example 4: 500 epochs; published .0016, .0015 and NDEI .007. */
@@ -413,10 +565,214 @@ static void test_min_cannot_be_trained(void **state)
 	incise_model_free(model);
 }
 
+/* Wherever parameters end, they are numbers, and functions of the default in order. */
+static void check_finite(const struct incise_model *model, bool ordered)
+{
+	for (int r = 0; r < incise_model_n_rules(model); r++)
+		for (int i = 0; i <= incise_model_n_inputs(model); i++)
+			assert_true(isfinite(incise_model_consequent(model, r)[i]));
+	for (int i = 0; i < incise_model_n_inputs(model); i++)
+		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+			const double *p = incise_model_mf(model, i, k)->p;
+
+			assert_true(isfinite(p[0]) && p[0] > 0 && isfinite(p[1]));
+			if (ordered && k)
+				assert_true(p[1] >
+					    incise_model_mf(model, i, k - 1)->p[1]);
+		}
+}
+
+/* Spread of the output about its mean, relative to a size that does not vanish. */
+static double spread(const double *rows, size_t n, double size)
+{
+	double mean = 0, sum = 0;
+
+	for (size_t i = 0; i < n; i++)
+		mean += rows[3 * i + 2] / size / n;
+	for (size_t i = 0; i < n; i++)
+		sum += pow(rows[3 * i + 2] / size - mean, 2) / n;
+	return sqrt(sum);
+}
+
+enum extreme {
+	PLAIN,
+	DEPENDENT,  /* the second input is twice the first: rank-deficient */
+	REPEATED,   /* eight different pairs, over and over */
+	TINY,	    /* targets of 1e-9 */
+	HUGE_ONES,  /* of 1e9 */
+	COLLAPSED,  /* functions on one spot */
+	NOT_FIRING, /* functions so thin that all strengths underflow */
+	DENORMAL,   /* targets of 1e-310 */
+	DENORMAL_INPUTS,
+	FAR_INPUTS, /* 1e12 off their own spread */
+	EXTREMES
+};
+
+static void make_extreme(enum extreme what, double *rows, size_t n, double *size)
+{
+	double factor = what == TINY	    ? 1e-9
+			: what == HUGE_ONES ? 1e9
+			: what == DENORMAL  ? 1e-310
+					    : 1;
+
+	for (size_t i = 0; i < n; i++) {
+		size_t k = what == REPEATED ? i % 8 : i;
+		double *row = rows + 3 * i;
+		double x = k * 37 % 101 / 100.0, y = k * 53 % 97 / 96.0;
+
+		if (what == DEPENDENT)
+			y = x;
+		row[0] = what == DENORMAL_INPUTS ? x * 1e-310 : x;
+		row[1] = what == FAR_INPUTS ? 1e12 + y : 2 * y;
+		row[2] = factor * (sin(3 * x) + y * y);
+	}
+	*size = factor;
+}
+
+/*
+ * Whatever the data, training ends in a model of numbers that is no worse on them than
+ * their mean, or refuses and leaves the model as it was.
+ */
+static void test_extreme_data(void **state)
+{
+	const int mfs[] = {4, 3};
+
+	for (int what = 0; what < EXTREMES; what++)
+		for (int classic = 0; classic < 2; classic++) {
+			double rows[120 * 3], min[2], max[2], size;
+			struct incise_pairs pairs = {rows, 120, 2};
+			struct incise_uncertainty *uncertainty = NULL;
+			struct incise_train_options options;
+			struct incise_train_report report;
+			struct incise_error err = {0};
+			struct incise_model *model, *before;
+			int rc;
+
+			make_extreme(what, rows, 120, &size);
+			ranges(rows, 120, 2, min, max);
+			model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
+			for (int k = 0; k < 4 && what == COLLAPSED; k++)
+				incise_model_set_mf(model, 0, k,
+						    (double[]){0.2, 0.5, 0, 0});
+			for (int k = 0; k < 4 && what == NOT_FIRING; k++)
+				incise_model_set_mf(model, 0, k,
+						    (double[]){1e-12, k * 0.4003, 0, 0});
+			before = incise_model_copy(model);
+			incise_train_options_init(&options);
+			options.classic = classic;
+			options.uncertainty = &uncertainty;
+			rc = incise_train(model, &pairs, NULL, &options, &report, &err);
+			if (rc) {
+				/* Consequents over 1e-310 are beyond a double; nothing
+				 * else is too much. */
+				assert_int_equal(rc, -EDOM);
+				assert_int_equal(what, DENORMAL_INPUTS);
+				assert_true(err.text[0] && !strchr(err.text, '\n'));
+				assert_null(uncertainty);
+				assert_memory_equal(incise_model_mf(model, 0, 1)->p,
+						    incise_model_mf(before, 0, 1)->p,
+						    2 * sizeof(double));
+			} else {
+				check_finite(model, !classic);
+				/* The classic ridge, 1e-6 on raw units, drowns targets of
+				 * 1e-9 no more than others; far inputs spoil its scale. */
+				if (!classic)
+					assert_true(report.train_rmse / size <=
+						    1.0001 * spread(rows, 120, size));
+				assert_true(isfinite(report.train_rmse));
+				assert_non_null(uncertainty);
+				assert_true(isfinite(
+					incise_uncertainty_sd(uncertainty, model, rows)));
+			}
+			incise_uncertainty_free(uncertainty);
+			incise_model_free(model);
+			incise_model_free(before);
+		}
+}
+
+/* What leaves nothing to learn is refused in one line that names it. */
+static void test_too_little_data(void **state)
+{
+	double rows[60 * 3];
+	const int three[] = {3, 3}, one[] = {1, 1};
+	const double min[] = {0, 0}, max[] = {1, 1};
+	struct incise_train_options options;
+	struct incise_error err = {0};
+
+	for (int i = 0; i < 60; i++) {
+		rows[3 * i] = 0.4;
+		rows[3 * i + 1] = i / 59.0;
+		rows[3 * i + 2] = i * 7 % 5;
+	}
+	incise_train_options_init(&options);
+	for (int classic = 0; classic < 2; classic++) {
+		struct incise_model *model = grid(2, min, max, three, INCISE_MF_GAUSS);
+
+		options.classic = classic;
+		assert_int_equal(incise_train(model, &(struct incise_pairs){rows, 60, 2},
+					      NULL, &options, NULL, &err),
+				 -EINVAL);
+		assert_non_null(strstr(err.text, "constant, 0.4"));
+		incise_model_free(model);
+		/* Three pairs fit a plane exactly, and say nothing. */
+		model = grid(2, min, max, one, INCISE_MF_GAUSS);
+		assert_int_equal(incise_train(model, &(struct incise_pairs){rows, 3, 2},
+					      NULL, &options, NULL, &err),
+				 -ENODATA);
+		assert_non_null(strstr(err.text, "3 training pairs"));
+		incise_model_free(model);
+	}
+}
+
+/* The report agrees with itself and with the model. */
+static void test_report(void **state)
+{
+	double rows[200 * 3], check_rows[100 * 3], mean = 0, sum = 0;
+	const int mfs[] = {4, 3};
+	const double min[] = {0, 0}, max[] = {1, 1};
+	struct incise_pairs train = {rows, 200, 2}, check = {check_rows, 100, 2};
+	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
+	struct incise_train_options options;
+	struct incise_train_report report;
+	static struct curve curve;
+	int unfired = 0;
+
+	for (int i = 0; i < 300; i++) {
+		double *row = i < 200 ? rows + 3 * i : check_rows + 3 * (i - 200);
+
+		/* Nothing in the upper left corner. */
+		row[0] = i * 37 % 101 / 100.0;
+		row[1] = i * 53 % 97 / 96.0 * row[0];
+		row[2] = sin(3 * row[0]) + row[1];
+	}
+	incise_train_options_init(&options);
+	options.progress = on_epoch;
+	options.user = &curve;
+	assert_int_equal(incise_train(model, &train, &check, &options, &report, NULL), 0);
+	assert_true(fabs(report.check_rmse - incise_train_rmse(model, &check)) < 1e-15);
+	assert_true(fabs(curve.train[report.best_epoch - 1] - report.train_rmse) < 1e-9);
+	assert_true(fabs(curve.check[report.best_epoch - 1] - report.check_rmse) < 1e-9);
+	for (int i = 0; i < 100; i++)
+		mean += check_rows[3 * i + 2] / 100;
+	for (int i = 0; i < 100; i++)
+		sum += pow(check_rows[3 * i + 2] - mean, 2) / 100;
+	assert_true(fabs(report.check_r2 - (1 - pow(report.check_rmse, 2) / sum)) <
+		    1e-12);
+	for (int r = 0; r < 12; r++)
+		unfired += report.unfired[r];
+	assert_int_equal(unfired, report.rules_unfired);
+	/* Function 1 of depth with function 3 of velocity: the empty corner. */
+	assert_true(report.unfired[2] && !report.unfired[0]);
+	assert_int_equal(report.pairs_tuned, 200);
+	assert_true(report.crossval_rmse > 0 && report.condition > 1);
+	incise_model_free(model);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_matlab_mackey_glass),
+		cmocka_unit_test(test_second_implementation),
 		cmocka_unit_test(test_jang_example_4),
 		cmocka_unit_test(test_jang_example_2),
 		cmocka_unit_test(test_plane_is_learnt),
@@ -425,6 +781,9 @@ int main(void)
 		cmocka_unit_test(test_refusals),
 		cmocka_unit_test(test_kinds_that_cannot_be_trained),
 		cmocka_unit_test(test_min_cannot_be_trained),
+		cmocka_unit_test(test_extreme_data),
+		cmocka_unit_test(test_too_little_data),
+		cmocka_unit_test(test_report),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
