@@ -41,6 +41,7 @@ $(foreach lib,$(libraries),$(eval $(call library,$(lib))))
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib)))
 	@mkdir -p $(@D)
 	@rm -f $@
+	# q, not r: two rooms may have a file of the same name
 	$(AR) qcs $@ $^
 
 all_libs = $(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))

@@ -55,14 +55,17 @@ struct evaluator {
 
 static void add_row(struct evaluator *e, const double *x, double y, bool outside)
 {
+	const char *unit = strrchr(e->output, '_');
 	json_t *row = json_object();
+	char key[INCISE_MODEL_NAME_MAX + 2];
 
+	snprintf(key, sizeof(key), "sd%s", unit ? unit : "");
 	for (int i = 0; i < e->n_inputs; i++)
 		json_object_set_new(row, e->input[i], json_number(x[i]));
 	json_object_set_new(row, e->output, json_number(y));
 	if (e->uncertainty)
 		json_object_set_new(
-			row, "sd",
+			row, key,
 			json_number(incise_uncertainty_sd(e->uncertainty, e->model, x)));
 	json_object_set_new(row, "extrapolated", json_boolean(outside));
 	json_array_append_new(e->rows, row);

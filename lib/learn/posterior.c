@@ -5,7 +5,8 @@
  * Within a cut residuals are small and alike; between cuts tissue differs. An error on a
  * new cut has both, so the noise is taken from whole groups left out. It is set by the
  * 95 % quantile rather than the mean square: errors of cuts have heavier tails than a
- * normal distribution, and the interval is what a user reads off.
+ * normal distribution, and the interval is what a user reads off. From few groups their
+ * spread is known badly; as for any mean of few, Student's t takes the place of 1.96.
  */
 #include <errno.h>
 #include <math.h>
@@ -17,6 +18,19 @@ static int ascending(const void *a, const void *b)
 	double x = *(const double *)a, y = *(const double *)b;
 
 	return (x > y) - (x < y);
+}
+
+/* The 97.5 % quantile of Student's t, to 0.1 %. */
+static double student(int freedom)
+{
+	static const double few[] = {12.706, 4.303, 3.182, 2.776, 2.571};
+	const double z = INCISE_INTERVAL95, n = freedom;
+
+	if (freedom <= 5)
+		return few[freedom - 1];
+	/* Cornish and Fisher's expansion. */
+	return z + (pow(z, 3) + z) / (4 * n) +
+	       (5 * pow(z, 5) + 16 * pow(z, 3) + 3 * z) / (96 * n * n);
 }
 
 int incise_posterior_noise(const struct incise_basis *basis,
@@ -35,7 +49,8 @@ int incise_posterior_noise(const struct incise_basis *basis,
 		size_t at = fmin(rank, folds->n_held) - 1;
 
 		qsort(ratios, folds->n_held, sizeof(*ratios), ascending);
-		*noise = ratios[at] / INCISE_INTERVAL95;
+		*noise = ratios[at] / INCISE_INTERVAL95 * student(folds->n_units - 1) /
+			 INCISE_INTERVAL95;
 	}
 	free(error);
 	free(ratios);

@@ -12,7 +12,7 @@ setup_file() {
 
 setup() {
 	work_folder
-	cp "$BATS_FILE_TMPDIR"/*.fis .
+	cp "$BATS_FILE_TMPDIR"/*.fis "$BATS_FILE_TMPDIR"/*.sd .
 }
 
 # The model in the file bad.fis is refused with these texts.
@@ -226,6 +226,50 @@ degree_model() {
 	done
 	run --separate-stderr incise eval m.fis points --grid 3x3
 	bad_usage # a grid reads nothing
+}
+
+@test "eval --sd prints force and standard deviation" {
+	printf '5 20\n12 3\n999 20\n20 20\n' >points
+	incise eval m.fis points --sd >got 2>/dev/null
+	# the force is the same as without
+	diff <(cut -d' ' -f1 got) <(incise eval m.fis points 2>/dev/null)
+	[ "$(awk 'NF == 2 && $2 > 0' got | wc -l)" -eq 4 ]
+	# outside counts as its nearest end
+	[ "$(sed -n 3p got)" = "$(sed -n 4p got)" ]
+	incise eval m.fis points --sd --json >r.json 2>/dev/null
+	holds "($(key r.json 'rows[1].sd_N') - $(sed -n '2s/.* //p' got))^2 < 1e-18"
+	[ "$(incise eval m.fis --grid 2x2 --sd | awk 'NF == 4' | wc -l)" -eq 4 ]
+	# any arithmetic: the deviation is that of the model
+	diff <(cut -d' ' -f2 got) <(incise eval m.fis points --sd --arith fixed 2>/dev/null | cut -d' ' -f2)
+	incise eval m.fis points >without 2>/dev/null
+	run -0 awk 'NF != 1' without
+	[ -z "$output" ]
+}
+
+@test "eval --sd refuses what is missing, stale or damaged, by name" {
+	cp m.fis alone.fis
+	run --separate-stderr incise eval alone.fis --sd <<<'5 20'
+	failed_with alone.fis.sd "No such file"
+	cp m.fis.sd alone.fis.sd
+	echo '5 20' | incise eval alone.fis --sd >/dev/null
+	cp bell.fis.sd alone.fis.sd
+	run --separate-stderr incise eval alone.fis --sd <<<'5 20'
+	failed_with alone.fis.sd:2 stale
+	head -n 20 m.fis.sd >alone.fis.sd
+	run --separate-stderr incise eval alone.fis --sd <<<'5 20'
+	failed_with alone.fis.sd truncated
+	sed '9s/ / x/' m.fis.sd >alone.fis.sd
+	run --separate-stderr incise eval alone.fis --sd <<<'5 20'
+	failed_with alone.fis.sd:9 "not a number"
+	run --separate-stderr incise eval - --sd <m.fis
+	failed_with "--sd needs a model in a file"
+	# without --sd nobody looks
+	echo '5 20' | incise eval alone.fis >/dev/null
+}
+
+@test "eval --sd reads the same in another language" {
+	[ "$(LC_ALL=de_DE.UTF-8 locale decimal_point 2>/dev/null)" = , ] || skip "no locale with a decimal comma here"
+	[ "$(echo '5 20' | LC_ALL=de_DE.UTF-8 incise eval m.fis --sd)" = "$(echo '5 20' | incise eval m.fis --sd)" ]
 }
 
 @test "eval: bad usage, and files that are not there" {

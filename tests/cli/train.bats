@@ -155,7 +155,8 @@ refuses() {
 		for (i = 0; i < 400; i++) print i / 20, i / 8, i / 200 }' >step.csv
 	incise train step.csv -o m.fis --json >r.json 2>err
 	grep -q "rules never fire in the data" err
-	holds "$(key r.json rules_unfired) >= 5"
+	# how many depends on where the functions have gone; the far corners stay empty
+	holds "$(key r.json rules_unfired) >= 2"
 }
 
 @test "train on recordings made by others beats the mean on unseen cuts" {
@@ -165,6 +166,106 @@ refuses() {
 		-o m.fis --json >r.json
 	holds "$(key r.json check.rmse_N) < $(key r.json baselines.mean.rmse_N)"
 	holds "$(key r.json check_groups) >= 2"
+}
+
+# Median of a key over splits of some data: median FILE KEY [OPTIONS], from the reports r1 …
+median_of() {
+	for seed in 1 2 3 4 5; do key r$seed.json "$1"; done | sort -g | sed -n 3p
+}
+
+# Five splits of a dataset by cut: the default is no worse than linear regression and the
+# nearest neighbours (median), and on no split worse than the mean by more than 2 %.
+holds_on_unseen_cuts() {
+	for seed in 1 2 3 4 5; do
+		incise train "$@" --group cut --check 0.3 --seed $seed -o m.fis --json \
+			>r$seed.json 2>/dev/null
+		holds "$(key r$seed.json check.rmse_N) <= 1.02 * $(key r$seed.json baselines.mean.rmse_N)" || return
+	done
+	holds "$(median_of check.rmse_N) <= $(median_of baselines.linear.rmse_N)" || return
+	holds "$(median_of check.rmse_N) <= $(median_of baselines.knn.rmse_N)" || return
+	# 95 % on average; four cuts tell the share of one split to some 10 %
+	holds "$(median_of interval95_coverage) > 0.85"
+}
+
+@test "train holds on unseen cuts of recordings made by others" {
+	data=$root/../shared/data
+	[ -f "$data/skin.csv" ] || skip "no $data: real data do not come with the source"
+	for name in meniscus skin; do
+		holds_on_unseen_cuts "$data/$name.csv" --inputs depth_deg,velocity_deg_s
+	done
+}
+
+@test "train holds on unseen cuts of the virtual liver" {
+	incise capture --rig sim:seed=1,clock=simulated -o s.rec >/dev/null
+	incise export s.rec --average 12x10 --by-cut -o s.csv >/dev/null
+	holds_on_unseen_cuts s.csv
+}
+
+@test "train writes the standard deviation beside the model, and checks it" {
+	run -0 --separate-stderr incise train pairs.csv --group cut --check 0.3 -o m.fis
+	[ -s m.fis.sd ]
+	[[ "$output" == *"95 % interval: noise 0."*" N, holds "*" % of the unseen cuts"* ]]
+	incise train pairs.csv --group cut --check 0.3 -o n.fis --json >r.json 2>/dev/null
+	cmp m.fis.sd n.fis.sd
+	# two cuts only, and they may be the outermost of the six
+	holds "$(key r.json interval95_coverage) > 0.6 && $(key r.json interval95_coverage) <= 1"
+	# the file holds the noise reported; JSON has fewer digits
+	holds "($(sed -n 's/^noise //p' m.fis.sd) / $(key r.json noise_N) - 1)^2 < 1e-16"
+	# what the report says is what eval says
+	sed 1d pairs.csv | cut -d, -f2,3 | incise eval m.fis --sd >all
+	[ "$(wc -l <all)" -eq 288 ]
+	awk '$2 < '"$(sed -n 's/^noise //p' m.fis.sd)"' * 0.999 { exit 1 }' all
+}
+
+@test "train leaves no standard deviation where there is no place beside the model" {
+	incise train pairs.csv --mf 2,2 -o - >out 2>/dev/null
+	incise train pairs.csv --mf 2,2 -o /dev/null >out2 2>/dev/null
+	[ "$(ls -A)" = "$(printf '%s\n' out out2 pairs.csv)" ]
+	[ ! -e /dev/null.sd ]
+}
+
+@test "train reports R², starts and rules that never fire" {
+	awk -v OFS=, 'BEGIN { print "depth_mm,velocity_mm_s,force_N"
+		for (i = 0; i < 400; i++) print i / 20, i / 8, sin(i / 60) }' >step.csv
+	incise train step.csv --check 0.3 --starts 1 -o m.fis --json >r.json 2>/dev/null
+	[ "$(key r.json start)" = 0 ]
+	# a noiseless curve
+	holds "$(key r.json check.r2) > 0.999 && $(key r.json check.r2) <= 1"
+	holds "$(key r.json train.r2) > 0.999 && $(key r.json train.r2) <= 1"
+	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '\$.unfired_rules')")" \
+		= "$(key r.json rules_unfired)" ]
+	# rule 4: the least depth with the largest velocity
+	[ "$(sqlite3 :memory: "SELECT count(*) FROM json_each(readfile('r.json'), '\$.unfired_rules')
+		WHERE value = 4")" = 1 ]
+	holds "$(key r.json crossval_rmse_N) > 0"
+	[ "$(key r.json pairs_tuned)" = 280 ]
+}
+
+@test "train --mf auto takes as many functions as the data need" {
+	awk -v OFS=, 'BEGIN { print "depth_mm,velocity_mm_s,force_N"
+		for (i = 0; i < 400; i++) { x = i * 37 % 401 / 400; y = i * 53 % 397 / 396
+			print x, y, sin(12 * x) + y + 0.1 * (i * 7919 % 1000) / 1000 } }' >wave.csv
+	incise train wave.csv --mf auto -o m.fis --json >r.json 2>/dev/null
+	holds "$(key r.json 'mf[0]') >= 4"
+	[ "$(key r.json 'mf[1]')" = 1 ]
+	[ "$(key r.json rules)" = "$(key r.json 'mf[0]')" ]
+	[ "$(sed -n 's/^NumRules=//p' m.fis)" = "$(key r.json rules)" ]
+	run --separate-stderr incise train wave.csv --mf auto,3 -o m.fis
+	bad_usage --mf
+}
+
+@test "train takes a million pairs within 10 s and 300 MB" {
+	awk -v OFS=, 'BEGIN { print "cut,depth_mm,velocity_mm_s,force_N"
+		for (i = 0; i < 1000000; i++) { d = i * 7919 % 20011 / 1000; v = i * 104729 % 50021 / 1000
+			print "c" int(i / 20000), d, v, d * 0.1 + v * d * 0.001 } }' >many.csv
+	start=$(date +%s%N)
+	# address space, which is more than memory: libraries are in it too
+	(ulimit -v 300000 && incise train many.csv --group cut --check 0.3 -o m.fis --json >r.json 2>/dev/null)
+	holds "$(date +%s%N) - $start < 10e9"
+	[ "$(key r.json pairs_tuned)" = 3000 ]
+	[ "$(key r.json train.pairs)" = 700000 ]
+	# d·v lies within reach of rules that are planes: 20 of them come close
+	holds "$(key r.json check.r2) > 0.9999"
 }
 
 @test "train: a file that is not there, or is a folder" {
@@ -241,6 +342,15 @@ refuses() {
 	[ -s m.fis ]
 }
 
+@test "train: three pairs say nothing" {
+	sed -n '1p;2p;60p;150p' pairs.csv >bad.csv
+	run --separate-stderr incise train bad.csv --mf 1,1 -o m.fis
+	failed_with bad.csv "3 training pairs" "at least 5"
+	run --separate-stderr incise train bad.csv --mf auto -o m.fis
+	failed_with bad.csv "3 training pairs"
+	[ ! -e m.fis ]
+}
+
 @test "train: too few cuts to keep one back" {
 	grep -E '^(cut|c1),' pairs.csv >bad.csv
 	run --separate-stderr incise train bad.csv --group cut --check 0.3 --mf 2,2 -o m.fis
@@ -257,7 +367,7 @@ refuses() {
 	bad_usage "one data file, got 2"
 	for wrong in "--check 0" "--check 1" "--check half" "--mf 0,3" "--mf 3" "--mf 3,3,3" \
 		"--mf 33,2" "--mf ," "--mf-type trimf" "--epochs 0" "--epochs 1.5" "--step 0" \
-		"--ridge -1" "--ridge nan" "--seed -1" "--seed x" "--inputs ,"; do
+		"--starts 0" "--starts x" "--ridge -1" "--ridge nan" "--seed -1" "--seed x" "--inputs ,"; do
 		# shellcheck disable=SC2086
 		run --separate-stderr incise train pairs.csv -o m.fis $wrong
 		bad_usage "${wrong%% *}"
