@@ -29,7 +29,7 @@ static const double means[TUNE_MEANS] = {1, 1e-3};
 /* Epochs of a search in cross-validation, at most. */
 #define EPOCHS_MAX 15
 
-/* Multiplications that all searches may cost together: half a minute for large grids. */
+/* Multiplications that all searches may cost together: some ten seconds at most. */
 #define BUDGET 1e11
 
 /* Standard errors by which a search has to win. */
