@@ -315,9 +315,9 @@ int incise_train(struct incise_model *model, const struct incise_pairs *train,
 
 	for (int i = 0; i < incise_model_n_inputs(model); i++)
 		inputs[i] = *incise_model_input(model, i);
-	rc = check_all(model, inputs, train, check, options, err);
+	rc = check_trainable(model, err);
 	if (!rc)
-		rc = check_trainable(model, err);
+		rc = check_all(model, inputs, train, check, options, err);
 	if (rc)
 		return rc;
 	l = calloc(1, sizeof(*l));
