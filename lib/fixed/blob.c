@@ -144,7 +144,13 @@ static int check_weights(const struct incise_fixed *fx)
 	return 0;
 }
 
-/* Rule outputs g + x·h stay within 2^31, so that Σ w·(…) does within 2^62. */
+/* 32 bits, less what weights may add up to above 1 (2^-24), and a rounding to Q16. */
+#define FOLD_MAX (INT32_MAX - (1 << 14))
+
+/*
+ * Outputs g + x·h, and h, weighed, stay within 32 bits: sums do within 62, and the batch
+ * evaluator holds them in halves of 64-bit lanes.
+ */
 static int check_fold(const struct incise_fixed *fx)
 {
 	const int32_t *fold = fx->data;
@@ -162,7 +168,7 @@ static int check_fold(const struct incise_fixed *fx)
 			uint64_t g = magnitude(get32(fold, 2 * (row * n + i)));
 			uint64_t h = magnitude(get32(fold, 2 * (row * n + i) + 1));
 
-			if (g + (h * reach >> to_g) + 2 > INT32_MAX)
+			if (h > FOLD_MAX || g + (h * reach >> to_g) + 2 > FOLD_MAX)
 				return BAD;
 		}
 	return 0;

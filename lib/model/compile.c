@@ -248,11 +248,11 @@ static double table_rounding(const struct image *image,
 	double weights = grid->a.n * (grid->a.n / 2.0 + 2) * 0x1p-30;
 	double output = 0.5 / INCISE_FIXED_ONE;
 
-	/* g: half an LSB in the table, one floored between knots; h the same, times x; one
-	 * for the sum's floor. */
+	/* g: half an LSB in the table, one for the floor of its sum, one of x·h's, one floored
+	 * between knots; h: half an LSB, one for its sum's floor, times x. */
 	if (grid->one)
 		return output + 2 * lsb_g;
-	return output + 3 * lsb_g + 2 * lsb_h * reach + weights * size->rule;
+	return output + 4 * lsb_g + 2 * lsb_h * reach + weights * size->rule;
 }
 
 static int build_table(struct image *image, const struct incise_grid *grid,

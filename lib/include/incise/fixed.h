@@ -145,6 +145,17 @@ INCISE_API const char *incise_fixed_arithmetic_name(
 	enum incise_fixed_arithmetic arithmetic);
 
 /**
+ * Evaluate many times: y[k] = incise_fixed_eval(fx, x + k·n_inputs), to the bit, and some
+ * times as fast where the processor has AVX2 (all but the direct arithmetic).
+ *
+ * @param x n × n_inputs values, Q16.16, one evaluation's inputs side by side
+ * @param y n outputs, Q16.16; apart from @x
+ * @param n may be 0. Real-time safe.
+ */
+INCISE_API void incise_fixed_eval_batch(const struct incise_fixed *fx, const int32_t *x,
+					int32_t *y, size_t n);
+
+/**
  * Evaluate with inputs and output in double. NaN counts as the middle of the support, as
  * in incise_model_eval(). Real-time safe.
  */

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The batch evaluator: what the scalar one says, to the bit, whatever the model, the
+ * arithmetic, the inputs, their number and where they lie in memory.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <limits.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/fixed.h>
+#include "paper_model.h"
+
+#define N 100000
+#define UNTOUCHED 0x5a5a5a5a
+
+/* A model of any shape with consequents by seed, compiled. */
+static struct incise_fixed *compiled(int n_inputs, int n_a, int n_b, int arithmetic,
+				     int cells, uint64_t seed)
+{
+	const struct incise_variable in[] = {{"depth_mm", -3, 20},
+					     {"velocity_mm_s", 0, 50}};
+	const struct incise_variable out = {"force_N", 0, 4};
+	const int mfs[] = {n_a, n_b};
+	struct incise_fixed_options options = {.arithmetic = arithmetic, .cells = cells};
+	struct incise_model *model =
+		incise_model_new_grid(n_inputs, in, mfs, INCISE_MF_GAUSS, &out, NULL);
+	struct incise_fixed *fx;
+
+	for (int r = 0; r < incise_model_n_rules(model); r++) {
+		double p[] = {5 * paper_random(&seed), paper_random(&seed),
+			      paper_random(&seed)};
+
+		incise_model_set_consequent(model, r, p);
+	}
+	fx = incise_fixed_compile(model, &options, NULL);
+	assert_non_null(fx);
+	incise_model_free(model);
+	return fx;
+}
+
+static uint32_t random_bits(uint64_t *seed)
+{
+	*seed = *seed * 6364136223846793005u + 1442695040888963407u;
+	return *seed >> 32;
+}
+
+/* Within the support, just around its ends, anywhere, or an extreme. */
+static int32_t random_input(const struct incise_fixed_input *in, uint64_t *seed)
+{
+	static const int32_t extremes[] = {INT32_MIN, INT32_MIN + 1, -1, 0, 1, INT32_MAX};
+	uint32_t bits = random_bits(seed), range = (uint32_t)in->max - (uint32_t)in->min;
+
+	switch (random_bits(seed) >> 28) {
+	case 0:
+		return (int32_t)bits;
+	case 1:
+		return extremes[bits % 6];
+	case 2:
+		return in->min + (int32_t)(bits % 5) - 2;
+	case 3:
+		return in->max + (int32_t)(bits % 5) - 2;
+	default:
+		return in->min + (int32_t)(bits % (range + 1));
+	}
+}
+
+static void fill(const struct incise_fixed *fx, int32_t *x, size_t n, uint64_t seed)
+{
+	for (size_t k = 0; k < n; k++)
+		for (int i = 0; i < fx->n_inputs; i++)
+			*x++ = random_input(&fx->input[i], &seed);
+}
+
+static void check(const struct incise_fixed *fx, size_t n, uint64_t seed)
+{
+	int32_t *x = calloc(n, fx->n_inputs * sizeof(*x));
+	int32_t *y = malloc((n + 1) * sizeof(*y));
+
+	fill(fx, x, n, seed);
+	y[n] = UNTOUCHED;
+	incise_fixed_eval_batch(fx, x, y, n);
+	for (size_t k = 0; k < n; k++)
+		assert_int_equal(y[k], incise_fixed_eval(fx, x + k * fx->n_inputs));
+	assert_int_equal(y[n], UNTOUCHED);
+	free(x);
+	free(y);
+}
+
+/* Counts of functions with every rest of a division by four; 32 is the most. */
+static void test_shapes(void **state)
+{
+	static const struct {
+		int n_inputs, n_a, n_b, arithmetic, cells;
+	} cases[] = {
+		{2, 5, 4, INCISE_FIXED_TABLE, 0},     {2, 5, 4, INCISE_FIXED_TABLE, 1024},
+		{2, 1, 1, INCISE_FIXED_TABLE, 0},     {2, 2, 5, INCISE_FIXED_TABLE, 0},
+		{2, 3, 3, INCISE_FIXED_TABLE, 64},    {2, 4, 4, INCISE_FIXED_TABLE, 0},
+		{2, 6, 2, INCISE_FIXED_TABLE, 0},     {2, 7, 1, INCISE_FIXED_TABLE, 0},
+		{2, 8, 3, INCISE_FIXED_TABLE, 4096},  {2, 9, 2, INCISE_FIXED_TABLE, 0},
+		{2, 32, 1, INCISE_FIXED_TABLE, 0},    {1, 5, 0, INCISE_FIXED_TABLE, 0},
+		{1, 32, 0, INCISE_FIXED_TABLE, 4096}, {2, 5, 4, INCISE_FIXED_FORCE, 0},
+		{2, 5, 4, INCISE_FIXED_FORCE, 128},   {1, 5, 0, INCISE_FIXED_FORCE, 0},
+		{2, 5, 4, INCISE_FIXED_DIRECT, 0},    {1, 5, 0, INCISE_FIXED_DIRECT, 0},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_fixed *fx =
+			compiled(cases[i].n_inputs, cases[i].n_a, cases[i].n_b,
+				 cases[i].arithmetic, cases[i].cells, i);
+
+		check(fx, N, i);
+		incise_fixed_free(fx);
+	}
+}
+
+/* Consequents from tiny to the largest that compile: every number format. */
+static void test_formats(void **state)
+{
+	int compiled_models = 0;
+
+	for (int arithmetic = INCISE_FIXED_TABLE; arithmetic <= INCISE_FIXED_FORCE;
+	     arithmetic++)
+		for (int e = -40; e < 20; e += 4) {
+			struct incise_fixed_options options = {.arithmetic = arithmetic};
+			double size = e < 0 ? 1.0 / (1ll << -e) : 1ll << e;
+			struct incise_model *model =
+				paper_model(INCISE_MF_GAUSS, 7 + e + 40, size);
+			struct incise_fixed *fx =
+				incise_fixed_compile(model, &options, NULL);
+
+			if (fx) {
+				compiled_models++;
+				check(fx, 5000, e + 40);
+			}
+			incise_fixed_free(fx);
+			incise_model_free(model);
+		}
+	/* Up to 2^12 N there is a format. */
+	assert_true(compiled_models >= 2 * 12);
+}
+
+/* Arrays that begin at any word: 13 results, and nothing beside them. */
+static void check_shifted(const struct incise_fixed *fx, int shift_x, int shift_y)
+{
+	int32_t x[8 + 2 * 13], y[8 + 13 + 8];
+	const int32_t *in = x + shift_x;
+
+	fill(fx, x + shift_x, 13, shift_x);
+	memset(y, 0x5a, sizeof(y));
+	incise_fixed_eval_batch(fx, in, y + shift_y, 13);
+	for (int k = 0; k < 8 + 13 + 8; k++)
+		if (k < shift_y || k >= shift_y + 13)
+			assert_int_equal(y[k], UNTOUCHED);
+	for (int k = 0; k < 13; k++)
+		assert_int_equal(y[shift_y + k],
+				 incise_fixed_eval(fx, in + k * fx->n_inputs));
+}
+
+/* Ends of a run that are no multiple of the vector, none at all, and no alignment. */
+static void test_lengths_and_alignment(void **state)
+{
+	for (int arithmetic = 0; arithmetic < 3; arithmetic++)
+		for (int n_inputs = 1; n_inputs <= 2; n_inputs++) {
+			struct incise_fixed *fx =
+				compiled(n_inputs, 5, 4, arithmetic, 0, 3);
+
+			for (size_t n = 0; n < 16; n++)
+				check(fx, n, n);
+			for (int shift = 0; shift < 64; shift++)
+				check_shifted(fx, shift / 8, shift % 8);
+			incise_fixed_eval_batch(fx, NULL, NULL, 0);
+			incise_fixed_free(fx);
+		}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_shapes),
+		cmocka_unit_test(test_formats),
+		cmocka_unit_test(test_lengths_and_alignment),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
