@@ -155,11 +155,6 @@ static const char direct_one_text[] =
 
 /* ---- the numbers ---- */
 
-static const struct incise_fx_header *header(const struct incise_fixed *fx)
-{
-	return fx->blob;
-}
-
 static int32_t get32(const int32_t *values, size_t i)
 {
 	return (int32_t)incise_fx_le32((uint32_t)values[i]);
@@ -219,7 +214,7 @@ static void put_comment(FILE *out, const struct incise_fixed *fx, const char *sy
 	fputs("/* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */\n"
 	      "/*\n * ",
 	      out);
-	put_name(out, header(fx)->name);
+	put_name(out, fx->name);
 	fprintf(out,
 		": a fuzzy model of %" PRId32 " rules in fixed point, %s.\n"
 		" * Written by incise %s from its compiled form; compile the model again "
@@ -227,16 +222,21 @@ static void put_comment(FILE *out, const struct incise_fixed *fx, const char *sy
 		" *     int32_t %s_eval(const int32_t *x);\n *\n",
 		fx->n_rules, incise_fixed_arithmetic_name(fx->arithmetic),
 		incise_version(), symbol);
-	for (int i = 0; i < fx->n_inputs; i++)
-		fprintf(out, " * x[%d]    Q16.16 of its unit; %.10g to %.10g, clamped\n",
-			i, fx->input[i].min / (double)INCISE_FIXED_ONE,
+	for (int i = 0; i < fx->n_inputs; i++) {
+		fprintf(out, " * x[%d]     ", i);
+		put_name(out, fx->input[i].name);
+		fprintf(out, ", Q16.16; %.10g to %.10g, clamped\n",
+			fx->input[i].min / (double)INCISE_FIXED_ONE,
 			fx->input[i].max / (double)INCISE_FIXED_ONE);
+	}
+	fputs(" * returns  ", out);
+	put_name(out, fx->output);
 	fprintf(out,
-		" * returns Q16.16 of the output's unit; certain to %.3g of it against the "
-		"model in\n *         real numbers, for any input\n *\n"
-		" * Units are those of the model: in incise mm, mm/s and N. Needs 64-bit "
-		"integers and\n * right shifts of negative numbers that keep the sign, as "
-		"compilers have them.\n */\n",
+		", Q16.16; within %.3g of the model in real numbers, whatever\n"
+		" *          the input: a certified bound\n *\n"
+		" * Q16.16: 65536 stands for 1 of the unit that the name ends in. Needs "
+		"64-bit integers,\n * and right shifts of negative numbers that keep the "
+		"sign, as compilers have them.\n */\n",
 		incise_fixed_bound(fx));
 }
 
