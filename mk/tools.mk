@@ -8,6 +8,18 @@ tool_shared := $(addprefix $(O)/obj/tools/,cli.o json.o)
 $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 
 extra_demo := $(O)/obj/tools/picture.o
+extra_bench := $(addprefix $(O)/obj/tools/,picture.o arithmetics.o machine.o)
+
+# Another project's evaluator beside ours in incise bench: a shared object of its own,
+# built where its headers are. It is for measuring, and is not installed.
+peer := $(if $(shell echo '\#include <fl/Headers.h>' | $(CXX) -E -x c++ -M - 2>/dev/null),\
+	$(O)/lib/incise/peer_fuzzylite.so)
+
+$(O)/lib/incise/peer_%.so: tools/peers/%.cc $(O)/lib/libincise.so
+	@mkdir -p $(@D) $(O)/obj/tools/peers
+	$(CXX) -std=c++14 -fPIC -fvisibility=hidden -Wall -Wextra $(cppflags) $(CPPFLAGS) $(CFLAGS) \
+		-MMD -MP -MF $(O)/obj/tools/peers/$*.d -shared $(LDFLAGS) -o $@ $< \
+		-L$(O)/lib -lincise -l$*
 
 link_tool = $(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed -Wl,-rpath,'$$ORIGIN/../lib' \
 	-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $(filter %.o,$^) $1 \
@@ -25,7 +37,7 @@ $(O)/bin/incise: $(O)/obj/tools/incise.o $(tool_shared) $(O)/lib/libincise.so
 	@mkdir -p $(@D)
 	$(call link_tool,-lincise)
 
-tools: $(programs)
+tools: $(programs) $(peer)
 
 DEMO ?= demo.out
 
@@ -38,9 +50,9 @@ demo: ## walk paper 1 on the virtual rig; pictures and summary in demo.out/
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise demo -o $(DEMO) --force
 
-bench: ## measure error against run time on this machine
-	@mk/deps build
+bench: ## measure error against run time on this machine; chart in build/bench/
+	@mk/deps build bench
 	+@$(MAKE) --no-print-directory all
-	$(O)/bin/incise bench precision
+	$(O)/bin/incise bench precision --plot $(O)/bench/precision
 
 .PHONY: tools deps demo bench

@@ -11,13 +11,18 @@
 #include <time.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
+#include "arithmetics.h"
 #include "cli.h"
 #include "json.h"
+#include "machine.h"
+#include "picture.h"
 
-enum { OPT_JSON = CLI_LONG };
+enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK };
 
 static const struct cli_option options[] = {
 	{OPT_JSON, "json", NULL, "report as JSON"},
+	{OPT_PLOT, "plot", "NAME", "draw error over time as NAME.png and NAME.svg"},
+	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
 	{0},
 };
 
@@ -31,20 +36,24 @@ static const struct cli_verb verb = {
 	.notes = "Exit: 0 measured, 1 failed, 2 bad usage. See incise-bench(1).",
 };
 
+/* Points for the errors. Times are of the first of them, so few that inputs and outputs
+ * stay in the cache and the arithmetic is what is measured. */
 #define POINTS 20000
-#define REPEATS 31
+#define TIMED_POINTS 2000
+#define REPEATS 101
+#define QUICK_REPEATS 5
 
-struct row {
-	const char *name;
-	double ns, max_error_N, rms_error_N;
+/* Of one arithmetic: nanoseconds per evaluation, errors in the output's unit. */
+struct figures {
+	double ns, ns_p5, ns_p95, max_error, rms_error, bound;
 };
 
 struct bench {
-	struct incise_model *model;
-	struct incise_fixed *fixed;
-	double x[POINTS][INCISE_MODEL_INPUTS_MAX];
-	int32_t q[POINTS][INCISE_FIXED_INPUTS_MAX];
-	double truth[POINTS];
+	struct arithmetics all;
+	struct points points;
+	struct figures figures[ARITHMETICS_MAX];
+	struct machine machine;
+	int repeats;
 };
 
 /* Paper 1's shape with a force surface of its kind. */
@@ -70,63 +79,12 @@ static struct incise_model *own_model(void)
 	return model;
 }
 
-/* Eq. (3) in long double, written apart from the library's evaluator. */
-static double reference(const struct incise_model *model, const double *x)
-{
-	long double sum = 0, weights = 0;
-
-	for (int r = 0; r < incise_model_n_rules(model); r++) {
-		const double *p = incise_model_consequent(model, r);
-		long double exponent = 0, y = p[0];
-
-		for (int i = 0; i < incise_model_n_inputs(model); i++) {
-			const struct incise_mf *mf = incise_model_mf(
-				model, i, incise_model_rule_mf(model, r, i));
-			long double z = (x[i] - (long double)mf->p[1]) / mf->p[0];
-
-			exponent += z * z / 2;
-			y += (long double)p[i + 1] * x[i];
-		}
-		/* Within a support as wide as 11000 widths long double does not underflow. */
-		sum += expl(-exponent) * y;
-		weights += expl(-exponent);
-	}
-	return (double)(sum / weights);
-}
-
-static void fill(struct bench *b)
-{
-	uint64_t seed = 1;
-	int n = incise_model_n_inputs(b->model);
-
-	for (int k = 0; k < POINTS; k++) {
-		for (int i = 0; i < n; i++) {
-			const struct incise_variable *v = incise_model_input(b->model, i);
-
-			seed = seed * 6364136223846793005u + 1442695040888963407u;
-			b->x[k][i] = v->min + (v->max - v->min) * (seed >> 11) * 0x1p-53;
-			b->q[k][i] = (int32_t)lrint(b->x[k][i] * INCISE_FIXED_ONE);
-		}
-		b->truth[k] = reference(b->model, b->x[k]);
-	}
-}
-
 static double now_ns(void)
 {
 	struct timespec t;
 
 	clock_gettime(CLOCK_MONOTONIC, &t);
 	return t.tv_sec * 1e9 + t.tv_nsec;
-}
-
-static double eval_double(const struct bench *b, int k)
-{
-	return incise_model_eval(b->model, b->x[k], NULL);
-}
-
-static double eval_fixed(const struct bench *b, int k)
-{
-	return incise_fixed_eval(b->fixed, b->q[k]) / (double)INCISE_FIXED_ONE;
 }
 
 static int by_value(const void *a, const void *b)
@@ -136,75 +94,271 @@ static int by_value(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
+/* Nearest rank. */
+static double quantile(const double *sorted, int n, double q)
+{
+	return sorted[(int)(q * (n - 1) + 0.5)];
+}
+
+static void measure_errors(struct bench *b)
+{
+	for (int i = 0; i < b->all.n; i++) {
+		struct arithmetic *a = &b->all.row[i];
+		struct figures *f = &b->figures[i];
+
+		*f = (struct figures){NAN, NAN, NAN, NAN, NAN, NAN};
+		if (*a->failed)
+			continue;
+		arithmetic_errors(a, &b->points, &f->max_error, &f->rms_error);
+		if (a->fixed)
+			f->bound = incise_fixed_bound(a->fixed);
+		if (f->max_error > f->bound)
+			snprintf(
+				a->failed, sizeof(a->failed),
+				"its error of %.3g exceeds its certified bound of %.3g: a "
+				"fault of incise, please report it with the model",
+				f->max_error, f->bound);
+		else if (!isfinite(f->max_error))
+			snprintf(a->failed, sizeof(a->failed),
+				 "an answer is not a number");
+	}
+}
+
+static void measure_times(struct bench *b)
+{
+	static double times[ARITHMETICS_MAX][REPEATS];
+	struct points timed = b->points;
+
+	timed.n = TIMED_POINTS;
+	/* Interleaved, so that a busy moment of the machine meets them all; a first run each
+	 * brings an arithmetic's tables back into the cache. */
+	for (int rep = 0; rep < b->repeats; rep++) {
+		cli_progress("repeat %d of %d", rep + 1, b->repeats);
+		for (int i = 0; i < b->all.n; i++) {
+			const struct arithmetic *a = &b->all.row[i];
+			double begin;
+
+			if (isnan(b->figures[i].max_error))
+				continue;
+			a->run(a, &timed);
+			begin = now_ns();
+			a->run(a, &timed);
+			times[i][rep] = (now_ns() - begin) / timed.n;
+		}
+	}
+	cli_progress_end();
+	for (int i = 0; i < b->all.n; i++) {
+		struct figures *f = &b->figures[i];
+
+		if (isnan(f->max_error))
+			continue;
+		qsort(times[i], b->repeats, sizeof(double), by_value);
+		f->ns = quantile(times[i], b->repeats, 0.5);
+		f->ns_p5 = quantile(times[i], b->repeats, 0.05);
+		f->ns_p95 = quantile(times[i], b->repeats, 0.95);
+	}
+}
+
+/* How many times as fast as fuzzylite; NaN without it. */
+static double against_peer(const struct bench *b, int i)
+{
+	for (int k = 0; k < b->all.n; k++)
+		if (b->all.row[k].kind == ARITHMETIC_PEER)
+			return b->figures[k].ns / b->figures[i].ns;
+	return NAN;
+}
+
+/* ---- report ---- */
+
+static void print_number(const char *fmt, int width, double value)
+{
+	if (isnan(value))
+		printf(" %*s", width, "-");
+	else
+		printf(fmt, width, value);
+}
+
+static void print_table(const struct bench *b, const struct incise_model *model)
+{
+	const struct machine *m = &b->machine;
+
+	printf("model %s, %d rules; errors at %zu points, times of %d runs in turn\n"
+	       "%s; %s; vectors: %s; %s%s%s\n\n"
+	       "%-18s %9s %8s %8s %11s %11s %11s %11s\n",
+	       incise_model_name(model), incise_model_n_rules(model), b->points.n,
+	       b->repeats, m->cpu, m->kernel, m->vectors, m->compiler,
+	       *b->all.peer_version ? "; fuzzylite " : "", b->all.peer_version,
+	       "arithmetic", "median ns", "5 %", "95 %", "largest / N", "rms / N",
+	       "bound / N", "x fuzzylite");
+	for (int i = 0; i < b->all.n; i++) {
+		const struct figures *f = &b->figures[i];
+
+		printf("%-18s", b->all.row[i].name);
+		print_number(" %*.1f", 9, f->ns);
+		print_number(" %*.1f", 8, f->ns_p5);
+		print_number(" %*.1f", 8, f->ns_p95);
+		print_number(" %*.3g", 11, f->max_error);
+		print_number(" %*.3g", 11, f->rms_error);
+		print_number(" %*.3g", 11, f->bound);
+		print_number(" %*.0f", 11, against_peer(b, i));
+		putchar('\n');
+	}
+	putchar('\n');
+	for (int i = 0; i < b->all.n; i++)
+		if (*b->all.row[i].failed)
+			printf("%s: %s\n", b->all.row[i].name, b->all.row[i].failed);
+}
+
+static json_t *row_json(const struct bench *b, int i)
+{
+	const struct arithmetic *a = &b->all.row[i];
+	const struct figures *f = &b->figures[i];
+	json_t *size = a->fixed ? json_integer(a->fixed->size) : json_null();
+	json_t *failed = *a->failed ? json_string(a->failed) : json_null();
+
+	return json_pack("{ss so so so so so so so so sb so}", "name", a->name, "ns",
+			 json_number(f->ns), "ns_p5", json_number(f->ns_p5), "ns_p95",
+			 json_number(f->ns_p95), "max_error_N", json_number(f->max_error),
+			 "rms_error_N", json_number(f->rms_error), "bound_N",
+			 json_number(f->bound), "size_bytes", size, "times_fuzzylite",
+			 json_number(against_peer(b, i)), "peer",
+			 a->kind == ARITHMETIC_PEER, "failed", failed);
+}
+
+static void print_json(const struct bench *b, const struct incise_model *model)
+{
+	json_t *rows = json_array();
+
+	for (int i = 0; i < b->all.n; i++)
+		json_array_append_new(rows, row_json(b, i));
+	json_print(json_pack(
+		"{ss si si si so ss? so}", "model", incise_model_name(model), "rules",
+		incise_model_n_rules(model), "points", (int)b->points.n, "repeats",
+		b->repeats, "machine", machine_json(&b->machine), "fuzzylite_version",
+		*b->all.peer_version ? b->all.peer_version : NULL, "rows", rows));
+}
+
+/* ---- the work-precision chart ---- */
+
+/* A block per kind: name, ns, its percentiles, largest error, bound. */
+static void write_data(const struct bench *b, const char *folder, const char *name)
+{
+	char *data;
+	FILE *out;
+
+	if (asprintf(&data, "%s.dat", name) < 0)
+		cli_fail("no memory");
+	out = picture_data(folder, data);
+	free(data);
+	for (int kind = 0; kind < ARITHMETIC_KINDS; kind++) {
+		/* A block without points would shift the numbers of those behind it. */
+		fputs("none NaN NaN NaN NaN NaN\n", out);
+		for (int i = 0; i < b->all.n; i++) {
+			const struct figures *f = &b->figures[i];
+
+			if (b->all.row[i].kind != (enum arithmetic_kind)kind ||
+			    isnan(f->ns))
+				continue;
+			/* An error of 0 has no place on a logarithmic axis. */
+			fprintf(out, "%s %g %g %g %g %g\n", b->all.row[i].name, f->ns,
+				f->ns_p5, f->ns_p95, fmax(f->max_error, 1e-18), f->bound);
+		}
+		fputs("\n\n", out);
+	}
+	picture_data_end(out, folder);
+}
+
+static void draw(const struct bench *b, const struct incise_model *model,
+		 const char *folder, const char *name)
+{
+	static const char *const titles[ARITHMETIC_KINDS] = {
+		"floating point",     "fixed, direct", "fixed, tables of weights",
+		"fixed, force table", "batch",	       "fuzzylite"};
+	double least = INFINITY, most = 0;
+	FILE *script;
+
+	/* With room for the last label. */
+	for (int i = 0; i < b->all.n; i++) {
+		least = fmin(least, b->figures[i].ns);
+		most = fmax(most, b->figures[i].ns);
+	}
+	write_data(b, folder, name);
+	script = picture_begin(folder, name, 1100, 800);
+	fprintf(script,
+		"set title \"Error over run time, %d rules\\n%s, %s\"\n"
+		"set xlabel 'time per evaluation / ns (bars: 5 to 95 %% of the runs)'\n"
+		"set ylabel 'largest error / N (thin lines: up to the certified bound)'\n"
+		"set logscale xy\nset format y '%%.0e'\nset xrange [%g:%g]\n"
+		"set yrange [*:*] extend\nset offsets 0, 0, graph 0.1, graph 0.05\n"
+		"set key outside bottom center horizontal\ndata = '%s.dat'\nplot \\\n",
+		incise_model_n_rules(model), b->machine.cpu, b->machine.kernel,
+		least / 1.5, most * 3, name);
+	for (int kind = 0; kind < ARITHMETIC_KINDS; kind++) {
+		const char *style = kind == ARITHMETIC_PEER ? "lc rgb 'black'" : "ls";
+		char number[4] = "";
+
+		if (kind != ARITHMETIC_PEER)
+			snprintf(number, sizeof(number), " %d", kind + 1);
+		fprintf(script,
+			"  data index %d using 2:5:(0):($6-$5) with vectors nohead %s%s lw 0.5, "
+			"\\\n"
+			"  '' index %d using 2:5:3:4 with xerrorbars %s%s pt 7 ps 0.8 "
+			"title '%s', \\\n"
+			"  '' index %d using 2:5:1 with labels left rotate by 25 offset 0.5,0.3 font ',8',  "
+			"\\\n",
+			kind, style, number, kind, style, number, titles[kind], kind);
+	}
+	fputs("  NaN\n", script);
+	if (!picture_draw(script, folder, name))
+		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
+}
+
 int main(int argc, char **argv)
 {
-	static double (*const evals[])(const struct bench *, int) = {eval_double,
-								     eval_fixed};
-	struct row rows[] = {{.name = "double_libm"}, {.name = "fixed_direct"}};
-	static double times[2][REPEATS];
+	const char *plot = NULL, *folder, *name;
 	struct incise_error err = {0};
 	struct bench *b = calloc(1, sizeof(*b));
-	volatile double sink = 0;
-	json_t *list = json_array();
-	bool json = false;
+	struct incise_model *model;
+	bool json = false, quick = false;
 	int opt;
 
 	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
-		if (opt == OPT_JSON)
+		switch (opt) {
+		case OPT_JSON:
 			json = true;
+			break;
+		case OPT_PLOT:
+			plot = optarg;
+			break;
+		case OPT_QUICK:
+			quick = true;
+			break;
+		}
 	if (optind >= argc || strcmp(argv[optind], "precision") || argc - optind > 2)
 		cli_usage("expected 'precision' and at most one model");
 	if (!b)
 		cli_fail("no memory");
-	b->model = argc - optind == 2 ? incise_model_load(argv[optind + 1], &err)
-				      : own_model();
-	if (!b->model)
+	if (plot)
+		picture_place("plot", plot, &folder, &name);
+	model = argc - optind == 2 ? incise_model_load(argv[optind + 1], &err)
+				   : own_model();
+	if (!model)
 		cli_fail_with(&err);
-	b->fixed = incise_fixed_compile(b->model, NULL, &err);
-	if (!b->fixed)
-		cli_fail_with(&err);
-	fill(b);
-	for (int i = 0; i < 2; i++) {
-		double sum = 0;
-
-		for (int k = 0; k < POINTS; k++) {
-			double e = fabs(evals[i](b, k) - b->truth[k]);
-
-			rows[i].max_error_N = fmax(rows[i].max_error_N, e);
-			sum += e * e / POINTS;
-		}
-		rows[i].rms_error_N = sqrt(sum);
-	}
-	/* Interleaved, so that a busy moment of the machine meets both. */
-	for (int rep = 0; rep < REPEATS; rep++)
-		for (int i = 0; i < 2; i++) {
-			double begin = now_ns();
-
-			for (int k = 0; k < POINTS; k++)
-				sink += evals[i](b, k);
-			times[i][rep] = (now_ns() - begin) / POINTS;
-		}
-	if (!json)
-		printf("%-14s %10s %12s %12s   (median of %d runs of %d points)\n",
-		       "arithmetic", "ns", "largest / N", "rms / N", REPEATS, POINTS);
-	for (int i = 0; i < 2; i++) {
-		qsort(times[i], REPEATS, sizeof(double), by_value);
-		rows[i].ns = times[i][REPEATS / 2];
-		if (!json)
-			printf("%-14s %10.1f %12.3g %12.3g\n", rows[i].name, rows[i].ns,
-			       rows[i].max_error_N, rows[i].rms_error_N);
-		json_array_append_new(list, json_pack("{ss sf sf sf so}", "name",
-						      rows[i].name, "ns", rows[i].ns,
-						      "max_error_N", rows[i].max_error_N,
-						      "rms_error_N", rows[i].rms_error_N,
-						      "bound_N", json_null()));
-	}
+	b->repeats = quick ? QUICK_REPEATS : REPEATS;
+	machine_init(&b->machine);
+	arithmetics_init(&b->all, model);
+	points_init(&b->points, model, quick ? TIMED_POINTS : POINTS);
+	measure_errors(b);
+	measure_times(b);
 	if (json)
-		json_print(json_pack("{so}", "rows", list));
+		print_json(b, model);
 	else
-		json_decref(list);
+		print_table(b, model);
 	cli_finish();
-	incise_model_free(b->model);
+	if (plot)
+		draw(b, model, folder, name);
+	/* Arithmetics and points live as long as the program. */
+	incise_model_free(model);
 	free(b);
 	return 0;
 }

@@ -5,8 +5,12 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include "cli.h"
 #include "picture.h"
+
+#define NAME_CHARACTERS \
+	"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-"
 
 static char *plot_path(const char *folder, const char *name, const char *suffix)
 {
@@ -15,6 +19,44 @@ static char *plot_path(const char *folder, const char *name, const char *suffix)
 	if (asprintf(&path, "%s/plot/%s%s", folder, name, suffix) < 0)
 		cli_fail("no memory");
 	return path;
+}
+
+static void make_folders(char *path)
+{
+	for (char *slash = path; slash; *slash = '/') {
+		slash = strchr(slash + 1, '/');
+		if (slash)
+			*slash = 0;
+		if (mkdir(path, 0777) && errno != EEXIST)
+			cli_fail("%s: %s", path, strerror(errno));
+		if (!slash)
+			break;
+	}
+}
+
+void picture_place(const char *option, const char *path, const char **folder,
+		   const char **name)
+{
+	const char *slash = strrchr(path, '/'), *last = slash ? slash + 1 : path;
+	size_t n = strlen(last);
+	char *plot;
+
+	if (n > 4 && (!strcmp(last + n - 4, ".png") || !strcmp(last + n - 4, ".svg")))
+		n -= 4;
+	/* The name stands in a script and in a command. */
+	if (!n || *last == '.' || strspn(last, NAME_CHARACTERS) != strlen(last))
+		cli_usage("--%s: '%s' is no name for a picture: letters, digits, '.', "
+			  "'_' and '-'",
+			  option, last);
+	if (!picture_possible())
+		cli_fail("gnuplot is not installed, it draws the pictures: apt-get "
+			 "install gnuplot-nox");
+	*name = strndup(last, n);
+	*folder = slash ? strndup(path, slash > path ? (size_t)(slash - path) : 1) : ".";
+	if (!*name || !*folder || asprintf(&plot, "%s/plot", *folder) < 0)
+		cli_fail("no memory");
+	make_folders(plot);
+	free(plot);
 }
 
 bool picture_possible(void)

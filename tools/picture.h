@@ -11,6 +11,14 @@
 #include <stdbool.h>
 #include <stdio.h>
 
+/*
+ * Where a picture that the user named shall go: "a/b/name", perhaps with .png or .svg, as
+ * folder "a/b" and "name". Makes both folders that are missing, and fails the program when
+ * there is no gnuplot, or the name cannot be. Both strings live as long as the program.
+ */
+void picture_place(const char *option, const char *path, const char **folder,
+		   const char **name);
+
 /* Whether gnuplot is there. */
 bool picture_possible(void);
 

@@ -549,9 +549,10 @@ static int choose(struct image *best, const struct incise_grid *grid,
 				rc = built;
 				goto out;
 			}
+			/* What went wrong last counts if all did. */
+			rc = rc && built ? built : 0;
 			if (built)
 				continue;
-			rc = 0;
 			if (image.bound >= best->bound) {
 				free(image.data);
 				continue;
@@ -596,6 +597,12 @@ struct incise_fixed *incise_fixed_compile(const struct incise_model *model,
 	rc = choose(&best, grid, &o, model);
 	if (rc == -ENOMEM)
 		incise_error_set(err, ENOMEM, "no memory to compile a model");
+	else if (rc == -E2BIG)
+		incise_error_set(
+			err, E2BIG,
+			"fixed point: a force table of so many cells exceeds %d bytes; ask for "
+			"fewer, or for the arithmetic 'table'",
+			FORCE_SIZE_MAX);
 	else if (rc)
 		incise_error_set(
 			err, ERANGE,
