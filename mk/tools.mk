@@ -7,7 +7,8 @@ tool_shared := $(addprefix $(O)/obj/tools/,cli.o json.o)
 
 $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 
-extra_demo := $(O)/obj/tools/picture.o
+extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
+extra_info := $(extra_demo)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o arithmetics.o machine.o)
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,

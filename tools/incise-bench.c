@@ -232,10 +232,11 @@ static void print_json(const struct bench *b, const struct incise_model *model)
 	for (int i = 0; i < b->all.n; i++)
 		json_array_append_new(rows, row_json(b, i));
 	json_print(json_pack(
-		"{ss si si si so ss? so}", "model", incise_model_name(model), "rules",
-		incise_model_n_rules(model), "points", (int)b->points.n, "repeats",
-		b->repeats, "machine", machine_json(&b->machine), "fuzzylite_version",
-		*b->all.peer_version ? b->all.peer_version : NULL, "rows", rows));
+		"{so si si si so ss? so}", "model", json_text(incise_model_name(model)),
+		"rules", incise_model_n_rules(model), "points", (int)b->points.n,
+		"repeats", b->repeats, "machine", machine_json(&b->machine),
+		"fuzzylite_version", *b->all.peer_version ? b->all.peer_version : NULL,
+		"rows", rows));
 }
 
 /* ---- the work-precision chart ---- */

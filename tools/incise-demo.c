@@ -28,6 +28,7 @@
 #include <incise/version.h>
 #include "cli.h"
 #include "json.h"
+#include "model_picture.h"
 #include "picture.h"
 
 enum { OPT_SEED = CLI_LONG, OPT_LOOP, OPT_FORCE, OPT_JSON };
@@ -285,50 +286,24 @@ static void figure_force(void)
 
 /* ---- Figure 3: membership functions and the force surface ---- */
 
-static void write_mfs(const char *name, const struct incise_model *model)
-{
-	FILE *data = picture_data(folder, name);
-
-	for (int i = 0; i < 2; i++) {
-		const struct incise_variable *v = incise_model_input(model, i);
-
-		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
-			for (int s = 0; s <= 200; s++) {
-				double x = v->min + (v->max - v->min) * s / 200;
-
-				fprintf(data, "%g %g\n", x,
-					incise_mf_eval(incise_model_mf(model, i, k), x));
-			}
-			fputs("\n\n", data);
-		}
-	}
-	picture_data_end(data, folder);
-}
-
 static void figure_membership(const struct incise_model *model)
 {
+	static const char *const names[] = {"NB NS Z PS PB", "NB NS PS PB"};
 	struct incise_model *before = read_model("liver-initial.fis");
-	int n = incise_model_n_mfs(model, 0), m = incise_model_n_mfs(model, 1);
 	FILE *script;
 
-	write_mfs("membership-before.dat", before);
-	write_mfs("membership-after.dat", model);
+	model_picture_functions(before, folder, "membership-before.dat");
+	model_picture_functions(model, folder, "membership-after.dat");
 	script = picture_begin(folder, "fig3a-membership", 1200, 700);
 	fputs("set multiplot layout 2,2 title 'Membership functions before and after training "
-	      "(as paper 1, fig. 3a)'\nset yrange [0:1.1]\nset ylabel 'degree'\n"
-	      "set key outside right center\n"
-	      "depth = 'NB NS Z PS PB'\nvelocity = 'NB NS PS PB'\n",
+	      "(as paper 1, fig. 3a)'\nset key outside right center\n",
 	      script);
-	for (int after = 0; after < 2; after++)
-		for (int i = 0; i < 2; i++)
-			fprintf(script,
-				"set title '%s training'\nset xlabel '%s'\n"
-				"plot for [k=%d:%d] 'membership-%s.dat' index k using 1:2 with "
-				"lines ls (k-%d+1) lw 2 title word(%s, k-%d+1)\n",
-				after ? "after" : "before",
-				i ? "velocity / (mm/s)" : "depth / mm", i ? n : 0,
-				i ? n + m - 1 : n - 1, after ? "after" : "before",
-				i ? n : 0, i ? "velocity" : "depth", i ? n : 0);
+	for (int i = 0; i < 2; i++)
+		model_picture_plot_functions(script, before, i, "membership-before.dat",
+					     "before training", names[i]);
+	for (int i = 0; i < 2; i++)
+		model_picture_plot_functions(script, model, i, "membership-after.dat",
+					     "after training", names[i]);
 	fputs("unset multiplot\n", script);
 	draw(script, "fig3a-membership");
 	incise_model_free(before);
@@ -336,29 +311,14 @@ static void figure_membership(const struct incise_model *model)
 
 static void figure_surface(const struct incise_model *model)
 {
-	const struct incise_variable *d = incise_model_input(model, 0);
-	const struct incise_variable *v = incise_model_input(model, 1);
-	FILE *data = picture_data(folder, "surface.dat");
 	FILE *script;
 
-	for (int i = 0; i <= 40; i++, fputc('\n', data))
-		for (int j = 0; j <= 40; j++) {
-			double x[] = {d->min + (d->max - d->min) * i / 40,
-				      v->min + (v->max - v->min) * j / 40};
-
-			fprintf(data, "%g %g %g\n", x[0], x[1],
-				incise_model_eval(model, x, NULL));
-		}
-	picture_data_end(data, folder);
+	model_picture_surface(model, folder, "surface.dat");
 	script = picture_begin(folder, "fig3b-surface", 1000, 800);
-	fputs("set title 'Force of the trained model (as paper 1, fig. 3b); dots: the averaged "
-	      "pairs'\nset xlabel 'depth / mm'\nset ylabel 'velocity / (mm/s)'\n"
-	      "set zlabel 'force / N' rotate parallel\nset ticslevel 0\nset view 55,320\n"
-	      "set palette rgbformulae 33,13,10\nset cblabel 'force / N'\n"
-	      "set pm3d border lc rgb '#555555' lw 0.3\n"
-	      "splot 'surface.dat' with pm3d, "
-	      "\\\n  'pairs.dat' with points pt 7 ps 0.6 lc rgb 'black'\n",
-	      script);
+	model_picture_plot_surface(
+		script, model, "surface.dat",
+		"Force of the trained model (as paper 1, fig. 3b); dots: the averaged pairs",
+		", \\\n  'pairs.dat' with points pt 7 ps 0.6 lc rgb 'black'");
 	draw(script, "fig3b-surface");
 }
 

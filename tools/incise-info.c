@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise info FILE: what a model or a recording holds.
+ * incise info FILE: what a model, a compiled model or a recording holds.
  */
 #include <errno.h>
 #include <getopt.h>
@@ -13,18 +13,23 @@
 #include <incise/recording.h>
 #include "cli.h"
 #include "json.h"
+#include "model_picture.h"
+#include "picture.h"
 
-enum { OPT_JSON = CLI_LONG };
+enum { OPT_JSON = CLI_LONG, OPT_PLOT };
 
 static const struct cli_option options[] = {
 	{OPT_JSON, "json", NULL, "report as JSON"},
+	{OPT_PLOT, "plot", "NAME",
+	 "of a .fis: draw the membership functions and the force\n"
+	 "surface as NAME.png and NAME.svg"},
 	{0},
 };
 
 static const struct cli_verb verb = {
 	.name = "info",
-	.synopsis = "MODEL.fis|NAME.rec [OPTIONS]",
-	.summary = "Say what a model or a recording holds.",
+	.synopsis = "MODEL.fis|MODEL.fx|NAME.rec [OPTIONS]",
+	.summary = "Say what a model, a compiled model or a recording holds.",
 	.options = options,
 	.notes = "Exit: 0 shown, 1 failed, 2 bad usage. See incise-info(1).",
 };
@@ -54,10 +59,50 @@ static const char *and_method(const struct incise_model *model)
 	return incise_model_and_method(model) == INCISE_AND_MIN ? "min" : "prod";
 }
 
-static void model_json(const struct incise_model *model, const char *refused)
+/* Cells per input, empty where the arithmetic has none. */
+static json_t *cells_json(const struct incise_fixed *fx)
+{
+	json_t *cells = json_array();
+
+	for (int i = 0; i < fx->n_inputs && fx->input[i].cells; i++)
+		json_array_append_new(cells, json_integer(fx->input[i].cells));
+	return cells;
+}
+
+/* "table, 316 x 362 cells, 21148 bytes, error certified to 0.059 mN" */
+static void put_fixed(const struct incise_fixed *fx)
+{
+	printf("%s", incise_fixed_arithmetic_name(fx->arithmetic));
+	for (int i = 0; i < fx->n_inputs && fx->input[i].cells; i++)
+		printf(i ? " x %d" : ", %d", fx->input[i].cells);
+	printf("%s, %u bytes, error certified to %.3g mN\n",
+	       fx->input[0].cells ? " cells" : "", fx->size,
+	       incise_fixed_bound(fx) * 1e3);
+}
+
+/* What the default budget makes of a model; keys are null where it is refused. */
+static void add_fixed_json(json_t *report, const struct incise_fixed *fx,
+			   const char *refused)
+{
+	json_object_set_new(report, "fixed_point", json_boolean(fx != NULL));
+	json_object_set_new(report, "fixed_point_refused",
+			    fx ? json_null() : json_string(refused));
+	json_object_set_new(report, "fixed_point_arithmetic",
+			    fx ? json_string(incise_fixed_arithmetic_name(fx->arithmetic))
+			       : json_null());
+	json_object_set_new(report, "fixed_point_cells",
+			    fx ? cells_json(fx) : json_null());
+	json_object_set_new(report, "fixed_point_size_bytes",
+			    fx ? json_integer(fx->size) : json_null());
+	json_object_set_new(report, "fixed_point_bound_N",
+			    fx ? json_number(incise_fixed_bound(fx)) : json_null());
+}
+
+static void model_json(const struct incise_model *model, const struct incise_fixed *fx,
+		       const char *refused)
 {
 	const struct incise_variable *out = incise_model_output(model);
-	json_t *inputs = json_array(), *rules = json_array();
+	json_t *inputs = json_array(), *rules = json_array(), *report;
 
 	for (int i = 0; i < incise_model_n_inputs(model); i++)
 		json_array_append_new(inputs, input_json(model, i));
@@ -74,15 +119,16 @@ static void model_json(const struct incise_model *model, const char *refused)
 			rules, json_pack("{so so sf}", "mfs", mfs, "consequent", p,
 					 "weight", incise_model_rule_weight(model, r)));
 	}
-	json_print(json_pack(
-		"{ss so so s{so sf sf} ss so sb so}", "kind", "model", "name",
-		json_text(incise_model_name(model)), "inputs", inputs, "output", "name",
-		json_text(out->name), "min", out->min, "max", out->max, "and_method",
-		and_method(model), "rules", rules, "fixed_point", !refused,
-		"fixed_point_refused", refused ? json_text(refused) : json_null()));
+	report = json_pack("{ss so so s{so sf sf} ss so}", "kind", "model", "name",
+			   json_text(incise_model_name(model)), "inputs", inputs,
+			   "output", "name", json_text(out->name), "min", out->min, "max",
+			   out->max, "and_method", and_method(model), "rules", rules);
+	add_fixed_json(report, fx, refused);
+	json_print(report);
 }
 
-static void model_text(const struct incise_model *model, const char *refused)
+static void model_text(const struct incise_model *model, const struct incise_fixed *fx,
+		       const char *refused)
 {
 	const struct incise_variable *v = incise_model_output(model);
 	int n = incise_model_n_inputs(model);
@@ -117,24 +163,109 @@ static void model_text(const struct incise_model *model, const char *refused)
 			printf("  weight %.6g", incise_model_rule_weight(model, r));
 		putchar('\n');
 	}
-	printf("fixed point: %s\n", refused ? refused : "fits");
+	printf("fixed point: ");
+	if (fx)
+		put_fixed(fx);
+	else
+		puts(refused);
 }
 
-static void show_model(const char *path, bool json)
+static void show_model(const char *path, bool json, const char *plot)
 {
 	struct incise_error err = {0}, refused = {0};
-	struct incise_model *model = incise_model_load(path, &err);
+	const char *folder, *name;
+	struct incise_model *model;
 	struct incise_fixed *fixed;
 
+	if (plot)
+		picture_place("plot", plot, &folder, &name);
+	model = incise_model_load(path, &err);
 	if (!model)
 		cli_fail_with(&err);
 	fixed = incise_fixed_compile(model, NULL, &refused);
-	incise_fixed_free(fixed);
 	if (json)
-		model_json(model, refused.code ? refused.text : NULL);
+		model_json(model, fixed, refused.text);
 	else
-		model_text(model, refused.code ? refused.text : NULL);
+		model_text(model, fixed, refused.text);
+	cli_finish();
+	if (plot)
+		model_picture_draw(model, folder, name);
+	incise_fixed_free(fixed);
 	incise_model_free(model);
+}
+
+static void compiled_json(const struct incise_fixed *fx)
+{
+	json_t *inputs = json_array();
+
+	for (int i = 0; i < fx->n_inputs; i++) {
+		const struct incise_fixed_input *in = &fx->input[i];
+
+		json_array_append_new(
+			inputs, json_pack("{so sf sf si}", "name", json_text(in->name),
+					  "min", in->min / (double)INCISE_FIXED_ONE,
+					  "max", in->max / (double)INCISE_FIXED_ONE,
+					  "n_mfs", (int)in->n_mfs));
+	}
+	json_print(json_pack("{ss so so s{so} si ss so s[ii] si sf}", "kind", "compiled",
+			     "name", json_text(fx->name), "inputs", inputs, "output",
+			     "name", json_text(fx->output), "n_rules", (int)fx->n_rules,
+			     "arithmetic", incise_fixed_arithmetic_name(fx->arithmetic),
+			     "cells", cells_json(fx), "format_bits", (int)fx->shift_a,
+			     (int)fx->shift_b, "size_bytes", (int)fx->size, "bound_N",
+			     incise_fixed_bound(fx)));
+}
+
+/* What the two formats of an arithmetic are of; see lib/fixed/layout.h. */
+static void put_formats(const struct incise_fixed *fx)
+{
+	static const char *const of[][2] = {
+		[INCISE_FIXED_DIRECT] = {"consequents", "rule outputs"},
+		[INCISE_FIXED_TABLE] = {"outputs", "slopes"},
+		[INCISE_FIXED_FORCE] = {"outputs", NULL},
+	};
+	const char *const *names = of[fx->arithmetic];
+	bool both =
+		names[1] && !(fx->arithmetic == INCISE_FIXED_TABLE && fx->n_inputs == 1);
+
+	printf("formats  inputs and output Q16.16, %s Q%d", names[0], fx->shift_a);
+	if (both)
+		printf(", %s Q%d", names[1], fx->shift_b);
+	putchar('\n');
+}
+
+static void compiled_text(const struct incise_fixed *fx)
+{
+	printf("compiled model %s: %d rules, %d inputs, output %s\n", fx->name,
+	       fx->n_rules, fx->n_inputs, fx->output);
+	for (int i = 0; i < fx->n_inputs; i++) {
+		const struct incise_fixed_input *in = &fx->input[i];
+
+		printf("input %s, support %.10g to %.10g, %d functions", in->name,
+		       in->min / (double)INCISE_FIXED_ONE,
+		       in->max / (double)INCISE_FIXED_ONE, in->n_mfs);
+		if (in->cells)
+			printf(", %d cells of %g", in->cells,
+			       (double)(1u << in->cell_shift) / INCISE_FIXED_ONE);
+		putchar('\n');
+	}
+	put_formats(fx);
+	printf("fixed point: ");
+	put_fixed(fx);
+}
+
+static void show_compiled(const char *path, bool json)
+{
+	struct incise_error err = {0};
+	struct incise_fixed *fx = incise_fixed_load(path, &err);
+
+	if (!fx)
+		cli_fail_with(&err);
+	if (json)
+		compiled_json(fx);
+	else
+		compiled_text(fx);
+	incise_fixed_free(fx);
 }
 
 static void recording_json(const struct incise_recording_info *info)
@@ -205,24 +336,46 @@ static void check_exists(const char *path)
 	struct stat st;
 
 	if (strcmp(path, "-") && stat(path, &st))
-		cli_fail("%s: %s; give a model (.fis) or a recording (NAME.rec)", path,
-			 strerror(errno));
+		cli_fail("%s: %s; give a model (.fis, .fx) or a recording (NAME.rec)",
+			 path, strerror(errno));
+}
+
+static bool is_compiled(const char *path)
+{
+	size_t n = strlen(path);
+
+	return n > 3 && !strcmp(path + n - 3, ".fx");
 }
 
 int main(int argc, char **argv)
 {
+	const char *path, *plot = NULL;
 	bool json = false;
 	int opt;
 
 	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
-		if (opt == OPT_JSON)
+		switch (opt) {
+		case OPT_JSON:
 			json = true;
+			break;
+		case OPT_PLOT:
+			plot = optarg;
+			break;
+		}
 	if (optind + 1 != argc)
 		cli_usage("expected one file, got %d", argc - optind);
-	if (is_recording(argv[optind]))
-		show_recording(argv[optind], json);
-	else
-		check_exists(argv[optind]), show_model(argv[optind], json);
+	path = argv[optind];
+	if (plot && (is_recording(path) || is_compiled(path)))
+		cli_usage("--plot draws a model, MODEL.fis");
+	if (is_recording(path)) {
+		show_recording(path, json);
+	} else {
+		check_exists(path);
+		if (is_compiled(path))
+			show_compiled(path, json);
+		else
+			show_model(path, json, plot);
+	}
 	cli_finish();
 	return 0;
 }

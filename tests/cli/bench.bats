@@ -3,43 +3,131 @@
 
 load cli
 
+names="double_libm double_separable double_library float fixed_direct fixed_table_64 \
+	fixed_table_1024 fixed_table force_table_32 force_table batch batch_force"
+
 setup() {
 	work_folder
 }
 
-@test "bench precision measures a model of its own" {
-	run -0 --separate-stderr incise bench precision
+# A value of the row with a name: row r.json fixed_table bound_N.
+row() {
+	local k
+	k=$(sqlite3 :memory: "SELECT key FROM json_each(readfile('$1'), '\$.rows')
+		WHERE json_extract(value, '\$.name') = '$2'")
+	[ -n "$k" ] || complain "no row $2" || return
+	key "$1" "rows[$k].$3"
+}
+
+@test "bench precision measures a model of its own, and says where" {
+	run -0 --separate-stderr incise bench precision --quick
 	[ -z "$stderr" ]
-	[[ "$output" == *double_libm* ]]
-	[[ "$output" == *fixed_direct* ]]
+	[[ "${lines[0]}" == "model incise, 20 rules; "* ]]
+	[[ "${lines[1]}" == *"$(uname -r)"* ]]
+	for name in $names; do
+		[[ "$output" == *$'\n'"$name "* ]]
+	done
 }
 
 @test "bench precision reports as JSON" {
-	incise bench precision --json >r.json
-	for name in double_libm fixed_direct; do
-		row=$(sqlite3 :memory: "SELECT key FROM json_each(readfile('r.json'), '\$.rows')
-			WHERE json_extract(value, '\$.name') = '$name'")
-		[ -n "$row" ]
-		holds "$(key r.json "rows[$row].ns") > 0"
-		holds "$(key r.json "rows[$row].rms_error_N") <= $(key r.json "rows[$row].max_error_N")"
-		key r.json "rows[$row].bound_N" # there, perhaps null
-		errors+=("$(key r.json "rows[$row].max_error_N")")
+	incise bench precision --quick --json >r.json
+	for name in $names; do
+		[ -z "$(row r.json $name failed)" ]
+		holds "$(row r.json $name ns) > 0"
+		holds "$(row r.json $name ns_p5) <= $(row r.json $name ns)"
+		holds "$(row r.json $name ns) <= $(row r.json $name ns_p95)"
+		holds "$(row r.json $name rms_error_N) <= $(row r.json $name max_error_N)"
+		[ "$(row r.json $name peer)" = 0 ]
 	done
-	# double: some roundings of 3 N; fixed: half an LSB of 15 uN and more, under 1 mN
-	holds "${errors[0]} < 1e-13"
-	holds "${errors[1]} > 7e-6 && ${errors[1]} < 1e-3"
+	for name in double_libm double_separable double_library float; do
+		[ -z "$(row r.json $name bound_N)" ]
+	done
+	for name in fixed_direct fixed_table fixed_table_64 force_table batch batch_force; do
+		holds "$(row r.json $name max_error_N) <= $(row r.json $name bound_N)"
+		holds "$(row r.json $name size_bytes) > 288" # more than the header
+	done
+	# double: some roundings of 3 N; float: the same, in 24 bits
+	holds "$(row r.json double_libm max_error_N) < 1e-13"
+	holds "$(row r.json double_separable max_error_N) < 1e-13"
+	holds "$(row r.json double_library max_error_N) < 1e-13"
+	holds "$(row r.json float max_error_N) > 1e-8 && $(row r.json float max_error_N) < 1e-5"
+	# half an LSB of the output is 7.6 uN; the default budget 0.1 mN
+	holds "$(row r.json fixed_table max_error_N) > 5e-6"
+	holds "$(row r.json fixed_table bound_N) <= 1e-4"
+	# a quarter of the width is a sixteenth of the error, less what rounding adds
+	holds "$(row r.json fixed_table_1024 bound_N) < $(row r.json fixed_table_64 bound_N) / 10"
+	# the same model, to the bit
+	[ "$(row r.json batch max_error_N)" = "$(row r.json fixed_table max_error_N)" ]
+	[ "$(row r.json batch rms_error_N)" = "$(row r.json fixed_table rms_error_N)" ]
+	[ "$(row r.json batch_force rms_error_N)" = "$(row r.json force_table rms_error_N)" ]
+	[ -n "$(key r.json machine.cpu)" ]
+	[ -n "$(key r.json machine.compiler)" ]
+	[[ "$(key r.json machine.kernel)" == *"$(uname -r)"* ]]
+}
+
+@test "bench precision lists what fails, and why" {
+	incise bench precision --quick --json >r.json
+	# 256 x 256 cells and more are over 256 KiB
+	[[ "$(row r.json force_table_256 failed)" == *bytes* ]]
+	[ -z "$(row r.json force_table_256 ns)" ]
+	[ -z "$(row r.json force_table_256 max_error_N)" ]
+	run -0 --separate-stderr incise bench precision --quick
+	[[ "$output" == *"force_table_256: fixed point: a force table of so many cells"* ]]
+}
+
+@test "bench precision has fuzzylite as a row, or says why not" {
+	incise bench precision --quick --json >r.json
+	if [ -e "$INCISE_BUILD/lib/incise/peer_fuzzylite.so" ]; then
+		[ "$(row r.json fuzzylite peer)" = 1 ]
+		[ -n "$(key r.json fuzzylite_version)" ]
+		holds "$(row r.json fuzzylite ns) > 0"
+		[ "$(row r.json fuzzylite times_fuzzylite)" = 1.0 ]
+		# it takes numbers within 1e-6 as equal, and the force is up to 3 N
+		holds "$(row r.json fuzzylite max_error_N) < 1e-4"
+	else
+		[[ "$(row r.json fuzzylite failed)" == \
+			"not built in: libfuzzylite-dev was absent" ]]
+		[ -z "$(row r.json fuzzylite ns)" ]
+	fi
+}
+
+@test "bench precision draws a chart" {
+	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
+	run -0 --separate-stderr incise bench precision --quick --plot "a folder/b/chart"
+	[ -z "$stderr" ]
+	[ "$(head -c 8 "a folder/b/chart.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
+	grep -q '<svg' "a folder/b/chart.svg"
+	# one text per measured row at least
+	for name in double_libm fixed_table_64 force_table batch; do
+		grep -q ">$name<" "a folder/b/chart.svg"
+	done
+	[ -f "a folder/b/plot/chart.gp" ]
+	# into the current folder, and with a suffix
+	incise bench precision --quick --plot c.svg >/dev/null
+	[ -f c.png ] && [ -f c.svg ] && [ ! -e c.svg.svg ]
 }
 
 @test "bench precision measures a model of mine" {
 	made_pairs >pairs.csv
 	incise train pairs.csv -o m.fis 2>/dev/null
-	incise bench precision m.fis --json >r.json
-	holds "$(key r.json 'rows[0].max_error_N') < 1e-3"
+	incise bench precision m.fis --quick --json >r.json
+	[ "$(key r.json rules)" = 20 ]
+	holds "$(row r.json fixed_table max_error_N) < 1e-4"
 	run --separate-stderr incise bench precision none.fis
 	failed_with none.fis
 	incise train pairs.csv --mf-type gbellmf -o bell.fis 2>/dev/null
 	run --separate-stderr incise bench precision bell.fis
 	failed_with gbellmf
+}
+
+@test "bench precision measures a model of one input" {
+	awk 'BEGIN { print "depth_mm,force_N"
+		for (i = 0; i <= 60; i++) print i / 3 "," i * i / 2000 }' >pairs.csv
+	incise train pairs.csv --inputs depth_mm -o m.fis 2>/dev/null
+	incise bench precision m.fis --quick --json >r.json
+	for name in $names; do
+		holds "$(row r.json $name ns) > 0"
+	done
 }
 
 @test "bench: bad usage" {
@@ -49,4 +137,8 @@ setup() {
 	bad_usage "'precision'"
 	run --separate-stderr incise bench precision a b
 	bad_usage "at most one model"
+	for name in "" a/ a/.png "a'b" 'a;b' '$(id)' 'a b'; do
+		run --separate-stderr incise bench precision --quick --plot "$name"
+		bad_usage "--plot"
+	done
 }

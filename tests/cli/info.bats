@@ -23,7 +23,7 @@ setup() {
 	[[ "${lines[0]}" == "model incise: 20 rules, 2 inputs, output force_N "* ]]
 	[[ "$output" == *"input depth_mm, support 0 to 20"* ]]
 	[[ "$output" == *"input velocity_mm_s, support 0 to 50"* ]]
-	[[ "${lines[-1]}" == "fixed point: fits" ]]
+	[[ "${lines[-1]}" == "fixed point: "*", error certified to "*" mN" ]]
 	[ "$(grep -c gaussmf <<<"$output")" -eq 9 ]
 	[[ "$output" == *"rules by prod "* ]]
 	[[ "$output" != *weight* ]] # all are 1
@@ -53,6 +53,11 @@ setup() {
 	[ "$(key r.json and_method)" = prod ]
 	[ "$(key r.json fixed_point)" = 1 ] # true
 	[ -z "$(key r.json fixed_point_refused)" ]
+	# what incise compile makes of it
+	incise compile m.fis -o m.fx --json >c.json
+	for name in arithmetic cells size_bytes bound_N; do
+		[ "$(key r.json fixed_point_$name)" = "$(key c.json $name)" ]
+	done
 	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '\$.rules')")" = 20 ]
 	# the file's last rule: functions 5 and 4, the constant first (12 digits are printed)
 	[ "$(key r.json 'rules[19].mfs')" = "[5,4]" ]
@@ -69,8 +74,67 @@ setup() {
 	incise info bell.fis --json >r.json
 	[ "$(key r.json fixed_point)" = 0 ]
 	[[ "$(key r.json fixed_point_refused)" == *gbellmf* ]]
+	[ -z "$(key r.json fixed_point_bound_N)" ]
 	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'),
 		'\$.inputs[0].mfs[0].params')")" = 3 ]
+}
+
+@test "info of a compiled model" {
+	for kind in direct table force; do
+		incise compile m.fis -o m.fx --arith $kind --budget 10mN --json >c.json
+		run -0 --separate-stderr incise info m.fx
+		[ -z "$stderr" ]
+		[ "${lines[0]}" = "compiled model incise: 20 rules, 2 inputs, output force_N" ]
+		[[ "${lines[1]}" == "input depth_mm, support 0 to 20, 5 functions"* ]]
+		[[ "${lines[2]}" == "input velocity_mm_s, support 0 to 50, 4 functions"* ]]
+		[[ "${lines[3]}" == "formats  inputs and output Q16.16, "* ]]
+		[[ "${lines[4]}" == "fixed point: $kind, "*" bytes, error certified to "*" mN" ]]
+		incise info --json m.fx >r.json
+		[ "$(key r.json kind)" = compiled ]
+		[ "$(key r.json name)" = incise ]
+		[ "$(key r.json 'inputs[1].name')" = velocity_mm_s ]
+		[ "$(key r.json 'inputs[1].max')" = 50.0 ]
+		[ "$(key r.json 'inputs[0].n_mfs')" = 5 ]
+		[ "$(key r.json output.name)" = force_N ]
+		[ "$(key r.json n_rules)" = 20 ]
+		holds "$(key r.json 'format_bits[0]') >= 17"
+		for name in arithmetic size_bytes bound_N; do
+			[ "$(key r.json $name)" = "$(key c.json $name)" ]
+		done
+	done
+	[ "$(key r.json cells)" = "$(key c.json cells)" ]
+	head -c 1000 m.fx >short.fx
+	run --separate-stderr incise info short.fx
+	failed_with short.fx
+}
+
+@test "info draws a model" {
+	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the picture"
+	run -0 --separate-stderr incise info m.fis --plot "my pictures/m"
+	[ -z "$stderr" ]
+	[[ "${lines[0]}" == "model incise: "* ]]
+	[ "$(head -c 8 "my pictures/m.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
+	for text in "depth / mm" "velocity / (mm/s)" "force / N" in1mf5 in2mf4; do
+		grep -qF ">$text<" "my pictures/m.svg"
+	done
+	# another kind, and names that gnuplot could take amiss
+	sed "s/Name='depth_mm'/Name='a \"b\" \`touch c\` \\\\ \$x'/; s/'in1mf1'/'x \"y'/" bell.fis >odd.fis
+	run -0 --separate-stderr incise info odd.fis --plot odd
+	[ -z "$stderr" ]
+	[ -s odd.png ] && [ -s odd.svg ] && [ ! -e c ] && [ ! -e plot/c ]
+	run --separate-stderr incise info a.rec --plot a
+	bad_usage "--plot"
+	run --separate-stderr incise info m.fis --plot "a'b"
+	bad_usage "--plot"
+}
+
+@test "names that are not UTF-8 leave JSON valid" {
+	sed "s/Name='incise'/Name='li\xffver'/" m.fis >odd.fis
+	incise info --json odd.fis >r.json
+	[ "$(key r.json name)" = "li?ver" ]
+	incise compile odd.fis -o odd.fx >/dev/null
+	incise info --json odd.fx >r.json
+	[ "$(key r.json name)" = "li?ver" ]
 }
 
 @test "info of a recording" {

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * What a model looks like; see model_picture.h.
+ */
+#include <stdlib.h>
+#include <string.h>
+#include "cli.h"
+#include "model_picture.h"
+#include "picture.h"
+
+#define SAMPLES 200 /* of a curve */
+#define MESH 40	    /* of the surface, per input */
+
+static double between(const struct incise_variable *v, int i, int n)
+{
+	return v->min + (v->max - v->min) * i / n;
+}
+
+/* A name with its unit as a title: 'depth / mm' of depth_mm. */
+static void put_label(FILE *script, const struct incise_variable *v)
+{
+	static const struct {
+		const char *suffix, *unit;
+	} units[] = {{"_mm_s", "(mm/s)"}, {"_mm", "mm"}, {"_N", "N"}, {"_s", "s"}};
+	size_t n = strlen(v->name);
+	const char *unit = NULL;
+
+	for (size_t i = 0; i < sizeof(units) / sizeof(*units) && !unit; i++) {
+		size_t suffix = strlen(units[i].suffix);
+
+		if (n <= suffix || strcmp(v->name + n - suffix, units[i].suffix))
+			continue;
+		unit = units[i].unit;
+		n -= suffix;
+	}
+	/* A file's name may hold anything: a quote would end the string, a line it all. */
+	fputc('\'', script);
+	for (size_t i = 0; i < n; i++)
+		fputc(strchr("'\\\n\r`", v->name[i]) ? ' ' : v->name[i], script);
+	fprintf(script, unit ? " / %s'" : "'", unit);
+}
+
+static void put_axis(FILE *script, const char *axis, const struct incise_variable *v)
+{
+	fprintf(script, "set %slabel ", axis);
+	put_label(script, v);
+	fputc('\n', script);
+}
+
+void model_picture_functions(const struct incise_model *model, const char *folder,
+			     const char *data)
+{
+	FILE *out = picture_data(folder, data);
+
+	for (int i = 0; i < incise_model_n_inputs(model); i++) {
+		const struct incise_variable *v = incise_model_input(model, i);
+
+		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+			for (int s = 0; s <= SAMPLES; s++) {
+				double x = between(v, s, SAMPLES);
+
+				fprintf(out, "%g %g\n", x,
+					incise_mf_eval(incise_model_mf(model, i, k), x));
+			}
+			fputs("\n\n", out);
+		}
+	}
+	picture_data_end(out, folder);
+}
+
+void model_picture_plot_functions(FILE *script, const struct incise_model *model,
+				  int input, const char *data, const char *title,
+				  const char *names)
+{
+	int first = 0, n = incise_model_n_mfs(model, input);
+
+	for (int i = 0; i < input; i++)
+		first += incise_model_n_mfs(model, i);
+	fprintf(script, "set title '%s'\nset yrange [0:1.1]\nset ylabel 'degree'\n",
+		title);
+	put_axis(script, "x", incise_model_input(model, input));
+	fputs("names = \"", script);
+	if (names)
+		fputs(names, script);
+	/* Words, as gnuplot counts them. */
+	for (int k = 0; k < n && !names; k++) {
+		for (const char *c = incise_model_mf(model, input, k)->name; *c; c++)
+			fputc(strchr("\"\\\n\r` ", *c) ? '_' : *c, script);
+		fputc(' ', script);
+	}
+	fprintf(script,
+		"\"\nplot for [k=%d:%d] '%s' index k using 1:2 with lines ls ((k-%d)%%5+1) "
+		"lw 2 title word(names, k-%d+1)\n",
+		first, first + n - 1, data, first, first);
+}
+
+void model_picture_surface(const struct incise_model *model, const char *folder,
+			   const char *data)
+{
+	const struct incise_variable *a = incise_model_input(model, 0), *b = a;
+	FILE *out = picture_data(folder, data);
+	double x[INCISE_MODEL_INPUTS_MAX];
+	int n = incise_model_n_inputs(model);
+
+	for (int i = 2; i < n; i++)
+		x[i] = between(incise_model_input(model, i), 1, 2);
+	if (n > 1)
+		b = incise_model_input(model, 1);
+	for (int i = 0; n > 1 && i <= MESH; i++, fputc('\n', out))
+		for (int j = 0; j <= MESH; j++) {
+			x[0] = between(a, i, MESH);
+			x[1] = between(b, j, MESH);
+			fprintf(out, "%g %g %g\n", x[0], x[1],
+				incise_model_eval(model, x, NULL));
+		}
+	for (int i = 0; n == 1 && i <= SAMPLES; i++) {
+		x[0] = between(a, i, SAMPLES);
+		fprintf(out, "%g %g\n", x[0], incise_model_eval(model, x, NULL));
+	}
+	picture_data_end(out, folder);
+}
+
+void model_picture_plot_surface(FILE *script, const struct incise_model *model,
+				const char *data, const char *title, const char *more)
+{
+	fprintf(script, "set title '%s'\n", title);
+	put_axis(script, "x", incise_model_input(model, 0));
+	if (incise_model_n_inputs(model) == 1) {
+		put_axis(script, "y", incise_model_output(model));
+		fprintf(script, "set yrange [*:*]\nplot '%s' with lines ls 1 lw 2%s\n",
+			data, more);
+		return;
+	}
+	put_axis(script, "y", incise_model_input(model, 1));
+	put_axis(script, "z", incise_model_output(model));
+	put_axis(script, "cb", incise_model_output(model));
+	fprintf(script,
+		"set zlabel rotate parallel\nset yrange [*:*]\nset ticslevel 0\n"
+		"set view 55,320\nset palette rgbformulae 33,13,10\n"
+		"set pm3d border lc rgb '#555555' lw 0.3\n"
+		"splot '%s' with pm3d%s\n",
+		data, more);
+}
+
+#define PANEL_WIDTH 600
+#define PANEL_HEIGHT 300
+#define SURFACE_HEIGHT 700
+
+void model_picture_draw(const struct incise_model *model, const char *folder,
+			const char *name)
+{
+	int n = incise_model_n_inputs(model), columns = n > 1 ? 2 : 1;
+	int rows = (n + columns - 1) / columns;
+	int width = 2 * PANEL_WIDTH, height = rows * PANEL_HEIGHT + SURFACE_HEIGHT;
+	double panel = (double)PANEL_HEIGHT / height;
+	char *functions, *surface;
+	FILE *script;
+
+	if (asprintf(&functions, "%s-functions.dat", name) < 0 ||
+	    asprintf(&surface, "%s-surface.dat", name) < 0)
+		cli_fail("no memory");
+	model_picture_functions(model, folder, functions);
+	model_picture_surface(model, folder, surface);
+	script = picture_begin(folder, name, width, height);
+	fputs("set multiplot\nset key outside right center\n", script);
+	for (int i = 0; i < n; i++) {
+		fprintf(script, "set size %g,%g\nset origin %g,%g\n", 1.0 / columns,
+			panel, (double)(i % columns) / columns,
+			1 - (i / columns + 1) * panel);
+		model_picture_plot_functions(script, model, i, functions, "", NULL);
+	}
+	fprintf(script, "set size 1,%g\nset origin 0,0\nunset key\n", 1 - rows * panel);
+	model_picture_plot_surface(
+		script, model, surface,
+		n > 2 ? "the other inputs at the middle of their support" : "", "");
+	fputs("unset multiplot\n", script);
+	if (!picture_draw(script, folder, name))
+		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
+	free(functions);
+	free(surface);
+}
