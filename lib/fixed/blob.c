@@ -245,6 +245,9 @@ int incise_fixed_open(struct incise_fixed *fx, const void *blob, uint32_t size)
 		.blob = blob,
 		.size = size,
 	};
+	/* Differences of formats are checked below, and must not overflow there. */
+	if (fx->shift_a < 0 || fx->shift_a > 127 || fx->shift_b < 0 || fx->shift_b > 127)
+		return BAD;
 	if (fx->n_inputs < 1 || fx->n_inputs > INCISE_FIXED_INPUTS_MAX ||
 	    head->name[sizeof(head->name) - 1] || head->output[sizeof(head->output) - 1])
 		return BAD;

@@ -11,7 +11,7 @@
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/fixed.h>
+#include "../../../lib/fixed/layout.h"
 #include "paper_model.h"
 
 #define N 100000
@@ -143,6 +143,57 @@ static void test_formats(void **state)
 	assert_true(compiled_models >= 2 * 12);
 }
 
+/* Fill a section of the blob with values of any size up to limit, often just that. */
+static void put_extremes(void *values, size_t n, int64_t limit, uint64_t *seed)
+{
+	uint32_t *to = values;
+
+	for (size_t k = 0; k < n; k++) {
+		uint32_t kind = random_bits(seed);
+		int64_t v = kind & 1 ? limit : random_bits(seed) % (limit + 1);
+
+		to[k] = incise_fx_le32((uint32_t)(kind & 2 ? -v : v));
+	}
+}
+
+/* Blobs that no compiler made, whose numbers are as large as validation lets through. */
+static void check_extreme(int n_inputs, int arithmetic, int32_t shift_a, int32_t shift_b,
+			  uint64_t seed)
+{
+	struct incise_fixed *fx = compiled(n_inputs, 5, 4, arithmetic, 8, 1), extreme;
+	struct incise_fx_header *head = malloc(fx->size);
+	uint8_t *bytes = (uint8_t *)head;
+	uint32_t data;
+	/* Half of what g + x·h may add up to, each. */
+	int64_t limit =
+		arithmetic == INCISE_FIXED_TABLE && n_inputs == 2 ? 1 << 30 : INT32_MAX;
+
+	memcpy(head, fx->blob, fx->size);
+	head->shift_a = (int32_t)incise_fx_le32((uint32_t)shift_a);
+	head->shift_b = (int32_t)incise_fx_le32((uint32_t)shift_b);
+	data = incise_fx_le32(head->data);
+	put_extremes(bytes + data, (fx->size - data) / 4, limit - (1 << 14), &seed);
+	head->crc = incise_fx_le32(
+		incise_fx_crc(bytes + INCISE_FX_CRC_FROM, fx->size - INCISE_FX_CRC_FROM));
+	assert_int_equal(incise_fixed_open(&extreme, head, fx->size), 0);
+	check(&extreme, 20000, seed);
+	free(head);
+	incise_fixed_free(fx);
+}
+
+static void test_extreme_blobs(void **state)
+{
+	for (int shift_a = 17; shift_a <= 30; shift_a++) {
+		check_extreme(1, INCISE_FIXED_TABLE, shift_a, 0, shift_a);
+		check_extreme(1, INCISE_FIXED_FORCE, shift_a, 0, shift_a);
+		check_extreme(2, INCISE_FIXED_FORCE, shift_a, 0, shift_a);
+		/* x·h, with |x| < 2^20, shifted by 20 to 62 bits: as large as g, or nothing. */
+		for (int to_g = 20; to_g <= 62; to_g += 7)
+			check_extreme(2, INCISE_FIXED_TABLE, shift_a, to_g - 16 + shift_a,
+				      to_g);
+	}
+}
+
 /* Arrays that begin at any word: 13 results, and nothing beside them. */
 static void check_shifted(const struct incise_fixed *fx, int shift_x, int shift_y)
 {
@@ -182,6 +233,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_shapes),
 		cmocka_unit_test(test_formats),
+		cmocka_unit_test(test_extreme_blobs),
 		cmocka_unit_test(test_lengths_and_alignment),
 	};
 
