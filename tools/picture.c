@@ -104,7 +104,7 @@ FILE *picture_begin(const char *folder, const char *name, int width, int height)
 		"set style line 3 lc rgb '#2e8b57' lw 1.5\n"
 		"set style line 4 lc rgb '#8e44ad' lw 1.5\n"
 		"set style line 5 lc rgb '#d68910' lw 1.5\n"
-		"set termoption noenhanced\nset grid lc rgb '#dddddd'\nset key noautotitle\n",
+		"set termoption noenhanced\nset grid lt 1 lw 1 lc rgb '#dddddd'\nset key noautotitle\n",
 		name, width, height, width, height, name);
 	return script;
 }
