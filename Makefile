@@ -55,7 +55,7 @@ uses_compile := incise
 uses_info := incise incise-record
 uses_haptic := incise
 uses_demo := incise incise-learn
-uses_bench := incise
+uses_bench := incise incise-learn
 
 all: libs tools
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench precision: error against run time of the model's arithmetics, on this
- * machine, in one run.
+ * machine, in one run. incise bench training: see bench_training.h.
  */
 #include <getopt.h>
 #include <math.h>
@@ -12,6 +12,7 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include "arithmetics.h"
+#include "bench_training.h"
 #include "cli.h"
 #include "json.h"
 #include "machine.h"
@@ -28,10 +29,11 @@ static const struct cli_option options[] = {
 
 static const struct cli_verb verb = {
 	.name = "bench",
-	.synopsis = "precision [MODEL.fis] [OPTIONS]",
+	.synopsis = "precision [MODEL.fis] | training [OPTIONS]",
 	.summary =
-		"Measure error against run time of a model's arithmetics. Without MODEL a\n"
-		"model of the paper's size (20 rules) is made.",
+		"precision: measure error against run time of a model's arithmetics. Without\n"
+		"MODEL a model of the paper's size (20 rules) is made.\n"
+		"training: measure how long training takes on data of the paper's size.",
 	.options = options,
 	.notes = "Exit: 0 measured, 1 failed, 2 bad usage. See incise-bench(1).",
 };
@@ -335,8 +337,15 @@ int main(int argc, char **argv)
 			quick = true;
 			break;
 		}
+	if (optind + 1 == argc && !strcmp(argv[optind], "training")) {
+		if (plot)
+			cli_usage("--plot goes with 'precision'");
+		bench_training(json, quick);
+		cli_finish();
+		return 0;
+	}
 	if (optind >= argc || strcmp(argv[optind], "precision") || argc - optind > 2)
-		cli_usage("expected 'precision' and at most one model");
+		cli_usage("expected 'training', or 'precision' and at most one model");
 	if (!b)
 		cli_fail("no memory");
 	if (plot)

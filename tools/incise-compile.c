@@ -3,6 +3,7 @@
  * incise compile MODEL.fis -o MODEL.fx: a model in integers, with a certified bound of
  * its error.
  */
+#include <ctype.h>
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +13,7 @@
 #include "cli.h"
 #include "json.h"
 
-enum { OPT_BUDGET = CLI_LONG, OPT_ARITH, OPT_CELLS, OPT_JSON };
+enum { OPT_BUDGET = CLI_LONG, OPT_ARITH, OPT_CELLS, OPT_C_SOURCE, OPT_JSON };
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
@@ -24,6 +25,9 @@ static const struct cli_option options[] = {
 	 "direct, table or force (default: the cheapest within the\n"
 	 "budget)"},
 	{OPT_CELLS, "cells", "N", "at least N cells per input of tables, up to 4096"},
+	{OPT_C_SOURCE, "c-source", "FILE.c",
+	 "write it as C for a microcontroller, too; FILE_eval() is the\n"
+	 "function"},
 	{OPT_JSON, "json", NULL, "report as JSON"},
 	{0},
 };
@@ -67,6 +71,33 @@ static int parse_arithmetic(const char *text)
 	cli_usage("--arith: '%s' is none of direct, table and force", text);
 }
 
+/* "out/pig liver.c" makes pig_liver: a C name of the file's own. */
+static char *symbol_of(const char *path)
+{
+	const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+	char *symbol = strndup(name, strcspn(name, "."));
+
+	if (!symbol)
+		cli_fail("no memory");
+	for (char *c = symbol; *c; c++)
+		if (!isalnum((unsigned char)*c) || (unsigned char)*c >= 0x80)
+			*c = '_';
+	if (!*symbol || isdigit((unsigned char)*symbol))
+		cli_usage("--c-source: '%s' gives no name in C: begin it with a letter",
+			  path);
+	return symbol;
+}
+
+static void write_c(const struct incise_fixed *fx, const char *path)
+{
+	struct incise_error err = {0};
+	char *symbol = symbol_of(path);
+
+	if (incise_fixed_write_c(fx, path, symbol, &err))
+		cli_fail_with(&err);
+	free(symbol);
+}
+
 static void report(const struct incise_fixed *fx, const char *model, const char *path,
 		   bool json)
 {
@@ -99,7 +130,7 @@ int main(int argc, char **argv)
 	struct incise_error err = {0};
 	struct incise_fixed *fx;
 	struct incise_model *model;
-	const char *output = NULL;
+	const char *output = NULL, *c_source = NULL;
 	bool json = false;
 	int opt;
 
@@ -117,6 +148,10 @@ int main(int argc, char **argv)
 			break;
 		case OPT_CELLS:
 			o.cells = cli_integer("cells", optarg, 1, 4096);
+			break;
+		case OPT_C_SOURCE:
+			c_source = optarg;
+			free(symbol_of(c_source));
 			break;
 		case OPT_JSON:
 			json = true;
@@ -136,6 +171,8 @@ int main(int argc, char **argv)
 		cli_fail("%s: %s", argv[optind], err.text);
 	if (incise_fixed_save(fx, output, &err))
 		cli_fail_with(&err);
+	if (c_source)
+		write_c(fx, c_source);
 	report(fx, argv[optind], output, json);
 	cli_finish();
 	incise_fixed_free(fx);

@@ -142,3 +142,13 @@ row() {
 		bad_usage "--plot"
 	done
 }
+
+@test "bench training gives both ways, as text and JSON" {
+	run -0 incise bench training --quick
+	[[ "$output" == *"classic "*"default "* ]]
+	incise bench training --quick --json >r.json
+	[ "$(key r.json rows[1].name)" = default ]
+	holds "$(key r.json rows[0].ms) > 0"
+	run -2 incise bench training --plot x
+	run -2 incise bench nothing
+}

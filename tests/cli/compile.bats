@@ -77,6 +77,30 @@ setup() {
 	failed_with absent.fis
 }
 
+@test "the C that is exported computes what the compiled model does" {
+	incise compile m.fis -o m.fx --c-source "pig liver.c"
+	cat >main.c <<-E
+		#include <inttypes.h>
+		#include <stdio.h>
+		int32_t pig_liver_eval(const int32_t *x);
+		int main(void)
+		{
+			int32_t x[2];
+
+			while (scanf("%" SCNd32 "%" SCNd32, &x[0], &x[1]) == 2)
+				printf("%.10g\\n", pig_liver_eval(x) / 65536.0);
+			return 0;
+		}
+	E
+	"${CC:-cc}" -std=c99 -pedantic -Wall -Wextra -Werror -c -o liver.o "pig liver.c"
+	"${CC:-cc}" -std=c99 -o main main.c liver.o
+	awk 'BEGIN { for (i = 0; i < 500; i++) print i * 2621, (i * 7919 % 500) * 6553 }' >q
+	./main <q >c
+	awk '{ printf "%.17g %.17g\n", $1 / 65536, $2 / 65536 }' q | incise eval m.fx >fx 2>/dev/null
+	cmp c fx
+	run -2 --separate-stderr incise compile m.fis -o m.fx --c-source 7.c
+}
+
 @test "compile: bad usage" {
 	for args in "" "m.fis" "m.fis -o" "m.fis -o x.fx --arith float" "m.fis -o x.fx --cells 0" \
 		"m.fis -o x.fx --budget 0.1kN" "m.fis -o x.fx --budget -1" "m.fis m.fis -o x.fx" \

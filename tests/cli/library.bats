@@ -104,7 +104,7 @@ declared_by() {
 	# what needs them has them: the pattern finds what it looks for
 	ldd "$INCISE_BUILD/bin/incise-train" | grep -q lapack
 	ldd "$INCISE_BUILD/bin/incise-export" | grep -q sqlite
-	for program in incise incise-eval incise-bench; do
+	for program in incise incise-eval incise-compile; do
 		ldd "$INCISE_BUILD/bin/$program" >mapped
 		run grep -E "$heavy" mapped
 		[ "$status" -eq 1 ]
