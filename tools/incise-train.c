@@ -259,6 +259,9 @@ static struct incise_model *first_model(struct job *job, const struct side *fit)
 	for (int i = 0; i < job->n_inputs; i++)
 		variable(&in[i], &fit->pairs, i, job->inputs[i]);
 	variable(&out, &fit->pairs, job->n_inputs, job->output);
+	if (!isfinite(out.max - out.min))
+		cli_fail("%s: column %s spans %g to %g: too far for a double; scale it",
+			 job->data, out.name, out.min, out.max);
 	if (!(out.min < out.max))
 		out.max = out.min + fmax(fabs(out.min), 1) * 1e-6;
 	job->train.groups = fit->groups;
@@ -301,6 +304,9 @@ static void check_writable(const struct job *job, const char *path)
 	    data.st_ino == out.st_ino && S_ISREG(out.st_mode))
 		cli_fail("%s: is the data to train from; give another file to write",
 			 path);
+	/* A pipe's reader would take the trial for the end. */
+	if (!stat(path, &out) && !S_ISREG(out.st_mode) && !S_ISDIR(out.st_mode))
+		return;
 	file = incise_outfile_open(path, &err);
 	if (!file)
 		cli_fail_with(&err);
@@ -432,10 +438,13 @@ static json_t *warnings(const struct job *job, const struct incise_model *model,
 	const char *data = !job->check		? "its own"
 			   : job->train.classic ? "the check"
 						: "unseen";
+	const struct incise_variable *out = incise_model_output(model);
+	/* Rounding of a double, some hundred times over, is no error worth a word. */
+	double rounding = 1e-13 * fmax(fabs(out->min), fabs(out->max));
 	json_t *list = json_array();
 
 	for (size_t i = 0; i < sizeof(others) / sizeof(*others); i++)
-		if (rmse > WORSE * others[i].rmse)
+		if (rmse > WORSE * others[i].rmse && rmse > rounding)
 			warn(list,
 			     "%s predicts %s data better than this model: RMSE %.4g against "
 			     "%.4g; try fewer rules or more data",

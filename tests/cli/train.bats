@@ -429,3 +429,25 @@ holds_on_unseen_cuts() {
 	LC_ALL=de_DE.UTF-8 incise train pairs.csv -o b.fis 2>/dev/null
 	cmp a.fis b.fis
 }
+
+@test "train refuses a target that no double spans, and is quiet about rounding" {
+	awk 'BEGIN { OFS = ","; print "depth_mm,velocity_mm_s,force_N"
+		for (i = 0; i < 100; i++) print i % 10, i, (i % 2 ? "" : "-") "1.7e308" }' >max.csv
+	run --separate-stderr incise train max.csv --mf 2,2 -o m.fis
+	failed_with max.csv force_N "scale it"
+	[ ! -e m.fis ]
+	awk 'BEGIN { OFS = ","; print "depth_mm,velocity_mm_s,force_N"
+		for (i = 0; i < 900; i++) print i % 30, int(i / 30), 5 }' >flat.csv
+	run -0 --separate-stderr incise train flat.csv --mf 2,2 -o m.fis
+	[[ "$stderr" != *"predicts its own data better"* ]]
+}
+
+@test "train writes to a pipe" {
+	awk 'BEGIN { OFS = ","; srand(1); print "depth_mm,velocity_mm_s,force_N"
+		for (i = 0; i < 300; i++) print rand() * 20, rand() * 50, rand() }' >d.csv
+	mkfifo pipe
+	timeout 20 cat pipe >got &
+	timeout 20 "$INCISE_BUILD/bin/incise" train d.csv --mf 2,2 -o pipe >/dev/null 2>&1
+	wait
+	grep -q '^\[Rules\]' got
+}
