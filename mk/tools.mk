@@ -14,8 +14,8 @@ extra_bench := $(addprefix $(O)/obj/tools/,picture.o arithmetics.o machine.o \
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
 # built where its headers are. It is for measuring, and is not installed.
-peer := $(if $(shell echo '\#include <fl/Headers.h>' | \
-	$(CXX) -E -x c++ - >/dev/null 2>&1 && echo yes),\
+peer := $(if $(shell $(CXX) -E -x c++ -include fl/Headers.h /dev/null >/dev/null 2>&1 && \
+	echo yes),\
 	$(O)/lib/incise/peer_fuzzylite.so)
 
 $(O)/lib/incise/peer_%.so: tools/peers/%.cc $(O)/lib/libincise.so
