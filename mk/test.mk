@@ -14,7 +14,7 @@ $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 check: ## install what is missing, build, and run all tests
 	@mk/deps build check demo
 	+@$(MAKE) --no-print-directory all
-	+@$(MAKE) --no-print-directory check-unit check-cli check-sanitize check-style
+	+@$(MAKE) --no-print-directory check-style check-unit check-cli check-sanitize
 
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8
@@ -38,7 +38,7 @@ style_sources := $(shell find lib tools tests driver -name '*.[ch]' 2>/dev/null)
 check-style: ## the house's form: clang-format, an SPDX line in every file
 	@tests/style $(style_sources)
 
-.PHONY: check check-unit check-cli check-sanitize check-style
+.PHONY: check check-style check-unit check-cli check-sanitize
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

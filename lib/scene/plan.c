@@ -160,10 +160,11 @@ struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 		goto out;
 	}
 	if (scene->compiled && !scene->fixed) {
-		rc = incise_error_set(err, EINVAL,
-				      "%s: its model is compiled: it cannot run in double; use the "
-				      ".fis it was made of",
-				      scene->path);
+		rc = incise_error_set(
+			err, EINVAL,
+			"%s: its model is compiled: it cannot run in double; use the "
+			".fis it was made of",
+			scene->path);
 	} else if (scene->compiled) {
 		plan->fixed = incise_fixed_copy(scene->compiled);
 		if (!plan->fixed)

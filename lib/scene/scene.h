@@ -14,7 +14,7 @@ struct incise_scene {
 	char *path;
 	double rate_hz;
 	bool fixed;
-	struct incise_model *model;  /* one of these */
+	struct incise_model *model; /* one of these */
 	struct incise_fixed *compiled;
 	bool own_surface; /* else the rig's */
 	double point_mm[3], normal[3];
