@@ -163,11 +163,13 @@ static void model_text(const struct incise_model *model, const struct incise_fix
 			printf("  weight %.6g", incise_model_rule_weight(model, r));
 		putchar('\n');
 	}
-	printf("fixed point: ");
-	if (fx)
-		put_fixed(fx);
-	else
+	/* A refusal says itself what it is about. */
+	if (!fx) {
 		puts(refused);
+		return;
+	}
+	printf("fixed point: ");
+	put_fixed(fx);
 }
 
 static void show_model(const char *path, bool json, const char *plot)

@@ -115,9 +115,19 @@ static int check_direct(const struct incise_fixed *fx)
 			if (sum > (uint64_t)1 << 62)
 				return BAD;
 		}
-		/* One more, for the floor of a negative number. */
-		sum = (sum >> shift) + 1;
-		largest = largest > sum ? largest : sum;
+		/* A rule is linear: its largest output is at a corner of the support. */
+		for (int corner = 0; corner < 1 << n; corner++) {
+			int64_t y = (int64_t)incise_fx_le64((uint64_t)p[0]) *
+				    INCISE_FIXED_ONE;
+
+			for (int i = 0; i < n; i++)
+				y += (int64_t)incise_fx_le64((uint64_t)p[i + 1]) *
+				     (corner & 1 << i ? fx->input[i].max
+						      : fx->input[i].min);
+			/* One more, for the floor of a negative number. */
+			sum = (magnitude(y) >> shift) + 1;
+			largest = largest > sum ? largest : sum;
+		}
 	}
 	/* Σ w·y with w ≤ 2^30. */
 	return largest <= ((uint64_t)1 << 62 >> 30) / (uint32_t)fx->n_rules ? 0 : BAD;
@@ -168,7 +178,9 @@ static int check_fold(const struct incise_fixed *fx)
 			uint64_t g = magnitude(get32(fold, 2 * (row * n + i)));
 			uint64_t h = magnitude(get32(fold, 2 * (row * n + i) + 1));
 
-			if (h > FOLD_MAX || g + (h * reach >> to_g) + 2 > FOLD_MAX)
+			/* One more of h: a sum of weights over 1 is floored away from 0. */
+			if (h + 1 > FOLD_MAX ||
+			    g + ((h + 1) * reach >> to_g) + 2 > FOLD_MAX)
 				return BAD;
 		}
 	return 0;
@@ -214,6 +226,39 @@ static int check_data(const struct incise_fixed *fx, const struct incise_fx_head
 	return UNSUPPORTED;
 }
 
+/* A name is text that ends, and zero from there on: it will be printed. */
+static int check_name(const char *name, int size)
+{
+	int i = 0;
+
+	for (; i < size && name[i]; i++)
+		if ((unsigned char)name[i] < ' ' || name[i] == 0x7f)
+			return BAD;
+	if (i == size)
+		return BAD;
+	for (; i < size; i++)
+		if (name[i])
+			return BAD;
+	return 0;
+}
+
+/* What says nothing in this version must be zero, so that a later one can use it. */
+static int check_unused(const struct incise_fx_header *head)
+{
+	const uint8_t *input = (const uint8_t *)&head->input[1];
+
+	if (head->reserved[0] || head->reserved[1] || head->reserved[2])
+		return BAD;
+	for (int i = 0; i < INCISE_FIXED_INPUTS_MAX; i++)
+		if (head->input[i].reserved[0] || head->input[i].reserved[1])
+			return BAD;
+	for (uint32_t i = 0;
+	     incise_fx_le32(head->n_inputs) == 1 && i < sizeof(head->input[1]); i++)
+		if (input[i])
+			return BAD;
+	return 0;
+}
+
 int incise_fixed_open(struct incise_fixed *fx, const void *blob, uint32_t size)
 {
 	const struct incise_fx_header *head = blob;
@@ -248,13 +293,14 @@ int incise_fixed_open(struct incise_fixed *fx, const void *blob, uint32_t size)
 	/* Differences of formats are checked below, and must not overflow there. */
 	if (fx->shift_a < 0 || fx->shift_a > 127 || fx->shift_b < 0 || fx->shift_b > 127)
 		return BAD;
-	if (fx->n_inputs < 1 || fx->n_inputs > INCISE_FIXED_INPUTS_MAX ||
-	    head->name[sizeof(head->name) - 1] || head->output[sizeof(head->output) - 1])
+	if (fx->n_inputs < 1 || fx->n_inputs > INCISE_FIXED_INPUTS_MAX || !fx->bound ||
+	    check_unused(head) || check_name(head->name, sizeof(head->name)) ||
+	    check_name(head->output, sizeof(head->output)))
 		return BAD;
 	for (int i = 0; i < fx->n_inputs; i++) {
 		const struct incise_fx_input *in = &head->input[i];
 
-		if (in->name[sizeof(in->name) - 1])
+		if (check_name(in->name, sizeof(in->name)))
 			return BAD;
 		fx->input[i] = (struct incise_fixed_input){
 			.name = in->name,

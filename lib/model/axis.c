@@ -15,8 +15,9 @@ void incise_axis_init(struct incise_axis *axis, const struct incise_model *model
 	const struct incise_variable *v = incise_model_input(model, input);
 
 	axis->n = incise_model_n_mfs(model, input);
-	axis->min = v->min;
-	axis->max = v->max;
+	/* A compiled support ends at the nearest LSB, which may lie half an LSB outside. */
+	axis->min = fmin(v->min, rint(v->min * INCISE_FIXED_ONE) / INCISE_FIXED_ONE);
+	axis->max = fmax(v->max, rint(v->max * INCISE_FIXED_ONE) / INCISE_FIXED_ONE);
 	for (int i = 0; i < axis->n; i++) {
 		axis->s[i] = incise_model_mf(model, input, i)->p[0];
 		axis->c[i] = incise_model_mf(model, input, i)->p[1];

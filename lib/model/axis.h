@@ -13,7 +13,7 @@
 
 struct incise_axis {
 	int n;
-	double min, max; /* support */
+	double min, max; /* support, as given and as rounded to Q16.16 */
 	double s[INCISE_FIXED_MFS_MAX], c[INCISE_FIXED_MFS_MAX];
 };
 

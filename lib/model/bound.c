@@ -26,17 +26,19 @@
 
 #define N INCISE_FIXED_MFS_MAX
 
-/* What one patch of the support says of errors. */
-struct spot {
-	double input;			/* rounding of the inputs */
-	double f11, f22;		/* second derivatives */
-	double weights, outputs, cross; /* tables: times wa²/8, wb²/8 and both */
-	double direct;
-};
-
+/*
+ * The largest of each, over the whole support. They are added up though they need not meet
+ * in one place: a cell of a table reaches over several blocks.
+ */
 struct incise_survey {
-	size_t n;
-	struct spot *at;
+	double input;	 /* rounding of the inputs */
+	double f11, f22; /* second derivatives */
+	double weights;	 /* table: times wa²/8 */
+	double slopes;	 /* the same for an output wa further on: times wa³/8 */
+	double outputs;	 /* times wb²/8 */
+	double bends,
+		worst; /* weights that are off meet outputs that are: wa²/8 · wb²/8 */
+	double direct;
 };
 
 /* A part of one input's support. */
@@ -153,25 +155,34 @@ static void inspect(const struct incise_grid *grid, const struct block *a,
 	patch->f22 = iv_mag(f22);
 }
 
-/* Of the weights' table and the folded one, by wa²/8 and wb²/8: lib/fixed/table.c. */
-static void table_errors(const struct incise_grid *grid, const struct block *a,
-			 const struct patch *patch, struct spot *at)
+/* The larger; a NaN counts as endless. */
+static double larger(double largest, double e)
 {
-	struct interval of_a = iv(0), of_b = iv(0);
-	double weights = 0, worst = 0;
+	if (isnan(e))
+		return INFINITY;
+	return e > largest ? e : largest;
+}
+
+/* Of the weights' table and the folded one: see lib/fixed/table.c. */
+static void table_errors(const struct incise_grid *grid, const struct block *a,
+			 const struct patch *patch, struct incise_survey *survey)
+{
+	struct interval of_a = iv(0), of_h = iv(0), of_b = iv(0);
+	double bends = 0;
 
 	for (int i = 0; i < grid->a.n; i++) {
 		double e = iv_mag(patch->t2[i]);
 
 		of_a = iv_add(of_a, iv_mul(a->range.d2[i], patch->t[i]));
+		of_h = iv_add(of_h, iv_mul(a->range.d2[i], patch->h[i]));
 		of_b = iv_add(of_b, iv_mul(a->range.a[i], (struct interval){0, e}));
-		weights += iv_mag(a->range.d2[i]);
-		worst = fmax(worst, e);
+		bends += iv_mag(a->range.d2[i]);
+		survey->worst = larger(survey->worst, e);
 	}
-	at->weights = iv_mag(of_a);
-	at->outputs = of_b.hi;
-	/* Weights that are off meet rule outputs that are off. */
-	at->cross = weights * worst;
+	survey->weights = larger(survey->weights, iv_mag(of_a));
+	survey->slopes = larger(survey->slopes, iv_mag(of_h));
+	survey->outputs = larger(survey->outputs, iv_mag(of_b));
+	survey->bends = larger(survey->bends, bends);
 }
 
 /*
@@ -236,87 +247,54 @@ struct incise_survey *incise_survey_new(const struct incise_grid *grid)
 {
 	struct incise_survey *survey = calloc(1, sizeof(*survey));
 	struct blocks ba = {0}, bb = {0};
-	size_t n;
 
 	if (!survey || make_blocks(&ba, &grid->a, grid->one) ||
-	    make_blocks(&bb, &grid->b, false))
+	    make_blocks(&bb, &grid->b, false)) {
+		free(survey);
+		survey = NULL;
 		goto out;
-	n = (size_t)ba.n * bb.n;
-	survey->at = malloc(n * sizeof(*survey->at));
-	if (!survey->at)
-		goto out;
-	survey->n = n;
-	for (size_t k = 0; k < n; k++) {
+	}
+	for (int k = 0; k < ba.n * bb.n; k++) {
 		const struct block *a = &ba.block[k / bb.n], *b = &bb.block[k % bb.n];
 		struct patch patch;
 
 		inspect(grid, a, b, &patch);
-		survey->at[k].input = (patch.f1 + patch.f2) * HALF_LSB;
-		survey->at[k].f11 = patch.f11;
-		survey->at[k].f22 = patch.f22;
-		survey->at[k].direct = direct_error(grid, a, b);
-		table_errors(grid, a, &patch, &survey->at[k]);
+		survey->input = larger(survey->input, (patch.f1 + patch.f2) * HALF_LSB);
+		survey->f11 = larger(survey->f11, patch.f11);
+		survey->f22 = larger(survey->f22, patch.f22);
+		survey->direct = larger(survey->direct, direct_error(grid, a, b));
+		table_errors(grid, a, &patch, survey);
 	}
 out:
 	free(ba.block);
 	free(bb.block);
-	if (survey && !survey->at) {
-		free(survey);
-		survey = NULL;
-	}
 	return survey;
 }
 
 void incise_survey_free(struct incise_survey *survey)
 {
-	if (!survey)
-		return;
-	free(survey->at);
 	free(survey);
-}
-
-/* The larger; a NaN counts as endless. */
-static double larger(double largest, double e)
-{
-	if (isnan(e))
-		return INFINITY;
-	return e > largest ? e : largest;
 }
 
 /* Sums of a few doubles, each rounded: 1e-12 covers them. */
 #define SLACK (1 + 1e-12)
 
-double incise_survey_table(const struct incise_survey *survey, double wa, double wb)
+double incise_survey_table(const struct incise_survey *s, double wa, double wb)
 {
-	double a2 = wa * wa / 8, b2 = wb * wb / 8, largest = 0;
+	double a2 = wa * wa / 8, b2 = wb * wb / 8;
+	double bound = s->input + (s->weights + s->slopes * wa) * a2 + s->outputs * b2 +
+		       s->bends * a2 * s->worst * b2;
 
-	for (size_t k = 0; k < survey->n; k++) {
-		const struct spot *at = &survey->at[k];
-
-		largest = larger(largest, at->input + at->weights * a2 +
-						  at->outputs * b2 + at->cross * a2 * b2);
-	}
-	return largest * SLACK;
+	return larger(0, bound * SLACK);
 }
 
-double incise_survey_force(const struct incise_survey *survey, double wa, double wb)
+double incise_survey_force(const struct incise_survey *s, double wa, double wb)
 {
-	double largest = 0;
-
-	for (size_t k = 0; k < survey->n; k++) {
-		const struct spot *at = &survey->at[k];
-
-		largest = larger(largest, at->input + at->f11 * wa * wa / 8 +
-						  at->f22 * wb * wb / 8);
-	}
-	return largest * SLACK;
+	return larger(0,
+		      (s->input + s->f11 * wa * wa / 8 + s->f22 * wb * wb / 8) * SLACK);
 }
 
-double incise_survey_direct(const struct incise_survey *survey)
+double incise_survey_direct(const struct incise_survey *s)
 {
-	double largest = 0;
-
-	for (size_t k = 0; k < survey->n; k++)
-		largest = larger(largest, survey->at[k].input + survey->at[k].direct);
-	return largest * SLACK;
+	return larger(0, (s->input + s->direct) * SLACK);
 }

@@ -91,6 +91,9 @@ static int n_inputs(const struct incise_grid *grid)
 static void put_name(char *to, size_t size, const char *name)
 {
 	memcpy(to, name, strnlen(name, size - 1));
+	for (char *c = to; *c; c++)
+		if ((unsigned char)*c < ' ' || *c == 0x7f)
+			*c = '_';
 }
 
 static void begin(struct image *image, const struct incise_grid *grid,
@@ -336,13 +339,16 @@ static int build_force(struct image *image, const struct incise_grid *grid,
 
 /* ---- direct ---- */
 
-static void compile_mf(const struct incise_axis *axis, int i, struct incise_fx_mf *fx)
+/* Returns whether the width has a format. */
+static bool compile_mf(const struct incise_axis *axis, int i, struct incise_fx_mf *fx)
 {
 	/* exp(-(x-c)²/(2s²)) = 2^-((x-c)·k)²; Q16 in, Q24 out. */
 	double k = 1 / (axis->s[i] * sqrt(2 * M_LN2)), scaled = k * 256;
 	int shift = 30 - bits(scaled);
 	double slope = rint(ldexp(scaled, shift)), lost;
 
+	if (shift < 0)
+		return false;
 	fx->centre = to_q16(axis->c[i]);
 	/* So wide that it is flat: 2^-32 of a width is less than an LSB of the result. */
 	fx->slope = shift > 62 ? 0 : (int32_t)fmin(slope, 1 << 30);
@@ -354,6 +360,7 @@ static void compile_mf(const struct incise_axis *axis, int i, struct incise_fx_m
 	fx->slope = (int32_t)incise_fx_le32((uint32_t)fx->slope);
 	fx->shift = (int32_t)incise_fx_le32((uint32_t)fx->shift);
 	fx->offset = (int32_t)incise_fx_le32((uint32_t)fx->offset);
+	return true;
 }
 
 /*
@@ -408,7 +415,8 @@ static int build_direct(struct image *image, const struct incise_grid *grid,
 		if (!covered(axis))
 			return -ERANGE;
 		for (int k = 0; k < axis->n; k++)
-			compile_mf(axis, k, &mf[k]);
+			if (!compile_mf(axis, k, &mf[k]))
+				return -ERANGE;
 		reach += fmax(fabs(axis->min), fabs(axis->max));
 	}
 	/* p·x adds up in Q(shift_a + 16), Σ w·y in Q(shift_b + 30): within 62 bits. */

@@ -7,6 +7,7 @@
 #ifndef INCISE_INTERVAL_H
 #define INCISE_INTERVAL_H
 
+#include <float.h>
 #include <math.h>
 
 struct interval {
@@ -65,7 +66,7 @@ static inline struct interval iv_inverse(struct interval a)
 /* e^a; libm's exp is good to an ulp, two more are given away. */
 static inline struct interval iv_exp(struct interval a)
 {
-	double lo = exp(a.lo), hi = exp(a.hi);
+	double lo = fmin(exp(a.lo), DBL_MAX), hi = exp(a.hi);
 
 	return (struct interval){fmax(0, lo - lo * 0x1p-50),
 				 hi + hi * 0x1p-50 + 0x1p-1040};
@@ -76,9 +77,11 @@ static inline struct interval iv_intersect(struct interval a, struct interval b)
 	return (struct interval){fmax(a.lo, b.lo), fmin(a.hi, b.hi)};
 }
 
-/* Largest absolute value. */
+/* Largest absolute value; endless where an end is no number. */
 static inline double iv_mag(struct interval a)
 {
+	if (isnan(a.lo) || isnan(a.hi))
+		return INFINITY;
 	return fmax(fabs(a.lo), fabs(a.hi));
 }
 

@@ -114,6 +114,24 @@ static uint32_t nasty(uint64_t random)
 	return random % 3 ? values[random / 3 % 20] : (uint32_t)(random >> 32);
 }
 
+/* The batch evaluator trusts the same validation, in 32-bit lanes. */
+static void same_in_batches(const struct incise_fixed *fx, uint64_t *seed)
+{
+	int32_t x[64 * INCISE_FIXED_INPUTS_MAX], y[64];
+
+	for (int i = 0; i < 64 * fx->n_inputs; i++) {
+		const struct incise_fixed_input *in = &fx->input[i % fx->n_inputs];
+
+		*seed = *seed * 6364136223846793005u + 1442695040888963407u;
+		x[i] = i / 2 % 3 == 0	? in->min
+		       : i / 2 % 3 == 1 ? in->max
+					: (int32_t)(*seed >> 32);
+	}
+	incise_fixed_eval_batch(fx, x, y, 64);
+	for (int n = 0; n < 64; n++)
+		assert_int_equal(y[n], incise_fixed_eval(fx, x + n * fx->n_inputs));
+}
+
 /*
  * Whoever can compute a checksum can sign anything: random fields and data under a right
  * checksum are refused, or evaluate without harm at every extreme.
@@ -166,12 +184,59 @@ static void test_signed_nonsense(void **state)
 				}
 				incise_fixed_eval(&fx, x);
 			}
+			same_in_batches(&fx, &seed);
 		}
 		free(good);
 		free(blob);
 	}
 	/* Both ways out were taken often. */
 	assert_true(opened > 1000 && refused > 1000);
+}
+
+/* What layout.h calls zero, a bound that there always is, names that end. */
+static void test_unused_fields(void **state)
+{
+	static const struct {
+		int kind;
+		size_t at;
+		uint8_t value;
+	} cases[] = {
+		{0, offsetof(struct incise_fx_header, reserved), 1},
+		{0, offsetof(struct incise_fx_header, input[0].reserved[1]), 1},
+		{3, offsetof(struct incise_fx_header, input[1].min), 1},
+		{0, offsetof(struct incise_fx_header, name[0]), '\n'},
+		{0, offsetof(struct incise_fx_header, name[63]), 'x'},
+		{0, offsetof(struct incise_fx_header, input[0].name[1]), '\033'},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_fixed fx;
+		uint32_t size;
+		uint8_t *blob = blob_of(cases[i].kind, &size);
+
+		blob[cases[i].at] = cases[i].value;
+		seal(blob, size);
+		assert_int_equal(incise_fixed_open(&fx, blob, size), -EINVAL);
+		free(blob);
+	}
+}
+
+/* A sum of weights just over 1 is floored away from 0: found by a reviewer. */
+static void test_weights_over_one(void **state)
+{
+	struct incise_fixed fx;
+	uint32_t size;
+	struct incise_fx_header *head = blob_of(1, &size);
+	int32_t *w = (int32_t *)((uint8_t *)head + incise_fx_le32(head->input[0].offset));
+	uint64_t seed = 1;
+
+	assert_int_equal(incise_fixed_open(&fx, head, size), 0);
+	for (int row = 0; row <= fx.input[0].cells; row++)
+		w[row * fx.input[0].n_mfs] += 64;
+	seal(head, size);
+	if (!incise_fixed_open(&fx, head, size))
+		same_in_batches(&fx, &seed);
+	free(head);
 }
 
 /* Sizes that wrap when multiplied must not pass for small ones. */
@@ -200,6 +265,8 @@ int main(void)
 		cmocka_unit_test(test_any_single_damage_is_seen),
 		cmocka_unit_test(test_versions),
 		cmocka_unit_test(test_signed_nonsense),
+		cmocka_unit_test(test_unused_fields),
+		cmocka_unit_test(test_weights_over_one),
 		cmocka_unit_test(test_huge_counts),
 	};
 

@@ -64,6 +64,51 @@ static void test_never_below_an_error(void **state)
 		}
 }
 
+/*
+ * Supports end anywhere, and are compiled to the nearest LSB: what holds for every real
+ * input has to hold at the very ends, and for functions that cross just outside.
+ */
+static void test_ends_between_lsbs(void **state)
+{
+	static const struct incise_variable out = {"y", 0, 1};
+	static const int mfs[] = {2};
+	uint64_t seed = 1;
+	int compiled_models = 0;
+
+	for (int n = 0; n < 300; n++) {
+		double min = 2 * paper_random(&seed);
+		struct incise_variable in = {"x", min,
+					     min + 1.05e-3 + 1e-4 * paper_random(&seed)};
+		struct incise_model *model =
+			incise_model_new_grid(1, &in, mfs, INCISE_MF_GAUSS, &out, NULL);
+		/* Half an LSB is 7.6e-6: the functions cross within that outside an end. */
+		double cross = (n % 2 ? in.min : in.max) + 7e-6 * paper_random(&seed);
+		double half = 0.0365, width = 3.8e-4 * pow(10, n % 3 - 1);
+
+		incise_model_set_mf(model, 0, 0, (double[4]){width, cross - half});
+		incise_model_set_mf(model, 0, 1, (double[4]){width, cross + half});
+		incise_model_set_consequent(model, 0, (double[]){1, 0});
+		for (int a = 0; a < ARITHMETICS; a++) {
+			struct incise_fixed *fx = compiled(model, a, 32);
+
+			if (!fx)
+				continue;
+			compiled_models++;
+			for (int k = 0; k <= 200; k++) {
+				double u = k / 200.0,
+				       x[] = {in.min * (1 - u) + in.max * u};
+
+				assert_true(fabs(incise_fixed_eval_double(fx, x) -
+						 incise_model_eval(model, x, NULL)) <=
+					    incise_fixed_bound(fx));
+			}
+			incise_fixed_free(fx);
+		}
+		incise_model_free(model);
+	}
+	assert_true(compiled_models > 300);
+}
+
 /* A plane has no second derivative: interpolation is exact and the bound knows it. */
 static void test_plane_needs_no_cells(void **state)
 {
@@ -105,6 +150,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_never_below_an_error),
+		cmocka_unit_test(test_ends_between_lsbs),
 		cmocka_unit_test(test_plane_needs_no_cells),
 		cmocka_unit_test(test_finer_cells_lower_bound),
 	};
