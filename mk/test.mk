@@ -46,7 +46,7 @@ $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise -lm -pthread
 
-check-exhaustive: $(O)/tests/exhaustive ## every 16-bit input of the shipped model, a minute or more
+check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the shipped model, about a minute
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 

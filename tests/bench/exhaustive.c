@@ -2,7 +2,7 @@
 /*
  * exhaustive MODEL.fis [direct|table|force]: a compiled model against double on all 2^32
  * pairs of 65536 evenly spaced values of each input, held against the certified bound.
- * `make check-exhaustive` runs it; about a minute on two cores.
+ * `make check-exhaustive` runs it; half a minute on two cores.
  *
  * The reference is separable: normalised degrees of each input are computed once for
  * each of its 65536 values, and a pair costs a few multiplications.
@@ -65,7 +65,15 @@ static void *run(void *user)
 {
 	struct job *job = user;
 	const struct input *a = job->a, *b = job->b;
+	int32_t *x = malloc(VALUES * 2 * sizeof(*x)),
+		*fixed = malloc(VALUES * sizeof(*fixed));
 
+	if (!x || !fixed) {
+		job->largest = INFINITY;
+		goto out;
+	}
+	for (int l = 0; l < VALUES; l++)
+		x[2 * l + 1] = b->q[l];
 	for (int k = job->from; k < job->to; k++) {
 		double c[MFS] = {0}, d[MFS] = {0};
 
@@ -78,15 +86,16 @@ static void *run(void *user)
 				c[j] += a->degree[k][i] * (p[0] + p[1] * a->x[k]);
 				d[j] += a->degree[k][i] * p[2];
 			}
+		/* Bit-identical to one by one, and quicker. */
+		for (int l = 0; l < VALUES; l++)
+			x[2 * l] = a->q[k];
+		incise_fixed_eval_batch(job->fx, x, fixed, VALUES);
 		for (int l = 0; l < VALUES; l++) {
-			int32_t x[] = {a->q[k], b->q[l]};
 			double y = 0, e;
 
 			for (int j = 0; j < b->n; j++)
 				y += b->degree[l][j] * (c[j] + d[j] * b->x[l]);
-			e = fabs(incise_fixed_eval(job->fx, x) *
-					 (1.0 / INCISE_FIXED_ONE) -
-				 y);
+			e = fabs(fixed[l] * (1.0 / INCISE_FIXED_ONE) - y);
 			job->sum2 += e * e;
 			if (e > job->largest) {
 				job->largest = e;
@@ -95,6 +104,9 @@ static void *run(void *user)
 			}
 		}
 	}
+out:
+	free(x);
+	free(fixed);
 	return NULL;
 }
 
