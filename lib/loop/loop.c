@@ -85,8 +85,14 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 			stats->lateness_max_ns = late_ns;
 		count(stats->lateness_us, late_ns / 1000);
 		if (late_ns >= period_ns) {
-			stats->skipped += late_ns / period_ns;
-			due_ns += late_ns / period_ns * period_ns;
+			int64_t skip = late_ns / period_ns;
+			int64_t left = (end_ns - due_ns - 1) / period_ns + 1;
+
+			/* A stall over the end leaves out what was still due, and no more. */
+			stats->skipped += skip < left ? skip : left;
+			if (skip >= left)
+				break;
+			due_ns += skip * period_ns;
 		}
 		rc = run_tick(plan, clock, options, stats, now_ns);
 		if (rc)

@@ -99,6 +99,25 @@ static void test_overrun_skips_and_counts(void **state)
 	felt_end(&f);
 }
 
+/* The same stall over the end: 12 were due, the two behind the tenth are left out. */
+static void test_overrun_over_the_end(void **state)
+{
+	struct incise_loop_options options = {.rate_hz = 1000, .duration_ns = 12000000};
+	struct incise_tracker_ops ops;
+	struct felt f;
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	ops = *f.tracker_ops;
+	ops.read = slow_tracker;
+	incise_rig_tracker(f.rig)->ops = &ops;
+	stalled = incise_rig_clock(f.rig);
+	calls = 0;
+	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, NULL), 0);
+	assert_int_equal(stats.ticks, 10);
+	assert_int_equal(stats.skipped, 2);
+	felt_end(&f);
+}
+
 static volatile sig_atomic_t stop;
 
 static int stopping_tracker(struct incise_tracker *tracker,
@@ -229,6 +248,7 @@ int main(void)
 		cmocka_unit_test(test_number_of_ticks),
 		cmocka_unit_test(test_log_and_times),
 		cmocka_unit_test(test_overrun_skips_and_counts),
+		cmocka_unit_test(test_overrun_over_the_end),
 		cmocka_unit_test(test_stop_flag),
 		cmocka_unit_test(test_end_lets_go),
 		cmocka_unit_test(test_device_failure_ends_the_loop),
