@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Vectors of three doubles.
+ */
+#ifndef INCISE_VECTOR_H
+#define INCISE_VECTOR_H
+
+#include <math.h>
+#include <stdbool.h>
+
+static inline double v3_dot(const double a[3], const double b[3])
+{
+	return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline double v3_length(const double a[3])
+{
+	return sqrt(v3_dot(a, a));
+}
+
+static inline void v3_copy(double to[3], const double a[3])
+{
+	for (int i = 0; i < 3; i++)
+		to[i] = a[i];
+}
+
+static inline void v3_sub(double to[3], const double a[3], const double b[3])
+{
+	for (int i = 0; i < 3; i++)
+		to[i] = a[i] - b[i];
+}
+
+/* to = a + s b; to may be a. */
+static inline void v3_add(double to[3], const double a[3], double s, const double b[3])
+{
+	for (int i = 0; i < 3; i++)
+		to[i] = a[i] + s * b[i];
+}
+
+/* to is neither a nor b. */
+static inline void v3_cross(double to[3], const double a[3], const double b[3])
+{
+	to[0] = a[1] * b[2] - a[2] * b[1];
+	to[1] = a[2] * b[0] - a[0] * b[2];
+	to[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static inline bool v3_finite(const double a[3])
+{
+	return isfinite(a[0]) && isfinite(a[1]) && isfinite(a[2]);
+}
+
+/*
+ * Make a unit vector of one that is longer than @least; else leave @to as it is, and
+ * return false.
+ */
+static inline bool v3_unit(double to[3], const double a[3], double least)
+{
+	double length = v3_length(a);
+
+	if (!(length > least) || !isfinite(length))
+		return false;
+	for (int i = 0; i < 3; i++)
+		to[i] = a[i] / length;
+	return true;
+}
+
+#endif
