@@ -11,6 +11,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include "conf.h"
+#include "vector.h"
 
 /* "sim.seed": the setting's name with those of the groups around it. */
 static void setting_name(const config_setting_t *setting, const char *key, char *name,
@@ -162,6 +163,21 @@ int incise_conf_read(config_t *config, const char *path, struct incise_error *er
 	return rc;
 }
 
+/*
+ * How many characters two keys begin with alike, when they are one quantity in two units
+ * ("radius_cm" and "radius_mm"); else 0.
+ */
+static size_t other_unit(const char *a, const char *b)
+{
+	size_t n = strcspn(a, "_"), same = 0;
+
+	if (n != strcspn(b, "_") || strncmp(a, b, n) || !b[n])
+		return 0;
+	while (a[same] && a[same] == b[same])
+		same++;
+	return same;
+}
+
 int incise_conf_known(const config_setting_t *group, const char *path,
 		      const char *const *keys, struct incise_error *err)
 {
@@ -172,7 +188,8 @@ int incise_conf_known(const config_setting_t *group, const char *path,
 		const config_setting_t *setting = config_setting_get_elem(group, i);
 		const char *own = config_setting_name(setting);
 		char name[120], known[240] = "";
-		size_t length = 0;
+		size_t length = 0, alike = 0;
+		const char *meant = NULL;
 		int found = 0;
 
 		for (const char *const *key = keys; *key; key++) {
@@ -181,10 +198,20 @@ int incise_conf_known(const config_setting_t *group, const char *path,
 					   key == keys ? "" : ", ", *key);
 			if (length >= sizeof(known))
 				length = sizeof(known) - 1;
+			if (other_unit(own, *key) > alike) {
+				alike = other_unit(own, *key);
+				meant = *key;
+			}
 		}
 		if (found)
 			continue;
 		setting_name(setting, NULL, name, sizeof(name));
+		if (meant)
+			return incise_error_set(
+				err, EINVAL,
+				"%.100s:%d: %s: unknown key; expected %s, in that unit",
+				file_of(setting, path),
+				config_setting_source_line(setting), name, meant);
 		return incise_error_set(err, EINVAL,
 					"%.100s:%d: %s: unknown key; expected one of %s",
 					file_of(setting, path),
@@ -225,8 +252,49 @@ int incise_conf_string(const config_setting_t *group, const char *path, const ch
 	return 0;
 }
 
-/* Three finite numbers [x, y, z], if the key is there. */
-static int conf_vector(const config_setting_t *group, const char *path, const char *key,
+int incise_conf_integer(const config_setting_t *group, const char *path, const char *key,
+			int min, int max, int *value, struct incise_error *err)
+{
+	const config_setting_t *setting = config_setting_get_member(group, key);
+	double number;
+
+	if (!setting)
+		return 0;
+	number = is_number(setting) ? number_of(setting) : NAN;
+	if (!(number >= min && number <= max) || number != floor(number))
+		return setting_error(setting, path, EINVAL, err,
+				     "a whole number from %d to %d", min, max);
+	*value = (int)number;
+	return 0;
+}
+
+int incise_conf_bool(const config_setting_t *group, const char *path, const char *key,
+		     bool *value, struct incise_error *err)
+{
+	const config_setting_t *setting = config_setting_get_member(group, key);
+
+	if (!setting)
+		return 0;
+	if (config_setting_type(setting) != CONFIG_TYPE_BOOL)
+		return setting_error(setting, path, EINVAL, err, "true or false");
+	*value = config_setting_get_bool(setting);
+	return 0;
+}
+
+int incise_conf_need(const config_setting_t *group, const char *path, const char *key,
+		     struct incise_error *err)
+{
+	char name[120];
+
+	if (config_setting_get_member(group, key))
+		return 0;
+	setting_name(group, key, name, sizeof(name));
+	return incise_error_set(err, EINVAL, "%.100s:%d: %s is missing; add it",
+				file_of(group, path), config_setting_source_line(group),
+				name);
+}
+
+int incise_conf_vector(const config_setting_t *group, const char *path, const char *key,
 		       double value[3], struct incise_error *err)
 {
 	const config_setting_t *setting = config_setting_get_member(group, key);
@@ -246,8 +314,21 @@ static int conf_vector(const config_setting_t *group, const char *path, const ch
 					     "three numbers [x, y, z] of at most 1e6");
 		number[i] = number_of(element);
 	}
-	memcpy(value, number, sizeof(number));
+	v3_copy(value, number);
 	return 0;
+}
+
+int incise_conf_direction(const config_setting_t *group, const char *path,
+			  const char *key, double value[3], struct incise_error *err)
+{
+	double asked[3] = {value[0], value[1], value[2]};
+	int rc = incise_conf_vector(group, path, key, asked, err);
+
+	/* Shorter than this, its direction is more rounding than intent. */
+	if (!rc && config_setting_get_member(group, key) && !v3_unit(value, asked, 1e-6))
+		rc = setting_error(config_setting_get_member(group, key), path, EINVAL,
+				   err, "a direction [x, y, z] of length 1e-6 or more");
+	return rc;
 }
 
 int incise_conf_surface(const config_setting_t *group, const char *path,
@@ -255,8 +336,7 @@ int incise_conf_surface(const config_setting_t *group, const char *path,
 {
 	static const char *const keys[] = {"point_mm", "normal", NULL};
 	const config_setting_t *surface = config_setting_get_member(group, "surface");
-	double unit[3] = {normal[0], normal[1], normal[2]};
-	double length;
+	double point[3];
 	int rc;
 
 	if (!surface)
@@ -265,23 +345,13 @@ int incise_conf_surface(const config_setting_t *group, const char *path,
 		return setting_error(
 			surface, path, EINVAL, err,
 			"a group { point_mm = [x, y, z]; normal = [x, y, z]; }");
+	v3_copy(point, point_mm);
 	rc = incise_conf_known(surface, path, keys, err);
 	if (!rc)
-		rc = conf_vector(surface, path, "normal", unit, err);
-	if (rc)
-		return rc;
-	length = sqrt(unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2]);
-	/* Shorter than this, its direction is more rounding than intent. */
-	if (length < 1e-6) {
-		const config_setting_t *at = config_setting_get_member(surface, "normal");
-
-		return setting_error(at ? at : surface, path, EINVAL, err,
-				     "a normal of length 1e-6 or more");
-	}
-	rc = conf_vector(surface, path, "point_mm", point_mm, err);
-	if (rc)
-		return rc;
-	for (int i = 0; i < 3; i++)
-		normal[i] = unit[i] / length;
-	return 0;
+		rc = incise_conf_vector(surface, path, "point_mm", point, err);
+	if (!rc)
+		rc = incise_conf_direction(surface, path, "normal", normal, err);
+	if (!rc)
+		v3_copy(point_mm, point);
+	return rc;
 }

@@ -6,6 +6,7 @@
 #ifndef INCISE_CONF_H
 #define INCISE_CONF_H
 
+#include <stdbool.h>
 #include <libconfig.h>
 #include <incise/error.h>
 
@@ -22,6 +23,26 @@ int incise_conf_known(const config_setting_t *group, const char *path,
  */
 int incise_conf_number(const config_setting_t *group, const char *path, const char *key,
 		       double min, double max, double *value, struct incise_error *err);
+
+/* The same for a whole number. */
+int incise_conf_integer(const config_setting_t *group, const char *path, const char *key,
+			int min, int max, int *value, struct incise_error *err);
+
+/* The same for true and false. */
+int incise_conf_bool(const config_setting_t *group, const char *path, const char *key,
+		     bool *value, struct incise_error *err);
+
+/* Three numbers [x, y, z] of at most 1e6. */
+int incise_conf_vector(const config_setting_t *group, const char *path, const char *key,
+		       double value[3], struct incise_error *err);
+
+/* A direction [x, y, z] of length 1e-6 or more, made unit. */
+int incise_conf_direction(const config_setting_t *group, const char *path,
+			  const char *key, double value[3], struct incise_error *err);
+
+/* Fail when a key that must be there is not. */
+int incise_conf_need(const config_setting_t *group, const char *path, const char *key,
+		     struct incise_error *err);
 
 /* Read a string if the key is there; it lives as long as the config. */
 int incise_conf_string(const config_setting_t *group, const char *path, const char *key,

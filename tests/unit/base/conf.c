@@ -17,13 +17,16 @@ struct content {
 	double seed;
 	const char *name;
 	double point[3], normal[3];
+	bool on;
+	int times;
 };
 
 static int read_content(const char *path, config_t *config, struct content *content,
 			struct incise_error *err)
 {
 	static const char *const root_keys[] = {"sim", "surface", NULL};
-	static const char *const sim_keys[] = {"seed", "name", NULL};
+	static const char *const sim_keys[] = {"seed",	"name",	    "on",
+					       "times", "reach_mm", NULL};
 	const config_setting_t *root, *sim;
 	int rc = incise_conf_read(config, path, err);
 
@@ -38,6 +41,12 @@ static int read_content(const char *path, config_t *config, struct content *cont
 		rc = incise_conf_number(sim, path, "seed", 0, 100, &content->seed, err);
 	if (!rc && sim)
 		rc = incise_conf_string(sim, path, "name", &content->name, err);
+	if (!rc && sim)
+		rc = incise_conf_bool(sim, path, "on", &content->on, err);
+	if (!rc && sim)
+		rc = incise_conf_integer(sim, path, "times", 1, 64, &content->times, err);
+	if (!rc && sim && content->on)
+		rc = incise_conf_need(sim, path, "reach_mm", err);
 	if (!rc)
 		rc = incise_conf_surface(root, path, content->point, content->normal,
 					 err);
@@ -70,7 +79,21 @@ static void refused_with_file_line_and_cause(void **state)
 		{"sim = { name = {}; };", -EINVAL,
 		 ":1: sim.name: expected text in quotes, found a group; correct it"},
 		{"sim = {\n sead = 1; };", -EINVAL,
-		 ":2: sim.sead: unknown key; expected one of seed, name"},
+		 ":2: sim.sead: unknown key; expected one of seed, name, on, times, reach_mm"},
+		{"sim = {\n reach_cm = 1; };", -EINVAL,
+		 ":2: sim.reach_cm: unknown key; expected reach_mm, in that unit"},
+		{"sim = { reach = 1; };", -EINVAL,
+		 ":1: sim.reach: unknown key; expected reach_mm, in that unit"},
+		{"sim = { on = 1; };", -EINVAL,
+		 ":1: sim.on: expected true or false, found 1; correct it"},
+		{"sim = {\n times = 2.5; };", -EINVAL,
+		 ":2: sim.times: expected a whole number from 1 to 64, found 2.5; correct it"},
+		{"sim = { times = 65; };", -EINVAL,
+		 ":1: sim.times: expected a whole number from 1 to 64, found 65; correct it"},
+		{"sim = { times = \"2\"; };", -EINVAL,
+		 ":1: sim.times: expected a whole number from 1 to 64, found \"2\"; correct it"},
+		{"\nsim = { on = true; };", -EINVAL,
+		 ":2: sim.reach_mm is missing; add it"},
 		{"sin = 1;", -EINVAL,
 		 ":1: sin: unknown key; expected one of sim, surface"},
 		{"sim = {\n seed 1; };", -EINVAL,
@@ -87,7 +110,7 @@ static void refused_with_file_line_and_cause(void **state)
 		 ":1: surface.point_mm: expected three numbers [x, y, z] of at most 1e6, "
 		 "found 3 values; correct it"},
 		{"surface = {\n normal = [0, 0, 0]; };", -EINVAL,
-		 ":2: surface.normal: expected a normal of length 1e-6 or more, found 3 "
+		 ":2: surface.normal: expected a direction [x, y, z] of length 1e-6 or more, found 3 "
 		 "values; correct it"},
 		{"surface = { up = [0, 0, 1]; };", -EINVAL,
 		 ":1: surface.up: unknown key; expected one of point_mm, normal"},
@@ -132,16 +155,20 @@ static void a_refused_value_leaves_what_was_there(void **state)
 static void taken(void **state)
 {
 	struct temp_file file =
-		temp_file_new("a.conf", "# a comment\n"
-					"sim = { seed = 42; name = \"one\"; };\n"
-					"surface = { point_mm = [1, 2, 3];\n"
-					"            normal = (0, -3.0, 4); };\n");
+		temp_file_new("a.conf",
+			      "# a comment\n"
+			      "sim = { seed = 42; name = \"one\"; on = true; times = 3;\n"
+			      "        reach_mm = 1; };\n"
+			      "surface = { point_mm = [1, 2, 3];\n"
+			      "            normal = (0, -3.0, 4); };\n");
 	struct content content = {.normal = {0, 0, 1}};
 	config_t config;
 
 	assert_int_equal(read_content(file.path, &config, &content, NULL), 0);
 	assert_true(content.seed == 42); /* an integer where a number is wanted */
 	assert_string_equal(content.name, "one");
+	assert_true(content.on);
+	assert_int_equal(content.times, 3);
 	assert_true(content.point[0] == 1 && content.point[1] == 2 &&
 		    content.point[2] == 3);
 	/* 3-4-5: exact up to one rounding of the division. */
