@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Reading a Wavefront OBJ: `v`, `vt` and `f`. A face's corner is v, v/vt, v//vn or
+ * v/vt/vn, counted from 1, or from -1 backwards for the last one before the face. Normals
+ * (`vn`) are counted, so that their indices can be checked, and not used: a proxy needs
+ * the ones of the faces.
+ *
+ * A face refers to what stands before it. One with more corners is cut into a fan from
+ * its first corner. A line that ends in a backslash does not go on in the next one.
+ */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include "reader.h"
+#include "text.h"
+
+#define UV_NONE UINT32_MAX
+#define POINTS_MAX (3 * (size_t)INCISE_SURFACE_TRIANGLES_MAX)
+
+struct index {
+	uint32_t v, vt;
+};
+
+struct obj {
+	struct text text;
+	struct incise_error *err;
+	const double *at_mm;
+	size_t n_vt, n_vn, room_v, room_vt, room_corner, room_index, room_line;
+	float (*vt)[2];
+	uint32_t (*index)[3]; /* of vt, per triangle */
+	bool textured;
+	struct mesh_draft draft;
+};
+
+/* Room for one more of @each bytes. */
+static int grow(struct obj *obj, void *array, size_t n, size_t *room, size_t each)
+{
+	void **old = array;
+	void *more;
+
+	if (n < *room)
+		return 0;
+	*room = *room ? 2 * *room : 1024;
+	more = realloc(*old, *room * each);
+	if (!more)
+		return incise_error_set(obj->err, ENOMEM, "%s: no memory to read it",
+					obj->text.path);
+	*old = more;
+	return 0;
+}
+
+static int too_many(struct obj *obj, const char *what, size_t most)
+{
+	return incise_error_set(obj->err, E2BIG, "%s:%d: more than %zu %s",
+				obj->text.path, obj->text.line, most, what);
+}
+
+/* The line's numbers, from @least to @most; those that are left out stay as they are. */
+static int numbers(struct obj *obj, const char *what, int least, int most, double *value)
+{
+	const char *word;
+	size_t length;
+	int n = 0;
+
+	while ((length = text_word(&obj->text, &word)) && *word != '#') {
+		if (n == most)
+			return text_error(&obj->text, obj->err,
+					  "%s with more than %d numbers", what, most);
+		if (!text_number(word, length, value + n++))
+			return text_error(&obj->text, obj->err, "%s: '%.*s' is no number",
+					  what, (int)(length < 40 ? length : 40), word);
+	}
+	if (n < least)
+		return text_error(&obj->text, obj->err, "%s with %d numbers, not %d",
+				  what, n, least);
+	return 0;
+}
+
+static int read_point(struct obj *obj)
+{
+	struct mesh_draft *draft = &obj->draft;
+	double value[7]; /* some writers add a weight, or a colour */
+	int rc = numbers(obj, "v", 3, 7, value);
+
+	if (!rc && draft->n_points == POINTS_MAX)
+		rc = too_many(obj, "points", POINTS_MAX);
+	if (!rc)
+		rc = grow(obj, &draft->point, draft->n_points, &obj->room_v,
+			  sizeof(*draft->point));
+	if (rc)
+		return rc;
+	for (int i = 0; i < 3; i++) {
+		double x = value[i] + obj->at_mm[i];
+
+		if (!(fabs(x) <= MESH_COORDINATE_MAX_MM))
+			return text_error(&obj->text, obj->err,
+					  "v: %g mm is farther than %g mm from the "
+					  "origin; is its unit mm?",
+					  x, MESH_COORDINATE_MAX_MM);
+		/* A sum with +0 is never -0, so that equal ones compare equal. */
+		draft->point[draft->n_points][i] = x + 0.0;
+	}
+	draft->n_points++;
+	return 0;
+}
+
+static int read_uv(struct obj *obj)
+{
+	double value[3] = {0};
+	int rc = numbers(obj, "vt", 1, 3, value);
+
+	if (!rc && obj->n_vt == POINTS_MAX)
+		rc = too_many(obj, "texture coordinates", POINTS_MAX);
+	if (!rc)
+		rc = grow(obj, &obj->vt, obj->n_vt, &obj->room_vt, sizeof(*obj->vt));
+	if (rc)
+		return rc;
+	for (int i = 0; i < 2; i++) {
+		if (!(fabs(value[i]) <= 1e6))
+			return text_error(&obj->text, obj->err,
+					  "vt: %g is no texture coordinate", value[i]);
+		obj->vt[obj->n_vt][i] = (float)value[i];
+	}
+	obj->n_vt++;
+	return 0;
+}
+
+/* One index of a corner; @at goes behind it. */
+static int read_index(struct obj *obj, const char **at, const char *end, const char *what,
+		      size_t n, uint32_t *index)
+{
+	long long value = 0;
+	const char *word = *at;
+
+	*at = text_integer(word, end, &value);
+	if (!*at)
+		return text_error(&obj->text, obj->err, "f: '%.*s' is no index",
+				  (int)(end - word < 40 ? end - word : 40), word);
+	if (!value || value > (long long)n || -value > (long long)n)
+		return text_error(&obj->text, obj->err,
+				  "f: there is no %s %lld among the %zu before this line",
+				  what, value, n);
+	*index = (uint32_t)(value > 0 ? value - 1 : (long long)n + value);
+	return 0;
+}
+
+static int read_corner(struct obj *obj, const char *word, size_t length,
+		       struct index *corner)
+{
+	const char *at = word, *end = word + length;
+	uint32_t vn;
+	int rc = read_index(obj, &at, end, "v", obj->draft.n_points, &corner->v);
+
+	corner->vt = UV_NONE;
+	if (!rc && at < end && *at == '/') {
+		at++;
+		if (at < end && *at != '/') {
+			obj->textured = true;
+			rc = read_index(obj, &at, end, "vt", obj->n_vt, &corner->vt);
+		}
+		if (!rc && at < end && *at == '/') {
+			at++;
+			rc = read_index(obj, &at, end, "vn", obj->n_vn, &vn);
+		}
+	}
+	if (!rc && at != end)
+		return text_error(&obj->text, obj->err,
+				  "f: '%.*s': expected v, v/vt, v//vn or v/vt/vn",
+				  (int)(length < 40 ? length : 40), word);
+	return rc;
+}
+
+static int add_triangle(struct obj *obj, const struct index corner[3])
+{
+	struct mesh_draft *draft = &obj->draft;
+	size_t n = draft->n_triangles;
+	int rc = 0;
+
+	if (n == INCISE_SURFACE_TRIANGLES_MAX)
+		rc = too_many(obj, "triangles", n);
+	if (!rc)
+		rc = grow(obj, &draft->corner, n, &obj->room_corner,
+			  sizeof(*draft->corner));
+	if (!rc)
+		rc = grow(obj, &obj->index, n, &obj->room_index, sizeof(*obj->index));
+	if (!rc)
+		rc = grow(obj, &draft->line, n, &obj->room_line, sizeof(*draft->line));
+	if (rc)
+		return rc;
+	for (int i = 0; i < 3; i++) {
+		draft->corner[n][i] = corner[i].v;
+		obj->index[n][i] = corner[i].vt;
+	}
+	draft->line[n] = obj->text.line;
+	draft->n_triangles++;
+	return 0;
+}
+
+static int read_face(struct obj *obj)
+{
+	struct index corner[3]; /* the first, the one before, this */
+	const char *word;
+	size_t length;
+	int n = 0, rc;
+
+	while ((length = text_word(&obj->text, &word)) && *word != '#') {
+		rc = read_corner(obj, word, length, corner + (n < 2 ? n : 2));
+		if (!rc && n >= 2) {
+			rc = add_triangle(obj, corner);
+			corner[1] = corner[2];
+		}
+		if (rc)
+			return rc;
+		n += n < 3;
+	}
+	if (n < 3)
+		return text_error(&obj->text, obj->err,
+				  "f with %d corners: expected 3 or more", n);
+	return 0;
+}
+
+static int read_line(struct obj *obj)
+{
+	const char *word;
+	size_t length = text_word(&obj->text, &word);
+
+	if (length == 1 && *word == 'v')
+		return read_point(obj);
+	if (length == 1 && *word == 'f')
+		return read_face(obj);
+	if (length == 2 && !memcmp(word, "vt", 2))
+		return read_uv(obj);
+	if (length == 2 && !memcmp(word, "vn", 2)) {
+		double value[3];
+
+		obj->n_vn++;
+		return numbers(obj, "vn", 3, 3, value);
+	}
+	return 0;
+}
+
+/* Texture coordinates of each triangle's corners; 0, 0 where it has none. */
+static int take_uv(struct obj *obj)
+{
+	struct mesh_draft *draft = &obj->draft;
+	size_t n = draft->n_triangles;
+
+	if (!obj->textured || !n)
+		return 0;
+	draft->uv = calloc(n, sizeof(*draft->uv));
+	if (!draft->uv)
+		return incise_error_set(obj->err, ENOMEM, "%s: no memory to read it",
+					obj->text.path);
+	for (size_t k = 0; k < n; k++)
+		for (int i = 0; i < 3; i++)
+			if (obj->index[k][i] != UV_NONE)
+				memcpy(draft->uv[k][i], obj->vt[obj->index[k][i]],
+				       sizeof(draft->uv[k][i]));
+	return 0;
+}
+
+struct mesh *obj_load(const char *path, const double at_mm[3], struct incise_error *err)
+{
+	struct obj obj = {.err = err, .at_mm = at_mm, .draft.path = path};
+	struct mesh *mesh = NULL;
+	int rc = text_open(&obj.text, path, err);
+
+	if (!rc) {
+		do {
+			rc = read_line(&obj);
+		} while (!rc && text_next_line(&obj.text));
+	}
+	if (!rc)
+		rc = take_uv(&obj);
+	text_close(&obj.text);
+	if (!rc) {
+		mesh = mesh_new(&obj.draft, err);
+		rc = mesh ? 0 : -errno;
+	}
+	free(obj.vt);
+	free(obj.index);
+	free(obj.draft.point);
+	free(obj.draft.corner);
+	free(obj.draft.line);
+	free(obj.draft.uv);
+	if (rc)
+		errno = -rc;
+	return mesh;
+}

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * A text file in memory, read word by word: large files of numbers, fast and strictly.
+ * Numbers have a decimal point whatever locale the program has set.
+ */
+#ifndef INCISE_TEXT_H
+#define INCISE_TEXT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <incise/error.h>
+
+#define TEXT_SIZE_MAX ((size_t)1 << 31) /* bytes of a file */
+
+struct text {
+	const char *path;
+	char *data; /* with a NUL behind its end */
+	const char *at, *end;
+	int line; /* of @at, from 1 */
+};
+
+/* 0; errno of fopen(3) and read(2), EFBIG, ENOMEM. @path must outlive the text. */
+int text_open(struct text *text, const char *path, struct incise_error *err);
+void text_close(struct text *text);
+
+/*
+ * The next word of the line, up to blank or end of line: its length, 0 at the line's end.
+ */
+size_t text_word(struct text *text, const char **word);
+
+/* Go to the next line; false at the end of the file. */
+bool text_next_line(struct text *text);
+
+/* The whole word is a finite decimal number: correctly rounded. */
+bool text_number(const char *word, size_t length, double *value);
+
+/* The word's begin is a whole number of at most ten digits; returns what follows or NULL. */
+const char *text_integer(const char *word, const char *end, long long *value);
+
+/* An error at the present line: "path:line: …". Returns -EINVAL. */
+int text_error(const struct text *text, struct incise_error *err, const char *fmt, ...)
+	INCISE_PRINTF(3, 4);
+
+#endif
