@@ -154,7 +154,7 @@ static int read_corner(struct obj *obj, const char *word, size_t length,
 	corner->vt = UV_NONE;
 	if (!rc && at < end && *at == '/') {
 		at++;
-		if (at < end && *at != '/') {
+		if (at == end || *at != '/') {
 			obj->textured = true;
 			rc = read_index(obj, &at, end, "vt", obj->n_vt, &corner->vt);
 		}

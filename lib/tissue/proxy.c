@@ -113,9 +113,9 @@ static void end(struct incise_proxy *proxy)
 /*
  * A proxy that is still on its way has the tool in front of its face: because the tool
  * has gone out, or because there is a dent between the two. Where the straight way to the
- * tool enters it is a dent, and the proxy goes on gliding. A way that begins on the edge
- * of the dent may enter right there, and rounding then hides it: when none is found, what
- * is nearest to the tool tells.
+ * tool enters it is a dent, the tool is inside, and the proxy goes on gliding. A way that
+ * begins on the edge of the dent may enter right there, and rounding then hides it: when
+ * none is found, what is nearest to the tool tells.
  */
 static bool is_dent(const struct incise_proxy *proxy, const struct mesh_spot *spot,
 		    const double tool[3])
@@ -142,21 +142,27 @@ static void follow(struct incise_proxy *proxy, const double tool[3], double reac
 	struct mesh_spot spot = spot_of(proxy), entry;
 
 	for (int part = 0; part < PARTS_MAX; part++) {
-		double way[3];
+		double way[3], above;
 
 		proxy->settled = mesh_glide(mesh, tool, reach, &spot);
 		proxy->at_face = spot.face;
 		mesh_touch(mesh, &spot, tool, &proxy->touch);
-		if (!(proxy->touch.depth_mm < -leave) &&
-		    !(proxy->settled && mesh_beyond_border(mesh, &spot, tool)))
-			return;
+		v3_sub(way, tool, spot.point);
+		above = v3_dot(way, proxy->touch.normal);
 		if (!proxy->settled) {
+			if (!(above > 0))
+				return;
 			if (is_dent(proxy, &spot, tool))
-				proxy->touch.depth_mm = -proxy->touch.depth_mm;
-			else
+				proxy->touch.depth_mm = v3_length(way);
+			else if (above > leave)
 				end(proxy);
+			else
+				proxy->touch.depth_mm = -above;
 			return;
 		}
+		if (!(proxy->touch.depth_mm < -leave) &&
+		    !mesh_beyond_border(mesh, &spot, tool))
+			return;
 		/* At the nearest place around, it is rounding that enters where it begins. */
 		if (!mesh_enters(mesh, spot.point, tool, ON_MM, &entry)) {
 			end(proxy);

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Reading ESRI ASCII grids: where heights lie, what is refused, damaged files.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <incise/surface.h>
+#include "../base/temp_file.h"
+#include "solid.h"
+
+static const double here[3];
+
+static struct incise_surface *load(const char *text, const double at[3],
+				   struct incise_error *err)
+{
+	struct temp_file file = temp_file_new("a.asc", text);
+	struct incise_surface *surface;
+
+	errno = 0;
+	surface = incise_surface_load_heights(file.path, at, err);
+	if (!surface)
+		assert_int_equal(errno, err->code);
+	temp_file_free(&file);
+	return surface;
+}
+
+/* Of a grid at 10, 20 with cells of 2. */
+#define HEAD(x, y) "ncols 3\nnrows 2\n" x " 10\n" y " 20\ncellsize 2\n"
+#define CENTERS HEAD("xllcenter", "yllcenter")
+#define ROWS "1 2 3\n4 5 6\n"
+
+static double height(const struct incise_surface *surface, double x, double y)
+{
+	const double above[3] = {x, y, 100}, below[3] = {x, y, -100};
+	struct incise_touch touch;
+
+	return incise_surface_enters(surface, above, below, &touch) ? touch.point_mm[2]
+								    : NAN;
+}
+
+static void test_heights_lie_where_they_belong(void **state)
+{
+	static const struct {
+		const char *text;
+		double x0, y0; /* of the lower left height */
+	} cases[] = {
+		{CENTERS ROWS, 10, 20},
+		{HEAD("xllcorner", "yllcorner") ROWS, 11, 21},
+		{HEAD("XLLCORNER", "YllCenter") "nodata_value -9999\n" ROWS, 11, 20},
+		{CENTERS "1 2 3 4\n\n5\r\n6", 10, 20},
+	};
+
+	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
+		struct incise_error err = {0};
+		struct incise_surface *surface =
+			load(cases[k].text, (double[3]){100, 0, 0.5}, &err);
+		double x0 = cases[k].x0 + 100, y0 = cases[k].y0;
+
+		if (!surface)
+			fail_msg("case %zu: %s", k, err.text);
+		assert_int_equal(incise_surface_triangles(surface), 4);
+		assert_int_equal(incise_surface_kind(surface), INCISE_SURFACE_HEIGHTS);
+		for (int i = 0; i < 3; i++) {
+			assert_true(height(surface, x0 + 2 * i, y0) == 4.5 + i);
+			assert_true(height(surface, x0 + 2 * i, y0 + 2) == 1.5 + i);
+		}
+		assert_true(fabs(height(surface, x0 + 0.3, y0 + 1) - 3.15) < 1e-12);
+		assert_true(isnan(height(surface, x0 - 0.01, y0 + 1)));
+		incise_surface_free(surface);
+	}
+}
+
+static void test_bad_files(void **state)
+{
+	static const struct {
+		const char *text;
+		int code, line;
+		const char *what;
+	} cases[] = {
+		{"", EINVAL, 1, "the header ends"},
+		{"ncols 3\nnrows 2\n" ROWS, EINVAL, 3, "the header ends"},
+		{"ncols 3\nncols 3\n", EINVAL, 2, "there already"},
+		{"ncols 3\ncolour 3\n", EINVAL, 2, "no known key"},
+		{"ncols three\n", EINVAL, 1, "'three' is no number"},
+		{"ncols\n3\n", EINVAL, 1, "is no number"},
+		{"ncols 3 4\n", EINVAL, 1, "more than one value"},
+		{HEAD("xllcenter", "xllcorner") ROWS, EINVAL, 6, "the header ends"},
+		{"ncols 1\nnrows 2\nxllcenter 0\nyllcenter 0\ncellsize 2\n1 2\n", EINVAL,
+		 6, "ncols is 1"},
+		{"ncols 2.5\nnrows 2\nxllcenter 0\nyllcenter 0\ncellsize 2\n1 2\n",
+		 EINVAL, 6, "ncols is 2.5"},
+		{"ncols 1e30\nnrows 2\nxllcenter 0\nyllcenter 0\ncellsize 2\n1\n", EINVAL,
+		 6, "ncols is 1e+30"},
+		{"ncols 2\nnrows 2\nxllcenter 0\nyllcenter 0\ncellsize 0\n1\n", EINVAL, 6,
+		 "cellsize is 0"},
+		{"ncols 2\nnrows 2\nxllcenter 1e9\nyllcenter 0\ncellsize 1\n1\n", EINVAL,
+		 6, "is its unit mm"},
+		{"ncols 2000\nnrows 2000\nxllcenter 0\nyllcenter 0\ncellsize 1\n1\n",
+		 E2BIG, 0, "more than 4000000"},
+		{CENTERS "1 2 3\n4 5\n", EINVAL, 7, "ends before height 3 of row 2"},
+		{CENTERS "1 2 3\n4 5 6\n7\n", EINVAL, 8, "'7' after the last"},
+		{CENTERS "1 2 3\n4 x 6\n", EINVAL, 7,
+		 "'x' is no height (column 2, row 2)"},
+		{CENTERS "1 2 3\n4 nan 6\n", EINVAL, 7, "'nan'"},
+		{CENTERS "nan 2 3\n4 5 6\n", EINVAL, 6, "'nan'"},
+		{CENTERS "1 2 3\n4 inf 6\n", EINVAL, 7, "'inf'"},
+		{CENTERS "NODATA_value -9999\n1 2 3\n4 -9999.0 6\n", EINVAL, 8,
+		 "a hole (NODATA) in column 2, row 2"},
+	};
+
+	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
+		struct incise_error err = {0};
+		struct incise_surface *surface = load(cases[k].text, here, &err);
+		char place[32];
+
+		if (surface)
+			fail_msg("case %zu was taken", k);
+		assert_int_equal(err.code, cases[k].code);
+		snprintf(place, sizeof(place), "a.asc:%d: ", cases[k].line);
+		if ((cases[k].line && !strstr(err.text, place)) ||
+		    !strstr(err.text, cases[k].what))
+			fail_msg("case %zu: %s", k, err.text);
+	}
+}
+
+static void test_damaged_files(void **state)
+{
+	static const char whole[] = CENTERS "NODATA_value -9999\n" ROWS;
+	static const char odd[] = "0123456789+-.eE \n\r\tnx\x80\xff";
+	uint64_t random = 88172645463325252u;
+	int taken = 0, refused = 0;
+
+	for (int k = 0; k < 3000; k++) {
+		struct incise_error err = {0};
+		struct incise_surface *surface;
+		char text[sizeof(whole)];
+
+		memcpy(text, whole, sizeof(whole));
+		for (int i = 0; i < 1 + k % 3; i++)
+			text[(size_t)(solid_random(&random) * (sizeof(whole) - 1))] =
+				odd[(size_t)(solid_random(&random) * (sizeof(odd) - 1))];
+		if (k % 11 == 0)
+			text[(size_t)(solid_random(&random) * sizeof(whole))] = '\0';
+		surface = load(text, here, &err);
+		if (surface) {
+			struct incise_touch touch;
+
+			taken++;
+			incise_surface_top(surface, &touch);
+			assert_true(v3_finite(touch.point_mm) && v3_finite(touch.normal));
+			incise_surface_free(surface);
+		} else {
+			refused++;
+			assert_true(err.code == EINVAL || err.code == E2BIG);
+			assert_non_null(strstr(err.text, "a.asc:"));
+		}
+	}
+	assert_true(taken > 100 && refused > 100);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_heights_lie_where_they_belong),
+		cmocka_unit_test(test_bad_files),
+		cmocka_unit_test(test_damaged_files),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

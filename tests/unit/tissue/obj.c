@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Reading OBJ files: what is taken, what is refused and with which words, and that no
+ * damage to a file does more than that.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <incise/surface.h>
+#include "../base/temp_file.h"
+#include "solid.h"
+
+static const double here[3];
+
+static struct incise_surface *load(const char *text, const double at[3],
+				   struct incise_error *err)
+{
+	struct temp_file file = temp_file_new("a.obj", text);
+	struct incise_surface *surface;
+
+	errno = 0;
+	surface = incise_surface_load_mesh(file.path, at, err);
+	if (!surface)
+		assert_int_equal(errno, err->code);
+	temp_file_free(&file);
+	return surface;
+}
+
+#define TRIANGLE "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+#define SQUARE TRIANGLE "v 1 1 0\n"
+
+static void test_good_files(void **state)
+{
+	static const struct {
+		const char *text;
+		size_t triangles;
+	} cases[] = {
+		{TRIANGLE "f 1 2 3\n", 1},
+		{TRIANGLE "f 1 2 3", 1},
+		{TRIANGLE "f -3 -2 -1\n", 1},
+		{"# by hand\r\nv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n", 1},
+		{"\n\n  v\t0 0   0 \nv +1.0e0 .0 0.\nv 0 1E0 0 # last\n f 1 2 3 # all\n",
+		 1},
+		{TRIANGLE "vt 0 0\nvn 0 0 1\nf 1/1 2/1 3/1\n", 1},
+		{TRIANGLE "vt 0.5\nvn 0 0 1\nf 1//1 2//-1 3//1\n", 1},
+		{TRIANGLE "vt 0 0 0\nvn 0 0 1\nf 1/1/1 2/-1/1 3/1/-1\n", 1},
+		{SQUARE "f 1 2 4 3\n", 2},
+		{SQUARE "f 1 2 4\nf 1 4 3\n", 2},
+		/* a corner written twice is one */
+		{SQUARE "v 0.0 0 -0\nv 1 1.0 0\nf 1 2 4\nf 5 6 3\n", 2},
+		/* colours, groups, materials, lines, parameters */
+		{"v 0 0 0 1 0 0\nv 1 0 0 1\nv 0 1 0\nvp 1\ng a\nusemtl b\nl 1 2\ns 1\nf 1 "
+		 "2 3\n",
+		 1},
+		/* two fans that share a point only */
+		{TRIANGLE "v -1 0 0\nv 0 -1 0\nf 1 2 3\nf 1 4 5\n", 2},
+		{"v 0 0 0\nv 1 0 0\nv 0.5 1e-6 0\nf 1 2 3\n", 1},
+	};
+
+	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
+		struct incise_error err = {0};
+		struct incise_surface *surface = load(cases[k].text, here, &err);
+
+		if (!surface)
+			fail_msg("case %zu: %s", k, err.text);
+		assert_int_equal(incise_surface_triangles(surface), cases[k].triangles);
+		assert_int_equal(incise_surface_kind(surface), INCISE_SURFACE_MESH);
+		incise_surface_free(surface);
+	}
+}
+
+static void test_bad_files(void **state)
+{
+	static const struct {
+		const char *text;
+		int line;
+		const char *what;
+	} cases[] = {
+		{"", 0, "no triangle"},
+		{TRIANGLE, 0, "no triangle"},
+		{"v 0 0\n", 1, "with 2 numbers"},
+		{"v 0 0 0 0 0 0 0 0\n", 1, "more than 7"},
+		{"v 0 0 zero\n", 1, "'zero' is no number"},
+		{"v 0 0 0\nv 0 0 nan\n", 2, "'nan'"},
+		{"v 0 0 inf\n", 1, "'inf'"},
+		{"v 0 0 0x10\n", 1, "'0x10'"},
+		{"v 0 0 1e999\n", 1, "'1e999'"},
+		{"v 0 0 1,5\n", 1, "'1,5'"},
+		{"v 0 0 1e\n", 1, "'1e'"},
+		{"v 0 0 -\n", 1, "'-'"},
+		{"v 0 0 1e6\n", 1, "is its unit mm"},
+		{"vt\n", 1, "with 0 numbers"},
+		{"vt 1e9\n", 1, "no texture coordinate"},
+		{"vn 0 0\n", 1, "with 2 numbers"},
+		{TRIANGLE "f 1 2\n", 4, "with 2 corners"},
+		{TRIANGLE "f\n", 4, "with 0 corners"},
+		{TRIANGLE "f 1 2 4\n", 4, "no v 4 among the 3"},
+		{TRIANGLE "f 0 1 2\n", 4, "no v 0"},
+		{TRIANGLE "f -4 1 2\n", 4, "no v -4"},
+		{TRIANGLE "f 99999999999 1 2\n", 4, "is no index"},
+		{TRIANGLE "f 1 2 3/1\n", 4, "no vt 1 among the 0"},
+		{TRIANGLE "f 1 2 3//1\n", 4, "no vn 1"},
+		{TRIANGLE "f 1 2 3/\n", 4, "is no index"},
+		{TRIANGLE "vt 0 0\nvn 0 0 1\nf 1/1/1/1 2 3\n", 6, "expected v, v/vt"},
+		{TRIANGLE "f 1 2 three\n", 4, "'three' is no index"},
+		{TRIANGLE "f 1 2 3.0\n", 4, "expected v"},
+		{TRIANGLE "f 1 2 \\\n3\n", 4, "is no index"},
+		{TRIANGLE "f 1 2 2\n", 4, "without area"},
+		{TRIANGLE "v 2 0 0\nf 1 2 3\nf 1 2 4\n", 6, "without area"},
+		{TRIANGLE "v 1 0 0\nf 1 2 4\n", 5, "without area"},
+		{"v 0 0 0\nv 1 0 0\nv 0.5 1e-10 0\nf 1 2 3\n", 4, "without area"},
+		{SQUARE "v 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 5 2\n", 8, "more than two"},
+		{TRIANGLE "f 1 2 3\nf 1 2 3\nf 2 1 3\n", 6, "more than two"},
+		{SQUARE "f 1 2 4\nf 1 3 4\n", 6, "turns the other way"},
+		{TRIANGLE "f 1 2 3\nf 1 2 3\n", 5, "turns the other way"},
+	};
+
+	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
+		struct incise_error err = {0};
+		struct incise_surface *surface = load(cases[k].text, here, &err);
+		char place[32];
+
+		if (surface)
+			fail_msg("case %zu was taken", k);
+		assert_int_equal(err.code, EINVAL);
+		snprintf(place, sizeof(place), "a.obj:%d: ", cases[k].line);
+		if ((cases[k].line && !strstr(err.text, place)) ||
+		    !strstr(err.text, cases[k].what))
+			fail_msg("case %zu: %s", k, err.text);
+	}
+}
+
+static void test_files_that_are_none(void **state)
+{
+	struct incise_error err = {0};
+
+	assert_null(incise_surface_load_mesh("/nowhere/a.obj", here, &err));
+	assert_int_equal(err.code, ENOENT);
+	assert_int_equal(errno, ENOENT);
+	assert_null(incise_surface_load_mesh("/tmp", here, &err));
+	assert_int_equal(err.code, EISDIR);
+	assert_null(incise_surface_load_mesh("/dev/null", here, NULL));
+	assert_int_equal(errno, EINVAL);
+	assert_null(incise_surface_load_mesh("/dev/null", (double[3]){NAN, 0, 0}, &err));
+	assert_int_equal(err.code, EINVAL);
+}
+
+static void test_placed_and_numbered(void **state)
+{
+	struct incise_error err = {0};
+	struct incise_surface *surface =
+		load(SQUARE
+		     "vt 0 0\nvt 1 0\nvt 1 0.5\nvt 0 0.5\nf 1/1 2/2 4/3\nf 1/1 4/3 3/4\n",
+		     (double[3]){10, 20, 30}, &err);
+	struct incise_touch touch;
+
+	assert_non_null(surface);
+	incise_surface_nearest(surface, (double[3]){10.75, 20.25, 31}, &touch);
+	assert_int_equal(touch.face, 0);
+	assert_true(touch.depth_mm == -1 && touch.normal[2] == 1);
+	/* u = x, v = y/2; texture coordinates are floats */
+	assert_true(fabs(touch.uv[0] - 0.75) < 1e-7 && fabs(touch.uv[1] - 0.125) < 1e-7);
+	incise_surface_nearest(surface, (double[3]){10.25, 20.75, 29}, &touch);
+	assert_int_equal(touch.face, 1);
+	assert_true(touch.depth_mm == 1);
+	assert_true(fabs(touch.uv[0] - 0.25) < 1e-7 && fabs(touch.uv[1] - 0.375) < 1e-7);
+	incise_surface_free(surface);
+}
+
+/* Bytes changed, cut off, doubled: each file is read or refused, and what is read works. */
+static void test_damaged_files(void **state)
+{
+	static const char whole[] =
+		"# a roof\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nv -1 0.5 -2e-1\n"
+		"vt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\n"
+		"f 1/1/1 2/2/1 4/3/1 3/1/1\nf -5/1 -3/2 -1/3\n";
+	static const char odd[] = "0123456789+-./eE# \n\r\tvftn\\\x80\xff";
+	uint64_t random = 88172645463325252u;
+	int taken = 0, refused = 0;
+
+	for (int k = 0; k < 3000; k++) {
+		struct incise_error err = {0};
+		struct incise_surface *surface;
+		char text[2 * sizeof(whole)];
+		size_t n = sizeof(whole) - 1;
+
+		memcpy(text, whole, sizeof(whole));
+		for (int i = 0; i < 1 + k % 3; i++) {
+			size_t at = (size_t)(solid_random(&random) * (double)n);
+
+			if (k % 7 == 0 && n > 20) {
+				memmove(text + at, text + at + 1, n - at);
+				n--;
+			} else {
+				text[at] = odd[(size_t)(solid_random(&random) *
+							(sizeof(odd) - 1))];
+			}
+		}
+		if (k % 11 == 0)
+			text[(size_t)(solid_random(&random) * (double)n)] = '\0';
+		surface = load(text, here, &err);
+		if (surface) {
+			struct incise_touch touch;
+
+			taken++;
+			incise_surface_nearest(surface, (double[3]){0.3, 0.4, 0.5},
+					       &touch);
+			assert_true(v3_finite(touch.point_mm) && v3_finite(touch.normal));
+			assert_true(isfinite(touch.depth_mm) && isfinite(touch.uv[0]));
+			incise_surface_top(surface, &touch);
+			assert_true(v3_finite(touch.point_mm));
+			incise_surface_free(surface);
+		} else {
+			refused++;
+			assert_int_equal(err.code, EINVAL);
+			assert_non_null(strstr(err.text, "a.obj:"));
+			assert_null(strchr(err.text, '\n'));
+		}
+	}
+	assert_true(taken > 200 && refused > 200);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_good_files),
+		cmocka_unit_test(test_bad_files),
+		cmocka_unit_test(test_files_that_are_none),
+		cmocka_unit_test(test_placed_and_numbered),
+		cmocka_unit_test(test_damaged_files),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,483 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Contacts: where they begin and end, on every kind of surface; ridges, creases, corners,
+ * folds, borders and slivers; and any pose whatever.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <float.h>
+#include <incise/surface.h>
+#include "solid.h"
+#include "wavy.h"
+
+static const double origin[3], up[3] = {0, 0, 1};
+
+static void move(struct incise_proxy *proxy, double x, double y, double z)
+{
+	incise_proxy_move(proxy, (double[3]){x, y, z});
+}
+
+/* Move in a straight line of @n ticks. */
+static void drag(struct incise_proxy *proxy, double x, double y, double z, int n)
+{
+	double from[3];
+
+	v3_copy(from, proxy->tool_mm);
+	for (int i = 1; i <= n; i++)
+		move(proxy, from[0] + (x - from[0]) * i / n,
+		     from[1] + (y - from[1]) * i / n, from[2] + (z - from[2]) * i / n);
+}
+
+static void assert_at(const struct incise_proxy *proxy, double x, double y, double z)
+{
+	const double p[3] = {x, y, z};
+
+	assert_true(proxy->touching);
+	/* a few millimetres, a few operations */
+	if (v3_distance2(proxy->touch.point_mm, p) > 1e-24)
+		fail_msg("at %g %g %g, not at %g %g %g", proxy->touch.point_mm[0],
+			 proxy->touch.point_mm[1], proxy->touch.point_mm[2], x, y, z);
+}
+
+/* A surface of each kind around the origin, whose top is at 0, 0, 1 or near it. */
+static struct incise_surface *of_kind(int kind)
+{
+	const struct wavy wavy = {30, 20, 1, 8};
+	struct solid *cube;
+	struct incise_surface *surface;
+
+	switch (kind) {
+	case 0:
+		return incise_surface_new_plane(up, up, NULL);
+	case 1:
+		return incise_surface_new_sphere(origin, 1, NULL);
+	case 2:
+		return incise_surface_new_capsule(origin, (double[3]){3, 1, 0}, 1, NULL);
+	case 3:
+		return wavy_surface(&wavy);
+	default:
+		cube = solid_cube();
+		surface = solid_surface(cube);
+		free(cube);
+		return surface;
+	}
+}
+
+#define N_KINDS 5
+
+/* Down onto the top of a plane, a sphere, a capsule and a cube, and up again. */
+static void test_begins_and_ends(void **state)
+{
+	for (int kind = 0; kind < N_KINDS; kind++) {
+		struct incise_surface *surface = of_kind(kind);
+		struct incise_proxy proxy;
+
+		if (kind == 3) {
+			incise_surface_free(surface);
+			continue;
+		}
+		incise_proxy_init(&proxy, surface, 0.05);
+		move(&proxy, 0, 0, 1.5);
+		assert_false(proxy.touching);
+		move(&proxy, 0, 0, 1.01);
+		assert_false(proxy.touching || proxy.began);
+		move(&proxy, 0, 0, 0.9);
+		assert_true(proxy.touching && proxy.began && proxy.settled);
+		assert_true(fabs(proxy.touch.depth_mm - 0.1) < 1e-15);
+		assert_true(fabs(proxy.touch.normal[2] - 1) < 1e-15);
+		assert_true(fabs(proxy.first.depth_mm) == 0);
+		assert_true(v3_distance2(proxy.first.point_mm, up) < 1e-30);
+		assert_at(&proxy, 0, 0, 1);
+		move(&proxy, 0, 0, 1.04);
+		assert_true(proxy.touching && !proxy.began);
+		assert_true(fabs(proxy.touch.depth_mm + 0.04) < 1e-15);
+		move(&proxy, 0, 0, 1.06);
+		assert_false(proxy.touching || proxy.began);
+		/* a tool that ends on the surface touches it */
+		move(&proxy, 0, 0, 1);
+		assert_true(proxy.touching && proxy.began);
+		assert_true(fabs(proxy.touch.depth_mm) == 0);
+		/* no number is no move */
+		move(&proxy, 0, NAN, 0);
+		assert_true(proxy.touching && !proxy.began && proxy.tool_mm[2] == 1);
+		incise_surface_free(surface);
+	}
+}
+
+static void test_first_place_of_all(void **state)
+{
+	for (int kind = 0; kind < N_KINDS; kind++) {
+		struct incise_surface *surface = of_kind(kind);
+		struct incise_proxy proxy;
+
+		incise_proxy_init(&proxy, surface, 0);
+		move(&proxy, 0.2, 0.1, -0.3);
+		assert_true(proxy.touching && proxy.began);
+		assert_true(proxy.touch.depth_mm > 0);
+		assert_memory_equal(&proxy.touch, &proxy.first, sizeof(proxy.first));
+		incise_proxy_init(&proxy, surface, 0);
+		move(&proxy, 0.2, 0.1, 30);
+		assert_false(proxy.touching || proxy.began);
+		incise_surface_free(surface);
+	}
+}
+
+/* Through a sphere in one tick: the way entered it and has left it. */
+static void test_through_a_ball(void **state)
+{
+	struct incise_surface *surface = of_kind(1);
+	struct incise_proxy proxy;
+
+	incise_proxy_init(&proxy, surface, 0.05);
+	move(&proxy, 0, 0, 5);
+	move(&proxy, 0, 0, -5);
+	assert_false(proxy.touching || proxy.began);
+	/* the centre keeps the direction that led to it */
+	move(&proxy, -0.5, 0, 0);
+	move(&proxy, 0, 0, 0);
+	assert_at(&proxy, -1, 0, 0);
+	incise_surface_free(surface);
+}
+
+/* Through a cube in one tick: the proxy stays on the side that was entered. */
+static void test_through_a_cube(void **state)
+{
+	struct incise_surface *surface = of_kind(4);
+	struct incise_proxy proxy;
+
+	incise_proxy_init(&proxy, surface, 0.05);
+	move(&proxy, 0.25, 0.5, 5);
+	move(&proxy, 0.25, 0.5, -5);
+	assert_at(&proxy, 0.25, 0.5, 1);
+	assert_true(proxy.touch.depth_mm == 6);
+	drag(&proxy, 0.25, 0.5, 1.01, 100);
+	assert_at(&proxy, 0.25, 0.5, 1);
+	drag(&proxy, 0.25, 0.5, 1.06, 1);
+	assert_false(proxy.touching);
+	incise_surface_free(surface);
+}
+
+/* Over an edge and around a corner of a cube, along an edge, exactly on it. */
+static void test_cube(void **state)
+{
+	struct incise_surface *surface = of_kind(4);
+	struct incise_proxy proxy;
+
+	incise_proxy_init(&proxy, surface, 0.05);
+	move(&proxy, 0, 0, 1.5);
+	drag(&proxy, 0, 0, 0.9, 20);
+	drag(&proxy, 0.5, 0.25, 0.9, 20);
+	assert_at(&proxy, 0.5, 0.25, 1);
+	/* nearer to +x than to the top: it goes over the edge when its face ends only */
+	drag(&proxy, 0.95, 0.25, 0.9, 20);
+	assert_at(&proxy, 0.95, 0.25, 1);
+	drag(&proxy, 1.01, 0.25, 0.9, 20);
+	/* 0.1 of a way of its own, which the tool has not paid for yet */
+	assert_true(proxy.touching && !proxy.settled && proxy.touch.depth_mm >= -0.05);
+	assert_true(proxy.touch.point_mm[0] == 1 && proxy.touch.point_mm[2] > 0.9);
+	drag(&proxy, 1.01, 0.25, 0.7, 20);
+	assert_at(&proxy, 1, 0.25, 0.7);
+	assert_true(fabs(proxy.touch.normal[0] - 1) < 1e-15);
+	assert_true(fabs(proxy.touch.depth_mm + 0.01) < 1e-15);
+	/* along the edge, with the tool on it */
+	drag(&proxy, 1, 0.25, 1, 20);
+	assert_at(&proxy, 1, 0.25, 1);
+	for (int i = 0; i < 50; i++) {
+		move(&proxy, 1, 0.25 - i * 0.02, 1);
+		assert_at(&proxy, 1, 0.25 - i * 0.02, 1);
+		assert_true(proxy.touch.depth_mm == 0);
+	}
+	/* around the corner on a ring just outside of it */
+	drag(&proxy, 1.01, -1.01, 1.01, 50);
+	assert_at(&proxy, 1, -1, 1);
+	/* 0.01 √3 outside, along the middle of three faces */
+	assert_true(fabs(proxy.touch.depth_mm + 0.01 * sqrt(3)) < 1e-14);
+	assert_true(fabs(proxy.touch.normal[0] - sqrt(1 / 3.0)) < 1e-14);
+	drag(&proxy, 0.5, -1.01, 0.5, 50);
+	assert_at(&proxy, 0.5, -1, 0.5);
+	drag(&proxy, 0.5, -1.06, 0.5, 5);
+	assert_false(proxy.touching);
+	incise_surface_free(surface);
+}
+
+/*
+ * A groove of 60°, 2 mm wide. From the left wall's tissue through the air to the right
+ * wall's: each contact begins on its own wall.
+ *
+ *    ────╲    ╱────
+ *         ╲  ╱
+ *          ╲╱
+ */
+static void test_crease(void **state)
+{
+	static const double profile[][2] = {
+		{10, 0}, {1, 0}, {0, -1.7320508075688772}, {-1, 0}, {-10, 0}};
+	struct solid *s = solid_profile(profile, 5, 3);
+	struct incise_surface *surface = solid_surface(s);
+	struct incise_proxy proxy;
+	int began = 0;
+
+	incise_proxy_init(&proxy, surface, 0.02);
+	move(&proxy, -3, 0.7, 1);
+	drag(&proxy, -3, 0.7, -0.3, 50);
+	assert_at(&proxy, -3, 0.7, 0);
+	for (int i = 0; i <= 300; i++) {
+		move(&proxy, -3 + 0.02 * i, 0.7, -0.3);
+		began += proxy.began;
+		/* 0.3 deep the groove's air is from -0.827 to 0.827 */
+		if (fabs(proxy.tool_mm[0]) < 0.78)
+			assert_false(proxy.touching);
+		if (fabs(proxy.tool_mm[0]) > 0.84)
+			assert_true(proxy.touching);
+	}
+	assert_int_equal(began, 1);
+	/* 1.5 below the bottom, from wall to wall: the bottom holds it, and lets it go */
+	drag(&proxy, 0, 0.7, -3.2, 200);
+	drag(&proxy, 0, 0.71, -3.2, 50);
+	assert_at(&proxy, 0, 0.71, -1.7320508075688772);
+	assert_true(fabs(proxy.touch.normal[0]) < 1e-15);
+	/* in one leap from the left wall through the air: the right wall has it then */
+	incise_proxy_init(&proxy, surface, 0.02);
+	move(&proxy, -0.9, 0, -0.3);
+	assert_true(proxy.touching);
+	move(&proxy, 1.2, 0, -0.3);
+	assert_true(proxy.touching && proxy.began);
+	assert_true(proxy.first.point_mm[0] > 0);
+	incise_surface_free(surface);
+	free(s);
+}
+
+/* A ridge of 60° and a saw of such: the tool below is never lost. */
+static void test_ridge_and_saw(void **state)
+{
+	static const double ridge[][2] = {
+		{10, 0}, {1, 0}, {0, 1.7320508075688772}, {-1, 0}, {-10, 0}};
+	double saw[40][2];
+	struct incise_surface *surface;
+	struct incise_proxy proxy;
+	struct solid *s = solid_profile(ridge, 5, 4);
+
+	surface = solid_surface(s);
+	incise_proxy_init(&proxy, surface, 0.02);
+	move(&proxy, -5, 0, 1);
+	drag(&proxy, -5, 0.3, -0.5, 50);
+	/*
+	 * 0.5 below, the near flank's nearest point comes to the top when the tool is at
+	 * (2 + 0.433)/0.5 - 1 = 3.87; from there the proxy goes 2 mm down and 8.5 on, in
+	 * twice the tool's 5.63.
+	 */
+	drag(&proxy, 3.85, 0.3, -0.5, 500);
+	assert_true(proxy.touch.point_mm[0] < 0 && proxy.touch.point_mm[2] > 1.7);
+	drag(&proxy, 9.5, 0.3, -0.5, 500);
+	assert_at(&proxy, 9.5, 0.3, 0);
+	incise_surface_free(surface);
+	free(s);
+
+	for (int i = 0; i < 40; i++) {
+		saw[i][0] = 10 - 20 * i / 39.0;
+		saw[i][1] = i & 1 ? 0.5 : 0;
+	}
+	s = solid_profile(saw, 40, 4);
+	surface = solid_surface(s);
+	incise_proxy_init(&proxy, surface, 0.02);
+	move(&proxy, -7, 0.3, 1);
+	drag(&proxy, -7, 0.3, -0.2, 50);
+	for (int i = 0; i < 1000; i++) {
+		move(&proxy, -7 + 0.014 * i, 0.3, -0.2);
+		assert_true(proxy.touching);
+		/* a flank of 44° holds the tool back by its depth at most, and one tooth */
+		assert_true(fabs(proxy.touch.point_mm[0] - proxy.tool_mm[0]) <
+			    0.7 + 0.52);
+	}
+	incise_surface_free(surface);
+	free(s);
+}
+
+/* A wedge, 0.2 mm thick 2 mm behind its edge: the proxy does not go through it. */
+static void test_thin_wedge(void **state)
+{
+	static const double wedge[][2] = {{0, -0.1}, {2, 0}, {0, 0.1}};
+	struct solid *s = solid_profile(wedge, 3, 5);
+	struct incise_surface *surface = solid_surface(s);
+	struct incise_proxy proxy;
+
+	incise_proxy_init(&proxy, surface, 0.02);
+	move(&proxy, 0.5, 0, 1);
+	drag(&proxy, 0.5, 0, -1, 67);
+	assert_true(proxy.touching && proxy.touch.point_mm[2] > 0.05);
+	/* out below, and still held by the upper side, which it has not left */
+	assert_true(proxy.touch.depth_mm > 1);
+	assert_true(proxy.touch.normal[2] > 0.9);
+	/* over the edge it may go, in steps of the surface */
+	drag(&proxy, 2.5, 0, 0, 100);
+	assert_false(proxy.touching);
+	incise_surface_free(surface);
+	free(s);
+}
+
+/* A sheet that ends: over its border contact ends, below it none begins from the side. */
+static void test_open_border(void **state)
+{
+	static const double flat[][2] = {{2, 0}, {0, 0}, {-2, 0}};
+	struct solid *s = solid_profile(flat, 3, 10);
+	struct incise_surface *surface = solid_surface(s);
+	struct incise_proxy proxy;
+
+	incise_proxy_init(&proxy, surface, 0.02);
+	move(&proxy, 1, 0.5, 1);
+	drag(&proxy, 1, 0.5, -0.5, 50);
+	drag(&proxy, 1.99, 0.5, -0.5, 50);
+	assert_at(&proxy, 1.99, 0.5, 0);
+	drag(&proxy, 2.01, 0.5, -0.5, 2);
+	assert_false(proxy.touching);
+	drag(&proxy, 1, 0.5, -0.5, 50);
+	assert_false(proxy.touching);
+	/* up through it from behind, and down again onto it */
+	drag(&proxy, 1, 0.5, 0.5, 50);
+	assert_false(proxy.touching);
+	drag(&proxy, 1, 0.5, -0.1, 50);
+	assert_at(&proxy, 1, 0.5, 0);
+	/* around a corner of the border, and first places beside it */
+	drag(&proxy, 1.5, 9.9, -0.1, 500);
+	assert_at(&proxy, 1.5, 9.9, 0);
+	drag(&proxy, 2.5, 10.5, -0.1, 50);
+	assert_false(proxy.touching);
+	incise_proxy_init(&proxy, surface, 0.02);
+	move(&proxy, 2.5, 0, -0.1);
+	assert_false(proxy.touching);
+	incise_surface_free(surface);
+	free(s);
+}
+
+/* Strips 20 mm long and 20 nm wide: over, along and across them. */
+static void test_slivers(void **state)
+{
+	struct solid *s = solid_new();
+	struct incise_surface *surface;
+	struct incise_proxy proxy;
+
+	for (int i = 0; i <= 200; i++) {
+		/* 2 mm, 100 strips of 20 nm, 2 mm */
+		double x = i < 51 ? -2 + 0.04 * i : i < 151 ? (i - 50) * 2e-5 : 0;
+
+		if (i >= 151)
+			x = 100 * 2e-5 + 0.04 * (i - 150);
+		solid_point(s, x, -10, 0.01 * x * x);
+		solid_point(s, x, 10, 0.01 * x * x);
+	}
+	for (uint32_t i = 0; i < 200; i++)
+		solid_square(s, 2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1);
+	surface = solid_surface(s);
+	incise_proxy_init(&proxy, surface, 0.02);
+	move(&proxy, -1, 0, 1);
+	drag(&proxy, -1, 0, -1, 50);
+	for (int i = 0; i < 1000; i++) {
+		double x = -1 + 0.002 * i, y = 3 * sin(i * 0.01);
+
+		move(&proxy, x, y, -1);
+		assert_true(proxy.touching);
+		/* the slope is 0.02 at most and the depth 1: so far a proxy may be aside */
+		assert_true(fabs(proxy.touch.point_mm[0] - x) < 0.025);
+		assert_true(fabs(proxy.touch.point_mm[1] - y) < 1e-6);
+		assert_true(fabs(proxy.touch.point_mm[2] -
+				 0.01 * pow(proxy.touch.point_mm[0], 2)) < 1e-5);
+	}
+	incise_surface_free(surface);
+	free(s);
+}
+
+/* A tool on the mesh itself, on a face, on edges and on corners. */
+static void test_on_the_surface(void **state)
+{
+	struct solid *s = solid_sphere(10 / 3.0, 2);
+	struct incise_surface *surface = solid_surface(s);
+	struct incise_proxy proxy;
+
+	incise_proxy_init(&proxy, surface, 0.01);
+	move(&proxy, 0, 0, 5);
+	drag(&proxy, 0, 0, 3, 50);
+	for (uint32_t f = 0; f < s->n_triangles; f++) {
+		for (int i = 0; i < 7; i++) {
+			const double *a = s->point[s->corner[f][i % 3]];
+			const double *b = s->point[s->corner[f][(i + 1) % 3]];
+			const double *c = s->point[s->corner[f][(i + 2) % 3]];
+			double share = i < 3 ? 0 : i < 6 ? 0.25 : 0.375, at[3];
+			double third = i < 6 ? 0 : 0.125;
+
+			for (int k = 0; k < 3; k++)
+				at[k] = (1 - share - third) * a[k] + share * b[k] +
+					third * c[k];
+			drag(&proxy, 0.9 * at[0], 0.9 * at[1], 0.9 * at[2], 20);
+			/* from deep below it may rest on the face beside; so up slowly */
+			drag(&proxy, at[0], at[1], at[2], 20);
+			drag(&proxy, at[0] * (1 - 1e-15), at[1], at[2], 3);
+			assert_true(proxy.touching);
+			assert_true(fabs(proxy.touch.depth_mm) < 1e-12);
+			assert_true(v3_distance2(proxy.touch.point_mm, at) < 1e-24);
+		}
+	}
+	incise_surface_free(surface);
+	free(s);
+}
+
+/* Any pose whatever, leaps of metres and the ends of double: all results are numbers. */
+static void test_any_pose(void **state)
+{
+	static const double odd[] = {0,	   -0.0,    1e-300,   5e-324,	1e300, -1e300,
+				     1e15, DBL_MAX, -DBL_MAX, INFINITY, NAN,   1,
+				     -1,   1e4,	    -1e4,     1e9};
+	uint64_t random = 88172645463325252u;
+
+	for (int kind = 0; kind < N_KINDS; kind++) {
+		struct incise_surface *surface = of_kind(kind);
+		struct incise_proxy proxy;
+
+		incise_proxy_init(&proxy, surface, kind & 1 ? 0 : 0.05);
+		for (int k = 0; k < 200000; k++) {
+			double tool[3], size = pow(10, 8 * solid_random(&random) - 4);
+			bool special = solid_random(&random) < 0.02;
+
+			if (k % 5000 == 0)
+				incise_proxy_init(&proxy, surface, proxy.leave_mm);
+			for (int i = 0; i < 3; i++) {
+				double step = size * (2 * solid_random(&random) - 1);
+
+				tool[i] = special ? odd[(int)(16 * solid_random(&random))]
+					  : fabs(proxy.tool_mm[i]) > 3
+						  ? 3 * solid_random(&random)
+						  : proxy.tool_mm[i] + step;
+			}
+			incise_proxy_move(&proxy, tool);
+			assert_true(v3_finite(proxy.tool_mm));
+			assert_true(v3_finite(proxy.touch.point_mm));
+			assert_true(isfinite(proxy.touch.depth_mm));
+			assert_true(isfinite(proxy.clear_mm));
+			assert_true(fabs(v3_length(proxy.touch.normal) - 1) < 1e-12);
+			assert_true(proxy.touching || !proxy.began);
+		}
+		incise_surface_free(surface);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_begins_and_ends),
+		cmocka_unit_test(test_first_place_of_all),
+		cmocka_unit_test(test_through_a_ball),
+		cmocka_unit_test(test_through_a_cube),
+		cmocka_unit_test(test_cube),
+		cmocka_unit_test(test_crease),
+		cmocka_unit_test(test_ridge_and_saw),
+		cmocka_unit_test(test_thin_wedge),
+		cmocka_unit_test(test_open_border),
+		cmocka_unit_test(test_slivers),
+		cmocka_unit_test(test_on_the_surface),
+		cmocka_unit_test(test_any_pose),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
