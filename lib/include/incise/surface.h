@@ -12,7 +12,7 @@
  * proxy is the nearest point. On a mesh it is the nearest point that can be reached by
  * gliding over the surface from where the proxy was, so that it does not jump to the
  * other side of a fold; a height field is a mesh of two triangles per cell. All lengths
- * in mm, in one frame, the tracker's.
+ * in mm, in one frame, the tracker's; none of a surface beyond 1e5.
  */
 #ifndef INCISE_SURFACE_H
 #define INCISE_SURFACE_H
@@ -39,7 +39,7 @@ struct incise_touch {
 	double point_mm[3]; /**< of the surface */
 	/** Outward unit normal there; on an edge or corner of a mesh between its faces'. */
 	double normal[3];
-	double depth_mm; /**< distance; > 0 inside, < 0 outside */
+	double depth_mm; /**< distance; > 0 inside, < 0 outside; at a border its side's */
 	int face;	 /**< of a mesh, from 0 in the file's order; else -1 */
 	double uv[2];	 /**< texture coordinates there; 0, 0 where there are none */
 };
@@ -51,7 +51,7 @@ INCISE_API struct incise_surface *incise_surface_new_plane(const double point_mm
 							   const double normal[3],
 							   struct incise_error *err);
 
-/** @return surface; NULL with errno EINVAL (not finite, radius not above 0), ENOMEM. */
+/** @return surface; NULL: EINVAL (not finite, radius below 1e-6), ENOMEM. */
 INCISE_API struct incise_surface *incise_surface_new_sphere(const double centre_mm[3],
 							    double radius_mm,
 							    struct incise_error *err);
@@ -65,7 +65,8 @@ INCISE_API struct incise_surface *incise_surface_new_capsule(const double a_mm[3
 /**
  * Read a triangle mesh: a Wavefront OBJ with `v`, `vt` and `f`; other statements are
  * passed over. Faces turn counter-clockwise seen from outside; those with more than three
- * corners are cut into fans. Corners with equal coordinates are one. The mesh may be open.
+ * corners are cut into fans. Corners with equal coordinates are one. The mesh may be open;
+ * where parts of it meet in a point only, no proxy passes through that point.
  *
  * The content is not trusted: every number and index is checked, and an error names file
  * and line.
@@ -73,8 +74,9 @@ INCISE_API struct incise_surface *incise_surface_new_capsule(const double a_mm[3
  * @param path   file
  * @param at_mm  added to all its coordinates
  * @return surface, to be freed with incise_surface_free(); NULL with errno of fopen(3),
- *         EINVAL (malformed, no triangle, a triangle without area, an edge with more than
- *         two triangles or with two that turn opposite ways), E2BIG, ENOMEM.
+ *         EINVAL (malformed, no triangle, a triangle less than 1e-9 mm high, an edge with
+ *         more than two triangles or with two that turn opposite ways), E2BIG, EFBIG (2 GB
+ *         and more), ENOMEM.
  */
 INCISE_API struct incise_surface *incise_surface_load_mesh(const char *path,
 							   const double at_mm[3],
@@ -112,7 +114,8 @@ INCISE_API void incise_surface_top(const struct incise_surface *surface,
  *
  * @param p any finite point
  * @param touch result; finite, its normal of length 1. Real-time safe, in a time that
- *              grows with the logarithm of the number of triangles.
+ *              grows with the logarithm of the number of triangles; only where very many
+ *              are equally near, as in the middle of a sphere, does it look at all these.
  */
 INCISE_API void incise_surface_nearest(const struct incise_surface *surface,
 				       const double p[3], struct incise_touch *touch);
@@ -159,11 +162,21 @@ INCISE_API void incise_proxy_init(struct incise_proxy *proxy,
 				  const struct incise_surface *surface, double leave_mm);
 
 /**
- * Follow the tool to a new place. A contact begins where the way from the last place
- * enters the tissue, or at the nearest point when the first place of all lies inside. On
- * a mesh the proxy goes at most twice as far as the tool went.
+ * Follow the tool to a new place.
  *
- * @param tool_mm finite. Real-time safe.
+ * A contact begins where the way from the last place enters the tissue, or at the nearest
+ * point when the first place of all lies inside. It ends leave_mm outside, and where the
+ * proxy comes to the border of an open mesh with the tool beyond it. Where the way from a
+ * proxy that lets go enters another part of the mesh, a contact begins there in the same
+ * move: `began` is set again and `first` is new.
+ *
+ * On a mesh the proxy goes at most twice as far as the tool went, in a straight line from
+ * its old place to its new one; a tool that does not move leaves it where it is. What it
+ * could not go it goes with the next moves (`settled`). Its work is finite: after about
+ * 1000 triangles in one move it stays where it got to as well.
+ *
+ * @param tool_mm beyond 1e9 it counts as there; one that is not finite changes nothing but
+ *                `began`. Real-time safe.
  */
 INCISE_API void incise_proxy_move(struct incise_proxy *proxy, const double tool_mm[3]);
 

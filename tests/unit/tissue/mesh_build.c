@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * From points and triangles to a mesh: welding, neighbours, fans, order.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <incise/surface.h>
+#include "solid.h"
+
+/* What a mesh promises to those that walk on it. */
+static void check(const struct solid *s, const struct mesh *mesh)
+{
+	uint32_t *corners = calloc(mesh->n_vertices, sizeof(*corners));
+
+	for (uint32_t f = 0; f < mesh->n_triangles; f++) {
+		const uint32_t *c = s->corner[mesh->number[f]];
+
+		for (int i = 0; i < 3; i++) {
+			uint32_t a = mesh->corner[f][i], b = mesh->corner[f][(i + 1) % 3];
+			uint32_t g = mesh->neighbour[f][i];
+
+			corners[a]++;
+			assert_memory_equal(mesh->vertex[a], s->point[c[i]],
+					    sizeof(mesh->vertex[a]));
+			assert_true(fabs(v3_length(mesh->normal[a]) - 1) < 1e-12);
+			if (g == MESH_NONE)
+				continue;
+			/* back over the same edge, which runs the other way there */
+			i = mesh_corner_of(mesh, f, a);
+			assert_int_equal(mesh->neighbour[g][mesh_corner_of(mesh, g, b)],
+					 f);
+			assert_int_equal(
+				mesh->corner[g][(mesh_corner_of(mesh, g, b) + 1) % 3], a);
+		}
+	}
+	/* A walk around a vertex meets all of its corners, each once. */
+	for (uint32_t f = 0; f < mesh->n_triangles; f++) {
+		for (int i = 0; i < 3; i++) {
+			struct mesh_fan fan = mesh_fan(f, mesh->corner[f][i]);
+			uint32_t face, met = 0;
+
+			while (mesh_fan_face(mesh, &fan, &face))
+				met++;
+			assert_int_equal(met, corners[mesh->corner[f][i]]);
+		}
+	}
+	free(corners);
+}
+
+static void test_closed_open_and_bow_tie(void **state)
+{
+	struct solid *s[] = {solid_cube(), solid_sphere(2, 3), solid_new(), solid_new()};
+	static const uint32_t vertices[] = {8, 258, 4, 6};
+
+	/* two back to back, and a bow tie: one point, two vertices */
+	for (int k = 2; k < 4; k++) {
+		solid_point(s[k], 0, 0, 0);
+		solid_point(s[k], 1, 0, 0);
+		solid_point(s[k], 0, 1, 0);
+		solid_point(s[k], -1, 0, 0);
+		solid_point(s[k], 0, -1, 0);
+		solid_face(s[k], 0, 1, 2);
+	}
+	solid_face(s[2], 0, 2, 3);
+	solid_face(s[3], 0, 3, 4);
+	for (int k = 0; k < 4; k++) {
+		struct incise_surface *surface = solid_surface(s[k]);
+
+		/* Euler: 8 faces cut three times in four have 512/2 + 2 corners */
+		assert_int_equal(surface->mesh->n_vertices, vertices[k]);
+		check(s[k], surface->mesh);
+		assert_true(incise_surface_memory(surface) >
+			    surface->mesh->n_triangles * 28);
+		incise_surface_free(surface);
+		free(s[k]);
+	}
+}
+
+/* Two faces back to back enclose nothing: normals are still unit vectors. */
+static void test_two_back_to_back(void **state)
+{
+	struct solid *s = solid_new();
+	struct incise_surface *surface;
+	struct incise_touch touch;
+
+	solid_point(s, 0, 0, 0);
+	solid_point(s, 1, 0, 0);
+	solid_point(s, 0, 1, 0);
+	solid_face(s, 0, 1, 2);
+	solid_face(s, 0, 2, 1);
+	surface = solid_surface(s);
+	for (int k = 0; k < 9; k++) {
+		incise_surface_nearest(
+			surface, (double[3]){k % 3 - 0.5, k / 3 - 0.5, 0.1}, &touch);
+		assert_true(fabs(v3_length(touch.normal) - 1) < 1e-12);
+	}
+	incise_surface_free(surface);
+	free(s);
+}
+
+/* A fan of 5000 triangles around one point, and a proxy that goes around on it. */
+static void test_a_large_fan(void **state)
+{
+	struct solid *s = solid_new();
+	struct incise_surface *surface;
+	struct incise_proxy proxy;
+	int n = 5000;
+
+	solid_point(s, 0, 0, -1);
+	for (int i = 0; i < n; i++)
+		solid_point(s, 5 * cos(2 * M_PI * i / n), 5 * sin(2 * M_PI * i / n), 0);
+	for (int i = 0; i < n; i++)
+		solid_face(s, 0, 1 + (uint32_t)i, 1 + (uint32_t)((i + 1) % n));
+	surface = solid_surface(s);
+	check(s, surface->mesh);
+	incise_proxy_init(&proxy, surface, 0.05);
+	incise_proxy_move(&proxy, (double[3]){0, 0, -1.5});
+	assert_true(proxy.touching);
+	for (int i = 0; i < 200; i++) {
+		double r = 0.02 * i, z = -1 + r / 5 - 0.2;
+
+		incise_proxy_move(&proxy, (double[3]){r * cos(i), r * sin(i), z});
+		assert_true(proxy.touching);
+	}
+	incise_surface_free(surface);
+	free(s);
+}
+
+static void test_refusals(void **state)
+{
+	struct solid *s = solid_cube();
+	struct mesh_draft draft = {.path = "x", .point = s->point, .corner = s->corner};
+	struct incise_error err = {0};
+
+	assert_null(mesh_new(&draft, &err));
+	assert_int_equal(errno, EINVAL);
+	draft.n_triangles = INCISE_SURFACE_TRIANGLES_MAX + 1;
+	assert_null(mesh_new(&draft, &err));
+	assert_int_equal(errno, E2BIG);
+	assert_int_equal(err.code, E2BIG);
+	free(s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_closed_open_and_bow_tie),
+		cmocka_unit_test(test_two_back_to_back),
+		cmocka_unit_test(test_a_large_fan),
+		cmocka_unit_test(test_refusals),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
