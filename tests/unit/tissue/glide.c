@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Gliding over waves of 2 and 4 mm at five resolutions: the proxy never jumps, never
+ * Gliding over waves of 2 mm at five resolutions: the proxy never jumps, never
  * locks, never falls behind for good, and a contact below the waves is never lost.
  */
 #include <stdarg.h>

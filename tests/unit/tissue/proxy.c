@@ -423,6 +423,70 @@ static void test_on_the_surface(void **state)
 	free(s);
 }
 
+/*
+ * Walks in and out of a potato: whoever is inside has come in, and is in contact; whoever
+ * has been outside for long is not.
+ */
+static void test_inside_is_in_contact(void **state)
+{
+	struct solid *s = solid_sphere(5, 4);
+	struct incise_surface *surface;
+	uint64_t random = 88172645463325252u;
+	struct incise_proxy proxy;
+	int inside = 0, outside = 0;
+
+	for (uint32_t k = 0; k < s->n_points; k++) {
+		double *p = s->point[k], bump = 1;
+
+		/* of the place only: a point that is made twice stays one */
+		for (int i = 0; i < 3; i++)
+			bump += 0.08 * sin(3 * p[i] + i) * cos(2 * p[(i + 1) % 3]);
+		for (int i = 0; i < 3; i++)
+			p[i] *= bump;
+	}
+	surface = solid_surface(s);
+	for (int k = 0; k < 60000; k++) {
+		double size = pow(10, 3 * solid_random(&random) - 2.5), tool[3];
+		struct incise_touch touch;
+
+		if (k % 1000 == 0) {
+			incise_proxy_init(&proxy, surface, k % 2000 ? 0 : 0.05);
+			move(&proxy, 7, 1, 2);
+			assert_false(proxy.touching);
+		}
+		/* towards the surface, and some to a corner or to a middle of an edge */
+		for (int i = 0; i < 3; i++) {
+			double out = v3_length(proxy.tool_mm) - 5;
+
+			tool[i] = proxy.tool_mm[i] * (1 - 0.01 * out) +
+				  size * (2 * solid_random(&random) - 1);
+		}
+		if (k % 17 == 0) {
+			uint32_t f = (uint32_t)(solid_random(&random) * s->n_triangles);
+
+			for (int i = 0; i < 3; i++)
+				tool[i] = (s->point[s->corner[f][0]][i] +
+					   s->point[s->corner[f][k % 2]][i]) /
+					  2;
+		}
+		incise_proxy_move(&proxy, tool);
+		incise_surface_nearest(surface, tool, &touch);
+		/* on the surface either is right: rounding is 1e-15 of 5 mm */
+		if (touch.depth_mm > 1e-12) {
+			inside++;
+			assert_true(proxy.touching);
+			if (proxy.settled)
+				assert_true(proxy.touch.depth_mm >=
+					    touch.depth_mm - 1e-12);
+		} else if (touch.depth_mm < -0.06 && !proxy.touching) {
+			outside++;
+		}
+	}
+	assert_true(inside > 10000 && outside > 10000);
+	incise_surface_free(surface);
+	free(s);
+}
+
 /* Any pose whatever, leaps of metres and the ends of double: all results are numbers. */
 static void test_any_pose(void **state)
 {
@@ -476,6 +540,7 @@ int main(void)
 		cmocka_unit_test(test_open_border),
 		cmocka_unit_test(test_slivers),
 		cmocka_unit_test(test_on_the_surface),
+		cmocka_unit_test(test_inside_is_in_contact),
 		cmocka_unit_test(test_any_pose),
 	};
 
