@@ -188,7 +188,7 @@ static int first_boxes(const struct incise_grid *grid, struct box *box)
 	return n;
 }
 
-/* 0; -ERANGE where nothing finite can be certified, -ENOMEM. */
+/* 0; -ERANGE where nothing of use can be certified and the slopes are those met; -ENOMEM. */
 static int enclose(const struct incise_grid *grid, struct incise_slope *slopes)
 {
 	static const struct interval none = {INFINITY, -INFINITY};
@@ -215,9 +215,14 @@ static int enclose(const struct incise_grid *grid, struct incise_slope *slopes)
 		const struct interval *met = &b.met[i + 2 - n_inputs];
 		double may = LOOSEST * iv_mag(*met);
 
-		if (!(bound->lo >= met->lo - may && bound->hi <= met->hi + may))
-			return -ERANGE;
 		slopes[i] = (struct incise_slope){bound->lo, bound->hi, true};
+		if (bound->lo >= met->lo - may && bound->hi <= met->hi + may)
+			continue;
+		for (int k = 0; k < n_inputs; k++) {
+			met = &b.met[k + 2 - n_inputs];
+			slopes[k] = (struct incise_slope){met->lo, met->hi, false};
+		}
+		return -ERANGE;
 	}
 	return 0;
 }
@@ -242,8 +247,10 @@ static double model_slope(const void *of, const double *x, int i)
 	return hi > lo ? (incise_model_eval(model, at, NULL) - from) / (hi - lo) : 0;
 }
 
+/* Widen the slopes by those that are found. */
 static void search_model(const struct incise_model *model, struct incise_slope *slopes)
 {
+	struct incise_slope found[INCISE_MODEL_INPUTS_MAX];
 	int n = model->n_inputs;
 	struct incise_secant secant = {.of = model, .n_inputs = n, .slope = model_slope};
 	int points = POINTS_WORK / (n * (model->n_rules + 12 * n));
@@ -255,7 +262,11 @@ static void search_model(const struct incise_model *model, struct incise_slope *
 		secant.min[i] = incise_model_input(model, i)->min;
 		secant.max[i] = incise_model_input(model, i)->max;
 	}
-	incise_secant_search(&secant, slopes);
+	incise_secant_search(&secant, found);
+	for (int i = 0; i < n; i++) {
+		slopes[i].lowest = fmin(slopes[i].lowest, found[i].lowest);
+		slopes[i].highest = fmax(slopes[i].highest, found[i].highest);
+	}
 }
 
 int incise_model_slopes(const struct incise_model *model, struct incise_slope *slopes)
@@ -265,6 +276,8 @@ int incise_model_slopes(const struct incise_model *model, struct incise_slope *s
 
 	if (!grid)
 		return -ENOMEM;
+	for (int i = 0; i < model->n_inputs; i++)
+		slopes[i] = (struct incise_slope){INFINITY, -INFINITY, false};
 	rc = incise_grid_init(grid, model, NULL);
 	if (!rc)
 		rc = enclose(grid, slopes);

@@ -48,7 +48,8 @@ struct incise_slope {
  * is not looked at.
  *
  * @param slopes one per input
- * @return 0; -ENOMEM. Takes some milliseconds.
+ * @return 0; -ENOMEM. Takes some 20 ms for a model of 20 rules, up to 0.3 s for the
+ *         largest.
  */
 INCISE_API int incise_model_slopes(const struct incise_model *model,
 				   struct incise_slope *slopes);
