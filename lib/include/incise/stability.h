@@ -1,0 +1,115 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * How stiff a virtual wall may be: what a sampled loop makes of a spring and a damper.
+ *
+ *   position  x_k ──▶ f = -K x_k - B (x_k - x_{k-1})/T ──▶ delay_ticks ──▶ held for T
+ *      ▲                                                                      │
+ *      └── device: mass, viscous damping b, Coulomb friction c, encoder Δ ◀───┘
+ *
+ * Between the samples the held force belongs to where the device was, not to where it is.
+ * On the way in it is too small, on the way out too large: every press makes energy, some
+ * K T u X. The device's own damping has to take it, or the wall hums.
+ *
+ * Forces in N, lengths in mm, times in s: stiffness in N/mm (= kN/m), damping in N s/mm.
+ * Functions compute and nothing else: no state, no allocation; of a device that cannot be
+ * (see its ranges) they say 0.
+ */
+#ifndef INCISE_STABILITY_H
+#define INCISE_STABILITY_H
+
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+#define INCISE_STABILITY_DELAY_MAX 64 /**< ticks */
+
+/** A haptic device as the sampled wall sees it. */
+struct incise_haptic_device {
+	double mass_kg;	       /**< > 0 */
+	double damping_N_s_mm; /**< viscous, b ≥ 0 */
+	double coulomb_N;      /**< dry friction, c ≥ 0 */
+	double encoder_mm;     /**< step of the position, Δ ≥ 0; 0: none */
+	double period_s;       /**< of the loop, T > 0 */
+	int delay_ticks; /**< until a force takes effect, 0 … INCISE_STABILITY_DELAY_MAX */
+};
+
+/**
+ * Stiffness up to which the wall alone on the device is stable: exact. Coulomb friction
+ * and encoder are left out.
+ *
+ * It is the least K at which an eigenvalue of the loop's state matrix
+ *
+ *   x' = x + a w + c u    w = v T, u = f T²/m, δ = b T/m, p = e^-δ,
+ *   w' = p w + a u        a = (1-p)/δ, c = (1-a)/δ
+ *
+ * with the delay's states meets the unit circle, to some 12 digits for b T/m of 1e-6 to
+ * 100. With B = 0 and no delay: min{δ(1-p)/(1-p-pδ), 2(1+p)/(1+p-2(1-p)/δ)} b/T.
+ *
+ * @param damping_N_s_mm of the wall, B, by backward difference; may be < 0
+ * @return N/mm; 0 when even the softest wall is unstable. Takes up to a millisecond.
+ */
+INCISE_API double incise_stability_limit(const struct incise_haptic_device *device,
+					 double damping_N_s_mm);
+
+/**
+ * Stiffness up to which the wall is passive: stable in whatever hand, as long as the hand
+ * is passive itself. Colgate and Schenkel, Passivity of a class of sampled-data systems,
+ * J. Robotic Systems 14 (1997): b > K (T/2 + t_d) + |B|. Exact without delay, and without
+ * B; with both it is enough, but more than is needed.
+ *
+ * @param damping_N_s_mm of the wall, B
+ * @return N/mm, ≥ 0
+ */
+INCISE_API double incise_stability_colgate(const struct incise_haptic_device *device,
+					   double damping_N_s_mm);
+
+/**
+ * The linear law: K < (b + B)/(T/2 + t_d), what incise_stability_limit() tends to for
+ * small (b + B) T/m. Gil, Avello, Rubio, Flórez, Stability analysis of a 1 DOF haptic
+ * interface, IEEE Trans. Control Systems Technology 12 (2004); Hulin, Preusche, Hirzinger,
+ * Stability boundary for haptic rendering, IROS 2006.
+ *
+ * @param damping_N_s_mm of the wall, B
+ * @return N/mm, ≥ 0
+ */
+INCISE_API double incise_stability_gil(const struct incise_haptic_device *device,
+				       double damping_N_s_mm);
+
+/**
+ * Stiffness up to which sampling and an encoder's steps make no energy that friction does
+ * not take: min(2b/T, 2c/Δ). Abbott and Okamura, Effects of position quantization and
+ * sampling rate on virtual-wall passivity, IEEE Trans. Robotics 21 (2005). For a spring
+ * without damper and delay.
+ *
+ * @return N/mm, ≥ 0
+ */
+INCISE_API double incise_stability_quantisation(
+	const struct incise_haptic_device *device);
+
+/**
+ * Amplitude below which Coulomb friction lets an oscillation at the wall die, and above
+ * which it grows: X* = 4c / (π √(K/m) (K (T/2 + t_d) - b)), by describing function. Within
+ * 3 % for √(K/m) T up to 0.32.
+ *
+ * @param stiffness_N_mm of a spring that pulls as well as pushes, > 0
+ * @return mm; infinite when every oscillation dies: K (T/2 + t_d) ≤ b
+ */
+INCISE_API double incise_stability_amplitude(const struct incise_haptic_device *device,
+					     double stiffness_N_mm);
+
+/**
+ * Energy that a spring gives to the hand beyond what was pressed into it, on the way to a
+ * depth and back at one speed: E = K (T + 2 t_d) u X, on average over where between two
+ * samples the contact begins. The device's damping takes 2 b u X.
+ *
+ * @param stiffness_N_mm ≥ 0
+ * @param speed_mm_s     ≥ 0
+ * @param depth_mm       ≥ 0
+ * @return N mm
+ */
+INCISE_API double incise_stability_leak(const struct incise_haptic_device *device,
+					double stiffness_N_mm, double speed_mm_s,
+					double depth_mm);
+
+INCISE_END_DECLS
+#endif

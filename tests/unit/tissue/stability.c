@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Stability: the limit against LAPACK's eigenvalues, closed forms, known figures and a run
+ * in time; the laws of one line against their figures.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <float.h>
+#include <lapacke.h>
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+#include <incise/stability.h>
+
+#define N(array) (sizeof(array) / sizeof(*(array)))
+
+/* Unit mass (N s²/mm) and period: damping is δ, stiffness is K T²/m. */
+static struct incise_haptic_device unit(double delta, int delay)
+{
+	return (struct incise_haptic_device){.mass_kg = 1000,
+					     .damping_N_s_mm = delta,
+					     .period_s = 1,
+					     .delay_ticks = delay};
+}
+
+static double limit(double delta, double beta, int delay)
+{
+	struct incise_haptic_device device = unit(delta, delay);
+
+	return incise_stability_limit(&device, beta);
+}
+
+/* What one period makes of x, v and a held force, in long double. */
+struct held {
+	long double p, a, c;
+};
+
+static struct held held(long double delta)
+{
+	struct held h = {expl(-delta), 1, 0.5L};
+
+	if (delta > 0) {
+		h.a = -expm1l(-delta) / delta;
+		/* 64 bits bear the cancellation down to δ = 1e-6: 1e-19/1e-12. */
+		h.c = (1 - h.a) / delta;
+	}
+	return h;
+}
+
+#define STATES (INCISE_STABILITY_DELAY_MAX + 3)
+
+/* Largest modulus of an eigenvalue; the state is x, v, then x one tick ago and so on. */
+static double radius(double delta, double beta, int delay, double kappa)
+{
+	static double A[STATES * STATES], re[STATES], im[STATES];
+	struct held h = held(delta);
+	int n = delay + 3, now = delay ? delay + 1 : 0, ago = delay + 2;
+	double largest = 0;
+
+	memset(A, 0, sizeof(A));
+	A[0] = 1;
+	A[1] = h.a;
+	A[n + 1] = h.p;
+	A[now] -= h.c * (kappa + beta);
+	A[n + now] -= h.a * (kappa + beta);
+	A[ago] += h.c * beta;
+	A[n + ago] += h.a * beta;
+	A[2 * n] = 1;
+	for (int i = 3; i < n; i++)
+		A[i * n + i - 1] = 1;
+	assert_int_equal(LAPACKE_dgeev(LAPACK_ROW_MAJOR, 'N', 'N', n, A, n, re, im, NULL,
+				       n, NULL, n),
+			 0);
+	for (int i = 0; i < n; i++)
+		largest = fmax(largest, hypot(re[i], im[i]));
+	return largest;
+}
+
+static void test_eigenvalues(void **state)
+{
+	static const double deltas[] = {1e-6, 1e-3, 0.01, 0.1, 1, 3, 10, 100};
+	static const double betas[] = {0, 0.1, 0.3, 0.8, -0.05};
+	static const int delays[] = {0, 1, 2, 5, 15};
+	int stable = 0;
+
+	for (size_t i = 0; i < N(deltas); i++)
+		for (size_t j = 0; j < N(betas); j++)
+			for (size_t k = 0; k < N(delays); k++) {
+				double d = deltas[i], b = betas[j];
+				double K = limit(d, b, delays[k]);
+				/* dgeev gives a radius to some 1e-14; it changes by about
+				 * the least of δ and 1 per relative change of K. */
+				double off = fmax(1e-8, 1e-11 / fmin(1, d + b));
+
+				if (K == 0) {
+					/* Even a soft wall is unstable, or the device drifts. */
+					assert_true(radius(d, b, delays[k], 1e-3) > 1);
+					continue;
+				}
+				stable++;
+				assert_true(radius(d, b, delays[k], K * (1 - off)) < 1);
+				assert_true(radius(d, b, delays[k], K * (1 + off)) > 1);
+				for (int s = 1; s < 20; s++)
+					assert_true(radius(d, b, delays[k], K * s / 20) <
+						    1);
+			}
+	/* Most are stable: the loop above did look at something. */
+	assert_true(stable > 150);
+}
+
+static void test_long_delays(void **state)
+{
+	static const int delays[] = {40, INCISE_STABILITY_DELAY_MAX};
+
+	for (size_t k = 0; k < N(delays); k++) {
+		double K = limit(0.5, 0.02, delays[k]);
+
+		assert_true(radius(0.5, 0.02, delays[k], K * (1 - 1e-8)) < 1);
+		assert_true(radius(0.5, 0.02, delays[k], K * (1 + 1e-8)) > 1);
+	}
+}
+
+static void test_closed_form(void **state)
+{
+	double largest = 0, at = 0;
+
+	for (double d = 1e-6; d < 120; d *= 1.003) {
+		long double p = expl(-d), q = -expm1l(-d), second = 1 + p - 2 * q / d;
+		long double K = d * q / (q - p * d);
+
+		if (second > 0)
+			K = fminl(K, 2 * (1 + p) / second);
+		/* The closed form in 64 bits loses 1e-19/δ² to cancellation. */
+		assert_true(fabsl(limit(d, 0, 0) / (K * d) - 1) <
+			    1e-12 + 1e-18 / (d * d));
+	}
+	/* Where the two branches cross. 4.0902 at 3.709, which is also met with, is 0.2 % less
+	 * than the closed form itself has there. */
+	for (double d = 3.71; d < 3.73; d += 1e-5)
+		if (limit(d, 0, 0) / d > largest) {
+			largest = limit(d, 0, 0) / d;
+			at = d;
+		}
+	assert_true(fabs(largest - 4.0993) < 0.51e-4);
+	assert_true(fabs(at - 3.7208) < 0.51e-4);
+	assert_true(fabs(limit(3.709, 0, 0) / 3.709 - 4.0900) < 0.51e-4);
+}
+
+static void test_known_figures(void **state)
+{
+	static const struct {
+		double delta, beta;
+		int delay;
+		double limit;
+	} known[] = {
+		{0.01, 0, 0, 0.020033}, {0.1, 0, 0, 0.203389}, {1, 0, 0, 2.392211},
+		{5, 0, 0, 16.519252},	{0.1, 0, 1, 0.068464}, {0.1, 0, 2, 0.041643},
+	};
+
+	for (size_t i = 0; i < N(known); i++)
+		/* Half a unit of the last digit. */
+		assert_true(fabs(limit(known[i].delta, known[i].beta, known[i].delay) -
+				 known[i].limit) < 0.51e-6);
+	/* The top of the Z-width without any damping in the device: 12 - 8√2. */
+	assert_true(fabs(limit(0, 2 * (sqrt(2) - 1), 0) - (12 - 8 * sqrt(2))) < 1e-12);
+	for (double beta = 0.01; beta < 1; beta += 0.01)
+		assert_true(limit(0, beta, 0) <= 12 - 8 * sqrt(2));
+}
+
+/* Whether a push dies away; in long double, so that no rounding feeds it. */
+static bool dies(double delta, double beta, int delay, double kappa)
+{
+	struct held h = held(delta);
+	long double x = 0, v = 1, past[STATES] = {0}, early = 0, late = 0;
+
+	for (int i = 0; i < 40000; i++) {
+		long double u;
+
+		memmove(past + 1, past, sizeof(past) - sizeof(*past));
+		past[0] = x;
+		u = -kappa * past[delay] - beta * (past[delay] - past[delay + 1]);
+		x += h.a * v + h.c * u;
+		v = h.p * v + h.a * u;
+		if (fabsl(x) > 1e100L)
+			return false;
+		if (i >= 10000 && i < 20000)
+			early = fmaxl(early, fabsl(x));
+		else if (i >= 30000)
+			late = fmaxl(late, fabsl(x));
+	}
+	return late < early;
+}
+
+static void test_run_in_time(void **state)
+{
+	static const struct {
+		double delta, beta;
+		int delay;
+	} cases[] = {{0.1, 0, 0},    {1, 0.3, 1}, {10, 0, 5},
+		     {0.01, 0.1, 2}, {0, 0.3, 0}, {0.5, -0.1, 3}};
+
+	for (size_t i = 0; i < N(cases); i++) {
+		double d = cases[i].delta, b = cases[i].beta,
+		       K = limit(d, b, cases[i].delay);
+
+		assert_true(K > 0);
+		assert_true(dies(d, b, cases[i].delay, 0.995 * K));
+		assert_false(dies(d, b, cases[i].delay, 1.005 * K));
+	}
+}
+
+/* A device in its own units: 1000 times the mass is 1000 times the stiffness, and so on. */
+static void test_units(void **state)
+{
+	struct incise_haptic_device device = {.mass_kg = 0.05,
+					      .damping_N_s_mm = 0.005,
+					      .period_s = 1e-3,
+					      .delay_ticks = 1};
+
+	/* δ = 0.1; m/T² = 50 N/mm. */
+	assert_true(
+		fabs(incise_stability_limit(&device, 0.015) / (50 * limit(0.1, 0.3, 1)) -
+		     1) < 1e-12);
+	/* (0.005 - 0.001)/(1.5 ms) and (0.005 + 0.001)/(1.5 ms) */
+	assert_true(fabs(incise_stability_colgate(&device, 0.001) - 0.004 / 1.5e-3) <
+		    1e-12);
+	assert_true(fabs(incise_stability_colgate(&device, -0.001) - 0.004 / 1.5e-3) <
+		    1e-12);
+	assert_true(incise_stability_colgate(&device, 0.006) == 0);
+	assert_true(fabs(incise_stability_gil(&device, 0.001) - 4) < 1e-12);
+	assert_true(incise_stability_gil(&device, -0.006) == 0);
+	/* 2b/T = 10, 2c/Δ = 4 N/mm */
+	device.coulomb_N = 0.02;
+	assert_true(fabs(incise_stability_quantisation(&device) - 10) < 1e-12);
+	device.encoder_mm = 0.01;
+	assert_true(fabs(incise_stability_quantisation(&device) - 4) < 1e-12);
+	/* K = 20: ω = √(20/5e-5), K T 1.5 - b = 0.025 */
+	assert_true(fabs(incise_stability_amplitude(&device, 20) -
+			 0.08 / (M_PI * sqrt(4e5) * 0.025)) < 1e-12);
+	assert_true(isinf(incise_stability_amplitude(&device, 3)));
+	/* K (T + 2 T) u X */
+	assert_true(fabs(incise_stability_leak(&device, 20, 50, 2) - 6) < 1e-12);
+}
+
+/* The linear law is where the exact limit tends to: Gil, and Colgate at half of K c. */
+static void test_small_damping(void **state)
+{
+	for (int delay = 0; delay <= 20; delay += 5) {
+		struct incise_haptic_device device = unit(1e-5, delay);
+		double exact = incise_stability_limit(&device, 1e-5);
+
+		/* The next term is (b + B) T/m times the delay: 2e-5 × 20 at most. */
+		assert_true(fabs(exact / incise_stability_gil(&device, 1e-5) - 1) < 1e-3);
+		assert_true(incise_stability_colgate(&device, 0) <=
+			    incise_stability_limit(&device, 0));
+	}
+}
+
+static void test_no_such_device(void **state)
+{
+	static const struct incise_haptic_device bad[] = {
+		{0, 0.1, 0, 0, 1, 0},	   {-1, 0.1, 0, 0, 1, 0},
+		{NAN, 0.1, 0, 0, 1, 0},	   {1, -0.1, 0, 0, 1, 0},
+		{1, NAN, 0, 0, 1, 0},	   {1, 0.1, -1, 0, 1, 0},
+		{1, 0.1, 0, -1, 1, 0},	   {1, 0.1, 0, 0, 0, 0},
+		{1, 0.1, 0, 0, NAN, 0},	   {1, 0.1, 0, 0, 1, -1},
+		{1, 0.1, 0, 0, 1, 65},	   {INFINITY, 1, 0, 0, 1, 0},
+		{1, INFINITY, 0, 0, 1, 0}, {1, 1e300, 0, 0, 1e300, 0},
+	};
+	struct incise_haptic_device good = unit(0.1, 0);
+
+	for (size_t i = 0; i < N(bad); i++)
+		assert_true(incise_stability_limit(&bad[i], 0) == 0);
+	for (size_t i = 0; i + 2 < N(bad); i++) {
+		assert_true(incise_stability_colgate(&bad[i], 0) == 0);
+		assert_true(incise_stability_gil(&bad[i], 0) == 0);
+		assert_true(incise_stability_quantisation(&bad[i]) == 0);
+		assert_true(incise_stability_amplitude(&bad[i], 1) == 0);
+		assert_true(incise_stability_leak(&bad[i], 1, 1, 1) == 0);
+	}
+	assert_true(incise_stability_limit(&good, NAN) == 0);
+	assert_true(incise_stability_limit(&good, INFINITY) == 0);
+	/* No damping at all: every wall is unstable. */
+	assert_true(limit(0, 0, 0) == 0);
+	assert_true(limit(0.1, -0.1, 0) == 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_eigenvalues),
+		cmocka_unit_test(test_long_delays),
+		cmocka_unit_test(test_closed_form),
+		cmocka_unit_test(test_known_figures),
+		cmocka_unit_test(test_run_in_time),
+		cmocka_unit_test(test_units),
+		cmocka_unit_test(test_small_damping),
+		cmocka_unit_test(test_no_such_device),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
