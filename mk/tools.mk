@@ -10,7 +10,8 @@ $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
 extra_info := $(extra_demo)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o arithmetics.o machine.o \
-	bench_training.o)
+	bench_training.o bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
+	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o)
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
 # built where its headers are. It is for measuring, and is not installed.
@@ -58,5 +59,6 @@ bench: ## measure error against run time on this machine; chart in build/bench/
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise bench precision --plot $(O)/bench/precision
 	$(O)/bin/incise bench training
+	$(O)/bin/incise bench stability --plot $(O)/bench/stability
 
 .PHONY: tools deps demo bench

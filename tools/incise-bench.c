@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench precision: error against run time of the model's arithmetics, on this
- * machine, in one run. incise bench training: see bench_training.h.
+ * machine, in one run. incise bench training and incise bench stability: see
+ * bench_training.h and bench_stability.h.
  */
 #include <getopt.h>
 #include <math.h>
@@ -12,6 +13,7 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include "arithmetics.h"
+#include "bench_stability.h"
 #include "bench_training.h"
 #include "cli.h"
 #include "json.h"
@@ -22,20 +24,26 @@ enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK };
 
 static const struct cli_option options[] = {
 	{OPT_JSON, "json", NULL, "report as JSON"},
-	{OPT_PLOT, "plot", "NAME", "draw error over time as NAME.png and NAME.svg"},
+	{OPT_PLOT, "plot", "NAME",
+	 "draw error over time as NAME.png and NAME.svg;\n"
+	 "stability: NAME-map, NAME-guard, NAME-integrators"},
 	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
 	{0},
 };
 
 static const struct cli_verb verb = {
 	.name = "bench",
-	.synopsis = "precision [MODEL.fis] | training [OPTIONS]",
+	.synopsis = "precision [MODEL.fis] | training | stability [OPTIONS]",
 	.summary =
 		"precision: measure error against run time of a model's arithmetics. Without\n"
 		"MODEL a model of the paper's size (20 rules) is made.\n"
-		"training: measure how long training takes on data of the paper's size.",
+		"training: measure how long training takes on data of the paper's size.\n"
+		"stability: find how stiff a virtual wall may be, simulated and computed; the\n"
+		"guard of passivity on and off; integrators of a stiff spring.",
 	.options = options,
-	.notes = "Exit: 0 measured, 1 failed, 2 bad usage. See incise-bench(1).",
+	.notes =
+		"Exit: 0 measured, 1 failed or simulation and theory differ, 2 bad usage.\n"
+		"See incise-bench(1).",
 };
 
 /* Points for the errors. Times are of the first of them, so few that inputs and outputs
@@ -339,13 +347,19 @@ int main(int argc, char **argv)
 		}
 	if (optind + 1 == argc && !strcmp(argv[optind], "training")) {
 		if (plot)
-			cli_usage("--plot goes with 'precision'");
+			cli_usage("--plot goes with 'precision' and 'stability'");
 		bench_training(json, quick);
 		cli_finish();
 		return 0;
 	}
+	if (optind + 1 == argc && !strcmp(argv[optind], "stability")) {
+		bench_stability(json, quick, plot);
+		return 0;
+	}
 	if (optind >= argc || strcmp(argv[optind], "precision") || argc - optind > 2)
-		cli_usage("expected 'training', or 'precision' and at most one model");
+		cli_usage(
+			"expected 'training', 'stability', or 'precision' and at most one "
+			"model");
 	if (!b)
 		cli_fail("no memory");
 	if (plot)

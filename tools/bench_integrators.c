@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Error against run time of integrators; see bench_integrators.h.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#include "bench_integrators.h"
+#include "cli.h"
+#include "json.h"
+
+#define N(array) (sizeof(array) / sizeof(*(array)))
+#define TICK_S 1e-3
+#define TICKS 2000
+#define REPEATS 15
+#define QUICK_REPEATS 3
+/* Beyond so many times the truth it is not coming back. */
+#define DIVERGED 1e6
+/* An exact one is exact to the roundings of 1000 steps with the force held, and to those
+ * of the angle that a tick has: 140 rad at 1e9 N/m. */
+#define EXACT 1e-9
+
+/* Of which smaller steps are tried too. */
+static const double swept[] = {1e3, 1e5};
+
+static double force(int tick)
+{
+	return tick < TICKS / 2 ? 1 : 2;
+}
+
+static double now_ns(void)
+{
+	struct timespec t;
+
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return t.tv_sec * 1e9 + t.tv_nsec;
+}
+
+static int by_value(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+
+	return (x > y) - (x < y);
+}
+
+static struct spring spring(double K_N_m)
+{
+	return (struct spring){.mass_kg = 0.05, .stiffness_N_m = K_N_m, .ratio = 0.1};
+}
+
+/* Places at the ends of all ticks; each part of the motion from where its force began. */
+static void true_places(double K_N_m, double *places)
+{
+	struct spring s = spring(K_N_m);
+	long double begin_x = 0, begin_v = 0, x = 0, v = 0;
+	int since = 0;
+
+	for (int k = 0; k < TICKS; k++) {
+		if (k && force(k) != force(k - 1)) {
+			since = k;
+			begin_x = x;
+			begin_v = v;
+		}
+		x = begin_x;
+		v = begin_v;
+		spring_truth(&s, force(k), (k + 1 - since) * (long double)TICK_S, &x, &v);
+		places[k] = x;
+	}
+}
+
+static void run(struct integration *in, int substeps, double *places)
+{
+	for (int k = 0; k < TICKS; k++) {
+		double f = force(k);
+
+		for (int i = 0; i < substeps; i++)
+			in->step(in, f);
+		places[k] = in->x;
+	}
+}
+
+static void measure_error(struct integrator_row *row, const double *truth)
+{
+	static double places[TICKS];
+	struct spring s = spring(row->K_N_m);
+	struct integration in;
+	double largest = 0, worst = 0, sum = 0;
+
+	integration_init(&in, row->kind, &s, row->step_s);
+	run(&in, lround(TICK_S / row->step_s), places);
+	for (int k = 0; k < TICKS; k++)
+		largest = fmax(largest, fabs(truth[k]));
+	for (int k = 0; k < TICKS; k++) {
+		double off = fabs(places[k] - truth[k]) / largest;
+
+		if (!(off < DIVERGED)) {
+			row->diverged = true;
+			row->max_error = row->rms_error = INFINITY;
+			return;
+		}
+		worst = fmax(worst, off);
+		sum += off * off;
+	}
+	row->max_error = worst;
+	row->rms_error = sqrt(sum / TICKS);
+}
+
+static double time_of(const struct integrator_row *row)
+{
+	static double places[TICKS];
+	struct spring s = spring(row->K_N_m);
+	struct integration in;
+	double begin;
+
+	integration_init(&in, row->kind, &s, row->step_s);
+	begin = now_ns();
+	run(&in, lround(TICK_S / row->step_s), places);
+	return (now_ns() - begin) / TICKS;
+}
+
+static void measure_times(struct integrator_bench *bench, int repeats)
+{
+	static double times[INTEGRATOR_ROWS_MAX][REPEATS];
+
+	/* In turn, so that a busy moment of the machine meets them all. */
+	for (int r = 0; r < repeats; r++)
+		for (int i = 0; i < bench->n; i++) {
+			if (i % 16 == 0)
+				cli_progress("integrators: time %d of %d", r + 1,
+					     repeats);
+			times[i][r] = time_of(&bench->row[i]);
+		}
+	for (int i = 0; i < bench->n; i++) {
+		struct integrator_row *row = &bench->row[i];
+
+		qsort(times[i], repeats, sizeof(double), by_value);
+		row->ns_per_ms = times[i][repeats / 2];
+		row->ns_per_step = row->ns_per_ms * row->step_s / TICK_S;
+	}
+}
+
+static void add(struct integrator_bench *bench, enum integrator kind, double K,
+		int substeps, const double *truth)
+{
+	struct integrator_row row = {
+		.kind = kind, .K_N_m = K, .step_s = TICK_S / substeps};
+
+	if (bench->n == INTEGRATOR_ROWS_MAX)
+		cli_fail("integrators: more than %d rows", INTEGRATOR_ROWS_MAX);
+	measure_error(&row, truth);
+	bench->row[bench->n++] = row;
+}
+
+void bench_integrators(struct integrator_bench *bench, bool quick)
+{
+	static const double stiffness[] = {1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
+	static double truth[TICKS];
+
+	for (size_t i = 0; i < N(stiffness); i += quick ? 2 : 1) {
+		true_places(stiffness[i], truth);
+		for (int kind = 0; kind < INTEGRATORS; kind++)
+			add(bench, kind, stiffness[i], 1, truth);
+	}
+	bench->table = bench->n;
+	/* Work against precision: smaller and smaller steps. */
+	for (size_t i = 0; i < N(swept); i++) {
+		true_places(swept[i], truth);
+		for (int kind = 0; kind < EXACT_ZOH; kind++)
+			for (int substeps = 2; substeps <= (quick ? 16 : 1024);
+			     substeps *= quick ? 8 : 2)
+				add(bench, kind, swept[i], substeps, truth);
+	}
+	measure_times(bench, quick ? QUICK_REPEATS : REPEATS);
+}
+
+static bool must_be_exact(const struct integrator_row *row)
+{
+	return row->kind == EXACT_ZOH || row->kind == PLANT;
+}
+
+int integrator_bench_missed(const struct integrator_bench *bench)
+{
+	int missed = 0;
+
+	for (int i = 0; i < bench->n; i++)
+		missed += must_be_exact(&bench->row[i]) &&
+			  !(bench->row[i].max_error <= EXACT);
+	return missed;
+}
+
+static void print_error(const struct integrator_row *row)
+{
+	if (row->diverged)
+		printf("%21s", "diverged");
+	else
+		printf("%21.2g", row->max_error);
+}
+
+/* The cheapest way to each error; all of them are in the JSON. */
+static void print_work(const struct integrator_bench *bench, double K,
+		       enum integrator kind)
+{
+	static const double errors[] = {1e-2, 1e-4, 1e-6, 1e-9};
+
+	printf("%10g%21s", K, integrator_name(kind));
+	for (size_t e = 0; e < N(errors); e++) {
+		double least = INFINITY;
+
+		for (int i = 0; i < bench->n; i++) {
+			const struct integrator_row *row = &bench->row[i];
+
+			if (row->kind == kind && row->K_N_m == K &&
+			    row->max_error <= errors[e])
+				least = fmin(least, row->ns_per_ms);
+		}
+		if (isinf(least))
+			printf("%12s", "-");
+		else
+			printf("%12.1f", least);
+	}
+	putchar('\n');
+}
+
+void integrator_bench_print(const struct integrator_bench *bench)
+{
+	printf("integrators of a spring: 50 g, ratio of damping 0.1, steps of 1 ms; largest error "
+	       "as part of the largest place\n%10s",
+	       "K_N_m");
+	for (int k = 0; k < INTEGRATORS; k++)
+		printf("%21s", integrator_name(k));
+	for (int i = 0; i < bench->table; i++) {
+		if (i % INTEGRATORS == 0)
+			printf("\n%10g", bench->row[i].K_N_m);
+		print_error(&bench->row[i]);
+	}
+	printf("\n%10s", "ns/step");
+	/* Of the second stiffness: nothing overflows there. */
+	for (int k = 0; k < INTEGRATORS; k++)
+		printf("%21.1f", bench->row[INTEGRATORS + k].ns_per_step);
+	printf("\nns for 1 ms of motion, by the largest error that it has with the best of the "
+	       "steps tried\n%10s%21s%12s%12s%12s%12s\n",
+	       "K_N_m", "integrator", "1e-2", "1e-4", "1e-6", "1e-9");
+	for (size_t i = 0; i < N(swept); i++)
+		for (int kind = 0; kind < INTEGRATORS; kind++)
+			print_work(bench, swept[i], kind);
+	putchar('\n');
+}
+
+json_t *integrator_bench_json(const struct integrator_bench *bench)
+{
+	json_t *rows = json_array();
+
+	for (int i = 0; i < bench->n; i++) {
+		const struct integrator_row *row = &bench->row[i];
+
+		json_array_append_new(
+			rows, json_pack("{ss so so so so so so ss?}", "integrator",
+					integrator_name(row->kind), "K_N_m",
+					json_number(row->K_N_m), "step_s",
+					json_number(row->step_s), "max_error",
+					json_number(row->max_error), "rms_error",
+					json_number(row->rms_error), "ns_per_step",
+					json_number(row->ns_per_step), "ns_per_ms",
+					json_number(row->ns_per_ms), "failed",
+					row->diverged ? "diverged" : NULL));
+	}
+	return rows;
+}
