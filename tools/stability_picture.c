@@ -57,6 +57,7 @@ static int values_of(const struct ratios *ratios, int param, double *values, int
 /* ---- map ---- */
 
 #define MAP_MAX 8
+#define MAP_LEAST 1e-4
 
 /* Unit mass and period. */
 static double limit(double delta, double beta, int delay)
@@ -83,14 +84,15 @@ static void write_map(const struct ratios *exact, const struct place *p,
 
 				fprintf(out, "%g %g\n", delta, K > 0 ? K : NAN);
 			}
-			fputs("\n\nNaN NaN\n", out);
+			fputs("\n\nNaN NaN 7\n", out);
 			for (int i = 0; i < exact->n; i++) {
 				const struct ratio *r = &exact->row[i];
 
-				if (r->param[1] == walls[w] && r->param[2] == delays[d] &&
-				    r->simulated > 0)
-					fprintf(out, "%g %g\n", r->param[0],
-						r->simulated);
+				/* Nothing is stable: a triangle at the lower edge. */
+				if (r->param[1] == walls[w] && r->param[2] == delays[d])
+					fprintf(out, "%g %g %d\n", r->param[0],
+						fmax(r->simulated, MAP_LEAST * 1.3),
+						r->simulated > 0 ? 7 : 11);
 			}
 			fputs("\n\n", out);
 		}
@@ -110,12 +112,12 @@ void stability_picture_map(const struct ratios *exact, const char *folder,
 	script = picture_begin(folder, p.name, 420 * n_walls + 60, 520);
 	fprintf(script,
 		"set multiplot layout 1,%d title \"Largest stable stiffness of a sampled wall: "
-		"lines computed, points simulated in time; stable below\" font ',13'\n"
-		"set logscale xy\nset xrange [5e-4:20]\nset yrange [1e-4:50]\n"
+		"lines computed, points simulated in time; stable below; triangle: none is\" font ',13'\n"
+		"set logscale xy\nset xrange [5e-4:20]\nset yrange [%g:50]\n"
 		"set format y '10^{%%L}'\nset format x '10^{%%L}'\nset termoption enhanced\n"
 		"set xlabel \"damping of the device, bT/m\"\nset key top left Left reverse\n"
 		"data = '%s'\n",
-		n_walls, p.data);
+		n_walls, MAP_LEAST, p.data);
 	for (int w = 0; w < n_walls; w++) {
 		fprintf(script,
 			"set title \"damping of the wall BT/m = %g\"\nset ylabel \"%s\"\nplot \\\n",
@@ -125,7 +127,7 @@ void stability_picture_map(const struct ratios *exact, const char *folder,
 
 			fprintf(script,
 				"  data index %d using 1:2 with lines ls %d title 'delay %g', \\\n"
-				"  '' index %d using 1:2 with points ls %d pt 7 ps 0.9, \\\n",
+				"  '' index %d using 1:2:3 with points ls %d pt variable ps 0.9, \\\n",
 				block, d % 5 + 1, delays[d], block + 1, d % 5 + 1);
 		}
 		fputs("  NaN\n", script);
@@ -216,7 +218,7 @@ void stability_picture_guard(const struct guard_bench *bench, const char *folder
 	fprintf(script,
 		"set multiplot layout 1,3 title \"50 g pressed on a wall that answers late. Not "
 		"bounded: %s without a guard, %s with it, %s with it and no cap\" font ',13'\n"
-		"data = '%s'\nset logscale xy\nset xlabel 'stiffness of the wall / N/mm'\n"
+		"data = '%s'\nset logscale xy\nset xrange [0.8:300]\nset xlabel 'stiffness of the wall / N/mm'\n"
 		"set key top left Left reverse\nset style line 6 lc rgb '#555555' lw 1.5\n",
 		grow[GUARD_OFF], grow[GUARD_ON], grow[GUARD_UNCAPPED], p.data);
 	for (int column = 2; column <= 3; column++) {
@@ -232,10 +234,10 @@ void stability_picture_guard(const struct guard_bench *bench, const char *folder
 		fputs("  NaN\n", script);
 	}
 	fprintf(script,
-		"unset logscale x\nset xrange [-0.5:5.5]\nset yrange [0.03:3]\n"
+		"unset logscale x\nset xrange [-0.5:5.5]\nset yrange [0.008:3]\n"
 		"set title 'guard behind a late actuator'\nset xlabel 'delay / ticks'\n"
-		"set ylabel 'cap / (m/T)'\nset key top right noreverse Right\nplot \\\n"
-		"  2*sin(pi/(4*x+2)) with lines ls 1 title '2 sin(pi/(4d+2))', \\\n"
+		"set ylabel 'cap / (m/T)'\nset key bottom left\nplot \\\n"
+		"  (x < 0 ? NaN : 2*sin(pi/(4*x+2))) with lines ls 1 title '2 sin(pi/(4d+2))', \\\n"
 		"  %g with lines dt 2 lc rgb 'black' title 'as built', \\\n"
 		"  data index %d using 1:2 with points pt 7 ps 1.4 lc rgb '#2e8b57' title "
 		"'bounded at every stiffness', \\\n"
@@ -248,21 +250,29 @@ void stability_picture_guard(const struct guard_bench *bench, const char *folder
 
 /* ---- integrators ---- */
 
+#define DIVERGED 10 /* its place on the axis */
+
+/* Blocks: for each stiffness of the sweep and then for steps of 1 ms, one per kind. */
 static void write_integrators(const struct integrator_bench *bench, const struct place *p)
 {
+	static const double swept[] = {1e3, 1e5};
 	FILE *out = picture_data(p->folder, p->data);
 
-	/* A block per stiffness of the sweep and integrator. */
-	for (int s = 0; s < 2; s++)
+	for (size_t s = 0; s <= N(swept); s++)
 		for (int kind = 0; kind < INTEGRATORS; kind++) {
 			fputs("NaN NaN\n", out);
 			for (int i = 0; i < bench->n; i++) {
 				const struct integrator_row *r = &bench->row[i];
+				double error = r->diverged ? DIVERGED
+							   : fmax(r->max_error, 1e-16);
 
-				if (r->kind == (enum integrator)kind &&
-				    r->K_N_m == (s ? 1e5 : 1e3) && !r->diverged)
-					fprintf(out, "%g %g\n", r->ns_per_ms,
-						fmax(r->max_error, 1e-16));
+				if (r->kind != (enum integrator)kind)
+					continue;
+				if (s == N(swept) && i < bench->table)
+					fprintf(out, "%g %g\n", r->K_N_m, error);
+				else if (s < N(swept) && r->K_N_m == swept[s] &&
+					 !r->diverged)
+					fprintf(out, "%g %g\n", r->ns_per_ms, error);
 			}
 			fputs("\n\n", out);
 		}
@@ -272,45 +282,49 @@ static void write_integrators(const struct integrator_bench *bench, const struct
 void stability_picture_integrators(const struct integrator_bench *bench,
 				   const char *folder, const char *name)
 {
-	static const char *const titles[INTEGRATORS] = {"explicit Euler",
-							"semi-implicit Euler",
-							"implicit Euler",
-							"trapezoid",
-							"RK4",
-							"exact, a matrix (ZOH)",
-							"exact, plant with events"};
-	static const char *const styles[INTEGRATORS] = {"ls 1",
-							"ls 2",
-							"ls 3",
-							"ls 4",
-							"ls 5",
-							"lc rgb 'black' lw 1.5",
-							"lc rgb '#777777' lw 1.5"};
+	static const struct {
+		const char *title, *style;
+	} kinds[INTEGRATORS] = {{"explicit Euler", "ls 1"},
+				{"semi-implicit Euler", "ls 2"},
+				{"implicit Euler", "ls 3"},
+				{"trapezoid", "ls 4"},
+				{"RK4", "ls 5"},
+				{"exact, a matrix (ZOH)", "lc rgb 'black' lw 1.5"},
+				{"exact, plant with events", "lc rgb '#888888' lw 1.5"}};
+	static const char *const titles[] = {"1 kN/m, steps from 1 ms down",
+					     "100 kN/m, from the largest step that holds",
+					     "steps of 1 ms; at the top: diverged"};
 	struct place p = place(folder, name, "integrators");
 	FILE *script;
 
 	write_integrators(bench, &p);
-	script = picture_begin(folder, p.name, 1200, 620);
+	script = picture_begin(folder, p.name, 1500, 560);
 	fprintf(script,
-		"set multiplot layout 1,2 title \"Integrators of a mass on a spring, 50 g, ratio of "
-		"damping 0.1: error over run time, steps from 1 ms down\" font ',13'\n"
+		"set multiplot layout 1,3 title \"Integrators of a mass on a spring: 50 g, ratio "
+		"of damping 0.1\" font ',13'\n"
 		"set termoption enhanced\nset logscale xy\nset format xy '10^{%%L}'\n"
-		"set xlabel 'run time for 1 ms of motion / ns'\nset yrange [1e-17:10]\n"
-		"set xrange [2:30000]\ndata = '%s'\nset key bottom right samplen 2\n",
-		p.data);
-	for (int s = 0; s < 2; s++) {
+		"set yrange [1e-17:%d]\ndata = '%s'\n"
+		"set key off\n",
+		DIVERGED * 3, p.data);
+	for (size_t s = 0; s < N(titles); s++) {
+		bool sweep = s + 1 < N(titles);
+
 		fprintf(script,
-			"set title '%s; the left end of a line is 1 ms or the first step that is "
-			"stable'\nset ylabel '%s'\nplot \\\n",
-			s ? "100 kN/m" : "1 kN/m",
-			s ? "" : "largest error / largest place");
+			"%sset title '%s'\nset ylabel '%s'\nset xlabel '%s'\nset xrange "
+			"[%s]\nplot \\\n",
+			sweep ? ""
+			      : "set key on at graph 0.97, graph 0.6 right samplen 2\n",
+			titles[s], s ? "" : "largest error / largest place",
+			sweep ? "run time for 1 ms of motion / ns" : "stiffness / (N/m)",
+			sweep ? "2:30000" : "5:2e9");
 		for (int kind = 0; kind < INTEGRATORS; kind++)
 			fprintf(script,
-				"  data index %d using 1:2 with %s %s pt 7 ps %s title '%s', \\\n",
+				"  data index %zu using 1:2 with %s %s pt 7 ps %s title '%s', \\\n",
 				s * INTEGRATORS + kind,
-				kind >= EXACT_ZOH ? "points" : "linespoints",
-				styles[kind], kind >= EXACT_ZOH ? "1.6" : "0.7",
-				titles[kind]);
+				sweep && kind >= EXACT_ZOH ? "points" : "linespoints",
+				kinds[kind].style,
+				sweep && kind >= EXACT_ZOH ? "1.5" : "0.7",
+				kinds[kind].title);
 		fputs("  NaN\n", script);
 	}
 	fputs("unset multiplot\n", script);
