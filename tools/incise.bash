@@ -29,6 +29,20 @@ _incise_options()
 		}'
 }
 
+# What a verb can do, where its usage line lists words: "bench precision [FILE] | …".
+_incise_words()
+{
+	"$1" "$2" --help 2>/dev/null | awk '
+		NR == 1 && sub(/^Usage: incise [a-z]+ /, "") {
+			n = split($0, part, "|")
+			for (i = 1; i <= n; i++) {
+				split(part[i], word, " ")
+				if (word[1] ~ /^[a-z]+$/)
+					print word[1]
+			}
+		}'
+}
+
 _incise_files()
 {
 	compopt -o filenames 2>/dev/null || : # not within a completion: a test
@@ -50,7 +64,9 @@ _incise()
 		mapfile -t COMPREPLY < <(compgen -W \
 			"$(_incise_options "$program" "$verb")" -- "$word")
 	else
-		_incise_files "$word"
+		((COMP_CWORD > 2)) || mapfile -t COMPREPLY < <(compgen -W \
+			"$(_incise_words "$program" "$verb")" -- "$word")
+		((${#COMPREPLY[@]})) || _incise_files "$word"
 	fi
 }
 

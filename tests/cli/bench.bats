@@ -152,3 +152,104 @@ row() {
 	run -2 incise bench training --plot x
 	run -2 incise bench nothing
 }
+
+# One number over a list of the stability report: of LIST 'max(ratio)' ['condition'].
+# Names of columns are keys of its objects; bT_m and BT_m are one to SQL.
+of() {
+	local keys
+	keys=$(sqlite3 :memory: "SELECT group_concat(DISTINCT
+		'json_extract(e.value, ''\$.' || o.key || ''') AS ' || o.key)
+		FROM json_each(readfile('r.json'), '\$.$1') e, json_each(e.value) o")
+	[ -n "$keys" ] || complain "no list $1" || return
+	sqlite3 :memory: "SELECT $2 FROM (SELECT $keys
+		FROM json_each(readfile('r.json'), '\$.$1') e) WHERE ${3:-1}"
+}
+
+@test "bench stability finds in time what theory says" {
+	incise bench stability --quick --json >r.json
+	# the tolerances of the manual
+	for list in exact_limit:0.01 colgate:0.01 gil:0.02 amplitude:0.03 quantisation:0.01 \
+		leak:0.03 break_even:0.03; do
+		holds "$(of ${list%:*} 'count(*)') >= 3"
+		holds "$(of ${list%:*} 'min(ratio)') >= 1 - ${list#*:}"
+		holds "$(of ${list%:*} 'max(ratio)' 'NOT at_least') <= 1 + ${list#*:}"
+		[ "$(of ${list%:*} 'min(ok)')" = 1 ]
+		[ "$(of ${list%:*} 'count(*)' 'ratio IS NULL')" = 0 ]
+	done
+	# a ratio is what it says
+	holds "$(of exact_limit 'max(abs(sim_KT2_m / theory_KT2_m - ratio))') < 1e-9"
+	# known figures of b T/m = 0.01 and 1 without delay: half of the last digit that is
+	# known, and what the search in time leaves
+	for known in 0:0.01:0.020033 1:1:2.392211; do
+		row=exact_limit[${known%%:*}] b=${known#*:} limit=${known##*:}
+		[ "$(key r.json "$row.BT_m") $(key r.json "$row.delay")" = "0 0" ]
+		holds "$(key r.json "$row.bT_m") == ${b%:*}"
+		holds "($(key r.json "$row.theory_KT2_m") - $limit) ^ 2 < 0.51e-6 ^ 2"
+		holds "($(key r.json "$row.sim_KT2_m") / $limit - 1) ^ 2 < 0.001 ^ 2"
+	done
+	[ "$(key r.json quick)" = 1 ]
+	[ -n "$(key r.json machine.cpu)" ]
+}
+
+@test "bench stability: the guard holds what is not held without it" {
+	incise bench stability --quick --json >r.json
+	late="late = 'wall' AND clamp_N IS NULL"
+	holds "$(of guard 'count(*)' "$late AND guard = 'on' AND share = 0.5") >= 6"
+	[ "$(of guard 'min(bounded)' "late = 'wall' AND guard = 'on' AND share = 0.5")" = 1 ]
+	[ "$(of guard 'max(bounded)' "$late AND guard = 'off'")" = 0 ]
+	# it is no limit of force: that is the clamp's part
+	holds "$(of guard 'max(largest_N)' "$late AND guard = 'on'") > 100"
+	holds "$(of guard 'max(largest_N)' "clamp_N = 10 AND guard = 'on'") <= 10"
+	# damping that acts five ticks late must be below 0.28 m/T
+	[ "$(of guard 'max(bounded)' "late = 'actuator' AND delay = 5 AND share >= 0.5")" = 0 ]
+	[ "$(of guard 'min(bounded)' "late = 'actuator' AND delay = 5 AND share <= 0.1")" = 1 ]
+}
+
+@test "bench stability lists integrators that diverge, and the exact ones are exact" {
+	incise bench stability --quick --json >r.json
+	ms="step_s = 0.001 AND K_N_m"
+	for name in explicit_euler semi_implicit_euler rk4; do
+		[ "$(of integrators failed "$ms = 1e7 AND integrator = '$name'")" = diverged ]
+		[ -z "$(of integrators max_error "$ms = 1e7 AND integrator = '$name'")" ]
+	done
+	holds "$(of integrators 'max(max_error)' "integrator IN ('exact_zoh', 'plant')") < 1e-9"
+	[ "$(of integrators 'count(*)' "integrator = 'plant'")" = 5 ]
+	# at 1 GN/m the trapezoid rings for ever, implicit Euler is off by 1/(K T^2/m)
+	holds "$(of integrators max_error "$ms = 1e9 AND integrator = 'trapezoid'") > 0.4"
+	holds "$(of integrators max_error "$ms = 1e9 AND integrator = 'implicit_euler'") < 1e-3"
+	# halved twice and once more: orders 1, 2 and 4 over a factor of 8
+	for order in explicit_euler:8 trapezoid:64 rk4:4096; do
+		holds "$(of integrators 'max(max_error) / min(max_error)' \
+			"integrator = '${order%:*}' AND K_N_m = 1000 AND step_s < 0.001") / ${order#*:} - 1 < 0.3"
+	done
+	holds "$(of integrators 'min(ns_per_step)') > 0"
+}
+
+@test "bench stability as text, with a verdict on every ratio" {
+	run -0 --separate-stderr incise bench stability --quick
+	[ -z "$stderr" ]
+	[[ "$output" == *"quick: a part of the grids"* ]]
+	[[ "$output" == *"guard uncapped"* ]]
+	[[ "$output" == *"diverged"* ]]
+	[ "$(grep -c '  ok$' <<<"$output")" -ge 30 ]
+	[[ "$output" != *MISSED* ]]
+}
+
+@test "bench stability draws maps" {
+	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
+	run -0 --separate-stderr incise bench stability --quick --json --plot "a folder/w"
+	[ -z "$stderr" ]
+	for part in map guard integrators; do
+		[ "$(head -c 8 "a folder/w-$part.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
+		grep -q '<svg' "a folder/w-$part.svg"
+	done
+	grep -q 'delay 2' "a folder/w-map.svg"
+	grep -q 'trapezoid' "a folder/w-integrators.svg"
+}
+
+@test "bench stability: bad usage" {
+	run --separate-stderr incise bench stability a
+	bad_usage "'stability'"
+	run --separate-stderr incise bench stability --plot a/
+	bad_usage "--plot"
+}

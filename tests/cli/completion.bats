@@ -51,6 +51,16 @@ complete_words() {
 	done
 }
 
+@test "what bench measures is completed" {
+	touch stale.csv
+	complete_words incise bench ""
+	[ "${COMPREPLY[*]}" = "precision training stability" ]
+	complete_words incise bench st
+	[ "${COMPREPLY[*]}" = stability ]
+	complete_words incise bench precision st
+	[ "${COMPREPLY[*]}" = stale.csv ]
+}
+
 @test "files are completed otherwise" {
 	touch data.csv "two words.csv"
 	mkdir data.rec
