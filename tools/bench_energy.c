@@ -6,13 +6,11 @@
 #include <stddef.h>
 #include <incise/plant.h>
 #include <incise/stability.h>
+#include "bench_device.h"
 #include "bench_energy.h"
 #include "cli.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
-#define MASS_KG 0.05
-#define PERIOD_S 1e-3
-#define MASS (MASS_KG * 1e-3) /* N s²/mm */
 
 /* ---- Coulomb friction: the amplitude that neither grows nor dies ---- */
 
@@ -25,7 +23,7 @@ static bool swing_grows(const struct incise_haptic_device *d, double K, double s
 				     .damping_N_s_mm = d->damping_N_s_mm,
 				     .coulomb_N = d->coulomb_N,
 				     .position_mm = start};
-	double omega = sqrt(K / MASS);
+	double omega = sqrt(K / DEVICE);
 
 	incise_plant_step(&plant, -K * start, phase * d->period_s);
 	/* By then the slowest case below has grown or died e^20 times. */
@@ -71,8 +69,8 @@ void bench_amplitude(struct ratios *ratios, bool quick)
 
 	for (size_t b = 0; b < (quick ? 1 : N(parts)); b++)
 		for (size_t i = 0; i < (quick ? 3 : N(angles)); i++) {
-			double omega = angles[i] / PERIOD_S, K = omega * omega * MASS;
-			struct incise_haptic_device d = {.mass_kg = MASS_KG,
+			double omega = angles[i] / PERIOD_S, K = omega * omega * DEVICE;
+			struct incise_haptic_device d = {.mass_kg = DEVICE_KG,
 							 .damping_N_s_mm = parts[b] * K *
 									   PERIOD_S / 2,
 							 .coulomb_N = 0.05,
@@ -126,7 +124,7 @@ void bench_quantisation(struct ratios *ratios, bool quick)
 	const int centres = quick ? 9 : 33;
 
 	for (size_t i = 0; i < N(cases); i++) {
-		struct incise_haptic_device d = {.mass_kg = MASS_KG,
+		struct incise_haptic_device d = {.mass_kg = DEVICE_KG,
 						 .damping_N_s_mm = cases[i].b_N_s_mm,
 						 .coulomb_N = cases[i].c_N,
 						 .encoder_mm = cases[i].encoder_mm,
@@ -183,7 +181,7 @@ void bench_leak(struct ratios *ratios, bool quick)
 	for (size_t i = 0; i < N(cases); i++) {
 		double K = cases[i].K_N_mm, u = cases[i].u_mm_s, X = cases[i].X_mm,
 		       sum = 0;
-		struct incise_haptic_device d = {.mass_kg = MASS_KG,
+		struct incise_haptic_device d = {.mass_kg = DEVICE_KG,
 						 .period_s = PERIOD_S};
 
 		for (int p = 0; p < phases; p++)
@@ -204,7 +202,7 @@ static double bounced(double K, double damping, int phases)
 	double sum = 0;
 
 	for (int p = 0; p < phases; p++) {
-		struct incise_plant plant = {.mass_kg = MASS_KG,
+		struct incise_plant plant = {.mass_kg = DEVICE_KG,
 					     .damping_N_s_mm = damping,
 					     .velocity_mm_s = -100};
 
@@ -224,7 +222,7 @@ void bench_break_even(struct ratios *ratios, bool quick)
 	const int phases = quick ? 16 : 64;
 
 	for (size_t i = 0; i < N(angles); i++) {
-		double omega = angles[i] / PERIOD_S, K = omega * omega * MASS;
+		double omega = angles[i] / PERIOD_S, K = omega * omega * DEVICE;
 		double lo = 0, hi = 10 * K * PERIOD_S;
 
 		cli_progress("break-even: wT %g", angles[i]);

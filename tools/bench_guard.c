@@ -7,17 +7,16 @@
 #include <string.h>
 #include <incise/guard.h>
 #include <incise/plant.h>
+#include "bench_device.h"
 #include "bench_guard.h"
 #include "cli.h"
 #include "json.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
 
-/* A light device with hardly any friction of its own: the guard has to do it. */
-#define MASS_KG 0.05
+/* Hardly any friction of the device's own: the guard has to do it. */
 #define DAMPING_N_s_mm 1e-5
-#define PERIOD_S 1e-3
-#define CAP_UNIT_N_s_mm (MASS_KG * 1e-3 / PERIOD_S) /* m/T */
+#define CAP_UNIT_N_s_mm (DEVICE / PERIOD_S) /* m/T */
 /* A hand that leans on it: nothing comes from a hand that is worse than a weight. */
 #define PRESS_N 1
 #define BEGIN_mm 1
@@ -39,7 +38,7 @@ static const char *const setting_names[GUARD_SETTINGS] = {"off", "on", "uncapped
 
 static void set(struct incise_guard *guard, const struct guard_row *row)
 {
-	incise_guard_init(guard, MASS_KG, PERIOD_S,
+	incise_guard_init(guard, DEVICE_KG, PERIOD_S,
 			  row->setting == GUARD_OFF ? 0 : RESERVE_N_mm);
 	if (row->setting == GUARD_ON)
 		guard->cap_N_s_mm = row->share * CAP_UNIT_N_s_mm;
@@ -49,7 +48,7 @@ static void set(struct incise_guard *guard, const struct guard_row *row)
 
 static void press(struct guard_row *row)
 {
-	struct incise_plant plant = {.mass_kg = MASS_KG,
+	struct incise_plant plant = {.mass_kg = DEVICE_KG,
 				     .damping_N_s_mm = DAMPING_N_s_mm,
 				     .position_mm = BEGIN_mm,
 				     .velocity_mm_s = -SPEED_mm_s};
@@ -215,7 +214,7 @@ void guard_bench_print(const struct guard_bench *bench)
 {
 	printf("guard of passivity: %g kg, pressed by %g N, meets a wall that answers late, at "
 	       "%g mm/s; cap %g m/T; farthest and hardest in %g s\n",
-	       MASS_KG, (double)PRESS_N, (double)SPEED_mm_s, INCISE_GUARD_SHARE,
+	       DEVICE_KG, (double)PRESS_N, (double)SPEED_mm_s, INCISE_GUARD_SHARE,
 	       TICKS * PERIOD_S);
 	for (int clamped = 0; clamped < 2; clamped++)
 		for (int s = 0; s < GUARD_SETTINGS; s++)

@@ -6,12 +6,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
+#include "bench_device.h"
 #include "bench_integrators.h"
 #include "cli.h"
 #include "json.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
-#define TICK_S 1e-3
+#define TICK_S PERIOD_S
 #define TICKS 2000
 #define REPEATS 15
 #define QUICK_REPEATS 3
@@ -46,7 +47,8 @@ static int by_value(const void *a, const void *b)
 
 static struct spring spring(double K_N_m)
 {
-	return (struct spring){.mass_kg = 0.05, .stiffness_N_m = K_N_m, .ratio = 0.1};
+	return (struct spring){
+		.mass_kg = DEVICE_KG, .stiffness_N_m = K_N_m, .ratio = 0.1};
 }
 
 /* Places at the ends of all ticks; each part of the motion from where its force began. */

@@ -5,21 +5,19 @@
 #include <math.h>
 #include <stddef.h>
 #include <incise/stability.h>
+#include "bench_device.h"
 #include "bench_limits.h"
 #include "cli.h"
 #include "sampled_wall.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
 
-/* A light device in a loop of 1 kHz. */
-#define MASS_KG 0.05
-#define PERIOD_S 1e-3
-#define UNIT_N_s_mm (MASS_KG * 1e-3 / PERIOD_S) /* m/T */
-#define UNIT_N_mm (UNIT_N_s_mm / PERIOD_S)	/* m/T² */
+#define UNIT_N_s_mm (DEVICE / PERIOD_S)	   /* m/T */
+#define UNIT_N_mm (UNIT_N_s_mm / PERIOD_S) /* m/T² */
 
 static struct incise_haptic_device device(double bT_m, int delay)
 {
-	return (struct incise_haptic_device){.mass_kg = MASS_KG,
+	return (struct incise_haptic_device){.mass_kg = DEVICE_KG,
 					     .damping_N_s_mm = bT_m * UNIT_N_s_mm,
 					     .period_s = PERIOD_S,
 					     .delay_ticks = delay};
@@ -27,7 +25,7 @@ static struct incise_haptic_device device(double bT_m, int delay)
 
 static struct sampled_wall wall(double bT_m, double BT_m, int delay)
 {
-	return (struct sampled_wall){.plant = {.mass_kg = MASS_KG,
+	return (struct sampled_wall){.plant = {.mass_kg = DEVICE_KG,
 					       .damping_N_s_mm = bT_m * UNIT_N_s_mm},
 				     .damping_N_s_mm = BT_m * UNIT_N_s_mm,
 				     .period_s = PERIOD_S,
@@ -68,8 +66,8 @@ static double limit_in_hand(struct sampled_wall sim, double angle)
 {
 	double m;
 
-	sim.plant.mass_kg = sim.plant.damping_N_s_mm * PERIOD_S / 0.01 / 1e-3;
-	m = sim.plant.mass_kg * 1e-3;
+	sim.plant.mass_kg = sim.plant.damping_N_s_mm * PERIOD_S / 0.01 / N_S2_PER_MM_KG;
+	m = sim.plant.mass_kg * N_S2_PER_MM_KG;
 	sim.plant.tied = true;
 	sim.plant.wall_N_mm = m * (angle / PERIOD_S) * (angle / PERIOD_S);
 	return sampled_wall_limit(&sim);

@@ -3,9 +3,9 @@
  * A sampled wall in time; see sampled_wall.h.
  */
 #include <math.h>
+#include "bench_device.h"
 #include "sampled_wall.h"
 
-#define N_S2_PER_MM_KG 1e-3
 #define DELAY_MAX 64
 
 /* A run: some time for what fades at once, then two windows apart.

@@ -12,8 +12,8 @@
  */
 #include <math.h>
 #include <incise/plant.h>
+#include "../base/units.h"
 
-#define N_S2_PER_MM_KG 1e-3 /* 1 kg = 1 N s²/m */
 #define EVENTS_MAX 1000000
 
 struct piece {

@@ -4,11 +4,11 @@
  */
 #include <string.h>
 #include <incise/guard.h>
+#include "../base/units.h"
 #include "../base/vector.h"
 
 /* More than any hand has: so that sums stay numbers. */
 #define DEBT_N_mm 1e30
-#define N_S2_PER_MM_KG 1e-3 /* 1 kg = 1 N s²/m */
 
 void incise_guard_init(struct incise_guard *guard, double mass_kg, double period_s,
 		       double reserve_N_mm)

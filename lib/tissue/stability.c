@@ -16,8 +16,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <incise/stability.h>
-
-#define N_S2_PER_MM_KG 1e-3 /* 1 kg = 1 N s²/m */
+#include "../base/units.h"
 
 /* What a held force makes of the device in one period, unit mass and period. */
 struct loop {

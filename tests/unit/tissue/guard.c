@@ -169,6 +169,30 @@ static void test_a_sampled_wall_stays_bounded(void **state)
 	}
 }
 
+/* What a bounce brings is what the guard sees to have come out; f·v T sees none of it. */
+static void test_a_bounce(void **state)
+{
+	struct incise_guard guard = made(1e6);
+	double x = 0, v = -100, m = MASS_KG / 1000, T = PERIOD_S, naive = 0, gain;
+
+	/* It only watches: what it adds is not sent. */
+	for (int i = 0; i < 1000 && (x < 0 || v < 0); i++) {
+		double at[3] = {x}, u[3] = {v}, f = x < 0 ? -1 * x : 0, force[3] = {f};
+
+		incise_guard_apply(&guard, at, u, force);
+		incise_guard_sent(&guard, (const double[3]){f});
+		naive += f * v * T;
+		x += (v + f / m * T / 2) * T;
+		v += f / m * T;
+	}
+	incise_guard_apply(&guard, (const double[3]){x}, (const double[3]){0},
+			   (double[3]){0});
+	gain = m / 2 * (v * v - 1e4);
+	assert_true(gain > 0.01);
+	assert_true(fabs(guard.energy_N_mm + gain) < 1e-13);
+	assert_true(naive < 0.1 * gain);
+}
+
 static void test_off_leaves_every_bit(void **state)
 {
 	static const struct {
@@ -238,6 +262,7 @@ int main(void)
 		cmocka_unit_test(test_credit_is_bounded_and_debt_is_not),
 		cmocka_unit_test(test_no_direction_is_special),
 		cmocka_unit_test(test_a_sampled_wall_stays_bounded),
+		cmocka_unit_test(test_a_bounce),
 		cmocka_unit_test(test_off_leaves_every_bit),
 		cmocka_unit_test(test_whatever_comes),
 	};
