@@ -191,21 +191,13 @@ int integrator_bench_missed(const struct integrator_bench *bench)
 	return missed;
 }
 
-static void print_error(const struct integrator_row *row)
-{
-	if (row->diverged)
-		printf("%21s", "diverged");
-	else
-		printf("%21.2g", row->max_error);
-}
-
 /* The cheapest way to each error; all of them are in the JSON. */
 static void print_work(const struct integrator_bench *bench, double K,
 		       enum integrator kind)
 {
 	static const double errors[] = {1e-2, 1e-4, 1e-6, 1e-9};
 
-	printf("%10g%21s", K, integrator_name(kind));
+	printf("%21s%10g", integrator_name(kind), K);
 	for (size_t e = 0; e < N(errors); e++) {
 		double least = INFINITY;
 
@@ -226,23 +218,25 @@ static void print_work(const struct integrator_bench *bench, double K,
 
 void integrator_bench_print(const struct integrator_bench *bench)
 {
-	printf("integrators of a spring: 50 g, ratio of damping 0.1, steps of 1 ms; largest error "
-	       "as part of the largest place\n%10s",
-	       "K_N_m");
-	for (int k = 0; k < INTEGRATORS; k++)
-		printf("%21s", integrator_name(k));
-	for (int i = 0; i < bench->table; i++) {
-		if (i % INTEGRATORS == 0)
-			printf("\n%10g", bench->row[i].K_N_m);
-		print_error(&bench->row[i]);
+	printf("integrators of a spring: %g kg, ratio of damping 0.1, steps of 1 ms; largest "
+	       "error as part of the largest place\n%21s",
+	       DEVICE_KG, "N/m");
+	for (int i = 0; i < bench->table; i += INTEGRATORS)
+		printf("%10g", bench->row[i].K_N_m);
+	printf("%10s\n", "ns/step");
+	for (int kind = 0; kind < INTEGRATORS; kind++) {
+		printf("%21s", integrator_name(kind));
+		for (int i = kind; i < bench->table; i += INTEGRATORS)
+			if (bench->row[i].diverged)
+				printf("%10s", "diverged");
+			else
+				printf("%10.2g", bench->row[i].max_error);
+		/* Of the second stiffness: nothing overflows there. */
+		printf("%10.1f\n", bench->row[INTEGRATORS + kind].ns_per_step);
 	}
-	printf("\n%10s", "ns/step");
-	/* Of the second stiffness: nothing overflows there. */
-	for (int k = 0; k < INTEGRATORS; k++)
-		printf("%21.1f", bench->row[INTEGRATORS + k].ns_per_step);
-	printf("\nns for 1 ms of motion, by the largest error that it has with the best of the "
-	       "steps tried\n%10s%21s%12s%12s%12s%12s\n",
-	       "K_N_m", "integrator", "1e-2", "1e-4", "1e-6", "1e-9");
+	printf("ns for 1 ms of motion, by the largest error that it has with the best of the "
+	       "steps tried\n%21s%10s%12s%12s%12s%12s\n",
+	       "", "N/m", "1e-2", "1e-4", "1e-6", "1e-9");
 	for (size_t i = 0; i < N(swept); i++)
 		for (int kind = 0; kind < INTEGRATORS; kind++)
 			print_work(bench, swept[i], kind);

@@ -38,7 +38,7 @@ void bench_exact_limit(struct ratios *ratios, bool quick)
 	static const double walls[] = {0, 0.1, 0.3};
 	static const int delays[] = {0, 1, 2, 5};
 
-	/* Quick: every third damping, two walls, two delays. */
+	/* Quick: every other damping and delay, two walls. */
 	for (size_t d = 0; d < N(delays); d += quick ? 2 : 1)
 		for (size_t w = 0; w < (quick ? 2 : N(walls)); w++)
 			for (size_t b = quick ? 1 : 0; b < N(dampings);

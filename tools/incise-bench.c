@@ -350,10 +350,12 @@ int main(int argc, char **argv)
 			cli_usage("--plot goes with 'precision' and 'stability'");
 		bench_training(json, quick);
 		cli_finish();
+		free(b);
 		return 0;
 	}
 	if (optind + 1 == argc && !strcmp(argv[optind], "stability")) {
 		bench_stability(json, quick, plot);
+		free(b);
 		return 0;
 	}
 	if (optind >= argc || strcmp(argv[optind], "precision") || argc - optind > 2)

@@ -150,40 +150,37 @@ static double angle(int i, int steps)
 	return M_PI - ldexp(step, -(i - FACTORS - steps + 2));
 }
 
+/* The lesser of two values, of which those that are not positive do not count. */
+static double lesser(double least, double value)
+{
+	return value > 0 ? fmin(least, value) : least;
+}
+
 /* The least positive value of the function where it is real; infinite without any. */
 static double least_real(locus *f, const struct loop *loop)
 {
 	int steps = STEPS_PER_TICK * (loop->delay + 2), n = FACTORS + steps + HALVINGS;
-	double at[3] = {0}, im[3] = {0}, least = INFINITY, end = creal(f(loop, M_PI));
+	double at[3] = {0}, im[3] = {0}, least;
 
 	/* At z = -1 it is real, but for rounding: not a change of sign. */
-	if (end > 0)
-		least = end;
+	least = lesser(INFINITY, creal(f(loop, M_PI)));
 	for (int i = 0; i < n; i++) {
-		double found = INFINITY;
-
 		at[0] = at[1], im[0] = im[1];
 		at[1] = at[2], im[1] = im[2];
 		at[2] = angle(i, steps);
 		im[2] = imaginary(f, loop, at[2]);
 		if (i > 0 && (im[2] < 0) != (im[1] < 0)) {
-			found = crossing(f, loop, at[1], at[2]);
+			least = lesser(least, crossing(f, loop, at[1], at[2]));
 		} else if (i > 1 && (im[1] < 0) == (im[0] < 0) &&
 			   fabs(im[1]) < fabs(im[0]) && fabs(im[1]) < fabs(im[2])) {
 			/* Perhaps it crosses twice between the angles looked at. */
 			double middle = nearest(f, loop, at[0], at[2]);
 
-			if ((imaginary(f, loop, middle) < 0) != (im[1] < 0)) {
-				found = crossing(f, loop, at[0], middle);
-				if (!(found > 0))
-					found = INFINITY;
-				end = crossing(f, loop, middle, at[2]);
-				if (end > 0)
-					found = fmin(found, end);
-			}
+			if ((imaginary(f, loop, middle) < 0) == (im[1] < 0))
+				continue;
+			least = lesser(least, crossing(f, loop, at[0], middle));
+			least = lesser(least, crossing(f, loop, middle, at[2]));
 		}
-		if (found > 0)
-			least = fmin(least, found);
 	}
 	return least;
 }
