@@ -13,10 +13,10 @@
 #include <stdbool.h>
 #include <jansson.h>
 
-#define GUARD_ROWS_MAX 640
+#define GUARD_ROWS_MAX 768
 
-/* How the guard is set. */
-enum guard_setting { GUARD_OFF, GUARD_ON, GUARD_UNCAPPED, GUARD_SETTINGS };
+/* How the guard is set: on in every tick, without its cap, or asked in contact only. */
+enum guard_setting { GUARD_OFF, GUARD_ON, GUARD_UNCAPPED, GUARD_CONTACT, GUARD_SETTINGS };
 
 struct guard_row {
 	double K_N_mm;

@@ -217,10 +217,12 @@ void stability_picture_guard(const struct guard_bench *bench, const char *folder
 		count(bench, s, grow[s]);
 	fprintf(script,
 		"set multiplot layout 1,3 title \"50 g pressed on a wall that answers late. Not "
-		"bounded: %s without a guard, %s with it, %s with it and no cap\" font ',13'\n"
+		"bounded: %s without a guard, %s with it, %s without its cap, %s in contact "
+		"only\" font ',12'\n"
 		"data = '%s'\nset logscale xy\nset xrange [0.8:300]\nset xlabel 'stiffness of the wall / N/mm'\n"
 		"set key top left Left reverse\nset style line 6 lc rgb '#555555' lw 1.5\n",
-		grow[GUARD_OFF], grow[GUARD_ON], grow[GUARD_UNCAPPED], p.data);
+		grow[GUARD_OFF], grow[GUARD_ON], grow[GUARD_UNCAPPED],
+		grow[GUARD_CONTACT], p.data);
 	for (int column = 2; column <= 3; column++) {
 		fprintf(script, "set title '%s'\nset ylabel '%s'\nplot \\\n",
 			column == 2 ? "guard on: how far the hand is thrown"

@@ -197,6 +197,9 @@ of() {
 	holds "$(of guard 'count(*)' "$late AND guard = 'on' AND share = 0.5") >= 6"
 	[ "$(of guard 'min(bounded)' "late = 'wall' AND guard = 'on' AND share = 0.5")" = 1 ]
 	[ "$(of guard 'max(bounded)' "$late AND guard = 'off'")" = 0 ]
+	# nor is it held by a guard without cap, or one that looks away out of contact
+	[ "$(of guard 'max(bounded)' "$late AND guard = 'uncapped'")" = 0 ]
+	[ "$(of guard 'max(bounded)' "$late AND guard = 'contact' AND K_N_mm = 200")" = 0 ]
 	# it is no limit of force: that is the clamp's part
 	holds "$(of guard 'max(largest_N)' "$late AND guard = 'on'") > 100"
 	holds "$(of guard 'max(largest_N)' "clamp_N = 10 AND guard = 'on'") <= 10"

@@ -72,8 +72,10 @@ INCISE_API void incise_guard_init(struct incise_guard *guard, double mass_kg,
 INCISE_API void incise_guard_reset(struct incise_guard *guard);
 
 /**
- * Once per tick: observe the force that was held since the last call, and add damping to
- * the next one where more energy came out than went in.
+ * Once per tick, out of contact too: observe the force that was held since the last call,
+ * and add damping to the next one where more energy came out than went in. What a stiff
+ * wall made is often seen when the device has left it already; asked in contact only, the
+ * guard does not hold walls that it holds otherwise (`incise bench stability` shows it).
  *
  * What is not finite is neither observed nor damped, and is left as it is.
  *
