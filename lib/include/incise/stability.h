@@ -54,7 +54,7 @@ INCISE_API double incise_stability_limit(const struct incise_haptic_device *devi
 /**
  * Stiffness up to which the wall is passive: stable in whatever hand, as long as the hand
  * is passive itself. Colgate and Schenkel, Passivity of a class of sampled-data systems,
- * J. Robotic Systems 14 (1997): b > K (T/2 + t_d) + |B|. Exact without delay, and without
+ * J. Robotic Systems 14 (1997): b > K (T/2 + t_d) + |B|. Exact where there is no delay or no
  * B; with both it is enough, but more than is needed.
  *
  * @param damping_N_s_mm of the wall, B
