@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/fixed.h>
+#include "../base/vector.h"
 #include "../tissue/limit.h"
 #include "../tissue/predict.h"
 #include "scene.h"
@@ -56,12 +57,15 @@ static int pose(struct incise_plan *plan, struct incise_tick *tick)
 
 static int predict(struct incise_plan *plan, struct incise_tick *tick)
 {
+	double velocity_mm_s[3], attitude[4];
+
 	if (incise_predict_age(&plan->predict, tick->t_ns) > plan->pose_age_ns) {
 		tick->flags |= INCISE_TICK_STALE;
 		return 0;
 	}
-	incise_predict_at(&plan->predict, tick->t_ns, tick->position_mm);
-	tick->velocity_mm_s = incise_predict_speed(&plan->predict);
+	incise_predict_at(&plan->predict, tick->t_ns, tick->position_mm, velocity_mm_s,
+			  attitude);
+	tick->velocity_mm_s = v3_length(velocity_mm_s);
 	return 0;
 }
 

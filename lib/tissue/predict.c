@@ -1,35 +1,146 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * Where the tip is now; see predict.h. Gains after Kalata's tracking index
- * Λ = σa T²/σx, the ratio of what a hand can do in one period to what the tracker sees.
+ * Λ = σa T²/σx, where σa is what acceleration changes in one period T and σx what the
+ * tracker sees: Kalata, The tracking index, IEEE Trans. AES-20(2), 1984; the closed form
+ * is Gray and Murray's, IEEE Trans. AES-29(3), 1993.
  */
 #include <math.h>
 #include <incise/clock.h>
+#include "../base/vector.h"
 #include "predict.h"
 
-/* A surgeon's hand accelerates by some hundred mm/s² while cutting. */
-#define HAND_MM_S2 300.0
+/*
+ * Density of the hand's white jerk, mm²/s⁵, about its mean square times the time for
+ * which it lasts, 1/2π of a period. A hand that goes ±1.7 mm at 3 Hz (32 mm/s) has
+ * 8000 mm/s³ rms for 53 ms: 3.4e6. Tremor of 30 µm at 10 Hz has 5300 mm/s³ for 16 ms:
+ * 0.4e6. The error is flat about it: half or twice as much changes it by less than a
+ * tenth.
+ */
+#define HAND_MM2_S5 4e6
 
 /* Noise of a magnetic tracker near its source. */
 #define NOISE_MM 0.02
 
-/* Beyond these nothing is believed: no hand is that far or that fast. */
+/* Beyond these nothing is believed: no hand is that far, that fast, or pushed by 10 g. */
 #define FAR_MM 1e4
 #define FAST_MM_S 1e4
+#define HARD_MM_S2 1e5
 
-void incise_predict_init(struct incise_predict *predict,
+/* At 60 Hz a hand that misses a pose by this is faster than 1 m/s. */
+#define JUMP_MM 20.0
+
+#define GAP_PERIODS 5
+
+static double within(double x, double least, double most)
+{
+	return x >= least ? fmin(x, most) : least;
+}
+
+/*
+ * s = √(1 - α) is where (1 - s)³ = Λ/2 s (1 + s); one side falls and the other rises, so
+ * that halving finds it for any Λ > 0.
+ */
+static void set_gains(struct incise_predict *p, double index)
+{
+	double low = 0, high = 1, s;
+
+	for (int i = 0; i < 64; i++) {
+		s = (low + high) / 2;
+		if (pow(1 - s, 3) > index / 2 * s * (1 + s))
+			low = s;
+		else
+			high = s;
+	}
+	p->alpha = 1 - s * s;
+	p->beta = 2 * (1 - s) * (1 - s);
+	p->gamma = 2 * pow(1 - s, 3) / (1 + s);
+}
+
+void incise_predict_init_noise(struct incise_predict *p,
+			       const struct incise_tracker_info *tracker, double noise_mm)
+{
+	double period_s = 1 / within(tracker->rate_hz, 1, 1e4);
+	double change = sqrt(HAND_MM2_S5 * period_s);
+
+	*p = (struct incise_predict){
+		.period_s = period_s,
+		.gap_ns = (int64_t)(GAP_PERIODS * period_s * INCISE_NS_PER_S),
+		.latency_ns =
+			(int64_t)within((double)tracker->latency_ns, 0, INCISE_NS_PER_S),
+		.q = {1},
+		.q_shown = {1},
+	};
+	set_gains(p, change * period_s * period_s / within(noise_mm, 1e-9, FAR_MM));
+}
+
+void incise_predict_init(struct incise_predict *p,
 			 const struct incise_tracker_info *tracker)
 {
-	double period = 1 / tracker->rate_hz;
-	double index = HAND_MM_S2 * period * period / NOISE_MM;
-	double r = (4 + index - sqrt(8 * index + index * index)) / 4;
+	incise_predict_init_noise(p, tracker, NOISE_MM);
+}
 
-	*predict = (struct incise_predict){
-		.alpha = 1 - r * r,
-		.beta = 2 * (1 - r) * (1 - r),
-		.latency_ns = tracker->latency_ns,
-		.gap_ns = (int64_t)(5 * period * INCISE_NS_PER_S),
-	};
+/* Never negative, and no overflow for any two times. */
+static int64_t since(int64_t t_ns, int64_t from_ns)
+{
+	uint64_t gone = (uint64_t)t_ns - (uint64_t)from_ns;
+
+	if (t_ns <= from_ns)
+		return 0;
+	return gone < INT64_MAX ? (int64_t)gone : INT64_MAX;
+}
+
+/* What the filter says of @t_ns: an old pose is not thrown across the room. */
+static void extrapolate(const struct incise_predict *p, int64_t t_ns, double x[3],
+			double v[3])
+{
+	int64_t ahead_ns = since(t_ns, p->t_ns);
+	double dt =
+		(double)(ahead_ns < p->gap_ns ? ahead_ns : p->gap_ns) / INCISE_NS_PER_S;
+
+	for (int i = 0; i < 3; i++) {
+		x[i] = p->x[i] + (p->v[i] + p->a[i] * dt / 2) * dt;
+		v[i] = within(p->v[i] + p->a[i] * dt, -FAST_MM_S, FAST_MM_S);
+	}
+}
+
+static double dot4(const double a[4], const double b[4])
+{
+	return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+}
+
+static void turn_between(double q[4], const double from[4], const double to[4],
+			 double share)
+{
+	double length;
+
+	for (int i = 0; i < 4; i++)
+		q[i] = share * from[i] + (1 - share) * to[i];
+	/* Never near 0: add() takes the sign for which from · to ≥ 0. */
+	length = sqrt(dot4(q, q));
+	for (int i = 0; i < 4; i++)
+		q[i] /= length;
+}
+
+/* How much is left of what was shown when the last pose arrived: 1 … 0. */
+static double left(const struct incise_predict *p, int64_t t_ns)
+{
+	double gone_s = (double)since(t_ns, p->arrival_ns) / INCISE_NS_PER_S;
+
+	return fmax(1 - gone_s / p->period_s, 0);
+}
+
+void incise_predict_at(const struct incise_predict *p, int64_t t_ns,
+		       double position_mm[3], double velocity_mm_s[3], double attitude[4])
+{
+	double share = left(p, t_ns);
+
+	extrapolate(p, t_ns, position_mm, velocity_mm_s);
+	v3_add(position_mm, position_mm, share, p->x_shown);
+	v3_add(velocity_mm_s, velocity_mm_s, share, p->v_shown);
+	for (int i = 0; i < 3; i++)
+		velocity_mm_s[i] = within(velocity_mm_s[i], -FAST_MM_S, FAST_MM_S);
+	turn_between(attitude, p->q_shown, p->q, share);
 }
 
 static bool believable(const double x[3])
@@ -37,54 +148,81 @@ static bool believable(const double x[3])
 	return fabs(x[0]) < FAR_MM && fabs(x[1]) < FAR_MM && fabs(x[2]) < FAR_MM;
 }
 
+/* Of the two quaternions of an attitude, the one on the shorter way from q_shown. */
+static void take_attitude(struct incise_predict *p, const double q[4])
+{
+	double length = sqrt(dot4(q, q));
+	double sign = dot4(q, p->q_shown) < 0 ? -1 : 1;
+
+	/* Devices round their numbers, but not by a tenth. */
+	if (!(length > 0.9 && length < 1.1))
+		return;
+	for (int i = 0; i < 4; i++)
+		p->q[i] = sign * q[i] / length;
+}
+
+/* Bring the state to @t_ns and correct it. Returns false when the pose is too far off. */
+static bool correct(struct incise_predict *p, int64_t t_ns, const double position_mm[3])
+{
+	double x[3], v[3], miss[3];
+	/*
+	 * Gains are those of the nominal period: a filter that divided by the time that
+	 * went by would make any speed of two poses a nanosecond apart.
+	 */
+	double per_s = 1 / p->period_s;
+
+	extrapolate(p, t_ns, x, v);
+	v3_sub(miss, position_mm, x);
+	if (!(v3_length(miss) <= JUMP_MM))
+		return false;
+	v3_add(p->x, x, p->alpha, miss);
+	v3_add(p->v, v, p->beta * per_s, miss);
+	v3_add(p->a, p->a, p->gamma * per_s * per_s, miss);
+	for (int i = 0; i < 3; i++) {
+		p->v[i] = within(p->v[i], -FAST_MM_S, FAST_MM_S);
+		p->a[i] = within(p->a[i], -HARD_MM_S2, HARD_MM_S2);
+	}
+	return true;
+}
+
 void incise_predict_add(struct incise_predict *p,
 			const struct incise_tracker_sample *sample)
 {
+	double shown[3], speed[3], attitude[4], x[3], v[3], step[3];
+	bool blend = p->started;
 	int64_t t_ns;
-	double dt;
 
 	if (!believable(sample->position_mm) || sample->t_ns < 0)
 		return;
 	t_ns = sample->t_ns - p->latency_ns;
 	if (p->started && t_ns <= p->t_ns)
 		return;
-	dt = (double)(t_ns - p->t_ns) / INCISE_NS_PER_S;
-	if (!p->started || t_ns - p->t_ns > p->gap_ns) {
-		for (int i = 0; i < 3; i++) {
-			p->x[i] = sample->position_mm[i];
-			p->v[i] = 0;
-		}
-	} else {
-		for (int i = 0; i < 3; i++) {
-			double ahead = p->x[i] + p->v[i] * dt;
-			double miss = sample->position_mm[i] - ahead;
-			double v = p->v[i] + p->beta * miss / dt;
-
-			p->x[i] = ahead + p->alpha * miss;
-			p->v[i] = fmax(-FAST_MM_S, fmin(FAST_MM_S, v));
-		}
+	incise_predict_at(p, sample->t_ns, shown, speed, attitude);
+	if (!p->started || since(t_ns, p->t_ns) > p->gap_ns ||
+	    !correct(p, t_ns, sample->position_mm)) {
+		v3_copy(p->x, sample->position_mm);
+		for (int i = 0; i < 3; i++)
+			p->v[i] = p->a[i] = 0;
+		v3_sub(step, shown, p->x);
+		blend = p->started && v3_length(step) <= JUMP_MM;
 	}
 	p->started = true;
 	p->t_ns = t_ns;
-}
-
-void incise_predict_at(const struct incise_predict *p, int64_t t_ns, double position[3])
-{
-	/* Never further ahead than a gap: an old pose is not thrown across the room. */
-	int64_t ahead_ns = t_ns - p->t_ns;
-	double ahead =
-		(double)(ahead_ns < p->gap_ns ? ahead_ns : p->gap_ns) / INCISE_NS_PER_S;
-
-	for (int i = 0; i < 3; i++)
-		position[i] = p->x[i] + p->v[i] * fmax(ahead, 0);
-}
-
-double incise_predict_speed(const struct incise_predict *p)
-{
-	return sqrt(p->v[0] * p->v[0] + p->v[1] * p->v[1] + p->v[2] * p->v[2]);
+	p->arrival_ns = sample->t_ns;
+	for (int i = 0; i < 4; i++)
+		p->q_shown[i] = attitude[i];
+	take_attitude(p, sample->quaternion);
+	extrapolate(p, sample->t_ns, x, v);
+	for (int i = 0; i < 3; i++) {
+		p->x_shown[i] = blend ? shown[i] - x[i] : 0;
+		p->v_shown[i] = blend ? speed[i] - v[i] : 0;
+	}
+	if (!blend)
+		for (int i = 0; i < 4; i++)
+			p->q_shown[i] = p->q[i];
 }
 
 int64_t incise_predict_age(const struct incise_predict *p, int64_t t_ns)
 {
-	return p->started ? t_ns - p->t_ns : INT64_MAX;
+	return p->started ? since(t_ns, p->t_ns) : INT64_MAX;
 }
