@@ -109,13 +109,10 @@ static int reaction(struct incise_plan *plan, struct incise_tick *tick)
 
 static int limit(struct incise_plan *plan, struct incise_tick *tick)
 {
-	bool held;
-	double force = incise_limit_apply(&plan->limit, plan->reaction_N, &held);
-
-	if (held)
-		tick->flags |= INCISE_TICK_LIMITED;
 	for (int i = 0; i < 3; i++)
-		tick->command_N[i] = force * plan->normal[i];
+		tick->command_N[i] = plan->reaction_N * plan->normal[i];
+	if (incise_limit_apply(&plan->limit, tick->command_N))
+		tick->flags |= INCISE_TICK_LIMITED;
 	return 0;
 }
 
@@ -133,8 +130,10 @@ static int actuate(struct incise_plan *plan, struct incise_tick *tick)
 	tick->rendered_N = isfinite(status.force_N) ? status.force_N : 0;
 	if (isfinite(status.handle_mm))
 		plan->handle_mm = status.handle_mm;
-	return incise_stepper_set(
-		plan->stepper, plan->handle_mm + plan->limit.last_N / plan->spring_N_mm);
+	return incise_stepper_set(plan->stepper,
+				  plan->handle_mm +
+					  v3_dot(plan->limit.last_N, plan->normal) /
+						  plan->spring_N_mm);
 }
 
 static void add_stage(struct incise_plan *plan, const char *name,
@@ -191,8 +190,10 @@ struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 		memcpy(plan->point_mm, scene->point_mm, sizeof(plan->point_mm));
 		memcpy(plan->normal, scene->normal, sizeof(plan->normal));
 	}
-	plan->limit = (struct incise_limit){scene->force_N,
-					    scene->slew_N_s / scene->rate_hz, 0};
+	plan->limit = (struct incise_limit){
+		.force_N = scene->force_N,
+		.slew_N = scene->slew_N_s / scene->rate_hz,
+	};
 	add_stage(plan, "pose", pose);
 	add_stage(plan, "predict", predict);
 	add_stage(plan, "contact", contact);
