@@ -16,7 +16,7 @@
 #include "cli.h"
 #include "json.h"
 
-enum { OPT_MODEL = CLI_LONG, OPT_ARITH, OPT_DURATION, OPT_LOG, OPT_JSON };
+enum { OPT_MODEL = CLI_LONG, OPT_ARITH, OPT_TOOL, OPT_DURATION, OPT_LOG, OPT_JSON };
 
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
@@ -24,6 +24,9 @@ static const struct cli_option options[] = {
 	 "(default: ./rig.conf, else /etc/incise/rig.conf)"},
 	{OPT_MODEL, "model", "FILE", "use this model instead of the scene's"},
 	{OPT_ARITH, "arith", "KIND", "fixed or double, instead of the scene's"},
+	{OPT_TOOL, "tool", "KIND",
+	 "what the hand holds: auto (blade or handle, by the scalpel's turn), blade,\n"
+	 "handle or tube (default: auto)"},
 	{OPT_DURATION, "duration", "TIME",
 	 "stop after this time, e.g. 10s (default: at SIGINT)"},
 	{OPT_LOG, "log", "FILE", "write every tick as CSV at the end; needs --duration"},
@@ -45,9 +48,20 @@ static const struct cli_verb verb = {
 
 struct job {
 	const char *scene, *rig, *model, *arith, *log;
+	enum incise_tool tool;
 	double duration;
 	bool json;
 };
+
+static enum incise_tool tool_named(const char *name)
+{
+	static const char *const names[] = {"auto", "blade", "handle", "tube"};
+
+	for (int i = 0; i < 4; i++)
+		if (!strcmp(name, names[i]))
+			return (enum incise_tool)i;
+	cli_usage("--tool: '%s' is none of auto, blade, handle, tube", name);
+}
 
 static void parse(struct job *job, int argc, char **argv)
 {
@@ -68,6 +82,9 @@ static void parse(struct job *job, int argc, char **argv)
 				cli_usage("--arith: '%s' is neither double nor fixed",
 					  optarg);
 			break;
+		case OPT_TOOL:
+			job->tool = tool_named(optarg);
+			break;
 		case OPT_DURATION:
 			job->duration = cli_duration("duration", optarg, 0.01, 86400);
 			break;
@@ -87,40 +104,46 @@ static void parse(struct job *job, int argc, char **argv)
 		cli_usage("--json and --log - would both write to standard output");
 }
 
+/* A letter for each flag, from the lowest bit on; incise-haptic(1) explains them. */
 static const char *flags_text(unsigned int flags, char *text)
 {
-	static const char letters[] =
-		"cesof"; /* contact extrapolated stale overlimit fault */
+	static const char letters[] = "cesofvtgrn";
 
+	_Static_assert(sizeof(letters) == INCISE_TICK_FLAGS + 1, "a letter for each");
 	for (int i = 0; letters[i]; i++)
 		text[i] = flags & 1u << i ? letters[i] : '-';
 	text[strlen(letters)] = 0;
 	return text;
 }
 
+static const char *const phases[] = {"free", "cutting", "insertion"};
+
 static void write_log(const struct job *job, const struct incise_tick *ticks, size_t n)
 {
 	struct incise_error err = {0};
 	struct incise_outfile *file = incise_outfile_open(job->log, &err);
-	char flags[8];
+	char flags[INCISE_TICK_FLAGS + 1];
 	FILE *out;
 
 	if (!file)
 		cli_fail_with(&err);
 	out = incise_outfile_stream(file);
-	fputs("t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags\n",
+	fputs("t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags,phase,"
+	      "command_x_N,command_y_N,command_z_N\n",
 	      out);
 	for (size_t i = 0; i < n; i++) {
 		const struct incise_tick *t = &ticks[i];
 
-		fprintf(out, "%.6f,%.4f,%.4f,%.4f,%.4f,%.3f,%.5f,%.5f,%s\n",
+		fprintf(out,
+			"%.6f,%.4f,%.4f,%.4f,%.4f,%.3f,%.5f,%.5f,%s,%s,%.5f,%.5f,%.5f\n",
 			(t->t_ns - ticks[0].t_ns) * 1e-9, t->position_mm[0],
 			t->position_mm[1], t->position_mm[2], t->depth_mm,
 			t->velocity_mm_s,
 			sqrt(t->command_N[0] * t->command_N[0] +
 			     t->command_N[1] * t->command_N[1] +
 			     t->command_N[2] * t->command_N[2]),
-			t->rendered_N, flags_text(t->flags, flags));
+			t->rendered_N, flags_text(t->flags, flags), phases[t->phase],
+			t->command_N[0], t->command_N[1], t->command_N[2]);
 	}
 	if (incise_outfile_commit(file, &err))
 		cli_fail_with(&err);
@@ -180,21 +203,37 @@ static json_t *cost_json(const struct incise_loop_stats *s)
 			 json_number(s->tick_max_ns));
 }
 
+/* As JSON names them, from the lowest bit on. */
+static const char *const flag_names[INCISE_TICK_FLAGS] = {
+	"contact", "extrapolated", "stale",   "clamped",  "fault",
+	"slewed",  "travel",	   "guarded", "starting", "not_finite",
+};
+
+static uint64_t ticks_with(const struct incise_loop_stats *s, enum incise_tick_flag flag)
+{
+	return s->flagged[__builtin_ctz(flag)];
+}
+
 static void report_json(const struct incise_loop_stats *s, const struct incise_plan *plan,
 			bool real, double rate_hz, double rms_N)
 {
-	json_t *stages = json_array();
+	json_t *stages = json_array(), *flags = json_object();
 
+	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
+		json_object_set_new(flags, flag_names[i],
+				    json_integer((json_int_t)s->flagged[i]));
 	for (int i = 0; incise_plan_stage(plan, i); i++)
 		json_array_append_new(stages, json_string(incise_plan_stage(plan, i)));
 	json_print(json_pack(
-		"{sI sI sf so so sI sI sI sI sf so ss so so}", "ticks",
+		"{sI sI sf so so sI sI sI sI so sf so ss so so}", "ticks",
 		(json_int_t)s->ticks, "skipped", (json_int_t)s->skipped, "rate_hz",
 		rate_hz, "lateness_us", real ? lateness_json(s) : json_null(), "tick_ns",
-		real ? cost_json(s) : json_null(), "contact", (json_int_t)s->contact,
-		"extrapolated", (json_int_t)s->extrapolated, "stale",
-		(json_int_t)s->stale, "limited", (json_int_t)s->limited, "force_max_N",
-		s->force_max_N, "rendered_rms_error_N", json_number(rms_N), "scheduling",
+		real ? cost_json(s) : json_null(), "contact",
+		(json_int_t)ticks_with(s, INCISE_TICK_CONTACT), "extrapolated",
+		(json_int_t)ticks_with(s, INCISE_TICK_EXTRAPOLATED), "stale",
+		(json_int_t)ticks_with(s, INCISE_TICK_STALE), "limited",
+		(json_int_t)s->limited, "flags", flags, "force_max_N", s->force_max_N,
+		"rendered_rms_error_N", json_number(rms_N), "scheduling",
 		scheduling(real), "stages", stages, "stopped_by",
 		cli_stop ? json_string(strsignal(cli_stop)) : json_null()));
 }
@@ -237,8 +276,17 @@ static void report_text(const struct incise_loop_stats *s, const struct incise_p
 		printf(", actuator off by %.4f N rms", rms_N);
 	printf("\nticks      %llu in contact, %llu outside the model's support, %llu without a "
 	       "fresh pose, %llu limited\n",
-	       (unsigned long long)s->contact, (unsigned long long)s->extrapolated,
-	       (unsigned long long)s->stale, (unsigned long long)s->limited);
+	       (unsigned long long)ticks_with(s, INCISE_TICK_CONTACT),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_EXTRAPOLATED),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_STALE),
+	       (unsigned long long)s->limited);
+	printf("held       %llu at the largest force, %llu at the largest slew, %llu at the end "
+	       "of the travel, %llu by the guard, %llu starting or fading\n",
+	       (unsigned long long)ticks_with(s, INCISE_TICK_CLAMPED),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_GUARDED),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
 }
 
 int main(int argc, char **argv)
@@ -267,6 +315,7 @@ int main(int argc, char **argv)
 	plan = incise_plan_new(scene, rig, &err);
 	if (!plan)
 		cli_fail_with(&err);
+	incise_plan_set_tool(plan, job.tool);
 	loop.rate_hz = incise_scene_rate_hz(scene);
 	loop.duration_ns = (int64_t)(job.duration * INCISE_NS_PER_S);
 	if (job.log) {

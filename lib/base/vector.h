@@ -65,4 +65,16 @@ static inline bool v3_unit(double to[3], const double a[3], double least)
 	return true;
 }
 
+/* Turn by a unit quaternion, w first; to is not v. */
+static inline void v3_rotate(double to[3], const double q[4], const double v[3])
+{
+	double t[3], u[3];
+
+	v3_cross(t, q + 1, v);
+	v3_add(t, t, 1, t);
+	v3_cross(u, q + 1, t);
+	for (int i = 0; i < 3; i++)
+		to[i] = v[i] + q[0] * t[i] + u[i];
+}
+
 #endif

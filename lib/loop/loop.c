@@ -31,10 +31,9 @@ static void count_tick(struct incise_loop_stats *stats, const struct incise_tick
 	stats->force_N = sqrt(force);
 	stats->force_max_N = fmax(stats->force_max_N, stats->force_N);
 	stats->ticks++;
-	stats->contact += !!(tick->flags & INCISE_TICK_CONTACT);
-	stats->extrapolated += !!(tick->flags & INCISE_TICK_EXTRAPOLATED);
-	stats->stale += !!(tick->flags & INCISE_TICK_STALE);
-	stats->limited += !!(tick->flags & INCISE_TICK_LIMITED);
+	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
+		stats->flagged[i] += tick->flags >> i & 1;
+	stats->limited += !!(tick->flags & (INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED));
 }
 
 /* One tick with its statistics; start_ns is when it began. */

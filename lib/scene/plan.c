@@ -7,139 +7,148 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/fixed.h>
+#include <time.h>
 #include "../base/vector.h"
-#include "../tissue/limit.h"
-#include "../tissue/predict.h"
-#include "scene.h"
+#include "../model/model.h"
+#include "stages.h"
 
-#define STAGES_MAX 8
-
-/* Poses taken at one tick; more than a tracker sends in a period, even after a stall. */
-#define POSES 32
-
-struct stage {
-	const char *name;
-	/* Returns 0, or a negative errno of a device. */
-	int (*run)(struct incise_plan *plan, struct incise_tick *tick);
+/* Without a rig poses are as of this tracker: a magnetic one of 120 Hz. */
+static const struct incise_tracker_info fed_tracker = {
+	.name = "fed",
+	.rate_hz = 120,
+	.latency_ns = 4200000,
 };
 
-struct incise_plan {
-	struct stage stage[STAGES_MAX + 1];
-	int n_stages;
-	struct incise_tracker *tracker;
-	struct incise_stepper *stepper; /* or NULL */
-	struct incise_predict predict;
-	int64_t pose_age_ns;
-	double point_mm[3], normal[3];
-	struct incise_model *model; /* one of these */
-	struct incise_fixed *fixed;
-	double reaction_N; /* along the normal */
-	struct incise_limit limit;
-	double spring_N_mm;
-	double handle_mm; /* where the handle was when last asked */
-	int fault;	  /* negative errno of the device that failed, or 0 */
-};
-
-static int pose(struct incise_plan *plan, struct incise_tick *tick)
+/* The model in the scene's arithmetic. */
+static int take_model(struct incise_plan *plan, struct incise_error *err)
 {
-	struct incise_tracker_sample samples[POSES];
-	int n = incise_tracker_read(plan->tracker, samples, POSES);
+	const struct incise_scene *scene = plan->scene;
 
-	for (int i = 0; i < n; i++) {
-		/* A stamp from the future would keep all later poses out. */
-		if (samples[i].t_ns > tick->t_ns)
-			samples[i].t_ns = tick->t_ns;
-		incise_predict_add(&plan->predict, &samples[i]);
-	}
-	return n < 0 ? n : 0;
-}
-
-static int predict(struct incise_plan *plan, struct incise_tick *tick)
-{
-	double velocity_mm_s[3], attitude[4];
-
-	if (incise_predict_age(&plan->predict, tick->t_ns) > plan->pose_age_ns) {
-		tick->flags |= INCISE_TICK_STALE;
+	if (scene->compiled && !scene->fixed)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: its model is compiled: it cannot run in double; use the "
+			".fis it was made of",
+			scene->path);
+	plan->fixed = scene->compiled;
+	if (!scene->model)
+		return 0;
+	if (!scene->fixed) {
+		plan->model = scene->model;
 		return 0;
 	}
-	incise_predict_at(&plan->predict, tick->t_ns, tick->position_mm, velocity_mm_s,
-			  attitude);
-	tick->velocity_mm_s = v3_length(velocity_mm_s);
-	return 0;
+	plan->fixed = plan->own_fixed = incise_fixed_compile(scene->model, NULL, err);
+	return plan->fixed ? 0 : -errno;
 }
 
-/* The surface is a plane: depth is the distance of the tip behind it. */
-static int contact(struct incise_plan *plan, struct incise_tick *tick)
+static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
+		    struct incise_tracker_info *tracker, struct incise_error *err)
 {
-	double above = 0;
+	double point_mm[3] = {0};
 
-	for (int i = 0; i < 3; i++)
-		above += (tick->position_mm[i] - plan->point_mm[i]) * plan->normal[i];
-	if (above < 0 && !(tick->flags & INCISE_TICK_STALE)) {
-		tick->flags |= INCISE_TICK_CONTACT;
-		tick->depth_mm = -above;
+	plan->axis[2] = 1;
+	*tracker = fed_tracker;
+	if (rig) {
+		plan->tracker = incise_rig_tracker(rig);
+		plan->stepper = incise_rig_stepper(rig);
+		if (!plan->tracker)
+			return incise_error_set(
+				err, ENODEV,
+				"%s: the rig has no tracker: name one in rig.conf",
+				plan->scene->path);
+		incise_tracker_info(plan->tracker, tracker);
+		incise_rig_surface(rig, point_mm, plan->axis);
 	}
-	return 0;
+	if (plan->stepper)
+		incise_stepper_info(plan->stepper, &plan->actuator);
+	plan->surface = plan->scene->surface;
+	if (!plan->surface)
+		plan->surface = plan->own_surface =
+			incise_surface_new_plane(point_mm, plan->axis, err);
+	return plan->surface ? 0 : -errno;
 }
 
-/* Paper 1, eq. (3), as the magnitude of paper 2's reaction force; tissue does not pull. */
-static int reaction(struct incise_plan *plan, struct incise_tick *tick)
+static void take_tissue(struct incise_plan *plan)
 {
-	double x[] = {tick->depth_mm, tick->velocity_mm_s};
-	unsigned int flags = 0;
+	static const double origin[3], any[3] = {0, 0, 1};
+	const struct incise_scene *scene = plan->scene;
 
-	plan->reaction_N = 0;
-	if (!(tick->flags & INCISE_TICK_CONTACT))
-		return 0;
-	if (plan->model) {
-		plan->reaction_N = incise_model_eval(plan->model, x, &flags);
-	} else {
-		for (int i = 0; i < 2; i++)
-			if (x[i] * INCISE_FIXED_ONE < plan->fixed->input[i].min ||
-			    x[i] * INCISE_FIXED_ONE > plan->fixed->input[i].max)
-				flags = INCISE_MODEL_EXTRAPOLATED;
-		plan->reaction_N = incise_fixed_eval_double(plan->fixed, x);
-	}
-	if (flags)
-		tick->flags |= INCISE_TICK_EXTRAPOLATED;
-	plan->reaction_N = fmax(plan->reaction_N, 0);
-	return 0;
-}
-
-static int limit(struct incise_plan *plan, struct incise_tick *tick)
-{
-	for (int i = 0; i < 3; i++)
-		tick->command_N[i] = plan->reaction_N * plan->normal[i];
-	if (incise_limit_apply(&plan->limit, tick->command_N))
-		tick->flags |= INCISE_TICK_LIMITED;
-	return 0;
+	plan->gain = scene->tissue.gain;
+	plan->reaction_N_mm = plan->gain * scene->tissue.reaction_N_mm;
+	plan->plane_N_mm = plan->gain * scene->tissue.plane_N_mm;
+	plan->damping_N_s_mm = plan->gain * scene->tissue.damping_N_s_mm;
+	plan->insertion_N_mm = plan->gain * scene->tissue.insertion_N_mm;
+	plan->spread_N_mm = plan->gain * scene->tissue.spread_N_mm;
+	incise_fixed_spring_set(&plan->reaction, plan->reaction_N_mm, origin, any);
+	incise_fixed_spring_set(&plan->plane, plan->plane_N_mm, origin, any);
 }
 
 /*
- * The actuator renders a force through its spring: the nut goes where the spring would
- * push with that force on the handle where it was at the last tick.
+ * What the tissue can have stored at most, N mm: of a spring that pushes with the largest
+ * force F²/(2K), of a model all of its support at that force.
  */
-static int actuate(struct incise_plan *plan, struct incise_tick *tick)
+static double reserve(const struct incise_plan *plan)
 {
-	struct incise_stepper_status status;
-	int rc = incise_stepper_status(plan->stepper, &status);
+	const double springs[] = {plan->reaction_N_mm, plan->plane_N_mm,
+				  plan->insertion_N_mm, plan->spread_N_mm};
+	double force_N = plan->scene->limits.force_N, most = 0;
 
-	if (rc)
-		return rc;
-	tick->rendered_N = isfinite(status.force_N) ? status.force_N : 0;
-	if (isfinite(status.handle_mm))
-		plan->handle_mm = status.handle_mm;
-	return incise_stepper_set(plan->stepper,
-				  plan->handle_mm +
-					  v3_dot(plan->limit.last_N, plan->normal) /
-						  plan->spring_N_mm);
+	for (size_t i = 0; i < sizeof(springs) / sizeof(*springs); i++)
+		if (springs[i] > 0)
+			most = fmax(most, force_N * force_N / (2 * springs[i]));
+	if (plan->fixed)
+		most = fmax(most, force_N * plan->fixed->input[0].max / INCISE_FIXED_ONE);
+	else if (plan->model)
+		most = fmax(most, force_N * incise_model_input(plan->model, 0)->max);
+	return fmax(most, 0);
 }
 
-static void add_stage(struct incise_plan *plan, const char *name,
-		      int (*run)(struct incise_plan *, struct incise_tick *))
+static void set_guard(struct incise_plan *plan)
 {
-	plan->stage[plan->n_stages++] = (struct stage){name, run};
+	const struct incise_haptic_device *device = &plan->stability.device;
+	/* Damping that acts d ticks late is itself stable below this, in m/T. */
+	double late = 2 * sin(M_PI / (4 * device->delay_ticks + 2));
+
+	incise_guard_init(&plan->guard, device->mass_kg, device->period_s,
+			  plan->scene->effects.guard ? reserve(plan) : 0);
+	plan->guard.cap_N_s_mm *= fmin(1, late);
+}
+
+static void set_limits(struct incise_plan *plan)
+{
+	const struct incise_scene *scene = plan->scene;
+
+	plan->pose_age_ns = (int64_t)(scene->limits.pose_age_ms * 1e6);
+	plan->start = (struct incise_start){
+		.small_N = scene->limits.start_N,
+		.ramp_s = scene->limits.ramp_ms * 1e-3,
+		.fade_s = scene->limits.fade_ms * 1e-3,
+	};
+	plan->limit = (struct incise_limit){
+		.force_N = scene->limits.force_N,
+		.slew_N = scene->limits.slew_N_s / scene->rate_hz,
+	};
+}
+
+static void set_tool(struct incise_plan *plan)
+{
+	struct incise_touch top;
+
+	v3_copy(plan->instrument.axis, plan->scene->tool.axis);
+	v3_copy(plan->instrument.side, plan->scene->tool.side);
+	plan->instrument.handle_mm = plan->scene->tool.handle_mm;
+	plan->instrument.held = INCISE_TOOL_BLADE;
+	/* Without insertion there is only the blade. */
+	if (!(plan->insertion_N_mm > 0) && !(plan->spread_N_mm > 0))
+		plan->instrument.wanted = INCISE_TOOL_BLADE;
+	incise_surface_top(plan->surface, &top);
+	v3_copy(plan->up, top.normal);
+	incise_proxy_init(&plan->proxy, plan->surface, plan->scene->tissue.leave_mm);
+	/* The average of what never changes is a rounding beside it. */
+	incise_average_init(&plan->average,
+			    incise_surface_kind(plan->surface) == INCISE_SURFACE_PLANE
+				    ? 1
+				    : plan->scene->effects.average_ticks);
 }
 
 struct incise_plan *incise_plan_new(const struct incise_scene *scene,
@@ -147,69 +156,30 @@ struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 {
 	struct incise_plan *plan = calloc(1, sizeof(*plan));
 	struct incise_tracker_info tracker;
-	struct incise_stepper_info stepper;
-	int rc = 0;
+	int rc;
 
 	if (!plan) {
 		incise_error_set(err, ENOMEM, "no memory for a plan");
 		return NULL;
 	}
-	plan->tracker = incise_rig_tracker(rig);
-	plan->stepper = incise_rig_stepper(rig);
-	if (!plan->tracker) {
-		rc = incise_error_set(err, ENODEV,
-				      "%s: the rig has no tracker: name one in rig.conf",
-				      scene->path);
-		goto out;
+	plan->scene = scene;
+	rc = take_rig(plan, rig, &tracker, err);
+	if (!rc)
+		rc = take_model(plan, err);
+	if (!rc) {
+		take_tissue(plan);
+		rc = incise_plan_check(plan, &tracker, err);
 	}
-	if (scene->compiled && !scene->fixed) {
-		rc = incise_error_set(
-			err, EINVAL,
-			"%s: its model is compiled: it cannot run in double; use the "
-			".fis it was made of",
-			scene->path);
-	} else if (scene->compiled) {
-		plan->fixed = incise_fixed_copy(scene->compiled);
-		if (!plan->fixed)
-			rc = incise_error_set(err, ENOMEM, "no memory for a plan");
-	} else if (scene->fixed) {
-		plan->fixed = incise_fixed_compile(scene->model, NULL, err);
-		rc = plan->fixed ? 0 : -errno;
-	} else {
-		plan->model = incise_model_copy(scene->model);
-		if (!plan->model)
-			rc = incise_error_set(err, ENOMEM, "no memory for a plan");
-	}
-	if (rc)
-		goto out;
-	incise_tracker_info(plan->tracker, &tracker);
-	incise_predict_init(&plan->predict, &tracker);
-	plan->pose_age_ns = (int64_t)(scene->pose_age_ms * 1e6);
-	incise_rig_surface(rig, plan->point_mm, plan->normal);
-	if (scene->own_surface) {
-		memcpy(plan->point_mm, scene->point_mm, sizeof(plan->point_mm));
-		memcpy(plan->normal, scene->normal, sizeof(plan->normal));
-	}
-	plan->limit = (struct incise_limit){
-		.force_N = scene->force_N,
-		.slew_N = scene->slew_N_s / scene->rate_hz,
-	};
-	add_stage(plan, "pose", pose);
-	add_stage(plan, "predict", predict);
-	add_stage(plan, "contact", contact);
-	add_stage(plan, "reaction", reaction);
-	add_stage(plan, "limit", limit);
-	if (plan->stepper) {
-		incise_stepper_info(plan->stepper, &stepper);
-		plan->spring_N_mm = stepper.spring_N_mm;
-		add_stage(plan, "actuate", actuate);
-	}
-out:
 	if (rc) {
 		incise_plan_free(plan);
 		errno = -rc;
 		return NULL;
 	}
+	incise_predict_init(&plan->predict, &tracker);
+	set_tool(plan);
+	set_limits(plan);
+	set_guard(plan);
+	incise_plan_choose(plan);
 	return plan;
 }
 
@@ -217,14 +187,80 @@ void incise_plan_free(struct incise_plan *plan)
 {
 	if (!plan)
 		return;
-	incise_model_free(plan->model);
-	incise_fixed_free(plan->fixed);
+	incise_fixed_free(plan->own_fixed);
+	incise_surface_free(plan->own_surface);
 	free(plan);
 }
 
 const char *incise_plan_stage(const struct incise_plan *plan, int index)
 {
 	return index >= 0 && index < plan->n_stages ? plan->stage[index].name : NULL;
+}
+
+const char *incise_plan_left_out(const struct incise_plan *plan, int index,
+				 const char **why)
+{
+	if (index < 0 || index >= plan->n_left_out)
+		return NULL;
+	if (why)
+		*why = plan->left_out[index].why;
+	return plan->left_out[index].name;
+}
+
+size_t incise_plan_memory(const struct incise_plan *plan)
+{
+	size_t size = sizeof(*plan) + incise_surface_memory(plan->surface);
+
+	if (plan->fixed)
+		size += sizeof(*plan->fixed) + plan->fixed->size;
+	if (plan->scene->model)
+		size += sizeof(*plan->scene->model);
+	return size;
+}
+
+void incise_plan_top(const struct incise_plan *plan, struct incise_touch *touch)
+{
+	incise_surface_top(plan->surface, touch);
+}
+
+void incise_plan_stability(const struct incise_plan *plan,
+			   struct incise_plan_stability *stability)
+{
+	*stability = plan->stability;
+}
+
+double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
+{
+	double bound_N = 0;
+
+	if (plan->fixed)
+		bound_N = plan->gain * incise_fixed_bound(plan->fixed);
+	else if (plan->scene->fixed && plan->reaction_N_mm > 0)
+		bound_N = incise_fixed_spring_bound(plan->reaction_N_mm, reach_mm);
+	if (plan->scene->fixed && plan->plane_N_mm > 0)
+		bound_N += incise_fixed_spring_bound(plan->plane_N_mm, reach_mm);
+	return bound_N;
+}
+
+int incise_plan_feed(struct incise_plan *plan,
+		     const struct incise_tracker_sample *samples, int n)
+{
+	int taken = 0;
+
+	if (plan->tracker || n < 0)
+		return -EINVAL;
+	while (taken < n && plan->n_fed < INCISE_PLAN_POSES)
+		plan->fed[plan->n_fed++] = samples[taken++];
+	return taken;
+}
+
+int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool)
+{
+	if ((unsigned int)tool > INCISE_TOOL_TUBE)
+		return -EINVAL;
+	if (plan->insertion_N_mm > 0 || plan->spread_N_mm > 0)
+		plan->instrument.wanted = tool;
+	return 0;
 }
 
 void incise_plan_release(struct incise_plan *plan)
@@ -245,16 +281,45 @@ static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 	return rc;
 }
 
-int incise_plan_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick)
+static int64_t now_ns(void)
 {
-	*tick = (struct incise_tick){.t_ns = t_ns};
+	struct timespec t;
+
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return t.tv_sec * INCISE_NS_PER_S + t.tv_nsec;
+}
+
+/* Inlined into both, so that the one without times does not pay for them. */
+static inline __attribute__((always_inline)) int run_stages(struct incise_plan *plan,
+							    int64_t t_ns,
+							    struct incise_tick *tick,
+							    int64_t *stage_ns)
+{
+	*tick = (struct incise_tick){.t_ns = t_ns, .tool = plan->instrument.held};
 	if (plan->fault)
 		return fail(plan, tick, plan->fault);
 	for (int i = 0; i < plan->n_stages; i++) {
-		int rc = plan->stage[i].run(plan, tick);
+		const struct incise_stage *stage = &plan->stage[i];
+		int64_t begin = stage_ns ? now_ns() : 0;
+		int rc = 0;
 
+		if (stage->always || !(tick->flags & INCISE_TICK_STALE))
+			rc = stage->run(plan, tick);
+		if (stage_ns)
+			stage_ns[i] = now_ns() - begin;
 		if (rc)
 			return fail(plan, tick, rc);
 	}
 	return 0;
+}
+
+int incise_plan_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick)
+{
+	return run_stages(plan, t_ns, tick, NULL);
+}
+
+int incise_plan_tick_timed(struct incise_plan *plan, int64_t t_ns,
+			   struct incise_tick *tick, int64_t *stage_ns)
+{
+	return run_stages(plan, t_ns, tick, stage_ns);
 }

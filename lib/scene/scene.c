@@ -3,25 +3,101 @@
  * Reading a scene file; see incise/scene.h for its form.
  */
 #include <errno.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "../base/conf.h"
 #include "scene.h"
 
-static const char *const keys[] = {"rate_hz", "model",	"arithmetic",
-				   "surface", "limits", NULL};
-static const char *const limit_keys[] = {"force_N", "slew_N_s", "pose_age_ms", NULL};
+#define KEYS_MAX 12
 
-/* A name in a scene is relative to the scene's folder. */
-static char *beside(const char *scene, const char *name)
+/* A number of a group. */
+struct number {
+	const char *key;
+	double min, max;
+	size_t offset; /* into struct incise_scene */
+};
+
+#define NUMBER(group, name, min, max)                                      \
+	{                                                                  \
+#name, min, max, offsetof(struct incise_scene, group.name) \
+	}
+
+static const struct number tissue[] = {
+	NUMBER(tissue, gain, 0, 10),
+	NUMBER(tissue, reaction_N_mm, 0, 1000),
+	NUMBER(tissue, plane_N_mm, 0, 1000),
+	NUMBER(tissue, damping_N_s_mm, 0, 1),
+	NUMBER(tissue, insertion_N_mm, 0, 1000),
+	NUMBER(tissue, aligned, 0, 1),
+	NUMBER(tissue, spread_N_mm, 0, 1000),
+	NUMBER(tissue, leave_mm, 0, 5),
+	{0},
+};
+
+static const struct number tool[] = {
+	NUMBER(tool, handle_mm, 1, 1000),
+	{0},
+};
+
+static const struct number device[] = {
+	NUMBER(device, mass_kg, 0.001, 10),
+	NUMBER(device, damping_N_s_mm, 0, 1),
+	NUMBER(device, coulomb_N, 0, 10),
+	NUMBER(device, encoder_mm, 0, 1),
+	{0},
+};
+
+static const struct number limits[] = {
+	NUMBER(limits, force_N, 0.01, 100),
+	NUMBER(limits, slew_N_s, 1, 1e5),
+	NUMBER(limits, pose_age_ms, 1, 1000),
+	NUMBER(limits, fade_ms, 1, 1000),
+	NUMBER(limits, ramp_ms, 1, 10000),
+	NUMBER(limits, start_N, 0, 100),
+	{0},
+};
+
+/*
+ * Read the numbers of a group, if it is there. Its keys are these and the ones of @more, a
+ * list that ends with NULL. Returns the group by *found.
+ */
+static int read_group(struct incise_scene *scene, const config_setting_t *root,
+		      const char *name, const struct number *numbers,
+		      const char *const *more, const config_setting_t **found,
+		      struct incise_error *err)
 {
-	const char *slash = strrchr(scene, '/');
+	const config_setting_t *group = config_setting_get_member(root, name);
+	const char *keys[KEYS_MAX + 1];
+	int n = 0, rc;
+
+	*found = group;
+	if (!group)
+		return 0;
+	for (const struct number *number = numbers; number && number->key; number++)
+		keys[n++] = number->key;
+	for (; more && *more; more++)
+		keys[n++] = *more;
+	keys[n] = NULL;
+	rc = incise_conf_known(group, scene->path, keys, err);
+	for (const struct number *number = numbers; number && number->key && !rc;
+	     number++)
+		rc = incise_conf_number(group, scene->path, number->key, number->min,
+					number->max,
+					(double *)((char *)scene + number->offset), err);
+	return rc;
+}
+
+char *incise_scene_beside(const struct incise_scene *scene, const char *name)
+{
+	const char *slash = strrchr(scene->path, '/');
 	char *path = NULL;
 
 	if (*name == '/' || !slash)
 		return strdup(name);
-	if (asprintf(&path, "%.*s%s", (int)(slash - scene) + 1, scene, name) < 0)
+	if (asprintf(&path, "%.*s%s", (int)(slash - scene->path) + 1, scene->path, name) <
+	    0)
 		return NULL;
 	return path;
 }
@@ -42,15 +118,9 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	char *path;
 	int rc = incise_conf_string(root, scene->path, "model", &name, err);
 
-	if (rc)
+	if (rc || (!name && !override))
 		return rc;
-	if (!name && !override)
-		return incise_error_set(
-			err, EINVAL,
-			"%s: no model: expected model = \"FILE.fis\", or give "
-			"--model",
-			scene->path);
-	path = override ? strdup(override) : beside(scene->path, name);
+	path = override ? strdup(override) : incise_scene_beside(scene, name);
 	if (!path)
 		return incise_error_set(err, ENOMEM, "%s: no memory", scene->path);
 	if (ends_with(path, ".fx"))
@@ -72,10 +142,73 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	return 0;
 }
 
+/* One reaction, and any force at all. */
+static int check_forces(const struct incise_scene *scene, struct incise_error *err)
+{
+	bool model = scene->model || scene->compiled;
+
+	if (model && scene->tissue.reaction_N_mm > 0)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: both a model and tissue.reaction_N_mm: a scene has one "
+			"reaction; remove one of them",
+			scene->path);
+	if (!model && !(scene->tissue.reaction_N_mm > 0) &&
+	    !(scene->tissue.plane_N_mm > 0) && !(scene->tissue.damping_N_s_mm > 0) &&
+	    !(scene->tissue.insertion_N_mm > 0) && !(scene->tissue.spread_N_mm > 0))
+		return incise_error_set(
+			err, EINVAL,
+			"%s: no model and no other force: expected model = "
+			"\"FILE.fis\", or tissue = { reaction_N_mm = K; }, or give "
+			"--model",
+			scene->path);
+	return 0;
+}
+
+static int read_switches(struct incise_scene *scene, const config_setting_t *root,
+			 struct incise_error *err)
+{
+	static const char *const effects_keys[] = {"average_ticks", "guard", NULL};
+	static const char *const tool_keys[] = {"side", "axis", NULL};
+	static const char *const device_keys[] = {"delay_ticks", NULL};
+	static const char *const picture_keys[] = {"wound", "bleeding", NULL};
+	const char *path = scene->path;
+	const config_setting_t *group;
+	int rc = read_group(scene, root, "effects", NULL, effects_keys, &group, err);
+
+	if (!rc && group)
+		rc = incise_conf_integer(group, path, "average_ticks", 1, 64,
+					 &scene->effects.average_ticks, err);
+	if (!rc && group)
+		rc = incise_conf_bool(group, path, "guard", &scene->effects.guard, err);
+	if (!rc)
+		rc = read_group(scene, root, "tool", tool, tool_keys, &group, err);
+	if (!rc && group)
+		rc = incise_conf_direction(group, path, "side", scene->tool.side, err);
+	if (!rc && group)
+		rc = incise_conf_direction(group, path, "axis", scene->tool.axis, err);
+	if (!rc)
+		rc = read_group(scene, root, "device", device, device_keys, &group, err);
+	if (!rc && group)
+		rc = incise_conf_integer(group, path, "delay_ticks", 0, 64,
+					 &scene->device.delay_ticks, err);
+	if (!rc)
+		rc = read_group(scene, root, "picture", NULL, picture_keys, &group, err);
+	if (!rc && group)
+		rc = incise_conf_bool(group, path, "wound", &scene->picture.wound, err);
+	if (!rc && group)
+		rc = incise_conf_bool(group, path, "bleeding", &scene->picture.bleeding,
+				      err);
+	return rc;
+}
+
 static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 		      const char *model, struct incise_error *err)
 {
-	const config_setting_t *limits;
+	static const char *const keys[] = {"rate_hz", "model",	 "arithmetic", "surface",
+					   "tissue",  "effects", "tool",       "device",
+					   "limits",  "picture", NULL};
+	const config_setting_t *group;
 	const char *arithmetic = NULL;
 	int rc = incise_conf_known(root, scene->path, keys, err);
 
@@ -88,23 +221,40 @@ static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 	if (!rc && arithmetic)
 		rc = incise_scene_set_arithmetic(scene, arithmetic, err);
 	if (!rc)
-		rc = incise_conf_surface(root, scene->path, scene->point_mm,
-					 scene->normal, err);
-	scene->own_surface = config_setting_lookup((config_setting_t *)root, "surface");
-	limits = config_setting_lookup((config_setting_t *)root, "limits");
-	if (!rc && limits) {
-		rc = incise_conf_known(limits, scene->path, limit_keys, err);
-		if (!rc)
-			rc = incise_conf_number(limits, scene->path, "force_N", 0.01, 100,
-						&scene->force_N, err);
-		if (!rc)
-			rc = incise_conf_number(limits, scene->path, "slew_N_s", 1, 1e5,
-						&scene->slew_N_s, err);
-		if (!rc)
-			rc = incise_conf_number(limits, scene->path, "pose_age_ms", 1,
-						1000, &scene->pose_age_ms, err);
-	}
-	return rc ? rc : read_model(scene, root, model, err);
+		rc = read_group(scene, root, "tissue", tissue, NULL, &group, err);
+	if (!rc)
+		rc = read_group(scene, root, "limits", limits, NULL, &group, err);
+	if (!rc)
+		rc = read_switches(scene, root, err);
+	if (!rc)
+		rc = incise_scene_read_surface(scene, root, err);
+	if (!rc)
+		rc = read_model(scene, root, model, err);
+	return rc ? rc : check_forces(scene, err);
+}
+
+/* What a scene has that its file says nothing of; incise-scene(5) gives the reasons. */
+static void set_defaults(struct incise_scene *scene)
+{
+	scene->rate_hz = 1000;
+	scene->fixed = true;
+	scene->tissue.gain = 1;
+	scene->tissue.aligned = 0.2;
+	scene->tissue.leave_mm = 0.1;
+	scene->effects.average_ticks = 1;
+	scene->tool.side[1] = 1;
+	scene->tool.axis[2] = 1;
+	scene->tool.handle_mm = 120;
+	scene->device.mass_kg = 0.05;
+	scene->device.damping_N_s_mm = 0.01;
+	scene->device.coulomb_N = 0.01;
+	scene->device.delay_ticks = -1;
+	scene->limits.force_N = 4;
+	scene->limits.slew_N_s = 400;
+	scene->limits.pose_age_ms = 50;
+	scene->limits.fade_ms = 20;
+	scene->limits.ramp_ms = 200;
+	scene->limits.start_N = 0.1;
 }
 
 struct incise_scene *incise_scene_load(const char *path, const char *model,
@@ -120,12 +270,7 @@ struct incise_scene *incise_scene_load(const char *path, const char *model,
 		incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
 		goto out;
 	}
-	scene->rate_hz = 1000;
-	scene->fixed = true;
-	scene->normal[2] = 1;
-	scene->force_N = 4;
-	scene->slew_N_s = 400;
-	scene->pose_age_ms = 50;
+	set_defaults(scene);
 	rc = incise_conf_read(&config, path, err);
 	if (rc)
 		goto out;
@@ -152,12 +297,18 @@ int incise_scene_set_arithmetic(struct incise_scene *scene, const char *name,
 	return 0;
 }
 
+void incise_scene_set_full(struct incise_scene *scene, bool full)
+{
+	scene->full = full;
+}
+
 void incise_scene_free(struct incise_scene *scene)
 {
 	if (!scene)
 		return;
 	incise_model_free(scene->model);
 	incise_fixed_free(scene->compiled);
+	incise_surface_free(scene->surface);
 	free(scene->path);
 	free(scene);
 }

@@ -33,7 +33,7 @@ refuses() {
 	run -0 --separate-stderr incise haptic liver.scene --rig $quick --duration 3s
 	[ -z "$stderr" ]
 	[[ "${lines[0]}" == "3000 ticks at 1000 Hz, 0 skipped"* ]]
-	[[ "${lines[1]}" =~ ^stages\ +pose\ predict\ contact\ reaction\ limit\ actuate$ ]]
+	[[ "${lines[1]}" =~ ^stages\ +pose\ predict\ contact\ reaction\ start\ limit\ actuate$ ]]
 }
 
 @test "haptic reports as JSON" {
@@ -41,7 +41,7 @@ refuses() {
 	[ "$(key r.json ticks)" = 3000 ]
 	[ "$(key r.json skipped)" = 0 ]
 	[ "$(key r.json rate_hz)" = 1000.0 ]
-	[ "$(key r.json stages)" = '["pose","predict","contact","reaction","limit","actuate"]' ]
+	[ "$(key r.json stages)" = '["pose","predict","contact","reaction","start","limit","actuate"]' ]
 	[ -z "$(key r.json stopped_by)" ]
 	[ "$(key r.json scheduling)" = "simulated time" ]
 	for name in lateness_us tick_ns; do # time stands still during a tick: null
@@ -52,7 +52,9 @@ refuses() {
 	[ "$(key r.json stale)" = "$(cut -d, -f9 l.csv | grep -c '^..s')" ]
 	# the report is that of the log
 	[ "$(key r.json contact)" = "$(cut -d, -f9 l.csv | grep -c ^c)" ]
-	[ "$(key r.json limited)" = "$(cut -d, -f9 l.csv | grep -c '^...o')" ]
+	[ "$(key r.json limited)" = "$(cut -d, -f9 l.csv | grep -cE '^...o|^.....v')" ]
+	[ "$(key r.json flags.starting)" = "$(cut -d, -f9 l.csv | grep -c '^........r')" ]
+	[ "$(key r.json flags.contact)" = "$(key r.json contact)" ]
 	holds "$(key r.json contact) > 1000"
 	largest=$(awk -F, 'NR > 1 && $7 > m { m = $7 } END { print m }' l.csv)
 	# the log has five decimals
@@ -64,12 +66,14 @@ refuses() {
 @test "the log has every tick, and its forces are the model's" {
 	incise haptic liver.scene --rig $quick --duration 3s --arith double --log l.csv
 	[ "$(head -n 1 l.csv)" = \
-		t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags ]
+		t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags,phase,command_x_N,command_y_N,command_z_N ]
 	[ "$(wc -l <l.csv)" -eq 3001 ]
 	awk -F, 'NR > 1 && ((NR - 2) / 1000 - $1)^2 > 1e-12 { exit 1 }' l.csv
-	# depth below the plane z = 0; at no depth no force but what the slew takes away
-	awk -F, 'NR > 1 && $9 ~ /^c/ && ($5 + $4)^2 > 1e-8 { exit 1 }' l.csv
-	awk -F, '$9 ~ /^c-/ && $9 !~ /o/ { print $5, $6, $7 }' l.csv >contact
+	# depth below the plane z = 0; a contact ends 0.1 mm above it
+	awk -F, 'NR > 1 && $9 ~ /^c/ { want = $4 < 0 ? -$4 : 0
+		if (($5 - want)^2 > 1e-8 || $4 > 0.1001) exit 1 }' l.csv
+	awk -F, 'NR > 1 && (($9 ~ /^c/) != ($10 == "cutting")) { exit 1 }' l.csv
+	awk -F, '$9 ~ /^c-/ && $9 !~ /[ovr]/ && $5 > 0 { print $5, $6, $7 }' l.csv >contact
 	[ "$(wc -l <contact)" -gt 1000 ]
 	cut -d' ' -f1,2 contact | incise eval liver.fis 2>/dev/null | paste -d' ' contact - |
 		awk '{ want = $4 < 0 ? 0 : $4; e = $3 - want
@@ -82,7 +86,7 @@ refuses() {
 	incise haptic liver.scene --rig $quick --duration 2s --arith fixed --log fixed.csv
 	# what was promised is 1 mN; they are not the same, so two arithmetics ran
 	paste -d, double.csv fixed.csv | awk -F, '
-		NR > 1 { e = $7 - $16; if (e < 0) e = -e; if (e > m) m = e }
+		NR > 1 { e = $7 - $20; if (e < 0) e = -e; if (e > m) m = e }
 		END { print m; exit !(m < 1e-3 && m > 0) }'
 	# the scene says fixed
 	incise haptic liver.scene --rig $quick --duration 2s --log scene.csv
@@ -140,7 +144,7 @@ refuses() {
 	incise haptic liver.scene --rig $quick --duration 2s --log a.csv
 	incise haptic deep.scene --rig $quick --duration 2s --log b.csv
 	# 2 mm lower: where it is touched, depth is 2 mm less, to the printed 0.1 um
-	paste -d, a.csv b.csv | awk -F, '$18 ~ /^c/ { n++; if (($5 - $14 - 2)^2 > 4.1e-8) exit 1 }
+	paste -d, a.csv b.csv | awk -F, '$22 ~ /^c/ && $18 > 0 { n++; if (($5 - $18 - 2)^2 > 4.1e-8) exit 1 }
 		END { exit n < 500 }'
 }
 

@@ -15,7 +15,7 @@
 #include <incise/clock.h>
 #include <incise/error.h>
 #include <incise/export.h>
-#include <incise/scene.h>
+#include <incise/plan.h>
 
 INCISE_BEGIN_DECLS
 
@@ -36,7 +36,8 @@ struct incise_loop_options {
 struct incise_loop_stats {
 	uint64_t ticks;	  /**< run */
 	uint64_t skipped; /**< not run because they would have been a period late */
-	uint64_t contact, extrapolated, stale, limited; /**< ticks with the flag */
+	uint64_t flagged[INCISE_TICK_FLAGS]; /**< ticks with flag 1 << i */
+	uint64_t limited; /**< ticks with INCISE_TICK_CLAMPED, _SLEWED or both */
 	size_t logged;
 	uint64_t lateness_us[INCISE_LOOP_BINS]; /**< of the wake-up */
 	int64_t lateness_max_ns;

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <incise/plan.h>
 #include <incise/rig.h>
 #include <incise/scene.h>
 #include "../../../lib/device/backend.h"

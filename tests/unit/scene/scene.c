@@ -8,6 +8,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 #include <errno.h>
+#include <math.h>
 #include "../../../lib/scene/scene.h"
 #include "felt.h"
 
@@ -48,26 +49,29 @@ static void test_defaults(void **state)
 	assert_non_null(scene);
 	assert_true(incise_scene_rate_hz(scene) == 1000);
 	assert_true(scene->fixed);
-	assert_true(scene->normal[2] == 1);
-	assert_true(scene->force_N == 4);
+	assert_null(scene->surface);
+	assert_true(scene->limits.force_N == 4);
 	incise_scene_free(scene);
 }
 
 static void test_everything_set(void **state)
 {
-	struct incise_scene *scene =
-		load("rate_hz = 2000; model = \"m.fis\"; arithmetic = \"double\";\n"
-		     "surface = { point_mm = [1, 2, 3]; normal = [0.0, 3.0, 4.0]; };\n"
-		     "limits = { force_N = 2.5; slew_N_s = 100; pose_age_ms = 20.0; };\n",
-		     NULL, NULL);
+	struct incise_touch top;
+	struct incise_scene *scene = load(
+		"rate_hz = 2000; model = \"m.fis\"; arithmetic = \"double\";\n"
+		"surface = { kind = \"plane\"; point_mm = [1, 2, 3]; normal = [0.0, 3.0, 4.0]; };\n"
+		"limits = { force_N = 2.5; slew_N_s = 100; pose_age_ms = 20.0; };\n",
+		NULL, NULL);
 
 	assert_non_null(scene);
 	assert_true(scene->rate_hz == 2000 && !scene->fixed);
-	assert_true(scene->point_mm[2] == 3);
-	/* The normal is made unit. */
-	assert_true(scene->normal[1] == 0.6 && scene->normal[2] == 0.8);
-	assert_true(scene->force_N == 2.5 && scene->slew_N_s == 100 &&
-		    scene->pose_age_ms == 20);
+	incise_surface_top(scene->surface, &top);
+	assert_true(top.point_mm[2] == 3);
+	/* The normal is made unit; 3-4-5, one rounding. */
+	assert_true(fabs(top.normal[1] - 0.6) < 1e-15 &&
+		    fabs(top.normal[2] - 0.8) < 1e-15);
+	assert_true(scene->limits.force_N == 2.5 && scene->limits.slew_N_s == 100 &&
+		    scene->limits.pose_age_ms == 20);
 	incise_scene_free(scene);
 }
 

@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The plan of a scene: the ordered list of just the stages that it needs, which a loop
+ * runs at each tick.
+ *
+ *     pose ─▶ predict ─▶ [tool] ─▶ contact ─▶ [normal] ─▶ [reaction] ─▶ [plane] ─▶
+ *     [damping] ─▶ [insertion] ─▶ [spread] ─▶ [guard] ─▶ start ─▶ limit ─▶ [actuate]
+ *
+ * Those in brackets are there when the scene or the rig asks for them. A plan belongs to
+ * one thread at a time.
+ */
+#ifndef INCISE_PLAN_H
+#define INCISE_PLAN_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <incise/error.h>
+#include <incise/export.h>
+#include <incise/rig.h>
+#include <incise/scene.h>
+#include <incise/stability.h>
+#include <incise/surface.h>
+#include <incise/tool.h>
+#include <incise/tracker.h>
+
+INCISE_BEGIN_DECLS
+
+#define INCISE_PLAN_STAGES_MAX 16
+
+struct incise_plan;
+
+/**
+ * Compile a scene. All that ticks need is allocated here. A scene that is stiffer than
+ * its device can hold is refused with the largest tissue.gain that is safe.
+ *
+ * @param scene must outlive the plan
+ * @param rig   opened with INCISE_RIG_TRACKER, and INCISE_RIG_STEPPER when force is to be
+ *              rendered; must outlive the plan. Or NULL: no device is touched, and poses
+ *              are given by incise_plan_feed(), as of a tracker of 120 Hz that is 4.2 ms
+ *              late
+ * @return plan, to be freed with incise_plan_free(); NULL with errno ENODEV (no tracker),
+ *         EDOM (not stable), ENOTSUP, ERANGE (incise_fixed_compile()), EINVAL, ENOMEM.
+ */
+INCISE_API struct incise_plan *incise_plan_new(const struct incise_scene *scene,
+					       struct incise_rig *rig,
+					       struct incise_error *err);
+INCISE_API void incise_plan_free(struct incise_plan *plan);
+
+/** Names of the stages in order; NULL from the first index that is not there. */
+INCISE_API const char *incise_plan_stage(const struct incise_plan *plan, int index);
+
+/**
+ * Names of the stages left out, with the reason; NULL from the first index that is not
+ * there. Both strings live as long as the plan.
+ */
+INCISE_API const char *incise_plan_left_out(const struct incise_plan *plan, int index,
+					    const char **why);
+
+/** Memory that the plan holds, bytes, with model and surface. */
+INCISE_API size_t incise_plan_memory(const struct incise_plan *plan);
+
+/** A place of the surface to begin at; incise_surface_top(). */
+INCISE_API void incise_plan_top(const struct incise_plan *plan,
+				struct incise_touch *touch);
+
+/** What is known of a plan's stability before its first tick. */
+struct incise_plan_stability {
+	struct incise_haptic_device device;
+	bool own_delay;	       /**< the scene gives the delay; else it is the tracker's */
+	double stiffness_N_mm; /**< largest of the scene, in any phase */
+	double damping_N_s_mm; /**< the scene's own */
+	double limit_N_mm;     /**< incise_stability_limit() of the device */
+	/** Largest slope of the model's force by the speed, either way; 0 without one. */
+	double speed_slope_N_s_mm;
+	bool certified; /**< the model's slopes are bounds, not estimates */
+};
+
+INCISE_API void incise_plan_stability(const struct incise_plan *plan,
+				      struct incise_plan_stability *stability);
+
+/**
+ * The certified error of what of the force is computed in fixed point: reaction and plane
+ * constraint within @reach_mm of where the contact began.
+ *
+ * @return N; 0 in double
+ */
+INCISE_API double incise_plan_bound(const struct incise_plan *plan, double reach_mm);
+
+/**
+ * Give poses to a plan without a rig, before its tick; as from a tracker.
+ *
+ * @param n at most 32 are kept until the next tick
+ * @return how many were taken; -EINVAL when the plan has a rig. Real-time safe.
+ */
+INCISE_API int incise_plan_feed(struct incise_plan *plan,
+				const struct incise_tracker_sample *samples, int n);
+
+/**
+ * Say what the hand holds from now on; by default INCISE_TOOL_AUTO. It changes out of the
+ * tissue only. Without insertion in the scene there is only the blade.
+ *
+ * @return 0, -EINVAL. Real-time safe; in the thread that ticks.
+ */
+INCISE_API int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool);
+
+/** What one tick came to. */
+struct incise_tick {
+	int64_t t_ns;
+	double position_mm[3]; /**< of the tip, predicted */
+	double tool_mm[3];     /**< of what the hand holds: Pfing */
+	double proxy_mm[3]; /**< of the surface that belongs to it: Pprxy; in contact */
+	double normal[3];   /**< along which the tissue pushes; in contact */
+	double depth_mm;
+	double velocity_mm_s; /**< speed of the tip */
+	double command_N[3];  /**< force asked for, in the tracker's frame */
+	double rendered_N;    /**< force of the actuator on the hand, 0 without one */
+	unsigned int flags;   /**< incise_tick_flag bits */
+	enum incise_phase phase;
+	enum incise_tool tool; /**< never AUTO */
+};
+
+/** Things worth counting about a tick. */
+enum incise_tick_flag {
+	INCISE_TICK_CONTACT = 1,      /**< the tool is in the tissue */
+	INCISE_TICK_EXTRAPOLATED = 2, /**< the model was asked outside its support */
+	INCISE_TICK_STALE = 4,	 /**< no pose younger than pose_age_ms: the force fades */
+	INCISE_TICK_CLAMPED = 8, /**< the force was held at force_N */
+	INCISE_TICK_FAULT = 16,	 /**< a device failed: no force from here on */
+	INCISE_TICK_SLEWED = 32, /**< the change of force was held at slew_N_s */
+	INCISE_TICK_TRAVEL = 64, /**< the actuator's target was held within its travel */
+	INCISE_TICK_GUARDED = 128,    /**< the passivity guard added damping */
+	INCISE_TICK_STARTING = 256,   /**< waiting for a small force, ramping or fading */
+	INCISE_TICK_NOT_FINITE = 512, /**< the force was no number: none was asked for */
+};
+#define INCISE_TICK_FLAGS 10 /**< how many there are */
+
+/**
+ * Let go: the actuator's nut is sent to 0, where nut and handle are at rest, as fast as
+ * it can go. To be called when no more ticks follow.
+ */
+INCISE_API void incise_plan_release(struct incise_plan *plan);
+
+/**
+ * Run all stages once, in order. Real-time safe as far as the devices are.
+ *
+ * @param t_ns time of the tick, not before the last one's
+ * @param tick result: finite, and within the scene's limits, whatever the devices say
+ * @return 0, or a negative errno of a device: the force commanded is then zero and stays
+ *         so; the one on the hand follows as fast as the actuator can.
+ */
+INCISE_API int incise_plan_tick(struct incise_plan *plan, int64_t t_ns,
+				struct incise_tick *tick);
+
+/**
+ * The same, with how long each stage took, by CLOCK_MONOTONIC and with its cost.
+ *
+ * @param stage_ns room for INCISE_PLAN_STAGES_MAX
+ */
+INCISE_API int incise_plan_tick_timed(struct incise_plan *plan, int64_t t_ns,
+				      struct incise_tick *tick, int64_t *stage_ns);
+
+INCISE_END_DECLS
+#endif

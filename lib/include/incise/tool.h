@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * What the hand holds, and what happens between it and the tissue.
+ *
+ *     free ──▶ cutting    with the blade
+ *      ▲  ╲
+ *      │    ▶ insertion   with the handle, which enlarges the cut, or a tube
+ *      └──── out of the tissue by more than tissue.leave_mm
+ */
+#ifndef INCISE_TOOL_H
+#define INCISE_TOOL_H
+
+/** What the hand holds. */
+enum incise_tool {
+	INCISE_TOOL_AUTO, /**< blade or handle, whichever end of the scalpel is down */
+	INCISE_TOOL_BLADE,
+	INCISE_TOOL_HANDLE, /**< the scalpel's other end */
+	INCISE_TOOL_TUBE,   /**< round; its end is where the tip was */
+};
+
+/** Phases of a procedure; paper 2, §2.2 and §2.3. */
+enum incise_phase {
+	INCISE_PHASE_FREE,
+	INCISE_PHASE_CUTTING,
+	INCISE_PHASE_INSERTION,
+};
+
+#endif

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Whether a scene is stable on its device, before its first tick: the largest stiffness
+ * of the scene against the exact limit of the sampled wall.
+ *
+ *   cutting     reaction (along the normal) + plane (along the blade's side): when the
+ *               blade lies flat both act along one line
+ *   insertion   the larger of insertion (along the normal) and spread (across it)
+ */
+#include <errno.h>
+#include <math.h>
+#include <incise/slope.h>
+#include "plan.h"
+
+/* The largest slopes of the model, by depth and by speed. */
+static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
+{
+	struct incise_plan_stability *s = &plan->stability;
+	struct incise_slope slope[2];
+
+	if (plan->fixed && !plan->scene->model)
+		incise_fixed_slopes(plan->fixed, slope);
+	else if (incise_model_slopes(plan->scene->model, slope))
+		return -ENOMEM;
+	s->certified = slope[0].certified && slope[1].certified;
+	s->speed_slope_N_s_mm =
+		plan->gain * fmax(fabs(slope[1].lowest), fabs(slope[1].highest));
+	*stiffness_N_mm = plan->gain * fmax(slope[0].highest, 0);
+	return 0;
+}
+
+/*
+ * How late a force answers a pose, as the scene says, or as the tracker is: its latency
+ * and the period for which a pose is used. That the pose is extrapolated over this time is
+ * not counted: it holds for a hand, not for a wall that hums.
+ */
+static void set_delay(struct incise_plan *plan, const struct incise_tracker_info *tracker)
+{
+	struct incise_haptic_device *device = &plan->stability.device;
+	double late_s = (double)tracker->latency_ns / INCISE_NS_PER_S +
+			(tracker->rate_hz > 0 ? 1 / tracker->rate_hz : 0);
+	double ticks = ceil(late_s / device->period_s - 1e-9);
+
+	plan->stability.own_delay = plan->scene->device.delay_ticks >= 0;
+	if (plan->stability.own_delay) {
+		device->delay_ticks = plan->scene->device.delay_ticks;
+	} else if (ticks <= INCISE_STABILITY_DELAY_MAX) {
+		device->delay_ticks = (int)ticks;
+	} else {
+		/* The same delay in longer ticks, which is less stable: on the safe side. */
+		device->delay_ticks = INCISE_STABILITY_DELAY_MAX;
+		device->period_s = late_s / INCISE_STABILITY_DELAY_MAX;
+	}
+}
+
+static bool stable(const struct incise_plan_stability *s, double share)
+{
+	double limit_N_mm = incise_stability_limit(&s->device, share * s->damping_N_s_mm);
+
+	/* A limit of 0 is that of a loop which its damper alone makes unstable. */
+	if (!(limit_N_mm > 0) && s->damping_N_s_mm > 0)
+		return share == 0;
+	return share * s->stiffness_N_mm <= limit_N_mm;
+}
+
+/* The largest gain that is stable, by bisection; damping goes with it. */
+static double largest_gain(const struct incise_plan *plan)
+{
+	double low = 0, high = 1;
+
+	while (high - low > 1e-4) {
+		double middle = (low + high) / 2;
+
+		*(stable(&plan->stability, middle) ? &low : &high) = middle;
+	}
+	return low * plan->gain;
+}
+
+int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,
+		      struct incise_error *err)
+{
+	struct incise_plan_stability *s = &plan->stability;
+	const struct incise_scene *scene = plan->scene;
+	double reaction_N_mm = plan->reaction_N_mm, gain;
+
+	s->device = (struct incise_haptic_device){
+		.mass_kg = scene->device.mass_kg,
+		.damping_N_s_mm = scene->device.damping_N_s_mm,
+		.coulomb_N = scene->device.coulomb_N,
+		.encoder_mm = scene->device.encoder_mm,
+		.period_s = 1 / scene->rate_hz,
+	};
+	set_delay(plan, tracker);
+	s->certified = true;
+	if ((plan->model || plan->fixed) && survey_model(plan, &reaction_N_mm))
+		return incise_error_set(err, ENOMEM, "no memory for a plan");
+	s->stiffness_N_mm = fmax(reaction_N_mm + plan->plane_N_mm,
+				 fmax(plan->insertion_N_mm, plan->spread_N_mm));
+	s->damping_N_s_mm = plan->damping_N_s_mm;
+	s->limit_N_mm = incise_stability_limit(&s->device, s->damping_N_s_mm);
+	if (stable(s, 1))
+		return 0;
+	gain = largest_gain(plan);
+	/* Downwards: what is named must be safe. */
+	return incise_error_set(
+		err, EDOM,
+		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm, a device of "
+		"%g kg and %g N s/mm that answers %d ticks late holds %.4g N/mm; set "
+		"tissue.gain to at most %.4g, or describe the device",
+		scene->path, s->stiffness_N_mm, s->damping_N_s_mm, s->device.mass_kg,
+		s->device.damping_N_s_mm, s->device.delay_ticks, s->limit_N_mm,
+		floor(gain * 1e3) / 1e3);
+}

@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Inside of a plan, for the files of this room: its stages and what they share.
+ */
+#ifndef INCISE_PLAN_INTERNAL_H
+#define INCISE_PLAN_INTERNAL_H
+
+#include <incise/fixed.h>
+#include <incise/fixed_spring.h>
+#include <incise/guard.h>
+#include <incise/model.h>
+#include <incise/plan.h>
+#include "../tissue/average.h"
+#include "../tissue/incision.h"
+#include "../tissue/instrument.h"
+#include "../tissue/limit.h"
+#include "../tissue/predict.h"
+#include "../tissue/start.h"
+#include "scene.h"
+
+/* Poses taken at one tick; more than a tracker sends in a period, even after a stall. */
+#define INCISE_PLAN_POSES 32
+
+struct incise_stage {
+	const char *name;
+	/* Also runs while there is no fresh pose; the others stand still then. */
+	bool always;
+	/* Returns 0, or a negative errno of a device. */
+	int (*run)(struct incise_plan *plan, struct incise_tick *tick);
+};
+
+struct incise_plan {
+	const struct incise_scene *scene;
+	struct incise_stage stage[INCISE_PLAN_STAGES_MAX];
+	int n_stages;
+	struct {
+		const char *name, *why;
+	} left_out[INCISE_PLAN_STAGES_MAX];
+	int n_left_out;
+	struct incise_plan_stability stability;
+	int fault; /* negative errno of the device that failed, or 0 */
+
+	/* pose */
+	struct incise_tracker *tracker; /* or NULL: poses are fed */
+	struct incise_tracker_sample fed[INCISE_PLAN_POSES];
+	int n_fed;
+	struct incise_predict predict;
+	int64_t pose_age_ns;
+	double velocity_mm_s[3], attitude[4];
+
+	/* tool, contact, normal */
+	struct incise_instrument instrument;
+	const struct incise_surface *surface;
+	struct incise_surface *own_surface; /* the rig's plane, when it is that */
+	double up[3];			    /* normal of the surface's top */
+	struct incise_proxy proxy;
+	double sn[3];	  /* the paper's Sn of this tick */
+	double normal[3]; /* the one that forces go along: Sn, or its average */
+	double depth_mm;  /* ≥ 0 */
+	double p0_mm[3];  /* where the contact began */
+	struct incise_incision incision;
+	struct incise_average average;
+
+	/* forces; the constants times the gain */
+	double force_N[3]; /* of this tick, before guard and limits */
+	double gain;
+	const struct incise_model *model; /* fuzzy: one of these */
+	const struct incise_fixed *fixed;
+	struct incise_fixed *own_fixed; /* compiled here */
+	double reaction_N_mm, plane_N_mm, damping_N_s_mm, insertion_N_mm, spread_N_mm;
+	struct incise_fixed_spring reaction, plane; /* in fixed point; anchor at 0 */
+	bool in_incision; /* the instrument went in where the blade had cut */
+
+	/* guard, start, limit */
+	struct incise_guard guard;
+	struct incise_start start;
+	struct incise_limit limit;
+	int64_t last_ns; /* of the last tick; 0: none */
+
+	/* actuate */
+	struct incise_stepper *stepper; /* or NULL */
+	struct incise_stepper_info actuator;
+	double axis[3];	  /* along which it pushes: out of the rig's surface */
+	double handle_mm; /* where the handle was when last asked */
+};
+
+/* Fill in the stages that the scene and the rig need, and why the others are left out. */
+void incise_plan_choose(struct incise_plan *plan);
+
+/*
+ * What is known of the scene's stability on this device, and whether it is stable. A pose
+ * is as old as the tracker's latency and one of its periods when it is used.
+ * Returns 0; -EDOM (not stable: the message names the largest gain), -ENOMEM.
+ */
+int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,
+		      struct incise_error *err);
+
+#endif

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The stages from the tracker's poses to where the tool is in the tissue.
+ */
+#include <errno.h>
+#include "../base/vector.h"
+#include "stages.h"
+
+/*
+ * Below this depth the direction from tool to proxy is rounding: the surface's own normal
+ * takes its place. Single doubles of positions within 10 m are good to 2e-12 mm.
+ */
+#define SHALLOW_MM 1e-6
+
+static void take(struct incise_plan *plan, struct incise_tracker_sample *samples, int n,
+		 int64_t now_ns)
+{
+	for (int i = 0; i < n; i++) {
+		/* A stamp from the future would keep all later poses out. */
+		if (samples[i].t_ns > now_ns)
+			samples[i].t_ns = now_ns;
+		incise_predict_add(&plan->predict, &samples[i]);
+	}
+}
+
+int incise_stage_pose(struct incise_plan *plan, struct incise_tick *tick)
+{
+	struct incise_tracker_sample samples[INCISE_PLAN_POSES];
+	int n = incise_tracker_read(plan->tracker, samples, INCISE_PLAN_POSES);
+
+	take(plan, samples, n, tick->t_ns);
+	return n < 0 ? n : 0;
+}
+
+int incise_stage_fed(struct incise_plan *plan, struct incise_tick *tick)
+{
+	take(plan, plan->fed, plan->n_fed, tick->t_ns);
+	plan->n_fed = 0;
+	return 0;
+}
+
+int incise_stage_predict(struct incise_plan *plan, struct incise_tick *tick)
+{
+	if (incise_predict_age(&plan->predict, tick->t_ns) > plan->pose_age_ns)
+		tick->flags |= INCISE_TICK_STALE;
+	incise_predict_at(&plan->predict, tick->t_ns, tick->position_mm,
+			  plan->velocity_mm_s, plan->attitude);
+	v3_copy(tick->tool_mm, tick->position_mm);
+	tick->velocity_mm_s = v3_length(plan->velocity_mm_s);
+	return 0;
+}
+
+int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
+{
+	bool other = incise_instrument_choose(&plan->instrument, plan->attitude, plan->up,
+					      plan->proxy.touching);
+
+	/* The way from the end of one to that of the other is no motion. */
+	if (other)
+		incise_proxy_init(&plan->proxy, plan->surface, plan->proxy.leave_mm);
+	incise_instrument_end(&plan->instrument, tick->position_mm, plan->attitude,
+			      tick->tool_mm);
+	return 0;
+}
+
+static void contact_begins(struct incise_plan *plan)
+{
+	const struct incise_touch *first = &plan->proxy.first;
+	double side[3];
+
+	v3_copy(plan->p0_mm, first->point_mm);
+	v3_copy(plan->sn, first->normal);
+	if (plan->instrument.held == INCISE_TOOL_BLADE) {
+		v3_rotate(side, plan->attitude, plan->instrument.side);
+		incise_incision_begin(&plan->incision, first->point_mm, first->normal,
+				      side);
+	}
+	incise_average_reset(&plan->average);
+	incise_guard_reset(&plan->guard);
+}
+
+/*
+ * Paper 2's Sn = (Q - P)/|Q - P|, which is no direction where Q and P meet. Where the
+ * proxy is the nearest point of a smooth surface it is the surface's normal.
+ */
+static void find_normal(struct incise_plan *plan, const double tool_mm[3])
+{
+	const struct incise_touch *touch = &plan->proxy.touch;
+	double out[3];
+
+	v3_sub(out, touch->point_mm, tool_mm);
+	if (touch->face < 0 || !(touch->depth_mm > SHALLOW_MM) ||
+	    !v3_unit(plan->sn, out, SHALLOW_MM))
+		v3_copy(plan->sn, touch->normal);
+	v3_copy(plan->normal, plan->sn);
+}
+
+int incise_stage_contact(struct incise_plan *plan, struct incise_tick *tick)
+{
+	struct incise_proxy *proxy = &plan->proxy;
+
+	for (int i = 0; i < 3; i++)
+		plan->force_N[i] = 0;
+	incise_proxy_move(proxy, tick->tool_mm);
+	tick->tool = plan->instrument.held;
+	plan->depth_mm = 0;
+	if (!proxy->touching)
+		return 0;
+	if (proxy->began)
+		contact_begins(plan);
+	find_normal(plan, tick->tool_mm);
+	plan->depth_mm = fmax(proxy->touch.depth_mm, 0);
+	if (plan->instrument.held == INCISE_TOOL_BLADE)
+		incise_incision_extend(&plan->incision, proxy->touch.point_mm);
+	tick->flags |= INCISE_TICK_CONTACT;
+	tick->phase = plan->instrument.held == INCISE_TOOL_BLADE ? INCISE_PHASE_CUTTING
+								 : INCISE_PHASE_INSERTION;
+	tick->depth_mm = plan->depth_mm;
+	v3_copy(tick->proxy_mm, proxy->touch.point_mm);
+	v3_copy(tick->normal, plan->normal);
+	return 0;
+}
+
+/* Paper 2's Snavg. */
+int incise_stage_normal(struct incise_plan *plan, struct incise_tick *tick)
+{
+	if (tick->phase == INCISE_PHASE_FREE)
+		return 0;
+	incise_average_add(&plan->average, plan->sn, plan->normal);
+	v3_copy(tick->normal, plan->normal);
+	return 0;
+}

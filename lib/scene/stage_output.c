@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The stages between the tissue's force and the hand.
+ */
+#include "../base/vector.h"
+#include "stages.h"
+
+/* In free air too: a debt of energy is paid there as well. */
+int incise_stage_guard(struct incise_plan *plan, struct incise_tick *tick)
+{
+	if (incise_guard_apply(&plan->guard, tick->tool_mm, plan->velocity_mm_s,
+			       plan->force_N))
+		tick->flags |= INCISE_TICK_GUARDED;
+	return 0;
+}
+
+/* Without a fresh pose the last force stays, and fades. */
+int incise_stage_start(struct incise_plan *plan, struct incise_tick *tick)
+{
+	double dt_s = plan->last_ns
+			      ? (double)(tick->t_ns - plan->last_ns) / INCISE_NS_PER_S
+			      : 0;
+	double gain = incise_start_gain(&plan->start, v3_length(plan->force_N),
+					!(tick->flags & INCISE_TICK_STALE), dt_s);
+
+	plan->last_ns = tick->t_ns;
+	if (gain < 1)
+		tick->flags |= INCISE_TICK_STARTING;
+	for (int i = 0; i < 3; i++)
+		tick->command_N[i] = gain * plan->force_N[i];
+	return 0;
+}
+
+int incise_stage_limit(struct incise_plan *plan, struct incise_tick *tick)
+{
+	unsigned int held = incise_limit_apply(&plan->limit, tick->command_N);
+
+	if (held & INCISE_LIMIT_FORCE)
+		tick->flags |= INCISE_TICK_CLAMPED;
+	if (held & INCISE_LIMIT_SLEW)
+		tick->flags |= INCISE_TICK_SLEWED;
+	if (held & INCISE_LIMIT_NOT_FINITE)
+		tick->flags |= INCISE_TICK_NOT_FINITE;
+	incise_guard_sent(&plan->guard, tick->command_N);
+	return 0;
+}
+
+/*
+ * The actuator renders a force through its spring: the nut goes where the spring would
+ * push with that force on the handle where it was at the last tick. It has one axis; what
+ * of the force is across it is not felt.
+ */
+int incise_stage_actuate(struct incise_plan *plan, struct incise_tick *tick)
+{
+	double along_N = v3_dot(plan->limit.last_N, plan->axis), target_mm, held_mm;
+	struct incise_stepper_status status;
+	int rc = incise_stepper_status(plan->stepper, &status);
+
+	if (rc)
+		return rc;
+	tick->rendered_N = isfinite(status.force_N) ? status.force_N : 0;
+	if (isfinite(status.handle_mm))
+		plan->handle_mm = status.handle_mm;
+	target_mm = plan->handle_mm + along_N / plan->actuator.spring_N_mm;
+	held_mm = fmax(0, fmin(plan->actuator.travel_mm, target_mm));
+	/* Less than a step beyond is where its position is read to. */
+	if (fabs(target_mm - held_mm) > plan->actuator.step_mm)
+		tick->flags |= INCISE_TICK_TRAVEL;
+	return incise_stepper_set(plan->stepper, held_mm);
+}

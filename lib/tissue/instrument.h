@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * What the hand holds: blade, handle or tube, and where its end is. The scalpel can be
+ * turned round: then its handle goes first.
+ *
+ *          blade            handle
+ *        axis ▲  ║             ▲ tip
+ *             │  ║             ║
+ *             │  ║ handle      ║
+ *             ○ tip            ○ tip + handle_mm · axis
+ *      ───────────────────────────────── surface
+ */
+#ifndef INCISE_INSTRUMENT_H
+#define INCISE_INSTRUMENT_H
+
+#include <stdbool.h>
+#include <incise/tool.h>
+
+struct incise_instrument {
+	/* In the scalpel's frame. */
+	double axis[3]; /* from the tip to the handle's end */
+	double side[3]; /* normal of the blade's, and the handle's, flat side */
+	double handle_mm;
+	enum incise_tool wanted; /* INCISE_TOOL_AUTO: by its turn */
+	enum incise_tool held;	 /* never AUTO */
+};
+
+/*
+ * Choose what is held, by the attitude (unit quaternion) of the scalpel over a surface
+ * with this outward normal. An instrument in the tissue is not changed. Returns whether
+ * it is another than before.
+ */
+bool incise_instrument_choose(struct incise_instrument *instrument,
+			      const double attitude[4], const double normal[3],
+			      bool touching);
+
+/* Where the end of the held one is, mm. */
+void incise_instrument_end(const struct incise_instrument *instrument,
+			   const double tip_mm[3], const double attitude[4],
+			   double end_mm[3]);
+
+#endif
