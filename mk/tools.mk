@@ -9,8 +9,9 @@ $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 
 extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
 extra_info := $(extra_demo)
+extra_plan := $(O)/obj/tools/tick_cost.o
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o arithmetics.o machine.o \
-	bench_training.o bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
+	bench_loop.o tick_cost.o bench_precision.o bench_training.o bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
 	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o)
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
@@ -59,6 +60,7 @@ bench: ## measure error against run time on this machine; chart in build/bench/
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise bench precision --plot $(O)/bench/precision
 	$(O)/bin/incise bench training
+	$(O)/bin/incise bench loop
 	$(O)/bin/incise bench stability --plot $(O)/bench/stability
 
 .PHONY: tools deps demo bench

@@ -23,6 +23,7 @@ static const struct {
 	{"compile", "turn a model into integers with a certified error bound"},
 	{"eval", "print the force of a model at given depth and velocity"},
 	{"info", "say what a recording or model holds"},
+	{"plan", "show what a scene runs and what it leaves out"},
 	{"haptic", "run the real-time loop of a scene"},
 	{"bench", "measure error against run time"},
 	{"demo", "walk the whole path on the virtual rig"},

@@ -165,6 +165,32 @@ of() {
 		FROM json_each(readfile('r.json'), '\$.$1') e) WHERE ${3:-1}"
 }
 
+@test "bench loop times ticks over a plane and meshes" {
+	incise bench loop --quick --json >r.json
+	for i in 0 1 2 3 4; do
+		holds "$(key r.json "rows[$i].tick_ns.median") > 0"
+		holds "$(key r.json "rows[$i].tick_ns.median") <= $(key r.json "rows[$i].tick_ns.p999")"
+		holds "$(key r.json "rows[$i].ticks") > 3000" # of 4000, the stroke's in contact
+	done
+	[ "$(key r.json "rows[3].triangles")" = 20000 ]
+	[ "$(key r.json "rows[4].triangles")" = 500000 ]
+	holds "$(key r.json "rows[4].memory_bytes") > 10 * $(key r.json "rows[3].memory_bytes")"
+	[ "$(key r.json tick_ns)" = "$(key r.json "rows[0].tick_ns")" ]
+	holds "$(key r.json lateness_us.ticks) + $(key r.json lateness_us.skipped) == 500"
+	run -0 key r.json cyclictest_us
+	[ -z "$output" ]
+	run -0 --separate-stderr incise bench loop --quick "$root/scenes/wall.scene"
+	[ -z "$stderr" ]
+	[[ "$output" == *wall.scene* ]]
+}
+
+@test "bench loop: bad usage" {
+	run -2 --separate-stderr incise bench loop a b
+	run -2 --separate-stderr incise bench loop --plot x
+	run --separate-stderr incise bench loop none.scene
+	failed_with none.scene
+}
+
 @test "bench stability finds in time what theory says" {
 	incise bench stability --quick --json >r.json
 	# the tolerances of the manual

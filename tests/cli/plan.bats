@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise plan, as a user meets it. Times are not judged here: the machine is shared.
+
+load cli
+
+setup() {
+	work_folder
+	cp "$root"/scenes/*.scene "$root"/scenes/*.fis .
+}
+
+@test "plan shows what each shipped scene runs and leaves out" {
+	for scene in liver neck wall; do
+		run -0 --separate-stderr incise plan $scene.scene
+		[ -z "$stderr" ]
+		[[ "${lines[0]}" == "$scene.scene: "*" ns a tick"* ]]
+		for word in kept "left out" devices libraries arithmetic stability; do
+			[[ "$output" == *$'\n'"$word"* ]]
+		done
+	done
+}
+
+@test "plan reports as JSON: every stage is kept or left out" {
+	incise plan liver.scene --json >r.json
+	[ "$(key r.json kept)" = '["pose","predict","contact","reaction","start","limit"]' ]
+	holds "$(key r.json stiffness_N_mm) < $(key r.json limit_N_mm)"
+	holds "($(key r.json margin) - $(key r.json limit_N_mm) / $(key r.json stiffness_N_mm))^2 < 1e-12"
+	holds "$(key r.json tick_ns) > 0"
+	holds "$(key r.json memory_bytes) > 1000"
+	[ "$(key r.json certified)" = 1 ]
+	incise plan neck.scene --json >n.json
+	for report in r n; do
+		sqlite3 :memory: "SELECT value FROM json_each(readfile('$report.json'), '\$.kept')
+			UNION ALL SELECT json_extract(value, '\$.stage')
+			FROM json_each(readfile('$report.json'), '\$.left_out')" | sort >$report.all
+		[ "$(uniq -d $report.all)" = "" ]
+		# each with a reason
+		[ "$(sqlite3 :memory: "SELECT count(*)
+			FROM json_each(readfile('$report.json'), '\$.left_out')
+			WHERE length(json_extract(value, '\$.why')) < 10")" = 0 ]
+	done
+	cmp r.all n.all
+	holds "$(grep -c . r.all) == 16"
+}
+
+@test "nothing heavy is mapped, and without a rig no device is opened" {
+	incise plan neck.scene --json >r.json
+	[ "$(key r.json devices)" = '[]' ]
+	[ "$(key r.json untouched_devices)" = '["tracker","stepper","force","camera"]' ]
+	[ "$(key r.json unmapped_libraries)" = \
+		'["SQLite","LAPACK","libavformat","OpenCV","OpenGL","SDL2","libusb","libgpiod"]' ]
+	# it looked at a real list
+	[[ "$(key r.json libraries)" == *libincise.so* ]]
+}
+
+@test "with a rig its devices count" {
+	incise plan neck.scene --rig sim:tracker_hz=240,tracker_latency_ms=2 --json >r.json
+	[ "$(key r.json devices)" = '["tracker","stepper"]' ]
+	[[ "$(key r.json kept)" == *'"actuate"]' ]]
+	# 2 ms and a period of 4.17 ms, in whole ticks
+	[ "$(key r.json device.delay_ticks)" = 7 ]
+	[ "$(key r.json own_delay)" = 0 ]
+}
+
+@test "a full plan keeps every stage" {
+	incise plan wall.scene --json >few.json
+	incise plan wall.scene --full --json >all.json
+	[ "$(key few.json kept)" = '["pose","predict","contact","reaction","start","limit"]' ]
+	[ "$(key all.json kept)" = '["pose","predict","tool","contact","normal","reaction","plane","damping","insertion","spread","guard","start","limit"]' ]
+	[ "$(key few.json stiffness_N_mm)" = "$(key all.json stiffness_N_mm)" ]
+	holds "$(key few.json memory_bytes) <= $(key all.json memory_bytes)"
+}
+
+@test "a scene that is not stable is refused, and the gain that it names is safe" {
+	echo 'tissue = { reaction_N_mm = 50.0; };' >stiff.scene
+	for verb in plan "haptic --rig sim:clock=simulated --duration 1s"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise $verb stiff.scene
+		failed_with stiff.scene "not stable" "50 N/mm" tissue.gain
+		[ -z "$output" ]
+	done
+	gain=$(sed 's/.*tissue.gain to at most \([0-9.e-]*\),.*/\1/' <<<"$stderr")
+	sed -i "s/= {/= { gain = $gain;/" stiff.scene
+	incise plan stiff.scene --json >r.json
+	# named with three decimals: at most one in the last below the limit
+	holds "$(key r.json margin) >= 1"
+	holds "$(key r.json stiffness_N_mm) + 0.0501 > $(key r.json limit_N_mm)"
+}
+
+@test "plan: another model, another arithmetic" {
+	incise plan liver.scene --json >fixed.json
+	incise plan liver.scene --arith double --json >double.json
+	holds "$(key fixed.json bound_N) > 0"
+	[ "$(key double.json bound_N)" = 0.0 ]
+	mv liver.fis other.fis
+	run --separate-stderr incise plan liver.scene
+	failed_with liver.scene liver.fis
+	incise plan liver.scene --model other.fis --json >other.json
+	[ "$(key other.json stiffness_N_mm)" = "$(key fixed.json stiffness_N_mm)" ]
+}
+
+@test "plan: bad usage and bad scenes" {
+	run -2 --separate-stderr incise plan
+	run -2 --separate-stderr incise plan a b
+	run -2 --separate-stderr incise plan wall.scene --arith float
+	run --separate-stderr incise plan none.scene
+	failed_with none.scene
+	printf 'surface = { kind = "mesh";\n file = "none.obj"; };\ntissue = { reaction_N_mm = 0.1; };\n' >m.scene
+	run --separate-stderr incise plan m.scene
+	failed_with m.scene none.obj
+	printf 'tissue = {\n reaction_N_m = 500.0; };\n' >u.scene
+	run --separate-stderr incise plan u.scene
+	failed_with u.scene:2 tissue.reaction_N_m reaction_N_mm unit
+	run -1 --separate-stderr bash -c "incise plan wall.scene >/dev/full"
+	[ "${#stderr_lines[@]}" -eq 1 ]
+}

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise plan SCENE: what a scene runs, what it leaves out and why, what a tick costs, and
+ * how far it is from instability.
+ */
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/plan.h>
+#include "cli.h"
+#include "json.h"
+#include "tick_cost.h"
+
+enum { OPT_MODEL = CLI_LONG, OPT_ARITH, OPT_FULL, OPT_JSON };
+
+static const struct cli_option options[] = {
+	{'r', "rig", "RIG",
+	 "file rig.conf, or sim:KEY=VALUE,…: its stepper and its tracker's delay count\n"
+	 "(default: no rig; a tracker of 120 Hz, 4.2 ms late)"},
+	{OPT_MODEL, "model", "FILE", "use this model instead of the scene's"},
+	{OPT_ARITH, "arith", "KIND", "fixed or double, instead of the scene's"},
+	{OPT_FULL, "full", NULL,
+	 "keep every stage, needed or not: what leaving out saves"},
+	{OPT_JSON, "json", NULL, "report as JSON"},
+	{0},
+};
+
+static const struct cli_verb verb = {
+	.name = "plan",
+	.synopsis = "SCENE [OPTIONS]",
+	.summary =
+		"Show what the haptic loop of a scene runs and what it leaves out, what "
+		"a tick costs\non this machine, and how stable the scene is.",
+	.options = options,
+	.notes =
+		"Example:\n  incise plan scenes/neck.scene\n\n"
+		"Exit: 0 shown, 1 failed or not stable, 2 bad usage. See incise-plan(1).",
+};
+
+/* Seconds of the stroke that ticks are timed in. */
+#define MEASURED_S 20
+
+/* Depth that the fixed-point error is stated for: paper 1's deepest cut. */
+#define REACH_MM 20
+
+/* What a process without need of it should not have mapped. */
+static const struct {
+	const char *part, *name;
+} heavy[] = {
+	{"libsqlite3", "SQLite"},
+	{"liblapack", "LAPACK"},
+	{"libavformat", "libavformat"},
+	{"libopencv", "OpenCV"},
+	{"libGL", "OpenGL"},
+	{"libSDL2", "SDL2"},
+	{"libusb", "libusb"},
+	{"libgpiod", "libgpiod"},
+};
+#define HEAVY (sizeof(heavy) / sizeof(*heavy))
+
+struct job {
+	const char *scene, *rig, *model, *arith;
+	bool full, json;
+};
+
+static void parse(struct job *job, int argc, char **argv)
+{
+	int opt;
+
+	*job = (struct job){0};
+	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+		switch (opt) {
+		case 'r':
+			job->rig = optarg;
+			break;
+		case OPT_MODEL:
+			job->model = optarg;
+			break;
+		case OPT_ARITH:
+			job->arith = optarg;
+			if (strcmp(optarg, "double") && strcmp(optarg, "fixed"))
+				cli_usage("--arith: '%s' is neither double nor fixed",
+					  optarg);
+			break;
+		case OPT_FULL:
+			job->full = true;
+			break;
+		case OPT_JSON:
+			job->json = true;
+			break;
+		}
+	if (optind + 1 != argc)
+		cli_usage("expected one scene, got %d", argc - optind);
+	job->scene = argv[optind];
+}
+
+/* The shared objects that this process has mapped, each once; and which heavy ones. */
+static json_t *mapped_libraries(bool *found)
+{
+	FILE *maps = fopen("/proc/self/maps", "re");
+	json_t *list = json_array();
+	char line[4096];
+
+	while (maps && fgets(line, sizeof(line), maps)) {
+		char *name = strrchr(line, '/');
+		bool known = false;
+
+		if (!name || !strstr(name, ".so"))
+			continue;
+		name++;
+		name[strcspn(name, "\n")] = 0;
+		for (size_t i = 0; i < json_array_size(list); i++)
+			known |=
+				!strcmp(json_string_value(json_array_get(list, i)), name);
+		if (!known)
+			json_array_append_new(list, json_text(name));
+		for (size_t i = 0; i < HEAVY; i++)
+			found[i] |= !!strstr(name, heavy[i].part);
+	}
+	if (maps)
+		fclose(maps);
+	return list;
+}
+
+static double margin(const struct incise_plan_stability *s)
+{
+	return s->stiffness_N_mm > 0 ? s->limit_N_mm / s->stiffness_N_mm : INFINITY;
+}
+
+static json_t *stability_json(const struct incise_plan_stability *s)
+{
+	const struct incise_haptic_device *d = &s->device;
+
+	return json_pack("{so so so so so so so sb sb s{sf sf sf sf sf si}}",
+			 "stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
+			 json_number(s->limit_N_mm), "margin", json_number(margin(s)),
+			 "damping_N_s_mm", json_number(s->damping_N_s_mm),
+			 "speed_slope_N_s_mm", json_number(s->speed_slope_N_s_mm),
+			 "passive_N_mm",
+			 json_number(incise_stability_colgate(d, s->damping_N_s_mm)),
+			 "encoder_N_mm",
+			 json_number(d->encoder_mm > 0 ? incise_stability_quantisation(d)
+						       : INFINITY),
+			 "certified", s->certified, "own_delay", s->own_delay, "device",
+			 "mass_kg", d->mass_kg, "damping_N_s_mm", d->damping_N_s_mm,
+			 "coulomb_N", d->coulomb_N, "encoder_mm", d->encoder_mm,
+			 "period_s", d->period_s, "delay_ticks", d->delay_ticks);
+}
+
+static void report_json(const struct job *job, const struct incise_plan *plan,
+			const struct tick_cost *cost)
+{
+	json_t *kept = json_array(), *stages = json_array(), *left = json_array();
+	json_t *absent = json_array(), *mapped, *object;
+	struct incise_plan_stability stability;
+	bool found[HEAVY] = {0};
+	const char *name, *why;
+
+	for (int i = 0; (name = incise_plan_stage(plan, i)); i++) {
+		json_array_append_new(kept, json_string(name));
+		/* The plan that was timed has no rig. */
+		json_array_append_new(stages,
+				      json_pack("{ss so}", "stage", name, "ns",
+						strcmp(name, "actuate")
+							? json_number(cost->stage[i])
+							: json_null()));
+	}
+	for (int i = 0; (name = incise_plan_left_out(plan, i, &why)); i++)
+		json_array_append_new(left,
+				      json_pack("{ss ss}", "stage", name, "why", why));
+	mapped = mapped_libraries(found);
+	for (size_t i = 0; i < HEAVY; i++)
+		if (!found[i])
+			json_array_append_new(absent, json_string(heavy[i].name));
+	incise_plan_stability(plan, &stability);
+	object = json_pack(
+		"{so so so so sf sf sf sI sf so so so so}", "scene",
+		json_text(job->scene), "kept", kept, "left_out", left, "stages", stages,
+		"tick_ns", cost->median, "tick_p99_ns", cost->p99, "tick_p999_ns",
+		cost->p999, "memory_bytes", (json_int_t)incise_plan_memory(plan),
+		"bound_N", incise_plan_bound(plan, REACH_MM), "devices",
+		job->rig ? json_pack("[ss]", "tracker", "stepper") : json_array(),
+		"untouched_devices",
+		job->rig ? json_pack("[ss]", "force", "camera")
+			 : json_pack("[ssss]", "tracker", "stepper", "force", "camera"),
+		"libraries", mapped, "unmapped_libraries", absent);
+	json_object_update_new(object, stability_json(&stability));
+	json_print(object);
+}
+
+static void print_stability(const struct incise_plan *plan)
+{
+	struct incise_plan_stability s;
+
+	incise_plan_stability(plan, &s);
+	printf("stability   %.4g N/mm of at most %.4g N/mm", s.stiffness_N_mm,
+	       s.limit_N_mm);
+	if (isfinite(margin(&s)))
+		printf(": margin %.3g", margin(&s));
+	printf("%s\n", s.certified ? "" : " (the model's slope is an estimate)");
+	printf("            on %g kg, %g N s/mm, answering %d ticks late (%s)\n",
+	       s.device.mass_kg, s.device.damping_N_s_mm, s.device.delay_ticks,
+	       s.own_delay ? "the scene's" : "the tracker's");
+	printf("            passive in any hand up to %.4g N/mm",
+	       incise_stability_colgate(&s.device, s.damping_N_s_mm));
+	if (s.device.encoder_mm > 0)
+		printf("; its encoder's steps die out up to %.4g N/mm",
+		       incise_stability_quantisation(&s.device));
+	if (s.speed_slope_N_s_mm > 0)
+		printf("\n            the model's force changes by up to %.3g N per mm/s, "
+		       "either way",
+		       s.speed_slope_N_s_mm);
+	putchar('\n');
+}
+
+static void report_text(const struct job *job, const struct incise_plan *plan,
+			const struct tick_cost *cost)
+{
+	bool found[HEAVY] = {0};
+	const char *name, *why, *comma = "";
+	double bound_N = incise_plan_bound(plan, REACH_MM);
+	json_t *mapped;
+
+	printf("%s: %.0f ns a tick (99.9 %% below %.0f), %.1f KiB\n\nkept\n", job->scene,
+	       cost->median, cost->p999, (double)incise_plan_memory(plan) / 1024);
+	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
+		if (strcmp(name, "actuate"))
+			printf("  %-10s %4.0f ns\n", name, cost->stage[i]);
+		else
+			printf("  %-10s    - (the device's)\n", name);
+	puts("left out");
+	for (int i = 0; (name = incise_plan_left_out(plan, i, &why)); i++)
+		printf("  %-10s %s\n", name, why);
+	printf("\ndevices     %s; not touched: %s\n",
+	       job->rig ? "tracker, stepper" : "none without --rig",
+	       job->rig ? "force, camera" : "tracker, stepper, force, camera");
+	mapped = mapped_libraries(found);
+	json_decref(mapped);
+	printf("libraries   not mapped: ");
+	for (size_t i = 0; i < HEAVY; i++)
+		if (!found[i]) {
+			printf("%s%s", comma, heavy[i].name);
+			comma = ", ";
+		}
+	printf("\narithmetic  %s", bound_N > 0 ? "fixed" : "double");
+	if (bound_N > 0)
+		printf(", reaction and plane within %.3g mN, certified", bound_N * 1e3);
+	putchar('\n');
+	print_stability(plan);
+}
+
+int main(int argc, char **argv)
+{
+	struct incise_error err = {0};
+	struct incise_rig *rig = NULL;
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+	struct tick_cost cost;
+	struct job job;
+
+	parse(&job, argc, argv);
+	scene = incise_scene_load(job.scene, job.model, &err);
+	if (!scene)
+		cli_fail_with(&err);
+	if (job.arith && incise_scene_set_arithmetic(scene, job.arith, &err))
+		cli_fail_with(&err);
+	incise_scene_set_full(scene, job.full);
+	if (job.rig) {
+		rig = incise_rig_open(job.rig, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER,
+				      &err);
+		if (!rig)
+			cli_fail_with(&err);
+	}
+	plan = incise_plan_new(scene, rig, &err);
+	if (!plan)
+		cli_fail_with(&err);
+	cli_progress("%s: timing %d s of ticks", job.scene, MEASURED_S);
+	tick_cost(scene, MEASURED_S, &cost);
+	cli_progress_end();
+	if (job.json)
+		report_json(&job, plan, &cost);
+	else
+		report_text(&job, plan, &cost);
+	cli_finish();
+	incise_plan_free(plan);
+	incise_rig_close(rig);
+	incise_scene_free(scene);
+	return 0;
+}

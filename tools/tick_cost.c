@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * What a tick costs; see tick_cost.h.
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include "cli.h"
+#include "tick_cost.h"
+
+#define NS 1e-9
+#define TRACKER_HZ 120
+#define LATENCY_NS 4200000
+#define ABOVE_MM 5.0
+#define DEPTH_MM 1.0
+#define DOWN_S 0.2
+#define REACH_MM 5.0
+#define STROKE_HZ 1.27 /* 5 mm · 2π · 1.27 Hz = 40 mm/s */
+
+struct stroke {
+	struct incise_touch top;
+	double along[3]; /* in the surface */
+};
+
+static void stroke_begin(struct stroke *stroke, const struct incise_plan *plan)
+{
+	const double *n = stroke->top.normal;
+	double size;
+
+	incise_plan_top(plan, &stroke->top);
+	/* Across the normal, in the plane of its largest part and the next axis. */
+	memset(stroke->along, 0, sizeof(stroke->along));
+	for (int i = 0; i < 3; i++)
+		if (fabs(n[i]) >= fabs(n[(i + 1) % 3]) &&
+		    fabs(n[i]) >= fabs(n[(i + 2) % 3])) {
+			size = hypot(n[i], n[(i + 1) % 3]);
+			stroke->along[(i + 1) % 3] = n[i] / size;
+			stroke->along[i] = -n[(i + 1) % 3] / size;
+			break;
+		}
+}
+
+static void stroke_pose(const struct stroke *stroke, int64_t t_ns,
+			struct incise_tracker_sample *sample)
+{
+	double t = (double)t_ns * NS, down = fmin(t / DOWN_S, 1);
+	double above = ABOVE_MM - (ABOVE_MM + DEPTH_MM) * down;
+	double off = REACH_MM * sin(2 * M_PI * STROKE_HZ * t);
+
+	*sample = (struct incise_tracker_sample){
+		.t_ns = t_ns + LATENCY_NS,
+		.quaternion = {1},
+		.status = ' ',
+	};
+	for (int i = 0; i < 3; i++)
+		sample->position_mm[i] = stroke->top.point_mm[i] +
+					 above * stroke->top.normal[i] +
+					 off * stroke->along[i];
+}
+
+static double now_ns(void)
+{
+	struct timespec t;
+
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return t.tv_sec * 1e9 + t.tv_nsec;
+}
+
+static int by_value(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+
+	return (x > y) - (x < y);
+}
+
+static double quantile(double *sorted, int n, double q)
+{
+	return sorted[(int)(q * (n - 1) + 0.5)];
+}
+
+/* Finer than the clock's steps: the mean of the middle half. */
+static double middle(const double *sorted, int n)
+{
+	double sum = 0;
+	int from = n / 4, to = n - n / 4;
+
+	for (int i = from; i < to; i++)
+		sum += sorted[i];
+	return sum / (to - from);
+}
+
+/* What reading the clock twice adds to a time, ns. */
+static double clock_cost(void)
+{
+	static double times[10001];
+	const int n = sizeof(times) / sizeof(*times);
+
+	for (int i = 0; i < n; i++) {
+		times[i] = now_ns();
+		times[i] = now_ns() - times[i];
+	}
+	qsort(times, n, sizeof(*times), by_value);
+	return middle(times, n);
+}
+
+/*
+ * Run the stroke. With @stage_ns, room for @ticks times of each stage, it is the stages
+ * that are timed, else the ticks. Returns how many ticks were in contact.
+ */
+static int run(const struct incise_scene *scene, int ticks, double *tick_ns,
+	       double *stage_ns)
+{
+	int64_t period_ns = llrint(1e9 / incise_scene_rate_hz(scene)), pose = 0, own[16];
+	struct incise_error err = {0};
+	struct incise_plan *plan = incise_plan_new(scene, NULL, &err);
+	struct incise_tracker_sample sample;
+	struct stroke stroke;
+	int n = 0;
+
+	_Static_assert(INCISE_PLAN_STAGES_MAX == 16, "room for the stages");
+	if (!plan)
+		cli_fail_with(&err);
+	stroke_begin(&stroke, plan);
+	stroke_pose(&stroke, 0, &sample);
+	for (int i = 0; i < ticks; i++) {
+		int64_t t_ns = (i + 1) * period_ns;
+		struct incise_tick tick;
+		double begin, ns;
+
+		if (sample.t_ns <= t_ns) {
+			incise_plan_feed(plan, &sample, 1);
+			pose++;
+			stroke_pose(&stroke, pose * 1000000000LL / TRACKER_HZ, &sample);
+		}
+		if (stage_ns) {
+			incise_plan_tick_timed(plan, t_ns, &tick, own);
+			ns = 0;
+		} else {
+			begin = now_ns();
+			incise_plan_tick(plan, t_ns, &tick);
+			ns = now_ns() - begin;
+		}
+		if (!(tick.flags & INCISE_TICK_CONTACT))
+			continue;
+		for (int k = 0; stage_ns && incise_plan_stage(plan, k); k++)
+			stage_ns[k * ticks + n] = (double)own[k];
+		if (tick_ns)
+			tick_ns[n] = ns;
+		n++;
+	}
+	incise_plan_free(plan);
+	return n;
+}
+
+void tick_cost(const struct incise_scene *scene, double seconds, struct tick_cost *cost)
+{
+	int ticks = (int)fmax(seconds * incise_scene_rate_hz(scene), 1000);
+	double *times = calloc((size_t)ticks * INCISE_PLAN_STAGES_MAX, sizeof(*times));
+	double own = clock_cost();
+	int n;
+
+	if (!times)
+		cli_fail("no memory for the times of %d ticks", ticks);
+	*cost = (struct tick_cost){0};
+	/* The first run brings code and surface into the caches. */
+	run(scene, ticks / 4, times, NULL);
+	n = cost->ticks = run(scene, ticks, times, NULL);
+	if (!n)
+		cli_fail("the stroke never met the tissue: nothing to measure");
+	qsort(times, n, sizeof(*times), by_value);
+	cost->median = fmax(quantile(times, n, 0.5) - own, 0);
+	cost->p99 = fmax(quantile(times, n, 0.99) - own, 0);
+	cost->p999 = fmax(quantile(times, n, 0.999) - own, 0);
+	n = run(scene, ticks, NULL, times);
+	for (int k = 0; k < INCISE_PLAN_STAGES_MAX && n; k++) {
+		qsort(times + (size_t)k * ticks, n, sizeof(*times), by_value);
+		cost->stage[k] = fmax(middle(times + (size_t)k * ticks, n) - own, 0);
+	}
+	free(times);
+}

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * What a tick of a plan costs: a stroke of the scalpel over the top of the surface is fed
+ * to a plan without a rig, and every tick in contact is timed.
+ *
+ *        ╲                        5 mm above, down in 0.2 s
+ *   ──────╲────────────────────── surface
+ *          ╲__________________    1 mm deep, ±5 mm to and fro at up to 40 mm/s
+ */
+#ifndef INCISE_TICK_COST_H
+#define INCISE_TICK_COST_H
+
+#include <incise/plan.h>
+
+struct tick_cost {
+	int ticks;			      /* timed: those in contact */
+	double median, p99, p999;	      /* ns, the clock's own cost taken off */
+	double stage[INCISE_PLAN_STAGES_MAX]; /* means of the middle half, ns, the same */
+};
+
+/*
+ * Measure over some seconds of the stroke's time, which go by as fast as they can. Fails
+ * the program when the stroke does not meet the tissue.
+ */
+void tick_cost(const struct incise_scene *scene, double seconds, struct tick_cost *cost);
+
+#endif
