@@ -9,9 +9,11 @@ $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 
 extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
 extra_info := $(extra_demo)
-extra_plan := $(O)/obj/tools/tick_cost.o
-extra_bench := $(addprefix $(O)/obj/tools/,picture.o arithmetics.o machine.o \
-	bench_loop.o tick_cost.o bench_precision.o bench_training.o bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
+extra_haptic := $(O)/obj/tools/scene_argument.o
+extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stopwatch.o)
+extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
+	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o \
+	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
 	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o)
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,

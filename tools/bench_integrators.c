@@ -5,11 +5,11 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 #include "bench_device.h"
 #include "bench_integrators.h"
 #include "cli.h"
 #include "json.h"
+#include "stopwatch.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
 #define TICK_S PERIOD_S
@@ -28,21 +28,6 @@ static const double swept[] = {1e3, 1e5};
 static double force(int tick)
 {
 	return tick < TICKS / 2 ? 1 : 2;
-}
-
-static double now_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return t.tv_sec * 1e9 + t.tv_nsec;
-}
-
-static int by_value(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
 }
 
 static struct spring spring(double K_N_m)
@@ -116,9 +101,9 @@ static double time_of(const struct integrator_row *row)
 	double begin;
 
 	integration_init(&in, row->kind, &s, row->step_s);
-	begin = now_ns();
+	begin = stopwatch_ns();
 	run(&in, lround(TICK_S / row->step_s), places);
-	return (now_ns() - begin) / TICKS;
+	return (stopwatch_ns() - begin) / TICKS;
 }
 
 static void measure_times(struct integrator_bench *bench, int repeats)
@@ -136,7 +121,7 @@ static void measure_times(struct integrator_bench *bench, int repeats)
 	for (int i = 0; i < bench->n; i++) {
 		struct integrator_row *row = &bench->row[i];
 
-		qsort(times[i], repeats, sizeof(double), by_value);
+		stopwatch_sort(times[i], repeats);
 		row->ns_per_ms = times[i][repeats / 2];
 		row->ns_per_step = row->ns_per_ms * row->step_s / TICK_S;
 	}

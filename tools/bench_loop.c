@@ -14,12 +14,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <time.h>
 #include <incise/loop.h>
 #include "bench_loop.h"
 #include "cli.h"
 #include "json.h"
 #include "machine.h"
+#include "stopwatch.h"
 #include "tick_cost.h"
 
 #define SHEET_MM 100.0
@@ -111,25 +111,17 @@ static struct file write_sheet(int cells)
 	return file;
 }
 
-static double now_s(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return t.tv_sec + t.tv_nsec * 1e-9;
-}
-
 static void measure(const char *path, bool quick, struct row *row)
 {
 	struct incise_error err = {0};
 	struct incise_scene *scene;
 	struct incise_plan *plan;
-	double begin = now_s();
+	double begin = stopwatch_ns();
 
 	scene = incise_scene_load(path, NULL, &err);
 	if (!scene)
 		cli_fail_with(&err);
-	row->load_s = now_s() - begin;
+	row->load_s = (stopwatch_ns() - begin) * 1e-9;
 	plan = incise_plan_new(scene, NULL, &err);
 	if (!plan)
 		cli_fail_with(&err);

@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include "arithmetics.h"
@@ -15,6 +14,7 @@
 #include "json.h"
 #include "machine.h"
 #include "picture.h"
+#include "stopwatch.h"
 
 /* Points for the errors. Times are of the first of them, so few that inputs and outputs
  * stay in the cache and the arithmetic is what is measured. */
@@ -59,27 +59,6 @@ static struct incise_model *own_model(void)
 	return model;
 }
 
-static double now_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return t.tv_sec * 1e9 + t.tv_nsec;
-}
-
-static int by_value(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
-/* Nearest rank. */
-static double quantile(const double *sorted, int n, double q)
-{
-	return sorted[(int)(q * (n - 1) + 0.5)];
-}
-
 static void measure_errors(struct bench *b)
 {
 	for (int i = 0; i < b->all.n; i++) {
@@ -121,9 +100,9 @@ static void measure_times(struct bench *b)
 			if (isnan(b->figures[i].max_error))
 				continue;
 			a->run(a, &timed);
-			begin = now_ns();
+			begin = stopwatch_ns();
 			a->run(a, &timed);
-			times[i][rep] = (now_ns() - begin) / timed.n;
+			times[i][rep] = (stopwatch_ns() - begin) / timed.n;
 		}
 	}
 	cli_progress_end();
@@ -132,10 +111,10 @@ static void measure_times(struct bench *b)
 
 		if (isnan(f->max_error))
 			continue;
-		qsort(times[i], b->repeats, sizeof(double), by_value);
-		f->ns = quantile(times[i], b->repeats, 0.5);
-		f->ns_p5 = quantile(times[i], b->repeats, 0.05);
-		f->ns_p95 = quantile(times[i], b->repeats, 0.95);
+		stopwatch_sort(times[i], b->repeats);
+		f->ns = stopwatch_quantile(times[i], b->repeats, 0.5);
+		f->ns_p5 = stopwatch_quantile(times[i], b->repeats, 0.05);
+		f->ns_p95 = stopwatch_quantile(times[i], b->repeats, 0.95);
 	}
 }
 

@@ -6,12 +6,12 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 #include <incise/train.h>
 #include "bench_training.h"
 #include "cli.h"
 #include "json.h"
 #include "machine.h"
+#include "stopwatch.h"
 
 #define PAIRS 120
 #define EPOCHS 80
@@ -56,7 +56,7 @@ static double train_once(bool classic, const double *rows, const int *groups)
 	struct incise_error err = {0};
 	struct incise_model *model =
 		incise_model_new_grid(2, in, mfs, INCISE_MF_GAUSS, &out, &err);
-	struct timespec begin, end;
+	double ns;
 
 	if (!model)
 		cli_fail_with(&err);
@@ -64,19 +64,12 @@ static double train_once(bool classic, const double *rows, const int *groups)
 	options.classic = classic;
 	options.epochs = EPOCHS;
 	options.groups = groups;
-	clock_gettime(CLOCK_MONOTONIC, &begin);
+	ns = stopwatch_ns();
 	if (incise_train(model, &pairs, NULL, &options, NULL, &err))
 		cli_fail_with(&err);
-	clock_gettime(CLOCK_MONOTONIC, &end);
+	ns = stopwatch_ns() - ns;
 	incise_model_free(model);
-	return (end.tv_sec - begin.tv_sec) * 1e3 + (end.tv_nsec - begin.tv_nsec) * 1e-6;
-}
-
-static int by_value(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
+	return ns * 1e-6;
 }
 
 void bench_training(bool json, bool quick)
@@ -101,7 +94,7 @@ void bench_training(bool json, bool quick)
 		printf("%s\n%d pairs, 20 rules, %d epochs at most; median of %d runs\n",
 		       machine.cpu, PAIRS, EPOCHS, repeats);
 	for (size_t w = 0; w < WAYS; w++) {
-		qsort(ms[w], repeats, sizeof(double), by_value);
+		stopwatch_sort(ms[w], repeats);
 		if (!json)
 			printf("%-8s %8.2f ms   (%.2f to %.2f)\n", ways[w].name,
 			       ms[w][repeats / 2], ms[w][0], ms[w][repeats - 1]);

@@ -12,9 +12,9 @@
 #include <unistd.h>
 #include <incise/loop.h>
 #include <incise/outfile.h>
-#include <incise/scene.h>
 #include "cli.h"
 #include "json.h"
+#include "scene_argument.h"
 
 enum { OPT_MODEL = CLI_LONG, OPT_ARITH, OPT_TOOL, OPT_DURATION, OPT_LOG, OPT_JSON };
 
@@ -47,7 +47,8 @@ static const struct cli_verb verb = {
 };
 
 struct job {
-	const char *scene, *rig, *model, *arith, *log;
+	struct scene_argument scene;
+	const char *rig, *log;
 	enum incise_tool tool;
 	double duration;
 	bool json;
@@ -74,13 +75,10 @@ static void parse(struct job *job, int argc, char **argv)
 			job->rig = optarg;
 			break;
 		case OPT_MODEL:
-			job->model = optarg;
+			job->scene.model = optarg;
 			break;
 		case OPT_ARITH:
-			job->arith = optarg;
-			if (strcmp(optarg, "double") && strcmp(optarg, "fixed"))
-				cli_usage("--arith: '%s' is neither double nor fixed",
-					  optarg);
+			scene_argument_arith(&job->scene, optarg);
 			break;
 		case OPT_TOOL:
 			job->tool = tool_named(optarg);
@@ -95,9 +93,7 @@ static void parse(struct job *job, int argc, char **argv)
 			job->json = true;
 			break;
 		}
-	if (optind + 1 != argc)
-		cli_usage("expected one scene, got %d", argc - optind);
-	job->scene = argv[optind];
+	scene_argument_operand(&job->scene, argc, argv, optind);
 	if (job->log && !job->duration)
 		cli_usage("--log keeps all ticks in memory: it needs --duration");
 	if (job->json && job->log && !strcmp(job->log, "-"))
@@ -303,11 +299,7 @@ int main(int argc, char **argv)
 	int rc;
 
 	parse(&job, argc, argv);
-	scene = incise_scene_load(job.scene, job.model, &err);
-	if (!scene)
-		cli_fail_with(&err);
-	if (job.arith && incise_scene_set_arithmetic(scene, job.arith, &err))
-		cli_fail_with(&err);
+	scene = scene_argument_load(&job.scene);
 	rig = incise_rig_open(cli_rig(job.rig), INCISE_RIG_TRACKER | INCISE_RIG_STEPPER,
 			      &err);
 	if (!rig)
@@ -329,7 +321,7 @@ int main(int argc, char **argv)
 	}
 	real = incise_clock_is_real(incise_rig_clock(rig));
 	cli_catch_signals();
-	cli_progress("%s: %g Hz, Ctrl-C ends", job.scene, loop.rate_hz);
+	cli_progress("%s: %g Hz, Ctrl-C ends", job.scene.path, loop.rate_hz);
 	rc = incise_loop_run(plan, incise_rig_clock(rig), &loop, &stats, &err);
 	cli_progress_end();
 	rms_N = incise_rig_stepper(rig) ? render_error(&stats) : NAN;
@@ -345,6 +337,6 @@ int main(int argc, char **argv)
 	incise_scene_free(scene);
 	free(loop.log);
 	if (rc)
-		cli_fail("%s: %s", job.scene, err.text);
+		cli_fail("%s: %s", job.scene.path, err.text);
 	return 0;
 }

@@ -11,6 +11,7 @@
 #include <incise/plan.h>
 #include "cli.h"
 #include "json.h"
+#include "scene_argument.h"
 #include "tick_cost.h"
 
 enum { OPT_MODEL = CLI_LONG, OPT_ARITH, OPT_FULL, OPT_JSON };
@@ -61,7 +62,8 @@ static const struct {
 #define HEAVY (sizeof(heavy) / sizeof(*heavy))
 
 struct job {
-	const char *scene, *rig, *model, *arith;
+	struct scene_argument scene;
+	const char *rig;
 	bool full, json;
 };
 
@@ -76,13 +78,10 @@ static void parse(struct job *job, int argc, char **argv)
 			job->rig = optarg;
 			break;
 		case OPT_MODEL:
-			job->model = optarg;
+			job->scene.model = optarg;
 			break;
 		case OPT_ARITH:
-			job->arith = optarg;
-			if (strcmp(optarg, "double") && strcmp(optarg, "fixed"))
-				cli_usage("--arith: '%s' is neither double nor fixed",
-					  optarg);
+			scene_argument_arith(&job->scene, optarg);
 			break;
 		case OPT_FULL:
 			job->full = true;
@@ -91,9 +90,7 @@ static void parse(struct job *job, int argc, char **argv)
 			job->json = true;
 			break;
 		}
-	if (optind + 1 != argc)
-		cli_usage("expected one scene, got %d", argc - optind);
-	job->scene = argv[optind];
+	scene_argument_operand(&job->scene, argc, argv, optind);
 }
 
 /* The shared objects that this process has mapped, each once; and which heavy ones. */
@@ -177,8 +174,8 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 	incise_plan_stability(plan, &stability);
 	object = json_pack(
 		"{so so so so sf sf sf sI sf so so so so}", "scene",
-		json_text(job->scene), "kept", kept, "left_out", left, "stages", stages,
-		"tick_ns", cost->median, "tick_p99_ns", cost->p99, "tick_p999_ns",
+		json_text(job->scene.path), "kept", kept, "left_out", left, "stages",
+		stages, "tick_ns", cost->median, "tick_p99_ns", cost->p99, "tick_p999_ns",
 		cost->p999, "memory_bytes", (json_int_t)incise_plan_memory(plan),
 		"bound_N", incise_plan_bound(plan, REACH_MM), "devices",
 		job->rig ? json_pack("[ss]", "tracker", "stepper") : json_array(),
@@ -223,8 +220,9 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 	double bound_N = incise_plan_bound(plan, REACH_MM);
 	json_t *mapped;
 
-	printf("%s: %.0f ns a tick (99.9 %% below %.0f), %.1f KiB\n\nkept\n", job->scene,
-	       cost->median, cost->p999, (double)incise_plan_memory(plan) / 1024);
+	printf("%s: %.0f ns a tick (99.9 %% below %.0f), %.1f KiB\n\nkept\n",
+	       job->scene.path, cost->median, cost->p999,
+	       (double)incise_plan_memory(plan) / 1024);
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
 		if (strcmp(name, "actuate"))
 			printf("  %-10s %4.0f ns\n", name, cost->stage[i]);
@@ -261,11 +259,7 @@ int main(int argc, char **argv)
 	struct job job;
 
 	parse(&job, argc, argv);
-	scene = incise_scene_load(job.scene, job.model, &err);
-	if (!scene)
-		cli_fail_with(&err);
-	if (job.arith && incise_scene_set_arithmetic(scene, job.arith, &err))
-		cli_fail_with(&err);
+	scene = scene_argument_load(&job.scene);
 	incise_scene_set_full(scene, job.full);
 	if (job.rig) {
 		rig = incise_rig_open(job.rig, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER,
@@ -276,7 +270,7 @@ int main(int argc, char **argv)
 	plan = incise_plan_new(scene, rig, &err);
 	if (!plan)
 		cli_fail_with(&err);
-	cli_progress("%s: timing %d s of ticks", job.scene, MEASURED_S);
+	cli_progress("%s: timing %d s of ticks", job.scene.path, MEASURED_S);
 	tick_cost(scene, MEASURED_S, &cost);
 	cli_progress_end();
 	if (job.json)

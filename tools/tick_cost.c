@@ -5,8 +5,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include "cli.h"
+#include "stopwatch.h"
 #include "tick_cost.h"
 
 #define NS 1e-9
@@ -59,37 +59,6 @@ static void stroke_pose(const struct stroke *stroke, int64_t t_ns,
 					 off * stroke->along[i];
 }
 
-static double now_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return t.tv_sec * 1e9 + t.tv_nsec;
-}
-
-static int by_value(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
-static double quantile(double *sorted, int n, double q)
-{
-	return sorted[(int)(q * (n - 1) + 0.5)];
-}
-
-/* Finer than the clock's steps: the mean of the middle half. */
-static double middle(const double *sorted, int n)
-{
-	double sum = 0;
-	int from = n / 4, to = n - n / 4;
-
-	for (int i = from; i < to; i++)
-		sum += sorted[i];
-	return sum / (to - from);
-}
-
 /* What reading the clock twice adds to a time, ns. */
 static double clock_cost(void)
 {
@@ -97,11 +66,11 @@ static double clock_cost(void)
 	const int n = sizeof(times) / sizeof(*times);
 
 	for (int i = 0; i < n; i++) {
-		times[i] = now_ns();
-		times[i] = now_ns() - times[i];
+		times[i] = stopwatch_ns();
+		times[i] = stopwatch_ns() - times[i];
 	}
-	qsort(times, n, sizeof(*times), by_value);
-	return middle(times, n);
+	stopwatch_sort(times, n);
+	return stopwatch_middle(times, n);
 }
 
 /*
@@ -137,9 +106,9 @@ static int run(const struct incise_scene *scene, int ticks, double *tick_ns,
 			incise_plan_tick_timed(plan, t_ns, &tick, own);
 			ns = 0;
 		} else {
-			begin = now_ns();
+			begin = stopwatch_ns();
 			incise_plan_tick(plan, t_ns, &tick);
-			ns = now_ns() - begin;
+			ns = stopwatch_ns() - begin;
 		}
 		if (!(tick.flags & INCISE_TICK_CONTACT))
 			continue;
@@ -168,14 +137,15 @@ void tick_cost(const struct incise_scene *scene, double seconds, struct tick_cos
 	n = cost->ticks = run(scene, ticks, times, NULL);
 	if (!n)
 		cli_fail("the stroke never met the tissue: nothing to measure");
-	qsort(times, n, sizeof(*times), by_value);
-	cost->median = fmax(quantile(times, n, 0.5) - own, 0);
-	cost->p99 = fmax(quantile(times, n, 0.99) - own, 0);
-	cost->p999 = fmax(quantile(times, n, 0.999) - own, 0);
+	stopwatch_sort(times, n);
+	cost->median = fmax(stopwatch_quantile(times, n, 0.5) - own, 0);
+	cost->p99 = fmax(stopwatch_quantile(times, n, 0.99) - own, 0);
+	cost->p999 = fmax(stopwatch_quantile(times, n, 0.999) - own, 0);
 	n = run(scene, ticks, NULL, times);
 	for (int k = 0; k < INCISE_PLAN_STAGES_MAX && n; k++) {
-		qsort(times + (size_t)k * ticks, n, sizeof(*times), by_value);
-		cost->stage[k] = fmax(middle(times + (size_t)k * ticks, n) - own, 0);
+		stopwatch_sort(times + (size_t)k * ticks, n);
+		cost->stage[k] =
+			fmax(stopwatch_middle(times + (size_t)k * ticks, n) - own, 0);
 	}
 	free(times);
 }

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * The scene that a verb is given, with the options that change it.
+ */
+#ifndef INCISE_SCENE_ARGUMENT_H
+#define INCISE_SCENE_ARGUMENT_H
+
+#include <incise/scene.h>
+
+struct scene_argument {
+	const char *path;
+	const char *model; /* --model, or NULL */
+	const char *arith; /* --arith, or NULL */
+};
+
+/* Take --arith; what is none is bad usage. */
+void scene_argument_arith(struct scene_argument *argument, const char *text);
+
+/* Take the one operand; another number of them is bad usage. */
+void scene_argument_operand(struct scene_argument *argument, int argc, char **argv,
+			    int first);
+
+/* Read it, or fail the program. To be freed. */
+struct incise_scene *scene_argument_load(const struct scene_argument *argument);
+
+#endif

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Times of runs; see stopwatch.h.
+ */
+#include <stdlib.h>
+#include <time.h>
+#include "stopwatch.h"
+
+double stopwatch_ns(void)
+{
+	struct timespec t;
+
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return t.tv_sec * 1e9 + t.tv_nsec;
+}
+
+static int by_value(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+
+	return (x > y) - (x < y);
+}
+
+void stopwatch_sort(double *times, int n)
+{
+	qsort(times, n, sizeof(*times), by_value);
+}
+
+double stopwatch_quantile(const double *sorted, int n, double q)
+{
+	return sorted[(int)(q * (n - 1) + 0.5)];
+}
+
+double stopwatch_middle(const double *sorted, int n)
+{
+	int from = n / 4, to = n - n / 4;
+	double sum = 0;
+
+	for (int i = from; i < to; i++)
+		sum += sorted[i];
+	return sum / (to - from);
+}

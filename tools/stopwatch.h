@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Times of runs, and what they come to: medians and percentiles, as a mean says little of
+ * a machine that is shared.
+ */
+#ifndef INCISE_STOPWATCH_H
+#define INCISE_STOPWATCH_H
+
+/* CLOCK_MONOTONIC, ns. */
+double stopwatch_ns(void);
+
+void stopwatch_sort(double *times, int n);
+
+/* Of sorted times: nearest rank; q from 0 to 1. */
+double stopwatch_quantile(const double *sorted, int n, double q);
+
+/* Of sorted times: mean of the middle half, which is finer than the clock's steps. */
+double stopwatch_middle(const double *sorted, int n);
+
+#endif
