@@ -145,7 +145,7 @@ static void write_log(const struct job *job, const struct incise_tick *ticks, si
 		cli_fail_with(&err);
 }
 
-/* How far the actuator's force was from the one commanded at the tick before, rms. */
+/* How far the actuator's force was from the one asked of it at the tick before, rms. */
 static double render_error(const struct incise_loop_stats *stats)
 {
 	return stats->ticks > 1 ? sqrt(stats->rendered_off2 / (stats->ticks - 1)) : NAN;

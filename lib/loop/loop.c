@@ -21,7 +21,7 @@ static void count(uint64_t *histogram, int64_t value)
 
 static void count_tick(struct incise_loop_stats *stats, const struct incise_tick *tick)
 {
-	double force = 0, off = tick->rendered_N - stats->force_N;
+	double force = 0, off = tick->rendered_N - stats->actuated_N;
 
 	for (int i = 0; i < 3; i++)
 		force += tick->command_N[i] * tick->command_N[i];
@@ -29,6 +29,7 @@ static void count_tick(struct incise_loop_stats *stats, const struct incise_tick
 	if (stats->ticks)
 		stats->rendered_off2 += off * off;
 	stats->force_N = sqrt(force);
+	stats->actuated_N = tick->actuated_N;
 	stats->force_max_N = fmax(stats->force_max_N, stats->force_N);
 	stats->ticks++;
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)

@@ -276,6 +276,7 @@ static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 	plan->fault = rc;
 	incise_limit_zero(&plan->limit);
 	memset(tick->command_N, 0, sizeof(tick->command_N));
+	tick->actuated_N = 0;
 	tick->flags |= INCISE_TICK_FAULT;
 	incise_plan_release(plan);
 	return rc;

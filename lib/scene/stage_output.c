@@ -58,6 +58,7 @@ int incise_stage_actuate(struct incise_plan *plan, struct incise_tick *tick)
 
 	if (rc)
 		return rc;
+	tick->actuated_N = along_N;
 	tick->rendered_N = isfinite(status.force_N) ? status.force_N : 0;
 	if (isfinite(status.handle_mm))
 		plan->handle_mm = status.handle_mm;

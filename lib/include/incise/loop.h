@@ -45,7 +45,8 @@ struct incise_loop_stats {
 	uint64_t tick_100ns[INCISE_LOOP_BINS]; /**< cost of the plan, bins of 100 ns */
 	double force_N;			       /**< commanded at the last tick */
 	double force_max_N;		       /**< largest commanded */
-	double rendered_off2; /**< Σ (rendered - commanded a tick before)², N² */
+	double actuated_N;		       /**< of that along the actuator's axis */
+	double rendered_off2; /**< Σ (rendered - actuated a tick before)², N² */
 };
 
 /**

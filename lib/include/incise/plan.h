@@ -114,6 +114,7 @@ struct incise_tick {
 	double depth_mm;
 	double velocity_mm_s; /**< speed of the tip */
 	double command_N[3];  /**< force asked for, in the tracker's frame */
+	double actuated_N;    /**< its part along the actuator's axis, 0 without one */
 	double rendered_N;    /**< force of the actuator on the hand, 0 without one */
 	unsigned int flags;   /**< incise_tick_flag bits */
 	enum incise_phase phase;
