@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * Whether a scene is stable on its device, before its first tick: the largest stiffness
- * of the scene against the exact limit of the sampled wall.
+ * of the scene against the limit of the loop with the tracker's poses, or, where the scene
+ * says how late its device answers, against the exact limit of a wall so late.
  *
  *   cutting     reaction (along the normal) + plane (along the blade's side): when the
  *               blade lies flat both act along one line
@@ -9,7 +10,9 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <incise/slope.h>
+#include "../tissue/pose_loop.h"
 #include "plan.h"
 
 /* The largest slopes of the model, by depth and by speed. */
@@ -31,8 +34,7 @@ static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 
 /*
  * How late a force answers a pose, as the scene says, or as the tracker is: its latency
- * and the period for which a pose is used. That the pose is extrapolated over this time is
- * not counted: it holds for a hand, not for a wall that hums.
+ * and the period for which a pose is used. The second is what the guard goes by.
  */
 static void set_delay(struct incise_plan *plan, const struct incise_tracker_info *tracker)
 {
@@ -53,27 +55,52 @@ static void set_delay(struct incise_plan *plan, const struct incise_tracker_info
 	}
 }
 
-static bool stable(const struct incise_plan_stability *s, double share)
+static double limit_N_mm(const struct incise_plan *plan, double damping_N_s_mm)
 {
-	double limit_N_mm = incise_stability_limit(&s->device, share * s->damping_N_s_mm);
+	struct incise_haptic_device device = plan->stability.device;
 
-	/* A limit of 0 is that of a loop which its damper alone makes unstable. */
-	if (!(limit_N_mm > 0) && s->damping_N_s_mm > 0)
-		return share == 0;
-	return share * s->stiffness_N_mm <= limit_N_mm;
+	if (plan->stability.own_delay)
+		return incise_stability_limit(&device, damping_N_s_mm);
+	device.period_s = 1 / plan->scene->rate_hz;
+	return incise_pose_loop_limit(&device, &plan->predict, damping_N_s_mm);
 }
 
-/* The largest gain that is stable, by bisection; damping goes with it. */
+static bool stable(const struct incise_plan *plan, double share)
+{
+	const struct incise_plan_stability *s = &plan->stability;
+	double most = limit_N_mm(plan, share * s->damping_N_s_mm);
+
+	/* A limit of 0 is that of a loop which its damper alone makes unstable. */
+	if (!(most > 0) && s->damping_N_s_mm > 0)
+		return share == 0;
+	return share * s->stiffness_N_mm <= most;
+}
+
+/* The largest gain that is stable; damping goes with it, so that the limit moves. */
 static double largest_gain(const struct incise_plan *plan)
 {
 	double low = 0, high = 1;
 
+	if (!(plan->stability.damping_N_s_mm > 0))
+		return plan->gain * plan->stability.limit_N_mm /
+		       plan->stability.stiffness_N_mm;
 	while (high - low > 1e-4) {
 		double middle = (low + high) / 2;
 
-		*(stable(&plan->stability, middle) ? &low : &high) = middle;
+		*(stable(plan, middle) ? &low : &high) = middle;
 	}
 	return low * plan->gain;
+}
+
+/* Where the delay comes from, for a message. */
+static void name_delay(const struct incise_plan_stability *s,
+		       const struct incise_tracker_info *tracker, char name[64])
+{
+	if (s->own_delay)
+		snprintf(name, 64, "that answers %d ticks late", s->device.delay_ticks);
+	else
+		snprintf(name, 64, "felt through a tracker of %g Hz and %g ms",
+			 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
 }
 
 int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,
@@ -81,7 +108,8 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_scene *scene = plan->scene;
-	double reaction_N_mm = plan->reaction_N_mm, gain;
+	double reaction_N_mm = plan->reaction_N_mm;
+	char delay[64];
 
 	s->device = (struct incise_haptic_device){
 		.mass_kg = scene->device.mass_kg,
@@ -97,17 +125,17 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	s->stiffness_N_mm = fmax(reaction_N_mm + plan->plane_N_mm,
 				 fmax(plan->insertion_N_mm, plan->spread_N_mm));
 	s->damping_N_s_mm = plan->damping_N_s_mm;
-	s->limit_N_mm = incise_stability_limit(&s->device, s->damping_N_s_mm);
-	if (stable(s, 1))
+	s->limit_N_mm = limit_N_mm(plan, s->damping_N_s_mm);
+	if (stable(plan, 1))
 		return 0;
-	gain = largest_gain(plan);
+	name_delay(s, tracker, delay);
 	/* Downwards: what is named must be safe. */
 	return incise_error_set(
 		err, EDOM,
 		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm, a device of "
-		"%g kg and %g N s/mm that answers %d ticks late holds %.4g N/mm; set "
-		"tissue.gain to at most %.4g, or describe the device",
+		"%g kg and %g N s/mm %s holds %.4g N/mm; set tissue.gain to at most "
+		"%.4g, or describe the device",
 		scene->path, s->stiffness_N_mm, s->damping_N_s_mm, s->device.mass_kg,
-		s->device.damping_N_s_mm, s->device.delay_ticks, s->limit_N_mm,
-		floor(gain * 1e3) / 1e3);
+		s->device.damping_N_s_mm, delay, s->limit_N_mm,
+		floor(largest_gain(plan) * 1e3) / 1e3);
 }

@@ -168,6 +168,7 @@ struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 		rc = take_model(plan, err);
 	if (!rc) {
 		take_tissue(plan);
+		incise_predict_init(&plan->predict, &tracker);
 		rc = incise_plan_check(plan, &tracker, err);
 	}
 	if (rc) {
@@ -175,7 +176,6 @@ struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 		errno = -rc;
 		return NULL;
 	}
-	incise_predict_init(&plan->predict, &tracker);
 	set_tool(plan);
 	set_limits(plan);
 	set_guard(plan);

@@ -88,8 +88,8 @@ struct incise_plan {
 void incise_plan_choose(struct incise_plan *plan);
 
 /*
- * What is known of the scene's stability on this device, and whether it is stable. A pose
- * is as old as the tracker's latency and one of its periods when it is used.
+ * What is known of the scene's stability on this device, and whether it is stable, with
+ * the plan's predictor.
  * Returns 0; -EDOM (not stable: the message names the largest gain), -ENOMEM.
  */
 int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,

@@ -70,7 +70,11 @@ struct incise_plan_stability {
 	bool own_delay;	       /**< the scene gives the delay; else it is the tracker's */
 	double stiffness_N_mm; /**< largest of the scene, in any phase */
 	double damping_N_s_mm; /**< the scene's own */
-	double limit_N_mm;     /**< incise_stability_limit() of the device */
+	/**
+	 * Stiffness that the device holds: with own_delay incise_stability_limit(); else
+	 * that of the loop with the tracker's rate and latency, and with the predictor.
+	 */
+	double limit_N_mm;
 	/** Largest slope of the model's force by the speed, either way; 0 without one. */
 	double speed_slope_N_s_mm;
 	bool certified; /**< the model's slopes are bounds, not estimates */

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The loop of a wall and a tracker; see pose_loop.h.
+ *
+ *   ticks      |     |     |     |     |     |     |     |
+ *   arrivals  ·:·······················:·······················:     P apart, LEAD of a
+ *   poses        '--- latency ---'                                   tick before one
+ *              ├───────── P ───────────┤
+ *              begin: a pose was just taken in
+ */
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+#include <incise/clock.h>
+#include <incise/plant.h>
+#include "../base/units.h"
+#include "pose_loop.h"
+
+#define TICKS_MOST 64 /* in a P */
+#define POSES_MOST 16 /* in a tick */
+#define LATE_MOST 32  /* P in the latency */
+/* On their way are those of the latency, and those that wait for their tick. */
+#define WAITING_MOST (LATE_MOST + POSES_MOST)
+#define OWN_STATES 7 /* of device and predictor */
+#define STATES (OWN_STATES + WAITING_MOST)
+
+/* Part of a tick that a pose waits before it is taken in: the mean. */
+#define LEAD 0.5
+
+/*
+ * Size of a state that is tried, mm: so small that the predictor's limits of what it
+ * believes are not met. All is linear below them.
+ */
+#define SIZE_MM 1e-6
+
+/* Begins of all runs: late enough that no time is negative. */
+#define BEGIN_NS (2 * INCISE_NS_PER_S)
+
+struct loop {
+	struct incise_plant plant; /* at rest */
+	struct incise_predict predict;
+	double tick_s, pose_s, latency_s;
+	int ticks, poses; /* in a period */
+	int waiting;	  /* poses on their way when a period begins */
+	int states;
+	double K, B;
+};
+
+/* Three runs at once: the predictor has three axes. */
+struct run {
+	struct incise_plant plant[3];
+	struct incise_predict predict;
+	double pose_mm[WAITING_MOST + POSES_MOST][3]; /* the oldest first */
+	int n;
+	double force_N[3];
+	double t_s;
+};
+
+static int64_t to_ns(double t_s)
+{
+	return BEGIN_NS + llround(t_s * INCISE_NS_PER_S);
+}
+
+/* Each state's place in a run, in mm, mm/s, mm/s². */
+static double *place(struct run *run, int state, int axis)
+{
+	double *const own[OWN_STATES] = {
+		&run->plant[axis].position_mm, &run->plant[axis].velocity_mm_s,
+		&run->predict.x[axis],	       &run->predict.v[axis],
+		&run->predict.a[axis],	       &run->predict.x_shown[axis],
+		&run->predict.v_shown[axis],
+	};
+
+	return state < OWN_STATES ? own[state] : &run->pose_mm[state - OWN_STATES][axis];
+}
+
+static void go_to(struct run *run, double t_s)
+{
+	for (int i = 0; i < 3; i++)
+		incise_plant_step(&run->plant[i], run->force_N[i],
+				  fmax(t_s - run->t_s, 0));
+	run->t_s = t_s;
+}
+
+static void take_pose(struct run *run, double arrival_s)
+{
+	struct incise_tracker_sample sample = {
+		.t_ns = to_ns(arrival_s),
+		.quaternion = {1},
+	};
+
+	memcpy(sample.position_mm, run->pose_mm[0], sizeof(run->pose_mm[0]));
+	incise_predict_add(&run->predict, &sample);
+	memmove(run->pose_mm[0], run->pose_mm[1],
+		(size_t)--run->n * sizeof(run->pose_mm[0]));
+}
+
+static void set_force(const struct loop *loop, struct run *run)
+{
+	double x[3], v[3], attitude[4];
+
+	incise_predict_at(&run->predict, to_ns(run->t_s), x, v, attitude);
+	for (int i = 0; i < 3; i++)
+		run->force_N[i] = -loop->K * x[i] - loop->B * v[i];
+}
+
+/* Round a period: the last poses are taken in before the tick that begins the next one. */
+static void run_period(const struct loop *loop, struct run *run)
+{
+	double lead_s = LEAD * loop->tick_s;
+	int taken = 0;
+
+	for (int k = 1; k <= loop->ticks; k++) {
+		set_force(loop, run);
+		for (; taken < loop->poses; taken++) {
+			double t_s = (loop->waiting + 1 + taken) * loop->pose_s -
+				     loop->latency_s - lead_s;
+
+			if (t_s > k * loop->tick_s && k < loop->ticks)
+				break;
+			go_to(run, t_s);
+			for (int i = 0; i < 3; i++)
+				run->pose_mm[run->n][i] = run->plant[i].position_mm;
+			run->n++;
+		}
+		go_to(run, k * loop->tick_s);
+	}
+	for (int i = 1; i <= loop->poses; i++)
+		take_pose(run, i * loop->pose_s - lead_s);
+}
+
+/* What a period makes of each state; column by column. */
+static void measure(const struct loop *loop, double matrix[STATES][STATES])
+{
+	for (int column = 0; column < loop->states; column += 3) {
+		struct run run = {
+			.plant = {loop->plant, loop->plant, loop->plant},
+			.predict = loop->predict,
+			.n = loop->waiting,
+		};
+
+		for (int i = 0; i < 3 && column + i < loop->states; i++)
+			*place(&run, column + i, i) = SIZE_MM;
+		run_period(loop, &run);
+		for (int row = 0; row < loop->states; row++)
+			for (int i = 0; i < 3 && column + i < loop->states; i++)
+				matrix[row][column + i] = *place(&run, row, i) / SIZE_MM;
+	}
+}
+
+/* The largest sum of a row, by which the matrix is divided; 0 when that is no number. */
+static double normalise(double matrix[STATES][STATES], int n)
+{
+	double most = 0;
+
+	for (int i = 0; i < n; i++) {
+		double sum = 0;
+
+		for (int j = 0; j < n; j++)
+			sum += fabs(matrix[i][j]);
+		if (!isfinite(sum))
+			return 0;
+		most = fmax(most, sum);
+	}
+	for (int i = 0; i < n && most > 0; i++)
+		for (int j = 0; j < n; j++)
+			matrix[i][j] /= most;
+	return most;
+}
+
+/*
+ * Whether all eigenvalues are below 1, by squaring: of the norms |M^n| the n-th root tends
+ * to the largest, and one of them below 1 proves it. Thirty squarings leave 1e-8 of what
+ * the norm is off.
+ */
+static bool decays(double matrix[STATES][STATES], int n)
+{
+	double log_norm = 0;
+
+	for (int k = 0; k < 30; k++) {
+		double square[STATES][STATES] = {{0}}, norm = normalise(matrix, n);
+
+		if (!(norm > 0))
+			return false;
+		log_norm = 2 * log_norm + log(norm);
+		if (log_norm < 0)
+			return true;
+		for (int i = 0; i < n; i++)
+			for (int k = 0; k < n; k++)
+				for (int j = 0; j < n; j++)
+					square[i][j] += matrix[i][k] * matrix[k][j];
+		memcpy(matrix, square, sizeof(square));
+	}
+	return false;
+}
+
+static bool stable(struct loop *loop, double stiffness_N_mm)
+{
+	double matrix[STATES][STATES];
+
+	loop->K = stiffness_N_mm;
+	measure(loop, matrix);
+	return decays(matrix, loop->states);
+}
+
+/* Times that are multiples of each other, none shorter than it is. */
+static void set_times(struct loop *loop, double tick_s)
+{
+	double pose_s = loop->predict.period_s;
+
+	loop->latency_s = (double)loop->predict.latency_ns / INCISE_NS_PER_S;
+	pose_s = fmax(pose_s, fmax(loop->latency_s / LATE_MOST, tick_s / POSES_MOST));
+	loop->ticks = (int)fmin(fmax(pose_s / tick_s + 1e-9, 1), TICKS_MOST);
+	loop->poses = (int)fmax(tick_s / pose_s + 1e-9, 1);
+	loop->pose_s = fmax(pose_s, tick_s / loop->poses);
+	loop->tick_s = loop->pose_s * loop->poses / loop->ticks;
+	loop->waiting =
+		(int)((loop->latency_s + LEAD * loop->tick_s) / loop->pose_s + 1e-9);
+	loop->states = OWN_STATES + loop->waiting;
+}
+
+/* The predictor as it is at the begin of a period, with all that it knows 0. */
+static void set_predict(struct loop *loop)
+{
+	struct incise_predict *p = &loop->predict;
+
+	p->gap_ns = llround((double)p->gap_ns * loop->pose_s / p->period_s);
+	p->period_s = loop->pose_s;
+	p->started = true;
+	p->arrival_ns = to_ns(-LEAD * loop->tick_s);
+	p->t_ns = p->arrival_ns - p->latency_ns;
+	for (int i = 0; i < 3; i++)
+		p->x[i] = p->v[i] = p->a[i] = p->x_shown[i] = p->v_shown[i] = 0;
+}
+
+static bool valid(const struct incise_haptic_device *d, double damping_N_s_mm)
+{
+	return d->mass_kg > 0 && isfinite(d->mass_kg) && d->damping_N_s_mm >= 0 &&
+	       isfinite(d->damping_N_s_mm) && d->period_s > 0 && isfinite(d->period_s) &&
+	       isfinite(damping_N_s_mm);
+}
+
+/* The scan: softest wall, as a part of what a delay holds; factor; how many. */
+#define SOFTEST 1e-4
+#define FACTOR 1.05
+#define STEPS 400
+#define HALVINGS 40
+
+double incise_pose_loop_limit(const struct incise_haptic_device *device,
+			      const struct incise_predict *predict, double damping_N_s_mm)
+{
+	double late_s, low = 0, high;
+	struct loop loop = {
+		.plant = {.mass_kg = device->mass_kg,
+			  .damping_N_s_mm = device->damping_N_s_mm},
+		.predict = *predict,
+		.B = damping_N_s_mm,
+	};
+
+	if (!valid(device, damping_N_s_mm))
+		return 0;
+	set_times(&loop, device->period_s);
+	set_predict(&loop);
+	late_s = loop.latency_s + loop.pose_s;
+	high = device->mass_kg * N_S2_PER_MM_KG / late_s;
+	if (device->damping_N_s_mm > 0)
+		high = fmin(high, device->damping_N_s_mm);
+	high *= SOFTEST / late_s;
+	/* Upwards, for a wall may be stable again beyond one that is not. */
+	for (int i = 0; i < STEPS && stable(&loop, high); i++) {
+		low = high;
+		high *= FACTOR;
+	}
+	for (int i = 0; i < HALVINGS && low > 0; i++) {
+		double middle = (low + high) / 2;
+
+		*(stable(&loop, middle) ? &low : &high) = middle;
+	}
+	return low;
+}

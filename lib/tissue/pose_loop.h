@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * How stiff a wall may be that is felt through a tracker: the loop of device, tracker,
+ * predictor and wall as it is, extrapolation and blending with it.
+ *
+ *   device ──pose, P apart──▶ latency ──▶ predict ──each tick T──▶ f = -K x - B v ──┐
+ *      ▲                                                                            │
+ *      └───────────────────────────── held for T ◀──────────────────────────────────┘
+ *
+ * A delay of latency + P alone is not the worst that this can be. The predictor turns
+ * phase back at the speed of a hand, and makes loud what is faster: at the frequency where
+ * a stiff wall hums it shows more than there is. On the shipped device (50 g, 0.01 N s/mm,
+ * 120 Hz, 4.2 ms) the loop holds 0.40 N/mm; the delay alone would hold 0.94. On a device
+ * that has next to no damping it is the other way about.
+ *
+ * In contact all of it is linear, and periodic when P is a whole number of ticks. The map
+ * of the state over one P is therefore a matrix, and the wall is stable when that has no
+ * eigenvalue of modulus 1 or more. The matrix is not derived but measured: the columns are
+ * what device (incise/plant.h) and predictor (predict.h) make of each unit state in one P.
+ * So it is that of the real predictor, whatever that becomes.
+ *
+ *   state: device x v | predictor x v a, shown x v | poses on their way
+ *
+ * N, mm, s.
+ */
+#ifndef INCISE_POSE_LOOP_H
+#define INCISE_POSE_LOOP_H
+
+#include <incise/stability.h>
+#include "predict.h"
+
+/*
+ * Stiffness up to which the wall is stable in this loop. Coulomb friction, encoder and
+ * delay_ticks are left out; so is noise.
+ *
+ * Times that are no multiples of each other are made so by the longer tick, or by the
+ * slower tracker when that is the faster of the two. Beyond 64 ticks in a P, or 16 P in a
+ * tick or 32 in the latency, tick or P are made longer too.
+ *
+ * @predict: as initialised for the tracker: its gains, period and latency count
+ * @damping_N_s_mm: of the wall, B, by the predictor's velocity
+ * Returns N/mm; 0 when even the softest wall is unstable, or of a device that cannot be.
+ * Takes some milliseconds, more with many P in the latency; no allocation.
+ */
+double incise_pose_loop_limit(const struct incise_haptic_device *device,
+			      const struct incise_predict *predict,
+			      double damping_N_s_mm);
+
+#endif
