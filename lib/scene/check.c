@@ -65,15 +65,40 @@ static double limit_N_mm(const struct incise_plan *plan, double damping_N_s_mm)
 	return incise_pose_loop_limit(&device, &plan->predict, damping_N_s_mm);
 }
 
+static bool holds(const struct incise_plan *plan, double stiffness_N_mm,
+		  double damping_N_s_mm)
+{
+	double most = limit_N_mm(plan, damping_N_s_mm);
+
+	/* A limit of 0 is that of a loop which its damper alone makes unstable. */
+	if (!(most > 0) && damping_N_s_mm > 0)
+		return false;
+	return stiffness_N_mm <= most;
+}
+
 static bool stable(const struct incise_plan *plan, double share)
 {
 	const struct incise_plan_stability *s = &plan->stability;
-	double most = limit_N_mm(plan, share * s->damping_N_s_mm);
 
-	/* A limit of 0 is that of a loop which its damper alone makes unstable. */
-	if (!(most > 0) && s->damping_N_s_mm > 0)
-		return share == 0;
-	return share * s->stiffness_N_mm <= most;
+	return holds(plan, share * s->stiffness_N_mm, share * s->damping_N_s_mm);
+}
+
+double incise_plan_spare_damping(const struct incise_plan *plan, double most_N_s_mm)
+{
+	const struct incise_plan_stability *s = &plan->stability;
+	double low = 0, high = most_N_s_mm;
+
+	if (holds(plan, s->stiffness_N_mm, s->damping_N_s_mm + most_N_s_mm))
+		return most_N_s_mm;
+	/* To a hundredth of @most. */
+	for (int i = 0; i < 7; i++) {
+		double middle = (low + high) / 2;
+
+		*(holds(plan, s->stiffness_N_mm, s->damping_N_s_mm + middle) ? &low
+									     : &high) =
+			middle;
+	}
+	return low;
 }
 
 /* The largest gain that is stable; damping goes with it, so that the limit moves. */

@@ -111,7 +111,15 @@ static void set_guard(struct incise_plan *plan)
 
 	incise_guard_init(&plan->guard, device->mass_kg, device->period_s,
 			  plan->scene->effects.guard ? reserve(plan) : 0);
+	if (!plan->scene->effects.guard)
+		return;
 	plan->guard.cap_N_s_mm *= fmin(1, late);
+	/*
+	 * What the guard adds must not make a wall hum that did not; half of what is spare,
+	 * as the guard's own share is half of what is stable.
+	 */
+	plan->guard.cap_N_s_mm =
+		incise_plan_spare_damping(plan, 2 * plan->guard.cap_N_s_mm) / 2;
 }
 
 static void set_limits(struct incise_plan *plan)

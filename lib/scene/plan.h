@@ -95,4 +95,11 @@ void incise_plan_choose(struct incise_plan *plan);
 int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,
 		      struct incise_error *err);
 
+/*
+ * After incise_plan_check(): how much damping may be added to the scene's own, up to
+ * @most, before its stiffness is too much. Through a tracker damping is late, and is no
+ * help.
+ */
+double incise_plan_spare_damping(const struct incise_plan *plan, double most_N_s_mm);
+
 #endif

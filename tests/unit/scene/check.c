@@ -237,6 +237,48 @@ static void test_own_delay(void **state)
 	assert_true(limit_of(&wall) == incise_stability_limit(&device, 0));
 }
 
+/*
+ * The guard's damping comes as late as all else. It must leave at rest what was at rest:
+ * with a cap for the delay alone, 0.0029 N s/mm, the first wall swings by 1.4 mm for ever.
+ */
+static void test_guard_lets_rest(void **state)
+{
+	static const struct wall walls[] = {
+		{.mass_kg = 0.05, .b = 0.01},
+		{.mass_kg = 0.05, .b = 0.005},
+		{.mass_kg = 0.2, .b = 0.04, .B = 0.002},
+	};
+
+	for (size_t i = 0; i < N(walls); i++) {
+		struct wall wall = walls[i];
+
+		wall.delay_ticks = -1;
+		wall.K = 0.9 * limit_of(&wall);
+		wall.guard = true;
+		/* The kick is 0.03 mm or more; what stays is the fixed point's step, 15 µN. */
+		assert_true(press(&wall, 6).last_mm < 1e-3);
+	}
+}
+
+/*
+ * What it does not do is to hold a wall that hums: without and with it the hum grows
+ * until the device leaves the wall at each swing, and stays so. 1.90 and 1.93 mm here.
+ */
+static void test_guard_beyond_the_limit(void **state)
+{
+	struct wall wall = {.mass_kg = 0.05, .b = 0.01, .delay_ticks = -1};
+	struct swing without, with;
+
+	wall.K = 1.5 * limit_of(&wall);
+	wall.delay_ticks = 13;
+	without = press(&wall, 6);
+	assert_true(without.last_mm > 1);
+	wall.guard = true;
+	with = press(&wall, 6);
+	assert_true(with.last_mm < 1.1 * without.last_mm);
+	assert_true(with.last_mm < 1.01 * with.middle_mm);
+}
+
 static void test_shipped_scenes(void **state)
 {
 	static const char *const names[] = {"liver", "neck", "wall"};
@@ -265,6 +307,8 @@ int main(void)
 		cmocka_unit_test(test_limit_is_that_of_the_loop),
 		cmocka_unit_test(test_refusal_names_a_gain),
 		cmocka_unit_test(test_own_delay),
+		cmocka_unit_test(test_guard_lets_rest),
+		cmocka_unit_test(test_guard_beyond_the_limit),
 		cmocka_unit_test(test_shipped_scenes),
 	};
 
