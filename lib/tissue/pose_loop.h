@@ -7,15 +7,16 @@
  *      ▲                                                                            │
  *      └───────────────────────────── held for T ◀──────────────────────────────────┘
  *
- * A delay of latency + P alone is not the worst that this can be. The predictor turns
- * phase back at the speed of a hand, and makes loud what is faster: at the frequency where
- * a stiff wall hums it shows more than there is. On the shipped device (50 g, 0.01 N s/mm,
- * 120 Hz, 4.2 ms) the loop holds 0.40 N/mm; the delay alone would hold 0.94. On a device
- * that has next to no damping it is the other way about.
+ * This is not the loop with a delay of latency + P and no predictor, nor is that on the
+ * safe side. The predictor leads, which helps where the motion is slow, as a hand's is;
+ * and it shows faster motion larger than it is, as that of a wall that hums. On a device
+ * of 50 g and 0.01 N s/mm, with 120 Hz and 4.2 ms, the loop holds 0.40 N/mm where the
+ * delay would hold 0.94. With a twentieth of the damping the loop holds three times more
+ * than the delay. Damping by the predictor's velocity makes it less, not more.
  *
  * In contact all of it is linear, and periodic when P is a whole number of ticks. The map
  * of the state over one P is therefore a matrix, and the wall is stable when that has no
- * eigenvalue of modulus 1 or more. The matrix is not derived but measured: the columns are
+ * eigenvalue of modulus above 1. The matrix is not derived but measured: the columns are
  * what device (incise/plant.h) and predictor (predict.h) make of each unit state in one P.
  * So it is that of the real predictor, whatever that becomes.
  *
