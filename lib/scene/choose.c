@@ -32,11 +32,18 @@ static run_fn *plane(const struct incise_plan *plan)
 
 /* Why a stage is not needed, or NULL. */
 
+/* A constant may be 0 because of the gain, whatever the file says of it. */
+static const char *zero(const struct incise_plan *plan, const char *why)
+{
+	return plan->gain > 0 ? why : "tissue.gain is 0";
+}
+
 static const char *no_tool(const struct incise_plan *plan)
 {
 	if (plan->insertion_N_mm > 0 || plan->spread_N_mm > 0)
 		return NULL;
-	return "nothing is inserted: tissue.insertion_N_mm and tissue.spread_N_mm are 0";
+	return zero(plan, "nothing is inserted: tissue.insertion_N_mm and "
+			  "tissue.spread_N_mm are 0");
 }
 
 static const char *no_normal(const struct incise_plan *plan)
@@ -51,28 +58,30 @@ static const char *no_normal(const struct incise_plan *plan)
 static const char *no_reaction(const struct incise_plan *plan)
 {
 	if (plan->fixed || plan->model)
-		return plan->gain > 0 ? NULL : "tissue.gain is 0";
-	return plan->reaction_N_mm > 0 ? NULL : "no model, and tissue.reaction_N_mm is 0";
+		return zero(plan, NULL);
+	return plan->reaction_N_mm > 0
+		       ? NULL
+		       : zero(plan, "no model, and tissue.reaction_N_mm is 0");
 }
 
 static const char *no_plane(const struct incise_plan *plan)
 {
-	return plan->plane_N_mm > 0 ? NULL : "tissue.plane_N_mm is 0";
+	return plan->plane_N_mm > 0 ? NULL : zero(plan, "tissue.plane_N_mm is 0");
 }
 
 static const char *no_damping(const struct incise_plan *plan)
 {
-	return plan->damping_N_s_mm > 0 ? NULL : "tissue.damping_N_s_mm is 0";
+	return plan->damping_N_s_mm > 0 ? NULL : zero(plan, "tissue.damping_N_s_mm is 0");
 }
 
 static const char *no_insertion(const struct incise_plan *plan)
 {
-	return plan->insertion_N_mm > 0 ? NULL : "tissue.insertion_N_mm is 0";
+	return plan->insertion_N_mm > 0 ? NULL : zero(plan, "tissue.insertion_N_mm is 0");
 }
 
 static const char *no_spread(const struct incise_plan *plan)
 {
-	return plan->spread_N_mm > 0 ? NULL : "tissue.spread_N_mm is 0";
+	return plan->spread_N_mm > 0 ? NULL : zero(plan, "tissue.spread_N_mm is 0");
 }
 
 static const char *no_guard(const struct incise_plan *plan)

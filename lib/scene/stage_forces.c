@@ -61,7 +61,8 @@ int incise_stage_reaction_fixed(struct incise_plan *plan, struct incise_tick *ti
 static void add_fuzzy(struct incise_plan *plan, struct incise_tick *tick, double size_N,
 		      bool outside)
 {
-	if (outside)
+	/* With no gain the model is asked only to keep the stage, not for a force. */
+	if (outside && plan->gain > 0)
 		tick->flags |= INCISE_TICK_EXTRAPOLATED;
 	incise_effect_reaction(plan->force_N, fmax(plan->gain * size_N, 0), plan->normal);
 }
