@@ -55,9 +55,14 @@ int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
 	bool other = incise_instrument_choose(&plan->instrument, plan->attitude, plan->up,
 					      plan->proxy.touching);
 
-	/* The way from the end of one to that of the other is no motion. */
-	if (other)
+	/*
+	 * The way from the end of one to that of the other is no motion, and no work of
+	 * a force that is still on its way down.
+	 */
+	if (other) {
 		incise_proxy_init(&plan->proxy, plan->surface, plan->proxy.leave_mm);
+		incise_guard_reset(&plan->guard);
+	}
 	incise_instrument_end(&plan->instrument, tick->position_mm, plan->attitude,
 			      tick->tool_mm);
 	return 0;
