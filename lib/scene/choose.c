@@ -98,7 +98,7 @@ static const struct {
 } all[] = {
 	{"pose", true, NULL, pose, NULL},
 	{"predict", true, incise_stage_predict, NULL, NULL},
-	{"tool", false, incise_stage_tool, NULL, no_tool},
+	{"tool", true, incise_stage_tool, NULL, no_tool},
 	{"contact", false, incise_stage_contact, NULL, NULL},
 	{"normal", false, incise_stage_normal, NULL, no_normal},
 	{"reaction", false, NULL, reaction, no_reaction},
