@@ -127,7 +127,9 @@ int incise_scene_read_surface(struct incise_scene *scene, const config_setting_t
 					"%s:%d: surface.kind: expected \"plane\", "
 					"\"sphere\", \"capsule\", \"heights\" or "
 					"\"mesh\", found \"%.40s\"; correct it",
-					scene->path, config_setting_source_line(group),
+					scene->path,
+					config_setting_source_line(
+						config_setting_get_member(group, "kind")),
 					name);
 	rc = read_named(&named, kind, group, scene->path, err);
 	if (rc)
@@ -142,7 +144,8 @@ int incise_scene_read_surface(struct incise_scene *scene, const config_setting_t
 	scene->surface = kind->make(&named, &why);
 	free(file);
 	if (!scene->surface)
-		return incise_error_set(err, why.code, "%s: its surface: %s", scene->path,
+		return incise_error_set(err, why.code, "%s:%d: its surface: %s",
+					scene->path, config_setting_source_line(group),
 					why.text);
 	return 0;
 }
