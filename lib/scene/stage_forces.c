@@ -71,9 +71,12 @@ int incise_stage_fuzzy(struct incise_plan *plan, struct incise_tick *tick)
 {
 	double x[] = {plan->depth_mm, tick->velocity_mm_s};
 	unsigned int flags = 0;
+	double size_N;
 
-	if (tick->phase == INCISE_PHASE_CUTTING && plan->depth_mm > 0)
-		add_fuzzy(plan, tick, incise_model_eval(plan->model, x, &flags), flags);
+	if (tick->phase != INCISE_PHASE_CUTTING || !(plan->depth_mm > 0))
+		return 0;
+	size_N = incise_model_eval(plan->model, x, &flags);
+	add_fuzzy(plan, tick, size_N, flags);
 	return 0;
 }
 
