@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Scenes in a folder of their own with a model and surfaces, and a hand that a test moves:
+ * plans without a rig, fed with the poses of a tracker of 120 Hz that is 4.2 ms late.
+ */
+#ifndef INCISE_TEST_FED_H
+#define INCISE_TEST_FED_H
+
+#include <math.h>
+#include "felt.h"
+
+#define FED_LATENCY_NS 4200000
+#define FED_PERIOD_NS 8333333
+
+struct fed_folder {
+	char dir[40], scene[64], model[64], mesh[64], heights[64];
+};
+
+/* A hill 4 mm high on 80 by 80 mm, its top at 0 0 0. */
+static inline double fed_hill(double x, double y)
+{
+	return 2 * cos(x / 13) + 2 * cos(y / 13) - 4;
+}
+
+static inline void fed_write_mesh(const char *path)
+{
+	FILE *out = fopen(path, "w");
+
+	for (int j = 0; j < 17; j++)
+		for (int i = 0; i < 17; i++)
+			fprintf(out, "v %d %d %.9f\n", 5 * i - 40, 5 * j - 40,
+				fed_hill(5 * i - 40, 5 * j - 40));
+	for (int j = 0; j < 16; j++)
+		for (int i = 0; i < 16; i++)
+			fprintf(out, "f %d %d %d %d\n", 17 * j + i + 1, 17 * j + i + 2,
+				17 * j + i + 19, 17 * j + i + 18);
+	fclose(out);
+}
+
+/* The same, as a height field: rows from the largest y. */
+static inline void fed_write_heights(const char *path)
+{
+	FILE *out = fopen(path, "w");
+
+	fprintf(out, "ncols 17\nnrows 17\nxllcorner -40\nyllcorner -40\ncellsize 5\n");
+	for (int j = 16; j >= 0; j--)
+		for (int i = 0; i < 17; i++)
+			fprintf(out, "%.9f%c", fed_hill(5 * i - 40, 5 * j - 40),
+				i == 16 ? '\n' : ' ');
+	fclose(out);
+}
+
+static inline void fed_folder_make(struct fed_folder *f)
+{
+	strcpy(f->dir, "/tmp/incise-fed-XXXXXX");
+	if (!mkdtemp(f->dir))
+		abort();
+	snprintf(f->scene, sizeof(f->scene), "%s/a.scene", f->dir);
+	snprintf(f->model, sizeof(f->model), "%s/m.fis", f->dir);
+	snprintf(f->mesh, sizeof(f->mesh), "%s/hill.obj", f->dir);
+	snprintf(f->heights, sizeof(f->heights), "%s/hill.asc", f->dir);
+	felt_write_model(f->model);
+	fed_write_mesh(f->mesh);
+	fed_write_heights(f->heights);
+}
+
+static inline void fed_folder_remove(struct fed_folder *f)
+{
+	unlink(f->scene);
+	unlink(f->model);
+	unlink(f->mesh);
+	unlink(f->heights);
+	if (rmdir(f->dir))
+		abort();
+}
+
+static inline struct incise_scene *fed_scene(struct fed_folder *f, const char *text,
+					     struct incise_error *err)
+{
+	FILE *out = fopen(f->scene, "w");
+
+	if (!out || fputs(text, out) < 0 || fclose(out))
+		abort();
+	return incise_scene_load(f->scene, NULL, err);
+}
+
+/* Attitude: turned by @about_x, then by @about_z. */
+static inline void fed_attitude(double q[4], double about_x, double about_z)
+{
+	double cx = cos(about_x / 2), sx = sin(about_x / 2);
+	double cz = cos(about_z / 2), sz = sin(about_z / 2);
+
+	q[0] = cz * cx;
+	q[1] = cz * sx;
+	q[2] = sz * sx;
+	q[3] = sz * cx;
+}
+
+/* Where the hand holds the scalpel at a time: tip and attitude. */
+typedef void fed_hand(void *own, double t_s, struct incise_tracker_sample *pose);
+
+/* Feed the poses that arrived in the millisecond up to @t_ns, and tick. */
+static inline int fed_tick(struct incise_plan *plan, int64_t t_ns, fed_hand *hand,
+			   void *own, struct incise_tick *tick)
+{
+	int64_t arrival_ns = t_ns / FED_PERIOD_NS * FED_PERIOD_NS;
+	struct incise_tracker_sample pose = {.t_ns = arrival_ns, .quaternion = {1}};
+
+	if (hand && t_ns - arrival_ns < 1000000) {
+		hand(own, (double)(arrival_ns - FED_LATENCY_NS) * 1e-9, &pose);
+		if (incise_plan_feed(plan, &pose, 1) != 1)
+			abort();
+	}
+	return incise_plan_tick(plan, t_ns, tick);
+}
+
+#endif
