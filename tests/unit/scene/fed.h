@@ -42,7 +42,7 @@ static inline void fed_write_heights(const char *path)
 {
 	FILE *out = fopen(path, "w");
 
-	fprintf(out, "ncols 17\nnrows 17\nxllcorner -40\nyllcorner -40\ncellsize 5\n");
+	fprintf(out, "ncols 17\nnrows 17\nxllcenter -40\nyllcenter -40\ncellsize 5\n");
 	for (int j = 16; j >= 0; j--)
 		for (int i = 0; i < 17; i++)
 			fprintf(out, "%.9f%c", fed_hill(5 * i - 40, 5 * j - 40),

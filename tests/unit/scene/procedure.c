@@ -459,6 +459,9 @@ static int count_contacts(double z, const char *leave)
 		begins += i > 1000 && !was && tick.phase != INCISE_PHASE_FREE;
 		was = tick.phase != INCISE_PHASE_FREE;
 	}
+	/* None that begins is one that lasts, or one that never was. */
+	if (!*leave)
+		assert_int_equal(was, z < 0.1);
 	incise_plan_free(plan);
 	incise_scene_free(scene);
 	fed_folder_remove(&folder);

@@ -50,7 +50,23 @@ static void test_defaults(void **state)
 	assert_true(incise_scene_rate_hz(scene) == 1000);
 	assert_true(scene->fixed);
 	assert_null(scene->surface);
-	assert_true(scene->limits.force_N == 4);
+	assert_true(scene->limits.force_N == 4 && scene->limits.slew_N_s == 400);
+	assert_true(scene->limits.pose_age_ms == 50 && scene->limits.fade_ms == 20);
+	assert_true(scene->limits.ramp_ms == 200 && scene->limits.start_N == 0.1);
+	/* No force of paper 2's without being asked for. */
+	assert_true(scene->tissue.gain == 1 && scene->tissue.aligned == 0.2);
+	assert_true(scene->tissue.reaction_N_mm == 0 && scene->tissue.plane_N_mm == 0);
+	assert_true(scene->tissue.damping_N_s_mm == 0);
+	assert_true(scene->tissue.insertion_N_mm == 0 && scene->tissue.spread_N_mm == 0);
+	assert_true(scene->tissue.leave_mm == 0.2);
+	assert_true(scene->effects.average_ticks == 1 && !scene->effects.guard);
+	assert_true(scene->tool.side[1] == 1 && scene->tool.axis[2] == 1);
+	assert_true(scene->tool.handle_mm == 120);
+	assert_true(scene->device.mass_kg == 0.05 &&
+		    scene->device.damping_N_s_mm == 0.01);
+	assert_true(scene->device.coulomb_N == 0.01 && scene->device.encoder_mm == 0);
+	assert_int_equal(scene->device.delay_ticks, -1);
+	assert_false(scene->picture.wound || scene->picture.bleeding || scene->full);
 	incise_scene_free(scene);
 }
 
@@ -73,6 +89,301 @@ static void test_everything_set(void **state)
 	assert_true(scene->limits.force_N == 2.5 && scene->limits.slew_N_s == 100 &&
 		    scene->limits.pose_age_ms == 20);
 	incise_scene_free(scene);
+}
+
+/* Each key goes to its own place: no two values are alike. */
+static void test_every_new_key(void **state)
+{
+	struct incise_error err = {0};
+	struct incise_scene *scene = load(
+		"tissue = { gain = 0.5; reaction_N_mm = 0.11; plane_N_mm = 0.12;\n"
+		"  damping_N_s_mm = 0.013; insertion_N_mm = 0.14; aligned = 0.15;\n"
+		"  spread_N_mm = 0.16; leave_mm = 0.17; };\n"
+		"effects = { average_ticks = 9; guard = true; };\n"
+		"tool = { side = [2, 0, 0]; axis = [0.0, 0.0, -3.0]; handle_mm = 90; };\n"
+		"device = { mass_kg = 0.2; damping_N_s_mm = 0.021; coulomb_N = 0.22;\n"
+		"  encoder_mm = 0.023; delay_ticks = 3; };\n"
+		"limits = { fade_ms = 31; ramp_ms = 32; start_N = 0.33; };\n"
+		"picture = { wound = true; bleeding = false; };\n",
+		NULL, &err);
+
+	if (!scene)
+		fail_msg("%s", err.text);
+	assert_true(scene->tissue.gain == 0.5 && scene->tissue.reaction_N_mm == 0.11);
+	assert_true(scene->tissue.plane_N_mm == 0.12);
+	assert_true(scene->tissue.damping_N_s_mm == 0.013);
+	assert_true(scene->tissue.insertion_N_mm == 0.14);
+	assert_true(scene->tissue.aligned == 0.15 && scene->tissue.spread_N_mm == 0.16);
+	assert_true(scene->tissue.leave_mm == 0.17);
+	assert_true(scene->effects.average_ticks == 9 && scene->effects.guard);
+	assert_true(scene->tool.side[0] == 1 && scene->tool.side[1] == 0);
+	assert_true(scene->tool.axis[2] == -1 && scene->tool.handle_mm == 90);
+	assert_true(scene->device.mass_kg == 0.2);
+	assert_true(scene->device.damping_N_s_mm == 0.021);
+	assert_true(scene->device.coulomb_N == 0.22 && scene->device.encoder_mm == 0.023);
+	assert_int_equal(scene->device.delay_ticks, 3);
+	assert_true(scene->limits.fade_ms == 31 && scene->limits.ramp_ms == 32);
+	assert_true(scene->limits.start_N == 0.33);
+	assert_true(scene->picture.wound && !scene->picture.bleeding);
+	incise_scene_free(scene);
+}
+
+/* Whether a scene with this key is taken; what is felt is asked for elsewhere in it. */
+static bool takes(const char *group, const char *key, const char *value,
+		  struct incise_error *err)
+{
+	bool reaction = !strcmp(group, "tissue") && !strcmp(key, "reaction_N_mm");
+	struct incise_scene *scene;
+	char text[300];
+
+	if (!*group)
+		snprintf(text, sizeof(text), "model = \"m.fis\";\n%s = %s;\n", key,
+			 value);
+	else
+		/* A scene has one reaction. */
+		snprintf(text, sizeof(text), "%s\n%s = {\n %s = %s; };\n",
+			 reaction ? "rate_hz = 1000;" : "model = \"m.fis\";", group, key,
+			 value);
+	scene = load(text, NULL, err);
+	incise_scene_free(scene);
+	return scene;
+}
+
+/* Both ends of each range are taken, what is just beyond is not, nor is another type. */
+static void test_ranges(void **state)
+{
+	static const struct {
+		const char *group, *key, *below, *least, *most, *above;
+	} cases[] = {
+		{"", "rate_hz", "99.99", "100", "20000", "20000.1"},
+		{"tissue", "gain", "-0.001", "0", "10", "10.001"},
+		/* 0 alone would be no force at all. */
+		{"tissue", "reaction_N_mm", "-0.001", "0.001", "1000", "1000.1"},
+		{"tissue", "plane_N_mm", "-0.001", "0", "1000", "1000.1"},
+		{"tissue", "damping_N_s_mm", "-1e-9", "0", "1", "1.001"},
+		{"tissue", "insertion_N_mm", "-0.001", "0", "1000", "1000.1"},
+		{"tissue", "aligned", "-0.001", "0", "1", "1.001"},
+		{"tissue", "spread_N_mm", "-0.001", "0", "1000", "1000.1"},
+		{"tissue", "leave_mm", "-0.001", "0", "5", "5.001"},
+		{"effects", "average_ticks", "0", "1", "64", "65"},
+		{"tool", "handle_mm", "0.999", "1", "1000", "1000.1"},
+		{"device", "mass_kg", "0.0009", "0.001", "10", "10.01"},
+		{"device", "damping_N_s_mm", "-1e-9", "0", "1", "1.001"},
+		{"device", "coulomb_N", "-1e-9", "0", "10", "10.01"},
+		{"device", "encoder_mm", "-1e-9", "0", "1", "1.001"},
+		{"device", "delay_ticks", "-1", "0", "64", "65"},
+		{"limits", "force_N", "0.009", "0.01", "100", "100.1"},
+		{"limits", "slew_N_s", "0.9", "1", "1e5", "1.001e5"},
+		{"limits", "pose_age_ms", "0.9", "1", "1000", "1000.1"},
+		{"limits", "fade_ms", "0.9", "1", "1000", "1000.1"},
+		{"limits", "ramp_ms", "0.9", "1", "10000", "10001"},
+		{"limits", "start_N", "-1e-9", "0", "100", "100.1"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		const char *good[] = {cases[i].least, cases[i].most};
+		const char *bad[] = {cases[i].below, cases[i].above, "\"1\"", "true",
+				     "[1.0]",	     "{ }",	     "1e999"};
+		/* The key stands in line 3 of a group, else in line 2. */
+		const char *line = *cases[i].group ? "a.scene:3" : "a.scene:2";
+
+		for (int k = 0; k < 2; k++) {
+			struct incise_error err = {0};
+
+			if (!takes(cases[i].group, cases[i].key, good[k], &err))
+				fail_msg("%s = %s: %s", cases[i].key, good[k], err.text);
+		}
+		for (int k = 0; k < 7; k++) {
+			struct incise_error err = {0};
+
+			if (takes(cases[i].group, cases[i].key, bad[k], &err))
+				fail_msg("%s = %s is taken", cases[i].key, bad[k]);
+			if (err.code != EINVAL || !strstr(err.text, line) ||
+			    !strstr(err.text, cases[i].key) ||
+			    !strstr(err.text, "expected"))
+				fail_msg("%s = %s: %s", cases[i].key, bad[k], err.text);
+		}
+	}
+}
+
+/* What is no number. */
+static void test_other_types(void **state)
+{
+	static const struct {
+		const char *group, *key;
+		const char *good[2], *bad[5];
+	} cases[] = {
+		{"effects",
+		 "average_ticks",
+		 {"2", "3.0"},
+		 {"2.5", "-1", "64.5", "[2]", "false"}},
+		{"device",
+		 "delay_ticks",
+		 {"2", "3.0"},
+		 {"2.5", "64.5", "[2]", "false", "\"2\""}},
+		{"effects",
+		 "guard",
+		 {"true", "false"},
+		 {"1", "0", "\"true\"", "1.0", "[true]"}},
+		{"picture",
+		 "wound",
+		 {"true", "false"},
+		 {"1", "0", "\"true\"", "1.0", "[true]"}},
+		{"picture",
+		 "bleeding",
+		 {"true", "false"},
+		 {"1", "0", "\"on\"", "1.0", "[true]"}},
+		{"tool",
+		 "side",
+		 {"[1.0, 2.0, 3.0]", "[0, 0, -1]"},
+		 {"[0.0, 0.0, 0.0]", "[1.0, 0.0]", "1.0", "[1.0, 2.0, 1e7]", "\"y\""}},
+		{"tool",
+		 "axis",
+		 {"[1.0, 2.0, 3.0]", "(0, 0.0, -1)"},
+		 {"[0.0, 0.0, 1e-7]", "[1, 0, 0, 0]", "1.0", "(1.0, 2.0, \"z\")",
+		  "true"}},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		for (int k = 0; k < 2; k++) {
+			struct incise_error err = {0};
+
+			if (!takes(cases[i].group, cases[i].key, cases[i].good[k], &err))
+				fail_msg("%s = %s: %s", cases[i].key, cases[i].good[k],
+					 err.text);
+		}
+		for (int k = 0; k < 5; k++) {
+			struct incise_error err = {0};
+
+			if (takes(cases[i].group, cases[i].key, cases[i].bad[k], &err))
+				fail_msg("%s = %s is taken", cases[i].key,
+					 cases[i].bad[k]);
+			if (err.code != EINVAL || !strstr(err.text, "a.scene:3") ||
+			    !strstr(err.text, cases[i].key))
+				fail_msg("%s = %s: %s", cases[i].key, cases[i].bad[k],
+					 err.text);
+		}
+	}
+}
+
+/* Keys that there are not; one in another unit is told the right one. */
+static void test_unknown_keys(void **state)
+{
+	static const struct {
+		const char *group, *key, *says;
+	} cases[] = {
+		{"tissue", "reaction_N_m", "expected reaction_N_mm, in that unit"},
+		{"tissue", "reaction_N_cm", "expected reaction_N_mm, in that unit"},
+		{"tissue", "plane_kN_m", "expected plane_N_mm, in that unit"},
+		{"tissue", "damping_N_s_m", "expected damping_N_s_mm, in that unit"},
+		{"tissue", "insertion_N_m", "expected insertion_N_mm, in that unit"},
+		{"tissue", "spread_N_m", "expected spread_N_mm, in that unit"},
+		{"tissue", "leave_m", "expected leave_mm, in that unit"},
+		{"tissue", "stiffness", "expected one of gain, reaction_N_mm"},
+		{"tissue", "Kn", "expected one of gain"},
+		{"effects", "average_ms", "expected average_ticks, in that unit"},
+		{"effects", "guarded", "expected one of average_ticks, guard"},
+		{"tool", "handle_cm", "expected handle_mm, in that unit"},
+		{"tool", "blade", "expected one of handle_mm, side, axis"},
+		{"device", "mass_g", "expected mass_kg, in that unit"},
+		{"device", "coulomb_mN", "expected coulomb_N, in that unit"},
+		{"device", "encoder_um", "expected encoder_mm, in that unit"},
+		{"device", "delay_ms", "expected delay_ticks, in that unit"},
+		{"limits", "force_mN", "expected force_N, in that unit"},
+		{"limits", "slew_N_ms", "expected slew_N_s, in that unit"},
+		{"limits", "pose_age_s", "expected pose_age_ms, in that unit"},
+		{"limits", "fade_s", "expected fade_ms, in that unit"},
+		{"limits", "ramp_s", "expected ramp_ms, in that unit"},
+		{"limits", "start_mN", "expected start_N, in that unit"},
+		{"picture", "blood", "expected one of wound, bleeding"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		char name[60];
+
+		snprintf(name, sizeof(name), "%s.%s", cases[i].group, cases[i].key);
+		assert_false(takes(cases[i].group, cases[i].key, "1.0", &err));
+		if (err.code != EINVAL || !strstr(err.text, "a.scene:3") ||
+		    !strstr(err.text, name) || !strstr(err.text, cases[i].says))
+			fail_msg("%s: %s", name, err.text);
+	}
+}
+
+/* Groups that are none. */
+static void test_groups(void **state)
+{
+	static const char *const groups[] = {"tissue", "effects", "tool",   "device",
+					     "limits", "picture", "surface"};
+	static const char *const values[] = {"1.0", "\"soft\"", "[1.0]", "true"};
+
+	for (size_t i = 0; i < sizeof(groups) / sizeof(*groups); i++) {
+		for (size_t k = 0; k < sizeof(values) / sizeof(*values); k++) {
+			struct incise_error err = {0};
+
+			assert_false(takes("", groups[i], values[k], &err));
+			if (err.code != EINVAL || !strstr(err.text, "a.scene:2") ||
+			    !strstr(err.text, groups[i]) || !strstr(err.text, "group"))
+				fail_msg("%s = %s: %s", groups[i], values[k], err.text);
+		}
+		/* With nothing in them they are as if they were not there. */
+		assert_true(takes("", groups[i], "{ }", NULL));
+	}
+}
+
+/* One reaction, of the model or of a constant, and any force at all. */
+static void test_forces(void **state)
+{
+	static const struct {
+		const char *text;
+		bool with_model;  /* given on the command line */
+		const char *says; /* NULL: fine */
+	} cases[] = {
+		{"model = \"m.fis\"; tissue = { reaction_N_mm = 0.1; };", false, "both"},
+		{"tissue = { reaction_N_mm = 0.1; };", true, "both"},
+		{"model = \"m.fis\"; tissue = { reaction_N_mm = 0.0; };", false, NULL},
+		{"model = \"m.fis\"; tissue = { plane_N_mm = 0.1; };", false, NULL},
+		{"# nothing\n", false, "no other force"},
+		{"tissue = { gain = 1.0; reaction_N_mm = 0.0; };", false,
+		 "no other force"},
+		{"tissue = { aligned = 0.5; leave_mm = 0.3; };", false, "no other force"},
+		{"effects = { guard = true; };", false, "no other force"},
+		{"# nothing\n", true, NULL},
+		{"tissue = { reaction_N_mm = 0.1; };", false, NULL},
+		{"tissue = { plane_N_mm = 0.1; };", false, NULL},
+		{"tissue = { damping_N_s_mm = 0.1; };", false, NULL},
+		{"tissue = { insertion_N_mm = 0.1; };", false, NULL},
+		{"tissue = { spread_N_mm = 0.1; };", false, NULL},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		struct incise_scene *scene = load(
+			cases[i].text, cases[i].with_model ? model_path : NULL, &err);
+
+		if (!scene != !!cases[i].says ||
+		    (cases[i].says && (err.code != EINVAL || errno != EINVAL ||
+				       !strstr(err.text, cases[i].says))))
+			fail_msg("case %zu: %s", i, err.text);
+		incise_scene_free(scene);
+	}
+}
+
+/* By name, as the command line does. */
+static void test_set_arithmetic(void **state)
+{
+	struct incise_scene *scene = load("model = \"m.fis\";", NULL, NULL);
+	struct incise_error err = {0};
+
+	assert_int_equal(incise_scene_set_arithmetic(scene, "double", NULL), 0);
+	assert_false(scene->fixed);
+	assert_int_equal(incise_scene_set_arithmetic(scene, "float", &err), -EINVAL);
+	assert_non_null(strstr(err.text, "'float'"));
+	assert_false(scene->fixed);
+	assert_int_equal(incise_scene_set_arithmetic(scene, "fixed", NULL), 0);
+	assert_true(scene->fixed);
+	incise_scene_free(scene);
+	incise_scene_free(NULL);
 }
 
 static void test_other_model(void **state)
@@ -149,6 +460,13 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_defaults),
 		cmocka_unit_test(test_everything_set),
+		cmocka_unit_test(test_every_new_key),
+		cmocka_unit_test(test_ranges),
+		cmocka_unit_test(test_other_types),
+		cmocka_unit_test(test_unknown_keys),
+		cmocka_unit_test(test_groups),
+		cmocka_unit_test(test_forces),
+		cmocka_unit_test(test_set_arithmetic),
 		cmocka_unit_test(test_other_model),
 		cmocka_unit_test(test_refusals),
 		cmocka_unit_test(test_model_of_other_shape),

@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Surfaces that a scene names: each kind with what it needs and may have, files beside the
+ * scene, and errors that name file and line.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <sys/stat.h>
+#include "../../../lib/scene/scene.h"
+#include "fed.h"
+
+static struct fed_folder folder;
+
+static struct incise_scene *load(const char *surface, struct incise_error *err)
+{
+	char text[700];
+
+	snprintf(text, sizeof(text), "model = \"m.fis\";\n%s\n", surface);
+	return fed_scene(&folder, text, err);
+}
+
+/* Each kind, and a point that is 1 mm deep in it just where it was put. */
+static void test_kinds(void **state)
+{
+	static const struct {
+		const char *text;
+		enum incise_surface_kind kind;
+		double point[3], normal[3];
+	} cases[] = {
+		{"surface = { };", INCISE_SURFACE_PLANE, {5, 6, -1}, {0, 0, 1}},
+		{"surface = { kind = \"plane\"; };",
+		 INCISE_SURFACE_PLANE,
+		 {5, 6, -1},
+		 {0, 0, 1}},
+		{"surface = { point_mm = [1, 2, 3]; };",
+		 INCISE_SURFACE_PLANE,
+		 {5, 6, 2},
+		 {0, 0, 1}},
+		{"surface = { normal = [0.0, 3.0, 4.0]; };",
+		 INCISE_SURFACE_PLANE,
+		 {0, -0.6, -0.8},
+		 {0, 0.6, 0.8}},
+		{"surface = { kind = \"sphere\"; centre_mm = [1, 2, 3]; radius_mm = 10; };",
+		 INCISE_SURFACE_SPHERE,
+		 {1, 11, 3},
+		 {0, 1, 0}},
+		{"surface = { kind = \"capsule\"; from_mm = [0, 0, -10];"
+		 " to_mm = [50, 0, -10]; radius_mm = 10.0; };",
+		 INCISE_SURFACE_CAPSULE,
+		 {25, 9, -10},
+		 {0, 1, 0}},
+		{"surface = { kind = \"capsule\"; from_mm = [0, 0, -10];"
+		 " to_mm = [50, 0, -10]; radius_mm = 10.0; };",
+		 INCISE_SURFACE_CAPSULE,
+		 {59, 0, -10},
+		 {1, 0, 0}},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		struct incise_scene *scene = load(cases[i].text, &err);
+		struct incise_touch touch;
+
+		if (!scene)
+			fail_msg("case %zu: %s", i, err.text);
+		assert_int_equal(incise_surface_kind(scene->surface), cases[i].kind);
+		incise_surface_nearest(scene->surface, cases[i].point, &touch);
+		/* Some roundings of numbers up to 60. */
+		assert_true(fabs(touch.depth_mm - 1) < 1e-13);
+		for (int k = 0; k < 3; k++)
+			assert_true(fabs(touch.normal[k] - cases[i].normal[k]) < 1e-13);
+		incise_scene_free(scene);
+	}
+}
+
+/* A hill of 16 by 16 squares, its top at 0 0 0 in the file. */
+static void test_files(void **state)
+{
+	char absolute[200];
+	const struct {
+		const char *text;
+		enum incise_surface_kind kind;
+		double top[3];
+	} cases[] = {
+		{"surface = { kind = \"mesh\"; file = \"hill.obj\"; };",
+		 INCISE_SURFACE_MESH,
+		 {0, 0, 0}},
+		{"surface = { kind = \"mesh\"; file = \"./hill.obj\"; at_mm = [10, 20, 30]; };",
+		 INCISE_SURFACE_MESH,
+		 {10, 20, 30}},
+		{"surface = { kind = \"heights\"; file = \"hill.asc\"; };",
+		 INCISE_SURFACE_HEIGHTS,
+		 {0, 0, 0}},
+		{"surface = { kind = \"heights\"; file = \"hill.asc\";"
+		 " at_mm = [-1.5, 0.0, 2.5]; };",
+		 INCISE_SURFACE_HEIGHTS,
+		 {-1.5, 0, 2.5}},
+		{absolute, INCISE_SURFACE_MESH, {0, 0, 0}},
+	};
+
+	snprintf(absolute, sizeof(absolute),
+		 "surface = { kind = \"mesh\"; file = \"%s\"; };", folder.mesh);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		struct incise_scene *scene = load(cases[i].text, &err);
+		struct incise_touch top;
+
+		if (!scene)
+			fail_msg("case %zu: %s", i, err.text);
+		assert_int_equal(incise_surface_kind(scene->surface), cases[i].kind);
+		assert_int_equal(incise_surface_triangles(scene->surface), 512);
+		incise_surface_top(scene->surface, &top);
+		/* The files have 9 digits after the point. */
+		for (int k = 0; k < 3; k++)
+			assert_true(fabs(top.point_mm[k] - cases[i].top[k]) < 1e-8);
+		incise_scene_free(scene);
+	}
+}
+
+/* A file is looked for beside the scene, not where the program was started. */
+static void test_from_within_the_folder(void **state)
+{
+	char before[512];
+	struct incise_scene *scene;
+
+	assert_non_null(getcwd(before, sizeof(before)));
+	load("surface = { kind = \"mesh\"; file = \"hill.obj\"; };", NULL);
+	assert_int_equal(chdir(folder.dir), 0);
+	/* A scene named without a folder: its files lie here. */
+	scene = incise_scene_load("a.scene", NULL, NULL);
+	assert_int_equal(chdir(before), 0);
+	assert_non_null(scene);
+	assert_int_equal(incise_surface_kind(scene->surface), INCISE_SURFACE_MESH);
+	incise_scene_free(scene);
+}
+
+static void test_refusals(void **state)
+{
+	static const struct {
+		const char *text;
+		int code;
+		const char *says[3];
+	} cases[] = {
+		{"surface = \"plane\";", EINVAL, {"a.scene:2", "group"}},
+		{"surface = {\n kind = \"cube\"; };",
+		 EINVAL,
+		 {"a.scene:3", "\"capsule\"", "found \"cube\""}},
+		{"surface = {\n kind = \"Plane\"; };",
+		 EINVAL,
+		 {"a.scene:3", "\"plane\""}},
+		{"surface = {\n kind = \"\"; };", EINVAL, {"a.scene:3", "found \"\""}},
+		{"surface = {\n kind = 1; };", EINVAL, {"a.scene:3", "surface.kind"}},
+		/* Missing. */
+		{"surface = { kind = \"sphere\"; radius_mm = 5; };",
+		 EINVAL,
+		 {"a.scene:2", "surface.centre_mm is missing"}},
+		{"surface = { kind = \"sphere\"; centre_mm = [0, 0, 0]; };",
+		 EINVAL,
+		 {"a.scene:2", "surface.radius_mm is missing"}},
+		{"surface = { kind = \"capsule\"; to_mm = [0, 0, 0]; radius_mm = 5; };",
+		 EINVAL,
+		 {"a.scene:2", "surface.from_mm is missing"}},
+		{"surface = { kind = \"capsule\"; from_mm = [0, 0, 0]; radius_mm = 5; };",
+		 EINVAL,
+		 {"a.scene:2", "surface.to_mm is missing"}},
+		{"surface = { kind = \"capsule\"; from_mm = [0, 0, 0]; to_mm = [0, 0, 1]; };",
+		 EINVAL,
+		 {"a.scene:2", "surface.radius_mm is missing"}},
+		{"surface = { kind = \"mesh\"; };",
+		 EINVAL,
+		 {"a.scene:2", "surface.file is missing"}},
+		{"surface = { kind = \"heights\"; at_mm = [0, 0, 0]; };",
+		 EINVAL,
+		 {"a.scene:2", "surface.file is missing"}},
+		/* Another kind's, or none's. */
+		{"surface = {\n radius_mm = 5; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.radius_mm", "expected one of kind, point_mm"}},
+		{"surface = { kind = \"sphere\";\n centre_mm = [0, 0, 0]; radius_mm = 5;\n"
+		 " to_mm = [1, 0, 0]; };",
+		 EINVAL,
+		 {"a.scene:4", "surface.to_mm", "unknown"}},
+		{"surface = { kind = \"capsule\";\n point_mm = [0, 0, 0]; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.point_mm", "unknown"}},
+		{"surface = { kind = \"mesh\"; file = \"hill.obj\";\n normal = [0, 0, 1]; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.normal", "unknown"}},
+		{"surface = { kind = \"mesh\"; file = \"hill.obj\";\n at_cm = [0, 0, 1]; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.at_cm", "expected at_mm, in that unit"}},
+		{"surface = { kind = \"sphere\"; centre_mm = [0, 0, 0];\n radius_m = 1; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.radius_m", "expected radius_mm, in that unit"}},
+		/* Wrong. */
+		{"surface = {\n normal = [0.0, 0.0, 0.0]; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.normal", "direction"}},
+		{"surface = {\n point_mm = [0.0, 0.0]; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.point_mm", "[x, y, z]"}},
+		{"surface = {\n point_mm = [0.0, 0.0, 2e6]; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.point_mm", "1e6"}},
+		{"surface = { kind = \"sphere\"; centre_mm = [0, 0, 0];\n radius_mm = 0.09; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.radius_mm", "from 0.1 to 100000"}},
+		{"surface = { kind = \"sphere\"; centre_mm = [0, 0, 0];\n radius_mm = 1.1e5; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.radius_mm", "from 0.1 to 100000"}},
+		{"surface = { kind = \"mesh\";\n file = 5; };",
+		 EINVAL,
+		 {"a.scene:3", "surface.file", "text in quotes"}},
+		/* Beyond what a surface can be: of the group, the whole. */
+		{"surface = { kind = \"sphere\"; centre_mm = [0.0, 0.0, 2e5]; radius_mm = 5; };",
+		 EINVAL,
+		 {"a.scene:2", "the sphere's centre", "1e5"}},
+		{"surface = { kind = \"capsule\"; from_mm = [0, 0, 0]; to_mm = [2e5, 0.0, 0.0];"
+		 " radius_mm = 5; };",
+		 EINVAL,
+		 {"a.scene:2", "the capsule's ends", "1e5"}},
+		/* Files: their own names and lines too. */
+		{"surface = { kind = \"mesh\"; file = \"absent.obj\"; };",
+		 ENOENT,
+		 {"a.scene:2", "/absent.obj"}},
+		{"surface = { kind = \"heights\"; file = \"absent.asc\"; };",
+		 ENOENT,
+		 {"a.scene:2", "/absent.asc"}},
+		{"surface = { kind = \"mesh\"; file = \"m.fis\"; };",
+		 EINVAL,
+		 {"a.scene:2", "/m.fis"}},
+		{"surface = { kind = \"heights\"; file = \"hill.obj\"; };",
+		 EINVAL,
+		 {"a.scene:2", "/hill.obj:1"}},
+		{"surface = { kind = \"mesh\"; file = \"hill.obj\"; at_mm = [0.0, 0.0, 2e5]; };",
+		 EINVAL,
+		 {"a.scene:2", "/hill.obj", "1e5"}},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		assert_null(load(cases[i].text, &err));
+		assert_int_equal(errno, err.code);
+		for (int k = 0; k < 3; k++)
+			if (cases[i].says[k] && !strstr(err.text, cases[i].says[k]))
+				fail_msg("case %zu gave %d '%s'", i, err.code, err.text);
+		if (err.code != cases[i].code)
+			fail_msg("case %zu gave %d '%s'", i, err.code, err.text);
+	}
+}
+
+/* A folder, or none: refused, and nothing waits or ends. */
+static void test_a_folder_is_no_file(void **state)
+{
+	static const char *const names[] = {".", "", "..", "/"};
+
+	for (size_t i = 0; i < sizeof(names) / sizeof(*names); i++) {
+		for (int mesh = 0; mesh < 2; mesh++) {
+			struct incise_error err = {0};
+			char text[100];
+
+			snprintf(text, sizeof(text),
+				 "surface = { kind = \"%s\"; file = \"%s\"; };",
+				 mesh ? "mesh" : "heights", names[i]);
+			assert_null(load(text, &err));
+			assert_non_null(strstr(err.text, "a.scene:2"));
+		}
+	}
+}
+
+static int set_up(void **state)
+{
+	fed_folder_make(&folder);
+	return 0;
+}
+
+static int tear_down(void **state)
+{
+	fed_folder_remove(&folder);
+	return 0;
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_kinds),
+		cmocka_unit_test(test_files),
+		cmocka_unit_test(test_from_within_the_folder),
+		cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_a_folder_is_no_file),
+	};
+
+	return cmocka_run_group_tests(tests, set_up, tear_down);
+}
