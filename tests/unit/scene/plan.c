@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The plan at work: against the virtual rig's truth, and with devices that lie or fail.
+ * The plan at work: against the virtual rig's truth, with devices that lie or fail, and
+ * without a rig, fed with poses.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,8 +11,10 @@
 #include <errno.h>
 #include <math.h>
 #include <incise/fixed.h>
+#include <incise/fixed_spring.h>
 #include <incise/sim.h>
-#include "felt.h"
+#include <time.h>
+#include "fed.h"
 
 #define LIMITED (INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED)
 #define BOTH (INCISE_RIG_TRACKER | INCISE_RIG_STEPPER)
@@ -275,6 +278,338 @@ static void test_fault_is_zero_force_for_good(void **state)
 	}
 }
 
+/* The scene with all of paper 2, without a rig. */
+struct fed {
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+};
+
+static struct fed fed_start(const char *path, bool fixed)
+{
+	struct incise_error err = {0};
+	struct fed fed = {.scene = incise_scene_load(path, NULL, &err)};
+
+	if (!fed.scene)
+		fail_msg("%s", err.text);
+	incise_scene_set_arithmetic(fed.scene, fixed ? "fixed" : "double", NULL);
+	fed.plan = incise_plan_new(fed.scene, NULL, &err);
+	if (!fed.plan)
+		fail_msg("%s", err.text);
+	return fed;
+}
+
+static void fed_end(struct fed *fed)
+{
+	incise_plan_free(fed->plan);
+	incise_scene_free(fed->scene);
+}
+
+static void test_feed(void **state)
+{
+	struct fed fed = fed_start("scenes/neck.scene", true);
+	struct incise_tracker_sample poses[40];
+	struct incise_tick t;
+	struct felt f;
+
+	for (int i = 0; i < 40; i++)
+		poses[i] = (struct incise_tracker_sample){
+			.t_ns = (i + 1) * INT64_C(1000000),
+			.position_mm = {1 + i, 2, 3},
+			.quaternion = {1},
+		};
+	assert_int_equal(incise_plan_feed(fed.plan, poses, -1), -EINVAL);
+	assert_int_equal(incise_plan_feed(fed.plan, NULL, 0), 0);
+	/* Before the first there is none. */
+	assert_int_equal(incise_plan_tick(fed.plan, 1000000, &t), 0);
+	assert_true(t.flags & INCISE_TICK_STALE);
+	/* 32 until the next tick. */
+	assert_int_equal(incise_plan_feed(fed.plan, poses, 2), 2);
+	assert_int_equal(incise_plan_feed(fed.plan, poses + 2, 38), 30);
+	assert_int_equal(incise_plan_feed(fed.plan, poses, 1), 0);
+	assert_int_equal(incise_plan_tick(fed.plan, 40000000, &t), 0);
+	assert_false(t.flags & INCISE_TICK_STALE);
+	/* The first of them were 1 mm apart: the last taken is the 32nd. */
+	assert_true(t.position_mm[0] > 25 && t.position_mm[0] < 60);
+	assert_true(fabs(t.position_mm[1] - 2) < 1e-9);
+	/* Taken once, and there is room again. */
+	assert_int_equal(incise_plan_feed(fed.plan, poses, 40), 32);
+	fed_end(&fed);
+
+	/* One with a rig takes its poses from there. */
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	assert_int_equal(incise_plan_feed(f.plan, poses, 1), -EINVAL);
+	assert_int_equal(incise_plan_feed(f.plan, NULL, 0), -EINVAL);
+	felt_end(&f);
+}
+
+/* A pose from the future is one of now: it does not keep the later ones out. */
+static void test_feed_from_the_future(void **state)
+{
+	struct fed fed = fed_start("scenes/wall.scene", true);
+	struct incise_tracker_sample pose = {.t_ns = INT64_MAX, .quaternion = {1}};
+	struct incise_tick t;
+
+	assert_int_equal(incise_plan_feed(fed.plan, &pose, 1), 1);
+	assert_int_equal(incise_plan_tick(fed.plan, 10000000, &t), 0);
+	for (int i = 1; i < 100; i++) {
+		pose.t_ns = 10000000 + i * INT64_C(8333333);
+		pose.position_mm[0] = 5;
+		assert_int_equal(incise_plan_feed(fed.plan, &pose, 1), 1);
+		assert_int_equal(incise_plan_tick(fed.plan, pose.t_ns, &t), 0);
+	}
+	/* The filter has come to rest there. */
+	assert_true(fabs(t.position_mm[0] - 5) < 1e-6);
+	fed_end(&fed);
+}
+
+static void test_set_tool(void **state)
+{
+	struct fed neck = fed_start("scenes/neck.scene", true);
+	struct fed wall = fed_start("scenes/wall.scene", true);
+	struct incise_tracker_sample pose = {.position_mm = {10, 0, 200},
+					     .quaternion = {1}};
+	static const enum incise_tool tools[] = {INCISE_TOOL_TUBE, INCISE_TOOL_BLADE,
+						 INCISE_TOOL_HANDLE, INCISE_TOOL_AUTO};
+	struct incise_tick t;
+
+	for (int i = 0; i < 4; i++) {
+		pose.t_ns = (i + 1) * INT64_C(10000000);
+		assert_int_equal(incise_plan_set_tool(neck.plan, tools[i]), 0);
+		incise_plan_feed(neck.plan, &pose, 1);
+		assert_int_equal(incise_plan_tick(neck.plan, pose.t_ns, &t), 0);
+		/* Upright the scalpel by itself is its blade. */
+		assert_int_equal(t.tool, tools[i] == INCISE_TOOL_AUTO ? INCISE_TOOL_BLADE
+								      : tools[i]);
+		/* Nothing is inserted into the wall. */
+		assert_int_equal(incise_plan_set_tool(wall.plan, tools[i]), 0);
+		incise_plan_feed(wall.plan, &pose, 1);
+		assert_int_equal(incise_plan_tick(wall.plan, pose.t_ns, &t), 0);
+		assert_int_equal(t.tool, INCISE_TOOL_BLADE);
+	}
+	assert_int_equal(incise_plan_set_tool(neck.plan, (enum incise_tool)4), -EINVAL);
+	assert_int_equal(incise_plan_set_tool(neck.plan, (enum incise_tool) - 1),
+			 -EINVAL);
+	fed_end(&neck);
+	fed_end(&wall);
+}
+
+/* The handle's end stays where it is while poses are missing, and the tip too. */
+static void test_stale_handle(void **state)
+{
+	struct fed fed = fed_start("scenes/neck.scene", true);
+	struct incise_tracker_sample pose = {.position_mm = {10, 0, 40},
+					     .quaternion = {1}};
+	struct incise_tick t;
+	int stale = 0;
+
+	assert_int_equal(incise_plan_set_tool(fed.plan, INCISE_TOOL_HANDLE), 0);
+	for (int i = 1; i < 300; i++) {
+		pose.t_ns = i * INT64_C(1000000);
+		if (i < 100 && i % 8 == 0)
+			incise_plan_feed(fed.plan, &pose, 1);
+		assert_int_equal(incise_plan_tick(fed.plan, pose.t_ns, &t), 0);
+		if (i < 20)
+			continue;
+		stale += !!(t.flags & INCISE_TICK_STALE);
+		assert_int_equal(t.tool, INCISE_TOOL_HANDLE);
+		/* 120 mm from tip to end; a hand at rest is predicted to some roundings. */
+		assert_true(fabs(t.tool_mm[2] - 160) < 1e-6);
+	}
+	assert_true(stale > 100);
+	fed_end(&fed);
+}
+
+static void test_getters(void **state)
+{
+	struct fed fixed = fed_start("scenes/neck.scene", true);
+	struct fed exact = fed_start("scenes/neck.scene", false);
+	struct incise_plan_stability s;
+	struct incise_touch top;
+	const char *why = "none";
+	double bound_N;
+	struct felt f;
+
+	/* The highest line of the neck, in the middle of its length. */
+	incise_plan_top(fixed.plan, &top);
+	assert_true(fabs(top.point_mm[0] - 50) < 1e-9 && fabs(top.point_mm[1]) < 1e-9);
+	assert_true(fabs(top.point_mm[2]) < 1e-9 && fabs(top.normal[2] - 1) < 1e-12);
+
+	/* Two springs of 0.25 and 0.3 N/mm; each is certified in its own test. */
+	bound_N =
+		incise_fixed_spring_bound(0.25, 20) + incise_fixed_spring_bound(0.3, 20);
+	assert_true(fabs(incise_plan_bound(fixed.plan, 20) - bound_N) < 1e-15);
+	assert_true(incise_plan_bound(fixed.plan, 40) >
+		    incise_plan_bound(fixed.plan, 20));
+	assert_true(incise_plan_bound(exact.plan, 20) == 0);
+
+	incise_plan_stability(fixed.plan, &s);
+	assert_true(s.stiffness_N_mm == 0.25 + 0.3 && s.certified);
+	assert_true(s.damping_N_s_mm == 0.001 && s.speed_slope_N_s_mm == 0);
+	assert_true(s.limit_N_mm >= s.stiffness_N_mm && !s.own_delay);
+	/* 4.2 ms and a period of 8.33. */
+	assert_int_equal(s.device.delay_ticks, 13);
+
+	assert_null(incise_plan_left_out(fixed.plan, 99, &why));
+	assert_string_equal(why, "none");
+	assert_string_equal(incise_plan_left_out(fixed.plan, 0, NULL), "actuate");
+
+	/* Its own size at the least, and the model's and the tables' on top. */
+	assert_true(incise_plan_memory(exact.plan) > 1000);
+	felt_start(&f, "fixed", BOTH);
+	assert_true(incise_plan_memory(f.plan) > incise_plan_memory(exact.plan) + 1000);
+	/* The model's own bound; it does not grow with the reach. */
+	assert_true(incise_plan_bound(f.plan, 1) > 0);
+	assert_true(incise_plan_bound(f.plan, 1) == incise_plan_bound(f.plan, 99));
+	felt_end(&f);
+	fed_end(&fixed);
+	fed_end(&exact);
+}
+
+/* Down into the neck and along it, blade first, and out. */
+static void dive(void *own, double t, struct incise_tracker_sample *pose)
+{
+	pose->position_mm[0] = 10 + 20 * t;
+	pose->position_mm[1] = sin(7 * t);
+	pose->position_mm[2] = 4 - 8 * sin(2 * t);
+}
+
+static int64_t now_ns(void)
+{
+	struct timespec t;
+
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
+}
+
+static void test_timed_tick_is_the_same(void **state)
+{
+	struct fed a = fed_start("scenes/neck.scene", true);
+	struct fed b = fed_start("scenes/neck.scene", true);
+	int contacts = 0, n = 0;
+
+	while (incise_plan_stage(a.plan, n))
+		n++;
+	for (int i = 1; i < 2000; i++) {
+		int64_t t_ns = i * INT64_C(1000000), ns[INCISE_PLAN_STAGES_MAX], sum = 0;
+		struct incise_tick x, y;
+		struct incise_tracker_sample pose = {.t_ns = t_ns, .quaternion = {1}};
+		int64_t before;
+
+		dive(NULL, i * 1e-3, &pose);
+		if (i % 8 == 0) {
+			incise_plan_feed(a.plan, &pose, 1);
+			incise_plan_feed(b.plan, &pose, 1);
+		}
+		memset(ns, 0xff, sizeof(ns));
+		assert_int_equal(incise_plan_tick(a.plan, t_ns, &x), 0);
+		before = now_ns();
+		assert_int_equal(incise_plan_tick_timed(b.plan, t_ns, &y, ns), 0);
+		for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++) {
+			assert_true(k < n ? ns[k] >= 0 : ns[k] == 0);
+			sum += ns[k];
+		}
+		/* By the same clock: parts of what the whole took. */
+		assert_true(sum <= now_ns() - before);
+		assert_memory_equal(x.command_N, y.command_N, sizeof(x.command_N));
+		assert_memory_equal(x.tool_mm, y.tool_mm, sizeof(x.tool_mm));
+		assert_memory_equal(x.proxy_mm, y.proxy_mm, sizeof(x.proxy_mm));
+		assert_memory_equal(x.normal, y.normal, sizeof(x.normal));
+		assert_memory_equal(&x.depth_mm, &y.depth_mm, sizeof(x.depth_mm));
+		assert_int_equal(x.flags, y.flags);
+		assert_int_equal(x.phase, y.phase);
+		contacts += x.flags & INCISE_TICK_CONTACT;
+	}
+	assert_true(contacts > 500);
+	fed_end(&a);
+	fed_end(&b);
+}
+
+/* What a fault keeps from running took no time. */
+static void test_timed_fault(void **state)
+{
+	int64_t ns[INCISE_PLAN_STAGES_MAX];
+	struct incise_tracker_ops ops;
+	struct incise_tick t;
+	struct felt f;
+
+	felt_start(&f, "fixed", BOTH);
+	press(&f);
+	ops = *f.tracker_ops;
+	ops.read = gone_tracker;
+	incise_rig_tracker(f.rig)->ops = &ops;
+	for (int i = 0; i < 2; i++) {
+		memset(ns, 0xff, sizeof(ns));
+		assert_int_equal(incise_plan_tick_timed(f.plan, t.t_ns + i, &t, ns),
+				 -ENODEV);
+		/* The first failed; after that none is begun. */
+		for (int k = i ? 0 : 1; k < INCISE_PLAN_STAGES_MAX; k++)
+			assert_true(ns[k] == 0);
+	}
+	felt_end(&f);
+}
+
+/* Within ±10, or now and then of any bits. */
+static double any_number(void)
+{
+	union {
+		uint64_t bits;
+		double value;
+	} u;
+
+	noise = noise * 6364136223846793005u + 1442695040888963407u;
+	u.bits = noise;
+	return noise >> 20 & 31 ? (double)(noise >> 44) / 52429 - 10 : u.value;
+}
+
+/* Any poses and attitudes, and any tool, on the scene that has all of paper 2. */
+static void test_any_fed_pose_gives_a_force_within_limits(void **state)
+{
+	for (int fixed = 0; fixed < 2; fixed++) {
+		struct fed fed = fed_start("scenes/neck.scene", fixed);
+		double last[3] = {0};
+		int phases[3] = {0};
+
+		noise = 3;
+		for (int i = 1; i < 20000; i++) {
+			struct incise_tracker_sample pose = {.t_ns = i *
+								     INT64_C(1000000)};
+			struct incise_tick t;
+			double change[3];
+
+			for (int k = 0; k < 3; k++)
+				pose.position_mm[k] = any_number();
+			for (int k = 0; k < 4; k++)
+				pose.quaternion[k] = any_number();
+			if (noise % 97 == 0)
+				pose.t_ns = (int64_t)noise;
+			if (noise % 89 == 0)
+				assert_int_equal(
+					incise_plan_set_tool(
+						fed.plan,
+						(enum incise_tool)(noise >> 8 & 3)),
+					0);
+			incise_plan_feed(fed.plan, &pose, 1);
+			assert_int_equal(
+				incise_plan_tick(fed.plan, i * INT64_C(1000000), &t), 0);
+			for (int k = 0; k < 3; k++) {
+				change[k] = t.command_N[k] - last[k];
+				last[k] = t.command_N[k];
+				assert_true(isfinite(t.tool_mm[k]));
+				assert_true(isfinite(t.normal[k]));
+			}
+			/* The limits of the scene; rounding as in limit.h. */
+			assert_true(size(last) <= 4);
+			assert_true(size(change) <= 0.4 + 1e-14);
+			assert_true(isfinite(t.depth_mm) && t.depth_mm >= 0);
+			phases[t.phase]++;
+		}
+		assert_true(phases[INCISE_PHASE_FREE] > 1000);
+		assert_true(phases[INCISE_PHASE_CUTTING] > 1000);
+		assert_true(phases[INCISE_PHASE_INSERTION] > 1000);
+		fed_end(&fed);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -284,6 +619,14 @@ int main(void)
 		cmocka_unit_test(test_any_pose_gives_a_force_within_limits),
 		cmocka_unit_test(test_stalled_tracker_fades_out),
 		cmocka_unit_test(test_fault_is_zero_force_for_good),
+		cmocka_unit_test(test_feed),
+		cmocka_unit_test(test_feed_from_the_future),
+		cmocka_unit_test(test_set_tool),
+		cmocka_unit_test(test_stale_handle),
+		cmocka_unit_test(test_getters),
+		cmocka_unit_test(test_timed_tick_is_the_same),
+		cmocka_unit_test(test_timed_fault),
+		cmocka_unit_test(test_any_fed_pose_gives_a_force_within_limits),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
