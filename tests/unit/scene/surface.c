@@ -128,7 +128,8 @@ static void test_from_within_the_folder(void **state)
 	struct incise_scene *scene;
 
 	assert_non_null(getcwd(before, sizeof(before)));
-	load("surface = { kind = \"mesh\"; file = \"hill.obj\"; };", NULL);
+	incise_scene_free(
+		load("surface = { kind = \"mesh\"; file = \"hill.obj\"; };", NULL));
 	assert_int_equal(chdir(folder.dir), 0);
 	/* A scene named without a folder: its files lie here. */
 	scene = incise_scene_load("a.scene", NULL, NULL);
