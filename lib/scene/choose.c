@@ -40,7 +40,7 @@ static const char *zero(const struct incise_plan *plan, const char *why)
 
 static const char *no_tool(const struct incise_plan *plan)
 {
-	if (plan->insertion_N_mm > 0 || plan->spread_N_mm > 0)
+	if (plan->inserts)
 		return NULL;
 	return zero(plan, "nothing is inserted: tissue.insertion_N_mm and "
 			  "tissue.spread_N_mm are 0");

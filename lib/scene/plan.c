@@ -146,8 +146,9 @@ static void set_tool(struct incise_plan *plan)
 	v3_copy(plan->instrument.side, plan->scene->tool.side);
 	plan->instrument.handle_mm = plan->scene->tool.handle_mm;
 	plan->instrument.held = INCISE_TOOL_BLADE;
+	plan->inserts = plan->insertion_N_mm > 0 || plan->spread_N_mm > 0;
 	/* Without insertion there is only the blade. */
-	if (!(plan->insertion_N_mm > 0) && !(plan->spread_N_mm > 0))
+	if (!plan->inserts)
 		plan->instrument.wanted = INCISE_TOOL_BLADE;
 	incise_surface_top(plan->surface, &top);
 	v3_copy(plan->up, top.normal);
@@ -184,6 +185,7 @@ struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 		errno = -rc;
 		return NULL;
 	}
+	incise_predict_init(&plan->handle, &tracker);
 	set_tool(plan);
 	set_limits(plan);
 	set_guard(plan);
@@ -266,7 +268,7 @@ int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool)
 {
 	if ((unsigned int)tool > INCISE_TOOL_TUBE)
 		return -EINVAL;
-	if (plan->insertion_N_mm > 0 || plan->spread_N_mm > 0)
+	if (plan->inserts)
 		plan->instrument.wanted = tool;
 	return 0;
 }

@@ -46,10 +46,13 @@ struct incise_plan {
 	int n_fed;
 	struct incise_predict predict;
 	int64_t pose_age_ns;
-	double velocity_mm_s[3], attitude[4];
+	double velocity_mm_s[3]; /* of what is held: of the tip, or the handle's end */
+	double attitude[4];
 
 	/* tool, contact, normal */
 	struct incise_instrument instrument;
+	bool inserts;		      /* handle and tube can be held */
+	struct incise_predict handle; /* its end's position */
 	const struct incise_surface *surface;
 	struct incise_surface *own_surface; /* the rig's plane, when it is that */
 	double up[3];			    /* normal of the surface's top */
