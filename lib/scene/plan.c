@@ -23,6 +23,7 @@ static const struct incise_tracker_info fed_tracker = {
 static int take_model(struct incise_plan *plan, struct incise_error *err)
 {
 	const struct incise_scene *scene = plan->scene;
+	struct incise_error why = {0};
 
 	if (scene->compiled && !scene->fixed)
 		return incise_error_set(
@@ -37,8 +38,11 @@ static int take_model(struct incise_plan *plan, struct incise_error *err)
 		plan->model = scene->model;
 		return 0;
 	}
-	plan->fixed = plan->own_fixed = incise_fixed_compile(scene->model, NULL, err);
-	return plan->fixed ? 0 : -errno;
+	plan->fixed = plan->own_fixed = incise_fixed_compile(scene->model, NULL, &why);
+	if (!plan->fixed)
+		return incise_error_set(err, why.code, "%s: its model: %s", scene->path,
+					why.text);
+	return 0;
 }
 
 static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
