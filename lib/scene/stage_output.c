@@ -17,8 +17,10 @@ int incise_stage_guard(struct incise_plan *plan, struct incise_tick *tick)
 /* Without a fresh pose the last force stays, and fades. */
 int incise_stage_start(struct incise_plan *plan, struct incise_tick *tick)
 {
-	double dt_s = plan->last_ns
-			      ? (double)(tick->t_ns - plan->last_ns) / INCISE_NS_PER_S
+	/* Unsigned: two times may be farther apart than an int64_t holds. */
+	uint64_t gone_ns = (uint64_t)tick->t_ns - (uint64_t)plan->last_ns;
+	double dt_s = plan->last_ns && tick->t_ns > plan->last_ns
+			      ? (double)gone_ns / INCISE_NS_PER_S
 			      : 0;
 	double gain = incise_start_gain(&plan->start, v3_length(plan->force_N),
 					!(tick->flags & INCISE_TICK_STALE), dt_s);
