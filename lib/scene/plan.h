@@ -45,6 +45,7 @@ struct incise_plan {
 	struct incise_tracker_sample fed[INCISE_PLAN_POSES];
 	int n_fed;
 	struct incise_predict predict;
+	unsigned int leaps; /* of it, that the guard knows of */
 	int64_t pose_age_ns;
 	double velocity_mm_s[3]; /* of what is held: of the tip, or the handle's end */
 	double attitude[4];

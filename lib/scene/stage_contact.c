@@ -64,6 +64,10 @@ int incise_stage_predict(struct incise_plan *plan, struct incise_tick *tick)
 			  plan->velocity_mm_s, plan->attitude);
 	v3_copy(tick->tool_mm, tick->position_mm);
 	tick->velocity_mm_s = v3_length(plan->velocity_mm_s);
+	/* A force did no work on a way that nobody went. */
+	if (plan->leaps != plan->predict.leaps)
+		incise_guard_leap(&plan->guard);
+	plan->leaps = plan->predict.leaps;
 	return 0;
 }
 
@@ -78,7 +82,7 @@ int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
 	 */
 	if (other) {
 		incise_proxy_init(&plan->proxy, plan->surface, plan->proxy.leave_mm);
-		incise_guard_reset(&plan->guard);
+		incise_guard_leap(&plan->guard);
 	}
 	if (plan->instrument.held == INCISE_TOOL_HANDLE)
 		incise_predict_at(&plan->handle, tick->t_ns, tick->tool_mm,

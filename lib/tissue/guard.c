@@ -31,6 +31,11 @@ void incise_guard_reset(struct incise_guard *guard)
 	guard->placed = guard->watching = false;
 }
 
+void incise_guard_leap(struct incise_guard *guard)
+{
+	guard->placed = false;
+}
+
 static void observe(struct incise_guard *guard, const double position_mm[3])
 {
 	double way[3], energy = guard->energy_N_mm;

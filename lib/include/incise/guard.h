@@ -72,6 +72,13 @@ INCISE_API void incise_guard_init(struct incise_guard *guard, double mass_kg,
 INCISE_API void incise_guard_reset(struct incise_guard *guard);
 
 /**
+ * The point that is watched is elsewhere now, and did not go there: another end of the
+ * instrument, or a tracker's leap. Up to the next apply() no energy is counted; debt and
+ * credit stay.
+ */
+INCISE_API void incise_guard_leap(struct incise_guard *guard);
+
+/**
  * Once per tick, out of contact too: observe the force that was held since the last call,
  * and add damping to the next one where more energy came out than went in. What a stiff
  * wall made is often seen when the device has left it already; asked in contact only, the
