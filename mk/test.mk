@@ -4,11 +4,14 @@
 unit_sources := $(wildcard tests/unit/*/*.c)
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
+# One counts allocations.
+ldflags_scene/jail := $(foreach name,malloc calloc realloc free,-Wl,--wrap=$(name))
+
 $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
 		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
-		-MMD -MP -MF $@.d $(LDFLAGS) -o $@ $< $(O)/lib/libincise-tests.a \
+		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(O)/lib/libincise-tests.a \
 		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm
 
 check: ## install what is missing, build, and run all tests

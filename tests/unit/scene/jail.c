@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * A tick allocates nothing and calls no system: it runs in a process that the kernel ends
+ * at any call but read, write and _exit, and that counts allocations.
+ *
+ *     test ── fork ──▶ child: prepare ──▶ seccomp strict ──▶ ticks ──▶ write ──▶ SYS_exit
+ *       ▲                                                               │
+ *       └───────────────────────── pipe: what it came to ◀──────────────┘
+ *
+ * mk/test.mk lets the linker send the allocations of this program here (--wrap).
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <signal.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include "ground.h"
+
+#define MS 1000000
+#define TICKS 5000 /* on each of four scenes */
+
+static long allocations;
+
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t n, size_t size);
+void *__real_realloc(void *old, size_t size);
+void __real_free(void *old);
+
+void *__wrap_malloc(size_t size)
+{
+	allocations++;
+	return __real_malloc(size);
+}
+
+void *__wrap_calloc(size_t n, size_t size)
+{
+	allocations++;
+	return __real_calloc(n, size);
+}
+
+void *__wrap_realloc(void *old, size_t size)
+{
+	allocations++;
+	return __real_realloc(old, size);
+}
+
+void __wrap_free(void *old)
+{
+	allocations++;
+	__real_free(old);
+}
+
+/* What a child tells. */
+struct told {
+	long ticks, contacts, insertions, guarded, stale, free, allocations;
+	double force_N; /* largest */
+};
+
+/* Strokes through the top, with blade, handle and tube, and a stall of the tracker. */
+static void run(struct incise_plan *plan, const struct incise_touch *top,
+		struct told *told)
+{
+	for (int i = 0; i < TICKS; i++) {
+		struct incise_tracker_sample s = {
+			.t_ns = 1000000000 + (int64_t)i * MS,
+			.quaternion = {1},
+			.status = ' ',
+		};
+		double height_mm = 10 * cos(i * 0.01), force_N = 0;
+		struct incise_tick t;
+
+		for (int k = 0; k < 3; k++)
+			s.position_mm[k] = top->point_mm[k] + height_mm * top->normal[k];
+		s.position_mm[0] += 5 * sin(i * 0.007);
+		/* One that leaps now and then. */
+		if (i % 100 == 7)
+			s.position_mm[1] += 1000;
+		if (i % 8 == 7 && i % 1000 < 900)
+			incise_plan_feed(plan, &s, 1);
+		if (i % 500 == 0)
+			incise_plan_set_tool(plan, (enum incise_tool)(i / 500 % 4));
+		if (incise_plan_tick(plan, s.t_ns, &t))
+			return;
+		told->ticks++;
+		told->contacts += !!(t.flags & INCISE_TICK_CONTACT);
+		told->insertions += t.phase == INCISE_PHASE_INSERTION;
+		told->free += t.phase == INCISE_PHASE_FREE;
+		told->guarded += !!(t.flags & INCISE_TICK_GUARDED);
+		told->stale += !!(t.flags & INCISE_TICK_STALE);
+		for (int k = 0; k < 3; k++)
+			force_N += t.command_N[k] * t.command_N[k];
+		told->force_N = fmax(told->force_N, sqrt(force_N));
+	}
+}
+
+/* A jailed process cannot use glibc's _exit(), which calls exit_group. */
+static void leave(int code)
+{
+	for (;;)
+		syscall(SYS_exit, code);
+}
+
+struct prepared {
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+	struct incise_touch top;
+};
+
+/* In the child; does not return. */
+static void jailed(struct prepared *prepared, int n, bool break_out, int out)
+{
+	struct told told = {0};
+
+	if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT))
+		leave(77);
+	allocations = 0;
+	for (int i = 0; i < n; i++)
+		run(prepared[i].plan, &prepared[i].top, &told);
+	told.allocations = allocations;
+	if (break_out)
+		syscall(SYS_getppid);
+	leave(write(out, &told, sizeof(told)) != sizeof(told));
+}
+
+/* Returns the child's status as of waitpid(2). */
+static int run_jailed(struct prepared *prepared, int n, bool break_out, struct told *told)
+{
+	int ends[2], status;
+	ssize_t got;
+	pid_t child;
+
+	memset(told, 0, sizeof(*told));
+	assert_int_equal(pipe(ends), 0);
+	child = fork();
+	assert_true(child >= 0);
+	if (!child)
+		jailed(prepared, n, break_out, ends[1]);
+	close(ends[1]);
+	got = read(ends[0], told, sizeof(*told));
+	close(ends[0]);
+	assert_int_equal(waitpid(child, &status, 0), child);
+	if (WIFEXITED(status) && WEXITSTATUS(status) == 0)
+		assert_int_equal(got, sizeof(*told));
+	return status;
+}
+
+static void test_ticks_in_jail(void **state)
+{
+	static const char *const arithmetics[] = {"fixed", "double"};
+	static const char *const names[] = {"plane", "large mesh"};
+	struct ground_folder folder;
+	struct prepared prepared[4];
+	struct told told, none;
+	bool no_jail;
+	int n = 0, status, broken;
+
+	ground_folder_make(&folder);
+	for (size_t g = 0; g < GROUNDS; g++) {
+		if (strcmp(grounds[g].name, names[0]) &&
+		    strcmp(grounds[g].name, names[1]))
+			continue;
+		for (int a = 0; a < 2; a++, n++) {
+			struct prepared *p = &prepared[n];
+
+			assert_in_range(n, 0, 3);
+			/* A model on the plane in fixed point, and on the mesh in double. */
+			p->scene = ground_scene(&folder, &grounds[g], arithmetics[a],
+						n == 0 || n == 3);
+			p->plan = ground_plan(p->scene);
+			incise_plan_top(p->plan, &p->top);
+		}
+	}
+	ground_folder_remove(&folder);
+	assert_int_equal(n, 4);
+	/* The counter counts: models, meshes and plans were made. */
+	assert_true(allocations > 20);
+
+	status = run_jailed(prepared, n, false, &told);
+	broken = run_jailed(prepared, n, true, &none);
+	for (int i = 0; i < n; i++) {
+		incise_plan_free(prepared[i].plan);
+		incise_scene_free(prepared[i].scene);
+	}
+	no_jail = WIFEXITED(status) && WEXITSTATUS(status) == 77;
+	if (no_jail) {
+		print_message("skipped: jail, this kernel has no strict seccomp\n");
+		skip();
+	}
+	if (WIFSIGNALED(status))
+		fail_msg("a tick called the system, or worse: signal %d",
+			 WTERMSIG(status));
+	assert_true(WIFEXITED(status));
+	assert_int_equal(WEXITSTATUS(status), 0);
+	assert_int_equal(told.ticks, n * TICKS);
+	assert_int_equal(told.allocations, 0);
+	/* They did all that ticks do. */
+	assert_true(told.contacts > TICKS && told.free > TICKS);
+	assert_true(told.insertions > TICKS / 10);
+	assert_true(told.stale > 100 && told.guarded > 100);
+	assert_true(told.force_N > 1 && told.force_N <= GROUND_FORCE_N);
+	/* And the jail is one: getppid(2), which does nothing, was the end. */
+	assert_true(WIFSIGNALED(broken));
+	assert_int_equal(WTERMSIG(broken), SIGKILL);
+	assert_int_equal(none.ticks, 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_ticks_in_jail),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
