@@ -127,7 +127,7 @@ static double special(void)
 		fail_msg(__VA_ARGS__);                                             \
 	} while (0)
 
-static void check_tick(struct run *run)
+static void check_tick(struct run *run, const struct incise_tick *before)
 {
 	const struct incise_tick *t = &run->tick;
 	bool contact = t->flags & INCISE_TICK_CONTACT;
@@ -156,6 +156,8 @@ static void check_tick(struct run *run)
 			 : t->tool == INCISE_TOOL_BLADE ? INCISE_PHASE_CUTTING
 							: INCISE_PHASE_INSERTION))
 		FAIL(run, "phase %d, tool %d, flags %#x", t->phase, t->tool, t->flags);
+	if (before->flags & INCISE_TICK_CONTACT && t->tool != before->tool)
+		FAIL(run, "tool %d became %d in the tissue", before->tool, t->tool);
 	if (contact && t->flags & INCISE_TICK_STALE)
 		FAIL(run, "contact by an old pose");
 	/* Of unit length, but for some roundings. */
@@ -194,6 +196,7 @@ static void count(const struct run *run)
 static void tick_at(struct run *run, int64_t t_ns)
 {
 	double dt_ns = (double)t_ns - (double)run->t_ns;
+	struct incise_tick before = run->tick;
 
 	met[MET_NO_TIME] += t_ns == run->t_ns;
 	met[MET_YEARS] += dt_ns > YEAR_NS;
@@ -202,7 +205,7 @@ static void tick_at(struct run *run, int64_t t_ns)
 	n_ticks++;
 	if (incise_plan_tick(run->plan, t_ns, &run->tick))
 		FAIL(run, "fault");
-	check_tick(run);
+	check_tick(run, &before);
 	count(run);
 }
 
