@@ -21,7 +21,7 @@
 
 #define MUTANTS 2000 /* of each scene */
 #define MODELS 6     /* of them, plans with a model */
-#define SIZE_MAX_TEXT 4000
+#define TEXT_MAX 4000
 
 /* What they are made of; of the heights and the mesh there is no shipped scene. */
 static const struct {
@@ -112,7 +112,7 @@ static uint32_t below(uint32_t n)
 
 struct text {
 	size_t n;
-	char c[SIZE_MAX_TEXT];
+	char c[TEXT_MAX];
 };
 
 static void put(const char *name, const void *data, size_t n)

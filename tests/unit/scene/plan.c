@@ -63,6 +63,27 @@ static void test_needs_a_tracker(void **state)
 	felt_end(&f);
 }
 
+/* The line that refuses a model names the scene that asks for it. */
+static void test_a_refused_model_names_its_scene(void **state)
+{
+	struct incise_model *triangles = paper_model(INCISE_MF_TRI, 1, 0.1);
+	struct incise_error err = {0};
+	struct incise_scene *scene;
+	struct felt f;
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	assert_int_equal(incise_model_save(triangles, f.model_path, NULL), 0);
+	scene = incise_scene_load(f.scene_path, NULL, NULL);
+	assert_non_null(scene);
+	assert_null(incise_plan_new(scene, f.rig, &err));
+	assert_int_equal(errno, err.code);
+	assert_non_null(strstr(err.text, f.scene_path));
+	assert_non_null(strstr(err.text, "trimf"));
+	incise_scene_free(scene);
+	incise_model_free(triangles);
+	felt_end(&f);
+}
+
 /* One whole cut of the virtual surgeon, in both arithmetics. */
 static void test_against_truth(void **state)
 {
@@ -615,6 +636,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_stages),
 		cmocka_unit_test(test_needs_a_tracker),
+		cmocka_unit_test(test_a_refused_model_names_its_scene),
 		cmocka_unit_test(test_against_truth),
 		cmocka_unit_test(test_any_pose_gives_a_force_within_limits),
 		cmocka_unit_test(test_stalled_tracker_fades_out),
