@@ -126,6 +126,21 @@ static double margin(const struct incise_plan_stability *s)
 	return s->stiffness_N_mm > 0 ? s->limit_N_mm / s->stiffness_N_mm : INFINITY;
 }
 
+/* Laws of a wall that answers so late; none is known for poses that are extrapolated. */
+static double passive_N_mm(const struct incise_plan_stability *s)
+{
+	return s->own_delay ? incise_stability_colgate(&s->device, s->damping_N_s_mm)
+			    : NAN;
+}
+
+/* For a wall without delay. */
+static double encoder_N_mm(const struct incise_plan_stability *s)
+{
+	return s->own_delay && !s->device.delay_ticks && s->device.encoder_mm > 0
+		       ? incise_stability_quantisation(&s->device)
+		       : NAN;
+}
+
 static json_t *stability_json(const struct incise_plan_stability *s)
 {
 	const struct incise_haptic_device *d = &s->device;
@@ -135,15 +150,12 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 			 json_number(s->limit_N_mm), "margin", json_number(margin(s)),
 			 "damping_N_s_mm", json_number(s->damping_N_s_mm),
 			 "speed_slope_N_s_mm", json_number(s->speed_slope_N_s_mm),
-			 "passive_N_mm",
-			 json_number(incise_stability_colgate(d, s->damping_N_s_mm)),
-			 "encoder_N_mm",
-			 json_number(d->encoder_mm > 0 ? incise_stability_quantisation(d)
-						       : INFINITY),
-			 "certified", s->certified, "own_delay", s->own_delay, "device",
-			 "mass_kg", d->mass_kg, "damping_N_s_mm", d->damping_N_s_mm,
-			 "coulomb_N", d->coulomb_N, "encoder_mm", d->encoder_mm,
-			 "period_s", d->period_s, "delay_ticks", d->delay_ticks);
+			 "passive_N_mm", json_number(passive_N_mm(s)), "encoder_N_mm",
+			 json_number(encoder_N_mm(s)), "certified", s->certified,
+			 "own_delay", s->own_delay, "device", "mass_kg", d->mass_kg,
+			 "damping_N_s_mm", d->damping_N_s_mm, "coulomb_N", d->coulomb_N,
+			 "encoder_mm", d->encoder_mm, "period_s", d->period_s,
+			 "delay_ticks", d->delay_ticks);
 }
 
 static void report_json(const struct job *job, const struct incise_plan *plan,
@@ -197,19 +209,22 @@ static void print_stability(const struct incise_plan *plan)
 	if (isfinite(margin(&s)))
 		printf(": margin %.3g", margin(&s));
 	printf("%s\n", s.certified ? "" : " (the model's slope is an estimate)");
-	printf("            on %g kg, %g N s/mm, answering %d ticks late (%s)\n",
-	       s.device.mass_kg, s.device.damping_N_s_mm, s.device.delay_ticks,
-	       s.own_delay ? "the scene's" : "the tracker's");
-	printf("            passive in any hand up to %.4g N/mm",
-	       incise_stability_colgate(&s.device, s.damping_N_s_mm));
-	if (s.device.encoder_mm > 0)
-		printf("; its encoder's steps die out up to %.4g N/mm",
-		       incise_stability_quantisation(&s.device));
+	printf("            on %g kg and %g N s/mm, with ", s.device.mass_kg,
+	       s.device.damping_N_s_mm);
+	if (s.own_delay)
+		printf("forces %d ticks late\n", s.device.delay_ticks);
+	else
+		printf("poses up to %d ticks old, extrapolated\n", s.device.delay_ticks);
+	if (isfinite(passive_N_mm(&s)))
+		printf("            passive in any hand up to %.4g N/mm\n",
+		       passive_N_mm(&s));
+	if (isfinite(encoder_N_mm(&s)))
+		printf("            the steps of its encoder die out up to %.4g N/mm\n",
+		       encoder_N_mm(&s));
 	if (s.speed_slope_N_s_mm > 0)
-		printf("\n            the model's force changes by up to %.3g N per mm/s, "
-		       "either way",
+		printf("            not counted: the model's force changes by up to %.3g N per "
+		       "mm/s, either way\n",
 		       s.speed_slope_N_s_mm);
-	putchar('\n');
 }
 
 static void report_text(const struct job *job, const struct incise_plan *plan,

@@ -58,6 +58,8 @@ int incise_stage_fed(struct incise_plan *plan, struct incise_tick *tick)
 
 int incise_stage_predict(struct incise_plan *plan, struct incise_tick *tick)
 {
+	unsigned int leaps = plan->predict.leaps + plan->handle.leaps;
+
 	if (incise_predict_age(&plan->predict, tick->t_ns) > plan->pose_age_ns)
 		tick->flags |= INCISE_TICK_STALE;
 	incise_predict_at(&plan->predict, tick->t_ns, tick->position_mm,
@@ -65,9 +67,9 @@ int incise_stage_predict(struct incise_plan *plan, struct incise_tick *tick)
 	v3_copy(tick->tool_mm, tick->position_mm);
 	tick->velocity_mm_s = v3_length(plan->velocity_mm_s);
 	/* A force did no work on a way that nobody went. */
-	if (plan->leaps != plan->predict.leaps)
+	if (plan->leaps != leaps)
 		incise_guard_leap(&plan->guard);
-	plan->leaps = plan->predict.leaps;
+	plan->leaps = leaps;
 	return 0;
 }
 

@@ -59,6 +59,20 @@ setup() {
 	# 2 ms and a period of 4.17 ms, in whole ticks
 	[ "$(key r.json device.delay_ticks)" = 7 ]
 	[ "$(key r.json own_delay)" = 0 ]
+	[ -z "$(key r.json passive_N_mm)" ]
+}
+
+@test "a device with an encoder says how late it is, and holds much more" {
+	cat >encoder.scene <<-'EOF'
+		tissue = { reaction_N_mm = 2.0; };
+		device = { delay_ticks = 0; encoder_mm = 0.005; };
+	EOF
+	incise plan encoder.scene --json >r.json
+	[ "$(key r.json own_delay)" = 1 ]
+	# b = 0.01, c = 0.01, T = 0.001: 2b/T = 20 N/mm, 2c/D = 4 N/mm
+	holds "($(key r.json passive_N_mm) - 20)^2 < 1e-20"
+	holds "($(key r.json encoder_N_mm) - 4)^2 < 1e-20"
+	holds "$(key r.json limit_N_mm) > 20 && $(key r.json limit_N_mm) < 22"
 }
 
 @test "a full plan keeps every stage" {

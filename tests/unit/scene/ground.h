@@ -154,6 +154,7 @@ static inline struct incise_scene *ground_scene(const struct ground_folder *fold
 		"  insertion_N_mm = 0.5; spread_N_mm = 0.4; leave_mm = %.17g; };\n"
 		"effects = { average_ticks = 8; guard = true; };\n"
 		"tool = { handle_mm = %.17g; };\n"
+		"device = { damping_N_s_mm = 0.03; };\n"
 		"limits = { force_N = %.17g; slew_N_s = %.17g; pose_age_ms = 50.0;\n"
 		"  ramp_ms = 50.0; fade_ms = 20.0; };\n",
 		arithmetic, ground->surface, model ? "model = \"m.fis\";" : "",

@@ -455,16 +455,16 @@ static void test_getters(void **state)
 	assert_true(fabs(top.point_mm[0] - 50) < 1e-9 && fabs(top.point_mm[1]) < 1e-9);
 	assert_true(fabs(top.point_mm[2]) < 1e-9 && fabs(top.normal[2] - 1) < 1e-12);
 
-	/* Two springs of 0.25 and 0.3 N/mm; each is certified in its own test. */
+	/* Two springs of 0.14 and 0.17 N/mm; each is certified in its own test. */
 	bound_N =
-		incise_fixed_spring_bound(0.25, 20) + incise_fixed_spring_bound(0.3, 20);
+		incise_fixed_spring_bound(0.14, 20) + incise_fixed_spring_bound(0.17, 20);
 	assert_true(fabs(incise_plan_bound(fixed.plan, 20) - bound_N) < 1e-15);
 	assert_true(incise_plan_bound(fixed.plan, 40) >
 		    incise_plan_bound(fixed.plan, 20));
 	assert_true(incise_plan_bound(exact.plan, 20) == 0);
 
 	incise_plan_stability(fixed.plan, &s);
-	assert_true(s.stiffness_N_mm == 0.25 + 0.3 && s.certified);
+	assert_true(s.stiffness_N_mm == 0.14 + 0.17 && s.certified);
 	assert_true(s.damping_N_s_mm == 0.001 && s.speed_slope_N_s_mm == 0);
 	assert_true(s.limit_N_mm >= s.stiffness_N_mm && !s.own_delay);
 	/* 4.2 ms and a period of 8.33. */
