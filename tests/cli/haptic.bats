@@ -21,6 +21,18 @@ teardown() {
 	[ -z "$pid" ] || kill -9 "$pid" 2>/dev/null || :
 }
 
+# Wait until the loop $pid catches a signal, given as a mask. Before it is the loop it is a
+# shell, which may catch it as well, and forget it.
+until_it_catches() {
+	for ((i = 0; i < 100; i++)); do
+		mask=$(awk '/^Name/ && $2 != "incise-haptic" { exit } /^SigCgt/ { print $2 }' \
+			/proc/$pid/status)
+		((0x${mask:-0} & $1)) && return
+		sleep 0.05
+	done
+	complain "it does not catch $1 within 5 s"
+}
+
 # The scene bad.scene is refused with these texts; nothing is printed.
 refuses() {
 	run --separate-stderr incise haptic bad.scene --rig $quick --duration 1s --log l.csv
@@ -152,11 +164,7 @@ refuses() {
 	incise haptic liver.scene --rig sim: --json >r.json 2>err 3>&- &
 	pid=$!
 	# a signal before the program listens would not be the case in question
-	for ((i = 0; i < 100; i++)); do
-		mask=$(awk '/^SigCgt/ { print $2 }' /proc/$pid/status)
-		((0x$mask & 2)) && break
-		sleep 0.05
-	done
+	until_it_catches 2
 	begin=$(date +%s%N)
 	sleep 0.5
 	kill -INT $pid
@@ -182,11 +190,7 @@ refuses() {
 @test "SIGTERM ends it as well" {
 	incise haptic liver.scene --rig sim: --json >r.json 2>err 3>&- &
 	pid=$!
-	for ((i = 0; i < 100; i++)); do
-		mask=$(awk '/^SigCgt/ { print $2 }' /proc/$pid/status)
-		((0x$mask & 0x4000)) && break
-		sleep 0.05
-	done
+	until_it_catches 0x4000
 	kill -TERM $pid
 	wait $pid
 	pid=
