@@ -35,8 +35,8 @@
 static const char all_forces[] =
 	"arithmetic = \"%s\";\n"
 	"surface = { %s };\n"
-	"tissue = { reaction_N_mm = 0.2; plane_N_mm = 0.2; damping_N_s_mm = 0.001;\n"
-	"  insertion_N_mm = 0.3; spread_N_mm = 0.2; };\n"
+	"tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; damping_N_s_mm = 0.0005;\n"
+	"  insertion_N_mm = 0.28; spread_N_mm = 0.22; };\n"
 	"effects = { average_ticks = 8; guard = true; };\n";
 
 static const struct {
