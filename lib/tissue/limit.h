@@ -32,9 +32,9 @@ enum incise_limit_event {
  * The force that may be rendered, in the place of the one asked for. Its length, the root
  * of the sum of squares as computed, is not above force_N; when that limit holds, it is
  * a few ulp less. The change is not above slew_N by more than 8 DBL_EPSILON of force_N,
- * which is rounding. One that has a component which is not finite asks for no force, and is gone at the rate of
- * the slew. Where both limits cannot be kept, as when force_N is made smaller, it is the
- * force that is.
+ * which is rounding. One that has a component which is not finite asks for no force, and
+ * is gone at the rate of the slew. Where both limits cannot be kept, as when force_N is
+ * made smaller, it is the force that is.
  *
  * Returns which of them held it back: a bit for each, 0 if it is as asked for.
  */

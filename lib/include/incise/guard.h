@@ -15,8 +15,9 @@
  * α = -W/(v² T) where W < 0. Three things differ. The energy is that of the held force,
  * not f·v T at the samples: that misses f² T²/(2m) per tick, which on a bare device is all
  * that a sampled spring makes. α has a cap: damping above m/T turns the velocity round
- * within one period and makes the energy that it should take. And the credit has a bound: what was dissipated long ago does not pay for
- * what is made now. Debt has none: only damping ends it, or a new contact.
+ * within one period and makes the energy that it should take. And the credit has a bound:
+ * what was dissipated long ago does not pay for what is made now. Debt has none: only
+ * damping ends it, or a new contact.
  *
  * With the cap a wall of up to 200 kN/m stays bounded even where it answers 15 ticks late,
  * as long as the damping itself acts at once. Damping that takes effect d ticks late is
