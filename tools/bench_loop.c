@@ -127,7 +127,7 @@ static void measure(const char *path, bool quick, struct row *row)
 		cli_fail_with(&err);
 	row->memory = incise_plan_memory(plan);
 	incise_plan_free(plan);
-	tick_cost(scene, quick ? QUICK_MEASURED_S : MEASURED_S, &row->cost);
+	tick_cost(scene, NULL, quick ? QUICK_MEASURED_S : MEASURED_S, &row->cost);
 	incise_scene_free(scene);
 }
 

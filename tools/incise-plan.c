@@ -267,6 +267,7 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 int main(int argc, char **argv)
 {
 	struct incise_error err = {0};
+	struct incise_tracker_info tracker;
 	struct incise_rig *rig = NULL;
 	struct incise_scene *scene;
 	struct incise_plan *plan;
@@ -282,11 +283,13 @@ int main(int argc, char **argv)
 		if (!rig)
 			cli_fail_with(&err);
 	}
+	if (rig)
+		incise_tracker_info(incise_rig_tracker(rig), &tracker);
 	plan = incise_plan_new(scene, rig, &err);
 	if (!plan)
 		cli_fail_with(&err);
 	cli_progress("%s: timing %d s of ticks", job.scene.path, MEASURED_S);
-	tick_cost(scene, MEASURED_S, &cost);
+	tick_cost(scene, rig ? &tracker : NULL, MEASURED_S, &cost);
 	cli_progress_end();
 	if (job.json)
 		report_json(&job, plan, &cost);

@@ -10,15 +10,20 @@
 #include "tick_cost.h"
 
 #define NS 1e-9
-#define TRACKER_HZ 120
-#define LATENCY_NS 4200000
 #define ABOVE_MM 5.0
 #define DEPTH_MM 1.0
 #define DOWN_S 0.2
 #define REACH_MM 5.0
 #define STROKE_HZ 1.27 /* 5 mm · 2π · 1.27 Hz = 40 mm/s */
 
+static const struct incise_tracker_info usual_tracker = {
+	.name = "usual",
+	.rate_hz = 120,
+	.latency_ns = 4200000,
+};
+
 struct stroke {
+	const struct incise_tracker_info *tracker;
 	struct incise_touch top;
 	double along[3]; /* in the surface */
 };
@@ -41,15 +46,15 @@ static void stroke_begin(struct stroke *stroke, const struct incise_plan *plan)
 		}
 }
 
-static void stroke_pose(const struct stroke *stroke, int64_t t_ns,
+static void stroke_pose(const struct stroke *stroke, int64_t pose,
 			struct incise_tracker_sample *sample)
 {
-	double t = (double)t_ns * NS, down = fmin(t / DOWN_S, 1);
+	double t = (double)pose / stroke->tracker->rate_hz, down = fmin(t / DOWN_S, 1);
 	double above = ABOVE_MM - (ABOVE_MM + DEPTH_MM) * down;
 	double off = REACH_MM * sin(2 * M_PI * STROKE_HZ * t);
 
 	*sample = (struct incise_tracker_sample){
-		.t_ns = t_ns + LATENCY_NS,
+		.t_ns = llrint(t / NS) + stroke->tracker->latency_ns,
 		.quaternion = {1},
 		.status = ' ',
 	};
@@ -77,14 +82,15 @@ static double clock_cost(void)
  * Run the stroke. With @stage_ns, room for @ticks times of each stage, it is the stages
  * that are timed, else the ticks. Returns how many ticks were in contact.
  */
-static int run(const struct incise_scene *scene, int ticks, double *tick_ns,
+static int run(const struct incise_scene *scene,
+	       const struct incise_tracker_info *tracker, int ticks, double *tick_ns,
 	       double *stage_ns)
 {
 	int64_t period_ns = llrint(1e9 / incise_scene_rate_hz(scene)), pose = 0, own[16];
 	struct incise_error err = {0};
-	struct incise_plan *plan = incise_plan_new(scene, NULL, &err);
+	struct incise_plan *plan = incise_plan_new_fed(scene, tracker, &err);
 	struct incise_tracker_sample sample;
-	struct stroke stroke;
+	struct stroke stroke = {.tracker = tracker};
 	int n = 0;
 
 	_Static_assert(INCISE_PLAN_STAGES_MAX == 16, "room for the stages");
@@ -97,10 +103,9 @@ static int run(const struct incise_scene *scene, int ticks, double *tick_ns,
 		struct incise_tick tick;
 		double begin, ns;
 
-		if (sample.t_ns <= t_ns) {
+		while (sample.t_ns <= t_ns) {
 			incise_plan_feed(plan, &sample, 1);
-			pose++;
-			stroke_pose(&stroke, pose * 1000000000LL / TRACKER_HZ, &sample);
+			stroke_pose(&stroke, ++pose, &sample);
 		}
 		if (stage_ns) {
 			incise_plan_tick_timed(plan, t_ns, &tick, own);
@@ -122,7 +127,9 @@ static int run(const struct incise_scene *scene, int ticks, double *tick_ns,
 	return n;
 }
 
-void tick_cost(const struct incise_scene *scene, double seconds, struct tick_cost *cost)
+void tick_cost(const struct incise_scene *scene,
+	       const struct incise_tracker_info *tracker, double seconds,
+	       struct tick_cost *cost)
 {
 	int ticks = (int)fmax(seconds * incise_scene_rate_hz(scene), 1000);
 	double *times = calloc((size_t)ticks * INCISE_PLAN_STAGES_MAX, sizeof(*times));
@@ -132,16 +139,18 @@ void tick_cost(const struct incise_scene *scene, double seconds, struct tick_cos
 	if (!times)
 		cli_fail("no memory for the times of %d ticks", ticks);
 	*cost = (struct tick_cost){0};
+	if (!tracker)
+		tracker = &usual_tracker;
 	/* The first run brings code and surface into the caches. */
-	run(scene, ticks / 4, times, NULL);
-	n = cost->ticks = run(scene, ticks, times, NULL);
+	run(scene, tracker, ticks / 4, times, NULL);
+	n = cost->ticks = run(scene, tracker, ticks, times, NULL);
 	if (!n)
 		cli_fail("the stroke never met the tissue: nothing to measure");
 	stopwatch_sort(times, n);
 	cost->median = fmax(stopwatch_quantile(times, n, 0.5) - own, 0);
 	cost->p99 = fmax(stopwatch_quantile(times, n, 0.99) - own, 0);
 	cost->p999 = fmax(stopwatch_quantile(times, n, 0.999) - own, 0);
-	n = run(scene, ticks, NULL, times);
+	n = run(scene, tracker, ticks, NULL, times);
 	for (int k = 0; k < INCISE_PLAN_STAGES_MAX && n; k++) {
 		stopwatch_sort(times + (size_t)k * ticks, n);
 		cost->stage[k] =

@@ -20,8 +20,11 @@ struct tick_cost {
 
 /*
  * Measure over some seconds of the stroke's time, which go by as fast as they can. Fails
- * the program when the stroke does not meet the tissue.
+ * the program when the stroke does not meet the tissue. Poses come as of the tracker, or
+ * with NULL of one of 120 Hz that is 4.2 ms late.
  */
-void tick_cost(const struct incise_scene *scene, double seconds, struct tick_cost *cost);
+void tick_cost(const struct incise_scene *scene,
+	       const struct incise_tracker_info *tracker, double seconds,
+	       struct tick_cost *cost);
 
 #endif

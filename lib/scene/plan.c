@@ -45,13 +45,13 @@ static int take_model(struct incise_plan *plan, struct incise_error *err)
 	return 0;
 }
 
+/* @tracker: that of the poses that are fed, or, with a rig, the rig's from here on. */
 static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 		    struct incise_tracker_info *tracker, struct incise_error *err)
 {
 	double point_mm[3] = {0};
 
 	plan->axis[2] = 1;
-	*tracker = fed_tracker;
 	if (rig) {
 		plan->tracker = incise_rig_tracker(rig);
 		plan->stepper = incise_rig_stepper(rig);
@@ -164,11 +164,12 @@ static void set_tool(struct incise_plan *plan)
 				    : plan->scene->effects.average_ticks);
 }
 
-struct incise_plan *incise_plan_new(const struct incise_scene *scene,
-				    struct incise_rig *rig, struct incise_error *err)
+static struct incise_plan *new_plan(const struct incise_scene *scene,
+				    struct incise_rig *rig,
+				    struct incise_tracker_info tracker,
+				    struct incise_error *err)
 {
 	struct incise_plan *plan = calloc(1, sizeof(*plan));
-	struct incise_tracker_info tracker;
 	int rc;
 
 	if (!plan) {
@@ -195,6 +196,28 @@ struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 	set_guard(plan);
 	incise_plan_choose(plan);
 	return plan;
+}
+
+struct incise_plan *incise_plan_new(const struct incise_scene *scene,
+				    struct incise_rig *rig, struct incise_error *err)
+{
+	return new_plan(scene, rig, fed_tracker, err);
+}
+
+struct incise_plan *incise_plan_new_fed(const struct incise_scene *scene,
+					const struct incise_tracker_info *tracker,
+					struct incise_error *err)
+{
+	if (!(tracker->rate_hz > 0) || !isfinite(tracker->rate_hz) ||
+	    tracker->latency_ns < 0) {
+		incise_error_set(err, EINVAL,
+				 "a tracker of %g Hz and %g ms: expected a rate above 0 "
+				 "and no negative latency",
+				 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
+		errno = EINVAL;
+		return NULL;
+	}
+	return new_plan(scene, NULL, *tracker, err);
 }
 
 void incise_plan_free(struct incise_plan *plan)

@@ -62,6 +62,15 @@ setup() {
 	[ -z "$(key r.json passive_N_mm)" ]
 }
 
+@test "a rig whose tracker is faster holds more than the one that is taken without a rig" {
+	echo 'tissue = { reaction_N_mm = 0.6; };' >fast.scene
+	run --separate-stderr incise plan fast.scene
+	failed_with fast.scene "not stable" "120 Hz"
+	incise plan fast.scene --rig sim:tracker_hz=240,tracker_latency_ms=2 --json >r.json
+	holds "$(key r.json limit_N_mm) > 0.6"
+	holds "$(key r.json tick_ns) > 0"
+}
+
 @test "a device with an encoder says how late it is, and holds much more" {
 	cat >encoder.scene <<-'EOF'
 		tissue = { reaction_N_mm = 2.0; };

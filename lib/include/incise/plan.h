@@ -45,6 +45,18 @@ struct incise_plan;
 INCISE_API struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 					       struct incise_rig *rig,
 					       struct incise_error *err);
+
+/**
+ * The same without a rig, for poses as of this tracker, which counts for the predictor and
+ * the stability.
+ *
+ * @param tracker rate above 0, latency not below 0
+ * @return as incise_plan_new()
+ */
+INCISE_API struct incise_plan *incise_plan_new_fed(
+	const struct incise_scene *scene, const struct incise_tracker_info *tracker,
+	struct incise_error *err);
+
 INCISE_API void incise_plan_free(struct incise_plan *plan);
 
 /** Names of the stages in order; NULL from the first index that is not there. */

@@ -486,6 +486,32 @@ static void test_getters(void **state)
 	fed_end(&exact);
 }
 
+/* A faster tracker holds more; what is no tracker is refused. */
+static void test_fed_tracker(void **state)
+{
+	static const struct incise_tracker_info fast = {"fast", 240, 2000000};
+	static const struct incise_tracker_info none[] = {
+		{"", 0, 0}, {"", -1, 0}, {"", NAN, 0}, {"", INFINITY, 0}, {"", 120, -1},
+	};
+	struct fed usual = fed_start("scenes/neck.scene", true);
+	struct incise_plan_stability by_usual, by_fast;
+	struct incise_error err;
+	struct incise_plan *plan = incise_plan_new_fed(usual.scene, &fast, &err);
+
+	assert_non_null(plan);
+	incise_plan_stability(usual.plan, &by_usual);
+	incise_plan_stability(plan, &by_fast);
+	assert_int_equal(by_fast.device.delay_ticks, 7);
+	assert_true(by_fast.limit_N_mm > 1.5 * by_usual.limit_N_mm);
+	incise_plan_free(plan);
+	for (size_t i = 0; i < sizeof(none) / sizeof(*none); i++) {
+		assert_null(incise_plan_new_fed(usual.scene, &none[i], &err));
+		assert_int_equal(errno, EINVAL);
+		assert_int_equal(err.code, EINVAL);
+	}
+	fed_end(&usual);
+}
+
 /* Down into the neck and along it, blade first, and out. */
 static void dive(void *own, double t, struct incise_tracker_sample *pose)
 {
@@ -646,6 +672,7 @@ int main(void)
 		cmocka_unit_test(test_set_tool),
 		cmocka_unit_test(test_stale_handle),
 		cmocka_unit_test(test_getters),
+		cmocka_unit_test(test_fed_tracker),
 		cmocka_unit_test(test_timed_tick_is_the_same),
 		cmocka_unit_test(test_timed_fault),
 		cmocka_unit_test(test_any_fed_pose_gives_a_force_within_limits),
