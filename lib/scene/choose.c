@@ -139,7 +139,9 @@ void incise_plan_choose(struct incise_plan *plan)
 	if (plan->stepper)
 		keep(plan, "actuate", true, incise_stage_actuate);
 	else
-		leave_out(plan, "actuate", "the rig has no stepper");
+		leave_out(plan, "actuate",
+			  plan->tracker ? "the rig has no stepper"
+					: "there is no rig, and no stepper");
 	leave_out(plan, "wound",
 		  plan->scene->picture.wound ? drawn : "picture.wound is false");
 	leave_out(plan, "bleeding",
