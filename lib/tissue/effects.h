@@ -5,9 +5,9 @@
  *
  *   cutting     reaction    F += Kn d n                      §2.2, Fn
  *               plane       F -= Kx ((P-P0)·s) s             §2.2, Fx
- *               damping     F -= Kd v                        §2.2, Fd
  *   insertion   insertion   F += Ky d n Fort                 §2.3, Fy
  *               spread      F -= Kxz (I - n nᵀ)(P-P0)        §2.3, Fxz
+ *   both        damping     F -= Kd v                        §2.2, Fd
  *
  * Read against the paper's print:
  *

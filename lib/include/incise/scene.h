@@ -10,7 +10,7 @@
  *     arithmetic = "fixed";         # or "double"
  *     surface = { kind = "capsule"; from_mm = [0.0, 0.0, -55.0];
  *                 to_mm = [120.0, 0.0, -55.0]; radius_mm = 55.0; };   # or the rig's plane
- *     tissue  = { plane_N_mm = 0.3; damping_N_s_mm = 0.001; };        # paper 2's constants
+ *     tissue  = { plane_N_mm = 0.1; damping_N_s_mm = 0.0005; };       # paper 2's constants
  *     effects = { average_ticks = 8; guard = true; };
  *     device  = { mass_kg = 0.05; damping_N_s_mm = 0.01; };
  *     limits  = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };
