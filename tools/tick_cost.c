@@ -145,7 +145,9 @@ void tick_cost(const struct incise_scene *scene,
 	run(scene, tracker, ticks / 4, times, NULL);
 	n = cost->ticks = run(scene, tracker, ticks, times, NULL);
 	if (!n)
-		cli_fail("the stroke never met the tissue: nothing to measure");
+		cli_fail(
+			"no pose of the stroke was felt: is limits.pose_age_ms shorter than "
+			"the tracker's latency?");
 	stopwatch_sort(times, n);
 	cost->median = fmax(stopwatch_quantile(times, n, 0.5) - own, 0);
 	cost->p99 = fmax(stopwatch_quantile(times, n, 0.99) - own, 0);

@@ -9,6 +9,7 @@
  *   insertion   the larger of insertion (along the normal) and spread (across it)
  */
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <incise/slope.h>
@@ -44,15 +45,8 @@ static void set_delay(struct incise_plan *plan, const struct incise_tracker_info
 	double ticks = ceil(late_s / device->period_s - 1e-9);
 
 	plan->stability.own_delay = plan->scene->device.delay_ticks >= 0;
-	if (plan->stability.own_delay) {
-		device->delay_ticks = plan->scene->device.delay_ticks;
-	} else if (ticks <= INCISE_STABILITY_DELAY_MAX) {
-		device->delay_ticks = (int)ticks;
-	} else {
-		/* The same delay in longer ticks, which is less stable: on the safe side. */
-		device->delay_ticks = INCISE_STABILITY_DELAY_MAX;
-		device->period_s = late_s / INCISE_STABILITY_DELAY_MAX;
-	}
+	device->delay_ticks = plan->stability.own_delay ? plan->scene->device.delay_ticks
+							: (int)fmin(ticks, INT_MAX);
 }
 
 static double limit_N_mm(const struct incise_plan *plan, double damping_N_s_mm)
@@ -61,7 +55,6 @@ static double limit_N_mm(const struct incise_plan *plan, double damping_N_s_mm)
 
 	if (plan->stability.own_delay)
 		return incise_stability_limit(&device, damping_N_s_mm);
-	device.period_s = 1 / plan->scene->rate_hz;
 	return incise_pose_loop_limit(&device, &plan->predict, damping_N_s_mm);
 }
 

@@ -111,7 +111,7 @@ static void set_guard(struct incise_plan *plan)
 {
 	const struct incise_haptic_device *device = &plan->stability.device;
 	/* Damping that acts d ticks late is itself stable below this, in m/T. */
-	double late = 2 * sin(M_PI / (4 * device->delay_ticks + 2));
+	double late = 2 * sin(M_PI / (4.0 * device->delay_ticks + 2));
 
 	incise_guard_init(&plan->guard, device->mass_kg, device->period_s,
 			  plan->scene->effects.guard ? reserve(plan) : 0);

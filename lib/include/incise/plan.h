@@ -78,6 +78,7 @@ INCISE_API void incise_plan_top(const struct incise_plan *plan,
 
 /** What is known of a plan's stability before its first tick. */
 struct incise_plan_stability {
+	/** Its delay may be above INCISE_STABILITY_DELAY_MAX where it is the tracker's. */
 	struct incise_haptic_device device;
 	bool own_delay;	       /**< the scene gives the delay; else it is the tracker's */
 	double stiffness_N_mm; /**< largest of the scene, in any phase */

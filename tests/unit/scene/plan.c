@@ -493,17 +493,34 @@ static void test_fed_tracker(void **state)
 	static const struct incise_tracker_info none[] = {
 		{"", 0, 0}, {"", -1, 0}, {"", NAN, 0}, {"", INFINITY, 0}, {"", 120, -1},
 	};
+	static const struct incise_tracker_info late = {"late", 100, 50000000};
 	struct fed usual = fed_start("scenes/neck.scene", true);
-	struct incise_plan_stability by_usual, by_fast;
+	struct incise_plan_stability by_usual, by_fast, by_slow;
+	struct incise_plan *plan, *slow;
+	struct incise_scene *often;
+	struct fed_folder folder;
 	struct incise_error err;
-	struct incise_plan *plan = incise_plan_new_fed(usual.scene, &fast, &err);
 
+	fed_folder_make(&folder);
+	often = fed_scene(&folder, "rate_hz = 20000; tissue = { reaction_N_mm = 0.01; };",
+			  &err);
+	assert_non_null(often);
+	slow = incise_plan_new_fed(often, &late, &err);
+	plan = incise_plan_new_fed(usual.scene, &fast, &err);
 	assert_non_null(plan);
 	incise_plan_stability(usual.plan, &by_usual);
 	incise_plan_stability(plan, &by_fast);
 	assert_int_equal(by_fast.device.delay_ticks, 7);
 	assert_true(by_fast.limit_N_mm > 1.5 * by_usual.limit_N_mm);
 	incise_plan_free(plan);
+	/* 50 ms and a period of 10, in ticks of 50 us: more than an exact limit takes. */
+	assert_non_null(slow);
+	incise_plan_stability(slow, &by_slow);
+	assert_int_equal(by_slow.device.delay_ticks, 1200);
+	assert_true(by_slow.device.period_s == 1 / 20000.0);
+	incise_plan_free(slow);
+	incise_scene_free(often);
+	fed_folder_remove(&folder);
 	for (size_t i = 0; i < sizeof(none) / sizeof(*none); i++) {
 		assert_null(incise_plan_new_fed(usual.scene, &none[i], &err));
 		assert_int_equal(errno, EINVAL);
