@@ -128,6 +128,9 @@ static void measure(const char *path, bool quick, struct row *row)
 	row->memory = incise_plan_memory(plan);
 	incise_plan_free(plan);
 	tick_cost(scene, NULL, quick ? QUICK_MEASURED_S : MEASURED_S, &row->cost);
+	if (!row->cost.ticks)
+		cli_fail("%s: a stroke over its top met no tissue: nothing to time",
+			 path);
 	incise_scene_free(scene);
 }
 

@@ -114,15 +114,13 @@ static const char *flags_text(unsigned int flags, char *text)
 
 static const char *const phases[] = {"free", "cutting", "insertion"};
 
-static void write_log(const struct job *job, const struct incise_tick *ticks, size_t n)
+static void write_log(struct incise_outfile *file, const struct incise_tick *ticks,
+		      size_t n)
 {
 	struct incise_error err = {0};
-	struct incise_outfile *file = incise_outfile_open(job->log, &err);
 	char flags[INCISE_TICK_FLAGS + 1];
 	FILE *out;
 
-	if (!file)
-		cli_fail_with(&err);
 	out = incise_outfile_stream(file);
 	fputs("t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags,phase,"
 	      "command_x_N,command_y_N,command_z_N\n",
@@ -143,6 +141,24 @@ static void write_log(const struct job *job, const struct incise_tick *ticks, si
 	}
 	if (incise_outfile_commit(file, &err))
 		cli_fail_with(&err);
+}
+
+/* Room for all ticks of the run, of half of this machine's memory at most. */
+static void make_log(const struct job *job, struct incise_loop_options *loop)
+{
+	double most = 0.5 * (double)sysconf(_SC_PHYS_PAGES) *
+		      (double)sysconf(_SC_PAGESIZE) / sizeof(*loop->log);
+	double ticks = ceil(job->duration * loop->rate_hz) + 1;
+
+	if (ticks <= most)
+		loop->log = calloc((size_t)ticks, sizeof(*loop->log));
+	if (!loop->log)
+		cli_fail("--log: no memory for %.0f ticks; a --duration of up to %.0f s "
+			 "fits in half of it",
+			 ticks, floor(most / loop->rate_hz));
+	loop->log_size = (size_t)ticks;
+	/* Touch the pages now: a fault in the loop is a late tick. */
+	memset(loop->log, 0xff, loop->log_size * sizeof(*loop->log));
 }
 
 /* How far the actuator's force was from the one asked of it at the tick before, rms. */
@@ -290,6 +306,7 @@ int main(int argc, char **argv)
 	struct incise_loop_options loop = {.stop = &cli_stop};
 	static struct incise_loop_stats stats;
 	struct incise_error err = {0};
+	struct incise_outfile *file = NULL;
 	struct incise_scene *scene;
 	struct incise_plan *plan;
 	struct incise_rig *rig;
@@ -311,13 +328,11 @@ int main(int argc, char **argv)
 	loop.rate_hz = incise_scene_rate_hz(scene);
 	loop.duration_ns = (int64_t)(job.duration * INCISE_NS_PER_S);
 	if (job.log) {
-		loop.log_size = (size_t)ceil(job.duration * loop.rate_hz) + 1;
-		loop.log = calloc(loop.log_size, sizeof(*loop.log));
-		if (!loop.log)
-			cli_fail("no memory for %zu ticks; give a shorter --duration",
-				 loop.log_size);
-		/* Touch the pages now: a fault in the loop is a late tick. */
-		memset(loop.log, 0xff, loop.log_size * sizeof(*loop.log));
+		/* A path that cannot be is said before the run, not after. */
+		file = incise_outfile_open(job.log, &err);
+		if (!file)
+			cli_fail_with(&err);
+		make_log(&job, &loop);
 	}
 	real = incise_clock_is_real(incise_rig_clock(rig));
 	cli_catch_signals();
@@ -326,7 +341,7 @@ int main(int argc, char **argv)
 	cli_progress_end();
 	rms_N = incise_rig_stepper(rig) ? render_error(&stats) : NAN;
 	if (job.log)
-		write_log(&job, loop.log, stats.logged);
+		write_log(file, loop.log, stats.logged);
 	if (job.json)
 		report_json(&stats, plan, real, loop.rate_hz, rms_N);
 	else if (!job.log || strcmp(job.log, "-"))

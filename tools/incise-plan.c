@@ -145,13 +145,14 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 {
 	const struct incise_haptic_device *d = &s->device;
 
-	return json_pack("{so so so so so so so sb sb s{sf sf sf sf sf si}}",
+	return json_pack("{so so so so so so so so sb sb s{sf sf sf sf sf si}}",
 			 "stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
 			 json_number(s->limit_N_mm), "margin", json_number(margin(s)),
 			 "damping_N_s_mm", json_number(s->damping_N_s_mm),
 			 "speed_slope_N_s_mm", json_number(s->speed_slope_N_s_mm),
 			 "passive_N_mm", json_number(passive_N_mm(s)), "encoder_N_mm",
-			 json_number(encoder_N_mm(s)), "certified", s->certified,
+			 json_number(encoder_N_mm(s)), "guard_N_s_mm",
+			 json_number(s->guard_N_s_mm), "certified", s->certified,
 			 "own_delay", s->own_delay, "device", "mass_kg", d->mass_kg,
 			 "damping_N_s_mm", d->damping_N_s_mm, "coulomb_N", d->coulomb_N,
 			 "encoder_mm", d->encoder_mm, "period_s", d->period_s,
@@ -185,11 +186,12 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 			json_array_append_new(absent, json_string(heavy[i].name));
 	incise_plan_stability(plan, &stability);
 	object = json_pack(
-		"{so so so so sf sf sf sI sf so so so so}", "scene",
+		"{so so so so so so so sI sf so so so so}", "scene",
 		json_text(job->scene.path), "kept", kept, "left_out", left, "stages",
-		stages, "tick_ns", cost->median, "tick_p99_ns", cost->p99, "tick_p999_ns",
-		cost->p999, "memory_bytes", (json_int_t)incise_plan_memory(plan),
-		"bound_N", incise_plan_bound(plan, REACH_MM), "devices",
+		stages, "tick_ns", json_number(cost->median), "tick_p99_ns",
+		json_number(cost->p99), "tick_p999_ns", json_number(cost->p999),
+		"memory_bytes", (json_int_t)incise_plan_memory(plan), "bound_N",
+		incise_plan_bound(plan, REACH_MM), "devices",
 		job->rig ? json_pack("[ss]", "tracker", "stepper") : json_array(),
 		"untouched_devices",
 		job->rig ? json_pack("[ss]", "force", "camera")
@@ -197,6 +199,16 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 		"libraries", mapped, "unmapped_libraries", absent);
 	json_object_update_new(object, stability_json(&stability));
 	json_print(object);
+}
+
+static bool guarded(const struct incise_plan *plan)
+{
+	const char *name;
+
+	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
+		if (!strcmp(name, "guard"))
+			return true;
+	return false;
 }
 
 static void print_stability(const struct incise_plan *plan)
@@ -221,6 +233,10 @@ static void print_stability(const struct incise_plan *plan)
 	if (isfinite(encoder_N_mm(&s)))
 		printf("            the steps of its encoder die out up to %.4g N/mm\n",
 		       encoder_N_mm(&s));
+	if (guarded(plan))
+		printf("            its guard adds up to %.3g N s/mm, which the loop can "
+		       "spare%s\n",
+		       s.guard_N_s_mm, s.guard_N_s_mm > 0 ? "" : ": it can do nothing");
 	if (s.speed_slope_N_s_mm > 0)
 		printf("            not counted: the model's force changes by up to %.3g N per "
 		       "mm/s, either way\n",
@@ -235,14 +251,20 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 	double bound_N = incise_plan_bound(plan, REACH_MM);
 	json_t *mapped;
 
-	printf("%s: %.0f ns a tick (99.9 %% below %.0f), %.1f KiB\n\nkept\n",
-	       job->scene.path, cost->median, cost->p999,
-	       (double)incise_plan_memory(plan) / 1024);
+	if (cost->ticks)
+		printf("%s: %.0f ns a tick (99.9 %% below %.0f), ", job->scene.path,
+		       cost->median, cost->p999);
+	else
+		printf("%s: a stroke over its top met no tissue, so no tick was timed; ",
+		       job->scene.path);
+	printf("%.1f KiB\n\nkept\n", (double)incise_plan_memory(plan) / 1024);
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
-		if (strcmp(name, "actuate"))
+		if (!strcmp(name, "actuate"))
+			printf("  %-10s    - (the device's)\n", name);
+		else if (cost->ticks)
 			printf("  %-10s %4.0f ns\n", name, cost->stage[i]);
 		else
-			printf("  %-10s    - (the device's)\n", name);
+			printf("  %-10s    -\n", name);
 	puts("left out");
 	for (int i = 0; (name = incise_plan_left_out(plan, i, &why)); i++)
 		printf("  %-10s %s\n", name, why);

@@ -83,8 +83,8 @@ static double clock_cost(void)
  * that are timed, else the ticks. Returns how many ticks were in contact.
  */
 static int run(const struct incise_scene *scene,
-	       const struct incise_tracker_info *tracker, int ticks, double *tick_ns,
-	       double *stage_ns)
+	       const struct incise_tracker_info *tracker, enum incise_tool tool,
+	       int ticks, double *tick_ns, double *stage_ns)
 {
 	int64_t period_ns = llrint(1e9 / incise_scene_rate_hz(scene)), pose = 0, own[16];
 	struct incise_error err = {0};
@@ -96,6 +96,7 @@ static int run(const struct incise_scene *scene,
 	_Static_assert(INCISE_PLAN_STAGES_MAX == 16, "room for the stages");
 	if (!plan)
 		cli_fail_with(&err);
+	incise_plan_set_tool(plan, tool);
 	stroke_begin(&stroke, plan);
 	stroke_pose(&stroke, 0, &sample);
 	for (int i = 0; i < ticks; i++) {
@@ -127,36 +128,53 @@ static int run(const struct incise_scene *scene,
 	return n;
 }
 
+/* The cost with one tool. */
+static void cost_with(const struct incise_scene *scene,
+		      const struct incise_tracker_info *tracker, enum incise_tool tool,
+		      int ticks, double *times, struct tick_cost *cost)
+{
+	double own = clock_cost();
+	int n;
+
+	/* The first run brings code and surface into the caches. */
+	run(scene, tracker, tool, ticks / 4, times, NULL);
+	n = cost->ticks = run(scene, tracker, tool, ticks, times, NULL);
+	if (!n) {
+		cost->median = cost->p99 = cost->p999 = NAN;
+		for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)
+			cost->stage[k] = NAN;
+		return;
+	}
+	stopwatch_sort(times, n);
+	cost->median = fmax(stopwatch_quantile(times, n, 0.5) - own, 0);
+	cost->p99 = fmax(stopwatch_quantile(times, n, 0.99) - own, 0);
+	cost->p999 = fmax(stopwatch_quantile(times, n, 0.999) - own, 0);
+	n = run(scene, tracker, tool, ticks, NULL, times);
+	for (int k = 0; k < INCISE_PLAN_STAGES_MAX && n; k++) {
+		double *stage = times + (size_t)k * ticks;
+
+		stopwatch_sort(stage, n);
+		cost->stage[k] = fmax(stopwatch_middle(stage, n) - own, 0);
+	}
+}
+
 void tick_cost(const struct incise_scene *scene,
 	       const struct incise_tracker_info *tracker, double seconds,
 	       struct tick_cost *cost)
 {
 	int ticks = (int)fmax(seconds * incise_scene_rate_hz(scene), 1000);
 	double *times = calloc((size_t)ticks * INCISE_PLAN_STAGES_MAX, sizeof(*times));
-	double own = clock_cost();
-	int n;
+	struct tick_cost blade = {0}, tube = {0};
 
 	if (!times)
 		cli_fail("no memory for the times of %d ticks", ticks);
-	*cost = (struct tick_cost){0};
 	if (!tracker)
 		tracker = &usual_tracker;
-	/* The first run brings code and surface into the caches. */
-	run(scene, tracker, ticks / 4, times, NULL);
-	n = cost->ticks = run(scene, tracker, ticks, times, NULL);
-	if (!n)
-		cli_fail(
-			"no pose of the stroke was felt: is limits.pose_age_ms shorter than "
-			"the tracker's latency?");
-	stopwatch_sort(times, n);
-	cost->median = fmax(stopwatch_quantile(times, n, 0.5) - own, 0);
-	cost->p99 = fmax(stopwatch_quantile(times, n, 0.99) - own, 0);
-	cost->p999 = fmax(stopwatch_quantile(times, n, 0.999) - own, 0);
-	n = run(scene, tracker, ticks, NULL, times);
-	for (int k = 0; k < INCISE_PLAN_STAGES_MAX && n; k++) {
-		stopwatch_sort(times + (size_t)k * ticks, n);
-		cost->stage[k] =
-			fmax(stopwatch_middle(times + (size_t)k * ticks, n) - own, 0);
-	}
+	cost_with(scene, tracker, INCISE_TOOL_BLADE, ticks, times, &blade);
+	/* In a scene without insertion this is the blade once more. */
+	cost_with(scene, tracker, INCISE_TOOL_TUBE, ticks, times, &tube);
 	free(times);
+	*cost = tube.median > blade.median ? tube : blade;
+	for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)
+		cost->stage[k] = fmax(blade.stage[k], tube.stage[k]);
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * What a tick of a plan costs: a stroke of the scalpel over the top of the surface is fed
- * to a plan without a rig, and every tick in contact is timed.
+ * to a plan without a rig, and every tick in contact is timed; with the blade, and where
+ * the scene has insertion with a tube as well. The costlier of the two counts.
  *
  *        ╲                        5 mm above, down in 0.2 s
  *   ──────╲────────────────────── surface
@@ -19,8 +20,9 @@ struct tick_cost {
 };
 
 /*
- * Measure over some seconds of the stroke's time, which go by as fast as they can. Fails
- * the program when the stroke does not meet the tissue. Poses come as of the tracker, or
+ * Measure over some seconds of the stroke's time, which go by as fast as they can. Where
+ * the stroke does not meet the tissue, as over a sheet that is too small, ticks is 0 and all
+ * times are NaN. Poses come as of the tracker, or
  * with NULL of one of 120 Hz that is 4.2 ms late.
  */
 void tick_cost(const struct incise_scene *scene,

@@ -123,15 +123,18 @@ static int include_line(FILE *stream)
 int incise_conf_read(config_t *config, const char *path, struct incise_error *err)
 {
 	struct stat st;
-	FILE *stream = fopen(path, "re");
+	FILE *stream;
 	int rc = 0, line;
 
-	/* fopen(3) takes folders, on which the parser would end the process. */
-	if (stream && !fstat(fileno(stream), &st) && S_ISDIR(st.st_mode)) {
-		fclose(stream);
-		stream = NULL;
-		errno = EISDIR;
-	}
+	/* On a folder the parser would end the process, on a pipe it would wait. */
+	if (!stat(path, &st) && !S_ISREG(st.st_mode))
+		return incise_error_set(err, S_ISDIR(st.st_mode) ? EISDIR : EINVAL,
+					"%.200s: cannot be read: %s; give the path of a "
+					"configuration file",
+					path,
+					S_ISDIR(st.st_mode) ? strerror(EISDIR)
+							    : "not a regular file");
+	stream = fopen(path, "re");
 	if (!stream)
 		return incise_error_set(err, errno,
 					"%.200s: cannot be read: %s; give the path of a "
@@ -327,7 +330,7 @@ int incise_conf_direction(const config_setting_t *group, const char *path,
 	/* Shorter than this, its direction is more rounding than intent. */
 	if (!rc && config_setting_get_member(group, key) && !v3_unit(value, asked, 1e-6))
 		rc = setting_error(config_setting_get_member(group, key), path, EINVAL,
-				   err, "a direction [x, y, z] of length 1e-6 or more");
+				   err, "a direction [x, y, z] longer than 1e-6");
 	return rc;
 }
 

@@ -110,8 +110,7 @@ struct incise_outfile *incise_outfile_open(const char *path, struct incise_error
 	}
 	return file;
 fail:
-	incise_error_set(err, errno,
-			 "%s: cannot be written: %s; give another path with -o", path,
+	incise_error_set(err, errno, "%s: cannot be written: %s; give another path", path,
 			 strerror(errno));
 	if (file) {
 		fd = errno;

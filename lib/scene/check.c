@@ -110,6 +110,17 @@ static double largest_gain(const struct incise_plan *plan)
 	return low * plan->gain;
 }
 
+/* For a message: downwards, as what is named must be safe. */
+static double three_digits_down(double gain)
+{
+	double unit;
+
+	if (!(gain > 0))
+		return 0;
+	unit = pow(10, floor(log10(gain)) - 2);
+	return floor(gain / unit) * unit;
+}
+
 /* Where the delay comes from, for a message. */
 static void name_delay(const struct incise_plan_stability *s,
 		       const struct incise_tracker_info *tracker, char name[64])
@@ -126,8 +137,8 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_scene *scene = plan->scene;
-	double reaction_N_mm = plan->reaction_N_mm;
-	char delay[64];
+	double reaction_N_mm = plan->reaction_N_mm, gain;
+	char delay[64], advice[64];
 
 	s->device = (struct incise_haptic_device){
 		.mass_kg = scene->device.mass_kg,
@@ -147,13 +158,16 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	if (stable(plan, 1))
 		return 0;
 	name_delay(s, tracker, delay);
-	/* Downwards: what is named must be safe. */
+	gain = three_digits_down(largest_gain(plan));
+	if (gain > 0)
+		snprintf(advice, sizeof(advice), "set tissue.gain to at most %.3g", gain);
+	else
+		snprintf(advice, sizeof(advice),
+			 "no gain is small enough: it needs damping");
 	return incise_error_set(
 		err, EDOM,
 		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm, a device of "
-		"%g kg and %g N s/mm %s holds %.4g N/mm; set tissue.gain to at most "
-		"%.4g, or describe the device",
+		"%g kg and %g N s/mm %s holds %.4g N/mm; %s, or describe the device",
 		scene->path, s->stiffness_N_mm, s->damping_N_s_mm, s->device.mass_kg,
-		s->device.damping_N_s_mm, delay, s->limit_N_mm,
-		floor(largest_gain(plan) * 1e3) / 1e3);
+		s->device.damping_N_s_mm, delay, s->limit_N_mm, advice);
 }

@@ -48,7 +48,7 @@ static const char *no_tool(const struct incise_plan *plan)
 
 static const char *no_normal(const struct incise_plan *plan)
 {
-	if (plan->average.n > 1)
+	if (plan->average_ticks > 1)
 		return NULL;
 	return plan->scene->effects.average_ticks > 1
 		       ? "a plane has one normal: there is nothing to average"

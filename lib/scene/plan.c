@@ -113,17 +113,18 @@ static void set_guard(struct incise_plan *plan)
 	/* Damping that acts d ticks late is itself stable below this, in m/T. */
 	double late = 2 * sin(M_PI / (4.0 * device->delay_ticks + 2));
 
-	incise_guard_init(&plan->guard, device->mass_kg, device->period_s,
+	incise_guard_init(plan->guard, device->mass_kg, device->period_s,
 			  plan->scene->effects.guard ? reserve(plan) : 0);
 	if (!plan->scene->effects.guard)
 		return;
-	plan->guard.cap_N_s_mm *= fmin(1, late);
+	plan->guard->cap_N_s_mm *= fmin(1, late);
 	/*
 	 * What the guard adds must not make a wall hum that did not; half of what is spare,
 	 * as the guard's own share is half of what is stable.
 	 */
-	plan->guard.cap_N_s_mm =
-		incise_plan_spare_damping(plan, 2 * plan->guard.cap_N_s_mm) / 2;
+	plan->guard->cap_N_s_mm =
+		incise_plan_spare_damping(plan, 2 * plan->guard->cap_N_s_mm) / 2;
+	plan->stability.guard_N_s_mm = plan->guard->cap_N_s_mm;
 }
 
 static void set_limits(struct incise_plan *plan)
@@ -158,10 +159,60 @@ static void set_tool(struct incise_plan *plan)
 	v3_copy(plan->up, top.normal);
 	incise_proxy_init(&plan->proxy, plan->surface, plan->scene->tissue.leave_mm);
 	/* The average of what never changes is a rounding beside it. */
-	incise_average_init(&plan->average,
-			    incise_surface_kind(plan->surface) == INCISE_SURFACE_PLANE
-				    ? 1
-				    : plan->scene->effects.average_ticks);
+	plan->average_ticks = incise_surface_kind(plan->surface) == INCISE_SURFACE_PLANE
+				      ? 1
+				      : plan->scene->effects.average_ticks;
+}
+
+static bool keeps(const struct incise_plan *plan, const char *stage)
+{
+	for (int i = 0; i < plan->n_stages; i++)
+		if (!strcmp(plan->stage[i].name, stage))
+			return true;
+	return false;
+}
+
+/* What only some stages need, for those that are kept. */
+static int equip(struct incise_plan *plan, const struct incise_tracker_info *tracker,
+		 struct incise_error *err)
+{
+	bool handle = keeps(plan, "tool"), average = keeps(plan, "normal"),
+	     guard = keeps(plan, "guard");
+
+	if (!plan->tracker)
+		plan->fed = calloc(INCISE_PLAN_POSES, sizeof(*plan->fed));
+	if (handle)
+		plan->handle = calloc(1, sizeof(*plan->handle));
+	if (average)
+		plan->average = calloc(1, sizeof(*plan->average));
+	if (guard)
+		plan->guard = calloc(1, sizeof(*plan->guard));
+	if ((!plan->tracker && !plan->fed) || (handle && !plan->handle) ||
+	    (average && !plan->average) || (guard && !plan->guard))
+		return incise_error_set(err, ENOMEM, "no memory for a plan");
+	if (handle)
+		incise_predict_init(plan->handle, tracker);
+	if (average)
+		incise_average_init(plan->average, plan->average_ticks);
+	if (guard)
+		set_guard(plan);
+	return 0;
+}
+
+/* A pose that is used for the last time is its latency and a period old. */
+static int check_age(const struct incise_plan *plan,
+		     const struct incise_tracker_info *tracker, struct incise_error *err)
+{
+	double least_ms = (double)tracker->latency_ns * 1e-6 + 1e3 / tracker->rate_hz;
+
+	if (plan->scene->limits.pose_age_ms >= least_ms)
+		return 0;
+	return incise_error_set(
+		err, EDOM,
+		"%s: limits.pose_age_ms: no pose of a tracker of %g Hz that is %g ms late is "
+		"always younger than %g ms: there would be no force; set it to %.1f or more",
+		plan->scene->path, tracker->rate_hz, (double)tracker->latency_ns * 1e-6,
+		plan->scene->limits.pose_age_ms, ceil(least_ms * 10) / 10);
 }
 
 static struct incise_plan *new_plan(const struct incise_scene *scene,
@@ -179,22 +230,25 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 	plan->scene = scene;
 	rc = take_rig(plan, rig, &tracker, err);
 	if (!rc)
+		rc = check_age(plan, &tracker, err);
+	if (!rc)
 		rc = take_model(plan, err);
 	if (!rc) {
 		take_tissue(plan);
 		incise_predict_init(&plan->predict, &tracker);
 		rc = incise_plan_check(plan, &tracker, err);
 	}
+	if (!rc) {
+		set_tool(plan);
+		set_limits(plan);
+		incise_plan_choose(plan);
+		rc = equip(plan, &tracker, err);
+	}
 	if (rc) {
 		incise_plan_free(plan);
 		errno = -rc;
 		return NULL;
 	}
-	incise_predict_init(&plan->handle, &tracker);
-	set_tool(plan);
-	set_limits(plan);
-	set_guard(plan);
-	incise_plan_choose(plan);
 	return plan;
 }
 
@@ -226,6 +280,10 @@ void incise_plan_free(struct incise_plan *plan)
 		return;
 	incise_fixed_free(plan->own_fixed);
 	incise_surface_free(plan->own_surface);
+	free(plan->fed);
+	free(plan->handle);
+	free(plan->average);
+	free(plan->guard);
 	free(plan);
 }
 
@@ -248,6 +306,10 @@ size_t incise_plan_memory(const struct incise_plan *plan)
 {
 	size_t size = sizeof(*plan) + incise_surface_memory(plan->surface);
 
+	size += plan->fed ? INCISE_PLAN_POSES * sizeof(*plan->fed) : 0;
+	size += plan->handle ? sizeof(*plan->handle) : 0;
+	size += plan->average ? sizeof(*plan->average) : 0;
+	size += plan->guard ? sizeof(*plan->guard) : 0;
 	if (plan->fixed)
 		size += sizeof(*plan->fixed) + plan->fixed->size;
 	if (plan->scene->model)

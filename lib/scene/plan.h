@@ -41,19 +41,19 @@ struct incise_plan {
 	int fault; /* negative errno of the device that failed, or 0 */
 
 	/* pose */
-	struct incise_tracker *tracker; /* or NULL: poses are fed */
-	struct incise_tracker_sample fed[INCISE_PLAN_POSES];
+	struct incise_tracker *tracker;	   /* or NULL: poses are fed */
+	struct incise_tracker_sample *fed; /* INCISE_PLAN_POSES, then */
 	int n_fed;
 	struct incise_predict predict;
-	unsigned int leaps; /* of it, that the guard knows of */
+	unsigned int leaps; /* of what is held, that the guard knows of */
 	int64_t pose_age_ns;
 	double velocity_mm_s[3]; /* of what is held: of the tip, or the handle's end */
 	double attitude[4];
 
 	/* tool, contact, normal */
 	struct incise_instrument instrument;
-	bool inserts;		      /* handle and tube can be held */
-	struct incise_predict handle; /* its end's position */
+	bool inserts;		       /* handle and tube can be held */
+	struct incise_predict *handle; /* its end's position; with stage tool */
 	const struct incise_surface *surface;
 	struct incise_surface *own_surface; /* the rig's plane, when it is that */
 	double up[3];			    /* normal of the surface's top */
@@ -63,7 +63,8 @@ struct incise_plan {
 	double depth_mm;  /* ≥ 0 */
 	double p0_mm[3];  /* where the contact began */
 	struct incise_incision incision;
-	struct incise_average average;
+	int average_ticks;
+	struct incise_average *average; /* with stage normal */
 
 	/* forces; the constants times the gain */
 	double force_N[3]; /* of this tick, before guard and limits */
@@ -76,7 +77,7 @@ struct incise_plan {
 	bool in_incision; /* the instrument went in where the blade had cut */
 
 	/* guard, start, limit */
-	struct incise_guard guard;
+	struct incise_guard *guard; /* with stage guard */
 	struct incise_start start;
 	struct incise_limit limit;
 	int64_t last_ns; /* of the last tick; 0: none */

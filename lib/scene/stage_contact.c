@@ -24,7 +24,7 @@ static void take_handle(struct incise_plan *plan, struct incise_tracker_sample s
 	handle.held = INCISE_TOOL_HANDLE;
 	incise_instrument_end(&handle, sample.position_mm, plan->predict.q, end_mm);
 	v3_copy(sample.position_mm, end_mm);
-	incise_predict_add(&plan->handle, &sample);
+	incise_predict_add(plan->handle, &sample);
 }
 
 static void take(struct incise_plan *plan, struct incise_tracker_sample *samples, int n,
@@ -58,18 +58,12 @@ int incise_stage_fed(struct incise_plan *plan, struct incise_tick *tick)
 
 int incise_stage_predict(struct incise_plan *plan, struct incise_tick *tick)
 {
-	unsigned int leaps = plan->predict.leaps + plan->handle.leaps;
-
 	if (incise_predict_age(&plan->predict, tick->t_ns) > plan->pose_age_ns)
 		tick->flags |= INCISE_TICK_STALE;
 	incise_predict_at(&plan->predict, tick->t_ns, tick->position_mm,
 			  plan->velocity_mm_s, plan->attitude);
 	v3_copy(tick->tool_mm, tick->position_mm);
 	tick->velocity_mm_s = v3_length(plan->velocity_mm_s);
-	/* A force did no work on a way that nobody went. */
-	if (plan->leaps != leaps)
-		incise_guard_leap(&plan->guard);
-	plan->leaps = leaps;
 	return 0;
 }
 
@@ -84,10 +78,12 @@ int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
 	 */
 	if (other) {
 		incise_proxy_init(&plan->proxy, plan->surface, plan->proxy.leave_mm);
-		incise_guard_leap(&plan->guard);
+		if (plan->guard)
+			incise_guard_leap(plan->guard);
 	}
+	tick->tool = plan->instrument.held;
 	if (plan->instrument.held == INCISE_TOOL_HANDLE)
-		incise_predict_at(&plan->handle, tick->t_ns, tick->tool_mm,
+		incise_predict_at(plan->handle, tick->t_ns, tick->tool_mm,
 				  plan->velocity_mm_s, plan->attitude);
 	return 0;
 }
@@ -104,8 +100,10 @@ static void contact_begins(struct incise_plan *plan)
 		incise_incision_begin(&plan->incision, first->point_mm, first->normal,
 				      side);
 	}
-	incise_average_reset(&plan->average);
-	incise_guard_reset(&plan->guard);
+	if (plan->average)
+		incise_average_reset(plan->average);
+	if (plan->guard)
+		incise_guard_reset(plan->guard);
 }
 
 /*
@@ -155,7 +153,7 @@ int incise_stage_normal(struct incise_plan *plan, struct incise_tick *tick)
 {
 	if (tick->phase == INCISE_PHASE_FREE)
 		return 0;
-	incise_average_add(&plan->average, plan->sn, plan->normal);
+	incise_average_add(plan->average, plan->sn, plan->normal);
 	v3_copy(tick->normal, plan->normal);
 	return 0;
 }

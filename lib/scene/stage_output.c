@@ -8,7 +8,15 @@
 /* In free air too: a debt of energy is paid there as well. */
 int incise_stage_guard(struct incise_plan *plan, struct incise_tick *tick)
 {
-	if (incise_guard_apply(&plan->guard, tick->tool_mm, plan->velocity_mm_s,
+	const struct incise_predict *held = plan->instrument.held == INCISE_TOOL_HANDLE
+						    ? plan->handle
+						    : &plan->predict;
+
+	/* A force did no work on a way that nobody went. */
+	if (plan->leaps != held->leaps)
+		incise_guard_leap(plan->guard);
+	plan->leaps = held->leaps;
+	if (incise_guard_apply(plan->guard, tick->tool_mm, plan->velocity_mm_s,
 			       plan->force_N))
 		tick->flags |= INCISE_TICK_GUARDED;
 	return 0;
@@ -43,7 +51,8 @@ int incise_stage_limit(struct incise_plan *plan, struct incise_tick *tick)
 		tick->flags |= INCISE_TICK_SLEWED;
 	if (held & INCISE_LIMIT_NOT_FINITE)
 		tick->flags |= INCISE_TICK_NOT_FINITE;
-	incise_guard_sent(&plan->guard, tick->command_N);
+	if (plan->guard)
+		incise_guard_sent(plan->guard, tick->command_N);
 	return 0;
 }
 

@@ -8,16 +8,22 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include "text.h"
 #include "../base/c_locale.h"
 
 int text_open(struct text *text, const char *path, struct incise_error *err)
 {
 	size_t room = 1 << 16, size = 0, got;
-	FILE *stream = fopen(path, "re");
+	struct stat st;
+	FILE *stream;
 	int rc = 0;
 
 	*text = (struct text){.path = path, .line = 1};
+	/* A pipe or a device may never end. */
+	if (!stat(path, &st) && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode))
+		return incise_error_set(err, EINVAL, "%s: not a regular file", path);
+	stream = fopen(path, "re");
 	if (!stream)
 		return incise_error_set(err, errno, "%s: %s", path, strerror(errno));
 	text->data = malloc(room + 1);

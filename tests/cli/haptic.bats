@@ -187,6 +187,18 @@ refuses() {
 	[[ "$(key r.json scheduling)" == SCHED_* ]]
 }
 
+@test "a log that cannot be is said before the run, and so is one that does not fit" {
+	run --separate-stderr timeout 5 incise haptic liver.scene --rig sim: --duration 1h --log none/l.csv
+	failed_with none/l.csv
+	run --separate-stderr timeout 5 incise haptic liver.scene --rig sim: --duration 24h \
+		--log l.csv
+	# 86.4 million ticks of some 200 bytes: 17 GB, unless this machine has twice that
+	if [ "$(awk '/^MemTotal/ { print $2 }' /proc/meminfo)" -lt 30000000 ]; then
+		failed_with --log --duration
+	fi
+	[ ! -e l.csv ]
+}
+
 @test "SIGTERM ends it as well" {
 	incise haptic liver.scene --rig sim: --json >r.json 2>err 3>&- &
 	pid=$!

@@ -40,7 +40,8 @@ struct incise_plan;
  *              are given by incise_plan_feed(), as of a tracker of 120 Hz that is 4.2 ms
  *              late
  * @return plan, to be freed with incise_plan_free(); NULL with errno ENODEV (no tracker),
- *         EDOM (not stable), ENOTSUP, ERANGE (incise_fixed_compile()), EINVAL, ENOMEM.
+ *         EDOM (not stable, or poses always older than limits.pose_age_ms), ENOTSUP,
+ *         ERANGE (incise_fixed_compile()), EINVAL, ENOMEM.
  */
 INCISE_API struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 					       struct incise_rig *rig,
@@ -91,6 +92,8 @@ struct incise_plan_stability {
 	/** Largest slope of the model's force by the speed, either way; 0 without one. */
 	double speed_slope_N_s_mm;
 	bool certified; /**< the model's slopes are bounds, not estimates */
+	/** Most damping that the guard may add: what the loop can spare; 0 without one. */
+	double guard_N_s_mm;
 };
 
 INCISE_API void incise_plan_stability(const struct incise_plan *plan,

@@ -212,7 +212,7 @@ static void check_free(struct run *run)
 	if (v3_length(run->tick.command_N) != 0)
 		FAIL(run, "still %g N in free air, flags %#x, debt of %g N mm",
 		     v3_length(run->tick.command_N), run->tick.flags,
-		     -run->plan->guard.energy_N_mm);
+		     -run->plan->guard->energy_N_mm);
 }
 
 /*
@@ -221,16 +221,16 @@ static void check_free(struct run *run)
  */
 static void wave(struct run *run, const double attitude[4])
 {
-	double before_N_mm = run->plan->guard.energy_N_mm;
+	double before_N_mm = run->plan->guard->energy_N_mm;
 	double away_mm = run->ground->away_mm;
 
 	run->waved = true;
 	move(run, away_mm, away_mm - 20, 100, attitude);
 	move(run, away_mm - 20, away_mm, 100, attitude);
 	run->waved = false;
-	if (before_N_mm < 0 && !(run->plan->guard.energy_N_mm > before_N_mm))
+	if (before_N_mm < 0 && !(run->plan->guard->energy_N_mm > before_N_mm))
 		FAIL(run, "a debt of %g N mm became one of %g", -before_N_mm,
-		     -run->plan->guard.energy_N_mm);
+		     -run->plan->guard->energy_N_mm);
 }
 
 /* Out, and in again: nothing of what was before is left. */

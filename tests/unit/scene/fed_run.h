@@ -101,7 +101,7 @@ static inline void check_tick(struct run *run, const struct incise_tick *before)
 		FAIL(run, "depth %.17g", t->depth_mm);
 	/* The slew is wide enough for a damping that follows a hand. */
 	if (run->waved && v3_length(t->command_N) >
-				  run->plan->guard.cap_N_s_mm * t->velocity_mm_s + 1e-9)
+				  run->plan->guard->cap_N_s_mm * t->velocity_mm_s + 1e-9)
 		FAIL(run, "%g N at %g mm/s in free air", v3_length(t->command_N),
 		     t->velocity_mm_s);
 }

@@ -502,7 +502,9 @@ static void test_fed_tracker(void **state)
 	struct incise_error err;
 
 	fed_folder_make(&folder);
-	often = fed_scene(&folder, "rate_hz = 20000; tissue = { reaction_N_mm = 0.01; };",
+	often = fed_scene(&folder,
+			  "rate_hz = 20000; tissue = { reaction_N_mm = 0.01; };"
+			  "limits = { pose_age_ms = 100; };",
 			  &err);
 	assert_non_null(often);
 	slow = incise_plan_new_fed(often, &late, &err);
