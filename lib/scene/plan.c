@@ -74,7 +74,6 @@ static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 
 static void take_tissue(struct incise_plan *plan)
 {
-	static const double origin[3], any[3] = {0, 0, 1};
 	const struct incise_scene *scene = plan->scene;
 
 	plan->gain = scene->tissue.gain;
@@ -83,8 +82,6 @@ static void take_tissue(struct incise_plan *plan)
 	plan->damping_N_s_mm = plan->gain * scene->tissue.damping_N_s_mm;
 	plan->insertion_N_mm = plan->gain * scene->tissue.insertion_N_mm;
 	plan->spread_N_mm = plan->gain * scene->tissue.spread_N_mm;
-	incise_fixed_spring_set(&plan->reaction, plan->reaction_N_mm, origin, any);
-	incise_fixed_spring_set(&plan->plane, plan->plane_N_mm, origin, any);
 }
 
 /*

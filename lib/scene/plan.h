@@ -73,7 +73,8 @@ struct incise_plan {
 	const struct incise_fixed *fixed;
 	struct incise_fixed *own_fixed; /* compiled here */
 	double reaction_N_mm, plane_N_mm, damping_N_s_mm, insertion_N_mm, spread_N_mm;
-	struct incise_fixed_spring reaction, plane; /* in fixed point; anchor at 0 */
+	struct incise_fixed_spring
+		plane;	  /* in fixed point, as it was when contact began */
 	bool in_incision; /* the instrument went in where the blade had cut */
 
 	/* guard, start, limit */

@@ -8,7 +8,7 @@
 
 /*
  * Below this depth the direction from tool to proxy is rounding: the surface's own normal
- * takes its place. Single doubles of positions within 10 m are good to 2e-12 mm.
+ * takes its place. Positions within 10 m are good to 2e-12 mm.
  */
 #define SHALLOW_MM 1e-6
 

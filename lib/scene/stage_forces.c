@@ -46,14 +46,14 @@ int incise_stage_reaction(struct incise_plan *plan, struct incise_tick *tick)
 int incise_stage_reaction_fixed(struct incise_plan *plan, struct incise_tick *tick)
 {
 	static const double origin[3];
+	struct incise_fixed_spring spring;
 	double below[3] = {0};
 
 	if (tick->phase != INCISE_PHASE_CUTTING)
 		return 0;
 	v3_add(below, below, -plan->depth_mm, plan->normal);
-	incise_fixed_spring_set(&plan->reaction, plan->reaction_N_mm, origin,
-				plan->normal);
-	add_fixed(plan->force_N, &plan->reaction, below, origin, true);
+	if (!incise_fixed_spring_set(&spring, plan->reaction_N_mm, origin, plan->normal))
+		add_fixed(plan->force_N, &spring, below, origin, true);
 	return 0;
 }
 

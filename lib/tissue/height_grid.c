@@ -14,8 +14,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include "../base/text.h"
 #include "reader.h"
-#include "text.h"
 
 enum key { NCOLS, NROWS, XLL_CORNER, XLL_CENTER, YLL_CORNER, YLL_CENTER, CELL, NODATA };
 

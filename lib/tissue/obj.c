@@ -11,8 +11,8 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../base/text.h"
 #include "reader.h"
-#include "text.h"
 
 #define UV_NONE UINT32_MAX
 #define POINTS_MAX (3 * (size_t)INCISE_SURFACE_TRIANGLES_MAX)

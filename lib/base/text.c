@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include "c_locale.h"
 #include "text.h"
-#include "../base/c_locale.h"
 
 int text_open(struct text *text, const char *path, struct incise_error *err)
 {

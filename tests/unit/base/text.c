@@ -12,7 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../../../lib/tissue/text.h"
+#include "../../../lib/base/text.h"
 
 static void test_numbers_are_rounded_correctly(void **state)
 {
