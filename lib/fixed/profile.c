@@ -261,19 +261,21 @@ int64_t incise_profile_velocity(const struct incise_profile *profile)
 uint64_t incise_profile_stopping_steps(const struct incise_profile_limits *limits,
 				       uint32_t velocity)
 {
-	uint64_t v, way, lag, travel;
+	uint64_t v, way, travel, n;
 
 	if (!limits_fit(limits) || average(limits) > INCISE_PROFILE_AVERAGE_MAX)
 		return INCISE_RAMP_UNBOUNDED;
+	n = average(limits);
 	v = velocity_per_tick(limits, velocity);
 	travel = (uint64_t)((int64_t)limits->position_max - limits->position_min);
 	way = incise_ramp_way(v, acceleration_per_tick(limits));
 	if (way >= travel * STEP)
 		return travel;
-	/* The output trails by the mean of 0 … N-1 ticks, and by less than 1. */
-	lag = v * (average(limits) - 1) / 2 + 1;
+	/* The average trails by the mean of 0 … n-1 ticks, and is rounded down. */
+	if (v && n > 1)
+		way += (v * (n - 1) + 1) / 2 + 1;
 	/* A step is due when the position gets there: rounded up to the whole. */
-	way = (way + lag + STEP - 1) >> 32;
+	way = (way + STEP - 1) >> 32;
 	return way < travel ? way : travel;
 }
 

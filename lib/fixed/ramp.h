@@ -19,7 +19,7 @@ void incise_ramp_tick(struct incise_ramp *ramp);
 
 /*
  * The way from velocity v to rest, without the tick at v itself: v - a, v - 2a, … down to
- * what is left. INCISE_RAMP_UNBOUNDED where it is more than that.
+ * what is left. May be INCISE_RAMP_UNBOUNDED from 2^62 on.
  */
 uint64_t incise_ramp_way(uint64_t velocity, uint64_t acceleration);
 
