@@ -67,6 +67,7 @@ all: libs tools
 include mk/lib.mk
 include mk/tools.mk
 include mk/test.mk
+include mk/fuzz.mk
 include mk/install.mk
 
 help:

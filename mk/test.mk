@@ -17,7 +17,7 @@ $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 check: ## install what is missing, build, and run all tests
 	@mk/deps build check demo
 	+@$(MAKE) --no-print-directory all
-	+@$(MAKE) --no-print-directory check-style check-unit check-cli check-sanitize
+	+@$(MAKE) --no-print-directory check-style check-unit check-cli check-sanitize check-fuzz
 
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8

@@ -83,16 +83,13 @@ static uint64_t velocity_per_tick(const struct incise_profile_limits *limits,
 	return per_tick((uint64_t)velocity << 32, limits->tick_ns);
 }
 
-/* What no velocity within the limits can use is left out. */
 static uint64_t acceleration_per_tick(const struct incise_profile_limits *limits)
 {
-	uint64_t top = velocity_per_tick(limits, limits->velocity);
 	uint64_t a = per_tick((uint64_t)limits->acceleration << 32, limits->tick_ns);
 
 	a = per_tick(a, limits->tick_ns);
-	if (average(limits) > 1)
-		a--; /* for the rounding of the average; at least 9 are left */
-	return a < 2 * top ? a : 2 * top;
+	/* One off for the rounding of the average; of the smallest, 10, are 9 left. */
+	return average(limits) > 1 ? a - 1 : a;
 }
 
 int incise_profile_init(struct incise_profile *profile,

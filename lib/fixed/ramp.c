@@ -16,10 +16,10 @@
  * n moves by 1 per tick at most and is kept, not computed.
  *
  * Nothing overflows. Positions lie within ±10⁹·2^32 < 2^62, ways between them within
- * W = 2·10⁹·2^32 < 2^63. Velocities are at most 400·2^32 < 2^41 and accelerations at most
- * twice that. It always can stop within the limits: S(v - a) ≤ W; so for the fastest v that
- * a tick may ask for S ≤ W + 2v + 2a < W + 2^44, and the largest number here, 2·S, stays
- * below 2^64 - 2^60. It counts without sign.
+ * W = 2·10⁹·2^32 < 2^63; velocities are at most 400·2^32 < 2^41, accelerations 2^46. It can
+ * always stop within the limits: S(v - a) ≤ W. The fastest that a tick may ask for is v + a,
+ * with S(v + a) = S(v - a) + 2v + a < W + 2^43; where a is beyond all velocities, S is just
+ * the velocity. So the largest number here, 2·S, stays below 2^64 - 2^60. It has no sign.
  */
 #include "division.h"
 #include "ramp.h"

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# Fuzz targets: tests/fuzz/NAME.c defines LLVMFuzzerTestOneInput() and is found by its name;
+# tests/fuzz/NAME/ holds inputs that are always tried first: starting points, and those that
+# once failed. A target is linked to all of lib/fixed; fuzz_NAME names sources beside that.
+#
+#   make check-fuzz FUZZ_RUNS=10000000    longer
+#   build/tests/fuzz/NAME FILE            one input again
+
+FUZZ_RUNS ?= 40000
+CLANG ?= $(firstword $(foreach name,clang $(addprefix clang-,22 21 20 19 18 17 16 15 14),\
+	$(shell command -v $(name))))
+
+fuzz_sources := $(wildcard tests/fuzz/*.c)
+fuzz_programs := $(patsubst tests/%.c,$(O)/tests/%,$(fuzz_sources))
+
+fuzz_flags := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined \
+	-fno-sanitize-recover=all
+
+$(O)/obj/fuzz/%.o: %.c
+	@mkdir -p $(@D)
+	$(CLANG) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \
+		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
+
+fuzz_core := $(patsubst %.c,$(O)/obj/fuzz/%.o,$(wildcard lib/fixed/*.c))
+define fuzz_program
+$(O)/tests/fuzz/$1: $(O)/obj/fuzz/tests/fuzz/$1.o $(fuzz_core) \
+		$$(patsubst %.c,$(O)/obj/fuzz/%.o,$$(fuzz_$1))
+	@mkdir -p $$(@D)
+	$$(CLANG) $$(fuzz_flags) -fsanitize=fuzzer -o $$@ $$^ -lm
+endef
+$(foreach name,$(basename $(notdir $(fuzz_sources))),$(eval $(call fuzz_program,$(name))))
+
+# Whether there is a clang, and its libFuzzer with it, which is a package of its own.
+has_fuzzer = $(if $(CLANG),$(shell echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' | \
+	$(CLANG) -fsanitize=fuzzer,address,undefined -x c -o /dev/null - 2>/dev/null && echo yes))
+
+check-fuzz: ## fuzz targets, a bounded number of runs each
+	+@if [ -n "$(has_fuzzer)" ]; then \
+		$(MAKE) --no-print-directory fuzz-programs && \
+		tests/fuzz/run $(FUZZ_RUNS) $(fuzz_programs); \
+	else \
+		echo "skipped: fuzz, which needs clang and libclang-rt-dev (here: $(or $(CLANG),none))"; \
+	fi
+
+fuzz-programs: $(fuzz_programs)
+
+.PHONY: check-fuzz fuzz-programs
