@@ -35,7 +35,7 @@ static uint64_t per_tick(uint64_t x, uint32_t tick_ns)
 	return seconds * tick_ns + div_u64((uint64_t)rest * tick_ns, SECOND_NS);
 }
 
-static int64_t clamp(int64_t v, int64_t least, int64_t most)
+static int64_t hold(int64_t v, int64_t least, int64_t most)
 {
 	if (v > most)
 		return most;
@@ -43,7 +43,7 @@ static int64_t clamp(int64_t v, int64_t least, int64_t most)
 }
 
 /* x/y rounded up; x + y < 2^64. */
-static uint64_t up(uint64_t x, uint32_t y)
+static uint64_t rounded_up(uint64_t x, uint32_t y)
 {
 	return div_u64(x + y - 1, y);
 }
@@ -71,7 +71,7 @@ static uint64_t average(const struct incise_profile_limits *limits)
 
 	if (!limits->jerk)
 		return 1;
-	n = up((uint64_t)limits->acceleration * 2 * SECOND_NS, limits->tick_ns);
+	n = rounded_up((uint64_t)limits->acceleration * 2 * SECOND_NS, limits->tick_ns);
 	return div64_u64(n - 1, limits->jerk) + 1;
 }
 
@@ -129,13 +129,13 @@ int64_t incise_profile_target(struct incise_profile *profile,
 	uint64_t top;
 
 	if (mode == INCISE_PROFILE_POSITION) {
-		target = clamp(target, profile->min / STEP, profile->max / STEP);
+		target = hold(target, profile->min / STEP, profile->max / STEP);
 		set_target(profile, target * STEP, profile->velocity_max);
 		return target;
 	}
 	if (mode != INCISE_PROFILE_VELOCITY)
 		target = 0;
-	target = clamp(target, -(int64_t)profile->velocity, profile->velocity);
+	target = hold(target, -(int64_t)profile->velocity, profile->velocity);
 	top = (uint64_t)(target < 0 ? -target : target) << 32;
 	set_target(profile, target < 0 ? profile->min : profile->max,
 		   per_tick(top, profile->tick_ns));
@@ -149,7 +149,7 @@ void incise_profile_stop(struct incise_profile *profile)
 
 void incise_profile_halt(struct incise_profile *profile, int32_t position)
 {
-	int64_t at = clamp(position * STEP, profile->min, profile->max);
+	int64_t at = hold(position * STEP, profile->min, profile->max);
 
 	incise_ramp_stand(&profile->ramp, at);
 	profile->ramp.top = profile->velocity_max;
@@ -228,12 +228,13 @@ uint32_t incise_profile_step_ns(const struct incise_profile_slot *slot, int32_t 
 {
 	uint64_t way =
 		(uint64_t)(slot->dir < 0 ? slot->from - slot->to : slot->to - slot->from);
+	uint64_t there;
 
 	if (slot->n <= 0 || !way)
 		return slot->tick_ns;
-	k = (int32_t)clamp(k, 0, slot->n - 1);
-	return (uint32_t)div64_u64(
-		(slot->first + (uint64_t)k * STEP) * slot->tick_ns + way - 1, way);
+	k = (int32_t)hold(k, 0, slot->n - 1);
+	there = slot->first + (uint64_t)k * STEP;
+	return (uint32_t)div64_u64(there * slot->tick_ns + way - 1, way);
 }
 
 bool incise_profile_resting(const struct incise_profile *profile)

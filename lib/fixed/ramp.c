@@ -13,7 +13,8 @@
  *   0 ┼───────▶  rounding leaves over, at most n, a later tick takes: it ends on the target
  *      ticks     to the last bit.
  *
- * n moves by 1 per tick at most and is kept, not computed.
+ * n moves by 1 per tick at most and is kept, not computed. No motion within the limits is at
+ * rest on the target in fewer ticks: the test tries all small ones.
  *
  * Nothing overflows. Positions lie within ±10⁹·2^32 < 2^62, ways between them within
  * W = 2·10⁹·2^32 < 2^63; velocities are at most 400·2^32 < 2^41, accelerations 2^46. It can
