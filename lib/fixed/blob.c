@@ -3,6 +3,7 @@
  * Validating a blob in full: after this no input can make an evaluator read outside of
  * it, shift by a wrong amount or overflow. Blobs come from files and go to kernels.
  */
+#include "division.h"
 #include "layout.h"
 
 /* Without errno.h, which a kernel does not have in this form. */
@@ -109,7 +110,7 @@ static int check_direct(const struct incise_fixed *fx)
 				x = magnitude(fx->input[i - 1].max);
 				x = x > low ? x : low;
 			}
-			if (x && c > ((uint64_t)1 << 62) / x)
+			if (x && c > div64_u64((uint64_t)1 << 62, x))
 				return BAD;
 			sum += c * x;
 			if (sum > (uint64_t)1 << 62)
@@ -130,7 +131,7 @@ static int check_direct(const struct incise_fixed *fx)
 		}
 	}
 	/* Σ w·y with w ≤ 2^30. */
-	return largest <= ((uint64_t)1 << 62 >> 30) / (uint32_t)fx->n_rules ? 0 : BAD;
+	return largest <= div_u64(1ull << 62 >> 30, (uint32_t)fx->n_rules) ? 0 : BAD;
 }
 
 /* Weights are not negative and add up to 1 within rounding, in every row. */

@@ -11,6 +11,7 @@
  * Taking the smallest exponent of each input away first does not change the quotient,
  * and makes the largest weight of the grid 1: the sum of weights is never 0.
  */
+#include "division.h"
 #include "layout.h"
 
 #define Z_MAX (((int64_t)1 << 31) - 1)
@@ -87,6 +88,6 @@ int64_t incise_fx_direct(const struct incise_fixed *fx, const uint32_t *from_min
 			sum += w * (rule >> shift);
 			weights += w;
 		}
-	y = sum / weights;
+	y = div64_s64(sum, weights);
 	return (y + ((int64_t)1 << (fx->shift_b - 17))) >> (fx->shift_b - 16);
 }

@@ -21,6 +21,11 @@ static inline uint64_t div64_u64(uint64_t dividend, uint64_t divisor)
 	return dividend / divisor;
 }
 
+static inline int64_t div64_s64(int64_t dividend, int64_t divisor)
+{
+	return dividend / divisor;
+}
+
 static inline uint64_t div_u64_rem(uint64_t dividend, uint32_t divisor, uint32_t *rest)
 {
 	*rest = (uint32_t)(dividend % divisor);
