@@ -68,6 +68,7 @@ include mk/lib.mk
 include mk/tools.mk
 include mk/test.mk
 include mk/fuzz.mk
+include mk/vm.mk
 include mk/install.mk
 
 help:

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# Tests that need a kernel: tests/vm boots Debian's own ones in QEMU.
+
+# Programs that the scripts in tests/vm/guest call; they reach into the library as unit
+# tests do.
+guest_programs := $(patsubst tests/vm/guest/%.c,$(O)/tests/vm/%,$(wildcard tests/vm/guest/*.c))
+
+$(O)/tests/vm/%: tests/vm/guest/%.c $(O)/lib/libincise-tests.a
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) $(CFLAGS) \
+		-MMD -MP -MF $@.d $(LDFLAGS) -o $@ $< $(O)/lib/libincise-tests.a $(all_libs) -lm
+
+# Virtual time for whatever asserts on time, two processors for races.
+vm_boots := main:deterministic second:deterministic main:smp
+
+check-vm: all $(guest_programs) ## tests of the kernel modules, on Debian's kernels in QEMU
+	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed $(vm_boots)
+
+check-vm-debug: all $(guest_programs) ## the same on a kernel with KASAN, lockdep, kmemleak; built once
+	@mk/deps vm vm-debug
+	+@tests/vm/debug-kernel >/dev/null
+	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" INCISE_VM_TIMEOUT=900 tests/vm/check \
+		debug:deterministic debug:smp
+
+.PHONY: check-vm check-vm-debug

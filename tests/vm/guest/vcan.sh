@@ -1,0 +1,16 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
+# A virtual CAN bus carries a frame: modules of the guest's own kernel load.
+. tests/vm/tap
+
+modprobe vcan 2>/dev/null || skip "vcan" "this kernel has no vcan"
+ip link add vcan0 type vcan
+ip link set vcan0 up
+candump -n 1 -T 2000 vcan0 >/run/candump &
+dump=$!
+# The socket of the reader is there when the kernel lists one on the bus.
+while ! grep -qs vcan0 /proc/net/can/rcvlist_all && kill -0 $dump; do :; done
+cansend vcan0 123#DEADBEEF
+wait $dump
+check "a frame arrives as it was sent" grep -q '123   \[4\]  DE AD BE EF' /run/candump
+ip link del vcan0
