@@ -70,6 +70,7 @@ include mk/test.mk
 include mk/fuzz.mk
 include mk/vm.mk
 include mk/install.mk
+include mk/module.mk
 
 help:
 	@sed -n 's/^\([a-z][a-z-]*\):.*## /\1  /p' $(MAKEFILE_LIST) | sort | \

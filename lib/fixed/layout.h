@@ -26,6 +26,8 @@
 
 #include <incise/fixed.h>
 
+#include "integers.h"
+
 #define INCISE_FX_MAGIC "INCISEFX"
 #define INCISE_FX_VERSION 1
 

@@ -12,6 +12,8 @@
  */
 #include <incise/fixed_spring.h>
 
+#include "integers.h"
+
 /* P - P0 beyond this counts as this: 16384 mm. */
 #define AWAY_MAX (1 << 30)
 
