@@ -13,6 +13,9 @@ libdir ?= $(prefix)/lib
 includedir ?= $(prefix)/include
 datadir ?= $(prefix)/share
 mandir ?= $(datadir)/man
+# systemd reads these below /usr/local too
+udevrulesdir ?= $(prefix)/lib/udev/rules.d
+sysusersdir ?= $(prefix)/lib/sysusers.d
 completiondir ?= $(datadir)/bash-completion/completions
 
 CFLAGS ?= -O2 -g

@@ -4,6 +4,8 @@
 headers := $(wildcard lib/include/incise/*.h)
 man_pages := $(wildcard man/*.[1-8])
 scenes := $(wildcard scenes/*.scene scenes/*.fis)
+udev_rules := $(wildcard udev/*.rules)
+sysusers := $(wildcard udev/*.sysusers)
 
 # Every file that `install` makes, relative to nothing: uninstall removes just these.
 installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
@@ -13,7 +15,9 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach lib,$(libraries),$(libdir)/pkgconfig/$(lib).pc) \
 	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
 	$(addprefix $(datadir)/incise/scenes/,$(notdir $(scenes))) \
-	$(completiondir)/incise
+	$(completiondir)/incise \
+	$(addprefix $(udevrulesdir)/,$(notdir $(udev_rules))) \
+	$(addprefix $(sysusersdir)/,$(patsubst %.sysusers,%.conf,$(notdir $(sysusers))))
 
 install: all ## install below $(DESTDIR)$(prefix)
 	$(INSTALL) -d $(addprefix $(DESTDIR),$(sort $(dir $(installed))))
@@ -34,6 +38,11 @@ install: all ## install below $(DESTDIR)$(prefix)
 	done
 	$(INSTALL) -m 644 $(scenes) $(DESTDIR)$(datadir)/incise/scenes
 	$(INSTALL) -m 644 tools/incise.bash $(DESTDIR)$(completiondir)/incise
+	$(INSTALL) -m 644 $(udev_rules) $(DESTDIR)$(udevrulesdir)
+	for file in $(sysusers); do \
+		$(INSTALL) -m 644 $$file \
+			$(DESTDIR)$(sysusersdir)/$$(basename $$file .sysusers).conf || exit 1; \
+	done
 
 uninstall: ## remove what install installed
 	rm -f $(addprefix $(DESTDIR),$(installed))

@@ -26,4 +26,39 @@ module: module_headers ## incise_stepper.ko for the running kernel, or for KDIR=
 	@find $(module_dir) -xtype l -delete
 	$(module_make) modules
 
-.PHONY: module module_headers
+# Where depmod looks first. The kernel's own depmod step wants System.map, which Debian's
+# headers do not have, and says that it was skipped: hence ours.
+module_folder := updates
+module_installed = $(DESTDIR)$(INSTALL_MOD_PATH)/lib/modules/$(module_release)/$(module_folder)
+depmod = $(if $(DESTDIR)$(INSTALL_MOD_PATH),:,depmod $(module_release))
+
+module_install: module ## install the module for that kernel, below $(DESTDIR)$(INSTALL_MOD_PATH)
+	$(module_make) INCISE_SIM= modules >/dev/null
+	$(module_make) INCISE_SIM= modules_install INSTALL_MOD_DIR=$(module_folder) \
+		INSTALL_MOD_PATH=$(abspath $(DESTDIR)$(INSTALL_MOD_PATH))
+	$(depmod)
+
+module_uninstall: module_headers ## remove what module_install installed
+	rm -f $(addprefix $(module_installed)/incise_stepper.ko,'' .gz .xz .zst)
+	$(depmod)
+
+# A source tree for dkms, which then builds the module for each kernel that is installed.
+# Without the simulator, which is for tests.
+srcdir ?= $(prefix)/src
+dkms_dir = $(srcdir)/incise-$(version)
+dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe) \
+	$(filter-out %.mod.c,$(wildcard $(addprefix driver/,*.[ch] uapi/*.h compat/*.c))) \
+	$(wildcard lib/fixed/*.[ch]) $(shell grep -l __KERNEL__ lib/include/incise/*.h) \
+	lib/include/incise/export.h
+
+dkms_install: ## install the module's sources for dkms in $(DESTDIR)$(srcdir)
+	$(INSTALL) -d $(addprefix $(DESTDIR)$(dkms_dir)/,$(sort $(dir $(dkms_sources))))
+	for file in $(dkms_sources); do \
+		$(INSTALL) -m 644 $$file $(DESTDIR)$(dkms_dir)/$$file || exit 1; \
+	done
+	sed 's|@version@|$(version)|' driver/dkms.conf.in >$(DESTDIR)$(dkms_dir)/dkms.conf
+
+dkms_uninstall: ## remove them
+	rm -rf $(DESTDIR)$(dkms_dir)
+
+.PHONY: module module_headers module_install module_uninstall dkms_install dkms_uninstall
