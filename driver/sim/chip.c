@@ -14,6 +14,7 @@
 #include <linux/seq_file.h>
 #include <linux/slab.h>
 
+#include "../compat.h"
 #include "sim.h"
 
 bool sim_level_locked(const struct sim *sim, unsigned int line)
@@ -82,33 +83,7 @@ static int sim_set(struct gpio_chip *chip, unsigned int line, int value)
 	return 0;
 }
 
-static int sim_set_multiple(struct gpio_chip *chip, unsigned long *mask,
-			    unsigned long *bits)
-{
-	struct sim *sim = gpiochip_get_data(chip);
-	unsigned long flags;
-	unsigned int line;
-
-	raw_spin_lock_irqsave(&sim->lock, flags);
-	for_each_set_bit(line, mask, sim->lines)
-		sim_put_out_locked(sim, line, test_bit(line, bits));
-	sim_settle_locked(sim);
-	raw_spin_unlock_irqrestore(&sim->lock, flags);
-	return 0;
-}
-
-/* Until 6.16 they return nothing. */
-static void __maybe_unused sim_set_void(struct gpio_chip *chip, unsigned int line,
-					int value)
-{
-	sim_set(chip, line, value);
-}
-
-static void __maybe_unused sim_set_multiple_void(struct gpio_chip *chip,
-						 unsigned long *mask, unsigned long *bits)
-{
-	sim_set_multiple(chip, mask, bits);
-}
+COMPAT_GPIO_SET(sim_set)
 
 static int sim_get(struct gpio_chip *chip, unsigned int line)
 {
@@ -181,12 +156,7 @@ int sim_chip_add(struct sim *sim, struct device *parent)
 	chip->direction_input = sim_direction_input;
 	chip->direction_output = sim_direction_output;
 	chip->get = sim_get;
-	/* The type that this kernel wants says which: no probe needed. */
-	chip->set = __builtin_choose_expr(__same_type(*chip->set, sim_set), sim_set,
-					  sim_set_void);
-	chip->set_multiple =
-		__builtin_choose_expr(__same_type(*chip->set_multiple, sim_set_multiple),
-				      sim_set_multiple, sim_set_multiple_void);
+	chip->set = compat_gpio_set(sim_set);
 	sim_interrupt_init(sim);
 	return gpiochip_add_data(chip, sim);
 }

@@ -38,6 +38,25 @@
  *	  min active              home                    max active
  *	 ------------|         |--------|              |------------
  *	          min_at     home_at: from..to       max_at        position
+ *
+ * The ADC is the IIO device INCISE_SIM_ADC: channel voltage0 (12 bits, mV =
+ * (raw - 2048) * 5000 / 4096) and timestamp, trigger INCISE_SIM_TRIGGER
+ * (current by default), sampling_frequency 1 to 20000 Hz at both.
+ *
+ *  adc/waveform write   __u16 raw codes 0 to 4095, appended to those that are
+ *                       queued; may be taken in part, ENOSPC when 2^20 are
+ *                       queued
+ *  adc/control  write   "repeat": what is queued is played again and again,
+ *                       from its start when a buffer is enabled (default)
+ *                       "once": each is played once and makes room
+ *                       "clear": nothing is queued
+ *                       "reset": all counts of adc/status to 0
+ *  adc/status   read    conversions = pushed + held + overflows + lost
+ *
+ * pushed (given to IIO, or read by in_voltage0_raw), held (not yet given),
+ * overflows (IIO's buffer was full), lost (256 were held), skipped (periods
+ * without a conversion, the timer was late), underruns (nothing was queued, the
+ * last code was converted again), queued, mode.
  */
 #ifndef INCISE_SIM_H
 #define INCISE_SIM_H
@@ -47,9 +66,16 @@
 #define INCISE_SIM_LABEL "incise-sim"
 #define INCISE_SIM_DIR "/sys/kernel/debug/incise_sim"
 
+#define INCISE_SIM_ADC "incise-sim-adc"
+#define INCISE_SIM_TRIGGER "incise-sim-timer"
+
 #define INCISE_SIM_LINES_MAX 256
 #define INCISE_SIM_CARRIAGES 8
 #define INCISE_SIM_SCRIPTS 64
+#define INCISE_SIM_ADC_WAVEFORM 1048576
+#define INCISE_SIM_ADC_MAX 4095
+#define INCISE_SIM_ADC_ZERO 2048
+#define INCISE_SIM_ADC_HZ_MAX 20000
 
 /* The line is an input; the change came from the simulator, not from set(). */
 #define INCISE_SIM_EDGE_INPUT 0x01

@@ -9,6 +9,8 @@
 #include <linux/module.h>
 #include <linux/platform_device.h>
 
+#include "../compat.h"
+#include "adc.h"
 #include "sim.h"
 
 static unsigned int lines = 64;
@@ -20,6 +22,7 @@ module_param(ring, uint, 0444);
 MODULE_PARM_DESC(ring, "Edges that are held for a reader, up to 2^24");
 
 static struct sim sim_instance;
+static struct sim_adc sim_adc_instance;
 static struct platform_device *sim_device;
 
 static int sim_probe(struct platform_device *device)
@@ -30,39 +33,35 @@ static int sim_probe(struct platform_device *device)
 	ret = sim_chip_add(sim, &device->dev);
 	if (ret)
 		return ret;
+	ret = sim_adc_add(&sim_adc_instance, &device->dev);
+	if (ret) {
+		sim_chip_remove(sim);
+		return ret;
+	}
 	platform_set_drvdata(device, sim);
 	sim->dir = debugfs_create_dir("incise_sim", NULL);
 	sim_chip_files(sim);
 	sim_edges_files(sim);
 	sim_carriage_files(sim);
 	sim_script_files(sim);
+	sim_adc_files(&sim_adc_instance, sim->dir);
 	return 0;
 }
 
-static int sim_remove(struct platform_device *device)
+static void sim_remove(struct platform_device *device)
 {
 	struct sim *sim = platform_get_drvdata(device);
 
 	debugfs_remove_recursive(sim->dir);
+	sim_adc_remove(&sim_adc_instance);
 	sim_chip_remove(sim);
-	return 0;
 }
 
-/* From 6.11 on it returns nothing. */
-static void __maybe_unused sim_remove_void(struct platform_device *device)
-{
-	sim_remove(device);
-}
-
-/* The type that this kernel wants says which: no probe needed. */
-#define SIM_REMOVE                                                                   \
-	__builtin_choose_expr(__same_type(*((struct platform_driver *)NULL)->remove, \
-					  sim_remove),                               \
-			      sim_remove, sim_remove_void)
+COMPAT_PLATFORM_REMOVE(sim_remove)
 
 static struct platform_driver sim_driver = {
 	.probe = sim_probe,
-	.remove = SIM_REMOVE,
+	.remove = compat_platform_remove(sim_remove),
 	.driver = {.name = INCISE_SIM_LABEL},
 };
 
@@ -78,9 +77,12 @@ static int __init sim_init(void)
 	ret = sim_edges_init(sim, ring);
 	if (ret)
 		return ret;
-	ret = platform_driver_register(&sim_driver);
+	ret = sim_adc_init(&sim_adc_instance);
 	if (ret)
 		goto out_free_edges;
+	ret = platform_driver_register(&sim_driver);
+	if (ret)
+		goto out_free_adc;
 	sim_device = platform_device_register_simple(INCISE_SIM_LABEL,
 						     PLATFORM_DEVID_NONE, NULL, 0);
 	if (IS_ERR(sim_device)) {
@@ -91,6 +93,8 @@ static int __init sim_init(void)
 
 out_unregister_driver:
 	platform_driver_unregister(&sim_driver);
+out_free_adc:
+	sim_adc_free(&sim_adc_instance);
 out_free_edges:
 	sim_edges_free(sim);
 	return ret;
@@ -101,6 +105,7 @@ static void __exit sim_exit(void)
 {
 	platform_device_unregister(sim_device);
 	platform_driver_unregister(&sim_driver);
+	sim_adc_free(&sim_adc_instance);
 	sim_edges_free(&sim_instance);
 }
 module_exit(sim_exit);
