@@ -2,13 +2,17 @@
 # Tests that need a kernel: tests/vm boots Debian's own ones in QEMU.
 
 # Programs that the scripts in tests/vm/guest call; they reach into the library as unit
-# tests do.
+# tests do, and share tests/vm/*.c.
+guest_shared := $(wildcard tests/vm/*.c)
+guest_headers := $(wildcard tests/vm/*.h driver/sim/incise_sim.h driver/uapi/*.h)
 guest_programs := $(patsubst tests/vm/guest/%.c,$(O)/tests/vm/%,$(wildcard tests/vm/guest/*.c))
 
-$(O)/tests/vm/%: tests/vm/guest/%.c $(O)/lib/libincise-tests.a
+$(O)/tests/vm/%: tests/vm/guest/%.c $(guest_shared) $(guest_headers) \
+		$(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) $(CFLAGS) \
-		-MMD -MP -MF $@.d $(LDFLAGS) -o $@ $< $(O)/lib/libincise-tests.a $(all_libs) -lm
+		$(LDFLAGS) -o $@ $< $(guest_shared) $(O)/lib/libincise-tests.a \
+		$(all_libs) -lm
 
 # Virtual time for whatever asserts on time, two processors for races.
 vm_boots := main:deterministic second:deterministic main:smp

@@ -8,7 +8,6 @@
  *
  * Spacing is asserted in virtual time only, where it does not depend on the host.
  */
-#define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -157,8 +156,8 @@ static size_t read_scans(int fd, size_t n)
 }
 
 /*
- * Spacing of the hard timer: in virtual time it was measured within 3.3 us of the period,
- * by other interrupts of the one processor; a tenth of the shortest period is the line.
+ * Spacing of the hard timer: in virtual time it was measured within 6 us of the period, by
+ * other interrupts of the one processor; a fifth of the shortest period is the line.
  */
 static void samples_are_accounted(const char *hertz, size_t n, bool virtual_time)
 {
@@ -201,8 +200,8 @@ static void samples_are_accounted(const char *hertz, size_t n, bool virtual_time
 	      hertz, n);
 	check(!counted("skipped") && !counted("lost") && !counted("overflows"),
 	      "%s Hz: none skipped or lost", hertz);
-	check(got > 1 && least > period_ns - 5000 && most < period_ns + 5000,
-	      "%s Hz: spacing within 5 us of %.0f us", hertz, period_ns / 1e3);
+	check(got > 1 && least > period_ns - 10000 && most < period_ns + 10000,
+	      "%s Hz: spacing within 10 us of %.0f us", hertz, period_ns / 1e3);
 }
 
 static void overflow_is_counted(void)
@@ -228,7 +227,7 @@ static void overflow_is_counted(void)
 
 static void waveform_ends(void)
 {
-	const size_t n = 3000;
+	const size_t n = 2100;
 	bool right = true;
 	size_t got;
 	int fd;
@@ -238,7 +237,7 @@ static void waveform_ends(void)
 	simulator_write("adc/control", "reset");
 	feed_ramp(2000);
 	fd = open(stream, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-	buffer_start("10000", "8192");
+	buffer_start("2000", "8192");
 	got = read_scans(fd, n);
 	attribute_write("buffer0/enable", "0");
 	close(fd);
@@ -293,9 +292,9 @@ int main(int argc, char **argv)
 		return check(false, "incise_sim.ko loads and has an ADC"), 1;
 	says_what_it_is();
 	/* Where time is the host's, a loaded host makes a second of samples take a minute. */
-	samples_are_accounted("1000", virtual_time ? 2000 : 200, virtual_time);
-	samples_are_accounted("10000", virtual_time ? 30000 : 2000, virtual_time);
-	samples_are_accounted("20000", virtual_time ? 30000 : 2000, virtual_time);
+	samples_are_accounted("1000", virtual_time ? 2000 : 50, virtual_time);
+	samples_are_accounted("10000", virtual_time ? 30000 : 500, virtual_time);
+	samples_are_accounted("20000", virtual_time ? 30000 : 500, virtual_time);
 	overflow_is_counted();
 	waveform_ends();
 	leaves_in_peace();

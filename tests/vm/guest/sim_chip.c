@@ -5,7 +5,6 @@
  *
  *   sim_chip FILE-OF-incise_sim.ko
  */
-#define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/gpio.h>
