@@ -1,0 +1,274 @@
+/* SPDX-License-Identifier: GPL-2.0-only */
+/*
+ * incise_stepper.ko inside: the structs that its files share. The door for
+ * programs is uapi/incise_stepper.h.
+ *
+ *   page ──▶ motor ──▶ profile ──▶ edges ──▶ lines      a hard timer per motor
+ *              ▲                                 │
+ *   file ──────┘◀── inputs: limits, e-stop … ◀───┘      hard interrupts
+ *     ▲                │
+ *     └── events ◀─────┘
+ *
+ * Locks, outer first: stepper.mutex (set-up, owner, unbind), motor.lock (raw; all
+ * that moves), events.lock (raw). sync.lock is on its own. No memory of a user is
+ * touched under any of them: mmap() comes with the user's memory locked already.
+ */
+#ifndef INCISE_DRIVER_STEPPER_H
+#define INCISE_DRIVER_STEPPER_H
+
+#include <linux/atomic.h>
+#include <linux/cdev.h>
+#include <linux/device.h>
+#include <linux/hrtimer.h>
+#include <linux/irq_work.h>
+#include <linux/mutex.h>
+#include <linux/notifier.h>
+#include <linux/spinlock.h>
+#include <linux/wait.h>
+
+#include <incise/profile.h>
+
+#include "stepper_page.h"
+#include "uapi/incise_stepper.h"
+
+struct dentry;
+struct file;
+struct fwnode_handle;
+struct gpio_desc;
+struct platform_device;
+struct stepper;
+
+/* Bins of a histogram: [0, 1), [1, 2), [2, 4) … µs; the last one is open. */
+#define STEPPER_BINS 24
+
+struct stepper_histogram {
+	u64 count[STEPPER_BINS];
+	u64 sum_ns;
+	u64 max_ns;
+};
+
+/* Inputs, in the order of the bits INCISE_STEPPER_LINE_… */
+enum stepper_input {
+	STEPPER_LIMIT_MIN,
+	STEPPER_LIMIT_MAX,
+	STEPPER_HOME,
+	STEPPER_ESTOP,
+	STEPPER_DRIVER,
+	STEPPER_INPUTS
+};
+
+/* Outputs, as the tracepoint names them; the inputs' numbers go before. */
+enum stepper_output {
+	STEPPER_ENABLE = STEPPER_INPUTS,
+	STEPPER_DIR,
+	STEPPER_STEP,
+	STEPPER_SYNC
+};
+
+/* An input's interrupt; irq is 0 where its chip has none. */
+struct stepper_irq {
+	struct stepper *stepper;
+	int motor; /* -1: of the controller */
+	enum stepper_input input;
+	int irq;
+};
+
+struct stepper_lines {
+	struct gpio_desc *step, *dir, *enable;
+	struct gpio_desc *input[STEPPER_INPUTS]; /* NULL: there is none */
+	struct stepper_irq irq[STEPPER_INPUTS];
+};
+
+/* What the timer does when it fires next. */
+enum stepper_next {
+	STEPPER_NEXT_TICK,  /* read the set-point, run the profile */
+	STEPPER_NEXT_DIR,   /* change of direction */
+	STEPPER_NEXT_LEAD,  /* leading edge: a step */
+	STEPPER_NEXT_TRAIL, /* end of the pulse */
+	STEPPER_NEXT_NONE
+};
+
+struct stepper_motor {
+	struct stepper *stepper;
+	unsigned int index;
+	struct stepper_lines lines;
+
+	raw_spinlock_t lock; /* all below */
+	struct hrtimer timer;
+	bool timing; /* the timer is queued, or its callback will queue it */
+
+	struct incise_stepper_config config;
+	s64 interval_ns; /* of steps at config.velocity, rounded up */
+	u32 state;
+	u32 faults;
+	u32 inputs;
+	u32 flags;
+	bool powered;
+	bool disabling;	   /* comes to rest to be disabled */
+	s64 position;	   /* sum of steps, and the origin */
+	s64 home_position;
+	u64 steps_up, steps_down, late, shifted_ns;
+
+	/* Set-point */
+	struct stepper_wish wish; /* in force; seq is what was seen */
+	s64 target;		  /* clamped */
+	s64 seen_ns;		  /* the last sign of life */
+
+	/* Motion */
+	struct incise_profile profile;
+	struct incise_profile_slot slot;
+	int given;	/* steps of the slot that are out */
+	s64 base_ns;	/* begin of the slot's tick */
+	s64 powered_ns; /* first step from then on */
+	enum stepper_next next;
+	s64 due_ns;
+
+	/* The lines, at actual times: after the write */
+	bool high;
+	int direction; /* +1, -1 */
+	s64 lead_ns, trail_ns, dir_ns;
+	s64 lead_due_ns; /* of that step by the profile */
+	u32 late_row;
+
+	/* Evidence */
+	struct stepper_histogram lateness, cost;
+	u64 edges;
+};
+
+#define STEPPER_EVENTS 1024 /* a power of two */
+
+struct stepper_events {
+	raw_spinlock_t lock;
+	u64 seq; /* of the last one */
+	struct incise_stepper_event ring[STEPPER_EVENTS];
+};
+
+struct stepper_sync_line {
+	struct gpio_desc *line;
+	raw_spinlock_t lock;
+	struct hrtimer timer;
+	struct incise_stepper_sync sync;
+	bool running;
+	bool high;
+	s64 due_ns; /* of the leading edge that comes, or that just was */
+};
+
+struct stepper {
+	struct device dev;
+	struct cdev cdev;
+	struct device *parent; /* only until unbind */
+	int id;
+
+	struct mutex mutex; /* owner, gone, and all set-up */
+	struct file *owner;
+	bool gone;
+
+	struct incise_stepper_info info;
+	struct incise_stepper_setpoint *setpoints; /* page 0: untrusted */
+	struct incise_stepper_status *status;	   /* page 1 */
+	struct gpio_desc *estop;
+	struct stepper_irq estop_irq;
+	struct stepper_sync_line sync;
+	struct stepper_events events;
+	wait_queue_head_t wait;
+	struct irq_work wake;
+
+	struct notifier_block reboot, panic;
+	struct dentry *debugfs;
+
+	unsigned int n_motors;
+	struct stepper_motor motor[INCISE_STEPPER_MOTORS_MAX];
+};
+
+/* stepper_motor.c */
+void stepper_motor_init(struct stepper_motor *motor);
+void stepper_motor_start(struct stepper_motor *motor); /* motor->lock held */
+void stepper_motor_end(struct stepper_motor *motor);
+
+/* stepper_setup.c: take motor->lock themselves */
+int stepper_setup_ready(struct stepper_motor *motor);
+int stepper_setup_enable(struct stepper_motor *motor);
+void stepper_setup_disable(struct stepper_motor *motor);
+int stepper_setup_clearable(struct stepper_motor *motor);
+void stepper_setup_clear(struct stepper_motor *motor);
+int stepper_setup_config(struct stepper_motor *motor,
+			 const struct incise_stepper_config *config);
+void stepper_setup_get_config(struct stepper_motor *motor,
+			      struct incise_stepper_config *config);
+int stepper_setup_position(struct stepper_motor *motor,
+			   const struct incise_stepper_origin *origin);
+void stepper_setup_fault(struct stepper_motor *motor, u32 fault);
+bool stepper_setup_powered(struct stepper_motor *motor);
+void stepper_setup_halt(struct stepper_motor *motor);
+
+/* stepper_stop.c: motor->lock held */
+void stepper_stop_off(struct stepper_motor *motor, s64 now);
+void stepper_stop_halt(struct stepper_motor *motor, s64 now);
+void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now);
+void stepper_stop_disable(struct stepper_motor *motor, s64 now);
+
+/* stepper_inputs.c: motor->lock held */
+void stepper_inputs_sample(struct stepper_motor *motor, s64 now);
+void stepper_inputs_one(struct stepper_motor *motor, enum stepper_input input, s64 now,
+			bool edge);
+
+/* stepper_status.c: motor->lock held */
+void stepper_status_state(struct stepper_motor *motor, u32 state, s64 now);
+void stepper_status_publish(struct stepper_motor *motor, s64 now);
+
+/* stepper_node.c */
+struct fwnode_handle *stepper_node_motor(struct device *dev, unsigned int motor);
+int stepper_node_count(struct device *dev);
+
+/* stepper_lines.c */
+int stepper_lines_get(struct stepper *stepper, struct device *dev);
+int stepper_lines_listen(struct stepper *stepper);
+void stepper_lines_ignore(struct stepper *stepper);
+
+/* stepper_event.c */
+void stepper_event_init(struct stepper *stepper);
+void stepper_event_put(struct stepper *stepper, const struct incise_stepper_event *event);
+u64 stepper_event_last(struct stepper *stepper);
+unsigned int stepper_event_take(struct stepper *stepper, u64 *after,
+				struct incise_stepper_event *to, unsigned int n);
+
+/* stepper_sync.c */
+void stepper_sync_init(struct stepper *stepper);
+int stepper_sync_set(struct stepper *stepper, const struct incise_stepper_sync *sync);
+void stepper_sync_get(struct stepper *stepper, struct incise_stepper_sync *sync);
+void stepper_sync_off(struct stepper *stepper);
+
+/* stepper_ability.c */
+int stepper_ability_measure(struct stepper *stepper);
+
+/* stepper_defaults.c */
+int stepper_defaults(struct stepper *stepper, struct device *dev);
+
+/* stepper_file.c */
+extern const struct file_operations stepper_file_operations;
+
+/* stepper_histogram.c */
+void stepper_histogram_add(struct stepper_histogram *histogram, s64 ns);
+
+/* stepper_debugfs.c */
+void stepper_debugfs_init(void);
+void stepper_debugfs_exit(void);
+void stepper_debugfs_add(struct stepper *stepper);
+void stepper_debugfs_remove(struct stepper *stepper);
+
+/* stepper_fixed.c */
+void stepper_fixed_init(struct dentry *root);
+void stepper_fixed_exit(void);
+
+/* stepper_device.c */
+struct stepper *stepper_device_new(struct device *parent, unsigned int n_motors);
+int stepper_device_add(struct stepper *stepper);
+void stepper_device_remove(struct stepper *stepper);
+int stepper_device_init(void);
+void stepper_device_exit(void);
+
+/* stepper_configfs.c */
+int stepper_configfs_init(void);
+void stepper_configfs_exit(void);
+
+#endif

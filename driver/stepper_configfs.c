@@ -1,0 +1,442 @@
+// SPDX-License-Identifier: GPL-2.0-only
+/*
+ * Controllers without a device tree:
+ *
+ *   cd /sys/kernel/config/incise-stepper
+ *   mkdir bench bench/motor0
+ *   echo incise-sim:0 >bench/motor0/step
+ *   echo incise-sim:2:active-low >bench/motor0/enable
+ *   echo 1 >bench/live                  binds; cdev says which node it is
+ *   echo 0 >bench/live                  unbinds
+ *
+ * A line is LABEL:OFFSET or LABEL:OFFSET:active-low, or nothing where it is not wired.
+ * While live nothing can be changed (EBUSY) and nothing removed.
+ */
+#include <linux/configfs.h>
+#include <linux/device.h>
+#include <linux/module.h>
+#include <linux/mutex.h>
+#include <linux/slab.h>
+#include <linux/string.h>
+
+#include "stepper.h"
+#include "stepper_wires.h"
+
+const char *const stepper_wire_names[STEPPER_WIRES] = {"estop", "sync"};
+const char *const stepper_motor_wire_names[STEPPER_MOTOR_WIRES] = {
+	"step", "dir", "enable", "limit-min", "limit-max", "home", "fault",
+};
+
+/* A folder of a controller. */
+struct stepper_folder {
+	struct config_group group;
+	struct mutex mutex;
+	struct stepper_wires wires;
+	struct config_item *motor[INCISE_STEPPER_MOTORS_MAX];
+	struct stepper_nodes *live;
+};
+
+/* A motor's folder in it. */
+struct stepper_motor_folder {
+	struct config_group group;
+	struct stepper_folder *folder;
+	unsigned int motor;
+};
+
+static struct configfs_subsystem stepper_configfs;
+
+static struct stepper_folder *to_folder(struct config_item *item)
+{
+	return container_of(to_config_group(item), struct stepper_folder, group);
+}
+
+static struct stepper_motor_folder *to_motor_folder(struct config_item *item)
+{
+	return container_of(to_config_group(item), struct stepper_motor_folder, group);
+}
+
+static ssize_t stepper_wire_show(struct stepper_folder *folder,
+				 const struct stepper_wire *wire, char *page)
+{
+	int n = 0;
+
+	mutex_lock(&folder->mutex);
+	if (wire->label)
+		n = sprintf(page, "%s:%u%s\n", wire->label, wire->offset,
+			    wire->active_low ? ":active-low" : "");
+	mutex_unlock(&folder->mutex);
+	return n;
+}
+
+/* LABEL:OFFSET[:active-low]; a label may have a ':' of its own. */
+static int stepper_wire_parse(struct stepper_wire *wire, char *text)
+{
+	const char *low = ":active-low";
+	size_t n = strlen(text);
+	char *colon;
+	int ret;
+
+	*wire = (struct stepper_wire){};
+	if (!n)
+		return 0;
+	if (n > strlen(low) && !strcmp(text + n - strlen(low), low)) {
+		wire->active_low = true;
+		text[n - strlen(low)] = '\0';
+	}
+	colon = strrchr(text, ':');
+	if (!colon || colon == text)
+		return -EINVAL;
+	*colon = '\0';
+	ret = kstrtouint(colon + 1, 10, &wire->offset);
+	if (ret)
+		return ret;
+	/* U16_MAX means "by the line's name" in a lookup table. */
+	if (wire->offset >= U16_MAX)
+		return -EINVAL;
+	wire->label = kstrdup(text, GFP_KERNEL);
+	return wire->label ? 0 : -ENOMEM;
+}
+
+static ssize_t stepper_wire_store(struct stepper_folder *folder,
+				  struct stepper_wire *wire, const char *page, size_t n)
+{
+	struct stepper_wire parsed;
+	char *text;
+	int ret;
+
+	text = kstrndup(page, n, GFP_KERNEL);
+	if (!text)
+		return -ENOMEM;
+	ret = stepper_wire_parse(&parsed, strim(text));
+	kfree(text);
+	if (ret)
+		return ret;
+
+	mutex_lock(&folder->mutex);
+	if (folder->live)
+		ret = -EBUSY;
+	else
+		swap(*wire, parsed);
+	mutex_unlock(&folder->mutex);
+	kfree(parsed.label);
+	return ret ? ret : (ssize_t)n;
+}
+
+#define STEPPER_MOTOR_LINE(_name, _wire)                                                   \
+	static ssize_t stepper_motor_##_name##_show(struct config_item *item, char *page)  \
+	{                                                                                  \
+		struct stepper_motor_folder *motor = to_motor_folder(item);                \
+                                                                                           \
+		return stepper_wire_show(motor->folder,                                    \
+					 &motor->folder->wires.motor[motor->motor][_wire], \
+					 page);                                            \
+	}                                                                                  \
+	static ssize_t stepper_motor_##_name##_store(struct config_item *item,             \
+						     const char *page, size_t n)           \
+	{                                                                                  \
+		struct stepper_motor_folder *motor = to_motor_folder(item);                \
+                                                                                           \
+		return stepper_wire_store(                                                 \
+			motor->folder, &motor->folder->wires.motor[motor->motor][_wire],   \
+			page, n);                                                          \
+	}                                                                                  \
+	CONFIGFS_ATTR(stepper_motor_, _name)
+
+STEPPER_MOTOR_LINE(step, STEPPER_WIRE_STEP);
+STEPPER_MOTOR_LINE(dir, STEPPER_WIRE_DIR);
+STEPPER_MOTOR_LINE(enable, STEPPER_WIRE_ENABLE);
+STEPPER_MOTOR_LINE(limit_min, STEPPER_WIRE_LIMIT_MIN);
+STEPPER_MOTOR_LINE(limit_max, STEPPER_WIRE_LIMIT_MAX);
+STEPPER_MOTOR_LINE(home, STEPPER_WIRE_HOME);
+STEPPER_MOTOR_LINE(fault, STEPPER_WIRE_FAULT);
+
+static struct configfs_attribute *stepper_motor_attrs[] = {
+	&stepper_motor_attr_step,      &stepper_motor_attr_dir,
+	&stepper_motor_attr_enable,    &stepper_motor_attr_limit_min,
+	&stepper_motor_attr_limit_max, &stepper_motor_attr_home,
+	&stepper_motor_attr_fault,     NULL,
+};
+
+static void stepper_motor_folder_release(struct config_item *item)
+{
+	struct stepper_motor_folder *motor = to_motor_folder(item);
+
+	config_item_put(&motor->folder->group.cg_item);
+	kfree(motor);
+}
+
+static struct configfs_item_operations stepper_motor_folder_ops = {
+	.release = stepper_motor_folder_release,
+};
+
+static const struct config_item_type stepper_motor_folder_type = {
+	.ct_item_ops = &stepper_motor_folder_ops,
+	.ct_attrs = stepper_motor_attrs,
+	.ct_owner = THIS_MODULE,
+};
+
+static struct config_group *stepper_motor_folder_make(struct config_group *group,
+						      const char *name)
+{
+	struct stepper_folder *folder = to_folder(&group->cg_item);
+	struct stepper_motor_folder *motor;
+	int ret = 0;
+
+	if (strlen(name) != 6 || strncmp(name, "motor", 5) || name[5] < '0' ||
+	    name[5] >= '0' + INCISE_STEPPER_MOTORS_MAX)
+		return ERR_PTR(-EINVAL);
+	motor = kzalloc(sizeof(*motor), GFP_KERNEL);
+	if (!motor)
+		return ERR_PTR(-ENOMEM);
+	motor->motor = name[5] - '0';
+
+	mutex_lock(&folder->mutex);
+	if (folder->live) {
+		ret = -EBUSY;
+	} else {
+		config_item_get(&folder->group.cg_item);
+		motor->folder = folder;
+		config_group_init_type_name(&motor->group, name,
+					    &stepper_motor_folder_type);
+		folder->motor[motor->motor] = &motor->group.cg_item;
+	}
+	mutex_unlock(&folder->mutex);
+	if (ret) {
+		kfree(motor);
+		return ERR_PTR(ret);
+	}
+	return &motor->group;
+}
+
+static void stepper_motor_folder_drop(struct config_group *group, struct config_item *item)
+{
+	struct stepper_folder *folder = to_folder(&group->cg_item);
+	struct stepper_motor_folder *motor = to_motor_folder(item);
+	int i;
+
+	mutex_lock(&folder->mutex);
+	folder->motor[motor->motor] = NULL;
+	for (i = 0; i < STEPPER_MOTOR_WIRES; i++) {
+		kfree(folder->wires.motor[motor->motor][i].label);
+		folder->wires.motor[motor->motor][i] = (struct stepper_wire){};
+	}
+	mutex_unlock(&folder->mutex);
+	config_item_put(item);
+}
+
+static ssize_t stepper_folder_estop_show(struct config_item *item, char *page)
+{
+	struct stepper_folder *folder = to_folder(item);
+
+	return stepper_wire_show(folder, &folder->wires.wire[STEPPER_WIRE_ESTOP], page);
+}
+
+static ssize_t stepper_folder_estop_store(struct config_item *item, const char *page,
+					  size_t n)
+{
+	struct stepper_folder *folder = to_folder(item);
+
+	return stepper_wire_store(folder, &folder->wires.wire[STEPPER_WIRE_ESTOP], page,
+				  n);
+}
+CONFIGFS_ATTR(stepper_folder_, estop);
+
+static ssize_t stepper_folder_sync_show(struct config_item *item, char *page)
+{
+	struct stepper_folder *folder = to_folder(item);
+
+	return stepper_wire_show(folder, &folder->wires.wire[STEPPER_WIRE_SYNC], page);
+}
+
+static ssize_t stepper_folder_sync_store(struct config_item *item, const char *page,
+					 size_t n)
+{
+	struct stepper_folder *folder = to_folder(item);
+
+	return stepper_wire_store(folder, &folder->wires.wire[STEPPER_WIRE_SYNC], page, n);
+}
+CONFIGFS_ATTR(stepper_folder_, sync);
+
+/* Name of the platform device, as /sys/bus/platform/devices has it. */
+static ssize_t stepper_folder_dev_name_show(struct config_item *item, char *page)
+{
+	struct stepper_folder *folder = to_folder(item);
+	int n = 0;
+
+	mutex_lock(&folder->mutex);
+	if (folder->live)
+		n = sprintf(page, "%s\n", dev_name(stepper_nodes_device(folder->live)));
+	mutex_unlock(&folder->mutex);
+	return n;
+}
+CONFIGFS_ATTR_RO(stepper_folder_, dev_name);
+
+/* Name of the node in /dev; nothing while it is not bound. */
+static ssize_t stepper_folder_cdev_show(struct config_item *item, char *page)
+{
+	struct stepper_folder *folder = to_folder(item);
+	struct stepper *stepper;
+	struct device *dev;
+	int n = 0;
+
+	mutex_lock(&folder->mutex);
+	if (folder->live) {
+		dev = stepper_nodes_device(folder->live);
+		device_lock(dev); /* it may be unbound through sysfs */
+		stepper = dev_get_drvdata(dev);
+		if (device_is_bound(dev) && stepper)
+			n = sprintf(page, "%s\n", dev_name(&stepper->dev));
+		device_unlock(dev);
+	}
+	mutex_unlock(&folder->mutex);
+	return n;
+}
+CONFIGFS_ATTR_RO(stepper_folder_, cdev);
+
+static ssize_t stepper_folder_live_show(struct config_item *item, char *page)
+{
+	struct stepper_folder *folder = to_folder(item);
+	bool live;
+
+	mutex_lock(&folder->mutex);
+	live = folder->live;
+	mutex_unlock(&folder->mutex);
+	return sprintf(page, "%d\n", live);
+}
+
+static int stepper_folder_bind(struct stepper_folder *folder)
+{
+	struct stepper_nodes *live;
+	int i, n = 0;
+
+	for (i = 0; i < INCISE_STEPPER_MOTORS_MAX; i++)
+		if (folder->motor[i] && i != n++)
+			return -EINVAL; /* a gap before it */
+	if (!n)
+		return -EINVAL;
+	folder->wires.name = config_item_name(&folder->group.cg_item);
+	folder->wires.n_motors = n;
+	live = stepper_nodes_make(&folder->wires);
+	if (IS_ERR(live))
+		return PTR_ERR(live);
+	folder->live = live;
+	return 0;
+}
+
+/* Motors' folders, and with them this one, cannot be removed while live. */
+static void stepper_folder_pin(struct stepper_folder *folder, bool pin)
+{
+	int i;
+
+	for (i = 0; i < INCISE_STEPPER_MOTORS_MAX; i++) {
+		if (!folder->motor[i])
+			continue;
+		if (pin)
+			WARN_ON(configfs_depend_item_unlocked(&stepper_configfs,
+							      folder->motor[i]));
+		else
+			configfs_undepend_item_unlocked(folder->motor[i]);
+	}
+}
+
+static ssize_t stepper_folder_live_store(struct config_item *item, const char *page,
+					 size_t n)
+{
+	struct stepper_folder *folder = to_folder(item);
+	bool live;
+	int ret;
+
+	ret = kstrtobool(page, &live);
+	if (ret)
+		return ret;
+	if (live)
+		stepper_folder_pin(folder, true);
+	mutex_lock(&folder->mutex);
+	if (live == !!folder->live) {
+		ret = -EPERM;
+	} else if (live) {
+		ret = stepper_folder_bind(folder);
+	} else {
+		stepper_nodes_free(folder->live);
+		folder->live = NULL;
+	}
+	mutex_unlock(&folder->mutex);
+	/* One pin per live: not for a try that failed, nor after the end. */
+	if (live ? ret : !ret)
+		stepper_folder_pin(folder, false);
+	return ret ? ret : (ssize_t)n;
+}
+CONFIGFS_ATTR(stepper_folder_, live);
+
+static struct configfs_attribute *stepper_folder_attrs[] = {
+	&stepper_folder_attr_estop, &stepper_folder_attr_sync, &stepper_folder_attr_dev_name,
+	&stepper_folder_attr_cdev,  &stepper_folder_attr_live, NULL,
+};
+
+static void stepper_folder_release(struct config_item *item)
+{
+	struct stepper_folder *folder = to_folder(item);
+	int i;
+
+	if (folder->live)
+		stepper_nodes_free(folder->live);
+	for (i = 0; i < STEPPER_WIRES; i++)
+		kfree(folder->wires.wire[i].label);
+	mutex_destroy(&folder->mutex);
+	kfree(folder);
+}
+
+static struct configfs_item_operations stepper_folder_item_ops = {
+	.release = stepper_folder_release,
+};
+
+static struct configfs_group_operations stepper_folder_group_ops = {
+	.make_group = stepper_motor_folder_make,
+	.drop_item = stepper_motor_folder_drop,
+};
+
+static const struct config_item_type stepper_folder_type = {
+	.ct_item_ops = &stepper_folder_item_ops,
+	.ct_group_ops = &stepper_folder_group_ops,
+	.ct_attrs = stepper_folder_attrs,
+	.ct_owner = THIS_MODULE,
+};
+
+static struct config_group *stepper_folder_make(struct config_group *group,
+						const char *name)
+{
+	struct stepper_folder *folder;
+
+	/* info.name is to hold it. */
+	if (strlen(name) >= sizeof(((struct incise_stepper_info *)0)->name))
+		return ERR_PTR(-ENAMETOOLONG);
+	folder = kzalloc(sizeof(*folder), GFP_KERNEL);
+	if (!folder)
+		return ERR_PTR(-ENOMEM);
+	mutex_init(&folder->mutex);
+	config_group_init_type_name(&folder->group, name, &stepper_folder_type);
+	return &folder->group;
+}
+
+static struct configfs_group_operations stepper_configfs_ops = {
+	.make_group = stepper_folder_make,
+};
+
+static const struct config_item_type stepper_configfs_type = {
+	.ct_group_ops = &stepper_configfs_ops,
+	.ct_owner = THIS_MODULE,
+};
+
+int stepper_configfs_init(void)
+{
+	config_group_init_type_name(&stepper_configfs.su_group, "incise-stepper",
+				    &stepper_configfs_type);
+	mutex_init(&stepper_configfs.su_mutex);
+	return configfs_register_subsystem(&stepper_configfs);
+}
+
+void stepper_configfs_exit(void)
+{
+	configfs_unregister_subsystem(&stepper_configfs);
+	mutex_destroy(&stepper_configfs.su_mutex);
+}

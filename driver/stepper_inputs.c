@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-2.0-only
+/*
+ * Limits, home, e-stop and the power stage's fault: what they do to a motor. Each is
+ * looked at by its interrupt, if it has one, and at each tick; the limit ahead and the
+ * e-stop just before each step as well, so that a lost interrupt costs one step at most.
+ *
+ *   e-stop, driver   a motor with power halts
+ *   limit            it halts if it moves towards it; away from it it may
+ *   home             the position at its leading edge is kept
+ *
+ * All under motor->lock.
+ */
+#include <linux/gpio/consumer.h>
+
+#include "stepper.h"
+
+static bool stepper_inputs_towards(const struct stepper_motor *motor,
+				   enum stepper_input limit)
+{
+	int direction = limit == STEPPER_LIMIT_MAX ? 1 : -1;
+
+	return motor->powered && motor->slot.dir == direction &&
+	       (motor->given < motor->slot.n ||
+		!incise_profile_resting(&motor->profile));
+}
+
+static void stepper_inputs_act(struct stepper_motor *motor, enum stepper_input input,
+			       s64 now)
+{
+	switch (input) {
+	case STEPPER_LIMIT_MIN:
+	case STEPPER_LIMIT_MAX:
+		if (stepper_inputs_towards(motor, input))
+			stepper_stop_fault(motor,
+					   input == STEPPER_LIMIT_MIN
+						   ? INCISE_STEPPER_FAULT_LIMIT_MIN
+						   : INCISE_STEPPER_FAULT_LIMIT_MAX,
+					   now);
+		break;
+	case STEPPER_ESTOP:
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_ESTOP, now);
+		break;
+	case STEPPER_DRIVER:
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_DRIVER, now);
+		break;
+	case STEPPER_HOME:
+	case STEPPER_INPUTS:
+		break;
+	}
+}
+
+static void stepper_inputs_changed(struct stepper_motor *motor, enum stepper_input input,
+				   bool active, s64 now)
+{
+	struct incise_stepper_event event = {
+		.t_ns = now,
+		.position = motor->position,
+		.type = INCISE_STEPPER_EVENT_INPUT,
+		.motor = motor->index,
+	};
+
+	motor->inputs ^= 1U << input;
+	event.value = motor->inputs;
+	stepper_event_put(motor->stepper, &event);
+	if (input == STEPPER_HOME && active) {
+		motor->home_position = motor->position;
+		motor->flags |= INCISE_STEPPER_FLAG_HOME_SEEN;
+	}
+}
+
+/**
+ * stepper_inputs_one() - look at one input
+ * @motor:	its motor
+ * @input:	which; one that the motor does not have is never active
+ * @now:	ktime
+ * @edge:	an interrupt says that it changed
+ *
+ * An interrupt that finds the line as it was has missed a pulse: shorter than the
+ * way to here, but for a stop long enough.
+ */
+void stepper_inputs_one(struct stepper_motor *motor, enum stepper_input input, s64 now,
+			bool edge)
+{
+	struct gpio_desc *line = motor->lines.input[input];
+	bool was = motor->inputs & 1U << input;
+	int value;
+
+	if (!line)
+		return;
+	value = gpiod_get_value(line);
+	if (value < 0) {
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LINE, now);
+		return;
+	}
+	if (edge && !value && !was) {
+		stepper_inputs_changed(motor, input, true, now);
+		stepper_inputs_act(motor, input, now);
+		stepper_inputs_changed(motor, input, false, now);
+	} else {
+		if (!!value != was)
+			stepper_inputs_changed(motor, input, value, now);
+		if (value)
+			stepper_inputs_act(motor, input, now);
+	}
+}
+
+void stepper_inputs_sample(struct stepper_motor *motor, s64 now)
+{
+	enum stepper_input input;
+
+	for (input = 0; input < STEPPER_INPUTS; input++)
+		stepper_inputs_one(motor, input, now, false);
+}

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: GPL-2.0-only
+/*
+ * The GPIO lines of a controller and their interrupts. A line is looked for at the
+ * motor's firmware node (device tree, or software nodes of configfs), and if there is
+ * none in the lookup table of the controller, where it goes by motorN-NAME:
+ *
+ *   motor@0 { step-gpios = <…>; };      or      GPIO_LOOKUP(chip, 4, "motor0-step", 0)
+ *
+ * Edges are written in hard interrupts, so that a line whose chip may sleep (an
+ * expander on I2C) is refused here, by name.
+ */
+#include <linux/device.h>
+#include <linux/gpio/consumer.h>
+#include <linux/interrupt.h>
+#include <linux/ktime.h>
+#include <linux/property.h>
+
+#include "stepper.h"
+
+static const char *const stepper_input_names[STEPPER_INPUTS] = {
+	"limit-min", "limit-max", "home", "estop", "fault",
+};
+
+/* A line, NULL where it is optional and there is none, or an error that was told. */
+static struct gpio_desc *stepper_lines_one(struct device *dev, struct fwnode_handle *node,
+					   int motor, const char *name,
+					   enum gpiod_flags flags, bool needed)
+{
+	struct gpio_desc *line = ERR_PTR(-ENOENT);
+	char key[32];
+
+	if (motor < 0)
+		snprintf(key, sizeof(key), "%s", name);
+	else
+		snprintf(key, sizeof(key), "motor%d-%s", motor, name);
+	if (node)
+		line = devm_fwnode_gpiod_get(dev, node, name, flags, key);
+	if (PTR_ERR_OR_ZERO(line) == -ENOENT)
+		line = devm_gpiod_get(dev, key, flags);
+	if (PTR_ERR_OR_ZERO(line) == -ENOENT && !needed)
+		return NULL;
+	if (IS_ERR(line)) {
+		dev_err_probe(dev, PTR_ERR(line), "line %s\n", key);
+		return line;
+	}
+	if (gpiod_cansleep(line))
+		return ERR_PTR(dev_err_probe(dev, -EOPNOTSUPP,
+					     "line %s: its chip may sleep, which a timer's "
+					     "interrupt may not; use a memory-mapped one\n",
+					     key));
+	return line;
+}
+
+static int stepper_lines_motor(struct stepper_motor *motor, struct device *dev,
+			       struct fwnode_handle *node)
+{
+	struct stepper_lines *lines = &motor->lines;
+	u32 has = INCISE_STEPPER_LINE_DIR;
+	int n = motor->index;
+	enum stepper_input i;
+
+	lines->step = stepper_lines_one(dev, node, n, "step", GPIOD_OUT_LOW, true);
+	if (IS_ERR(lines->step))
+		return PTR_ERR(lines->step);
+	lines->dir = stepper_lines_one(dev, node, n, "dir", GPIOD_OUT_LOW, true);
+	if (IS_ERR(lines->dir))
+		return PTR_ERR(lines->dir);
+	lines->enable = stepper_lines_one(dev, node, n, "enable", GPIOD_OUT_LOW, false);
+	if (IS_ERR(lines->enable))
+		return PTR_ERR(lines->enable);
+	if (lines->enable)
+		has |= INCISE_STEPPER_LINE_ENABLE;
+
+	for (i = 0; i < STEPPER_INPUTS; i++) {
+		struct gpio_desc *line = motor->stepper->estop;
+
+		if (i != STEPPER_ESTOP)
+			line = stepper_lines_one(dev, node, n, stepper_input_names[i],
+						 GPIOD_IN, false);
+		if (IS_ERR(line))
+			return PTR_ERR(line);
+		lines->input[i] = line;
+		if (line)
+			has |= 1U << i;
+	}
+	motor->stepper->info.lines[n] = has;
+	return 0;
+}
+
+/* Get all lines, outputs inactive. They go with the device. */
+int stepper_lines_get(struct stepper *stepper, struct device *dev)
+{
+	struct fwnode_handle *root = dev_fwnode(dev);
+	unsigned int i;
+	int ret;
+
+	stepper->estop = stepper_lines_one(dev, root, -1, "estop", GPIOD_IN, false);
+	if (IS_ERR(stepper->estop))
+		return PTR_ERR(stepper->estop);
+	stepper->sync.line =
+		stepper_lines_one(dev, root, -1, "sync", GPIOD_OUT_LOW, false);
+	if (IS_ERR(stepper->sync.line))
+		return PTR_ERR(stepper->sync.line);
+	if (stepper->sync.line)
+		stepper->info.capabilities |= INCISE_STEPPER_CAP_SYNC;
+
+	for (i = 0; i < stepper->n_motors; i++) {
+		struct fwnode_handle *node;
+
+		node = stepper_node_motor(dev, i);
+		ret = stepper_lines_motor(&stepper->motor[i], dev, node);
+		fwnode_handle_put(node);
+		if (ret)
+			return ret;
+	}
+	return 0;
+}
+
+static irqreturn_t stepper_lines_interrupt(int irq, void *data)
+{
+	struct stepper_irq *from = data;
+	struct stepper *stepper = from->stepper;
+	s64 now = ktime_get_ns();
+	unsigned int i;
+
+	for (i = 0; i < stepper->n_motors; i++) {
+		struct stepper_motor *motor = &stepper->motor[i];
+
+		if (from->motor >= 0 && from->motor != (int)i)
+			continue;
+		raw_spin_lock(&motor->lock);
+		stepper_inputs_one(motor, from->input, now, true);
+		stepper_status_publish(motor, now);
+		raw_spin_unlock(&motor->lock);
+	}
+	return IRQ_HANDLED;
+}
+
+/* A chip without interrupts is served by the looks at each tick and step. */
+static int stepper_lines_request(struct stepper *stepper, struct stepper_irq *irq,
+				 struct gpio_desc *line, int motor, enum stepper_input input)
+{
+	int number, ret;
+
+	if (!line)
+		return 0;
+	number = gpiod_to_irq(line);
+	if (number <= 0)
+		return 0;
+	irq->stepper = stepper;
+	irq->motor = motor;
+	irq->input = input;
+	/* Hard on PREEMPT_RT too: a stop must not wait for a thread. */
+	ret = request_irq(number, stepper_lines_interrupt,
+			  IRQF_TRIGGER_RISING | IRQF_TRIGGER_FALLING | IRQF_NO_THREAD,
+			  dev_name(&stepper->dev), irq);
+	if (ret)
+		return dev_err_probe(stepper->parent, ret, "interrupt of input %s\n",
+				     stepper_input_names[input]);
+	irq->irq = number;
+	return 0;
+}
+
+/* Interrupts from now on, and what the inputs are already. */
+int stepper_lines_listen(struct stepper *stepper)
+{
+	enum stepper_input input;
+	unsigned long flags;
+	unsigned int i;
+	int ret;
+
+	ret = stepper_lines_request(stepper, &stepper->estop_irq, stepper->estop, -1,
+				    STEPPER_ESTOP);
+	for (i = 0; !ret && i < stepper->n_motors; i++) {
+		struct stepper_motor *motor = &stepper->motor[i];
+
+		for (input = 0; !ret && input < STEPPER_INPUTS; input++)
+			if (input != STEPPER_ESTOP)
+				ret = stepper_lines_request(
+					stepper, &motor->lines.irq[input],
+					motor->lines.input[input], i, input);
+		raw_spin_lock_irqsave(&motor->lock, flags);
+		stepper_inputs_sample(motor, ktime_get_ns());
+		stepper_status_publish(motor, ktime_get_ns());
+		raw_spin_unlock_irqrestore(&motor->lock, flags);
+	}
+	if (ret)
+		stepper_lines_ignore(stepper);
+	return ret;
+}
+
+static void stepper_lines_release(struct stepper_irq *irq)
+{
+	if (irq->irq)
+		free_irq(irq->irq, irq);
+	irq->irq = 0;
+}
+
+/* No interrupt any more when this returns. */
+void stepper_lines_ignore(struct stepper *stepper)
+{
+	enum stepper_input input;
+	unsigned int i;
+
+	stepper_lines_release(&stepper->estop_irq);
+	for (i = 0; i < stepper->n_motors; i++)
+		for (input = 0; input < STEPPER_INPUTS; input++)
+			stepper_lines_release(&stepper->motor[i].lines.irq[input]);
+}

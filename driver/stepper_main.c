@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: GPL-2.0-only
+/*
+ * incise_stepper.ko: the platform driver, and every way in which a machine stops:
+ *
+ *   unbind    no new file, brake, power off, no interrupts, ENODEV to who is left
+ *   suspend   brake, power off, fault SUSPEND; nothing moves after resume by itself
+ *   reboot    the same, before anything else is taken down
+ *   panic     power off, at once, without a lock that somebody may hold
+ */
+#include <linux/delay.h>
+#include <linux/mod_devicetable.h>
+#include <linux/module.h>
+#include <linux/panic_notifier.h>
+#include <linux/platform_device.h>
+#include <linux/pm.h>
+#include <linux/property.h>
+#include <linux/reboot.h>
+
+#include "compat.h"
+#include "stepper.h"
+
+/* Longest wait for motors to brake; then they halt where they are. */
+#define BRAKE_MS 2000
+
+static bool stepper_main_powered(struct stepper *stepper)
+{
+	unsigned int i;
+
+	for (i = 0; i < stepper->n_motors; i++)
+		if (stepper_setup_powered(&stepper->motor[i]))
+			return true;
+	return false;
+}
+
+/* All motors without power and their timers done. Sleeps; stepper.mutex held. */
+static void stepper_main_rest(struct stepper *stepper, u32 fault)
+{
+	unsigned int i, waited;
+
+	for (i = 0; i < stepper->n_motors; i++)
+		stepper_setup_fault(&stepper->motor[i], fault);
+	for (waited = 0; waited < BRAKE_MS && stepper_main_powered(stepper); waited += 2)
+		usleep_range(2000, 3000);
+	for (i = 0; i < stepper->n_motors; i++) {
+		stepper_setup_halt(&stepper->motor[i]);
+		stepper_motor_end(&stepper->motor[i]);
+	}
+}
+
+static int stepper_main_reboot(struct notifier_block *block, unsigned long action,
+			       void *data)
+{
+	struct stepper *stepper = container_of(block, struct stepper, reboot);
+
+	mutex_lock(&stepper->mutex);
+	stepper_main_rest(stepper, INCISE_STEPPER_FAULT_SUSPEND);
+	stepper_sync_off(stepper);
+	mutex_unlock(&stepper->mutex);
+	return NOTIFY_DONE;
+}
+
+/* The other processors have been stopped, maybe while they held a lock. */
+static int stepper_main_panic(struct notifier_block *block, unsigned long action,
+			      void *data)
+{
+	struct stepper *stepper = container_of(block, struct stepper, panic);
+	unsigned int i;
+
+	for (i = 0; i < stepper->n_motors; i++) {
+		struct stepper_motor *motor = &stepper->motor[i];
+
+		compat_gpiod_set_value(motor->lines.enable, 0);
+		if (raw_spin_trylock(&motor->lock)) {
+			motor->powered = false;
+			raw_spin_unlock(&motor->lock);
+		}
+	}
+	return NOTIFY_DONE;
+}
+
+static int stepper_main_listen(struct stepper *stepper)
+{
+	int ret;
+
+	stepper->reboot.notifier_call = stepper_main_reboot;
+	stepper->panic.notifier_call = stepper_main_panic;
+	ret = register_reboot_notifier(&stepper->reboot);
+	if (ret)
+		return ret;
+	ret = atomic_notifier_chain_register(&panic_notifier_list, &stepper->panic);
+	if (ret)
+		unregister_reboot_notifier(&stepper->reboot);
+	return ret;
+}
+
+static void stepper_main_ignore(struct stepper *stepper)
+{
+	atomic_notifier_chain_unregister(&panic_notifier_list, &stepper->panic);
+	unregister_reboot_notifier(&stepper->reboot);
+}
+
+static int stepper_main_probe(struct platform_device *pdev)
+{
+	struct device *dev = &pdev->dev;
+	struct stepper *stepper;
+	const char *label;
+	int ret;
+
+	ret = stepper_node_count(dev);
+	if (ret < 0)
+		return ret;
+	stepper = stepper_device_new(dev, ret);
+	if (IS_ERR(stepper))
+		return PTR_ERR(stepper);
+	if (device_property_read_string(dev, "label", &label))
+		label = dev_name(dev);
+	strscpy(stepper->info.name, label, sizeof(stepper->info.name));
+	stepper->info.capabilities = INCISE_STEPPER_CAP_FIXED;
+
+	ret = stepper_lines_get(stepper, dev);
+	if (ret)
+		goto put;
+	ret = stepper_ability_measure(stepper);
+	if (ret)
+		goto put;
+	ret = stepper_defaults(stepper, dev);
+	if (ret)
+		goto put;
+	ret = stepper_lines_listen(stepper);
+	if (ret)
+		goto put;
+	ret = stepper_main_listen(stepper);
+	if (ret)
+		goto ignore_lines;
+	ret = stepper_device_add(stepper);
+	if (ret)
+		goto ignore;
+	stepper_debugfs_add(stepper);
+	platform_set_drvdata(pdev, stepper);
+	dev_info(dev, "%s: %u motors, at most %u steps/s; timers late by %u ns, %u at most\n",
+		 dev_name(&stepper->dev), stepper->n_motors, stepper->info.rate_max,
+		 stepper->info.lateness_ns, stepper->info.lateness_max_ns);
+	return 0;
+
+ignore:
+	stepper_main_ignore(stepper);
+ignore_lines:
+	stepper_lines_ignore(stepper);
+put:
+	irq_work_sync(&stepper->wake);
+	put_device(&stepper->dev);
+	return ret;
+}
+
+static void stepper_main_remove(struct platform_device *pdev)
+{
+	struct stepper *stepper = platform_get_drvdata(pdev);
+
+	stepper_debugfs_remove(stepper);
+	stepper_device_remove(stepper);
+	stepper_main_ignore(stepper);
+
+	mutex_lock(&stepper->mutex);
+	stepper_main_rest(stepper, INCISE_STEPPER_FAULT_GONE);
+	stepper_sync_off(stepper);
+	WRITE_ONCE(stepper->gone, true);
+	mutex_unlock(&stepper->mutex);
+
+	stepper_lines_ignore(stepper);
+	wake_up_all(&stepper->wait);
+	irq_work_sync(&stepper->wake);
+	put_device(&stepper->dev);
+}
+COMPAT_PLATFORM_REMOVE(stepper_main_remove)
+
+static void stepper_main_shutdown(struct platform_device *pdev)
+{
+	struct stepper *stepper = platform_get_drvdata(pdev);
+
+	stepper_main_reboot(&stepper->reboot, 0, NULL);
+}
+
+static int stepper_main_suspend(struct device *dev)
+{
+	struct stepper *stepper = dev_get_drvdata(dev);
+
+	mutex_lock(&stepper->mutex);
+	stepper_main_rest(stepper, INCISE_STEPPER_FAULT_SUSPEND);
+	mutex_unlock(&stepper->mutex);
+	return 0;
+}
+
+/* SYNC goes on in its beat: pulses of the sleep count as missed. Motors stay off. */
+static DEFINE_SIMPLE_DEV_PM_OPS(stepper_main_pm, stepper_main_suspend, NULL);
+
+static const struct of_device_id stepper_main_of[] = {
+	{ .compatible = "incise,stepper-gpio" },
+	{}
+};
+MODULE_DEVICE_TABLE(of, stepper_main_of);
+
+static const struct platform_device_id stepper_main_ids[] = {
+	{ .name = "incise-stepper" },
+	{}
+};
+MODULE_DEVICE_TABLE(platform, stepper_main_ids);
+
+static struct platform_driver stepper_main_driver = {
+	.probe = stepper_main_probe,
+	.remove = compat_platform_remove(stepper_main_remove),
+	.shutdown = stepper_main_shutdown,
+	.id_table = stepper_main_ids,
+	.driver = {
+		.name = "incise-stepper",
+		.of_match_table = stepper_main_of,
+		.pm = pm_sleep_ptr(&stepper_main_pm),
+		/* configfs waits for it; and one that measures shall not race another. */
+		.probe_type = PROBE_FORCE_SYNCHRONOUS,
+	},
+};
+
+static int __init stepper_main_init(void)
+{
+	int ret;
+
+	ret = stepper_device_init();
+	if (ret)
+		return ret;
+	stepper_debugfs_init();
+	ret = platform_driver_register(&stepper_main_driver);
+	if (ret)
+		goto exit_device;
+	ret = stepper_configfs_init();
+	if (ret)
+		goto unregister;
+	return 0;
+
+unregister:
+	platform_driver_unregister(&stepper_main_driver);
+exit_device:
+	stepper_debugfs_exit();
+	stepper_device_exit();
+	return ret;
+}
+module_init(stepper_main_init);
+
+static void __exit stepper_main_exit(void)
+{
+	stepper_configfs_exit();
+	platform_driver_unregister(&stepper_main_driver);
+	stepper_debugfs_exit();
+	stepper_device_exit();
+}
+module_exit(stepper_main_exit);
+
+MODULE_DESCRIPTION("Step and direction pulses from a hard timer, for incise");
+MODULE_LICENSE("GPL");

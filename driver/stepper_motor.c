@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: GPL-2.0-only
+/*
+ * The hard timer of a motor: ticks, and the edges between them. It fires in hard
+ * interrupt on PREEMPT_RT too. One thing per firing, the one that is due first;
+ * the timer is set anew for the next.
+ *
+ *          tick k                          tick k+1
+ *   timer ──╫──────┬────┬─────┬─────┬────────╫──
+ *   dir   ─────────╥────────────────────────────     set_up, hold
+ *   step  ______________┌─────┐_____┌─────┐_____     high, low
+ *                       ◀── interval ──▶
+ *
+ * Due times come from the profile's time line, never from now: lateness does not
+ * add up. But high, low, set-up, hold and the interval at the largest velocity
+ * count from the actual times of edges, taken after the write, when the line has
+ * changed for sure. So a late edge shortens nothing. What was lost is caught up
+ * by going at most 1/7 faster than the profile asks (CATCH_UP), and where it is
+ * more than a tick the time line is put off: there is never a burst.
+ */
+#include <linux/hrtimer.h>
+#include <linux/kernel.h>
+#include <linux/ktime.h>
+#include <linux/minmax.h>
+
+#include "compat.h"
+#include "stepper.h"
+#include "trace.h"
+
+/* Intervals may be 1/2^CATCH_UP shorter than the profile has them. */
+#define CATCH_UP 3
+
+/* What is due next, and when: only from the state of the motor, so that it may be asked
+ * for as often as one likes, after whatever has come between.
+ */
+static enum stepper_next stepper_motor_plan(const struct stepper_motor *motor, s64 *due,
+					    s64 *want)
+{
+	const struct incise_stepper_config *config = &motor->config;
+	s64 tick = motor->base_ns + config->tick_ns;
+	s64 trail = motor->lead_ns + config->high_ns;
+	bool steps = motor->given < motor->slot.n;
+	s64 gap;
+
+	if (!motor->powered && !motor->high)
+		return STEPPER_NEXT_NONE;
+	if (motor->high && (!motor->powered || steps || trail <= tick)) {
+		*due = trail;
+		return STEPPER_NEXT_TRAIL;
+	}
+	if (!steps) {
+		*due = tick;
+		return STEPPER_NEXT_TICK;
+	}
+
+	*want = motor->base_ns + incise_profile_step_ns(&motor->slot, motor->given);
+	if (motor->direction != motor->slot.dir) {
+		*due = max3(*want - config->setup_ns, motor->lead_ns + config->hold_ns,
+			    motor->trail_ns);
+		return STEPPER_NEXT_DIR;
+	}
+	gap = *want - motor->lead_due_ns;
+	gap = max(gap - (gap >> CATCH_UP), motor->interval_ns);
+	*due = max3(*want, motor->lead_ns + gap, motor->trail_ns + config->low_ns);
+	*due = max3(*due, motor->dir_ns + config->setup_ns, motor->powered_ns);
+	return STEPPER_NEXT_LEAD;
+}
+
+static s64 stepper_motor_write(struct stepper_motor *motor, enum stepper_output output,
+			       struct gpio_desc *line, bool value, s64 due)
+{
+	int ret = compat_gpiod_set_value(line, value);
+	s64 now = ktime_get_ns();
+
+	motor->edges++;
+	trace_incise_stepper_edge(motor->stepper->id, motor->index, output, value, due,
+				  now);
+	if (ret < 0)
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LINE, now);
+	return now;
+}
+
+/* An edge that is late by more than its shortest time; too many in a row are a fault. */
+static void stepper_motor_late(struct stepper_motor *motor, s64 late, u32 shortest,
+			       s64 now)
+{
+	if (late <= shortest) {
+		motor->late_row = 0;
+		return;
+	}
+	motor->late++;
+	if (++motor->late_row >= motor->config.late_max)
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LATE, now);
+}
+
+static void stepper_motor_lead(struct stepper_motor *motor, s64 now, s64 due, s64 want)
+{
+	int direction = motor->slot.dir;
+	s64 lag;
+
+	/* The last look at what forbids this step. It may halt the motor. */
+	stepper_inputs_one(motor, direction > 0 ? STEPPER_LIMIT_MAX : STEPPER_LIMIT_MIN,
+			   now, false);
+	stepper_inputs_one(motor, STEPPER_ESTOP, now, false);
+	if (!motor->lines.irq[STEPPER_HOME].irq)
+		stepper_inputs_one(motor, STEPPER_HOME, now, false);
+	if (!motor->powered)
+		return;
+
+	/* Counted first: whoever sees the edge finds it counted. */
+	motor->given++;
+	motor->high = true;
+	motor->position += direction;
+	if (direction > 0)
+		motor->steps_up++;
+	else
+		motor->steps_down++;
+	motor->lead_ns = stepper_motor_write(motor, STEPPER_STEP, motor->lines.step, true,
+					     due);
+	motor->lead_due_ns = want;
+
+	lag = motor->lead_ns - want;
+	if (lag > motor->config.tick_ns) {
+		motor->base_ns += lag;
+		motor->lead_due_ns += lag;
+		motor->shifted_ns += lag;
+	}
+	stepper_motor_late(motor, now - due, motor->config.low_ns, motor->lead_ns);
+}
+
+static void stepper_motor_trail(struct stepper_motor *motor, s64 now, s64 due)
+{
+	motor->high = false;
+	motor->trail_ns = stepper_motor_write(motor, STEPPER_STEP, motor->lines.step,
+					      false, due);
+	if (motor->powered)
+		stepper_motor_late(motor, now - due, motor->config.high_ns,
+				   motor->trail_ns);
+}
+
+static void stepper_motor_dir(struct stepper_motor *motor, s64 due)
+{
+	bool up = motor->slot.dir > 0;
+	bool invert = motor->config.flags & INCISE_STEPPER_CONFIG_INVERT;
+
+	motor->direction = motor->slot.dir;
+	motor->dir_ns = stepper_motor_write(motor, STEPPER_DIR, motor->lines.dir,
+					    up != invert, due);
+}
+
+/* Take a new set-point, if there is one and it is still asked for. */
+static void stepper_motor_listen(struct stepper_motor *motor, s64 now)
+{
+	struct stepper *stepper = motor->stepper;
+	enum incise_profile_mode mode;
+
+	if (motor->disabling)
+		return;
+	switch (stepper_page_take(&stepper->setpoints[motor->index], &motor->wish)) {
+	case STEPPER_PAGE_TAKEN:
+		motor->seen_ns = now;
+		motor->target = stepper_page_clamp(&motor->wish, &motor->config);
+		motor->flags &= ~INCISE_STEPPER_FLAG_HELD;
+		if (motor->target != motor->wish.target)
+			motor->flags |= INCISE_STEPPER_FLAG_HELD;
+		mode = motor->wish.mode == INCISE_STEPPER_MODE_VELOCITY
+			       ? INCISE_PROFILE_VELOCITY
+			       : INCISE_PROFILE_POSITION;
+		incise_profile_target(&motor->profile, mode, motor->target);
+		break;
+	case STEPPER_PAGE_GARBAGE:
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_SETPOINT, now);
+		break;
+	case STEPPER_PAGE_NOTHING:
+		break;
+	}
+	if (now - motor->seen_ns > (s64)motor->config.deadman_ns)
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_DEADMAN, now);
+}
+
+static void stepper_motor_tick(struct stepper_motor *motor, s64 now, s64 due)
+{
+	bool resting;
+
+	stepper_inputs_sample(motor, now);
+	if (motor->powered)
+		stepper_motor_listen(motor, now);
+	if (!motor->powered)
+		return;
+
+	resting = incise_profile_resting(&motor->profile);
+	if (resting && motor->disabling) {
+		stepper_stop_off(motor, now);
+		return;
+	}
+	motor->base_ns = due;
+	if (now - due > motor->config.tick_ns) {
+		motor->base_ns = now;
+		if (!resting)
+			motor->shifted_ns += now - due;
+	}
+	incise_profile_tick(&motor->profile, &motor->slot);
+	motor->given = 0;
+	resting = incise_profile_resting(&motor->profile);
+	if (!motor->disabling)
+		stepper_status_state(
+			motor, resting ? INCISE_STEPPER_STATE_READY : INCISE_STEPPER_STATE_MOVING,
+			now);
+	stepper_status_publish(motor, now);
+}
+
+static enum hrtimer_restart stepper_motor_fire(struct hrtimer *timer)
+{
+	struct stepper_motor *motor = container_of(timer, struct stepper_motor, timer);
+	enum hrtimer_restart restart = HRTIMER_RESTART;
+	s64 now = ktime_get_ns();
+	s64 due, want = 0;
+	unsigned long flags;
+	enum stepper_next next;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	/* An interrupt may have halted the motor: ask again what is due. */
+	next = stepper_motor_plan(motor, &due, &want);
+	if (next != STEPPER_NEXT_NONE && due <= now) {
+		stepper_histogram_add(&motor->lateness, now - due);
+		switch (next) {
+		case STEPPER_NEXT_TICK:
+			stepper_motor_tick(motor, now, due);
+			break;
+		case STEPPER_NEXT_DIR:
+			stepper_motor_dir(motor, due);
+			break;
+		case STEPPER_NEXT_LEAD:
+			stepper_motor_lead(motor, now, due, want);
+			break;
+		case STEPPER_NEXT_TRAIL:
+			stepper_motor_trail(motor, now, due);
+			break;
+		case STEPPER_NEXT_NONE:
+			break;
+		}
+		next = stepper_motor_plan(motor, &due, &want);
+	}
+	if (next == STEPPER_NEXT_NONE) {
+		motor->timing = false;
+		restart = HRTIMER_NORESTART;
+	} else {
+		hrtimer_set_expires(timer, ns_to_ktime(due));
+	}
+	stepper_histogram_add(&motor->cost, ktime_get_ns() - now);
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+	return restart;
+}
+
+/* Begin to fire; motor->lock held. */
+void stepper_motor_start(struct stepper_motor *motor)
+{
+	s64 due, want;
+
+	if (motor->timing ||
+	    stepper_motor_plan(motor, &due, &want) == STEPPER_NEXT_NONE)
+		return;
+	motor->timing = true;
+	hrtimer_start(&motor->timer, ns_to_ktime(due), HRTIMER_MODE_ABS_PINNED_HARD);
+}
+
+void stepper_motor_init(struct stepper_motor *motor)
+{
+	raw_spin_lock_init(&motor->lock);
+	hrtimer_setup(&motor->timer, stepper_motor_fire, CLOCK_MONOTONIC,
+		      HRTIMER_MODE_ABS_PINNED_HARD);
+}
+
+/* No firing any more; the motor was halted before. Sleeps. */
+void stepper_motor_end(struct stepper_motor *motor)
+{
+	unsigned long flags;
+
+	hrtimer_cancel(&motor->timer);
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	motor->timing = false;
+	/* A pulse that the timer did not come to end. */
+	if (motor->high) {
+		motor->high = false;
+		compat_gpiod_set_value(motor->lines.step, 0);
+	}
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+}

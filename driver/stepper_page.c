@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-2.0-only
+/*
+ * Taking a set-point. The owner may write the page at any moment, on another
+ * processor, and may be mad: every field is read once, into a copy, and only the
+ * copy is looked at.
+ *
+ *   owner    seq+1 ── fields ── seq+2
+ *   kernel   seq ───── copy of 64 bytes ───── seq       even, new, and the same: taken
+ */
+#include "stepper_page.h"
+
+#ifdef __KERNEL__
+#include <asm/barrier.h>
+#include <linux/compiler.h>
+#include <linux/errno.h>
+#include <linux/math64.h>
+#else
+#include <errno.h>
+/* The same for a processor without a kernel. */
+#define READ_ONCE(x) __atomic_load_n(&(x), __ATOMIC_RELAXED)
+#define smp_rmb() __atomic_thread_fence(__ATOMIC_ACQUIRE)
+#define div_u64(a, b) ((a) / (b))
+#endif
+
+#include <incise/profile.h>
+
+#define SLOT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(__u64))
+
+/* A slot as words that are read whole, and as what they mean. */
+union slot_copy {
+	__u64 word[SLOT_WORDS];
+	struct incise_stepper_setpoint setpoint;
+};
+
+/**
+ * stepper_page_take() - look for a new set-point
+ * @slot:	in the page, aligned to 8 bytes
+ * @wish:	the last one taken; @wish->seq says what is not new
+ *
+ * A slot whose seq is odd for ever gives nothing for ever, and the deadman acts.
+ * Garbage is told once per seq.
+ */
+enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint *slot,
+					   struct stepper_wish *wish)
+{
+	const union slot_copy *from = (const union slot_copy *)slot;
+	union slot_copy copy;
+	__u32 seq = READ_ONCE(slot->seq);
+	unsigned int i;
+
+	if (seq & 1 || seq == wish->seq)
+		return STEPPER_PAGE_NOTHING;
+	smp_rmb(); /* with the owner's barrier between the fields and seq+2 */
+	for (i = 0; i < SLOT_WORDS; i++)
+		copy.word[i] = READ_ONCE(from->word[i]);
+	smp_rmb(); /* with the owner's barrier between seq+1 and the fields */
+	if (READ_ONCE(slot->seq) != seq)
+		return STEPPER_PAGE_NOTHING;
+
+	wish->seq = seq;
+	if (copy.setpoint.mode > INCISE_STEPPER_MODE_VELOCITY || copy.setpoint.reserved0)
+		return STEPPER_PAGE_GARBAGE;
+	for (i = 0; i < sizeof(copy.setpoint.reserved) / sizeof(__u64); i++)
+		if (copy.setpoint.reserved[i])
+			return STEPPER_PAGE_GARBAGE;
+	wish->mode = copy.setpoint.mode;
+	wish->target = copy.setpoint.target;
+	wish->t_ns = copy.setpoint.t_ns;
+	return STEPPER_PAGE_TAKEN;
+}
+
+/**
+ * stepper_page_clamp() - the target within a motor's limits
+ * @wish:	what was asked for
+ * @config:	a config that stepper_page_config() let pass
+ */
+__s64 stepper_page_clamp(const struct stepper_wish *wish,
+			 const struct incise_stepper_config *config)
+{
+	__s64 min = config->position_min, max = config->position_max;
+
+	if (wish->mode == INCISE_STEPPER_MODE_VELOCITY) {
+		max = config->velocity;
+		min = -max;
+	}
+	if (wish->target < min)
+		return min;
+	return wish->target > max ? max : wish->target;
+}
+
+static bool stepper_page_within(__u64 value, __u64 min, __u64 max)
+{
+	return value >= min && value <= max;
+}
+
+/**
+ * stepper_page_config() - whether a config can be held on this machine
+ * @config:	from a user
+ * @info:	what the self-test found
+ *
+ * A pulse time below what a timer is late by would make every edge late; it is
+ * refused rather than held by luck.
+ *
+ * Return: 0; -EINVAL, -ERANGE as INCISE_STEPPER_SET_CONFIG says.
+ */
+int stepper_page_config(const struct incise_stepper_config *config,
+			const struct incise_stepper_info *info)
+{
+	const __u32 flags = INCISE_STEPPER_CONFIG_INVERT | INCISE_STEPPER_CONFIG_RETRACT;
+	const __s64 most = INCISE_PROFILE_POSITION_MAX;
+	__u64 pulse = (__u64)info->edge_ns + info->lateness_ns;
+	unsigned int i;
+
+	for (i = 0; i < sizeof(config->reserved) / sizeof(config->reserved[0]); i++)
+		if (config->reserved[i])
+			return -EINVAL;
+	if (config->motor >= info->n_motors || config->flags & ~flags ||
+	    !stepper_page_within(config->tick_ns, INCISE_PROFILE_TICK_MIN_NS,
+				 INCISE_PROFILE_TICK_MAX_NS) ||
+	    !config->velocity || !config->acceleration ||
+	    !stepper_page_within(config->late_max, 1, 1000) ||
+	    !stepper_page_within(config->deadman_ns, 1000000, 10000000000ULL) ||
+	    !stepper_page_within(config->high_ns, 500, 1000000) ||
+	    !stepper_page_within(config->low_ns, 500, 1000000) ||
+	    config->setup_ns > 1000000 || config->hold_ns > 1000000 ||
+	    config->enable_ns > 1000000000)
+		return -EINVAL;
+	if (config->position_min < -most || config->position_max > most ||
+	    config->position_min > config->position_max ||
+	    config->safe_position < config->position_min ||
+	    config->safe_position > config->position_max)
+		return -EINVAL;
+	if (config->velocity > info->rate_max ||
+	    config->velocity > INCISE_PROFILE_VELOCITY_MAX)
+		return -ERANGE;
+	if (config->high_ns < pulse || config->low_ns < pulse ||
+	    (__u64)config->high_ns + config->low_ns >
+		    div_u64(1000000000ULL, config->velocity))
+		return -ERANGE;
+	return 0;
+}

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: GPL-2.0-only */
+/*
+ * A set-point out of the page that the owner writes, and the check of a config:
+ * pure functions over bytes that nobody vouches for. They build without a kernel
+ * too, for unit tests and a fuzzer.
+ */
+#ifndef INCISE_DRIVER_STEPPER_PAGE_H
+#define INCISE_DRIVER_STEPPER_PAGE_H
+
+#ifdef __KERNEL__
+#include <linux/types.h>
+#else
+#include <stdbool.h>
+#include <stdint.h>
+#endif
+
+#include "uapi/incise_stepper.h"
+
+/* A set-point that was looked at: one copy, which nobody can change any more. */
+struct stepper_wish {
+	__u32 seq;
+	__u16 mode;
+	__s64 target; /* not clamped */
+	__s64 t_ns;
+};
+
+enum stepper_page_answer {
+	STEPPER_PAGE_NOTHING, /* nothing new, or the owner is writing just now */
+	STEPPER_PAGE_TAKEN,   /* wish is new */
+	STEPPER_PAGE_GARBAGE, /* wish->seq is new, the rest is as it was */
+};
+
+enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint *slot,
+					   struct stepper_wish *wish);
+__s64 stepper_page_clamp(const struct stepper_wish *wish,
+			 const struct incise_stepper_config *config);
+int stepper_page_config(const struct incise_stepper_config *config,
+			const struct incise_stepper_info *info);
+
+#endif

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: GPL-2.0-only
+/*
+ * What is set up by ioctl: enable, disable, clear, config, origin. The caller holds
+ * stepper.mutex, so that only the motor's timer and its interrupts come between.
+ *
+ *   DISABLED ──(enable)──▶ READY ◀──▶ MOVING
+ *       ▲                     └──(disable)──▶ STOPPING ──▶ DISABLED
+ *       └──(clear)── FAULT
+ */
+#include <linux/ktime.h>
+#include <linux/math64.h>
+
+#include "compat.h"
+#include "stepper.h"
+#include "trace.h"
+
+static struct incise_profile_limits
+stepper_setup_limits(const struct incise_stepper_config *config)
+{
+	return (struct incise_profile_limits){
+		.tick_ns = config->tick_ns,
+		.velocity = config->velocity,
+		.acceleration = config->acceleration,
+		.position_min = config->position_min,
+		.position_max = config->position_max,
+		.jerk = config->jerk,
+	};
+}
+
+/**
+ * stepper_setup_ready() - whether a motor may be enabled
+ * @motor:	the motor
+ *
+ * Return: 0; -EPERM a fault is latched; -EBUSY it is coming to rest, or an input
+ * forbids it; -ERANGE it stands outside of its position limits.
+ */
+int stepper_setup_ready(struct stepper_motor *motor)
+{
+	const u32 forbid = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_DRIVER;
+	unsigned long flags;
+	int ret = 0;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	stepper_inputs_sample(motor, ktime_get_ns());
+	if (motor->faults)
+		ret = -EPERM;
+	else if (motor->disabling || motor->inputs & forbid)
+		ret = -EBUSY;
+	else if (motor->position < motor->config.position_min ||
+		 motor->position > motor->config.position_max)
+		ret = -ERANGE;
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+	return ret;
+}
+
+/* Power, and the deadman from now on. One that has power already goes on as it is. */
+int stepper_setup_enable(struct stepper_motor *motor)
+{
+	struct incise_profile_limits limits;
+	unsigned long flags;
+	int ret = 0;
+	s64 now;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	if (motor->powered)
+		goto unlock;
+	if (motor->faults) {
+		ret = -EPERM;
+		goto unlock;
+	}
+	limits = stepper_setup_limits(&motor->config);
+	ret = incise_profile_init(&motor->profile, &limits, motor->position);
+	if (ret)
+		goto unlock;
+	ret = compat_gpiod_set_value(motor->lines.enable, 1);
+	now = ktime_get_ns();
+	if (ret < 0)
+		goto unlock;
+	trace_incise_stepper_edge(motor->stepper->id, motor->index, STEPPER_ENABLE, 1, now,
+				  now);
+
+	motor->powered = true;
+	motor->disabling = false;
+	motor->powered_ns = now + motor->config.enable_ns;
+	motor->base_ns = now;
+	motor->slot = (struct incise_profile_slot){.tick_ns = motor->config.tick_ns};
+	motor->given = 0;
+	motor->late_row = 0;
+	motor->direction = 0; /* written before the first step, whatever it is */
+	motor->target = motor->position;
+	/* What the page says now was said to somebody else. */
+	motor->wish = (struct stepper_wish){
+		.seq = READ_ONCE(motor->stepper->setpoints[motor->index].seq),
+	};
+	motor->seen_ns = now;
+	motor->flags &= ~(INCISE_STEPPER_FLAG_HELD | INCISE_STEPPER_FLAG_HOME_SEEN);
+	stepper_status_state(motor, INCISE_STEPPER_STATE_READY, now);
+	stepper_status_publish(motor, now);
+	stepper_motor_start(motor);
+	ret = 0;
+unlock:
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+	return ret;
+}
+
+void stepper_setup_disable(struct stepper_motor *motor)
+{
+	unsigned long flags;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	stepper_stop_disable(motor, ktime_get_ns());
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+}
+
+/* 0; -EBUSY: it has power, or what caused the fault is still there. */
+int stepper_setup_clearable(struct stepper_motor *motor)
+{
+	const u32 causes = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_DRIVER;
+	unsigned long flags;
+	int ret = 0;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	stepper_inputs_sample(motor, ktime_get_ns());
+	if (motor->faults && (motor->powered || motor->inputs & causes))
+		ret = -EBUSY;
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+	return ret;
+}
+
+void stepper_setup_clear(struct stepper_motor *motor)
+{
+	unsigned long flags;
+	s64 now;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	if (motor->faults && !motor->powered) {
+		now = ktime_get_ns();
+		motor->faults = 0;
+		stepper_status_state(motor, INCISE_STEPPER_STATE_DISABLED, now);
+		stepper_status_publish(motor, now);
+	}
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+}
+
+/**
+ * stepper_setup_config() - new limits and times
+ * @motor:	the motor
+ * @config:	one that stepper_page_config() let pass
+ *
+ * Return: 0; -EBUSY the motor has power; -ERANGE a jerk that the profile cannot
+ * hold.
+ */
+int stepper_setup_config(struct stepper_motor *motor,
+			 const struct incise_stepper_config *config)
+{
+	struct incise_profile_limits limits = stepper_setup_limits(config);
+	unsigned long flags;
+	int ret;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	if (motor->powered) {
+		ret = -EBUSY;
+	} else {
+		/* Refused before anything is changed. */
+		ret = incise_profile_init(&motor->profile, &limits, config->position_min);
+	}
+	if (!ret) {
+		motor->config = *config;
+		motor->interval_ns =
+			div_u64(NSEC_PER_SEC + config->velocity - 1, config->velocity);
+		incise_profile_halt(&motor->profile, motor->position);
+		stepper_status_publish(motor, ktime_get_ns());
+	}
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+	return ret;
+}
+
+void stepper_setup_get_config(struct stepper_motor *motor,
+			      struct incise_stepper_config *config)
+{
+	unsigned long flags;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	*config = motor->config;
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+}
+
+/* Name the place where it stands. home_position is renamed with it. */
+int stepper_setup_position(struct stepper_motor *motor,
+			   const struct incise_stepper_origin *origin)
+{
+	unsigned long flags;
+	int ret = 0;
+	s64 now;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	now = ktime_get_ns();
+	if (origin->position < motor->config.position_min ||
+	    origin->position > motor->config.position_max) {
+		ret = -EINVAL;
+	} else if (motor->powered &&
+		   (motor->disabling || motor->given < motor->slot.n ||
+		    !incise_profile_resting(&motor->profile))) {
+		ret = -EBUSY;
+	} else {
+		motor->home_position += origin->position - motor->position;
+		motor->position = origin->position;
+		motor->target = origin->position;
+		motor->wish.mode = INCISE_STEPPER_MODE_POSITION;
+		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
+		if (origin->homed)
+			motor->flags |= INCISE_STEPPER_FLAG_HOMED;
+		incise_profile_halt(&motor->profile, motor->position);
+		stepper_status_publish(motor, now);
+	}
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+	return ret;
+}
+
+void stepper_setup_fault(struct stepper_motor *motor, u32 fault)
+{
+	unsigned long flags;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	stepper_stop_fault(motor, fault, ktime_get_ns());
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+}
+
+bool stepper_setup_powered(struct stepper_motor *motor)
+{
+	unsigned long flags;
+	bool powered;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	powered = motor->powered;
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+	return powered;
+}
+
+/* At once, whatever it does: when there is no time to brake. */
+void stepper_setup_halt(struct stepper_motor *motor)
+{
+	unsigned long flags;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	if (motor->powered)
+		stepper_stop_halt(motor, ktime_get_ns());
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+}

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: GPL-2.0-only */
+/*
+ * What is wired to which line of which chip, as configfs was told: what
+ * stepper_configfs.c fills and stepper_nodes.c makes a device of.
+ */
+#ifndef INCISE_DRIVER_STEPPER_WIRES_H
+#define INCISE_DRIVER_STEPPER_WIRES_H
+
+#include <linux/types.h>
+
+#include "uapi/incise_stepper.h"
+
+struct device;
+struct stepper_nodes;
+
+struct stepper_wire {
+	char *label; /* of the chip; NULL: not wired */
+	unsigned int offset;
+	bool active_low;
+};
+
+enum {
+	STEPPER_WIRE_ESTOP,
+	STEPPER_WIRE_SYNC,
+	STEPPER_WIRES
+};
+
+enum {
+	STEPPER_WIRE_STEP,
+	STEPPER_WIRE_DIR,
+	STEPPER_WIRE_ENABLE,
+	STEPPER_WIRE_LIMIT_MIN,
+	STEPPER_WIRE_LIMIT_MAX,
+	STEPPER_WIRE_HOME,
+	STEPPER_WIRE_FAULT,
+	STEPPER_MOTOR_WIRES
+};
+
+/* As firmware nodes name them, less "-gpios". */
+extern const char *const stepper_wire_names[STEPPER_WIRES];
+extern const char *const stepper_motor_wire_names[STEPPER_MOTOR_WIRES];
+
+struct stepper_wires {
+	const char *name;
+	struct stepper_wire wire[STEPPER_WIRES];
+	int n_motors;
+	struct stepper_wire motor[INCISE_STEPPER_MOTORS_MAX][STEPPER_MOTOR_WIRES];
+};
+
+struct stepper_nodes *stepper_nodes_make(const struct stepper_wires *wires);
+void stepper_nodes_free(struct stepper_nodes *nodes);
+struct device *stepper_nodes_device(struct stepper_nodes *nodes);
+
+#endif
