@@ -2,7 +2,7 @@
 /*
  * A camera, whatever stands behind it; see incise/camera.h.
  */
-#include "backend.h"
+#include <incise/backend.h>
 
 int incise_camera_read(struct incise_camera *camera, struct incise_camera_frame *frame)
 {

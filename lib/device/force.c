@@ -2,7 +2,7 @@
 /*
  * A force channel, whatever stands behind it; see incise/force.h.
  */
-#include "backend.h"
+#include <incise/backend.h>
 
 int incise_force_read(struct incise_force *force, struct incise_force_sample *samples,
 		      int n)

@@ -2,7 +2,7 @@
 /*
  * A tracker, whatever stands behind it; see incise/tracker.h.
  */
-#include "backend.h"
+#include <incise/backend.h>
 
 int incise_tracker_read(struct incise_tracker *tracker,
 			struct incise_tracker_sample *samples, int n)

@@ -7,7 +7,7 @@
 #define INCISE_SIM_DEVICES_H
 
 #include <incise/sim.h>
-#include "../device/backend.h"
+#include <incise/backend.h>
 
 /* All return NULL with errno ENOMEM. */
 struct incise_tracker *incise_sim_tracker_new(struct incise_sim *sim);

@@ -137,6 +137,46 @@ static int sim_stepper_set(struct incise_stepper *stepper, double position_mm)
 	return 0;
 }
 
+/* A target where it stands. The virtual actuator is always powered. */
+static int sim_stepper_enable(struct incise_stepper *stepper, struct incise_error *err)
+{
+	struct sim_stepper *s = of_stepper(stepper);
+
+	(void)err;
+	return sim_stepper_set(stepper, nut_held(s));
+}
+
+/* As far as it goes without power to take away: no force, and nobody to miss. */
+static int sim_stepper_disable(struct incise_stepper *stepper, struct incise_error *err)
+{
+	struct sim_stepper *s = of_stepper(stepper);
+
+	(void)err;
+	sim_stepper_set(stepper, 0);
+	s->watched = false;
+	return 0;
+}
+
+static int sim_stepper_clear(struct incise_stepper *stepper, struct incise_error *err)
+{
+	struct sim_stepper *s = of_stepper(stepper);
+
+	(void)err;
+	advance(s, script_now(s));
+	s->faults = 0;
+	return 0;
+}
+
+static enum incise_stepper_state sim_stepper_state(const struct sim_stepper *s)
+{
+	/* Within half a microstep, and no faster than what one tick takes away. */
+	if (fabs(s->nut_mm - s->target_mm) < s->step_mm / 2 &&
+	    fabs(s->nut_mm_s) <= s->sim->config.screw_mm_s2 * TICK_S)
+		return INCISE_STEPPER_READY;
+	return s->faults & INCISE_STEPPER_DEADMAN ? INCISE_STEPPER_STOPPING
+						  : INCISE_STEPPER_MOVING;
+}
+
 static int sim_stepper_status(struct incise_stepper *stepper,
 			      struct incise_stepper_status *status)
 {
@@ -148,9 +188,12 @@ static int sim_stepper_status(struct incise_stepper *stepper,
 	*status = (struct incise_stepper_status){
 		.t_ns = s->sim->start_ns + s->t_ns,
 		.position_mm = nut,
+		.velocity_mm_s = s->nut_mm_s,
 		.handle_mm = s->handle_mm,
 		.force_N = s->sim->config.spring_N_mm * (nut - s->handle_mm),
 		.faults = s->faults,
+		.state = sim_stepper_state(s),
+		.homed = true,
 	};
 	return 0;
 }
@@ -167,6 +210,8 @@ static void sim_stepper_info(const struct incise_stepper *stepper,
 		.step_mm = s->step_mm,
 		.velocity_mm_s = config->screw_mm_s,
 		.acceleration_mm_s2 = config->screw_mm_s2,
+		.deadman_s = DEADMAN_NS * NS,
+		.measures_handle = true,
 	};
 	snprintf(info->name, sizeof(info->name), "virtual haptic scalpel");
 }
@@ -179,6 +224,9 @@ static void sim_stepper_close(struct incise_stepper *stepper)
 static const struct incise_stepper_ops ops = {
 	.set = sim_stepper_set,
 	.status = sim_stepper_status,
+	.enable = sim_stepper_enable,
+	.disable = sim_stepper_disable,
+	.clear = sim_stepper_clear,
 	.info = sim_stepper_info,
 	.close = sim_stepper_close,
 };

@@ -8,10 +8,17 @@
  *                          position_mm    handle_mm
  *
  *      force_N = spring_N_mm · (position_mm - handle_mm)
+ *
+ * From the start of a rig to a force on the hand:
+ *
+ *      disabled ── enable ─▶ ready ◀─▶ moving     set: a target, and a sign of life
+ *         ▲                    │ deadman, limit, e-stop, alarm …
+ *         ╰──── clear ──── fault ◀─ stopping      latched: nothing moves by itself again
  */
 #ifndef INCISE_STEPPER_H
 #define INCISE_STEPPER_H
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
@@ -26,40 +33,139 @@ struct incise_stepper_info {
 	double step_mm;		   /**< one microstep */
 	double velocity_mm_s;	   /**< largest */
 	double acceleration_mm_s2; /**< largest */
+	double jerk_mm_s3;	   /**< largest; 0: not limited */
+	double deadman_s;	   /**< without a target for so long, it stops */
+	double rate_max_hz;	   /**< largest step rate the backend takes; 0: any */
+	bool measures_handle;	   /**< status has handle_mm and force_N */
+	double origin_mm;    /**< without measures_handle: where handle_mm is 0, along
+					the actuator's axis in the tracker's frame */
+	unsigned int inputs; /**< incise_stepper_input bits that are wired */
 };
 
-/** Why an actuator does not move; bits. */
+/** What it does. */
+enum incise_stepper_state {
+	INCISE_STEPPER_DISABLED, /**< not powered, no fault */
+	INCISE_STEPPER_READY,	 /**< powered, at rest */
+	INCISE_STEPPER_MOVING,
+	INCISE_STEPPER_STOPPING, /**< coming to rest because of a fault */
+	INCISE_STEPPER_FAULT,	 /**< not powered; clear, then enable */
+};
+
+/**
+ * Why an actuator does not move, or not as asked; bits. All are latched but TRAVEL, and
+ * the virtual rig's DEADMAN, which ends with the next target.
+ */
 enum incise_stepper_fault {
 	INCISE_STEPPER_DEADMAN = 1, /**< set-points stopped coming */
 	INCISE_STEPPER_TRAVEL = 2, /**< a set-point lay outside the travel and was held */
+	INCISE_STEPPER_LIMIT_MIN = 4,  /**< ran into the limit switch at 0 */
+	INCISE_STEPPER_LIMIT_MAX = 8,  /**< at the end of the travel */
+	INCISE_STEPPER_ESTOP = 16,     /**< emergency stop */
+	INCISE_STEPPER_ALARM = 32,     /**< the power stage reports a fault */
+	INCISE_STEPPER_LATE = 64,      /**< this machine could not hold the step times */
+	INCISE_STEPPER_SETPOINT = 128, /**< a set-point that cannot be read */
+	INCISE_STEPPER_OWNER = 256,    /**< the program that drove it ended */
+	INCISE_STEPPER_SUSPEND = 512,  /**< the machine went to sleep */
+	INCISE_STEPPER_GONE = 1024,    /**< the device went away */
+	INCISE_STEPPER_LINE = 2048,    /**< a GPIO line cannot be written or read */
+};
+
+#define INCISE_STEPPER_FAULTS 12 /**< bits of incise_stepper_fault */
+
+/** Inputs that are active; bits. */
+enum incise_stepper_input {
+	INCISE_STEPPER_AT_MIN = 1,
+	INCISE_STEPPER_AT_MAX = 2,
+	INCISE_STEPPER_AT_HOME = 4,
+	INCISE_STEPPER_ESTOP_ACTIVE = 8,
+	INCISE_STEPPER_ALARM_ACTIVE = 16,
 };
 
 /** Where it stands. */
 struct incise_stepper_status {
 	int64_t t_ns;
-	double position_mm;  /**< of the nut, counted in microsteps */
-	double handle_mm;    /**< of the handle */
-	double force_N;	     /**< on the hand */
-	unsigned int faults; /**< incise_stepper_fault bits */
+	double position_mm;   /**< of the nut, counted in microsteps */
+	double velocity_mm_s; /**< of the nut */
+	double handle_mm;     /**< of the handle; NaN where it is not measured */
+	double force_N;	      /**< on the hand; NaN where it is not measured */
+	unsigned int faults;  /**< incise_stepper_fault bits */
+	enum incise_stepper_state state;
+	unsigned int inputs; /**< incise_stepper_input bits that are active */
+	bool homed;	     /**< position_mm is that of the machine, not just a count */
+	uint64_t late;	     /**< steps that came too late since it was opened */
 };
 
 struct incise_stepper;
 
 /**
- * Give a new target. Without one for the deadman time (100 ms) the nut goes back to 0,
- * which is no force, and stays until the next target.
+ * Give a new target. It moves the nut only when powered; the virtual rig's always is.
+ * Without a target for the deadman time the nut comes to rest and power goes away (after
+ * going back to 0, which is no force, where `retract` says so in rig.conf, and in the
+ * virtual rig).
  *
  * @param position_mm target of the nut; clamped to the travel
- * @return 0; -EDOM (not finite; the last target stands), -EIO, -ENODEV. Real-time safe.
+ * @return 0; -EDOM (not finite; the last target stands), -EIO (not powered, or a fault is
+ *         latched), -ENODEV (gone). Real-time safe: no system call.
  */
 INCISE_API int incise_stepper_set(struct incise_stepper *stepper, double position_mm);
 
-/** Read back position, force and faults. @return 0, -EIO, -ENODEV. Real-time safe. */
+/**
+ * Move at a speed until the next target, within the travel; by hand, for bring-up. As
+ * incise_stepper_set() otherwise.
+ *
+ * @return 0; -EDOM, -EIO, -ENODEV; -EOPNOTSUPP (the virtual rig).
+ */
+INCISE_API int incise_stepper_jog(struct incise_stepper *stepper, double velocity_mm_s);
+
+/**
+ * Read back position, force, state and faults.
+ * @return 0, -EIO, -ENODEV. Real-time safe: no system call but the clock.
+ */
 INCISE_API int incise_stepper_status(struct incise_stepper *stepper,
 				     struct incise_stepper_status *status);
 
+/**
+ * Power it. Its target is where it stands; the deadman runs from here on.
+ *
+ * @return 0, also when it was powered; -EPERM (a fault is latched: clear it), -EBUSY (an
+ *         input forbids it, such as the e-stop), -EIO, -ENODEV. The message says which.
+ */
+INCISE_API int incise_stepper_enable(struct incise_stepper *stepper,
+				     struct incise_error *err);
+
+/** Bring it to rest and take power away; returns when that is done. @return 0, -EIO,
+ * -ENODEV, -ETIMEDOUT (1 s and the time to stop went by). */
+INCISE_API int incise_stepper_disable(struct incise_stepper *stepper,
+				      struct incise_error *err);
+
+/** Forget latched faults. @return 0; -EBUSY (a cause is still there), -EIO, -ENODEV. */
+INCISE_API int incise_stepper_clear(struct incise_stepper *stepper,
+				    struct incise_error *err);
+
+/**
+ * Find the machine's 0: towards the home input (or the limit at 0 where there is no home),
+ * back off, again slowly, then to `home_mm` of rig.conf. Must be powered. Blocks, at most
+ * 60 s and a way through the travel at `home_mm_s`; SIGINT stops it through @stop.
+ *
+ * @param stop looked at between polls; non-zero ends with -EINTR and the nut at rest. Or
+ *             NULL.
+ * @return 0, homed; -EOPNOTSUPP (neither input is wired), -EIO (a fault came up: the
+ *         message names it), -ETIMEDOUT, -EINTR, -ENODEV.
+ */
+INCISE_API int incise_stepper_home(struct incise_stepper *stepper,
+				   const volatile int *stop, struct incise_error *err);
+
 INCISE_API void incise_stepper_info(const struct incise_stepper *stepper,
 				    struct incise_stepper_info *info);
+
+/** "disabled", "ready", "moving", "stopping", "fault". */
+INCISE_API const char *incise_stepper_state_name(enum incise_stepper_state state);
+
+/**
+ * A fault in words that say what to do, such as "e-stop: release it, then clear".
+ * @param fault one bit
+ */
+INCISE_API const char *incise_stepper_fault_text(enum incise_stepper_fault fault);
 
 INCISE_END_DECLS
 #endif

@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <errno.h>
-#include "../../../lib/device/backend.h"
+#include <incise/backend.h>
 
 /* A backend that remembers what it was called with. */
 struct fake {

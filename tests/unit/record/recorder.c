@@ -7,7 +7,7 @@
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include "../../../lib/device/backend.h"
+#include <incise/backend.h>
 #include "../../../lib/record/cut.h"
 
 #define SIM "sim:clock=simulated"

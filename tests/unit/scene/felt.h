@@ -13,7 +13,7 @@
 #include <incise/plan.h>
 #include <incise/rig.h>
 #include <incise/scene.h>
-#include "../../../lib/device/backend.h"
+#include <incise/backend.h>
 #include "../model/paper_model.h"
 
 #define FELT_LIMIT_N 3.0

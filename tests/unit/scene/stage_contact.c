@@ -11,7 +11,7 @@
 #include <math.h>
 #include <string.h>
 #include "../../../lib/base/vector.h"
-#include "../../../lib/device/backend.h"
+#include <incise/backend.h>
 #include "../../../lib/scene/stages.h"
 
 static const struct incise_tracker_info info = {.rate_hz = 100, .latency_ns = 5000000};

@@ -10,7 +10,7 @@
 #include <errno.h>
 #include <math.h>
 #include <string.h>
-#include "../../../lib/device/backend.h"
+#include <incise/backend.h>
 #include "../../../lib/scene/stages.h"
 
 /* An actuator that tells what it was asked, and says what it is told. */
@@ -47,7 +47,10 @@ static struct incise_plan plan_on(struct told *told)
 	*told = (struct told){.stepper = {.ops = &ops}};
 	return (struct incise_plan){
 		.stepper = &told->stepper,
-		.actuator = {.spring_N_mm = 2, .travel_mm = 20, .step_mm = 0.001},
+		.actuator = {.spring_N_mm = 2,
+			     .travel_mm = 20,
+			     .step_mm = 0.001,
+			     .measures_handle = true},
 		.axis = {0, 0, 1},
 	};
 }

@@ -327,6 +327,44 @@ static void asking_changes_nothing(void **state)
 	assert_int_equal(end[0].t_ns, end[1].t_ns);
 }
 
+static void it_is_always_powered_and_says_how_it_moves(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_stepper_status s;
+	struct rig rig;
+
+	incise_sim_config_init(&config);
+	rig = rig_new(&config);
+	s = rig_after(&rig, 0);
+	assert_int_equal(s.state, INCISE_STEPPER_READY);
+	assert_true(s.homed && !s.inputs && !s.late && s.velocity_mm_s == 0);
+	assert_int_equal(incise_stepper_set(rig.stepper, 10), 0);
+	/* 30 mm/s are reached after 10 ms. */
+	s = rig_after(&rig, 20000000);
+	assert_int_equal(s.state, INCISE_STEPPER_MOVING);
+	assert_true(s.velocity_mm_s == 30);
+	/* Enabled, it stays where it is, and the deadman runs from there on. */
+	assert_int_equal(incise_stepper_enable(rig.stepper, NULL), 0);
+	s = rig_after(&rig, 90000000);
+	assert_int_equal(s.state, INCISE_STEPPER_READY);
+	assert_true(s.position_mm > 0.3 && s.position_mm < 1 && !s.faults);
+	s = rig_after(&rig, 10200000);
+	assert_int_equal(s.faults, INCISE_STEPPER_DEADMAN);
+	assert_int_equal(s.state, INCISE_STEPPER_STOPPING);
+	s = rig_after(&rig, INCISE_NS_PER_S);
+	assert_int_equal(s.state, INCISE_STEPPER_READY);
+	assert_int_equal(incise_stepper_clear(rig.stepper, NULL), 0);
+	assert_int_equal(rig_after(&rig, 0).faults, 0);
+	/* Disabled, it goes to no force, and misses nobody. */
+	rig_hold(&rig, 5, 1);
+	assert_int_equal(incise_stepper_disable(rig.stepper, NULL), 0);
+	s = rig_after(&rig, INCISE_NS_PER_S);
+	assert_true(s.position_mm == 0 && !s.faults);
+	assert_int_equal(incise_stepper_jog(rig.stepper, 1), -EOPNOTSUPP);
+	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL), -EOPNOTSUPP);
+	rig_free(&rig);
+}
+
 static void info_is_the_configuration(void **state)
 {
 	struct incise_sim_config config;
@@ -339,6 +377,7 @@ static void info_is_the_configuration(void **state)
 	assert_true(info.spring_N_mm == 2 && info.travel_mm == 20);
 	assert_true(info.step_mm == 2.0 / 3200);
 	assert_true(info.velocity_mm_s == 30 && info.acceleration_mm_s2 == 3000);
+	assert_true(info.deadman_s == 0.1 && info.measures_handle && !info.inputs);
 	assert_string_equal(info.name, "virtual haptic scalpel");
 	rig_free(&rig);
 }
@@ -354,6 +393,7 @@ int main(void)
 		cmocka_unit_test(friction_holds),
 		cmocka_unit_test(bounded_however_stiff),
 		cmocka_unit_test(asking_changes_nothing),
+		cmocka_unit_test(it_is_always_powered_and_says_how_it_moves),
 		cmocka_unit_test(info_is_the_configuration),
 	};
 

@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * What stands behind a device: a table of functions per backend and kind. A backend
- * embeds the kind's struct as its first member.
+ * embeds the kind's struct as its first member. For those who write one; who only uses
+ * devices needs the header of their kind.
  */
 #ifndef INCISE_BACKEND_H
 #define INCISE_BACKEND_H
 
+#include <stdbool.h>
+#include <stdint.h>
 #include <incise/camera.h>
 #include <incise/force.h>
 #include <incise/stepper.h>
@@ -47,13 +50,46 @@ struct incise_camera {
 	const struct incise_camera_ops *ops;
 };
 
+/** Where the home input, or the limit at 0, was met, in the count of position_mm. */
+struct incise_stepper_edge {
+	bool seen;	    /**< since it was enabled */
+	double position_mm; /**< at the last one */
+};
+
+/** How to find the machine's 0. */
+struct incise_stepper_homing {
+	double speed_mm_s;    /**< of the way there; a tenth of it for the edge itself */
+	double home_mm;	      /**< position of the edge in the machine */
+	unsigned int home_at; /**< INCISE_STEPPER_AT_HOME, or _AT_MIN without one */
+};
+
+/**
+ * A stepper. What a backend has not (NULL) answers -EOPNOTSUPP. All but set, jog and
+ * status may block.
+ */
 struct incise_stepper_ops {
+	/** See the functions of incise/stepper.h; @err may be NULL. */
 	int (*set)(struct incise_stepper *stepper, double position_mm);
+	int (*jog)(struct incise_stepper *stepper, double velocity_mm_s);
 	int (*status)(struct incise_stepper *stepper,
 		      struct incise_stepper_status *status);
+	int (*enable)(struct incise_stepper *stepper, struct incise_error *err);
+	int (*disable)(struct incise_stepper *stepper, struct incise_error *err);
+	int (*clear)(struct incise_stepper *stepper, struct incise_error *err);
 	void (*info)(const struct incise_stepper *stepper,
 		     struct incise_stepper_info *info);
 	void (*close)(struct incise_stepper *stepper);
+
+	/* The parts that incise_stepper_home() is made of. */
+
+	/** 0; -EOPNOTSUPP: neither input is wired. */
+	int (*homing)(struct incise_stepper *stepper,
+		      struct incise_stepper_homing *homing);
+	int (*edge)(struct incise_stepper *stepper, struct incise_stepper_edge *edge);
+	/** Name the position where it stands at rest. 0, -EBUSY (it moves), -EIO. */
+	int (*origin)(struct incise_stepper *stepper, double position_mm, bool homed);
+	/** Let time pass; 0, or -EINTR. NULL: the computer's clock. */
+	int (*wait)(struct incise_stepper *stepper, int64_t ns);
 };
 
 struct incise_stepper {
