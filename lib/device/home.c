@@ -33,6 +33,8 @@ struct home {
 	struct incise_stepper_homing homing;
 	struct incise_stepper_status status; /* the last one */
 	int64_t poll_ns, left_ns;
+	double renamed_mm; /* the count less that of the beginning, of one place */
+	double edge_mm;	   /* in the count of the beginning */
 };
 
 static const char *input_name(const struct home *h)
@@ -157,6 +159,18 @@ static int rest(struct home *h)
 	return rc;
 }
 
+/* Name the place where it stands. */
+static int name_place(struct home *h, double position_mm, bool homed)
+{
+	int rc = refused(h, h->stepper->ops->origin(h->stepper, position_mm, homed));
+
+	if (rc)
+		return rc;
+	h->renamed_mm += position_mm - h->status.position_mm;
+	h->status.position_mm = position_mm;
+	return 0;
+}
+
 static int go_to(struct home *h, double position_mm)
 {
 	/* Half a step, and what rounding there is of a count in mm. */
@@ -186,7 +200,7 @@ static int seek(struct home *h, double mm_s, double from_mm, bool until, double 
 	double end_mm = mm_s > 0 ? h->info.travel_mm : 0;
 	struct incise_stepper_edge before = {0}, edge = {0};
 	bool found = false, passed = false, ended = false;
-	int rc = refused(h, h->stepper->ops->origin(h->stepper, from_mm, false));
+	int rc = name_place(h, from_mm, false);
 
 	if (!rc)
 		rc = refused(h, h->stepper->ops->edge(h->stepper, &before));
@@ -227,7 +241,7 @@ static int back_off(struct home *h)
 				h->info.name, input_name(h));
 	}
 	if (!rc)
-		rc = refused(h, h->stepper->ops->origin(h->stepper, 0, false));
+		rc = name_place(h, 0, false);
 	if (!rc)
 		rc = go_to(h, fmin(CLEARANCE_MM, travel_mm / 4));
 	return rc;
@@ -268,11 +282,12 @@ static int find(struct home *h)
 					"homing %s: the %s did not come back; see that "
 					"it is firm",
 					h->info.name, input_name(h));
+	h->edge_mm = edge_mm - h->renamed_mm;
 	/* Onto the edge, or off it to where the travel begins. */
 	if (!rc)
 		rc = go_to(h, edge_mm + rest_mm - h->homing.home_mm);
 	if (!rc)
-		rc = refused(h, h->stepper->ops->origin(h->stepper, rest_mm, true));
+		rc = name_place(h, rest_mm, true);
 	if (!rc)
 		rc = go_to(h, rest_mm);
 	return rc;
@@ -288,7 +303,7 @@ static void halt(struct home *h)
 }
 
 int incise_home(struct incise_stepper *stepper, const volatile int *stop,
-		struct incise_error *err)
+		struct incise_stepper_edge_found *edge, struct incise_error *err)
 {
 	struct home h = {.stepper = stepper, .stop = stop, .err = err};
 	int rc;
@@ -314,5 +329,7 @@ int incise_home(struct incise_stepper *stepper, const volatile int *stop,
 		rc = find(&h);
 	if (rc && rc != -ENODEV)
 		halt(&h);
+	if (!rc && edge)
+		*edge = (struct incise_stepper_edge_found){h.edge_mm, h.homing.home_mm};
 	return rc;
 }

@@ -7,8 +7,8 @@
 
 #include <incise/backend.h>
 
-/* For a stepper with jog, homing, edge and origin. */
+/* For a stepper with jog, homing, edge and origin; @edge may be NULL. */
 int incise_home(struct incise_stepper *stepper, const volatile int *stop,
-		struct incise_error *err);
+		struct incise_stepper_edge_found *edge, struct incise_error *err);
 
 #endif

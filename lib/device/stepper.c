@@ -3,6 +3,7 @@
  * An actuator, whatever stands behind it; see incise/stepper.h.
  */
 #include <errno.h>
+#include <stddef.h>
 #include <incise/backend.h>
 #include "home.h"
 
@@ -56,11 +57,18 @@ int incise_stepper_clear(struct incise_stepper *stepper, struct incise_error *er
 int incise_stepper_home(struct incise_stepper *stepper, const volatile int *stop,
 			struct incise_error *err)
 {
+	return incise_stepper_home_edge(stepper, stop, NULL, err);
+}
+
+int incise_stepper_home_edge(struct incise_stepper *stepper, const volatile int *stop,
+			     struct incise_stepper_edge_found *edge,
+			     struct incise_error *err)
+{
 	const struct incise_stepper_ops *ops = stepper->ops;
 
 	if (!ops->jog || !ops->homing || !ops->edge || !ops->origin)
 		return cannot(stepper, "homed: its position is the machine's", err);
-	return incise_home(stepper, stop, err);
+	return incise_home(stepper, stop, edge, err);
 }
 
 void incise_stepper_info(const struct incise_stepper *stepper,

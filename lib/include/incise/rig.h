@@ -33,6 +33,8 @@ enum incise_rig_device {
 	INCISE_RIG_FORCE = 2,
 	INCISE_RIG_CAMERA = 4,
 	INCISE_RIG_STEPPER = 8,
+	INCISE_RIG_WATCH = 16, /**< the stepper is only looked at, not owned: but for its
+				    status, it answers -EPERM. The virtual one is as ever */
 };
 
 /**

@@ -155,6 +155,24 @@ INCISE_API int incise_stepper_clear(struct incise_stepper *stepper,
 INCISE_API int incise_stepper_home(struct incise_stepper *stepper,
 				   const volatile int *stop, struct incise_error *err);
 
+/**
+ * Where homing found the edge of the input. Of a nut that was homed before, the difference
+ * is what the count had lost since, or how well the edge repeats.
+ */
+struct incise_stepper_edge_found {
+	double before_mm; /**< in the count that held before */
+	double after_mm;  /**< in that of the machine: `home_mm` of rig.conf */
+};
+
+/**
+ * The same, and tell where the edge was.
+ * @param edge untouched on an error; may be NULL
+ */
+INCISE_API int incise_stepper_home_edge(struct incise_stepper *stepper,
+					const volatile int *stop,
+					struct incise_stepper_edge_found *edge,
+					struct incise_error *err);
+
 INCISE_API void incise_stepper_info(const struct incise_stepper *stepper,
 				    struct incise_stepper_info *info);
 

@@ -281,6 +281,35 @@ static void the_count_becomes_the_position(void **state)
 		}
 }
 
+/* The count at the edge, read before homing names places anew; as well as homing reads. */
+static void the_edge_is_told_in_the_old_count(void **state)
+{
+	static const unsigned int inputs[] = {INCISE_STEPPER_AT_HOME,
+					      INCISE_STEPPER_AT_MIN};
+	static const double lost_mm[] = {0, 0.25, -0.125, 3};
+
+	for (size_t i = 0; i < 2; i++) {
+		struct machine m = {
+			.home_at = inputs[i], .edge_mm = 0.5, .end_mm = -9, .home_mm = 2};
+
+		powered_at(&m, 7);
+		for (size_t k = 0; k < sizeof(lost_mm) / sizeof(*lost_mm); k++) {
+			struct incise_stepper_edge_found edge = {0};
+			double was_mm;
+
+			m.count_mm += lost_mm[k];
+			was_mm = m.edge_mm + m.count_mm;
+			assert_int_equal(incise_stepper_home_edge(&m.stepper, &m.stop,
+								  &edge, NULL),
+					 0);
+			assert_true(edge.after_mm == 2);
+			if (!(fabs(edge.before_mm - was_mm) < 0.0005 + 0.00005 + STEP_MM))
+				fail_msg("input %u, %g mm lost: %g, was %g", inputs[i],
+					 lost_mm[k], edge.before_mm, was_mm);
+		}
+	}
+}
+
 static void what_is_wrong_is_said(void **state)
 {
 	static const struct {
@@ -309,10 +338,12 @@ static void what_is_wrong_is_said(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct machine m = cases[i].m;
 		struct incise_error err = {0};
+		struct incise_stepper_edge_found edge = {77, 78};
 		int rc;
 
 		powered_at(&m, 10);
-		rc = incise_stepper_home(&m.stepper, &m.stop, &err);
+		rc = incise_stepper_home_edge(&m.stepper, &m.stop, &edge, &err);
+		assert_true(edge.before_mm == 77 && edge.after_mm == 78);
 		if (rc != cases[i].rc || !strstr(err.text, cases[i].says))
 			fail_msg("case %zu: %d, \"%s\"", i, rc, err.text);
 		assert_int_equal(err.code, -rc);
@@ -336,6 +367,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(the_count_becomes_the_position),
+		cmocka_unit_test(the_edge_is_told_in_the_old_count),
 		cmocka_unit_test(what_is_wrong_is_said),
 		cmocka_unit_test(it_must_be_powered),
 	};
