@@ -11,6 +11,7 @@ sysusers := $(wildcard udev/*.sysusers)
 installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach lib,$(libraries),$(addprefix $(libdir)/lib$(lib).so,.$(version) .$(soversion)) \
 		$(libdir)/lib$(lib).so) \
+	$(addprefix $(libdir)/incise/,$(addsuffix .so,$(device_modules))) \
 	$(addprefix $(includedir)/incise/,$(notdir $(headers))) \
 	$(foreach lib,$(libraries),$(libdir)/pkgconfig/$(lib).pc) \
 	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
@@ -26,6 +27,9 @@ install: all ## install below $(DESTDIR)$(prefix)
 		$(INSTALL) -m 644 $(O)/lib/lib$$lib.so.$(version) $(DESTDIR)$(libdir) && \
 		ln -sf lib$$lib.so.$(version) $(DESTDIR)$(libdir)/lib$$lib.so.$(soversion) && \
 		ln -sf lib$$lib.so.$(soversion) $(DESTDIR)$(libdir)/lib$$lib.so || exit 1; \
+	done
+	for module in $(device_modules); do \
+		$(INSTALL) -m 644 $(O)/lib/incise/$$module.so $(DESTDIR)$(libdir)/incise || exit 1; \
 	done
 	$(INSTALL) -m 644 $(headers) $(DESTDIR)$(includedir)/incise
 	$(foreach lib,$(libraries),sed -e 's|@prefix@|$(prefix)|' -e 's|@libdir@|$(libdir)|' \
@@ -46,7 +50,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 
 uninstall: ## remove what install installed
 	rm -f $(addprefix $(DESTDIR),$(installed))
-	for dir in $(includedir)/incise $(datadir)/incise/scenes $(datadir)/incise; do \
+	for dir in $(libdir)/incise $(includedir)/incise $(datadir)/incise/scenes $(datadir)/incise; do \
 		rmdir "$(DESTDIR)$$dir" 2>/dev/null || :; \
 	done
 

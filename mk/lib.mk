@@ -37,8 +37,29 @@ libs: $(O)/lib/lib$1.so
 endef
 $(foreach lib,$(libraries),$(eval $(call library,$(lib))))
 
+# Modules of devices, $(O)/lib/incise/KIND_NAME.so: loaded when rig.conf names them. They
+# bring a library into the process that others do not need. What of libincise they use and
+# it does not export, they hold themselves.
+device_modules := $(if $(shell $(PKG_CONFIG) --exists libgpiod && echo yes),stepper_gpio)
+pc_stepper_gpio := libgpiod
+objects_stepper_gpio := $(addprefix $(O)/obj/lib/device/,motor.o page.o gpio/pulser.o \
+	gpio/stepper_gpio.o \
+	$(if $(shell $(PKG_CONFIG) --atleast-version=2 libgpiod && echo yes),gpio/gpio_v2.o,gpio/gpio_v1.o))
+
+define device_module
+$(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
+	@mkdir -p $$(@D)
+	$$(CC) -shared -Wl,-z,defs -Wl,--as-needed -Wl,-rpath,'$$$$ORIGIN/..' -L$(O)/lib \
+		$$(CFLAGS) $$(LDFLAGS) -o $$@ $$(objects_$1) -lincise \
+		$$(shell $$(PKG_CONFIG) --libs $$(pc_$1)) -lm -pthread
+
+libs: $(O)/lib/incise/$1.so
+endef
+$(foreach name,$(device_modules),$(eval $(call device_module,$(name))))
+
 # For unit tests, which reach into what the shared objects hide.
-$(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib)))
+test_objects := $(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o)
+$(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
 	# q, not r: two rooms may have a file of the same name

@@ -11,6 +11,8 @@
 #include "../base/c_locale.h"
 #include "../base/conf.h"
 #include "../sim/sim.h"
+#include "actuator.h"
+#include "backends.h"
 
 #define SIM_BACKEND "sim"
 #define SIM_START_NS INCISE_NS_PER_S /* of a simulated clock: 0 would pass for unset */
@@ -27,6 +29,7 @@ static unsigned int kind_bit(int kind)
 
 struct incise_rig {
 	char *spec;
+	struct incise_loaded loaded[N_KINDS]; /* modules of real devices */
 	struct incise_clock *clock;
 	struct incise_sim *sim;
 	struct incise_tracker *tracker;
@@ -36,13 +39,51 @@ struct incise_rig {
 	double point_mm[3], normal[3];
 };
 
+/* A device that does not stand on the virtual rig. */
+struct rig_real {
+	char *name; /* of its backend; NULL: none is wanted */
+	char *arguments;
+	char where[240];
+};
+
 /* What is wanted of a rig. */
 struct rig_plan {
 	bool simulated;
-	bool sim; /* one of the devices stands on the virtual rig */
+	bool sim;   /* one of the devices stands on the virtual rig */
+	bool watch; /* the stepper */
+	struct rig_real real[N_KINDS];
+	struct incise_actuator actuator;
+	bool has_actuator;
 	struct incise_sim_config config;
 	double point_mm[3], normal[3];
 };
+
+/* What a real device needs besides its string. */
+static int plan_real(struct rig_plan *plan, int kind, const char *path, int line,
+		     const char *device, size_t length, struct incise_error *err)
+{
+	struct rig_real *real = &plan->real[kind];
+
+	snprintf(real->where, sizeof(real->where), "%.200s:%d: %s", path, line,
+		 kind_name[kind]);
+	if (plan->simulated)
+		return incise_error_set(err, EINVAL,
+					"%s: only the virtual rig can follow a simulated "
+					"clock; write clock = \"real\"",
+					real->where);
+	if (kind == STEPPER && !plan->has_actuator)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: \"%.40s\" needs the group actuator; add actuator = { "
+			"spring_N_mm = …; travel_mm = …; lead_mm = …; };",
+			real->where, device);
+	real->name = strndup(device, length);
+	real->arguments = strdup(device + length + 1);
+	if (!real->name || !real->arguments)
+		return incise_error_set(err, ENOMEM, "%s: %s", real->where,
+					strerror(ENOMEM));
+	return 0;
+}
 
 /*
  * A device's string. Only a device that will be opened must have a backend here: one
@@ -74,15 +115,9 @@ static int plan_device(struct rig_plan *plan, int kind, bool wanted,
 			"%.200s:%d: %s: expected BACKEND:ARGUMENTS such as "
 			"\"" SIM_BACKEND ":\", found \"%.40s\"; correct it",
 			path, line, name, device);
-	if (length != strlen(SIM_BACKEND) || strncmp(device, SIM_BACKEND, length)) {
-		if (!wanted)
-			return 0;
-		return incise_error_set(
-			err, ENODEV,
-			"%.200s:%d: %s: there is no backend \"%.*s\"; those "
-			"there are: " SIM_BACKEND,
-			path, line, name, length < 40 ? (int)length : 40, device);
-	}
+	if (length != strlen(SIM_BACKEND) || strncmp(device, SIM_BACKEND, length))
+		return wanted ? plan_real(plan, kind, path, line, device, length, err)
+			      : 0;
 	plan->sim = true;
 	if (device[length + 1])
 		return incise_error_set(
@@ -205,8 +240,10 @@ static int plan_root(struct rig_plan *plan, unsigned int devices,
 		     const config_setting_t *root, const char *path,
 		     struct incise_error *err)
 {
-	static const char *const keys[] = {"clock",   "tracker", "force", "camera",
-					   "stepper", "surface", "sim",	  NULL};
+	static const char *const keys[] = {"clock",  "tracker",	 "force",
+					   "camera", "stepper",	 "surface",
+					   "sim",    "actuator", NULL};
+	const config_setting_t *actuator;
 	const char *clock = NULL;
 	char where[240];
 	int rc;
@@ -224,6 +261,11 @@ static int plan_root(struct rig_plan *plan, unsigned int devices,
 		rc = incise_conf_surface(root, path, plan->point_mm, plan->normal, err);
 	if (!rc)
 		rc = plan_sim(plan, root, path, err);
+	actuator = rc ? NULL : config_setting_get_member(root, "actuator");
+	if (actuator) {
+		rc = incise_actuator_read(&plan->actuator, actuator, path, err);
+		plan->has_actuator = true;
+	}
 	for (int kind = 0; kind < N_KINDS && !rc; kind++)
 		rc = plan_device(plan, kind, devices & kind_bit(kind), root, path, err);
 	return rc;
@@ -284,67 +326,102 @@ static int plan_shorthand(struct rig_plan *plan, const char *spec,
 	return rc;
 }
 
-static int rig_devices(struct incise_rig *rig, unsigned int devices)
+/* Where a device of a kind is kept. Each kind's struct is what its backend opens. */
+static void *rig_open_sim(struct incise_rig *rig, int kind)
 {
-	if (devices & INCISE_RIG_TRACKER) {
-		rig->tracker = incise_sim_tracker_new(rig->sim);
-		if (!rig->tracker)
-			return -errno;
+	switch (kind) {
+	case TRACKER:
+		return rig->tracker = incise_sim_tracker_new(rig->sim);
+	case FORCE:
+		return rig->force = incise_sim_force_new(rig->sim);
+	case CAMERA:
+		return rig->camera = incise_sim_camera_new(rig->sim);
+	default:
+		return rig->stepper = incise_sim_stepper_new(rig->sim);
 	}
-	if (devices & INCISE_RIG_FORCE) {
-		rig->force = incise_sim_force_new(rig->sim);
-		if (!rig->force)
-			return -errno;
-	}
-	if (devices & INCISE_RIG_CAMERA) {
-		rig->camera = incise_sim_camera_new(rig->sim);
-		if (!rig->camera)
-			return -errno;
-	}
-	if (devices & INCISE_RIG_STEPPER) {
-		rig->stepper = incise_sim_stepper_new(rig->sim);
-		if (!rig->stepper)
-			return -errno;
-	}
+}
+
+static int rig_open_real(struct incise_rig *rig, const struct rig_plan *plan, int kind,
+			 struct incise_error *err)
+{
+	const struct rig_real *real = &plan->real[kind];
+	struct incise_backend_request request = {
+		.arguments = real->arguments,
+		.where = real->where,
+		.clock = rig->clock,
+		.watch = plan->watch,
+		.actuator = &plan->actuator,
+	};
+	void *device;
+	int rc = incise_backend_find(&rig->loaded[kind], kind_name[kind], real->name,
+				     real->where, err);
+
+	if (rc)
+		return rc;
+	device = rig->loaded[kind].backend->open(&request, err);
+	if (!device)
+		return errno ? -errno : -EIO;
+	if (kind == TRACKER)
+		rig->tracker = device;
+	else if (kind == FORCE)
+		rig->force = device;
+	else if (kind == CAMERA)
+		rig->camera = device;
+	else
+		rig->stepper = device;
 	return 0;
 }
 
-struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
-				   struct incise_error *err)
+static int rig_devices(struct incise_rig *rig, const struct rig_plan *plan,
+		       unsigned int devices, struct incise_error *err)
 {
-	struct rig_plan plan = {.normal = {0, 0, 1}};
-	struct incise_rig *rig;
+	int rc = 0;
+
+	for (int kind = 0; kind < N_KINDS && !rc; kind++) {
+		if (!(devices & kind_bit(kind)))
+			continue;
+		if (plan->real[kind].name)
+			rc = rig_open_real(rig, plan, kind, err);
+		else if (!rig_open_sim(rig, kind))
+			rc = incise_error_set(err, ENOMEM, "%.200s: %s; free some memory",
+					      rig->spec, strerror(ENOMEM));
+	}
+	return rc;
+}
+
+static void plan_free(struct rig_plan *plan)
+{
+	for (int kind = 0; kind < N_KINDS; kind++) {
+		free(plan->real[kind].name);
+		free(plan->real[kind].arguments);
+	}
+}
+
+static struct incise_rig *rig_new(const struct rig_plan *plan, const char *spec,
+				  unsigned int devices, struct incise_error *err)
+{
+	struct incise_rig *rig = calloc(1, sizeof(*rig));
 	int rc;
 
-	incise_sim_config_init(&plan.config);
-	if (!strncmp(spec, SIM_BACKEND ":", strlen(SIM_BACKEND ":")))
-		rc = plan_shorthand(&plan, spec, err);
-	else
-		rc = plan_file(&plan, spec, devices, err);
-	if (rc) {
-		/* A value out of range is the file's fault like any other. */
-		errno = -rc;
-		if (err)
-			err->code = errno;
-		return NULL;
-	}
-	rig = calloc(1, sizeof(*rig));
 	if (!rig)
 		goto no_memory;
-	memcpy(rig->point_mm, plan.point_mm, sizeof(rig->point_mm));
-	memcpy(rig->normal, plan.normal, sizeof(rig->normal));
+	memcpy(rig->point_mm, plan->point_mm, sizeof(rig->point_mm));
+	memcpy(rig->normal, plan->normal, sizeof(rig->normal));
 	rig->spec = strdup(spec);
-	rig->clock = plan.simulated ? incise_clock_new_simulated(SIM_START_NS)
-				    : incise_clock_new_real();
+	rig->clock = plan->simulated ? incise_clock_new_simulated(SIM_START_NS)
+				     : incise_clock_new_real();
 	if (!rig->spec || !rig->clock)
 		goto no_memory;
-	if (plan.sim) {
-		rig->sim = incise_sim_new(&plan.config, rig->clock, err);
+	if (plan->sim) {
+		rig->sim = incise_sim_new(&plan->config, rig->clock, err);
 		if (!rig->sim)
 			goto close;
 	}
-	if (!rig_devices(rig, devices))
+	rc = rig_devices(rig, plan, devices, err);
+	if (!rc)
 		return rig;
+	errno = -rc;
+	goto close;
 no_memory:
 	incise_error_set(err, ENOMEM, "%.200s: %s; free some memory", spec,
 			 strerror(ENOMEM));
@@ -353,6 +430,33 @@ close:
 	incise_rig_close(rig);
 	errno = rc;
 	return NULL;
+}
+
+struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
+				   struct incise_error *err)
+{
+	struct rig_plan plan = {.normal = {0, 0, 1}};
+	struct incise_rig *rig = NULL;
+	int rc;
+
+	plan.watch = devices & INCISE_RIG_WATCH;
+	incise_sim_config_init(&plan.config);
+	if (!strncmp(spec, SIM_BACKEND ":", strlen(SIM_BACKEND ":")))
+		rc = plan_shorthand(&plan, spec, err);
+	else
+		rc = plan_file(&plan, spec, devices, err);
+	if (!rc) {
+		rig = rig_new(&plan, spec, devices, err);
+		rc = rig ? 0 : -errno;
+	}
+	plan_free(&plan);
+	if (rc) {
+		/* A value out of range is the file's fault like any other. */
+		errno = -rc;
+		if (err)
+			err->code = errno;
+	}
+	return rig;
 }
 
 void incise_rig_close(struct incise_rig *rig)
@@ -367,6 +471,8 @@ void incise_rig_close(struct incise_rig *rig)
 		rig->camera->ops->close(rig->camera);
 	if (rig->stepper)
 		rig->stepper->ops->close(rig->stepper);
+	for (int kind = 0; kind < N_KINDS; kind++)
+		incise_backend_unload(&rig->loaded[kind]);
 	incise_sim_free(rig->sim);
 	incise_clock_free(rig->clock);
 	free(rig->spec);

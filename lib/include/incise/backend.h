@@ -9,7 +9,10 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <incise/actuator.h>
 #include <incise/camera.h>
+#include <incise/clock.h>
+#include <incise/error.h>
 #include <incise/force.h>
 #include <incise/stepper.h>
 #include <incise/tracker.h>
@@ -94,6 +97,41 @@ struct incise_stepper_ops {
 
 struct incise_stepper {
 	const struct incise_stepper_ops *ops;
+};
+
+/** Changes when any struct of this header does. */
+#define INCISE_BACKEND_ABI 1
+
+/** What rig.conf asks a backend for. */
+struct incise_backend_request {
+	const char *arguments;	    /**< what follows "NAME:" */
+	const char *where;	    /**< "FILE:LINE: stepper"; messages begin with it */
+	struct incise_clock *clock; /**< real; lives as long as the device */
+	bool watch; /**< only look: the device must not be moved, nor its owner be hurt */
+	const struct incise_actuator *actuator; /**< of a stepper; to be copied */
+};
+
+/**
+ * A backend. A module, KIND_NAME.so in the folder incise/ beside libincise.so or in
+ * INCISE_MODULE_PATH, exports one as the symbol `incise_backend`:
+ *
+ *     const struct incise_backend incise_backend = {
+ *             .abi = INCISE_BACKEND_ABI, .kind = "stepper", .name = "mine", .open = f};
+ *
+ * and is loaded when rig.conf has stepper = "mine:ARGUMENTS".
+ */
+struct incise_backend {
+	unsigned int abi; /**< INCISE_BACKEND_ABI */
+	const char *kind; /**< "tracker", "force", "camera" or "stepper" */
+	const char *name; /**< letters a to z, digits, underscores; below 32 */
+	/**
+	 * Open a device. Whatever was powered when it is closed must be brought to rest.
+	 *
+	 * @return the struct of the kind, such as struct incise_stepper; NULL with errno,
+	 *         and the line in @err.
+	 */
+	void *(*open)(const struct incise_backend_request *request,
+		      struct incise_error *err);
 };
 
 #endif

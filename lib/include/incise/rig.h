@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * A rig: the devices that stand on one table, with their common clock, as rig.conf names
- * them. Each device is a string, `BACKEND:ARGUMENTS`; `sim:` is the virtual rig.
+ * them. Each device is a string, `BACKEND:ARGUMENTS`; `sim:` is the virtual rig. A backend
+ * that is not built in is a module, loaded when it is named (incise/backend.h).
  *
  *     clock   = "real";          # or "simulated"
  *     tracker = "sim:";
@@ -33,8 +34,8 @@ enum incise_rig_device {
 	INCISE_RIG_FORCE = 2,
 	INCISE_RIG_CAMERA = 4,
 	INCISE_RIG_STEPPER = 8,
-	INCISE_RIG_WATCH = 16, /**< the stepper is only looked at, not owned: but for its
-				    status, it answers -EPERM. The virtual one is as ever */
+	/** With STEPPER: only look at it, beside the program that drives it. */
+	INCISE_RIG_WATCH = 16,
 };
 
 /**
@@ -45,7 +46,10 @@ enum incise_rig_device {
  * @param devices incise_rig_device bits: the only ones that are opened
  * @return rig, to be closed with incise_rig_close(); NULL with errno of fopen(3), EINVAL
  *         (syntax, unknown key, value out of range: file and line are named), ENODEV (a
- *         device that the file does not name, or a backend that does not exist), ENOMEM.
+ *         device that the file does not name, or a backend that does not exist), ENOEXEC
+ *         (a module that is broken), ENOMEM; of a real device also ENOENT, EACCES, EBUSY
+ *         (another program drives it), ERANGE (this machine cannot make its steps so
+ *         fast), EOPNOTSUPP (it cannot be watched).
  */
 INCISE_API struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
 					      struct incise_error *err);

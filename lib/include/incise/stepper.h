@@ -105,7 +105,8 @@ struct incise_stepper;
  *
  * @param position_mm target of the nut; clamped to the travel
  * @return 0; -EDOM (not finite; the last target stands), -EIO (not powered, or a fault is
- *         latched), -ENODEV (gone). Real-time safe: no system call.
+ *         latched), -EPERM (opened to watch), -ENODEV (gone). Real-time safe: no system
+ *         call.
  */
 INCISE_API int incise_stepper_set(struct incise_stepper *stepper, double position_mm);
 

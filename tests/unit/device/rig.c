@@ -179,7 +179,7 @@ static void file_refuses(void **state)
 		 ":1: clock: expected real or simulated, found fast; correct it"},
 		{"tracer = \"sim:\";", EINVAL,
 		 ":1: tracer: unknown key; expected one of clock, tracker, force, camera, "
-		 "stepper, surface, sim"},
+		 "stepper, surface, sim, actuator"},
 		{"sim = 1;", EINVAL,
 		 ":1: sim: expected a group { key = value; }; correct it"},
 		{"sim = {\n\nsede = 1; };", EINVAL,

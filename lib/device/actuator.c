@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The actuator of rig.conf, and its mm in microsteps; see incise/actuator.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+#include "actuator.h"
+
+#define US 1000.0      /* ns */
+#define MS 1000000.0   /* ns */
+#define MOST_STEPS 2e9 /* of speed and acceleration: what 32 bits hold */
+#define SECOND_NS 1e9
+
+double incise_actuator_step_mm(const struct incise_actuator *actuator)
+{
+	return actuator->lead_mm /
+	       ((double)actuator->steps_per_turn * actuator->microsteps);
+}
+
+/* Whole microsteps in the travel; the rounding of the division must not lose one. */
+static double travel_steps(const struct incise_actuator *actuator)
+{
+	return floor(actuator->travel_mm / incise_actuator_step_mm(actuator) *
+		     (1 + 1e-12));
+}
+
+int32_t incise_actuator_steps(const struct incise_actuator *actuator, double position_mm)
+{
+	double steps = position_mm / incise_actuator_step_mm(actuator);
+
+	if (isnan(steps))
+		return 0;
+	return (int32_t)fmax(0, fmin(travel_steps(actuator), round(steps)));
+}
+
+int64_t incise_actuator_rate(const struct incise_actuator *actuator, double velocity_mm_s)
+{
+	double most = actuator->velocity_mm_s;
+
+	if (isnan(velocity_mm_s))
+		return 0;
+	velocity_mm_s = fmax(-most, fmin(most, velocity_mm_s));
+	return llround(velocity_mm_s / incise_actuator_step_mm(actuator));
+}
+
+static double whole(double value)
+{
+	return fmin(MOST_STEPS, floor(value * (1 + 1e-12)));
+}
+
+void incise_actuator_limits(const struct incise_actuator *actuator,
+			    struct incise_profile_limits *limits)
+{
+	double step_mm = incise_actuator_step_mm(actuator);
+
+	*limits = (struct incise_profile_limits){
+		.tick_ns = actuator->tick_ns,
+		.velocity = (uint32_t)whole(actuator->velocity_mm_s / step_mm),
+		.acceleration = (uint32_t)whole(actuator->acceleration_mm_s2 / step_mm),
+		.position_max = (int32_t)travel_steps(actuator),
+		.jerk = (uint64_t)floor(actuator->jerk_mm_s3 / step_mm),
+	};
+}
+
+/* A key that is a number of the struct, in another unit there. */
+struct number {
+	const char *key;
+	double min, max, unit; /* unit: of the key in that of the field */
+	size_t offset;
+	enum { DOUBLE, U32, U64 } type;
+};
+
+#define NUMBER(key, min, max, unit, field, type)                                   \
+	{                                                                          \
+		key, min, max, unit, offsetof(struct incise_actuator, field), type \
+	}
+
+static const struct number numbers[] = {
+	NUMBER("spring_N_mm", 0.001, 1000, 1, spring_N_mm, DOUBLE),
+	NUMBER("travel_mm", 0.1, 1000, 1, travel_mm, DOUBLE),
+	NUMBER("lead_mm", 0.01, 100, 1, lead_mm, DOUBLE),
+	NUMBER("velocity_mm_s", 0.001, 10000, 1, velocity_mm_s, DOUBLE),
+	NUMBER("acceleration_mm_s2", 0.1, 1e7, 1, acceleration_mm_s2, DOUBLE),
+	NUMBER("jerk_mm_s3", 0, 1e12, 1, jerk_mm_s3, DOUBLE),
+	NUMBER("deadman_ms", 1, 10000, 1e-3, deadman_s, DOUBLE),
+	NUMBER("tick_us", 50, 2000, US, tick_ns, U32),
+	NUMBER("high_us", 0.5, 1000, US, high_ns, U32),
+	NUMBER("low_us", 0.5, 1000, US, low_ns, U32),
+	NUMBER("setup_us", 0, 1000, US, setup_ns, U32),
+	NUMBER("hold_us", 0, 1000, US, hold_ns, U32),
+	NUMBER("enable_ms", 0, 1000, MS, enable_ns, U64),
+	NUMBER("home_mm_s", 0.001, 10000, 1, home_mm_s, DOUBLE),
+	NUMBER("home_mm", -1000, 1000, 1, home_mm, DOUBLE),
+	NUMBER("origin_mm", -1e6, 1e6, 1, origin_mm, DOUBLE),
+};
+
+static int read_numbers(struct incise_actuator *actuator, const config_setting_t *group,
+			const char *path, struct incise_error *err)
+{
+	for (size_t i = 0; i < sizeof(numbers) / sizeof(*numbers); i++) {
+		void *field = (char *)actuator + numbers[i].offset;
+		double value = NAN;
+		int rc = incise_conf_number(group, path, numbers[i].key, numbers[i].min,
+					    numbers[i].max, &value, err);
+
+		if (rc)
+			return rc;
+		if (isnan(value))
+			continue;
+		value *= numbers[i].unit;
+		if (numbers[i].type == DOUBLE)
+			*(double *)field = value;
+		else if (numbers[i].type == U32)
+			*(uint32_t *)field = (uint32_t)lround(value);
+		else
+			*(uint64_t *)field = (uint64_t)llround(value);
+	}
+	return 0;
+}
+
+static const char *const line_keys[] = {"step",	     "dir",  "enable", "limit_min",
+					"limit_max", "home", "estop",  "alarm"};
+
+/* Names in active_low = ["enable", "estop"]; */
+static int read_active_low(struct incise_actuator *actuator,
+			   const config_setting_t *lines, const char *path,
+			   struct incise_error *err)
+{
+	const config_setting_t *names = config_setting_get_member(lines, "active_low");
+	int n = names && config_setting_is_aggregate(names) ? config_setting_length(names)
+							    : 0;
+
+	if (names &&
+	    (!config_setting_is_aggregate(names) || config_setting_is_group(names)))
+		return incise_error_set(err, EINVAL,
+					"%.200s:%d: actuator.lines.active_low: expected "
+					"names such as [\"enable\"]; correct it",
+					path, config_setting_source_line(names));
+	for (int i = 0; i < n; i++) {
+		const char *name =
+			config_setting_get_string(config_setting_get_elem(names, i));
+		int k = 0;
+
+		while (k < INCISE_LINES && (!name || strcmp(name, line_keys[k])))
+			k++;
+		if (k == INCISE_LINES || actuator->line[k] < 0)
+			return incise_error_set(
+				err, EINVAL,
+				"%.200s:%d: actuator.lines.active_low: \"%.40s\" is no "
+				"line that is given here; correct it",
+				path, config_setting_source_line(names),
+				name ? name : "?");
+		actuator->active_low |= 1u << k;
+	}
+	return 0;
+}
+
+static int read_lines(struct incise_actuator *actuator, const config_setting_t *group,
+		      const char *path, struct incise_error *err)
+{
+	static const char *const keys[] = {"step",	 "dir",	 "enable", "limit_min",
+					   "limit_max",	 "home", "estop",  "alarm",
+					   "active_low", NULL};
+	const config_setting_t *lines = config_setting_get_member(group, "lines");
+	int rc;
+
+	for (int i = 0; i < INCISE_LINES; i++)
+		actuator->line[i] = -1;
+	if (!lines)
+		return 0;
+	actuator->has_lines = true;
+	rc = incise_conf_known(lines, path, keys, err);
+	for (int i = 0; i < INCISE_LINES && !rc; i++) {
+		rc = incise_conf_integer(lines, path, line_keys[i], 0, 1023,
+					 &actuator->line[i], err);
+		for (int k = 0; k < i && !rc; k++)
+			if (actuator->line[i] >= 0 &&
+			    actuator->line[k] == actuator->line[i])
+				rc = incise_error_set(
+					err, EINVAL,
+					"%.200s:%d: actuator.lines: %s and %s are both "
+					"line %d; correct one",
+					path, config_setting_source_line(lines),
+					line_keys[k], line_keys[i], actuator->line[i]);
+	}
+	if (!rc)
+		rc = incise_conf_need(lines, path, "step", err);
+	if (!rc)
+		rc = incise_conf_need(lines, path, "dir", err);
+	return rc ? rc : read_active_low(actuator, lines, path, err);
+}
+
+static int line_of(const config_setting_t *group, const char *key)
+{
+	const config_setting_t *setting = config_setting_get_member(group, key);
+
+	return config_setting_source_line(setting ? setting : group);
+}
+
+/* What fits alone need not fit together. */
+static int check(const struct incise_actuator *actuator, const config_setting_t *group,
+		 const char *path, struct incise_error *err)
+{
+	double step_mm = incise_actuator_step_mm(actuator);
+	double rate = actuator->velocity_mm_s / step_mm, pulse_ns, jerk;
+	struct incise_profile_limits limits;
+
+	if (actuator->travel_mm / step_mm > INCISE_PROFILE_POSITION_MAX ||
+	    actuator->travel_mm < step_mm)
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: actuator.travel_mm: expected 1 to %d microsteps of "
+			"%g mm, found %.0f; correct lead_mm, steps_per_turn or microsteps",
+			path, line_of(group, "travel_mm"), INCISE_PROFILE_POSITION_MAX,
+			step_mm, actuator->travel_mm / step_mm);
+	if (!(rate >= 1 && rate <= INCISE_PROFILE_VELOCITY_MAX))
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: actuator.velocity_mm_s: expected 1 to %d microsteps/s, "
+			"that is %g to %g mm/s, found %g; correct it, or microsteps",
+			path, line_of(group, "velocity_mm_s"),
+			INCISE_PROFILE_VELOCITY_MAX, step_mm,
+			step_mm * INCISE_PROFILE_VELOCITY_MAX, actuator->velocity_mm_s);
+	pulse_ns = (double)actuator->high_ns + actuator->low_ns;
+	if (pulse_ns * rate > SECOND_NS * (1 + 1e-9))
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: actuator.velocity_mm_s: %g mm/s are a step each %.3f us, "
+			"but high_us and low_us take %.3f us; give at most %g mm/s",
+			path, line_of(group, "velocity_mm_s"), actuator->velocity_mm_s,
+			SECOND_NS / US / rate, pulse_ns / US,
+			floor(SECOND_NS / pulse_ns * step_mm * 1e4) / 1e4);
+	if (!(actuator->acceleration_mm_s2 / step_mm >= 1 &&
+	      actuator->acceleration_mm_s2 / step_mm <= MOST_STEPS))
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: actuator.acceleration_mm_s2: expected 1 to %.0f "
+			"microsteps/s^2, that is %g to %g mm/s^2, found %g; correct it",
+			path, line_of(group, "acceleration_mm_s2"), MOST_STEPS, step_mm,
+			step_mm * MOST_STEPS, actuator->acceleration_mm_s2);
+	incise_actuator_limits(actuator, &limits);
+	/* So that its average, 2a/(jT), has no more ticks than there is room for. */
+	jerk = 2 * actuator->acceleration_mm_s2 /
+	       (INCISE_PROFILE_AVERAGE_MAX * (actuator->tick_ns / SECOND_NS));
+	if (actuator->jerk_mm_s3 &&
+	    (limits.jerk < 1 || incise_profile_stopping_ns(&limits, 1) == UINT64_MAX))
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: actuator.jerk_mm_s3: expected 0 or at least %.4g for this "
+			"acceleration and tick_us, found %g; correct it",
+			path, line_of(group, "jerk_mm_s3"), jerk * 1.01,
+			actuator->jerk_mm_s3);
+	if (actuator->home_mm_s > actuator->velocity_mm_s)
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: actuator.home_mm_s: expected at most velocity_mm_s, %g, "
+			"found %g; correct it",
+			path, line_of(group, "home_mm_s"), actuator->velocity_mm_s,
+			actuator->home_mm_s);
+	if (actuator->home_mm < -actuator->travel_mm / 4 ||
+	    actuator->home_mm > actuator->travel_mm)
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: actuator.home_mm: expected %g to %g, from a quarter of "
+			"the travel below 0 to its end, found %g; correct it",
+			path, line_of(group, "home_mm"), -actuator->travel_mm / 4,
+			actuator->travel_mm, actuator->home_mm);
+	return 0;
+}
+
+int incise_actuator_read(struct incise_actuator *actuator, const config_setting_t *group,
+			 const char *path, struct incise_error *err)
+{
+	static const char *const keys[] = {"spring_N_mm",
+					   "travel_mm",
+					   "lead_mm",
+					   "steps_per_turn",
+					   "microsteps",
+					   "velocity_mm_s",
+					   "acceleration_mm_s2",
+					   "jerk_mm_s3",
+					   "deadman_ms",
+					   "retract",
+					   "tick_us",
+					   "high_us",
+					   "low_us",
+					   "setup_us",
+					   "hold_us",
+					   "enable_ms",
+					   "home_mm_s",
+					   "home_mm",
+					   "origin_mm",
+					   "invert",
+					   "lines",
+					   NULL};
+	static const char *const needed[] = {"spring_N_mm", "travel_mm", "lead_mm"};
+	int rc;
+
+	*actuator = (struct incise_actuator){
+		.steps_per_turn = 200,
+		.microsteps = 16,
+		.velocity_mm_s = 10,
+		.acceleration_mm_s2 = 500,
+		.deadman_s = 0.1,
+		.tick_ns = 250000,
+		.setup_ns = 5000,
+		.hold_ns = 5000,
+		.enable_ns = 1000000,
+		.home_mm_s = NAN,
+	};
+	rc = incise_conf_known(group, path, keys, err);
+	for (size_t i = 0; i < sizeof(needed) / sizeof(*needed) && !rc; i++)
+		rc = incise_conf_need(group, path, needed[i], err);
+	if (!rc)
+		rc = read_numbers(actuator, group, path, err);
+	if (!rc)
+		rc = incise_conf_integer(group, path, "steps_per_turn", 1, 100000,
+					 &actuator->steps_per_turn, err);
+	if (!rc)
+		rc = incise_conf_integer(group, path, "microsteps", 1, 1024,
+					 &actuator->microsteps, err);
+	if (!rc)
+		rc = incise_conf_bool(group, path, "invert", &actuator->invert, err);
+	if (!rc)
+		rc = incise_conf_bool(group, path, "retract", &actuator->retract, err);
+	if (!rc)
+		rc = read_lines(actuator, group, path, err);
+	if (isnan(actuator->home_mm_s))
+		actuator->home_mm_s = fmin(2, actuator->velocity_mm_s);
+	return rc ? rc : check(actuator, group, path, err);
+}

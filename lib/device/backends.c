@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Finding a backend by its name, built in or in a module; see backends.h. Nothing is
+ * loaded that is not named: a module brings its libraries into the process.
+ */
+#include <dirent.h>
+#include <dlfcn.h>
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "backends.h"
+
+#define BUILT_IN_SIM "sim" /* rig.c makes it: it stands on a world of its own */
+#define SYMBOL "incise_backend"
+
+static const struct incise_backend *const built_in[] = {&incise_stepper_kernel};
+
+/* Names go into paths: letters, digits and the underscore, no more. */
+static bool plain(const char *name)
+{
+	size_t length = strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_");
+
+	return length && length < 32 && !name[length];
+}
+
+/* The folder of modules; false where it has no name that fits. */
+static bool folder(char *path, size_t size)
+{
+	const char *given = getenv("INCISE_MODULE_PATH");
+	char own[PATH_MAX];
+	Dl_info info;
+	int length;
+
+	if (given && *given) {
+		length = snprintf(path, size, "%s", given);
+		return length > 0 && (size_t)length < size;
+	}
+	if (!dladdr((void *)incise_backend_find, &info) || !info.dli_fname ||
+	    !realpath(info.dli_fname, own) || !strrchr(own, '/'))
+		return false;
+	*strrchr(own, '/') = '\0';
+	length = snprintf(path, size, "%s/incise", own);
+	return length > 0 && (size_t)length < size;
+}
+
+/* "sim, kernel, gpio": what there is of a kind. */
+static void list(const char *kind, const char *in, char *text, size_t size)
+{
+	size_t prefix = strlen(kind), length;
+	DIR *dir = in ? opendir(in) : NULL;
+	struct dirent *entry;
+
+	snprintf(text, size, BUILT_IN_SIM);
+	for (size_t i = 0; i < sizeof(built_in) / sizeof(*built_in); i++)
+		if (!strcmp(built_in[i]->kind, kind)) {
+			length = strlen(text);
+			snprintf(text + length, size - length, ", %s", built_in[i]->name);
+		}
+	while (dir && (entry = readdir(dir))) {
+		const char *name = entry->d_name;
+		size_t n = strlen(name);
+
+		if (n < prefix + 5 || strncmp(name, kind, prefix) ||
+		    name[prefix] != '_' || strcmp(name + n - 3, ".so"))
+			continue;
+		length = strlen(text);
+		snprintf(text + length, size - length, ", %.*s", (int)(n - prefix - 4),
+			 name + prefix + 1);
+	}
+	if (dir)
+		closedir(dir);
+}
+
+static int load(struct incise_loaded *loaded, const char *kind, const char *name,
+		const char *path, const char *where, struct incise_error *err)
+{
+	const struct incise_backend *backend;
+	void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+	int rc = 0;
+
+	if (!handle)
+		return incise_error_set(
+			err, ENOEXEC,
+			"%s: the module cannot be loaded: %.300s; install "
+			"what it needs",
+			where, dlerror());
+	backend = dlsym(handle, SYMBOL);
+	if (!backend)
+		rc = incise_error_set(err, ENOEXEC,
+				      "%s: %.200s: has no symbol " SYMBOL
+				      "; it is no module of incise",
+				      where, path);
+	else if (backend->abi != INCISE_BACKEND_ABI)
+		rc = incise_error_set(err, ENOEXEC,
+				      "%s: %.200s: is made for interface %u, this is %u; "
+				      "build it again",
+				      where, path, backend->abi, INCISE_BACKEND_ABI);
+	else if (!backend->open || !backend->kind || strcmp(backend->kind, kind) ||
+		 !backend->name || strcmp(backend->name, name))
+		rc = incise_error_set(err, ENOEXEC,
+				      "%s: %.200s: holds another backend than its name "
+				      "says; build it again",
+				      where, path);
+	if (rc) {
+		dlclose(handle);
+		errno = -rc;
+		return rc;
+	}
+	*loaded = (struct incise_loaded){backend, handle};
+	return 0;
+}
+
+int incise_backend_find(struct incise_loaded *loaded, const char *kind, const char *name,
+			const char *where, struct incise_error *err)
+{
+	char in[PATH_MAX], path[PATH_MAX + 80], known[200];
+	bool has_folder = folder(in, sizeof(in));
+	FILE *file;
+
+	for (size_t i = 0; i < sizeof(built_in) / sizeof(*built_in); i++)
+		if (!strcmp(built_in[i]->kind, kind) &&
+		    !strcmp(built_in[i]->name, name)) {
+			*loaded = (struct incise_loaded){built_in[i], NULL};
+			return 0;
+		}
+	if (has_folder && plain(name)) {
+		snprintf(path, sizeof(path), "%s/%s_%s.so", in, kind, name);
+		file = fopen(path, "re");
+		if (file) {
+			fclose(file);
+			return load(loaded, kind, name, path, where, err);
+		}
+	}
+	list(kind, has_folder ? in : NULL, known, sizeof(known));
+	return incise_error_set(err, ENODEV,
+				"%s: there is no backend \"%.40s\"; those there are: %s",
+				where, name, known);
+}
+
+void incise_backend_unload(struct incise_loaded *loaded)
+{
+	if (loaded->handle)
+		dlclose(loaded->handle);
+	*loaded = (struct incise_loaded){0};
+}

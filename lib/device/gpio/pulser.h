@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Steps on lines from user space, by the same rules as the kernel module's timer: shortest
+ * times, limits, deadman, faults that stay. It knows no thread and no clock of its own; who
+ * runs it does, and tests do with a clock that they make.
+ *
+ *   set-points ─▶ profile ─▶ plan ─▶ one edge at a time ─▶ lines
+ *   inputs ────────────────▶  │
+ *   status ◀──────────────────╯
+ *
+ *   dir   ────╥────────────────────────────────────────────────╥──────────
+ *   step  ____╨___________┌───────┐_______┌───────┐____________╨_____┌────
+ *              set_up ≥     high ≥  low ≥           hold ≥   set_up ≥
+ */
+#ifndef INCISE_PULSER_H
+#define INCISE_PULSER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <incise/profile.h>
+#include "../abi.h"
+
+struct incise_pulser;
+
+enum incise_pulser_output { INCISE_PULSER_STEP, INCISE_PULSER_DIR, INCISE_PULSER_ENABLE };
+
+/* The outside world. */
+struct incise_pulser_door {
+	int64_t (*now)(void *world); /* ns; never goes back */
+	/* 0 or a negative errno */
+	int (*write)(void *world, enum incise_pulser_output output, bool active);
+	/* INCISE_STEPPER_LINE_… bits that are active, or a negative errno */
+	int (*inputs)(void *world);
+};
+
+/* One motor; one thread runs and commands it. */
+struct incise_pulser {
+	const struct incise_pulser_door *door;
+	void *world;
+	const struct incise_stepper_setpoint *setpoint; /* another thread's to write */
+	struct incise_abi_status *slot;			/* another thread's to read */
+
+	/* private */
+	struct incise_stepper_config config;
+	struct incise_abi_status status; /* what goes into the slot */
+	struct incise_stepper_setpoint wish;
+	struct incise_profile profile;
+	struct incise_profile_slot steps;  /* of this tick */
+	int32_t given;			   /* of them */
+	int64_t interval_ns;		   /* of steps at the largest velocity */
+	int64_t base_ns;		   /* begin of the tick */
+	int64_t powered_ns;		   /* no step before that */
+	int64_t seen_ns;		   /* the last sign of life */
+	int64_t lead_ns, trail_ns, dir_ns; /* the last edges, when they were made */
+	int64_t lead_want_ns;		   /* that step by the profile */
+	uint32_t seq;			   /* of the last set-point */
+	uint32_t late_row;
+	int direction; /* +1, -1; 0: not known */
+	bool powered, resting, ending, high;
+};
+
+/* A motor without power at 0. Returns 0, -EINVAL as incise_profile_init() says. */
+int incise_pulser_init(struct incise_pulser *pulser,
+		       const struct incise_stepper_config *config);
+
+/*
+ * Do what is due, and say when it is to be run next, ns. The sooner after that the better;
+ * being late shifts steps, and never makes them come closer than they may.
+ */
+int64_t incise_pulser_run(struct incise_pulser *pulser);
+
+/* As the ioctls of the same names. */
+int incise_pulser_enable(struct incise_pulser *pulser);
+void incise_pulser_disable(struct incise_pulser *pulser);
+int incise_pulser_clear(struct incise_pulser *pulser);
+int incise_pulser_origin(struct incise_pulser *pulser, int32_t steps, bool homed);
+
+/* INCISE_STEPPER_FAULT_… from outside, such as OWNER; only what has power takes it. */
+void incise_pulser_fault(struct incise_pulser *pulser, uint32_t fault);
+
+#endif

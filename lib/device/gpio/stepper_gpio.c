@@ -1,0 +1,417 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A stepper on GPIO lines, for machines that cannot load the module: "gpio:CHIP", with the
+ * lines in actuator.lines of rig.conf. A thread of its own makes the steps, real-time when
+ * it may be.
+ *
+ *   incise_stepper_…() ─▶ pages, mailbox ─▶ thread: pulser ─▶ libgpiod
+ *
+ * The thread sleeps until shortly before an edge is due, and waits for the rest of it in a
+ * loop: what a sleep is late by, the loop takes up.
+ */
+#include <errno.h>
+#include <limits.h>
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <time.h>
+#include <incise/clock.h>
+#include "../motor.h"
+#include "gpio_lines.h"
+#include "pulser.h"
+
+#define PRIORITY 60 /* above a haptic loop, which must not hold up steps */
+#define SLEEPS 64   /* of the self-test */
+#define SLEEP_NS 200000
+#define SPIN_MAX_NS 200000
+#define WRITES 64
+#define RATE_MOST 20000 /* steps/s, whatever the self-test says */
+#define ANSWER_NS INCISE_NS_PER_S
+
+enum command { NONE, ENABLE, DISABLE, CLEAR, ORIGIN, HOMED, END };
+
+struct gpio_stepper {
+	struct incise_motor motor;
+	/* The two pages. */
+	_Alignas(64) struct incise_stepper_setpoint setpoint;
+	_Alignas(64) struct incise_abi_status status;
+	/* Mailbox: written by the caller while it is NONE, else by the thread. */
+	_Alignas(64) atomic_int command;
+	int32_t steps;
+	int answer;
+	/* The thread's. */
+	_Alignas(64) struct incise_pulser pulser;
+	struct gpio_lines *lines;
+	unsigned int active_low;
+	int64_t spin_ns;
+	pthread_t thread;
+	bool runs;
+};
+
+static int64_t clock_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
+}
+
+static void sleep_until(int64_t t_ns)
+{
+	struct timespec until = {t_ns / INCISE_NS_PER_S, t_ns % INCISE_NS_PER_S};
+
+	clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
+}
+
+/* The pulser's world. */
+
+static int64_t world_now(void *world)
+{
+	(void)world;
+	return clock_ns();
+}
+
+static int world_write(void *world, enum incise_pulser_output output, bool active)
+{
+	static const enum incise_actuator_line line[] = {
+		[INCISE_PULSER_STEP] = INCISE_LINE_STEP,
+		[INCISE_PULSER_DIR] = INCISE_LINE_DIR,
+		[INCISE_PULSER_ENABLE] = INCISE_LINE_ENABLE,
+	};
+	struct gpio_stepper *g = world;
+	bool low = g->active_low >> line[output] & 1;
+
+	return gpio_lines_write(g->lines, line[output], active != low);
+}
+
+static unsigned int input_bits(unsigned int lines)
+{
+	static const unsigned int bit[INCISE_LINES] = {
+		[INCISE_LINE_LIMIT_MIN] = INCISE_STEPPER_LINE_LIMIT_MIN,
+		[INCISE_LINE_LIMIT_MAX] = INCISE_STEPPER_LINE_LIMIT_MAX,
+		[INCISE_LINE_HOME] = INCISE_STEPPER_LINE_HOME,
+		[INCISE_LINE_ESTOP] = INCISE_STEPPER_LINE_ESTOP,
+		[INCISE_LINE_ALARM] = INCISE_STEPPER_LINE_DRIVER,
+	};
+	unsigned int bits = 0;
+
+	for (int i = INCISE_LINES_OUT; i < INCISE_LINES; i++)
+		if (lines >> i & 1)
+			bits |= bit[i];
+	return bits;
+}
+
+static int world_inputs(void *world)
+{
+	struct gpio_stepper *g = world;
+	int high = gpio_lines_read(g->lines);
+
+	/* A line that is not wired is never among active_low, nor ever high. */
+	return high < 0 ? high : (int)input_bits((unsigned int)high ^ g->active_low);
+}
+
+static const struct incise_pulser_door world_door = {world_now, world_write,
+						     world_inputs};
+
+/* The thread. */
+
+static int obey(struct gpio_stepper *g, int command)
+{
+	switch (command) {
+	case ENABLE:
+		return incise_pulser_enable(&g->pulser);
+	case DISABLE:
+		incise_pulser_disable(&g->pulser);
+		return 0;
+	case CLEAR:
+		return incise_pulser_clear(&g->pulser);
+	case ORIGIN:
+	case HOMED:
+		return incise_pulser_origin(&g->pulser, g->steps, command == HOMED);
+	default:
+		return 0;
+	}
+}
+
+static void *thread_run(void *argument)
+{
+	struct gpio_stepper *g = argument;
+	int command = NONE;
+
+	while (command != END) {
+		int64_t due = incise_pulser_run(&g->pulser);
+		int64_t spin_ns = g->pulser.resting ? 0 : g->spin_ns;
+
+		command = atomic_load_explicit(&g->command, memory_order_acquire);
+		if (command != NONE) {
+			g->answer = obey(g, command);
+			atomic_store_explicit(&g->command, NONE, memory_order_release);
+			continue;
+		}
+		if (due - clock_ns() > spin_ns)
+			sleep_until(due - spin_ns);
+	}
+	return NULL;
+}
+
+/* The doors of the motor. */
+
+static struct gpio_stepper *of(struct incise_motor *motor)
+{
+	return (struct gpio_stepper *)motor;
+}
+
+static int ask(struct gpio_stepper *g, enum command command)
+{
+	int64_t end = clock_ns() + ANSWER_NS;
+
+	atomic_store_explicit(&g->command, command, memory_order_release);
+	while (atomic_load_explicit(&g->command, memory_order_acquire) != NONE) {
+		if (clock_ns() > end && command != END)
+			return -EIO;
+		sleep_until(clock_ns() + 50000);
+	}
+	return g->answer;
+}
+
+static int gpio_enable(struct incise_motor *motor)
+{
+	return ask(of(motor), ENABLE);
+}
+
+static int gpio_disable(struct incise_motor *motor)
+{
+	return ask(of(motor), DISABLE);
+}
+
+static int gpio_clear(struct incise_motor *motor)
+{
+	return ask(of(motor), CLEAR);
+}
+
+static int gpio_origin(struct incise_motor *motor, int32_t steps, bool homed)
+{
+	of(motor)->steps = steps;
+	return ask(of(motor), homed ? HOMED : ORIGIN);
+}
+
+static int64_t gpio_now(struct incise_motor *motor)
+{
+	(void)motor;
+	return clock_ns();
+}
+
+static void gpio_close(struct incise_motor *motor)
+{
+	struct gpio_stepper *g = of(motor);
+
+	if (g->runs) {
+		motor->stepper.ops->disable(&motor->stepper, NULL);
+		ask(g, END);
+		pthread_join(g->thread, NULL);
+	}
+	if (g->lines) {
+		world_write(g, INCISE_PULSER_STEP, false);
+		world_write(g, INCISE_PULSER_ENABLE, false);
+		gpio_lines_close(g->lines);
+	}
+	free(g);
+}
+
+static int ascending(const void *a, const void *b)
+{
+	int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
+
+	return (x > y) - (x < y);
+}
+
+/* What this machine can hold, measured on lines that move nothing. */
+static int self_test(struct gpio_stepper *g, uint32_t *rate_max, uint32_t *pulse_ns)
+{
+	int64_t late[SLEEPS], write[WRITES], step_ns;
+
+	for (int i = 0; i < SLEEPS; i++) {
+		int64_t due = clock_ns() + SLEEP_NS;
+
+		sleep_until(due);
+		late[i] = clock_ns() - due;
+	}
+	for (int i = 0; i < WRITES; i++) {
+		int64_t begin = clock_ns();
+		int rc = world_write(g, INCISE_PULSER_STEP, false);
+
+		if (rc < 0 || (rc = world_inputs(g)) < 0)
+			return rc;
+		write[i] = clock_ns() - begin;
+	}
+	qsort(late, SLEEPS, sizeof(*late), ascending);
+	qsort(write, WRITES, sizeof(*write), ascending);
+	g->spin_ns = late[SLEEPS - 1] < SPIN_MAX_NS ? late[SLEEPS - 1] : SPIN_MAX_NS;
+	/* A step is two edges, each with a look at the inputs; half of the time is spare. */
+	step_ns = 2 * (2 * write[WRITES * 9 / 10] + late[SLEEPS * 9 / 10]);
+	*pulse_ns = (uint32_t)write[WRITES * 9 / 10];
+	*rate_max = step_ns > INCISE_NS_PER_S / RATE_MOST
+			    ? (uint32_t)(INCISE_NS_PER_S / step_ns)
+			    : RATE_MOST;
+	return *rate_max ? 0 : -ERANGE;
+}
+
+static int start_thread(struct gpio_stepper *g)
+{
+	struct sched_param priority = {.sched_priority = PRIORITY};
+	sigset_t all, before;
+	int rc;
+
+	/* Signals are the program's; none shall hold up a step. */
+	sigfillset(&all);
+	pthread_sigmask(SIG_SETMASK, &all, &before);
+	rc = pthread_create(&g->thread, NULL, thread_run, g);
+	pthread_sigmask(SIG_SETMASK, &before, NULL);
+	if (rc)
+		return -rc;
+	g->runs = true;
+	if (pthread_setschedparam(g->thread, SCHED_FIFO, &priority)) {
+		size_t length = strlen(g->motor.name);
+
+		snprintf(g->motor.name + length, sizeof(g->motor.name) - length,
+			 ", not real-time");
+	}
+	return 0;
+}
+
+static int take_lines(struct gpio_stepper *g, const struct incise_backend_request *asked,
+		      struct incise_error *err)
+{
+	const struct incise_actuator *actuator = asked->actuator;
+	const char *todo;
+
+	if (!*asked->arguments)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: expected gpio:CHIP, a name, label or path such "
+			"as gpio:gpiochip0; correct it",
+			asked->where);
+	if (!actuator->has_lines)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: gpio needs actuator.lines; add lines = { step "
+			"= 17; dir = 27; enable = 22; }; with your lines",
+			asked->where);
+	if (asked->watch)
+		return incise_error_set(err, EOPNOTSUPP,
+					"%s: steps over gpio are made within the program "
+					"that drives them, and cannot be watched from "
+					"another",
+					asked->where);
+	/* At rest all are inactive. */
+	g->lines =
+		gpio_lines_open(asked->arguments, actuator->line, actuator->active_low);
+	if (g->lines)
+		return 0;
+	switch (errno) {
+	case ENOENT:
+	case ENODEV:
+		todo = "there is no such chip; `gpiodetect` lists those there are";
+		break;
+	case EBUSY:
+		todo = "a line is in use; `gpioinfo` says by whom";
+		break;
+	case EACCES:
+	case EPERM:
+		todo = "not permitted; become a member of the group that owns "
+		       "/dev/gpiochip*, or root";
+		break;
+	case EINVAL:
+		todo = "it has not all of the lines in actuator.lines";
+		break;
+	default:
+		todo = strerror(errno);
+	}
+	return incise_error_set(err, errno, "%s: gpio chip %.60s: %s", asked->where,
+				asked->arguments, todo);
+}
+
+static int set_up(struct gpio_stepper *g, const struct incise_backend_request *asked,
+		  struct incise_error *err)
+{
+	struct incise_stepper_config config;
+	uint32_t rate_max, pulse_ns;
+	int rc = take_lines(g, asked, err);
+
+	if (rc)
+		return rc;
+	rc = self_test(g, &rate_max, &pulse_ns);
+	if (rc)
+		return incise_error_set(
+			err, -rc, "%s: gpio chip %.60s: its lines cannot be used: %s",
+			asked->where, asked->arguments, strerror(-rc));
+	rc = incise_motor_fit(&g->motor.actuator, g->motor.name, rate_max, pulse_ns, err);
+	if (rc)
+		return rc;
+	g->motor.rate_max_hz = rate_max;
+	incise_motor_config(&g->motor.actuator, 0, &config);
+	/* So that no first use of a page comes in a step. It may be refused. */
+	mlock(g, sizeof(*g));
+	rc = incise_pulser_init(&g->pulser, &config);
+	if (!rc)
+		rc = start_thread(g);
+	return rc ? incise_error_set(err, -rc, "%s: cannot begin: %s", g->motor.name,
+				     strerror(-rc))
+		  : 0;
+}
+
+static void *gpio_open(const struct incise_backend_request *asked,
+		       struct incise_error *err)
+{
+	static const struct incise_motor_door door = {
+		.enable = gpio_enable,
+		.disable = gpio_disable,
+		.clear = gpio_clear,
+		.origin = gpio_origin,
+		.close = gpio_close,
+		.now = gpio_now,
+	};
+	struct gpio_stepper *g = aligned_alloc(64, sizeof(*g));
+	int rc;
+
+	if (!g) {
+		incise_error_set(err, ENOMEM, "%s: %s", asked->where, strerror(ENOMEM));
+		return NULL;
+	}
+	memset(g, 0, sizeof(*g));
+	g->motor.door = &door;
+	g->motor.actuator = *asked->actuator;
+	g->motor.setpoint = &g->setpoint;
+	g->motor.slot = &g->status;
+	g->active_low = asked->actuator->active_low;
+	for (int i = 0; i < INCISE_LINES; i++)
+		if (asked->actuator->line[i] >= 0)
+			g->motor.lines |= input_bits(1u << i);
+	snprintf(g->motor.name, sizeof(g->motor.name), "gpio chip %.24s",
+		 asked->arguments);
+	incise_motor_init(&g->motor);
+	g->pulser.door = &world_door;
+	g->pulser.world = g;
+	g->pulser.setpoint = &g->setpoint;
+	g->pulser.slot = &g->status;
+	rc = set_up(g, asked, err);
+	if (!rc)
+		return &g->motor.stepper;
+	gpio_close(&g->motor);
+	errno = -rc;
+	return NULL;
+}
+
+INCISE_API extern const struct incise_backend incise_backend;
+
+const struct incise_backend incise_backend = {
+	.abi = INCISE_BACKEND_ABI,
+	.kind = "stepper",
+	.name = "gpio",
+	.open = gpio_open,
+};

@@ -1,0 +1,407 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A motor behind pages, in mm; see motor.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include <incise/clock.h>
+#include "motor.h"
+#include "page.h"
+
+#define LEAST_PULSE_NS 5000 /* where nothing is said: what most power stages take */
+#define UNREAD_MAX 100	    /* looks in vain until it is said */
+#define POLL_NS INCISE_NS_PER_S / 1000
+#define LATE_MAX 20 /* edges in a row */
+
+/* Bits of the ABI, and what the library calls them. */
+struct bit {
+	unsigned int abi, own;
+};
+
+static const struct bit fault_bits[] = {
+	{INCISE_STEPPER_FAULT_DEADMAN, INCISE_STEPPER_DEADMAN},
+	{INCISE_STEPPER_FAULT_LIMIT_MIN, INCISE_STEPPER_LIMIT_MIN},
+	{INCISE_STEPPER_FAULT_LIMIT_MAX, INCISE_STEPPER_LIMIT_MAX},
+	{INCISE_STEPPER_FAULT_ESTOP, INCISE_STEPPER_ESTOP},
+	{INCISE_STEPPER_FAULT_DRIVER, INCISE_STEPPER_ALARM},
+	{INCISE_STEPPER_FAULT_LATE, INCISE_STEPPER_LATE},
+	{INCISE_STEPPER_FAULT_SETPOINT, INCISE_STEPPER_SETPOINT},
+	{INCISE_STEPPER_FAULT_OWNER, INCISE_STEPPER_OWNER},
+	{INCISE_STEPPER_FAULT_SUSPEND, INCISE_STEPPER_SUSPEND},
+	{INCISE_STEPPER_FAULT_GONE, INCISE_STEPPER_GONE},
+	{INCISE_STEPPER_FAULT_LINE, INCISE_STEPPER_LINE},
+	{0, 0},
+};
+
+static const struct bit input_bits[] = {
+	{INCISE_STEPPER_LINE_LIMIT_MIN, INCISE_STEPPER_AT_MIN},
+	{INCISE_STEPPER_LINE_LIMIT_MAX, INCISE_STEPPER_AT_MAX},
+	{INCISE_STEPPER_LINE_HOME, INCISE_STEPPER_AT_HOME},
+	{INCISE_STEPPER_LINE_ESTOP, INCISE_STEPPER_ESTOP_ACTIVE},
+	{INCISE_STEPPER_LINE_DRIVER, INCISE_STEPPER_ALARM_ACTIVE},
+	{0, 0},
+};
+
+static unsigned int own_bits(const struct bit *bit, unsigned int abi)
+{
+	unsigned int own = 0;
+
+	for (; bit->abi; bit++)
+		if (abi & bit->abi)
+			own |= bit->own;
+	return own;
+}
+
+static struct incise_motor *of(const struct incise_stepper *stepper)
+{
+	return (struct incise_motor *)stepper;
+}
+
+static double to_mm(const struct incise_motor *motor, int64_t steps)
+{
+	return (double)steps * incise_actuator_step_mm(&motor->actuator);
+}
+
+/*
+ * The latest status that could be read. A writer that is cut off in the midst of it leaves
+ * the one before for a while; whoever drives a real machine must hear of more.
+ */
+static int look(struct incise_motor *motor)
+{
+	int rc = incise_page_get_status(motor->slot, &motor->last);
+
+	if (rc != -EAGAIN) {
+		motor->unread = 0;
+		return rc;
+	}
+	if (motor->unread >= UNREAD_MAX)
+		return -EIO;
+	motor->unread++;
+	return 0;
+}
+
+/* Whether a target would move it. */
+static int drivable(struct incise_motor *motor)
+{
+	int rc = motor->watches ? -EPERM : look(motor);
+
+	if (rc)
+		return rc;
+	if (motor->last.faults & INCISE_STEPPER_FAULT_GONE)
+		return -ENODEV;
+	if (motor->last.faults || (motor->last.state != INCISE_STEPPER_STATE_READY &&
+				   motor->last.state != INCISE_STEPPER_STATE_MOVING))
+		return -EIO;
+	return 0;
+}
+
+static int motor_set(struct incise_stepper *stepper, double position_mm)
+{
+	struct incise_motor *motor = of(stepper);
+	int rc;
+
+	if (!isfinite(position_mm))
+		return -EDOM;
+	rc = drivable(motor);
+	if (rc)
+		return rc;
+	motor->beyond = position_mm < 0 || position_mm > motor->actuator.travel_mm;
+	incise_page_put_setpoint(motor->setpoint, INCISE_STEPPER_MODE_POSITION,
+				 incise_actuator_steps(&motor->actuator, position_mm),
+				 motor->door->now(motor));
+	return 0;
+}
+
+static int motor_jog(struct incise_stepper *stepper, double velocity_mm_s)
+{
+	struct incise_motor *motor = of(stepper);
+	int rc;
+
+	if (!isfinite(velocity_mm_s))
+		return -EDOM;
+	rc = drivable(motor);
+	if (rc)
+		return rc;
+	motor->beyond = false;
+	incise_page_put_setpoint(motor->setpoint, INCISE_STEPPER_MODE_VELOCITY,
+				 incise_actuator_rate(&motor->actuator, velocity_mm_s),
+				 motor->door->now(motor));
+	return 0;
+}
+
+static enum incise_stepper_state state_of(unsigned int abi)
+{
+	switch (abi) {
+	case INCISE_STEPPER_STATE_READY:
+		return INCISE_STEPPER_READY;
+	case INCISE_STEPPER_STATE_MOVING:
+		return INCISE_STEPPER_MOVING;
+	case INCISE_STEPPER_STATE_STOPPING:
+		return INCISE_STEPPER_STOPPING;
+	case INCISE_STEPPER_STATE_FAULT:
+		return INCISE_STEPPER_FAULT;
+	default:
+		return INCISE_STEPPER_DISABLED;
+	}
+}
+
+static int motor_status(struct incise_stepper *stepper,
+			struct incise_stepper_status *status)
+{
+	struct incise_motor *motor = of(stepper);
+	const struct incise_abi_status *last = &motor->last;
+	int rc = look(motor);
+
+	*status = (struct incise_stepper_status){
+		.t_ns = last->t_ns,
+		.position_mm = to_mm(motor, last->position),
+		.velocity_mm_s = (double)last->velocity / 65536 *
+				 incise_actuator_step_mm(&motor->actuator),
+		.handle_mm = NAN,
+		.force_N = NAN,
+		.faults = own_bits(fault_bits, last->faults) |
+			  (motor->beyond ? INCISE_STEPPER_TRAVEL : 0),
+		.state = state_of(last->state),
+		.inputs = own_bits(input_bits, last->inputs),
+		.homed = last->flags & INCISE_STEPPER_FLAG_HOMED,
+		.late = last->late,
+	};
+	if (!rc && last->faults & INCISE_STEPPER_FAULT_GONE)
+		rc = -ENODEV;
+	return rc;
+}
+
+/* The first of the faults that are latched, in words. */
+static const char *fault_text(const struct incise_motor *motor)
+{
+	unsigned int faults = own_bits(fault_bits, motor->last.faults);
+
+	return incise_stepper_fault_text((enum incise_stepper_fault)(faults & -faults));
+}
+
+/* What the door said, in words, with what is known of the cause. */
+static int told(struct incise_motor *motor, int rc, const char *what,
+		struct incise_error *err)
+{
+	const char *why = NULL;
+
+	if (!rc)
+		return 0;
+	look(motor);
+	if (motor->watches)
+		why = "it was opened to watch; the program that drives it can";
+	else if (motor->last.faults & INCISE_STEPPER_FAULT_GONE || rc == -ENODEV)
+		why = incise_stepper_fault_text(INCISE_STEPPER_GONE);
+	else if (rc == -EBUSY && motor->last.inputs & INCISE_STEPPER_LINE_ESTOP)
+		why = "the e-stop is active; release it";
+	else if (rc == -EBUSY && motor->last.inputs & INCISE_STEPPER_LINE_DRIVER)
+		why = "the power stage reports a fault; see what it says, switch it off "
+		      "and on";
+	else if (rc == -EBUSY)
+		why = "it still moves; wait until it rests";
+	else if (motor->last.faults)
+		why = fault_text(motor);
+	return incise_error_set(err, -rc, "%s: %s: %s", motor->name, what,
+				why ? why : strerror(-rc));
+}
+
+static int motor_enable(struct incise_stepper *stepper, struct incise_error *err)
+{
+	struct incise_motor *motor = of(stepper);
+	int rc = motor->watches ? -EPERM : motor->door->enable(motor);
+
+	motor->beyond = false;
+	return told(motor, rc, "cannot be enabled", err);
+}
+
+static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
+{
+	struct incise_motor *motor = of(stepper);
+	int rc = motor->watches ? -EPERM : motor->door->clear(motor);
+
+	return told(motor, rc, "cannot be cleared", err);
+}
+
+static int motor_wait(struct incise_stepper *stepper, int64_t ns)
+{
+	struct incise_motor *motor = of(stepper);
+	struct timespec wait = {ns / INCISE_NS_PER_S, ns % INCISE_NS_PER_S};
+
+	if (motor->door->wait)
+		return motor->door->wait(motor, ns);
+	/* Cut short by a signal: who waits looks again. */
+	clock_nanosleep(CLOCK_MONOTONIC, 0, &wait, NULL);
+	return 0;
+}
+
+static int motor_disable(struct incise_stepper *stepper, struct incise_error *err)
+{
+	struct incise_motor *motor = of(stepper);
+	int rc = motor->watches ? -EPERM : motor->door->disable(motor);
+	struct incise_profile_limits limits;
+	int64_t left_ns;
+
+	incise_actuator_limits(&motor->actuator, &limits);
+	left_ns = INCISE_NS_PER_S +
+		  (int64_t)incise_profile_stopping_ns(&limits, UINT32_MAX);
+	/* A retract that is under way may take the travel. */
+	if (motor->actuator.retract)
+		left_ns += (int64_t)(motor->actuator.travel_mm /
+				     motor->actuator.velocity_mm_s * INCISE_NS_PER_S);
+	while (!rc) {
+		rc = look(motor);
+		if (rc || motor->last.state == INCISE_STEPPER_STATE_DISABLED ||
+		    motor->last.state == INCISE_STEPPER_STATE_FAULT)
+			break;
+		motor_wait(stepper, POLL_NS);
+		left_ns -= POLL_NS;
+		if (left_ns <= 0)
+			return incise_error_set(err, ETIMEDOUT,
+						"%s: did not come to rest in time; "
+						"switch its power off",
+						motor->name);
+	}
+	return told(motor, rc, "cannot be disabled", err);
+}
+
+static void motor_info(const struct incise_stepper *stepper,
+		       struct incise_stepper_info *info)
+{
+	const struct incise_motor *motor = of(stepper);
+	const struct incise_actuator *actuator = &motor->actuator;
+
+	*info = (struct incise_stepper_info){
+		.spring_N_mm = actuator->spring_N_mm,
+		.travel_mm = actuator->travel_mm,
+		.step_mm = incise_actuator_step_mm(actuator),
+		.velocity_mm_s = actuator->velocity_mm_s,
+		.acceleration_mm_s2 = actuator->acceleration_mm_s2,
+		.jerk_mm_s3 = actuator->jerk_mm_s3,
+		.deadman_s = actuator->deadman_s,
+		.rate_max_hz = motor->rate_max_hz,
+		.origin_mm = actuator->origin_mm,
+		.inputs = own_bits(input_bits, motor->lines),
+	};
+	snprintf(info->name, sizeof(info->name), "%s", motor->name);
+}
+
+static void motor_close(struct incise_stepper *stepper)
+{
+	of(stepper)->door->close(of(stepper));
+}
+
+static int motor_homing(struct incise_stepper *stepper,
+			struct incise_stepper_homing *homing)
+{
+	const struct incise_motor *motor = of(stepper);
+
+	homing->speed_mm_s = motor->actuator.home_mm_s;
+	homing->home_mm = motor->actuator.home_mm;
+	if (motor->lines & INCISE_STEPPER_LINE_HOME)
+		homing->home_at = INCISE_STEPPER_AT_HOME;
+	else if (motor->lines & INCISE_STEPPER_LINE_LIMIT_MIN)
+		homing->home_at = INCISE_STEPPER_AT_MIN;
+	else
+		return -EOPNOTSUPP;
+	return 0;
+}
+
+/* Only the home input's edges are kept; a limit's is where it halts. */
+static int motor_edge(struct incise_stepper *stepper, struct incise_stepper_edge *edge)
+{
+	struct incise_motor *motor = of(stepper);
+	int rc = look(motor);
+
+	edge->seen = motor->lines & INCISE_STEPPER_LINE_HOME &&
+		     motor->last.flags & INCISE_STEPPER_FLAG_HOME_SEEN;
+	edge->position_mm = to_mm(motor, motor->last.home_position);
+	return rc;
+}
+
+static int motor_origin(struct incise_stepper *stepper, double position_mm, bool homed)
+{
+	struct incise_motor *motor = of(stepper);
+	int32_t steps = incise_actuator_steps(&motor->actuator, position_mm);
+	int rc = drivable(motor);
+
+	return rc ? rc : motor->door->origin(motor, steps, homed);
+}
+
+void incise_motor_init(struct incise_motor *motor)
+{
+	static const struct incise_stepper_ops ops = {
+		.set = motor_set,
+		.jog = motor_jog,
+		.status = motor_status,
+		.enable = motor_enable,
+		.disable = motor_disable,
+		.clear = motor_clear,
+		.info = motor_info,
+		.close = motor_close,
+		.homing = motor_homing,
+		.edge = motor_edge,
+		.origin = motor_origin,
+		.wait = motor_wait,
+	};
+
+	motor->stepper.ops = &ops;
+}
+
+void incise_motor_config(const struct incise_actuator *actuator, unsigned int index,
+			 struct incise_stepper_config *config)
+{
+	struct incise_profile_limits limits;
+
+	incise_actuator_limits(actuator, &limits);
+	*config = (struct incise_stepper_config){
+		.motor = index,
+		.flags = (actuator->invert ? INCISE_STEPPER_CONFIG_INVERT : 0) |
+			 (actuator->retract ? INCISE_STEPPER_CONFIG_RETRACT : 0),
+		.tick_ns = limits.tick_ns,
+		.velocity = limits.velocity,
+		.acceleration = limits.acceleration,
+		.late_max = LATE_MAX,
+		.jerk = limits.jerk,
+		.position_max = limits.position_max,
+		.deadman_ns = (__u64)llround(actuator->deadman_s * INCISE_NS_PER_S),
+		.high_ns = actuator->high_ns,
+		.low_ns = actuator->low_ns,
+		.setup_ns = actuator->setup_ns,
+		.hold_ns = actuator->hold_ns,
+		.enable_ns = actuator->enable_ns,
+	};
+}
+
+int incise_motor_fit(struct incise_actuator *actuator, const char *name,
+		     uint32_t rate_max, uint32_t pulse_ns, struct incise_error *err)
+{
+	double step_mm = incise_actuator_step_mm(actuator);
+	double rate = actuator->velocity_mm_s / step_mm, most = rate_max, own;
+	uint32_t least = pulse_ns > LEAST_PULSE_NS ? pulse_ns : LEAST_PULSE_NS;
+
+	if (!actuator->high_ns)
+		actuator->high_ns = least;
+	if (!actuator->low_ns)
+		actuator->low_ns = least;
+	if (actuator->high_ns < pulse_ns || actuator->low_ns < pulse_ns)
+		return incise_error_set(
+			err, ERANGE,
+			"%s: high_us and low_us are %g and %g, but this machine holds no less "
+			"than %g; correct them in rig.conf, or leave them out",
+			name, actuator->high_ns / 1e3, actuator->low_ns / 1e3,
+			pulse_ns / 1e3);
+	own = 1e9 / ((double)actuator->high_ns + actuator->low_ns);
+	most = fmin(most, own);
+	if (rate <= most * (1 + 1e-9))
+		return 0;
+	return incise_error_set(
+		err, ERANGE,
+		"%s: velocity_mm_s = %g asks for %.0f steps/s, but this machine holds %.0f "
+		"at most (by its self-test and the pulses' times); give at most %g mm/s in "
+		"rig.conf, or fewer microsteps",
+		name, actuator->velocity_mm_s, rate, floor(most),
+		floor(most * step_mm * 1e4) / 1e4);
+}

@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * A motor behind pages of set-points and status, in mm: what the kernel module and the
+ * thread over GPIO have in common. What differs stands behind a door.
+ *
+ *   incise_stepper_…()  ─▶ motor ─┬─▶ pages ◀─▶ timer of the kernel, or thread
+ *        mm                       ╰─▶ door        steps
+ */
+#ifndef INCISE_MOTOR_H
+#define INCISE_MOTOR_H
+
+#include <incise/actuator.h>
+#include <incise/backend.h>
+#include "abi.h"
+
+struct incise_motor;
+
+/* Each returns 0 or a negative errno as the ioctl of the same name does. */
+struct incise_motor_door {
+	int (*enable)(struct incise_motor *motor);
+	int (*disable)(struct incise_motor *motor); /* begins it */
+	int (*clear)(struct incise_motor *motor);
+	int (*origin)(struct incise_motor *motor, int32_t steps, bool homed);
+	void (*close)(struct incise_motor *motor);
+	int64_t (*now)(struct incise_motor *motor);
+	int (*wait)(struct incise_motor *motor, int64_t ns); /* NULL: sleep */
+};
+
+struct incise_motor {
+	struct incise_stepper stepper;
+	const struct incise_motor_door *door;
+	struct incise_actuator actuator;
+	char name[64];
+	double rate_max_hz;
+	unsigned int lines; /* INCISE_STEPPER_LINE_… bits it has */
+	bool watches;	    /* it may not be driven from here */
+	struct incise_stepper_setpoint *setpoint; /* NULL where it watches */
+	const struct incise_abi_status *slot;
+
+	/* private */
+	struct incise_abi_status last; /* status that could be read */
+	unsigned int unread;	       /* looks since then */
+	bool beyond;		       /* the last target was clamped */
+};
+
+/* Fill in the functions; the fields above "private" are the backend's to set. */
+void incise_motor_init(struct incise_motor *motor);
+
+/* Its configuration for the module, or a thread that does the same. */
+void incise_motor_config(const struct incise_actuator *actuator, unsigned int index,
+			 struct incise_stepper_config *config);
+
+/*
+ * With what a machine can hold, give pulses that rig.conf leaves open their shortest times.
+ * @pulse_ns: what an edge and its lateness take. Returns 0; -ERANGE: err says which rate was
+ * asked for, and which is the largest.
+ */
+int incise_motor_fit(struct incise_actuator *actuator, const char *name,
+		     uint32_t rate_max, uint32_t pulse_ns, struct incise_error *err);
+
+#endif

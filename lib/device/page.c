@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Slots in shared memory; see page.h. The pattern is H.-J. Boehm's, 'Can seqlocks get
+ * along with programming language memory models?', MSPC 2012, figure 6.
+ */
+#include <errno.h>
+#include <stdbool.h>
+#include <string.h>
+#include <incise/profile.h>
+#include "page.h"
+
+/* A writer is in it for some 20 ns; a reader that is so often unlucky is not unlucky. */
+#define TRIES 100
+
+#define SETPOINT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(uint32_t))
+#define STATUS_WORDS (sizeof(struct incise_abi_status) / sizeof(uint32_t))
+#define KNOWN_FAULTS (2 * INCISE_STEPPER_FAULT_LINE - 1)
+#define KNOWN_INPUTS (2 * INCISE_STEPPER_LINE_DRIVER - 1)
+
+static void begin(uint32_t *words, uint32_t seq)
+{
+	__atomic_store_n(words, seq, __ATOMIC_RELAXED);
+	__atomic_thread_fence(__ATOMIC_RELEASE);
+}
+
+static void end(uint32_t *words, uint32_t seq)
+{
+	__atomic_store_n(words, seq, __ATOMIC_RELEASE);
+}
+
+/* All but seq, which is the first word. */
+static void put(uint32_t *words, const void *from, size_t n)
+{
+	uint32_t word;
+
+	for (size_t i = 1; i < n; i++) {
+		memcpy(&word, (const char *)from + i * sizeof(word), sizeof(word));
+		__atomic_store_n(words + i, word, __ATOMIC_RELAXED);
+	}
+}
+
+/* Whether the copy is whole. */
+static bool get(const uint32_t *words, void *to, size_t n)
+{
+	uint32_t word, seq = __atomic_load_n(words, __ATOMIC_ACQUIRE);
+
+	if (seq & 1)
+		return false;
+	memcpy(to, &seq, sizeof(seq));
+	for (size_t i = 1; i < n; i++) {
+		word = __atomic_load_n(words + i, __ATOMIC_RELAXED);
+		memcpy((char *)to + i * sizeof(word), &word, sizeof(word));
+	}
+	__atomic_thread_fence(__ATOMIC_ACQUIRE);
+	return __atomic_load_n(words, __ATOMIC_RELAXED) == seq;
+}
+
+void incise_page_put_setpoint(struct incise_stepper_setpoint *slot, unsigned int mode,
+			      int64_t target, int64_t t_ns)
+{
+	struct incise_stepper_setpoint setpoint = {
+		.mode = (__u16)mode, .target = target, .t_ns = t_ns};
+	uint32_t *words = (uint32_t *)slot;
+	uint32_t seq = __atomic_load_n(words, __ATOMIC_RELAXED) & ~1u;
+
+	begin(words, seq + 1);
+	put(words, &setpoint, SETPOINT_WORDS);
+	end(words, seq + 2);
+}
+
+int incise_page_get_setpoint(const struct incise_stepper_setpoint *slot, uint32_t *seq,
+			     struct incise_stepper_setpoint *copy)
+{
+	const uint32_t *words = (const uint32_t *)slot;
+
+	if (__atomic_load_n(words, __ATOMIC_RELAXED) == *seq ||
+	    !get(words, copy, SETPOINT_WORDS) || copy->seq == *seq)
+		return 0;
+	*seq = copy->seq;
+	if (copy->mode > INCISE_STEPPER_MODE_VELOCITY || copy->reserved0)
+		return -EINVAL;
+	for (size_t i = 0; i < sizeof(copy->reserved) / sizeof(*copy->reserved); i++)
+		if (copy->reserved[i])
+			return -EINVAL;
+	return 1;
+}
+
+void incise_page_put_status(struct incise_abi_status *slot,
+			    const struct incise_abi_status *status)
+{
+	uint32_t *words = (uint32_t *)slot;
+	uint32_t seq = __atomic_load_n(words, __ATOMIC_RELAXED) & ~1u;
+
+	begin(words, seq + 1);
+	put(words, status, STATUS_WORDS);
+	end(words, seq + 2);
+}
+
+static bool sensible(const struct incise_abi_status *status)
+{
+	const int64_t most = 2LL * INCISE_PROFILE_POSITION_MAX;
+	const int64_t fastest = (INCISE_PROFILE_VELOCITY_MAX + 1LL) << 16;
+
+	return status->state <= INCISE_STEPPER_STATE_FAULT &&
+	       !(status->faults & ~KNOWN_FAULTS) && !(status->inputs & ~KNOWN_INPUTS) &&
+	       status->position >= -most && status->position <= most &&
+	       status->home_position >= -most && status->home_position <= most &&
+	       status->velocity >= -fastest && status->velocity <= fastest;
+}
+
+int incise_page_get_status(const struct incise_abi_status *slot,
+			   struct incise_abi_status *copy)
+{
+	struct incise_abi_status status;
+
+	for (int i = 0; i < TRIES; i++) {
+		if (!get((const uint32_t *)slot, &status, STATUS_WORDS))
+			continue;
+		if (!sensible(&status))
+			return -EIO;
+		*copy = status;
+		return 0;
+	}
+	return -EAGAIN;
+}

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A stepper on the kernel module incise_stepper: "kernel:/dev/incise-stepper0", or
+ * "kernel:/dev/incise-stepper0:2" for its third motor. Targets and status go through two
+ * mapped pages, without a system call; what is set up while it stands goes by ioctl. See
+ * driver/uapi/incise_stepper.h.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <time.h>
+#include <unistd.h>
+#include <incise/clock.h>
+#include "backends.h"
+#include "motor.h"
+
+struct kernel_stepper {
+	struct incise_motor motor;
+	char path[PATH_MAX];
+	unsigned int index; /* of the motor */
+	int fd;
+	size_t page;
+	void *setpoints, *status; /* pages; NULL or MAP_FAILED where there is none */
+};
+
+static struct kernel_stepper *of(struct incise_motor *motor)
+{
+	return (struct kernel_stepper *)motor;
+}
+
+static int request(const struct kernel_stepper *k, unsigned long number, void *argument)
+{
+	/* A lost device answers ENODEV for good. */
+	return ioctl(k->fd, number, argument) < 0 ? -errno : 0;
+}
+
+static int on_mask(struct incise_motor *motor, unsigned long number)
+{
+	__u32 mask = 1u << of(motor)->index;
+
+	return request(of(motor), number, &mask);
+}
+
+static int kernel_enable(struct incise_motor *motor)
+{
+	return on_mask(motor, INCISE_STEPPER_ENABLE);
+}
+
+static int kernel_disable(struct incise_motor *motor)
+{
+	return on_mask(motor, INCISE_STEPPER_DISABLE);
+}
+
+static int kernel_clear(struct incise_motor *motor)
+{
+	return on_mask(motor, INCISE_STEPPER_CLEAR);
+}
+
+static int kernel_origin(struct incise_motor *motor, int32_t steps, bool homed)
+{
+	struct incise_stepper_origin origin = {
+		.motor = of(motor)->index, .homed = homed, .position = steps};
+
+	return request(of(motor), INCISE_STEPPER_SET_POSITION, &origin);
+}
+
+static int64_t kernel_now(struct incise_motor *motor)
+{
+	struct timespec now;
+
+	(void)motor;
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
+}
+
+static void unmap(const struct kernel_stepper *k, void *page)
+{
+	if (page && page != MAP_FAILED)
+		munmap(page, k->page);
+}
+
+/* The module brings what is powered to rest by itself. */
+static void kernel_close(struct incise_motor *motor)
+{
+	struct kernel_stepper *k = of(motor);
+
+	unmap(k, k->setpoints);
+	unmap(k, k->status);
+	if (k->fd >= 0)
+		close(k->fd);
+	free(k);
+}
+
+/* PATH or PATH:MOTOR. */
+static int parse(struct kernel_stepper *k, const struct incise_backend_request *asked,
+		 struct incise_error *err)
+{
+	const char *text = asked->arguments, *colon = strrchr(text, ':');
+	size_t length = colon ? (size_t)(colon - text) : strlen(text);
+
+	if (colon && (strlen(colon) != 2 || colon[1] < '0' ||
+		      colon[1] >= '0' + INCISE_STEPPER_MOTORS_MAX))
+		return incise_error_set(
+			err, EINVAL,
+			"%s: expected kernel:/dev/incise-stepper0 or, for its third motor, "
+			"kernel:/dev/incise-stepper0:2, found kernel:%.60s; correct it",
+			asked->where, text);
+	if (*text != '/' || length >= sizeof(k->path))
+		return incise_error_set(
+			err, EINVAL,
+			"%s: expected the path of a device such as "
+			"kernel:/dev/incise-stepper0, found kernel:%.60s; "
+			"correct it",
+			asked->where, text);
+	memcpy(k->path, text, length);
+	k->index = colon ? (unsigned int)(colon[1] - '0') : 0;
+	return 0;
+}
+
+static int open_device(struct kernel_stepper *k,
+		       const struct incise_backend_request *asked,
+		       struct incise_error *err)
+{
+	const char *todo;
+
+	k->fd = open(k->path, (asked->watch ? O_RDONLY : O_RDWR) | O_CLOEXEC);
+	if (k->fd >= 0)
+		return 0;
+	switch (errno) {
+	case ENOENT:
+	case ENXIO:
+	case ENODEV:
+		todo = "there is no such device: load the module (modprobe incise_stepper) "
+		       "and bind its lines, or name another";
+		break;
+	case EACCES:
+	case EPERM:
+		todo = "not permitted: become a member of the group incise, or root";
+		break;
+	case EBUSY:
+		todo = "another program drives it: end that (incise haptic and its service, "
+		       "incise stepper), or only watch";
+		break;
+	default:
+		todo = strerror(errno);
+	}
+	return incise_error_set(err, errno, "%s: %.200s: %s", asked->where, k->path,
+				todo);
+}
+
+/* What the module says of itself is not believed blindly: sizes lead to memory. */
+static int check_info(const struct kernel_stepper *k, struct incise_abi_info *info,
+		      const struct incise_backend_request *asked,
+		      struct incise_error *err)
+{
+	int rc = request(k, INCISE_ABI_GET_INFO, info);
+
+	if (rc == -ENOTTY)
+		return incise_error_set(
+			err, ENODEV,
+			"%s: %.200s: is no incise stepper, or its module is of another "
+			"version; see `modinfo incise_stepper`",
+			asked->where, k->path);
+	if (!rc && (!info->n_motors || info->n_motors > INCISE_STEPPER_MOTORS_MAX ||
+		    !info->rate_max))
+		rc = -EPROTO;
+	if (rc)
+		return incise_error_set(err, -rc,
+					"%s: %.200s: cannot say what it is: %s; load its "
+					"module again",
+					asked->where, k->path, strerror(-rc));
+	if (k->index >= info->n_motors)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: %.200s: has motors 0 to %u, found %u; correct "
+			"it",
+			asked->where, k->path, info->n_motors - 1, k->index);
+	return 0;
+}
+
+static int configure(struct kernel_stepper *k, const struct incise_abi_info *info,
+		     const struct incise_backend_request *asked, struct incise_error *err)
+{
+	uint64_t pulse_ns = (uint64_t)info->edge_ns + info->lateness_ns;
+	struct incise_stepper_config config;
+	int rc;
+
+	rc = incise_motor_fit(&k->motor.actuator, k->path, info->rate_max,
+			      pulse_ns < UINT32_MAX ? (uint32_t)pulse_ns : UINT32_MAX,
+			      err);
+	if (rc)
+		return rc;
+	incise_motor_config(&k->motor.actuator, k->index, &config);
+	rc = request(k, INCISE_STEPPER_SET_CONFIG, &config);
+	if (!rc)
+		return 0;
+	if (rc == -ERANGE)
+		return incise_error_set(
+			err, ERANGE,
+			"%s: %.200s: %u steps/s with pulses of %u and %u ns are more than this "
+			"machine holds: %u steps/s, %llu ns; give a smaller velocity_mm_s, "
+			"fewer microsteps or longer pulses",
+			asked->where, k->path, config.velocity, config.high_ns,
+			config.low_ns, info->rate_max, (unsigned long long)pulse_ns);
+	return incise_error_set(
+		err, -rc,
+		rc == -EBUSY ? "%s: %.200s: its motor is powered: %s; disable it first"
+			     : "%s: %.200s: refuses the group actuator: %s; see `dmesg`",
+		asked->where, k->path, strerror(-rc));
+}
+
+/* A watcher has nobody's limits but the owner's. */
+static int adopt(struct kernel_stepper *k)
+{
+	struct incise_stepper_config config = {.motor = k->index};
+	int rc = request(k, INCISE_STEPPER_GET_CONFIG, &config);
+
+	if (!rc && config.deadman_ns)
+		k->motor.actuator.deadman_s = (double)config.deadman_ns / INCISE_NS_PER_S;
+	return rc;
+}
+
+/* All of it now: a page that is first touched in the loop would be a late tick. */
+static int map_pages(struct kernel_stepper *k, bool watch)
+{
+	off_t page = (off_t)k->page;
+
+	k->status = mmap(NULL, k->page, PROT_READ, MAP_SHARED | MAP_POPULATE, k->fd,
+			 INCISE_STEPPER_PAGE_STATUS * page);
+	if (k->status == MAP_FAILED)
+		return -errno;
+	k->motor.slot = (const struct incise_abi_status *)k->status + k->index;
+	if (watch)
+		return 0;
+	k->setpoints =
+		mmap(NULL, k->page, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE,
+		     k->fd, INCISE_STEPPER_PAGE_SETPOINTS * page);
+	if (k->setpoints == MAP_FAILED)
+		return -errno;
+	k->motor.setpoint = (struct incise_stepper_setpoint *)k->setpoints + k->index;
+	return 0;
+}
+
+static int set_up(struct kernel_stepper *k, const struct incise_backend_request *asked,
+		  struct incise_error *err)
+{
+	struct incise_abi_info info = {0};
+	int rc = parse(k, asked, err);
+
+	if (!rc)
+		rc = open_device(k, asked, err);
+	if (!rc)
+		rc = check_info(k, &info, asked, err);
+	if (rc)
+		return rc;
+	k->motor.rate_max_hz = info.rate_max;
+	k->motor.lines = info.lines[k->index];
+	snprintf(k->motor.name, sizeof(k->motor.name), "%.31s motor %u at %.16s",
+		 info.name, k->index, strrchr(k->path, '/') + 1);
+	if (!asked->watch)
+		rc = configure(k, &info, asked, err);
+	if (rc)
+		return rc;
+	rc = asked->watch ? adopt(k) : 0;
+	if (!rc)
+		rc = map_pages(k, asked->watch);
+	return rc ? incise_error_set(err, -rc, "%s: %.200s: %s; load its module again",
+				     asked->where, k->path, strerror(-rc))
+		  : 0;
+}
+
+static void *kernel_open(const struct incise_backend_request *asked,
+			 struct incise_error *err)
+{
+	static const struct incise_motor_door door = {
+		.enable = kernel_enable,
+		.disable = kernel_disable,
+		.clear = kernel_clear,
+		.origin = kernel_origin,
+		.close = kernel_close,
+		.now = kernel_now,
+	};
+	struct kernel_stepper *k = calloc(1, sizeof(*k));
+	int rc;
+
+	if (!k) {
+		incise_error_set(err, ENOMEM, "%s: %s", asked->where, strerror(ENOMEM));
+		return NULL;
+	}
+	k->fd = -1;
+	k->page = (size_t)sysconf(_SC_PAGESIZE);
+	k->motor.door = &door;
+	k->motor.actuator = *asked->actuator;
+	k->motor.watches = asked->watch;
+	incise_motor_init(&k->motor);
+	rc = set_up(k, asked, err);
+	if (!rc)
+		return &k->motor.stepper;
+	kernel_close(&k->motor);
+	errno = -rc;
+	return NULL;
+}
+
+const struct incise_backend incise_stepper_kernel = {
+	.abi = INCISE_BACKEND_ABI,
+	.kind = "stepper",
+	.name = "kernel",
+	.open = kernel_open,
+};
