@@ -7,17 +7,20 @@
  *   due ─────── lateness ──────▶│◀─ edge ─▶│
  *                              fires       line has changed
  *
- * With L the lateness that 99 % of shots keep and E the median cost of an edge, the
- * shortest pulse is p = L + E: below that edges would be late by more than their own
- * length. The largest rate is
+ * With L the lateness that 99 % of shots keep, M its median and E the median cost of an
+ * edge, the shortest pulse is p = E + M: below that most edges would be late by more than
+ * their own length. The largest rate is
  *
  *                  10⁹
- *   rate = ─────────────────────       M median lateness, n motors
+ *   rate = ─────────────────────       n motors
  *          max(2p + L, 4n(E + M))
  *
- * First: high and low last p each, and their first edge may be late by L. Second: a step
- * is two firings, each of which costs the processor an edge and the way into the
- * interrupt; n motors share one processor, and shall leave half of it to others.
+ * First: high and low last p each, and an edge may be late by L. Second: a step is two
+ * firings, each of which costs the processor an edge and the way into the interrupt; n
+ * motors share one processor, and shall leave half of it to others.
+ *
+ * A machine that was not quiet in one round gets another: what else ran just then, the
+ * loading of modules say, is not what it will run later.
  */
 #include <linux/device.h>
 #include <linux/hrtimer.h>
@@ -33,6 +36,8 @@
 
 #define SHOTS 512
 #define SHOT_NS 100000
+#define ROUNDS 3
+#define QUIET_NS 20000
 
 struct stepper_trial {
 	struct hrtimer timer;
@@ -71,13 +76,26 @@ static int stepper_ability_compare(const void *a, const void *b)
 	return x < y ? -1 : x > y;
 }
 
-/* Fill in info.rate_max, edge_ns, lateness_ns, lateness_max_ns, resolution_ns. Sleeps. */
+/* SHOTS shots, sorted. Sleeps. */
+static void stepper_ability_round(struct stepper_trial *trial)
+{
+	trial->n = 0;
+	hrtimer_start(&trial->timer, ktime_add_ns(ktime_get(), SHOT_NS),
+		      HRTIMER_MODE_ABS_PINNED_HARD);
+	while (smp_load_acquire(&trial->n) < SHOTS)
+		usleep_range(2000, 5000);
+	hrtimer_cancel(&trial->timer);
+	sort(trial->late_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
+	sort(trial->edge_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
+}
+
+/* Fill in what the self-test says in info. Sleeps. */
 int stepper_ability_measure(struct stepper *stepper)
 {
 	struct incise_stepper_info *info = &stepper->info;
+	u64 pulse = U32_MAX, late = U32_MAX, period;
 	struct stepper_trial *trial;
-	u64 pulses, share;
-	u32 median;
+	int round;
 
 	trial = kzalloc(sizeof(*trial), GFP_KERNEL);
 	if (!trial)
@@ -85,24 +103,25 @@ int stepper_ability_measure(struct stepper *stepper)
 	trial->stepper = stepper;
 	hrtimer_setup(&trial->timer, stepper_ability_fire, CLOCK_MONOTONIC,
 		      HRTIMER_MODE_ABS_PINNED_HARD);
-	hrtimer_start(&trial->timer, ktime_add_ns(ktime_get(), SHOT_NS),
-		      HRTIMER_MODE_ABS_PINNED_HARD);
-	while (smp_load_acquire(&trial->n) < SHOTS)
-		usleep_range(2000, 5000);
-	hrtimer_cancel(&trial->timer);
-
-	sort(trial->late_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
-	sort(trial->edge_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
-	median = trial->late_ns[SHOTS / 2];
-	info->resolution_ns = hrtimer_resolution;
-	info->edge_ns = max(trial->edge_ns[SHOTS / 2], 1U);
-	info->lateness_ns = trial->late_ns[SHOTS * 99 / 100];
-	info->lateness_max_ns = trial->late_ns[SHOTS - 1];
+	for (round = 0; round < ROUNDS && late > QUIET_NS; round++) {
+		stepper_ability_round(trial);
+		/* The latest of all counts, whatever the round. */
+		info->lateness_max_ns =
+			max(info->lateness_max_ns, trial->late_ns[SHOTS - 1]);
+		if (trial->late_ns[SHOTS * 99 / 100] >= late)
+			continue;
+		late = trial->late_ns[SHOTS * 99 / 100];
+		info->edge_ns = trial->edge_ns[SHOTS / 2];
+		pulse = (u64)info->edge_ns + trial->late_ns[SHOTS / 2];
+	}
 	kfree(trial);
 
-	pulses = 2ULL * info->edge_ns + 3ULL * info->lateness_ns;
-	share = 4ULL * stepper->n_motors * ((u64)info->edge_ns + median);
-	info->rate_max = clamp(div64_u64(NSEC_PER_SEC, max(pulses, share)), 1ULL,
+	period = max(2 * pulse + late, 4 * stepper->n_motors * pulse);
+	info->rate_max = clamp(div64_u64(NSEC_PER_SEC, max(period, 1ULL)), 1ULL,
 			       (u64)INCISE_PROFILE_VELOCITY_MAX);
+	info->resolution_ns = hrtimer_resolution;
+	info->lateness_ns = late;
+	/* What a config can say at all. */
+	info->pulse_ns = clamp(pulse, 500ULL, 1000000ULL);
 	return 0;
 }

@@ -284,7 +284,7 @@ static ssize_t stepper_folder_cdev_show(struct config_item *item, char *page)
 		dev = stepper_nodes_device(folder->live);
 		device_lock(dev); /* it may be unbound through sysfs */
 		stepper = dev_get_drvdata(dev);
-		if (device_is_bound(dev) && stepper)
+		if (stepper)
 			n = sprintf(page, "%s\n", dev_name(&stepper->dev));
 		device_unlock(dev);
 	}

@@ -68,11 +68,10 @@ static void stepper_defaults_fit(struct stepper_motor *motor,
 				 struct incise_stepper_config *c, struct device *dev)
 {
 	const struct incise_stepper_info *info = &motor->stepper->info;
-	u32 pulse = min(info->edge_ns + info->lateness_ns, 1000000U);
 	u32 velocity;
 
-	c->high_ns = max(c->high_ns, pulse);
-	c->low_ns = max(c->low_ns, pulse);
+	c->high_ns = max(c->high_ns, info->pulse_ns);
+	c->low_ns = max(c->low_ns, info->pulse_ns);
 	velocity = min_t(u64, info->rate_max,
 			 div_u64(NSEC_PER_SEC, max(c->high_ns + c->low_ns, 1U)));
 	if (c->velocity > velocity) {

@@ -249,7 +249,8 @@ static int stepper_file_mmap(struct file *file, struct vm_area_struct *vma)
 	/* No mutex: see above. After unbind a new mapping would only be of no use. */
 	if (READ_ONCE(stepper->gone))
 		return -ENODEV;
-	if (vma->vm_end - vma->vm_start != PAGE_SIZE || !(vma->vm_flags & VM_SHARED))
+	/* Of a file open for reading only the kernel has taken VM_SHARED away already. */
+	if (vma->vm_end - vma->vm_start != PAGE_SIZE || !(vma->vm_flags & VM_MAYSHARE))
 		return -EINVAL;
 	if (vma->vm_flags & VM_EXEC)
 		return -EACCES;

@@ -138,8 +138,8 @@ static int stepper_nodes_bind(struct stepper_nodes *nodes)
 	nodes->pdev = platform_device_register_full(&info);
 	if (IS_ERR(nodes->pdev))
 		return PTR_ERR(nodes->pdev);
-	/* Why not is in the log, told by probe. */
-	if (!device_is_bound(&nodes->pdev->dev)) {
+	/* Set when probe has succeeded. If not, the log says why. */
+	if (!platform_get_drvdata(nodes->pdev)) {
 		platform_device_unregister(nodes->pdev);
 		return -ENXIO;
 	}

@@ -98,8 +98,8 @@ static bool stepper_page_within(__u64 value, __u64 min, __u64 max)
  * @config:	from a user
  * @info:	what the self-test found
  *
- * A pulse time below what a timer is late by would make every edge late; it is
- * refused rather than held by luck.
+ * A pulse that is shorter than a timer mostly is late would make every edge late; it
+ * is refused rather than held by luck.
  *
  * Return: 0; -EINVAL, -ERANGE as INCISE_STEPPER_SET_CONFIG says.
  */
@@ -108,7 +108,6 @@ int stepper_page_config(const struct incise_stepper_config *config,
 {
 	const __u32 flags = INCISE_STEPPER_CONFIG_INVERT | INCISE_STEPPER_CONFIG_RETRACT;
 	const __s64 most = INCISE_PROFILE_POSITION_MAX;
-	__u64 pulse = (__u64)info->edge_ns + info->lateness_ns;
 	unsigned int i;
 
 	for (i = 0; i < sizeof(config->reserved) / sizeof(config->reserved[0]); i++)
@@ -133,7 +132,7 @@ int stepper_page_config(const struct incise_stepper_config *config,
 	if (config->velocity > info->rate_max ||
 	    config->velocity > INCISE_PROFILE_VELOCITY_MAX)
 		return -ERANGE;
-	if (config->high_ns < pulse || config->low_ns < pulse ||
+	if (config->high_ns < info->pulse_ns || config->low_ns < info->pulse_ns ||
 	    (__u64)config->high_ns + config->low_ns >
 		    div_u64(1000000000ULL, config->velocity))
 		return -ERANGE;

@@ -64,7 +64,7 @@ struct incise_stepper_setpoint {
 #define INCISE_STEPPER_STATE_DISABLED 0 /* not powered, no fault latched */
 #define INCISE_STEPPER_STATE_READY 1	/* powered, at rest */
 #define INCISE_STEPPER_STATE_MOVING 2
-#define INCISE_STEPPER_STATE_STOPPING 3 /* coming to rest by a fault; disabled next */
+#define INCISE_STEPPER_STATE_STOPPING 3 /* coming to rest, by a fault or DISABLE */
 #define INCISE_STEPPER_STATE_FAULT 4	/* not powered, a fault latched */
 
 /* incise_stepper_status.faults, latched; value of an INCISE_STEPPER_EVENT_FAULT */
@@ -173,10 +173,12 @@ struct incise_stepper_event {
  * @rate_max: steps/s of one motor that this machine's self-test allows; config.velocity
  *            and its pulse times are refused beyond
  * @edge_ns: self-test: median cost of writing a line
- * @lateness_ns: self-test: 99 % of timers were at most this late
+ * @lateness_ns: self-test: 99 % of timers were at most this late, in the best of its rounds
  * @lateness_max_ns: self-test: the latest
  * @resolution_ns: of the timer
  * @lines: per motor, the optional lines it has
+ * @pulse_ns: self-test: shortest config.high_ns and low_ns
+ * @reserved0: zero
  * @reserved: zero
  */
 struct incise_stepper_info {
@@ -189,7 +191,9 @@ struct incise_stepper_info {
 	__u32 lateness_max_ns;
 	__u32 resolution_ns;
 	__u32 lines[INCISE_STEPPER_MOTORS_MAX];
-	__u64 reserved[20];
+	__u32 pulse_ns;
+	__u32 reserved0;
+	__u64 reserved[19];
 };
 
 /* incise_stepper_config.flags */
@@ -206,7 +210,7 @@ struct incise_stepper_info {
  * @velocity: largest, steps/s, 1 …; ERANGE beyond info.rate_max
  * @acceleration: largest, steps/s², 1 …
  * @jerk: largest, steps/s³; 0: not limited
- * @position_min: lowest target, steps, within 32 bits
+ * @position_min: lowest target, steps, within ±10⁹
  * @position_max: highest
  * @safe_position: see INCISE_STEPPER_CONFIG_RETRACT; within the two
  * @deadman_ns: 1000000 … 10000000000
@@ -219,8 +223,9 @@ struct incise_stepper_info {
  * @reserved: zero
  *
  * SET_CONFIG gives EBUSY while the motor is enabled, EINVAL for a value out of its range
- * and ERANGE for times that do not fit: high_ns + low_ns longer than a step at velocity, or
- * shorter than the self-test found this machine to hold.
+ * and ERANGE for what this machine or a step cannot hold: velocity beyond info.rate_max,
+ * high_ns or low_ns below info.pulse_ns, high_ns + low_ns longer than a step at velocity,
+ * and a jerk so low that the profile would take more than 256 ticks for it.
  */
 struct incise_stepper_config {
 	__u32 motor;
@@ -284,7 +289,10 @@ struct incise_stepper_sync {
 	_IOWR(INCISE_STEPPER_IOC, 1, struct incise_stepper_config)
 #define INCISE_STEPPER_SET_CONFIG \
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
-/* A mask of motors. EPERM: a fault is latched; EBUSY: an input forbids it, e-stop say. */
+/*
+ * A mask of motors, not 0. EPERM: a fault is latched; EBUSY: an input forbids it, e-stop
+ * say, or it is still coming to rest; ERANGE: it stands outside of its position limits.
+ */
 #define INCISE_STEPPER_ENABLE _IOW(INCISE_STEPPER_IOC, 3, __u32)
 /* Brings them to rest within the limits, then takes power away. Returns at once. */
 #define INCISE_STEPPER_DISABLE _IOW(INCISE_STEPPER_IOC, 4, __u32)

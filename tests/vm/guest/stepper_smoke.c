@@ -1,0 +1,469 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * What the stepper module promises, one promise after the other, on the simulated chip:
+ *
+ *   stepper_smoke /dev/incise-stepperN DRIVER_DIR DEVICE
+ *
+ * Lines of the chip: step 0, dir 1, enable 2, limits 3 and 4, home 5, fault 6, e-stop 7,
+ * SYNC 8. Prints "ok …" and "not ok …".
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "../../../driver/sim/incise_sim.h"
+#include "../../../driver/uapi/incise_stepper.h"
+
+#define PAGE 4096
+#define EDGES_MAX 65536
+
+struct bench {
+	int fd;
+	struct incise_stepper_setpoint *slot;
+	const struct incise_stepper_status *status;
+};
+
+static void tell(bool good, const char *what)
+{
+	printf("%sok %s\n", good ? "" : "not ", what);
+}
+
+static int64_t now_ns(void)
+{
+	struct timespec t;
+
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
+}
+
+static void nap(long us)
+{
+	nanosleep(&(struct timespec){.tv_nsec = us * 1000}, NULL);
+}
+
+static bool write_text(const char *path, const char *text)
+{
+	int fd = open(path, O_WRONLY | O_CLOEXEC);
+	bool good = fd >= 0 && write(fd, text, strlen(text)) == (ssize_t)strlen(text);
+
+	if (fd >= 0)
+		close(fd);
+	return good;
+}
+
+static bool drive(const char *what)
+{
+	return write_text(INCISE_SIM_DIR "/inputs", what);
+}
+
+static bool bench_open(struct bench *bench, const char *path)
+{
+	bench->fd = open(path, O_RDWR | O_CLOEXEC);
+	if (bench->fd < 0)
+		return false;
+	bench->slot =
+		mmap(NULL, PAGE, PROT_READ | PROT_WRITE, MAP_SHARED, bench->fd, 0);
+	bench->status = mmap(NULL, PAGE, PROT_READ, MAP_SHARED, bench->fd, PAGE);
+	return bench->slot != MAP_FAILED && bench->status != MAP_FAILED;
+}
+
+static void bench_close(struct bench *bench)
+{
+	munmap(bench->slot, PAGE);
+	munmap((void *)bench->status, PAGE);
+	close(bench->fd);
+}
+
+static struct incise_stepper_status look(const struct bench *bench)
+{
+	struct incise_stepper_status copy;
+	uint32_t seq;
+
+	do {
+		seq = __atomic_load_n(&bench->status->seq, __ATOMIC_ACQUIRE);
+		copy = *(const volatile struct incise_stepper_status *)bench->status;
+		__atomic_thread_fence(__ATOMIC_ACQUIRE);
+	} while (seq & 1 || seq != __atomic_load_n(&bench->status->seq, __ATOMIC_RELAXED));
+	return copy;
+}
+
+static void want(struct bench *bench, unsigned int mode, int64_t target)
+{
+	volatile struct incise_stepper_setpoint *slot = bench->slot;
+	uint32_t seq = slot->seq;
+
+	slot->seq = seq + 1;
+	__atomic_thread_fence(__ATOMIC_SEQ_CST);
+	slot->mode = mode;
+	slot->target = target;
+	slot->t_ns = now_ns();
+	__atomic_thread_fence(__ATOMIC_SEQ_CST);
+	slot->seq = seq + 2;
+}
+
+static int command(const struct bench *bench, unsigned long request, uint32_t mask)
+{
+	return ioctl(bench->fd, request, &mask) ? -errno : 0;
+}
+
+/* Until the motor is in a state, with signs of life; false after 5 s. */
+static bool until(struct bench *bench, uint32_t state, unsigned int mode, int64_t target,
+		  bool alive)
+{
+	int64_t end = now_ns() + INT64_C(5000000000);
+
+	while (look(bench).state != state) {
+		if (now_ns() > end)
+			return false;
+		if (alive)
+			want(bench, mode, target);
+		nap(500);
+	}
+	return true;
+}
+
+/* Go somewhere and be there, on a machine of any speed. */
+static bool go(struct bench *bench, int64_t target)
+{
+	int64_t end = now_ns() + INT64_C(60000000000);
+	struct incise_stepper_status status;
+
+	do {
+		want(bench, INCISE_STEPPER_MODE_POSITION, target);
+		nap(500);
+		status = look(bench);
+		if (now_ns() > end || status.state == INCISE_STEPPER_STATE_FAULT)
+			return false;
+	} while (status.position != target || status.state != INCISE_STEPPER_STATE_READY);
+	return true;
+}
+
+static bool fresh(struct bench *bench)
+{
+	command(bench, INCISE_STEPPER_CLEAR, 1);
+	return command(bench, INCISE_STEPPER_ENABLE, 1) == 0;
+}
+
+/* Move away at 2000 steps/s and see it moving. */
+static bool run(struct bench *bench, int64_t velocity)
+{
+	struct incise_stepper_status status = {0};
+
+	for (int i = 0; i < 100; i++) {
+		want(bench, INCISE_STEPPER_MODE_VELOCITY, velocity);
+		nap(500);
+		status = look(bench);
+	}
+	return status.state == INCISE_STEPPER_STATE_MOVING;
+}
+
+static size_t read_edges(struct incise_sim_edge *edges, size_t n)
+{
+	int fd = open(INCISE_SIM_DIR "/edges", O_RDONLY | O_CLOEXEC);
+	size_t done = 0;
+	ssize_t got = 1;
+
+	while (fd >= 0 && got > 0 && done < n) {
+		got = read(fd, edges + done, (n - done) * sizeof(*edges));
+		if (got > 0)
+			done += (size_t)got / sizeof(*edges);
+	}
+	if (fd >= 0)
+		close(fd);
+	return done;
+}
+
+/* 1000 steps up and back: counted edges, and none shorter than the config says. */
+static void try_edges(struct bench *bench, const struct incise_stepper_config *config)
+{
+	static struct incise_sim_edge edges[EDGES_MAX];
+	int64_t lead = 0, trail = 0, dir = 0, up = 0, down = 0, shorts = 0;
+	int64_t interval = 1000000000 / config->velocity;
+	bool level = false;
+	size_t n;
+
+	write_text(INCISE_SIM_DIR "/edges", "reset");
+	tell(go(bench, 1000) && look(bench).steps_up == 1000, "1000 steps up, exactly");
+	tell(go(bench, 0) && look(bench).steps_down == 1000, "and 1000 back");
+	n = read_edges(edges, EDGES_MAX);
+	for (size_t i = 0; i < n; i++) {
+		int64_t t = edges[i].t_ns;
+
+		if (edges[i].line == 1) {
+			level = edges[i].value;
+			shorts += lead && t - lead < config->hold_ns;
+			dir = t;
+		} else if (edges[i].line == 0 && edges[i].value) {
+			up += level;
+			down += !level;
+			shorts += trail && t - trail < config->low_ns;
+			shorts += lead && t - lead < interval;
+			shorts += dir && t - dir < config->setup_ns;
+			lead = t;
+		} else if (edges[i].line == 0) {
+			shorts += t - lead < config->high_ns;
+			trail = t;
+		}
+	}
+	tell(up == 1000 && down == 1000, "as many edges with the right direction");
+	tell(!shorts, "no time of an edge is below its limit");
+	if (shorts)
+		printf("# %lld of %zu edges\n", (long long)shorts, n);
+}
+
+static void try_deadman(struct bench *bench)
+{
+	int64_t begin;
+
+	tell(run(bench, 2000), "it runs");
+	begin = now_ns();
+	tell(until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false) &&
+		     look(bench).faults == INCISE_STEPPER_FAULT_DEADMAN,
+	     "deadman: it stops with that fault");
+	printf("# %lld us after the last set-point\n",
+	       (long long)(now_ns() - begin) / 1000);
+	tell(command(bench, INCISE_STEPPER_ENABLE, 1) == -EPERM,
+	     "no power while a fault is latched");
+	tell(command(bench, INCISE_STEPPER_CLEAR, 1) == 0 &&
+		     look(bench).state == INCISE_STEPPER_STATE_DISABLED,
+	     "clear leaves it disabled");
+}
+
+static void try_limit(struct bench *bench)
+{
+	struct incise_stepper_status status;
+	int64_t stop;
+
+	tell(fresh(bench) && run(bench, 2000), "it runs up");
+	drive("4 1");
+	nap(2000);
+	status = look(bench);
+	stop = status.position;
+	tell(status.state == INCISE_STEPPER_STATE_FAULT &&
+		     status.faults == INCISE_STEPPER_FAULT_LIMIT_MAX &&
+		     status.inputs == INCISE_STEPPER_LINE_LIMIT_MAX,
+	     "the upper limit stops it");
+	tell(!(status.flags & INCISE_STEPPER_FLAG_HOMED),
+	     "a stop at once is no longer homed");
+	fresh(bench);
+	tell(!go(bench, stop + 10) && look(bench).position == stop,
+	     "no step towards a limit that is active");
+	tell(fresh(bench) && go(bench, stop - 10), "steps away from it");
+	drive("4 0");
+	command(bench, INCISE_STEPPER_DISABLE, 1);
+	tell(until(bench, INCISE_STEPPER_STATE_DISABLED, 0, 0, false), "disable");
+}
+
+static void try_estop(struct bench *bench)
+{
+	tell(fresh(bench) && run(bench, -2000), "it runs down");
+	drive("7 1");
+	nap(2000);
+	tell(look(bench).faults == INCISE_STEPPER_FAULT_ESTOP, "e-stop");
+	tell(command(bench, INCISE_STEPPER_CLEAR, 1) == -EBUSY,
+	     "no clear while it is pressed");
+	drive("7 0");
+	tell(command(bench, INCISE_STEPPER_CLEAR, 1) == 0, "clear after it");
+	drive("6 1");
+	nap(1000);
+	tell(command(bench, INCISE_STEPPER_ENABLE, 1) == -EBUSY,
+	     "no power while the power stage reports a fault");
+	drive("6 0");
+}
+
+static void try_home(struct bench *bench)
+{
+	struct incise_stepper_status status;
+	struct incise_stepper_origin origin = {.homed = 1, .position = 100};
+
+	tell(fresh(bench) && run(bench, 1000), "it runs");
+	drive("5 1");
+	until(bench, INCISE_STEPPER_STATE_READY, INCISE_STEPPER_MODE_VELOCITY, 0, true);
+	status = look(bench);
+	tell(status.flags & INCISE_STEPPER_FLAG_HOME_SEEN &&
+		     status.home_position < status.position,
+	     "the home edge has its position");
+	tell(!ioctl(bench->fd, INCISE_STEPPER_SET_POSITION, &origin) &&
+		     look(bench).position == 100 &&
+		     look(bench).flags & INCISE_STEPPER_FLAG_HOMED,
+	     "a new origin");
+	tell(go(bench, 0), "and it goes to 0 there");
+	drive("5 0");
+}
+
+static void try_garbage(struct bench *bench)
+{
+	tell(fresh(bench), "enable");
+	bench->slot->reserved[3] = 1;
+	want(bench, INCISE_STEPPER_MODE_POSITION, 10);
+	tell(until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false) &&
+		     look(bench).faults == INCISE_STEPPER_FAULT_SETPOINT,
+	     "garbage in the page is a fault");
+	bench->slot->reserved[3] = 0;
+}
+
+static void try_abi(struct bench *bench, const char *path)
+{
+	struct incise_stepper_config config = {.reserved = {1}};
+	int watcher = open(path, O_RDONLY | O_CLOEXEC);
+	uint32_t mask = 1;
+
+	tell(open(path, O_RDWR) < 0 && errno == EBUSY, "a second owner is refused");
+	tell(ioctl(bench->fd, _IO(INCISE_STEPPER_IOC, 99)) < 0 && errno == ENOTTY,
+	     "an unknown ioctl");
+	tell(ioctl(bench->fd, INCISE_STEPPER_SET_CONFIG, &config) < 0 && errno == EINVAL,
+	     "a reserved field that is not zero");
+	tell(ioctl(watcher, INCISE_STEPPER_ENABLE, &mask) < 0 && errno == EPERM,
+	     "a watcher cannot enable");
+	tell(mmap(NULL, PAGE, PROT_READ, MAP_SHARED, watcher, 0) == MAP_FAILED &&
+		     errno == EPERM,
+	     "nor see the set-points");
+	tell(mmap(NULL, PAGE, PROT_READ, MAP_SHARED, watcher, PAGE) != MAP_FAILED,
+	     "it sees the status");
+	tell(mmap(NULL, PAGE, PROT_READ | PROT_WRITE, MAP_SHARED, bench->fd, PAGE) ==
+				     MAP_FAILED &&
+		     errno == EACCES,
+	     "the status page is read-only");
+	tell(mprotect((void *)bench->status, PAGE, PROT_READ | PROT_WRITE) < 0,
+	     "and stays so");
+	tell(mmap(NULL, 2 * PAGE, PROT_READ, MAP_SHARED, bench->fd, PAGE) == MAP_FAILED &&
+		     errno == EINVAL,
+	     "one page, no more");
+	close(watcher);
+}
+
+static void try_events(struct bench *bench)
+{
+	struct incise_stepper_event event[256];
+	ssize_t n = read(bench->fd, event, sizeof(event));
+	bool order = n > 0;
+
+	for (ssize_t i = 1; i < n / (ssize_t)sizeof(*event); i++)
+		order = order && event[i].seq == event[i - 1].seq + 1 &&
+			event[i].t_ns >= event[i - 1].t_ns;
+	tell(order, "events in order");
+	printf("# %zd events\n", n / (ssize_t)sizeof(*event));
+}
+
+static void try_sync(struct bench *bench)
+{
+	struct incise_stepper_sync sync = {.period_ns = 1000000, .width_ns = 10000};
+	struct pollfd waiting = {.fd = bench->fd, .events = POLLIN};
+	struct incise_stepper_event event[32];
+	bool beat = true;
+	int seen = 0;
+
+	tell(!ioctl(bench->fd, INCISE_STEPPER_SET_SYNC, &sync), "SYNC at 1 kHz");
+	while (seen < 100 && poll(&waiting, 1, 1000) == 1) {
+		ssize_t n = read(bench->fd, event, sizeof(event));
+
+		for (ssize_t i = 0; i < n / (ssize_t)sizeof(*event); i++)
+			if (event[i].type == INCISE_STEPPER_EVENT_SYNC)
+				beat = beat && event[i].position == ++seen;
+	}
+	ioctl(bench->fd, INCISE_STEPPER_GET_SYNC, &sync);
+	tell(seen >= 100 && beat, "each pulse is an event with its number");
+	tell(sync.last_ns - sync.first_ns >=
+		     (int64_t)(sync.pulses + sync.missed - 1) * 1000000,
+	     "pulses keep their beat");
+	sync = (struct incise_stepper_sync){0};
+	tell(!ioctl(bench->fd, INCISE_STEPPER_SET_SYNC, &sync), "SYNC off");
+}
+
+/* Killed while it moves: the next owner finds the motor stopped, and why. */
+static void try_kill(struct bench *bench, const char *path)
+{
+	pid_t child;
+
+	bench_close(bench);
+	child = fork();
+	if (!child) {
+		if (bench_open(bench, path) && fresh(bench))
+			for (;;)
+				run(bench, 2000);
+		_exit(1);
+	}
+	nap(200000);
+	kill(child, SIGKILL);
+	waitpid(child, NULL, 0);
+	tell(bench_open(bench, path), "the owner is killed; the next one opens");
+	tell(until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false) &&
+		     look(bench).faults & INCISE_STEPPER_FAULT_OWNER,
+	     "the motor has stopped with that fault");
+}
+
+static void try_unbind(struct bench *bench, const char *driver, const char *device)
+{
+	struct pollfd hung = {.fd = bench->fd, .events = POLLIN};
+	struct incise_stepper_info info;
+	char path[256];
+
+	tell(fresh(bench) && run(bench, 2000), "it runs");
+	snprintf(path, sizeof(path), "%s/unbind", driver);
+	tell(write_text(path, device), "unbound while it moves");
+	tell(ioctl(bench->fd, INCISE_STEPPER_GET_INFO, &info) < 0 && errno == ENODEV,
+	     "calls give ENODEV");
+	tell(poll(&hung, 1, 0) == 1 && hung.revents & POLLHUP, "poll tells HUP");
+	tell(look(bench).faults & INCISE_STEPPER_FAULT_GONE, "the status says why");
+	bench->slot->target = 5;
+	tell(bench->slot->target == 5, "the pages stay memory");
+	bench_close(bench);
+	snprintf(path, sizeof(path), "%s/bind", driver);
+	tell(write_text(path, device), "bound again");
+}
+
+int main(int argc, char **argv)
+{
+	struct incise_stepper_config config = {0};
+	struct incise_stepper_info info;
+	struct bench bench;
+
+	if (argc != 4)
+		return 2;
+	setbuf(stdout, NULL);
+	tell(bench_open(&bench, argv[1]), "open and map");
+	tell(!ioctl(bench.fd, INCISE_STEPPER_GET_INFO, &info) && info.n_motors == 1 &&
+		     info.rate_max,
+	     "info");
+	printf("# rate_max %u /s, pulse %u ns, edge %u ns, lateness %u ns, %u at most\n",
+	       info.rate_max, info.pulse_ns, info.edge_ns, info.lateness_ns,
+	       info.lateness_max_ns);
+	tell(!ioctl(bench.fd, INCISE_STEPPER_GET_CONFIG, &config) &&
+		     !ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config),
+	     "the config of the bind is one that may be set");
+	/* Slower machines make late edges, not errors: a row of a thousand is none of these. */
+	config.late_max = 1000;
+	config.velocity = config.velocity > 5000 ? 5000 : config.velocity;
+	tell(!ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config), "another config");
+	config.velocity = info.rate_max + 1;
+	tell(ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config) < 0 && errno == ERANGE,
+	     "a rate beyond the machine's is refused");
+	ioctl(bench.fd, INCISE_STEPPER_GET_CONFIG, &config);
+	tell(command(&bench, INCISE_STEPPER_ENABLE, 1) == 0, "enable");
+	tell(ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config) < 0 && errno == EBUSY,
+	     "no config while it has power");
+
+	try_edges(&bench, &config);
+	try_deadman(&bench);
+	try_limit(&bench);
+	try_estop(&bench);
+	try_home(&bench);
+	try_garbage(&bench);
+	try_abi(&bench, argv[1]);
+	try_events(&bench);
+	try_sync(&bench);
+	try_kill(&bench, argv[1]);
+	try_unbind(&bench, argv[2], argv[3]);
+	return 0;
+}
