@@ -15,11 +15,22 @@
 #include <linux/ktime.h>
 #include <linux/property.h>
 
+#include "compat.h"
 #include "stepper.h"
 
 static const char *const stepper_input_names[STEPPER_INPUTS] = {
 	"limit-min", "limit-max", "home", "estop", "fault",
 };
+
+/* Whether gpiolib finds lines by this kind of node. */
+static bool stepper_lines_found_by(const struct fwnode_handle *node)
+{
+#ifdef HAVE_GPIO_SOFTWARE_NODES
+	return true;
+#else
+	return !is_software_node(node);
+#endif
+}
 
 /* A line, NULL where it is optional and there is none, or an error that was told. */
 static struct gpio_desc *stepper_lines_one(struct device *dev, struct fwnode_handle *node,
@@ -33,7 +44,7 @@ static struct gpio_desc *stepper_lines_one(struct device *dev, struct fwnode_han
 		snprintf(key, sizeof(key), "%s", name);
 	else
 		snprintf(key, sizeof(key), "motor%d-%s", motor, name);
-	if (node)
+	if (node && stepper_lines_found_by(node))
 		line = devm_fwnode_gpiod_get(dev, node, name, flags, key);
 	if (PTR_ERR_OR_ZERO(line) == -ENOENT)
 		line = devm_gpiod_get(dev, key, flags);
