@@ -51,7 +51,8 @@ static inline void incise_fx_trial_inputs(uint64_t *state, const struct incise_f
 
 /* Half of them near enough to the anchor that nothing is held, half anywhere. */
 static inline void incise_fx_trial_spring(uint64_t *state,
-					  struct incise_fixed_spring *spring, int32_t p[3])
+					  struct incise_fixed_spring *spring,
+					  int32_t p[3])
 {
 	int shift = incise_fx_trial_next(state) >> 63 ? 10 : 0;
 

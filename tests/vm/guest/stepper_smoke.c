@@ -72,8 +72,7 @@ static bool bench_open(struct bench *bench, const char *path)
 	bench->fd = open(path, O_RDWR | O_CLOEXEC);
 	if (bench->fd < 0)
 		return false;
-	bench->slot =
-		mmap(NULL, PAGE, PROT_READ | PROT_WRITE, MAP_SHARED, bench->fd, 0);
+	bench->slot = mmap(NULL, PAGE, PROT_READ | PROT_WRITE, MAP_SHARED, bench->fd, 0);
 	bench->status = mmap(NULL, PAGE, PROT_READ, MAP_SHARED, bench->fd, PAGE);
 	return bench->slot != MAP_FAILED && bench->status != MAP_FAILED;
 }
@@ -94,7 +93,8 @@ static struct incise_stepper_status look(const struct bench *bench)
 		seq = __atomic_load_n(&bench->status->seq, __ATOMIC_ACQUIRE);
 		copy = *(const volatile struct incise_stepper_status *)bench->status;
 		__atomic_thread_fence(__ATOMIC_ACQUIRE);
-	} while (seq & 1 || seq != __atomic_load_n(&bench->status->seq, __ATOMIC_RELAXED));
+	} while (seq & 1 ||
+		 seq != __atomic_load_n(&bench->status->seq, __ATOMIC_RELAXED));
 	return copy;
 }
 
@@ -332,7 +332,7 @@ static void try_abi(struct bench *bench, const char *path)
 	tell(mmap(NULL, PAGE, PROT_READ, MAP_SHARED, watcher, PAGE) != MAP_FAILED,
 	     "it sees the status");
 	tell(mmap(NULL, PAGE, PROT_READ | PROT_WRITE, MAP_SHARED, bench->fd, PAGE) ==
-				     MAP_FAILED &&
+			     MAP_FAILED &&
 		     errno == EACCES,
 	     "the status page is read-only");
 	tell(mprotect((void *)bench->status, PAGE, PROT_READ | PROT_WRITE) < 0,
