@@ -112,6 +112,7 @@ struct stepper_motor {
 	/* Set-point */
 	struct stepper_wish wish; /* in force; seq is what was seen */
 	s64 target;		  /* clamped */
+	bool asked;		  /* the profile does not know target yet */
 	s64 seen_ns;		  /* the last sign of life */
 
 	/* Motion */
@@ -161,6 +162,7 @@ struct stepper {
 
 	struct mutex mutex; /* owner, gone, and all set-up */
 	struct file *owner;
+	bool closing; /* reboot: no power any more */
 	bool gone;
 
 	struct incise_stepper_info info;

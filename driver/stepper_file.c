@@ -11,6 +11,7 @@
 #include <linux/mm.h>
 #include <linux/poll.h>
 #include <linux/slab.h>
+#include <linux/string.h>
 #include <linux/uaccess.h>
 
 #include "compat.h"
@@ -83,6 +84,8 @@ static int stepper_file_enable(struct stepper *stepper, u32 mask)
 	unsigned int i;
 	int ret;
 
+	if (stepper->closing)
+		return -ESHUTDOWN;
 	for (i = 0; i < stepper->n_motors; i++) {
 		if (!(mask & BIT(i)))
 			continue;
@@ -162,7 +165,8 @@ static int stepper_file_command(struct stepper *stepper, unsigned int command,
 		return 0;
 	case INCISE_STEPPER_GET_CONFIG:
 		motor = arg->config.motor;
-		if (motor >= stepper->n_motors)
+		if (motor >= stepper->n_motors ||
+		    memchr_inv(arg->config.reserved, 0, sizeof(arg->config.reserved)))
 			return -EINVAL;
 		stepper_setup_get_config(&stepper->motor[motor], &arg->config);
 		return 0;

@@ -132,6 +132,7 @@ static irqreturn_t stepper_lines_interrupt(int irq, void *data)
 	struct stepper_irq *from = data;
 	struct stepper *stepper = from->stepper;
 	s64 now = ktime_get_ns();
+	unsigned long flags;
 	unsigned int i;
 
 	for (i = 0; i < stepper->n_motors; i++) {
@@ -139,10 +140,10 @@ static irqreturn_t stepper_lines_interrupt(int irq, void *data)
 
 		if (from->motor >= 0 && from->motor != (int)i)
 			continue;
-		raw_spin_lock(&motor->lock);
+		raw_spin_lock_irqsave(&motor->lock, flags);
 		stepper_inputs_one(motor, from->input, now, true);
 		stepper_status_publish(motor, now);
-		raw_spin_unlock(&motor->lock);
+		raw_spin_unlock_irqrestore(&motor->lock, flags);
 	}
 	return IRQ_HANDLED;
 }

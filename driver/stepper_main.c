@@ -53,6 +53,7 @@ static int stepper_main_reboot(struct notifier_block *block, unsigned long actio
 	struct stepper *stepper = container_of(block, struct stepper, reboot);
 
 	mutex_lock(&stepper->mutex);
+	stepper->closing = true;
 	stepper_main_rest(stepper, INCISE_STEPPER_FAULT_SUSPEND);
 	stepper_sync_off(stepper);
 	mutex_unlock(&stepper->mutex);

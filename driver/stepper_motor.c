@@ -17,6 +17,7 @@
  * by going at most 1/7 faster than the profile asks (CATCH_UP), and where it is
  * more than a tick the time line is put off: there is never a burst.
  */
+#include <linux/delay.h>
 #include <linux/hrtimer.h>
 #include <linux/kernel.h>
 #include <linux/ktime.h>
@@ -151,7 +152,6 @@ static void stepper_motor_dir(struct stepper_motor *motor, s64 due)
 static void stepper_motor_listen(struct stepper_motor *motor, s64 now)
 {
 	struct stepper *stepper = motor->stepper;
-	enum incise_profile_mode mode;
 
 	if (motor->disabling)
 		return;
@@ -162,10 +162,7 @@ static void stepper_motor_listen(struct stepper_motor *motor, s64 now)
 		motor->flags &= ~INCISE_STEPPER_FLAG_HELD;
 		if (motor->target != motor->wish.target)
 			motor->flags |= INCISE_STEPPER_FLAG_HELD;
-		mode = motor->wish.mode == INCISE_STEPPER_MODE_VELOCITY
-			       ? INCISE_PROFILE_VELOCITY
-			       : INCISE_PROFILE_POSITION;
-		incise_profile_target(&motor->profile, mode, motor->target);
+		motor->asked = true;
 		break;
 	case STEPPER_PAGE_GARBAGE:
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_SETPOINT, now);
@@ -175,6 +172,19 @@ static void stepper_motor_listen(struct stepper_motor *motor, s64 now)
 	}
 	if (now - motor->seen_ns > (s64)motor->config.deadman_ns)
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_DEADMAN, now);
+}
+
+/* Hand the target to the profile, once the power stage is ready for steps. */
+static void stepper_motor_aim(struct stepper_motor *motor, s64 now)
+{
+	enum incise_profile_mode mode = INCISE_PROFILE_POSITION;
+
+	if (!motor->asked || motor->disabling || now < motor->powered_ns)
+		return;
+	if (motor->wish.mode == INCISE_STEPPER_MODE_VELOCITY)
+		mode = INCISE_PROFILE_VELOCITY;
+	incise_profile_target(&motor->profile, mode, motor->target);
+	motor->asked = false;
 }
 
 static void stepper_motor_tick(struct stepper_motor *motor, s64 now, s64 due)
@@ -187,6 +197,7 @@ static void stepper_motor_tick(struct stepper_motor *motor, s64 now, s64 due)
 	if (!motor->powered)
 		return;
 
+	stepper_motor_aim(motor, now);
 	resting = incise_profile_resting(&motor->profile);
 	if (resting && motor->disabling) {
 		stepper_stop_off(motor, now);
@@ -273,12 +284,15 @@ void stepper_motor_init(struct stepper_motor *motor)
 /* No firing any more; the motor was halted before. Sleeps. */
 void stepper_motor_end(struct stepper_motor *motor)
 {
+	unsigned int waited;
 	unsigned long flags;
 
+	/* It ends by itself, with the pulse that is out, within a tick. */
+	for (waited = 0; waited < 20 && READ_ONCE(motor->timing); waited++)
+		usleep_range(1000, 2000);
 	hrtimer_cancel(&motor->timer);
 	raw_spin_lock_irqsave(&motor->lock, flags);
 	motor->timing = false;
-	/* A pulse that the timer did not come to end. */
 	if (motor->high) {
 		motor->high = false;
 		compat_gpiod_set_value(motor->lines.step, 0);

@@ -27,6 +27,21 @@ stepper_setup_limits(const struct incise_stepper_config *config)
 	};
 }
 
+/* motor->lock held. */
+static int stepper_setup_allowed(const struct stepper_motor *motor)
+{
+	const u32 forbid = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_DRIVER;
+
+	if (motor->faults)
+		return -EPERM;
+	if (motor->disabling || motor->inputs & forbid)
+		return -EBUSY;
+	if (motor->position < motor->config.position_min ||
+	    motor->position > motor->config.position_max)
+		return -ERANGE;
+	return 0;
+}
+
 /**
  * stepper_setup_ready() - whether a motor may be enabled
  * @motor:	the motor
@@ -36,19 +51,12 @@ stepper_setup_limits(const struct incise_stepper_config *config)
  */
 int stepper_setup_ready(struct stepper_motor *motor)
 {
-	const u32 forbid = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_DRIVER;
 	unsigned long flags;
-	int ret = 0;
+	int ret;
 
 	raw_spin_lock_irqsave(&motor->lock, flags);
 	stepper_inputs_sample(motor, ktime_get_ns());
-	if (motor->faults)
-		ret = -EPERM;
-	else if (motor->disabling || motor->inputs & forbid)
-		ret = -EBUSY;
-	else if (motor->position < motor->config.position_min ||
-		 motor->position > motor->config.position_max)
-		ret = -ERANGE;
+	ret = stepper_setup_allowed(motor);
 	raw_spin_unlock_irqrestore(&motor->lock, flags);
 	return ret;
 }
@@ -64,10 +72,11 @@ int stepper_setup_enable(struct stepper_motor *motor)
 	raw_spin_lock_irqsave(&motor->lock, flags);
 	if (motor->powered)
 		goto unlock;
-	if (motor->faults) {
-		ret = -EPERM;
+	/* Asked before, but an interrupt may have come since. */
+	stepper_inputs_sample(motor, ktime_get_ns());
+	ret = stepper_setup_allowed(motor);
+	if (ret)
 		goto unlock;
-	}
 	limits = stepper_setup_limits(&motor->config);
 	ret = incise_profile_init(&motor->profile, &limits, motor->position);
 	if (ret)
@@ -88,6 +97,7 @@ int stepper_setup_enable(struct stepper_motor *motor)
 	motor->late_row = 0;
 	motor->direction = 0; /* written before the first step, whatever it is */
 	motor->target = motor->position;
+	motor->asked = false;
 	/* What the page says now was said to somebody else. */
 	motor->wish = (struct stepper_wish){
 		.seq = READ_ONCE(motor->stepper->setpoints[motor->index].seq),
@@ -206,6 +216,7 @@ int stepper_setup_position(struct stepper_motor *motor,
 		motor->home_position += origin->position - motor->position;
 		motor->position = origin->position;
 		motor->target = origin->position;
+		motor->asked = false;
 		motor->wish.mode = INCISE_STEPPER_MODE_POSITION;
 		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
 		if (origin->homed)

@@ -291,7 +291,8 @@ struct incise_stepper_sync {
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
 /*
  * A mask of motors, not 0. EPERM: a fault is latched; EBUSY: an input forbids it, e-stop
- * say, or it is still coming to rest; ERANGE: it stands outside of its position limits.
+ * say, or it is still coming to rest; ERANGE: it stands outside of its position limits;
+ * ESHUTDOWN: the machine goes down.
  */
 #define INCISE_STEPPER_ENABLE _IOW(INCISE_STEPPER_IOC, 3, __u32)
 /* Brings them to rest within the limits, then takes power away. Returns at once. */
@@ -300,6 +301,7 @@ struct incise_stepper_sync {
 #define INCISE_STEPPER_CLEAR _IOW(INCISE_STEPPER_IOC, 5, __u32)
 #define INCISE_STEPPER_SET_POSITION \
 	_IOW(INCISE_STEPPER_IOC, 6, struct incise_stepper_origin)
+/* Both: EOPNOTSUPP without a SYNC line. */
 #define INCISE_STEPPER_SET_SYNC _IOW(INCISE_STEPPER_IOC, 7, struct incise_stepper_sync)
 #define INCISE_STEPPER_GET_SYNC _IOR(INCISE_STEPPER_IOC, 8, struct incise_stepper_sync)
 
