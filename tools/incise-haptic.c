@@ -16,7 +16,15 @@
 #include "json.h"
 #include "scene_argument.h"
 
-enum { OPT_MODEL = CLI_LONG, OPT_ARITH, OPT_TOOL, OPT_DURATION, OPT_LOG, OPT_JSON };
+enum {
+	OPT_MODEL = CLI_LONG,
+	OPT_ARITH,
+	OPT_TOOL,
+	OPT_DURATION,
+	OPT_HOME,
+	OPT_LOG,
+	OPT_JSON
+};
 
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
@@ -29,6 +37,7 @@ static const struct cli_option options[] = {
 	 "handle or tube (default: auto)"},
 	{OPT_DURATION, "duration", "TIME",
 	 "stop after this time, e.g. 10s (default: at SIGINT)"},
+	{OPT_HOME, "home", NULL, "find the actuator's 0 first, unless it is known"},
 	{OPT_LOG, "log", "FILE", "write every tick as CSV at the end; needs --duration"},
 	{OPT_JSON, "json", NULL, "report as JSON"},
 	{0},
@@ -51,7 +60,7 @@ struct job {
 	const char *rig, *log;
 	enum incise_tool tool;
 	double duration;
-	bool json;
+	bool json, home;
 };
 
 static enum incise_tool tool_named(const char *name)
@@ -85,6 +94,9 @@ static void parse(struct job *job, int argc, char **argv)
 			break;
 		case OPT_DURATION:
 			job->duration = cli_duration("duration", optarg, 0.01, 86400);
+			break;
+		case OPT_HOME:
+			job->home = true;
 			break;
 		case OPT_LOG:
 			job->log = optarg;
@@ -301,6 +313,61 @@ static void report_text(const struct incise_loop_stats *s, const struct incise_p
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
 }
 
+/*
+ * Power the actuator. Without its 0 a target is no position: that of a real machine must
+ * be found, where it has a switch for that.
+ */
+static void take_hold(const struct job *job, struct incise_rig *rig)
+{
+	struct incise_stepper *stepper = incise_rig_stepper(rig);
+	struct incise_stepper_status status;
+	struct incise_stepper_info info;
+	struct incise_error err = {0};
+	int rc = incise_stepper_status(stepper, &status);
+
+	incise_stepper_info(stepper, &info);
+	if (rc)
+		cli_fail("%s: %s", info.name, strerror(-rc));
+	if (!status.homed && !job->home) {
+		if (info.inputs & (INCISE_STEPPER_AT_HOME | INCISE_STEPPER_AT_MIN))
+			cli_fail(
+				"%s is not homed; run `incise stepper home --rig %s`, or "
+				"give --home",
+				info.name, incise_rig_spec(rig));
+		cli_warn("%s has no home input: its 0 is where it stands", info.name);
+	}
+	if (incise_stepper_enable(stepper, &err) ||
+	    (!status.homed && job->home && incise_stepper_home(stepper, &cli_stop, &err)))
+		cli_fail_with(&err);
+}
+
+/* To where there is no force, then without power. */
+static void let_go(struct incise_rig *rig)
+{
+	struct incise_stepper *stepper = incise_rig_stepper(rig);
+	struct incise_clock *clock = incise_rig_clock(rig);
+	struct incise_stepper_status status;
+	struct incise_stepper_info info;
+	struct incise_error err = {0};
+	int64_t now = incise_clock_now(clock), end;
+
+	incise_stepper_info(stepper, &info);
+	/* The virtual one has no power to lose: it goes there by itself. */
+	end = info.measures_handle
+		      ? now
+		      : now + (int64_t)((1 + info.travel_mm / info.velocity_mm_s) *
+					INCISE_NS_PER_S);
+	while (now < end && !incise_stepper_set(stepper, 0) &&
+	       !incise_stepper_status(stepper, &status) &&
+	       (status.position_mm > info.step_mm / 2 ||
+		status.state == INCISE_STEPPER_MOVING)) {
+		incise_clock_wait_until(clock, now + 2000000);
+		now = incise_clock_now(clock);
+	}
+	if (incise_stepper_disable(stepper, &err))
+		cli_warn("%s", err.text);
+}
+
 int main(int argc, char **argv)
 {
 	struct incise_loop_options loop = {.stop = &cli_stop};
@@ -336,9 +403,11 @@ int main(int argc, char **argv)
 	}
 	real = incise_clock_is_real(incise_rig_clock(rig));
 	cli_catch_signals();
+	take_hold(&job, rig);
 	cli_progress("%s: %g Hz, Ctrl-C ends", job.scene.path, loop.rate_hz);
 	rc = incise_loop_run(plan, incise_rig_clock(rig), &loop, &stats, &err);
 	cli_progress_end();
+	let_go(rig);
 	rms_N = incise_rig_stepper(rig) ? render_error(&stats) : NAN;
 	if (job.log)
 		write_log(file, loop.log, stats.logged);

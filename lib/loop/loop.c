@@ -104,7 +104,7 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		incise_error_set(
 			err, -rc,
 			"a device failed at tick %llu: %s; the force was taken away",
-			(unsigned long long)stats->ticks, strerror(-rc));
+			(unsigned long long)stats->ticks, incise_plan_fault(plan));
 	return rc;
 }
 

@@ -366,6 +366,20 @@ void incise_plan_release(struct incise_plan *plan)
 		incise_stepper_set(plan->stepper, 0);
 }
 
+const char *incise_plan_fault(const struct incise_plan *plan)
+{
+	unsigned int faults = plan->actuator_faults;
+
+	if (!plan->fault)
+		return NULL;
+	if (faults)
+		return incise_stepper_fault_text(
+			(enum incise_stepper_fault)(faults & -faults));
+	if (plan->actuator_off)
+		return "the actuator has no power: enable it";
+	return strerror(-plan->fault);
+}
+
 /* Take the force away, and keep why. */
 static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 {

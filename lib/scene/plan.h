@@ -88,6 +88,10 @@ struct incise_plan {
 	struct incise_stepper_info actuator;
 	double axis[3];	  /* along which it pushes: out of the rig's surface */
 	double handle_mm; /* where the handle was when last asked */
+	bool handle_seen; /* by a pose */
+	unsigned int
+		actuator_faults; /* why it does not move; incise_stepper_fault bits */
+	bool actuator_off;	 /* it has no power */
 };
 
 /* Fill in the stages that the scene and the rig need, and why the others are left out. */

@@ -2,6 +2,7 @@
 /*
  * The stages between the tissue's force and the hand.
  */
+#include <errno.h>
 #include "../base/vector.h"
 #include "stages.h"
 
@@ -56,6 +57,48 @@ int incise_stage_limit(struct incise_plan *plan, struct incise_tick *tick)
 	return 0;
 }
 
+/* An actuator that does not move any more: keep why. */
+static int refused(struct incise_plan *plan, const struct incise_stepper_status *status,
+		   int rc)
+{
+	plan->actuator_faults = status->faults & ~(unsigned int)INCISE_STEPPER_TRAVEL;
+	plan->actuator_off = rc == -EIO && status->state == INCISE_STEPPER_DISABLED;
+	return rc;
+}
+
+/*
+ * Where the handle is: as the actuator measures it, else what the hand holds is the
+ * handle, and the tracker's pose of it says where along the axis it is. Without a fresh
+ * pose it is where it was; before the first one, where the spring is at rest.
+ */
+static void take_handle(struct incise_plan *plan, const struct incise_tick *tick,
+			const struct incise_stepper_status *status)
+{
+	double mm = status->handle_mm;
+
+	if (!plan->actuator.measures_handle) {
+		if (!(tick->flags & INCISE_TICK_STALE))
+			mm = v3_dot(tick->tool_mm, plan->axis) - plan->actuator.origin_mm;
+		else if (!plan->handle_seen)
+			mm = status->position_mm;
+	}
+	if (!isfinite(mm))
+		return;
+	plan->handle_mm = mm;
+	plan->handle_seen |= !(tick->flags & INCISE_TICK_STALE);
+}
+
+static double rendered(const struct incise_plan *plan,
+		       const struct incise_stepper_status *status)
+{
+	double force_N = status->force_N;
+
+	if (!plan->actuator.measures_handle)
+		force_N = plan->actuator.spring_N_mm *
+			  (status->position_mm - plan->handle_mm);
+	return isfinite(force_N) ? force_N : 0;
+}
+
 /*
  * The actuator renders a force through its spring: the nut goes where the spring would
  * push with that force on the handle where it was at the last tick. It has one axis; what
@@ -64,19 +107,21 @@ int incise_stage_limit(struct incise_plan *plan, struct incise_tick *tick)
 int incise_stage_actuate(struct incise_plan *plan, struct incise_tick *tick)
 {
 	double along_N = v3_dot(plan->limit.last_N, plan->axis), target_mm, held_mm;
-	struct incise_stepper_status status;
+	struct incise_stepper_status status = {0};
 	int rc = incise_stepper_status(plan->stepper, &status);
 
 	if (rc)
-		return rc;
+		return refused(plan, &status, rc);
 	tick->actuated_N = along_N;
-	tick->rendered_N = isfinite(status.force_N) ? status.force_N : 0;
-	if (isfinite(status.handle_mm))
-		plan->handle_mm = status.handle_mm;
+	take_handle(plan, tick, &status);
+	tick->rendered_N = rendered(plan, &status);
 	target_mm = plan->handle_mm + along_N / plan->actuator.spring_N_mm;
 	held_mm = fmax(0, fmin(plan->actuator.travel_mm, target_mm));
 	/* Less than a step beyond is where its position is read to. */
 	if (fabs(target_mm - held_mm) > plan->actuator.step_mm)
 		tick->flags |= INCISE_TICK_TRAVEL;
-	return incise_stepper_set(plan->stepper, held_mm);
+	rc = incise_stepper_set(plan->stepper, held_mm);
+	if (rc)
+		incise_stepper_status(plan->stepper, &status);
+	return rc ? refused(plan, &status, rc) : 0;
 }

@@ -163,6 +163,14 @@ enum incise_tick_flag {
 INCISE_API void incise_plan_release(struct incise_plan *plan);
 
 /**
+ * Why a plan's ticks fail: the fault of the actuator that is latched, with what to do, or
+ * what a device answered.
+ *
+ * @return words; NULL while none failed
+ */
+INCISE_API const char *incise_plan_fault(const struct incise_plan *plan);
+
+/**
  * Run all stages once, in order. Real-time safe as far as the devices are.
  *
  * @param t_ns time of the tick, not before the last one's

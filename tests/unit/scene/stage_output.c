@@ -17,7 +17,7 @@
 struct told {
 	struct incise_stepper stepper;
 	struct incise_stepper_status status;
-	int rc, sets;
+	int rc, set_rc, sets;
 	double target_mm;
 };
 
@@ -27,7 +27,7 @@ static int told_set(struct incise_stepper *stepper, double position_mm)
 
 	told->sets++;
 	told->target_mm = position_mm;
-	return 0;
+	return told->set_rc;
 }
 
 static int told_status(struct incise_stepper *stepper,
@@ -91,6 +91,75 @@ static void test_the_nut_goes_where_its_spring_gives_the_force(void **state)
 				 tick.flags);
 		assert_true(tick.actuated_N == cases[i].force_N[2]);
 		assert_true(tick.rendered_N == 0.25);
+	}
+}
+
+/* Where the actuator does not measure its handle, the tracker does. */
+static void test_the_pose_says_where_the_handle_is(void **state)
+{
+	static const struct {
+		double tool_mm[3], nut_mm;
+		unsigned int flags;
+		double target_mm, rendered_N;
+	} ticks[] = {
+		/* No pose yet: the spring is at rest where the nut is, and 1 N is 0.5 mm. */
+		{{0, 0, 99}, 4, INCISE_TICK_STALE, 4.5, 0},
+		/* 13 mm along the axis is 3 mm from its origin. */
+		{{7, -8, 13}, 4, 0, 3.5, 2},
+		{{0, 0, 15}, 4, 0, 5.5, -2},
+		/* A pose that is too old, or is none, changes nothing. */
+		{{0, 0, 18}, 4, INCISE_TICK_STALE, 5.5, -2},
+		{{0, 0, NAN}, 4, 0, 5.5, -2},
+	};
+	struct told told;
+	struct incise_plan plan = plan_on(&told);
+
+	plan.actuator.measures_handle = false;
+	plan.actuator.origin_mm = 10;
+	plan.limit.last_N[2] = 1;
+	told.status.handle_mm = told.status.force_N = NAN;
+	for (size_t i = 0; i < sizeof(ticks) / sizeof(*ticks); i++) {
+		struct incise_tick tick = {.flags = ticks[i].flags};
+
+		memcpy(tick.tool_mm, ticks[i].tool_mm, sizeof(tick.tool_mm));
+		told.status.position_mm = ticks[i].nut_mm;
+		assert_int_equal(incise_stage_actuate(&plan, &tick), 0);
+		assert_true(told.target_mm == ticks[i].target_mm);
+		assert_true(tick.rendered_N == ticks[i].rendered_N);
+	}
+}
+
+/* What is latched ends the ticks, and is said. */
+static void test_a_fault_of_the_actuator_is_named(void **state)
+{
+	static const struct {
+		int status_rc, set_rc;
+		unsigned int faults;
+		enum incise_stepper_state state;
+		const char *says;
+	} cases[] = {
+		{0, -EIO, INCISE_STEPPER_ESTOP | INCISE_STEPPER_TRAVEL,
+		 INCISE_STEPPER_FAULT, "e-stop: release it"},
+		{0, -EIO, 0, INCISE_STEPPER_DISABLED, "no power: enable it"},
+		{-ENODEV, 0, INCISE_STEPPER_GONE, INCISE_STEPPER_FAULT,
+		 "the device went away"},
+		{-EIO, 0, 0, INCISE_STEPPER_READY, "Input/output error"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct told told;
+		struct incise_plan plan = plan_on(&told);
+		struct incise_tick tick = {0};
+
+		assert_null(incise_plan_fault(&plan));
+		told.rc = cases[i].status_rc;
+		told.set_rc = cases[i].set_rc;
+		told.status.faults = cases[i].faults;
+		told.status.state = cases[i].state;
+		plan.fault = incise_stage_actuate(&plan, &tick);
+		assert_int_equal(plan.fault, cases[i].status_rc + cases[i].set_rc);
+		if (!strstr(incise_plan_fault(&plan), cases[i].says))
+			fail_msg("case %zu: %s", i, incise_plan_fault(&plan));
 	}
 }
 
@@ -195,6 +264,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_the_nut_goes_where_its_spring_gives_the_force),
+		cmocka_unit_test(test_the_pose_says_where_the_handle_is),
+		cmocka_unit_test(test_a_fault_of_the_actuator_is_named),
 		cmocka_unit_test(test_an_actuator_that_lies_or_fails),
 		cmocka_unit_test(test_each_limit_is_an_event_of_its_own),
 		cmocka_unit_test(test_without_poses_the_last_force_fades),
