@@ -19,6 +19,9 @@
 #include "backends.h"
 #include "motor.h"
 
+#define REST_POLL_NS 10000000
+#define REST_POLLS 500
+
 struct kernel_stepper {
 	struct incise_motor motor;
 	char path[PATH_MAX];
@@ -84,11 +87,16 @@ static void unmap(const struct kernel_stepper *k, void *page)
 		munmap(page, k->page);
 }
 
-/* The module brings what is powered to rest by itself. */
+/*
+ * The module brings to rest what is powered by itself, as it does when a program dies; but
+ * that is a fault, and to close is none.
+ */
 static void kernel_close(struct incise_motor *motor)
 {
 	struct kernel_stepper *k = of(motor);
 
+	if (motor->slot && !motor->watches)
+		motor->stepper.ops->disable(&motor->stepper, NULL);
 	unmap(k, k->setpoints);
 	unmap(k, k->status);
 	if (k->fd >= 0)
@@ -197,6 +205,11 @@ static int configure(struct kernel_stepper *k, const struct incise_abi_info *inf
 		return rc;
 	incise_motor_config(&k->motor.actuator, k->index, &config);
 	rc = request(k, INCISE_STEPPER_SET_CONFIG, &config);
+	/* What the last owner left in motion is still coming to rest. */
+	for (int i = 0; rc == -EBUSY && i < REST_POLLS; i++) {
+		nanosleep(&(struct timespec){.tv_nsec = REST_POLL_NS}, NULL);
+		rc = request(k, INCISE_STEPPER_SET_CONFIG, &config);
+	}
 	if (!rc)
 		return 0;
 	if (rc == -ERANGE)
@@ -209,8 +222,10 @@ static int configure(struct kernel_stepper *k, const struct incise_abi_info *inf
 			config.low_ns, info->rate_max, (unsigned long long)pulse_ns);
 	return incise_error_set(
 		err, -rc,
-		rc == -EBUSY ? "%s: %.200s: its motor is powered: %s; disable it first"
-			     : "%s: %.200s: refuses the group actuator: %s; see `dmesg`",
+		rc == -EBUSY
+			? "%s: %.200s: its motor does not come to rest: %s; switch it "
+			  "off"
+			: "%s: %.200s: refuses the group actuator: %s; see `dmesg`",
 		asked->where, k->path, strerror(-rc));
 }
 

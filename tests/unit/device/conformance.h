@@ -93,7 +93,8 @@ static inline void conform_rests_when_opened(struct conformance *c)
 		CONFORM(c, incise_stepper_set(c->stepper, 1) == -EIO);
 	c->advance(c->world, 300 * CONFORM_MS);
 	later = conform_look(c);
-	CONFORM(c, later.position_mm == s.position_mm && later.t_ns > s.t_ns);
+	/* Without power nobody need look at it at each tick. */
+	CONFORM(c, later.position_mm == s.position_mm && later.t_ns >= s.t_ns);
 	CONFORM(c, later.faults == 0);
 }
 
