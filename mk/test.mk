@@ -4,8 +4,10 @@
 unit_sources := $(wildcard tests/unit/*/*.c)
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
-# One counts allocations.
+# One counts allocations, one plays the kernel.
 ldflags_scene/jail := $(foreach name,malloc calloc realloc free,-Wl,--wrap=$(name))
+ldflags_device/stepper_kernel := $(foreach name,open close ioctl mmap munmap clock_nanosleep \
+	nanosleep,-Wl,--wrap=$(name))
 
 $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)

@@ -240,6 +240,47 @@ static void file_refuses(void **state)
 	assert_int_equal(errno, ENOENT);
 }
 
+/* A real actuator: what it needs besides its string. */
+static void real_steppers_are_refused_with_a_line(void **state)
+{
+#define ACTUATOR "actuator = { spring_N_mm = 2.0; travel_mm = 9.0; lead_mm = 2.0; };\n"
+	static const struct {
+		const char *text;
+		int code;
+		const char *says;
+	} row[] = {
+		{"stepper = \"kernel:/dev/incise-nowhere\";", EINVAL,
+		 ":1: stepper: \"kernel:/dev/incise-nowhere\" needs the group actuator"},
+		{ACTUATOR "stepper = \"kernel:/dev/incise-nowhere\";", ENOENT,
+		 ":2: stepper: /dev/incise-nowhere: there is no such device"},
+		{ACTUATOR "stepper = \"kernel:x\";", EINVAL,
+		 ":2: stepper: expected the path"},
+		{ACTUATOR "clock = \"simulated\"; stepper = \"kernel:/dev/x\";", EINVAL,
+		 ":2: stepper: only the virtual rig can follow a simulated clock"},
+		{ACTUATOR "stepper = \"canopen:can0\";", ENODEV,
+		 ":2: stepper: there is no backend \"canopen\"; those there are: sim, kernel"},
+		{ACTUATOR "stepper = \"../../x:\";", ENODEV,
+		 "there is no backend \"../../x\""},
+		/* Broken, it is refused where the virtual actuator stands, too. */
+		{"actuator = { travel_mm = 9.0; };\nstepper = \"sim:\";", EINVAL,
+		 ":1: actuator.spring_N_mm is missing"},
+		{"actuator = 3; stepper = \"sim:\";", EINVAL,
+		 ":1: actuator: expected a group"},
+	};
+
+	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
+		struct temp_file file = temp_file_new("rig.conf", row[i].text);
+		struct incise_error err = {0};
+
+		errno = 0;
+		if (incise_rig_open(file.path, INCISE_RIG_STEPPER, &err) ||
+		    errno != row[i].code || err.code != row[i].code ||
+		    !strstr(err.text, row[i].says))
+			fail_msg("row %zu: %d, \"%s\"", i, err.code, err.text);
+		temp_file_free(&file);
+	}
+}
+
 static void devices_share_one_world(void **state)
 {
 	struct incise_rig *rig = incise_rig_open("sim:clock=simulated", ALL, NULL);
@@ -268,6 +309,7 @@ int main(void)
 		cmocka_unit_test(file_is_read),
 		cmocka_unit_test(empty_file_is_a_rig_without_devices),
 		cmocka_unit_test(file_refuses),
+		cmocka_unit_test(real_steppers_are_refused_with_a_line),
 		cmocka_unit_test(devices_share_one_world),
 	};
 

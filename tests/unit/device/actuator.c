@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/actuator.c: what the group says becomes steps and limits, what does not fit
+ * is refused with its line.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "../../../lib/device/actuator.h"
+#include "../../../lib/device/motor.h"
+
+#define NEEDED "spring_N_mm = 2.0; travel_mm = 20.0; lead_mm = 2.0; "
+
+static int read_text(struct incise_actuator *actuator, const char *inside,
+		     struct incise_error *err)
+{
+	char text[2000];
+	config_t config;
+	int rc;
+
+	snprintf(text, sizeof(text), "actuator = {\n%s\n};", inside);
+	config_init(&config);
+	assert_true(config_read_string(&config, text));
+	rc = incise_actuator_read(actuator, config_lookup(&config, "actuator"), "r", err);
+	config_destroy(&config);
+	return rc;
+}
+
+static struct incise_actuator read_good(const char *inside)
+{
+	struct incise_actuator actuator;
+	struct incise_error err = {0};
+
+	if (read_text(&actuator, inside, &err))
+		fail_msg("%s", err.text);
+	return actuator;
+}
+
+static void defaults_are_those_of_the_manual(void **state)
+{
+	struct incise_actuator a = read_good(NEEDED);
+
+	assert_true(a.spring_N_mm == 2 && a.travel_mm == 20 && a.lead_mm == 2);
+	assert_true(a.steps_per_turn == 200 && a.microsteps == 16 && !a.invert);
+	assert_true(a.velocity_mm_s == 10 && a.acceleration_mm_s2 == 500);
+	assert_true(a.jerk_mm_s3 == 0 && a.deadman_s == 0.1 && !a.retract);
+	assert_true(a.tick_ns == 250000 && !a.high_ns && !a.low_ns);
+	assert_true(a.setup_ns == 5000 && a.hold_ns == 5000 && a.enable_ns == 1000000);
+	assert_true(a.home_mm_s == 2 && a.home_mm == 0 && a.origin_mm == 0);
+	assert_false(a.has_lines);
+	/* Not faster than it goes at all. */
+	assert_true(read_good(NEEDED "velocity_mm_s = 0.5;").home_mm_s == 0.5);
+}
+
+static void every_key_is_taken_in_its_unit(void **state)
+{
+	struct incise_actuator a = read_good(
+		"spring_N_mm = 1.5; travel_mm = 12; lead_mm = 4; steps_per_turn = 400;\n"
+		"microsteps = 8; invert = true; velocity_mm_s = 7.5;\n"
+		"acceleration_mm_s2 = 321.0; jerk_mm_s3 = 1e5; deadman_ms = 50;\n"
+		"retract = true; tick_us = 100; high_us = 2.5; low_us = 3.5;\n"
+		"setup_us = 20; hold_us = 0; enable_ms = 25; home_mm_s = 1.25;\n"
+		"home_mm = -0.5; origin_mm = -33.25;\n"
+		"lines = { step = 17; dir = 27; enable = 0; home = 5; estop = 6;\n"
+		"active_low = [\"enable\", \"estop\"]; };");
+
+	assert_true(a.spring_N_mm == 1.5 && a.travel_mm == 12 && a.lead_mm == 4);
+	assert_true(a.steps_per_turn == 400 && a.microsteps == 8 && a.invert);
+	assert_true(a.velocity_mm_s == 7.5 && a.acceleration_mm_s2 == 321);
+	assert_true(a.jerk_mm_s3 == 1e5 && a.deadman_s == 0.05 && a.retract);
+	assert_true(a.tick_ns == 100000 && a.high_ns == 2500 && a.low_ns == 3500);
+	assert_true(a.setup_ns == 20000 && a.hold_ns == 0 && a.enable_ns == 25000000);
+	assert_true(a.home_mm_s == 1.25 && a.home_mm == -0.5 && a.origin_mm == -33.25);
+	assert_true(a.has_lines && a.line[INCISE_LINE_STEP] == 17);
+	assert_true(a.line[INCISE_LINE_DIR] == 27 && a.line[INCISE_LINE_ENABLE] == 0);
+	assert_true(a.line[INCISE_LINE_HOME] == 5 && a.line[INCISE_LINE_ESTOP] == 6);
+	assert_true(a.line[INCISE_LINE_LIMIT_MIN] == -1 &&
+		    a.line[INCISE_LINE_ALARM] == -1);
+	assert_int_equal(a.active_low, 1 << INCISE_LINE_ENABLE | 1 << INCISE_LINE_ESTOP);
+}
+
+static void what_does_not_fit_is_refused_with_its_line(void **state)
+{
+	static const struct {
+		const char *inside, *says;
+	} cases[] = {
+		{"travel_mm = 20.0; lead_mm = 2.0;",
+		 "r:1: actuator.spring_N_mm is missing"},
+		{"spring_N_mm = 2.0; lead_mm = 2.0;", "actuator.travel_mm is missing"},
+		{"spring_N_mm = 2.0; travel_mm = 2.0;", "actuator.lead_mm is missing"},
+		{NEEDED "\nspeed = 3;", "r:3: actuator.speed: unknown key"},
+		{NEEDED "\nvelocity_cm_s = 3;", "expected velocity_mm_s, in that unit"},
+		{NEEDED "\nmicrosteps = 16.5;",
+		 "r:3: actuator.microsteps: expected a whole"},
+		{NEEDED "\nmicrosteps = 0;",
+		 "r:3: actuator.microsteps: expected a whole"},
+		{NEEDED "\ninvert = 1;", "r:3: actuator.invert: expected true or false"},
+		{NEEDED "\ndeadman_ms = 0.5;",
+		 "r:3: actuator.deadman_ms: expected a number "
+		 "from 1 to 10000"},
+		{NEEDED "\ntick_us = 20;", "from 50 to 2000"},
+		/* 200 000 microsteps/s of 0.625 µm. */
+		{NEEDED "\nvelocity_mm_s = 126;",
+		 "r:3: actuator.velocity_mm_s: expected 1 "
+		 "to 200000 microsteps/s, that is "
+		 "0.000625 to 125 mm/s, found 126"},
+		/* A step each 62.5 µs, of 40 + 30 µs: 14285.7 steps/s. */
+		{NEEDED "\nhigh_us = 40; low_us = 30;", "take 70.000 us; give at most "
+							"8.9285 mm/s"},
+		{NEEDED "\nacceleration_mm_s2 = 2e6;",
+		 "r:3: actuator.acceleration_mm_s2: "
+		 "expected 1 to 2000000000"},
+		/* An average of 256 ticks of 250 µs: 2·500/0.064. */
+		{NEEDED "\njerk_mm_s3 = 15000;", "expected 0 or at least 1.578e+04"},
+		{NEEDED "\nhome_mm_s = 11;", "at most velocity_mm_s, 10, found 11"},
+		{NEEDED "\nhome_mm = -6;", "expected -5 to 20"},
+		{NEEDED "\nhome_mm = 21;", "expected -5 to 20"},
+		{"spring_N_mm = 2.0; travel_mm = 1000.0; lead_mm = 0.01;\nmicrosteps = 1024;"
+		 "steps_per_turn = 100000; velocity_mm_s = 0.001; home_mm_s = 0.001;",
+		 "r:2: actuator.travel_mm: expected 1 to 1000000000 microsteps"},
+		{NEEDED "\nlines = 3;", "actuator.lines: expected a group"},
+		{NEEDED "\nlines = { step = 1; };", "actuator.lines.dir is missing"},
+		{NEEDED "\nlines = { step = 1; dir = 1; };",
+		 "step and dir are both line 1"},
+		{NEEDED "\nlines = { step = 1; dir = -2; };", "r:3: actuator.lines.dir"},
+		{NEEDED "\nlines = { step = 1; dir = 2; stop = 3; };",
+		 "stop: unknown key"},
+		{NEEDED "\nlines = { step = 1; dir = 2; active_low = [\"home\"]; };",
+		 "\"home\" is no line that is given here"},
+		{NEEDED "\nlines = { step = 1; dir = 2; active_low = \"dir\"; };",
+		 "expected names such as"},
+		{NEEDED "\nlines = { step = 1; dir = 2; active_low = [1]; };",
+		 "\"?\" is no"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_actuator actuator;
+		struct incise_error err = {0};
+
+		assert_int_equal(read_text(&actuator, cases[i].inside, &err), -EINVAL);
+		if (!strstr(err.text, cases[i].says))
+			fail_msg("case %zu: \"%s\" has no \"%s\"", i, err.text,
+				 cases[i].says);
+	}
+	/* One beyond the jerk that is refused is not. */
+	read_good(NEEDED "jerk_mm_s3 = 15790.0;");
+}
+
+static void millimetres_become_steps(void **state)
+{
+	static const struct {
+		double mm;
+		int32_t steps;
+	} cases[] = {
+		{0, 0},		{0.000625, 1},	   {10, 16000}, {20, 32000},
+		{0.0003124, 0}, {0.0003126, 1},	   {-1, 0},	{1e300, 32000},
+		{-INFINITY, 0}, {INFINITY, 32000}, {NAN, 0},
+	};
+	struct incise_actuator a = read_good(NEEDED "jerk_mm_s3 = 1e5;");
+	struct incise_profile_limits limits;
+
+	assert_true(incise_actuator_step_mm(&a) == 0.000625);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
+		assert_int_equal(incise_actuator_steps(&a, cases[i].mm), cases[i].steps);
+	assert_int_equal(incise_actuator_rate(&a, 5), 8000);
+	assert_int_equal(incise_actuator_rate(&a, -1e9), -16000);
+	assert_int_equal(incise_actuator_rate(&a, NAN), 0);
+	incise_actuator_limits(&a, &limits);
+	assert_int_equal(limits.velocity, 16000);
+	assert_int_equal(limits.acceleration, 800000);
+	assert_int_equal(limits.jerk, 160000000);
+	assert_int_equal(limits.position_min, 0);
+	assert_int_equal(limits.position_max, 32000);
+	assert_int_equal(limits.tick_ns, 250000);
+	/* Whole steps that a quotient of decimals would lose: 0.3 mm at 0.1 mm each. */
+	a.lead_mm = 0.1;
+	a.steps_per_turn = a.microsteps = 1;
+	a.travel_mm = 0.3;
+	assert_int_equal(incise_actuator_steps(&a, 0.3), 3);
+}
+
+static void the_machine_must_hold_the_rate(void **state)
+{
+	struct incise_actuator a = read_good(NEEDED);
+	struct incise_stepper_config config;
+	struct incise_error err = {0};
+
+	/* 16 000 steps/s asked, and pulses that are not given become the shortest. */
+	assert_int_equal(incise_motor_fit(&a, "m", 16000, 8000, &err), 0);
+	assert_true(a.high_ns == 8000 && a.low_ns == 8000);
+	incise_motor_config(&a, 3, &config);
+	assert_true(config.motor == 3 && config.velocity == 16000 &&
+		    config.high_ns == 8000);
+	assert_true(config.deadman_ns == 100000000 && config.position_max == 32000);
+	a = read_good(NEEDED);
+	assert_int_equal(incise_motor_fit(&a, "m", 20000, 100, &err), 0);
+	assert_true(a.high_ns == 5000 && a.low_ns == 5000);
+	a = read_good(NEEDED);
+	assert_int_equal(incise_motor_fit(&a, "m", 15999, 100, &err), -ERANGE);
+	assert_non_null(strstr(err.text, "asks for 16000 steps/s"));
+	assert_non_null(strstr(err.text, "holds 15999 at most"));
+	assert_non_null(strstr(err.text, "at most 9.9993 mm/s"));
+	/* Pulses so long that the rate does not fit: 2·40 µs are 12 500 steps/s. */
+	a = read_good(NEEDED);
+	assert_int_equal(incise_motor_fit(&a, "m", 20000, 40000, &err), -ERANGE);
+	assert_non_null(strstr(err.text, "holds 12500 at most"));
+	a = read_good(NEEDED "high_us = 7.0;");
+	assert_int_equal(incise_motor_fit(&a, "m", 20000, 8000, &err), -ERANGE);
+	assert_non_null(strstr(err.text, "no less than 8"));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(defaults_are_those_of_the_manual),
+		cmocka_unit_test(every_key_is_taken_in_its_unit),
+		cmocka_unit_test(what_does_not_fit_is_refused_with_its_line),
+		cmocka_unit_test(millimetres_become_steps),
+		cmocka_unit_test(the_machine_must_hold_the_rate),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

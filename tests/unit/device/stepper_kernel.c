@@ -1,0 +1,430 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/stepper_kernel.c on a kernel that a test makes: the linker hands its system
+ * calls to functions here, behind which a pulser and a machine play the module, on a clock
+ * that goes when one sleeps. The real module is asked in tests/vm.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdbool.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <time.h>
+#include "../../../lib/device/backends.h"
+#include "../../../lib/device/motor.h"
+#include "conformance.h"
+#include "machine.h"
+
+#define FD 7777
+#define MOTOR 2
+
+/* The module, and how it shall misbehave. */
+static struct {
+	_Alignas(4096) char setpoints[4096], status[4096];
+	struct incise_abi_info info;
+	struct incise_pulser pulser;
+	struct incise_stepper_config config;
+	struct machine machine;
+	int open_error, info_error, config_error, config_busy, map_error;
+	int opened, mapped, flags;
+	bool configured;
+} module;
+
+int __real_open(const char *path, int flags, ...);
+int __real_close(int fd);
+int __real_ioctl(int fd, unsigned long request, void *argument);
+void *__real_mmap(void *at, size_t size, int prot, int flags, int fd, off_t offset);
+int __real_munmap(void *at, size_t size);
+
+static void run_for(int64_t ns)
+{
+	int64_t end = module.machine.now_ns + ns;
+
+	while (module.configured) {
+		int64_t due = incise_pulser_run(&module.pulser);
+
+		if (due > end)
+			break;
+		if (due > module.machine.now_ns)
+			module.machine.now_ns = due;
+	}
+	if (module.machine.now_ns < end)
+		module.machine.now_ns = end;
+}
+
+static int answer(int code)
+{
+	errno = code < 0 ? -code : code;
+	return code ? -1 : 0;
+}
+
+int __wrap_open(const char *path, int flags, ...)
+{
+	if (strncmp(path, "/dev/incise", 11))
+		return __real_open(path, flags, 0600);
+	if (module.open_error)
+		return answer(module.open_error);
+	module.opened++;
+	module.flags = flags;
+	return FD;
+}
+
+int __wrap_close(int fd)
+{
+	if (fd != FD)
+		return __real_close(fd);
+	module.opened--;
+	return 0;
+}
+
+static int configure(const struct incise_stepper_config *config)
+{
+	if (module.config_busy-- > 0)
+		return -EBUSY;
+	if (module.config_error)
+		return -module.config_error;
+	module.config = *config;
+	if (config->motor != MOTOR)
+		return -EINVAL;
+	module.machine.config = &module.config;
+	module.pulser.door = &machine_door;
+	module.pulser.world = &module.machine;
+	module.pulser.setpoint =
+		(struct incise_stepper_setpoint *)module.setpoints + MOTOR;
+	module.pulser.slot = (struct incise_abi_status *)module.status + MOTOR;
+	module.configured = true;
+	return incise_pulser_init(&module.pulser, &module.config);
+}
+
+int __wrap_ioctl(int fd, unsigned long request, void *argument)
+{
+	const struct incise_stepper_origin *origin = argument;
+
+	if (fd != FD)
+		return __real_ioctl(fd, request, argument);
+	if (request == INCISE_ABI_GET_INFO) {
+		memcpy(argument, &module.info, sizeof(module.info));
+		return answer(module.info_error);
+	}
+	switch (request) {
+	case INCISE_STEPPER_GET_CONFIG:
+		((struct incise_stepper_config *)argument)->deadman_ns = 70000000;
+		return 0;
+	case INCISE_STEPPER_SET_CONFIG:
+		return answer(configure(argument));
+	case INCISE_STEPPER_SET_POSITION:
+		return answer(incise_pulser_origin(
+			&module.pulser, (int32_t)origin->position, origin->homed));
+	}
+	if (*(const __u32 *)argument != 1u << MOTOR)
+		return answer(EINVAL);
+	switch (request) {
+	case INCISE_STEPPER_ENABLE:
+		return answer(incise_pulser_enable(&module.pulser));
+	case INCISE_STEPPER_DISABLE:
+		incise_pulser_disable(&module.pulser);
+		return 0;
+	case INCISE_STEPPER_CLEAR:
+		return answer(incise_pulser_clear(&module.pulser));
+	default:
+		return answer(ENOTTY);
+	}
+}
+
+void *__wrap_mmap(void *at, size_t size, int prot, int flags, int fd, off_t offset)
+{
+	if (fd != FD)
+		return __real_mmap(at, size, prot, flags, fd, offset);
+	if (module.map_error) {
+		errno = module.map_error;
+		return MAP_FAILED;
+	}
+	module.mapped++;
+	assert_int_equal(size, 4096);
+	return offset ? module.status : module.setpoints;
+}
+
+int __wrap_munmap(void *at, size_t size)
+{
+	if (at != module.setpoints && at != module.status)
+		return __real_munmap(at, size);
+	module.mapped--;
+	return 0;
+}
+
+int __wrap_clock_nanosleep(clockid_t id, int flags, const struct timespec *t,
+			   struct timespec *left)
+{
+	run_for(t->tv_sec * 1000000000LL + t->tv_nsec);
+	return 0;
+}
+
+int __wrap_nanosleep(const struct timespec *t, struct timespec *left)
+{
+	run_for(t->tv_sec * 1000000000LL + t->tv_nsec);
+	return 0;
+}
+
+static void module_load(void)
+{
+	memset(&module, 0, sizeof(module));
+	strcpy(module.info.name, "bench");
+	module.info.n_motors = 3;
+	module.info.rate_max = 20000;
+	module.info.edge_ns = 300;
+	module.info.lateness_ns = 2000;
+	module.info.lines[MOTOR] = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_HOME |
+				   INCISE_STEPPER_LINE_LIMIT_MIN |
+				   INCISE_STEPPER_LINE_LIMIT_MAX;
+	module.machine = (struct machine){.now_ns = 5000000000,
+					  .look_ns = 200,
+					  .at = 1500,
+					  .end = 100000,
+					  .wired_home = true,
+					  .wired_limits = true};
+}
+
+/* 5 mm of travel, 1.25 µm a step, 8000 steps/s. */
+static const struct incise_actuator actuator = {
+	.spring_N_mm = 2,
+	.travel_mm = 5,
+	.lead_mm = 4,
+	.steps_per_turn = 200,
+	.microsteps = 16,
+	.velocity_mm_s = 10,
+	.acceleration_mm_s2 = 500,
+	.deadman_s = 0.1,
+	.tick_ns = 250000,
+	.setup_ns = 20000,
+	.hold_ns = 10000,
+	.home_mm_s = 2,
+};
+
+static struct incise_stepper *open_stepper(const char *arguments, bool watch,
+					   const struct incise_actuator *asked,
+					   struct incise_error *err)
+{
+	struct incise_backend_request request = {
+		.arguments = arguments,
+		.where = "rig.conf:1: stepper",
+		.watch = watch,
+		.actuator = asked,
+	};
+
+	return incise_stepper_kernel.open(&request, err);
+}
+
+static void failed(const char *text)
+{
+	fail_msg("%s", text);
+}
+
+static void sleep_for(void *world, int64_t ns)
+{
+	run_for(ns);
+}
+
+static void raise(void *world, unsigned int input, bool active)
+{
+	unsigned int line = input == INCISE_STEPPER_ESTOP_ACTIVE
+				    ? INCISE_STEPPER_LINE_ESTOP
+				    : INCISE_STEPPER_LINE_LIMIT_MAX;
+
+	if (active)
+		module.machine.forced |= line;
+	else
+		module.machine.forced &= ~line;
+}
+
+static void every_case(void **state)
+{
+	for (int i = 0; conformance[i].name; i++) {
+		struct conformance c = {
+			.advance = sleep_for, .input = raise, .say = failed};
+		struct incise_error err = {0};
+
+		module_load();
+		c.stepper =
+			open_stepper("/dev/incise-stepper0:2", false, &actuator, &err);
+		if (!c.stepper)
+			fail_msg("%s", err.text);
+		incise_stepper_info(c.stepper, &c.info);
+		assert_string_equal(c.info.name, "bench motor 2 at incise-stepper0");
+		assert_true(c.info.rate_max_hz == 20000);
+		run_for(1000000);
+		conformance[i].run(&c);
+		c.stepper->ops->close(c.stepper);
+		/* Closed while it was powered, it came to rest, and that is no fault. */
+		assert_false(module.machine.enable);
+		assert_false(module.pulser.status.faults & INCISE_STEPPER_FAULT_OWNER);
+		assert_int_equal(module.opened, 0);
+		assert_int_equal(module.mapped, 0);
+		assert_int_equal(module.machine.too_short, 0);
+	}
+}
+
+static void a_watcher_only_looks(void **state)
+{
+	struct incise_stepper_status status;
+	struct incise_stepper *owner, *watcher;
+	struct incise_stepper_info info;
+	struct incise_error err = {0};
+
+	module_load();
+	owner = open_stepper("/dev/incise-stepper0:2", false, &actuator, NULL);
+	assert_int_equal(module.flags & O_ACCMODE, O_RDWR);
+	watcher = open_stepper("/dev/incise/NAME:2", true, &actuator, &err);
+	assert_non_null(watcher);
+	assert_int_equal(module.flags & O_ACCMODE, O_RDONLY);
+	assert_int_equal(module.mapped, 3);
+	/* The owner's limits, not those of its own rig.conf. */
+	incise_stepper_info(watcher, &info);
+	assert_true(info.deadman_s == 0.07);
+	assert_int_equal(incise_stepper_enable(owner, NULL), 0);
+	assert_int_equal(incise_stepper_set(owner, 4), 0);
+	run_for(90000000);
+	assert_int_equal(incise_stepper_status(watcher, &status), 0);
+	assert_true(status.position_mm > 0.1 && status.state == INCISE_STEPPER_MOVING);
+	assert_int_equal(incise_stepper_set(watcher, 1), -EPERM);
+	assert_int_equal(incise_stepper_jog(watcher, 1), -EPERM);
+	assert_int_equal(incise_stepper_enable(watcher, &err), -EPERM);
+	assert_non_null(strstr(err.text, "opened to watch"));
+	assert_int_equal(incise_stepper_disable(watcher, &err), -EPERM);
+	assert_int_equal(incise_stepper_clear(watcher, &err), -EPERM);
+	watcher->ops->close(watcher);
+	assert_true(module.machine.enable);
+	owner->ops->close(owner);
+}
+
+static void why_it_does_not_open_is_said(void **state)
+{
+	static const struct {
+		const char *arguments;
+		int open_error, info_error, config_error, map_error;
+		uint32_t n_motors, rate_max;
+		int code;
+		const char *says;
+	} cases[] = {
+		{"", 0, 0, 0, 0, 3, 20000, EINVAL, "expected the path of a device"},
+		{"incise-stepper0", 0, 0, 0, 0, 3, 20000, EINVAL, "expected the path"},
+		{"/dev/incise-stepper0:9", 0, 0, 0, 0, 3, 20000, EINVAL, "third motor"},
+		{"/dev/incise-stepper0:", 0, 0, 0, 0, 3, 20000, EINVAL, "third motor"},
+		{"/dev/incise-stepper0:2", ENOENT, 0, 0, 0, 3, 20000, ENOENT, "modprobe"},
+		{"/dev/incise-stepper0:2", EACCES, 0, 0, 0, 3, 20000, EACCES,
+		 "group incise"},
+		{"/dev/incise-stepper0:2", EBUSY, 0, 0, 0, 3, 20000, EBUSY,
+		 "another program drives it"},
+		{"/dev/incise-stepper0:2", 0, ENOTTY, 0, 0, 3, 20000, ENODEV,
+		 "another version"},
+		{"/dev/incise-stepper0:2", 0, ENODEV, 0, 0, 3, 20000, ENODEV,
+		 "cannot say what it is"},
+		/* What it says of itself is not believed. */
+		{"/dev/incise-stepper0:2", 0, 0, 0, 0, 99, 20000, EPROTO, "cannot say"},
+		{"/dev/incise-stepper0:2", 0, 0, 0, 0, 3, 0, EPROTO, "cannot say"},
+		{"/dev/incise-stepper0:2", 0, 0, 0, 0, 2, 20000, EINVAL,
+		 "has motors 0 to 1"},
+		{"/dev/incise-stepper0:2", 0, 0, 0, 0, 3, 7999, ERANGE,
+		 "asks for 8000 steps/s, but this machine holds 7999"},
+		{"/dev/incise-stepper0:2", 0, 0, ERANGE, 0, 3, 20000, ERANGE,
+		 "8000 steps/s with pulses of 5000 and 5000 ns"},
+		{"/dev/incise-stepper0:2", 0, 0, EINVAL, 0, 3, 20000, EINVAL,
+		 "refuses the group actuator"},
+		{"/dev/incise-stepper0:2", 0, 0, EBUSY, 0, 3, 20000, EBUSY,
+		 "does not come to rest"},
+		{"/dev/incise-stepper0:2", 0, 0, 0, ENOMEM, 3, 20000, ENOMEM,
+		 "load its module again"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		module_load();
+		module.open_error = cases[i].open_error;
+		module.info_error = cases[i].info_error;
+		module.config_error = cases[i].config_error;
+		module.map_error = cases[i].map_error;
+		module.info.n_motors = cases[i].n_motors;
+		module.info.rate_max = cases[i].rate_max;
+		errno = 0;
+		if (open_stepper(cases[i].arguments, false, &actuator, &err) ||
+		    errno != cases[i].code || err.code != cases[i].code ||
+		    !strstr(err.text, cases[i].says))
+			fail_msg("case %zu: %d, \"%s\"", i, err.code, err.text);
+		assert_int_equal(module.opened, 0);
+		assert_int_equal(module.mapped, 0);
+	}
+}
+
+static void what_the_last_owner_left_is_waited_for(void **state)
+{
+	struct incise_stepper *stepper;
+
+	module_load();
+	module.config_busy = 30;
+	stepper = open_stepper("/dev/incise-stepper0:2", false, &actuator, NULL);
+	assert_non_null(stepper);
+	stepper->ops->close(stepper);
+}
+
+/* Unbound while it is open: the page says so, and all calls do. */
+static void a_device_that_goes_away(void **state)
+{
+	struct incise_stepper_status status;
+	struct incise_stepper *stepper;
+	struct incise_error err = {0};
+
+	module_load();
+	stepper = open_stepper("/dev/incise-stepper0:2", false, &actuator, NULL);
+	assert_int_equal(incise_stepper_enable(stepper, NULL), 0);
+	incise_pulser_fault(&module.pulser, INCISE_STEPPER_FAULT_GONE);
+	assert_int_equal(incise_stepper_set(stepper, 1), -ENODEV);
+	assert_int_equal(incise_stepper_status(stepper, &status), -ENODEV);
+	assert_int_equal(status.faults, INCISE_STEPPER_GONE);
+	run_for(100000000);
+	assert_int_equal(incise_stepper_enable(stepper, &err), -EPERM);
+	assert_non_null(strstr(err.text, "went away"));
+	stepper->ops->close(stepper);
+}
+
+/* A status that is never finished is not waited for, and is told after a while. */
+static void a_page_that_makes_no_sense(void **state)
+{
+	struct incise_abi_status *slot =
+		(struct incise_abi_status *)module.status + MOTOR;
+	struct incise_stepper_status status;
+	struct incise_stepper *stepper;
+	int rc = 0, looks = 0;
+
+	module_load();
+	stepper = open_stepper("/dev/incise-stepper0:2", false, &actuator, NULL);
+	assert_int_equal(incise_stepper_status(stepper, &status), 0);
+	slot->seq |= 1;
+	while (!rc && looks++ < 1000)
+		rc = incise_stepper_status(stepper, &status);
+	assert_int_equal(rc, -EIO);
+	assert_in_range(looks, 50, 200);
+	memset(slot, 0xfe, sizeof(*slot));
+	assert_int_equal(incise_stepper_status(stepper, &status), -EIO);
+	assert_int_equal(incise_stepper_set(stepper, 1), -EIO);
+	stepper->ops->close(stepper);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(every_case),
+		cmocka_unit_test(a_watcher_only_looks),
+		cmocka_unit_test(why_it_does_not_open_is_said),
+		cmocka_unit_test(what_the_last_owner_left_is_waited_for),
+		cmocka_unit_test(a_device_that_goes_away),
+		cmocka_unit_test(a_page_that_makes_no_sense),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
