@@ -16,6 +16,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach lib,$(libraries),$(libdir)/pkgconfig/$(lib).pc) \
 	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
 	$(addprefix $(datadir)/incise/scenes/,$(notdir $(scenes))) \
+	$(datadir)/incise/rig.conf.example \
 	$(completiondir)/incise \
 	$(addprefix $(udevrulesdir)/,$(notdir $(udev_rules))) \
 	$(addprefix $(sysusersdir)/,$(patsubst %.sysusers,%.conf,$(notdir $(sysusers))))
@@ -41,6 +42,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 		$(INSTALL) -m 644 $$page $(DESTDIR)$(mandir)/man$${page##*.} || exit 1; \
 	done
 	$(INSTALL) -m 644 $(scenes) $(DESTDIR)$(datadir)/incise/scenes
+	$(INSTALL) -m 644 doc/rig.conf.example $(DESTDIR)$(datadir)/incise
 	$(INSTALL) -m 644 tools/incise.bash $(DESTDIR)$(completiondir)/incise
 	$(INSTALL) -m 644 $(udev_rules) $(DESTDIR)$(udevrulesdir)
 	for file in $(sysusers); do \

@@ -3,6 +3,7 @@
  * incise plan SCENE: what a scene runs, what it leaves out and why, what a tick costs, and
  * how far it is from instability.
  */
+#include <errno.h>
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
@@ -286,6 +287,17 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 	print_stability(plan);
 }
 
+/* A plan is made beside a loop that runs, where the actuator can be watched. */
+static struct incise_rig *open_rig(const char *spec, struct incise_error *err)
+{
+	const unsigned int devices = INCISE_RIG_TRACKER | INCISE_RIG_STEPPER;
+	struct incise_rig *rig = incise_rig_open(spec, devices | INCISE_RIG_WATCH, err);
+
+	if (rig || errno != EOPNOTSUPP)
+		return rig;
+	return incise_rig_open(spec, devices, err);
+}
+
 int main(int argc, char **argv)
 {
 	struct incise_error err = {0};
@@ -300,8 +312,7 @@ int main(int argc, char **argv)
 	scene = scene_argument_load(&job.scene);
 	incise_scene_set_full(scene, job.full);
 	if (job.rig) {
-		rig = incise_rig_open(job.rig, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER,
-				      &err);
+		rig = open_rig(job.rig, &err);
 		if (!rig)
 			cli_fail_with(&err);
 	}

@@ -25,7 +25,7 @@
 #include "gpio_lines.h"
 #include "pulser.h"
 
-#define PRIORITY 60 /* above a haptic loop, which must not hold up steps */
+#define PRIORITY 85 /* above a haptic loop at 80, which must not hold up steps */
 #define SLEEPS 64   /* of the self-test */
 #define SLEEP_NS 200000
 #define SPIN_MAX_NS 200000

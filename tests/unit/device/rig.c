@@ -10,6 +10,7 @@
 #include <errno.h>
 #include <locale.h>
 #include <math.h>
+#include <unistd.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
 #include "../base/temp_file.h"
@@ -281,6 +282,20 @@ static void real_steppers_are_refused_with_a_line(void **state)
 	}
 }
 
+/* Its text is checked whole, whatever is opened of it. */
+static void the_example_is_a_good_one(void **state)
+{
+	struct incise_error err = {0};
+	struct incise_rig *rig;
+
+	if (access("doc/rig.conf.example", R_OK))
+		skip();
+	rig = incise_rig_open("doc/rig.conf.example", 0, &err);
+	if (!rig)
+		fail_msg("%s", err.text);
+	incise_rig_close(rig);
+}
+
 static void devices_share_one_world(void **state)
 {
 	struct incise_rig *rig = incise_rig_open("sim:clock=simulated", ALL, NULL);
@@ -310,6 +325,7 @@ int main(void)
 		cmocka_unit_test(empty_file_is_a_rig_without_devices),
 		cmocka_unit_test(file_refuses),
 		cmocka_unit_test(real_steppers_are_refused_with_a_line),
+		cmocka_unit_test(the_example_is_a_good_one),
 		cmocka_unit_test(devices_share_one_world),
 	};
 
