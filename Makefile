@@ -57,6 +57,7 @@ uses_eval := incise
 uses_compile := incise
 uses_info := incise incise-record
 uses_haptic := incise
+uses_stepper := incise
 uses_plan := incise
 uses_demo := incise incise-learn
 uses_bench := incise incise-learn

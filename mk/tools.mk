@@ -9,6 +9,8 @@ $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 
 extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
 extra_info := $(extra_demo)
+extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
+	stepper_status.o)
 extra_haptic := $(O)/obj/tools/scene_argument.o
 extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stopwatch.o)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \

@@ -168,26 +168,64 @@ long cli_integer(const char *option, const char *text, long min, long max)
 	return value;
 }
 
+/* A number and maybe a unit, nothing else; NAN is as good as no number. */
+static bool in_units(const char *text, const struct cli_unit *units, double *value)
+{
+	char *end;
+
+	*value = strtod(text, &end);
+	if (end == text)
+		return false;
+	for (const struct cli_unit *unit = units; unit->name; unit++)
+		if (!*end || !strcmp(end, unit->name)) {
+			*value *= unit->factor;
+			return true;
+		}
+	return false;
+}
+
 double cli_duration(const char *option, const char *text, double min, double max)
 {
-	static const struct {
-		const char *unit;
-		double s;
-	} units[] = {{"", 1}, {"s", 1}, {"ms", 1e-3}, {"min", 60}, {"h", 3600}};
-	char *end;
-	double value = strtod(text, &end);
+	static const struct cli_unit units[] = {
+		{"s", 1}, {"ms", 1e-3}, {"min", 60}, {"h", 3600}, {0}};
+	double value;
 
-	for (size_t i = 0; i < sizeof(units) / sizeof(*units) && end != text; i++) {
-		if (strcmp(end, units[i].unit))
+	if (!in_units(text, units, &value))
+		cli_usage("--%s: '%s' is not a duration such as 10s, 500ms, 2min or 1h",
+			  option, text);
+	if (!(value >= min && value <= max))
+		cli_usage("--%s: %s is not within %g s to %g s", option, text, min, max);
+	return value;
+}
+
+double cli_quantity(const char *what, const char *text, const struct cli_unit *units,
+		    double min, double max)
+{
+	double value;
+
+	if (!in_units(text, units, &value))
+		cli_usage("%s: '%s' is not a number, alone or with a unit as in 1%s or "
+			  "1%s",
+			  what, text, units[0].name, units[1].name);
+	if (!(value >= min && value <= max))
+		cli_usage("%s: %s is not within %g %s to %g %s", what, text, min,
+			  units->name, max, units->name);
+	return value;
+}
+
+void cli_negative_numbers(int argc, char **argv)
+{
+	for (int i = 1; i < argc && strcmp(argv[i], "--"); i++) {
+		const char *arg = argv[i];
+		char *spaced;
+
+		if (arg[0] != '-' || !(arg[1] == '.' || (arg[1] >= '0' && arg[1] <= '9')))
 			continue;
-		value *= units[i].s;
-		if (!(value >= min && value <= max))
-			cli_usage("--%s: %s is not within %g s to %g s", option, text,
-				  min, max);
-		return value;
+		/* A space keeps getopt away, and is nothing to strtod. */
+		if (asprintf(&spaced, " %s", arg) < 0)
+			abort();
+		argv[i] = spaced;
 	}
-	cli_usage("--%s: '%s' is not a duration such as 10s, 500ms, 2min or 1h", option,
-		  text);
 }
 
 int cli_list(const char *option, char *text, char **items, int max)

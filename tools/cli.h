@@ -57,6 +57,20 @@ long cli_integer(const char *option, const char *text, long min, long max);
 /* "10", "10s", "500ms", "2min", "1h" in seconds. */
 double cli_duration(const char *option, const char *text, double min, double max);
 
+/*
+ * A quantity such as "10", "10mm", "-500um", in the first of these units; what names it in
+ * the message, "--for" say. Units end with {0}.
+ */
+struct cli_unit {
+	const char *name;
+	double factor; /* to the first, whose own is 1 */
+};
+double cli_quantity(const char *what, const char *text, const struct cli_unit *units,
+		    double min, double max);
+
+/* Have "-5" read as a number and not as options; for verbs whose operands are numbers. */
+void cli_negative_numbers(int argc, char **argv);
+
 /* "a,b,c" to at most max strings; the text is cut in place. Returns how many. */
 int cli_list(const char *option, char *text, char **items, int max);
 

@@ -22,9 +22,10 @@ static const struct {
 	{"train", "learn a fuzzy force model from a dataset"},
 	{"compile", "turn a model into integers with a certified error bound"},
 	{"eval", "print the force of a model at given depth and velocity"},
-	{"info", "say what a recording or model holds"},
+	{"info", "say what a recording, model or stepper module holds"},
 	{"plan", "show what a scene runs and what it leaves out"},
 	{"haptic", "run the real-time loop of a scene"},
+	{"stepper", "look at the actuator and move it by hand"},
 	{"bench", "measure error against run time"},
 	{"demo", "walk the whole path on the virtual rig"},
 };

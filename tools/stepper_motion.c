@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The commands of incise stepper that power the motor: enable, move, jog, home.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "cli.h"
+#include "json.h"
+#include "stepper_command.h"
+#include "stepper_status.h"
+
+/* A motion may take twice what its limits make of it, and this. */
+#define MOTION_S 2
+
+void stepper_enable(const struct stepper_job *job, struct stepper_drive *drive)
+{
+	stepper_drive_power(drive);
+	if (!job->json) {
+		printf("powered, held at %.4f mm; Ctrl-C disables it, and so does the end of "
+		       "this program within %g ms\n",
+		       drive->status.position_mm, drive->info.deadman_s * 1e3);
+		fflush(stdout);
+	}
+	stepper_drive_hold(drive, job->seconds);
+	if (job->json)
+		stepper_put(stepper_report(job, drive), JSON_INDENT(2));
+}
+
+/* After a motion: where it is, when it is done in full. */
+static void put_moved(const struct stepper_job *job, const struct stepper_drive *drive,
+		      double from_mm, double seconds)
+{
+	const struct incise_stepper_status *s = &drive->status;
+	json_t *object;
+
+	if (job->json) {
+		object = stepper_report(job, drive);
+		json_object_set_new(object, "from_mm", json_number(from_mm));
+		json_object_set_new(object, "seconds", json_number(seconds));
+		stepper_put(object, JSON_INDENT(2));
+		return;
+	}
+	printf("moved %.4f mm in %.3f s, now at %.4f mm (step %lld)%s\n",
+	       s->position_mm - from_mm, seconds, s->position_mm,
+	       stepper_steps(&drive->info, s->position_mm),
+	       s->homed ? "" : ", not homed");
+	fflush(stdout);
+}
+
+static void maybe_hold(const struct stepper_job *job, struct stepper_drive *drive)
+{
+	if (job->hold)
+		stepper_drive_hold(drive, job->seconds);
+}
+
+/* Where the way goes, within the travel, or the end of the program. */
+static double destination(const struct stepper_job *job, struct stepper_drive *drive)
+{
+	double mm = job->amount, from_mm = drive->status.position_mm;
+	/* A travel need not be of whole steps; the last one is half a step away at most. */
+	double slack_mm = 0.5 * drive->info.step_mm;
+
+	if (job->by)
+		mm += from_mm;
+	else if (!drive->status.homed && !job->unhomed)
+		stepper_drive_fail(
+			drive,
+			"%s is not homed, so %g mm is no place of it: run `incise stepper "
+			"home`, or move --by, or with --unhomed",
+			drive->info.name, mm);
+	if (mm < -slack_mm || mm > drive->info.travel_mm + slack_mm)
+		stepper_drive_fail(
+			drive,
+			"from %g mm to %g mm: that lies outside the travel of %s, "
+			"0 to %g mm%s",
+			from_mm, mm, drive->info.name, drive->info.travel_mm,
+			drive->status.homed ? ""
+					    : "; its count is not the machine's: run "
+					      "`incise stepper home`");
+	return fmax(0, fmin(drive->info.travel_mm, mm));
+}
+
+/* Whether it rests at the microstep nearest to a target. */
+static bool arrived(const struct stepper_drive *drive, double to_mm)
+{
+	return stepper_drive_rests(drive) &&
+	       fabs(drive->status.position_mm - to_mm) <= 0.6 * drive->info.step_mm;
+}
+
+/* What the limits make of a motion, from rest to rest at most. */
+static double motion_s(const struct incise_stepper_info *info, double mm)
+{
+	double s = fabs(mm) / info->velocity_mm_s +
+		   2 * info->velocity_mm_s / info->acceleration_mm_s2;
+
+	if (info->jerk_mm_s3 > 0)
+		s += 2 * info->acceleration_mm_s2 / info->jerk_mm_s3;
+	return 2 * s + MOTION_S;
+}
+
+static _Noreturn void fail_stopped(struct stepper_drive *drive)
+{
+	stepper_drive_rest(drive);
+	stepper_drive_fail(drive, "%s: at rest at %.4f mm, without power",
+			   strsignal(cli_stop), drive->status.position_mm);
+}
+
+void stepper_move(const struct stepper_job *job, struct stepper_drive *drive)
+{
+	double to_mm = destination(job, drive), from_mm = drive->status.position_mm;
+	double within_s = motion_s(&drive->info, to_mm - from_mm), seconds;
+	double step_mm = drive->info.step_mm;
+	int64_t begin;
+
+	/* The travel's end, when that is between two steps, is the one before it. */
+	to_mm = fmin(to_mm,
+		     floor(drive->info.travel_mm / step_mm * (1 + 1e-12)) * step_mm);
+	stepper_drive_power(drive);
+	begin = incise_clock_now(drive->clock);
+	do {
+		stepper_drive_to(drive, to_mm);
+		seconds = (double)(incise_clock_now(drive->clock) - begin) /
+			  INCISE_NS_PER_S;
+	} while (!cli_stop && !arrived(drive, to_mm) && seconds < within_s);
+	if (!arrived(drive, to_mm) && cli_stop)
+		fail_stopped(drive);
+	if (!arrived(drive, to_mm))
+		stepper_drive_fail(
+			drive,
+			"%s is at %.4f mm after %.1f s and did not come to rest at "
+			"%.4f mm; see incise stepper status",
+			drive->info.name, drive->status.position_mm, seconds, to_mm);
+	put_moved(job, drive, from_mm, seconds);
+	maybe_hold(job, drive);
+}
+
+void stepper_jog(const struct stepper_job *job, struct stepper_drive *drive)
+{
+	double mm_s = job->amount, end_mm = mm_s > 0 ? drive->info.travel_mm : 0;
+	double from_mm = drive->status.position_mm, seconds;
+	int64_t begin;
+	bool ended;
+
+	if (fabs(mm_s) > drive->info.velocity_mm_s)
+		stepper_drive_fail(drive, "%g mm/s is faster than the %g mm/s of %s",
+				   mm_s, drive->info.velocity_mm_s, drive->info.name);
+	stepper_drive_power(drive);
+	begin = incise_clock_now(drive->clock);
+	do {
+		stepper_drive_at(drive, mm_s);
+		seconds = (double)(incise_clock_now(drive->clock) - begin) /
+			  INCISE_NS_PER_S;
+		ended = stepper_drive_rests(drive) &&
+			fabs(drive->status.position_mm - end_mm) < drive->info.step_mm;
+	} while (!cli_stop && !ended && (!job->seconds || seconds < job->seconds));
+	stepper_drive_rest(drive);
+	put_moved(job, drive, from_mm, seconds);
+	if (ended && !job->json)
+		printf("that is the end of the travel, 0 to %g mm%s\n",
+		       drive->info.travel_mm,
+		       drive->status.homed ? ""
+					   : " of a count that is not the machine's");
+}
+
+/* Times that homing found the edge, in the count that the first of them made. */
+struct edges {
+	json_t *before_mm; /* each in the count before it */
+	double after_mm, off_mm, low_mm, high_mm;
+	int n;
+};
+
+static void find_edge(struct edges *edges, const struct stepper_job *job,
+		      struct stepper_drive *drive)
+{
+	struct incise_stepper_edge_found edge;
+	struct incise_error err = {0};
+
+	if (incise_stepper_home_edge(drive->stepper, &cli_stop, &edge, &err))
+		stepper_drive_fail(drive, "%s", err.text);
+	stepper_drive_look(drive);
+	/* Each homing names the edge anew, by what it was off. */
+	if (edges->n++)
+		edges->off_mm += edge.before_mm - edge.after_mm;
+	edges->low_mm = fmin(edges->low_mm, edges->off_mm);
+	edges->high_mm = fmax(edges->high_mm, edges->off_mm);
+	edges->after_mm = edge.after_mm;
+	json_array_append_new(edges->before_mm, json_number(edge.before_mm));
+	if (job->json)
+		return;
+	cli_progress_end();
+	printf("home edge at %.4f mm (step %lld) of the count before, now %.4f mm\n",
+	       edge.before_mm, stepper_steps(&drive->info, edge.before_mm),
+	       edge.after_mm);
+	fflush(stdout);
+}
+
+static json_t *home_json(const struct stepper_job *job, const struct stepper_drive *drive,
+			 const struct edges *edges)
+{
+	double spread_mm = edges->high_mm - edges->low_mm;
+	json_t *object = stepper_report(job, drive);
+
+	json_object_set(object, "edges_before_mm", edges->before_mm);
+	json_object_set_new(object, "edge_mm", json_number(edges->after_mm));
+	json_object_set_new(object, "spread_mm",
+			    edges->n > 1 ? json_number(spread_mm) : json_null());
+	return object;
+}
+
+void stepper_home(const struct stepper_job *job, struct stepper_drive *drive)
+{
+	struct edges edges = {.before_mm = json_array()};
+	int times = job->repeat ? job->repeat : 1;
+	double spread_mm;
+
+	stepper_drive_power(drive);
+	for (int i = 0; i < times; i++) {
+		cli_progress("home: %d of %d, Ctrl-C stops", i + 1, times);
+		find_edge(&edges, job, drive);
+	}
+	cli_progress_end();
+	spread_mm = edges.high_mm - edges.low_mm;
+	if (job->json)
+		stepper_put(home_json(job, drive, &edges), JSON_INDENT(2));
+	else if (times > 1)
+		printf("%d times within %.4f mm (%lld steps)\n", times, spread_mm,
+		       stepper_steps(&drive->info, spread_mm));
+	if (!job->json)
+		printf("homed, at %.4f mm\n", drive->status.position_mm);
+	fflush(stdout);
+	json_decref(edges.before_mm);
+	maybe_hold(job, drive);
+}
