@@ -8,7 +8,7 @@ tool_shared := $(addprefix $(O)/obj/tools/,cli.o json.o)
 $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 
 extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
-extra_info := $(extra_demo)
+extra_info := $(extra_demo) $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o)
 extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
 	stepper_status.o)
 extra_haptic := $(O)/obj/tools/scene_argument.o

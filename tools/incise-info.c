@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise info FILE: what a model, a compiled model or a recording holds.
+ * incise info FILE: what a model, a compiled model or a recording holds, and what a
+ * controller of the stepper module is and does.
  */
 #include <errno.h>
 #include <getopt.h>
@@ -15,6 +16,7 @@
 #include "json.h"
 #include "model_picture.h"
 #include "picture.h"
+#include "stepper_module.h"
 
 enum { OPT_JSON = CLI_LONG, OPT_PLOT };
 
@@ -28,8 +30,10 @@ static const struct cli_option options[] = {
 
 static const struct cli_verb verb = {
 	.name = "info",
-	.synopsis = "MODEL.fis|MODEL.fx|NAME.rec [OPTIONS]",
-	.summary = "Say what a model, a compiled model or a recording holds.",
+	.synopsis = "MODEL.fis|MODEL.fx|NAME.rec|stepper|/dev/incise-stepperN [OPTIONS]",
+	.summary =
+		"Say what a model, a compiled model or a recording holds, or what the kernel's\n"
+		"stepper module found, does and costs.",
 	.options = options,
 	.notes = "Exit: 0 shown, 1 failed, 2 bad usage. See incise-info(1).",
 };
@@ -338,7 +342,8 @@ static void check_exists(const char *path)
 	struct stat st;
 
 	if (strcmp(path, "-") && stat(path, &st))
-		cli_fail("%s: %s; give a model (.fis, .fx) or a recording (NAME.rec)",
+		cli_fail("%s: %s; give a model (.fis, .fx), a recording (NAME.rec) or "
+			 "`stepper`",
 			 path, strerror(errno));
 }
 
@@ -367,9 +372,11 @@ int main(int argc, char **argv)
 	if (optind + 1 != argc)
 		cli_usage("expected one file, got %d", argc - optind);
 	path = argv[optind];
-	if (plot && (is_recording(path) || is_compiled(path)))
+	if (plot && (is_recording(path) || is_compiled(path) || stepper_module_is(path)))
 		cli_usage("--plot draws a model, MODEL.fis");
-	if (is_recording(path)) {
+	if (stepper_module_is(path)) {
+		stepper_module_show(path, json);
+	} else if (is_recording(path)) {
 		show_recording(path, json);
 	} else {
 		check_exists(path);
