@@ -29,7 +29,8 @@ _incise_options()
 		}'
 }
 
-# What a verb can do, where its usage line lists words: "bench precision [FILE] | …".
+# What a verb can do, where its usage line lists words: "bench precision [FILE] | …"; and
+# FILE, in capitals, where it lists others than words.
 _incise_words()
 {
 	"$1" "$2" --help 2>/dev/null | awk '
@@ -37,8 +38,7 @@ _incise_words()
 			n = split($0, part, "|")
 			for (i = 1; i <= n; i++) {
 				split(part[i], word, " ")
-				if (word[1] ~ /^[a-z]+$/)
-					print word[1]
+				print word[1] ~ /^[a-z]+$/ ? word[1] : "FILE"
 			}
 		}'
 }
@@ -52,7 +52,7 @@ _incise_files()
 _incise()
 {
 	local word=${COMP_WORDS[COMP_CWORD]}
-	local program=${COMP_WORDS[0]} verb=${COMP_WORDS[1]}
+	local program=${COMP_WORDS[0]} verb=${COMP_WORDS[1]} words=
 
 	COMPREPLY=()
 	if ((COMP_CWORD == 1)); then
@@ -64,8 +64,10 @@ _incise()
 		mapfile -t COMPREPLY < <(compgen -W \
 			"$(_incise_options "$program" "$verb")" -- "$word")
 	else
-		((COMP_CWORD > 2)) || mapfile -t COMPREPLY < <(compgen -W \
-			"$(_incise_words "$program" "$verb")" -- "$word")
+		((COMP_CWORD > 2)) || words=$(_incise_words "$program" "$verb")
+		[[ $words != *FILE* ]] || _incise_files "$word"
+		mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY < <(compgen -W \
+			"${words//FILE/}" -- "$word")
 		((${#COMPREPLY[@]})) || _incise_files "$word"
 	fi
 }

@@ -137,9 +137,9 @@ static void put_text(const struct stepper_module *module)
 	printf("%s: %.*s, %u motor%s\n", module->path, (int)sizeof(info->name),
 	       info->name, info->n_motors, info->n_motors == 1 ? "" : "s");
 	printf("self-test  99 %% of timers at most %.3f us late, the latest %.3f us; an edge "
-	       "takes %.3f us\n           so at most %.1f kHz; timers of %u ns\n",
+	       "takes %.3f us\n           so at most %.1f kHz, pulses of at least %.3f us; timers of %u ns\n",
 	       info->lateness_ns * US, info->lateness_max_ns * US, info->edge_ns * US,
-	       info->rate_max * KHZ, info->resolution_ns);
+	       info->rate_max * KHZ, info->pulse_ns * US, info->resolution_ns);
 	put_sync(module);
 	printf("force      %s\n", info->capabilities & INCISE_STEPPER_CAP_FIXED
 					  ? "the integer model is built in"
@@ -241,14 +241,14 @@ static json_t *module_json(const struct stepper_module *module)
 	memcpy(name, info->name, sizeof(info->name));
 	for (uint32_t i = 0; i < info->n_motors; i++)
 		json_array_append_new(motors, motor_json(module, i));
-	return json_pack("{so so s{sI sI sI sI sI} so sb so so}", "device",
+	return json_pack("{so so s{sI sI sI sI sI sI} so sb so so}", "device",
 			 json_text(module->path), "name", json_text(name), "self_test",
-			 "rate_max_steps_s", (json_int_t)info->rate_max, "edge_ns",
-			 (json_int_t)info->edge_ns, "lateness_p99_ns",
-			 (json_int_t)info->lateness_ns, "lateness_max_ns",
-			 (json_int_t)info->lateness_max_ns, "resolution_ns",
-			 (json_int_t)info->resolution_ns, "sync", sync_json(module),
-			 "fixed_point",
+			 "rate_max_steps_s", (json_int_t)info->rate_max, "pulse_min_ns",
+			 (json_int_t)info->pulse_ns, "edge_ns", (json_int_t)info->edge_ns,
+			 "lateness_p99_ns", (json_int_t)info->lateness_ns,
+			 "lateness_max_ns", (json_int_t)info->lateness_max_ns,
+			 "resolution_ns", (json_int_t)info->resolution_ns, "sync",
+			 sync_json(module), "fixed_point",
 			 (int)!!(info->capabilities & INCISE_STEPPER_CAP_FIXED), "motors",
 			 motors, "no_evidence",
 			 module->evidence ? json_string(module->evidence) : json_null());

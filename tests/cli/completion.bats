@@ -39,7 +39,7 @@ complete_words() {
 	[ "${COMPREPLY[*]}" = "--mf --mf-type" ]
 	complete_words incise haptic --lo
 	[ "${COMPREPLY[*]}" = --log ]
-	for verb in capture export train eval info haptic bench demo; do
+	for verb in capture export train eval info haptic stepper bench demo; do
 		complete_words incise "$verb" --
 		for option in "${COMPREPLY[@]}"; do
 			"incise-$verb" --help | grep -qE -- "^ .*$option( |\$)"
@@ -58,6 +58,18 @@ complete_words() {
 	complete_words incise bench st
 	[ "${COMPREPLY[*]}" = stability ]
 	complete_words incise bench precision st
+	[ "${COMPREPLY[*]}" = stale.csv ]
+}
+
+@test "commands of stepper are completed, and the word beside files of info" {
+	touch stale.csv
+	complete_words incise stepper ""
+	[ "${COMPREPLY[*]}" = "status enable disable move jog home clear" ]
+	complete_words incise stepper mo
+	[ "${COMPREPLY[*]}" = move ]
+	complete_words incise info st
+	[ "${COMPREPLY[*]}" = "stale.csv stepper" ]
+	complete_words incise info stepper st
 	[ "${COMPREPLY[*]}" = stale.csv ]
 }
 

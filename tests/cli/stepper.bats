@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise stepper on the virtual rig, and without a device; tests/vm/guest/stepper_tool.sh
+# runs it on the kernel module. In simulated time it takes none.
+
+load cli
+
+setup() {
+	work_folder
+	quick=sim:clock=simulated
+}
+
+teardown() {
+	[ -z "$pid" ] || kill -9 "$pid" 2>/dev/null || :
+}
+
+# Wait until a line that holds a text stands in a file.
+until_it_says() {
+	for ((i = 0; i < 100; i++)); do
+		grep -q "$1" "$2" && return
+		sleep 0.05
+	done
+	complain "$2 does not say $1 within 5 s: $(cat "$2")"
+}
+
+@test "status says where it stands and what its limits are" {
+	run -0 --separate-stderr incise stepper status --rig $quick,travel_mm=15
+	[ -z "$stderr" ]
+	[ "${lines[0]}" = "virtual haptic scalpel: ready at 0.0000 mm (step 0), homed" ]
+	[[ "$output" == *"faults     none"* ]]
+	[[ "$output" == *"limits     0 to 15 mm in steps of 0.625 um, up to 30 mm/s"* ]]
+}
+
+@test "status as JSON" {
+	incise stepper status --rig $quick --json >s.json
+	[ "$(key s.json command)" = status ]
+	[ "$(key s.json state)" = ready ]
+	[ "$(key s.json homed)" = 1 ]
+	[ "$(key s.json faults)" = '[]' ]
+	[ "$(key s.json inputs_wired)" = '[]' ]
+	holds "$(key s.json step_mm) == 0.000625 && $(key s.json deadman_s) == 0.1"
+	[ -z "$(key s.json jerk_max_mm_s3)" ]
+}
+
+@test "status --follow prints what changes, as text or as a line of JSON" {
+	run -0 --separate-stderr incise stepper status --follow --for 1s --rig $quick
+	[ "${#lines[@]}" -eq 1 ] # nothing does
+	[[ "$output" == "0.000 s  ready at 0.0000 mm, 0.000 mm/s, homed; inputs none" ]]
+	incise stepper status -f --for 1s --json --rig $quick >s.json
+	[ "$(wc -l <s.json)" -eq 1 ]
+	[ "$(key s.json state)" = ready ]
+}
+
+@test "move goes there and says so; its time is that of the limits" {
+	run -0 --separate-stderr incise stepper move 10 --rig $quick
+	[ -z "$stderr" ]
+	[[ "$output" == "moved 10.0000 mm in "*" s, now at 10.0000 mm (step 16000)" ]]
+	for there in 10mm 10000um 10.0; do
+		incise stepper move $there --rig $quick --json >m.json
+		[ "$(key m.json position_steps)" = 16000 ]
+		[ "$(key m.json from_mm)" = 0.0 ]
+		[ "$(key m.json state)" = ready ]
+		# 10 mm at 30 mm/s, and 30 mm/s at 3000 mm/s^2; a look each 5 ms
+		holds "$(key m.json seconds) >= 10 / 30 + 30 / 3000 - 1e-9"
+		holds "$(key m.json seconds) <= 10 / 30 + 30 / 3000 + 0.01"
+	done
+	incise stepper move 1mm --by --rig $quick --json >m.json
+	[ "$(key m.json position_mm)" = 1.0 ]
+}
+
+@test "move to where it stands, and to the end of a travel that is not of whole steps" {
+	incise stepper move 0 --rig $quick --json >m.json
+	[ "$(key m.json position_mm)" = 0.0 ]
+	incise stepper move 10.0004 --rig $quick,travel_mm=10.0004 --json >m.json
+	[ "$(key m.json position_steps)" = 16000 ]
+	# to the nearest step otherwise
+	incise stepper move 0.0009 --rig $quick --json >m.json
+	[ "$(key m.json position_steps)" = 1 ]
+}
+
+@test "move outside the travel is refused" {
+	for way in 20.1 -1 -0.1mm "-1 --by" "20001um --by"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise stepper move $way --rig $quick
+		failed_with "outside the travel" "0 to 20 mm"
+		[ -z "$output" ]
+	done
+}
+
+@test "move --hold stays there" {
+	run -0 --separate-stderr incise stepper move 2 --hold --for 3s --rig $quick
+	[[ "$output" == "moved 2.0000 mm "* ]]
+	[ "${#lines[@]}" -eq 1 ]
+}
+
+@test "enable holds it and says how long" {
+	run -0 --separate-stderr incise stepper enable --for 2s --rig $quick
+	[ -z "$stderr" ]
+	[[ "$output" == "powered, held at 0.0000 mm; Ctrl-C disables it, "*"100 ms" ]]
+	incise stepper enable --for 2s --rig $quick --json >e.json
+	# that time passed, and the deadman saw targets all the while
+	holds "$(key e.json t_ns) >= 3e9 && $(key e.json t_ns) < 3.1e9"
+	[ "$(key e.json faults)" = '[]' ]
+}
+
+@test "disable and clear" {
+	run -0 --separate-stderr incise stepper disable --rig $quick
+	[[ "$output" == "virtual haptic scalpel: ready at 0.0000 mm, as it is always powered" ]]
+	run -0 --separate-stderr incise stepper clear --rig $quick
+	[ "$output" = "virtual haptic scalpel: there was no fault" ]
+	incise stepper clear --rig $quick --json >c.json
+	[ "$(key c.json faults)" = '[]' ]
+}
+
+@test "what makes no sense on the virtual rig is said in a line" {
+	run --separate-stderr incise stepper jog -2 --rig $quick
+	failed_with "virtual haptic scalpel has no jog" "incise stepper move"
+	run --separate-stderr incise stepper home --rig $quick
+	failed_with "virtual haptic scalpel cannot be homed"
+	run --separate-stderr incise stepper jog 31mm/s --rig $quick
+	failed_with "31 mm/s" "30 mm/s"
+}
+
+@test "Ctrl-C stops a move, at rest, and says where" {
+	# 20 mm at 0.5 mm/s
+	incise stepper move 20 --rig sim:screw_mm_s=0.5 >out 2>err 3>&- &
+	pid=$!
+	for ((i = 0; i < 100; i++)); do
+		mask=$(awk '/^Name/ && $2 != "incise-stepper" { exit } /^SigCgt/ { print $2 }' \
+			/proc/$pid/status)
+		((0x${mask:-0} & 2)) && break
+		sleep 0.05
+	done
+	kill -INT $pid
+	wait $pid && complain "exit 0" || [ $? -eq 1 ]
+	pid=
+	[ ! -s out ]
+	[ "$(wc -l <err)" -eq 1 ]
+	grep -q '^incise stepper: move: Interrupt: at rest at ' err
+}
+
+@test "Ctrl-C ends enable and --follow as asked" {
+	for command in enable "status --follow"; do
+		# shellcheck disable=SC2086
+		incise stepper $command --rig sim: >out 2>err 3>&- &
+		pid=$!
+		until_it_says "0.0000 mm" out
+		kill -INT $pid
+		wait $pid # exit status 0
+		pid=
+		[ ! -s err ]
+	done
+}
+
+@test "a reader that goes away ends it, without a word" {
+	touch reader
+	run -1 --separate-stderr bash -c "set -o pipefail
+		{ while [ -e reader ]; do sleep 0.1; done
+			sleep 0.1; incise stepper move 1 --hold --for 9s --rig $quick; } | rm reader"
+	[ -z "$stderr" ]
+	run --separate-stderr bash -c "incise stepper enable --for 1s --rig $quick >/dev/full"
+	failed_with "standard output: "
+}
+
+@test "stepper: rigs that cannot be" {
+	run --separate-stderr incise stepper status --rig none.conf
+	failed_with none.conf "No such file"
+	echo 'tracker = "sim:";' >rig.conf
+	run --separate-stderr incise stepper status
+	failed_with rig.conf stepper
+	echo 'stepper = "sim:";' >>rig.conf
+	incise stepper status # ./rig.conf is the default
+	cat >rig.conf <<-'END'
+		stepper = "kernel:/dev/incise-none";
+		actuator = { spring_N_mm = 2.0; travel_mm = 10.0; lead_mm = 2.0; };
+	END
+	for command in status enable disable "move 1" "jog 1" home clear; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise stepper $command
+		failed_with /dev/incise-none
+	done
+}
+
+@test "stepper: bad usage" {
+	run --separate-stderr incise stepper --rig $quick
+	bad_usage "which command"
+	run --separate-stderr incise stepper spin --rig $quick
+	bad_usage "no command 'spin'"
+	run --separate-stderr incise stepper move --rig $quick
+	bad_usage "move needs one MM"
+	run --separate-stderr incise stepper move 1 2 --rig $quick
+	bad_usage "move needs one MM, got 2"
+	run --separate-stderr incise stepper status 3 --rig $quick
+	bad_usage "status takes no '3'"
+	for amount in 1x mm "" nan 1e9 -- 1mm/s; do
+		run --separate-stderr incise stepper move --rig $quick -- "$amount"
+		bad_usage ""
+	done
+	run --separate-stderr incise stepper jog 1mm --rig $quick
+	bad_usage "MM_S: '1mm'"
+	run --separate-stderr incise stepper jog -x --rig $quick
+	bad_usage "-x"
+	for wrong in "status --by" "enable --hold" "move 1 --repeat 2" "home --unhomed" \
+		"clear --follow" "disable --for 1s"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise stepper $wrong --rig $quick
+		bad_usage "${wrong%% *} does not take --"
+	done
+	run --separate-stderr incise stepper move 1 --for 1s --rig $quick
+	bad_usage "add --hold"
+	run --separate-stderr incise stepper status --for 1s --rig $quick
+	bad_usage "add --follow"
+	run --separate-stderr incise stepper move 1 --by --unhomed --rig $quick
+	bad_usage "--by needs no --unhomed"
+	run --separate-stderr incise stepper home --repeat 0 --rig $quick
+	bad_usage --repeat
+}
+
+@test "info of a controller that is not there, or is none" {
+	compgen -G '/dev/incise-stepper*' >/dev/null && skip "this machine has a controller"
+	run --separate-stderr incise info stepper
+	failed_with "modprobe incise_stepper"
+	run --separate-stderr incise info stepper --json
+	failed_with "modprobe incise_stepper"
+	run --separate-stderr incise info /dev/incise-stepper0
+	failed_with /dev/incise-stepper0 "No such file"
+	run --separate-stderr incise info stepper --plot p
+	bad_usage "--plot"
+	echo text >stepper
+	run --separate-stderr incise info ./stepper # a file of that name
+	failed_with ./stepper
+}
