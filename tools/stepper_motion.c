@@ -164,56 +164,78 @@ void stepper_jog(const struct stepper_job *job, struct stepper_drive *drive)
 					   : " of a count that is not the machine's");
 }
 
-/* Times that homing found the edge, in the count that the first of them made. */
+/* Where homing found the edge, each time; steps in the count that the first one made. */
 struct edges {
-	json_t *before_mm; /* each in the count before it */
-	double after_mm, off_mm, low_mm, high_mm;
+	json_t *before_mm, *before_steps; /* each in the count before it */
+	double after_mm;
+	long long off, lowest, highest;
 	int n;
 };
 
 static void find_edge(struct edges *edges, const struct stepper_job *job,
 		      struct stepper_drive *drive)
 {
+	const struct incise_stepper_info *info = &drive->info;
 	struct incise_stepper_edge_found edge;
 	struct incise_error err = {0};
+	long long before;
 
 	if (incise_stepper_home_edge(drive->stepper, &cli_stop, &edge, &err))
 		stepper_drive_fail(drive, "%s", err.text);
 	stepper_drive_look(drive);
+	before = stepper_steps(info, edge.before_mm);
 	/* Each homing names the edge anew, by what it was off. */
 	if (edges->n++)
-		edges->off_mm += edge.before_mm - edge.after_mm;
-	edges->low_mm = fmin(edges->low_mm, edges->off_mm);
-	edges->high_mm = fmax(edges->high_mm, edges->off_mm);
+		edges->off += before - stepper_steps(info, edge.after_mm);
+	if (edges->off < edges->lowest)
+		edges->lowest = edges->off;
+	if (edges->off > edges->highest)
+		edges->highest = edges->off;
 	edges->after_mm = edge.after_mm;
-	json_array_append_new(edges->before_mm, json_number(edge.before_mm));
+	json_array_append_new(edges->before_mm,
+			      json_number((double)before * info->step_mm));
+	json_array_append_new(edges->before_steps, json_integer(before));
 	if (job->json)
 		return;
 	cli_progress_end();
-	printf("home edge at %.4f mm (step %lld) of the count before, now %.4f mm\n",
-	       edge.before_mm, stepper_steps(&drive->info, edge.before_mm),
-	       edge.after_mm);
+	printf("home edge at step %lld, %.4f mm, of the count before; now at %.4f mm\n",
+	       before, (double)before * info->step_mm, edge.after_mm);
 	fflush(stdout);
 }
 
 static json_t *home_json(const struct stepper_job *job, const struct stepper_drive *drive,
 			 const struct edges *edges)
 {
-	double spread_mm = edges->high_mm - edges->low_mm;
+	long long spread = edges->highest - edges->lowest;
+	double spread_mm = edges->n > 1 ? (double)spread * drive->info.step_mm : NAN;
 	json_t *object = stepper_report(job, drive);
 
-	json_object_set(object, "edges_before_mm", edges->before_mm);
+	json_object_set_new(object, "edges_before_mm", edges->before_mm);
+	json_object_set_new(object, "edges_before_steps", edges->before_steps);
 	json_object_set_new(object, "edge_mm", json_number(edges->after_mm));
-	json_object_set_new(object, "spread_mm",
-			    edges->n > 1 ? json_number(spread_mm) : json_null());
+	json_object_set_new(object, "spread_mm", json_number(spread_mm));
+	json_object_set_new(object, "spread_steps",
+			    edges->n > 1 ? json_integer(spread) : json_null());
 	return object;
+}
+
+static void put_home(const struct edges *edges, const struct stepper_drive *drive)
+{
+	long long spread = edges->highest - edges->lowest;
+
+	if (edges->n > 1)
+		printf("%d times within %lld steps, %.4f mm\n", edges->n, spread,
+		       (double)spread * drive->info.step_mm);
+	printf("homed, at %.4f mm\n", drive->status.position_mm);
+	fflush(stdout);
+	json_decref(edges->before_mm);
+	json_decref(edges->before_steps);
 }
 
 void stepper_home(const struct stepper_job *job, struct stepper_drive *drive)
 {
-	struct edges edges = {.before_mm = json_array()};
+	struct edges edges = {.before_mm = json_array(), .before_steps = json_array()};
 	int times = job->repeat ? job->repeat : 1;
-	double spread_mm;
 
 	stepper_drive_power(drive);
 	for (int i = 0; i < times; i++) {
@@ -221,15 +243,9 @@ void stepper_home(const struct stepper_job *job, struct stepper_drive *drive)
 		find_edge(&edges, job, drive);
 	}
 	cli_progress_end();
-	spread_mm = edges.high_mm - edges.low_mm;
 	if (job->json)
 		stepper_put(home_json(job, drive, &edges), JSON_INDENT(2));
-	else if (times > 1)
-		printf("%d times within %.4f mm (%lld steps)\n", times, spread_mm,
-		       stepper_steps(&drive->info, spread_mm));
-	if (!job->json)
-		printf("homed, at %.4f mm\n", drive->status.position_mm);
-	fflush(stdout);
-	json_decref(edges.before_mm);
+	else
+		put_home(&edges, drive);
 	maybe_hold(job, drive);
 }
