@@ -71,13 +71,12 @@ int simulator_write(const char *file, const char *command, ...)
 	return simulator_write_bytes(file, text, strlen(text));
 }
 
-int64_t simulator_number(const char *file, const char *name)
+int64_t simulator_number_of(const char *file, const char *number, const char *name)
 {
-	char text[16384] = " ", key[64];
+	char text[16384] = "\n", key[64], *line, *end, *at;
 	int fd = simulator_open(file, O_RDONLY);
 	size_t size = 1;
 	ssize_t got;
-	char *at;
 
 	if (fd < 0)
 		return INT64_MIN;
@@ -85,12 +84,27 @@ int64_t simulator_number(const char *file, const char *name)
 		size += got;
 	close(fd);
 	text[size] = '\0';
-	for (char *c = text; *c; c++)
+	line = text;
+	if (number) {
+		snprintf(key, sizeof(key), "\nnumber=%s ", number);
+		line = strstr(text, key);
+		if (!line)
+			return INT64_MIN;
+		end = strchr(line + 1, '\n');
+		if (end)
+			*end = '\0';
+	}
+	for (char *c = line; *c; c++)
 		if (*c == '\n')
 			*c = ' ';
 	snprintf(key, sizeof(key), " %s=", name);
-	at = strstr(text, key);
+	at = strstr(line, key);
 	return at ? strtoll(at + strlen(key), NULL, 10) : INT64_MIN;
+}
+
+int64_t simulator_number(const char *file, const char *name)
+{
+	return simulator_number_of(file, NULL, name);
 }
 
 long simulator_edges(struct incise_sim_edge *edge, size_t max)
