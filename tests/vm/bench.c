@@ -18,8 +18,8 @@
 #define AT_ONCE 4096 /* edges that are read at a time */
 
 /*
- * How late a step may be against the profile, beyond a tick: what the timer was late in
- * virtual time at most (measured 10 us), and again for the edge before it.
+ * How late a step may be against the profile, beyond what a change of direction costs: what
+ * the timer was late in virtual time at most (measured 10 us), and again for the edge before.
  */
 #define LATE_NS 20000
 
@@ -221,9 +221,9 @@ int bench_configure(struct bench *bench, const struct incise_stepper_config *con
 		.velocity = config->velocity,
 		.acceleration = config->acceleration,
 		.tick_ns = config->tick_ns,
-		.lateness_ns = timed ? (int64_t)config->tick_ns + config->setup_ns +
-					       config->hold_ns + LATE_NS
-				     : -1,
+		.lateness_ns =
+			timed ? (int64_t)config->tick_ns + config->setup_ns + config->hold_ns + LATE_NS
+			      : -1,
 		.position_min = config->position_min,
 		.position_max = config->position_max,
 		.stop = {{true, bench_line(m, BENCH_MIN), false, -1, 0},
@@ -245,6 +245,22 @@ int bench_configure(struct bench *bench, const struct incise_stepper_config *con
 		edge_log_init(&bench->log[m], &motor, position, levels_now(m));
 	}
 	return 0;
+}
+
+int bench_carriage(const struct incise_stepper_config *config, int64_t position,
+		   const char *more)
+{
+	const unsigned int m = config->motor;
+
+	return simulator_write("carriage",
+			       "number=%u step=%u dir=%u enable=%u min=%u max=%u home=%u "
+			       "position=%lld inverted=enable%s %s",
+			       m, bench_line(m, BENCH_STEP), bench_line(m, BENCH_DIR),
+			       bench_line(m, BENCH_ENABLE), bench_line(m, BENCH_MIN),
+			       bench_line(m, BENCH_MAX), bench_line(m, BENCH_HOME),
+			       (long long)position,
+			       config->flags & INCISE_STEPPER_CONFIG_INVERT ? ",dir" : "",
+			       more);
 }
 
 void bench_want(struct bench *bench, unsigned int motor, unsigned int mode,

@@ -64,6 +64,13 @@ int bench_command(const struct bench *bench, unsigned long request, uint32_t mas
 int bench_configure(struct bench *bench, const struct incise_stepper_config *config,
 		    int64_t position);
 
+/*
+ * Mechanics behind a motor that stands at @position: with limits and home as @more says in
+ * the words of the file "carriage", or "".
+ */
+int bench_carriage(const struct incise_stepper_config *config, int64_t position,
+		   const char *more);
+
 void bench_want(struct bench *bench, unsigned int motor, unsigned int mode,
 		int64_t target);
 struct incise_stepper_status bench_look(const struct bench *bench, unsigned int motor);

@@ -250,6 +250,7 @@ static void edge_log_lead(struct edge_log *log)
 			       (long long)(log->t_ns - log->lead_ns), motor->velocity);
 	edge_log_stops(log, direction);
 
+	log->marked += log->t_ns > log->mark_ns;
 	log->lead_ns = log->t_ns;
 	log->position += direction;
 	if (direction > 0)

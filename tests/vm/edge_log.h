@@ -78,9 +78,11 @@ struct edge_log {
 	int64_t position;
 	uint64_t edges, up, down;
 	uint64_t faults[EDGE_LOG_FAULTS];
-	uint64_t faulty;     /* sum of faults */
-	char first[200];     /* the first, for a person */
-	uint64_t into_stop;  /* most steps that came after a stop's edge */
+	uint64_t faulty;    /* sum of faults */
+	char first[200];    /* the first, for a person */
+	uint64_t into_stop; /* most steps that came after a stop's edge */
+	int64_t mark_ns;    /* set by the caller: steps after it are counted */
+	uint64_t marked;
 	double acceleration; /* most that the steps show for sure, steps/s^2 */
 	/* State */
 	bool begun, step_on, dir_on, powered;

@@ -16,77 +16,12 @@
 #include <time.h>
 
 #include "../bench.h"
+#include "../draw.h"
 #include "../tap.h"
 
 #define MOTORS 2
-#define FASTEST 20000 /* steps/s in virtual time, if the self-test allows it */
 #define RETARGETS 40
 #define AFTER 5000000000 /* ns in which all must have come to an end */
-
-static uint64_t state;
-
-/* xorshift64*: S. Vigna, 'An experimental exploration of Marsaglia's xorshift generators'. */
-static uint64_t draw(void)
-{
-	state ^= state >> 12;
-	state ^= state << 25;
-	state ^= state >> 27;
-	return state * UINT64_C(2685821657736338717);
-}
-
-static int64_t between(int64_t from, int64_t to)
-{
-	return from + (int64_t)(draw() % (uint64_t)(to - from + 1));
-}
-
-/* As many of them small as large. */
-static double scattered(double from, double to)
-{
-	return from * pow(to / from, between(0, 1 << 20) / (double)(1 << 20));
-}
-
-static struct incise_stepper_config random_config(const struct bench *bench,
-						  unsigned int motor)
-{
-	const uint32_t pulse_ns = bench->info.pulse_ns;
-	struct incise_stepper_config config = {
-		.motor = motor,
-		.flags = between(0, 1) ? INCISE_STEPPER_CONFIG_INVERT : 0,
-		.tick_ns = scattered(50000, 1000000),
-		.late_max = 1000,
-		.deadman_ns = 1000000000,
-		.high_ns = pulse_ns + between(0, 5000),
-		.low_ns = pulse_ns + between(0, 5000),
-		.setup_ns = between(0, 30000),
-		.hold_ns = between(0, 30000),
-		.enable_ns = between(0, 2000000),
-	};
-	uint32_t most = bench->info.rate_max < FASTEST ? bench->info.rate_max : FASTEST;
-	uint32_t fits = 1000000000 / (config.high_ns + config.low_ns);
-
-	config.velocity = scattered(most / 8, most < fits ? most : fits);
-	/* From rest to full speed in 2 to 200 ms. */
-	config.acceleration = config.velocity / scattered(0.002, 0.2);
-	/* As much again to come to that acceleration, or at once. */
-	if (between(0, 1))
-		config.jerk = config.acceleration / scattered(0.001, 0.02);
-	config.position_min = -between(0, 5000);
-	config.position_max = between(0, 5000);
-	return config;
-}
-
-static int place_carriage(const struct incise_stepper_config *config, int64_t position)
-{
-	const unsigned int m = config->motor;
-
-	return simulator_write("carriage",
-			       "number=%u step=%u dir=%u enable=%u position=%" PRId64
-			       " inverted=enable%s",
-			       m, bench_line(m, BENCH_STEP), bench_line(m, BENCH_DIR),
-			       bench_line(m, BENCH_ENABLE), position,
-			       config->flags & INCISE_STEPPER_CONFIG_INVERT ? ",dir"
-									    : "");
-}
 
 static int64_t carriage_of(unsigned int motor)
 {
@@ -102,23 +37,24 @@ static void random_wish(struct bench *bench, unsigned int motor)
 	const struct incise_stepper_config *config = &bench->config[motor];
 	int64_t way = config->position_max - config->position_min;
 
-	switch (between(0, 5)) {
+	switch (draw_between(0, 5)) {
 	case 0: /* any velocity, a tenth beyond the limit */
 		bench_want(bench, motor, INCISE_STEPPER_MODE_VELOCITY,
-			   between(-(int64_t)config->velocity * 11 / 10,
-				   (int64_t)config->velocity * 11 / 10));
+			   draw_between(-(int64_t)config->velocity * 11 / 10,
+					(int64_t)config->velocity * 11 / 10));
 		break;
 	case 1: /* an end, or far beyond */
 		bench_want(bench, motor, INCISE_STEPPER_MODE_POSITION,
-			   between(0, 1) ? INT64_MIN : config->position_max + way);
+			   draw_between(0, 1) ? INT64_MIN : config->position_max + way);
 		break;
 	case 2: /* a step or two from here */
 		bench_want(bench, motor, INCISE_STEPPER_MODE_POSITION,
-			   bench_look(bench, motor).position + between(-2, 2));
+			   bench_look(bench, motor).position + draw_between(-2, 2));
 		break;
 	default:
 		bench_want(bench, motor, INCISE_STEPPER_MODE_POSITION,
-			   between(config->position_min - 10, config->position_max + 10));
+			   draw_between(config->position_min - 10,
+					config->position_max + 10));
 	}
 }
 
@@ -134,14 +70,14 @@ static bool session(struct bench *bench, uint32_t *retargets)
 	int ret;
 
 	for (unsigned int i = 0; i < MOTORS; i++) {
-		struct incise_stepper_config config = random_config(bench, i);
-		int64_t begin = between(config.position_min, config.position_max);
+		struct incise_stepper_config config = draw_config(bench, i);
+		int64_t begin = draw_between(config.position_min, config.position_max);
 
 		/* A jerk that this tick cannot hold is refused: then without. */
 		ret = bench_configure(bench, &config, begin);
 		config.jerk = ret == -34 ? 0 : config.jerk;
 		ret = ret == -34 ? bench_configure(bench, &config, begin) : ret;
-		if (ret || place_carriage(&config, begin)) {
+		if (ret || bench_carriage(&config, begin, "")) {
 			note("motor %u: its config is refused: %s", i, strerror(-ret));
 			return false;
 		}
@@ -152,16 +88,16 @@ static bool session(struct bench *bench, uint32_t *retargets)
 		return false;
 	}
 	for (int i = 0; i < RETARGETS; i++) {
-		random_wish(bench, between(0, MOTORS - 1));
+		random_wish(bench, draw_between(0, MOTORS - 1));
 		++*retargets;
-		bench_nap(scattered(20000, 50000000));
+		bench_nap(draw_scattered(20000, 50000000));
 		for (unsigned int m = 0; m < MOTORS && i % 8 == 7; m++)
 			random_wish(bench, m);
 	}
 	bench_judge(bench);
 	for (unsigned int i = 0; i < MOTORS; i++) {
-		target[i] = between(bench->config[i].position_min,
-				    bench->config[i].position_max);
+		target[i] = draw_between(bench->config[i].position_min,
+					 bench->config[i].position_max);
 		bench_want(bench, i, INCISE_STEPPER_MODE_POSITION, target[i]);
 	}
 	for (unsigned int i = 0; i < MOTORS; i++) {
@@ -203,7 +139,7 @@ int main(int argc, char **argv)
 	int64_t begin_ns;
 	int ret;
 
-	state = argc > 2 ? strtoull(argv[2], NULL, 0) : 1;
+	draw_seed(argc > 2 ? strtoull(argv[2], NULL, 0) : 1);
 	ret = bench_bind(&bench, MOTORS);
 	ret = ret ? ret : bench_open(&bench);
 	if (!check(!ret, "two motors are bound (%s)", strerror(-ret)))
