@@ -58,6 +58,11 @@ static inline void vm_flags_clear(struct vm_area_struct *vma, unsigned long flag
 }
 #endif
 
+/* Good for asking whether a device that was just added found its driver. */
+#ifndef HAVE_DEVICE_IS_BOUND
+#define device_is_bound(dev) (!!(dev)->driver)
+#endif
+
 #ifdef HAVE_PLATFORM_REMOVE_VOID
 #define COMPAT_PLATFORM_REMOVE(remove)
 #define compat_platform_remove(remove) remove

@@ -39,7 +39,7 @@ module_install: module ## install the module for that kernel, below $(DESTDIR)$(
 	$(depmod)
 
 module_uninstall: module_headers ## remove what module_install installed
-	rm -f $(addprefix $(module_installed)/incise_stepper.ko,'' .gz .xz .zst)
+	rm -f $(module_installed)/incise_stepper.ko*
 	$(depmod)
 
 # A source tree for dkms, which then builds the module for each kernel that is installed.
