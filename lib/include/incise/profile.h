@@ -21,8 +21,8 @@
  * that jerk is at most 2a/(NT) ≤ j; and as an average of positions is never beyond all of
  * them, the other limits and the end hold as they were (L. Biagiotti, C. Melchiorri, 'FIR
  * filters for online trajectory planning with time- and frequency-domain specifications',
- * Control Engineering Practice 20, 2012, §2-3; there N = a/(jT), as their motions start
- * from rest; ours may turn from +a to -a at once). It costs (N-1)/2 ticks of delay.
+ * Control Engineering Practice 20, 2012; there the filter for jerk takes a/j, for motions in
+ * which +a does not turn to -a at once, as it may here). It costs (N-1)/2 ticks of delay.
  *
  * What holds, whatever the targets are and whenever they come, with v, a, j, T of the limits
  * in steps and seconds, P(k) = incise_profile_slot.to of tick k and t(i) the time of the
