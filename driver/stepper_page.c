@@ -16,8 +16,10 @@
 #include <linux/math64.h>
 #else
 #include <errno.h>
-/* The same for a processor without a kernel. */
+/* The same for a processor without a kernel; a test has a READ_ONCE() of its own. */
+#ifndef READ_ONCE
 #define READ_ONCE(x) __atomic_load_n(&(x), __ATOMIC_RELAXED)
+#endif
 #define smp_rmb() __atomic_thread_fence(__ATOMIC_ACQUIRE)
 #define div_u64(a, b) ((a) / (b))
 #endif
