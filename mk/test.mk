@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# Tests. tests/unit/ROOM/NAME.c tests lib/ROOM/NAME.c; tests/cli runs the real programs.
+# Tests. tests/unit/ROOM/NAME.c tests lib/ROOM/NAME.c, tests/unit/driver what of driver/ builds
+# without a kernel; tests/cli runs the real programs.
 
 unit_sources := $(wildcard tests/unit/*/*.c)
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
