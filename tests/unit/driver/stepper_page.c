@@ -186,7 +186,11 @@ static void test_clamp(void **state)
 	}
 }
 
-static const struct incise_stepper_info machine = {.n_motors = 2, .rate_max = 100000};
+static const struct incise_stepper_info machine = {
+	.n_motors = 2,
+	.rate_max = 100000,
+	.pulse_ns = 600,
+};
 
 static const struct incise_stepper_config good = {
 	.motor = 1,
@@ -247,11 +251,14 @@ static void test_config(void **state)
 		{FIELD(deadman_ns), 10000000000, 0},
 		{FIELD(deadman_ns), 10000000001, -EINVAL},
 		{FIELD(deadman_ns), -1, -EINVAL},
-		{FIELD(high_ns), 500, 0},
+		{FIELD(high_ns), 600, 0}, /* what the self-test found */
+		{FIELD(high_ns), 599, -ERANGE},
 		{FIELD(high_ns), 499, -EINVAL},
 		{FIELD(high_ns), 45000, 0}, /* 50 µs are a step at 20000 steps/s */
 		{FIELD(high_ns), 45001, -ERANGE},
 		{FIELD(high_ns), 0xffffffff, -EINVAL},
+		{FIELD(low_ns), 600, 0},
+		{FIELD(low_ns), 599, -ERANGE},
 		{FIELD(low_ns), 499, -EINVAL},
 		{FIELD(low_ns), 45001, -ERANGE},
 		{FIELD(setup_ns), 1000000, 0},
@@ -275,13 +282,25 @@ static void test_config(void **state)
 	}
 }
 
+/* The profile's own limit holds where a machine could do more. */
+static void test_fast_machine(void **state)
+{
+	const struct incise_stepper_info fast = {.n_motors = 2, .rate_max = UINT32_MAX};
+	struct incise_stepper_config config = good;
+
+	config.high_ns = config.low_ns = 500;
+	config.velocity = INCISE_PROFILE_VELOCITY_MAX;
+	assert_int_equal(stepper_page_config(&config, &fast), 0);
+	config.velocity++;
+	assert_int_equal(stepper_page_config(&config, &fast), -ERANGE);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_any_merge),
-		cmocka_unit_test(test_answers),
-		cmocka_unit_test(test_clamp),
-		cmocka_unit_test(test_config),
+		cmocka_unit_test(test_any_merge),    cmocka_unit_test(test_answers),
+		cmocka_unit_test(test_clamp),	     cmocka_unit_test(test_config),
+		cmocka_unit_test(test_fast_machine),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
