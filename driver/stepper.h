@@ -104,8 +104,8 @@ struct stepper_motor {
 	u32 inputs;
 	u32 flags;
 	bool powered;
-	bool disabling;	   /* comes to rest to be disabled */
-	s64 position;	   /* sum of steps, and the origin */
+	bool disabling; /* comes to rest to be disabled */
+	s64 position;	/* sum of steps, and the origin */
 	s64 home_position;
 	u64 steps_up, steps_down, late, shifted_ns;
 

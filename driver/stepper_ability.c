@@ -51,8 +51,7 @@ static enum hrtimer_restart stepper_ability_fire(struct hrtimer *timer)
 {
 	struct stepper_trial *trial = container_of(timer, struct stepper_trial, timer);
 	struct stepper *stepper = trial->stepper;
-	struct gpio_desc *line =
-		stepper->motor[trial->n % stepper->n_motors].lines.step;
+	struct gpio_desc *line = stepper->motor[trial->n % stepper->n_motors].lines.step;
 	s64 due = ktime_to_ns(hrtimer_get_expires(timer));
 	s64 fired = ktime_get_ns(), written;
 
@@ -82,6 +81,7 @@ static void stepper_ability_round(struct stepper_trial *trial)
 	trial->n = 0;
 	hrtimer_start(&trial->timer, ktime_add_ns(ktime_get(), SHOT_NS),
 		      HRTIMER_MODE_ABS_PINNED_HARD);
+	/* Pairs with the release in the timer. */
 	while (smp_load_acquire(&trial->n) < SHOTS)
 		usleep_range(2000, 5000);
 	hrtimer_cancel(&trial->timer);

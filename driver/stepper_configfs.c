@@ -30,7 +30,7 @@ const char *const stepper_motor_wire_names[STEPPER_MOTOR_WIRES] = {
 /* A folder of a controller. */
 struct stepper_folder {
 	struct config_group group;
-	struct mutex mutex;
+	struct mutex mutex; /* all below */
 	struct stepper_wires wires;
 	struct config_item *motor[INCISE_STEPPER_MOTORS_MAX];
 	struct stepper_nodes *live;
@@ -122,33 +122,43 @@ static ssize_t stepper_wire_store(struct stepper_folder *folder,
 	return ret ? ret : (ssize_t)n;
 }
 
-#define STEPPER_MOTOR_LINE(_name, _wire)                                                   \
-	static ssize_t stepper_motor_##_name##_show(struct config_item *item, char *page)  \
-	{                                                                                  \
-		struct stepper_motor_folder *motor = to_motor_folder(item);                \
-                                                                                           \
-		return stepper_wire_show(motor->folder,                                    \
-					 &motor->folder->wires.motor[motor->motor][_wire], \
-					 page);                                            \
-	}                                                                                  \
-	static ssize_t stepper_motor_##_name##_store(struct config_item *item,             \
-						     const char *page, size_t n)           \
-	{                                                                                  \
-		struct stepper_motor_folder *motor = to_motor_folder(item);                \
-                                                                                           \
-		return stepper_wire_store(                                                 \
-			motor->folder, &motor->folder->wires.motor[motor->motor][_wire],   \
-			page, n);                                                          \
-	}                                                                                  \
+/* The folder of the controller that a motor's folder lies in, and its wires. */
+static struct stepper_folder *motor_folder_of(struct config_item *item)
+{
+	return to_motor_folder(item)->folder;
+}
+
+static struct stepper_wire *motor_wires(struct config_item *item)
+{
+	struct stepper_motor_folder *motor = to_motor_folder(item);
+
+	return motor->folder->wires.motor[motor->motor];
+}
+
+#define STEPPER_MOTOR_LINE(_name, _wire)                                            \
+	static ssize_t stepper_motor_##_name##_show(struct config_item *item,       \
+						    char *page)                     \
+	{                                                                           \
+		return stepper_wire_show(motor_folder_of(item),                     \
+					 motor_wires(item) + STEPPER_WIRE_##_wire,  \
+					 page);                                     \
+	}                                                                           \
+	static ssize_t stepper_motor_##_name##_store(struct config_item *item,      \
+						     const char *page, size_t n)    \
+	{                                                                           \
+		return stepper_wire_store(motor_folder_of(item),                    \
+					  motor_wires(item) + STEPPER_WIRE_##_wire, \
+					  page, n);                                 \
+	}                                                                           \
 	CONFIGFS_ATTR(stepper_motor_, _name)
 
-STEPPER_MOTOR_LINE(step, STEPPER_WIRE_STEP);
-STEPPER_MOTOR_LINE(dir, STEPPER_WIRE_DIR);
-STEPPER_MOTOR_LINE(enable, STEPPER_WIRE_ENABLE);
-STEPPER_MOTOR_LINE(limit_min, STEPPER_WIRE_LIMIT_MIN);
-STEPPER_MOTOR_LINE(limit_max, STEPPER_WIRE_LIMIT_MAX);
-STEPPER_MOTOR_LINE(home, STEPPER_WIRE_HOME);
-STEPPER_MOTOR_LINE(fault, STEPPER_WIRE_FAULT);
+STEPPER_MOTOR_LINE(step, STEP);
+STEPPER_MOTOR_LINE(dir, DIR);
+STEPPER_MOTOR_LINE(enable, ENABLE);
+STEPPER_MOTOR_LINE(limit_min, LIMIT_MIN);
+STEPPER_MOTOR_LINE(limit_max, LIMIT_MAX);
+STEPPER_MOTOR_LINE(home, HOME);
+STEPPER_MOTOR_LINE(fault, FAULT);
 
 static struct configfs_attribute *stepper_motor_attrs[] = {
 	&stepper_motor_attr_step,      &stepper_motor_attr_dir,
@@ -208,7 +218,8 @@ static struct config_group *stepper_motor_folder_make(struct config_group *group
 	return &motor->group;
 }
 
-static void stepper_motor_folder_drop(struct config_group *group, struct config_item *item)
+static void stepper_motor_folder_drop(struct config_group *group,
+				      struct config_item *item)
 {
 	struct stepper_folder *folder = to_folder(&group->cg_item);
 	struct stepper_motor_folder *motor = to_motor_folder(item);
@@ -253,7 +264,8 @@ static ssize_t stepper_folder_sync_store(struct config_item *item, const char *p
 {
 	struct stepper_folder *folder = to_folder(item);
 
-	return stepper_wire_store(folder, &folder->wires.wire[STEPPER_WIRE_SYNC], page, n);
+	return stepper_wire_store(folder, &folder->wires.wire[STEPPER_WIRE_SYNC], page,
+				  n);
 }
 CONFIGFS_ATTR(stepper_folder_, sync);
 
@@ -369,8 +381,9 @@ static ssize_t stepper_folder_live_store(struct config_item *item, const char *p
 CONFIGFS_ATTR(stepper_folder_, live);
 
 static struct configfs_attribute *stepper_folder_attrs[] = {
-	&stepper_folder_attr_estop, &stepper_folder_attr_sync, &stepper_folder_attr_dev_name,
-	&stepper_folder_attr_cdev,  &stepper_folder_attr_live, NULL,
+	&stepper_folder_attr_estop,    &stepper_folder_attr_sync,
+	&stepper_folder_attr_dev_name, &stepper_folder_attr_cdev,
+	&stepper_folder_attr_live,     NULL,
 };
 
 static void stepper_folder_release(struct config_item *item)

@@ -89,10 +89,10 @@ static int counters_show(struct seq_file *file, void *data)
 		shifted = motor->shifted_ns;
 		faults = motor->faults;
 		raw_spin_unlock_irqrestore(&motor->lock, flags);
-		seq_printf(file,
-			   "motor=%u edges=%llu steps_up=%llu steps_down=%llu late=%llu "
-			   "shifted_ns=%llu faults=%#x\n",
-			   i, edges, up, down, late, shifted, faults);
+		seq_printf(file, "motor=%u edges=%llu steps_up=%llu steps_down=%llu", i,
+			   edges, up, down);
+		seq_printf(file, " late=%llu shifted_ns=%llu faults=%#x\n", late, shifted,
+			   faults);
 	}
 	return 0;
 }

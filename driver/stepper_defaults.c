@@ -47,9 +47,9 @@ static void stepper_defaults_read(struct incise_stepper_config *c,
 	c->late_max = stepper_defaults_u32(node, "incise,late-max", 100);
 	c->position_min = stepper_defaults_s32(node, "incise,position-min", -far);
 	c->position_max = stepper_defaults_s32(node, "incise,position-max", far);
-	c->safe_position = clamp(
-		(s64)stepper_defaults_s32(node, "incise,safe-position", 0),
-		c->position_min, max(c->position_min, c->position_max));
+	c->safe_position =
+		clamp((s64)stepper_defaults_s32(node, "incise,safe-position", 0),
+		      c->position_min, max(c->position_min, c->position_max));
 	c->deadman_ns = stepper_defaults_u64(node, "incise,deadman-ns", 100000000);
 	c->high_ns = stepper_defaults_u32(node, "incise,high-ns", 5000);
 	c->low_ns = stepper_defaults_u32(node, "incise,low-ns", 5000);
@@ -75,7 +75,8 @@ static void stepper_defaults_fit(struct stepper_motor *motor,
 	velocity = min_t(u64, info->rate_max,
 			 div_u64(NSEC_PER_SEC, max(c->high_ns + c->low_ns, 1U)));
 	if (c->velocity > velocity) {
-		dev_warn(dev, "motor %u: %u steps/s are more than this machine holds: %u\n",
+		dev_warn(dev,
+			 "motor %u: %u steps/s are more than this machine holds: %u\n",
 			 motor->index, c->velocity, velocity);
 		c->velocity = velocity;
 	}
@@ -100,9 +101,7 @@ int stepper_defaults(struct stepper *stepper, struct device *dev)
 			ret = stepper_setup_config(&stepper->motor[i], &config);
 		if (ret)
 			return dev_err_probe(dev, ret,
-					     "motor %u: its incise,… properties are out of "
-					     "range; see incise,stepper-gpio.yaml\n",
-					     i);
+					     "motor %u: a property is out of range\n", i);
 	}
 	return 0;
 }

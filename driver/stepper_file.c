@@ -231,7 +231,8 @@ static long stepper_file_ioctl(struct file *file, unsigned int command, unsigned
 	if (!opened->owner && !stepper_file_watchers(command))
 		return -EPERM;
 	memset(&arg, 0, sizeof(arg));
-	if (_IOC_DIR(command) & _IOC_WRITE && copy_from_user(&arg, user, _IOC_SIZE(command)))
+	if (_IOC_DIR(command) & _IOC_WRITE &&
+	    copy_from_user(&arg, user, _IOC_SIZE(command)))
 		return -EFAULT;
 
 	mutex_lock(&stepper->mutex);

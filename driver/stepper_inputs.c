@@ -5,7 +5,7 @@
  * e-stop just before each step as well, so that a lost interrupt costs one step at most.
  *
  *   e-stop, driver   a motor with power halts
- *   limit            it halts if it moves towards it; away from it it may
+ *   limit            it halts if it moves towards it; away from there it may move
  *   home             the position at its leading edge is kept
  *
  * All under motor->lock.
@@ -20,8 +20,7 @@ static bool stepper_inputs_towards(const struct stepper_motor *motor,
 	int direction = limit == STEPPER_LIMIT_MAX ? 1 : -1;
 
 	return motor->powered && motor->slot.dir == direction &&
-	       (motor->given < motor->slot.n ||
-		!incise_profile_resting(&motor->profile));
+	       (motor->given < motor->slot.n || !incise_profile_resting(&motor->profile));
 }
 
 static void stepper_inputs_act(struct stepper_motor *motor, enum stepper_input input,

@@ -55,10 +55,9 @@ static struct gpio_desc *stepper_lines_one(struct device *dev, struct fwnode_han
 		return line;
 	}
 	if (gpiod_cansleep(line))
-		return ERR_PTR(dev_err_probe(dev, -EOPNOTSUPP,
-					     "line %s: its chip may sleep, which a timer's "
-					     "interrupt may not; use a memory-mapped one\n",
-					     key));
+		return ERR_PTR(dev_err_probe(
+			dev, -EOPNOTSUPP,
+			"line %s: its chip may sleep, an interrupt may not\n", key));
 	return line;
 }
 
@@ -150,7 +149,8 @@ static irqreturn_t stepper_lines_interrupt(int irq, void *data)
 
 /* A chip without interrupts is served by the looks at each tick and step. */
 static int stepper_lines_request(struct stepper *stepper, struct stepper_irq *irq,
-				 struct gpio_desc *line, int motor, enum stepper_input input)
+				 struct gpio_desc *line, int motor,
+				 enum stepper_input input)
 {
 	int number, ret;
 
@@ -188,9 +188,10 @@ int stepper_lines_listen(struct stepper *stepper)
 
 		for (input = 0; !ret && input < STEPPER_INPUTS; input++)
 			if (input != STEPPER_ESTOP)
-				ret = stepper_lines_request(
-					stepper, &motor->lines.irq[input],
-					motor->lines.input[input], i, input);
+				ret = stepper_lines_request(stepper,
+							    &motor->lines.irq[input],
+							    motor->lines.input[input], i,
+							    input);
 		raw_spin_lock_irqsave(&motor->lock, flags);
 		stepper_inputs_sample(motor, ktime_get_ns());
 		stepper_status_publish(motor, ktime_get_ns());

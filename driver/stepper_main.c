@@ -60,7 +60,10 @@ static int stepper_main_reboot(struct notifier_block *block, unsigned long actio
 	return NOTIFY_DONE;
 }
 
-/* The other processors have been stopped, maybe while they held a lock. */
+/*
+ * The other processors have been stopped, maybe while they held a motor's lock: so there is
+ * none taken here. Only a chip whose own lock was held then could stand in the way.
+ */
 static int stepper_main_panic(struct notifier_block *block, unsigned long action,
 			      void *data)
 {
@@ -68,13 +71,9 @@ static int stepper_main_panic(struct notifier_block *block, unsigned long action
 	unsigned int i;
 
 	for (i = 0; i < stepper->n_motors; i++) {
-		struct stepper_motor *motor = &stepper->motor[i];
-
-		compat_gpiod_set_value(motor->lines.enable, 0);
-		if (raw_spin_trylock(&motor->lock)) {
-			motor->powered = false;
-			raw_spin_unlock(&motor->lock);
-		}
+		/* Should a timer fire once more, it finds nothing to do. */
+		WRITE_ONCE(stepper->motor[i].powered, false);
+		compat_gpiod_set_value(stepper->motor[i].lines.enable, 0);
 	}
 	return NOTIFY_DONE;
 }
@@ -138,7 +137,8 @@ static int stepper_main_probe(struct platform_device *pdev)
 		goto ignore;
 	stepper_debugfs_add(stepper);
 	platform_set_drvdata(pdev, stepper);
-	dev_info(dev, "%s: %u motors, at most %u steps/s; timers late by %u ns, %u at most\n",
+	dev_info(dev,
+		 "%s: %u motors, at most %u steps/s; timers late by %u ns, %u at most\n",
 		 dev_name(&stepper->dev), stepper->n_motors, stepper->info.rate_max,
 		 stepper->info.lateness_ns, stepper->info.lateness_max_ns);
 	return 0;
@@ -172,6 +172,7 @@ static void stepper_main_remove(struct platform_device *pdev)
 	irq_work_sync(&stepper->wake);
 	put_device(&stepper->dev);
 }
+
 COMPAT_PLATFORM_REMOVE(stepper_main_remove)
 
 static void stepper_main_shutdown(struct platform_device *pdev)
@@ -195,15 +196,11 @@ static int stepper_main_suspend(struct device *dev)
 static DEFINE_SIMPLE_DEV_PM_OPS(stepper_main_pm, stepper_main_suspend, NULL);
 
 static const struct of_device_id stepper_main_of[] = {
-	{ .compatible = "incise,stepper-gpio" },
-	{}
-};
+	{.compatible = "incise,stepper-gpio"}, {}};
 MODULE_DEVICE_TABLE(of, stepper_main_of);
 
-static const struct platform_device_id stepper_main_ids[] = {
-	{ .name = "incise-stepper" },
-	{}
-};
+static const struct platform_device_id stepper_main_ids[] = {{.name = "incise-stepper"},
+							     {}};
 MODULE_DEVICE_TABLE(platform, stepper_main_ids);
 
 static struct platform_driver stepper_main_driver = {
@@ -211,13 +208,11 @@ static struct platform_driver stepper_main_driver = {
 	.remove = compat_platform_remove(stepper_main_remove),
 	.shutdown = stepper_main_shutdown,
 	.id_table = stepper_main_ids,
-	.driver = {
-		.name = "incise-stepper",
-		.of_match_table = stepper_main_of,
-		.pm = pm_sleep_ptr(&stepper_main_pm),
-		/* configfs waits for it; and one that measures shall not race another. */
-		.probe_type = PROBE_FORCE_SYNCHRONOUS,
-	},
+	.driver.name = "incise-stepper",
+	.driver.of_match_table = stepper_main_of,
+	.driver.pm = pm_sleep_ptr(&stepper_main_pm),
+	/* configfs waits for it; and who measures shall not race another. */
+	.driver.probe_type = PROBE_FORCE_SYNCHRONOUS,
 };
 
 static int __init stepper_main_init(void)

@@ -115,8 +115,8 @@ static void stepper_motor_lead(struct stepper_motor *motor, s64 now, s64 due, s6
 		motor->steps_up++;
 	else
 		motor->steps_down++;
-	motor->lead_ns = stepper_motor_write(motor, STEPPER_STEP, motor->lines.step, true,
-					     due);
+	motor->lead_ns =
+		stepper_motor_write(motor, STEPPER_STEP, motor->lines.step, true, due);
 	motor->lead_due_ns = want;
 
 	lag = motor->lead_ns - want;
@@ -131,8 +131,8 @@ static void stepper_motor_lead(struct stepper_motor *motor, s64 now, s64 due, s6
 static void stepper_motor_trail(struct stepper_motor *motor, s64 now, s64 due)
 {
 	motor->high = false;
-	motor->trail_ns = stepper_motor_write(motor, STEPPER_STEP, motor->lines.step,
-					      false, due);
+	motor->trail_ns =
+		stepper_motor_write(motor, STEPPER_STEP, motor->lines.step, false, due);
 	if (motor->powered)
 		stepper_motor_late(motor, now - due, motor->config.high_ns,
 				   motor->trail_ns);
@@ -213,9 +213,10 @@ static void stepper_motor_tick(struct stepper_motor *motor, s64 now, s64 due)
 	motor->given = 0;
 	resting = incise_profile_resting(&motor->profile);
 	if (!motor->disabling)
-		stepper_status_state(
-			motor, resting ? INCISE_STEPPER_STATE_READY : INCISE_STEPPER_STATE_MOVING,
-			now);
+		stepper_status_state(motor,
+				     resting ? INCISE_STEPPER_STATE_READY
+					     : INCISE_STEPPER_STATE_MOVING,
+				     now);
 	stepper_status_publish(motor, now);
 }
 
@@ -267,8 +268,7 @@ void stepper_motor_start(struct stepper_motor *motor)
 {
 	s64 due, want;
 
-	if (motor->timing ||
-	    stepper_motor_plan(motor, &due, &want) == STEPPER_NEXT_NONE)
+	if (motor->timing || stepper_motor_plan(motor, &due, &want) == STEPPER_NEXT_NONE)
 		return;
 	motor->timing = true;
 	hrtimer_start(&motor->timer, ns_to_ktime(due), HRTIMER_MODE_ABS_PINNED_HARD);

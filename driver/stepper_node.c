@@ -13,25 +13,28 @@
 /* A motor's node, to be put; NULL: it has none. */
 struct fwnode_handle *stepper_node_motor(struct device *dev, unsigned int motor)
 {
-	struct fwnode_handle *node;
+	struct fwnode_handle *node = NULL;
 	u32 reg;
 
-	device_for_each_child_node(dev, node)
-		if (!fwnode_property_read_u32(node, "reg", &reg) && reg == motor)
-			return node;
-	return NULL;
+	do {
+		node = device_get_next_child_node(dev, node);
+	} while (node && (fwnode_property_read_u32(node, "reg", &reg) || reg != motor));
+	return node;
 }
 
 /* How many motors there are, 0 … N-1 without a gap; errors are told. */
 int stepper_node_count(struct device *dev)
 {
-	struct fwnode_handle *node;
+	struct fwnode_handle *node = NULL;
 	unsigned long seen = 0;
 	u32 n = 0, reg;
 
-	device_for_each_child_node(dev, node) {
+	for (;;) {
+		node = device_get_next_child_node(dev, node);
+		if (!node)
+			break;
 		if (fwnode_property_read_u32(node, "reg", &reg))
-			continue;
+			continue; /* not a motor's */
 		if (reg >= INCISE_STEPPER_MOTORS_MAX || seen & BIT(reg)) {
 			fwnode_handle_put(node);
 			return dev_err_probe(dev, -EINVAL,

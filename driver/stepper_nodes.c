@@ -79,19 +79,19 @@ static unsigned int stepper_nodes_line(struct stepper_nodes *nodes,
 		return 0;
 	nodes->n_lines++;
 #ifdef HAVE_GPIO_SOFTWARE_NODES
+	const struct software_node *chip;
+
 	snprintf(key, sizeof(nodes->key[n]), "%s-gpios", name);
-	nodes->ref[n] = SOFTWARE_NODE_REFERENCE(stepper_nodes_chip(nodes, wire->label),
-						wire->offset, flags);
-	*property = (struct property_entry)PROPERTY_ENTRY_REF_ARRAY_LEN(
-		key, &nodes->ref[n], 1);
+	chip = stepper_nodes_chip(nodes, wire->label);
+	nodes->ref[n] = SOFTWARE_NODE_REFERENCE(chip, wire->offset, flags);
+	*property = PROPERTY_ENTRY_REF_ARRAY_LEN(key, &nodes->ref[n], 1);
 	return 1;
 #else
 	if (motor < 0)
 		snprintf(key, sizeof(nodes->key[n]), "%s", name);
 	else
 		snprintf(key, sizeof(nodes->key[n]), "motor%d-%s", motor, name);
-	nodes->table->table[n] =
-		GPIO_LOOKUP(wire->label, wire->offset, key, flags);
+	nodes->table->table[n] = GPIO_LOOKUP(wire->label, wire->offset, key, flags);
 	return 0;
 #endif
 }
@@ -161,7 +161,8 @@ struct stepper_nodes *stepper_nodes_make(const struct stepper_wires *wires)
 	nodes = kzalloc(sizeof(*nodes), GFP_KERNEL);
 	if (!nodes)
 		return ERR_PTR(ret);
-	nodes->table = kzalloc(struct_size(nodes->table, table, LINES_MAX + 1), GFP_KERNEL);
+	nodes->table =
+		kzalloc(struct_size(nodes->table, table, LINES_MAX + 1), GFP_KERNEL);
 	if (!nodes->table)
 		goto free;
 	ret = ida_alloc(&stepper_nodes_ids, GFP_KERNEL);

@@ -12,15 +12,17 @@
 #ifdef __KERNEL__
 #include <asm/barrier.h>
 #include <linux/compiler.h>
+#include <linux/kernel.h>
 #include <linux/errno.h>
 #include <linux/math64.h>
 #else
 #include <errno.h>
-/* The same for a processor without a kernel; a test has a READ_ONCE() of its own. */
+/* What the same words mean in a program; a test has a READ_ONCE() of its own. */
+#define ARRAY_SIZE(array) (sizeof(array) / sizeof((array)[0]))
 #ifndef READ_ONCE
 #define READ_ONCE(x) __atomic_load_n(&(x), __ATOMIC_RELAXED)
 #endif
-#define smp_rmb() __atomic_thread_fence(__ATOMIC_ACQUIRE)
+#define smp_rmb() __atomic_thread_fence(__ATOMIC_ACQUIRE) /* loads before loads */
 #define div_u64(a, b) ((a) / (b))
 #endif
 
@@ -62,7 +64,7 @@ enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint 
 	wish->seq = seq;
 	if (copy.setpoint.mode > INCISE_STEPPER_MODE_VELOCITY || copy.setpoint.reserved0)
 		return STEPPER_PAGE_GARBAGE;
-	for (i = 0; i < sizeof(copy.setpoint.reserved) / sizeof(__u64); i++)
+	for (i = 0; i < ARRAY_SIZE(copy.setpoint.reserved); i++)
 		if (copy.setpoint.reserved[i])
 			return STEPPER_PAGE_GARBAGE;
 	wish->mode = copy.setpoint.mode;
@@ -112,7 +114,7 @@ int stepper_page_config(const struct incise_stepper_config *config,
 	const __s64 most = INCISE_PROFILE_POSITION_MAX;
 	unsigned int i;
 
-	for (i = 0; i < sizeof(config->reserved) / sizeof(config->reserved[0]); i++)
+	for (i = 0; i < ARRAY_SIZE(config->reserved); i++)
 		if (config->reserved[i])
 			return -EINVAL;
 	if (config->motor >= info->n_motors || config->flags & ~flags ||

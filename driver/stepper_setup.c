@@ -14,8 +14,8 @@
 #include "stepper.h"
 #include "trace.h"
 
-static struct incise_profile_limits
-stepper_setup_limits(const struct incise_stepper_config *config)
+static struct incise_profile_limits stepper_setup_limits(
+	const struct incise_stepper_config *config)
 {
 	return (struct incise_profile_limits){
 		.tick_ns = config->tick_ns,
@@ -85,8 +85,8 @@ int stepper_setup_enable(struct stepper_motor *motor)
 	now = ktime_get_ns();
 	if (ret < 0)
 		goto unlock;
-	trace_incise_stepper_edge(motor->stepper->id, motor->index, STEPPER_ENABLE, 1, now,
-				  now);
+	trace_incise_stepper_edge(motor->stepper->id, motor->index, STEPPER_ENABLE, 1,
+				  now, now);
 
 	motor->powered = true;
 	motor->disabling = false;
@@ -208,9 +208,8 @@ int stepper_setup_position(struct stepper_motor *motor,
 	if (origin->position < motor->config.position_min ||
 	    origin->position > motor->config.position_max) {
 		ret = -EINVAL;
-	} else if (motor->powered &&
-		   (motor->disabling || motor->given < motor->slot.n ||
-		    !incise_profile_resting(&motor->profile))) {
+	} else if (motor->powered && (motor->disabling || motor->given < motor->slot.n ||
+				      !incise_profile_resting(&motor->profile))) {
 		ret = -EBUSY;
 	} else {
 		motor->home_position += origin->position - motor->position;

@@ -17,9 +17,9 @@
 #include "stepper.h"
 #include "trace.h"
 
-#define AT_ONCE                                                              \
-	(INCISE_STEPPER_FAULT_LIMIT_MIN | INCISE_STEPPER_FAULT_LIMIT_MAX |   \
-	 INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_DRIVER |          \
+#define AT_ONCE                                                            \
+	(INCISE_STEPPER_FAULT_LIMIT_MIN | INCISE_STEPPER_FAULT_LIMIT_MAX | \
+	 INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_DRIVER |        \
 	 INCISE_STEPPER_FAULT_LATE | INCISE_STEPPER_FAULT_LINE)
 #define RETRACT (INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER)
 
@@ -29,8 +29,8 @@ void stepper_stop_off(struct stepper_motor *motor, s64 now)
 	motor->powered = false;
 	motor->disabling = false;
 	compat_gpiod_set_value(motor->lines.enable, 0);
-	trace_incise_stepper_edge(motor->stepper->id, motor->index, STEPPER_ENABLE, 0, now,
-				  now);
+	trace_incise_stepper_edge(motor->stepper->id, motor->index, STEPPER_ENABLE, 0,
+				  now, now);
 	stepper_status_state(motor,
 			     motor->faults ? INCISE_STEPPER_STATE_FAULT
 					   : INCISE_STEPPER_STATE_DISABLED,

@@ -73,7 +73,8 @@ static enum hrtimer_restart stepper_sync_fire(struct hrtimer *timer)
 		else
 			stepper_sync_lead(stepper, ktime_get_ns());
 		/* The width counts from the actual edge. */
-		due = line->high ? line->sync.last_ns + line->sync.width_ns : line->due_ns;
+		due = line->high ? line->sync.last_ns + line->sync.width_ns
+				 : line->due_ns;
 		hrtimer_set_expires(timer, ns_to_ktime(due));
 		restart = HRTIMER_RESTART;
 	}

@@ -19,11 +19,7 @@ struct stepper_wire {
 	bool active_low;
 };
 
-enum {
-	STEPPER_WIRE_ESTOP,
-	STEPPER_WIRE_SYNC,
-	STEPPER_WIRES
-};
+enum { STEPPER_WIRE_ESTOP, STEPPER_WIRE_SYNC, STEPPER_WIRES };
 
 enum {
 	STEPPER_WIRE_STEP,

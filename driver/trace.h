@@ -12,54 +12,58 @@
 
 #include <linux/tracepoint.h>
 
+/* No C that clang-format knows. */
+/* clang-format off */
 TRACE_EVENT(incise_stepper_edge,
-	TP_PROTO(int controller, unsigned int motor, unsigned int line, bool value,
-		 s64 due_ns, s64 actual_ns),
-	TP_ARGS(controller, motor, line, value, due_ns, actual_ns),
-	TP_STRUCT__entry(
-		__field(s64, due_ns)
-		__field(s64, actual_ns)
-		__field(int, controller)
-		__field(u8, motor)
-		__field(u8, line)
-		__field(u8, value)
-	),
-	TP_fast_assign(
-		__entry->due_ns = due_ns;
-		__entry->actual_ns = actual_ns;
-		__entry->controller = controller;
-		__entry->motor = motor;
-		__entry->line = line;
-		__entry->value = value;
-	),
-	TP_printk("controller=%d motor=%u line=%s value=%u due_ns=%lld actual_ns=%lld",
-		  __entry->controller, __entry->motor,
-		  __print_symbolic(__entry->line, {5, "enable"}, {6, "dir"}, {7, "step"},
-				   {8, "sync"}),
-		  __entry->value, __entry->due_ns, __entry->actual_ns)
+	    TP_PROTO(int controller, unsigned int motor, unsigned int line, bool value,
+		     s64 due_ns, s64 actual_ns),
+	    TP_ARGS(controller, motor, line, value, due_ns, actual_ns),
+	    TP_STRUCT__entry(
+		    __field(s64, due_ns)
+		    __field(s64, actual_ns)
+		    __field(int, controller)
+		    __field(u8, motor)
+		    __field(u8, line)
+		    __field(u8, value)
+	    ),
+	    TP_fast_assign(
+		    __entry->due_ns = due_ns;
+		    __entry->actual_ns = actual_ns;
+		    __entry->controller = controller;
+		    __entry->motor = motor;
+		    __entry->line = line;
+		    __entry->value = value;
+	    ),
+	    TP_printk("controller=%d motor=%u line=%s value=%u due_ns=%lld actual_ns=%lld",
+		      __entry->controller, __entry->motor,
+		      __print_symbolic(__entry->line, {5, "enable"}, {6, "dir"}, {7, "step"},
+				       {8, "sync"}),
+		      __entry->value, __entry->due_ns, __entry->actual_ns)
 );
 
 TRACE_EVENT(incise_stepper_fault,
-	TP_PROTO(int controller, unsigned int motor, u32 faults, s64 position, s64 t_ns),
-	TP_ARGS(controller, motor, faults, position, t_ns),
-	TP_STRUCT__entry(
-		__field(s64, position)
-		__field(s64, t_ns)
-		__field(int, controller)
-		__field(u32, faults)
-		__field(u8, motor)
-	),
-	TP_fast_assign(
-		__entry->position = position;
-		__entry->t_ns = t_ns;
-		__entry->controller = controller;
-		__entry->faults = faults;
-		__entry->motor = motor;
-	),
-	TP_printk("controller=%d motor=%u faults=%#x position=%lld t_ns=%lld",
-		  __entry->controller, __entry->motor, __entry->faults,
-		  __entry->position, __entry->t_ns)
+	    TP_PROTO(int controller, unsigned int motor, u32 faults, s64 position, s64 t_ns),
+	    TP_ARGS(controller, motor, faults, position, t_ns),
+	    TP_STRUCT__entry(
+		    __field(s64, position)
+		    __field(s64, t_ns)
+		    __field(int, controller)
+		    __field(u32, faults)
+		    __field(u8, motor)
+	    ),
+	    TP_fast_assign(
+		    __entry->position = position;
+		    __entry->t_ns = t_ns;
+		    __entry->controller = controller;
+		    __entry->faults = faults;
+		    __entry->motor = motor;
+	    ),
+	    TP_printk("controller=%d motor=%u faults=%#x position=%lld t_ns=%lld",
+		      __entry->controller, __entry->motor, __entry->faults,
+		      __entry->position, __entry->t_ns)
 );
+
+/* clang-format on */
 
 #endif
 
