@@ -99,6 +99,7 @@ struct stepper_motor {
 
 	struct incise_stepper_config config;
 	s64 interval_ns; /* of steps at config.velocity, rounded up */
+	s64 lag_ns;	 /* what is caught up, not put off */
 	u32 state;
 	u32 faults;
 	u32 inputs;

@@ -13,9 +13,10 @@
  * Due times come from the profile's time line, never from now: lateness does not
  * add up. But high, low, set-up, hold and the interval at the largest velocity
  * count from the actual times of edges, taken after the write, when the line has
- * changed for sure. So a late edge shortens nothing. What was lost is caught up
- * by going at most 1/7 faster than the profile asks (CATCH_UP), and where it is
- * more than a tick the time line is put off: there is never a burst.
+ * changed for sure. So a late edge shortens nothing. What a timer mostly is late by
+ * (lag_ns) is caught up, at most 1/7 faster than the profile asks (CATCH_UP); where
+ * it is more, the time line is put off. There is never a burst, and no acceleration
+ * that the profile does not know of.
  */
 #include <linux/delay.h>
 #include <linux/hrtimer.h>
@@ -120,7 +121,7 @@ static void stepper_motor_lead(struct stepper_motor *motor, s64 now, s64 due, s6
 	motor->lead_due_ns = want;
 
 	lag = motor->lead_ns - want;
-	if (lag > motor->config.tick_ns) {
+	if (lag > motor->lag_ns) {
 		motor->base_ns += lag;
 		motor->lead_due_ns += lag;
 		motor->shifted_ns += lag;

@@ -8,6 +8,7 @@
  *       └──(clear)── FAULT
  */
 #include <linux/ktime.h>
+#include <linux/minmax.h>
 #include <linux/math64.h>
 
 #include "compat.h"
@@ -178,6 +179,9 @@ int stepper_setup_config(struct stepper_motor *motor,
 		motor->config = *config;
 		motor->interval_ns =
 			div_u64(NSEC_PER_SEC + config->velocity - 1, config->velocity);
+		/* Timers are late by so much anyway, and an eighth of a step is not felt. */
+		motor->lag_ns = max(motor->interval_ns >> 3,
+				    (s64)motor->stepper->info.lateness_ns);
 		incise_profile_halt(&motor->profile, motor->position);
 		stepper_status_publish(motor, ktime_get_ns());
 	}
