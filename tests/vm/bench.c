@@ -98,9 +98,19 @@ static int wire_motor(unsigned int motor)
 	return ret;
 }
 
-int bench_bind(struct bench *bench, unsigned int n_motors)
+int bench_name(struct bench *bench)
 {
 	char text[64];
+	int ret = get("cdev", text, sizeof(text));
+
+	if (ret)
+		return ret;
+	snprintf(bench->cdev, sizeof(bench->cdev), "/dev/%.50s", text);
+	return get("dev_name", bench->dev_name, sizeof(bench->dev_name));
+}
+
+int bench_bind(struct bench *bench, unsigned int n_motors)
+{
 	int ret = 0;
 
 	memset(bench, 0, sizeof(*bench));
@@ -118,11 +128,7 @@ int bench_bind(struct bench *bench, unsigned int n_motors)
 	ret = ret ? ret : wire("estop", BENCH_ESTOP, true);
 	ret = ret ? ret : wire("sync", BENCH_SYNC, false);
 	ret = ret ? ret : put("live", "1");
-	ret = ret ? ret : get("cdev", text, sizeof(text));
-	if (ret)
-		return ret;
-	snprintf(bench->cdev, sizeof(bench->cdev), "/dev/%.50s", text);
-	ret = get("dev_name", bench->dev_name, sizeof(bench->dev_name));
+	ret = ret ? ret : bench_name(bench);
 	/* What binding did to the lines is not a motion. */
 	simulator_write("edges", "reset");
 	return ret;
@@ -221,9 +227,9 @@ int bench_configure(struct bench *bench, const struct incise_stepper_config *con
 		.velocity = config->velocity,
 		.acceleration = config->acceleration,
 		.tick_ns = config->tick_ns,
-		.lateness_ns =
-			timed ? (int64_t)config->tick_ns + config->setup_ns + config->hold_ns + LATE_NS
-			      : -1,
+		.lateness_ns = timed ? (int64_t)config->tick_ns + config->setup_ns +
+					       config->hold_ns + LATE_NS
+				     : -1,
 		.position_min = config->position_min,
 		.position_max = config->position_max,
 		.stop = {{true, bench_line(m, BENCH_MIN), false, -1, 0},

@@ -54,6 +54,9 @@ struct bench {
 int bench_bind(struct bench *bench, unsigned int n_motors);
 int bench_unbind(struct bench *bench);
 
+/* Asks again for the names of the node and the device: they may be others after a bind. */
+int bench_name(struct bench *bench);
+
 /* As owner, with both pages. Closing takes care of a bench that is not open. */
 int bench_open(struct bench *bench);
 void bench_close(struct bench *bench);
