@@ -341,7 +341,7 @@ bool bench_until(struct bench *bench, unsigned int motor, uint32_t states,
 	/* Two looks, with a tick between: the first may be of before the last set-point. */
 	for (int seen = 0; seen < 2;) {
 		bench_want(bench, motor, mode, target);
-		bench_nap(bench->config[motor].tick_ns + 100000);
+		bench_nap(bench->config[motor].tick_ns + 500000);
 		seen = states & 1U << bench_look(bench, motor).state ? seen + 1 : 0;
 		if (bench_now_ns() > end)
 			return false;

@@ -52,13 +52,14 @@ struct incise_stepper_config draw_config(const struct bench *bench, unsigned int
 	uint32_t most = bench->info.rate_max < FASTEST ? bench->info.rate_max : FASTEST;
 	uint32_t fits = 1000000000 / (config.high_ns + config.low_ns);
 
-	config.velocity = draw_scattered(most / 8, most < fits ? most : fits);
+	config.velocity = draw_scattered(most / 4, most < fits ? most : fits);
 	/* From rest to full speed in 2 to 200 ms. */
 	config.acceleration = config.velocity / draw_scattered(0.002, 0.2);
 	/* As much again to come to that acceleration, or at once. */
 	if (draw_between(0, 1))
 		config.jerk = config.acceleration / draw_scattered(0.001, 0.02);
-	config.position_min = -draw_between(0, 5000);
-	config.position_max = draw_between(0, 5000);
+	/* What half a second is enough for. */
+	config.position_min = -draw_between(0, config.velocity / 2);
+	config.position_max = draw_between(0, config.velocity / 2);
 	return config;
 }

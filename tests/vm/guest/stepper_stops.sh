@@ -10,7 +10,7 @@ modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs 2>/dev
 check "the simulated chip loads" insmod "$module" || exit 0
 check "the module loads" insmod "$stepper" || exit 0
 rounds=40
-[ "$INCISE_VM_PROFILE" = deterministic ] || rounds=8
+[ "$INCISE_VM_PROFILE" = deterministic ] || rounds=4
 "$INCISE_BUILD/tests/vm/stepper_stops" $rounds "${INCISE_VM_SEED:-1}"
 check "the module goes" rmmod incise_stepper
 check "the chip goes" rmmod incise_sim
