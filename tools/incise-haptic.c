@@ -313,6 +313,27 @@ static void report_text(const struct incise_loop_stats *s, const struct incise_p
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
 }
 
+static int home(struct incise_stepper *stepper, struct incise_error *err)
+{
+	int rc = incise_stepper_enable(stepper, err);
+
+	if (!rc)
+		rc = incise_stepper_home(stepper, &cli_stop, err);
+	return rc ? rc : incise_stepper_disable(stepper, err);
+}
+
+/*
+ * Poses that came while one was busy are old. To take them in the first tick would keep the
+ * actuator waiting, longer than its deadman does.
+ */
+static void drop_poses(struct incise_tracker *tracker)
+{
+	struct incise_tracker_sample samples[64];
+
+	while (incise_tracker_read(tracker, samples, 64) == 64)
+		continue;
+}
+
 /*
  * Power the actuator. Without its 0 a target is no position: that of a real machine must
  * be found, where it has a switch for that.
@@ -336,9 +357,17 @@ static void take_hold(const struct job *job, struct incise_rig *rig)
 				info.name, incise_rig_spec(rig));
 		cli_warn("%s has no home input: its 0 is where it stands", info.name);
 	}
-	if (incise_stepper_enable(stepper, &err) ||
-	    (!status.homed && job->home && incise_stepper_home(stepper, &cli_stop, &err)))
-		cli_fail_with(&err);
+	if (!status.homed && job->home)
+		rc = home(stepper, &err);
+	if (!rc)
+		drop_poses(incise_rig_tracker(rig));
+	if (!rc)
+		rc = incise_stepper_enable(stepper, &err);
+	if (!rc)
+		return;
+	/* Steps that are made in this program do not lose their power with it. */
+	incise_rig_close(rig);
+	cli_fail_with(&err);
 }
 
 /* To where there is no force, then without power. */

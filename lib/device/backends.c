@@ -28,7 +28,7 @@ static bool plain(const char *name)
 /* The folder of modules; false where it has no name that fits. */
 static bool folder(char *path, size_t size)
 {
-	const char *given = getenv("INCISE_MODULE_PATH");
+	const char *given = secure_getenv("INCISE_MODULE_PATH");
 	char own[PATH_MAX];
 	Dl_info info;
 	int length;

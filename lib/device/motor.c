@@ -375,7 +375,7 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
 	};
 }
 
-int incise_motor_fit(struct incise_actuator *actuator, const char *name,
+int incise_motor_fit(struct incise_actuator *actuator, const char *where,
 		     uint32_t rate_max, uint32_t pulse_ns, struct incise_error *err)
 {
 	double step_mm = incise_actuator_step_mm(actuator);
@@ -391,7 +391,7 @@ int incise_motor_fit(struct incise_actuator *actuator, const char *name,
 			err, ERANGE,
 			"%s: high_us and low_us are %g and %g, but this machine holds no less "
 			"than %g; correct them in rig.conf, or leave them out",
-			name, actuator->high_ns / 1e3, actuator->low_ns / 1e3,
+			where, actuator->high_ns / 1e3, actuator->low_ns / 1e3,
 			pulse_ns / 1e3);
 	own = 1e9 / ((double)actuator->high_ns + actuator->low_ns);
 	most = fmin(most, own);
@@ -402,6 +402,6 @@ int incise_motor_fit(struct incise_actuator *actuator, const char *name,
 		"%s: velocity_mm_s = %g asks for %.0f steps/s, but this machine holds %.0f "
 		"at most (by its self-test and the pulses' times); give at most %g mm/s in "
 		"rig.conf, or fewer microsteps",
-		name, actuator->velocity_mm_s, rate, floor(most),
+		where, actuator->velocity_mm_s, rate, floor(most),
 		floor(most * step_mm * 1e4) / 1e4);
 }

@@ -52,10 +52,10 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
 
 /*
  * With what a machine can hold, give pulses that rig.conf leaves open their shortest times.
- * @pulse_ns: what an edge and its lateness take. Returns 0; -ERANGE: err says which rate was
+ * @where begins the message; @pulse_ns: what an edge and its lateness take. Returns 0; -ERANGE: err says which rate was
  * asked for, and which is the largest.
  */
-int incise_motor_fit(struct incise_actuator *actuator, const char *name,
+int incise_motor_fit(struct incise_actuator *actuator, const char *where,
 		     uint32_t rate_max, uint32_t pulse_ns, struct incise_error *err);
 
 #endif

@@ -198,7 +198,7 @@ static int configure(struct kernel_stepper *k, const struct incise_abi_info *inf
 	struct incise_stepper_config config;
 	int rc;
 
-	rc = incise_motor_fit(&k->motor.actuator, k->path, info->rate_max,
+	rc = incise_motor_fit(&k->motor.actuator, asked->where, info->rate_max,
 			      pulse_ns < UINT32_MAX ? (uint32_t)pulse_ns : UINT32_MAX,
 			      err);
 	if (rc)

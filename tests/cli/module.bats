@@ -14,24 +14,34 @@ setup() {
 # A stepper that stands where it was told to, and says when it is loaded.
 make_module() { # FILE NAME ABI
 	cat >mine.c <<-END
+		#include <errno.h>
 		#include <math.h>
 		#include <stdio.h>
 		#include <string.h>
 		#include <incise/backend.h>
 		static struct mine { struct incise_stepper stepper; double mm; char name[64]; } mine;
 		__attribute__((constructor)) static void loaded(void) { fputs("loaded\n", stderr); }
-		static int set(struct incise_stepper *s, double mm) { ((struct mine *)s)->mm = mm; return 0; }
+		static int sets; static unsigned int faults;
+		static int set(struct incise_stepper *s, double mm)
+		{
+			((struct mine *)s)->mm = mm;
+			if (strstr(((struct mine *)s)->name, "pressed") && ++sets > 20)
+				faults = INCISE_STEPPER_ESTOP;
+			return faults ? -EIO : 0;
+		}
 		static int status(struct incise_stepper *s, struct incise_stepper_status *status)
 		{
 			*status = (struct incise_stepper_status){.position_mm = ((struct mine *)s)->mm,
-				.handle_mm = NAN, .force_N = NAN, .state = INCISE_STEPPER_READY, .homed = true};
+				.handle_mm = NAN, .force_N = NAN, .state = INCISE_STEPPER_READY,
+				.homed = !strstr(((struct mine *)s)->name, "lost"), .faults = faults};
 			return 0;
 		}
 		static int nothing(struct incise_stepper *s, struct incise_error *err) { (void)s; (void)err; return 0; }
 		static void info(const struct incise_stepper *s, struct incise_stepper_info *info)
 		{
 			*info = (struct incise_stepper_info){.spring_N_mm = 2, .travel_mm = 20, .step_mm = 0.01,
-				.velocity_mm_s = 10, .acceleration_mm_s2 = 100, .deadman_s = 1};
+				.velocity_mm_s = 10, .acceleration_mm_s2 = 100, .deadman_s = 1,
+				.inputs = strstr(((const struct mine *)s)->name, "switch") ? INCISE_STEPPER_AT_HOME : 0};
 			strcpy(info->name, ((const struct mine *)s)->name);
 		}
 		static void closed(struct incise_stepper *s) { (void)s; fputs("closed\n", stderr); }
@@ -66,6 +76,30 @@ rig() { # STEPPER
 	[ "${stderr_lines[1]}" = "opened mine at 42, lead 3" ]
 	[[ "$stderr" == *closed* ]]
 	[[ "$output" == *" actuate"* ]]
+}
+
+@test "an actuator whose 0 is not known is refused, or taken as it stands" {
+	make_module stepper_mine mine INCISE_BACKEND_ABI
+	rig "mine:lost with switch"
+	run --separate-stderr incise haptic liver.scene --rig rig.conf --duration 0.1s
+	[ "$status" -eq 1 ]
+	[[ "${stderr_lines[-1]}" == "incise haptic: mine at lost with switch is not homed; run \`incise stepper home --rig rig.conf\`, or give --home" ]]
+	# It has a switch, but no way to go there.
+	run --separate-stderr incise haptic liver.scene --rig rig.conf --duration 0.1s --home
+	[ "$status" -eq 1 ]
+	[[ "${stderr_lines[-1]}" == *"mine at lost with switch cannot be homed"* ]]
+	rig "mine:lost"
+	run -0 --separate-stderr incise haptic liver.scene --rig rig.conf --duration 0.1s
+	[[ "$stderr" == *"warning: mine at lost has no home input: its 0 is where it stands"* ]]
+}
+
+@test "a fault of the actuator ends the loop with its name" {
+	make_module stepper_mine mine INCISE_BACKEND_ABI
+	rig "mine:pressed"
+	run --separate-stderr incise haptic liver.scene --rig rig.conf --duration 10s
+	[ "$status" -eq 1 ]
+	[[ "${stderr_lines[-1]}" == "incise haptic: liver.scene: a device failed at tick 21: e-stop: release it, then clear; the force was taken away" ]]
+	[[ "$output" == "21 ticks"* ]]
 }
 
 @test "a module that is not named is not loaded" {

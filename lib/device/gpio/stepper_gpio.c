@@ -350,7 +350,7 @@ static int set_up(struct gpio_stepper *g, const struct incise_backend_request *a
 		return incise_error_set(
 			err, -rc, "%s: gpio chip %.60s: its lines cannot be used: %s",
 			asked->where, asked->arguments, strerror(-rc));
-	rc = incise_motor_fit(&g->motor.actuator, g->motor.name, rate_max, pulse_ns, err);
+	rc = incise_motor_fit(&g->motor.actuator, asked->where, rate_max, pulse_ns, err);
 	if (rc)
 		return rc;
 	g->motor.rate_max_hz = rate_max;
