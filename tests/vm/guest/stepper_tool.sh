@@ -42,7 +42,7 @@ rig()
 		actuator = {
 			spring_N_mm = 2.0; travel_mm = 3.0; lead_mm = 2.0; microsteps = 4;
 			velocity_mm_s = $2; acceleration_mm_s2 = 100.0;
-			home_mm_s = $2; deadman_ms = 2000.0;
+			home_mm_s = $2; deadman_ms = 500.0;
 		};
 	END
 }
@@ -172,6 +172,27 @@ at=$(carriage position)
 check "it is latched" says 0 '"fault": "owner"' stepper status --json
 check "it stands" [ "$(carriage position)" = "$at" ]
 check "clear" says 0 "forgot the program" stepper clear
+
+slowly home
+kill -INT $pid
+wait $pid
+code=$?
+check "Ctrl-C stops homing" ended 1 "stopped; its position is not that of the machine"
+check "without power, not homed" says 0 ": disabled at" stepper status
+
+# Homing counts down from the end of the travel.
+slowly move --by -500um
+kill -STOP $pid
+until grep -q "faults=0x1$" /sys/kernel/debug/incise_stepper/*/counters || ! kill -0 $pid; do :; done
+at=$(carriage position)
+check "the deadman takes power from a program that sleeps" \
+	says 0 "fault      deadman: targets stopped coming" stepper status
+check "it stands" [ "$(carriage position)" = "$at" ]
+kill -CONT $pid
+wait $pid
+code=$?
+check "which says so when it wakes" ended 1 "deadman: targets stopped coming"
+check "clear" says 0 "forgot deadman" stepper clear
 
 incise info stepper --json >info.json
 incise info stepper >info
