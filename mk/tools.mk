@@ -7,6 +7,9 @@ tool_shared := $(addprefix $(O)/obj/tools/,cli.o json.o)
 
 $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 
+# The kernel module's own interface, for those who look at it past the library.
+$(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o): cppflags += -Idriver
+
 extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
 extra_info := $(extra_demo) $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o)
 extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \

@@ -16,7 +16,7 @@
 #include "json.h"
 #include "model_picture.h"
 #include "picture.h"
-#include "stepper_module.h"
+#include "stepper_module_report.h"
 
 enum { OPT_JSON = CLI_LONG, OPT_PLOT };
 

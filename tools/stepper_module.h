@@ -10,7 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 /* Not together with incise/stepper.h: the kernel's names and the library's are alike. */
-#include "../driver/uapi/incise_stepper.h"
+#include <uapi/incise_stepper.h>
 
 #define STEPPER_MODULE_BINS 64
 
@@ -41,11 +41,5 @@ struct stepper_module {
 
 /* Ends the program with 1 and one line when it is no such file. */
 void stepper_module_read(struct stepper_module *module, const char *path);
-
-/* "stepper", for all there are, or the path of one. */
-bool stepper_module_is(const char *what);
-
-/* incise info of these. */
-void stepper_module_show(const char *what, bool json);
 
 #endif

@@ -9,6 +9,7 @@
 #include "cli.h"
 #include "json.h"
 #include "stepper_module.h"
+#include "stepper_module_report.h"
 
 #define DEVICES "/dev/incise-stepper*"
 #define KHZ 1e-3
@@ -137,7 +138,8 @@ static void put_text(const struct stepper_module *module)
 	printf("%s: %.*s, %u motor%s\n", module->path, (int)sizeof(info->name),
 	       info->name, info->n_motors, info->n_motors == 1 ? "" : "s");
 	printf("self-test  99 %% of timers at most %.3f us late, the latest %.3f us; an edge "
-	       "takes %.3f us\n           so at most %.1f kHz, pulses of at least %.3f us; timers of %u ns\n",
+	       "takes %.3f us\n           so at most %.1f kHz, pulses of at least %.3f us; timers "
+	       "of %u ns\n",
 	       info->lateness_ns * US, info->lateness_max_ns * US, info->edge_ns * US,
 	       info->rate_max * KHZ, info->pulse_ns * US, info->resolution_ns);
 	put_sync(module);

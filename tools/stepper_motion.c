@@ -35,6 +35,7 @@ static void put_moved(const struct stepper_job *job, const struct stepper_drive 
 	const struct incise_stepper_status *s = &drive->status;
 	json_t *object;
 
+	cli_progress_end();
 	if (job->json) {
 		object = stepper_report(job, drive);
 		json_object_set_new(object, "from_mm", json_number(from_mm));
