@@ -42,6 +42,7 @@ static inline struct class *compat_class_create(const char *name)
 {
 	return class_create(THIS_MODULE, name);
 }
+
 #undef class_create
 #define class_create(name) compat_class_create(name)
 #endif

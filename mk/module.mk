@@ -62,3 +62,17 @@ dkms_uninstall: ## remove them
 	rm -rf $(DESTDIR)$(dkms_dir)
 
 .PHONY: module module_headers module_install module_uninstall dkms_install dkms_uninstall
+
+check-module: ## the modules for each kernel: W=1, sparse, checkpatch, dkms; and Debian's newest
+	@INCISE_BUILD=$(abspath $(O)) tests/module/check
+
+# .ci/run in a Debian of that release, from a clean clone of HEAD.
+check-debian12: ## CI's run on Debian 12, in a chroot
+	@mk/deps debian
+	@tests/debian/check bookworm
+
+check-debian13: ## CI's run on Debian 13, in a chroot
+	@mk/deps debian
+	@tests/debian/check trixie
+
+.PHONY: check-module check-debian12 check-debian13

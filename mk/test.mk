@@ -20,8 +20,9 @@ $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 check: ## install what is missing, build, and run all tests
 	@mk/deps build check demo
 	@mk/deps vm || echo "going on without what the test bed needs"
+	@mk/deps module || echo "going on without what checking the module needs"
 	+@$(MAKE) --no-print-directory all
-	+@$(MAKE) --no-print-directory check-style check-unit check-cli check-sanitize check-fuzz check-vm
+	+@$(MAKE) --no-print-directory check-style check-unit check-cli check-sanitize check-fuzz check-module check-vm
 
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8

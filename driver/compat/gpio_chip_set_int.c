@@ -3,11 +3,9 @@
 #include <linux/gpio/driver.h>
 
 #ifdef NEW
-#define WANTED int
+int probe(struct gpio_chip *chip, unsigned int line, int value);
 #else
-#define WANTED void
+void probe(struct gpio_chip *chip, unsigned int line, int value);
 #endif
 
-static_assert(__builtin_types_compatible_p(typeof(((struct gpio_chip *)0)->set),
-					   WANTED (*)(struct gpio_chip *, unsigned int,
-						      int)));
+static_assert(__same_type(((struct gpio_chip *)0)->set, &probe));

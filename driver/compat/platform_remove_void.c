@@ -3,10 +3,9 @@
 #include <linux/platform_device.h>
 
 #ifdef NEW
-#define WANTED void
+void probe(struct platform_device *pdev);
 #else
-#define WANTED int
+int probe(struct platform_device *pdev);
 #endif
 
-static_assert(__builtin_types_compatible_p(typeof(((struct platform_driver *)0)->remove),
-					   WANTED (*)(struct platform_device *)));
+static_assert(__same_type(((struct platform_driver *)0)->remove, &probe));
