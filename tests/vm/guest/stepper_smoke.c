@@ -381,6 +381,30 @@ static void try_sync(struct bench *bench)
 	tell(!ioctl(bench->fd, INCISE_STEPPER_SET_SYNC, &sync), "SYNC off");
 }
 
+/* The owner stops to speak: a homed motor goes to its safe place, then has no power. */
+static void try_retract(struct bench *bench)
+{
+	struct incise_stepper_config config = {0};
+	struct incise_stepper_origin origin = {.homed = 1, .position = 0};
+	struct incise_stepper_status status;
+
+	command(bench, INCISE_STEPPER_CLEAR, 1);
+	ioctl(bench->fd, INCISE_STEPPER_GET_CONFIG, &config);
+	config.flags |= INCISE_STEPPER_CONFIG_RETRACT;
+	config.safe_position = -20;
+	tell(!ioctl(bench->fd, INCISE_STEPPER_SET_CONFIG, &config) &&
+		     !ioctl(bench->fd, INCISE_STEPPER_SET_POSITION, &origin),
+	     "a safe position");
+	tell(fresh(bench) && go(bench, 100), "it goes elsewhere");
+	until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false);
+	status = look(bench);
+	tell(status.faults == INCISE_STEPPER_FAULT_DEADMAN && status.position == -20,
+	     "deadman: homed, it goes to the safe position");
+	tell(status.flags & INCISE_STEPPER_FLAG_HOMED, "and is homed still");
+	config.flags &= ~INCISE_STEPPER_CONFIG_RETRACT;
+	ioctl(bench->fd, INCISE_STEPPER_SET_CONFIG, &config);
+}
+
 /* Killed while it moves: the next owner finds the motor stopped, and why. */
 static void try_kill(struct bench *bench, const char *path)
 {
@@ -465,6 +489,11 @@ int main(int argc, char **argv)
 	try_abi(&bench, argv[1]);
 	try_events(&bench);
 	try_sync(&bench);
+	try_retract(&bench);
+	tell(system("rmmod incise_stepper 2>/dev/null") != 0,
+	     "the module cannot go while it is open");
+	system("sed 's/^/# /' /sys/kernel/debug/incise_stepper/incise-*/lateness "
+	       "/sys/kernel/debug/incise_stepper/incise-*/cost");
 	try_kill(&bench, argv[1]);
 	try_unbind(&bench, argv[2], argv[3]);
 	return 0;

@@ -42,7 +42,6 @@ check "the chip cannot go away" refused rmmod incise_sim
 
 "$INCISE_BUILD/tests/vm/stepper_smoke" "/dev/$cdev" /sys/bus/platform/drivers/incise-stepper \
 	"$(cat $config/bench/dev_name)"
-sed 's/^/# /' /sys/kernel/debug/incise_stepper/*/lateness 2>/dev/null
 
 check "it is taken down" live 0
 check "folders go" rmdir $config/bench/motor0 $config/bench
