@@ -192,7 +192,7 @@ static int stepper_main_suspend(struct device *dev)
 	return 0;
 }
 
-/* SYNC goes on in its beat: pulses of the sleep count as missed. Motors stay off. */
+/* SYNC goes on in its beat, whose clock stood still. Motors stay off. */
 static DEFINE_SIMPLE_DEV_PM_OPS(stepper_main_pm, stepper_main_suspend, NULL);
 
 static const struct of_device_id stepper_main_of[] = {

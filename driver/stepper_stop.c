@@ -77,6 +77,9 @@ void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now)
 {
 	if (!motor->powered)
 		return;
+	/* Who disabled it before closing the file did what is asked. */
+	if (fault == INCISE_STEPPER_FAULT_OWNER && motor->disabling && !motor->faults)
+		return;
 	if (fault & ~motor->faults) {
 		struct incise_stepper_event event = {
 			.t_ns = now,

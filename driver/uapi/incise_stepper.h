@@ -75,9 +75,9 @@ struct incise_stepper_setpoint {
 #define INCISE_STEPPER_FAULT_DRIVER (1U << 4)	/* the power stage's fault output */
 #define INCISE_STEPPER_FAULT_LATE (1U << 5)	/* the timer was late too often */
 #define INCISE_STEPPER_FAULT_SETPOINT (1U << 6) /* a slot with unknown contents */
-#define INCISE_STEPPER_FAULT_OWNER (1U << 7)	/* the file was closed while enabled */
-#define INCISE_STEPPER_FAULT_SUSPEND (1U << 8)	/* the machine went to sleep */
-#define INCISE_STEPPER_FAULT_GONE (1U << 9)	/* the device was unbound */
+#define INCISE_STEPPER_FAULT_OWNER (1U << 7)   /* closed while enabled, without DISABLE */
+#define INCISE_STEPPER_FAULT_SUSPEND (1U << 8) /* the machine went to sleep */
+#define INCISE_STEPPER_FAULT_GONE (1U << 9)    /* the device was unbound */
 #define INCISE_STEPPER_FAULT_LINE \
 	(1U << 10) /* a GPIO line could not be written or read */
 
