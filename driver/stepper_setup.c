@@ -28,6 +28,15 @@ static struct incise_profile_limits stepper_setup_limits(
 	};
 }
 
+/* Without power there are no ticks: who has no interrupts either is looked at when asked. */
+static void stepper_setup_look(struct stepper_motor *motor)
+{
+	s64 now = ktime_get_ns();
+
+	stepper_inputs_sample(motor, now);
+	stepper_status_publish(motor, now);
+}
+
 /* motor->lock held. */
 static int stepper_setup_allowed(const struct stepper_motor *motor)
 {
@@ -56,7 +65,7 @@ int stepper_setup_ready(struct stepper_motor *motor)
 	int ret;
 
 	raw_spin_lock_irqsave(&motor->lock, flags);
-	stepper_inputs_sample(motor, ktime_get_ns());
+	stepper_setup_look(motor);
 	ret = stepper_setup_allowed(motor);
 	raw_spin_unlock_irqrestore(&motor->lock, flags);
 	return ret;
@@ -131,7 +140,7 @@ int stepper_setup_clearable(struct stepper_motor *motor)
 	int ret = 0;
 
 	raw_spin_lock_irqsave(&motor->lock, flags);
-	stepper_inputs_sample(motor, ktime_get_ns());
+	stepper_setup_look(motor);
 	if (motor->faults && (motor->powered || motor->inputs & causes))
 		ret = -EBUSY;
 	raw_spin_unlock_irqrestore(&motor->lock, flags);

@@ -102,7 +102,8 @@ struct incise_stepper_setpoint {
  * @seq: odd while the kernel writes; a reader tries again when it changed meanwhile
  * @state: INCISE_STEPPER_STATE_…
  * @faults: INCISE_STEPPER_FAULT_… bits, latched
- * @inputs: INCISE_STEPPER_LINE_… bits that are active now
+ * @inputs: INCISE_STEPPER_LINE_… bits that are active now; while disabled, and on a chip
+ *          without interrupts: at the last ENABLE or CLEAR
  * @t_ns: when this was written; a tick at most before now while enabled
  * @position: steps given out, up less down, from the origin SET_POSITION gave
  * @velocity: of the profile, 2^-16 steps/s

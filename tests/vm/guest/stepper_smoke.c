@@ -222,6 +222,43 @@ static void try_edges(struct bench *bench, const struct incise_stepper_config *c
 		printf("# %lld of %zu edges\n", (long long)shorts, n);
 }
 
+#define TRACE "/sys/kernel/tracing/"
+
+/* One line of the trace for each edge, with times that make sense. */
+static void try_trace(struct bench *bench)
+{
+	int leads = 0, trails = 0, backwards = 0, motor;
+	char line[512];
+	FILE *trace;
+
+	write_text(TRACE "trace", "\n");
+	tell(write_text(TRACE "events/incise_stepper/enable", "1"), "tracepoints");
+	go(bench, 10);
+	write_text(TRACE "events/incise_stepper/enable", "0");
+	trace = fopen(TRACE "trace", "r");
+	while (trace && fgets(line, sizeof(line), trace)) {
+		long long due, actual;
+		char *at = strstr(line, "controller=");
+		unsigned int value;
+		char name[16];
+
+		if (!at ||
+		    sscanf(at,
+			   "controller=%*d motor=%d line=%15s value=%u due_ns=%lld "
+			   "actual_ns=%lld",
+			   &motor, name, &value, &due, &actual) != 5)
+			continue;
+		leads += !strcmp(name, "step") && value;
+		trails += !strcmp(name, "step") && !value;
+		backwards += actual < due;
+	}
+	if (trace)
+		fclose(trace);
+	tell(leads == 10 && trails == 10, "an event for each edge");
+	tell(!backwards, "no edge before it was due");
+	tell(go(bench, 0), "and back");
+}
+
 static void try_deadman(struct bench *bench)
 {
 	int64_t begin;
@@ -481,6 +518,7 @@ int main(int argc, char **argv)
 	     "no config while it has power");
 
 	try_edges(&bench, &config);
+	try_trace(&bench);
 	try_deadman(&bench);
 	try_limit(&bench);
 	try_estop(&bench);
