@@ -266,6 +266,7 @@ struct incise_stepper_origin {
  * struct incise_stepper_sync - the SYNC line, 64 bytes
  * @period_ns: 0: off; else 100000 … 10000000000
  * @width_ns: time it is active, at least 1000, at most half of the period
+ * @reserved0: zero
  * @first_ns: of the first pulse; 0: as soon as may be. Read back: of the first pulse.
  * @pulses: given out since it was set, read-only: zero when it is set
  * @last_ns: of the last pulse's leading edge, read-only likewise
