@@ -18,8 +18,9 @@
 #define AT_ONCE 4096 /* edges that are read at a time */
 
 /*
- * How late a step may be against the profile, beyond what a change of direction costs: what
- * the timer was late in virtual time at most (measured 10 us), and again for the edge before.
+ * How late a step may be against the profile, beyond 1/8 of a step at full speed, from which
+ * on the module puts its time line off, and what a change of direction costs: what the timer
+ * was late in virtual time at most (measured 10 us), and again for the edge before.
  */
 #define LATE_NS 20000
 
@@ -227,8 +228,9 @@ int bench_configure(struct bench *bench, const struct incise_stepper_config *con
 		.velocity = config->velocity,
 		.acceleration = config->acceleration,
 		.tick_ns = config->tick_ns,
-		.lateness_ns = timed ? (int64_t)config->tick_ns + config->setup_ns +
-					       config->hold_ns + LATE_NS
+		.lateness_ns = timed ? 1000000000 / config->velocity / 8 +
+					       config->setup_ns + config->hold_ns +
+					       LATE_NS
 				     : -1,
 		.position_min = config->position_min,
 		.position_max = config->position_max,

@@ -65,6 +65,20 @@ static bool run_into(int64_t velocity)
 			   LONG);
 }
 
+/* Power was given a moment ago: at rest it also is before it has begun to move. */
+static bool comes_to(int64_t target)
+{
+	int64_t end_ns = bench_now_ns() + LONG;
+	bool there;
+
+	do
+		there = bench_until(&bench, 0, 1U << INCISE_STEPPER_STATE_READY,
+				    INCISE_STEPPER_MODE_POSITION, target, LONG) &&
+			status().position == target;
+	while (!there && !status().faults && bench_now_ns() < end_ns);
+	return there;
+}
+
 static int64_t any_velocity(const struct incise_stepper_config *config)
 {
 	int64_t velocity = draw_between(config->velocity / 4, config->velocity);
@@ -111,9 +125,7 @@ static void limits_stop(int rounds)
 		/* And it may leave, but not go on. */
 		leaves &= bench_command(&bench, INCISE_STEPPER_CLEAR, 1) == 0 &&
 			  bench_command(&bench, INCISE_STEPPER_ENABLE, 1) == 0;
-		leaves &= bench_until(&bench, 0, 1U << INCISE_STEPPER_STATE_READY,
-				      INCISE_STEPPER_MODE_POSITION, 0, LONG) &&
-			  status().position == 0;
+		leaves &= comes_to(0);
 		bench_command(&bench, INCISE_STEPPER_DISABLE, 1);
 		leaves &= bench_until(&bench, 0, at_rest, INCISE_STEPPER_MODE_POSITION, 0,
 				      LONG);
