@@ -228,7 +228,7 @@ int bench_configure(struct bench *bench, const struct incise_stepper_config *con
 		.velocity = config->velocity,
 		.acceleration = config->acceleration,
 		.tick_ns = config->tick_ns,
-		.lateness_ns = timed ? 1000000000 / config->velocity / 8 +
+		.lateness_ns = timed ? INT64_C(125000000) / config->velocity +
 					       config->setup_ns + config->hold_ns +
 					       LATE_NS
 				     : -1,
