@@ -102,7 +102,7 @@ static void edge_log_judge(struct edge_log *log, struct range before, struct ran
 	double change = fmax(fmax(after.from - before.to, before.from - after.to), 0);
 	double allowed = log->motor.acceleration * apart;
 
-	log->acceleration = fmax(log->acceleration, change / apart);
+	log->hardest = fmax(log->hardest, change / allowed);
 	if (change > allowed * (1 + 1e-9))
 		edge_log_fault(
 			log, EDGE_LOG_ACCELERATION,

@@ -83,7 +83,7 @@ struct edge_log {
 	uint64_t into_stop; /* most steps that came after a stop's edge */
 	int64_t mark_ns;    /* set by the caller: steps after it are counted */
 	uint64_t marked;
-	double acceleration; /* most that the steps show for sure, steps/s^2 */
+	double hardest; /* acceleration that steps show for sure, of the limit */
 	/* State */
 	bool begun, step_on, dir_on, powered;
 	uint32_t sequence;
