@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * What is wanted of a rig, read from rig.conf or from the shorthand before anything is
+ * opened.
+ */
+#ifndef INCISE_RIG_PLAN_H
+#define INCISE_RIG_PLAN_H
+
+#include <stdbool.h>
+#include <incise/actuator.h>
+#include <incise/error.h>
+#include <incise/sim.h>
+
+/* The kinds of devices; their order is that of the incise_rig_device bits. */
+enum { KIND_TRACKER, KIND_FORCE, KIND_CAMERA, KIND_STEPPER, N_KINDS };
+
+extern const char *const incise_kind_name[N_KINDS];
+
+static inline unsigned int kind_bit(int kind)
+{
+	return 1u << kind;
+}
+
+/* A device that does not stand on the virtual rig. */
+struct rig_real {
+	char *name; /* of its backend; NULL: none is wanted */
+	char *arguments;
+	char where[240];
+};
+
+/* What is wanted of a rig. */
+struct incise_rig_plan {
+	bool simulated;
+	bool sim;   /* one of the devices stands on the virtual rig */
+	bool watch; /* the stepper */
+	struct rig_real real[N_KINDS];
+	struct incise_actuator actuator;
+	bool has_actuator;
+	struct incise_sim_config config;
+	double point_mm[3], normal[3];
+};
+
+/*
+ * Read a rig.conf, or "sim:KEY=VALUE,…". Only devices that will be opened must have what
+ * they need. Returns 0 or a negative errno; incise_rig_plan_free() in both cases.
+ */
+int incise_rig_plan_read(struct incise_rig_plan *plan, const char *spec,
+			 unsigned int devices, struct incise_error *err);
+
+void incise_rig_plan_free(struct incise_rig_plan *plan);
+
+#endif

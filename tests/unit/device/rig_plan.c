@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * lib/device/rig_plan.c: what rig.conf and the shorthand say, and what they are refused for.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <locale.h>
+#include <math.h>
+#include <unistd.h>
+#include <incise/rig.h>
+#include <incise/sim.h>
+#include "../base/temp_file.h"
+
+#define ALL \
+	(INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_CAMERA | INCISE_RIG_STEPPER)
+
+static void shorthand_sets_keys(void **state)
+{
+	struct incise_rig *rig = incise_rig_open(
+		"sim:seed=7,cut_s=2.5,depth_mm=5,times=3,clock=simulated", ALL, NULL);
+	const struct incise_sim_config *config;
+	double point[3], normal[3];
+
+	assert_non_null(rig);
+	config = incise_sim_config(incise_rig_sim(rig));
+	assert_int_equal(config->seed, 7);
+	assert_true(config->cut_s == 2.5 && config->depth_mm[0] == 5);
+	assert_int_equal(config->n_depths, 1);
+	assert_int_equal(config->times[0], 3);
+	/* Three cuts of 2.5 s, four pauses of 1 s. */
+	assert_int_equal(incise_sim_duration(incise_rig_sim(rig)), 11500000000LL);
+	assert_false(incise_clock_is_real(incise_rig_clock(rig)));
+	assert_int_equal(incise_clock_now(incise_rig_clock(rig)), 1000000000);
+	incise_rig_surface(rig, point, normal);
+	assert_true(point[0] == 0 && point[1] == 0 && point[2] == 0);
+	assert_true(normal[0] == 0 && normal[1] == 0 && normal[2] == 1);
+	incise_rig_close(rig);
+}
+
+static void shorthand_ignores_the_locale(void **state)
+{
+	struct incise_rig *rig;
+
+	if (!setlocale(LC_NUMERIC, "de_DE.UTF-8") &&
+	    !setlocale(LC_NUMERIC, "fr_FR.UTF-8"))
+		skip(); /* this machine has no locale with a decimal comma */
+	rig = incise_rig_open("sim:cut_s=2.5", 0, NULL);
+	setlocale(LC_NUMERIC, "C");
+	assert_non_null(rig);
+	assert_true(incise_sim_config(incise_rig_sim(rig))->cut_s == 2.5);
+	incise_rig_close(rig);
+}
+
+static void shorthand_refuses(void **state)
+{
+	static const struct {
+		const char *spec, *text;
+	} row[] = {
+		{"sim:sede=1",
+		 "sim:sede=1: sim.sede: unknown key; rig.conf(5) lists them"},
+		{"sim:seed", "sim:seed: expected KEY=VALUE; correct it"},
+		{"sim:seed=", "sim:seed=: expected KEY=VALUE; correct it"},
+		{"sim:=1", "sim:=1: expected KEY=VALUE; correct it"},
+		{"sim:seed=1,", "sim:: expected KEY=VALUE; correct it"},
+		{"sim:seed=x",
+		 "sim:seed=x: seed: expected a number, found x; correct it"},
+		{"sim:seed=1x",
+		 "sim:seed=1x: seed: expected a number, found 1x; correct it"},
+		{"sim:clock=fast",
+		 "sim:clock=fast: clock: expected real or simulated, found "
+		 "fast; correct it"},
+		{"sim:seed=1,tooth=1",
+		 "sim:tooth=1: sim.tooth: expected a number from 0 to "
+		 "0.9, found 1; correct it"},
+		{"sim:tooth=nan",
+		 "sim:tooth=nan: sim.tooth: expected a number from 0 to 0.9, "
+		 "found nan; correct it"},
+	};
+
+	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
+		struct incise_error err = {0};
+
+		errno = 0;
+		assert_null(incise_rig_open(row[i].spec, ALL, &err));
+		assert_int_equal(errno, EINVAL);
+		assert_int_equal(err.code, EINVAL);
+		assert_string_equal(err.text, row[i].text);
+	}
+}
+
+static void file_is_read(void **state)
+{
+	struct temp_file file = temp_file_new(
+		"rig.conf",
+		"clock = \"simulated\";\n"
+		"tracker = \"sim:\"; force = \"sim:\"; camera = \"other:1\";\n"
+		"surface = { point_mm = [1, 2, 3]; normal = [0, 0, 2]; };\n"
+		"sim = { seed = 3; depth_mm = [4.0, 8.5]; times = [1, 2];\n"
+		"        cut_s = 2; };\n");
+	/* The camera's backend does not exist, but nobody asked for it. */
+	struct incise_rig *rig =
+		incise_rig_open(file.path, INCISE_RIG_TRACKER | INCISE_RIG_FORCE, NULL);
+	const struct incise_sim_config *config;
+	double point[3], normal[3];
+
+	assert_non_null(rig);
+	config = incise_sim_config(incise_rig_sim(rig));
+	assert_int_equal(config->seed, 3);
+	assert_int_equal(config->n_depths, 2);
+	assert_true(config->depth_mm[0] == 4 && config->depth_mm[1] == 8.5);
+	assert_true(config->times[0] == 1 && config->times[1] == 2);
+	assert_true(config->tooth == 0.2); /* not named: its default */
+	assert_false(incise_clock_is_real(incise_rig_clock(rig)));
+	assert_non_null(incise_rig_tracker(rig));
+	assert_null(incise_rig_camera(rig));
+	incise_rig_surface(rig, point, normal);
+	assert_true(point[0] == 1 && point[1] == 2 && point[2] == 3);
+	assert_true(normal[0] == 0 && normal[1] == 0 && normal[2] == 1);
+	assert_string_equal(incise_rig_spec(rig), file.path);
+	incise_rig_close(rig);
+	temp_file_free(&file);
+}
+
+static void empty_file_is_a_rig_without_devices(void **state)
+{
+	struct temp_file file = temp_file_new("rig.conf", "");
+	struct incise_rig *rig = incise_rig_open(file.path, 0, NULL);
+
+	assert_non_null(rig);
+	assert_null(incise_rig_sim(rig));
+	assert_true(incise_clock_is_real(incise_rig_clock(rig)));
+	incise_rig_close(rig);
+	temp_file_free(&file);
+}
+
+static void file_refuses(void **state)
+{
+	static const struct {
+		const char *text;
+		int code;
+		const char *tail; /* of the message, after the path */
+	} row[] = {
+		{"", ENODEV,
+		 ": tracker: not named, but needed; add `tracker = \"sim:\";` or another backend"},
+		{"\ntracker = \"fastrak:usb\";", ENODEV,
+		 ":2: tracker: there is no backend \"fastrak\"; those there are: sim"},
+		{"tracker = \"sim\";", EINVAL,
+		 ":1: tracker: expected BACKEND:ARGUMENTS such as \"sim:\", found \"sim\"; "
+		 "correct it"},
+		{"tracker = \"sim:seed=1\";", EINVAL,
+		 ":1: tracker: expected \"sim:\" without arguments, found \"sim:seed=1\"; "
+		 "settings of the virtual rig belong in the group `sim`"},
+		{"tracker = 1;", EINVAL,
+		 ":1: tracker: expected text in quotes, found 1; correct it"},
+		{"clock = \"fast\";", EINVAL,
+		 ":1: clock: expected real or simulated, found fast; correct it"},
+		{"tracer = \"sim:\";", EINVAL,
+		 ":1: tracer: unknown key; expected one of clock, tracker, force, camera, "
+		 "stepper, surface, sim, actuator"},
+		{"sim = 1;", EINVAL,
+		 ":1: sim: expected a group { key = value; }; correct it"},
+		{"sim = {\n\nsede = 1; };", EINVAL,
+		 ":3: sim.sede: unknown key; rig.conf(5) lists them"},
+		{"sim = {\nseed = -1; };", EINVAL,
+		 ":2: sim.seed: expected a whole number from 0 to 2147483647, found -1; "
+		 "correct it"},
+		{"sim = { seed = \"a\"; };", EINVAL,
+		 ":1: sim.seed: expected a number; correct it"},
+		{"sim = { seed = [1]; };", EINVAL,
+		 ":1: sim.seed: expected a number; correct it"},
+		{"sim = { seed = {}; };", EINVAL,
+		 ":1: sim.seed: expected a number; correct it"},
+		{"sim = { depth_mm = [5]; };", EINVAL,
+		 ":1: sim: expected depth_mm and times with as many values each, 1 to 8; "
+		 "correct them"},
+		{"sim = { depth_mm = [5, 6]; times = [1]; };", EINVAL,
+		 ":1: sim: expected depth_mm and times with as many values each, 1 to 8; "
+		 "correct them"},
+		{"sim = { depth_mm = []; times = []; };", EINVAL,
+		 ":1: sim: expected depth_mm and times with as many values each, 1 to 8; "
+		 "correct them"},
+		{"sim = { depth_mm = [1,1,1,1,1,1,1,1,1]; times = [1,1,1,1,1,1,1,1,1]; };",
+		 EINVAL,
+		 ":1: sim.depth_mm: expected an array of at most 8 numbers such as [5, 10]; "
+		 "correct it"},
+		/* libconfig's own rule: an array is of one type. */
+		{"sim = { depth_mm = [4, 8.5]; times = [1, 1]; };", EINVAL,
+		 ":1: mismatched element type in array; correct it"},
+		{"sim = { depth_mm = [50]; times = [1]; };", EINVAL,
+		 ":1: sim.depth_mm: expected a number from 0.1 to 40, found 50; correct it"},
+		{"sim = { depth_mm = (\"5\"); times = [1]; };", EINVAL,
+		 ":1: sim.depth_mm: expected a number; correct it"},
+		{"sim = { depth_mm = 5; times = 1; };", EINVAL,
+		 ":1: sim: expected depth_mm and times with as many values each, 1 to 8; "
+		 "correct them"},
+		{"surface = { normal = [0, 0, 0]; };", EINVAL,
+		 ":1: surface.normal: expected a direction [x, y, z] longer than 1e-6, found 3 "
+		 "values; correct it"},
+	};
+
+	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
+		struct temp_file file = temp_file_new("rig.conf", row[i].text);
+		struct incise_error err = {0};
+		char expected[600];
+
+		errno = 0;
+		assert_null(incise_rig_open(file.path, INCISE_RIG_TRACKER, &err));
+		assert_int_equal(errno, row[i].code);
+		assert_int_equal(err.code, row[i].code);
+		snprintf(expected, sizeof(expected), "%s%s", file.path, row[i].tail);
+		assert_string_equal(err.text, expected);
+		/* Without a place for the message it fails all the same. */
+		assert_null(incise_rig_open(file.path, INCISE_RIG_TRACKER, NULL));
+		temp_file_free(&file);
+	}
+	assert_null(incise_rig_open("/nowhere/rig.conf", ALL, NULL));
+	assert_int_equal(errno, ENOENT);
+}
+
+/* A real actuator: what it needs besides its string. */
+static void real_steppers_are_refused_with_a_line(void **state)
+{
+#define ACTUATOR "actuator = { spring_N_mm = 2.0; travel_mm = 9.0; lead_mm = 2.0; };\n"
+	static const struct {
+		const char *text;
+		int code;
+		const char *says;
+	} row[] = {
+		{"stepper = \"kernel:/dev/incise-nowhere\";", EINVAL,
+		 ":1: stepper: \"kernel:/dev/incise-nowhere\" needs the group actuator"},
+		{ACTUATOR "stepper = \"kernel:/dev/incise-nowhere\";", ENOENT,
+		 ":2: stepper: /dev/incise-nowhere: there is no such device"},
+		{ACTUATOR "stepper = \"kernel:x\";", EINVAL,
+		 ":2: stepper: expected the path"},
+		{ACTUATOR "clock = \"simulated\"; stepper = \"kernel:/dev/x\";", EINVAL,
+		 ":2: stepper: only the virtual rig can follow a simulated clock"},
+		{ACTUATOR "stepper = \"canopen:can0\";", ENODEV,
+		 ":2: stepper: there is no backend \"canopen\"; those there are: sim, kernel"},
+		{ACTUATOR "stepper = \"../../x:\";", ENODEV,
+		 "there is no backend \"../../x\""},
+		/* Broken, it is refused where the virtual actuator stands, too. */
+		{"actuator = { travel_mm = 9.0; };\nstepper = \"sim:\";", EINVAL,
+		 ":1: actuator.spring_N_mm is missing"},
+		{"actuator = 3; stepper = \"sim:\";", EINVAL,
+		 ":1: actuator: expected a group"},
+	};
+
+	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
+		struct temp_file file = temp_file_new("rig.conf", row[i].text);
+		struct incise_error err = {0};
+
+		errno = 0;
+		if (incise_rig_open(file.path, INCISE_RIG_STEPPER, &err) ||
+		    errno != row[i].code || err.code != row[i].code ||
+		    !strstr(err.text, row[i].says))
+			fail_msg("row %zu: %d, \"%s\"", i, err.code, err.text);
+		temp_file_free(&file);
+	}
+}
+
+/* Its text is checked whole, whatever is opened of it. */
+static void the_example_is_a_good_one(void **state)
+{
+	struct incise_error err = {0};
+	struct incise_rig *rig;
+
+	if (access("doc/rig.conf.example", R_OK))
+		skip();
+	rig = incise_rig_open("doc/rig.conf.example", 0, &err);
+	if (!rig)
+		fail_msg("%s", err.text);
+	incise_rig_close(rig);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(shorthand_sets_keys),
+		cmocka_unit_test(shorthand_ignores_the_locale),
+		cmocka_unit_test(shorthand_refuses),
+		cmocka_unit_test(file_is_read),
+		cmocka_unit_test(empty_file_is_a_rig_without_devices),
+		cmocka_unit_test(file_refuses),
+		cmocka_unit_test(real_steppers_are_refused_with_a_line),
+		cmocka_unit_test(the_example_is_a_good_one),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
