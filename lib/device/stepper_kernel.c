@@ -8,6 +8,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +19,7 @@
 #include <incise/clock.h>
 #include "backends.h"
 #include "motor.h"
+#include "page.h"
 
 #define REST_POLL_NS 10000000
 #define REST_POLLS 500
@@ -194,13 +196,11 @@ static int check_info(const struct kernel_stepper *k, struct incise_abi_info *in
 static int configure(struct kernel_stepper *k, const struct incise_abi_info *info,
 		     const struct incise_backend_request *asked, struct incise_error *err)
 {
-	uint64_t pulse_ns = (uint64_t)info->edge_ns + info->lateness_ns;
 	struct incise_stepper_config config;
 	int rc;
 
 	rc = incise_motor_fit(&k->motor.actuator, asked->where, info->rate_max,
-			      pulse_ns < UINT32_MAX ? (uint32_t)pulse_ns : UINT32_MAX,
-			      err);
+			      info->pulse_ns, err);
 	if (rc)
 		return rc;
 	incise_motor_config(&k->motor.actuator, k->index, &config);
@@ -216,10 +216,10 @@ static int configure(struct kernel_stepper *k, const struct incise_abi_info *inf
 		return incise_error_set(
 			err, ERANGE,
 			"%s: %.200s: %u steps/s with pulses of %u and %u ns are more than this "
-			"machine holds: %u steps/s, %llu ns; give a smaller velocity_mm_s, "
+			"machine holds: %u steps/s, %u ns; give a smaller velocity_mm_s, "
 			"fewer microsteps or longer pulses",
 			asked->where, k->path, config.velocity, config.high_ns,
-			config.low_ns, info->rate_max, (unsigned long long)pulse_ns);
+			config.low_ns, info->rate_max, info->pulse_ns);
 	return incise_error_set(
 		err, -rc,
 		rc == -EBUSY
@@ -261,6 +261,21 @@ static int map_pages(struct kernel_stepper *k, bool watch)
 	return 0;
 }
 
+/*
+ * The module's count goes on from one owner to the next. One that lies outside of this
+ * travel cannot be gone on from, so it begins anew, and its 0 is not known.
+ */
+static int take_count(struct kernel_stepper *k)
+{
+	double most = incise_actuator_steps(&k->motor.actuator, HUGE_VAL);
+	struct incise_abi_status status;
+	int rc = incise_page_get_status(k->motor.slot, &status);
+
+	if (rc || (status.position >= 0 && (double)status.position <= most))
+		return rc;
+	return kernel_origin(&k->motor, 0, false);
+}
+
 static int set_up(struct kernel_stepper *k, const struct incise_backend_request *asked,
 		  struct incise_error *err)
 {
@@ -284,6 +299,8 @@ static int set_up(struct kernel_stepper *k, const struct incise_backend_request 
 	rc = asked->watch ? adopt(k) : 0;
 	if (!rc)
 		rc = map_pages(k, asked->watch);
+	if (!rc && !asked->watch)
+		rc = take_count(k);
 	return rc ? incise_error_set(err, -rc, "%s: %.200s: %s; load its module again",
 				     asked->where, k->path, strerror(-rc))
 		  : 0;

@@ -179,6 +179,7 @@ static void module_load(void)
 	module.info.rate_max = 20000;
 	module.info.edge_ns = 300;
 	module.info.lateness_ns = 2000;
+	module.info.pulse_ns = 2300;
 	module.info.lines[MOTOR] = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_HOME |
 				   INCISE_STEPPER_LINE_LIMIT_MIN |
 				   INCISE_STEPPER_LINE_LIMIT_MAX;
@@ -372,6 +373,30 @@ static void what_the_last_owner_left_is_waited_for(void **state)
 	stepper->ops->close(stepper);
 }
 
+/* 4000 steps are the travel. */
+static void a_count_outside_the_travel_begins_anew(void **state)
+{
+	static const struct {
+		int64_t before, after;
+		bool homed;
+	} cases[] = {{4000, 4000, true}, {4001, 0, false}, {-1, 0, false}, {0, 0, true}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_stepper_status status;
+		struct incise_stepper *stepper;
+
+		module_load();
+		module.pulser.status.position = cases[i].before;
+		module.pulser.status.flags = INCISE_STEPPER_FLAG_HOMED;
+		stepper = open_stepper("/dev/incise-stepper0:2", false, &actuator, NULL);
+		assert_non_null(stepper);
+		assert_int_equal(incise_stepper_status(stepper, &status), 0);
+		assert_true(status.position_mm == (double)cases[i].after * 0.00125);
+		assert_int_equal(status.homed, cases[i].homed);
+		stepper->ops->close(stepper);
+	}
+}
+
 /* Unbound while it is open: the page says so, and all calls do. */
 static void a_device_that_goes_away(void **state)
 {
@@ -422,6 +447,7 @@ int main(void)
 		cmocka_unit_test(a_watcher_only_looks),
 		cmocka_unit_test(why_it_does_not_open_is_said),
 		cmocka_unit_test(what_the_last_owner_left_is_waited_for),
+		cmocka_unit_test(a_count_outside_the_travel_begins_anew),
 		cmocka_unit_test(a_device_that_goes_away),
 		cmocka_unit_test(a_page_that_makes_no_sense),
 	};

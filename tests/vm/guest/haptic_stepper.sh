@@ -63,3 +63,5 @@ check "it has no power then" unpowered
 pressed() { ! haptic --duration 1s && said "is not homed\|e-stop" </tmp/err; }
 check "it stays refused" pressed
 echo 0 >"$config/bench/live"
+rmdir $config/bench/motor0 $config/bench
+check "the modules go" rmmod incise_stepper incise_sim

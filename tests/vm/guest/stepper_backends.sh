@@ -43,3 +43,5 @@ if [ -e "$INCISE_BUILD/lib/incise/stepper_gpio.so" ]; then
 else
 	echo "ok gpio # skip libgpiod is not installed"
 fi
+rmdir $config/bench/motor0 $config/bench
+check "the modules go" rmmod incise_stepper incise_sim
