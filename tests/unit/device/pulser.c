@@ -240,6 +240,45 @@ static void a_thread_that_is_late_goes_slower_and_then_stops(void **state)
 	over(&b);
 }
 
+/* Times so long that the profile alone would not keep one of them, and a late thread. */
+static void shortest_times_hold_where_the_profile_would_not_keep_them(void **state)
+{
+	uint64_t random = 88172645463325252ULL, reversals = 0;
+	int64_t target = 3000;
+	struct bench b;
+
+	start(&b, 0);
+	b.config.high_ns = 110000;
+	b.config.low_ns = 130000;
+	b.config.setup_ns = 700000;
+	b.config.hold_ns = 900000;
+	b.config.enable_ns = 30 * MS;
+	b.config.acceleration = 4000000;
+	assert_int_equal(incise_pulser_init(&b.pulser, &b.config), 0);
+	assert_int_equal(incise_pulser_enable(&b.pulser), 0);
+	for (int i = 0; i < 2000; i++) {
+		random ^= random << 13;
+		random ^= random >> 7;
+		random ^= random << 17;
+		/* A few steps to and fro, while it is still under way. */
+		target = (int64_t)(b.status.position + (i % 2 ? 1 : -1) * (random >> 60));
+		target = target < 0 ? 0 : target;
+		want(&b, INCISE_STEPPER_MODE_POSITION, target);
+		go(&b, (int64_t)(random % (6 * MS)), (int64_t)(random >> 32) % 90000);
+		assert_int_equal(b.status.faults, 0);
+		reversals += b.pulser.direction == (i % 2 ? 1 : -1);
+	}
+	for (int i = 0; i < 40; i++) {
+		want(&b, INCISE_STEPPER_MODE_POSITION, target);
+		go(&b, 50 * MS, 0);
+	}
+	assert_int_equal(b.status.position, target);
+	assert_int_equal(b.machine.at, target);
+	assert_int_equal(b.machine.too_short, 0);
+	/* It did turn, and it did step. */
+	assert_true(reversals > 500 && b.machine.steps > 2000);
+}
+
 /* A stall of 30 ms: the motion goes on where it was, with no burst. */
 static void a_stall_shifts_the_motion(void **state)
 {
@@ -285,6 +324,8 @@ int main(void)
 		cmocka_unit_test(a_limit_stops_one_direction),
 		cmocka_unit_test(some_faults_brake),
 		cmocka_unit_test(a_thread_that_is_late_goes_slower_and_then_stops),
+		cmocka_unit_test(
+			shortest_times_hold_where_the_profile_would_not_keep_them),
 		cmocka_unit_test(a_stall_shifts_the_motion),
 		cmocka_unit_test(a_count_is_named_only_at_rest),
 	};
