@@ -14,5 +14,8 @@ figure()
 }
 echo "# lateness in virtual time: min $(figure min) avg $(figure avg) max $(figure max) us"
 check "2000 loops ran" [ "$(figure cycles)" = 2000 ]
-# Measured 7 to 10 us; an interrupt storm or a profile that is not in force shows as ms.
-check "no loop was 100 us late" [ "$(figure max)" -lt 100 ]
+# Measured 7 to 10 us, and 151 us where each access and each lock is checked; an interrupt
+# storm or a profile that is not in force shows as milliseconds.
+limit=100
+[ "$INCISE_VM_KERNEL" != debug ] || limit=1000
+check "no loop was $limit us late" [ "$(figure max)" -lt $limit ]
