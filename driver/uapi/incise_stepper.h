@@ -91,10 +91,9 @@ struct incise_stepper_setpoint {
 #define INCISE_STEPPER_LINE_DIR (1U << 6)    /* an output; in info only */
 
 /* incise_stepper_status.flags */
-#define INCISE_STEPPER_FLAG_HOMED \
-	(1U << 0)			   /* position is that of the machine; a stop at
-					       once while moving takes it away */
-#define INCISE_STEPPER_FLAG_HELD (1U << 1) /* the last set-point was clamped */
+/* Position is that of the machine; a stop at once while moving takes it away. */
+#define INCISE_STEPPER_FLAG_HOMED (1U << 0)
+#define INCISE_STEPPER_FLAG_HELD (1U << 1)	/* the last set-point was clamped */
 #define INCISE_STEPPER_FLAG_HOME_SEEN (1U << 2) /* home_position is of this enable */
 
 /**
@@ -199,9 +198,8 @@ struct incise_stepper_info {
 
 /* incise_stepper_config.flags */
 #define INCISE_STEPPER_CONFIG_INVERT (1U << 0) /* a step up sets dir inactive */
-#define INCISE_STEPPER_CONFIG_RETRACT \
-	(1U << 1) /* on DEADMAN and OWNER, a homed motor goes
-						   to safe_position before it is disabled */
+/* On DEADMAN and OWNER, a homed motor goes to safe_position before it is disabled. */
+#define INCISE_STEPPER_CONFIG_RETRACT (1U << 1)
 
 /**
  * struct incise_stepper_config - a motor's limits and times, 128 bytes
