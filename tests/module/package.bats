@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # make module, module_install, dkms_install and what dkms makes of it. Run by
-# tests/module/check with INCISE_KDIR, headers of a kernel, and INCISE_BUILD, where the
-# modules were built for it already.
+# tests/module/check with INCISE_KDIR, the headers of a kernel.
 
 bats_require_minimum_version 1.5.0
 
