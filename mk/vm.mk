@@ -23,7 +23,7 @@ check-vm: all $(guest_programs) ## tests of the kernel modules, on Debian's kern
 check-vm-debug: all $(guest_programs) ## the same on a kernel with KASAN, lockdep, kmemleak; built once
 	@mk/deps vm vm-debug
 	+@tests/vm/debug-kernel >/dev/null
-	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" INCISE_VM_TIMEOUT=900 tests/vm/check --bed \
+	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed \
 		debug:deterministic debug:smp
 
 .PHONY: check-vm check-vm-debug
