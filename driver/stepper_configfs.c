@@ -22,6 +22,8 @@
 #include "stepper.h"
 #include "stepper_wires.h"
 
+#define LABEL_MAX 63
+
 const char *const stepper_wire_names[STEPPER_WIRES] = {"estop", "sync"};
 const char *const stepper_motor_wire_names[STEPPER_MOTOR_WIRES] = {
 	"step", "dir", "enable", "limit-min", "limit-max", "home", "fault",
@@ -62,8 +64,8 @@ static ssize_t stepper_wire_show(struct stepper_folder *folder,
 
 	mutex_lock(&folder->mutex);
 	if (wire->label)
-		n = sprintf(page, "%s:%u%s\n", wire->label, wire->offset,
-			    wire->active_low ? ":active-low" : "");
+		n = sysfs_emit(page, "%s:%u%s\n", wire->label, wire->offset,
+			       wire->active_low ? ":active-low" : "");
 	mutex_unlock(&folder->mutex);
 	return n;
 }
@@ -87,6 +89,9 @@ static int stepper_wire_parse(struct stepper_wire *wire, char *text)
 	if (!colon || colon == text)
 		return -EINVAL;
 	*colon = '\0';
+	/* A node of the label's name will stand for the chip. */
+	if (strlen(text) > LABEL_MAX)
+		return -ENAMETOOLONG;
 	ret = kstrtouint(colon + 1, 10, &wire->offset);
 	if (ret)
 		return ret;
@@ -277,7 +282,8 @@ static ssize_t stepper_folder_dev_name_show(struct config_item *item, char *page
 
 	mutex_lock(&folder->mutex);
 	if (folder->live)
-		n = sprintf(page, "%s\n", dev_name(stepper_nodes_device(folder->live)));
+		n = sysfs_emit(page, "%s\n",
+			       dev_name(stepper_nodes_device(folder->live)));
 	mutex_unlock(&folder->mutex);
 	return n;
 }
@@ -297,7 +303,7 @@ static ssize_t stepper_folder_cdev_show(struct config_item *item, char *page)
 		device_lock(dev); /* it may be unbound through sysfs */
 		stepper = dev_get_drvdata(dev);
 		if (stepper)
-			n = sprintf(page, "%s\n", dev_name(&stepper->dev));
+			n = sysfs_emit(page, "%s\n", dev_name(&stepper->dev));
 		device_unlock(dev);
 	}
 	mutex_unlock(&folder->mutex);
@@ -313,7 +319,7 @@ static ssize_t stepper_folder_live_show(struct config_item *item, char *page)
 	mutex_lock(&folder->mutex);
 	live = folder->live;
 	mutex_unlock(&folder->mutex);
-	return sprintf(page, "%d\n", live);
+	return sysfs_emit(page, "%d\n", live);
 }
 
 static int stepper_folder_bind(struct stepper_folder *folder)
@@ -335,20 +341,33 @@ static int stepper_folder_bind(struct stepper_folder *folder)
 	return 0;
 }
 
-/* Motors' folders, and with them this one, cannot be removed while live. */
-static void stepper_folder_pin(struct stepper_folder *folder, bool pin)
+/* The first n motors' folders can be removed again. */
+static void stepper_folder_unpin(struct stepper_folder *folder, int n)
 {
-	int i;
+	while (n--)
+		if (folder->motor[n])
+			configfs_undepend_item_unlocked(folder->motor[n]);
+}
+
+/*
+ * Motors' folders, and with them this one, cannot be removed while live. One that is
+ * just being made or removed cannot be pinned; su_mutex and folder->mutex are held, so that
+ * it is at least linked to its parent, and what is pinned stays what it is.
+ */
+static int stepper_folder_pin(struct stepper_folder *folder)
+{
+	int i, ret;
 
 	for (i = 0; i < INCISE_STEPPER_MOTORS_MAX; i++) {
 		if (!folder->motor[i])
 			continue;
-		if (pin)
-			WARN_ON(configfs_depend_item_unlocked(&stepper_configfs,
-							      folder->motor[i]));
-		else
-			configfs_undepend_item_unlocked(folder->motor[i]);
+		ret = configfs_depend_item_unlocked(&stepper_configfs, folder->motor[i]);
+		if (ret) {
+			stepper_folder_unpin(folder, i);
+			return ret == -ENOENT ? -EBUSY : ret;
+		}
 	}
+	return 0;
 }
 
 static ssize_t stepper_folder_live_store(struct config_item *item, const char *page,
@@ -361,21 +380,26 @@ static ssize_t stepper_folder_live_store(struct config_item *item, const char *p
 	ret = kstrtobool(page, &live);
 	if (ret)
 		return ret;
-	if (live)
-		stepper_folder_pin(folder, true);
+	/* configfs holds su_mutex when it makes and drops folders, so it comes first. */
+	mutex_lock(&stepper_configfs.su_mutex);
 	mutex_lock(&folder->mutex);
-	if (live == !!folder->live) {
+	if (live == !!folder->live)
 		ret = -EPERM;
+	else if (live)
+		ret = stepper_folder_pin(folder);
+	mutex_unlock(&stepper_configfs.su_mutex);
+	if (ret) {
+		/* Nothing was changed. */
 	} else if (live) {
 		ret = stepper_folder_bind(folder);
+		if (ret)
+			stepper_folder_unpin(folder, INCISE_STEPPER_MOTORS_MAX);
 	} else {
 		stepper_nodes_free(folder->live);
 		folder->live = NULL;
+		stepper_folder_unpin(folder, INCISE_STEPPER_MOTORS_MAX);
 	}
 	mutex_unlock(&folder->mutex);
-	/* One pin per live: not for a try that failed, nor after the end. */
-	if (live ? ret : !ret)
-		stepper_folder_pin(folder, false);
 	return ret ? ret : (ssize_t)n;
 }
 CONFIGFS_ATTR(stepper_folder_, live);
