@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * What this machine can do, measured at bind, without moving anything: a hard timer
- * fires SHOTS times, and each time the step lines are written with the value that they
- * have. A config that asks for more is refused.
+ * fires SHOTS times, and each time does what a tick and a leading edge do to the lines: it
+ * reads all inputs of a motor, and writes its step line with the value that it has. A
+ * config that asks for more is refused.
  *
- *   due ─────── lateness ──────▶│◀─ edge ─▶│
- *                              fires       line has changed
+ *   due ─────── lateness ──────▶│◀─ inputs ─▶│◀─ write ─▶│
+ *                              fires                     line has changed
  *
- * With L the lateness that 99 % of shots keep, M its median and E the median cost of an
- * edge, the shortest pulse is p = E + M: below that most edges would be late by more than
+ * With L the lateness that 99 % of shots keep, M its median and E the median cost of a
+ * shot, the shortest pulse is p = E + M: below that most edges would be late by more than
  * their own length. The largest rate is
  *
  *                  10⁹
@@ -16,13 +17,14 @@
  *          max(2p + L, 4n(E + M))
  *
  * First: high and low last p each, and an edge may be late by L. Second: a step is two
- * firings, each of which costs the processor an edge and the way into the interrupt; n
+ * firings, each of which costs the processor a shot and the way into the interrupt; n
  * motors share one processor, and shall leave half of it to others.
  *
  * A machine that was not quiet in one round gets another: what else ran just then, the
  * loading of modules say, is not what it will run later.
  */
 #include <linux/device.h>
+#include <linux/gpio/consumer.h>
 #include <linux/hrtimer.h>
 #include <linux/kernel.h>
 #include <linux/ktime.h>
@@ -45,17 +47,28 @@ struct stepper_trial {
 	int n; /* shots so far */
 	u32 late_ns[SHOTS];
 	u32 edge_ns[SHOTS];
+	u32 seen; /* inputs: their reading is not left out */
 };
+
+static void stepper_ability_shot(struct stepper_trial *trial,
+				 const struct stepper_lines *lines)
+{
+	enum stepper_input input;
+
+	for (input = 0; input < STEPPER_INPUTS; input++)
+		if (lines->input[input])
+			trial->seen += gpiod_get_value(lines->input[input]);
+	compat_gpiod_set_value(lines->step, 0);
+}
 
 static enum hrtimer_restart stepper_ability_fire(struct hrtimer *timer)
 {
 	struct stepper_trial *trial = container_of(timer, struct stepper_trial, timer);
 	struct stepper *stepper = trial->stepper;
-	struct gpio_desc *line = stepper->motor[trial->n % stepper->n_motors].lines.step;
 	s64 due = ktime_to_ns(hrtimer_get_expires(timer));
 	s64 fired = ktime_get_ns(), written;
 
-	compat_gpiod_set_value(line, 0);
+	stepper_ability_shot(trial, &stepper->motor[trial->n % stepper->n_motors].lines);
 	written = ktime_get_ns();
 	trial->late_ns[trial->n] = min(fired - due, (s64)U32_MAX);
 	trial->edge_ns[trial->n] = min(written - fired, (s64)U32_MAX);

@@ -182,6 +182,8 @@ static int stepper_file_command(struct stepper *stepper, unsigned int command,
 		return stepper_setup_position(&stepper->motor[arg->origin.motor],
 					      &arg->origin);
 	case INCISE_STEPPER_SET_SYNC:
+		if (stepper->closing)
+			return -ESHUTDOWN;
 		return stepper_sync_set(stepper, &arg->sync);
 	case INCISE_STEPPER_GET_SYNC:
 		if (!stepper->sync.line)

@@ -170,9 +170,10 @@ struct incise_stepper_event {
  * @name: of the controller, zero-padded
  * @capabilities: INCISE_STEPPER_CAP_… bits
  * @n_motors: 1 … INCISE_STEPPER_MOTORS_MAX
- * @rate_max: steps/s of one motor that this machine's self-test allows; config.velocity
- *            and its pulse times are refused beyond
- * @edge_ns: self-test: median cost of writing a line
+ * @rate_max: steps/s that this machine's self-test allows a motor when all of them move;
+ *            config.velocity and its pulse times are refused beyond. Cruising at it may be
+ *            slower, by what edges are late
+ * @edge_ns: self-test: median cost of reading a motor's inputs and writing a line
  * @lateness_ns: self-test: 99 % of timers were at most this late, in the best of its rounds
  * @lateness_max_ns: self-test: the latest
  * @resolution_ns: of the timer
@@ -270,6 +271,9 @@ struct incise_stepper_origin {
  * @last_ns: of the last pulse's leading edge, read-only likewise
  * @missed: pulses left out because the timer was late by a period, read-only likewise
  * @reserved: zero
+ *
+ * It has no deadman, as nothing moves by it: it goes on when its owner closes the file, until
+ * period_ns is set to 0, the machine reboots or the device is unbound.
  */
 struct incise_stepper_sync {
 	__u64 period_ns;

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include "backends.h"
 
 #define BUILT_IN_SIM "sim" /* rig.c makes it: it stands on a world of its own */
@@ -117,7 +118,7 @@ int incise_backend_find(struct incise_loaded *loaded, const char *kind, const ch
 {
 	char in[PATH_MAX], path[PATH_MAX + 80], known[200];
 	bool has_folder = folder(in, sizeof(in));
-	FILE *file;
+	struct stat status;
 
 	for (size_t i = 0; i < sizeof(built_in) / sizeof(*built_in); i++)
 		if (!strcmp(built_in[i]->kind, kind) &&
@@ -127,11 +128,8 @@ int incise_backend_find(struct incise_loaded *loaded, const char *kind, const ch
 		}
 	if (has_folder && plain(name)) {
 		snprintf(path, sizeof(path), "%s/%s_%s.so", in, kind, name);
-		file = fopen(path, "re");
-		if (file) {
-			fclose(file);
+		if (!stat(path, &status) && S_ISREG(status.st_mode))
 			return load(loaded, kind, name, path, where, err);
-		}
 	}
 	list(kind, has_folder ? in : NULL, known, sizeof(known));
 	return incise_error_set(err, ENODEV,

@@ -14,6 +14,7 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 #include <incise/clock.h>
@@ -138,7 +139,16 @@ static int open_device(struct kernel_stepper *k,
 {
 	const char *todo;
 
-	k->fd = open(k->path, (asked->watch ? O_RDONLY : O_RDWR) | O_CLOEXEC);
+	struct stat status;
+
+	/* Without waiting: a pipe would, for a writer. */
+	k->fd = open(k->path,
+		     (asked->watch ? O_RDONLY : O_RDWR) | O_CLOEXEC | O_NONBLOCK);
+	if (k->fd >= 0 && !fstat(k->fd, &status) && !S_ISCHR(status.st_mode)) {
+		close(k->fd);
+		k->fd = -1;
+		errno = ENOTTY;
+	}
 	if (k->fd >= 0)
 		return 0;
 	switch (errno) {
@@ -155,6 +165,10 @@ static int open_device(struct kernel_stepper *k,
 	case EBUSY:
 		todo = "another program drives it: end that (incise haptic and its service, "
 		       "incise stepper), or only watch";
+		break;
+	case ENOTTY:
+		todo = "is no device; name the one of incise_stepper, such as "
+		       "/dev/incise-stepper0";
 		break;
 	default:
 		todo = strerror(errno);

@@ -137,6 +137,13 @@ rig() { # STEPPER
 	failed_with "rig.conf:2: stepper: the module cannot be loaded"
 }
 
+@test "a module that is a pipe is none, and nobody waits for it" {
+	mkdir -p modules && rm -f modules/stepper_mine.so && mkfifo modules/stepper_mine.so
+	rig mine:1
+	run --separate-stderr timeout 10 incise haptic liver.scene --rig rig.conf --duration 0.1s
+	failed_with 'there is no backend "mine"'
+}
+
 @test "the modules that are built are found beside the library" {
 	unset INCISE_MODULE_PATH
 	[ -e "$INCISE_BUILD/lib/incise/stepper_gpio.so" ] || skip "libgpiod is not installed"

@@ -180,6 +180,21 @@ until_it_says() {
 	done
 }
 
+@test "stepper: a path that is no device is not waited for" {
+	mkfifo pipe
+	: >file
+	for path in pipe file; do
+		cat >kernel.conf <<-END
+			stepper = "kernel:$PWD/$path";
+			actuator = { spring_N_mm = 2.0; travel_mm = 20.0; lead_mm = 4.0; };
+		END
+		for command in status clear; do
+			run --separate-stderr timeout 10 incise stepper $command --rig kernel.conf
+			failed_with "is no device"
+		done
+	done
+}
+
 @test "stepper: bad usage" {
 	run --separate-stderr incise stepper --rig $quick
 	bad_usage "which command"

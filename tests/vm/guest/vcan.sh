@@ -8,8 +8,8 @@ ip link add vcan0 type vcan
 ip link set vcan0 up
 candump -n 1 -T 2000 vcan0 >/run/candump &
 dump=$!
-# The socket of the reader is there when the kernel lists one on the bus.
-while ! grep -qs vcan0 /proc/net/can/rcvlist_all && kill -0 $dump; do :; done
+# The socket of the reader is there when the kernel lists it, not "(vcan0: no entry)".
+while ! grep -Eqs '^ *vcan0 ' /proc/net/can/rcvlist_all && kill -0 $dump; do :; done
 cansend vcan0 123#DEADBEEF
 wait $dump
 check "a frame arrives as it was sent" grep -q '123   \[4\]  DE AD BE EF' /run/candump
