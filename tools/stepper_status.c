@@ -21,8 +21,9 @@ static const struct {
 #define INPUTS (sizeof(inputs) / sizeof(*inputs))
 
 static const char *const fault_keys[] = {
-	"deadman", "travel",   "limit_min", "limit_max", "estop", "alarm",
-	"late",	   "setpoint", "owner",	    "suspend",	 "gone",  "line",
+	"deadman", "travel", "limit_min", "limit_max", "estop",
+	"alarm",   "late",   "setpoint",  "owner",     "suspend",
+	"gone",	   "line",   "bus",	  "lost",      "following",
 };
 _Static_assert(sizeof(fault_keys) / sizeof(*fault_keys) == INCISE_STEPPER_FAULTS,
 	       "a key for each fault");

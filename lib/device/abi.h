@@ -14,6 +14,11 @@
 /* The numbers of requests hold the structs' sizes: before they get their names back. */
 static const unsigned long INCISE_ABI_GET_INFO = INCISE_STEPPER_GET_INFO;
 
+/* What a drive may have beside the kernel's faults; status.faults. */
+#define INCISE_ABI_FAULT_BUS (1U << 16)
+#define INCISE_ABI_FAULT_LOST (1U << 17)
+#define INCISE_ABI_FAULT_FOLLOWING (1U << 18)
+
 #undef incise_stepper_info
 #undef incise_stepper_status
 #undef INCISE_STEPPER_GET_INFO

@@ -14,7 +14,9 @@
 
 #define SETPOINT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(uint32_t))
 #define STATUS_WORDS (sizeof(struct incise_abi_status) / sizeof(uint32_t))
-#define KNOWN_FAULTS (2 * INCISE_STEPPER_FAULT_LINE - 1)
+#define KNOWN_FAULTS                                                  \
+	((2 * INCISE_STEPPER_FAULT_LINE - 1) | INCISE_ABI_FAULT_BUS | \
+	 INCISE_ABI_FAULT_LOST | INCISE_ABI_FAULT_FOLLOWING)
 #define KNOWN_INPUTS (2 * INCISE_STEPPER_LINE_DRIVER - 1)
 
 static void begin(uint32_t *words, uint32_t seq)

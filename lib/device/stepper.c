@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <incise/backend.h>
 #include "home.h"
 
@@ -66,6 +67,8 @@ int incise_stepper_home_edge(struct incise_stepper *stepper, const volatile int 
 {
 	const struct incise_stepper_ops *ops = stepper->ops;
 
+	if (ops->home)
+		return ops->home(stepper, stop, edge, err);
 	if (!ops->jog || !ops->homing || !ops->edge || !ops->origin)
 		return cannot(stepper, "homed: its position is the machine's", err);
 	return incise_home(stepper, stop, edge, err);
@@ -75,6 +78,35 @@ void incise_stepper_info(const struct incise_stepper *stepper,
 			 struct incise_stepper_info *info)
 {
 	stepper->ops->info(stepper, info);
+}
+
+int incise_stepper_cause(struct incise_stepper *stepper, char *text, size_t size)
+{
+	struct incise_stepper_status status = {0};
+	unsigned int faults;
+	int length = 0;
+
+	if (stepper->ops->cause)
+		length = stepper->ops->cause(stepper, text, size);
+	if (length > 0)
+		return length;
+	stepper->ops->status(stepper, &status);
+	/* A target that was held stops nothing. */
+	faults = status.faults & ~INCISE_STEPPER_TRAVEL
+			 ? status.faults & ~INCISE_STEPPER_TRAVEL
+			 : status.faults;
+	return snprintf(text, size, "%s",
+			faults ? incise_stepper_fault_text(
+					 (enum incise_stepper_fault)(faults & -faults))
+			       : "");
+}
+
+int incise_stepper_counter(struct incise_stepper *stepper, int i,
+			   struct incise_stepper_counter *counter)
+{
+	return stepper->ops->counter && i >= 0
+		       ? stepper->ops->counter(stepper, i, counter)
+		       : -ENOENT;
 }
 
 const char *incise_stepper_state_name(enum incise_stepper_state state)
@@ -126,6 +158,15 @@ const char *incise_stepper_fault_text(enum incise_stepper_fault fault)
 	case INCISE_STEPPER_LINE:
 		return "a GPIO line cannot be written or read: see its wiring and the "
 		       "kernel's log, then clear";
+	case INCISE_STEPPER_BUS:
+		return "the bus to the drive fails: see its cable, its ends and "
+		       "`ip -details link show`, then clear";
+	case INCISE_STEPPER_LOST:
+		return "the drive is not heard any more, or began anew: see its power and "
+		       "cable, then clear, enable and home";
+	case INCISE_STEPPER_FOLLOWING:
+		return "it does not follow its targets: see what blocks it, or give a "
+		       "smaller acceleration_mm_s2, then clear";
 	}
 	return "unknown fault: see incise/stepper.h of the version in use";
 }

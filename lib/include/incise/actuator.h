@@ -32,6 +32,31 @@ enum incise_actuator_line {
 #define INCISE_LINES 8	   /**< how many there are */
 #define INCISE_LINES_OUT 3 /**< how many of them are outputs */
 
+/** How a drive on a bus is told where to go; CiA 402's cyclic modes. */
+enum incise_actuator_mode {
+	INCISE_ACTUATOR_CSP, /**< positions; the drive closes all loops */
+	INCISE_ACTUATOR_CSV, /**< velocities; the loop of position is closed here */
+	INCISE_ACTUATOR_CST, /**< torques; those of position and velocity are closed here */
+};
+
+/** A drive on a CAN bus: the group `can`. 0 in a unit: as the drive itself says. */
+struct incise_actuator_can {
+	enum incise_actuator_mode mode;
+	uint32_t bitrate;		  /**< 0: that of the interface */
+	uint32_t cycle_ns;		  /**< between SYNCs */
+	double counts_per_turn;		  /**< position units per turn of the screw */
+	double velocity_per_turn_s;	  /**< velocity units of a turn/s: 60 for rpm */
+	double acceleration_per_turn_s2;  /**< acceleration units of a turn/s² */
+	double following_mm, following_s; /**< off its target by that, for so long */
+	int homing_method;		  /**< CiA 402's number; 0: it cannot home */
+	bool absolute;		      /**< its count is the machine's from power-on on */
+	double position_gain_1_s;     /**< csv: mm/s per mm */
+	double stiffness_permille_mm; /**< cst: ‰ of the rated torque */
+	double damping_permille_s_mm;
+	double torque_max_permille;
+	int master; /**< node id of this program's heartbeat, 1 … 127 */
+};
+
 struct incise_actuator {
 	double spring_N_mm, travel_mm;
 	double lead_mm;	    /**< per turn */
@@ -51,6 +76,7 @@ struct incise_actuator {
 	bool has_lines;		 /**< the group `lines` is there */
 	int line[INCISE_LINES];	 /**< offsets; -1: not wired */
 	unsigned int active_low; /**< bits 1 << incise_actuator_line */
+	struct incise_actuator_can can;
 };
 
 /** One microstep, mm. */

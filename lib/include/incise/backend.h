@@ -14,6 +14,7 @@
 #include <incise/clock.h>
 #include <incise/error.h>
 #include <incise/force.h>
+#include <incise/scan.h>
 #include <incise/stepper.h>
 #include <incise/tracker.h>
 
@@ -83,6 +84,15 @@ struct incise_stepper_ops {
 		     struct incise_stepper_info *info);
 	void (*close)(struct incise_stepper *stepper);
 
+	/** What the device tells of its fault; 0: nothing, and @text is as it was. */
+	int (*cause)(struct incise_stepper *stepper, char *text, size_t size);
+	int (*counter)(struct incise_stepper *stepper, int i,
+		       struct incise_stepper_counter *counter);
+
+	/** A drive that homes by itself; else the parts below. */
+	int (*home)(struct incise_stepper *stepper, const volatile int *stop,
+		    struct incise_stepper_edge_found *edge, struct incise_error *err);
+
 	/* The parts that incise_stepper_home() is made of. */
 
 	/** 0; -EOPNOTSUPP: neither input is wired. */
@@ -100,7 +110,7 @@ struct incise_stepper {
 };
 
 /** Changes when any struct of this header does. */
-#define INCISE_BACKEND_ABI 1
+#define INCISE_BACKEND_ABI 2
 
 /** What rig.conf asks a backend for. */
 struct incise_backend_request {
@@ -132,6 +142,12 @@ struct incise_backend {
 	 */
 	void *(*open)(const struct incise_backend_request *request,
 		      struct incise_error *err);
+	/**
+	 * Look for devices, as incise_scan() says. NULL: it cannot look.
+	 * @arguments of the device's string, as far as it goes: "can0"
+	 */
+	int (*scan)(const char *arguments, incise_scan_found *found, void *context,
+		    struct incise_error *err);
 };
 
 #endif

@@ -19,6 +19,7 @@
 #define INCISE_STEPPER_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
@@ -68,9 +69,12 @@ enum incise_stepper_fault {
 	INCISE_STEPPER_SUSPEND = 512,  /**< the machine went to sleep */
 	INCISE_STEPPER_GONE = 1024,    /**< the device went away */
 	INCISE_STEPPER_LINE = 2048,    /**< a GPIO line cannot be written or read */
+	INCISE_STEPPER_BUS = 4096,     /**< the bus to the drive fails */
+	INCISE_STEPPER_LOST = 8192, /**< the drive is not heard any more, or rebooted */
+	INCISE_STEPPER_FOLLOWING = 16384, /**< it does not follow its targets */
 };
 
-#define INCISE_STEPPER_FAULTS 12 /**< bits of incise_stepper_fault */
+#define INCISE_STEPPER_FAULTS 15 /**< bits of incise_stepper_fault */
 
 /** Inputs that are active; bits. */
 enum incise_stepper_input {
@@ -145,8 +149,9 @@ INCISE_API int incise_stepper_clear(struct incise_stepper *stepper,
 
 /**
  * Find the machine's 0: towards the home input (or the limit at 0 where there is no home),
- * back off, again slowly, then to `home_mm` of rig.conf. Must be powered. Blocks, at most
- * 60 s and a way through the travel at `home_mm_s`; SIGINT stops it through @stop.
+ * back off, again slowly, then to `home_mm` of rig.conf. Must be powered. A drive that
+ * homes by itself does it in its own way. Blocks, at most 60 s and a way through the travel
+ * at `home_mm_s`; SIGINT stops it through @stop.
  *
  * @param stop looked at between polls; non-zero ends with -EINTR and the nut at rest. Or
  *             NULL.
@@ -161,8 +166,9 @@ INCISE_API int incise_stepper_home(struct incise_stepper *stepper,
  * is what the count had lost since, or how well the edge repeats.
  */
 struct incise_stepper_edge_found {
-	double before_mm; /**< in the count that held before */
-	double after_mm;  /**< in that of the machine: `home_mm` of rig.conf */
+	/** In the count that held before; NaN: a drive homed by itself and does not tell. */
+	double before_mm;
+	double after_mm; /**< in that of the machine: `home_mm` of rig.conf */
 };
 
 /**
@@ -176,6 +182,31 @@ INCISE_API int incise_stepper_home_edge(struct incise_stepper *stepper,
 
 INCISE_API void incise_stepper_info(const struct incise_stepper *stepper,
 				    struct incise_stepper_info *info);
+
+/**
+ * The cause of a fault in one line that says what to do: what the device itself tells of
+ * it, such as a drive's emergency message, else incise_stepper_fault_text().
+ *
+ * @param text always a string; empty where there is no fault
+ * @return length of the line, as snprintf(3). For people: not real-time safe.
+ */
+INCISE_API int incise_stepper_cause(struct incise_stepper *stepper, char *text,
+				    size_t size);
+
+/** Something that a backend counts since it was opened; all are 0 on a sound machine. */
+struct incise_stepper_counter {
+	const char *key;  /**< "sync_late", for JSON */
+	const char *text; /**< "SYNCs sent late", for people */
+	uint64_t value;
+};
+
+/**
+ * What else than status.late it counts.
+ * @param i 0 …
+ * @return 0; -ENOENT (there are no more). The strings live as long as the device.
+ */
+INCISE_API int incise_stepper_counter(struct incise_stepper *stepper, int i,
+				      struct incise_stepper_counter *counter);
 
 /** "disabled", "ready", "moving", "stopping", "fault". */
 INCISE_API const char *incise_stepper_state_name(enum incise_stepper_state state);

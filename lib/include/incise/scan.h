@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Which devices there are behind a backend, for who writes a rig.conf: "can:can0" lists the
+ * drives on that bus. Nothing that is found is changed, moved or set up.
+ */
+#ifndef INCISE_SCAN_H
+#define INCISE_SCAN_H
+
+#include <incise/error.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+#define INCISE_SCAN_PROPERTIES 24
+
+/** Something known of a device. */
+struct incise_scan_property {
+	const char *key; /**< "vendor_id": for JSON, lower snake case, unit as suffix */
+	char text[100];	 /**< for people, and for JSON a string */
+};
+
+/** A device. */
+struct incise_scan_device {
+	char device[100]; /**< what rig.conf names it by, such as "can:can0:0x10" */
+	char what[100];	  /**< a line: what it is, and how it is */
+	int n;
+	struct incise_scan_property property[INCISE_SCAN_PROPERTIES];
+};
+
+/**
+ * Called for each device that is found. @device lives until it returns.
+ * @return 0; another value ends the scan, which returns it
+ */
+typedef int incise_scan_found(void *context, const struct incise_scan_device *device);
+
+/**
+ * Look for devices. Blocks, for some seconds at most.
+ *
+ * @param kind "stepper", "tracker", "force" or "camera"
+ * @param spec "BACKEND:ARGUMENTS", such as "can:can0"
+ * @return 0, also where none was found; what @found returned; -EINVAL (@spec),
+ *         -ENODEV (no such backend, or bus), -EOPNOTSUPP (the backend cannot look),
+ *         -EACCES, -EBUSY, -ENETDOWN, -EIO.
+ */
+INCISE_API int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
+			   void *context, struct incise_error *err);
+
+INCISE_END_DECLS
+#endif

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/scan.c: what it says where there is nothing to scan. What it finds is in the
+ * tests of the backends that can.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <string.h>
+#include <incise/scan.h>
+
+static int found(void *context, const struct incise_scan_device *device)
+{
+	fail_msg("found %s", device->device);
+	return 0;
+}
+
+static void what_cannot_be_scanned_is_said(void **state)
+{
+	static const struct {
+		const char *spec;
+		int code;
+		const char *says;
+	} cases[] = {
+		{"can0", EINVAL, "can0: expected BACKEND:ARGUMENTS"},
+		{"", EINVAL, "expected BACKEND:ARGUMENTS"},
+		{"an_extremely_long_name_of_a_backend:x", EINVAL, "expected BACKEND"},
+		{"nosuch:can0", ENODEV, "there is no backend \"nosuch\""},
+		{"../../etc:can0", ENODEV, "there is no backend"},
+		{"kernel:/dev/incise-stepper0", EOPNOTSUPP, "cannot look for devices"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		int rc = incise_scan("stepper", cases[i].spec, found, NULL, &err);
+
+		if (rc != -cases[i].code || err.code != cases[i].code ||
+		    !strstr(err.text, cases[i].says))
+			fail_msg("%s: %d, \"%s\"", cases[i].spec, rc, err.text);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(what_cannot_be_scanned_is_said),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
