@@ -58,13 +58,14 @@ endef
 $(foreach name,$(device_modules),$(eval $(call device_module,$(name))))
 
 # For unit tests, which reach into what the shared objects hide.
-test_objects := $(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o)
+test_objects := $(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
+	$(patsubst %.c,$(O)/obj/%.o,$(filter-out %/stepper_can.c %/stepper_slcan.c,$(wildcard lib/device/can/*.c)))
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
 	# q, not r: two rooms may have a file of the same name
 	$(AR) qcs $@ $^
 
-all_libs = $(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
+all_libs = $(shell $(PKG_CONFIG) --libs libsocketcan 2>/dev/null) $(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
 
 .PHONY: libs
