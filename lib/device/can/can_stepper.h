@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * A stepper that is a CiA 402 drive on a CAN bus, over any transport; see can_bus.h. A
+ * thread of its own owns the bus while the drive has power; without power, callers of
+ * enable, clear and home borrow it for SDOs.
+ */
+#ifndef INCISE_CAN_STEPPER_H
+#define INCISE_CAN_STEPPER_H
+
+#include <incise/backend.h>
+#include "can_bus.h"
+
+/* As struct incise_backend.open and .scan, of a backend with this transport. */
+void *can_stepper_open(const struct can_transport *transport,
+		       const struct incise_backend_request *request,
+		       struct incise_error *err);
+int can_stepper_scan(const struct can_transport *transport, const char *arguments,
+		     incise_scan_found *found, void *context, struct incise_error *err);
+
+#endif
