@@ -17,8 +17,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
-#include <incise/profile.h>
-#include "../abi.h"
+#include "../motion.h"
 
 struct incise_pulser;
 
@@ -37,26 +36,19 @@ struct incise_pulser_door {
 struct incise_pulser {
 	const struct incise_pulser_door *door;
 	void *world;
-	const struct incise_stepper_setpoint *setpoint; /* another thread's to write */
-	struct incise_abi_status *slot;			/* another thread's to read */
+	struct incise_motion motion; /* its setpoint and slot are to be set */
 
 	/* private */
-	struct incise_stepper_config config;
-	struct incise_abi_status status; /* what goes into the slot */
-	struct incise_stepper_setpoint wish;
-	struct incise_profile profile;
 	struct incise_profile_slot steps;  /* of this tick */
 	int32_t given;			   /* of them */
 	int64_t interval_ns;		   /* of steps at the largest velocity */
 	int64_t base_ns;		   /* begin of the tick */
 	int64_t powered_ns;		   /* no step before that */
-	int64_t seen_ns;		   /* the last sign of life */
 	int64_t lead_ns, trail_ns, dir_ns; /* the last edges, when they were made */
 	int64_t lead_want_ns;		   /* that step by the profile */
-	uint32_t seq;			   /* of the last set-point */
 	uint32_t late_row;
 	int direction; /* +1, -1; 0: not known */
-	bool powered, resting, ending, high;
+	bool high;
 };
 
 /* A motor without power at 0. Returns 0, -EINVAL as incise_profile_init() says. */

@@ -145,7 +145,7 @@ static void *thread_run(void *argument)
 
 	while (command != END) {
 		int64_t due = incise_pulser_run(&g->pulser);
-		int64_t spin_ns = g->pulser.resting ? 0 : g->spin_ns;
+		int64_t spin_ns = g->pulser.motion.resting ? 0 : g->spin_ns;
 
 		command = atomic_load_explicit(&g->command, memory_order_acquire);
 		if (command != NONE) {
@@ -397,8 +397,8 @@ static void *gpio_open(const struct incise_backend_request *asked,
 	incise_motor_init(&g->motor);
 	g->pulser.door = &world_door;
 	g->pulser.world = g;
-	g->pulser.setpoint = &g->setpoint;
-	g->pulser.slot = &g->status;
+	g->pulser.motion.setpoint = &g->setpoint;
+	g->pulser.motion.slot = &g->status;
 	rc = set_up(g, asked, err);
 	if (!rc)
 		return &g->motor.stepper;

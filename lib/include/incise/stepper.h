@@ -193,11 +193,12 @@ INCISE_API void incise_stepper_info(const struct incise_stepper *stepper,
 INCISE_API int incise_stepper_cause(struct incise_stepper *stepper, char *text,
 				    size_t size);
 
-/** Something that a backend counts since it was opened; all are 0 on a sound machine. */
+/** Something that a backend counts since it was opened. */
 struct incise_stepper_counter {
 	const char *key;  /**< "sync_late", for JSON */
 	const char *text; /**< "SYNCs sent late", for people */
 	uint64_t value;
+	bool trouble; /**< it is 0 on a sound machine */
 };
 
 /**

@@ -168,8 +168,8 @@ static void bench_start(struct bench *b, bool home, bool limits, bool invert,
 	b->pulser = (struct incise_pulser){
 		.door = &machine_door,
 		.world = &b->machine,
-		.setpoint = &b->setpoint,
-		.slot = &b->status,
+		.motion.setpoint = &b->setpoint,
+		.motion.slot = &b->status,
 	};
 	assert_int_equal(incise_pulser_init(&b->pulser, &b->config), 0);
 }
@@ -200,7 +200,7 @@ static void every_case_on_a_made_clock(void **state)
 				.slack_s = 0.1,
 				.say = failed,
 			};
-			const struct incise_abi_status *told = &b.pulser.status;
+			const struct incise_abi_status *told = &b.pulser.motion.status;
 			int64_t start;
 
 			bench_start(&b, row[k].home, row[k].limits, row[k].invert,

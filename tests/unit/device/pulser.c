@@ -48,8 +48,8 @@ static void start(struct bench *b, unsigned int flags)
 	b->pulser = (struct incise_pulser){
 		.door = &machine_door,
 		.world = &b->machine,
-		.setpoint = &b->setpoint,
-		.slot = &b->status,
+		.motion.setpoint = &b->setpoint,
+		.motion.slot = &b->status,
 	};
 	assert_int_equal(incise_pulser_init(&b->pulser, &b->config), 0);
 	assert_int_equal(b->status.state, INCISE_STEPPER_STATE_DISABLED);
@@ -160,7 +160,7 @@ static void some_faults_halt_at_once(void **state)
 		uint64_t steps;
 
 		under_way(&b, 0);
-		b.pulser.status.flags |= INCISE_STEPPER_FLAG_HOMED;
+		b.pulser.motion.status.flags |= INCISE_STEPPER_FLAG_HOMED;
 		steps = b.machine.steps;
 		b.machine.forced = cases[i].forced;
 		b.machine.write_error = cases[i].write_error;

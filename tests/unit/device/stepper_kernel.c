@@ -95,9 +95,9 @@ static int configure(const struct incise_stepper_config *config)
 	module.machine.config = &module.config;
 	module.pulser.door = &machine_door;
 	module.pulser.world = &module.machine;
-	module.pulser.setpoint =
+	module.pulser.motion.setpoint =
 		(struct incise_stepper_setpoint *)module.setpoints + MOTOR;
-	module.pulser.slot = (struct incise_abi_status *)module.status + MOTOR;
+	module.pulser.motion.slot = (struct incise_abi_status *)module.status + MOTOR;
 	module.configured = true;
 	return incise_pulser_init(&module.pulser, &module.config);
 }
@@ -263,7 +263,8 @@ static void every_case(void **state)
 		c.stepper->ops->close(c.stepper);
 		/* Closed while it was powered, it came to rest, and that is no fault. */
 		assert_false(module.machine.enable);
-		assert_false(module.pulser.status.faults & INCISE_STEPPER_FAULT_OWNER);
+		assert_false(module.pulser.motion.status.faults &
+			     INCISE_STEPPER_FAULT_OWNER);
 		assert_int_equal(module.opened, 0);
 		assert_int_equal(module.mapped, 0);
 		assert_int_equal(module.machine.too_short, 0);
@@ -386,8 +387,8 @@ static void a_count_outside_the_travel_begins_anew(void **state)
 		struct incise_stepper *stepper;
 
 		module_load();
-		module.pulser.status.position = cases[i].before;
-		module.pulser.status.flags = INCISE_STEPPER_FLAG_HOMED;
+		module.pulser.motion.status.position = cases[i].before;
+		module.pulser.motion.status.flags = INCISE_STEPPER_FLAG_HOMED;
 		stepper = open_stepper("/dev/incise-stepper0:2", false, &actuator, NULL);
 		assert_non_null(stepper);
 		assert_int_equal(incise_stepper_status(stepper, &status), 0);
