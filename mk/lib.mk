@@ -42,7 +42,7 @@ $(foreach lib,$(libraries),$(eval $(call library,$(lib))))
 # it does not export, they hold themselves.
 device_modules := $(if $(shell $(PKG_CONFIG) --exists libgpiod && echo yes),stepper_gpio)
 pc_stepper_gpio := libgpiod
-objects_stepper_gpio := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o gpio/pulser.o \
+objects_stepper_gpio := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o thread.o gpio/pulser.o \
 	gpio/stepper_gpio.o \
 	$(if $(shell $(PKG_CONFIG) --atleast-version=2 libgpiod && echo yes),gpio/gpio_v2.o,gpio/gpio_v1.o))
 

@@ -350,12 +350,12 @@ static void take_hold(const struct job *job, struct incise_rig *rig)
 	if (rc)
 		cli_fail("%s: %s", info.name, strerror(-rc));
 	if (!status.homed && !job->home) {
-		if (info.inputs & (INCISE_STEPPER_AT_HOME | INCISE_STEPPER_AT_MIN))
+		if (info.can_home)
 			cli_fail(
 				"%s is not homed; run `incise stepper home --rig %s`, or "
 				"give --home",
 				info.name, incise_rig_spec(rig));
-		cli_warn("%s has no home input: its 0 is where it stands", info.name);
+		cli_warn("%s cannot be homed: its 0 is where it stands", info.name);
 	}
 	if (!status.homed && job->home)
 		rc = home(stepper, &err);

@@ -185,14 +185,16 @@ static const char *fault_text(const struct incise_motor *motor)
 	return incise_stepper_fault_text((enum incise_stepper_fault)(faults & -faults));
 }
 
-/* What the door said, in words, with what is known of the cause. */
+/* What the door said, in its own words, or in ours with what is known of the cause. */
 static int told(struct incise_motor *motor, int rc, const char *what,
-		struct incise_error *err)
+		const struct incise_error *said, struct incise_error *err)
 {
 	const char *why = NULL;
 
 	if (!rc)
 		return 0;
+	if (said->code)
+		return incise_error_set(err, -rc, "%s", said->text);
 	look(motor);
 	if (motor->watches)
 		why = "it was opened to watch; the program that drives it can";
@@ -214,18 +216,20 @@ static int told(struct incise_motor *motor, int rc, const char *what,
 static int motor_enable(struct incise_stepper *stepper, struct incise_error *err)
 {
 	struct incise_motor *motor = of(stepper);
-	int rc = motor->watches ? -EPERM : motor->door->enable(motor);
+	struct incise_error why = {0};
+	int rc = motor->watches ? -EPERM : motor->door->enable(motor, &why);
 
 	motor->beyond = false;
-	return told(motor, rc, "cannot be enabled", err);
+	return told(motor, rc, "cannot be enabled", &why, err);
 }
 
 static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
 {
 	struct incise_motor *motor = of(stepper);
-	int rc = motor->watches ? -EPERM : motor->door->clear(motor);
+	struct incise_error why = {0};
+	int rc = motor->watches ? -EPERM : motor->door->clear(motor, &why);
 
-	return told(motor, rc, "cannot be cleared", err);
+	return told(motor, rc, "cannot be cleared", &why, err);
 }
 
 static int motor_wait(struct incise_stepper *stepper, int64_t ns)
@@ -267,7 +271,7 @@ static int motor_disable(struct incise_stepper *stepper, struct incise_error *er
 						"switch its power off",
 						motor->name);
 	}
-	return told(motor, rc, "cannot be disabled", err);
+	return told(motor, rc, "cannot be disabled", &(struct incise_error){0}, err);
 }
 
 static void motor_info(const struct incise_stepper *stepper,
@@ -285,6 +289,8 @@ static void motor_info(const struct incise_stepper *stepper,
 		.jerk_mm_s3 = actuator->jerk_mm_s3,
 		.deadman_s = actuator->deadman_s,
 		.rate_max_hz = motor->rate_max_hz,
+		.can_home = motor->lines &
+			    (INCISE_STEPPER_LINE_HOME | INCISE_STEPPER_LINE_LIMIT_MIN),
 		.origin_mm = actuator->origin_mm,
 		.inputs = own_bits(input_bits, motor->lines),
 	};

@@ -15,11 +15,14 @@
 
 struct incise_motor;
 
-/* Each returns 0 or a negative errno as the ioctl of the same name does. */
+/*
+ * Each returns 0 or a negative errno as the ioctl of the same name does. Who knows more of
+ * the cause says so in @err, which is always there.
+ */
 struct incise_motor_door {
-	int (*enable)(struct incise_motor *motor);
+	int (*enable)(struct incise_motor *motor, struct incise_error *err);
 	int (*disable)(struct incise_motor *motor); /* begins it */
-	int (*clear)(struct incise_motor *motor);
+	int (*clear)(struct incise_motor *motor, struct incise_error *err);
 	int (*origin)(struct incise_motor *motor, int32_t steps, bool homed);
 	void (*close)(struct incise_motor *motor);
 	int64_t (*now)(struct incise_motor *motor);

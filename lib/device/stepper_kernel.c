@@ -52,8 +52,9 @@ static int on_mask(struct incise_motor *motor, unsigned long number)
 	return request(of(motor), number, &mask);
 }
 
-static int kernel_enable(struct incise_motor *motor)
+static int kernel_enable(struct incise_motor *motor, struct incise_error *err)
 {
+	(void)err;
 	return on_mask(motor, INCISE_STEPPER_ENABLE);
 }
 
@@ -62,8 +63,9 @@ static int kernel_disable(struct incise_motor *motor)
 	return on_mask(motor, INCISE_STEPPER_DISABLE);
 }
 
-static int kernel_clear(struct incise_motor *motor)
+static int kernel_clear(struct incise_motor *motor, struct incise_error *err)
 {
+	(void)err;
 	return on_mask(motor, INCISE_STEPPER_CLEAR);
 }
 

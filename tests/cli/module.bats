@@ -90,7 +90,7 @@ rig() { # STEPPER
 	[[ "${stderr_lines[-1]}" == *"mine at lost with switch cannot be homed"* ]]
 	rig "mine:lost"
 	run -0 --separate-stderr incise haptic liver.scene --rig rig.conf --duration 0.1s
-	[[ "$stderr" == *"warning: mine at lost has no home input: its 0 is where it stands"* ]]
+	[[ "$stderr" == *"warning: mine at lost cannot be homed: its 0 is where it stands"* ]]
 }
 
 @test "a fault of the actuator ends the loop with its name" {

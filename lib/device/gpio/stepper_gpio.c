@@ -12,8 +12,6 @@
 #include <errno.h>
 #include <limits.h>
 #include <pthread.h>
-#include <sched.h>
-#include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,11 +20,11 @@
 #include <time.h>
 #include <incise/clock.h>
 #include "../motor.h"
+#include "../thread.h"
 #include "gpio_lines.h"
 #include "pulser.h"
 
-#define PRIORITY 85 /* above a haptic loop at 80, which must not hold up steps */
-#define SLEEPS 64   /* of the self-test */
+#define SLEEPS 64 /* of the self-test */
 #define SLEEP_NS 200000
 #define SPIN_MAX_NS 200000
 #define WRITES 64
@@ -179,8 +177,9 @@ static int ask(struct gpio_stepper *g, enum command command)
 	return g->answer;
 }
 
-static int gpio_enable(struct incise_motor *motor)
+static int gpio_enable(struct incise_motor *motor, struct incise_error *err)
 {
+	(void)err;
 	return ask(of(motor), ENABLE);
 }
 
@@ -189,8 +188,9 @@ static int gpio_disable(struct incise_motor *motor)
 	return ask(of(motor), DISABLE);
 }
 
-static int gpio_clear(struct incise_motor *motor)
+static int gpio_clear(struct incise_motor *motor, struct incise_error *err)
 {
+	(void)err;
 	return ask(of(motor), CLEAR);
 }
 
@@ -263,24 +263,16 @@ static int self_test(struct gpio_stepper *g, uint32_t *rate_max, uint32_t *pulse
 
 static int start_thread(struct gpio_stepper *g)
 {
-	struct sched_param priority = {.sched_priority = PRIORITY};
-	sigset_t all, before;
-	int rc;
+	size_t length = strlen(g->motor.name);
+	bool real_time;
+	int rc = incise_thread_start(&g->thread, thread_run, g, &real_time);
 
-	/* Signals are the program's; none shall hold up a step. */
-	sigfillset(&all);
-	pthread_sigmask(SIG_SETMASK, &all, &before);
-	rc = pthread_create(&g->thread, NULL, thread_run, g);
-	pthread_sigmask(SIG_SETMASK, &before, NULL);
 	if (rc)
-		return -rc;
+		return rc;
 	g->runs = true;
-	if (pthread_setschedparam(g->thread, SCHED_FIFO, &priority)) {
-		size_t length = strlen(g->motor.name);
-
+	if (!real_time)
 		snprintf(g->motor.name + length, sizeof(g->motor.name) - length,
 			 ", not real-time");
-	}
 	return 0;
 }
 

@@ -38,6 +38,7 @@ struct incise_stepper_info {
 	double deadman_s;	   /**< without a target for so long, it stops */
 	double rate_max_hz;	   /**< largest step rate the backend takes; 0: any */
 	bool measures_handle;	   /**< status has handle_mm and force_N */
+	bool can_home;		   /**< incise_stepper_home() can find its 0 */
 	double origin_mm;    /**< without measures_handle: where handle_mm is 0, along
 					the actuator's axis in the tracker's frame */
 	unsigned int inputs; /**< incise_stepper_input bits that are wired */

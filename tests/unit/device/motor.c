@@ -69,7 +69,7 @@ static struct bench *of(struct incise_motor *motor)
 	return (struct bench *)motor;
 }
 
-static int bench_enable(struct incise_motor *motor)
+static int bench_enable(struct incise_motor *motor, struct incise_error *err)
 {
 	return incise_pulser_enable(&of(motor)->pulser);
 }
@@ -80,7 +80,7 @@ static int bench_disable(struct incise_motor *motor)
 	return 0;
 }
 
-static int bench_clear(struct incise_motor *motor)
+static int bench_clear(struct incise_motor *motor, struct incise_error *err)
 {
 	return incise_pulser_clear(&of(motor)->pulser);
 }

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A thread of a device that is to be on time; see thread.h.
+ */
+#include <sched.h>
+#include <signal.h>
+#include "thread.h"
+
+int incise_thread_start(pthread_t *thread, void *(*run)(void *), void *argument,
+			bool *real_time)
+{
+	struct sched_param priority = {.sched_priority = INCISE_THREAD_PRIORITY};
+	sigset_t all, before;
+	int rc;
+
+	sigfillset(&all);
+	pthread_sigmask(SIG_SETMASK, &all, &before);
+	rc = pthread_create(thread, NULL, run, argument);
+	pthread_sigmask(SIG_SETMASK, &before, NULL);
+	if (rc)
+		return -rc;
+	*real_time = !pthread_setschedparam(*thread, SCHED_FIFO, &priority);
+	return 0;
+}
