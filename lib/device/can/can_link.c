@@ -1,0 +1,513 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A drive and the bus that leads to it; see can_link.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <linux/can/netlink.h>
+#include "../motor.h"
+#include "bus_load.h"
+#include "can_link.h"
+
+#define MS 1000000LL
+#define DEVICE_MAX 200
+#define LISTEN_NS (60 * MS)   /* for another master; a SYNC comes every 20 ms at least */
+#define READY_NS (500 * MS)   /* until it says that it is operational */
+#define DEADMAN_LEAST_S 0.02  /* heartbeats are in whole ms, and four must fit */
+#define MARGIN 1.25	      /* of the drive's limits, so that ours come first */
+#define FINEST_STEPS_S 150000 /* of the profile: below its largest */
+
+int can_link_parse(const char *arguments, char *device, size_t size, unsigned int *node)
+{
+	const char *colon = strrchr(arguments, ':');
+	size_t length = colon ? (size_t)(colon - arguments) : 0;
+	unsigned long value;
+	char *end;
+
+	if (!length || length >= size || !colon[1] || strchr("+- \t", colon[1]))
+		return -EINVAL;
+	value = strtoul(colon + 1, &end, 0);
+	if (*end || value < 1 || value > 127)
+		return -EINVAL;
+	memcpy(device, arguments, length);
+	device[length] = '\0';
+	*node = (unsigned int)value;
+	return 0;
+}
+
+/* Only what concerns this drive, and what would show another master. */
+static int set_filter(struct can_link *link)
+{
+	const uint32_t node = link->master.node;
+	const uint32_t ids[] = {
+		CANOPEN_SYNC,
+		CANOPEN_EMCY + node,
+		CANOPEN_TPDO1 + node,
+		CANOPEN_TPDO2 + node,
+		CANOPEN_RPDO1 + node,
+		CANOPEN_SDO_ANSWER + node,
+		CANOPEN_HEARTBEAT + node,
+		CANOPEN_HEARTBEAT + link->master.own,
+	};
+	struct can_filter filter[sizeof(ids) / sizeof(*ids)];
+	int n = sizeof(ids) / sizeof(*ids);
+
+	for (int i = 0; i < n; i++)
+		filter[i] = (struct can_filter){ids[i], CAN_EFF_FLAG | CAN_RTR_FLAG |
+								CAN_SFF_MASK};
+	return link->bus->ops->filter(link->bus, filter, n);
+}
+
+static int open_bus(struct can_link *link, const struct can_transport *transport,
+		    const struct incise_backend_request *asked, bool look,
+		    struct incise_error *err)
+{
+	const struct incise_actuator_can *can = &asked->actuator->can;
+	char device[DEVICE_MAX];
+	struct can_bus_request request = {
+		.where = asked->where, .device = device, .bitrate = can->bitrate};
+	unsigned int node;
+	int rc = can_link_parse(asked->arguments, device, sizeof(device), &node);
+
+	if (rc)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: expected %s:DEVICE:NODE such as %s with a node id of 1 to 127, "
+			"found %s:%.60s; `incise info %s` lists drives",
+			asked->where, transport->name,
+			strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0:0x10"
+						       : "can:can0:0x10",
+			transport->name, asked->arguments,
+			strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0"
+						       : "can:can0");
+	if (node == (unsigned int)can->master)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: node %u is also actuator.can.master, the id of "
+			"this program's heartbeat; give another one there",
+			asked->where, node);
+	request.node = look ? 0 : (uint8_t)node;
+	rc = transport->open(&link->bus, &request, err);
+	if (rc)
+		return rc;
+	link->master = (struct canopen){
+		.bus = link->bus, .node = (uint8_t)node, .state = CANOPEN_UNKNOWN};
+	snprintf(link->where, sizeof(link->where), "drive 0x%02x at %.36s", node,
+		 link->bus->name);
+	return 0;
+}
+
+static bool is_foreign(const struct canopen *master)
+{
+	return master->foreign;
+}
+
+static int check_alone(struct can_link *link, const char *where, struct incise_error *err)
+{
+	int64_t until = link->bus->ops->now(link->bus) + LISTEN_NS;
+	int rc = canopen_await(&link->master, is_foreign, until);
+
+	if (rc == -ETIMEDOUT)
+		return 0;
+	if (rc)
+		return incise_error_set(err, -rc, "%s: %s: %s", where, link->bus->name,
+					strerror(-rc));
+	return incise_error_set(
+		err, EBUSY,
+		"%s: another master sends SYNCs, set-points or heartbeats of node 0x%02x on "
+		"%s; end it, or give another actuator.can.master",
+		where, link->master.own, link->bus->name);
+}
+
+/* Steps as fine as the drive's counts, or as fine as the profile can take them. */
+static void fit_steps(struct can_link *link)
+{
+	struct incise_actuator *a = &link->actuator;
+	double most = fmin(FINEST_STEPS_S * a->lead_mm / a->velocity_mm_s,
+			   INCISE_PROFILE_POSITION_MAX * a->lead_mm / a->travel_mm);
+
+	a->steps_per_turn = (int)fmax(
+		1, floor(fmin(fmin(link->units.counts_per_turn, most), INT32_MAX)));
+	a->microsteps = 1;
+	a->tick_ns = a->can.cycle_ns;
+}
+
+static uint32_t units_of(double value)
+{
+	return (uint32_t)fmax(1, fmin(UINT32_MAX, ceil(value)));
+}
+
+static int32_t counts_of(double value)
+{
+	return (int32_t)fmax(INT32_MIN, fmin(INT32_MAX, round(value)));
+}
+
+/* The range of positions in counts, with what it may be off. */
+static void fit_range(struct can_link *link)
+{
+	const struct incise_actuator *a = &link->actuator;
+	double per_mm = link->axis.setup.counts_per_step / incise_actuator_step_mm(a);
+	double low = link->axis.zero_counts +
+		     per_mm * (fmin(0, a->home_mm) - link->following_mm);
+	double high =
+		link->axis.zero_counts + per_mm * (a->travel_mm + link->following_mm);
+
+	link->setup.limited = link->is_homed;
+	link->setup.position_min = counts_of(fmin(low, high));
+	link->setup.position_max = counts_of(fmax(low, high));
+}
+
+static void fit_setup(struct can_link *link)
+{
+	const struct incise_actuator *a = &link->actuator;
+	const struct incise_actuator_can *can = &a->can;
+	static const enum cia402_mode modes[] = {
+		[INCISE_ACTUATOR_CSP] = CIA402_CSP,
+		[INCISE_ACTUATOR_CSV] = CIA402_CSV,
+		[INCISE_ACTUATOR_CST] = CIA402_CST,
+	};
+	uint32_t deadman_ms = (uint32_t)ceil(a->deadman_s * 1e3 - 1e-9);
+	uint32_t beat_ms = deadman_ms / 4 < 250 ? deadman_ms / 4 : 250;
+
+	link->setup = (struct cia402_setup){
+		.mode = modes[can->mode],
+		.cycle_ns = can->cycle_ns,
+		.deadman_ms = deadman_ms,
+		.master = (uint8_t)can->master,
+		.beat_ms = beat_ms,
+		.velocity = units_of(MARGIN * a->velocity_mm_s / a->lead_mm *
+				     link->units.velocity_per_turn_s),
+		.acceleration = units_of(MARGIN * a->acceleration_mm_s2 / a->lead_mm *
+					 link->units.acceleration_per_turn_s2),
+		.following = units_of(can->following_mm / a->lead_mm *
+				      link->units.counts_per_turn),
+		.following_ms = (uint16_t)fmin(65535, ceil(can->following_s * 1e3)),
+		.torque_permille = can->mode == INCISE_ACTUATOR_CST
+					   ? (uint16_t)can->torque_max_permille
+					   : 0,
+	};
+	link->master.own = (uint8_t)can->master;
+	link->master.beat_ns = beat_ms * MS;
+}
+
+static int fit_axis(struct can_link *link, const char *where, struct incise_error *err)
+{
+	const struct incise_actuator *a = &link->actuator;
+	double step_mm = incise_actuator_step_mm(a), sign = a->invert ? -1 : 1;
+	double turns = sign / a->steps_per_turn; /* per step */
+	struct can_axis_setup setup = {
+		.step_mm = step_mm,
+		.mode = link->setup.mode,
+		.counts_per_step = turns * link->units.counts_per_turn,
+		.units_per_step_s = turns * link->units.velocity_per_turn_s,
+		.gain_1_s = a->can.position_gain_1_s,
+		.torque_per_step = sign * a->can.stiffness_permille_mm * step_mm,
+		.torque_s_per_step = sign * a->can.damping_permille_s_mm * step_mm,
+		.torque_most = a->can.torque_max_permille,
+		.silence_ns = (link->setup.deadman_ms + 2 * link->setup.beat_ms) * MS,
+		.following = (int32_t)ceil(a->can.following_mm / step_mm),
+		.following_ns = (int64_t)(a->can.following_s * INCISE_NS_PER_S),
+	};
+	int rc;
+
+	incise_motor_config(a, 0, &setup.config);
+	/* Room for where homing ends; targets lie within the travel all the same. */
+	if (a->home_mm < 0)
+		setup.config.position_min = (int64_t)floor(a->home_mm / step_mm);
+	rc = can_axis_init(&link->axis, &setup);
+	link->axis.master = &link->master;
+	if (rc)
+		return incise_error_set(
+			err, -rc,
+			"%s: velocity_mm_s = %g, acceleration_mm_s2 = %g or jerk_mm_s3 = %g "
+			"is nothing that cycles of %g us can make; correct it",
+			where, a->velocity_mm_s, a->acceleration_mm_s2, a->jerk_mm_s3,
+			a->can.cycle_ns / 1e3);
+	return 0;
+}
+
+static int check_load(struct can_link *link, const char *where, struct incise_error *err)
+{
+	uint32_t cycle_ns = link->actuator.can.cycle_ns, bitrate = link->bus->bitrate;
+	unsigned int target = link->setup.mode == CIA402_CST ? 2 : 4;
+	uint32_t load = bus_load_of(cycle_ns, 2 + target, 6, link->master.beat_ns);
+	double least_us;
+
+	if (!bitrate)
+		return 0;
+	link->load_percent = (uint32_t)ceil(100.0 * load / bitrate);
+	if (link->load_percent <= BUS_LOAD_MOST)
+		return 0;
+	least_us = ceil((double)cycle_ns / 1e3 * link->load_percent / BUS_LOAD_MOST);
+	return incise_error_set(
+		err, ERANGE,
+		"%s: a cycle each %g us takes %u kbit/s, %u %% of the %u kbit/s of %s, and "
+		"may take %d %%; give a bit rate of at least %u kbit/s, or cycle_us = %g",
+		where, cycle_ns / 1e3, (load + 999) / 1000, link->load_percent,
+		bitrate / 1000, link->bus->name, BUS_LOAD_MOST,
+		(load * 100 / BUS_LOAD_MOST + 999) / 1000, least_us);
+}
+
+/* Where it stands, and what of that is the machine's. */
+static int take_position(struct can_link *link, const char *where,
+			 struct incise_error *err)
+{
+	const struct incise_actuator *a = &link->actuator;
+	double per_mm = link->axis.setup.counts_per_step / incise_actuator_step_mm(a);
+	struct incise_abi_status *status = &link->axis.motion.status;
+	uint32_t counts;
+	int rc = canopen_read(&link->master, 0x6064, 0, 4, &counts);
+
+	if (rc)
+		return incise_error_set(err, -rc,
+					"%s: its position (6064) cannot be read: %s",
+					where, strerror(-rc));
+	link->axis.position = (int32_t)counts;
+	link->axis.zero_counts = link->is_homed ? -a->home_mm * per_mm : (int32_t)counts;
+	status->position = can_axis_steps(&link->axis, link->axis.position);
+	status->flags &= ~INCISE_STEPPER_FLAG_HOMED;
+	if (link->is_homed)
+		status->flags |= INCISE_STEPPER_FLAG_HOMED;
+	return 0;
+}
+
+static int ask_homed(struct can_link *link, const char *where, struct incise_error *err)
+{
+	link->is_homed = link->actuator.can.absolute;
+	if (link->is_homed || !link->actuator.can.homing_method)
+		return 0;
+	return cia402_homed(&link->master, link->setup.mode, &link->is_homed, where, err);
+}
+
+/* All of it, also after it began anew. */
+static int set_up(struct can_link *link, const char *where, struct incise_error *err)
+{
+	struct can_axis_setup *setup = &link->axis.setup;
+	int rc = ask_homed(link, where, err);
+
+	link->is_setup = false;
+	if (!rc)
+		rc = take_position(link, where, err);
+	if (rc)
+		return rc;
+	fit_range(link);
+	link->boots = link->master.boots;
+	rc = cia402_configure(&link->master, &link->setup, &link->taken, where, err);
+	if (rc)
+		return rc;
+	link->is_setup = true;
+	setup->inputs = link->taken.inputs;
+	setup->wired = link->taken.inputs ? INCISE_STEPPER_LINE_LIMIT_MIN |
+						    INCISE_STEPPER_LINE_LIMIT_MAX |
+						    INCISE_STEPPER_LINE_HOME |
+						    INCISE_STEPPER_LINE_ESTOP
+					  : 0;
+	return 0;
+}
+
+/* A fault that it has from before: whoever drives it must hear of it. */
+static void take_fault(struct can_link *link)
+{
+	struct can_axis *axis = &link->axis;
+	uint32_t word = 0, code = 0;
+
+	if (canopen_read(&link->master, 0x6041, 0, 2, &word))
+		return;
+	axis->statusword = (uint16_t)word;
+	if (cia402_state(axis->statusword) != CIA402_FAULT)
+		return;
+	axis->motion.status.faults |= INCISE_STEPPER_FAULT_DRIVER;
+	axis->motion.status.state = INCISE_STEPPER_STATE_FAULT;
+	if (canopen_read(&link->master, 0x603f, 0, 2, &code))
+		code = 0;
+	axis->why_a = code;
+	axis->why = code ? CAN_AXIS_EMCY : CAN_AXIS_DRIVE_FAULT;
+}
+
+static int check_deadman(const struct incise_actuator *a, const char *where,
+			 struct incise_error *err)
+{
+	if (a->deadman_s >= DEADMAN_LEAST_S * (1 - 1e-9) &&
+	    a->deadman_s * 1e9 >= 5.0 * a->can.cycle_ns)
+		return 0;
+	return incise_error_set(
+		err, EINVAL,
+		"%s: actuator.deadman_ms: expected at least %g for a drive on CAN, as its "
+		"heartbeats are in whole ms, found %g; correct it",
+		where, fmax(DEADMAN_LEAST_S * 1e3, 5e-6 * a->can.cycle_ns),
+		a->deadman_s * 1e3);
+}
+
+static int know(struct can_link *link, const char *where, struct incise_error *err)
+{
+	const struct incise_actuator_can *can = &link->actuator.can;
+	int rc = set_filter(link);
+
+	if (rc)
+		return incise_error_set(err, -rc, "%s: %s: cannot be filtered: %s", where,
+					link->bus->name, strerror(-rc));
+	link->units =
+		(struct cia402_units){can->counts_per_turn, can->velocity_per_turn_s,
+				      can->acceleration_per_turn_s2};
+	rc = cia402_identify(&link->master, &link->identity, where, err);
+	if (!rc)
+		rc = cia402_units(&link->master, &link->units, where, err);
+	if (rc)
+		return rc;
+	link->following_mm = can->following_mm;
+	fit_steps(link);
+	fit_setup(link);
+	return fit_axis(link, where, err);
+}
+
+int can_link_open(struct can_link *link, const struct can_transport *transport,
+		  const struct incise_backend_request *asked, struct incise_error *err)
+{
+	int rc = check_deadman(asked->actuator, asked->where, err);
+
+	link->actuator = *asked->actuator;
+	if (!rc)
+		rc = open_bus(link, transport, asked, false, err);
+	if (rc)
+		return rc;
+	link->master.own = (uint8_t)asked->actuator->can.master;
+	rc = set_filter(link);
+	if (!rc)
+		rc = check_alone(link, asked->where, err);
+	if (!rc)
+		rc = know(link, asked->where, err);
+	if (!rc)
+		rc = check_load(link, asked->where, err);
+	/* What another left in motion, and its own deadman did not stop. */
+	if (!rc)
+		rc = cia402_power_off(&link->master, asked->where, err);
+	if (!rc)
+		rc = set_up(link, asked->where, err);
+	if (!rc)
+		take_fault(link);
+	return rc;
+}
+
+/*
+ * Whether it is homed it tells in homing mode, and that is to be asked only where nobody
+ * drives it: who owns it for a moment makes sure of that.
+ */
+static int look_alone(struct can_link *link, const struct can_transport *transport,
+		      const struct incise_backend_request *asked,
+		      struct incise_error *err)
+{
+	uint32_t word;
+	int rc = open_bus(link, transport, asked, false, err);
+
+	if (rc)
+		return rc;
+	rc = know(link, asked->where, err);
+	if (!rc && !canopen_read(&link->master, 0x6041, 0, 2, &word) &&
+	    cia402_state((uint16_t)word) == CIA402_DISABLED)
+		rc = ask_homed(link, asked->where, err);
+	link->bus->ops->close(link->bus);
+	link->bus = NULL;
+	return rc;
+}
+
+int can_link_look(struct can_link *link, const struct can_transport *transport,
+		  const struct incise_backend_request *asked, struct incise_error *err)
+{
+	int rc;
+
+	link->actuator = *asked->actuator;
+	rc = look_alone(link, transport, asked, err);
+	if (rc && rc != -EBUSY)
+		return rc;
+	if (err)
+		*err = (struct incise_error){0};
+	rc = open_bus(link, transport, asked, true, err);
+	if (!rc)
+		rc = know(link, asked->where, err);
+	/* It sends nothing of its own. */
+	link->master.own = 0;
+	return rc ? rc : take_position(link, asked->where, err);
+}
+
+static bool is_operational(const struct canopen *master)
+{
+	return master->state == CANOPEN_OPERATIONAL;
+}
+
+int can_link_ready(struct can_link *link, bool homing, struct incise_error *err)
+{
+	const struct incise_actuator *a = &link->actuator;
+	double per_turn_s = link->units.velocity_per_turn_s / a->lead_mm;
+	int64_t now = link->bus->ops->now(link->bus);
+	int rc = 0;
+
+	if (!link->is_setup || link->boots != link->master.boots)
+		rc = set_up(link, link->where, err);
+	if (!rc && homing)
+		rc = cia402_set_homing(&link->master, a->can.homing_method,
+				       units_of(a->home_mm_s * per_turn_s),
+				       units_of(a->home_mm_s / 10 * per_turn_s),
+				       units_of(a->acceleration_mm_s2 / a->lead_mm *
+						link->units.acceleration_per_turn_s2),
+				       link->where, err);
+	if (!rc)
+		rc = cia402_set_mode(&link->master,
+				     homing ? CIA402_HOMING : link->setup.mode,
+				     link->where, err);
+	if (rc)
+		return rc;
+	rc = canopen_await(&link->master, is_operational, now + READY_NS);
+	return rc ? incise_error_set(
+			    err, -rc,
+			    "%s: does not become operational, and is %s: %s; see "
+			    "its power and cable",
+			    link->where, canopen_state_name(link->master.state),
+			    strerror(-rc))
+		  : 0;
+}
+
+int can_link_clear(struct can_link *link, struct incise_error *err)
+{
+	int state = link->bus->ops->state(link->bus), rc;
+
+	if (state == CAN_STATE_BUS_OFF)
+		return incise_error_set(
+			err, EBUSY,
+			"%s: cannot be cleared: %s is still bus-off; `ip link set %s type can "
+			"restart`, then clear",
+			link->where, link->bus->name, link->bus->name);
+	rc = cia402_clear(&link->master, link->where, err);
+	if (!rc && (!link->is_setup || link->boots != link->master.boots))
+		rc = set_up(link, link->where, err);
+	link->axis.why = rc ? link->axis.why : CAN_AXIS_NO_REASON;
+	return rc;
+}
+
+int can_link_homed(struct can_link *link, struct incise_error *err)
+{
+	int rc;
+
+	link->is_homed = true;
+	rc = take_position(link, link->where, err);
+	if (rc)
+		return rc;
+	fit_range(link);
+	return cia402_set_range(&link->master, link->setup.position_min,
+				link->setup.position_max, link->where, err);
+}
+
+void can_link_close(struct can_link *link)
+{
+	if (!link->bus)
+		return;
+	/* It need not watch over who has gone in good order. */
+	if (link->is_setup && link->master.own) {
+		canopen_write(&link->master, 0x1016, 1, 4, 0);
+		canopen_nmt(&link->master, CANOPEN_PREPARE);
+	}
+	link->bus->ops->close(link->bus);
+	link->bus = NULL;
+}
