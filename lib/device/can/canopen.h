@@ -66,13 +66,19 @@ struct canopen {
 	uint32_t bus_error;
 	uint8_t bus_error_data[8];
 	uint32_t bus_offs; /* times that it was bus-off */
-	/* SYNCs, heartbeats of our id, and PDOs to this node that are not ours. */
+	/* SYNCs, NMT commands, heartbeats of our id, and PDOs to this node: not from us. */
 	uint32_t foreign;
 
 	uint32_t abort; /* code of the last SDO that was aborted */
 
 	/* private */
 	int64_t next_beat_ns;
+	/* The answer that an SDO waits for: of this object, or the next segment. */
+	struct canopen_answer {
+		bool wanted, segment, came;
+		uint8_t object[3]; /* index and sub, as a frame has them */
+		uint8_t data[8];
+	} answer;
 };
 
 #define CANOPEN_ANSWER_NS 200000000 /* for an SDO: ample, for a drive that is busy */
@@ -85,20 +91,27 @@ struct canopen {
 uint32_t canopen_take(struct canopen *master, const struct can_frame *frame,
 		      int64_t t_ns);
 
-/* Send this side's heartbeat if it is due. 0 or what the bus says. */
+/*
+ * Send this side's heartbeat if it is due. 0 or what the bus says; with -ENOBUFS it is tried
+ * again a millisecond later.
+ */
 int canopen_beat(struct canopen *master, int64_t now_ns);
 
 /* To the node alone. 0 or what the bus says. */
 int canopen_nmt(struct canopen *master, enum canopen_command command);
 
-/* Until *done* of what was heard is so, or the time has come. 0, -ETIMEDOUT, of the bus. */
+/*
+ * Until @done of what was heard is so, or the time has come; NULL: until the time has come.
+ * 0, -ETIMEDOUT, -EINTR where the bus's wait says so, of the bus.
+ */
 int canopen_await(struct canopen *master, bool (*done)(const struct canopen *master),
 		  int64_t until_ns);
 
 /*
  * Read or write an object by SDO. Both: 0; -EREMOTEIO (aborted: master->abort), -ETIMEDOUT
- * (no answer), -EPROTO (an answer that makes no sense, or of another size), -EINTR, and
- * what the bus says.
+ * (no answer; the node is told so), -EPROTO (an answer that makes no sense, or of another
+ * size), -EINTR, and what the bus says. Answers for other objects are somebody else's and
+ * are passed over.
  *
  * @size 1, 2 or 4 bytes; *value is not extended: 0xffff is -1 of 16 bits
  */

@@ -63,7 +63,8 @@ enum cia402_mode {
 
 enum cia402_state cia402_state(uint16_t statusword);
 const char *cia402_state_name(enum cia402_state state); /* "operation enabled" … */
-const char *cia402_mode_name(int mode);			/* "CSP (8)" style; any number */
+/* "CSP (8)"; any number, as 6061 has it. */
+const char *cia402_mode_name(int mode);
 
 /*
  * The controlword of the next step from a state to operation enabled; one to stay there. 0
