@@ -21,6 +21,9 @@ $(O)/obj/fuzz/%.o: %.c
 	$(CLANG) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \
 		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
+# What a target needs beside that.
+fuzz_slcan_line := lib/device/can/slcan_line.c
+
 fuzz_core := $(patsubst %.c,$(O)/obj/fuzz/%.o,$(wildcard lib/fixed/*.c))
 define fuzz_program
 $(O)/tests/fuzz/$1: $(O)/obj/fuzz/tests/fuzz/$1.o $(fuzz_core) \
