@@ -7,6 +7,7 @@
 #include <stddef.h>
 #include <string.h>
 #include "actuator.h"
+#include "actuator_can.h"
 
 #define US 1000.0      /* ns */
 #define MS 1000000.0   /* ns */
@@ -294,6 +295,7 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 					   "origin_mm",
 					   "invert",
 					   "lines",
+					   "can",
 					   NULL};
 	static const char *const needed[] = {"spring_N_mm", "travel_mm", "lead_mm"};
 	int rc;
@@ -327,6 +329,9 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 		rc = incise_conf_bool(group, path, "retract", &actuator->retract, err);
 	if (!rc)
 		rc = read_lines(actuator, group, path, err);
+	if (!rc)
+		rc = incise_actuator_can_read(&actuator->can, actuator->travel_mm, group,
+					      path, err);
 	if (isnan(actuator->home_mm_s))
 		actuator->home_mm_s = fmin(2, actuator->velocity_mm_s);
 	return rc ? rc : check(actuator, group, path, err);

@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Reading the group `actuator.can` of rig.conf; see struct incise_actuator_can.
+ */
+#ifndef INCISE_ACTUATOR_CAN_H
+#define INCISE_ACTUATOR_CAN_H
+
+#include <incise/actuator.h>
+#include "../base/conf.h"
+
+/*
+ * Read and check the group `can` within @group; without one all is as by default.
+ * Returns 0 or -EINVAL; err names file, line, key and what to do.
+ */
+int incise_actuator_can_read(struct incise_actuator_can *can, double travel_mm,
+			     const config_setting_t *group, const char *path,
+			     struct incise_error *err);
+
+/* Largest position_gain_1_s of csv that is taken at a cycle: half of what is stable. */
+double incise_actuator_can_gain_1_s(double cycle_s);
+
+#endif

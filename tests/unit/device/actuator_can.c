@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/actuator_can.c: each key in its unit and up to its ends, each refusal with its
+ * line, and that the gain that csv may have is half of what a loop with that delay holds.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "../../../lib/device/actuator.h"
+#include "../../../lib/device/actuator_can.h"
+
+/* Through the group around it, as a person meets it. */
+static int read_text(struct incise_actuator *actuator, const char *inside,
+		     struct incise_error *err)
+{
+	char text[2000];
+	config_t config;
+	int rc;
+
+	snprintf(
+		text, sizeof(text),
+		"actuator = { spring_N_mm = 2.0; travel_mm = 20.0; lead_mm = 2.0;\n%s\n};",
+		inside);
+	config_init(&config);
+	assert_true(config_read_string(&config, text));
+	rc = incise_actuator_read(actuator, config_lookup(&config, "actuator"), "r", err);
+	config_destroy(&config);
+	return rc;
+}
+
+static struct incise_actuator read_good(const char *inside)
+{
+	struct incise_actuator actuator;
+	struct incise_error err = {0};
+
+	if (read_text(&actuator, inside, &err))
+		fail_msg("%s: %s", inside, err.text);
+	return actuator;
+}
+
+static void defaults_are_those_of_the_manual(void **state)
+{
+	/* A rig.conf of before there was the group; an empty one; one of other wires. */
+	static const char *const cases[] = {
+		"",
+		"can = { };",
+		"lines = { step = 1; dir = 2; }; can = { };",
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_actuator a = read_good(cases[i]);
+
+		assert_int_equal(a.can.mode, INCISE_ACTUATOR_CSP);
+		assert_int_equal(a.can.bitrate, 0);
+		assert_int_equal(a.can.cycle_ns, 1000000);
+		assert_true(!a.can.counts_per_turn && !a.can.velocity_per_turn_s &&
+			    !a.can.acceleration_per_turn_s2);
+		assert_true(a.can.following_mm == 1 && a.can.following_s == 0.05);
+		assert_int_equal(a.can.homing_method, 0);
+		assert_false(a.can.absolute);
+		assert_true(a.can.position_gain_1_s == 20);
+		assert_true(!a.can.stiffness_permille_mm && !a.can.damping_permille_s_mm);
+		assert_true(!a.can.torque_max_permille);
+		assert_int_equal(a.can.master, 127);
+		assert_true(a.has_lines == !!strstr(cases[i], "lines"));
+		assert_int_equal(a.line[INCISE_LINE_STEP], a.has_lines ? 1 : -1);
+	}
+}
+
+static void following_is_a_tenth_of_the_travel_up_to_a_millimetre(void **state)
+{
+	static const struct {
+		double travel_mm, following_mm;
+	} cases[] = {{0.1, 0.01}, {5, 0.5}, {10, 1}, {1000, 1}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_actuator_can can;
+		config_t config;
+
+		config_init(&config);
+		assert_true(config_read_string(&config, "a = { };"));
+		assert_int_equal(incise_actuator_can_read(&can, cases[i].travel_mm,
+							  config_lookup(&config, "a"),
+							  "r", NULL),
+				 0);
+		/* A rounding of the division. */
+		assert_true(fabs(can.following_mm - cases[i].following_mm) < 1e-12);
+		config_destroy(&config);
+	}
+}
+
+static void every_key_is_taken_in_its_unit(void **state)
+{
+	struct incise_actuator a = read_good(
+		"can = { mode = \"csv\"; bitrate = 500000; cycle_us = 1250;\n"
+		"counts_per_turn = 51200; velocity_per_turn_s = 60.0;\n"
+		"acceleration_per_turn_s2 = 3600; following_mm = 0.25; following_ms = 20;\n"
+		"homing_method = -17; absolute = true; position_gain_1_s = 12.5;\n"
+		"stiffness_permille_mm = 40; damping_permille_s_mm = 0.75;\n"
+		"torque_max_permille = 300; master = 5; };");
+
+	assert_int_equal(a.can.mode, INCISE_ACTUATOR_CSV);
+	assert_int_equal(a.can.bitrate, 500000);
+	assert_int_equal(a.can.cycle_ns, 1250000);
+	assert_true(a.can.counts_per_turn == 51200 && a.can.velocity_per_turn_s == 60);
+	assert_true(a.can.acceleration_per_turn_s2 == 3600);
+	assert_true(a.can.following_mm == 0.25 && a.can.following_s == 0.02);
+	assert_int_equal(a.can.homing_method, -17);
+	assert_true(a.can.absolute && a.can.position_gain_1_s == 12.5);
+	assert_true(a.can.stiffness_permille_mm == 40);
+	assert_true(a.can.damping_permille_s_mm == 0.75);
+	assert_true(a.can.torque_max_permille == 300);
+	assert_int_equal(a.can.master, 5);
+	a = read_good("can = { mode = \"cst\"; stiffness_permille_mm = 40;\n"
+		      "torque_max_permille = 300; };");
+	assert_int_equal(a.can.mode, INCISE_ACTUATOR_CST);
+	assert_true(a.can.damping_permille_s_mm == 0);
+}
+
+/* Both ends are taken, and what lies just beyond is refused. */
+static void every_range_ends_where_the_manual_says(void **state)
+{
+	static const struct {
+		const char *key, *below, *least, *most, *above;
+	} cases[] = {
+		{"bitrate", "-1", "0", "1000000", "1000001"},
+		{"cycle_us", "490", "500", "2000", "2010"},
+		{"counts_per_turn", "0.9", "1", "1000000000", "1000000001"},
+		{"velocity_per_turn_s", "0.9", "1", "1000000000", "1000000001"},
+		{"acceleration_per_turn_s2", "0.9", "1", "1000000000", "1000000001"},
+		{"following_mm", "0.0009", "0.001", "20", "20.001"},
+		{"following_ms", "0.9", "1", "10000", "10001"},
+		{"homing_method", "-129", "-128", "127", "128"},
+		{"position_gain_1_s", "0.09", "0.1", "10000", "10001"},
+		{"stiffness_permille_mm", "0.0009", "0.001", "1000000", "1000001"},
+		{"damping_permille_s_mm", "-0.001", "0", "1000000", "1000001"},
+		{"torque_max_permille", "0.9", "1", "1000", "1001"},
+		{"master", "0", "1", "127", "128"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		const char *const values[] = {cases[i].below, cases[i].least,
+					      cases[i].most, cases[i].above};
+
+		for (int k = 0; k < 4; k++) {
+			bool good = k == 1 || k == 2;
+			struct incise_actuator actuator;
+			struct incise_error err = {0};
+			char text[200], says[100];
+			int rc;
+
+			snprintf(text, sizeof(text), "can = {\n%s = %s; };", cases[i].key,
+				 values[k]);
+			snprintf(says, sizeof(says), "r:3: actuator.can.%s: expected",
+				 cases[i].key);
+			rc = read_text(&actuator, text, &err);
+			if (rc != (good ? 0 : -EINVAL) ||
+			    (!good && !strstr(err.text, says)))
+				fail_msg("%s: %d, \"%s\"", text, rc, err.text);
+		}
+	}
+}
+
+static void bit_rates_are_those_of_adapters(void **state)
+{
+	static const int good[] = {10000,  20000,  50000,  100000, 125000,
+				   250000, 500000, 800000, 1000000};
+	static const int bad[] = {1, 9999, 83333, 400000, 999999};
+	struct incise_actuator actuator;
+	struct incise_error err;
+	char text[100];
+
+	for (size_t i = 0; i < sizeof(good) / sizeof(*good); i++) {
+		snprintf(text, sizeof(text), "can = { bitrate = %d; };", good[i]);
+		assert_int_equal(read_good(text).can.bitrate, good[i]);
+	}
+	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++) {
+		snprintf(text, sizeof(text), "can = { bitrate = %d; };", bad[i]);
+		assert_int_equal(read_text(&actuator, text, &err), -EINVAL);
+		assert_non_null(strstr(err.text, "125000, 250000, 500000"));
+	}
+}
+
+/* Whether a byte times a power of ten of a second is just so many µs. */
+static bool fits_60C2(int us)
+{
+	for (int byte = 1; byte <= 255; byte++)
+		for (int unit_us = 1; unit_us <= 1000; unit_us *= 10)
+			if (byte * unit_us == us)
+				return true;
+	return false;
+}
+
+static void cycles_are_those_that_a_drive_can_keep(void **state)
+{
+	for (int us = 500; us <= 2000; us++) {
+		struct incise_actuator actuator;
+		struct incise_error err;
+		char text[100];
+
+		snprintf(text, sizeof(text), "can = { cycle_us = %d; };", us);
+		assert_int_equal(read_text(&actuator, text, &err),
+				 fits_60C2(us) ? 0 : -EINVAL);
+	}
+}
+
+static void what_does_not_fit_is_refused_with_its_line(void **state)
+{
+	static const struct {
+		const char *inside, *says;
+	} cases[] = {
+		{"can = 3;", "r:2: actuator.can: expected a group"},
+		{"can = {\nspeed = 3; };", "r:3: actuator.can.speed: unknown key"},
+		{"can = {\nfollowing_um = 3; };",
+		 "actuator.can.following_um: unknown key; expected following_mm, in that "
+		 "unit"},
+		{"can = {\nmode = \"CSP\"; };",
+		 "r:3: actuator.can.mode: expected \"csp\", \"csv\" or \"cst\", found "
+		 "\"CSP\"; correct it"},
+		{"can = {\nmode = 8; };",
+		 "r:3: actuator.can.mode: expected text in quotes, found 8"},
+		{"can = {\nabsolute = 1; };",
+		 "r:3: actuator.can.absolute: expected true or false"},
+		{"can = {\ncycle_us = 1005; };",
+		 "r:3: actuator.can.cycle_us: expected a whole number of 10 us, as a drive "
+		 "keeps it in a byte, found 1005; give 1000 or 1010"},
+		{"can = {\ncycle_us = 1000.5; };",
+		 "r:3: actuator.can.cycle_us: expected a whole number from 500 to 2000"},
+		{"can = {\nmode = \"cst\"; };",
+		 "r:3: actuator.can.stiffness_permille_mm is missing: in mode \"cst\""},
+		{"can = { stiffness_permille_mm = 3;\nmode = \"cst\"; };",
+		 "r:3: actuator.can.torque_max_permille is missing"},
+		{"can = { mode = \"csv\";\nposition_gain_1_s = 223; };",
+		 "r:3: actuator.can.position_gain_1_s: expected at most 222.5 1/s, half of "
+		 "what is stable over a bus with cycle_us = 1000, found 223; correct it"},
+		/* Twice the cycle, half the gain. */
+		{"can = { mode = \"csv\"; cycle_us = 2000;\nposition_gain_1_s = 112; };",
+		 "at most 111.2 1/s"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_actuator actuator;
+		struct incise_error err = {0};
+
+		assert_int_equal(read_text(&actuator, cases[i].inside, &err), -EINVAL);
+		if (!strstr(err.text, cases[i].says))
+			fail_msg("case %zu: \"%s\" has no \"%s\"", i, err.text,
+				 cases[i].says);
+	}
+	read_good("can = { mode = \"csv\"; position_gain_1_s = 222.5; };");
+	/* It is of csv alone. */
+	read_good("can = { position_gain_1_s = 223; };");
+}
+
+/*
+ * The loop itself, from 1 mm off: x[n+1] = x[n] - k x[n-3]. The largest deviation within
+ * the last hundred of @cycles.
+ */
+static double left_over(double k, int cycles)
+{
+	double x[4] = {1, 1, 1, 1}, largest = 0; /* x[n] … x[n-3] */
+
+	for (int n = 0; n < cycles; n++) {
+		double next = x[0] - k * x[3];
+
+		if (fabs(next) > 1e6)
+			return INFINITY;
+		memmove(x + 1, x, 3 * sizeof(*x));
+		x[0] = next;
+		if (n >= cycles - 100)
+			largest = fmax(largest, fabs(next));
+	}
+	return largest;
+}
+
+static void half_of_the_gain_that_is_stable_is_taken(void **state)
+{
+	static const double cycles_s[] = {0.0005, 0.001, 0.002};
+	double low = 0, high = 2;
+
+	/* Where a deviation begins to grow, found by trying. */
+	while (high - low > 1e-6) {
+		double k = (low + high) / 2;
+
+		if (left_over(k, 200000) < 1)
+			low = k;
+		else
+			high = k;
+	}
+	for (size_t i = 0; i < sizeof(cycles_s) / sizeof(*cycles_s); i++) {
+		double k = incise_actuator_can_gain_1_s(cycles_s[i]) * cycles_s[i];
+
+		/* What grows by less than a factor of 2 in 200 000 cycles is not seen: 4e-6. */
+		assert_true(fabs(2 * k - low) < 1e-5);
+		/* With half of it a deviation is gone, to a millionth, in 200 cycles. */
+		assert_true(left_over(k, 300) < 1e-6);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(defaults_are_those_of_the_manual),
+		cmocka_unit_test(following_is_a_tenth_of_the_travel_up_to_a_millimetre),
+		cmocka_unit_test(every_key_is_taken_in_its_unit),
+		cmocka_unit_test(every_range_ends_where_the_manual_says),
+		cmocka_unit_test(bit_rates_are_those_of_adapters),
+		cmocka_unit_test(cycles_are_those_that_a_drive_can_keep),
+		cmocka_unit_test(what_does_not_fit_is_refused_with_its_line),
+		cmocka_unit_test(half_of_the_gain_that_is_stable_is_taken),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
