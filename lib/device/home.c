@@ -13,6 +13,7 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include <time.h>
 #include <incise/clock.h>
@@ -79,6 +80,7 @@ static int refused(const struct home *h, int rc)
 static int fault_error(const struct home *h)
 {
 	unsigned int faults = h->status.faults & ~INCISE_STEPPER_TRAVEL;
+	char cause[300];
 
 	if (faults & INCISE_STEPPER_GONE)
 		return incise_error_set(h->err, ENODEV, "homing %s: %s", h->info.name,
@@ -87,9 +89,12 @@ static int fault_error(const struct home *h)
 		return incise_error_set(h->err, EIO,
 					"homing %s: it is not powered; enable it first",
 					h->info.name);
-	return incise_error_set(
-		h->err, EIO, "homing %s: %s", h->info.name,
-		incise_stepper_fault_text((enum incise_stepper_fault)(faults & -faults)));
+	/* Whoever cleared it meanwhile did not make this way end well. */
+	if (incise_stepper_cause(h->stepper, cause, sizeof(cause)) <= 0)
+		snprintf(cause, sizeof(cause), "%s",
+			 incise_stepper_fault_text(
+				 (enum incise_stepper_fault)(faults & -faults)));
+	return incise_error_set(h->err, EIO, "homing %s: %s", h->info.name, cause);
 }
 
 /* Let one poll pass and look where it stands. A limit that was looked for is no fault. */

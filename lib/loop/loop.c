@@ -62,6 +62,7 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		    struct incise_loop_stats *stats, struct incise_error *err)
 {
 	int64_t period_ns, due_ns, end_ns;
+	char cause[300];
 	int rc = 0;
 
 	memset(stats, 0, sizeof(*stats));
@@ -100,11 +101,13 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		due_ns += period_ns;
 	}
 	incise_plan_release(plan);
-	if (rc)
+	if (rc) {
+		incise_plan_cause(plan, cause, sizeof(cause));
 		incise_error_set(
 			err, -rc,
 			"a device failed at tick %llu: %s; the force was taken away",
-			(unsigned long long)stats->ticks, incise_plan_fault(plan));
+			(unsigned long long)stats->ticks, cause);
+	}
 	return rc;
 }
 

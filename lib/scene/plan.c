@@ -5,6 +5,7 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -378,6 +379,18 @@ const char *incise_plan_fault(const struct incise_plan *plan)
 	if (plan->actuator_off)
 		return "the actuator has no power: enable it";
 	return strerror(-plan->fault);
+}
+
+int incise_plan_cause(const struct incise_plan *plan, char *text, size_t size)
+{
+	const char *fault = incise_plan_fault(plan);
+	int length = 0;
+
+	/* Only of an actuator that has one: else a tracker's failure would go under. */
+	if (plan->fault && plan->actuator_faults)
+		length = incise_stepper_cause(plan->stepper, text, size);
+	/* It may have been cleared since, by someone else. */
+	return length > 0 ? length : snprintf(text, size, "%s", fault ? fault : "");
 }
 
 /* Take the force away, and keep why. */

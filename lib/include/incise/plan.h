@@ -171,6 +171,15 @@ INCISE_API void incise_plan_release(struct incise_plan *plan);
 INCISE_API const char *incise_plan_fault(const struct incise_plan *plan);
 
 /**
+ * The same in a line, with what the actuator itself tells of its fault;
+ * incise_stepper_cause().
+ *
+ * @param text always a string; empty while none failed
+ * @return length of the line, as snprintf(3). For people: not real-time safe.
+ */
+INCISE_API int incise_plan_cause(const struct incise_plan *plan, char *text, size_t size);
+
+/**
  * Run all stages once, in order. Real-time safe as far as the devices are.
  *
  * @param t_ns time of the tick, not before the last one's

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include <incise/backend.h>
 
@@ -27,6 +28,7 @@ struct machine {
 	bool stuck_on, stuck_off, estop, deaf;
 	int polls, stop_at;
 	int stop;
+	const char *cause; /* what it tells of its fault; or NULL */
 
 	double at_mm, v_mm_s, target_mm, count_mm; /* count: position less at_mm */
 	bool by_speed, homed, touched;
@@ -178,6 +180,13 @@ static void machine_info(const struct incise_stepper *stepper,
 	};
 }
 
+static int machine_cause(struct incise_stepper *stepper, char *text, size_t size)
+{
+	const char *cause = of(stepper)->cause;
+
+	return cause ? snprintf(text, size, "%s", cause) : 0;
+}
+
 static int machine_homing(struct incise_stepper *stepper,
 			  struct incise_stepper_homing *homing)
 {
@@ -217,6 +226,7 @@ static const struct incise_stepper_ops ops = {
 	.enable = machine_enable,
 	.clear = machine_clear,
 	.info = machine_info,
+	.cause = machine_cause,
 	.homing = machine_homing,
 	.edge = machine_edge,
 	.origin = machine_origin,
@@ -327,6 +337,12 @@ static void what_is_wrong_is_said(void **state)
 		{{.home_at = INCISE_STEPPER_AT_HOME, .end_mm = -9, .estop = true},
 		 -EIO,
 		 "e-stop: release it"},
+		{{.home_at = INCISE_STEPPER_AT_HOME,
+		  .end_mm = -9,
+		  .estop = true,
+		  .cause = "safe torque off (5441h)"},
+		 -EIO,
+		 "homing machine: safe torque off (5441h)"},
 		{{.home_at = INCISE_STEPPER_AT_HOME, .end_mm = -9, .deaf = true},
 		 -ETIMEDOUT,
 		 "not done in time"},

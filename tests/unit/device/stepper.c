@@ -9,6 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <errno.h>
+#include <stdio.h>
 #include <string.h>
 #include <incise/backend.h>
 
@@ -136,12 +137,103 @@ static void states_and_faults_have_words(void **state)
 	}
 }
 
+/* One that may tell more of its fault than that there is one, and counts two things. */
+struct teller {
+	struct incise_stepper stepper;
+	unsigned int faults;
+	const char *cause;
+};
+
+static int teller_status(struct incise_stepper *stepper,
+			 struct incise_stepper_status *status)
+{
+	*status = (struct incise_stepper_status){
+		.faults = ((struct teller *)stepper)->faults};
+	return 0;
+}
+
+static int teller_cause(struct incise_stepper *stepper, char *text, size_t size)
+{
+	const char *cause = ((struct teller *)stepper)->cause;
+
+	return cause ? snprintf(text, size, "%s", cause) : 0;
+}
+
+static int teller_counter(struct incise_stepper *stepper, int i,
+			  struct incise_stepper_counter *counter)
+{
+	static const struct incise_stepper_counter counters[] = {
+		{"sync_late", "SYNCs sent late", 3}, {"emcy", "emergencies", 0}};
+
+	if (i > 1)
+		return -ENOENT;
+	*counter = counters[i];
+	return 0;
+}
+
+static void the_cause_is_the_device_s_own_or_the_first_fault(void **state)
+{
+	static const struct incise_stepper_ops ops[] = {
+		{.status = teller_status},
+		{.status = teller_status, .cause = teller_cause},
+	};
+	static const struct {
+		unsigned int faults;
+		const char *cause, *says; /* says: the beginning, without a cause */
+	} cases[] = {
+		{0, NULL, ""},
+		{INCISE_STEPPER_BUS | INCISE_STEPPER_LOST, NULL, "the bus to the drive"},
+		/* What stopped nothing is said only where there is nothing else. */
+		{INCISE_STEPPER_TRAVEL, NULL, "travel: "},
+		{INCISE_STEPPER_TRAVEL | INCISE_STEPPER_ALARM, NULL, "alarm of"},
+		{INCISE_STEPPER_ALARM, "short circuit (2320h)", "alarm of"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
+		for (size_t k = 0; k < 2; k++) {
+			const char *own = k ? cases[i].cause : NULL;
+			const char *says = own ? own : cases[i].says;
+			struct teller teller = {{&ops[k]}, cases[i].faults, own};
+			char text[200] = "untouched", little[8];
+			int length = incise_stepper_cause(&teller.stepper, text, 200);
+
+			assert_int_equal(length, strlen(text));
+			assert_true(!*text == !*says);
+			assert_memory_equal(text, says, strlen(says));
+			/* Cut to what there is room for, as snprintf(3) does. */
+			assert_int_equal(incise_stepper_cause(&teller.stepper, little,
+							      sizeof(little)),
+					 length);
+			assert_int_equal(strncmp(little, text, sizeof(little) - 1), 0);
+			assert_true(strlen(little) < sizeof(little));
+		}
+}
+
+static void counters_are_the_backend_s(void **state)
+{
+	static const struct incise_stepper_ops ops = {.counter = teller_counter}, none;
+	struct teller teller = {.stepper.ops = &ops};
+	struct incise_stepper stepper = {.ops = &none};
+	struct incise_stepper_counter counter = {0};
+
+	assert_int_equal(incise_stepper_counter(&teller.stepper, 0, &counter), 0);
+	assert_string_equal(counter.key, "sync_late");
+	assert_int_equal(counter.value, 3);
+	assert_int_equal(incise_stepper_counter(&teller.stepper, 1, &counter), 0);
+	assert_string_equal(counter.key, "emcy");
+	assert_int_equal(incise_stepper_counter(&teller.stepper, 2, &counter), -ENOENT);
+	assert_int_equal(incise_stepper_counter(&teller.stepper, -1, &counter), -ENOENT);
+	assert_int_equal(incise_stepper_counter(&stepper, 0, &counter), -ENOENT);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(calls_reach_the_backend),
 		cmocka_unit_test(what_a_backend_has_not_is_said),
 		cmocka_unit_test(states_and_faults_have_words),
+		cmocka_unit_test(the_cause_is_the_device_s_own_or_the_first_fault),
+		cmocka_unit_test(counters_are_the_backend_s),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include <incise/backend.h>
 #include "../../../lib/scene/stages.h"
@@ -18,6 +19,7 @@ struct told {
 	struct incise_stepper stepper;
 	struct incise_stepper_status status;
 	int rc, set_rc, sets;
+	const char *cause;
 	double target_mm;
 };
 
@@ -39,7 +41,15 @@ static int told_status(struct incise_stepper *stepper,
 	return told->rc;
 }
 
-static const struct incise_stepper_ops ops = {.set = told_set, .status = told_status};
+static int told_cause(struct incise_stepper *stepper, char *text, size_t size)
+{
+	const char *cause = ((struct told *)stepper)->cause;
+
+	return cause ? snprintf(text, size, "%s", cause) : 0;
+}
+
+static const struct incise_stepper_ops ops = {
+	.set = told_set, .status = told_status, .cause = told_cause};
 
 /* A spring of 2 N/mm and a travel of 20 mm, pushing along z. */
 static struct incise_plan plan_on(struct told *told)
@@ -136,30 +146,43 @@ static void test_a_fault_of_the_actuator_is_named(void **state)
 		int status_rc, set_rc;
 		unsigned int faults;
 		enum incise_stepper_state state;
-		const char *says;
+		const char *says, *own; /* own: what the device tells of its fault */
 	} cases[] = {
 		{0, -EIO, INCISE_STEPPER_ESTOP | INCISE_STEPPER_TRAVEL,
-		 INCISE_STEPPER_FAULT, "e-stop: release it"},
-		{0, -EIO, 0, INCISE_STEPPER_DISABLED, "no power: enable it"},
+		 INCISE_STEPPER_FAULT, "e-stop: release it", NULL},
+		{0, -EIO, INCISE_STEPPER_ALARM, INCISE_STEPPER_FAULT, "alarm of",
+		 "over-voltage (3210h)"},
+		{0, -EIO, 0, INCISE_STEPPER_DISABLED, "no power: enable it", NULL},
 		{-ENODEV, 0, INCISE_STEPPER_GONE, INCISE_STEPPER_FAULT,
-		 "the device went away"},
-		{-EIO, 0, 0, INCISE_STEPPER_READY, "Input/output error"},
+		 "the device went away", NULL},
+		{-EIO, 0, 0, INCISE_STEPPER_READY, "Input/output error", NULL},
+		/* Another device failed: what the actuator may have is not why. */
+		{-EIO, 0, 0, INCISE_STEPPER_READY, "Input/output error", "of last week"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct told told;
 		struct incise_plan plan = plan_on(&told);
 		struct incise_tick tick = {0};
+		const char *own = cases[i].faults ? cases[i].own : NULL;
+		char text[200] = "untouched";
+		int length;
 
 		assert_null(incise_plan_fault(&plan));
+		assert_int_equal(incise_plan_cause(&plan, text, sizeof(text)), 0);
+		assert_string_equal(text, "");
 		told.rc = cases[i].status_rc;
 		told.set_rc = cases[i].set_rc;
 		told.status.faults = cases[i].faults;
 		told.status.state = cases[i].state;
+		told.cause = cases[i].own;
 		plan.fault = incise_stage_actuate(&plan, &tick);
 		assert_int_equal(plan.fault, cases[i].status_rc + cases[i].set_rc);
 		if (!strstr(incise_plan_fault(&plan), cases[i].says))
 			fail_msg("case %zu: %s", i, incise_plan_fault(&plan));
+		length = incise_plan_cause(&plan, text, sizeof(text));
+		assert_int_equal(length, strlen(text));
+		assert_string_equal(text, own ? own : incise_plan_fault(&plan));
 	}
 }
 
