@@ -11,10 +11,11 @@ $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o): cppflags += -Idriver
 
 extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
-extra_info := $(extra_demo) $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o)
+extra_info := $(extra_demo) $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o \
+	bus_report.o)
 extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
-	stepper_status.o)
-extra_haptic := $(O)/obj/tools/scene_argument.o
+	stepper_status.o stepper_counters.o)
+extra_haptic := $(addprefix $(O)/obj/tools/,scene_argument.o stepper_counters.o)
 extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stopwatch.o)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o \

@@ -15,6 +15,7 @@
 #include "cli.h"
 #include "json.h"
 #include "scene_argument.h"
+#include "stepper_counters.h"
 
 enum {
 	OPT_MODEL = CLI_LONG,
@@ -239,7 +240,8 @@ static uint64_t ticks_with(const struct incise_loop_stats *s, enum incise_tick_f
 }
 
 static void report_json(const struct incise_loop_stats *s, const struct incise_plan *plan,
-			bool real, double rate_hz, double rms_N)
+			struct incise_stepper *stepper, bool real, double rate_hz,
+			double rms_N)
 {
 	json_t *stages = json_array(), *flags = json_object();
 
@@ -249,7 +251,7 @@ static void report_json(const struct incise_loop_stats *s, const struct incise_p
 	for (int i = 0; incise_plan_stage(plan, i); i++)
 		json_array_append_new(stages, json_string(incise_plan_stage(plan, i)));
 	json_print(json_pack(
-		"{sI sI sf so so sI sI sI sI so sf so ss so so}", "ticks",
+		"{sI sI sf so so sI sI sI sI so sf so so ss so so}", "ticks",
 		(json_int_t)s->ticks, "skipped", (json_int_t)s->skipped, "rate_hz",
 		rate_hz, "lateness_us", real ? lateness_json(s) : json_null(), "tick_ns",
 		real ? cost_json(s) : json_null(), "contact",
@@ -257,7 +259,8 @@ static void report_json(const struct incise_loop_stats *s, const struct incise_p
 		(json_int_t)ticks_with(s, INCISE_TICK_EXTRAPOLATED), "stale",
 		(json_int_t)ticks_with(s, INCISE_TICK_STALE), "limited",
 		(json_int_t)s->limited, "flags", flags, "force_max_N", s->force_max_N,
-		"rendered_rms_error_N", json_number(rms_N), "scheduling",
+		"rendered_rms_error_N", json_number(rms_N), "actuator",
+		stepper ? stepper_counters_json(stepper) : json_null(), "scheduling",
 		scheduling(real), "stages", stages, "stopped_by",
 		cli_stop ? json_string(strsignal(cli_stop)) : json_null()));
 }
@@ -273,7 +276,8 @@ static const char *below(char *text, size_t size, double us)
 }
 
 static void report_text(const struct incise_loop_stats *s, const struct incise_plan *plan,
-			bool real, double rate_hz, double rms_N)
+			struct incise_stepper *stepper, bool real, double rate_hz,
+			double rms_N)
 {
 	char a[32], b[32], c[32];
 
@@ -311,6 +315,8 @@ static void report_text(const struct incise_loop_stats *s, const struct incise_p
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_GUARDED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
+	if (stepper)
+		stepper_counters_line(stepper);
 }
 
 static int home(struct incise_stepper *stepper, struct incise_error *err)
@@ -441,9 +447,11 @@ int main(int argc, char **argv)
 	if (job.log)
 		write_log(file, loop.log, stats.logged);
 	if (job.json)
-		report_json(&stats, plan, real, loop.rate_hz, rms_N);
+		report_json(&stats, plan, incise_rig_stepper(rig), real, loop.rate_hz,
+			    rms_N);
 	else if (!job.log || strcmp(job.log, "-"))
-		report_text(&stats, plan, real, loop.rate_hz, rms_N);
+		report_text(&stats, plan, incise_rig_stepper(rig), real, loop.rate_hz,
+			    rms_N);
 	cli_finish();
 	incise_plan_free(plan);
 	incise_rig_close(rig);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise info FILE: what a model, a compiled model or a recording holds, and what a
- * controller of the stepper module is and does.
+ * incise info FILE: what a model, a compiled model or a recording holds, what a controller
+ * of the stepper module is and does, and which drives are on a bus.
  */
 #include <errno.h>
 #include <getopt.h>
@@ -12,6 +12,7 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/recording.h>
+#include "bus_report.h"
 #include "cli.h"
 #include "json.h"
 #include "model_picture.h"
@@ -30,12 +31,14 @@ static const struct cli_option options[] = {
 
 static const struct cli_verb verb = {
 	.name = "info",
-	.synopsis = "MODEL.fis|MODEL.fx|NAME.rec|stepper|/dev/incise-stepperN [OPTIONS]",
+	.synopsis = "MODEL.fis|MODEL.fx|NAME.rec|stepper|/dev/incise-stepperN|can:IFACE|"
+		    "slcan:TTY [OPTIONS]",
 	.summary =
-		"Say what a model, a compiled model or a recording holds, or what the kernel's\n"
-		"stepper module found, does and costs.",
+		"Say what a model, a compiled model or a recording holds, what the kernel's\n"
+		"stepper module found, does and costs, or which drives are on a CAN bus.",
 	.options = options,
-	.notes = "Exit: 0 shown, 1 failed, 2 bad usage. See incise-info(1).",
+	.notes =
+		"Example:\n  incise info can:can0\n\nExit: 0 shown, 1 failed, 2 bad usage. See incise-info(1).",
 };
 
 static json_t *input_json(const struct incise_model *model, int i)
@@ -342,8 +345,8 @@ static void check_exists(const char *path)
 	struct stat st;
 
 	if (strcmp(path, "-") && stat(path, &st))
-		cli_fail("%s: %s; give a model (.fis, .fx), a recording (NAME.rec) or "
-			 "`stepper`",
+		cli_fail("%s: %s; give a model (.fis, .fx), a recording (NAME.rec), "
+			 "`stepper` or a bus such as can:can0",
 			 path, strerror(errno));
 }
 
@@ -372,10 +375,13 @@ int main(int argc, char **argv)
 	if (optind + 1 != argc)
 		cli_usage("expected one file, got %d", argc - optind);
 	path = argv[optind];
-	if (plot && (is_recording(path) || is_compiled(path) || stepper_module_is(path)))
+	if (plot && (is_recording(path) || is_compiled(path) || stepper_module_is(path) ||
+		     bus_report_is(path)))
 		cli_usage("--plot draws a model, MODEL.fis");
 	if (stepper_module_is(path)) {
 		stepper_module_show(path, json);
+	} else if (bus_report_is(path)) {
+		bus_report_show(path, json);
 	} else if (is_recording(path)) {
 		show_recording(path, json);
 	} else {

@@ -60,7 +60,8 @@ json_t *stepper_report(const struct stepper_job *job, const struct stepper_drive
 {
 	json_t *object = json_pack("{ss}", "command", job->command->name);
 
-	json_object_update_new(object, stepper_status_json(&drive->info, &drive->status));
+	json_object_update_new(object, stepper_status_json(drive->stepper, &drive->info,
+							   &drive->status));
 	return object;
 }
 
@@ -81,7 +82,7 @@ static void put_line(const struct stepper_job *job, const struct stepper_drive *
 		stepper_put(stepper_report(job, drive), JSON_COMPACT);
 		return;
 	}
-	stepper_status_line(&drive->status, t_s);
+	stepper_status_line(drive->stepper, &drive->status, t_s);
 	fflush(stdout);
 }
 
@@ -122,7 +123,7 @@ static void run_status(const struct stepper_job *job, struct stepper_drive *driv
 	else if (job->json)
 		stepper_put(stepper_report(job, drive), JSON_INDENT(2));
 	else
-		stepper_status_text(&drive->info, &drive->status);
+		stepper_status_text(drive->stepper, &drive->info, &drive->status);
 }
 
 static void run_disable(const struct stepper_job *job, struct stepper_drive *drive)
@@ -147,14 +148,14 @@ static void run_clear(const struct stepper_job *job, struct stepper_drive *drive
 	unsigned int before = drive->status.faults;
 	char text[400];
 
+	stepper_why(drive->stepper, before, text, sizeof(text));
 	if (incise_stepper_clear(drive->stepper, &err))
 		stepper_drive_fail(drive, "%s", err.text);
 	stepper_drive_look(drive);
 	if (job->json)
 		stepper_put(stepper_report(job, drive), JSON_INDENT(2));
 	else if (before)
-		printf("%s: forgot %s\n", drive->info.name,
-		       stepper_faults(before, text, sizeof(text)));
+		printf("%s: forgot %s\n", drive->info.name, text);
 	else
 		printf("%s: there was no fault\n", drive->info.name);
 }

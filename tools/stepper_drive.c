@@ -137,7 +137,8 @@ static _Noreturn void fail_with_fault(struct stepper_drive *drive)
 	faults = drive->status.faults & ~INCISE_STEPPER_TRAVEL;
 	stepper_drive_fail(drive, "%s stopped at %.4f mm: %s", drive->info.name,
 			   drive->status.position_mm,
-			   faults ? stepper_faults(faults, text, sizeof(text))
+			   faults ? stepper_why(drive->stepper, faults, text,
+						sizeof(text))
 				  : "power was taken away; try again");
 }
 

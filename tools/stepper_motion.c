@@ -170,8 +170,29 @@ struct edges {
 	json_t *before_mm, *before_steps; /* each in the count before it */
 	double after_mm;
 	long long off, lowest, highest;
-	int n;
+	int n;	      /* of which the edge is known */
+	bool unknown; /* the drive homed by itself and did not tell */
 };
+
+/* A drive that homed by itself: it is at its 0, and that is all that is known. */
+static void put_unknown_edge(struct edges *edges, const struct stepper_job *job,
+			     const struct stepper_drive *drive)
+{
+	bool first = !edges->unknown;
+
+	edges->unknown = true;
+	json_array_append_new(edges->before_mm, json_null());
+	json_array_append_new(edges->before_steps, json_null());
+	if (job->json)
+		return;
+	cli_progress_end();
+	if (first)
+		printf("%s homes by itself and does not tell where the edge was in the count "
+		       "before%s\n",
+		       drive->info.name,
+		       job->repeat > 1 ? ": how well it repeats is not known" : "");
+	fflush(stdout);
+}
 
 static void find_edge(struct edges *edges, const struct stepper_job *job,
 		      struct stepper_drive *drive)
@@ -184,6 +205,11 @@ static void find_edge(struct edges *edges, const struct stepper_job *job,
 	if (incise_stepper_home_edge(drive->stepper, &cli_stop, &edge, &err))
 		stepper_drive_fail(drive, "%s", err.text);
 	stepper_drive_look(drive);
+	edges->after_mm = edge.after_mm;
+	if (isnan(edge.before_mm)) {
+		put_unknown_edge(edges, job, drive);
+		return;
+	}
 	before = stepper_steps(info, edge.before_mm);
 	/* Each homing names the edge anew, by what it was off. */
 	if (edges->n++)
@@ -192,7 +218,6 @@ static void find_edge(struct edges *edges, const struct stepper_job *job,
 		edges->lowest = edges->off;
 	if (edges->off > edges->highest)
 		edges->highest = edges->off;
-	edges->after_mm = edge.after_mm;
 	json_array_append_new(edges->before_mm,
 			      json_number((double)before * info->step_mm));
 	json_array_append_new(edges->before_steps, json_integer(before));
@@ -208,7 +233,8 @@ static json_t *home_json(const struct stepper_job *job, const struct stepper_dri
 			 const struct edges *edges)
 {
 	long long spread = edges->highest - edges->lowest;
-	double spread_mm = edges->n > 1 ? (double)spread * drive->info.step_mm : NAN;
+	bool known = edges->n > 1 && !edges->unknown;
+	double spread_mm = known ? (double)spread * drive->info.step_mm : NAN;
 	json_t *object = stepper_report(job, drive);
 
 	json_object_set_new(object, "edges_before_mm", edges->before_mm);
@@ -216,7 +242,7 @@ static json_t *home_json(const struct stepper_job *job, const struct stepper_dri
 	json_object_set_new(object, "edge_mm", json_number(edges->after_mm));
 	json_object_set_new(object, "spread_mm", json_number(spread_mm));
 	json_object_set_new(object, "spread_steps",
-			    edges->n > 1 ? json_integer(spread) : json_null());
+			    known ? json_integer(spread) : json_null());
 	return object;
 }
 
@@ -224,7 +250,7 @@ static void put_home(const struct edges *edges, const struct stepper_drive *driv
 {
 	long long spread = edges->highest - edges->lowest;
 
-	if (edges->n > 1)
+	if (edges->n > 1 && !edges->unknown)
 		printf("%d times within %lld steps, %.4f mm\n", edges->n, spread,
 		       (double)spread * drive->info.step_mm);
 	printf("homed, at %.4f mm\n", drive->status.position_mm);

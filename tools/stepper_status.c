@@ -3,9 +3,11 @@
  * Where an actuator stands, in words and as JSON; see stepper_status.h.
  */
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 #include "json.h"
+#include "stepper_counters.h"
 #include "stepper_status.h"
 
 /* From the lowest bit on; a person's word, and the key of JSON. */
@@ -46,6 +48,26 @@ const char *stepper_faults(unsigned int faults, char *text, size_t size)
 	return text;
 }
 
+/* The device's own words for its fault; false where it has none beyond those of the bit. */
+static bool own_cause(struct incise_stepper *stepper, unsigned int faults, char *text,
+		      size_t size)
+{
+	if (!faults || incise_stepper_cause(stepper, text, size) <= 0)
+		return false;
+	for (unsigned int bit = 0; bit < INCISE_STEPPER_FAULTS; bit++)
+		if (!strcmp(text, incise_stepper_fault_text(1u << bit)))
+			return false;
+	return true;
+}
+
+const char *stepper_why(struct incise_stepper *stepper, unsigned int faults, char *text,
+			size_t size)
+{
+	return own_cause(stepper, faults, text, size)
+		       ? text
+		       : stepper_faults(faults, text, size);
+}
+
 /* "home, e-stop", or what to say when there is none. */
 static void put_inputs(unsigned int bits, const char *none)
 {
@@ -73,9 +95,12 @@ static void put_limits(const struct incise_stepper_info *info)
 	putchar('\n');
 }
 
-void stepper_status_text(const struct incise_stepper_info *info,
+void stepper_status_text(struct incise_stepper *stepper,
+			 const struct incise_stepper_info *info,
 			 const struct incise_stepper_status *status)
 {
+	char cause[300];
+
 	printf("%s: %s at %.4f mm (step %lld), %s\n", info->name,
 	       incise_stepper_state_name(status->state), status->position_mm,
 	       stepper_steps(info, status->position_mm),
@@ -98,12 +123,16 @@ void stepper_status_text(const struct incise_stepper_info *info,
 			printf("fault      %s\n", incise_stepper_fault_text(1u << bit));
 	if (!status->faults)
 		puts("faults     none");
+	if (own_cause(stepper, status->faults, cause, sizeof(cause)))
+		printf("cause      %s\n", cause);
 	put_limits(info);
 	printf("deadman    %g ms without a target\nlate       %llu steps\n",
 	       info->deadman_s * 1e3, (unsigned long long)status->late);
+	stepper_counters_text(stepper);
 }
 
-void stepper_status_line(const struct incise_stepper_status *status, double t_s)
+void stepper_status_line(struct incise_stepper *stepper,
+			 const struct incise_stepper_status *status, double t_s)
 {
 	char text[400];
 
@@ -112,7 +141,7 @@ void stepper_status_line(const struct incise_stepper_status *status, double t_s)
 	       status->velocity_mm_s, status->homed ? "homed" : "not homed");
 	put_inputs(status->inputs, "none");
 	if (status->faults)
-		printf("; %s", stepper_faults(status->faults, text, sizeof(text)));
+		printf("; %s", stepper_why(stepper, status->faults, text, sizeof(text)));
 	putchar('\n');
 }
 
@@ -145,11 +174,22 @@ static json_t *measured(const struct incise_stepper_info *info, double value)
 	return info->measures_handle ? json_number(value) : json_null();
 }
 
-json_t *stepper_status_json(const struct incise_stepper_info *info,
+/* In the device's own words, else those of its first fault; null without one. */
+static json_t *cause_json(struct incise_stepper *stepper, unsigned int faults)
+{
+	char text[300];
+
+	return faults && incise_stepper_cause(stepper, text, sizeof(text)) > 0
+		       ? json_text(text)
+		       : json_null();
+}
+
+json_t *stepper_status_json(struct incise_stepper *stepper,
+			    const struct incise_stepper_info *info,
 			    const struct incise_stepper_status *status)
 {
 	return json_pack(
-		"{so sI ss so sI so sb so so so so so sI so so so so so so so so}",
+		"{so sI ss so sI so sb so so so so so so sI so so so so so so so so so}",
 		"name", json_text(info->name), "t_ns", (json_int_t)status->t_ns, "state",
 		incise_stepper_state_name(status->state), "position_mm",
 		json_number(status->position_mm), "position_steps",
@@ -158,13 +198,15 @@ json_t *stepper_status_json(const struct incise_stepper_info *info,
 		measured(info, status->handle_mm), "force_N",
 		measured(info, status->force_N), "inputs", inputs_json(status->inputs),
 		"inputs_wired", inputs_json(info->inputs), "faults",
-		faults_json(status->faults), "late_steps", (json_int_t)status->late,
-		"travel_mm", json_number(info->travel_mm), "step_mm",
-		json_number(info->step_mm), "velocity_max_mm_s",
-		json_number(info->velocity_mm_s), "acceleration_max_mm_s2",
-		json_number(info->acceleration_mm_s2), "jerk_max_mm_s3",
+		faults_json(status->faults), "cause", cause_json(stepper, status->faults),
+		"late_steps", (json_int_t)status->late, "travel_mm",
+		json_number(info->travel_mm), "step_mm", json_number(info->step_mm),
+		"velocity_max_mm_s", json_number(info->velocity_mm_s),
+		"acceleration_max_mm_s2", json_number(info->acceleration_mm_s2),
+		"jerk_max_mm_s3",
 		info->jerk_mm_s3 > 0 ? json_number(info->jerk_mm_s3) : json_null(),
 		"deadman_s", json_number(info->deadman_s), "rate_max_hz",
 		info->rate_max_hz > 0 ? json_number(info->rate_max_hz) : json_null(),
-		"spring_N_mm", json_number(info->spring_N_mm));
+		"spring_N_mm", json_number(info->spring_N_mm), "counters",
+		stepper_counters_json(stepper));
 }

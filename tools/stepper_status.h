@@ -15,14 +15,21 @@ long long stepper_steps(const struct incise_stepper_info *info, double mm);
 /* "e-stop: release it, then clear; late: …"; "" without a fault. Returns text. */
 const char *stepper_faults(unsigned int faults, char *text, size_t size);
 
+/* The same, or, where the device itself tells the cause, that. */
+const char *stepper_why(struct incise_stepper *stepper, unsigned int faults, char *text,
+			size_t size);
+
 /* A block of lines. */
-void stepper_status_text(const struct incise_stepper_info *info,
+void stepper_status_text(struct incise_stepper *stepper,
+			 const struct incise_stepper_info *info,
 			 const struct incise_stepper_status *status);
 
 /* One line, "ready at 1.000 mm, 0.0 mm/s, homed; inputs home", for --follow. */
-void stepper_status_line(const struct incise_stepper_status *status, double t_s);
+void stepper_status_line(struct incise_stepper *stepper,
+			 const struct incise_stepper_status *status, double t_s);
 
-json_t *stepper_status_json(const struct incise_stepper_info *info,
+json_t *stepper_status_json(struct incise_stepper *stepper,
+			    const struct incise_stepper_info *info,
 			    const struct incise_stepper_status *status);
 
 #endif

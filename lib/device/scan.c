@@ -23,10 +23,12 @@ int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 					spec);
 	snprintf(name, sizeof(name), "%.*s", (int)length, spec);
 	snprintf(where, sizeof(where), "%.70s", spec);
-	rc = incise_backend_find(&loaded, kind, name, where, err);
+	/* The virtual rig is whatever one asks for. */
+	rc = strcmp(name, "sim") ? incise_backend_find(&loaded, kind, name, where, err)
+				 : 0;
 	if (rc)
 		return rc;
-	if (loaded.backend->scan)
+	if (loaded.backend && loaded.backend->scan)
 		rc = loaded.backend->scan(spec + length + 1, found, context, err);
 	else
 		rc = incise_error_set(err, EOPNOTSUPP,

@@ -31,6 +31,7 @@ static void what_cannot_be_scanned_is_said(void **state)
 		{"nosuch:can0", ENODEV, "there is no backend \"nosuch\""},
 		{"../../etc:can0", ENODEV, "there is no backend"},
 		{"kernel:/dev/incise-stepper0", EOPNOTSUPP, "cannot look for devices"},
+		{"sim:", EOPNOTSUPP, "cannot look for devices"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

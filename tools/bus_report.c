@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise info BACKEND:BUS: who is on a bus, and what to write into rig.conf for it.
+ */
+#include <ctype.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/scan.h>
+#include "bus_report.h"
+#include "cli.h"
+#include "json.h"
+
+/* A device, with keys that stay when the backend's module is gone. */
+struct answer {
+	char device[100], what[100];
+	int n;
+	struct {
+		char key[40], text[100];
+	} property[INCISE_SCAN_PROPERTIES];
+};
+
+/* All of them, in the order in which they answered. */
+struct found {
+	struct answer *answer;
+	int n;
+};
+
+bool bus_report_is(const char *what)
+{
+	static const char *const files[] = {".fis", ".fx", ".rec", ".rec/"};
+	size_t n = strspn(what, "abcdefghijklmnopqrstuvwxyz0123456789_");
+
+	if (!n || what[n] != ':')
+		return false;
+	n = strlen(what);
+	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
+		if (n > strlen(files[i]) &&
+		    !strcmp(what + n - strlen(files[i]), files[i]))
+			return false;
+	return true;
+}
+
+static int keep(void *context, const struct incise_scan_device *device)
+{
+	struct found *found = context;
+	struct answer *more, *one;
+
+	more = reallocarray(found->answer, (size_t)found->n + 1, sizeof(*more));
+	if (!more)
+		return -ENOMEM;
+	found->answer = more;
+	one = &more[found->n++];
+	*one = (struct answer){0};
+	snprintf(one->device, sizeof(one->device), "%s", device->device);
+	snprintf(one->what, sizeof(one->what), "%s", device->what);
+	for (; one->n < device->n && one->n < INCISE_SCAN_PROPERTIES; one->n++) {
+		const struct incise_scan_property *from = &device->property[one->n];
+
+		snprintf(one->property[one->n].key, sizeof(one->property->key), "%s",
+			 from->key);
+		snprintf(one->property[one->n].text, sizeof(one->property->text), "%s",
+			 from->text);
+	}
+	return 0;
+}
+
+/* A drive gives its own name: what it says must not reach the terminal as commands. */
+static void put_plain(const char *text)
+{
+	for (; *text; text++)
+		putchar(iscntrl((unsigned char)*text) ? '?' : *text);
+}
+
+static void put_device(const struct answer *device)
+{
+	int width = (int)strlen("stepper");
+
+	for (int i = 0; i < device->n; i++)
+		if ((int)strlen(device->property[i].key) > width)
+			width = (int)strlen(device->property[i].key);
+	putchar('\n');
+	put_plain(device->what);
+	printf("\n  %-*s = \"", width, "stepper");
+	put_plain(device->device);
+	fputs("\";\n", stdout);
+	for (int i = 0; i < device->n; i++) {
+		printf("  %-*s   ", width, device->property[i].key);
+		put_plain(device->property[i].text);
+		putchar('\n');
+	}
+}
+
+static json_t *device_json(const struct answer *device)
+{
+	json_t *object = json_pack("{so so}", "device", json_text(device->device), "what",
+				   json_text(device->what));
+
+	for (int i = 0; i < device->n; i++)
+		json_object_set_new(object, device->property[i].key,
+				    json_text(device->property[i].text));
+	return object;
+}
+
+static void show_json(const char *what, const struct found *found)
+{
+	json_t *devices = json_array();
+
+	for (int i = 0; i < found->n; i++)
+		json_array_append_new(devices, device_json(&found->answer[i]));
+	json_print(json_pack("{ss so so}", "kind", "bus", "bus", json_text(what),
+			     "devices", devices));
+}
+
+void bus_report_show(const char *what, bool json)
+{
+	struct incise_error err = {0};
+	struct found found = {0};
+	int rc;
+
+	cli_progress("looking on %s", what);
+	rc = incise_scan("stepper", what, keep, &found, &err);
+	cli_progress_end();
+	if (rc == -ENOMEM && !err.code)
+		cli_fail("%s: no memory for what was found", what);
+	if (rc)
+		cli_fail_with(&err);
+	/* As with a word that names no file: who asks for it expects it to be there. */
+	if (!found.n)
+		cli_fail(
+			"%s: nobody answers; see that the drive has power, its node id and "
+			"bit rate, the cable and its two ends of 120 ohm",
+			what);
+	if (json) {
+		show_json(what, &found);
+	} else {
+		printf("%s: %d device%s\n", what, found.n, found.n == 1 ? "" : "s");
+		for (int i = 0; i < found.n; i++)
+			put_device(&found.answer[i]);
+	}
+	free(found.answer);
+}

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * What an actuator's backend counts; see stepper_counters.h.
+ */
+#include <stdio.h>
+#include "json.h"
+#include "stepper_counters.h"
+
+json_t *stepper_counters_json(struct incise_stepper *stepper)
+{
+	struct incise_stepper_counter counter;
+	json_t *object = json_object();
+
+	for (int i = 0; !incise_stepper_counter(stepper, i, &counter); i++)
+		json_object_set_new(object, counter.key,
+				    json_integer((json_int_t)counter.value));
+	return object;
+}
+
+void stepper_counters_text(struct incise_stepper *stepper)
+{
+	struct incise_stepper_counter counter;
+
+	for (int i = 0; !incise_stepper_counter(stepper, i, &counter); i++)
+		printf("%-10s %llu %s\n", i ? "" : "counted",
+		       (unsigned long long)counter.value, counter.text);
+}
+
+void stepper_counters_line(struct incise_stepper *stepper)
+{
+	struct incise_stepper_counter counter;
+	const char *before = "actuator   ";
+
+	for (int i = 0; !incise_stepper_counter(stepper, i, &counter); i++)
+		if (counter.value) {
+			printf("%s%llu %s", before, (unsigned long long)counter.value,
+			       counter.text);
+			before = ", ";
+		}
+	if (*before == ',')
+		putchar('\n');
+}
