@@ -33,7 +33,11 @@ $(locale):
 check-unit: $(unit_programs) $(locale) ## unit tests
 	@LOCPATH=$(abspath $(O)/locale) tests/unit/run $(unit_programs)
 
-check-cli: all $(locale) ## command-line tests of the real programs
+# The CAN drive that tests talk to is on python-canopen, in a folder of its own.
+can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/README.md
+	@tests/can/venv $(O)/tests/can
+
+check-cli: all $(locale) can-drive ## command-line tests of the real programs
 	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
@@ -46,7 +50,7 @@ style_sources := $(shell find lib tools tests driver -name '*.[ch]' 2>/dev/null)
 check-style: ## the house's form: clang-format, an SPDX line in every file
 	@tests/style $(style_sources)
 
-.PHONY: check check-style check-unit check-cli check-sanitize
+.PHONY: check check-style check-unit check-cli check-sanitize can-drive
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""
+The drive of the CAN tests, tested by python-canopen's own master (RemoteNode, BaseNode402)
+and python-can's own slcan: nothing here is incise's. Prints "ok …" or "not ok …" lines.
+
+    selftest.py                 all of it, 5 s
+    selftest.py --speed SECONDS  1 kHz of RPDO, SYNC and TPDO; prints what came of it
+"""
+
+import json
+import logging
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+for name in ("can", "canopen"):
+    logging.getLogger(name).setLevel(logging.ERROR)
+
+import can
+import canopen
+from canopen.profiles.p402 import BaseNode402
+from canopen.sdo import SdoAbortedError
+
+from objects import dictionary
+
+NODE, MASTER = 0x10, 0x7E
+
+
+class Peer:
+    """drive.py in a process of its own."""
+
+    def __init__(self, *options):
+        program = [sys.executable, str(Path(__file__).with_name("drive.py")), *options]
+        self.process = subprocess.Popen(program, stdin=subprocess.PIPE,
+                                        stdout=subprocess.PIPE, text=True)
+        self.path = self.process.stdout.readline().split()[1].split(":")[1]
+
+    def ask(self, command):
+        self.process.stdin.write(command + "\n")
+        self.process.stdin.flush()
+        return json.loads(self.process.stdout.readline())
+
+    def close(self):
+        self.process.stdin.close()
+        self.process.wait(5)
+
+
+class Master:
+    def __init__(self, path):
+        self.network = canopen.Network()
+        self.network.NOTIFIER_CYCLE = 0.05
+        self.network.connect(interface="slcan", channel=path, bitrate=1000000,
+                             sleep_after_open=0, ignore_config=True)
+        self.node = BaseNode402(NODE, dictionary(NODE))
+        self.network.add_node(self.node)
+        self.beating = None
+
+    def map_pdos(self):
+        node = self.node
+        node.nmt.state = "PRE-OPERATIONAL"
+        rpdo, tpdo = node.rpdo[1], node.tpdo[1]
+        node.rpdo.read()
+        node.tpdo.read()
+        for pdo, objects, kind in ((rpdo, (0x6040, 0x607A), 1), (tpdo, (0x6041, 0x6064), 1)):
+            pdo.clear()
+            for index in objects:
+                pdo.add_variable(index, 0)
+            pdo.trans_type, pdo.enabled = kind, True
+            pdo.save()
+
+    def write(self, index, sub, value):
+        entry = self.node.sdo[index]
+        (entry[sub] if hasattr(entry, "__getitem__") else entry).raw = value
+
+    def beat(self, period_s):
+        self.beating = self.network.send_periodic(0x700 + MASTER, [5], period_s)
+
+    def enable(self):
+        """To operation enabled by SDO, as BaseNode402 has it."""
+        self.node.nmt.state = "OPERATIONAL"
+        for word in (0x06, 0x07, 0x0F):
+            self.write(0x6040, 0, word)
+
+    def cycle(self, word, target, wait_s=0.5):
+        """One cycle; returns statusword and position that answered."""
+        rpdo, tpdo = self.node.rpdo[1], self.node.tpdo[1]
+        rpdo[0].raw, rpdo[1].raw = word, target
+        with tpdo.receive_condition:
+            tpdo.is_received = False
+            rpdo.transmit()
+            self.network.send_message(0x80, b"")
+            tpdo.receive_condition.wait_for(lambda: tpdo.is_received, wait_s)
+        return tpdo[0].raw, tpdo[1].raw
+
+    def close(self):
+        if self.beating:
+            self.beating.stop()
+        self.network.disconnect()
+
+
+def until(check, limit_s=3.0):
+    end = time.monotonic() + limit_s
+    while time.monotonic() < end:
+        if check():
+            return True
+        time.sleep(0.01)
+    return False
+
+
+def code_of(action):
+    """The abort code of what should be refused."""
+    try:
+        action()
+    except SdoAbortedError as error:
+        return error.code
+    return 0
+
+
+def identity(peer, master):
+    sdo = master.node.sdo
+    assert sdo[0x1008].raw == "incise-test-drive", "name in segments"
+    assert sdo[0x1018][2].raw == 0x402
+    assert sdo[0x1000].raw & 0xFFFF == 402
+    assert code_of(lambda: sdo.upload(0x2000, 0)) == 0x06020000
+    assert code_of(lambda: sdo.upload(0x1018, 9)) == 0x06090011
+    assert code_of(lambda: sdo.download(0x6064, 0, bytes(4))) == 0x06010002, "read only"
+    assert code_of(lambda: sdo.download(0x6040, 0, bytes(4))) == 0x06070010, "length"
+
+
+def mapping(peer, master):
+    sdo = master.node.sdo
+    master.node.nmt.state = "PRE-OPERATIONAL"
+    write = master.write
+    assert code_of(lambda: write(0x1600, 0, 0)) == 0x08000022, "the PDO exists"
+    assert code_of(lambda: write(0x1400, 1, 0x333)) == 0x08000022, "the id of one that exists"
+    write(0x1400, 1, 0x80000210)
+    assert code_of(lambda: write(0x1600, 1, 0x60400010)) == 0x08000022, "entries before 0"
+    write(0x1600, 0, 0)
+    assert code_of(lambda: write(0x1600, 1, 0x60640020)) == 0x06040041, "it cannot be received"
+    assert code_of(lambda: write(0x1600, 1, 0x20000020)) == 0x06020000
+    write(0x1600, 1, 0x607A0020)
+    write(0x1600, 2, 0x60FF0020)
+    write(0x1600, 3, 0x60400010)
+    assert code_of(lambda: write(0x1600, 0, 3)) == 0x06040042, "ten bytes"
+    master.map_pdos()
+    assert sdo[0x1600][2].raw == 0x607A0020
+
+
+def states(peer, master):
+    """BaseNode402 walks it through its states and back, by SDO."""
+    node = master.node
+    master.map_pdos()
+    node.nmt.state = "OPERATIONAL"
+    for word, status in ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27), (0x07, 0x23), (0x06, 0x21),
+                         (0x0F, 0x27), (0x00, 0x40)):
+        master.write(0x6040, 0, word)
+        seen = node.sdo[0x6041].raw & (0x6F if status != 0x40 else 0x4F)
+        assert seen == status, f"{word:#x}: {seen:#x}"
+    node.setup_402_state_machine(read_pdos=False)
+    node.tpdo_pointers.clear()
+    node.rpdo_pointers.clear()
+    node.tpdo_values.clear()
+    node.state = "OPERATION ENABLED"
+    assert peer.ask("state")["state"] == "operation enabled"
+    node.state = "SWITCH ON DISABLED"
+    assert peer.ask("state")["state"] == "switch-on disabled"
+
+
+def follows(peer, master):
+    master.map_pdos()
+    master.write(0x6060, 0, 8)
+    master.enable()
+    peer.ask("restart")
+    targets = [i * i // 8 for i in range(200)]
+    answers = [master.cycle(0x0F, target) for target in targets]
+    positions = [position for _, position in answers]
+    assert positions[2:] == targets[1:-1], "one cycle behind its target"
+    assert all(status & 0x106F == 0x1027 for status, _ in answers)
+    report = peer.ask("report")
+    assert (report["syncs"], report["rpdos"], report["missing"], report["doubled"]) == (
+        200, 200, 0, 0), report
+    assert report["largest_step"] == targets[-1] - targets[-2]
+    master.network.send_message(0x80, b"")
+    until(lambda: peer.ask("report")["syncs"] == 201)
+    assert peer.ask("report")["missing"] == 1, "a SYNC without a set-point is seen"
+    master.node.rpdo[1].transmit()
+    master.cycle(0x0F, targets[-1])
+    assert peer.ask("report")["doubled"] == 1, "so are two"
+
+
+def heartbeat(peer, master):
+    follows(peer, master)
+    assert peer.ask("state")["state"] == "operation enabled"
+    master.write(0x6007, 0, 3)
+    master.write(0x605A, 0, 2)
+    master.write(0x1016, 1, MASTER << 16 | 100)
+    time.sleep(0.3)
+    assert peer.ask("state")["state"] == "operation enabled", "nothing is heard, none is missed"
+    master.beat(0.03)
+    time.sleep(0.5)
+    assert peer.ask("state")["state"] == "operation enabled", "heard"
+    master.beating.stop()
+    master.beating = None
+    assert until(lambda: peer.ask("state")["state"] == "switch-on disabled"), peer.ask("state")
+    assert peer.ask("report")["silence_ms"] >= 100
+    assert any(emcy.code == 0x8130 for emcy in master.node.emcy.log)
+    master.cycle(0x0F, 0, wait_s=0.1)
+    assert peer.ask("state")["state"] == "switch-on disabled", "nothing enables it again"
+
+
+def faults(peer, master):
+    follows(peer, master)
+    peer.ask("block")
+    assert until(lambda: master.cycle(0x0F, 100000)[0] & 0x4F == 0x08), "following error"
+    assert master.node.sdo[0x603F].raw == 0x8611
+    peer.ask("block off")
+    master.write(0x6040, 0, 0x0F)
+    assert peer.ask("state")["state"] == "fault"
+    for word in (0x00, 0x80):
+        master.write(0x6040, 0, word)
+    assert peer.ask("state")["state"] == "switch-on disabled"
+    assert until(lambda: [e.code for e in master.node.emcy.log][-2:] == [0x8611, 0])
+    peer.ask("fault 0x3210 stays")
+    for word in (0x00, 0x80):
+        master.write(0x6040, 0, word)
+    assert peer.ask("state")["state"] == "fault", "its cause is still there"
+
+
+def homing(peer, master):
+    master.map_pdos()
+    master.write(0x6060, 0, 6)
+    master.write(0x6098, 0, 17)
+    master.write(0x6099, 1, 100000)
+    master.enable()
+    assert master.node.sdo[0x6041].raw & 0x3400 == 0x0400, "not started"
+    master.write(0x6040, 0, 0x1F)
+    assert until(lambda: master.node.sdo[0x6041].raw & 0x3400 == 0x1400), peer.ask("state")
+    state = peer.ask("state")
+    assert (state["shaft"], state["position"]) == (-19999, 0), state
+
+
+def reboots(peer, master):
+    follows(peer, master)
+    boots = []
+    master.node.nmt.add_heartbeat_callback(boots.append)
+    peer.ask("reboot")
+    assert until(lambda: 0 in boots), "boot-up message"
+    assert peer.ask("state")["state"] == "switch-on disabled"
+    assert master.node.sdo[0x1600][0].raw == 1, "its mapping is that of power-on"
+
+
+def speed(seconds):
+    """1 kHz, whatever comes back; then what both sides counted."""
+    peer = Peer()
+    master = Master(peer.path)
+    master.map_pdos()
+    master.write(0x6060, 0, 8)
+    master.enable()
+    peer.ask("restart")
+    rpdo, answers = master.node.rpdo[1], []
+    master.node.tpdo[1].add_callback(lambda pdo: answers.append(pdo[1].raw))
+    count, due = int(seconds * 1000), time.monotonic()
+    for i in range(count):
+        rpdo[0].raw, rpdo[1].raw = 0x0F, i
+        rpdo.transmit()
+        master.network.send_message(0x80, b"")
+        due += 0.001
+        time.sleep(max(0.0, due - time.monotonic()))
+    time.sleep(0.5)
+    report = peer.ask("report")
+    cpu = sum(map(int, Path(f"/proc/{peer.process.pid}/stat").read_text().split()[13:15]))
+    del report["events"]
+    report.update(sent=count, answers=len(answers), drive_cpu_s=cpu / 100,
+                  master_cpu_s=round(time.process_time(), 2), seconds=seconds)
+    print(json.dumps(report))
+    master.close()
+    peer.close()
+
+
+def main():
+    if sys.argv[1:2] == ["--speed"]:
+        speed(float(sys.argv[2]))
+        return 0
+    failed = 0
+    for test in (identity, mapping, states, follows, heartbeat, faults, homing, reboots):
+        peer = Peer()
+        master = Master(peer.path)
+        try:
+            test(peer, master)
+            print("ok", test.__name__)
+        except (AssertionError, SdoAbortedError, canopen.SdoCommunicationError) as error:
+            failed += 1
+            line = error.__traceback__
+            while line.tb_next and "selftest" in line.tb_next.tb_frame.f_code.co_filename:
+                line = line.tb_next
+            print(f"not ok {test.__name__}: line {line.tb_lineno}: {error!r}")
+        finally:
+            master.close()
+            peer.close()
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
