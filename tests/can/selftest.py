@@ -31,7 +31,7 @@ class Peer:
     """drive.py in a process of its own."""
 
     def __init__(self, *options):
-        program = [sys.executable, str(Path(__file__).with_name("drive.py")), *options]
+        program = [sys.executable, "-B", str(Path(__file__).with_name("drive.py")), *options]
         self.process = subprocess.Popen(program, stdin=subprocess.PIPE,
                                         stdout=subprocess.PIPE, text=True)
         self.path = self.process.stdout.readline().split()[1].split(":")[1]
