@@ -76,6 +76,9 @@ struct can_transport {
 	 * the line in @err. */
 	int (*open)(struct can_bus **bus, const struct can_bus_request *request,
 		    struct incise_error *err);
+	/* Of a test whose time goes only when it is told to: no thread is started, and cycles
+	 * run while somebody waits. NULL: the computer's clock. */
+	void (*sleep_until)(struct can_bus *bus, int64_t t_ns);
 };
 
 extern const struct can_transport can_transport_socketcan, can_transport_slcan;

@@ -40,9 +40,13 @@ struct can_stepper {
 	_Alignas(64) atomic_int command;
 	/* The thread's, or the caller's who borrowed it. */
 	_Alignas(64) struct can_link link;
+	struct can_watch watch;
+	int64_t due_ns, idle_ns; /* the next cycle; the next without power */
+	bool lent, ended;
+	/* Fixed once it runs. */
+	void (*sleep_until)(struct can_bus *bus, int64_t t_ns); /* of a test's clock */
 	pthread_t thread;
 	bool runs, watches;
-	struct can_watch watch;
 };
 
 static struct can_stepper *of(struct incise_motor *motor)
@@ -55,11 +59,68 @@ static int64_t now_of(struct can_bus *bus)
 	return bus->ops->now(bus);
 }
 
-static void nap(int64_t ns)
-{
-	struct timespec wait = {ns / INCISE_NS_PER_S, ns % INCISE_NS_PER_S};
+/* The thread. */
 
-	clock_nanosleep(CLOCK_MONOTONIC, 0, &wait, NULL);
+static void obey(struct can_stepper *c)
+{
+	switch (atomic_load_explicit(&c->command, memory_order_acquire)) {
+	case NONE:
+		return;
+	case DISABLE:
+		if (!c->watches)
+			can_axis_disable(&c->link.axis);
+		break;
+	case LEND:
+		c->lent = true;
+		break;
+	case RETURN:
+		c->lent = false;
+		c->due_ns = now_of(c->link.bus);
+		break;
+	case END:
+		c->ended = true;
+		break;
+	}
+	atomic_store_explicit(&c->command, NONE, memory_order_release);
+}
+
+/* Without power, and while it is borrowed: the mailbox, and now and then a cycle. */
+static int64_t idle(struct can_stepper *c)
+{
+	int64_t now = now_of(c->link.bus);
+
+	if (!c->lent && now >= c->idle_ns) {
+		if (c->watches)
+			can_watch_cycle(&c->watch, &c->link);
+		else
+			can_axis_cycle(&c->link.axis, now, 0, 0);
+		c->idle_ns = now + CAN_AXIS_IDLE_NS;
+	}
+	c->due_ns = now_of(c->link.bus);
+	return c->due_ns + IDLE_LOOK_NS;
+}
+
+/*
+ * Do what is due; returns when it is to be called again. Times are start + n cycles; what is
+ * late by a cycle or more is left out.
+ */
+static int64_t step(struct can_stepper *c)
+{
+	struct can_axis *axis = &c->link.axis;
+	int64_t cycle = axis->setup.config.tick_ns, now;
+	uint32_t left_out = 0;
+
+	obey(c);
+	if (c->lent || !axis->motion.powered)
+		return idle(c);
+	now = now_of(c->link.bus);
+	if (now < c->due_ns)
+		return c->due_ns;
+	left_out = (uint32_t)((now - c->due_ns) / cycle);
+	c->due_ns += left_out * cycle;
+	can_axis_cycle(axis, now, now - c->due_ns, left_out);
+	c->due_ns += cycle;
+	return c->due_ns;
 }
 
 static void sleep_until(int64_t t_ns)
@@ -69,83 +130,28 @@ static void sleep_until(int64_t t_ns)
 	clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
 }
 
-/* The thread. */
-
-/* Until who borrowed the bus gives it back; false: it is to end. */
-static bool wait_return(struct can_stepper *c)
-{
-	atomic_store_explicit(&c->command, NONE, memory_order_release);
-	for (;;) {
-		int command = atomic_load_explicit(&c->command, memory_order_acquire);
-
-		if (command == RETURN || command == END)
-			return command == RETURN;
-		nap(IDLE_LOOK_NS / 2);
-	}
-}
-
-/* False: it is to end. */
-static bool obey(struct can_stepper *c)
-{
-	int command = atomic_load_explicit(&c->command, memory_order_acquire);
-	bool on = true;
-
-	switch (command) {
-	case NONE:
-		return true;
-	case DISABLE:
-		if (!c->watches)
-			can_axis_disable(&c->link.axis);
-		break;
-	case LEND:
-		on = wait_return(c);
-		break;
-	default:
-		on = false;
-	}
-	atomic_store_explicit(&c->command, NONE, memory_order_release);
-	return on;
-}
-
-/* Times are start + n cycles; what is late by a cycle or more is left out. */
 static void *thread_run(void *argument)
 {
 	struct can_stepper *c = argument;
-	struct can_axis *axis = &c->link.axis;
-	int64_t cycle = axis->setup.config.tick_ns, due = now_of(c->link.bus);
-	int64_t idle_due = due;
 
-	while (obey(c)) {
-		int64_t now = now_of(c->link.bus);
-		uint32_t left_out;
-
-		if (!axis->motion.powered) {
-			if (now >= idle_due) {
-				can_axis_cycle(axis, now, 0, 0);
-				idle_due = now + CAN_AXIS_IDLE_NS;
-			}
-			nap(IDLE_LOOK_NS);
-			due = now_of(c->link.bus);
-			continue;
-		}
-		left_out = now - due >= cycle ? (uint32_t)((now - due) / cycle) : 0;
-		due += left_out * cycle;
-		can_axis_cycle(axis, now, now - due, left_out);
-		due += cycle;
-		sleep_until(due);
-	}
+	while (!c->ended)
+		sleep_until(step(c));
 	return NULL;
 }
 
-static void *thread_watch(void *argument)
+/* Let time pass for a caller; in a test's time the thread's work is done meanwhile. */
+static void nap(struct can_stepper *c, int64_t ns)
 {
-	struct can_stepper *c = argument;
+	int64_t end = now_of(c->link.bus) + ns, due;
 
-	while (obey(c)) {
-		can_watch_cycle(&c->watch, &c->link);
-		nap(CAN_AXIS_IDLE_NS);
+	if (!c->sleep_until) {
+		sleep_until(end);
+		return;
 	}
-	return NULL;
+	do {
+		due = step(c);
+		c->sleep_until(c->link.bus, due < end ? due : end);
+	} while (now_of(c->link.bus) < end);
 }
 
 /* The callers' side of the mailbox. */
@@ -158,7 +164,7 @@ static int ask(struct can_stepper *c, enum command command)
 	while (atomic_load_explicit(&c->command, memory_order_acquire) != NONE) {
 		if (now_of(c->link.bus) > end)
 			return -EIO;
-		nap(POLL_NS / 4);
+		nap(c, POLL_NS / 4);
 	}
 	return 0;
 }
@@ -192,7 +198,7 @@ static int await_result(struct can_stepper *c, int64_t most_ns, const volatile i
 			stopped = true;
 			ask(c, DISABLE);
 		}
-		nap(POLL_NS);
+		nap(c, POLL_NS);
 	}
 	return c->link.axis.result;
 }
@@ -297,7 +303,8 @@ static void can_close(struct incise_motor *motor)
 		if (!c->watches)
 			motor->stepper.ops->disable(&motor->stepper, NULL);
 		atomic_store_explicit(&c->command, END, memory_order_release);
-		pthread_join(c->thread, NULL);
+		if (!c->sleep_until)
+			pthread_join(c->thread, NULL);
 	}
 	can_link_close(&c->link);
 	free(c);
@@ -357,7 +364,7 @@ static int go_to_begin(struct can_stepper *c, double home_mm, const volatile int
 		rc = stepper->ops->set(stepper, to_mm);
 		if (rc)
 			return say_why(c, rc, "homing", err);
-		nap(POLL_NS);
+		nap(c, POLL_NS);
 		stepper->ops->status(stepper, &status);
 		if (stop && *stop)
 			return incise_error_set(err, EINTR, "homing %s: stopped",
@@ -430,16 +437,23 @@ static void stepper_info(const struct incise_stepper *stepper,
 	info->can_home = c->motor.actuator.can.homing_method != 0;
 }
 
+static int can_wait(struct incise_motor *motor, int64_t ns)
+{
+	nap(of(motor), ns);
+	return 0;
+}
+
 static int start_thread(struct can_stepper *c)
 {
 	size_t length = strlen(c->motor.name);
 	bool real_time = true;
-	int rc;
+	int rc = 0;
 
-	if (!c->watches)
+	c->due_ns = c->idle_ns = now_of(c->link.bus);
+	if (!c->sleep_until && c->watches)
+		rc = -pthread_create(&c->thread, NULL, thread_run, c);
+	else if (!c->sleep_until)
 		rc = incise_thread_start(&c->thread, thread_run, c, &real_time);
-	else
-		rc = -pthread_create(&c->thread, NULL, thread_watch, c);
 	if (rc)
 		return rc;
 	c->runs = true;
@@ -499,6 +513,7 @@ void *can_stepper_open(const struct can_transport *transport,
 		.clear = can_clear,
 		.close = can_close,
 		.now = can_now,
+		.wait = can_wait,
 	};
 	struct can_stepper *c = aligned_alloc(64, sizeof(*c));
 	int rc;
@@ -509,6 +524,7 @@ void *can_stepper_open(const struct can_transport *transport,
 	}
 	memset(c, 0, sizeof(*c));
 	c->watches = asked->watch;
+	c->sleep_until = transport->sleep_until;
 	c->motor.door = &door;
 	c->motor.watches = asked->watch;
 	c->motor.setpoint = &c->setpoint;
