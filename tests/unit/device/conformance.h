@@ -313,7 +313,7 @@ static inline void conform_home(struct conformance *c)
 
 	conform_enable(c);
 	rc = incise_stepper_home(c->stepper, NULL, &err);
-	if (!(c->info.inputs & (INCISE_STEPPER_AT_HOME | INCISE_STEPPER_AT_MIN))) {
+	if (!c->info.can_home) {
 		CONFORM(c, rc == -EOPNOTSUPP && err.text[0]);
 		return;
 	}

@@ -1,0 +1,553 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/can as a whole against a simulated drive, in virtual time: what every stepper
+ * must do, each thing that goes wrong, and that no set-point is lost.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include "../device/conformance.h"
+#include "rig.h"
+
+#define MS DRIVE_MS
+#define COUNTS_PER_MM 12800 /* 51200 a turn of 4 mm */
+
+static struct can_rig rig;
+
+static void failed(const char *text)
+{
+	fail_msg("%s", text);
+}
+
+static void open_or_fail(void)
+{
+	struct incise_error err = {0};
+
+	if (!can_rig_open(&rig, &err))
+		fail_msg("%s", err.text);
+}
+
+static void enable_or_fail(void)
+{
+	struct incise_error err = {0};
+
+	rig.drive.tripped = false;
+	if (incise_stepper_enable(rig.stepper, &err))
+		fail_msg("%s", err.text);
+	assert_int_equal(rig.drive.state, CIA402_ENABLED);
+}
+
+static void input(void *world, unsigned int input, bool active)
+{
+	struct can_rig *r = world;
+	uint32_t bit = input == INCISE_STEPPER_ESTOP_ACTIVE ? CIA402_INTERLOCK
+		       : r->actuator.invert		    ? CIA402_AT_MIN
+							    : CIA402_AT_MAX;
+
+	r->drive.inputs = active ? r->drive.inputs | bit : r->drive.inputs & ~bit;
+}
+
+static void every_case_of_a_stepper(void **state)
+{
+	static const struct {
+		bool invert, no_homing;
+		double jerk_mm_s3;
+		uint32_t cycle_ns;
+	} row[] = {
+		{false, false, 0, 1000000},
+		{true, true, 0, 2000000},
+		{false, false, 50000, 500000},
+	};
+
+	for (size_t k = 0; k < sizeof(row) / sizeof(*row); k++)
+		for (int i = 0; conformance[i].name; i++) {
+			struct conformance c = {
+				.world = &rig,
+				.advance = can_rig_advance,
+				.input = input,
+				/* A quick stop, and the frames' way there and back. */
+				.slack_s = 0.1,
+				.say = failed,
+			};
+
+			can_rig_init(&rig);
+			rig.actuator.invert = row[k].invert;
+			rig.actuator.jerk_mm_s3 = row[k].jerk_mm_s3;
+			rig.actuator.can.cycle_ns = row[k].cycle_ns;
+			if (row[k].no_homing)
+				rig.actuator.can.homing_method = 0;
+			open_or_fail();
+			c.stepper = rig.stepper;
+			incise_stepper_info(c.stepper, &c.info);
+			conformance[i].run(&c);
+			assert_int_equal(rig.drive.enabled_unasked, 0);
+			/* 1 % of rounding in the drive's own clock of 250 us. */
+			assert_true(rig.drive.fastest <= 1.01 * 10 * COUNTS_PER_MM);
+			can_rig_close(&rig);
+			assert_false(drive_powered(&rig.drive));
+		}
+}
+
+/* Things that go wrong under way; each is undone before `clear`. */
+static void emcy(struct drive *d, bool on)
+{
+	if (on)
+		drive_fault(d, 0x3210);
+}
+
+static void heartbeat(struct drive *d, bool on)
+{
+	d->no_heartbeat = on;
+}
+
+static void tpdo(struct drive *d, bool on)
+{
+	d->no_tpdo = on;
+}
+
+static void unplugged(struct drive *d, bool on)
+{
+	d->unplugged = on;
+}
+
+static void reboot(struct drive *d, bool on)
+{
+	if (on)
+		drive_reboot(d);
+}
+
+static void blocked(struct drive *d, bool on)
+{
+	d->blocked = on;
+}
+
+static void bus_off(struct drive *d, bool on)
+{
+	if (on) {
+		drive_bus_off(d);
+		return;
+	}
+	d->unplugged = false;
+	d->can_state = CAN_STATE_ERROR_ACTIVE;
+	d->send_error = 0;
+}
+
+static void queue_full(struct drive *d, bool on)
+{
+	d->send_error = on ? -ENOBUFS : 0;
+}
+
+static void adapter_gone(struct drive *d, bool on)
+{
+	d->receive_error = d->send_error = on ? -ENODEV : 0;
+}
+
+static void other_master(struct drive *d, bool on)
+{
+	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
+
+	if (on)
+		drive_say(d, &sync);
+}
+
+static void powered_off(struct drive *d, bool on)
+{
+	if (on)
+		drive_enter(d, CIA402_DISABLED);
+}
+
+static void pre_operational(struct drive *d, bool on)
+{
+	if (on)
+		d->nmt = CANOPEN_PRE_OPERATIONAL;
+}
+
+static const struct {
+	const char *name;
+	void (*inject)(struct drive *drive, bool on);
+	unsigned int fault;
+	const char *says;
+} faults[] = {
+	{"EMCY", emcy, INCISE_STEPPER_ALARM, "(3210h)"},
+	{"no heartbeat", heartbeat, INCISE_STEPPER_LOST, "no heartbeat of it"},
+	{"no TPDO", tpdo, INCISE_STEPPER_LOST, "no status (TPDO1)"},
+	{"unplugged", unplugged, INCISE_STEPPER_LOST, "see its power and cable"},
+	{"reboot", reboot, INCISE_STEPPER_LOST, "began anew"},
+	{"blocked", blocked, INCISE_STEPPER_FOLLOWING, "off its target by"},
+	{"bus-off", bus_off, INCISE_STEPPER_BUS, "the bus is off"},
+	{"queue full", queue_full, INCISE_STEPPER_BUS, "queue is full"},
+	{"adapter gone", adapter_gone, INCISE_STEPPER_BUS, "No such device"},
+	{"other master", other_master, INCISE_STEPPER_SETPOINT, "another program"},
+	{"power taken", powered_off, INCISE_STEPPER_ALARM, "left operation enabled"},
+	{"NMT", pre_operational, INCISE_STEPPER_LOST, "pre-operational"},
+};
+
+static void each_fault_stops_the_drive_and_is_named(void **state)
+{
+	for (size_t i = 0; i < sizeof(faults) / sizeof(*faults); i++) {
+		struct incise_stepper_status s;
+		struct incise_error err = {0};
+		char cause[300];
+		uint64_t enables;
+
+		can_rig_init(&rig);
+		/* What is blocked is seen here before the drive itself sees it. */
+		if (faults[i].inject == blocked)
+			rig.drive.od[OD_FOLLOWING].size = 0;
+		open_or_fail();
+		enable_or_fail();
+		can_rig_hold(&rig, 15, 200 * MS);
+		assert_true(rig.drive.velocity > 5 * COUNTS_PER_MM);
+		faults[i].inject(&rig.drive, true);
+		can_rig_hold(&rig, 15, 2000 * MS);
+		s = can_rig_look(&rig);
+		incise_stepper_cause(rig.stepper, cause, sizeof(cause));
+		if (s.state != INCISE_STEPPER_FAULT || !(s.faults & faults[i].fault) ||
+		    !strstr(cause, faults[i].says) ||
+		    !strstr(cause, "drive 0x10 at can-test: "))
+			fail_msg("%s: %s, faults %#x, \"%s\"", faults[i].name,
+				 incise_stepper_state_name(s.state), s.faults, cause);
+		/* Stopped, by us or by its own deadman, and without power. */
+		if (rig.drive.velocity || drive_powered(&rig.drive))
+			fail_msg("%s: it goes on in %s", faults[i].name,
+				 cia402_state_name(rig.drive.state));
+		enables = rig.drive.enables;
+		faults[i].inject(&rig.drive, false);
+		assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
+		assert_true(*err.text);
+		can_rig_hold(&rig, 15, 500 * MS);
+		assert_int_equal(rig.drive.enables, enables);
+		if (incise_stepper_clear(rig.stepper, &err))
+			fail_msg("%s: %s", faults[i].name, err.text);
+		can_rig_hold(&rig, 15, 500 * MS);
+		assert_int_equal(rig.drive.enables, enables);
+		enable_or_fail();
+		can_rig_hold(&rig, 5, 3000 * MS);
+		s = can_rig_look(&rig);
+		if (s.faults || fabs(s.position_mm - 5) > 1e-3)
+			fail_msg("%s: afterwards %#x at %g mm", faults[i].name, s.faults,
+				 s.position_mm);
+		assert_int_equal(rig.drive.enabled_unasked, 0);
+		can_rig_close(&rig);
+	}
+}
+
+static void a_program_that_hangs_is_stopped_by_the_drive(void **state)
+{
+	double at_mm, most_mm;
+
+	can_rig_init(&rig);
+	open_or_fail();
+	enable_or_fail();
+	can_rig_hold(&rig, 15, 300 * MS);
+	assert_true(rig.drive.velocity > 5 * COUNTS_PER_MM);
+	at_mm = rig.drive.position / COUNTS_PER_MM;
+	drive_advance(&rig.drive, 1000 * MS);
+	assert_int_equal(rig.drive.velocity, 0);
+	assert_false(drive_powered(&rig.drive));
+	/*
+	 * It goes on at the last target's speed for the deadman and a beat at most, then by
+	 * its ramp, which is at least as steep as ours: v²/2a = 0.1 mm.
+	 */
+	most_mm = 10 * (0.1 + 0.025) + 0.1;
+	assert_true(rig.drive.position / COUNTS_PER_MM - at_mm <= most_mm);
+	/* The program wakes up: nothing moves by itself. */
+	can_rig_hold(&rig, 15, 500 * MS);
+	assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_FAULT);
+	assert_int_equal(rig.drive.velocity, 0);
+	assert_int_equal(rig.drive.enabled_unasked, 0);
+	can_rig_close(&rig);
+}
+
+static uint64_t counter(const char *key)
+{
+	struct incise_stepper_counter c;
+
+	for (int i = 0; !incise_stepper_counter(rig.stepper, i, &c); i++)
+		if (!strcmp(c.key, key))
+			return c.value;
+	fail_msg("there is no counter %s", key);
+	return 0;
+}
+
+/* 60 s at 1 kHz, each cycle another target. */
+static void no_set_point_is_lost(void **state)
+{
+	uint64_t rpdos, sent;
+	int64_t end;
+
+	can_rig_init(&rig);
+	open_or_fail();
+	enable_or_fail();
+	can_rig_hold(&rig, 10, 3000 * MS);
+	rpdos = rig.drive.rpdos;
+	sent = counter("setpoints_sent");
+	end = rig.drive.now_ns + 60000 * MS;
+	for (int i = 0; rig.drive.now_ns < end; i++) {
+		assert_int_equal(incise_stepper_set(rig.stepper, 10 + 2 * sin(0.002 * i)),
+				 0);
+		can_rig_advance(&rig, MS);
+	}
+	/* The last one may still be on its way. */
+	drive_advance(&rig.drive, MS / 2);
+	assert_int_equal(rig.drive.rpdos - rpdos, counter("setpoints_sent") - sent);
+	assert_in_range(rig.drive.rpdos - rpdos, 59990, 60010);
+	for (int i = 0; i < 9; i++) {
+		struct incise_stepper_counter c;
+
+		assert_int_equal(incise_stepper_counter(rig.stepper, i, &c), 0);
+		if (c.trouble && c.value)
+			fail_msg("%s: %llu", c.text, (unsigned long long)c.value);
+	}
+	can_rig_close(&rig);
+}
+
+/* Whatever the drive refuses, or leaves without an answer, on its way to power. */
+static void no_step_of_the_start_hangs_or_gives_power(void **state)
+{
+	uint32_t requests;
+
+	can_rig_init(&rig);
+	open_or_fail();
+	requests = (uint32_t)rig.drive.requests;
+	can_rig_close(&rig);
+	assert_true(requests > 40);
+	for (uint32_t k = 1; k <= requests; k++)
+		for (int drop = 0; drop < 2; drop++) {
+			struct incise_error err = {0};
+			int64_t begin;
+
+			can_rig_init(&rig);
+			if (drop)
+				rig.drive.drop_at = k;
+			else
+				rig.drive.abort_at = k;
+			begin = rig.drive.now_ns;
+			if (can_rig_open(&rig, &err)) {
+				/* One that it can do without. */
+				enable_or_fail();
+				can_rig_close(&rig);
+			} else if (!strstr(err.text, "rig.conf:3: stepper: ") || !errno) {
+				fail_msg("request %u: \"%s\"", k, err.text);
+			}
+			assert_false(drive_powered(&rig.drive));
+			assert_int_equal(rig.drive.enabled_unasked, 0);
+			/* An answer is waited for 0.2 s; all else goes by the cycle. */
+			if (rig.drive.now_ns - begin > 3000 * MS)
+				fail_msg("request %u took %lld ms", k,
+					 (long long)((rig.drive.now_ns - begin) / MS));
+		}
+}
+
+static void why_it_cannot_begin_is_said(void **state)
+{
+	static const struct {
+		const char *arguments;
+		int master;
+		double deadman_s;
+		uint32_t bitrate;
+		int code;
+		const char *says;
+	} cases[] = {
+		{"can0", 127, 0.1, 1000000, EINVAL, "expected can:DEVICE:NODE"},
+		{"can0:", 127, 0.1, 1000000, EINVAL, "expected can:DEVICE:NODE"},
+		{"can0:0", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
+		{"can0:128", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
+		{"can0:-1", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
+		{"can0:0x10x", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
+		{":0x10", 127, 0.1, 1000000, EINVAL, "expected can:DEVICE:NODE"},
+		{"c:0x10", 16, 0.1, 1000000, EINVAL, "also actuator.can.master"},
+		{"c:0x11", 127, 0.1, 1000000, ENODEV, "nobody answers"},
+		{"c:0x10", 127, 0.01, 1000000, EINVAL, "expected at least 20"},
+		/* 305 bits of 1 kHz, by the lengths of three frames, are 122 % … */
+		{"c:0x10", 127, 0.1, 250000, ERANGE, "may take 80 %"},
+		/* … and fit into twice that. */
+		{"c:0x10", 127, 0.1, 500000, 0, ""},
+		{"c:0x10", 127, 0.1, 0, 0, ""},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		can_rig_init(&rig);
+		rig.arguments = cases[i].arguments;
+		rig.actuator.can.master = cases[i].master;
+		rig.actuator.deadman_s = cases[i].deadman_s;
+		rig.drive.bus.bitrate = cases[i].bitrate;
+		if (can_rig_open(&rig, &err))
+			can_rig_close(&rig);
+		if (err.code != cases[i].code || !strstr(err.text, cases[i].says))
+			fail_msg("case %zu: %d, \"%s\"", i, err.code, err.text);
+	}
+}
+
+static void another_master_is_not_disturbed(void **state)
+{
+	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
+	struct incise_error err = {0};
+
+	can_rig_init(&rig);
+	drive_say(&rig.drive, &sync);
+	assert_null(can_rig_open(&rig, &err));
+	assert_int_equal(err.code, EBUSY);
+	assert_non_null(strstr(err.text, "another master"));
+	assert_int_equal(rig.drive.requests, 0);
+}
+
+static void it_homes_by_itself(void **state)
+{
+	static const double home_mm[] = {0, -0.5, 1.5};
+
+	for (size_t i = 0; i < sizeof(home_mm) / sizeof(*home_mm); i++) {
+		struct incise_stepper_edge_found edge = {0, 0};
+		struct incise_stepper_status s;
+		struct incise_error err = {0};
+
+		can_rig_init(&rig);
+		rig.actuator.home_mm = home_mm[i];
+		open_or_fail();
+		assert_false(can_rig_look(&rig).homed);
+		enable_or_fail();
+		if (incise_stepper_home_edge(rig.stepper, NULL, &edge, &err))
+			fail_msg("%s", err.text);
+		s = can_rig_look(&rig);
+		assert_true(s.homed && s.state == INCISE_STEPPER_READY && !s.faults);
+		assert_true(isnan(edge.before_mm) && edge.after_mm == home_mm[i]);
+		assert_true(fabs(s.position_mm - fmax(0, home_mm[i])) < 1e-3);
+		/* The drive's own 0 is at its switch, that is at home_mm. */
+		assert_true(fabs(rig.drive.position / COUNTS_PER_MM -
+				 (fmax(0, home_mm[i]) - home_mm[i])) < 1e-3);
+		assert_int_equal((int32_t)rig.drive.od[OD_RANGE_MIN].value,
+				 (int32_t)lround(COUNTS_PER_MM *
+						 (fmin(0, home_mm[i]) - home_mm[i] - 1)));
+		can_rig_close(&rig);
+		/* Whoever opens it next knows: the drive says so. */
+		open_or_fail();
+		assert_true(can_rig_look(&rig).homed);
+		can_rig_close(&rig);
+		/* A reboot takes it away. */
+		drive_reboot(&rig.drive);
+		open_or_fail();
+		assert_false(can_rig_look(&rig).homed);
+		can_rig_close(&rig);
+	}
+}
+
+static void homing_can_fail_and_be_stopped(void **state)
+{
+	volatile int stop = 0;
+	struct incise_error err = {0};
+
+	can_rig_init(&rig);
+	open_or_fail();
+	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), -EIO);
+	assert_non_null(strstr(err.text, "not powered"));
+	enable_or_fail();
+	rig.drive.homing_fails = true;
+	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), -EIO);
+	assert_non_null(strstr(err.text, "its homing failed"));
+	assert_false(drive_powered(&rig.drive));
+	assert_false(can_rig_look(&rig).homed);
+	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
+	rig.drive.homing_fails = false;
+	assert_int_equal(incise_stepper_clear(rig.stepper, &err), 0);
+	enable_or_fail();
+	stop = 1;
+	assert_int_equal(incise_stepper_home(rig.stepper, &stop, &err), -EINTR);
+	assert_false(drive_powered(&rig.drive));
+	assert_int_equal(can_rig_look(&rig).faults, 0);
+	enable_or_fail();
+	can_rig_close(&rig);
+}
+
+/* The loops that are closed here: they come to the target, and stay within its limits. */
+static void velocities_and_torques_go_there_too(void **state)
+{
+	static const struct {
+		enum incise_actuator_mode mode;
+		bool invert;
+		double within_mm;
+	} cases[] = {
+		/* To the count: an integrator leaves nothing. */
+		{INCISE_ACTUATOR_CSV, false, 2e-4},
+		{INCISE_ACTUATOR_CSV, true, 2e-4},
+		/* To what a spring of stiffness_permille_mm gives for half a ‰. */
+		{INCISE_ACTUATOR_CST, false, 0.02},
+		{INCISE_ACTUATOR_CST, true, 0.02},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_stepper_status s;
+
+		can_rig_init(&rig);
+		rig.actuator.invert = cases[i].invert;
+		rig.actuator.can.mode = cases[i].mode;
+		rig.actuator.can.stiffness_permille_mm = 50;
+		rig.actuator.can.damping_permille_s_mm = 5;
+		rig.actuator.can.torque_max_permille = 300;
+		rig.drive.torque_counts_s2 = 0.1 * 1000 * COUNTS_PER_MM / 10;
+		open_or_fail();
+		enable_or_fail();
+		can_rig_hold(&rig, 4, 3000 * MS);
+		s = can_rig_look(&rig);
+		if (s.faults || fabs(s.position_mm - 4) > cases[i].within_mm)
+			fail_msg("case %zu: faults %#x at %g mm", i, s.faults,
+				 s.position_mm);
+		assert_true((rig.drive.position < 0) == cases[i].invert);
+		can_rig_close(&rig);
+	}
+}
+
+static void a_watcher_looks_and_writes_nothing(void **state)
+{
+	struct incise_stepper_status s;
+	struct incise_error err = {0};
+	uint64_t enables;
+
+	can_rig_init(&rig);
+	rig.drive.absolute = true;
+	drive_reboot(&rig.drive);
+	rig.drive.position = 3 * COUNTS_PER_MM;
+	rig.actuator.can.absolute = true;
+	rig.watch = true;
+	open_or_fail();
+	enables = rig.drive.enables;
+	can_rig_advance(&rig, 100 * MS);
+	s = can_rig_look(&rig);
+	assert_int_equal(s.state, INCISE_STEPPER_DISABLED);
+	assert_true(s.homed && fabs(s.position_mm - 3) < 1e-3);
+	assert_int_equal(incise_stepper_set(rig.stepper, 1), -EPERM);
+	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
+	drive_fault(&rig.drive, 0x4310);
+	can_rig_advance(&rig, 100 * MS);
+	s = can_rig_look(&rig);
+	assert_int_equal(s.state, INCISE_STEPPER_FAULT);
+	assert_int_equal(s.faults, INCISE_STEPPER_ALARM);
+	rig.drive.mute = true;
+	can_rig_advance(&rig, 1000 * MS);
+	assert_int_equal(can_rig_look(&rig).faults, INCISE_STEPPER_LOST);
+	assert_int_equal(rig.drive.enables, enables);
+	assert_int_equal(rig.drive.master_beats, 0);
+	can_rig_close(&rig);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(every_case_of_a_stepper),
+		cmocka_unit_test(each_fault_stops_the_drive_and_is_named),
+		cmocka_unit_test(a_program_that_hangs_is_stopped_by_the_drive),
+		cmocka_unit_test(no_set_point_is_lost),
+		cmocka_unit_test(no_step_of_the_start_hangs_or_gives_power),
+		cmocka_unit_test(why_it_cannot_begin_is_said),
+		cmocka_unit_test(another_master_is_not_disturbed),
+		cmocka_unit_test(it_homes_by_itself),
+		cmocka_unit_test(homing_can_fail_and_be_stopped),
+		cmocka_unit_test(velocities_and_torques_go_there_too),
+		cmocka_unit_test(a_watcher_looks_and_writes_nothing),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
