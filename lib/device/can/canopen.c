@@ -11,7 +11,7 @@
 #include <linux/can/error.h>
 #include "canopen.h"
 
-#define NODE 0x7f
+#define NODE 0x7fu
 #define MS_NS 1000000
 /* Frames taken between two looks at the clock: a flood shall not hold anyone up. */
 #define AT_ONCE 64

@@ -15,7 +15,7 @@
 #define RPDO1_LENGTH_CST 4
 #define TPDO1_LENGTH 6
 #define TPDO2_LENGTH 4
-#define NODE 0x7f
+#define NODE 0x7fu
 
 enum cia402_state cia402_state(uint16_t statusword)
 {
@@ -56,6 +56,24 @@ const char *cia402_state_name(enum cia402_state state)
 	};
 
 	return (unsigned int)state < CIA402_UNKNOWN ? names[state] : "unknown";
+}
+
+bool cia402_powered(enum cia402_state state)
+{
+	switch (state) {
+	case CIA402_NOT_READY:
+	case CIA402_DISABLED:
+	case CIA402_READY:
+	case CIA402_FAULT:
+		return false;
+	case CIA402_SWITCHED_ON:
+	case CIA402_ENABLED:
+	case CIA402_QUICK_STOP:
+	case CIA402_FAULT_REACTION:
+	case CIA402_UNKNOWN:
+		break;
+	}
+	return true;
 }
 
 const char *cia402_mode_name(int mode)

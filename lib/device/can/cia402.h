@@ -63,6 +63,10 @@ enum cia402_mode {
 
 enum cia402_state cia402_state(uint16_t statusword);
 const char *cia402_state_name(enum cia402_state state); /* "operation enabled" … */
+
+/* Whether it may have power on its motor, as far as its state tells. */
+bool cia402_powered(enum cia402_state state);
+
 /* "CSP (8)"; any number, as 6061 has it. */
 const char *cia402_mode_name(int mode);
 
@@ -97,8 +101,9 @@ struct cia402_units {
 
 /*
  * By the drive's own factors: positions by 6092 (feed constant), else 608F and 6091 (encoder
- * resolution, gear ratio); velocity and acceleration by 60A9 and 60AA (SI units) where it has
- * them, else counts/s and counts/s². A field that is not 0 before is kept: rig.conf's.
+ * resolution, gear ratio), or by 60A8 (SI unit) where that names an angle or increments;
+ * velocity and acceleration by 60A9 and 60AA (SI units) where it has them, else counts/s and
+ * counts/s². A field that is not 0 before is kept: rig.conf's.
  * 0; -EPROTO (it does not say, or says what makes no sense: rig.conf must).
  */
 int cia402_units(struct canopen *master, struct cia402_units *units, const char *where,
@@ -132,9 +137,10 @@ struct cia402_taken {
  * Set a drive up that has no power: to pre-operational, PDOs, heartbeats, EMCY, what it does
  * when this side is silent (6007: quick stop) and how it does (605A: ramp, then without
  * power), limits, mode, interpolation period; then to operational. All that matters is read
- * back. Also after it rebooted.
+ * back. Also after it rebooted. @master sends heartbeats from then on (own, beat_ns): they are
+ * what keeps the drive's deadman off. About 130 SDOs; in vain, it ends within seconds.
  *
- * 0; -EBUSY (it has power), -EOPNOTSUPP (it lacks what is needed: heartbeat consumer, abort
+ * 0; -EINVAL (setup that cannot be), -EBUSY (it has power), -EOPNOTSUPP (it lacks what is needed: heartbeat consumer, abort
  * connection option, the mode …; the line says which object and why), -ETIMEDOUT, -EPROTO
  * (it did not keep what was written), of the bus.
  */

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Who a drive is, and what its units are (CiA 402-2, factor group). A turn is one of the
+ * screw, which is the shaft behind the drive's own gear, if it has one.
+ *
+ *   60A8, 60A9, 60AA   31 … 24        23 … 16     15 … 8   7 … 0
+ *                      power of ten   numerator   per      –
+ */
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include "cia402_object.h"
+
+#define TWO_PI 6.283185307179586
+#define DRIVE_PROFILE 402
+#define MOST_PER_TURN 4294967296.0
+
+/* Numerators that belong to an angle. */
+#define UNIT_RADIAN 0x10
+#define UNIT_GON 0x40
+#define UNIT_DEGREE 0x41
+#define UNIT_MINUTE_OF_ARC 0x42
+#define UNIT_SECOND_OF_ARC 0x43
+#define UNIT_TURN 0xb4
+#define UNIT_INCREMENT 0xb5
+#define UNIT_TURN_PER_MINUTE 0xc0 /* of an acceleration: maxon's rpm/s */
+#define UNIT_METRE 0x01
+/* Denominators. */
+#define PER_SECOND 0x03
+#define PER_MINUTE 0x47
+#define PER_SECOND_2 0x57
+
+static const struct cia402_object device_type = {0x1000, 0, 4, "device type"};
+static const struct cia402_object identity_objects[] = {
+	{0x1018, 1, 4, "vendor"},
+	{0x1018, 2, 4, "product"},
+	{0x1018, 3, 4, "revision"},
+	{0x1018, 4, 4, "serial number"},
+};
+static const struct cia402_object supported = {0x6502, 0, 4, "supported drive modes"};
+static const struct cia402_object position_unit = {0x60a8, 0, 4, "SI unit position"};
+static const struct cia402_object velocity_unit = {0x60a9, 0, 4, "SI unit velocity"};
+static const struct cia402_object acceleration_unit = {0x60aa, 0, 4,
+						       "SI unit acceleration"};
+
+/* A ratio of two sub-objects. */
+static const struct cia402_object feed[] = {{0x6092, 1, 4, "feed"},
+					    {0x6092, 2, 4, "shaft revolutions"}};
+static const struct cia402_object encoder[] = {{0x608f, 1, 4, "encoder increments"},
+					       {0x608f, 2, 4, "motor revolutions"}};
+static const struct cia402_object gear[] = {{0x6091, 1, 4, "motor shaft revolutions"},
+					    {0x6091, 2, 4, "driving shaft revolutions"}};
+
+int cia402_identify(struct canopen *master, struct cia402_identity *identity,
+		    const char *where, struct incise_error *err)
+{
+	const struct cia402_talk talk = {master, where, err};
+	uint32_t *const numbers[] = {&identity->vendor, &identity->product,
+				     &identity->revision, &identity->serial};
+	bool has;
+	int rc;
+
+	memset(identity, 0, sizeof(*identity));
+	rc = canopen_read(master, 0x1000, 0, 4, &identity->type);
+	if (rc == -ETIMEDOUT)
+		return incise_error_set(
+			err, ENODEV,
+			"%s: nobody answers at node %u; see the drive's power, its "
+			"wiring, node id and bit rate, or list what is there with `incise "
+			"info can:%s`",
+			where, master->node, master->bus->name);
+	if (rc)
+		return cia402_failed(&talk, &device_type, "read", rc);
+	if ((identity->type & 0xffff) != DRIVE_PROFILE)
+		return incise_error_set(err, EPROTO,
+					"%s: node %u is no CiA 402 drive: its device "
+					"profile is %u; see the node id",
+					where, master->node, identity->type & 0xffff);
+	for (int i = 0; i < 4; i++) {
+		rc = cia402_ask_if(&talk, &identity_objects[i], numbers[i], &has);
+		if (rc)
+			return rc;
+	}
+	rc = cia402_ask_if(&talk, &supported, &identity->modes, &has);
+	if (rc)
+		return rc;
+	/* A name is for people: what is odd about it is no reason to refuse the drive. */
+	rc = canopen_read_text(master, 0x1008, 0, identity->name, sizeof(identity->name));
+	if (rc && rc != -EREMOTEIO && rc != -EPROTO)
+		return cia402_failed(&talk,
+				     &(struct cia402_object){0x1008, 0, 4, "device name"},
+				     "read", rc);
+	return 0;
+}
+
+/* How many per turn it may be, and mean it. */
+static bool sensible(double value)
+{
+	return isfinite(value) && value > 0 && value <= MOST_PER_TURN * 1e9;
+}
+
+/* *value stays as it is where the drive has no such ratio. */
+static int ratio(const struct cia402_talk *talk, const struct cia402_object pair[2],
+		 double *value, bool *has)
+{
+	uint32_t numerator = 0, denominator = 0;
+	int rc = cia402_ask_if(talk, &pair[0], &numerator, has);
+
+	if (rc || !*has)
+		return rc;
+	rc = cia402_ask(talk, &pair[1], &denominator);
+	if (rc)
+		return rc;
+	if (!numerator || !denominator)
+		return incise_error_set(
+			talk->err, EPROTO,
+			"%s: the drive's %s (%04X) is %u/%u; set it there, "
+			"or give counts_per_turn in rig.conf",
+			talk->where, pair[0].name, pair[0].index, numerator, denominator);
+	*value = (double)numerator / denominator;
+	return 0;
+}
+
+/* Encoder increments per turn of the screw; *has false: the drive does not say. */
+static int increments(const struct cia402_talk *talk, double *value, bool *has)
+{
+	double turns = 1;
+	bool geared;
+	int rc = ratio(talk, encoder, value, has);
+
+	if (rc || !*has)
+		return rc;
+	rc = ratio(talk, gear, &turns, &geared);
+	*value *= turns;
+	return rc;
+}
+
+/* Of an angle, per turn; 0: it is none. */
+static double angle(uint8_t unit)
+{
+	switch (unit) {
+	case UNIT_TURN:
+		return 1;
+	case UNIT_DEGREE:
+		return 360;
+	case UNIT_RADIAN:
+		return TWO_PI;
+	case UNIT_GON:
+		return 400;
+	case UNIT_MINUTE_OF_ARC:
+		return 360 * 60;
+	case UNIT_SECOND_OF_ARC:
+		return 360 * 3600;
+	default:
+		return 0;
+	}
+}
+
+static double power_of_ten(uint32_t unit)
+{
+	return pow(10, (int8_t)(unit >> 24));
+}
+
+static int unknown_unit(const struct cia402_talk *talk,
+			const struct cia402_object *object, uint32_t unit,
+			const char *key)
+{
+	return incise_error_set(
+		talk->err, EPROTO,
+		"%s: what the drive's %s (%04X) says, %08Xh, is not known "
+		"here; give %s in rig.conf",
+		talk->where, object->name, object->index, unit, key);
+}
+
+static int positions(const struct cia402_talk *talk, double *per_turn)
+{
+	uint32_t unit = 0;
+	bool has = false;
+	uint8_t code;
+	int rc = cia402_ask_if(talk, &position_unit, &unit, &has);
+
+	if (rc)
+		return rc;
+	code = (uint8_t)(unit >> 16);
+	if (has && angle(code) > 0) {
+		*per_turn = angle(code) / power_of_ten(unit);
+	} else if (has && code == UNIT_INCREMENT && !(unit >> 24)) {
+		rc = increments(talk, per_turn, &has);
+		if (!rc && !has)
+			rc = ratio(talk, feed, per_turn, &has);
+	} else if (!has || code == 0 || code == UNIT_METRE) {
+		rc = ratio(talk, feed, per_turn, &has);
+		if (!rc && !has)
+			rc = increments(talk, per_turn, &has);
+	} else {
+		return unknown_unit(talk, &position_unit, unit, "counts_per_turn");
+	}
+	if (rc)
+		return rc;
+	if (!sensible(*per_turn) || *per_turn < 1 || *per_turn > MOST_PER_TURN)
+		return incise_error_set(
+			talk->err, EPROTO,
+			"%s: the drive does not say how many counts a turn has (6092, 608F, "
+			"60A8: %g); give counts_per_turn in rig.conf",
+			talk->where, *per_turn);
+	return 0;
+}
+
+/* A velocity's or an acceleration's. */
+static int rates(const struct cia402_talk *talk, const struct cia402_object *object,
+		 double counts, bool squared, double *per_turn, const char *key)
+{
+	uint32_t unit = 0;
+	uint8_t code, per;
+	double turn;
+	bool has = false;
+	int rc = cia402_ask_if(talk, object, &unit, &has);
+
+	if (rc)
+		return rc;
+	if (!has) {
+		*per_turn = counts;
+		return 0;
+	}
+	code = (uint8_t)(unit >> 16);
+	per = (uint8_t)(unit >> 8);
+	turn = angle(code);
+	if (code == UNIT_INCREMENT) {
+		rc = increments(talk, &turn, &has);
+		if (rc)
+			return rc;
+		if (!has)
+			turn = counts;
+	}
+	if (squared && code == UNIT_TURN_PER_MINUTE && per == PER_SECOND)
+		turn = 60;
+	else if (!squared && per == PER_MINUTE)
+		turn *= 60;
+	else if (per != (squared ? PER_SECOND_2 : PER_SECOND))
+		turn = 0;
+	*per_turn = turn / power_of_ten(unit);
+	if (turn <= 0 || !sensible(*per_turn))
+		return unknown_unit(talk, object, unit, key);
+	return 0;
+}
+
+int cia402_units(struct canopen *master, struct cia402_units *units, const char *where,
+		 struct incise_error *err)
+{
+	const struct cia402_talk talk = {master, where, err};
+	struct cia402_units found = *units;
+	int rc = 0;
+
+	if (found.counts_per_turn == 0)
+		rc = positions(&talk, &found.counts_per_turn);
+	if (!rc && found.velocity_per_turn_s == 0)
+		rc = rates(&talk, &velocity_unit, found.counts_per_turn, false,
+			   &found.velocity_per_turn_s, "velocity_per_turn_s");
+	if (!rc && found.acceleration_per_turn_s2 == 0)
+		rc = rates(&talk, &acceleration_unit, found.counts_per_turn, true,
+			   &found.acceleration_per_turn_s2, "acceleration_per_turn_s2");
+	if (rc)
+		return rc;
+	*units = found;
+	return 0;
+}
