@@ -71,10 +71,11 @@ static void power_off(struct can_axis *axis, int64_t now)
 	incise_motion_halt(m, m->status.faults & INCISE_ABI_FAULT_LOST);
 	incise_motion_power_off(m);
 	if (axis->result > 0)
-		axis->result = -EIO;
+		axis->result = axis->outcome;
 	enter(axis, CAN_AXIS_IDLE, now);
 }
 
+/* What the drive's inputs are to us. */
 static unsigned int line_bits(const struct can_axis *axis, uint32_t inputs)
 {
 	/* Turned round, the drive's lower end is our upper one. */
@@ -107,14 +108,11 @@ static void take_status(struct can_axis *axis, const struct can_frame *frame, in
 	axis->motion.status.position = can_axis_steps(axis, axis->position);
 }
 
-static void take_inputs(struct can_axis *axis, const struct can_frame *frame)
+void can_axis_inputs(struct can_axis *axis, uint32_t inputs)
 {
 	struct incise_abi_status *status = &axis->motion.status;
-	uint32_t inputs;
 	unsigned int came;
 
-	if (!cia402_get_inputs(frame, &inputs))
-		return;
 	came = line_bits(axis, inputs) & ~status->inputs;
 	status->inputs = line_bits(axis, inputs);
 	if (came & INCISE_STEPPER_LINE_HOME) {
@@ -128,6 +126,7 @@ static void hear(struct can_axis *axis, int64_t now)
 {
 	struct can_bus *bus = axis->master->bus;
 	struct can_frame frame;
+	uint32_t inputs;
 	int64_t t_ns;
 	int rc = 0;
 
@@ -140,7 +139,8 @@ static void hear(struct can_axis *axis, int64_t now)
 			take_status(axis, &frame, now);
 			break;
 		case CANOPEN_TPDO2:
-			take_inputs(axis, &frame);
+			if (cia402_get_inputs(&frame, &inputs))
+				can_axis_inputs(axis, inputs);
 			break;
 		}
 	}
@@ -288,6 +288,7 @@ static void put(struct can_axis *axis, uint16_t controlword, int32_t target, int
 
 	cia402_put(&frame, axis->master->node, axis->setup.mode, controlword, target);
 	rc = bus->ops->send(bus, &frame);
+	axis->put = !rc;
 	if (!rc) {
 		axis->full = 0;
 		axis->counts.setpoints++;
@@ -329,12 +330,14 @@ static void start(struct can_axis *axis, int64_t now)
 		enter(axis, homes ? CAN_AXIS_HOMING : CAN_AXIS_RUNNING, now);
 	} else if (now - axis->since_ns > START_NS) {
 		note(axis, CAN_AXIS_NO_START, state, 0);
-		axis->result = -ETIMEDOUT;
+		axis->outcome = -ETIMEDOUT;
 		axis->motion.ending = true;
 		enter(axis, CAN_AXIS_QUICK_STOP, now);
 	}
 	/* What it said before may be old: no target is made of that. */
-	if (fresh)
+	if (!fresh)
+		axis->put = true;
+	else
 		put(axis, cia402_up(state), hold_target(axis), now);
 }
 
@@ -363,18 +366,17 @@ static void home(struct can_axis *axis, int64_t now)
 	if (!(word & CIA402_HOMED))
 		axis->attained_before = false;
 	if (axis->stop_homing) {
-		axis->result = -EINTR;
+		axis->outcome = -EINTR;
 		axis->motion.ending = true;
 		axis->motion.status.state = INCISE_STEPPER_STATE_STOPPING;
 		enter(axis, CAN_AXIS_QUICK_STOP, now);
 	} else if (word & CIA402_FOLLOWING_ERROR) {
-		axis->result = -EIO;
 		fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_NO_HOME, 0, 0, now);
 	} else if (now > axis->limit_ns) {
-		axis->result = -ETIMEDOUT;
+		axis->outcome = -ETIMEDOUT;
 		fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_HOME_TIME, 0, 0, now);
 	} else if (begun && word & CIA402_HOMED && word & CIA402_TARGET_REACHED) {
-		axis->result = 0;
+		axis->outcome = 0;
 		axis->motion.ending = true;
 		enter(axis, CAN_AXIS_ENDING, now);
 	} else {
@@ -423,7 +425,7 @@ static void quick_stop(struct can_axis *axis, int64_t now)
 	 */
 	if (now - axis->since_ns > most) {
 		put(axis, CIA402_DISABLE_VOLTAGE, hold_target(axis), now);
-		if (!axis->motion.status.faults && axis->result != -ETIMEDOUT)
+		if (!axis->motion.status.faults && axis->outcome != -ETIMEDOUT)
 			axis->motion.status.faults |= INCISE_ABI_FAULT_LOST;
 		note(axis, CAN_AXIS_NO_STOP, state, 0);
 		power_off(axis, now);
@@ -437,9 +439,11 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 		    uint32_t left_out)
 {
 	struct incise_motion *m = &axis->motion;
+	bool powered = m->powered;
 
+	axis->put = false;
 	hear(axis, now_ns);
-	if (m->powered) {
+	if (powered) {
 		axis->counts.sync_late +=
 			left_out + (2 * late_ns > (int64_t)axis->setup.config.tick_ns);
 		axis->counts.tpdo_missing += !axis->answered;
@@ -469,7 +473,9 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 	else if (axis->phase == CAN_AXIS_QUICK_STOP)
 		quick_stop(axis, now_ns);
 	sync(axis);
-	canopen_beat(axis->master, now_ns);
+	/* With power it answers for set-points that really go out, and for no less. */
+	if (!powered || axis->put)
+		canopen_beat(axis->master, now_ns);
 	m->status.late = axis->counts.sync_late;
 	incise_motion_publish(m, now_ns);
 }
@@ -511,6 +517,7 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns)
 	axis->tpdo_ns = now_ns;
 	axis->limit_ns = homing_ns ? now_ns + homing_ns : 0;
 	axis->result = 1;
+	axis->outcome = -EIO;
 	enter(axis, CAN_AXIS_STARTING, now_ns);
 	return 1;
 }
@@ -526,7 +533,7 @@ void can_axis_disable(struct can_axis *axis)
 		axis->stop_homing = true;
 		break;
 	case CAN_AXIS_STARTING:
-		axis->result = -EINTR;
+		axis->outcome = -EINTR;
 		m->ending = true;
 		enter(axis, CAN_AXIS_QUICK_STOP, axis->since_ns);
 		break;

@@ -98,7 +98,9 @@ struct can_axis {
 	int32_t commanded[4]; /* the last targets, steps */
 	double speed;	      /* measured, counts per cycle, smoothed */
 	uint32_t boots, emcys, bus_offs, foreign; /* when power was given */
+	int outcome;				  /* what result will be without power */
 	uint32_t full; /* set-points in a row that the bus did not take */
+	bool put;      /* a set-point went out in this cycle */
 	bool answered, attained_before, stop_homing, failed;
 };
 
@@ -124,6 +126,9 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns);
 
 /* Come to rest, then without power. Homing is stopped. */
 void can_axis_disable(struct can_axis *axis);
+
+/* 60FD, however it came. */
+void can_axis_inputs(struct can_axis *axis, uint32_t inputs);
 
 /* From counts, rounded. */
 int64_t can_axis_steps(const struct can_axis *axis, int32_t counts);

@@ -251,8 +251,8 @@ static int check_load(struct can_link *link, const char *where, struct incise_er
 		(load * 100 / BUS_LOAD_MOST + 999) / 1000, least_us);
 }
 
-/* Where it stands, and what of that is the machine's. */
-static int take_position(struct can_link *link, const char *where,
+/* Where it stands, and what of that is the machine's. @keep: a count that goes on. */
+static int take_position(struct can_link *link, bool keep, const char *where,
 			 struct incise_error *err)
 {
 	const struct incise_actuator *a = &link->actuator;
@@ -266,7 +266,10 @@ static int take_position(struct can_link *link, const char *where,
 					"%s: its position (6064) cannot be read: %s",
 					where, strerror(-rc));
 	link->axis.position = (int32_t)counts;
-	link->axis.zero_counts = link->is_homed ? -a->home_mm * per_mm : (int32_t)counts;
+	if (link->is_homed)
+		link->axis.zero_counts = -a->home_mm * per_mm;
+	else if (!keep)
+		link->axis.zero_counts = (int32_t)counts;
 	status->position = can_axis_steps(&link->axis, link->axis.position);
 	status->flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	if (link->is_homed)
@@ -286,11 +289,15 @@ static int ask_homed(struct can_link *link, const char *where, struct incise_err
 static int set_up(struct can_link *link, const char *where, struct incise_error *err)
 {
 	struct can_axis_setup *setup = &link->axis.setup;
+	bool was_homed = link->is_homed, keep;
+	uint32_t inputs;
 	int rc = ask_homed(link, where, err);
 
+	keep = link->is_setup && link->boots == link->master.boots &&
+	       link->is_homed == was_homed;
 	link->is_setup = false;
 	if (!rc)
-		rc = take_position(link, where, err);
+		rc = take_position(link, keep, where, err);
 	if (rc)
 		return rc;
 	fit_range(link);
@@ -305,6 +312,8 @@ static int set_up(struct can_link *link, const char *where, struct incise_error 
 						    INCISE_STEPPER_LINE_HOME |
 						    INCISE_STEPPER_LINE_ESTOP
 					  : 0;
+	if (link->taken.inputs && !canopen_read(&link->master, 0x60fd, 0, 4, &inputs))
+		can_axis_inputs(&link->axis, inputs);
 	return 0;
 }
 
@@ -429,7 +438,7 @@ int can_link_look(struct can_link *link, const struct can_transport *transport,
 		rc = know(link, asked->where, err);
 	/* It sends nothing of its own. */
 	link->master.own = 0;
-	return rc ? rc : take_position(link, asked->where, err);
+	return rc ? rc : take_position(link, false, asked->where, err);
 }
 
 static bool is_operational(const struct canopen *master)
@@ -480,7 +489,8 @@ int can_link_clear(struct can_link *link, struct incise_error *err)
 			"restart`, then clear",
 			link->where, link->bus->name, link->bus->name);
 	rc = cia402_clear(&link->master, link->where, err);
-	if (!rc && (!link->is_setup || link->boots != link->master.boots))
+	/* Whatever it was, nobody need trust what it still knows. */
+	if (!rc)
 		rc = set_up(link, link->where, err);
 	link->axis.why = rc ? link->axis.why : CAN_AXIS_NO_REASON;
 	return rc;
@@ -491,7 +501,7 @@ int can_link_homed(struct can_link *link, struct incise_error *err)
 	int rc;
 
 	link->is_homed = true;
-	rc = take_position(link, link->where, err);
+	rc = take_position(link, false, link->where, err);
 	if (rc)
 		return rc;
 	fit_range(link);

@@ -50,7 +50,7 @@ int can_link_look(struct can_link *link, const struct can_transport *transport,
 /* Before power: set up again where it rebooted, in its mode or in homing mode, operational. */
 int can_link_ready(struct can_link *link, bool homing, struct incise_error *err);
 
-/* Take it out of its fault, and set it up again where it rebooted. */
+/* Take it out of its fault, and set it up again. */
 int can_link_clear(struct can_link *link, struct incise_error *err);
 
 /* It has homed: its 0 is that of the machine from now on. */

@@ -350,33 +350,40 @@ static int stepper_counter(struct incise_stepper *stepper, int i,
 	return 0;
 }
 
-/* To where the travel begins, from the edge that homing ended at. */
+/*
+ * To where the travel begins, from the edge that homing ended at. Once the profile rests
+ * there, the drive may be behind it for following_ms.
+ */
 static int go_to_begin(struct can_stepper *c, double home_mm, const volatile int *stop,
 		       struct incise_error *err)
 {
 	struct incise_stepper *stepper = &c->motor.stepper;
+	int64_t now = now_of(c->link.bus), begin = now, end = begin + HOME_MOST_NS;
+	int64_t rested = INT64_MAX, settle = c->link.axis.setup.following_ns;
 	double to_mm = fmax(home_mm, 0);
-	int64_t end = now_of(c->link.bus) + HOME_MOST_NS;
 	struct incise_stepper_status status;
-	int rc = 0;
+	int rc;
 
-	do {
+	while (rested == INT64_MAX || now - rested < settle) {
 		rc = stepper->ops->set(stepper, to_mm);
 		if (rc)
 			return say_why(c, rc, "homing", err);
 		nap(c, POLL_NS);
 		stepper->ops->status(stepper, &status);
+		now = now_of(c->link.bus);
 		if (stop && *stop)
 			return incise_error_set(err, EINTR, "homing %s: stopped",
 						c->motor.name);
-		if (now_of(c->link.bus) > end)
+		if (now > end)
 			return incise_error_set(
 				err, ETIMEDOUT,
 				"homing %s: it does not come to %g mm; see "
 				"that it moves",
 				c->motor.name, to_mm);
-	} while (status.state != INCISE_STEPPER_READY || status.velocity_mm_s != 0 ||
-		 fabs(status.position_mm - to_mm) > c->link.following_mm);
+		if (rested == INT64_MAX && c->motor.last.setpoint_t_ns >= begin &&
+		    status.state == INCISE_STEPPER_READY)
+			rested = now;
+	}
 	return 0;
 }
 
