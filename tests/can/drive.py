@@ -161,6 +161,8 @@ class Drive:
 
     def event(self, what):
         self.record.event(self.now, what)
+        if "-> operation enabled" in what:
+            self.record.enabled(self.now)
 
     # Power, NMT, heartbeats.
 
@@ -258,7 +260,7 @@ class Drive:
     def on_sdo(self, can_id, data, timestamp):
         if self.nmt == STOPPED or len(data) != 8:
             return
-        self.record.sdos += 1
+        self.record.sdo(self.now)
         kind = data[0] & 0xE0
         if kind in (0x20, 0x40):
             index, sub = struct.unpack_from("<HB", data, 1)

@@ -32,10 +32,21 @@ class Record:
         self.last_heartbeat = None
         self.last_set_point = None
         self.silence_ms = None  # from the last heartbeat to the reaction to its loss
+        self.first_sdo = None
+        self.start_ms = None  # from the first SDO to operation enabled
 
     def event(self, now, what):
         if len(self.events) < EVENTS_MOST:
             self.events.append({"ms": round((now - self.start) * 1000, 1), "what": what})
+
+    def sdo(self, now):
+        self.sdos += 1
+        if self.first_sdo is None:
+            self.first_sdo = now
+
+    def enabled(self, now):
+        if self.first_sdo is not None and self.start_ms is None:
+            self.start_ms = round((now - self.first_sdo) * 1000, 1)
 
     def set_point(self, now, enabled):
         self.rpdos += 1
@@ -74,7 +85,8 @@ class Record:
 
     def report(self):
         names = ("syncs", "rpdos", "enabled_rpdos", "tpdos", "missing", "doubled",
-                 "largest_step", "largest_change", "sdos", "heartbeats", "emcys", "silence_ms")
+                 "largest_step", "largest_change", "sdos", "heartbeats", "emcys", "silence_ms",
+                 "start_ms")
         made = {name: getattr(self, name) for name in names}
         made["between_syncs"] = self._gaps()
         return made

@@ -3,8 +3,8 @@
 The drive of the CAN tests, tested by python-canopen's own master (RemoteNode, BaseNode402)
 and python-can's own slcan: nothing here is incise's. Prints "ok …" or "not ok …" lines.
 
-    selftest.py                 all of it, 5 s
-    selftest.py --speed SECONDS  1 kHz of RPDO, SYNC and TPDO; prints what came of it
+    selftest.py [--can NAME]                    all of it, 5 s; over slcan, or a CAN interface
+    selftest.py [--can NAME] --speed SECONDS HZ RPDO, SYNC and TPDO; prints what came of it
 """
 
 import json
@@ -17,7 +17,6 @@ from pathlib import Path
 for name in ("can", "canopen"):
     logging.getLogger(name).setLevel(logging.ERROR)
 
-import can
 import canopen
 from canopen.profiles.p402 import BaseNode402
 from canopen.sdo import SdoAbortedError
@@ -34,7 +33,7 @@ class Peer:
         program = [sys.executable, "-B", str(Path(__file__).with_name("drive.py")), *options]
         self.process = subprocess.Popen(program, stdin=subprocess.PIPE,
                                         stdout=subprocess.PIPE, text=True)
-        self.path = self.process.stdout.readline().split()[1].split(":")[1]
+        self.device = self.process.stdout.readline().split()[1].split(":")[1]
 
     def ask(self, command):
         self.process.stdin.write(command + "\n")
@@ -47,11 +46,13 @@ class Peer:
 
 
 class Master:
-    def __init__(self, path):
+    def __init__(self, device, interface):
         self.network = canopen.Network()
         self.network.NOTIFIER_CYCLE = 0.05
-        self.network.connect(interface="slcan", channel=path, bitrate=1000000,
-                             sleep_after_open=0, ignore_config=True)
+        options = {}
+        if interface == "slcan":
+            options = {"bitrate": 1000000, "sleep_after_open": 0}
+        self.network.connect(interface=interface, channel=device, ignore_config=True, **options)
         self.node = BaseNode402(NODE, dictionary(NODE))
         self.network.add_node(self.node)
         self.beating = None
@@ -227,6 +228,74 @@ def faults(peer, master):
     assert peer.ask("state")["state"] == "fault", "its cause is still there"
 
 
+def deadline(peer, master):
+    """1400:5 watches over set-points; heartbeats alone do not hold it."""
+    master.map_pdos()
+    master.write(0x1400, 5, 50)
+    master.write(0x6060, 0, 8)
+    master.write(0x6007, 0, 3)
+    master.enable()
+    time.sleep(0.2)
+    assert peer.ask("state")["state"] == "operation enabled", "it starts with the first"
+    master.cycle(0x0F, 0)
+    assert until(lambda: peer.ask("state")["state"] == "switch-on disabled")
+    assert any(emcy.code == 0x8250 for emcy in master.node.emcy.log)
+
+
+def speeds(peer, master):
+    """CSV in rpm: a quick stop goes down its ramp, and the set-point is not the only word."""
+    write = master.write
+    write(0x6060, 0, 9)
+    write(0x607F, 0, 600)  # rpm
+    write(0x6085, 0, 51200)  # counts/s²: a second from 60 rpm
+    master.enable()
+    write(0x60FF, 0, 60)
+    time.sleep(0.2)
+    state = peer.ask("state")
+    assert state["velocity"] == 51200 and state["position"] > 5000, state
+    write(0x60FF, 0, 6000)
+    time.sleep(0.05)
+    assert peer.ask("state")["velocity"] == 512000, "607F holds"
+    assert peer.ask("state")["statusword"] & 0x0800, "and it says so"
+    write(0x60FF, 0, 60)
+    time.sleep(0.05)
+    write(0x6040, 0, 0x02)
+    assert peer.ask("state")["state"] == "quick stop"
+    assert until(lambda: peer.ask("state")["state"] == "switch-on disabled")
+    slowed = [e["ms"] for e in peer.ask("events")["events"] if "quick stop" in e["what"]]
+    assert slowed[1] - slowed[0] > 900, slowed
+
+
+def torques(peer, master):
+    write = master.write
+    write(0x6060, 0, 10)
+    write(0x6072, 0, 50)
+    master.enable()
+    write(0x6071, 0, 100)
+    time.sleep(0.3)
+    assert peer.ask("state")["velocity"] > 1000
+    assert master.node.sdo[0x6077].raw == 50, "6072 holds"
+
+
+def inputs(peer, master):
+    """60FD in an event-driven TPDO2."""
+    node = master.node
+    node.nmt.state = "PRE-OPERATIONAL"
+    node.tpdo.read()
+    tpdo = node.tpdo[2]
+    tpdo.clear()
+    tpdo.add_variable(0x60FD, 0)
+    tpdo.trans_type, tpdo.enabled = 255, True
+    tpdo.save()
+    seen = []
+    tpdo.add_callback(lambda pdo: seen.append(pdo[0].raw))
+    node.nmt.state = "OPERATIONAL"
+    assert until(lambda: seen == [0]), "once at first"
+    peer.ask("inputs 0x1")
+    peer.ask("inputs 0x6")
+    assert until(lambda: seen == [0, 1, 6]), seen
+
+
 def homing(peer, master):
     master.map_pdos()
     master.write(0x6060, 0, 6)
@@ -250,22 +319,20 @@ def reboots(peer, master):
     assert master.node.sdo[0x1600][0].raw == 1, "its mapping is that of power-on"
 
 
-def speed(seconds):
-    """1 kHz, whatever comes back; then what both sides counted."""
-    peer = Peer()
-    master = Master(peer.path)
+def speed(seconds, rate, peer, master):
+    """So many cycles, whatever comes back; then what both sides counted."""
     master.map_pdos()
     master.write(0x6060, 0, 8)
     master.enable()
     peer.ask("restart")
     rpdo, answers = master.node.rpdo[1], []
     master.node.tpdo[1].add_callback(lambda pdo: answers.append(pdo[1].raw))
-    count, due = int(seconds * 1000), time.monotonic()
+    count, due = int(seconds * rate), time.monotonic()
     for i in range(count):
         rpdo[0].raw, rpdo[1].raw = 0x0F, i
         rpdo.transmit()
         master.network.send_message(0x80, b"")
-        due += 0.001
+        due += 1 / rate
         time.sleep(max(0.0, due - time.monotonic()))
     time.sleep(0.5)
     report = peer.ask("report")
@@ -274,30 +341,43 @@ def speed(seconds):
     report.update(sent=count, answers=len(answers), drive_cpu_s=cpu / 100,
                   master_cpu_s=round(time.process_time(), 2), seconds=seconds)
     print(json.dumps(report))
-    master.close()
-    peer.close()
+
+
+TESTS = ((identity,), (mapping,), (states,), (follows,), (heartbeat,), (deadline,),
+         (speeds, "--set", "0x60A9:0=0x00B44700"), (torques,), (inputs,), (faults,), (homing,),
+         (reboots,))
+
+
+def run(test, options, can_name):
+    """None, or what is wrong."""
+    peer = Peer(*options, *(["--can", can_name] if can_name else []))
+    master = Master(peer.device, "socketcan" if can_name else "slcan")
+    try:
+        test(peer, master)
+    except (AssertionError, SdoAbortedError, canopen.SdoCommunicationError) as error:
+        line = error.__traceback__
+        while line.tb_next and "selftest" in line.tb_next.tb_frame.f_code.co_filename:
+            line = line.tb_next
+        return f"line {line.tb_lineno}: {error!r}"
+    finally:
+        master.close()
+        peer.close()
+    return None
 
 
 def main():
-    if sys.argv[1:2] == ["--speed"]:
-        speed(float(sys.argv[2]))
-        return 0
+    words = sys.argv[1:]
+    can_name = words[1] if words[:1] == ["--can"] else None
+    words = words[2:] if can_name else words
+    if words[:1] == ["--speed"]:
+        wrong = run(lambda *both: speed(float(words[1]), float(words[2]), *both), (), can_name)
+        print(wrong or "", end="")
+        return 1 if wrong else 0
     failed = 0
-    for test in (identity, mapping, states, follows, heartbeat, faults, homing, reboots):
-        peer = Peer()
-        master = Master(peer.path)
-        try:
-            test(peer, master)
-            print("ok", test.__name__)
-        except (AssertionError, SdoAbortedError, canopen.SdoCommunicationError) as error:
-            failed += 1
-            line = error.__traceback__
-            while line.tb_next and "selftest" in line.tb_next.tb_frame.f_code.co_filename:
-                line = line.tb_next
-            print(f"not ok {test.__name__}: line {line.tb_lineno}: {error!r}")
-        finally:
-            master.close()
-            peer.close()
+    for test, *options in TESTS:
+        wrong = run(test, options, can_name)
+        print(f"not ok {test.__name__}: {wrong}" if wrong else f"ok {test.__name__}", flush=True)
+        failed += wrong is not None
     return 1 if failed else 0
 
 
