@@ -10,8 +10,8 @@ modprobe vcan 2>/dev/null || skip "CAN drive" "this kernel has no vcan"
 ip link add vcan0 type vcan
 ip link set vcan0 up
 selftest() { "$INCISE_BUILD/tests/can/selftest" "$@"; }
-time selftest --can vcan0
-time selftest --can vcan0 --speed 5 100
-time selftest --can vcan0 --speed 5 500
-time selftest --can vcan0 --speed 5 1000
+time "$INCISE_BUILD/tests/can/selftest" --can vcan0
+time "$INCISE_BUILD/tests/can/selftest" --can vcan0 --speed 5 100
+time "$INCISE_BUILD/tests/can/selftest" --can vcan0 --speed 5 500
+time "$INCISE_BUILD/tests/can/selftest" --can vcan0 --speed 5 1000
 ip link del vcan0
