@@ -29,8 +29,8 @@ _incise_options()
 		}'
 }
 
-# What a verb can do, where its usage line lists words: "bench precision [FILE] | …"; and
-# FILE, in capitals, where it lists others than words.
+# What a verb can do, where its usage line lists words: "bench precision [FILE] | …", or the
+# beginning of one, "can:IFACE"; and FILE, in capitals, where it lists others than words.
 _incise_words()
 {
 	"$1" "$2" --help 2>/dev/null | awk '
@@ -38,7 +38,9 @@ _incise_words()
 			n = split($0, part, "|")
 			for (i = 1; i <= n; i++) {
 				split(part[i], word, " ")
-				print word[1] ~ /^[a-z]+$/ ? word[1] : "FILE"
+				if (word[1] ~ /^[a-z]+:/)
+					sub(/:.*/, ":", word[1])
+				print word[1] ~ /^[a-z]+:?$/ ? word[1] : "FILE"
 			}
 		}'
 }
@@ -47,6 +49,22 @@ _incise_files()
 {
 	compopt -o filenames 2>/dev/null || : # not within a completion: a test
 	mapfile -t COMPREPLY < <(compgen -f -- "$1")
+}
+
+# What may follow "can:", which bash takes for two words: interfaces of CAN (280 in
+# linux/if_arp.h); and "slcan:": serial adapters.
+_incise_buses()
+{
+	local type
+
+	case $1 in
+	can)
+		for type in "${INCISE_SYS:-/sys}"/class/net/*/type; do
+			[ "$(cat "$type" 2>/dev/null)" != 280 ] ||
+				basename "$(dirname "$type")"
+		done ;;
+	slcan) compgen -G "/dev/ttyACM*"; compgen -G "/dev/ttyUSB*" ;;
+	esac
 }
 
 _incise()
@@ -60,6 +78,9 @@ _incise()
 			"$(_incise_verbs "$program") help --help --version" -- "$word")
 	elif [[ $verb == help ]]; then
 		mapfile -t COMPREPLY < <(compgen -W "$(_incise_verbs "$program")" -- "$word")
+	elif [[ $verb == info && ${COMP_WORDS[3]} == : ]]; then
+		mapfile -t COMPREPLY < <(compgen -W "$(_incise_buses "${COMP_WORDS[2]}")" \
+			-- "${word#:}")
 	elif [[ $word == -* ]]; then
 		mapfile -t COMPREPLY < <(compgen -W \
 			"$(_incise_options "$program" "$verb")" -- "$word")
@@ -69,6 +90,7 @@ _incise()
 		mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY < <(compgen -W \
 			"${words//FILE/}" -- "$word")
 		((${#COMPREPLY[@]})) || _incise_files "$word"
+		[[ "${COMPREPLY[*]}" != *: ]] || compopt -o nospace 2>/dev/null || :
 	fi
 }
 

@@ -32,7 +32,7 @@ void stepper_counters_line(struct incise_stepper *stepper)
 	const char *before = "actuator   ";
 
 	for (int i = 0; !incise_stepper_counter(stepper, i, &counter); i++)
-		if (counter.value) {
+		if (counter.trouble && counter.value) {
 			printf("%s%llu %s", before, (unsigned long long)counter.value,
 			       counter.text);
 			before = ", ";

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What an actuator's backend counts, such as SYNCs that were late on a bus: since it was
- * opened, 0 on a sound machine.
+ * What an actuator's backend counts since it was opened, such as SYNCs that were late.
  */
 #ifndef INCISE_STEPPER_COUNTERS_H
 #define INCISE_STEPPER_COUNTERS_H
@@ -15,7 +14,7 @@ json_t *stepper_counters_json(struct incise_stepper *stepper);
 /* A line for each; none where it counts nothing. */
 void stepper_counters_text(struct incise_stepper *stepper);
 
-/* One line of those that are not 0; none where all are. */
+/* One line of those that tell of trouble; none where there was none. */
 void stepper_counters_line(struct incise_stepper *stepper);
 
 #endif

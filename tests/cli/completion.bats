@@ -73,6 +73,26 @@ complete_words() {
 	[ "${COMPREPLY[*]}" = stale.csv ]
 }
 
+@test "buses of info are completed: their word, then what there is of them" {
+	complete_words incise info can
+	[ "${COMPREPLY[*]}" = can: ]
+	complete_words incise info sl
+	[ "${COMPREPLY[*]}" = slcan: ]
+	# as bash takes "can:can" apart
+	export INCISE_SYS=$PWD/sys
+	mkdir -p sys/class/net/{can0,can1,eth0,vcan0}
+	echo 280 | tee sys/class/net/{can0,can1,vcan0}/type
+	echo 1 >sys/class/net/eth0/type
+	complete_words incise info can :
+	[ "${COMPREPLY[*]}" = "can0 can1 vcan0" ]
+	complete_words incise info can : can
+	[ "${COMPREPLY[*]}" = "can0 can1" ]
+	complete_words incise info can : x
+	[ "${#COMPREPLY[@]}" -eq 0 ]
+	complete_words incise info slcan : /dev/ttyNONE
+	[ "${#COMPREPLY[@]}" -eq 0 ]
+}
+
 @test "files are completed otherwise" {
 	touch data.csv "two words.csv"
 	mkdir data.rec

@@ -163,7 +163,8 @@ static int teller_counter(struct incise_stepper *stepper, int i,
 			  struct incise_stepper_counter *counter)
 {
 	static const struct incise_stepper_counter counters[] = {
-		{"sync_late", "SYNCs sent late", 3}, {"emcy", "emergencies", 0}};
+		{"sync_late", "SYNCs sent late", 3, true},
+		{"setpoints", "set-points sent", 0, false}};
 
 	if (i > 1)
 		return -ENOENT;
@@ -218,9 +219,9 @@ static void counters_are_the_backend_s(void **state)
 
 	assert_int_equal(incise_stepper_counter(&teller.stepper, 0, &counter), 0);
 	assert_string_equal(counter.key, "sync_late");
-	assert_int_equal(counter.value, 3);
+	assert_true(counter.value == 3 && counter.trouble);
 	assert_int_equal(incise_stepper_counter(&teller.stepper, 1, &counter), 0);
-	assert_string_equal(counter.key, "emcy");
+	assert_string_equal(counter.key, "setpoints");
 	assert_int_equal(incise_stepper_counter(&teller.stepper, 2, &counter), -ENOENT);
 	assert_int_equal(incise_stepper_counter(&teller.stepper, -1, &counter), -ENOENT);
 	assert_int_equal(incise_stepper_counter(&stepper, 0, &counter), -ENOENT);
