@@ -4,6 +4,7 @@
 headers := $(wildcard lib/include/incise/*.h)
 man_pages := $(wildcard man/*.[1-8])
 scenes := $(wildcard scenes/*.scene scenes/*.fis)
+examples := $(wildcard doc/*.example)
 udev_rules := $(wildcard udev/*.rules)
 sysusers := $(wildcard udev/*.sysusers)
 
@@ -16,7 +17,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach lib,$(libraries),$(libdir)/pkgconfig/$(lib).pc) \
 	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
 	$(addprefix $(datadir)/incise/scenes/,$(notdir $(scenes))) \
-	$(datadir)/incise/rig.conf.example \
+	$(addprefix $(datadir)/incise/,$(notdir $(examples))) \
 	$(completiondir)/incise \
 	$(addprefix $(udevrulesdir)/,$(notdir $(udev_rules))) \
 	$(addprefix $(sysusersdir)/,$(patsubst %.sysusers,%.conf,$(notdir $(sysusers))))
@@ -42,7 +43,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 		$(INSTALL) -m 644 $$page $(DESTDIR)$(mandir)/man$${page##*.} || exit 1; \
 	done
 	$(INSTALL) -m 644 $(scenes) $(DESTDIR)$(datadir)/incise/scenes
-	$(INSTALL) -m 644 doc/rig.conf.example $(DESTDIR)$(datadir)/incise
+	$(INSTALL) -m 644 $(examples) $(DESTDIR)$(datadir)/incise
 	$(INSTALL) -m 644 tools/incise.bash $(DESTDIR)$(completiondir)/incise
 	$(INSTALL) -m 644 $(udev_rules) $(DESTDIR)$(udevrulesdir)
 	for file in $(sysusers); do \

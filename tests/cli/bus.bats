@@ -301,3 +301,24 @@ rig() { # ARGUMENTS
 	[ -z "$(key h.json spread_mm)" ]
 	[ -z "$(key h.json spread_steps)" ]
 }
+
+@test "the examples of rig.conf are read, those in the manual too" {
+	for example in "$root"/doc/*.example; do
+		sed 's|^stepper = "[^"]*"|stepper = "bench:bus0"|' "$example" >rig.conf
+		incise stepper status
+	done
+	example_in "$root/man/rig.conf.5" can:can0 | sed 's|"can:can0:0x10"|"bench:bus0"|' >rig.conf
+	grep -q 'can = {' rig.conf
+	incise stepper status
+	grep '^actuator = .*can = ' "$root/README.md" >rig.conf
+	grep -q homing_method rig.conf
+	echo 'stepper = "bench:bus0";' >>rig.conf
+	incise stepper status
+}
+
+@test "what rig.conf says of a drive on CAN is checked whatever the backend" {
+	rig bus0
+	sed -i 's/lead_mm = 3.0;/&\ncan = { mode = "torque"; };/' rig.conf
+	run --separate-stderr incise stepper status
+	failed_with 'rig.conf:4: actuator.can.mode: expected "csp", "csv" or "cst", found "torque"'
+}

@@ -46,6 +46,9 @@ setup() {
 	for header in "$root"/lib/include/incise/*.h; do
 		cmp "$header" "$dest/usr/include/incise/${header##*/}"
 	done
+	for example in rig.conf.example rig-can.conf.example; do
+		cmp "$root/doc/$example" "$dest/usr/share/incise/$example"
+	done
 	cmp "$root/scenes/liver.scene" "$dest/usr/share/incise/scenes/liver.scene"
 	cmp "$root/tools/incise.bash" "$dest/usr/share/bash-completion/completions/incise"
 	for lib in incise incise-learn incise-record; do
