@@ -11,6 +11,7 @@
 #include <string.h>
 #include "cli.h"
 #include "stepper_command.h"
+#include "stepper_counters.h"
 #include "stepper_status.h"
 
 enum { OPT_BY = CLI_LONG, OPT_UNHOMED, OPT_HOLD, OPT_FOR, OPT_REPEAT, OPT_JSON };
@@ -267,6 +268,9 @@ int main(int argc, char **argv)
 	parse(&job, argc, argv);
 	stepper_drive_open(&drive, job.rig, job.command->watch, job.command->name);
 	job.command->run(&job, &drive);
+	/* Status shows all of them; what moved it shows what was amiss on the way. */
+	if (!job.json && drive.drove)
+		stepper_counters_line(drive.stepper);
 	stepper_drive_end(&drive);
 	if (cli_stop == SIGPIPE)
 		return 1;

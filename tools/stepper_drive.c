@@ -82,7 +82,7 @@ void stepper_drive_power(struct stepper_drive *drive)
 	if (incise_clock_is_real(drive->clock))
 		sched_setscheduler(0, SCHED_FIFO, &(struct sched_param){1});
 	/* Before it is: a signal's way out has to take power away as well. */
-	drive->powered = true;
+	drive->powered = drive->drove = true;
 	if (incise_stepper_enable(drive->stepper, &err))
 		stepper_drive_fail(drive, "%s", err.text);
 	stepper_drive_look(drive);

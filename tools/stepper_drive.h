@@ -24,6 +24,7 @@ struct stepper_drive {
 	struct incise_stepper_status status; /* the last one */
 	const char *doing;		     /* "move" */
 	bool powered;			     /* by us */
+	bool drove;			     /* it was */
 	int64_t period_ns;		     /* of targets */
 	int64_t shown_ns;		     /* when progress was shown */
 };

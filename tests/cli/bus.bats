@@ -282,16 +282,28 @@ rig() { # ARGUMENTS
 	[ "$(key r.json actuator)" = '{}' ]
 }
 
-@test "a drive that homes by itself does not tell where the edge was" {
+@test "what moves it says what was amiss on the way" {
 	rig bus0
+	run -0 --separate-stderr incise stepper move 2
+	[ "${#lines[@]}" -eq 2 ]
+	[ "${lines[1]}" = "actuator   3 SYNCs sent late, 1 emergencies" ]
+	incise stepper move 2 --json >m.json
+	[ "$(key m.json counters.sync_late)" = 3 ]
+	rig sound
+	run -0 --separate-stderr incise stepper move 2
+	[ "${#lines[@]}" -eq 1 ]
+}
+
+@test "a drive that homes by itself does not tell where the edge was" {
+	rig sound
 	run -0 --separate-stderr incise stepper home
 	diff - <(echo "$output") <<-'END'
-		drive bus0 homes by itself and does not tell where the edge was in the count before
+		drive sound homes by itself and does not tell where the edge was in the count before
 		homed, at 0.0000 mm
 	END
 	run -0 --separate-stderr incise stepper home --repeat 3
 	diff - <(echo "$output") <<-'END'
-		drive bus0 homes by itself and does not tell where the edge was in the count before: how well it repeats is not known
+		drive sound homes by itself and does not tell where the edge was in the count before: how well it repeats is not known
 		homed, at 0.0000 mm
 	END
 	incise stepper home --repeat 2 --json >h.json
