@@ -402,15 +402,22 @@ static void end(struct can_axis *axis, int64_t now)
 	put(axis, CIA402_SHUTDOWN, hold_target(axis), now);
 }
 
+/* What it says is of now. */
+static bool is_fresh(const struct can_axis *axis, int64_t now)
+{
+	return now - axis->tpdo_ns <= 3 * (int64_t)axis->setup.config.tick_ns;
+}
+
 /* By the drive's own ramp, then without power; or as well as can be known. */
 static void quick_stop(struct can_axis *axis, int64_t now)
 {
 	enum cia402_state state = cia402_state(axis->statusword);
 	bool stopping = state == CIA402_ENABLED || state == CIA402_QUICK_STOP ||
 			state == CIA402_FAULT_REACTION;
-	bool fresh = now - axis->tpdo_ns <= 3 * (int64_t)axis->setup.config.tick_ns;
-	int64_t most = QUICK_NS + (int64_t)(1e9 * axis->setup.config.velocity /
-					    axis->setup.config.acceleration);
+	bool fresh = is_fresh(axis, now);
+	int64_t most = QUICK_NS + (int64_t)axis->setup.config.deadman_ns +
+		       (int64_t)(1e9 * axis->setup.config.velocity /
+				 axis->setup.config.acceleration);
 
 	/* One cycle at least, so that what it says now answers to the stop. */
 	if (fresh && !stopping &&
@@ -439,7 +446,7 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 		    uint32_t left_out)
 {
 	struct incise_motion *m = &axis->motion;
-	bool powered = m->powered;
+	bool powered = m->powered, deaf;
 
 	axis->put = false;
 	hear(axis, now_ns);
@@ -473,8 +480,12 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 	else if (axis->phase == CAN_AXIS_QUICK_STOP)
 		quick_stop(axis, now_ns);
 	sync(axis);
-	/* With power it answers for set-points that really go out, and for no less. */
-	if (!powered || axis->put)
+	/*
+	 * With power it answers for set-points that really go out, and for no less. A drive
+	 * that is to stop and does not say that it hears is left to its own watch.
+	 */
+	deaf = axis->phase == CAN_AXIS_QUICK_STOP && !is_fresh(axis, now_ns);
+	if (!powered || (axis->put && !deaf))
 		canopen_beat(axis->master, now_ns);
 	m->status.late = axis->counts.sync_late;
 	incise_motion_publish(m, now_ns);

@@ -290,7 +290,6 @@ static int set_up(struct can_link *link, const char *where, struct incise_error 
 {
 	struct can_axis_setup *setup = &link->axis.setup;
 	bool was_homed = link->is_homed, keep;
-	uint32_t inputs;
 	int rc = ask_homed(link, where, err);
 
 	keep = link->is_setup && link->boots == link->master.boots &&
@@ -312,8 +311,6 @@ static int set_up(struct can_link *link, const char *where, struct incise_error 
 						    INCISE_STEPPER_LINE_HOME |
 						    INCISE_STEPPER_LINE_ESTOP
 					  : 0;
-	if (link->taken.inputs && !canopen_read(&link->master, 0x60fd, 0, 4, &inputs))
-		can_axis_inputs(&link->axis, inputs);
 	return 0;
 }
 
@@ -441,6 +438,25 @@ int can_link_look(struct can_link *link, const struct can_transport *transport,
 	return rc ? rc : take_position(link, false, asked->where, err);
 }
 
+/* An e-stop that is pressed forbids power, and one that was let go no longer does. */
+static int take_inputs(struct can_link *link, struct incise_error *err)
+{
+	uint32_t inputs;
+	int rc;
+
+	if (!link->taken.inputs)
+		return 0;
+	rc = canopen_read(&link->master, 0x60fd, 0, 4, &inputs);
+	if (rc)
+		return incise_error_set(
+			err, -rc,
+			"%s: its inputs (60FD) cannot be read: %s; see its "
+			"power and cable",
+			link->where, strerror(-rc));
+	can_axis_inputs(&link->axis, inputs);
+	return 0;
+}
+
 static bool is_operational(const struct canopen *master)
 {
 	return master->state == CANOPEN_OPERATIONAL;
@@ -466,6 +482,8 @@ int can_link_ready(struct can_link *link, bool homing, struct incise_error *err)
 		rc = cia402_set_mode(&link->master,
 				     homing ? CIA402_HOMING : link->setup.mode,
 				     link->where, err);
+	if (!rc)
+		rc = take_inputs(link, err);
 	if (rc)
 		return rc;
 	rc = canopen_await(&link->master, is_operational, now + READY_NS);
@@ -492,6 +510,8 @@ int can_link_clear(struct can_link *link, struct incise_error *err)
 	/* Whatever it was, nobody need trust what it still knows. */
 	if (!rc)
 		rc = set_up(link, link->where, err);
+	if (!rc)
+		rc = take_inputs(link, err);
 	link->axis.why = rc ? link->axis.why : CAN_AXIS_NO_REASON;
 	return rc;
 }

@@ -130,7 +130,6 @@ struct cia402_setup {
 struct cia402_taken {
 	bool inputs; /* 60FD comes in TPDO2 */
 	bool position_limit, velocity_limit, acceleration_limit, following_limit;
-	bool rpdo_deadline; /* it watches over set-points too, beside our heartbeat */
 };
 
 /*

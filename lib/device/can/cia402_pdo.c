@@ -164,6 +164,10 @@ static uint32_t target(enum cia402_mode mode)
 int cia402_set_pdos(const struct cia402_talk *talk, const struct cia402_setup *setup,
 		    struct cia402_taken *taken)
 {
+	/*
+	 * Off: none go out while the bus is borrowed for SDOs. Our heartbeat goes out with
+	 * set-points only, so the drive's watch over that is one over them too.
+	 */
 	static const struct cia402_object deadline = {RPDO, 5, 2, "RPDO deadline"};
 	uint32_t node = talk->master->node, id = 0;
 	const struct pdo set_points = {
@@ -176,7 +180,7 @@ int cia402_set_pdos(const struct cia402_talk *talk, const struct cia402_setup *s
 	const struct pdo actual = {
 		TPDO, CANOPEN_TPDO1 + node, AT_SYNC, 2, {MAP_STATUSWORD, MAP_POSITION},
 	};
-	bool has;
+	bool has, kept;
 	int rc = switch_others_off(talk, RPDO, 1);
 
 	if (!rc)
@@ -186,8 +190,7 @@ int cia402_set_pdos(const struct cia402_talk *talk, const struct cia402_setup *s
 	if (!rc)
 		rc = set_pdo(talk, &set_points);
 	if (!rc)
-		rc = cia402_keep_if(talk, &deadline, setup->deadman_ms,
-				    &taken->rpdo_deadline);
+		rc = cia402_keep_if(talk, &deadline, 0, &kept);
 	if (!rc)
 		rc = set_pdo(talk, &actual);
 	if (!rc && has)
