@@ -5,7 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <string.h>
-#include "axis.h"
+#include "axis_check.h"
 
 #define MS 1000000LL
 #define FRAMES 64	       /* taken in a cycle: more than a bus carries in 2 ms */
@@ -42,8 +42,8 @@ static void note(struct can_axis *axis, enum can_axis_why why, int64_t a, int64_
 	axis->why = why;
 }
 
-static void fault(struct can_axis *axis, uint32_t bits, enum can_axis_why why, int64_t a,
-		  int64_t b, int64_t now)
+void can_axis_fault(struct can_axis *axis, uint32_t bits, enum can_axis_why why,
+		    int64_t a, int64_t b, int64_t now)
 {
 	struct incise_motion *m = &axis->motion;
 
@@ -145,90 +145,8 @@ static void hear(struct can_axis *axis, int64_t now)
 		}
 	}
 	if (rc < 0)
-		fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_BUS_FAILED, -rc, 0, now);
-}
-
-/* What it says of itself, beside its position. */
-static void check_drive(struct can_axis *axis, int64_t now)
-{
-	const struct canopen *master = axis->master;
-	enum cia402_state state = cia402_state(axis->statusword);
-
-	if (master->bus_offs != axis->bus_offs)
-		fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_BUS_OFF, 0, 0, now);
-	if (master->boots != axis->boots)
-		fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_REBOOTED, 0, 0, now);
-	if (master->emcy.count != axis->emcys)
-		fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_EMCY, master->emcy.code,
-		      master->emcy.error_register, now);
-	/* Its EMCY may be a frame behind: the next cycle has it. */
-	else if (state == CIA402_FAULT || state == CIA402_FAULT_REACTION) {
-		if (axis->failed)
-			fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_DRIVE_FAULT, 0,
-			      0, now);
-		axis->failed = true;
-	}
-	if (master->foreign != axis->foreign)
-		fault(axis, INCISE_STEPPER_FAULT_SETPOINT, CAN_AXIS_FOREIGN, 0, 0, now);
-	if (now - master->heard_ns > axis->setup.silence_ns)
-		fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_HEARTBEAT,
-		      axis->setup.silence_ns / MS, 0, now);
-	else if (master->state != CANOPEN_OPERATIONAL)
-		fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NMT, master->state, 0, now);
-	if (now - axis->tpdo_ns > axis->setup.silence_ns)
-		fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_TPDO,
-		      axis->setup.silence_ns / MS, 0, now);
-}
-
-static void check_inputs(struct can_axis *axis, int64_t now)
-{
-	uint32_t inputs = axis->motion.status.inputs;
-	int64_t velocity = incise_profile_velocity(&axis->motion.profile);
-
-	if (inputs & INCISE_STEPPER_LINE_ESTOP)
-		fault(axis, INCISE_STEPPER_FAULT_ESTOP, CAN_AXIS_NO_REASON, 0, 0, now);
-	if (axis->phase != CAN_AXIS_RUNNING)
-		return;
-	/* Away from a limit it may go. */
-	if (inputs & INCISE_STEPPER_LINE_LIMIT_MIN && velocity < 0)
-		fault(axis, INCISE_STEPPER_FAULT_LIMIT_MIN, CAN_AXIS_NO_REASON, 0, 0,
-		      now);
-	if (inputs & INCISE_STEPPER_LINE_LIMIT_MAX && velocity > 0)
-		fault(axis, INCISE_STEPPER_FAULT_LIMIT_MAX, CAN_AXIS_NO_REASON, 0, 0,
-		      now);
-}
-
-/* It is somewhere behind: between the targets that it may have had by now. */
-static void check_following(struct can_axis *axis, int64_t now)
-{
-	int64_t at = axis->motion.status.position, low = INT64_MAX, high = INT64_MIN, off;
-
-	for (int i = 0; i < 4; i++) {
-		low = axis->commanded[i] < low ? axis->commanded[i] : low;
-		high = axis->commanded[i] > high ? axis->commanded[i] : high;
-	}
-	off = at < low ? low - at : at > high ? at - high : 0;
-	if (off <= axis->setup.following) {
-		axis->off_ns = 0;
-		return;
-	}
-	if (!axis->off_ns)
-		axis->off_ns = now;
-	if (now - axis->off_ns >= axis->setup.following_ns)
-		fault(axis, INCISE_ABI_FAULT_FOLLOWING, CAN_AXIS_OFF_TARGET, off, 0, now);
-}
-
-static void check_running(struct can_axis *axis, int64_t now)
-{
-	enum cia402_state state = cia402_state(axis->statusword);
-
-	if (state == CIA402_FAULT || state == CIA402_FAULT_REACTION)
-		return;
-	if (state != CIA402_ENABLED)
-		fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_NOT_ENABLED, state, 0,
-		      now);
-	else if (axis->phase == CAN_AXIS_RUNNING)
-		check_following(axis, now);
+		can_axis_fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_BUS_FAILED, -rc, 0,
+			       now);
 }
 
 /* In the drive's units, whatever its mode asks for. */
@@ -294,10 +212,11 @@ static void put(struct can_axis *axis, uint16_t controlword, int32_t target, int
 		axis->counts.setpoints++;
 	} else if (rc == -ENOBUFS) {
 		if (++axis->full > FULL_MOST)
-			fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_QUEUE_FULL, axis->full,
-			      0, now);
+			can_axis_fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_QUEUE_FULL,
+				       axis->full, 0, now);
 	} else {
-		fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_BUS_FAILED, -rc, 0, now);
+		can_axis_fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_BUS_FAILED, -rc, 0,
+			       now);
 	}
 }
 
@@ -347,8 +266,8 @@ static void run(struct can_axis *axis, int64_t now)
 	uint32_t bits = incise_motion_listen(m, now);
 
 	if (bits)
-		fault(axis, bits, CAN_AXIS_NO_REASON, 0, 0, now);
-	check_inputs(axis, now);
+		can_axis_fault(axis, bits, CAN_AXIS_NO_REASON, 0, 0, now);
+	can_axis_check_inputs(axis, now);
 	if (m->ending && m->resting && axis->phase == CAN_AXIS_RUNNING)
 		enter(axis, CAN_AXIS_ENDING, now);
 	if (axis->phase == CAN_AXIS_RUNNING)
@@ -360,7 +279,7 @@ static void home(struct can_axis *axis, int64_t now)
 	uint16_t word = axis->statusword;
 	bool begun = !axis->attained_before || now - axis->since_ns > PICKED_UP_NS;
 
-	check_inputs(axis, now);
+	can_axis_check_inputs(axis, now);
 	if (axis->phase != CAN_AXIS_HOMING)
 		return;
 	if (!(word & CIA402_HOMED))
@@ -371,10 +290,12 @@ static void home(struct can_axis *axis, int64_t now)
 		axis->motion.status.state = INCISE_STEPPER_STATE_STOPPING;
 		enter(axis, CAN_AXIS_QUICK_STOP, now);
 	} else if (word & CIA402_FOLLOWING_ERROR) {
-		fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_NO_HOME, 0, 0, now);
+		can_axis_fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_NO_HOME, 0, 0,
+			       now);
 	} else if (now > axis->limit_ns) {
 		axis->outcome = -ETIMEDOUT;
-		fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_HOME_TIME, 0, 0, now);
+		can_axis_fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_HOME_TIME, 0,
+			       0, now);
 	} else if (begun && word & CIA402_HOMED && word & CIA402_TARGET_REACHED) {
 		axis->outcome = 0;
 		axis->motion.ending = true;
@@ -454,10 +375,10 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 		axis->counts.sync_late +=
 			left_out + (2 * late_ns > (int64_t)axis->setup.config.tick_ns);
 		axis->counts.tpdo_missing += !axis->answered;
-		check_drive(axis, now_ns);
+		can_axis_check_drive(axis, now_ns);
 	}
 	if (axis->phase == CAN_AXIS_RUNNING || axis->phase == CAN_AXIS_HOMING)
-		check_running(axis, now_ns);
+		can_axis_check_running(axis, now_ns);
 	switch (axis->phase) {
 	case CAN_AXIS_IDLE:
 		break;
