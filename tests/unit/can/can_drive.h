@@ -215,6 +215,8 @@ static inline void drive_tick(struct drive *d)
 			d->nmt = CANOPEN_PRE_OPERATIONAL;
 		drive_connection_lost(d, 0x8130);
 	}
+	if (d->nmt != CANOPEN_OPERATIONAL) /* no PDOs, no deadline of theirs */
+		d->deadline_runs = false;
 	if (d->deadline_runs && d->now_ns > d->deadline_ns) {
 		d->deadline_runs = false;
 		drive_connection_lost(d, 0x8250);

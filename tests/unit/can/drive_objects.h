@@ -165,6 +165,7 @@ static inline void drive_abort(struct drive *d, const uint8_t request[8], uint32
 	uint8_t bytes[8] = {0x80, request[1], request[2], request[3]};
 
 	d->refused++;
+	d->aborted = (uint16_t)(request[1] | request[2] << 8);
 	d->segmented = false;
 	memcpy(bytes + 4, &code, 4);
 	drive_answer(d, bytes);

@@ -1,0 +1,472 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/can/cia402_setup.c, with cia402_pdo.c and cia402_limits.c: a drive does what it
+ * was set up to do, and whatever goes wrong at whatever step, it ends in a line, in bounded
+ * time, and without power.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <stdio.h>
+#include "led.h"
+
+#define COUNT(table) (sizeof(table) / sizeof((table)[0]))
+
+static int setup(void **state)
+{
+	static struct led led;
+
+	led_init(&led);
+	*state = &led;
+	return 0;
+}
+
+static uint32_t value(struct led *led, uint16_t index, uint8_t sub)
+{
+	return drive_object(&led->drive, index, sub)->value;
+}
+
+static void test_objects(void **state)
+{
+	static const struct {
+		uint16_t index;
+		uint8_t sub;
+		uint32_t value;
+	} cases[] = {
+		{0x1005, 0, 0x80},	 {0x1006, 0, 1000},
+		{0x1007, 0, 0},		 {0x1014, 0, 0x90},
+		{0x1016, 1, 0x7f0064},	 {0x1017, 0, 20},
+		{0x1029, 1, 0},		 {0x6007, 0, 3},
+		{0x605a, 0, 2},		 {0x6060, 0, 8},
+		{0x6065, 0, 500},	 {0x6066, 0, 20},
+		{0x6072, 0, 800},	 {0x607d, 1, (uint32_t)-100},
+		{0x607d, 2, 200000},	 {0x607f, 0, 50000},
+		{0x6085, 0, 1000000},	 {0x60c2, 1, 1},
+		{0x60c2, 2, 0xfd},	 {0x60c5, 0, 1000000},
+		{0x60c6, 0, 1000000},	 {0x1400, 1, 0x210},
+		{0x1400, 2, 1},		 {0x1400, 5, 100},
+		{0x1600, 0, 2},		 {0x1600, 1, 0x60400010},
+		{0x1600, 2, 0x607a0020}, {0x1401, 1, 0x80000310},
+		{0x1800, 1, 0x40000190}, {0x1800, 2, 1},
+		{0x1a00, 0, 2},		 {0x1a00, 1, 0x60410010},
+		{0x1a00, 2, 0x60640020}, {0x1801, 1, 0x40000290},
+		{0x1801, 2, 255},	 {0x1801, 3, 10},
+		{0x1801, 5, 100},	 {0x1a01, 0, 1},
+		{0x1a01, 1, 0x60fd0020}, {0x1802, 1, 0xc0000390},
+	};
+	struct led *led = *state;
+	int64_t t = led->drive.now_ns;
+
+	led->drive.od[OD_SYNC_ID].value = 0x40000080; /* it would send SYNCs itself */
+	assert_int_equal(led_configure(led), 0);
+	for (size_t i = 0; i < COUNT(cases); i++)
+		assert_int_equal(value(led, cases[i].index, cases[i].sub),
+				 cases[i].value);
+	assert_true(led->taken.inputs && led->taken.position_limit &&
+		    led->taken.velocity_limit && led->taken.acceleration_limit &&
+		    led->taken.following_limit && led->taken.rpdo_deadline);
+	assert_int_equal(led->drive.nmt, CANOPEN_OPERATIONAL);
+	assert_int_equal(led->drive.state, CIA402_DISABLED);
+	assert_int_equal(led->drive.enables, 0);
+	/* Start-up in a second, at 0.2 ms for each SDO: a third of it is left to slower ones. */
+	assert_true(led->drive.now_ns - t < 300 * DRIVE_MS);
+	assert_true(led->drive.requests < 250);
+	/* And once more, as after a reboot of this side. */
+	assert_int_equal(led_configure(led), 0);
+}
+
+static void cycle(struct led *led, uint16_t word, int32_t target)
+{
+	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
+	struct can_frame frame;
+
+	cia402_put(&frame, DRIVE_NODE, led->setup.mode, word, target);
+	led->drive.bus.ops->send(&led->drive.bus, &frame);
+	led->drive.bus.ops->send(&led->drive.bus, &sync);
+	canopen_await(&led->master, NULL, led->drive.now_ns + DRIVE_MS);
+}
+
+/* It is led by PDOs, and stops by itself when they and the heartbeats end. */
+static void test_deadman(void **state)
+{
+	static const struct {
+		enum cia402_mode mode;
+		bool beats, points; /* what goes on */
+		uint16_t
+			code; /* the last; where both end, set-points are waited for longer */
+	} cases[] = {
+		{CIA402_CSP, false, false, 0x8130}, {CIA402_CSV, false, false, 0x8130},
+		{CIA402_CST, false, false, 0x8130}, {CIA402_CSP, false, true, 0x8130},
+		{CIA402_CSV, true, false, 0x8250},
+	};
+	struct led *led = *state;
+
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		struct drive *d = &led->drive;
+		int32_t target = 0;
+
+		led_init(led);
+		led->setup.mode = cases[i].mode;
+		assert_int_equal(led_configure(led), 0);
+		for (int k = 0; k < 500; k++) {
+			if (k > 100 && cases[i].mode == CIA402_CSP)
+				target += 20;
+			else if (k > 100)
+				target = cases[i].mode == CIA402_CSV ? 20000 : 500;
+			cycle(led, cia402_up(d->state), target);
+		}
+		assert_int_equal(d->state, CIA402_ENABLED);
+		assert_true(d->velocity > 1000);
+		assert_true(d->position > 500);
+		if (!cases[i].beats)
+			led->master.own = 0;
+		led->master.emcy.code = 0;
+		for (int k = 0; k < 300; k++) {
+			if (cases[i].points)
+				cycle(led, CIA402_ENABLE, target += 20);
+			else
+				canopen_await(&led->master, NULL, d->now_ns + DRIVE_MS);
+		}
+		assert_int_equal(d->state, CIA402_DISABLED);
+		assert_true(d->velocity == 0);
+		assert_int_equal(led->master.emcy.code, cases[i].code);
+		assert_int_equal(d->quick_stops, 1);
+		assert_int_equal(d->enabled_unasked, 0);
+		/* On its ramp, not at once: 6085 is kept. */
+		assert_true(d->hardest <= 1000000.1 || cases[i].mode == CIA402_CST);
+	}
+}
+
+/* Limits are the drive's own too. */
+static void test_limits(void **state)
+{
+	struct led *led = *state;
+
+	led->setup.position_max = 1000;
+	led->setup.following = UINT32_MAX;
+	assert_int_equal(led_configure(led), 0);
+	for (int k = 0; k < 500; k++)
+		cycle(led, cia402_up(led->drive.state), k < 50 ? 0 : 1000000);
+	assert_in_range((int)led->drive.position, 990, 1000);
+	assert_true(led->drive.fastest <= 50000);
+
+	led_init(led);
+	assert_int_equal(led_configure(led), 0);
+	for (int k = 0; k < 500; k++) {
+		led->drive.blocked = k > 100;
+		cycle(led, cia402_up(led->drive.state), k * 10);
+	}
+	assert_int_equal(led->drive.state, CIA402_FAULT);
+	assert_int_equal(led->master.emcy.code, 0x8611);
+	assert_int_equal(led->drive.enabled_unasked, 0);
+}
+
+/* What a drive may lack, and what it may not. */
+static void test_absences(void **state)
+{
+	static const struct {
+		uint16_t index;
+		int sub;
+		int rc;
+		size_t taken; /* offset of what is not taken; 0: nothing is lost */
+	} cases[] = {
+		{0x60fd, -1, 0, offsetof(struct cia402_taken, inputs)},
+		{0x1801, -1, 0, offsetof(struct cia402_taken, inputs)},
+		{0x607d, -1, 0, offsetof(struct cia402_taken, position_limit)},
+		{0x607f, -1, 0, offsetof(struct cia402_taken, velocity_limit)},
+		{0x60c5, -1, 0, offsetof(struct cia402_taken, acceleration_limit)},
+		{0x6065, -1, 0, offsetof(struct cia402_taken, following_limit)},
+		{0x1400, 5, 0, offsetof(struct cia402_taken, rpdo_deadline)},
+		{0x1006, -1, 0, SIZE_MAX},
+		{0x1007, -1, 0, SIZE_MAX},
+		{0x1029, -1, 0, SIZE_MAX},
+		{0x6085, -1, 0, SIZE_MAX},
+		{0x60c6, -1, 0, SIZE_MAX},
+		{0x6072, -1, 0, SIZE_MAX},
+		{0x6502, -1, 0, SIZE_MAX},
+		{0x1401, -1, 0, SIZE_MAX},
+		{0x1802, -1, 0, SIZE_MAX},
+		{0x1801, 3, 0, SIZE_MAX},
+		{0x1016, -1, -EOPNOTSUPP, 0},
+		{0x1017, -1, -EOPNOTSUPP, 0},
+		{0x6007, -1, -EOPNOTSUPP, 0},
+		{0x605a, -1, -EOPNOTSUPP, 0},
+		{0x6060, -1, -EOPNOTSUPP, 0},
+		{0x60c2, -1, -EOPNOTSUPP, 0},
+		{0x1400, -1, -EOPNOTSUPP, 0},
+		{0x1800, -1, -EOPNOTSUPP, 0},
+		{0x607a, -1, -EOPNOTSUPP, 0},
+		{0x6064, -1, -EOPNOTSUPP, 0},
+		{0x1005, -1, -EOPNOTSUPP, 0},
+	};
+	struct led *led = *state;
+
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		bool *taken = (bool *)&led->taken;
+
+		led_init(led);
+		drive_lacks(&led->drive, cases[i].index, cases[i].sub);
+		assert_int_equal(led_configure(led), cases[i].rc);
+		if (cases[i].rc) {
+			char number[12];
+
+			snprintf(number, sizeof(number), "%04X",
+				 cases[i].index == 0x607a   ? 0x1600
+				 : cases[i].index == 0x6064 ? 0x1a00
+							    : cases[i].index);
+			assert_memory_equal(led->err.text, "here: ", 6);
+			assert_non_null(strstr(led->err.text, number));
+			continue;
+		}
+		for (size_t k = 0; k < sizeof(led->taken); k++)
+			assert_int_equal(taken[k], k != cases[i].taken);
+	}
+}
+
+/* An object that takes a write and forgets it. */
+static void test_not_kept(void **state)
+{
+	static const enum drive_object_name cases[] = {
+		OD_CONSUMER,
+		OD_HEARTBEAT,
+		OD_ABORT_OPTION,
+		OD_QUICK_STOP_OPTION,
+		OD_MODE,
+		OD_FOLLOWING,
+		OD_FOLLOWING_TIME,
+		OD_RANGE_MIN,
+		OD_RANGE_MAX,
+		OD_MOST_VELOCITY,
+		OD_MOST_ACCELERATION,
+		OD_RPDO1_COB,
+		OD_RPDO1_TYPE,
+		OD_RPDO1_MAP2,
+		OD_RPDO1_COUNT,
+		OD_TPDO1_MAP2,
+		OD_TPDO1_COUNT,
+		OD_RPDO1_TIMER,
+		OD_RPDO2_COB,
+		OD_TPDO1_TYPE,
+		OD_QUICK_STOP_RAMP,
+	};
+	struct led *led = *state;
+
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		int rc;
+
+		led_init(led);
+		led->drive.od[cases[i]].deaf = true;
+		rc = led_configure(led);
+		/* A mode that does not come is waited for; a PDO that stays on refuses. */
+		assert_true(rc == -EPROTO || rc == -ETIMEDOUT || rc == -EOPNOTSUPP);
+		assert_memory_equal(led->err.text, "here: ", 6);
+		assert_false(cia402_powered(led->drive.state));
+	}
+}
+
+static void test_refused(void **state)
+{
+	struct led *led = *state;
+
+	/* It has power. */
+	led_enable(led);
+	assert_int_equal(led->drive.state, CIA402_ENABLED);
+	assert_int_equal(led_configure(led), -EBUSY);
+	assert_non_null(strstr(led->err.text, "operation enabled"));
+	assert_int_equal(led->drive.state, CIA402_ENABLED); /* and nothing was touched */
+
+	led_init(led);
+	drive_set(&led->drive, 0x6502, 0, 0x01);
+	assert_int_equal(led_configure(led), -EOPNOTSUPP);
+	assert_non_null(strstr(led->err.text, "CSP"));
+
+	for (int i = 0; i < 9; i++) {
+		led_init(led);
+		switch (i) {
+		case 0:
+			led->setup.deadman_ms = 0;
+			break;
+		case 1:
+			led->setup.deadman_ms = 65536;
+			break;
+		case 2:
+			led->setup.beat_ms = 0;
+			break;
+		case 3:
+			led->setup.master = led->master.own = DRIVE_NODE;
+			break;
+		case 4:
+			led->setup.mode = CIA402_HOMING;
+			break;
+		case 5:
+			led->setup.cycle_ns = 1234567;
+			break;
+		case 6:
+			led->setup.position_min = led->setup.position_max;
+			break;
+		case 7:
+			led->master.own = 0;
+			break;
+		case 8:
+			led->master.beat_ns = LED_DEADMAN_MS * DRIVE_MS;
+			break;
+		}
+		assert_int_equal(led_configure(led), -EINVAL);
+		assert_non_null(strstr(led->err.text, "rig.conf"));
+		assert_false(cia402_powered(led->drive.state));
+	}
+}
+
+static void test_cycles(void **state)
+{
+	static const struct {
+		uint32_t ns;
+		uint8_t digit;
+		int8_t power;
+	} cases[] = {
+		{1000000, 1, -3}, {2000000, 2, -3},  {10000000, 10, -3},  {500000, 5, -4},
+		{250000, 25, -5}, {1500000, 15, -4}, {300000000, 30, -2},
+	};
+	struct led *led = *state;
+
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		led_init(led);
+		led->setup.cycle_ns = cases[i].ns;
+		assert_int_equal(led_configure(led), 0);
+		assert_int_equal(value(led, 0x60c2, 1), cases[i].digit);
+		assert_int_equal((int8_t)value(led, 0x60c2, 2), cases[i].power);
+	}
+}
+
+/* Limits of before do not stay: a machine that is not homed has no range. */
+static void test_unlimited(void **state)
+{
+	struct led *led = *state;
+
+	drive_set(&led->drive, 0x607d, 1, 5);
+	drive_set(&led->drive, 0x607d, 2, 9);
+	led->setup.limited = false;
+	assert_int_equal(led_configure(led), 0);
+	assert_false(led->taken.position_limit);
+	assert_int_equal((int32_t)value(led, 0x607d, 1), INT32_MIN);
+	assert_int_equal((int32_t)value(led, 0x607d, 2), INT32_MAX);
+	assert_int_equal(cia402_set_range(&led->master, 10, 20, "here", &led->err), 0);
+	assert_int_equal(cia402_set_range(&led->master, 30, 40, "here", &led->err), 0);
+	assert_int_equal(value(led, 0x607d, 1), 30);
+	assert_int_equal(value(led, 0x607d, 2), 40);
+	assert_int_equal(cia402_set_range(&led->master, 40, 40, "here", &led->err),
+			 -EINVAL);
+}
+
+/* What goes wrong at the k-th SDO, for every k: a line, or an absence that is noted. */
+static void test_every_step(void **state)
+{
+	static const uint32_t codes[] = {0x08000000, ABORT_NO_OBJECT, ABORT_NO_SUB,
+					 0x08000022, ABORT_VALUE};
+	struct led *led = *state;
+	uint64_t requests;
+	unsigned int failed = 0, went_on = 0;
+
+	assert_int_equal(led_configure(led), 0);
+	requests = led->drive.requests;
+	/* The last pass loses the request; each ends in bounded time. */
+	for (size_t c = 0; c <= COUNT(codes); c++)
+		for (uint32_t k = 1; k <= requests; k++) {
+			int64_t t;
+			int rc;
+
+			led_init(led);
+			t = led->drive.now_ns;
+			if (c < COUNT(codes)) {
+				led->drive.abort_at = k;
+				led->drive.abort_code = codes[c];
+			} else {
+				led->drive.drop_at = k;
+			}
+			rc = led_configure(led);
+			assert_true(led->drive.now_ns - t < 5000 * DRIVE_MS);
+			assert_false(cia402_powered(led->drive.state));
+			assert_int_equal(led->drive.enables, 0);
+			if (!rc) {
+				went_on++;
+				/* Silence is never passed over; a refusal that is no absence
+				 * only where the object is a hint, or leaves inputs out. */
+				assert_true(c < COUNT(codes));
+				if (codes[c] != ABORT_NO_OBJECT &&
+				    codes[c] != ABORT_NO_SUB)
+					assert_true(led->drive.aborted == 0x1006 ||
+						    led->drive.aborted == 0x1007 ||
+						    led->drive.aborted == 0x1a01);
+				if (led->drive.aborted == 0x1a01)
+					assert_false(led->taken.inputs);
+				continue;
+			}
+			failed++;
+			assert_memory_equal(led->err.text, "here: ", 6);
+			assert_non_null(strpbrk(led->err.text, ";"));
+			if (c < COUNT(codes)) {
+				assert_true(rc == -EOPNOTSUPP);
+			} else {
+				assert_int_equal(rc, -ETIMEDOUT);
+				drive_advance(&led->drive, DRIVE_MS);
+				assert_int_equal(led->drive.master_abort, ABORT_TIMEOUT);
+			}
+		}
+	/* Of six passes, four and more failed at nearly every step. */
+	assert_true(failed > requests * 4);
+	assert_int_equal(failed + went_on, requests * (COUNT(codes) + 1));
+}
+
+/* The bus fails at the k-th frame, for some time or for good. */
+static void test_bus_fails(void **state)
+{
+	static const int errors[] = {-ENETDOWN, -ENODEV, -EIO};
+	struct led *led = *state;
+
+	for (size_t i = 0; i < COUNT(errors); i++)
+		for (int k = 0; k < 3; k++) {
+			led_init(led);
+			if (k == 0)
+				led->drive.send_error = errors[i];
+			else if (k == 1)
+				led->drive.receive_error = errors[i];
+			else
+				led->drive.wait_error = errors[i];
+			assert_int_equal(led_configure(led), errors[i]);
+			assert_non_null(strstr(led->err.text, led->drive.bus.name));
+		}
+	led_init(led);
+	led->drive.wait_error = -EINTR;
+	assert_int_equal(led_configure(led), -EINTR);
+	led_init(led);
+	led->drive.send_error = -ENOBUFS;
+	led->drive.send_errors = 10;
+	assert_int_equal(led_configure(led), 0);
+	led_init(led);
+	led->drive.twice = true;
+	assert_int_equal(led_configure(led), 0);
+	led_init(led);
+	led->drive.no_heartbeat = true;
+	assert_int_equal(led_configure(led), -ETIMEDOUT);
+	assert_non_null(strstr(led->err.text, "does not become operational"));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup(test_objects, setup),
+		cmocka_unit_test_setup(test_deadman, setup),
+		cmocka_unit_test_setup(test_limits, setup),
+		cmocka_unit_test_setup(test_absences, setup),
+		cmocka_unit_test_setup(test_not_kept, setup),
+		cmocka_unit_test_setup(test_refused, setup),
+		cmocka_unit_test_setup(test_cycles, setup),
+		cmocka_unit_test_setup(test_unlimited, setup),
+		cmocka_unit_test_setup(test_every_step, setup),
+		cmocka_unit_test_setup(test_bus_fails, setup),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * A simulated drive and a master that leads it: where tests of the CAN room begin.
+ */
+#ifndef INCISE_TEST_LED_H
+#define INCISE_TEST_LED_H
+
+#include "can_drive.h"
+
+#define LED_MASTER 0x7f
+#define LED_DEADMAN_MS 100
+
+struct led {
+	struct drive drive;
+	struct canopen master;
+	struct cia402_setup setup;
+	struct cia402_taken taken;
+	struct incise_error err;
+};
+
+static inline void led_init(struct led *led)
+{
+	*led = (struct led){
+		.setup = {.mode = CIA402_CSP,
+			  .cycle_ns = 1000000,
+			  .deadman_ms = LED_DEADMAN_MS,
+			  .master = LED_MASTER,
+			  .beat_ms = 20,
+			  .limited = true,
+			  .position_min = -100,
+			  .position_max = 200000,
+			  .velocity = 50000,
+			  .acceleration = 1000000,
+			  .following = 500,
+			  .following_ms = 20,
+			  .torque_permille = 800},
+	};
+	drive_init(&led->drive);
+	led->master = (struct canopen){.bus = &led->drive.bus,
+				       .node = DRIVE_NODE,
+				       .own = LED_MASTER,
+				       .beat_ns = 20 * DRIVE_MS,
+				       .state = CANOPEN_UNKNOWN};
+}
+
+static inline int led_configure(struct led *led)
+{
+	return cia402_configure(&led->master, &led->setup, &led->taken, "here",
+				&led->err);
+}
+
+/* To what @word leads, by SDO. */
+static inline void led_control(struct led *led, uint16_t word)
+{
+	canopen_write(&led->master, 0x6040, 0, 2, word);
+	canopen_await(&led->master, NULL, led->drive.now_ns + 10 * DRIVE_MS);
+}
+
+static inline void led_enable(struct led *led)
+{
+	led_control(led, CIA402_SHUTDOWN);
+	led_control(led, CIA402_SWITCH_ON);
+	led_control(led, CIA402_ENABLE);
+}
+
+#endif
