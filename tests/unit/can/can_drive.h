@@ -297,6 +297,10 @@ static inline int drive_send(struct can_bus *bus, const struct can_frame *frame)
 	struct drive *d = (struct drive *)bus;
 	int rc = d->send_error;
 
+	if (rc && d->send_first) {
+		d->send_first--;
+		rc = 0;
+	}
 	if (rc && d->send_errors && !--d->send_errors)
 		d->send_error = 0;
 	if (rc) {

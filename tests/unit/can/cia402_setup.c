@@ -419,12 +419,25 @@ static void test_every_step(void **state)
 	assert_int_equal(failed + went_on, requests * (COUNT(codes) + 1));
 }
 
-/* The bus fails at the k-th frame, for some time or for good. */
+/* The bus fails, at the start or at the k-th frame, for good or once. */
 static void test_bus_fails(void **state)
 {
 	static const int errors[] = {-ENETDOWN, -ENODEV, -EIO};
 	struct led *led = *state;
+	uint64_t frames;
 
+	assert_int_equal(led_configure(led), 0);
+	frames = led->drive.bus.counts.sent;
+	/* As many as it takes without a failure, but for a heartbeat more or less. */
+	for (uint32_t k = 0; k < frames - 2; k++)
+		for (int good = 0; good < 2; good++) {
+			led_init(led);
+			led->drive.send_first = k;
+			led->drive.send_error = good ? -ENOBUFS : -ENETDOWN;
+			led->drive.send_errors = (uint32_t)good;
+			assert_int_equal(led_configure(led), good ? 0 : -ENETDOWN);
+			assert_false(cia402_powered(led->drive.state));
+		}
 	for (size_t i = 0; i < COUNT(errors); i++)
 		for (int k = 0; k < 3; k++) {
 			led_init(led);

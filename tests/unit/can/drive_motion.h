@@ -244,6 +244,7 @@ static inline double drive_homing(struct drive *d, double dt)
 		d->homed = true;
 		d->position = drive_signed(d, OD_HOME_OFFSET);
 		d->origin = raw - d->position;
+		d->velocity = 0;
 		drive_settle(d);
 		return 0;
 	}
@@ -318,6 +319,7 @@ static inline void drive_move(struct drive *d)
 	if (!drive_powered(d))
 		return;
 	v = drive_wanted(d, dt);
+	before = d->velocity; /* at its home it stops at once */
 	most = drive_speed_limit(d);
 	v = fmax(-most, fmin(most, v));
 	step = drive_ramp(d, stopping ? OD_QUICK_STOP_RAMP : OD_MOST_ACCELERATION) * dt;

@@ -44,6 +44,17 @@ static inline void drive_set(struct drive *d, uint16_t index, uint8_t sub, uint3
 	o->value = o->initial = value;
 }
 
+/* It has one that it lacks by default, of so many bytes. */
+static inline void drive_has(struct drive *d, uint16_t index, uint8_t sub, uint8_t size,
+			     uint32_t value)
+{
+	for (int i = 0; i < OD_N; i++)
+		if (d->od[i].index == index && d->od[i].sub == sub) {
+			d->od[i].size = size;
+			drive_set(d, index, sub, value);
+		}
+}
+
 /* It lacks an object; all subs of it: -1. */
 static inline void drive_lacks(struct drive *d, uint16_t index, int sub)
 {

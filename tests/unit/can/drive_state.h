@@ -93,6 +93,7 @@ enum { R_ = 1, W_ = 2, RW = 3, MAPPED = 4, OF_NODE = 8 /* its id is added */ };
 	X(HOMING_SPEED, 0x6099, 1, 4, RW, 1000)                                   \
 	X(HOMING_SLOW, 0x6099, 2, 4, RW, 100)                                     \
 	X(HOMING_RAMP, 0x609a, 0, 4, RW, 1000)                                    \
+	X(POSITION_UNIT, 0x60a8, 0, 0, RW, 0)                                     \
 	X(VELOCITY_UNIT, 0x60a9, 0, 4, RW, 0x00b50300)                            \
 	X(ACCELERATION_UNIT, 0x60aa, 0, 4, RW, 0x00b55700)                        \
 	X(CYCLES, 0x60c2, 0, 1, R_, 2)                                            \
@@ -171,6 +172,7 @@ struct drive {
 	bool no_tpdo;	      /* TPDO1 is not sent */
 	bool twice;	      /* each frame of it comes twice */
 	int send_error;	      /* of bus->ops->send, such as -ENOBUFS … */
+	uint32_t send_first;  /* so many frames are sent well before it begins */
 	uint32_t send_errors; /* … for so many frames; 0: until it is taken back */
 	int receive_error, wait_error; /* of the bus */
 	int can_state;		       /* of bus->ops->state */

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/can/cia402_power.c: power goes away, faults go when their cause has, modes are
+ * taken; and nothing of it leads to operation enabled.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include "led.h"
+
+static int setup(void **state)
+{
+	static struct led led;
+
+	led_init(&led);
+	*state = &led;
+	return 0;
+}
+
+static void test_power_off(void **state)
+{
+	struct led *led = *state;
+	struct drive *d = &led->drive;
+
+	assert_int_equal(cia402_power_off(&led->master, "here", &led->err), 0);
+	led_enable(led);
+	assert_int_equal(d->state, CIA402_ENABLED);
+	assert_int_equal(cia402_power_off(&led->master, "here", &led->err), 0);
+	assert_int_equal(d->state, CIA402_DISABLED);
+	led_control(led, CIA402_SHUTDOWN);
+	led_control(led, CIA402_SWITCH_ON);
+	assert_int_equal(d->state, CIA402_SWITCHED_ON);
+	assert_int_equal(cia402_power_off(&led->master, "here", &led->err), 0);
+	assert_int_equal(d->state, CIA402_DISABLED);
+
+	/* It does not obey. */
+	led_enable(led);
+	d->od[OD_CONTROLWORD].deaf = true;
+	d->od[OD_CONTROLWORD].index = 0x5040;
+	assert_int_equal(cia402_power_off(&led->master, "here", &led->err), -EOPNOTSUPP);
+	d->od[OD_CONTROLWORD].index = 0x6040;
+	d->state = CIA402_FAULT_REACTION; /* which does not end */
+	assert_int_equal(cia402_power_off(&led->master, "here", &led->err), -ETIMEDOUT);
+	assert_non_null(strstr(led->err.text, "fault reaction active"));
+	d->mute = true;
+	assert_int_equal(cia402_power_off(&led->master, "here", &led->err), -ETIMEDOUT);
+}
+
+static void test_clear(void **state)
+{
+	struct led *led = *state;
+	struct drive *d = &led->drive;
+
+	assert_int_equal(cia402_clear(&led->master, "here", &led->err), 0);
+	led_enable(led);
+	drive_fault(d, 0x2310);
+	assert_int_equal(cia402_clear(&led->master, "here", &led->err), 0);
+	assert_int_equal(d->state, CIA402_DISABLED);
+	assert_int_equal(d->enabled_unasked, 0);
+
+	/* Also where bit 7 was left set: an edge is made. */
+	drive_fault(d, 0x2310);
+	d->od[OD_CONTROLWORD].value = CIA402_FAULT_RESET;
+	d->had_reset_bit = true;
+	assert_int_equal(cia402_clear(&led->master, "here", &led->err), 0);
+
+	drive_fault(d, 0x3210);
+	d->fault_stays = true;
+	assert_int_equal(cia402_clear(&led->master, "here", &led->err), -EBUSY);
+	assert_non_null(strstr(led->err.text, "DC link over-voltage (3210h)"));
+	assert_int_equal(d->state, CIA402_FAULT);
+	/* By its EMCY, where it has no 603F. */
+	drive_lacks(d, 0x603f, -1);
+	led->master.emcy.code = 0x8611;
+	assert_int_equal(cia402_clear(&led->master, "here", &led->err), -EBUSY);
+	assert_non_null(strstr(led->err.text, "8611h"));
+	d->fault_stays = false;
+	assert_int_equal(cia402_clear(&led->master, "here", &led->err), 0);
+
+	/* One that is not in fault but has power is without it afterwards. */
+	d->tripped = false;
+	led_enable(led);
+	assert_int_equal(cia402_clear(&led->master, "here", &led->err), 0);
+	assert_int_equal(d->state, CIA402_DISABLED);
+	d->mute = true;
+	assert_int_equal(cia402_clear(&led->master, "here", &led->err), -ETIMEDOUT);
+}
+
+/* The k-th SDO is refused or lost: it ends in a line, and never with power. */
+static void test_every_step(void **state)
+{
+	struct led *led = *state;
+
+	for (uint32_t k = 1; k <= 8; k++)
+		for (int drop = 0; drop < 2; drop++) {
+			int64_t t;
+			int rc;
+
+			led_init(led);
+			drive_fault(&led->drive, 0x2310);
+			*(drop ? &led->drive.drop_at : &led->drive.abort_at) = k;
+			t = led->drive.now_ns;
+			rc = cia402_clear(&led->master, "here", &led->err);
+			assert_true(led->drive.now_ns - t < 5000 * DRIVE_MS);
+			assert_int_equal(led->drive.enables, 0);
+			assert_false(cia402_powered(led->drive.state));
+			if (k < led->drive.requests || rc)
+				assert_int_equal(rc, drop ? -ETIMEDOUT : -EOPNOTSUPP);
+			if (rc)
+				assert_memory_equal(led->err.text, "here: ", 6);
+		}
+}
+
+static void test_modes(void **state)
+{
+	struct led *led = *state;
+	struct drive *d = &led->drive;
+
+	assert_int_equal(cia402_set_mode(&led->master, CIA402_CSV, "here", &led->err), 0);
+	assert_int_equal(d->od[OD_MODE_NOW].value, 9);
+	assert_int_equal(cia402_set_mode(&led->master, CIA402_HOMING, "here", &led->err),
+			 0);
+	drive_set(d, 0x6502, 0, 0x20);
+	assert_int_equal(cia402_set_mode(&led->master, CIA402_CSP, "here", &led->err),
+			 -EOPNOTSUPP);
+	d->od[OD_MODE].deaf = true;
+	drive_set(d, 0x6502, 0, 0x3a5);
+	assert_int_equal(cia402_set_mode(&led->master, CIA402_CSP, "here", &led->err),
+			 -ETIMEDOUT);
+	assert_non_null(strstr(led->err.text, "CSP (8)"));
+	assert_non_null(strstr(led->err.text, "homing (6)"));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup(test_power_off, setup),
+		cmocka_unit_test_setup(test_clear, setup),
+		cmocka_unit_test_setup(test_every_step, setup),
+		cmocka_unit_test_setup(test_modes, setup),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
