@@ -23,6 +23,9 @@ $(O)/obj/fuzz/%.o: %.c
 
 # What a target needs beside that.
 fuzz_slcan_line := lib/device/can/slcan_line.c
+fuzz_can_frames := lib/base/error.c $(addprefix lib/device/can/,canopen.c canopen_sdo.c \
+	canopen_text.c cia402.c cia402_homing.c cia402_limits.c cia402_object.c cia402_pdo.c \
+	cia402_power.c cia402_setup.c cia402_units.c)
 
 fuzz_core := $(patsubst %.c,$(O)/obj/fuzz/%.o,$(wildcard lib/fixed/*.c))
 define fuzz_program
