@@ -48,6 +48,18 @@ const char *stepper_faults(unsigned int faults, char *text, size_t size)
 	return text;
 }
 
+/* What begins with the device's name is printed where that was said. */
+static void drop_name(struct incise_stepper *stepper, char *text)
+{
+	const char *rest = strstr(text, ": ");
+	struct incise_stepper_info info = {0};
+
+	incise_stepper_info(stepper, &info);
+	/* The name may say more than the line does, such as "not real-time". */
+	if (rest && !strncmp(text, info.name, (size_t)(rest - text)))
+		memmove(text, rest + 2, strlen(rest + 2) + 1);
+}
+
 /* The device's own words for its fault; false where it has none beyond those of the bit. */
 static bool own_cause(struct incise_stepper *stepper, unsigned int faults, char *text,
 		      size_t size)
@@ -57,6 +69,7 @@ static bool own_cause(struct incise_stepper *stepper, unsigned int faults, char 
 	for (unsigned int bit = 0; bit < INCISE_STEPPER_FAULTS; bit++)
 		if (!strcmp(text, incise_stepper_fault_text(1u << bit)))
 			return false;
+	drop_name(stepper, text);
 	return true;
 }
 

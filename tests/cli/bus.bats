@@ -68,7 +68,8 @@ setup_file() {
 		{
 			(void)s;
 			return faults && !strstr(name, "mute") ?
-				snprintf(text, size, "over-voltage (3210h): see the supply, then clear") : 0;
+				snprintf(text, size, "%sover-voltage (3210h): see the supply, then clear",
+					strstr(name, "named") ? "drive named: " : "") : 0;
 		}
 		static int counter(struct incise_stepper *s, int i, struct incise_stepper_counter *counter)
 		{
@@ -249,6 +250,13 @@ rig() { # ARGUMENTS
 	failed_with "move: drive faulty stopped at " ": over-voltage (3210h): see the supply, then clear"
 	run -0 --separate-stderr incise stepper clear
 	[ "$output" = "drive faulty: forgot over-voltage (3210h): see the supply, then clear" ]
+	# One that says who it is: it is said once. Its name says more than that.
+	rig "named, faulty"
+	run --separate-stderr incise stepper move 1
+	failed_with "move: drive named, faulty stopped at "
+	[[ "$stderr" != *"drive named: "* ]]
+	incise stepper status --json >s.json
+	[ "$(key s.json cause)" = "drive named: over-voltage (3210h): see the supply, then clear" ]
 	# One that says nothing of it: what all the faults mean.
 	rig "mute, faulty"
 	run -0 --separate-stderr incise stepper status
