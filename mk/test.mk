@@ -5,10 +5,11 @@
 unit_sources := $(wildcard tests/unit/*/*.c)
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
-# One counts allocations, one plays the kernel.
+# One counts allocations, others play the kernel.
 ldflags_scene/jail := $(foreach name,malloc calloc realloc free,-Wl,--wrap=$(name))
 ldflags_device/stepper_kernel := $(foreach name,open close ioctl mmap munmap clock_nanosleep \
 	nanosleep,-Wl,--wrap=$(name))
+ldflags_can/slcan := -Wl,--wrap=write
 
 $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)

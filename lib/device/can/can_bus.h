@@ -19,22 +19,36 @@
 
 struct can_bus;
 
+/* As many at most may be given to filter. */
+#define CAN_BUS_FILTERS 32
+
 struct can_bus_ops {
 	/* CLOCK_MONOTONIC, ns; a test's own clock. */
 	int64_t (*now)(struct can_bus *bus);
-	/* 0; -ENOBUFS (the queue is full; the frame was not taken, nothing else was hurt),
-	 * -ENETDOWN, -ENODEV, -EIO. */
+	/*
+	 * 0; -ENOBUFS (the queue is full; the frame was not taken, nothing else was hurt),
+	 * -ENETDOWN, -ENODEV, -EIO, -EINVAL (no frame for a bus: an error frame, too long).
+	 * What went down or away stays so for this bus, of all functions, even if the
+	 * interface comes back: it must be opened again.
+	 */
 	int (*send)(struct can_bus *bus, const struct can_frame *frame);
 	/*
-	 * 1 (a frame; *t_ns: when it came, by the kernel where it tells), 0 (there is none);
-	 * -ENETDOWN, -ENODEV, -EIO.
+	 * 1 (a frame; *t_ns: when it came, by the kernel where it tells; never before that
+	 * of the frame before it, nor after now), 0 (there is none); -ENETDOWN, -ENODEV,
+	 * -EIO.
 	 */
 	int (*receive)(struct can_bus *bus, struct can_frame *frame, int64_t *t_ns);
-	/* Until a frame may be there, or @until_ns has come. 0, -EINTR, -ENODEV … */
+	/* Until a frame may be there, or @until_ns has come. 0, -EINTR, -ENETDOWN … */
 	int (*wait)(struct can_bus *bus, int64_t until_ns);
-	/* Only these are received, and error frames; n = 0: all. 0 or -errno. */
+	/*
+	 * Only these are received, and error frames; n = 0: all. What the kernel has in its
+	 * queue already still comes. 0 or -errno.
+	 */
 	int (*filter)(struct can_bus *bus, const struct can_filter *filter, int n);
-	/* enum can_state of linux/can/netlink.h; -EOPNOTSUPP (not known). May block. */
+	/*
+	 * enum can_state of linux/can/netlink.h, by what was told when it was opened and the
+	 * error frames that were received since; -EOPNOTSUPP (not known).
+	 */
 	int (*state)(struct can_bus *bus);
 	void (*close)(struct can_bus *bus);
 };
@@ -42,10 +56,11 @@ struct can_bus_ops {
 /* Of this side; since it was opened. */
 struct can_bus_counts {
 	uint64_t sent, received;
-	uint64_t full;	   /* frames not taken: -ENOBUFS */
-	uint64_t overflow; /* frames lost before they could be read */
-	uint64_t errors;   /* error frames */
-	uint64_t broken;   /* what was no frame: a line of slcan, a short read */
+	uint64_t full; /* frames not taken: -ENOBUFS */
+	/* frames lost before they could be read; of slcan: times that some were */
+	uint64_t overflow;
+	uint64_t errors; /* error frames */
+	uint64_t broken; /* what was no frame: a line of slcan, a short read */
 };
 
 struct can_bus {
@@ -61,7 +76,8 @@ struct can_bus {
 struct can_bus_request {
 	const char *where;  /* messages begin with it */
 	const char *device; /* "can0", "/dev/ttyACM0" */
-	uint32_t bitrate;   /* slcan: is set; can0: must be its own; 0: as it is */
+	uint32_t
+		bitrate; /* can0: must be its own; 0: as it is. slcan: is set; 0: 1 Mbit/s */
 	/*
 	 * To drive the node: only one program at a time may, and only one may have a serial
 	 * line open (EBUSY). 0: to look.

@@ -1,0 +1,547 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/can/slcan.c on a pseudo terminal: the test is the adapter at its other end.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <termios.h>
+#include <time.h>
+#include <unistd.h>
+#include <linux/can/error.h>
+#include <linux/can/netlink.h>
+#include "../../../lib/device/can/can_bus.h"
+
+#define MS 1000000
+
+/* The tty takes at most so many bytes at once; -1: as many as it does. */
+static ssize_t write_most = -1;
+
+ssize_t __real_write(int fd, const void *bytes, size_t n);
+
+ssize_t __wrap_write(int fd, const void *bytes, size_t n)
+{
+	if (write_most >= 0 && n > (size_t)write_most)
+		n = (size_t)write_most;
+	if (!n) {
+		errno = EAGAIN;
+		return -1;
+	}
+	return __real_write(fd, bytes, n);
+}
+
+struct adapter {
+	int fd;
+	char path[64];
+	struct can_bus *bus;
+};
+
+static void adapter_new(struct adapter *a)
+{
+	a->fd = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+	assert_true(a->fd >= 0 && !grantpt(a->fd) && !unlockpt(a->fd));
+	assert_int_equal(ptsname_r(a->fd, a->path, sizeof(a->path)), 0);
+	a->bus = NULL;
+	write_most = -1;
+}
+
+static int adapter_open(struct adapter *a, uint32_t bitrate, struct incise_error *err)
+{
+	const struct can_bus_request request = {
+		.where = "rig.conf:1: stepper", .device = a->path, .bitrate = bitrate};
+
+	return can_transport_slcan.open(&a->bus, &request, err);
+}
+
+/* What the adapter was told, as far as it goes; CR is shown as a dot. */
+static const char *told(struct adapter *a)
+{
+	static char text[4096];
+	struct pollfd poll_fd = {.fd = a->fd, .events = POLLIN};
+	size_t n = 0;
+
+	/* A pty hands bytes on by a kernel worker: wait for the first ones. */
+	while (n < sizeof(text) - 1 && poll(&poll_fd, 1, n ? 20 : 1000) == 1) {
+		ssize_t got = read(a->fd, text + n, sizeof(text) - 1 - n);
+
+		if (got <= 0)
+			break;
+		n += (size_t)got;
+	}
+	text[n] = 0;
+	for (size_t i = 0; i < n; i++)
+		if (text[i] == '\r')
+			text[i] = '.';
+	return text;
+}
+
+static void tell(struct adapter *a, const char *bytes, size_t n)
+{
+	assert_int_equal(__real_write(a->fd, bytes, n), n);
+}
+
+#define TELL(a, text) tell(a, text, sizeof(text) - 1)
+
+/* The next frame or error frame; 0 where none comes within 50 ms. */
+static int next(struct adapter *a, struct can_frame *frame)
+{
+	int64_t end = a->bus->ops->now(a->bus) + 50 * MS, t_ns;
+	int rc;
+
+	do {
+		rc = a->bus->ops->receive(a->bus, frame, &t_ns);
+		if (rc)
+			break;
+		rc = a->bus->ops->wait(a->bus, end);
+		assert_true(rc == 0 || rc == -ENODEV);
+	} while (!rc && a->bus->ops->now(a->bus) < end);
+	if (rc == 1)
+		assert_true(t_ns <= a->bus->ops->now(a->bus) && t_ns > end - 1000 * MS);
+	return rc;
+}
+
+static int setup(void **state)
+{
+	static struct adapter a;
+	struct incise_error err = {0};
+
+	adapter_new(&a);
+	if (adapter_open(&a, 500000, &err))
+		fail_msg("%s", err.text);
+	assert_string_equal(told(&a), ".C.S6.O.");
+	*state = &a;
+	return 0;
+}
+
+static int teardown(void **state)
+{
+	struct adapter *a = *state;
+
+	write_most = -1;
+	if (a->bus)
+		a->bus->ops->close(a->bus);
+	if (a->fd >= 0)
+		close(a->fd);
+	return 0;
+}
+
+static void it_goes_on_the_bus_and_off(void **state)
+{
+	static const struct {
+		uint32_t bitrate, is;
+		const char *said;
+	} cases[] = {
+		{10000, 10000, ".C.S0.O."},	{20000, 20000, ".C.S1.O."},
+		{50000, 50000, ".C.S2.O."},	{100000, 100000, ".C.S3.O."},
+		{125000, 125000, ".C.S4.O."},	{250000, 250000, ".C.S5.O."},
+		{500000, 500000, ".C.S6.O."},	{800000, 800000, ".C.S7.O."},
+		{1000000, 1000000, ".C.S8.O."}, {0, 1000000, ".C.S8.O."},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		struct termios t;
+		struct adapter a;
+
+		adapter_new(&a);
+		assert_int_equal(adapter_open(&a, cases[i].bitrate, &err), 0);
+		assert_string_equal(told(&a), cases[i].said);
+		assert_int_equal(a.bus->bitrate, cases[i].is);
+		assert_string_equal(a.bus->name, a.path);
+		assert_int_equal(a.bus->ops->state(a.bus), -EOPNOTSUPP);
+		assert_int_equal(tcgetattr(a.fd, &t), 0);
+		assert_int_equal(t.c_lflag & (ICANON | ECHO | ISIG), 0);
+		assert_int_equal(t.c_iflag & (IXON | IXOFF | ICRNL), 0);
+		assert_int_equal(t.c_oflag & OPOST, 0);
+		a.bus->ops->close(a.bus);
+		assert_string_equal(told(&a), "C.");
+		close(a.fd);
+	}
+}
+
+static void a_rate_that_none_has_is_refused(void **state)
+{
+	struct incise_error err = {0};
+	struct adapter a;
+
+	adapter_new(&a);
+	assert_int_equal(adapter_open(&a, 83333, &err), -EINVAL);
+	assert_non_null(
+		strstr(err.text, "rig.conf:1: stepper: no adapter has 83333 bit/s"));
+	close(a.fd);
+}
+
+static void what_is_no_serial_line_is_refused(void **state)
+{
+	char folder[] = "/tmp/incise-slcan-XXXXXX", file[64], pipe[64];
+	struct {
+		const char *path;
+		int code;
+		const char *words;
+	} cases[] = {
+		{file, -EINVAL, "is no serial line"},
+		{pipe, -EINVAL, "is no serial line"},
+		{folder, -EINVAL, "is no serial line"},
+		{"/dev/null", -EINVAL, "is no serial line"},
+		{"", -ENODEV, "is not there"},
+		{"/dev/ttyACM4711", -ENODEV, "is the adapter plugged in"},
+	};
+	struct adapter a = {.fd = -1};
+	int fd;
+
+	assert_non_null(mkdtemp(folder));
+	snprintf(file, sizeof(file), "%s/file", folder);
+	snprintf(pipe, sizeof(pipe), "%s/pipe", folder);
+	fd = open(file, O_CREAT | O_WRONLY, 0600);
+	close(fd);
+	assert_int_equal(mkfifo(pipe, 0600), 0);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		snprintf(a.path, sizeof(a.path), "%s", cases[i].path);
+		assert_int_equal(adapter_open(&a, 0, &err), cases[i].code);
+		assert_int_equal(err.code, -cases[i].code);
+		assert_non_null(strstr(err.text, cases[i].words));
+		assert_ptr_equal(strstr(err.text, "rig.conf:1: stepper: "), err.text);
+	}
+	unlink(file);
+	unlink(pipe);
+	rmdir(folder);
+}
+
+static void one_program_at_a_time(void **state)
+{
+	struct adapter *a = *state, other = *a;
+	struct incise_error err = {0};
+
+	assert_int_equal(adapter_open(&other, 0, &err), -EBUSY);
+	assert_non_null(strstr(err.text, "another program has /dev/pts/"));
+	a->bus->ops->close(a->bus);
+	a->bus = NULL;
+	assert_int_equal(adapter_open(a, 0, &err), 0);
+}
+
+static void frames_go_both_ways(void **state)
+{
+	struct adapter *a = *state;
+	struct can_frame out = {.can_id = 0x210,
+				.can_dlc = 6,
+				.data = {0x0f, 0, 0xff, 0xee, 0xdd, 0xcc}},
+			 in;
+
+	assert_int_equal(a->bus->ops->send(a->bus, &out), 0);
+	assert_string_equal(told(a), "t21060F00FFEEDDCC.");
+	out.can_dlc = 9;
+	assert_int_equal(a->bus->ops->send(a->bus, &out), -EINVAL);
+	/* Its own C, S and O, as python-can sends them, are nothing to this side. */
+	TELL(a, "C\rS8\rO\rz\rt190237AB12");
+	assert_int_equal(next(a, &in), 0);
+	TELL(a, "34\rT1FFFFFFF0\r");
+	assert_int_equal(next(a, &in), 1);
+	assert_int_equal(in.can_id, 0x190);
+	assert_int_equal(in.can_dlc, 2);
+	assert_memory_equal(in.data, "\x37\xab", 2);
+	assert_int_equal(next(a, &in), 1);
+	assert_int_equal(in.can_id, CAN_EFF_MASK | CAN_EFF_FLAG);
+	assert_int_equal(next(a, &in), 0);
+	assert_int_equal(a->bus->counts.sent, 1);
+	assert_int_equal(a->bus->counts.received, 2);
+	assert_int_equal(a->bus->counts.broken, 0);
+	assert_int_equal(a->bus->counts.errors, 0);
+}
+
+static void junk_is_counted_and_left_behind(void **state)
+{
+	static char junk[9000];
+	struct adapter *a = *state;
+	struct can_frame in;
+
+	memset(junk, 'x', sizeof(junk));
+	TELL(a, "\0\0t12\0\rt1231A\r");
+	for (size_t at = 0; at < sizeof(junk); at += 3000) {
+		tell(a, junk + at, 3000);
+		assert_int_equal(next(a, &in), 0);
+	}
+	TELL(a, "\rt1230\r");
+	assert_int_equal(next(a, &in), 1);
+	assert_int_equal(in.can_id, 0x123);
+	assert_int_equal(a->bus->counts.broken, 3);
+}
+
+static void filters_are_exact(void **state)
+{
+	struct adapter *a = *state;
+	const canid_t mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
+	const struct can_filter exact[] = {{0x190, mask}, {0x710, mask}};
+	const struct can_filter other = {0x190 | CAN_INV_FILTER, mask};
+	struct can_filter many[CAN_BUS_FILTERS + 1] = {{0}};
+	static const char all[] = "t1900\rT000001900\rr1900\rt1910\rt7100\rt0000\r";
+	struct can_frame in;
+	int n = 0;
+
+	assert_int_equal(a->bus->ops->filter(a->bus, exact, 2), 0);
+	tell(a, all, sizeof(all) - 1);
+	assert_int_equal(next(a, &in), 1);
+	assert_int_equal(in.can_id, 0x190);
+	assert_int_equal(next(a, &in), 1);
+	assert_int_equal(in.can_id, 0x710);
+	assert_int_equal(next(a, &in), 0);
+	assert_int_equal(a->bus->ops->filter(a->bus, &other, 1), 0);
+	tell(a, all, sizeof(all) - 1);
+	while (next(a, &in)) {
+		assert_int_not_equal(in.can_id, 0x190);
+		n++;
+	}
+	assert_int_equal(n, 5);
+	assert_int_equal(a->bus->ops->filter(a->bus, NULL, 0), 0);
+	tell(a, all, sizeof(all) - 1);
+	for (n = 0; next(a, &in); n++)
+		;
+	assert_int_equal(n, 6);
+	assert_int_equal(a->bus->ops->filter(a->bus, many, CAN_BUS_FILTERS + 1), -EINVAL);
+}
+
+/* Send until the adapter is asked for its status: 100 ms. */
+static void until_asked(struct adapter *a)
+{
+	const struct can_frame sync = {.can_id = 0x080};
+
+	nanosleep(&(struct timespec){.tv_nsec = 101 * MS}, NULL);
+	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
+	assert_string_equal(told(a), "t0800.F.");
+	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
+	assert_string_equal(told(a), "t0800.");
+}
+
+static void status_becomes_error_frames(void **state)
+{
+	static const struct {
+		const char *answer;
+		int state;
+		canid_t id; /* 0: no frame */
+		uint8_t controller;
+	} cases[] = {
+		{"F00\r", CAN_STATE_ERROR_ACTIVE, 0, 0},
+		{"F40\r", CAN_STATE_ERROR_ACTIVE, 0, 0},
+		{"F04\r", CAN_STATE_ERROR_WARNING, CAN_ERR_CRTL,
+		 CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING},
+		{"F04\r", CAN_STATE_ERROR_WARNING, 0, 0},
+		{"FA4\r", CAN_STATE_ERROR_PASSIVE, CAN_ERR_CRTL | CAN_ERR_BUSERROR,
+		 CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE},
+		{"F09\r", CAN_STATE_ERROR_ACTIVE, CAN_ERR_CRTL,
+		 CAN_ERR_CRTL_ACTIVE | CAN_ERR_CRTL_RX_OVERFLOW},
+		{"F02\r", CAN_STATE_ERROR_ACTIVE, CAN_ERR_CRTL, CAN_ERR_CRTL_TX_OVERFLOW},
+		{"sb000256\r", CAN_STATE_BUS_OFF, CAN_ERR_BUSOFF, 0},
+		{"F02\r", CAN_STATE_BUS_OFF, 0, 0},
+		{"sa000000\r", CAN_STATE_ERROR_ACTIVE, CAN_ERR_CRTL | CAN_ERR_RESTARTED,
+		 CAN_ERR_CRTL_ACTIVE},
+	};
+	struct adapter *a = *state;
+	struct can_frame in;
+	uint64_t errors = 0;
+
+	until_asked(a);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		tell(a, cases[i].answer, strlen(cases[i].answer));
+		assert_int_equal(next(a, &in), !!cases[i].id);
+		assert_int_equal(a->bus->ops->state(a->bus), cases[i].state);
+		if (!cases[i].id)
+			continue;
+		errors++;
+		assert_int_equal(in.can_id, CAN_ERR_FLAG | cases[i].id);
+		assert_int_equal(in.can_dlc, CAN_ERR_DLC);
+		assert_int_equal(in.data[1], cases[i].controller);
+	}
+	assert_int_equal(a->bus->counts.errors, errors);
+	assert_int_equal(a->bus->counts.overflow, 1);
+	assert_int_equal(a->bus->counts.received, 0);
+}
+
+static void refusals_are_errors_but_for_the_start(void **state)
+{
+	struct adapter *a = *state;
+	struct can_frame in;
+
+	TELL(a, "\a\a\r\a");
+	assert_int_equal(next(a, &in), 0);
+	TELL(a, "\a\a");
+	assert_int_equal(next(a, &in), 1);
+	assert_int_equal(in.can_id, CAN_ERR_FLAG | CAN_ERR_CRTL);
+	assert_int_equal(in.data[1], CAN_ERR_CRTL_TX_OVERFLOW);
+	assert_int_equal(next(a, &in), 0);
+	assert_int_equal(a->bus->counts.errors, 1);
+}
+
+static void who_does_not_know_the_question_is_left_alone(void **state)
+{
+	const struct can_frame sync = {.can_id = 0x080};
+	struct adapter *a = *state;
+	struct can_frame in;
+
+	TELL(a, "\a\a\a\a");
+	assert_int_equal(next(a, &in), 0);
+	for (int i = 0; i < 3; i++) {
+		until_asked(a);
+		TELL(a, "\r\a");
+		assert_int_equal(next(a, &in), 0);
+	}
+	nanosleep(&(struct timespec){.tv_nsec = 101 * MS}, NULL);
+	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
+	assert_string_equal(told(a), "t0800.");
+	assert_int_equal(a->bus->counts.errors, 0);
+}
+
+/* An adapter that does not read: what was taken arrives whole and in order, once it does. */
+static void a_frame_is_sent_whole_or_not(void **state)
+{
+	struct adapter *a = *state;
+	struct can_frame frame = {.can_id = 0x210, .can_dlc = 4};
+	struct pollfd poll_fd = {.fd = a->fd, .events = POLLIN};
+	uint32_t sent = 0, seen = 0;
+	char line[64], byte;
+	size_t n = 0;
+	int rc;
+
+	do {
+		memcpy(frame.data, &sent, 4);
+		rc = a->bus->ops->send(a->bus, &frame);
+		sent += !rc;
+	} while (!rc && sent < 100000);
+	assert_int_equal(rc, -ENOBUFS);
+	assert_int_equal(a->bus->ops->send(a->bus, &frame), -ENOBUFS);
+	assert_int_equal(a->bus->counts.full, 2);
+	assert_int_equal(a->bus->counts.sent, sent);
+	while (poll(&poll_fd, 1, 100) == 1 && read(a->fd, &byte, 1) == 1) {
+		if (byte != '\r') {
+			line[n++] = byte;
+			assert_true(n < sizeof(line));
+			/* The last line may end here: it is the rest that goes out now. */
+			if (seen == sent - 1)
+				a->bus->ops->wait(a->bus, 0);
+			continue;
+		}
+		line[n] = 0;
+		n = 0;
+		if (!strcmp(line, "F"))
+			continue;
+		frame.data[0] = (uint8_t)seen;
+		frame.data[1] = (uint8_t)(seen >> 8);
+		frame.data[2] = (uint8_t)(seen >> 16);
+		char expected[64];
+
+		snprintf(expected, sizeof(expected), "t2104%02X%02X%02X00", frame.data[0],
+			 frame.data[1], frame.data[2]);
+		assert_string_equal(line, expected);
+		seen++;
+	}
+	assert_int_equal(seen, sent);
+	assert_int_equal(n, 0);
+}
+
+/* The tty takes three bytes at a time. */
+static void a_torn_line_is_finished_first(void **state)
+{
+	struct adapter *a = *state;
+	const struct can_frame sync = {.can_id = 0x080}, other = {.can_id = 0x123};
+
+	write_most = 0;
+	assert_int_equal(a->bus->ops->send(a->bus, &sync), -ENOBUFS);
+	write_most = 3;
+	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
+	assert_int_equal(a->bus->ops->send(a->bus, &other), 0);
+	write_most = -1;
+	assert_string_equal(told(a), "t0800.t1230.");
+	assert_int_equal(a->bus->counts.full, 1);
+	assert_int_equal(a->bus->counts.sent, 2);
+}
+
+static void to_close_a_line_that_is_stuck_ends(void **state)
+{
+	struct adapter *a = *state;
+	const struct can_frame sync = {.can_id = 0x080};
+
+	write_most = 0;
+	assert_int_equal(a->bus->ops->send(a->bus, &sync), -ENOBUFS);
+	a->bus->ops->close(a->bus);
+	a->bus = NULL;
+}
+
+static void an_adapter_that_is_unplugged_is_gone(void **state)
+{
+	struct adapter *a = *state;
+	const struct can_frame sync = {.can_id = 0x080};
+	struct can_frame in;
+
+	TELL(a, "t1230\r");
+	assert_int_equal(next(a, &in), 1);
+	close(a->fd);
+	a->fd = -1;
+	assert_int_equal(next(a, &in), -ENODEV);
+	assert_int_equal(next(a, &in), -ENODEV);
+	assert_int_equal(a->bus->ops->send(a->bus, &sync), -ENODEV);
+	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MAX), -ENODEV);
+}
+
+static void sending_finds_that_it_is_gone(void **state)
+{
+	struct adapter *a = *state;
+	const struct can_frame sync = {.can_id = 0x080};
+
+	close(a->fd);
+	a->fd = -1;
+	assert_int_equal(a->bus->ops->send(a->bus, &sync), -ENODEV);
+}
+
+static void waiting_ends(void **state)
+{
+	struct adapter *a = *state;
+	int64_t begin = a->bus->ops->now(a->bus);
+	struct can_frame in;
+	int64_t t_ns;
+
+	/* In the past: at once, however little it says. */
+	assert_int_equal(a->bus->ops->wait(a->bus, 0), 0);
+	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MIN + begin), 0);
+	assert_int_equal(a->bus->ops->wait(a->bus, begin + 5 * MS), 0);
+	assert_true(a->bus->ops->now(a->bus) >= begin + 5 * MS);
+	/* No frame can come but by these bytes; two came at once, so that the other waits. */
+	TELL(a, "t1230\rt1240\r");
+	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MAX), 0);
+	assert_int_equal(a->bus->ops->receive(a->bus, &in, &t_ns), 1);
+	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MAX), 0);
+}
+
+#define WITH(test) cmocka_unit_test_setup_teardown(test, setup, teardown)
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(it_goes_on_the_bus_and_off),
+		cmocka_unit_test(a_rate_that_none_has_is_refused),
+		cmocka_unit_test(what_is_no_serial_line_is_refused),
+		WITH(one_program_at_a_time),
+		WITH(frames_go_both_ways),
+		WITH(junk_is_counted_and_left_behind),
+		WITH(filters_are_exact),
+		WITH(status_becomes_error_frames),
+		WITH(refusals_are_errors_but_for_the_start),
+		WITH(who_does_not_know_the_question_is_left_alone),
+		WITH(a_frame_is_sent_whole_or_not),
+		WITH(a_torn_line_is_finished_first),
+		WITH(to_close_a_line_that_is_stuck_ends),
+		WITH(an_adapter_that_is_unplugged_is_gone),
+		WITH(sending_finds_that_it_is_gone),
+		WITH(waiting_ends),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
