@@ -112,7 +112,7 @@ class Pdo:
         self.map, self.com, self.mapping, self.receives = pdo_map, com, mapping, receives
         self.fresh = False
         self.sent = None
-        self.sent_at = 0.0
+        self.sent_at = self.received_at = 0.0
         self.countdown = 0
         self.deadline = None
 
@@ -223,7 +223,6 @@ class Drive:
 
     def on_heartbeat(self, _, __, ___):
         self.record.heartbeats += 1
-        self.record.last_heartbeat = self.now
         self.heard = self.now
         if self.lost:
             self.lost = False
@@ -238,7 +237,7 @@ class Drive:
         for pdo in self.pdos:
             if pdo.deadline is not None and self.now > pdo.deadline:
                 pdo.deadline = None
-                self.connection_lost(0x8250, "RPDO time-out", self.record.last_set_point)
+                self.connection_lost(0x8250, "RPDO time-out", pdo.received_at)
 
     def connection_lost(self, code, why, since):
         silence = (self.now - since) * 1000
@@ -380,7 +379,8 @@ class Drive:
             self.register |= 0x10
             self.emcy(0x8210)  # not processed: too short
             return
-        self.record.set_point(self.now, self.machine.state == "operation enabled")
+        pdo.received_at = self.now
+        self.record.set_point(self.machine.state == "operation enabled")
         timer = self.node.value(pdo.com, 5)
         pdo.deadline = self.now + timer / 1000 if timer else None
         pdo.fresh = True

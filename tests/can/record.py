@@ -29,8 +29,6 @@ class Record:
         self.last_target = None
         self.last_step = 0
         self.pending = 0
-        self.last_heartbeat = None
-        self.last_set_point = None
         self.silence_ms = None  # from the last heartbeat to the reaction to its loss
         self.first_sdo = None
         self.start_ms = None  # from the first SDO to operation enabled
@@ -48,10 +46,9 @@ class Record:
         if self.first_sdo is not None and self.start_ms is None:
             self.start_ms = round((now - self.first_sdo) * 1000, 1)
 
-    def set_point(self, now, enabled):
+    def set_point(self, enabled):
         self.rpdos += 1
         self.pending += 1
-        self.last_set_point = now
         if enabled:
             self.enabled_rpdos += 1
 

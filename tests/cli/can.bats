@@ -22,3 +22,349 @@ teardown() {
 	[[ "$output" != *"not ok"* ]]
 	[ "${#lines[@]}" -ge 8 ]
 }
+
+# Turns of 4 mm and 51200 counts: 12800 counts per mm. The limit switches are at -1.56 mm and
+# 46.9 mm of the shaft, which stands at 0 at first.
+rig() {
+	drive_start "$@" || return
+	write_rig
+}
+
+# write_rig [MORE [CAN]]: keys that come after the usual ones win nothing: give others.
+write_rig() {
+	cat >rig.conf <<-END
+		tracker = "sim:";
+		stepper = "$drive";
+		actuator = {
+			spring_N_mm = 2.0; travel_mm = 30.0; lead_mm = 4.0;
+			velocity_mm_s = 30.0; acceleration_mm_s2 = 2000.0; home_mm_s = 20.0;
+			deadman_ms = ${deadman_ms:-200}; ${1:-}
+			can = { bitrate = 1000000; homing_method = 17; ${2:-} };
+		};
+		sim = { depth_mm = [15]; times = [1000]; };
+	END
+}
+
+# In the background until the drive has power; its number is $pid.
+begin() {
+	incise "$@" >out 2>err 3>&- 7>&- &
+	pid=$!
+	drive_until "operation enabled" || complain "$(cat out err)"
+}
+
+# ended TEXT…: what was begun ends within 10 s with 1 and one line that holds these; the drive
+# is stopped then.
+ended() {
+	local code=0
+	for ((i = 0; i < 500; i++)); do
+		kill -0 "$pid" 2>/dev/null || break
+		sleep 0.02
+	done
+	if kill -0 "$pid" 2>/dev/null; then
+		kill -9 "$pid"
+		complain "it does not end: $(cat out err)"
+		return
+	fi
+	wait "$pid" || code=$?
+	pid=
+	echo "# $(cat err)"
+	[ "$code" -eq 1 ] || complain "exit $code: $(cat out err)" || return
+	[ "$(wc -l <err)" -eq 1 ] || complain "not one line: $(cat err)" || return
+	for text; do
+		grep -qF -- "$text" err || complain "no '$text' in: $(cat err)" || return
+	done
+	drive_stopped
+}
+
+@test "info lists who is on the bus, with state and fault" {
+	drive_start
+	run -0 --separate-stderr incise info "${drive%:*}"
+	[[ "$output" == *"$drive"* ]]
+	[[ "$output" == *"incise-test-drive: switch-on disabled"* ]]
+	drive_tell fault 0x3210
+	run -0 --separate-stderr incise info "${drive%:*}"
+	[[ "$output" == *"fault, "*"3210h"* ]]
+	drive_stopped
+}
+
+@test "status looks and changes nothing" {
+	rig
+	run -0 --separate-stderr incise stepper status --rig rig.conf
+	[[ "${lines[0]}" == *": disabled at 0.0000 mm (step 0), not homed"* ]] || complain "$output"
+	drive_is "switch-on disabled"
+	drive_tell report
+	[ "$(drive_value rpdos)" = 0 ]
+}
+
+@test "move, jog, home, enable: what is said is what the shaft does" {
+	rig
+	run -0 --separate-stderr incise stepper move 5 --unhomed --rig rig.conf
+	[[ "$output" == *"now at 5.0000 mm"* ]]
+	drive_is "switch-on disabled"
+	[ "$(drive_value shaft)" -eq 64000 ]
+	run -0 --separate-stderr incise stepper jog 10 --for 200ms --rig rig.conf
+	drive_is "switch-on disabled"
+	holds "$(drive_value shaft) > 64000 + 12800 && $(drive_value shaft) < 64000 + 4 * 12800"
+	run -0 --separate-stderr incise stepper home --rig rig.conf
+	drive_is "switch-on disabled"
+	[ "$(drive_value homed)" = true ]
+	[ "$(drive_value shaft)" -eq -19999 ] # where the limit switch lets go
+	run -0 --separate-stderr incise stepper move 2 --rig rig.conf
+	drive_is "switch-on disabled"
+	[ "$(drive_value position)" -eq 25600 ]
+	run -0 --separate-stderr incise stepper enable --for 300ms --rig rig.conf
+	drive_is "switch-on disabled"
+}
+
+# fault VERB… -- COMMAND…: what the drive is told while that runs; then ended TEXT.
+under() {
+	local -a verb=()
+	while [ "$1" != -- ]; do
+		verb+=("$1")
+		shift
+	done
+	shift
+	echo "# $*"
+	begin "${verb[@]}" --rig rig.conf || return
+	for told; do
+		drive_tell "$told" || return
+	done
+}
+
+@test "a fault of the drive, the bus or the adapter ends in a stopped drive and its cause" {
+	local failed= fault
+	local -a faults=(
+		"fault 0x3210|3210h"
+		"emcy 0x4310|4310h"
+		"emcy 0x4310 0x09|4310h" # and EMCY 0000h, its reset, right behind
+		"heartbeat off|heartbeat"
+		"tpdo off|TPDO1"
+		"silent|no "
+		"reboot|began anew"
+		"disable|switch-on disabled"
+		"hang 1000|no "
+		"inputs 0x8|e-stop"
+		"send 0x80|another"
+		"send 0x210 0f0000000000|another"
+	)
+	for fault in "${faults[@]}"; do
+		rig --homed
+		{ under stepper enable --for 20s -- "${fault%|*}" && ended "${fault#*|}"; } ||
+			failed+=" ${fault%|*};"
+		drive_end
+	done
+	[ -z "$failed" ] || complain "these did not:$failed"
+}
+
+@test "the same in motion" {
+	local failed= fault
+	local -a faults=(
+		"fault 0x7305|7305h"
+		"heartbeat off|heartbeat"
+		"tpdo off|TPDO1"
+		"reboot|began anew"
+		"block|8611h" # the drive's own window is no larger than ours
+		"disable|switch-on disabled"
+		"inputs 0x2|limit switch"
+		"hang 600|no "
+	)
+	for fault in "${faults[@]}"; do
+		rig --homed
+		{ under stepper jog 5 -- "${fault%|*}" && ended "${fault#*|}"; } ||
+			failed+=" ${fault%|*};"
+		drive_end
+	done
+	[ -z "$failed" ] || complain "these did not:$failed"
+}
+
+@test "an adapter that is pulled out: one line; the drive stops by itself" {
+	rig --homed
+	under stepper jog 5 -- unplug
+	drive_until "switch-on disabled"
+	ended "clear"
+	drive_tell report
+	[[ "$drive_line" == *"heartbeat lost after"* ]]
+}
+
+@test "what is no frame, is cut off or belongs to others is counted, and nothing else" {
+	rig --homed
+	begin stepper enable --for 1s --rig rig.conf
+	for line in 74 7431 743138 7431383038313233340d 743139303646460d ffffff0d 0d 07 7a0d \
+		5439393939393939393830313032303330343035303630373038300d; do
+		drive_tell raw $line
+	done
+	# TPDO1 of others, too short, empty; an SDO answer that nobody asked for; node 0x11's EMCY
+	for frame in "0x181 2716" "0x190 27" "0x190" "0x590 4300100092014200" "0x91 1032010000000000" \
+		"0x711 7f" "0x7e5 00"; do
+		drive_tell send $frame
+	done
+	wait "$pid" || complain "$(cat out err)"
+	pid=
+	drive_is "switch-on disabled"
+}
+
+@test "a limit switch stops it, and away from it it may go" {
+	rig --homed --span=-20000:64000
+	run --separate-stderr incise stepper move 8 --rig rig.conf
+	failed_with "limit switch"
+	drive_stopped
+	holds "$(drive_value shaft) >= 64000 && $(drive_value shaft) < 64000 + 25600"
+	run -0 --separate-stderr incise stepper clear --rig rig.conf
+	run -0 --separate-stderr incise stepper move 3 --rig rig.conf
+	drive_is "switch-on disabled"
+	[ "$(drive_value shaft)" -eq 38400 ]
+}
+
+@test "a fault is cleared by a person, and only when its cause is gone" {
+	rig --homed
+	drive_tell fault 0x4210 stays
+	run --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+	failed_with "4210h"
+	run --separate-stderr incise stepper clear --rig rig.conf
+	failed_with "4210h"
+	drive_is fault
+	drive_tell calm
+	run --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+	failed_with "clear"
+	drive_is fault
+	run -0 --separate-stderr incise stepper clear --rig rig.conf
+	drive_is "switch-on disabled"
+	run -0 --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+}
+
+# The drive's own deadman is 200 ms; silence_ms is what it counted from the last heartbeat to
+# its quick stop. It hears each 50 ms, so 200 ms is the least; its loop looks every ms, and the
+# host may keep it from that for some 100 ms.
+stopped_itself() {
+	drive_until "switch-on disabled" || return
+	drive_tell report
+	echo "# silence $(drive_value silence_ms) ms"
+	holds "$(drive_value silence_ms) >= 200 && $(drive_value silence_ms) < 600"
+	[ "$(drive_value velocity)" = 0 ]
+}
+
+@test "kill -9: the drive stops by itself" {
+	rig --homed
+	for mode in 'mode = "csp";' 'mode = "csv";'; do
+		write_rig "" "$mode"
+		begin stepper jog 5 --rig rig.conf
+		sleep 0.3
+		kill -9 "$pid"
+		wait "$pid" || :
+		pid=
+		stopped_itself
+		sleep 0.5
+		drive_is "switch-on disabled"
+		# Who comes next finds it so, and a person may go on.
+		run -0 --separate-stderr incise stepper status --rig rig.conf
+		drive_is "switch-on disabled"
+		drive_tell restart
+	done
+}
+
+@test "kill -STOP: the drive stops by itself, and stays so when the program goes on" {
+	rig --homed
+	begin stepper jog 5 --rig rig.conf
+	sleep 0.3
+	kill -STOP "$pid"
+	stopped_itself
+	sleep 0.3
+	kill -CONT "$pid"
+	ended "drive 0x10"
+}
+
+@test "incise haptic renders through it; a fault ends that, kill -9 too" {
+	rig
+	run --separate-stderr incise haptic "$root/scenes/liver.scene" --rig rig.conf --duration 1s
+	failed_with "not homed"
+	run -0 --separate-stderr incise haptic "$root/scenes/liver.scene" --rig rig.conf --home --duration 3s
+	drive_is "switch-on disabled"
+	begin haptic "$root/scenes/liver.scene" --rig rig.conf --duration 20s
+	sleep 0.5
+	drive_tell fault 0x3210
+	ended 3210h
+	run -0 --separate-stderr incise stepper clear --rig rig.conf
+	begin haptic "$root/scenes/liver.scene" --rig rig.conf --duration 20s
+	sleep 0.5
+	kill -9 "$pid"
+	wait "$pid" || :
+	pid=
+	stopped_itself
+}
+
+# Objects of PDOs, of what the drive must watch over and of power: without them nothing moves.
+@test "start-up: an object that is refused, not kept or not answered is named, and nothing moves" {
+	local failed= place how
+	rig --homed
+	run -0 --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+	drive_tell objects
+	printf '%s\n' "$drive_line" | grep -o '"written": \[[^]]*\]' | grep -o '0x[0-9A-F]*:[0-9]*' >written
+	printf '%s\n' "$drive_line" | grep -o '"read": \[[^]]*\]' | grep -o '0x[0-9A-F]*:[0-9]*' >read
+	[ "$(wc -l <written)" -ge 20 ]
+	for place in $(sort -u written read); do
+		for how in abort mute; do
+			drive_tell "$how" "${place%:*}" "${place#*:}"
+			drive_tell restart
+			code=0
+			timeout 10 incise stepper enable --for 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
+			drive_stopped || failed+=" $how $place (power);"
+			case $code in
+			0) echo "# $how $place: goes on" ;;
+			1)
+				echo "# $how $place: $(cat err)"
+				[ "$(wc -l <err)" -eq 1 ] || failed+=" $how $place (lines);"
+				drive_tell report
+				[ "$(drive_value enabled_rpdos)" = 0 ] || failed+=" $how $place (enabled);"
+				grep -qi "${place:2:4}" err || failed+=" $how $place (not named);"
+				;;
+			*) failed+=" $how $place (exit $code);" ;;
+			esac
+			drive_tell "$how" off
+		done
+	done
+	[ -z "$failed" ] || complain "$failed"
+}
+
+@test "start-up: what must be kept is read back" {
+	local failed= place
+	rig --homed
+	for place in 0x6007:0 0x605A:0 0x1016:1 0x1017:0 0x6060:0 0x60C2:1 0x60C2:2 0x1400:1 0x1400:2 \
+		0x1600:0 0x1600:1 0x1600:2 0x1800:2 0x1A00:1 0x1A00:2; do
+		drive_end
+		# Values at power-on that are not those that will be written.
+		drive_start --homed --set 0x605A:0=1 --set 0x60C2:1=5 --set 0x60C2:2=-6 \
+			--set 0x1600:1=0x60FF0020 --set 0x1A00:1=0x606C0020
+		write_rig
+		drive_tell ignore "${place%:*}" "${place#*:}"
+		code=0
+		timeout 10 incise stepper enable --for 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
+		echo "# $place: $code $(cat err)"
+		[ $code -eq 1 ] || failed+=" $place;"
+		drive_tell report
+		[ "$(drive_value enabled_rpdos)" = 0 ] || failed+=" $place (enabled);"
+	done
+	[ -z "$failed" ] || complain "these went on:$failed"
+}
+
+@test "start-up to operation enabled, by the drive's own clock" {
+	rig --homed
+	for ((i = 0; i < 3; i++)); do
+		drive_tell restart
+		run -0 --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+		drive_tell report
+		echo "# $(drive_value start_ms) ms" >&3
+		[ "$(drive_value start_ms)" != null ]
+	done
+}
+
+@test "60 s at 1 kHz: no set-point is lost or doubled" {
+	rig --homed
+	run -0 --separate-stderr incise haptic "$root/scenes/liver.scene" --rig rig.conf --duration 60s --json
+	printf '%s\n' "$output" >r.json
+	drive_tell report
+	echo "# $(drive_value enabled_rpdos) of $(drive_value rpdos) set-points with power"
+	echo "# $drive_line" | cut -c1-800
+	holds "$(drive_value syncs) >= 59000"
+	[ "$(drive_value missing)" = 0 ]
+	[ "$(drive_value doubled)" = 0 ]
+}
