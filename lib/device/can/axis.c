@@ -323,19 +323,13 @@ static void end(struct can_axis *axis, int64_t now)
 	put(axis, CIA402_SHUTDOWN, hold_target(axis), now);
 }
 
-/* What it says is of now. */
-static bool is_fresh(const struct can_axis *axis, int64_t now)
-{
-	return now - axis->tpdo_ns <= 3 * (int64_t)axis->setup.config.tick_ns;
-}
-
 /* By the drive's own ramp, then without power; or as well as can be known. */
 static void quick_stop(struct can_axis *axis, int64_t now)
 {
 	enum cia402_state state = cia402_state(axis->statusword);
 	bool stopping = state == CIA402_ENABLED || state == CIA402_QUICK_STOP ||
 			state == CIA402_FAULT_REACTION;
-	bool fresh = is_fresh(axis, now);
+	bool fresh = can_axis_is_fresh(axis, now);
 	int64_t most = QUICK_NS + (int64_t)axis->setup.config.deadman_ns +
 		       (int64_t)(1e9 * axis->setup.config.velocity /
 				 axis->setup.config.acceleration);
@@ -405,7 +399,7 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 	 * With power it answers for set-points that really go out, and for no less. A drive
 	 * that is to stop and does not say that it hears is left to its own watch.
 	 */
-	deaf = axis->phase == CAN_AXIS_QUICK_STOP && !is_fresh(axis, now_ns);
+	deaf = axis->phase == CAN_AXIS_QUICK_STOP && !can_axis_is_fresh(axis, now_ns);
 	if (!powered || (axis->put && !deaf))
 		canopen_beat(axis->master, now_ns);
 	m->status.late = axis->counts.sync_late;

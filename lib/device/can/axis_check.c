@@ -6,6 +6,11 @@
 
 #define MS 1000000LL
 
+bool can_axis_is_fresh(const struct can_axis *axis, int64_t now)
+{
+	return now - axis->tpdo_ns <= 3 * (int64_t)axis->setup.config.tick_ns;
+}
+
 /* What it says of itself, beside its position. */
 void can_axis_check_drive(struct can_axis *axis, int64_t now)
 {
@@ -89,6 +94,7 @@ void can_axis_check_running(struct can_axis *axis, int64_t now)
 	if (state != CIA402_ENABLED)
 		can_axis_fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_NOT_ENABLED,
 			       state, 0, now);
-	else if (axis->phase == CAN_AXIS_RUNNING)
+	/* Where it was when it last spoke is not where it is. */
+	else if (axis->phase == CAN_AXIS_RUNNING && can_axis_is_fresh(axis, now))
 		check_following(axis, now);
 }

@@ -237,7 +237,11 @@ static int set_up(struct can_stepper *c, const struct can_transport *transport,
 	c->motor.actuator = link->actuator;
 	c->motor.lines = link->axis.setup.wired;
 	snprintf(c->motor.name, sizeof(c->motor.name), "%s", link->where);
-	incise_motion_publish(&link->axis.motion, now_of(link->bus));
+	/* So that a look at it, first of all, is not at nothing. */
+	if (asked->watch)
+		can_watch_cycle(&c->thread.watch, link);
+	else
+		incise_motion_publish(&link->axis.motion, now_of(link->bus));
 	/* So that no first use of a page comes in a cycle. It may be refused. */
 	mlock(c, sizeof(*c));
 	rc = can_thread_start(&c->thread, &real_time);

@@ -45,12 +45,15 @@ static void take_emcy(struct canopen *master, const struct can_frame *frame)
 {
 	struct canopen_emcy *emcy = &master->emcy;
 
-	if (frame->len != 8)
+	uint16_t code = (uint16_t)(frame->data[0] | frame->data[1] << 8);
+
+	/* That it is over, often a ms later, must not hide what it was. */
+	if (frame->len != 8 || !code)
 		return;
-	emcy->code = (uint16_t)(frame->data[0] | frame->data[1] << 8);
+	emcy->code = code;
 	emcy->error_register = frame->data[2];
 	memcpy(emcy->vendor, frame->data + 3, sizeof(emcy->vendor));
-	emcy->count += emcy->code != 0;
+	emcy->count++;
 }
 
 static void take_answer(struct canopen *master, const struct can_frame *frame)

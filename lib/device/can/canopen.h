@@ -43,11 +43,12 @@ enum canopen_state {
 	CANOPEN_UNKNOWN = 0xff, /* none was heard */
 };
 
+/* The last that tells of an error; those that tell that it is over are not kept. */
 struct canopen_emcy {
-	uint16_t code;		/* 0: no error, or reset */
+	uint16_t code;		/* 0: there was none */
 	uint8_t error_register; /* object 1001 */
 	uint8_t vendor[5];
-	uint32_t count; /* with a code that is not 0; since it was opened */
+	uint32_t count; /* since it was opened */
 };
 
 struct canopen {

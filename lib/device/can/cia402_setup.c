@@ -129,7 +129,7 @@ static int set_cycle(const struct cia402_talk *talk, const struct cia402_setup *
 	}
 	return incise_error_set(talk->err, EINVAL,
 				"%s: a cycle of %u ns is no digit times a power of ten; "
-				"choose another cycle_s in rig.conf",
+				"choose another cycle_us in rig.conf",
 				talk->where, setup->cycle_ns);
 }
 

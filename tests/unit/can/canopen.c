@@ -122,8 +122,9 @@ static void test_emcy(void **state)
 	take(w, 0x81 + N, 8, "\x10\x23\x01\0\0\0\0\0");
 	assert_int_equal(w->master.emcy.code, 0x8611);
 	assert_int_equal(w->master.emcy.count, 1);
+	/* What it was is kept when it is over. */
 	take(w, 0x80 + N, 8, "\0\0\0\0\0\0\0\0");
-	assert_int_equal(w->master.emcy.code, 0);
+	assert_int_equal(w->master.emcy.code, 0x8611);
 	assert_int_equal(w->master.emcy.count, 1);
 }
 

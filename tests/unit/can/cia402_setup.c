@@ -46,7 +46,7 @@ static void test_objects(void **state)
 		{0x6085, 0, 1000000},	 {0x60c2, 1, 1},
 		{0x60c2, 2, 0xfd},	 {0x60c5, 0, 1000000},
 		{0x60c6, 0, 1000000},	 {0x1400, 1, 0x210},
-		{0x1400, 2, 1},		 {0x1400, 5, 100},
+		{0x1400, 2, 1},		 {0x1400, 5, 0},
 		{0x1600, 0, 2},		 {0x1600, 1, 0x60400010},
 		{0x1600, 2, 0x607a0020}, {0x1401, 1, 0x80000310},
 		{0x1800, 1, 0x40000190}, {0x1800, 2, 1},
@@ -66,7 +66,7 @@ static void test_objects(void **state)
 				 cases[i].value);
 	assert_true(led->taken.inputs && led->taken.position_limit &&
 		    led->taken.velocity_limit && led->taken.acceleration_limit &&
-		    led->taken.following_limit && led->taken.rpdo_deadline);
+		    led->taken.following_limit);
 	assert_int_equal(led->drive.nmt, CANOPEN_OPERATIONAL);
 	assert_int_equal(led->drive.state, CIA402_DISABLED);
 	assert_int_equal(led->drive.enables, 0);
@@ -88,18 +88,18 @@ static void cycle(struct led *led, uint16_t word, int32_t target)
 	canopen_await(&led->master, NULL, led->drive.now_ns + DRIVE_MS);
 }
 
-/* It is led by PDOs, and stops by itself when they and the heartbeats end. */
+/* It is led by PDOs, and stops by itself when the heartbeats end. */
 static void test_deadman(void **state)
 {
 	static const struct {
 		enum cia402_mode mode;
-		bool beats, points; /* what goes on */
-		uint16_t
-			code; /* the last; where both end, set-points are waited for longer */
+		bool points; /* they go on, without heartbeats */
+		uint16_t code;
 	} cases[] = {
-		{CIA402_CSP, false, false, 0x8130}, {CIA402_CSV, false, false, 0x8130},
-		{CIA402_CST, false, false, 0x8130}, {CIA402_CSP, false, true, 0x8130},
-		{CIA402_CSV, true, false, 0x8250},
+		{CIA402_CSP, false, 0x8130},
+		{CIA402_CSV, false, 0x8130},
+		{CIA402_CST, false, 0x8130},
+		{CIA402_CSP, true, 0x8130},
 	};
 	struct led *led = *state;
 
@@ -120,8 +120,7 @@ static void test_deadman(void **state)
 		assert_int_equal(d->state, CIA402_ENABLED);
 		assert_true(d->velocity > 1000);
 		assert_true(d->position > 500);
-		if (!cases[i].beats)
-			led->master.own = 0;
+		led->master.own = 0;
 		led->master.emcy.code = 0;
 		for (int k = 0; k < 300; k++) {
 			if (cases[i].points)
@@ -178,7 +177,7 @@ static void test_absences(void **state)
 		{0x607f, -1, 0, offsetof(struct cia402_taken, velocity_limit)},
 		{0x60c5, -1, 0, offsetof(struct cia402_taken, acceleration_limit)},
 		{0x6065, -1, 0, offsetof(struct cia402_taken, following_limit)},
-		{0x1400, 5, 0, offsetof(struct cia402_taken, rpdo_deadline)},
+		{0x1400, 5, 0, SIZE_MAX},
 		{0x1006, -1, 0, SIZE_MAX},
 		{0x1007, -1, 0, SIZE_MAX},
 		{0x1029, -1, 0, SIZE_MAX},
@@ -246,7 +245,6 @@ static void test_not_kept(void **state)
 		OD_RPDO1_COUNT,
 		OD_TPDO1_MAP2,
 		OD_TPDO1_COUNT,
-		OD_RPDO1_TIMER,
 		OD_RPDO2_COB,
 		OD_TPDO1_TYPE,
 		OD_QUICK_STOP_RAMP,
