@@ -141,8 +141,13 @@ static int set_inputs(const struct cia402_talk *talk, uint32_t id, bool *taken)
 		rc = cia402_tell(talk, &count, 0);
 	if (rc)
 		return rc;
-	/* The one refusal that is an answer: it does not map them. */
+	/*
+	 * The one refusal that is an answer: it does not map them, and says so at once or
+	 * when they are counted.
+	 */
 	rc = canopen_write(talk->master, entry.index, entry.sub, 4, MAP_INPUTS);
+	if (!rc)
+		rc = canopen_write(talk->master, count.index, count.sub, 1, 1);
 	if (rc == -EREMOTEIO)
 		return 0;
 	if (rc)

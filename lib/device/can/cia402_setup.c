@@ -29,6 +29,8 @@ static const struct cia402_object stop_option = {0x605a, 0, 2, "quick-stop optio
 static const struct cia402_object cycle = {0x60c2, 1, 1, "interpolation period"};
 static const struct cia402_object cycle_power = {0x60c2, 2, 1,
 						 "interpolation period's power of ten"};
+/* No object; for the line of a command that was not sent. */
+static const struct cia402_object nmt = {0, 0, 0, "NMT state"};
 static const struct cia402_object modes = {0x6502, 0, 4, "supported drive modes"};
 
 /* What can be written, before anything is. */
@@ -83,7 +85,7 @@ static int tell_nmt(const struct cia402_talk *talk, enum canopen_command command
 			return rc;
 		rc = canopen_nmt(talk->master, command);
 	}
-	return rc ? cia402_failed(talk, &cia402_statusword, "read", rc) : 0;
+	return rc ? cia402_failed(talk, &nmt, "changed", rc) : 0;
 }
 
 /*
@@ -185,7 +187,7 @@ static int start(const struct cia402_talk *talk, const struct cia402_setup *setu
 			"%s; see its EMCY codes with `incise info can:%s`",
 			talk->where, canopen_state_name(master->state), bus->name);
 	if (rc)
-		return cia402_failed(talk, &producer, "heard", rc);
+		return cia402_failed(talk, &nmt, "heard", rc);
 	return check_power(talk);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402_setup.c, with cia402_pdo.c and cia402_limits.c: a drive does what it
+ * lib/device/can/cia402_setup.c, with all that it calls: a drive does what it
  * was set up to do, and whatever goes wrong at whatever step, it ends in a line, in bounded
  * time, and without power.
  */
@@ -21,11 +21,6 @@ static int setup(void **state)
 	led_init(&led);
 	*state = &led;
 	return 0;
-}
-
-static uint32_t value(struct led *led, uint16_t index, uint8_t sub)
-{
-	return drive_object(&led->drive, index, sub)->value;
 }
 
 static void test_objects(void **state)
@@ -60,9 +55,10 @@ static void test_objects(void **state)
 	int64_t t = led->drive.now_ns;
 
 	led->drive.od[OD_SYNC_ID].value = 0x40000080; /* it would send SYNCs itself */
+	led->drive.od[OD_EMCY_ID].value = 0x80000090; /* and no EMCYs */
 	assert_int_equal(led_configure(led), 0);
 	for (size_t i = 0; i < COUNT(cases); i++)
-		assert_int_equal(value(led, cases[i].index, cases[i].sub),
+		assert_int_equal(led_value(led, cases[i].index, cases[i].sub),
 				 cases[i].value);
 	assert_true(led->taken.inputs && led->taken.position_limit &&
 		    led->taken.velocity_limit && led->taken.acceleration_limit &&
@@ -75,17 +71,6 @@ static void test_objects(void **state)
 	assert_true(led->drive.requests < 250);
 	/* And once more, as after a reboot of this side. */
 	assert_int_equal(led_configure(led), 0);
-}
-
-static void cycle(struct led *led, uint16_t word, int32_t target)
-{
-	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
-	struct can_frame frame;
-
-	cia402_put(&frame, DRIVE_NODE, led->setup.mode, word, target);
-	led->drive.bus.ops->send(&led->drive.bus, &frame);
-	led->drive.bus.ops->send(&led->drive.bus, &sync);
-	canopen_await(&led->master, NULL, led->drive.now_ns + DRIVE_MS);
 }
 
 /* It is led by PDOs, and stops by itself when the heartbeats end. */
@@ -115,7 +100,7 @@ static void test_deadman(void **state)
 				target += 20;
 			else if (k > 100)
 				target = cases[i].mode == CIA402_CSV ? 20000 : 500;
-			cycle(led, cia402_up(d->state), target);
+			led_cycle(led, cia402_up(d->state), target);
 		}
 		assert_int_equal(d->state, CIA402_ENABLED);
 		assert_true(d->velocity > 1000);
@@ -124,7 +109,7 @@ static void test_deadman(void **state)
 		led->master.emcy.code = 0;
 		for (int k = 0; k < 300; k++) {
 			if (cases[i].points)
-				cycle(led, CIA402_ENABLE, target += 20);
+				led_cycle(led, CIA402_ENABLE, target += 20);
 			else
 				canopen_await(&led->master, NULL, d->now_ns + DRIVE_MS);
 		}
@@ -136,30 +121,6 @@ static void test_deadman(void **state)
 		/* On its ramp, not at once: 6085 is kept. */
 		assert_true(d->hardest <= 1000000.1 || cases[i].mode == CIA402_CST);
 	}
-}
-
-/* Limits are the drive's own too. */
-static void test_limits(void **state)
-{
-	struct led *led = *state;
-
-	led->setup.position_max = 1000;
-	led->setup.following = UINT32_MAX;
-	assert_int_equal(led_configure(led), 0);
-	for (int k = 0; k < 500; k++)
-		cycle(led, cia402_up(led->drive.state), k < 50 ? 0 : 1000000);
-	assert_in_range((int)led->drive.position, 990, 1000);
-	assert_true(led->drive.fastest <= 50000);
-
-	led_init(led);
-	assert_int_equal(led_configure(led), 0);
-	for (int k = 0; k < 500; k++) {
-		led->drive.blocked = k > 100;
-		cycle(led, cia402_up(led->drive.state), k * 10);
-	}
-	assert_int_equal(led->drive.state, CIA402_FAULT);
-	assert_int_equal(led->master.emcy.code, 0x8611);
-	assert_int_equal(led->drive.enabled_unasked, 0);
 }
 
 /* What a drive may lack, and what it may not. */
@@ -280,7 +241,7 @@ static void test_refused(void **state)
 	assert_int_equal(led_configure(led), -EOPNOTSUPP);
 	assert_non_null(strstr(led->err.text, "CSP"));
 
-	for (int i = 0; i < 9; i++) {
+	for (int i = 0; i < 10; i++) {
 		led_init(led);
 		switch (i) {
 		case 0:
@@ -310,6 +271,9 @@ static void test_refused(void **state)
 		case 8:
 			led->master.beat_ns = LED_DEADMAN_MS * DRIVE_MS;
 			break;
+		case 9:
+			led->setup.cycle_ns = 0;
+			break;
 		}
 		assert_int_equal(led_configure(led), -EINVAL);
 		assert_non_null(strstr(led->err.text, "rig.conf"));
@@ -333,29 +297,9 @@ static void test_cycles(void **state)
 		led_init(led);
 		led->setup.cycle_ns = cases[i].ns;
 		assert_int_equal(led_configure(led), 0);
-		assert_int_equal(value(led, 0x60c2, 1), cases[i].digit);
-		assert_int_equal((int8_t)value(led, 0x60c2, 2), cases[i].power);
+		assert_int_equal(led_value(led, 0x60c2, 1), cases[i].digit);
+		assert_int_equal((int8_t)led_value(led, 0x60c2, 2), cases[i].power);
 	}
-}
-
-/* Limits of before do not stay: a machine that is not homed has no range. */
-static void test_unlimited(void **state)
-{
-	struct led *led = *state;
-
-	drive_set(&led->drive, 0x607d, 1, 5);
-	drive_set(&led->drive, 0x607d, 2, 9);
-	led->setup.limited = false;
-	assert_int_equal(led_configure(led), 0);
-	assert_false(led->taken.position_limit);
-	assert_int_equal((int32_t)value(led, 0x607d, 1), INT32_MIN);
-	assert_int_equal((int32_t)value(led, 0x607d, 2), INT32_MAX);
-	assert_int_equal(cia402_set_range(&led->master, 10, 20, "here", &led->err), 0);
-	assert_int_equal(cia402_set_range(&led->master, 30, 40, "here", &led->err), 0);
-	assert_int_equal(value(led, 0x607d, 1), 30);
-	assert_int_equal(value(led, 0x607d, 2), 40);
-	assert_int_equal(cia402_set_range(&led->master, 40, 40, "here", &led->err),
-			 -EINVAL);
 }
 
 /* What goes wrong at the k-th SDO, for every k: a line, or an absence that is noted. */
@@ -469,12 +413,10 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup(test_objects, setup),
 		cmocka_unit_test_setup(test_deadman, setup),
-		cmocka_unit_test_setup(test_limits, setup),
 		cmocka_unit_test_setup(test_absences, setup),
 		cmocka_unit_test_setup(test_not_kept, setup),
 		cmocka_unit_test_setup(test_refused, setup),
 		cmocka_unit_test_setup(test_cycles, setup),
-		cmocka_unit_test_setup(test_unlimited, setup),
 		cmocka_unit_test_setup(test_every_step, setup),
 		cmocka_unit_test_setup(test_bus_fails, setup),
 	};

@@ -63,4 +63,22 @@ static inline void led_enable(struct led *led)
 	led_control(led, CIA402_ENABLE);
 }
 
+/* What an object holds, by the drive itself. */
+static inline uint32_t led_value(struct led *led, uint16_t index, uint8_t sub)
+{
+	return drive_object(&led->drive, index, sub)->value;
+}
+
+/* One cycle of PDOs, and a millisecond. */
+static inline void led_cycle(struct led *led, uint16_t word, int32_t target)
+{
+	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
+	struct can_frame frame;
+
+	cia402_put(&frame, DRIVE_NODE, led->setup.mode, word, target);
+	led->drive.bus.ops->send(&led->drive.bus, &frame);
+	led->drive.bus.ops->send(&led->drive.bus, &sync);
+	canopen_await(&led->master, NULL, led->drive.now_ns + DRIVE_MS);
+}
+
 #endif
