@@ -66,6 +66,23 @@ static void test_homes(void **state)
 	assert_true(homed(led, 0));
 }
 
+/* All three bits count. */
+static void test_bits(void **state)
+{
+	struct led *led = *state;
+	struct drive *d = &led->drive;
+
+	for (int bits = 0; bits < 8; bits++) {
+		assert_int_equal(cia402_set_mode(&led->master, CIA402_HOMING, "here",
+						 &led->err),
+				 0);
+		d->homed = bits & 1;
+		d->homing = bits & 2;
+		d->homing_error = bits & 4;
+		assert_int_equal(homed(led, 0), bits == 1);
+	}
+}
+
 static void test_fails(void **state)
 {
 	struct led *led = *state;
@@ -98,6 +115,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup(test_homes, setup),
+		cmocka_unit_test_setup(test_bits, setup),
 		cmocka_unit_test_setup(test_fails, setup),
 	};
 

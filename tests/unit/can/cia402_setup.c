@@ -228,13 +228,18 @@ static void test_not_kept(void **state)
 static void test_refused(void **state)
 {
 	struct led *led = *state;
+	uint64_t asked;
 
 	/* It has power. */
 	led_enable(led);
 	assert_int_equal(led->drive.state, CIA402_ENABLED);
+	asked = led->drive.requests;
 	assert_int_equal(led_configure(led), -EBUSY);
 	assert_non_null(strstr(led->err.text, "operation enabled"));
-	assert_int_equal(led->drive.state, CIA402_ENABLED); /* and nothing was touched */
+	/* And nothing was touched: it was asked once. */
+	assert_int_equal(led->drive.state, CIA402_ENABLED);
+	assert_int_equal(led->drive.requests, asked + 1);
+	assert_int_equal(led_value(led, 0x1016, 1), 0);
 
 	led_init(led);
 	drive_set(&led->drive, 0x6502, 0, 0x01);

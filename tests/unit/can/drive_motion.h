@@ -151,7 +151,7 @@ static inline uint16_t drive_statusword(const struct drive *d)
 
 	if (mode == CIA402_HOMING) {
 		word |= d->homing ? 0 : CIA402_TARGET_REACHED;
-		word |= d->homed && !d->homing ? CIA402_HOMED : 0;
+		word |= d->homed ? CIA402_HOMED : 0;
 		word |= d->homing_error ? CIA402_FOLLOWING_ERROR : 0;
 	} else if (mode >= CIA402_CSP && d->state == CIA402_ENABLED) {
 		word |= CIA402_HOMED; /* follows its targets */

@@ -20,6 +20,7 @@
 #define ABORT_SHORT 0x06070013
 #define ABORT_NO_SUB 0x06090011
 #define ABORT_VALUE 0x06090030
+#define ABORT_RANGE 0x06090036
 
 static const enum drive_object_name drive_pdos[] = {
 	OD_RPDO1_SUBS, OD_RPDO2_SUBS, OD_TPDO1_SUBS, OD_TPDO2_SUBS, OD_TPDO3_SUBS,
@@ -144,6 +145,9 @@ static inline uint32_t drive_write(struct drive *d, struct drive_object *o,
 	if (at == OD_MODE && value &&
 	    (value > 32 || !(d->od[OD_MODES].value & 1u << (value - 1))))
 		rc = ABORT_VALUE;
+	if ((at == OD_RANGE_MIN && (int32_t)value > drive_signed(d, OD_RANGE_MAX)) ||
+	    (at == OD_RANGE_MAX && (int32_t)value < drive_signed(d, OD_RANGE_MIN)))
+		rc = ABORT_RANGE;
 	if (at == OD_CYCLE_POWER && (int8_t)value > 0)
 		rc = ABORT_VALUE;
 	if (rc || o->deaf)
