@@ -40,18 +40,32 @@ $(foreach lib,$(libraries),$(eval $(call library,$(lib))))
 # Modules of devices, $(O)/lib/incise/KIND_NAME.so: loaded when rig.conf names them. They
 # bring a library into the process that others do not need. What of libincise they use and
 # it does not export, they hold themselves.
-device_modules := $(if $(shell $(PKG_CONFIG) --exists libgpiod && echo yes),stepper_gpio)
+has_socketcan := $(shell $(PKG_CONFIG) --exists libsocketcan && echo yes)
+device_modules := $(if $(shell $(PKG_CONFIG) --exists libgpiod && echo yes),stepper_gpio) \
+	$(if $(has_socketcan),stepper_can) stepper_slcan
 pc_stepper_gpio := libgpiod
 objects_stepper_gpio := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o thread.o gpio/pulser.o \
 	gpio/stepper_gpio.o \
 	$(if $(shell $(PKG_CONFIG) --atleast-version=2 libgpiod && echo yes),gpio/gpio_v2.o,gpio/gpio_v1.o))
+
+# One drive on two kinds of bus; each module has just its own.
+can_transports := $(addprefix lib/device/can/,socketcan.c slcan.c slcan_line.c)
+can_modules := $(addprefix lib/device/can/,stepper_can.c stepper_slcan.c)
+can_core := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o thread.o) \
+	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(can_transports) $(can_modules),\
+		$(wildcard lib/device/can/*.c)))
+pc_stepper_can := libsocketcan
+objects_stepper_can := $(can_core) $(addprefix $(O)/obj/lib/device/can/,socketcan.o stepper_can.o)
+pc_stepper_slcan :=
+objects_stepper_slcan := $(can_core) \
+	$(addprefix $(O)/obj/lib/device/can/,slcan.o slcan_line.o stepper_slcan.o)
 
 define device_module
 $(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
 	@mkdir -p $$(@D)
 	$$(CC) -shared -Wl,-z,defs -Wl,--as-needed -Wl,-rpath,'$$$$ORIGIN/..' -L$(O)/lib \
 		$$(CFLAGS) $$(LDFLAGS) -o $$@ $$(objects_$1) -lincise \
-		$$(shell $$(PKG_CONFIG) --libs $$(pc_$1)) -lm -pthread
+		$$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1))) -lm -pthread
 
 libs: $(O)/lib/incise/$1.so
 endef
@@ -59,13 +73,15 @@ $(foreach name,$(device_modules),$(eval $(call device_module,$(name))))
 
 # For unit tests, which reach into what the shared objects hide.
 test_objects := $(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
-	$(patsubst %.c,$(O)/obj/%.o,$(filter-out %/stepper_can.c %/stepper_slcan.c,$(wildcard lib/device/can/*.c)))
+	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(can_modules) \
+		$(if $(has_socketcan),,%/socketcan.c),$(wildcard lib/device/can/*.c)))
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
 	# q, not r: two rooms may have a file of the same name
 	$(AR) qcs $@ $^
 
-all_libs = $(shell $(PKG_CONFIG) --libs libsocketcan 2>/dev/null) $(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
+all_libs = $(if $(has_socketcan),$(shell $(PKG_CONFIG) --libs libsocketcan)) \
+	$(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
 
 .PHONY: libs

@@ -2,7 +2,8 @@
 # Tests. tests/unit/ROOM/NAME.c tests lib/ROOM/NAME.c, tests/unit/driver what of driver/ builds
 # without a kernel; tests/cli runs the real programs.
 
-unit_sources := $(wildcard tests/unit/*/*.c)
+unit_sources := $(filter-out $(if $(has_socketcan),,tests/unit/can/socketcan.c),\
+	$(wildcard tests/unit/*/*.c))
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
 # One counts allocations, others play the kernel.
