@@ -1,0 +1,15 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
+# CAN buses of the kernel, as the library opens them, over vcan.
+. tests/vm/tap
+
+modprobe -a vcan can_raw 2>/dev/null || skip "vcan" "this kernel has no vcan"
+[ -x "$INCISE_BUILD/tests/vm/can_bus" ] || skip "CAN buses" "libsocketcan is not installed"
+ip link add vcan0 type vcan
+ip link set vcan0 up
+ip link add vcan9 type vcan
+"$INCISE_BUILD/tests/vm/can_bus" vcan0 2>/run/stderr
+# libsocketcan would print lines of its own
+check "nothing is printed beside" [ ! -s /run/stderr ]
+sed 's/^/# /' /run/stderr
+ip link del vcan9
