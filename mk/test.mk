@@ -11,6 +11,8 @@ ldflags_scene/jail := $(foreach name,malloc calloc realloc free,-Wl,--wrap=$(nam
 ldflags_device/stepper_kernel := $(foreach name,open close ioctl mmap munmap clock_nanosleep \
 	nanosleep,-Wl,--wrap=$(name))
 ldflags_can/slcan := -Wl,--wrap=write
+ldflags_can/socketcan := $(foreach name,socket bind setsockopt ioctl send recvmsg ppoll close readlink \
+	clock_gettime can_get_state can_get_restart_ms can_get_bittiming,-Wl,--wrap=$(name))
 
 $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)

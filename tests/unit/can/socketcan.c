@@ -1,0 +1,631 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/can/socketcan.c on a kernel that a test makes: the linker hands its system
+ * calls, and what it asks of libsocketcan, to functions here. The real kernel is asked in
+ * tests/vm/guest/can_bus.c. The lock of a node is real.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <net/if.h>
+#include <net/if_arp.h>
+#include <poll.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <linux/can/error.h>
+#include <linux/can/netlink.h>
+#include <linux/can/raw.h>
+#include <linux/errqueue.h>
+#include <linux/net_tstamp.h>
+#include "../../../lib/device/can/can_bus.h"
+
+#define FD 7777
+#define INDEX 42
+#define S INT64_C(1000000000)
+
+/* Two interfaces of CAN, can0 and vcan0, and lo; and how they shall misbehave. */
+static struct {
+	int socket_error, option_error, bind_error, poll_error;
+	bool down, tells; /* tells: libsocketcan gets answers */
+	unsigned int asked;
+	struct can_bittiming timing;
+	uint32_t restart_ms;
+	int state;
+	int opened, bound;
+	/* set by options */
+	struct can_filter filter[64];
+	int n_filters;
+	can_err_mask_t errors;
+	int overflow_on, stamps;
+	/* send */
+	int send_error, send_interrupts;
+	struct can_frame sent;
+	ssize_t send_takes;
+	/* receive */
+	int receive_error;
+	struct can_frame frames[64];
+	ssize_t size[64];
+	struct timespec stamp;
+	uint32_t lost;
+	int n_frames, next;
+	/* clocks */
+	int64_t now_ns, wall_ns;
+	struct timespec slept;
+} kernel;
+
+int __real_socket(int domain, int type, int protocol);
+int __real_close(int fd);
+int __real_bind(int fd, const struct sockaddr *address, socklen_t size);
+ssize_t __real_readlink(const char *path, char *target, size_t size);
+int __real_clock_gettime(clockid_t clock, struct timespec *t);
+
+static int answer(int code)
+{
+	errno = code;
+	return code ? -1 : 0;
+}
+
+int __wrap_socket(int domain, int type, int protocol)
+{
+	if (domain != PF_CAN)
+		return __real_socket(domain, type, protocol);
+	assert_int_equal(type, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK);
+	assert_int_equal(protocol, CAN_RAW);
+	if (kernel.socket_error)
+		return answer(kernel.socket_error);
+	kernel.opened++;
+	return FD;
+}
+
+int __wrap_close(int fd)
+{
+	if (fd != FD)
+		return __real_close(fd);
+	kernel.opened--;
+	return 0;
+}
+
+int __wrap_bind(int fd, const struct sockaddr *address, socklen_t size)
+{
+	if (fd != FD)
+		return __real_bind(fd, address, size);
+	kernel.bound = ((const struct sockaddr_can *)address)->can_ifindex;
+	return answer(kernel.bind_error);
+}
+
+int __wrap_setsockopt(int fd, int level, int name, const void *value, socklen_t size)
+{
+	assert_int_equal(fd, FD);
+	if (kernel.option_error)
+		return answer(kernel.option_error);
+	if (level == SOL_CAN_RAW && name == CAN_RAW_FILTER) {
+		kernel.n_filters = (int)(size / sizeof(struct can_filter));
+		memcpy(kernel.filter, value, size);
+	} else if (level == SOL_CAN_RAW && name == CAN_RAW_ERR_FILTER) {
+		memcpy(&kernel.errors, value, size);
+	} else if (level == SOL_SOCKET && name == SO_RXQ_OVFL) {
+		memcpy(&kernel.overflow_on, value, size);
+	} else if (level == SOL_SOCKET && name == SO_TIMESTAMPING) {
+		memcpy(&kernel.stamps, value, size);
+	} else {
+		return answer(ENOPROTOOPT);
+	}
+	return 0;
+}
+
+int __wrap_ioctl(int fd, unsigned long request, void *argument)
+{
+	struct ifreq *ask = argument;
+	bool is_can = !strcmp(ask->ifr_name, "can0") || !strcmp(ask->ifr_name, "vcan0");
+
+	assert_int_equal(fd, FD);
+	if (!is_can && strcmp(ask->ifr_name, "lo"))
+		return answer(ENODEV);
+	switch (request) {
+	case SIOCGIFINDEX:
+		ask->ifr_ifindex = INDEX;
+		return 0;
+	case SIOCGIFHWADDR:
+		ask->ifr_hwaddr.sa_family = is_can ? ARPHRD_CAN : ARPHRD_LOOPBACK;
+		return 0;
+	case SIOCGIFFLAGS:
+		ask->ifr_flags = kernel.down ? 0 : IFF_UP;
+		return 0;
+	default:
+		return answer(ENOTTY);
+	}
+}
+
+ssize_t __wrap_readlink(const char *path, char *target, size_t size)
+{
+	const char *at = "../../devices/pci0000:00/0000:00:1d.0/usb1/1-1/net/can0";
+
+	if (!strcmp(path, "/sys/class/net/vcan0"))
+		at = "../../devices/virtual/net/vcan0";
+	else if (strcmp(path, "/sys/class/net/can0"))
+		return __real_readlink(path, target, size);
+	assert_true(strlen(at) <= size);
+	memcpy(target, at, strlen(at));
+	return (ssize_t)strlen(at);
+}
+
+int __wrap_can_get_state(const char *name, int *state)
+{
+	assert_string_equal(name, "can0");
+	kernel.asked++;
+	*state = kernel.state;
+	return kernel.tells ? 0 : -1;
+}
+
+int __wrap_can_get_restart_ms(const char *name, __u32 *restart_ms)
+{
+	assert_string_equal(name, "can0");
+	*restart_ms = kernel.restart_ms;
+	return kernel.tells ? 0 : -1;
+}
+
+int __wrap_can_get_bittiming(const char *name, struct can_bittiming *timing)
+{
+	assert_string_equal(name, "can0");
+	*timing = kernel.timing;
+	return kernel.tells ? 0 : -1;
+}
+
+ssize_t __wrap_send(int fd, const void *bytes, size_t n, int flags)
+{
+	assert_int_equal(fd, FD);
+	assert_int_equal(n, sizeof(struct can_frame));
+	assert_true(flags & MSG_DONTWAIT);
+	if (kernel.send_interrupts-- > 0)
+		return answer(EINTR);
+	if (kernel.send_error)
+		return answer(kernel.send_error);
+	memcpy(&kernel.sent, bytes, n);
+	return kernel.send_takes ? kernel.send_takes : (ssize_t)n;
+}
+
+ssize_t __wrap_recvmsg(int fd, struct msghdr *msg, int flags)
+{
+	struct scm_timestamping stamps = {.ts = {kernel.stamp}};
+	struct cmsghdr *c;
+	ssize_t n;
+
+	assert_int_equal(fd, FD);
+	assert_true(flags & MSG_DONTWAIT);
+	if (kernel.next == kernel.n_frames)
+		return answer(kernel.receive_error ? kernel.receive_error : EAGAIN);
+	n = kernel.size[kernel.next] ? kernel.size[kernel.next]
+				     : (ssize_t)sizeof(struct can_frame);
+	memcpy(msg->msg_iov->iov_base, &kernel.frames[kernel.next++],
+	       sizeof(struct can_frame));
+	/* As the kernel does: stamp first, what was lost only if something was. */
+	c = CMSG_FIRSTHDR(msg);
+	c->cmsg_level = SOL_SOCKET;
+	c->cmsg_type = SCM_TIMESTAMPING;
+	c->cmsg_len = CMSG_LEN(sizeof(stamps));
+	memcpy(CMSG_DATA(c), &stamps, sizeof(stamps));
+	memset((char *)c + CMSG_SPACE(sizeof(stamps)), 0, sizeof(*c));
+	if (!kernel.lost) {
+		msg->msg_controllen = CMSG_SPACE(sizeof(stamps));
+		return n;
+	}
+	c = CMSG_NXTHDR(msg, c);
+	assert_non_null(c);
+	c->cmsg_level = SOL_SOCKET;
+	c->cmsg_type = SO_RXQ_OVFL;
+	c->cmsg_len = CMSG_LEN(sizeof(kernel.lost));
+	memcpy(CMSG_DATA(c), &kernel.lost, sizeof(kernel.lost));
+	msg->msg_controllen =
+		CMSG_SPACE(sizeof(stamps)) + CMSG_SPACE(sizeof(kernel.lost));
+	return n;
+}
+
+int __wrap_ppoll(struct pollfd *fds, nfds_t n, const struct timespec *timeout,
+		 const sigset_t *mask)
+{
+	assert_int_equal(n, 1);
+	assert_int_equal(fds->fd, FD);
+	assert_true(timeout->tv_sec >= 0 && timeout->tv_nsec >= 0 &&
+		    timeout->tv_nsec < S);
+	kernel.slept = *timeout;
+	return answer(kernel.poll_error);
+}
+
+int __wrap_clock_gettime(clockid_t clock, struct timespec *t)
+{
+	int64_t ns = clock == CLOCK_REALTIME ? kernel.wall_ns : kernel.now_ns;
+
+	*t = (struct timespec){ns / S, ns % S};
+	return 0;
+}
+
+static void kernel_begin(void)
+{
+	memset(&kernel, 0, sizeof(kernel));
+	kernel.now_ns = 1000 * S;
+	kernel.wall_ns = 1700000000 * S;
+	kernel.tells = true;
+	kernel.timing.bitrate = 1000000;
+	kernel.restart_ms = 100;
+	kernel.state = CAN_STATE_ERROR_WARNING;
+}
+
+static int open_bus(struct can_bus **bus, const char *device, uint32_t bitrate,
+		    uint8_t node, struct incise_error *err)
+{
+	const struct can_bus_request request = {.where = "rig.conf:1: stepper",
+						.device = device,
+						.bitrate = bitrate,
+						.node = node};
+
+	return can_transport_socketcan.open(bus, &request, err);
+}
+
+static struct can_bus *bus;
+
+static int setup(void **state)
+{
+	struct incise_error err = {0};
+
+	kernel_begin();
+	return open_bus(&bus, "can0", 0, 0, &err);
+}
+
+static int teardown(void **state)
+{
+	bus->ops->close(bus);
+	assert_int_equal(kernel.opened, 0);
+	return 0;
+}
+
+static void what_cannot_be_opened_is_said(void **state)
+{
+	static const struct {
+		const char *device;
+		uint32_t bitrate;
+		int socket_error, option_error, bind_error;
+		bool down;
+		int code;
+		const char *words;
+	} cases[] = {
+		{"can0", 0, EAFNOSUPPORT, 0, 0, false, -EAFNOSUPPORT, "modprobe can_raw"},
+		{"can0", 0, EPROTONOSUPPORT, 0, 0, false, -EAFNOSUPPORT,
+		 "modprobe can_raw"},
+		{"can0", 0, EPERM, 0, 0, false, -EACCES, "no right"},
+		{"can0", 0, EMFILE, 0, 0, false, -EIO, "Too many open files"},
+		{"can0", 0, 0, EINVAL, 0, false, -EIO, "Invalid argument"},
+		{"can0", 0, 0, 0, ENODEV, false, -ENODEV, "No such device"},
+		{"can0", 0, 0, 0, ENETDOWN, false, -ENETDOWN, "Network is down"},
+		{"nope", 0, 0, 0, 0, false, -ENODEV, "there is no interface nope"},
+		{"", 0, 0, 0, 0, false, -ENODEV, "there is no interface"},
+		{"can0/../lo", 0, 0, 0, 0, false, -ENODEV, "there is no interface"},
+		{"sixteen-or-more-", 0, 0, 0, 0, false, -ENODEV, "there is no interface"},
+		{"lo", 0, 0, 0, 0, false, -EINVAL, "lo is no CAN interface"},
+		{"can0", 0, 0, 0, 0, true, -ENETDOWN,
+		 "can0 is down: ip link set can0 up type can bitrate 1000000"},
+		{"vcan0", 0, 0, 0, 0, true, -ENETDOWN,
+		 "vcan0 is down: ip link set vcan0 up"},
+		{"can0", 500000, 0, 0, 0, false, -EINVAL,
+		 "can0 runs at 1000000 bit/s, bitrate is 500000"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		int rc;
+
+		kernel_begin();
+		kernel.socket_error = cases[i].socket_error;
+		kernel.option_error = cases[i].option_error;
+		kernel.bind_error = cases[i].bind_error;
+		kernel.down = cases[i].down;
+		rc = open_bus(&bus, cases[i].device, cases[i].bitrate, 0, &err);
+		if (rc != cases[i].code || !strstr(err.text, cases[i].words))
+			fail_msg("case %zu: %d: %s", i, rc, err.text);
+		assert_int_equal(err.code, -rc);
+		assert_int_equal(errno, -rc);
+		assert_ptr_equal(strstr(err.text, "rig.conf:1: stepper: "), err.text);
+		assert_int_equal(kernel.opened, 0);
+	}
+}
+
+static void what_it_is_set_to_is_asked_of_hardware(void **state)
+{
+	static const struct {
+		const char *device;
+		bool tells;
+		uint32_t set, asked_for, bitrate, restart_ms;
+		int state;
+	} cases[] = {
+		{"can0", true, 1000000, 0, 1000000, 100, CAN_STATE_ERROR_WARNING},
+		{"can0", true, 1000000, 1000000, 1000000, 100, CAN_STATE_ERROR_WARNING},
+		{"can0", true, UINT32_MAX, 500000, 0, 100, CAN_STATE_ERROR_WARNING},
+		{"can0", false, 1000000, 500000, 0, 0, -EOPNOTSUPP},
+		{"vcan0", true, 1000000, 500000, 0, 0, -EOPNOTSUPP},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		kernel_begin();
+		kernel.tells = cases[i].tells;
+		kernel.timing.bitrate = cases[i].set;
+		assert_int_equal(
+			open_bus(&bus, cases[i].device, cases[i].asked_for, 0, &err), 0);
+		assert_int_equal(bus->bitrate, cases[i].bitrate);
+		assert_int_equal(bus->restart_ms, cases[i].restart_ms);
+		assert_int_equal(bus->ops->state(bus), cases[i].state);
+		assert_string_equal(bus->name, cases[i].device);
+		/* Of vcan nothing is asked: the library would print a line. */
+		assert_int_equal(kernel.asked, *cases[i].device == 'c');
+		bus->ops->close(bus);
+	}
+}
+
+static void the_socket_is_set_up(void **state)
+{
+	assert_int_equal(kernel.bound, INDEX);
+	assert_int_equal(kernel.errors, CAN_ERR_MASK);
+	assert_int_equal(kernel.overflow_on, 1);
+	assert_int_equal(kernel.stamps,
+			 SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE);
+}
+
+static void filters_are_the_kernels(void **state)
+{
+	struct can_filter filter[CAN_BUS_FILTERS + 1] = {{0x190, 0xc00007ff}};
+
+	assert_int_equal(bus->ops->filter(bus, filter, 3), 0);
+	assert_int_equal(kernel.n_filters, 3);
+	assert_memory_equal(kernel.filter, filter, 3 * sizeof(*filter));
+	/* All: one that everything passes. To the kernel none means nothing. */
+	assert_int_equal(bus->ops->filter(bus, NULL, 0), 0);
+	assert_int_equal(kernel.n_filters, 1);
+	assert_int_equal(kernel.filter[0].can_mask, 0);
+	assert_int_equal(bus->ops->filter(bus, filter, CAN_BUS_FILTERS), 0);
+	assert_int_equal(bus->ops->filter(bus, filter, CAN_BUS_FILTERS + 1), -EINVAL);
+	assert_int_equal(bus->ops->filter(bus, filter, -1), -EINVAL);
+	kernel.option_error = ENOMEM;
+	assert_int_equal(bus->ops->filter(bus, filter, 1), -ENOMEM);
+}
+
+static void sending_says_what_became_of_it(void **state)
+{
+	struct can_frame frame = {.can_id = 0x210, .can_dlc = 8, .data = {1, 2, 3}};
+	static const struct {
+		int error, code;
+	} cases[] = {
+		{ENOBUFS, -ENOBUFS},
+		{EAGAIN, -ENOBUFS},
+		{EIO, -EIO},
+		{EINVAL, -EIO},
+		{0, 0},
+		{ENETDOWN, -ENETDOWN},
+		{0, -ENETDOWN},
+	};
+
+	kernel.send_interrupts = 2;
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		kernel.send_error = cases[i].error;
+		assert_int_equal(bus->ops->send(bus, &frame), cases[i].code);
+	}
+	assert_memory_equal(&kernel.sent, &frame, sizeof(frame));
+	assert_int_equal(bus->counts.sent, 1);
+	assert_int_equal(bus->counts.full, 2);
+	assert_int_equal(bus->ops->wait(bus, INT64_MAX), -ENETDOWN);
+	assert_int_equal(bus->ops->receive(bus, &frame, &kernel.now_ns), -ENETDOWN);
+}
+
+static void what_is_no_frame_is_not_sent(void **state)
+{
+	struct can_frame frame = {.can_id = CAN_ERR_FLAG | CAN_ERR_BUSOFF, .can_dlc = 8};
+
+	assert_int_equal(bus->ops->send(bus, &frame), -EINVAL);
+	frame.can_id = 0x210;
+	frame.can_dlc = 9;
+	assert_int_equal(bus->ops->send(bus, &frame), -EINVAL);
+	frame.can_dlc = 8;
+	kernel.send_takes = 4;
+	assert_int_equal(bus->ops->send(bus, &frame), -EIO);
+	kernel.send_takes = 0;
+	kernel.send_error = ENXIO;
+	assert_int_equal(bus->ops->send(bus, &frame), -ENODEV);
+	assert_int_equal(bus->counts.sent, 0);
+}
+
+/* A frame came so long ago; returns its stamp. */
+static int64_t came(int64_t ago_ns)
+{
+	struct can_frame frame;
+	int64_t t_ns = -1, wall_ns = kernel.wall_ns - ago_ns;
+
+	kernel.stamp = (struct timespec){wall_ns / S, wall_ns % S};
+	kernel.n_frames = 1;
+	kernel.next = 0;
+	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), 1);
+	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), 0);
+	return t_ns;
+}
+
+static void stamps_are_monotonic(void **state)
+{
+	int64_t now;
+
+	kernel.now_ns += 10 * S;
+	kernel.wall_ns += 10 * S;
+	now = kernel.now_ns;
+	assert_int_equal(came(3000), now - 3000);
+	assert_int_equal(came(2000), now - 2000);
+	/* Two processors stamp: the second frame is not before the first. */
+	assert_int_equal(came(2500), now - 2000);
+	/* The wall clock is set back, then far forward, with a frame in the queue. */
+	assert_int_equal(came(-3600 * S), now);
+	kernel.now_ns += S;
+	assert_int_equal(came(3600 * S), now);
+	assert_int_equal(came(1), now + S - 1);
+	/* No stamp: now. */
+	assert_int_equal(came(kernel.wall_ns), now + S);
+}
+
+static void what_the_kernel_lost_is_counted(void **state)
+{
+	static const struct {
+		uint32_t kernel;
+		uint64_t counted;
+	} cases[] = {{0, 0},
+		     {5, 5},
+		     {5, 5},
+		     {9, 9},
+		     {0xfffffff0u, 0xfffffff0u},
+		     {0x10, 0x100000010},
+		     {0x11, 0x100000011}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		kernel.lost = cases[i].kernel;
+		came(0);
+		assert_true(bus->counts.overflow == cases[i].counted);
+	}
+}
+
+static void error_frames_tell_the_state(void **state)
+{
+	static const struct {
+		canid_t id;
+		uint8_t controller;
+		int state;
+	} cases[] = {
+		{CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE, CAN_STATE_ERROR_PASSIVE},
+		{CAN_ERR_ACK, 0, CAN_STATE_ERROR_PASSIVE},
+		{CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW, CAN_STATE_ERROR_PASSIVE},
+		{CAN_ERR_CRTL, CAN_ERR_CRTL_RX_WARNING, CAN_STATE_ERROR_WARNING},
+		{CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE, CAN_STATE_ERROR_ACTIVE},
+		{CAN_ERR_BUSOFF | CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE,
+		 CAN_STATE_BUS_OFF},
+		{CAN_ERR_RESTARTED, 0, CAN_STATE_ERROR_ACTIVE},
+		{CAN_ERR_BUSOFF, 0, CAN_STATE_BUS_OFF},
+	};
+	struct can_frame frame;
+	int64_t t_ns;
+	int n = sizeof(cases) / sizeof(*cases);
+
+	for (int i = 0; i < n; i++) {
+		kernel.frames[0] =
+			(struct can_frame){.can_id = CAN_ERR_FLAG | cases[i].id,
+					   .can_dlc = CAN_ERR_DLC,
+					   .data = {0, cases[i].controller}};
+		kernel.n_frames = 1;
+		kernel.next = 0;
+		assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), 1);
+		assert_memory_equal(&frame, &kernel.frames[0], sizeof(frame));
+		assert_int_equal(bus->ops->state(bus), cases[i].state);
+	}
+	assert_int_equal(bus->counts.errors, n);
+	assert_int_equal(bus->counts.received, 0);
+}
+
+static void what_is_no_frame_is_passed_over(void **state)
+{
+	struct can_frame frame;
+	int64_t t_ns;
+
+	kernel.size[0] = 4;
+	kernel.size[1] = 72; /* CAN FD */
+	kernel.frames[2].can_dlc = 9;
+	kernel.frames[3].can_id = 0x190;
+	kernel.n_frames = 4;
+	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), 1);
+	assert_int_equal(frame.can_id, 0x190);
+	assert_int_equal(bus->counts.broken, 3);
+	assert_int_equal(bus->counts.received, 1);
+	/* Not without end. */
+	for (int i = 0; i < 64; i++)
+		kernel.size[i] = 4;
+	kernel.n_frames = 64;
+	kernel.next = 0;
+	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), 0);
+	assert_true(kernel.next < 64);
+}
+
+static void receiving_finds_what_went(void **state)
+{
+	struct can_frame frame;
+	int64_t t_ns;
+
+	kernel.receive_error = EIO;
+	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), -EIO);
+	kernel.receive_error = ENODEV;
+	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), -ENODEV);
+	/* For good, although the socket then says nothing more. */
+	kernel.receive_error = 0;
+	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), -ENODEV);
+	frame = (struct can_frame){.can_id = 0x080};
+	assert_int_equal(bus->ops->send(bus, &frame), -ENODEV);
+}
+
+static void waiting_has_an_end(void **state)
+{
+	int64_t now = kernel.now_ns;
+
+	assert_int_equal(bus->ops->now(bus), now);
+	assert_int_equal(bus->ops->wait(bus, now + 3 * S + 5), 0);
+	assert_int_equal(kernel.slept.tv_sec, 3);
+	assert_int_equal(kernel.slept.tv_nsec, 5);
+	assert_int_equal(bus->ops->wait(bus, now - 1), 0);
+	assert_int_equal(kernel.slept.tv_sec, 0);
+	assert_int_equal(kernel.slept.tv_nsec, 0);
+	assert_int_equal(bus->ops->wait(bus, INT64_MIN), 0);
+	assert_int_equal(kernel.slept.tv_nsec, 0);
+	assert_int_equal(bus->ops->wait(bus, INT64_MAX), 0);
+	kernel.poll_error = EINTR;
+	assert_int_equal(bus->ops->wait(bus, now + 1), -EINTR);
+}
+
+static void one_program_drives_a_node(void **state)
+{
+	struct can_bus *first, *second = NULL;
+	struct incise_error err = {0};
+
+	kernel_begin();
+	assert_int_equal(open_bus(&first, "vcan0", 0, 113, &err), 0);
+	assert_int_equal(open_bus(&second, "vcan0", 0, 113, &err), -EBUSY);
+	assert_non_null(strstr(err.text, "another program drives it: "));
+	assert_int_equal(kernel.opened, 1);
+	/* The other interface, another node and who just looks are free. */
+	assert_int_equal(open_bus(&second, "can0", 0, 113, &err), 0);
+	second->ops->close(second);
+	assert_int_equal(open_bus(&second, "vcan0", 0, 11, &err), 0);
+	second->ops->close(second);
+	assert_int_equal(open_bus(&second, "vcan0", 0, 0, &err), 0);
+	second->ops->close(second);
+	first->ops->close(first);
+	assert_int_equal(open_bus(&first, "vcan0", 0, 113, &err), 0);
+	first->ops->close(first);
+	assert_int_equal(kernel.opened, 0);
+}
+
+#define WITH(test) cmocka_unit_test_setup_teardown(test, setup, teardown)
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(what_cannot_be_opened_is_said),
+		cmocka_unit_test(what_it_is_set_to_is_asked_of_hardware),
+		cmocka_unit_test(one_program_drives_a_node),
+		WITH(the_socket_is_set_up),
+		WITH(filters_are_the_kernels),
+		WITH(sending_says_what_became_of_it),
+		WITH(what_is_no_frame_is_not_sent),
+		WITH(stamps_are_monotonic),
+		WITH(what_the_kernel_lost_is_counted),
+		WITH(error_frames_tell_the_state),
+		WITH(what_is_no_frame_is_passed_over),
+		WITH(receiving_finds_what_went),
+		WITH(waiting_has_an_end),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
