@@ -83,11 +83,12 @@ static double destination(const struct stepper_job *job, struct stepper_drive *d
 	return fmax(0, fmin(drive->info.travel_mm, mm));
 }
 
-/* Whether it rests at the microstep nearest to a target. */
+/* Whether it rests at a target, or at the microstep nearest to it. */
 static bool arrived(const struct stepper_drive *drive, double to_mm)
 {
 	return stepper_drive_rests(drive) &&
-	       fabs(drive->status.position_mm - to_mm) <= 0.6 * drive->info.step_mm;
+	       fabs(drive->status.position_mm - to_mm) <=
+		       fmax(0.6 * drive->info.step_mm, drive->info.within_mm);
 }
 
 /* What the limits make of a motion, from rest to rest at most. */
@@ -112,7 +113,7 @@ void stepper_move(const struct stepper_job *job, struct stepper_drive *drive)
 {
 	double to_mm = destination(job, drive), from_mm = drive->status.position_mm;
 	double within_s = motion_s(&drive->info, to_mm - from_mm), seconds;
-	double step_mm = drive->info.step_mm;
+	double step_mm = drive->info.step_mm, arrived_s = INFINITY;
 	int64_t begin;
 
 	/* The travel's end, when that is between two steps, is the one before it. */
@@ -124,7 +125,10 @@ void stepper_move(const struct stepper_job *job, struct stepper_drive *drive)
 		stepper_drive_to(drive, to_mm);
 		seconds = (double)(incise_clock_now(drive->clock) - begin) /
 			  INCISE_NS_PER_S;
-	} while (!cli_stop && !arrived(drive, to_mm) && seconds < within_s);
+		arrived_s = arrived(drive, to_mm) ? fmin(arrived_s, seconds) : INFINITY;
+		/* A drive that follows its targets is given the time to be there. */
+	} while (!cli_stop && seconds < within_s &&
+		 !(seconds >= arrived_s + drive->info.settle_s));
 	if (!arrived(drive, to_mm) && cli_stop)
 		fail_stopped(drive);
 	if (!arrived(drive, to_mm))

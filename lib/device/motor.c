@@ -289,6 +289,8 @@ static void motor_info(const struct incise_stepper *stepper,
 		.jerk_mm_s3 = actuator->jerk_mm_s3,
 		.deadman_s = actuator->deadman_s,
 		.rate_max_hz = motor->rate_max_hz,
+		/* The count of steps is exact. */
+		.within_mm = incise_actuator_step_mm(actuator) / 2,
 		.can_home = motor->lines &
 			    (INCISE_STEPPER_LINE_HOME | INCISE_STEPPER_LINE_LIMIT_MIN),
 		.origin_mm = actuator->origin_mm,

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <linux/can/netlink.h>
 #include "can_fit.h"
+#include "cia402_object.h"
 #include "can_link.h"
 
 #define MS 1000000LL
@@ -125,13 +126,13 @@ static int take_position(struct can_link *link, bool keep, const char *where,
 	const struct incise_actuator *a = &link->actuator;
 	double per_mm = link->axis.setup.counts_per_step / incise_actuator_step_mm(a);
 	struct incise_abi_status *status = &link->axis.motion.status;
+	const struct cia402_object position = {0x6064, 0, 4, "position"};
+	const struct cia402_talk talk = {&link->master, where, err};
 	uint32_t counts;
-	int rc = canopen_read(&link->master, 0x6064, 0, 4, &counts);
+	int rc = cia402_ask(&talk, &position, &counts);
 
 	if (rc)
-		return incise_error_set(err, -rc,
-					"%s: its position (6064) cannot be read: %s",
-					where, strerror(-rc));
+		return rc;
 	link->axis.position = (int32_t)counts;
 	if (link->is_homed)
 		link->axis.zero_counts = -a->home_mm * per_mm;
@@ -236,6 +237,10 @@ int can_link_open(struct can_link *link, const struct can_transport *transport,
 	rc = set_filter(link);
 	if (!rc)
 		rc = check_alone(link, asked->where, err);
+	/* One that another master stopped answers nothing else. */
+	if (!rc && (rc = canopen_nmt(&link->master, CANOPEN_PREPARE)) < 0)
+		rc = incise_error_set(err, -rc, "%s: %s: cannot send: %s", asked->where,
+				      link->bus->name, strerror(-rc));
 	if (!rc)
 		rc = know(link, asked->where, err);
 	if (!rc)
@@ -294,18 +299,16 @@ int can_link_look(struct can_link *link, const struct can_transport *transport,
 /* An e-stop that is pressed forbids power, and one that was let go no longer does. */
 static int take_inputs(struct can_link *link, struct incise_error *err)
 {
+	const struct cia402_object digital = {0x60fd, 0, 4, "digital inputs"};
+	const struct cia402_talk talk = {&link->master, link->where, err};
 	uint32_t inputs;
 	int rc;
 
 	if (!link->taken.inputs)
 		return 0;
-	rc = canopen_read(&link->master, 0x60fd, 0, 4, &inputs);
+	rc = cia402_ask(&talk, &digital, &inputs);
 	if (rc)
-		return incise_error_set(
-			err, -rc,
-			"%s: its inputs (60FD) cannot be read: %s; see its "
-			"power and cable",
-			link->where, strerror(-rc));
+		return rc;
 	can_axis_inputs(&link->axis, inputs);
 	return 0;
 }

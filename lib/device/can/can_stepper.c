@@ -196,6 +196,9 @@ static void stepper_info(const struct incise_stepper *stepper,
 	const struct can_stepper *c = (const struct can_stepper *)stepper;
 
 	c->motor_ops->info(stepper, info);
+	/* What it measures is not what it was told: it follows. */
+	info->within_mm = c->motor.actuator.can.following_mm;
+	info->settle_s = c->motor.actuator.can.following_s;
 	info->can_home = c->motor.actuator.can.homing_method != 0;
 }
 

@@ -37,11 +37,13 @@ struct incise_stepper_info {
 	double jerk_mm_s3;	   /**< largest; 0: not limited */
 	double deadman_s;	   /**< without a target for so long, it stops */
 	double rate_max_hz;	   /**< largest step rate the backend takes; 0: any */
-	bool measures_handle;	   /**< status has handle_mm and force_N */
-	bool can_home;		   /**< incise_stepper_home() can find its 0 */
-	double origin_mm;    /**< without measures_handle: where handle_mm is 0, along
+	double within_mm;     /**< at rest, position may be off its target by that … */
+	double settle_s;      /**< … so long after the state is ready again */
+	bool measures_handle; /**< status has handle_mm and force_N */
+	bool can_home;	      /**< incise_stepper_home() can find its 0 */
+	double origin_mm;     /**< without measures_handle: where handle_mm is 0, along
 					the actuator's axis in the tracker's frame */
-	unsigned int inputs; /**< incise_stepper_input bits that are wired */
+	unsigned int inputs;  /**< incise_stepper_input bits that are wired */
 };
 
 /** What it does. */
