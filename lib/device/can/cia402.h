@@ -137,11 +137,11 @@ struct cia402_taken {
  * when this side is silent (6007: quick stop) and how it does (605A: ramp, then without
  * power), limits, mode, interpolation period; then to operational. All that matters is read
  * back. Also after it rebooted. @master sends heartbeats from then on (own, beat_ns): they are
- * what keeps the drive's deadman off. About 130 SDOs; in vain, it ends within seconds.
+ * what keeps the drive's deadman off. About 100 SDOs; in vain, it ends within seconds.
  *
- * 0; -EINVAL (setup that cannot be), -EBUSY (it has power), -EOPNOTSUPP (it lacks what is needed: heartbeat consumer, abort
- * connection option, the mode …; the line says which object and why), -ETIMEDOUT, -EPROTO
- * (it did not keep what was written), of the bus.
+ * 0; -EINVAL (setup that cannot be), -EBUSY (it has power), -EOPNOTSUPP (it lacks what is
+ * needed: heartbeat consumer, abort connection option, the mode …; the line says which object
+ * and why), -ETIMEDOUT, -EPROTO (it did not keep what was written), -EINTR, of the bus.
  */
 int cia402_configure(struct canopen *master, const struct cia402_setup *setup,
 		     struct cia402_taken *taken, const char *where,

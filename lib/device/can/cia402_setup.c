@@ -88,9 +88,19 @@ static int tell_nmt(const struct cia402_talk *talk, enum canopen_command command
 	return rc ? cia402_failed(talk, &nmt, "changed", rc) : 0;
 }
 
+/* For a drive that can make use of it: one that refuses it does without. */
+static int hint(const struct cia402_talk *talk, const struct cia402_object *object,
+		uint32_t value)
+{
+	int rc = canopen_write(talk->master, object->index, object->sub, object->size,
+			       value);
+
+	return rc && rc != -EREMOTEIO ? cia402_failed(talk, object, "written", rc) : 0;
+}
+
 /*
  * The mode, its cycle, and the SYNC. What 1006 and 1007 say is a hint to drives that lock
- * their loops to SYNC: those that refuse it do without.
+ * their loops to SYNC.
  */
 static int set_cycle(const struct cia402_talk *talk, const struct cia402_setup *setup)
 {
@@ -114,11 +124,11 @@ static int set_cycle(const struct cia402_talk *talk, const struct cia402_setup *
 		rc = cia402_see_to(talk, &sync_id, SYNC_ID);
 	if (rc)
 		return rc;
-	rc = canopen_write(talk->master, sync_period.index, 0, 4, setup->cycle_ns / 1000);
-	if (!rc || rc == -EREMOTEIO)
-		rc = canopen_write(talk->master, sync_window.index, 0, 4, 0);
-	if (rc && rc != -EREMOTEIO)
-		return cia402_failed(talk, &sync_period, "written", rc);
+	rc = hint(talk, &sync_period, setup->cycle_ns / 1000);
+	if (!rc)
+		rc = hint(talk, &sync_window, 0);
+	if (rc)
+		return rc;
 	for (size_t i = 0; i < sizeof(powers); i++) {
 		uint64_t unit_ns = 1000000000;
 
@@ -184,8 +194,8 @@ static int start(const struct cia402_talk *talk, const struct cia402_setup *setu
 		return incise_error_set(
 			talk->err, ETIMEDOUT,
 			"%s: the drive does not become operational: its heartbeat says "
-			"%s; see its EMCY codes with `incise info can:%s`",
-			talk->where, canopen_state_name(master->state), bus->name);
+			"%s; see its EMCY codes with `incise info` of this bus",
+			talk->where, canopen_state_name(master->state));
 	if (rc)
 		return cia402_failed(talk, &nmt, "heard", rc);
 	return check_power(talk);

@@ -65,9 +65,9 @@ int cia402_identify(struct canopen *master, struct cia402_identity *identity,
 	if (rc == -ETIMEDOUT)
 		return incise_error_set(
 			err, ENODEV,
-			"%s: nobody answers at node %u; see the drive's power, its "
-			"wiring, node id and bit rate, or list what is there with `incise "
-			"info can:%s`",
+			"%s: nobody answers at node 0x%02x on %s; see the drive's power, "
+			"its wiring, node id and bit rate, and what else `incise info` "
+			"finds on this bus",
 			where, master->node, master->bus->name);
 	if (rc)
 		return cia402_failed(&talk, &device_type, "read", rc);

@@ -366,7 +366,7 @@ static inline void drive_init(struct drive *d)
 					       drive_close};
 	static const struct drive_object objects[] = {
 #define X(name, index, sub, size, access, value) \
-	{index, sub, size, access, 0, value, false},
+	{index, sub, size, access, 0, value, false, false},
 		DRIVE_OBJECTS(X)
 #undef X
 	};

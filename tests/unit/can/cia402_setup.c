@@ -407,6 +407,16 @@ static void test_bus_fails(void **state)
 	led_init(led);
 	led->drive.twice = true;
 	assert_int_equal(led_configure(led), 0);
+	/* A silence is named by its object, also where a refusal would be passed over. */
+	for (uint16_t index = 0x1006; index <= 0x1007; index++) {
+		char name[8];
+
+		led_init(led);
+		drive_object(&led->drive, index, 0)->lost = true;
+		assert_int_equal(led_configure(led), -ETIMEDOUT);
+		snprintf(name, sizeof(name), "%04X:0", index);
+		assert_non_null(strstr(led->err.text, name));
+	}
 	led_init(led);
 	led->drive.no_heartbeat = true;
 	assert_int_equal(led_configure(led), -ETIMEDOUT);

@@ -217,7 +217,7 @@ static void test_identity(void **state)
 	led->drive.mute = true;
 	assert_int_equal(cia402_identify(&led->master, &identity, "here", &led->err),
 			 -ENODEV);
-	assert_non_null(strstr(led->err.text, "nobody answers at node 16"));
+	assert_non_null(strstr(led->err.text, "nobody answers at node 0x10 on can-test"));
 	led->drive.send_error = -ENETDOWN;
 	assert_int_equal(cia402_identify(&led->master, &identity, "here", &led->err),
 			 -ENETDOWN);

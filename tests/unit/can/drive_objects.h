@@ -264,6 +264,7 @@ static inline void drive_download(struct drive *d, const uint8_t request[8])
 static inline void drive_sdo(struct drive *d, const struct can_frame *frame)
 {
 	uint16_t index = (uint16_t)(frame->data[1] | frame->data[2] << 8);
+	const struct drive_object *o = drive_object(d, index, frame->data[3]);
 
 	if (frame->len != 8)
 		return;
@@ -273,7 +274,7 @@ static inline void drive_sdo(struct drive *d, const struct can_frame *frame)
 		return;
 	}
 	d->requests++;
-	if (d->requests == d->drop_at)
+	if (d->requests == d->drop_at || (o && o->lost))
 		return;
 	if (d->requests == d->abort_at ||
 	    (d->abort_index && index == d->abort_index &&

@@ -122,6 +122,7 @@ struct drive_object {
 	uint8_t access;
 	uint32_t value, initial;
 	bool deaf; /* a write is answered well, but not kept */
+	bool lost; /* an SDO of it is not answered */
 };
 
 struct drive_frame {
