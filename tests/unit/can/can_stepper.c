@@ -308,164 +308,6 @@ static void no_set_point_is_lost(void **state)
 	can_rig_close(&rig);
 }
 
-/* Whatever the drive refuses, or leaves without an answer, on its way to power. */
-static void no_step_of_the_start_hangs_or_gives_power(void **state)
-{
-	uint32_t requests;
-
-	can_rig_init(&rig);
-	open_or_fail();
-	requests = (uint32_t)rig.drive.requests;
-	can_rig_close(&rig);
-	assert_true(requests > 40);
-	for (uint32_t k = 1; k <= requests; k++)
-		for (int drop = 0; drop < 2; drop++) {
-			struct incise_error err = {0};
-			int64_t begin;
-
-			can_rig_init(&rig);
-			if (drop)
-				rig.drive.drop_at = k;
-			else
-				rig.drive.abort_at = k;
-			begin = rig.drive.now_ns;
-			if (can_rig_open(&rig, &err)) {
-				/* One that it can do without. */
-				enable_or_fail();
-				can_rig_close(&rig);
-			} else if (!strstr(err.text, "rig.conf:3: stepper: ") || !errno) {
-				fail_msg("request %u: \"%s\"", k, err.text);
-			}
-			assert_false(drive_powered(&rig.drive));
-			assert_int_equal(rig.drive.enabled_unasked, 0);
-			/* An answer is waited for 0.2 s; all else goes by the cycle. */
-			if (rig.drive.now_ns - begin > 3000 * MS)
-				fail_msg("request %u took %lld ms", k,
-					 (long long)((rig.drive.now_ns - begin) / MS));
-		}
-}
-
-static void why_it_cannot_begin_is_said(void **state)
-{
-	static const struct {
-		const char *arguments;
-		int master;
-		double deadman_s;
-		uint32_t bitrate;
-		int code;
-		const char *says;
-	} cases[] = {
-		{"can0", 127, 0.1, 1000000, EINVAL, "expected can:DEVICE:NODE"},
-		{"can0:", 127, 0.1, 1000000, EINVAL, "expected can:DEVICE:NODE"},
-		{"can0:0", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
-		{"can0:128", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
-		{"can0:-1", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
-		{"can0:0x10x", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
-		{":0x10", 127, 0.1, 1000000, EINVAL, "expected can:DEVICE:NODE"},
-		{"c:0x10", 16, 0.1, 1000000, EINVAL, "also actuator.can.master"},
-		{"c:0x11", 127, 0.1, 1000000, ENODEV, "nobody answers"},
-		{"c:0x10", 127, 0.01, 1000000, EINVAL, "expected at least 20"},
-		/* 305 bits of 1 kHz, by the lengths of three frames, are 122 % … */
-		{"c:0x10", 127, 0.1, 250000, ERANGE, "may take 80 %"},
-		/* … and fit into twice that. */
-		{"c:0x10", 127, 0.1, 500000, 0, ""},
-		{"c:0x10", 127, 0.1, 0, 0, ""},
-	};
-
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-
-		can_rig_init(&rig);
-		rig.arguments = cases[i].arguments;
-		rig.actuator.can.master = cases[i].master;
-		rig.actuator.deadman_s = cases[i].deadman_s;
-		rig.drive.bus.bitrate = cases[i].bitrate;
-		if (can_rig_open(&rig, &err))
-			can_rig_close(&rig);
-		if (err.code != cases[i].code || !strstr(err.text, cases[i].says))
-			fail_msg("case %zu: %d, \"%s\"", i, err.code, err.text);
-	}
-}
-
-static void another_master_is_not_disturbed(void **state)
-{
-	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
-	struct incise_error err = {0};
-
-	can_rig_init(&rig);
-	drive_say(&rig.drive, &sync);
-	assert_null(can_rig_open(&rig, &err));
-	assert_int_equal(err.code, EBUSY);
-	assert_non_null(strstr(err.text, "another master"));
-	assert_int_equal(rig.drive.requests, 0);
-}
-
-static void it_homes_by_itself(void **state)
-{
-	static const double home_mm[] = {0, -0.5, 1.5};
-
-	for (size_t i = 0; i < sizeof(home_mm) / sizeof(*home_mm); i++) {
-		struct incise_stepper_edge_found edge = {0, 0};
-		struct incise_stepper_status s;
-		struct incise_error err = {0};
-
-		can_rig_init(&rig);
-		rig.actuator.home_mm = home_mm[i];
-		open_or_fail();
-		assert_false(can_rig_look(&rig).homed);
-		enable_or_fail();
-		if (incise_stepper_home_edge(rig.stepper, NULL, &edge, &err))
-			fail_msg("%s", err.text);
-		s = can_rig_look(&rig);
-		assert_true(s.homed && s.state == INCISE_STEPPER_READY && !s.faults);
-		assert_true(isnan(edge.before_mm) && edge.after_mm == home_mm[i]);
-		assert_true(fabs(s.position_mm - fmax(0, home_mm[i])) < 1e-3);
-		/* The drive's own 0 is at its switch, that is at home_mm. */
-		assert_true(fabs(rig.drive.position / COUNTS_PER_MM -
-				 (fmax(0, home_mm[i]) - home_mm[i])) < 1e-3);
-		assert_int_equal((int32_t)rig.drive.od[OD_RANGE_MIN].value,
-				 (int32_t)lround(COUNTS_PER_MM *
-						 (fmin(0, home_mm[i]) - home_mm[i] - 1)));
-		can_rig_close(&rig);
-		/* Whoever opens it next knows: the drive says so. */
-		open_or_fail();
-		assert_true(can_rig_look(&rig).homed);
-		can_rig_close(&rig);
-		/* A reboot takes it away. */
-		drive_reboot(&rig.drive);
-		open_or_fail();
-		assert_false(can_rig_look(&rig).homed);
-		can_rig_close(&rig);
-	}
-}
-
-static void homing_can_fail_and_be_stopped(void **state)
-{
-	volatile int stop = 0;
-	struct incise_error err = {0};
-
-	can_rig_init(&rig);
-	open_or_fail();
-	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), -EIO);
-	assert_non_null(strstr(err.text, "not powered"));
-	enable_or_fail();
-	rig.drive.homing_fails = true;
-	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), -EIO);
-	assert_non_null(strstr(err.text, "its homing failed"));
-	assert_false(drive_powered(&rig.drive));
-	assert_false(can_rig_look(&rig).homed);
-	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
-	rig.drive.homing_fails = false;
-	assert_int_equal(incise_stepper_clear(rig.stepper, &err), 0);
-	enable_or_fail();
-	stop = 1;
-	assert_int_equal(incise_stepper_home(rig.stepper, &stop, &err), -EINTR);
-	assert_false(drive_powered(&rig.drive));
-	assert_int_equal(can_rig_look(&rig).faults, 0);
-	enable_or_fail();
-	can_rig_close(&rig);
-}
-
 /* The loops that are closed here: they come to the target, and stay within its limits. */
 static void velocities_and_torques_go_there_too(void **state)
 {
@@ -504,39 +346,6 @@ static void velocities_and_torques_go_there_too(void **state)
 	}
 }
 
-static void a_watcher_looks_and_writes_nothing(void **state)
-{
-	struct incise_stepper_status s;
-	struct incise_error err = {0};
-	uint64_t enables;
-
-	can_rig_init(&rig);
-	rig.drive.absolute = true;
-	drive_reboot(&rig.drive);
-	rig.drive.position = 3 * COUNTS_PER_MM;
-	rig.actuator.can.absolute = true;
-	rig.watch = true;
-	open_or_fail();
-	enables = rig.drive.enables;
-	can_rig_advance(&rig, 100 * MS);
-	s = can_rig_look(&rig);
-	assert_int_equal(s.state, INCISE_STEPPER_DISABLED);
-	assert_true(s.homed && fabs(s.position_mm - 3) < 1e-3);
-	assert_int_equal(incise_stepper_set(rig.stepper, 1), -EPERM);
-	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
-	drive_fault(&rig.drive, 0x4310);
-	can_rig_advance(&rig, 100 * MS);
-	s = can_rig_look(&rig);
-	assert_int_equal(s.state, INCISE_STEPPER_FAULT);
-	assert_int_equal(s.faults, INCISE_STEPPER_ALARM);
-	rig.drive.mute = true;
-	can_rig_advance(&rig, 1000 * MS);
-	assert_int_equal(can_rig_look(&rig).faults, INCISE_STEPPER_LOST);
-	assert_int_equal(rig.drive.enables, enables);
-	assert_int_equal(rig.drive.master_beats, 0);
-	can_rig_close(&rig);
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -544,13 +353,7 @@ int main(void)
 		cmocka_unit_test(each_fault_stops_the_drive_and_is_named),
 		cmocka_unit_test(a_program_that_hangs_is_stopped_by_the_drive),
 		cmocka_unit_test(no_set_point_is_lost),
-		cmocka_unit_test(no_step_of_the_start_hangs_or_gives_power),
-		cmocka_unit_test(why_it_cannot_begin_is_said),
-		cmocka_unit_test(another_master_is_not_disturbed),
-		cmocka_unit_test(it_homes_by_itself),
-		cmocka_unit_test(homing_can_fail_and_be_stopped),
 		cmocka_unit_test(velocities_and_torques_go_there_too),
-		cmocka_unit_test(a_watcher_looks_and_writes_nothing),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

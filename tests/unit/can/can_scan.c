@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/can/can_scan.c: who is on a bus, found without a word written to them.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include "rig.h"
+
+static struct can_rig rig;
+
+struct list {
+	struct incise_scan_device device[4];
+	int n, end;
+};
+
+static int found(void *context, const struct incise_scan_device *device)
+{
+	struct list *list = context;
+
+	assert_true(list->n < 4);
+	list->device[list->n++] = *device;
+	return list->end;
+}
+
+static const char *property(const struct incise_scan_device *device, const char *key)
+{
+	for (int i = 0; i < device->n; i++)
+		if (!strcmp(device->property[i].key, key))
+			return device->property[i].text;
+	return "(there is none)";
+}
+
+static void a_drive_is_listed_with_what_it_is(void **state)
+{
+	static const char *const arguments[] = {"can-test", "can-test:0x10"};
+
+	for (int i = 0; i < 2; i++) {
+		struct incise_error err = {0};
+		struct list list = {0};
+
+		can_rig_init(&rig);
+		assert_int_equal(can_stepper_scan(&can_rig_of, arguments[i], found, &list,
+						  &err),
+				 0);
+		assert_int_equal(list.n, 1);
+		assert_string_equal(list.device[0].device, "can:can-test:0x10");
+		assert_string_equal(list.device[0].what,
+				    "simulated drive: switch-on disabled");
+		assert_string_equal(property(&list.device[0], "vendor_id"), "0x00000286");
+		assert_string_equal(property(&list.device[0], "serial"), "0x00001267");
+		assert_string_equal(property(&list.device[0], "drive_state"),
+				    "switch-on disabled");
+		assert_string_equal(property(&list.device[0], "error"), "no fault");
+		assert_non_null(
+			strstr(property(&list.device[0], "modes"), "csp csv cst"));
+		/* It only read, and sent no heartbeat. */
+		assert_int_equal(rig.drive.master_beats, 0);
+		assert_int_equal(rig.drive.rpdos + rig.drive.syncs, 0);
+		assert_int_equal(rig.drive.nmt, CANOPEN_PRE_OPERATIONAL);
+	}
+}
+
+static void a_fault_is_told(void **state)
+{
+	struct incise_error err = {0};
+	struct list list = {0};
+
+	can_rig_init(&rig);
+	drive_fault(&rig.drive, 0x4310);
+	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
+			 0);
+	assert_int_equal(list.n, 1);
+	assert_string_equal(property(&list.device[0], "drive_state"), "fault");
+	assert_string_equal(property(&list.device[0], "error_code"), "0x4310");
+	assert_non_null(strstr(list.device[0].what, "fault, "));
+	assert_non_null(strstr(property(&list.device[0], "error"), "(4310h)"));
+}
+
+static void what_is_no_drive_is_listed_too(void **state)
+{
+	struct incise_error err = {0};
+	struct list list = {0};
+
+	can_rig_init(&rig);
+	rig.drive.od[OD_TYPE].value = 0x000f0191;
+	rig.drive.name = NULL;
+	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
+			 0);
+	assert_int_equal(list.n, 1);
+	assert_non_null(strstr(list.device[0].what, "profile 401, no CiA 402 drive"));
+}
+
+static void nobody_and_nothing(void **state)
+{
+	struct incise_error err = {0};
+	struct list list = {0};
+
+	can_rig_init(&rig);
+	rig.drive.unplugged = true;
+	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
+			 0);
+	assert_int_equal(list.n, 0);
+	/* Nobody acknowledges. */
+	rig.drive.send_error = -ENOBUFS;
+	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
+			 -ENOBUFS);
+	assert_non_null(strstr(err.text, "can:can-test: "));
+	can_rig_init(&rig);
+	rig.drive.receive_error = -ENETDOWN;
+	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
+			 -ENETDOWN);
+	/* Who asked may end it. */
+	can_rig_init(&rig);
+	list.end = 7;
+	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
+			 7);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_drive_is_listed_with_what_it_is),
+		cmocka_unit_test(a_fault_is_told),
+		cmocka_unit_test(what_is_no_drive_is_listed_too),
+		cmocka_unit_test(nobody_and_nothing),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
