@@ -12,7 +12,7 @@
 #define NS_PER_S 1000000000ull
 #define BEAT_BYTES 1
 #define INPUT_BYTES 4
-#define INPUT_NS 1000000 /* the inhibit time that TPDO2 is configured with */
+#define INPUT_NS 10000000 /* the inhibit time that TPDO2 is configured with */
 
 uint32_t bus_load_bits(unsigned int bytes)
 {

@@ -19,7 +19,8 @@
 #define KEPT 0x40000000u /* a drive's own bit: no RTR */
 #define AT_SYNC 1
 #define AT_CHANGE 255
-#define INHIBIT 10   /* 1 ms; bus_load.c counts on it */
+#define INHIBIT \
+	100 /* 10 ms, after an input that changed at once; bus_load.c counts on it */
 #define TIMER_MS 100 /* inputs come at least that often */
 
 #define MAP_CONTROLWORD 0x60400010

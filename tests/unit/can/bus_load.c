@@ -43,11 +43,11 @@ static void test_bits(void **state)
 
 static void test_loads(void **state)
 {
-	/* SYNC 55, two of 8 bytes 135 each, at 1 kHz; inputs 95 bits at 1 kHz. */
-	assert_int_equal(bus_load_of(1000000, 8, 8, 0), 325000 + 95000);
+	/* SYNC 55, two of 8 bytes 135 each, at 1 kHz; inputs 95 bits at 100 Hz. */
+	assert_int_equal(bus_load_of(1000000, 8, 8, 0), 325000 + 9500);
 	/* Heartbeats of 65 bits, ten a second each way. */
-	assert_int_equal(bus_load_of(1000000, 8, 8, 100000000), 325000 + 95000 + 1300);
-	assert_int_equal(bus_load_of(2000000, 6, 6, 0), 285000 / 2 + 95000);
+	assert_int_equal(bus_load_of(1000000, 8, 8, 100000000), 325000 + 9500 + 1300);
+	assert_int_equal(bus_load_of(2000000, 6, 6, 0), 285000 / 2 + 9500);
 }
 
 /* What fits: 1 kHz at 1 Mbit/s and at 500 kbit/s, not at 250. */
@@ -64,8 +64,8 @@ static void test_extremes(void **state)
 {
 	assert_int_equal(bus_load_of(0, 8, 8, 1), UINT32_MAX);
 	assert_int_equal(bus_load_of(1, 8, 8, 1), UINT32_MAX);
-	assert_int_equal(bus_load_of(UINT32_MAX, 0, 0, INT64_MAX), 39 + 95000 + 1);
-	assert_int_equal(bus_load_of(UINT32_MAX, 0, 0, -1), 39 + 95000);
+	assert_int_equal(bus_load_of(UINT32_MAX, 0, 0, INT64_MAX), 39 + 9500 + 1);
+	assert_int_equal(bus_load_of(UINT32_MAX, 0, 0, -1), 39 + 9500);
 }
 
 int main(void)
