@@ -390,8 +390,12 @@ void can_link_close(struct can_link *link)
 {
 	if (!link->bus)
 		return;
-	/* It need not watch over who has gone in good order. */
-	if (link->is_setup && link->master.own) {
+	/*
+	 * It need not watch over who has gone in good order; else its own watch is what stops
+	 * it now. That it has no power it must have said itself.
+	 */
+	if (link->is_setup && link->master.own &&
+	    !cia402_power_off(&link->master, link->where, NULL)) {
 		canopen_write(&link->master, 0x1016, 1, 4, 0);
 		canopen_nmt(&link->master, CANOPEN_PREPARE);
 	}

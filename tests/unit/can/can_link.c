@@ -125,9 +125,38 @@ static void another_master_is_not_disturbed(void **state)
 	assert_int_equal(rig.drive.requests, 0);
 }
 
+/* Its watch is switched off by who leaves in good order, and by nobody else. */
+static void who_goes_leaves_it_stopped_or_watched(void **state)
+{
+	static const struct {
+		bool unplugged, mute;
+		uint32_t consumer;
+	} cases[] = {
+		{false, false, 0},
+		{true, false, 127 << 16 | 100},
+		{false, true, 127 << 16 | 100},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		can_rig_init(&rig);
+		open_or_fail();
+		enable_or_fail();
+		can_rig_hold(&rig, 15, 200 * MS);
+		rig.drive.unplugged = cases[i].unplugged;
+		rig.drive.mute = cases[i].mute;
+		can_rig_close(&rig);
+		assert_int_equal(rig.drive.od[OD_CONSUMER].value, cases[i].consumer);
+		drive_advance(&rig.drive, 500 * MS);
+		assert_false(drive_powered(&rig.drive));
+		assert_int_equal(rig.drive.velocity, 0);
+		assert_int_equal(rig.drive.enabled_unasked, 0);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(who_goes_leaves_it_stopped_or_watched),
 		cmocka_unit_test(no_step_of_the_start_hangs_or_gives_power),
 		cmocka_unit_test(why_it_cannot_begin_is_said),
 		cmocka_unit_test(another_master_is_not_disturbed),

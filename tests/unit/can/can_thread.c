@@ -116,7 +116,8 @@ static void it_runs_and_lends_the_bus(void **state)
 	/* Closed under way. */
 	rig.stepper->ops->close(rig.stepper);
 	catch_up(&rig.drive.bus);
-	assert_false(drive_powered(&rig.drive));
+	if (drive_powered(&rig.drive))
+		fail_msg("left in %s", cia402_state_name(rig.drive.state));
 	assert_int_equal(rig.drive.enabled_unasked, 0);
 }
 
