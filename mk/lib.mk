@@ -40,25 +40,28 @@ $(foreach lib,$(libraries),$(eval $(call library,$(lib))))
 # Modules of devices, $(O)/lib/incise/KIND_NAME.so: loaded when rig.conf names them. They
 # bring a library into the process that others do not need. What of libincise they use and
 # it does not export, they hold themselves.
-has_socketcan := $(shell $(PKG_CONFIG) --exists libsocketcan && echo yes)
+has_libmnl := $(shell $(PKG_CONFIG) --exists libmnl && echo yes)
 device_modules := $(if $(shell $(PKG_CONFIG) --exists libgpiod && echo yes),stepper_gpio) \
-	$(if $(has_socketcan),stepper_can) stepper_slcan
+	$(if $(has_libmnl),stepper_can) stepper_slcan
 pc_stepper_gpio := libgpiod
 objects_stepper_gpio := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o thread.o gpio/pulser.o \
 	gpio/stepper_gpio.o \
 	$(if $(shell $(PKG_CONFIG) --atleast-version=2 libgpiod && echo yes),gpio/gpio_v2.o,gpio/gpio_v1.o))
 
 # One drive on two kinds of bus; each module has just its own.
-can_transports := $(addprefix lib/device/can/,socketcan.c slcan.c slcan_line.c)
+can_socketcan := socketcan can_netlink can_owner
+can_slcan := slcan slcan_line
+can_transports := $(patsubst %,lib/device/can/%.c,$(can_socketcan) $(can_slcan))
 can_modules := $(addprefix lib/device/can/,stepper_can.c stepper_slcan.c)
 can_core := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o thread.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(can_transports) $(can_modules),\
 		$(wildcard lib/device/can/*.c)))
-pc_stepper_can := libsocketcan
-objects_stepper_can := $(can_core) $(addprefix $(O)/obj/lib/device/can/,socketcan.o stepper_can.o)
+pc_stepper_can := libmnl
+objects_stepper_can := $(can_core) \
+	$(patsubst %,$(O)/obj/lib/device/can/%.o,$(can_socketcan) stepper_can)
 pc_stepper_slcan :=
 objects_stepper_slcan := $(can_core) \
-	$(addprefix $(O)/obj/lib/device/can/,slcan.o slcan_line.o stepper_slcan.o)
+	$(patsubst %,$(O)/obj/lib/device/can/%.o,$(can_slcan) stepper_slcan)
 
 define device_module
 $(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
@@ -74,14 +77,14 @@ $(foreach name,$(device_modules),$(eval $(call device_module,$(name))))
 # For unit tests, which reach into what the shared objects hide.
 test_objects := $(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(can_modules) \
-		$(if $(has_socketcan),,%/socketcan.c),$(wildcard lib/device/can/*.c)))
+		$(if $(has_libmnl),,%/socketcan.c %/can_netlink.c),$(wildcard lib/device/can/*.c)))
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
 	# q, not r: two rooms may have a file of the same name
 	$(AR) qcs $@ $^
 
-all_libs = $(if $(has_socketcan),$(shell $(PKG_CONFIG) --libs libsocketcan)) \
+all_libs = $(if $(has_libmnl),$(shell $(PKG_CONFIG) --libs libmnl)) \
 	$(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
 
 .PHONY: libs

@@ -2,7 +2,7 @@
 # Tests. tests/unit/ROOM/NAME.c tests lib/ROOM/NAME.c, tests/unit/driver what of driver/ builds
 # without a kernel; tests/cli runs the real programs.
 
-unit_sources := $(filter-out $(if $(has_socketcan),,tests/unit/can/socketcan.c),\
+unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_netlink.c),\
 	$(wildcard tests/unit/*/*.c))
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
@@ -11,8 +11,10 @@ ldflags_scene/jail := $(foreach name,malloc calloc realloc free,-Wl,--wrap=$(nam
 ldflags_device/stepper_kernel := $(foreach name,open close ioctl mmap munmap clock_nanosleep \
 	nanosleep,-Wl,--wrap=$(name))
 ldflags_can/slcan := -Wl,--wrap=write
-ldflags_can/socketcan := $(foreach name,socket bind setsockopt ioctl send recvmsg ppoll close readlink \
-	clock_gettime can_get_state can_get_restart_ms can_get_bittiming,-Wl,--wrap=$(name))
+ldflags_can/socketcan := $(foreach name,socket bind setsockopt send recvmsg ppoll close \
+	clock_gettime can_netlink_ask,-Wl,--wrap=$(name))
+ldflags_can/can_netlink := $(foreach name,mnl_socket_open2 mnl_socket_sendto mnl_socket_recvfrom \
+	mnl_socket_get_portid setsockopt clock_gettime,-Wl,--wrap=$(name))
 
 $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)

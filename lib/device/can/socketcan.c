@@ -5,31 +5,27 @@
  *   controller ─▶ driver ─▶ exact filters ─▶ queue of the socket ─▶ receive
  *                   ╰─ stamp, CLOCK_REALTIME    ╰─ counts what it loses
  *
- * What an interface is set to, libsocketcan asks the kernel, once: it waits without end
- * where an interface goes away while it asks, and prints a line where the kernel does not
- * tell. So it is asked at open only, and only of interfaces that tell all of it: those of a
- * controller, which are up. vcan, vxcan and the kernel's own slcan have no hardware in
- * sysfs. The state is then kept by error frames.
+ * What an interface is and is set to, the kernel is asked once, when it is opened; the state
+ * is then kept by error frames.
+ *
+ * The queue is as long as the kernel has it, some 220 frames: 70 ms of a drive's traffic at
+ * 1 kHz. Who does not read for so long has missed more than that: the drive's deadman.
  */
 #include <errno.h>
-#include <net/if.h>
-#include <net/if_arp.h>
 #include <poll.h>
-#include <stddef.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
-#include <libsocketcan.h>
 #include <linux/can/error.h>
+#include <linux/can/netlink.h>
 #include <linux/can/raw.h>
 #include <linux/errqueue.h>
 #include <linux/net_tstamp.h>
 #include "can_bus.h"
+#include "can_netlink.h"
+#include "can_owner.h"
 
 #define NS_PER_S INT64_C(1000000000)
 /* What is no frame is passed over, but not without end. */
@@ -260,44 +256,35 @@ static const struct can_bus_ops socketcan_ops = {
 	.close = socketcan_close,
 };
 
-/* A controller of its own, which its driver tells all of. */
-static bool is_hardware(const char *name)
+/* Whether what it is set to is what is asked for. */
+static int check_rate(struct socketcan *s, const struct can_bus_request *request,
+		      struct incise_error *err)
 {
-	char path[64], target[256];
-	ssize_t n;
+	const char *name = s->bus.name;
 
-	snprintf(path, sizeof(path), "/sys/class/net/%s", name);
-	n = readlink(path, target, sizeof(target) - 1);
-	if (n <= 0)
-		return false;
-	target[n] = 0;
-	return !strstr(target, "/virtual/");
+	if (!request->bitrate || !s->bus.bitrate || request->bitrate == s->bus.bitrate)
+		return 0;
+	return incise_error_set(
+		err, EINVAL,
+		"%s: %s runs at %u bit/s, bitrate is %u: correct it, or run ip link set %s "
+		"down, then ip link set %s up type can bitrate %u",
+		request->where, name, s->bus.bitrate, request->bitrate, name, name,
+		request->bitrate);
 }
 
-static int ask_hardware(struct socketcan *s, const struct can_bus_request *request,
-			struct incise_error *err)
+static int not_known(const struct can_bus_request *request, int code,
+		     struct incise_error *err)
 {
-	struct can_bittiming timing = {0};
-	__u32 restart_ms = 0;
-	int state;
-
-	if (!is_hardware(s->bus.name))
-		return 0;
-	if (!can_get_state(s->bus.name, &state))
-		s->state = state;
-	if (!can_get_restart_ms(s->bus.name, &restart_ms))
-		s->bus.restart_ms = restart_ms;
-	/* All ones: the driver does not know it either. */
-	if (!can_get_bittiming(s->bus.name, &timing) && timing.bitrate != UINT32_MAX)
-		s->bus.bitrate = timing.bitrate;
-	if (request->bitrate && s->bus.bitrate && request->bitrate != s->bus.bitrate)
+	if (code == ENODEV)
 		return incise_error_set(
-			err, EINVAL,
-			"%s: %s runs at %u bit/s, bitrate is %u: correct it, or run ip link "
-			"set %s down, then ip link set %s up type can bitrate %u",
-			request->where, s->bus.name, s->bus.bitrate, request->bitrate,
-			s->bus.name, s->bus.name, request->bitrate);
-	return 0;
+			err, ENODEV,
+			"%s: there is no interface %.40s: is the adapter plugged in, "
+			"its driver loaded? Then ip link set can0 up type can bitrate "
+			"1000000; ip -br link lists what there is",
+			request->where, request->device);
+	return incise_error_set(err, code == ENOMEM ? ENOMEM : EIO,
+				"%s: the kernel does not tell of %s: %s", request->where,
+				request->device, strerror(code));
 }
 
 /* The interface's number; or -errno, and the line says what to do. */
@@ -305,68 +292,28 @@ static int look_up(struct socketcan *s, const struct can_bus_request *request,
 		   struct incise_error *err)
 {
 	const char *where = request->where, *name = request->device;
-	struct ifreq ask = {0};
-	int index;
+	struct can_netlink told;
+	int rc = can_netlink_ask(name, &told);
 
-	if (!*name || strlen(name) >= sizeof(ask.ifr_name) || strchr(name, '/'))
-		goto missing;
-	memcpy(ask.ifr_name, name, strlen(name));
-	if (ioctl(s->fd, SIOCGIFINDEX, &ask) < 0)
-		goto missing;
-	index = ask.ifr_ifindex;
-	if (ioctl(s->fd, SIOCGIFHWADDR, &ask) < 0)
-		goto missing;
-	if (ask.ifr_hwaddr.sa_family != ARPHRD_CAN)
+	if (rc)
+		return not_known(request, -rc, err);
+	if (!told.is_can)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: %s is no CAN interface: ip -br link show type "
 			"can lists those there are",
 			where, name);
-	if (ioctl(s->fd, SIOCGIFFLAGS, &ask) < 0)
-		goto missing;
-	if (!(ask.ifr_flags & IFF_UP))
+	if (!told.is_up)
 		return incise_error_set(
 			err, ENETDOWN, "%s: %s is down: ip link set %s up%s", where, name,
-			name, is_hardware(name) ? " type can bitrate 1000000" : "");
-	return index;
-missing:
-	return incise_error_set(
-		err, ENODEV,
-		"%s: there is no interface %.40s: is the adapter plugged in, "
-		"its driver loaded? Then ip link set can0 up type can bitrate "
-		"1000000; ip -br link lists what there is",
-		where, name);
-}
-
-/*
- * One program drives a node: who has bound this name, which is gone with the process and
- * of the same network namespace as the interface.
- */
-static int take_node(struct socketcan *s, const struct can_bus_request *request,
-		     struct incise_error *err)
-{
-	struct sockaddr_un name = {.sun_family = AF_UNIX};
-	int n;
-
-	if (!request->node)
-		return 0;
-	s->owner = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-	if (s->owner < 0)
-		return incise_error_set(err, EIO, "%s: socket: %s", request->where,
-					strerror(errno));
-	n = snprintf(name.sun_path + 1, sizeof(name.sun_path) - 1, "incise-can/%s/%u",
-		     request->device, request->node);
-	if (!bind(s->owner, (struct sockaddr *)&name,
-		  (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1 + (size_t)n)))
-		return 0;
-	if (errno == EADDRINUSE)
-		return incise_error_set(
-			err, EBUSY,
-			"%s: another program drives it: end that first (ss -xap shows the "
-			"one with @%s)",
-			request->where, name.sun_path + 1);
-	return incise_error_set(err, EIO, "%s: bind: %s", request->where,
-				strerror(errno));
+			name,
+			strcmp(told.kind, "can") ? "" : " type can bitrate 1000000");
+	memcpy(s->bus.name, told.name, sizeof(told.name));
+	s->bus.bitrate = told.bitrate;
+	s->bus.restart_ms = told.restart_ms;
+	s->state = told.state;
+	rc = check_rate(s, request, err);
+	return rc ? rc : told.index;
 }
 
 static int set_up(struct socketcan *s, const struct can_bus_request *request, int index,
@@ -427,16 +374,16 @@ static int socketcan_open(struct can_bus **bus, const struct can_bus_request *re
 	s->fd = s->owner = -1;
 	s->state = -EOPNOTSUPP;
 	s->last_ns = clock_ns(CLOCK_MONOTONIC);
-	strncpy(s->bus.name, request->device, sizeof(s->bus.name) - 1);
 	rc = open_socket(s, request, err);
 	if (!rc) {
 		index = look_up(s, request, err);
 		rc = index < 0 ? index : 0;
 	}
-	if (!rc)
-		rc = ask_hardware(s, request, err);
-	if (!rc)
-		rc = take_node(s, request, err);
+	if (!rc && request->node) {
+		s->owner =
+			can_owner_take(s->bus.name, request->node, request->where, err);
+		rc = s->owner < 0 ? s->owner : 0;
+	}
 	if (!rc)
 		rc = set_up(s, request, index, err);
 	if (rc) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/device/can/socketcan.c on a kernel that a test makes: the linker hands its system
- * calls, and what it asks of libsocketcan, to functions here. The real kernel is asked in
- * tests/vm/guest/can_bus.c. The lock of a node is real.
+ * calls, and its question what an interface is, to functions here. The real kernel is asked
+ * in tests/vm/guest/can_bus.c. The lock of a node is real.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,11 +10,8 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <errno.h>
-#include <net/if.h>
-#include <net/if_arp.h>
 #include <poll.h>
 #include <string.h>
-#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <linux/can/error.h>
@@ -23,6 +20,7 @@
 #include <linux/errqueue.h>
 #include <linux/net_tstamp.h>
 #include "../../../lib/device/can/can_bus.h"
+#include "../../../lib/device/can/can_netlink.h"
 
 #define FD 7777
 #define INDEX 42
@@ -31,10 +29,9 @@
 /* Two interfaces of CAN, can0 and vcan0, and lo; and how they shall misbehave. */
 static struct {
 	int socket_error, option_error, bind_error, poll_error;
-	bool down, tells; /* tells: libsocketcan gets answers */
-	unsigned int asked;
-	struct can_bittiming timing;
-	uint32_t restart_ms;
+	bool down;
+	int ask_error;
+	uint32_t bitrate, restart_ms;
 	int state;
 	int opened, bound;
 	/* set by options */
@@ -61,7 +58,6 @@ static struct {
 int __real_socket(int domain, int type, int protocol);
 int __real_close(int fd);
 int __real_bind(int fd, const struct sockaddr *address, socklen_t size);
-ssize_t __real_readlink(const char *path, char *target, size_t size);
 int __real_clock_gettime(clockid_t clock, struct timespec *t);
 
 static int answer(int code)
@@ -118,62 +114,28 @@ int __wrap_setsockopt(int fd, int level, int name, const void *value, socklen_t 
 	return 0;
 }
 
-int __wrap_ioctl(int fd, unsigned long request, void *argument)
+/* can0 has a second name, adapter. */
+int __wrap_can_netlink_ask(const char *name, struct can_netlink *told)
 {
-	struct ifreq *ask = argument;
-	bool is_can = !strcmp(ask->ifr_name, "can0") || !strcmp(ask->ifr_name, "vcan0");
+	bool is_can0 = !strcmp(name, "can0") || !strcmp(name, "adapter");
+	bool is_can = is_can0 || !strcmp(name, "vcan0");
 
-	assert_int_equal(fd, FD);
-	if (!is_can && strcmp(ask->ifr_name, "lo"))
-		return answer(ENODEV);
-	switch (request) {
-	case SIOCGIFINDEX:
-		ask->ifr_ifindex = INDEX;
-		return 0;
-	case SIOCGIFHWADDR:
-		ask->ifr_hwaddr.sa_family = is_can ? ARPHRD_CAN : ARPHRD_LOOPBACK;
-		return 0;
-	case SIOCGIFFLAGS:
-		ask->ifr_flags = kernel.down ? 0 : IFF_UP;
-		return 0;
-	default:
-		return answer(ENOTTY);
+	if (kernel.ask_error)
+		return -kernel.ask_error;
+	if (!is_can && strcmp(name, "lo") != 0)
+		return -ENODEV;
+	*told = (struct can_netlink){.index = INDEX,
+				     .is_can = is_can,
+				     .is_up = !kernel.down,
+				     .state = -EOPNOTSUPP};
+	strcpy(told->name, is_can0 ? "can0" : name);
+	strcpy(told->kind, is_can0 ? "can" : is_can ? "vcan" : "");
+	if (is_can0) {
+		told->bitrate = kernel.bitrate;
+		told->restart_ms = kernel.restart_ms;
+		told->state = kernel.state;
 	}
-}
-
-ssize_t __wrap_readlink(const char *path, char *target, size_t size)
-{
-	const char *at = "../../devices/pci0000:00/0000:00:1d.0/usb1/1-1/net/can0";
-
-	if (!strcmp(path, "/sys/class/net/vcan0"))
-		at = "../../devices/virtual/net/vcan0";
-	else if (strcmp(path, "/sys/class/net/can0"))
-		return __real_readlink(path, target, size);
-	assert_true(strlen(at) <= size);
-	memcpy(target, at, strlen(at));
-	return (ssize_t)strlen(at);
-}
-
-int __wrap_can_get_state(const char *name, int *state)
-{
-	assert_string_equal(name, "can0");
-	kernel.asked++;
-	*state = kernel.state;
-	return kernel.tells ? 0 : -1;
-}
-
-int __wrap_can_get_restart_ms(const char *name, __u32 *restart_ms)
-{
-	assert_string_equal(name, "can0");
-	*restart_ms = kernel.restart_ms;
-	return kernel.tells ? 0 : -1;
-}
-
-int __wrap_can_get_bittiming(const char *name, struct can_bittiming *timing)
-{
-	assert_string_equal(name, "can0");
-	*timing = kernel.timing;
-	return kernel.tells ? 0 : -1;
+	return 0;
 }
 
 ssize_t __wrap_send(int fd, const void *bytes, size_t n, int flags)
@@ -249,8 +211,7 @@ static void kernel_begin(void)
 	memset(&kernel, 0, sizeof(kernel));
 	kernel.now_ns = 1000 * S;
 	kernel.wall_ns = 1700000000 * S;
-	kernel.tells = true;
-	kernel.timing.bitrate = 1000000;
+	kernel.bitrate = 1000000;
 	kernel.restart_ms = 100;
 	kernel.state = CAN_STATE_ERROR_WARNING;
 }
@@ -292,26 +253,33 @@ static void what_cannot_be_opened_is_said(void **state)
 		bool down;
 		int code;
 		const char *words;
+		int ask_error;
 	} cases[] = {
-		{"can0", 0, EAFNOSUPPORT, 0, 0, false, -EAFNOSUPPORT, "modprobe can_raw"},
+		{"can0", 0, EAFNOSUPPORT, 0, 0, false, -EAFNOSUPPORT, "modprobe can_raw",
+		 0},
 		{"can0", 0, EPROTONOSUPPORT, 0, 0, false, -EAFNOSUPPORT,
-		 "modprobe can_raw"},
-		{"can0", 0, EPERM, 0, 0, false, -EACCES, "no right"},
-		{"can0", 0, EMFILE, 0, 0, false, -EIO, "Too many open files"},
-		{"can0", 0, 0, EINVAL, 0, false, -EIO, "Invalid argument"},
-		{"can0", 0, 0, 0, ENODEV, false, -ENODEV, "No such device"},
-		{"can0", 0, 0, 0, ENETDOWN, false, -ENETDOWN, "Network is down"},
-		{"nope", 0, 0, 0, 0, false, -ENODEV, "there is no interface nope"},
-		{"", 0, 0, 0, 0, false, -ENODEV, "there is no interface"},
-		{"can0/../lo", 0, 0, 0, 0, false, -ENODEV, "there is no interface"},
-		{"sixteen-or-more-", 0, 0, 0, 0, false, -ENODEV, "there is no interface"},
-		{"lo", 0, 0, 0, 0, false, -EINVAL, "lo is no CAN interface"},
+		 "modprobe can_raw", 0},
+		{"can0", 0, EPERM, 0, 0, false, -EACCES, "no right", 0},
+		{"can0", 0, EMFILE, 0, 0, false, -EIO, "Too many open files", 0},
+		{"can0", 0, 0, EINVAL, 0, false, -EIO, "Invalid argument", 0},
+		{"can0", 0, 0, 0, ENODEV, false, -ENODEV, "No such device", 0},
+		{"can0", 0, 0, 0, ENETDOWN, false, -ENETDOWN, "Network is down", 0},
+		{"nope", 0, 0, 0, 0, false, -ENODEV, "there is no interface nope", 0},
+		{"", 0, 0, 0, 0, false, -ENODEV, "there is no interface", 0},
+		{"can0", 0, 0, 0, 0, false, -ENODEV, "there is no interface can0",
+		 ENODEV},
+		{"can0", 0, 0, 0, 0, false, -EIO,
+		 "the kernel does not tell of can0: Connection timed out", ETIMEDOUT},
+		{"can0", 0, 0, 0, 0, false, -EIO,
+		 "the kernel does not tell of can0: Bad message", EBADMSG},
+		{"can0", 0, 0, 0, 0, false, -ENOMEM, "can0: Cannot allocate", ENOMEM},
+		{"lo", 0, 0, 0, 0, false, -EINVAL, "lo is no CAN interface", 0},
 		{"can0", 0, 0, 0, 0, true, -ENETDOWN,
-		 "can0 is down: ip link set can0 up type can bitrate 1000000"},
+		 "can0 is down: ip link set can0 up type can bitrate 1000000", 0},
 		{"vcan0", 0, 0, 0, 0, true, -ENETDOWN,
-		 "vcan0 is down: ip link set vcan0 up"},
+		 "vcan0 is down: ip link set vcan0 up", 0},
 		{"can0", 500000, 0, 0, 0, false, -EINVAL,
-		 "can0 runs at 1000000 bit/s, bitrate is 500000"},
+		 "can0 runs at 1000000 bit/s, bitrate is 500000", 0},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -323,6 +291,7 @@ static void what_cannot_be_opened_is_said(void **state)
 		kernel.option_error = cases[i].option_error;
 		kernel.bind_error = cases[i].bind_error;
 		kernel.down = cases[i].down;
+		kernel.ask_error = cases[i].ask_error;
 		rc = open_bus(&bus, cases[i].device, cases[i].bitrate, 0, &err);
 		if (rc != cases[i].code || !strstr(err.text, cases[i].words))
 			fail_msg("case %zu: %d: %s", i, rc, err.text);
@@ -333,35 +302,32 @@ static void what_cannot_be_opened_is_said(void **state)
 	}
 }
 
-static void what_it_is_set_to_is_asked_of_hardware(void **state)
+static void what_it_is_set_to_is_the_kernels(void **state)
 {
 	static const struct {
 		const char *device;
-		bool tells;
 		uint32_t set, asked_for, bitrate, restart_ms;
 		int state;
+		const char *name;
 	} cases[] = {
-		{"can0", true, 1000000, 0, 1000000, 100, CAN_STATE_ERROR_WARNING},
-		{"can0", true, 1000000, 1000000, 1000000, 100, CAN_STATE_ERROR_WARNING},
-		{"can0", true, UINT32_MAX, 500000, 0, 100, CAN_STATE_ERROR_WARNING},
-		{"can0", false, 1000000, 500000, 0, 0, -EOPNOTSUPP},
-		{"vcan0", true, 1000000, 500000, 0, 0, -EOPNOTSUPP},
+		{"can0", 1000000, 0, 1000000, 100, CAN_STATE_ERROR_WARNING, "can0"},
+		{"can0", 1000000, 1000000, 1000000, 100, CAN_STATE_ERROR_WARNING, "can0"},
+		{"can0", 0, 500000, 0, 100, CAN_STATE_ERROR_WARNING, "can0"},
+		{"adapter", 500000, 500000, 500000, 100, CAN_STATE_ERROR_WARNING, "can0"},
+		{"vcan0", 1000000, 500000, 0, 0, -EOPNOTSUPP, "vcan0"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_error err = {0};
 
 		kernel_begin();
-		kernel.tells = cases[i].tells;
-		kernel.timing.bitrate = cases[i].set;
+		kernel.bitrate = cases[i].set;
 		assert_int_equal(
 			open_bus(&bus, cases[i].device, cases[i].asked_for, 0, &err), 0);
 		assert_int_equal(bus->bitrate, cases[i].bitrate);
 		assert_int_equal(bus->restart_ms, cases[i].restart_ms);
 		assert_int_equal(bus->ops->state(bus), cases[i].state);
-		assert_string_equal(bus->name, cases[i].device);
-		/* Of vcan nothing is asked: the library would print a line. */
-		assert_int_equal(kernel.asked, *cases[i].device == 'c');
+		assert_string_equal(bus->name, cases[i].name);
 		bus->ops->close(bus);
 	}
 }
@@ -613,7 +579,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(what_cannot_be_opened_is_said),
-		cmocka_unit_test(what_it_is_set_to_is_asked_of_hardware),
+		cmocka_unit_test(what_it_is_set_to_is_the_kernels),
 		cmocka_unit_test(one_program_drives_a_node),
 		WITH(the_socket_is_set_up),
 		WITH(filters_are_the_kernels),

@@ -4,12 +4,12 @@
 . tests/vm/tap
 
 modprobe -a vcan can_raw 2>/dev/null || skip "vcan" "this kernel has no vcan"
-[ -x "$INCISE_BUILD/tests/vm/can_bus" ] || skip "CAN buses" "libsocketcan is not installed"
+[ -x "$INCISE_BUILD/tests/vm/can_bus" ] || skip "CAN buses" "libmnl was not there to build with"
 ip link add vcan0 type vcan
 ip link set vcan0 up
 ip link add vcan9 type vcan
 "$INCISE_BUILD/tests/vm/can_bus" vcan0 2>/run/stderr
-# libsocketcan would print lines of its own
+# who asked the kernel by libsocketcan had lines of that here
 check "nothing is printed beside" [ ! -s /run/stderr ]
 sed 's/^/# /' /run/stderr
 ip link del vcan9
