@@ -50,7 +50,7 @@ objects_stepper_gpio := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o
 
 # One drive on two kinds of bus; each module has just its own.
 can_socketcan := socketcan can_netlink can_owner
-can_slcan := slcan slcan_line
+can_slcan := slcan slcan_tty slcan_status slcan_line
 can_transports := $(patsubst %,lib/device/can/%.c,$(can_socketcan) $(can_slcan))
 can_modules := $(addprefix lib/device/can/,stepper_can.c stepper_slcan.c)
 can_core := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o thread.o) \

@@ -75,9 +75,12 @@ struct can_bus {
 /* What a bus is opened for. */
 struct can_bus_request {
 	const char *where;  /* messages begin with it */
-	const char *device; /* "can0", "/dev/ttyACM0" */
-	uint32_t
-		bitrate; /* can0: must be its own; 0: as it is. slcan: is set; 0: 1 Mbit/s */
+	const char *device; /* "can0", "/dev/ttyACM0", "/dev/ttyACM0@500000" */
+	/*
+	 * can0: must be its own; 0: as it is. slcan: is set, and must be the one behind the
+	 * @ where there is one; 0: that, or 1 Mbit/s.
+	 */
+	uint32_t bitrate;
 	/*
 	 * To drive the node: only one program at a time may, and only one may have a serial
 	 * line open (EBUSY). 0: to look.

@@ -9,58 +9,43 @@
  * Nothing here waits for an answer: many adapters give none, and what is at the other end
  * may be another program, such as python-can on a pty. What does come is taken as it is.
  *
- * A rate that nobody asked for is 1 Mbit/s, what drives have from the factory: most
+ * The rate is that of the request, or stands behind the tty, as in "/dev/ttyACM0@500000".
+ * One that nobody asked for is 1 Mbit/s, what drives have from the factory: most
  * adapters go on the bus with no rate of their own, and the rate must be known to say
  * whether the traffic fits.
  */
 #include <errno.h>
-#include <fcntl.h>
+#include <limits.h>
 #include <poll.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
-#include <sys/ioctl.h>
-#include <sys/stat.h>
-#include <termios.h>
 #include <time.h>
-#include <unistd.h>
 #include <linux/can/error.h>
-#include <linux/can/netlink.h>
 #include "can_bus.h"
 #include "slcan_line.h"
+#include "slcan_status.h"
+#include "slcan_tty.h"
 
 #define NS_PER_S INT64_C(1000000000)
-#define ASK_NS 100000000 /* between two questions for the status */
-#define DRAIN_POLLS 20	 /* of 5 ms, until the last bytes have gone */
 #define BITRATE 1000000
+#define START_COMMANDS 4
 /* Bytes that one call of receive looks at: junk without end must not hold it. */
 #define LOOK_MAX 4096
-/* Questions that may be refused before no more are asked. */
-#define ASKS_MAX 3
 
 struct slcan {
 	struct can_bus bus;
-	int fd;
-	int gone; /* -ENODEV: for good */
+	struct slcan_tty tty;
 
 	struct slcan_line line;
 	unsigned char in[256];
 	unsigned int in_at, in_n;
 	int64_t in_ns; /* when it was read */
 
-	/* What is left of a line that was written in part. */
-	char out[SLCAN_LINE_MAX + 2];
-	unsigned int out_at, out_n;
-
 	struct can_filter filter[CAN_BUS_FILTERS];
 	int n_filters;
 
-	int64_t asked_ns;
-	unsigned int asks;     /* refused */
-	bool asking, answers;  /* a question is open; one was answered once */
-	unsigned int refusals; /* that may come of the start: C of what is closed … */
-	uint8_t flags;
-	int state; /* enum can_state; -EOPNOTSUPP: it never told */
+	struct slcan_status status;
 };
 
 static struct slcan *of(struct can_bus *bus)
@@ -77,56 +62,13 @@ static int64_t slcan_now(struct can_bus *bus)
 	return now.tv_sec * NS_PER_S + now.tv_nsec;
 }
 
-/* A line that was pulled out answers EIO; it does not come back on this descriptor. */
-static int failed(struct slcan *s, int code)
-{
-	s->gone = code == EIO || code == ENXIO || code == ENODEV ? -ENODEV : -EIO;
-	return s->gone;
-}
-
-/* Write what is left. 0, -ENOBUFS (there is still some), or it is gone. */
-static int flush(struct slcan *s)
-{
-	while (s->out_at < s->out_n) {
-		ssize_t n = write(s->fd, s->out + s->out_at, s->out_n - s->out_at);
-
-		if (n < 0 && errno == EINTR)
-			continue;
-		if (n < 0 && errno != EAGAIN)
-			return failed(s, errno);
-		if (n <= 0)
-			return -ENOBUFS;
-		s->out_at += (unsigned int)n;
-	}
-	s->out_at = s->out_n = 0;
-	return 0;
-}
-
-/* All of it, now or later; -ENOBUFS: none of it. */
-static int put(struct slcan *s, const char *text, unsigned int n)
-{
-	int rc = s->gone ? s->gone : flush(s);
-
-	if (rc)
-		return rc;
-	memcpy(s->out, text, n);
-	s->out_n = n;
-	rc = flush(s);
-	if (rc == -ENOBUFS) {
-		if (s->out_at)
-			return 0;
-		s->out_n = 0;
-	}
-	return rc;
-}
-
 static int slcan_send(struct can_bus *bus, const struct can_frame *frame)
 {
 	struct slcan *s = of(bus);
-	char text[SLCAN_LINE_MAX + 2];
+	char text[SLCAN_TTY_PUT_MAX];
 	size_t n = slcan_line_put(text, frame);
 	int64_t now = slcan_now(bus);
-	bool ask = s->asks < ASKS_MAX && now - s->asked_ns >= ASK_NS;
+	bool ask = slcan_status_due(&s->status, now);
 	int rc;
 
 	if (!n)
@@ -135,16 +77,14 @@ static int slcan_send(struct can_bus *bus, const struct can_frame *frame)
 		text[n++] = 'F';
 		text[n++] = '\r';
 	}
-	rc = put(s, text, (unsigned int)n);
+	rc = slcan_tty_put(&s->tty, text, (unsigned int)n);
 	if (rc == -ENOBUFS)
 		bus->counts.full++;
 	if (rc)
 		return rc;
 	bus->counts.sent++;
-	if (ask) {
-		s->asked_ns = now;
-		s->asking = true;
-	}
+	if (ask)
+		slcan_status_asked(&s->status, now);
 	return 0;
 }
 
@@ -160,103 +100,14 @@ static bool passes(const struct slcan *s, canid_t id)
 	return !s->n_filters;
 }
 
-static void error_frame(struct slcan *s, struct can_frame *frame, canid_t what,
-			uint8_t controller)
-{
-	memset(frame, 0, sizeof(*frame));
-	frame->can_id = CAN_ERR_FLAG | what;
-	frame->can_dlc = CAN_ERR_DLC;
-	frame->data[1] = controller;
-	s->bus.counts.errors++;
-}
-
-/* True: it is another one than before, and *controller says so as an error frame does. */
-static bool state_is(struct slcan *s, int state, uint8_t *controller)
-{
-	int before = s->state;
-
-	s->state = state;
-	if (state == before || (before < 0 && state == CAN_STATE_ERROR_ACTIVE))
-		return false;
-	if (state == CAN_STATE_ERROR_PASSIVE)
-		*controller |= CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE;
-	else if (state == CAN_STATE_ERROR_WARNING)
-		*controller |= CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING;
-	else if (state == CAN_STATE_ERROR_ACTIVE)
-		*controller |= CAN_ERR_CRTL_ACTIVE;
-	return true;
-}
-
-/* What is new in the status becomes an error frame. */
-static bool take_flags(struct slcan *s, uint8_t flags, struct can_frame *frame)
-{
-	uint8_t fresh = flags & ~s->flags, controller = 0;
-	canid_t what = 0;
-
-	s->flags = flags;
-	s->asking = false;
-	s->answers = true;
-	/* Bus-off is told by those that tell states: the flags do not know it. */
-	if (s->state != CAN_STATE_BUS_OFF &&
-	    state_is(s,
-		     flags & SLCAN_PASSIVE   ? CAN_STATE_ERROR_PASSIVE
-		     : flags & SLCAN_WARNING ? CAN_STATE_ERROR_WARNING
-					     : CAN_STATE_ERROR_ACTIVE,
-		     &controller))
-		what |= CAN_ERR_CRTL;
-	if (fresh & (SLCAN_OVERRUN | SLCAN_RX_FULL)) {
-		what |= CAN_ERR_CRTL;
-		controller |= CAN_ERR_CRTL_RX_OVERFLOW;
-		s->bus.counts.overflow++;
-	}
-	if (fresh & SLCAN_TX_FULL) {
-		what |= CAN_ERR_CRTL;
-		controller |= CAN_ERR_CRTL_TX_OVERFLOW;
-	}
-	if (fresh & SLCAN_BUS_ERROR)
-		what |= CAN_ERR_BUSERROR;
-	if (!what)
-		return false;
-	error_frame(s, frame, what, controller);
-	return true;
-}
-
-static bool take_state(struct slcan *s, int state, struct can_frame *frame)
-{
-	bool was_off = s->state == CAN_STATE_BUS_OFF;
-	uint8_t controller = 0;
-
-	if (!state_is(s, state, &controller))
-		return false;
-	error_frame(s, frame,
-		    (state == CAN_STATE_BUS_OFF ? CAN_ERR_BUSOFF : CAN_ERR_CRTL) |
-			    (was_off ? CAN_ERR_RESTARTED : 0),
-		    controller);
-	return true;
-}
-
-/* A frame was refused, or what was sent at the start, or a question that it does not know. */
-static bool take_refusal(struct slcan *s, struct can_frame *frame)
-{
-	if (s->refusals) {
-		s->refusals--;
-		return false;
-	}
-	if (s->asking && !s->answers) {
-		s->asking = false;
-		s->asks++;
-		return false;
-	}
-	error_frame(s, frame, CAN_ERR_CRTL, CAN_ERR_CRTL_TX_OVERFLOW);
-	return true;
-}
-
 /* True: *frame is one for the caller. */
 static bool take(struct slcan *s, unsigned char byte, struct can_frame *frame)
 {
+	enum slcan_kind kind;
 	struct slcan_told told;
 
-	switch (slcan_line_take(&s->line, byte, &told)) {
+	kind = slcan_line_take(&s->line, byte, &told);
+	switch (kind) {
 	case SLCAN_FRAME:
 		if (!passes(s, told.frame.can_id))
 			return false;
@@ -264,11 +115,14 @@ static bool take(struct slcan *s, unsigned char byte, struct can_frame *frame)
 		*frame = told.frame;
 		return true;
 	case SLCAN_REFUSED:
-		return take_refusal(s, frame);
 	case SLCAN_FLAGS:
-		return take_flags(s, told.flags, frame);
 	case SLCAN_STATE:
-		return take_state(s, told.state, frame);
+		if (!slcan_status_take(&s->status, kind, &told, frame))
+			return false;
+		s->bus.counts.errors++;
+		if (frame->data[1] & CAN_ERR_CRTL_RX_OVERFLOW)
+			s->bus.counts.overflow++;
+		return true;
 	case SLCAN_BROKEN:
 		s->bus.counts.broken++;
 		return false;
@@ -286,16 +140,9 @@ static int fill(struct slcan *s)
 
 	if (s->in_at < s->in_n)
 		return 1;
-	if (s->gone)
-		return s->gone;
-	do
-		n = read(s->fd, s->in, sizeof(s->in));
-	while (n < 0 && errno == EINTR);
-	if (n < 0)
-		return errno == EAGAIN ? 0 : failed(s, errno);
-	/* VMIN is 1: no byte is the end, not a pause. */
-	if (!n)
-		return failed(s, EIO);
+	n = slcan_tty_read(&s->tty, s->in, sizeof(s->in));
+	if (n <= 0)
+		return (int)n;
 	s->in_at = 0;
 	s->in_n = (unsigned int)n;
 	s->in_ns = slcan_now(&s->bus);
@@ -324,21 +171,21 @@ static int slcan_wait(struct can_bus *bus, int64_t until_ns)
 	struct slcan *s = of(bus);
 
 	for (;;) {
-		struct pollfd poll = {.fd = s->fd,
-				      .events =
-					      (short)(POLLIN | (s->out_n ? POLLOUT : 0))};
+		struct pollfd poll = {.fd = s->tty.fd,
+				      .events = (short)(POLLIN |
+							(s->tty.out_n ? POLLOUT : 0))};
 		int64_t now = slcan_now(bus), left = until_ns > now ? until_ns - now : 0;
 		struct timespec timeout = {left / NS_PER_S, left % NS_PER_S};
 
 		if (s->in_at < s->in_n)
 			return 0;
-		if (s->gone)
-			return s->gone;
+		if (s->tty.gone)
+			return s->tty.gone;
 		if (ppoll(&poll, 1, &timeout, NULL) < 0)
 			return -errno;
 		/* The rest of a line goes out meanwhile; if that fails, receive says so. */
 		if (poll.revents & POLLOUT)
-			flush(s);
+			slcan_tty_flush(&s->tty);
 		if (poll.revents & ~POLLOUT || !left)
 			return 0;
 	}
@@ -358,29 +205,14 @@ static int slcan_filter(struct can_bus *bus, const struct can_filter *filter, in
 
 static int slcan_state(struct can_bus *bus)
 {
-	return of(bus)->state;
+	return of(bus)->status.state;
 }
 
-/*
- * Off the bus; the adapter must have read that before the line goes. What it does not take
- * is thrown away: to close a tty may wait 30 s for it.
- */
 static void slcan_close(struct can_bus *bus)
 {
 	struct slcan *s = of(bus);
-	bool told = false, read = false;
-	int left = 0;
 
-	for (int i = 0; i < DRAIN_POLLS && !read && !s->gone; i++) {
-		told = told || !put(s, "C\r", 2);
-		read = told && !flush(s) && (ioctl(s->fd, TIOCOUTQ, &left) < 0 || !left);
-		if (!read)
-			nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
-	}
-	if (!read)
-		tcflush(s->fd, TCOFLUSH);
-	ioctl(s->fd, TIOCNXCL);
-	close(s->fd);
+	slcan_tty_close(&s->tty, "C\r", 2);
 	free(s);
 }
 
@@ -406,140 +238,96 @@ static int rate_number(uint32_t bitrate)
 	return -1;
 }
 
-static int refuse(const struct can_bus_request *request, int code,
-		  struct incise_error *err)
+static int refuse_rate(const struct can_bus_request *request, const char *rate,
+		       struct incise_error *err)
 {
-	const char *where = request->where, *device = request->device;
-
-	switch (code) {
-	case ENOENT:
-	case ENXIO:
-	case ENODEV:
-		return incise_error_set(err, ENODEV,
-					"%s: %s is not there: is the adapter plugged in? "
-					"/dev/serial/by-id lists those that are",
-					where, device);
-	case EACCES:
-	case EPERM:
-		return incise_error_set(
-			err, EACCES,
-			"%s: no right to open %s: join the group that owns "
-			"it, which mostly is dialout",
-			where, device);
-	case EBUSY:
-	case EWOULDBLOCK:
-		return incise_error_set(
-			err, EBUSY,
-			"%s: another program has %s open: end it first, or "
-			"drive from one place only",
-			where, device);
-	case ENOTTY:
-	case EINVAL:
-		return incise_error_set(
-			err, EINVAL,
-			"%s: %s is no serial line: expected the tty of an "
-			"adapter that speaks slcan, such as /dev/ttyACM0",
-			where, device);
-	case ENOMEM:
-		return incise_error_set(err, ENOMEM, "%s: out of memory", where);
-	default:
-		return incise_error_set(err, EIO, "%s: %s: %s", where, device,
-					strerror(code));
-	}
+	return incise_error_set(
+		err, EINVAL,
+		"%s: no adapter has %.20s bit/s: choose 10000, 20000, 50000, 100000, "
+		"125000, 250000, 500000, 800000 or 1000000, as the drive has it",
+		request->where, rate);
 }
 
 /*
- * Bytes as they are, 8N1, no flow control. The speed is left as stty set it: over USB it
- * mostly means nothing, and where it does only the user knows. But 9600, which a port has
- * when nobody set it, carries no cycle, and 115200 is what such adapters have.
+ * "/dev/ttyACM0@500000" in its parts. An @ that no digit follows is
+ * of the path.
  */
-static int set_raw(int fd)
+static int parse_device(const struct can_bus_request *request, char path[PATH_MAX],
+			uint32_t *bitrate, struct incise_error *err)
 {
-	struct termios t;
+	const char *device = request->device, *at = strrchr(device, '@');
+	size_t n = strlen(device);
+	unsigned long rate = 0;
+	char *end;
 
-	if (tcgetattr(fd, &t) < 0)
-		return -ENOTTY;
-	cfmakeraw(&t);
-	t.c_cflag |= CLOCAL | CREAD;
-	t.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS);
-	t.c_iflag &= ~(tcflag_t)(IXOFF | IXANY | INPCK);
-	t.c_cc[VMIN] = 1;
-	t.c_cc[VTIME] = 0;
-	if (cfgetospeed(&t) == B9600)
-		cfsetspeed(&t, B115200);
-	return tcsetattr(fd, TCSANOW, &t) < 0 ? -errno : 0;
+	*bitrate = request->bitrate ? request->bitrate : BITRATE;
+	if (at && at[1] >= '0' && at[1] <= '9') {
+		n = (size_t)(at - device);
+		rate = strtoul(at + 1, &end, 10);
+		if (*end || rate > BITRATE || rate_number((uint32_t)rate) < 0)
+			return refuse_rate(request, at + 1, err);
+		*bitrate = (uint32_t)rate;
+	}
+	if (n >= PATH_MAX)
+		return incise_error_set(err, ENODEV,
+					"%s: the name of the device is too long",
+					request->where);
+	memcpy(path, device, n);
+	path[n] = '\0';
+	if (rate && request->bitrate && request->bitrate != *bitrate)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: %s is given %u bit/s behind its @, and bitrate is %u: take one "
+			"of them away",
+			request->where, path, *bitrate, request->bitrate);
+	return 0;
 }
 
-/* A descriptor that is ours alone, or -errno. */
-static int open_line(const char *device)
+/* Go on the bus. */
+static int start(struct slcan *s, const struct can_bus_request *request,
+		 struct incise_error *err)
 {
-	struct stat is;
-	int fd, rc;
+	char text[] = "\rC\rS0\rO\r";
+	int rc;
 
-	/* To open what is no line may wait, or do what nobody asked for. */
-	if (stat(device, &is) < 0)
-		return -errno;
-	if (!S_ISCHR(is.st_mode))
-		return -ENOTTY;
-	fd = open(device, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-	if (fd < 0)
-		return -errno;
-	/* TIOCEXCL does not keep root out; the lock does, of those that ask for it. */
-	if (!isatty(fd))
-		rc = -ENOTTY;
-	else if (flock(fd, LOCK_EX | LOCK_NB) < 0 || ioctl(fd, TIOCEXCL) < 0)
-		rc = -errno;
-	else
-		rc = set_raw(fd);
-	if (rc) {
-		close(fd);
-		return rc;
-	}
-	/* What lies there is of another time. */
-	tcflush(fd, TCIOFLUSH);
-	return fd;
+	text[4] = (char)('0' + rate_number(s->bus.bitrate));
+	rc = slcan_tty_put(&s->tty, text, sizeof(text) - 1);
+	if (!rc)
+		return 0;
+	slcan_tty_close(&s->tty, "", 0);
+	return incise_error_set(
+		err, rc == -ENODEV ? ENODEV : EIO,
+		"%s: %s takes no bytes: unplug the adapter and plug it in "
+		"again",
+		request->where, s->bus.name);
 }
 
 static int slcan_open(struct can_bus **bus, const struct can_bus_request *request,
 		      struct incise_error *err)
 {
-	uint32_t bitrate = request->bitrate ? request->bitrate : BITRATE;
-	char start[] = "\rC\rS0\rO\r";
-	int number = rate_number(bitrate), rc;
+	char path[PATH_MAX], text[16];
+	uint32_t bitrate;
 	struct slcan *s;
+	int rc = parse_device(request, path, &bitrate, err);
 
-	if (number < 0)
-		return incise_error_set(
-			err, EINVAL,
-			"%s: no adapter has %u bit/s: choose 10000, 20000, 50000, 100000, "
-			"125000, 250000, 500000, 800000 or 1000000, as the drive has it",
-			request->where, bitrate);
+	if (rc)
+		return rc;
+	if (rate_number(bitrate) < 0) {
+		snprintf(text, sizeof(text), "%u", bitrate);
+		return refuse_rate(request, text, err);
+	}
 	s = calloc(1, sizeof(*s));
 	if (!s)
-		return refuse(request, ENOMEM, err);
-	s->fd = open_line(request->device);
-	if (s->fd < 0) {
-		rc = refuse(request, -s->fd, err);
-		free(s);
-		return rc;
-	}
+		return incise_error_set(err, ENOMEM, "%s: out of memory", request->where);
 	s->bus.ops = &slcan_ops;
 	s->bus.bitrate = bitrate;
-	strncpy(s->bus.name, request->device, sizeof(s->bus.name) - 1);
-	s->state = -EOPNOTSUPP;
-	s->asked_ns = slcan_now(&s->bus);
-	s->refusals = 4;
-	start[4] = (char)('0' + number);
-	rc = put(s, start, sizeof(start) - 1);
+	snprintf(s->bus.name, sizeof(s->bus.name), "%.39s", path);
+	/* Each may be refused: C where it is closed, S where it has one rate only … */
+	slcan_status_begin(&s->status, START_COMMANDS, slcan_now(&s->bus));
+	rc = slcan_tty_open(&s->tty, path, request->where, err);
+	if (!rc)
+		rc = start(s, request, err);
 	if (rc) {
-		rc = rc == -ENOBUFS
-			     ? incise_error_set(err, EIO,
-						"%s: %s takes no bytes: unplug the "
-						"adapter and plug it in again",
-						request->where, request->device)
-			     : refuse(request, -rc, err);
-		tcflush(s->fd, TCOFLUSH);
-		close(s->fd);
 		free(s);
 		return rc;
 	}

@@ -54,12 +54,18 @@ static void adapter_new(struct adapter *a)
 	write_most = -1;
 }
 
-static int adapter_open(struct adapter *a, uint32_t bitrate, struct incise_error *err)
+static int open_device(struct adapter *a, const char *device, uint32_t bitrate,
+		       struct incise_error *err)
 {
 	const struct can_bus_request request = {
-		.where = "rig.conf:1: stepper", .device = a->path, .bitrate = bitrate};
+		.where = "rig.conf:1: stepper", .device = device, .bitrate = bitrate};
 
 	return can_transport_slcan.open(&a->bus, &request, err);
+}
+
+static int adapter_open(struct adapter *a, uint32_t bitrate, struct incise_error *err)
+{
+	return open_device(a, a->path, bitrate, err);
 }
 
 /* What the adapter was told, as far as it goes; CR is shown as a dot. */
@@ -178,6 +184,88 @@ static void a_rate_that_none_has_is_refused(void **state)
 	assert_non_null(
 		strstr(err.text, "rig.conf:1: stepper: no adapter has 83333 bit/s"));
 	close(a.fd);
+}
+
+static void the_rate_may_stand_behind_the_tty(void **state)
+{
+	static const struct {
+		const char *behind;
+		uint32_t bitrate;
+		int rc;
+		const char *said; /* to the adapter; or in the line */
+	} cases[] = {
+		{"@500000", 0, 0, ".C.S6.O."},
+		{"@500000", 500000, 0, ".C.S6.O."},
+		{"@1000000", 0, 0, ".C.S8.O."},
+		{"@10000", 0, 0, ".C.S0.O."},
+		{"@500000", 250000, -EINVAL,
+		 "is given 500000 bit/s behind its @, and bitrate is 250000"},
+		{"@83333", 0, -EINVAL, "no adapter has 83333 bit/s"},
+		{"@0", 0, -EINVAL, "no adapter has 0 bit/s"},
+		{"@500k", 0, -EINVAL, "no adapter has 500k bit/s"},
+		{"@500000 ", 0, -EINVAL, "no adapter has 500000  bit/s"},
+		{"@4295467296", 0, -EINVAL, "no adapter has 4295467296 bit/s"},
+		{"@99999999999999999999", 0, -EINVAL,
+		 "no adapter has 99999999999999999999 bit/s"},
+		{"@", 0, -ENODEV, "@ is not there"},
+		{"@-500000", 0, -ENODEV, "@-500000 is not there"},
+		{"@500000@", 0, -ENODEV, "@500000@ is not there"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		struct adapter a;
+		char device[100];
+		int rc;
+
+		adapter_new(&a);
+		snprintf(device, sizeof(device), "%s%s", a.path, cases[i].behind);
+		rc = open_device(&a, device, cases[i].bitrate, &err);
+		if (rc != cases[i].rc || (rc && !strstr(err.text, cases[i].said)))
+			fail_msg("case %zu: %d: %s", i, rc, err.text);
+		if (!rc) {
+			assert_string_equal(told(&a), cases[i].said);
+			assert_int_equal(a.bus->bitrate, atoi(cases[i].behind + 1));
+			assert_string_equal(a.bus->name, a.path);
+			a.bus->ops->close(a.bus);
+		}
+		close(a.fd);
+	}
+}
+
+static void a_path_may_have_an_at(void **state)
+{
+	char folder[] = "/tmp/incise-slcan-XXXXXX", path[64], device[80];
+	struct incise_error err = {0};
+	struct adapter a;
+
+	adapter_new(&a);
+	assert_non_null(mkdtemp(folder));
+	snprintf(path, sizeof(path), "%s/usb@home", folder);
+	snprintf(device, sizeof(device), "%s@250000", path);
+	assert_int_equal(symlink(a.path, path), 0);
+	assert_int_equal(open_device(&a, path, 0, &err), 0);
+	assert_int_equal(a.bus->bitrate, 1000000);
+	a.bus->ops->close(a.bus);
+	assert_int_equal(open_device(&a, device, 0, &err), 0);
+	assert_int_equal(a.bus->bitrate, 250000);
+	a.bus->ops->close(a.bus);
+	close(a.fd);
+	unlink(path);
+	rmdir(folder);
+}
+
+static void a_path_of_any_length_is_safe(void **state)
+{
+	static char device[10000];
+	struct incise_error err = {0};
+	struct adapter a = {.fd = -1};
+
+	memset(device, 'x', sizeof(device) - 1);
+	assert_int_equal(open_device(&a, device, 0, &err), -ENODEV);
+	device[9000] = '@';
+	memset(device + 9001, '5', 900);
+	assert_int_equal(open_device(&a, device, 0, &err), -EINVAL);
 }
 
 static void what_is_no_serial_line_is_refused(void **state)
@@ -464,6 +552,34 @@ static void a_torn_line_is_finished_first(void **state)
 	assert_int_equal(a->bus->counts.sent, 2);
 }
 
+/* A reader that is late: what was sent before the end waits in the pty, and stays there. */
+static void what_was_sent_last_arrives(void **state)
+{
+	const struct can_frame last = {.can_id = 0x000, .can_dlc = 2, .data = {0x80, 16}};
+	struct adapter *a = *state;
+	const char *text;
+	size_t frames = 0;
+
+	/* More than the 4096 bytes that the reader's side of a pty takes by itself. */
+	for (int i = 0; i < 700; i++)
+		assert_int_equal(a->bus->ops->send(a->bus,
+						   &(struct can_frame){.can_id = 0x080}),
+				 0);
+	assert_int_equal(a->bus->ops->send(a->bus, &last), 0);
+	a->bus->ops->close(a->bus);
+	a->bus = NULL;
+	do {
+		text = told(a);
+		for (const char *at = strchr(text, 't'); at; at = strchr(at + 1, 't'))
+			frames++;
+		if (strlen(text) >= 12 &&
+		    !strcmp(text + strlen(text) - 12, "t00028010.C."))
+			break;
+	} while (*text);
+	assert_true(*text);
+	assert_int_equal(frames, 701);
+}
+
 static void to_close_a_line_that_is_stuck_ends(void **state)
 {
 	struct adapter *a = *state;
@@ -527,6 +643,9 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(it_goes_on_the_bus_and_off),
 		cmocka_unit_test(a_rate_that_none_has_is_refused),
+		cmocka_unit_test(the_rate_may_stand_behind_the_tty),
+		cmocka_unit_test(a_path_may_have_an_at),
+		cmocka_unit_test(a_path_of_any_length_is_safe),
 		cmocka_unit_test(what_is_no_serial_line_is_refused),
 		WITH(one_program_at_a_time),
 		WITH(frames_go_both_ways),
@@ -537,6 +656,7 @@ int main(void)
 		WITH(who_does_not_know_the_question_is_left_alone),
 		WITH(a_frame_is_sent_whole_or_not),
 		WITH(a_torn_line_is_finished_first),
+		WITH(what_was_sent_last_arrives),
 		WITH(to_close_a_line_that_is_stuck_ends),
 		WITH(an_adapter_that_is_unplugged_is_gone),
 		WITH(sending_finds_that_it_is_gone),

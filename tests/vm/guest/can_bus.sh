@@ -13,3 +13,10 @@ ip link add vcan9 type vcan
 check "nothing is printed beside" [ ! -s /run/stderr ]
 sed 's/^/# /' /run/stderr
 ip link del vcan9
+
+# A controller with a driver, whose settings ip tells as well: the kernel's own slcan on a pty.
+if modprobe slcan 2>/dev/null; then
+	"$INCISE_BUILD/tests/vm/can_netlink"
+else
+	echo "ok a controller # SKIP this kernel has no slcan"
+fi
