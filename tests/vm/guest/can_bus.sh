@@ -18,5 +18,5 @@ ip link del vcan9
 if modprobe slcan 2>/dev/null; then
 	"$INCISE_BUILD/tests/vm/can_netlink"
 else
-	echo "ok a controller # SKIP this kernel has no slcan"
+	echo "ok a controller # skip this kernel has no slcan"
 fi
