@@ -102,11 +102,6 @@ static void as_ip_has_it(const char *name)
 	check(!run("ip link property add dev %s altname a-servo", name) &&
 		      !can_netlink_ask("a-servo", &told) && !strcmp(told.name, name),
 	      "it is found by its other name, and tells its own");
-	/* Not all drivers let it be set. */
-	if (!run("ip link set %s down", name) &&
-	    !run("ip link set %s type can restart-ms 100 2>/dev/null", name))
-		check(!can_netlink_ask(name, &told) && told.restart_ms == 100,
-		      "when it leaves bus-off is told");
 }
 
 /* An adapter that takes what it is told; else the kernel waits for that in vain. */
