@@ -11,6 +11,7 @@ ldflags_scene/jail := $(foreach name,malloc calloc realloc free,-Wl,--wrap=$(nam
 ldflags_device/stepper_kernel := $(foreach name,open close ioctl mmap munmap clock_nanosleep \
 	nanosleep,-Wl,--wrap=$(name))
 ldflags_can/slcan := -Wl,--wrap=write
+ldflags_can/slcan_tty := -Wl,--wrap=write
 ldflags_can/socketcan := $(foreach name,socket bind setsockopt send recvmsg ppoll close \
 	clock_gettime can_netlink_ask,-Wl,--wrap=$(name))
 ldflags_can/can_netlink := $(foreach name,mnl_socket_open2 mnl_socket_sendto mnl_socket_recvfrom \

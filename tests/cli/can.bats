@@ -87,6 +87,26 @@ ended() {
 	drive_stopped
 }
 
+@test "an adapter's bit rate stands behind its tty" {
+	rig
+	local tty=${drive%:*} rate='500000'
+	drive=$tty@$rate:${drive##*:}
+	run -0 --separate-stderr incise info "$tty@$rate"
+	# What it prints can be copied.
+	[[ "$output" == *"$drive"* ]] || complain "$output"
+	drive_tell report
+	[ "$(drive_value bitrate)" = "$rate" ] || complain "$drive_line"
+	write_rig
+	run -1 --separate-stderr incise stepper status --rig rig.conf
+	[[ "$stderr" == *"is given 500000 bit/s behind its @, and bitrate is 1000000"* ]] ||
+		complain "$stderr"
+	sed -i 's/bitrate = 1000000;//' rig.conf
+	run -0 --separate-stderr incise stepper status --rig rig.conf
+	[[ "${lines[0]}" == "drive 0x10 at ${tty#slcan:}"* ]] || complain "$output"
+	drive_tell report
+	[ "$(drive_value bitrate)" = "$rate" ] || complain "$drive_line"
+}
+
 @test "status looks and changes nothing" {
 	rig
 	run -0 --separate-stderr incise stepper status --rig rig.conf

@@ -13,7 +13,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
@@ -266,44 +265,6 @@ static void a_path_of_any_length_is_safe(void **state)
 	device[9000] = '@';
 	memset(device + 9001, '5', 900);
 	assert_int_equal(open_device(&a, device, 0, &err), -EINVAL);
-}
-
-static void what_is_no_serial_line_is_refused(void **state)
-{
-	char folder[] = "/tmp/incise-slcan-XXXXXX", file[64], pipe[64];
-	struct {
-		const char *path;
-		int code;
-		const char *words;
-	} cases[] = {
-		{file, -EINVAL, "is no serial line"},
-		{pipe, -EINVAL, "is no serial line"},
-		{folder, -EINVAL, "is no serial line"},
-		{"/dev/null", -EINVAL, "is no serial line"},
-		{"", -ENODEV, "is not there"},
-		{"/dev/ttyACM4711", -ENODEV, "is the adapter plugged in"},
-	};
-	struct adapter a = {.fd = -1};
-	int fd;
-
-	assert_non_null(mkdtemp(folder));
-	snprintf(file, sizeof(file), "%s/file", folder);
-	snprintf(pipe, sizeof(pipe), "%s/pipe", folder);
-	fd = open(file, O_CREAT | O_WRONLY, 0600);
-	close(fd);
-	assert_int_equal(mkfifo(pipe, 0600), 0);
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-
-		snprintf(a.path, sizeof(a.path), "%s", cases[i].path);
-		assert_int_equal(adapter_open(&a, 0, &err), cases[i].code);
-		assert_int_equal(err.code, -cases[i].code);
-		assert_non_null(strstr(err.text, cases[i].words));
-		assert_ptr_equal(strstr(err.text, "rig.conf:1: stepper: "), err.text);
-	}
-	unlink(file);
-	unlink(pipe);
-	rmdir(folder);
 }
 
 static void one_program_at_a_time(void **state)
@@ -646,7 +607,6 @@ int main(void)
 		cmocka_unit_test(the_rate_may_stand_behind_the_tty),
 		cmocka_unit_test(a_path_may_have_an_at),
 		cmocka_unit_test(a_path_of_any_length_is_safe),
-		cmocka_unit_test(what_is_no_serial_line_is_refused),
 		WITH(one_program_at_a_time),
 		WITH(frames_go_both_ways),
 		WITH(junk_is_counted_and_left_behind),
