@@ -2,8 +2,8 @@
 """
 A CiA 402 drive for tests: independent of incise's own CANopen, on python-canopen.
 
-    host ── slcan on a pty, or a CAN interface ── adapter.py ── drive.py ── machine.py
-                                                  objects.py ─╯   ╰─ record.py, control.py
+    host ── slcan on a pty, or can0 ── adapter.py ── drive.py ── machine.py
+                                    objects.py ─╯   ╰─ record.py, control.py
 
 SDO, NMT, EMCY and the packing of PDOs are python-canopen's; what its LocalNode leaves out is
 here: heartbeats are consumed, PDOs follow SYNC, mapping has the standard's rules, object 6007
@@ -491,7 +491,11 @@ class Loop:
         """All frames that are there; the drive's clock goes on with each."""
         drive = self.drive
         while True:
-            message = self.bus.recv(0)
+            try:
+                message = self.bus.recv(0)
+            except can.CanError as error:  # such as an interface that goes down
+                drive.event(f"bus: {error}")
+                return
             if message is None:
                 return
             if message.is_extended_id or message.is_remote_frame or message.is_error_frame:
