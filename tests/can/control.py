@@ -135,6 +135,10 @@ class Control:
         """the serial adapter is pulled out"""
         self.loop.unplug()
 
+    def nmt(self, words):
+        """4|5|127: another master put it to stopped, operational or pre-operational"""
+        self.drive.go_nmt(int(words[0]))
+
     def reboot(self, _):
         """mains gone and back"""
         self.drive.reboot()

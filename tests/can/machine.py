@@ -297,12 +297,12 @@ class Machine:
         self.shaft += self.velocity * dt
 
     def _follow_torque(self, dt):
-        """A mass with friction: full torque gives 5e5 counts/s² and at most 1e5 counts/s."""
+        """A mass with friction: full torque gives 5e6 counts/s² and at most 1e6 counts/s."""
         most = self.get(0x6072, 0)
         self.limit_active = False
         self.torque = self._clamp(self.get(0x6071, 0) + self.get(0x60B2, 0), -most, most)
         if self.blocked:
             self.velocity = 0.0
             return
-        self.velocity += (self.torque * 500.0 - self.velocity * 5.0) * dt
+        self.velocity += (self.torque * 5000.0 - self.velocity * 5.0) * dt
         self.shaft += self.velocity * dt

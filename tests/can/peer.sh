@@ -12,17 +12,16 @@ drive_start()
 	"$INCISE_BUILD/tests/can/drive" "$@" <drive.in >drive.out 2>drive.err 3>&- &
 	drive_pid=$!
 	exec 7>drive.in
-	drive_answers=1
-	drive_answer || return
+	drive_answer 0 || return
 	drive=$(sed -n 's/^ready //p' drive.out)
 	[ -n "$drive" ]
 }
 
-# The next answer, within 20 s: its place is line $drive_answers. An emulated machine is slow.
+# drive_answer BEFORE: the answer after so many, within 20 s: an emulated machine is slow.
 drive_answer()
 {
 	drive_tries=0
-	until [ "$(wc -l <drive.out)" -ge "$drive_answers" ]; do
+	until [ "$(wc -l <drive.out)" -gt "$1" ]; do
 		drive_tries=$((drive_tries + 1))
 		if [ $drive_tries -gt 1000 ] || ! kill -0 "$drive_pid" 2>/dev/null; then
 			echo "the drive does not answer:" "$(cat drive.err)"
@@ -30,15 +29,15 @@ drive_answer()
 		fi
 		sleep 0.02
 	done
-	drive_line=$(sed -n "${drive_answers}p" drive.out)
-	drive_answers=$((drive_answers + 1))
+	drive_line=$(tail -n 1 drive.out)
 }
 
 # drive_tell COMMAND…: its answer is in $drive_line.
 drive_tell()
 {
+	drive_before=$(wc -l <drive.out)
 	echo "$@" >&7
-	drive_answer || return
+	drive_answer "$drive_before" || return
 	case $drive_line in
 	'{"error": "'[a-zA-Z]*)
 		echo "$drive_line"
