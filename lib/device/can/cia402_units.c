@@ -206,9 +206,10 @@ static int positions(const struct cia402_talk *talk, double *per_turn)
 	return 0;
 }
 
-/* A velocity's or an acceleration's. */
+/* A velocity's or an acceleration's; counts where it does not tell. */
 static int rates(const struct cia402_talk *talk, const struct cia402_object *object,
-		 double counts, bool squared, double *per_turn, const char *key)
+		 double counts, bool squared, double *per_turn, bool *told,
+		 const char *key)
 {
 	uint32_t unit = 0;
 	uint8_t code, per;
@@ -222,6 +223,7 @@ static int rates(const struct cia402_talk *talk, const struct cia402_object *obj
 		*per_turn = counts;
 		return 0;
 	}
+	*told = true;
 	code = (uint8_t)(unit >> 16);
 	per = (uint8_t)(unit >> 8);
 	turn = angle(code);
@@ -248,6 +250,7 @@ int cia402_units(struct canopen *master, struct cia402_units *units, const char 
 		 struct incise_error *err)
 {
 	const struct cia402_talk talk = {master, where, err};
+	bool velocity_told = false, acceleration_told = false;
 	struct cia402_units found = *units;
 	int rc = 0;
 
@@ -255,10 +258,25 @@ int cia402_units(struct canopen *master, struct cia402_units *units, const char 
 		rc = positions(&talk, &found.counts_per_turn);
 	if (!rc && found.velocity_per_turn_s == 0)
 		rc = rates(&talk, &velocity_unit, found.counts_per_turn, false,
-			   &found.velocity_per_turn_s, "velocity_per_turn_s");
-	if (!rc && found.acceleration_per_turn_s2 == 0)
+			   &found.velocity_per_turn_s, &velocity_told,
+			   "velocity_per_turn_s");
+	if (!rc && found.acceleration_per_turn_s2 == 0) {
 		rc = rates(&talk, &acceleration_unit, found.counts_per_turn, true,
-			   &found.acceleration_per_turn_s2, "acceleration_per_turn_s2");
+			   &found.acceleration_per_turn_s2, &acceleration_told,
+			   "acceleration_per_turn_s2");
+		/*
+		 * One that counts speeds in something else will not count accelerations in
+		 * counts: taken for that, its quick stop would have no ramp.
+		 */
+		if (!rc && velocity_told && !acceleration_told &&
+		    found.velocity_per_turn_s != found.counts_per_turn)
+			rc = incise_error_set(
+				err, EPROTO,
+				"%s: the drive says its unit of velocity (60A9) but none of "
+				"acceleration (60AA); give acceleration_per_turn_s2 in "
+				"rig.conf, see its manual",
+				where);
+	}
 	if (rc)
 		return rc;
 	*units = found;

@@ -148,6 +148,9 @@ static void test_refused(void **state)
 		{{1000, 1, NO, NO, NO, NO, NO, 0x00010300, NO}, "velocity_per_turn_s"},
 		{{1000, 1, NO, NO, NO, NO, NO, 0x80b44700, NO}, "velocity_per_turn_s"},
 		{{1000, 1, NO, NO, NO, NO, NO, 0x00c00300, NO}, "velocity_per_turn_s"},
+		/* Its accelerations are rpm/s, or are they? */
+		{{1000, 1, NO, NO, NO, NO, NO, 0x00b44700, NO},
+		 "acceleration_per_turn_s2"},
 		{{1000, 1, NO, NO, NO, NO, NO, NO, 0x00b44700},
 		 "acceleration_per_turn_s2"},
 		{{1000, 1, NO, NO, NO, NO, NO, NO, 0x00b40300},
