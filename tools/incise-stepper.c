@@ -155,9 +155,12 @@ static void run_clear(const struct stepper_job *job, struct stepper_drive *drive
 	stepper_drive_look(drive);
 	if (job->json)
 		stepper_put(stepper_report(job, drive), JSON_INDENT(2));
-	else if (before)
-		printf("%s: forgot %s\n", drive->info.name, text);
-	else
+	else if (before) {
+		/* What to do about it has been done. */
+		if (strstr(text, ", then clear"))
+			*strstr(text, ", then clear") = 0;
+		printf("%s: cleared; it was %s\n", drive->info.name, text);
+	} else
 		printf("%s: there was no fault\n", drive->info.name);
 }
 

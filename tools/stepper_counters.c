@@ -22,8 +22,8 @@ void stepper_counters_text(struct incise_stepper *stepper)
 	struct incise_stepper_counter counter;
 
 	for (int i = 0; !incise_stepper_counter(stepper, i, &counter); i++)
-		printf("%-10s %llu %s\n", i ? "" : "counted",
-		       (unsigned long long)counter.value, counter.text);
+		printf("%-10s %s: %llu\n", i ? "" : "counted", counter.text,
+		       (unsigned long long)counter.value);
 }
 
 void stepper_counters_line(struct incise_stepper *stepper)
@@ -33,8 +33,8 @@ void stepper_counters_line(struct incise_stepper *stepper)
 
 	for (int i = 0; !incise_stepper_counter(stepper, i, &counter); i++)
 		if (counter.trouble && counter.value) {
-			printf("%s%llu %s", before, (unsigned long long)counter.value,
-			       counter.text);
+			printf("%s%s: %llu", before, counter.text,
+			       (unsigned long long)counter.value);
 			before = ", ";
 		}
 	if (*before == ',')

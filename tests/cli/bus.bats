@@ -221,7 +221,7 @@ rig() { # ARGUMENTS
 @test "status shows what is counted" {
 	rig bus0
 	run -0 --separate-stderr incise stepper status
-	[[ "$output" == *$'\ncounted    1234 set-points sent\n           3 SYNCs sent late\n           0 answers missing\n           1 emergencies' ]]
+	[[ "$output" == *$'\ncounted    set-points sent: 1234\n           SYNCs sent late: 3\n           answers missing: 0\n           emergencies: 1' ]]
 	[[ "$output" == *"faults     none"* ]]
 	[[ "$output" != *cause* ]]
 	incise stepper status --json >s.json
@@ -249,7 +249,7 @@ rig() { # ARGUMENTS
 	run --separate-stderr incise stepper move 1
 	failed_with "move: drive faulty stopped at " ": over-voltage (3210h): see the supply, then clear"
 	run -0 --separate-stderr incise stepper clear
-	[ "$output" = "drive faulty: forgot over-voltage (3210h): see the supply, then clear" ]
+	[ "$output" = "drive faulty: cleared; it was over-voltage (3210h): see the supply" ]
 	# One that says who it is: it is said once. Its name says more than that.
 	rig "named, faulty"
 	run --separate-stderr incise stepper move 1
@@ -272,7 +272,7 @@ rig() { # ARGUMENTS
 	run --separate-stderr incise haptic liver.scene --duration 10s
 	[ "$status" -eq 1 ]
 	[[ "${stderr_lines[-1]}" == "incise haptic: liver.scene: a device failed at tick 21: over-voltage (3210h): see the supply, then clear; the force was taken away" ]]
-	[ "${lines[-1]}" = "actuator   3 SYNCs sent late, 1 emergencies" ]
+	[ "${lines[-1]}" = "actuator   SYNCs sent late: 3, emergencies: 1" ]
 	rig "mute, failing"
 	run --separate-stderr incise haptic liver.scene --duration 10s
 	[[ "${stderr_lines[-1]}" == *" tick 21: alarm of the power stage: see what it says, "* ]]
@@ -294,7 +294,7 @@ rig() { # ARGUMENTS
 	rig bus0
 	run -0 --separate-stderr incise stepper move 2
 	[ "${#lines[@]}" -eq 2 ]
-	[ "${lines[1]}" = "actuator   3 SYNCs sent late, 1 emergencies" ]
+	[ "${lines[1]}" = "actuator   SYNCs sent late: 3, emergencies: 1" ]
 	incise stepper move 2 --json >m.json
 	[ "$(key m.json counters.sync_late)" = 3 ]
 	rig sound

@@ -17,6 +17,8 @@
 #define LISTEN_NS (60 * MS) /* for another master; a SYNC comes every 20 ms at least */
 #define READY_NS (500 * MS) /* until it says that it is operational */
 
+static const struct cia402_object digital_inputs = {0x60fd, 0, 4, "digital inputs"};
+
 int can_link_parse(const char *arguments, char *device, size_t size, unsigned int *node)
 {
 	const char *colon = strrchr(arguments, ':');
@@ -153,10 +155,21 @@ static int ask_homed(struct can_link *link, const char *where, struct incise_err
 	return cia402_homed(&link->master, link->setup.mode, &link->is_homed, where, err);
 }
 
+/* Which of them are wired, only a person knows: all that 60FD has a bit for. */
+static void have_inputs(struct can_link *link, bool inputs)
+{
+	struct can_axis_setup *setup = &link->axis.setup;
+
+	setup->inputs = inputs;
+	setup->wired =
+		inputs ? INCISE_STEPPER_LINE_LIMIT_MIN | INCISE_STEPPER_LINE_LIMIT_MAX |
+				 INCISE_STEPPER_LINE_HOME | INCISE_STEPPER_LINE_ESTOP
+		       : 0;
+}
+
 /* All of it, also after it began anew. */
 static int set_up(struct can_link *link, const char *where, struct incise_error *err)
 {
-	struct can_axis_setup *setup = &link->axis.setup;
 	bool was_homed = link->is_homed, keep;
 	int rc = ask_homed(link, where, err);
 
@@ -173,12 +186,7 @@ static int set_up(struct can_link *link, const char *where, struct incise_error 
 	if (rc)
 		return rc;
 	link->is_setup = true;
-	setup->inputs = link->taken.inputs;
-	setup->wired = link->taken.inputs ? INCISE_STEPPER_LINE_LIMIT_MIN |
-						    INCISE_STEPPER_LINE_LIMIT_MAX |
-						    INCISE_STEPPER_LINE_HOME |
-						    INCISE_STEPPER_LINE_ESTOP
-					  : 0;
+	have_inputs(link, link->taken.inputs);
 	return 0;
 }
 
@@ -277,6 +285,19 @@ static int look_alone(struct can_link *link, const struct can_transport *transpo
 	return rc;
 }
 
+static int look_for_inputs(struct can_link *link, const char *where,
+			   struct incise_error *err)
+{
+	const struct cia402_talk talk = {&link->master, where, err};
+	uint32_t inputs;
+	bool has;
+	int rc = cia402_ask_if(&talk, &digital_inputs, &inputs, &has);
+
+	if (!rc)
+		have_inputs(link, has);
+	return rc;
+}
+
 int can_link_look(struct can_link *link, const struct can_transport *transport,
 		  const struct incise_backend_request *asked, struct incise_error *err)
 {
@@ -293,20 +314,21 @@ int can_link_look(struct can_link *link, const struct can_transport *transport,
 		rc = know(link, asked->where, err);
 	/* It sends nothing of its own. */
 	link->master.own = 0;
+	if (!rc)
+		rc = look_for_inputs(link, asked->where, err);
 	return rc ? rc : take_position(link, false, asked->where, err);
 }
 
 /* An e-stop that is pressed forbids power, and one that was let go no longer does. */
 static int take_inputs(struct can_link *link, struct incise_error *err)
 {
-	const struct cia402_object digital = {0x60fd, 0, 4, "digital inputs"};
 	const struct cia402_talk talk = {&link->master, link->where, err};
 	uint32_t inputs;
 	int rc;
 
 	if (!link->taken.inputs)
 		return 0;
-	rc = cia402_ask(&talk, &digital, &inputs);
+	rc = cia402_ask(&talk, &digital_inputs, &inputs);
 	if (rc)
 		return rc;
 	can_axis_inputs(&link->axis, inputs);

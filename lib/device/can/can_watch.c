@@ -15,6 +15,7 @@ static void listen(struct can_watch *watch, struct can_link *link, int64_t now)
 {
 	struct can_axis *axis = &link->axis;
 	struct can_frame frame;
+	uint32_t inputs;
 	int64_t t_ns;
 
 	for (int i = 0;
@@ -27,13 +28,17 @@ static void listen(struct can_watch *watch, struct can_link *link, int64_t now)
 static int ask(struct can_link *link)
 {
 	struct can_axis *axis = &link->axis;
-	uint32_t word, counts;
+	uint32_t word, counts, inputs;
 	int rc = canopen_read(&link->master, 0x6041, 0, 2, &word);
 
 	if (!rc)
 		rc = canopen_read(&link->master, 0x6064, 0, 4, &counts);
+	if (!rc && axis->setup.inputs)
+		rc = canopen_read(&link->master, 0x60fd, 0, 4, &inputs);
 	if (rc)
 		return rc;
+	if (axis->setup.inputs)
+		can_axis_inputs(axis, inputs);
 	axis->statusword = (uint16_t)word;
 	axis->position = (int32_t)counts;
 	return 0;

@@ -43,6 +43,11 @@ static void a_watcher_looks_and_writes_nothing(void **state)
 	assert_true(s.homed && fabs(s.position_mm - 3) < 1e-3);
 	assert_int_equal(incise_stepper_set(rig.stepper, 1), -EPERM);
 	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
+	/* Switches that are pressed by hand. */
+	rig.drive.inputs = CIA402_AT_MAX | CIA402_AT_HOME;
+	can_rig_advance(&rig, 100 * MS);
+	s = can_rig_look(&rig);
+	assert_int_equal(s.inputs, INCISE_STEPPER_AT_MAX | INCISE_STEPPER_AT_HOME);
 	drive_fault(&rig.drive, 0x4310);
 	can_rig_advance(&rig, 100 * MS);
 	s = can_rig_look(&rig);
