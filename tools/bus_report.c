@@ -15,6 +15,7 @@
 /* A device, with keys that stay when the backend's module is gone. */
 struct answer {
 	char device[100], what[100];
+	bool usable;
 	int n;
 	struct {
 		char key[40], text[100];
@@ -55,6 +56,7 @@ static int keep(void *context, const struct incise_scan_device *device)
 	*one = (struct answer){0};
 	snprintf(one->device, sizeof(one->device), "%s", device->device);
 	snprintf(one->what, sizeof(one->what), "%s", device->what);
+	one->usable = device->usable;
 	for (; one->n < device->n && one->n < INCISE_SCAN_PROPERTIES; one->n++) {
 		const struct incise_scan_property *from = &device->property[one->n];
 
@@ -82,9 +84,12 @@ static void put_device(const struct answer *device)
 			width = (int)strlen(device->property[i].key);
 	putchar('\n');
 	put_plain(device->what);
-	printf("\n  %-*s = \"", width, "stepper");
-	put_plain(device->device);
-	fputs("\";\n", stdout);
+	putchar('\n');
+	if (device->usable) {
+		printf("  %-*s = \"", width, "stepper");
+		put_plain(device->device);
+		fputs("\";\n", stdout);
+	}
 	for (int i = 0; i < device->n; i++) {
 		printf("  %-*s   ", width, device->property[i].key);
 		put_plain(device->property[i].text);
@@ -94,8 +99,9 @@ static void put_device(const struct answer *device)
 
 static json_t *device_json(const struct answer *device)
 {
-	json_t *object = json_pack("{so so}", "device", json_text(device->device), "what",
-				   json_text(device->what));
+	json_t *object =
+		json_pack("{so so sb}", "device", json_text(device->device), "what",
+			  json_text(device->what), "usable", device->usable);
 
 	for (int i = 0; i < device->n; i++)
 		json_object_set_new(object, device->property[i].key,

@@ -109,9 +109,9 @@ setup_file() {
 		static int scan(const char *arguments, incise_scan_found *found, void *context,
 				struct incise_error *err)
 		{
-			struct incise_scan_device one = {"bench:bus0:0x10", "PD42-1270, operation enabled", 3,
+			struct incise_scan_device one = {"bench:bus0:0x10", "PD42-1270, operation enabled", true, 3,
 				{{"vendor_id", "0x00000286"}, {"mode", "CSP (8)"}, {"error_code", "none"}}};
-			struct incise_scan_device other = {"bench:bus0:0x11", "odd \033[2J, fault", 1,
+			struct incise_scan_device other = {"bench:bus0:0x11", "odd \033[2J, fault", false, 1,
 				{{"nmt_state", "pre-operational"}}};
 			int rc;
 			if (!strcmp(arguments, "dead"))
@@ -156,7 +156,6 @@ rig() { # ARGUMENTS
 		  error_code   none
 
 		odd ?[2J, fault
-		  stepper   = "bench:bus0:0x11";
 		  nmt_state   pre-operational
 	END
 	run -0 incise info bench:bus0:0x10
@@ -173,6 +172,8 @@ rig() { # ARGUMENTS
 	[ "$(key r.json 'devices[0].vendor_id')" = 0x00000286 ]
 	[ "$(key r.json 'devices[0].mode')" = "CSP (8)" ]
 	[ "$(key r.json 'devices[1].nmt_state')" = pre-operational ]
+	[ "$(key r.json 'devices[0].usable')" = true ]
+	[ "$(key r.json 'devices[1].usable')" = false ]
 	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '\$.devices')")" = 2 ]
 }
 

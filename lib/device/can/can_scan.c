@@ -16,6 +16,7 @@
 #define SPACING_NS \
 	(2 * MS) /* between two requests: a bus at 10 kbit/s still carries that */
 #define ANSWERS_NS (150 * MS) /* after the last one */
+#define ANSWER_NS (100 * MS)  /* of one that answered before; there may be 127 */
 
 struct scan {
 	const struct can_transport *transport;
@@ -91,78 +92,127 @@ static int ask_all(struct scan *scan, unsigned int only)
 	return rc ? rc : hear(scan, bus->ops->now(bus) + ANSWERS_NS);
 }
 
-static void add_modes(struct incise_scan_device *device, uint32_t modes)
+/* A node that is asked: once it is silent, it is asked nothing more. */
+struct asked {
+	struct canopen master;
+	struct incise_scan_device *device;
+	bool silent;
+};
+
+/* Whether it tells. */
+static bool tells(struct asked *asked, uint16_t index, uint8_t sub, int size,
+		  uint32_t *value)
+{
+	int rc;
+
+	*value = 0;
+	if (asked->silent)
+		return false;
+	rc = canopen_read(&asked->master, index, sub, size, value);
+	asked->silent = rc && rc != -EREMOTEIO && rc != -EPROTO;
+	return !rc;
+}
+
+static void add_modes(struct asked *asked)
 {
 	static const char *const names[] = {"pp", "vl", "pv",  "tq",  NULL,
 					    "hm", "ip", "csp", "csv", "cst"};
 	char text[80] = "";
+	uint32_t modes;
 
+	if (!tells(asked, 0x6502, 0, 4, &modes))
+		return;
 	for (unsigned int i = 0; i < sizeof(names) / sizeof(*names); i++)
 		if (modes >> i & 1 && names[i])
 			snprintf(text + strlen(text), sizeof(text) - strlen(text), "%s%s",
 				 *text ? " " : "", names[i]);
-	add(device, "modes", "%s", text);
+	add(asked->device, "modes", "%s", text);
 }
 
 /* Of a drive: what it does, and what is wrong with it. */
-static void add_drive(struct canopen *master, struct incise_scan_device *device,
-		      const struct cia402_identity *identity)
+static void add_drive(struct asked *asked, const char *name)
 {
-	uint32_t word = 0, mode = 0, code = 0, reg = 0, type = identity->type;
-	bool drive = (type & 0xffff) == 402;
+	struct incise_scan_device *device = asked->device;
+	const char *state = "it does not say its state";
 	char words[100] = "no fault";
-	const char *state = "";
+	uint32_t word, mode, code = 0;
 
-	if (!canopen_read(master, 0x1001, 0, 1, &reg))
-		add(device, "error_register", "0x%02x", reg);
-	if (drive && !canopen_read(master, 0x6041, 0, 2, &word)) {
+	if (tells(asked, 0x6041, 0, 2, &word)) {
 		state = cia402_state_name(cia402_state((uint16_t)word));
 		add(device, "statusword", "0x%04x", word);
 		add(device, "drive_state", "%s", state);
 	}
-	if (drive && !canopen_read(master, 0x6061, 0, 1, &mode))
+	if (tells(asked, 0x6061, 0, 1, &mode))
 		add(device, "mode", "%s", cia402_mode_name((int8_t)mode));
-	if (drive)
-		add_modes(device, identity->modes);
-	if (drive && !canopen_read(master, 0x603f, 0, 2, &code)) {
+	add_modes(asked);
+	if (tells(asked, 0x603f, 0, 2, &code)) {
 		if (code)
 			canopen_emcy_text((uint16_t)code, words, sizeof(words));
 		add(device, "error_code", "0x%04x", code);
 		add(device, "error", "%s", words);
 	}
-	if (drive)
-		snprintf(device->what, sizeof(device->what), "%.50s: %s%s%.40s",
-			 *identity->name ? identity->name : "CiA 402 drive", state,
-			 code ? ", " : "", code ? words : "");
-	else
-		snprintf(device->what, sizeof(device->what),
-			 "%.50s: CANopen profile %u, no CiA 402 drive",
-			 *identity->name ? identity->name : "a device", type & 0xffff);
+	snprintf(device->what, sizeof(device->what), "%.50s: %s%s%.40s",
+		 *name ? name : "CiA 402 drive", state, code ? ", " : "",
+		 code ? words : "");
+}
+
+/* Who it is; only what it tells. */
+static void add_identity(struct asked *asked, char *name, size_t size)
+{
+	static const struct {
+		const char *key;
+		uint8_t sub;
+	} identity[] = {
+		{"vendor_id", 1}, {"product_code", 2}, {"revision", 3}, {"serial", 4}};
+	uint32_t value;
+
+	*name = '\0';
+	if (!asked->silent && !canopen_read_text(&asked->master, 0x1008, 0, name, size) &&
+	    *name)
+		add(asked->device, "name", "%s", name);
+	for (size_t i = 0; i < sizeof(identity) / sizeof(*identity); i++)
+		if (tells(asked, 0x1018, identity[i].sub, 4, &value))
+			add(asked->device, identity[i].key, "0x%08x", value);
+	if (tells(asked, 0x1001, 0, 1, &value))
+		add(asked->device, "error_register", "0x%02x", value);
 }
 
 static void describe(struct scan *scan, unsigned int node,
 		     struct incise_scan_device *device)
 {
-	struct canopen master = {.bus = scan->bus, .node = (uint8_t)node};
-	struct cia402_identity identity = {0};
-	struct incise_error ignored = {0};
+	struct asked asked = {
+		.master = {.bus = scan->bus,
+			   .node = (uint8_t)node,
+			   .answer_ns = ANSWER_NS,
+			   .state = CANOPEN_UNKNOWN},
+		.device = device,
+	};
+	char name[64];
+	uint32_t type;
+	bool told;
 
 	*device = (struct incise_scan_device){0};
 	snprintf(device->device, sizeof(device->device), "%s:%.80s:0x%02x",
 		 scan->transport->name, scan->device, node);
-	/* What is no drive is listed too: it says why it is not found as one. */
-	cia402_identify(&master, &identity, scan->device, &ignored);
 	add(device, "node", "%u", node);
-	add(device, "device_type", "0x%08x", identity.type);
-	if (*identity.name)
-		add(device, "name", "%s", identity.name);
-	add(device, "vendor_id", "0x%08x", identity.vendor);
-	add(device, "product_code", "0x%08x", identity.product);
-	add(device, "revision", "0x%08x", identity.revision);
-	add(device, "serial", "0x%08x", identity.serial);
-	if (master.state != CANOPEN_UNKNOWN && master.heard_ns)
-		add(device, "nmt_state", "%s", canopen_state_name(master.state));
-	add_drive(&master, device, &identity);
+	told = tells(&asked, 0x1000, 0, 4, &type);
+	if (told)
+		add(device, "device_type", "0x%08x", type);
+	add_identity(&asked, name, sizeof(name));
+	if (asked.master.heard_ns)
+		add(device, "nmt_state", "%s", canopen_state_name(asked.master.state));
+	/* What is no drive is listed too: that it is there is half of the answer. */
+	if (told && (type & 0xffff) == 402)
+		add_drive(&asked, name);
+	else if (told)
+		snprintf(device->what, sizeof(device->what),
+			 "%.50s: CANopen profile %u, no CiA 402 drive",
+			 *name ? name : "a device", type & 0xffff);
+	else
+		snprintf(device->what, sizeof(device->what),
+			 "%.50s: does not say what it is, no CiA 402 drive",
+			 *name ? name : "a device");
+	device->usable = told && (type & 0xffff) == 402;
 }
 
 static int scan_bus(struct scan *scan, unsigned int only, incise_scan_found *found,

@@ -19,10 +19,15 @@ static void listen(struct can_watch *watch, struct can_link *link, int64_t now)
 	int64_t t_ns;
 
 	for (int i = 0;
-	     i < FRAMES && link->bus->ops->receive(link->bus, &frame, &t_ns) > 0; i++)
-		if (canopen_take(&link->master, &frame, t_ns) == CANOPEN_TPDO1 &&
+	     i < FRAMES && link->bus->ops->receive(link->bus, &frame, &t_ns) > 0; i++) {
+		uint32_t function = canopen_take(&link->master, &frame, t_ns);
+
+		if (function == CANOPEN_TPDO1 &&
 		    cia402_get(&frame, &axis->statusword, &axis->position))
 			watch->heard_ns = now;
+		else if (function == CANOPEN_TPDO2 && cia402_get_inputs(&frame, &inputs))
+			can_axis_inputs(axis, inputs);
+	}
 }
 
 static int ask(struct can_link *link)

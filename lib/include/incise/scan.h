@@ -6,6 +6,7 @@
 #ifndef INCISE_SCAN_H
 #define INCISE_SCAN_H
 
+#include <stdbool.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
@@ -23,6 +24,7 @@ struct incise_scan_property {
 struct incise_scan_device {
 	char device[100]; /**< what rig.conf names it by, such as "can:can0:0x10" */
 	char what[100];	  /**< a line: what it is, and how it is */
+	bool usable; /**< rig.conf may name it; false: it is there, but of no use here */
 	int n;
 	struct incise_scan_property property[INCISE_SCAN_PROPERTIES];
 };

@@ -56,6 +56,7 @@ static void a_drive_is_listed_with_what_it_is(void **state)
 		assert_string_equal(property(&list.device[0], "error"), "no fault");
 		assert_non_null(
 			strstr(property(&list.device[0], "modes"), "csp csv cst"));
+		assert_true(list.device[0].usable);
 		/* It only read, and sent no heartbeat. */
 		assert_int_equal(rig.drive.master_beats, 0);
 		assert_int_equal(rig.drive.rpdos + rig.drive.syncs, 0);
@@ -91,6 +92,34 @@ static void what_is_no_drive_is_listed_too(void **state)
 			 0);
 	assert_int_equal(list.n, 1);
 	assert_non_null(strstr(list.device[0].what, "profile 401, no CiA 402 drive"));
+	assert_false(list.device[0].usable);
+}
+
+/* What a node does not tell is not there, and one that fell silent is asked no more. */
+static void what_is_not_told_is_not_made_up(void **state)
+{
+	struct incise_error err = {0};
+	struct list list = {0};
+	uint64_t requests;
+
+	can_rig_init(&rig);
+	rig.drive.abort_index = 0x1018;
+	rig.drive.abort_sub = -1;
+	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
+			 0);
+	assert_string_equal(property(&list.device[0], "vendor_id"), "(there is none)");
+	assert_true(list.device[0].usable);
+	can_rig_init(&rig);
+	list = (struct list){0};
+	rig.drive.drop_at = 2;
+	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
+			 0);
+	assert_int_equal(list.n, 1);
+	requests = rig.drive.requests;
+	assert_int_equal(requests, 2);
+	assert_string_equal(property(&list.device[0], "device_type"), "(there is none)");
+	assert_non_null(strstr(list.device[0].what, "does not say what it is"));
+	assert_false(list.device[0].usable);
 }
 
 static void nobody_and_nothing(void **state)
@@ -125,6 +154,7 @@ int main(void)
 		cmocka_unit_test(a_drive_is_listed_with_what_it_is),
 		cmocka_unit_test(a_fault_is_told),
 		cmocka_unit_test(what_is_no_drive_is_listed_too),
+		cmocka_unit_test(what_is_not_told_is_not_made_up),
 		cmocka_unit_test(nobody_and_nothing),
 	};
 
