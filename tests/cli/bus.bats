@@ -172,8 +172,8 @@ rig() { # ARGUMENTS
 	[ "$(key r.json 'devices[0].vendor_id')" = 0x00000286 ]
 	[ "$(key r.json 'devices[0].mode')" = "CSP (8)" ]
 	[ "$(key r.json 'devices[1].nmt_state')" = pre-operational ]
-	[ "$(key r.json 'devices[0].usable')" = true ]
-	[ "$(key r.json 'devices[1].usable')" = false ]
+	[ "$(key r.json 'devices[0].usable')" = 1 ]
+	[ "$(key r.json 'devices[1].usable')" = 0 ]
 	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '\$.devices')")" = 2 ]
 }
 

@@ -12,8 +12,10 @@
 #define START_NS (500 * MS)    /* from no power to operation enabled */
 #define END_NS (200 * MS)      /* from shutdown to no power */
 #define QUICK_NS (1000 * MS)   /* a quick stop beside that */
+#define OBEY_NS (20 * MS)      /* from a quick stop to its beginning */
 #define FULL_MOST 5	       /* set-points in a row that may not get out */
 #define PICKED_UP_NS (50 * MS) /* a drive has taken the start of homing by then */
+#define STALE_CYCLES 3	       /* without an answer: no loop is closed over that */
 #define SMOOTH 0.25	       /* of a new speed, in its average */
 #define ONE 4294967296.0       /* a step, in a profile's units */
 
@@ -30,6 +32,8 @@ static void enter(struct can_axis *axis, enum can_axis_phase phase, int64_t now)
 {
 	axis->phase = phase;
 	axis->since_ns = now;
+	axis->told = false;
+	axis->answers = 0;
 }
 
 /* The first reason stays: the others follow from it. */
@@ -103,7 +107,7 @@ static void take_status(struct can_axis *axis, const struct can_frame *frame, in
 		return;
 	if (axis->heard)
 		axis->speed += SMOOTH * ((double)axis->position - before - axis->speed);
-	axis->heard = axis->answered = true;
+	axis->heard = axis->answered = axis->came = true;
 	axis->tpdo_ns = now;
 	axis->motion.status.position = can_axis_steps(axis, axis->position);
 }
@@ -169,13 +173,18 @@ static int32_t mode_target(const struct can_axis *axis,
 	double to = (double)slot->to / ONE, cycle_s = setup->config.tick_ns * 1e-9;
 	double at = (axis->position - axis->zero_counts) / setup->counts_per_step;
 	double speed = (double)(slot->to - slot->from) / ONE / cycle_s, most;
+	bool stale = axis->missed > STALE_CYCLES;
 
 	switch (setup->mode) {
 	case CIA402_CSV:
 		most = setup->config.velocity;
-		speed = fmax(-most, fmin(most, speed + setup->gain_1_s * (to - at)));
+		if (!stale)
+			speed += setup->gain_1_s * (to - at);
+		speed = fmax(-most, fmin(most, speed));
 		return whole(speed * setup->units_per_step_s, INT32_MAX);
 	case CIA402_CST:
+		if (stale)
+			return 0;
 		speed -= axis->speed / setup->counts_per_step / cycle_s;
 		return whole(setup->torque_per_step * (to - at) +
 				     setup->torque_s_per_step * speed,
@@ -220,13 +229,37 @@ static void put(struct can_axis *axis, uint16_t controlword, int32_t target, int
 	}
 }
 
-static void sync(struct can_axis *axis)
+static void sync(struct can_axis *axis, int64_t now)
 {
 	const struct can_frame frame = {.can_id = CANOPEN_SYNC};
 	struct can_bus *bus = axis->master->bus;
 
-	/* A queue that is full was noted by the set-point before it. */
+	/* A set-point that no SYNC follows is none: the drive goes on as it did. */
 	axis->answered = bus->ops->send(bus, &frame) != 0;
+	axis->put = axis->put && !axis->answered;
+	axis->unsynced = axis->answered ? axis->unsynced + 1 : 0;
+	if (axis->unsynced > FULL_MOST)
+		can_axis_fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_QUEUE_FULL,
+			       axis->unsynced, 0, now);
+}
+
+/*
+ * What the drive says now answers to what it was told in this phase: the SYNC of that cycle
+ * may have sampled it before, the one after that not.
+ */
+static bool has_answered(const struct can_axis *axis)
+{
+	return axis->told && axis->answers >= 2;
+}
+
+/* Its first target lies within the limits: that must be no jump. */
+static bool within(const struct can_axis *axis)
+{
+	const struct incise_stepper_config *config = &axis->motion.config;
+	int64_t slack = 1 + (int64_t)config->velocity * config->tick_ns / 1000000000;
+	int64_t at = axis->motion.status.position;
+
+	return at >= config->position_min - slack && at <= config->position_max + slack;
 }
 
 static void start(struct can_axis *axis, int64_t now)
@@ -234,7 +267,13 @@ static void start(struct can_axis *axis, int64_t now)
 	enum cia402_state state = cia402_state(axis->statusword);
 	bool homes = axis->limit_ns, fresh = axis->tpdo_ns != axis->since_ns;
 
-	if (fresh && state == CIA402_ENABLED) {
+	if (fresh && state == CIA402_ENABLED && !homes && !within(axis)) {
+		/* It gave way, so far that its first target would be a jump. */
+		note(axis, CAN_AXIS_OUTSIDE, axis->motion.status.position, 0);
+		axis->outcome = -ERANGE;
+		axis->motion.ending = true;
+		enter(axis, CAN_AXIS_QUICK_STOP, now);
+	} else if (fresh && state == CIA402_ENABLED) {
 		axis->motion.seen_ns = now;
 		/* It may have given way a little while it got power. */
 		incise_motion_halt(&axis->motion, false);
@@ -256,7 +295,7 @@ static void start(struct can_axis *axis, int64_t now)
 	/* What it said before may be old: no target is made of that. */
 	if (!fresh)
 		axis->put = true;
-	else
+	else if (axis->phase != CAN_AXIS_QUICK_STOP)
 		put(axis, cia402_up(state), hold_target(axis), now);
 }
 
@@ -311,7 +350,7 @@ static void end(struct can_axis *axis, int64_t now)
 	enum cia402_state state = cia402_state(axis->statusword);
 	bool off = state != CIA402_ENABLED && state != CIA402_SWITCHED_ON;
 
-	if (off && now - axis->since_ns >= 2 * (int64_t)axis->setup.config.tick_ns) {
+	if (off && has_answered(axis)) {
 		put(axis, CIA402_DISABLE_VOLTAGE, hold_target(axis), now);
 		power_off(axis, now);
 		return;
@@ -321,6 +360,7 @@ static void end(struct can_axis *axis, int64_t now)
 		return;
 	}
 	put(axis, CIA402_SHUTDOWN, hold_target(axis), now);
+	axis->told |= axis->put;
 }
 
 /* By the drive's own ramp, then without power; or as well as can be known. */
@@ -329,14 +369,11 @@ static void quick_stop(struct can_axis *axis, int64_t now)
 	enum cia402_state state = cia402_state(axis->statusword);
 	bool stopping = state == CIA402_ENABLED || state == CIA402_QUICK_STOP ||
 			state == CIA402_FAULT_REACTION;
-	bool fresh = can_axis_is_fresh(axis, now);
 	int64_t most = QUICK_NS + (int64_t)axis->setup.config.deadman_ns +
 		       (int64_t)(1e9 * axis->setup.config.velocity /
 				 axis->setup.config.acceleration);
 
-	/* One cycle at least, so that what it says now answers to the stop. */
-	if (fresh && !stopping &&
-	    now - axis->since_ns >= 2 * (int64_t)axis->setup.config.tick_ns) {
+	if (can_axis_is_fresh(axis, now) && !stopping && has_answered(axis)) {
 		put(axis, CIA402_DISABLE_VOLTAGE, hold_target(axis), now);
 		power_off(axis, now);
 		return;
@@ -350,21 +387,57 @@ static void quick_stop(struct can_axis *axis, int64_t now)
 		if (!axis->motion.status.faults && axis->outcome != -ETIMEDOUT)
 			axis->motion.status.faults |= INCISE_ABI_FAULT_LOST;
 		note(axis, CAN_AXIS_NO_STOP, state, 0);
+		axis->mute = true;
 		power_off(axis, now);
 		return;
 	}
 	put(axis, stopping ? CIA402_QUICK_STOP_COMMAND : CIA402_DISABLE_VOLTAGE,
 	    hold_target(axis), now);
+	axis->told |= axis->put;
+}
+
+/* Nobody gave it power, and yet it says that it has it. */
+static void idle(struct can_axis *axis)
+{
+	struct incise_abi_status *status = &axis->motion.status;
+
+	if (cia402_state(axis->statusword) != CIA402_ENABLED || axis->answers < 2)
+		return;
+	if (!status->faults)
+		note(axis, CAN_AXIS_NO_STOP, CIA402_ENABLED, 0);
+	status->faults |= INCISE_STEPPER_FAULT_DRIVER;
+	status->state = INCISE_STEPPER_STATE_FAULT;
+	axis->mute = true;
+}
+
+/*
+ * Heartbeats keep the drive from stopping by itself. With power they answer for set-points
+ * that really go out, and for no less; and a drive that is to stop, and does not say that it
+ * does, is left to its own watch.
+ */
+static bool may_beat(const struct can_axis *axis, bool powered, int64_t now)
+{
+	bool obeys = cia402_state(axis->statusword) != CIA402_ENABLED ||
+		     now - axis->since_ns < OBEY_NS;
+
+	if (axis->mute)
+		return false;
+	if (axis->phase == CAN_AXIS_QUICK_STOP &&
+	    !(obeys && can_axis_is_fresh(axis, now)))
+		return false;
+	return !powered || axis->put;
 }
 
 void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 		    uint32_t left_out)
 {
 	struct incise_motion *m = &axis->motion;
-	bool powered = m->powered, deaf;
+	bool powered = m->powered;
 
-	axis->put = false;
+	axis->put = axis->came = false;
 	hear(axis, now_ns);
+	axis->answers += axis->came;
+	axis->missed = axis->answered ? 0 : axis->missed + 1;
 	if (powered) {
 		axis->counts.sync_late +=
 			left_out + (2 * late_ns > (int64_t)axis->setup.config.tick_ns);
@@ -375,6 +448,7 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 		can_axis_check_running(axis, now_ns);
 	switch (axis->phase) {
 	case CAN_AXIS_IDLE:
+		idle(axis);
 		break;
 	case CAN_AXIS_STARTING:
 		start(axis, now_ns);
@@ -394,13 +468,8 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 		end(axis, now_ns);
 	else if (axis->phase == CAN_AXIS_QUICK_STOP)
 		quick_stop(axis, now_ns);
-	sync(axis);
-	/*
-	 * With power it answers for set-points that really go out, and for no less. A drive
-	 * that is to stop and does not say that it hears is left to its own watch.
-	 */
-	deaf = axis->phase == CAN_AXIS_QUICK_STOP && !can_axis_is_fresh(axis, now_ns);
-	if (!powered || (axis->put && !deaf))
+	sync(axis, now_ns);
+	if (may_beat(axis, powered, now_ns))
 		canopen_beat(axis->master, now_ns);
 	m->status.late = axis->counts.sync_late;
 	incise_motion_publish(m, now_ns);
@@ -419,13 +488,9 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns)
 {
 	struct incise_motion *m = &axis->motion;
 	const struct canopen *master = axis->master;
-	int64_t at = m->status.position, slack;
 	int rc;
 
-	/* Its first target is within the limits: that must be no jump. */
-	slack = 1 + (int64_t)m->config.velocity * m->config.tick_ns / 1000000000;
-	if (!homing_ns &&
-	    (at < m->config.position_min - slack || at > m->config.position_max + slack))
+	if (!homing_ns && !within(axis))
 		return -ERANGE;
 	rc = incise_motion_power_on(m, now_ns);
 	if (rc <= 0)
@@ -438,7 +503,11 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns)
 	axis->full = 0;
 	axis->off_ns = 0;
 	axis->speed = 0;
-	axis->stop_homing = axis->failed = false;
+	axis->stop_homing = axis->failed = axis->mute = false;
+	axis->missed = 0;
+	/* Until it has homed again. */
+	if (homing_ns)
+		m->status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	axis->answered = true;
 	axis->tpdo_ns = now_ns;
 	axis->limit_ns = homing_ns ? now_ns + homing_ns : 0;

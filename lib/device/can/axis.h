@@ -50,6 +50,7 @@ enum can_axis_why {
 	CAN_AXIS_NO_START,   /* a: enum cia402_state it stayed in */
 	CAN_AXIS_NO_HOME,    /* the drive says that homing failed */
 	CAN_AXIS_HOME_TIME,
+	CAN_AXIS_OUTSIDE, /* a: steps; it gave way while it got power */
 	CAN_AXIS_NO_STOP, /* it did not say that it lost power */
 };
 
@@ -99,8 +100,14 @@ struct can_axis {
 	double speed;	      /* measured, counts per cycle, smoothed */
 	uint32_t boots, emcys, bus_offs, foreign; /* when power was given */
 	int outcome;				  /* what result will be without power */
-	uint32_t full; /* set-points in a row that the bus did not take */
-	bool put;      /* a set-point went out in this cycle */
+	uint32_t full;	   /* set-points in a row that the bus did not take */
+	uint32_t unsynced; /* SYNCs in a row that the bus did not take */
+	uint32_t missed;   /* SYNCs in a row without an answer */
+	uint32_t answers;  /* cycles with one, in this phase */
+	bool put;	   /* a set-point, and its SYNC, went out in this cycle */
+	bool came;	   /* an answer, in this cycle */
+	bool told;	   /* the drive was told what this phase is about */
+	bool mute;	   /* no heartbeat: it did not stop when it was told to */
 	bool answered, attained_before, stop_homing, failed;
 };
 

@@ -5,6 +5,8 @@
 #include "axis_check.h"
 
 #define MS 1000000LL
+#define OPEN_CYCLES 10	  /* without an answer, in csv and cst … */
+#define OPEN_NS (20 * MS) /* … and at least that */
 
 bool can_axis_is_fresh(const struct can_axis *axis, int64_t now)
 {
@@ -40,6 +42,11 @@ void can_axis_check_drive(struct can_axis *axis, int64_t now)
 	else if (master->state != CANOPEN_OPERATIONAL)
 		can_axis_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NMT, master->state,
 			       0, now);
+	/* Where the loop is closed here, it cannot stay open for so long. */
+	if (axis->setup.mode != CIA402_CSP && axis->missed >= OPEN_CYCLES &&
+	    now - axis->tpdo_ns > OPEN_NS)
+		can_axis_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_TPDO,
+			       OPEN_NS / MS, 0, now);
 	if (now - axis->tpdo_ns > axis->setup.silence_ns)
 		can_axis_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_TPDO,
 			       axis->setup.silence_ns / MS, 0, now);

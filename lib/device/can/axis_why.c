@@ -87,6 +87,12 @@ int can_axis_why(const struct can_axis *axis, char *text, size_t size)
 		return snprintf(text, size,
 				"its homing was not done in time: see that it moves, "
 				"home_mm_s and homing_method in rig.conf, then clear");
+	case CAN_AXIS_OUTSIDE:
+		return snprintf(
+			text, size,
+			"it gave way while it got power, to %.3f mm, outside of its "
+			"travel: see its brake, and home it",
+			(double)a * axis->setup.step_mm);
 	case CAN_AXIS_NO_STOP:
 		return snprintf(text, size,
 				"it did not say that it stopped, and was last in %s: "

@@ -349,6 +349,8 @@ int can_link_ready(struct can_link *link, bool homing, struct incise_error *err)
 
 	if (!link->is_setup || link->boots != link->master.boots)
 		rc = set_up(link, link->where, err);
+	/* Until it has: whether it fails, or is stopped on the way. */
+	link->is_homed = link->is_homed && (!homing || a->can.absolute);
 	if (!rc && homing)
 		rc = cia402_set_homing(
 			&link->master, a->can.homing_method,
@@ -385,12 +387,15 @@ int can_link_clear(struct can_link *link, struct incise_error *err)
 			"%s: cannot be cleared: %s is still bus-off; `ip link set %s type can "
 			"restart`, then clear",
 			link->where, link->bus->name, link->bus->name);
-	rc = cia402_clear(&link->master, link->where, err);
+	rc = cia402_power_off(&link->master, link->where, err);
+	if (!rc)
+		rc = cia402_clear(&link->master, link->where, err);
 	/* Whatever it was, nobody need trust what it still knows. */
 	if (!rc)
 		rc = set_up(link, link->where, err);
 	if (!rc)
 		rc = take_inputs(link, err);
+	link->axis.mute = link->axis.mute && rc;
 	link->axis.why = rc ? link->axis.why : CAN_AXIS_NO_REASON;
 	return rc;
 }

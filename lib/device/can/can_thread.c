@@ -42,14 +42,17 @@ static void obey(struct can_thread *t)
 /* Without power, and while it is borrowed: the mailbox, and now and then a cycle. */
 static int64_t idle(struct can_thread *t)
 {
-	int64_t now = now_of(t);
+	int64_t now = now_of(t), beat_ns = t->link->master.beat_ns;
 
 	if (!t->lent && now >= t->idle_ns) {
 		if (t->watches)
 			can_watch_cycle(&t->watch, t->link);
 		else
 			can_axis_cycle(&t->link->axis, now, 0, 0);
-		t->idle_ns = now + CAN_AXIS_IDLE_NS;
+		/* The drive's watch waits for no more than four heartbeats. */
+		t->idle_ns = now + (beat_ns > 0 && beat_ns < CAN_AXIS_IDLE_NS
+					    ? beat_ns
+					    : CAN_AXIS_IDLE_NS);
 	}
 	t->due_ns = now_of(t);
 	return t->due_ns + IDLE_LOOK_NS;

@@ -33,6 +33,7 @@ static void each_reason_has_its_own_line(void **state)
 		{CAN_AXIS_NO_START, CIA402_READY, 0, "stays in ready to switch on"},
 		{CAN_AXIS_NO_HOME, 0, 0, "its homing failed"},
 		{CAN_AXIS_HOME_TIME, 0, 0, "not done in time"},
+		{CAN_AXIS_OUTSIDE, -100, 0, "to -0.750 mm"},
 		{CAN_AXIS_NO_STOP, CIA402_ENABLED, 0, "operation enabled: switch"},
 	};
 	struct can_axis axis = {.setup.step_mm = 0.0075};
