@@ -3,6 +3,7 @@
  * The habits that all verbs share; see cli.h.
  */
 #include <errno.h>
+#include <fcntl.h>
 #include <getopt.h>
 #include <math.h>
 #include <stdarg.h>
@@ -46,6 +47,22 @@ static void print_help(const struct cli_verb *verb)
 		printf("\n%s\n", verb->notes);
 }
 
+/*
+ * Where a standard stream was closed, the next file that is opened would take its place: a
+ * device, that then gets what is printed. One that cannot be written to takes it instead, so
+ * that what is printed is an error.
+ */
+static void fill_streams(void)
+{
+	int fd;
+
+	do
+		fd = open("/dev/null", O_RDONLY);
+	while (fd >= 0 && fd <= 2);
+	if (fd > 2)
+		close(fd);
+}
+
 int cli_next(const struct cli_verb *verb, int argc, char **argv)
 {
 	struct option longs[OPTIONS_MAX + 3] = {0};
@@ -54,6 +71,8 @@ int cli_next(const struct cli_verb *verb, int argc, char **argv)
 	int n = 0;
 	int id;
 
+	if (!current)
+		fill_streams();
 	current = verb;
 	for (const struct cli_option *opt = verb->options; opt->name; opt++) {
 		if (n == OPTIONS_MAX)

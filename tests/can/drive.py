@@ -496,6 +496,9 @@ class Loop:
             except can.CanError as error:  # such as an interface that goes down
                 drive.event(f"bus: {error}")
                 return
+            except ValueError as error:  # a line that was cut off
+                drive.event(f"no frame: {error}")
+                continue
             if message is None:
                 return
             if message.is_extended_id or message.is_remote_frame or message.is_error_frame:

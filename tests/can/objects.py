@@ -153,6 +153,8 @@ def dictionary(node, changed=(), without=()):
         if not od[index][0].default:
             del od[index]
     for index, sub in without:
+        if index not in od:
+            continue
         if sub is None:
             del od[index]
         else:

@@ -59,9 +59,12 @@ void can_axis_fault(struct can_axis *axis, uint32_t bits, enum can_axis_why why,
 		m->status.faults |= bits;
 		return;
 	}
-	/* There is no profile to brake by yet, or none at all. */
-	if (incise_motion_fault(m, bits) || axis->phase == CAN_AXIS_STARTING ||
-	    axis->phase == CAN_AXIS_HOMING) {
+	/*
+	 * There is no profile to brake by yet, or none at all; and amid another's set-points
+	 * ours are none.
+	 */
+	if (incise_motion_fault(m, bits) || why == CAN_AXIS_FOREIGN ||
+	    axis->phase == CAN_AXIS_STARTING || axis->phase == CAN_AXIS_HOMING) {
 		m->ending = true;
 		m->status.state = INCISE_STEPPER_STATE_STOPPING;
 		enter(axis, CAN_AXIS_QUICK_STOP, now);
@@ -143,8 +146,10 @@ static void hear(struct can_axis *axis, int64_t now)
 			take_status(axis, &frame, now);
 			break;
 		case CANOPEN_TPDO2:
-			if (cia402_get_inputs(&frame, &inputs))
+			if (cia402_get_inputs(&frame, &inputs)) {
 				can_axis_inputs(axis, inputs);
+				axis->inputs_ns = now;
+			}
 			break;
 		}
 	}
@@ -267,6 +272,10 @@ static void start(struct can_axis *axis, int64_t now)
 	enum cia402_state state = cia402_state(axis->statusword);
 	bool homes = axis->limit_ns, fresh = axis->tpdo_ns != axis->since_ns;
 
+	can_axis_check_inputs(axis, now);
+	if (axis->phase != CAN_AXIS_STARTING)
+		return;
+
 	if (fresh && state == CIA402_ENABLED && !homes && !within(axis)) {
 		/* It gave way, so far that its first target would be a jump. */
 		note(axis, CAN_AXIS_OUTSIDE, axis->motion.status.position, 0);
@@ -282,7 +291,8 @@ static void start(struct can_axis *axis, int64_t now)
 				incise_profile_position(&axis->motion.profile);
 		axis->motion.status.state =
 			homes ? INCISE_STEPPER_STATE_MOVING : INCISE_STEPPER_STATE_READY;
-		axis->attained_before = axis->statusword & CIA402_HOMED;
+		axis->old_bits =
+			axis->statusword & (CIA402_HOMED | CIA402_FOLLOWING_ERROR);
 		if (!homes)
 			axis->result = 0;
 		enter(axis, homes ? CAN_AXIS_HOMING : CAN_AXIS_RUNNING, now);
@@ -316,19 +326,19 @@ static void run(struct can_axis *axis, int64_t now)
 static void home(struct can_axis *axis, int64_t now)
 {
 	uint16_t word = axis->statusword;
-	bool begun = !axis->attained_before || now - axis->since_ns > PICKED_UP_NS;
+	bool begun = !axis->old_bits || now - axis->since_ns > PICKED_UP_NS;
 
 	can_axis_check_inputs(axis, now);
 	if (axis->phase != CAN_AXIS_HOMING)
 		return;
-	if (!(word & CIA402_HOMED))
-		axis->attained_before = false;
+	/* What a homing before left is over when the drive takes this one up. */
+	axis->old_bits &= word;
 	if (axis->stop_homing) {
 		axis->outcome = -EINTR;
 		axis->motion.ending = true;
 		axis->motion.status.state = INCISE_STEPPER_STATE_STOPPING;
 		enter(axis, CAN_AXIS_QUICK_STOP, now);
-	} else if (word & CIA402_FOLLOWING_ERROR) {
+	} else if (begun && word & CIA402_FOLLOWING_ERROR) {
 		can_axis_fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_NO_HOME, 0, 0,
 			       now);
 	} else if (now > axis->limit_ns) {
@@ -348,9 +358,8 @@ static void home(struct can_axis *axis, int64_t now)
 static void end(struct can_axis *axis, int64_t now)
 {
 	enum cia402_state state = cia402_state(axis->statusword);
-	bool off = state != CIA402_ENABLED && state != CIA402_SWITCHED_ON;
 
-	if (off && has_answered(axis)) {
+	if (!cia402_powered(state) && has_answered(axis)) {
 		put(axis, CIA402_DISABLE_VOLTAGE, hold_target(axis), now);
 		power_off(axis, now);
 		return;
@@ -373,7 +382,8 @@ static void quick_stop(struct can_axis *axis, int64_t now)
 		       (int64_t)(1e9 * axis->setup.config.velocity /
 				 axis->setup.config.acceleration);
 
-	if (can_axis_is_fresh(axis, now) && !stopping && has_answered(axis)) {
+	if (can_axis_is_fresh(axis, now) && !cia402_powered(state) &&
+	    has_answered(axis)) {
 		put(axis, CIA402_DISABLE_VOLTAGE, hold_target(axis), now);
 		power_off(axis, now);
 		return;
@@ -509,7 +519,7 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns)
 	if (homing_ns)
 		m->status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	axis->answered = true;
-	axis->tpdo_ns = now_ns;
+	axis->tpdo_ns = axis->inputs_ns = now_ns;
 	axis->limit_ns = homing_ns ? now_ns + homing_ns : 0;
 	axis->result = 1;
 	axis->outcome = -EIO;

@@ -40,6 +40,7 @@ enum can_axis_why {
 	CAN_AXIS_NOT_ENABLED,  /* a: enum cia402_state it fell to */
 	CAN_AXIS_NO_HEARTBEAT, /* a: ms */
 	CAN_AXIS_NO_TPDO,      /* a: ms */
+	CAN_AXIS_NO_INPUTS,    /* a: ms */
 	CAN_AXIS_REBOOTED,
 	CAN_AXIS_NMT, /* a: enum canopen_state */
 	CAN_AXIS_BUS_OFF,
@@ -66,7 +67,8 @@ struct can_axis_setup {
 	int64_t silence_ns;   /* of the drive: longer, and it is lost */
 	int32_t following;    /* steps off the target … */
 	int64_t following_ns; /* … for so long */
-	bool inputs;	      /* it sends TPDO2 */
+	bool inputs;	      /* it sends TPDO2 … */
+	bool inputs_timed;    /* … at each CIA402_INPUTS_MS */
 	unsigned int wired;   /* INCISE_STEPPER_LINE_… bits that count */
 };
 
@@ -106,9 +108,11 @@ struct can_axis {
 	uint32_t answers;  /* cycles with one, in this phase */
 	bool put;	   /* a set-point, and its SYNC, went out in this cycle */
 	bool came;	   /* an answer, in this cycle */
+	uint16_t old_bits; /* of the statusword, that a homing before left */
+	int64_t inputs_ns; /* the last that came */
 	bool told;	   /* the drive was told what this phase is about */
 	bool mute;	   /* no heartbeat: it did not stop when it was told to */
-	bool answered, attained_before, stop_homing, failed;
+	bool answered, stop_homing, failed;
 };
 
 /* Without power. Returns 0, or as incise_profile_init() says. */

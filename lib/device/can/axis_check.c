@@ -5,6 +5,7 @@
 #include "axis_check.h"
 
 #define MS 1000000LL
+#define INPUTS_NS (3 * CIA402_INPUTS_MS * MS)
 #define OPEN_CYCLES 10	  /* without an answer, in csv and cst … */
 #define OPEN_NS (20 * MS) /* … and at least that */
 
@@ -42,6 +43,9 @@ void can_axis_check_drive(struct can_axis *axis, int64_t now)
 	else if (master->state != CANOPEN_OPERATIONAL)
 		can_axis_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NMT, master->state,
 			       0, now);
+	if (axis->setup.inputs_timed && now - axis->inputs_ns > INPUTS_NS)
+		can_axis_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_INPUTS,
+			       INPUTS_NS / MS, 0, now);
 	/* Where the loop is closed here, it cannot stay open for so long. */
 	if (axis->setup.mode != CIA402_CSP && axis->missed >= OPEN_CYCLES &&
 	    now - axis->tpdo_ns > OPEN_NS)

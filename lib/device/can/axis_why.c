@@ -39,6 +39,12 @@ int can_axis_why(const struct can_axis *axis, char *text, size_t size)
 				"no status (TPDO1) of it for %lld ms: see its power and "
 				"cable, then clear",
 				a);
+	case CAN_AXIS_NO_INPUTS:
+		return snprintf(
+			text, size,
+			"its inputs (TPDO2) were not heard for %lld ms, the e-stop "
+			"among them: see what changed its set-up, then clear",
+			a);
 	case CAN_AXIS_REBOOTED:
 		return snprintf(text, size,
 				"it began anew (boot-up message): see its power supply, "

@@ -4,11 +4,14 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include "../motor.h"
 #include "bus_load.h"
 #include "can_fit.h"
 
 #define MS 1000000LL
+#define COUNTS_MOST 2e9 /* of a position: 32 bits, and something for its neighbourhood */
+#define CYCLE_MOST_US 2000    /* of rig.conf */
 #define DEADMAN_LEAST_S 0.02  /* heartbeats are in whole ms, and four must fit */
 #define MARGIN 1.25	      /* of the drive's limits, so that ours come first */
 #define FINEST_STEPS_S 150000 /* of the profile: below its largest */
@@ -46,6 +49,7 @@ void can_fit_range(struct can_link *link)
 	double high =
 		link->axis.zero_counts + per_mm * (a->travel_mm + link->following_mm);
 
+	link->in_range = fmin(low, high) > -COUNTS_MOST && fmax(low, high) < COUNTS_MOST;
 	link->setup.limited = link->is_homed;
 	link->setup.position_min = counts_of(fmin(low, high));
 	link->setup.position_max = counts_of(fmax(low, high));
@@ -124,23 +128,29 @@ int can_fit_axis(struct can_link *link, const char *where, struct incise_error *
 int can_fit_load(struct can_link *link, const char *where, struct incise_error *err)
 {
 	uint32_t cycle_ns = link->actuator.can.cycle_ns, bitrate = link->bus->bitrate;
-	unsigned int target = link->setup.mode == CIA402_CST ? 2 : 4;
-	uint32_t load = bus_load_of(cycle_ns, 2 + target, 6, link->master.beat_ns);
-	double least_us;
+	unsigned int rpdo = link->setup.mode == CIA402_CST ? 4 : 6;
+	uint32_t load = bus_load_of(cycle_ns, rpdo, 6, link->master.beat_ns);
+	/* What does not come in cycles is there with any. */
+	uint32_t fixed = bus_load_of(UINT32_MAX, rpdo, 6, link->master.beat_ns);
+	double room = bitrate * (BUS_LOAD_MOST / 100.0) - fixed, least_us;
+	char slower[60] = "";
 
 	if (!bitrate)
 		return 0;
 	link->load_percent = (uint32_t)ceil(100.0 * load / bitrate);
 	if (link->load_percent <= BUS_LOAD_MOST)
 		return 0;
-	least_us = ceil((double)cycle_ns / 1e3 * link->load_percent / BUS_LOAD_MOST);
+	least_us =
+		room > 0 ? 10 * ceil(cycle_ns / 1e4 * (load - fixed) / room) : INFINITY;
+	if (least_us <= CYCLE_MOST_US)
+		snprintf(slower, sizeof(slower), ", or cycle_us = %g", least_us);
 	return incise_error_set(
 		err, ERANGE,
 		"%s: a cycle each %g us takes %u kbit/s, %u %% of the %u kbit/s of %s, and "
-		"may take %d %%; give a bit rate of at least %u kbit/s, or cycle_us = %g",
+		"may take %d %%; give a bit rate of at least %u kbit/s%s",
 		where, cycle_ns / 1e3, (load + 999) / 1000, link->load_percent,
 		bitrate / 1000, link->bus->name, BUS_LOAD_MOST,
-		(load * 100 / BUS_LOAD_MOST + 999) / 1000, least_us);
+		(load * 100 / BUS_LOAD_MOST + 999) / 1000, slower);
 }
 
 int can_fit_deadman(const struct incise_actuator *a, const char *where,

@@ -42,6 +42,7 @@ static int set_filter(struct can_link *link)
 {
 	const uint32_t node = link->master.node;
 	const uint32_t ids[] = {
+		CANOPEN_NMT,
 		CANOPEN_SYNC,
 		CANOPEN_EMCY + node,
 		CANOPEN_TPDO1 + node,
@@ -181,12 +182,20 @@ static int set_up(struct can_link *link, const char *where, struct incise_error 
 	if (rc)
 		return rc;
 	can_fit_range(link);
+	if (!link->in_range)
+		return incise_error_set(
+			err, ERANGE,
+			"%s: its position is %d counts, and with %g counts a turn the travel "
+			"goes beyond what 32 bits hold; switch its power off and on, or see "
+			"counts_per_turn in rig.conf",
+			where, link->axis.position, link->units.counts_per_turn);
 	link->boots = link->master.boots;
 	rc = cia402_configure(&link->master, &link->setup, &link->taken, where, err);
 	if (rc)
 		return rc;
 	link->is_setup = true;
 	have_inputs(link, link->taken.inputs);
+	link->axis.setup.inputs_timed = link->taken.inputs && link->taken.inputs_timed;
 	return 0;
 }
 
@@ -272,12 +281,16 @@ static int look_alone(struct can_link *link, const struct can_transport *transpo
 		      struct incise_error *err)
 {
 	uint32_t word;
+	bool alone;
 	int rc = open_bus(link, transport, asked, false, err);
 
 	if (rc)
 		return rc;
+	link->master.own = (uint8_t)asked->actuator->can.master;
 	rc = know(link, asked->where, err);
-	if (!rc && !canopen_read(&link->master, 0x6041, 0, 2, &word) &&
+	/* Nor under a master that is none of ours. */
+	alone = !rc && !check_alone(link, asked->where, NULL);
+	if (alone && !canopen_read(&link->master, 0x6041, 0, 2, &word) &&
 	    cia402_state((uint16_t)word) == CIA402_DISABLED)
 		rc = ask_homed(link, asked->where, err);
 	link->bus->ops->close(link->bus);

@@ -30,6 +30,7 @@ struct can_link {
 	/* private */
 	uint32_t boots; /* when it was set up */
 	bool is_setup, is_homed;
+	bool in_range; /* all of the travel, in the drive's 32-bit counts */
 };
 
 /* "can0:0x10" in its parts. 0, -EINVAL. */
@@ -43,7 +44,10 @@ int can_link_parse(const char *arguments, char *device, size_t size, unsigned in
 int can_link_open(struct can_link *link, const struct can_transport *transport,
 		  const struct incise_backend_request *request, struct incise_error *err);
 
-/* The same to look: the drive is asked what it is, and nothing is written. */
+/*
+ * The same to look: the drive is asked what it is. Nothing is written but, where nobody drives
+ * it and it has no power, its mode for a moment: homing mode tells whether it has homed.
+ */
 int can_link_look(struct can_link *link, const struct can_transport *transport,
 		  const struct incise_backend_request *request, struct incise_error *err);
 

@@ -239,6 +239,11 @@ int can_stepper_scan(const struct can_transport *transport, const char *argument
 	int rc;
 
 	snprintf(where, sizeof(where), "%s:%.80s", transport->name, arguments);
+	if (!*arguments || *arguments == ':' || *arguments == '@')
+		return incise_error_set(err, EINVAL,
+					"%s: expected a bus, such as can:can0 or "
+					"slcan:/dev/ttyACM0; correct it",
+					where);
 	if (can_link_parse(arguments, device, sizeof(device), &only))
 		snprintf(device, sizeof(device), "%s", arguments);
 	rc = transport->open(&scan.bus, &request, err);
@@ -247,9 +252,7 @@ int can_stepper_scan(const struct can_transport *transport, const char *argument
 	rc = scan_bus(&scan, only, found, context);
 	scan.bus->ops->close(scan.bus);
 	if (rc < 0)
-		incise_error_set(err, -rc,
-				 "%s: %s; see its cable and `ip -details link "
-				 "show`",
+		incise_error_set(err, -rc, "%s: %s; see its cable, and that it is up",
 				 where, strerror(-rc));
 	return rc;
 }

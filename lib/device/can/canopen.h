@@ -16,6 +16,7 @@
 #include <stddef.h>
 #include "can_bus.h"
 
+#define CANOPEN_NMT 0x000
 #define CANOPEN_SYNC 0x080
 #define CANOPEN_EMCY 0x080
 #define CANOPEN_TPDO1 0x180

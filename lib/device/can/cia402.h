@@ -126,9 +126,12 @@ struct cia402_setup {
 	uint16_t torque_permille; /* 6072; 0: as it is */
 };
 
+#define CIA402_INPUTS_MS 100
+
 /* What it took of it; what it does not have it cannot watch over. */
 struct cia402_taken {
-	bool inputs; /* 60FD comes in TPDO2 */
+	bool inputs;	   /* 60FD comes in TPDO2 … */
+	bool inputs_timed; /* … also when nothing changed, each CIA402_INPUTS_MS */
 	bool position_limit, velocity_limit, acceleration_limit, following_limit;
 };
 

@@ -21,7 +21,6 @@
 #define AT_CHANGE 255
 #define INHIBIT \
 	100 /* 10 ms, after an input that changed at once; bus_load.c counts on it */
-#define TIMER_MS 100 /* inputs come at least that often */
 
 #define MAP_CONTROLWORD 0x60400010
 #define MAP_STATUSWORD 0x60410010
@@ -117,7 +116,8 @@ static int switch_others_off(const struct cia402_talk *talk, uint16_t base,
  * Inputs in TPDO2, which is off. A drive whose inputs cannot be mapped has none for us: what
  * is wired to it is not watched, and who needs them says so.
  */
-static int set_inputs(const struct cia402_talk *talk, uint32_t id, bool *taken)
+static int set_inputs(const struct cia402_talk *talk, uint32_t id, bool *taken,
+		      bool *timed)
 {
 	static const struct cia402_object inputs = {0x60fd, 0, 4, "digital inputs"};
 	static const struct cia402_object inhibit = {TPDO + 1, 3, 2, "PDO inhibit time"};
@@ -132,12 +132,12 @@ static int set_inputs(const struct cia402_talk *talk, uint32_t id, bool *taken)
 	bool has;
 	int rc = cia402_ask_if(talk, &inputs, &now, &has);
 
-	*taken = false;
+	*taken = *timed = false;
 	if (rc || !has)
 		return rc;
 	rc = cia402_keep_if(talk, &inhibit, INHIBIT, &has);
 	if (!rc)
-		rc = cia402_keep_if(talk, &timer, TIMER_MS, &has);
+		rc = cia402_keep_if(talk, &timer, CIA402_INPUTS_MS, timed);
 	if (!rc)
 		rc = cia402_tell(talk, &count, 0);
 	if (rc)
@@ -200,6 +200,6 @@ int cia402_set_pdos(const struct cia402_talk *talk, const struct cia402_setup *s
 	if (!rc)
 		rc = set_pdo(talk, &actual);
 	if (!rc && has)
-		rc = set_inputs(talk, id, &taken->inputs);
+		rc = set_inputs(talk, id, &taken->inputs, &taken->inputs_timed);
 	return rc;
 }

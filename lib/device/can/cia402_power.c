@@ -24,12 +24,25 @@ static bool out_of_fault(enum cia402_state state)
 	return state == CIA402_DISABLED || state == CIA402_READY;
 }
 
+#define STOP_NS 500000000
+
 int cia402_power_off(struct canopen *master, const char *where, struct incise_error *err)
 {
 	const struct cia402_talk talk = {master, where, err};
 	enum cia402_state state = CIA402_UNKNOWN;
-	int rc = cia402_tell(&talk, &cia402_controlword, CIA402_DISABLE_VOLTAGE);
+	uint32_t word = 0;
+	int rc = cia402_ask(&talk, &cia402_statusword, &word);
 
+	/* One that moves is given its ramp; if it stays in its quick stop, no more of that. */
+	if (!rc && cia402_state((uint16_t)word) == CIA402_ENABLED) {
+		rc = cia402_tell(&talk, &cia402_controlword, CIA402_QUICK_STOP_COMMAND);
+		if (!rc)
+			rc = cia402_watch(&talk, without_power, STOP_NS, &state);
+		if (rc == -ETIME)
+			rc = 0;
+	}
+	if (!rc)
+		rc = cia402_tell(&talk, &cia402_controlword, CIA402_DISABLE_VOLTAGE);
 	if (!rc)
 		rc = cia402_watch(&talk, without_power, RAMP_NS, &state);
 	if (rc == -ETIME)

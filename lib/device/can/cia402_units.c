@@ -268,13 +268,13 @@ int cia402_units(struct canopen *master, struct cia402_units *units, const char 
 		 * One that counts speeds in something else will not count accelerations in
 		 * counts: taken for that, its quick stop would have no ramp.
 		 */
-		if (!rc && velocity_told && !acceleration_told &&
+		if (!rc && !acceleration_told &&
 		    found.velocity_per_turn_s != found.counts_per_turn)
 			rc = incise_error_set(
 				err, EPROTO,
-				"%s: the drive says its unit of velocity (60A9) but none of "
-				"acceleration (60AA); give acceleration_per_turn_s2 in "
-				"rig.conf, see its manual",
+				"%s: the unit of velocity is not a count per second, and the "
+				"drive does not say that of acceleration (60AA); give "
+				"acceleration_per_turn_s2 in rig.conf, see its manual",
 				where);
 	}
 	if (rc)

@@ -23,6 +23,7 @@ static void each_reason_has_its_own_line(void **state)
 		{CAN_AXIS_NOT_ENABLED, CIA402_DISABLED, 0, "switch-on disabled"},
 		{CAN_AXIS_NO_HEARTBEAT, 150, 0, "no heartbeat of it for 150 ms"},
 		{CAN_AXIS_NO_TPDO, 150, 0, "(TPDO1) of it for 150 ms"},
+		{CAN_AXIS_NO_INPUTS, 300, 0, "not heard for 300 ms"},
 		{CAN_AXIS_REBOOTED, 0, 0, "began anew"},
 		{CAN_AXIS_NMT, CANOPEN_STOPPED, 0, "stopped"},
 		{CAN_AXIS_BUS_OFF, 0, 0, "the bus is off"},

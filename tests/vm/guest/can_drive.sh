@@ -5,6 +5,7 @@
 # which needs 1.5 ms a cycle on an emulated processor.
 . tests/vm/tap
 . tests/can/peer.sh
+in_virtual_time "CAN drive"
 
 [ -x "$INCISE_BUILD/tests/can/drive" ] || skip "CAN drive" "python-canopen was not installed"
 [ -e "$INCISE_BUILD/lib/incise/stepper_can.so" ] || skip "CAN drive" "stepper_can.so was not built"
