@@ -286,6 +286,14 @@ under() {
 	run -0 --separate-stderr incise stepper enable --for 100ms --rig rig.conf
 }
 
+@test "what is printed to a stream that was closed goes nowhere, and least of all onto the bus" {
+	rig --homed
+	run -1 --separate-stderr bash -c "incise stepper enable --for 100ms --rig rig.conf >&-"
+	[[ "$stderr" == "incise stepper: standard output: "* ]]
+	drive_is "switch-on disabled"
+	[ "$(drive_value odd_lines)" = 0 ]
+}
+
 @test "one program drives it; who looks meanwhile is told or shown" {
 	rig --homed
 	begin stepper enable --for 20s --rig rig.conf

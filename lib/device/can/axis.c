@@ -411,7 +411,8 @@ static void idle(struct can_axis *axis)
 {
 	struct incise_abi_status *status = &axis->motion.status;
 
-	if (cia402_state(axis->statusword) != CIA402_ENABLED || axis->answers < 2)
+	if (!axis->came || axis->answers < 2 ||
+	    cia402_state(axis->statusword) != CIA402_ENABLED)
 		return;
 	if (!status->faults)
 		note(axis, CAN_AXIS_NO_STOP, CIA402_ENABLED, 0);
@@ -525,6 +526,13 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns)
 	axis->outcome = -EIO;
 	enter(axis, CAN_AXIS_STARTING, now_ns);
 	return 1;
+}
+
+void can_axis_cleared(struct can_axis *axis)
+{
+	axis->why = CAN_AXIS_NO_REASON;
+	axis->mute = false;
+	axis->answers = 0;
 }
 
 void can_axis_disable(struct can_axis *axis)

@@ -135,6 +135,9 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
  */
 int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns);
 
+/* A person cleared what was: nothing that it said before counts. */
+void can_axis_cleared(struct can_axis *axis);
+
 /* Come to rest, then without power. Homing is stopped. */
 void can_axis_disable(struct can_axis *axis);
 

@@ -408,8 +408,8 @@ int can_link_clear(struct can_link *link, struct incise_error *err)
 		rc = set_up(link, link->where, err);
 	if (!rc)
 		rc = take_inputs(link, err);
-	link->axis.mute = link->axis.mute && rc;
-	link->axis.why = rc ? link->axis.why : CAN_AXIS_NO_REASON;
+	if (!rc)
+		can_axis_cleared(&link->axis);
 	return rc;
 }
 
