@@ -291,7 +291,8 @@ under() {
 	run -1 --separate-stderr bash -c "incise stepper enable --for 100ms --rig rig.conf >&-"
 	[[ "$stderr" == "incise stepper: standard output: "* ]]
 	drive_is "switch-on disabled"
-	[ "$(drive_value odd_lines)" = 0 ]
+	drive_tell report
+	[ "$(drive_value odd_lines)" -eq 0 ] || complain "lines that are no frames: $(drive_value odd_lines)"
 }
 
 @test "one program drives it; who looks meanwhile is told or shown" {
