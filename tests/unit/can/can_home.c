@@ -15,24 +15,6 @@
 
 static struct can_rig rig;
 
-static void open_or_fail(void)
-{
-	struct incise_error err = {0};
-
-	if (!can_rig_open(&rig, &err))
-		fail_msg("%s", err.text);
-}
-
-static void enable_or_fail(void)
-{
-	struct incise_error err = {0};
-
-	rig.drive.tripped = false;
-	if (incise_stepper_enable(rig.stepper, &err))
-		fail_msg("%s", err.text);
-	assert_int_equal(rig.drive.state, CIA402_ENABLED);
-}
-
 static void it_homes_by_itself(void **state)
 {
 	static const double home_mm[] = {0, -0.5, 1.5};
@@ -44,9 +26,9 @@ static void it_homes_by_itself(void **state)
 
 		can_rig_init(&rig);
 		rig.actuator.home_mm = home_mm[i];
-		open_or_fail();
+		can_rig_open_or_fail(&rig);
 		assert_false(can_rig_look(&rig).homed);
-		enable_or_fail();
+		can_rig_enable_or_fail(&rig);
 		if (incise_stepper_home_edge(rig.stepper, NULL, &edge, &err))
 			fail_msg("%s", err.text);
 		s = can_rig_look(&rig);
@@ -61,12 +43,12 @@ static void it_homes_by_itself(void **state)
 						 (fmin(0, home_mm[i]) - home_mm[i] - 1)));
 		can_rig_close(&rig);
 		/* Whoever opens it next knows: the drive says so. */
-		open_or_fail();
+		can_rig_open_or_fail(&rig);
 		assert_true(can_rig_look(&rig).homed);
 		can_rig_close(&rig);
 		/* A reboot takes it away. */
 		drive_reboot(&rig.drive);
-		open_or_fail();
+		can_rig_open_or_fail(&rig);
 		assert_false(can_rig_look(&rig).homed);
 		can_rig_close(&rig);
 	}
@@ -78,10 +60,10 @@ static void homing_can_fail_and_be_stopped(void **state)
 	struct incise_error err = {0};
 
 	can_rig_init(&rig);
-	open_or_fail();
+	can_rig_open_or_fail(&rig);
 	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), -EIO);
 	assert_non_null(strstr(err.text, "not powered"));
-	enable_or_fail();
+	can_rig_enable_or_fail(&rig);
 	rig.drive.homing_fails = true;
 	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), -EIO);
 	assert_non_null(strstr(err.text, "its homing failed"));
@@ -90,7 +72,7 @@ static void homing_can_fail_and_be_stopped(void **state)
 	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
 	rig.drive.homing_fails = false;
 	assert_int_equal(incise_stepper_clear(rig.stepper, &err), 0);
-	enable_or_fail();
+	can_rig_enable_or_fail(&rig);
 	/* What failed before is not taken for what fails now, here or in the next program. */
 	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), 0);
 	assert_true(can_rig_look(&rig).homed);
@@ -99,15 +81,15 @@ static void homing_can_fail_and_be_stopped(void **state)
 	assert_false(can_rig_look(&rig).homed);
 	can_rig_close(&rig);
 	rig.drive.homing_fails = false;
-	open_or_fail();
+	can_rig_open_or_fail(&rig);
 	assert_false(can_rig_look(&rig).homed);
-	enable_or_fail();
+	can_rig_enable_or_fail(&rig);
 	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), 0);
 	stop = 1;
 	assert_int_equal(incise_stepper_home(rig.stepper, &stop, &err), -EINTR);
 	assert_false(drive_powered(&rig.drive));
 	assert_int_equal(can_rig_look(&rig).faults, 0);
-	enable_or_fail();
+	can_rig_enable_or_fail(&rig);
 	can_rig_close(&rig);
 }
 

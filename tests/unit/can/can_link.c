@@ -15,31 +15,13 @@
 
 static struct can_rig rig;
 
-static void open_or_fail(void)
-{
-	struct incise_error err = {0};
-
-	if (!can_rig_open(&rig, &err))
-		fail_msg("%s", err.text);
-}
-
-static void enable_or_fail(void)
-{
-	struct incise_error err = {0};
-
-	rig.drive.tripped = false;
-	if (incise_stepper_enable(rig.stepper, &err))
-		fail_msg("%s", err.text);
-	assert_int_equal(rig.drive.state, CIA402_ENABLED);
-}
-
 /* Whatever the drive refuses, or leaves without an answer, on its way to power. */
 static void no_step_of_the_start_hangs_or_gives_power(void **state)
 {
 	uint32_t requests;
 
 	can_rig_init(&rig);
-	open_or_fail();
+	can_rig_open_or_fail(&rig);
 	requests = (uint32_t)rig.drive.requests;
 	can_rig_close(&rig);
 	assert_true(requests > 40);
@@ -56,7 +38,7 @@ static void no_step_of_the_start_hangs_or_gives_power(void **state)
 			begin = rig.drive.now_ns;
 			if (can_rig_open(&rig, &err)) {
 				/* One that it can do without. */
-				enable_or_fail();
+				can_rig_enable_or_fail(&rig);
 				can_rig_close(&rig);
 			} else if (!strstr(err.text, "rig.conf:3: stepper: ") || !errno) {
 				fail_msg("request %u: \"%s\"", k, err.text);
@@ -139,8 +121,8 @@ static void who_goes_leaves_it_stopped_or_watched(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		can_rig_init(&rig);
-		open_or_fail();
-		enable_or_fail();
+		can_rig_open_or_fail(&rig);
+		can_rig_enable_or_fail(&rig);
 		can_rig_hold(&rig, 15, 200 * MS);
 		rig.drive.unplugged = cases[i].unplugged;
 		rig.drive.mute = cases[i].mute;

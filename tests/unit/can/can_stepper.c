@@ -21,24 +21,6 @@ static void failed(const char *text)
 	fail_msg("%s", text);
 }
 
-static void open_or_fail(void)
-{
-	struct incise_error err = {0};
-
-	if (!can_rig_open(&rig, &err))
-		fail_msg("%s", err.text);
-}
-
-static void enable_or_fail(void)
-{
-	struct incise_error err = {0};
-
-	rig.drive.tripped = false;
-	if (incise_stepper_enable(rig.stepper, &err))
-		fail_msg("%s", err.text);
-	assert_int_equal(rig.drive.state, CIA402_ENABLED);
-}
-
 static void input(void *world, unsigned int input, bool active)
 {
 	struct can_rig *r = world;
@@ -78,7 +60,7 @@ static void every_case_of_a_stepper(void **state)
 			rig.actuator.can.cycle_ns = row[k].cycle_ns;
 			if (row[k].no_homing)
 				rig.actuator.can.homing_method = 0;
-			open_or_fail();
+			can_rig_open_or_fail(&rig);
 			c.stepper = rig.stepper;
 			incise_stepper_info(c.stepper, &c.info);
 			conformance[i].run(&c);
@@ -200,8 +182,8 @@ static void each_fault_stops_the_drive_and_is_named(void **state)
 		/* What is blocked is seen here before the drive itself sees it. */
 		if (faults[i].inject == blocked)
 			rig.drive.od[OD_FOLLOWING].size = 0;
-		open_or_fail();
-		enable_or_fail();
+		can_rig_open_or_fail(&rig);
+		can_rig_enable_or_fail(&rig);
 		can_rig_hold(&rig, 15, 200 * MS);
 		assert_true(rig.drive.velocity > 5 * COUNTS_PER_MM);
 		faults[i].inject(&rig.drive, true);
@@ -227,7 +209,7 @@ static void each_fault_stops_the_drive_and_is_named(void **state)
 			fail_msg("%s: %s", faults[i].name, err.text);
 		can_rig_hold(&rig, 15, 500 * MS);
 		assert_int_equal(rig.drive.enables, enables);
-		enable_or_fail();
+		can_rig_enable_or_fail(&rig);
 		can_rig_hold(&rig, 5, 3000 * MS);
 		s = can_rig_look(&rig);
 		if (s.faults || fabs(s.position_mm - 5) > 1e-3)
@@ -243,8 +225,8 @@ static void a_program_that_hangs_is_stopped_by_the_drive(void **state)
 	double at_mm, most_mm;
 
 	can_rig_init(&rig);
-	open_or_fail();
-	enable_or_fail();
+	can_rig_open_or_fail(&rig);
+	can_rig_enable_or_fail(&rig);
 	can_rig_hold(&rig, 15, 300 * MS);
 	assert_true(rig.drive.velocity > 5 * COUNTS_PER_MM);
 	at_mm = rig.drive.position / COUNTS_PER_MM;
@@ -283,8 +265,8 @@ static void no_set_point_is_lost(void **state)
 	int64_t end;
 
 	can_rig_init(&rig);
-	open_or_fail();
-	enable_or_fail();
+	can_rig_open_or_fail(&rig);
+	can_rig_enable_or_fail(&rig);
 	can_rig_hold(&rig, 10, 3000 * MS);
 	rpdos = rig.drive.rpdos;
 	sent = counter("setpoints_sent");
@@ -334,8 +316,8 @@ static void velocities_and_torques_go_there_too(void **state)
 		rig.actuator.can.damping_permille_s_mm = 5;
 		rig.actuator.can.torque_max_permille = 300;
 		rig.drive.torque_counts_s2 = 0.1 * 1000 * COUNTS_PER_MM / 10;
-		open_or_fail();
-		enable_or_fail();
+		can_rig_open_or_fail(&rig);
+		can_rig_enable_or_fail(&rig);
 		can_rig_hold(&rig, 4, 3000 * MS);
 		s = can_rig_look(&rig);
 		if (s.faults || fabs(s.position_mm - 4) > cases[i].within_mm)

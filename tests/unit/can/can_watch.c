@@ -15,14 +15,6 @@
 
 static struct can_rig rig;
 
-static void open_or_fail(void)
-{
-	struct incise_error err = {0};
-
-	if (!can_rig_open(&rig, &err))
-		fail_msg("%s", err.text);
-}
-
 static void a_watcher_looks_and_writes_nothing(void **state)
 {
 	struct incise_stepper_status s;
@@ -35,7 +27,7 @@ static void a_watcher_looks_and_writes_nothing(void **state)
 	rig.drive.position = 3 * COUNTS_PER_MM;
 	rig.actuator.can.absolute = true;
 	rig.watch = true;
-	open_or_fail();
+	can_rig_open_or_fail(&rig);
 	enables = rig.drive.enables;
 	can_rig_advance(&rig, 100 * MS);
 	s = can_rig_look(&rig);

@@ -89,6 +89,25 @@ static inline struct incise_stepper *can_rig_open(struct can_rig *rig,
 	return rig->stepper = can_stepper_open(&can_rig_of, &request, err);
 }
 
+static inline void can_rig_open_or_fail(struct can_rig *rig)
+{
+	struct incise_error err = {0};
+
+	if (!can_rig_open(rig, &err))
+		fail_msg("%s", err.text);
+}
+
+/* A person asks for it. */
+static inline void can_rig_enable_or_fail(struct can_rig *rig)
+{
+	struct incise_error err = {0};
+
+	rig->drive.tripped = false;
+	if (incise_stepper_enable(rig->stepper, &err))
+		fail_msg("%s", err.text);
+	assert_int_equal(rig->drive.state, CIA402_ENABLED);
+}
+
 static inline void can_rig_close(struct can_rig *rig)
 {
 	rig->stepper->ops->close(rig->stepper);

@@ -16,22 +16,6 @@ deadman=200
 mkdir -p /run/can_drive
 cd /run/can_drive || exit 1
 
-# says CODE TEXT VERB…: incise VERB ends so and prints that.
-says()
-{
-	code=$1
-	text=$2
-	shift 2
-	said=$(incise "$@" 2>&1 </dev/null)
-	got=$?
-	echo "exit code $got: $said"
-	[ $got = "$code" ] || return
-	case $said in
-	*"$text"*) ;;
-	*) return 1 ;;
-	esac
-}
-
 # In the background until the drive has power; $pid.
 begin()
 {
