@@ -449,9 +449,13 @@ stopped_itself() {
 			# Silence takes 200 ms each: some objects are enough for that.
 			[[ "$how $place" == abort* || " $silent " == *" $place "* ]] || continue
 			drive_tell "$how" "${place%:*}" "${place#*:}"
-			drive_tell restart
-			code=0
-			timeout 10 incise stepper enable --for 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
+			# A drive that was held up by a busy machine for 200 ms is another matter.
+			for try in 1 2 3; do
+				drive_tell restart
+				code=0
+				timeout 10 incise stepper enable --for 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
+				[ "$how" = abort ] && grep -q "no answer when" err || break
+			done
 			drive_stopped || failed+=" $how $place (power);"
 			case $code in
 			0) echo "# $how $place: goes on" ;;

@@ -148,7 +148,7 @@ static void hear(struct can_axis *axis, int64_t now)
 		case CANOPEN_TPDO2:
 			if (cia402_get_inputs(&frame, &inputs)) {
 				can_axis_inputs(axis, inputs);
-				axis->inputs_ns = now;
+				axis->inputs_ns = 0;
 			}
 			break;
 		}
@@ -448,6 +448,8 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 	axis->put = axis->came = false;
 	hear(axis, now_ns);
 	axis->answers += axis->came;
+	/* A time in which the drive did live. */
+	axis->inputs_ns += axis->came ? axis->setup.config.tick_ns : 0;
 	axis->missed = axis->answered ? 0 : axis->missed + 1;
 	if (powered) {
 		axis->counts.sync_late +=
@@ -520,7 +522,8 @@ int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns)
 	if (homing_ns)
 		m->status.flags &= ~INCISE_STEPPER_FLAG_HOMED;
 	axis->answered = true;
-	axis->tpdo_ns = axis->inputs_ns = now_ns;
+	axis->tpdo_ns = now_ns;
+	axis->inputs_ns = 0;
 	axis->limit_ns = homing_ns ? now_ns + homing_ns : 0;
 	axis->result = 1;
 	axis->outcome = -EIO;

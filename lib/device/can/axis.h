@@ -109,7 +109,7 @@ struct can_axis {
 	bool put;	   /* a set-point, and its SYNC, went out in this cycle */
 	bool came;	   /* an answer, in this cycle */
 	uint16_t old_bits; /* of the statusword, that a homing before left */
-	int64_t inputs_ns; /* the last that came */
+	int64_t inputs_ns; /* cycles with an answer since the inputs came, as a time */
 	bool told;	   /* the drive was told what this phase is about */
 	bool mute;	   /* no heartbeat: it did not stop when it was told to */
 	bool answered, stop_homing, failed;

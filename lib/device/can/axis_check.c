@@ -43,9 +43,7 @@ void can_axis_check_drive(struct can_axis *axis, int64_t now)
 	else if (master->state != CANOPEN_OPERATIONAL)
 		can_axis_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NMT, master->state,
 			       0, now);
-	/* Of a drive that says nothing at all, that is the reason. */
-	if (axis->setup.inputs_timed && can_axis_is_fresh(axis, now) &&
-	    now - axis->inputs_ns > INPUTS_NS)
+	if (axis->setup.inputs_timed && axis->inputs_ns > INPUTS_NS)
 		can_axis_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_INPUTS,
 			       INPUTS_NS / MS, 0, now);
 	/* Where the loop is closed here, it cannot stay open for so long. */
