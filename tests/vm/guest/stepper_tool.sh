@@ -135,7 +135,7 @@ check "the limit switch stops it, and it is said what to do" \
 check "within a step" [ "$(carriage highest)" -le 1001 ]
 check "status says so" says 0 "fault at 2.25" stepper status
 check "nothing moves before it is cleared" says 1 "clear" stepper move --by -250um
-check "clear" says 0 "forgot limit switch" stepper clear
+check "clear" says 0 "cleared; it was limit switch" stepper clear
 check "away from it" says 0 "moved -0.5000 mm" stepper move --by -500um
 
 begin powered enable
@@ -146,7 +146,7 @@ check "the e-stop ends it" ended 1 "e-stop: release it, then clear"
 check "status says so" says 0 "fault      e-stop: release it" stepper status
 check "clear while it is pressed" says 1 "e-stop is active" stepper clear
 echo "7 0" >$sim/inputs
-check "clear after it" says 0 "forgot e-stop" stepper clear
+check "clear after it" says 0 "cleared; it was e-stop" stepper clear
 
 slowly move --by -750um
 kill -9 $pid
@@ -156,7 +156,7 @@ check "kill -9: the module brought it to rest, and says why" \
 at=$(carriage position)
 check "it is latched" says 0 '"fault": "owner"' stepper status --json
 check "it stands" [ "$(carriage position)" = "$at" ]
-check "clear" says 0 "forgot the program" stepper clear
+check "clear" says 0 "cleared; it was the program" stepper clear
 
 slowly home
 kill -INT $pid
@@ -177,7 +177,7 @@ kill -CONT $pid
 wait $pid
 code=$?
 check "which says so when it wakes" ended 1 "deadman: targets stopped coming"
-check "clear" says 0 "forgot deadman" stepper clear
+check "clear" says 0 "cleared; it was deadman" stepper clear
 
 incise info stepper --json >info.json
 incise info stepper >info
