@@ -45,9 +45,9 @@ void can_fit_range(struct can_link *link)
 	const struct incise_actuator *a = &link->actuator;
 	double per_mm = link->axis.setup.counts_per_step / incise_actuator_step_mm(a);
 	double low = link->axis.zero_counts +
-		     per_mm * (fmin(0, a->home_mm) - link->following_mm);
+		     per_mm * (fmin(0, a->home_mm) - a->can.following_mm);
 	double high =
-		link->axis.zero_counts + per_mm * (a->travel_mm + link->following_mm);
+		link->axis.zero_counts + per_mm * (a->travel_mm + a->can.following_mm);
 
 	link->in_range = fmin(low, high) > -COUNTS_MOST && fmax(low, high) < COUNTS_MOST;
 	link->setup.limited = link->is_homed;

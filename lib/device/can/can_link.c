@@ -199,11 +199,24 @@ static int set_up(struct can_link *link, const char *where, struct incise_error 
 	return 0;
 }
 
+void can_link_ask_why(struct can_link *link)
+{
+	struct can_axis *axis = &link->axis;
+	uint32_t code;
+
+	if (axis->why != CAN_AXIS_NO_REASON)
+		return;
+	if (canopen_read(&link->master, 0x603f, 0, 2, &code))
+		code = 0;
+	axis->why_a = code;
+	axis->why = code ? CAN_AXIS_EMCY : CAN_AXIS_DRIVE_FAULT;
+}
+
 /* A fault that it has from before: whoever drives it must hear of it. */
 static void take_fault(struct can_link *link)
 {
 	struct can_axis *axis = &link->axis;
-	uint32_t word = 0, code = 0;
+	uint32_t word = 0;
 
 	if (canopen_read(&link->master, 0x6041, 0, 2, &word))
 		return;
@@ -212,10 +225,7 @@ static void take_fault(struct can_link *link)
 		return;
 	axis->motion.status.faults |= INCISE_STEPPER_FAULT_DRIVER;
 	axis->motion.status.state = INCISE_STEPPER_STATE_FAULT;
-	if (canopen_read(&link->master, 0x603f, 0, 2, &code))
-		code = 0;
-	axis->why_a = code;
-	axis->why = code ? CAN_AXIS_EMCY : CAN_AXIS_DRIVE_FAULT;
+	can_link_ask_why(link);
 }
 
 static int know(struct can_link *link, const char *where, struct incise_error *err)
@@ -234,7 +244,6 @@ static int know(struct can_link *link, const char *where, struct incise_error *e
 		rc = cia402_units(&link->master, &link->units, where, err);
 	if (rc)
 		return rc;
-	link->following_mm = can->following_mm;
 	can_fit_steps(link);
 	can_fit_setup(link);
 	return can_fit_axis(link, where, err);

@@ -23,8 +23,7 @@ struct can_link {
 	struct cia402_units units;
 	struct cia402_taken taken;
 	struct cia402_setup setup;
-	char where[64]; /* "drive 0x10 at can0" */
-	double following_mm;
+	char where[64];	       /* "drive 0x10 at can0" */
 	uint32_t load_percent; /* of the bus; 0: it has no bit rate */
 
 	/* private */
@@ -59,6 +58,9 @@ int can_link_clear(struct can_link *link, struct incise_error *err);
 
 /* It has homed: its 0 is that of the machine from now on. */
 int can_link_homed(struct can_link *link, struct incise_error *err);
+
+/* Note why a drive is in fault, by its own error code; a reason that is known stays. */
+void can_link_ask_why(struct can_link *link);
 
 void can_link_close(struct can_link *link);
 

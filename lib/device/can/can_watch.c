@@ -89,19 +89,6 @@ static void publish(struct can_watch *watch, struct can_link *link, int rc, int6
 	incise_motion_publish(m, now);
 }
 
-static void say_why(struct can_link *link)
-{
-	struct can_axis *axis = &link->axis;
-	uint32_t code;
-
-	if (axis->why != CAN_AXIS_NO_REASON)
-		return;
-	if (canopen_read(&link->master, 0x603f, 0, 2, &code))
-		code = 0;
-	axis->why_a = code;
-	axis->why = code ? CAN_AXIS_EMCY : CAN_AXIS_DRIVE_FAULT;
-}
-
 void can_watch_cycle(struct can_watch *watch, struct can_link *link)
 {
 	int64_t now = link->bus->ops->now(link->bus);
@@ -111,7 +98,7 @@ void can_watch_cycle(struct can_watch *watch, struct can_link *link)
 	if (!watch->heard_ns || now - watch->heard_ns > LISTEN_NS)
 		rc = ask(link);
 	if (!rc && cia402_state(link->axis.statusword) == CIA402_FAULT)
-		say_why(link);
+		can_link_ask_why(link);
 	else
 		link->axis.why = CAN_AXIS_NO_REASON;
 	publish(watch, link, rc, link->bus->ops->now(link->bus));

@@ -206,7 +206,7 @@ static int positions(const struct cia402_talk *talk, double *per_turn)
 	return 0;
 }
 
-/* A velocity's or an acceleration's; counts where it does not tell. */
+/* A velocity's or an acceleration's; counts where it does not tell. @told may be NULL. */
 static int rates(const struct cia402_talk *talk, const struct cia402_object *object,
 		 double counts, bool squared, double *per_turn, bool *told,
 		 const char *key)
@@ -223,7 +223,8 @@ static int rates(const struct cia402_talk *talk, const struct cia402_object *obj
 		*per_turn = counts;
 		return 0;
 	}
-	*told = true;
+	if (told)
+		*told = true;
 	code = (uint8_t)(unit >> 16);
 	per = (uint8_t)(unit >> 8);
 	turn = angle(code);
@@ -250,7 +251,7 @@ int cia402_units(struct canopen *master, struct cia402_units *units, const char 
 		 struct incise_error *err)
 {
 	const struct cia402_talk talk = {master, where, err};
-	bool velocity_told = false, acceleration_told = false;
+	bool acceleration_told = false;
 	struct cia402_units found = *units;
 	int rc = 0;
 
@@ -258,8 +259,7 @@ int cia402_units(struct canopen *master, struct cia402_units *units, const char 
 		rc = positions(&talk, &found.counts_per_turn);
 	if (!rc && found.velocity_per_turn_s == 0)
 		rc = rates(&talk, &velocity_unit, found.counts_per_turn, false,
-			   &found.velocity_per_turn_s, &velocity_told,
-			   "velocity_per_turn_s");
+			   &found.velocity_per_turn_s, NULL, "velocity_per_turn_s");
 	if (!rc && found.acceleration_per_turn_s2 == 0) {
 		rc = rates(&talk, &acceleration_unit, found.counts_per_turn, true,
 			   &found.acceleration_per_turn_s2, &acceleration_told,

@@ -22,7 +22,6 @@ static void make(struct can_link *link, double counts_per_turn)
 		.bus = &rig.drive.bus,
 		.actuator = rig.actuator,
 		.units = {counts_per_turn, 60, 60},
-		.following_mm = 1,
 	};
 	link->master.bus = link->bus;
 }
