@@ -31,6 +31,8 @@
 #include "timeline.h"
 
 #define COMMIT_NS 100000000LL
+/* How long a reader may keep the recorder from writing. */
+#define BUSY_MS 1000
 #define BATCH 1024
 
 /* The tool is to be held free for so long, for the zero of the force channel. */
@@ -245,6 +247,13 @@ static int open_database(struct incise_recorder *rec, struct incise_error *err)
 		file, &rec->db,
 		SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL);
 	free(file);
+	/*
+	 * Someone may read the recording as it grows, and SQLite keeps the writer out for
+	 * a moment: until the file has its log, and when a log is folded in. What comes
+	 * meanwhile waits in the sources' rings.
+	 */
+	if (rc == SQLITE_OK)
+		rc = sqlite3_busy_timeout(rec->db, BUSY_MS);
 	if (rc == SQLITE_OK)
 		rc = sqlite3_exec(
 			rec->db,
@@ -739,7 +748,6 @@ static int complete(struct incise_recorder *rec, struct incise_error *err)
 	 * One file that stands alone. Someone who is reading it now keeps SQLite from
 	 * folding the log in; then the log stays beside it, which is as good.
 	 */
-	sqlite3_busy_timeout(rec->db, 1000);
 	if (sqlite3_exec(rec->db,
 			 "COMMIT; PRAGMA synchronous=FULL; PRAGMA journal_mode=DELETE",
 			 NULL, NULL, NULL) != SQLITE_OK &&

@@ -40,7 +40,7 @@ until_it_runs() {
 			"${2:-0}" ] 2>/dev/null && return
 		sleep 0.1
 	done
-	echo "$1: no rows after 10 s"
+	echo "$1: no rows after 10 s; capture said: $(cat err)"
 	false
 }
 
