@@ -444,7 +444,7 @@ static void figure_camera(void)
 		cli_fail("the virtual camera gave no picture");
 	data = picture_data(folder, "camera.rgb");
 	for (int y = 0; y < frame.height; y++)
-		fwrite(frame.rgb + (size_t)y * frame.stride, 3, frame.width, data);
+		fwrite(frame.data + (size_t)y * frame.stride, 3, frame.width, data);
 	picture_data_end(data, folder);
 	script = picture_begin(folder, "camera", frame.width + 160, frame.height + 120);
 	fprintf(script,

@@ -199,7 +199,9 @@ static int sim_camera_read(struct incise_camera *camera,
 		.width = WIDTH,
 		.height = HEIGHT,
 		.stride = STRIDE,
-		.rgb = c->rgb,
+		.pixels = INCISE_PIXELS_RGB,
+		.data = c->rgb,
+		.size = (size_t)HEIGHT * STRIDE,
 	};
 	return 1;
 }

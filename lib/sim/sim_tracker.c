@@ -60,7 +60,7 @@ static void sim_tracker_sample(struct incise_sim_stream *stream,
 		(struct sim_tracker *)((char *)stream -
 				       offsetof(struct sim_tracker, stream));
 	const struct incise_sim_config *config = &sim->config;
-	struct incise_tracker_sample sample = {.status = ' '};
+	struct incise_tracker_sample sample = {.status = ' ', .station = 1};
 	struct incise_blade blade;
 	double draw[7], shake[3], delay_ms;
 
@@ -110,6 +110,7 @@ static void sim_tracker_info(const struct incise_tracker *tracker,
 
 	*info = (struct incise_tracker_info){
 		.rate_hz = config->tracker_hz,
+		.stations = 1,
 		.latency_ns = llround(config->tracker_latency_ms * 1e6),
 	};
 	snprintf(info->name, sizeof(info->name), "virtual tracker");

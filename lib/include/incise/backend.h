@@ -110,7 +110,7 @@ struct incise_stepper {
 };
 
 /** Changes when any struct of this header does. */
-#define INCISE_BACKEND_ABI 2
+#define INCISE_BACKEND_ABI 3
 
 /** What rig.conf asks a backend for. */
 struct incise_backend_request {
@@ -118,7 +118,11 @@ struct incise_backend_request {
 	const char *where;	    /**< "FILE:LINE: stepper"; messages begin with it */
 	struct incise_clock *clock; /**< real; lives as long as the device */
 	bool watch; /**< only look: the device must not be moved, nor its owner be hurt */
-	const struct incise_actuator *actuator; /**< of a stepper; to be copied */
+	/* What rig.conf has for its kind, or defaults; to be copied. */
+	const struct incise_actuator *actuator; /**< of a stepper */
+	const struct incise_tracker_setup *tracker;
+	const struct incise_force_setup *force;
+	const struct incise_camera_setup *camera;
 };
 
 /**

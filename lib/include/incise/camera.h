@@ -5,19 +5,30 @@
 #ifndef INCISE_CAMERA_H
 #define INCISE_CAMERA_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
 INCISE_BEGIN_DECLS
 
+/** How a picture's bytes are pixels. */
+enum incise_pixels {
+	INCISE_PIXELS_RGB,  /**< 3 bytes a pixel, red first */
+	INCISE_PIXELS_GREY, /**< 1 byte a pixel */
+	INCISE_PIXELS_YUYV, /**< 4 bytes for two pixels: Y0 U Y1 V, full resolution in Y */
+	INCISE_PIXELS_MJPEG, /**< a JPEG picture; stride is 0 */
+};
+
 /** One picture; its pixels belong to the camera until the next read. */
 struct incise_camera_frame {
 	int64_t t_ns; /**< middle of the exposure */
 	uint64_t seq; /**< counts from 0; a gap is a lost picture */
 	int width, height;
-	int stride;	    /**< bytes from row to row */
-	const uint8_t *rgb; /**< 3 bytes a pixel, red first, top row first */
+	int stride; /**< bytes from row to row, top row first */
+	enum incise_pixels pixels;
+	const uint8_t *data;
+	size_t size; /**< bytes of data */
 };
 
 /** What a camera says of itself. */
@@ -25,6 +36,21 @@ struct incise_camera_info {
 	char name[64];
 	double rate_hz;
 	int width, height;
+	enum incise_pixels pixels;
+	int64_t exposure_ns; /**< 0: not known; then t_ns is what the device stamped */
+	uint64_t damaged; /**< pictures that came with an error or too short; lost too */
+};
+
+/** What a real camera is set to; the group `camera_setup` of rig.conf. 0: as it is. */
+struct incise_camera_setup {
+	int width, height;
+	double rate_hz;
+	enum incise_pixels
+		pixels; /**< YUYV has no smear of colour at an edge; the default */
+	double exposure_ms;
+	double gain; /**< the driver's units */
+	double white_balance_K;
+	double focus; /**< the driver's units */
 };
 
 struct incise_camera;

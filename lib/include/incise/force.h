@@ -24,7 +24,20 @@ struct incise_force_info {
 	char name[64];
 	double rate_hz;	     /**< nominal */
 	int bits;	     /**< resolution */
-	double full_scale_V; /**< code 2^bits stands for this voltage */
+	double full_scale_V; /**< 2^bits codes span this voltage */
+	double offset_V;     /**< code 0 stands for this voltage; 0 of a unipolar range */
+	uint64_t clipped;    /**< samples at either end of the range so far */
+	uint64_t overflows;  /**< times that the device or the kernel had no room */
+};
+
+/** What a real force channel is set to; the group `force_setup` of rig.conf. */
+struct incise_force_setup {
+	double rate_hz; /**< 1 … 100000; default 10000 */
+	int channel;	/**< 0 …; default 0 */
+	double full_scale_V; /**< of IIO without a scale, and the range to choose; 0: its own */
+	char trigger
+		[64]; /**< of IIO: its name; empty: hrtimer where the kernel has one, else
+			       the driver's own */
 };
 
 struct incise_force;

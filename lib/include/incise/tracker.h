@@ -5,6 +5,7 @@
 #ifndef INCISE_TRACKER_H
 #define INCISE_TRACKER_H
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
@@ -18,6 +19,24 @@ struct incise_tracker_sample {
 	double position_mm[3]; /**< tip of the blade, in the tracker's frame */
 	double quaternion[4];  /**< unit, w first; rotates the scalpel's frame into it */
 	char status;	       /**< the device's error character, ' ' when all is well */
+	uint8_t station;       /**< 1 …: which sensor; the virtual rig's is 1 */
+	bool button;	       /**< the stylus's is pressed; false where there is none */
+};
+
+/** When a tracker measures. */
+enum incise_tracker_sync {
+	INCISE_TRACKER_INTERNAL, /**< by its own clock */
+	INCISE_TRACKER_EXTERNAL, /**< by pulses at its sync input */
+	INCISE_TRACKER_VIDEO,	 /**< by the video sync that it hears */
+};
+
+/** What a real tracker is set to; the group `tracker_setup` of rig.conf. */
+struct incise_tracker_setup {
+	int n_stations;
+	uint8_t stations[4];  /**< 1 … 4, ascending; default {1} */
+	double hemisphere[3]; /**< unit vector to where the sensor is; default +x */
+	enum incise_tracker_sync sync;
+	double tip_mm[3]; /**< of the blade, in the sensor's frame; default 0 */
 };
 
 /** What a tracker says of itself. */
@@ -25,6 +44,7 @@ struct incise_tracker_info {
 	char name[64];
 	double rate_hz;	    /**< nominal */
 	int64_t latency_ns; /**< nominal, acquisition to arrival */
+	int stations;	    /**< sensors that send records; seq counts all of them */
 };
 
 struct incise_tracker;

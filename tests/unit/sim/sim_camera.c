@@ -47,7 +47,7 @@ static double red(const struct incise_camera_frame *frame, int x, int y)
 {
 	if (x < 0 || y < 0 || x >= frame->width || y >= frame->height)
 		return 118; /* as liver: the edge of the picture is no edge of the scalpel */
-	return frame->rgb[y * frame->stride + 3 * x];
+	return frame->data[y * frame->stride + 3 * x];
 }
 
 static double red_between(const struct incise_camera_frame *frame, double x, double y)
@@ -218,7 +218,7 @@ static uint8_t *picture(uint64_t seed, int ms, int skip_ms)
 	incise_clock_wait_until(rig.clock, START_NS + ms * 1000000LL);
 	assert_int_equal(incise_camera_read(rig.camera, &frame), 1);
 	for (int y = 0; y < 480; y++)
-		memcpy(copy + y * 640 * 3, frame.rgb + y * frame.stride, 640 * 3);
+		memcpy(copy + y * 640 * 3, frame.data + y * frame.stride, 640 * 3);
 	rig_free(&rig);
 	return copy;
 }
