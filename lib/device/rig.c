@@ -51,6 +51,9 @@ static int rig_open_real(struct incise_rig *rig, const struct incise_rig_plan *p
 		.clock = rig->clock,
 		.watch = plan->watch,
 		.actuator = &plan->actuator,
+		.tracker = &plan->tracker,
+		.force = &plan->force,
+		.camera = &plan->camera,
 	};
 	void *device;
 	int rc = incise_backend_find(&rig->loaded[kind], incise_kind_name[kind],

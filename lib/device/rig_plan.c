@@ -12,6 +12,7 @@
 #include "../sim/sim.h"
 #include "actuator.h"
 #include "rig_plan.h"
+#include "source_setup.h"
 
 #define SIM_BACKEND "sim"
 
@@ -199,9 +200,10 @@ static int plan_root(struct incise_rig_plan *plan, unsigned int devices,
 		     const config_setting_t *root, const char *path,
 		     struct incise_error *err)
 {
-	static const char *const keys[] = {"clock",  "tracker",	 "force",
-					   "camera", "stepper",	 "surface",
-					   "sim",    "actuator", NULL};
+	static const char *const keys[] = {"clock",	  "tracker",	  "force",
+					   "camera",	  "stepper",	  "surface",
+					   "sim",	  "actuator",	  "tracker_setup",
+					   "force_setup", "camera_setup", NULL};
 	const config_setting_t *actuator;
 	const char *clock = NULL;
 	char where[240];
@@ -225,6 +227,12 @@ static int plan_root(struct incise_rig_plan *plan, unsigned int devices,
 		rc = incise_actuator_read(&plan->actuator, actuator, path, err);
 		plan->has_actuator = true;
 	}
+	if (!rc)
+		rc = incise_tracker_setup_read(&plan->tracker, root, path, err);
+	if (!rc)
+		rc = incise_force_setup_read(&plan->force, root, path, err);
+	if (!rc)
+		rc = incise_camera_setup_read(&plan->camera, root, path, err);
 	for (int kind = 0; kind < N_KINDS && !rc; kind++)
 		rc = plan_device(plan, kind, devices & kind_bit(kind), root, path, err);
 	return rc;

@@ -8,8 +8,11 @@
 
 #include <stdbool.h>
 #include <incise/actuator.h>
+#include <incise/camera.h>
 #include <incise/error.h>
+#include <incise/force.h>
 #include <incise/sim.h>
+#include <incise/tracker.h>
 
 /* The kinds of devices; their order is that of the incise_rig_device bits. */
 enum { KIND_TRACKER, KIND_FORCE, KIND_CAMERA, KIND_STEPPER, N_KINDS };
@@ -36,6 +39,9 @@ struct incise_rig_plan {
 	struct rig_real real[N_KINDS];
 	struct incise_actuator actuator;
 	bool has_actuator;
+	struct incise_tracker_setup tracker;
+	struct incise_force_setup force;
+	struct incise_camera_setup camera;
 	struct incise_sim_config config;
 	double point_mm[3], normal[3];
 };

@@ -160,7 +160,8 @@ static void file_refuses(void **state)
 		 ":1: clock: expected real or simulated, found fast; correct it"},
 		{"tracer = \"sim:\";", EINVAL,
 		 ":1: tracer: unknown key; expected one of clock, tracker, force, camera, "
-		 "stepper, surface, sim, actuator"},
+		 "stepper, surface, sim, actuator, "
+		 "tracker_setup, force_setup, camera_setup"},
 		{"sim = 1;", EINVAL,
 		 ":1: sim: expected a group { key = value; }; correct it"},
 		{"sim = {\n\nsede = 1; };", EINVAL,
