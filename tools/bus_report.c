@@ -14,7 +14,7 @@
 
 /* A device, with keys that stay when the backend's module is gone. */
 struct answer {
-	char device[100], what[100];
+	char kind[16], device[100], what[100];
 	bool usable;
 	int n;
 	struct {
@@ -54,6 +54,7 @@ static int keep(void *context, const struct incise_scan_device *device)
 	found->answer = more;
 	one = &more[found->n++];
 	*one = (struct answer){0};
+	snprintf(one->kind, sizeof(one->kind), "%s", device->kind);
 	snprintf(one->device, sizeof(one->device), "%s", device->device);
 	snprintf(one->what, sizeof(one->what), "%s", device->what);
 	one->usable = device->usable;
@@ -77,7 +78,7 @@ static void put_plain(const char *text)
 
 static void put_device(const struct answer *device)
 {
-	int width = (int)strlen("stepper");
+	int width = (int)strlen(device->kind);
 
 	for (int i = 0; i < device->n; i++)
 		if ((int)strlen(device->property[i].key) > width)
@@ -86,7 +87,7 @@ static void put_device(const struct answer *device)
 	put_plain(device->what);
 	putchar('\n');
 	if (device->usable) {
-		printf("  %-*s = \"", width, "stepper");
+		printf("  %-*s = \"", width, device->kind);
 		put_plain(device->device);
 		fputs("\";\n", stdout);
 	}
@@ -99,9 +100,9 @@ static void put_device(const struct answer *device)
 
 static json_t *device_json(const struct answer *device)
 {
-	json_t *object =
-		json_pack("{so so sb}", "device", json_text(device->device), "what",
-			  json_text(device->what), "usable", device->usable);
+	json_t *object = json_pack("{ss so so sb}", "kind", device->kind, "device",
+				   json_text(device->device), "what",
+				   json_text(device->what), "usable", device->usable);
 
 	for (int i = 0; i < device->n; i++)
 		json_object_set_new(object, device->property[i].key,
@@ -109,14 +110,43 @@ static json_t *device_json(const struct answer *device)
 	return object;
 }
 
-static void show_json(const char *what, const struct found *found)
+static void show_json(const char *kind, const char *bus, const struct found *found)
 {
-	json_t *devices = json_array();
+	json_t *report = json_pack("{ss}", "kind", kind), *devices = json_array();
 
 	for (int i = 0; i < found->n; i++)
 		json_array_append_new(devices, device_json(&found->answer[i]));
-	json_print(json_pack("{ss so so}", "kind", "bus", "bus", json_text(what),
-			     "devices", devices));
+	if (bus)
+		json_object_set_new(report, "bus", json_text(bus));
+	json_object_set_new(report, "devices", devices);
+	json_print(report);
+}
+
+static void put_all(const char *what, const struct found *found)
+{
+	printf("%s: %d device%s\n", what, found->n, found->n == 1 ? "" : "s");
+	for (int i = 0; i < found->n; i++)
+		put_device(&found->answer[i]);
+}
+
+void bus_report_show_attached(bool json)
+{
+	struct found found = {0};
+	int rc;
+
+	cli_progress("looking for devices");
+	rc = incise_scan_all(keep, &found);
+	cli_progress_end();
+	if (rc)
+		cli_fail("devices: %s", strerror(-rc));
+	if (json)
+		show_json("devices", NULL, &found);
+	else if (found.n)
+		put_all("attached", &found);
+	else
+		puts("no tracker, force channel, camera or stepper is attached; drives on a "
+		     "CAN bus are listed by `incise info can:can0`");
+	free(found.answer);
 }
 
 void bus_report_show(const char *what, bool json)
@@ -139,11 +169,9 @@ void bus_report_show(const char *what, bool json)
 			"bit rate, the cable and its two ends of 120 ohm",
 			what);
 	if (json) {
-		show_json(what, &found);
+		show_json("bus", what, &found);
 	} else {
-		printf("%s: %d device%s\n", what, found.n, found.n == 1 ? "" : "s");
-		for (int i = 0; i < found.n; i++)
-			put_device(&found.answer[i]);
+		put_all(what, &found);
 	}
 	free(found.answer);
 }

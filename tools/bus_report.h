@@ -16,4 +16,7 @@ bool bus_report_is(const char *what);
 /* Ends the program with 1 and one line when nothing is found. */
 void bus_report_show(const char *what, bool json);
 
+/* All that is attached, of each kind; nothing is an answer too. */
+void bus_report_show_attached(bool json);
+
 #endif

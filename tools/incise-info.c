@@ -380,6 +380,8 @@ int main(int argc, char **argv)
 		cli_usage("--plot draws a model, MODEL.fis");
 	if (stepper_module_is(path)) {
 		stepper_module_show(path, json);
+	} else if (!strcmp(path, "devices")) {
+		bus_report_show_attached(json);
 	} else if (bus_report_is(path)) {
 		bus_report_show(path, json);
 	} else if (is_recording(path)) {

@@ -74,6 +74,18 @@ static void list(const char *kind, const char *in, char *text, size_t size)
 		closedir(dir);
 }
 
+int incise_backend_names(const char *kind, char names[][32], int room)
+{
+	char known[400], in[PATH_MAX], *rest = known, *name;
+	int n = 0;
+
+	list(kind, folder(in, sizeof(in)) ? in : NULL, known, sizeof(known));
+	while ((name = strsep(&rest, ", ")) && n < room)
+		if (*name && strcmp(name, BUILT_IN_SIM))
+			snprintf(names[n++], sizeof(*names), "%.31s", name);
+	return n;
+}
+
 static int load(struct incise_loaded *loaded, const char *kind, const char *name,
 		const char *path, const char *where, struct incise_error *err)
 {

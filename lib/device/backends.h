@@ -27,6 +27,9 @@ struct incise_loaded {
 int incise_backend_find(struct incise_loaded *loaded, const char *kind, const char *name,
 			const char *where, struct incise_error *err);
 
+/* Those that there are of a kind, built in and in modules; "sim" not. Ends with n names. */
+int incise_backend_names(const char *kind, char names[][32], int room);
+
 void incise_backend_unload(struct incise_loaded *loaded);
 
 #endif

@@ -8,11 +8,63 @@
 #include <incise/scan.h>
 #include "backends.h"
 
+/* What a backend finds, with its kind. */
+struct kind_found {
+	const char *kind;
+	incise_scan_found *found;
+	void *context;
+	int rc; /* of found */
+};
+
+static int pass_on(void *context, const struct incise_scan_device *device)
+{
+	struct incise_scan_device copy = *device;
+	struct kind_found *of = context;
+
+	snprintf(copy.kind, sizeof(copy.kind), "%s", of->kind);
+	return of->rc = of->found(of->context, &copy);
+}
+
+static int scan_backend(struct kind_found *of, const char *name)
+{
+	struct incise_scan_device failed = {0};
+	struct incise_error err = {0};
+	char spec[40];
+	int rc;
+
+	snprintf(spec, sizeof(spec), "%.31s:", name);
+	rc = incise_scan(of->kind, spec, of->found, of->context, &err);
+	/* It cannot look, or needs to be told where. */
+	if (!err.code || rc == -EOPNOTSUPP || rc == -EINVAL)
+		return err.code ? 0 : rc;
+	snprintf(failed.kind, sizeof(failed.kind), "%s", of->kind);
+	snprintf(failed.device, sizeof(failed.device), "%s", spec);
+	snprintf(failed.what, sizeof(failed.what), "%.99s", err.text);
+	return of->found(of->context, &failed);
+}
+
+int incise_scan_all(incise_scan_found *found, void *context)
+{
+	static const char *const kinds[] = {"tracker", "force", "camera", "stepper"};
+	char names[16][32];
+	int rc = 0;
+
+	for (size_t k = 0; k < sizeof(kinds) / sizeof(*kinds) && !rc; k++) {
+		struct kind_found of = {kinds[k], found, context, 0};
+		int n = incise_backend_names(kinds[k], names, 16);
+
+		for (int i = 0; i < n && !rc; i++)
+			rc = scan_backend(&of, names[i]);
+	}
+	return rc;
+}
+
 int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 		void *context, struct incise_error *err)
 {
 	struct incise_loaded loaded = {0};
 	size_t length = strcspn(spec, ":");
+	struct kind_found of = {kind, found, context, 0};
 	char name[32], where[80];
 	int rc;
 
@@ -29,7 +81,7 @@ int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 	if (rc)
 		return rc;
 	if (loaded.backend && loaded.backend->scan)
-		rc = loaded.backend->scan(spec + length + 1, found, context, err);
+		rc = loaded.backend->scan(spec + length + 1, pass_on, &of, err);
 	else
 		rc = incise_error_set(err, EOPNOTSUPP,
 				      "%s: this backend cannot look for devices; name "

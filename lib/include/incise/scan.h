@@ -27,6 +27,7 @@ struct incise_scan_device {
 	bool usable; /**< rig.conf may name it; false: it is there, but of no use here */
 	int n;
 	struct incise_scan_property property[INCISE_SCAN_PROPERTIES];
+	char kind[16]; /**< "stepper" …; the library's to fill in */
 };
 
 /**
@@ -46,6 +47,14 @@ typedef int incise_scan_found(void *context, const struct incise_scan_device *de
  */
 INCISE_API int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 			   void *context, struct incise_error *err);
+
+/**
+ * Look for all that is attached: each backend of each kind that can look without being told
+ * where. One that fails is told as a device that is not usable, whose line says why.
+ *
+ * @return 0; what @found returned; -ENOMEM
+ */
+INCISE_API int incise_scan_all(incise_scan_found *found, void *context);
 
 INCISE_END_DECLS
 #endif
