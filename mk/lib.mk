@@ -63,6 +63,11 @@ pc_stepper_slcan :=
 objects_stepper_slcan := $(can_core) \
 	$(patsubst %,$(O)/obj/lib/device/can/%.o,$(can_slcan) stepper_slcan)
 
+# Needs nothing but the kernel's headers.
+device_modules += camera_v4l2
+objects_camera_v4l2 := $(O)/obj/lib/device/thread.o \
+	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c))
+
 define device_module
 $(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
 	@mkdir -p $$(@D)
@@ -75,7 +80,9 @@ endef
 $(foreach name,$(device_modules),$(eval $(call device_module,$(name))))
 
 # For unit tests, which reach into what the shared objects hide.
-test_objects := $(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
+test_objects := $(patsubst %.c,$(O)/obj/%.o,$(filter-out %/camera_v4l2.c,\
+		$(wildcard lib/device/v4l2/*.c))) \
+	$(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(can_modules) \
 		$(if $(has_libmnl),,%/socketcan.c %/can_netlink.c),$(wildcard lib/device/can/*.c)))
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)

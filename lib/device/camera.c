@@ -2,6 +2,7 @@
 /*
  * A camera, whatever stands behind it; see incise/camera.h.
  */
+#include <stdio.h>
 #include <incise/backend.h>
 
 int incise_camera_read(struct incise_camera *camera, struct incise_camera_frame *frame)
@@ -18,4 +19,10 @@ void incise_camera_info(const struct incise_camera *camera,
 uint64_t incise_camera_lost(const struct incise_camera *camera)
 {
 	return camera->ops->lost(camera);
+}
+
+int incise_camera_cause(struct incise_camera *camera, char *text, size_t size)
+{
+	return camera->ops->cause ? camera->ops->cause(camera, text, size)
+				  : snprintf(text, size, "%s", "");
 }

@@ -48,6 +48,8 @@ struct incise_camera_ops {
 	void (*info)(const struct incise_camera *camera, struct incise_camera_info *info);
 	uint64_t (*lost)(const struct incise_camera *camera);
 	void (*close)(struct incise_camera *camera);
+	/** Why read() fails; NULL: it cannot tell. */
+	int (*cause)(struct incise_camera *camera, char *text, size_t size);
 };
 
 struct incise_camera {

@@ -58,7 +58,8 @@ struct incise_camera;
 /**
  * Take the newest picture, without waiting. Older ones not yet taken count as lost.
  *
- * @return 1 with a picture, 0 with none; -EIO, -ENODEV (unplugged).
+ * @return 1 with a picture, 0 with none; -EIO, -ENODEV (unplugged): then
+ *         incise_camera_cause() says why, and no picture will come any more.
  */
 INCISE_API int incise_camera_read(struct incise_camera *camera,
 				  struct incise_camera_frame *frame);
@@ -68,6 +69,15 @@ INCISE_API void incise_camera_info(const struct incise_camera *camera,
 
 /** Pictures lost so far. */
 INCISE_API uint64_t incise_camera_lost(const struct incise_camera *camera);
+
+/**
+ * Why read() gives an error, in one line that says what to do: what was unplugged, which
+ * control has changed from what it was locked at.
+ *
+ * @param text always a string; empty as long as there is no error, or nothing is known
+ * @return length of the line, as snprintf(3). For people: not real-time safe.
+ */
+INCISE_API int incise_camera_cause(struct incise_camera *camera, char *text, size_t size);
 
 INCISE_END_DECLS
 #endif

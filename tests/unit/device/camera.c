@@ -9,6 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <errno.h>
+#include <stdio.h>
 #include <incise/backend.h>
 
 /* A backend that remembers what it was called with. */
@@ -33,25 +34,46 @@ static uint64_t fake_lost(const struct incise_camera *camera)
 	return ((const struct fake *)camera)->frame->seq;
 }
 
+static int fake_cause(struct incise_camera *camera, char *text, size_t size)
+{
+	return snprintf(text, size, "picture %d", ((struct fake *)camera)->frame->width);
+}
+
 static void calls_reach_the_backend(void **state)
 {
-	static const struct incise_camera_ops ops = {
-		.read = fake_read, .info = fake_info, .lost = fake_lost};
+	static const struct incise_camera_ops ops = {.read = fake_read,
+						     .info = fake_info,
+						     .lost = fake_lost,
+						     .cause = fake_cause};
 	struct fake fake = {.camera.ops = &ops};
 	struct incise_camera_frame frame = {.width = 77, .seq = 30000000000ULL};
 	struct incise_camera_info info = {0};
+	char text[20] = "x";
 
 	assert_int_equal(incise_camera_read(&fake.camera, &frame), -ENODEV);
 	assert_ptr_equal(fake.frame, &frame);
 	incise_camera_info(&fake.camera, &info);
 	assert_int_equal(info.width, 77);
 	assert_true(incise_camera_lost(&fake.camera) == 30000000000ULL);
+	assert_int_equal(incise_camera_cause(&fake.camera, text, sizeof(text)), 10);
+	assert_string_equal(text, "picture 77");
+}
+
+static void a_backend_that_tells_no_cause_has_an_empty_one(void **state)
+{
+	static const struct incise_camera_ops ops = {0};
+	struct fake fake = {.camera.ops = &ops};
+	char text[20] = "x";
+
+	assert_int_equal(incise_camera_cause(&fake.camera, text, sizeof(text)), 0);
+	assert_string_equal(text, "");
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(calls_reach_the_backend),
+		cmocka_unit_test(a_backend_that_tells_no_cause_has_an_empty_one),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

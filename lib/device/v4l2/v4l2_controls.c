@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A camera's controls, locked; see v4l2_controls.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <string.h>
+#include <linux/videodev2.h>
+#include "v4l2_controls.h"
+#include "v4l2_file.h"
+
+#define NS_PER_UNIT 100000	       /* of V4L2_CID_EXPOSURE_ABSOLUTE: 100 µs */
+#define EXPOSURE_MOST_NS 10000000000LL /* beyond, it is not believed */
+#define UNREAD_MOST 3
+
+/* What is locked together: what adjusts by itself, and what it adjusts. */
+static const struct pair {
+	const char *key; /* of camera_setup; NULL: kept as it is */
+	size_t asked;	 /* a double in struct incise_camera_setup */
+	double scale;	 /* from there to the driver's units */
+	uint32_t automatic, value;
+	int32_t off[2]; /* of automatic, the first that the camera takes */
+	const char *automatic_name, *name;
+} pairs[] = {
+	{"exposure_ms",
+	 offsetof(struct incise_camera_setup, exposure_ms),
+	 10,
+	 V4L2_CID_EXPOSURE_AUTO,
+	 V4L2_CID_EXPOSURE_ABSOLUTE,
+	 /* the second leaves only the iris to the camera */
+	 {V4L2_EXPOSURE_MANUAL, V4L2_EXPOSURE_SHUTTER_PRIORITY},
+	 "automatic exposure",
+	 "exposure"},
+	{NULL,
+	 0,
+	 0,
+	 V4L2_CID_EXPOSURE_AUTO_PRIORITY,
+	 V4L2_CID_EXPOSURE,
+	 {0, 0},
+	 "dynamic frame rate",
+	 "exposure step"},
+	{"white_balance_K",
+	 offsetof(struct incise_camera_setup, white_balance_K),
+	 1,
+	 V4L2_CID_AUTO_WHITE_BALANCE,
+	 V4L2_CID_WHITE_BALANCE_TEMPERATURE,
+	 {0, 0},
+	 "automatic white balance",
+	 "white balance"},
+	{NULL, 0, 0, 0, V4L2_CID_RED_BALANCE, {0, 0}, NULL, "red balance"},
+	{NULL, 0, 0, 0, V4L2_CID_BLUE_BALANCE, {0, 0}, NULL, "blue balance"},
+	{"gain",
+	 offsetof(struct incise_camera_setup, gain),
+	 1,
+	 V4L2_CID_AUTOGAIN,
+	 V4L2_CID_GAIN,
+	 {0, 0},
+	 "automatic gain",
+	 "gain"},
+	{"focus",
+	 offsetof(struct incise_camera_setup, focus),
+	 1,
+	 V4L2_CID_FOCUS_AUTO,
+	 V4L2_CID_FOCUS_ABSOLUTE,
+	 {0, 0},
+	 "automatic focus",
+	 "focus"},
+};
+
+/* Each may bring two. */
+_Static_assert(2 * sizeof(pairs) / sizeof(*pairs) <= V4L2_LOCKS_MOST, "locks fit");
+
+struct locking {
+	struct v4l2_controls *controls;
+	const char *where;
+	struct incise_error *err;
+};
+
+static int get(int fd, uint32_t id, int32_t *value)
+{
+	struct v4l2_control control = {.id = id};
+	int rc = v4l2_ask(fd, VIDIOC_G_CTRL, &control);
+
+	*value = control.value;
+	return rc;
+}
+
+static int set(int fd, uint32_t id, int32_t value)
+{
+	struct v4l2_control control = {.id = id, .value = value};
+
+	return v4l2_ask(fd, VIDIOC_S_CTRL, &control);
+}
+
+/* Whether the camera has a control that can be read. */
+static bool has(int fd, uint32_t id, struct v4l2_queryctrl *told)
+{
+	*told = (struct v4l2_queryctrl){.id = id};
+	return id && !v4l2_ask(fd, VIDIOC_QUERYCTRL, told) &&
+	       !(told->flags & (V4L2_CTRL_FLAG_DISABLED | V4L2_CTRL_FLAG_WRITE_ONLY));
+}
+
+static int refuse(struct locking *l, int rc, const char *name)
+{
+	if (rc == -ENODEV)
+		return incise_error_set(l->err, ENODEV, "%s: the camera was unplugged",
+					l->where);
+	if (rc == -EBUSY)
+		return incise_error_set(l->err, EBUSY,
+					"%s: the camera's %s is held by another program; "
+					"end that one",
+					l->where, name);
+	return incise_error_set(l->err, EIO, "%s: the camera's %s cannot be set: %s",
+				l->where, name, strerror(-rc));
+}
+
+/* Bring a control to a value, and note it. It is read back when all are set. */
+static int hold(struct locking *l, uint32_t id, const char *name, int32_t value)
+{
+	struct v4l2_controls *c = l->controls;
+	int32_t is = 0;
+	int rc = get(c->fd, id, &is);
+
+	if (!rc && is != value)
+		rc = set(c->fd, id, value);
+	if (rc)
+		return refuse(l, rc, name);
+	c->lock[c->n++] = (struct v4l2_lock){id, value, name};
+	return 0;
+}
+
+static int lock_automatic(struct locking *l, const struct pair *pair)
+{
+	struct v4l2_controls *c = l->controls;
+	struct v4l2_queryctrl told;
+	int32_t is;
+	int rc;
+
+	if (!has(c->fd, pair->automatic, &told))
+		return 0;
+	rc = get(c->fd, pair->automatic, &is);
+	if (rc)
+		return refuse(l, rc, pair->automatic_name);
+	for (int i = 0; i < 2; i++) {
+		rc = is == pair->off[i] ? 0 : set(c->fd, pair->automatic, pair->off[i]);
+		if (!rc) {
+			c->lock[c->n++] = (struct v4l2_lock){
+				pair->automatic, pair->off[i], pair->automatic_name};
+			return 0;
+		}
+	}
+	return refuse(l, rc, pair->automatic_name);
+}
+
+/* What is asked for, in the driver's units and steps. */
+static int value_of(struct locking *l, const struct pair *pair, double asked,
+		    const struct v4l2_queryctrl *told, int32_t *value)
+{
+	double units = asked * pair->scale, step = told->step > 0 ? told->step : 1;
+	double nearest = told->minimum + round((units - told->minimum) / step) * step;
+
+	/* Half a step is what rounding takes. */
+	if (units < told->minimum - step / 2 || units > told->maximum + step / 2)
+		return incise_error_set(l->err, ERANGE,
+					"%s: camera_setup.%s is %g; the camera takes %g "
+					"to %g; correct it",
+					l->where, pair->key, asked,
+					told->minimum / pair->scale,
+					told->maximum / pair->scale);
+	if (nearest > told->maximum)
+		nearest -= step;
+	*value = (int32_t)fmax(nearest, told->minimum);
+	return 0;
+}
+
+static int lock_pair(struct locking *l, const struct pair *pair,
+		     const struct incise_camera_setup *setup)
+{
+	struct v4l2_controls *c = l->controls;
+	struct v4l2_queryctrl told;
+	bool there = has(c->fd, pair->value, &told);
+	double asked = 0;
+	int32_t value = 0;
+	int rc = 0;
+
+	if (pair->key)
+		memcpy(&asked, (const char *)setup + pair->asked, sizeof(asked));
+	if (!(asked >= 0 && asked <= 1e6))
+		return incise_error_set(l->err, EINVAL,
+					"%s: camera_setup.%s is %g; correct it", l->where,
+					pair->key, asked);
+	if (asked > 0 && (!there || told.flags & V4L2_CTRL_FLAG_READ_ONLY))
+		return incise_error_set(l->err, EOPNOTSUPP,
+					"%s: the camera has no %s that can be set; take "
+					"camera_setup.%s away",
+					l->where, pair->name, pair->key);
+	/* What it is now is what the camera has chosen, so read it first. */
+	if (there && !(asked > 0))
+		rc = get(c->fd, pair->value, &value);
+	if (rc)
+		return refuse(l, rc, pair->name);
+	if (asked > 0)
+		rc = value_of(l, pair, asked, &told, &value);
+	if (!rc)
+		rc = lock_automatic(l, pair);
+	if (rc || !there || told.flags & V4L2_CTRL_FLAG_READ_ONLY)
+		return rc;
+	return hold(l, pair->value, pair->name, value);
+}
+
+static int check_exposure(const struct incise_camera_setup *setup, double rate_hz,
+			  const char *where, struct incise_error *err)
+{
+	if (!(setup->exposure_ms * rate_hz > 1000))
+		return 0;
+	return incise_error_set(err, ERANGE,
+				"%s: camera_setup.exposure_ms is %g, longer than the %g "
+				"ms of a picture at %g Hz; correct one of them",
+				where, setup->exposure_ms, 1000 / rate_hz, rate_hz);
+}
+
+/* Those that are not what they were set to, in one line. */
+static int read_back(struct locking *l)
+{
+	struct v4l2_controls *c = l->controls;
+
+	for (int i = 0; i < c->n; i++) {
+		const struct v4l2_lock *lock = &c->lock[i];
+		int32_t is;
+		int rc = get(c->fd, lock->id, &is);
+
+		if (rc)
+			return refuse(l, rc, lock->name);
+		if (is != lock->value)
+			return incise_error_set(
+				l->err, EIO,
+				"%s: the camera's %s does not hold: set to %d, it is %d; "
+				"set another value in camera_setup",
+				l->where, lock->name, lock->value, is);
+	}
+	return 0;
+}
+
+static void note_exposure(struct v4l2_controls *c)
+{
+	for (int i = 0; i < c->n; i++)
+		if (c->lock[i].id == V4L2_CID_EXPOSURE_ABSOLUTE && c->lock[i].value > 0 &&
+		    c->lock[i].value <= EXPOSURE_MOST_NS / NS_PER_UNIT)
+			c->exposure_ns = (int64_t)c->lock[i].value * NS_PER_UNIT;
+}
+
+int v4l2_controls_lock(struct v4l2_controls *controls, int fd,
+		       const struct incise_camera_setup *setup, double rate_hz,
+		       const char *where, struct incise_error *err)
+{
+	struct locking l = {controls, where, err};
+	int rc;
+
+	*controls = (struct v4l2_controls){.fd = fd};
+	for (size_t i = 0; i < sizeof(pairs) / sizeof(*pairs); i++) {
+		rc = lock_pair(&l, &pairs[i], setup);
+		if (rc)
+			return rc;
+	}
+	rc = check_exposure(setup, rate_hz, where, err);
+	if (!rc)
+		rc = read_back(&l);
+	if (!rc)
+		note_exposure(controls);
+	return rc;
+}
+
+int v4l2_controls_check(struct v4l2_controls *c, const char *where,
+			struct incise_error *err)
+{
+	int rc = 0, is;
+
+	for (int i = 0; i < c->n; i++) {
+		const struct v4l2_lock *lock = &c->lock[i];
+
+		rc = get(c->fd, lock->id, &is);
+		if (rc == -ENODEV)
+			return incise_error_set(
+				err, ENODEV,
+				"%s: the camera was unplugged; plug it in and begin again",
+				where);
+		if (rc)
+			break;
+		if (is != lock->value)
+			return incise_error_set(
+				err, EIO,
+				"%s: the camera's %s has changed from %d to %d; end what "
+				"changes it, and begin again",
+				where, lock->name, lock->value, is);
+	}
+	/* A transfer on a bus may fail once. */
+	c->unread = rc ? c->unread + 1 : 0;
+	if (c->unread < UNREAD_MOST)
+		return 0;
+	return incise_error_set(err, EIO,
+				"%s: the camera's controls cannot be read any more: %s; "
+				"look at its cable",
+				where, strerror(-rc));
+}

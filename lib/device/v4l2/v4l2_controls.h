@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * A camera's controls, held where they are: what a camera adjusts by itself moves edges and
+ * colours from picture to picture, and the time of a picture with the exposure.
+ *
+ *   exposure, dynamic frame rate, white balance, gain, focus:
+ *   automatic off ─▶ set ─▶ read back ─▶ read again while it runs
+ */
+#ifndef INCISE_V4L2_CONTROLS_H
+#define INCISE_V4L2_CONTROLS_H
+
+#include <stdint.h>
+#include <incise/camera.h>
+
+#define V4L2_LOCKS_MOST 16
+
+struct v4l2_lock {
+	uint32_t id;
+	int32_t value;
+	const char *name; /* for people */
+};
+
+struct v4l2_controls {
+	int fd;
+	int n;
+	int unread; /* checks in a row that a control could not be read at */
+	struct v4l2_lock lock[V4L2_LOCKS_MOST];
+	int64_t exposure_ns; /* 0: not known */
+};
+
+/*
+ * Lock all that the camera has, at what @setup says, or at what they are. @rate_hz of the
+ * pictures, 0: not known. 0; -EINVAL, -ERANGE (@setup), -EOPNOTSUPP (the camera has not what
+ * @setup sets), -EIO (it does not hold), -EBUSY, -ENODEV. @where begins the message.
+ */
+int v4l2_controls_lock(struct v4l2_controls *controls, int fd,
+		       const struct incise_camera_setup *setup, double rate_hz,
+		       const char *where, struct incise_error *err);
+
+/* 0; -EIO: one has drifted, or cannot be read; -ENODEV: unplugged. */
+int v4l2_controls_check(struct v4l2_controls *controls, const char *where,
+			struct incise_error *err);
+
+#endif

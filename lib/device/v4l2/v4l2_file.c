@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The file of a V4L2 device; see v4l2_file.h.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <linux/videodev2.h>
+#include "v4l2_file.h"
+
+#define TRIES 1000 /* against a signal that never ends */
+
+int v4l2_open(const char *path)
+{
+	int fd = -1;
+
+	for (int i = 0; i < TRIES && fd < 0; i++) {
+		fd = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC);
+		if (fd < 0 && errno != EINTR)
+			break;
+	}
+	return fd < 0 ? -errno : fd;
+}
+
+int v4l2_ask(int fd, unsigned long request, void *argument)
+{
+	for (int i = 0; i < TRIES; i++) {
+		if (ioctl(fd, request, argument) >= 0)
+			return 0;
+		if (errno != EINTR)
+			return -errno;
+	}
+	return -EINTR;
+}
+
+/* What a driver names need not end, nor be printable. */
+static void text_of(char *text, size_t size, const unsigned char *from, size_t length)
+{
+	size_t i;
+
+	for (i = 0; i < length && i + 1 < size && from[i]; i++)
+		text[i] = from[i] >= ' ' && from[i] < 127 ? (char)from[i] : '?';
+	text[i] = '\0';
+}
+
+int v4l2_identify(int fd, struct v4l2_identity *identity)
+{
+	struct v4l2_capability told = {0};
+	int rc = v4l2_ask(fd, VIDIOC_QUERYCAP, &told);
+
+	if (rc)
+		return rc == -EINVAL ? -ENOTTY : rc;
+	text_of(identity->card, sizeof(identity->card), told.card, sizeof(told.card));
+	text_of(identity->driver, sizeof(identity->driver), told.driver,
+		sizeof(told.driver));
+	text_of(identity->bus, sizeof(identity->bus), told.bus_info,
+		sizeof(told.bus_info));
+	identity->version = told.version;
+	/* A device may have several files, each for something else. */
+	identity->capabilities = told.capabilities & V4L2_CAP_DEVICE_CAPS
+					 ? told.device_caps
+					 : told.capabilities;
+	return 0;
+}
+
+char *v4l2_letters(uint32_t fourcc, char *text)
+{
+	for (int i = 0; i < 4; i++) {
+		char letter = (char)(fourcc >> 8 * i & 0x7f);
+
+		text[i] = letter >= ' ' && letter < 127 ? letter : '?';
+	}
+	text[4] = '\0';
+	return text;
+}

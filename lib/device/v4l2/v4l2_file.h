@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The file of a V4L2 device, /dev/video0: opened so that nothing on it waits, asked so that
+ * a signal does not matter. Shared by who captures and who looks what is attached.
+ */
+#ifndef INCISE_V4L2_FILE_H
+#define INCISE_V4L2_FILE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* What a device says that it is: text that is safe to print. */
+struct v4l2_identity {
+	char card[40], driver[24], bus[40];
+	uint32_t capabilities; /* of this very file */
+	uint32_t version;      /* of the driver */
+};
+
+/* A file descriptor, or a negative errno. */
+int v4l2_open(const char *path);
+
+/* 0 or a negative errno; -EINTR only where signals never end. */
+int v4l2_ask(int fd, unsigned long request, void *argument);
+
+/* 0; -ENOTTY: not a V4L2 device; -ENODEV. */
+int v4l2_identify(int fd, struct v4l2_identity *identity);
+
+/* The four letters of a pixel format; @text has room for 5. Returns @text. */
+char *v4l2_letters(uint32_t fourcc, char *text);
+
+#endif

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Choice of a camera's format, size and rate; see v4l2_format.h. A driver may enumerate
+ * what it likes: lists are followed for a bounded length, and numbers are used only when
+ * they can be.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <linux/videodev2.h>
+#include "v4l2_file.h"
+#include "v4l2_format.h"
+
+#define FORMATS_MOST 64
+#define CHOICES_MOST 256	       /* sizes, or rates */
+#define PICTURE_MOST ((size_t)1 << 28) /* bytes */
+
+static const struct {
+	enum incise_pixels pixels;
+	uint32_t fourcc;
+	int bytes; /* per pixel; 0: compressed */
+} known[] = {
+	{INCISE_PIXELS_YUYV, V4L2_PIX_FMT_YUYV, 2},
+	{INCISE_PIXELS_GREY, V4L2_PIX_FMT_GREY, 1},
+	{INCISE_PIXELS_RGB, V4L2_PIX_FMT_RGB24, 3},
+	{INCISE_PIXELS_MJPEG, V4L2_PIX_FMT_MJPEG, 0},
+	{INCISE_PIXELS_MJPEG, V4L2_PIX_FMT_JPEG, 0},
+};
+
+#define KNOWN (sizeof(known) / sizeof(*known))
+
+/* The @i-th format on offer; 0: there is none. */
+static uint32_t offered(int fd, uint32_t i)
+{
+	struct v4l2_fmtdesc told = {.index = i, .type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+
+	return i < FORMATS_MOST && !v4l2_ask(fd, VIDIOC_ENUM_FMT, &told)
+		       ? told.pixelformat
+		       : 0;
+}
+
+void v4l2_format_list(int fd, char *text, size_t size)
+{
+	size_t length = 0;
+	char letters[5];
+	uint32_t fourcc;
+
+	*text = '\0';
+	for (uint32_t i = 0; (fourcc = offered(fd, i)) && length + 6 < size; i++)
+		length += (size_t)snprintf(text + length, size - length, "%s%s",
+					   length ? " " : "",
+					   v4l2_letters(fourcc, letters));
+}
+
+/* Index into known; KNOWN: it has none of that kind. */
+static size_t find(int fd, enum incise_pixels pixels)
+{
+	size_t best = KNOWN;
+	uint32_t fourcc;
+
+	for (uint32_t i = 0; (fourcc = offered(fd, i)); i++)
+		for (size_t k = 0; k < KNOWN; k++)
+			if (known[k].fourcc == fourcc && known[k].pixels == pixels &&
+			    k < best)
+				best = k;
+	return best;
+}
+
+static long away(uint32_t a, int b)
+{
+	return labs((long)a - b);
+}
+
+/* The nearest that steps from @least to @most give. */
+static int step_to(int asked, uint32_t least, uint32_t most, uint32_t step)
+{
+	if (most < least || most > V4L2_SIDE_MOST)
+		return asked;
+	if (!step)
+		step = 1;
+	if ((uint32_t)asked <= least)
+		return (int)least;
+	if ((uint32_t)asked >= most)
+		return (int)most;
+	return (int)(least + ((uint32_t)asked - least + step / 2) / step * step);
+}
+
+/* Make a size asked for the nearest on offer; as it is where none is enumerated. */
+static void nearest_size(int fd, uint32_t fourcc, int *width, int *height)
+{
+	int w = *width, h = *height;
+	long best = -1;
+
+	for (uint32_t i = 0; i < CHOICES_MOST; i++) {
+		struct v4l2_frmsizeenum told = {.index = i, .pixel_format = fourcc};
+		long off;
+
+		if (v4l2_ask(fd, VIDIOC_ENUM_FRAMESIZES, &told))
+			return;
+		if (told.type != V4L2_FRMSIZE_TYPE_DISCRETE) {
+			*width = step_to(w, told.stepwise.min_width,
+					 told.stepwise.max_width,
+					 told.stepwise.step_width);
+			*height = step_to(h, told.stepwise.min_height,
+					  told.stepwise.max_height,
+					  told.stepwise.step_height);
+			return;
+		}
+		off = away(told.discrete.width, w) + away(told.discrete.height, h);
+		if (told.discrete.width - 1 < V4L2_SIDE_MOST &&
+		    told.discrete.height - 1 < V4L2_SIDE_MOST &&
+		    (best < 0 || off < best)) {
+			best = off;
+			*width = (int)told.discrete.width;
+			*height = (int)told.discrete.height;
+		}
+	}
+}
+
+/* Pictures per second; 0: not a rate. */
+static double rate_of(const struct v4l2_fract *interval)
+{
+	double hz = interval->numerator
+			    ? (double)interval->denominator / interval->numerator
+			    : 0;
+
+	return hz >= 1e-3 && hz <= 1e5 ? hz : 0;
+}
+
+static struct v4l2_fract nearest_interval(int fd, const struct v4l2_shape *shape,
+					  double hz)
+{
+	struct v4l2_fract best = {1000, (uint32_t)lround(hz * 1000)};
+	double off = -1;
+
+	for (uint32_t i = 0; i < CHOICES_MOST; i++) {
+		struct v4l2_frmivalenum told = {.index = i,
+						.pixel_format = shape->fourcc,
+						.width = (uint32_t)shape->width,
+						.height = (uint32_t)shape->height};
+		double is;
+
+		if (v4l2_ask(fd, VIDIOC_ENUM_FRAMEINTERVALS, &told))
+			break;
+		if (told.type != V4L2_FRMIVAL_TYPE_DISCRETE) {
+			/* The shortest interval is the highest rate. */
+			if (rate_of(&told.stepwise.min) > 0 &&
+			    hz > rate_of(&told.stepwise.min))
+				return told.stepwise.min;
+			if (rate_of(&told.stepwise.max) > 0 &&
+			    hz < rate_of(&told.stepwise.max))
+				return told.stepwise.max;
+			break;
+		}
+		is = rate_of(&told.discrete);
+		if (is > 0 && (off < 0 || fabs(is - hz) < off)) {
+			off = fabs(is - hz);
+			best = told.discrete;
+		}
+	}
+	return best;
+}
+
+/* Not every driver has a rate; then it is not known. */
+static void set_rate(int fd, struct v4l2_shape *shape, double hz)
+{
+	struct v4l2_streamparm told = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+
+	if (v4l2_ask(fd, VIDIOC_G_PARM, &told))
+		return;
+	if (hz > 0 && told.parm.capture.capability & V4L2_CAP_TIMEPERFRAME) {
+		struct v4l2_streamparm asked = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+
+		asked.parm.capture.timeperframe = nearest_interval(fd, shape, hz);
+		v4l2_ask(fd, VIDIOC_S_PARM, &asked);
+		if (v4l2_ask(fd, VIDIOC_G_PARM, &told))
+			return;
+	}
+	shape->rate_hz = rate_of(&told.parm.capture.timeperframe);
+}
+
+/* Whether what a driver says of its pictures can be; else why not. */
+static const char *wrong(const struct v4l2_pix_format *told, size_t kind,
+			 struct v4l2_shape *shape)
+{
+	size_t row;
+
+	if (told->pixelformat != known[kind].fourcc)
+		return "other pixels than were set";
+	if (told->field != V4L2_FIELD_NONE)
+		return "interlaced pictures, whose halves are of two times; set a "
+		       "progressive mode";
+	if (told->width - 1 >= V4L2_SIDE_MOST || told->height - 1 >= V4L2_SIDE_MOST)
+		return "a size that cannot be";
+	if (!told->sizeimage || told->sizeimage > PICTURE_MOST)
+		return "a number of bytes that cannot be";
+	*shape = (struct v4l2_shape){
+		.pixels = known[kind].pixels,
+		.fourcc = told->pixelformat,
+		.width = (int)told->width,
+		.height = (int)told->height,
+	};
+	if (!known[kind].bytes)
+		return NULL;
+	row = (size_t)told->width * (size_t)known[kind].bytes;
+	/* Drivers of the old days leave it at 0 where rows have no padding. */
+	shape->stride = (int)(told->bytesperline ? told->bytesperline : row);
+	if (told->bytesperline > PICTURE_MOST || (size_t)shape->stride < row)
+		return "rows that are too short";
+	if (shape->pixels == INCISE_PIXELS_YUYV && told->width % 2)
+		return "an odd number of pixels in a row of YUYV";
+	/* Padding behind the last row may be missing. */
+	shape->least = (size_t)shape->stride * (told->height - 1) + row;
+	return shape->least > told->sizeimage ? "fewer bytes than its rows have" : NULL;
+}
+
+static int check_setup(const struct incise_camera_setup *setup, const char *where,
+		       struct incise_error *err)
+{
+	if (setup->width < 0 || setup->width > V4L2_SIDE_MOST || setup->height < 0 ||
+	    setup->height > V4L2_SIDE_MOST)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: camera_setup: a picture of %d x %d pixels cannot be; "
+			"correct width and height",
+			where, setup->width, setup->height);
+	if (!(setup->rate_hz >= 0 && setup->rate_hz <= 10000))
+		return incise_error_set(
+			err, EINVAL,
+			"%s: camera_setup: %g pictures a second cannot be; correct "
+			"rate_hz",
+			where, setup->rate_hz);
+	return 0;
+}
+
+int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char *where,
+		    struct v4l2_shape *shape, struct incise_error *err)
+{
+	struct v4l2_format set = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+	struct v4l2_format told = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+	size_t kind = find(fd, setup->pixels);
+	int width, height, rc;
+	const char *why;
+	char list[120];
+
+	rc = check_setup(setup, where, err);
+	if (rc)
+		return rc;
+	rc = v4l2_ask(fd, VIDIOC_G_FMT, &set);
+	if (rc)
+		return incise_error_set(err, -rc, "%s: the camera tells no format: %s",
+					where, strerror(-rc));
+	if (kind == KNOWN) {
+		v4l2_format_list(fd, list, sizeof(list));
+		return incise_error_set(
+			err, EOPNOTSUPP,
+			"%s: the camera has no pictures of camera_setup.pixels; it has "
+			"%s: name one of yuyv, grey, mjpeg, rgb among them",
+			where, *list ? list : "none");
+	}
+	width = setup->width ? setup->width
+			     : step_to(V4L2_SIDE_MOST, 1, set.fmt.pix.width, 1);
+	height = setup->height ? setup->height
+			       : step_to(V4L2_SIDE_MOST, 1, set.fmt.pix.height, 1);
+	nearest_size(fd, known[kind].fourcc, &width, &height);
+	set.fmt.pix.width = (uint32_t)width;
+	set.fmt.pix.height = (uint32_t)height;
+	set.fmt.pix.pixelformat = known[kind].fourcc;
+	set.fmt.pix.field = V4L2_FIELD_NONE;
+	set.fmt.pix.bytesperline = set.fmt.pix.sizeimage = 0;
+	rc = v4l2_ask(fd, VIDIOC_S_FMT, &set);
+	if (!rc)
+		rc = v4l2_ask(fd, VIDIOC_G_FMT, &told);
+	if (rc)
+		return incise_error_set(err, -rc,
+					rc == -EBUSY ? "%s: another program uses the "
+						       "camera; end that one: %s"
+						     : "%s: the camera's format cannot "
+						       "be set: %s",
+					where, strerror(-rc));
+	why = wrong(&told.fmt.pix, kind, shape);
+	if (why)
+		return incise_error_set(err, EPROTO, "%s: the camera's driver gives %s",
+					where, why);
+	set_rate(fd, shape, setup->rate_hz);
+	return 0;
+}
