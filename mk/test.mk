@@ -16,6 +16,10 @@ ldflags_can/socketcan := $(foreach name,socket bind setsockopt send recvmsg ppol
 	clock_gettime can_netlink_ask,-Wl,--wrap=$(name))
 ldflags_can/can_netlink := $(foreach name,mnl_socket_open2 mnl_socket_sendto mnl_socket_recvfrom \
 	mnl_socket_get_portid setsockopt clock_gettime,-Wl,--wrap=$(name))
+# All of them meet the same driver, tests/unit/v4l2/driver.h.
+ldflags_v4l2 := $(foreach name,open close ioctl mmap munmap poll clock_gettime,-Wl,--wrap=$(name))
+$(foreach test,$(wildcard tests/unit/v4l2/*.c),\
+	$(eval ldflags_v4l2/$(basename $(notdir $(test))) := $(ldflags_v4l2)))
 
 $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/v4l2/v4l2_camera.c on a driver that the test plays: the parts put together
+ * behind the door of cameras, with the thread, until it is closed or the camera ends.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <stdio.h>
+#include "../../../lib/device/v4l2/v4l2_camera.h"
+#include "driver.h"
+
+#define PATIENCE 20000 /* looks, about a millisecond apart when the thread waits */
+
+static struct incise_error err;
+
+/* A test that is held up must not make the camera silent for seconds. */
+static void reset(void)
+{
+	driver_reset();
+	driver.stands = true;
+}
+
+static struct incise_camera *open_camera(const char *path,
+					 const struct incise_camera_setup *setup)
+{
+	const struct incise_backend_request request = {
+		.arguments = path, .where = "rig.conf:1: camera", .camera = setup};
+
+	err = (struct incise_error){0};
+	return v4l2_camera_open(&request, &err);
+}
+
+static int await(struct incise_camera *camera, struct incise_camera_frame *frame)
+{
+	int rc = 0;
+
+	for (int i = 0; i < PATIENCE && !rc; i++) {
+		rc = incise_camera_read(camera, frame);
+		if (!rc)
+			__real_poll(NULL, 0, 1);
+	}
+	return rc;
+}
+
+static void close_camera(struct incise_camera *camera)
+{
+	camera->ops->close(camera);
+	assert_int_equal(driver.opened, 0);
+	assert_int_equal(driver.streams, 0);
+	assert_int_equal(driver.mapped, 0);
+}
+
+static void pictures_come_through_the_door(void **state)
+{
+	static const struct incise_camera_setup setup = {.width = 32,
+							 .height = 24,
+							 .rate_hz = 60,
+							 .pixels = INCISE_PIXELS_YUYV,
+							 .exposure_ms = 10};
+	struct incise_camera_frame frame = {0};
+	struct incise_camera_info info;
+	struct incise_camera *camera;
+	char text[100];
+
+	reset();
+	driver_add(V4L2_CID_EXPOSURE_ABSOLUTE, 1, 1000, 50);
+	camera = open_camera("/dev/video7", &setup);
+	if (!camera)
+		fail_msg("%s", err.text);
+	incise_camera_info(camera, &info);
+	assert_int_equal(strncmp(info.name, "C?CCC", 5), 0);
+	assert_int_equal(strlen(info.name), 32);
+	assert_true(info.width == 32 && info.height == 24 && info.rate_hz == 60);
+	assert_int_equal(info.pixels, INCISE_PIXELS_YUYV);
+	assert_true(info.exposure_ns == 10000000 && !info.damaged);
+	for (uint32_t i = 0; i < 200; i++) {
+		/* Every other one is damaged. */
+		driver_shoot_flagged(2 * i, V4L2_BUF_FLAG_ERROR);
+		driver_shoot(2 * i + 1);
+		assert_int_equal(await(camera, &frame), 1);
+		assert_int_equal(frame.data[0], (uint8_t)(2 * i + 1));
+		assert_true(frame.seq == 2 * i + 1);
+	}
+	assert_true(incise_camera_lost(camera) == 200);
+	incise_camera_info(camera, &info);
+	assert_true(info.damaged == 200);
+	assert_int_equal(incise_camera_cause(camera, text, sizeof(text)), 0);
+	assert_string_equal(text, "");
+	close_camera(camera);
+}
+
+static void an_unplugged_camera_says_so(void **state)
+{
+	struct incise_camera_frame frame;
+	struct incise_camera *camera;
+	char text[200];
+
+	reset();
+	/* Without a group in rig.conf. */
+	camera = open_camera("/dev/video7", NULL);
+	assert_non_null(camera);
+	driver_shoot(0);
+	assert_int_equal(await(camera, &frame), 1);
+	pthread_mutex_lock(&driver.lock);
+	driver.dqbuf_error = ENODEV;
+	pthread_mutex_unlock(&driver.lock);
+	assert_int_equal(await(camera, &frame), -ENODEV);
+	assert_int_equal(incise_camera_read(camera, &frame), -ENODEV);
+	assert_true(incise_camera_cause(camera, text, sizeof(text)) > 0);
+	assert_string_equal(text, "rig.conf:1: camera: the camera was unplugged; plug it "
+				  "in and begin again");
+	/* What is held may still be looked at. */
+	assert_int_equal(frame.data[0], 0);
+	close_camera(camera);
+}
+
+static void controls_that_drift_end_it(void **state)
+{
+	struct incise_camera_frame frame;
+	struct incise_camera *camera;
+	char text[200];
+	int rc = 0;
+
+	/* Found by time where pictures are few, by their number where there are many. */
+	for (int many = 0; many < 2; many++) {
+		reset();
+		driver_add(V4L2_CID_GAIN, 0, 100, 50);
+		camera = open_camera("/dev/video7", NULL);
+		assert_non_null(camera);
+		pthread_mutex_lock(&driver.lock);
+		driver_control(V4L2_CID_GAIN)->value = 51;
+		if (!many)
+			driver.now_ns += 1000000000;
+		pthread_mutex_unlock(&driver.lock);
+		for (uint32_t i = 0; many && i < 64; i++)
+			driver_shoot(i);
+		while ((rc = await(camera, &frame)) == 1)
+			;
+		assert_int_equal(rc, -EIO);
+		incise_camera_cause(camera, text, sizeof(text));
+		if (!strstr(text, "gain has changed from 50 to 51"))
+			fail_msg("%d: %s", many, text);
+		close_camera(camera);
+	}
+}
+
+static void forget_when_beginning(void)
+{
+	driver_add(V4L2_CID_GAIN, 0, 100, 50);
+	driver.streamon_error = EIO;
+}
+
+static void why_it_cannot_be_opened_is_said(void **state)
+{
+	static const struct {
+		const char *path;
+		int open_error, querycap_error;
+		uint32_t capabilities;
+		void (*make)(void);
+		int code;
+		const char *says;
+	} cases[] = {
+		{"", 0, 0, 0, NULL, EINVAL, "expected v4l2:PATH"},
+		{"video0", 0, 0, 0, NULL, EINVAL, "expected v4l2:PATH"},
+		{"/dev/video0", ENOENT, 0, 0, NULL, ENOENT, "no such camera"},
+		{"/dev/video0", EACCES, 0, 0, NULL, EACCES, "member of the group"},
+		{"/dev/video0", EBUSY, 0, 0, NULL, EBUSY, "another program"},
+		{"/dev/video0", EMFILE, 0, 0, NULL, EMFILE, "Too many open files"},
+		{"/dev/video0", 0, ENOTTY, 0, NULL, ENOTTY, "this is no camera"},
+		{"/dev/video0", 0, EINVAL, 0, NULL, ENOTTY, "this is no camera"},
+		{"/dev/video0", 0, 0, V4L2_CAP_META_CAPTURE | V4L2_CAP_STREAMING, NULL,
+		 EOPNOTSUPP, "gives no stream of pictures"},
+		{"/dev/video0", 0, 0, V4L2_CAP_VIDEO_CAPTURE, NULL, EOPNOTSUPP,
+		 "gives no stream of pictures"},
+		{"/dev/video0", 0, 0, V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING,
+		 forget_when_beginning, EIO, "does not begin"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		reset();
+		driver.open_error = cases[i].open_error;
+		driver.querycap_error = cases[i].querycap_error;
+		driver.capabilities = cases[i].capabilities;
+		if (cases[i].make)
+			cases[i].make();
+		if (open_camera(cases[i].path, NULL) || errno != cases[i].code ||
+		    err.code != cases[i].code || !strstr(err.text, cases[i].says))
+			fail_msg("case %zu: %d, \"%s\"", i, errno, err.text);
+		assert_int_equal(driver.opened, 0);
+		assert_int_equal(driver.mapped, 0);
+	}
+}
+
+static void a_camera_may_be_opened_and_closed_at_once(void **state)
+{
+	for (int i = 0; i < 20; i++) {
+		struct incise_camera *camera;
+
+		reset();
+		driver.interrupted = i;
+		camera = open_camera("/dev/video7", NULL);
+		assert_non_null(camera);
+		close_camera(camera);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(pictures_come_through_the_door),
+		cmocka_unit_test(an_unplugged_camera_says_so),
+		cmocka_unit_test(controls_that_drift_end_it),
+		cmocka_unit_test(why_it_cannot_be_opened_is_said),
+		cmocka_unit_test(a_camera_may_be_opened_and_closed_at_once),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

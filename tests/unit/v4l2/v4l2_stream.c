@@ -1,0 +1,489 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/v4l2/v4l2_stream.c on a driver that the test plays: every picture that was
+ * lost or damaged is counted, what a caller holds is left alone, and what a driver says
+ * wrongly is refused.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <stdio.h>
+#include "../../../lib/device/v4l2/v4l2_stream.h"
+#include "driver.h"
+
+#define WHERE "rig.conf:1: camera"
+#define PERIOD_NS 33333333
+
+static struct v4l2_stream stream;
+static struct incise_error err;
+
+static struct v4l2_shape shape_of(enum incise_pixels pixels)
+{
+	struct v4l2_shape shape = {.pixels = pixels,
+				   .width = 16,
+				   .height = 8,
+				   .stride = 32,
+				   .least = 256,
+				   .rate_hz = 30};
+
+	driver.is.pixelformat = V4L2_PIX_FMT_YUYV;
+	driver.is.sizeimage = 256;
+	if (pixels == INCISE_PIXELS_MJPEG) {
+		shape.stride = 0;
+		shape.least = 0;
+		driver.is.pixelformat = V4L2_PIX_FMT_MJPEG;
+		driver.is.sizeimage = 100;
+	}
+	return shape;
+}
+
+static int start(enum incise_pixels pixels, int64_t exposure_ns)
+{
+	struct v4l2_shape shape = shape_of(pixels);
+
+	err = (struct incise_error){0};
+	return v4l2_stream_start(&stream, DRIVER_FD, &shape, exposure_ns, WHERE, &err);
+}
+
+static void begin(void)
+{
+	driver_reset();
+	assert_int_equal(start(INCISE_PIXELS_YUYV, 0), 0);
+}
+
+static void end(void)
+{
+	v4l2_stream_stop(&stream);
+	assert_int_equal(driver.streams, 0);
+	assert_int_equal(driver.mapped, 0);
+}
+
+static int step(void)
+{
+	return v4l2_stream_step(&stream, 100, &err);
+}
+
+static void losses(uint64_t lost, uint64_t damaged)
+{
+	assert_true(atomic_load(&stream.lost) == lost);
+	assert_true(atomic_load(&stream.damaged) == damaged);
+}
+
+static void pictures_come_in_order_with_their_stamps(void **state)
+{
+	struct incise_camera_frame frame;
+
+	begin();
+	assert_int_equal(v4l2_stream_read(&stream, &frame), 0);
+	assert_int_equal(step(), 0);
+	for (uint32_t i = 0; i < 100; i++) {
+		/* A driver's count may begin anywhere, and runs over. */
+		int64_t t_ns = driver_shoot(UINT32_MAX - 50 + i)->t_ns;
+
+		assert_int_equal(step(), 1);
+		assert_int_equal(v4l2_stream_read(&stream, &frame), 1);
+		assert_true(frame.seq == i);
+		/* A timeval has microseconds. */
+		assert_true(frame.t_ns == t_ns / 1000 * 1000);
+		assert_int_equal(frame.data[0], (uint8_t)(UINT32_MAX - 50 + i));
+		assert_int_equal(frame.size, 256);
+		assert_int_equal(frame.stride, 32);
+		assert_int_equal(v4l2_stream_read(&stream, &frame), 0);
+	}
+	losses(0, 0);
+	end();
+}
+
+static void what_is_held_is_not_written_to(void **state)
+{
+	struct incise_camera_frame held, next;
+
+	begin();
+	driver_shoot(7);
+	assert_int_equal(step(), 1);
+	assert_int_equal(v4l2_stream_read(&stream, &held), 1);
+	/* More pictures than there are buffers; each but the last is passed over. */
+	for (uint32_t i = 1; i <= 50; i++) {
+		driver_shoot(7 + i);
+		assert_int_equal(step(), 1);
+		assert_int_equal(held.data[0], 7);
+		assert_int_equal(held.data[255], 7);
+	}
+	losses(49, 0);
+	assert_int_equal(v4l2_stream_read(&stream, &next), 1);
+	assert_true(next.seq == 50 && next.data[0] == 57);
+	/* All buffers but the one held are with the driver again. */
+	assert_int_equal(step(), 0);
+	for (uint32_t i = 0; i < driver.given; i++)
+		assert_int_equal(driver.queued[i],
+				 driver.memory + i * DRIVER_BYTES != next.data);
+	end();
+}
+
+static void four_buffers_suffice(void **state)
+{
+	struct incise_camera_frame frame;
+
+	driver_reset();
+	driver.count = 4;
+	assert_int_equal(start(INCISE_PIXELS_YUYV, 0), 0);
+	for (uint32_t i = 0; i < 40; i++) {
+		driver_shoot(i);
+		assert_int_equal(step(), 1);
+		if (i % 3)
+			assert_int_equal(v4l2_stream_read(&stream, &frame), 1);
+	}
+	end();
+}
+
+static void all_that_is_lost_is_counted(void **state)
+{
+	struct incise_camera_frame frame;
+
+	begin();
+	driver_shoot(0);
+	driver_shoot(1);
+	driver_shoot(5);			       /* 2, 3, 4 */
+	driver_shoot(6)->flags |= V4L2_BUF_FLAG_ERROR; /* damaged */
+	driver_shoot(7)->bytesused = 255;	       /* too short */
+	driver_shoot(8)->bytesused = DRIVER_BYTES + 1; /* more than there can be */
+	driver_shoot(9)->bytesused = 0;
+	driver_shoot(12); /* 10, 11 */
+	for (int i = 0; i < 8; i++) {
+		assert_int_equal(step(), 1);
+		v4l2_stream_read(&stream, &frame);
+	}
+	assert_true(frame.seq == 12);
+	losses(3 + 4 + 2, 4);
+	end();
+}
+
+static void damage_that_a_driver_does_not_count(void **state)
+{
+	struct incise_camera_frame frame;
+
+	begin();
+	/* Before the first one; its count may be anything. */
+	driver_shoot(99999999)->flags |= V4L2_BUF_FLAG_ERROR;
+	driver_shoot(40);
+	driver_shoot(40)->flags |= V4L2_BUF_FLAG_ERROR;
+	driver_shoot(3000000)->flags |= V4L2_BUF_FLAG_ERROR;
+	driver_shoot(41);
+	for (int i = 0; i < 5; i++) {
+		assert_int_equal(step(), 1);
+		v4l2_stream_read(&stream, &frame);
+	}
+	/* 0 damaged, 1, 2 and 3 damaged, 4. */
+	assert_true(frame.seq == 4);
+	losses(3, 3);
+	end();
+}
+
+static void stamps_that_cannot_be_are_damage(void **state)
+{
+	static const struct {
+		int64_t from_now_ns, from_last_ns;
+		bool good;
+	} cases[] = {
+		{0, 0, true},
+		{0, 1000, true},	  /* a microsecond is what it counts in */
+		{1000000000, 0, false},	  /* to come */
+		{-20000000000, 0, false}, /* long ago, and before the last one */
+		{0, -1, false},		  /* the same as before */
+	};
+	struct incise_camera_frame frame;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct driver_picture *shot;
+		int64_t last;
+
+		begin();
+		last = driver_shoot(0)->t_ns;
+		assert_int_equal(step(), 1);
+		shot = driver_shoot(1);
+		shot->t_ns += cases[i].from_now_ns;
+		if (cases[i].from_last_ns)
+			shot->t_ns = last + cases[i].from_last_ns +
+				     (cases[i].from_last_ns < 0);
+		assert_int_equal(step(), 1);
+		if ((v4l2_stream_read(&stream, &frame) == 1 && frame.seq == 1) !=
+		    cases[i].good)
+			fail_msg("case %zu", i);
+		losses(1, !cases[i].good);
+		end();
+	}
+}
+
+static void the_middle_of_the_exposure_is_told(void **state)
+{
+	static const struct {
+		uint32_t source;
+		int64_t shift_ns;
+	} cases[] = {
+		{V4L2_BUF_FLAG_TSTAMP_SRC_SOE, 4000000},
+		{V4L2_BUF_FLAG_TSTAMP_SRC_EOF, -4000000},
+	};
+	struct incise_camera_frame frame;
+
+	for (size_t i = 0; i < 2; i++) {
+		struct driver_picture *shot;
+
+		driver_reset();
+		assert_int_equal(start(INCISE_PIXELS_YUYV, 8000000), 0);
+		shot = driver_shoot(0);
+		shot->t_ns = shot->t_ns / 1000 * 1000;
+		shot->flags |= cases[i].source;
+		assert_int_equal(step(), 1);
+		assert_int_equal(v4l2_stream_read(&stream, &frame), 1);
+		assert_true(frame.t_ns == shot->t_ns + cases[i].shift_ns);
+		end();
+	}
+}
+
+static void a_jpeg_is_whole_from_first_to_last_marker(void **state)
+{
+	static const struct {
+		uint8_t bytes[8];
+		uint32_t size;
+		bool good;
+	} cases[] = {
+		{{0xff, 0xd8, 1, 2, 0xff, 0xd9}, 6, true},
+		{{0xff, 0xd8, 1, 0xff, 0xd9, 0, 0}, 7, true},  /* padded */
+		{{0xff, 0xd8, 1, 2, 3, 0xff, 0xd9}, 6, false}, /* cut */
+		{{0, 0xd8, 1, 2, 0xff, 0xd9}, 6, false},
+		{{0xff, 0xd8, 0xff}, 3, false},
+		{{0xff, 0xd8, 0xd9, 0}, 4, false},
+	};
+	struct incise_camera_frame frame;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		driver_reset();
+		assert_int_equal(start(INCISE_PIXELS_MJPEG, 0), 0);
+		memcpy(driver.memory, cases[i].bytes, 8);
+		driver_shoot(0)->bytesused = cases[i].size;
+		assert_int_equal(step(), 1);
+		if (v4l2_stream_read(&stream, &frame) != cases[i].good)
+			fail_msg("case %zu", i);
+		if (cases[i].good)
+			assert_true(frame.size == cases[i].size && !frame.stride);
+		losses(!cases[i].good, !cases[i].good);
+		end();
+	}
+}
+
+/* Ways in which a stream ends. */
+static void lie_index(void)
+{
+	driver_shoot(1)->index = 500;
+}
+
+static void lie_not_queued(void)
+{
+	/* the first picture's, which nobody took yet */
+	driver_shoot(1)->index = 0;
+}
+
+static void lie_clock(void)
+{
+	driver_shoot(1)->flags = V4L2_BUF_FLAG_TIMESTAMP_COPY;
+}
+
+static void count_stands(void)
+{
+	driver_shoot(0);
+}
+
+static void count_falls(void)
+{
+	driver_shoot(UINT32_MAX);
+}
+
+static void unplug(void)
+{
+	driver.dqbuf_error = ENODEV;
+	driver.events = POLLERR | POLLHUP;
+}
+
+static void unplug_silently(void)
+{
+	driver.events = POLLERR;
+	driver.querycap_error = ENODEV;
+}
+
+static void break_down(void)
+{
+	driver.events = POLLERR;
+}
+
+static void fail_always(void)
+{
+	driver.dqbuf_error = EIO;
+}
+
+static void forget_streaming(void)
+{
+	driver.dqbuf_error = EINVAL;
+}
+
+static void refuse_buffers(void)
+{
+	driver_shoot(1)->flags |= V4L2_BUF_FLAG_ERROR;
+	driver.qbuf_error = EINVAL;
+}
+
+static void unplug_at_queueing(void)
+{
+	driver_shoot(1)->flags |= V4L2_BUF_FLAG_ERROR;
+	driver.qbuf_error = ENODEV;
+}
+
+static void damage_all(void)
+{
+	for (uint32_t i = 1; i <= 30; i++)
+		driver_shoot(i)->flags |= V4L2_BUF_FLAG_ERROR;
+}
+
+static void fall_silent(void)
+{
+}
+
+static void every_end_has_its_cause(void **state)
+{
+	static const struct {
+		void (*make)(void);
+		int code;
+		const char *says;
+	} cases[] = {
+		{lie_index, EIO, "number 500"},
+		{lie_not_queued, EIO, "fills a buffer that it does not have, number 0"},
+		{lie_clock, EIO, "CLOCK_MONOTONIC"},
+		{count_stands, EIO, "counts picture 0 behind 0"},
+		{count_falls, EIO, "counts picture 4294967295 behind 0"},
+		{unplug, ENODEV, "unplugged"},
+		{unplug_silently, ENODEV, "unplugged"},
+		{break_down, EIO, "no more pictures"},
+		{fail_always, EIO, "no more pictures"},
+		{forget_streaming, EIO, "no more pictures: Invalid argument"},
+		{refuse_buffers, EIO, "takes a buffer no more"},
+		{unplug_at_queueing, ENODEV, "unplugged"},
+		{damage_all, EIO, "last 30 pictures"},
+		{fall_silent, EIO, "no picture came from the camera for 5 s"},
+	};
+	struct incise_camera_frame frame;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		int rc = 0, steps = 0;
+
+		begin();
+		driver_shoot(0);
+		assert_int_equal(step(), 1);
+		cases[i].make();
+		/* 5 s in steps of 100 ms, and some. */
+		while (rc >= 0 && steps++ < 60)
+			rc = step();
+		if (rc != -cases[i].code || err.code != cases[i].code ||
+		    !strstr(err.text, cases[i].says) ||
+		    strncmp(err.text, WHERE ": ", strlen(WHERE) + 2))
+			fail_msg("case %zu: %d, \"%s\"", i, rc, err.text);
+		/* What came before is whole, and can be had. */
+		assert_int_equal(v4l2_stream_read(&stream, &frame), 1);
+		assert_int_equal(frame.data[0], 0);
+		end();
+	}
+}
+
+static void one_error_ends_nothing(void **state)
+{
+	struct incise_camera_frame frame;
+
+	begin();
+	for (int i = 0; i < 20; i++) {
+		driver.dqbuf_error = i % 2 ? 0 : EIO;
+		driver.interrupted = 3;
+		driver_shoot((uint32_t)i);
+		assert_int_equal(step(), i % 2);
+	}
+	driver.dqbuf_error = 0;
+	assert_int_equal(v4l2_stream_read(&stream, &frame), 1);
+	end();
+}
+
+static void slow_cameras_may_be_silent_longer(void **state)
+{
+	begin();
+	stream.shape.rate_hz = 1;
+	for (int i = 0; i < 190; i++)
+		assert_int_equal(step(), 0);
+	for (int i = 0; i < 20 && !err.code; i++)
+		step();
+	assert_int_equal(err.code, EIO);
+	assert_non_null(strstr(err.text, "for 20 s"));
+	end();
+}
+
+static void why_it_cannot_begin_is_said(void **state)
+{
+	static const struct {
+		size_t error; /* field of the driver */
+		int value, code;
+		const char *says;
+	} cases[] = {
+		{offsetof(struct driver, buffer_flags), V4L2_BUF_FLAG_TIMESTAMP_UNKNOWN,
+		 EPROTO, "CLOCK_MONOTONIC"},
+		{offsetof(struct driver, buffer_flags), V4L2_BUF_FLAG_TIMESTAMP_COPY,
+		 EPROTO, "CLOCK_MONOTONIC"},
+		{offsetof(struct driver, count), 3, EPROTO, "has 3 buffers"},
+		{offsetof(struct driver, length), 255, EPROTO,
+		 "buffers of 255 bytes for pictures of 256"},
+		{offsetof(struct driver, reqbufs_error), EBUSY, EBUSY, "another program"},
+		{offsetof(struct driver, reqbufs_error), ENOMEM, ENOMEM, "no memory"},
+		{offsetof(struct driver, querybuf_error), EINVAL, EINVAL, "buffer 0"},
+		{offsetof(struct driver, map_error), EAGAIN, EAGAIN, "cannot be mapped"},
+		{offsetof(struct driver, qbuf_error), EINVAL, EIO, "takes a buffer"},
+		{offsetof(struct driver, streamon_error), ENOSPC, ENOSPC, "lower size"},
+		{offsetof(struct driver, streamon_error), EIO, EIO, "does not begin"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		int rc;
+
+		driver_reset();
+		memcpy((char *)&driver + cases[i].error, &cases[i].value, sizeof(int));
+		rc = start(INCISE_PIXELS_YUYV, 0);
+		if (rc != -cases[i].code || !strstr(err.text, cases[i].says))
+			fail_msg("case %zu: %d, \"%s\"", i, rc, err.text);
+		end();
+	}
+}
+
+static void more_buffers_than_asked_for_are_not_overrun(void **state)
+{
+	driver_reset();
+	driver.count = 33;
+	assert_int_equal(start(INCISE_PIXELS_YUYV, 0), 0);
+	assert_int_equal(stream.n, 32);
+	end();
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(pictures_come_in_order_with_their_stamps),
+		cmocka_unit_test(what_is_held_is_not_written_to),
+		cmocka_unit_test(four_buffers_suffice),
+		cmocka_unit_test(all_that_is_lost_is_counted),
+		cmocka_unit_test(damage_that_a_driver_does_not_count),
+		cmocka_unit_test(stamps_that_cannot_be_are_damage),
+		cmocka_unit_test(the_middle_of_the_exposure_is_told),
+		cmocka_unit_test(a_jpeg_is_whole_from_first_to_last_marker),
+		cmocka_unit_test(every_end_has_its_cause),
+		cmocka_unit_test(one_error_ends_nothing),
+		cmocka_unit_test(slow_cameras_may_be_silent_longer),
+		cmocka_unit_test(why_it_cannot_begin_is_said),
+		cmocka_unit_test(more_buffers_than_asked_for_are_not_overrun),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
