@@ -191,7 +191,7 @@ static int set_up(struct v4l2_camera *c, const struct incise_backend_request *as
 {
 	static const struct incise_camera_setup plain = {.pixels = INCISE_PIXELS_YUYV};
 	const struct incise_camera_setup *setup = asked->camera ? asked->camera : &plain;
-	enum v4l2_priority priority = V4L2_PRIORITY_RECORD;
+	uint32_t priority = V4L2_PRIORITY_RECORD;
 	struct v4l2_shape shape;
 	bool real_time;
 	int rc = open_file(c, asked->arguments, err);
@@ -199,7 +199,7 @@ static int set_up(struct v4l2_camera *c, const struct incise_backend_request *as
 	if (rc)
 		return rc;
 	/* Other programs cannot set it then. Not every driver has that. */
-	v4l2_ask(c->fd, VIDIOC_S_PRIORITY, (void *)(uintptr_t)priority);
+	v4l2_ask(c->fd, VIDIOC_S_PRIORITY, &priority);
 	rc = v4l2_format_set(c->fd, setup, c->where, &shape, err);
 	if (rc)
 		return rc;
