@@ -2,7 +2,7 @@
 /*
  * A camera's pictures; see v4l2_stream.h. What the driver says of one is believed only as far
  * as it can be: an index of a buffer that it has, a size within it, a stamp that rises and is
- * not of the future, a count that rises.
+ * near now, a count that rises.
  */
 #include <errno.h>
 #include <poll.h>
@@ -23,8 +23,12 @@
 #define SILENT_NS 5000000000LL /* without any picture; or so many periods: */
 #define SILENT_PERIODS 20
 #define STALE_NS 10000000000LL /* age of a picture that is not believed */
-#define FUTURE_NS 1000000      /* a stamp's rounding, and a clock read before it */
-#define JUMP_MOST 1000	       /* step of the count that a damaged picture may make */
+/*
+ * A driver may reckon a stamp: from the camera's own clock (UVC), or for the end of a picture
+ * that it hands out before (vivid). Another clock is off by more.
+ */
+#define FUTURE_NS 300000000
+#define JUMP_MOST 1000 /* step of the count that a damaged picture may make */
 
 static int64_t clock_ns(void)
 {
