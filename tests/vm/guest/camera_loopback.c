@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/v4l2 held against what was really shot: this program feeds v4l2loopback and
+ * takes the pictures back through the camera. Prints "ok …" and "not ok …".
+ *
+ *   feed ─▶ /dev/video9 ─▶ v4l2_camera ─▶ the same bytes, stamp and number
+ *
+ * v4l2loopback writes to a buffer whether somebody holds it or not, so at most seven pictures
+ * are shot between two that are read.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <sched.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <time.h>
+#include <unistd.h>
+#include <linux/videodev2.h>
+#include "../../../lib/device/thread.h"
+#include "../../../lib/device/v4l2/v4l2_camera.h"
+#include "../tap.h"
+
+#define WIDTH 320
+#define HEIGHT 240
+#define SIZE (WIDTH * HEIGHT * 2)
+#define BUFFERS 8
+#define PATIENCE_NS 5000000000LL
+
+static const char *path;
+
+struct feeder {
+	int fd;
+	uint8_t *buffer[BUFFERS];
+	int n;	      /* pictures shot */
+	int64_t t_ns; /* stamp of the last one */
+};
+
+static int64_t now_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * 1000000000LL + now.tv_nsec;
+}
+
+/* Every byte of every picture is another one. */
+static uint8_t pixel(int picture, size_t at)
+{
+	uint32_t mixed = (uint32_t)picture * 2654435761u + (uint32_t)at * 40503u;
+
+	return (uint8_t)(mixed >> 24 ^ mixed >> 11);
+}
+
+static bool feeder_open(struct feeder *f)
+{
+	struct v4l2_format format = {.type = V4L2_BUF_TYPE_VIDEO_OUTPUT};
+	struct v4l2_requestbuffers asked = {.count = BUFFERS,
+					    .type = V4L2_BUF_TYPE_VIDEO_OUTPUT,
+					    .memory = V4L2_MEMORY_MMAP};
+	int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+
+	f->n = 0;
+	f->fd = open(path, O_RDWR);
+	format.fmt.pix.width = WIDTH;
+	format.fmt.pix.height = HEIGHT;
+	format.fmt.pix.pixelformat = V4L2_PIX_FMT_YUYV;
+	format.fmt.pix.field = V4L2_FIELD_NONE;
+	if (f->fd < 0 || ioctl(f->fd, VIDIOC_S_FMT, &format) ||
+	    ioctl(f->fd, VIDIOC_REQBUFS, &asked) || asked.count != BUFFERS)
+		return false;
+	for (uint32_t i = 0; i < BUFFERS; i++) {
+		struct v4l2_buffer buffer = {.index = i,
+					     .type = V4L2_BUF_TYPE_VIDEO_OUTPUT,
+					     .memory = V4L2_MEMORY_MMAP};
+
+		if (ioctl(f->fd, VIDIOC_QUERYBUF, &buffer))
+			return false;
+		f->buffer[i] = mmap(NULL, buffer.length, PROT_READ | PROT_WRITE,
+				    MAP_SHARED, f->fd, buffer.m.offset);
+		if (f->buffer[i] == MAP_FAILED)
+			return false;
+	}
+	return !ioctl(f->fd, VIDIOC_STREAMON, &type);
+}
+
+/* @stamp_ns: 0: the kernel's */
+static bool feeder_shoot(struct feeder *f, int64_t stamp_ns)
+{
+	struct v4l2_buffer buffer = {.index = (uint32_t)(f->n % BUFFERS),
+				     .type = V4L2_BUF_TYPE_VIDEO_OUTPUT,
+				     .memory = V4L2_MEMORY_MMAP,
+				     .bytesused = SIZE,
+				     .field = V4L2_FIELD_NONE};
+
+	if (f->n >= BUFFERS && ioctl(f->fd, VIDIOC_DQBUF, &buffer))
+		return false;
+	for (size_t i = 0; i < SIZE; i++)
+		f->buffer[buffer.index][i] = pixel(f->n, i);
+	buffer.bytesused = SIZE;
+	buffer.timestamp.tv_sec = stamp_ns / 1000000000;
+	buffer.timestamp.tv_usec = stamp_ns % 1000000000 / 1000;
+	if (ioctl(f->fd, VIDIOC_QBUF, &buffer))
+		return false;
+	f->t_ns = buffer.timestamp.tv_sec * 1000000000LL +
+		  buffer.timestamp.tv_usec * 1000LL;
+	f->n++;
+	return true;
+}
+
+static void feeder_close(struct feeder *f)
+{
+	int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+
+	ioctl(f->fd, VIDIOC_STREAMOFF, &type);
+	for (int i = 0; i < BUFFERS; i++)
+		munmap(f->buffer[i], SIZE);
+	close(f->fd);
+}
+
+static struct incise_camera *open_camera(void)
+{
+	static const struct incise_camera_setup setup = {.pixels = INCISE_PIXELS_YUYV};
+	const struct incise_backend_request request = {
+		.arguments = path, .where = "rig.conf:1: camera", .camera = &setup};
+	struct incise_error err = {0};
+	struct incise_camera *camera = v4l2_camera_open(&request, &err);
+
+	if (!camera)
+		note("%s", err.text);
+	return camera;
+}
+
+/* Read until picture @seq is there. */
+static int await(struct incise_camera *camera, struct incise_camera_frame *frame,
+		 uint64_t seq)
+{
+	const struct timespec nap = {.tv_nsec = 200000};
+	int64_t end = now_ns() + PATIENCE_NS;
+	int rc = 0;
+
+	while (rc >= 0 && now_ns() < end) {
+		rc = incise_camera_read(camera, frame);
+		if (rc == 1 && frame->seq >= seq)
+			return 1;
+		nanosleep(&nap, NULL);
+	}
+	return rc;
+}
+
+/* Until the thread has taken them all: the newest replaces those before. */
+static void settle(const struct incise_camera *camera, uint64_t lost)
+{
+	const struct timespec nap = {.tv_nsec = 200000};
+	int64_t end = now_ns() + PATIENCE_NS;
+
+	while (incise_camera_lost(camera) < lost && now_ns() < end)
+		nanosleep(&nap, NULL);
+}
+
+static bool same(const struct incise_camera_frame *frame, int picture)
+{
+	if (frame->size != SIZE || frame->width != WIDTH || frame->stride != WIDTH * 2)
+		return false;
+	for (size_t i = 0; i < SIZE; i++)
+		if (frame->data[i] != pixel(picture, i))
+			return false;
+	return true;
+}
+
+static void a_hundred(struct feeder *f, struct incise_camera *camera)
+{
+	struct incise_camera_frame frame = {0};
+	int bytes = 0, stamps = 0, numbers = 0;
+
+	for (int i = 0; i < 100; i++) {
+		if (!feeder_shoot(f, 0) || await(camera, &frame, (uint64_t)i) != 1)
+			break;
+		bytes += same(&frame, i);
+		stamps += frame.t_ns == f->t_ns;
+		numbers += frame.seq == (uint64_t)i;
+	}
+	check(numbers == 100, "%d of 100 pictures, in order", numbers);
+	check(bytes == 100, "%d of 100 are the same byte by byte", bytes);
+	check(stamps == 100, "%d of 100 have the stamp of the shot", stamps);
+	check(incise_camera_lost(camera) == 0, "none is lost");
+}
+
+/* Pictures that nobody reads are passed over by newer ones. */
+static void not_read(struct feeder *f, struct incise_camera *camera)
+{
+	struct incise_camera_frame frame = {0};
+	uint64_t before = incise_camera_lost(camera);
+	int exact = 0;
+
+	for (int i = 0; i < 20; i++) {
+		bool shot = true;
+
+		for (int k = 0; k < 5; k++)
+			shot = shot && feeder_shoot(f, 0);
+		settle(camera, before + 4 * (uint64_t)(i + 1));
+		if (!shot || await(camera, &frame, (uint64_t)f->n - 1) != 1)
+			break;
+		exact += frame.seq == (uint64_t)f->n - 1 && same(&frame, f->n - 1) &&
+			 frame.t_ns == f->t_ns;
+	}
+	check(exact == 20, "%d of 20 times the newest of five is read", exact);
+	check(incise_camera_lost(camera) - before == 80, "%llu of 80 not read are lost",
+	      (unsigned long long)(incise_camera_lost(camera) - before));
+}
+
+/* Shot faster than the thread may run: v4l2loopback goes on with the newest one. */
+static void dropped(struct feeder *f, struct incise_camera *camera)
+{
+	struct sched_param fast = {.sched_priority = INCISE_THREAD_PRIORITY + 1};
+	struct sched_param usual = {0};
+	struct incise_camera_frame frame = {0};
+	uint64_t before = incise_camera_lost(camera);
+	bool shot = true;
+
+	if (!check(!sched_setscheduler(0, SCHED_FIFO, &fast), "it can be outrun"))
+		return;
+	for (int i = 0; i < BUFFERS + 5; i++)
+		shot = shot && feeder_shoot(f, 0);
+	sched_setscheduler(0, SCHED_OTHER, &usual);
+	check(shot && await(camera, &frame, (uint64_t)f->n - 1) == 1 &&
+		      frame.seq == (uint64_t)f->n - 1 && same(&frame, f->n - 1),
+	      "outrun, the newest comes");
+	check(incise_camera_lost(camera) - before == BUFFERS + 4,
+	      "%llu of %d dropped by the driver are lost",
+	      (unsigned long long)(incise_camera_lost(camera) - before), BUFFERS + 4);
+}
+
+static void another_clock(struct feeder *f, struct incise_camera *camera)
+{
+	struct incise_camera_frame frame = {0};
+	char text[500];
+
+	check(feeder_shoot(f, now_ns()) && await(camera, &frame, (uint64_t)f->n) == -EIO,
+	      "a picture with a stamp of the feeder's own ends it");
+	incise_camera_cause(camera, text, sizeof(text));
+	check(strstr(text, "CLOCK_MONOTONIC"), "the cause: %s", text);
+}
+
+int main(int argc, char **argv)
+{
+	struct incise_camera *camera;
+	struct feeder f;
+	cpu_set_t first;
+
+	if (argc != 2)
+		return 2;
+	path = argv[1];
+	/* On one processor this program can outrun the camera's thread. */
+	CPU_ZERO(&first);
+	CPU_SET(0, &first);
+	sched_setaffinity(0, sizeof(first), &first);
+	if (!check(feeder_open(&f), "the feeder begins"))
+		return 1;
+	camera = open_camera();
+	if (check(camera, "the camera opens")) {
+		a_hundred(&f, camera);
+		not_read(&f, camera);
+		dropped(&f, camera);
+		another_clock(&f, camera);
+		camera->ops->close(camera);
+	}
+	feeder_close(&f);
+	return tap_failures ? 1 : 0;
+}
