@@ -42,6 +42,15 @@ static uint32_t offered(int fd, uint32_t i)
 		       : 0;
 }
 
+static bool is_known(uint32_t fourcc)
+{
+	size_t k = 0;
+
+	while (k < KNOWN && known[k].fourcc != fourcc)
+		k++;
+	return k < KNOWN;
+}
+
 void v4l2_format_list(int fd, char *text, size_t size)
 {
 	size_t length = 0;
@@ -49,10 +58,13 @@ void v4l2_format_list(int fd, char *text, size_t size)
 	uint32_t fourcc;
 
 	*text = '\0';
-	for (uint32_t i = 0; (fourcc = offered(fd, i)) && length + 6 < size; i++)
-		length += (size_t)snprintf(text + length, size - length, "%s%s",
-					   length ? " " : "",
-					   v4l2_letters(fourcc, letters));
+	/* Those that can be taken come first. */
+	for (int other = 0; other < 2; other++)
+		for (uint32_t i = 0; (fourcc = offered(fd, i)) && length + 6 < size; i++)
+			if (is_known(fourcc) != other)
+				length += (size_t)snprintf(text + length, size - length,
+							   "%s%s", length ? " " : "",
+							   v4l2_letters(fourcc, letters));
 }
 
 /* Index into known; KNOWN: it has none of that kind. */

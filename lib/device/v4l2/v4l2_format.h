@@ -29,7 +29,7 @@ struct v4l2_shape {
 int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char *where,
 		    struct v4l2_shape *shape, struct incise_error *err);
 
-/* "YUYV MJPG": the formats that a driver offers, as far as they fit. */
+/* "YUYV MJPG UYVY": the formats that a driver offers, as far as they fit; ours first. */
 void v4l2_format_list(int fd, char *text, size_t size);
 
 #endif

@@ -225,7 +225,13 @@ static int64_t stamp_of(const struct v4l2_stream *s, const struct v4l2_buffer *b
 	return t > s->stamp_ns && t <= now + FUTURE_NS && t >= now - STALE_NS ? t : -1;
 }
 
-/* A picture is stamped when its exposure begins, or when its last pixel is there. */
+/*
+ * A picture is stamped when its exposure begins, or when its last pixel is there:
+ *
+ *     SOE                        EOF
+ *      ├─ exposure ─┼─ readout ───┤      The readout is not known here: what it makes the
+ *           middle                       second kind late, a measured delay takes off.
+ */
 static int64_t to_middle(const struct v4l2_stream *s, const struct v4l2_buffer *buffer)
 {
 	bool begin = (buffer->flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) ==

@@ -458,6 +458,70 @@ static void why_it_cannot_begin_is_said(void **state)
 	}
 }
 
+/* A number that depends on nothing but how often it was asked for. */
+static uint32_t draw(uint32_t below)
+{
+	static uint64_t state = 7;
+
+	state = state * 6364136223846793005u + 1442695040888963407u;
+	return (uint32_t)(state >> 33) % below;
+}
+
+static void a_driver_that_lies_at_random_does_no_harm(void **state)
+{
+	struct incise_camera_frame frame;
+	unsigned int pictures = 0, ends = 0;
+
+	for (int run = 0; run < 300; run++) {
+		enum incise_pixels pixels =
+			run % 3 ? INCISE_PIXELS_YUYV : INCISE_PIXELS_MJPEG;
+		uint64_t taken = 0;
+		uint32_t sequence = draw(UINT32_MAX);
+		int rc = 0;
+
+		driver_reset();
+		assert_int_equal(start(pixels, draw(20000000)), 0);
+		for (int i = 0; i < 100 && rc >= 0; i++) {
+			struct driver_picture *shot =
+				driver_shoot(sequence += 1 + !draw(9));
+
+			if (!draw(10))
+				shot->bytesused = draw(5) ? draw(300) : draw(UINT32_MAX);
+			if (!draw(10))
+				shot->flags |= V4L2_BUF_FLAG_ERROR;
+			if (!draw(300))
+				shot->index = draw(UINT32_MAX);
+			if (!draw(300))
+				shot->sequence = draw(UINT32_MAX);
+			if (!draw(20))
+				shot->t_ns +=
+					(int64_t)draw(UINT32_MAX) * 1000 - 2000000000000;
+			if (!draw(300))
+				shot->flags = draw(UINT32_MAX);
+			memset(driver.memory, (int)draw(256), DRIVER_BYTES);
+			memcpy(driver.memory, "\xff\xd8\xff\xd9", 4);
+			rc = step();
+			if (rc < 0 || v4l2_stream_read(&stream, &frame) != 1)
+				continue;
+			/* All there were are either taken or lost. */
+			taken++;
+			assert_true(frame.seq + 1 == taken + atomic_load(&stream.lost));
+			assert_true((const uint8_t *)frame.data >= driver.memory &&
+				    frame.data + frame.size <=
+					    driver.memory +
+						    DRIVER_BUFFERS * DRIVER_BYTES &&
+				    frame.size >= stream.shape.least &&
+				    frame.size <= DRIVER_BYTES);
+		}
+		pictures += (unsigned int)taken;
+		ends += rc < 0;
+		end();
+	}
+	/* Both happen, or nothing was tried: at these odds most runs are not ended. */
+	assert_in_range(pictures, 5000, 30000);
+	assert_in_range(ends, 30, 270);
+}
+
 static void more_buffers_than_asked_for_are_not_overrun(void **state)
 {
 	driver_reset();
@@ -482,6 +546,7 @@ int main(void)
 		cmocka_unit_test(one_error_ends_nothing),
 		cmocka_unit_test(slow_cameras_may_be_silent_longer),
 		cmocka_unit_test(why_it_cannot_begin_is_said),
+		cmocka_unit_test(a_driver_that_lies_at_random_does_no_harm),
 		cmocka_unit_test(more_buffers_than_asked_for_are_not_overrun),
 	};
 
