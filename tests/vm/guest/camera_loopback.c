@@ -3,7 +3,7 @@
  * lib/device/v4l2 held against what was really shot: this program feeds v4l2loopback and
  * takes the pictures back through the camera. Prints "ok …" and "not ok …".
  *
- *   feed ─▶ /dev/video9 ─▶ v4l2_camera ─▶ the same bytes, stamp and number
+ *   feed ─▶ /dev/video8 ─▶ v4l2_camera ─▶ the same bytes, stamp and number
  *
  * v4l2loopback writes to a buffer whether somebody holds it or not, so at most seven pictures
  * are shot between two that are read.
@@ -19,6 +19,7 @@
 #include <linux/videodev2.h>
 #include "../../../lib/device/thread.h"
 #include "../../../lib/device/v4l2/v4l2_camera.h"
+#include "../../../lib/sim/sim.h"
 #include "../tap.h"
 
 #define WIDTH 320
@@ -31,7 +32,10 @@ static const char *path;
 
 struct feeder {
 	int fd;
+	uint32_t fourcc, width, height;
+	size_t size;
 	uint8_t *buffer[BUFFERS];
+	size_t length;
 	int n;	      /* pictures shot */
 	int64_t t_ns; /* stamp of the last one */
 };
@@ -62,9 +66,9 @@ static bool feeder_open(struct feeder *f)
 
 	f->n = 0;
 	f->fd = open(path, O_RDWR);
-	format.fmt.pix.width = WIDTH;
-	format.fmt.pix.height = HEIGHT;
-	format.fmt.pix.pixelformat = V4L2_PIX_FMT_YUYV;
+	format.fmt.pix.width = f->width;
+	format.fmt.pix.height = f->height;
+	format.fmt.pix.pixelformat = f->fourcc;
 	format.fmt.pix.field = V4L2_FIELD_NONE;
 	if (f->fd < 0 || ioctl(f->fd, VIDIOC_S_FMT, &format) ||
 	    ioctl(f->fd, VIDIOC_REQBUFS, &asked) || asked.count != BUFFERS)
@@ -74,8 +78,9 @@ static bool feeder_open(struct feeder *f)
 					     .type = V4L2_BUF_TYPE_VIDEO_OUTPUT,
 					     .memory = V4L2_MEMORY_MMAP};
 
-		if (ioctl(f->fd, VIDIOC_QUERYBUF, &buffer))
+		if (ioctl(f->fd, VIDIOC_QUERYBUF, &buffer) || buffer.length < f->size)
 			return false;
+		f->length = buffer.length;
 		f->buffer[i] = mmap(NULL, buffer.length, PROT_READ | PROT_WRITE,
 				    MAP_SHARED, f->fd, buffer.m.offset);
 		if (f->buffer[i] == MAP_FAILED)
@@ -84,20 +89,19 @@ static bool feeder_open(struct feeder *f)
 	return !ioctl(f->fd, VIDIOC_STREAMON, &type);
 }
 
-/* @stamp_ns: 0: the kernel's */
-static bool feeder_shoot(struct feeder *f, int64_t stamp_ns)
+/* @picture: NULL: one of pixel(). @stamp_ns: 0: the kernel's. */
+static bool feeder_shoot(struct feeder *f, const uint8_t *picture, int64_t stamp_ns)
 {
 	struct v4l2_buffer buffer = {.index = (uint32_t)(f->n % BUFFERS),
 				     .type = V4L2_BUF_TYPE_VIDEO_OUTPUT,
 				     .memory = V4L2_MEMORY_MMAP,
-				     .bytesused = SIZE,
 				     .field = V4L2_FIELD_NONE};
 
 	if (f->n >= BUFFERS && ioctl(f->fd, VIDIOC_DQBUF, &buffer))
 		return false;
-	for (size_t i = 0; i < SIZE; i++)
-		f->buffer[buffer.index][i] = pixel(f->n, i);
-	buffer.bytesused = SIZE;
+	for (size_t i = 0; i < f->size; i++)
+		f->buffer[buffer.index][i] = picture ? picture[i] : pixel(f->n, i);
+	buffer.bytesused = (uint32_t)f->size;
 	buffer.timestamp.tv_sec = stamp_ns / 1000000000;
 	buffer.timestamp.tv_usec = stamp_ns % 1000000000 / 1000;
 	if (ioctl(f->fd, VIDIOC_QBUF, &buffer))
@@ -114,13 +118,13 @@ static void feeder_close(struct feeder *f)
 
 	ioctl(f->fd, VIDIOC_STREAMOFF, &type);
 	for (int i = 0; i < BUFFERS; i++)
-		munmap(f->buffer[i], SIZE);
+		munmap(f->buffer[i], f->length);
 	close(f->fd);
 }
 
-static struct incise_camera *open_camera(void)
+static struct incise_camera *open_camera(enum incise_pixels pixels)
 {
-	static const struct incise_camera_setup setup = {.pixels = INCISE_PIXELS_YUYV};
+	const struct incise_camera_setup setup = {.pixels = pixels};
 	const struct incise_backend_request request = {
 		.arguments = path, .where = "rig.conf:1: camera", .camera = &setup};
 	struct incise_error err = {0};
@@ -174,7 +178,7 @@ static void a_hundred(struct feeder *f, struct incise_camera *camera)
 	int bytes = 0, stamps = 0, numbers = 0;
 
 	for (int i = 0; i < 100; i++) {
-		if (!feeder_shoot(f, 0) || await(camera, &frame, (uint64_t)i) != 1)
+		if (!feeder_shoot(f, NULL, 0) || await(camera, &frame, (uint64_t)i) != 1)
 			break;
 		bytes += same(&frame, i);
 		stamps += frame.t_ns == f->t_ns;
@@ -197,7 +201,7 @@ static void not_read(struct feeder *f, struct incise_camera *camera)
 		bool shot = true;
 
 		for (int k = 0; k < 5; k++)
-			shot = shot && feeder_shoot(f, 0);
+			shot = shot && feeder_shoot(f, NULL, 0);
 		settle(camera, before + 4 * (uint64_t)(i + 1));
 		if (!shot || await(camera, &frame, (uint64_t)f->n - 1) != 1)
 			break;
@@ -221,7 +225,7 @@ static void dropped(struct feeder *f, struct incise_camera *camera)
 	if (!check(!sched_setscheduler(0, SCHED_FIFO, &fast), "it can be outrun"))
 		return;
 	for (int i = 0; i < BUFFERS + 5; i++)
-		shot = shot && feeder_shoot(f, 0);
+		shot = shot && feeder_shoot(f, NULL, 0);
 	sched_setscheduler(0, SCHED_OTHER, &usual);
 	check(shot && await(camera, &frame, (uint64_t)f->n - 1) == 1 &&
 		      frame.seq == (uint64_t)f->n - 1 && same(&frame, f->n - 1),
@@ -236,19 +240,62 @@ static void another_clock(struct feeder *f, struct incise_camera *camera)
 	struct incise_camera_frame frame = {0};
 	char text[500];
 
-	check(feeder_shoot(f, now_ns()) && await(camera, &frame, (uint64_t)f->n) == -EIO,
+	check(feeder_shoot(f, NULL, now_ns()) &&
+		      await(camera, &frame, (uint64_t)f->n) == -EIO,
 	      "a picture with a stamp of the feeder's own ends it");
 	incise_camera_cause(camera, text, sizeof(text));
 	check(strstr(text, "CLOCK_MONOTONIC"), "the cause: %s", text);
 }
 
+/* What the virtual rig's camera sees, through the kernel and back. */
+static void virtual_rig(void)
+{
+	struct feeder f = {.width = 640,
+			   .height = 480,
+			   .fourcc = V4L2_PIX_FMT_RGB24,
+			   .size = 640 * 480 * 3};
+	struct incise_clock *clock = incise_clock_new_simulated(0);
+	struct incise_camera_frame shot, frame = {0};
+	struct incise_camera *eye, *camera = NULL;
+	struct incise_sim_config config;
+	struct incise_sim *sim;
+	int exact = 0;
+
+	incise_sim_config_init(&config);
+	sim = incise_sim_new(&config, clock, NULL);
+	eye = incise_sim_camera_new(sim);
+	if (check(feeder_open(&f), "the feeder begins in RGB"))
+		camera = open_camera(INCISE_PIXELS_RGB);
+	/* Two seconds, in which the first cut begins; 100 pictures. */
+	for (int64_t t = 0; camera && t < 2000; t += 20) {
+		incise_clock_wait_until(clock, t * 1000000);
+		if (incise_camera_read(eye, &shot) != 1 ||
+		    !feeder_shoot(&f, shot.data, 0) ||
+		    await(camera, &frame, shot.seq) != 1)
+			break;
+		exact += frame.seq == shot.seq && frame.t_ns == f.t_ns &&
+			 frame.size == shot.size && frame.stride == shot.stride &&
+			 !memcmp(frame.data, shot.data, shot.size);
+	}
+	check(exact == 100, "%d of 100 pictures of the virtual rig come exactly", exact);
+	if (camera)
+		camera->ops->close(camera);
+	feeder_close(&f);
+	eye->ops->close(eye);
+	incise_sim_free(sim);
+	incise_clock_free(clock);
+}
+
 int main(int argc, char **argv)
 {
 	struct incise_camera *camera;
-	struct feeder f;
+	struct feeder f = {.width = WIDTH,
+			   .height = HEIGHT,
+			   .fourcc = V4L2_PIX_FMT_YUYV,
+			   .size = SIZE};
 	cpu_set_t first;
 
-	if (argc != 2)
+	if (argc != 3)
 		return 2;
 	path = argv[1];
 	/* On one processor this program can outrun the camera's thread. */
@@ -257,7 +304,7 @@ int main(int argc, char **argv)
 	sched_setaffinity(0, sizeof(first), &first);
 	if (!check(feeder_open(&f), "the feeder begins"))
 		return 1;
-	camera = open_camera();
+	camera = open_camera(INCISE_PIXELS_YUYV);
 	if (check(camera, "the camera opens")) {
 		a_hundred(&f, camera);
 		not_read(&f, camera);
@@ -266,5 +313,8 @@ int main(int argc, char **argv)
 		camera->ops->close(camera);
 	}
 	feeder_close(&f);
+	/* On a device that has had no picture yet. */
+	path = argv[2];
+	virtual_rig();
 	return tap_failures ? 1 : 0;
 }
