@@ -356,8 +356,11 @@ static int no_picture(struct v4l2_stream *s, int rc, short events,
 
 	if (rc == -ENODEV)
 		return gone(s, err);
-	if (rc == -EAGAIN && !(events & (POLLERR | POLLHUP | POLLNVAL)))
+	if (rc == -EAGAIN && !(events & (POLLERR | POLLHUP | POLLNVAL))) {
+		/* Ready, and then not: a driver that goes on so must not take all time. */
+		poll(NULL, 0, 1);
 		return check_silence(s, err);
+	}
 	if (rc != -EAGAIN && rc != -EIO)
 		s->errors = ERRORS_MOST;
 	/* It says so at once as long as it lasts. */

@@ -345,6 +345,11 @@ static void damage_all(void)
 		driver_shoot(i)->flags |= V4L2_BUF_FLAG_ERROR;
 }
 
+static void be_ready_and_not(void)
+{
+	driver.dqbuf_error = EAGAIN;
+}
+
 static void fall_silent(void)
 {
 }
@@ -369,6 +374,7 @@ static void every_end_has_its_cause(void **state)
 		{refuse_buffers, EIO, "takes a buffer no more"},
 		{unplug_at_queueing, ENODEV, "unplugged"},
 		{damage_all, EIO, "last 30 pictures"},
+		{be_ready_and_not, EIO, "no picture came from the camera for 5 s"},
 		{fall_silent, EIO, "no picture came from the camera for 5 s"},
 	};
 	struct incise_camera_frame frame;
@@ -380,8 +386,8 @@ static void every_end_has_its_cause(void **state)
 		driver_shoot(0);
 		assert_int_equal(step(), 1);
 		cases[i].make();
-		/* 5 s in steps of 100 ms, and some. */
-		while (rc >= 0 && steps++ < 60)
+		/* 5 s in steps of 1 ms at least, and some. */
+		while (rc >= 0 && steps++ < 6000)
 			rc = step();
 		if (rc != -cases[i].code || err.code != cases[i].code ||
 		    !strstr(err.text, cases[i].says) ||

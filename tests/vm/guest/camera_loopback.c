@@ -298,6 +298,8 @@ int main(int argc, char **argv)
 	if (argc != 3)
 		return 2;
 	path = argv[1];
+	/* Virtual time goes on while a page is read from the host. */
+	mlockall(MCL_CURRENT | MCL_FUTURE);
 	/* On one processor this program can outrun the camera's thread. */
 	CPU_ZERO(&first);
 	CPU_SET(0, &first);

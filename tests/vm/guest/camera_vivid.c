@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <sys/mman.h>
 #include <time.h>
 #include <unistd.h>
 #include <incise/scan.h>
@@ -358,6 +359,8 @@ int main(int argc, char **argv)
 	if (argc != 2)
 		return 2;
 	path = argv[1];
+	/* Virtual time goes on while a page is read from the host. */
+	mlockall(MCL_CURRENT | MCL_FUTURE);
 	profile = getenv("INCISE_VM_PROFILE");
 	on_time = profile && !strcmp(profile, "deterministic");
 	scan();
