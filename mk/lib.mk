@@ -41,8 +41,11 @@ $(foreach lib,$(libraries),$(eval $(call library,$(lib))))
 # bring a library into the process that others do not need. What of libincise they use and
 # it does not export, they hold themselves.
 has_libmnl := $(shell $(PKG_CONFIG) --exists libmnl && echo yes)
+has_libiio := $(shell $(PKG_CONFIG) --exists 'libiio < 1' && echo yes)
+has_comedilib := $(shell $(PKG_CONFIG) --exists comedilib && echo yes)
 device_modules := $(if $(shell $(PKG_CONFIG) --exists libgpiod && echo yes),stepper_gpio) \
-	$(if $(has_libmnl),stepper_can) stepper_slcan
+	$(if $(has_libmnl),stepper_can) stepper_slcan \
+	$(if $(has_libiio),force_iio) $(if $(has_comedilib),force_comedi)
 pc_stepper_gpio := libgpiod
 objects_stepper_gpio := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o thread.o gpio/pulser.o \
 	gpio/stepper_gpio.o \
@@ -67,6 +70,16 @@ objects_stepper_slcan := $(can_core) \
 device_modules += camera_v4l2
 objects_camera_v4l2 := $(O)/obj/lib/device/thread.o \
 	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c))
+# Force samples from two kinds of converters; what is not of one is of both.
+daq_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o device/daq/daq_feed.o \
+	device/daq/daq_scan.o)
+daq_iio := $(wildcard lib/device/daq/iio_*.c)
+daq_comedi := $(wildcard lib/device/daq/comedi_*.c)
+pc_force_iio := libiio
+objects_force_iio := $(daq_core) $(patsubst %.c,$(O)/obj/%.o,$(daq_iio) lib/device/daq/force_iio.c)
+pc_force_comedi := comedilib
+objects_force_comedi := $(daq_core) \
+	$(patsubst %.c,$(O)/obj/%.o,$(daq_comedi) lib/device/daq/force_comedi.c)
 
 define device_module
 $(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
@@ -84,7 +97,10 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(filter-out %/camera_v4l2.c,\
 		$(wildcard lib/device/v4l2/*.c))) \
 	$(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(can_modules) \
-		$(if $(has_libmnl),,%/socketcan.c %/can_netlink.c),$(wildcard lib/device/can/*.c)))
+		$(if $(has_libmnl),,%/socketcan.c %/can_netlink.c),$(wildcard lib/device/can/*.c))) \
+	$(addprefix $(O)/obj/lib/device/daq/,daq_feed.o daq_scan.o) \
+	$(patsubst %.c,$(O)/obj/%.o,$(if $(has_libiio),$(daq_iio)) \
+		$(if $(has_comedilib),$(daq_comedi)))
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
@@ -92,6 +108,8 @@ $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $
 	$(AR) qcs $@ $^
 
 all_libs = $(if $(has_libmnl),$(shell $(PKG_CONFIG) --libs libmnl)) \
+	$(if $(has_libiio),$(shell $(PKG_CONFIG) --libs libiio)) \
+	$(if $(has_comedilib),$(shell $(PKG_CONFIG) --libs comedilib)) \
 	$(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
 
 .PHONY: libs

@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The way of force samples from a card's thread to whoever reads them, and the account of
+ * what was lost on it; the same for every kind of card.
+ *
+ *   device ─▶ kernel's buffer ─▶ thread of the card ─▶ ring ─▶ incise_force_read()
+ *                   │ full                              │ full
+ *                   ╰───────── seq goes on: a gap ──────╯  counted in lost, overflows
+ */
+#ifndef INCISE_DAQ_FEED_H
+#define INCISE_DAQ_FEED_H
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <incise/backend.h>
+#include "../../base/ring.h"
+
+/* For how long of nobody reading there is room, s. */
+#define DAQ_FEED_ROOM_S 4
+
+struct daq_feed {
+	struct incise_force force;     /* first: what the caller holds */
+	struct incise_force_info info; /* what stays as it was at opening */
+	struct incise_ring ring;
+	_Atomic uint64_t clipped, lost, overflows;
+	atomic_int error; /* 0, or -errno once the card is gone */
+	/* The thread's. */
+	uint64_t seq; /* of the next sample */
+	bool full;    /* the last sample found no room */
+	pthread_t thread;
+	bool runs, real_time;
+	int stop; /* eventfd; readable: the thread is to end */
+};
+
+/* What rig.conf asks for, or what is usual. 0 or -EINVAL. */
+int daq_feed_setup(const struct incise_backend_request *request,
+		   struct incise_force_setup *setup, struct incise_error *err);
+
+/* @feed->info is set. 0 or -ENOMEM, -EMFILE …; then daq_feed_free() is due all the same. */
+int daq_feed_init(struct daq_feed *feed);
+void daq_feed_free(struct daq_feed *feed);
+
+/* Start the thread; it gets @feed's card. 0 or -errno. */
+int daq_feed_start(struct daq_feed *feed, void *(*run)(void *), void *card);
+/* Ends it, within what run() does between two daq_feed_wait(). */
+void daq_feed_stop(struct daq_feed *feed);
+
+/* The thread's. */
+
+enum daq_wait { DAQ_STOP, DAQ_READY, DAQ_QUIET };
+
+/* Until @fd has data, it is to stop, or @ms are over. */
+enum daq_wait daq_feed_wait(struct daq_feed *feed, int fd, int ms);
+void daq_feed_put(struct daq_feed *feed, int64_t t_ns, int32_t code);
+/* @n samples are missing before the next; counted as one overflow. 0: none. */
+void daq_feed_lose(struct daq_feed *feed, uint64_t n);
+/* The last word: -ENODEV, -EIO; readers are told once they have read all. */
+void daq_feed_end(struct daq_feed *feed, int error);
+
+/* struct incise_force_ops */
+int daq_feed_read(struct incise_force *force, struct incise_force_sample *samples, int n);
+void daq_feed_info(const struct incise_force *force, struct incise_force_info *info);
+uint64_t daq_feed_lost(const struct incise_force *force);
+
+#endif

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A force channel on an A/D converter of Linux IIO; see iio_force.h.
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "iio_force.h"
+#include "iio_source.h"
+#include "iio_spacing.h"
+#include "iio_trigger.h"
+
+#define BLOCKS_PER_S 200
+#define BLOCKS 100   /* that the kernel has room for: half a second */
+#define QUIET_MS 100 /* between looks whether it is still there */
+#define DEAD_NS 3e9  /* of no sample at all, and ten periods */
+#define PERIODS_DEAD 10
+
+struct iio_force {
+	struct daq_feed feed; /* first */
+	struct iio_source source;
+	struct iio_buffer *buffer;
+	struct iio_spacing spacing;
+};
+
+/* Scans that came, of whatever the buffer is said to hold. */
+static void pass_on(struct iio_force *f)
+{
+	const char *end = iio_buffer_end(f->buffer);
+	const char *at = iio_buffer_first(f->buffer, f->source.voltage);
+	const char *stamp = iio_buffer_first(f->buffer, f->source.stamp);
+	ptrdiff_t step = iio_buffer_step(f->buffer);
+
+	if (step <= 0)
+		return;
+	for (; end - at >= (ptrdiff_t)f->source.format.bytes &&
+	       end - stamp >= (ptrdiff_t)f->source.stamp_format.bytes;
+	     at += step, stamp += step)
+		iio_spacing_put(&f->spacing,
+				(int64_t)iio_format_raw(&f->source.stamp_format, stamp),
+				iio_format_code(&f->source.format, at));
+}
+
+/* Waiting does not tell of an unplugged device, reading does. */
+static void *run(void *argument)
+{
+	struct iio_force *f = argument;
+	int fd = iio_buffer_get_poll_fd(f->buffer);
+	int64_t quiet_ms = 0;
+	int64_t dead_ms =
+		(int64_t)((DEAD_NS + PERIODS_DEAD * 1e9 / f->source.rate_hz) / 1e6);
+	ssize_t got = 0;
+
+	while (daq_feed_wait(&f->feed, fd, QUIET_MS) != DAQ_STOP) {
+		got = iio_buffer_refill(f->buffer);
+		if (got > 0) {
+			quiet_ms = 0;
+			pass_on(f);
+		} else if (got == -EAGAIN || got == -EINTR || got == -ETIMEDOUT) {
+			/* Nothing will come behind it within the next periods. */
+			if (quiet_ms > 2 * QUIET_MS)
+				iio_spacing_flush(&f->spacing);
+			quiet_ms += QUIET_MS;
+			if (quiet_ms > dead_ms) {
+				daq_feed_end(&f->feed, -EIO);
+				return NULL;
+			}
+		} else {
+			break;
+		}
+	}
+	iio_spacing_flush(&f->spacing);
+	daq_feed_end(&f->feed, got == -ENODEV ? -ENODEV : got < 0 ? -EIO : 0);
+	return NULL;
+}
+
+static void iio_force_close(struct incise_force *force)
+{
+	struct iio_force *f = (struct iio_force *)force;
+
+	daq_feed_stop(&f->feed);
+	if (f->buffer)
+		iio_buffer_destroy(f->buffer);
+	iio_source_close(&f->source);
+	daq_feed_free(&f->feed);
+	free(f);
+}
+
+static const struct incise_force_ops iio_force_ops = {
+	.read = daq_feed_read,
+	.info = daq_feed_info,
+	.lost = daq_feed_lost,
+	.close = iio_force_close,
+};
+
+/* The kernel wakes the thread once per block, and has room for many. */
+static int make_buffer(struct iio_force *f, struct incise_error *err)
+{
+	struct iio_device *device = f->source.device;
+	unsigned int block = (unsigned int)(f->source.rate_hz / BLOCKS_PER_S);
+	char text[24];
+	int rc;
+
+	block = block ? block : 1;
+	/* libiio leaves the watermark alone; it may be no more than the length. */
+	snprintf(text, sizeof(text), "%u", block * BLOCKS);
+	rc = (int)iio_device_buffer_attr_write(device, "length", text);
+	snprintf(text, sizeof(text), "%u", block);
+	if (rc >= 0)
+		rc = (int)iio_device_buffer_attr_write(device, "watermark", text);
+	/* One without a watermark wakes it more often: that is all. */
+	rc = iio_device_set_kernel_buffers_count(device, BLOCKS);
+	if (rc >= 0)
+		f->buffer = iio_device_create_buffer(device, block, false);
+	if (f->buffer)
+		rc = iio_buffer_set_blocking_mode(f->buffer, false);
+	else if (rc >= 0)
+		rc = -errno;
+	if (rc >= 0)
+		return 0;
+	return incise_error_set(err, -rc,
+				"%s: %s starts no buffer of %u samples: %s; see dmesg",
+				f->source.where, iio_device_get_id(device),
+				block * BLOCKS, strerror(-rc));
+}
+
+static int start(struct iio_force *f, struct incise_error *err)
+{
+	const struct iio_source *s = &f->source;
+	const char *name = iio_device_get_name(s->device);
+	struct incise_force_info *info = &f->feed.info;
+	int rc;
+
+	info->rate_hz = s->rate_hz;
+	info->bits = (int)s->format.bits;
+	info->full_scale_V = s->full_scale_V;
+	info->offset_V = s->offset_V;
+	snprintf(info->name, sizeof(info->name), "%.30s %s%s%.24s",
+		 name ? name : iio_device_get_id(s->device),
+		 iio_channel_get_id(s->voltage), *s->trigger_used ? ", " : "",
+		 s->trigger_used);
+	iio_spacing_init(&f->spacing, &f->feed, s->rate_hz);
+	rc = daq_feed_init(&f->feed);
+	if (rc)
+		return incise_error_set(err, -rc, "%s: no room for samples: %s", s->where,
+					strerror(-rc));
+	rc = make_buffer(f, err);
+	if (rc)
+		return rc;
+	rc = daq_feed_start(&f->feed, run, f);
+	return rc ? incise_error_set(err, -rc, "%s: no thread to read with: %s", s->where,
+				     strerror(-rc))
+		  : 0;
+}
+
+void *iio_force_open(const struct incise_backend_request *request,
+		     struct incise_error *err)
+{
+	struct iio_force *f;
+	int rc;
+
+	if (!*request->arguments) {
+		incise_error_set(err, EINVAL,
+				 "%s: expected iio:NAME, such as iio:iio:device0; see "
+				 "`incise info devices`",
+				 request->where);
+		return NULL;
+	}
+	f = aligned_alloc(_Alignof(struct iio_force), sizeof(*f));
+	if (!f) {
+		incise_error_set(err, ENOMEM, "%s: out of memory", request->where);
+		return NULL;
+	}
+	memset(f, 0, sizeof(*f));
+	f->feed.force.ops = &iio_force_ops;
+	f->feed.stop = -1;
+	f->source.where = request->where;
+	f->source.trigger_folder = IIO_TRIGGER_FOLDER;
+	rc = daq_feed_setup(request, &f->source.setup, err);
+	rc = rc ? rc : iio_source_open(&f->source, request->arguments, err);
+	rc = rc ? rc : start(f, err);
+	f->source.where = NULL; /* the caller's */
+	if (!rc)
+		return &f->feed.force;
+	iio_force_close(&f->feed.force);
+	errno = -rc;
+	return NULL;
+}
