@@ -2,7 +2,8 @@
 # Tests. tests/unit/ROOM/NAME.c tests lib/ROOM/NAME.c, tests/unit/driver what of driver/ builds
 # without a kernel; tests/cli runs the real programs.
 
-unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_netlink.c),\
+unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_netlink.c) \
+	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%),\
 	$(wildcard tests/unit/*/*.c))
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 

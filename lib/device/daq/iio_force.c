@@ -9,6 +9,7 @@
 #include "iio_force.h"
 #include "iio_source.h"
 #include "iio_spacing.h"
+#include "iio_stream.h"
 #include "iio_trigger.h"
 
 #define BLOCKS_PER_S 200
@@ -20,55 +21,33 @@
 struct iio_force {
 	struct daq_feed feed; /* first */
 	struct iio_source source;
-	struct iio_buffer *buffer;
+	struct iio_stream stream;
 	struct iio_spacing spacing;
 };
-
-/* Scans that came, of whatever the buffer is said to hold. */
-static void pass_on(struct iio_force *f)
-{
-	const char *end = iio_buffer_end(f->buffer);
-	const char *at = iio_buffer_first(f->buffer, f->source.voltage);
-	const char *stamp = iio_buffer_first(f->buffer, f->source.stamp);
-	ptrdiff_t step = iio_buffer_step(f->buffer);
-
-	if (step <= 0)
-		return;
-	for (; end - at >= (ptrdiff_t)f->source.format.bytes &&
-	       end - stamp >= (ptrdiff_t)f->source.stamp_format.bytes;
-	     at += step, stamp += step)
-		iio_spacing_put(&f->spacing,
-				(int64_t)iio_format_raw(&f->source.stamp_format, stamp),
-				iio_format_code(&f->source.format, at));
-}
 
 /* Waiting does not tell of an unplugged device, reading does. */
 static void *run(void *argument)
 {
 	struct iio_force *f = argument;
-	int fd = iio_buffer_get_poll_fd(f->buffer);
-	int64_t quiet_ms = 0;
 	int64_t dead_ms =
 		(int64_t)((DEAD_NS + PERIODS_DEAD * 1e9 / f->source.rate_hz) / 1e6);
-	ssize_t got = 0;
+	int64_t quiet_ms = 0;
+	int got = 0;
 
-	while (daq_feed_wait(&f->feed, fd, QUIET_MS) != DAQ_STOP) {
-		got = iio_buffer_refill(f->buffer);
-		if (got > 0) {
-			quiet_ms = 0;
-			pass_on(f);
-		} else if (got == -EAGAIN || got == -EINTR || got == -ETIMEDOUT) {
-			/* Nothing will come behind it within the next periods. */
-			if (quiet_ms > 2 * QUIET_MS)
-				iio_spacing_flush(&f->spacing);
-			quiet_ms += QUIET_MS;
-			if (quiet_ms > dead_ms) {
-				daq_feed_end(&f->feed, -EIO);
-				return NULL;
-			}
-		} else {
+	while (daq_feed_wait(&f->feed, f->stream.fd, QUIET_MS) != DAQ_STOP) {
+		got = iio_stream_read(&f->stream);
+		for (int i = 0; i < got; i++)
+			iio_spacing_put(&f->spacing, iio_stream_stamp(&f->stream, i),
+					iio_stream_code(&f->stream, i));
+		quiet_ms = got > 0 ? 0 : quiet_ms + QUIET_MS;
+		if (got < 0 && got != -EAGAIN && got != -EINTR)
 			break;
-		}
+		/* Nothing will come behind what is held within the next periods. */
+		if (quiet_ms > 2 * QUIET_MS)
+			iio_spacing_flush(&f->spacing);
+		got = quiet_ms > dead_ms ? -EIO : 0;
+		if (got)
+			break;
 	}
 	iio_spacing_flush(&f->spacing);
 	daq_feed_end(&f->feed, got == -ENODEV ? -ENODEV : got < 0 ? -EIO : 0);
@@ -80,8 +59,7 @@ static void iio_force_close(struct incise_force *force)
 	struct iio_force *f = (struct iio_force *)force;
 
 	daq_feed_stop(&f->feed);
-	if (f->buffer)
-		iio_buffer_destroy(f->buffer);
+	iio_stream_stop(&f->stream);
 	iio_source_close(&f->source);
 	daq_feed_free(&f->feed);
 	free(f);
@@ -95,34 +73,22 @@ static const struct incise_force_ops iio_force_ops = {
 };
 
 /* The kernel wakes the thread once per block, and has room for many. */
-static int make_buffer(struct iio_force *f, struct incise_error *err)
+static int start_stream(struct iio_force *f, struct incise_error *err)
 {
-	struct iio_device *device = f->source.device;
+	const char *id = iio_device_get_id(f->source.device);
 	unsigned int block = (unsigned int)(f->source.rate_hz / BLOCKS_PER_S);
-	char text[24];
+	char folder[100];
 	int rc;
 
 	block = block ? block : 1;
-	/* libiio leaves the watermark alone; it may be no more than the length. */
-	snprintf(text, sizeof(text), "%u", block * BLOCKS);
-	rc = (int)iio_device_buffer_attr_write(device, "length", text);
-	snprintf(text, sizeof(text), "%u", block);
-	if (rc >= 0)
-		rc = (int)iio_device_buffer_attr_write(device, "watermark", text);
-	/* One without a watermark wakes it more often: that is all. */
-	rc = iio_device_set_kernel_buffers_count(device, BLOCKS);
-	if (rc >= 0)
-		f->buffer = iio_device_create_buffer(device, block, false);
-	if (f->buffer)
-		rc = iio_buffer_set_blocking_mode(f->buffer, false);
-	else if (rc >= 0)
-		rc = -errno;
-	if (rc >= 0)
-		return 0;
-	return incise_error_set(err, -rc,
-				"%s: %s starts no buffer of %u samples: %s; see dmesg",
-				f->source.where, iio_device_get_id(device),
-				block * BLOCKS, strerror(-rc));
+	snprintf(folder, sizeof(folder), "/sys/bus/iio/devices/%.60s", id);
+	f->stream.fd = f->source.fd;
+	rc = iio_stream_start(&f->stream, &f->source, folder, block, block * BLOCKS);
+	return rc ? incise_error_set(err, -rc,
+				     "%s: %s starts no buffer of %u samples: %s; see "
+				     "dmesg",
+				     f->source.where, id, block * BLOCKS, strerror(-rc))
+		  : 0;
 }
 
 static int start(struct iio_force *f, struct incise_error *err)
@@ -145,7 +111,7 @@ static int start(struct iio_force *f, struct incise_error *err)
 	if (rc)
 		return incise_error_set(err, -rc, "%s: no room for samples: %s", s->where,
 					strerror(-rc));
-	rc = make_buffer(f, err);
+	rc = start_stream(f, err);
 	if (rc)
 		return rc;
 	rc = daq_feed_start(&f->feed, run, f);
@@ -175,6 +141,7 @@ void *iio_force_open(const struct incise_backend_request *request,
 	memset(f, 0, sizeof(*f));
 	f->feed.force.ops = &iio_force_ops;
 	f->feed.stop = -1;
+	f->source.fd = -1;
 	f->source.where = request->where;
 	f->source.trigger_folder = IIO_TRIGGER_FOLDER;
 	rc = daq_feed_setup(request, &f->source.setup, err);

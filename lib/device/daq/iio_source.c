@@ -116,19 +116,17 @@ static int refused(const struct iio_source *s, int rc, const char *what,
 
 /*
  * The file of a device opens once at a time: so it is known whether somebody samples. What
- * a program left running that was killed is ended, as nothing can be set meanwhile.
+ * a program left running that was killed is ended, as nothing can be set meanwhile. The file
+ * stays open: it is what samples are read from.
  */
 static int check_alone(struct iio_source *s, struct incise_error *err)
 {
 	char path[80];
-	int fd;
 
 	snprintf(path, sizeof(path), "/dev/%.60s", iio_device_get_id(s->device));
-	fd = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC);
-	if (fd < 0 && errno != ENOENT)
+	s->fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+	if (s->fd < 0)
 		return refused(s, -errno, "open the file", err);
-	if (fd >= 0)
-		close(fd);
 	if (iio_device_buffer_attr_write(s->device, "enable", "0") == -EACCES)
 		return refused(s, -EACCES, "change the settings", err);
 	return 0;
@@ -136,7 +134,6 @@ static int check_alone(struct iio_source *s, struct incise_error *err)
 
 static int take_channels(struct iio_source *s, struct incise_error *err)
 {
-	unsigned int n = iio_device_get_channels_count(s->device);
 	const char *id = iio_device_get_id(s->device);
 	const struct iio_data_format *data;
 
@@ -165,10 +162,6 @@ static int take_channels(struct iio_source *s, struct incise_error *err)
 			"read",
 			s->where, id, data->bits, data->length, data->shift, data->repeat,
 			CODE_BITS_MAX);
-	for (unsigned int i = 0; i < n; i++)
-		iio_channel_disable(iio_device_get_channel(s->device, i));
-	iio_channel_enable(s->voltage);
-	iio_channel_enable(s->stamp);
 	return 0;
 }
 
@@ -311,11 +304,13 @@ void iio_source_close(struct iio_source *s)
 		/* An empty line takes it off. */
 		const char *before = *s->trigger_before ? s->trigger_before : "\n";
 
-		if (iio_device_attr_write(s->device, "trigger/current_trigger", before) <
-		    0)
-			s->trigger_set = false; /* it is gone */
+		s->trigger_set =
+			iio_device_attr_write(s->device, "trigger/current_trigger",
+					      before) < 0; /* the device is gone */
 	}
 	if (s->context)
 		iio_context_destroy(s->context);
+	if (s->fd >= 0)
+		close(s->fd);
 	iio_trigger_remove(s->trigger_folder, s->trigger);
 }

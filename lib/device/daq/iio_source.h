@@ -11,6 +11,7 @@
 #include "iio_format.h"
 
 struct iio_source {
+	int fd;		   /* of the device's file; -1 before */
 	const char *where; /* begins each line; while it is set up */
 	struct incise_force_setup setup;
 	struct iio_context *context;

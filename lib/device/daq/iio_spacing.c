@@ -35,8 +35,9 @@ static void pass(struct iio_spacing *s, int64_t t_ns, int64_t true_ns, int32_t c
 	double steps = (double)(true_ns - s->last_ns) / period(s);
 	uint64_t lost = 0;
 
-	if (steps >= 1.5)
-		lost = (uint64_t)llround(fmin(steps, GAP_MAX)) - 1;
+	/* What lies just between two is the shorter gap. */
+	if (steps > 1.5)
+		lost = (uint64_t)ceil(fmin(steps, GAP_MAX) - 0.5) - 1;
 	daq_feed_lose(s->feed, lost);
 	daq_feed_put(s->feed, t_ns, code);
 	s->n += lost + 1;

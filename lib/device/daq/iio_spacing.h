@@ -3,7 +3,7 @@
  * Samples that are missing, found by the kernel's time stamps: IIO drops what its buffer has
  * no room for and says nothing.
  *
- *   stamps   |    |    |                   |    |       gap: round(4 T / T) - 1 = 3 lost
+ *   stamps   |    |    |                   |    |       gap of 4 T: 3 lost
  *   stamps   |    |    |        | |    |    |    |      one interrupt late by 0.9 T: none
  *
  * A stamp later than 1.5 T is held until the one behind it has come: a sample is not later

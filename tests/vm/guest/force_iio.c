@@ -105,10 +105,18 @@ static void hold(int ms)
 	waitpid(child, NULL, 0);
 }
 
-static void one_minute(const char *trigger, const char *called)
+/*
+ * Samples of @seconds. The spacing of the simulator's own timer is within 5 us in virtual
+ * time; 5.5 us were measured with hrtimer's, which takes one more interrupt on its way.
+ */
+static void all_come(const char *trigger, const char *called, int seconds,
+		     int64_t within_ns)
 {
+	int many = HZ * seconds;
 	int64_t least = INT64_MAX, most = 0, begin = now_ns(), cpu;
 	uint64_t missing = 0, clipped = 0;
+	/* each ramp has one code at either end, and the last ramp has begun */
+	uint64_t ends = 2 * (uint64_t)(many / 4096) + (many % 4096 != 0);
 	bool codes = true, order = true, clock = true;
 	struct incise_force_info info;
 	struct incise_force *force;
@@ -120,7 +128,7 @@ static void one_minute(const char *trigger, const char *called)
 	force = open_force(INCISE_SIM_ADC, trigger, HZ, &err);
 	if (!check(force, "%s: it opens%s%s", called, force ? "" : ": ", err.text))
 		return;
-	n = take(force, MANY, 5000, &rc);
+	n = take(force, many, 5000, &rc);
 	clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
 	cpu = used.tv_sec * 1000 + used.tv_nsec / 1000000;
 	incise_force_info(force, &info);
@@ -150,19 +158,19 @@ static void one_minute(const char *trigger, const char *called)
 		      fabs(info.offset_V + 2.5) < 1e-9,
 	      "%s: 10 kHz, 12 bits, 5 V from -2.5 V", called);
 	check(clock, "%s: stamps are of CLOCK_MONOTONIC", called);
-	check(incise_force_lost(force) == missing + (uint64_t)counted("overflows") * 0 ||
-		      !virtual_time,
-	      "%s: what is lost is a gap in seq", called);
+	check(incise_force_lost(force) >= missing,
+	      "%s: what is a gap in seq is told as lost", called);
 	if (virtual_time) {
-		check(n == MANY && order && !incise_force_lost(force),
-		      "%s: %d of %d samples in order, none lost", called, n, MANY);
+		check(n == many && order && !incise_force_lost(force),
+		      "%s: %d of %d samples in order, none lost", called, n, many);
 		check(codes, "%s: each code is the one converted", called);
-		check(info.clipped >= clipped && clipped == 2 * (MANY / 4096) + 1,
+		check(info.clipped >= clipped && clipped == ends,
 		      "%s: both ends of the range are told as clipped", called);
 		check(!counted("overflows") && !counted("lost") && !counted("skipped"),
 		      "%s: the simulator lost none either", called);
-		check(least > 95000 && most < 105000, "%s: spacing within 5 us of 100 us",
-		      called);
+		check(least > 100000 - within_ns && most < 100000 + within_ns,
+		      "%s: spacing within %lld us of 100 us", called,
+		      (long long)within_ns / 1000);
 	}
 	force->ops->close(force);
 }
@@ -173,44 +181,39 @@ static void one_minute(const char *trigger, const char *called)
  */
 static void overflow_is_counted(void)
 {
-	uint64_t missing = 0, last;
 	struct incise_force_info info;
 	struct incise_force *force;
 	struct incise_error err;
-	int64_t pushed, overflows;
-	int n, more, rc;
+	uint64_t missing = 0;
+	int64_t overflows;
+	int more, rc;
 
 	feed_ramp();
 	force = open_force(INCISE_SIM_ADC, INCISE_SIM_TRIGGER, HZ, &err);
 	if (!check(force, "it opens for an overflow %s", err.text))
 		return;
-	n = take(force, HZ, 5000, &rc);
+	take(force, HZ, 5000, &rc);
 	hold(2000);
-	n += take(force, HZ, 5000, &rc);
-	n = 0;
 	more = take(force, 2 * HZ, 5000, &rc);
 	overflows = counted("overflows") + counted("lost") + counted("skipped");
-	pushed = counted("pushed");
 	incise_force_info(force, &info);
 	for (int i = 1; i < more; i++)
 		missing += samples[i].seq - samples[i - 1].seq - 1;
-	last = samples[more - 1].seq;
 	note("held for 2 s: the simulator could not hand over %lld, lost says %llu in %llu "
-	     "overflows; %lld handed over",
+	     "overflow",
 	     (long long)overflows, (unsigned long long)incise_force_lost(force),
-	     (unsigned long long)info.overflows, (long long)pushed);
+	     (unsigned long long)info.overflows);
 	if (virtual_time) {
 		check(overflows > HZ && incise_force_lost(force) == (uint64_t)overflows &&
-			      info.overflows == 1,
+			      missing == (uint64_t)overflows && info.overflows == 1,
 		      "an overflow is counted to the sample");
-		check((uint64_t)samples[more - 1].code == last % (INCISE_SIM_ADC_MAX + 1),
+		check((uint64_t)samples[more - 1].code ==
+			      samples[more - 1].seq % (INCISE_SIM_ADC_MAX + 1),
 		      "behind it seq is still the number of the conversion");
 	} else {
 		check(incise_force_lost(force) > 0, "an overflow is told");
 	}
 	force->ops->close(force);
-	(void)n;
-	(void)missing;
 }
 
 /* Nobody reads: the ring has room for four seconds. */
@@ -229,7 +232,7 @@ static void reader_is_slow(void)
 	if (!check(force, "it opens for a slow reader %s", err.text))
 		return;
 	nap(8000);
-	n = take(force, MANY, 20, &rc);
+	n = take(force, 7 * HZ, 20, &rc);
 	for (int i = 0; i < n; i++) {
 		missing += samples[i].seq - expected;
 		expected = samples[i].seq + 1;
@@ -403,9 +406,9 @@ int main(int argc, char **argv)
 	memset(samples, 1, sizeof(samples));
 	mlockall(MCL_CURRENT | MCL_FUTURE);
 	is_listed();
-	one_minute(INCISE_SIM_TRIGGER, "own trigger");
+	all_come(INCISE_SIM_TRIGGER, "own trigger", virtual_time ? SECONDS : 5, 5000);
 	if (hrtimer) {
-		one_minute("", "hrtimer trigger");
+		all_come("", "hrtimer trigger", virtual_time ? 10 : 5, 7000);
 		own_trigger_goes();
 	}
 	overflow_is_counted();
