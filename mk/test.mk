@@ -11,6 +11,8 @@ unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 ldflags_scene/jail := $(foreach name,malloc calloc realloc free,-Wl,--wrap=$(name))
 ldflags_device/stepper_kernel := $(foreach name,open close ioctl mmap munmap clock_nanosleep \
 	nanosleep,-Wl,--wrap=$(name))
+ldflags_daq/comedi_force := -Wl,--wrap=read
+ldflags_daq/iio_source := -Wl,--wrap=open
 ldflags_can/slcan := -Wl,--wrap=write
 ldflags_can/slcan_tty := -Wl,--wrap=write
 ldflags_can/socketcan := $(foreach name,socket bind setsockopt send recvmsg ppoll close \

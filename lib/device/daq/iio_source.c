@@ -174,6 +174,8 @@ static int set_clock(struct iio_source *s, struct incise_error *err)
 	if (rc < 0)
 		return refused(s, (int)rc, "set the clock of time stamps", err);
 	rc = iio_device_attr_read(s->device, key, is, sizeof(is));
+	/* Linux 6.1 gives a NUL behind the end of the line, of which libiio takes one. */
+	is[strcspn(is, "\n")] = '\0';
 	if (rc < 0 || strcmp(is, "monotonic") != 0)
 		return incise_error_set(
 			err, EOPNOTSUPP,

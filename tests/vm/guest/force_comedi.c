@@ -160,7 +160,7 @@ static void two_seconds(void)
 	force->ops->close(force);
 }
 
-/* The kernel's buffer of 64 KiB holds 3.3 s: held for 8 s there must be one overflow. */
+/* The kernel has room for less than 7 s: held for 8 s there must be one overflow. */
 static void overflow_is_counted(void)
 {
 	struct incise_force_info info;
