@@ -51,12 +51,13 @@ static void count_gap(struct comedi_force *f, int64_t last_ns, int64_t t_ns)
 	f->gap = false;
 }
 
-static void pass_on(struct comedi_force *f, size_t bytes)
+/* @last: no more was waiting behind it. */
+static void pass_on(struct comedi_force *f, size_t bytes, bool last)
 {
 	size_t size = f->card.wide ? sizeof(lsampl_t) : sizeof(sampl_t);
 	size_t n = bytes / size;
 
-	comedi_stamps_block(&f->stamps, f->heard_ns, n);
+	comedi_stamps_block(&f->stamps, f->heard_ns, n, last);
 	for (size_t i = 0; i < n; i++) {
 		int64_t last_ns = f->stamps.last_ns;
 		int64_t t_ns = comedi_stamps_next(&f->stamps);
@@ -99,7 +100,7 @@ static int judge(struct comedi_force *f, ssize_t got)
 	if (got > 0) {
 		f->heard_ns = now_ns();
 		f->restarts = 0;
-		pass_on(f, f->rest + (size_t)got);
+		pass_on(f, f->rest + (size_t)got, f->rest + (size_t)got < BLOCK_BYTES);
 		return 0;
 	}
 	/* The command has ended: for want of room, or by itself. */

@@ -6,6 +6,8 @@
 #include "comedi_stamps.h"
 
 #define WINDOW_NS 1000000000LL
+#define WINDOW_BLOCKS 8
+#define DRIFT_MOST 1e-3
 
 void comedi_stamps_init(struct comedi_stamps *s, double period_ns)
 {
@@ -19,6 +21,7 @@ void comedi_stamps_begin(struct comedi_stamps *s, int64_t t_ns)
 	s->n = 0;
 	s->least_ns = INFINITY;
 	s->has_usual = false;
+	s->blocks = 0;
 }
 
 static double since_begin(const struct comedi_stamps *s, uint64_t n)
@@ -26,7 +29,7 @@ static double since_begin(const struct comedi_stamps *s, uint64_t n)
 	return s->shift_ns + s->period_ns * (double)n;
 }
 
-void comedi_stamps_block(struct comedi_stamps *s, int64_t t_ns, uint64_t n)
+void comedi_stamps_block(struct comedi_stamps *s, int64_t t_ns, uint64_t n, bool last)
 {
 	double delay = (double)(t_ns - s->begin_ns) - since_begin(s, s->n + n);
 
@@ -37,16 +40,22 @@ void comedi_stamps_block(struct comedi_stamps *s, int64_t t_ns, uint64_t n)
 		s->least_ns += -delay;
 		delay = 0;
 	}
-	s->least_ns = fmin(s->least_ns, delay);
-	if (t_ns - s->window_ns < WINDOW_NS)
+	if (!last)
 		return;
-	if (s->has_usual)
-		s->shift_ns += s->least_ns - s->usual_ns;
-	else
+	s->least_ns = fmin(s->least_ns, delay);
+	if (++s->blocks < WINDOW_BLOCKS || t_ns - s->window_ns < WINDOW_NS)
+		return;
+	if (s->has_usual) {
+		double most = DRIFT_MOST * (double)(t_ns - s->window_ns);
+
+		s->shift_ns += fmin(fmax(s->least_ns - s->usual_ns, -most), most);
+	} else {
 		s->usual_ns = s->least_ns;
+	}
 	s->has_usual = true;
 	s->window_ns = t_ns;
 	s->least_ns = INFINITY;
+	s->blocks = 0;
 }
 
 int64_t comedi_stamps_next(struct comedi_stamps *s)

@@ -8,6 +8,9 @@
  *                   ▲         ▲           the least of it within a second is taken for
  *                block 1   block 2        constant, and what it drifts by moves begin
  *
+ * A reader that was held up finds much waiting, which is no drift: only blocks that emptied
+ * the kernel's buffer tell of it, eight of them at least, and no clock is off by 1000 ppm.
+ *
  * Good to the card's least delay, which is not known from here: milliseconds with a card
  * that hands over its store when it is half full. No stamp is later than its arrival, and
  * each is later than the one before.
@@ -24,6 +27,7 @@ struct comedi_stamps {
 	double shift_ns; /* drift of the card's clock since begin_ns */
 	uint64_t n;	 /* samples since begin_ns */
 	int64_t window_ns;
+	int blocks;		   /* of this window that tell of the delay */
 	double least_ns, usual_ns; /* delay: of this window, of the first one */
 	bool has_usual;
 };
@@ -32,8 +36,9 @@ struct comedi_stamps {
 void comedi_stamps_init(struct comedi_stamps *stamps, double period_ns);
 /* A command was started at @t_ns. */
 void comedi_stamps_begin(struct comedi_stamps *stamps, int64_t t_ns);
-/* A block of @n samples came at @t_ns. */
-void comedi_stamps_block(struct comedi_stamps *stamps, int64_t t_ns, uint64_t n);
+/* A block of @n samples came at @t_ns; @last: no more was waiting behind it. */
+void comedi_stamps_block(struct comedi_stamps *stamps, int64_t t_ns, uint64_t n,
+			 bool last);
 /* The time of the next sample of it. */
 int64_t comedi_stamps_next(struct comedi_stamps *stamps);
 

@@ -33,7 +33,7 @@ struct iio_source {
 int iio_source_open(struct iio_source *source, const char *name,
 		    struct incise_error *err);
 
-/* As it was before, as far as it can be. */
+/* The trigger is as it was before; rate and clock stay. */
 void iio_source_close(struct iio_source *source);
 
 /* "voltage0" of a device; also "voltage0-voltage1", which is channel 0 of a differential one.

@@ -32,7 +32,7 @@ static double run(int block, double delay_ns, double jitter_ns, double ppm, int 
 		double late = delay_ns + jitter_ns * rand() / RAND_MAX;
 		int64_t arrival = START + llround(period * (n + block) + late);
 
-		comedi_stamps_block(&stamps, arrival, (uint64_t)block);
+		comedi_stamps_block(&stamps, arrival, (uint64_t)block, true);
 		for (int i = 0; i < block; i++) {
 			int64_t t = comedi_stamps_next(&stamps);
 			double off = (double)(t - START) - period * ++n;
@@ -84,18 +84,42 @@ static void again(void **state)
 
 	comedi_stamps_init(&stamps, T);
 	comedi_stamps_begin(&stamps, START);
-	comedi_stamps_block(&stamps, START + 1000000, 10);
+	comedi_stamps_block(&stamps, START + 1000000, 10, true);
 	for (int i = 0; i < 10; i++)
 		last = comedi_stamps_next(&stamps);
 	assert_int_equal(last, START + 1000000);
 	comedi_stamps_begin(&stamps, START + 5000000);
-	comedi_stamps_block(&stamps, START + 5200000, 2);
+	comedi_stamps_block(&stamps, START + 5200000, 2, true);
 	assert_int_equal(comedi_stamps_next(&stamps), START + 5100000);
 	/* a clock of the computer that stood still */
 	comedi_stamps_begin(&stamps, START);
-	comedi_stamps_block(&stamps, START, 2);
+	comedi_stamps_block(&stamps, START, 2, true);
 	assert_int_equal(comedi_stamps_next(&stamps), START + 5100001);
 	assert_int_equal(comedi_stamps_next(&stamps), START + 5100002);
+}
+
+/* A reader that was held for 5 s finds blocks of 4096 waiting: their stamps stay true. */
+static void held_up(void **state)
+{
+	struct comedi_stamps stamps;
+	int n = 0;
+
+	comedi_stamps_init(&stamps, T);
+	comedi_stamps_begin(&stamps, START);
+	while (n < 200000) {
+		bool held = n >= 60000 && n < 110000;
+		int block = held ? 4096 : 80;
+		int64_t taken = START + llround(T * (n + block));
+		/* from 6 s on all comes at 11 s */
+		int64_t arrival = taken < START + 11000000000LL && n >= 60000
+					  ? START + 11000000000LL
+					  : taken;
+
+		comedi_stamps_block(&stamps, arrival, (uint64_t)block, block == 80);
+		for (int i = 0; i < block; i++)
+			assert_true(llabs(comedi_stamps_next(&stamps) - START -
+					  llround(T * ++n)) < 2);
+	}
 }
 
 int main(void)
@@ -103,6 +127,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(times),
 		cmocka_unit_test(again),
+		cmocka_unit_test(held_up),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
