@@ -406,9 +406,9 @@ int main(int argc, char **argv)
 	memset(samples, 1, sizeof(samples));
 	mlockall(MCL_CURRENT | MCL_FUTURE);
 	is_listed();
-	all_come(INCISE_SIM_TRIGGER, "own trigger", virtual_time ? SECONDS : 5, 5000);
+	all_come(INCISE_SIM_TRIGGER, "own trigger", virtual_time ? SECONDS : 2, 5000);
 	if (hrtimer) {
-		all_come("", "hrtimer trigger", virtual_time ? 10 : 5, 7000);
+		all_come("", "hrtimer trigger", virtual_time ? 10 : 2, 7000);
 		own_trigger_goes();
 	}
 	overflow_is_counted();
