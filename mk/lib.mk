@@ -80,6 +80,20 @@ objects_force_iio := $(daq_core) $(patsubst %.c,$(O)/obj/%.o,$(daq_iio) lib/devi
 pc_force_comedi := comedilib
 objects_force_comedi := $(daq_core) \
 	$(patsubst %.c,$(O)/obj/%.o,$(daq_comedi) lib/device/daq/force_comedi.c)
+# One tracker on two kinds of line.
+polhemus_lines := polhemus_usb polhemus_tty tracker_usb tracker_tty
+polhemus_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o) \
+	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(polhemus_lines:%=lib/device/polhemus/%.c),\
+		$(wildcard lib/device/polhemus/*.c)))
+has_libusb := $(shell $(PKG_CONFIG) --exists libusb-1.0 && echo yes)
+device_modules += $(if $(has_libusb),tracker_usb) tracker_tty
+pc_tracker_usb := libusb-1.0
+objects_tracker_usb := $(polhemus_core) \
+	$(patsubst %,$(O)/obj/lib/device/polhemus/%.o,polhemus_usb tracker_usb)
+$(O)/obj/lib/device/polhemus/polhemus_usb.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags libusb-1.0)
+pc_tracker_tty :=
+objects_tracker_tty := $(polhemus_core) \
+	$(patsubst %,$(O)/obj/lib/device/polhemus/%.o,polhemus_tty tracker_tty)
 
 define device_module
 $(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
@@ -101,6 +115,7 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(filter-out %/camera_v4l2.c,\
 	$(addprefix $(O)/obj/lib/device/daq/,daq_feed.o daq_scan.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(if $(has_libiio),$(daq_iio)) \
 		$(if $(has_comedilib),$(daq_comedi)))
+	$(filter $(O)/obj/lib/device/polhemus/%,$(filter-out %/tracker_tty.o,$(objects_tracker_tty)))
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@

@@ -24,11 +24,16 @@ ldflags_v4l2 := $(foreach name,open close ioctl mmap munmap poll clock_gettime,-
 $(foreach test,$(wildcard tests/unit/v4l2/*.c),\
 	$(eval ldflags_v4l2/$(basename $(notdir $(test))) := $(ldflags_v4l2)))
 
+# The tracker that is not there is of several tests, and a program of its own.
+emulator := tests/polhemus/emulator.c
+unit_emulator = $(if $(filter polhemus/%,$*),$(emulator))
+$(filter $(O)/tests/unit/polhemus/%,$(unit_programs)): $(emulator) tests/polhemus/emulator.h
+
 $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
 		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
-		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(O)/lib/libincise-tests.a \
+		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(O)/lib/libincise-tests.a \
 		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm
 
 check: ## install what is missing, build, and run all tests

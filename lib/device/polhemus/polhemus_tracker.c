@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A tracker of Polhemus behind struct incise_tracker; see polhemus_tracker.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#include "../thread.h"
+#include "polhemus_setup.h"
+#include "polhemus_stream.h"
+#include "polhemus_tracker.h"
+
+#define POLL_MS 50 /* how long close() waits for the thread, at most */
+
+struct polhemus_tracker {
+	struct incise_tracker tracker;
+	struct polhemus_line *line;
+	struct polhemus_times times;
+	struct polhemus_identity identity;
+	struct polhemus_stream stream;
+	pthread_t thread;
+	_Atomic bool stop;
+	_Atomic int gone; /* negative errno: for good */
+};
+
+static struct polhemus_tracker *of_tracker(const struct incise_tracker *tracker)
+{
+	return (struct polhemus_tracker *)tracker;
+}
+
+static int64_t now_ms(void)
+{
+	struct timespec ts;
+
+	clock_gettime(CLOCK_MONOTONIC, &ts);
+	return ts.tv_sec * INT64_C(1000) + ts.tv_nsec / 1000000;
+}
+
+/* Wait for it to come back. false: it did not, or close() does not want to wait. */
+static bool recover(struct polhemus_tracker *t)
+{
+	int64_t began_ms = now_ms();
+	struct timespec pause = {t->times.retry_ms / 1000,
+				 t->times.retry_ms % 1000 * 1000000L};
+
+	while (!atomic_load(&t->stop)) {
+		struct polhemus_identity identity;
+
+		if (!t->line->ops->reopen(t->line) &&
+		    !polhemus_setup(t->line, &t->stream.setup, &identity, "", NULL)) {
+			polhemus_stream_broken(&t->stream, &identity.layout);
+			return true;
+		}
+		if (now_ms() - began_ms >= t->times.gone_ms)
+			return false;
+		nanosleep(&pause, NULL);
+	}
+	return false;
+}
+
+static void *run(void *argument)
+{
+	struct polhemus_tracker *t = argument;
+	unsigned char bytes[POLHEMUS_LINE_CHUNK];
+	int silent_ms = 0;
+
+	while (!atomic_load(&t->stop)) {
+		int64_t t_ns = 0;
+		ssize_t n =
+			t->line->ops->read(t->line, bytes, sizeof(bytes), &t_ns, POLL_MS);
+
+		if (n > 0) {
+			polhemus_stream_put(&t->stream, bytes, (size_t)n, t_ns);
+			silent_ms = 0;
+			continue;
+		}
+		silent_ms += POLL_MS;
+		/* Pulses from outside may pause as long as they like. */
+		if (!n && (silent_ms < t->times.silent_ms ||
+			   t->stream.setup.sync != INCISE_TRACKER_INTERNAL))
+			continue;
+		silent_ms = 0;
+		if (!recover(t))
+			break;
+	}
+	atomic_store(&t->gone, -ENODEV);
+	return NULL;
+}
+
+static int tracker_read(struct incise_tracker *tracker,
+			struct incise_tracker_sample *samples, int n)
+{
+	struct polhemus_tracker *t = of_tracker(tracker);
+	/* Before the ring is looked into: what came before the end is still in it. */
+	int gone = atomic_load(&t->gone);
+	int taken = polhemus_stream_take(&t->stream, samples, n);
+
+	return taken || n <= 0 ? taken : gone;
+}
+
+static void tracker_info(const struct incise_tracker *tracker,
+			 struct incise_tracker_info *info)
+{
+	const struct polhemus_tracker *t = of_tracker(tracker);
+	const struct polhemus_layout *layout = &t->identity.layout;
+	int n = t->stream.setup.n_stations;
+
+	*info = (struct incise_tracker_info){
+		.rate_hz = polhemus_family_hz(layout->family, n),
+		.stations = n,
+		.latency_ns =
+			polhemus_family_latency_ns(layout->family) +
+			(int64_t)polhemus_layout_length(layout) * t->line->ns_per_byte,
+	};
+	snprintf(info->name, sizeof(info->name), "%s", t->identity.name);
+}
+
+static uint64_t tracker_lost(const struct incise_tracker *tracker)
+{
+	return polhemus_stream_lost(&of_tracker(tracker)->stream);
+}
+
+static void tracker_close(struct incise_tracker *tracker)
+{
+	struct polhemus_tracker *t = of_tracker(tracker);
+
+	atomic_store(&t->stop, true);
+	pthread_join(t->thread, NULL);
+	polhemus_stop(t->line, t->identity.layout.family);
+	t->line->ops->close(t->line);
+	polhemus_stream_free(&t->stream);
+	free(t);
+}
+
+static const struct incise_tracker_ops ops = {
+	.read = tracker_read,
+	.info = tracker_info,
+	.lost = tracker_lost,
+	.close = tracker_close,
+};
+
+static int check(const struct incise_tracker_setup *setup, const char *where,
+		 struct incise_error *err)
+{
+	const double *h = setup->hemisphere, *tip = setup->tip_mm;
+	bool good = setup->n_stations >= 1 && setup->n_stations <= POLHEMUS_STATIONS &&
+		    setup->sync >= INCISE_TRACKER_INTERNAL &&
+		    setup->sync <= INCISE_TRACKER_VIDEO &&
+		    fabs(h[0] * h[0] + h[1] * h[1] + h[2] * h[2] - 1) <= 1e-3 &&
+		    isfinite(tip[0] + tip[1] + tip[2]);
+
+	for (int i = 0; good && i < setup->n_stations; i++)
+		good = setup->stations[i] >= 1 &&
+		       setup->stations[i] <= POLHEMUS_STATIONS &&
+		       (!i || setup->stations[i] > setup->stations[i - 1]);
+	return good ? 0
+		    : incise_error_set(err, EINVAL,
+				       "%s: tracker_setup: expected stations 1 to 4, "
+				       "ascending, a hemisphere of length 1 and numbers; "
+				       "correct it",
+				       where);
+}
+
+static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *setup,
+		 const char *where, struct incise_error *err)
+{
+	bool real_time;
+	int rc = check(setup, where, err);
+
+	if (!rc)
+		rc = polhemus_setup(t->line, setup, &t->identity, where, err);
+	if (rc)
+		return rc;
+	if (polhemus_stream_init(&t->stream, setup, &t->identity.layout))
+		rc = incise_error_set(err, ENOMEM, "%s: out of memory", where);
+	if (!rc) {
+		rc = incise_thread_start(&t->thread, run, t, &real_time);
+		if (!rc)
+			return 0;
+		incise_error_set(err, -rc, "%s: no thread to read the tracker in", where);
+	}
+	polhemus_stop(t->line, t->identity.layout.family);
+	polhemus_stream_free(&t->stream);
+	return rc;
+}
+
+struct incise_tracker *polhemus_tracker_open(struct polhemus_line *line,
+					     const struct incise_tracker_setup *setup,
+					     const struct polhemus_times *times,
+					     const char *where, struct incise_error *err)
+{
+	/* The ring's indices lie on lines of the cache of their own. */
+	struct polhemus_tracker *t = aligned_alloc(_Alignof(struct polhemus_tracker),
+						   sizeof(struct polhemus_tracker));
+	int rc;
+
+	if (!t) {
+		line->ops->close(line);
+		incise_error_set(err, ENOMEM, "%s: out of memory", where);
+		return NULL;
+	}
+	*t = (struct polhemus_tracker){
+		.tracker.ops = &ops,
+		.line = line,
+		.times = *times,
+	};
+	rc = begin(t, setup, where, err);
+	if (!rc)
+		return &t->tracker;
+	line->ops->close(line);
+	free(t);
+	errno = -rc;
+	return NULL;
+}

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * What rig.conf calls a tracker on USB; see polhemus_usb_name.h.
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include "polhemus_usb_name.h"
+
+/* Four hexadecimal digits. */
+static int read_id(const char *text, uint16_t *id)
+{
+	unsigned int value = 0;
+
+	for (int i = 0; i < 4; i++) {
+		char c = text[i];
+
+		if (c >= '0' && c <= '9')
+			value = value * 16 + (unsigned int)(c - '0');
+		else if (c >= 'a' && c <= 'f')
+			value = value * 16 + (unsigned int)(c - 'a' + 10);
+		else if (c >= 'A' && c <= 'F')
+			value = value * 16 + (unsigned int)(c - 'A' + 10);
+		else
+			return -EINVAL;
+	}
+	*id = (uint16_t)value;
+	return 0;
+}
+
+int polhemus_usb_name_read(const char *text, struct polhemus_usb_name *name)
+{
+	size_t n;
+
+	memset(name, 0, sizeof(*name));
+	if (read_id(text, &name->vendor) || text[4] != ':' ||
+	    read_id(text + 5, &name->product))
+		return -EINVAL;
+	text += 9;
+	if (!*text)
+		return 0;
+	n = strlen(text + 1);
+	if (!n)
+		return -EINVAL;
+	if (*text == '#' && n < sizeof(name->serial)) {
+		strcpy(name->serial, text + 1);
+		return 0;
+	}
+	if (*text != '@' || n >= sizeof(name->path) ||
+	    strspn(text + 1, "0123456789.-") != n)
+		return -EINVAL;
+	strcpy(name->path, text + 1);
+	return 0;
+}
+
+void polhemus_usb_path(char path[POLHEMUS_USB_PATH_MAX], unsigned int bus,
+		       const uint8_t *ports, int n)
+{
+	int at = snprintf(path, POLHEMUS_USB_PATH_MAX, "%u-%u", bus & 0xff,
+			  n > 0 ? ports[0] : 0);
+
+	for (int i = 1; i < n && at < POLHEMUS_USB_PATH_MAX - 5; i++)
+		at += snprintf(path + at, POLHEMUS_USB_PATH_MAX - (size_t)at, ".%u",
+			       ports[i]);
+}

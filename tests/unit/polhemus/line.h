@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * A line to an emulator in the same process, in a time of its own: a read that finds nothing
+ * lets time go on to the next record, or to its end.
+ */
+#ifndef INCISE_TEST_POLHEMUS_LINE_H
+#define INCISE_TEST_POLHEMUS_LINE_H
+
+#include <errno.h>
+#include "../../../lib/device/polhemus/polhemus_line.h"
+#include "../../../lib/device/polhemus/polhemus_model.h"
+#include "../../polhemus/emulator.h"
+
+struct test_line {
+	struct polhemus_line line;
+	struct emulator *emulator;
+	int64_t now_ns;
+	size_t most;	 /* bytes of a read; 0: as many as fit */
+	int gone;	 /* what all calls return */
+	char said[2000]; /* all commands */
+	size_t n_said;
+};
+
+static int test_line_write(struct polhemus_line *line, const void *bytes, size_t n)
+{
+	struct test_line *l = (struct test_line *)line;
+
+	if (l->gone)
+		return l->gone;
+	for (size_t i = 0; i < n && l->n_said + 1 < sizeof(l->said); i++)
+		l->said[l->n_said++] = ((const char *)bytes)[i];
+	emulator_write(l->emulator, bytes, n);
+	return 0;
+}
+
+static ssize_t test_line_read(struct polhemus_line *line, void *bytes, size_t size,
+			      int64_t *t_ns, int timeout_ms)
+{
+	struct test_line *l = (struct test_line *)line;
+	int64_t end_ns = l->now_ns + timeout_ms * INT64_C(1000000);
+	int64_t next_ns = emulator_next_ns(l->emulator);
+	size_t n;
+
+	if (l->gone)
+		return l->gone;
+	if (l->most && size > l->most)
+		size = l->most;
+	n = emulator_take(l->emulator, bytes, size);
+	if (!n) {
+		l->now_ns = next_ns < end_ns ? next_ns : end_ns;
+		emulator_advance(l->emulator, l->now_ns);
+		n = emulator_take(l->emulator, bytes, size);
+	}
+	*t_ns = l->now_ns;
+	return (ssize_t)n;
+}
+
+static int test_line_reopen(struct polhemus_line *line)
+{
+	return ((struct test_line *)line)->gone;
+}
+
+static void test_line_close(struct polhemus_line *line)
+{
+}
+
+static const struct polhemus_line_ops test_line_ops = {
+	.write = test_line_write,
+	.read = test_line_read,
+	.reopen = test_line_reopen,
+	.close = test_line_close,
+};
+
+static inline void test_line_init(struct test_line *l, struct emulator *e, int family)
+{
+	*l = (struct test_line){
+		.line = {.ops = &test_line_ops, .family = family, .name = "emulator"},
+		.emulator = e,
+		.now_ns = e->now_ns,
+	};
+}
+
+#endif

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/polhemus/polhemus_setup.c, polhemus_fastrak.c, polhemus_liberty.c and
+ * polhemus_dialogue.c against the emulator: what it is set to, and how it is told when it is not.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <stdio.h>
+#include <string.h>
+#include "../../../lib/device/polhemus/polhemus_setup.h"
+#include "line.h"
+
+static struct emulator e;
+static struct test_line line;
+static struct polhemus_identity identity;
+static struct incise_error err;
+
+static int end(void **state)
+{
+	emulator_free(&e);
+	return 0;
+}
+
+static int set_up(const struct incise_tracker_setup *setup)
+{
+	memset(&err, 0, sizeof(err));
+	return polhemus_setup(&line.line, setup, &identity, "rig.conf:3: tracker", &err);
+}
+
+static void begin(enum emulator_kind kind, int family)
+{
+	const char *streams;
+
+	emulator_free(&e);
+	emulator_init(&e, kind, 0);
+	test_line_init(&line, &e, family);
+	/* It streams in its own format when somebody left it so. */
+	streams = kind == EMULATOR_FASTRAK ? "I1,0\rfC" : "F1\rC\r";
+	emulator_write(&e, streams, strlen(streams));
+}
+
+static const struct incise_tracker_setup first = {
+	.n_stations = 1, .stations = {1}, .hemisphere = {1, 0, 0}};
+static const struct incise_tracker_setup two = {
+	.n_stations = 2, .stations = {1, 2}, .hemisphere = {0, 0.6, -0.8}};
+
+static void all_is_set(void **state)
+{
+	static const struct {
+		enum emulator_kind kind;
+		int family; /* -1: it is asked */
+		int switch_bytes;
+		const struct incise_tracker_setup *setup;
+		size_t length;
+	} cases[] = {
+		{EMULATOR_FASTRAK, POLHEMUS_FASTRAK, 1, &first, 34},
+		{EMULATOR_FASTRAK, -1, 1, &two, 34},
+		{EMULATOR_FASTRAK, -1, 2, &two, 35},
+		{EMULATOR_FASTRAK, -1, 4, &two, 37},
+		{EMULATOR_LIBERTY, POLHEMUS_LIBERTY, 4, &two, 44},
+		{EMULATOR_LIBERTY, -1, 4, &first, 44},
+		{EMULATOR_PATRIOT, -1, 4, &two, 44},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		const struct incise_tracker_setup *s = cases[i].setup;
+
+		begin(cases[i].kind, cases[i].family);
+		e.present[1] = true;
+		/* A station that is to be off. */
+		e.on[1] = s->n_stations == 1;
+		e.switch_bytes = cases[i].switch_bytes;
+		if (set_up(s))
+			fail_msg("case %zu: %s", i, err.text);
+		assert_int_equal(identity.layout.family, cases[i].kind);
+		assert_int_equal(polhemus_layout_length(&identity.layout),
+				 cases[i].length);
+		assert_true(e.binary && e.cm && e.continuous && e.mouse);
+		assert_true(e.on[0] && e.on[1] == (s->n_stations == 2) && !e.on[2] &&
+			    !e.on[3]);
+		for (int k = 0; k < s->n_stations; k++) {
+			if (cases[i].kind == EMULATOR_FASTRAK)
+				assert_true(e.increment[k] == 0);
+			/* Four digits are sent. */
+			for (int j = 0; j < 3; j++)
+				assert_float_equal(e.hemisphere[k][j], s->hemisphere[j],
+						   1e-4);
+		}
+		for (int f = 0; f < 2; f++)
+			assert_true(e.filters[f][0] == 0 && e.filters[f][1] == 1);
+		assert_int_equal(e.eeprom_writes, 0);
+		assert_null(memchr(line.said, 'K' & 31, line.n_said));
+		if (cases[i].kind == EMULATOR_FASTRAK) {
+			assert_int_equal(identity.sensors, 3);
+			assert_string_equal(identity.name, "FASTRAK 3.02 OutputCompensat "
+							   "CPG2030-003-10");
+		} else {
+			assert_non_null(strstr(identity.name, "SN 1234"));
+		}
+		polhemus_stop(&line.line, identity.layout.family);
+		assert_false(e.continuous);
+	}
+}
+
+static void sync_from_outside(void **state)
+{
+	struct incise_tracker_setup s = first;
+
+	for (int sync = 1; sync <= 2; sync++) {
+		begin(EMULATOR_FASTRAK, -1);
+		s.sync = (enum incise_tracker_sync)sync;
+		assert_int_equal(set_up(&s), 0);
+		assert_int_equal(e.sync, sync);
+		begin(EMULATOR_LIBERTY, -1);
+		assert_int_equal(set_up(&s), -EINVAL);
+		assert_non_null(strstr(err.text, "sync"));
+	}
+}
+
+/* What it forgets, one command each, is found and named. */
+static void what_is_not_taken(void **state)
+{
+	static const struct {
+		enum emulator_kind kind;
+		const char *stuck, *says;
+	} cases[] = {
+		{EMULATOR_FASTRAK, "u", "centimetres"},
+		{EMULATOR_FASTRAK, "O", "items"},
+		{EMULATOR_FASTRAK, "H", "hemisphere"},
+		{EMULATOR_FASTRAK, "I", "increment"},
+		{EMULATOR_FASTRAK, "x", "position"},
+		{EMULATOR_FASTRAK, "v", "attitude"},
+		{EMULATOR_FASTRAK, "y", "sync"},
+		{EMULATOR_FASTRAK, "l", "station"},
+		{EMULATOR_LIBERTY, "U", "centimetres"},
+		{EMULATOR_LIBERTY, "H", "hemisphere"},
+		{EMULATOR_LIBERTY, "X", "position"},
+		{EMULATOR_LIBERTY, "Y", "attitude"},
+		{EMULATOR_LIBERTY, "R", "240"},
+		{EMULATOR_LIBERTY, "O", "record"},
+		{EMULATOR_PATRIOT, "\025", "station"},
+	};
+	struct incise_tracker_setup s = two;
+
+	s.sync = INCISE_TRACKER_INTERNAL;
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		int rc;
+
+		begin(cases[i].kind, (int)cases[i].kind);
+		e.present[1] = true;
+		/* As it is not to be. */
+		e.sync = 2;
+		e.increment[0] = 2;
+		e.stuck = cases[i].stuck;
+		rc = set_up(&s);
+		if (rc != -EIO || !strstr(err.text, cases[i].says) ||
+		    strncmp(err.text, "rig.conf:3: tracker: ", 21))
+			fail_msg("%s: %d: %s", cases[i].stuck, rc, err.text);
+	}
+}
+
+static void what_cannot_be(void **state)
+{
+	/* No sensor. */
+	begin(EMULATOR_FASTRAK, -1);
+	assert_int_equal(set_up(&two), -EIO);
+	assert_non_null(strstr(err.text, "station 2"));
+	/* Nobody. */
+	begin(EMULATOR_FASTRAK, -1);
+	emulator_write(&e, "c", 1);
+	e.deaf = true;
+	assert_int_equal(set_up(&first), -ETIMEDOUT);
+	assert_non_null(strstr(err.text, "baud"));
+	/* One that does not stop; its button would. */
+	begin(EMULATOR_FASTRAK, -1);
+	e.deaf = e.mouse = true;
+	assert_int_equal(set_up(&first), -EBUSY);
+	/* Gone in the middle. */
+	begin(EMULATOR_FASTRAK, -1);
+	line.gone = -ENODEV;
+	assert_int_equal(set_up(&first), -ENODEV);
+	assert_non_null(strstr(err.text, "went away"));
+}
+
+static void who_is_there(void **state)
+{
+	begin(EMULATOR_FASTRAK, -1);
+	assert_int_equal(polhemus_identify(&line.line, &identity, "tty", &err), 0);
+	assert_string_equal(identity.version, "3.02");
+	begin(EMULATOR_PATRIOT, -1);
+	assert_int_equal(polhemus_identify(&line.line, &identity, "tty", &err), 0);
+	assert_int_equal(identity.layout.family, POLHEMUS_PATRIOT);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_teardown(all_is_set, end),
+		cmocka_unit_test_teardown(sync_from_outside, end),
+		cmocka_unit_test_teardown(what_is_not_taken, end),
+		cmocka_unit_test_teardown(what_cannot_be, end),
+		cmocka_unit_test_teardown(who_is_there, end),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,393 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/polhemus/polhemus_stream.c against the emulator's own list of what it sent, in a
+ * time of its own.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../../../lib/device/polhemus/polhemus_setup.h"
+#include "../../../lib/device/polhemus/polhemus_stream.h"
+#include "line.h"
+
+#define S INT64_C(1000000000)
+#define MS INT64_C(1000000)
+
+struct bench {
+	struct emulator e;
+	struct test_line line;
+	struct incise_tracker_setup setup;
+	struct polhemus_identity identity;
+	struct polhemus_stream stream;
+	/* What came out. */
+	struct incise_tracker_sample *samples;
+	size_t n;
+	uint64_t first; /* slot of the emulator's first record */
+};
+
+static void bench_init(struct bench *b, enum emulator_kind kind, int stations)
+{
+	struct incise_error err = {0};
+
+	memset(b, 0, sizeof(*b));
+	emulator_init(&b->e, kind, 7 * S);
+	b->setup = (struct incise_tracker_setup){.n_stations = stations,
+						 .hemisphere = {1, 0, 0}};
+	for (int i = 0; i < stations; i++) {
+		b->setup.stations[i] = (uint8_t)(i + 1);
+		b->e.present[i] = true;
+	}
+	test_line_init(&b->line, &b->e, (int)kind);
+	if (polhemus_setup(&b->line.line, &b->setup, &b->identity, "test", &err))
+		fail_msg("%s", err.text);
+	assert_int_equal(polhemus_stream_init(&b->stream, &b->setup, &b->identity.layout),
+			 0);
+	b->samples = calloc(300000, sizeof(*b->samples));
+	assert_non_null(b->samples);
+}
+
+static void bench_free(struct bench *b)
+{
+	polhemus_stream_free(&b->stream);
+	emulator_free(&b->e);
+	free(b->samples);
+}
+
+static void bench_take(struct bench *b)
+{
+	int n;
+
+	while ((n = polhemus_stream_take(&b->stream, b->samples + b->n, 100)) > 0)
+		b->n += (size_t)n;
+}
+
+static void bench_run(struct bench *b, double seconds)
+{
+	int64_t end_ns = b->line.now_ns + (int64_t)(seconds * 1e9);
+
+	while (b->line.now_ns < end_ns) {
+		unsigned char bytes[512];
+		int64_t t_ns;
+		ssize_t n = b->line.line.ops->read(&b->line.line, bytes, sizeof(bytes),
+						   &t_ns, 10);
+
+		assert_true(n >= 0);
+		polhemus_stream_put(&b->stream, bytes, (size_t)n, t_ns);
+		bench_take(b);
+	}
+}
+
+/* Whether a sample is what the emulator sent in this slot, to the float's last digit. */
+static bool is_sent(const struct incise_tracker_sample *s,
+		    const struct emulator_sent *sent)
+{
+	struct emulator_pose pose = emulator_pose(sent->slot, sent->station);
+
+	for (int i = 0; i < 3; i++)
+		if (s->position_mm[i] != (double)pose.xyz_cm[i] * 10)
+			return false;
+	/* It is made unit: the float's rounding, 4 times 6e-8. */
+	for (int i = 0; i < 4; i++)
+		if (fabs(s->quaternion[i] - (double)pose.q[i]) > 5e-7)
+			return false;
+	return s->station == sent->station && s->button == pose.button &&
+	       s->status == pose.error;
+}
+
+/*
+ * Every record that was not touched is there, once, in order, with a seq that counts all
+ * that were before it; how many touched ones are there as well.
+ */
+static size_t compare(struct bench *b, int64_t late_ns, uint64_t slack)
+{
+	size_t at = 0, extra = 0;
+	uint64_t lost = polhemus_stream_lost(&b->stream);
+
+	for (size_t i = 0; i < b->e.n_sent; i++) {
+		const struct emulator_sent *sent = &b->e.sent[i];
+
+		/* The last ones may be on their way. */
+		if (at == b->n)
+			break;
+		if (is_sent(&b->samples[at], sent)) {
+			const struct incise_tracker_sample *s = &b->samples[at++];
+
+			assert_true(s->t_ns >= sent->t_ns &&
+				    s->t_ns <= sent->t_ns + late_ns);
+			if (s->seq + slack < i || s->seq > i + slack)
+				fail_msg("record %zu has seq %llu", i,
+					 (unsigned long long)s->seq);
+			continue;
+		}
+		if (!sent->touched)
+			fail_msg("record %zu of slot %llu is not there", i,
+				 (unsigned long long)sent->slot);
+		/* It came to harm in a way that cannot be seen: at its time, from its place. */
+		if (b->samples[at].station == sent->station &&
+		    b->samples[at].t_ns >= sent->t_ns &&
+		    b->samples[at].t_ns < sent->t_ns + 2 * MS) {
+			at++;
+			extra++;
+		}
+	}
+	assert_int_equal(at, b->n);
+	for (size_t i = 1; i < b->n; i++)
+		assert_true(b->samples[i].seq > b->samples[i - 1].seq);
+	/* All that was sent up to the last sample is there or counted. */
+	assert_int_equal(b->n + lost, b->samples[b->n - 1].seq + 1);
+	return extra;
+}
+
+static void ten_minutes(void **state)
+{
+	static const struct {
+		enum emulator_kind kind;
+		int stations;
+		double seconds;
+		size_t records;
+	} cases[] = {
+		{EMULATOR_FASTRAK, 1, 600, 72000},
+		{EMULATOR_FASTRAK, 4, 100, 12000},
+		{EMULATOR_LIBERTY, 2, 50, 24000},
+		{EMULATOR_PATRIOT, 1, 100, 6000},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct bench b;
+
+		bench_init(&b, cases[i].kind, cases[i].stations);
+		bench_run(&b, cases[i].seconds);
+		assert_in_range(b.n, cases[i].records - 4, cases[i].records + 4);
+		assert_int_equal(b.n, b.e.n_sent);
+		assert_int_equal(compare(&b, 0, 0), 0);
+		assert_int_equal(polhemus_stream_lost(&b.stream), 0);
+		assert_int_equal(b.e.eeprom_writes, 0);
+		bench_free(&b);
+	}
+}
+
+/* Bursts of damage, of each kind and of all at once, at 1 % of the bytes, and at more. */
+static void loses_what_is_touched(void **state)
+{
+	static const struct {
+		enum emulator_kind kind;
+		int stations;
+		unsigned int flip, drop, insert, lose;
+	} cases[] = {
+		{EMULATOR_FASTRAK, 1, 10000, 0, 0, 0},
+		{EMULATOR_FASTRAK, 1, 0, 10000, 0, 0},
+		{EMULATOR_FASTRAK, 1, 0, 0, 10000, 0},
+		{EMULATOR_FASTRAK, 1, 5000, 5000, 5000, 0},
+		{EMULATOR_FASTRAK, 1, 50000, 0, 0, 0},
+		{EMULATOR_FASTRAK, 3, 10000, 0, 0, 0},
+		{EMULATOR_FASTRAK, 4, 5000, 5000, 5000, 0},
+		{EMULATOR_LIBERTY, 1, 10000, 0, 0, 0},
+		{EMULATOR_LIBERTY, 3, 5000, 5000, 5000, 20000},
+		{EMULATOR_PATRIOT, 2, 10000, 10000, 10000, 100000},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct bench b;
+		size_t touched = 0, extra;
+
+		bench_init(&b, cases[i].kind, cases[i].stations);
+		bench_run(&b, 2);
+		b.e.damage = (struct emulator_damage){b.e.slot,	       b.e.slot + 2400,
+						      cases[i].flip,   cases[i].drop,
+						      cases[i].insert, cases[i].lose};
+		bench_run(&b, 45);
+		for (size_t j = 0; j < b.e.n_sent; j++)
+			touched += b.e.sent[j].touched;
+		extra = compare(&b, S / 50, 0);
+		print_message(
+			"case %zu: %zu sent, %zu touched, %llu lost, %zu damaged and "
+			"not seen\n",
+			i, b.e.n_sent, touched,
+			(unsigned long long)polhemus_stream_lost(&b.stream), extra);
+		/* So it was tried. */
+		assert_true(touched > 100);
+		assert_true(polhemus_stream_lost(&b.stream) <= touched);
+		bench_free(&b);
+	}
+}
+
+/* Records that vanish without a trace, which only time tells, to within a window. */
+static void time_tells(void **state)
+{
+	for (int stations = 1; stations <= 4; stations++) {
+		struct bench b;
+		uint64_t missing = 0;
+
+		bench_init(&b, EMULATOR_FASTRAK, stations);
+		bench_run(&b, 2);
+		b.e.damage = (struct emulator_damage){
+			.from = b.e.slot, .to = b.e.slot + 6000, .lose = 20000};
+		bench_run(&b, 52);
+		for (size_t i = 0; i < b.e.n_sent; i++)
+			missing += b.e.sent[i].touched;
+		assert_true(missing > 60);
+		/* Exact in the end; on the way a window and its losses behind. */
+		compare(&b, 0, 3 * (uint64_t)stations + 3);
+		assert_int_equal(polhemus_stream_lost(&b.stream), missing);
+		bench_free(&b);
+	}
+}
+
+/* A host that looks rarely, and then gets many at once, lost nothing. */
+static void bursts_are_no_loss(void **state)
+{
+	static const double pauses_ms[] = {16, 40, 130, 400};
+
+	for (size_t p = 0; p < 4; p++) {
+		struct bench b;
+
+		bench_init(&b, EMULATOR_FASTRAK, 1);
+		for (int i = 0; i < 60; i++) {
+			unsigned char bytes[8192];
+			size_t n;
+
+			/* A pause, and then quick for a while. */
+			b.line.now_ns += (int64_t)(pauses_ms[p] * 1e6);
+			emulator_advance(&b.e, b.line.now_ns);
+			n = emulator_take(&b.e, bytes, sizeof(bytes));
+			polhemus_stream_put(&b.stream, bytes, n, b.line.now_ns);
+			bench_run(&b, 0.3);
+		}
+		assert_int_equal(b.n, b.e.n_sent);
+		assert_int_equal(polhemus_stream_lost(&b.stream), 0);
+		compare(&b, S, 0);
+		bench_free(&b);
+	}
+}
+
+/* Clocks that differ by 1000 ppm, for long enough to be 8 records apart. */
+static void drift_is_no_loss(void **state)
+{
+	static const double ppm[] = {-1000, 1000};
+
+	for (int i = 0; i < 2; i++) {
+		struct bench b;
+
+		bench_init(&b, EMULATOR_FASTRAK, 1);
+		bench_run(&b, 1);
+		b.e.start_ns = b.e.now_ns - (int64_t)((double)b.e.slot * 1e9 / 120);
+		/* The emulator's clock is ours, run faster or slower. */
+		b.e.start_ns = b.e.now_ns - (int64_t)((double)b.e.slot * 1e9 /
+						      (120 * (1 + ppm[i] * 1e-6)));
+		b.e.hz = 120 * (1 + ppm[i] * 1e-6);
+		bench_run(&b, 70);
+		assert_int_equal(b.n, b.e.n_sent);
+		assert_int_equal(polhemus_stream_lost(&b.stream), 0);
+		bench_free(&b);
+	}
+}
+
+/* The tip is where the quaternion turns it to, by a matrix that is written out. */
+static void the_tip(void **state)
+{
+	struct bench b;
+
+	bench_init(&b, EMULATOR_FASTRAK, 1);
+	b.stream.setup.tip_mm[0] = 3;
+	b.stream.setup.tip_mm[1] = -20;
+	b.stream.setup.tip_mm[2] = 100;
+	bench_run(&b, 10);
+	assert_true(b.n > 1000);
+	for (size_t k = 0; k < b.n; k++) {
+		const struct incise_tracker_sample *s = &b.samples[k];
+		struct emulator_pose pose = emulator_pose(b.e.sent[k].slot, 1);
+		double w = s->quaternion[0], x = s->quaternion[1], y = s->quaternion[2],
+		       z = s->quaternion[3];
+		const double r[3][3] = {
+			{w * w + x * x - y * y - z * z, 2 * (x * y - w * z),
+			 2 * (x * z + w * y)},
+			{2 * (x * y + w * z), w * w - x * x + y * y - z * z,
+			 2 * (y * z - w * x)},
+			{2 * (x * z - w * y), 2 * (y * z + w * x),
+			 w * w - x * x - y * y + z * z},
+		};
+
+		for (int i = 0; i < 3; i++)
+			/* Rounding of sums of 100. */
+			assert_true(fabs((double)pose.xyz_cm[i] * 10 + r[i][0] * 3 -
+					 r[i][1] * 20 + r[i][2] * 100 -
+					 s->position_mm[i]) < 1e-10);
+	}
+	bench_free(&b);
+}
+
+/* Nobody reads: what has no room is counted, and the rest in order. */
+static void no_room(void **state)
+{
+	struct bench b;
+	uint64_t dropped;
+
+	bench_init(&b, EMULATOR_FASTRAK, 1);
+	for (int i = 0; i < 5000; i++) {
+		unsigned char bytes[512];
+		int64_t t_ns;
+		ssize_t n = b.line.line.ops->read(&b.line.line, bytes, sizeof(bytes),
+						  &t_ns, 10);
+
+		polhemus_stream_put(&b.stream, bytes, (size_t)n, t_ns);
+	}
+	dropped = polhemus_stream_lost(&b.stream);
+	bench_take(&b);
+	assert_true(dropped > 500);
+	assert_int_equal(b.n + dropped, b.e.n_sent);
+	bench_run(&b, 1);
+	assert_int_equal(b.n + dropped, b.samples[b.n - 1].seq + 1);
+	bench_free(&b);
+}
+
+/* Away for a while: all that time is lost, to the record. */
+static void pulled_out(void **state)
+{
+	for (int stations = 1; stations <= 3; stations++) {
+		struct bench b;
+		size_t was;
+
+		bench_init(&b, EMULATOR_FASTRAK, stations);
+		bench_run(&b, 2.5);
+		was = b.n;
+		/* Its set-up takes some of the time as well. */
+		b.line.now_ns += 3 * S;
+		emulator_advance(&b.e, b.line.now_ns);
+		b.e.n_records = 0;
+		assert_int_equal(polhemus_setup(&b.line.line, &b.setup, &b.identity,
+						"test", NULL),
+				 0);
+		polhemus_stream_broken(&b.stream, &b.identity.layout);
+		bench_run(&b, 1);
+		assert_true(b.n > was + 100);
+		/* By slot, as the order of stations begins anew: a round at most. */
+		assert_in_range(polhemus_stream_lost(&b.stream) + b.n,
+				b.e.slot - b.e.sent[0].slot - (uint64_t)stations - 1,
+				b.e.slot - b.e.sent[0].slot + (uint64_t)stations + 1);
+		assert_int_equal(b.samples[b.n - 1].seq + 1,
+				 polhemus_stream_lost(&b.stream) + b.n);
+		bench_free(&b);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(ten_minutes),
+		cmocka_unit_test(loses_what_is_touched),
+		cmocka_unit_test(time_tells),
+		cmocka_unit_test(bursts_are_no_loss),
+		cmocka_unit_test(drift_is_no_loss),
+		cmocka_unit_test(the_tip),
+		cmocka_unit_test(no_room),
+		cmocka_unit_test(pulled_out),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/polhemus/polhemus_tracker.c, polhemus_tty.c and the backend "tty", through their
+ * door, with the emulator behind a pseudo terminal. Nothing is held to the clock: a host that is
+ * busy makes it wait longer.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <sys/file.h>
+#include "../../../lib/device/polhemus/polhemus_tracker.h"
+#include "../../../lib/device/polhemus/polhemus_tty.h"
+#include "../../../lib/device/polhemus/tracker_tty.c"
+#include "pty.h"
+
+#define PATIENCE_NS INT64_C(20000000000)
+
+static const struct incise_tracker_setup two = {
+	.n_stations = 2, .stations = {1, 3}, .hemisphere = {1, 0, 0}};
+static struct pty pty;
+
+static int begin(void **state)
+{
+	assert_int_equal(pty_begin(&pty, EMULATOR_FASTRAK), 0);
+	pty.emulator.present[2] = true;
+	return 0;
+}
+
+static int end(void **state)
+{
+	pty_unplug(&pty);
+	pty_end(&pty);
+	return 0;
+}
+
+static struct incise_tracker *open_it(const struct polhemus_times *times,
+				      struct incise_error *err)
+{
+	struct polhemus_line *line =
+		polhemus_tty_open(pty.path, "rig.conf:1: tracker", err);
+
+	assert_non_null(line);
+	return polhemus_tracker_open(line, &two, times, "rig.conf:1: tracker", err);
+}
+
+/* Read until there were @n; each follows the one before. */
+static int read_some(struct incise_tracker *tracker, uint64_t *next, uint64_t n)
+{
+	int64_t end_ns = pty_now_ns() + PATIENCE_NS;
+	uint64_t end = *next + n;
+
+	while (*next < end && pty_now_ns() < end_ns) {
+		struct incise_tracker_sample samples[16];
+		int m = incise_tracker_read(tracker, samples, 16);
+
+		if (m < 0)
+			return m;
+		for (int i = 0; i < m; i++) {
+			assert_true(samples[i].seq >= *next);
+			assert_true(samples[i].station == 1 || samples[i].station == 3);
+			assert_true(samples[i].t_ns <= pty_now_ns());
+			*next = samples[i].seq + 1;
+		}
+		if (!m)
+			usleep(2000);
+	}
+	return *next < end ? -ETIMEDOUT : 0;
+}
+
+static void through_the_door(void **state)
+{
+	const struct incise_backend_request request = {
+		.arguments = pty.path, .where = "rig.conf:1: tracker", .tracker = &two};
+	struct incise_error err = {0};
+	struct incise_tracker *tracker = incise_backend.open(&request, &err);
+	struct incise_tracker_info info;
+	uint64_t next = 0;
+	int fd;
+
+	if (!tracker)
+		fail_msg("%s", err.text);
+	incise_tracker_info(tracker, &info);
+	assert_string_equal(info.name, "FASTRAK 3.02 OutputCompensat CPG2030-003-10");
+	assert_true(info.rate_hz == 120 && info.stations == 2);
+	/* 4 ms of the device, and 34 bytes of 10 bits at 115200. */
+	assert_in_range(info.latency_ns, 6950000, 6952000);
+	assert_int_equal(read_some(tracker, &next, 60), 0);
+	/* Ours alone. */
+	fd = open(pty.path, O_RDWR | O_NOCTTY);
+	assert_true(fd < 0 || flock(fd, LOCK_EX | LOCK_NB) < 0);
+	if (fd >= 0)
+		close(fd);
+	tracker->ops->close(tracker);
+	assert_int_equal(pty.emulator.eeprom_writes, 0);
+}
+
+static void pulled_out_and_back(void **state)
+{
+	const struct polhemus_times times = {400, 20, 20000};
+	struct incise_error err = {0};
+	struct incise_tracker *tracker = open_it(&times, &err);
+	struct incise_tracker_sample sample;
+	uint64_t next = 0, before;
+
+	if (!tracker)
+		fail_msg("%s", err.text);
+	assert_int_equal(read_some(tracker, &next, 30), 0);
+	before = incise_tracker_lost(tracker);
+	pty_unplug(&pty);
+	/* What came before is still taken; then there is nothing. */
+	while (incise_tracker_read(tracker, &sample, 1) > 0)
+		next = sample.seq + 1;
+	usleep(300000);
+	assert_int_equal(incise_tracker_read(tracker, &sample, 1), 0);
+	/* As switched off and on: as it was delivered. */
+	emulator_free(&pty.emulator);
+	emulator_init(&pty.emulator, EMULATOR_FASTRAK, pty_now_ns());
+	pty.emulator.present[2] = true;
+	assert_int_equal(pty_plug(&pty), 0);
+	assert_int_equal(read_some(tracker, &next, 100), 0);
+	/* It was away for 0.3 s at least: 36 records. */
+	assert_true(incise_tracker_lost(tracker) >= before + 36);
+	/* Silent, as when its power goes and its line stays. */
+	before = incise_tracker_lost(tracker);
+	atomic_store(&pty.deaf, true);
+	usleep(600000);
+	while (incise_tracker_read(tracker, &sample, 1) > 0)
+		next = sample.seq + 1;
+	atomic_store(&pty.deaf, false);
+	assert_int_equal(read_some(tracker, &next, 100), 0);
+	assert_true(incise_tracker_lost(tracker) >= before + 60);
+	tracker->ops->close(tracker);
+}
+
+static void gone_for_good(void **state)
+{
+	const struct polhemus_times times = {200, 20, 100};
+	struct incise_error err = {0};
+	struct incise_tracker *tracker = open_it(&times, &err);
+	int64_t end_ns = pty_now_ns() + PATIENCE_NS;
+	struct incise_tracker_sample sample;
+	int rc = 0;
+
+	assert_non_null(tracker);
+	pty_unplug(&pty);
+	while (rc >= 0 && pty_now_ns() < end_ns) {
+		rc = incise_tracker_read(tracker, &sample, 1);
+		usleep(1000);
+	}
+	assert_int_equal(rc, -ENODEV);
+	assert_int_equal(incise_tracker_read(tracker, &sample, 1), -ENODEV);
+	tracker->ops->close(tracker);
+	assert_int_equal(pty_plug(&pty), 0);
+}
+
+static void refuses(void **state)
+{
+	static const struct {
+		const char *arguments;
+		int code;
+	} cases[] = {
+		{"", EINVAL},
+		{"ttyUSB0:9600", EINVAL},
+		{"/dev/null:115201", EINVAL},
+		{"/dev/null:99999999999", EINVAL},
+		{"/dev/null:9600", EINVAL},
+		{"/tmp", EINVAL},
+		{"/dev/not-there", ENODEV},
+		{"/dev/not:there:9600", ENODEV},
+	};
+	static const struct incise_tracker_setup bad[] = {
+		{.n_stations = 0, .hemisphere = {1, 0, 0}},
+		{.n_stations = 5, .stations = {1, 2, 3, 4}, .hemisphere = {1, 0, 0}},
+		{.n_stations = 2, .stations = {2, 1}, .hemisphere = {1, 0, 0}},
+		{.n_stations = 1, .stations = {5}, .hemisphere = {1, 0, 0}},
+		{.n_stations = 1, .stations = {1}, .hemisphere = {0, 0, 0}},
+		{.n_stations = 1, .stations = {1}, .hemisphere = {1, 0, 0}, .sync = 3},
+		{.n_stations = 1,
+		 .stations = {1},
+		 .hemisphere = {1, 0, 0},
+		 .tip_mm = {0, 1 / 0.0, 0}},
+	};
+	struct incise_error err;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		err = (struct incise_error){0};
+		assert_null(polhemus_tty_open(cases[i].arguments, "rig.conf", &err));
+		if (errno != cases[i].code || err.code != errno)
+			fail_msg("%s: %s", cases[i].arguments, err.text);
+	}
+	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++) {
+		struct polhemus_line *line =
+			polhemus_tty_open(pty.path, "rig.conf", &err);
+
+		assert_non_null(line);
+		assert_null(polhemus_tracker_open(line, &bad[i], &POLHEMUS_TIMES,
+						  "rig.conf", &err));
+		assert_int_equal(errno, EINVAL);
+	}
+}
+
+static int count_found(void *context, const struct incise_scan_device *device)
+{
+	struct incise_scan_device *last = context;
+
+	*last = *device;
+	return 0;
+}
+
+static void a_scan(void **state)
+{
+	struct incise_scan_device found = {0};
+	struct incise_error err = {0};
+	char arguments[80];
+
+	snprintf(arguments, sizeof(arguments), "%s:115200", pty.path);
+	if (incise_backend.scan(arguments, count_found, &found, &err))
+		fail_msg("%s", err.text);
+	assert_non_null(strstr(found.device, arguments));
+	assert_string_equal(found.what, "FASTRAK 3.02 OutputCompensat CPG2030-003-10");
+	assert_int_equal(found.n, 3);
+	assert_string_equal(found.property[2].text, "13");
+	assert_int_equal(incise_backend.scan("/dev/not-there", count_found, &found, &err),
+			 -ENODEV);
+	assert_int_equal(incise_backend.scan("", count_found, &found, &err), 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(through_the_door, begin, end),
+		cmocka_unit_test_setup_teardown(pulled_out_and_back, begin, end),
+		cmocka_unit_test_setup_teardown(gone_for_good, begin, end),
+		cmocka_unit_test_setup_teardown(refuses, begin, end),
+		cmocka_unit_test_setup_teardown(a_scan, begin, end),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
