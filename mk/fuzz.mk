@@ -27,6 +27,10 @@ fuzz_can_frames := lib/base/error.c $(addprefix lib/device/can/,canopen.c canope
 	canopen_text.c cia402.c cia402_homing.c cia402_limits.c cia402_object.c cia402_pdo.c \
 	cia402_power.c cia402_setup.c cia402_units.c)
 
+fuzz_polhemus_records := lib/base/ring.c $(addprefix lib/device/polhemus/polhemus_,gaps.c model.c \
+	records.c stream.c)
+fuzz_polhemus_status := lib/device/polhemus/polhemus_reply.c
+
 fuzz_core := $(patsubst %.c,$(O)/obj/fuzz/%.o,$(wildcard lib/fixed/*.c))
 define fuzz_program
 $(O)/tests/fuzz/$1: $(O)/obj/fuzz/tests/fuzz/$1.o $(fuzz_core) \

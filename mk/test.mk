@@ -29,6 +29,11 @@ emulator := tests/polhemus/emulator.c
 unit_emulator = $(if $(filter polhemus/%,$*),$(emulator))
 $(filter $(O)/tests/unit/polhemus/%,$(unit_programs)): $(emulator) tests/polhemus/emulator.h
 
+$(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
+		$(filter %.c,$^) -lm -pthread
+
 $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \

@@ -19,12 +19,12 @@ $(O)/tests/vm/%: tests/vm/guest/%.c $(guest_shared) $(guest_headers) \
 # Virtual time for whatever asserts on time, two processors for races.
 vm_boots := main:deterministic second:deterministic main:smp
 
-check-vm: all $(guest_programs) ## tests of the kernel modules, on Debian's kernels in QEMU
+check-vm: all $(guest_programs) $(O)/tests/polhemus/fastrak ## tests of the kernel modules, on Debian's kernels in QEMU
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed $(vm_boots)
 
 # In real time only: with every access checked its timers are late by up to a millisecond,
 # in virtual time too, so that nothing about time can be asserted.
-check-vm-debug: all $(guest_programs) ## the same on a kernel with KASAN, lockdep, kmemleak; built once
+check-vm-debug: all $(guest_programs) $(O)/tests/polhemus/fastrak ## the same on a kernel with KASAN, lockdep, kmemleak; built once
 	@mk/deps vm vm-debug
 	+@tests/vm/debug-kernel >/dev/null
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed debug:smp

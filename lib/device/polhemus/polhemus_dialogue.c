@@ -10,7 +10,8 @@
 #define QUIET_MS 120   /* without a byte: it has ended; 10 records at 120 Hz */
 #define ANSWER_MS 1000 /* the manual gives none; a system cycle is 8 ms */
 #define WAIT_MS 20
-#define DRAIN_MAX 65536 /* bytes: 10 s of what it sends; then it does not listen */
+#define HEARD_MS 5     /* what a read counts that brought bytes: they may never end */
+#define DRAIN_MAX 8192 /* bytes: 2 s of what a FASTRAK sends */
 
 static int gone(struct polhemus_dialogue *d, int rc)
 {
@@ -55,11 +56,7 @@ int polhemus_drain(struct polhemus_dialogue *d)
 			return (int)n;
 		bytes += (size_t)n;
 		if (bytes > DRAIN_MAX)
-			return incise_error_set(
-				d->err, EBUSY,
-				"%s: the device at %s does not stop sending: is it a "
-				"Polhemus tracker, and the baud rate its own?",
-				d->where, d->line->name);
+			return -EBUSY;
 	}
 }
 
@@ -149,7 +146,7 @@ int polhemus_ask(struct polhemus_dialogue *d, const char *command, char type, ch
 		if (n < 0)
 			return (int)n;
 		/* What comes and comes is no answer either. */
-		waited += n ? 1 : WAIT_MS;
+		waited += n ? HEARD_MS : WAIT_MS;
 		while (next_line(d, text, sizeof(text))) {
 			if (strstr(text, "*ERROR*"))
 				return refused(d, command, text);
@@ -195,7 +192,7 @@ int polhemus_ask_frame(struct polhemus_dialogue *d, const char *command,
 
 		if (n < 0)
 			return (int)n;
-		waited += n ? 1 : WAIT_MS;
+		waited += n ? HEARD_MS : WAIT_MS;
 		if (at > d->n)
 			at = 0;
 		while (at < d->n) {

@@ -24,7 +24,7 @@ struct polhemus_dialogue {
 /* 0, -ENODEV, -EIO. */
 int polhemus_say(struct polhemus_dialogue *d, const char *command);
 
-/* Throw away what comes, until nothing does. -EBUSY: it does not end. */
+/* Throw away what comes, until nothing does. -EBUSY, without a line: it does not end. */
 int polhemus_drain(struct polhemus_dialogue *d);
 
 /* All that comes until nothing does: how many bytes in d->bytes. -EBUSY: too many. */

@@ -39,6 +39,8 @@ int polhemus_liberty_identify(struct polhemus_dialogue *d,
 
 	if (!rc)
 		rc = polhemus_drain(d);
+	if (rc == -EBUSY)
+		return -ETIMEDOUT; /* what comes is no answer */
 	if (!rc)
 		rc = polhemus_ask_frame(d, "\026\r", CONTROL_V, &frame);
 	if (rc)

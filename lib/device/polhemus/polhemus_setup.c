@@ -6,6 +6,8 @@
 #include <string.h>
 #include "polhemus_family.h"
 
+#define STOPS 5
+
 static int no_answer(struct polhemus_dialogue *d)
 {
 	return incise_error_set(
@@ -25,9 +27,20 @@ static int quiet(struct polhemus_dialogue *d)
 	const char *stop = d->line->family == POLHEMUS_FASTRAK ? "\rc"
 			   : d->line->family >= 0	       ? "\rP"
 							       : "\rc\rP";
-	int rc = polhemus_say(d, stop);
+	int rc = -EBUSY;
 
-	return rc ? rc : polhemus_drain(d);
+	/* Again and again: one that was just switched on did not hear the first. */
+	for (int i = 0; rc == -EBUSY && i < STOPS; i++) {
+		rc = polhemus_say(d, stop);
+		if (!rc)
+			rc = polhemus_drain(d);
+	}
+	if (rc == -EBUSY)
+		incise_error_set(d->err, EBUSY,
+				 "%s: the device at %s does not stop sending: is it a "
+				 "Polhemus tracker, and the baud rate its own?",
+				 d->where, d->line->name);
+	return rc;
 }
 
 /* Which family it is, where the line does not tell. */

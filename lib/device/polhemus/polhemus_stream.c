@@ -11,10 +11,11 @@ int polhemus_stream_init(struct polhemus_stream *stream,
 			 const struct incise_tracker_setup *setup,
 			 const struct polhemus_layout *layout)
 {
-	double hz = setup->sync == INCISE_TRACKER_INTERNAL
-			    ? polhemus_family_hz(layout->family, setup->n_stations)
-			    : 0;
+	double hz = polhemus_family_hz(layout->family, setup->n_stations);
 
+	/* Pulses from outside come as they like; the others have no such input. */
+	if (layout->family == POLHEMUS_FASTRAK && setup->sync != INCISE_TRACKER_INTERNAL)
+		hz = 0;
 	memset(stream, 0, sizeof(*stream));
 	stream->setup = *setup;
 	polhemus_records_init(&stream->records, layout);
