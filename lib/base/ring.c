@@ -18,9 +18,10 @@ int incise_ring_init(struct incise_ring *ring, size_t size, size_t count)
 		return -EINVAL;
 	while (room < count)
 		room *= 2;
+	if (size > SIZE_MAX / room)
+		return -ENOMEM;
 	ring->size = size;
 	ring->room = room;
-	/* calloc: pages that are never touched cost nothing, and its product is checked */
 	ring->records = calloc(room, size);
 	return ring->records ? 0 : -ENOMEM;
 }

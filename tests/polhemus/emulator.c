@@ -79,7 +79,8 @@ static void reply_bytes(struct emulator *e, const void *bytes, size_t n)
 {
 	if (n > EMULATOR_ROOM - e->n_replies)
 		n = EMULATOR_ROOM - e->n_replies;
-	memcpy(e->replies + e->n_replies, bytes, n);
+	if (n)
+		memcpy(e->replies + e->n_replies, bytes, n);
 	e->n_replies += n;
 }
 
@@ -283,11 +284,13 @@ static void cycle(struct emulator *e)
 {
 	bool button = emulator_pose(e->slot, 1).button && e->on[0];
 
-	/* Unless it is told to be a mouse's, the button ends and begins the stream. */
-	if (button && !e->pressed && !e->mouse)
-		e->continuous = !e->continuous;
-	e->pressed = button;
+	/* Unless it is told to be a mouse's, the button ends and begins a stream. */
 	if (!e->continuous)
+		e->paused = false;
+	else if (button && !e->pressed && !e->mouse)
+		e->paused = !e->paused;
+	e->pressed = button;
+	if (!e->continuous || e->paused)
 		return;
 	if (e->kind == EMULATOR_FASTRAK) {
 		int station = next_station(e, e->turn);

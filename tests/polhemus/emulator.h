@@ -71,9 +71,9 @@ struct emulator {
 	char command[160];
 	size_t n;
 	int64_t start_ns, now_ns;
-	uint64_t slot; /* the next */
-	int turn;      /* which of the stations is next */
-	bool pressed;
+	uint64_t slot;	      /* the next */
+	int turn;	      /* which of the stations is next */
+	bool pressed, paused; /* its button; by it */
 
 	unsigned char replies[EMULATOR_ROOM], records[EMULATOR_ROOM];
 	size_t n_replies, n_records;

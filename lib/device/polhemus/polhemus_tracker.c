@@ -173,6 +173,8 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 		rc = polhemus_setup(t->line, setup, &t->identity, where, err);
 	if (rc)
 		return rc;
+	/* So that it need not be asked again when it comes back. */
+	t->line->family = (int)t->identity.layout.family;
 	if (polhemus_stream_init(&t->stream, setup, &t->identity.layout))
 		rc = incise_error_set(err, ENOMEM, "%s: out of memory", where);
 	if (!rc) {
