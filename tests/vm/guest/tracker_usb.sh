@@ -59,7 +59,7 @@ make_gadget 0x0002 SN-77
 check "it is listed with the string of rig.conf" lists "usb:0f44:0002#SN-77: FASTRAK"
 place=$(basename "$(dirname "$(grep -l 0f44 /sys/bus/usb/devices/*/idVendor)")")
 # TRACKER_SECONDS=600 for the ten minutes that tests/unit/polhemus has in a time of its own.
-"$program" "0f44:0002" "${TRACKER_SECONDS:-30}"
+"$program" "0f44:0002" "${TRACKER_SECONDS:-10}"
 "$program" "0f44:0002@$place" 1
 "$program" "0f44:0002#SN-77" 1
 check "another place is none" "$program" --refuse "0f44:0002@9-9" "no 0f44:0002@9-9 is attached"
