@@ -14,7 +14,7 @@
  *            '---------------------------------------------------> records
  *
  * Where stations are out of order, or bytes were no record, the loss is told at once;
- * where only time tells, once the lateness stayed for POLHEMUS_GAPS_WINDOW records (0.1 s):
+ * where only time tells, once the lateness stayed for POLHEMUS_GAPS_WINDOW records (0.5 s):
  * the number is right then, its place in seq is that much late. A drift between the
  * two clocks is followed. With sync from outside there is no period, and only
  * order and damage tell.
@@ -26,7 +26,7 @@
 #include <stdint.h>
 #include "polhemus_records.h"
 
-#define POLHEMUS_GAPS_WINDOW 12
+#define POLHEMUS_GAPS_WINDOW 60
 
 struct polhemus_gaps {
 	uint8_t order[POLHEMUS_STATIONS]; /* in which stations send */
