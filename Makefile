@@ -27,26 +27,38 @@ version := $(shell sed -n 's/^\#define INCISE_VERSION "\(.*\)"/\1/p' lib/include
 soversion := 1
 
 cppflags := -D_GNU_SOURCE -Ilib/include
+cxxflags := -std=c++14 -fPIC -fvisibility=hidden -ffp-contract=off -Wall -Wextra
 warnings := -Wall -Wextra -Wmissing-prototypes -Wstrict-prototypes -Wvla
 cflags := -std=gnu11 -fPIC -fvisibility=hidden -fno-math-errno -ffp-contract=off $(warnings)
 
+# Vision is built where the headers of OpenCV are, which is in C++. Debian's opencv4.pc is in
+# the package of all of OpenCV, half a gigabyte: two small ones will do.
+opencv_cflags := $(or $(shell $(PKG_CONFIG) --cflags opencv4 2>/dev/null),-I/usr/include/opencv4)
+has_vision := $(if $(shell $(CXX) -E -x c++ $(opencv_cflags) -include opencv2/imgproc.hpp \
+	-include cstdio -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes),yes)
+
 # One shared object per group of rooms; a process maps only the ones it uses.
-libraries := incise incise-learn incise-record
+libraries := incise incise-learn incise-record $(if $(has_vision),incise-vision)
 rooms_incise := base fixed model tissue scene loop sim device
 rooms_incise-learn := learn
 rooms_incise-record := record
+rooms_incise-vision := vision
 pc_incise := libconfig
 pc_incise-learn := lapacke lapack blas
 pc_incise-record := sqlite3
+cflags_incise-vision := $(opencv_cflags)
 libs_incise := -lm -ldl
 libs_incise-learn := -lm
 libs_incise-record := -lm
+libs_incise-vision := -lopencv_imgproc -lopencv_core -ljpeg -lstdc++ -lm
 about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop
 about_incise-learn := haptic cutting: learning models from data
 about_incise-record := haptic cutting: recordings and what is exported of them
+about_incise-vision := haptic cutting: depth of the blade from pictures
 needs_incise :=
 needs_incise-learn := incise
 needs_incise-record := incise
+needs_incise-vision := incise
 
 # One program per verb, and the libraries it is linked to.
 verbs := $(patsubst tools/incise-%.c,%,$(wildcard tools/incise-*.c))
@@ -60,7 +72,7 @@ uses_haptic := incise
 uses_stepper := incise
 uses_plan := incise
 uses_demo := incise incise-learn
-uses_bench := incise incise-learn
+uses_bench := incise incise-learn $(if $(has_vision),incise-vision)
 
 all: libs tools
 

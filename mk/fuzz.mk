@@ -10,7 +10,7 @@ FUZZ_RUNS ?= 40000
 CLANG ?= $(firstword $(foreach name,clang $(addprefix clang-,22 21 20 19 18 17 16 15 14),\
 	$(shell command -v $(name))))
 
-fuzz_sources := $(wildcard tests/fuzz/*.c)
+fuzz_sources := $(filter-out $(if $(has_vision),,%/vision_frame.c),$(wildcard tests/fuzz/*.c))
 fuzz_programs := $(patsubst tests/%.c,$(O)/tests/%,$(fuzz_sources))
 
 fuzz_flags := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined \
@@ -21,7 +21,14 @@ $(O)/obj/fuzz/%.o: %.c
 	$(CLANG) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \
 		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
+$(O)/obj/fuzz/%.o: %.cc
+	@mkdir -p $(@D)
+	$(CLANG) $(cppflags) $(CPPFLAGS) $(cxxflags) $(opencv_cflags) \
+		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
+
 # What a target needs beside that.
+fuzz_vision_frame := lib/base/error.c $(wildcard lib/vision/*.c lib/vision/*.cc)
+fuzz_libs_vision_frame := $(libs_incise-vision)
 fuzz_slcan_line := lib/device/can/slcan_line.c
 fuzz_can_frames := lib/base/error.c $(addprefix lib/device/can/,canopen.c canopen_sdo.c \
 	canopen_text.c cia402.c cia402_homing.c cia402_limits.c cia402_object.c cia402_pdo.c \
@@ -34,9 +41,9 @@ fuzz_polhemus_status := lib/device/polhemus/polhemus_reply.c
 fuzz_core := $(patsubst %.c,$(O)/obj/fuzz/%.o,$(wildcard lib/fixed/*.c))
 define fuzz_program
 $(O)/tests/fuzz/$1: $(O)/obj/fuzz/tests/fuzz/$1.o $(fuzz_core) \
-		$$(patsubst %.c,$(O)/obj/fuzz/%.o,$$(fuzz_$1))
+		$$(addprefix $(O)/obj/fuzz/,$$(addsuffix .o,$$(basename $$(fuzz_$1))))
 	@mkdir -p $$(@D)
-	$$(CLANG) $$(fuzz_flags) -fsanitize=fuzzer -o $$@ $$^ -lm
+	$$(CLANG) $$(fuzz_flags) -fsanitize=fuzzer -o $$@ $$^ $$(fuzz_libs_$1) -lm
 endef
 $(foreach name,$(basename $(notdir $(fuzz_sources))),$(eval $(call fuzz_program,$(name))))
 

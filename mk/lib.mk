@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # The shared objects.
 
-sources = $(sort $(foreach room,$(rooms_$1),$(wildcard lib/$(room)/*.c)))
-objects = $(patsubst %.c,$(O)/obj/%.o,$(call sources,$1))
+sources = $(sort $(foreach room,$(rooms_$1),$(wildcard lib/$(room)/*.c lib/$(room)/*.cc)))
+objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))))
 
 $(O)/obj/%.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
+
+$(O)/obj/%.o: %.cc
+	@mkdir -p $(@D)
+	$(CXX) $(cppflags) $(CPPFLAGS) $(cxxflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
 
 # The integer core builds without any library and, where the compiler can be told so,
 # without floating-point registers: it will be linked into a kernel.
@@ -15,7 +19,7 @@ fixed_cflags += $(if $(filter x86_64-%,$(shell $(CC) -dumpmachine 2>/dev/null)),
 $(O)/obj/lib/fixed/%.o: cflags += $(fixed_cflags)
 
 define library
-pc_flags_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --cflags $$(pc_$1)))
+pc_flags_$1 = $$(cflags_$1) $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --cflags $$(pc_$1)))
 pc_libs_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1)))
 $$(call objects,$1): pc_cflags = $$(pc_flags_$1)
 
@@ -68,6 +72,7 @@ objects_stepper_slcan := $(can_core) \
 
 # Needs nothing but the kernel's headers.
 device_modules += camera_v4l2
+pc_camera_v4l2 :=
 objects_camera_v4l2 := $(O)/obj/lib/device/thread.o \
 	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c))
 # Force samples from two kinds of converters; what is not of one is of both.
@@ -114,17 +119,19 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(filter-out %/camera_v4l2.c,\
 		$(if $(has_libmnl),,%/socketcan.c %/can_netlink.c),$(wildcard lib/device/can/*.c))) \
 	$(addprefix $(O)/obj/lib/device/daq/,daq_feed.o daq_scan.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(if $(has_libiio),$(daq_iio)) \
-		$(if $(has_comedilib),$(daq_comedi)))
-	$(filter $(O)/obj/lib/device/polhemus/%,$(filter-out %/tracker_tty.o,$(objects_tracker_tty)))
+		$(if $(has_comedilib),$(daq_comedi))) \
+	$(filter $(O)/obj/lib/device/polhemus/%,$(filter-out %/tracker_tty.o,$(objects_tracker_tty))) \
+	$(O)/obj/tools/scalpel_picture.o
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
 	# q, not r: two rooms may have a file of the same name
 	$(AR) qcs $@ $^
 
+# Vision's own are linked to its own tests only: every other one would map OpenCV.
 all_libs = $(if $(has_libmnl),$(shell $(PKG_CONFIG) --libs libmnl)) \
 	$(if $(has_libiio),$(shell $(PKG_CONFIG) --libs libiio)) \
 	$(if $(has_comedilib),$(shell $(PKG_CONFIG) --libs comedilib)) \
-	$(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
+	$(foreach lib,$(filter-out incise-vision,$(libraries)),$(pc_libs_$(lib)) $(libs_$(lib)))
 
 .PHONY: libs

@@ -3,7 +3,8 @@
 # without a kernel; tests/cli runs the real programs.
 
 unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_netlink.c) \
-	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%),\
+	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \
+	$(if $(has_vision),,tests/unit/vision/%),\
 	$(wildcard tests/unit/*/*.c))
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
@@ -39,6 +40,7 @@ $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
 		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
 		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(O)/lib/libincise-tests.a \
+		$(if $(filter vision/%,$*),$(libs_incise-vision)) \
 		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm
 
 check: ## install what is missing, build, and run all tests
@@ -70,7 +72,7 @@ check-sanitize: ## unit tests under AddressSanitizer and UBSan
 	+@$(MAKE) --no-print-directory O=$(O)/sanitize CFLAGS="-O1 -g $(sanitize_flags)" \
 		LDFLAGS="$(sanitize_flags)" check-unit
 
-style_sources := $(shell find lib tools tests driver -name '*.[ch]' 2>/dev/null)
+style_sources := $(shell find lib tools tests driver -name '*.[ch]' -o -path 'lib/*.cc' 2>/dev/null)
 check-style: ## the house's form: clang-format, an SPDX line in every file
 	@tests/style $(style_sources)
 

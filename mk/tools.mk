@@ -20,7 +20,9 @@ extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stopwatch
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o \
 	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
-	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o)
+	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o \
+	bench_vision.o scalpel_picture.o)
+$(O)/obj/tools/bench_vision.o: cppflags += $(if $(has_vision),-DWITH_VISION)
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
 # built where its headers are. It is for measuring, and is not installed.
@@ -70,5 +72,6 @@ bench: ## measure error against run time on this machine; chart in build/bench/
 	$(O)/bin/incise bench training
 	$(O)/bin/incise bench loop
 	$(O)/bin/incise bench stability --plot $(O)/bench/stability
+	$(O)/bin/incise bench vision
 
 .PHONY: tools deps demo bench

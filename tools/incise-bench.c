@@ -8,6 +8,7 @@
 #include "bench_precision.h"
 #include "bench_stability.h"
 #include "bench_training.h"
+#include "bench_vision.h"
 #include "cli.h"
 
 enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK };
@@ -24,7 +25,7 @@ static const struct cli_option options[] = {
 static const struct cli_verb verb = {
 	.name = "bench",
 	.synopsis =
-		"precision [MODEL.fis] | training | stability | loop [SCENE] [OPTIONS]",
+		"precision [MODEL.fis] | training | stability | loop [SCENE] | vision [OPTIONS]",
 	.summary =
 		"precision: measure error against run time of a model's arithmetics. Without\n"
 		"MODEL a model of the paper's size (20 rules) is made.\n"
@@ -33,7 +34,9 @@ static const struct cli_verb verb = {
 		"guard of passivity on and off; integrators of a stiff spring.\n"
 		"loop: measure what a tick of the haptic loop costs with all forces, on a plane\n"
 		"and on meshes of 20 000 and 500 000 triangles, or of SCENE; and how late the\n"
-		"machine wakes it.",
+		"machine wakes it.\n"
+		"vision: measure error and run time of the exposed length in pictures whose truth\n"
+		"is known.",
 	.options = options,
 	.notes =
 		"Exit: 0 measured, 1 failed or simulation and theory differ, 2 bad usage.\n"
@@ -65,15 +68,19 @@ static void loop(const struct job *job)
 	bench_loop(job->operand, job->json, job->quick);
 }
 
+static void vision(const struct job *job)
+{
+	bench_vision(job->json, job->quick);
+}
+
 static const struct {
 	const char *word;
 	bool operand, plot; /* takes one */
 	void (*run)(const struct job *job);
 } words[] = {
-	{"precision", true, true, precision},
-	{"training", false, false, training},
-	{"stability", false, true, stability},
-	{"loop", true, false, loop},
+	{"precision", true, true, precision},  {"training", false, false, training},
+	{"stability", false, true, stability}, {"loop", true, false, loop},
+	{"vision", false, false, vision},
 };
 #define WORDS (int)(sizeof(words) / sizeof(*words))
 
@@ -98,8 +105,9 @@ int main(int argc, char **argv)
 		what++;
 	if (optind >= argc || what == WORDS ||
 	    argc - optind > (words[what].operand ? 2 : 1))
-		cli_usage("expected 'training', 'stability', 'precision' and at most one "
-			  "model, or 'loop' and at most one scene");
+		cli_usage(
+			"expected 'training', 'stability', 'vision', 'precision' and at most one "
+			"model, or 'loop' and at most one scene");
 	if (job.plot && !words[what].plot)
 		cli_usage("--plot goes with 'precision' and 'stability'");
 	job.operand = argc - optind == 2 ? argv[optind + 1] : NULL;

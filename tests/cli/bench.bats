@@ -282,3 +282,16 @@ of() {
 	run --separate-stderr incise bench stability --plot a/
 	bad_usage "--plot"
 }
+
+@test "bench vision reports error and time of each kind of picture" {
+	[ -e "$INCISE_BUILD/lib/libincise-vision.so" ] || skip "OpenCV's headers were absent"
+	incise bench vision --quick --json >r.json
+	for k in 0 1 2 3 4 5 6 7 8 9 10 11 12 13; do
+		holds "$(key r.json "rows[$k].found") >= 7 && $(key r.json "rows[$k].pictures") == 10"
+		holds "$(key r.json "rows[$k].bias_px") < 0.1 && $(key r.json "rows[$k].bias_px") > -0.1"
+		holds "$(key r.json "rows[$k].us") > 0"
+		holds "$(key r.json "rows[$k].us") <= $(key r.json "rows[$k].us_p99")"
+	done
+	run -2 --separate-stderr incise bench vision --plot x
+	bad_usage "--plot goes with"
+}

@@ -54,7 +54,7 @@ complete_words() {
 @test "what bench measures is completed" {
 	touch stale.csv
 	complete_words incise bench ""
-	[ "${COMPREPLY[*]}" = "precision training stability loop" ]
+	[ "${COMPREPLY[*]}" = "precision training stability loop vision" ]
 	complete_words incise bench st
 	[ "${COMPREPLY[*]}" = stability ]
 	complete_words incise bench precision st

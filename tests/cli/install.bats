@@ -51,7 +51,7 @@ setup() {
 	done
 	cmp "$root/scenes/liver.scene" "$dest/usr/share/incise/scenes/liver.scene"
 	cmp "$root/tools/incise.bash" "$dest/usr/share/bash-completion/completions/incise"
-	for lib in incise incise-learn incise-record; do
+	for lib in incise incise-learn incise-record incise-vision; do
 		[ -f "$dest/usr/lib/lib$lib.so" ]
 		[ "$(readlink "$dest/usr/lib/lib$lib.so")" = lib$lib.so.1 ]
 	done

@@ -10,7 +10,7 @@ setup() {
 	include=$root/lib/include
 }
 
-parts="libincise libincise-learn libincise-record"
+parts="libincise libincise-learn libincise-record libincise-vision"
 
 # Functions that a shared object gives to others.
 exported_by() {
@@ -40,7 +40,7 @@ declared_by() {
 			[ "$(part_of "$header")" != $part ] || declared_by "$header"
 		done | sort >declared
 		exported_by $part >exported
-		[ "$(wc -l <exported)" -gt 8 ]
+		[ "$(wc -l <exported)" -gt 3 ]
 		diff map exported
 		diff declared exported
 	done
@@ -104,6 +104,12 @@ declared_by() {
 	# what needs them has them: the pattern finds what it looks for
 	ldd "$INCISE_BUILD/bin/incise-train" | grep -q lapack
 	ldd "$INCISE_BUILD/bin/incise-export" | grep -q sqlite
+	ldd "$INCISE_BUILD/lib/libincise-vision.so" | grep -q opencv
+	for lib in incise incise-learn incise-record; do
+		ldd "$INCISE_BUILD/lib/lib$lib.so" >mapped
+		run grep -E 'opencv|libjpeg|libstdc' mapped
+		[ "$status" -eq 1 ]
+	done
 	for program in incise incise-eval incise-compile; do
 		ldd "$INCISE_BUILD/bin/$program" >mapped
 		run grep -E "$heavy" mapped

@@ -1,0 +1,505 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Where an end of the handle is; see edge.h. Pixels are taken where they are, none is
+ * interpolated:
+ *
+ *   value    ·····──────   beyond      1. strips along the axis say where, and how slanted
+ *          /                           2. medians over the width, a curve fitted to them
+ *   ──────/                handle      3. pixels that are off that curve are thrown out
+ *         u                            4. means of the others, the curve once more
+ *
+ * The curve is a step, blurred by a Gaussian and by the pixel's own width, between a level
+ * and a slope. It is at half of its height at u whatever the blur. Of colours the sum that
+ * differs most between handle and beyond is taken: for liver mostly red.
+ */
+#include <algorithm>
+#include <cmath>
+#include "edge.h"
+
+namespace vision
+{
+
+enum { STRIPS = 16, FEWEST_STRIPS = 6, PASSES = 15, BINS = 96, FEWEST = 60 };
+
+static constexpr double reach_px = 14;	/* beyond which nothing is looked at, at least */
+static constexpr double widest_px = 48; /* beyond which nothing is, at most */
+static constexpr double clear_px = 8; /* from the end: one colour or the other, mostly */
+static constexpr double window_px = 12; /* of the curve, to both sides */
+/* The curve's end beyond the edge, and blurs more: farther out the tissue's texture counts. */
+static constexpr double beyond_px = 1.5;
+static constexpr double beyond_blurs = 2;
+static constexpr double slope_sd =
+	0.1; /* of what is beyond, levels per pixel, expected */
+static constexpr double across =
+	0.8; /* of the width is looked at: the sides are blurred */
+static constexpr double steepest = 1.5; /* slant of the edge */
+static constexpr double least_step = 8; /* levels */
+static constexpr double keep_sd = 3.5;
+static constexpr double floor_share[2] = {0.04, 0.02}; /* of the step, is no outlier */
+
+typedef cv::Vec<double, 5> vec5;
+typedef cv::Matx<double, 5, 5> mat5;
+
+/* Where the step is, sd of the blur, level of the handle; level beyond and its slope. */
+struct curve {
+	vec5 p;
+	double centre;
+};
+
+enum { PLACE, BLUR, INSIDE, BEYOND, SLOPE };
+
+static double normal(double x)
+{
+	return std::exp(-0.5 * x * x) * 0.3989422804014327;
+}
+
+static double cumulated(double x)
+{
+	return 0.5 * std::erfc(-x * 0.7071067811865475);
+}
+
+/* The curve at @x, and by @d its derivatives. */
+static double at(const curve &c, double x, vec5 *d)
+{
+	double s = c.p[BLUR], a = (x + 0.5 - c.p[PLACE]) / s,
+	       b = (x - 0.5 - c.p[PLACE]) / s;
+	double ca = cumulated(a), cb = cumulated(b), na = normal(a), nb = normal(b);
+	double part = s * (a * ca + na - b * cb - nb); /* of the step, in 0 … 1 */
+	double beyond = c.p[BEYOND] + c.p[SLOPE] * (x - c.centre);
+	double step = beyond - c.p[INSIDE];
+
+	if (d)
+		*d = vec5(-step * (ca - cb), step * (na - nb), 1 - part, part,
+			  part * (x - c.centre));
+	return c.p[INSIDE] + step * part;
+}
+
+struct bin {
+	double x, y, weight;
+};
+
+/* Least squares, Levenberg-Marquardt. @variance: of PLACE, over that of a sample of weight 1. */
+static bool fit(const bin *bins, int n, double noise, curve &c, double *variance)
+{
+	double damping = 1e-3, best = HUGE_VAL,
+	       flat = noise * noise / (slope_sd * slope_sd);
+	vec5 start = c.p, gradient;
+	mat5 normal_matrix;
+	curve trial = c;
+
+	for (int pass = 0; pass < PASSES; pass++) {
+		mat5 m = mat5::zeros();
+		vec5 g(0, 0, 0, 0, 0);
+		double sum = 0;
+
+		for (int i = 0; i < n; i++) {
+			vec5 d;
+			double r = bins[i].y - at(trial, bins[i].x, &d);
+
+			sum += bins[i].weight * r * r;
+			for (int k = 0; k < 5; k++) {
+				double w = bins[i].weight * d[k];
+
+				g[k] += w * r;
+				for (int l = 0; l <= k; l++)
+					m(k, l) += w * d[l];
+			}
+		}
+		m(SLOPE, SLOPE) += flat;
+		g[SLOPE] -= flat * trial.p[SLOPE];
+		sum += flat * trial.p[SLOPE] * trial.p[SLOPE];
+		for (int k = 0; k < 5; k++)
+			for (int l = 0; l < k; l++)
+				m(l, k) = m(k, l);
+		if (!std::isfinite(sum))
+			return false;
+		if (sum <= best) {
+			bool settled = best - sum <= 1e-9 * sum;
+
+			best = sum;
+			c = trial;
+			normal_matrix = m;
+			gradient = g;
+			damping *= 0.2;
+			if (settled)
+				break;
+		} else {
+			damping *= 8;
+		}
+		/* From the best so far; after a bad step by its old equations. */
+		mat5 damped = normal_matrix;
+		for (int k = 0; k < 5; k++)
+			damped(k, k) += damping * normal_matrix(k, k) + 1e-9;
+		bool ok;
+		vec5 by = damped.inv(cv::DECOMP_CHOLESKY, &ok) * gradient;
+		if (!ok)
+			return false;
+		trial.p = c.p + by;
+		trial.p[BLUR] = std::min(std::max(trial.p[BLUR], 0.05), 8.0);
+		trial.p[PLACE] = std::min(std::max(trial.p[PLACE], start[PLACE] - 8),
+					  start[PLACE] + 8);
+	}
+	bool ok;
+	for (int k = 0; k < 5; k++)
+		normal_matrix(k, k) += 1e-9;
+	*variance = normal_matrix.inv(cv::DECOMP_CHOLESKY, &ok)(PLACE, PLACE);
+	return ok && std::fabs(c.p[PLACE] - start[PLACE]) < 7.9;
+}
+
+static float median(std::vector<float> &values)
+{
+	auto middle = values.begin() + values.size() / 2;
+
+	std::nth_element(values.begin(), middle, values.end());
+	return *middle;
+}
+
+static int middle_of(const int *count, int n)
+{
+	int value = 0;
+
+	for (int below = count[0]; below <= n / 2 && value < 255; below += count[value])
+		value++;
+	return value;
+}
+
+/* The pixels around the end; a colour becomes one number, which rises outwards. */
+static bool gather(edge_search &s, const picture &picture, const cv::Point2d &end,
+		   const cv::Point2d &out, double reach, double half)
+{
+	int channels = picture.channels();
+	double wide = std::fabs(out.x) * reach + std::fabs(out.y) * half;
+	double high = std::fabs(out.y) * reach + std::fabs(out.x) * half;
+	cv::Rect box(
+		cv::Point((int)std::floor(end.x - wide), (int)std::floor(end.y - high)),
+		cv::Point((int)std::ceil(end.x + wide), (int)std::ceil(end.y + high)));
+	int count[2][3][256] = {};
+	double weight[3] = {1, 0, 0}, norm = 0;
+	int n[2] = {};
+
+	box &= picture.area;
+	s.samples.clear();
+	for (int pass = 0; pass < 2; pass++) {
+		for (int y = box.y; y < box.y + box.height; y++)
+			for (int x = box.x; x < box.x + box.width; x++) {
+				double dx = x + 0.5 - end.x, dy = y + 0.5 - end.y;
+				double u = dx * out.x + dy * out.y;
+				double v = dx * out.y - dy * out.x;
+				float value[3];
+
+				if (std::fabs(u) > reach || std::fabs(v) > half)
+					continue;
+				if (!pass && std::fabs(u) < clear_px)
+					continue;
+				picture.pixel(x, y, value);
+				if (!pass) {
+					n[u > 0]++;
+					for (int k = 0; k < channels; k++)
+						count[u > 0][k][(uint8_t)value[k]]++;
+					continue;
+				}
+				double total = 0;
+				for (int k = 0; k < channels; k++)
+					total += weight[k] * value[k];
+				s.samples.push_back({(float)u, (float)v, (float)total});
+			}
+		if (pass)
+			break;
+		if (n[0] < FEWEST || n[1] < FEWEST)
+			return false;
+		for (int k = 0; k < channels; k++) {
+			weight[k] = middle_of(count[1][k], n[1]) -
+				    middle_of(count[0][k], n[0]);
+			norm += weight[k] * weight[k];
+		}
+		norm = std::sqrt(norm);
+		for (int k = 0; k < channels; k++)
+			weight[k] = norm > 0 ? weight[k] / norm : k == 0;
+	}
+	return true;
+}
+
+/*
+ * Where a strip's profile, one value per pixel, is best parted in two: as few as can be are
+ * above half of the height before and below it behind, so that neither reflections on the
+ * handle nor crumbs beyond it are taken for its end. Then the area around that place.
+ */
+static bool cross(const double *profile, int n, double *place)
+{
+	enum { AROUND = 4, NEAR = 8 };
+	std::vector<float> inner(profile, profile + n / 4);
+	std::vector<float> outer(profile + n - n / 4, profile + n);
+	double low = median(inner), high = median(outer), half = (low + high) / 2;
+	int wrong = 0, least = n, split = 0;
+
+	if (high - low < least_step)
+		return false;
+	for (int i = 0; i < n; i++)
+		wrong += profile[i] < half;
+	for (int i = 0; i < n; i++) {
+		wrong += profile[i] < half ? -1 : 1;
+		if (wrong < least) {
+			least = wrong;
+			split = i + 1;
+		}
+	}
+	if (split < NEAR || split + NEAR > n)
+		return false;
+	/* Levels from close by: what is beyond has a texture. */
+	inner.assign(profile + split - NEAR, profile + split - 2);
+	outer.assign(profile + split + 2, profile + split + NEAR);
+	low = median(inner);
+	high = median(outer);
+	if (high - low < least_step)
+		return false;
+	*place = split - AROUND;
+	for (int i = split - AROUND; i < split + AROUND; i++)
+		*place +=
+			std::min(std::max((high - profile[i]) / (high - low), 0.0), 1.0);
+	return true;
+}
+
+static int strip_of(const sample &p, double half)
+{
+	int strip = (int)((p.v / half + 1) / 2 * STRIPS);
+
+	return std::min(std::max(strip, 0), STRIPS - 1);
+}
+
+/*
+ * A line u = place + slope v through the strips' places, that outliers do not move. Strips
+ * that are off it, by a reflection over the edge, lose their pixels; @share of them is left.
+ */
+static bool find_line(edge_search &s, double reach, double half, double *place,
+		      double *slope, double *share)
+{
+	int bins = 2 * (int)reach, found = 0;
+	double sum[STRIPS][2 * (int)widest_px] = {}, u[STRIPS], v[STRIPS];
+	int count[STRIPS][2 * (int)widest_px] = {}, which[STRIPS], left = 0;
+	bool good[STRIPS] = {};
+	double phase[STRIPS] = {};
+	int total[STRIPS] = {};
+
+	for (const sample &p : s.samples) {
+		int strip = strip_of(p, half);
+		int i = (int)std::floor(p.u + bins / 2);
+
+		if (i < 0 || i >= bins)
+			continue;
+		sum[strip][i] += p.value;
+		/* Upright, all pixels of a row are at one place within their bin. */
+		phase[strip] += p.u + bins / 2 - i - 0.5;
+		total[strip]++;
+		count[strip][i]++;
+	}
+	for (int k = 0; k < STRIPS; k++) {
+		double profile[2 * (int)widest_px];
+		int from = 0, to = bins;
+
+		/* The picture may end within the reach. */
+		while (from < bins && !count[k][from])
+			from++;
+		while (to > from && !count[k][to - 1])
+			to--;
+		for (int i = from; i < to; i++)
+			profile[i] =
+				count[k][i] ? sum[k][i] / count[k][i] : profile[i - 1];
+		if (to - from < 16 || !cross(profile + from, to - from, &u[found]))
+			continue;
+		u[found] += from - bins / 2 + phase[k] / total[k];
+		v[found] = ((k + 0.5) / STRIPS * 2 - 1) * half;
+		which[found++] = k;
+	}
+	if (found < FEWEST_STRIPS)
+		return false;
+	/* Each two of them propose a line, all vote. */
+	const double limit = 1.2;
+	double most = 0;
+	*slope = *place = 0;
+	for (int k = 0; k < found; k++)
+		for (int l = 0; l < k; l++) {
+			double a = (u[k] - u[l]) / (v[k] - v[l]), b = u[k] - a * v[k];
+			double votes = 0;
+
+			if (std::fabs(a) > steepest)
+				continue;
+			for (int m = 0; m < found; m++) {
+				double r = (u[m] - b - a * v[m]) / limit;
+
+				votes += std::max(0.0, 1 - r * r);
+			}
+			/* The mask's end is good to some pixels. */
+			votes -= 0.1 * std::fabs(b);
+			if (votes > most) {
+				most = votes;
+				*slope = a;
+				*place = b;
+			}
+		}
+	if (!(most > 0))
+		return false;
+	for (int k = 0; k < found; k++)
+		if (std::fabs(u[k] - *slope * v[k] - *place) <= limit) {
+			good[which[k]] = true;
+			left++;
+		}
+	/* The slant once more, by least squares: it must not smear the edge. */
+	double mu = 0, mv = 0, vv = 0, uv = 0;
+	for (int k = 0; k < found; k++)
+		if (good[which[k]]) {
+			mu += u[k] / left;
+			mv += v[k] / left;
+		}
+	for (int k = 0; k < found; k++)
+		if (good[which[k]]) {
+			vv += (v[k] - mv) * (v[k] - mv);
+			uv += (v[k] - mv) * (u[k] - mu);
+		}
+	if (left >= FEWEST_STRIPS && vv > 0) {
+		*slope = std::min(std::max(uv / vv, -steepest), steepest);
+		*place = mu - *slope * mv;
+	}
+	*share = (double)left / STRIPS;
+	s.samples.erase(
+		std::remove_if(s.samples.begin(), s.samples.end(),
+			       [&](const sample &p) { return !good[strip_of(p, half)]; }),
+		s.samples.end());
+	return left >= FEWEST_STRIPS;
+}
+
+/* Medians of the pixels in bins of half a pixel. */
+static int by_medians(edge_search &s, double place, bin *bins)
+{
+	enum { HALVES = 4 * (int)window_px };
+	std::vector<float> &values = s.sorted;
+	int begin[HALVES + 1] = {}, filled[HALVES] = {}, n = 0;
+	double sum[HALVES] = {};
+	auto which = [place](const sample &p) {
+		return (int)std::floor((p.u - place) * 2) + HALVES / 2;
+	};
+
+	for (const sample &p : s.samples)
+		begin[which(p) + 1]++;
+	for (int i = 0; i < HALVES; i++)
+		begin[i + 1] += begin[i];
+	values.resize(s.samples.size());
+	for (const sample &p : s.samples) {
+		int i = which(p);
+
+		values[begin[i] + filled[i]++] = p.value;
+		sum[i] += p.u;
+	}
+	for (int i = 0; i < HALVES; i++) {
+		if (!filled[i])
+			continue;
+		auto from = values.begin() + begin[i], to = from + filled[i];
+		auto middle = from + filled[i] / 2;
+
+		std::nth_element(from, middle, to);
+		bins[n++] = {sum[i] / filled[i], *middle, (double)filled[i]};
+	}
+	return n;
+}
+
+/* Means of those near the curve, in bins of a quarter. */
+static int by_means(edge_search &s, double place, double end, double limit, bin *bins,
+		    double *kept)
+{
+	double x[BINS] = {}, y[BINS] = {};
+	int count[BINS] = {}, n = 0, all = 1, good = 0;
+
+	for (size_t k = 0; k < s.samples.size(); k++) {
+		const sample &p = s.samples[k];
+		int i = (int)std::floor((p.u - place) * 4) + BINS / 2;
+
+		if (p.u > end || i < 0 || i >= BINS)
+			continue;
+		all++;
+		if (s.sorted[k] > limit)
+			continue;
+		good++;
+		x[i] += p.u;
+		y[i] += p.value;
+		count[i]++;
+	}
+	for (int i = 0; i < BINS; i++)
+		if (count[i])
+			bins[n++] = {x[i] / count[i], y[i] / count[i], (double)count[i]};
+	*kept = (double)good / all;
+	return n;
+}
+
+const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d &end,
+		      const cv::Point2d &out, double half_px, edge &found)
+{
+	static const char *const no_step = "the handle's end does not stand out";
+	double half = across * half_px;
+	double reach = std::floor(std::min(reach_px + half, widest_px));
+	double place, slope, share, variance, square = 0;
+	bin bins[BINS];
+	curve c;
+	int n;
+
+	if (!gather(s, picture, end, out, reach, half))
+		return "the handle reaches the picture's border";
+	if (!find_line(s, reach, half, &place, &slope, &share))
+		return no_step;
+
+	/* From here on u is along the axis at its middle, whatever the slant. */
+	size_t left = 0;
+	int n_inside = 0, n_beyond = 0;
+	for (sample p : s.samples) {
+		p.u -= (float)(slope * p.v);
+		if (!(std::fabs(p.u - place) < window_px))
+			continue;
+		n_inside += p.u < place - 4;
+		n_beyond += p.u > place + 4;
+		s.samples[left++] = p;
+	}
+	s.samples.resize(left);
+	if (n_inside < FEWEST || n_beyond < FEWEST)
+		return "the handle reaches the picture's border";
+
+	n = by_medians(s, place, bins);
+	c.p = vec5(place, 1, bins[0].y, bins[n - 1].y, 0);
+	c.centre = place;
+	if (!fit(bins, n, 4, c, &variance))
+		return no_step;
+	double last, limit;
+	for (int pass = 0; pass < 2; pass++) {
+		double step = std::fabs(c.p[BEYOND] - c.p[INSIDE]), noise;
+
+		s.sorted.clear();
+		for (const sample &p : s.samples)
+			s.sorted.push_back(
+				(float)std::fabs(p.value - at(c, p.u, nullptr)));
+		s.residuals = s.sorted;
+		noise = std::max(1.0, 1.4826 * median(s.residuals));
+		limit = keep_sd * std::max(noise, 1 + floor_share[pass] * step);
+		last = c.p[PLACE] + beyond_px + beyond_blurs * c.p[BLUR];
+		n = by_means(s, place, last, limit, bins, &found.kept);
+		if (n < 8 || !fit(bins, n, noise, c, &variance))
+			return no_step;
+	}
+	found.kept *= share;
+
+	size_t used = 0;
+	for (size_t k = 0; k < s.samples.size(); k++) {
+		const sample &p = s.samples[k];
+
+		if (s.sorted[k] > limit || p.u > last)
+			continue;
+		double r = p.value - at(c, p.u, nullptr);
+		square += r * r;
+		used++;
+	}
+	found.u = c.p[PLACE];
+	found.step = at(c, c.p[PLACE] + window_px, nullptr) - c.p[INSIDE];
+	found.noise = std::sqrt(square / std::max<size_t>(used, 6));
+	found.sd = found.noise * std::sqrt(variance);
+	if (!(found.step >= least_step) || !std::isfinite(found.sd))
+		return no_step;
+	return nullptr;
+}
+
+} // namespace vision

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The handle in a picture; see handle.h. Pixels within the thresholds are cleaned of specks
+ * and joined; of what hangs together the largest with the form of a handle is taken:
+ *
+ *      x            the first and last pixel of each row give two sides, each a line
+ *      ·┌──┐·       x = a + b y fitted so that rows which are off, by a reflection or
+ *      ·│  │·       a shadow, weigh little; rows that meet an end of a tilted handle
+ *      ·└──┘·       are left out
+ *
+ * Of high pictures every second row will do: ends and sides are refined from all pixels.
+ */
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include "handle.h"
+
+namespace vision
+{
+
+enum {
+	HIGH = 400,	/* rows: from here on every second one is looked at */
+	CANDIDATES = 8, /* largest pieces that are looked at */
+	FEWEST = 12,	/* rows that a side is fitted to */
+	BORDER = 6,	/* pixels of background that an end needs */
+};
+
+static constexpr double longest_ratio = 1.5; /* length over width at least */
+static constexpr double least_fill = 0.6;    /* of the rectangle between the sides */
+static constexpr double most_tilt = 1.75;    /* tan 60° and a little */
+static constexpr double most_rms_px = 3;
+
+/* 255 where a pixel has the handle's colour. */
+static void find_colour(handle_search &s, const struct incise_vision_setup &setup)
+{
+	double low[3], high[3];
+
+	if (s.hsv.channels() == 1) {
+		cv::inRange(s.hsv, setup.value[0], setup.value[1], s.mask);
+		return;
+	}
+	low[0] = setup.hue[0];
+	high[0] = setup.hue[1];
+	low[1] = setup.saturation[0];
+	high[1] = setup.saturation[1];
+	low[2] = setup.value[0];
+	high[2] = setup.value[1];
+	if (low[0] > high[0]) {
+		cv::inRange(s.hsv, cv::Scalar(low[0], low[1], low[2]),
+			    cv::Scalar(179, high[1], high[2]), s.mask);
+		cv::inRange(s.hsv, cv::Scalar(0, low[1], low[2]),
+			    cv::Scalar(high[0], high[1], high[2]), s.cleaned);
+		cv::bitwise_or(s.mask, s.cleaned, s.mask);
+	} else {
+		cv::inRange(s.hsv, cv::Scalar(low[0], low[1], low[2]),
+			    cv::Scalar(high[0], high[1], high[2]), s.mask);
+	}
+}
+
+struct line {
+	double a, b, rms;
+};
+
+/* x = a + b y through the rows from @y0 to @y1, by weights of Tukey's. */
+static bool fit_line(handle_search &s, const std::vector<double> &x, double y0, double y1,
+		     line &line)
+{
+	size_t n = s.y.size(), used = 0;
+	double scale = 0;
+
+	s.weight.assign(n, 0);
+	for (size_t i = 0; i < n; i++)
+		if (s.y[i] >= y0 && s.y[i] <= y1) {
+			s.weight[i] = 1;
+			used++;
+		}
+	if (used < FEWEST)
+		return false;
+	for (int pass = 0; pass < 6; pass++) {
+		double w = 0, my = 0, mx = 0, yy = 0, xy = 0, square = 0;
+
+		for (size_t i = 0; i < n; i++) {
+			w += s.weight[i];
+			my += s.weight[i] * s.y[i];
+			mx += s.weight[i] * x[i];
+		}
+		if (w < FEWEST / 2)
+			return false;
+		my /= w;
+		mx /= w;
+		for (size_t i = 0; i < n; i++) {
+			yy += s.weight[i] * (s.y[i] - my) * (s.y[i] - my);
+			xy += s.weight[i] * (s.y[i] - my) * (x[i] - mx);
+		}
+		if (!(yy > 0))
+			return false;
+		line.b = xy / yy;
+		line.a = mx - line.b * my;
+		for (size_t i = 0; i < n; i++) {
+			double r = x[i] - line.a - line.b * s.y[i];
+
+			square += s.weight[i] * r * r;
+		}
+		line.rms = std::sqrt(square / w);
+		/* From wide to narrow: a bad start must not throw out what is good. */
+		scale = std::max(1.5, pass < 2 ? 4 * line.rms : 3 * line.rms);
+		for (size_t i = 0; i < n; i++) {
+			double r = (x[i] - line.a - line.b * s.y[i]) / scale;
+
+			if (s.y[i] < y0 || s.y[i] > y1)
+				continue;
+			s.weight[i] = std::fabs(r) < 1 ? (1 - r * r) * (1 - r * r) : 0;
+		}
+	}
+	return true;
+}
+
+/* First and last pixel of each row of a piece, in pixels of the picture. */
+static void read_sides(handle_search &s, int label, const cv::Rect &piece,
+		       const cv::Rect &box, int step)
+{
+	s.y.clear();
+	s.side[0].clear();
+	s.side[1].clear();
+	for (int j = piece.y; j < piece.y + piece.height; j++) {
+		const int *row = s.labels.ptr<int>(j);
+		int from = piece.x, to = piece.x + piece.width - 1;
+
+		while (from <= to && row[from] != label)
+			from++;
+		while (to > from && row[to] != label)
+			to--;
+		if (from > to)
+			continue;
+		s.y.push_back(box.y + j * step + 0.5);
+		s.side[0].push_back(box.x + from);
+		s.side[1].push_back(box.x + to + 1);
+	}
+}
+
+static bool fit_sides(handle_search &s, double y0, double y1, line *side)
+{
+	return fit_line(s, s.side[0], y0, y1, side[0]) &&
+	       fit_line(s, s.side[1], y0, y1, side[1]);
+}
+
+/* NULL when it is one; else why not. */
+static const char *judge(handle_search &s, double area, handle &h)
+{
+	double y0, y1, slope, width, corner, length;
+	line side[2];
+
+	if (s.y.size() < FEWEST)
+		return "what has the handle's colour is too small";
+	y0 = s.y.front();
+	y1 = s.y.back();
+	corner = (y1 - y0) / 8;
+	if (!fit_sides(s, y0 + corner, y1 - corner, side))
+		return "what has the handle's colour has no straight sides";
+	for (int pass = 0; pass < 2; pass++) {
+		slope = (side[0].b + side[1].b) / 2;
+		if (!(std::fabs(slope) < most_tilt))
+			return "what has the handle's colour lies flat";
+		h.axis = cv::Point2d(slope, 1) / std::hypot(slope, 1);
+		width = (side[1].a - side[0].a +
+			 (side[1].b - side[0].b) * (y0 + y1) / 2) *
+			h.axis.y;
+		/* Rows that an end crosses, if it is square to the axis or level. */
+		corner = std::min(width * std::fabs(h.axis.x) + 4, (y1 - y0) / 3);
+		if (!fit_sides(s, y0 + corner, y1 - corner, side))
+			return "what has the handle's colour has no straight sides";
+	}
+	h.half_px = width / 2;
+	h.rms_px = std::max(side[0].rms, side[1].rms);
+	if (h.half_px < 2)
+		return "what has the handle's colour is too thin";
+	if (h.rms_px > most_rms_px)
+		return "what has the handle's colour has no straight sides";
+
+	/* Where the axis enters the piece and leaves it. */
+	double a = (side[0].a + side[1].a) / 2, b = (side[0].b + side[1].b) / 2;
+	size_t first = s.y.size(), last = 0;
+
+	for (size_t i = 0; i < s.y.size(); i++) {
+		double x = a + b * s.y[i];
+
+		if (x < s.side[0][i] || x > s.side[1][i])
+			continue;
+		first = std::min(first, i);
+		last = i;
+	}
+	if (first >= last)
+		return "what has the handle's colour has no straight sides";
+	h.top = cv::Point2d(a + b * s.y[first], s.y[first]);
+	h.bottom = cv::Point2d(a + b * s.y[last], s.y[last]);
+	length = (h.bottom - h.top).dot(h.axis);
+	if (length < longest_ratio * width)
+		return "what has the handle's colour is not long enough for a handle";
+	if (area < least_fill * length * width)
+		return "what has the handle's colour is not filled as a handle is";
+	return nullptr;
+}
+
+static bool at_border(const handle &h, const cv::Rect &within)
+{
+	cv::Point2d out = h.axis * (double)BORDER;
+
+	for (const cv::Point2d &p : {h.top - out, h.bottom + out})
+		if (p.x < within.x || p.y < within.y || p.x > within.x + within.width ||
+		    p.y > within.y + within.height)
+			return true;
+	return false;
+}
+
+bool handle_find(handle_search &s, picture &picture,
+		 const struct incise_vision_setup &setup, const cv::Rect &box,
+		 handle &found, const char **why)
+{
+	int step = picture.size.height >= HIGH ? 2 : 1;
+	int smallest = 16 * FEWEST / step;
+	double most = 0;
+
+	*why = "nothing has the handle's colour";
+	picture.hsv(box, step, s.hsv);
+	find_colour(s, setup);
+	/* Close first: reflections on the handle are more than specks. */
+	cv::morphologyEx(s.mask, s.cleaned, cv::MORPH_CLOSE,
+			 cv::getStructuringElement(cv::MORPH_RECT, cv::Size(5, 3)));
+	cv::morphologyEx(s.cleaned, s.mask, cv::MORPH_OPEN,
+			 cv::getStructuringElement(cv::MORPH_RECT, cv::Size(3, 3)));
+	int n = cv::connectedComponentsWithStats(s.mask, s.labels, s.stats, s.centres, 8,
+						 CV_32S);
+
+	s.order.clear();
+	for (int k = 1; k < n; k++)
+		if (s.stats.at<int>(k, cv::CC_STAT_AREA) >= smallest)
+			s.order.push_back(k);
+	std::sort(s.order.begin(), s.order.end(), [&s](int a, int b) {
+		return s.stats.at<int>(a, cv::CC_STAT_AREA) >
+		       s.stats.at<int>(b, cv::CC_STAT_AREA);
+	});
+	if (s.order.size() > CANDIDATES)
+		s.order.resize(CANDIDATES);
+	for (int k : s.order) {
+		const int *stat = s.stats.ptr<int>(k);
+		cv::Rect piece(stat[cv::CC_STAT_LEFT], stat[cv::CC_STAT_TOP],
+			       stat[cv::CC_STAT_WIDTH], stat[cv::CC_STAT_HEIGHT]);
+		double area = (double)stat[cv::CC_STAT_AREA] * step;
+		const char *fault;
+		handle h;
+
+		read_sides(s, k, piece, box, step);
+		fault = judge(s, area, h);
+		if (!fault && (at_border(h, box) || piece.x == 0 || piece.y == 0 ||
+			       piece.x + piece.width == s.mask.cols ||
+			       piece.y + piece.height == s.mask.rows))
+			/* cut off, a side would be taken for the border's */
+			fault = "the handle reaches the picture's border";
+		if (!fault && area > most) {
+			most = area;
+			h.box = cv::Rect(box.x + piece.x, box.y + piece.y * step,
+					 piece.width, piece.height * step);
+			found = h;
+		} else if (fault && most == 0 && k == s.order.front()) {
+			*why = fault;
+		}
+	}
+	return most > 0;
+}
+
+} // namespace vision
