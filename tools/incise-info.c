@@ -32,10 +32,11 @@ static const struct cli_option options[] = {
 static const struct cli_verb verb = {
 	.name = "info",
 	.synopsis = "MODEL.fis|MODEL.fx|NAME.rec|stepper|/dev/incise-stepperN|can:IFACE|"
-		    "slcan:TTY [OPTIONS]",
+		    "slcan:TTY|devices [OPTIONS]",
 	.summary =
 		"Say what a model, a compiled model or a recording holds, what the kernel's\n"
-		"stepper module found, does and costs, or which drives are on a CAN bus.",
+		"stepper module found, does and costs, which drives are on a CAN bus, or which\n"
+		"devices are attached.",
 	.options = options,
 	.notes =
 		"Example:\n  incise info can:can0\n\nExit: 0 shown, 1 failed, 2 bad usage. See incise-info(1).",

@@ -343,3 +343,13 @@ rig() { # ARGUMENTS
 	run --separate-stderr incise stepper status
 	failed_with 'rig.conf:4: actuator.can.mode: expected "csp", "csv" or "cst", found "torque"'
 }
+
+@test "info devices lists what is attached, of each kind that can look" {
+	run -0 --separate-stderr incise info devices
+	[ -z "$stderr" ]
+	# The backend of these tests finds two without being told where.
+	[[ "$output" == *"stepper    = \"bench:bus0:0x10\";"* ]]
+	incise info devices --json >r.json
+	[ "$(key r.json kind)" = devices ]
+	[ "$(key r.json 'devices[0].kind')" != "" ]
+}
