@@ -63,7 +63,7 @@ check-unit: $(unit_programs) $(locale) ## unit tests
 can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/README.md
 	@tests/can/venv $(O)/tests/can
 
-check-cli: all $(locale) can-drive ## command-line tests of the real programs
+check-cli: all $(locale) can-drive $(O)/tests/polhemus/fastrak ## command-line tests of the real programs
 	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.

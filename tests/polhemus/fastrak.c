@@ -107,6 +107,9 @@ static void serve_tty(void)
 		poll(waits, 2, 1);
 		if (waits[1].revents)
 			listen = command();
+		/* It says so at once as long as nobody has the other end open. */
+		if (waits[0].revents & POLLHUP)
+			poll(NULL, 0, 1);
 		if (master >= 0 && waits[0].revents & POLLIN && waits[0].fd == master)
 			n = read(master, bytes, sizeof(bytes));
 		emulator_advance(&e, now_ns());

@@ -255,6 +255,13 @@ static int set_trigger(struct iio_source *s, struct incise_error *err)
 	/* It takes none but its own. */
 	iio_trigger_remove(s->trigger_folder, s->trigger);
 	*s->trigger = '\0';
+	if (!*s->trigger_before && s->trigger_refused)
+		return incise_error_set(
+			err, EACCES,
+			"%s: nothing starts the conversions of %s, and you may make no "
+			"trigger; as root: mkdir %s/incise, and name "
+			"force_setup.trigger = \"incise\"",
+			s->where, iio_device_get_id(s->device), s->trigger_folder);
 	if (!*s->trigger_before)
 		return incise_error_set(
 			err, ENODEV,
@@ -271,11 +278,15 @@ static int with_own_trigger(struct iio_source *s, const char *name,
 			    struct incise_error *err)
 {
 	char before[64];
+	int rc;
 
 	if (*s->setup.trigger ||
 	    iio_device_attr_read(s->device, "trigger/current_trigger", before,
-				 sizeof(before)) < 0 ||
-	    iio_trigger_make(s->trigger_folder, s->trigger, sizeof(s->trigger)))
+				 sizeof(before)) < 0)
+		return 0;
+	rc = iio_trigger_make(s->trigger_folder, s->trigger, sizeof(s->trigger));
+	s->trigger_refused = rc == -EACCES || rc == -EPERM;
+	if (rc)
 		return 0;
 	iio_context_destroy(s->context);
 	s->context = NULL;

@@ -20,6 +20,7 @@ struct iio_source {
 	struct iio_format format, stamp_format;
 	double rate_hz, full_scale_V, offset_V;
 	const char *trigger_folder; /* where ours is made */
+	bool trigger_refused;	    /* for want of the right to */
 	char trigger[64];	    /* its name; empty: none was made */
 	char trigger_used[64];
 	char trigger_before[64]; /* what was set before */

@@ -123,6 +123,24 @@ static void own_trigger(void **state)
 	assert_int_equal(rmdir(folder), 0);
 }
 
+/* Configfs is root's. */
+static void no_right_to_a_trigger(void **state)
+{
+	struct incise_error err = {0};
+	bool root = !geteuid();
+	struct iio_source s;
+
+	snprintf(folder, sizeof(folder), "/");
+	snprintf(device_attribute(adc(), "trigger/current_trigger")->text, 2, "%s", "");
+	if (root && seteuid(65534))
+		fail_msg("cannot become another user");
+	assert_int_equal(open_source(&s, "adc", 10000, "", &err), -EACCES);
+	iio_source_close(&s);
+	if (root)
+		assert_int_equal(seteuid(0), 0);
+	assert_non_null(strstr(err.text, "as root: mkdir //incise"));
+}
+
 static void volts(void **state)
 {
 	static const struct {
@@ -314,6 +332,7 @@ int main(void)
 		cmocka_unit_test_setup(is_set_up, setup),
 		cmocka_unit_test_setup(named_trigger, setup),
 		cmocka_unit_test_setup(own_trigger, setup),
+		cmocka_unit_test_setup(no_right_to_a_trigger, setup),
 		cmocka_unit_test_setup(volts, setup),
 		cmocka_unit_test_setup(what_the_driver_does_not_say, setup),
 		cmocka_unit_test_setup(channels, setup),

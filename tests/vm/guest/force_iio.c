@@ -9,6 +9,7 @@
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <grp.h>
 #include <math.h>
 #include <poll.h>
 #include <signal.h>
@@ -374,6 +375,49 @@ static void is_listed(void)
 	check(!iio_force_scan("", found, &n, &err) && n == 1, "it is listed once");
 }
 
+/* What udev would run, from the rules themselves; and then as one of the group. */
+#define GROUP 31337
+static void is_for_the_group(void)
+{
+	static const gid_t group = GROUP;
+	struct incise_force *force;
+	struct incise_error err;
+	char command[1000];
+	int status, rc;
+	pid_t child;
+
+	snprintf(
+		command, sizeof(command),
+		"for entry in %s /sys/bus/iio/devices/trigger*; do "
+		"sed -n '/iio.*RUN/s/RUN+=/\\n/gp' udev/70-incise-sources.rules | "
+		"sed -n 's/^\"\\(.*\\)\".*/\\1/p' | "
+		"sed \"s| incise | %d |; s|/sys%%p|$(readlink -f $entry)|\" | sh -e || exit 1; "
+		"done; chgrp %d /dev/iio:device0 && chmod 660 /dev/iio:device0",
+		device_folder(), GROUP, GROUP);
+	check(!system(command), "the rules of udev give it to the group");
+	child = fork();
+	if (!child) {
+		if (setgroups(1, &group) || setgid(65534) || setuid(65534))
+			_exit(2);
+		force = open_force(INCISE_SIM_ADC, INCISE_SIM_TRIGGER, HZ, &err);
+		if (!force)
+			note("%s", err.text);
+		_exit(!force || take(force, 100, 5000, &rc) != 100);
+	}
+	waitpid(child, &status, 0);
+	check(WIFEXITED(status) && !WEXITSTATUS(status), "one of the group samples");
+	child = fork();
+	if (!child) {
+		if (setgroups(0, NULL) || setgid(65534) || setuid(65534))
+			_exit(2);
+		force = open_force(INCISE_SIM_ADC, INCISE_SIM_TRIGGER, HZ, &err);
+		note("%s", err.text);
+		_exit(!force && errno == EACCES ? 0 : 1);
+	}
+	waitpid(child, &status, 0);
+	check(WIFEXITED(status) && !WEXITSTATUS(status), "someone else may not");
+}
+
 static void is_unplugged(void)
 {
 	struct incise_force *force;
@@ -415,6 +459,7 @@ int main(int argc, char **argv)
 	reader_is_slow();
 	refusals();
 	after_a_kill();
+	is_for_the_group();
 	is_unplugged();
 	check(!module_unload("incise_sim"), "the simulator goes");
 	return tap_failures != 0;

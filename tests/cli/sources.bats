@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# Captures from real sources, as a user meets them: a FASTRAK that answers behind a pseudo
+# terminal (tests/polhemus), beside the virtual force channel; and sources that are absent.
+# Those that need a kernel with their drivers are in tests/vm/guest.
+
+load cli
+
+# A FASTRAK at $PWD/tracker that takes commands on 9; with options of its own.
+plug_in() {
+	mkfifo to
+	"$INCISE_BUILD/tests/polhemus/fastrak" --link "$PWD/tracker" "$@" <to >from 2>&1 3>&- &
+	fastrak=$!
+	exec 9>to
+	for _ in $(seq 100); do
+		grep -q ready from && return
+		sleep 0.1
+	done
+	complain "no emulator: $(cat from)"
+}
+
+setup() {
+	work_folder
+	cat >rig.conf <<-END
+		clock = "real";
+		tracker = "tty:$PWD/tracker:115200";
+		force = "sim:";
+		# far below where the emulator's sensor goes
+		surface = { point_mm = [0.0, 0.0, -500.0]; normal = [0.0, 0.0, 1.0]; };
+	END
+}
+
+teardown() {
+	exec 9>&-
+	[ -z "$fastrak" ] || kill "$fastrak"
+}
+
+# One value of a recording.
+ask() {
+	sqlite3 "$1/recording.db" "$2"
+}
+
+@test "a FASTRAK on a serial line is captured, by name, without loss" {
+	plug_in
+	incise capture -o a.rec --duration 3s --json >report.json
+	[ "$(key report.json tracker_lost)" = 0 ]
+	# 120 Hz for 3 s; a machine that is busy ends later, never earlier
+	[ "$(key report.json tracker)" -ge 355 ]
+	[[ "$(ask a.rec "SELECT value FROM meta WHERE key='tracker_name'")" == FASTRAK* ]]
+	[ "$(ask a.rec "SELECT count(*) FROM tracker")" = "$(key report.json tracker)" ]
+	# each record once, and later than the one before
+	[ "$(ask a.rec "SELECT max(seq) - min(seq) + 1 - count(*) FROM tracker")" = 0 ]
+	[ "$(ask a.rec "SELECT count(*) FROM (SELECT t_ns - lag(t_ns) OVER (ORDER BY seq) AS d
+		FROM tracker) WHERE d <= 0")" = 0 ]
+}
+
+@test "a tracker that is pulled out and plugged in: the rest is there, the gap is counted" {
+	local code=0
+	plug_in
+	incise capture -o a.rec --duration 8s >out 2>err 3>&- 9>&- &
+	capture=$!
+	for _ in $(seq 100); do
+		[ "$(sqlite3 -readonly a.rec.part/recording.db \
+			'SELECT count(*) FROM tracker' 2>/dev/null)" -gt 120 ] 2>/dev/null && break
+		sleep 0.1
+	done
+	echo unplug >&9
+	sleep 1
+	echo plug >&9
+	# samples are lost: it says so, and exits with 1
+	wait $capture || code=$?
+	[ "$code" = 1 ]
+	grep -q "tracker records were lost" err
+	[ "$(wc -l <err)" = 1 ]
+	lost=$(ask a.rec "SELECT value FROM meta WHERE key='tracker_lost'")
+	# at least the second without it
+	[ "$lost" -ge 120 ]
+	# every record has its number: what is missing between them is what was counted
+	[ "$(ask a.rec "SELECT max(seq) - min(seq) + 1 - count(*) FROM tracker")" = "$lost" ]
+	# and it went on behind the gap
+	[ "$(ask a.rec "SELECT count(*) > 0 FROM tracker WHERE seq > (SELECT min(seq) FROM
+		(SELECT seq, seq - lag(seq) OVER (ORDER BY seq) AS d FROM tracker) WHERE d > 100)")" = 1 ]
+}
+
+@test "records with flipped bytes: no capture is doubled, what is missing is counted" {
+	plug_in --flip 10000 # 1 % of the bytes
+	run --separate-stderr incise capture -o a.rec --duration 4s
+	[ "$status" -le 1 ]
+	[ "$(ask a.rec "SELECT max(seq) - min(seq) + 1 - count(*) FROM tracker")" = \
+		"$(ask a.rec "SELECT value FROM meta WHERE key='tracker_lost'")" ]
+	[ "$(ask a.rec "SELECT count(*) FROM tracker")" -gt 100 ]
+}
+
+@test "a source that is absent is named, with what to do" {
+	local case
+	while IFS='|' read -r line text; do
+		{
+			echo 'clock = "real"; tracker = "sim:"; force = "sim:";'
+		} | sed "s|${line%% =*} = \"sim:\"|$line|" >absent.conf
+		run --separate-stderr incise capture -o a.rec --rig absent.conf --duration 1s
+		failed_with "absent.conf:1: ${line%% =*}: " "$text"
+		[ ! -e a.rec ]
+		[ ! -e a.rec.part ]
+	done <<-END
+		tracker = "usb:0f44:9999"|is no tracker of Polhemus that is known
+		tracker = "tty:$PWD/nothing:115200"|is not there: is the adapter plugged in?
+		tracker = "tty:/dev/null:115200"|/dev/null
+		force = "iio:no-such-converter"|driver of your converter
+		force = "comedi:/dev/comedi77"|/dev/comedi77: No such file
+	END
+}
