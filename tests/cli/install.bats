@@ -46,7 +46,7 @@ setup() {
 	for header in "$root"/lib/include/incise/*.h; do
 		cmp "$header" "$dest/usr/include/incise/${header##*/}"
 	done
-	for example in rig.conf.example rig-can.conf.example; do
+	for example in rig.conf.example rig-can.conf.example rig-sources.conf.example; do
 		cmp "$root/doc/$example" "$dest/usr/share/incise/$example"
 	done
 	cmp "$root/scenes/liver.scene" "$dest/usr/share/incise/scenes/liver.scene"

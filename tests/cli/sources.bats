@@ -108,3 +108,14 @@ ask() {
 		force = "comedi:/dev/comedi77"|/dev/comedi77: No such file
 	END
 }
+
+@test "the example is read" {
+	sed -E 's/^(tracker|force|camera) = "[^"]*"/\1 = "sim:"/' \
+		"$root/doc/rig-sources.conf.example" >rig.conf
+	[ "$(grep -c '"sim:"' rig.conf)" = 3 ]
+	incise capture -o a.rec --duration 600ms
+	# and its settings with it: none that is wrong goes by
+	sed -i 's/rate_hz = 10000.0/rate_hz = 0.5/' rig.conf
+	run --separate-stderr incise capture -o b.rec --duration 600ms
+	failed_with "rig.conf" "force_setup.rate_hz"
+}
