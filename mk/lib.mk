@@ -73,17 +73,16 @@ objects_stepper_slcan := $(can_core) \
 # Needs nothing but the kernel's headers.
 device_modules += camera_v4l2
 pc_camera_v4l2 :=
-objects_camera_v4l2 := $(O)/obj/lib/device/thread.o \
+objects_camera_v4l2 := $(addprefix $(O)/obj/lib/device/,stable_path.o thread.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c))
 # Force samples from two kinds of converters; what is not of one is of both.
-daq_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o device/daq/daq_feed.o \
-	device/daq/daq_scan.o)
+daq_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o device/daq/daq_feed.o)
 daq_iio := $(wildcard lib/device/daq/iio_*.c)
 daq_comedi := $(wildcard lib/device/daq/comedi_*.c)
 pc_force_iio := libiio
 objects_force_iio := $(daq_core) $(patsubst %.c,$(O)/obj/%.o,$(daq_iio) lib/device/daq/force_iio.c)
 pc_force_comedi := comedilib
-objects_force_comedi := $(daq_core) \
+objects_force_comedi := $(daq_core) $(O)/obj/lib/device/stable_path.o \
 	$(patsubst %.c,$(O)/obj/%.o,$(daq_comedi) lib/device/daq/force_comedi.c)
 # One tracker on two kinds of line.
 polhemus_lines := polhemus_usb polhemus_tty tracker_usb tracker_tty
@@ -117,7 +116,7 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(filter-out %/camera_v4l2.c,\
 	$(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(can_modules) \
 		$(if $(has_libmnl),,%/socketcan.c %/can_netlink.c),$(wildcard lib/device/can/*.c))) \
-	$(addprefix $(O)/obj/lib/device/daq/,daq_feed.o daq_scan.o) \
+	$(addprefix $(O)/obj/lib/device/daq/,daq_feed.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(if $(has_libiio),$(daq_iio)) \
 		$(if $(has_comedilib),$(daq_comedi))) \
 	$(filter $(O)/obj/lib/device/polhemus/%,$(filter-out %/tracker_tty.o,$(objects_tracker_tty))) \

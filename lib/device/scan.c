@@ -3,6 +3,7 @@
  * Looking for devices behind a backend; see incise/scan.h.
  */
 #include <errno.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <incise/scan.h>
@@ -89,4 +90,19 @@ int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 				      where);
 	incise_backend_unload(&loaded);
 	return rc;
+}
+
+void incise_scan_tell(struct incise_scan_device *device, const char *key,
+		      const char *format, ...)
+{
+	struct incise_scan_property *property;
+	va_list args;
+
+	if (device->n >= INCISE_SCAN_PROPERTIES)
+		return;
+	property = &device->property[device->n++];
+	property->key = key;
+	va_start(args, format);
+	vsnprintf(property->text, sizeof(property->text), format, args);
+	va_end(args);
 }

@@ -4,7 +4,6 @@
  * that answer are asked what they are. Only objects are read.
  */
 #include <errno.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,24 +23,6 @@ struct scan {
 	const char *device;
 	bool there[NODES];
 };
-
-static void add(struct incise_scan_device *device, const char *key, const char *format,
-		...) __attribute__((format(printf, 3, 4)));
-
-static void add(struct incise_scan_device *device, const char *key, const char *format,
-		...)
-{
-	struct incise_scan_property *property;
-	va_list args;
-
-	if (device->n >= INCISE_SCAN_PROPERTIES)
-		return;
-	property = &device->property[device->n++];
-	property->key = key;
-	va_start(args, format);
-	vsnprintf(property->text, sizeof(property->text), format, args);
-	va_end(args);
-}
 
 /* Whoever answers or beats. */
 static int hear(struct scan *scan, int64_t until_ns)
@@ -126,7 +107,7 @@ static void add_modes(struct asked *asked)
 		if (modes >> i & 1 && names[i])
 			snprintf(text + strlen(text), sizeof(text) - strlen(text), "%s%s",
 				 *text ? " " : "", names[i]);
-	add(asked->device, "modes", "%s", text);
+	incise_scan_tell(asked->device, "modes", "%s", text);
 }
 
 /* Of a drive: what it does, and what is wrong with it. */
@@ -139,17 +120,17 @@ static void add_drive(struct asked *asked, const char *name)
 
 	if (tells(asked, 0x6041, 0, 2, &word)) {
 		state = cia402_state_name(cia402_state((uint16_t)word));
-		add(device, "statusword", "0x%04x", word);
-		add(device, "drive_state", "%s", state);
+		incise_scan_tell(device, "statusword", "0x%04x", word);
+		incise_scan_tell(device, "drive_state", "%s", state);
 	}
 	if (tells(asked, 0x6061, 0, 1, &mode))
-		add(device, "mode", "%s", cia402_mode_name((int8_t)mode));
+		incise_scan_tell(device, "mode", "%s", cia402_mode_name((int8_t)mode));
 	add_modes(asked);
 	if (tells(asked, 0x603f, 0, 2, &code)) {
 		if (code)
 			canopen_emcy_text((uint16_t)code, words, sizeof(words));
-		add(device, "error_code", "0x%04x", code);
-		add(device, "error", "%s", words);
+		incise_scan_tell(device, "error_code", "0x%04x", code);
+		incise_scan_tell(device, "error", "%s", words);
 	}
 	snprintf(device->what, sizeof(device->what), "%.50s: %s%s%.40s",
 		 *name ? name : "CiA 402 drive", state, code ? ", " : "",
@@ -169,12 +150,12 @@ static void add_identity(struct asked *asked, char *name, size_t size)
 	*name = '\0';
 	if (!asked->silent && !canopen_read_text(&asked->master, 0x1008, 0, name, size) &&
 	    *name)
-		add(asked->device, "name", "%s", name);
+		incise_scan_tell(asked->device, "name", "%s", name);
 	for (size_t i = 0; i < sizeof(identity) / sizeof(*identity); i++)
 		if (tells(asked, 0x1018, identity[i].sub, 4, &value))
-			add(asked->device, identity[i].key, "0x%08x", value);
+			incise_scan_tell(asked->device, identity[i].key, "0x%08x", value);
 	if (tells(asked, 0x1001, 0, 1, &value))
-		add(asked->device, "error_register", "0x%02x", value);
+		incise_scan_tell(asked->device, "error_register", "0x%02x", value);
 }
 
 static void describe(struct scan *scan, unsigned int node,
@@ -194,13 +175,14 @@ static void describe(struct scan *scan, unsigned int node,
 	*device = (struct incise_scan_device){0};
 	snprintf(device->device, sizeof(device->device), "%s:%.80s:0x%02x",
 		 scan->transport->name, scan->device, node);
-	add(device, "node", "%u", node);
+	incise_scan_tell(device, "node", "%u", node);
 	told = tells(&asked, 0x1000, 0, 4, &type);
 	if (told)
-		add(device, "device_type", "0x%08x", type);
+		incise_scan_tell(device, "device_type", "0x%08x", type);
 	add_identity(&asked, name, sizeof(name));
 	if (asked.master.heard_ns)
-		add(device, "nmt_state", "%s", canopen_state_name(asked.master.state));
+		incise_scan_tell(device, "nmt_state", "%s",
+				 canopen_state_name(asked.master.state));
 	/* What is no drive is listed too: that it is there is half of the answer. */
 	if (told && (type & 0xffff) == 402)
 		add_drive(&asked, name);

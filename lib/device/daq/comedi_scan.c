@@ -7,9 +7,9 @@
 #include <glob.h>
 #include <stdio.h>
 #include <string.h>
+#include "../stable_path.h"
 #include "comedi_card.h"
 #include "comedi_force.h"
-#include "daq_scan.h"
 
 #define SECOND_NS 1000000000U
 
@@ -29,7 +29,7 @@ static void add_ranges(struct incise_scan_device *device, comedi_t *card,
 						 "%s%.6g to %.6g", used ? ", " : "",
 						 range->min, range->max);
 	}
-	daq_scan_add(device, "ranges_V", "%s", text);
+	incise_scan_tell(device, "ranges_V", "%s", text);
 }
 
 static void describe(const char *path, comedi_t *card, unsigned int subdevice,
@@ -41,26 +41,32 @@ static void describe(const char *path, comedi_t *card, unsigned int subdevice,
 	unsigned int chanlist[1] = {CR_PACK(0, 0, AREF_GROUND)};
 	double period_ns;
 	comedi_cmd command;
+	char stable[80];
 
 	*device = (struct incise_scan_device){0};
-	snprintf(device->device, sizeof(device->device), "comedi:%.70s:%u", path,
+	/* /dev/comediN is the order of probing; the link is the slot or socket. */
+	if (!incise_stable_path("/dev/incise/daq/*", path, stable, sizeof(stable)))
+		snprintf(stable, sizeof(stable), "%.70s", path);
+	snprintf(device->device, sizeof(device->device), "comedi:%s:%u", stable,
 		 subdevice);
 	snprintf(device->what, sizeof(device->what),
 		 "DAQ card %.40s, %d channels of %d bits%s", comedi_get_board_name(card),
 		 n, bits, flags & SDF_BUSY ? ", in use" : "");
-	daq_scan_add(device, "board", "%.90s", comedi_get_board_name(card));
-	daq_scan_add(device, "driver", "%.90s", comedi_get_driver_name(card));
-	daq_scan_add(device, "channels", "%d", n);
-	daq_scan_add(device, "bits", "%d", bits);
+	incise_scan_tell(device, "path", "%.90s", path);
+	incise_scan_tell(device, "board", "%.90s", comedi_get_board_name(card));
+	incise_scan_tell(device, "driver", "%.90s", comedi_get_driver_name(card));
+	incise_scan_tell(device, "channels", "%d", n);
+	incise_scan_tell(device, "bits", "%d", bits);
 	add_ranges(device, card, subdevice);
 	/* The shortest that it takes; tests do not disturb who samples. */
 	period_ns = comedi_card_period(card, subdevice, chanlist, 1, &command);
+	device->usable = bits && period_ns > 0;
 	if (period_ns > 0)
-		daq_scan_add(device, "rate_most_hz", "%.9g", SECOND_NS / period_ns);
+		incise_scan_tell(device, "rate_most_hz", "%.9g", SECOND_NS / period_ns);
 	period_ns = comedi_card_period(card, subdevice, chanlist, SECOND_NS, &command);
 	if (period_ns > 0)
-		daq_scan_add(device, "rate_least_hz", "%.9g", SECOND_NS / period_ns);
-	daq_scan_add(device, "time_stamps", "by arrival");
+		incise_scan_tell(device, "rate_least_hz", "%.9g", SECOND_NS / period_ns);
+	incise_scan_tell(device, "time_stamps", "by arrival");
 }
 
 static int scan_card(const char *path, incise_scan_found *found, void *context)

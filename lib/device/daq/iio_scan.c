@@ -6,7 +6,6 @@
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
-#include "daq_scan.h"
 #include "iio_force.h"
 #include "iio_source.h"
 
@@ -53,7 +52,7 @@ static void add_text(struct incise_scan_device *device, const struct iio_device 
 
 	if (iio_device_attr_read(iio, attribute, text, sizeof(text)) >= 0 ||
 	    iio_channel_attr_read(channel, attribute, text, sizeof(text)) >= 0)
-		daq_scan_add(device, key, "%.99s", text);
+		incise_scan_tell(device, key, "%.99s", text);
 }
 
 static void describe(const struct iio_context *context, const struct iio_device *iio,
@@ -64,6 +63,8 @@ static void describe(const struct iio_context *context, const struct iio_device 
 	const struct iio_data_format *data = iio_channel_get_data_format(channel);
 	double full_scale_V, offset_V;
 	struct iio_format format;
+	bool stamped = iio_device_find_channel(iio, "timestamp", false);
+	bool plain = !iio_format_of(&format, data, 31);
 
 	*device = (struct incise_scan_device){0};
 	snprintf(device->device, sizeof(device->device), "iio:%.90s",
@@ -71,22 +72,20 @@ static void describe(const struct iio_context *context, const struct iio_device 
 	snprintf(device->what, sizeof(device->what),
 		 "IIO converter %.40s, %d channel%s of %u bits", name ? name : id,
 		 channels, channels == 1 ? "" : "s", data->bits);
-	daq_scan_add(device, "id", "%.90s", id);
+	incise_scan_tell(device, "id", "%.90s", id);
 	if (name)
-		daq_scan_add(device, "name", "%.90s", name);
-	daq_scan_add(device, "channels", "%d", channels);
-	daq_scan_add(device, "channel", "%.90s", iio_channel_get_id(channel));
-	daq_scan_add(device, "bits", "%u", data->bits);
-	if (!iio_format_of(&format, data, 31) &&
-	    iio_source_volts(channel, &format, &full_scale_V, &offset_V))
-		daq_scan_add(device, "range_V", "%.6g to %.6g", offset_V,
-			     offset_V + full_scale_V);
+		incise_scan_tell(device, "name", "%.90s", name);
+	incise_scan_tell(device, "channels", "%d", channels);
+	incise_scan_tell(device, "channel", "%.90s", iio_channel_get_id(channel));
+	incise_scan_tell(device, "bits", "%u", data->bits);
+	device->usable = stamped && plain;
+	if (plain && iio_source_volts(channel, &format, &full_scale_V, &offset_V))
+		incise_scan_tell(device, "range_V", "%.6g to %.6g", offset_V,
+				 offset_V + full_scale_V);
 	add_text(device, iio, channel, KEY, "rate_hz");
 	add_text(device, iio, channel, KEY "_available", "rates_available_hz");
 	add_text(device, iio, channel, "trigger/current_trigger", "trigger");
-	daq_scan_add(device, "time_stamps", "%s",
-		     iio_device_find_channel(iio, "timestamp", false) ? "kernel"
-								      : "none");
+	incise_scan_tell(device, "time_stamps", "%s", stamped ? "kernel" : "none");
 }
 
 int iio_force_scan(const char *arguments, incise_scan_found *found, void *context,

@@ -24,14 +24,6 @@ static void *open_tracker(const struct incise_backend_request *request,
 		    : NULL;
 }
 
-static void put(struct incise_scan_device *device, const char *key, const char *text)
-{
-	struct incise_scan_property *p = &device->property[device->n++];
-
-	p->key = key;
-	snprintf(p->text, sizeof(p->text), "%s", text);
-}
-
 /* Nobody can see what is behind a line; to ask each would disturb who does not expect it. */
 static int list_lines(incise_scan_found *found, void *context)
 {
@@ -48,6 +40,7 @@ static int list_lines(incise_scan_found *found, void *context)
 			     "tty:" BY_ID "/%s:115200",
 			     entry->d_name) >= (int)sizeof(device.device))
 			continue;
+		device.usable = true;
 		snprintf(device.what, sizeof(device.what),
 			 "a serial line, not asked; behind it may be a tracker");
 		rc = found(context, &device);
@@ -84,10 +77,12 @@ static int scan(const char *arguments, incise_scan_found *found, void *context,
 			"%s: the path is too long to be shown: name it by a "
 			"shorter one",
 			where);
+	device.usable = true;
 	snprintf(device.what, sizeof(device.what), "%s", identity.name);
-	put(&device, "family", polhemus_family_name(identity.layout.family));
+	incise_scan_tell(&device, "family", "%s",
+			 polhemus_family_name(identity.layout.family));
 	if (identity.version[0])
-		put(&device, "firmware", identity.version);
+		incise_scan_tell(&device, "firmware", "%s", identity.version);
 	if (identity.sensors >= 0) {
 		size_t n = 0;
 
@@ -95,7 +90,7 @@ static int scan(const char *arguments, incise_scan_found *found, void *context,
 			if (identity.sensors >> i & 1)
 				sensors[n++] = (char)('1' + i);
 		sensors[n] = '\0';
-		put(&device, "sensors", sensors);
+		incise_scan_tell(&device, "sensors", "%s", sensors);
 	}
 	return found(context, &device);
 }

@@ -13,6 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <linux/videodev2.h>
+#include "../stable_path.h"
 #include "v4l2_camera.h"
 #include "v4l2_file.h"
 #include "v4l2_format.h"
@@ -26,40 +27,14 @@ struct search {
 	int answer; /* of @found, the last one's */
 };
 
-/* A link in @folder to @path; false: there is none that fits. */
-static bool link_to(const char *dev, const char *folder, const char *path, char *name,
+/* One of @folder's links to @path. */
+static bool link_in(const char *dev, const char *folder, const char *path, char *link,
 		    size_t size)
 {
-	char pattern[PATH_MAX], real[PATH_MAX], own[PATH_MAX];
-	bool is = false;
-	glob_t links;
+	char pattern[PATH_MAX];
 
 	snprintf(pattern, sizeof(pattern), "%s/v4l/%s/*", dev, folder);
-	if (!realpath(path, own) || glob(pattern, 0, NULL, &links))
-		return false;
-	for (size_t i = 0; i < links.gl_pathc && !is; i++) {
-		const char *link = links.gl_pathv[i];
-
-		is = strlen(link) < size && realpath(link, real) && !strcmp(real, own);
-		if (is)
-			memcpy(name, link, strlen(link) + 1);
-	}
-	globfree(&links);
-	return is;
-}
-
-__attribute__((format(printf, 3, 4))) static void tell(struct incise_scan_device *device,
-						       const char *key,
-						       const char *format, ...)
-{
-	struct incise_scan_property *property = &device->property[device->n];
-	va_list rest;
-
-	property->key = key;
-	va_start(rest, format);
-	vsnprintf(property->text, sizeof(property->text), format, rest);
-	va_end(rest);
-	device->n++;
+	return incise_stable_path(pattern, path, link, size);
 }
 
 static void describe(const struct search *s, int fd, const char *path,
@@ -68,20 +43,22 @@ static void describe(const struct search *s, int fd, const char *path,
 {
 	char stable[sizeof(device->device) - 5], formats[60];
 
-	if (!link_to(s->dev, "by-id", path, stable, sizeof(stable)) &&
-	    !link_to(s->dev, "by-path", path, stable, sizeof(stable)))
+	if (!link_in(s->dev, "by-id", path, stable, sizeof(stable)) &&
+	    !link_in(s->dev, "by-path", path, stable, sizeof(stable)))
 		snprintf(stable, sizeof(stable), "%s", path);
 	snprintf(device->device, sizeof(device->device), "v4l2:%s", stable);
+	device->usable = identity->capabilities & V4L2_CAP_STREAMING;
 	v4l2_format_list(fd, formats, sizeof(formats));
 	snprintf(device->what, sizeof(device->what), "%.32s (%.55s)", identity->card,
 		 *formats ? formats : "no formats");
-	tell(device, "name", "%s", identity->card);
-	tell(device, "driver", "%s", identity->driver);
-	tell(device, "driver_version", "%u.%u.%u", identity->version >> 16 & 0xff,
-	     identity->version >> 8 & 0xff, identity->version & 0xff);
-	tell(device, "bus", "%s", identity->bus);
-	tell(device, "path", "%.99s", path);
-	tell(device, "formats", "%s", formats);
+	incise_scan_tell(device, "name", "%s", identity->card);
+	incise_scan_tell(device, "driver", "%s", identity->driver);
+	incise_scan_tell(device, "driver_version", "%u.%u.%u",
+			 identity->version >> 16 & 0xff, identity->version >> 8 & 0xff,
+			 identity->version & 0xff);
+	incise_scan_tell(device, "bus", "%s", identity->bus);
+	incise_scan_tell(device, "path", "%.99s", path);
+	incise_scan_tell(device, "formats", "%s", formats);
 }
 
 /* Tell of the camera at @path. 0, or why it cannot be. */

@@ -56,5 +56,14 @@ INCISE_API int incise_scan(const char *kind, const char *spec, incise_scan_found
  */
 INCISE_API int incise_scan_all(incise_scan_found *found, void *context);
 
+/**
+ * For backends: add a property to @device, its text as printf(3). One too many is left out.
+ *
+ * @param key is kept as it is
+ */
+INCISE_API void incise_scan_tell(struct incise_scan_device *device, const char *key,
+				 const char *format, ...)
+	__attribute__((format(printf, 3, 4)));
+
 INCISE_END_DECLS
 #endif

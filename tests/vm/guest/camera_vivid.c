@@ -317,7 +317,8 @@ static void wraps(void)
 static int found(void *context, const struct incise_scan_device *device)
 {
 	note("%s: %s", device->device, device->what);
-	*(int *)context += !strcmp(device->device,
+	*(int *)context += device->usable &&
+			   !strcmp(device->device,
 				   "v4l2:/dev/v4l/by-path/platform-vivid.0-video-index0");
 	return 0;
 }

@@ -254,7 +254,7 @@ static int found(void *context, const struct incise_scan_device *device)
 	note("%s: %s", device->device, device->what);
 	for (int i = 0; i < device->n; i++)
 		note("  %s = %s", device->property[i].key, device->property[i].text);
-	*(int *)context += !strcmp(device->device, "comedi:" DEVICE);
+	*(int *)context += device->usable && !strcmp(device->device, "comedi:" DEVICE);
 	return 0;
 }
 
