@@ -38,27 +38,22 @@ has_vision := $(if $(shell $(CXX) -E -x c++ $(opencv_cflags) -include opencv2/im
 	-include cstdio -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes),yes)
 
 # One shared object per group of rooms; a process maps only the ones it uses.
-libraries := incise incise-learn incise-record $(if $(has_vision),incise-vision)
+libraries := incise incise-learn incise-record
 rooms_incise := base fixed model tissue scene loop sim device
 rooms_incise-learn := learn
 rooms_incise-record := record
-rooms_incise-vision := vision
 pc_incise := libconfig
 pc_incise-learn := lapacke lapack blas
 pc_incise-record := sqlite3
-cflags_incise-vision := $(opencv_cflags)
 libs_incise := -lm -ldl
 libs_incise-learn := -lm
 libs_incise-record := -lm
-libs_incise-vision := -lopencv_imgproc -lopencv_core -ljpeg -lstdc++ -lm
 about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop
 about_incise-learn := haptic cutting: learning models from data
 about_incise-record := haptic cutting: recordings and what is exported of them
-about_incise-vision := haptic cutting: depth of the blade from pictures
 needs_incise :=
 needs_incise-learn := incise
 needs_incise-record := incise
-needs_incise-vision := incise
 
 # One program per verb, and the libraries it is linked to.
 verbs := $(patsubst tools/incise-%.c,%,$(wildcard tools/incise-*.c))
@@ -72,7 +67,7 @@ uses_haptic := incise
 uses_stepper := incise
 uses_plan := incise
 uses_demo := incise incise-learn
-uses_bench := incise incise-learn $(if $(has_vision),incise-vision)
+uses_bench := incise incise-learn
 
 all: libs tools
 

@@ -27,8 +27,9 @@ $(O)/obj/fuzz/%.o: %.cc
 		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
 # What a target needs beside that.
-fuzz_vision_frame := lib/base/error.c $(wildcard lib/vision/*.c lib/vision/*.cc)
-fuzz_libs_vision_frame := $(libs_incise-vision)
+fuzz_vision_frame := lib/base/error.c lib/device/vision.c $(vision_linked) \
+	$(wildcard lib/vision/*.c lib/vision/*.cc)
+fuzz_libs_vision_frame := $(libs_vision_opencv)
 fuzz_slcan_line := lib/device/can/slcan_line.c
 fuzz_can_frames := lib/base/error.c $(addprefix lib/device/can/,canopen.c canopen_sdo.c \
 	canopen_text.c cia402.c cia402_homing.c cia402_limits.c cia402_object.c cia402_pdo.c \

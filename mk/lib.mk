@@ -19,7 +19,7 @@ fixed_cflags += $(if $(filter x86_64-%,$(shell $(CC) -dumpmachine 2>/dev/null)),
 $(O)/obj/lib/fixed/%.o: cflags += $(fixed_cflags)
 
 define library
-pc_flags_$1 = $$(cflags_$1) $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --cflags $$(pc_$1)))
+pc_flags_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --cflags $$(pc_$1)))
 pc_libs_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1)))
 $$(call objects,$1): pc_cflags = $$(pc_flags_$1)
 
@@ -99,12 +99,20 @@ pc_tracker_tty :=
 objects_tracker_tty := $(polhemus_core) \
 	$(patsubst %,$(O)/obj/lib/device/polhemus/%.o,polhemus_tty tracker_tty)
 
+# What looks at pictures, in C++.
+device_modules += $(if $(has_vision),vision_opencv)
+pc_vision_opencv :=
+objects_vision_opencv := $(addprefix $(O)/obj/,$(addsuffix .o,$(basename \
+	$(wildcard lib/vision/*.c lib/vision/*.cc))))
+libs_vision_opencv := -lopencv_imgproc -lopencv_core -ljpeg -lstdc++
+$(objects_vision_opencv): pc_cflags = $(opencv_cflags)
+
 define device_module
 $(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
 	@mkdir -p $$(@D)
 	$$(CC) -shared -Wl,-z,defs -Wl,--as-needed -Wl,-rpath,'$$$$ORIGIN/..' -L$(O)/lib \
 		$$(CFLAGS) $$(LDFLAGS) -o $$@ $$(objects_$1) -lincise \
-		$$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1))) -lm -pthread
+		$$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1))) $$(libs_$1) -lm -pthread
 
 libs: $(O)/lib/incise/$1.so
 endef
@@ -120,6 +128,7 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(filter-out %/camera_v4l2.c,\
 	$(patsubst %.c,$(O)/obj/%.o,$(if $(has_libiio),$(daq_iio)) \
 		$(if $(has_comedilib),$(daq_comedi))) \
 	$(filter $(O)/obj/lib/device/polhemus/%,$(filter-out %/tracker_tty.o,$(objects_tracker_tty))) \
+	$(if $(has_vision),$(filter-out %/vision_opencv.o,$(objects_vision_opencv))) \
 	$(O)/obj/tools/scalpel_picture.o
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
@@ -127,10 +136,9 @@ $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $
 	# q, not r: two rooms may have a file of the same name
 	$(AR) qcs $@ $^
 
-# Vision's own are linked to its own tests only: every other one would map OpenCV.
 all_libs = $(if $(has_libmnl),$(shell $(PKG_CONFIG) --libs libmnl)) \
 	$(if $(has_libiio),$(shell $(PKG_CONFIG) --libs libiio)) \
 	$(if $(has_comedilib),$(shell $(PKG_CONFIG) --libs comedilib)) \
-	$(foreach lib,$(filter-out incise-vision,$(libraries)),$(pc_libs_$(lib)) $(libs_$(lib)))
+	$(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
 
 .PHONY: libs

@@ -30,6 +30,10 @@ emulator := tests/polhemus/emulator.c
 unit_emulator = $(if $(filter polhemus/%,$*),$(emulator))
 $(filter $(O)/tests/unit/polhemus/%,$(unit_programs)): $(emulator) tests/polhemus/emulator.h
 
+# What of vision is in a module is linked to its own tests, which then map OpenCV, alone.
+vision_linked := tests/vision/linked.c
+$(filter $(O)/tests/unit/vision/%,$(unit_programs)): $(vision_linked)
+
 $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
@@ -39,8 +43,8 @@ $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
 		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
-		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(O)/lib/libincise-tests.a \
-		$(if $(filter vision/%,$*),$(libs_incise-vision)) \
+		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(if $(filter vision/%,$*),$(vision_linked)) \
+		$(O)/lib/libincise-tests.a $(if $(filter vision/%,$*),$(libs_vision_opencv)) \
 		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm
 
 check: ## install what is missing, build, and run all tests

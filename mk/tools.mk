@@ -22,7 +22,6 @@ extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
 	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o \
 	bench_vision.o scalpel_picture.o)
-$(O)/obj/tools/bench_vision.o: cppflags += $(if $(has_vision),-DWITH_VISION)
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
 # built where its headers are. It is for measuring, and is not installed.

@@ -8,11 +8,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
+#include <incise/vision.h>
 #include "bench_vision.h"
 #include "cli.h"
-
-#ifdef WITH_VISION
-#include <incise/vision.h>
 #include "json.h"
 #include "machine.h"
 #include "scalpel_picture.h"
@@ -110,19 +108,26 @@ static void look(struct incise_vision *vision, const struct incise_camera_frame 
 		cli_fail("a picture cannot be measured");
 }
 
-static struct row measure(const struct pictures *p, int kind, bool follows, int rounds)
+static struct incise_vision *vision_of(int kind)
 {
 	struct incise_vision_setup setup = {
 		.hue = {0, 179}, .saturation = {0, 255}, .value = {0, kinds[kind].value}};
 	struct incise_error err = {0};
 	struct incise_vision *vision = incise_vision_new(&setup, &err);
+
+	if (!vision)
+		cli_fail_with(&err);
+	return vision;
+}
+
+static struct row measure(const struct pictures *p, int kind, bool follows, int rounds)
+{
+	struct incise_vision *vision = vision_of(kind);
 	struct incise_vision_result result;
 	double us[PICTURES * ROUNDS], sum = 0, square = 0, said = 0;
 	struct row row = {.pictures = p->n};
 	int n = 0;
 
-	if (!vision)
-		cli_fail_with(&err);
 	look(vision, &p->frame[p->n - 1], &result); /* warms up */
 	for (int r = 0; r < rounds; r++)
 		for (int i = 0; i < p->n; i++) {
@@ -160,6 +165,7 @@ void bench_vision(bool json, bool quick)
 	struct machine machine;
 	json_t *list = json_array();
 
+	incise_vision_free(vision_of(0)); /* fails before anything is printed */
 	machine_init(&machine);
 	if (!json)
 		printf("%s\n640 x 480 pixels, one thread\n%-12s %-8s %7s %9s %7s %7s %8s %8s\n",
@@ -193,14 +199,3 @@ void bench_vision(bool json, bool quick)
 	else
 		json_decref(list);
 }
-
-#else
-
-void bench_vision(bool json, bool quick)
-{
-	(void)json;
-	(void)quick;
-	cli_fail("not built in: libopencv-imgproc-dev was absent");
-}
-
-#endif

@@ -26,8 +26,7 @@ static bool plain(const char *name)
 	return length && length < 32 && !name[length];
 }
 
-/* The folder of modules; false where it has no name that fits. */
-static bool folder(char *path, size_t size)
+bool incise_backend_folder(char *path, size_t size)
 {
 	const char *given = secure_getenv("INCISE_MODULE_PATH");
 	char own[PATH_MAX];
@@ -79,7 +78,8 @@ int incise_backend_names(const char *kind, char names[][32], int room)
 	char known[400], in[PATH_MAX], *rest = known, *name;
 	int n = 0;
 
-	list(kind, folder(in, sizeof(in)) ? in : NULL, known, sizeof(known));
+	list(kind, incise_backend_folder(in, sizeof(in)) ? in : NULL, known,
+	     sizeof(known));
 	while ((name = strsep(&rest, ", ")) && n < room)
 		if (*name && strcmp(name, BUILT_IN_SIM))
 			snprintf(names[n++], sizeof(*names), "%.31s", name);
@@ -129,7 +129,7 @@ int incise_backend_find(struct incise_loaded *loaded, const char *kind, const ch
 			const char *where, struct incise_error *err)
 {
 	char in[PATH_MAX], path[PATH_MAX + 80], known[200];
-	bool has_folder = folder(in, sizeof(in));
+	bool has_folder = incise_backend_folder(in, sizeof(in));
 	struct stat status;
 
 	for (size_t i = 0; i < sizeof(built_in) / sizeof(*built_in); i++)

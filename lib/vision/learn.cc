@@ -14,6 +14,7 @@
 #include <vector>
 #include <incise/vision.h>
 #include "picture.h"
+#include "vision_opencv.h"
 
 namespace
 {
@@ -136,7 +137,7 @@ int learn(const struct incise_camera_frame &frame, const struct incise_vision_bo
 
 } // namespace
 
-int incise_vision_learn(const struct incise_camera_frame *frame,
+int vision_opencv_learn(struct incise_vision *, const struct incise_camera_frame *frame,
 			const struct incise_vision_box *box,
 			struct incise_vision_setup *setup, struct incise_error *err)
 {

@@ -16,12 +16,14 @@
 #include "edge.h"
 #include "handle.h"
 #include "picture.h"
+#include "vision_opencv.h"
 
 enum { MARGIN = 24 }; /* pixels that a handle may move between two pictures */
 
 static constexpr double worst_quality = 0.2;
 
-struct incise_vision {
+struct opencv_vision {
+	struct incise_vision vision;
 	struct incise_vision_setup setup;
 	cv::Rect region; /* to look at first; empty: all */
 	vision::picture picture;
@@ -64,36 +66,6 @@ static int check_setup(const struct incise_vision_setup *s, struct incise_error 
 	return 0;
 }
 
-struct incise_vision *incise_vision_new(const struct incise_vision_setup *setup,
-					struct incise_error *err)
-{
-	int ret = check_setup(setup, err);
-
-	if (ret) {
-		errno = -ret;
-		return NULL;
-	}
-	try {
-		struct incise_vision *v = new incise_vision();
-
-		/* It is quicker so on a region of interest, and a capture that has a core for
-		 * itself wants no threads beside its own. */
-		cv::setNumThreads(1);
-		v->setup = *setup;
-		v->region = cv::Rect(setup->roi.x, setup->roi.y, setup->roi.width,
-				     setup->roi.height);
-		return v;
-	} catch (...) {
-		errno = -incise_error_set(err, ENOMEM, "vision: out of memory");
-		return NULL;
-	}
-}
-
-void incise_vision_free(struct incise_vision *vision)
-{
-	delete vision;
-}
-
 static void say_nothing(struct incise_vision_result *result, int64_t t_ns,
 			const char *why)
 {
@@ -109,7 +81,7 @@ static double clip01(double value)
 	return std::min(1.0, std::max(0.0, value));
 }
 
-static void say(struct incise_vision *v, const vision::handle &handle,
+static void say(struct opencv_vision *v, const vision::handle &handle,
 		const vision::edge &top, const vision::edge &bottom,
 		struct incise_vision_result *result)
 {
@@ -133,7 +105,7 @@ static void say(struct incise_vision *v, const vision::handle &handle,
 }
 
 /* Look in a region. 0, or a negative errno; result->found says the rest. */
-static int look(struct incise_vision *v, const cv::Rect &region,
+static int look(struct opencv_vision *v, const cv::Rect &region,
 		struct incise_vision_result *result)
 {
 	vision::edge top, bottom;
@@ -184,7 +156,7 @@ static cv::Rect fit_region(cv::Rect region, const cv::Size &size)
 	return region;
 }
 
-static int measure(struct incise_vision *v, const struct incise_camera_frame *frame,
+static int measure(struct opencv_vision *v, const struct incise_camera_frame *frame,
 		   struct incise_vision_result *result)
 {
 	int ret = v->picture.take(*frame);
@@ -203,7 +175,7 @@ static int measure(struct incise_vision *v, const struct incise_camera_frame *fr
 	return look(v, all, result);
 }
 
-int incise_vision_measure(struct incise_vision *vision,
+static int opencv_measure(struct incise_vision *vision,
 			  const struct incise_camera_frame *frame,
 			  struct incise_vision_result *result)
 {
@@ -211,7 +183,7 @@ int incise_vision_measure(struct incise_vision *vision,
 
 	say_nothing(result, frame->t_ns, "no picture");
 	try {
-		ret = measure(vision, frame, result);
+		ret = measure((struct opencv_vision *)vision, frame, result);
 	} catch (const std::bad_alloc &) {
 		ret = -ENOMEM;
 	} catch (const cv::Exception &e) {
@@ -222,4 +194,38 @@ int incise_vision_measure(struct incise_vision *vision,
 	if (ret)
 		say_nothing(result, frame->t_ns, "no picture");
 	return ret;
+}
+
+static void opencv_close(struct incise_vision *vision)
+{
+	delete (struct opencv_vision *)vision;
+}
+
+void *vision_opencv_open(const struct incise_backend_request *request,
+			 struct incise_error *err)
+{
+	static const struct incise_vision_ops ops = {opencv_measure, vision_opencv_learn,
+						     opencv_close};
+	const struct incise_vision_setup *setup = request->vision;
+	int ret = check_setup(setup, err);
+
+	if (ret) {
+		errno = -ret;
+		return NULL;
+	}
+	try {
+		struct opencv_vision *v = new opencv_vision();
+
+		/* It is quicker so on a region of interest, and a capture that has a core for
+		 * itself wants no threads beside its own. */
+		cv::setNumThreads(1);
+		v->vision.ops = &ops;
+		v->setup = *setup;
+		v->region = cv::Rect(setup->roi.x, setup->roi.y, setup->roi.width,
+				     setup->roi.height);
+		return v;
+	} catch (...) {
+		errno = -incise_error_set(err, ENOMEM, "vision: out of memory");
+		return NULL;
+	}
 }

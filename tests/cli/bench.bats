@@ -284,7 +284,7 @@ of() {
 }
 
 @test "bench vision reports error and time of each kind of picture" {
-	[ -e "$INCISE_BUILD/lib/libincise-vision.so" ] || skip "OpenCV's headers were absent"
+	[ -e "$INCISE_BUILD/lib/incise/vision_opencv.so" ] || skip "OpenCV's headers were absent"
 	incise bench vision --quick --json >r.json
 	for k in 0 1 2 3 4 5 6 7 8 9 10 11 12 13; do
 		holds "$(key r.json "rows[$k].found") >= 7 && $(key r.json "rows[$k].pictures") == 10"

@@ -51,9 +51,12 @@ setup() {
 	done
 	cmp "$root/scenes/liver.scene" "$dest/usr/share/incise/scenes/liver.scene"
 	cmp "$root/tools/incise.bash" "$dest/usr/share/bash-completion/completions/incise"
-	for lib in incise incise-learn incise-record incise-vision; do
+	for lib in incise incise-learn incise-record; do
 		[ -f "$dest/usr/lib/lib$lib.so" ]
 		[ "$(readlink "$dest/usr/lib/lib$lib.so")" = lib$lib.so.1 ]
+	done
+	for module in "$INCISE_BUILD"/lib/incise/[!p]*.so; do
+		cmp "$module" "$dest/usr/lib/incise/${module##*/}"
 	done
 	# nothing but /usr was made
 	[ "$(ls -A "$dest")" = usr ]

@@ -10,7 +10,7 @@ setup() {
 	include=$root/lib/include
 }
 
-parts="libincise libincise-learn libincise-record libincise-vision"
+parts="libincise libincise-learn libincise-record"
 
 # Functions that a shared object gives to others.
 exported_by() {
@@ -104,16 +104,63 @@ declared_by() {
 	# what needs them has them: the pattern finds what it looks for
 	ldd "$INCISE_BUILD/bin/incise-train" | grep -q lapack
 	ldd "$INCISE_BUILD/bin/incise-export" | grep -q sqlite
-	ldd "$INCISE_BUILD/lib/libincise-vision.so" | grep -q opencv
-	for lib in incise incise-learn incise-record; do
-		ldd "$INCISE_BUILD/lib/lib$lib.so" >mapped
-		run grep -E 'opencv|libjpeg|libstdc' mapped
-		[ "$status" -eq 1 ]
-	done
 	for program in incise incise-eval incise-compile; do
 		ldd "$INCISE_BUILD/bin/$program" >mapped
 		run grep -E "$heavy" mapped
 		[ "$status" -eq 1 ]
+	done
+}
+
+# The files that a program maps, what it loads by itself included.
+maps() {
+	LD_DEBUG=files LD_DEBUG_OUTPUT=$PWD/debug "$@" >/dev/null 2>&1 || :
+	cat debug.* >mapped
+	rm debug.*
+	grep -q libincise.so mapped
+}
+
+@test "OpenCV is mapped by who looks at pictures, and by no one else" {
+	for file in "$INCISE_BUILD"/lib/lib*.so "$INCISE_BUILD"/bin/*; do
+		ldd "$file" >linked
+		run ! grep -E 'opencv|libjpeg' linked
+	done
+	maps incise bench precision --quick
+	run ! grep opencv mapped
+	maps incise info "$root/scenes/liver.fis"
+	run ! grep opencv mapped
+	maps incise info devices
+	run ! grep opencv mapped
+	printf '%s\n' 'tracker = "sim:"; stepper = "sim:"; camera = "sim:";' >rig.conf
+	maps incise haptic "$root/scenes/liver.scene" --rig rig.conf --duration 0.2s
+	run ! grep opencv mapped
+	# the pattern finds it where it is
+	[ -e "$INCISE_BUILD/lib/incise/vision_opencv.so" ] || skip "OpenCV's headers were absent"
+	maps incise bench vision --quick
+	grep -q vision_opencv.so mapped
+	grep -q libopencv_core mapped
+}
+
+@test "without its module vision says where that was looked for" {
+	mkdir modules
+	export INCISE_MODULE_PATH=$PWD/modules
+	run --separate-stderr incise bench vision --quick
+	failed_with "vision: there is no module vision_opencv.so in $PWD/modules" \
+		libopencv-imgproc-dev
+	# one that is none, and one of another kind
+	echo none >modules/vision_opencv.so
+	run --separate-stderr incise bench vision --quick
+	failed_with "vision: the module cannot be loaded"
+	cp "$INCISE_BUILD/lib/incise/tracker_tty.so" modules/vision_opencv.so
+	run --separate-stderr incise bench vision --quick
+	failed_with "holds another backend"
+}
+
+@test "a module exports its backend and nothing else of its own" {
+	for module in "$INCISE_BUILD"/lib/incise/[!p]*.so; do
+		# what templates of C++ leave is weak
+		nm -D --defined-only "$module" | awk '$2 !~ /[VWu]/ { print $3 }' |
+			grep -vxE '_end|_edata|__bss_start' >exported
+		[ "$(cat exported)" = incise_backend ] || complain "$module: $(cat exported)"
 	done
 }
 
@@ -122,6 +169,10 @@ declared_by() {
 		run -0 ldd -r "$INCISE_BUILD/lib/$part.so"
 		[[ "$output" != *"not found"* ]]
 		[[ "$output" != *"undefined symbol"* ]]
+	done
+	for module in "$INCISE_BUILD"/lib/incise/[!p]*.so; do
+		run -0 ldd -r "$module"
+		[[ "$output" != *"not found"* && "$output" != *"undefined symbol"* ]]
 	done
 }
 

@@ -17,6 +17,7 @@
 #include <incise/scan.h>
 #include <incise/stepper.h>
 #include <incise/tracker.h>
+#include <incise/vision.h>
 
 struct incise_tracker_ops {
 	int (*read)(struct incise_tracker *tracker, struct incise_tracker_sample *samples,
@@ -111,6 +112,23 @@ struct incise_stepper {
 	const struct incise_stepper_ops *ops;
 };
 
+/** Vision is no device, but comes in a module like one. */
+struct incise_vision_ops {
+	int (*measure)(struct incise_vision *vision,
+		       const struct incise_camera_frame *frame,
+		       struct incise_vision_result *result);
+	/** Asked of an object whose own setup says nothing. */
+	int (*learn)(struct incise_vision *vision,
+		     const struct incise_camera_frame *frame,
+		     const struct incise_vision_box *box,
+		     struct incise_vision_setup *setup, struct incise_error *err);
+	void (*close)(struct incise_vision *vision);
+};
+
+struct incise_vision {
+	const struct incise_vision_ops *ops;
+};
+
 /** Changes when any struct of this header does. */
 #define INCISE_BACKEND_ABI 3
 
@@ -125,6 +143,7 @@ struct incise_backend_request {
 	const struct incise_tracker_setup *tracker;
 	const struct incise_force_setup *force;
 	const struct incise_camera_setup *camera;
+	const struct incise_vision_setup *vision; /**< to be checked */
 };
 
 /**
@@ -138,7 +157,7 @@ struct incise_backend_request {
  */
 struct incise_backend {
 	unsigned int abi; /**< INCISE_BACKEND_ABI */
-	const char *kind; /**< "tracker", "force", "camera" or "stepper" */
+	const char *kind; /**< "tracker", "force", "camera", "stepper" or "vision" */
 	const char *name; /**< letters a to z, digits, underscores; below 32 */
 	/**
 	 * Open a device. Whatever was powered when it is closed must be brought to rest.

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Depth of the blade from a picture. Part of libincise-vision, on OpenCV: only a program
- * that is linked to it maps that. The black scalpel is found, its axis fitted, and along
- * the axis its upper end and the place where the tissue begins. As in paper 1, handle and
+ * Depth of the blade from a picture. It is done by a module on OpenCV, vision_opencv.so
+ * (incise/backend.h), which the first call of incise_vision_new() or incise_vision_learn()
+ * maps into the process, to stay there; who calls neither never maps it. The black scalpel
+ * is found, its axis fitted, and along the axis its upper end and the place where the tissue
+ * begins. As in paper 1, handle and
  * sheath are black all the way into the tissue, and both ends of what is seen of them are
  * in the picture: 47.5 mm over 400 pixels there.
  *
@@ -15,8 +17,10 @@
  * A blade of bright steel below the black is not part of length_px: paint it.
  * Pixel (0, 0) covers 0 … 1 in both directions, top row first.
  *
- * Not real-time safe. One thread at a time per object. No exception of C++ comes out.
- * OpenCV is told to use no threads of its own, in the whole process.
+ * Not real-time safe: it allocates, and the first call loads some 25 libraries, which takes
+ * milliseconds; a loop that must not wait makes the object before it begins. One thread at a
+ * time per object. No exception of C++ comes out. OpenCV is told to use no threads of its
+ * own, in the whole process.
  */
 #ifndef INCISE_VISION_H
 #define INCISE_VISION_H
@@ -68,7 +72,11 @@ struct incise_vision_result {
 
 struct incise_vision;
 
-/** @return NULL with errno EINVAL (a value out of range), ENOMEM; to be freed. */
+/**
+ * @return to be freed; NULL with errno EINVAL (a value out of range), ENOMEM; ENOENT (the
+ *         module is not installed: the message says where it was looked for), ENOEXEC (it
+ *         is broken, or lacks a library)
+ */
 INCISE_API struct incise_vision *incise_vision_new(
 	const struct incise_vision_setup *setup, struct incise_error *err);
 
@@ -96,7 +104,8 @@ INCISE_API int incise_vision_measure(struct incise_vision *vision,
  * the thresholds of *setup are written.
  *
  * @return 0; -EINVAL (the box is not within the picture), -ERANGE (what is in the box is not
- *         of one colour: the message says what it spans); as incise_vision_measure()
+ *         of one colour: the message says what it spans); as incise_vision_measure(), and
+ *         -ENOENT, -ENOEXEC as incise_vision_new()
  */
 INCISE_API int incise_vision_learn(const struct incise_camera_frame *frame,
 				   const struct incise_vision_box *box,
