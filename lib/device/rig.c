@@ -24,6 +24,8 @@ struct incise_rig {
 	struct incise_camera *camera;
 	struct incise_stepper *stepper;
 	double point_mm[3], normal[3];
+	struct incise_vision_setup vision;
+	bool has_vision;
 };
 
 /* Where a device of a kind is kept. Each kind's struct is what its backend opens. */
@@ -102,6 +104,8 @@ static struct incise_rig *rig_new(const struct incise_rig_plan *plan, const char
 		goto no_memory;
 	memcpy(rig->point_mm, plan->point_mm, sizeof(rig->point_mm));
 	memcpy(rig->normal, plan->normal, sizeof(rig->normal));
+	rig->vision = plan->vision;
+	rig->has_vision = plan->has_vision;
 	rig->spec = strdup(spec);
 	rig->clock = plan->simulated ? incise_clock_new_simulated(SIM_START_NS)
 				     : incise_clock_new_real();
@@ -208,4 +212,12 @@ void incise_rig_surface(const struct incise_rig *rig, double point_mm[3],
 {
 	memcpy(point_mm, rig->point_mm, sizeof(rig->point_mm));
 	memcpy(normal, rig->normal, sizeof(rig->normal));
+}
+
+int incise_rig_vision(const struct incise_rig *rig, struct incise_vision_setup *setup)
+{
+	if (!rig->has_vision)
+		return -ENOENT;
+	*setup = rig->vision;
+	return 0;
 }

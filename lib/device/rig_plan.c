@@ -196,6 +196,22 @@ static int plan_clock(struct incise_rig_plan *plan, const char *where, const cha
 				where, text);
 }
 
+/* Its pictures are known: no group need say what is in them. */
+static void plan_virtual_vision(struct incise_rig_plan *plan)
+{
+	incise_sim_vision_setup(&plan->config, &plan->vision);
+	plan->has_vision = true;
+}
+
+static bool virtual_camera(const config_setting_t *root)
+{
+	const char *device = NULL;
+
+	return config_setting_lookup_string(root, incise_kind_name[KIND_CAMERA],
+					    &device) &&
+	       !strcmp(device, SIM_BACKEND ":");
+}
+
 static int plan_root(struct incise_rig_plan *plan, unsigned int devices,
 		     const config_setting_t *root, const char *path,
 		     struct incise_error *err)
@@ -203,7 +219,8 @@ static int plan_root(struct incise_rig_plan *plan, unsigned int devices,
 	static const char *const keys[] = {"clock",	  "tracker",	  "force",
 					   "camera",	  "stepper",	  "surface",
 					   "sim",	  "actuator",	  "tracker_setup",
-					   "force_setup", "camera_setup", NULL};
+					   "force_setup", "camera_setup", "vision",
+					   NULL};
 	const config_setting_t *actuator;
 	const char *clock = NULL;
 	char where[240];
@@ -233,8 +250,13 @@ static int plan_root(struct incise_rig_plan *plan, unsigned int devices,
 		rc = incise_force_setup_read(&plan->force, root, path, err);
 	if (!rc)
 		rc = incise_camera_setup_read(&plan->camera, root, path, err);
+	if (!rc)
+		rc = incise_vision_setup_read(&plan->vision, &plan->has_vision, root,
+					      path, err);
 	for (int kind = 0; kind < N_KINDS && !rc; kind++)
 		rc = plan_device(plan, kind, devices & kind_bit(kind), root, path, err);
+	if (!rc && !plan->has_vision && virtual_camera(root))
+		plan_virtual_vision(plan);
 	return rc;
 }
 
@@ -290,6 +312,8 @@ static int plan_shorthand(struct incise_rig_plan *plan, const char *spec,
 	while (!rc && *words && (word = strsep(&rest, ",")))
 		rc = plan_word(plan, word, err);
 	free(words);
+	if (!rc)
+		plan_virtual_vision(plan);
 	return rc;
 }
 

@@ -13,6 +13,7 @@
 #include <incise/force.h>
 #include <incise/sim.h>
 #include <incise/tracker.h>
+#include <incise/vision.h>
 
 /* The kinds of devices; their order is that of the incise_rig_device bits. */
 enum { KIND_TRACKER, KIND_FORCE, KIND_CAMERA, KIND_STEPPER, N_KINDS };
@@ -42,6 +43,8 @@ struct incise_rig_plan {
 	struct incise_tracker_setup tracker;
 	struct incise_force_setup force;
 	struct incise_camera_setup camera;
+	struct incise_vision_setup vision;
+	bool has_vision; /* rig.conf has it, or the camera is the virtual one */
 	struct incise_sim_config config;
 	double point_mm[3], normal[3];
 };

@@ -182,3 +182,93 @@ int incise_camera_setup_read(struct incise_camera_setup *setup,
 	setup->pixels = (enum incise_pixels)pixels;
 	return rc;
 }
+
+/* Whole numbers of 0 … @most, @n of them; *values as they were where the key is absent. */
+static int read_numbers(const config_setting_t *group, const char *path, const char *key,
+			int n, int most, int *values, const char *form,
+			struct incise_error *err)
+{
+	const config_setting_t *list = config_setting_get_member(group, key);
+	bool good = list && config_setting_is_aggregate(list) &&
+		    !config_setting_is_group(list) && config_setting_length(list) == n;
+	int number[4] = {0};
+
+	if (!list)
+		return 0;
+	for (int i = 0; i < n && good; i++) {
+		const config_setting_t *one = config_setting_get_elem(list, i);
+
+		number[i] = config_setting_get_int(one);
+		good = config_setting_type(one) == CONFIG_TYPE_INT && number[i] >= 0 &&
+		       number[i] <= most;
+	}
+	if (good) {
+		memcpy(values, number, n * sizeof(*values));
+		return 0;
+	}
+	return incise_error_set(
+		err, EINVAL,
+		"%.200s:%d: vision.%s: expected %s of whole numbers from 0 to %d; "
+		"correct it",
+		path, config_setting_source_line(list), key, form, most);
+}
+
+/* [low, high], the lower one first unless it @wraps around. */
+static int read_range(const config_setting_t *group, const char *path, const char *key,
+		      int most, bool wraps, int range[2], struct incise_error *err)
+{
+	int rc = read_numbers(group, path, key, 2, most, range, "[low, high]", err);
+
+	if (rc || wraps || range[0] <= range[1])
+		return rc;
+	return incise_error_set(
+		err, EINVAL,
+		"%.200s:%d: vision.%s: expected the lower number first; correct it", path,
+		config_setting_source_line(config_setting_get_member(group, key)), key);
+}
+
+/* All of roi or nothing; what is smaller than a picture may be shows no handle. */
+static int read_roi(const config_setting_t *group, const char *path,
+		    struct incise_vision_box *roi, struct incise_error *err)
+{
+	int box[4] = {0};
+	int rc = read_numbers(group, path, "roi", 4, 8192, box, "[x, y, width, height]",
+			      err);
+
+	*roi = (struct incise_vision_box){box[0], box[1], box[2], box[3]};
+	if (rc || !config_setting_get_member(group, "roi") ||
+	    (roi->width >= 16 && roi->height >= 16))
+		return rc;
+	return incise_error_set(
+		err, EINVAL,
+		"%.200s:%d: vision.roi: expected a width and a height of 16 or more; "
+		"correct it",
+		path,
+		config_setting_source_line(config_setting_get_member(group, "roi")));
+}
+
+int incise_vision_setup_read(struct incise_vision_setup *setup, bool *given,
+			     const config_setting_t *root, const char *path,
+			     struct incise_error *err)
+{
+	static const char *const keys[] = {"hue",     "saturation", "value",
+					   "full_px", "roi",	    NULL};
+	const config_setting_t *group;
+	int rc = group_of(root, "vision", path, keys, &group, err);
+
+	*given = group;
+	*setup = (struct incise_vision_setup){
+		.hue = {0, 179}, .saturation = {0, 255}, .value = {0, 60}};
+	if (rc || !group)
+		return rc;
+	rc = read_range(group, path, "hue", 179, true, setup->hue, err);
+	if (!rc)
+		rc = read_range(group, path, "saturation", 255, false, setup->saturation,
+				err);
+	if (!rc)
+		rc = read_range(group, path, "value", 255, false, setup->value, err);
+	if (!rc)
+		rc = incise_conf_number(group, path, "full_px", 16, 8192, &setup->full_px,
+					err);
+	return rc ? rc : read_roi(group, path, &setup->roi, err);
+}

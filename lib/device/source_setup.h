@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * Reading what rig.conf sets real sources to: the groups tracker_setup, force_setup and
- * camera_setup. Without its group a source is as by default.
+ * camera_setup; and vision, which looks at the camera's pictures. Without its group a source
+ * is as by default.
  */
 #ifndef INCISE_SOURCE_SETUP_H
 #define INCISE_SOURCE_SETUP_H
@@ -9,6 +10,7 @@
 #include <incise/camera.h>
 #include <incise/force.h>
 #include <incise/tracker.h>
+#include <incise/vision.h>
 #include "../base/conf.h"
 
 /* Each reads the group of its name within @root. Returns 0 or -EINVAL; err names file, line,
@@ -20,6 +22,11 @@ int incise_force_setup_read(struct incise_force_setup *setup,
 			    const config_setting_t *root, const char *path,
 			    struct incise_error *err);
 int incise_camera_setup_read(struct incise_camera_setup *setup,
+			     const config_setting_t *root, const char *path,
+			     struct incise_error *err);
+
+/* *given says whether there is such a group. depth_mm_px stays 0: calibration.conf has it. */
+int incise_vision_setup_read(struct incise_vision_setup *setup, bool *given,
 			     const config_setting_t *root, const char *path,
 			     struct incise_error *err);
 

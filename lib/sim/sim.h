@@ -8,6 +8,7 @@
 
 #include <incise/sim.h>
 #include <incise/backend.h>
+#include <incise/vision.h>
 
 /* All return NULL with errno ENOMEM. */
 struct incise_tracker *incise_sim_tracker_new(struct incise_sim *sim);
@@ -26,6 +27,10 @@ int incise_sim_config_set(struct incise_sim_config *config, const char *key, dou
 /* Whether every value is within its range. Returns 0 or -EINVAL. */
 int incise_sim_config_check(const struct incise_sim_config *config,
 			    struct incise_error *err);
+
+/* What finds the scalpel in the virtual camera's pictures, with its scale. */
+void incise_sim_vision_setup(const struct incise_sim_config *config,
+			     struct incise_vision_setup *setup);
 
 /* True length of the scalpel in a picture of time t_ns (the clock's), pixels. */
 double incise_sim_camera_exposed_px(const struct incise_sim *sim, int64_t t_ns);

@@ -164,6 +164,19 @@ static void draw(struct sim_camera *c, uint64_t n, const struct incise_blade *bl
 	}
 }
 
+void incise_sim_vision_setup(const struct incise_sim_config *config,
+			     struct incise_vision_setup *setup)
+{
+	/* Between the scalpel, 26, and the darkest liver, 88, as HSV's value sees them. */
+	*setup = (struct incise_vision_setup){
+		.hue = {0, 179},
+		.saturation = {0, 255},
+		.value = {0, 60},
+		.full_px = SCALPEL_MM / config->camera_mm_px,
+		.depth_mm_px = config->camera_mm_px,
+	};
+}
+
 double incise_sim_camera_exposed_px(const struct incise_sim *sim, int64_t t_ns)
 {
 	struct incise_blade blade;

@@ -22,6 +22,7 @@
 #include <incise/force.h>
 #include <incise/stepper.h>
 #include <incise/tracker.h>
+#include <incise/vision.h>
 
 INCISE_BEGIN_DECLS
 
@@ -74,6 +75,17 @@ INCISE_API struct incise_sim *incise_rig_sim(struct incise_rig *rig);
 /** The tissue's surface: a point on it and the outward unit normal. */
 INCISE_API void incise_rig_surface(const struct incise_rig *rig, double point_mm[3],
 				   double normal[3]);
+
+/**
+ * What finds the scalpel in the camera's pictures, for incise_vision_new(): rig.conf's group
+ * `vision`, whose depth_mm_px is 0, as calibration.conf has that: fill it in where full_px is
+ * not 0. Without the group, of a virtual camera what fits its pictures, with their scale.
+ * Whether the camera was opened does not matter, and nothing of vision is loaded.
+ *
+ * @return 0; -ENOENT (no such group, and no virtual camera): *setup is as it was
+ */
+INCISE_API int incise_rig_vision(const struct incise_rig *rig,
+				 struct incise_vision_setup *setup);
 
 INCISE_END_DECLS
 #endif

@@ -7,7 +7,10 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <errno.h>
+#include <math.h>
 #include <incise/rig.h>
+#include "../base/temp_file.h"
 
 #define ALL \
 	(INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_CAMERA | INCISE_RIG_STEPPER)
@@ -50,11 +53,59 @@ static void devices_share_one_world(void **state)
 	incise_rig_close(rig);
 }
 
+/* What a rig says of vision; -1 in value[1] where it says nothing. */
+static struct incise_vision_setup vision_of(const char *spec)
+{
+	struct incise_vision_setup setup = {.value = {-1, -1}};
+	struct incise_rig *rig = incise_rig_open(spec, 0, NULL);
+	int rc;
+
+	assert_non_null(rig);
+	rc = incise_rig_vision(rig, &setup);
+	assert_int_equal(rc, setup.value[1] < 0 ? -ENOENT : 0);
+	incise_rig_close(rig);
+	return setup;
+}
+
+static void vision_is_that_of_rig_conf_or_of_the_virtual_camera(void **state)
+{
+	/* full_px: 47.5 mm over camera_mm_px, which is 0.11875 unless it is given */
+	static const struct {
+		const char *text; /* of a file, or the shorthand */
+		int value;
+		double full_px, depth_mm_px;
+	} row[] = {
+		{"sim:", 60, 400, 47.5 / 400},
+		{"sim:camera_mm_px=0.2375", 60, 200, 0.2375},
+		{"camera = \"sim:\"; sim = { camera_mm_px = 0.475; };", 60, 100, 0.475},
+		{"camera = \"sim:\"; vision = { value = [0, 70]; };", 70, 0, 0},
+		{"camera = \"v4l2:/dev/video0\"; vision = { full_px = 300; };", 60, 300,
+		 0},
+		{"vision = { value = [1, 2]; };", 2, 0, 0},
+		{"camera = \"v4l2:/dev/video0\"; tracker = \"sim:\";", -1, 0, 0},
+		{"", -1, 0, 0},
+	};
+
+	for (size_t i = 0; i < sizeof(row) / sizeof(*row); i++) {
+		bool shorthand = row[i].text[0] == 's';
+		struct temp_file file = temp_file_new("rig.conf", row[i].text);
+		struct incise_vision_setup setup =
+			vision_of(shorthand ? row[i].text : file.path);
+
+		assert_int_equal(setup.value[1], row[i].value);
+		/* a rounding of the division */
+		assert_true(fabs(setup.full_px - row[i].full_px) < 1e-9);
+		assert_true(setup.depth_mm_px == row[i].depth_mm_px);
+		temp_file_free(&file);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(only_what_is_asked_for_is_open),
 		cmocka_unit_test(devices_share_one_world),
+		cmocka_unit_test(vision_is_that_of_rig_conf_or_of_the_virtual_camera),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -161,7 +161,7 @@ static void file_refuses(void **state)
 		{"tracer = \"sim:\";", EINVAL,
 		 ":1: tracer: unknown key; expected one of clock, tracker, force, camera, "
 		 "stepper, surface, sim, actuator, "
-		 "tracker_setup, force_setup, camera_setup"},
+		 "tracker_setup, force_setup, camera_setup, vision"},
 		{"sim = 1;", EINVAL,
 		 ":1: sim: expected a group { key = value; }; correct it"},
 		{"sim = {\n\nsede = 1; };", EINVAL,

@@ -16,6 +16,8 @@ struct all {
 	struct incise_tracker_setup tracker;
 	struct incise_force_setup force;
 	struct incise_camera_setup camera;
+	struct incise_vision_setup vision;
+	bool has_vision;
 };
 
 static int read_all(const char *text, struct all *all, struct incise_error *err)
@@ -33,6 +35,9 @@ static int read_all(const char *text, struct all *all, struct incise_error *err)
 		rc = incise_force_setup_read(&all->force, root, "rig.conf", err);
 	if (!rc)
 		rc = incise_camera_setup_read(&all->camera, root, "rig.conf", err);
+	if (!rc)
+		rc = incise_vision_setup_read(&all->vision, &all->has_vision, root,
+					      "rig.conf", err);
 	config_destroy(&config);
 	return rc;
 }
@@ -51,6 +56,21 @@ static void without_groups_all_is_by_default(void **state)
 	assert_string_equal(all.force.trigger, "");
 	assert_int_equal(all.camera.pixels, INCISE_PIXELS_YUYV);
 	assert_int_equal(all.camera.width, 0);
+	assert_false(all.has_vision);
+}
+
+static void an_empty_vision_is_of_a_black_handle(void **state)
+{
+	struct incise_error err = {0};
+	struct all all;
+
+	assert_int_equal(read_all("vision = {};", &all, &err), 0);
+	assert_true(all.has_vision);
+	assert_true(all.vision.hue[0] == 0 && all.vision.hue[1] == 179);
+	assert_true(all.vision.saturation[0] == 0 && all.vision.saturation[1] == 255);
+	assert_true(all.vision.value[0] == 0 && all.vision.value[1] == 60);
+	assert_true(all.vision.full_px == 0 && all.vision.depth_mm_px == 0);
+	assert_int_equal(all.vision.roi.width, 0);
 }
 
 static void all_keys_are_read(void **state)
@@ -64,7 +84,9 @@ static void all_keys_are_read(void **state)
 		     " trigger = \"my trigger\"; };"
 		     "camera_setup = { width = 640; height = 480; rate_hz = 59.94;"
 		     " format = \"grey\"; exposure_ms = 4.5; gain = 10;"
-		     " white_balance_K = 5000; focus = 7; };",
+		     " white_balance_K = 5000; focus = 7; };"
+		     "vision = { hue = [170, 10]; saturation = [80, 255]; value = [9, 9];"
+		     " full_px = 400.5; roi = [8192, 0, 16, 8192]; };",
 		     &all, &err))
 		fail_msg("%s", err.text);
 	assert_int_equal(all.tracker.n_stations, 2);
@@ -79,6 +101,13 @@ static void all_keys_are_read(void **state)
 		    all.camera.gain == 10 && all.camera.white_balance_K == 5000 &&
 		    all.camera.focus == 7);
 	assert_int_equal(all.camera.pixels, INCISE_PIXELS_GREY);
+	assert_true(all.has_vision);
+	assert_true(all.vision.hue[0] == 170 && all.vision.hue[1] == 10);
+	assert_true(all.vision.saturation[0] == 80 && all.vision.saturation[1] == 255);
+	assert_true(all.vision.value[0] == 9 && all.vision.value[1] == 9);
+	assert_true(all.vision.full_px == 400.5 && all.vision.depth_mm_px == 0);
+	assert_true(all.vision.roi.x == 8192 && all.vision.roi.y == 0 &&
+		    all.vision.roi.width == 16 && all.vision.roi.height == 8192);
 }
 
 static void what_is_wrong_is_said(void **state)
@@ -112,6 +141,32 @@ static void what_is_wrong_is_said(void **state)
 		{"camera_setup = { format = \"h264\"; };", "rgb, grey, yuyv, mjpeg"},
 		{"camera_setup = { exposure_ms = 0; };", "exposure_ms"},
 		{"camera_setup = { zoom = 1; };", "zoom"},
+		{"vision = 3;", "rig.conf:1: vision: expected a group"},
+		{"vision = { depth_mm_px = 0.1; };", "depth_mm_px"},
+		{"\nvision = { hue = [0, 180]; };",
+		 "rig.conf:2: vision.hue: expected [low, high] of whole numbers from 0 to "
+		 "179"},
+		{"vision = { hue = [-1, 179]; };", "vision.hue: expected [low"},
+		{"vision = { hue = [1]; };", "vision.hue: expected [low"},
+		{"vision = { hue = [1, 2, 3]; };", "vision.hue: expected [low"},
+		{"vision = { hue = [1.0, 2.0]; };", "vision.hue: expected [low"},
+		{"vision = { hue = (1, \"2\"); };", "vision.hue: expected [low"},
+		{"vision = { hue = 5; };", "vision.hue: expected [low"},
+		{"vision = { hue = { a = 1; b = 2; }; };", "vision.hue: expected [low"},
+		{"vision = { saturation = [0, 256]; };", "vision.saturation: expected"},
+		{"vision = { saturation = [9, 8]; };",
+		 "vision.saturation: expected the lower number first"},
+		{"vision = { value = [1, 0]; };",
+		 "vision.value: expected the lower number first"},
+		{"vision = { value = [0, 256]; };", "from 0 to 255"},
+		{"vision = { full_px = 15.9; };", "full_px"},
+		{"vision = { full_px = 8193; };", "full_px"},
+		{"vision = { roi = [0, 0, 640]; };",
+		 "vision.roi: expected [x, y, width, height] of"},
+		{"vision = { roi = [0, -1, 640, 480]; };", "vision.roi: expected [x, y"},
+		{"vision = { roi = [0, 0, 8193, 480]; };", "from 0 to 8192"},
+		{"vision = { roi = [0, 0, 15, 480]; };", "of 16 or more"},
+		{"vision = { roi = [0, 0, 480, 0]; };", "of 16 or more"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -128,6 +183,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(without_groups_all_is_by_default),
+		cmocka_unit_test(an_empty_vision_is_of_a_black_handle),
 		cmocka_unit_test(all_keys_are_read),
 		cmocka_unit_test(what_is_wrong_is_said),
 	};
