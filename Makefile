@@ -67,7 +67,7 @@ uses_haptic := incise
 uses_stepper := incise
 uses_plan := incise
 uses_demo := incise incise-learn
-uses_bench := incise incise-learn
+uses_bench := incise incise-learn incise-record
 
 all: libs tools
 

@@ -21,7 +21,7 @@ extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o \
 	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
 	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o \
-	bench_vision.o scalpel_picture.o)
+	bench_vision.o scalpel_picture.o bench_capture.o)
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
 # built where its headers are. It is for measuring, and is not installed.
@@ -72,5 +72,6 @@ bench: ## measure error against run time on this machine; chart in build/bench/
 	$(O)/bin/incise bench loop
 	$(O)/bin/incise bench stability --plot $(O)/bench/stability
 	$(O)/bin/incise bench vision
+	$(O)/bin/incise bench capture
 
 .PHONY: tools deps demo bench

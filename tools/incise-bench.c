@@ -4,6 +4,7 @@
  */
 #include <getopt.h>
 #include <string.h>
+#include "bench_capture.h"
 #include "bench_loop.h"
 #include "bench_precision.h"
 #include "bench_stability.h"
@@ -25,7 +26,8 @@ static const struct cli_option options[] = {
 static const struct cli_verb verb = {
 	.name = "bench",
 	.synopsis =
-		"precision [MODEL.fis] | training | stability | loop [SCENE] | vision [OPTIONS]",
+		"precision [MODEL.fis] | training | stability | loop [SCENE] | vision | capture "
+		"[OPTIONS]",
 	.summary =
 		"precision: measure error against run time of a model's arithmetics. Without\n"
 		"MODEL a model of the paper's size (20 rules) is made.\n"
@@ -36,7 +38,9 @@ static const struct cli_verb verb = {
 		"and on meshes of 20 000 and 500 000 triangles, or of SCENE; and how late the\n"
 		"machine wakes it.\n"
 		"vision: measure error and run time of the exposed length in pictures whose truth\n"
-		"is known.",
+		"is known.\n"
+		"capture: measure how much of a core it takes to record the virtual rig, pictures\n"
+		"and vision included, in real time.",
 	.options = options,
 	.notes =
 		"Exit: 0 measured, 1 failed or simulation and theory differ, 2 bad usage.\n"
@@ -73,6 +77,11 @@ static void vision(const struct job *job)
 	bench_vision(job->json, job->quick);
 }
 
+static void capture(const struct job *job)
+{
+	bench_capture(job->json, job->quick);
+}
+
 static const struct {
 	const char *word;
 	bool operand, plot; /* takes one */
@@ -80,7 +89,7 @@ static const struct {
 } words[] = {
 	{"precision", true, true, precision},  {"training", false, false, training},
 	{"stability", false, true, stability}, {"loop", true, false, loop},
-	{"vision", false, false, vision},
+	{"vision", false, false, vision},      {"capture", false, false, capture},
 };
 #define WORDS (int)(sizeof(words) / sizeof(*words))
 
@@ -106,8 +115,8 @@ int main(int argc, char **argv)
 	if (optind >= argc || what == WORDS ||
 	    argc - optind > (words[what].operand ? 2 : 1))
 		cli_usage(
-			"expected 'training', 'stability', 'vision', 'precision' and at most one "
-			"model, or 'loop' and at most one scene");
+			"expected 'training', 'stability', 'vision', 'capture', 'precision' and "
+			"at most one model, or 'loop' and at most one scene");
 	if (job.plot && !words[what].plot)
 		cli_usage("--plot goes with 'precision' and 'stability'");
 	job.operand = argc - optind == 2 ? argv[optind + 1] : NULL;

@@ -295,3 +295,45 @@ of() {
 	run -2 --separate-stderr incise bench vision --plot x
 	bad_usage "--plot goes with"
 }
+
+@test "bench capture tells what a whole capture takes, and leaves nothing behind" {
+	[ -e "$INCISE_BUILD/lib/incise/vision_opencv.so" ] || skip "OpenCV's headers were absent"
+	mkdir t
+	TMPDIR=$PWD/t incise bench capture --quick --json >r.json
+	[ -z "$(ls -A t)" ]
+	for run in full without_vision without_camera virtual_rig; do
+		holds "$(row r.json $run cpu_percent) > 0"
+		# of 2 s at least; the tracker's last record may be under way, and a stream has
+		# room for 2.5 s
+		holds "$(row r.json $run force) + $(row r.json $run force_lost) >= 19999"
+		holds "$(row r.json $run tracker) + $(row r.json $run tracker_lost) >= 238"
+		frames=$(($(row r.json $run frames) + $(row r.json $run frames_lost)))
+		[ "$run" = without_camera ] && [ "$frames" = 0 ] || [ "$frames" -ge 119 ]
+	done
+	[ "$(key r.json vision.pictures)" = "$(row r.json full frames)" ]
+	holds "$(key r.json vision.found) >= 0.9 * $(key r.json vision.pictures)"
+	holds "$(key r.json vision.us) > 0 && $(key r.json vision.us) <= $(key r.json vision.us_p99)"
+	[ "$(key r.json cpu_percent)" = "$(row r.json full cpu_percent)" ]
+	[ "$(key r.json virtual_rig_cpu_percent)" = "$(row r.json virtual_rig cpu_percent)" ]
+	[ "$(key r.json force_hz) $(key r.json tracker_hz) $(key r.json camera_hz)" = "10000.0 120.0 60.0" ]
+	[ "$(key r.json width) $(key r.json height) $(key r.json seconds)" = "640 480 2" ]
+}
+
+@test "bench capture that is interrupted, or has no room, leaves nothing behind" {
+	[ -e "$INCISE_BUILD/lib/incise/vision_opencv.so" ] || skip "OpenCV's headers were absent"
+	mkdir t
+	TMPDIR=$PWD/t run --separate-stderr timeout --preserve-status -s INT 1 incise bench capture
+	failed_with interrupted
+	[ -z "$(ls -A t)" ]
+	TMPDIR=$PWD/none run --separate-stderr incise bench capture --quick
+	failed_with "$PWD/none/" TMPDIR
+	run --separate-stderr incise bench capture more
+	bad_usage "'capture'"
+}
+
+@test "bench capture without vision's module says so at once" {
+	mkdir t modules
+	TMPDIR=$PWD/t INCISE_MODULE_PATH=$PWD/modules run --separate-stderr incise bench capture
+	failed_with vision_opencv.so
+	[ -z "$(ls -A t)" ]
+}

@@ -54,7 +54,7 @@ complete_words() {
 @test "what bench measures is completed" {
 	touch stale.csv
 	complete_words incise bench ""
-	[ "${COMPREPLY[*]}" = "precision training stability loop vision" ]
+	[ "${COMPREPLY[*]}" = "precision training stability loop vision capture" ]
 	complete_words incise bench st
 	[ "${COMPREPLY[*]}" = stability ]
 	complete_words incise bench precision st
@@ -71,6 +71,8 @@ complete_words() {
 	[ "${COMPREPLY[*]}" = "stale.csv stepper" ]
 	complete_words incise info stepper st
 	[ "${COMPREPLY[*]}" = stale.csv ]
+	complete_words incise info dev
+	[ "${COMPREPLY[*]}" = devices ]
 }
 
 @test "buses of info are completed: their word, then what there is of them" {
