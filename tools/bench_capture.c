@@ -31,6 +31,7 @@
 #define QUICK_SECONDS 2
 #define POLL_NS 10000000LL /* as incise capture */
 #define BATCH 256
+#define HELD_UP 0.05	  /* of the time: then the figures say more of the machine */
 #define PICTURES_MAX 1200 /* twice as many as there are */
 
 static const struct part {
@@ -50,6 +51,8 @@ struct run {
 	struct incise_recorder *recorder; /* NULL: what is read is dropped */
 	struct incise_vision *vision;
 	double cpu_percent;
+	double late_ms; /* the latest wake */
+	double held_up; /* share of the time that wakes were late, by a period or more */
 	uint64_t force, tracker, frames, force_lost, tracker_lost, frames_lost;
 	struct incise_tracker_info tracker_info;
 	struct incise_force_info force_info;
@@ -123,13 +126,16 @@ static int capture(struct run *run, int seconds, struct incise_error *err)
 {
 	struct incise_clock *clock = incise_rig_clock(run->rig);
 	int64_t start = incise_clock_now(clock), now = start, next = start;
-	double cpu = cpu_ns(CLOCK_PROCESS_CPUTIME_ID);
+	double cpu = cpu_ns(CLOCK_PROCESS_CPUTIME_ID), held_up_ns = 0;
 	int rc = 0;
 
 	while (!rc && !cli_stop && now - start < seconds * INCISE_NS_PER_S) {
 		next = now > next + POLL_NS ? now : next + POLL_NS;
 		incise_clock_wait_until(clock, next);
 		now = incise_clock_now(clock);
+		run->late_ms = fmax(run->late_ms, (now - next) * 1e-6);
+		if (now - next >= POLL_NS)
+			held_up_ns += now - next;
 		if (run->recorder)
 			rc = incise_recorder_poll(run->recorder, err);
 		else if ((rc = drop_samples(run)))
@@ -139,6 +145,7 @@ static int capture(struct run *run, int seconds, struct incise_error *err)
 	}
 	run->cpu_percent =
 		100 * (cpu_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu) / (double)(now - start);
+	run->held_up = held_up_ns / (double)(now - start);
 	return rc;
 }
 
@@ -250,19 +257,20 @@ static void print_text(const struct run *runs, const struct machine *machine, in
 	const struct run *full = &runs[0];
 
 	printf("%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz; %d s each, in "
-	       "real time\n%-15s %6s %8s %5s %8s %5s %7s %5s\n",
+	       "real time\n%-15s %6s %8s %5s %8s %5s %7s %5s %8s\n",
 	       machine->cpu, full->force_info.rate_hz, full->tracker_info.rate_hz,
 	       full->camera_info.width, full->camera_info.height,
 	       full->camera_info.rate_hz, seconds, "run", "CPU %", "force", "lost",
-	       "tracker", "lost", "frames", "lost");
+	       "tracker", "lost", "frames", "lost", "late ms");
 	for (int i = 0; i < RUNS; i++)
-		printf("%-15s %6.2f %8llu %5llu %8llu %5llu %7llu %5llu\n", parts[i].name,
-		       runs[i].cpu_percent, (unsigned long long)runs[i].force,
+		printf("%-15s %6.2f %8llu %5llu %8llu %5llu %7llu %5llu %8.1f\n",
+		       parts[i].name, runs[i].cpu_percent,
+		       (unsigned long long)runs[i].force,
 		       (unsigned long long)runs[i].force_lost,
 		       (unsigned long long)runs[i].tracker,
 		       (unsigned long long)runs[i].tracker_lost,
 		       (unsigned long long)runs[i].frames,
-		       (unsigned long long)runs[i].frames_lost);
+		       (unsigned long long)runs[i].frames_lost, runs[i].late_ms);
 	printf("vision: found %d/%d, us %.0f, p99 %.0f\n"
 	       "%.2f %% of a core; of that the virtual rig itself takes %.2f, the capture %.2f\n",
 	       full->found, full->pictures, vision_us(full, 0.5), vision_us(full, 0.99),
@@ -278,14 +286,15 @@ static void print_json(const struct run *runs, const struct machine *machine, in
 	for (int i = 0; i < RUNS; i++)
 		json_array_append_new(
 			list,
-			json_pack("{ss so sI sI sI sI sI sI}", "name", parts[i].name,
+			json_pack("{ss so sI sI sI sI sI sI so}", "name", parts[i].name,
 				  "cpu_percent", json_number(runs[i].cpu_percent),
 				  "force", (json_int_t)runs[i].force, "force_lost",
 				  (json_int_t)runs[i].force_lost, "tracker",
 				  (json_int_t)runs[i].tracker, "tracker_lost",
 				  (json_int_t)runs[i].tracker_lost, "frames",
 				  (json_int_t)runs[i].frames, "frames_lost",
-				  (json_int_t)runs[i].frames_lost));
+				  (json_int_t)runs[i].frames_lost, "late_ms",
+				  json_number(runs[i].late_ms)));
 	json_print(json_pack("{so si so so so si si so so s{si si so so} so}", "machine",
 			     machine_json(machine), "seconds", seconds, "force_hz",
 			     json_number(full->force_info.rate_hz), "tracker_hz",
@@ -312,4 +321,10 @@ void bench_capture(bool json, bool quick)
 		print_json(runs, &machine, seconds);
 	else
 		print_text(runs, &machine, seconds);
+	for (int i = 0; i < RUNS; i++)
+		if (runs[i].held_up > HELD_UP)
+			cli_warn(
+				"%s: the machine held it up for %.0f %% of the time; close other "
+				"programs and measure again",
+				parts[i].name, 100 * runs[i].held_up);
 }

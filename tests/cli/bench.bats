@@ -302,7 +302,7 @@ of() {
 	TMPDIR=$PWD/t incise bench capture --quick --json >r.json
 	[ -z "$(ls -A t)" ]
 	for run in full without_vision without_camera virtual_rig; do
-		holds "$(row r.json $run cpu_percent) > 0"
+		holds "$(row r.json $run cpu_percent) > 0 && $(row r.json $run late_ms) > 0"
 		# of 2 s at least; the tracker's last record may be under way, and a stream has
 		# room for 2.5 s
 		holds "$(row r.json $run force) + $(row r.json $run force_lost) >= 19999"
