@@ -178,6 +178,38 @@ static void geometry_is_the_papers(void **state)
 	rig_free(&rig);
 }
 
+/* The pixels within what is given for vision, value alone: the scalpel's area, no more. */
+static void setup_for_vision_is_of_the_scalpel(void **state)
+{
+	static const double scale[] = {47.5 / 400, 0.25, 0.5};
+
+	for (size_t k = 0; k < 3; k++) {
+		struct rig rig = rig_new(k + 1, scale[k]);
+		struct incise_vision_setup setup;
+		struct incise_camera_frame frame;
+		double seen = 0, truth;
+
+		incise_sim_vision_setup(incise_sim_config(rig.sim), &setup);
+		assert_true(fabs(setup.full_px * scale[k] - 47.5) < 1e-9);
+		assert_true(setup.depth_mm_px == scale[k]);
+		incise_clock_wait_until(rig.clock, START_NS + 4000000000LL);
+		assert_int_equal(incise_camera_read(rig.camera, &frame), 1);
+		for (int i = 0; i < frame.width * frame.height; i++) {
+			const uint8_t *rgb = frame.data + 3 * i;
+			int value = fmax(rgb[0], fmax(rgb[1], rgb[2]));
+
+			seen += value >= setup.value[0] && value <= setup.value[1];
+		}
+		/* 8 mm wide; the threshold is within a quarter pixel of half height, all
+		 * around: 2 (w + h) / 4 of w h */
+		truth = incise_sim_camera_exposed_px(rig.sim, frame.t_ns);
+		truth *= 8 / scale[k];
+		assert_true(fabs(seen - truth) <
+			    (truth / (8 / scale[k]) + 8 / scale[k]) / 2);
+		rig_free(&rig);
+	}
+}
+
 static void newest_picture_and_losses(void **state)
 {
 	/* ms, whether there is a picture, its number, losses so far */
@@ -263,6 +295,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(picture_shows_the_true_length),
 		cmocka_unit_test(geometry_is_the_papers),
+		cmocka_unit_test(setup_for_vision_is_of_the_scalpel),
 		cmocka_unit_test(newest_picture_and_losses),
 		cmocka_unit_test(pictures_are_the_seeds),
 		cmocka_unit_test(info_names_the_camera),
