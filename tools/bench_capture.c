@@ -54,6 +54,7 @@ struct run {
 	double late_ms; /* the latest wake */
 	double held_up; /* share of the time that wakes were late, by a period or more */
 	uint64_t force, tracker, frames, force_lost, tracker_lost, frames_lost;
+	uint64_t lost_before; /* pictures, before it began */
 	struct incise_tracker_info tracker_info;
 	struct incise_force_info force_info;
 	struct incise_camera_info camera_info;
@@ -117,18 +118,33 @@ static int take_frame(struct run *run)
 	if (rc <= 0)
 		return rc;
 	run->frames++;
-	run->frames_lost = incise_camera_lost(camera);
+	run->frames_lost = incise_camera_lost(camera) - run->lost_before;
 	return run->vision ? look(run, &frame) : 0;
+}
+
+/* What came while it was opened is nobody's loss. */
+static int skip_pictures(struct run *run)
+{
+	struct incise_camera *camera = incise_rig_camera(run->rig);
+	struct incise_camera_frame frame;
+	int rc = camera ? incise_camera_read(camera, &frame) : 0;
+
+	run->lost_before = camera ? incise_camera_lost(camera) : 0;
+	return rc < 0 ? rc : 0;
 }
 
 /* Opening and closing are not measured: they happen once. */
 static int capture(struct run *run, int seconds, struct incise_error *err)
 {
 	struct incise_clock *clock = incise_rig_clock(run->rig);
-	int64_t start = incise_clock_now(clock), now = start, next = start;
-	double cpu = cpu_ns(CLOCK_PROCESS_CPUTIME_ID), held_up_ns = 0;
-	int rc = 0;
+	double cpu, held_up_ns = 0;
+	int64_t start, now, next;
+	int rc = skip_pictures(run);
 
+	if (rc)
+		incise_error_set(err, -rc, "a picture: %s", strerror(-rc));
+	start = now = next = incise_clock_now(clock);
+	cpu = cpu_ns(CLOCK_PROCESS_CPUTIME_ID);
 	while (!rc && !cli_stop && now - start < seconds * INCISE_NS_PER_S) {
 		next = now > next + POLL_NS ? now : next + POLL_NS;
 		incise_clock_wait_until(clock, next);

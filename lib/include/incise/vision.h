@@ -17,10 +17,10 @@
  * A blade of bright steel below the black is not part of length_px: paint it.
  * Pixel (0, 0) covers 0 … 1 in both directions, top row first.
  *
- * Not real-time safe: it allocates, and the first call loads some 25 libraries, which takes
- * milliseconds; a loop that must not wait makes the object before it begins. One thread at a
- * time per object. No exception of C++ comes out. OpenCV is told to use no threads of its
- * own, in the whole process.
+ * Not real-time safe. One thread at a time per object. No exception of C++ comes out.
+ * OpenCV is told to use no threads of its own, in the whole process.
+ * Loading the module, with some 25 libraries, takes milliseconds: who must not wait makes
+ * the object before.
  */
 #ifndef INCISE_VISION_H
 #define INCISE_VISION_H
