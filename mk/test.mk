@@ -88,8 +88,19 @@ $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise -lm -pthread
 
+# A tracker at a line, in real time.
+$(O)/tests/tracker_line: tests/bench/tracker_line.c $(wildcard tests/polhemus/emulator.[ch]) \
+		tests/unit/polhemus/pty.h $(O)/lib/libincise-tests.a
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
+		$(filter %.c,$^) $(O)/lib/libincise-tests.a $(all_libs) -lm -pthread
+
+TRACKER_SECONDS ?= 600
+check-tracker: $(O)/tests/tracker_line ## a FASTRAK at a serial line for ten minutes, clean and with harm on the way
+	$(O)/tests/tracker_line $(TRACKER_SECONDS)
+
 check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the shipped model, about a minute
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 
-.PHONY: check-exhaustive
+.PHONY: check-exhaustive check-tracker
