@@ -85,7 +85,7 @@ pc_force_comedi := comedilib
 objects_force_comedi := $(daq_core) $(O)/obj/lib/device/stable_path.o \
 	$(patsubst %.c,$(O)/obj/%.o,$(daq_comedi) lib/device/daq/force_comedi.c)
 # One tracker on two kinds of line.
-polhemus_lines := polhemus_usb polhemus_tty tracker_usb tracker_tty
+polhemus_lines := polhemus_usb polhemus_usb_find polhemus_tty tracker_usb tracker_tty
 polhemus_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(polhemus_lines:%=lib/device/polhemus/%.c),\
 		$(wildcard lib/device/polhemus/*.c)))
@@ -93,8 +93,9 @@ has_libusb := $(shell $(PKG_CONFIG) --exists libusb-1.0 && echo yes)
 device_modules += $(if $(has_libusb),tracker_usb) tracker_tty
 pc_tracker_usb := libusb-1.0
 objects_tracker_usb := $(polhemus_core) \
-	$(patsubst %,$(O)/obj/lib/device/polhemus/%.o,polhemus_usb tracker_usb)
-$(O)/obj/lib/device/polhemus/polhemus_usb.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags libusb-1.0)
+	$(patsubst %,$(O)/obj/lib/device/polhemus/%.o,polhemus_usb polhemus_usb_find tracker_usb)
+$(filter %/polhemus_usb.o %/polhemus_usb_find.o %/tracker_usb.o,$(objects_tracker_usb)): \
+	pc_cflags = $(shell $(PKG_CONFIG) --cflags libusb-1.0)
 pc_tracker_tty :=
 objects_tracker_tty := $(polhemus_core) \
 	$(patsubst %,$(O)/obj/lib/device/polhemus/%.o,polhemus_tty tracker_tty)

@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <sys/types.h>
 
-#define POLHEMUS_LINE_CHUNK 512 /* bytes that a reader has room for; a packet of USB 2 */
+#define POLHEMUS_LINE_CHUNK 1024 /* bytes that a reader has room for; a packet of USB 2 */
 
 struct polhemus_line;
 

@@ -8,13 +8,13 @@
  *
  * Which endpoints these are the descriptors tell. On each that goes in there are always
  * several transfers of a packet on their way, so that none is missed while another is
- * looked at; a packet is stamped where its transfer completes.
+ * looked at; a packet is stamped where its transfer completes. When those that nobody reads
+ * fill the room there is, no more are asked for: the device waits, and none is thrown away.
  */
 #ifndef INCISE_POLHEMUS_USB_H
 #define INCISE_POLHEMUS_USB_H
 
 #include <incise/error.h>
-#include <incise/scan.h>
 #include "polhemus_line.h"
 
 /*
@@ -24,9 +24,5 @@
  */
 struct polhemus_line *polhemus_usb_open(const char *arguments, const char *where,
 					struct incise_error *err);
-
-/* All that are attached, those without firmware too; as incise_scan(). */
-int polhemus_usb_scan(const char *arguments, incise_scan_found *found, void *context,
-		      struct incise_error *err);
 
 #endif

@@ -5,6 +5,7 @@
  */
 #include "polhemus_tracker.h"
 #include "polhemus_usb.h"
+#include "polhemus_usb_find.h"
 
 static void *open_tracker(const struct incise_backend_request *request,
 			  struct incise_error *err)
