@@ -3,6 +3,7 @@
  * What rig.conf calls a tracker on USB; see polhemus_usb_name.h.
  */
 #include <errno.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 #include "polhemus_usb_name.h"
@@ -28,6 +29,27 @@ static int read_id(const char *text, uint16_t *id)
 	return 0;
 }
 
+/* A number of at most three digits, as polhemus_usb_path() writes it; what follows, or NULL. */
+static const char *skip_number(const char *text)
+{
+	int value = 0, n = 0;
+
+	for (; n < 3 && text[n] >= '0' && text[n] <= '9'; n++)
+		value = value * 10 + (text[n] - '0');
+	return n && text[0] != '0' && value <= 255 ? text + n : NULL;
+}
+
+/* "1-1.2" */
+static bool is_path(const char *text)
+{
+	text = skip_number(text);
+	if (!text || *text++ != '-')
+		return false;
+	for (text = skip_number(text); text && *text == '.';)
+		text = skip_number(text + 1);
+	return text && !*text;
+}
+
 int polhemus_usb_name_read(const char *text, struct polhemus_usb_name *name)
 {
 	size_t n;
@@ -40,16 +62,12 @@ int polhemus_usb_name_read(const char *text, struct polhemus_usb_name *name)
 	if (!*text)
 		return 0;
 	n = strlen(text + 1);
-	if (!n)
+	if (*text == '#' && n && n < sizeof(name->serial))
+		memcpy(name->serial, text + 1, n + 1);
+	else if (*text == '@' && n < sizeof(name->path) && is_path(text + 1))
+		memcpy(name->path, text + 1, n + 1);
+	else
 		return -EINVAL;
-	if (*text == '#' && n < sizeof(name->serial)) {
-		strcpy(name->serial, text + 1);
-		return 0;
-	}
-	if (*text != '@' || n >= sizeof(name->path) ||
-	    strspn(text + 1, "0123456789.-") != n)
-		return -EINVAL;
-	strcpy(name->path, text + 1);
 	return 0;
 }
 
@@ -59,7 +77,7 @@ void polhemus_usb_path(char path[POLHEMUS_USB_PATH_MAX], unsigned int bus,
 	int at = snprintf(path, POLHEMUS_USB_PATH_MAX, "%u-%u", bus & 0xff,
 			  n > 0 ? ports[0] : 0);
 
-	for (int i = 1; i < n && at < POLHEMUS_USB_PATH_MAX - 5; i++)
+	for (int i = 1; i < n && at <= POLHEMUS_USB_PATH_MAX - 5; i++)
 		at += snprintf(path + at, POLHEMUS_USB_PATH_MAX - (size_t)at, ".%u",
 			       ports[i]);
 }

@@ -17,7 +17,7 @@ struct polhemus_usb_name {
 	char serial[POLHEMUS_USB_SERIAL_MAX]; /* "": any */
 };
 
-/* 0 or -EINVAL. */
+/* 0; -EINVAL, and what was read of it in @name. */
 int polhemus_usb_name_read(const char *text, struct polhemus_usb_name *name);
 
 /* "1-1.2" of bus 1, ports 1 and 2; a root hub is "1-0". */
