@@ -10,8 +10,8 @@
 #define QUIET_MS 120   /* without a byte: it has ended; 10 records at 120 Hz */
 #define ANSWER_MS 1000 /* the manual gives none; a system cycle is 8 ms */
 #define WAIT_MS 20
-#define HEARD_MS 5     /* what a read counts that brought bytes: they may never end */
-#define DRAIN_MAX 8192 /* bytes: 2 s of what a FASTRAK sends */
+#define HEARD_MS 5 /* what a read counts that brought bytes: they may never end */
+#define ENDLESS_NS INT64_C(2000000000) /* what does not stop for so long does not stop */
 
 static int gone(struct polhemus_dialogue *d, int rc)
 {
@@ -28,14 +28,14 @@ int polhemus_say(struct polhemus_dialogue *d, const char *command)
 	return rc ? gone(d, rc) : 0;
 }
 
-static ssize_t listen(struct polhemus_dialogue *d, int timeout_ms)
+/* How many bytes came; @t_ns, when there are some: when. */
+static ssize_t listen_at(struct polhemus_dialogue *d, int timeout_ms, int64_t *t_ns)
 {
-	int64_t t_ns;
 	ssize_t n;
 
 	if (d->n == sizeof(d->bytes))
 		d->n = 0;
-	n = d->line->ops->read(d->line, d->bytes + d->n, sizeof(d->bytes) - d->n, &t_ns,
+	n = d->line->ops->read(d->line, d->bytes + d->n, sizeof(d->bytes) - d->n, t_ns,
 			       timeout_ms);
 	if (n < 0)
 		return gone(d, (int)n);
@@ -43,35 +43,46 @@ static ssize_t listen(struct polhemus_dialogue *d, int timeout_ms)
 	return n;
 }
 
+static ssize_t listen(struct polhemus_dialogue *d, int timeout_ms)
+{
+	int64_t t_ns;
+
+	return listen_at(d, timeout_ms, &t_ns);
+}
+
+/* By the time of what comes: a byte now and then is no end either. */
 int polhemus_drain(struct polhemus_dialogue *d)
 {
-	size_t bytes = 0;
+	int64_t first_ns = 0, t_ns = 0;
 
-	for (;;) {
+	for (bool first = true;; first = false) {
 		ssize_t n;
 
 		d->n = 0;
-		n = listen(d, QUIET_MS);
+		n = listen_at(d, QUIET_MS, &t_ns);
 		if (n <= 0)
 			return (int)n;
-		bytes += (size_t)n;
-		if (bytes > DRAIN_MAX)
+		if (first)
+			first_ns = t_ns;
+		if (t_ns - first_ns > ENDLESS_NS)
 			return -EBUSY;
 	}
 }
 
 int polhemus_collect(struct polhemus_dialogue *d)
 {
+	int64_t first_ns = 0, t_ns = 0;
+
 	d->n = 0;
-	for (;;) {
-		ssize_t n = listen(d, QUIET_MS);
+	for (bool first = true;; first = false) {
+		ssize_t n = listen_at(d, QUIET_MS, &t_ns);
 
 		if (n < 0)
 			return (int)n;
-		if (!n)
+		if (first)
+			first_ns = t_ns;
+		if (!n || d->n == sizeof(d->bytes) || t_ns - first_ns > ENDLESS_NS)
 			return (int)d->n;
-		if (d->n == sizeof(d->bytes))
-			return -EBUSY;
 	}
 }
 
@@ -188,12 +199,14 @@ int polhemus_ask_frame(struct polhemus_dialogue *d, const char *command,
 	d->n = 0;
 	rc = polhemus_say(d, command);
 	while (!rc && waited < ANSWER_MS) {
+		size_t before = d->n;
 		ssize_t n = listen(d, WAIT_MS);
 
 		if (n < 0)
 			return (int)n;
 		waited += n ? HEARD_MS : WAIT_MS;
-		if (at > d->n)
+		/* listen() began at the front again. */
+		if (d->n < before + (size_t)n)
 			at = 0;
 		while (at < d->n) {
 			int is = polhemus_frame_read(d->bytes + at, d->n - at, frame);

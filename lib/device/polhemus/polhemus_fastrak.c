@@ -128,7 +128,7 @@ static int measure(struct polhemus_dialogue *d, const struct incise_tracker_setu
 	if (rc)
 		return rc;
 	total = polhemus_collect(d);
-	if (total < 0 && total != -EBUSY)
+	if (total < 0)
 		return total;
 	for (size_t i = 0; i < sizeof(lengths); i++) {
 		struct polhemus_record record;

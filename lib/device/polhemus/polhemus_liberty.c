@@ -99,6 +99,8 @@ static int switch_stations(struct polhemus_dialogue *d, uint8_t mask)
 			else if (!(rc = polhemus_say(d, command)))
 				rc = polhemus_drain(d);
 		}
+	if (rc == -EBUSY)
+		return polhemus_not_taken(d, "its stations", "more and more");
 	if (!rc)
 		rc = polhemus_ask_frame(d, "\0250\r", CONTROL_U, &frame);
 	if (rc)
@@ -125,7 +127,7 @@ static int measure(struct polhemus_dialogue *d, const struct incise_tracker_setu
 	if (rc)
 		return rc;
 	total = polhemus_collect(d);
-	if (total < 0 && total != -EBUSY)
+	if (total < 0)
 		return total;
 	if (total == (int)length * setup->n_stations)
 		while (good < setup->n_stations &&

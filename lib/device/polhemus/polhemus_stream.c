@@ -70,11 +70,12 @@ static void put_sample(struct polhemus_stream *stream,
 		stream->no_room++;
 }
 
-void polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *bytes,
-			 size_t n, int64_t t_ns)
+int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *bytes,
+			size_t n, int64_t t_ns)
 {
 	struct polhemus_record record;
 	uint64_t seq;
+	int found = 0;
 
 	while (n) {
 		size_t some = n < POLHEMUS_RECORD_MAX ? n : POLHEMUS_RECORD_MAX;
@@ -82,12 +83,13 @@ void polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *by
 
 		bytes += taken;
 		n -= taken;
-		while (polhemus_records_next(&stream->records, &record))
+		for (; polhemus_records_next(&stream->records, &record); found++)
 			if (polhemus_gaps_take(&stream->gaps, &record, &seq))
 				put_sample(stream, &record, seq);
 	}
 	atomic_store_explicit(&stream->lost, stream->gaps.lost + stream->no_room,
 			      memory_order_relaxed);
+	return found;
 }
 
 int polhemus_stream_take(struct polhemus_stream *stream,

@@ -12,7 +12,9 @@
 #include "polhemus_stream.h"
 #include "polhemus_tracker.h"
 
-#define POLL_MS 50 /* how long close() waits for the thread, at most */
+/* How long close() waits for the thread; longer only while it sets the tracker up anew. */
+#define POLL_MS 50
+#define NOISE_MAX (2 * POLHEMUS_RECORD_MAX) /* bytes: so many have a record in them */
 
 struct polhemus_tracker {
 	struct incise_tracker tracker;
@@ -60,11 +62,22 @@ static bool recover(struct polhemus_tracker *t)
 	return false;
 }
 
+/*
+ * Nothing was understood for too long. Pulses from outside may pause as long as they like; but
+ * one that was switched off and on sends nothing, or what it sends out of its box.
+ */
+static bool is_dumb(const struct polhemus_tracker *t, int64_t silent_ms, size_t noise)
+{
+	return silent_ms >= t->times.silent_ms &&
+	       (t->stream.setup.sync == INCISE_TRACKER_INTERNAL || noise > NOISE_MAX);
+}
+
 static void *run(void *argument)
 {
 	struct polhemus_tracker *t = argument;
 	unsigned char bytes[POLHEMUS_LINE_CHUNK];
-	int silent_ms = 0;
+	int64_t heard_ms = now_ms(); /* the last record */
+	size_t noise = 0;	     /* bytes since */
 
 	while (!atomic_load(&t->stop)) {
 		int64_t t_ns = 0;
@@ -72,18 +85,18 @@ static void *run(void *argument)
 			t->line->ops->read(t->line, bytes, sizeof(bytes), &t_ns, POLL_MS);
 
 		if (n > 0) {
-			polhemus_stream_put(&t->stream, bytes, (size_t)n, t_ns);
-			silent_ms = 0;
-			continue;
+			noise += (size_t)n;
+			if (polhemus_stream_put(&t->stream, bytes, (size_t)n, t_ns)) {
+				heard_ms = now_ms();
+				noise = 0;
+			}
 		}
-		silent_ms += POLL_MS;
-		/* Pulses from outside may pause as long as they like. */
-		if (!n && (silent_ms < t->times.silent_ms ||
-			   t->stream.setup.sync != INCISE_TRACKER_INTERNAL))
+		if (n >= 0 && !is_dumb(t, now_ms() - heard_ms, noise))
 			continue;
-		silent_ms = 0;
 		if (!recover(t))
 			break;
+		heard_ms = now_ms();
+		noise = 0;
 	}
 	atomic_store(&t->gone, -ENODEV);
 	return NULL;
@@ -176,12 +189,16 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 	/* So that it need not be asked again when it comes back. */
 	t->line->family = (int)t->identity.layout.family;
 	if (polhemus_stream_init(&t->stream, setup, &t->identity.layout))
-		rc = incise_error_set(err, ENOMEM, "%s: out of memory", where);
+		rc = incise_error_set(err, ENOMEM,
+				      "%s: out of memory: end other programs", where);
 	if (!rc) {
 		rc = incise_thread_start(&t->thread, run, t, &real_time);
 		if (!rc)
 			return 0;
-		incise_error_set(err, -rc, "%s: no thread to read the tracker in", where);
+		incise_error_set(
+			err, -rc,
+			"%s: no thread to read the tracker in: end other programs, or raise the limit of threads",
+			where);
 	}
 	polhemus_stop(t->line, t->identity.layout.family);
 	polhemus_stream_free(&t->stream);
@@ -200,7 +217,8 @@ struct incise_tracker *polhemus_tracker_open(struct polhemus_line *line,
 
 	if (!t) {
 		line->ops->close(line);
-		incise_error_set(err, ENOMEM, "%s: out of memory", where);
+		incise_error_set(err, ENOMEM, "%s: out of memory: end other programs",
+				 where);
 		return NULL;
 	}
 	*t = (struct polhemus_tracker){

@@ -7,7 +7,7 @@
  * byte had come, as the kernel stamps neither USB packets nor serial bytes; rate_hz is of all
  * stations together.
  *
- * Pulled out, or silent for silent_ms, the tracker is looked for every retry_ms, set up again
+ * Pulled out, or silent for silent_ms, or sending what is no record for as long, the tracker is looked for every retry_ms, set up again
  * and goes on; until then read() returns 0, and what the time in between would have brought
  * counts as lost once it is back. After gone_ms read() returns -ENODEV, for good.
  */

@@ -19,6 +19,7 @@
 #include "polhemus_tty.h"
 
 #define WRITE_MS 1000
+#define NS_PER_MS INT64_C(1000000)
 #define BITS 10 /* of a byte on the line: start, 8, stop */
 
 struct polhemus_tty {
@@ -139,18 +140,25 @@ static ssize_t tty_read(struct polhemus_line *line, void *bytes, size_t size,
 {
 	struct polhemus_tty *tty = of_line(line);
 	struct pollfd waits = {.fd = tty->fd, .events = POLLIN};
-	ssize_t n;
+	int64_t end_ns = now_ns() + timeout_ms * NS_PER_MS, left_ns;
 
 	if (tty->fd < 0)
 		return -ENODEV;
-	if (!poll(&waits, 1, timeout_ms))
-		return 0;
-	n = read(tty->fd, bytes, size);
-	*t_ns = now_ns();
-	if (n < 0)
-		return errno == EAGAIN || errno == EINTR ? 0 : failed(errno);
-	/* VMIN is 1: no byte is the end, not a pause. */
-	return n ? n : -ENODEV;
+	/* While it is set up a signal of the program may come, which is no end of time. */
+	while ((left_ns = end_ns - now_ns()) > 0) {
+		ssize_t n;
+
+		if (!poll(&waits, 1, (int)((left_ns + NS_PER_MS - 1) / NS_PER_MS)))
+			break;
+		n = read(tty->fd, bytes, size);
+		*t_ns = now_ns();
+		/* VMIN is 1: no byte is the end, not a pause. */
+		if (n >= 0)
+			return n ? n : -ENODEV;
+		if (errno != EAGAIN && errno != EINTR)
+			return failed(errno);
+	}
+	return 0;
 }
 
 static void let_go(struct polhemus_tty *tty)
@@ -221,8 +229,15 @@ static void refuse(const char *path, int code, const char *where,
 				 "/dev/ttyUSB0",
 				 where, path);
 		break;
+	case EINVAL:
+		incise_error_set(err, EIO,
+				 "%s: %s cannot run at this rate: choose another one, "
+				 "here and at the tracker's switches",
+				 where, path);
+		break;
 	default:
-		incise_error_set(err, EIO, "%s: %s: %s", where, path, strerror(code));
+		incise_error_set(err, EIO, "%s: %s: %s: plug the adapter out and in",
+				 where, path, strerror(code));
 	}
 }
 
@@ -258,7 +273,8 @@ struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where
 	const char *tail;
 
 	if (!tty) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", where);
+		incise_error_set(err, ENOMEM, "%s: out of memory: end other programs",
+				 where);
 		return NULL;
 	}
 	tty->line.ops = &ops;

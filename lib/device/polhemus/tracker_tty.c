@@ -92,6 +92,9 @@ static int scan(const char *arguments, incise_scan_found *found, void *context,
 		sensors[n] = '\0';
 		incise_scan_tell(&device, "sensors", "%s", sensors);
 	}
+	/* Of a FASTRAK, of when it was switched on. */
+	if (identity.test_error)
+		incise_scan_tell(&device, "self_test_error", "%d", identity.test_error);
 	return found(context, &device);
 }
 
