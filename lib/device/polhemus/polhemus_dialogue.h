@@ -24,11 +24,11 @@ struct polhemus_dialogue {
 /* 0, -ENODEV, -EIO. */
 int polhemus_say(struct polhemus_dialogue *d, const char *command);
 
-/* Throw away what comes, until nothing does. -EBUSY, without a line: for 2 s it does not. */
+/* Throw away what comes, until nothing does. -EBUSY, without a line: for 0.5 s it does not. */
 int polhemus_drain(struct polhemus_dialogue *d);
 
 /*
- * All that comes until nothing does, or for 2 s, or until d->bytes is full: how many bytes
+ * All that comes until nothing does, or for 0.5 s, or until d->bytes is full: how many bytes
  * are in there.
  */
 int polhemus_collect(struct polhemus_dialogue *d);

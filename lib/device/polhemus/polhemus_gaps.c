@@ -175,8 +175,11 @@ static bool take_timed(struct polhemus_gaps *gaps, const struct polhemus_record 
 	if (is_too_early(gaps, late))
 		return false;
 	if (record->skipped) {
-		/* As many as fit into the bytes that were no record, and into the time. */
-		most = (record->skipped + gaps->length - 1) / gaps->length;
+		/*
+		 * As many as the bytes make that were no record, to the nearest, and as fit
+		 * into the time: a host that is late must not make two of one.
+		 */
+		most = (record->skipped + gaps->length / 2) / gaps->length;
 		more = rounds(gaps, late) * (uint64_t)gaps->n;
 		while (more && steps - 1 + more > most + (uint64_t)gaps->n - 1)
 			more -= (uint64_t)gaps->n;

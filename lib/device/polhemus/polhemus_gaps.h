@@ -13,7 +13,7 @@
  *          0 |--o--o--o-----o--o--o--          --o--o
  *            '---------------------------------------------------> records
  *
- * Where stations are out of order, or bytes were no record, the loss is told at once;
+ * Where stations are out of order, or half a record or more was none, the loss is told at once;
  * where only time tells, once the lateness stayed for POLHEMUS_GAPS_WINDOW records (0.5 s):
  * the number is right then, its place in seq is that much late. A drift between the
  * two clocks is followed. With sync from outside there is no period, and only

@@ -6,7 +6,7 @@
 #include <string.h>
 #include "polhemus_family.h"
 
-#define STOPS 5
+#define STOPS 10
 
 static int no_answer(struct polhemus_dialogue *d)
 {

@@ -266,6 +266,43 @@ static void bursts_are_no_loss(void **state)
 	}
 }
 
+/*
+ * Bytes from nowhere, and a host that is late just then: what they did not touch is there, and no
+ * more is counted than they did.
+ */
+static void bursts_and_new_bytes(void **state)
+{
+	static const double pauses_ms[] = {5, 16, 40, 130};
+
+	for (size_t p = 0; p < 4; p++) {
+		struct bench b;
+		size_t touched = 0;
+
+		bench_init(&b, EMULATOR_FASTRAK, 1);
+		bench_run(&b, 2);
+		b.e.damage = (struct emulator_damage){
+			.from = b.e.slot, .to = b.e.slot + 2400, .insert = 3000};
+		while (b.e.slot < b.e.damage.to + 240) {
+			unsigned char bytes[8192];
+			size_t n;
+
+			b.line.now_ns += (int64_t)(pauses_ms[p] * 1e6);
+			emulator_advance(&b.e, b.line.now_ns);
+			n = emulator_take(&b.e, bytes, sizeof(bytes));
+			polhemus_stream_put(&b.stream, bytes, n, b.line.now_ns);
+			bench_take(&b);
+			bench_run(&b, 0.05);
+		}
+		for (size_t j = 0; j < b.e.n_sent; j++)
+			touched += b.e.sent[j].touched;
+		assert_true(touched > 100);
+		/* Time tells some of it, a window later. */
+		compare(&b, S, POLHEMUS_GAPS_WINDOW);
+		assert_true(polhemus_stream_lost(&b.stream) <= touched);
+		bench_free(&b);
+	}
+}
+
 /* Clocks that differ by 1000 ppm, for long enough to be 8 records apart. */
 static void drift_is_no_loss(void **state)
 {
@@ -383,6 +420,7 @@ int main(void)
 		cmocka_unit_test(loses_what_is_touched),
 		cmocka_unit_test(time_tells),
 		cmocka_unit_test(bursts_are_no_loss),
+		cmocka_unit_test(bursts_and_new_bytes),
 		cmocka_unit_test(drift_is_no_loss),
 		cmocka_unit_test(the_tip),
 		cmocka_unit_test(no_room),

@@ -46,13 +46,12 @@ static struct incise_tracker *open_it(const struct polhemus_times *times,
 	return polhemus_tracker_open(line, &two, times, "rig.conf:1: tracker", err);
 }
 
-/* Read until there were @n; each follows the one before. */
-static int read_some(struct incise_tracker *tracker, uint64_t *next, uint64_t n)
+/* Read until @n more came; each follows the one before. */
+static int read_some(struct incise_tracker *tracker, uint64_t *next, int n)
 {
 	int64_t end_ns = pty_now_ns() + PATIENCE_NS;
-	uint64_t end = *next + n;
 
-	while (*next < end && pty_now_ns() < end_ns) {
+	while (n > 0 && pty_now_ns() < end_ns) {
 		struct incise_tracker_sample samples[16];
 		int m = incise_tracker_read(tracker, samples, 16);
 
@@ -64,10 +63,11 @@ static int read_some(struct incise_tracker *tracker, uint64_t *next, uint64_t n)
 			assert_true(samples[i].t_ns <= pty_now_ns());
 			*next = samples[i].seq + 1;
 		}
+		n -= m;
 		if (!m)
 			usleep(2000);
 	}
-	return *next < end ? -ETIMEDOUT : 0;
+	return n > 0 ? -ETIMEDOUT : 0;
 }
 
 static void through_the_door(void **state)
@@ -87,7 +87,7 @@ static void through_the_door(void **state)
 	assert_true(info.rate_hz == 120 && info.stations == 2);
 	/* 4 ms of the device, and 34 bytes of 10 bits at 115200. */
 	assert_in_range(info.latency_ns, 6950000, 6952000);
-	assert_int_equal(read_some(tracker, &next, 60), 0);
+	assert_int_equal(read_some(tracker, &next, 12), 0);
 	/* Ours alone. */
 	fd = open(pty.path, O_RDWR | O_NOCTTY);
 	assert_true(fd < 0 || flock(fd, LOCK_EX | LOCK_NB) < 0);
@@ -97,9 +97,18 @@ static void through_the_door(void **state)
 	assert_int_equal(pty.emulator.eeprom_writes, 0);
 }
 
+/* What waits is taken, up to now. */
+static void read_all(struct incise_tracker *tracker, uint64_t *next)
+{
+	struct incise_tracker_sample sample;
+
+	while (incise_tracker_read(tracker, &sample, 1) > 0)
+		*next = sample.seq + 1;
+}
+
 static void pulled_out_and_back(void **state)
 {
-	const struct polhemus_times times = {400, 20, 20000};
+	const struct polhemus_times times = {150, 20, 20000};
 	struct incise_error err = {0};
 	struct incise_tracker *tracker = open_it(&times, &err);
 	struct incise_tracker_sample sample;
@@ -107,31 +116,54 @@ static void pulled_out_and_back(void **state)
 
 	if (!tracker)
 		fail_msg("%s", err.text);
-	assert_int_equal(read_some(tracker, &next, 30), 0);
+	assert_int_equal(read_some(tracker, &next, 6), 0);
 	before = incise_tracker_lost(tracker);
 	pty_unplug(&pty);
 	/* What came before is still taken; then there is nothing. */
-	while (incise_tracker_read(tracker, &sample, 1) > 0)
-		next = sample.seq + 1;
-	usleep(300000);
+	read_all(tracker, &next);
+	usleep(100000);
+	read_all(tracker, &next);
 	assert_int_equal(incise_tracker_read(tracker, &sample, 1), 0);
 	/* As switched off and on: as it was delivered. */
 	emulator_free(&pty.emulator);
 	emulator_init(&pty.emulator, EMULATOR_FASTRAK, pty_now_ns());
 	pty.emulator.present[2] = true;
 	assert_int_equal(pty_plug(&pty), 0);
-	assert_int_equal(read_some(tracker, &next, 100), 0);
-	/* It was away for 0.3 s at least: 36 records. */
-	assert_true(incise_tracker_lost(tracker) >= before + 36);
-	/* Silent, as when its power goes and its line stays. */
+	assert_int_equal(read_some(tracker, &next, 6), 0);
+	/* It was away for 0.1 s at least: 12 records. */
+	assert_true(incise_tracker_lost(tracker) >= before + 12);
+	tracker->ops->close(tracker);
+}
+
+/* Its line stays, and what comes through it is nothing, or nothing that was asked for. */
+static void switched_off_and_on(void **state)
+{
+	const struct polhemus_times times = {150, 20, 20000};
+	struct incise_error err = {0};
+	struct incise_tracker *tracker = open_it(&times, &err);
+	uint64_t next = 0, before;
+
+	if (!tracker)
+		fail_msg("%s", err.text);
+	assert_int_equal(read_some(tracker, &next, 6), 0);
 	before = incise_tracker_lost(tracker);
 	atomic_store(&pty.deaf, true);
-	usleep(600000);
-	while (incise_tracker_read(tracker, &sample, 1) > 0)
-		next = sample.seq + 1;
+	usleep(250000);
+	read_all(tracker, &next);
 	atomic_store(&pty.deaf, false);
-	assert_int_equal(read_some(tracker, &next, 100), 0);
-	assert_true(incise_tracker_lost(tracker) >= before + 60);
+	assert_int_equal(read_some(tracker, &next, 6), 0);
+	/* 30 periods, less one on its way at each end. */
+	assert_true(incise_tracker_lost(tracker) >= before + 28);
+	/* It streams in ASCII, as its EEPROM may have it. */
+	before = incise_tracker_lost(tracker);
+	atomic_store(&pty.heard, "F");
+	while (atomic_load(&pty.heard))
+		usleep(1000);
+	usleep(50000);
+	read_all(tracker, &next);
+	assert_int_equal(read_some(tracker, &next, 6), 0);
+	/* Silent for 0.15 s, and then it was set up. */
+	assert_true(incise_tracker_lost(tracker) >= before + 18);
 	tracker->ops->close(tracker);
 }
 
@@ -223,6 +255,7 @@ static void a_scan(void **state)
 	assert_string_equal(found.what, "FASTRAK 3.02 OutputCompensat CPG2030-003-10");
 	assert_int_equal(found.n, 3);
 	assert_string_equal(found.property[2].text, "13");
+	assert_true(found.usable);
 	assert_int_equal(incise_backend.scan("/dev/not-there", count_found, &found, &err),
 			 -ENODEV);
 	assert_int_equal(incise_backend.scan("", count_found, &found, &err), 0);
@@ -233,6 +266,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(through_the_door, begin, end),
 		cmocka_unit_test_setup_teardown(pulled_out_and_back, begin, end),
+		cmocka_unit_test_setup_teardown(switched_off_and_on, begin, end),
 		cmocka_unit_test_setup_teardown(gone_for_good, begin, end),
 		cmocka_unit_test_setup_teardown(refuses, begin, end),
 		cmocka_unit_test_setup_teardown(a_scan, begin, end),
