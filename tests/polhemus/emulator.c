@@ -327,6 +327,9 @@ static void point(struct emulator *e)
 
 	if (e->kind != EMULATOR_FASTRAK)
 		e->continuous = false;
+	/* Nobody gives it pulses before it streams. */
+	if (e->sync)
+		return;
 	for (int i = 0; i < EMULATOR_STATIONS; i++)
 		if (e->on[i])
 			reply_bytes(e, bytes, record(e, e->slot, i + 1, 'P', bytes));

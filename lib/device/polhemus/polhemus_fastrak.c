@@ -154,14 +154,21 @@ static int measure(struct polhemus_dialogue *d, const struct incise_tracker_setu
 		d->where, d->line->name, total, setup->n_stations);
 }
 
+static int set_sync(struct polhemus_dialogue *d, enum incise_tracker_sync sync)
+{
+	const double is[] = {(double)sync};
+	char command[8];
+
+	snprintf(command, sizeof(command), "y%d\r", (int)sync);
+	return put(d, command, "y\r", 0, is, 1, "its sync mode");
+}
+
 int polhemus_fastrak_setup(struct polhemus_dialogue *d,
 			   const struct incise_tracker_setup *setup,
 			   struct polhemus_identity *identity)
 {
 	static const double unfiltered[] = {0, 1, 0, 0};
-	const double sync[] = {(double)setup->sync};
 	struct polhemus_status status;
-	char command[8];
 	int rc = polhemus_say(d, "Fu");
 
 	if (!rc)
@@ -174,9 +181,9 @@ int polhemus_fastrak_setup(struct polhemus_dialogue *d,
 		rc = put(d, "x0,1,0,0\r", "x\r", 0, unfiltered, 4, "no position filter");
 	if (!rc)
 		rc = put(d, "v0,1,0,0\r", "v\r", 0, unfiltered, 4, "no attitude filter");
-	snprintf(command, sizeof(command), "y%d\r", (int)setup->sync);
+	/* Its own clock for now: without pulses it may not answer P. */
 	if (!rc)
-		rc = put(d, command, "y\r", 0, sync, 1, "its sync mode");
+		rc = set_sync(d, INCISE_TRACKER_INTERNAL);
 	/* Nothing tells what the button does; but a refusal would stand before the status. */
 	if (!rc)
 		rc = polhemus_say(d, "e1,0\rf");
@@ -193,5 +200,7 @@ int polhemus_fastrak_setup(struct polhemus_dialogue *d,
 	identity->layout = (struct polhemus_layout){.family = POLHEMUS_FASTRAK,
 						    .stations = polhemus_mask(setup)};
 	rc = measure(d, setup, &identity->layout);
+	if (!rc && setup->sync != INCISE_TRACKER_INTERNAL)
+		rc = set_sync(d, setup->sync);
 	return rc ? rc : polhemus_say(d, "C");
 }

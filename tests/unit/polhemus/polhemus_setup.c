@@ -114,6 +114,11 @@ static void sync_from_outside(void **state)
 		s.sync = (enum incise_tracker_sync)sync;
 		assert_int_equal(set_up(&s), 0);
 		assert_int_equal(e.sync, sync);
+		/* Left so by somebody, with no pulses. */
+		begin(EMULATOR_FASTRAK, -1);
+		e.sync = sync;
+		assert_int_equal(set_up(&first), 0);
+		assert_int_equal(e.sync, 0);
 		begin(EMULATOR_LIBERTY, -1);
 		assert_int_equal(set_up(&s), -EINVAL);
 		assert_non_null(strstr(err.text, "sync"));
