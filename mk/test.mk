@@ -4,6 +4,7 @@
 
 unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_netlink.c) \
 	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \
+	$(if $(has_libusb),,%/polhemus_usb.c %/polhemus_usb_find.c) \
 	$(if $(has_vision),,tests/unit/vision/%),\
 	$(wildcard tests/unit/*/*.c))
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
@@ -26,9 +27,13 @@ $(foreach test,$(wildcard tests/unit/v4l2/*.c),\
 	$(eval ldflags_v4l2/$(basename $(notdir $(test))) := $(ldflags_v4l2)))
 
 # The tracker that is not there is of several tests, and a program of its own.
-emulator := tests/polhemus/emulator.c
+emulator := $(O)/obj/tests/polhemus/emulator.o
 unit_emulator = $(if $(filter polhemus/%,$*),$(emulator))
-$(filter $(O)/tests/unit/polhemus/%,$(unit_programs)): $(emulator) tests/polhemus/emulator.h
+$(filter $(O)/tests/unit/polhemus/%,$(unit_programs)): $(emulator)
+
+# They play libusb.
+$(filter %/polhemus_usb %/polhemus_usb_find,$(unit_programs)): private CPPFLAGS += \
+	$(shell $(PKG_CONFIG) --cflags libusb-1.0)
 
 # What of vision is in a module is linked to its own tests, which then map OpenCV, alone.
 vision_linked := tests/vision/linked.c
@@ -89,11 +94,10 @@ $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
 		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise -lm -pthread
 
 # A tracker at a line, in real time.
-$(O)/tests/tracker_line: tests/bench/tracker_line.c $(wildcard tests/polhemus/emulator.[ch]) \
-		tests/unit/polhemus/pty.h $(O)/lib/libincise-tests.a
+$(O)/tests/tracker_line: tests/bench/tracker_line.c $(emulator) $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
-		$(filter %.c,$^) $(O)/lib/libincise-tests.a $(all_libs) -lm -pthread
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
+		$(LDFLAGS) -o $@ $^ $(all_libs) -lm -pthread
 
 TRACKER_SECONDS ?= 600
 check-tracker: $(O)/tests/tracker_line ## a FASTRAK at a serial line for ten minutes, clean and with harm on the way

@@ -97,7 +97,8 @@ static struct incise_tracker *open_it(const char *device, struct incise_error *e
 static int list(void *context, const struct incise_scan_device *device)
 {
 	(void)context;
-	printf("%s: %s\n", device->device, device->what);
+	printf("%s %s: %s\n", device->usable ? "ready" : "waits", device->device,
+	       device->what);
 	return 0;
 }
 

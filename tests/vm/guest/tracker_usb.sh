@@ -56,7 +56,7 @@ lists()
 }
 
 make_gadget 0x0002 SN-77
-check "it is listed with the string of rig.conf" lists "usb:0f44:0002#SN-77: FASTRAK"
+check "it is listed with the string of rig.conf" lists "ready usb:0f44:0002#SN-77: FASTRAK"
 place=$(basename "$(dirname "$(grep -l 0f44 /sys/bus/usb/devices/*/idVendor)")")
 # TRACKER_SECONDS=600 for the ten minutes that tests/unit/polhemus has in a time of its own.
 "$program" "0f44:0002" "${TRACKER_SECONDS:-10}"
@@ -71,7 +71,7 @@ check "its EEPROM was never written" grep -q "^sent .* eeprom 0$" /run/emulator
 remove_gadget
 
 make_gadget 0x0001 ""
-check "one without firmware is listed" lists "FASTRAK without firmware"
+check "one without firmware is listed" lists "waits usb:0f44:0001@$place: FASTRAK without firmware"
 check "and named where one with it was asked for" "$program" --refuse "0f44:0002" "fxload"
 remove_gadget
 modprobe -r dummy_hcd usb_f_fs libcomposite 2>/dev/null
