@@ -21,9 +21,8 @@
 #include "../unit/polhemus/pty.h"
 
 #define HZ 120
-#define BEFORE 5       /* s without harm, while it is set up and after */
-#define AFTER 5	       /* s: what only time tells it tells half a second later */
-#define AHEAD (2 * HZ) /* records in a row are never lost by this harm */
+#define BEFORE 5 /* s without harm, while it is set up and after */
+#define AFTER 5	 /* s: what only time tells it tells half a second later */
 
 static const struct incise_tracker_setup setup = {
 	.n_stations = 1, .stations = {1}, .hemisphere = {1, 0, 0}};
@@ -110,7 +109,7 @@ static bool is_sent(const struct incise_tracker_sample *s,
 		if (fabs(s->quaternion[i] - (double)pose.q[i]) > 5e-7)
 			return false;
 	return s->station == sent->station && s->button == pose.button &&
-	       s->status == pose.error && s->t_ns >= sent->t_ns;
+	       s->status == pose.error;
 }
 
 /* Whether all is as it should be. */
@@ -128,9 +127,10 @@ static bool compare(const struct line *l)
 		size_t from = at;
 
 		doubled += i && s->seq <= s[-1].seq;
-		while (at < e->n_sent && at < from + AHEAD && !is_sent(s, &e->sent[at]))
+		while (at < e->n_sent && e->sent[at].t_ns <= s->t_ns &&
+		       !is_sent(s, &e->sent[at]))
 			at++;
-		if (at == e->n_sent || at == from + AHEAD) {
+		if (at == e->n_sent || e->sent[at].t_ns > s->t_ns) {
 			/* None that was sent, so one that came to harm. */
 			unseen++;
 			at = from;

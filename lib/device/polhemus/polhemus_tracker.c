@@ -72,12 +72,17 @@ static bool is_dumb(const struct polhemus_tracker *t, int64_t silent_ms, size_t 
 	       (t->stream.setup.sync == INCISE_TRACKER_INTERNAL || noise > NOISE_MAX);
 }
 
+static int64_t least(int64_t a, int64_t b)
+{
+	return a < b ? a : b;
+}
+
 static void *run(void *argument)
 {
 	struct polhemus_tracker *t = argument;
 	unsigned char bytes[POLHEMUS_LINE_CHUNK];
-	int64_t heard_ms = now_ms(); /* the last record */
-	size_t noise = 0;	     /* bytes since */
+	int64_t silent_ms = 0, before_ms = now_ms(), now;
+	size_t noise = 0; /* bytes since the last record */
 
 	while (!atomic_load(&t->stop)) {
 		int64_t t_ns = 0;
@@ -87,15 +92,20 @@ static void *run(void *argument)
 		if (n > 0) {
 			noise += (size_t)n;
 			if (polhemus_stream_put(&t->stream, bytes, (size_t)n, t_ns)) {
-				heard_ms = now_ms();
+				silent_ms = 0;
 				noise = 0;
 			}
 		}
-		if (n >= 0 && !is_dumb(t, now_ms() - heard_ms, noise))
+		/* A computer that stood still did not listen. */
+		now = now_ms();
+		silent_ms += least(now - before_ms, 2 * POLL_MS);
+		before_ms = now;
+		if (n >= 0 && !is_dumb(t, silent_ms, noise))
 			continue;
 		if (!recover(t))
 			break;
-		heard_ms = now_ms();
+		silent_ms = 0;
+		before_ms = now_ms();
 		noise = 0;
 	}
 	atomic_store(&t->gone, -ENODEV);
