@@ -167,6 +167,65 @@ static void switched_off_and_on(void **state)
 	tracker->ops->close(tracker);
 }
 
+static const struct polhemus_line_ops *tty_ops;
+static _Atomic bool streams, stands_still;
+static _Atomic int reopened;
+
+static ssize_t slow_read(struct polhemus_line *line, void *bytes, size_t size,
+			 int64_t *t_ns, int timeout_ms)
+{
+	ssize_t n;
+
+	if (atomic_exchange(&stands_still, false)) {
+		usleep(300000);
+		return 0;
+	}
+	/* Else it is a busy host that makes it silent. */
+	do
+		n = tty_ops->read(line, bytes, size, t_ns, timeout_ms);
+	while (!n && atomic_load(&streams));
+	return n;
+}
+
+static int counted_reopen(struct polhemus_line *line)
+{
+	atomic_fetch_add(&reopened, 1);
+	return tty_ops->reopen(line);
+}
+
+/* A computer that slept for a while finds its tracker as it was: it does not set it up anew. */
+static void stood_still(void **state)
+{
+	const struct polhemus_times times = {250, 20, 20000};
+	struct incise_error err = {0};
+	struct polhemus_line *line =
+		polhemus_tty_open(pty.path, "rig.conf:1: tracker", &err);
+	struct polhemus_line_ops slow;
+	struct incise_tracker *tracker;
+	uint64_t next = 0;
+
+	assert_non_null(line);
+	tty_ops = line->ops;
+	slow = *tty_ops;
+	slow.read = slow_read;
+	slow.reopen = counted_reopen;
+	line->ops = &slow;
+	tracker = polhemus_tracker_open(line, &two, &times, "rig.conf:1: tracker", &err);
+	if (!tracker)
+		fail_msg("%s", err.text);
+	atomic_store(&streams, true);
+	assert_int_equal(read_some(tracker, &next, 6), 0);
+	atomic_store(&reopened, 0);
+	atomic_store(&stands_still, true);
+	while (atomic_load(&stands_still))
+		usleep(1000);
+	/* What came meanwhile waits in the line. */
+	assert_int_equal(read_some(tracker, &next, 40), 0);
+	atomic_store(&streams, false);
+	assert_int_equal(atomic_load(&reopened), 0);
+	tracker->ops->close(tracker);
+}
+
 static void gone_for_good(void **state)
 {
 	const struct polhemus_times times = {200, 20, 100};
@@ -267,6 +326,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(through_the_door, begin, end),
 		cmocka_unit_test_setup_teardown(pulled_out_and_back, begin, end),
 		cmocka_unit_test_setup_teardown(switched_off_and_on, begin, end),
+		cmocka_unit_test_setup_teardown(stood_still, begin, end),
 		cmocka_unit_test_setup_teardown(gone_for_good, begin, end),
 		cmocka_unit_test_setup_teardown(refuses, begin, end),
 		cmocka_unit_test_setup_teardown(a_scan, begin, end),
