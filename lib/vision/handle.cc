@@ -116,25 +116,23 @@ static bool fit_line(handle_search &s, const std::vector<double> &x, double y0, 
 }
 
 /* First and last pixel of each row of a piece, in pixels of the picture. */
-static void read_sides(handle_search &s, int label, const cv::Rect &piece,
-		       const cv::Rect &box, int step)
+static void read_sides(handle_search &s, int piece, const cv::Rect &box, int step)
 {
+	int last = -1;
+
 	s.y.clear();
 	s.side[0].clear();
 	s.side[1].clear();
-	for (int j = piece.y; j < piece.y + piece.height; j++) {
-		const int *row = s.labels.ptr<int>(j);
-		int from = piece.x, to = piece.x + piece.width - 1;
-
-		while (from <= to && row[from] != label)
-			from++;
-		while (to > from && row[to] != label)
-			to--;
-		if (from > to)
+	for (const run &r : s.found.runs) {
+		if (r.piece != piece)
 			continue;
-		s.y.push_back(box.y + j * step + 0.5);
-		s.side[0].push_back(box.x + from);
-		s.side[1].push_back(box.x + to + 1);
+		if (r.y != last) {
+			s.y.push_back(box.y + r.y * step + 0.5);
+			s.side[0].push_back(box.x + r.from);
+			s.side[1].push_back(0);
+		}
+		s.side[1].back() = box.x + r.to;
+		last = r.y;
 	}
 }
 
@@ -228,28 +226,24 @@ bool handle_find(handle_search &s, picture &picture,
 			 cv::getStructuringElement(cv::MORPH_RECT, cv::Size(5, 3)));
 	cv::morphologyEx(s.cleaned, s.mask, cv::MORPH_OPEN,
 			 cv::getStructuringElement(cv::MORPH_RECT, cv::Size(3, 3)));
-	int n = cv::connectedComponentsWithStats(s.mask, s.labels, s.stats, s.centres, 8,
-						 CV_32S);
+	s.found.find(s.mask);
 
+	const std::vector<piece> &list = s.found.list;
 	s.order.clear();
-	for (int k = 1; k < n; k++)
-		if (s.stats.at<int>(k, cv::CC_STAT_AREA) >= smallest)
-			s.order.push_back(k);
-	std::sort(s.order.begin(), s.order.end(), [&s](int a, int b) {
-		return s.stats.at<int>(a, cv::CC_STAT_AREA) >
-		       s.stats.at<int>(b, cv::CC_STAT_AREA);
-	});
+	for (size_t k = 0; k < list.size(); k++)
+		if (list[k].area >= smallest)
+			s.order.push_back((int)k);
+	std::sort(s.order.begin(), s.order.end(),
+		  [&list](int a, int b) { return list[a].area > list[b].area; });
 	if (s.order.size() > CANDIDATES)
 		s.order.resize(CANDIDATES);
 	for (int k : s.order) {
-		const int *stat = s.stats.ptr<int>(k);
-		cv::Rect piece(stat[cv::CC_STAT_LEFT], stat[cv::CC_STAT_TOP],
-			       stat[cv::CC_STAT_WIDTH], stat[cv::CC_STAT_HEIGHT]);
-		double area = (double)stat[cv::CC_STAT_AREA] * step;
+		const cv::Rect &piece = list[k].box;
+		double area = (double)list[k].area * step;
 		const char *fault;
 		handle h;
 
-		read_sides(s, k, piece, box, step);
+		read_sides(s, k, box, step);
 		fault = judge(s, area, h);
 		if (!fault && (at_border(h, box) || piece.x == 0 || piece.y == 0 ||
 			       piece.x + piece.width == s.mask.cols ||

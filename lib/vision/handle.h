@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 #include <incise/vision.h>
 #include "picture.h"
+#include "pieces.h"
 
 namespace vision
 {
@@ -30,7 +31,8 @@ struct handle {
 
 /* What the search keeps from picture to picture, so that it need not allocate. */
 struct handle_search {
-	cv::Mat hsv, mask, cleaned, labels, stats, centres;
+	cv::Mat hsv, mask, cleaned;
+	pieces found;
 	std::vector<double> y, side[2], weight;
 	std::vector<int> order;
 };
