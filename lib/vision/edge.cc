@@ -74,6 +74,28 @@ static double at(const curve &c, double x, vec5 *d)
 	return c.p[INSIDE] + step * part;
 }
 
+/* The curve over the window, for many pixels: between 16 values per pixel by a line. */
+struct drawn {
+	enum { FINE = 16, VALUES = 2 * (int)window_px * FINE + 2 };
+	float value[VALUES];
+	double from;
+
+	drawn(const curve &c, double place) : from(place - window_px)
+	{
+		for (int i = 0; i < VALUES; i++)
+			value[i] = (float)at(c, from + (double)i / FINE, nullptr);
+	}
+
+	/* @u: within the window */
+	float operator()(double u) const
+	{
+		double x = std::min(std::max((u - from) * FINE, 0.0), VALUES - 2.0);
+		int i = (int)x;
+
+		return value[i] + (float)(x - i) * (value[i + 1] - value[i]);
+	}
+};
+
 struct bin {
 	double x, y, weight;
 };
@@ -468,11 +490,11 @@ const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d 
 	double last, limit;
 	for (int pass = 0; pass < 2; pass++) {
 		double step = std::fabs(c.p[BEYOND] - c.p[INSIDE]), noise;
+		drawn line(c, place);
 
 		s.sorted.clear();
 		for (const sample &p : s.samples)
-			s.sorted.push_back(
-				(float)std::fabs(p.value - at(c, p.u, nullptr)));
+			s.sorted.push_back(std::fabs(p.value - line(p.u)));
 		s.residuals = s.sorted;
 		noise = std::max(1.0, 1.4826 * median(s.residuals));
 		limit = keep_sd * std::max(noise, 1 + floor_share[pass] * step);
@@ -483,13 +505,14 @@ const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d 
 	}
 	found.kept *= share;
 
+	drawn line(c, place);
 	size_t used = 0;
 	for (size_t k = 0; k < s.samples.size(); k++) {
 		const sample &p = s.samples[k];
 
 		if (s.sorted[k] > limit || p.u > last)
 			continue;
-		double r = p.value - at(c, p.u, nullptr);
+		double r = p.value - line(p.u);
 		square += r * r;
 		used++;
 	}

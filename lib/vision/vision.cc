@@ -18,7 +18,7 @@
 #include "picture.h"
 #include "vision_opencv.h"
 
-enum { MARGIN = 24 }; /* pixels that a handle may move between two pictures */
+enum { MARGIN = 24 }; /* pixels that a handle may stray from where its motion takes it */
 
 static constexpr double worst_quality = 0.2;
 
@@ -26,6 +26,7 @@ struct opencv_vision {
 	struct incise_vision vision;
 	struct incise_vision_setup setup;
 	cv::Rect region; /* to look at first; empty: all */
+	cv::Rect last;	 /* around the handle in the picture before; empty: not seen */
 	vision::picture picture;
 	vision::handle_search handle;
 	vision::edge_search edge;
@@ -104,6 +105,20 @@ static void say(struct opencv_vision *v, const vision::handle &handle,
 	result->quality = clip01(std::min(contrast, std::min(straight, kept)));
 }
 
+/* Where it is and where it will be if all sides go on as from @last, and a margin. */
+static cv::Rect follow(const cv::Rect &last, const cv::Rect &now)
+{
+	cv::Rect next = now;
+
+	if (last.area() > 0) {
+		cv::Point from = 2 * now.tl() - last.tl(), to = 2 * now.br() - last.br();
+
+		if (to.x > from.x && to.y > from.y)
+			next |= cv::Rect(from, to);
+	}
+	return next + cv::Size(2 * MARGIN, 2 * MARGIN) - cv::Point(MARGIN, MARGIN);
+}
+
 /* Look in a region. 0, or a negative errno; result->found says the rest. */
 static int look(struct opencv_vision *v, const cv::Rect &region,
 		struct incise_vision_result *result)
@@ -134,8 +149,8 @@ static int look(struct opencv_vision *v, const cv::Rect &region,
 			    "the handle's ends or sides are not clear");
 		return 0;
 	}
-	v->region =
-		handle.box + cv::Size(2 * MARGIN, 2 * MARGIN) - cv::Point(MARGIN, MARGIN);
+	v->region = follow(v->last, handle.box);
+	v->last = handle.box;
 	return 0;
 }
 
@@ -171,7 +186,7 @@ static int measure(struct opencv_vision *v, const struct incise_camera_frame *fr
 		if (ret || result->found)
 			return ret;
 	}
-	v->region = cv::Rect();
+	v->region = v->last = cv::Rect();
 	return look(v, all, result);
 }
 
