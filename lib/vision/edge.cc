@@ -519,7 +519,22 @@ const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d 
 	found.u = c.p[PLACE];
 	found.step = at(c, c.p[PLACE] + window_px, nullptr) - c.p[INSIDE];
 	found.noise = std::sqrt(square / std::max<size_t>(used, 6));
-	found.sd = found.noise * std::sqrt(variance);
+	/* What is not noise, as texture, or a curve of another form, does not average out. */
+	double excess = 0, near = 0, weight = 0, white = 0;
+	for (int i = 0; i < n; i++) {
+		double r = bins[i].y - at(c, bins[i].x, nullptr);
+
+		excess += bins[i].weight * r * r;
+		if (std::fabs(bins[i].x - c.p[PLACE]) > clear_px)
+			continue;
+		near += bins[i].weight * r * r;
+		weight += bins[i].weight;
+		white += found.noise * found.noise;
+	}
+	excess = std::sqrt(excess / std::max(n - 5, 1));
+	found.sd = std::max(found.noise, excess) * std::sqrt(variance);
+	found.misfit = std::sqrt(std::max(near - white, 0.0) / std::max(weight, 1.0)) /
+		       std::max(found.step, 1.0);
 	if (!(found.step >= least_step) || !std::isfinite(found.sd))
 		return no_step;
 	return nullptr;

@@ -22,7 +22,8 @@ struct edge {
 	double sd;    /* of u */
 	double step;  /* from the handle to what is beyond, levels */
 	double noise; /* sd of what the fit leaves, levels */
-	double kept;  /* share of the pixels that it kept */
+	double misfit; /* rms by which the means of pixels are off the fit, over step; no noise */
+	double kept; /* share of the pixels that it kept */
 };
 
 struct edge_search {

@@ -19,16 +19,19 @@ namespace vision
 {
 
 enum {
-	HIGH = 400,	/* rows: from here on every second one is looked at */
-	CANDIDATES = 8, /* largest pieces that are looked at */
-	FEWEST = 12,	/* rows that a side is fitted to */
-	BORDER = 6,	/* pixels of background that an end needs */
+	HIGH = 400,	 /* rows: from here on every second one is looked at */
+	CANDIDATES = 8,	 /* largest pieces that are looked at */
+	FEWEST = 12,	 /* rows that a side is fitted to */
+	BORDER = 6,	 /* pixels of background that an end needs */
+	LEAST_PIECE = 6, /* rows of what goes on with the handle behind a gap */
 };
 
 static constexpr double longest_ratio = 1.5; /* length over width at least */
 static constexpr double least_fill = 0.6;    /* of the rectangle between the sides */
 static constexpr double most_tilt = 1.75;    /* tan 60° and a little */
 static constexpr double most_rms_px = 3;
+static constexpr double seam_levels =
+	8; /* more than light and noise do to what is black */
 
 /* 255 where a pixel has the handle's colour. */
 static void find_colour(handle_search &s, const struct incise_vision_setup &setup)
@@ -210,6 +213,107 @@ static bool at_border(const handle &h, const cv::Rect &within)
 	return false;
 }
 
+/*
+ * Whether a piece other than @own goes on with the handle, as wide as it is: a reflection
+ * all across it, or a tape, has cut it, or this is its mirror image in the tissue.
+ */
+static bool is_cut(handle_search &s, int own, const handle &h, const cv::Rect &box,
+		   int step)
+{
+	double width = 2 * h.half_px / h.axis.y; /* of a row */
+	std::vector<cv::Vec3d> &sum =
+		s.rows; /* pixels on the handle's way, off it; rows */
+
+	sum.assign(s.found.list.size(), cv::Vec3d());
+	for (const run &r : s.found.runs) {
+		double y = box.y + r.y * step + 0.5;
+		double middle = h.top.x + (y - h.top.y) * h.axis.x / h.axis.y;
+		double on = std::min<double>(box.x + r.to, middle + width / 2) -
+			    std::max<double>(box.x + r.from, middle - width / 2);
+
+		on = std::max(on, 0.0);
+		sum[r.piece] += cv::Vec3d(on, r.to - r.from - on, 1);
+	}
+	for (size_t k = 0; k < sum.size(); k++) {
+		double rows = s.found.list[k].box.height;
+
+		if ((int)k != own && rows * step >= LEAST_PIECE &&
+		    sum[k][0] > 0.6 * rows * width && sum[k][1] < 0.25 * sum[k][0])
+			return true;
+	}
+	return false;
+}
+
+/* Value and chroma of the handle in the middle of each row, as medians: no reflections. */
+static void read_colour(handle_search &s, const handle &h, const cv::Rect &box, int step)
+{
+	enum { POINTS = 15 };
+	double reach = 0.6 * h.half_px / h.axis.y;
+	double end = 1.2 * h.half_px * std::fabs(h.axis.x) + 8; /* blurred, aslant */
+
+	s.colour.clear();
+	for (int j = 0; j < s.hsv.rows; j++) {
+		double y = box.y + j * step + 0.5;
+		double x = h.top.x + (y - h.top.y) * h.axis.x / h.axis.y - box.x;
+		uint8_t value[POINTS], chroma[POINTS] = {};
+
+		if (y < h.top.y + end || y > h.bottom.y - end)
+			continue;
+		for (int k = 0; k < POINTS; k++) {
+			int at = (int)(x + reach * (2 * k / (POINTS - 1.0) - 1));
+
+			at = std::min(std::max(at, 0), s.hsv.cols - 1);
+			if (s.hsv.channels() == 1) {
+				value[k] = *s.hsv.ptr(j, at);
+				continue;
+			}
+			const uint8_t *hsv = s.hsv.ptr(j, at);
+			value[k] = hsv[2];
+			chroma[k] = (uint8_t)(hsv[1] * hsv[2] / 255);
+		}
+		std::nth_element(value, value + POINTS / 2, value + POINTS);
+		std::nth_element(chroma, chroma + POINTS / 2, chroma + POINTS);
+		s.colour.push_back(cv::Vec2d(value[POINTS / 2], chroma[POINTS / 2]));
+	}
+}
+
+/*
+ * Whether the handle is best told apart in two parts of a colour each, from one row to the
+ * next. A shadow on the tissue, or blood, may have the handle's colour and go on with it.
+ */
+static bool has_seam(handle_search &s, const handle &h, const cv::Rect &box, int step)
+{
+	enum { LEAST = 3, NEAR = 8 };
+
+	read_colour(s, h, box, step);
+	int n = (int)s.colour.size(), split = 0;
+	double most = 0;
+
+	s.sum.assign(1, cv::Vec2d());
+	for (const cv::Vec2d &c : s.colour)
+		s.sum.push_back(s.sum.back() + c);
+	auto mean = [&s](int from, int to) {
+		return (s.sum[to] - s.sum[from]) * (1.0 / (to - from));
+	};
+	for (int i = LEAST; i <= n - LEAST; i++) {
+		cv::Vec2d step = mean(i, n) - mean(0, i);
+		double between = step.dot(step) * i * (n - i);
+
+		if (between > most) {
+			most = between;
+			split = i;
+		}
+	}
+	if (!split)
+		return false;
+	cv::Vec2d all = mean(split, n) - mean(0, split);
+	/* Light that fades has no step. */
+	cv::Vec2d here = mean(std::min(split + 1, n - 2), std::min(split + NEAR, n)) -
+			 mean(std::max(split - NEAR, 0), std::max(split - 1, 2));
+	double size = cv::norm(all);
+	return size > seam_levels && here.dot(all) > 0.7 * size * size;
+}
+
 bool handle_find(handle_search &s, picture &picture,
 		 const struct incise_vision_setup &setup, const cv::Rect &box,
 		 handle &found, const char **why)
@@ -217,6 +321,7 @@ bool handle_find(handle_search &s, picture &picture,
 	int step = picture.size.height >= HIGH ? 2 : 1;
 	int smallest = 16 * FEWEST / step;
 	double most = 0;
+	int own = -1;
 
 	*why = "nothing has the handle's colour";
 	picture.hsv(box, step, s.hsv);
@@ -255,11 +360,19 @@ bool handle_find(handle_search &s, picture &picture,
 			h.box = cv::Rect(box.x + piece.x, box.y + piece.y * step,
 					 piece.width, piece.height * step);
 			found = h;
+			own = k;
 		} else if (fault && most == 0 && k == s.order.front()) {
 			*why = fault;
 		}
 	}
-	return most > 0;
+	if (own < 0)
+		return false;
+	if (is_cut(s, own, found, box, step)) {
+		*why = "the handle is cut in two";
+		return false;
+	}
+	found.seam = has_seam(s, found, box, step);
+	return true;
 }
 
 } // namespace vision

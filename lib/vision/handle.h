@@ -27,6 +27,7 @@ struct handle {
 	double half_px;
 	double rms_px; /* of the sides from straight lines */
 	cv::Rect box;  /* around all of it */
+	bool seam; /* its colour changes at once, on its way: is all of it the handle? */
 };
 
 /* What the search keeps from picture to picture, so that it need not allocate. */
@@ -35,6 +36,8 @@ struct handle_search {
 	pieces found;
 	std::vector<double> y, side[2], weight;
 	std::vector<int> order;
+	std::vector<cv::Vec3d> rows;
+	std::vector<cv::Vec2d> colour, sum; /* of rows: value and chroma, levels */
 };
 
 /* Whether there is one within @box of the picture. *@why is set where not, to what is most

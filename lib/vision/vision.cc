@@ -21,6 +21,8 @@
 enum { MARGIN = 24 }; /* pixels that a handle may stray from where its motion takes it */
 
 static constexpr double worst_quality = 0.2;
+static constexpr double seam_quality = 0.25;
+static constexpr double most_misfit = 0.1; /* liver of 12 levels of texture: 0.02 */
 
 struct opencv_vision {
 	struct incise_vision vision;
@@ -90,6 +92,8 @@ static void say(struct opencv_vision *v, const vision::handle &handle,
 	double contrast = bottom.step / (10 * std::max(bottom.noise, 0.1));
 	double straight = 1 - handle.rms_px / 3;
 	double kept = 2 * std::min(top.kept, bottom.kept) - 1;
+	double form = 1 - std::max(top.misfit, bottom.misfit) / most_misfit;
+	double even = handle.seam ? seam_quality : 1;
 
 	result->found = true;
 	result->length_px =
@@ -102,7 +106,7 @@ static void say(struct opencv_vision *v, const vision::handle &handle,
 	result->edge_px[1] = edge.y;
 	result->axis[0] = handle.axis.x;
 	result->axis[1] = handle.axis.y;
-	result->quality = clip01(std::min(contrast, std::min(straight, kept)));
+	result->quality = clip01(std::min({contrast, straight, kept, form, even}));
 }
 
 /* Where it is and where it will be if all sides go on as from @last, and a margin. */

@@ -17,6 +17,13 @@
  * A blade of bright steel below the black is not part of length_px: paint it.
  * Pixel (0, 0) covers 0 … 1 in both directions, top row first.
  *
+ * What no picture tells: a hand or glove over the upper end is taken for that end; tissue,
+ * blood or a shadow of the very colour of the handle, in grey of its very brightness, that
+ * goes on with it is taken for more of it. A depth that leaps from picture to picture is
+ * worth no trust whatever its quality. Light that leaves the tissue within the handle's
+ * thresholds, a dark glove at the handle, and anything that cuts the handle in two give
+ * "not found".
+ *
  * Not real-time safe. One thread at a time per object. No exception of C++ comes out.
  * OpenCV is told to use no threads of its own, in the whole process.
  * Loading the module, with some 25 libraries, takes milliseconds: who must not wait makes
@@ -57,14 +64,18 @@ struct incise_vision_result {
 	int64_t t_ns;	  /**< of the picture */
 	bool found;	  /**< else the numbers are NaN, the quality 0 */
 	double length_px; /**< exposed, sub-pixel */
-	double sd_px;	 /**< standard deviation of length_px, from the fits' residuals */
-	double depth_mm; /**< a little below 0 is noise; NaN without full_px */
+	double sd_px; /**< standard deviation of length_px, from the fits' residuals; the
+			  * tissue's texture may make it 1.5 times as large */
+	double depth_mm;   /**< a little below 0 is noise; NaN without full_px */
 	double edge_px[2]; /**< where the axis meets the tissue: x, y */
 	double axis[2];	   /**< unit, down the handle */
 	/**
 	 * 0 … 1, the least of: step at the tissue over 10 sd of what is left of the fit
 	 * there; 1 - rms of the handle's sides from straight lines / 3 px; share of the
-	 * pixels at both ends that the fits kept, from 1/2 (0) to 1 (1).
+	 * pixels at both ends that the fits kept, from 1/2 (0) to 1 (1); 1 - what the fits
+	 * leave beside noise / 10 % of the step, as a shelf of blood does; 1/4 where the
+	 * colour of what is taken for the handle changes at once: shadow, blood or a mirror
+	 * image may go on with it. Below 0.2 nothing is found.
 	 */
 	double quality;
 	const char *why; /**< not found: why, in words; static */

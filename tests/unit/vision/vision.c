@@ -273,6 +273,78 @@ static void of_several_dark_things_the_handle_is_taken(void **state)
 	incise_vision_free(vision);
 }
 
+/* A rectangle of one colour. */
+static void paint(struct incise_camera_frame *frame, int x, int y, int width, int height,
+		  const uint8_t *rgb)
+{
+	for (int j = y; j < y + height; j++)
+		for (int i = x; i < x + width; i++)
+			memcpy((uint8_t *)frame->data + (size_t)j * frame->stride + 3 * i,
+			       rgb, 3);
+}
+
+/*
+ * What makes the length wrong by tens of pixels must not pass for a good one. The handle is
+ * upright, 67 pixels wide, from row 100 to row 400.
+ */
+static void what_only_looks_like_the_handle_costs_quality(void **state)
+{
+	static const struct {
+		const char *name;
+		int y, height, half; /* of what is painted */
+		uint8_t rgb[3];
+		double most;	 /* quality; 1: it is not to suffer */
+		const char *why; /* not found */
+	} cases[] = {
+		{"reflection across", 200, 12, 40, {230, 230, 230}, 0, "cut in two"},
+		{"wide reflection across", 220, 30, 40, {230, 230, 230}, 0, "cut in two"},
+		{"reflection near the end", 370, 14, 40, {90, 90, 90}, 0, "cut in two"},
+		{"wide one near the end", 366, 24, 40, {230, 230, 230}, 0, "cut in two"},
+		{"mirror image", 400, 60, 34, {45, 45, 45}, 0.25, NULL},
+		{"blood", 400, 60, 34, {50, 10, 10}, 0.25, NULL},
+		{"shadow", 400, 40, 34, {35, 14, 11}, 0.25, NULL},
+		{"blood at the edge", 400, 6, 45, {50, 10, 10}, 0, "not clear"},
+		{"dark, but not the handle's", 400, 60, 34, {70, 30, 25}, 1, NULL},
+		{"light that fades", 0, 0, 0, {0, 0, 0}, 1, NULL},
+	};
+
+	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
+		struct incise_vision *vision = vision_of(&black);
+		struct incise_vision_result r;
+		struct incise_camera_frame frame;
+		struct scalpel_picture p;
+
+		scalpel_picture_init(&p);
+		p.y = 400;
+		p.length_px = 300;
+		p.noise = 2;
+		p.blur_px = 1;
+		p.gradient = cases[k].half ? 0 : 1.2;
+		assert_int_equal(scalpel_picture_draw(&p, &frame), 0);
+		paint(&frame, 320 - cases[k].half, cases[k].y, 2 * cases[k].half,
+		      cases[k].height, cases[k].rgb);
+		/* The second time in the region of interest, where there is one. */
+		for (int i = 0; i < 2; i++) {
+			assert_int_equal(incise_vision_measure(vision, &frame, &r), 0);
+			print_message("%s: %s, %.1f px off, quality %.2f\n",
+				      cases[k].name, r.found ? "found" : r.why,
+				      r.length_px - 300, r.quality);
+			assert_int_equal(r.found, !cases[k].why);
+			if (!r.found) {
+				assert_not_found(&r, cases[k].why);
+				continue;
+			}
+			assert_true(r.quality <= cases[k].most);
+			if (cases[k].most == 1) {
+				assert_true(r.quality > 0.6);
+				assert_true(fabs(r.length_px - 300) < 1);
+			}
+		}
+		free((void *)frame.data);
+		incise_vision_free(vision);
+	}
+}
+
 /* Wherever it jumps to, the region of interest is not what decides. */
 static void the_region_follows(void **state)
 {
@@ -453,6 +525,7 @@ int main(void)
 		cmocka_unit_test(without_a_scalpel_it_says_so),
 		cmocka_unit_test(what_reaches_the_border_is_not_measured),
 		cmocka_unit_test(of_several_dark_things_the_handle_is_taken),
+		cmocka_unit_test(what_only_looks_like_the_handle_costs_quality),
 		cmocka_unit_test(the_region_follows),
 		cmocka_unit_test(the_virtual_cameras_truth),
 		cmocka_unit_test(sizes_that_do_not_fit_are_refused),
