@@ -8,8 +8,9 @@
  *   ──────/                handle      3. pixels that are off that curve are thrown out
  *         u                            4. means of the others, the curve once more
  *
- * The curve is a step, blurred by a Gaussian and by the pixel's own width, between a level
- * and a slope. It is at half of its height at u whatever the blur. Of colours the sum that
+ * The curve is a step, blurred by a Gaussian and by the pixel's own width, from a level to
+ * one that may wander farther out. It is at half of its height at u whatever the blur.
+ * tests/unit/vision/edge.c holds it against the bound of what is possible. Of colours the sum that
  * differs most between handle and beyond is taken: for liver mostly red.
  */
 #include <algorithm>
@@ -25,11 +26,12 @@ static constexpr double reach_px = 14;	/* beyond which nothing is looked at, at 
 static constexpr double widest_px = 48; /* beyond which nothing is, at most */
 static constexpr double clear_px = 8; /* from the end: one colour or the other, mostly */
 static constexpr double window_px = 12; /* of the curve, to both sides */
-/* The curve's end beyond the edge, and blurs more: farther out the tissue's texture counts. */
-static constexpr double beyond_px = 1.5;
-static constexpr double beyond_blurs = 2;
-static constexpr double slope_sd =
-	0.1; /* of what is beyond, levels per pixel, expected */
+/*
+ * What is beyond has a texture: its level is a random walk of some steps. At the edge it is
+ * one level: what rises there is the edge.
+ */
+static constexpr double level_px = 2, rise_px = 2;
+static constexpr double rise_sd = 1; /* levels, of a step */
 static constexpr double across =
 	0.8; /* of the width is looked at: the sides are blurred */
 static constexpr double steepest = 1.5; /* slant of the edge */
@@ -37,16 +39,17 @@ static constexpr double least_step = 8; /* levels */
 static constexpr double keep_sd = 3.5;
 static constexpr double floor_share[2] = {0.04, 0.02}; /* of the step, is no outlier */
 
-typedef cv::Vec<double, 5> vec5;
-typedef cv::Matx<double, 5, 5> mat5;
+enum { PLACE, BLUR, INSIDE, BEYOND, RISE, RISES = 5, UNKNOWNS = RISE + RISES };
 
-/* Where the step is, sd of the blur, level of the handle; level beyond and its slope. */
+typedef cv::Vec<double, UNKNOWNS> unknowns;
+typedef cv::Matx<double, UNKNOWNS, UNKNOWNS> equations;
+
+/* Where the step is, sd of the blur, level of the handle, level beyond at the edge; what this
+ * rises by farther out, over each rise_px. */
 struct curve {
-	vec5 p;
-	double centre;
+	unknowns p;
+	double level; /* from here on it may rise */
 };
-
-enum { PLACE, BLUR, INSIDE, BEYOND, SLOPE };
 
 static double normal(double x)
 {
@@ -59,18 +62,27 @@ static double cumulated(double x)
 }
 
 /* The curve at @x, and by @d its derivatives. */
-static double at(const curve &c, double x, vec5 *d)
+static double at(const curve &c, double x, unknowns *d)
 {
 	double s = c.p[BLUR], a = (x + 0.5 - c.p[PLACE]) / s,
 	       b = (x - 0.5 - c.p[PLACE]) / s;
 	double ca = cumulated(a), cb = cumulated(b), na = normal(a), nb = normal(b);
 	double part = s * (a * ca + na - b * cb - nb); /* of the step, in 0 … 1 */
-	double beyond = c.p[BEYOND] + c.p[SLOPE] * (x - c.centre);
+	double far = (x - c.level) / rise_px, beyond = c.p[BEYOND];
+
+	for (int k = 0; k < RISES; k++)
+		beyond += c.p[RISE + k] * std::min(std::max(far - k, 0.0), 1.0);
 	double step = beyond - c.p[INSIDE];
 
-	if (d)
-		*d = vec5(-step * (ca - cb), step * (na - nb), 1 - part, part,
-			  part * (x - c.centre));
+	if (d) {
+		*d = unknowns();
+		(*d)[PLACE] = -step * (ca - cb);
+		(*d)[BLUR] = step * (na - nb);
+		(*d)[INSIDE] = 1 - part;
+		(*d)[BEYOND] = part;
+		for (int k = 0; k < RISES; k++)
+			(*d)[RISE + k] = part * std::min(std::max(far - k, 0.0), 1.0);
+	}
 	return c.p[INSIDE] + step * part;
 }
 
@@ -104,22 +116,22 @@ struct bin {
 static bool fit(const bin *bins, int n, double noise, curve &c, double *variance)
 {
 	double damping = 1e-3, best = HUGE_VAL,
-	       flat = noise * noise / (slope_sd * slope_sd);
-	vec5 start = c.p, gradient;
-	mat5 normal_matrix;
+	       flat = noise * noise / (rise_sd * rise_sd);
+	unknowns start = c.p, gradient;
+	equations normal_matrix;
 	curve trial = c;
 
 	for (int pass = 0; pass < PASSES; pass++) {
-		mat5 m = mat5::zeros();
-		vec5 g(0, 0, 0, 0, 0);
+		equations m = equations::zeros();
+		unknowns g;
 		double sum = 0;
 
 		for (int i = 0; i < n; i++) {
-			vec5 d;
+			unknowns d;
 			double r = bins[i].y - at(trial, bins[i].x, &d);
 
 			sum += bins[i].weight * r * r;
-			for (int k = 0; k < 5; k++) {
+			for (int k = 0; k < UNKNOWNS; k++) {
 				double w = bins[i].weight * d[k];
 
 				g[k] += w * r;
@@ -127,16 +139,19 @@ static bool fit(const bin *bins, int n, double noise, curve &c, double *variance
 					m(k, l) += w * d[l];
 			}
 		}
-		m(SLOPE, SLOPE) += flat;
-		g[SLOPE] -= flat * trial.p[SLOPE];
-		sum += flat * trial.p[SLOPE] * trial.p[SLOPE];
-		for (int k = 0; k < 5; k++)
+		for (int k = RISE; k < UNKNOWNS; k++) {
+			m(k, k) += flat;
+			g[k] -= flat * trial.p[k];
+			sum += flat * trial.p[k] * trial.p[k];
+		}
+		for (int k = 0; k < UNKNOWNS; k++)
 			for (int l = 0; l < k; l++)
 				m(l, k) = m(k, l);
 		if (!std::isfinite(sum))
 			return false;
 		if (sum <= best) {
-			bool settled = best - sum <= 1e-9 * sum;
+			/* a hundredth of the sd, for a hundred bins */
+			bool settled = best - sum <= 1e-6 * sum;
 
 			best = sum;
 			c = trial;
@@ -149,11 +164,11 @@ static bool fit(const bin *bins, int n, double noise, curve &c, double *variance
 			damping *= 8;
 		}
 		/* From the best so far; after a bad step by its old equations. */
-		mat5 damped = normal_matrix;
-		for (int k = 0; k < 5; k++)
+		equations damped = normal_matrix;
+		for (int k = 0; k < UNKNOWNS; k++)
 			damped(k, k) += damping * normal_matrix(k, k) + 1e-9;
 		bool ok;
-		vec5 by = damped.inv(cv::DECOMP_CHOLESKY, &ok) * gradient;
+		unknowns by = damped.inv(cv::DECOMP_CHOLESKY, &ok) * gradient;
 		if (!ok)
 			return false;
 		trial.p = c.p + by;
@@ -162,7 +177,7 @@ static bool fit(const bin *bins, int n, double noise, curve &c, double *variance
 					  start[PLACE] + 8);
 	}
 	bool ok;
-	for (int k = 0; k < 5; k++)
+	for (int k = 0; k < UNKNOWNS; k++)
 		normal_matrix(k, k) += 1e-9;
 	*variance = normal_matrix.inv(cv::DECOMP_CHOLESKY, &ok)(PLACE, PLACE);
 	return ok && std::fabs(c.p[PLACE] - start[PLACE]) < 7.9;
@@ -424,8 +439,7 @@ static int by_medians(edge_search &s, double place, bin *bins)
 }
 
 /* Means of those near the curve, in bins of a quarter. */
-static int by_means(edge_search &s, double place, double end, double limit, bin *bins,
-		    double *kept)
+static int by_means(edge_search &s, double place, double limit, bin *bins, double *kept)
 {
 	double x[BINS] = {}, y[BINS] = {};
 	int count[BINS] = {}, n = 0, all = 1, good = 0;
@@ -434,7 +448,7 @@ static int by_means(edge_search &s, double place, double end, double limit, bin 
 		const sample &p = s.samples[k];
 		int i = (int)std::floor((p.u - place) * 4) + BINS / 2;
 
-		if (p.u > end || i < 0 || i >= BINS)
+		if (i < 0 || i >= BINS)
 			continue;
 		all++;
 		if (s.sorted[k] > limit)
@@ -483,11 +497,15 @@ const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d 
 		return "the handle reaches the picture's border";
 
 	n = by_medians(s, place, bins);
-	c.p = vec5(place, 1, bins[0].y, bins[n - 1].y, 0);
-	c.centre = place;
+	c.p = unknowns();
+	c.p[PLACE] = place;
+	c.p[BLUR] = 1;
+	c.p[INSIDE] = bins[0].y;
+	c.p[BEYOND] = bins[n - 1].y;
+	c.level = place + level_px;
 	if (!fit(bins, n, 4, c, &variance))
 		return no_step;
-	double last, limit;
+	double limit;
 	for (int pass = 0; pass < 2; pass++) {
 		double step = std::fabs(c.p[BEYOND] - c.p[INSIDE]), noise;
 		drawn line(c, place);
@@ -498,8 +516,7 @@ const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d 
 		s.residuals = s.sorted;
 		noise = std::max(1.0, 1.4826 * median(s.residuals));
 		limit = keep_sd * std::max(noise, 1 + floor_share[pass] * step);
-		last = c.p[PLACE] + beyond_px + beyond_blurs * c.p[BLUR];
-		n = by_means(s, place, last, limit, bins, &found.kept);
+		n = by_means(s, place, limit, bins, &found.kept);
 		if (n < 8 || !fit(bins, n, noise, c, &variance))
 			return no_step;
 	}
@@ -510,7 +527,7 @@ const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d 
 	for (size_t k = 0; k < s.samples.size(); k++) {
 		const sample &p = s.samples[k];
 
-		if (s.sorted[k] > limit || p.u > last)
+		if (s.sorted[k] > limit)
 			continue;
 		double r = p.value - line(p.u);
 		square += r * r;

@@ -64,8 +64,9 @@ struct incise_vision_result {
 	int64_t t_ns;	  /**< of the picture */
 	bool found;	  /**< else the numbers are NaN, the quality 0 */
 	double length_px; /**< exposed, sub-pixel */
-	double sd_px; /**< standard deviation of length_px, from the fits' residuals; the
-			  * tissue's texture may make it 1.5 times as large */
+	/** standard deviation of length_px, from what the fits leave; 0.6 to 2 times that of
+	 * many pictures, by the tissue's texture */
+	double sd_px;
 	double depth_mm;   /**< a little below 0 is noise; NaN without full_px */
 	double edge_px[2]; /**< where the axis meets the tissue: x, y */
 	double axis[2];	   /**< unit, down the handle */

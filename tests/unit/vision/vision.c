@@ -303,7 +303,7 @@ static void what_only_looks_like_the_handle_costs_quality(void **state)
 		{"mirror image", 400, 60, 34, {45, 45, 45}, 0.25, NULL},
 		{"blood", 400, 60, 34, {50, 10, 10}, 0.25, NULL},
 		{"shadow", 400, 40, 34, {35, 14, 11}, 0.25, NULL},
-		{"blood at the edge", 400, 6, 45, {50, 10, 10}, 0, "not clear"},
+		{"blood at the edge", 400, 6, 45, {50, 10, 10}, 0.4, NULL},
 		{"dark, but not the handle's", 400, 60, 34, {70, 30, 25}, 1, NULL},
 		{"light that fades", 0, 0, 0, {0, 0, 0}, 1, NULL},
 	};
