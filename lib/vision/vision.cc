@@ -20,6 +20,7 @@
 
 enum { MARGIN = 24 }; /* pixels that a handle may stray from where its motion takes it */
 
+static const char unclear[] = "the handle's ends or sides are not clear";
 static constexpr double worst_quality = 0.2;
 static constexpr double seam_quality = 0.25;
 static constexpr double most_misfit = 0.1; /* liver of 12 levels of texture: 0.02 */
@@ -149,8 +150,7 @@ static int look(struct opencv_vision *v, const cv::Rect &region,
 	}
 	say(v, handle, top, bottom, result);
 	if (result->quality < worst_quality) {
-		say_nothing(result, result->t_ns,
-			    "the handle's ends or sides are not clear");
+		say_nothing(result, result->t_ns, unclear);
 		return 0;
 	}
 	v->region = follow(v->last, handle.box);
@@ -186,9 +186,17 @@ static int measure(struct opencv_vision *v, const struct incise_camera_frame *fr
 
 	region = fit_region(v->region, v->picture.size);
 	if (region.area() > 0) {
+		bool followed = v->last.area() > 0;
+
 		ret = look(v, region, result);
 		if (ret || result->found)
 			return ret;
+		/* Seen, but not clearly: so it would be in all of it, and a picture is to
+		 * take no longer than that. The next one is searched as a whole. */
+		if (followed && result->why == unclear) {
+			v->region = v->last = cv::Rect();
+			return 0;
+		}
 	}
 	v->region = v->last = cv::Rect();
 	return look(v, all, result);
