@@ -32,6 +32,9 @@ static constexpr double window_px = 12; /* of the curve, to both sides */
  */
 static constexpr double level_px = 2, rise_px = 2;
 static constexpr double rise_sd = 1; /* levels, of a step */
+/* What a fit may leave, over the step; where it leaves more, how far out it then looks. */
+static constexpr double most_misfit = 0.04;
+static constexpr double near_px = 1.5, near_blurs = 2;
 static constexpr double across =
 	0.8; /* of the width is looked at: the sides are blurred */
 static constexpr double steepest = 1.5; /* slant of the edge */
@@ -439,7 +442,8 @@ static int by_medians(edge_search &s, double place, bin *bins)
 }
 
 /* Means of those near the curve, in bins of a quarter. */
-static int by_means(edge_search &s, double place, double limit, bin *bins, double *kept)
+static int by_means(edge_search &s, double place, double end, double limit, bin *bins,
+		    double *kept)
 {
 	double x[BINS] = {}, y[BINS] = {};
 	int count[BINS] = {}, n = 0, all = 1, good = 0;
@@ -448,7 +452,7 @@ static int by_means(edge_search &s, double place, double limit, bin *bins, doubl
 		const sample &p = s.samples[k];
 		int i = (int)std::floor((p.u - place) * 4) + BINS / 2;
 
-		if (i < 0 || i >= BINS)
+		if (p.u > end || i < 0 || i >= BINS)
 			continue;
 		all++;
 		if (s.sorted[k] > limit)
@@ -465,13 +469,80 @@ static int by_means(edge_search &s, double place, double limit, bin *bins, doubl
 	return n;
 }
 
+/* Where the level beyond begins to wander, past the blur. */
+static double level_from(const curve &c)
+{
+	return c.p[PLACE] + std::max(level_px, 0.5 + 1.5 * c.p[BLUR]);
+}
+
+/*
+ * From a curve that is nearly right: throw out what is off it, fit means, and once more.
+ * What is beyond counts as far as @blurs blurs and @more pixels.
+ */
+static bool refine(edge_search &s, double place, double more, double blurs, curve c,
+		   edge &found)
+{
+	double variance, limit, end, square = 0;
+	bin bins[BINS];
+	int n;
+
+	for (int pass = 0; pass < 2; pass++) {
+		double step = std::fabs(c.p[BEYOND] - c.p[INSIDE]), noise;
+		drawn line(c, place);
+
+		s.sorted.clear();
+		for (const sample &p : s.samples)
+			s.sorted.push_back(std::fabs(p.value - line(p.u)));
+		s.residuals = s.sorted;
+		noise = std::max(1.0, 1.4826 * median(s.residuals));
+		limit = keep_sd * std::max(noise, 1 + floor_share[pass] * step);
+		end = c.p[PLACE] + more + blurs * c.p[BLUR];
+		n = by_means(s, place, end, limit, bins, &found.kept);
+		c.level = level_from(c);
+		if (n < 8 || !fit(bins, n, noise, c, &variance))
+			return false;
+	}
+
+	drawn line(c, place);
+	size_t used = 0;
+	for (size_t k = 0; k < s.samples.size(); k++) {
+		const sample &p = s.samples[k];
+
+		if (s.sorted[k] > limit || p.u > end)
+			continue;
+		double r = p.value - line(p.u);
+		square += r * r;
+		used++;
+	}
+	found.u = c.p[PLACE];
+	found.step = c.p[BEYOND] - c.p[INSIDE];
+	found.noise = std::sqrt(square / std::max<size_t>(used, 6));
+	/* What is not noise, as texture, or a curve of another form, does not average out. */
+	double excess = 0, near = 0, weight = 0, white = 0;
+	for (int i = 0; i < n; i++) {
+		double r = bins[i].y - at(c, bins[i].x, nullptr);
+
+		excess += bins[i].weight * r * r;
+		if (std::fabs(bins[i].x - c.p[PLACE]) > clear_px)
+			continue;
+		near += bins[i].weight * r * r;
+		weight += bins[i].weight;
+		white += found.noise * found.noise;
+	}
+	excess = std::sqrt(excess / std::max(n - 5, 1));
+	found.sd = std::max(found.noise, excess) * std::sqrt(variance);
+	found.misfit = std::sqrt(std::max(near - white, 0.0) / std::max(weight, 1.0)) /
+		       std::max(found.step, 1.0);
+	return found.step >= least_step && std::isfinite(found.sd);
+}
+
 const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d &end,
 		      const cv::Point2d &out, double half_px, edge &found)
 {
 	static const char *const no_step = "the handle's end does not stand out";
 	double half = across * half_px;
 	double reach = std::floor(std::min(reach_px + half, widest_px));
-	double place, slope, share, variance, square = 0;
+	double place, slope, share, variance;
 	bin bins[BINS];
 	curve c;
 	int n;
@@ -505,55 +576,17 @@ const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d 
 	c.level = place + level_px;
 	if (!fit(bins, n, 4, c, &variance))
 		return no_step;
-	double limit;
-	for (int pass = 0; pass < 2; pass++) {
-		double step = std::fabs(c.p[BEYOND] - c.p[INSIDE]), noise;
-		drawn line(c, place);
+	if (!refine(s, place, window_px, 0, c, found))
+		return no_step;
+	if (found.misfit > most_misfit) {
+		/* Other things beyond, as a bright rim: look less far. */
+		edge near;
 
-		s.sorted.clear();
-		for (const sample &p : s.samples)
-			s.sorted.push_back(std::fabs(p.value - line(p.u)));
-		s.residuals = s.sorted;
-		noise = std::max(1.0, 1.4826 * median(s.residuals));
-		limit = keep_sd * std::max(noise, 1 + floor_share[pass] * step);
-		n = by_means(s, place, limit, bins, &found.kept);
-		if (n < 8 || !fit(bins, n, noise, c, &variance))
-			return no_step;
+		if (refine(s, place, near_px, near_blurs, c, near) &&
+		    near.misfit < found.misfit)
+			found = near;
 	}
 	found.kept *= share;
-
-	drawn line(c, place);
-	size_t used = 0;
-	for (size_t k = 0; k < s.samples.size(); k++) {
-		const sample &p = s.samples[k];
-
-		if (s.sorted[k] > limit)
-			continue;
-		double r = p.value - line(p.u);
-		square += r * r;
-		used++;
-	}
-	found.u = c.p[PLACE];
-	found.step = at(c, c.p[PLACE] + window_px, nullptr) - c.p[INSIDE];
-	found.noise = std::sqrt(square / std::max<size_t>(used, 6));
-	/* What is not noise, as texture, or a curve of another form, does not average out. */
-	double excess = 0, near = 0, weight = 0, white = 0;
-	for (int i = 0; i < n; i++) {
-		double r = bins[i].y - at(c, bins[i].x, nullptr);
-
-		excess += bins[i].weight * r * r;
-		if (std::fabs(bins[i].x - c.p[PLACE]) > clear_px)
-			continue;
-		near += bins[i].weight * r * r;
-		weight += bins[i].weight;
-		white += found.noise * found.noise;
-	}
-	excess = std::sqrt(excess / std::max(n - 5, 1));
-	found.sd = std::max(found.noise, excess) * std::sqrt(variance);
-	found.misfit = std::sqrt(std::max(near - white, 0.0) / std::max(weight, 1.0)) /
-		       std::max(found.step, 1.0);
-	if (!(found.step >= least_step) || !std::isfinite(found.sd))
-		return no_step;
 	return nullptr;
 }
 
