@@ -472,7 +472,7 @@ static int by_means(edge_search &s, double place, double end, double limit, bin 
 /* Where the level beyond begins to wander, past the blur. */
 static double level_from(const curve &c)
 {
-	return c.p[PLACE] + std::max(level_px, 0.5 + 1.5 * c.p[BLUR]);
+	return c.p[PLACE] + std::max(level_px, 1.25 * c.p[BLUR]);
 }
 
 /*

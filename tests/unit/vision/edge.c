@@ -13,7 +13,7 @@
  *   sd = noise / step · sqrt(2 · 2 s sqrt(pi) / w)
  *
  * for both ends. For 8 levels of noise, w = 54, s = 2 and a step of 97 it is 0.042 px; with
- * blur and levels unknown 0.050 px; with liver that has a texture of 12 levels 0.078 px.
+ * blur and levels unknown 0.050 px; with liver that has a texture of 12 levels 0.082 px.
  * So the 0.05 px of issue 7 cannot be had there by anyone, nor in YUYV at 8 levels (step
  * 36: 0.081 px, 0.098 with texture); in grey at 4 levels it just cannot (0.051 px).
  */
@@ -235,7 +235,7 @@ static void the_edge_is_as_good_as_can_be(void **state)
 	pooled = sqrt(pooled);
 	print_message("all: %.2f times the bound\n", pooled);
 	/* 1.1: what the rms of 240 may be by chance; below the bound only by chance */
-	assert_true(pooled < 1.25 * 1.1 && pooled > 1 / 1.15);
+	assert_true(pooled < 1.15 * 1.1 && pooled > 1 / 1.15);
 }
 
 int main(void)

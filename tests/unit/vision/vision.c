@@ -78,12 +78,9 @@ struct condition {
 };
 
 /*
- * Cramer and Rao's bound for a step of height A with a blur of s, noise n in each pixel and
- * w columns is n/A sqrt(2 s sqrt(pi) / w) for one end, and there are two. In colour A is 97
- * levels: 0.030 px at n = 8, s = 1 and w = 54 (80 % of the width); 0.042 px at s = 2, and
- * more as levels and blur are not known either. In grey A is 41, in YUYV 36: there 8 levels
- * of noise are 0.07 px for anyone. What cannot be 0.05 px is allowed twice the bound.
- * The liver's texture adds 0.03 px, see "sharp".
+ * What edge.c has as Cramer and Rao's bound is above the 0.05 px of issue 7 for 8 levels of
+ * noise with a blur of 2 px (0.082 px), in grey at 4 levels (0.051) and in YUYV at 8 (0.098):
+ * there 1.15 times the bound is allowed.
  */
 #define GREY INCISE_PIXELS_GREY
 #define YUYV INCISE_PIXELS_YUYV
@@ -116,7 +113,7 @@ static const struct condition conditions[] = {
 	{"grey, noise 4",
 	 {.texture = 12, .noise = 4, .blur_px = 1, .pixels = GREY},
 	 0,
-	 0.07,
+	 0.06,
 	 0},
 	{"yuyv, noise 2",
 	 {.texture = 12, .noise = 2, .blur_px = 1, .pixels = YUYV},
@@ -131,7 +128,7 @@ static const struct condition conditions[] = {
 	{"yuyv, noise 8",
 	 {.texture = 12, .noise = 8, .blur_px = 1, .pixels = YUYV},
 	 0,
-	 0.15,
+	 0.115,
 	 0},
 };
 
