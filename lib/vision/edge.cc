@@ -20,7 +20,14 @@
 namespace vision
 {
 
-enum { STRIPS = 16, FEWEST_STRIPS = 6, PASSES = 15, BINS = 96, FEWEST = 60 };
+enum {
+	STRIPS = 16,
+	FEWEST_STRIPS = 6,
+	PASSES = 15,
+	REFINEMENTS = 3,
+	BINS = 96,
+	FEWEST = 60
+};
 
 static constexpr double reach_px = 14;	/* beyond which nothing is looked at, at least */
 static constexpr double widest_px = 48; /* beyond which nothing is, at most */
@@ -37,8 +44,9 @@ static constexpr double most_misfit = 0.04;
 static constexpr double near_px = 1.5, near_blurs = 2;
 static constexpr double across =
 	0.8; /* of the width is looked at: the sides are blurred */
-static constexpr double steepest = 1.5; /* slant of the edge */
-static constexpr double least_step = 8; /* levels */
+static constexpr double steepest = 1.5;	 /* slant of the edge */
+static constexpr double most_more = 0.1; /* slant that the strips may have missed */
+static constexpr double least_step = 8;	 /* levels */
 static constexpr double keep_sd = 3.5;
 static constexpr double floor_share[2] = {0.04, 0.02}; /* of the step, is no outlier */
 
@@ -69,7 +77,15 @@ static double at(const curve &c, double x, unknowns *d)
 {
 	double s = c.p[BLUR], a = (x + 0.5 - c.p[PLACE]) / s,
 	       b = (x - 0.5 - c.p[PLACE]) / s;
-	double ca = cumulated(a), cb = cumulated(b), na = normal(a), nb = normal(b);
+	double ca = b >= 5, cb = ca, na = 0, nb = 0;
+
+	/* Most of it is far from the edge. */
+	if (a > -5 && b < 5) {
+		ca = cumulated(a);
+		cb = cumulated(b);
+		na = normal(a);
+		nb = normal(b);
+	}
 	double part = s * (a * ca + na - b * cb - nb); /* of the step, in 0 … 1 */
 	double far = (x - c.level) / rise_px, beyond = c.p[BEYOND];
 
@@ -476,6 +492,35 @@ static double level_from(const curve &c)
 }
 
 /*
+ * The slant once more, now from all pixels that are near the curve: by least squares of
+ * what it leaves, with the place. A reflection over a corner had a part in the line.
+ */
+static void straighten(edge_search &s, const drawn &line, double limit)
+{
+	double dd = 0, dv = 0, vv = 0, rd = 0, rv = 0;
+
+	for (size_t k = 0; k < s.samples.size(); k++) {
+		const sample &p = s.samples[k];
+		double d = 2 * (line(p.u + 0.25) - line(p.u - 0.25));
+		double r = p.value - line(p.u);
+
+		if (s.sorted[k] > limit)
+			continue;
+		dd += d * d;
+		dv += d * d * p.v;
+		vv += d * d * p.v * p.v;
+		rd += r * d;
+		rv += r * d * p.v;
+	}
+	double by = dd * vv - dv * dv;
+	double more = by > 1e-6 * dd * vv ? (dd * rv - dv * rd) / by : 0;
+	/* u + more v is where the curve has it */
+	more = std::min(std::max(more, -most_more), most_more);
+	for (sample &p : s.samples)
+		p.u += (float)(more * p.v);
+}
+
+/*
  * From a curve that is nearly right: throw out what is off it, fit means, and once more.
  * What is beyond counts as far as @blurs blurs and @more pixels.
  */
@@ -486,7 +531,7 @@ static bool refine(edge_search &s, double place, double more, double blurs, curv
 	bin bins[BINS];
 	int n;
 
-	for (int pass = 0; pass < 2; pass++) {
+	for (int pass = 0; pass < REFINEMENTS; pass++) {
 		double step = std::fabs(c.p[BEYOND] - c.p[INSIDE]), noise;
 		drawn line(c, place);
 
@@ -495,12 +540,14 @@ static bool refine(edge_search &s, double place, double more, double blurs, curv
 			s.sorted.push_back(std::fabs(p.value - line(p.u)));
 		s.residuals = s.sorted;
 		noise = std::max(1.0, 1.4826 * median(s.residuals));
-		limit = keep_sd * std::max(noise, 1 + floor_share[pass] * step);
+		limit = keep_sd * std::max(noise, 1 + floor_share[pass > 0] * step);
 		end = c.p[PLACE] + more + blurs * c.p[BLUR];
 		n = by_means(s, place, end, limit, bins, &found.kept);
 		c.level = level_from(c);
 		if (n < 8 || !fit(bins, n, noise, c, &variance))
 			return false;
+		if (pass + 1 < REFINEMENTS)
+			straighten(s, drawn(c, place), limit);
 	}
 
 	drawn line(c, place);
