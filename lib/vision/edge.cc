@@ -10,35 +10,23 @@
  *
  * The curve is a step, blurred by a Gaussian and by the pixel's own width, from a level to
  * one that may wander farther out. It is at half of its height at u whatever the blur.
- * tests/unit/vision/edge.c holds it against the bound of what is possible. Of colours the sum that
- * differs most between handle and beyond is taken: for liver mostly red.
+ * Of colours the sum that differs most between handle and beyond is taken: for liver mostly
+ * red. tests/unit/vision/edge.c holds it against the bound of what is possible.
  */
 #include <algorithm>
 #include <cmath>
 #include "edge.h"
+#include "step.h"
 
 namespace vision
 {
 
-enum {
-	STRIPS = 16,
-	FEWEST_STRIPS = 6,
-	PASSES = 15,
-	REFINEMENTS = 3,
-	BINS = 96,
-	FEWEST = 60
-};
+enum { STRIPS = 16, FEWEST_STRIPS = 6, REFINEMENTS = 3, BINS = 96, FEWEST = 60 };
 
 static constexpr double reach_px = 14;	/* beyond which nothing is looked at, at least */
 static constexpr double widest_px = 48; /* beyond which nothing is, at most */
 static constexpr double clear_px = 8; /* from the end: one colour or the other, mostly */
 static constexpr double window_px = 12; /* of the curve, to both sides */
-/*
- * What is beyond has a texture: its level is a random walk of some steps. At the edge it is
- * one level: what rises there is the edge.
- */
-static constexpr double level_px = 2, rise_px = 2;
-static constexpr double rise_sd = 1; /* levels, of a step */
 /* What a fit may leave, over the step; where it leaves more, how far out it then looks. */
 static constexpr double most_misfit = 0.04;
 static constexpr double near_px = 1.5, near_blurs = 2;
@@ -49,61 +37,6 @@ static constexpr double most_more = 0.1; /* slant that the strips may have misse
 static constexpr double least_step = 8;	 /* levels */
 static constexpr double keep_sd = 3.5;
 static constexpr double floor_share[2] = {0.04, 0.02}; /* of the step, is no outlier */
-
-enum { PLACE, BLUR, INSIDE, BEYOND, RISE, RISES = 5, UNKNOWNS = RISE + RISES };
-
-typedef cv::Vec<double, UNKNOWNS> unknowns;
-typedef cv::Matx<double, UNKNOWNS, UNKNOWNS> equations;
-
-/* Where the step is, sd of the blur, level of the handle, level beyond at the edge; what this
- * rises by farther out, over each rise_px. */
-struct curve {
-	unknowns p;
-	double level; /* from here on it may rise */
-};
-
-static double normal(double x)
-{
-	return std::exp(-0.5 * x * x) * 0.3989422804014327;
-}
-
-static double cumulated(double x)
-{
-	return 0.5 * std::erfc(-x * 0.7071067811865475);
-}
-
-/* The curve at @x, and by @d its derivatives. */
-static double at(const curve &c, double x, unknowns *d)
-{
-	double s = c.p[BLUR], a = (x + 0.5 - c.p[PLACE]) / s,
-	       b = (x - 0.5 - c.p[PLACE]) / s;
-	double ca = b >= 5, cb = ca, na = 0, nb = 0;
-
-	/* Most of it is far from the edge. */
-	if (a > -5 && b < 5) {
-		ca = cumulated(a);
-		cb = cumulated(b);
-		na = normal(a);
-		nb = normal(b);
-	}
-	double part = s * (a * ca + na - b * cb - nb); /* of the step, in 0 … 1 */
-	double far = (x - c.level) / rise_px, beyond = c.p[BEYOND];
-
-	for (int k = 0; k < RISES; k++)
-		beyond += c.p[RISE + k] * std::min(std::max(far - k, 0.0), 1.0);
-	double step = beyond - c.p[INSIDE];
-
-	if (d) {
-		*d = unknowns();
-		(*d)[PLACE] = -step * (ca - cb);
-		(*d)[BLUR] = step * (na - nb);
-		(*d)[INSIDE] = 1 - part;
-		(*d)[BEYOND] = part;
-		for (int k = 0; k < RISES; k++)
-			(*d)[RISE + k] = part * std::min(std::max(far - k, 0.0), 1.0);
-	}
-	return c.p[INSIDE] + step * part;
-}
 
 /* The curve over the window, for many pixels: between 16 values per pixel by a line. */
 struct drawn {
@@ -126,81 +59,6 @@ struct drawn {
 		return value[i] + (float)(x - i) * (value[i + 1] - value[i]);
 	}
 };
-
-struct bin {
-	double x, y, weight;
-};
-
-/* Least squares, Levenberg-Marquardt. @variance: of PLACE, over that of a sample of weight 1. */
-static bool fit(const bin *bins, int n, double noise, curve &c, double *variance)
-{
-	double damping = 1e-3, best = HUGE_VAL,
-	       flat = noise * noise / (rise_sd * rise_sd);
-	unknowns start = c.p, gradient;
-	equations normal_matrix;
-	curve trial = c;
-
-	for (int pass = 0; pass < PASSES; pass++) {
-		equations m = equations::zeros();
-		unknowns g;
-		double sum = 0;
-
-		for (int i = 0; i < n; i++) {
-			unknowns d;
-			double r = bins[i].y - at(trial, bins[i].x, &d);
-
-			sum += bins[i].weight * r * r;
-			for (int k = 0; k < UNKNOWNS; k++) {
-				double w = bins[i].weight * d[k];
-
-				g[k] += w * r;
-				for (int l = 0; l <= k; l++)
-					m(k, l) += w * d[l];
-			}
-		}
-		for (int k = RISE; k < UNKNOWNS; k++) {
-			m(k, k) += flat;
-			g[k] -= flat * trial.p[k];
-			sum += flat * trial.p[k] * trial.p[k];
-		}
-		for (int k = 0; k < UNKNOWNS; k++)
-			for (int l = 0; l < k; l++)
-				m(l, k) = m(k, l);
-		if (!std::isfinite(sum))
-			return false;
-		if (sum <= best) {
-			/* a hundredth of the sd, for a hundred bins */
-			bool settled = best - sum <= 1e-6 * sum;
-
-			best = sum;
-			c = trial;
-			normal_matrix = m;
-			gradient = g;
-			damping *= 0.2;
-			if (settled)
-				break;
-		} else {
-			damping *= 8;
-		}
-		/* From the best so far; after a bad step by its old equations. */
-		equations damped = normal_matrix;
-		for (int k = 0; k < UNKNOWNS; k++)
-			damped(k, k) += damping * normal_matrix(k, k) + 1e-9;
-		bool ok;
-		unknowns by = damped.inv(cv::DECOMP_CHOLESKY, &ok) * gradient;
-		if (!ok)
-			return false;
-		trial.p = c.p + by;
-		trial.p[BLUR] = std::min(std::max(trial.p[BLUR], 0.05), 8.0);
-		trial.p[PLACE] = std::min(std::max(trial.p[PLACE], start[PLACE] - 8),
-					  start[PLACE] + 8);
-	}
-	bool ok;
-	for (int k = 0; k < UNKNOWNS; k++)
-		normal_matrix(k, k) += 1e-9;
-	*variance = normal_matrix.inv(cv::DECOMP_CHOLESKY, &ok)(PLACE, PLACE);
-	return ok && std::fabs(c.p[PLACE] - start[PLACE]) < 7.9;
-}
 
 static float median(std::vector<float> &values)
 {
@@ -485,12 +343,6 @@ static int by_means(edge_search &s, double place, double end, double limit, bin 
 	return n;
 }
 
-/* Where the level beyond begins to wander, past the blur. */
-static double level_from(const curve &c)
-{
-	return c.p[PLACE] + std::max(level_px, 1.25 * c.p[BLUR]);
-}
-
 /*
  * The slant once more, now from all pixels that are near the curve: by least squares of
  * what it leaves, with the place. A reflection over a corner had a part in the line.
@@ -620,7 +472,7 @@ const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d 
 	c.p[BLUR] = 1;
 	c.p[INSIDE] = bins[0].y;
 	c.p[BEYOND] = bins[n - 1].y;
-	c.level = place + level_px;
+	c.level = level_from(c);
 	if (!fit(bins, n, 4, c, &variance))
 		return no_step;
 	if (!refine(s, place, window_px, 0, c, found))
