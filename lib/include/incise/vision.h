@@ -20,10 +20,10 @@
  * What no picture tells: a hand or glove over the upper end is taken for that end; tissue,
  * blood or a shadow of the very colour of the handle, in grey of its very brightness, that
  * goes on with it is taken for more of it; so are less than about 10 pixels of any colour
- * that is within the thresholds, next to the tissue. A depth that leaps from picture to picture is
- * worth no trust whatever its quality. Light that leaves the tissue within the handle's
- * thresholds, a dark glove at the handle, and anything that cuts the handle in two give
- * "not found".
+ * that is within the thresholds, next to the tissue. A depth that leaps from picture to
+ * picture is worth no trust whatever its quality. Light that leaves the tissue within the
+ * handle's thresholds, a dark glove at the handle, and anything that cuts the handle in two
+ * give "not found".
  *
  * Not real-time safe. One thread at a time per object. No exception of C++ comes out.
  * OpenCV is told to use no threads of its own, in the whole process.
