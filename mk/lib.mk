@@ -67,7 +67,7 @@ pc_stepper_can := libmnl
 objects_stepper_can := $(can_core) \
 	$(patsubst %,$(O)/obj/lib/device/can/%.o,$(can_socketcan) stepper_can)
 pc_stepper_slcan :=
-objects_stepper_slcan := $(can_core) \
+objects_stepper_slcan := $(can_core) $(O)/obj/lib/device/tty.o \
 	$(patsubst %,$(O)/obj/lib/device/can/%.o,$(can_slcan) stepper_slcan)
 
 # Needs nothing but the kernel's headers.
@@ -97,7 +97,7 @@ objects_tracker_usb := $(polhemus_core) \
 $(filter %/polhemus_usb.o %/polhemus_usb_find.o %/tracker_usb.o,$(objects_tracker_usb)): \
 	pc_cflags = $(shell $(PKG_CONFIG) --cflags libusb-1.0)
 pc_tracker_tty :=
-objects_tracker_tty := $(polhemus_core) \
+objects_tracker_tty := $(polhemus_core) $(O)/obj/lib/device/tty.o \
 	$(patsubst %,$(O)/obj/lib/device/polhemus/%.o,polhemus_tty tracker_tty)
 
 # What looks at pictures, in C++.

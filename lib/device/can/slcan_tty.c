@@ -3,15 +3,13 @@
  * The serial line to an adapter that speaks slcan; see slcan_tty.h.
  */
 #include <errno.h>
-#include <fcntl.h>
 #include <stdbool.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/ioctl.h>
-#include <sys/stat.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
+#include "../tty.h"
 #include "slcan_tty.h"
 
 #define DRAIN_POLLS 20 /* of 5 ms, until the last bytes have gone */
@@ -112,62 +110,10 @@ static int refuse(const char *path, int code, const char *where, struct incise_e
 	}
 }
 
-/*
- * Bytes as they are, 8N1, no flow control. The speed is left as stty set it: over USB it
- * mostly means nothing, and where it does only the user knows. But 9600, which a port has
- * when nobody set it, carries no cycle, and 115200 is what such adapters have.
- */
-static int set_raw(int fd)
-{
-	struct termios t;
-
-	if (tcgetattr(fd, &t) < 0)
-		return -ENOTTY;
-	cfmakeraw(&t);
-	t.c_cflag |= CLOCAL | CREAD;
-	t.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS);
-	t.c_iflag &= ~(tcflag_t)(IXOFF | IXANY | INPCK);
-	t.c_cc[VMIN] = 1;
-	t.c_cc[VTIME] = 0;
-	if (cfgetospeed(&t) == B9600)
-		cfsetspeed(&t, B115200);
-	return tcsetattr(fd, TCSANOW, &t) < 0 ? -errno : 0;
-}
-
-/* A descriptor that is ours alone, or -errno. */
-static int open_line(const char *path)
-{
-	struct stat is;
-	int fd, rc;
-
-	/* To open what is no line may wait, or do what nobody asked for. */
-	if (stat(path, &is) < 0)
-		return -errno;
-	if (!S_ISCHR(is.st_mode))
-		return -ENOTTY;
-	fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-	if (fd < 0)
-		return -errno;
-	/* TIOCEXCL does not keep root out; the lock does, of those that ask for it. */
-	if (!isatty(fd))
-		rc = -ENOTTY;
-	else if (flock(fd, LOCK_EX | LOCK_NB) < 0 || ioctl(fd, TIOCEXCL) < 0)
-		rc = -errno;
-	else
-		rc = set_raw(fd);
-	if (rc) {
-		close(fd);
-		return rc;
-	}
-	/* What lies there is of another time. */
-	tcflush(fd, TCIOFLUSH);
-	return fd;
-}
-
 int slcan_tty_open(struct slcan_tty *tty, const char *path, const char *where,
 		   struct incise_error *err)
 {
-	*tty = (struct slcan_tty){.fd = open_line(path)};
+	*tty = (struct slcan_tty){.fd = incise_tty_open(path, B0)};
 	return tty->fd < 0 ? refuse(path, -tty->fd, where, err) : 0;
 }
 

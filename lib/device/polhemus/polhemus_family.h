@@ -22,6 +22,14 @@ int polhemus_liberty_setup(struct polhemus_dialogue *d,
 			   const struct incise_tracker_setup *setup,
 			   struct polhemus_identity *identity);
 
+/*
+ * Ask for one record of each station with P, which tells that they are as was set. A FASTRAK's
+ * layout->switch_bytes is found by it.
+ */
+int polhemus_measure(struct polhemus_dialogue *d,
+		     const struct incise_tracker_setup *setup,
+		     struct polhemus_layout *layout);
+
 /* Bit 0 is station 1. */
 static inline uint8_t polhemus_mask(const struct incise_tracker_setup *setup)
 {

@@ -118,42 +118,6 @@ static int set_station(struct polhemus_dialogue *d, int station,
 	return put(d, command, question, 0, hemisphere, 3, "its hemisphere");
 }
 
-/* How long the switch is the manual does not say: one record of each station tells. */
-static int measure(struct polhemus_dialogue *d, const struct incise_tracker_setup *setup,
-		   struct polhemus_layout *layout)
-{
-	static const uint8_t lengths[] = {1, 2, 4};
-	int rc = polhemus_say(d, "P"), total;
-
-	if (rc)
-		return rc;
-	total = polhemus_collect(d);
-	if (total < 0)
-		return total;
-	for (size_t i = 0; i < sizeof(lengths); i++) {
-		struct polhemus_record record;
-		size_t length;
-		int good = 0;
-
-		layout->switch_bytes = lengths[i];
-		length = polhemus_layout_length(layout);
-		if (total != (int)length * setup->n_stations)
-			continue;
-		while (good < setup->n_stations &&
-		       polhemus_record_read(layout, d->bytes + (size_t)good * length,
-					    &record) &&
-		       record.station == setup->stations[good])
-			good++;
-		if (good == setup->n_stations)
-			return 0;
-	}
-	return incise_error_set(
-		d->err, EIO,
-		"%s: the tracker at %s answers P with %d bytes that are not "
-		"a record of each of its %d stations: check its sensors",
-		d->where, d->line->name, total, setup->n_stations);
-}
-
 static int set_sync(struct polhemus_dialogue *d, enum incise_tracker_sync sync)
 {
 	const double is[] = {(double)sync};
@@ -199,7 +163,7 @@ int polhemus_fastrak_setup(struct polhemus_dialogue *d,
 					  "the status S");
 	identity->layout = (struct polhemus_layout){.family = POLHEMUS_FASTRAK,
 						    .stations = polhemus_mask(setup)};
-	rc = measure(d, setup, &identity->layout);
+	rc = polhemus_measure(d, setup, &identity->layout);
 	if (!rc && setup->sync != INCISE_TRACKER_INTERNAL)
 		rc = set_sync(d, setup->sync);
 	return rc ? rc : polhemus_say(d, "C");

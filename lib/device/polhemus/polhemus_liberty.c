@@ -14,20 +14,6 @@
 
 enum { CONTROL_U = 'U' & 31, CONTROL_V = 'V' & 31 };
 
-static uint32_t word(const unsigned char *b)
-{
-	return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
-}
-
-static double real(const unsigned char *b)
-{
-	uint32_t bits = word(b);
-	float value;
-
-	memcpy(&value, &bits, sizeof(value));
-	return (double)value;
-}
-
 int polhemus_liberty_identify(struct polhemus_dialogue *d,
 			      struct polhemus_identity *identity)
 {
@@ -73,7 +59,7 @@ static int put(struct polhemus_dialogue *d, const char *command, const char *que
 
 		if (frame.n < (size_t)(i + 1) * 4)
 			return polhemus_not_taken(d, what, "a short answer");
-		got = reals ? real(at) : (double)word(at);
+		got = reals ? polhemus_real(at) : (double)polhemus_word(at);
 		if (!(fabs(got - values[i]) <= NEAR))
 			return polhemus_not_taken(d, what, "something else");
 	}
@@ -107,7 +93,8 @@ static int switch_stations(struct polhemus_dialogue *d, uint8_t mask)
 		return rc == -ETIMEDOUT ? polhemus_not_taken(d, "its stations", "") : rc;
 	if (frame.n < 4)
 		return polhemus_not_taken(d, "its stations", "a short answer");
-	active = frame.n >= 8 ? word(frame.payload + 4) : word(frame.payload) >> 16;
+	active = frame.n >= 8 ? polhemus_word(frame.payload + 4)
+			      : polhemus_word(frame.payload) >> 16;
 	if ((active & 0xf) == mask)
 		return 0;
 	return incise_error_set(
@@ -115,33 +102,6 @@ static int switch_stations(struct polhemus_dialogue *d, uint8_t mask)
 		"%s: the tracker at %s has stations %#x active, not %#x: plug "
 		"its sensors in, or change tracker_setup",
 		d->where, d->line->name, (unsigned int)active, mask);
-}
-
-static int measure(struct polhemus_dialogue *d, const struct incise_tracker_setup *setup,
-		   const struct polhemus_layout *layout)
-{
-	size_t length = polhemus_layout_length(layout);
-	struct polhemus_record record;
-	int rc = polhemus_say(d, "P"), total, good = 0;
-
-	if (rc)
-		return rc;
-	total = polhemus_collect(d);
-	if (total < 0)
-		return total;
-	if (total == (int)length * setup->n_stations)
-		while (good < setup->n_stations &&
-		       polhemus_record_read(layout, d->bytes + (size_t)good * length,
-					    &record) &&
-		       record.station == setup->stations[good])
-			good++;
-	if (good == setup->n_stations)
-		return 0;
-	return incise_error_set(
-		d->err, EIO,
-		"%s: the tracker at %s answers P with %d bytes that are not "
-		"a record of each of its %d stations: check its sensors",
-		d->where, d->line->name, total, setup->n_stations);
 }
 
 int polhemus_liberty_setup(struct polhemus_dialogue *d,
@@ -190,6 +150,6 @@ int polhemus_liberty_setup(struct polhemus_dialogue *d,
 	if (rc)
 		return rc;
 	identity->layout.stations = polhemus_mask(setup);
-	rc = measure(d, setup, &identity->layout);
+	rc = polhemus_measure(d, setup, &identity->layout);
 	return rc ? rc : polhemus_say(d, "C\r");
 }

@@ -44,14 +44,14 @@ static bool begins(const struct polhemus_layout *layout, const unsigned char *b,
 	       (n < 8 || (b[6] == FRAME_PAYLOAD && !b[7]));
 }
 
-static uint32_t word(const unsigned char *b)
+uint32_t polhemus_word(const unsigned char *b)
 {
 	return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
 }
 
-static double real(const unsigned char *b)
+double polhemus_real(const unsigned char *b)
 {
-	uint32_t bits = word(b);
+	uint32_t bits = polhemus_word(b);
 	float value;
 
 	memcpy(&value, &bits, sizeof(value));
@@ -84,7 +84,7 @@ static bool number(const unsigned char *b, double *value)
 /* A switch is 0 or 1, as a character or as a number. */
 static bool read_switch(const unsigned char *b, size_t n, bool *pressed)
 {
-	uint32_t value = n == 4 ? word(b) : b[n - 1];
+	uint32_t value = n == 4 ? polhemus_word(b) : b[n - 1];
 
 	if (n == 2 && b[0] != ' ' && b[0] != '0' && b[0])
 		return false;
@@ -120,7 +120,7 @@ static bool read_fastrak(const struct polhemus_layout *layout, const unsigned ch
 	record->status = (char)b[2];
 	for (int i = 0; i < 7; i++) {
 		if (!layout->ascii)
-			values[i] = real(at);
+			values[i] = polhemus_real(at);
 		else if (!number(at, &values[i]))
 			return false;
 		at += layout->ascii ? ASCII_WIDTH : 4;
@@ -137,8 +137,8 @@ static bool read_frame(const unsigned char *b, double values[7],
 	record->station = b[2];
 	record->status = b[4] ? (char)(is_printable(b[4]) ? b[4] : '?') : ' ';
 	for (int i = 0; i < 7; i++)
-		values[i] = real(at + (size_t)i * 4);
-	record->frame = word(at + (size_t)7 * 4);
+		values[i] = polhemus_real(at + (size_t)i * 4);
+	record->frame = polhemus_word(at + (size_t)7 * 4);
 	return read_switch(at + (size_t)8 * 4, 4, &record->button);
 }
 

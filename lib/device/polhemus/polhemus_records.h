@@ -62,6 +62,10 @@ struct polhemus_records {
 	int64_t t_ns[4 * POLHEMUS_RECORD_MAX]; /* of each byte */
 };
 
+/* Numbers as all of them send it: low byte first, reals as IEEE singles. */
+uint32_t polhemus_word(const unsigned char *bytes);
+double polhemus_real(const unsigned char *bytes);
+
 /* Bytes of a record; 0: there is no such layout. */
 size_t polhemus_layout_length(const struct polhemus_layout *layout);
 

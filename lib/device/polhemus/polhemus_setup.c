@@ -59,6 +59,49 @@ static int find_family(struct polhemus_dialogue *d, struct polhemus_identity *id
 	return polhemus_liberty_identify(d, identity);
 }
 
+/* The bytes @d has are one record of each station, in their order. */
+static bool fits(const struct polhemus_dialogue *d,
+		 const struct incise_tracker_setup *setup,
+		 const struct polhemus_layout *layout, int total)
+{
+	size_t length = polhemus_layout_length(layout);
+	struct polhemus_record record;
+
+	if (total != (int)length * setup->n_stations)
+		return false;
+	for (int i = 0; i < setup->n_stations; i++)
+		if (!polhemus_record_read(layout, d->bytes + (size_t)i * length,
+					  &record) ||
+		    record.station != setup->stations[i])
+			return false;
+	return true;
+}
+
+/* How long a FASTRAK's switch is the manual does not say. */
+int polhemus_measure(struct polhemus_dialogue *d,
+		     const struct incise_tracker_setup *setup,
+		     struct polhemus_layout *layout)
+{
+	static const uint8_t lengths[] = {1, 2, 4};
+	int rc = polhemus_say(d, "P"), total;
+
+	if (rc)
+		return rc;
+	total = polhemus_collect(d);
+	if (total < 0)
+		return total;
+	for (size_t i = 0; i < sizeof(lengths); i++) {
+		layout->switch_bytes = lengths[i];
+		if (fits(d, setup, layout, total))
+			return 0;
+	}
+	return incise_error_set(
+		d->err, EIO,
+		"%s: the tracker at %s answers P with %d bytes that are not "
+		"a record of each of its %d stations: check its sensors",
+		d->where, d->line->name, total, setup->n_stations);
+}
+
 int polhemus_setup(struct polhemus_line *line, const struct incise_tracker_setup *setup,
 		   struct polhemus_identity *identity, const char *where,
 		   struct incise_error *err)

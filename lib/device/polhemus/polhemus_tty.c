@@ -3,19 +3,16 @@
  * The serial line to a tracker; see polhemus_tty.h.
  */
 #include <errno.h>
-#include <fcntl.h>
 #include <limits.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/ioctl.h>
-#include <sys/stat.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
-#include <linux/serial.h>
+#include "../tty.h"
 #include "polhemus_tty.h"
 
 #define WRITE_MS 1000
@@ -40,62 +37,6 @@ static const struct {
 static struct polhemus_tty *of_line(struct polhemus_line *line)
 {
 	return (struct polhemus_tty *)line;
-}
-
-static int set_raw(int fd, speed_t speed)
-{
-	struct serial_struct serial;
-	struct termios t, is;
-
-	if (tcgetattr(fd, &t) < 0)
-		return -ENOTTY;
-	cfmakeraw(&t);
-	t.c_cflag |= CLOCAL | CREAD;
-	t.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS | PARENB);
-	t.c_iflag &= ~(tcflag_t)(IXOFF | IXANY | INPCK);
-	t.c_cc[VMIN] = 1;
-	t.c_cc[VTIME] = 0;
-	cfsetspeed(&t, speed);
-	if (tcsetattr(fd, TCSANOW, &t) < 0)
-		return -errno;
-	/* It also succeeds when only a part of it was done. */
-	if (tcgetattr(fd, &is) < 0 || cfgetospeed(&is) != speed)
-		return -EINVAL;
-	/* Else an FTDI adapter holds bytes back for 16 ms. Not every line knows of it. */
-	if (!ioctl(fd, TIOCGSERIAL, &serial)) {
-		serial.flags |= ASYNC_LOW_LATENCY;
-		ioctl(fd, TIOCSSERIAL, &serial);
-	}
-	return 0;
-}
-
-/* A descriptor that is ours alone, or -errno. */
-static int open_line(const char *path, speed_t speed)
-{
-	struct stat is;
-	int fd, rc;
-
-	/* To open what is no line may wait, or do what nobody asked for. */
-	if (stat(path, &is) < 0)
-		return -errno;
-	if (!S_ISCHR(is.st_mode))
-		return -ENOTTY;
-	fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-	if (fd < 0)
-		return -errno;
-	/* TIOCEXCL does not keep root out; the lock does, of those that ask for it. */
-	if (!isatty(fd))
-		rc = -ENOTTY;
-	else if (flock(fd, LOCK_EX | LOCK_NB) < 0 || ioctl(fd, TIOCEXCL) < 0)
-		rc = -errno;
-	else
-		rc = set_raw(fd, speed);
-	if (rc) {
-		close(fd);
-		return rc;
-	}
-	tcflush(fd, TCIOFLUSH);
-	return fd;
 }
 
 static int64_t now_ns(void)
@@ -178,7 +119,7 @@ static int tty_reopen(struct polhemus_line *line)
 	int fd;
 
 	let_go(tty);
-	fd = open_line(tty->path, tty->speed);
+	fd = incise_tty_open(tty->path, tty->speed);
 	if (fd < 0)
 		return fd;
 	tty->fd = fd;
@@ -296,7 +237,7 @@ struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where
 	else
 		tail = tty->path;
 	strcpy(tty->line.name, tail);
-	tty->fd = open_line(tty->path, tty->speed);
+	tty->fd = incise_tty_open(tty->path, tty->speed);
 	if (tty->fd < 0) {
 		struct incise_error none;
 
