@@ -81,6 +81,23 @@ ask() {
 		(SELECT seq, seq - lag(seq) OVER (ORDER BY seq) AS d FROM tracker) WHERE d > 100)")" = 1 ]
 }
 
+@test "a tracker that is pulled out and does not come back: what did not come is lost" {
+	local code=0
+	plug_in
+	incise capture -o a.rec --duration 5s >out 2>err 3>&- 9>&- &
+	capture=$!
+	for _ in $(seq 100); do
+		[ "$(sqlite3 -readonly a.rec.part/recording.db \
+			'SELECT count(*) FROM tracker' 2>/dev/null)" -gt 0 ] 2>/dev/null && break
+		sleep 0.1
+	done
+	echo unplug >&9
+	wait $capture || code=$?
+	[ "$code" = 1 ]
+	grep -q "tracker records were lost" err
+	[ "$(ask a.rec "SELECT value FROM meta WHERE key='tracker_lost'")" -ge 60 ]
+}
+
 @test "records with flipped bytes: no capture is doubled, what is missing is counted" {
 	plug_in --flip 10000 # 1 % of the bytes
 	run --separate-stderr incise capture -o a.rec --duration 4s

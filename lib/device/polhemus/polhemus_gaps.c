@@ -25,6 +25,16 @@ void polhemus_gaps_broken(struct polhemus_gaps *gaps)
 	gaps->broken = gaps->begun;
 }
 
+/* Less a round: one may be on its way. */
+uint64_t polhemus_gaps_silent(const struct polhemus_gaps *gaps, int64_t t_ns)
+{
+	int64_t round_ns = gaps->n * gaps->period_ns;
+	int64_t rounds =
+		gaps->begun && round_ns ? (t_ns - gaps->last_ns) / round_ns - 1 : 0;
+
+	return rounds > 0 ? (uint64_t)(rounds * gaps->n) : 0;
+}
+
 static int place(const struct polhemus_gaps *gaps, uint8_t station)
 {
 	for (int i = 0; i < gaps->n; i++)

@@ -60,6 +60,12 @@ void polhemus_gaps_init(struct polhemus_gaps *gaps, const uint8_t *stations, int
 /* The link was gone: before the next record all that time is lost. */
 void polhemus_gaps_broken(struct polhemus_gaps *gaps);
 
+/*
+ * How many have not come for sure, when nothing did since the last record; not above what
+ * counts as lost once one comes after polhemus_gaps_broken().
+ */
+uint64_t polhemus_gaps_silent(const struct polhemus_gaps *gaps, int64_t t_ns);
+
 /* Its seq. false: it cannot be, as it came before it could; damaged, or there twice. */
 bool polhemus_gaps_take(struct polhemus_gaps *gaps, const struct polhemus_record *record,
 			uint64_t *seq);

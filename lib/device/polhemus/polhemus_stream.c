@@ -39,6 +39,14 @@ void polhemus_stream_broken(struct polhemus_stream *stream,
 	polhemus_gaps_broken(&stream->gaps);
 }
 
+void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns)
+{
+	atomic_store_explicit(&stream->lost,
+			      stream->gaps.lost + stream->no_room +
+				      polhemus_gaps_silent(&stream->gaps, t_ns),
+			      memory_order_relaxed);
+}
+
 /* to += v turned by the unit quaternion q: v + 2w(u × v) + 2u × (u × v). */
 static void add_turned(double to[3], const double q[4], const double v[3])
 {

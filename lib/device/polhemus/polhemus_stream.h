@@ -36,6 +36,9 @@ void polhemus_stream_free(struct polhemus_stream *stream);
 void polhemus_stream_broken(struct polhemus_stream *stream,
 			    const struct polhemus_layout *layout);
 
+/* Nothing has come up to @t_ns: what is missing counts as lost, until something comes. */
+void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns);
+
 /* Any number of bytes that came at @t_ns: how many records were in them. One thread. */
 int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *bytes,
 			size_t n, int64_t t_ns);

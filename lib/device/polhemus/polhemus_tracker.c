@@ -14,6 +14,7 @@
 
 /* How long close() waits for the thread; longer only while it sets the tracker up anew. */
 #define POLL_MS 50
+#define LOST_MS 500 /* of silence: what is missing counts, as of what only time tells */
 #define NOISE_MAX (2 * POLHEMUS_RECORD_MAX) /* bytes: so many have a record in them */
 
 struct polhemus_tracker {
@@ -32,12 +33,17 @@ static struct polhemus_tracker *of_tracker(const struct incise_tracker *tracker)
 	return (struct polhemus_tracker *)tracker;
 }
 
-static int64_t now_ms(void)
+static int64_t now_ns(void)
 {
 	struct timespec ts;
 
 	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INT64_C(1000) + ts.tv_nsec / 1000000;
+	return ts.tv_sec * INT64_C(1000000000) + ts.tv_nsec;
+}
+
+static int64_t now_ms(void)
+{
+	return now_ns() / 1000000;
 }
 
 /* Wait for it to come back. false: it did not, or close() does not want to wait. */
@@ -55,6 +61,8 @@ static bool recover(struct polhemus_tracker *t)
 			polhemus_stream_broken(&t->stream, &identity.layout);
 			return true;
 		}
+		/* It may never come back, or not before it is closed. */
+		polhemus_stream_silent(&t->stream, now_ns());
 		if (now_ms() - began_ms >= t->times.gone_ms)
 			return false;
 		nanosleep(&pause, NULL);
@@ -100,6 +108,9 @@ static void *run(void *argument)
 		now = now_ms();
 		silent_ms += least(now - before_ms, 2 * POLL_MS);
 		before_ms = now;
+		/* Less may be a host that is busy; pulses from outside may pause. */
+		if (n < 0 || silent_ms >= LOST_MS)
+			polhemus_stream_silent(&t->stream, now_ns());
 		if (n >= 0 && !is_dumb(t, silent_ms, noise))
 			continue;
 		if (!recover(t))

@@ -168,12 +168,38 @@ static void broken(void **state)
 	assert_int_equal(gaps.lost, 900);
 }
 
+/* What never comes again is missing as well: never more of it than counts if it does. */
+static void silent(void **state)
+{
+	for (int n = 1; n <= 4; n++)
+		for (uint64_t missing = 1; missing < 40; missing++) {
+			uint64_t seq = 0, known, next;
+
+			begin(n, false, 120);
+			assert_int_equal(polhemus_gaps_silent(&gaps, PERIOD_NS), 0);
+			take_all(0, 100);
+			next = 100 + missing;
+			assert_int_equal(polhemus_gaps_silent(&gaps, gaps.last_ns), 0);
+			known = polhemus_gaps_silent(
+				&gaps, gaps.last_ns + (int64_t)missing * gaps.period_ns);
+			assert_in_range(known + 2 * (uint64_t)n, missing,
+					missing + 2 * n);
+			polhemus_gaps_broken(&gaps);
+			assert_true(take(next, 0, 0, &seq));
+			assert_true(gaps.lost >= known);
+		}
+	begin(1, false, 0);
+	take_all(0, 10);
+	assert_int_equal(polhemus_gaps_silent(&gaps, INT64_C(1) << 50), 0);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(damage),	    cmocka_unit_test(order),
 		cmocka_unit_test(counted),	    cmocka_unit_test(doubled),
 		cmocka_unit_test(without_a_period), cmocka_unit_test(broken),
+		cmocka_unit_test(silent),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
