@@ -34,6 +34,8 @@ static ssize_t listen_at(struct polhemus_dialogue *d, int timeout_ms, int64_t *t
 {
 	ssize_t n;
 
+	if (d->line->stop && atomic_load(d->line->stop))
+		return gone(d, -ECANCELED);
 	if (d->n == sizeof(d->bytes))
 		d->n = 0;
 	n = d->line->ops->read(d->line, d->bytes + d->n, sizeof(d->bytes) - d->n, t_ns,

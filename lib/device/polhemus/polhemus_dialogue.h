@@ -21,6 +21,8 @@ struct polhemus_dialogue {
 	size_t n;
 };
 
+/* All of them: -ECANCELED once line->stop is set. */
+
 /* 0, -ENODEV, -EIO. */
 int polhemus_say(struct polhemus_dialogue *d, const char *command);
 

@@ -5,6 +5,8 @@
 #ifndef INCISE_POLHEMUS_LINE_H
 #define INCISE_POLHEMUS_LINE_H
 
+#include <stdatomic.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <sys/types.h>
@@ -32,6 +34,8 @@ struct polhemus_line {
 	int family;	     /* enum polhemus_family, or -1: to be asked */
 	int64_t ns_per_byte; /* of a serial line, else 0 */
 	char name[40];	     /* for messages: "/dev/ttyUSB0" */
+	/* A dialogue is given up once this is true; NULL: never. */
+	const _Atomic bool *stop;
 };
 
 #endif

@@ -12,7 +12,7 @@
 #include "polhemus_stream.h"
 #include "polhemus_tracker.h"
 
-/* How long close() waits for the thread; longer only while it sets the tracker up anew. */
+/* How long close() waits for the thread, about. */
 #define POLL_MS 50
 #define LOST_MS 500 /* of silence: what is missing counts, as of what only time tells */
 #define NOISE_MAX (2 * POLHEMUS_RECORD_MAX) /* bytes: so many have a record in them */
@@ -162,6 +162,7 @@ static void tracker_close(struct incise_tracker *tracker)
 
 	atomic_store(&t->stop, true);
 	pthread_join(t->thread, NULL);
+	t->line->stop = NULL;
 	polhemus_stop(t->line, t->identity.layout.family);
 	t->line->ops->close(t->line);
 	polhemus_stream_free(&t->stream);
@@ -213,6 +214,7 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 		rc = incise_error_set(err, ENOMEM,
 				      "%s: out of memory: end other programs", where);
 	if (!rc) {
+		t->line->stop = &t->stop;
 		rc = incise_thread_start(&t->thread, run, t, &real_time);
 		if (!rc)
 			return 0;
@@ -221,6 +223,7 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 			"%s: no thread to read the tracker in: end other programs, or raise the limit of threads",
 			where);
 	}
+	t->line->stop = NULL;
 	polhemus_stop(t->line, t->identity.layout.family);
 	polhemus_stream_free(&t->stream);
 	return rc;

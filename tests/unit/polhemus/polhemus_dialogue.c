@@ -174,6 +174,22 @@ static void frames(void **state)
 	assert_int_equal(polhemus_ask_frame(&dialogue, "H\r", 'H', &frame), -ETIMEDOUT);
 }
 
+/* Who closes a tracker does not wait until it has answered all, or not. */
+static void given_up(void **state)
+{
+	static const _Atomic bool stop = true;
+	char reply[POLHEMUS_REPLY_MAX];
+	struct polhemus_frame frame;
+
+	begin("x", 1, -1);
+	source.line.stop = &stop;
+	assert_int_equal(polhemus_drain(&dialogue), -ECANCELED);
+	assert_int_equal(polhemus_collect(&dialogue), -ECANCELED);
+	assert_int_equal(polhemus_ask(&dialogue, "S", 'S', reply), -ECANCELED);
+	assert_int_equal(polhemus_ask_frame(&dialogue, "H\r", 'H', &frame), -ECANCELED);
+	assert_int_equal(source.now_ns, 1000 * MS);
+}
+
 static void printed(void **state)
 {
 	static const struct {
@@ -199,7 +215,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(draining_ends), cmocka_unit_test(answers),
 		cmocka_unit_test(long_lines),	 cmocka_unit_test(frames),
-		cmocka_unit_test(printed),
+		cmocka_unit_test(given_up),	 cmocka_unit_test(printed),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
