@@ -144,6 +144,8 @@ static void refuse(const char *path, int code, const char *where,
 {
 	switch (code) {
 	case ENOENT:
+	case ENOTDIR:
+	case ELOOP:
 	case ENXIO:
 	case ENODEV:
 		incise_error_set(err, ENODEV,

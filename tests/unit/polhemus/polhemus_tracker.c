@@ -266,6 +266,7 @@ static void refuses(void **state)
 		{"/tmp", EINVAL},
 		{"/dev/not-there", ENODEV},
 		{"/dev/not:there:9600", ENODEV},
+		{"/dev/null/x", ENODEV},
 	};
 	static const struct incise_tracker_setup bad[] = {
 		{.n_stations = 0, .hemisphere = {1, 0, 0}},
