@@ -57,8 +57,10 @@ static int read_stations(struct incise_tracker_setup *setup,
 			 struct incise_error *err)
 {
 	const config_setting_t *list = config_setting_get_member(group, "stations");
-	int n = list && config_setting_is_aggregate(list) ? config_setting_length(list)
-							  : 0;
+	int n = list && config_setting_is_aggregate(list) &&
+				!config_setting_is_group(list)
+			? config_setting_length(list)
+			: 0;
 	bool good = n >= 1 && n <= 4;
 
 	if (!list)

@@ -119,6 +119,7 @@ static void what_is_wrong_is_said(void **state)
 		{"tracker_setup = { station = [1]; };", "station"},
 		{"tracker_setup = { stations = []; };", "numbers of 1 to 4"},
 		{"tracker_setup = { stations = [0]; };", "numbers of 1 to 4"},
+		{"tracker_setup = { stations = { a = 1; }; };", "numbers of 1 to 4"},
 		{"tracker_setup = { stations = [2, 1]; };", "ascending"},
 		{"tracker_setup = { stations = [1, 1]; };", "ascending"},
 		{"tracker_setup = { stations = [1, 2, 3, 4, 4]; };", "numbers of 1 to 4"},
