@@ -3,6 +3,7 @@
  * One analog input of a DAQ card under comedi; see comedi_card.h.
  */
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -88,10 +89,11 @@ static int parse(struct comedi_card *card, const char *arguments, int *subdevice
 	const char *colon = strrchr(arguments, ':');
 	size_t length = colon ? (size_t)(colon - arguments) : strlen(arguments);
 	char *end = NULL;
+	long number = -1;
 
-	*subdevice = -1;
 	if (colon)
-		*subdevice = (int)strtol(colon + 1, &end, 10);
+		number = strtol(colon + 1, &end, 10);
+	*subdevice = number > INT_MAX ? -1 : (int)number;
 	if (*arguments == '/' && length < sizeof(card->path) &&
 	    (!colon || (end != colon + 1 && !*end && *subdevice >= 0))) {
 		snprintf(card->path, sizeof(card->path), "%.*s", (int)length, arguments);

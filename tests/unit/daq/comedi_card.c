@@ -113,6 +113,7 @@ static void refusals(void **state)
 		{"/dev/comedi0:", 1e4, NULL, 0, EINVAL, "expected comedi:"},
 		{"/dev/comedi0:x", 1e4, NULL, 0, EINVAL, "expected comedi:"},
 		{"/dev/comedi0:-1", 1e4, NULL, 0, EINVAL, "expected comedi:"},
+		{"/dev/comedi0:4294967296", 1e4, NULL, 0, EINVAL, "expected comedi:"},
 		{"", 1e4, NULL, 0, EINVAL, "expected comedi:"},
 		{"/dev/comedi0", 1e4, &card.open_error, EACCES, EACCES, "join the group"},
 		{"/dev/comedi0", 1e4, &card.open_error, ENOENT, ENOENT,
