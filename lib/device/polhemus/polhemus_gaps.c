@@ -20,17 +20,24 @@ void polhemus_gaps_init(struct polhemus_gaps *gaps, const uint8_t *stations, int
 	memcpy(gaps->order, stations, (size_t)n);
 }
 
+void polhemus_gaps_start(struct polhemus_gaps *gaps, int64_t t_ns)
+{
+	gaps->started = true;
+	gaps->last_ns = t_ns;
+}
+
 void polhemus_gaps_broken(struct polhemus_gaps *gaps)
 {
-	gaps->broken = gaps->begun;
+	gaps->broken = gaps->begun || gaps->started;
 }
 
 /* Less a round: one may be on its way. */
 uint64_t polhemus_gaps_silent(const struct polhemus_gaps *gaps, int64_t t_ns)
 {
 	int64_t round_ns = gaps->n * gaps->period_ns;
-	int64_t rounds =
-		gaps->begun && round_ns ? (t_ns - gaps->last_ns) / round_ns - 1 : 0;
+	int64_t rounds = (gaps->begun || gaps->started) && round_ns
+				 ? (t_ns - gaps->last_ns) / round_ns - 1
+				 : 0;
 
 	return rounds > 0 ? (uint64_t)(rounds * gaps->n) : 0;
 }
@@ -211,16 +218,40 @@ static void take_ordered(struct polhemus_gaps *gaps, const struct polhemus_recor
 	step(gaps, steps);
 }
 
+/*
+ * Before the first record lie what the bytes make that were no record, as fits into the time,
+ * and where the link was gone as well all of the time since the start, less a round, as the
+ * first one takes that long.
+ */
+static void begin(struct polhemus_gaps *gaps, const struct polhemus_record *record,
+		  int where)
+{
+	uint64_t n = (uint64_t)gaps->n, missing = 0, most;
+
+	if (gaps->started) {
+		most = rounds(gaps, record->t_ns - gaps->last_ns) * n;
+		missing = (record->skipped + gaps->length / 2) / gaps->length;
+		if (gaps->period_ns && missing > most)
+			missing = most;
+		if (gaps->broken && polhemus_gaps_silent(gaps, record->t_ns) > missing)
+			missing = polhemus_gaps_silent(gaps, record->t_ns);
+	}
+	gaps->begun = true;
+	gaps->broken = false;
+	gaps->first_place = gaps->counts ? (uint64_t)where : 0;
+	/* Whole rounds, so that the stations keep their places. */
+	gaps->seq = gaps->lost = (missing + n - 1) / n * n;
+	gaps->base_ns = record->t_ns - due_ns(gaps, gaps->seq);
+	restart_window(gaps);
+}
+
 bool polhemus_gaps_take(struct polhemus_gaps *gaps, const struct polhemus_record *record,
 			uint64_t *seq)
 {
 	int where = place(gaps, record->station);
 
 	if (!gaps->begun) {
-		gaps->begun = true;
-		gaps->first_place = gaps->counts ? (uint64_t)where : 0;
-		gaps->base_ns = record->t_ns;
-		restart_window(gaps);
+		begin(gaps, record, where);
 	} else if (gaps->broken) {
 		step_over(gaps, record->t_ns, where);
 	} else if (gaps->counts) {

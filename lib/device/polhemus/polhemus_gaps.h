@@ -36,12 +36,12 @@ struct polhemus_gaps {
 	unsigned int length;
 
 	uint64_t lost, seq; /* so far; of the last record */
-	bool begun, broken;
+	bool started, begun, broken;
 	bool settled; /* base_ns is known: nothing came much earlier for a window */
 	bool moved;   /* in this window something did */
 	uint64_t first_place; /* of seq 0 in the order */
 	int64_t base_ns;      /* the earliest that seq 0 could have come */
-	int64_t last_ns;      /* of the last record */
+	int64_t last_ns;      /* of the last record; before the first: the start */
 	int last;	      /* its place in the order */
 	uint32_t frame;	      /* its count */
 	unsigned int refused; /* in a row */
@@ -56,6 +56,9 @@ struct polhemus_gaps {
 /* @hz: records of all stations per second; 0: not known. @length of a record in bytes. */
 void polhemus_gaps_init(struct polhemus_gaps *gaps, const uint8_t *stations, int n,
 			bool counts, double hz, unsigned int length);
+
+/* The device was told to send at @t_ns: what does not come before the first record is lost. */
+void polhemus_gaps_start(struct polhemus_gaps *gaps, int64_t t_ns);
 
 /* The link was gone: before the next record all that time is lost. */
 void polhemus_gaps_broken(struct polhemus_gaps *gaps);

@@ -26,6 +26,11 @@ int polhemus_stream_init(struct polhemus_stream *stream,
 				ROOM);
 }
 
+void polhemus_stream_start(struct polhemus_stream *stream, int64_t t_ns)
+{
+	polhemus_gaps_start(&stream->gaps, t_ns);
+}
+
 void polhemus_stream_free(struct polhemus_stream *stream)
 {
 	incise_ring_free(&stream->ring);

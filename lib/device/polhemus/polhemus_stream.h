@@ -30,6 +30,8 @@ struct polhemus_stream {
 int polhemus_stream_init(struct polhemus_stream *stream,
 			 const struct incise_tracker_setup *setup,
 			 const struct polhemus_layout *layout);
+/* The device was told to send, at @t_ns: from there on what is missing is lost. */
+void polhemus_stream_start(struct polhemus_stream *stream, int64_t t_ns);
 void polhemus_stream_free(struct polhemus_stream *stream);
 
 /* The link was gone, and the device was set up anew, so that records look as @layout says. */

@@ -214,6 +214,7 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 		rc = incise_error_set(err, ENOMEM,
 				      "%s: out of memory: end other programs", where);
 	if (!rc) {
+		polhemus_stream_start(&t->stream, now_ns());
 		t->line->stop = &t->stop;
 		rc = incise_thread_start(&t->thread, run, t, &real_time);
 		if (!rc)

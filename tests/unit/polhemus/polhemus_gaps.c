@@ -152,6 +152,44 @@ static void without_a_period(void **state)
 	assert_int_equal(gaps.lost, 5);
 }
 
+/* What was told to send, and did not, or not so that it was understood. */
+static void before_the_first(void **state)
+{
+	static const struct {
+		int stations;
+		bool counts, broken;
+		unsigned int records_skipped;
+		int64_t first; /* periods after the start */
+		uint64_t lost;
+	} cases[] = {
+		{1, false, false, 0, 1, 0},   /* as it should be */
+		{1, false, false, 0, 3, 0},   /* it takes its time */
+		{1, false, false, 2, 3, 2},   /* two were no records */
+		{1, false, false, 9, 3, 3},   /* not more than there was time for */
+		{1, false, true, 2, 100, 99}, /* and the link was gone */
+		{1, true, true, 0, 100, 99},
+		{4, false, false, 1, 5, 4}, /* whole rounds */
+		{4, false, true, 0, 100, 96},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct polhemus_record record = {.station = 1};
+		uint64_t seq = 0;
+		double hz = 120;
+
+		begin(cases[i].stations, cases[i].counts, hz);
+		polhemus_gaps_start(&gaps, 1000);
+		if (cases[i].broken)
+			polhemus_gaps_broken(&gaps);
+		record.t_ns = 1000 + cases[i].first * gaps.period_ns;
+		record.skipped = cases[i].records_skipped * gaps.length;
+		assert_true(polhemus_gaps_take(&gaps, &record, &seq));
+		if (seq != cases[i].lost || gaps.lost != cases[i].lost)
+			fail_msg("case %zu: seq %d, lost %d", i, (int)seq,
+				 (int)gaps.lost);
+	}
+}
+
 /* The link was gone: the time it took is lost. */
 static void broken(void **state)
 {
@@ -199,7 +237,7 @@ int main(void)
 		cmocka_unit_test(damage),	    cmocka_unit_test(order),
 		cmocka_unit_test(counted),	    cmocka_unit_test(doubled),
 		cmocka_unit_test(without_a_period), cmocka_unit_test(broken),
-		cmocka_unit_test(silent),
+		cmocka_unit_test(silent),	    cmocka_unit_test(before_the_first),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
