@@ -269,7 +269,7 @@ int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char 
 		v4l2_format_list(fd, list, sizeof(list));
 		return incise_error_set(
 			err, EOPNOTSUPP,
-			"%s: the camera has no pictures of camera_setup.pixels; it has "
+			"%s: the camera has no pictures of camera_setup.format; it has "
 			"%s: name one of yuyv, grey, mjpeg, rgb among them",
 			where, *list ? list : "none");
 	}

@@ -150,7 +150,8 @@ static void a_missing_format_names_those_there_are(void **state)
 
 	driver_reset();
 	assert_int_equal(set(&setup), -EOPNOTSUPP);
-	assert_non_null(strstr(err.text, "it has YUYV MJPG: name one"));
+	assert_non_null(
+		strstr(err.text, "camera_setup.format; it has YUYV MJPG: name one"));
 	driver.format[0] = 0;
 	assert_int_equal(set(&setup), -EOPNOTSUPP);
 	assert_non_null(strstr(err.text, "it has none"));
