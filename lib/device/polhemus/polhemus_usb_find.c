@@ -8,9 +8,8 @@
 #include <string.h>
 #include "polhemus_usb_find.h"
 
-#define FIRMWARE                                                                            \
-	"has no firmware yet: load the maker's .hex file with fxload, as the rule of udev " \
-	"that comes with it does, then it appears anew"
+#define FIRMWARE                                                                         \
+	"has no firmware yet: load the maker's .hex file with fxload, then it appears anew"
 
 int polhemus_usb_wanted(const char *arguments, struct polhemus_usb_name *wanted,
 			const struct polhemus_model **model, const char *where,
