@@ -14,7 +14,7 @@
 
 /* A device, with keys that stay when the backend's module is gone. */
 struct answer {
-	char kind[16], device[100], what[100];
+	char kind[16], device[320], what[100];
 	bool usable;
 	int n;
 	struct {

@@ -22,7 +22,7 @@ struct incise_scan_property {
 
 /** A device. */
 struct incise_scan_device {
-	char device[100]; /**< what rig.conf names it by, such as "can:can0:0x10" */
+	char device[320]; /**< what rig.conf names it by, such as "can:can0:0x10" */
 	char what[100];	  /**< a line: what it is, and how it is */
 	bool usable; /**< rig.conf may name it; false: it is there, but of no use here */
 	int n;
