@@ -382,6 +382,7 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 					    const struct incise_calibration *calibration,
 					    struct incise_error *err)
 {
+	struct incise_tracker_info tracker;
 	struct incise_recorder *rec;
 	double point_mm[3], normal[3];
 	int rc;
@@ -392,6 +393,17 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 			"%s: a recording needs a tracker and a force channel; the rig "
 			"%s was opened without",
 			path, incise_rig_spec(rig));
+		return NULL;
+	}
+	incise_tracker_info(incise_rig_tracker(rig), &tracker);
+	/* Rows of two sensors in one table would be one that jumps to and fro. */
+	if (tracker.stations > 1) {
+		incise_error_set(
+			err, EOPNOTSUPP,
+			"%s: a recording holds one sensor, and the tracker of %s "
+			"reads %d; name the scalpel's alone in "
+			"tracker_setup.stations",
+			path, incise_rig_spec(rig), tracker.stations);
 		return NULL;
 	}
 	rec = calloc(1, sizeof(*rec));
@@ -405,7 +417,7 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	rec->stats.zero_mV = calibration->force_zero_mV;
 	rec->zero.depth_max_mm = -INFINITY;
 	incise_force_info(incise_rig_force(rig), &rec->force_info);
-	incise_tracker_info(incise_rig_tracker(rig), &rec->tracker_info);
+	rec->tracker_info = tracker;
 	incise_rig_surface(rig, point_mm, normal);
 	incise_depth_init(&rec->depth, point_mm, normal);
 	incise_timeline_init(&rec->force.timeline, 0); /* stamped at acquisition */

@@ -107,6 +107,18 @@ ask() {
 	[ "$(ask a.rec "SELECT count(*) FROM tracker")" -gt 100 ]
 }
 
+@test "two sensors of a tracker make no recording of one" {
+	plug_in --stations 12
+	echo 'tracker_setup = { stations = [1, 2]; };' >>rig.conf
+	run --separate-stderr incise capture -o a.rec --duration 1s
+	failed_with "a.rec: a recording holds one sensor" "tracker_setup.stations"
+	[ ! -e a.rec ]
+	[ ! -e a.rec.part ]
+	# either of them does
+	sed -i 's/\[1, 2\]/[2]/' rig.conf
+	incise capture -o a.rec --duration 1s
+}
+
 @test "a source that is absent is named, with what to do" {
 	local case
 	while IFS='|' read -r line text; do

@@ -35,7 +35,8 @@ struct incise_recorder;
  * @param rig   opened with INCISE_RIG_TRACKER | INCISE_RIG_FORCE; not owned
  * @return recorder, to be ended with incise_recorder_close(); NULL with errno EEXIST, EINVAL
  *         (a path that is no name),
- *         ENODEV (the rig has no tracker or force channel), of mkdir(2), EIO, ENOMEM.
+ *         ENODEV (the rig has no tracker or force channel), EOPNOTSUPP (its tracker reads
+ *         more than one sensor), of mkdir(2), EIO, ENOMEM.
  */
 INCISE_API struct incise_recorder *incise_recorder_new(
 	const char *path, struct incise_rig *rig,
