@@ -50,7 +50,10 @@ enum incise_rig_device {
  *         device that the file does not name, or a backend that does not exist), ENOEXEC
  *         (a module that is broken), ENOMEM; of a real device also ENOENT, EACCES, EBUSY
  *         (another program drives it), ERANGE (this machine cannot make its steps so
- *         fast), EOPNOTSUPP (it cannot be watched).
+ *         fast; it has no such range or value), EOPNOTSUPP (it cannot be watched, or has
+ *         not what is set of it), ETIMEDOUT (nobody answers), EPROTO (its driver says what
+ *         cannot be), EIO (it does not take, or keep, a setting), ENOSPC (no room on its
+ *         bus).
  */
 INCISE_API struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
 					      struct incise_error *err);

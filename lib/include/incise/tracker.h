@@ -53,8 +53,9 @@ struct incise_tracker;
  * Take records that have arrived, without waiting.
  *
  * @param samples room for @n records, oldest first
- * @return how many were taken, 0 … n; -EIO, -ENODEV (unplugged). Real-time safe for the
- *         virtual rig; a real backend says so itself.
+ * @return how many were taken, 0 … n; -EIO, -ENODEV (unplugged; of a tracker that is waited
+ *         for, see rig.conf(5), only once it is given up: until then 0). Real-time safe for
+ *         the virtual rig and for trackers of Polhemus; another backend says so itself.
  */
 INCISE_API int incise_tracker_read(struct incise_tracker *tracker,
 				   struct incise_tracker_sample *samples, int n);
