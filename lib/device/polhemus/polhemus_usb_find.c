@@ -8,7 +8,7 @@
 #include <string.h>
 #include "polhemus_usb_find.h"
 
-#define FIRMWARE                                                                         \
+#define FIRMWARE \
 	"has no firmware yet: load the maker's .hex file with fxload, then it appears anew"
 
 int polhemus_usb_wanted(const char *arguments, struct polhemus_usb_name *wanted,
