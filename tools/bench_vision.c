@@ -69,7 +69,8 @@ static void draw_all(struct pictures *p, int kind, int n)
 	s.spots = kinds[kind].spots;
 	p->n = n;
 	for (int i = 0; i < n; i++) {
-		double turn = 2 * M_PI * i / n;
+		/* Of a few the same hand, not a faster one. */
+		double turn = 2 * M_PI * i / PICTURES;
 
 		s.x = 320 + 30 * sin(turn) + scalpel_picture_random(&random);
 		s.y = 440 + scalpel_picture_random(&random);
