@@ -14,7 +14,7 @@
 
 /* A device, with keys that stay when the backend's module is gone. */
 struct answer {
-	char kind[16], device[320], what[100];
+	char kind[16], device[320], what[240];
 	bool usable;
 	int n;
 	struct {
@@ -129,6 +129,23 @@ static void put_all(const char *what, const struct found *found)
 		put_device(&found->answer[i]);
 }
 
+/* Backends that could not look are no devices: their lines go to who has to mend them. */
+static void warn_of_failed(struct found *found)
+{
+	int n = 0;
+
+	for (int i = 0; i < found->n; i++) {
+		const struct answer *one = &found->answer[i];
+		size_t length = strlen(one->device);
+
+		if (one->usable || one->n || !length || one->device[length - 1] != ':')
+			found->answer[n++] = *one;
+		else
+			cli_warn("%s", one->what);
+	}
+	found->n = n;
+}
+
 void bus_report_show_attached(bool json)
 {
 	struct found found = {0};
@@ -139,6 +156,7 @@ void bus_report_show_attached(bool json)
 	cli_progress_end();
 	if (rc)
 		cli_fail("devices: %s", strerror(-rc));
+	warn_of_failed(&found);
 	if (json)
 		show_json("devices", NULL, &found);
 	else if (found.n)
@@ -156,7 +174,7 @@ void bus_report_show(const char *what, bool json)
 	int rc;
 
 	cli_progress("looking on %s", what);
-	rc = incise_scan("stepper", what, keep, &found, &err);
+	rc = incise_scan(NULL, what, keep, &found, &err);
 	cli_progress_end();
 	if (rc == -ENOMEM && !err.code)
 		cli_fail("%s: no memory for what was found", what);
@@ -165,8 +183,8 @@ void bus_report_show(const char *what, bool json)
 	/* As with a word that names no file: who asks for it expects it to be there. */
 	if (!found.n)
 		cli_fail(
-			"%s: nobody answers; see that the drive has power, its node id and "
-			"bit rate, the cable and its two ends of 120 ohm",
+			"%s: nobody answers; see that it has power and its cable is in; on a "
+			"bus its node id, bit rate and the two ends of 120 ohm",
 			what);
 	if (json) {
 		show_json("bus", what, &found);

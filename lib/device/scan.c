@@ -40,19 +40,47 @@ static int scan_backend(struct kind_found *of, const char *name)
 		return err.code ? 0 : rc;
 	snprintf(failed.kind, sizeof(failed.kind), "%s", of->kind);
 	snprintf(failed.device, sizeof(failed.device), "%s", spec);
-	snprintf(failed.what, sizeof(failed.what), "%.99s", err.text);
+	snprintf(failed.what, sizeof(failed.what), "%.239s", err.text);
 	return of->found(of->context, &failed);
+}
+
+static const char *const kinds[] = {"tracker", "force", "camera", "stepper"};
+#define KINDS (sizeof(kinds) / sizeof(*kinds))
+#define NAMES 16
+
+/* The backend of that name, of whatever kind. */
+static int find_any(struct incise_loaded *loaded, struct kind_found *of, const char *name,
+		    const char *where, struct incise_error *err)
+{
+	char names[NAMES][32], known[KINDS * NAMES * 34] = "sim";
+	int rc = -ENODEV;
+
+	for (size_t k = 0; k < KINDS && rc == -ENODEV; k++) {
+		int n = incise_backend_names(kinds[k], names, NAMES);
+
+		of->kind = kinds[k];
+		rc = incise_backend_find(loaded, kinds[k], name, where, err);
+		for (int i = 0; i < n; i++) {
+			size_t used = strlen(known);
+
+			snprintf(known + used, sizeof(known) - used, ", %s", names[i]);
+		}
+	}
+	return rc == -ENODEV ? incise_error_set(err, ENODEV,
+						"%s: there is no backend \"%.40s\"; "
+						"those there are: %.160s",
+						where, name, known)
+			     : rc;
 }
 
 int incise_scan_all(incise_scan_found *found, void *context)
 {
-	static const char *const kinds[] = {"tracker", "force", "camera", "stepper"};
-	char names[16][32];
+	char names[NAMES][32];
 	int rc = 0;
 
-	for (size_t k = 0; k < sizeof(kinds) / sizeof(*kinds) && !rc; k++) {
+	for (size_t k = 0; k < KINDS && !rc; k++) {
 		struct kind_found of = {kinds[k], found, context, 0};
-		int n = incise_backend_names(kinds[k], names, 16);
+		int n = incise_backend_names(kinds[k], names, NAMES);
 
 		for (int i = 0; i < n && !rc; i++)
 			rc = scan_backend(&of, names[i]);
@@ -67,7 +95,7 @@ int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 	size_t length = strcspn(spec, ":");
 	struct kind_found of = {kind, found, context, 0};
 	char name[32], where[80];
-	int rc;
+	int rc = 0;
 
 	if (!spec[length] || length >= sizeof(name))
 		return incise_error_set(err, EINVAL,
@@ -77,8 +105,9 @@ int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 	snprintf(name, sizeof(name), "%.*s", (int)length, spec);
 	snprintf(where, sizeof(where), "%.70s", spec);
 	/* The virtual rig is whatever one asks for. */
-	rc = strcmp(name, "sim") ? incise_backend_find(&loaded, kind, name, where, err)
-				 : 0;
+	if (strcmp(name, "sim"))
+		rc = kind ? incise_backend_find(&loaded, kind, name, where, err)
+			  : find_any(&loaded, &of, name, where, err);
 	if (rc)
 		return rc;
 	if (loaded.backend && loaded.backend->scan)

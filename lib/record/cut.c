@@ -121,7 +121,7 @@ int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recordin
 		.recording = recording,
 		.n_per_code =
 			meta->full_scale_V * 1e3 / (1LL << meta->bits) / meta->force_mV_N,
-		.zero_N = meta->zero_mV / meta->force_mV_N,
+		.zero_N = (meta->zero_mV - meta->offset_V * 1e3) / meta->force_mV_N,
 		.top = (1LL << meta->bits) - 1,
 		.depth_max_mm = -INFINITY,
 	};

@@ -221,6 +221,7 @@ static int write_meta(struct incise_recorder *rec)
 	bad |= set_real(rec, "force_hz", rec->force_info.rate_hz);
 	bad |= set_integer(rec, "force_bits", rec->force_info.bits);
 	bad |= set_real(rec, "force_full_scale_V", rec->force_info.full_scale_V);
+	bad |= set_real(rec, "force_offset_V", rec->force_info.offset_V);
 	bad |= set_real(rec, "force_mV_N", rec->calibration.force_mV_N);
 	bad |= set_real(rec, "force_zero_mV", rec->stats.zero_mV);
 	bad |= set_real(rec, "depth_mm_px", rec->calibration.depth_mm_px);
@@ -478,9 +479,15 @@ static uint64_t lost(const struct stream *stream, uint64_t device)
 	return stream->lost > device ? stream->lost : device;
 }
 
+/* So many codes are so many mV. */
+static double span_mV(const struct incise_recorder *rec, double codes)
+{
+	return codes * rec->force_info.full_scale_V * 1e3 / (1LL << rec->force_info.bits);
+}
+
 static double code_mV(const struct incise_recorder *rec, double code)
 {
-	return code * rec->force_info.full_scale_V * 1e3 / (1LL << rec->force_info.bits);
+	return rec->force_info.offset_V * 1e3 + span_mV(rec, code);
 }
 
 static int put_force(struct incise_recorder *rec,
@@ -665,7 +672,7 @@ static int settle_zero(struct incise_recorder *rec, struct incise_error *err)
 		"the calibration";
 	double mean = (double)zero->sum / zero->n;
 	double var = fmax(0, (double)zero->sum2 / zero->n - mean * mean);
-	double sd_mV = code_mV(rec, sqrt(var));
+	double sd_mV = span_mV(rec, sqrt(var));
 	double sd_N = sd_mV / fabs(rec->calibration.force_mV_N);
 
 	rec->worthless = true;

@@ -17,9 +17,12 @@
 
 /* --- table meta ------------------------------------------------------------------- */
 
-/* Run @take on the value of a key. Returns 0, -EINVAL (absent, or not taken), -errno. */
+/*
+ * Run @take on the value of a key. Returns 0, -EINVAL (absent and not @optional, or not
+ * taken), -errno.
+ */
 static int meta(struct incise_recording *rec, const char *key,
-		int (*take)(sqlite3_stmt *stmt, void *to), void *to,
+		int (*take)(sqlite3_stmt *stmt, void *to), void *to, bool optional,
 		struct incise_error *err)
 {
 	sqlite3_stmt *stmt;
@@ -31,6 +34,8 @@ static int meta(struct incise_recording *rec, const char *key,
 	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
 	rc = sqlite3_step(stmt);
 	if (rc == SQLITE_ROW && !take(stmt, to))
+		rc = 0;
+	else if (rc == SQLITE_DONE && optional)
 		rc = 0;
 	else if (rc == SQLITE_ROW || rc == SQLITE_DONE)
 		rc = incise_error_set(
@@ -124,24 +129,27 @@ static int read_meta(struct incise_recording *rec, struct incise_error *err)
 		{"tracker_lost", take_count, &info->tracker_lost},
 		{"force_clipped", take_count, &info->force_clipped},
 	};
+	int rc = 0;
 
-	for (size_t i = 0; i < sizeof(items) / sizeof(*items); i++) {
-		int rc = meta(rec, items[i].key, items[i].take, items[i].to, err);
-
-		if (rc)
-			return rc;
-	}
+	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && !rc; i++)
+		rc = meta(rec, items[i].key, items[i].take, items[i].to, false, err);
+	/* Recordings from before have none, and begin at 0 V. */
+	if (!rc)
+		rc = meta(rec, "force_offset_V", take_real, &info->offset_V, true, err);
+	if (rc)
+		return rc;
 	/* No converter has more than 31 bits; figures of 1e±9 keep all that follows finite. */
 	if (bits < 1 || bits > 31 ||
 	    !(info->full_scale_V > 1e-9 && info->full_scale_V < 1e9) ||
+	    !(fabs(info->offset_V) < 1e9) ||
 	    !(fabs(info->force_mV_N) > 1e-9 && fabs(info->force_mV_N) < 1e9) ||
 	    fabs(info->zero_mV) > 1e12)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: damaged: the force channel in table meta has %llu "
-			"bits, %g V, %g mV/N, zero %g mV, which cannot be",
+			"bits, %g V from %g V, %g mV/N, zero %g mV, which cannot be",
 			rec->path, (unsigned long long)bits, info->full_scale_V,
-			info->force_mV_N, info->zero_mV);
+			info->offset_V, info->force_mV_N, info->zero_mV);
 	info->bits = bits;
 	info->depth = rec->depth_rows;
 	info->complete = complete;

@@ -157,6 +157,7 @@ setup() {
 	[ "$(key r.json lost.force)" = 0 ]
 	[ "$(key r.json adc.bits)" = 12 ]
 	[ "$(key r.json adc.full_scale_V)" = 5.0 ]
+	[ "$(key r.json adc.offset_V)" = 0.0 ]
 	[ "$(key r.json calibration.force_mV_N)" = 1240.0 ]
 	[ "$(key r.json rig)" = "sim:clock=simulated,depth_mm=5,times=2,cut_s=1,pause_s=0.6" ]
 	# two cuts of 1 s and three pauses of 0.6 s

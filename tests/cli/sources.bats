@@ -53,6 +53,29 @@ ask() {
 		FROM tracker) WHERE d <= 0")" = 0 ]
 }
 
+@test "info asks a source that is named, of whatever kind" {
+	plug_in
+	incise info "tty:$PWD/tracker:115200" >told
+	grep -q "^ *tracker *= \"tty:$PWD/tracker:115200\";" told
+	grep -q "^ *family *FASTRAK" told
+	grep -q "^ *firmware " told
+	run --separate-stderr incise info "tty:$PWD/none:115200"
+	failed_with "$PWD/none" "is the adapter plugged in?"
+	run --separate-stderr incise info v4l2:/dev/video99
+	failed_with "v4l2:/dev/video99: nobody answers" "cable"
+	run --separate-stderr incise info nonsense:x
+	failed_with 'no backend "nonsense"' "tty" "can" "v4l2"
+}
+
+@test "a module that cannot be loaded is no device" {
+	mkdir modules
+	echo text >modules/tracker_broken.so
+	INCISE_MODULE_PATH=$PWD/modules run -0 --separate-stderr incise info devices
+	[[ "$output" == "no tracker, force channel"* ]]
+	[[ "$stderr" == *"tracker_broken.so"* ]]
+	[ "${#stderr_lines[@]}" = 1 ]
+}
+
 @test "a tracker that is pulled out and plugged in: the rest is there, the gap is counted" {
 	local code=0
 	plug_in

@@ -25,7 +25,7 @@ struct incise_recording_info {
 	uint64_t force, tracker, depth; /**< rows */
 	uint64_t force_lost, tracker_lost, force_clipped;
 	int bits;
-	double full_scale_V;
+	double full_scale_V, offset_V; /**< 2^bits codes span that; code 0 is this */
 	double force_mV_N, zero_mV, depth_mm_px; /**< calibration it was made with */
 	double surface_normal[3], surface_point_mm[3];
 	int cuts; /**< stretches with the blade in the tissue */

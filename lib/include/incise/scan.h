@@ -23,7 +23,7 @@ struct incise_scan_property {
 /** A device. */
 struct incise_scan_device {
 	char device[320]; /**< what rig.conf names it by, such as "can:can0:0x10" */
-	char what[100];	  /**< a line: what it is, and how it is */
+	char what[240];	  /**< a line: what it is, and how it is */
 	bool usable; /**< rig.conf may name it; false: it is there, but of no use here */
 	int n;
 	struct incise_scan_property property[INCISE_SCAN_PROPERTIES];
@@ -39,7 +39,7 @@ typedef int incise_scan_found(void *context, const struct incise_scan_device *de
 /**
  * Look for devices. Blocks, for some seconds at most.
  *
- * @param kind "stepper", "tracker", "force" or "camera"
+ * @param kind "stepper", "tracker", "force" or "camera"; NULL: whichever has that backend
  * @param spec "BACKEND:ARGUMENTS", such as "can:can0"
  * @return 0, also where none was found; what @found returned; -EINVAL (@spec),
  *         -ENODEV (no such backend, or bus), -EOPNOTSUPP (the backend cannot look),

@@ -429,6 +429,55 @@ static int in_tissue(struct incise_tracker_sample *samples, int n)
 	return n;
 }
 
+static void from_minus_2_5_V(const struct incise_force *force,
+			     struct incise_force_info *info)
+{
+	force_real->info(force, info);
+	info->offset_V = -2.5;
+}
+
+/* A range that does not begin at 0 V moves the zero, not the force. */
+static void force_is_that_of_the_voltage(void **state)
+{
+	struct incise_recording_info at_0, moved, old;
+	struct incise_error err = {0};
+
+	record("a.rec", SIM, 4000 * MS);
+	for (int i = 0; i < 3; i++) {
+		const char *path = i ? "b.rec" : "a.rec";
+		struct incise_recording_info *info = i == 0   ? &at_0
+						     : i == 1 ? &moved
+							      : &old;
+		struct incise_recording *recording;
+
+		if (i == 1) {
+			struct incise_rig *rig = faulty_rig();
+			struct incise_recorder *rec;
+
+			force_fault = NULL;
+			tracker_fault = NULL;
+			force_ops.info = from_minus_2_5_V;
+			rec = start(path, rig);
+			assert_int_equal(poll_for(rec, rig, 4000 * MS, &err), 0);
+			assert_int_equal(incise_recorder_close(rec, &err), 0);
+			incise_rig_close(rig);
+		}
+		if (i == 2) /* recordings from before know of none */
+			change("b.rec/recording.db",
+			       "DELETE FROM meta WHERE key = 'force_offset_V'");
+		recording = incise_recording_open(path, &err);
+		if (!recording || incise_recording_info(recording, info, &err))
+			fail_msg("%s", err.text);
+		incise_recording_close(recording);
+	}
+	assert_true(at_0.force_max_N > 0.1);
+	assert_true(at_0.offset_V == 0 && moved.offset_V == -2.5 && old.offset_V == 0);
+	assert_true(fabs(moved.zero_mV - at_0.zero_mV + 2500) < 1e-9);
+	assert_true(fabs(moved.force_max_N - at_0.force_max_N) < 1e-9);
+	/* 2500 mV over 1240 mV/N */
+	assert_true(fabs(old.force_max_N - at_0.force_max_N - 2500 / 1240.0) < 1e-9);
+}
+
 static void failures_of_devices(void **state)
 {
 	static const struct {
@@ -668,6 +717,7 @@ int main(void)
 		IN_FOLDER(exit_without_close),
 		IN_FOLDER(sigkill),
 		IN_FOLDER(interrupted_recording_knows_its_losses),
+		IN_FOLDER(force_is_that_of_the_voltage),
 		IN_FOLDER(failures_of_devices),
 		IN_FOLDER(losses_are_counted_and_doubts_kept),
 		IN_FOLDER(full_disk_keeps_what_was_committed),
