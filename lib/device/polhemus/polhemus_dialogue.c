@@ -14,6 +14,9 @@
 /* What does not stop for so long does not stop: 4 records at 9600 baud take 0.14 s. */
 #define ENDLESS_NS INT64_C(500000000)
 
+/* All of it, from the first byte that was heard; see the test of a slow line. */
+#define WHOLE_NS INT64_C(15000000000)
+
 static int gone(struct polhemus_dialogue *d, int rc)
 {
 	return incise_error_set(d->err, -rc,
@@ -42,6 +45,14 @@ static ssize_t listen_at(struct polhemus_dialogue *d, int timeout_ms, int64_t *t
 			       timeout_ms);
 	if (n < 0)
 		return gone(d, (int)n);
+	if (n && !d->first_ns)
+		d->first_ns = *t_ns;
+	if (n && *t_ns - d->first_ns > WHOLE_NS)
+		return incise_error_set(
+			d->err, EIO,
+			"%s: the tracker at %s was not set up after 15 s, so slowly does "
+			"it answer: see its baud rate, or what else is at that line",
+			d->where, d->line->name);
 	d->n += (size_t)n;
 	return n;
 }

@@ -19,6 +19,7 @@ struct polhemus_dialogue {
 	struct incise_error *err;
 	unsigned char bytes[1024]; /* that came and were not understood yet */
 	size_t n;
+	int64_t first_ns; /* when the first byte was heard; 0: none was */
 };
 
 /* All of them: -ECANCELED once line->stop is set. */

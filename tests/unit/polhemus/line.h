@@ -16,6 +16,8 @@ struct test_line {
 	struct emulator *emulator;
 	int64_t now_ns;
 	size_t most;	 /* bytes of a read; 0: as many as fit */
+	int64_t read_ns; /* that each takes, from the first command with slow_from on */
+	char slow_from;	 /* 0: from the beginning */
 	int gone;	 /* what all calls return */
 	char said[2000]; /* all commands */
 	size_t n_said;
@@ -45,6 +47,8 @@ static ssize_t test_line_read(struct polhemus_line *line, void *bytes, size_t si
 		return l->gone;
 	if (l->most && size > l->most)
 		size = l->most;
+	if (!l->slow_from || memchr(l->said, l->slow_from, l->n_said))
+		l->now_ns += l->read_ns;
 	n = emulator_take(l->emulator, bytes, size);
 	if (!n) {
 		l->now_ns = next_ns < end_ns ? next_ns : end_ns;

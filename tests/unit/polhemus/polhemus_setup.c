@@ -200,6 +200,38 @@ static void who_is_there(void **state)
 	assert_int_equal(identity.layout.family, POLHEMUS_PATRIOT);
 }
 
+/* A byte at a time: at 9600 baud there is time enough; what trickles is given up. */
+static void slow_line(void **state)
+{
+	static const struct {
+		enum emulator_kind kind;
+		int64_t byte_ns;
+		char slow_from;
+		const char *says; /* NULL: it is set up */
+	} cases[] = {
+		{EMULATOR_FASTRAK, 1041667, 0, NULL},
+		{EMULATOR_LIBERTY, 1041667, 0, NULL},
+		/* who does not stop sending is told before */
+		{EMULATOR_FASTRAK, 40000000, 0, "does not stop sending"},
+		{EMULATOR_FASTRAK, 80000000, 'O', "was not set up after 15 s"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		int rc;
+
+		begin(cases[i].kind, -1);
+		e.present[1] = true;
+		line.most = 1;
+		line.slow_from = cases[i].slow_from;
+		line.read_ns = cases[i].byte_ns;
+		rc = set_up(&two);
+		if (cases[i].says ? !rc || !strstr(err.text, cases[i].says) : rc)
+			fail_msg("case %zu: %d %s", i, rc, err.text);
+		/* the limit, and what is waited for before the first byte */
+		assert_true(line.now_ns < INT64_C(20000000000));
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -208,6 +240,7 @@ int main(void)
 		cmocka_unit_test_teardown(what_is_not_taken, end),
 		cmocka_unit_test_teardown(what_cannot_be, end),
 		cmocka_unit_test_teardown(who_is_there, end),
+		cmocka_unit_test_teardown(slow_line, end),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
