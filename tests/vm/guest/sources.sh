@@ -52,11 +52,23 @@ record()
 	rm -rf a.rec
 	# a sawtooth is never at rest, so that its zero is given
 	echo 'force_mV_N = 1240.0; force_zero_mV = 180.0; depth_mm_px = 0.11875;' >calibration.conf
-	incise capture -o a.rec -c calibration.conf --duration 1500ms --json >report.json &&
-		cat report.json &&
-		grep -q '"force_lost": 0' report.json && grep -q '"tracker_lost": 0' report.json &&
-		[ "$(sed -n 's/.*"force": \([0-9]*\).*/\1/p' report.json)" -ge "$3" ] &&
-		[ "$(sed -n 's/.*"tracker": \([0-9]*\).*/\1/p' report.json)" -ge 170 ]
+	code=0
+	incise capture -o a.rec -c calibration.conf --duration 1500ms --json >report.json || code=$?
+	cat report.json
+	force=$(count force) force_lost=$(count force_lost)
+	tracker=$(count tracker) tracker_lost=$(count tracker_lost)
+	# In real time an emulated machine loses some: it says so, and how many.
+	if [ "$INCISE_VM_PROFILE" = deterministic ] || [ $code = 0 ]; then
+		[ $code = 0 ] && [ "$force_lost" = 0 ] && [ "$tracker_lost" = 0 ] || return
+	else
+		[ $code = 1 ] && [ $((force_lost + tracker_lost)) -gt 0 ] || return
+	fi
+	[ $((force + force_lost)) -ge "$3" ] && [ $((tracker + tracker_lost)) -ge 170 ]
+}
+
+count()
+{
+	sed -n 's/.*"'"$1"'": \([0-9]*\).*/\1/p' report.json
 }
 # 10 kHz and 120 Hz for 1.5 s, less what is on its way when it ends
 check "FASTRAK and converter are captured" record "iio:incise-sim-adc" "" 14500
