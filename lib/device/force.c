@@ -2,6 +2,7 @@
 /*
  * A force channel, whatever stands behind it; see incise/force.h.
  */
+#include <stdio.h>
 #include <incise/backend.h>
 
 int incise_force_read(struct incise_force *force, struct incise_force_sample *samples,
@@ -18,4 +19,10 @@ void incise_force_info(const struct incise_force *force, struct incise_force_inf
 uint64_t incise_force_lost(const struct incise_force *force)
 {
 	return force->ops->lost(force);
+}
+
+int incise_force_cause(struct incise_force *force, char *text, size_t size)
+{
+	return force->ops->cause ? force->ops->cause(force, text, size)
+				 : snprintf(text, size, "%s", "");
 }

@@ -2,6 +2,7 @@
 /*
  * A tracker, whatever stands behind it; see incise/tracker.h.
  */
+#include <stdio.h>
 #include <incise/backend.h>
 
 int incise_tracker_read(struct incise_tracker *tracker,
@@ -19,4 +20,10 @@ void incise_tracker_info(const struct incise_tracker *tracker,
 uint64_t incise_tracker_lost(const struct incise_tracker *tracker)
 {
 	return tracker->ops->lost(tracker);
+}
+
+int incise_tracker_cause(struct incise_tracker *tracker, char *text, size_t size)
+{
+	return tracker->ops->cause ? tracker->ops->cause(tracker, text, size)
+				   : snprintf(text, size, "%s", "");
 }

@@ -605,14 +605,21 @@ static int put_tracker(struct incise_recorder *rec,
 	return 0;
 }
 
-static int fail_device(struct incise_recorder *rec, const char *name, int rc,
-		       struct incise_error *err)
+/* @cause: what the device itself tells of it, if anything. */
+static int fail_device(struct incise_recorder *rec, const char *name, const char *cause,
+		       int rc, struct incise_error *err)
 {
 	struct incise_error ignored = {0};
 
-	if (note(rec, "failed", "%s: %s", name, strerror(-rc)) == SQLITE_OK)
+	if (note(rec, "failed", "%s: %s", name, *cause ? cause : strerror(-rc)) ==
+	    SQLITE_OK)
 		commit(rec, rec->commit_ns,
 		       &ignored); /* what came before is worth keeping */
+	if (*cause)
+		return incise_error_set(
+			err, -rc,
+			"%s; what was recorded before is in %s: `incise info` reads it",
+			cause, rec->part);
 	return incise_error_set(
 		err, -rc,
 		"%s: %s; check its cable and power; what was recorded before is "
@@ -624,12 +631,15 @@ static int take_force(struct incise_recorder *rec, struct incise_error *err)
 {
 	struct incise_force *force = incise_rig_force(rec->rig);
 	struct incise_force_sample samples[BATCH];
+	char cause[200];
 	int n = BATCH;
 
 	while (n == BATCH) {
 		n = incise_force_read(force, samples, BATCH);
-		if (n < 0)
-			return fail_device(rec, rec->force_info.name, n, err);
+		if (n < 0) {
+			incise_force_cause(force, cause, sizeof(cause));
+			return fail_device(rec, rec->force_info.name, cause, n, err);
+		}
 		for (int i = 0; i < n; i++) {
 			int rc = put_force(rec, &samples[i], err);
 
@@ -645,12 +655,15 @@ static int take_tracker(struct incise_recorder *rec, struct incise_error *err)
 {
 	struct incise_tracker *tracker = incise_rig_tracker(rec->rig);
 	struct incise_tracker_sample samples[BATCH / 16];
+	char cause[200];
 	int n = BATCH / 16;
 
 	while (n == BATCH / 16) {
 		n = incise_tracker_read(tracker, samples, BATCH / 16);
-		if (n < 0)
-			return fail_device(rec, rec->tracker_info.name, n, err);
+		if (n < 0) {
+			incise_tracker_cause(tracker, cause, sizeof(cause));
+			return fail_device(rec, rec->tracker_info.name, cause, n, err);
+		}
 		for (int i = 0; i < n; i++) {
 			int rc = put_tracker(rec, &samples[i], err);
 

@@ -125,7 +125,11 @@ static void *run(void *argument)
 
 		rc = judge(f, got < 0 ? -errno : got);
 	}
-	daq_feed_end(&f->feed, rc);
+	daq_feed_end(&f->feed, rc,
+		     f->restarts > RESTARTS
+			     ? "its command ends as soon as it begins; see dmesg"
+			     : "no sample comes any more, or none that can be read; see "
+			       "dmesg, and begin again");
 	return NULL;
 }
 
@@ -144,6 +148,7 @@ static const struct incise_force_ops comedi_force_ops = {
 	.info = daq_feed_info,
 	.lost = daq_feed_lost,
 	.close = comedi_force_close,
+	.cause = daq_feed_cause,
 };
 
 static int start(struct comedi_force *f, struct incise_error *err)

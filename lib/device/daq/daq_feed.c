@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <poll.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -116,8 +117,14 @@ void daq_feed_lose(struct daq_feed *feed, uint64_t n)
 	count(&feed->overflows, 1);
 }
 
-void daq_feed_end(struct daq_feed *feed, int error)
+void daq_feed_end(struct daq_feed *feed, int error, const char *what)
 {
+	if (error == -ENODEV)
+		incise_error_set(&feed->cause, ENODEV,
+				 "%s was unplugged; plug it in and begin again",
+				 feed->info.name);
+	else if (error)
+		incise_error_set(&feed->cause, -error, "%s: %s", feed->info.name, what);
 	atomic_store_explicit(&feed->error, error, memory_order_release);
 }
 
@@ -143,4 +150,12 @@ void daq_feed_info(const struct incise_force *force, struct incise_force_info *i
 uint64_t daq_feed_lost(const struct incise_force *force)
 {
 	return atomic_load_explicit(&of(force)->lost, memory_order_relaxed);
+}
+
+int daq_feed_cause(struct incise_force *force, char *text, size_t size)
+{
+	const struct daq_feed *feed = of(force);
+	int error = atomic_load_explicit(&feed->error, memory_order_acquire);
+
+	return snprintf(text, size, "%s", error ? feed->cause.text : "");
 }

@@ -23,7 +23,8 @@ struct daq_feed {
 	struct incise_force_info info; /* what stays as it was at opening */
 	struct incise_ring ring;
 	_Atomic uint64_t clipped, lost, overflows;
-	atomic_int error; /* 0, or -errno once the card is gone */
+	atomic_int error; /* 0, or -errno once the card is gone: then cause is there */
+	struct incise_error cause;
 	/* The thread's. */
 	uint64_t seq; /* of the next sample */
 	bool full;    /* the last sample found no room */
@@ -54,12 +55,16 @@ enum daq_wait daq_feed_wait(struct daq_feed *feed, int fd, int ms);
 void daq_feed_put(struct daq_feed *feed, int64_t t_ns, int32_t code);
 /* @n samples are missing before the next; counted as one overflow. 0: none. */
 void daq_feed_lose(struct daq_feed *feed, uint64_t n);
-/* The last word: -ENODEV, -EIO; readers are told once they have read all. */
-void daq_feed_end(struct daq_feed *feed, int error);
+/*
+ * The last word: 0 (it was to stop), -ENODEV, or -EIO because of @what; readers are told once
+ * they have read all.
+ */
+void daq_feed_end(struct daq_feed *feed, int error, const char *what);
 
 /* struct incise_force_ops */
 int daq_feed_read(struct incise_force *force, struct incise_force_sample *samples, int n);
 void daq_feed_info(const struct incise_force *force, struct incise_force_info *info);
 uint64_t daq_feed_lost(const struct incise_force *force);
+int daq_feed_cause(struct incise_force *force, char *text, size_t size);
 
 #endif

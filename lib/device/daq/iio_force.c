@@ -45,12 +45,19 @@ static void *run(void *argument)
 		/* Nothing will come behind what is held within the next periods. */
 		if (quiet_ms > 2 * QUIET_MS)
 			iio_spacing_flush(&f->spacing);
-		got = quiet_ms > dead_ms ? -EIO : 0;
+		got = quiet_ms > dead_ms ? -ETIME : 0;
 		if (got)
 			break;
 	}
 	iio_spacing_flush(&f->spacing);
-	daq_feed_end(&f->feed, got == -ENODEV ? -ENODEV : got < 0 ? -EIO : 0);
+	daq_feed_end(&f->feed,
+		     got == -ENODEV ? -ENODEV
+		     : got < 0	    ? -EIO
+				    : 0,
+		     got == -ETIME ? "no sample came any more; see that what triggers "
+				     "it runs, and begin again"
+				   : "its buffer cannot be read any more; see dmesg, and "
+				     "begin again");
 	return NULL;
 }
 
@@ -70,6 +77,7 @@ static const struct incise_force_ops iio_force_ops = {
 	.info = daq_feed_info,
 	.lost = daq_feed_lost,
 	.close = iio_force_close,
+	.cause = daq_feed_cause,
 };
 
 /* The kernel wakes the thread once per block, and has room for many. */

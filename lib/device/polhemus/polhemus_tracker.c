@@ -25,7 +25,8 @@ struct polhemus_tracker {
 	struct polhemus_stream stream;
 	pthread_t thread;
 	_Atomic bool stop;
-	_Atomic int gone; /* negative errno: for good */
+	_Atomic int gone; /* negative errno: for good; then cause is there */
+	struct incise_error cause;
 };
 
 static struct polhemus_tracker *of_tracker(const struct incise_tracker *tracker)
@@ -119,6 +120,11 @@ static void *run(void *argument)
 		before_ms = now_ms();
 		noise = 0;
 	}
+	incise_error_set(
+		&t->cause, ENODEV,
+		"%s went away and was not back, and set up, after %.0f s; plug it in, "
+		"switch it on and begin again",
+		t->identity.name, t->times.gone_ms / 1e3);
 	atomic_store(&t->gone, -ENODEV);
 	return NULL;
 }
@@ -156,6 +162,13 @@ static uint64_t tracker_lost(const struct incise_tracker *tracker)
 	return polhemus_stream_lost(&of_tracker(tracker)->stream);
 }
 
+static int tracker_cause(struct incise_tracker *tracker, char *text, size_t size)
+{
+	const struct polhemus_tracker *t = of_tracker(tracker);
+
+	return snprintf(text, size, "%s", atomic_load(&t->gone) ? t->cause.text : "");
+}
+
 static void tracker_close(struct incise_tracker *tracker)
 {
 	struct polhemus_tracker *t = of_tracker(tracker);
@@ -174,6 +187,7 @@ static const struct incise_tracker_ops ops = {
 	.info = tracker_info,
 	.lost = tracker_lost,
 	.close = tracker_close,
+	.cause = tracker_cause,
 };
 
 static int check(const struct incise_tracker_setup *setup, const char *where,

@@ -9,7 +9,8 @@
  *
  * Pulled out, or silent for silent_ms, or sending what is no record for as long, the tracker is looked for every retry_ms, set up again
  * and goes on; until then read() returns 0, and what the time in between would have brought
- * counts as lost, whether it comes back or not, from the first record on. After gone_ms read() returns -ENODEV, for good.
+ * counts as lost, whether it comes back or not, from the start on. After gone_ms read()
+ * returns -ENODEV, for good.
  */
 #ifndef INCISE_POLHEMUS_TRACKER_H
 #define INCISE_POLHEMUS_TRACKER_H

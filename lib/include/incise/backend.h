@@ -26,6 +26,8 @@ struct incise_tracker_ops {
 		     struct incise_tracker_info *info);
 	uint64_t (*lost)(const struct incise_tracker *tracker);
 	void (*close)(struct incise_tracker *tracker);
+	/** Why read() fails; NULL: it cannot tell. */
+	int (*cause)(struct incise_tracker *tracker, char *text, size_t size);
 };
 
 struct incise_tracker {
@@ -38,6 +40,8 @@ struct incise_force_ops {
 	void (*info)(const struct incise_force *force, struct incise_force_info *info);
 	uint64_t (*lost)(const struct incise_force *force);
 	void (*close)(struct incise_force *force);
+	/** Why read() fails; NULL: it cannot tell. */
+	int (*cause)(struct incise_force *force, char *text, size_t size);
 };
 
 struct incise_force {

@@ -6,6 +6,7 @@
 #ifndef INCISE_FORCE_H
 #define INCISE_FORCE_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
@@ -56,6 +57,14 @@ INCISE_API void incise_force_info(const struct incise_force *force,
 
 /** Samples lost so far, in the device or for want of room. */
 INCISE_API uint64_t incise_force_lost(const struct incise_force *force);
+
+/**
+ * Why read() gives an error, in one line that says what to do.
+ *
+ * @param text always a string; empty as long as there is no error, or nothing is known
+ * @return length of the line, as snprintf(3). For people: not real-time safe.
+ */
+INCISE_API int incise_force_cause(struct incise_force *force, char *text, size_t size);
 
 INCISE_END_DECLS
 #endif

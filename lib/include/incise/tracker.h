@@ -6,6 +6,7 @@
 #define INCISE_TRACKER_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
@@ -65,6 +66,15 @@ INCISE_API void incise_tracker_info(const struct incise_tracker *tracker,
 
 /** Records lost so far, in the device or for want of room. */
 INCISE_API uint64_t incise_tracker_lost(const struct incise_tracker *tracker);
+
+/**
+ * Why read() gives an error, in one line that says what to do.
+ *
+ * @param text always a string; empty as long as there is no error, or nothing is known
+ * @return length of the line, as snprintf(3). For people: not real-time safe.
+ */
+INCISE_API int incise_tracker_cause(struct incise_tracker *tracker, char *text,
+				    size_t size);
 
 INCISE_END_DECLS
 #endif

@@ -100,13 +100,21 @@ static void no_room(void **state)
 static void the_end_is_told_last(void **state)
 {
 	struct incise_force_sample sample;
+	char cause[200] = "?";
 
 	assert_int_equal(daq_feed_read(&feed->force, &sample, 1), 0);
+	assert_int_equal(daq_feed_cause(&feed->force, cause, sizeof(cause)), 0);
+	assert_string_equal(cause, "");
 	daq_feed_put(feed, 0, 5);
-	daq_feed_end(feed, -ENODEV);
+	daq_feed_end(feed, -ENODEV, "not this");
 	assert_int_equal(daq_feed_read(&feed->force, &sample, 1), 1);
 	assert_int_equal(daq_feed_read(&feed->force, &sample, 1), -ENODEV);
 	assert_int_equal(daq_feed_read(&feed->force, &sample, 1), -ENODEV);
+	assert_true(daq_feed_cause(&feed->force, cause, sizeof(cause)) > 0);
+	assert_non_null(strstr(cause, "was unplugged; plug it in"));
+	daq_feed_end(feed, -EIO, "its clock stands still; see to it");
+	daq_feed_cause(&feed->force, cause, sizeof(cause));
+	assert_non_null(strstr(cause, ": its clock stands still; see to it"));
 }
 
 static void what_is_asked_for(void **state)

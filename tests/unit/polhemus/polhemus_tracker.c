@@ -241,6 +241,7 @@ static void gone_for_good(void **state)
 	struct incise_tracker *tracker = open_it(&times, &err);
 	int64_t end_ns = pty_now_ns() + PATIENCE_NS;
 	struct incise_tracker_sample sample;
+	char cause[200];
 	int rc = 0;
 
 	assert_non_null(tracker);
@@ -251,6 +252,8 @@ static void gone_for_good(void **state)
 	}
 	assert_int_equal(rc, -ENODEV);
 	assert_int_equal(incise_tracker_read(tracker, &sample, 1), -ENODEV);
+	assert_true(incise_tracker_cause(tracker, cause, sizeof(cause)) > 0);
+	assert_non_null(strstr(cause, "went away and was not back"));
 	tracker->ops->close(tracker);
 	assert_int_equal(pty_plug(&pty), 0);
 }

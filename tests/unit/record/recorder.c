@@ -369,6 +369,14 @@ static int faulty_tracker(struct incise_tracker *tracker,
 	return n > 0 && tracker_fault ? tracker_fault(samples, n) : n;
 }
 
+/* What the device tells of its end; empty: nothing. */
+static const char *force_tells;
+
+static int force_cause(struct incise_force *force, char *text, size_t size)
+{
+	return snprintf(text, size, "%s", force_tells);
+}
+
 static struct incise_rig *faulty_rig(void)
 {
 	struct incise_rig *rig = open_rig(SIM);
@@ -380,6 +388,8 @@ static struct incise_rig *faulty_rig(void)
 	force_ops = *force_real;
 	tracker_ops = *tracker_real;
 	force_ops.read = faulty_force;
+	force_ops.cause = force_cause;
+	force_tells = "";
 	tracker_ops.read = faulty_tracker;
 	force->ops = &force_ops;
 	tracker->ops = &tracker_ops;
@@ -541,6 +551,27 @@ static int doubtful(struct incise_tracker_sample *samples, int n)
 		}
 	}
 	return n;
+}
+
+static void device_tells_why(void **state)
+{
+	struct incise_rig *rig = faulty_rig();
+	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_error err = {0};
+
+	force_fault = gone;
+	force_tells = "the channel: its clock stands still; wind it up";
+	assert_int_equal(poll_for(rec, rig, 2000 * MS, &err), -ENODEV);
+	assert_non_null(strstr(err.text, "wind it up; what was recorded before is in "
+					 "a.rec.part"));
+	assert_int_equal(incise_recorder_close(rec, &err), -ENODEV);
+	/* The reason is kept. */
+	assert_int_equal((int)ask("a.rec.part/recording.db",
+				  "SELECT count(*) FROM events WHERE kind = 'failed' AND "
+				  "text LIKE '%its clock stands still%'"),
+			 1);
+	assert_int_equal(system("rm -r a.rec.part"), 0);
+	incise_rig_close(rig);
 }
 
 static void losses_are_counted_and_doubts_kept(void **state)
@@ -719,6 +750,7 @@ int main(void)
 		IN_FOLDER(interrupted_recording_knows_its_losses),
 		IN_FOLDER(force_is_that_of_the_voltage),
 		IN_FOLDER(failures_of_devices),
+		IN_FOLDER(device_tells_why),
 		IN_FOLDER(losses_are_counted_and_doubts_kept),
 		IN_FOLDER(full_disk_keeps_what_was_committed),
 		IN_FOLDER(full_disk_at_the_end),
