@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <time.h>
 #include <incise/clock.h>
+#include "monotonic.h"
 
 struct incise_clock {
 	bool real;
@@ -38,12 +39,9 @@ void incise_clock_free(struct incise_clock *clock)
 
 int64_t incise_clock_now(const struct incise_clock *clock)
 {
-	struct timespec ts;
-
 	if (!clock->real)
 		return clock->now_ns;
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INCISE_NS_PER_S + ts.tv_nsec;
+	return incise_monotonic_ns();
 }
 
 bool incise_clock_is_real(const struct incise_clock *clock)

@@ -18,6 +18,7 @@
 #include <time.h>
 #include <unistd.h>
 #include <incise/clock.h>
+#include "../base/monotonic.h"
 #include "backends.h"
 #include "motor.h"
 #include "page.h"
@@ -79,11 +80,8 @@ static int kernel_origin(struct incise_motor *motor, int32_t steps, bool homed)
 
 static int64_t kernel_now(struct incise_motor *motor)
 {
-	struct timespec now;
-
 	(void)motor;
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
+	return incise_monotonic_ns();
 }
 
 static void unmap(const struct kernel_stepper *k, void *page)

@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "../base/monotonic.h"
 #include "../base/vector.h"
 #include "../model/model.h"
 #include "stages.h"
@@ -405,14 +405,6 @@ static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 	return rc;
 }
 
-static int64_t now_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return t.tv_sec * INCISE_NS_PER_S + t.tv_nsec;
-}
-
 /* Inlined into both, so that the one without times does not pay for them. */
 static inline __attribute__((always_inline)) int run_stages(struct incise_plan *plan,
 							    int64_t t_ns,
@@ -424,13 +416,13 @@ static inline __attribute__((always_inline)) int run_stages(struct incise_plan *
 		return fail(plan, tick, plan->fault);
 	for (int i = 0; i < plan->n_stages; i++) {
 		const struct incise_stage *stage = &plan->stage[i];
-		int64_t begin = stage_ns ? now_ns() : 0;
+		int64_t begin = stage_ns ? incise_monotonic_ns() : 0;
 		int rc = 0;
 
 		if (stage->always || !(tick->flags & INCISE_TICK_STALE))
 			rc = stage->run(plan, tick);
 		if (stage_ns)
-			stage_ns[i] = now_ns() - begin;
+			stage_ns[i] = incise_monotonic_ns() - begin;
 		if (rc)
 			return fail(plan, tick, rc);
 	}

@@ -9,11 +9,11 @@
 #include <net/if_arp.h>
 #include <string.h>
 #include <sys/time.h>
-#include <time.h>
 #include <libmnl/libmnl.h>
 #include <linux/can/netlink.h>
 #include <linux/if_link.h>
 #include <linux/rtnetlink.h>
+#include "../../base/monotonic.h"
 #include "can_netlink.h"
 
 #define NS_PER_S INT64_C(1000000000)
@@ -193,14 +193,6 @@ static int question(const struct mnl_socket *socket, const char *name)
 	return mnl_socket_sendto(socket, message, message->nlmsg_len) < 0 ? -errno : 0;
 }
 
-static int64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * NS_PER_S + now.tv_nsec;
-}
-
 /* What is not for us, and signals, do not make it longer. */
 static int answer(const struct mnl_socket *socket, struct can_netlink *told)
 {
@@ -208,7 +200,7 @@ static int answer(const struct mnl_socket *socket, struct can_netlink *told)
 		struct nlmsghdr align;
 		char bytes[ANSWER_MAX];
 	} buffer;
-	int64_t end = now_ns() + WAIT_S * NS_PER_S;
+	int64_t end = incise_monotonic_ns() + WAIT_S * NS_PER_S;
 
 	do {
 		ssize_t n = mnl_socket_recvfrom(socket, &buffer, sizeof(buffer));
@@ -225,7 +217,7 @@ static int answer(const struct mnl_socket *socket, struct can_netlink *told)
 			return -errno;
 		if (rc)
 			return rc < 0 ? rc : 0;
-	} while (now_ns() < end);
+	} while (incise_monotonic_ns() < end);
 	return -ETIMEDOUT;
 }
 

@@ -22,6 +22,7 @@
 #include <string.h>
 #include <time.h>
 #include <linux/can/error.h>
+#include "../../base/monotonic.h"
 #include "can_bus.h"
 #include "slcan_line.h"
 #include "slcan_status.h"
@@ -55,11 +56,8 @@ static struct slcan *of(struct can_bus *bus)
 
 static int64_t slcan_now(struct can_bus *bus)
 {
-	struct timespec now;
-
 	(void)bus;
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * NS_PER_S + now.tv_nsec;
+	return incise_monotonic_ns();
 }
 
 static int slcan_send(struct can_bus *bus, const struct can_frame *frame)

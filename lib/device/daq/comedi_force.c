@@ -8,8 +8,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
+#include "../../base/monotonic.h"
 #include "comedi_card.h"
 #include "comedi_force.h"
 #include "comedi_stamps.h"
@@ -32,14 +32,6 @@ struct comedi_force {
 	unsigned int rest; /* bytes of a sample that has come in part */
 	_Alignas(8) unsigned char block[BLOCK_BYTES];
 };
-
-static int64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
-}
 
 /* Samples that would have come while no command ran; an overflow lost one at least. */
 static void count_gap(struct comedi_force *f, int64_t last_ns, int64_t t_ns)
@@ -87,7 +79,7 @@ static int restart(struct comedi_force *f)
 	comedi_cancel(f->card.device, f->card.subdevice);
 	f->rest = 0;
 	f->gap = true;
-	f->heard_ns = now_ns();
+	f->heard_ns = incise_monotonic_ns();
 	comedi_stamps_begin(&f->stamps, f->heard_ns);
 	return comedi_card_start(&f->card);
 }
@@ -98,7 +90,7 @@ static int judge(struct comedi_force *f, ssize_t got)
 	double dead_ns = DEAD_NS + PERIODS_DEAD * f->card.period_ns;
 
 	if (got > 0) {
-		f->heard_ns = now_ns();
+		f->heard_ns = incise_monotonic_ns();
 		f->restarts = 0;
 		pass_on(f, f->rest + (size_t)got, f->rest + (size_t)got < BLOCK_BYTES);
 		return 0;
@@ -112,7 +104,7 @@ static int judge(struct comedi_force *f, ssize_t got)
 		return got == -ENODEV || got == -ENXIO ? -ENODEV : -EIO;
 	/* A card that waits for its store to fill may be asked for what it has. */
 	comedi_poll(f->card.device, f->card.subdevice);
-	return (double)(now_ns() - f->heard_ns) > dead_ns ? -EIO : 0;
+	return (double)(incise_monotonic_ns() - f->heard_ns) > dead_ns ? -EIO : 0;
 }
 
 static void *run(void *argument)
@@ -167,7 +159,7 @@ static int start(struct comedi_force *f, struct incise_error *err)
 	if (!rc && fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK) < 0)
 		rc = -errno;
 	if (!rc) {
-		f->heard_ns = now_ns();
+		f->heard_ns = incise_monotonic_ns();
 		comedi_stamps_begin(&f->stamps, f->heard_ns);
 		rc = comedi_card_start(&f->card);
 	}

@@ -19,6 +19,7 @@
 #include <sys/mman.h>
 #include <time.h>
 #include <incise/clock.h>
+#include "../../base/monotonic.h"
 #include "../motor.h"
 #include "../thread.h"
 #include "gpio_lines.h"
@@ -51,14 +52,6 @@ struct gpio_stepper {
 	bool runs;
 };
 
-static int64_t clock_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
-}
-
 static void sleep_until(int64_t t_ns)
 {
 	struct timespec until = {t_ns / INCISE_NS_PER_S, t_ns % INCISE_NS_PER_S};
@@ -71,7 +64,7 @@ static void sleep_until(int64_t t_ns)
 static int64_t world_now(void *world)
 {
 	(void)world;
-	return clock_ns();
+	return incise_monotonic_ns();
 }
 
 static int world_write(void *world, enum incise_pulser_output output, bool active)
@@ -151,7 +144,7 @@ static void *thread_run(void *argument)
 			atomic_store_explicit(&g->command, NONE, memory_order_release);
 			continue;
 		}
-		if (due - clock_ns() > spin_ns)
+		if (due - incise_monotonic_ns() > spin_ns)
 			sleep_until(due - spin_ns);
 	}
 	return NULL;
@@ -166,13 +159,13 @@ static struct gpio_stepper *of(struct incise_motor *motor)
 
 static int ask(struct gpio_stepper *g, enum command command)
 {
-	int64_t end = clock_ns() + ANSWER_NS;
+	int64_t end = incise_monotonic_ns() + ANSWER_NS;
 
 	atomic_store_explicit(&g->command, command, memory_order_release);
 	while (atomic_load_explicit(&g->command, memory_order_acquire) != NONE) {
-		if (clock_ns() > end && command != END)
+		if (incise_monotonic_ns() > end && command != END)
 			return -EIO;
-		sleep_until(clock_ns() + 50000);
+		sleep_until(incise_monotonic_ns() + 50000);
 	}
 	return g->answer;
 }
@@ -203,7 +196,7 @@ static int gpio_origin(struct incise_motor *motor, int32_t steps, bool homed)
 static int64_t gpio_now(struct incise_motor *motor)
 {
 	(void)motor;
-	return clock_ns();
+	return incise_monotonic_ns();
 }
 
 static void gpio_close(struct incise_motor *motor)
@@ -236,18 +229,18 @@ static int self_test(struct gpio_stepper *g, uint32_t *rate_max, uint32_t *pulse
 	int64_t late[SLEEPS], write[WRITES], step_ns;
 
 	for (int i = 0; i < SLEEPS; i++) {
-		int64_t due = clock_ns() + SLEEP_NS;
+		int64_t due = incise_monotonic_ns() + SLEEP_NS;
 
 		sleep_until(due);
-		late[i] = clock_ns() - due;
+		late[i] = incise_monotonic_ns() - due;
 	}
 	for (int i = 0; i < WRITES; i++) {
-		int64_t begin = clock_ns();
+		int64_t begin = incise_monotonic_ns();
 		int rc = world_write(g, INCISE_PULSER_STEP, false);
 
 		if (rc < 0 || (rc = world_inputs(g)) < 0)
 			return rc;
-		write[i] = clock_ns() - begin;
+		write[i] = incise_monotonic_ns() - begin;
 	}
 	qsort(late, SLEEPS, sizeof(*late), ascending);
 	qsort(write, WRITES, sizeof(*write), ascending);

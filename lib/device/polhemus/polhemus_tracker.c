@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
+#include "../../base/monotonic.h"
 #include "../thread.h"
 #include "polhemus_setup.h"
 #include "polhemus_stream.h"
@@ -34,17 +35,9 @@ static struct polhemus_tracker *of_tracker(const struct incise_tracker *tracker)
 	return (struct polhemus_tracker *)tracker;
 }
 
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INT64_C(1000000000) + ts.tv_nsec;
-}
-
 static int64_t now_ms(void)
 {
-	return now_ns() / 1000000;
+	return incise_monotonic_ns() / 1000000;
 }
 
 /* Wait for it to come back. false: it did not, or close() does not want to wait. */
@@ -63,7 +56,7 @@ static bool recover(struct polhemus_tracker *t)
 			return true;
 		}
 		/* It may never come back, or not before it is closed. */
-		polhemus_stream_silent(&t->stream, now_ns());
+		polhemus_stream_silent(&t->stream, incise_monotonic_ns());
 		if (now_ms() - began_ms >= t->times.gone_ms)
 			return false;
 		nanosleep(&pause, NULL);
@@ -111,7 +104,7 @@ static void *run(void *argument)
 		before_ms = now;
 		/* Less may be a host that is busy; pulses from outside may pause. */
 		if (n < 0 || silent_ms >= LOST_MS)
-			polhemus_stream_silent(&t->stream, now_ns());
+			polhemus_stream_silent(&t->stream, incise_monotonic_ns());
 		if (n >= 0 && !is_dumb(t, silent_ms, noise))
 			continue;
 		if (!recover(t))
@@ -228,7 +221,7 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 		rc = incise_error_set(err, ENOMEM,
 				      "%s: out of memory: end other programs", where);
 	if (!rc) {
-		polhemus_stream_start(&t->stream, now_ns());
+		polhemus_stream_start(&t->stream, incise_monotonic_ns());
 		t->line->stop = &t->stop;
 		rc = incise_thread_start(&t->thread, run, t, &real_time);
 		if (!rc)

@@ -10,8 +10,8 @@
 #include <string.h>
 #include <sys/ioctl.h>
 #include <termios.h>
-#include <time.h>
 #include <unistd.h>
+#include "../../base/monotonic.h"
 #include "../tty.h"
 #include "polhemus_tty.h"
 
@@ -37,14 +37,6 @@ static const struct {
 static struct polhemus_tty *of_line(struct polhemus_line *line)
 {
 	return (struct polhemus_tty *)line;
-}
-
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INT64_C(1000000000) + ts.tv_nsec;
 }
 
 /* A line that was pulled out answers EIO, or nothing at all. */
@@ -81,18 +73,18 @@ static ssize_t tty_read(struct polhemus_line *line, void *bytes, size_t size,
 {
 	struct polhemus_tty *tty = of_line(line);
 	struct pollfd waits = {.fd = tty->fd, .events = POLLIN};
-	int64_t end_ns = now_ns() + timeout_ms * NS_PER_MS, left_ns;
+	int64_t end_ns = incise_monotonic_ns() + timeout_ms * NS_PER_MS, left_ns;
 
 	if (tty->fd < 0)
 		return -ENODEV;
 	/* While it is set up a signal of the program may come, which is no end of time. */
-	while ((left_ns = end_ns - now_ns()) > 0) {
+	while ((left_ns = end_ns - incise_monotonic_ns()) > 0) {
 		ssize_t n;
 
 		if (!poll(&waits, 1, (int)((left_ns + NS_PER_MS - 1) / NS_PER_MS)))
 			break;
 		n = read(tty->fd, bytes, size);
-		*t_ns = now_ns();
+		*t_ns = incise_monotonic_ns();
 		/* VMIN is 1: no byte is the end, not a pause. */
 		if (n >= 0)
 			return n ? n : -ENODEV;

@@ -7,8 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <libusb.h>
+#include "../../base/monotonic.h"
 #include "polhemus_usb.h"
 #include "polhemus_usb_find.h"
 
@@ -49,14 +49,6 @@ static struct polhemus_usb *of_line(struct polhemus_line *line)
 	return (struct polhemus_usb *)line;
 }
 
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INT64_C(1000000000) + ts.tv_nsec;
-}
-
 /* On its way again, if there is a place for what it brings. */
 static void send_off(struct polhemus_usb *usb, struct libusb_transfer *transfer)
 {
@@ -77,7 +69,7 @@ static void LIBUSB_CALL completed(struct libusb_transfer *transfer)
 	/* There is room: it was only sent off because there was. */
 	if (transfer->status == LIBUSB_TRANSFER_COMPLETED &&
 	    transfer->actual_length > 0) {
-		packet->t_ns = now_ns();
+		packet->t_ns = incise_monotonic_ns();
 		packet->n = (size_t)transfer->actual_length;
 		memcpy(packet->bytes, transfer->buffer, packet->n);
 		usb->head++;
@@ -300,13 +292,13 @@ static int usb_write(struct polhemus_line *line, const void *bytes, size_t n)
 /* Until a packet waits, or it is gone, or time is over: other events wake it as well. */
 static void await_packet(struct polhemus_usb *usb, int timeout_ms)
 {
-	int64_t end_ns = now_ns() + timeout_ms * INT64_C(1000000), left_ns;
+	int64_t end_ns = incise_monotonic_ns() + timeout_ms * INT64_C(1000000), left_ns;
 	struct timeval left;
 
 	while (usb->n_resting && usb->head == usb->tail && !usb->gone)
 		send_off(usb, usb->resting[--usb->n_resting]);
 	while (usb->head == usb->tail && !usb->gone &&
-	       (left_ns = end_ns - now_ns()) > 0) {
+	       (left_ns = end_ns - incise_monotonic_ns()) > 0) {
 		left = (struct timeval){left_ns / 1000000000,
 					left_ns % 1000000000 / 1000};
 		if (libusb_handle_events_timeout_completed(usb->context, &left, NULL))

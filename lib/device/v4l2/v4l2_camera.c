@@ -15,9 +15,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 #include <linux/videodev2.h>
+#include "../../base/monotonic.h"
 #include "../thread.h"
 #include "v4l2_camera.h"
 #include "v4l2_controls.h"
@@ -47,18 +47,10 @@ static const struct v4l2_camera *of(const struct incise_camera *camera)
 	return (const struct v4l2_camera *)camera;
 }
 
-static int64_t clock_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
-}
-
 static void *thread_run(void *argument)
 {
 	struct v4l2_camera *c = argument;
-	int64_t checked_ns = clock_ns();
+	int64_t checked_ns = incise_monotonic_ns();
 	int pictures = 0, rc = 0;
 
 	while (rc >= 0 && !atomic_load_explicit(&c->stop, memory_order_relaxed)) {
@@ -66,10 +58,11 @@ static void *thread_run(void *argument)
 		if (rc < 0)
 			break;
 		pictures += rc;
-		if (pictures < CHECK_PICTURES && clock_ns() - checked_ns < CHECK_NS)
+		if (pictures < CHECK_PICTURES &&
+		    incise_monotonic_ns() - checked_ns < CHECK_NS)
 			continue;
 		rc = v4l2_controls_check(&c->controls, c->where, &c->cause);
-		checked_ns = clock_ns();
+		checked_ns = incise_monotonic_ns();
 		pictures = 0;
 	}
 	atomic_store_explicit(&c->end, rc < 0 ? rc : 0, memory_order_release);

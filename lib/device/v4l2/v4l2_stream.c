@@ -11,6 +11,7 @@
 #include <time.h>
 #include <incise/clock.h>
 #include <linux/videodev2.h>
+#include "../../base/monotonic.h"
 #include "v4l2_file.h"
 #include "v4l2_stream.h"
 
@@ -29,14 +30,6 @@
  */
 #define FUTURE_NS 300000000
 #define JUMP_MOST 1000 /* step of the count that a damaged picture may make */
-
-static int64_t clock_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
-}
 
 static struct v4l2_buffer buffer_at(uint32_t index)
 {
@@ -167,7 +160,7 @@ int v4l2_stream_start(struct v4l2_stream *s, int fd, const struct v4l2_shape *sh
 							"begin: %s",
 					where, strerror(-rc));
 	s->runs = true;
-	s->seen_ns = clock_ns();
+	s->seen_ns = incise_monotonic_ns();
 	return 0;
 }
 
@@ -340,7 +333,7 @@ static int check_silence(const struct v4l2_stream *s, struct incise_error *err)
 
 	if (periods_s * 1e9 > (double)most)
 		most = (int64_t)(periods_s * 1e9);
-	if (clock_ns() - s->seen_ns < most)
+	if (incise_monotonic_ns() - s->seen_ns < most)
 		return 0;
 	return incise_error_set(err, EIO,
 				"%s: no picture came from the camera for %.0f s; look at "
@@ -393,7 +386,7 @@ int v4l2_stream_step(struct v4l2_stream *s, int timeout_ms, struct incise_error 
 	if (rc)
 		return no_picture(s, rc, ready.revents, err);
 	s->errors = 0;
-	s->seen_ns = clock_ns();
+	s->seen_ns = incise_monotonic_ns();
 	rc = take(s, &buffer, s->seen_ns, err);
 	return rc ? rc : 1;
 }

@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The time that all stamps are of: CLOCK_MONOTONIC, in ns. Real-time safe (vDSO). What follows
+ * a rig's clock, which may be simulated, asks incise_clock_now().
+ */
+#ifndef INCISE_BASE_MONOTONIC_H
+#define INCISE_BASE_MONOTONIC_H
+
+#include <stdint.h>
+#include <time.h>
+
+static inline int64_t incise_monotonic_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
+}
+
+#endif
