@@ -18,6 +18,7 @@
 #include <math.h>
 #include "../../lib/device/polhemus/polhemus_tracker.h"
 #include "../../lib/device/polhemus/polhemus_tty.h"
+#include "../polhemus/sent.h"
 #include "../unit/polhemus/pty.h"
 
 #define HZ 120
@@ -90,22 +91,6 @@ static void end(struct line *l)
 	pty_unplug(&l->pty);
 }
 
-/* To the float's last digit; the quaternion was made unit. */
-static bool is_sent(const struct incise_tracker_sample *s,
-		    const struct emulator_sent *sent)
-{
-	struct emulator_pose pose = emulator_pose(sent->slot, sent->station);
-
-	for (int i = 0; i < 3; i++)
-		if (s->position_mm[i] != (double)pose.xyz_cm[i] * 10)
-			return false;
-	for (int i = 0; i < 4; i++)
-		if (fabs(s->quaternion[i] - (double)pose.q[i]) > 5e-7)
-			return false;
-	return s->station == sent->station && s->button == pose.button &&
-	       s->status == pose.error;
-}
-
 /* Whether all is as it should be. */
 static bool compare(const struct line *l)
 {
@@ -122,7 +107,7 @@ static bool compare(const struct line *l)
 
 		doubled += i && s->seq <= s[-1].seq;
 		while (at < e->n_sent && e->sent[at].t_ns <= s->t_ns &&
-		       !is_sent(s, &e->sent[at]))
+		       !polhemus_is_sent(s, &e->sent[at]))
 			at++;
 		if (at == e->n_sent || e->sent[at].t_ns > s->t_ns) {
 			/* None that was sent, so one that came to harm. */

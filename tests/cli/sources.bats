@@ -34,6 +34,16 @@ teardown() {
 	[ -z "$fastrak" ] || kill "$fastrak"
 }
 
+# Until the capture in the background has more records of the tracker than that.
+until_records() {
+	for _ in $(seq 100); do
+		[ "$(sqlite3 -readonly a.rec.part/recording.db \
+			'SELECT count(*) FROM tracker' 2>/dev/null)" -gt "$1" ] 2>/dev/null && return
+		sleep 0.1
+	done
+	complain "no $1 records after 10 s; capture said: $(cat err)"
+}
+
 # One value of a recording.
 ask() {
 	sqlite3 "$1/recording.db" "$2"
@@ -91,11 +101,7 @@ ask() {
 	plug_in
 	incise capture -o a.rec --duration 8s >out 2>err 3>&- 9>&- &
 	capture=$!
-	for _ in $(seq 100); do
-		[ "$(sqlite3 -readonly a.rec.part/recording.db \
-			'SELECT count(*) FROM tracker' 2>/dev/null)" -gt 120 ] 2>/dev/null && break
-		sleep 0.1
-	done
+	until_records 120
 	echo unplug >&9
 	sleep 1
 	echo plug >&9
@@ -119,11 +125,7 @@ ask() {
 	plug_in
 	incise capture -o a.rec --duration 5s >out 2>err 3>&- 9>&- &
 	capture=$!
-	for _ in $(seq 100); do
-		[ "$(sqlite3 -readonly a.rec.part/recording.db \
-			'SELECT count(*) FROM tracker' 2>/dev/null)" -gt 0 ] 2>/dev/null && break
-		sleep 0.1
-	done
+	until_records 0
 	echo unplug >&9
 	wait $capture || code=$?
 	[ "$code" = 1 ]

@@ -5,28 +5,18 @@
  */
 #include <string.h>
 #include <linux/can/netlink.h>
+#include "../../base/hex.h"
 #include "slcan_line.h"
 
 #define CR '\r'
 #define BEL '\a'
-
-static int digit(char c)
-{
-	if (c >= '0' && c <= '9')
-		return c - '0';
-	if (c >= 'A' && c <= 'F')
-		return c - 'A' + 10;
-	if (c >= 'a' && c <= 'f')
-		return c - 'a' + 10;
-	return -1;
-}
 
 /* @n hex digits, at most 8. */
 static bool number(const char *text, unsigned int n, uint32_t *value)
 {
 	*value = 0;
 	for (unsigned int i = 0; i < n; i++) {
-		int d = digit(text[i]);
+		int d = incise_hex_digit(text[i]);
 
 		if (d < 0)
 			return false;

@@ -3,21 +3,11 @@
  * What a tracker answers to a command; see polhemus_reply.h.
  */
 #include <string.h>
+#include "../../base/hex.h"
 #include "polhemus_model.h"
 #include "polhemus_reply.h"
 
 enum { FLAG_BINARY = 1, FLAG_CM = 2, FLAG_COMPENSATED = 4, FLAG_CONTINUOUS = 8 };
-
-static int hex(unsigned char c)
-{
-	if (c >= '0' && c <= '9')
-		return c - '0';
-	if (c >= 'A' && c <= 'F')
-		return c - 'A' + 10;
-	if (c >= 'a' && c <= 'f')
-		return c - 'a' + 10;
-	return -1;
-}
 
 static bool is_digit(char c)
 {
@@ -50,9 +40,9 @@ bool polhemus_status_read(const unsigned char *bytes, size_t n,
 	    bytes[1] > '4' || bytes[2] != 'S' || bytes[53] != '\r' || bytes[54] != '\n')
 		return false;
 	for (int i = 3; i < 6; i++) {
-		if (hex(bytes[i]) < 0)
+		if (incise_hex_digit(bytes[i]) < 0)
 			return false;
-		flags = flags * 16 + (unsigned int)hex(bytes[i]);
+		flags = flags * 16 + (unsigned int)incise_hex_digit(bytes[i]);
 	}
 	memcpy(digits, bytes + 6, 3);
 	if (polhemus_reply_numbers(digits, &error, 1) < 0)
@@ -63,7 +53,7 @@ bool polhemus_status_read(const unsigned char *bytes, size_t n,
 	status->compensated = flags & FLAG_COMPENSATED;
 	status->continuous = flags & FLAG_CONTINUOUS;
 	status->test_error = (int)error;
-	status->sensors = hex(bytes[12]);
+	status->sensors = incise_hex_digit(bytes[12]);
 	copy_text(status->version, bytes + 15, 6);
 	copy_text(status->id, bytes + 21, 32);
 	return true;

@@ -6,6 +6,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
+#include "../../base/hex.h"
 #include "polhemus_usb_name.h"
 
 /* Four hexadecimal digits. */
@@ -14,16 +15,11 @@ static int read_id(const char *text, uint16_t *id)
 	unsigned int value = 0;
 
 	for (int i = 0; i < 4; i++) {
-		char c = text[i];
+		int digit = incise_hex_digit(text[i]);
 
-		if (c >= '0' && c <= '9')
-			value = value * 16 + (unsigned int)(c - '0');
-		else if (c >= 'a' && c <= 'f')
-			value = value * 16 + (unsigned int)(c - 'a' + 10);
-		else if (c >= 'A' && c <= 'F')
-			value = value * 16 + (unsigned int)(c - 'A' + 10);
-		else
+		if (digit < 0)
 			return -EINVAL;
+		value = value * 16 + (unsigned int)digit;
 	}
 	*id = (uint16_t)value;
 	return 0;

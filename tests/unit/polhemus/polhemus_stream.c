@@ -14,6 +14,7 @@
 #include <string.h>
 #include "../../../lib/device/polhemus/polhemus_setup.h"
 #include "../../../lib/device/polhemus/polhemus_stream.h"
+#include "../../polhemus/sent.h"
 #include "line.h"
 
 #define S INT64_C(1000000000)
@@ -83,23 +84,6 @@ static void bench_run(struct bench *b, double seconds)
 	}
 }
 
-/* Whether a sample is what the emulator sent in this slot, to the float's last digit. */
-static bool is_sent(const struct incise_tracker_sample *s,
-		    const struct emulator_sent *sent)
-{
-	struct emulator_pose pose = emulator_pose(sent->slot, sent->station);
-
-	for (int i = 0; i < 3; i++)
-		if (s->position_mm[i] != (double)pose.xyz_cm[i] * 10)
-			return false;
-	/* It is made unit: the float's rounding, 4 times 6e-8. */
-	for (int i = 0; i < 4; i++)
-		if (fabs(s->quaternion[i] - (double)pose.q[i]) > 5e-7)
-			return false;
-	return s->station == sent->station && s->button == pose.button &&
-	       s->status == pose.error;
-}
-
 /*
  * Every record that was not touched is there, once, in order, with a seq that counts all
  * that were before it; how many touched ones are there as well.
@@ -115,7 +99,7 @@ static size_t compare(struct bench *b, int64_t late_ns, uint64_t slack)
 		/* The last ones may be on their way. */
 		if (at == b->n)
 			break;
-		if (is_sent(&b->samples[at], sent)) {
+		if (polhemus_is_sent(&b->samples[at], sent)) {
 			const struct incise_tracker_sample *s = &b->samples[at++];
 
 			assert_true(s->t_ns >= sent->t_ns &&

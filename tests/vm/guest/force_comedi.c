@@ -24,6 +24,7 @@
 
 #include <comedilib.h>
 #include "../../../lib/device/daq/comedi_force.h"
+#include "../hold.h"
 #include "../tap.h"
 
 #define DEVICE "/dev/comedi0:0"
@@ -110,19 +111,6 @@ static void stamps_off(int n, double *least, double *most)
 	}
 }
 
-static void hold(int ms)
-{
-	pid_t me = getpid(), child = fork();
-
-	if (!child) {
-		kill(me, SIGSTOP);
-		nap(ms);
-		kill(me, SIGCONT);
-		_exit(0);
-	}
-	waitpid(child, NULL, 0);
-}
-
 static void two_seconds(void)
 {
 	struct incise_force_info info;
@@ -189,7 +177,7 @@ static void overflow_is_counted(void)
 	if (!check(force, "it opens for an overflow %s", err.text))
 		return;
 	take(force, HZ);
-	hold(8000);
+	hold_ms(8000);
 	n = take(force, 10 * HZ);
 	incise_force_info(force, &info);
 	for (int i = 1; i < n; i++) {

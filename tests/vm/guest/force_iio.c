@@ -22,6 +22,7 @@
 
 #include "../../../lib/device/daq/iio_force.h"
 #include "../../../lib/device/daq/iio_trigger.h"
+#include "../hold.h"
 #include "../simulator.h"
 #include "../tap.h"
 
@@ -91,20 +92,6 @@ static void feed_ramp(void)
 	simulator_write("adc/control", "repeat");
 	simulator_write_bytes("adc/waveform", ramp, sizeof(ramp));
 	simulator_write("adc/control", "reset");
-}
-
-/* Stops this program, all of its threads, for so long. */
-static void hold(int ms)
-{
-	pid_t me = getpid(), child = fork();
-
-	if (!child) {
-		kill(me, SIGSTOP);
-		nap(ms);
-		kill(me, SIGCONT);
-		_exit(0);
-	}
-	waitpid(child, NULL, 0);
 }
 
 /*
@@ -200,7 +187,7 @@ static void overflow_is_counted(void)
 	if (!check(force, "it opens for an overflow %s", err.text))
 		return;
 	take(force, HZ, 5000, &rc);
-	hold(2000);
+	hold_ms(2000);
 	more = take(force, 2 * HZ, 5000, &rc);
 	overflows = counted("overflows") + counted("lost") + counted("skipped");
 	incise_force_info(force, &info);
