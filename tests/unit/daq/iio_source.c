@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/daq/iio_source.c and iio_rate.c on a converter that a test makes: what is set
+ * lib/device/daq/iio_source.c on a converter that a test makes: what is set
  * and put back, and each refusal. The linker hands open() of a device's file to here.
  */
 #include <stdarg.h>

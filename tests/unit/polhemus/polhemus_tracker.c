@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/polhemus/polhemus_tracker.c, polhemus_tty.c and the backend "tty", through their
- * door, with the emulator behind a pseudo terminal. Nothing is held to the clock: a host that is
- * busy makes it wait longer.
+ * lib/device/polhemus/polhemus_tracker.c through its door, with the emulator behind a pseudo
+ * terminal. Nothing is held to the clock: a host that is busy makes it wait longer.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +12,6 @@
 #include <sys/file.h>
 #include "../../../lib/device/polhemus/polhemus_tracker.h"
 #include "../../../lib/device/polhemus/polhemus_tty.h"
-#include "../../../lib/device/polhemus/tracker_tty.c"
 #include "pty.h"
 
 #define PATIENCE_NS INT64_C(20000000000)
@@ -75,10 +73,8 @@ static int read_some(struct incise_tracker *tracker, uint64_t *next, int n)
 
 static void through_the_door(void **state)
 {
-	const struct incise_backend_request request = {
-		.arguments = pty.path, .where = "rig.conf:1: tracker", .tracker = &two};
 	struct incise_error err = {0};
-	struct incise_tracker *tracker = incise_backend.open(&request, &err);
+	struct incise_tracker *tracker = open_it(&POLHEMUS_TIMES, &err);
 	struct incise_tracker_info info;
 	uint64_t next = 0;
 	int fd;
@@ -260,20 +256,6 @@ static void gone_for_good(void **state)
 
 static void refuses(void **state)
 {
-	static const struct {
-		const char *arguments;
-		int code;
-	} cases[] = {
-		{"", EINVAL},
-		{"ttyUSB0:9600", EINVAL},
-		{"/dev/null:115201", EINVAL},
-		{"/dev/null:99999999999", EINVAL},
-		{"/dev/null:9600", EINVAL},
-		{"/tmp", EINVAL},
-		{"/dev/not-there", ENODEV},
-		{"/dev/not:there:9600", ENODEV},
-		{"/dev/null/x", ENODEV},
-	};
 	static const struct incise_tracker_setup bad[] = {
 		{.n_stations = 0, .hemisphere = {1, 0, 0}},
 		{.n_stations = 5, .stations = {1, 2, 3, 4}, .hemisphere = {1, 0, 0}},
@@ -288,12 +270,6 @@ static void refuses(void **state)
 	};
 	struct incise_error err;
 
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		err = (struct incise_error){0};
-		assert_null(polhemus_tty_open(cases[i].arguments, "rig.conf", &err));
-		if (errno != cases[i].code || err.code != errno)
-			fail_msg("%s: %s", cases[i].arguments, err.text);
-	}
 	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++) {
 		struct polhemus_line *line =
 			polhemus_tty_open(pty.path, "rig.conf", &err);
@@ -305,33 +281,6 @@ static void refuses(void **state)
 	}
 }
 
-static int count_found(void *context, const struct incise_scan_device *device)
-{
-	struct incise_scan_device *last = context;
-
-	*last = *device;
-	return 0;
-}
-
-static void a_scan(void **state)
-{
-	struct incise_scan_device found = {0};
-	struct incise_error err = {0};
-	char arguments[80];
-
-	snprintf(arguments, sizeof(arguments), "%s:115200", pty.path);
-	if (incise_backend.scan(arguments, count_found, &found, &err))
-		fail_msg("%s", err.text);
-	assert_non_null(strstr(found.device, arguments));
-	assert_string_equal(found.what, "FASTRAK 3.02 OutputCompensat CPG2030-003-10");
-	assert_int_equal(found.n, 3);
-	assert_string_equal(found.property[2].text, "13");
-	assert_true(found.usable);
-	assert_int_equal(incise_backend.scan("/dev/not-there", count_found, &found, &err),
-			 -ENODEV);
-	assert_int_equal(incise_backend.scan("", count_found, &found, &err), 0);
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -341,7 +290,6 @@ int main(void)
 		cmocka_unit_test_setup_teardown(stood_still, begin, end),
 		cmocka_unit_test_setup_teardown(gone_for_good, begin, end),
 		cmocka_unit_test_setup_teardown(refuses, begin, end),
-		cmocka_unit_test_setup_teardown(a_scan, begin, end),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

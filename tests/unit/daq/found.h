@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * What a scan finds, kept for a test to look at.
+ */
+#ifndef INCISE_TEST_DAQ_FOUND_H
+#define INCISE_TEST_DAQ_FOUND_H
+
+#include <string.h>
+#include <incise/scan.h>
+
+struct found {
+	int n;
+	int answer; /* to the scan */
+	struct incise_scan_device device[4];
+};
+
+static inline int keep(void *context, const struct incise_scan_device *device)
+{
+	struct found *found = context;
+
+	if (found->n < 4)
+		found->device[found->n] = *device;
+	found->n++;
+	return found->answer;
+}
+
+/* "" where it is not told. */
+static inline const char *told(const struct incise_scan_device *device, const char *key)
+{
+	for (int i = 0; i < device->n; i++)
+		if (!strcmp(device->property[i].key, key))
+			return device->property[i].text;
+	return "";
+}
+
+#endif

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/polhemus/polhemus_tty.c: names that are no line, and bytes over one whose other end
+ * the test holds. A tracker over it is in polhemus_tracker.c.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "../../../lib/device/polhemus/polhemus_tty.h"
+
+static int master;
+static char path[64];
+
+static int begin(void **state)
+{
+	master = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
+	return master < 0 || grantpt(master) || unlockpt(master) ||
+	       ptsname_r(master, path, sizeof(path));
+}
+
+static int end(void **state)
+{
+	return master < 0 ? 0 : close(master);
+}
+
+static void names(void **state)
+{
+	static const struct {
+		const char *arguments;
+		int code;
+	} cases[] = {
+		{"", EINVAL},
+		{"ttyUSB0:9600", EINVAL},
+		{"/dev/null:115201", EINVAL},
+		{"/dev/null:99999999999", EINVAL},
+		{"/dev/null:9600", EINVAL},
+		{"/tmp", EINVAL},
+		{"/dev/not-there", ENODEV},
+		{"/dev/not:there:9600", ENODEV},
+		{"/dev/null/x", ENODEV},
+	};
+	struct incise_error err;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		err = (struct incise_error){0};
+		assert_null(polhemus_tty_open(cases[i].arguments, "rig.conf", &err));
+		if (errno != cases[i].code || err.code != errno)
+			fail_msg("%s: %s", cases[i].arguments, err.text);
+	}
+}
+
+static void there_and_back(void **state)
+{
+	struct incise_error err = {0};
+	struct polhemus_line *line = polhemus_tty_open(path, "rig.conf", &err);
+	unsigned char bytes[16];
+	int64_t t_ns = 0, before;
+
+	if (!line)
+		fail_msg("%s", err.text);
+	assert_int_equal(line->family, -1);
+	/* ten bits a byte at the usual rate */
+	assert_int_equal(line->ns_per_byte, 10 * INT64_C(1000000000) / 115200);
+	assert_string_equal(line->name, path);
+	assert_int_equal(line->ops->write(line, "P\r", 2), 0);
+	assert_int_equal(read(master, bytes, sizeof(bytes)), 2);
+	assert_memory_equal(bytes, "P\r", 2);
+	/* Nothing comes: no error. What comes has a time. */
+	assert_int_equal(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 1), 0);
+	before = t_ns;
+	assert_int_equal(write(master, "01 \r\n", 5), 5);
+	assert_int_equal(line->ops->read(line, bytes, 3, &t_ns, 1000), 3);
+	assert_true(t_ns > before);
+	assert_int_equal(line->ops->read(line, bytes + 3, 13, &t_ns, 1000), 2);
+	assert_memory_equal(bytes, "01 \r\n", 5);
+	line->ops->close(line);
+}
+
+static void pulled_out(void **state)
+{
+	struct incise_error err = {0};
+	struct polhemus_line *line = polhemus_tty_open(path, "rig.conf", &err);
+	unsigned char bytes[16];
+	int64_t t_ns;
+
+	assert_non_null(line);
+	close(master);
+	master = -1;
+	assert_int_equal(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 1000),
+			 -ENODEV);
+	assert_int_equal(line->ops->write(line, "P", 1), -ENODEV);
+	assert_true(line->ops->reopen(line) < 0);
+	assert_int_equal(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 1), -ENODEV);
+	line->ops->close(line);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(names),
+		cmocka_unit_test_setup_teardown(there_and_back, begin, end),
+		cmocka_unit_test_setup_teardown(pulled_out, begin, end),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
