@@ -223,8 +223,12 @@ static void measure_gap(struct incise_envelope *env, double *excess, int n,
 			(high + env->gap_ns) / pow(-log(1 - 0.625), 1 / env->shape);
 		env->gap_ns = env->scale_ns * pow(2.0 / n, 1 / env->shape);
 	}
-	env->gap_sd_ns = env->gap_ns / env->shape + ROUNDING_NS;
-	env->slope_sd = span_ns > 0 ? 5 * env->gap_sd_ns / span_ns : env->prior_slope_sd;
+	/* Scatter of the gap is by its shape, but the shape itself was never seen down there,
+	 * where none arrived: nearly all of the gap may be wrong. */
+	env->gap_sd_ns = env->gap_ns * fmax(1 / env->shape, 0.8) + ROUNDING_NS;
+	env->slope_sd = env->prior_slope_sd;
+	if (span_ns > 0)
+		env->slope_sd = 5 * (env->gap_ns / env->shape + ROUNDING_NS) / span_ns;
 }
 
 /*

@@ -77,7 +77,7 @@ static void measure_jitter(struct incise_timeline *timeline, double excess_ns)
 static double on_line(struct incise_timeline *timeline, uint64_t seq, int64_t arrival_ns)
 {
 	struct incise_envelope *env = &timeline->envelope;
-	double x_ns, y_ns, line_ns;
+	double x_ns = 0, y_ns = 0, line_ns;
 
 	if (timeline->period_ns <= 0)
 		return NAN;
@@ -95,7 +95,8 @@ static double on_line(struct incise_timeline *timeline, uint64_t seq, int64_t ar
 		timeline->lines++;
 		timeline->base_seq = seq;
 		timeline->base_ns = arrival_ns;
-		x_ns = y_ns = 0;
+		x_ns = 0;
+		y_ns = 0;
 	}
 	timeline->last_seq = seq;
 	timeline->last_arrival_ns = arrival_ns;
