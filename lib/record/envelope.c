@@ -33,15 +33,24 @@
 #define SHAPE_MAX 3.0
 /* Shape is averaged over so many lines: one set of 64 blocks gives it to ± 25 %. */
 #define SHAPE_FITS 256
+#define SHAPE_FITS_FIRST 32
+/* log(log(1 - 0.625) / log(1 - 0.25)): two quantiles of shape 1 */
+#define LOG_ODDS 1.22645
 
 void incise_envelope_init(struct incise_envelope *env, double period_ns, double grain_ns)
 {
 	memset(env, 0, sizeof(*env));
 	env->period_ns = period_ns;
 	env->grain_ns = grain_ns;
-	env->block_ns = fmin(period_ns, INCISE_ENVELOPE_BLOCK_MAX_NS);
+	/* so that doubling ends at the full length */
+	env->block_ns = INCISE_ENVELOPE_BLOCK_MAX_NS;
+	while (env->block_ns / 2 >= period_ns)
+		env->block_ns /= 2;
 	env->prior_slope_sd = SLOPE_SD_FIRST;
+	/* Until it is known, of shape 1, as if so many lines had told. */
 	env->shape = 1;
+	env->log_ratio = LOG_ODDS;
+	env->shape_fits = SHAPE_FITS_FIRST;
 }
 
 double incise_envelope_at(const struct incise_envelope *env, double x_ns)
@@ -64,7 +73,7 @@ double incise_envelope_sd(const struct incise_envelope *env, double x_ns)
 
 bool incise_envelope_full(const struct incise_envelope *env)
 {
-	return env->block_ns * 2 > INCISE_ENVELOPE_BLOCK_MAX_NS && env->count &&
+	return env->block_ns >= INCISE_ENVELOPE_BLOCK_MAX_NS && env->count &&
 	       env->blocks[env->count - 1].number - env->blocks[0].number >= BLOCKS - 1;
 }
 
@@ -100,7 +109,7 @@ static void close_block(struct incise_envelope *env)
 	int gone = 0;
 
 	while (env->count && open->number - env->blocks[0].number >= BLOCKS &&
-	       env->block_ns * 2 <= INCISE_ENVELOPE_BLOCK_MAX_NS) {
+	       env->block_ns < INCISE_ENVELOPE_BLOCK_MAX_NS) {
 		double_blocks(env);
 		open->number /= 2;
 	}
@@ -195,7 +204,6 @@ static void sort(double *values, int n)
 static void measure_gap(struct incise_envelope *env, double *excess, int n,
 			double span_ns)
 {
-	const double log_odds = log(log(1 - 0.625) / log(1 - 0.25));
 	double low, high;
 
 	sort(excess, n);
@@ -218,7 +226,7 @@ static void measure_gap(struct incise_envelope *env, double *excess, int n,
 			env->log_ratio += (ratio - env->log_ratio) / env->shape_fits;
 			ratio = env->log_ratio;
 		}
-		env->shape = fmin(fmax(log_odds / ratio, SHAPE_MIN), SHAPE_MAX);
+		env->shape = fmin(fmax(LOG_ODDS / ratio, SHAPE_MIN), SHAPE_MAX);
 		env->scale_ns =
 			(high + env->gap_ns) / pow(-log(1 - 0.625), 1 / env->shape);
 		env->gap_ns = env->scale_ns * pow(2.0 / n, 1 / env->shape);

@@ -9,7 +9,7 @@
  *       └──────────────────► x
  *
  * Of each block of x the lowest arrival is kept, 64 blocks at most. A block begins as one
- * period and doubles whenever the 64 are full, up to BLOCK_MAX_NS; from then on the oldest
+ * period or two and doubles whenever the 64 are full, up to BLOCK_MAX_NS; from then on the oldest
  * go, so that the line follows a clock that warms up.
  *
  * The line maximizes its own height over the blocks under the condition that none is below
