@@ -218,6 +218,29 @@ static void grids_are_admitted(void **state)
 	assert_true(rms(&after) <= 1.2e6);
 }
 
+/*
+ * A queue: who waits makes those behind wait. Where jitter is of several periods, hardly one
+ * arrives unhindered, and the shape of the lower end tells so. (With 10000 Hz and jitter of
+ * its own for each sample nobody could tell the queue from a longer delay.)
+ */
+static void queues_are_seen(void **state)
+{
+	struct errors live = {0}, after = {0};
+	struct incise_timeline timeline;
+
+	for (int seed = 0; seed < 16; seed++) {
+		struct stream stream = stream_of(120, UNIFORM, (uint64_t)seed + 300);
+		struct incise_timeline_setup setup = setup_of(&stream);
+
+		stream.in_order = true;
+		run(&stream, &setup, &timeline, &live, &after);
+	}
+	assert_true(rms(&live) <= 500e3);
+	assert_true(rms(&after) <= 500e3);
+	assert_true(coverage(&live) >= 0.95);
+	assert_true(coverage(&after) >= 0.95);
+}
+
 /* Kernel stamps with the jitter of an interrupt: 0.1 ms, of which most is the delay's. */
 static void stamps_are_taken(void **state)
 {
@@ -355,6 +378,10 @@ static void new_line_after_replug(void **state)
 		truth_ns[i] = stream_next(&stream, &arrival_ns);
 		if (i && i % (240 * 30) == 0) {
 			incise_timeline_replug(&timeline);
+			/* a fast device has short periods; 30 s told within 5 ppm */
+			assert_true(fabs(timeline.envelope.prior_slope * 1e6 +
+					 stream.drift_ppm) < 5);
+			assert_true(timeline.envelope.prior_slope_sd <= 20e-6);
 			shift_ns += 3.3e9 + 1e6;
 		}
 		truth_ns[i] += shift_ns;
@@ -541,6 +568,7 @@ int main(void)
 		cmocka_unit_test(times_always_increase),
 		cmocka_unit_test(arrivals_are_enough),
 		cmocka_unit_test(grids_are_admitted),
+		cmocka_unit_test(queues_are_seen),
 		cmocka_unit_test(stamps_are_taken),
 		cmocka_unit_test(delay_is_uncertain),
 		cmocka_unit_test(drift_is_followed),
