@@ -2,9 +2,10 @@
 /*
  * Writing a recording; see incise/recorder.h.
  *
- *     force ────► timeline ─────────────────► table force      one transaction
- *       └► zero: mean of the first 0.5 s ───► table meta    ──► per 100 ms of
- *     tracker ──► timeline ┬────────────────► table tracker     the rig's clock
+ *     force ────► timeline ┬────────────────► table force
+ *       └► zero: mean of the│first 0.5 s ───► table meta       one transaction
+ *                           ├► CRC, chained ► table ledger  ──► per 100 ms of
+ *     tracker ──► timeline ┬┴───────────────► table tracker     the rig's clock
  *                          └► depth, speed ─► table depth
  *
  * On a real clock each commit is synced, so a power cut costs no more than a kill: the
@@ -26,9 +27,10 @@
 
 static const char *const sql[STATEMENTS] = {
 	[INSERT_FORCE] = "INSERT INTO force VALUES(?,?,?)",
-	[INSERT_TRACKER] = "INSERT INTO tracker VALUES(?,?,?,?,?,?,?,?,?,?,?)",
+	[INSERT_TRACKER] = "INSERT INTO tracker VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?)",
 	[INSERT_DEPTH] = "INSERT INTO depth VALUES(?,?,?,?)",
 	[INSERT_EVENT] = "INSERT INTO events VALUES(?,?,?)",
+	[INSERT_LEDGER] = "INSERT INTO ledger VALUES(?,?,?,?,?,?,?,?,?)",
 	[SET_META] = "INSERT OR REPLACE INTO meta VALUES(?,?)",
 };
 
@@ -71,6 +73,8 @@ static int commit(struct incise_recorder *rec, int64_t now_ns, struct incise_err
 		if (incise_recorder_set_integer(rec, counts[i].key, counts[i].value) !=
 		    SQLITE_OK)
 			return incise_recorder_fail(rec, err);
+	if (incise_recorder_ledger(rec) != SQLITE_OK)
+		return incise_recorder_fail(rec, err);
 	if (sqlite3_exec(rec->db, "COMMIT; BEGIN", NULL, NULL, NULL) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	rec->commit_ns = now_ns;
@@ -113,6 +117,8 @@ static int open_database(struct incise_recorder *rec, struct incise_error *err)
 					&rec->stmt[i], NULL);
 	if (rc == SQLITE_OK)
 		rc = incise_recorder_write_meta(rec);
+	if (rc == SQLITE_OK)
+		rc = incise_recorder_write_streams(rec);
 	if (rc != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	return commit(rec, incise_clock_now(incise_rig_clock(rec->rig)), err);
@@ -182,6 +188,8 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	rec->tracker_info = tracker;
 	incise_rig_surface(rig, point_mm, normal);
 	incise_depth_init(&rec->depth, point_mm, normal);
+	incise_ledger_init(&rec->force.ledger);
+	incise_ledger_init(&rec->tracker.ledger);
 	incise_timeline_init(&rec->force.timeline, 0); /* stamped at acquisition */
 	incise_timeline_init(&rec->tracker.timeline, rec->tracker_info.latency_ns);
 	rec->force.lost_at_start = incise_force_lost(incise_rig_force(rig));
@@ -247,6 +255,7 @@ static int put_force(struct incise_recorder *rec,
 	sqlite3_stmt *stmt = rec->stmt[INSERT_FORCE];
 	int64_t t_ns = incise_timeline_acquired(&rec->force.timeline, sample->t_ns);
 	int64_t top = (1LL << rec->force_info.bits) - 1;
+	struct incise_ledger_row row;
 	int rc = take_number(rec, &rec->force, rec->force_info.name, sample->seq, err);
 
 	if (rc)
@@ -267,6 +276,8 @@ static int put_force(struct incise_recorder *rec,
 	if (incise_recorder_run(stmt) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	rec->stats.force++;
+	incise_ledger_row_force(&row, sample->seq, t_ns, sample->code);
+	incise_ledger_add(&rec->force.ledger, &row);
 	if (sample->code == 0 || sample->code == top)
 		rec->stats.force_clipped++;
 	if (!isnan(rec->stats.zero_mV)) {
@@ -312,6 +323,7 @@ static int put_tracker(struct incise_recorder *rec,
 {
 	sqlite3_stmt *stmt = rec->stmt[INSERT_TRACKER];
 	int64_t t_ns = incise_timeline_acquired(&rec->tracker.timeline, sample->t_ns);
+	struct incise_ledger_row entry;
 	struct incise_depth_row row;
 	int rc =
 		take_number(rec, &rec->tracker, rec->tracker_info.name, sample->seq, err);
@@ -339,9 +351,13 @@ static int put_tracker(struct incise_recorder *rec,
 	for (int i = 0; i < 4; i++)
 		sqlite3_bind_double(stmt, 7 + i, sample->quaternion[i]);
 	sqlite3_bind_text(stmt, 11, &sample->status, 1, SQLITE_TRANSIENT);
+	sqlite3_bind_int(stmt, 12, sample->station);
+	sqlite3_bind_int(stmt, 13, sample->button);
 	if (incise_recorder_run(stmt) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	rec->stats.tracker++;
+	incise_ledger_row_tracker(&entry, t_ns, sample);
+	incise_ledger_add(&rec->tracker.ledger, &entry);
 	/* A record that the tracker itself doubts is kept, but not believed. */
 	if (sample->status != ' ')
 		return 0;
@@ -462,7 +478,8 @@ static int complete(struct incise_recorder *rec, struct incise_error *err)
 		rc = incise_recorder_settle_zero(rec, err);
 	while (!rc && incise_depth_flush(&rec->depth, &row))
 		rc = put_depth(rec, &row, err);
-	if (!rc && (incise_recorder_note(rec, "end", "recording ended") != SQLITE_OK ||
+	if (!rc && (incise_recorder_ledger_close(rec) != SQLITE_OK ||
+		    incise_recorder_note(rec, "end", "recording ended") != SQLITE_OK ||
 		    incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK))
 		rc = incise_recorder_fail(rec, err);
 	if (!rc)

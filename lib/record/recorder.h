@@ -3,6 +3,7 @@
  * Inside a recorder; for lib/record/recorder*.c only.
  *
  *     recorder.c         samples, commits, beginning and end
+ *     recorder_ledger.c  table ledger
  *     recorder_folder.c  NAME.rec.part, its lock and its name
  *     recorder_meta.c    tables meta and events
  *     recorder_zero.c    the zero of the force channel
@@ -15,14 +16,24 @@
 #include <sqlite3.h>
 #include <incise/recorder.h>
 #include "depth.h"
+#include "ledger.h"
 #include "timeline.h"
 
 /* Prepared once; see recorder.c. */
-enum { INSERT_FORCE, INSERT_TRACKER, INSERT_DEPTH, INSERT_EVENT, SET_META, STATEMENTS };
+enum {
+	INSERT_FORCE,
+	INSERT_TRACKER,
+	INSERT_DEPTH,
+	INSERT_EVENT,
+	INSERT_LEDGER,
+	SET_META,
+	STATEMENTS
+};
 
 /* One stream's numbers and times. */
 struct incise_recorder_stream {
 	struct incise_timeline timeline;
+	struct incise_ledger ledger;
 	bool begun;
 	int64_t first_ns;
 	uint64_t next;		/* sequence number expected */
@@ -75,6 +86,15 @@ int incise_recorder_set_real(struct incise_recorder *rec, const char *key, doubl
 
 /* All that is known at the start. Returns SQLite codes, or'ed. */
 int incise_recorder_write_meta(struct incise_recorder *rec);
+
+/* What is known of the streams at the start. Returns an SQLite code. */
+int incise_recorder_write_streams(struct incise_recorder *rec);
+
+/* A block of the ledger for each stream that has rows since the last. SQLite code. */
+int incise_recorder_ledger(struct incise_recorder *rec);
+
+/* The last blocks, and the end of the ledger of each stream. Returns an SQLite code. */
+int incise_recorder_ledger_close(struct incise_recorder *rec);
 
 /* A line in the table of events. Returns an SQLite code. */
 int incise_recorder_note(struct incise_recorder *rec, const char *kind, const char *fmt,

@@ -109,3 +109,31 @@ int incise_recorder_write_meta(struct incise_recorder *rec)
 	}
 	return bad | incise_recorder_note(rec, "start", "recording started");
 }
+
+int incise_recorder_write_streams(struct incise_recorder *rec)
+{
+	const struct {
+		const char *name, *device;
+		bool stamped; /* by the kernel or the converter, at acquisition */
+		double rate_hz;
+	} streams[] = {
+		{"force", rec->force_info.name, true, rec->force_info.rate_hz},
+		{"tracker", rec->tracker_info.name, false, rec->tracker_info.rate_hz},
+	};
+	sqlite3_stmt *stmt;
+	int rc = sqlite3_prepare_v2(
+		rec->db,
+		"INSERT INTO streams(name, device, stamped, rate_hz) VALUES(?,?,?,?)", -1,
+		&stmt, NULL);
+
+	for (size_t i = 0; i < sizeof(streams) / sizeof(*streams) && rc == SQLITE_OK;
+	     i++) {
+		sqlite3_bind_text(stmt, 1, streams[i].name, -1, SQLITE_STATIC);
+		sqlite3_bind_text(stmt, 2, streams[i].device, -1, SQLITE_STATIC);
+		sqlite3_bind_int(stmt, 3, streams[i].stamped);
+		sqlite3_bind_double(stmt, 4, streams[i].rate_hz);
+		rc = incise_recorder_run(stmt);
+	}
+	sqlite3_finalize(stmt);
+	return rc;
+}

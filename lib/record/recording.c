@@ -281,7 +281,7 @@ struct incise_recording *incise_recording_open(const char *path, struct incise_e
 	if (!rc)
 		rc = open_database(rec, err);
 	if (!rc)
-		rc = incise_schema_check(rec->db, rec->path, err);
+		rc = incise_schema_check(rec->db, rec->path, &rec->form, err);
 	if (!rc)
 		rc = check_size(rec, err);
 	if (!rc)

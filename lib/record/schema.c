@@ -3,6 +3,7 @@
  * The form of recording.db; see schema.h.
  */
 #include <errno.h>
+#include <stdbool.h>
 #include <string.h>
 #include "schema.h"
 
@@ -12,23 +13,55 @@
  * added beside these tables is left alone.
  */
 static const struct {
-	const char *name, *sql;
+	const char *name;
+	int first, last; /* forms that have it so */
+	const char *sql;
 } tables[] = {
-	{"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY NOT NULL, value)"},
-	{"force", "CREATE TABLE force(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
-		  "code INTEGER NOT NULL)"},
-	{"tracker",
+	{"meta", 1, 2, "CREATE TABLE meta(key TEXT PRIMARY KEY NOT NULL, value)"},
+	{"force", 1, 2,
+	 "CREATE TABLE force(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
+	 "code INTEGER NOT NULL)"},
+	{"tracker", 1, 1,
 	 "CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "
 	 "z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "
 	 "qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL)"},
-	{"depth", "CREATE TABLE depth(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
-		  "depth_mm REAL NOT NULL, velocity_mm_s REAL NOT NULL)"},
-	{"events", "CREATE TABLE events(t_ns INTEGER NOT NULL, kind TEXT NOT NULL, "
-		   "text TEXT NOT NULL)"},
+	{"tracker", 2, 2,
+	 "CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
+	 "arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "
+	 "z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "
+	 "qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL, "
+	 "station INTEGER NOT NULL, button INTEGER NOT NULL)"},
+	{"depth", 1, 2,
+	 "CREATE TABLE depth(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
+	 "depth_mm REAL NOT NULL, velocity_mm_s REAL NOT NULL)"},
+	{"events", 1, 2,
+	 "CREATE TABLE events(t_ns INTEGER NOT NULL, kind TEXT NOT NULL, "
+	 "text TEXT NOT NULL)"},
+	{"frames", 2, 2,
+	 "CREATE TABLE frames(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
+	 "arrival_ns INTEGER NOT NULL, pts INTEGER NOT NULL, bytes INTEGER NOT NULL, "
+	 "length_px REAL, sd_px REAL, depth_mm REAL, quality REAL)"},
+	{"streams", 2, 2,
+	 "CREATE TABLE streams(name TEXT PRIMARY KEY NOT NULL, device TEXT NOT NULL, "
+	 "stamped INTEGER NOT NULL, rate_hz REAL, drift_ppm REAL, drift_sd_ppm REAL, "
+	 "jitter_ns REAL, late INTEGER, offset_ns REAL, offset_sd_ns REAL, "
+	 "line_seq INTEGER, line_ns INTEGER, line_period_ns REAL)"},
+	{"ledger", 2, 2,
+	 "CREATE TABLE ledger(stream TEXT NOT NULL, block INTEGER NOT NULL, "
+	 "first_seq INTEGER NOT NULL, last_seq INTEGER NOT NULL, "
+	 "first_ns INTEGER NOT NULL, last_ns INTEGER NOT NULL, "
+	 "count INTEGER NOT NULL, lost INTEGER NOT NULL, crc INTEGER NOT NULL, "
+	 "PRIMARY KEY(stream, block)) WITHOUT ROWID"},
 };
 
 #define TABLES (sizeof(tables) / sizeof(*tables))
+
+static bool has(size_t table, int form)
+{
+	return form >= tables[table].first && form <= tables[table].last;
+}
+
 #define TEXT_OF(x) TEXT_OF_(x)
 #define TEXT_OF_(x) #x
 
@@ -43,7 +76,8 @@ int incise_schema_create(sqlite3 *db)
 		NULL, NULL, NULL);
 
 	for (size_t i = 0; i < TABLES && rc == SQLITE_OK; i++)
-		rc = sqlite3_exec(db, tables[i].sql, NULL, NULL, NULL);
+		if (has(i, INCISE_SCHEMA_VERSION))
+			rc = sqlite3_exec(db, tables[i].sql, NULL, NULL, NULL);
 	return rc;
 }
 
@@ -117,7 +151,7 @@ static int pragma(sqlite3 *db, const char *sql, sqlite3_int64 *value)
 	return sqlite3_finalize(stmt); /* tells of a failed step as well */
 }
 
-static int check_tables(sqlite3 *db, const char *path, struct incise_error *err)
+static int check_tables(sqlite3 *db, const char *path, int form, struct incise_error *err)
 {
 	sqlite3_stmt *stmt;
 	int rc = 0;
@@ -130,6 +164,8 @@ static int check_tables(sqlite3 *db, const char *path, struct incise_error *err)
 		const char *sql;
 		int step;
 
+		if (!has(i, form))
+			continue;
 		sqlite3_reset(stmt);
 		sqlite3_bind_text(stmt, 1, tables[i].name, -1, SQLITE_STATIC);
 		step = sqlite3_step(stmt);
@@ -147,7 +183,8 @@ static int check_tables(sqlite3 *db, const char *path, struct incise_error *err)
 	return rc;
 }
 
-int incise_schema_check(sqlite3 *db, const char *path, struct incise_error *err)
+int incise_schema_check(sqlite3 *db, const char *path, int *form,
+			struct incise_error *err)
 {
 	sqlite3_int64 application, version;
 
@@ -169,5 +206,6 @@ int incise_schema_check(sqlite3 *db, const char *path, struct incise_error *err)
 			err, EINVAL,
 			"%s: damaged: its form has the impossible number %lld", path,
 			(long long)version);
-	return check_tables(db, path, err);
+	*form = version;
+	return check_tables(db, path, version, err);
 }

@@ -11,16 +11,18 @@
 
 #define INCISE_SCHEMA_DB "recording.db"	     /* inside the folder NAME.rec */
 #define INCISE_SCHEMA_APPLICATION 0x494e4349 /* "INCI", SQLite's application_id */
-#define INCISE_SCHEMA_VERSION 1		     /* SQLite's user_version */
+#define INCISE_SCHEMA_VERSION 2		     /* SQLite's user_version */
 
 /* Make the tables in an empty database. Returns an SQLite code. */
 int incise_schema_create(sqlite3 *db);
 
 /*
  * Whether an opened database is a recording of this or an older version, with just the
- * tables this library makes. Returns 0, -EINVAL, or as incise_schema_fail().
+ * tables this library makes; which form it has. Form 1 has no ledger, streams and frames,
+ * and no station and button of the tracker. Returns 0, -EINVAL, or as incise_schema_fail().
  */
-int incise_schema_check(sqlite3 *db, const char *path, struct incise_error *err);
+int incise_schema_check(sqlite3 *db, const char *path, int *form,
+			struct incise_error *err);
 
 /* The errno that the last SQLite error amounts to: EINVAL for a damaged file. */
 int incise_schema_errno(sqlite3 *db);

@@ -38,6 +38,17 @@ __attribute__((unused)) static int remove_entry(const char *path, const struct s
 	return remove(path);
 }
 
+/* Makes a recording of form 1, from before the ledger, of one of form 2. */
+#define TO_FORM_1                                                                      \
+	"CREATE TABLE old AS SELECT * FROM tracker; DROP TABLE tracker; "              \
+	"CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "        \
+	"arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "        \
+	"z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "                     \
+	"qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL); "                  \
+	"INSERT INTO tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, " \
+	"qy, qz, status FROM old; DROP TABLE old; DROP TABLE frames; "                 \
+	"DROP TABLE streams; DROP TABLE ledger; PRAGMA user_version=1"
+
 /* For setup and teardown: a folder as the working folder, so that paths are short. */
 __attribute__((unused)) static int enter_folder(void **state)
 {

@@ -76,15 +76,52 @@ static void rows_are_the_samples(void **state)
 			assert_true(sqlite3_column_double(stmt, 6 + i) ==
 				    tracker[n].quaternion[i]);
 		assert_string_equal((const char *)sqlite3_column_text(stmt, 10), " ");
+		assert_int_equal(sqlite3_column_int(stmt, 11), 1); /* station */
+		assert_int_equal(sqlite3_column_int(stmt, 12), 0); /* button */
 		/* the default surface is z = 0 */
-		assert_true(sqlite3_column_double(stmt, 11) ==
+		assert_true(sqlite3_column_double(stmt, 13) ==
 			    -tracker[n].position_mm[2]);
-		assert_true(sqlite3_column_double(stmt, 12) >= 0);
+		assert_true(sqlite3_column_double(stmt, 14) >= 0);
 	}
 	sqlite3_finalize(stmt);
 	sqlite3_close(db);
 	assert_int_equal(n, n_tracker);
 	incise_rig_close(rig);
+}
+
+static void ledger_counts_the_rows(void **state)
+{
+	record("a.rec", SIM, 1000 * MS);
+	for (int i = 0; i < 2; i++) {
+		const char *stream = i ? "tracker" : "force";
+		char sql[400];
+		int rows;
+
+		snprintf(sql, sizeof(sql), "SELECT count(*) FROM %s", stream);
+		rows = ask(DB, sql);
+		assert_true(rows >= (i ? 118 : 10000));
+		/* each row in one block, and the blocks one after the other */
+		snprintf(sql, sizeof(sql),
+			 "SELECT count(*) FROM %s r JOIN ledger l ON l.stream='%s' AND "
+			 "r.seq BETWEEN l.first_seq AND l.last_seq AND r.t_ns BETWEEN "
+			 "l.first_ns AND l.last_ns",
+			 stream, stream);
+		assert_int_equal((int)ask(DB, sql), rows);
+		snprintf(sql, sizeof(sql),
+			 "SELECT sum(count) + 1000000 * sum(lost) FROM ledger WHERE "
+			 "stream='%s'",
+			 stream);
+		assert_int_equal((int)ask(DB, sql), rows);
+		/* a block per commit, and the end */
+		snprintf(
+			sql, sizeof(sql),
+			"SELECT count(*) FROM ledger WHERE stream='%s' AND (count > 0) = "
+			"(block < 10)",
+			stream);
+		assert_int_equal((int)ask(DB, sql), 11);
+	}
+	assert_int_equal((int)ask(DB, "SELECT count(*) FROM streams"), 2);
+	assert_int_equal((int)ask(DB, "SELECT count(*) FROM frames"), 0);
 }
 
 static void closed_recording_is_one_file(void **state)
@@ -738,6 +775,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		IN_FOLDER(rows_are_the_samples),
+		IN_FOLDER(ledger_counts_the_rows),
 		IN_FOLDER(closed_recording_is_one_file),
 		IN_FOLDER(zero_is_the_mean_at_rest),
 		IN_FOLDER(given_zero_is_taken),

@@ -52,6 +52,21 @@ static void info_tells_what_the_tables_hold(void **state)
 	assert_true(info.force_max_N > 1); /* 2.6 N by the model at 20 mm and 25 mm/s */
 }
 
+static void form_1_is_read(void **state)
+{
+	struct incise_recording_info now, before;
+	struct incise_error err = {0};
+
+	record("a.rec", SHORT_SCRIPT, 8000 * MS); /* two cuts */
+	assert_int_equal(read_all("a.rec", &now, &err), 0);
+	change(DB, TO_FORM_1);
+	if (read_all("a.rec", &before, &err))
+		fail_msg("%s", err.text);
+	assert_true(before.cuts > 0 && before.cuts == now.cuts);
+	assert_true(before.tracker == now.tracker &&
+		    before.force_max_N == now.force_max_N);
+}
+
 static void paths_that_lead_to_a_recording(void **state)
 {
 	struct incise_recording_info info;
@@ -295,6 +310,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		IN_FOLDER(info_tells_what_the_tables_hold),
+		IN_FOLDER(form_1_is_read),
 		IN_FOLDER(paths_that_lead_to_a_recording),
 		IN_FOLDER(no_recording),
 		IN_FOLDER(damage_is_found),

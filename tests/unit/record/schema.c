@@ -10,14 +10,16 @@ static void check(const char *sql, int expected, const char *text)
 {
 	struct incise_error err = {0};
 	sqlite3 *db;
-	int rc;
+	int form = 0, rc;
 
 	assert_int_equal(sqlite3_open(":memory:", &db), SQLITE_OK);
 	assert_int_equal(incise_schema_create(db), SQLITE_OK);
 	assert_int_equal(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
-	rc = incise_schema_check(db, "x.rec", &err);
+	rc = incise_schema_check(db, "x.rec", &form, &err);
 	if (rc != expected || !strstr(err.text, text))
 		fail_msg("%s: %d, %s", sql, rc, err.text);
+	else if (!rc)
+		assert_int_equal(form, strcmp(sql, TO_FORM_1) ? 2 : 1);
 	sqlite3_close(db);
 }
 
@@ -31,8 +33,11 @@ static void only_the_own_form_is_taken(void **state)
 		{"", 0, ""},
 		/* what others add does not hurt */
 		{"CREATE TABLE mine(a); CREATE INDEX i ON force(t_ns)", 0, ""},
+		{TO_FORM_1, 0, ""},
+		{"PRAGMA user_version=1", -EINVAL, "table 'tracker' is not as incise"},
+		{"DROP TABLE ledger", -EINVAL, "table 'ledger' is missing"},
 		{"PRAGMA application_id=1", -EINVAL, "not made by incise"},
-		{"PRAGMA user_version=2", -EINVAL, "newer incise"},
+		{"PRAGMA user_version=3", -EINVAL, "newer incise"},
 		{"PRAGMA user_version=0", -EINVAL, "damaged"},
 		{"PRAGMA user_version=-1", -EINVAL, "damaged"},
 		{"DROP TABLE force", -EINVAL, "table 'force' is missing"},

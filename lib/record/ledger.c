@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Rows and blocks of the ledger; see ledger.h.
+ */
+#include <math.h>
+#include <string.h>
+#include "crc32c.h"
+#include "ledger.h"
+
+const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_STREAMS] = {
+	[INCISE_LEDGER_FORCE] = {"force", "force", "seq, t_ns, code", "iii"},
+	[INCISE_LEDGER_TRACKER] = {"tracker", "tracker",
+				   "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy, "
+				   "qz, status, station, button",
+				   "iiirrrrrrrcii"},
+	[INCISE_LEDGER_CAMERA] = {"camera", "frames",
+				  "seq, t_ns, arrival_ns, pts, bytes, length_px, sd_px, "
+				  "depth_mm, quality",
+				  "iiiiinnnn"},
+};
+
+/* --- rows ------------------------------------------------------------------------- */
+
+static uint8_t *put(uint8_t *to, uint64_t value)
+{
+	for (int i = 0; i < 8; i++)
+		to[i] = value >> 8 * i;
+	return to + 8;
+}
+
+static void put_integer(struct incise_ledger_row *row, int64_t value)
+{
+	put(row->bytes + row->n, value);
+	row->n += 8;
+}
+
+static void put_real(struct incise_ledger_row *row, double value)
+{
+	uint64_t bits = 0x7ff8000000000000;
+
+	value += 0.0; /* -0 becomes 0 */
+	if (!isnan(value))
+		memcpy(&bits, &value, sizeof(bits));
+	put_integer(row, bits);
+}
+
+void incise_ledger_row_force(struct incise_ledger_row *row, uint64_t seq, int64_t t_ns,
+			     int32_t code)
+{
+	row->seq = seq;
+	row->t_ns = t_ns;
+	row->n = 0;
+	put_integer(row, seq);
+	put_integer(row, t_ns);
+	put_integer(row, code);
+}
+
+void incise_ledger_row_tracker(struct incise_ledger_row *row, int64_t t_ns,
+			       const struct incise_tracker_sample *sample)
+{
+	row->seq = sample->seq;
+	row->t_ns = t_ns;
+	row->n = 0;
+	put_integer(row, sample->seq);
+	put_integer(row, t_ns);
+	put_integer(row, sample->t_ns);
+	for (int i = 0; i < 3; i++)
+		put_real(row, sample->position_mm[i]);
+	for (int i = 0; i < 4; i++)
+		put_real(row, sample->quaternion[i]);
+	row->bytes[row->n++] = sample->status;
+	put_integer(row, sample->station);
+	put_integer(row, sample->button);
+}
+
+bool incise_ledger_row_read(struct incise_ledger_row *row,
+			    const struct incise_ledger_form *form, sqlite3_stmt *stmt)
+{
+	row->n = 0;
+	row->seq = sqlite3_column_int64(stmt, 0);
+	row->t_ns = sqlite3_column_int64(stmt, 1);
+	for (int i = 0; form->types[i]; i++) {
+		int type = sqlite3_column_type(stmt, i);
+
+		switch (form->types[i]) {
+		case 'i':
+			if (type != SQLITE_INTEGER)
+				return false;
+			put_integer(row, sqlite3_column_int64(stmt, i));
+			break;
+		case 'n':
+			if (type == SQLITE_NULL) {
+				put_real(row, NAN);
+				break;
+			}
+			/* fall through */
+		case 'r':
+			if (type != SQLITE_FLOAT)
+				return false;
+			put_real(row, sqlite3_column_double(stmt, i));
+			break;
+		case 'c':
+			if (type != SQLITE_TEXT || !sqlite3_column_text(stmt, i) ||
+			    sqlite3_column_bytes(stmt, i) != 1)
+				return false;
+			row->bytes[row->n++] = *sqlite3_column_text(stmt, i);
+			break;
+		}
+	}
+	return true;
+}
+
+/* --- blocks ------------------------------------------------------------------------ */
+
+void incise_ledger_init(struct incise_ledger *ledger)
+{
+	*ledger = (struct incise_ledger){.last_seq = -1};
+}
+
+void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_row *row)
+{
+	struct incise_ledger_block *open = &ledger->open;
+
+	if (!open->count) {
+		open->first_seq = row->seq;
+		open->first_ns = row->t_ns;
+		open->lost = 0;
+	}
+	/* Unsigned: whatever a damaged row holds, the difference is defined. */
+	if (ledger->begun)
+		open->lost += (uint64_t)row->seq - (uint64_t)ledger->last_seq - 1;
+	open->count++;
+	open->crc = incise_crc32c(open->crc, row->bytes, row->n);
+	ledger->begun = true;
+	ledger->last_seq = row->seq;
+	ledger->last_ns = row->t_ns;
+}
+
+/* The open block with its last fields; the next one goes on from its CRC. */
+static void seal(struct incise_ledger *ledger, struct incise_ledger_block *block)
+{
+	struct incise_ledger_block *open = &ledger->open;
+	uint8_t bytes[7 * 8], *to = bytes;
+
+	to = put(to, open->block);
+	to = put(to, open->first_seq);
+	to = put(to, open->last_seq);
+	to = put(to, open->first_ns);
+	to = put(to, open->last_ns);
+	to = put(to, open->count);
+	put(to, open->lost);
+	open->crc = incise_crc32c(open->crc, bytes, sizeof(bytes));
+	*block = *open;
+	ledger->lost += open->lost;
+	open->block++;
+	open->count = 0;
+}
+
+bool incise_ledger_end(struct incise_ledger *ledger, struct incise_ledger_block *block)
+{
+	if (!ledger->open.count)
+		return false;
+	ledger->open.last_seq = ledger->last_seq;
+	ledger->open.last_ns = ledger->last_ns;
+	seal(ledger, block);
+	return true;
+}
+
+void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
+			 struct incise_ledger_block *block)
+{
+	struct incise_ledger_block *open = &ledger->open;
+
+	open->first_seq = (uint64_t)ledger->last_seq + 1;
+	open->last_seq = (uint64_t)ledger->last_seq + lost;
+	open->first_ns = open->last_ns = ledger->last_ns;
+	open->lost = lost;
+	seal(ledger, block);
+}

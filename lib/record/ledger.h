@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The ledger of a recording: which rows a stream was written with, in blocks of one
+ * commit each, so that whatever is missing or altered later is found, and where.
+ *
+ *     rows    ├─ block 0 ─┤├─ block 1 ─┤├─ … ─┤ end
+ *     CRC32C  0 ─────────► c0 ────────► c1 … ► cn          each goes on from the one before
+ *
+ * A block's CRC is that of its rows and then of its own fields (all of them but the name of
+ * the stream and the CRC), each integer 64 bits, little-endian. The end is a block without
+ * rows: its count is 0, and its lost are the samples that the device lost and that no gap
+ * in the numbers shows. Described for users in incise-recording(5).
+ */
+#ifndef INCISE_LEDGER_H
+#define INCISE_LEDGER_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <sqlite3.h>
+#include <incise/tracker.h>
+
+/* A stream, its table, and how the columns of a row are encoded. */
+struct incise_ledger_form {
+	const char *stream, *table;
+	const char *columns; /* seq and t_ns are first */
+	/* of each column: i integer, r real, n real or NULL, c one character; see below */
+	const char *types;
+};
+
+enum {
+	INCISE_LEDGER_FORCE,
+	INCISE_LEDGER_TRACKER,
+	INCISE_LEDGER_CAMERA,
+	INCISE_LEDGER_STREAMS
+};
+
+extern const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_STREAMS];
+
+/*
+ * One row, encoded: integers and reals (IEEE 754) as 8 bytes, little-endian, a character as
+ * one. Minus zero is zero, since SQLite keeps no minus zero; NULL is the NaN
+ * 0x7ff8000000000000, since it keeps no NaN.
+ */
+struct incise_ledger_row {
+	int64_t seq, t_ns;
+	size_t n;
+	uint8_t bytes[13 * 8];
+};
+
+void incise_ledger_row_force(struct incise_ledger_row *row, uint64_t seq, int64_t t_ns,
+			     int32_t code);
+void incise_ledger_row_tracker(struct incise_ledger_row *row, int64_t t_ns,
+			       const struct incise_tracker_sample *sample);
+
+/* The row that a SELECT of a form's columns is at. Returns false when it cannot be one. */
+bool incise_ledger_row_read(struct incise_ledger_row *row,
+			    const struct incise_ledger_form *form, sqlite3_stmt *stmt);
+
+/* As in table ledger. */
+struct incise_ledger_block {
+	int64_t block;
+	int64_t first_seq, last_seq;
+	int64_t first_ns, last_ns;
+	int64_t count,
+		lost; /* rows; gaps in their numbers, before the first and within */
+	uint32_t crc;
+};
+
+/* One stream's, while it is written or recomputed. */
+struct incise_ledger {
+	bool begun;		   /* there were rows */
+	int64_t last_seq, last_ns; /* of the row before; -1 and 0 before the first */
+	uint64_t lost;		   /* of all blocks so far */
+	struct incise_ledger_block open; /* crc: of what came so far */
+};
+
+void incise_ledger_init(struct incise_ledger *ledger);
+
+/* The next row; numbers increase. */
+void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_row *row);
+
+/* End the block. Returns false, and does nothing, when it has no rows. */
+bool incise_ledger_end(struct incise_ledger *ledger, struct incise_ledger_block *block);
+
+/* The end of the ledger, after the last block; @lost: that no gap shows. */
+void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
+			 struct incise_ledger_block *block);
+
+#endif
