@@ -59,6 +59,7 @@ needs_incise-record := incise
 verbs := $(patsubst tools/incise-%.c,%,$(wildcard tools/incise-*.c))
 uses_capture := incise incise-record
 uses_export := incise incise-record
+uses_verify := incise incise-record
 uses_train := incise incise-learn
 uses_eval := incise
 uses_compile := incise

@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Proof that a recording is complete: its ledger is recomputed from its rows, and SQLite
+ * checks its pages. See table ledger in incise-recording(5). Part of libincise-record.
+ */
+#ifndef INCISE_VERIFY_H
+#define INCISE_VERIFY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <incise/error.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+/** What may be wrong. */
+enum incise_verify_kind {
+	INCISE_VERIFY_LOST,    /**< samples are missing between two rows, or at the end */
+	INCISE_VERIFY_ALTERED, /**< rows of some blocks are not those that were written,
+					or the ledger is not */
+	INCISE_VERIFY_LEDGER,  /**< blocks of the ledger are missing, or cannot be */
+	INCISE_VERIFY_EXTRA,   /**< rows that no block holds */
+	INCISE_VERIFY_COUNT,   /**< the recorder counted otherwise */
+	INCISE_VERIFY_INTERRUPTED, /**< not closed: it ends with its last commit */
+	INCISE_VERIFY_DAMAGED, /**< SQLite cannot read it, or its pages do not agree */
+};
+
+/** One thing that is wrong, and where. */
+struct incise_verify_finding {
+	enum incise_verify_kind kind;
+	const char *stream;		 /**< "force", "tracker", "camera"; "" of all */
+	int64_t first_block, last_block; /**< ALTERED and LEDGER; else -1 */
+	int64_t first_seq, last_seq;	 /**< numbers; last < first: not known */
+	int64_t first_ns, last_ns; /**< LOST: of the rows around; else of those that are
+					     named; CLOCK_MONOTONIC, -1: not known */
+	uint64_t count;		   /**< samples, rows or blocks that are concerned */
+	const char *text;	   /**< all that as one line; valid during the call */
+};
+
+#define INCISE_VERIFY_STREAMS 3
+
+/** One stream. */
+struct incise_verify_stream {
+	char name[16];
+	uint64_t expected; /**< samples from the first to the last that there were */
+	uint64_t present;  /**< rows */
+	uint64_t lost; /**< expected and not present, whether lost when it was captured or
+				later */
+	uint64_t lost_at_capture; /**< of these, those that the ledger says */
+	uint64_t blocks;	  /**< of the ledger */
+	uint64_t altered; /**< blocks that are missing or do not agree with the rows */
+};
+
+struct incise_verify_report {
+	bool complete; /**< closed, nothing lost, nothing altered: no findings */
+	bool intact;   /**< all that was committed is there and as it was written; samples
+			       may have been lost before that */
+	bool interrupted; /**< not closed, or being written */
+	uint64_t findings;
+	int n_streams;
+	struct incise_verify_stream streams[INCISE_VERIFY_STREAMS];
+};
+
+/** Who is told; any may be NULL. */
+struct incise_verify_watch {
+	void (*found)(void *user, const struct incise_verify_finding *finding);
+	/** Some 10 times a second; @p share from 0 to 1, or -1 while SQLite checks its pages,
+	    which says nothing of how far it is. Another return value than 0 stops it. */
+	int (*progress)(void *user, double share);
+	void *user;
+};
+
+/**
+ * Verify a recording, or what is left of an interrupted one, up to its last commit. Its
+ * memory does not grow with the recording; a recording that is being written may be
+ * verified too.
+ *
+ * @param path  as of incise_recording_open()
+ * @param watch may be NULL
+ * @return 0: report->complete has the answer; -ENODATA: a recording of form 1, which has no
+ *         ledger; -ECANCELED: stopped by @p watch; of incise_recording_open(), such as
+ *         -EINVAL for a file that is too damaged to be opened.
+ */
+INCISE_API int incise_verify(const char *path, const struct incise_verify_watch *watch,
+			     struct incise_verify_report *report,
+			     struct incise_error *err);
+
+INCISE_END_DECLS
+#endif

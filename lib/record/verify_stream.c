@@ -1,0 +1,432 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The rows of one stream against its ledger, both in order and a row at a time; see verify.h.
+ *
+ *     ledger   ├─ block 0 ─┤├─ block 1 ─┤├─ block 2 ─┤ end
+ *     rows     1 2 3 4 5 6  7 8   10 11   12 …              extra
+ *                              └ lost
+ *
+ * After a block that does not agree it is not known which is wrong, its rows or its entry,
+ * so the next one may go on from either: from the CRC that was recomputed or from the one
+ * that is written. That way only what is wrong is reported, and not all that follows.
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include "verify.h"
+
+#define TELL_ROWS 4096
+/* Sums of what a damaged ledger says stay in range. */
+#define COUNT_MAX (1LL << 53)
+
+struct walk {
+	struct incise_verification *verify;
+	const struct incise_ledger_form *form;
+	struct incise_verify_stream *out;
+	sqlite3_stmt *rows, *blocks;
+
+	struct incise_ledger_row row; /* next, where has_row */
+	bool has_row, good_row;
+	bool known; /* last_seq and last_ns: of a row, or where the ledger begins */
+	int64_t last_seq, last_ns;
+
+	struct incise_ledger chain[2]; /* from the CRC recomputed, from the one written */
+	uint64_t counted;	       /* rows, by the ledger */
+	int64_t next;		       /* block */
+	struct incise_verify_finding altered; /* blocks in a row; first_block -1: none */
+	uint64_t there;			      /* rows that they have */
+};
+
+static struct incise_verify_finding finding(const struct walk *walk,
+					    enum incise_verify_kind kind)
+{
+	return (struct incise_verify_finding){
+		.kind = kind,
+		.stream = walk->form->stream,
+		.first_block = -1,
+		.last_block = -1,
+		.last_seq = -1,
+		.first_ns = -1,
+		.last_ns = -1,
+	};
+}
+
+/* Samples from @first to @last are not there; the row after them is at @after_ns, or -1. */
+static void lost(struct walk *walk, int64_t first, int64_t last, int64_t after_ns)
+{
+	struct incise_verify_finding found = finding(walk, INCISE_VERIFY_LOST);
+	uint64_t count = (uint64_t)last - (uint64_t)first + 1;
+	char number[80];
+
+	found.first_seq = first;
+	found.last_seq = last;
+	found.first_ns = walk->known ? walk->last_ns : -1;
+	found.last_ns = after_ns;
+	found.count = count;
+	if (count == 1)
+		snprintf(number, sizeof(number), "number %lld", (long long)first);
+	else
+		snprintf(number, sizeof(number), "numbers %lld to %lld", (long long)first,
+			 (long long)last);
+	if (after_ns < 0)
+		incise_verify_found(walk->verify, &found,
+				    "%s: %llu missing at the end, %s, after %.4f s",
+				    walk->form->stream, (unsigned long long)count, number,
+				    incise_verify_s(walk->verify, walk->last_ns));
+	else
+		incise_verify_found(walk->verify, &found,
+				    "%s: %llu missing, %s, before %.4f s",
+				    walk->form->stream, (unsigned long long)count, number,
+				    incise_verify_s(walk->verify, after_ns));
+}
+
+/* Read the next row into walk->row. Returns 0; -EIO: SQLite cannot, -ECANCELED. */
+static int next_row(struct walk *walk)
+{
+	struct incise_verification *verify = walk->verify;
+	int rc = sqlite3_step(walk->rows);
+
+	walk->has_row = rc == SQLITE_ROW;
+	if (rc == SQLITE_DONE)
+		return 0;
+	if (rc != SQLITE_ROW) {
+		incise_verify_unreadable(verify, walk->form->stream, walk->form->table);
+		return -EIO;
+	}
+	walk->good_row = incise_ledger_row_read(&walk->row, walk->form, walk->rows);
+	if (++verify->rows_done % TELL_ROWS)
+		return 0;
+	return incise_verify_progress(verify,
+				      verify->rows_done < verify->rows
+					      ? (double)verify->rows_done / verify->rows
+					      : 1);
+}
+
+/* Take the row into the chains, and go on to the next. Returns as next_row(). */
+static int take_row(struct walk *walk, bool *good)
+{
+	if (walk->known && walk->row.seq > walk->last_seq + 1)
+		lost(walk, walk->last_seq + 1, walk->row.seq - 1, walk->row.t_ns);
+	walk->known = true;
+	walk->last_seq = walk->row.seq;
+	walk->last_ns = walk->row.t_ns;
+	walk->out->present++;
+	*good &= walk->good_row;
+	for (int i = 0; i < 2; i++)
+		incise_ledger_add(&walk->chain[i], &walk->row);
+	return next_row(walk);
+}
+
+static bool same(const struct incise_ledger_block *a, const struct incise_ledger_block *b)
+{
+	return a->block == b->block && a->first_seq == b->first_seq &&
+	       a->last_seq == b->last_seq && a->first_ns == b->first_ns &&
+	       a->last_ns == b->last_ns && a->count == b->count && a->lost == b->lost &&
+	       a->crc == b->crc;
+}
+
+/* Tell of blocks that do not agree, if there are any. */
+static void flush_altered(struct walk *walk)
+{
+	struct incise_verify_finding *found = &walk->altered;
+	char blocks[80], what[120];
+
+	if (found->first_block < 0)
+		return;
+	if (found->first_block == found->last_block)
+		snprintf(blocks, sizeof(blocks), "block %lld is",
+			 (long long)found->first_block);
+	else
+		snprintf(blocks, sizeof(blocks), "blocks %lld to %lld are",
+			 (long long)found->first_block, (long long)found->last_block);
+	if (walk->there == found->count)
+		snprintf(what, sizeof(what), "rows or ledger are not what was written");
+	else
+		snprintf(what, sizeof(what), "%llu rows, and %llu were written",
+			 (unsigned long long)walk->there,
+			 (unsigned long long)found->count);
+	incise_verify_found(walk->verify, found,
+			    "%s: %s altered, numbers %lld to %lld, %.4f to %.4f s: %s",
+			    walk->form->stream, blocks, (long long)found->first_seq,
+			    (long long)found->last_seq,
+			    incise_verify_s(walk->verify, found->first_ns),
+			    incise_verify_s(walk->verify, found->last_ns), what);
+	*found = finding(walk, INCISE_VERIFY_ALTERED);
+	walk->there = 0;
+}
+
+static void add_altered(struct walk *walk, const struct incise_ledger_block *block,
+			uint64_t there)
+{
+	struct incise_verify_finding *found = &walk->altered;
+
+	if (found->first_block < 0) {
+		found->first_block = block->block;
+		found->first_seq = block->first_seq;
+		found->first_ns = block->first_ns;
+	}
+	found->last_block = block->block;
+	found->last_seq = block->last_seq;
+	found->last_ns = block->last_ns;
+	found->count += block->count;
+	walk->there += there;
+	walk->out->altered++;
+}
+
+/* The entry that walk->blocks is at. Returns false when it cannot be one. */
+static bool read_block(struct walk *walk, struct incise_ledger_block *block)
+{
+	int64_t *const to[] = {&block->block,	 &block->first_seq, &block->last_seq,
+			       &block->first_ns, &block->last_ns,   &block->count,
+			       &block->lost};
+	int64_t crc = sqlite3_column_int64(walk->blocks, 7);
+	bool good = sqlite3_column_type(walk->blocks, 7) == SQLITE_INTEGER && crc >= 0 &&
+		    crc <= UINT32_MAX;
+
+	for (int i = 0; i < 7; i++) {
+		good &= sqlite3_column_type(walk->blocks, i) == SQLITE_INTEGER;
+		*to[i] = sqlite3_column_int64(walk->blocks, i);
+	}
+	block->crc = crc;
+	if (block->count < 0 || block->count > COUNT_MAX || block->lost < 0 ||
+	    block->lost > COUNT_MAX) {
+		block->count = block->lost = 0;
+		good = false;
+	}
+	if (block->block < 0 || block->block > COUNT_MAX) {
+		block->block = walk->next;
+		good = false;
+	}
+	return good;
+}
+
+/*
+ * Entries from walk->next to @block are not there. The rows before it are taken for one
+ * block: where it was one, the chain goes on.
+ */
+static int skip_blocks(struct walk *walk, const struct incise_ledger_block *block)
+{
+	struct incise_verify_finding found = finding(walk, INCISE_VERIFY_LEDGER);
+	struct incise_ledger_block ignored;
+	uint64_t before = walk->out->present;
+	bool good = true;
+	int rc = 0;
+
+	flush_altered(walk);
+	while (!rc && walk->has_row && walk->row.seq < block->first_seq) {
+		if (walk->out->present == before) {
+			found.first_seq = walk->row.seq;
+			found.first_ns = walk->row.t_ns;
+		}
+		rc = take_row(walk, &good);
+		found.last_seq = walk->last_seq;
+		found.last_ns = walk->last_ns;
+	}
+	if (rc == -ECANCELED)
+		return rc;
+	for (int i = 0; i < 2; i++) {
+		incise_ledger_end(&walk->chain[i], &ignored);
+		walk->chain[i].open.block = block->block;
+	}
+	found.first_block = walk->next;
+	found.last_block = block->block - 1;
+	found.count = block->block - walk->next;
+	walk->out->altered += found.count;
+	incise_verify_found(
+		walk->verify, &found,
+		"%s: the ledger has no entry of block %lld%s%.0lld; %llu rows "
+		"are there in its place",
+		walk->form->stream, (long long)found.first_block,
+		found.count > 1 ? " to " : "",
+		found.count > 1 ? (long long)found.last_block : 0,
+		(unsigned long long)(walk->out->present - before));
+	return rc;
+}
+
+/* Recompute a block of its rows. Returns as next_row(). */
+static int take_block(struct walk *walk, const struct incise_ledger_block *block,
+		      bool good)
+{
+	uint64_t before = walk->out->present;
+	int match = -1, rc = 0;
+
+	while (!rc && walk->has_row && walk->row.seq <= block->last_seq)
+		rc = take_row(walk, &good);
+	if (rc == -ECANCELED)
+		return rc;
+	for (int i = 0; i < 2; i++) {
+		struct incise_ledger_block computed;
+		bool is = true;
+
+		if (!block->count && walk->out->present == before)
+			incise_ledger_close(&walk->chain[i], block->lost, &computed);
+		else
+			is = incise_ledger_end(&walk->chain[i], &computed);
+		if (match < 0 && good && is && same(&computed, block))
+			match = i;
+	}
+	walk->next = block->block + 1;
+	if (match >= 0) {
+		flush_altered(walk);
+		walk->chain[!match] = walk->chain[match];
+	} else {
+		add_altered(walk, block, walk->out->present - before);
+		walk->chain[1] = walk->chain[0];
+		walk->chain[1].open.crc = block->crc;
+		if (block->count) {
+			walk->chain[1].begun = true;
+			walk->chain[1].last_seq = block->last_seq;
+			walk->chain[1].last_ns = block->last_ns;
+		}
+	}
+	for (int i = 0; i < 2; i++) {
+		walk->chain[i].open.block = walk->next;
+		walk->chain[i].open.count = 0;
+	}
+	return rc;
+}
+
+/* Rows behind the last block. */
+static int take_extra(struct walk *walk)
+{
+	struct incise_verify_finding found = finding(walk, INCISE_VERIFY_EXTRA);
+	bool good = true;
+	int rc = 0;
+
+	if (!walk->has_row)
+		return 0;
+	found.first_seq = walk->row.seq;
+	found.first_ns = walk->row.t_ns;
+	while (!rc && walk->has_row) {
+		rc = take_row(walk, &good);
+		found.count++;
+	}
+	if (rc == -ECANCELED)
+		return rc;
+	found.last_seq = walk->last_seq;
+	found.last_ns = walk->last_ns;
+	incise_verify_found(
+		walk->verify, &found,
+		"%s: %llu rows behind the end of the ledger, numbers %lld to %lld",
+		walk->form->stream, (unsigned long long)found.count,
+		(long long)found.first_seq, (long long)found.last_seq);
+	return rc;
+}
+
+static int step_block(struct walk *walk)
+{
+	int rc = sqlite3_step(walk->blocks);
+
+	if (rc == SQLITE_ROW || rc == SQLITE_DONE)
+		return rc == SQLITE_ROW;
+	incise_verify_unreadable(walk->verify, walk->form->stream, "ledger");
+	return -EIO;
+}
+
+/* What the recorder counted in table meta against the ledger. */
+static void check_counts(struct walk *walk, uint64_t rows, uint64_t lost_rows)
+{
+	const struct incise_verify_stream *out = walk->out;
+	struct incise_verify_finding found = finding(walk, INCISE_VERIFY_COUNT);
+
+	if (rows != walk->counted) {
+		found.count = rows;
+		incise_verify_found(walk->verify, &found,
+				    "%s: %llu rows were written, and the ledger has %llu",
+				    walk->form->stream, (unsigned long long)rows,
+				    (unsigned long long)walk->counted);
+	}
+	/* Before the end a device may know of losses that no gap shows yet. */
+	if (!walk->verify->report->interrupted && lost_rows != out->lost_at_capture) {
+		found.count = lost_rows;
+		incise_verify_found(
+			walk->verify, &found,
+			"%s: %llu were lost when it was captured, and the ledger has %llu",
+			walk->form->stream, (unsigned long long)lost_rows,
+			(unsigned long long)out->lost_at_capture);
+	}
+}
+
+static int walk_through(struct walk *walk)
+{
+	struct incise_ledger_block block;
+	int64_t end_seq = INT64_MIN;
+	bool ended = false;
+	int rc = next_row(walk), step;
+
+	while (!rc && (rc = step = step_block(walk)) > 0) {
+		bool good = read_block(walk, &block);
+
+		rc = 0;
+		if (good && !walk->known && block.count && block.first_seq >= 0) {
+			walk->known = true;
+			walk->last_seq = block.first_seq - 1;
+			walk->last_ns = block.first_ns;
+		}
+		if (block.block > walk->next)
+			rc = skip_blocks(walk, &block);
+		if (!rc)
+			rc = take_block(walk, &block, good);
+		walk->out->blocks++;
+		if (walk->counted < COUNT_MAX && walk->out->lost_at_capture < COUNT_MAX) {
+			walk->counted += block.count;
+			walk->out->lost_at_capture += block.lost;
+		}
+		ended = !block.count;
+		end_seq = good ? block.last_seq : end_seq;
+	}
+	flush_altered(walk);
+	if (!rc && end_seq > walk->last_seq &&
+	    !(walk->has_row && walk->row.seq <= end_seq))
+		lost(walk, walk->last_seq + 1, end_seq, -1);
+	if (!rc)
+		rc = take_extra(walk);
+	if (!rc && !ended && !walk->verify->report->interrupted) {
+		struct incise_verify_finding found = finding(walk, INCISE_VERIFY_LEDGER);
+
+		found.first_block = found.last_block = walk->next;
+		incise_verify_found(
+			walk->verify, &found,
+			"%s: the ledger has no end: its last blocks were cut off",
+			walk->form->stream);
+	}
+	return rc;
+}
+
+int incise_verify_stream(struct incise_verification *verify,
+			 const struct incise_ledger_form *form, uint64_t rows,
+			 uint64_t lost_rows, struct incise_verify_stream *out)
+{
+	sqlite3 *db = verify->recording->db;
+	struct walk walk = {.verify = verify, .form = form, .out = out, .last_seq = -1};
+	char sql[300];
+	int rc = 0;
+
+	snprintf(out->name, sizeof(out->name), "%s", form->stream);
+	for (int i = 0; i < 2; i++)
+		incise_ledger_init(&walk.chain[i]);
+	walk.altered = finding(&walk, INCISE_VERIFY_ALTERED);
+	snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY seq", form->columns,
+		 form->table);
+	if (sqlite3_prepare_v2(db, sql, -1, &walk.rows, NULL) != SQLITE_OK ||
+	    sqlite3_prepare_v2(
+		    db,
+		    "SELECT block, first_seq, last_seq, first_ns, last_ns, count, lost, crc "
+		    "FROM ledger WHERE stream = ? ORDER BY block",
+		    -1, &walk.blocks, NULL) != SQLITE_OK) {
+		incise_verify_unreadable(verify, form->stream, form->table);
+		rc = -EIO;
+	}
+	sqlite3_bind_text(walk.blocks, 1, form->stream, -1, SQLITE_STATIC);
+	if (!rc)
+		rc = walk_through(&walk);
+	if (!rc)
+		check_counts(&walk, rows, lost_rows);
+	sqlite3_finalize(walk.rows);
+	sqlite3_finalize(walk.blocks);
+	out->expected = walk.counted + out->lost_at_capture;
+	if (out->expected < rows + lost_rows)
+		out->expected = rows + lost_rows;
+	out->lost = out->expected > out->present ? out->expected - out->present : 0;
+	return rc == -ECANCELED ? rc : 0;
+}

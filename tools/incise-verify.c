@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise verify: proves that a recording is complete, or says what is missing and where.
+ */
+#include <stdio.h>
+#include <string.h>
+#include <incise/verify.h>
+#include "cli.h"
+#include "json.h"
+
+/* More in one JSON object is of no use to anyone. */
+#define FINDINGS_MAX 1000
+
+enum { OPT_JSON = CLI_LONG };
+
+static const struct cli_option options[] = {
+	{OPT_JSON, "json", NULL, "report as one JSON object"},
+	{0},
+};
+
+static const struct cli_verb verb = {
+	.name = "verify",
+	.synopsis = "NAME.rec [OPTIONS]",
+	.summary =
+		"Prove that a recording is complete and as it was written: recompute its\n"
+		"ledger and check its pages. Says what is missing or altered, and where.",
+	.options = options,
+	.notes =
+		"Example: incise verify liver.rec\n"
+		"Exit codes: 0 all is there, 1 anything is missing or altered, 2 bad usage.",
+};
+
+/* Where findings go: lines, or a list. */
+struct sink {
+	json_t *list; /* NULL: lines */
+	const char *path;
+	uint64_t left_out;
+};
+
+static json_t *known(int64_t value, bool is)
+{
+	return is ? json_integer(value) : json_null();
+}
+
+static json_t *as_json(const struct incise_verify_finding *finding)
+{
+	static const char *const kinds[] = {
+		[INCISE_VERIFY_LOST] = "lost",
+		[INCISE_VERIFY_ALTERED] = "altered",
+		[INCISE_VERIFY_LEDGER] = "ledger",
+		[INCISE_VERIFY_EXTRA] = "extra",
+		[INCISE_VERIFY_COUNT] = "count",
+		[INCISE_VERIFY_INTERRUPTED] = "interrupted",
+		[INCISE_VERIFY_DAMAGED] = "damaged",
+	};
+	bool numbers = finding->last_seq >= finding->first_seq;
+	bool blocks = finding->first_block >= 0;
+
+	return json_pack("{ss so so so so so so so sI so}", "kind", kinds[finding->kind],
+			 "stream",
+			 *finding->stream ? json_text(finding->stream) : json_null(),
+			 "first_block", known(finding->first_block, blocks), "last_block",
+			 known(finding->last_block, blocks), "first_seq",
+			 known(finding->first_seq, numbers), "last_seq",
+			 known(finding->last_seq, numbers), "first_ns",
+			 known(finding->first_ns, finding->first_ns >= 0), "last_ns",
+			 known(finding->last_ns, finding->last_ns >= 0), "count",
+			 (json_int_t)finding->count, "text", json_text(finding->text));
+}
+
+static void found(void *user, const struct incise_verify_finding *finding)
+{
+	struct sink *sink = user;
+
+	if (!sink->list) {
+		cli_progress_end();
+		printf("%s: %s\n", sink->path, finding->text);
+	} else if (json_array_size(sink->list) < FINDINGS_MAX) {
+		json_array_append_new(sink->list, as_json(finding));
+	} else {
+		sink->left_out++;
+	}
+}
+
+static int progress(void *user, double share)
+{
+	(void)user;
+	if (share < 0)
+		cli_progress("checking the pages of the database");
+	else
+		cli_progress("verifying %.0f %%", 100 * share);
+	return cli_stop;
+}
+
+static void print_json(const struct incise_verify_report *report, const struct sink *sink)
+{
+	json_t *streams = json_array();
+
+	for (int i = 0; i < report->n_streams; i++) {
+		const struct incise_verify_stream *stream = &report->streams[i];
+
+		json_array_append_new(
+			streams, json_pack("{ss sI sI sI sI sI sI}", "name", stream->name,
+					   "expected", (json_int_t)stream->expected,
+					   "present", (json_int_t)stream->present, "lost",
+					   (json_int_t)stream->lost, "lost_at_capture",
+					   (json_int_t)stream->lost_at_capture, "blocks",
+					   (json_int_t)stream->blocks, "altered_blocks",
+					   (json_int_t)stream->altered));
+	}
+	json_print(json_pack("{so sb sb sb so so sI}", "path", json_text(sink->path),
+			     "complete", report->complete, "intact", report->intact,
+			     "interrupted", report->interrupted, "streams", streams,
+			     "findings", sink->list, "findings_left_out",
+			     (json_int_t)sink->left_out));
+}
+
+static void print_table(const struct incise_verify_report *report, const char *path)
+{
+	for (int i = 0; i < report->n_streams; i++) {
+		const struct incise_verify_stream *stream = &report->streams[i];
+
+		printf("%-8s %llu expected, %llu present, %llu lost, in %llu blocks",
+		       stream->name, (unsigned long long)stream->expected,
+		       (unsigned long long)stream->present,
+		       (unsigned long long)stream->lost,
+		       (unsigned long long)stream->blocks);
+		if (stream->altered)
+			printf(", %llu of them altered",
+			       (unsigned long long)stream->altered);
+		printf("\n");
+	}
+	if (report->complete)
+		printf("%s: complete: all is there, as it was written\n", path);
+}
+
+int main(int argc, char **argv)
+{
+	struct incise_verify_report report;
+	struct incise_error err = {0};
+	struct sink sink = {0};
+	struct incise_verify_watch watch = {found, progress, &sink};
+	unsigned long long lost = 0;
+	bool json = false;
+	int id;
+
+	while ((id = cli_next(&verb, argc, argv)) != CLI_END)
+		json |= id == OPT_JSON;
+	if (optind == argc)
+		cli_usage("which recording?");
+	if (optind + 1 < argc)
+		cli_usage("'%s': one recording at a time", argv[optind + 1]);
+	sink.path = argv[optind];
+	sink.list = json ? json_array() : NULL;
+	cli_catch_signals();
+	if (incise_verify(sink.path, &watch, &report, &err))
+		cli_fail_with(&err);
+	cli_progress_end();
+	for (int i = 0; i < report.n_streams; i++)
+		lost += report.streams[i].lost;
+	if (json)
+		print_json(&report, &sink);
+	else
+		print_table(&report, sink.path);
+	cli_finish();
+	if (report.complete)
+		return 0;
+	if (!report.intact)
+		cli_fail("%s: not what was recorded: %llu samples missing, findings: "
+			 "%llu; keep a copy before anything else is done with it",
+			 sink.path, lost, (unsigned long long)report.findings);
+	if (report.interrupted)
+		cli_fail(
+			"%s: interrupted: its end is missing; what was committed is there "
+			"as it was written, %llu samples were lost",
+			sink.path, lost);
+	cli_fail("%s: %llu samples were lost when it was captured; what was committed is "
+		 "there as it was written",
+		 sink.path, lost);
+}
