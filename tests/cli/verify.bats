@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise verify, as a user meets it: what is whole is proved, and of every tampering it is
+# said what and where. tests/unit/record/verify.c has more of them.
+
+load cli
+
+setup_file() {
+	cd "$BATS_FILE_TMPDIR"
+	"$INCISE_BUILD/bin/incise" capture -o good.rec --rig sim:clock=simulated \
+		--duration 3s >/dev/null
+}
+
+setup() {
+	work_folder
+	cp -r "$BATS_FILE_TMPDIR/good.rec" a.rec
+}
+
+ask() {
+	sqlite3 "$1/recording.db" "$2"
+}
+
+# tampered SQL TEXT…: after that, verify fails, with lines that hold these texts.
+tampered() {
+	local sql=$1
+	shift
+	rm -rf a.rec
+	cp -r "$BATS_FILE_TMPDIR/good.rec" a.rec
+	ask a.rec "$sql"
+	run --separate-stderr incise verify a.rec
+	failed_with "a.rec: not what was recorded"
+	for text; do
+		[[ "$output" == *"$text"* ]] || complain "$sql: no '$text' in: $output"
+	done
+}
+
+@test "verify of a whole recording says so" {
+	before=$(sha256sum a.rec/recording.db)
+	run -0 --separate-stderr incise verify a.rec
+	[ -z "$stderr" ]
+	[ "${lines[0]}" = "force    30000 expected, 30000 present, 0 lost, in 31 blocks" ]
+	[[ "${lines[1]}" == "tracker  "*" expected, "*" present, 0 lost, in 31 blocks" ]]
+	[ "${lines[2]}" = "a.rec: complete: all is there, as it was written" ]
+	[ "${#lines[@]}" -eq 3 ]
+	[ "$(sha256sum a.rec/recording.db)" = "$before" ]
+	[ "$(ls a.rec)" = recording.db ]
+}
+
+@test "verify --json has what scripts lean on" {
+	incise verify a.rec --json >report.json
+	[ "$(key report.json complete)" = 1 ]
+	[ "$(key report.json intact)" = 1 ]
+	[ "$(key report.json 'streams[0].name')" = force ]
+	[ "$(key report.json 'streams[0].expected')" = 30000 ]
+	[ "$(key report.json 'streams[0].present')" = 30000 ]
+	[ "$(key report.json 'streams[0].lost')" = 0 ]
+	[ "$(key report.json 'streams[1].name')" = tracker ]
+	[ "$(key report.json findings)" = "[]" ]
+
+	ask a.rec "DELETE FROM force WHERE seq BETWEEN 100 AND 104"
+	run -1 --separate-stderr incise verify a.rec --json
+	echo "$output" >report.json
+	[ "$(key report.json complete)" = 0 ]
+	[ "$(key report.json 'streams[0].present')" = 29995 ]
+	[ "$(key report.json 'streams[0].lost')" = 5 ]
+	[ "$(key report.json 'findings[0].kind')" = lost ]
+	[ "$(key report.json 'findings[0].first_seq')" = 100 ]
+	[ "$(key report.json 'findings[0].last_seq')" = 104 ]
+	[ "$(key report.json 'findings[0].first_ns')" = "$(ask a.rec \
+		'SELECT t_ns FROM force WHERE seq = 99')" ]
+	[ "$(key report.json 'findings[1].kind')" = altered ]
+	[ "$(key report.json 'findings[1].first_block')" = 0 ]
+}
+
+@test "verify finds rows that were deleted, changed, swapped or inserted" {
+	tampered "DELETE FROM force WHERE seq = 12345" \
+		"a.rec: force: 1 missing, number 12345, before 1.2346 s" "force: block 12 is altered"
+	tampered "UPDATE force SET code = code + 1 WHERE seq = 12345" "force: block 12 is altered"
+	tampered "UPDATE tracker SET t_ns = t_ns + 1 WHERE seq = 50" "tracker: block 4 is altered"
+	tampered "UPDATE force SET seq = -1 WHERE seq = 2001;
+		UPDATE force SET seq = 2001 WHERE seq = 2002;
+		UPDATE force SET seq = 2002 WHERE seq = -1" "force: block 2 is altered"
+	tampered "INSERT INTO force SELECT 30000, t_ns + 100000, code FROM force
+		WHERE seq = 29999" "force: 1 rows behind the end of the ledger"
+}
+
+@test "verify finds a ledger that was changed, and an end that was cut off" {
+	tampered "DELETE FROM ledger WHERE stream = 'force' AND block = 7" \
+		"the ledger has no entry of block 7"
+	tampered "UPDATE ledger SET crc = crc + 1 WHERE stream = 'tracker' AND block = 7" \
+		"tracker: block 7 is altered"
+	tampered "UPDATE ledger SET lost = 1 WHERE stream = 'tracker' AND block = 7" \
+		"tracker: block 7 is altered"
+	tampered "UPDATE ledger SET block = -block WHERE stream = 'force' AND block IN (5, 6);
+		UPDATE ledger SET block = 11 + block WHERE block < 0" "force: blocks 5 to 7 are altered"
+	tampered "DELETE FROM force WHERE seq >= 29000;
+		DELETE FROM ledger WHERE stream = 'force' AND block >= 29" \
+		"the ledger has no end: its last blocks were cut off" "1000 lost"
+	tampered "DELETE FROM ledger" "rows behind the end of the ledger" "has no end"
+}
+
+@test "verify of a file that was cut short, anywhere" {
+	size=$(stat -c %s a.rec/recording.db)
+	for share in 99 90 70 50 30 10 1; do
+		for page in 1 4096; do # in mid-page, and between two
+			truncate -s $((size * share / 100 / page * page)) a.rec/recording.db
+			run --separate-stderr incise verify a.rec
+			failed_with a.rec
+		done
+	done
+}
+
+@test "verify of a page that went bad" {
+	dd if=/dev/urandom of=a.rec/recording.db bs=4096 seek=40 count=1 conv=notrunc 2>/dev/null
+	run --separate-stderr incise verify a.rec
+	failed_with "a.rec: not what was recorded"
+	[[ "$output" == *"recording.db is damaged"* ]]
+}
+
+@test "verify of a recording of form 1 says that it has no ledger" {
+	ask a.rec "CREATE TABLE old AS SELECT * FROM tracker; DROP TABLE tracker;
+		DROP TABLE frames; DROP TABLE streams; DROP TABLE ledger; PRAGMA user_version=1"
+	ask a.rec "CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, \
+arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, z_mm REAL NOT NULL, \
+qw REAL NOT NULL, qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL)"
+	ask a.rec "INSERT INTO tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy,
+		qz, status FROM old; DROP TABLE old"
+	incise info a.rec # is still read
+	run --separate-stderr incise verify a.rec
+	failed_with "kept no ledger"
+}
+
+@test "verify of nothing, and of too much" {
+	run --separate-stderr incise verify none.rec
+	failed_with "none.rec: there is no such recording"
+	run --separate-stderr incise verify
+	bad_usage "which recording?"
+	run --separate-stderr incise verify a.rec b.rec
+	bad_usage "b.rec"
+	run -1 --separate-stderr bash -c "incise verify a.rec >/dev/full"
+	[ "${#stderr_lines[@]}" -eq 1 ]
+}
+
+@test "kill -9 at 20 moments leaves what verifies up to its last commit" {
+	rm -rf a.rec
+	for i in $(seq 20); do
+		incise capture -o a.rec --rig sim:clock=real >out 2>err 3>&- &
+		pid=$!
+		until [ -s a.rec.part/recording.db ]; do sleep 0.01; done
+		# from 50 to 1000 ms; each time another part of the 100 ms between commits
+		sleep "$(awk "BEGIN { print 0.05 + $i * 37 % 20 * 0.05 + $i * 0.0023 }")"
+		kill -KILL $pid
+		wait $pid || true
+		run -1 --separate-stderr incise verify a.rec --json
+		echo "$output" >report.json
+		[ "$(key report.json intact)" = 1 ] || complain "$i: $output"
+		[ "$(key report.json interrupted)" = 1 ]
+		[ "$(key report.json 'streams[0].lost')" = 0 ]
+		[ "$(key report.json 'streams[0].present')" = \
+			"$(ask a.rec.part 'SELECT count(*) FROM force')" ]
+		key report.json 'streams[0].present' >>rows
+		rm -rf a.rec.part
+	done
+	# some of them had rows: it was not killed before it began
+	[ "$(sort -n rows | tail -n 1)" -gt 3000 ]
+}
