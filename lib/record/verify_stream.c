@@ -31,6 +31,7 @@ struct walk {
 	int64_t last_seq, last_ns;
 
 	struct incise_ledger chain[2]; /* from the CRC recomputed, from the one written */
+	int chains;		       /* 1 as long as both are the same */
 	uint64_t counted;	       /* rows, by the ledger */
 	int64_t next;		       /* block */
 	struct incise_verify_finding altered; /* blocks in a row; first_block -1: none */
@@ -112,7 +113,7 @@ static int take_row(struct walk *walk, bool *good)
 	walk->last_ns = walk->row.t_ns;
 	walk->out->present++;
 	*good &= walk->good_row;
-	for (int i = 0; i < 2; i++)
+	for (int i = 0; i < walk->chains; i++)
 		incise_ledger_add(&walk->chain[i], &walk->row);
 	return next_row(walk);
 }
@@ -224,10 +225,10 @@ static int skip_blocks(struct walk *walk, const struct incise_ledger_block *bloc
 	}
 	if (rc == -ECANCELED)
 		return rc;
-	for (int i = 0; i < 2; i++) {
-		incise_ledger_end(&walk->chain[i], &ignored);
-		walk->chain[i].open.block = block->block;
-	}
+	/* whatever the missing entries said, only what was recomputed is left */
+	incise_ledger_end(&walk->chain[0], &ignored);
+	walk->chain[0].open.block = block->block;
+	walk->chains = 1;
 	found.first_block = walk->next;
 	found.last_block = block->block - 1;
 	found.count = block->block - walk->next;
@@ -254,7 +255,7 @@ static int take_block(struct walk *walk, const struct incise_ledger_block *block
 		rc = take_row(walk, &good);
 	if (rc == -ECANCELED)
 		return rc;
-	for (int i = 0; i < 2; i++) {
+	for (int i = 0; i < walk->chains; i++) {
 		struct incise_ledger_block computed;
 		bool is = true;
 
@@ -268,9 +269,11 @@ static int take_block(struct walk *walk, const struct incise_ledger_block *block
 	walk->next = block->block + 1;
 	if (match >= 0) {
 		flush_altered(walk);
-		walk->chain[!match] = walk->chain[match];
+		walk->chain[0] = walk->chain[match];
+		walk->chains = 1;
 	} else {
 		add_altered(walk, block, walk->out->present - before);
+		walk->chains = 2;
 		walk->chain[1] = walk->chain[0];
 		walk->chain[1].open.crc = block->crc;
 		if (block->count) {
@@ -279,7 +282,7 @@ static int take_block(struct walk *walk, const struct incise_ledger_block *block
 			walk->chain[1].last_ns = block->last_ns;
 		}
 	}
-	for (int i = 0; i < 2; i++) {
+	for (int i = 0; i < walk->chains; i++) {
 		walk->chain[i].open.block = walk->next;
 		walk->chain[i].open.count = 0;
 	}
@@ -403,8 +406,8 @@ int incise_verify_stream(struct incise_verification *verify,
 	int rc = 0;
 
 	snprintf(out->name, sizeof(out->name), "%s", form->stream);
-	for (int i = 0; i < 2; i++)
-		incise_ledger_init(&walk.chain[i]);
+	walk.chains = 1;
+	incise_ledger_init(&walk.chain[0]);
 	walk.altered = finding(&walk, INCISE_VERIFY_ALTERED);
 	snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY seq", form->columns,
 		 form->table);
