@@ -2,11 +2,11 @@
 /*
  * Writing a recording; see incise/recorder.h.
  *
- *     force ────► timeline ┬────────────────► table force
- *       └► zero: mean of the│first 0.5 s ───► table meta       one transaction
- *                           ├► CRC, chained ► table ledger  ──► per 100 ms of
- *     tracker ──► timeline ┬┴───────────────► table tracker     the rig's clock
- *                          └► depth, speed ─► table depth
+ *     force ────► timeline ─┬─────────────────► table force
+ *       └► zero: 0.5 s ─────┼─────────────────► table meta       one transaction
+ *                           ├─► CRC, chained ─► table ledger ──► per 100 ms of
+ *     tracker ──► timeline ─┴┬────────────────► table tracker    the rig's clock
+ *                            └► depth, speed ─► table depth
  *
  * On a real clock each commit is synced, so a power cut costs no more than a kill: the
  * last 100 ms. A device's own buffer bridges the time that syncing takes.
@@ -21,122 +21,13 @@
 #include "schema.h"
 
 #define COMMIT_NS 100000000LL
-/* How long a reader may keep the recorder from writing. */
-#define BUSY_MS 1000
 #define BATCH 1024
-
-static const char *const sql[STATEMENTS] = {
-	[INSERT_FORCE] = "INSERT INTO force VALUES(?,?,?)",
-	[INSERT_TRACKER] = "INSERT INTO tracker VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?)",
-	[INSERT_DEPTH] = "INSERT INTO depth VALUES(?,?,?,?)",
-	[INSERT_EVENT] = "INSERT INTO events VALUES(?,?,?)",
-	[INSERT_LEDGER] = "INSERT INTO ledger VALUES(?,?,?,?,?,?,?,?,?)",
-	[SET_META] = "INSERT OR REPLACE INTO meta VALUES(?,?)",
-};
-
-/* --- database ------------------------------------------------------------------- */
-
-int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err)
-{
-	int code = incise_schema_errno(rec->db);
-	const char *text = sqlite3_errmsg(rec->db);
-
-	if (code == ENOSPC)
-		return incise_error_set(
-			err, code,
-			"%s: disk full (or a quota or limit on files); make room "
-			"and record again; what was committed is in %s: `incise "
-			"info` reads it",
-			rec->path, rec->part);
-	return incise_error_set(err, code == EINVAL ? EIO : code,
-				"%s: cannot be written: %s; what was committed is in %s: "
-				"`incise info` reads it",
-				rec->path, text, rec->part);
-}
-
-/* Counts go with the rows they count, so that an interrupted recording knows its losses. */
-static int commit(struct incise_recorder *rec, int64_t now_ns, struct incise_error *err)
-{
-	const struct {
-		const char *key;
-		uint64_t value;
-	} counts[] = {
-		{"force_rows", rec->stats.force},
-		{"tracker_rows", rec->stats.tracker},
-		{"depth_rows", rec->stats.depth},
-		{"force_lost", rec->stats.force_lost},
-		{"tracker_lost", rec->stats.tracker_lost},
-		{"force_clipped", rec->stats.force_clipped},
-	};
-
-	for (size_t i = 0; i < sizeof(counts) / sizeof(*counts); i++)
-		if (incise_recorder_set_integer(rec, counts[i].key, counts[i].value) !=
-		    SQLITE_OK)
-			return incise_recorder_fail(rec, err);
-	if (incise_recorder_ledger(rec) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	if (sqlite3_exec(rec->db, "COMMIT; BEGIN", NULL, NULL, NULL) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	rec->commit_ns = now_ns;
-	return 0;
-}
 
 /* --- beginning ------------------------------------------------------------------- */
 
-static int open_database(struct incise_recorder *rec, struct incise_error *err)
-{
-	bool real = incise_clock_is_real(incise_rig_clock(rec->rig));
-	char *file = NULL;
-	int rc;
-
-	if (asprintf(&file, "%s/%s", rec->part, INCISE_SCHEMA_DB) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
-	rc = sqlite3_open_v2(
-		file, &rec->db,
-		SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL);
-	free(file);
-	/*
-	 * Someone may read the recording as it grows, and SQLite keeps the writer out for
-	 * a moment: until the file has its log, and when a log is folded in. What comes
-	 * meanwhile waits in the sources' rings.
-	 */
-	if (rc == SQLITE_OK)
-		rc = sqlite3_busy_timeout(rec->db, BUSY_MS);
-	if (rc == SQLITE_OK)
-		rc = sqlite3_exec(
-			rec->db,
-			real ? "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL"
-			     : "PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL",
-			NULL, NULL, NULL);
-	if (rc == SQLITE_OK)
-		rc = sqlite3_exec(rec->db, "BEGIN", NULL, NULL, NULL);
-	if (rc == SQLITE_OK)
-		rc = incise_schema_create(rec->db);
-	for (int i = 0; i < STATEMENTS && rc == SQLITE_OK; i++)
-		rc = sqlite3_prepare_v3(rec->db, sql[i], -1, SQLITE_PREPARE_PERSISTENT,
-					&rec->stmt[i], NULL);
-	if (rc == SQLITE_OK)
-		rc = incise_recorder_write_meta(rec);
-	if (rc == SQLITE_OK)
-		rc = incise_recorder_write_streams(rec);
-	if (rc != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	return commit(rec, incise_clock_now(incise_rig_clock(rec->rig)), err);
-}
-
-static void close_database(struct incise_recorder *rec)
-{
-	for (int i = 0; i < STATEMENTS; i++) {
-		sqlite3_finalize(rec->stmt[i]);
-		rec->stmt[i] = NULL;
-	}
-	sqlite3_close(rec->db);
-	rec->db = NULL;
-}
-
 static void recorder_free(struct incise_recorder *rec)
 {
-	close_database(rec);
+	incise_recorder_close_database(rec);
 	if (rec->folder >= 0)
 		close(rec->folder);
 	if (rec->parent >= 0)
@@ -198,9 +89,9 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	if (!rc)
 		rc = incise_recorder_make_folder(rec, err);
 	if (!rc) {
-		rc = open_database(rec, err);
+		rc = incise_recorder_open_database(rec, err);
 		if (rc) {
-			close_database(rec);
+			incise_recorder_close_database(rec);
 			incise_recorder_remove_folder(rec);
 		}
 	}
@@ -376,8 +267,8 @@ static int fail_device(struct incise_recorder *rec, const char *name, const char
 
 	if (incise_recorder_note(rec, "failed", "%s: %s", name,
 				 *cause ? cause : strerror(-rc)) == SQLITE_OK)
-		commit(rec, rec->commit_ns,
-		       &ignored); /* what came before is worth keeping */
+		incise_recorder_commit(rec, rec->commit_ns,
+				       &ignored); /* what came before is worth keeping */
 	if (*cause)
 		return incise_error_set(
 			err, -rc,
@@ -452,7 +343,7 @@ int incise_recorder_poll(struct incise_recorder *rec, struct incise_error *err)
 	if (!rc && incise_recorder_zero_due(rec))
 		rc = incise_recorder_settle_zero(rec, err);
 	if (!rc && now - rec->commit_ns >= COMMIT_NS)
-		rc = commit(rec, now, err);
+		rc = incise_recorder_commit(rec, now, err);
 	rec->failed = rc;
 	return rc;
 }
@@ -483,7 +374,7 @@ static int complete(struct incise_recorder *rec, struct incise_error *err)
 		    incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK))
 		rc = incise_recorder_fail(rec, err);
 	if (!rc)
-		rc = commit(rec, rec->commit_ns, err);
+		rc = incise_recorder_commit(rec, rec->commit_ns, err);
 	if (rc)
 		return rc;
 	/*
@@ -513,7 +404,7 @@ int incise_recorder_close(struct incise_recorder *rec, struct incise_error *err)
 			rec->worthless ? "" : rec->part);
 	else
 		rc = complete(rec, err);
-	close_database(rec);
+	incise_recorder_close_database(rec);
 	if (!rc)
 		rc = incise_recorder_give_name(rec, err);
 	if (rec->worthless)

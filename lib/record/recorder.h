@@ -2,11 +2,12 @@
 /*
  * Inside a recorder; for lib/record/recorder*.c only.
  *
- *     recorder.c         samples, commits, beginning and end
- *     recorder_ledger.c  table ledger
- *     recorder_folder.c  NAME.rec.part, its lock and its name
- *     recorder_meta.c    tables meta and events
- *     recorder_zero.c    the zero of the force channel
+ *     recorder.c           samples, beginning and end
+ *     recorder_database.c  opening, commits
+ *     recorder_ledger.c    table ledger
+ *     recorder_folder.c    NAME.rec.part, its lock and its name
+ *     recorder_meta.c      tables meta and events
+ *     recorder_zero.c      the zero of the force channel
  */
 #ifndef INCISE_RECORDER_PRIVATE_H
 #define INCISE_RECORDER_PRIVATE_H
@@ -19,7 +20,7 @@
 #include "ledger.h"
 #include "timeline.h"
 
-/* Prepared once; see recorder.c. */
+/* Prepared once; see recorder_database.c. */
 enum {
 	INSERT_FORCE,
 	INSERT_TRACKER,
@@ -73,6 +74,15 @@ struct incise_recorder {
 
 /* Report a failed write; what was committed stays. Returns -errno. */
 int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err);
+
+/* Make the database in the folder, with what is known at the start. Returns 0 or -errno. */
+int incise_recorder_open_database(struct incise_recorder *rec, struct incise_error *err);
+
+/* Make what came so far safe, with its counts and its ledger. Returns 0 or -errno. */
+int incise_recorder_commit(struct incise_recorder *rec, int64_t now_ns,
+			   struct incise_error *err);
+
+void incise_recorder_close_database(struct incise_recorder *rec);
 
 /* Run a bound statement. Returns an SQLite code. */
 int incise_recorder_run(sqlite3_stmt *stmt);
