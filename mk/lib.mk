@@ -2,7 +2,8 @@
 # The shared objects.
 
 sources = $(sort $(foreach room,$(rooms_$1),$(wildcard lib/$(room)/*.c lib/$(room)/*.cc)))
-objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))))
+# also_LIB: what a library holds itself of a room of another, which does not export it.
+objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))) $(also_$1))
 
 $(O)/obj/%.o: %.c
 	@mkdir -p $(@D)
@@ -108,6 +109,13 @@ objects_vision_opencv := $(addprefix $(O)/obj/,$(addsuffix .o,$(basename \
 libs_vision_opencv := -lopencv_imgproc -lopencv_core -ljpeg -lstdc++
 $(objects_vision_opencv): pc_cflags = $(opencv_cflags)
 
+# Pictures in a file; lib/record loads it.
+has_frames := $(shell $(PKG_CONFIG) --exists libavformat libavcodec libavutil && echo yes)
+device_modules += $(if $(has_frames),frames_mkv)
+pc_frames_mkv := libavformat libavcodec libavutil
+objects_frames_mkv := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/frames/*.c))
+$(objects_frames_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
+
 define device_module
 $(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
 	@mkdir -p $$(@D)
@@ -130,6 +138,7 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(filter-out %/camera_v4l2.c,\
 		$(if $(has_comedilib),$(daq_comedi))) \
 	$(filter $(O)/obj/lib/device/polhemus/%,$(filter-out %/tracker_tty.o,$(objects_tracker_tty))) \
 	$(if $(has_vision),$(filter-out %/vision_opencv.o,$(objects_vision_opencv))) \
+	$(if $(has_frames),$(objects_frames_mkv)) \
 	$(O)/obj/tools/scalpel_picture.o
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)

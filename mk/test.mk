@@ -5,7 +5,7 @@
 unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_netlink.c) \
 	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \
 	$(if $(has_libusb),,%/polhemus_usb.c %/polhemus_usb_find.c) \
-	$(if $(has_vision),,tests/unit/vision/%),\
+	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/frames/%),\
 	$(wildcard tests/unit/*/*.c))
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
@@ -39,6 +39,11 @@ $(filter %/polhemus_usb %/polhemus_usb_find,$(unit_programs)): private CPPFLAGS 
 vision_linked := tests/vision/linked.c
 $(filter $(O)/tests/unit/vision/%,$(unit_programs)): $(vision_linked)
 
+# What of pictures in a file is in a module is linked to its own tests.
+libs_frames_tests = $(shell $(PKG_CONFIG) --libs $(pc_frames_mkv))
+$(filter $(O)/tests/unit/frames/%,$(unit_programs)): private CPPFLAGS += \
+	$(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
+
 $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
@@ -50,6 +55,7 @@ $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
 		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(if $(filter vision/%,$*),$(vision_linked)) \
 		$(O)/lib/libincise-tests.a $(if $(filter vision/%,$*),$(libs_vision_opencv)) \
+		$(if $(filter frames/%,$*),$(libs_frames_tests)) \
 		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm
 
 check: ## install what is missing, build, and run all tests
