@@ -105,6 +105,15 @@ $(O)/tests/tracker_line: tests/bench/tracker_line.c $(emulator) $(O)/lib/libinci
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
 		$(LDFLAGS) -o $@ $^ $(all_libs) -lm -pthread
 
+# Pictures into a file, what they cost.
+$(O)/tests/frames: tests/bench/frames.c $(O)/lib/libincise-tests.a
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
+		$(LDFLAGS) -o $@ $(filter %.c %.a,$^) $(libs_frames_tests) $(all_libs) -lm -pthread
+
+check-frames: $(O)/tests/frames ## CPU per picture and bytes per hour of each format
+	$(O)/tests/frames $(O)/tests
+
 TRACKER_SECONDS ?= 600
 check-tracker: $(O)/tests/tracker_line ## a FASTRAK at a serial line for ten minutes, clean and with harm on the way
 	$(O)/tests/tracker_line $(TRACKER_SECONDS)
@@ -113,4 +122,4 @@ check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the sh
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 
-.PHONY: check-exhaustive check-tracker
+.PHONY: check-exhaustive check-frames check-tracker
