@@ -1,0 +1,437 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/record/frame_pump.c, with a camera, a file and a vision that do as they are told:
+ * every picture is in the file or in a count, whoever is slow, ends or hangs.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include <semaphore.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+#include <incise/backend.h>
+#include "../../../lib/record/frame_pump.h"
+
+#define SIDE 16
+#define MS 1000000LL
+
+/* A picture every 1/hz s of the clock; none is lost if it is not read in time. */
+struct fake_camera {
+	struct incise_camera camera;
+	struct incise_clock *clock;
+	int64_t from_ns;
+	double hz;
+	uint64_t next, last; /* ends at */
+	int end;	     /* negative errno of the end; 0: no more pictures */
+	uint64_t lost;
+	uint8_t bytes[SIDE * SIDE];
+};
+
+static int camera_read(struct incise_camera *camera, struct incise_camera_frame *frame)
+{
+	struct fake_camera *c = (struct fake_camera *)camera;
+	int64_t t_ns = c->from_ns + (int64_t)((double)c->next / c->hz * 1e9);
+
+	if (c->next == c->last)
+		return c->end;
+	if (t_ns > incise_clock_now(c->clock))
+		return 0;
+	memset(c->bytes, (int)c->next, sizeof(c->bytes));
+	*frame = (struct incise_camera_frame){
+		.t_ns = t_ns,
+		.seq = c->next++,
+		.width = SIDE,
+		.height = SIDE,
+		.stride = SIDE,
+		.pixels = INCISE_PIXELS_GREY,
+		.data = c->bytes,
+		.size = sizeof(c->bytes),
+	};
+	return 1;
+}
+
+static void camera_info(const struct incise_camera *camera,
+			struct incise_camera_info *info)
+{
+	*info = (struct incise_camera_info){
+		.rate_hz = ((const struct fake_camera *)camera)->hz,
+		.width = SIDE,
+		.height = SIDE,
+		.pixels = INCISE_PIXELS_GREY,
+	};
+}
+
+static uint64_t camera_lost(const struct incise_camera *camera)
+{
+	return ((const struct fake_camera *)camera)->lost;
+}
+
+static int camera_cause(struct incise_camera *camera, char *text, size_t size)
+{
+	return snprintf(text, size, "it was unplugged");
+}
+
+static const struct incise_camera_ops camera_ops = {
+	.read = camera_read,
+	.info = camera_info,
+	.lost = camera_lost,
+	.cause = camera_cause,
+};
+
+static struct fake_camera camera_of(struct incise_clock *clock, double hz, uint64_t last)
+{
+	return (struct fake_camera){
+		.camera = {&camera_ops},
+		.clock = clock,
+		.from_ns = incise_clock_now(clock),
+		.hz = hz,
+		.last = last,
+		.lost = 7, /* before it was recorded */
+	};
+}
+
+/* A file that stalls, fails or hangs at one picture. */
+struct fake_file {
+	struct incise_frames_writer writer;
+	uint64_t puts, at;
+	useconds_t stall;
+	int fail;
+	sem_t *hang;
+	bool wrong; /* a picture that is not whole, or out of order */
+	_Atomic int closed;
+};
+
+static int file_put(struct incise_frames_writer *writer,
+		    const struct incise_camera_frame *frame,
+		    struct incise_frames_stored *stored, struct incise_error *err)
+{
+	struct fake_file *f = (struct fake_file *)writer;
+	uint64_t n = f->puts++;
+
+	for (size_t i = 0; i < frame->size; i++)
+		f->wrong |= frame->data[i] != (uint8_t)frame->seq;
+	if (f->at == n && f->stall)
+		usleep(f->stall);
+	if (f->at == n && f->hang)
+		while (sem_wait(f->hang))
+			;
+	if (f->at == n && f->fail)
+		return incise_error_set(err, f->fail, "the file: disk full");
+	*stored = (struct incise_frames_stored){(int64_t)frame->seq * 10, 100, 5};
+	return 0;
+}
+
+static int file_close(struct incise_frames_writer *writer, struct incise_error *err)
+{
+	((struct fake_file *)writer)->closed++;
+	return 0;
+}
+
+static const struct incise_frames_writer_ops file_ops = {file_put, file_close};
+
+/* A vision that is slow, and finds no handle in every third picture. */
+struct fake_vision {
+	struct incise_vision vision;
+	useconds_t takes;
+};
+
+static int vision_measure(struct incise_vision *vision,
+			  const struct incise_camera_frame *frame,
+			  struct incise_vision_result *result)
+{
+	useconds_t takes = ((struct fake_vision *)vision)->takes;
+
+	if (takes)
+		usleep(takes);
+	if (frame->data[5] % 3 == 2)
+		return -EBADMSG;
+	*result = (struct incise_vision_result){
+		.found = true,
+		.length_px = 100.0 + frame->data[5],
+		.sd_px = 0.25,
+		.depth_mm = 3,
+		.quality = 0.5,
+	};
+	return 0;
+}
+
+static const struct incise_vision_ops vision_ops = {.measure = vision_measure};
+
+static struct incise_frame_pump *begin(struct fake_camera *camera, struct fake_file *file,
+				       struct fake_vision *vision)
+{
+	struct incise_error err = {0};
+	struct incise_frame_pump *pump = incise_frame_pump_new(
+		&(struct incise_frame_pump_setup){
+			.camera = &camera->camera,
+			.clock = camera->clock,
+			.vision = vision ? &vision->vision : NULL,
+			.writer = &file->writer,
+		},
+		&err);
+
+	if (!pump)
+		fail_msg("%s", err.text);
+	return pump;
+}
+
+/* Until the camera has given its last and all of it went through. */
+static struct incise_frame_pump_stats wait_for(struct incise_frame_pump *pump,
+					       uint64_t pictures)
+{
+	struct incise_frame_pump_stats s;
+
+	do {
+		usleep(1000);
+		incise_frame_pump_stats(pump, &s);
+	} while (s.written + s.dropped + s.unwritten < pictures);
+	return s;
+}
+
+/* On a clock that stands still all is written and looked at, however slow vision is. */
+static void nothing_is_lost_where_time_waits(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_simulated(1000 * MS);
+	struct fake_camera camera = camera_of(clock, 100, 200);
+	struct fake_file file = {.writer = {&file_ops}, .at = 3, .stall = 50000};
+	struct fake_vision vision = {{&vision_ops}, 500};
+	struct incise_frame_pump *pump = begin(&camera, &file, &vision);
+	struct incise_frame_record record[7];
+	struct incise_frame_pump_stats stats;
+	uint64_t seq = 0;
+	int n;
+
+	for (int i = 0; i < 200; i++) {
+		incise_clock_wait_until(clock, 1000 * MS + i * 10 * MS);
+		assert_int_equal(incise_frame_pump_step(pump), 1);
+		assert_int_equal(incise_frame_pump_step(pump), 0);
+		if (i == 199)
+			assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL),
+					 0);
+		while ((n = incise_frame_pump_take(pump, record, 7)) > 0)
+			for (int k = 0; k < n; k++, seq++) {
+				const struct incise_frame_record *r = &record[k];
+
+				assert_int_equal(r->seq, seq);
+				assert_int_equal(r->t_ns, 1000 * MS + seq * 10 * MS);
+				assert_int_equal(r->arrival_ns, r->t_ns);
+				assert_int_equal(r->pts_ms, seq * 10);
+				assert_int_equal(r->bytes, 100);
+				assert_int_equal(r->crc, 5);
+				if (seq % 256 % 3 == 2) {
+					assert_true(isnan(r->length_px) &&
+						    isnan(r->sd_px) &&
+						    isnan(r->depth_mm));
+					assert_true(r->quality == 0);
+				} else {
+					assert_true(r->length_px == 100.0 + (double)seq);
+					assert_true(r->sd_px == 0.25);
+					assert_true(r->depth_mm == 3);
+					assert_true(r->quality == 0.5);
+				}
+			}
+	}
+	assert_int_equal(seq, 200);
+	incise_frame_pump_stats(pump, &stats);
+	assert_int_equal(stats.read, 200);
+	assert_int_equal(stats.written, 200);
+	assert_int_equal(stats.bytes, 20000);
+	assert_int_equal(stats.lost + stats.dropped + stats.unwritten + stats.unlooked +
+				 stats.unrecorded,
+			 0);
+	assert_false(file.wrong);
+	assert_int_equal(file.closed, 1);
+	assert_int_equal(incise_frame_pump_step(pump), 0);
+	incise_frame_pump_free(pump);
+	incise_clock_free(clock);
+}
+
+/* A disk that does not answer for 1.5 s, of the 2.5 s that there is room for. */
+static void a_stall_is_bridged(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_real();
+	struct fake_camera camera = camera_of(clock, 60, 120);
+	struct fake_file file = {.writer = {&file_ops}, .at = 5, .stall = 1500000};
+	struct incise_frame_pump *pump = begin(&camera, &file, NULL);
+	struct incise_frame_pump_stats stats = wait_for(pump, 120);
+	struct incise_frame_record record;
+
+	assert_int_equal(stats.written, 120);
+	assert_int_equal(stats.room, 150);
+	/* It did stall: of 90 pictures most have waited. */
+	assert_true(stats.waiting_most > 45);
+	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
+	for (uint64_t seq = 0; seq < 120; seq++) {
+		assert_int_equal(incise_frame_pump_take(pump, &record, 1), 1);
+		assert_int_equal(record.seq, seq);
+		assert_true(record.arrival_ns >= record.t_ns);
+		assert_true(isnan(record.length_px) && isnan(record.quality));
+	}
+	assert_int_equal(incise_frame_pump_take(pump, &record, 1), 0);
+	assert_false(file.wrong);
+	incise_frame_pump_free(pump);
+	incise_clock_free(clock);
+}
+
+/* One that hangs: what finds no room is counted, and the end does not wait for it. */
+static void a_disk_that_hangs_holds_nobody(void **state)
+{
+	/* What the thread that hangs may touch is never freed. */
+	static struct incise_frame_pump *left;
+	static struct fake_file file = {.writer = {&file_ops}, .at = 5};
+	static sem_t hang;
+	struct incise_clock *clock = incise_clock_new_real();
+	struct fake_camera camera = camera_of(clock, 1000, 3000);
+	struct incise_frame_pump_stats stats;
+	struct incise_frame_record record[10];
+	struct incise_error err = {0};
+
+	/* As if 3 s had passed. */
+	camera.from_ns -= 3000 * MS;
+	sem_init(&hang, 0, 0);
+	file.hang = &hang;
+	left = begin(&camera, &file, NULL);
+	do {
+		usleep(1000);
+		incise_frame_pump_stats(left, &stats);
+	} while (stats.read < 3000);
+	assert_int_equal(incise_frame_pump_stop(left, 20 * MS, &err), -ETIMEDOUT);
+	assert_non_null(strstr(err.text, "the disk does not answer; 2"));
+	incise_frame_pump_stats(left, &stats);
+	/* 5 are in the file, one is in the hand of who hangs and in its slot still. */
+	assert_int_equal(stats.written, 5);
+	/* All are somewhere. Who hangs may have begun before or after the slots were full. */
+	assert_in_range(stats.waiting, 2495, 2500);
+	assert_int_equal(stats.written + stats.waiting + stats.dropped, 3000);
+	assert_int_equal(incise_frame_pump_take(left, record, 10), 5);
+	incise_frame_pump_free(left);
+	/* It comes back, to nothing that was taken from under it. */
+	sem_post(&hang);
+	while (!file.closed)
+		usleep(1000);
+	assert_int_equal(file.puts, 6);
+	incise_clock_free(clock);
+}
+
+static void a_full_disk_ends_the_file_alone(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_real();
+	struct fake_camera camera = camera_of(clock, 1000, 50);
+	struct fake_file file = {.writer = {&file_ops}, .at = 20, .fail = ENOSPC};
+	struct incise_frame_pump *pump = begin(&camera, &file, NULL);
+	struct incise_frame_pump_stats stats = wait_for(pump, 50);
+	struct incise_error err = {0};
+
+	assert_int_equal(stats.read, 50);
+	assert_int_equal(stats.written, 20);
+	assert_int_equal(stats.unwritten, 30);
+	assert_int_equal(stats.file.code, ENOSPC);
+	assert_string_equal(stats.file.text, "the file: disk full");
+	assert_int_equal(stats.camera.code, 0);
+	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, &err), -ENOSPC);
+	assert_string_equal(err.text, "the file: disk full");
+	assert_int_equal(file.closed, 1);
+	incise_frame_pump_free(pump);
+	incise_clock_free(clock);
+}
+
+/* What is not of the shape costs itself alone. */
+static void a_wrong_picture_is_passed_over(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_real();
+	struct fake_camera camera = camera_of(clock, 1000, 50);
+	struct fake_file file = {.writer = {&file_ops}, .at = 20, .fail = EINVAL};
+	struct fake_vision vision = {{&vision_ops}, 0};
+	struct incise_frame_pump *pump = begin(&camera, &file, &vision);
+	struct incise_frame_pump_stats stats = wait_for(pump, 50);
+	struct incise_frame_record record[50];
+
+	assert_int_equal(stats.written, 49);
+	assert_int_equal(stats.unwritten, 1);
+	assert_int_equal(stats.file.code, 0);
+	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
+	assert_int_equal(incise_frame_pump_take(pump, record, 50), 49);
+	/* What vision saw stays with its picture behind the gap. */
+	for (int i = 0; i < 49; i++) {
+		uint64_t seq = (uint64_t)i + (i >= 20);
+
+		assert_int_equal(record[i].seq, seq);
+		assert_true(isnan(record[i].length_px) ||
+			    record[i].length_px == 100.0 + (double)seq);
+	}
+	incise_frame_pump_free(pump);
+	incise_clock_free(clock);
+}
+
+static void a_camera_that_ends_says_why(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_real();
+	struct fake_camera camera = camera_of(clock, 1000, 50);
+	struct fake_file file = {.writer = {&file_ops}, .at = UINT64_MAX};
+	struct incise_frame_pump_stats stats;
+	struct incise_frame_pump *pump;
+
+	camera.end = -ENODEV;
+	pump = begin(&camera, &file, NULL);
+	do {
+		stats = wait_for(pump, 50);
+	} while (!stats.camera.code);
+	assert_int_equal(stats.camera.code, ENODEV);
+	assert_string_equal(stats.camera.text, "it was unplugged");
+	assert_int_equal(stats.written, 50);
+	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
+	incise_frame_pump_free(pump);
+	incise_clock_free(clock);
+}
+
+/* Vision that is slower than the camera: pictures without a depth, but all of them. */
+static void slow_vision_holds_nobody(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_real();
+	struct fake_camera camera = camera_of(clock, 1000, 200);
+	struct fake_file file = {.writer = {&file_ops}, .at = UINT64_MAX};
+	struct fake_vision vision = {{&vision_ops}, 20000};
+	struct incise_frame_record record[200];
+	struct incise_frame_pump_stats stats;
+	struct incise_frame_pump *pump;
+	uint64_t looked = 0;
+
+	camera.from_ns -= 200 * MS; /* all at once */
+	pump = begin(&camera, &file, &vision);
+	stats = wait_for(pump, 200);
+	assert_int_equal(stats.written, 200);
+	assert_true(stats.unlooked > 0);
+	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
+	incise_frame_pump_stats(pump, &stats);
+	assert_int_equal(incise_frame_pump_take(pump, record, 200), 200);
+	for (int i = 0; i < 200; i++) {
+		assert_int_equal(record[i].seq, i);
+		looked += !isnan(record[i].quality);
+		if (!isnan(record[i].length_px))
+			assert_true(record[i].length_px == 100.0 + i);
+	}
+	assert_int_equal(looked, 200 - stats.unlooked);
+	incise_frame_pump_free(pump);
+	incise_clock_free(clock);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(nothing_is_lost_where_time_waits),
+		cmocka_unit_test(a_stall_is_bridged),
+		cmocka_unit_test(a_disk_that_hangs_holds_nobody),
+		cmocka_unit_test(a_full_disk_ends_the_file_alone),
+		cmocka_unit_test(a_wrong_picture_is_passed_over),
+		cmocka_unit_test(a_camera_that_ends_says_why),
+		cmocka_unit_test(slow_vision_holds_nobody),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
