@@ -15,6 +15,7 @@ ldflags_device/stepper_kernel := $(foreach name,open close ioctl mmap munmap clo
 	nanosleep,-Wl,--wrap=$(name))
 ldflags_daq/comedi_force := -Wl,--wrap=read
 ldflags_daq/iio_source := -Wl,--wrap=open
+ldflags_frames/mkv_writer := -Wl,--wrap=write
 ldflags_can/slcan := -Wl,--wrap=write
 ldflags_can/slcan_tty := -Wl,--wrap=write
 ldflags_can/socketcan := $(foreach name,socket bind setsockopt send recvmsg ppoll close \

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/frames/mkv_writer.c: what is put comes back to the byte, with its times; a file that
- * is cut off at any byte gives all that is whole before it; a full disk; kill -9.
+ * is cut off at any byte gives all that is whole before it; a disk that is full,
+ * writes little at once, or fails; kill -9.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -26,6 +27,29 @@ static const struct incise_frames_shape shapes[] = {
 	{17, 19, INCISE_PIXELS_RGB, 0},	   {17, 16, INCISE_PIXELS_GREY, 7.5},
 	{18, 17, INCISE_PIXELS_YUYV, 1e3}, {16, 8192, INCISE_PIXELS_YUYV, 30},
 };
+
+/* A disk that writes at most so much at once, or fails. 0: as it is. */
+static struct {
+	size_t most;
+	int64_t room; /* bytes until it fails with EIO; below 0: for ever */
+} disk = {0, -1};
+
+ssize_t __real_write(int fd, const void *bytes, size_t n);
+ssize_t __wrap_write(int fd, const void *bytes, size_t n)
+{
+	if (disk.room >= 0 && (int64_t)n > disk.room) {
+		n = (size_t)disk.room;
+		if (!n) {
+			errno = EIO;
+			return -1;
+		}
+	}
+	if (disk.most && n > disk.most)
+		n = disk.most;
+	if (disk.room >= 0)
+		disk.room -= (int64_t)n;
+	return __real_write(fd, bytes, n);
+}
 
 static struct incise_frames_writer *begin(const char *path,
 					  const struct incise_frames_shape *shape)
@@ -392,6 +416,56 @@ static void full_disk(void **state)
 	}
 }
 
+static void short_writes_are_gone_on_with(void **state)
+{
+	off_t ends[6];
+	char path[64];
+
+	film_path(path, sizeof(path));
+	disk.most = 100;
+	write_film(path, &shapes[0], 6, ends);
+	disk.most = 0;
+	assert_int_equal(count(path, &shapes[0]), 6);
+	film_remove(path);
+}
+
+/* Wherever it fails, what was put before is there, and the rest is cut off. */
+static void a_disk_that_fails(void **state)
+{
+	static uint8_t bytes[ROOM];
+
+	for (int64_t room = 0; room < 20000; room += 777) {
+		struct incise_frames_writer *writer;
+		struct incise_frames_stored stored;
+		struct incise_error err = {0};
+		uint64_t n = 0;
+		char path[64];
+		int rc = 0;
+
+		film_path(path, sizeof(path));
+		disk.room = room;
+		writer = mkv_writer_new(path, &shapes[3], NULL, &err);
+		while (writer && !rc && n < 100) {
+			struct incise_camera_frame frame =
+				film_frame(&shapes[3], n++, 0, bytes);
+
+			rc = writer->ops->put(writer, &frame, &stored, &err);
+		}
+		disk.room = -1;
+		assert_int_equal(err.code, EIO);
+		if (!writer) {
+			/* Nothing is left of what could not be begun. */
+			assert_int_equal(access(path, F_OK), -1);
+			film_remove(path);
+			continue;
+		}
+		assert_int_equal(rc, -EIO);
+		assert_int_equal(writer->ops->close(writer, &err), -EIO);
+		assert_int_equal(count(path, &shapes[3]), n - 1);
+		film_remove(path);
+	}
+}
+
 /* 20 writers are killed at 20 moments: every picture that was put is there. */
 static void killed(void **state)
 {
@@ -453,6 +527,8 @@ int main(void)
 		cmocka_unit_test(altered_bytes_are_found),
 		cmocka_unit_test(noise_ends),
 		cmocka_unit_test(full_disk),
+		cmocka_unit_test(short_writes_are_gone_on_with),
+		cmocka_unit_test(a_disk_that_fails),
 		cmocka_unit_test(killed),
 	};
 

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/record/frames.c: the module is found where it is, and what is said where it is not.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "../../../lib/record/frames.h"
+
+static const struct incise_frames_shape shape = {32, 16, INCISE_PIXELS_GREY, 60};
+
+static void a_module_that_is_not_there_is_said(void **state)
+{
+	char folder[] = "/tmp/incise-frames-XXXXXX", path[100];
+	struct incise_error err = {0};
+	FILE *file;
+
+	assert_non_null(mkdtemp(folder));
+	setenv("INCISE_MODULE_PATH", folder, 1);
+	errno = 0;
+	assert_null(incise_frames_writer_new("/tmp/none.mkv", &shape, NULL, &err));
+	assert_int_equal(errno, ENOENT);
+	assert_non_null(strstr(err.text, "there is no module frames_mkv.so in "));
+	assert_non_null(strstr(err.text, folder));
+	assert_null(incise_frames_reader_new("/tmp/none.mkv", &err));
+	assert_int_equal(err.code, ENOENT);
+
+	snprintf(path, sizeof(path), "%s/frames_mkv.so", folder);
+	file = fopen(path, "w");
+	assert_non_null(file);
+	fputs("none\n", file);
+	fclose(file);
+	assert_null(incise_frames_writer_new("/tmp/none.mkv", &shape, NULL, &err));
+	assert_int_equal(err.code, ENOEXEC);
+	assert_non_null(strstr(err.text, "cannot be loaded"));
+	unlink(path);
+	rmdir(folder);
+	assert_int_equal(access("/tmp/none.mkv", F_OK), -1);
+}
+
+static void the_module_is_found(void **state)
+{
+	char folder[] = "/tmp/incise-frames-XXXXXX", own[PATH_MAX], path[PATH_MAX + 40];
+	struct incise_frames_reader *reader;
+	struct incise_frames_writer *writer;
+	struct incise_frames_stored stored;
+	struct incise_camera_frame frame;
+	struct incise_error err = {0};
+	uint8_t bytes[32 * 16];
+
+	/* O/tests/unit/record/frames, O/lib/incise */
+	assert_non_null(realpath("/proc/self/exe", own));
+	for (int i = 0; i < 4; i++)
+		*strrchr(own, '/') = '\0';
+	snprintf(path, sizeof(path), "%s/lib/incise", own);
+	setenv("INCISE_MODULE_PATH", path, 1);
+	strcat(path, "/frames_mkv.so");
+	if (access(path, R_OK)) {
+		printf("skipped: frames_mkv.so is not built\n");
+		skip();
+	}
+	assert_non_null(mkdtemp(folder));
+	snprintf(path, sizeof(path), "%s/" INCISE_FRAMES_FILE, folder);
+	writer = incise_frames_writer_new(path, &shape, NULL, &err);
+	if (!writer)
+		fail_msg("%s", err.text);
+	for (size_t i = 0; i < sizeof(bytes); i++)
+		bytes[i] = (uint8_t)(i * i);
+	frame = (struct incise_camera_frame){
+		.t_ns = 5,
+		.seq = 6,
+		.width = 32,
+		.height = 16,
+		.stride = 32,
+		.pixels = INCISE_PIXELS_GREY,
+		.data = bytes,
+		.size = sizeof(bytes),
+	};
+	assert_int_equal(incise_frames_put(writer, &frame, &stored, &err), 0);
+	assert_int_equal(incise_frames_writer_close(writer, &err), 0);
+	reader = incise_frames_reader_new(path, &err);
+	assert_non_null(reader);
+	assert_int_equal(incise_frames_next(reader, &frame, &stored, &err), 1);
+	assert_int_equal(frame.seq, 6);
+	assert_memory_equal(frame.data, bytes, sizeof(bytes));
+	assert_int_equal(incise_frames_next(reader, &frame, &stored, &err), 0);
+	incise_frames_reader_close(reader);
+	incise_frames_reader_close(NULL);
+	assert_int_equal(incise_frames_writer_close(NULL, NULL), 0);
+	unlink(path);
+	rmdir(folder);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_module_that_is_not_there_is_said),
+		cmocka_unit_test(the_module_is_found),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
