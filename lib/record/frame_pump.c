@@ -46,7 +46,7 @@ struct incise_frame_pump {
 	int64_t nap_ns;
 	struct incise_frame_slots slots, vision_slots;
 	struct incise_ring records, results;
-	sem_t filled, vision_filled;
+	sem_t filled, vision_filled, ended;
 	pthread_t camera_thread, file_thread, vision_thread;
 	bool camera_runs, file_runs, vision_runs;
 	bool real_time, stopped, leaked;
@@ -58,7 +58,7 @@ struct incise_frame_pump {
 
 	/* Errors are whole before their flag is set. */
 	struct incise_error camera_error, file_error;
-	atomic_bool camera_ended, file_failed, file_ended;
+	atomic_bool camera_ended, file_failed;
 
 	_Atomic uint64_t read, written, lost, dropped, unwritten, unlooked, unrecorded,
 		waiting_most;
@@ -251,7 +251,7 @@ static void *file_run(void *argument)
 		p->file_error = err;
 		say(&p->file_failed);
 	}
-	say(&p->file_ended);
+	sem_post(&p->ended);
 	return NULL;
 }
 
@@ -432,6 +432,7 @@ struct incise_frame_pump *incise_frame_pump_new(
 	p->setup = *setup;
 	sem_init(&p->filled, 0, 0);
 	sem_init(&p->vision_filled, 0, 0);
+	sem_init(&p->ended, 0, 0);
 	rc = make(p);
 	if (!rc)
 		return p;
@@ -448,6 +449,7 @@ int incise_frame_pump_stop(struct incise_frame_pump *p, int64_t patience_ns,
 {
 	struct timespec now, until;
 	int64_t until_ns;
+	int rc;
 
 	if (!p->stopped) {
 		say(&p->stop);
@@ -460,12 +462,18 @@ int incise_frame_pump_stop(struct incise_frame_pump *p, int64_t patience_ns,
 		until_ns = now.tv_sec * INCISE_NS_PER_S + now.tv_nsec + patience_ns;
 		until = (struct timespec){until_ns / INCISE_NS_PER_S,
 					  until_ns % INCISE_NS_PER_S};
-		if (p->file_runs &&
-		    pthread_clockjoin_np(p->file_thread, NULL, CLOCK_MONOTONIC, &until)) {
+		do {
+			rc = p->file_runs
+				     ? sem_clockwait(&p->ended, CLOCK_MONOTONIC, &until)
+				     : 0;
+		} while (rc && errno == EINTR);
+		if (rc) {
 			/* It may sit in write(2) for ever, with memory of ours. */
 			say(&p->give_up);
 			pthread_detach(p->file_thread);
 			p->leaked = true;
+		} else if (p->file_runs) {
+			pthread_join(p->file_thread, NULL);
 		}
 		if (p->vision_runs)
 			pthread_join(p->vision_thread, NULL);
@@ -499,5 +507,6 @@ void incise_frame_pump_free(struct incise_frame_pump *p)
 	incise_ring_free(&p->results);
 	sem_destroy(&p->filled);
 	sem_destroy(&p->vision_filled);
+	sem_destroy(&p->ended);
 	free(p);
 }
