@@ -21,8 +21,8 @@
 struct reader {
 	struct incise_frames_reader reader;
 	char *path;
-	AVFormatContext *format;
-	AVCodecContext *codec; /* NULL: MJPEG */
+	AVFormatContext *format; /* NULL: there is no picture */
+	AVCodecContext *codec;	 /* NULL: MJPEG */
 	AVFrame *planes;
 	AVPacket *packet;
 	uint8_t *data;
@@ -110,16 +110,39 @@ static int decode(struct reader *r, struct incise_camera_frame *frame)
 	return 0;
 }
 
+/* A file that was killed before its first cluster, which libavformat does not open. */
+static bool is_unbegun(const char *path)
+{
+	static const uint8_t magic[4] = {0x1a, 0x45, 0xdf, 0xa3};
+	static const uint8_t cluster[4] = {0x1f, 0x43, 0xb6, 0x75};
+	uint8_t head[4096], *found;
+	FILE *file = fopen(path, "rbe");
+	size_t n;
+
+	if (!file)
+		return false;
+	n = fread(head, 1, sizeof(head), file);
+	fclose(file);
+	if (n == sizeof(head) || memcmp(head, magic, n < 4 ? n : 4))
+		return false;
+	found = memmem(head, n, cluster, sizeof(cluster));
+	/* Or in the length of the first one. */
+	return !found || found + 12 > head + n;
+}
+
 static int reader_next(struct incise_frames_reader *reader,
 		       struct incise_camera_frame *frame,
 		       struct incise_frames_stored *stored, struct incise_error *err)
 {
 	struct reader *r = of(reader);
-	const AVCodecParameters *codec = r->format->streams[0]->codecpar;
+	const AVCodecParameters *codec;
 	struct mkv_note note;
 	bool noted;
 	int rc;
 
+	if (!r->format)
+		return 0;
+	codec = r->format->streams[0]->codecpar;
 	do {
 		av_packet_unref(r->packet);
 		rc = av_read_frame(r->format, r->packet);
@@ -209,6 +232,8 @@ static int begin(struct reader *r)
 				 &options);
 	av_dict_free(&options);
 	free(url);
+	if (rc < 0 && rc != AVERROR(ENOMEM) && is_unbegun(r->path))
+		return 0;
 	if (rc < 0)
 		return rc;
 	r->format->flags |= AVFMT_FLAG_NOPARSE | AVFMT_FLAG_NOFILLIN;
