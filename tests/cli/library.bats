@@ -125,14 +125,14 @@ maps() {
 		run ! grep -E 'libopencv|libjpeg' linked
 	done
 	maps incise bench precision --quick
-	run ! grep -E 'libopencv|vision_opencv' mapped
+	run ! grep -E 'libopencv|vision_opencv|libav(format|codec)|frames_mkv' mapped
 	maps incise info "$root/scenes/liver.fis"
-	run ! grep -E 'libopencv|vision_opencv' mapped
+	run ! grep -E 'libopencv|vision_opencv|libav(format|codec)|frames_mkv' mapped
 	maps incise info devices
-	run ! grep -E 'libopencv|vision_opencv' mapped
+	run ! grep -E 'libopencv|vision_opencv|libav(format|codec)|frames_mkv' mapped
 	printf '%s\n' 'tracker = "sim:"; stepper = "sim:"; camera = "sim:";' >rig.conf
 	maps incise haptic "$root/scenes/liver.scene" --rig rig.conf --duration 0.2s
-	run ! grep -E 'libopencv|vision_opencv' mapped
+	run ! grep -E 'libopencv|vision_opencv|libav(format|codec)|frames_mkv' mapped
 	# the pattern finds it where it is
 	[ -e "$INCISE_BUILD/lib/incise/vision_opencv.so" ] || skip "OpenCV's headers were absent"
 	maps incise bench vision --quick
@@ -160,7 +160,11 @@ maps() {
 		# what templates of C++ leave is weak
 		nm -D --defined-only "$module" | awk '$2 !~ /[VWu]/ { print $3 }' |
 			grep -vxE '_end|_edata|__bss_start' >exported
-		[ "$(cat exported)" = incise_backend ] || complain "$module: $(cat exported)"
+		case $module in
+		*/frames_mkv.so) symbol=incise_frames ;;
+		*) symbol=incise_backend ;;
+		esac
+		[ "$(cat exported)" = "$symbol" ] || complain "$module: $(cat exported)"
 	done
 }
 
