@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/outfile.h>
+#include <incise/calibration.h>
 #include <incise/recording.h>
 #include "cli.h"
 #include "json.h"
@@ -71,7 +71,6 @@ static void export(char **paths, int n, const struct incise_export_options *how,
 	struct incise_recording **recordings =
 		calloc(n, sizeof(struct incise_recording *));
 	struct incise_error err = {0};
-	struct incise_outfile *file;
 
 	if (!recordings)
 		cli_fail("out of memory");
@@ -80,16 +79,9 @@ static void export(char **paths, int n, const struct incise_export_options *how,
 		if (!recordings[i])
 			cli_fail_with(&err);
 	}
-	file = incise_outfile_open(output, &err);
-	if (!file)
+	if (incise_export(recordings, n, how, output, report, &err))
 		cli_fail_with(&err);
-	if (incise_export_csv(recordings, n, how, incise_outfile_stream(file), report,
-			      &err)) {
-		incise_outfile_abort(file);
-		cli_fail_with(&err);
-	}
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
+	cli_progress_end();
 	for (int i = 0; i < n; i++)
 		incise_recording_close(recordings[i]);
 	free(recordings);

@@ -112,6 +112,22 @@ static int step_depth(struct incise_cuts *cuts, struct incise_error *err)
 	return 1;
 }
 
+static void scale(struct incise_cuts *cuts, double force_mV_N, double zero_mV)
+{
+	const struct incise_recording_info *meta = &cuts->recording->meta;
+
+	cuts->n_per_code = meta->full_scale_V * 1e3 / (1LL << meta->bits) / force_mV_N;
+	cuts->zero_N = (zero_mV - meta->offset_V * 1e3) / force_mV_N;
+}
+
+void incise_cuts_calibrate(struct incise_cuts *cuts,
+			   const struct incise_calibration *calibration)
+{
+	scale(cuts, calibration->force_mV_N,
+	      isnan(calibration->force_zero_mV) ? cuts->recording->meta.zero_mV
+						: calibration->force_zero_mV);
+}
+
 int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recording,
 		     struct incise_error *err)
 {
@@ -119,12 +135,10 @@ int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recordin
 
 	*cuts = (struct incise_cuts){
 		.recording = recording,
-		.n_per_code =
-			meta->full_scale_V * 1e3 / (1LL << meta->bits) / meta->force_mV_N,
-		.zero_N = (meta->zero_mV - meta->offset_V * 1e3) / meta->force_mV_N,
 		.top = (1LL << meta->bits) - 1,
 		.depth_max_mm = -INFINITY,
 	};
+	scale(cuts, meta->force_mV_N, meta->zero_mV);
 	if (sqlite3_prepare_v2(recording->db,
 			       "SELECT seq, t_ns, code FROM force ORDER BY seq", -1,
 			       &cuts->force, NULL) != SQLITE_OK ||

@@ -15,6 +15,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <sqlite3.h>
+#include <incise/calibration.h>
 #include "recording.h"
 
 /* Ten times the tracker's noise apart, so that noise ends no cut. */
@@ -60,6 +61,10 @@ struct incise_cuts {
 /* Start at the beginning. Returns 0 or -errno; then there is nothing to close. */
 int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recording,
 		     struct incise_error *err);
+
+/* Take another calibration of force than the recording's; its zero where that has one. */
+void incise_cuts_calibrate(struct incise_cuts *cuts,
+			   const struct incise_calibration *calibration);
 
 /*
  * The next sample inside a cut. Every row on the way is checked. Returns 1, 0 at the

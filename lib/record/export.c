@@ -2,8 +2,8 @@
 /*
  * A dataset of recordings; see incise/recording.h.
  *
- *     recordings ──► cuts ──► raw rows, or means over 1/rate            ──► CSV
- *                        └──► bins of depth × velocity (paper 1, §4.1)  ──► CSV
+ *     recordings ──► cuts ──► raw rows, or means over 1/rate            ──► table
+ *                        └──► bins of depth × velocity (paper 1, §4.1)  ──► table
  *
  * Memory is that of the bins; recordings are streamed.
  */
@@ -11,9 +11,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../base/c_locale.h"
 #include "cut.h"
 #include "recording.h"
+#include "table_writer.h"
 
 #define BINS_MAX 1000 /* in one direction; all of them are held in memory */
 
@@ -30,11 +30,12 @@ struct bin {
 struct export
 {
 	const struct incise_export_options *options;
-	FILE *out;
+	struct incise_table *table;
 	struct incise_export_report report;
 	struct incise_error *err;
 
-	char *name; /* of the recording under way, unique and ready for CSV */
+	char *name;		       /* of the recording under way, unique */
+	uint64_t samples, samples_all; /* of force, gone through and to go through */
 	int cut;    /* of all recordings, from 1; that of the bins or row under way */
 	int number; /* of the same cut in its recording */
 	double depth_deepest_mm; /* of any row, for who finds no cut */
@@ -76,62 +77,66 @@ static int check_options(const struct incise_export_options *o, struct incise_er
 }
 
 /*
- * Names the recording in the cut column: quoted where CSV wants it, and unlike any
- * recording before it, so that a/liver.rec and b/liver.rec stay apart.
+ * Names the recording in the cut column: unlike any recording before it, so that
+ * a/liver.rec and b/liver.rec stay apart.
  */
 static char *cut_name(struct incise_recording *const *recordings, int at)
 {
 	const char *name = recordings[at]->name;
-	char *text, *to;
 	int same = 1;
+	char *text;
 
 	for (int i = 0; i < at; i++)
 		same += !strcmp(recordings[i]->name, name);
-	text = malloc(2 * strlen(name) + 16);
-	if (!text)
-		return NULL;
-	to = text;
-	for (const char *c = name; *c; c++) {
-		if (*c == '"')
-			*to++ = '"';
-		*to++ = (unsigned char)*c < ' ' || *c == 0x7f ? '_' : *c;
-	}
-	*to = 0;
 	/* '~' stands in no recording's own suffix of this kind. */
-	if (same > 1)
-		sprintf(to, "~%d", same);
+	if (same > 1 ? asprintf(&text, "%s~%d", name, same) < 0
+		     : asprintf(&text, "%s", name) < 0)
+		return NULL;
+	for (char *c = text; *c; c++)
+		if ((unsigned char)*c < ' ' || *c == 0x7f)
+			*c = '_';
 	return text;
 }
 
-/* The header waits for the first row, so that a failure before it prints nothing. */
-static void print_header(struct export *export)
+/* Number of the present cut's name in the table, or -errno. */
+static int name_cut(struct export *export)
 {
-	if (export->report.rows)
-		return;
-	if (!export->bins)
-		fputs("cut,t_s,depth_mm,velocity_mm_s,force_N,clipped\n", export->out);
-	else
-		fprintf(export->out, "%sdepth_mm,velocity_mm_s,force_N,sd_N,count,cuts\n",
-			export->options->by_cut ? "cut," : "");
+	char *text;
+	int rc;
+
+	if (asprintf(&text, "%s-%02d", export->name, export->number) < 0)
+		return incise_error_set(export->err, ENOMEM, "out of memory");
+	rc = incise_table_name(export->table, text);
+	free(text);
+	if (rc < 0)
+		return incise_error_set(export->err, -rc, "out of memory");
+	return rc;
 }
 
-static void print_cut(struct export *export)
-{
-	bool quote = strpbrk(export->name, ",\" ;#") != NULL;
+/* What the columns are: raw, and averaged, of which the first is left out for all cuts. */
+#define CUT                                                                          \
+	{                                                                            \
+		"cut", "1", "recording and number of the cut", INCISE_COLUMN_NAME, 0 \
+	}
+static const struct incise_column raw_columns[] = {
+	CUT,
+	{"t_s", "s", "since the recording's first force sample", INCISE_COLUMN_REAL, 6},
+	{"depth_mm", "mm", "of the tip below the surface", INCISE_COLUMN_SINGLE, 4},
+	{"velocity_mm_s", "mm/s", "speed of the tip", INCISE_COLUMN_SINGLE, 3},
+	{"force_N", "N", "on the blade", INCISE_COLUMN_SINGLE, 5},
+	{"clipped", "1", "1: the converter was at an end", INCISE_COLUMN_FLAG, 0},
+};
+static const struct incise_column bin_columns[] = {
+	CUT,
+	{"depth_mm", "mm", "mean depth in the bin", INCISE_COLUMN_REAL, -1},
+	{"velocity_mm_s", "mm/s", "mean speed in the bin", INCISE_COLUMN_REAL, -1},
+	{"force_N", "N", "mean force in the bin", INCISE_COLUMN_REAL, -1},
+	{"sd_N", "N", "standard deviation of single samples", INCISE_COLUMN_REAL, -1},
+	{"count", "1", "samples", INCISE_COLUMN_INTEGER, 0},
+	{"cuts", "1", "different cuts that they are from", INCISE_COLUMN_INTEGER, 0},
+};
 
-	fprintf(export->out, "%s%s-%02d%s,", quote ? "\"" : "", export->name,
-		export->number, quote ? "\"" : "");
-}
-
-static int check_out(struct export *export)
-{
-	if (!ferror(export->out))
-		return 0;
-	return incise_error_set(
-		export->err, errno ? errno : EIO,
-		"the dataset cannot be written: %s; make room, or give another -o",
-		strerror(errno ? errno : EIO));
-}
+#define COLUMNS(of) ((int)(sizeof(of) / sizeof(*(of))))
 
 /* Welford's way: one pass, no cancellation. */
 static void bin_add(struct bin *bin, const struct incise_cut_sample *sample, double t_s,
@@ -154,32 +159,43 @@ static void bin_add(struct bin *bin, const struct incise_cut_sample *sample, dou
 
 /* --- raw --------------------------------------------------------------------------- */
 
-static void print_row(struct export *export)
+static int put_row(struct export *export)
 {
 	const struct bin *row = &export->row;
+	int name, rc;
 
 	if (!row->n)
-		return;
-	print_header(export);
-	print_cut(export);
-	fprintf(export->out, "%.6f,%.4f,%.3f,%.5f,%d\n", row->t_s, row->depth_mm,
-		row->velocity_mm_s, row->force_N, row->clipped);
+		return 0;
+	name = name_cut(export);
+	if (name < 0)
+		return name;
+	rc = incise_table_add(export->table,
+			      (union incise_cell[]){
+				      {.integer = name},
+				      {.real = row->t_s},
+				      {.real = row->depth_mm},
+				      {.real = row->velocity_mm_s},
+				      {.real = row->force_N},
+				      {.integer = row->clipped},
+			      },
+			      export->err);
 	export->report.rows++;
 	export->row = (struct bin){0};
+	return rc;
 }
 
-static void add_raw(struct export *export, const struct incise_cut_sample *sample,
-		    double t_s)
+static int add_raw(struct export *export, const struct incise_cut_sample *sample,
+		   double t_s)
 {
 	double rate = export->options->rate_hz;
 	/* Times are whole ns: half of one keeps a sample on the edge in its own slot. */
 	int64_t slot =
 		rate > 0 ? (int64_t)floor((t_s + 0.5e-9) * rate) : export->slot + 1;
+	int rc = slot != export->slot ? put_row(export) : 0;
 
-	if (slot != export->slot)
-		print_row(export);
 	export->slot = slot;
 	bin_add(&export->row, sample, t_s, export->cut);
+	return rc;
 }
 
 /* --- averaged ---------------------------------------------------------------------- */
@@ -203,113 +219,145 @@ static void add_binned(struct export *export, const struct incise_cut_sample *sa
 		bin_add(&export->bins[i * o->velocity_bins + k], sample, 0, export->cut);
 }
 
-/* Print the bins that hold enough, and empty them. */
-static void print_bins(struct export *export)
+/* The bins that hold enough go out, and all are emptied. */
+static int put_bins(struct export *export)
 {
 	const struct incise_export_options *o = export->options;
 	size_t n = (size_t)o->depth_bins * o->velocity_bins;
 	uint64_t enough = o->min_count > 1 ? o->min_count : 1;
+	int rc = 0;
 
 	for (size_t i = 0; i < n; i++) {
 		struct bin *bin = &export->bins[i];
+		union incise_cell cells[] = {
+			{.integer = 0},
+			{.real = bin->depth_mm},
+			{.real = bin->velocity_mm_s},
+			{.real = bin->force_N},
+			{.real = bin->n > 1 ? sqrt(bin->m2 / (bin->n - 1)) : 0.0},
+			{.integer = (int64_t)bin->n},
+			{.integer = bin->cuts},
+		};
 
-		if (bin->n >= enough) {
-			print_header(export);
-			if (o->by_cut)
-				print_cut(export);
-			fprintf(export->out, "%.9g,%.9g,%.9g,%.9g,%llu,%d\n",
-				bin->depth_mm, bin->velocity_mm_s, bin->force_N,
-				bin->n > 1 ? sqrt(bin->m2 / (bin->n - 1)) : 0.0,
-				(unsigned long long)bin->n, bin->cuts);
+		if (bin->n >= enough && !rc) {
+			if (o->by_cut) {
+				rc = name_cut(export);
+				cells[0].integer = rc;
+			}
+			if (rc >= 0)
+				rc = incise_table_add(export->table, cells + !o->by_cut,
+						      export->err);
 			export->report.rows++;
 		}
 		*bin = (struct bin){0};
 	}
+	return rc;
 }
 
 /* --- all --------------------------------------------------------------------------- */
 
 /* What was gathered of the cut before goes out before a new one starts. */
-static void end_cut(struct export *export)
+static int end_cut(struct export *export)
 {
 	if (!export->bins)
-		print_row(export);
-	else if (export->options->by_cut)
-		print_bins(export);
+		return put_row(export);
+	return export->options->by_cut ? put_bins(export) : 0;
 }
 
-typedef void (*visit)(struct export *export, const struct incise_cut_sample *sample,
-		      double t_s);
+typedef int (*visit)(struct export *export, const struct incise_cut_sample *sample,
+		     double t_s);
+
+/* Every 4096 samples. Returns 0, or -EINTR where whoever watches wants it to end. */
+static int tell(struct export *export)
+{
+	const struct incise_export_options *o = export->options;
+
+	export->samples += 0x1000;
+	if (o->progress &&
+	    o->progress(o->context,
+			fmin(1, (double)export->samples / fmax(1, export->samples_all))))
+		return incise_error_set(export->err, EINTR, "interrupted");
+	return 0;
+}
 
 /* Pass over the cuts of one recording. */
 static int each_sample(struct export *export, struct incise_recording *recording,
 		       visit visit)
 {
+	const struct incise_calibration *calibration = export->options->calibration;
 	struct incise_cut_sample sample;
 	struct incise_cuts cuts;
 	int rc;
 
-	if (isnan(recording->meta.zero_mV))
+	rc = incise_cuts_open(&cuts, recording, export->err);
+	if (rc)
+		return rc;
+	if (calibration)
+		incise_cuts_calibrate(&cuts, calibration);
+	if (isnan(cuts.zero_N)) {
+		incise_cuts_close(&cuts);
 		return incise_error_set(
 			export->err, EINVAL,
 			"%s: ended before the zero of the force channel was "
 			"known (0.5 s), so no force can be told",
 			recording->path);
-	rc = incise_cuts_open(&cuts, recording, export->err);
-	if (rc)
-		return rc;
+	}
 	export->number = 0;
 	while ((rc = incise_cuts_next(&cuts, &sample, export->err)) > 0) {
 		if (sample.cut != export->number) {
-			if (export->number)
-				end_cut(export);
+			rc = export->number ? end_cut(export) : 0;
+			if (rc)
+				break;
 			export->number = sample.cut;
 			export->cut++;
 		}
-		visit(export, &sample, (sample.t_ns - cuts.first_ns) * 1e-9);
-		/* Often enough to stop soon on a full disk. */
-		if ((cuts.force_rows & 0xfff) == 0 && (rc = check_out(export)))
+		rc = visit(export, &sample, (sample.t_ns - cuts.first_ns) * 1e-9);
+		if (!rc && (cuts.force_rows & 0xfff) == 0)
+			rc = tell(export);
+		if (rc)
 			break;
 	}
 	if (!rc && export->number)
-		end_cut(export);
+		rc = end_cut(export);
 	export->depth_deepest_mm = fmax(export->depth_deepest_mm, cuts.depth_max_mm);
 	incise_cuts_close(&cuts);
 	return rc;
 }
 
-static void visit_extent(struct export *export, const struct incise_cut_sample *sample,
-			 double t_s)
+static int visit_extent(struct export *export, const struct incise_cut_sample *sample,
+			double t_s)
 {
 	const struct incise_export_options *o = export->options;
 	struct incise_export_report *report = &export->report;
 
 	(void)t_s; /* visitors share one form */
 	if (sample->clipped)
-		return;
+		return 0;
 	if (!(o->depth_max_mm > 0))
 		report->depth_max_mm = fmax(report->depth_max_mm, sample->depth_mm);
 	if (!(o->velocity_max_mm_s > 0))
 		report->velocity_max_mm_s =
 			fmax(report->velocity_max_mm_s, sample->velocity_mm_s);
+	return 0;
 }
 
-static void visit_raw(struct export *export, const struct incise_cut_sample *sample,
-		      double t_s)
+static int visit_raw(struct export *export, const struct incise_cut_sample *sample,
+		     double t_s)
 {
 	visit_extent(export, sample, t_s);
 	export->report.clipped += sample->clipped;
-	add_raw(export, sample, t_s);
+	return add_raw(export, sample, t_s);
 }
 
-static void visit_binned(struct export *export, const struct incise_cut_sample *sample,
-			 double t_s)
+static int visit_binned(struct export *export, const struct incise_cut_sample *sample,
+			double t_s)
 {
 	(void)t_s;
 	if (sample->clipped)
 		export->report.clipped++;
 	else
 		add_binned(export, sample);
+	return 0;
 }
 
 static int each_recording(struct export *export,
@@ -329,26 +377,29 @@ static int each_recording(struct export *export,
 	return rc;
 }
 
-static int write_csv(struct export *export, struct incise_recording *const *recordings,
-		     int n)
+static int write_table(struct export *export, struct incise_recording *const *recordings,
+		       int n)
 {
 	const struct incise_export_options *o = export->options;
 	struct bin *bins = export->bins;
+	bool extent = bins && !(o->depth_max_mm > 0 && o->velocity_max_mm_s > 0);
 	int rc = 0;
 
+	for (int i = 0; i < n; i++)
+		export->samples_all += recordings[i]->meta.force * (1 + extent);
 	export->report.depth_max_mm = o->depth_max_mm;
 	export->report.velocity_max_mm_s = o->velocity_max_mm_s;
 	if (!bins) {
 		rc = each_recording(export, recordings, n, visit_raw);
 	} else {
 		export->bins = NULL; /* the first pass gathers nothing */
-		if (!(o->depth_max_mm > 0) || !(o->velocity_max_mm_s > 0))
+		if (extent)
 			rc = each_recording(export, recordings, n, visit_extent);
 		export->bins = bins;
 		if (!rc)
 			rc = each_recording(export, recordings, n, visit_binned);
 		if (!rc && !o->by_cut)
-			print_bins(export);
+			rc = put_bins(export);
 	}
 	if (rc)
 		return rc;
@@ -368,27 +419,24 @@ static int write_csv(struct export *export, struct incise_recording *const *reco
 			"smaller least count",
 			recordings[0]->path, n > 1 ? " and the others" : "",
 			o->min_count);
-	if (fflush(export->out))
-		rc = check_out(export);
-	return rc;
+	return incise_table_finish(export->table, export->err);
 }
 
-int incise_export_csv(struct incise_recording *const *recordings, int n,
-		      const struct incise_export_options *options, FILE *out,
-		      struct incise_export_report *report, struct incise_error *err)
+/* To a file or, where that is NULL, to a stream. */
+static int export_table(struct incise_recording *const *recordings, int n,
+			const struct incise_export_options *options,
+			const struct incise_table_format *format,
+			struct incise_outfile *file, FILE *out,
+			const struct incise_lineage *lineage,
+			struct incise_export_report *report, struct incise_error *err)
 {
-	struct export export = {.options = options,
-				.out = out,
-				.err = err,
-				.depth_deepest_mm = -INFINITY};
-	struct incise_c_locale locale;
-	int rc = check_options(options, err);
+	struct export export = {
+		.options = options, .err = err, .depth_deepest_mm = -INFINITY};
+	bool bins = options->depth_bins > 0, whole = !bins || options->by_cut;
+	struct incise_table table;
+	int rc;
 
-	if (rc)
-		return rc;
-	if (n < 1)
-		return incise_error_set(err, EINVAL, "no recording to export");
-	if (options->depth_bins) {
+	if (bins) {
 		export.bins = calloc((size_t)options->depth_bins * options->velocity_bins,
 				     sizeof(*export.bins));
 		if (!export.bins)
@@ -397,12 +445,81 @@ int incise_export_csv(struct incise_recording *const *recordings, int n,
 						options->depth_bins,
 						options->velocity_bins);
 	}
-	locale = incise_c_locale_begin();
-	rc = write_csv(&export, recordings, n);
-	incise_c_locale_end(locale);
+	rc = incise_table_open(
+		&table, format, file, out, (bins ? bin_columns : raw_columns) + !whole,
+		(bins ? COLUMNS(bin_columns) : COLUMNS(raw_columns)) - !whole, lineage,
+		err);
+	if (!rc) {
+		export.table = &table;
+		rc = write_table(&export, recordings, n);
+		incise_table_close(&table);
+	}
 	free(export.bins);
 	free(export.name);
 	if (!rc && report)
 		*report = export.report;
+	return rc;
+}
+
+int incise_export_csv(struct incise_recording *const *recordings, int n,
+		      const struct incise_export_options *options, FILE *out,
+		      struct incise_export_report *report, struct incise_error *err)
+{
+	struct incise_lineage lineage = {0};
+	int rc = check_options(options, err);
+
+	if (rc)
+		return rc;
+	if (n < 1)
+		return incise_error_set(err, EINVAL, "no recording to export");
+	if (options->lineage)
+		rc = incise_lineage_of(&lineage, recordings, n, options, err);
+	if (!rc)
+		rc = export_table(recordings, n, options, &incise_table_csv, NULL, out,
+				  options->lineage ? &lineage : NULL, report, err);
+	incise_lineage_free(&lineage);
+	return rc;
+}
+
+/* The ending of a path, without regard to case. */
+static bool ends_with(const char *path, const char *end)
+{
+	size_t n = strlen(path), k = strlen(end);
+
+	return n > k && !strcasecmp(path + n - k, end);
+}
+
+int incise_export(struct incise_recording *const *recordings, int n,
+		  const struct incise_export_options *options, const char *path,
+		  struct incise_export_report *report, struct incise_error *err)
+{
+	bool hdf5 = ends_with(path, ".h5") || ends_with(path, ".hdf5");
+	const struct incise_table_format *format = NULL;
+	struct incise_lineage lineage = {0};
+	struct incise_outfile *file;
+	int rc = check_options(options, err);
+
+	if (rc)
+		return rc;
+	if (n < 1)
+		return incise_error_set(err, EINVAL, "no recording to export");
+	if (hdf5 && !(format = incise_table_hdf5(err)))
+		return -errno;
+	file = incise_outfile_open(path, err);
+	if (!file)
+		return -errno;
+	if (!hdf5)
+		rc = incise_export_csv(recordings, n, options,
+				       incise_outfile_stream(file), report, err);
+	else
+		rc = incise_lineage_of(&lineage, recordings, n, options, err);
+	if (!rc && hdf5)
+		rc = export_table(recordings, n, options, format, file, NULL, &lineage,
+				  report, err);
+	incise_lineage_free(&lineage);
+	if (!rc)
+		return incise_outfile_commit(file, err);
+	incise_outfile_abort(file);
+	errno = -rc;
 	return rc;
 }

@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <incise/calibration.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
@@ -58,6 +59,15 @@ struct incise_export_options {
 	double velocity_max_mm_s;
 	bool by_cut;   /**< average each cut by itself, giving a cut column */
 	int min_count; /**< bins with fewer force samples are left out; default 50 */
+
+	bool resample; /**< all of the recording, with the pose, at each force sample or,
+			    with a rate, on a grid; see incise-export(1) */
+	const struct incise_calibration *calibration; /**< in place of the recordings' */
+	bool lineage; /**< CSV begins with lines "# key: value"; HDF5 and MCAP always have it */
+
+	/** Told now and then how much is done, 0 to 1, or NULL; what is not 0 ends it. */
+	int (*progress)(void *context, double share);
+	void *context;
 };
 
 INCISE_API void incise_export_options_init(struct incise_export_options *options);
@@ -85,6 +95,22 @@ INCISE_API int incise_export_csv(struct incise_recording *const *recordings, int
 				 const struct incise_export_options *options, FILE *out,
 				 struct incise_export_report *report,
 				 struct incise_error *err);
+
+/**
+ * Export to a file whose name says of which kind it is: .h5 and .hdf5 are HDF5, any
+ * other is CSV. It appears under its name when it is whole.
+ *
+ * HDF5 has a dataset of one dimension per column, named like it, with the attributes
+ * units and description; the column cut holds numbers from 1 into the dataset cut_names.
+ * The root's attributes are the lineage.
+ *
+ * @return as incise_export_csv(); -ENOENT where the module export_hdf5.so is not there;
+ *         -EINTR where progress wanted it to end; errno of incise_outfile_open().
+ */
+INCISE_API int incise_export(struct incise_recording *const *recordings, int n,
+			     const struct incise_export_options *options,
+			     const char *path, struct incise_export_report *report,
+			     struct incise_error *err);
 
 INCISE_END_DECLS
 #endif
