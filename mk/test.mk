@@ -5,7 +5,8 @@
 unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_netlink.c) \
 	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \
 	$(if $(has_libusb),,%/polhemus_usb.c %/polhemus_usb_find.c) \
-	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/frames/%),\
+	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/frames/%) \
+	$(if $(has_hdf5),,tests/unit/hdf5/%),\
 	$(wildcard tests/unit/*/*.c))
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
@@ -45,6 +46,11 @@ libs_frames_tests = $(shell $(PKG_CONFIG) --libs $(pc_frames_mkv))
 $(filter $(O)/tests/unit/frames/%,$(unit_programs)): private CPPFLAGS += \
 	$(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
 
+# The module of HDF5 is linked to its own tests, which read with the library itself.
+$(filter $(O)/tests/unit/hdf5/%,$(unit_programs)): $(objects_export_hdf5)
+$(filter $(O)/tests/unit/hdf5/%,$(unit_programs)): private CPPFLAGS += \
+	$(shell $(PKG_CONFIG) --cflags hdf5)
+
 $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
@@ -55,6 +61,7 @@ $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
 		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
 		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(if $(filter vision/%,$*),$(vision_linked)) \
+		$(if $(filter hdf5/%,$*),$(objects_export_hdf5) $(shell $(PKG_CONFIG) --libs hdf5)) \
 		$(O)/lib/libincise-tests.a $(if $(filter vision/%,$*),$(libs_vision_opencv)) \
 		$(if $(filter frames/%,$*),$(libs_frames_tests)) \
 		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm

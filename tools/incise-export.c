@@ -13,10 +13,18 @@
 
 #define BINS_MAX 1000
 
-enum { OPT_BY_CUT = CLI_LONG, OPT_DEPTH_MAX, OPT_VELOCITY_MAX, OPT_MIN_COUNT, OPT_JSON };
+enum {
+	OPT_BY_CUT = CLI_LONG,
+	OPT_DEPTH_MAX,
+	OPT_VELOCITY_MAX,
+	OPT_MIN_COUNT,
+	OPT_LINEAGE,
+	OPT_JSON
+};
 
 static const struct cli_option options[] = {
-	{'o', "output", "FILE.csv", "dataset to write; - is standard output (default)"},
+	{'o', "output", "FILE",
+	 "dataset to write: FILE.csv, or FILE.h5 for HDF5; - is CSV on\nstandard output (default)"},
 	{'r', "rate", "HZ",
 	 "rows per second, each the mean of its samples (default: all\nsamples)"},
 	{'a', "average", "DEPTHxVELOCITY",
@@ -29,13 +37,17 @@ static const struct cli_option options[] = {
 	 "upper end of the bins (default: largest in the data)"},
 	{OPT_MIN_COUNT, "min-count", "N",
 	 "leave out bins with fewer samples (default: 50)"},
-	{OPT_JSON, "json", NULL, "report as one JSON object; needs -o FILE.csv"},
+	{'c', "calibration", "FILE.conf",
+	 "take this calibration of force, not that of the recordings"},
+	{OPT_LINEAGE, "lineage", NULL,
+	 "begin a CSV with comments that tell where it is from"},
+	{OPT_JSON, "json", NULL, "report as one JSON object; needs -o FILE"},
 	{0},
 };
 
 static const struct cli_verb verb = {
 	.name = "export",
-	.synopsis = "NAME.rec… [-o FILE.csv] [OPTIONS]",
+	.synopsis = "NAME.rec… [-o FILE] [OPTIONS]",
 	.summary =
 		"Make a dataset of the cuts of some recordings: every force sample with depth\n"
 		"and velocity at its time, or their averages.",
@@ -65,6 +77,26 @@ static void print_report(const struct incise_export_report *report, const char *
 			     json_number(report->velocity_max_mm_s)));
 }
 
+/* The file under way, and what its bar shows. */
+struct bar {
+	const char *path;
+	int percent;
+};
+
+static int progress(void *context, double share)
+{
+	static const char full[] = "##############################";
+	struct bar *bar = context;
+	int percent = (int)(100 * share), n = (int)(share * (sizeof(full) - 1));
+
+	if (percent == bar->percent)
+		return 0;
+	bar->percent = percent;
+	cli_progress("%s [%-*.*s] %d %%", bar->path, (int)sizeof(full) - 1, n, full,
+		     percent);
+	return 0;
+}
+
 static void export(char **paths, int n, const struct incise_export_options *how,
 		   const char *output, struct incise_export_report *report)
 {
@@ -89,6 +121,9 @@ static void export(char **paths, int n, const struct incise_export_options *how,
 
 int main(int argc, char **argv)
 {
+	struct incise_calibration calibration;
+	struct incise_error err = {0};
+	struct bar bar = {.percent = -1};
 	struct incise_export_options how;
 	struct incise_export_report report = {0};
 	const char *output = "-";
@@ -121,6 +156,14 @@ int main(int argc, char **argv)
 			how.min_count = cli_integer("min-count", optarg, 1, 1000000000);
 			min_count = true;
 			break;
+		case 'c':
+			if (incise_calibration_load(optarg, &calibration, &err))
+				cli_fail_with(&err);
+			how.calibration = &calibration;
+			break;
+		case OPT_LINEAGE:
+			how.lineage = true;
+			break;
 		case OPT_JSON:
 			json = true;
 			break;
@@ -135,8 +178,14 @@ int main(int argc, char **argv)
 		cli_usage("--by-cut, --depth-max, --velocity-max and --min-count go with "
 			  "--average");
 	if (json && !strcmp(output, "-"))
-		cli_usage("--json needs -o FILE.csv: standard output cannot take both");
+		cli_usage("--json needs -o FILE: standard output cannot take both");
 
+	/* A bar would run through rows on the same terminal. */
+	if (strcmp(output, "-")) {
+		how.progress = progress;
+		how.context = &bar;
+		bar.path = output;
+	}
 	export(argv + optind, argc - optind, &how, output, &report);
 	if (json)
 		print_report(&report, output);

@@ -267,15 +267,14 @@ static int end_cut(struct export *export)
 typedef int (*visit)(struct export *export, const struct incise_cut_sample *sample,
 		     double t_s);
 
-/* Every 4096 samples. Returns 0, or -EINTR where whoever watches wants it to end. */
-static int tell(struct export *export)
+/* 0, or -EINTR where whoever watches wants it to end. */
+static int tell(struct export *export, uint64_t samples)
 {
 	const struct incise_export_options *o = export->options;
 
-	export->samples += 0x1000;
 	if (o->progress &&
-	    o->progress(o->context,
-			fmin(1, (double)export->samples / fmax(1, export->samples_all))))
+	    o->progress(o->context, fmin(1, (double)(export->samples + samples) /
+						    fmax(1, export->samples_all))))
 		return incise_error_set(export->err, EINTR, "interrupted");
 	return 0;
 }
@@ -313,12 +312,13 @@ static int each_sample(struct export *export, struct incise_recording *recording
 		}
 		rc = visit(export, &sample, (sample.t_ns - cuts.first_ns) * 1e-9);
 		if (!rc && (cuts.force_rows & 0xfff) == 0)
-			rc = tell(export);
+			rc = tell(export, cuts.force_rows);
 		if (rc)
 			break;
 	}
 	if (!rc && export->number)
 		rc = end_cut(export);
+	export->samples += cuts.force_rows;
 	export->depth_deepest_mm = fmax(export->depth_deepest_mm, cuts.depth_max_mm);
 	incise_cuts_close(&cuts);
 	return rc;

@@ -39,7 +39,7 @@ well_formed() {
 @test "export --help lists the options" {
 	run -0 --separate-stderr incise export --help
 	for option in --output --rate --average --by-cut --depth-max --velocity-max \
-		--min-count --json; do
+		--min-count --calibration --lineage --json; do
 		[[ "$output" == *"$option"* ]]
 	done
 }
@@ -198,6 +198,63 @@ well_formed() {
 @test "export feeds incise train" {
 	[ -x "$INCISE_BUILD/bin/incise-train" ] || skip "incise train is not built"
 	incise export liver.rec -a 12x10 -o a.csv
+	incise train a.csv -o a.fis
+	[ -s a.fis ]
+}
+
+@test "export as HDF5" {
+	[ -e "$INCISE_BUILD/lib/incise/export_hdf5.so" ] || skip "the module of HDF5 is not built"
+	command -v h5dump >/dev/null || skip "h5dump is not installed"
+	incise export liver.rec --rate 100 -o raw.csv
+	run -0 --separate-stderr incise export liver.rec --rate 100 -o raw.h5
+	[ -z "$stderr" ]
+	[[ "$output" == "raw.h5: "*" rows from 14 cuts" ]]
+	h5dump -y -w 1 -d /t_s -m "%.6f" raw.h5 | grep -oE '^ +[0-9.]+' | tr -d ' ' >t
+	diff t <(tail -n +2 raw.csv | cut -d, -f2)
+	h5dump -y -w 1 -d /force_N -m "%.5f" raw.h5 | grep -oE '^ +-?[0-9.]+' >force
+	# float32 may round the last digit to the other side
+	paste -d, force <(tail -n +2 raw.csv | cut -d, -f5) |
+		awk -F, '{ d = $1 - $2; if (d > 1.5e-5 || d < -1.5e-5) bad = 1 } END { exit bad || !NR }'
+	h5dump -a /source raw.h5 | grep -q '"liver.rec"'
+	h5dump -d /cut_names raw.h5 | grep -q '"liver-14"'
+	h5dump -a /depth_mm/units raw.h5 | grep -q '"mm"'
+}
+
+@test "export as HDF5 needs a file and the module" {
+	mkdir none
+	INCISE_MODULE_PATH=$PWD/none run --separate-stderr incise export liver.rec -o a.h5
+	failed_with "there is no module export_hdf5.so"
+	[ ! -e a.h5 ]
+	[ -e "$INCISE_BUILD/lib/incise/export_hdf5.so" ] || skip "the module of HDF5 is not built"
+	ln -s /dev/null null.h5
+	run --separate-stderr incise export liver.rec -o null.h5
+	failed_with "cannot be written to a pipe"
+	(ulimit -f 100; trap '' XFSZ
+		run --separate-stderr incise export liver.rec -o small.h5
+		failed_with "File too large")
+	[ ! -e small.h5 ]
+}
+
+@test "export by another calibration" {
+	echo 'force_mV_N = 2480;' >half.conf
+	incise export liver.rec -a 3x3 -o a.csv
+	incise export liver.rec -a 3x3 -c half.conf -o b.csv
+	paste -d, a.csv b.csv | awk -F, '
+		NR > 1 { d = $3 - 2 * $9; if (d > 1e-7 || d < -1e-7) bad = 1 } END { exit bad || NR < 2 }'
+	echo 'force_mV_N = 0;' >bad.conf
+	run --separate-stderr incise export liver.rec -c bad.conf -o c.csv
+	failed_with "bad.conf"
+	[ ! -e c.csv ]
+}
+
+@test "export tells where data are from, and training reads it" {
+	incise export liver.rec -a 12x10 -o plain.csv
+	incise export liver.rec -a 12x10 --lineage -o a.csv
+	diff plain.csv <(grep -v '^#' a.csv)
+	grep -qx '# source: liver.rec' a.csv
+	grep -qE '^# force_mV_N: 1240$' a.csv
+	[ -x "$INCISE_BUILD/bin/incise-train" ] || skip "incise train is not built"
+	incise train plain.csv -o plain.fis
 	incise train a.csv -o a.fis
 	[ -s a.fis ]
 }

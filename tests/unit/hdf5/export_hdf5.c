@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Tests of lib/record/hdf5/export_hdf5.c: what it wrote is read back through libhdf5's
+ * own interface.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <signal.h>
+#include <unistd.h>
+#include <cmocka.h>
+#include <hdf5.h>
+#include "../../../lib/record/table_writer.h"
+
+extern const struct incise_table_format incise_table_module;
+
+static const struct incise_column columns[] = {
+	{"cut", "1", "a name", INCISE_COLUMN_NAME, 0},
+	{"t_s", "s", "a time", INCISE_COLUMN_REAL, 6},
+	{"force_N", "N", "a force", INCISE_COLUMN_SINGLE, 5},
+	{"count", "1", "a count", INCISE_COLUMN_INTEGER, 0},
+	{"clipped", "1", "a flag", INCISE_COLUMN_FLAG, 0},
+};
+
+#define FILE_NAME "table.h5"
+
+static int enter(void **state)
+{
+	char path[] = "/tmp/incise-hdf5-XXXXXX";
+
+	if (!mkdtemp(path) || chdir(path))
+		return -1;
+	*state = strdup(path);
+	return 0;
+}
+
+static int leave(void **state)
+{
+	int rc;
+
+	unlink(FILE_NAME);
+	rc = chdir("/") || rmdir(*state);
+	free(*state);
+	return rc;
+}
+
+static double time_of(int64_t row)
+{
+	return row * 1e-4 + 1e6;
+}
+
+/* Write n rows; the first error, or 0. */
+static int write_rows(int64_t n, const struct incise_lineage *lineage,
+		      struct incise_error *err)
+{
+	struct incise_outfile *file = incise_outfile_open(FILE_NAME, err);
+	struct incise_table table;
+	char name[16];
+	int rc;
+
+	assert_non_null(file);
+	rc = incise_table_open(&table, &incise_table_module, file, NULL, columns, 5,
+			       lineage, err);
+	for (int64_t i = 0; i < n && !rc; i++) {
+		/* uneven, so that little of it can be deflated away */
+		int64_t mixed = (int64_t)(i * 6364136223846793005u);
+
+		snprintf(name, sizeof(name), "liver-%02d", (int)(i / 20000) + 1);
+		rc = incise_table_add(&table,
+				      (union incise_cell[]){{.integer = incise_table_name(
+								     &table, name)},
+							    {.real = time_of(i)},
+							    {.real = mixed * 0x1p-60},
+							    {.integer = mixed},
+							    {.integer = i % 3 == 0}},
+				      err);
+	}
+	if (!rc)
+		rc = incise_table_finish(&table, err);
+	incise_table_close(&table);
+	if (!rc)
+		return incise_outfile_commit(file, err);
+	incise_outfile_abort(file);
+	return rc;
+}
+
+static void text_attribute(hid_t at, const char *key, const char *expected)
+{
+	hid_t attribute = H5Aopen(at, key, H5P_DEFAULT), type;
+	char text[100] = "";
+
+	assert_true(attribute >= 0);
+	type = H5Aget_type(attribute);
+	assert_true(H5Tget_size(type) < sizeof(text));
+	assert_true(H5Aread(attribute, type, text) >= 0);
+	assert_string_equal(text, expected);
+	H5Tclose(type);
+	H5Aclose(attribute);
+}
+
+/* All of a column, as libhdf5 converts it to doubles. */
+static double *read_column(hid_t file, const char *name, hsize_t n, const char *unit)
+{
+	hid_t set = H5Dopen2(file, name, H5P_DEFAULT), space = H5Dget_space(set);
+	double *values = calloc(n ? n : 1, sizeof(*values));
+	hsize_t rows;
+
+	assert_true(set >= 0);
+	assert_int_equal(H5Sget_simple_extent_ndims(space), 1);
+	H5Sget_simple_extent_dims(space, &rows, NULL);
+	assert_int_equal(rows, n);
+	assert_true(H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
+			    values) >= 0);
+	text_attribute(set, "units", unit);
+	H5Sclose(space);
+	H5Dclose(set);
+	return values;
+}
+
+static void rows_come_back(void **state)
+{
+	/* none, one, a block, one more, and several with a rest */
+	static const int64_t sizes[] = {0, 1, INCISE_TABLE_BLOCK, INCISE_TABLE_BLOCK + 1,
+					50001};
+	struct incise_lineage lineage = {0};
+
+	assert_int_equal(incise_lineage_add(&lineage, "source", "liver.rec"), 0);
+	for (size_t k = 0; k < sizeof(sizes) / sizeof(*sizes); k++) {
+		struct incise_error err = {0};
+		int64_t n = sizes[k];
+		double *cut, *t_s, *force, *count, *clipped;
+		hid_t file;
+
+		if (write_rows(n, &lineage, &err))
+			fail_msg("%s", err.text);
+		file = H5Fopen(FILE_NAME, H5F_ACC_RDONLY, H5P_DEFAULT);
+		assert_true(file >= 0);
+		text_attribute(file, "source", "liver.rec");
+		cut = read_column(file, "cut", n, "1");
+		t_s = read_column(file, "t_s", n, "s");
+		force = read_column(file, "force_N", n, "N");
+		count = read_column(file, "count", n, "1");
+		clipped = read_column(file, "clipped", n, "1");
+		for (int64_t i = 0; i < n; i++) {
+			int64_t mixed = (int64_t)(i * 6364136223846793005u);
+
+			assert_true(cut[i] == i / 20000 + 1);
+			assert_true(t_s[i] == time_of(i));
+			assert_true(force[i] == (float)(mixed * 0x1p-60));
+			assert_true(count[i] == (double)mixed);
+			assert_true(clipped[i] == (i % 3 == 0));
+		}
+		free(cut);
+		free(t_s);
+		free(force);
+		free(count);
+		free(clipped);
+		H5Fclose(file);
+	}
+	incise_lineage_free(&lineage);
+}
+
+static void names_stand_beside_their_column(void **state)
+{
+	struct incise_error err = {0};
+	char names[3][8];
+	hid_t file, set, type;
+
+	assert_int_equal(write_rows(50001, NULL, &err), 0);
+	file = H5Fopen(FILE_NAME, H5F_ACC_RDONLY, H5P_DEFAULT);
+	set = H5Dopen2(file, "cut_names", H5P_DEFAULT);
+	assert_true(set >= 0);
+	type = H5Dget_type(set);
+	assert_int_equal(H5Tget_size(type), 8);
+	assert_true(H5Dread(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, names) >= 0);
+	assert_memory_equal(names, "liver-01liver-02liver-03", sizeof(names));
+	H5Tclose(type);
+	H5Dclose(set);
+	H5Fclose(file);
+}
+
+/* No more than so many bytes of a file, as on a full disk. */
+static void no_room_leaves_nothing(void **state)
+{
+	static const rlim_t rooms[] = {100, 5000, 300000};
+	struct rlimit before, limit;
+
+	signal(SIGXFSZ, SIG_IGN);
+	getrlimit(RLIMIT_FSIZE, &before);
+	unlink(FILE_NAME);
+	for (size_t i = 0; i < sizeof(rooms) / sizeof(*rooms); i++) {
+		struct incise_error err = {0};
+		int rc;
+
+		limit = before;
+		limit.rlim_cur = rooms[i];
+		setrlimit(RLIMIT_FSIZE, &limit);
+		rc = write_rows(50001, NULL, &err);
+		setrlimit(RLIMIT_FSIZE, &before);
+		assert_int_equal(rc, -EFBIG);
+		assert_int_equal(err.code, EFBIG);
+		assert_int_equal(access(FILE_NAME, F_OK), -1);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(rows_come_back),
+		cmocka_unit_test(names_stand_beside_their_column),
+		cmocka_unit_test(no_room_leaves_nothing),
+	};
+
+	return cmocka_run_group_tests(tests, enter, leave);
+}
