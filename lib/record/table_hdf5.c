@@ -9,10 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <incise/backend.h>
 #include "table_writer.h"
 
 #define MODULE "export_hdf5.so"
-#define SYMBOL "incise_table_module"
+#define SYMBOL "incise_backend"
 
 /* As of the modules of devices: INCISE_MODULE_PATH, or incise/ beside this library. */
 static bool find(char *path, size_t size)
@@ -36,7 +37,8 @@ static bool find(char *path, size_t size)
 
 const struct incise_table_format *incise_table_hdf5(struct incise_error *err)
 {
-	const struct incise_table_format *format;
+	const struct incise_table_format *format = NULL;
+	const struct incise_backend *backend;
 	char path[PATH_MAX];
 	void *handle;
 
@@ -55,7 +57,10 @@ const struct incise_table_format *incise_table_hdf5(struct incise_error *err)
 				 dlerror());
 		return NULL;
 	}
-	format = dlsym(handle, SYMBOL);
+	backend = dlsym(handle, SYMBOL);
+	if (backend && backend->abi == INCISE_BACKEND_ABI && backend->open &&
+	    !strcmp(backend->kind, "export") && !strcmp(backend->name, "hdf5"))
+		format = backend->open(NULL, err);
 	if (format && format->abi == INCISE_TABLE_ABI)
 		return format;
 	dlclose(handle);

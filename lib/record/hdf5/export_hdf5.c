@@ -17,6 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include <hdf5.h>
+#include <incise/backend.h>
 #include "../table_writer.h"
 
 #define LEVEL 1 /* of deflate: 6 takes three times as long for a twentieth less */
@@ -281,12 +282,28 @@ static int hdf5_end(struct incise_table *table, struct incise_error *err)
 	return bad ? fail(hdf5, "the file cannot be ended", err) : 0;
 }
 
-extern INCISE_API const struct incise_table_format incise_table_module;
-
-const struct incise_table_format incise_table_module = {
+static const struct incise_table_format format = {
 	.abi = INCISE_TABLE_ABI,
 	.begin = hdf5_begin,
 	.rows = hdf5_rows,
 	.end = hdf5_end,
 	.close = hdf5_close,
+};
+
+static void *hdf5_open(const struct incise_backend_request *request,
+		       struct incise_error *err)
+{
+	(void)request;
+	(void)err;
+	return (void *)&format;
+}
+
+INCISE_API extern const struct incise_backend incise_backend;
+
+/* No device, but found as one: what opens is a format. */
+const struct incise_backend incise_backend = {
+	.abi = INCISE_BACKEND_ABI,
+	.kind = "export",
+	.name = "hdf5",
+	.open = hdf5_open,
 };
