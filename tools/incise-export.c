@@ -189,6 +189,8 @@ int main(int argc, char **argv)
 	export(argv + optind, argc - optind, &how, output, &report);
 	if (json)
 		print_report(&report, output);
+	else if (strcmp(output, "-") && !report.cuts)
+		printf("%s: %llu messages\n", output, (unsigned long long)report.rows);
 	else if (strcmp(output, "-"))
 		printf("%s: %llu rows from %d cuts\n", output,
 		       (unsigned long long)report.rows, report.cuts);

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "cut.h"
+#include "export_mcap.h"
 #include "recording.h"
 #include "table_writer.h"
 
@@ -489,12 +490,25 @@ static bool ends_with(const char *path, const char *end)
 	return n > k && !strcasecmp(path + n - k, end);
 }
 
+static int write_mcap(struct incise_recording *const *recordings, int n,
+		      const struct incise_export_options *options, FILE *out,
+		      const struct incise_lineage *lineage,
+		      struct incise_export_report *report, struct incise_error *err)
+{
+	if (n > 1 || options->rate_hz > 0 || options->depth_bins || options->resample)
+		return incise_error_set(
+			err, EINVAL,
+			"MCAP takes one recording as it is: no rate, no "
+			"averages; give -o FILE.csv or FILE.h5 for these");
+	return incise_export_mcap(recordings[0], options, out, lineage, report, err);
+}
+
 int incise_export(struct incise_recording *const *recordings, int n,
 		  const struct incise_export_options *options, const char *path,
 		  struct incise_export_report *report, struct incise_error *err)
 {
 	bool hdf5 = ends_with(path, ".h5") || ends_with(path, ".hdf5");
-	const struct incise_table_format *format = NULL;
+	const struct incise_table_format *format = &incise_table_csv;
 	struct incise_lineage lineage = {0};
 	struct incise_outfile *file;
 	int rc = check_options(options, err);
@@ -508,14 +522,14 @@ int incise_export(struct incise_recording *const *recordings, int n,
 	file = incise_outfile_open(path, err);
 	if (!file)
 		return -errno;
-	if (!hdf5)
-		rc = incise_export_csv(recordings, n, options,
-				       incise_outfile_stream(file), report, err);
-	else
-		rc = incise_lineage_of(&lineage, recordings, n, options, err);
-	if (!rc && hdf5)
-		rc = export_table(recordings, n, options, format, file, NULL, &lineage,
-				  report, err);
+	rc = incise_lineage_of(&lineage, recordings, n, options, err);
+	if (!rc && ends_with(path, ".mcap"))
+		rc = write_mcap(recordings, n, options, incise_outfile_stream(file),
+				&lineage, report, err);
+	else if (!rc)
+		rc = export_table(recordings, n, options, format, file, NULL,
+				  hdf5 || options->lineage ? &lineage : NULL, report,
+				  err);
 	incise_lineage_free(&lineage);
 	if (!rc)
 		return incise_outfile_commit(file, err);

@@ -2,66 +2,12 @@
 /*
  * A table as CSV: a header of names, a row per line, a decimal point in any locale.
  * Lineage goes before it as lines "# key: value", which incise train passes over.
- *
- * printf(3) would take most of the time of an export; the digits here are the same.
  */
 #include <errno.h>
-#include <math.h>
 #include <string.h>
 #include "../base/c_locale.h"
+#include "decimal.h"
 #include "table_writer.h"
-
-#define CELL_MAX 400 /* bytes of a number: %.6f of the largest double is 316 */
-
-/* The digits of a whole number; returns behind the last. */
-static char *put_digits(char *to, uint64_t value, int least)
-{
-	char digits[24];
-	int n = 0;
-
-	for (; value || n < least; value /= 10)
-		digits[n++] = '0' + value % 10;
-	while (n)
-		*to++ = digits[--n];
-	return to;
-}
-
-static char *put_integer(char *to, int64_t value)
-{
-	if (value < 0)
-		*to++ = '-';
-	return put_digits(to, value < 0 ? -(uint64_t)value : (uint64_t)value, 1);
-}
-
-/*
- * As printf("%.*f"). The product is off by half of its last digit, 2^-53 of it: below
- * 2^40 that is 1.3e-4, so only within 1e-3 of a half can the rounding be in doubt.
- */
-static char *put_real(char *to, double value, int decimals)
-{
-	static const double powers[] = {1, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
-	double scaled, whole;
-	uint64_t n, power;
-
-	if (decimals < 0)
-		return to + sprintf(to, "%.9g", value);
-	if (decimals > 9 || !(fabs(value) * powers[decimals] < 0x1p40))
-		return to + sprintf(to, "%.*f", decimals, value);
-	scaled = fabs(value) * powers[decimals];
-	whole = floor(scaled);
-	if (fabs(scaled - whole - 0.5) < 1e-3)
-		return to + sprintf(to, "%.*f", decimals, value);
-	n = (uint64_t)whole + (scaled - whole > 0.5);
-	power = (uint64_t)powers[decimals];
-	if (signbit(value))
-		*to++ = '-';
-	to = put_digits(to, n / power, 1);
-	if (decimals) {
-		*to++ = '.';
-		to = put_digits(to, n % power, decimals);
-	}
-	return to;
-}
 
 static void put_name(struct incise_table *table, int64_t number)
 {
@@ -114,7 +60,7 @@ static void put_header(struct incise_table *table)
 static int csv_rows(struct incise_table *table, struct incise_error *err)
 {
 	struct incise_c_locale locale = incise_c_locale_begin();
-	char text[CELL_MAX];
+	char text[INCISE_DECIMAL_MAX];
 
 	if (!table->rows)
 		put_header(table);
@@ -131,9 +77,10 @@ static int csv_rows(struct incise_table *table, struct incise_error *err)
 				put_name(table, cell->integer);
 			else if (column->type == INCISE_COLUMN_REAL ||
 				 column->type == INCISE_COLUMN_SINGLE)
-				to = put_real(to, cell->real, column->decimals);
+				to = incise_decimal_real(to, cell->real,
+							 column->decimals);
 			else
-				to = put_integer(to, cell->integer);
+				to = incise_decimal_integer(to, cell->integer);
 			fwrite_unlocked(text, 1, to - text, table->out);
 		}
 		fputc_unlocked('\n', table->out);

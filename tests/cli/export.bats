@@ -258,3 +258,48 @@ well_formed() {
 	incise train a.csv -o a.fis
 	[ -s a.fis ]
 }
+
+# Read by a reader of our own, and by that of the format's makers where it is there.
+read_mcap() {
+	if [ -x "$INCISE_BUILD/tests/mcap/check" ]; then
+		"$INCISE_BUILD/tests/mcap/check" "$1"
+	else
+		echo "# the package mcap is not there: read by our own reader alone" >&3
+		python3 "$BATS_TEST_DIRNAME/../mcap/check.py" "$1"
+	fi
+}
+
+@test "export as MCAP" {
+	command -v python3 >/dev/null || skip "python3 is not installed"
+	incise capture -o short.rec --rig sim:clock=simulated --duration 6s >/dev/null
+	sqlite3 short.rec/recording.db "INSERT INTO events VALUES (2000000000, 'note',
+		'\"quoted\" \\ ' || char(10) || ' é ' || CAST(x'ff' AS TEXT))"
+	run -0 --separate-stderr incise export short.rec -o short.mcap
+	[ -z "$stderr" ]
+	[[ "$output" == "short.mcap: "*" messages" ]]
+	read_mcap short.mcap >found.json
+	for table in force tracker depth events; do
+		[ "$(sqlite3 :memory: "SELECT json_extract(readfile('found.json'),
+			'\$.topics.\"/$table\"')")" = \
+			"$(sqlite3 short.rec/recording.db "SELECT count(*) FROM $table")" ]
+	done
+	[ "$(key found.json metadata.incise.source)" = short.rec ]
+	[ "$(key found.json chunks)" -ge 2 ]
+	code=$(sqlite3 short.rec/recording.db "SELECT code FROM force ORDER BY seq LIMIT 1")
+	[ "$(key found.json 'first[2].code')" = "$code" ]
+	sqlite3 :memory: "SELECT abs(json_extract(readfile('found.json'), '\$.first[2].force_N')
+		- ($code * 5000.0 / 4096 - $(sqlite3 short.rec/recording.db "SELECT value FROM meta
+		WHERE key = 'force_zero_mV'")) / 1240) < 6e-6" | grep -qx 1
+}
+
+@test "export as MCAP takes one recording as it is" {
+	for arguments in "liver.rec liver.rec" "liver.rec --rate 100" "liver.rec -a 3x3"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise export $arguments -o a.mcap
+		failed_with "MCAP takes one recording as it is"
+		[ ! -e a.mcap ]
+	done
+	ln -s /dev/full full.mcap
+	run --separate-stderr incise export liver.rec -o full.mcap
+	failed_with "No space left"
+}

@@ -97,12 +97,15 @@ INCISE_API int incise_export_csv(struct incise_recording *const *recordings, int
 				 struct incise_error *err);
 
 /**
- * Export to a file whose name says of which kind it is: .h5 and .hdf5 are HDF5, any
- * other is CSV. It appears under its name when it is whole.
+ * Export to a file whose name says of which kind it is: .h5 and .hdf5 are HDF5, .mcap is
+ * MCAP, any other is CSV. It appears under its name when it is whole.
  *
  * HDF5 has a dataset of one dimension per column, named like it, with the attributes
  * units and description; the column cut holds numbers from 1 into the dataset cut_names.
  * The root's attributes are the lineage.
+ *
+ * MCAP is all of one recording for viewers, not only its cuts: /force, /tracker, /depth
+ * and /events in JSON; rows of the report are messages then, and cuts 0.
  *
  * @return as incise_export_csv(); -ENOENT where the module export_hdf5.so is not there;
  *         -EINTR where progress wanted it to end; errno of incise_outfile_open().
