@@ -86,7 +86,11 @@ check-unit: $(unit_programs) $(locale) ## unit tests
 can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/README.md
 	@tests/can/venv $(O)/tests/can
 
-check-cli: all $(locale) can-drive $(O)/tests/polhemus/fastrak ## command-line tests of the real programs
+# The reader of MCAP's own makers, for what is exported.
+mcap-reader: ## a second reader for the tests of MCAP, $(O)/tests/mcap/check
+	@tests/mcap/venv $(O)/tests/mcap
+
+check-cli: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak ## command-line tests of the real programs
 	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
@@ -99,7 +103,7 @@ style_sources := $(shell find lib tools tests driver -name '*.[ch]' -o -path 'li
 check-style: ## the house's form: clang-format, an SPDX line in every file
 	@tests/style $(style_sources)
 
-.PHONY: check check-style check-unit check-cli check-sanitize can-drive
+.PHONY: check check-style check-unit check-cli check-sanitize can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

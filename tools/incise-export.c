@@ -18,6 +18,7 @@ enum {
 	OPT_DEPTH_MAX,
 	OPT_VELOCITY_MAX,
 	OPT_MIN_COUNT,
+	OPT_RESAMPLE,
 	OPT_LINEAGE,
 	OPT_JSON
 };
@@ -27,6 +28,8 @@ static const struct cli_option options[] = {
 	 "dataset to write: FILE.csv, or FILE.h5 for HDF5; - is CSV on\nstandard output (default)"},
 	{'r', "rate", "HZ",
 	 "rows per second, each the mean of its samples (default: all\nsamples)"},
+	{OPT_RESAMPLE, "resample", NULL,
+	 "all of the recording with the pose, at each force sample or on a\ngrid of --rate, with uncertainty and flags"},
 	{'a', "average", "DEPTHxVELOCITY",
 	 "average in so many bins of depth and of velocity: 12x10"},
 	{OPT_BY_CUT, "by-cut", NULL,
@@ -161,6 +164,9 @@ int main(int argc, char **argv)
 				cli_fail_with(&err);
 			how.calibration = &calibration;
 			break;
+		case OPT_RESAMPLE:
+			how.resample = true;
+			break;
 		case OPT_LINEAGE:
 			how.lineage = true;
 			break;
@@ -171,6 +177,8 @@ int main(int argc, char **argv)
 	}
 	if (optind == argc)
 		cli_usage("which recording?");
+	if (how.resample && (how.depth_bins || (how.rate_hz > 0 && how.rate_hz < 1)))
+		cli_usage("--resample takes a --rate of 1 or more, and no --average");
 	if (how.rate_hz > 0 && how.depth_bins)
 		cli_usage("--rate and --average exclude each other");
 	if (!how.depth_bins && (how.by_cut || min_count || how.depth_max_mm > 0 ||
@@ -189,7 +197,7 @@ int main(int argc, char **argv)
 	export(argv + optind, argc - optind, &how, output, &report);
 	if (json)
 		print_report(&report, output);
-	else if (strcmp(output, "-") && !report.cuts)
+	else if (strcmp(output, "-") && !report.cuts && !how.resample)
 		printf("%s: %llu messages\n", output, (unsigned long long)report.rows);
 	else if (strcmp(output, "-"))
 		printf("%s: %llu rows from %d cuts\n", output,

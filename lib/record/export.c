@@ -14,6 +14,7 @@
 #include "cut.h"
 #include "export_mcap.h"
 #include "recording.h"
+#include "resample.h"
 #include "table_writer.h"
 
 #define BINS_MAX 1000 /* in one direction; all of them are held in memory */
@@ -71,6 +72,10 @@ static int check_options(const struct incise_export_options *o, struct incise_er
 			"upper ends of the bins, %g mm and %g mm/s, must be "
 			"positive, or 0 for the largest in the data",
 			o->depth_max_mm, o->velocity_max_mm_s);
+	if (o->resample && (o->depth_bins || (o->rate_hz > 0 && o->rate_hz < 1)))
+		return incise_error_set(err, EINVAL,
+					"resampling takes a rate of 1 Hz or more, and "
+					"no averages");
 	if (o->min_count < 0)
 		return incise_error_set(err, EINVAL, "smallest count %d is negative",
 					o->min_count);
@@ -423,6 +428,27 @@ static int write_table(struct export *export, struct incise_recording *const *re
 	return incise_table_finish(export->table, export->err);
 }
 
+static int write_resampled(struct export *export,
+			   struct incise_recording *const *recordings, int n)
+{
+	int rc = 0;
+
+	for (int i = 0; i < n; i++)
+		export->samples_all += recordings[i]->meta.force;
+	for (int i = 0; i < n && !rc; i++) {
+		char *name = cut_name(recordings, i);
+
+		rc = name ? incise_resample(recordings[i], name, export->options,
+					    export->table, &export->report,
+					    export->samples, export->samples_all,
+					    export->err)
+			  : incise_error_set(export->err, ENOMEM, "out of memory");
+		export->samples += recordings[i]->meta.force;
+		free(name);
+	}
+	return rc ? rc : incise_table_finish(export->table, export->err);
+}
+
 /* To a file or, where that is NULL, to a stream. */
 static int export_table(struct incise_recording *const *recordings, int n,
 			const struct incise_export_options *options,
@@ -446,13 +472,19 @@ static int export_table(struct incise_recording *const *recordings, int n,
 						options->depth_bins,
 						options->velocity_bins);
 	}
-	rc = incise_table_open(
-		&table, format, file, out, (bins ? bin_columns : raw_columns) + !whole,
-		(bins ? COLUMNS(bin_columns) : COLUMNS(raw_columns)) - !whole, lineage,
-		err);
+	if (options->resample)
+		rc = incise_table_open(&table, format, file, out, incise_resample_columns,
+				       INCISE_RESAMPLE_COLUMNS, lineage, err);
+	else
+		rc = incise_table_open(
+			&table, format, file, out,
+			(bins ? bin_columns : raw_columns) + !whole,
+			(bins ? COLUMNS(bin_columns) : COLUMNS(raw_columns)) - !whole,
+			lineage, err);
 	if (!rc) {
 		export.table = &table;
-		rc = write_table(&export, recordings, n);
+		rc = options->resample ? write_resampled(&export, recordings, n)
+				       : write_table(&export, recordings, n);
 		incise_table_close(&table);
 	}
 	free(export.bins);

@@ -39,7 +39,7 @@ well_formed() {
 @test "export --help lists the options" {
 	run -0 --separate-stderr incise export --help
 	for option in --output --rate --average --by-cut --depth-max --velocity-max \
-		--min-count --calibration --lineage --json; do
+		--min-count --resample --calibration --lineage --json; do
 		[[ "$output" == *"$option"* ]]
 	done
 }
@@ -173,7 +173,8 @@ well_formed() {
 		"liver.rec --average 5x5x5" "liver.rec --rate 0" "liver.rec --rate fast" \
 		"liver.rec --rate 10 --average 3x3" "liver.rec --by-cut" \
 		"liver.rec --min-count 3" "liver.rec --json" "liver.rec --json -o -" \
-		"liver.rec --average 3x3 --depth-max -1" "liver.rec --no-such"; do
+		"liver.rec --average 3x3 --depth-max -1" \
+		"liver.rec --resample --average 3x3" "liver.rec --resample --rate 0.5" "liver.rec --no-such"; do
 		# shellcheck disable=SC2086
 		run -2 --separate-stderr incise export $arguments
 		[ -z "$output" ]
@@ -302,4 +303,18 @@ read_mcap() {
 	ln -s /dev/full full.mcap
 	run --separate-stderr incise export liver.rec -o full.mcap
 	failed_with "No space left"
+}
+
+@test "export resampled" {
+	incise export liver.rec --resample --rate 100 -o a.csv
+	well_formed <(sed 's/nan/0/g' a.csv) 17 2
+	# 43 s of it, in cuts or not
+	[ "$(wc -l <a.csv)" -eq 4301 ]
+	[ "$(tail -n +2 a.csv | cut -d, -f2 | sort -nu | tail -n 1)" -eq 14 ]
+	incise export liver.rec --resample -o b.csv
+	[ "$(wc -l <b.csv)" -eq 430001 ]
+	# at the same time the same pose, and a force that is less uncertain
+	join -t, <(tail -n +2 a.csv | cut -d, -f3-13 | sort) <(tail -n +2 b.csv |
+		cut -d, -f3-13 | sort) | awk -F, '
+		{ for (i = 2; i < 11; i++) if ($i != $(i + 10)) bad = 1 } END { exit bad || NR < 4290 }'
 }
