@@ -17,9 +17,9 @@
 #define CELLS 2048 /* of the tabulated weights, per row */
 #define STEPS (HALF * CELLS)
 
-#define REAL(name, unit, about, decimals)                       \
-	{                                                       \
-		name, unit, about, INCISE_COLUMN_REAL, decimals \
+#define SINGLE(name, unit, about, decimals)                       \
+	{                                                         \
+		name, unit, about, INCISE_COLUMN_SINGLE, decimals \
 	}
 #define FLAG(name, about)                               \
 	{                                               \
@@ -28,18 +28,18 @@
 const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS] = {
 	{"recording", "1", "its name", INCISE_COLUMN_NAME, 0},
 	{"cut", "1", "number of the cut, 0 outside", INCISE_COLUMN_INTEGER, 0},
-	REAL("t_s", "s", "since the recording's first force sample", 6),
-	REAL("x_mm", "mm", "position of the tip", 4),
-	REAL("y_mm", "mm", "position of the tip", 4),
-	REAL("z_mm", "mm", "position of the tip", 4),
-	REAL("qw", "1", "orientation, unit quaternion", 6),
-	REAL("qx", "1", "orientation, unit quaternion", 6),
-	REAL("qy", "1", "orientation, unit quaternion", 6),
-	REAL("qz", "1", "orientation, unit quaternion", 6),
-	REAL("depth_mm", "mm", "of the tip below the surface", 4),
-	REAL("velocity_mm_s", "mm/s", "speed of the tip", 3),
-	REAL("force_N", "N", "on the blade", 5),
-	REAL("force_u_N", "N", "standard uncertainty of force_N from noise", 6),
+	{"t_s", "s", "since the recording's first force sample", INCISE_COLUMN_REAL, 6},
+	SINGLE("x_mm", "mm", "position of the tip", 4),
+	SINGLE("y_mm", "mm", "position of the tip", 4),
+	SINGLE("z_mm", "mm", "position of the tip", 4),
+	SINGLE("qw", "1", "orientation, unit quaternion", 6),
+	SINGLE("qx", "1", "orientation, unit quaternion", 6),
+	SINGLE("qy", "1", "orientation, unit quaternion", 6),
+	SINGLE("qz", "1", "orientation, unit quaternion", 6),
+	SINGLE("depth_mm", "mm", "of the tip below the surface", 4),
+	SINGLE("velocity_mm_s", "mm/s", "speed of the tip", 3),
+	SINGLE("force_N", "N", "on the blade", 5),
+	SINGLE("force_u_N", "N", "standard uncertainty of force_N from noise", 6),
 	FLAG("clipped", "1: the converter was at an end"),
 	FLAG("interpolated", "1: a tracker record is missing here"),
 	FLAG("tracker_error", "1: the tracker told of an error"),
