@@ -192,7 +192,10 @@ static int open_run(struct run *run, const struct part *part, const char *folder
 	if (part->recorder) {
 		incise_calibration_nominal(&calibration);
 		snprintf(path, sizeof(path), "%s/%s.rec", folder, part->name);
-		run->recorder = incise_recorder_new(path, run->rig, &calibration, err);
+		run->recorder = incise_recorder_new(
+			path, run->rig,
+			&(struct incise_recorder_setup){.calibration = &calibration},
+			err);
 		if (!run->recorder)
 			return -errno;
 	}

@@ -281,7 +281,9 @@ int main(int argc, char **argv)
 		remove_recording(target);
 	}
 	cli_catch_signals();
-	recorder = incise_recorder_new(target, rig, &calibration, &err);
+	recorder = incise_recorder_new(
+		target, rig, &(struct incise_recorder_setup){.calibration = &calibration},
+		&err);
 	if (!recorder)
 		cli_fail_with(&err);
 	seconds = record(recorder, rig, duration_s);

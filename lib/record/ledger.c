@@ -14,9 +14,9 @@ const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_STREAMS] = {
 				   "qz, status, station, button",
 				   "iiirrrrrrrcii"},
 	[INCISE_LEDGER_CAMERA] = {"camera", "frames",
-				  "seq, t_ns, arrival_ns, pts, bytes, length_px, sd_px, "
-				  "depth_mm, quality",
-				  "iiiiinnnn"},
+				  "seq, t_ns, arrival_ns, pts, bytes, crc, length_px, "
+				  "sd_px, depth_mm, quality",
+				  "iiiiiinnnn"},
 };
 
 /* --- rows ------------------------------------------------------------------------- */

@@ -38,7 +38,7 @@ static void recorder_free(struct incise_recorder *rec)
 }
 
 struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig *rig,
-					    const struct incise_calibration *calibration,
+					    const struct incise_recorder_setup *setup,
 					    struct incise_error *err)
 {
 	struct incise_tracker_info tracker;
@@ -72,8 +72,8 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	}
 	rec->parent = rec->folder = -1;
 	rec->rig = rig;
-	rec->calibration = *calibration;
-	rec->stats.zero_mV = calibration->force_zero_mV;
+	rec->calibration = *setup->calibration;
+	rec->stats.zero_mV = rec->calibration.force_zero_mV;
 	rec->zero.depth_max_mm = -INFINITY;
 	incise_force_info(incise_rig_force(rig), &rec->force_info);
 	rec->tracker_info = tracker;

@@ -123,8 +123,9 @@ int incise_recorder_write_streams(struct incise_recorder *rec)
 	sqlite3_stmt *stmt;
 	int rc = sqlite3_prepare_v2(
 		rec->db,
-		"INSERT INTO streams(name, device, stamped, rate_hz) VALUES(?,?,?,?)", -1,
-		&stmt, NULL);
+		"INSERT INTO streams(name, device, stamped, nominal_hz, delay_ns, "
+		"grain_ns, rows, lost, late) VALUES(?,?,?,?,0,0,0,0,0)",
+		-1, &stmt, NULL);
 
 	for (size_t i = 0; i < sizeof(streams) / sizeof(*streams) && rc == SQLITE_OK;
 	     i++) {

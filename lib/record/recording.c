@@ -362,6 +362,10 @@ int incise_recording_info(struct incise_recording *rec,
 	*info = rec->meta;
 	if (rc)
 		return rc;
+	rc = incise_recording_streams(rec, info->streams, err);
+	if (rc < 0)
+		return rc;
+	info->n_streams = rc;
 	rc = incise_cuts_open(&cuts, rec, err);
 	if (rc)
 		return rc;

@@ -41,12 +41,19 @@ static const struct {
 	{"frames", 2, 2,
 	 "CREATE TABLE frames(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "arrival_ns INTEGER NOT NULL, pts INTEGER NOT NULL, bytes INTEGER NOT NULL, "
-	 "length_px REAL, sd_px REAL, depth_mm REAL, quality REAL)"},
+	 "crc INTEGER NOT NULL, length_px REAL, sd_px REAL, depth_mm REAL, "
+	 "quality REAL)"},
 	{"streams", 2, 2,
 	 "CREATE TABLE streams(name TEXT PRIMARY KEY NOT NULL, device TEXT NOT NULL, "
-	 "stamped INTEGER NOT NULL, rate_hz REAL, drift_ppm REAL, drift_sd_ppm REAL, "
-	 "jitter_ns REAL, late INTEGER, offset_ns REAL, offset_sd_ns REAL, "
-	 "line_seq INTEGER, line_ns INTEGER, line_period_ns REAL)"},
+	 "stamped INTEGER NOT NULL, nominal_hz REAL, delay_ns INTEGER NOT NULL, "
+	 "delay_sd_ns INTEGER, grain_ns INTEGER NOT NULL, rows INTEGER NOT NULL, "
+	 "lost INTEGER NOT NULL, late INTEGER NOT NULL, rate_hz REAL, drift_ppm REAL, "
+	 "drift_sd_ppm REAL, jitter_ns REAL, jitter_max_ns REAL, offset_ns REAL, "
+	 "offset_sd_ns REAL, ended TEXT)"},
+	{"knots", 2, 2,
+	 "CREATE TABLE knots(stream TEXT NOT NULL, knot INTEGER NOT NULL, "
+	 "seq INTEGER NOT NULL, t_ns INTEGER NOT NULL, sd_ns REAL NOT NULL, "
+	 "begins INTEGER NOT NULL, PRIMARY KEY(stream, knot)) WITHOUT ROWID"},
 	{"ledger", 2, 2,
 	 "CREATE TABLE ledger(stream TEXT NOT NULL, block INTEGER NOT NULL, "
 	 "first_seq INTEGER NOT NULL, last_seq INTEGER NOT NULL, "

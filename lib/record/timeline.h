@@ -50,6 +50,7 @@ struct incise_timeline_knot {
 };
 
 #define INCISE_TIMELINE_KNOTS 256
+#define INCISE_TIMELINE_KNOTS_MAX (INCISE_TIMELINE_KNOTS + 3) /* of a line that goes on */
 
 struct incise_timeline_line {
 	uint64_t seq;
@@ -99,7 +100,7 @@ void incise_timeline_report(const struct incise_timeline *timeline,
 
 /*
  * For streams without stamps: the best line afterwards, from what came before and after.
- * Returns the number of knots, at most INCISE_TIMELINE_KNOTS + 3: 0 before two samples.
+ * Returns the number of knots, at most INCISE_TIMELINE_KNOTS_MAX: 0 before two samples.
  */
 int incise_timeline_knots(const struct incise_timeline *timeline,
 			  struct incise_timeline_knot *knots);

@@ -33,6 +33,7 @@ struct polhemus_line {
 	const struct polhemus_line_ops *ops;
 	int family;	     /* enum polhemus_family, or -1: to be asked */
 	int64_t ns_per_byte; /* of a serial line, else 0 */
+	int64_t grain_ns;    /* arrivals come on a grid: frames of USB; else 0 */
 	char name[40];	     /* for messages: "/dev/ttyUSB0" */
 	/* A dialogue is given up once this is true; NULL: never. */
 	const _Atomic bool *stop;

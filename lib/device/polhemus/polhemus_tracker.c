@@ -146,6 +146,7 @@ static void tracker_info(const struct incise_tracker *tracker,
 		.latency_ns =
 			polhemus_family_latency_ns(layout->family) +
 			(int64_t)polhemus_layout_length(layout) * t->line->ns_per_byte,
+		.grain_ns = t->line->grain_ns,
 	};
 	snprintf(info->name, sizeof(info->name), "%s", t->identity.name);
 }

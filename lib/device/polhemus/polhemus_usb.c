@@ -370,6 +370,7 @@ struct polhemus_line *polhemus_usb_open(const char *arguments, const char *where
 		return NULL;
 	}
 	usb->line.ops = &ops;
+	usb->line.grain_ns = 1000000; /* frames of full speed */
 	snprintf(usb->line.name, sizeof(usb->line.name), "%s", arguments);
 	rc = polhemus_usb_wanted(arguments, &usb->wanted, &model, where, err);
 	if (!rc) {

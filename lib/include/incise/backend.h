@@ -134,7 +134,7 @@ struct incise_vision {
 };
 
 /** Changes when any struct of this header does. */
-#define INCISE_BACKEND_ABI 3
+#define INCISE_BACKEND_ABI 4
 
 /** What rig.conf asks a backend for. */
 struct incise_backend_request {

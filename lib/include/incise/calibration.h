@@ -16,6 +16,11 @@ struct incise_calibration {
 	double force_mV_N; /**< sensitivity; nominal 1240 (paper 1, §2) */
 	double force_zero_mV; /**< reading without load; NAN: measured at each recording's start */
 	double depth_mm_px; /**< nominal 47.5/400 = 0.11875; the paper prints 0.118 */
+	/* From acquisition to the quickest arrival, or to the stamp where there is one, and
+	 * its standard deviation; NAN: what the device says of itself, sd not known. */
+	double force_delay_ms, force_delay_sd_ms;
+	double tracker_delay_ms, tracker_delay_sd_ms;
+	double camera_delay_ms, camera_delay_sd_ms;
 };
 
 /** The paper's figures. */

@@ -13,51 +13,91 @@
 #include <incise/error.h>
 #include <incise/export.h>
 #include <incise/rig.h>
+#include <incise/stream.h>
+#include <incise/vision.h>
 
 INCISE_BEGIN_DECLS
 
+/** How to record. */
+struct incise_recorder_setup {
+	const struct incise_calibration *calibration;
+	/** Look for the scalpel in the camera's pictures; NULL: pictures only. Its
+	 * depth_mm_px is of the calibration. */
+	const struct incise_vision_setup *vision;
+	double planned_s; /**< for the disk's free space; 0: not known */
+	/** Begin armed: everything is read and shown, but nothing written until
+	 * incise_recorder_trigger(); then it begins with what came in the second before. */
+	bool armed;
+};
+
 /** Counts of what a recorder has written. */
 struct incise_recorder_stats {
-	uint64_t force, tracker, depth; /**< rows */
-	uint64_t force_lost, tracker_lost;
-	uint64_t force_clipped; /**< codes at either end of the range */
-	double depth_mm;	/**< last */
-	double force_N;		/**< last; 0 until the zero is known */
-	double zero_mV;		/**< NAN until known */
+	uint64_t force, tracker, depth, frames; /**< rows */
+	uint64_t force_lost, tracker_lost, frames_lost;
+	uint64_t frames_unlooked; /**< that vision had no time for */
+	uint64_t force_clipped;	  /**< codes at either end of the range */
+	double depth_mm;	  /**< last, by the tracker */
+	double camera_depth_mm;	  /**< last, by vision; NAN: not seen */
+	double force_N;		  /**< last; 0 until the zero is known */
+	double zero_mV;		  /**< NAN until known */
+	bool button;		  /**< of the stylus */
+	bool armed;		  /**< waits for its trigger */
+	double bytes_per_s;	  /**< that it writes */
+	double disk_s;		  /**< until the disk is full; INFINITY: not known yet */
 };
 
 struct incise_recorder;
 
 /**
- * Start a recording of a rig's tracker and force channel.
+ * Start a recording of a rig's tracker and force channel, and of its camera if that is open.
  *
  * @param path  folder NAME.rec; it must not exist
- * @param rig   opened with INCISE_RIG_TRACKER | INCISE_RIG_FORCE; not owned
+ * @param rig   opened with INCISE_RIG_TRACKER | INCISE_RIG_FORCE, and INCISE_RIG_CAMERA or
+ *              not; not owned
+ * @param setup its pointers are not kept
  * @return recorder, to be ended with incise_recorder_close(); NULL with errno EEXIST, EINVAL
- *         (a path that is no name),
+ *         (a path that is no name; vision's thresholds),
  *         ENODEV (the rig has no tracker or force channel), EOPNOTSUPP (its tracker reads
- *         more than one sensor), of mkdir(2), EIO, ENOMEM.
+ *         more than one sensor), ENOSPC (no room for the planned time), of mkdir(2), EIO,
+ *         ENOMEM; ENOENT, ENOEXEC (a module of pictures is not installed, or broken).
  */
 INCISE_API struct incise_recorder *incise_recorder_new(
 	const char *path, struct incise_rig *rig,
-	const struct incise_calibration *calibration, struct incise_error *err);
+	const struct incise_recorder_setup *setup, struct incise_error *err);
 
 /**
  * Take what has arrived since the last call and write it; to be called at least 10 times
- * a second. Commits every 100 ms of the rig's clock.
+ * a second. Commits every 100 ms of the rig's clock. A device that dies is an event, and the
+ * others go on: see incise_recorder_streams().
  *
- * @return 0; -ENOSPC (disk full), -EIO, -ENODEV (a device is gone), -EBUSY (the tool was not
- *         free while the zero was measured). After an error only
- *         incise_recorder_close() makes sense.
+ * @return 0; 1: it is to be closed now, because the disk is nearly full or no device is left;
+ *         *err says which; -ENOSPC (disk full), -EIO, -EBUSY (the tool was not free while the
+ *         zero was measured). After an error only incise_recorder_close() makes sense.
  */
 INCISE_API int incise_recorder_poll(struct incise_recorder *recorder,
 				    struct incise_error *err);
 
+/** Armed: begin. What came in the second before is written with the next poll. */
+INCISE_API void incise_recorder_trigger(struct incise_recorder *recorder);
+
+/**
+ * Write a line into the table of events, of kind "marker" or "cut", with the clock's time.
+ *
+ * @return 0, or a negative errno of the disk, after which only closing makes sense
+ */
+INCISE_API int incise_recorder_mark(struct incise_recorder *recorder, const char *kind,
+				    const char *text, struct incise_error *err);
+
 INCISE_API void incise_recorder_stats(const struct incise_recorder *recorder,
 				      struct incise_recorder_stats *stats);
 
+/** The streams and their times. Returns how many there are, 2 or 3. */
+INCISE_API int incise_recorder_streams(const struct incise_recorder *recorder,
+				       struct incise_stream streams[INCISE_STREAMS_MAX]);
+
 /**
- * End the recording and give it its name; frees @recorder in any case.
+ * End the recording and give it its name; frees @recorder in any case. Blocks up to 5 s for
+ * pictures that are not in their file yet.
  *
  * @return 0, or a negative errno when it could not be completed; what was committed then
  *         stays readable as NAME.rec.part.

@@ -12,6 +12,7 @@
 #include <incise/calibration.h>
 #include <incise/error.h>
 #include <incise/export.h>
+#include <incise/stream.h>
 
 INCISE_BEGIN_DECLS
 
@@ -31,6 +32,8 @@ struct incise_recording_info {
 	double surface_normal[3], surface_point_mm[3];
 	int cuts; /**< stretches with the blade in the tissue */
 	double depth_max_mm, force_max_N;
+	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< of form 2 */
+	int n_streams;
 };
 
 /**

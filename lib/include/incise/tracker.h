@@ -46,6 +46,7 @@ struct incise_tracker_info {
 	double rate_hz;	    /**< nominal */
 	int64_t latency_ns; /**< nominal, acquisition to arrival */
 	int stations;	    /**< sensors that send records; seq counts all of them */
+	int64_t grain_ns;   /**< arrivals come on such a grid: 1000000 for USB; 0: none */
 };
 
 struct incise_tracker;

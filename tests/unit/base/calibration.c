@@ -20,13 +20,15 @@ static void nominal_is_the_papers(void **state)
 	assert_true(c.force_mV_N == 1240);
 	assert_true(isnan(c.force_zero_mV));
 	assert_true(c.depth_mm_px == 0.11875); /* 47.5 mm over 400 px */
+	assert_true(isnan(c.force_delay_ms) && isnan(c.tracker_delay_ms) &&
+		    isnan(c.camera_delay_ms) && isnan(c.tracker_delay_sd_ms));
 }
 
 static void absent_keys_are_nominal(void **state)
 {
 	struct temp_file file =
 		temp_file_new("calibration.conf", "force_zero_mV = 175.5;\n");
-	struct incise_calibration c = {1, 2, 3};
+	struct incise_calibration c = {.force_mV_N = 1, .force_zero_mV = 2};
 
 	assert_int_equal(incise_calibration_load(file.path, &c, NULL), 0);
 	assert_true(c.force_mV_N == 1240 && c.force_zero_mV == 175.5);
@@ -38,12 +40,18 @@ static void all_keys_are_read(void **state)
 {
 	struct temp_file file = temp_file_new(
 		"calibration.conf",
-		"force_mV_N = 1238.5;\nforce_zero_mV = -12;\ndepth_mm_px = 0.12;\n");
+		"force_mV_N = 1238.5;\nforce_zero_mV = -12;\ndepth_mm_px = 0.12;\n"
+		"force_delay_ms = 0.1;\nforce_delay_sd_ms = 0.01;\n"
+		"tracker_delay_ms = 8.5;\ntracker_delay_sd_ms = 0.2;\n"
+		"camera_delay_ms = -3.5;\ncamera_delay_sd_ms = 0.5;\n");
 	struct incise_calibration c;
 
 	assert_int_equal(incise_calibration_load(file.path, &c, NULL), 0);
 	assert_true(c.force_mV_N == 1238.5 && c.force_zero_mV == -12 &&
 		    c.depth_mm_px == 0.12);
+	assert_true(c.force_delay_ms == 0.1 && c.force_delay_sd_ms == 0.01);
+	assert_true(c.tracker_delay_ms == 8.5 && c.tracker_delay_sd_ms == 0.2);
+	assert_true(c.camera_delay_ms == -3.5 && c.camera_delay_sd_ms == 0.5);
 	temp_file_free(&file);
 }
 
@@ -68,7 +76,7 @@ static void faults_leave_the_calibration_alone(void **state)
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
 		struct temp_file file = temp_file_new("calibration.conf", row[i].text);
-		struct incise_calibration c = {1, 2, 3};
+		struct incise_calibration c = {.force_mV_N = 1, .force_zero_mV = 2};
 		struct incise_error err = {0};
 		char expected[600];
 

@@ -104,7 +104,9 @@ __attribute__((unused)) static void record(const char *path, const char *spec,
 	struct incise_recorder *recorder;
 
 	incise_calibration_nominal(&calibration);
-	recorder = incise_recorder_new(path, rig, &calibration, &err);
+	recorder = incise_recorder_new(
+		path, rig, &(struct incise_recorder_setup){.calibration = &calibration},
+		&err);
 	if (!recorder)
 		fail_msg("%s", err.text);
 	if (!duration_ns)

@@ -21,7 +21,9 @@ static struct incise_recorder *start(const char *path, struct incise_rig *rig)
 	struct incise_recorder *recorder;
 
 	incise_calibration_nominal(&calibration);
-	recorder = incise_recorder_new(path, rig, &calibration, &err);
+	recorder = incise_recorder_new(
+		path, rig, &(struct incise_recorder_setup){.calibration = &calibration},
+		&err);
 	if (!recorder)
 		fail_msg("%s", err.text);
 	return recorder;
@@ -163,8 +165,9 @@ static void given_zero_is_taken(void **state)
 	struct incise_calibration calibration = {
 		.force_mV_N = 1000, .force_zero_mV = 200, .depth_mm_px = 0.1};
 	struct incise_error err = {0};
-	struct incise_recorder *rec =
-		incise_recorder_new("a.rec", rig, &calibration, &err);
+	struct incise_recorder *rec = incise_recorder_new(
+		"a.rec", rig,
+		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
 	struct incise_recorder_stats stats;
 
 	assert_non_null(rec);
@@ -218,7 +221,9 @@ static void refused(const char *path, struct incise_rig *rig, int code, const ch
 
 	incise_calibration_nominal(&calibration);
 	errno = 0;
-	assert_null(incise_recorder_new(path, rig, &calibration, &err));
+	assert_null(incise_recorder_new(
+		path, rig, &(struct incise_recorder_setup){.calibration = &calibration},
+		&err));
 	if (errno != code || err.code != code || !strstr(err.text, text))
 		fail_msg("%s: errno %d, %d: %s", path, errno, err.code, err.text);
 }

@@ -194,7 +194,9 @@ static void losses_are_no_alteration(void **state)
 	struct incise_recorder *recorder;
 
 	incise_calibration_nominal(&calibration);
-	recorder = incise_recorder_new("a.rec", rig, &calibration, &err);
+	recorder = incise_recorder_new(
+		"a.rec", rig,
+		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
 	assert_non_null(recorder);
 	assert_int_equal(poll_for(recorder, rig, 700 * MS, &err), 0);
 	/* someone else takes what the recorder should have had: 700 to 730 ms */
@@ -228,7 +230,9 @@ static void interrupted_is_intact(void **state)
 	struct incise_recorder *recorder;
 
 	incise_calibration_nominal(&calibration);
-	recorder = incise_recorder_new("a.rec", rig, &calibration, &err);
+	recorder = incise_recorder_new(
+		"a.rec", rig,
+		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
 	verify("a.rec", &report, &findings); /* not a row */
 	assert_true(report.interrupted && report.intact && report.findings == 1);
 	assert_int_equal(poll_for(recorder, rig, 750 * MS, &err), 0);
