@@ -73,6 +73,24 @@ void incise_ledger_row_tracker(struct incise_ledger_row *row, int64_t t_ns,
 	put_integer(row, sample->button);
 }
 
+void incise_ledger_row_frame(struct incise_ledger_row *row,
+			     const struct incise_frame_record *record)
+{
+	row->seq = record->seq;
+	row->t_ns = record->t_ns;
+	row->n = 0;
+	put_integer(row, record->seq);
+	put_integer(row, record->t_ns);
+	put_integer(row, record->arrival_ns);
+	put_integer(row, record->pts_ms);
+	put_integer(row, record->bytes);
+	put_integer(row, record->crc);
+	put_real(row, record->length_px);
+	put_real(row, record->sd_px);
+	put_real(row, record->depth_mm);
+	put_real(row, record->quality);
+}
+
 bool incise_ledger_row_read(struct incise_ledger_row *row,
 			    const struct incise_ledger_form *form, sqlite3_stmt *stmt)
 {

@@ -19,6 +19,7 @@
 #include <stdint.h>
 #include <sqlite3.h>
 #include <incise/tracker.h>
+#include "frame_pump.h"
 
 /* A stream, its table, and how the columns of a row are encoded. */
 struct incise_ledger_form {
@@ -52,6 +53,9 @@ void incise_ledger_row_force(struct incise_ledger_row *row, uint64_t seq, int64_
 			     int32_t code);
 void incise_ledger_row_tracker(struct incise_ledger_row *row, int64_t t_ns,
 			       const struct incise_tracker_sample *sample);
+/* NaN is a column that is NULL: bind it so. Its t_ns is the time as in the table. */
+void incise_ledger_row_frame(struct incise_ledger_row *row,
+			     const struct incise_frame_record *record);
 
 /* The row that a SELECT of a form's columns is at. Returns false when it cannot be one. */
 bool incise_ledger_row_read(struct incise_ledger_row *row,

@@ -38,6 +38,26 @@ static const uint8_t tracker_bytes[] = {
 	0, 0, 0, 0,    0,    0,	   0, 0, 0,   0,   0,	0,   'j', 3,	0,    0,   0,
 	0, 0, 0, 0,    1,    0,	   0, 0, 0,   0,   0,	0};
 
+static const struct incise_frame_record picture = {
+	.seq = 1,
+	.t_ns = 2,
+	.arrival_ns = 3,
+	.pts_ms = 4,
+	.bytes = 5,
+	.crc = 6,
+	.length_px = 1.5,
+	.sd_px = 2.5,
+	.depth_mm = NAN,
+	.quality = 0.5,
+};
+
+/* 1.5, 2.5, NaN and 0.5: 3ff8…, 4004…, 7ff8…, 3fe0… */
+static const uint8_t frame_bytes[] = {
+	1, 0, 0, 0,    0, 0, 0, 0, 2, 0, 0,    0,    0, 0, 0,	 0,    3, 0, 0,	   0,
+	0, 0, 0, 0,    4, 0, 0, 0, 0, 0, 0,    0,    5, 0, 0,	 0,    0, 0, 0,	   0,
+	6, 0, 0, 0,    0, 0, 0, 0, 0, 0, 0,    0,    0, 0, 0xf8, 0x3f, 0, 0, 0,	   0,
+	0, 0, 4, 0x40, 0, 0, 0, 0, 0, 0, 0xf8, 0x7f, 0, 0, 0,	 0,    0, 0, 0xe0, 0x3f};
+
 static void rows_are_these_bytes(void **state)
 {
 	static const uint8_t force[] = {5, 1, 0, 0, 0,	 0,  0, 0, 0, 202, 154, 59,
@@ -53,6 +73,11 @@ static void rows_are_these_bytes(void **state)
 	assert_int_equal(row.n, sizeof(tracker_bytes));
 	assert_memory_equal(row.bytes, tracker_bytes, sizeof(tracker_bytes));
 	assert_true(row.seq == 7 && row.t_ns == -2);
+
+	incise_ledger_row_frame(&row, &picture);
+	assert_int_equal(row.n, sizeof(frame_bytes));
+	assert_memory_equal(row.bytes, frame_bytes, sizeof(frame_bytes));
+	assert_true(row.seq == 1 && row.t_ns == 2);
 }
 
 /* What a SELECT of this gives is such bytes, or no row. */
@@ -79,9 +104,11 @@ static void read_from_SQLite(void **state)
 		{INCISE_LEDGER_FORCE, "1, 2, 3.5", 0},
 		{INCISE_LEDGER_FORCE, "1, 'x', 3", 0},
 		{INCISE_LEDGER_FORCE, "1, 2, NULL", 0},
-		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, NULL, NULL, NULL, NULL", 72},
-		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 1.5, 2.5, NULL, 0.5", 72},
-		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, NULL, 1.5, 2.5, NULL, 0.5", 0},
+		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, NULL, NULL, NULL, NULL", 80},
+		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, 1.5, 2.5, NULL, 0.5",
+		 sizeof(frame_bytes)},
+		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, NULL, 1.5, 2.5, NULL, 0.5", 0},
+		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, 1.5, 2.5, 'x', 0.5", 0},
 	};
 	static const uint8_t null[] = {0, 0, 0, 0, 0, 0, 0xf8, 0x7f};
 	sqlite3 *db;
@@ -102,8 +129,10 @@ static void read_from_SQLite(void **state)
 			fail_msg("%s: %d, %zu bytes", cases[i].values, good, row.n);
 		if (i == 0)
 			assert_memory_equal(row.bytes, tracker_bytes, row.n);
-		if (cases[i].n == 72) /* depth_mm */
-			assert_memory_equal(row.bytes + 56, null, 8);
+		if (cases[i].n == sizeof(frame_bytes)) /* depth_mm */
+			assert_memory_equal(row.bytes + 64, null, 8);
+		if (strstr(cases[i].values, "6, 1.5, 2.5, NULL"))
+			assert_memory_equal(row.bytes, frame_bytes, row.n);
 		sqlite3_finalize(stmt);
 	}
 	sqlite3_close(db);
