@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Writing a recording; see incise/recorder.h.
+ * Writing a recording; see incise/recorder.h, and recorder.h for its parts.
  *
- *     force ────► timeline ─┬─────────────────► table force
- *       └► zero: 0.5 s ─────┼─────────────────► table meta       one transaction
- *                           ├─► CRC, chained ─► table ledger ──► per 100 ms of
- *     tracker ──► timeline ─┴┬────────────────► table tracker    the rig's clock
- *                            └► depth, speed ─► table depth
+ *     force ────►┐                         ┌─► tables, ledger ─► one transaction per 100 ms
+ *     tracker ──►┼─► poll ─► times ─► rows ┤                     of the rig's clock
+ *     camera ─► pump (threads of its own) ─┴─► camera.mkv
  *
  * On a real clock each commit is synced, so a power cut costs no more than a kill: the
  * last 100 ms. A device's own buffer bridges the time that syncing takes.
@@ -18,16 +16,16 @@
 #include <string.h>
 #include <unistd.h>
 #include "recorder.h"
-#include "schema.h"
 
-#define COMMIT_NS 100000000LL
 #define BATCH 1024
 
 /* --- beginning ------------------------------------------------------------------- */
 
 static void recorder_free(struct incise_recorder *rec)
 {
+	incise_recorder_close_camera(rec);
 	incise_recorder_close_database(rec);
+	incise_recorder_hold_free(rec);
 	if (rec->folder >= 0)
 		close(rec->folder);
 	if (rec->parent >= 0)
@@ -37,34 +35,60 @@ static void recorder_free(struct incise_recorder *rec)
 	free(rec);
 }
 
-struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig *rig,
-					    const struct incise_recorder_setup *setup,
-					    struct incise_error *err)
+static int check_rig(const char *path, struct incise_rig *rig, struct incise_error *err)
 {
 	struct incise_tracker_info tracker;
-	struct incise_recorder *rec;
-	double point_mm[3], normal[3];
-	int rc;
 
-	if (!incise_rig_tracker(rig) || !incise_rig_force(rig)) {
-		incise_error_set(
+	if (!incise_rig_tracker(rig) || !incise_rig_force(rig))
+		return incise_error_set(
 			err, ENODEV,
 			"%s: a recording needs a tracker and a force channel; the rig "
 			"%s was opened without",
 			path, incise_rig_spec(rig));
-		return NULL;
-	}
 	incise_tracker_info(incise_rig_tracker(rig), &tracker);
 	/* Rows of two sensors in one table would be one that jumps to and fro. */
-	if (tracker.stations > 1) {
-		incise_error_set(
+	if (tracker.stations > 1)
+		return incise_error_set(
 			err, EOPNOTSUPP,
 			"%s: a recording holds one sensor, and the tracker of %s "
 			"reads %d; name the scalpel's alone in "
 			"tracker_setup.stations",
 			path, incise_rig_spec(rig), tracker.stations);
-		return NULL;
+	return 0;
+}
+
+/* Files in the folder, and all that may fail before the first sample is taken. */
+static int begin(struct incise_recorder *rec, const struct incise_recorder_setup *setup,
+		 struct incise_error *err)
+{
+	int rc = incise_recorder_preflight(rec, setup->planned_s, err);
+
+	if (!rc)
+		rc = incise_recorder_open_database(rec, err);
+	if (!rc && rec->streams[INCISE_LEDGER_CAMERA].there)
+		rc = incise_recorder_open_camera(rec, setup->vision, err);
+	if (!rc && setup->armed && incise_recorder_hold(rec))
+		rc = incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+	if (!rc && !setup->armed)
+		rc = incise_recorder_start_camera(rec, err);
+	if (rc) {
+		incise_recorder_close_camera(rec);
+		incise_recorder_close_database(rec);
+		incise_recorder_remove_folder(rec);
 	}
+	return rc;
+}
+
+struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig *rig,
+					    const struct incise_recorder_setup *setup,
+					    struct incise_error *err)
+{
+	struct incise_recorder *rec;
+	double point_mm[3], normal[3];
+	int rc;
+
+	if (check_rig(path, rig, err))
+		return NULL;
 	rec = calloc(1, sizeof(*rec));
 	if (!rec) {
 		incise_error_set(err, ENOMEM, "%s: out of memory", path);
@@ -73,28 +97,22 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	rec->parent = rec->folder = -1;
 	rec->rig = rig;
 	rec->calibration = *setup->calibration;
+	rec->cuts = setup->cuts;
 	rec->stats.zero_mV = rec->calibration.force_zero_mV;
+	rec->stats.camera_depth_mm = NAN;
 	rec->zero.depth_max_mm = -INFINITY;
 	incise_force_info(incise_rig_force(rig), &rec->force_info);
-	rec->tracker_info = tracker;
+	incise_tracker_info(incise_rig_tracker(rig), &rec->tracker_info);
+	if (incise_rig_camera(rig))
+		incise_camera_info(incise_rig_camera(rig), &rec->camera_info);
 	incise_rig_surface(rig, point_mm, normal);
 	incise_depth_init(&rec->depth, point_mm, normal);
-	incise_ledger_init(&rec->force.ledger);
-	incise_ledger_init(&rec->tracker.ledger);
-	incise_timeline_init(&rec->force.timeline, 0); /* stamped at acquisition */
-	incise_timeline_init(&rec->tracker.timeline, rec->tracker_info.latency_ns);
-	rec->force.lost_at_start = incise_force_lost(incise_rig_force(rig));
-	rec->tracker.lost_at_start = incise_tracker_lost(incise_rig_tracker(rig));
+	incise_recorder_begin_streams(rec);
 	rc = incise_recorder_take_path(rec, path, err);
 	if (!rc)
 		rc = incise_recorder_make_folder(rec, err);
-	if (!rc) {
-		rc = incise_recorder_open_database(rec, err);
-		if (rc) {
-			incise_recorder_close_database(rec);
-			incise_recorder_remove_folder(rec);
-		}
-	}
+	if (!rc)
+		rc = begin(rec, setup, err);
 	if (rc) {
 		recorder_free(rec);
 		errno = -rc;
@@ -109,223 +127,92 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 /* --- samples --------------------------------------------------------------------- */
 
 /*
- * Whether a sample is the next of its stream; counts those missing before it. A number
- * that was there before is a fault of the backend.
+ * A device that fails ends its stream alone. @cause: what it tells of it, if anything.
+ * Returns 0 or of the disk.
  */
-static int take_number(struct incise_recorder *rec, struct incise_recorder_stream *stream,
-		       const char *name, uint64_t seq, struct incise_error *err)
-{
-	if (seq > INT64_MAX || (stream->begun && seq < stream->next))
-		return incise_error_set(err, EIO,
-					"%s: sample %llu came after %llu; the driver of "
-					"this device is at fault",
-					name, (unsigned long long)seq,
-					(unsigned long long)stream->next - 1);
-	if (stream->begun && seq > stream->next) {
-		stream->lost += seq - stream->next;
-		if (incise_recorder_note(rec, "lost",
-					 "%s: %llu samples before number %llu", name,
-					 (unsigned long long)(seq - stream->next),
-					 (unsigned long long)seq) != SQLITE_OK)
-			return incise_recorder_fail(rec, err);
-	}
-	stream->next = seq + 1;
-	return 0;
-}
-
-/* Losses by the numbers, or by the device's own count, which sees the last ones too. */
-static uint64_t lost(const struct incise_recorder_stream *stream, uint64_t device)
-{
-	device -= stream->lost_at_start;
-	return stream->lost > device ? stream->lost : device;
-}
-
-static int put_force(struct incise_recorder *rec,
-		     const struct incise_force_sample *sample, struct incise_error *err)
-{
-	sqlite3_stmt *stmt = rec->stmt[INSERT_FORCE];
-	int64_t t_ns = incise_timeline_acquired(&rec->force.timeline, sample->t_ns);
-	int64_t top = (1LL << rec->force_info.bits) - 1;
-	struct incise_ledger_row row;
-	int rc = take_number(rec, &rec->force, rec->force_info.name, sample->seq, err);
-
-	if (rc)
-		return rc;
-	if (sample->code < 0 || sample->code > top)
-		return incise_error_set(err, EIO,
-					"%s: code %d is not within 0 to %lld; the driver "
-					"of this device is at fault",
-					rec->force_info.name, sample->code,
-					(long long)top);
-	if (!rec->force.begun) {
-		rec->force.begun = true;
-		rec->force.first_ns = t_ns;
-	}
-	sqlite3_bind_int64(stmt, 1, sample->seq);
-	sqlite3_bind_int64(stmt, 2, t_ns);
-	sqlite3_bind_int(stmt, 3, sample->code);
-	if (incise_recorder_run(stmt) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	rec->stats.force++;
-	incise_ledger_row_force(&row, sample->seq, t_ns, sample->code);
-	incise_ledger_add(&rec->force.ledger, &row);
-	if (sample->code == 0 || sample->code == top)
-		rec->stats.force_clipped++;
-	if (!isnan(rec->stats.zero_mV)) {
-		rec->stats.force_N = (incise_recorder_code_mV(rec, sample->code) -
-				      rec->stats.zero_mV) /
-				     rec->calibration.force_mV_N;
-	} else {
-		incise_recorder_zero_force(rec, t_ns, sample->code,
-					   sample->code == 0 || sample->code == top);
-	}
-	return 0;
-}
-
-static int put_depth(struct incise_recorder *rec, const struct incise_depth_row *row,
-		     struct incise_error *err)
-{
-	sqlite3_stmt *stmt = rec->stmt[INSERT_DEPTH];
-
-	sqlite3_bind_int64(stmt, 1, row->seq);
-	sqlite3_bind_int64(stmt, 2, row->t_ns);
-	sqlite3_bind_double(stmt, 3, row->depth_mm);
-	sqlite3_bind_double(stmt, 4, row->velocity_mm_s);
-	if (incise_recorder_run(stmt) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	rec->stats.depth++;
-	return 0;
-}
-
-static bool finite_record(const struct incise_tracker_sample *sample)
-{
-	for (int i = 0; i < 3; i++)
-		if (!isfinite(sample->position_mm[i]))
-			return false;
-	for (int i = 0; i < 4; i++)
-		if (!isfinite(sample->quaternion[i]))
-			return false;
-	return true;
-}
-
-static int put_tracker(struct incise_recorder *rec,
-		       const struct incise_tracker_sample *sample,
+static int fail_device(struct incise_recorder *rec, int stream, const char *cause, int rc,
 		       struct incise_error *err)
 {
-	sqlite3_stmt *stmt = rec->stmt[INSERT_TRACKER];
-	int64_t t_ns = incise_timeline_acquired(&rec->tracker.timeline, sample->t_ns);
-	struct incise_ledger_row entry;
-	struct incise_depth_row row;
-	int rc =
-		take_number(rec, &rec->tracker, rec->tracker_info.name, sample->seq, err);
+	char why[200];
 
-	if (rc)
-		return rc;
-	if (!rec->tracker.begun) {
-		rec->tracker.begun = true;
-		rec->tracker.first_ns = t_ns;
-	}
-	rec->zero.tracker_ns = t_ns;
-	if (!finite_record(sample)) { /* no place in the table: as good as lost */
-		rec->tracker.lost++;
-		return incise_recorder_note(rec, "lost", "%s: record %llu is not finite",
-					    rec->tracker_info.name,
-					    (unsigned long long)sample->seq) == SQLITE_OK
-			       ? 0
-			       : incise_recorder_fail(rec, err);
-	}
-	sqlite3_bind_int64(stmt, 1, sample->seq);
-	sqlite3_bind_int64(stmt, 2, t_ns);
-	sqlite3_bind_int64(stmt, 3, sample->t_ns);
-	for (int i = 0; i < 3; i++)
-		sqlite3_bind_double(stmt, 4 + i, sample->position_mm[i]);
-	for (int i = 0; i < 4; i++)
-		sqlite3_bind_double(stmt, 7 + i, sample->quaternion[i]);
-	sqlite3_bind_text(stmt, 11, &sample->status, 1, SQLITE_TRANSIENT);
-	sqlite3_bind_int(stmt, 12, sample->station);
-	sqlite3_bind_int(stmt, 13, sample->button);
-	if (incise_recorder_run(stmt) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	rec->stats.tracker++;
-	incise_ledger_row_tracker(&entry, t_ns, sample);
-	incise_ledger_add(&rec->tracker.ledger, &entry);
-	/* A record that the tracker itself doubts is kept, but not believed. */
-	if (sample->status != ' ')
-		return 0;
-	rec->stats.depth_mm = incise_depth_of(&rec->depth, sample->position_mm);
-	incise_recorder_zero_depth(rec, t_ns, rec->stats.depth_mm);
-	if (incise_depth_push(&rec->depth, sample->seq, t_ns, sample->position_mm, &row))
-		return put_depth(rec, &row, err);
-	return 0;
-}
-
-/* @cause: what the device itself tells of it, if anything. */
-static int fail_device(struct incise_recorder *rec, const char *name, const char *cause,
-		       int rc, struct incise_error *err)
-{
-	struct incise_error ignored = {0};
-
-	if (incise_recorder_note(rec, "failed", "%s: %s", name,
-				 *cause ? cause : strerror(-rc)) == SQLITE_OK)
-		incise_recorder_commit(rec, rec->commit_ns,
-				       &ignored); /* what came before is worth keeping */
-	if (*cause)
-		return incise_error_set(
-			err, -rc,
-			"%s; what was recorded before is in %s: `incise info` reads it",
-			cause, rec->part);
-	return incise_error_set(
-		err, -rc,
-		"%s: %s; check its cable and power; what was recorded before is "
-		"in %s: `incise info` reads it",
-		name, rc == -ENODEV ? "is gone" : strerror(-rc), rec->part);
+	if (!*cause)
+		snprintf(why, sizeof(why), "%s: %s; check its cable and power",
+			 rec->streams[stream].device,
+			 rc == -ENODEV ? "is gone" : strerror(-rc));
+	return incise_recorder_end_stream(rec, stream, *cause ? cause : why, err);
 }
 
 static int take_force(struct incise_recorder *rec, struct incise_error *err)
 {
+	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_FORCE];
 	struct incise_force *force = incise_rig_force(rec->rig);
 	struct incise_force_sample samples[BATCH];
 	char cause[200];
-	int n = BATCH;
+	int n = BATCH, rc = 0;
 
-	while (n == BATCH) {
+	while (n == BATCH && !*stream->ended) {
 		n = incise_force_read(force, samples, BATCH);
 		if (n < 0) {
 			incise_force_cause(force, cause, sizeof(cause));
-			return fail_device(rec, rec->force_info.name, cause, n, err);
+			rc = fail_device(rec, INCISE_LEDGER_FORCE, cause, n, err);
 		}
-		for (int i = 0; i < n; i++) {
-			int rc = put_force(rec, &samples[i], err);
-
-			if (rc)
-				return rc;
-		}
+		for (int i = 0; i < n && !rc && !*stream->ended; i++)
+			rc = incise_recorder_put_force(rec, &samples[i], err);
+		if (rc)
+			return rc;
 	}
-	rec->stats.force_lost = lost(&rec->force, incise_force_lost(force));
+	stream->device_lost = incise_force_lost(force) - stream->lost_at_start;
 	return 0;
 }
 
 static int take_tracker(struct incise_recorder *rec, struct incise_error *err)
 {
+	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_TRACKER];
 	struct incise_tracker *tracker = incise_rig_tracker(rec->rig);
 	struct incise_tracker_sample samples[BATCH / 16];
 	char cause[200];
-	int n = BATCH / 16;
+	int n = BATCH / 16, rc = 0;
 
-	while (n == BATCH / 16) {
+	while (n == BATCH / 16 && !*stream->ended) {
 		n = incise_tracker_read(tracker, samples, BATCH / 16);
 		if (n < 0) {
 			incise_tracker_cause(tracker, cause, sizeof(cause));
-			return fail_device(rec, rec->tracker_info.name, cause, n, err);
+			rc = fail_device(rec, INCISE_LEDGER_TRACKER, cause, n, err);
 		}
-		for (int i = 0; i < n; i++) {
-			int rc = put_tracker(rec, &samples[i], err);
-
-			if (rc)
-				return rc;
-		}
+		for (int i = 0; i < n && !rc && !*stream->ended; i++)
+			rc = incise_recorder_put_tracker(rec, &samples[i], err);
+		if (rc)
+			return rc;
 	}
-	rec->stats.tracker_lost = lost(&rec->tracker, incise_tracker_lost(tracker));
+	stream->device_lost =
+		incise_tracker_lost(tracker) - stream->lost_at_start + rec->not_finite;
+	return 0;
+}
+
+static bool all_ended(const struct incise_recorder *rec)
+{
+	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++)
+		if (rec->streams[i].there && !*rec->streams[i].ended)
+			return false;
+	return true;
+}
+
+/* 1 with *err where it is to end, though nothing is wrong with what there is. */
+static int check_end(struct incise_recorder *rec, struct incise_error *err)
+{
+	if (all_ended(rec)) {
+		incise_error_set(err, ENODEV, "%s: no device is left: %s", rec->path,
+				 rec->streams[INCISE_LEDGER_FORCE].ended);
+		return 1;
+	}
+	if (incise_recorder_disk_full(rec)) {
+		incise_error_set(err, ENOSPC,
+				 "%s: the disk is nearly full (%.0f MB free); the "
+				 "recording was ended while there is room to; make room "
+				 "before the next",
+				 rec->path, rec->disk.free_bytes / 1e6);
+		return 1;
+	}
 	return 0;
 }
 
@@ -340,18 +227,41 @@ int incise_recorder_poll(struct incise_recorder *rec, struct incise_error *err)
 	rc = take_force(rec, err);
 	if (!rc)
 		rc = take_tracker(rec, err);
+	if (!rc)
+		rc = incise_recorder_take_camera(rec, err);
 	if (!rc && incise_recorder_zero_due(rec))
 		rc = incise_recorder_settle_zero(rec, err);
-	if (!rc && now - rec->commit_ns >= COMMIT_NS)
-		rc = incise_recorder_commit(rec, now, err);
+	if (!rc && rec->stats.armed && rec->hold.triggered)
+		rc = incise_recorder_release(rec, err);
+	if (!rc && now - rec->commit_ns >= INCISE_RECORDER_COMMIT_NS)
+		rc = incise_recorder_commit(rec, now, false, err);
 	rec->failed = rc;
-	return rc;
+	return rc ? rc : check_end(rec, err);
+}
+
+void incise_recorder_trigger(struct incise_recorder *rec)
+{
+	rec->hold.triggered = true;
+}
+
+int incise_recorder_mark(struct incise_recorder *rec, const char *kind, const char *text,
+			 struct incise_error *err)
+{
+	if (!rec->failed && incise_recorder_note(rec, kind, "%s", text) != SQLITE_OK)
+		rec->failed = incise_recorder_fail(rec, err);
+	return rec->failed;
 }
 
 void incise_recorder_stats(const struct incise_recorder *rec,
 			   struct incise_recorder_stats *stats)
 {
 	*stats = rec->stats;
+	stats->force = rec->streams[INCISE_LEDGER_FORCE].rows;
+	stats->tracker = rec->streams[INCISE_LEDGER_TRACKER].rows;
+	stats->frames = rec->streams[INCISE_LEDGER_CAMERA].rows;
+	stats->force_lost = incise_recorder_lost(rec, INCISE_LEDGER_FORCE);
+	stats->tracker_lost = incise_recorder_lost(rec, INCISE_LEDGER_TRACKER);
+	stats->frames_lost = incise_recorder_lost(rec, INCISE_LEDGER_CAMERA);
 	/* Rows whose window is still open are as good as written: closing writes them. */
 	stats->depth += rec->depth.n - rec->depth.done;
 }
@@ -361,20 +271,19 @@ void incise_recorder_stats(const struct incise_recorder *rec,
 /* Write what is still held back, and that nothing is missing. */
 static int complete(struct incise_recorder *rec, struct incise_error *err)
 {
-	struct incise_depth_row row;
-	int rc = 0;
+	int rc = incise_recorder_end_camera(rec, err);
 
 	/* A recording shorter than the time for the zero makes do with what it has. */
-	if (isnan(rec->stats.zero_mV) && rec->force.begun)
+	if (!rc && isnan(rec->stats.zero_mV) && rec->streams[INCISE_LEDGER_FORCE].begun)
 		rc = incise_recorder_settle_zero(rec, err);
-	while (!rc && incise_depth_flush(&rec->depth, &row))
-		rc = put_depth(rec, &row, err);
+	if (!rc)
+		rc = incise_recorder_flush_depth(rec, err);
 	if (!rc && (incise_recorder_ledger_close(rec) != SQLITE_OK ||
 		    incise_recorder_note(rec, "end", "recording ended") != SQLITE_OK ||
 		    incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK))
 		rc = incise_recorder_fail(rec, err);
 	if (!rc)
-		rc = incise_recorder_commit(rec, rec->commit_ns, err);
+		rc = incise_recorder_commit(rec, rec->commit_ns, true, err);
 	if (rc)
 		return rc;
 	/*
@@ -404,6 +313,7 @@ int incise_recorder_close(struct incise_recorder *rec, struct incise_error *err)
 			rec->worthless ? "" : rec->part);
 	else
 		rc = complete(rec, err);
+	incise_recorder_close_camera(rec);
 	incise_recorder_close_database(rec);
 	if (!rc)
 		rc = incise_recorder_give_name(rec, err);

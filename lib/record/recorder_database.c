@@ -15,9 +15,14 @@ static const char *const sql[STATEMENTS] = {
 	[INSERT_FORCE] = "INSERT INTO force VALUES(?,?,?)",
 	[INSERT_TRACKER] = "INSERT INTO tracker VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?)",
 	[INSERT_DEPTH] = "INSERT INTO depth VALUES(?,?,?,?)",
+	[INSERT_FRAME] = "INSERT INTO frames VALUES(?,?,?,?,?,?,?,?,?,?)",
 	[INSERT_EVENT] = "INSERT INTO events VALUES(?,?,?)",
 	[INSERT_LEDGER] = "INSERT INTO ledger VALUES(?,?,?,?,?,?,?,?,?)",
 	[SET_META] = "INSERT OR REPLACE INTO meta VALUES(?,?)",
+	[SET_STREAM] = "INSERT OR REPLACE INTO streams "
+		       "VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
+	[DROP_KNOTS] = "DELETE FROM knots WHERE stream = ?",
+	[INSERT_KNOT] = "INSERT INTO knots VALUES(?,?,?,?,?,?)",
 };
 
 int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err)
@@ -39,25 +44,44 @@ int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err)
 }
 
 /* Counts go with the rows they count, so that an interrupted recording knows its losses. */
-int incise_recorder_commit(struct incise_recorder *rec, int64_t now_ns,
-			   struct incise_error *err)
+static int write_counts(struct incise_recorder *rec)
 {
+	struct incise_recorder_stats stats;
+	bool camera = rec->streams[INCISE_LEDGER_CAMERA].there;
+	int bad = SQLITE_OK;
+
+	incise_recorder_stats(rec, &stats);
 	const struct {
 		const char *key;
 		uint64_t value;
 	} counts[] = {
-		{"force_rows", rec->stats.force},
-		{"tracker_rows", rec->stats.tracker},
-		{"depth_rows", rec->stats.depth},
-		{"force_lost", rec->stats.force_lost},
-		{"tracker_lost", rec->stats.tracker_lost},
-		{"force_clipped", rec->stats.force_clipped},
+		{"force_rows", stats.force},
+		{"tracker_rows", stats.tracker},
+		{"depth_rows", rec->stats.depth}, /* without those that are to come */
+		{"force_lost", stats.force_lost},
+		{"tracker_lost", stats.tracker_lost},
+		{"force_clipped", stats.force_clipped},
+		{"frames_rows", stats.frames},
+		{"frames_lost", stats.frames_lost},
+		{"frames_unlooked", stats.frames_unlooked},
 	};
 
-	for (size_t i = 0; i < sizeof(counts) / sizeof(*counts); i++)
-		if (incise_recorder_set_integer(rec, counts[i].key, counts[i].value) !=
-		    SQLITE_OK)
-			return incise_recorder_fail(rec, err);
+	for (size_t i = 0; i < sizeof(counts) / sizeof(*counts) - (camera ? 0 : 3); i++)
+		bad |= incise_recorder_set_integer(rec, counts[i].key, counts[i].value);
+	return bad;
+}
+
+/* The knots of a line are many, and move little in a second: not with each commit. */
+#define KNOTS_EVERY 10
+
+int incise_recorder_commit(struct incise_recorder *rec, int64_t now_ns, bool last,
+			   struct incise_error *err)
+{
+	bool knots = last || rec->commits++ % KNOTS_EVERY == 0;
+
+	if (write_counts(rec) != SQLITE_OK ||
+	    incise_recorder_write_streams(rec, knots) != SQLITE_OK)
+		return incise_recorder_fail(rec, err);
 	if (incise_recorder_ledger(rec) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	if (sqlite3_exec(rec->db, "COMMIT; BEGIN", NULL, NULL, NULL) != SQLITE_OK)
@@ -100,12 +124,10 @@ int incise_recorder_open_database(struct incise_recorder *rec, struct incise_err
 					&rec->stmt[i], NULL);
 	if (rc == SQLITE_OK)
 		rc = incise_recorder_write_meta(rec);
-	if (rc == SQLITE_OK)
-		rc = incise_recorder_write_streams(rec);
 	if (rc != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	return incise_recorder_commit(rec, incise_clock_now(incise_rig_clock(rec->rig)),
-				      err);
+				      false, err);
 }
 
 void incise_recorder_close_database(struct incise_recorder *rec)

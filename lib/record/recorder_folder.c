@@ -89,7 +89,8 @@ void incise_recorder_remove_folder(struct incise_recorder *rec)
 {
 	static const char *const files[] = {INCISE_SCHEMA_DB, INCISE_SCHEMA_DB "-wal",
 					    INCISE_SCHEMA_DB "-shm",
-					    INCISE_SCHEMA_DB "-journal"};
+					    INCISE_SCHEMA_DB "-journal",
+					    INCISE_FRAMES_FILE};
 
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
 		unlinkat(rec->folder, files[i], 0);

@@ -24,33 +24,27 @@ int incise_recorder_ledger(struct incise_recorder *rec)
 	struct incise_ledger_block block;
 	int rc = SQLITE_OK;
 
-	if (incise_ledger_end(&rec->force.ledger, &block))
-		rc = put_block(rec, "force", &block);
-	if (rc == SQLITE_OK && incise_ledger_end(&rec->tracker.ledger, &block))
-		rc = put_block(rec, "tracker", &block);
+	for (int i = 0; i < INCISE_LEDGER_STREAMS && rc == SQLITE_OK; i++)
+		if (incise_ledger_end(&rec->streams[i].ledger, &block))
+			rc = put_block(rec, rec->streams[i].name, &block);
 	return rc;
-}
-
-/* @lost: all that this stream has lost. */
-static int close_stream(struct incise_recorder *rec, const char *name,
-			struct incise_ledger *ledger, uint64_t lost)
-{
-	struct incise_ledger_block block;
-
-	incise_ledger_close(ledger, lost > ledger->lost ? lost - ledger->lost : 0,
-			    &block);
-	return put_block(rec, name, &block);
 }
 
 int incise_recorder_ledger_close(struct incise_recorder *rec)
 {
 	int rc = incise_recorder_ledger(rec);
 
-	if (rc == SQLITE_OK)
-		rc = close_stream(rec, "force", &rec->force.ledger,
-				  rec->stats.force_lost);
-	if (rc == SQLITE_OK)
-		rc = close_stream(rec, "tracker", &rec->tracker.ledger,
-				  rec->stats.tracker_lost);
+	for (int i = 0; i < INCISE_LEDGER_STREAMS && rc == SQLITE_OK; i++) {
+		struct incise_ledger *ledger = &rec->streams[i].ledger;
+		struct incise_ledger_block block;
+		uint64_t lost = incise_recorder_lost(rec, i);
+
+		if (!rec->streams[i].there)
+			continue;
+		/* What no gap in the numbers shows. */
+		incise_ledger_close(ledger, lost > ledger->lost ? lost - ledger->lost : 0,
+				    &block);
+		rc = put_block(rec, rec->streams[i].name, &block);
+	}
 	return rc;
 }

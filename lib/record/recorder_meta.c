@@ -47,21 +47,55 @@ int incise_recorder_set_real(struct incise_recorder *rec, const char *key, doubl
 	return incise_recorder_run(stmt);
 }
 
-/* A line in the table of events. Returns an SQLite code. */
+/* A text that was cut short ends before the character that has no room. */
+static void end_whole(char *text, size_t size, int length)
+{
+	size_t n = size - 1;
+
+	if (length < (int)size)
+		return;
+	while (n && ((unsigned char)text[n - 1] & 0xc0) == 0x80)
+		n--;
+	if (n && (unsigned char)text[n - 1] >= 0xc0)
+		n--;
+	text[n] = 0;
+}
+
+static int note(struct incise_recorder *rec, int64_t t_ns, const char *kind,
+		const char *fmt, va_list args)
+{
+	sqlite3_stmt *stmt = rec->stmt[INSERT_EVENT];
+	char text[250];
+
+	end_whole(text, sizeof(text), vsnprintf(text, sizeof(text), fmt, args));
+	sqlite3_bind_int64(stmt, 1, t_ns);
+	sqlite3_bind_text(stmt, 2, kind, -1, SQLITE_TRANSIENT);
+	sqlite3_bind_text(stmt, 3, text, -1, SQLITE_TRANSIENT);
+	return incise_recorder_run(stmt);
+}
+
+int incise_recorder_note_at(struct incise_recorder *rec, int64_t t_ns, const char *kind,
+			    const char *fmt, ...)
+{
+	va_list args;
+	int rc;
+
+	va_start(args, fmt);
+	rc = note(rec, t_ns, kind, fmt, args);
+	va_end(args);
+	return rc;
+}
+
 int incise_recorder_note(struct incise_recorder *rec, const char *kind, const char *fmt,
 			 ...)
 {
-	sqlite3_stmt *stmt = rec->stmt[INSERT_EVENT];
-	char text[200];
 	va_list args;
+	int rc;
 
 	va_start(args, fmt);
-	vsnprintf(text, sizeof(text), fmt, args);
+	rc = note(rec, incise_clock_now(incise_rig_clock(rec->rig)), kind, fmt, args);
 	va_end(args);
-	sqlite3_bind_int64(stmt, 1, incise_clock_now(incise_rig_clock(rec->rig)));
-	sqlite3_bind_text(stmt, 2, kind, -1, SQLITE_STATIC);
-	sqlite3_bind_text(stmt, 3, text, -1, SQLITE_TRANSIENT);
-	return incise_recorder_run(stmt);
+	return rc;
 }
 
 int incise_recorder_write_meta(struct incise_recorder *rec)
@@ -99,6 +133,18 @@ int incise_recorder_write_meta(struct incise_recorder *rec)
 	bad |= incise_recorder_set_real(rec, "force_mV_N", rec->calibration.force_mV_N);
 	bad |= incise_recorder_set_real(rec, "force_zero_mV", rec->stats.zero_mV);
 	bad |= incise_recorder_set_real(rec, "depth_mm_px", rec->calibration.depth_mm_px);
+	if (rec->streams[INCISE_LEDGER_CAMERA].there) {
+		bad |= incise_recorder_set_text(rec, "camera_name",
+						rec->camera_info.name);
+		bad |= incise_recorder_set_real(rec, "camera_hz",
+						rec->camera_info.rate_hz);
+		bad |= incise_recorder_set_integer(rec, "camera_width",
+						   rec->camera_info.width);
+		bad |= incise_recorder_set_integer(rec, "camera_height",
+						   rec->camera_info.height);
+		bad |= incise_recorder_set_integer(rec, "camera_exposure_ns",
+						   rec->camera_info.exposure_ns);
+	}
 	for (int i = 0; i < 3; i++) {
 		char key[32];
 
@@ -108,33 +154,4 @@ int incise_recorder_write_meta(struct incise_recorder *rec)
 		bad |= incise_recorder_set_real(rec, key, rec->depth.normal[i]);
 	}
 	return bad | incise_recorder_note(rec, "start", "recording started");
-}
-
-int incise_recorder_write_streams(struct incise_recorder *rec)
-{
-	const struct {
-		const char *name, *device;
-		bool stamped; /* by the kernel or the converter, at acquisition */
-		double rate_hz;
-	} streams[] = {
-		{"force", rec->force_info.name, true, rec->force_info.rate_hz},
-		{"tracker", rec->tracker_info.name, false, rec->tracker_info.rate_hz},
-	};
-	sqlite3_stmt *stmt;
-	int rc = sqlite3_prepare_v2(
-		rec->db,
-		"INSERT INTO streams(name, device, stamped, nominal_hz, delay_ns, "
-		"grain_ns, rows, lost, late) VALUES(?,?,?,?,0,0,0,0,0)",
-		-1, &stmt, NULL);
-
-	for (size_t i = 0; i < sizeof(streams) / sizeof(*streams) && rc == SQLITE_OK;
-	     i++) {
-		sqlite3_bind_text(stmt, 1, streams[i].name, -1, SQLITE_STATIC);
-		sqlite3_bind_text(stmt, 2, streams[i].device, -1, SQLITE_STATIC);
-		sqlite3_bind_int(stmt, 3, streams[i].stamped);
-		sqlite3_bind_double(stmt, 4, streams[i].rate_hz);
-		rc = incise_recorder_run(stmt);
-	}
-	sqlite3_finalize(stmt);
-	return rc;
 }

@@ -31,7 +31,7 @@ double incise_recorder_code_mV(const struct incise_recorder *rec, double code)
 void incise_recorder_zero_force(struct incise_recorder *rec, int64_t t_ns, int32_t code,
 				bool clipped)
 {
-	if (t_ns - rec->force.first_ns >= ZERO_NS)
+	if (t_ns - rec->streams[INCISE_LEDGER_FORCE].first_ns >= ZERO_NS)
 		return;
 	rec->zero.n++;
 	rec->zero.sum += code;
@@ -42,8 +42,8 @@ void incise_recorder_zero_force(struct incise_recorder *rec, int64_t t_ns, int32
 void incise_recorder_zero_depth(struct incise_recorder *rec, int64_t t_ns,
 				double depth_mm)
 {
-	if (isnan(rec->stats.zero_mV) && rec->force.begun &&
-	    t_ns - rec->force.first_ns < ZERO_NS)
+	if (isnan(rec->stats.zero_mV) && rec->streams[INCISE_LEDGER_FORCE].begun &&
+	    t_ns - rec->streams[INCISE_LEDGER_FORCE].first_ns < ZERO_NS)
 		rec->zero.depth_max_mm = fmax(rec->zero.depth_max_mm, depth_mm);
 }
 
@@ -94,10 +94,11 @@ int incise_recorder_settle_zero(struct incise_recorder *rec, struct incise_error
 /* The tracker's records come later than the force's: wait until it has had its say. */
 bool incise_recorder_zero_due(const struct incise_recorder *rec)
 {
-	int64_t end_ns = rec->force.first_ns + ZERO_NS;
+	int64_t end_ns = rec->streams[INCISE_LEDGER_FORCE].first_ns + ZERO_NS;
 
-	return isnan(rec->stats.zero_mV) && rec->force.begun &&
-	       rec->force.timeline.last_ns >= end_ns &&
+	return isnan(rec->stats.zero_mV) && rec->streams[INCISE_LEDGER_FORCE].begun &&
+	       rec->streams[INCISE_LEDGER_FORCE].timeline.last_ns >= end_ns &&
 	       (rec->zero.tracker_ns >= end_ns ||
-		rec->force.timeline.last_ns >= rec->force.first_ns + ZERO_PATIENCE_NS);
+		rec->streams[INCISE_LEDGER_FORCE].timeline.last_ns >=
+			rec->streams[INCISE_LEDGER_FORCE].first_ns + ZERO_PATIENCE_NS);
 }

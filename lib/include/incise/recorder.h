@@ -28,6 +28,7 @@ struct incise_recorder_setup {
 	/** Begin armed: everything is read and shown, but nothing written until
 	 * incise_recorder_trigger(); then it begins with what came in the second before. */
 	bool armed;
+	bool cuts; /**< note beginning and end of each cut as events of kind "cut" */
 };
 
 /** Counts of what a recorder has written. */
