@@ -12,7 +12,8 @@ $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o): cppflags 
 
 extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
 extra_info := $(extra_demo) $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o \
-	bus_report.o)
+	bus_report.o stream_report.o)
+extra_capture := $(addprefix $(O)/obj/tools/,capture_view.o keyboard.o stopwatch.o stream_report.o)
 extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
 	stepper_status.o stepper_counters.o)
 extra_haptic := $(addprefix $(O)/obj/tools/,scene_argument.o stepper_counters.o)

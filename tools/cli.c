@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 #include <incise/version.h>
 #include "cli.h"
@@ -18,6 +19,7 @@
 
 static const struct cli_verb *current;
 static bool status_line;
+static int status_above; /* lines above its last one */
 
 volatile sig_atomic_t cli_stop;
 
@@ -280,21 +282,42 @@ void cli_progress(const char *fmt, ...)
 {
 	va_list args;
 
+	char text[4096], *line = text, *end;
+	struct winsize window;
+	int columns = 80;
+
 	if (!isatty(STDERR_FILENO))
 		return;
-	fputs("\r\033[K", stderr);
 	va_start(args, fmt);
-	vfprintf(stderr, fmt, args);
+	vsnprintf(text, sizeof(text), fmt, args);
 	va_end(args);
+	if (!ioctl(STDERR_FILENO, TIOCGWINSZ, &window) && window.ws_col)
+		columns = window.ws_col;
+	cli_progress_end();
+	/* A line that wraps could not be found again. */
+	for (;; line = end + 1) {
+		size_t length = strcspn(line, "\n");
+
+		end = line + length;
+		fprintf(stderr, "%.*s",
+			length < (size_t)columns ? (int)length : columns - 1, line);
+		if (!*end)
+			break;
+		fputc('\n', stderr);
+		status_above++;
+	}
 	fflush(stderr);
 	status_line = true;
 }
 
 void cli_progress_end(void)
 {
+	if (status_line && status_above)
+		fprintf(stderr, "\033[%dA", status_above);
 	if (status_line)
-		fputs("\r\033[K", stderr);
+		fputs("\r\033[J", stderr);
 	status_line = false;
+	status_above = 0;
 }
 
 static void on_signal(int number)

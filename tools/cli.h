@@ -77,10 +77,10 @@ int cli_list(const char *option, char *text, char **items, int max);
 /* The rig to use: the one given, else ./rig.conf, else /etc/incise/rig.conf, else fail. */
 const char *cli_rig(const char *given);
 
-/* Overwrite the status line on stderr; nothing when that is not a terminal. */
+/* Overwrite the status line, or lines, on stderr; nothing when that is not a terminal. */
 void cli_progress(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
-/* Remove the status line. */
+/* Remove them. */
 void cli_progress_end(void);
 
 /* SIGINT, SIGTERM and SIGHUP set cli_stop instead of killing; a second one kills. */

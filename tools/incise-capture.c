@@ -1,29 +1,31 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise capture: records the tracker and the force channel of a rig in sync.
+ * incise capture: records the streams of a rig in sync: tracker, force, camera.
  */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 #include <incise/calibration.h>
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
+#include "capture_view.h"
 #include "cli.h"
 #include "json.h"
+#include "keyboard.h"
+#include "stream_report.h"
 
 #define POLL_NS 10000000LL
-#define PROGRESS_NS 200000000LL
 
-enum { OPT_DURATION = CLI_LONG, OPT_FORCE, OPT_JSON };
+enum { OPT_DURATION = CLI_LONG, OPT_CAMERA, OPT_TRIGGER, OPT_CUTS, OPT_FORCE, OPT_JSON };
 
 static const struct cli_option options[] = {
 	{'o', "output", "NAME.rec", "folder to record into; it must not exist"},
@@ -35,6 +37,15 @@ static const struct cli_option options[] = {
 	{OPT_DURATION, "duration", "TIME",
 	 "end after 10s, 500ms, 2min, 1h (default: at Ctrl-C;\n"
 	 "on the virtual rig at the end of its cuts)"},
+	{OPT_CAMERA, "camera", "WHAT",
+	 "off; pictures: record them; depth: and find the scalpel in\n"
+	 "them; auto: what rig.conf has (default; a rig of sim:… has\n"
+	 "no camera then)"},
+	{OPT_TRIGGER, "trigger", "WHAT",
+	 "wait for the stylus's button, or for a force such as 0.2N;\n"
+	 "the second before is recorded too"},
+	{OPT_CUTS, "cuts", NULL,
+	 "mark beginning and end of each cut in the table events"},
 	{OPT_FORCE, "force", NULL,
 	 "replace NAME.rec once the new one is complete; drop what\n"
 	 "an interrupted recording left as NAME.rec.part"},
@@ -46,12 +57,14 @@ static const struct cli_verb verb = {
 	.name = "capture",
 	.synopsis = "-o NAME.rec [--rig RIG] [OPTIONS]",
 	.summary =
-		"Record the tracker and the force channel of a rig in sync. Hold the tool\n"
-		"free for the first half second: the zero of the force is measured then.",
+		"Record tracker, force channel and camera of a rig in sync. Hold the tool free\n"
+		"for the first half second: the zero of the force is measured then. On a\n"
+		"terminal the keys m and 1 to 9 set markers, t triggers, q ends.",
 	.options = options,
 	.notes =
 		"Example: incise capture -o liver.rec --rig sim:clock=simulated\n"
-		"Exit codes: 0 recorded without loss, 1 failed or samples lost, 2 bad usage.",
+		"Exit codes: 0 recorded without loss; 1 failed, samples lost, a device died or\n"
+		"the disk was nearly full; 2 bad usage.",
 };
 
 /* --- NAME.rec that stands there already -------------------------------------------- */
@@ -125,184 +138,387 @@ static void replace(const char *new, const char *path)
 
 /* --- recording ---------------------------------------------------------------------- */
 
-static int64_t now_real(void)
-{
-	struct timespec ts;
+enum camera { CAMERA_AUTO, CAMERA_OFF, CAMERA_PICTURES, CAMERA_DEPTH };
 
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return ts.tv_sec * INCISE_NS_PER_S + ts.tv_nsec;
+/* What is asked for. */
+struct wish {
+	const char *rig, *calibration;
+	char *output;
+	enum camera camera;
+	double trigger_force_N;
+	bool trigger_button;
+	double duration_s; /* 0: not given */
+	bool cuts, force, json;
+};
+
+struct run {
+	const struct wish *wish;
+	struct incise_rig *rig;
+	struct incise_recorder *recorder;
+	struct capture_view view;
+	int64_t start_ns, end_ns; /* of the recording; end_ns INT64_MAX: not known */
+	bool armed;
+	int markers;
+	double seconds;		   /* recorded */
+	struct incise_error early; /* why it ended by itself; code 0: it did not */
+};
+
+static enum camera camera_of(const char *text)
+{
+	static const char *const names[] = {"auto", "off", "pictures", "depth"};
+
+	for (int i = 0; i < 4; i++)
+		if (!strcmp(text, names[i]))
+			return (enum camera)i;
+	cli_usage("--camera: '%s' is none of auto, off, pictures and depth", text);
 }
 
-static void show_progress(const struct incise_recorder *recorder, double seconds)
+static void take_trigger(struct wish *wish, const char *text)
 {
-	static int64_t last_ns; /* of the one status line of this program */
-	struct incise_recorder_stats stats;
-	int64_t now = now_real();
+	static const struct cli_unit units[] = {{"N", 1}, {"mN", 1e-3}, {0}};
 
-	if (now - last_ns < PROGRESS_NS)
-		return;
-	last_ns = now;
-	incise_recorder_stats(recorder, &stats);
-	cli_progress(
-		"%.1f s  force %.0f/s  tracker %.0f/s  depth %.1f mm  %s%.3f N  lost %llu",
-		seconds, seconds > 0 ? stats.force / seconds : 0,
-		seconds > 0 ? stats.tracker / seconds : 0, stats.depth_mm,
-		isnan(stats.zero_mV) ? "zeroing, hold free " : "", stats.force_N,
-		(unsigned long long)(stats.force_lost + stats.tracker_lost));
+	wish->trigger_button = !strcmp(text, "button");
+	wish->trigger_force_N =
+		wish->trigger_button ? 0
+				     : cli_quantity("--trigger", text, units, 1e-3, 1e4);
 }
 
-/* Record until the end, a signal or a failure. Returns the seconds recorded. */
-static double record(struct incise_recorder *recorder, struct incise_rig *rig,
-		     double duration_s)
+static void mark(struct run *run, const char *text)
 {
-	struct incise_clock *clock = incise_rig_clock(rig);
-	struct incise_sim *sim = incise_rig_sim(rig);
-	int64_t start = incise_clock_now(clock);
-	int64_t end = INT64_MAX;
-	int64_t next = start;
-	int64_t now = start;
 	struct incise_error err = {0}, second = {0};
 
-	if (duration_s > 0)
-		end = start + (int64_t)(duration_s * INCISE_NS_PER_S);
-	else if (sim)
-		end = start + incise_sim_duration(sim);
-	while (!cli_stop && now < end) {
-		next = now > next + POLL_NS ? now : next + POLL_NS;
-		if (next > end)
-			next = end;
-		incise_clock_wait_until(clock, next);
-		now = incise_clock_now(clock);
-		if (incise_recorder_poll(recorder, &err)) {
-			incise_recorder_close(recorder, &second);
-			cli_fail_with(&err);
-		}
-		show_progress(recorder, (now - start) / (double)INCISE_NS_PER_S);
+	if (incise_recorder_mark(run->recorder, "marker", text, &err)) {
+		incise_recorder_close(run->recorder, &second);
+		cli_fail_with(&err);
 	}
-	cli_progress_end();
-	return (now - start) / (double)INCISE_NS_PER_S;
+	snprintf(run->view.last, sizeof(run->view.last), "marked: %s", text);
+	run->view.shown_ns = 0;
 }
 
-static void report(const char *path, const struct incise_recorder_stats *stats,
-		   double seconds, bool json)
+static void take_keys(struct run *run)
 {
-	uint64_t lost = stats->force_lost + stats->tracker_lost;
+	char text[40];
+	int key;
 
-	if (json) {
-		json_print(json_pack("{so so sI sI sI sI sI sI sI so}", "path",
-				     json_text(path), "seconds", json_number(seconds),
-				     "force", (json_int_t)stats->force, "tracker",
-				     (json_int_t)stats->tracker, "depth",
-				     (json_int_t)stats->depth, "lost", (json_int_t)lost,
-				     "force_lost", (json_int_t)stats->force_lost,
-				     "tracker_lost", (json_int_t)stats->tracker_lost,
-				     "clipped", (json_int_t)stats->force_clipped,
-				     "zero_mV", json_number(stats->zero_mV)));
+	while ((key = keyboard_next())) {
+		if (key == 'm' || key == ' ') {
+			snprintf(text, sizeof(text), "marker %d", ++run->markers);
+			mark(run, text);
+		} else if (key >= '1' && key <= '9') {
+			snprintf(text, sizeof(text), "%c", key);
+			mark(run, text);
+		} else if (key == 't' && run->armed) {
+			incise_recorder_trigger(run->recorder);
+		} else if (key == 'q') {
+			cli_stop = SIGINT;
+		}
+	}
+}
+
+/* The recording begins, maybe at its trigger; its end is known from then on. */
+static void begin(struct run *run, int64_t now_ns)
+{
+	struct incise_sim *sim = incise_rig_sim(run->rig);
+	double duration_s = run->wish->duration_s;
+
+	run->armed = false;
+	run->start_ns = now_ns;
+	if (duration_s > 0)
+		run->end_ns = now_ns + (int64_t)(duration_s * INCISE_NS_PER_S);
+	else if (sim)
+		run->end_ns = now_ns + incise_sim_duration(sim);
+	else
+		run->end_ns = INT64_MAX;
+	if (run->end_ns < INT64_MAX)
+		run->view.planned_s = (run->end_ns - now_ns) / (double)INCISE_NS_PER_S;
+}
+
+/* Record until the end, a signal or a failure. */
+static void record(struct run *run)
+{
+	struct incise_clock *clock = incise_rig_clock(run->rig);
+	struct incise_recorder_stats stats;
+	struct incise_error err = {0}, second = {0};
+	int64_t now = incise_clock_now(clock), next = now;
+	int rc = 0;
+
+	begin(run, now);
+	if (run->wish->trigger_button || run->wish->trigger_force_N > 0) {
+		/* A virtual surgeon who has put the scalpel down triggers nothing. */
+		run->armed = true;
+		run->end_ns =
+			incise_rig_sim(run->rig)
+				? now + incise_sim_duration(incise_rig_sim(run->rig))
+				: INT64_MAX;
+		run->view.planned_s = 0;
+	}
+	while (!cli_stop && now < run->end_ns && !rc) {
+		next = now > next + POLL_NS ? now : next + POLL_NS;
+		if (next > run->end_ns)
+			next = run->end_ns;
+		incise_clock_wait_until(clock, next);
+		now = incise_clock_now(clock);
+		rc = incise_recorder_poll(run->recorder, &err);
+		if (rc < 0) {
+			incise_recorder_close(run->recorder, &second);
+			cli_fail_with(&err);
+		}
+		if (run->armed) {
+			incise_recorder_stats(run->recorder, &stats);
+			if (!stats.armed)
+				begin(run, now);
+		}
+		take_keys(run);
+		capture_view_show(&run->view, run->recorder,
+				  (now - run->start_ns) / (double)INCISE_NS_PER_S);
+	}
+	cli_progress_end();
+	if (rc)
+		run->early = err;
+	run->seconds = (now - run->start_ns) / (double)INCISE_NS_PER_S;
+}
+
+/* --- report ------------------------------------------------------------------------- */
+
+static void report(const struct run *run, const struct incise_recorder_stats *stats,
+		   const struct incise_stream *streams, int n)
+{
+	uint64_t lost = stats->force_lost + stats->tracker_lost + stats->frames_lost;
+	const char *path = run->wish->output;
+
+	if (run->wish->json) {
+		json_print(json_pack(
+			"{so so sI sI sI sI sI sI sI sI sI so so}", "path",
+			json_text(path), "seconds", json_number(run->seconds), "force",
+			(json_int_t)stats->force, "tracker", (json_int_t)stats->tracker,
+			"depth", (json_int_t)stats->depth, "frames",
+			(json_int_t)stats->frames, "lost", (json_int_t)lost, "force_lost",
+			(json_int_t)stats->force_lost, "tracker_lost",
+			(json_int_t)stats->tracker_lost, "frames_lost",
+			(json_int_t)stats->frames_lost, "clipped",
+			(json_int_t)stats->force_clipped, "zero_mV",
+			json_number(stats->zero_mV), "streams", stream_json(streams, n)));
 		return;
 	}
-	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker records, %llu lost",
-	       path, seconds, (unsigned long long)stats->force,
+	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker records, ",
+	       path, run->seconds, (unsigned long long)stats->force,
 	       (unsigned long long)stats->force_clipped,
-	       (unsigned long long)stats->tracker, (unsigned long long)lost);
+	       (unsigned long long)stats->tracker);
+	if (n > 2)
+		printf("%llu pictures, ", (unsigned long long)stats->frames);
+	printf("%llu lost", (unsigned long long)lost);
 	/* A short recording gets its zero when it is closed. */
 	if (!isnan(stats->zero_mV))
 		printf(", zero %.1f mV", stats->zero_mV);
 	putchar('\n');
+	stream_table(streams, n);
 	cli_finish();
 }
 
-int main(int argc, char **argv)
+_Noreturn static void fail_of_losses(const char *path,
+				     const struct incise_recorder_stats *stats)
 {
-	struct incise_calibration calibration;
-	struct incise_recorder_stats stats;
-	struct incise_error err = {0};
-	struct incise_recorder *recorder;
-	struct incise_rig *rig;
-	const char *rig_spec = NULL, *calibration_path = NULL;
-	char *output = NULL;
-	char target[PATH_MAX], part[PATH_MAX + 8];
-	double duration_s = 0, seconds;
-	bool force = false, json = false;
+	const struct {
+		uint64_t n;
+		const char *what;
+	} lost[] = {
+		{stats->force_lost, "force samples"},
+		{stats->tracker_lost, "tracker records"},
+		{stats->frames_lost, "pictures"},
+	};
+	char text[200] = "";
+	size_t at = 0;
+
+	for (int i = 0; i < 3; i++)
+		if (lost[i].n)
+			at += (size_t)snprintf(text + at, sizeof(text) - at, "%s%llu %s",
+					       at ? ", " : "",
+					       (unsigned long long)lost[i].n,
+					       lost[i].what);
+	cli_fail("%s: %s were lost; the table events says when", path, text);
+}
+
+/* Whatever is not as it should be is exit 1, with one line that says what. */
+static void judge(const struct run *run, const struct incise_recorder_stats *stats,
+		  const struct incise_stream *streams, int n)
+{
+	const char *path = run->wish->output;
+
+	if (run->early.code)
+		cli_fail_with(&run->early);
+	if (stats->armed)
+		cli_fail("%s: was never triggered, and is empty", path);
+	for (int i = 0; i < n; i++)
+		if (*streams[i].ended)
+			cli_fail("%s: the %s ended before the recording did: %s", path,
+				 streams[i].name, streams[i].ended);
+	if (!stats->force || !stats->tracker)
+		cli_fail("%s: the %s gave nothing in %.1f s; check its cable and power",
+			 path, stats->force ? "tracker" : "force channel", run->seconds);
+	if (stats->force_lost || stats->tracker_lost || stats->frames_lost)
+		fail_of_losses(path, stats);
+	if (n > 2 && !stats->frames)
+		cli_fail("%s: the camera gave nothing in %.1f s; check its cable", path,
+			 run->seconds);
+}
+
+/* --- main --------------------------------------------------------------------------- */
+
+static void take_options(struct wish *wish, int argc, char **argv)
+{
 	size_t length;
 	int id;
 
 	while ((id = cli_next(&verb, argc, argv)) != CLI_END) {
 		switch (id) {
 		case 'o':
-			output = optarg;
+			wish->output = optarg;
 			break;
 		case 'r':
-			rig_spec = optarg;
+			wish->rig = optarg;
 			break;
 		case 'c':
-			calibration_path = optarg;
+			wish->calibration = optarg;
 			break;
 		case OPT_DURATION:
-			duration_s = cli_duration("duration", optarg, 0.01, 1e6);
+			wish->duration_s = cli_duration("duration", optarg, 0.01, 1e6);
+			break;
+		case OPT_CAMERA:
+			wish->camera = camera_of(optarg);
+			break;
+		case OPT_TRIGGER:
+			take_trigger(wish, optarg);
+			break;
+		case OPT_CUTS:
+			wish->cuts = true;
 			break;
 		case OPT_FORCE:
-			force = true;
+			wish->force = true;
 			break;
 		case OPT_JSON:
-			json = true;
+			wish->json = true;
 			break;
 		}
 	}
 	if (optind < argc)
 		cli_usage("'%s' is too much: the recording's name goes with -o",
 			  argv[optind]);
-	if (!output)
+	if (!wish->output)
 		cli_usage("where to? give -o NAME.rec");
-	for (length = strlen(output); length > 1 && output[length - 1] == '/'; length--)
-		output[length - 1] = 0;
-	if (length < 5 || strcmp(output + length - 4, ".rec") ||
-	    output[length - 5] == '/')
-		cli_usage("-o: '%s' is not a name that ends in .rec", output);
+	for (length = strlen(wish->output); length > 1 && wish->output[length - 1] == '/';
+	     length--)
+		wish->output[length - 1] = 0;
+	if (length < 5 || strcmp(wish->output + length - 4, ".rec") ||
+	    wish->output[length - 5] == '/')
+		cli_usage("-o: '%s' is not a name that ends in .rec", wish->output);
 	if (length > PATH_MAX - 16)
 		cli_usage("-o: the path is too long");
+}
 
-	incise_calibration_nominal(&calibration);
-	if (calibration_path &&
-	    incise_calibration_load(calibration_path, &calibration, &err))
-		cli_fail_with(&err);
-	rig = incise_rig_open(cli_rig(rig_spec), INCISE_RIG_TRACKER | INCISE_RIG_FORCE,
-			      &err);
+static struct incise_rig *open_rig(const struct wish *wish)
+{
+	static const unsigned int camera[] = {
+		[CAMERA_AUTO] = INCISE_RIG_CAMERA | INCISE_RIG_IF_NAMED,
+		[CAMERA_PICTURES] = INCISE_RIG_CAMERA,
+		[CAMERA_DEPTH] = INCISE_RIG_CAMERA,
+	};
+	struct incise_error err = {0};
+	struct incise_rig *rig = incise_rig_open(
+		cli_rig(wish->rig),
+		INCISE_RIG_TRACKER | INCISE_RIG_FORCE | camera[wish->camera], &err);
+
 	if (!rig)
 		cli_fail_with(&err);
+	return rig;
+}
 
-	/* With --force the new one grows beside the old one. */
-	snprintf(target, sizeof(target), "%s%s", output, force ? ".new" : "");
-	if (force) {
-		check_replaceable(output);
-		snprintf(part, sizeof(part), "%s.part", output);
-		remove_recording(part);
-		snprintf(part, sizeof(part), "%s.part", target);
-		remove_recording(part);
-		remove_recording(target);
-	}
-	cli_catch_signals();
-	recorder = incise_recorder_new(
-		target, rig, &(struct incise_recorder_setup){.calibration = &calibration},
-		&err);
-	if (!recorder)
-		cli_fail_with(&err);
-	seconds = record(recorder, rig, duration_s);
-	incise_recorder_stats(recorder, &stats);
-	if (incise_recorder_close(recorder, &err))
-		cli_fail_with(&err);
-	incise_rig_close(rig);
-	if (force)
-		replace(target, output);
+/* Whether pictures are looked at. */
+static bool take_vision(const struct wish *wish, struct incise_rig *rig,
+			struct incise_vision_setup *vision)
+{
+	bool has = incise_rig_camera(rig) && !incise_rig_vision(rig, vision);
 
-	report(output, &stats, seconds, json);
-	if (!stats.force || !stats.tracker)
-		cli_fail("%s: the %s gave nothing in %.1f s; check its cable and power",
-			 output, stats.force ? "tracker" : "force channel", seconds);
-	if (stats.force_lost || stats.tracker_lost)
+	if (wish->camera == CAMERA_DEPTH && !has)
 		cli_fail(
-			"%s: %llu force samples and %llu tracker records were lost; the table "
-			"events says when",
-			output, (unsigned long long)stats.force_lost,
-			(unsigned long long)stats.tracker_lost);
+			"%s: --camera depth needs its group `vision`, which says what the "
+			"handle looks like; see rig.conf(5)",
+			incise_rig_spec(rig));
+	return has && wish->camera != CAMERA_PICTURES;
+}
+
+/* With --force the new one grows beside the old one. */
+static void clear(const struct wish *wish, const char *target)
+{
+	char part[PATH_MAX + 8];
+
+	check_replaceable(wish->output);
+	snprintf(part, sizeof(part), "%s.part", wish->output);
+	remove_recording(part);
+	snprintf(part, sizeof(part), "%s.part", target);
+	remove_recording(part);
+	remove_recording(target);
+}
+
+static double planned_s(const struct wish *wish, struct incise_rig *rig)
+{
+	struct incise_sim *sim = incise_rig_sim(rig);
+
+	if (wish->duration_s > 0 || !sim)
+		return wish->duration_s;
+	return incise_sim_duration(sim) / (double)INCISE_NS_PER_S;
+}
+
+int main(int argc, char **argv)
+{
+	struct incise_stream streams[INCISE_STREAMS_MAX];
+	struct incise_calibration calibration;
+	struct incise_recorder_setup setup = {.calibration = &calibration};
+	struct incise_vision_setup vision;
+	struct incise_recorder_stats stats;
+	struct incise_force_info force;
+	struct incise_error err = {0}, second = {0};
+	struct wish wish = {0};
+	struct run run = {.wish = &wish};
+	char target[PATH_MAX];
+	int n;
+
+	take_options(&wish, argc, argv);
+	incise_calibration_nominal(&calibration);
+	if (wish.calibration &&
+	    incise_calibration_load(wish.calibration, &calibration, &err))
+		cli_fail_with(&err);
+	run.rig = open_rig(&wish);
+	setup.planned_s = planned_s(&wish, run.rig);
+	setup.vision = take_vision(&wish, run.rig, &vision) ? &vision : NULL;
+	setup.cuts = wish.cuts;
+	setup.trigger_force_N = wish.trigger_force_N;
+	setup.trigger_button = wish.trigger_button;
+	setup.armed = wish.trigger_button || wish.trigger_force_N > 0;
+	incise_force_info(incise_rig_force(run.rig), &force);
+	run.view.full_scale_N = force.full_scale_V * 1e3 / calibration.force_mV_N;
+	run.view.depth = setup.vision;
+
+	snprintf(target, sizeof(target), "%s%s", wish.output, wish.force ? ".new" : "");
+	if (wish.force)
+		clear(&wish, target);
+	cli_catch_signals();
+	run.recorder = incise_recorder_new(target, run.rig, &setup, &err);
+	if (!run.recorder)
+		cli_fail_with(&err);
+	keyboard_begin();
+	record(&run);
+	if (incise_recorder_end(run.recorder, &err)) {
+		incise_recorder_close(run.recorder, &second);
+		cli_fail_with(&err);
+	}
+	incise_recorder_stats(run.recorder, &stats);
+	n = incise_recorder_streams(run.recorder, streams);
+	if (incise_recorder_close(run.recorder, &err))
+		cli_fail_with(&err);
+	incise_rig_close(run.rig);
+	if (wish.force)
+		replace(target, wish.output);
+	report(&run, &stats, streams, n);
+	judge(&run, &stats, streams, n);
 	return 0;
 }

@@ -15,6 +15,7 @@
 #include "bus_report.h"
 #include "cli.h"
 #include "json.h"
+#include "stream_report.h"
 #include "model_picture.h"
 #include "picture.h"
 #include "stepper_module_report.h"
@@ -281,8 +282,9 @@ static void show_compiled(const char *path, bool json)
 static void recording_json(const struct incise_recording_info *info)
 {
 	json_print(json_pack(
-		"{ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf} s{sf so sf} si sf sf}",
-		"kind", "recording", "complete", info->complete, "seconds",
+		"{so ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf} s{sf so sf} si sf sf}",
+		"streams", stream_json(info->streams, info->n_streams), "kind",
+		"recording", "complete", info->complete, "seconds",
 		(info->end_ns - info->start_ns) * 1e-9, "started",
 		json_text(info->started), "rig", json_text(info->rig), "rows", "force",
 		(json_int_t)info->force, "tracker", (json_int_t)info->tracker, "depth",
@@ -315,6 +317,7 @@ static void recording_text(const char *path, const struct incise_recording_info 
 	printf("calibration  %g mV/N, zero %.1f mV, %g mm/px\n", info->force_mV_N,
 	       info->zero_mV, info->depth_mm_px);
 	printf("cuts     %d\n", info->cuts);
+	stream_table(info->streams, info->n_streams);
 }
 
 static void show_recording(const char *path, bool json)

@@ -78,12 +78,12 @@ static int rig_open_real(struct incise_rig *rig, const struct incise_rig_plan *p
 }
 
 static int rig_devices(struct incise_rig *rig, const struct incise_rig_plan *plan,
-		       unsigned int devices, struct incise_error *err)
+		       struct incise_error *err)
 {
 	int rc = 0;
 
 	for (int kind = 0; kind < N_KINDS && !rc; kind++) {
-		if (!(devices & kind_bit(kind)))
+		if (!(plan->devices & kind_bit(kind)))
 			continue;
 		if (plan->real[kind].name)
 			rc = rig_open_real(rig, plan, kind, err);
@@ -95,7 +95,7 @@ static int rig_devices(struct incise_rig *rig, const struct incise_rig_plan *pla
 }
 
 static struct incise_rig *rig_new(const struct incise_rig_plan *plan, const char *spec,
-				  unsigned int devices, struct incise_error *err)
+				  struct incise_error *err)
 {
 	struct incise_rig *rig = calloc(1, sizeof(*rig));
 	int rc;
@@ -116,7 +116,7 @@ static struct incise_rig *rig_new(const struct incise_rig_plan *plan, const char
 		if (!rig->sim)
 			goto close;
 	}
-	rc = rig_devices(rig, plan, devices, err);
+	rc = rig_devices(rig, plan, err);
 	if (!rc)
 		return rig;
 	errno = -rc;
@@ -139,7 +139,7 @@ struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
 	int rc = incise_rig_plan_read(&plan, spec, devices, err);
 
 	if (!rc) {
-		rig = rig_new(&plan, spec, devices, err);
+		rig = rig_new(&plan, spec, err);
 		rc = rig ? 0 : -errno;
 	}
 	incise_rig_plan_free(&plan);

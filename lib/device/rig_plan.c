@@ -212,9 +212,8 @@ static bool virtual_camera(const config_setting_t *root)
 	       !strcmp(device, SIM_BACKEND ":");
 }
 
-static int plan_root(struct incise_rig_plan *plan, unsigned int devices,
-		     const config_setting_t *root, const char *path,
-		     struct incise_error *err)
+static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
+		     const char *path, struct incise_error *err)
 {
 	static const char *const keys[] = {"clock",	  "tracker",	  "force",
 					   "camera",	  "stepper",	  "surface",
@@ -253,14 +252,17 @@ static int plan_root(struct incise_rig_plan *plan, unsigned int devices,
 	if (!rc)
 		rc = incise_vision_setup_read(&plan->vision, &plan->has_vision, root,
 					      path, err);
+	if (plan->devices & INCISE_RIG_IF_NAMED && !config_setting_get_member(root, "camera"))
+		plan->devices &= ~INCISE_RIG_CAMERA;
 	for (int kind = 0; kind < N_KINDS && !rc; kind++)
-		rc = plan_device(plan, kind, devices & kind_bit(kind), root, path, err);
+		rc = plan_device(plan, kind, plan->devices & kind_bit(kind), root, path,
+				 err);
 	if (!rc && !plan->has_vision && virtual_camera(root))
 		plan_virtual_vision(plan);
 	return rc;
 }
 
-static int plan_file(struct incise_rig_plan *plan, const char *path, unsigned int devices,
+static int plan_file(struct incise_rig_plan *plan, const char *path,
 		     struct incise_error *err)
 {
 	config_t config;
@@ -268,7 +270,7 @@ static int plan_file(struct incise_rig_plan *plan, const char *path, unsigned in
 
 	if (rc)
 		return rc;
-	rc = plan_root(plan, devices, config_root_setting(&config), path, err);
+	rc = plan_root(plan, config_root_setting(&config), path, err);
 	config_destroy(&config);
 	return rc;
 }
@@ -309,6 +311,8 @@ static int plan_shorthand(struct incise_rig_plan *plan, const char *spec,
 	if (!words)
 		return incise_error_set(err, ENOMEM, "sim: %s", strerror(ENOMEM));
 	plan->sim = true;
+	if (plan->devices & INCISE_RIG_IF_NAMED)
+		plan->devices &= ~INCISE_RIG_CAMERA;
 	while (!rc && *words && (word = strsep(&rest, ",")))
 		rc = plan_word(plan, word, err);
 	free(words);
@@ -323,11 +327,12 @@ int incise_rig_plan_read(struct incise_rig_plan *plan, const char *spec,
 	*plan = (struct incise_rig_plan){
 		.normal = {0, 0, 1},
 		.watch = devices & INCISE_RIG_WATCH,
+		.devices = devices,
 	};
 	incise_sim_config_init(&plan->config);
 	if (!strncmp(spec, SIM_BACKEND ":", strlen(SIM_BACKEND ":")))
 		return plan_shorthand(plan, spec, err);
-	return plan_file(plan, spec, devices, err);
+	return plan_file(plan, spec, err);
 }
 
 void incise_rig_plan_free(struct incise_rig_plan *plan)

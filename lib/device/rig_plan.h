@@ -35,8 +35,9 @@ struct rig_real {
 /* What is wanted of a rig. */
 struct incise_rig_plan {
 	bool simulated;
-	bool sim;   /* one of the devices stands on the virtual rig */
-	bool watch; /* the stepper */
+	bool sim;	      /* one of the devices stands on the virtual rig */
+	bool watch;	      /* the stepper */
+	unsigned int devices; /* incise_rig_device bits of what is to be opened */
 	struct rig_real real[N_KINDS];
 	struct incise_actuator actuator;
 	bool has_actuator;

@@ -140,10 +140,6 @@ static int step(struct incise_frame_pump *p, bool wait)
 
 	if (is(&p->camera_ended))
 		return -p->camera_error.code;
-	if (!p->begun) {
-		p->begun = true;
-		p->lost_before = incise_camera_lost(p->setup.camera);
-	}
 	rc = incise_camera_read(p->setup.camera, &frame);
 	if (rc < 0) {
 		incise_camera_cause(p->setup.camera, text, sizeof(text));
@@ -154,6 +150,10 @@ static int step(struct incise_frame_pump *p, bool wait)
 	}
 	if (!rc)
 		return 0;
+	/* What is older than the first picture was lost by nobody: it was not asked for. */
+	if (!p->begun)
+		p->lost_before = incise_camera_lost(p->setup.camera);
+	p->begun = true;
 	count(&p->read);
 	hand_on(p, &frame, incise_clock_now(p->setup.clock), wait);
 	atomic_store_explicit(&p->lost,

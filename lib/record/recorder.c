@@ -98,6 +98,8 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	rec->rig = rig;
 	rec->calibration = *setup->calibration;
 	rec->cuts = setup->cuts;
+	rec->hold.force_N = setup->trigger_force_N;
+	rec->hold.button = setup->trigger_button;
 	rec->stats.zero_mV = rec->calibration.force_zero_mV;
 	rec->stats.camera_depth_mm = NAN;
 	rec->zero.depth_max_mm = -INFINITY;
@@ -268,16 +270,30 @@ void incise_recorder_stats(const struct incise_recorder *rec,
 
 /* --- end -------------------------------------------------------------------------- */
 
-/* Write what is still held back, and that nothing is missing. */
-static int complete(struct incise_recorder *rec, struct incise_error *err)
+int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
 {
-	int rc = incise_recorder_end_camera(rec, err);
+	int rc = rec->failed;
 
+	if (rc)
+		return incise_error_set(err, -rc, "%s: has failed before", rec->path);
+	if (rec->ended)
+		return 0;
+	rec->ended = true;
+	rc = incise_recorder_end_camera(rec, err);
 	/* A recording shorter than the time for the zero makes do with what it has. */
 	if (!rc && isnan(rec->stats.zero_mV) && rec->streams[INCISE_LEDGER_FORCE].begun)
 		rc = incise_recorder_settle_zero(rec, err);
 	if (!rc)
 		rc = incise_recorder_flush_depth(rec, err);
+	rec->failed = rc;
+	return rc;
+}
+
+/* Write what is still held back, and that nothing is missing. */
+static int complete(struct incise_recorder *rec, struct incise_error *err)
+{
+	int rc = incise_recorder_end(rec, err);
+
 	if (!rc && (incise_recorder_ledger_close(rec) != SQLITE_OK ||
 		    incise_recorder_note(rec, "end", "recording ended") != SQLITE_OK ||
 		    incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK))

@@ -85,6 +85,8 @@ struct incise_recorder_tracker_row {
 
 struct incise_recorder_hold {
 	struct incise_ring force, tracker;
+	double force_N; /* that triggers; 0: none does */
+	bool button;	/* triggers */
 	bool triggered; /* what is held goes out with the next poll */
 };
 
@@ -125,6 +127,7 @@ struct incise_recorder {
 	struct incise_recorder_stats stats;
 	int64_t commit_ns; /* up to when samples are safe */
 	int commits;
+	bool ended;	     /* takes no more samples */
 	bool cuts;	     /* mark their beginnings and ends */
 	uint64_t not_finite; /* records of the tracker, as good as lost */
 	int failed;	     /* negative errno of the failure that ended it, or 0 */

@@ -5,10 +5,13 @@
  */
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 #include <sys/utsname.h>
 #include <time.h>
 #include <incise/version.h>
 #include "recorder.h"
+
+#define SETTINGS_MAX 16384
 
 /* Run a bound statement. Returns an SQLite code. */
 int incise_recorder_run(sqlite3_stmt *stmt)
@@ -98,6 +101,22 @@ int incise_recorder_note(struct incise_recorder *rec, const char *kind, const ch
 	return rc;
 }
 
+/* The text of rig.conf as it is now, so that it is known what each device was set to. */
+static int set_settings(struct incise_recorder *rec)
+{
+	const char *spec = incise_rig_spec(rec->rig);
+	char text[SETTINGS_MAX + 1];
+	FILE *file = strncmp(spec, "sim:", 4) ? fopen(spec, "re") : NULL;
+	size_t n;
+
+	if (!file)
+		return SQLITE_OK;
+	n = fread(text, 1, SETTINGS_MAX, file);
+	fclose(file);
+	text[n] = 0;
+	return incise_recorder_set_text(rec, "rig_conf", text);
+}
+
 int incise_recorder_write_meta(struct incise_recorder *rec)
 {
 	const char *const axes[] = {"x", "y", "z"};
@@ -117,6 +136,7 @@ int incise_recorder_write_meta(struct incise_recorder *rec)
 	bad |= incise_recorder_set_text(rec, "kernel", host.release);
 	bad |= incise_recorder_set_text(rec, "started", started);
 	bad |= incise_recorder_set_text(rec, "rig", incise_rig_spec(rec->rig));
+	bad |= set_settings(rec);
 	bad |= incise_recorder_set_text(
 		rec, "clock",
 		incise_clock_is_real(incise_rig_clock(rec->rig)) ? "real" : "simulated");

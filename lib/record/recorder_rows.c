@@ -98,13 +98,16 @@ int incise_recorder_put_force(struct incise_recorder *rec,
 		incise_recorder_hold_force(rec, &row);
 	else
 		rc = incise_recorder_write_force(rec, &row, err);
-	if (!isnan(rec->stats.zero_mV))
+	if (!isnan(rec->stats.zero_mV)) {
 		rec->stats.force_N = (incise_recorder_code_mV(rec, sample->code) -
 				      rec->stats.zero_mV) /
 				     rec->calibration.force_mV_N;
-	else
+		rec->hold.triggered |= rec->hold.force_N > 0 &&
+				       fabs(rec->stats.force_N) >= rec->hold.force_N;
+	} else {
 		incise_recorder_zero_force(rec, row.t_ns, sample->code,
 					   sample->code == 0 || sample->code == top);
+	}
 	return rc;
 }
 
@@ -211,6 +214,7 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 	}
 	if (sample->button != rec->stats.button) {
 		rec->stats.button = sample->button;
+		rec->hold.triggered |= rec->hold.button && sample->button;
 		if (incise_recorder_note_at(rec, row.t_ns, "button", "%s",
 					    sample->button ? "pressed" : "released") !=
 		    SQLITE_OK)

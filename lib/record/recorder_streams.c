@@ -97,6 +97,9 @@ static void tell(const struct incise_recorder *rec, int i, struct incise_stream 
 		.offset_ms = report.offset_ns * 1e-6,
 		.offset_sd_ms = report.offset_sd_ns * 1e-6,
 	};
+	/* Of a stamp nothing is uncertain but its delay, of which nothing is known. */
+	if (out->stamped && isnan(out->delay_sd_ms))
+		out->offset_sd_ms = NAN;
 	snprintf(out->name, sizeof(out->name), "%s", stream->name);
 	snprintf(out->device, sizeof(out->device), "%s", stream->device);
 	snprintf(out->ended, sizeof(out->ended), "%s", stream->ended);

@@ -25,9 +25,13 @@ struct incise_recorder_setup {
 	 * depth_mm_px is of the calibration. */
 	const struct incise_vision_setup *vision;
 	double planned_s; /**< for the disk's free space; 0: not known */
-	/** Begin armed: everything is read and shown, but nothing written until
-	 * incise_recorder_trigger(); then it begins with what came in the second before. */
+	/** Begin armed: everything is read and shown, but nothing written until a trigger;
+	 * then it begins with what came in the second before. */
 	bool armed;
+	/** Armed: what triggers beside incise_recorder_trigger(). The force, either way, once
+	 * its zero is known (0: not), and the stylus's button when it is pressed. */
+	double trigger_force_N;
+	bool trigger_button;
 	bool cuts; /**< note beginning and end of each cut as events of kind "cut" */
 };
 
@@ -97,8 +101,17 @@ INCISE_API int incise_recorder_streams(const struct incise_recorder *recorder,
 				       struct incise_stream streams[INCISE_STREAMS_MAX]);
 
 /**
- * End the recording and give it its name; frees @recorder in any case. Blocks up to 5 s for
- * pictures that are not in their file yet.
+ * Take no more samples, and write those that still wait: up to 5 s for pictures. What stats
+ * and streams say then is final; close() makes the recording whole.
+ *
+ * @return 0; as incise_recorder_poll() < 0
+ */
+INCISE_API int incise_recorder_end(struct incise_recorder *recorder,
+				   struct incise_error *err);
+
+/**
+ * End the recording and give it its name; frees @recorder in any case. Does what
+ * incise_recorder_end() does, where that was not called.
  *
  * @return 0, or a negative errno when it could not be completed; what was committed then
  *         stays readable as NAME.rec.part.

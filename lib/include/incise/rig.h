@@ -37,6 +37,8 @@ enum incise_rig_device {
 	INCISE_RIG_STEPPER = 8,
 	/** With STEPPER: only look at it, beside the program that drives it. */
 	INCISE_RIG_WATCH = 16,
+	/** With CAMERA: only where a rig.conf names one; a "sim:KEY=VALUE,…" names none. */
+	INCISE_RIG_IF_NAMED = 32,
 };
 
 /**

@@ -32,7 +32,9 @@ struct incise_stream {
 	double jitter_ms;		/**< standard deviation of arrivals or stamps */
 	double jitter_max_ms;		/**< farthest above the line */
 	double offset_ms;    /**< in all: the delay, and what the line is too high */
-	double offset_sd_ms; /**< standard uncertainty of times against this clock */
+	/** Standard uncertainty of times against this clock; without that of the delay, as
+	 * long as delay_sd_ms is NAN. */
+	double offset_sd_ms;
 	char ended[200]; /**< why it died before the recording's end; empty: it did not */
 };
 

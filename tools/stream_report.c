@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Tables and JSON of streams; see stream_report.h.
+ */
+#include <math.h>
+#include <stdio.h>
+#include "cli.h"
+#include "json.h"
+#include "stream_report.h"
+
+const char stream_heading[] =
+	"stream      rate/s       rows   lost   late  jitter ms   drift ppm       offset ms";
+
+/* "1.23", or "-" for what is not known. */
+static const char *number(char *text, size_t size, double value, int decimals)
+{
+	if (isfinite(value))
+		snprintf(text, size, "%.*f", decimals, value);
+	else
+		snprintf(text, size, "-");
+	return text;
+}
+
+static const char *with_sd(char *text, size_t size, double value, double sd, int decimals)
+{
+	char a[32], b[32];
+
+	if (!isfinite(value))
+		return number(text, size, value, decimals);
+	snprintf(text, size, "%s+-%s", number(a, sizeof(a), value, decimals),
+		 isfinite(sd) ? number(b, sizeof(b), sd, decimals) : "?");
+	return text;
+}
+
+int stream_line(const struct incise_stream *s, char *text, size_t size)
+{
+	char rate[32], jitter[32], drift[80], offset[80];
+
+	return snprintf(text, size, "%-8s %9s %10llu %6llu %6llu %10s %11s %15s%s",
+			s->name, number(rate, sizeof(rate), s->rate_hz, 2),
+			(unsigned long long)s->rows, (unsigned long long)s->lost,
+			(unsigned long long)s->late,
+			number(jitter, sizeof(jitter), s->jitter_ms, 3),
+			with_sd(drift, sizeof(drift), s->drift_ppm, s->drift_sd_ppm, 2),
+			with_sd(offset, sizeof(offset), s->offset_ms, s->offset_sd_ms, 3),
+			*s->ended ? "  ENDED" : "");
+}
+
+/* Whose offsets are no surer than their devices' word. */
+static void not_calibrated(const struct incise_stream *streams, int n)
+{
+	const char *before = "delays not calibrated: ";
+
+	for (int i = 0; i < n; i++) {
+		if (!isnan(streams[i].delay_sd_ms))
+			continue;
+		printf("%s%s", before, streams[i].name);
+		before = ", ";
+	}
+	if (*before == ',')
+		putchar('\n');
+}
+
+void stream_table(const struct incise_stream *streams, int n)
+{
+	char line[200];
+
+	if (n)
+		puts(stream_heading);
+	for (int i = 0; i < n; i++) {
+		stream_line(&streams[i], line, sizeof(line));
+		puts(line);
+	}
+	not_calibrated(streams, n);
+	for (int i = 0; i < n; i++)
+		if (*streams[i].ended)
+			printf("%s ended: %s\n", streams[i].name, streams[i].ended);
+}
+
+json_t *stream_json(const struct incise_stream *streams, int n)
+{
+	json_t *array = json_array();
+
+	for (int i = 0; i < n && array; i++) {
+		const struct incise_stream *s = &streams[i];
+
+		json_array_append_new(
+			array,
+			json_pack("{so so sb so so so sI sI sI so so so so so so so so}",
+				  "name", json_text(s->name), "device",
+				  json_text(s->device), "stamped", s->stamped,
+				  "nominal_hz", json_number(s->nominal_hz), "delay_ms",
+				  json_number(s->delay_ms), "delay_sd_ms",
+				  json_number(s->delay_sd_ms), "rows",
+				  (json_int_t)s->rows, "lost", (json_int_t)s->lost,
+				  "late", (json_int_t)s->late, "rate_hz",
+				  json_number(s->rate_hz), "drift_ppm",
+				  json_number(s->drift_ppm), "drift_sd_ppm",
+				  json_number(s->drift_sd_ppm), "jitter_ms",
+				  json_number(s->jitter_ms), "jitter_max_ms",
+				  json_number(s->jitter_max_ms), "offset_ms",
+				  json_number(s->offset_ms), "offset_sd_ms",
+				  json_number(s->offset_sd_ms), "ended",
+				  *s->ended ? json_text(s->ended) : json_null()));
+	}
+	return array;
+}
