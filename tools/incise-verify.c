@@ -51,6 +51,8 @@ static json_t *as_json(const struct incise_verify_finding *finding)
 		[INCISE_VERIFY_EXTRA] = "extra",
 		[INCISE_VERIFY_COUNT] = "count",
 		[INCISE_VERIFY_INTERRUPTED] = "interrupted",
+		[INCISE_VERIFY_PICTURES] = "pictures",
+		[INCISE_VERIFY_UNVERIFIED] = "unverified",
 		[INCISE_VERIFY_DAMAGED] = "damaged",
 	};
 	bool numbers = finding->last_seq >= finding->first_seq;
@@ -92,6 +94,22 @@ static int progress(void *user, double share)
 	return cli_stop;
 }
 
+/* Of the camera's file; null where the recording has none. */
+static json_t *pictures(const struct incise_verify_report *report)
+{
+	const struct incise_verify_pictures *pictures = &report->pictures;
+
+	if (!report->n_streams ||
+	    strcmp(report->streams[report->n_streams - 1].name, "camera"))
+		return json_null();
+	return json_pack("{sb sI sI sI sI sI}", "checked", pictures->checked, "present",
+			 (json_int_t)pictures->present, "missing",
+			 (json_int_t)pictures->missing, "altered",
+			 (json_int_t)pictures->altered, "extra",
+			 (json_int_t)pictures->extra, "ahead",
+			 (json_int_t)pictures->ahead);
+}
+
 static void print_json(const struct incise_verify_report *report, const struct sink *sink)
 {
 	json_t *streams = json_array();
@@ -108,11 +126,12 @@ static void print_json(const struct incise_verify_report *report, const struct s
 					   (json_int_t)stream->blocks, "altered_blocks",
 					   (json_int_t)stream->altered));
 	}
-	json_print(json_pack("{so sb sb sb so so sI}", "path", json_text(sink->path),
-			     "complete", report->complete, "intact", report->intact,
-			     "interrupted", report->interrupted, "streams", streams,
-			     "findings", sink->list, "findings_left_out",
-			     (json_int_t)sink->left_out));
+	json_print(json_pack("{so sb sb sb sb so so so sI}", "path",
+			     json_text(sink->path), "complete", report->complete,
+			     "intact", report->intact, "unverified", report->unverified,
+			     "interrupted", report->interrupted, "pictures",
+			     pictures(report), "streams", streams, "findings", sink->list,
+			     "findings_left_out", (json_int_t)sink->left_out));
 }
 
 static void print_table(const struct incise_verify_report *report, const char *path)
@@ -130,6 +149,13 @@ static void print_table(const struct incise_verify_report *report, const char *p
 			       (unsigned long long)stream->altered);
 		printf("\n");
 	}
+	if (report->pictures.checked)
+		printf("%-8s %llu pictures as written, %llu missing, %llu altered, %llu that "
+		       "no row has\n",
+		       "", (unsigned long long)report->pictures.present,
+		       (unsigned long long)report->pictures.missing,
+		       (unsigned long long)report->pictures.altered,
+		       (unsigned long long)report->pictures.extra);
 	if (report->complete)
 		printf("%s: complete: all is there, as it was written\n", path);
 }
@@ -165,6 +191,10 @@ int main(int argc, char **argv)
 	cli_finish();
 	if (report.complete)
 		return 0;
+	if (report.unverified)
+		cli_fail("%s: not all of it could be verified; %llu samples missing, "
+			 "findings: %llu",
+			 sink.path, lost, (unsigned long long)report.findings);
 	if (!report.intact)
 		cli_fail("%s: not what was recorded: %llu samples missing, findings: "
 			 "%llu; keep a copy before anything else is done with it",

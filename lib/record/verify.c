@@ -120,6 +120,18 @@ static void tell_of_interruption(struct incise_verification *verify)
 
 /* --- all of it ------------------------------------------------------------------------- */
 
+/* Whatever says so, since anything may have been removed. */
+static bool has_camera(struct incise_verification *verify)
+{
+	return ask(
+		verify,
+		"SELECT EXISTS(SELECT 1 FROM ledger WHERE stream = 'camera') OR "
+		"EXISTS(SELECT 1 FROM streams WHERE name = 'camera') OR "
+		"EXISTS(SELECT 1 FROM meta WHERE key = 'frames_rows' AND value > 0) OR "
+		"EXISTS(SELECT 1 FROM frames)",
+		1);
+}
+
 /* Streams one after the other. Returns 0 or -ECANCELED. */
 static int check_streams(struct incise_verification *verify)
 {
@@ -130,26 +142,29 @@ static int check_streams(struct incise_verification *verify)
 	} counted[INCISE_LEDGER_STREAMS] = {
 		[INCISE_LEDGER_FORCE] = {meta->force, meta->force_lost},
 		[INCISE_LEDGER_TRACKER] = {meta->tracker, meta->tracker_lost},
-		/* of the camera table meta holds no counts yet */
 		[INCISE_LEDGER_CAMERA] = {
-			ask(verify,
-			    "SELECT sum(count) FROM ledger WHERE stream = 'camera'", 0),
-			ask(verify,
-			    "SELECT sum(lost) FROM ledger WHERE stream = 'camera'", 0)}};
+			ask(verify, "SELECT value FROM meta WHERE key = 'frames_rows'",
+			    0),
+			ask(verify, "SELECT value FROM meta WHERE key = 'frames_lost'",
+			    0)}};
+	bool camera = has_camera(verify);
 	int rc = 0;
 
+	verify->rows = meta->force + meta->tracker;
+	if (camera) {
+		verify->frames = ask(verify, "SELECT count(*) FROM frames", 0);
+		verify->rows += verify->frames * INCISE_VERIFY_PICTURE_ROWS;
+	}
+
 	for (int i = 0; i < INCISE_LEDGER_STREAMS && !rc; i++) {
-		if (i == INCISE_LEDGER_CAMERA &&
-		    !ask(verify,
-			 "SELECT EXISTS(SELECT 1 FROM ledger WHERE stream = 'camera') OR "
-			 "EXISTS(SELECT 1 FROM streams WHERE name = 'camera') OR "
-			 "EXISTS(SELECT 1 FROM frames)",
-			 1))
+		if (i == INCISE_LEDGER_CAMERA && !camera)
 			continue;
 		rc = incise_verify_stream(verify, &incise_ledger_forms[i],
 					  counted[i].rows, counted[i].lost,
 					  &report->streams[report->n_streams++]);
 	}
+	if (!rc && camera)
+		rc = incise_verify_camera(verify);
 	return rc;
 }
 
@@ -172,7 +187,6 @@ int incise_verify(const char *path, const struct incise_verify_watch *watch,
 		goto out;
 	}
 	report->interrupted = !verify.recording->meta.complete;
-	verify.rows = verify.recording->meta.force + verify.recording->meta.tracker;
 	verify.origin_ns =
 		ask(&verify, "SELECT min(first_ns) FROM ledger WHERE count > 0", 0);
 	rc = check_streams(&verify);

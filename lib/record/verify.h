@@ -4,6 +4,7 @@
  *
  *     verify.c          the recording as a whole: pages, counts, the report
  *     verify_stream.c   one stream: its rows against its ledger
+ *     verify_camera.c   the camera's file against its rows
  *     verify_finding.c  what is wrong, as a line
  */
 #ifndef INCISE_VERIFY_PRIVATE_H
@@ -13,13 +14,17 @@
 #include "ledger.h"
 #include "recording.h"
 
+/* What a picture takes, in rows: for the share that is done. */
+#define INCISE_VERIFY_PICTURE_ROWS 100
+
 struct incise_verification {
 	struct incise_recording *recording;
 	const struct incise_verify_watch *watch;
 	struct incise_verify_report *report;
 	int64_t origin_ns; /* times in lines are seconds from here: the first row */
 	int64_t told_ns;   /* progress was told */
-	uint64_t rows, rows_done;
+	uint64_t rows, rows_done; /* to go through; pictures count as some rows each */
+	uint64_t frames;	  /* rows of table frames */
 	bool altered; /* found something else than losses and an interruption */
 };
 
@@ -30,6 +35,12 @@ struct incise_verification {
 int incise_verify_stream(struct incise_verification *verify,
 			 const struct incise_ledger_form *form, uint64_t rows,
 			 uint64_t lost, struct incise_verify_stream *out);
+
+/*
+ * Walk through the pictures; fills report->pictures. Returns 0, or -ECANCELED; what cannot
+ * be read is a finding.
+ */
+int incise_verify_camera(struct incise_verification *verify);
 
 /* Tell of a finding, whose text is made of these. */
 void incise_verify_found(struct incise_verification *verify,

@@ -30,6 +30,7 @@ void incise_verify_found(struct incise_verification *verify,
 			*c = '?';
 	finding->text = line;
 	verify->report->findings++;
+	verify->report->unverified |= finding->kind == INCISE_VERIFY_UNVERIFIED;
 	verify->altered |= finding->kind != INCISE_VERIFY_LOST &&
 			   finding->kind != INCISE_VERIFY_INTERRUPTED;
 	if (verify->watch && verify->watch->found)

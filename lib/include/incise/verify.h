@@ -22,7 +22,10 @@ enum incise_verify_kind {
 	INCISE_VERIFY_EXTRA,   /**< rows that no block holds */
 	INCISE_VERIFY_COUNT,   /**< the recorder counted otherwise */
 	INCISE_VERIFY_INTERRUPTED, /**< not closed: it ends with its last commit */
-	INCISE_VERIFY_DAMAGED, /**< SQLite cannot read it, or its pages do not agree */
+	INCISE_VERIFY_PICTURES, /**< pictures are missing in the camera's file, or altered,
+					or in no row */
+	INCISE_VERIFY_UNVERIFIED, /**< could not be looked at, as a module is missing */
+	INCISE_VERIFY_DAMAGED,	  /**< SQLite cannot read it, or its pages do not agree */
 };
 
 /** One thing that is wrong, and where. */
@@ -51,14 +54,25 @@ struct incise_verify_stream {
 	uint64_t altered; /**< blocks that are missing or do not agree with the rows */
 };
 
+/** The camera's file against the rows of the camera. All 0 where there is no camera. */
+struct incise_verify_pictures {
+	bool checked;	  /**< the file was read to its end */
+	uint64_t present; /**< as they were written */
+	uint64_t missing, altered;
+	uint64_t extra; /**< that no row has */
+	uint64_t ahead; /**< behind the last row of an interrupted recording: no fault */
+};
+
 struct incise_verify_report {
 	bool complete; /**< closed, nothing lost, nothing altered: no findings */
 	bool intact;   /**< all that was committed is there and as it was written; samples
 			       may have been lost before that */
+	bool unverified;  /**< something could not be looked at; then it is not intact */
 	bool interrupted; /**< not closed, or being written */
 	uint64_t findings;
 	int n_streams;
 	struct incise_verify_stream streams[INCISE_VERIFY_STREAMS];
+	struct incise_verify_pictures pictures;
 };
 
 /** Who is told; any may be NULL. */
