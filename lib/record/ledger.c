@@ -154,20 +154,35 @@ void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_
 	ledger->last_ns = row->t_ns;
 }
 
+void incise_ledger_seal_block(struct incise_ledger_block *block)
+{
+	uint8_t bytes[7 * 8], *to = bytes;
+
+	to = put(to, block->block);
+	to = put(to, block->first_seq);
+	to = put(to, block->last_seq);
+	to = put(to, block->first_ns);
+	to = put(to, block->last_ns);
+	to = put(to, block->count);
+	put(to, block->lost);
+	block->crc = incise_crc32c(block->crc, bytes, sizeof(bytes));
+}
+
+bool incise_ledger_same(const struct incise_ledger_block *a,
+			const struct incise_ledger_block *b)
+{
+	return a->block == b->block && a->first_seq == b->first_seq &&
+	       a->last_seq == b->last_seq && a->first_ns == b->first_ns &&
+	       a->last_ns == b->last_ns && a->count == b->count && a->lost == b->lost &&
+	       a->crc == b->crc;
+}
+
 /* The open block with its last fields; the next one goes on from its CRC. */
 static void seal(struct incise_ledger *ledger, struct incise_ledger_block *block)
 {
 	struct incise_ledger_block *open = &ledger->open;
-	uint8_t bytes[7 * 8], *to = bytes;
 
-	to = put(to, open->block);
-	to = put(to, open->first_seq);
-	to = put(to, open->last_seq);
-	to = put(to, open->first_ns);
-	to = put(to, open->last_ns);
-	to = put(to, open->count);
-	put(to, open->lost);
-	open->crc = incise_crc32c(open->crc, bytes, sizeof(bytes));
+	incise_ledger_seal_block(open);
 	*block = *open;
 	ledger->lost += open->lost;
 	open->block++;

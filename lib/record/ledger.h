@@ -91,4 +91,10 @@ bool incise_ledger_end(struct incise_ledger *ledger, struct incise_ledger_block 
 void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
 			 struct incise_ledger_block *block);
 
+/* Take the fields of an entry into its CRC, which is that of what it counts. */
+void incise_ledger_seal_block(struct incise_ledger_block *block);
+
+bool incise_ledger_same(const struct incise_ledger_block *a,
+			const struct incise_ledger_block *b);
+
 #endif

@@ -295,19 +295,22 @@ static int complete(struct incise_recorder *rec, struct incise_error *err)
 	int rc = incise_recorder_end(rec, err);
 
 	if (!rc && (incise_recorder_ledger_close(rec) != SQLITE_OK ||
-		    incise_recorder_note(rec, "end", "recording ended") != SQLITE_OK ||
-		    incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK))
+		    incise_recorder_note(rec, "end", "recording ended") != SQLITE_OK))
 		rc = incise_recorder_fail(rec, err);
 	if (!rc)
 		rc = incise_recorder_commit(rec, rec->commit_ns, true, err);
+	/* With it all is written that is to be sealed. */
+	if (!rc && (incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK ||
+		    incise_recorder_seal(rec) != SQLITE_OK ||
+		    sqlite3_exec(rec->db, "COMMIT", NULL, NULL, NULL) != SQLITE_OK))
+		rc = incise_recorder_fail(rec, err);
 	if (rc)
 		return rc;
 	/*
 	 * One file that stands alone. Someone who is reading it now keeps SQLite from
 	 * folding the log in; then the log stays beside it, which is as good.
 	 */
-	if (sqlite3_exec(rec->db,
-			 "COMMIT; PRAGMA synchronous=FULL; PRAGMA journal_mode=DELETE",
+	if (sqlite3_exec(rec->db, "PRAGMA synchronous=FULL; PRAGMA journal_mode=DELETE",
 			 NULL, NULL, NULL) != SQLITE_OK &&
 	    sqlite3_errcode(rec->db) != SQLITE_BUSY &&
 	    sqlite3_errcode(rec->db) != SQLITE_LOCKED)

@@ -248,6 +248,12 @@ int incise_recorder_ledger(struct incise_recorder *rec);
 /* The last blocks, and the end of the ledger of each stream. Returns an SQLite code. */
 int incise_recorder_ledger_close(struct incise_recorder *rec);
 
+/*
+ * Seal what is not in blocks; the last that is written, in the transaction in which table
+ * meta says complete. Returns an SQLite code.
+ */
+int incise_recorder_seal(struct incise_recorder *rec);
+
 /* A line in the table of events, at a time or now. Returns an SQLite code. */
 int incise_recorder_note_at(struct incise_recorder *rec, int64_t t_ns, const char *kind,
 			    const char *fmt, ...) INCISE_PRINTF(4, 5);

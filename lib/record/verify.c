@@ -7,19 +7,6 @@
 #include "schema.h"
 #include "verify.h"
 
-static struct incise_verify_finding finding(enum incise_verify_kind kind)
-{
-	return (struct incise_verify_finding){
-		.kind = kind,
-		.stream = "",
-		.first_block = -1,
-		.last_block = -1,
-		.last_seq = -1,
-		.first_ns = -1,
-		.last_ns = -1,
-	};
-}
-
 /* One number by SQL; @otherwise where it is NULL or cannot be had. */
 static int64_t ask(struct incise_verification *verify, const char *sql, int64_t otherwise)
 {
@@ -56,7 +43,7 @@ static int check_pages(struct incise_verification *verify)
 
 		if (!text || strcmp(text, "ok")) {
 			struct incise_verify_finding found =
-				finding(INCISE_VERIFY_DAMAGED);
+				incise_verify_finding(INCISE_VERIFY_DAMAGED);
 
 			incise_verify_found(verify, &found, "%s is damaged: %s",
 					    INCISE_SCHEMA_DB,
@@ -66,7 +53,8 @@ static int check_pages(struct incise_verification *verify)
 	}
 	sqlite3_progress_handler(db, 0, NULL, NULL);
 	if (rc != SQLITE_DONE && rc != SQLITE_INTERRUPT) {
-		struct incise_verify_finding found = finding(INCISE_VERIFY_DAMAGED);
+		struct incise_verify_finding found =
+			incise_verify_finding(INCISE_VERIFY_DAMAGED);
 
 		incise_verify_found(verify, &found, "%s is damaged: %s", INCISE_SCHEMA_DB,
 				    sqlite3_errmsg(db));
@@ -75,9 +63,10 @@ static int check_pages(struct incise_verification *verify)
 	return rc == SQLITE_INTERRUPT ? -ECANCELED : 0;
 }
 
+/* Of an interrupted recording; a closed one has a seal of it. */
 static void check_depth(struct incise_verification *verify)
 {
-	struct incise_verify_finding found = finding(INCISE_VERIFY_COUNT);
+	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_COUNT);
 	uint64_t rows = ask(verify, "SELECT count(*) FROM depth", -1);
 
 	found.count = verify->recording->depth_rows;
@@ -87,13 +76,19 @@ static void check_depth(struct incise_verification *verify)
 }
 
 /* Streams that this version does not know would be taken for verified. */
+#define STREAMS "'force', 'tracker', 'camera'"
+#define SEALS                                                                           \
+	"'table:depth', 'table:events', 'table:knots', 'table:meta', 'table:streams', " \
+	"'file:camera.mkv'"
 static void check_names(struct incise_verification *verify)
 {
-	struct incise_verify_finding found = finding(INCISE_VERIFY_LEDGER);
+	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_LEDGER);
 
 	if (ask(verify,
-		"SELECT count(*) FROM ledger WHERE stream NOT IN ('force', 'tracker', "
-		"'camera')",
+		verify->report->interrupted
+			? "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS ")"
+			: "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS
+			  ", " SEALS ")",
 		-1))
 		incise_verify_found(
 			verify, &found,
@@ -102,11 +97,14 @@ static void check_names(struct incise_verification *verify)
 
 static void tell_of_interruption(struct incise_verification *verify)
 {
-	struct incise_verify_finding found = finding(INCISE_VERIFY_INTERRUPTED);
+	struct incise_verify_finding found =
+		incise_verify_finding(INCISE_VERIFY_INTERRUPTED);
 
 	if (!verify->report->interrupted)
 		return;
-	found.last_ns = ask(verify, "SELECT max(last_ns) FROM ledger", -1);
+	found.last_ns =
+		ask(verify,
+		    "SELECT max(last_ns) FROM ledger WHERE stream IN (" STREAMS ")", -1);
 	if (found.last_ns < 0)
 		incise_verify_found(verify, &found,
 				    "interrupted, or being written: not a row in it yet");
@@ -114,7 +112,8 @@ static void tell_of_interruption(struct incise_verification *verify)
 		incise_verify_found(
 			verify, &found,
 			"interrupted, or being written: it ends with its last commit, at "
-			"%.4f s",
+			"%.4f s; tables depth, events, knots, meta and streams have no "
+			"seal before the end: nothing proves them",
 			incise_verify_s(verify, found.last_ns));
 }
 
@@ -147,23 +146,23 @@ static int check_streams(struct incise_verification *verify)
 			    0),
 			ask(verify, "SELECT value FROM meta WHERE key = 'frames_lost'",
 			    0)}};
-	bool camera = has_camera(verify);
 	int rc = 0;
 
+	verify->camera = has_camera(verify);
 	verify->rows = meta->force + meta->tracker;
-	if (camera) {
+	if (verify->camera) {
 		verify->frames = ask(verify, "SELECT count(*) FROM frames", 0);
 		verify->rows += verify->frames * INCISE_VERIFY_PICTURE_ROWS;
 	}
 
 	for (int i = 0; i < INCISE_LEDGER_STREAMS && !rc; i++) {
-		if (i == INCISE_LEDGER_CAMERA && !camera)
+		if (i == INCISE_LEDGER_CAMERA && !verify->camera)
 			continue;
 		rc = incise_verify_stream(verify, &incise_ledger_forms[i],
 					  counted[i].rows, counted[i].lost,
 					  &report->streams[report->n_streams++]);
 	}
-	if (!rc && camera)
+	if (!rc && verify->camera)
 		rc = incise_verify_camera(verify);
 	return rc;
 }
@@ -187,14 +186,21 @@ int incise_verify(const char *path, const struct incise_verify_watch *watch,
 		goto out;
 	}
 	report->interrupted = !verify.recording->meta.complete;
-	verify.origin_ns =
-		ask(&verify, "SELECT min(first_ns) FROM ledger WHERE count > 0", 0);
+	verify.origin_ns = ask(
+		&verify,
+		"SELECT min(first_ns) FROM ledger WHERE count > 0 AND stream IN (" STREAMS
+		")",
+		0);
 	rc = check_streams(&verify);
 	if (!rc) {
-		check_depth(&verify);
+		if (report->interrupted)
+			check_depth(&verify);
 		check_names(&verify);
-		rc = check_pages(&verify);
+		if (!report->interrupted)
+			rc = incise_verify_seals(&verify);
 	}
+	if (!rc)
+		rc = check_pages(&verify);
 	if (rc) {
 		rc = incise_error_set(err, ECANCELED, "%s: stopped; not verified", path);
 		goto out;

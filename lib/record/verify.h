@@ -5,6 +5,7 @@
  *     verify.c          the recording as a whole: pages, counts, the report
  *     verify_stream.c   one stream: its rows against its ledger
  *     verify_camera.c   the camera's file against its rows
+ *     verify_seal.c     tables and the head of that file against their seals
  *     verify_finding.c  what is wrong, as a line
  */
 #ifndef INCISE_VERIFY_PRIVATE_H
@@ -24,8 +25,9 @@ struct incise_verification {
 	int64_t origin_ns; /* times in lines are seconds from here: the first row */
 	int64_t told_ns;   /* progress was told */
 	uint64_t rows, rows_done; /* to go through; pictures count as some rows each */
-	uint64_t frames;	  /* rows of table frames */
-	bool altered; /* found something else than losses and an interruption */
+	bool camera;
+	uint64_t frames; /* rows of table frames */
+	bool altered;	 /* found something else than losses and an interruption */
 };
 
 /*
@@ -41,6 +43,12 @@ int incise_verify_stream(struct incise_verification *verify,
  * be read is a finding.
  */
 int incise_verify_camera(struct incise_verification *verify);
+
+/* What a closed recording has sealed, likewise. */
+int incise_verify_seals(struct incise_verification *verify);
+
+/* Nothing but its kind. */
+struct incise_verify_finding incise_verify_finding(enum incise_verify_kind kind);
 
 /* Tell of a finding, whose text is made of these. */
 void incise_verify_found(struct incise_verification *verify,

@@ -44,15 +44,10 @@ struct walk {
 
 static struct incise_verify_finding finding(enum incise_verify_kind kind)
 {
-	return (struct incise_verify_finding){
-		.kind = kind,
-		.stream = "camera",
-		.first_block = -1,
-		.last_block = -1,
-		.last_seq = -1,
-		.first_ns = -1,
-		.last_ns = -1,
-	};
+	struct incise_verify_finding found = incise_verify_finding(kind);
+
+	found.stream = "camera";
+	return found;
 }
 
 /* --- findings -------------------------------------------------------------------------- */

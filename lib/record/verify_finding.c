@@ -15,6 +15,19 @@ double incise_verify_s(const struct incise_verification *verify, int64_t t_ns)
 	return ((double)t_ns - (double)verify->origin_ns) * 1e-9;
 }
 
+struct incise_verify_finding incise_verify_finding(enum incise_verify_kind kind)
+{
+	return (struct incise_verify_finding){
+		.kind = kind,
+		.stream = "",
+		.first_block = -1,
+		.last_block = -1,
+		.last_seq = -1,
+		.first_ns = -1,
+		.last_ns = -1,
+	};
+}
+
 void incise_verify_found(struct incise_verification *verify,
 			 struct incise_verify_finding *finding, const char *fmt, ...)
 {
@@ -40,16 +53,10 @@ void incise_verify_found(struct incise_verification *verify,
 void incise_verify_unreadable(struct incise_verification *verify, const char *stream,
 			      const char *table)
 {
-	struct incise_verify_finding finding = {
-		.kind = INCISE_VERIFY_DAMAGED,
-		.stream = stream,
-		.first_block = -1,
-		.last_block = -1,
-		.last_seq = -1,
-		.first_ns = -1,
-		.last_ns = -1,
-	};
+	struct incise_verify_finding finding =
+		incise_verify_finding(INCISE_VERIFY_DAMAGED);
 
+	finding.stream = stream;
 	incise_verify_found(verify, &finding, "table %s cannot be read: %s", table,
 			    sqlite3_errmsg(verify->recording->db));
 }

@@ -41,15 +41,10 @@ struct walk {
 static struct incise_verify_finding finding(const struct walk *walk,
 					    enum incise_verify_kind kind)
 {
-	return (struct incise_verify_finding){
-		.kind = kind,
-		.stream = walk->form->stream,
-		.first_block = -1,
-		.last_block = -1,
-		.last_seq = -1,
-		.first_ns = -1,
-		.last_ns = -1,
-	};
+	struct incise_verify_finding found = incise_verify_finding(kind);
+
+	found.stream = walk->form->stream;
+	return found;
 }
 
 /* Samples from @first to @last are not there; the row after them is at @after_ns, or -1. */
@@ -116,14 +111,6 @@ static int take_row(struct walk *walk, bool *good)
 	for (int i = 0; i < walk->chains; i++)
 		incise_ledger_add(&walk->chain[i], &walk->row);
 	return next_row(walk);
-}
-
-static bool same(const struct incise_ledger_block *a, const struct incise_ledger_block *b)
-{
-	return a->block == b->block && a->first_seq == b->first_seq &&
-	       a->last_seq == b->last_seq && a->first_ns == b->first_ns &&
-	       a->last_ns == b->last_ns && a->count == b->count && a->lost == b->lost &&
-	       a->crc == b->crc;
 }
 
 /* Tell of blocks that do not agree, if there are any. */
@@ -263,7 +250,7 @@ static int take_block(struct walk *walk, const struct incise_ledger_block *block
 			incise_ledger_close(&walk->chain[i], block->lost, &computed);
 		else
 			is = incise_ledger_end(&walk->chain[i], &computed);
-		if (match < 0 && good && is && same(&computed, block))
+		if (match < 0 && good && is && incise_ledger_same(&computed, block))
 			match = i;
 	}
 	walk->next = block->block + 1;

@@ -154,7 +154,33 @@ static void tampering_is_found(void **state)
 		{"UPDATE meta SET value = value + 1 WHERE key = 'tracker_lost'",
 		 "tracker: 1 were lost when it was captured, and the ledger has 0", -1,
 		 -1, 1, 0},
+		/* what is sealed */
 		{"DELETE FROM depth WHERE seq = 7", "table depth has ", -1, -1, 0, 0},
+		{"UPDATE depth SET depth_mm = depth_mm + 1e-9 WHERE seq = 7",
+		 "table depth is altered", -1, -1, 0, 0},
+		{"UPDATE meta SET value = 7.0 WHERE key = 'force_mV_N'",
+		 "table meta is altered", -1, -1, 0, 0},
+		{"INSERT INTO meta VALUES('odour', 7)", "table meta has ", -1, -1, 0, 0},
+		{"UPDATE events SET text = 'nothing' WHERE kind = 'zero'",
+		 "table events is altered", -1, -1, 0, 0},
+		{"INSERT INTO events VALUES(7, 'cut', 'one more')", "table events has ",
+		 -1, -1, 0, 0},
+		{"UPDATE streams SET delay_ns = delay_ns + 1 WHERE name = 'force'",
+		 "table streams is altered", -1, -1, 0, 0},
+		{"INSERT INTO knots VALUES('force', 9, 7, 7, 1.0, 1)", "table knots has ",
+		 -1, -1, 0, 0},
+		{"DELETE FROM ledger WHERE stream = 'table:meta'",
+		 "table meta has no seal in the ledger", -1, -1, 0, 0},
+		{"UPDATE ledger SET crc = (crc | 1) - (crc & 1) + 2 WHERE stream = "
+		 "'table:depth'",
+		 "table depth is altered", -1, -1, 0, 0},
+		{"UPDATE ledger SET lost = 1 WHERE stream = 'table:depth'",
+		 "table depth is altered", -1, -1, 0, 0},
+		{"UPDATE ledger SET block = 1 WHERE stream = 'table:depth'",
+		 "table depth is altered", -1, -1, 0, 0},
+		{"INSERT INTO ledger SELECT stream, 1, 0, 0, 0, 0, count, 0, crc FROM ledger "
+		 "WHERE stream = 'table:depth'",
+		 "table depth is altered", -1, -1, 0, 0},
 	};
 
 	record("good.rec", SIM, 3000 * MS);
@@ -247,10 +273,31 @@ static void interrupted_is_intact(void **state)
 	incise_rig_close(rig);
 	verify("b.rec", &report, &findings);
 	assert_true(report.interrupted && report.intact);
+	assert_non_null(strstr(findings.text, "nothing proves them"));
+	/* of them no change is found, but that rows of depth are missing */
+	change("b.rec.part/recording.db", "UPDATE events SET text = 'else'");
+	verify("b.rec", &report, &findings);
+	assert_true(report.interrupted && report.intact);
+	change("b.rec.part/recording.db", "DELETE FROM depth WHERE seq = 7");
+	verify("b.rec", &report, &findings);
+	assert_false(report.intact);
 	change("b.rec.part/recording.db", "DELETE FROM force WHERE seq = 77");
 	verify("b.rec", &report, &findings);
 	assert_true(report.interrupted && !report.intact);
 	assert_int_equal(report.streams[0].lost, 1);
+}
+
+/* Who says that it was interrupted does not get rid of the seals. */
+static void closed_and_not_complete(void **state)
+{
+	struct incise_verify_report report;
+	struct findings findings;
+
+	record("a.rec", SIM, 600 * MS);
+	change(DB, "UPDATE meta SET value = 0 WHERE key = 'complete'");
+	verify("a.rec", &report, &findings);
+	assert_true(report.interrupted && !report.intact);
+	assert_non_null(strstr(findings.text, "entries of streams that there are not"));
 }
 
 static void what_cannot_be_verified(void **state)
@@ -340,6 +387,7 @@ int main(void)
 		IN_FOLDER(tampering_is_found),
 		IN_FOLDER(losses_are_no_alteration),
 		IN_FOLDER(interrupted_is_intact),
+		IN_FOLDER(closed_and_not_complete),
 		IN_FOLDER(what_cannot_be_verified),
 		IN_FOLDER(damaged_pages_are_found),
 		IN_FOLDER(truncated_file),

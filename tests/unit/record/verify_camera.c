@@ -4,10 +4,11 @@
  * found in camera.mkv, and where; a file that is ahead of an interrupted recording is right.
  */
 #include "recorded.h"
+#include <fcntl.h>
 #include <limits.h>
 #include <incise/verify.h>
 #include "../../../lib/record/frames.h"
-#include "../../../lib/record/ledger.h"
+#include "../../../lib/record/ledger_seal.h"
 
 #define DB "a.rec/recording.db"
 #define FILE_NAME "a.rec/" INCISE_FRAMES_FILE
@@ -115,18 +116,17 @@ static void write_pictures(int n, const struct change *change,
 	assert_int_equal(incise_frames_writer_close(writer, &err), 0);
 }
 
-static void put_block(const struct incise_ledger_block *block)
+static void put_block(const char *stream, const struct incise_ledger_block *block)
 {
 	char sql[300];
 
-	snprintf(
-		sql, sizeof(sql),
-		"INSERT INTO ledger VALUES('camera', %lld, %lld, %lld, %lld, %lld, %lld, "
-		"%lld, %lld)",
-		(long long)block->block, (long long)block->first_seq,
-		(long long)block->last_seq, (long long)block->first_ns,
-		(long long)block->last_ns, (long long)block->count,
-		(long long)block->lost, (long long)block->crc);
+	snprintf(sql, sizeof(sql),
+		 "INSERT INTO ledger VALUES('%s', %lld, %lld, %lld, %lld, %lld, %lld, "
+		 "%lld, %lld)",
+		 stream, (long long)block->block, (long long)block->first_seq,
+		 (long long)block->last_seq, (long long)block->first_ns,
+		 (long long)block->last_ns, (long long)block->count,
+		 (long long)block->lost, (long long)block->crc);
 	change(DB, sql);
 }
 
@@ -160,13 +160,13 @@ static void add_camera(const struct incise_frame_record *rows, int n, bool end)
 		incise_ledger_row_frame(&row, &rows[i]);
 		incise_ledger_add(&ledger, &row);
 		if (i % BLOCK == BLOCK - 1 && incise_ledger_end(&ledger, &block))
-			put_block(&block);
+			put_block("camera", &block);
 	}
 	if (incise_ledger_end(&ledger, &block))
-		put_block(&block);
+		put_block("camera", &block);
 	incise_ledger_close(&ledger, 0, &block);
 	if (end)
-		put_block(&block);
+		put_block("camera", &block);
 	snprintf(
 		sql, sizeof(sql),
 		"INSERT INTO streams(name, device, stamped, delay_ns, grain_ns, rows, lost, "
@@ -174,6 +174,35 @@ static void add_camera(const struct incise_frame_record *rows, int n, bool end)
 		"VALUES('frames_rows', %d), ('frames_lost', 0)",
 		DELAY_NS, n, n);
 	change(DB, sql);
+}
+
+/* As a recorder does at last; not @whole: it did not come to that. */
+static void seal(bool whole)
+{
+	struct incise_ledger_block block;
+	int fd = open(FILE_NAME, O_RDONLY);
+
+	change(DB, "DELETE FROM ledger WHERE stream LIKE '%:%'");
+	change(DB, whole ? "UPDATE meta SET value = 1 WHERE key = 'complete'"
+			 : "UPDATE meta SET value = 0 WHERE key = 'complete'");
+	assert_true(fd >= 0);
+	assert_int_equal(incise_ledger_seal_head(fd, &block), 0);
+	close(fd);
+	if (!whole)
+		return;
+	put_block(INCISE_LEDGER_HEAD, &block);
+	for (int i = 0; incise_ledger_sealed[i]; i++) {
+		char stream[40];
+		sqlite3 *db;
+
+		assert_int_equal(sqlite3_open(DB, &db), SQLITE_OK);
+		assert_int_equal(incise_ledger_seal(db, incise_ledger_sealed[i], &block),
+				 SQLITE_OK);
+		sqlite3_close(db);
+		snprintf(stream, sizeof(stream), INCISE_LEDGER_TABLE "%s",
+			 incise_ledger_sealed[i]);
+		put_block(stream, &block);
+	}
 }
 
 struct findings {
@@ -328,6 +357,7 @@ static void pictures_are_held_against_their_rows(void **state)
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	write_pictures(PICTURES, &none, rows);
 	add_camera(rows, PICTURES, true);
+	seal(true);
 	verify(&report, &findings);
 	if (!report.complete || !report.intact)
 		fail_msg("%s", findings.text);
@@ -339,6 +369,7 @@ static void pictures_are_held_against_their_rows(void **state)
 	assert_int_equal(report.pictures.present, PICTURES);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		write_pictures(PICTURES, &cases[i].change, NULL);
+		seal(true); /* a file's head has a random number of its own */
 		verify(&report, &findings);
 		if (report.complete || report.intact || report.findings != 1 ||
 		    !strstr(findings.text, cases[i].text))
@@ -386,6 +417,7 @@ static void rows_of_pictures_are_in_the_ledger(void **state)
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	write_pictures(PICTURES, &none, rows);
 	add_camera(rows, PICTURES, true);
+	seal(true);
 	assert_int_equal(system("cp -r a.rec good.rec"), 0);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
@@ -412,6 +444,7 @@ static void damaged_file(void **state)
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	write_pictures(PICTURES, &none, rows);
 	add_camera(rows, PICTURES, true);
+	seal(true);
 	assert_int_equal(stat(FILE_NAME, &st), 0);
 	assert_int_equal(system("cp " FILE_NAME " good.mkv"), 0);
 
@@ -436,6 +469,18 @@ static void damaged_file(void **state)
 	if (report.intact ||
 	    !strstr(findings.text, "1 altered in camera.mkv, number 12, "))
 		fail_msg("%s", findings.text);
+
+	/* its head is no picture's */
+	for (long at = 8; at < 250; at += 8) {
+		assert_int_equal(system("cp good.mkv " FILE_NAME), 0);
+		file = fopen(FILE_NAME, "r+");
+		fseek(file, at, SEEK_SET);
+		fputc(0x55, file); /* no byte there is */
+		fclose(file);
+		verify(&report, &findings);
+		if (report.intact)
+			fail_msg("byte %ld", at);
+	}
 
 	/* cut short, in a picture and between two; and with nothing but its head */
 	for (off_t size = st.st_size - 1; size > 0; size -= 397) {
@@ -474,14 +519,14 @@ static void file_is_ahead_of_an_interrupted_recording(void **state)
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	write_pictures(PICTURES, &none, rows);
 	add_camera(rows, PICTURES - 4, false);
-	change(DB, "UPDATE meta SET value = 0 WHERE key = 'complete'");
+	seal(false);
 	verify(&report, &findings);
 	if (!report.interrupted || !report.intact || report.findings != 1)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.pictures.present, PICTURES - 4);
 	assert_int_equal(report.pictures.ahead, 4);
 
-	change(DB, "UPDATE meta SET value = 1 WHERE key = 'complete'");
+	seal(true);
 	verify(&report, &findings);
 	assert_false(report.intact);
 	assert_non_null(strstr(findings.text,
@@ -500,6 +545,7 @@ static void without_the_module_it_is_said(void **state)
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	write_pictures(PICTURES, &none, rows);
 	add_camera(rows, PICTURES, true);
+	seal(true);
 	setenv("INCISE_MODULE_PATH", "/nonexistent", 1);
 	verify(&report, &findings);
 	assert_false(report.complete);
