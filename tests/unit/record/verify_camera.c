@@ -558,6 +558,50 @@ static void without_the_module_it_is_said(void **state)
 	assert_false(report.pictures.checked);
 }
 
+/* What a recorder makes, with a delay that was calibrated. */
+static void recorder_and_verification_agree(void **state)
+{
+	struct incise_error err = {0};
+	struct incise_calibration calibration;
+	struct incise_verify_report report;
+	struct incise_recorder *recorder;
+	struct findings findings;
+	struct incise_rig *rig;
+
+	if (!has_module())
+		skip();
+	rig = incise_rig_open("sim:clock=simulated", BOTH | INCISE_RIG_CAMERA, &err);
+	if (!rig)
+		fail_msg("%s", err.text);
+	incise_calibration_nominal(&calibration);
+	calibration.camera_delay_ms = 2.5;
+	recorder = incise_recorder_new(
+		"a.rec", rig,
+		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
+	if (!recorder)
+		fail_msg("%s", err.text);
+	assert_int_equal(poll_for(recorder, rig, 550 * MS, &err), 0);
+	verify(&report, &findings); /* as it is written */
+	if (!report.interrupted || !report.intact || report.findings != 1)
+		fail_msg("%s", findings.text);
+	assert_int_equal(incise_recorder_close(recorder, &err), 0);
+	incise_rig_close(rig);
+	verify(&report, &findings);
+	if (!report.complete || !report.intact)
+		fail_msg("%s", findings.text);
+	assert_int_equal(report.n_streams, 3);
+	assert_true(report.pictures.checked);
+	assert_int_equal(report.pictures.present, report.streams[2].present);
+	assert_true(report.pictures.present > 10);
+	assert_int_equal(ask(DB, "SELECT delay_ns FROM streams WHERE name = 'camera'"),
+			 2500000);
+	change(DB, "UPDATE streams SET delay_ns = 0 WHERE name = 'camera'");
+	verify(&report, &findings);
+	assert_false(report.intact);
+	assert_non_null(strstr(findings.text, "its time is not as written"));
+	assert_non_null(strstr(findings.text, "table streams is altered"));
+}
+
 #define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, enter, leave_folder)
 
 int main(void)
@@ -567,6 +611,7 @@ int main(void)
 		IN_FOLDER(rows_of_pictures_are_in_the_ledger),
 		IN_FOLDER(damaged_file),
 		IN_FOLDER(file_is_ahead_of_an_interrupted_recording),
+		IN_FOLDER(recorder_and_verification_agree),
 		IN_FOLDER(without_the_module_it_is_said),
 	};
 
