@@ -110,8 +110,11 @@ int incise_recorder_end_camera(struct incise_recorder *rec, struct incise_error 
 	struct incise_error why = {0};
 	int rc = 0, stopped;
 
-	if (!rec->camera.pump)
+	if (!rec->camera.pump) { /* never triggered: a file without pictures */
+		incise_frames_writer_close(rec->camera.writer, NULL);
+		rec->camera.writer = NULL;
 		return 0;
+	}
 	stopped = incise_frame_pump_stop(rec->camera.pump, PATIENCE_NS, &why);
 	rc = take_records(rec, err);
 	count(rec, &stats);

@@ -55,10 +55,12 @@ struct text {
 static int take_text(sqlite3_stmt *stmt, void *to)
 {
 	struct text *text = to;
+	/* Before the text is asked for, which makes one of anything. */
+	int type = sqlite3_column_type(stmt, 0);
 	const char *value = (const char *)sqlite3_column_text(stmt, 0);
 	size_t n;
 
-	if (sqlite3_column_type(stmt, 0) != SQLITE_TEXT || !value)
+	if (type != SQLITE_TEXT || !value)
 		return -EINVAL;
 	n = strnlen(value, text->size - 1);
 	memcpy(text->to, value, n);

@@ -23,11 +23,13 @@ static int damaged(struct incise_recording *rec, const char *table, const char *
 /* A text without what a terminal would take for a command. */
 static bool take_text(sqlite3_stmt *stmt, int column, char *to, size_t size)
 {
+	/* Before the text is asked for, which makes one of anything. */
+	int type = sqlite3_column_type(stmt, column);
 	const char *text = (const char *)sqlite3_column_text(stmt, column);
 
-	if (sqlite3_column_type(stmt, column) == SQLITE_NULL)
+	if (type == SQLITE_NULL)
 		text = "";
-	else if (sqlite3_column_type(stmt, column) != SQLITE_TEXT || !text)
+	else if (type != SQLITE_TEXT || !text)
 		return false;
 	snprintf(to, size, "%s", text);
 	for (char *c = to; *c; c++)

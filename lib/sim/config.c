@@ -53,7 +53,7 @@ static const struct key keys[] = {
 	KEY(KEY_DOUBLE, tracker_latency_ms, 4.2, 0, 1000),
 	KEY(KEY_DOUBLE, tracker_jitter_ms, 0.2, 0, 100),
 	KEY(KEY_DOUBLE, tracker_drift_ppm, 50, -10000, 10000),
-	KEY(KEY_DOUBLE, force_hz, 10000, 1, 20000),
+	KEY(KEY_DOUBLE, force_hz, 10000, 1, 200000),
 	KEY(KEY_DOUBLE, force_mV_N, 1240, 1, 100000),
 	KEY(KEY_DOUBLE, force_zero_mV, 180, -10000, 10000),
 	KEY(KEY_DOUBLE, force_noise_mV, 3, 0, 1000),

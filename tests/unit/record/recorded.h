@@ -11,6 +11,7 @@
 #include <stdint.h>
 #include <errno.h>
 #include <ftw.h>
+#include <limits.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -47,7 +48,7 @@ __attribute__((unused)) static int remove_entry(const char *path, const struct s
 	"qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL); "                  \
 	"INSERT INTO tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, " \
 	"qy, qz, status FROM old; DROP TABLE old; DROP TABLE frames; "                 \
-	"DROP TABLE streams; DROP TABLE ledger; PRAGMA user_version=1"
+	"DROP TABLE streams; DROP TABLE knots; DROP TABLE ledger; PRAGMA user_version=1"
 
 /* For setup and teardown: a folder as the working folder, so that paths are short. */
 __attribute__((unused)) static int enter_folder(void **state)
@@ -58,6 +59,29 @@ __attribute__((unused)) static int enter_folder(void **state)
 		return -1;
 	*state = strdup(path);
 	return 0;
+}
+
+/* And with the modules that are in O/lib/incise, beside O/tests/unit/record/. */
+__attribute__((unused)) static int enter_with_modules(void **state)
+{
+	char own[PATH_MAX], path[PATH_MAX + 40];
+
+	if (!realpath("/proc/self/exe", own))
+		return -1;
+	for (int i = 0; i < 4; i++)
+		*strrchr(own, '/') = '\0';
+	snprintf(path, sizeof(path), "%s/lib/incise", own);
+	setenv("INCISE_MODULE_PATH", path, 1);
+	return enter_folder(state);
+}
+
+/* Whether the module that writes and reads pictures was built. */
+__attribute__((unused)) static bool has_frames(void)
+{
+	char path[PATH_MAX];
+
+	snprintf(path, sizeof(path), "%s/frames_mkv.so", getenv("INCISE_MODULE_PATH"));
+	return !access(path, R_OK);
 }
 
 __attribute__((unused)) static int leave_folder(void **state)

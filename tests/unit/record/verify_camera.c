@@ -31,28 +31,6 @@ struct change {
 	int left_out_n; /* pictures, where it is left out; 0: 1 */
 };
 
-/* For setup: the module that is in O/lib/incise, beside O/tests/unit/record/. */
-static int enter(void **state)
-{
-	char own[PATH_MAX], path[PATH_MAX + 40];
-
-	if (!realpath("/proc/self/exe", own))
-		return -1;
-	for (int i = 0; i < 4; i++)
-		*strrchr(own, '/') = '\0';
-	snprintf(path, sizeof(path), "%s/lib/incise", own);
-	setenv("INCISE_MODULE_PATH", path, 1);
-	return enter_folder(state);
-}
-
-static bool has_module(void)
-{
-	char path[PATH_MAX];
-
-	snprintf(path, sizeof(path), "%s/frames_mkv.so", getenv("INCISE_MODULE_PATH"));
-	return !access(path, R_OK);
-}
-
 static int64_t stamp(int i)
 {
 	return 1000000000 + i * PERIOD_NS;
@@ -352,7 +330,7 @@ static void pictures_are_held_against_their_rows(void **state)
 	struct incise_verify_report report;
 	struct findings findings;
 
-	if (!has_module())
+	if (!has_frames())
 		skip();
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	write_pictures(PICTURES, &none, rows);
@@ -412,7 +390,7 @@ static void rows_of_pictures_are_in_the_ledger(void **state)
 	struct incise_verify_report report;
 	struct findings findings;
 
-	if (!has_module())
+	if (!has_frames())
 		skip();
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	write_pictures(PICTURES, &none, rows);
@@ -439,7 +417,7 @@ static void damaged_file(void **state)
 	struct stat st;
 	FILE *file;
 
-	if (!has_module())
+	if (!has_frames())
 		skip();
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	write_pictures(PICTURES, &none, rows);
@@ -514,7 +492,7 @@ static void file_is_ahead_of_an_interrupted_recording(void **state)
 	struct incise_verify_report report;
 	struct findings findings;
 
-	if (!has_module())
+	if (!has_frames())
 		skip();
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	write_pictures(PICTURES, &none, rows);
@@ -540,7 +518,7 @@ static void without_the_module_it_is_said(void **state)
 	struct incise_verify_report report;
 	struct findings findings;
 
-	if (!has_module())
+	if (!has_frames())
 		skip();
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	write_pictures(PICTURES, &none, rows);
@@ -568,7 +546,7 @@ static void recorder_and_verification_agree(void **state)
 	struct findings findings;
 	struct incise_rig *rig;
 
-	if (!has_module())
+	if (!has_frames())
 		skip();
 	rig = incise_rig_open("sim:clock=simulated", BOTH | INCISE_RIG_CAMERA, &err);
 	if (!rig)
@@ -602,7 +580,8 @@ static void recorder_and_verification_agree(void **state)
 	assert_non_null(strstr(findings.text, "table streams is altered"));
 }
 
-#define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, enter, leave_folder)
+#define IN_FOLDER(test) \
+	cmocka_unit_test_setup_teardown(test, enter_with_modules, leave_folder)
 
 int main(void)
 {

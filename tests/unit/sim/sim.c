@@ -310,7 +310,7 @@ static void bad_configuration_is_refused(void **state)
 	assert_null(incise_sim_new(&config, clock, &err));
 	assert_int_equal(errno, EINVAL);
 	assert_string_equal(err.text,
-			    "sim.force_hz: expected a number from 1 to 20000, found "
+			    "sim.force_hz: expected a number from 1 to 200000, found "
 			    "0; correct it");
 	incise_sim_free(NULL);
 	incise_clock_free(clock);
