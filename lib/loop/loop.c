@@ -39,17 +39,12 @@ static void count_tick(struct incise_loop_stats *stats, const struct incise_tick
 
 /* One tick with its statistics; start_ns is when it began. */
 static int run_tick(struct incise_plan *plan, const struct incise_clock *clock,
-		    const struct incise_loop_options *options,
-		    struct incise_loop_stats *stats, int64_t start_ns)
+		    struct incise_tick *tick, struct incise_loop_stats *stats,
+		    int64_t start_ns)
 {
-	struct incise_tick own, *tick = &own;
-	int64_t cost_ns;
-	int rc;
+	int rc = incise_plan_tick(plan, start_ns, tick);
+	int64_t cost_ns = incise_clock_now(clock) - start_ns;
 
-	if (stats->logged < options->log_size)
-		tick = &options->log[stats->logged++];
-	rc = incise_plan_tick(plan, start_ns, tick);
-	cost_ns = incise_clock_now(clock) - start_ns;
 	if (cost_ns > stats->tick_max_ns)
 		stats->tick_max_ns = cost_ns;
 	count(stats->tick_100ns, cost_ns / 100);
@@ -62,8 +57,8 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		    struct incise_loop_stats *stats, struct incise_error *err)
 {
 	int64_t period_ns, due_ns, end_ns;
+	int rc = 0, ended = 0;
 	char cause[300];
-	int rc = 0;
 
 	memset(stats, 0, sizeof(*stats));
 	if (options->duration_ns < 0)
@@ -75,16 +70,18 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 	period_ns = llrint(INCISE_NS_PER_S / options->rate_hz);
 	due_ns = incise_clock_now(clock) + period_ns;
 	end_ns = options->duration_ns ? due_ns + options->duration_ns : INT64_MAX;
-	while (due_ns < end_ns && !(options->stop && *options->stop)) {
-		int64_t now_ns, late_ns;
+	while (due_ns < end_ns && !ended && !(options->stop && *options->stop)) {
+		struct incise_tick own, *tick = &own;
+		int64_t now_ns, late_ns, lag_ns;
 
 		if (incise_clock_wait_until(clock, due_ns) == -EINTR)
 			continue;
 		now_ns = incise_clock_now(clock);
 		late_ns = now_ns - due_ns;
-		if (late_ns > stats->lateness_max_ns)
-			stats->lateness_max_ns = late_ns;
-		count(stats->lateness_us, late_ns / 1000);
+		lag_ns = late_ns + incise_clock_lag_ns(clock);
+		if (lag_ns > stats->lateness_max_ns)
+			stats->lateness_max_ns = lag_ns;
+		count(stats->lateness_us, lag_ns / 1000);
 		if (late_ns >= period_ns) {
 			int64_t skip = late_ns / period_ns;
 			int64_t left = (end_ns - due_ns - 1) / period_ns + 1;
@@ -95,10 +92,14 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 				break;
 			due_ns += skip * period_ns;
 		}
-		rc = run_tick(plan, clock, options, stats, now_ns);
+		if (stats->logged < options->log_size)
+			tick = &options->log[stats->logged++];
+		rc = run_tick(plan, clock, tick, stats, now_ns);
 		if (rc)
 			break;
 		due_ns += period_ns;
+		if (options->ticked)
+			ended = options->ticked(options->context, tick);
 	}
 	incise_plan_release(plan);
 	if (rc) {
@@ -108,7 +109,7 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 			"a device failed at tick %llu: %s; the force was taken away",
 			(unsigned long long)stats->ticks, cause);
 	}
-	return rc;
+	return rc ? rc : ended;
 }
 
 double incise_loop_quantile(const uint64_t *histogram, double share)

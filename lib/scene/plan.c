@@ -20,6 +20,13 @@ static const struct incise_tracker_info fed_tracker = {
 	.latency_ns = 4200000,
 };
 
+/* Where the rig's plane lies. */
+struct place {
+	double point_mm[3], normal[3];
+};
+
+static const struct place floor_place = {.normal = {0, 0, 1}};
+
 /* The model in the scene's arithmetic. */
 static int take_model(struct incise_plan *plan, struct incise_error *err)
 {
@@ -46,13 +53,14 @@ static int take_model(struct incise_plan *plan, struct incise_error *err)
 	return 0;
 }
 
-/* @tracker: that of the poses that are fed, or, with a rig, the rig's from here on. */
+/*
+ * @tracker: that of the poses that are fed, or, with a rig, the rig's from here on, and
+ * @place as well.
+ */
 static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
-		    struct incise_tracker_info *tracker, struct incise_error *err)
+		    struct incise_tracker_info *tracker, struct place place,
+		    struct incise_error *err)
 {
-	double point_mm[3] = {0};
-
-	plan->axis[2] = 1;
 	if (rig) {
 		plan->tracker = incise_rig_tracker(rig);
 		plan->stepper = incise_rig_stepper(rig);
@@ -62,14 +70,15 @@ static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 				"%s: the rig has no tracker: name one in rig.conf",
 				plan->scene->path);
 		incise_tracker_info(plan->tracker, tracker);
-		incise_rig_surface(rig, point_mm, plan->axis);
+		incise_rig_surface(rig, place.point_mm, place.normal);
 	}
+	v3_copy(plan->axis, place.normal);
 	if (plan->stepper)
 		incise_stepper_info(plan->stepper, &plan->actuator);
 	plan->surface = plan->scene->surface;
 	if (!plan->surface)
 		plan->surface = plan->own_surface =
-			incise_surface_new_plane(point_mm, plan->axis, err);
+			incise_surface_new_plane(place.point_mm, plan->axis, err);
 	return plan->surface ? 0 : -errno;
 }
 
@@ -216,7 +225,7 @@ static int check_age(const struct incise_plan *plan,
 static struct incise_plan *new_plan(const struct incise_scene *scene,
 				    struct incise_rig *rig,
 				    struct incise_tracker_info tracker,
-				    struct incise_error *err)
+				    const struct place *place, struct incise_error *err)
 {
 	struct incise_plan *plan = calloc(1, sizeof(*plan));
 	int rc;
@@ -226,7 +235,7 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 		return NULL;
 	}
 	plan->scene = scene;
-	rc = take_rig(plan, rig, &tracker, err);
+	rc = take_rig(plan, rig, &tracker, *place, err);
 	if (!rc)
 		rc = check_age(plan, &tracker, err);
 	if (!rc)
@@ -253,13 +262,25 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 struct incise_plan *incise_plan_new(const struct incise_scene *scene,
 				    struct incise_rig *rig, struct incise_error *err)
 {
-	return new_plan(scene, rig, fed_tracker, err);
+	return new_plan(scene, rig, fed_tracker, &floor_place, err);
 }
 
 struct incise_plan *incise_plan_new_fed(const struct incise_scene *scene,
 					const struct incise_tracker_info *tracker,
 					struct incise_error *err)
 {
+	return incise_plan_new_fed_on(scene, tracker, floor_place.point_mm,
+				      floor_place.normal, err);
+}
+
+struct incise_plan *incise_plan_new_fed_on(const struct incise_scene *scene,
+					   const struct incise_tracker_info *tracker,
+					   const double point_mm[3],
+					   const double normal[3],
+					   struct incise_error *err)
+{
+	struct place place;
+
 	if (!(tracker->rate_hz > 0) || !isfinite(tracker->rate_hz) ||
 	    tracker->latency_ns < 0) {
 		incise_error_set(err, EINVAL,
@@ -269,7 +290,14 @@ struct incise_plan *incise_plan_new_fed(const struct incise_scene *scene,
 		errno = EINVAL;
 		return NULL;
 	}
-	return new_plan(scene, NULL, *tracker, err);
+	v3_copy(place.point_mm, point_mm);
+	if (!v3_finite(point_mm) || !v3_unit(place.normal, normal, 0)) {
+		incise_error_set(err, EINVAL,
+				 "the tissue's plane has no place or no normal");
+		errno = EINVAL;
+		return NULL;
+	}
+	return new_plan(scene, NULL, *tracker, &place, err);
 }
 
 void incise_plan_free(struct incise_plan *plan)

@@ -5,6 +5,7 @@
  *
  *   real:       now() = CLOCK_MONOTONIC        wait_until(t) sleeps
  *   simulated:  now() = what was waited for    wait_until(t) sets the time to t
+ *   paced:      the same                       wait_until(t) sleeps first
  */
 #ifndef INCISE_CLOCK_H
 #define INCISE_CLOCK_H
@@ -34,6 +35,16 @@ INCISE_API struct incise_clock *incise_clock_new_real(void);
  */
 INCISE_API struct incise_clock *incise_clock_new_simulated(int64_t start_ns);
 
+/**
+ * A simulated clock that waits as long as it says: time goes on by the very same steps, but
+ * no faster than CLOCK_MONOTONIC from the first wait on. After a wait that took too long the
+ * next ones are short until it has caught up.
+ *
+ * @param start_ns as above
+ * @return clock, to be freed with incise_clock_free(); NULL with errno ENOMEM.
+ */
+INCISE_API struct incise_clock *incise_clock_new_paced(int64_t start_ns);
+
 INCISE_API void incise_clock_free(struct incise_clock *clock);
 
 /** Nanoseconds since an arbitrary start. Real-time safe (vDSO). */
@@ -43,9 +54,16 @@ INCISE_API int64_t incise_clock_now(const struct incise_clock *clock);
 INCISE_API bool incise_clock_is_real(const struct incise_clock *clock);
 
 /**
+ * How far a paced clock was behind CLOCK_MONOTONIC when its last wait ended, ns; 0 for the
+ * others. Real-time safe.
+ */
+INCISE_API int64_t incise_clock_lag_ns(const struct incise_clock *clock);
+
+/**
  * Wait until an absolute time; a time that has passed returns at once.
  *
- * @return 0, or -EINTR when a signal handler ran. Makes one system call on a real clock.
+ * @return 0, or -EINTR when a signal handler ran. Makes one system call on a real or
+ *         paced clock; a paced one that was interrupted has not gone on.
  */
 INCISE_API int incise_clock_wait_until(struct incise_clock *clock, int64_t t_ns);
 

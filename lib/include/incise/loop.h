@@ -4,7 +4,8 @@
  *
  * The next wake-up follows from the previous one, never from now. A tick that would
  * start more than a period late is skipped and counted, so that a stall is not followed
- * by a burst.
+ * by a burst. On a paced clock (incise/clock.h) every tick has its own time, however late it
+ * runs, so that none is skipped.
  */
 #ifndef INCISE_LOOP_H
 #define INCISE_LOOP_H
@@ -30,6 +31,13 @@ struct incise_loop_options {
 	size_t log_size;
 	/** Set by a signal handler to end the loop, or NULL. */
 	const volatile sig_atomic_t *stop;
+	/**
+	 * Told of each tick after it, outside of its cost; what is not 0 ends the loop, and is
+	 * what incise_loop_run() returns. Or NULL. For what is not live: it takes the time of
+	 * the next tick.
+	 */
+	int (*ticked)(void *context, const struct incise_tick *tick);
+	void *context;
 };
 
 /** Statistics of a run. */
@@ -51,11 +59,11 @@ struct incise_loop_stats {
 
 /**
  * Run a plan, and let go of the actuator at the end, however it comes. Makes no
- * allocation and no system call but the clock's.
+ * allocation and no system call but the clock's, and what options->ticked makes.
  *
  * @param stats caller's memory, some 300 KiB; zeroed here
  * @return 0 at the end of the time or when stopped; -EINVAL (options), or the errno of
- *         the device that failed.
+ *         the device that failed; what options->ticked returned, which sets @err itself.
  */
 INCISE_API int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 			       const struct incise_loop_options *options,

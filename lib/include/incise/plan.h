@@ -58,6 +58,16 @@ INCISE_API struct incise_plan *incise_plan_new_fed(
 	const struct incise_scene *scene, const struct incise_tracker_info *tracker,
 	struct incise_error *err);
 
+/**
+ * The same for tissue whose plane, where the scene has no surface of its own, lies there and
+ * not at z = 0; as with a rig.
+ *
+ * @param normal outward, any length above 0
+ */
+INCISE_API struct incise_plan *incise_plan_new_fed_on(
+	const struct incise_scene *scene, const struct incise_tracker_info *tracker,
+	const double point_mm[3], const double normal[3], struct incise_error *err);
+
 INCISE_API void incise_plan_free(struct incise_plan *plan);
 
 /** Names of the stages in order; NULL from the first index that is not there. */

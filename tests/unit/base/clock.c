@@ -27,6 +27,31 @@ static void test_simulated_time_stands_still(void **state)
 	incise_clock_free(clock);
 }
 
+/* Its steps are those of a simulated one, and no wait ends before its time. */
+static void test_paced_time_is_simulated_time_that_takes_time(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_paced(5);
+	struct timespec before, after;
+
+	assert_false(incise_clock_is_real(clock));
+	assert_int_equal(incise_clock_now(clock), 5);
+	assert_int_equal(incise_clock_lag_ns(clock), 0);
+	clock_gettime(CLOCK_MONOTONIC, &before);
+	for (int i = 1; i <= 4; i++) {
+		assert_int_equal(incise_clock_wait_until(clock, 5 + i * 1000000), 0);
+		assert_int_equal(incise_clock_now(clock), 5 + i * 1000000);
+		assert_true(incise_clock_lag_ns(clock) >= 0);
+	}
+	clock_gettime(CLOCK_MONOTONIC, &after);
+	assert_true((after.tv_sec - before.tv_sec) * INCISE_NS_PER_S + after.tv_nsec -
+			    before.tv_nsec >=
+		    4000000);
+	/* What is over takes no time, and time does not go back. */
+	assert_int_equal(incise_clock_wait_until(clock, 10), 0);
+	assert_int_equal(incise_clock_now(clock), 4000005);
+	incise_clock_free(clock);
+}
+
 static void test_real_time_is_monotonic_clock(void **state)
 {
 	struct incise_clock *clock = incise_clock_new_real();
@@ -71,6 +96,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_simulated_time_stands_still),
+		cmocka_unit_test(test_paced_time_is_simulated_time_that_takes_time),
 		cmocka_unit_test(test_real_time_is_monotonic_clock),
 		cmocka_unit_test(test_a_signal_ends_the_wait),
 	};

@@ -532,6 +532,51 @@ static void test_fed_tracker(void **state)
 	fed_end(&usual);
 }
 
+/* Without a surface in the scene the tissue is where it is said to be. */
+static void test_fed_plane(void **state)
+{
+	static const struct incise_tracker_info tracker = {
+		.name = "t", .rate_hz = 120, .stations = 1};
+	const double point[3] = {10, -4, 7}, normal[3] = {0, 3, 4}, nowhere[3] = {0};
+	const double off[3] = {NAN, 0, 0};
+	struct incise_tracker_sample pose = {.quaternion = {1}, .status = ' '};
+	struct fed_folder folder;
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+	struct incise_error err;
+	struct incise_tick tick;
+
+	fed_folder_make(&folder);
+	scene = fed_scene(&folder, "tissue = { reaction_N_mm = 0.1; };", &err);
+	assert_non_null(scene);
+	plan = incise_plan_new_fed_on(scene, &tracker, point, normal, &err);
+	assert_non_null(plan);
+	/* 2 mm along (0, 0.6, 0.8) below the point, and aside; there from the first pose on */
+	for (int i = 0; i < 3; i++)
+		pose.position_mm[i] = point[i] - 2 * normal[i] / 5;
+	pose.position_mm[0] += 5;
+	for (int k = 1; k <= 400; k++) {
+		pose.t_ns = k * 1000000LL;
+		/* from above, so that the force begins small */
+		pose.position_mm[2] += k == 1 ? 4 : k <= 201 ? -0.02 : 0;
+		assert_int_equal(incise_plan_feed(plan, &pose, 1), 1);
+		assert_int_equal(incise_plan_tick(plan, pose.t_ns, &tick), 0);
+	}
+	/* what is left of a smoothed way of 4 mm after 0.2 s at rest */
+	assert_true(fabs(tick.depth_mm - 2) < 1e-3);
+	assert_true(fabs(tick.normal[1] - 0.6) < 1e-12 &&
+		    fabs(tick.normal[2] - 0.8) < 1e-12);
+	assert_true(fabs(tick.command_N[1] - 0.2 * 0.6) < 1e-3);
+	assert_true(fabs(tick.command_N[2] - 0.2 * 0.8) < 1e-3);
+	incise_plan_free(plan);
+	assert_null(incise_plan_new_fed_on(scene, &tracker, point, nowhere, &err));
+	assert_int_equal(errno, EINVAL);
+	assert_null(incise_plan_new_fed_on(scene, &tracker, off, normal, &err));
+	assert_int_equal(err.code, EINVAL);
+	incise_scene_free(scene);
+	fed_folder_remove(&folder);
+}
+
 /* Down into the neck and along it, blade first, and out. */
 static void dive(void *own, double t, struct incise_tracker_sample *pose)
 {
@@ -692,6 +737,7 @@ int main(void)
 		cmocka_unit_test(test_set_tool),
 		cmocka_unit_test(test_stale_handle),
 		cmocka_unit_test(test_getters),
+		cmocka_unit_test(test_fed_plane),
 		cmocka_unit_test(test_fed_tracker),
 		cmocka_unit_test(test_timed_tick_is_the_same),
 		cmocka_unit_test(test_timed_fault),
