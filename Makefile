@@ -68,6 +68,7 @@ uses_info := incise incise-record
 uses_haptic := incise
 uses_stepper := incise
 uses_plan := incise
+uses_replay := incise incise-record
 uses_demo := incise incise-learn
 uses_bench := incise incise-learn incise-record
 

@@ -14,6 +14,7 @@
 #include <incise/outfile.h>
 #include "cli.h"
 #include "json.h"
+#include "loop_report.h"
 #include "scene_argument.h"
 #include "stepper_counters.h"
 
@@ -113,18 +114,6 @@ static void parse(struct job *job, int argc, char **argv)
 		cli_usage("--json and --log - would both write to standard output");
 }
 
-/* A letter for each flag, from the lowest bit on; incise-haptic(1) explains them. */
-static const char *flags_text(unsigned int flags, char *text)
-{
-	static const char letters[] = "cesofvtgrn";
-
-	_Static_assert(sizeof(letters) == INCISE_TICK_FLAGS + 1, "a letter for each");
-	for (int i = 0; letters[i]; i++)
-		text[i] = flags & 1u << i ? letters[i] : '-';
-	text[strlen(letters)] = 0;
-	return text;
-}
-
 static const char *const phases[] = {"free", "cutting", "insertion"};
 
 static void write_log(struct incise_outfile *file, const struct incise_tick *ticks,
@@ -149,7 +138,7 @@ static void write_log(struct incise_outfile *file, const struct incise_tick *tic
 			sqrt(t->command_N[0] * t->command_N[0] +
 			     t->command_N[1] * t->command_N[1] +
 			     t->command_N[2] * t->command_N[2]),
-			t->rendered_N, flags_text(t->flags, flags), phases[t->phase],
+			t->rendered_N, loop_flags_text(t->flags, flags), phases[t->phase],
 			t->command_N[0], t->command_N[1], t->command_N[2]);
 	}
 	if (incise_outfile_commit(file, &err))
@@ -180,14 +169,6 @@ static double render_error(const struct incise_loop_stats *stats)
 	return stats->ticks > 1 ? sqrt(stats->rendered_off2 / (stats->ticks - 1)) : NAN;
 }
 
-/* Bins of 1 µs or 100 ns as a quantile in their unit; null in the open last bin. */
-static double quantile(const uint64_t *histogram, double share, double unit)
-{
-	double bin = incise_loop_quantile(histogram, share);
-
-	return bin < INCISE_LOOP_BINS ? bin * unit : INFINITY;
-}
-
 static const char *scheduling(bool real)
 {
 	int policy = sched_getscheduler(0);
@@ -199,40 +180,13 @@ static const char *scheduling(bool real)
 				    : "SCHED_OTHER";
 }
 
-static json_t *histogram_json(const uint64_t *histogram)
-{
-	json_t *list = json_array();
-
-	for (int i = 0; i < INCISE_LOOP_BINS; i++)
-		if (histogram[i])
-			json_array_append_new(list, json_pack("[iI]", i,
-							      (json_int_t)histogram[i]));
-	return list;
-}
-
-static json_t *lateness_json(const struct incise_loop_stats *s)
-{
-	return json_pack("{so so so so so}", "median",
-			 json_number(quantile(s->lateness_us, 0.5, 1)), "p99",
-			 json_number(quantile(s->lateness_us, 0.99, 1)), "p999",
-			 json_number(quantile(s->lateness_us, 0.999, 1)), "max",
-			 json_number(s->lateness_max_ns * 1e-3), "histogram",
-			 histogram_json(s->lateness_us));
-}
-
 static json_t *cost_json(const struct incise_loop_stats *s)
 {
 	return json_pack("{so so so}", "median",
-			 json_number(quantile(s->tick_100ns, 0.5, 100)), "p999",
-			 json_number(quantile(s->tick_100ns, 0.999, 100)), "max",
+			 json_number(loop_quantile(s->tick_100ns, 0.5, 100)), "p999",
+			 json_number(loop_quantile(s->tick_100ns, 0.999, 100)), "max",
 			 json_number(s->tick_max_ns));
 }
-
-/* As JSON names them, from the lowest bit on. */
-static const char *const flag_names[INCISE_TICK_FLAGS] = {
-	"contact", "extrapolated", "stale",   "clamped",  "fault",
-	"slewed",  "travel",	   "guarded", "starting", "not_finite",
-};
 
 static uint64_t ticks_with(const struct incise_loop_stats *s, enum incise_tick_flag flag)
 {
@@ -243,43 +197,30 @@ static void report_json(const struct incise_loop_stats *s, const struct incise_p
 			struct incise_stepper *stepper, bool real, double rate_hz,
 			double rms_N)
 {
-	json_t *stages = json_array(), *flags = json_object();
+	json_t *stages = json_array();
 
-	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
-		json_object_set_new(flags, flag_names[i],
-				    json_integer((json_int_t)s->flagged[i]));
 	for (int i = 0; incise_plan_stage(plan, i); i++)
 		json_array_append_new(stages, json_string(incise_plan_stage(plan, i)));
 	json_print(json_pack(
 		"{sI sI sf so so sI sI sI sI so sf so so ss so so}", "ticks",
 		(json_int_t)s->ticks, "skipped", (json_int_t)s->skipped, "rate_hz",
-		rate_hz, "lateness_us", real ? lateness_json(s) : json_null(), "tick_ns",
-		real ? cost_json(s) : json_null(), "contact",
+		rate_hz, "lateness_us", real ? loop_lateness_json(s) : json_null(),
+		"tick_ns", real ? cost_json(s) : json_null(), "contact",
 		(json_int_t)ticks_with(s, INCISE_TICK_CONTACT), "extrapolated",
 		(json_int_t)ticks_with(s, INCISE_TICK_EXTRAPOLATED), "stale",
 		(json_int_t)ticks_with(s, INCISE_TICK_STALE), "limited",
-		(json_int_t)s->limited, "flags", flags, "force_max_N", s->force_max_N,
-		"rendered_rms_error_N", json_number(rms_N), "actuator",
-		stepper ? stepper_counters_json(stepper) : json_null(), "scheduling",
-		scheduling(real), "stages", stages, "stopped_by",
+		(json_int_t)s->limited, "flags", loop_flags_json(s->flagged),
+		"force_max_N", s->force_max_N, "rendered_rms_error_N", json_number(rms_N),
+		"actuator", stepper ? stepper_counters_json(stepper) : json_null(),
+		"scheduling", scheduling(real), "stages", stages, "stopped_by",
 		cli_stop ? json_string(strsignal(cli_stop)) : json_null()));
-}
-
-/* "< 74 us", or that it lies beyond the histogram; text is the caller's. */
-static const char *below(char *text, size_t size, double us)
-{
-	if (isfinite(us))
-		snprintf(text, size, "< %g us", us);
-	else
-		snprintf(text, size, "beyond the histogram");
-	return text;
 }
 
 static void report_text(const struct incise_loop_stats *s, const struct incise_plan *plan,
 			struct incise_stepper *stepper, bool real, double rate_hz,
 			double rms_N)
 {
-	char a[32], b[32], c[32];
+	char a[32], b[32];
 
 	printf("%llu ticks at %g Hz, %llu skipped (%s)\nstages    ",
 	       (unsigned long long)s->ticks, rate_hz, (unsigned long long)s->skipped,
@@ -289,14 +230,10 @@ static void report_text(const struct incise_loop_stats *s, const struct incise_p
 	putchar('\n');
 	/* In simulated time a tick takes none and is never late. */
 	if (real) {
-		printf("lateness   median %s, 99 %% %s, 99.9 %% %s, max %.0f us\n",
-		       below(a, sizeof(a), quantile(s->lateness_us, 0.5, 1)),
-		       below(b, sizeof(b), quantile(s->lateness_us, 0.99, 1)),
-		       below(c, sizeof(c), quantile(s->lateness_us, 0.999, 1)),
-		       s->lateness_max_ns * 1e-3);
+		loop_lateness_line(s);
 		printf("tick       median %s, 99.9 %% %s, max %.1f us\n",
-		       below(a, sizeof(a), quantile(s->tick_100ns, 0.5, 0.1)),
-		       below(b, sizeof(b), quantile(s->tick_100ns, 0.999, 0.1)),
+		       loop_below(a, sizeof(a), loop_quantile(s->tick_100ns, 0.5, 0.1)),
+		       loop_below(b, sizeof(b), loop_quantile(s->tick_100ns, 0.999, 0.1)),
 		       s->tick_max_ns * 1e-3);
 	}
 	printf("force      largest %.3f N", s->force_max_N);
