@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise replay, as a user meets it.
+
+load cli
+
+quick=sim:clock=simulated,depth_mm=10,times=1,pause_s=0.1,cut_s=4
+
+setup_file() {
+	cd "$BATS_FILE_TMPDIR"
+	made_pairs >pairs.csv
+	incise train pairs.csv -o liver.fis 2>/dev/null
+	incise capture -o liver.rec --rig $quick --duration 3s >/dev/null
+}
+
+setup() {
+	work_folder
+	cp "$BATS_FILE_TMPDIR/liver.fis" .
+	cp -r "$BATS_FILE_TMPDIR/liver.rec" .
+	cp "$root/scenes/liver.scene" .
+}
+
+teardown() {
+	[ -z "$pid" ] || kill -9 "$pid" 2>/dev/null || :
+}
+
+@test "replay reports" {
+	run -0 --separate-stderr incise replay liver.rec liver.scene
+	[ -z "$stderr" ]
+	[[ "${lines[0]}" =~ ^liver.rec:\ 3.0\ s,\ 2999\ ticks\ at\ 1000\ Hz,\ 3[56][0-9]\ poses,\ 1\ cuts$ ]]
+	[[ "${lines[1]}" == "predicted  off by 0."*" N rms ("*" % of the range), at most "* ]]
+	[[ "${lines[-1]}" =~ ^crc32c\ +[0-9a-f]{8}$ ]]
+	[[ "$output" != *lateness* ]]
+}
+
+@test "forces are the same from run to run and at both speeds" {
+	incise replay liver.rec liver.scene --csv a.csv | tail -n 1 >a
+	incise replay liver.rec liver.scene --csv b.csv | tail -n 1 >b
+	incise replay liver.rec liver.scene --csv c.csv --real-time >report
+	tail -n 1 report >c
+	cmp a.csv b.csv
+	cmp a.csv c.csv
+	cmp a b
+	cmp a c
+	grep -q '^lateness ' report
+	grep -q '^late ' report
+	# and others where they must be
+	incise replay liver.rec liver.scene --arith double | tail -n 1 >d
+	run ! cmp -s a d
+	incise replay liver.rec liver.scene --at acquisition | tail -n 1 >e
+	run ! cmp -s a e
+}
+
+@test "real time takes the recording's time" {
+	start=$(date +%s%N)
+	incise replay liver.rec liver.scene --real-time >/dev/null
+	[ $(($(date +%s%N) - start)) -ge 2990000000 ]
+}
+
+@test "what is predicted is what the live loop does on the same poses" {
+	incise haptic liver.scene --rig $quick --duration 3s --log live.csv >/dev/null
+	incise replay liver.rec liver.scene --csv replay.csv >/dev/null
+	# the log begins with the first tick, as the recording's ticks do; it is rounded to 0.01 mN
+	paste -d, <(sed 1d live.csv) <(sed 1d replay.csv) | head -n 2999 | awk -F, '
+		{ e = $13 - $18; if (e < 0) e = -e; if (e > 0.6e-5 || $9 != $21) { print; exit 1 }
+		  if ($18 > m) m = $18 }
+		END { exit !(NR == 2999 && m > 0.3) }'
+}
+
+@test "the table has every tick, and the report is the table's" {
+	incise replay liver.rec liver.scene --csv t.csv --json >r.json
+	[ "$(head -n 1 t.csv)" = \
+		t_s,cut,depth_mm,velocity_mm_s,predicted_N,measured_N,clipped,flags ]
+	[ "$(key r.json ticks)" = "$(($(wc -l <t.csv) - 1))" ]
+	awk -F, 'NR > 2 && ($1 - last - 0.001) ^ 2 > 1e-12 { exit 1 } { last = $1 }' t.csv
+	read -r n rms most range < <(awk -F, 'NR > 1 && $2 && !$7 && $6 != "nan" {
+			e = $5 - $6; s += e * e; if (e < 0) e = -e; if (e > m) m = e
+			if (!n || $6 < a) a = $6; if (!n || $6 > b) b = $6; n++ }
+		END { print n, sqrt(s / n), m, b - a }' t.csv)
+	[ "$(key r.json compared)" = "$n" ]
+	# six decimals in the table
+	holds "($(key r.json rms_N) - $rms)^2 < 1e-12"
+	holds "($(key r.json max_N) - $most)^2 < 1e-11"
+	holds "($(key r.json nrmse) - $rms / $range)^2 < 1e-11"
+	[ "$(key r.json flags.contact)" = "$(cut -d, -f8 t.csv | grep -c ^c)" ]
+	[ "$(key r.json flags.starting)" = "$(cut -d, -f8 t.csv | grep -c '^........r')" ]
+	[ "$(key r.json cuts)" = 1 ]
+	[ "$(key r.json tracker_hz)" = 120.0 ]
+	[ "$(key r.json tracker_latency_ms)" = 4.2 ]
+	[ "$(key r.json crc32c)" = "$(incise replay liver.rec liver.scene | awk 'END { print $2 }')" ]
+	[ -z "$(key r.json late)" ]
+	[ -z "$(key r.json lateness_us)" ]
+	incise replay liver.rec liver.scene --real-time --json >r.json
+	holds "$(key r.json late) >= 0"
+	holds "$(key r.json lateness_us.max) > 0"
+}
+
+@test "measured forces and cuts are those of the export" {
+	incise replay liver.rec liver.scene --csv t.csv >/dev/null
+	incise export liver.rec -o e.csv >/dev/null
+	# the samples of a cut, in the millisecond around each tick that lies inside of it
+	awk -F, 'NR == FNR { if (FNR > 1) { k = int($2 * 1000 + 0.5 + 1e-7); s[k] += $5; n[k]++ } next }
+		FNR > 1 && $2 { k = int($1 * 1000 + 0.5); seen++
+			if (n[k] != 10) next
+			# five decimals in the one, six in the other
+			whole++; e = $6 - s[k] / 10; if (e * e > 3.1e-11) { print; bad = 1; exit } }
+		END { exit bad || whole < 2000 || seen > whole + 2 }' e.csv t.csv
+}
+
+@test "the table to standard output" {
+	run -0 --separate-stderr incise replay liver.rec liver.scene --csv -
+	[ -z "$stderr" ]
+	[ "${#lines[@]}" -eq 3000 ]
+	[[ "${lines[0]}" == t_s,* ]]
+	run --separate-stderr incise replay liver.rec liver.scene --csv - --json
+	bad_usage "standard output"
+}
+
+@test "another calibration, model and tool" {
+	echo 'force_mV_N = 620.0;' >half.conf
+	incise replay liver.rec liver.scene --csv a.csv >/dev/null
+	incise replay liver.rec liver.scene --csv b.csv -c half.conf >/dev/null
+	# half the sensitivity: twice the force; six decimals
+	paste -d, a.csv b.csv | awk -F, 'NR > 1 { e = 2 * $6 - $14; if (e * e > 9e-12) exit 1 }
+		NR > 1 && $5 != $13 { exit 1 }'
+	incise replay liver.rec "$root/scenes/neck.scene" --tool blade >/dev/null
+	incise compile liver.fis -o liver.fx >/dev/null
+	incise replay liver.rec liver.scene --model liver.fx >/dev/null
+}
+
+@test "an interrupted recording is replayed" {
+	mv liver.rec crash.rec.part
+	run -0 incise replay crash.rec liver.scene
+	[[ "$output" == *"2999 ticks"* ]]
+}
+
+@test "a signal ends it, and leaves an older file as it was" {
+	echo old >t.csv
+	incise replay liver.rec liver.scene --real-time --csv t.csv >out 2>err &
+	pid=$!
+	# before it is the replay it is a shell
+	for ((i = 0; i < 100; i++)); do
+		mask=$(awk '/^Name/ && $2 != "incise-replay" { exit } /^SigCgt/ { print $2 }' \
+			/proc/$pid/status)
+		((0x${mask:-0} & 2)) && break
+		sleep 0.02
+	done
+	sleep 0.3
+	kill -INT $pid
+	status=0
+	wait $pid || status=$?
+	pid=
+	[ "$status" -eq 1 ]
+	grep -q '^incise replay: liver.rec: interrupted .* nothing was written$' err
+	[ "$(cat t.csv)" = old ]
+	[ ! -s out ]
+	[ -z "$(find . -name '.*.csv*')" ]
+}
+
+@test "what cannot be replayed" {
+	run --separate-stderr incise replay none.rec liver.scene --csv t.csv
+	failed_with none.rec "no such recording"
+	run --separate-stderr incise replay liver.rec none.scene --csv t.csv
+	failed_with none.scene
+	run --separate-stderr incise replay liver.rec liver.scene --csv no/folder/t.csv
+	failed_with no/folder
+	sqlite3 liver.rec/recording.db "UPDATE tracker SET x_mm = 'far' WHERE seq = 100"
+	run --separate-stderr incise replay liver.rec liver.scene --csv t.csv
+	failed_with liver.rec "damaged" "row 100"
+	[ ! -e t.csv ]
+	sqlite3 liver.rec/recording.db "DELETE FROM tracker;
+		UPDATE meta SET value = 0 WHERE key = 'tracker_rows'"
+	run --separate-stderr incise replay liver.rec liver.scene
+	failed_with "no pose"
+}
+
+@test "a full disk" {
+	run --separate-stderr incise replay liver.rec liver.scene --csv /dev/full
+	failed_with /dev/full
+}
+
+@test "bad usage" {
+	run --separate-stderr incise replay
+	bad_usage "a recording and a scene"
+	run --separate-stderr incise replay liver.rec
+	bad_usage "got 1"
+	run --separate-stderr incise replay liver.rec liver.scene more
+	bad_usage "got 3"
+	run --separate-stderr incise replay liver.rec liver.scene --at dawn
+	bad_usage dawn
+	run --separate-stderr incise replay liver.rec liver.scene --tool spoon
+	bad_usage spoon
+	run --separate-stderr incise replay liver.rec liver.scene --arith half
+	bad_usage half
+}
