@@ -17,7 +17,8 @@ extra_capture := $(addprefix $(O)/obj/tools/,capture_view.o keyboard.o stopwatch
 extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
 	stepper_status.o stepper_counters.o)
 extra_haptic := $(addprefix $(O)/obj/tools/,scene_argument.o stepper_counters.o loop_report.o)
-extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o)
+extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o picture.o \
+	replay_picture.o)
 extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stopwatch.o)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o \

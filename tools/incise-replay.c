@@ -12,10 +12,12 @@
 #include "cli.h"
 #include "json.h"
 #include "loop_report.h"
+#include "replay_picture.h"
 #include "scene_argument.h"
 
 enum {
 	OPT_CSV = CLI_LONG,
+	OPT_PLOT,
 	OPT_AT,
 	OPT_REAL_TIME,
 	OPT_MODEL,
@@ -27,6 +29,8 @@ enum {
 static const struct cli_option options[] = {
 	{OPT_CSV, "csv", "FILE",
 	 "write every tick, predicted beside measured force; - is standard\noutput"},
+	{OPT_PLOT, "plot", "NAME",
+	 "draw predicted beside measured force as NAME.png and NAME.svg"},
 	{OPT_REAL_TIME, "real-time", NULL,
 	 "wait for each tick (default: as fast as it goes)"},
 	{OPT_AT, "at", "WHEN",
@@ -54,7 +58,7 @@ static const struct cli_verb verb = {
 };
 
 struct job {
-	const char *recording, *csv, *calibration;
+	const char *recording, *csv, *plot, *calibration;
 	struct scene_argument scene;
 	struct incise_replay_options how;
 	bool json;
@@ -80,6 +84,9 @@ static void parse(struct job *job, int argc, char **argv)
 		switch (opt) {
 		case OPT_CSV:
 			job->csv = optarg;
+			break;
+		case OPT_PLOT:
+			job->plot = optarg;
 			break;
 		case OPT_REAL_TIME:
 			job->how.real_time = true;
@@ -118,6 +125,7 @@ struct table {
 	bool bar;  /* one would run through rows on the same terminal */
 	int percent;
 	const char *name;
+	struct replay_picture *picture; /* or NULL */
 };
 
 static void show_progress(struct table *table, double done)
@@ -139,6 +147,8 @@ static int put_tick(void *context, const struct incise_replay_tick *told,
 	struct table *table = context;
 
 	show_progress(table, told->done);
+	if (table->picture)
+		replay_picture_add(table->picture, told);
 	if (!table->out)
 		return 0;
 	fprintf(table->out, "%.6f,%d,%.4f,%.3f,%.6f,", told->t_s, told->cut,
@@ -268,6 +278,7 @@ int main(int argc, char **argv)
 	struct incise_error err = {0};
 	struct incise_scene *scene;
 	struct table table = {.percent = -1};
+	struct replay_picture picture;
 	struct job job;
 	double rate_hz;
 	int rc;
@@ -295,6 +306,10 @@ int main(int argc, char **argv)
 		      "flags\n",
 		      table.out);
 	}
+	if (job.plot) {
+		replay_picture_begin(&picture, job.plot);
+		table.picture = &picture;
+	}
 	job.how.ticked = put_tick;
 	job.how.context = &table;
 	cli_catch_signals();
@@ -309,6 +324,8 @@ int main(int argc, char **argv)
 	if (cli_stop)
 		cli_fail("%s: interrupted %.1f s after its beginning%s", job.recording,
 			 report.seconds, job.csv ? "; nothing was written" : "");
+	if (job.plot)
+		replay_picture_draw(&picture);
 	if (job.json)
 		report_json(&job, rate_hz, &stats, &report);
 	else if (table.bar)

@@ -127,6 +127,15 @@ teardown() {
 	incise replay liver.rec liver.scene --model liver.fx >/dev/null
 }
 
+@test "a picture of it" {
+	command -v gnuplot >/dev/null || skip "gnuplot is not installed"
+	incise replay liver.rec liver.scene --plot pictures/liver >/dev/null
+	[ "$(head -c 8 pictures/liver.png | od -An -tx1 | tr -d ' ')" = 89504e470d0a1a0a ]
+	grep -q '<svg' pictures/liver.svg
+	# all ticks of a short one
+	[ "$(wc -l <pictures/plot/liver.dat)" -eq 2999 ]
+}
+
 @test "an interrupted recording is replayed" {
 	mv liver.rec crash.rec.part
 	run -0 incise replay crash.rec liver.scene
