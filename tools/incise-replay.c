@@ -172,16 +172,6 @@ static double relative(const struct incise_replay_report *report)
 	return report->range_N > 0 ? report->rms_N / report->range_N : NAN;
 }
 
-/* Ticks that a live loop would have left out. */
-static uint64_t late(const struct incise_loop_stats *stats, double rate_hz)
-{
-	uint64_t n = 0;
-
-	for (int i = (int)(1e6 / rate_hz); i < INCISE_LOOP_BINS; i++)
-		n += stats->lateness_us[i];
-	return n;
-}
-
 static void report_json(const struct job *job, double rate_hz,
 			const struct incise_loop_stats *stats,
 			const struct incise_replay_report *r)
@@ -202,8 +192,7 @@ static void report_json(const struct job *job, double rate_hz,
 		json_number(stats->force_max_N), "flags", loop_flags_json(stats->flagged),
 		"spells", loop_flags_json(r->spells), "crc32c", crc, "lateness_us",
 		job->how.real_time ? loop_lateness_json(stats) : json_null(), "late",
-		job->how.real_time ? json_integer((json_int_t)late(stats, rate_hz))
-				   : json_null()));
+		job->how.real_time ? json_integer((json_int_t)r->late) : json_null()));
 }
 
 /* Why there was less force than the tissue's, or none, as far as it was met. */
@@ -263,7 +252,7 @@ static void report_text(const struct job *job, double rate_hz,
 	if (job->how.real_time) {
 		loop_lateness_line(stats);
 		printf("late       %llu ticks by a period or more\n",
-		       (unsigned long long)late(stats, rate_hz));
+		       (unsigned long long)r->late);
 	}
 	printf("crc32c     %08x\n", r->crc);
 }

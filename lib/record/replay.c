@@ -20,6 +20,7 @@ struct replay {
 	const struct incise_replay_options *options;
 	struct incise_replay_report *report;
 	struct incise_plan *plan;
+	struct incise_clock *clock;
 	struct incise_error *err;
 	double normal[3]; /* of the recording's surface */
 	int64_t period_ns, first_ns;
@@ -84,6 +85,7 @@ static int ticked(void *context, const struct incise_tick *tick)
 
 	if (rc)
 		return rc;
+	report->late += incise_clock_lag_ns(replay->clock) >= replay->period_ns;
 	report->crc = add_force(report->crc, tick->command_N);
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
 		report->spells[i] += (tick->flags & ~replay->flags) >> i & 1;
@@ -130,6 +132,7 @@ static int run(struct replay *replay, double rate_hz, struct incise_loop_stats *
 
 	if (!clock)
 		return incise_error_set(replay->err, ENOMEM, "out of memory");
+	replay->clock = clock;
 	rc = feed(replay, replay->first_ns);
 	if (!rc)
 		rc = incise_loop_run(replay->plan, clock, &loop, stats, replay->err);

@@ -75,7 +75,9 @@ struct incise_replay_report {
 	double max_N;	   /**< largest size */
 	double max_t_s;	   /**< where that is */
 	double range_N;	   /**< largest less least measured force of them */
-	uint32_t crc;	   /**< CRC32C of all command_N, 3 little-endian doubles a tick */
+	uint64_t
+		late; /**< ticks that began a period late or more; 0 as fast as it goes */
+	uint32_t crc; /**< CRC32C of all command_N, 3 little-endian doubles a tick */
 };
 
 /**
@@ -83,7 +85,8 @@ struct incise_replay_report {
  * the rig that it was recorded on; poses are of the tracker that it names. What the tracker
  * doubts is fed like the rest, as live. Memory does not grow with the recording's length.
  *
- * @param stats as of incise_loop_run(); lateness only in real time
+ * @param stats as of incise_loop_run(), lateness only in real time; caller's memory, as it was
+ *        where the loop does not begin
  * @return 0; -EINVAL (rows that cannot be, rows missing), -ENODATA (no pose, or shorter than
  *         a tick), -EIO, -ENOMEM; errno of incise_plan_new_fed_on(); what options->ticked
  *         returned.
