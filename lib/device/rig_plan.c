@@ -252,7 +252,8 @@ static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 	if (!rc)
 		rc = incise_vision_setup_read(&plan->vision, &plan->has_vision, root,
 					      path, err);
-	if (plan->devices & INCISE_RIG_IF_NAMED && !config_setting_get_member(root, "camera"))
+	if (plan->devices & INCISE_RIG_IF_NAMED &&
+	    !config_setting_get_member(root, "camera"))
 		plan->devices &= ~INCISE_RIG_CAMERA;
 	for (int kind = 0; kind < N_KINDS && !rc; kind++)
 		rc = plan_device(plan, kind, plan->devices & kind_bit(kind), root, path,

@@ -31,7 +31,7 @@ struct incise_stream {
 	double drift_ppm, drift_sd_ppm; /**< of the device's clock; fast is positive */
 	double jitter_ms;		/**< standard deviation of arrivals or stamps */
 	double jitter_max_ms;		/**< farthest above the line */
-	double offset_ms;    /**< in all: the delay, and what the line is too high */
+	double offset_ms; /**< in all: the delay, and what the line is too high */
 	/** Standard uncertainty of times against this clock; without that of the delay, as
 	 * long as delay_sd_ms is NAN. */
 	double offset_sd_ms;
