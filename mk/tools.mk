@@ -24,7 +24,12 @@ extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o \
 	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
 	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o \
-	bench_vision.o scalpel_picture.o bench_capture.o)
+	bench_vision.o scalpel_picture.o bench_capture.o jpeg_camera.o)
+
+# Pictures that incise bench has coded before it measures.
+has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
+$(O)/obj/tools/jpeg_camera.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
+libs_bench := $(if $(has_jpeg),-ljpeg)
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
 # built where its headers are. It is for measuring, and is not installed.
@@ -46,7 +51,7 @@ define verb_program
 $(O)/bin/incise-$1: $(O)/obj/tools/incise-$1.o $$(extra_$1) $(tool_shared) \
 		$$(foreach lib,$$(uses_$1),$(O)/lib/lib$$(lib).so)
 	@mkdir -p $$(@D)
-	$$(call link_tool,$$(addprefix -l,$$(uses_$1)))
+	$$(call link_tool,$$(addprefix -l,$$(uses_$1)) $$(libs_$1))
 endef
 $(foreach verb,$(verbs),$(eval $(call verb_program,$(verb))))
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * A capture of all streams of the virtual rig, in real time, and the same with parts left
- * out; what a part takes is the difference. The rig is simulated by the process that is
- * measured, and is no part of a real capture: a run that reads all and keeps nothing tells
- * what it takes.
+ * A capture of all streams in real time, and the same with parts left out; what a part takes
+ * is the difference. Force and tracker are simulated by the process that is measured, which
+ * is no part of a real capture: a run that reads all and keeps nothing tells what it takes.
  *
- *   every 10 ms:  force, tracker ─ recorder ─ folder      camera ─ vision
+ *   every 10 ms:  force, tracker ─ recorder ─ folder
+ *   by the pump:  JPEG pictures, made before ─ camera.mkv, vision
  */
 #include <errno.h>
 #include <ftw.h>
@@ -15,33 +15,37 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 #include <incise/calibration.h>
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/vision.h>
 #include "bench_capture.h"
 #include "cli.h"
+#include "jpeg_camera.h"
 #include "json.h"
 #include "machine.h"
-#include "stopwatch.h"
 
-/* The issue's: 10 kHz, 120 Hz, VGA at 60 fps. The first two are what it is by default. */
-#define RIG "sim:camera_hz=60"
 #define SECONDS 10
 #define QUICK_SECONDS 2
+#define CAMERA_HZ 60
 #define POLL_NS 10000000LL /* as incise capture */
 #define BATCH 256
-#define HELD_UP 0.05	  /* of the time: then the figures say more of the machine */
-#define PICTURES_MAX 1200 /* twice as many as there are */
+#define HELD_UP 0.05 /* of the time: then the figures say more of the machine */
+
+#define RIG "sim:tracker_hz=240"
 
 static const struct part {
-	const char *name;
+	const char *name, *rig;
 	bool camera, recorder, vision;
+	int base; /* the run that tells what the rig itself takes */
 } parts[] = {
-	{"full", true, true, true},
-	{"without_vision", true, true, false},
-	{"without_camera", false, true, false},
-	{"virtual_rig", true, false, false},
+	{"full", RIG, true, true, true, 4},
+	{"without_vision", RIG, true, true, false, 4},
+	{"without_camera", RIG, false, true, false, 4},
+	{"force_100_kHz", RIG ",force_hz=100000", true, true, false, 5},
+	{"virtual_rig", RIG, true, false, false, 4},
+	{"virtual_100_kHz", RIG ",force_hz=100000", true, false, false, 5},
 };
 #define RUNS (int)(sizeof(parts) / sizeof(*parts))
 
@@ -49,17 +53,15 @@ static const struct part {
 struct run {
 	struct incise_rig *rig;
 	struct incise_recorder *recorder; /* NULL: what is read is dropped */
-	struct incise_vision *vision;
 	double cpu_percent;
 	double late_ms; /* the latest wake */
 	double held_up; /* share of the time that wakes were late, by a period or more */
-	uint64_t force, tracker, frames, force_lost, tracker_lost, frames_lost;
-	uint64_t lost_before; /* pictures, before it began */
+	double rss_MB[2]; /* memory at a quarter of the time, and at its end */
+	bool done;
+	uint64_t force, tracker, frames, force_lost, tracker_lost, frames_lost, unlooked;
 	struct incise_tracker_info tracker_info;
 	struct incise_force_info force_info;
 	struct incise_camera_info camera_info;
-	double us[PICTURES_MAX]; /* of vision */
-	int pictures, found;
 };
 
 /* CPU time, ns: CLOCK_PROCESS_CPUTIME_ID or CLOCK_THREAD_CPUTIME_ID. */
@@ -97,55 +99,44 @@ static int drop_samples(struct run *run)
 	return 0;
 }
 
-static int look(struct run *run, const struct incise_camera_frame *frame)
-{
-	struct incise_vision_result result;
-	double ns = cpu_ns(CLOCK_THREAD_CPUTIME_ID);
-	int rc = incise_vision_measure(run->vision, frame, &result);
-
-	if (run->pictures < PICTURES_MAX)
-		run->us[run->pictures++] = (cpu_ns(CLOCK_THREAD_CPUTIME_ID) - ns) * 1e-3;
-	run->found += result.found;
-	return rc;
-}
-
 static int take_frame(struct run *run)
 {
 	struct incise_camera *camera = incise_rig_camera(run->rig);
 	struct incise_camera_frame frame;
-	int rc = camera ? incise_camera_read(camera, &frame) : 0;
+	int rc = camera && !run->recorder ? incise_camera_read(camera, &frame) : 0;
 
 	if (rc <= 0)
 		return rc;
 	run->frames++;
-	run->frames_lost = incise_camera_lost(camera) - run->lost_before;
-	return run->vision ? look(run, &frame) : 0;
+	run->frames_lost = incise_camera_lost(camera);
+	return 0;
 }
 
-/* What came while it was opened is nobody's loss. */
-static int skip_pictures(struct run *run)
+/* Memory of this process that is in use, MB. */
+static double memory_MB(void)
 {
-	struct incise_camera *camera = incise_rig_camera(run->rig);
-	struct incise_camera_frame frame;
-	int rc = camera ? incise_camera_read(camera, &frame) : 0;
+	FILE *file = fopen("/proc/self/statm", "re");
+	long pages = 0;
 
-	run->lost_before = camera ? incise_camera_lost(camera) : 0;
-	return rc < 0 ? rc : 0;
+	if (!file)
+		return NAN;
+	if (fscanf(file, "%*d %ld", &pages) != 1)
+		pages = 0;
+	fclose(file);
+	return (double)pages * (double)sysconf(_SC_PAGESIZE) / 1e6;
 }
 
 /* Opening and closing are not measured: they happen once. */
-static int capture(struct run *run, int seconds, struct incise_error *err)
+static int capture(struct run *run, double seconds, struct incise_error *err)
 {
 	struct incise_clock *clock = incise_rig_clock(run->rig);
+	int64_t length_ns = (int64_t)(seconds * INCISE_NS_PER_S), start, now, next;
 	double cpu, held_up_ns = 0;
-	int64_t start, now, next;
-	int rc = skip_pictures(run);
+	int rc = 0;
 
-	if (rc)
-		incise_error_set(err, -rc, "a picture: %s", strerror(-rc));
 	start = now = next = incise_clock_now(clock);
 	cpu = cpu_ns(CLOCK_PROCESS_CPUTIME_ID);
-	while (!rc && !cli_stop && now - start < seconds * INCISE_NS_PER_S) {
+	while (!rc && !cli_stop && now - start < length_ns) {
 		next = now > next + POLL_NS ? now : next + POLL_NS;
 		incise_clock_wait_until(clock, next);
 		now = incise_clock_now(clock);
@@ -158,7 +149,10 @@ static int capture(struct run *run, int seconds, struct incise_error *err)
 			incise_error_set(err, -rc, "the virtual rig: %s", strerror(-rc));
 		if (!rc && (rc = take_frame(run)))
 			incise_error_set(err, -rc, "a picture: %s", strerror(-rc));
+		if (!run->rss_MB[0] && now - start >= length_ns / 4)
+			run->rss_MB[0] = memory_MB();
 	}
+	run->rss_MB[1] = memory_MB();
 	run->cpu_percent =
 		100 * (cpu_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu) / (double)(now - start);
 	run->held_up = held_up_ns / (double)(now - start);
@@ -166,14 +160,15 @@ static int capture(struct run *run, int seconds, struct incise_error *err)
 }
 
 /* Make what this run is of. Returns 0 or a negative errno. */
-static int open_run(struct run *run, const struct part *part, const char *folder,
-		    struct incise_error *err)
+static int open_run(struct run *run, const struct part *part, struct jpeg_camera *camera,
+		    const char *folder, struct incise_error *err)
 {
 	struct incise_calibration calibration;
-	struct incise_vision_setup setup;
+	struct incise_recorder_setup setup = {.calibration = &calibration};
+	struct incise_vision_setup vision;
 	char path[PATH_MAX];
 
-	run->rig = incise_rig_open(RIG,
+	run->rig = incise_rig_open(part->rig,
 				   INCISE_RIG_TRACKER | INCISE_RIG_FORCE |
 					   (part->camera ? INCISE_RIG_CAMERA : 0),
 				   err);
@@ -181,51 +176,54 @@ static int open_run(struct run *run, const struct part *part, const char *folder
 		return -errno;
 	incise_force_info(incise_rig_force(run->rig), &run->force_info);
 	incise_tracker_info(incise_rig_tracker(run->rig), &run->tracker_info);
-	if (part->camera)
+	incise_calibration_nominal(&calibration);
+	if (part->vision && !incise_rig_vision(run->rig, &vision))
+		setup.vision = &vision;
+	if (part->camera) {
+		jpeg_camera_take_over(camera, incise_rig_camera(run->rig),
+				      incise_rig_clock(run->rig));
 		incise_camera_info(incise_rig_camera(run->rig), &run->camera_info);
-	if (part->vision) {
-		incise_rig_vision(run->rig, &setup);
-		run->vision = incise_vision_new(&setup, err);
-		if (!run->vision)
-			return -errno;
 	}
 	if (part->recorder) {
-		incise_calibration_nominal(&calibration);
 		snprintf(path, sizeof(path), "%s/%s.rec", folder, part->name);
-		run->recorder = incise_recorder_new(
-			path, run->rig,
-			&(struct incise_recorder_setup){.calibration = &calibration},
-			err);
+		run->recorder = incise_recorder_new(path, run->rig, &setup, err);
 		if (!run->recorder)
 			return -errno;
 	}
 	return 0;
 }
 
-static int do_run(struct run *run, const struct part *part, const char *folder,
-		  int seconds, struct incise_error *err)
+static int end_recorder(struct run *run, struct incise_error *err)
 {
 	struct incise_recorder_stats stats;
 	struct incise_error ignored = {0};
-	int rc = open_run(run, part, folder, err);
+	int rc = incise_recorder_end(run->recorder, err), closed;
+
+	incise_recorder_stats(run->recorder, &stats);
+	run->force = stats.force;
+	run->tracker = stats.tracker;
+	run->frames = stats.frames;
+	run->force_lost = stats.force_lost;
+	run->tracker_lost = stats.tracker_lost;
+	run->frames_lost = stats.frames_lost;
+	run->unlooked = stats.frames_unlooked;
+	closed = incise_recorder_close(run->recorder, rc ? &ignored : err);
+	return rc ? rc : closed;
+}
+
+static int do_run(struct run *run, const struct part *part, struct jpeg_camera *camera,
+		  const char *folder, double seconds, struct incise_error *err)
+{
+	struct incise_error ignored = {0};
+	int rc = open_run(run, part, camera, folder, err), ended;
 
 	if (!rc)
 		rc = capture(run, seconds, err);
-	if (run->recorder) {
-		int closed;
-
-		incise_recorder_stats(run->recorder, &stats);
-		run->force = stats.force;
-		run->tracker = stats.tracker;
-		run->force_lost = stats.force_lost;
-		run->tracker_lost = stats.tracker_lost;
-		closed = incise_recorder_close(run->recorder, rc ? &ignored : err);
-		rc = rc ? rc : closed;
-	}
-	incise_vision_free(run->vision);
+	if (rc > 0) /* the disk is nearly full */
+		rc = -err->code;
+	ended = run->recorder ? end_recorder(run, rc ? &ignored : err) : 0;
 	incise_rig_close(run->rig);
-	stopwatch_sort(run->us, run->pictures);
-	return rc;
+	return rc ? rc : ended;
 }
 
 static int remove_one(const char *path, const struct stat *status, int type,
@@ -238,7 +236,8 @@ static int remove_one(const char *path, const struct stat *status, int type,
 }
 
 /* All runs; the recordings go into a folder that is gone afterwards, come what may. */
-static void run_all(struct run *runs, int seconds)
+static void run_all(struct run *runs, struct jpeg_camera *camera, const char *only,
+		    double seconds)
 {
 	const char *where = getenv("TMPDIR");
 	struct incise_error err = {0};
@@ -254,8 +253,11 @@ static void run_all(struct run *runs, int seconds)
 		cli_fail("%s: no folder for the recording: %s; set TMPDIR", folder,
 			 strerror(errno));
 	for (int i = 0; i < RUNS && !rc && !cli_stop; i++) {
-		cli_progress("%s, %d s", parts[i].name, seconds);
-		rc = do_run(&runs[i], &parts[i], folder, seconds, &err);
+		if (only && strcmp(only, parts[i].name))
+			continue;
+		cli_progress("%s, %.0f s", parts[i].name, seconds);
+		rc = do_run(&runs[i], &parts[i], camera, folder, seconds, &err);
+		runs[i].done = true;
 	}
 	cli_progress_end();
 	nftw(folder, remove_one, 8, FTW_DEPTH | FTW_PHYS);
@@ -265,81 +267,107 @@ static void run_all(struct run *runs, int seconds)
 		cli_fail_with(&err);
 }
 
-/* A quantile of what vision took. */
-static double vision_us(const struct run *run, double q)
+/* Of the capture alone: without what the virtual rig takes in the same run's time. */
+static double net(const struct run *runs, int i)
 {
-	return run->pictures ? stopwatch_quantile(run->us, run->pictures, q) : NAN;
+	const struct run *base = &runs[parts[i].base];
+
+	return base->done ? runs[i].cpu_percent - base->cpu_percent : NAN;
 }
 
-static void print_text(const struct run *runs, const struct machine *machine, int seconds)
+static const struct run *first(const struct run *runs)
 {
-	const struct run *full = &runs[0];
+	while (!runs->done)
+		runs++;
+	return runs;
+}
 
-	printf("%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz; %d s each, in "
-	       "real time\n%-15s %6s %8s %5s %8s %5s %7s %5s %8s\n",
+static void print_text(const struct run *runs, const struct machine *machine,
+		       double seconds, const struct jpeg_camera *camera)
+{
+	const struct run *full = first(runs);
+	int n;
+	size_t bytes = jpeg_camera_bytes(camera, &n);
+
+	printf("%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz, JPEG of %.0f "
+	       "kB; %.0f s each, in real time\n%-15s %6s %6s %9s %5s %8s %5s %7s %5s %8s %7s "
+	       "%7s\n",
 	       machine->cpu, full->force_info.rate_hz, full->tracker_info.rate_hz,
 	       full->camera_info.width, full->camera_info.height,
-	       full->camera_info.rate_hz, seconds, "run", "CPU %", "force", "lost",
-	       "tracker", "lost", "frames", "lost", "late ms");
+	       full->camera_info.rate_hz, (double)bytes / n / 1e3, seconds, "run",
+	       "CPU %", "net %", "force", "lost", "tracker", "lost", "frames", "lost",
+	       "late ms", "MB 1/4", "MB end");
 	for (int i = 0; i < RUNS; i++)
-		printf("%-15s %6.2f %8llu %5llu %8llu %5llu %7llu %5llu %8.1f\n",
-		       parts[i].name, runs[i].cpu_percent,
-		       (unsigned long long)runs[i].force,
-		       (unsigned long long)runs[i].force_lost,
-		       (unsigned long long)runs[i].tracker,
-		       (unsigned long long)runs[i].tracker_lost,
-		       (unsigned long long)runs[i].frames,
-		       (unsigned long long)runs[i].frames_lost, runs[i].late_ms);
-	printf("vision: found %d/%d, us %.0f, p99 %.0f\n"
-	       "%.2f %% of a core; of that the virtual rig itself takes %.2f, the capture %.2f\n",
-	       full->found, full->pictures, vision_us(full, 0.5), vision_us(full, 0.99),
-	       full->cpu_percent, runs[RUNS - 1].cpu_percent,
-	       full->cpu_percent - runs[RUNS - 1].cpu_percent);
+		if (runs[i].done)
+			printf("%-15s %6.2f %6.2f %9llu %5llu %8llu %5llu %7llu %5llu %8.1f %7.1f "
+			       "%7.1f\n",
+			       parts[i].name, runs[i].cpu_percent, net(runs, i),
+			       (unsigned long long)runs[i].force,
+			       (unsigned long long)runs[i].force_lost,
+			       (unsigned long long)runs[i].tracker,
+			       (unsigned long long)runs[i].tracker_lost,
+			       (unsigned long long)runs[i].frames,
+			       (unsigned long long)runs[i].frames_lost, runs[i].late_ms,
+			       runs[i].rss_MB[0], runs[i].rss_MB[1]);
+	printf("net: without what the virtual rig itself takes in the runs virtual_*\n"
+	       "pictures that vision had no time for: %llu\n",
+	       (unsigned long long)full->unlooked);
 }
 
-static void print_json(const struct run *runs, const struct machine *machine, int seconds)
+static void print_json(const struct run *runs, const struct machine *machine,
+		       double seconds)
 {
-	const struct run *full = &runs[0];
+	const struct run *full = first(runs);
 	json_t *list = json_array();
 
 	for (int i = 0; i < RUNS; i++)
-		json_array_append_new(
-			list,
-			json_pack("{ss so sI sI sI sI sI sI so}", "name", parts[i].name,
-				  "cpu_percent", json_number(runs[i].cpu_percent),
-				  "force", (json_int_t)runs[i].force, "force_lost",
-				  (json_int_t)runs[i].force_lost, "tracker",
-				  (json_int_t)runs[i].tracker, "tracker_lost",
-				  (json_int_t)runs[i].tracker_lost, "frames",
-				  (json_int_t)runs[i].frames, "frames_lost",
-				  (json_int_t)runs[i].frames_lost, "late_ms",
-				  json_number(runs[i].late_ms)));
-	json_print(json_pack("{so si so so so si si so so s{si si so so} so}", "machine",
-			     machine_json(machine), "seconds", seconds, "force_hz",
-			     json_number(full->force_info.rate_hz), "tracker_hz",
-			     json_number(full->tracker_info.rate_hz), "camera_hz",
-			     json_number(full->camera_info.rate_hz), "width",
+		if (runs[i].done)
+			json_array_append_new(
+				list,
+				json_pack("{ss so so sI sI sI sI sI sI so so so}", "name",
+					  parts[i].name, "cpu_percent",
+					  json_number(runs[i].cpu_percent), "net_percent",
+					  json_number(net(runs, i)), "force",
+					  (json_int_t)runs[i].force, "force_lost",
+					  (json_int_t)runs[i].force_lost, "tracker",
+					  (json_int_t)runs[i].tracker, "tracker_lost",
+					  (json_int_t)runs[i].tracker_lost, "frames",
+					  (json_int_t)runs[i].frames, "frames_lost",
+					  (json_int_t)runs[i].frames_lost, "late_ms",
+					  json_number(runs[i].late_ms), "quarter_MB",
+					  json_number(runs[i].rss_MB[0]), "end_MB",
+					  json_number(runs[i].rss_MB[1])));
+	json_print(json_pack("{so so so so so si si sI so}", "machine",
+			     machine_json(machine), "seconds", json_number(seconds),
+			     "force_hz", json_number(full->force_info.rate_hz),
+			     "tracker_hz", json_number(full->tracker_info.rate_hz),
+			     "camera_hz", json_number(full->camera_info.rate_hz), "width",
 			     full->camera_info.width, "height", full->camera_info.height,
-			     "cpu_percent", json_number(full->cpu_percent),
-			     "virtual_rig_cpu_percent",
-			     json_number(runs[RUNS - 1].cpu_percent), "vision",
-			     "pictures", full->pictures, "found", full->found, "us",
-			     json_number(vision_us(full, 0.5)), "us_p99",
-			     json_number(vision_us(full, 0.99)), "rows", list));
+			     "unlooked", (json_int_t)full->unlooked, "rows", list));
 }
 
-void bench_capture(bool json, bool quick)
+void bench_capture(const char *only, double seconds, bool json, bool quick)
 {
-	int seconds = quick ? QUICK_SECONDS : SECONDS;
 	static struct run runs[RUNS]; /* large */
+	struct incise_error err = {0};
+	struct jpeg_camera *camera;
 	struct machine machine;
 
+	for (int i = 0; only && strcmp(only, parts[i].name);)
+		if (++i == RUNS)
+			cli_usage("'%s' is no run of capture; see incise-bench(1)", only);
+	if (!(seconds > 0))
+		seconds = quick ? QUICK_SECONDS : SECONDS;
 	machine_init(&machine);
-	run_all(runs, seconds);
+	camera = jpeg_camera_new(CAMERA_HZ, &err);
+	if (!camera)
+		cli_fail_with(&err);
+	run_all(runs, camera, only, seconds);
 	if (json)
 		print_json(runs, &machine, seconds);
 	else
-		print_text(runs, &machine, seconds);
+		print_text(runs, &machine, seconds, camera);
+	jpeg_camera_free(camera);
 	for (int i = 0; i < RUNS; i++)
 		if (runs[i].held_up > HELD_UP)
 			cli_warn(

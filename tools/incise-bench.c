@@ -12,13 +12,14 @@
 #include "bench_vision.h"
 #include "cli.h"
 
-enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK };
+enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION };
 
 static const struct cli_option options[] = {
 	{OPT_JSON, "json", NULL, "report as JSON"},
 	{OPT_PLOT, "plot", "NAME",
 	 "draw error over time as NAME.png and NAME.svg;\n"
 	 "stability: NAME-map, NAME-guard, NAME-integrators"},
+	{OPT_DURATION, "duration", "TIME", "of each run of capture: 10min; default 10s"},
 	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
 	{0},
 };
@@ -27,7 +28,7 @@ static const struct cli_verb verb = {
 	.name = "bench",
 	.synopsis =
 		"precision [MODEL.fis] | training | stability | loop [SCENE] | vision | capture "
-		"[OPTIONS]",
+		"[RUN] [OPTIONS]",
 	.summary =
 		"precision: measure error against run time of a model's arithmetics. Without\n"
 		"MODEL a model of the paper's size (20 rules) is made.\n"
@@ -39,8 +40,8 @@ static const struct cli_verb verb = {
 		"machine wakes it.\n"
 		"vision: measure error and run time of the exposed length in pictures whose truth\n"
 		"is known.\n"
-		"capture: measure how much of a core it takes to record the virtual rig, pictures\n"
-		"and vision included, in real time.",
+		"capture: measure how much of a core it takes to record all streams in real time,\n"
+		"and with parts left out; or one RUN of these.",
 	.options = options,
 	.notes =
 		"Exit: 0 measured, 1 failed or simulation and theory differ, 2 bad usage.\n"
@@ -49,6 +50,7 @@ static const struct cli_verb verb = {
 
 struct job {
 	bool json, quick;
+	double seconds; /* 0: not given */
 	const char *plot, *operand;
 };
 
@@ -79,7 +81,7 @@ static void vision(const struct job *job)
 
 static void capture(const struct job *job)
 {
-	bench_capture(job->json, job->quick);
+	bench_capture(job->operand, job->seconds, job->json, job->quick);
 }
 
 static const struct {
@@ -89,7 +91,7 @@ static const struct {
 } words[] = {
 	{"precision", true, true, precision},  {"training", false, false, training},
 	{"stability", false, true, stability}, {"loop", true, false, loop},
-	{"vision", false, false, vision},      {"capture", false, false, capture},
+	{"vision", false, false, vision},      {"capture", true, false, capture},
 };
 #define WORDS (int)(sizeof(words) / sizeof(*words))
 
@@ -106,6 +108,9 @@ int main(int argc, char **argv)
 		case OPT_PLOT:
 			job.plot = optarg;
 			break;
+		case OPT_DURATION:
+			job.seconds = cli_duration("duration", optarg, 1, 86400);
+			break;
 		case OPT_QUICK:
 			job.quick = true;
 			break;
@@ -115,10 +120,12 @@ int main(int argc, char **argv)
 	if (optind >= argc || what == WORDS ||
 	    argc - optind > (words[what].operand ? 2 : 1))
 		cli_usage(
-			"expected 'training', 'stability', 'vision', 'capture', 'precision' and "
-			"at most one model, or 'loop' and at most one scene");
+			"expected 'training', 'stability', 'vision', 'precision' and at most one "
+			"model, 'loop' and at most one scene, or 'capture' and at most one run");
 	if (job.plot && !words[what].plot)
 		cli_usage("--plot goes with 'precision' and 'stability'");
+	if (job.seconds > 0 && words[what].run != capture)
+		cli_usage("--duration goes with 'capture'");
 	job.operand = argc - optind == 2 ? argv[optind + 1] : NULL;
 	words[what].run(&job);
 	cli_finish();
