@@ -17,7 +17,7 @@
 static const struct {
 	const char *name, *does;
 } verbs[] = {
-	{"capture", "record tracker and force channel in sync"},
+	{"capture", "record the streams of a rig in sync"},
 	{"verify", "prove that a recording is complete"},
 	{"export", "make a dataset of recordings, raw or averaged"},
 	{"train", "learn a fuzzy force model from a dataset"},
