@@ -12,6 +12,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include "backends.h"
+#include "module.h"
 
 #define BUILT_IN_SIM "sim" /* rig.c makes it: it stands on a world of its own */
 #define SYMBOL "incise_backend"
@@ -24,25 +25,6 @@ static bool plain(const char *name)
 	size_t length = strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_");
 
 	return length && length < 32 && !name[length];
-}
-
-bool incise_backend_folder(char *path, size_t size)
-{
-	const char *given = secure_getenv("INCISE_MODULE_PATH");
-	char own[PATH_MAX];
-	Dl_info info;
-	int length;
-
-	if (given && *given) {
-		length = snprintf(path, size, "%s", given);
-		return length > 0 && (size_t)length < size;
-	}
-	if (!dladdr((void *)incise_backend_find, &info) || !info.dli_fname ||
-	    !realpath(info.dli_fname, own) || !strrchr(own, '/'))
-		return false;
-	*strrchr(own, '/') = '\0';
-	length = snprintf(path, size, "%s/incise", own);
-	return length > 0 && (size_t)length < size;
 }
 
 /* "sim, kernel, gpio": what there is of a kind. */
@@ -78,7 +60,7 @@ int incise_backend_names(const char *kind, char names[][32], int room)
 	char known[400], in[PATH_MAX], *rest = known, *name;
 	int n = 0;
 
-	list(kind, incise_backend_folder(in, sizeof(in)) ? in : NULL, known,
+	list(kind, incise_module_folder(in, sizeof(in)) ? in : NULL, known,
 	     sizeof(known));
 	while ((name = strsep(&rest, ", ")) && n < room)
 		if (*name && strcmp(name, BUILT_IN_SIM))
@@ -90,22 +72,13 @@ static int load(struct incise_loaded *loaded, const char *kind, const char *name
 		const char *path, const char *where, struct incise_error *err)
 {
 	const struct incise_backend *backend;
-	void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-	int rc = 0;
+	struct incise_module module;
+	int rc = incise_module_open(&module, path, SYMBOL, where, err);
 
-	if (!handle)
-		return incise_error_set(
-			err, ENOEXEC,
-			"%s: the module cannot be loaded: %.300s; install "
-			"what it needs",
-			where, dlerror());
-	backend = dlsym(handle, SYMBOL);
-	if (!backend)
-		rc = incise_error_set(err, ENOEXEC,
-				      "%s: %.200s: has no symbol " SYMBOL
-				      "; it is no module of incise",
-				      where, path);
-	else if (backend->abi != INCISE_BACKEND_ABI)
+	if (rc)
+		return rc;
+	backend = module.symbol;
+	if (backend->abi != INCISE_BACKEND_ABI)
 		rc = incise_error_set(err, ENOEXEC,
 				      "%s: %.200s: is made for interface %u, this is %u; "
 				      "build it again",
@@ -117,11 +90,11 @@ static int load(struct incise_loaded *loaded, const char *kind, const char *name
 				      "says; build it again",
 				      where, path);
 	if (rc) {
-		dlclose(handle);
+		dlclose(module.handle);
 		errno = -rc;
 		return rc;
 	}
-	*loaded = (struct incise_loaded){backend, handle};
+	*loaded = (struct incise_loaded){backend, module.handle};
 	return 0;
 }
 
@@ -129,7 +102,7 @@ int incise_backend_find(struct incise_loaded *loaded, const char *kind, const ch
 			const char *where, struct incise_error *err)
 {
 	char in[PATH_MAX], path[PATH_MAX + 80], known[200];
-	bool has_folder = incise_backend_folder(in, sizeof(in));
+	bool has_folder = incise_module_folder(in, sizeof(in));
 	struct stat status;
 
 	for (size_t i = 0; i < sizeof(built_in) / sizeof(*built_in); i++)

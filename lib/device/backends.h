@@ -27,12 +27,6 @@ struct incise_loaded {
 int incise_backend_find(struct incise_loaded *loaded, const char *kind, const char *name,
 			const char *where, struct incise_error *err);
 
-/*
- * The folder that modules are looked for in: INCISE_MODULE_PATH, or that beside
- * libincise.so. False where its name does not fit.
- */
-bool incise_backend_folder(char *path, size_t size);
-
 /* Those that there are of a kind, built in and in modules; "sim" not. Ends with n names. */
 int incise_backend_names(const char *kind, char names[][32], int room);
 

@@ -6,8 +6,8 @@
  * The module is not unloaded: OpenCV leaves in threads that used it what runs when they end.
  */
 #include <errno.h>
-#include <limits.h>
 #include "backends.h"
+#include "module.h"
 
 #define KIND "vision"
 #define NAME "opencv"
@@ -21,20 +21,14 @@ static struct incise_vision *vision_open(const struct incise_vision_setup *setup
 		.vision = setup,
 	};
 	struct incise_loaded loaded;
-	char folder[PATH_MAX];
 	int rc = incise_backend_find(&loaded, KIND, NAME, KIND, err);
 
 	if (!rc)
 		return loaded.backend->open(&request, err);
 	if (rc == -ENODEV)
-		rc = incise_error_set(
-			err, ENOENT,
-			KIND ": there is no module " KIND "_" NAME
-			     ".so in %.300s; build and install incise where "
-			     "libopencv-imgproc-dev and libjpeg-dev are, or set "
-			     "INCISE_MODULE_PATH",
-			incise_backend_folder(folder, sizeof(folder)) ? folder
-								      : "any folder");
+		rc = incise_module_absent(KIND "_" NAME ".so", KIND,
+					  "libopencv-imgproc-dev and libjpeg-dev are",
+					  err);
 	errno = -rc;
 	return NULL;
 }

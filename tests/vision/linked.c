@@ -18,10 +18,3 @@ int incise_backend_find(struct incise_loaded *loaded, const char *kind, const ch
 	*loaded = (struct incise_loaded){&linked, NULL};
 	return 0;
 }
-
-bool incise_backend_folder(char *path, size_t size)
-{
-	(void)path;
-	(void)size;
-	return false;
-}

@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <errno.h>
-#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "../../../lib/device/backends.h"
 
@@ -72,16 +72,10 @@ int incise_backend_find(struct incise_loaded *loaded, const char *kind, const ch
 	return seen.find_rc ? incise_error_set(err, -seen.find_rc, "as found") : 0;
 }
 
-bool incise_backend_folder(char *path, size_t size)
-{
-	snprintf(path, size, "/some/folder");
-	return true;
-}
-
 static int forget(void **state)
 {
 	memset(&seen, 0, sizeof(seen));
-	return 0;
+	return setenv("INCISE_MODULE_PATH", "/some/folder", 1);
 }
 
 static void calls_reach_the_module(void **state)

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Loading a module; see module.h.
+ */
+#include <dlfcn.h>
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "module.h"
+
+bool incise_module_folder(char *path, size_t size)
+{
+	const char *given = secure_getenv("INCISE_MODULE_PATH");
+	char own[PATH_MAX];
+	Dl_info info;
+	int length;
+
+	if (given && *given) {
+		length = snprintf(path, size, "%s", given);
+		return length > 0 && (size_t)length < size;
+	}
+	if (!dladdr((void *)incise_module_folder, &info) || !info.dli_fname ||
+	    !realpath(info.dli_fname, own) || !strrchr(own, '/'))
+		return false;
+	*strrchr(own, '/') = '\0';
+	length = snprintf(path, size, "%s/incise", own);
+	return length > 0 && (size_t)length < size;
+}
+
+int incise_module_open(struct incise_module *module, const char *path, const char *symbol,
+		       const char *where, struct incise_error *err)
+{
+	module->handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+	if (!module->handle)
+		return incise_error_set(
+			err, ENOEXEC,
+			"%s: the module cannot be loaded: %.300s; install "
+			"what it needs",
+			where, dlerror());
+	module->symbol = dlsym(module->handle, symbol);
+	if (module->symbol)
+		return 0;
+	dlclose(module->handle);
+	return incise_error_set(err, ENOEXEC,
+				"%s: %.200s: has no symbol %s; it is no module of incise",
+				where, path, symbol);
+}
+
+int incise_module_find(struct incise_module *module, const char *file, const char *symbol,
+		       const char *where, const char *packages, struct incise_error *err)
+{
+	char in[PATH_MAX], path[PATH_MAX + 80];
+
+	if (incise_module_folder(in, sizeof(in))) {
+		snprintf(path, sizeof(path), "%s/%s", in, file);
+		if (!access(path, R_OK))
+			return incise_module_open(module, path, symbol, where, err);
+	}
+	return incise_module_absent(file, where, packages, err);
+}
+
+int incise_module_absent(const char *file, const char *where, const char *packages,
+			 struct incise_error *err)
+{
+	char in[PATH_MAX];
+
+	return incise_error_set(err, ENOENT,
+				"%s: there is no module %s in %.300s; build and install "
+				"incise where %s, or set INCISE_MODULE_PATH",
+				where, file,
+				incise_module_folder(in, sizeof(in)) ? in : "any folder",
+				packages);
+}
+
+int incise_module_refuse(struct incise_module *module, const char *file,
+			 const char *where, struct incise_error *err)
+{
+	dlclose(module->handle);
+	return incise_error_set(err, ENOEXEC,
+				"%s: %s is made for another version of incise; build it "
+				"again",
+				where, file);
+}
