@@ -30,9 +30,9 @@ static int bad_row(const struct incise_cuts *cuts, const char *table, sqlite3_st
 		what, cuts->recording->path, INCISE_SCHEMA_DB);
 }
 
-/* Step to a row with integer seq and time. Returns 1, 0 at the end, -errno. */
+/* Step to a row and find its best time. Returns 1, 0 at the end, -errno. */
 static int step(struct incise_cuts *cuts, sqlite3_stmt *stmt, const char *table,
-		struct incise_error *err)
+		struct incise_row_times *times, int64_t *t_ns, struct incise_error *err)
 {
 	int rc = sqlite3_step(stmt);
 
@@ -44,6 +44,9 @@ static int step(struct incise_cuts *cuts, sqlite3_stmt *stmt, const char *table,
 	if (sqlite3_column_type(stmt, 1) != SQLITE_INTEGER ||
 	    sqlite3_column_int64(stmt, 1) < 0)
 		return bad_row(cuts, table, stmt, "t_ns is no time", err);
+	if (!incise_row_times_next(times, sqlite3_column_int64(stmt, 0),
+				   sqlite3_column_int64(stmt, 1), t_ns))
+		return bad_row(cuts, table, stmt, "t_ns does not increase", err);
 	return 1;
 }
 
@@ -51,7 +54,7 @@ static int step_force(struct incise_cuts *cuts, int64_t *t_ns, int32_t *code,
 		      struct incise_error *err)
 {
 	sqlite3_stmt *stmt = cuts->force;
-	int rc = step(cuts, stmt, "force", err);
+	int rc = step(cuts, stmt, "force", &cuts->force_times, t_ns, err);
 	sqlite3_int64 value;
 
 	if (rc == 0 && cuts->force_rows != cuts->recording->meta.force)
@@ -62,10 +65,7 @@ static int step_force(struct incise_cuts *cuts, int64_t *t_ns, int32_t *code,
 					(unsigned long long)cuts->recording->meta.force);
 	if (rc <= 0)
 		return rc;
-	*t_ns = sqlite3_column_int64(stmt, 1);
 	value = sqlite3_column_int64(stmt, 2);
-	if (cuts->force_rows && *t_ns <= cuts->last_ns)
-		return bad_row(cuts, "force", stmt, "t_ns does not increase", err);
 	if (sqlite3_column_type(stmt, 2) != SQLITE_INTEGER || value < 0 ||
 	    value > cuts->top)
 		return bad_row(cuts, "force", stmt,
@@ -82,7 +82,7 @@ static int step_depth(struct incise_cuts *cuts, struct incise_error *err)
 {
 	sqlite3_stmt *stmt = cuts->depth;
 	struct incise_cut_depth next;
-	int rc = step(cuts, stmt, "depth", err);
+	int rc = step(cuts, stmt, "depth", &cuts->depth_times, &next.t_ns, err);
 
 	cuts->before = cuts->after;
 	cuts->has_before = cuts->has_after;
@@ -95,11 +95,8 @@ static int step_depth(struct incise_cuts *cuts, struct incise_error *err)
 					(unsigned long long)cuts->recording->depth_rows);
 	if (rc <= 0)
 		return rc;
-	next.t_ns = sqlite3_column_int64(stmt, 1);
 	next.depth_mm = sqlite3_column_double(stmt, 2);
 	next.velocity_mm_s = sqlite3_column_double(stmt, 3);
-	if (cuts->has_before && next.t_ns <= cuts->before.t_ns)
-		return bad_row(cuts, "depth", stmt, "t_ns does not increase", err);
 	/* A rig is some metres wide; light is slow enough for the other bound. */
 	if (sqlite3_column_type(stmt, 2) != SQLITE_FLOAT || !(fabs(next.depth_mm) < 1e6))
 		return bad_row(cuts, "depth", stmt, "depth_mm is no depth", err);
@@ -126,12 +123,15 @@ void incise_cuts_calibrate(struct incise_cuts *cuts,
 	scale(cuts, calibration->force_mV_N,
 	      isnan(calibration->force_zero_mV) ? cuts->recording->meta.zero_mV
 						: calibration->force_zero_mV);
+	incise_row_times_calibrate(&cuts->force_times, calibration);
+	incise_row_times_calibrate(&cuts->depth_times, calibration);
 }
 
 int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recording,
 		     struct incise_error *err)
 {
 	const struct incise_recording_info *meta = &recording->meta;
+	int rc;
 
 	*cuts = (struct incise_cuts){
 		.recording = recording,
@@ -146,12 +146,16 @@ int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recordin
 		    recording->db,
 		    "SELECT seq, t_ns, depth_mm, velocity_mm_s FROM depth ORDER BY seq",
 		    -1, &cuts->depth, NULL) != SQLITE_OK) {
-		int rc = incise_schema_fail(recording->db, recording->path, err);
-
+		rc = incise_schema_fail(recording->db, recording->path, err);
 		incise_cuts_close(cuts);
 		return rc;
 	}
-	return 0;
+	rc = incise_row_times_open(&cuts->force_times, recording, "force", err);
+	if (!rc)
+		rc = incise_row_times_open(&cuts->depth_times, recording, "depth", err);
+	if (rc)
+		incise_cuts_close(cuts);
+	return rc;
 }
 
 void incise_cuts_close(struct incise_cuts *cuts)

@@ -17,6 +17,7 @@
 #include <sqlite3.h>
 #include <incise/calibration.h>
 #include "recording.h"
+#include "row_times.h"
 
 /* Ten times the tracker's noise apart, so that noise ends no cut. */
 #define INCISE_CUT_BEGIN_MM 0.3
@@ -48,6 +49,7 @@ struct incise_cut_depth {
 struct incise_cuts {
 	struct incise_recording *recording;
 	sqlite3_stmt *force, *depth;
+	struct incise_row_times force_times, depth_times;
 	struct incise_cut cut;
 	struct incise_cut_depth before, after; /* the force sample */
 	bool has_before, has_after;
@@ -62,7 +64,8 @@ struct incise_cuts {
 int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recording,
 		     struct incise_error *err);
 
-/* Take another calibration of force than the recording's; its zero where that has one. */
+/* Take another calibration of force than the recording's, its zero and the delays of force
+ * and tracker where that has them. Before the first sample. */
 void incise_cuts_calibrate(struct incise_cuts *cuts,
 			   const struct incise_calibration *calibration);
 

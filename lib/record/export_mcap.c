@@ -204,7 +204,9 @@ static int64_t each_row(struct mcap_export *export, struct incise_mcap *mcap,
 				err, -rc, "%s: damaged: table %s, row %lld cannot be",
 				export->recording->path, streams[next].table,
 				(long long)sqlite3_column_int64(rows[next].stmt, 0));
-		rc = incise_mcap_message(mcap, next, rows[next].t_ns, export->text, rc);
+		rc = incise_mcap_message(mcap, next,
+					 rows[next].t_ns > 0 ? rows[next].t_ns : 0,
+					 export->text, rc);
 		if (rc)
 			return fail_write(rc, err);
 		if ((++n & 0xffff) == 0 && o->progress &&
@@ -250,6 +252,8 @@ int incise_export_mcap(struct incise_recording *recording,
 		rc = incise_rows_open(&rows[i], recording, streams[i].table,
 				      streams[i].columns, streams[i].types, expected[i],
 				      err);
+		if (!rc && given)
+			incise_rows_calibrate(&rows[i], given);
 		if (!rc &&
 		    incise_mcap_channel(mcap, streams[i].topic, streams[i].schema_name,
 					streams[i].schema) < 0)

@@ -68,7 +68,7 @@ struct resample {
 	int64_t top;
 	struct sample *samples; /* those near the row */
 	size_t n, room;
-	struct pose pose[2]; /* before and after the row; t_ns -1: none */
+	struct pose pose[2]; /* before and after the row; INCISE_TIME_NONE: none */
 	struct depth deep[2];
 	struct incise_cut cut;
 	double *weights; /* of |rows| in 1/CELLS, STEPS + 2 */
@@ -126,7 +126,7 @@ static int more_pose(struct resample *r, struct incise_error *err)
 	double norm = 0;
 
 	r->pose[0] = *pose;
-	pose->t_ns = -1;
+	pose->t_ns = INCISE_TIME_NONE;
 	if (rc <= 0)
 		return rc;
 	pose->seq = sqlite3_column_int64(stmt, 0);
@@ -149,7 +149,7 @@ static int more_depth(struct resample *r, struct incise_error *err)
 	int rc = incise_rows_next(&r->depth, err);
 
 	r->deep[0] = r->deep[1];
-	r->deep[1].t_ns = -1;
+	r->deep[1].t_ns = INCISE_TIME_NONE;
 	if (rc > 0)
 		r->deep[1] = (struct depth){r->depth.t_ns,
 					    sqlite3_column_double(r->depth.stmt, 2),
@@ -162,9 +162,9 @@ static int go_to(struct resample *r, int64_t t_ns, struct incise_error *err)
 {
 	int rc = 0;
 
-	while (rc >= 0 && r->pose[1].t_ns >= 0 && r->pose[1].t_ns <= t_ns)
+	while (rc >= 0 && r->pose[1].t_ns != INCISE_TIME_NONE && r->pose[1].t_ns <= t_ns)
 		rc = more_pose(r, err);
-	while (rc >= 0 && r->deep[1].t_ns >= 0 && r->deep[1].t_ns <= t_ns)
+	while (rc >= 0 && r->deep[1].t_ns != INCISE_TIME_NONE && r->deep[1].t_ns <= t_ns)
 		rc = more_depth(r, err);
 	return rc < 0 ? rc : 0;
 }
@@ -172,7 +172,8 @@ static int go_to(struct resample *r, int64_t t_ns, struct incise_error *err)
 /* Share of the way from a to b; NAN where they are not around it, or too far apart. */
 static double share(int64_t a_ns, int64_t b_ns, int64_t t_ns)
 {
-	if (a_ns < 0 || b_ns < 0 || t_ns < a_ns || b_ns - a_ns > INCISE_DEPTH_GAP_NS)
+	if (a_ns == INCISE_TIME_NONE || b_ns == INCISE_TIME_NONE || t_ns < a_ns ||
+	    b_ns - a_ns > INCISE_DEPTH_GAP_NS)
 		return NAN;
 	return (double)(t_ns - a_ns) / (b_ns - a_ns);
 }
@@ -393,18 +394,20 @@ static int on_grid(struct resample *r, struct pass *pass, int64_t last_ns,
 }
 
 /* Last time of the table force, which is what the grid goes to. */
-static int find_last(struct incise_recording *recording, int64_t *last_ns,
-		     struct incise_error *err)
+static int find_last(struct resample *r, int64_t *last_ns, struct incise_error *err)
 {
+	struct incise_recording *recording = r->force.recording;
+	struct incise_row_times times = r->force.times; /* as before the first row */
 	sqlite3_stmt *stmt = NULL;
 	bool found = sqlite3_prepare_v2(recording->db,
-					"SELECT t_ns FROM force ORDER BY seq DESC LIMIT "
-					"1",
+					"SELECT seq, t_ns FROM force ORDER BY seq DESC "
+					"LIMIT 1",
 					-1, &stmt, NULL) == SQLITE_OK &&
 		     sqlite3_step(stmt) == SQLITE_ROW;
 
-	if (found)
-		*last_ns = sqlite3_column_int64(stmt, 0);
+	if (found && !incise_row_times_next(&times, sqlite3_column_int64(stmt, 0),
+					    sqlite3_column_int64(stmt, 1), last_ns))
+		*last_ns = INCISE_TIME_NONE; /* no row; the rows tell of the damage */
 	sqlite3_finalize(stmt);
 	return found ? 0
 		     : incise_error_set(err, ENODATA, "%s: there is no force sample",
@@ -412,11 +415,16 @@ static int find_last(struct incise_recording *recording, int64_t *last_ns,
 }
 
 static int open_rows(struct resample *r, struct incise_recording *recording,
+		     const struct incise_calibration *given, int64_t *last_ns,
 		     struct incise_error *err)
 {
 	int rc = incise_rows_open(&r->force, recording, "force", "seq, t_ns, code", "iii",
 				  recording->meta.force, err);
 
+	if (!rc && given)
+		incise_rows_calibrate(&r->force, given);
+	if (!rc)
+		rc = find_last(r, last_ns, err);
 	if (!rc)
 		rc = incise_rows_open(
 			&r->tracker, recording, "tracker",
@@ -426,8 +434,12 @@ static int open_rows(struct resample *r, struct incise_recording *recording,
 		rc = incise_rows_open(&r->depth, recording, "depth",
 				      "seq, t_ns, depth_mm, velocity_mm_s", "iirr",
 				      recording->depth_rows, err);
+	if (!rc && given) {
+		incise_rows_calibrate(&r->tracker, given);
+		incise_rows_calibrate(&r->depth, given);
+	}
 	for (int i = 0; i < 2; i++)
-		r->pose[i].t_ns = r->deep[i].t_ns = -1;
+		r->pose[i].t_ns = r->deep[i].t_ns = INCISE_TIME_NONE;
 	if (!rc)
 		rc = more_force(r, err) < 0 || more_pose(r, err) < 0 ||
 				     more_depth(r, err) < 0
@@ -453,16 +465,13 @@ int incise_resample(struct incise_recording *recording, const char *name,
 	};
 	struct pass pass = {options, table, report, 0, 0, samples, all, err};
 	int64_t last_ns = 0;
-	int rc;
+	int rc = 0;
 
 	if (isnan(zero_mV))
 		return incise_error_set(err, EINVAL,
 					"%s: ended before the zero of the force channel "
 					"was known (0.5 s), so no force can be told",
 					recording->path);
-	rc = find_last(recording, &last_ns, err);
-	if (rc)
-		return rc;
 	r.weights = malloc((STEPS + 2) * sizeof(*r.weights));
 	pass.name = incise_table_name(table, name);
 	if (!r.weights || pass.name < 0)
@@ -470,7 +479,7 @@ int incise_resample(struct incise_recording *recording, const char *name,
 	for (int i = 0; i < STEPS + 2 && !rc; i++)
 		r.weights[i] = incise_resample_weight((double)i / CELLS);
 	if (!rc)
-		rc = open_rows(&r, recording, err);
+		rc = open_rows(&r, recording, given, &last_ns, err);
 	if (!rc) {
 		pass.first_ns = r.n ? r.samples[0].t_ns : 0;
 		rc = options->rate_hz > 0

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include "rows.h"
 #include "schema.h"
 
@@ -19,31 +20,47 @@ int incise_rows_open(struct incise_rows *rows, struct incise_recording *recordin
 		.table = table,
 		.types = types,
 		.expected = expected,
-		.t_ns = -1,
+		.t_ns = INCISE_TIME_NONE,
 	};
 	snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY %s", columns, table,
-		 expected == UINT64_MAX ? "t_ns, rowid" : "seq");
-	if (sqlite3_prepare_v2(recording->db, sql, -1, &rows->stmt, NULL) == SQLITE_OK)
-		return 0;
-	return incise_schema_fail(recording->db, recording->path, err);
+		 strcmp(table, "events") ? "seq" : "t_ns, rowid");
+	if (sqlite3_prepare_v2(recording->db, sql, -1, &rows->stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(recording->db, recording->path, err);
+	return incise_row_times_open(&rows->times, recording, table, err);
 }
 
-static bool good(const struct incise_rows *rows)
+void incise_rows_calibrate(struct incise_rows *rows,
+			   const struct incise_calibration *calibration)
 {
-	int64_t t_ns = sqlite3_column_int64(rows->stmt, 1);
+	incise_row_times_calibrate(&rows->times, calibration);
+}
 
-	for (int i = 0; rows->types[i]; i++) {
-		int type = sqlite3_column_type(rows->stmt, i);
+static bool fits(sqlite3_stmt *stmt, int column, char type)
+{
+	int found = sqlite3_column_type(stmt, column);
 
-		if (rows->types[i] == 'i' ? type != SQLITE_INTEGER
-		    : rows->types[i] == 't'
-			    ? type != SQLITE_TEXT
-			    : type != SQLITE_FLOAT ||
-				      !isfinite(sqlite3_column_double(rows->stmt, i)))
-			return false;
+	switch (type) {
+	case 'i':
+		return found == SQLITE_INTEGER;
+	case 't':
+		return found == SQLITE_TEXT;
+	case 'n':
+		if (found == SQLITE_NULL)
+			return true;
+		/* fall through */
+	default:
+		return found == SQLITE_FLOAT &&
+		       isfinite(sqlite3_column_double(stmt, column));
 	}
-	return t_ns > rows->t_ns ||
-	       (rows->expected == UINT64_MAX && t_ns == rows->t_ns && t_ns >= 0);
+}
+
+static bool take(struct incise_rows *rows)
+{
+	for (int i = 0; rows->types[i]; i++)
+		if (!fits(rows->stmt, i, rows->types[i]))
+			return false;
+	return incise_row_times_next(&rows->times, sqlite3_column_int64(rows->stmt, 0),
+				     sqlite3_column_int64(rows->stmt, 1), &rows->t_ns);
 }
 
 int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
@@ -62,14 +79,13 @@ int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 	}
 	if (rc != SQLITE_ROW)
 		return incise_schema_fail(rows->recording->db, path, err);
-	if (!good(rows))
+	if (!take(rows))
 		return incise_error_set(
 			err, EINVAL,
 			"%s: damaged: table %s, row %lld cannot be; `sqlite3 "
 			"%s/%s` shows it",
 			path, rows->table, (long long)sqlite3_column_int64(rows->stmt, 0),
 			path, INCISE_SCHEMA_DB);
-	rows->t_ns = sqlite3_column_int64(rows->stmt, 1);
 	rows->live = true;
 	rows->n++;
 	return 1;

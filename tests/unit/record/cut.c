@@ -67,7 +67,7 @@ static void samples_are_interpolated(void **state)
 	 * depth      1 ─────────► 2 ───── ►3 ─ gap ─ 4
 	 */
 	record("cut.rec", "sim:clock=simulated", 100 * MS);
-	change(DB, "DELETE FROM force; DELETE FROM depth;"
+	change(DB, "DELETE FROM knots; DELETE FROM force; DELETE FROM depth;"
 		   "INSERT INTO depth VALUES(0,1000000,1.0,10.0),(1,11000000,2.0,30.0),"
 		   "(2,21000000,3.0,30.0),(3,100000000,4.0,30.0);"
 		   "INSERT INTO force VALUES(0,0,0),(1,1000000,1024),(2,3500000,2048),"

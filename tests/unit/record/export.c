@@ -57,10 +57,15 @@ static struct truth brute_force(const char *file)
 	int n_force, n_depth, k = 0;
 	struct row *force =
 		table(file, "SELECT t_ns, code, 0 FROM force ORDER BY t_ns", &n_force);
-	struct row *depth =
-		table(file,
-		      "SELECT t_ns, depth_mm, velocity_mm_s FROM depth ORDER BY t_ns",
-		      &n_depth);
+	struct row *depth = table(
+		file,
+		/* on the tracker's line, which here begins but once */
+		"SELECT (SELECT a.t_ns + CAST((depth.seq - a.seq) * ((b.t_ns - "
+		"a.t_ns) * 1.0 / (b.seq - a.seq)) AS INTEGER) FROM knots a, knots b "
+		"WHERE a.stream = 'tracker' AND b.stream = 'tracker' AND b.knot = "
+		"a.knot + 1 AND (a.seq <= depth.seq OR a.knot = 0) ORDER BY a.knot "
+		"DESC LIMIT 1), depth_mm, velocity_mm_s FROM depth ORDER BY seq",
+		&n_depth);
 	double zero = ask(file, "SELECT value FROM meta WHERE key = 'force_zero_mV'");
 	bool inside = false;
 
@@ -107,6 +112,9 @@ static int record_once(void **state)
 	if (enter_folder(state))
 		return -1;
 	record("liver.rec", SHORT_SCRIPT, 0);
+	if (ask("liver.rec/recording.db", "SELECT sum(begins) FROM knots WHERE stream = "
+					  "'tracker'") != 1)
+		return -1;
 	truth = brute_force("liver.rec/recording.db");
 	return 0;
 }

@@ -15,6 +15,7 @@ static int record_once(void **state)
 	change("known.rec/recording.db",
 	       "UPDATE force SET code = round(2048 + 500 * sin(2 * pi() * 5 * seq / 1e4) + "
 	       "500 * sin(2 * pi() * 170 * seq / 1e4));"
+	       "DELETE FROM knots; DELETE FROM streams;"
 	       "UPDATE tracker SET t_ns = (SELECT min(t_ns) FROM force) + seq * 8000000, "
 	       "x_mm = seq * 0.8, y_mm = 1.5, z_mm = -seq * 0.08, "
 	       "qw = cos(seq * 0.01), qx = 0.0, qy = sin(seq * 0.01), qz = 0.0;"
