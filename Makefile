@@ -48,7 +48,8 @@ pc_incise-record := sqlite3
 libs_incise := -lm -ldl
 libs_incise-learn := -lm
 libs_incise-record := -lm -ldl -pthread
-also_incise-record := lib/base/ring.o lib/device/module.o lib/device/thread.o
+also_incise-record := lib/base/ring.o lib/device/module.o lib/device/thread.o \
+	lib/tissue/predict.o
 about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop
 about_incise-learn := haptic cutting: learning models from data
 about_incise-record := haptic cutting: recordings and what is exported of them

@@ -7,8 +7,8 @@
 #include "row_times.h"
 #include "schema.h"
 
-#define TIME_MAX (INT64_MAX / 2)
-#define DELAY_MAX_NS 1e12 /* a quarter of an hour; shifts stay far from overflow */
+#define TIME_MAX (INT64_MAX / 4) /* 73 years; sums and differences do not overflow */
+#define DELAY_MAX_NS 1e12	 /* a quarter of an hour; shifts stay far from overflow */
 
 static const struct {
 	const char *table, *stream;
@@ -111,6 +111,7 @@ bool incise_row_times_next(struct incise_row_times *times, int64_t seq, int64_t 
 		return false;
 	times->own_ns = t_ns;
 	best = incise_recording_time(&times->line, seq, t_ns) + times->shift_ns;
+	best = best > TIME_MAX ? TIME_MAX : best < -TIME_MAX ? -TIME_MAX : best;
 	if (times->last_ns != INCISE_TIME_NONE && best < times->last_ns + !times->still)
 		best = times->last_ns + !times->still;
 	times->last_ns = *best_ns = best;

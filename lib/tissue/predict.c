@@ -27,9 +27,6 @@
 #define FAST_MM_S 1e4
 #define HARD_MM_S2 1e5
 
-/* At 60 Hz a hand that misses a pose by this is faster than 1 m/s. */
-#define JUMP_MM 20.0
-
 #define GAP_PERIODS 5
 
 static double within(double x, double least, double most)
@@ -173,7 +170,7 @@ static bool correct(struct incise_predict *p, int64_t t_ns, const double positio
 
 	extrapolate(p, t_ns, x, v);
 	v3_sub(miss, position_mm, x);
-	if (!(v3_length(miss) <= JUMP_MM))
+	if (!(v3_length(miss) <= INCISE_PREDICT_JUMP_MM))
 		return false;
 	v3_add(p->x, x, p->alpha, miss);
 	v3_add(p->v, v, p->beta * per_s, miss);
@@ -204,7 +201,7 @@ void incise_predict_add(struct incise_predict *p,
 		for (int i = 0; i < 3; i++)
 			p->v[i] = p->a[i] = 0;
 		v3_sub(step, shown, p->x);
-		blend = p->started && v3_length(step) <= JUMP_MM;
+		blend = p->started && v3_length(step) <= INCISE_PREDICT_JUMP_MM;
 		p->leaps += p->started && !blend;
 	}
 	p->started = true;

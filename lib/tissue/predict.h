@@ -26,6 +26,9 @@
 #include <stdint.h>
 #include <incise/tracker.h>
 
+/* At 60 Hz a hand that misses a pose by this is faster than 1 m/s. */
+#define INCISE_PREDICT_JUMP_MM 20.0
+
 struct incise_predict {
 	double alpha, beta, gamma; /* of a miss: to x, v · period, a · period² */
 	double period_s;

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Velocity by the loop's filter, forward and backward; see smooth.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "smooth.h"
+
+#define AHEAD 4	  /* records that a first slope is made of, besides its own */
+#define AROUND 16 /* records to each side that noise is told from */
+#define FADED 1e-7
+#define LAG_MAX 4096 /* at 10 kHz, the fastest that the filter is made for, it is 2198 */
+
+/* λ of a record becomes that of the one before: Fᵀ (I - K H)ᵀ λ, less what it missed. */
+static void step_back(const struct incise_predict *p, double miss, double periods,
+		      double lambda[3])
+{
+	double x = lambda[0] - p->alpha * lambda[0] - p->beta * lambda[1] -
+		   p->gamma * lambda[2] - miss;
+
+	lambda[2] += (lambda[1] + x * periods / 2) * periods;
+	lambda[1] += x * periods;
+	lambda[0] = x;
+}
+
+static size_t fading(const struct incise_predict *p)
+{
+	double lambda[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+	size_t lag = 1;
+
+	for (size_t i = 1; i < LAG_MAX; i++) {
+		double most = 0;
+
+		for (int k = 0; k < 3; k++) {
+			step_back(p, 0, 1, lambda[k]);
+			for (int j = 0; j < 3; j++)
+				most = fmax(most, fabs(lambda[k][j]));
+		}
+		if (most > FADED)
+			lag = i + 1;
+	}
+	return lag;
+}
+
+int incise_smooth_init(struct incise_smooth *smooth, double rate_hz)
+{
+	struct incise_predict *p = &smooth->fresh;
+	double a, b, g;
+
+	*smooth = (struct incise_smooth){0};
+	incise_predict_init(p, &(struct incise_tracker_info){.rate_hz = rate_hz});
+	smooth->period_s = p->period_s;
+	/*
+	 * The filter's covariance of velocity with x, v and a, for a noise of 1 and times
+	 * in periods: Bar-Shalom, Li and Kirubarajan, Estimation with Applications to
+	 * Tracking and Navigation, 2001, §6.5.4, where γ is twice ours.
+	 */
+	a = p->alpha;
+	b = p->beta;
+	g = 2 * p->gamma;
+	smooth->pull[0] = b;
+	smooth->pull[1] = (8 * a * b + g * (b - 2 * a - 4)) / (8 * (1 - a));
+	smooth->pull[2] = b * (2 * b - g) / (4 * (1 - a));
+	smooth->lag = fading(p);
+	smooth->room = 2 * smooth->lag + AHEAD + 2 * AROUND;
+	smooth->records = calloc(smooth->room, sizeof(*smooth->records));
+	return smooth->records ? 0 : -ENOMEM;
+}
+
+void incise_smooth_free(struct incise_smooth *smooth)
+{
+	free(smooth->records);
+	smooth->records = NULL;
+}
+
+static double apart(const struct incise_smooth_record *a,
+		    const struct incise_smooth_record *b)
+{
+	double sum = 0;
+
+	for (int i = 0; i < 3; i++)
+		sum += (b->position_mm[i] - a->position_mm[i]) *
+		       (b->position_mm[i] - a->position_mm[i]);
+	return sqrt(sum);
+}
+
+/* Whether a record goes on from the one before: no gap, no leap. */
+static bool goes_on(const struct incise_smooth *smooth, size_t i)
+{
+	const struct incise_smooth_record *r = &smooth->records[i];
+
+	return r->t_ns - r[-1].t_ns <= smooth->fresh.gap_ns &&
+	       apart(&r[-1], r) <= INCISE_PREDICT_JUMP_MM;
+}
+
+/* Slope of the straight line through a record and those that follow, mm/s. */
+static void first_slope(const struct incise_smooth *smooth, size_t first, double slope[3])
+{
+	const struct incise_smooth_record *r = &smooth->records[first];
+	double t[AHEAD + 1], mean = 0, tt = 0;
+	size_t n = 1;
+
+	while (n <= AHEAD && first + n < smooth->n && goes_on(smooth, first + n))
+		n++;
+	for (size_t i = 0; i < n; i++) {
+		t[i] = (r[i].t_ns - r->t_ns) * 1e-9;
+		mean += t[i] / n;
+	}
+	slope[0] = slope[1] = slope[2] = 0;
+	for (size_t i = 0; i < n; i++) {
+		tt += (t[i] - mean) * (t[i] - mean);
+		for (int k = 0; k < 3; k++)
+			slope[k] +=
+				(t[i] - mean) * (r[i].position_mm[k] - r->position_mm[k]);
+	}
+	for (int k = 0; k < 3 && n > 1; k++)
+		slope[k] /= tt;
+}
+
+/* Whether the filter, brought to this record, is too far off to go on. */
+static bool lost(const struct incise_predict *p, const struct incise_smooth_record *r,
+		 double dt)
+{
+	double sum = 0;
+
+	for (int i = 0; i < 3; i++) {
+		double miss =
+			r->position_mm[i] - p->x[i] - (p->v[i] + p->a[i] * dt / 2) * dt;
+
+		sum += miss * miss;
+	}
+	return !(sqrt(sum) <= INCISE_PREDICT_JUMP_MM);
+}
+
+static void step_forward(struct incise_smooth *smooth, size_t i)
+{
+	struct incise_smooth_record *r = &smooth->records[i];
+	struct incise_predict *p = &smooth->predict, next;
+	/* The filter takes no negative times; rows' are within ±2^61. */
+	struct incise_tracker_sample sample = {.t_ns = r->t_ns + (1LL << 62),
+					       .quaternion = {1}};
+	double dt = (sample.t_ns - p->t_ns) * 1e-9;
+
+	memcpy(sample.position_mm, r->position_mm, sizeof(sample.position_mm));
+	r->begins = !p->started || sample.t_ns - p->t_ns > p->gap_ns || lost(p, r, dt);
+	r->periods = dt / smooth->period_s;
+	next = r->begins ? smooth->fresh : *p;
+	incise_predict_add(&next, &sample);
+	r->skipped = next.t_ns != sample.t_ns;
+	if (!r->skipped)
+		*p = next;
+	if (!r->skipped && r->begins)
+		first_slope(smooth, i, p->v);
+	for (int k = 0; k < 3; k++) {
+		r->velocity_mm_s[k] = r->skipped ? NAN : p->v[k];
+		r->miss_mm[k] = r->position_mm[k] - p->x[k];
+	}
+}
+
+/* How much a record is off the line between its neighbours. */
+static void bend(struct incise_smooth *smooth, size_t i)
+{
+	struct incise_smooth_record *r = &smooth->records[i], *a, *b;
+	double before, after;
+
+	r->even = false;
+	if (!i || i + 1 >= smooth->n)
+		return;
+	a = r - 1;
+	b = r + 1;
+	before = r->t_ns - a->t_ns;
+	after = b->t_ns - r->t_ns;
+	if (before > smooth->fresh.gap_ns || fabs(after - before) > 0.2 * before)
+		return;
+	r->even = true;
+	r->depth_bend2_mm2 = pow(b->depth_mm - 2 * r->depth_mm + a->depth_mm, 2);
+	r->bend2_mm2 = 0;
+	for (int k = 0; k < 3; k++)
+		r->bend2_mm2 += pow(
+			b->position_mm[k] - 2 * r->position_mm[k] + a->position_mm[k], 2);
+}
+
+static void tell_noise(struct incise_smooth *smooth, size_t i)
+{
+	struct incise_smooth_record *r = &smooth->records[i];
+	size_t from = i > AROUND ? i - AROUND : 0, n = 0;
+	double sum = 0, depth = 0;
+
+	for (size_t k = from; k < smooth->forward && k <= i + AROUND; k++) {
+		const struct incise_smooth_record *near = &smooth->records[k];
+
+		if (!near->even)
+			continue;
+		sum += near->bend2_mm2;
+		depth += near->depth_bend2_mm2;
+		n++;
+	}
+	r->noise_mm = n ? sqrt(sum / n / 18) : NAN;
+	r->depth_noise_mm = n ? sqrt(depth / n / 6) : NAN;
+}
+
+/* Go as far as there are records, and back to those not finished yet. */
+static void run(struct incise_smooth *smooth)
+{
+	size_t end = smooth->ended ? smooth->n : smooth->n - AHEAD;
+	size_t sure = smooth->ended ? end : end - smooth->lag;
+	double lambda[3][3] = {0};
+
+	for (; smooth->forward < end; smooth->forward++) {
+		step_forward(smooth, smooth->forward);
+		bend(smooth, smooth->forward);
+	}
+	for (size_t i = end; i-- > smooth->finished;) {
+		struct incise_smooth_record *r = &smooth->records[i];
+
+		if (i < sure)
+			tell_noise(smooth, i);
+		if (r->skipped)
+			continue;
+		for (int k = 0; k < 3; k++) {
+			double *l = lambda[k];
+
+			if (i < sure)
+				r->velocity_mm_s[k] -=
+					(smooth->pull[0] * l[0] + smooth->pull[1] * l[1] +
+					 smooth->pull[2] * l[2]) /
+					smooth->period_s;
+			step_back(&smooth->fresh, r->miss_mm[k], r->periods, l);
+		}
+		if (r->begins)
+			memset(lambda, 0, sizeof(lambda));
+	}
+	smooth->finished = sure;
+}
+
+void incise_smooth_push(struct incise_smooth *smooth,
+			const struct incise_smooth_record *record)
+{
+	if (smooth->n == smooth->room) {
+		/* All that is finished has been taken; noise looks at some before. */
+		size_t old = smooth->finished - AROUND;
+
+		smooth->n -= old;
+		memmove(smooth->records, smooth->records + old,
+			smooth->n * sizeof(*smooth->records));
+		smooth->forward -= old;
+		smooth->finished -= old;
+		smooth->taken -= old;
+	}
+	smooth->records[smooth->n++] = *record;
+	if (smooth->n == smooth->room)
+		run(smooth);
+}
+
+void incise_smooth_end(struct incise_smooth *smooth)
+{
+	if (smooth->ended)
+		return;
+	smooth->ended = true;
+	run(smooth);
+}
+
+const struct incise_smooth_record *incise_smooth_take(struct incise_smooth *smooth)
+{
+	return smooth->taken < smooth->finished ? &smooth->records[smooth->taken++]
+						: NULL;
+}
