@@ -117,11 +117,11 @@ objects_frames_mkv := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/frames/*.c))
 $(objects_frames_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
 
 # What writes HDF5; libincise-record loads it.
-has_hdf5 := $(shell $(PKG_CONFIG) --exists hdf5 && echo yes)
+has_hdf5 := $(shell $(PKG_CONFIG) --exists hdf5 zlib && echo yes)
 device_modules += $(if $(has_hdf5),export_hdf5)
-pc_export_hdf5 := hdf5
+pc_export_hdf5 := hdf5 zlib
 objects_export_hdf5 := $(O)/obj/lib/record/hdf5/export_hdf5.o
-$(objects_export_hdf5): pc_cflags = $(shell $(PKG_CONFIG) --cflags hdf5)
+$(objects_export_hdf5): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_export_hdf5))
 
 define device_module
 $(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so

@@ -61,7 +61,7 @@ $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
 		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
 		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(if $(filter vision/%,$*),$(vision_linked)) \
-		$(if $(filter hdf5/%,$*),$(objects_export_hdf5) $(shell $(PKG_CONFIG) --libs hdf5)) \
+		$(if $(filter hdf5/%,$*),$(objects_export_hdf5) $(shell $(PKG_CONFIG) --libs $(pc_export_hdf5))) \
 		$(O)/lib/libincise-tests.a $(if $(filter vision/%,$*),$(libs_vision_opencv)) \
 		$(if $(filter frames/%,$*),$(libs_frames_tests)) \
 		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm

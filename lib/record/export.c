@@ -129,10 +129,12 @@ static int export_table(struct incise_recording *const *recordings, int n,
 
 	for (int i = 0; i < n; i++)
 		pass.samples_all += recordings[i]->meta.force;
-	if (options->resample)
-		rc = incise_table_open(&table, format, file, out, incise_resample_columns,
-				       INCISE_RESAMPLE_COLUMNS, lineage, err);
-	else
+	if (options->resample) {
+		rc = incise_resample_width(recordings, n, err);
+		if (rc > 0)
+			rc = incise_table_open(&table, format, file, out,
+					       incise_resample_columns, rc, lineage, err);
+	} else {
 		rc = incise_table_open(
 			&table, format, file, out,
 			(bins ? incise_export_bin_columns : incise_export_raw_columns) +
@@ -140,6 +142,7 @@ static int export_table(struct incise_recording *const *recordings, int n,
 			(bins ? INCISE_EXPORT_BIN_COLUMNS : INCISE_EXPORT_RAW_COLUMNS) -
 				!whole,
 			lineage, err);
+	}
 	if (!rc) {
 		pass.table = &table;
 		rc = options->resample ? write_resampled(&pass, recordings, n)

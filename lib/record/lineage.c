@@ -91,6 +91,33 @@ static int add_sources(struct incise_lineage *lineage,
 	return rc;
 }
 
+/* What turns pixels into depth, and delays that are given. */
+static int add_lengths(struct incise_lineage *lineage,
+		       struct incise_recording *const *recordings, int n,
+		       const struct incise_calibration *given)
+{
+	double mm_px = given ? given->depth_mm_px : recordings[0]->meta.depth_mm_px;
+	const struct {
+		const char *key;
+		double ms;
+	} delays[] = {
+		{"force_delay_ms", given ? given->force_delay_ms : NAN},
+		{"tracker_delay_ms", given ? given->tracker_delay_ms : NAN},
+		{"camera_delay_ms", given ? given->camera_delay_ms : NAN},
+	};
+	int rc;
+
+	for (int i = 1; i < n && !given; i++)
+		if (recordings[i]->meta.depth_mm_px != mm_px)
+			return 0;
+	rc = incise_lineage_add(lineage, "depth_mm_px", "%.9g", mm_px);
+	for (size_t i = 0; i < sizeof(delays) / sizeof(*delays) && !rc; i++)
+		if (!isnan(delays[i].ms))
+			rc = incise_lineage_add(lineage, delays[i].key, "%.9g",
+						delays[i].ms);
+	return rc;
+}
+
 /* Without one that is given, each recording's own; told where it is one for all. */
 static int add_calibration(struct incise_lineage *lineage,
 			   struct incise_recording *const *recordings, int n,
@@ -119,7 +146,7 @@ static int add_calibration(struct incise_lineage *lineage,
 							 "each recording's own")
 				    : incise_lineage_add(lineage, "force_zero_mV",
 							 "%.17g", zero_mV);
-	return rc;
+	return rc ? rc : add_lengths(lineage, recordings, n, given);
 }
 
 static int add_options(struct incise_lineage *lineage,

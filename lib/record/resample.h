@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * All of a recording on one grid of time, or on the times of the force samples: force,
- * pose of the blade, depth and speed, each with what is to be known of its worth.
+ * pose of the blade, depth and speed, what the camera saw, each with what is to be known of
+ * its worth.
  *
- *     force    │││││││││││││││││   weighted by  ╱▔╲  around the row's time
- *     tracker  │      │      │     position linear, orientation slerp
+ *     force    │││││││││││││││││   force_near.h
+ *     tracker  │      │      │     blade.h
+ *     camera     │        │        camera_near.h
  *     row             ▲
  */
 #ifndef INCISE_RESAMPLE_H
@@ -13,18 +15,16 @@
 #include <incise/recording.h>
 #include "table_writer.h"
 
-#define INCISE_RESAMPLE_COLUMNS 17
+/* The last five are there where there are pictures. */
+#define INCISE_RESAMPLE_COLUMNS 21
+#define INCISE_RESAMPLE_CAMERA_COLUMNS 5
 
-extern const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS];
+extern const struct incise_column
+	incise_resample_columns[INCISE_RESAMPLE_COLUMNS + INCISE_RESAMPLE_CAMERA_COLUMNS];
 
-/*
- * Weight of a force sample that is so many rows away from the row: a sinc with its -6 dB
- * at a third of the rate of rows, under Blackman's window of 8 rows to each side. Even,
- * so that phase and delay are 0; the weights are divided by their sum, so that a constant
- * comes out as it is. From half the rate of rows on, where aliases would begin, less than
- * 1e-3 is let through.
- */
-double incise_resample_weight(double rows);
+/* How many columns recordings have: 21 or 26, or -errno. */
+int incise_resample_width(struct incise_recording *const *recordings, int n,
+			  struct incise_error *err);
 
 /*
  * Add the rows of a recording under a name. @samples is of force, gone through before, and

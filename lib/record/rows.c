@@ -9,6 +9,15 @@
 #include "rows.h"
 #include "schema.h"
 
+static int open_sql(struct incise_rows *rows, const char *sql, struct incise_error *err)
+{
+	struct incise_recording *recording = rows->recording;
+
+	if (sqlite3_prepare_v2(recording->db, sql, -1, &rows->stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(recording->db, recording->path, err);
+	return incise_row_times_open(&rows->times, recording, rows->table, err);
+}
+
 int incise_rows_open(struct incise_rows *rows, struct incise_recording *recording,
 		     const char *table, const char *columns, const char *types,
 		     uint64_t expected, struct incise_error *err)
@@ -24,9 +33,28 @@ int incise_rows_open(struct incise_rows *rows, struct incise_recording *recordin
 	};
 	snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY %s", columns, table,
 		 strcmp(table, "events") ? "seq" : "t_ns, rowid");
-	if (sqlite3_prepare_v2(recording->db, sql, -1, &rows->stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(recording->db, recording->path, err);
-	return incise_row_times_open(&rows->times, recording, table, err);
+	return open_sql(rows, sql, err);
+}
+
+int incise_rows_open_joined(struct incise_rows *rows, struct incise_recording *recording,
+			    const char *table, const char *other, const char *columns,
+			    const char *types, uint64_t expected,
+			    struct incise_error *err)
+{
+	char sql[300];
+
+	*rows = (struct incise_rows){
+		.recording = recording,
+		.table = table,
+		.types = types,
+		.expected = expected,
+		.t_ns = INCISE_TIME_NONE,
+	};
+	/* CROSS: SQLite keeps this order, and looks the other's rows up by their number. */
+	snprintf(sql, sizeof(sql),
+		 "SELECT %s FROM %s CROSS JOIN %s USING (seq) ORDER BY %s.seq", columns,
+		 table, other, table);
+	return open_sql(rows, sql, err);
 }
 
 void incise_rows_calibrate(struct incise_rows *rows,

@@ -33,6 +33,12 @@ int incise_rows_open(struct incise_rows *rows, struct incise_recording *recordin
 		     const char *table, const char *columns, const char *types,
 		     uint64_t expected, struct incise_error *err);
 
+/* The same with the columns of another table's row of the same number, which must be there. */
+int incise_rows_open_joined(struct incise_rows *rows, struct incise_recording *recording,
+			    const char *table, const char *other, const char *columns,
+			    const char *types, uint64_t expected,
+			    struct incise_error *err);
+
 /* Take another calibration's delay; before the first row. */
 void incise_rows_calibrate(struct incise_rows *rows,
 			   const struct incise_calibration *calibration);

@@ -275,6 +275,8 @@ read_mcap() {
 	incise capture -o short.rec --rig sim:clock=simulated --duration 6s >/dev/null
 	sqlite3 short.rec/recording.db "INSERT INTO events VALUES (2000000000, 'note',
 		'\"quoted\" \\ ' || char(10) || ' é ' || CAST(x'ff' AS TEXT))"
+	# the line puts no record before the first force sample
+	sqlite3 short.rec/recording.db "UPDATE knots SET t_ns = t_ns + 1000000"
 	run -0 --separate-stderr incise export short.rec -o short.mcap
 	[ -z "$stderr" ]
 	[[ "$output" == "short.mcap: "*" messages" ]]
@@ -307,14 +309,98 @@ read_mcap() {
 
 @test "export resampled" {
 	incise export liver.rec --resample --rate 100 -o a.csv
-	well_formed <(sed 's/nan/0/g' a.csv) 17 2
+	well_formed <(sed 's/nan/0/g' a.csv) 21 2
+	[[ "$(head -n 1 a.csv)" != *camera* ]]
 	# 43 s of it, in cuts or not
 	[ "$(wc -l <a.csv)" -eq 4301 ]
 	[ "$(tail -n +2 a.csv | cut -d, -f2 | sort -nu | tail -n 1)" -eq 14 ]
 	incise export liver.rec --resample -o b.csv
 	[ "$(wc -l <b.csv)" -eq 430001 ]
 	# at the same time the same pose, and a force that is less uncertain
-	join -t, <(tail -n +2 a.csv | cut -d, -f3-13 | sort) <(tail -n +2 b.csv |
-		cut -d, -f3-13 | sort) | awk -F, '
-		{ for (i = 2; i < 11; i++) if ($i != $(i + 10)) bad = 1 } END { exit bad || NR < 4290 }'
+	join -t, <(tail -n +2 a.csv | cut -d, -f3-16 | sort) <(tail -n +2 b.csv |
+		cut -d, -f3-16 | sort) | awk -F, '
+		{ for (i = 2; i < 15; i++) if ($i != $(i + 13)) bad = 1 } END { exit bad || NR < 4290 }'
+}
+
+@test "export resampled with pictures" {
+	cp -r liver.rec/ seen.rec
+	sqlite3 seen.rec/recording.db "DELETE FROM knots;
+		INSERT INTO frames SELECT seq, t_ns, t_ns, 0, 1, 0, 100.0, 0.5, depth_mm, 0.9 FROM depth"
+	incise export seen.rec liver.rec --resample --rate 50 -o a.csv
+	[[ "$(head -n 1 a.csv)" == *,tracker_error,camera_depth_mm,camera_depth_sd_mm,camera_depth_u_mm,quality,low_quality ]]
+	# by the pictures as by the tracker; and none of what has no pictures
+	awk -F, 'NR > 1 && $1 == "seen" && $14 != "nan" { n++; if ($14 != $22 || $26) bad = 1 }
+		NR > 1 && $1 == "liver" && ($22 != "nan" || !$26) { bad = 1 }
+		END { exit bad || n < 2100 }' a.csv
+	echo 'depth_mm_px = 0.2375;' >twice.conf
+	incise export seen.rec --resample --rate 50 -c twice.conf --lineage -o b.csv
+	awk -F, 'FNR > 1 && /^seen/ && $14 != "nan" { n++; d = $22 - 2 * $14; if (d > 2e-4 || d < -2e-4) bad = 1 }
+		END { exit bad || n < 2100 }' b.csv
+	grep -qx '# depth_mm_px: 0.2375' b.csv
+}
+
+@test "export takes the times of the line" {
+	cp -r liver.rec/ even.rec
+	sqlite3 even.rec/recording.db "UPDATE tracker SET t_ns = seq * 8333333;
+		UPDATE depth SET t_ns = seq * 8333333; DELETE FROM knots"
+	cp -r even.rec line.rec
+	# each record of the tracker 100 ms later than its row says
+	sqlite3 line.rec/recording.db "DELETE FROM knots; INSERT INTO knots SELECT 'tracker',
+		seq > 0, seq, t_ns + 100000000, 1e5, seq = 0 FROM tracker
+		WHERE seq IN (0, (SELECT max(seq) FROM tracker))"
+	for how in "" --resample; do
+		incise export even.rec $how -o a.csv
+		incise export line.rec $how -o b.csv
+		python3 - <<-'END'
+			import csv
+			def depth(path):
+			    return {float(r["t_s"]): float(r["depth_mm"]) for r in csv.DictReader(open(path))}
+			a, b = depth("a.csv"), depth("b.csv")
+			both = [t for t in a if 2 < t < 30 and round(t + 0.1, 6) in b]
+			assert len(both) > 50000, len(both)
+			off = [abs(a[t] - b[round(t + 0.1, 6)]) for t in both]
+			off = [d for d in off if d == d]
+			# the last digit
+			assert max(off) < 1.5e-4, max(off)
+		END
+	done
+	incise export even.rec --resample --rate 100 -o a.csv
+	# by another delay, 100 ms longer, they are as they were
+	delay=$(sqlite3 line.rec/recording.db "SELECT delay_ns FROM streams WHERE name = 'tracker'")
+	echo "tracker_delay_ms = $(awk "BEGIN { print 100 + $delay / 1e6 }");" >back.conf
+	incise export line.rec --resample --rate 100 -c back.conf -o c.csv
+	paste -d, a.csv c.csv | awk -F, 'NR > 20 && $14 != "nan" && $35 != "nan" {
+		n++; d = $14 - $35; if (d > 1.5e-4 || d < -1.5e-4) bad = 1 } END { exit bad || n < 4000 }'
+}
+
+@test "export as HDF5 is what h5py reads" {
+	[ -e "$INCISE_BUILD/lib/incise/export_hdf5.so" ] || skip "the module of HDF5 is not built"
+	for python in python3 /usr/bin/python3; do
+		$python -c 'import h5py' 2>/dev/null && break
+		python=
+	done
+	[ "$python" ] || skip "python3-h5py is not installed"
+	incise export liver.rec --resample --rate 1000 -o a.h5
+	incise export liver.rec --resample --rate 1000 -o a.csv
+	$python - <<-'END'
+		import csv, h5py, math
+		rows = list(csv.DictReader(open("a.csv")))
+		with h5py.File("a.h5") as file:
+		    assert file["recording_names"][0] == b"liver"
+		    assert file.attrs["source"] in ("liver.rec", b"liver.rec")
+		    # three chunks, the last of them cut short
+		    assert len(rows) == 43000
+		    for name in rows[0]:
+		        column = file[name][:]
+		        assert len(column) == len(rows), name
+		        assert file[name].attrs["units"]
+		        if name == "recording":
+		            assert set(column) == {1}
+		            continue
+		        for value, row in zip(column, rows):
+		            text = float(row[name])
+		            # float32, and half of the last digit
+		            assert math.isnan(value) and math.isnan(text) or abs(value - text) < 2e-5 + 5.1e-4 * (
+		                name == "velocity_mm_s") + 5.1e-5 * name.endswith("_mm") + 1e-6 * abs(text), (name, value, text)
+	END
 }

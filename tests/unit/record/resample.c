@@ -4,6 +4,7 @@
  * signals that are put into a recording and known at any time.
  */
 #include "recorded.h"
+#include "../../../lib/record/force_near.h"
 #include "../../../lib/record/resample.h"
 
 static int record_once(void **state)
@@ -15,19 +16,21 @@ static int record_once(void **state)
 	change("known.rec/recording.db",
 	       "UPDATE force SET code = round(2048 + 500 * sin(2 * pi() * 5 * seq / 1e4) + "
 	       "500 * sin(2 * pi() * 170 * seq / 1e4));"
-	       "DELETE FROM knots; DELETE FROM streams;"
 	       "UPDATE tracker SET t_ns = (SELECT min(t_ns) FROM force) + seq * 8000000, "
 	       "x_mm = seq * 0.8, y_mm = 1.5, z_mm = -seq * 0.08, "
 	       "qw = cos(seq * 0.01), qx = 0.0, qy = sin(seq * 0.01), qz = 0.0;"
+	       "DELETE FROM knots; DELETE FROM streams;"
 	       "UPDATE tracker SET status = 'k' WHERE seq = 60;"
+	       "UPDATE tracker SET button = seq >= 100;"
 	       "UPDATE tracker SET qw = -qw, qy = -qy WHERE seq % 2;"
 	       "UPDATE depth SET t_ns = (SELECT min(t_ns) FROM force) + seq * 8000000, "
 	       "depth_mm = seq * 0.08, velocity_mm_s = 100.0;");
 	return 0;
 }
 
-/* Resample at a rate; the CSV's text, to be freed. */
-static char *resample(double rate_hz)
+/* Resample at a rate, by another calibration or NULL; the CSV's text, to be freed. */
+static char *resample(const char *path, double rate_hz,
+		      const struct incise_calibration *calibration)
 {
 	struct incise_recording *recording;
 	struct incise_export_options how;
@@ -40,7 +43,8 @@ static char *resample(double rate_hz)
 	incise_export_options_init(&how);
 	how.resample = true;
 	how.rate_hz = rate_hz;
-	recording = incise_recording_open("known.rec", &err);
+	how.calibration = calibration;
+	recording = incise_recording_open(path, &err);
 	if (!recording || incise_export_csv(&recording, 1, &how, out, &report, &err))
 		fail_msg("%s", err.text);
 	incise_recording_close(recording);
@@ -49,21 +53,21 @@ static char *resample(double rate_hz)
 }
 
 struct row {
-	double cut, t, x[3], q[4], depth, velocity, force, u, clipped, interpolated,
-		error;
+	double cut, t, x[3], x_u, q[4], station, button, depth, depth_u, velocity, force,
+		u, clipped, interpolated, error, camera[5];
 };
 
+/* Columns in the order of the struct, with the camera's or without. */
 static bool next_row(char **rest, struct row *r)
 {
-	char *line = strsep(rest, "\n");
+	char *line = strsep(rest, "\n"), *end;
+	double *to = &r->cut;
 
-	return line && *line &&
-	       sscanf(line,
-		      "known,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,"
-		      "%lf",
-		      &r->cut, &r->t, &r->x[0], &r->x[1], &r->x[2], &r->q[0], &r->q[1],
-		      &r->q[2], &r->q[3], &r->depth, &r->velocity, &r->force, &r->u,
-		      &r->clipped, &r->interpolated, &r->error) == 16;
+	if (!line || !*line)
+		return false;
+	for (line = strchr(line, ','); line && *line == ','; line = end)
+		*to++ = strtod(line + 1, &end);
+	return line && !*line && (to == r->camera || to == r->camera + 5);
 }
 
 /* Gain at a frequency, in parts of the rate of rows, by the sum over a dense grid. */
@@ -72,7 +76,7 @@ static double gain(double frequency)
 	double sum = 0, all = 0;
 
 	for (int i = -8000; i <= 8000; i++) {
-		double w = incise_resample_weight(i * 1e-3);
+		double w = incise_force_weight(i * 1e-3);
 
 		sum += w * cos(2 * M_PI * frequency * i * 1e-3);
 		all += w;
@@ -88,7 +92,7 @@ static void the_filter_is_as_it_says(void **state)
 	for (double f = 0.5; f < 20; f += 0.0137)
 		assert_true(fabs(gain(f)) < 1e-3);
 	for (double x = 0; x < 9; x += 0.1)
-		assert_true(incise_resample_weight(x) == incise_resample_weight(-x));
+		assert_true(incise_force_weight(x) == incise_force_weight(-x));
 }
 
 /* 170 Hz is above half of all rates at which it is filtered. */
@@ -104,7 +108,7 @@ static void rows_are_those_of_the_signals(void **state)
 
 	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
 		double rate = cases[k].rate ? cases[k].rate : 1e4;
-		char *text = resample(cases[k].rate), *rest = text;
+		char *text = resample("known.rec", cases[k].rate, NULL), *rest = text;
 		struct row r;
 		int n = 0;
 
@@ -128,7 +132,11 @@ static void rows_are_those_of_the_signals(void **state)
 			assert_true(fabs(r.x[0] - 0.8 * at) < 2e-4);
 			assert_true(fabs(r.x[1] - 1.5) < 1e-4);
 			assert_true(fabs(r.depth - 0.08 * at) < 2e-4);
-			assert_true(fabs(r.velocity - 100) < 1e-3);
+			/* with z's 10 mm/s; three decimals */
+			assert_true(fabs(r.velocity - sqrt(10100)) < 1e-3);
+			/* no noise in it, and nothing is known of times */
+			assert_true(r.x_u == 0 && r.depth_u == 0);
+			assert_true(r.station == 1 && r.button == (record >= 100));
 			assert_true(fabs(fabs(r.q[0]) - fabs(cos(0.01 * at))) < 2e-6);
 			assert_true(fabs(fabs(r.q[2]) - fabs(sin(0.01 * at))) < 2e-6);
 			for (int i = 0; i < 4; i++)
@@ -144,11 +152,102 @@ static void rows_are_those_of_the_signals(void **state)
 	}
 }
 
+static double at(const char *sql)
+{
+	return ask("camera.rec/recording.db", sql);
+}
+
+/*
+ * Noise on the records, pictures on a saw, times that are uncertain by 1 ms of the tracker's
+ * and 2 ms of the camera's: what is said of each is what was put in.
+ */
+static void uncertainties_are_what_was_put_in(void **state)
+{
+	struct incise_calibration calibration;
+	struct row r, other;
+	char *text, *rest, *text2, *rest2;
+	double x_u = 0, depth_u = 0, first;
+	int n = 0, seen = 0;
+
+	assert_int_equal(system("cp -r known.rec camera.rec"), 0);
+	change("camera.rec/recording.db",
+	       "DELETE FROM streams; INSERT INTO streams(name, device, stamped, delay_ns, "
+	       "grain_ns, rows, lost, late, offset_sd_ns) VALUES"
+	       "('tracker', 't', 0, 5000000, 0, 1, 0, 0, 1e6),"
+	       "('camera', 'c', 1, 2000000, 0, 1, 0, 0, 2e6);"
+	       /* ±0.05 in turn has second differences of 0.2: √(0.04/6) of noise */
+	       "UPDATE tracker SET y_mm = 1.5 + (seq % 2) * 0.1;"
+	       "UPDATE depth SET depth_mm = depth_mm + (seq % 2) * 0.06;"
+	       "INSERT INTO frames WITH RECURSIVE f(i) AS (SELECT 0 UNION ALL SELECT i + 1 "
+	       "FROM f WHERE i < 250) SELECT i, (SELECT min(t_ns) FROM force) + i * "
+	       "10000000, 0, 0, 1, 0, 100.0, 0.5, 0.2 * i, CASE WHEN i % 50 = 7 THEN 0.4 "
+	       "ELSE 0.9 END FROM f;"
+	       "UPDATE frames SET depth_mm = NULL, sd_px = NULL WHERE seq IN (20, 21);"
+	       "DELETE FROM frames WHERE seq BETWEEN 100 AND 105");
+	incise_calibration_nominal(&calibration);
+	text = rest = resample("camera.rec", 1000, NULL);
+	first = at("SELECT value FROM meta WHERE key = 'depth_mm_px'");
+	assert_non_null(strstr(strsep(&rest, "\n"),
+			       "tracker_error,camera_depth_mm,camera_depth_sd_mm,"
+			       "camera_depth_u_mm,quality,low_quality"));
+	for (int i = 0; next_row(&rest, &r); i++) {
+		int picture = i / 10;
+		double share = i % 10 / 10.0, line = hypot(share, 1 - share);
+		bool low = picture % 50 == 7 || picture % 50 == 6;
+
+		if (i < 200 || i >= 2500)
+			continue;
+		if (picture >= 19 && picture <= 21) {
+			assert_true(isnan(r.camera[0]) && isnan(r.camera[3]));
+			assert_true(r.camera[4] == 1);
+		} else if (picture >= 99 && picture < 106) {
+			assert_true(isnan(r.camera[0]) && r.camera[4] == 1);
+		} else {
+			double sd = 0.5 * first * line;
+
+			assert_true(fabs(r.camera[0] - 0.02 * i) < 1e-4);
+			assert_true(fabs(r.camera[1] - sd) < 1e-4);
+			assert_true(fabs(r.camera[2] - hypot(sd, 20 * 2e-3)) < 1e-4);
+			assert_true(r.camera[3] <= 0.9 && r.camera[3] >= 0.4);
+			assert_true(r.camera[4] == low);
+			seen++;
+		}
+		/* at a record (each 8 ms): its own noise; 100 mm/s for 1 ms */
+		if (i % 8 == 0 && i < 2400) {
+			x_u += r.x_u;
+			depth_u += r.depth_u;
+			n++;
+		}
+	}
+	assert_true(seen > 2000 && n > 200);
+	/* one axis of three has it: 0.2²/18; and the way, which the noise itself makes
+	 * longer: up to √(0.8² + 0.08² + 0.1²)/8 ms */
+	assert_true(fabs(x_u / n - hypot(0.2 / sqrt(18), 0.1)) < 2e-3);
+	/* 0.12 of second differences; 10 mm/s, and in turn 7.5 more and less */
+	assert_true(fabs(depth_u / n - hypot(0.12 / sqrt(6), 0.01)) < 2e-3);
+
+	/* Another calibration: twice the depth, and later by 3 ms less of a delay. */
+	calibration.depth_mm_px = 2 * first;
+	calibration.camera_delay_ms = -1;
+	calibration.tracker_delay_ms = 9;
+	text2 = rest2 = resample("camera.rec", 1000, &calibration);
+	strsep(&rest2, "\n");
+	for (int i = 0; next_row(&rest2, &other); i++)
+		if (i > 1200 && i < 2400) {
+			assert_true(fabs(other.camera[0] - 2 * 0.02 * (i - 3)) < 1e-4);
+			/* x goes on by 0.1 mm each ms, and was there 4 ms before */
+			assert_true(fabs(other.x[0] - 0.1 * (i + 4)) < 2e-4);
+		}
+	free(text);
+	free(text2);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(the_filter_is_as_it_says),
 		cmocka_unit_test(rows_are_those_of_the_signals),
+		cmocka_unit_test(uncertainties_are_what_was_put_in),
 	};
 
 	return cmocka_run_group_tests(tests, record_once, leave_folder);
