@@ -41,7 +41,7 @@ static const struct cli_option options[] = {
 	{OPT_MIN_COUNT, "min-count", "N",
 	 "leave out bins with fewer samples (default: 50)"},
 	{'c', "calibration", "FILE.conf",
-	 "take this calibration of force, not that of the recordings"},
+	 "take this calibration of force, camera and delays, not that of\nthe recordings"},
 	{OPT_LINEAGE, "lineage", NULL,
 	 "begin a CSV with comments that tell where it is from"},
 	{OPT_JSON, "json", NULL, "report as one JSON object; needs -o FILE"},

@@ -56,6 +56,9 @@ const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
 	FLAG("low_quality", "1: below 0.5 in a picture, or not seen"),
 };
 
+/* No session takes a hundred days; a grid over forged times has no end. */
+#define SPAN_MAX_NS 1e16
+
 struct resample {
 	struct incise_force_near force;
 	struct incise_blade blade;
@@ -253,11 +256,19 @@ int incise_resample(struct incise_recording *recording, const char *name,
 		r.first_ns = r.force.samples[0].t_ns;
 		r.t_sd_s = incise_row_times_sd(&r.force.rows.times, 0);
 		span_ns = (double)(r.force.last_ns - r.first_ns);
-		rc = options->rate_hz > 0
-			     ? on_grid(&r, span_ns > 0 ? (recording->meta.force - 1) *
-								 1e9 / span_ns
-						       : 1)
-			     : on_force(&r);
+		if (span_ns > SPAN_MAX_NS)
+			rc = incise_error_set(err, EINVAL,
+					      "%s: damaged: table force: times from %lld "
+					      "to %lld ns cannot be",
+					      recording->path, (long long)r.first_ns,
+					      (long long)r.force.last_ns);
+		else
+			rc = options->rate_hz > 0
+				     ? on_grid(&r, span_ns > 0
+							   ? (recording->meta.force - 1) *
+								     1e9 / span_ns
+							   : 1)
+				     : on_force(&r);
 	}
 	report->cuts += r.blade.cut.count;
 	incise_force_near_close(&r.force);

@@ -47,6 +47,7 @@ int incise_rows_open_joined(struct incise_rows *rows, struct incise_recording *r
 		.recording = recording,
 		.table = table,
 		.types = types,
+		.other = other,
 		.expected = expected,
 		.t_ns = INCISE_TIME_NONE,
 	};
@@ -100,20 +101,24 @@ int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 	if (rc == SQLITE_DONE) {
 		if (rows->expected == UINT64_MAX || rows->n == rows->expected)
 			return 0;
-		return incise_error_set(err, EINVAL,
-					"%s: damaged: table %s has %llu rows of %llu",
-					path, rows->table, (unsigned long long)rows->n,
-					(unsigned long long)rows->expected);
+		return incise_error_set(
+			err, EINVAL, "%s: damaged: table %s has %llu rows of %llu%s%s%s",
+			path, rows->table, (unsigned long long)rows->n,
+			(unsigned long long)rows->expected,
+			rows->other ? " that table " : "", rows->other ? rows->other : "",
+			rows->other ? " has too" : "");
 	}
 	if (rc != SQLITE_ROW)
 		return incise_schema_fail(rows->recording->db, path, err);
 	if (!take(rows))
 		return incise_error_set(
 			err, EINVAL,
-			"%s: damaged: table %s, row %lld cannot be; `sqlite3 "
+			"%s: damaged: table %s%s%s, row %lld cannot be; `sqlite3 "
 			"%s/%s` shows it",
-			path, rows->table, (long long)sqlite3_column_int64(rows->stmt, 0),
-			path, INCISE_SCHEMA_DB);
+			path, rows->table, rows->other ? " or " : "",
+			rows->other ? rows->other : "",
+			(long long)sqlite3_column_int64(rows->stmt, 0), path,
+			INCISE_SCHEMA_DB);
 	rows->live = true;
 	rows->n++;
 	return 1;

@@ -16,6 +16,7 @@
 struct incise_rows {
 	struct incise_recording *recording;
 	const char *table, *types;
+	const char *other;  /* that is joined, or NULL */
 	sqlite3_stmt *stmt; /* at the row */
 	uint64_t n, expected;
 	int64_t t_ns; /* of the row, the best there is; column 1 is its own */

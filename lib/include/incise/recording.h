@@ -65,7 +65,8 @@ struct incise_export_options {
 
 	bool resample; /**< all of the recording, with the pose, at each force sample or,
 			    with a rate, on a grid; see incise-export(1) */
-	const struct incise_calibration *calibration; /**< in place of the recordings' */
+	/** In place of the recordings': force, the camera's depth, and the delays it has. */
+	const struct incise_calibration *calibration;
 	bool lineage; /**< CSV begins with lines "# key: value"; HDF5 and MCAP always have it */
 
 	/** Told now and then how much is done, 0 to 1, or NULL; what is not 0 ends it. */

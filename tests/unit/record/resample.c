@@ -242,12 +242,77 @@ static void uncertainties_are_what_was_put_in(void **state)
 	free(text2);
 }
 
+/* Of before the tracker's station was known. */
+static void a_recording_of_form_1_has_no_station(void **state)
+{
+	char *text, *rest;
+	struct row r;
+	int n = 0;
+
+	assert_int_equal(system("cp -r known.rec old.rec"), 0);
+	change("old.rec/recording.db", TO_FORM_1);
+	text = rest = resample("old.rec", 100, NULL);
+	strsep(&rest, "\n");
+	for (; next_row(&rest, &r); n++) {
+		assert_true(r.station == 0 && r.button == 0);
+		assert_true(n < 5 || n > 280 || fabs(r.x[0] - 100 * r.t) < 2e-4);
+	}
+	assert_true(n >= 300);
+	free(text);
+}
+
+static void damage_is_told(void **state)
+{
+	static const struct {
+		const char *sql, *message;
+	} cases[] = {
+		{"UPDATE force SET t_ns = 2305843009213693951 WHERE seq = (SELECT max(seq) "
+		 "FROM force)",
+		 "times from"},
+		{"UPDATE force SET code = 4096 WHERE seq = 900", "table force, row 900"},
+		{"DELETE FROM tracker WHERE seq = 70",
+		 "table depth has 359 rows of 360 that table tracker has too"},
+		{"UPDATE tracker SET x_mm = 9e999 WHERE seq = 70", "tracker, row 70"},
+		{"UPDATE tracker SET t_ns = 5 WHERE seq = 70", "table tracker, row 70"},
+		{"UPDATE depth SET depth_mm = 'deep' WHERE seq = 70",
+		 "table depth or tracker, row 70"},
+		{"INSERT INTO frames VALUES(0, 1, 1, 0, 1, 0, 1.0, 1.0, 'x', 1.0)",
+		 "table frames, row 0"},
+		{"INSERT INTO frames VALUES(0, 5, 1, 0, 1, 0, 1.0, 1.0, 1.0, 1.0), "
+		 "(1, 5, 1, 0, 1, 0, 1.0, 1.0, 1.0, 1.0)",
+		 "table frames, row 1"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_export_options how = {.resample = true, .rate_hz = 100};
+		struct incise_recording *recording;
+		struct incise_error err = {0};
+		FILE *out = fopen("/dev/null", "w");
+
+		assert_int_equal(system("rm -rf hurt.rec; cp -r known.rec hurt.rec"), 0);
+		change("hurt.rec/recording.db", cases[i].sql);
+		recording = incise_recording_open("hurt.rec", &err);
+		assert_non_null(recording);
+		assert_int_equal(incise_export_csv(&recording, 1, &how, out, NULL, &err),
+				 -EINVAL);
+		if (!strstr(err.text, cases[i].message))
+			fail_msg("%s: %s", cases[i].sql, err.text);
+		/* Nobody need want the message. */
+		assert_int_equal(incise_export_csv(&recording, 1, &how, out, NULL, NULL),
+				 -EINVAL);
+		incise_recording_close(recording);
+		fclose(out);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(the_filter_is_as_it_says),
 		cmocka_unit_test(rows_are_those_of_the_signals),
 		cmocka_unit_test(uncertainties_are_what_was_put_in),
+		cmocka_unit_test(a_recording_of_form_1_has_no_station),
+		cmocka_unit_test(damage_is_told),
 	};
 
 	return cmocka_run_group_tests(tests, record_once, leave_folder);
