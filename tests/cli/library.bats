@@ -122,7 +122,9 @@ maps() {
 @test "OpenCV is mapped by who looks at pictures, and by no one else" {
 	for file in "$INCISE_BUILD"/lib/lib*.so "$INCISE_BUILD"/bin/*; do
 		ldd "$file" >linked
-		run ! grep -E 'libopencv|libjpeg' linked
+		run ! grep libopencv linked
+		[ "${file##*/}" = incise-bench ] && continue # makes JPEG pictures
+		run ! grep libjpeg linked
 	done
 	maps incise bench precision --quick
 	run ! grep -E 'libopencv|vision_opencv|libav(format|codec)|frames_mkv' mapped
