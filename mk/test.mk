@@ -90,8 +90,27 @@ can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/RE
 mcap-reader: ## a second reader for the tests of MCAP, $(O)/tests/mcap/check
 	@tests/mcap/venv $(O)/tests/mcap
 
-check-cli: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak ## command-line tests of the real programs
-	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli
+# Attacks on recordings. What is in a module is found by INCISE_MODULE_PATH.
+attack_programs := $(addprefix $(O)/tests/attack/,storage damage record watch.so)
+
+$(O)/tests/attack/%: tests/attack/%.c $(O)/lib/libincise-tests.a
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
+		$(LDFLAGS) -o $@ $< $(O)/lib/libincise-tests.a $(all_libs) -lm -pthread
+
+# Loaded into the real programs; under a sanitizer it would have to come behind its library.
+$(O)/tests/attack/watch.so: tests/attack/watch.c
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -fPIC $(warnings) -Wno-missing-prototypes \
+		$(CFLAGS) -MMD -MP -MF $@.d -shared $(LDFLAGS) -o $@ $< -ldl \
+		$(shell $(PKG_CONFIG) --libs sqlite3)
+
+attack_bats = INCISE_BUILD=$(abspath $(O)) bats --print-output-on-failure tests/attack
+check-attack: all $(attack_programs) ## attacks on recordings with their full counts: 100 kills, thousands of faults
+	ATTACK=full $(attack_bats)
+
+check-cli: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(attack_programs) ## command-line tests of the real programs
+	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli tests/attack
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
 sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all
@@ -103,7 +122,7 @@ style_sources := $(shell find lib tools tests driver -name '*.[ch]' -o -path 'li
 check-style: ## the house's form: clang-format, an SPDX line in every file
 	@tests/style $(style_sources)
 
-.PHONY: check check-style check-unit check-cli check-sanitize can-drive mcap-reader
+.PHONY: check check-style check-unit check-cli check-attack check-sanitize can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

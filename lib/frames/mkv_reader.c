@@ -177,6 +177,8 @@ static int reader_next(struct incise_frames_reader *reader,
 		frame->size = (size_t)r->packet->size;
 		return 1;
 	}
+	if (reader->undecoded)
+		return 1;
 	rc = decode(r, frame);
 	if (rc == -ENOMEM)
 		return incise_error_set(err, ENOMEM, "%.300s: out of memory", r->path);

@@ -23,6 +23,7 @@
 #ifndef INCISE_FRAMES_H
 #define INCISE_FRAMES_H
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <incise/camera.h>
 #include <incise/error.h>
@@ -103,6 +104,9 @@ struct incise_frames_reader_ops {
 /* One thread at a time. */
 struct incise_frames_reader {
 	const struct incise_frames_reader_ops *ops;
+	/* May be set between two pictures: FFV1 is not decoded, which takes some 25 ms, and
+	 * pictures of it have no data. Their bytes are held against their CRC as ever. */
+	bool undecoded;
 };
 
 /*
@@ -126,7 +130,7 @@ void incise_frames_reader_close(struct incise_frames_reader *reader);
 
 /* --- module ------------------------------------------------------------------------ */
 
-#define INCISE_FRAMES_ABI 1
+#define INCISE_FRAMES_ABI 2
 #define INCISE_FRAMES_SYMBOL "incise_frames"
 
 /* What frames_mkv.so exports. */

@@ -201,9 +201,19 @@ static char *find_name(const char *folder)
 	return name;
 }
 
+/* Whether there is a log, which then has the newest pages, be the file as it may. */
+static bool has_log(struct incise_recording *rec)
+{
+	const char *log = sqlite3_filename_wal(sqlite3_db_filename(rec->db, "main"));
+	struct stat st;
+
+	return log && !stat(log, &st) && st.st_size > 0;
+}
+
 /*
  * Whole pages: SQLite notices a missing page, but takes zeros for the missing end of the
- * last one.
+ * last one. While the log is folded in, the end of the file may be in mid-page, as after a
+ * disk that failed then.
  */
 static int check_size(struct incise_recording *rec, struct incise_error *err)
 {
@@ -217,13 +227,55 @@ static int check_size(struct incise_recording *rec, struct incise_error *err)
 		page = sqlite3_column_int64(stmt, 0);
 	if (sqlite3_finalize(stmt) != SQLITE_OK || page < 1)
 		return incise_schema_fail(rec->db, rec->path, err);
-	if (!stat(sqlite3_db_filename(rec->db, "main"), &st) && st.st_size % page)
+	if (!stat(sqlite3_db_filename(rec->db, "main"), &st) && st.st_size % page &&
+	    !has_log(rec))
 		return incise_error_set(
 			err, EINVAL,
 			"%s: damaged: its %s ends in mid-page: it was cut short, "
 			"as by a copy that did not finish",
 			rec->path, INCISE_SCHEMA_DB);
 	return 0;
+}
+
+/* Until SQLite has read something it does not know what state a file was left in. */
+static int read_something(sqlite3 *db)
+{
+	return sqlite3_exec(db, "SELECT 1 FROM sqlite_master", NULL, NULL, NULL);
+}
+
+/*
+ * A recorder that was killed, or whose disk failed, in the moment when it gave up its log has
+ * left a journal, and SQLite wants that rolled back by someone who may write.
+ */
+static void roll_back(const char *file)
+{
+	sqlite3 *db;
+
+	if (sqlite3_open_v2(file, &db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX,
+			    NULL) == SQLITE_OK) {
+		sqlite3_db_config(db, SQLITE_DBCONFIG_DEFENSIVE, 1, NULL);
+		sqlite3_db_config(db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, NULL);
+		sqlite3_busy_timeout(db, 1000);
+		read_something(db);
+	}
+	sqlite3_close(db);
+}
+
+static int open_read_only(const char *file, sqlite3 **db)
+{
+	int rc = sqlite3_open_v2(file, db, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX,
+				 NULL);
+
+	if (rc == SQLITE_OK) {
+		/* Nothing that stands in a file's schema is run. */
+		sqlite3_db_config(*db, SQLITE_DBCONFIG_DEFENSIVE, 1, NULL);
+		sqlite3_db_config(*db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, NULL);
+		sqlite3_busy_timeout(*db, 1000);
+		sqlite3_extended_result_codes(*db, 1);
+		rc = read_something(*db);
+		sqlite3_extended_result_codes(*db, 0);
+	}
+	return rc;
 }
 
 static int open_database(struct incise_recording *rec, struct incise_error *err)
@@ -246,19 +298,21 @@ static int open_database(struct incise_recording *rec, struct incise_error *err)
 				      rec->path, INCISE_SCHEMA_DB);
 	} else if (access(file, R_OK)) {
 		rc = incise_error_set(err, errno, "%s: %s", file, strerror(errno));
-	} else if (sqlite3_open_v2(file, &rec->db,
-				   SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, NULL)) {
-		rc = incise_schema_fail(rec->db, rec->path, err);
 	} else {
-		rc = 0;
+		rc = open_read_only(file, &rec->db);
+		if (rc == SQLITE_READONLY_ROLLBACK) {
+			sqlite3_close(rec->db);
+			rec->db = NULL;
+			roll_back(file);
+			rc = open_read_only(file, &rec->db);
+		}
+		if (rc != SQLITE_OK)
+			rc = incise_schema_fail(rec->db, rec->path, err);
 	}
 	free(file);
 	if (rc)
 		return rc;
-	/* Nothing that stands in a file's schema is run; pages are checked as they are read. */
-	sqlite3_db_config(rec->db, SQLITE_DBCONFIG_DEFENSIVE, 1, NULL);
-	sqlite3_db_config(rec->db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, NULL);
-	sqlite3_busy_timeout(rec->db, 1000);
+	/* Pages are checked as they are read. */
 	if (sqlite3_exec(rec->db, "PRAGMA cell_size_check=ON; BEGIN", NULL, NULL, NULL))
 		return incise_schema_fail(rec->db, rec->path, err);
 	return 0;

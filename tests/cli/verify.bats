@@ -139,27 +139,3 @@ qw REAL NOT NULL, qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, status T
 	run -1 --separate-stderr bash -c "incise verify a.rec >/dev/full"
 	[ "${#stderr_lines[@]}" -eq 1 ]
 }
-
-@test "kill -9 at 20 moments leaves what verifies up to its last commit" {
-	rm -rf a.rec
-	for i in $(seq 20); do
-		incise capture -o a.rec --rig sim:clock=real >out 2>err 3>&- &
-		pid=$!
-		until [ -s a.rec.part/recording.db ]; do sleep 0.01; done
-		# from 50 to 1000 ms; each time another part of the 100 ms between commits
-		sleep "$(awk "BEGIN { print 0.05 + $i * 37 % 20 * 0.05 + $i * 0.0023 }")"
-		kill -KILL $pid
-		wait $pid || true
-		run -1 --separate-stderr incise verify a.rec --json
-		echo "$output" >report.json
-		[ "$(key report.json intact)" = 1 ] || complain "$i: $output"
-		[ "$(key report.json interrupted)" = 1 ]
-		[ "$(key report.json 'streams[0].lost')" = 0 ]
-		[ "$(key report.json 'streams[0].present')" = \
-			"$(ask a.rec.part 'SELECT count(*) FROM force')" ]
-		key report.json 'streams[0].present' >>rows
-		rm -rf a.rec.part
-	done
-	# some of them had rows: it was not killed before it began
-	[ "$(sort -n rows | tail -n 1)" -gt 3000 ]
-}

@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * What the library that is loaded into a recording program (watch.c) tells the attacker: a
+ * page that both map, so that it outlives a kill -9.
+ */
+#ifndef TEST_ATTACK_WATCH_H
+#define TEST_ATTACK_WATCH_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+enum { WATCH_FORCE, WATCH_TRACKER, WATCH_FRAMES, WATCH_TABLES };
+
+struct watch_page {
+	_Atomic int64_t commits;
+	_Atomic int64_t began_ns; /* a COMMIT that is under way; 0: none is */
+	_Atomic int64_t took_ns;  /* the last one */
+	/* Greatest seq that SQLite has said is committed; -1: none. */
+	_Atomic int64_t seq[WATCH_TABLES];
+	_Atomic int64_t calls;	/* on files of the recording */
+	_Atomic int64_t faults; /* errors given, and writes cut short */
+};
+
+#endif
