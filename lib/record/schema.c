@@ -146,7 +146,7 @@ int incise_schema_fail(sqlite3 *db, const char *path, struct incise_error *err)
 				db ? sqlite3_errmsg(db) : strerror(ENOMEM));
 }
 
-/* The one number that a PRAGMA answers. */
+/* The one number that this answers. */
 static int pragma(sqlite3 *db, const char *sql, sqlite3_int64 *value)
 {
 	sqlite3_stmt *stmt;
@@ -193,11 +193,18 @@ static int check_tables(sqlite3 *db, const char *path, int form, struct incise_e
 int incise_schema_check(sqlite3 *db, const char *path, int *form,
 			struct incise_error *err)
 {
-	sqlite3_int64 application, version;
+	sqlite3_int64 application, version, entries;
 
 	if (pragma(db, "PRAGMA application_id", &application) != SQLITE_OK ||
-	    pragma(db, "PRAGMA user_version", &version) != SQLITE_OK)
+	    pragma(db, "PRAGMA user_version", &version) != SQLITE_OK ||
+	    pragma(db, "SELECT count(*) FROM sqlite_master", &entries) != SQLITE_OK)
 		return incise_schema_fail(db, path, err);
+	if (!application && !version && !entries)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: empty: interrupted before anything was recorded; there is "
+			"nothing to keep",
+			path);
 	if (application != INCISE_SCHEMA_APPLICATION)
 		return incise_error_set(err, EINVAL,
 					"%s: no recording: its %s was not made by incise",

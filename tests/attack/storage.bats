@@ -13,6 +13,10 @@ setup() {
 	programs=$INCISE_BUILD/tests/attack
 }
 
+teardown() {
+	[ -z "$mounted" ] || umount "$mounted"
+}
+
 # attack FEW MANY PROGRAM ARGUMENT…: the count and the seed go behind them.
 attack() {
 	local count=$1
@@ -30,6 +34,11 @@ tell() {
 
 @test "kill -9 at random moments: at most 200 ms are lost, and nothing that was committed" {
 	run -0 attack 20 100 storage kill
+	tell
+}
+
+@test "kill -9 before any write or sync, those of closing too" {
+	run -0 attack 60 1000 storage die
 	tell
 }
 
@@ -65,4 +74,28 @@ tell() {
 	incise verify good.rec
 	run -0 attack 100 2000 damage good.rec camera.mkv
 	tell
+}
+
+@test "a disk that someone else fills" {
+	mkdir disk
+	mount -t tmpfs -o size=40m tmpfs disk 2>/dev/null ||
+		skip "mounting a small tmpfs is not permitted; that of so many bytes stands in"
+	mounted=$PWD/disk
+	incise capture -o disk/a.rec --rig sim:clock=real --duration 60s >out 2>err 3>&- &
+	pid=$!
+	until [ "$(sqlite3 -readonly disk/a.rec.part/recording.db \
+		'SELECT count(*) FROM force' 2>/dev/null)" -gt 1000 ] 2>/dev/null; do
+		kill -0 $pid || complain "$(cat err)"
+		sleep 0.1
+	done
+	dd if=/dev/zero of=disk/else bs=64k 2>/dev/null || true
+	status=0
+	wait $pid || status=$?
+	[ "$status" -eq 1 ] || complain "exit $status: $(cat err)"
+	[ "$(wc -l <err)" -eq 1 ] || complain "$(cat err)"
+	rm disk/else
+	# ended cleanly, or up to the last commit
+	incise verify --json disk/a.rec >report.json || [ -d disk/a.rec.part ]
+	[ "$(key report.json intact)" = 1 ] || complain "$(cat report.json)"
+	holds "$(key report.json 'streams[0].present') > 1000"
 }

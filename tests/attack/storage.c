@@ -4,6 +4,7 @@
  *
  *     storage kill COUNT SEED            kill -9 at random moments, in real time
  *     storage eio|sync|short|enospc …    writes that fail, in simulated time; see watch.c
+ *     storage die COUNT SEED             kill -9 before a write or a sync, the last ones too
  *
  * After each one, what is left must open and verify, and what SQLite said is committed must be
  * in it. Works in the current folder; INCISE_BUILD is where the programs are. Prints a line
@@ -202,6 +203,20 @@ static void check_recording(struct round *round)
 	}
 }
 
+/* Before the first commit there is nothing to lose, and that is said. */
+static void check_unbegun(const struct round *round)
+{
+	struct incise_verify_report report;
+	struct incise_error err = {0};
+
+	if (access(recording(), F_OK))
+		return;
+	/* the first commit may have come to the disk, and its end not to the program */
+	if (incise_verify("a.rec", NULL, &report, &err) ? !strstr(err.text, ": empty: ")
+							: !report.intact)
+		fail(round, "before the first commit: %s", err.text);
+}
+
 /* --- kill -9 ------------------------------------------------------------------------------- */
 
 static struct {
@@ -261,6 +276,7 @@ static void attack_by_kill(struct round *round, int count)
 			if (delay_ns > LOST_MAX_NS && took_ns < STALL_NS &&
 			    canary.late_ns < STALL_NS)
 				fail(round, "there was no commit yet");
+			check_unbegun(round);
 			unbegun++;
 			continue;
 		}
@@ -319,6 +335,7 @@ static void check_message(const struct round *round)
 static void attack_by_errors(struct round *round, const char *kind, int count)
 {
 	bool is_short = !strcmp(kind, "short"), is_full = !strcmp(kind, "enospc");
+	bool dies = !strcmp(kind, "die");
 	int hit = 0, failed = 0, unbegun = 0, calls = 0;
 	int64_t bytes = 0;
 
@@ -328,9 +345,13 @@ static void attack_by_errors(struct round *round, const char *kind, int count)
 		long long after = round->number && !is_short ? draw(calls) : 0;
 		long long every = is_short ? 1 + draw(20) : 1 + draw(4) * 5;
 		int lasting = draw(2), status;
+		bool killed;
 		struct stat st;
 		pid_t pid;
 
+		/* while it is closed, every second time */
+		if (dies && calls && draw(2))
+			after = calls - 1 - (long long)draw(30);
 		set("ATTACK_SEED", draw(1000000));
 		set("ATTACK_AFTER", round->number ? (is_full ? 0 : after) : 1LL << 60);
 		set("ATTACK_EVERY", every);
@@ -342,7 +363,10 @@ static void attack_by_errors(struct round *round, const char *kind, int count)
 			 getenv("ATTACK_BYTES"));
 		clear(round);
 		pid = start(round, "sim:clock=simulated,seed=7", "1s");
-		if (waitpid(pid, &status, 0) != pid || !WIFEXITED(status))
+		if (waitpid(pid, &status, 0) != pid)
+			fail(round, "%s", strerror(errno));
+		killed = WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL;
+		if (!WIFEXITED(status) && !(dies && killed))
 			fail(round, "ended by signal %d: %s", WTERMSIG(status),
 			     text_of("err"));
 		if (!round->number) {
@@ -355,7 +379,16 @@ static void attack_by_errors(struct round *round, const char *kind, int count)
 				fail(round, "there is no recording");
 			bytes = 2 * st.st_size;
 		}
-		hit += round->page->faults > 0;
+		hit += round->page->faults > 0 || killed;
+		if (killed) {
+			if (round->page->commits) {
+				check_recording(round);
+			} else {
+				check_unbegun(round);
+				unbegun++;
+			}
+			continue;
+		}
 		if (!WEXITSTATUS(status)) {
 			if (*text_of("err"))
 				fail(round, "exit 0, and: %s", text_of("err"));
@@ -384,10 +417,10 @@ static void attack_by_errors(struct round *round, const char *kind, int count)
 		fprintf(stderr, "%s: no fault in %d recordings\n", kind, count);
 		exit(1);
 	}
-	printf("%s: %d recordings, %d met faults, %d failed with exit 1 and one line, %d of "
-	       "them before there was anything; all open, are intact and have what was "
+	printf("%s: %d recordings, %d met %s, %d failed with exit 1 and one line, %d ended "
+	       "before there was anything; all others open, are intact and have what was "
 	       "committed\n",
-	       kind, count, hit, failed, unbegun);
+	       kind, count, hit, dies ? "it" : "faults", failed, unbegun);
 }
 
 int main(int argc, char **argv)

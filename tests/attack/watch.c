@@ -8,7 +8,7 @@
  *
  * ATTACK_PAGE is the file of struct watch_page. ATTACK_KIND is eio (an error, now and then),
  * sync (the same of fsync and fdatasync only), short (writes that do less than they were
- * asked for, and no error), enospc (a disk of ATTACK_BYTES). ATTACK_AFTER calls go well
+ * asked for, and no error), enospc (a disk of ATTACK_BYTES), die (kill -9 before such a call). ATTACK_AFTER calls go well
  * first, then one of ATTACK_EVERY fails; ATTACK_LASTING 1: all that follow as well.
  * ATTACK_SEED chooses.
  */
@@ -16,6 +16,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -155,6 +156,8 @@ static int fate(int fd, size_t *size)
 	pthread_mutex_lock(&attack.lock);
 	attack.page->calls++;
 	if (attack.page->calls <= attack.after) {
+	} else if (!strcmp(attack.kind, "die")) {
+		kill(getpid(), SIGKILL);
 	} else if (!strcmp(attack.kind, "enospc")) {
 		if (size && (long long)*size > attack.bytes) {
 			*size = attack.bytes; /* as a disk does: what still fits */

@@ -55,6 +55,8 @@ tampered() {
 	[ "$(key report.json 'streams[0].lost')" = 0 ]
 	[ "$(key report.json 'streams[1].name')" = tracker ]
 	[ "$(key report.json findings)" = "[]" ]
+	[ "$(key report.json unverified)" = 0 ]
+	[ -z "$(key report.json pictures)" ]
 
 	ask a.rec "DELETE FROM force WHERE seq BETWEEN 100 AND 104"
 	run -1 --separate-stderr incise verify a.rec --json
@@ -98,6 +100,16 @@ tampered() {
 	tampered "DELETE FROM ledger" "rows behind the end of the ledger" "has no end"
 }
 
+@test "verify finds what was changed in tables that have no blocks" {
+	tampered "UPDATE meta SET value = 100.0 WHERE key = 'force_mV_N'" \
+		"a.rec: table meta is altered: its rows or its seal are not what was written"
+	tampered "UPDATE events SET text = 'nothing' WHERE kind = 'start'" "table events is altered"
+	tampered "INSERT INTO events VALUES(7, 'cut', 'one more')" "table events has "
+	tampered "UPDATE depth SET depth_mm = 0 WHERE seq = 7" "table depth is altered"
+	tampered "UPDATE streams SET delay_ns = delay_ns + 1" "table streams is altered"
+	tampered "DELETE FROM ledger WHERE stream = 'table:knots'" "table knots has no seal"
+}
+
 @test "verify of a file that was cut short, anywhere" {
 	size=$(stat -c %s a.rec/recording.db)
 	for share in 99 90 70 50 30 10 1; do
@@ -127,6 +139,14 @@ qw REAL NOT NULL, qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, status T
 	incise info a.rec # is still read
 	run --separate-stderr incise verify a.rec
 	failed_with "kept no ledger"
+}
+
+@test "a recording of a form that is not known yet is told from a damaged one" {
+	ask a.rec "PRAGMA user_version=3"
+	for verb in verify info export; do
+		run --separate-stderr incise $verb a.rec
+		failed_with "a.rec: made by a newer incise (form 3, this one reads up to 2)"
+	done
 }
 
 @test "verify of nothing, and of too much" {

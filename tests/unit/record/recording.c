@@ -97,7 +97,7 @@ static void no_recording(void **state)
 		{"empty.rec", -EINVAL, "no recording.db"},
 		{"folder.rec", -EINVAL, "is no file"},
 		{"garbage.rec", -EINVAL, "file is not a database"},
-		{"nothing.rec", -EINVAL, "not made by incise"},
+		{"nothing.rec", -EINVAL, "empty: interrupted before anything was"},
 		{"text\nfile.rec", -ENOENT, "text?file.rec"},
 	};
 	struct incise_recording_info info;
@@ -121,6 +121,56 @@ static void no_recording(void **state)
 		    !strstr(err.text, cases[i].text))
 			fail_msg("%s: %d, %s", cases[i].path, err.code, err.text);
 	}
+}
+
+/* As a recorder leaves it that was killed while it gave up its log. */
+static void journal_is_rolled_back(void **state)
+{
+	struct incise_recording_info info;
+	struct incise_error err = {0};
+	sqlite3 *db;
+
+	record("a.rec", "sim:clock=simulated", 1000 * MS);
+	assert_int_equal(sqlite3_open("a.rec/recording.db", &db), SQLITE_OK);
+	/* so little room that changed pages come to the file before the commit */
+	assert_int_equal(
+		sqlite3_exec(db, "PRAGMA cache_size=1; BEGIN; UPDATE force SET t_ns = 0",
+			     NULL, NULL, NULL),
+		SQLITE_OK);
+	assert_int_equal(system("cp -r a.rec b.rec"), 0);
+	sqlite3_close(db);
+	assert_int_equal(access("b.rec/recording.db-journal", F_OK), 0);
+	if (read_all("b.rec", &info, &err))
+		fail_msg("%s", err.text);
+	assert_int_equal(info.force, 10000);
+	assert_true(ask("b.rec/recording.db", "SELECT max(t_ns) FROM force") > 0);
+}
+
+/* The log has the page that did not come to the file as a whole. */
+static void half_a_page_beside_a_log(void **state)
+{
+	struct incise_calibration calibration;
+	struct incise_recording_info info;
+	struct incise_rig *rig = open_rig("sim:clock=simulated");
+	struct incise_recorder *recorder;
+	struct incise_error err = {0};
+	struct stat st;
+
+	incise_calibration_nominal(&calibration);
+	recorder = incise_recorder_new(
+		"a.rec", rig,
+		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
+	assert_non_null(recorder);
+	assert_int_equal(poll_for(recorder, rig, 700 * MS, &err), 0);
+	assert_int_equal(system("cp -r a.rec.part b.rec.part"), 0);
+	assert_int_equal(incise_recorder_close(recorder, &err), 0);
+	incise_rig_close(rig);
+	assert_int_equal(stat("b.rec.part/recording.db-wal", &st), 0);
+	assert_true(st.st_size > 0);
+	assert_int_equal(system("printf half >>b.rec.part/recording.db"), 0);
+	if (read_all("b.rec", &info, &err))
+		fail_msg("%s", err.text);
+	assert_true(info.force > 5000 && !info.complete);
 }
 
 /* Each change alone, on a fresh copy of a good recording. */
@@ -313,6 +363,8 @@ int main(void)
 		IN_FOLDER(form_1_is_read),
 		IN_FOLDER(paths_that_lead_to_a_recording),
 		IN_FOLDER(no_recording),
+		IN_FOLDER(journal_is_rolled_back),
+		IN_FOLDER(half_a_page_beside_a_log),
 		IN_FOLDER(damage_is_found),
 		IN_FOLDER(truncated_file_is_found),
 		IN_FOLDER(flipped_bytes_do_no_harm),
