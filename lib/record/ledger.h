@@ -9,7 +9,8 @@
  * A block's CRC is that of its rows and then of its own fields (all of them but the name of
  * the stream and the CRC), each integer 64 bits, little-endian. The end is a block without
  * rows: its count is 0, and its lost are the samples that the device lost and that no gap
- * in the numbers shows. Described for users in incise-recording(5).
+ * in the numbers shows. What has no blocks is sealed, see ledger_seal.h. Described for
+ * users in incise-recording(5).
  */
 #ifndef INCISE_LEDGER_H
 #define INCISE_LEDGER_H

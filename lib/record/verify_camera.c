@@ -39,6 +39,7 @@ struct walk {
 	int64_t last_ns; /* of the row before */
 	bool stamped;	 /* rows have the pictures' times, less the delay */
 	int64_t delay_ns;
+	bool ended; /* it died, maybe in mid-picture */
 	struct run run;
 };
 
@@ -216,7 +217,8 @@ static int take_picture(struct walk *walk, const struct picture *picture)
 	}
 	if (!walk->has_row) {
 		/* Pictures are in the file before their rows are in the table. */
-		if (walk->verify->report->interrupted) {
+		if (walk->verify->report->interrupted ||
+		    (walk->ended && !picture->good)) {
 			walk->out->ahead++;
 			return 0;
 		}
@@ -312,11 +314,14 @@ static int prepare(struct walk *walk)
 		rc = sqlite3_prepare_v2(db, text, -1, &walk->by_seq, NULL);
 	if (rc == SQLITE_OK)
 		rc = sqlite3_prepare_v2(
-			db, "SELECT stamped, delay_ns FROM streams WHERE name = 'camera'",
+			db,
+			"SELECT stamped, delay_ns, ended IS NOT NULL FROM streams WHERE "
+			"name = 'camera'",
 			-1, &stmt, NULL);
 	if (rc == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW) {
 		walk->stamped = sqlite3_column_int(stmt, 0);
 		walk->delay_ns = sqlite3_column_int64(stmt, 1);
+		walk->ended = sqlite3_column_int(stmt, 2);
 	}
 	sqlite3_finalize(stmt);
 	return rc == SQLITE_OK ? 0 : -EIO;

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Proof that a recording is complete: its ledger is recomputed from its rows, and SQLite
- * checks its pages. See table ledger in incise-recording(5). Part of libincise-record.
+ * Proof that a recording is complete: its ledger is recomputed from its rows, the pictures of
+ * its camera are held against theirs, what was sealed when it was closed is sealed once more,
+ * and SQLite checks its pages. See table ledger in incise-recording(5). Part of
+ * libincise-record.
  */
 #ifndef INCISE_VERIFY_H
 #define INCISE_VERIFY_H
@@ -16,8 +18,8 @@ INCISE_BEGIN_DECLS
 /** What may be wrong. */
 enum incise_verify_kind {
 	INCISE_VERIFY_LOST,    /**< samples are missing between two rows, or at the end */
-	INCISE_VERIFY_ALTERED, /**< rows of some blocks are not those that were written,
-					or the ledger is not */
+	INCISE_VERIFY_ALTERED, /**< rows of some blocks, or of a table that is sealed, are
+					not those that were written, or the ledger is not */
 	INCISE_VERIFY_LEDGER,  /**< blocks of the ledger are missing, or cannot be */
 	INCISE_VERIFY_EXTRA,   /**< rows that no block holds */
 	INCISE_VERIFY_COUNT,   /**< the recorder counted otherwise */
@@ -60,7 +62,9 @@ struct incise_verify_pictures {
 	uint64_t present; /**< as they were written */
 	uint64_t missing, altered;
 	uint64_t extra; /**< that no row has */
-	uint64_t ahead; /**< behind the last row of an interrupted recording: no fault */
+	uint64_t
+		ahead; /**< behind the last row of an interrupted recording, or what was begun
+			     when the camera died: no fault */
 };
 
 struct incise_verify_report {
