@@ -51,7 +51,7 @@ static struct incise_verify_finding finding(enum incise_verify_kind kind)
 	return found;
 }
 
-/* --- findings -------------------------------------------------------------------------- */
+/* --- findings --------------------------------------------------------------------- */
 
 static void flush_run(struct walk *walk)
 {
@@ -105,7 +105,7 @@ static void add_to_run(struct walk *walk, int what, const char *why, int64_t seq
 	run->count++;
 }
 
-/* --- rows ------------------------------------------------------------------------------ */
+/* --- rows ------------------------------------------------------------------------- */
 
 static void read_row(sqlite3_stmt *stmt, struct row *row)
 {
@@ -135,7 +135,7 @@ static int skip_row(struct walk *walk)
 	return next_row(walk);
 }
 
-/* --- pictures -------------------------------------------------------------------------- */
+/* --- pictures --------------------------------------------------------------------- */
 
 struct picture {
 	struct incise_camera_frame frame;

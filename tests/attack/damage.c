@@ -36,7 +36,7 @@ static uint64_t draw(uint64_t below)
 	return random_state % below;
 }
 
-/* --- what can be read ------------------------------------------------------------------------ */
+/* --- what can be read ------------------------------------------------------------- */
 
 static int add_row(void *user, int n, char **values, char **names)
 {
@@ -113,7 +113,7 @@ static bool read_pictures(const char *folder, uint32_t *crc)
 	return !rc;
 }
 
-/* --- attacks ----------------------------------------------------------------------------------- */
+/* --- attacks ---------------------------------------------------------------------- */
 
 /* Somewhere: anywhere, in the first pages, or where a page says what it is. */
 static off_t choose_in_database(off_t size)

@@ -80,7 +80,7 @@ static void fail(const struct round *round, const char *fmt, ...)
 	exit(1);
 }
 
-/* --- the recording program --------------------------------------------------------------- */
+/* --- the recording program -------------------------------------------------------- */
 
 static pid_t start(const struct round *round, const char *rig, const char *duration)
 {
@@ -128,7 +128,7 @@ static char *text_of(const char *path)
 	return text;
 }
 
-/* --- what is left -------------------------------------------------------------------------- */
+/* --- what is left ----------------------------------------------------------------- */
 
 static const char *recording(void)
 {
@@ -217,7 +217,7 @@ static void check_unbegun(const struct round *round)
 		fail(round, "before the first commit: %s", err.text);
 }
 
-/* --- kill -9 ------------------------------------------------------------------------------- */
+/* --- kill -9 ---------------------------------------------------------------------- */
 
 static struct {
 	_Atomic int64_t late_ns; /* most, since it was cleared */
@@ -313,7 +313,7 @@ static void attack_by_kill(struct round *round, int count)
 	       timed ? lost_sum_ns * 1e-6 / timed : 0, timed, stalled);
 }
 
-/* --- writes that fail ------------------------------------------------------------------------ */
+/* --- writes that fail ------------------------------------------------------------- */
 
 static void set(const char *name, long long value)
 {

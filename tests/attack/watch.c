@@ -7,10 +7,10 @@
  *     SQLite, libavformat ─ write, fsync ─► may fail ─► kernel
  *
  * ATTACK_PAGE is the file of struct watch_page. ATTACK_KIND is eio (an error, now and then),
- * sync (the same of fsync and fdatasync only), short (writes that do less than they were
- * asked for, and no error), enospc (a disk of ATTACK_BYTES), die (kill -9 before such a call). ATTACK_AFTER calls go well
- * first, then one of ATTACK_EVERY fails; ATTACK_LASTING 1: all that follow as well.
- * ATTACK_SEED chooses.
+ * sync (the same of fsync and its kin only), short (writes that do less than they were asked
+ * for, and no error), enospc (a disk of ATTACK_BYTES), die (kill -9 before such a call).
+ * ATTACK_AFTER calls go well first, then one of ATTACK_EVERY fails; ATTACK_LASTING 1: all
+ * that follow as well. ATTACK_SEED chooses.
  */
 #include <dlfcn.h>
 #include <errno.h>
@@ -65,7 +65,7 @@ __attribute__((constructor)) static void begin(void)
 	attack.random = (uint64_t)number("ATTACK_SEED", 1) * 0x9e3779b97f4a7c15 | 1;
 }
 
-/* --- what is committed ------------------------------------------------------------------ */
+/* --- what is committed ------------------------------------------------------------ */
 
 static int64_t now_ns(void)
 {
@@ -120,7 +120,7 @@ __attribute__((visibility("default"))) int sqlite3_exec(sqlite3 *db, const char 
 	return rc;
 }
 
-/* --- what fails -------------------------------------------------------------------------- */
+/* --- what fails ------------------------------------------------------------------- */
 
 static uint64_t draw(uint64_t below)
 {
