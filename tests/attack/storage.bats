@@ -24,7 +24,7 @@ attack() {
 	shift 2
 	local program=$1
 	shift
-	"$programs/$program" "$@" "$count" "$ATTACK_SEED"
+	"$programs/$program" "$@" "$count" "$ATTACK_SEED" $camera
 }
 
 # Its result stands in the log of a full run.
@@ -59,6 +59,31 @@ tell() {
 
 @test "a disk that is full after any number of bytes" {
 	run -0 attack 40 1000 storage enospc
+	tell
+}
+
+# Where pictures can be recorded; the attacks that follow are with them.
+with_camera() {
+	[ -e "$INCISE_MODULE_PATH/frames_mkv.so" ] || skip "frames_mkv.so is not built"
+	incise capture --help | grep -q -- --camera || skip "incise capture takes no camera"
+	camera=camera
+}
+
+@test "kill -9 while pictures are recorded" {
+	with_camera
+	run -0 attack 3 50 storage kill
+	tell
+	run -0 attack 8 200 storage die
+	tell
+}
+
+@test "a disk that fails or is full while pictures are recorded" {
+	with_camera
+	for kind in eio sync enospc; do
+		run -0 attack 6 200 storage $kind
+		tell
+	done
+	run -0 attack 2 50 storage short
 	tell
 }
 

@@ -2,7 +2,7 @@
 /*
  * Attacks on a recording while `incise capture` writes it, from outside of its process:
  *
- *     storage kill COUNT SEED            kill -9 at random moments, in real time
+ *     storage kill COUNT SEED [camera]   kill -9 at random moments, in real time
  *     storage eio|sync|short|enospc …    writes that fail, in simulated time; see watch.c
  *     storage die COUNT SEED             kill -9 before a write or a sync, the last ones too
  *
@@ -38,6 +38,7 @@ struct round {
 	int number;
 	uint64_t seed;
 	char what[120]; /* for a report */
+	bool camera;
 	struct watch_page *page;
 };
 
@@ -84,6 +85,8 @@ static void fail(const struct round *round, const char *fmt, ...)
 
 static pid_t start(const struct round *round, const char *rig, const char *duration)
 {
+	const char *arguments[10] = {"incise-capture", "-o", "a.rec", "--rig", rig};
+	int n = 5;
 	char program[4096], library[4096];
 	const char *build = getenv("INCISE_BUILD");
 	pid_t pid = fork();
@@ -97,12 +100,15 @@ static pid_t start(const struct round *round, const char *rig, const char *durat
 	alarm(60); /* one that hangs ends by a signal */
 	if (!freopen("out", "w", stdout) || !freopen("err", "w", stderr))
 		_exit(126);
-	if (duration)
-		execl(program, program, "-o", "a.rec", "--rig", rig, "--duration",
-		      duration, NULL);
-	else
-		execl(program, program, "-o", "a.rec", "--rig", rig, NULL);
-	(void)round;
+	if (duration) {
+		arguments[n++] = "--duration";
+		arguments[n++] = duration;
+	}
+	if (round->camera) {
+		arguments[n++] = "--camera";
+		arguments[n++] = "pictures";
+	}
+	execv(program, (char *const *)arguments);
 	_exit(127);
 }
 
@@ -166,9 +172,9 @@ static int64_t ask(const struct round *round, const char *file, const char *sql)
 
 /*
  * It verifies, and holds what was committed. One that was closed may still be called .part,
- * when something was in the way of its name.
+ * when something was in the way of its name. @whole: nothing was lost at all.
  */
-static void check_recording(struct round *round)
+static void check_recording(struct round *round, bool whole)
 {
 	static const char *const max[WATCH_TABLES] = {
 		[WATCH_FORCE] = "SELECT max(seq) FROM force",
@@ -188,8 +194,8 @@ static void check_recording(struct round *round)
 							.user = &findings},
 			  &report, &err))
 		fail(round, "does not open: %s", err.text);
-	if (!report.intact || report.complete == report.interrupted ||
-	    (has_name && !report.complete))
+	if (!report.intact || (report.interrupted && (has_name || report.complete)) ||
+	    (whole && !report.complete))
 		fail(round,
 		     "intact %d, interrupted %d, complete %d: %s; capture said: %s",
 		     report.intact, report.interrupted, report.complete, findings.text,
@@ -280,7 +286,7 @@ static void attack_by_kill(struct round *round, int count)
 			unbegun++;
 			continue;
 		}
-		check_recording(round);
+		check_recording(round, false);
 		last_ns = ask(round, recording(), "SELECT max(t_ns) FROM force");
 		with_rows += last_ns >= 0;
 		if (last_ns < 0)
@@ -362,7 +368,8 @@ static void attack_by_errors(struct round *round, const char *kind, int count)
 			 getenv("ATTACK_SEED"), getenv("ATTACK_AFTER"), every, lasting,
 			 getenv("ATTACK_BYTES"));
 		clear(round);
-		pid = start(round, "sim:clock=simulated,seed=7", "1s");
+		pid = start(round, "sim:clock=simulated,seed=7",
+			    round->camera ? "200ms" : "1s");
 		if (waitpid(pid, &status, 0) != pid)
 			fail(round, "%s", strerror(errno));
 		killed = WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL;
@@ -378,11 +385,13 @@ static void attack_by_errors(struct round *round, const char *kind, int count)
 			if (stat("a.rec/recording.db", &st))
 				fail(round, "there is no recording");
 			bytes = 2 * st.st_size;
+			if (!stat("a.rec/camera.mkv", &st))
+				bytes += st.st_size;
 		}
 		hit += round->page->faults > 0 || killed;
 		if (killed) {
 			if (round->page->commits) {
-				check_recording(round);
+				check_recording(round, false);
 			} else {
 				check_unbegun(round);
 				unbegun++;
@@ -394,7 +403,7 @@ static void attack_by_errors(struct round *round, const char *kind, int count)
 				fail(round, "exit 0, and: %s", text_of("err"));
 			if (access("a.rec", F_OK))
 				fail(round, "exit 0, and there is no a.rec");
-			check_recording(round);
+			check_recording(round, true);
 			continue;
 		}
 		if (WEXITSTATUS(status) != 1)
@@ -410,7 +419,7 @@ static void attack_by_errors(struct round *round, const char *kind, int count)
 				     text_of("err"));
 			unbegun++;
 		} else {
-			check_recording(round);
+			check_recording(round, false);
 		}
 	}
 	if (!hit) {
@@ -428,10 +437,12 @@ int main(int argc, char **argv)
 	struct round round = {0};
 	int fd, count;
 
-	if (argc != 4 || !getenv("INCISE_BUILD")) {
-		fprintf(stderr, "usage: INCISE_BUILD=… storage KIND COUNT SEED\n");
+	if (argc < 4 || argc > 5 || !getenv("INCISE_BUILD")) {
+		fprintf(stderr, "usage: INCISE_BUILD=… storage KIND COUNT SEED "
+				"[camera]\n");
 		return 2;
 	}
+	round.camera = argc == 5;
 	count = atoi(argv[2]);
 	round.seed = strtoull(argv[3], NULL, 10);
 	random_state = round.seed * 0x9e3779b97f4a7c15 | 1;
