@@ -110,6 +110,52 @@ tampered() {
 	tampered "DELETE FROM ledger WHERE stream = 'table:knots'" "table knots has no seal"
 }
 
+@test "verify holds the pictures of the camera against their rows" {
+	[ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ] || skip "frames_mkv.so is not built"
+	incise capture -o c.rec --rig sim:clock=simulated --camera pictures --duration 300ms
+	n=$(ask c.rec "SELECT count(*) FROM frames")
+	run -0 --separate-stderr incise verify c.rec
+	[[ "${lines[2]}" == "camera   $n expected, $n present, 0 lost, in "*" blocks" ]]
+	[ "${lines[3]}" = "         $n pictures as written, 0 missing, 0 altered, 0 that no row has" ]
+	incise verify c.rec --json >report.json
+	[ "$(key report.json pictures.checked)" = 1 ]
+	[ "$(key report.json pictures.present)" = "$n" ]
+
+	# a byte in the middle of the file is some picture's
+	cp -r c.rec d.rec
+	size=$(stat -c %s d.rec/camera.mkv)
+	byte=$(od -An -tu1 -j $((size / 2)) -N 1 d.rec/camera.mkv)
+	printf '%b' "\\0$(printf %o $((byte ^ 1)))" |
+		dd of=d.rec/camera.mkv bs=1 seek=$((size / 2)) conv=notrunc 2>/dev/null
+	run --separate-stderr incise verify d.rec
+	failed_with "d.rec: not what was recorded"
+	[[ "$output" == *"d.rec: camera: 1 altered in camera.mkv, number "*": its bytes are not as written"* ]] ||
+		complain "$output"
+
+	truncate -s $((size / 2)) d.rec/camera.mkv
+	run --separate-stderr incise verify d.rec
+	failed_with "d.rec: not what was recorded"
+	[[ "$output" == *" missing in camera.mkv, numbers "* ]]
+
+	rm d.rec/camera.mkv
+	run --separate-stderr incise verify d.rec
+	failed_with "d.rec: not what was recorded"
+	[[ "$output" == *"camera.mkv is missing, and $n pictures with it"* ]]
+}
+
+@test "verify without the module says that pictures are not verified" {
+	[ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ] || skip "frames_mkv.so is not built"
+	incise capture -o c.rec --rig sim:clock=simulated --camera pictures --duration 200ms
+	INCISE_MODULE_PATH=$PWD run --separate-stderr incise verify c.rec
+	failed_with "c.rec: not all of it could be verified"
+	[[ "$output" == *"c.rec: camera: the pictures are not verified: "*"no module frames_mkv.so"* ]]
+	INCISE_MODULE_PATH=$PWD run -1 --separate-stderr incise verify c.rec --json
+	echo "$output" >report.json
+	[ "$(key report.json unverified)" = 1 ]
+	[ "$(key report.json complete)" = 0 ]
+	[ "$(key report.json 'findings[0].kind')" = unverified ]
+}
+
 @test "verify of a file that was cut short, anywhere" {
 	size=$(stat -c %s a.rec/recording.db)
 	for share in 99 90 70 50 30 10 1; do
