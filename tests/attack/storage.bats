@@ -33,32 +33,32 @@ tell() {
 }
 
 @test "kill -9 at random moments: at most 200 ms are lost, and nothing that was committed" {
-	run -0 attack 20 100 storage kill
+	run -0 attack 20 100 kill
 	tell
 }
 
 @test "kill -9 before any write or sync, those of closing too" {
-	run -0 attack 60 1000 storage die
+	run -0 attack 60 1000 faults die
 	tell
 }
 
 @test "errors of the disk, once or from then on" {
-	run -0 attack 40 1000 storage eio
+	run -0 attack 40 1000 faults eio
 	tell
 }
 
 @test "errors of fsync" {
-	run -0 attack 40 1000 storage sync
+	run -0 attack 40 1000 faults sync
 	tell
 }
 
 @test "writes that do less than they were asked for" {
-	run -0 attack 40 1000 storage short
+	run -0 attack 40 1000 faults short
 	tell
 }
 
 @test "a disk that is full after any number of bytes" {
-	run -0 attack 40 1000 storage enospc
+	run -0 attack 40 1000 faults enospc
 	tell
 }
 
@@ -71,19 +71,19 @@ with_camera() {
 
 @test "kill -9 while pictures are recorded" {
 	with_camera
-	run -0 attack 3 50 storage kill
+	run -0 attack 3 50 kill
 	tell
-	run -0 attack 8 200 storage die
+	run -0 attack 8 200 faults die
 	tell
 }
 
 @test "a disk that fails or is full while pictures are recorded" {
 	with_camera
 	for kind in eio sync enospc; do
-		run -0 attack 6 200 storage $kind
+		run -0 attack 6 200 faults $kind
 		tell
 	done
-	run -0 attack 2 50 storage short
+	run -0 attack 2 50 faults short
 	tell
 }
 
