@@ -70,13 +70,17 @@ static void faults_leave_the_calibration_alone(void **state)
 		 ":1: depth_mm_px: expected a number from 0.0001 to "
 		 "10, found \"x\"; correct it"},
 		{"gain = 1;", ":1: gain: unknown key; expected one of force_mV_N, "
-			      "force_zero_mV, depth_mm_px"},
+			      "force_zero_mV, depth_mm_px, force_delay_ms, "
+			      "force_delay_sd_ms, tracker_delay_ms, "
+			      "tracker_delay_sd_ms, camera_delay_ms, "
+			      "camera_delay_sd_ms"},
 		{"force_mV_N", ":1: syntax error: expected `key = value;`; correct it"},
 	};
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
 		struct temp_file file = temp_file_new("calibration.conf", row[i].text);
-		struct incise_calibration c = {.force_mV_N = 1, .force_zero_mV = 2};
+		struct incise_calibration c = {
+			.force_mV_N = 1, .force_zero_mV = 2, .depth_mm_px = 3};
 		struct incise_error err = {0};
 		char expected[600];
 
