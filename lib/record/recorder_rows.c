@@ -196,6 +196,9 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 	struct incise_error why = {0};
 	int rc = 0;
 
+	/* A line through both would bend, and bend the times of either. */
+	if (sample->begins)
+		incise_timeline_replug(&stream->timeline);
 	if (take_number(stream, sample->seq, sample->t_ns, &row.t_ns, &why))
 		return incise_recorder_end_stream(rec, INCISE_LEDGER_TRACKER, why.text,
 						  err);

@@ -9,7 +9,7 @@
  * when that is given), or as a device of USB in a mounted FunctionFS. N are parts of a
  * million, of bytes and of records. On standard input: "unplug", "plug", "lost" (prints how
  * many records it did not send whole), "sent" (prints how many it was to send, and writes
- * to the EEPROM).
+ * to the EEPROM), "late N" (its periods end N µs later from now on).
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -82,6 +82,8 @@ static bool command(void)
 		unplug();
 	} else if (!strcmp(line, "plug\n") && master < 0) {
 		plug();
+	} else if (!strncmp(line, "late ", 5)) {
+		e.start_ns += atoi(line + 5) * INT64_C(1000);
 	} else if (!strcmp(line, "lost\n")) {
 		snprintf(text, sizeof(text), "lost %zu", touched);
 		say(text);

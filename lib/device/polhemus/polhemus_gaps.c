@@ -90,13 +90,14 @@ static uint64_t rounds(const struct polhemus_gaps *gaps, int64_t ns)
 	return ns > 0 && round_ns ? (uint64_t)((ns + round_ns / 2) / round_ns) : 0;
 }
 
-/* After a pause only time and order are left to tell. */
+/*
+ * After a pause only time and order are left to tell: from the earliest that the record could
+ * have come, as the last one before the pause may have come late.
+ */
 static void step_over(struct polhemus_gaps *gaps, int64_t t_ns, int where)
 {
 	uint64_t steps = in_order(gaps, where);
-	int64_t gone = t_ns - gaps->last_ns - (int64_t)steps * gaps->period_ns;
-
-	uint64_t more = rounds(gaps, gone);
+	uint64_t more = rounds(gaps, lateness(gaps, t_ns, gaps->seq + steps));
 
 	/* Without a period: one round, so that it shows. */
 	if (!gaps->period_ns)
@@ -104,6 +105,7 @@ static void step_over(struct polhemus_gaps *gaps, int64_t t_ns, int where)
 	step(gaps, steps + more * (uint64_t)gaps->n);
 	gaps->base_ns = t_ns - due_ns(gaps, gaps->seq);
 	gaps->broken = gaps->settled = false;
+	gaps->anew = true;
 	restart_window(gaps);
 }
 
@@ -250,6 +252,7 @@ bool polhemus_gaps_take(struct polhemus_gaps *gaps, const struct polhemus_record
 {
 	int where = place(gaps, record->station);
 
+	gaps->anew = false;
 	if (!gaps->begun) {
 		begin(gaps, record, where);
 	} else if (gaps->broken) {

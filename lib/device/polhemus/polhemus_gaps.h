@@ -37,6 +37,7 @@ struct polhemus_gaps {
 
 	uint64_t lost, seq; /* so far; of the last record */
 	bool started, begun, broken;
+	bool anew;    /* the last record's periods begin anew, maybe with another phase */
 	bool settled; /* base_ns is known: nothing came much earlier for a window */
 	bool moved;   /* in this window something did */
 	uint64_t first_place; /* of seq 0 in the order */

@@ -74,12 +74,16 @@ static void put_sample(struct polhemus_stream *stream,
 		.status = record->status,
 		.station = record->station,
 		.button = record->button,
+		.begins = stream->anew,
 	};
 
 	memcpy(sample.position_mm, record->position_mm, sizeof(sample.position_mm));
 	memcpy(sample.quaternion, record->quaternion, sizeof(sample.quaternion));
 	add_turned(sample.position_mm, sample.quaternion, stream->setup.tip_mm);
-	if (!incise_ring_put(&stream->ring, &sample))
+	/* Where the first one finds no room the next one tells it. */
+	if (incise_ring_put(&stream->ring, &sample))
+		stream->anew = false;
+	else
 		stream->no_room++;
 }
 
@@ -97,8 +101,10 @@ int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *byt
 		bytes += taken;
 		n -= taken;
 		for (; polhemus_records_next(&stream->records, &record); found++)
-			if (polhemus_gaps_take(&stream->gaps, &record, &seq))
+			if (polhemus_gaps_take(&stream->gaps, &record, &seq)) {
+				stream->anew |= stream->gaps.anew;
 				put_sample(stream, &record, seq);
+			}
 	}
 	atomic_store_explicit(&stream->lost, stream->gaps.lost + stream->no_room,
 			      memory_order_relaxed);

@@ -23,6 +23,7 @@ struct polhemus_stream {
 	struct polhemus_gaps gaps;
 	struct incise_ring ring; /* of struct incise_tracker_sample */
 	uint64_t no_room;	 /* seq that the ring had no place for count as lost */
+	bool anew;		 /* the next sample is to say that it begins */
 	_Atomic uint64_t lost;
 };
 

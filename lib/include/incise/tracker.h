@@ -22,6 +22,7 @@ struct incise_tracker_sample {
 	char status;	       /**< the device's error character, ' ' when all is well */
 	uint8_t station;       /**< 1 …: which sensor; the virtual rig's is 1 */
 	bool button;	       /**< the stylus's is pressed; false where there is none */
+	bool begins; /**< it was away before this record: periods have a new phase from here */
 };
 
 /** When a tracker measures. */

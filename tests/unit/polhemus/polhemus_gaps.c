@@ -204,6 +204,15 @@ static void broken(void **state)
 	assert_true(take(1000, 0, 0, &seq));
 	assert_int_equal(seq, 1000);
 	assert_int_equal(gaps.lost, 900);
+	assert_true(gaps.anew);
+	/* The last one before it was held up: that makes it no shorter. */
+	take_all(1001, 200);
+	assert_false(gaps.anew);
+	assert_true(take(1201, PERIOD_NS, 0, &seq));
+	polhemus_gaps_broken(&gaps);
+	assert_true(take(1400, 0, 0, &seq));
+	assert_int_equal(seq, 1400);
+	assert_int_equal(gaps.lost, 900 + 198);
 }
 
 /* What never comes again is missing as well: never more of it than counts if it does. */
