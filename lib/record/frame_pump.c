@@ -64,6 +64,8 @@ struct incise_frame_pump {
 		waiting_most;
 	_Atomic int64_t bytes;
 
+	uint64_t unanswered; /* pictures that waited when the disk was given up */
+
 	/* take()'s. */
 	struct written next;
 	struct looked result;
@@ -444,12 +446,33 @@ struct incise_frame_pump *incise_frame_pump_new(
 	return NULL;
 }
 
+/*
+ * Wait until the file is closed. A disk that is slow is waited for as long as it takes
+ * pictures: false where it took none for @patience_ns.
+ */
+static bool wait_for_file(struct incise_frame_pump *p, int64_t patience_ns)
+{
+	struct timespec now, until;
+	uint64_t waiting;
+	int64_t until_ns;
+	int rc;
+
+	do {
+		waiting = incise_frame_slots_wait(&p->slots);
+		clock_gettime(CLOCK_MONOTONIC, &now);
+		until_ns = now.tv_sec * INCISE_NS_PER_S + now.tv_nsec + patience_ns;
+		until = (struct timespec){until_ns / INCISE_NS_PER_S,
+					  until_ns % INCISE_NS_PER_S};
+		do {
+			rc = sem_clockwait(&p->ended, CLOCK_MONOTONIC, &until);
+		} while (rc && errno == EINTR);
+	} while (rc && incise_frame_slots_wait(&p->slots) != waiting);
+	return !rc;
+}
+
 int incise_frame_pump_stop(struct incise_frame_pump *p, int64_t patience_ns,
 			   struct incise_error *err)
 {
-	struct timespec now, until;
-	int64_t until_ns;
-	int rc;
 
 	if (!p->stopped) {
 		say(&p->stop);
@@ -458,16 +481,8 @@ int incise_frame_pump_stop(struct incise_frame_pump *p, int64_t patience_ns,
 		say(&p->drain);
 		sem_post(&p->filled);
 		sem_post(&p->vision_filled);
-		clock_gettime(CLOCK_MONOTONIC, &now);
-		until_ns = now.tv_sec * INCISE_NS_PER_S + now.tv_nsec + patience_ns;
-		until = (struct timespec){until_ns / INCISE_NS_PER_S,
-					  until_ns % INCISE_NS_PER_S};
-		do {
-			rc = p->file_runs
-				     ? sem_clockwait(&p->ended, CLOCK_MONOTONIC, &until)
-				     : 0;
-		} while (rc && errno == EINTR);
-		if (rc) {
+		if (p->file_runs && !wait_for_file(p, patience_ns)) {
+			p->unanswered = incise_frame_slots_wait(&p->slots);
 			/* It may sit in write(2) for ever, with memory of ours. */
 			say(&p->give_up);
 			pthread_detach(p->file_thread);
@@ -480,11 +495,10 @@ int incise_frame_pump_stop(struct incise_frame_pump *p, int64_t patience_ns,
 		p->stopped = true;
 	}
 	if (p->leaked)
-		return incise_error_set(
-			err, ETIMEDOUT,
-			"camera: the disk does not answer; %llu pictures "
-			"are not written",
-			(unsigned long long)incise_frame_slots_wait(&p->slots));
+		return incise_error_set(err, ETIMEDOUT,
+					"camera: the disk does not answer; %llu pictures "
+					"are not written",
+					(unsigned long long)p->unanswered);
 	if (is(&p->file_failed)) {
 		if (err)
 			*err = p->file_error;

@@ -84,7 +84,8 @@ void incise_frame_pump_stats(struct incise_frame_pump *pump,
 /*
  * End the camera thread, write what waits, close the file; take() gives the rest behind it.
  * 0; the error that ended the file; -ETIMEDOUT: the disk has not answered for
- * @patience_ns, what waits is given up, and the thread that hangs is left alone.
+ * @patience_ns, not even for a single picture; what waits is given up, and the thread that
+ * hangs is left alone.
  */
 int incise_frame_pump_stop(struct incise_frame_pump *pump, int64_t patience_ns,
 			   struct incise_error *err);

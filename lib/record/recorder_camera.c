@@ -118,9 +118,9 @@ int incise_recorder_end_camera(struct incise_recorder *rec, struct incise_error 
 	stopped = incise_frame_pump_stop(rec->camera.pump, PATIENCE_NS, &why);
 	rc = take_records(rec, err);
 	count(rec, &stats);
-	/* What hangs on a disk that does not answer will never be told of. */
+	/* What hangs on a disk that does not answer will never be told of: it has no row. */
 	if (stopped == -ETIMEDOUT)
-		stream->device_lost += stats.waiting;
+		stream->device_lost = stats.lost + stats.read - stream->rows;
 	if (!rc && stopped && !*stream->ended)
 		rc = incise_recorder_end_stream(rec, INCISE_LEDGER_CAMERA, why.text, err);
 	return rc;
