@@ -278,30 +278,50 @@ const char *cli_rig(const char *given)
 		"--rig FILE, or try the virtual one: --rig sim:");
 }
 
+/* The terminal has come to be another's, who may have written to it. */
+static bool in_background(void)
+{
+	pid_t front = tcgetpgrp(STDERR_FILENO);
+
+	return front > 0 && front != getpgrp();
+}
+
+void cli_progress_forget(void)
+{
+	status_line = false;
+	status_above = 0;
+}
+
 void cli_progress(const char *fmt, ...)
 {
 	va_list args;
 
 	char text[4096], *line = text, *end;
 	struct winsize window;
-	int columns = 80;
+	int columns = 80, rows = 24;
 
 	if (!isatty(STDERR_FILENO))
 		return;
+	if (in_background()) {
+		cli_progress_forget();
+		return;
+	}
 	va_start(args, fmt);
 	vsnprintf(text, sizeof(text), fmt, args);
 	va_end(args);
-	if (!ioctl(STDERR_FILENO, TIOCGWINSZ, &window) && window.ws_col)
+	if (!ioctl(STDERR_FILENO, TIOCGWINSZ, &window) && window.ws_col) {
 		columns = window.ws_col;
+		rows = window.ws_row ? window.ws_row : rows;
+	}
 	cli_progress_end();
-	/* A line that wraps could not be found again. */
+	/* A line that wraps, or has left at the top, could not be found again. */
 	for (;; line = end + 1) {
 		size_t length = strcspn(line, "\n");
 
 		end = line + length;
 		fprintf(stderr, "%.*s",
 			length < (size_t)columns ? (int)length : columns - 1, line);
-		if (!*end)
+		if (!*end || status_above + 1 >= rows)
 			break;
 		fputc('\n', stderr);
 		status_above++;

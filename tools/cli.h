@@ -83,6 +83,9 @@ void cli_progress(const char *fmt, ...) INCISE_PRINTF(1, 2);
 /* Remove them. */
 void cli_progress_end(void);
 
+/* Leave them: others have written below them. */
+void cli_progress_forget(void);
+
 /* SIGINT, SIGTERM and SIGHUP set cli_stop instead of killing; a second one kills. */
 void cli_catch_signals(void);
 extern volatile sig_atomic_t cli_stop;

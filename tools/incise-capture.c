@@ -269,6 +269,8 @@ static void record(struct run *run)
 				begin(run, now);
 		}
 		take_keys(run);
+		if (keyboard_resumed())
+			cli_progress_forget();
 		capture_view_show(&run->view, run->recorder,
 				  (now - run->start_ns) / (double)INCISE_NS_PER_S);
 	}
@@ -507,6 +509,7 @@ int main(int argc, char **argv)
 		cli_fail_with(&err);
 	keyboard_begin();
 	record(&run);
+	keyboard_end();
 	if (incise_recorder_end(run.recorder, &err)) {
 		incise_recorder_close(run.recorder, &second);
 		cli_fail_with(&err);
