@@ -91,7 +91,7 @@ mcap-reader: ## a second reader for the tests of MCAP, $(O)/tests/mcap/check
 	@tests/mcap/venv $(O)/tests/mcap
 
 # Attacks on recordings. What is in a module is found by INCISE_MODULE_PATH.
-attack_programs := $(addprefix $(O)/tests/attack/,kill faults damage record watch.so)
+attack_programs := $(addprefix $(O)/tests/attack/,kill faults damage record watch.so stall.so)
 
 $(addprefix $(O)/tests/attack/,kill faults): tests/attack/round.c
 $(O)/tests/attack/%: tests/attack/%.c $(O)/lib/libincise-tests.a
@@ -100,7 +100,7 @@ $(O)/tests/attack/%: tests/attack/%.c $(O)/lib/libincise-tests.a
 		$(LDFLAGS) -o $@ $(filter %.c,$^) $(O)/lib/libincise-tests.a $(all_libs) -lm -pthread
 
 # Loaded into the real programs; under a sanitizer it would have to come behind its library.
-$(O)/tests/attack/watch.so: tests/attack/watch.c
+$(O)/tests/attack/%.so: tests/attack/%.c
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -fPIC $(warnings) -Wno-missing-prototypes \
 		$(CFLAGS) -MMD -MP -MF $@.d -shared $(LDFLAGS) -o $@ $< -ldl \

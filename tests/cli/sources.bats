@@ -4,19 +4,7 @@
 # Those that need a kernel with their drivers are in tests/vm/guest.
 
 load cli
-
-# A FASTRAK at $PWD/tracker that takes commands on 9; with options of its own.
-plug_in() {
-	mkfifo to
-	"$INCISE_BUILD/tests/polhemus/fastrak" --link "$PWD/tracker" "$@" <to >from 2>&1 3>&- &
-	fastrak=$!
-	exec 9>to
-	for _ in $(seq 100); do
-		grep -q ready from && return
-		sleep 0.1
-	done
-	complain "no emulator: $(cat from)"
-}
+load fastrak
 
 setup() {
 	work_folder
@@ -30,8 +18,7 @@ setup() {
 }
 
 teardown() {
-	exec 9>&-
-	[ -z "$fastrak" ] || kill "$fastrak"
+	pull_away
 }
 
 # Until the capture in the background has more records of the tracker than that.

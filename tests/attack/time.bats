@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# Captures whose disk or whole process stands still, whose tracker goes and comes back, that
+# others read or would replace meanwhile, and that are suspended at a terminal. What is lost
+# is counted, the same by everyone; times go on. CLOCK_REALTIME that is set, and cameras that
+# go, are in tests/vm/guest/capture_time.sh.
+
+load ../cli/cli
+load ../cli/fastrak
+
+setup() {
+	work_folder
+	export INCISE_MODULE_PATH=$INCISE_BUILD/lib/incise
+	cat >rig.conf <<-END
+		clock = "real";
+		tracker = "tty:$PWD/tracker:115200";
+		force = "sim:";
+		camera = "sim:";
+		# a machine that is busy must not be late by itself
+		sim = { camera_hz = 20.0; };
+		# far below where the emulator's sensor goes
+		surface = { point_mm = [0.0, 0.0, -500.0]; normal = [0.0, 0.0, 1.0]; };
+	END
+}
+
+teardown() {
+	pull_away
+}
+
+ask() {
+	sqlite3 -readonly "$1/recording.db" "$2"
+}
+
+# Until the capture in the background has more records of the tracker than that.
+until_records() {
+	for _ in $(seq 100); do
+		[ "$(ask a.rec.part 'SELECT count(*) FROM tracker' 2>/dev/null)" -gt "$1" ] \
+			2>/dev/null && return
+		sleep 0.1
+	done
+	complain "no $1 records after 10 s; capture said: $(cat err)"
+}
+
+# The times of records, those of table tracker and those of table knots, lie on a line of
+# the emulator's rate, which is by this clock. Once it has settled the live one is as good
+# as its jitter; a stall that bends it does so by many periods of 8.3 ms. Knots are to be
+# within the 0.5 ms that are promised without stamps.
+straight() {
+	local period_ns="(1e9 / $1)"
+	holds "$(ask a.rec "SELECT max(abs(t_ns - seq * $period_ns - (SELECT avg(t_ns - seq *
+		$period_ns) FROM tracker))) FROM tracker WHERE seq > 120") < 2e6"
+	holds "$(ask a.rec "SELECT max(abs(t_ns - seq * $period_ns - (SELECT avg(t_ns - seq *
+		$period_ns) FROM knots))) FROM knots") < 0.5e6"
+}
+
+pictures_can_be_recorded() {
+	[ -e "$INCISE_MODULE_PATH/frames_mkv.so" ]
+}
+
+# A capture whose disk does not answer now and then: STALL_… of stall.c.
+stalled_capture() {
+	local camera=off
+	! pictures_can_be_recorded || camera=pictures
+	LD_PRELOAD=$INCISE_BUILD/tests/attack/stall.so run --separate-stderr incise capture \
+		-o a.rec --camera $camera --duration 6s --json
+	echo "$output" >report.json
+}
+
+# What capture said was lost is what verify finds missing, and what the tables hold.
+agreed() {
+	local code=0 stream
+	incise verify --json a.rec >verify.json || code=$?
+	[ "$(key verify.json intact)" = 1 ] || complain "$(cat verify.json)"
+	[ "$code" -eq "$(($(key report.json lost) > 0))" ]
+	for stream in 0 1; do
+		name=$(key verify.json "streams[$stream].name")
+		[ "$(key verify.json "streams[$stream].lost")" = "$(key report.json "${name}_lost")" ]
+		[ "$(key verify.json "streams[$stream].present")" = "$(key report.json "$name")" ]
+	done
+	[ "$(ask a.rec 'SELECT sum(lost) FROM streams')" = "$(key report.json lost)" ]
+	[ "$(ask a.rec 'SELECT count(*) FROM frames')" = "$(key report.json frames)" ]
+}
+
+@test "a disk that does not answer for 1.5 s, twice: nothing is lost" {
+	plug_in
+	export STALL_FIRST_MS=1000 STALL_EVERY_MS=3500 STALL_MS=1500
+	stalled_capture
+	[ "$status" = 0 ] || complain "$stderr"
+	[ "$(key report.json lost)" = 0 ]
+	agreed
+	straight 120
+	# it has stood still: so long nothing was committed
+	holds "$(ask a.rec "SELECT max(last_ns - first_ns) FROM ledger WHERE
+		stream = 'force'") > 1.3e9"
+}
+
+@test "a disk that does not answer for 4 s: what had no room is counted" {
+	plug_in
+	export STALL_FIRST_MS=1000 STALL_MS=4000
+	stalled_capture
+	[ "$status" = 1 ]
+	[[ "$stderr" == *"force samples"*"were lost"* ]] || complain "$stderr"
+	agreed
+	[ "$(key report.json tracker_lost)" = 0 ]
+	straight 120
+	# 10 kHz, and room for 2.5 s of them; numbers tell what is between
+	holds "$(key report.json force_lost) > 14000 && $(key report.json force_lost) < 25000"
+	[ "$(ask a.rec 'SELECT max(seq) - min(seq) + 1 - count(*) FROM force')" = \
+		"$(key report.json force_lost)" ]
+	! pictures_can_be_recorded || holds "$(key report.json frames_lost) > 20"
+}
+
+@test "a process that is stopped for 1.5 s: nothing is lost" {
+	plug_in
+	incise capture -o a.rec --camera off --duration 5s --json >report.json 2>err 3>&- 9>&- &
+	until_records 180
+	kill -STOP $!
+	sleep 1.5
+	kill -CONT $!
+	wait $! || complain "$(cat err)"
+	[ "$(key report.json lost)" = 0 ]
+	agreed
+	straight 120
+}
+
+@test "a process that is stopped until the terminal's buffer is full" {
+	local code=0
+	# 240 Hz; the kernel keeps some 64 kB, 5 s of them
+	plug_in --kind liberty
+	incise capture -o a.rec --camera off --duration 9s --json >report.json 2>err 3>&- 9>&- &
+	until_records 240
+	kill -STOP $!
+	sleep 6.5
+	kill -CONT $!
+	wait $! || code=$?
+	[ "$code" = 1 ]
+	agreed
+	holds "$(key report.json tracker_lost) > 100"
+	[ "$(ask a.rec 'SELECT max(seq) - min(seq) + 1 - count(*) FROM tracker')" = \
+		"$(key report.json tracker_lost)" ]
+	# 240 of them a second, there or lost: 8 ms of jitter at either end
+	holds "$(ask a.rec 'SELECT abs((max(arrival_ns) - min(arrival_ns)) * 240e-9 -
+		max(seq) + min(seq)) FROM tracker') < 3"
+	straight 240
+}
+
+@test "a tracker that comes back with another phase: its times are right at once" {
+	local code=0
+	plug_in
+	incise capture -o a.rec --camera off --duration 7s --json >report.json 2>err 3>&- 9>&- &
+	until_records 240
+	echo unplug >&9
+	sleep 0.5
+	# what is most, less than half a period, that rounding would move it by
+	echo late 3000 >&9
+	echo plug >&9
+	wait $! || code=$?
+	[ "$code" = 1 ]
+	agreed
+	# where the line begins anew is where records are missing
+	[ "$(ask a.rec 'SELECT count(*) FROM knots WHERE begins')" = 2 ]
+	first=$(ask a.rec 'SELECT max(seq) FROM knots WHERE begins')
+	[ "$(ask a.rec "SELECT $first - max(seq) - 1 FROM tracker WHERE seq < $first")" = \
+		"$(key report.json tracker_lost)" ]
+	# The least delay of a second is the line's to its jitter, and a few lowest of 120
+	# come within 1 ms: right after it came back as before and as much later.
+	delay_ns=$(ask a.rec "SELECT delay_ns FROM streams WHERE name = 'tracker'")
+	for from in 120 "$first" $((first + 120)); do
+		least=$(ask a.rec "SELECT min(arrival_ns - t_ns) - $delay_ns FROM tracker
+			WHERE seq BETWEEN $from AND $from + 119")
+		holds "$least >= -0.5e6 && $least < 1e6"
+	done
+}
+
+@test "two captures of one name at once: one is told so" {
+	local first second
+	for _ in 1 2 3; do
+		rm -rf a.rec
+		incise capture -o a.rec --rig sim: --duration 700ms >out1 2>err1 3>&- &
+		first=$!
+		incise capture -o a.rec --rig sim: --duration 700ms >out2 2>err2 3>&- &
+		second=$!
+		wait $first && first=0 || first=$?
+		wait $second && second=0 || second=$?
+		[ $((first + second)) = 1 ] || complain "$first $second: $(cat err1 err2)"
+		[ "$(cat err1 err2 | wc -l)" = 1 ]
+		[ ! -e a.rec.part ]
+		incise verify a.rec
+	done
+}
+
+# reads NAME CODE COMMAND…: again and again until the file `end` is there; each time with that
+# exit code. How often is in NAME.
+reads() {
+	local name=$1 code=$2 n=0 got
+	shift 2
+	until [ -e end ]; do
+		got=0
+		rm -f part.csv
+		"$@" >"said.$name" 2>&1 || got=$?
+		# it ends, and its name changes, before the file is there
+		[ -d a.rec.part ] || break
+		[ $got = "$code" ] || complain "$name: $got: $(cat "said.$name")" >>wrong || true
+		n=$((n + 1))
+	done
+	echo "$n" >"$name"
+}
+
+@test "a capture that others read all the time loses nothing" {
+	incise capture -o a.rec --rig sim:clock=real --duration 10s --json >report.json 2>err 3>&- &
+	capture=$!
+	until_records 60
+	reads info 0 incise info a.rec.part 3>&- &
+	reads export 0 incise export a.rec.part --resample --rate 100 -o part.csv 3>&- &
+	# which is not complete
+	reads verify 1 incise verify a.rec.part 3>&- &
+	reads sqlite3 0 sqlite3 a.rec.part/recording.db \
+		'SELECT avg(code) FROM force; SELECT max(t_ns) FROM depth' 3>&- &
+	wait $capture || complain "$(cat err)"
+	touch end
+	wait
+	[ "$(key report.json lost)" = 0 ]
+	agreed
+	# and they have read
+	[ ! -e wrong ] || complain "$(cat wrong)"
+	for name in info export verify sqlite3; do
+		[ "$(cat $name)" -ge 3 ]
+	done
+}
+
+@test "at a terminal: suspended, in the background, ended, failed" {
+	local scene pids=()
+	for scene in suspend background terminate quit full; do
+		timeout 60 "$root/tests/attack/terminal" $scene incise capture -o $scene.rec \
+			--rig sim:force_hz=1000 --duration 5s >$scene.out 2>$scene.err 3>&- &
+		pids+=($!)
+	done
+	for scene in 0:suspend 0:background 0:terminate 131:quit 1:full; do
+		status=0
+		wait "${pids[0]}" || status=$?
+		pids=("${pids[@]:1}")
+		[ $status = ${scene%:*} ] || complain "${scene#*:}: $status $(cat ${scene#*:}.err)"
+	done
+	for scene in suspend background terminate; do
+		incise verify $scene.rec
+	done
+	[ "$(ask suspend.rec "SELECT count(*) FROM events WHERE kind = 'marker'")" = 1 ]
+	grep -q 'full.rec: disk full' full.out
+	# What is shown while it runs fits 40 columns.
+	sed 's/\x1b\[[0-9]*[AJ]/\n/g; s/\r//g; /\.rec: /,$d' suspend.out >shown
+	grep -q force shown
+	! grep -E '^.{41}' shown
+}

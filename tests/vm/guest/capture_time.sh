@@ -1,0 +1,134 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-2.0-or-later
+# A capture with a camera of the kernel: CLOCK_REALTIME is set meanwhile, one hour on and
+# back, and nothing comes of it; then the camera goes, and the rest is recorded.
+. tests/vm/tap
+
+[ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ] || skip "a capture" "frames_mkv.so was not built"
+command -v sqlite3 >/dev/null || skip "a capture" "there is no sqlite3 to look into it with"
+modprobe vivid n_devs=1 node_types=1 num_inputs=1 input_types=0 2>/dev/null ||
+	skip "vivid" "this kernel has no vivid"
+name=$(cd /sys/class/video4linux && grep -l '^vivid-.*-vid-cap$' video*/name | head -n 1)
+name=${name%/name}
+PATH=$INCISE_BUILD/bin:$PATH
+mkdir -p /run/rig
+cd /run/rig || exit 1
+
+# A machine that is emulated is slow: few samples, small pictures.
+cat >rig.conf <<-END_OF_RIG
+	clock = "real";
+	tracker = "sim:";
+	force = "sim:";
+	sim = { force_hz = 1000.0; };
+	camera = "v4l2:/dev/$name";
+	camera_setup = { width = 320; height = 180; rate_hz = 10.0; };
+END_OF_RIG
+
+# ask SQL: one value of the last recording
+ask()
+{
+	sqlite3 -readonly a.rec/recording.db "$1"
+}
+
+# holds SQL: what is asked is true
+holds()
+{
+	got=$(ask "SELECT $1")
+	[ "$got" = 1 ] || {
+		echo "$1: $got"
+		return 1
+	}
+}
+
+# Until it has written more than so many rows of a table.
+until_rows()
+{
+	i=0
+	until [ "$(sqlite3 -readonly a.rec.part/recording.db "SELECT count(*) FROM $1" \
+		2>/dev/null || echo 0)" -gt "$2" ] || [ $i = 300 ]; do
+		sleep 0.1
+		i=$((i + 1))
+	done
+}
+
+# what_was: the report, and what others say of the recording
+what_was()
+{
+	cat report.json err
+	incise verify a.rec
+	echo "verify: $?"
+	ask "SELECT name, rows, lost, ended FROM streams; SELECT * FROM events"
+}
+
+# verified CODE: verify ends so, and counts as lost what capture did
+verified()
+{
+	code=0
+	incise verify --json a.rec >verify.json || code=$?
+	[ $code = "$1" ] && [ "$(ask "SELECT sum(lost) FROM streams")" = "$(ask "SELECT
+		sum(json_extract(value, '$.lost')) FROM
+		json_each(readfile('verify.json'), '$.streams')")" ]
+}
+
+# --- CLOCK_REALTIME is set ------------------------------------------------------------
+
+# set_clock SECONDS: to so much later
+set_clock()
+{
+	date -s "@$(($(date +%s) + $1))" >/dev/null || echo "not ok the clock can be set"
+}
+
+began=$(date +%s)
+incise capture -o a.rec --duration 5s --json >report.json 2>err &
+capture=$!
+until_rows force 1000
+set_clock 3600
+until_rows force 2000
+set_clock -7200
+until_rows force 3000
+set_clock 3600
+wait $capture
+code=$?
+what_was | sed 's/^/# /'
+# In real time an emulated machine may lose some: it says so, and how many.
+lost=$(ask "SELECT sum(lost) FROM streams")
+if [ "$INCISE_VM_PROFILE" = deterministic ]; then
+	check "nothing is lost while the clock is set" [ "$code:$lost" = 0:0 ]
+fi
+check "verify says the same" verified $((lost > 0))
+check "it began when it began" holds "abs(strftime('%s', (SELECT value FROM meta WHERE
+	key = 'started')) - $began) <= 20"
+# 1 ms apart, as their numbers; those of the tracker by a line that is not bent
+check "times of the force go on" holds "max(abs(t_ns - seq * 1e6 - (SELECT min(t_ns - seq *
+	1e6) FROM force))) < 2 FROM force"
+check "times of the tracker go on" holds "max(abs(t_ns - seq * 1e9 / 120 / (1 + 50e-6) -
+	(SELECT avg(t_ns - seq * 1e9 / 120 / (1 + 50e-6)) FROM tracker))) < 2e6
+	FROM tracker WHERE seq > 120"
+check "times of the pictures go on" holds "min(d) > 0 AND max(d) < 2e9 FROM (SELECT t_ns -
+	lag(t_ns) OVER (ORDER BY seq) AS d FROM frames)"
+ask "SELECT count(*), min(arrival_ns - t_ns), max(arrival_ns - t_ns) FROM frames" | sed "s|^|# |"
+check "they have come, and not before they were shot" holds "count(*) > 10 AND
+	min(arrival_ns - t_ns) >= 0 AND max(arrival_ns - t_ns) < 2e9 FROM frames"
+
+# --- the camera goes ------------------------------------------------------------------
+
+rm -r a.rec
+incise capture -o a.rec --duration 5s --json >report.json 2>err &
+capture=$!
+until_rows frames 10
+check "the camera is taken away" sh -c 'echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind'
+wait $capture
+code=$?
+what_was | sed 's/^/# /'
+check "it ends with 1, and one line that says why" sh -c "[ $code = 1 ] &&
+	[ \$(wc -l <err) = 1 ] && grep -q 'the camera ended before the recording did: .*unplugged' err"
+check "that is an event, and stands in the table of streams" holds "(SELECT count(*) FROM
+	events WHERE kind = 'failed' AND text LIKE 'camera: %unplugged%') = 1 AND (SELECT ended
+	FROM streams WHERE name = 'camera') LIKE '%unplugged%'"
+check "the others went on" holds "max(t_ns) - (SELECT max(t_ns) FROM frames) > 1.5e9 AND
+	(SELECT count(*) FROM streams WHERE ended IS NOT NULL) = 1 FROM force"
+check "verify says what is missing, and why" sh -c 'incise verify a.rec >said 2>&1
+	[ $? = 1 ] && grep -q unplugged said'
+cd / || exit 1
+rm -r /run/rig
+check "vivid goes" modprobe -r vivid
