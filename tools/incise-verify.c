@@ -54,6 +54,7 @@ static json_t *as_json(const struct incise_verify_finding *finding)
 		[INCISE_VERIFY_PICTURES] = "pictures",
 		[INCISE_VERIFY_UNVERIFIED] = "unverified",
 		[INCISE_VERIFY_DAMAGED] = "damaged",
+		[INCISE_VERIFY_ENDED] = "ended",
 	};
 	bool numbers = finding->last_seq >= finding->first_seq;
 	bool blocks = finding->first_block >= 0;
@@ -204,6 +205,11 @@ int main(int argc, char **argv)
 			"%s: interrupted: its end is missing; what was committed is there "
 			"as it was written, %llu samples were lost",
 			sink.path, lost);
+	if (!lost)
+		cli_fail(
+			"%s: a device was gone before it ended; what was committed is there "
+			"as it was written",
+			sink.path);
 	cli_fail("%s: %llu samples were lost when it was captured; what was committed is "
 		 "there as it was written",
 		 sink.path, lost);

@@ -95,6 +95,39 @@ static void check_names(struct incise_verification *verify)
 			"the ledger has entries of streams that there are not");
 }
 
+/* How many samples a device that died would still have given nobody knows. */
+static void tell_of_ends(struct incise_verification *verify)
+{
+	sqlite3_stmt *stmt;
+
+	if (sqlite3_prepare_v2(
+		    verify->recording->db,
+		    "SELECT name, ended, (SELECT max(last_ns) FROM ledger WHERE "
+		    "stream = name AND count > 0) FROM streams WHERE ended IS NOT NULL",
+		    -1, &stmt, NULL) != SQLITE_OK)
+		return; /* pages and seals tell of it */
+	while (sqlite3_step(stmt) == SQLITE_ROW) {
+		struct incise_verify_finding found =
+			incise_verify_finding(INCISE_VERIFY_ENDED);
+		const char *name = (const char *)sqlite3_column_text(stmt, 0);
+		const char *why = (const char *)sqlite3_column_text(stmt, 1);
+
+		found.stream = name ? name : "";
+		if (sqlite3_column_type(stmt, 2) == SQLITE_INTEGER)
+			found.last_ns = sqlite3_column_int64(stmt, 2);
+		if (found.last_ns < 0)
+			incise_verify_found(verify, &found, "%s: gave nothing: %s",
+					    found.stream, why ? why : "");
+		else
+			incise_verify_found(
+				verify, &found,
+				"%s: ended at %.4f s, before the recording did: %s",
+				found.stream, incise_verify_s(verify, found.last_ns),
+				why ? why : "");
+	}
+	sqlite3_finalize(stmt);
+}
+
 static void tell_of_interruption(struct incise_verification *verify)
 {
 	struct incise_verify_finding found =
@@ -205,6 +238,7 @@ int incise_verify(const char *path, const struct incise_verify_watch *watch,
 		rc = incise_error_set(err, ECANCELED, "%s: stopped; not verified", path);
 		goto out;
 	}
+	tell_of_ends(&verify);
 	tell_of_interruption(&verify);
 	report->complete = !report->findings;
 	report->intact = !verify.altered;

@@ -45,7 +45,8 @@ void incise_verify_found(struct incise_verification *verify,
 	verify->report->findings++;
 	verify->report->unverified |= finding->kind == INCISE_VERIFY_UNVERIFIED;
 	verify->altered |= finding->kind != INCISE_VERIFY_LOST &&
-			   finding->kind != INCISE_VERIFY_INTERRUPTED;
+			   finding->kind != INCISE_VERIFY_INTERRUPTED &&
+			   finding->kind != INCISE_VERIFY_ENDED;
 	if (verify->watch && verify->watch->found)
 		verify->watch->found(verify->watch->user, finding);
 }

@@ -28,6 +28,7 @@ enum incise_verify_kind {
 					or in no row */
 	INCISE_VERIFY_UNVERIFIED, /**< could not be looked at, as a module is missing */
 	INCISE_VERIFY_DAMAGED,	  /**< SQLite cannot read it, or its pages do not agree */
+	INCISE_VERIFY_ENDED,	  /**< a device was gone before the recording ended */
 };
 
 /** One thing that is wrong, and where. */
