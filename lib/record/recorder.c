@@ -57,6 +57,23 @@ static int check_rig(const char *path, struct incise_rig *rig, struct incise_err
 	return 0;
 }
 
+/*
+ * Where making files took long, devices have lost some of what came meanwhile. That is of
+ * before the recording, and no loss to it. The virtual rig loses when it is asked.
+ */
+static void begin_counts(struct incise_recorder *rec)
+{
+	struct incise_tracker *tracker = incise_rig_tracker(rec->rig);
+	struct incise_force *force = incise_rig_force(rec->rig);
+	struct incise_tracker_sample record;
+	struct incise_force_sample sample;
+
+	incise_force_read(force, &sample, 0);
+	incise_tracker_read(tracker, &record, 0);
+	rec->streams[INCISE_LEDGER_FORCE].lost_at_start = incise_force_lost(force);
+	rec->streams[INCISE_LEDGER_TRACKER].lost_at_start = incise_tracker_lost(tracker);
+}
+
 /* Files in the folder, and all that may fail before the first sample is taken. */
 static int begin(struct incise_recorder *rec, const struct incise_recorder_setup *setup,
 		 struct incise_error *err)
@@ -71,6 +88,8 @@ static int begin(struct incise_recorder *rec, const struct incise_recorder_setup
 		rc = incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
 	if (!rc && !setup->armed)
 		rc = incise_recorder_start_camera(rec, err);
+	if (!rc)
+		begin_counts(rec);
 	if (rc) {
 		incise_recorder_close_camera(rec);
 		incise_recorder_close_database(rec);
