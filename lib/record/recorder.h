@@ -95,6 +95,11 @@ struct incise_recorder_camera {
 	struct incise_vision *vision;
 	struct incise_frame_pump *pump;
 	bool records; /* until the pump has given its last picture */
+	/* Numbers do not tell of pictures that were never shot: time does. */
+	uint64_t seen;	   /* pictures, when it was looked for them */
+	int64_t looked_ns; /* that was then */
+	int64_t silent_ns; /* without a new one, as long as it was looked for them */
+	bool silent;	   /* there is an event of it */
 };
 
 struct incise_recorder_disk {

@@ -13,6 +13,11 @@
 #define PATIENCE_NS (5 * INCISE_NS_PER_S)
 /* A power cut costs no more pictures than the database loses rows, and a little. */
 #define SYNC_NS 1000000000LL
+/* A camera that shoots nothing for so long, and so many periods, is silent. */
+#define SILENT_NS (2 * INCISE_NS_PER_S)
+#define SILENT_PERIODS 10
+/* A computer that stood still for longer did not look. */
+#define LOOK_NS 100000000LL
 
 int incise_recorder_open_camera(struct incise_recorder *rec,
 				const struct incise_vision_setup *vision,
@@ -83,6 +88,32 @@ static void count(struct incise_recorder *rec, struct incise_frame_pump_stats *s
 	rec->stats.frames_unlooked = stats->unlooked;
 }
 
+/* Whether pictures come. Returns 0 or of the disk. */
+static int listen(struct incise_recorder *rec, uint64_t read, struct incise_error *err)
+{
+	struct incise_recorder_camera *camera = &rec->camera;
+	int64_t now_ns = incise_clock_now(incise_rig_clock(rec->rig));
+	int64_t since_ns = camera->looked_ns ? now_ns - camera->looked_ns : 0;
+	double period_ns = 1e9 / rec->camera_info.rate_hz; /* of none: infinite */
+	bool was = camera->silent;
+	int rc = SQLITE_OK;
+
+	camera->looked_ns = now_ns;
+	camera->silent_ns += since_ns < LOOK_NS ? since_ns : LOOK_NS;
+	if (read != camera->seen)
+		camera->silent_ns = 0;
+	camera->seen = read;
+	camera->silent = camera->silent_ns >= SILENT_NS &&
+			 ((double)camera->silent_ns >= SILENT_PERIODS * period_ns ||
+			  !(rec->camera_info.rate_hz > 0));
+	if (camera->silent && !was)
+		rc = incise_recorder_note(rec, "silent", "camera: no picture for %.1f s",
+					  (double)camera->silent_ns * 1e-9);
+	else if (was && !camera->silent)
+		rc = incise_recorder_note(rec, "silent", "camera: pictures come again");
+	return rc == SQLITE_OK ? 0 : incise_recorder_fail(rec, err);
+}
+
 int incise_recorder_take_camera(struct incise_recorder *rec, struct incise_error *err)
 {
 	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_CAMERA];
@@ -100,6 +131,8 @@ int incise_recorder_take_camera(struct incise_recorder *rec, struct incise_error
 		rc = incise_recorder_end_stream(
 			rec, INCISE_LEDGER_CAMERA,
 			stats.camera.code ? stats.camera.text : stats.file.text, err);
+	else if (!rc && !*stream->ended)
+		rc = listen(rec, stats.read, err);
 	return rc;
 }
 
@@ -123,6 +156,13 @@ int incise_recorder_end_camera(struct incise_recorder *rec, struct incise_error 
 		stream->device_lost = stats.lost + stats.read - stream->rows;
 	if (!rc && stopped && !*stream->ended)
 		rc = incise_recorder_end_stream(rec, INCISE_LEDGER_CAMERA, why.text, err);
+	if (!rc && rec->camera.silent && !*stream->ended) {
+		incise_error_set(
+			&why, ENODATA,
+			"%s: gave no picture for the last %.1f s; check its cable",
+			stream->device, (double)rec->camera.silent_ns * 1e-9);
+		rc = incise_recorder_end_stream(rec, INCISE_LEDGER_CAMERA, why.text, err);
+	}
 	return rc;
 }
 

@@ -11,12 +11,14 @@
 
 static const struct incise_camera_ops *real;
 static struct incise_camera_ops ops;
-static uint64_t dies_at, skips_at;
+static uint64_t dies_at, skips_at, silent_from, silent_to;
 
 static int faulty(struct incise_camera *camera, struct incise_camera_frame *frame)
 {
 	int rc = real->read(camera, frame);
 
+	if (rc == 1 && frame->seq >= silent_from && frame->seq < silent_to)
+		return 0;
 	if (rc == 1 && frame->seq >= dies_at)
 		return -ENODEV;
 	return rc == 1 && frame->seq == skips_at ? 0 : rc;
@@ -48,7 +50,7 @@ static struct incise_rig *open_camera(void)
 	ops.read = faulty;
 	ops.cause = why;
 	camera->ops = &ops;
-	dies_at = skips_at = UINT64_MAX;
+	dies_at = skips_at = silent_from = silent_to = UINT64_MAX;
 	return rig;
 }
 
@@ -136,6 +138,37 @@ static void camera_that_dies(void **state)
 	verified(false);
 }
 
+/* Its numbers tell nothing of it: it shot nothing. 50 Hz, and silence is 2 s of it. */
+static void silent_camera(void **state)
+{
+	static const struct {
+		uint64_t from, to;
+		int events;
+		bool ended;
+	} cases[] = {
+		{50, 140, 0, false},	     {50, 160, 2, false},
+		{50, UINT64_MAX, 1, true},   {0, UINT64_MAX, 1, true},
+		{200, UINT64_MAX, 0, false}, /* 1 s before the end */
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_rig *rig = open_camera();
+		struct incise_recorder *recorder = start(rig, false);
+		struct incise_stream streams[INCISE_STREAMS_MAX];
+
+		silent_from = cases[i].from;
+		silent_to = cases[i].to;
+		assert_int_equal(poll_for(recorder, rig, 5000 * MS, NULL), 0);
+		end(recorder, rig, streams);
+		assert_int_equal(ask(DB,
+				     "SELECT count(*) FROM events WHERE kind = 'silent'"),
+				 cases[i].events);
+		assert_int_equal(*streams[2].ended != 0, cases[i].ended);
+		verified(!cases[i].ended && cases[i].to == UINT64_MAX);
+		assert_int_equal(system("rm -r a.rec"), 0);
+	}
+}
+
 static void lost_picture_is_counted(void **state)
 {
 	struct incise_rig *rig = open_camera();
@@ -184,6 +217,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		TEST(pictures_are_rows),
 		TEST(camera_that_dies),
+		TEST(silent_camera),
 		TEST(lost_picture_is_counted),
 		TEST(armed_camera_begins_with_the_trigger),
 		TEST(never_triggered_is_empty_and_whole),
