@@ -19,16 +19,6 @@
 
 #define BINS_MAX 1000 /* in one direction; all of them are held in memory */
 
-/* Force samples of one bin, or of one row of a raw export. */
-struct bin {
-	uint64_t n;
-	double t_s, depth_mm, velocity_mm_s, force_N; /* means */
-	double m2; /* sum of squared deviations of the force */
-	int cuts;  /* that have samples here */
-	int last;  /* the cut counted last */
-	bool clipped;
-};
-
 void incise_export_options_init(struct incise_export_options *options)
 {
 	*options = (struct incise_export_options){.min_count = 50};
