@@ -351,6 +351,8 @@ void cli_catch_signals(void)
 
 	sigaction(SIGINT, &action, NULL);
 	sigaction(SIGTERM, &action, NULL);
+	/* A terminal that closes sends two: the kernel's, and the shell's to its jobs. */
+	action.sa_flags = 0;
 	sigaction(SIGHUP, &action, NULL);
 }
 

@@ -86,7 +86,10 @@ void cli_progress_end(void);
 /* Leave them: others have written below them. */
 void cli_progress_forget(void);
 
-/* SIGINT, SIGTERM and SIGHUP set cli_stop instead of killing; a second one kills. */
+/*
+ * SIGINT, SIGTERM and SIGHUP set cli_stop instead of killing; a second one kills, but for
+ * SIGHUP.
+ */
 void cli_catch_signals(void);
 extern volatile sig_atomic_t cli_stop;
 

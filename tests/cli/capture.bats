@@ -152,6 +152,19 @@ until_it_runs() {
 	[ -d a.rec ]
 }
 
+# The kernel's, and the shell's to its jobs.
+@test "capture ends cleanly by the two SIGHUP of a terminal that closes" {
+	incise capture -o a.rec --rig sim:clock=real >out 2>err 3>&- &
+	pid=$!
+	until_it_runs a.rec.part
+	for gap in 0 0.001 0.003 0.01; do
+		sleep $gap
+		kill -HUP $pid 2>/dev/null || true
+	done
+	wait $pid
+	[ -d a.rec ]
+}
+
 @test "capture refuses an existing recording, --force replaces it" {
 	incise capture -o a.rec --rig $quick --duration 1s
 	before=$(sha256sum <a.rec/recording.db)
@@ -169,6 +182,15 @@ until_it_runs() {
 	run --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1,pause_s=0.1 --force
 	failed_with "deep while the zero"
 	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
+}
+
+@test "capture --force of what is never triggered leaves the old recording" {
+	incise capture -o a.rec --rig $quick --duration 1s
+	before=$(sha256sum <a.rec/recording.db)
+	run --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1 --trigger 100N --force
+	failed_with "was never triggered; nothing was recorded, and nothing is replaced"
+	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
+	[ "$(ls)" = a.rec ]
 }
 
 @test "capture --force replaces nothing but recordings" {
