@@ -7,7 +7,9 @@
  *     force     10000.00     123456      0      0 …
  *     m: marker   q: end
  */
+#include <fcntl.h>
 #include <math.h>
+#include <poll.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -19,6 +21,40 @@
 
 #define SHOW_NS 200000000LL
 #define BAR 10
+
+/*
+ * A terminal that is held (Ctrl-S), or at the other end of a line that hangs, must not hold up
+ * who records: nothing waits for it. It is opened anew, as flags of the one that was inherited
+ * are the shell's too.
+ */
+void capture_view_begin(void)
+{
+	int fd = isatty(STDERR_FILENO)
+			 ? open("/proc/self/fd/2",
+				O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)
+			 : -1;
+
+	if (fd < 0)
+		return;
+	dup2(fd, STDERR_FILENO);
+	close(fd);
+}
+
+void capture_view_end(void)
+{
+	if (isatty(STDERR_FILENO))
+		fcntl(STDERR_FILENO, F_SETFL,
+		      fcntl(STDERR_FILENO, F_GETFL) & ~O_NONBLOCK);
+	cli_progress_end();
+}
+
+static bool terminal_takes(void)
+{
+	struct pollfd terminal = {.fd = STDERR_FILENO, .events = POLLOUT};
+
+	return isatty(STDERR_FILENO) && poll(&terminal, 1, 0) == 1 &&
+	       terminal.revents == POLLOUT;
+}
 
 static void time_left(char *text, size_t size, double seconds)
 {
@@ -78,9 +114,11 @@ void capture_view_show(struct capture_view *view, const struct incise_recorder *
 	int64_t now_ns = (int64_t)stopwatch_ns();
 	int n;
 
-	if (!isatty(STDERR_FILENO) || now_ns - view->shown_ns < SHOW_NS)
+	if (now_ns - view->shown_ns < SHOW_NS)
 		return;
 	view->shown_ns = now_ns;
+	if (!terminal_takes())
+		return;
 	incise_recorder_stats(recorder, &stats);
 	headline(view, &stats, seconds, top, sizeof(top));
 	n = incise_recorder_streams(recorder, streams);

@@ -21,4 +21,8 @@ struct capture_view {
 void capture_view_show(struct capture_view *view, const struct incise_recorder *recorder,
 		       double seconds);
 
+/* Around all of it: from begin to end no writing to the terminal waits for it. */
+void capture_view_begin(void);
+void capture_view_end(void);
+
 #endif

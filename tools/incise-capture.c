@@ -157,6 +157,7 @@ struct run {
 	struct incise_recorder *recorder;
 	struct capture_view view;
 	int64_t start_ns, end_ns; /* of the recording; end_ns INT64_MAX: not known */
+	int64_t held_ns;	  /* recorded before the trigger */
 	bool armed;
 	int markers;
 	double seconds;		   /* recorded */
@@ -183,14 +184,22 @@ static void take_trigger(struct wish *wish, const char *text)
 				     : cli_quantity("--trigger", text, units, 1e-3, 1e4);
 }
 
+/* What was committed stays. */
+_Noreturn static void give_up(struct run *run, const struct incise_error *why)
+{
+	struct incise_error second = {0};
+
+	incise_recorder_close(run->recorder, &second);
+	capture_view_end();
+	cli_fail_with(why);
+}
+
 static void mark(struct run *run, const char *text)
 {
-	struct incise_error err = {0}, second = {0};
+	struct incise_error err = {0};
 
-	if (incise_recorder_mark(run->recorder, "marker", text, &err)) {
-		incise_recorder_close(run->recorder, &second);
-		cli_fail_with(&err);
-	}
+	if (incise_recorder_mark(run->recorder, "marker", text, &err))
+		give_up(run, &err);
 	snprintf(run->view.last, sizeof(run->view.last), "marked: %s", text);
 	run->view.shown_ns = 0;
 }
@@ -225,10 +234,10 @@ static void begin(struct run *run, int64_t now_ns)
 	run->start_ns = now_ns;
 	if (duration_s > 0)
 		run->end_ns = now_ns + (int64_t)(duration_s * INCISE_NS_PER_S);
-	else if (sim)
-		run->end_ns = now_ns + incise_sim_duration(sim);
-	else
+	else if (!sim)
 		run->end_ns = INT64_MAX;
+	else if (!run->end_ns) /* a trigger does not begin the virtual cuts anew */
+		run->end_ns = now_ns + incise_sim_duration(sim);
 	if (run->end_ns < INT64_MAX)
 		run->view.planned_s = (run->end_ns - now_ns) / (double)INCISE_NS_PER_S;
 }
@@ -238,8 +247,8 @@ static void record(struct run *run)
 {
 	struct incise_clock *clock = incise_rig_clock(run->rig);
 	struct incise_recorder_stats stats;
-	struct incise_error err = {0}, second = {0};
-	int64_t now = incise_clock_now(clock), next = now;
+	struct incise_error err = {0};
+	int64_t now = incise_clock_now(clock), next = now, armed_ns = now;
 	int rc = 0;
 
 	begin(run, now);
@@ -259,14 +268,16 @@ static void record(struct run *run)
 		incise_clock_wait_until(clock, next);
 		now = incise_clock_now(clock);
 		rc = incise_recorder_poll(run->recorder, &err);
-		if (rc < 0) {
-			incise_recorder_close(run->recorder, &second);
-			cli_fail_with(&err);
-		}
+		if (rc < 0)
+			give_up(run, &err);
 		if (run->armed) {
 			incise_recorder_stats(run->recorder, &stats);
-			if (!stats.armed)
+			if (!stats.armed) {
 				begin(run, now);
+				run->held_ns = now - armed_ns < INCISE_NS_PER_S
+						       ? now - armed_ns
+						       : INCISE_NS_PER_S;
+			}
 		}
 		take_keys(run);
 		if (keyboard_resumed())
@@ -274,10 +285,11 @@ static void record(struct run *run)
 		capture_view_show(&run->view, run->recorder,
 				  (now - run->start_ns) / (double)INCISE_NS_PER_S);
 	}
-	cli_progress_end();
 	if (rc)
 		run->early = err;
-	run->seconds = (now - run->start_ns) / (double)INCISE_NS_PER_S;
+	if (!run->armed)
+		run->seconds =
+			(now - run->start_ns + run->held_ns) / (double)INCISE_NS_PER_S;
 }
 
 /* --- report ------------------------------------------------------------------------- */
@@ -362,6 +374,20 @@ static void judge(const struct run *run, const struct incise_recorder_stats *sta
 	if (n > 2 && !stats->frames)
 		cli_fail("%s: the camera gave nothing in %.1f s; check its cable", path,
 			 run->seconds);
+}
+
+/* With --force: what has not a sample does not replace a recording that may have some. */
+static void keep_old(const struct run *run, const struct incise_recorder_stats *stats,
+		     const char *new)
+{
+	if (stats->force || stats->tracker || stats->frames)
+		return;
+	remove_recording(new);
+	if (run->early.code)
+		cli_fail_with(&run->early);
+	cli_fail("%s: %s; nothing was recorded, and nothing is replaced",
+		 run->wish->output,
+		 stats->armed ? "was never triggered" : "no device gave a sample");
 }
 
 /* --- main --------------------------------------------------------------------------- */
@@ -478,7 +504,7 @@ int main(int argc, char **argv)
 	struct incise_vision_setup vision;
 	struct incise_recorder_stats stats;
 	struct incise_force_info force;
-	struct incise_error err = {0}, second = {0};
+	struct incise_error err = {0};
 	struct wish wish = {0};
 	struct run run = {.wish = &wish};
 	char target[PATH_MAX];
@@ -508,19 +534,22 @@ int main(int argc, char **argv)
 	if (!run.recorder)
 		cli_fail_with(&err);
 	keyboard_begin();
+	capture_view_begin();
 	record(&run);
 	keyboard_end();
-	if (incise_recorder_end(run.recorder, &err)) {
-		incise_recorder_close(run.recorder, &second);
-		cli_fail_with(&err);
-	}
+	if (incise_recorder_end(run.recorder, &err))
+		give_up(&run, &err);
 	incise_recorder_stats(run.recorder, &stats);
 	n = incise_recorder_streams(run.recorder, streams);
 	if (incise_recorder_close(run.recorder, &err))
 		cli_fail_with(&err);
+	/* Whole by now, should the terminal be held. */
+	capture_view_end();
 	incise_rig_close(run.rig);
-	if (wish.force)
+	if (wish.force) {
+		keep_old(&run, &stats, target);
 		replace(target, wish.output);
+	}
 	report(&run, &stats, streams, n);
 	judge(&run, &stats, streams, n);
 	return 0;

@@ -90,7 +90,9 @@ END
 
 @test "a trigger on force begins a second before it" {
 	# The first cut begins at 1 s.
-	incise capture -o a.rec --rig $quick --trigger 0.2N --duration 1s
+	incise capture -o a.rec --rig $quick --trigger 0.2N --duration 1s --json >report.json
+	# 1 s before the trigger and 1 s after, in steps of 10 ms
+	holds "$(key report.json seconds) > 1.98 && $(key report.json seconds) < 2.02"
 	incise verify a.rec
 	t=$(ask a.rec "SELECT t_ns FROM events WHERE kind = 'trigger'")
 	# polled every 10 ms, written with the next poll
