@@ -80,7 +80,8 @@ $(locale):
 	localedef -i de_DE -f UTF-8 $@
 
 check-unit: $(unit_programs) $(locale) ## unit tests
-	@LOCPATH=$(abspath $(O)/locale) tests/unit/run $(unit_programs)
+	@LOCPATH=$(abspath $(O)/locale) LSAN_OPTIONS=suppressions=$(abspath tests/unit/lsan.supp):print_suppressions=0 \
+		tests/unit/run $(unit_programs)
 
 # The CAN drive that tests talk to is on python-canopen, in a folder of its own.
 can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/README.md

@@ -360,8 +360,6 @@ static void judge(const struct run *run, const struct incise_recorder_stats *sta
 
 	if (run->early.code)
 		cli_fail_with(&run->early);
-	if (stats->armed)
-		cli_fail("%s: was never triggered, and is empty", path);
 	for (int i = 0; i < n; i++)
 		if (*streams[i].ended)
 			cli_fail("%s: the %s ended before the recording did: %s", path,
@@ -376,18 +374,22 @@ static void judge(const struct run *run, const struct incise_recorder_stats *sta
 			 run->seconds);
 }
 
-/* With --force: what has not a sample does not replace a recording that may have some. */
+/*
+ * What was never triggered leaves nothing behind; and with --force, what has not a sample does
+ * not replace a recording that may have some.
+ */
 static void keep_old(const struct run *run, const struct incise_recorder_stats *stats,
 		     const char *new)
 {
-	if (stats->force || stats->tracker || stats->frames)
+	if (stats->force || stats->tracker || stats->frames ||
+	    (!stats->armed && !run->wish->force))
 		return;
 	remove_recording(new);
 	if (run->early.code)
 		cli_fail_with(&run->early);
-	cli_fail("%s: %s; nothing was recorded, and nothing is replaced",
-		 run->wish->output,
-		 stats->armed ? "was never triggered" : "no device gave a sample");
+	cli_fail("%s: %s; nothing was recorded%s", run->wish->output,
+		 stats->armed ? "was never triggered" : "no device gave a sample",
+		 run->wish->force ? ", and nothing is replaced" : "");
 }
 
 /* --- main --------------------------------------------------------------------------- */
@@ -546,10 +548,9 @@ int main(int argc, char **argv)
 	/* Whole by now, should the terminal be held. */
 	capture_view_end();
 	incise_rig_close(run.rig);
-	if (wish.force) {
-		keep_old(&run, &stats, target);
+	keep_old(&run, &stats, target);
+	if (wish.force)
 		replace(target, wish.output);
-	}
 	report(&run, &stats, streams, n);
 	judge(&run, &stats, streams, n);
 	return 0;

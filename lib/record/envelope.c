@@ -8,8 +8,7 @@
 
 #define BLOCKS INCISE_ENVELOPE_BLOCKS
 
-/* Crystals are within 100 ppm; RC oscillators of cheap devices are not. */
-#define SLOPE_MAX 2e-3
+#define SLOPE_MAX INCISE_ENVELOPE_SLOPE_MAX
 #define SLOPE_SD_FIRST 300e-6
 /* Once known, the rate of a device does not change by more while blocks are few. */
 #define SLOPE_SD_KNOWN 20e-6

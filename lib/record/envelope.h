@@ -25,6 +25,11 @@
 
 #define INCISE_ENVELOPE_BLOCKS 64
 #define INCISE_ENVELOPE_BLOCK_MAX_NS 500000000LL
+/*
+ * Periods are so much longer or shorter than nominal at most. Crystals are within 100 ppm; RC
+ * oscillators of cheap devices are not.
+ */
+#define INCISE_ENVELOPE_SLOPE_MAX 2e-3
 
 struct incise_envelope_block {
 	int64_t number; /* x / block_ns */

@@ -495,10 +495,11 @@ int incise_frame_pump_stop(struct incise_frame_pump *p, int64_t patience_ns,
 		p->stopped = true;
 	}
 	if (p->leaked)
-		return incise_error_set(err, ETIMEDOUT,
-					"camera: the disk does not answer; %llu pictures "
-					"are not written",
-					(unsigned long long)p->unanswered);
+		return incise_error_set(
+			err, ETIMEDOUT,
+			"camera: disk or coder did not get on; %llu pictures "
+			"are not written",
+			(unsigned long long)p->unanswered);
 	if (is(&p->file_failed)) {
 		if (err)
 			*err = p->file_error;

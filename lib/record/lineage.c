@@ -67,6 +67,17 @@ static const char *start_of(const struct incise_recording *recording)
 	return recording->meta.started;
 }
 
+/* What is missing in it, so that who reads the table is not left in the dark. */
+static const char *state_of(const struct incise_recording *recording)
+{
+	const struct incise_recording_info *meta = &recording->meta;
+	bool lost = meta->force_lost || meta->tracker_lost;
+
+	if (!meta->complete)
+		return lost ? "interrupted, with losses" : "interrupted";
+	return lost ? "complete, with losses" : "complete";
+}
+
 static const char *rig_of(const struct incise_recording *recording)
 {
 	return recording->meta.rig;
@@ -78,7 +89,10 @@ static int add_sources(struct incise_lineage *lineage,
 	const struct {
 		const char *key;
 		const char *(*text)(const struct incise_recording *recording);
-	} items[] = {{"source", path_of}, {"recorded", start_of}, {"rig", rig_of}};
+	} items[] = {{"source", path_of},
+		     {"recorded", start_of},
+		     {"rig", rig_of},
+		     {"state", state_of}};
 	int rc = 0;
 
 	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && !rc; i++) {

@@ -58,6 +58,7 @@ struct incise_recorder_stream {
 	int64_t first_ns;
 	uint64_t next;		/* sequence number expected */
 	uint64_t gaps;		/* samples that the numbers show to be missing */
+	uint64_t gaps_held;	/* of them, from before the trigger */
 	uint64_t lost_at_start; /* by the device, before this recording */
 	uint64_t device_lost;	/* since then */
 	char ended[200];	/* why it died; empty: it has not */

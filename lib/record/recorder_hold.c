@@ -67,6 +67,7 @@ int incise_recorder_release(struct incise_recorder *rec, struct incise_error *er
 	int rc = 0;
 
 	rec->stats.armed = false;
+	rec->not_finite = 0;
 	rec->streams[INCISE_LEDGER_FORCE].lost_at_start =
 		incise_force_lost(incise_rig_force(rec->rig));
 	rec->streams[INCISE_LEDGER_TRACKER].lost_at_start =
@@ -80,6 +81,9 @@ int incise_recorder_release(struct incise_recorder *rec, struct incise_error *er
 	while (!rc && incise_ring_take(&rec->hold.tracker, &tracker, 1))
 		if (tracker.t_ns >= from_ns)
 			rc = incise_recorder_write_tracker(rec, &tracker, err);
+	/* The device counts from here; what is missing in the second before was lost too. */
+	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++)
+		rec->streams[i].gaps_held = rec->streams[i].gaps;
 	incise_recorder_hold_free(rec);
 	if (!rc)
 		rc = incise_recorder_start_camera(rec, err);

@@ -72,7 +72,10 @@ uint64_t incise_recorder_lost(const struct incise_recorder *rec, int i)
 {
 	const struct incise_recorder_stream *stream = &rec->streams[i];
 
-	return stream->gaps > stream->device_lost ? stream->gaps : stream->device_lost;
+	uint64_t since = stream->gaps - stream->gaps_held;
+
+	return stream->gaps_held +
+	       (since > stream->device_lost ? since : stream->device_lost);
 }
 
 static void tell(const struct incise_recorder *rec, int i, struct incise_stream *out)

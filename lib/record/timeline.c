@@ -156,7 +156,9 @@ void incise_timeline_report(const struct incise_timeline *timeline,
 	if (timeline->jitter_n > 1)
 		report->jitter_ns =
 			sqrt(timeline->jitter_sum2 / (timeline->jitter_n - 1));
-	if (incise_timeline_slope(timeline, &slope, &slope_sd)) {
+	/* A device that is further from its rate than a line is let: how far is not known. */
+	if (incise_timeline_slope(timeline, &slope, &slope_sd) &&
+	    fabs(slope) < 0.99 * INCISE_ENVELOPE_SLOPE_MAX) {
 		/* periods are longer by the slope, so the rate is lower */
 		report->rate_hz = 1e9 / (timeline->period_ns * (1 + slope));
 		report->drift_ppm = (1 / (1 + slope) - 1) * 1e6;

@@ -30,14 +30,6 @@ static const struct incise_column columns[] = {
 
 #define FILE_NAME "table.h5"
 
-/* libhdf5 brings p11-kit along, which asks for a locale before main(); where LOCPATH is set
- * glibc keeps the text of it for ever. The leak checker looks for a function of this name. */
-const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-	return "leak:argz_add_sep";
-}
-
 static int enter(void **state)
 {
 	char path[] = "/tmp/incise-hdf5-XXXXXX";
