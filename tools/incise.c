@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise VERB …: runs incise-VERB, the one beside this program first, then the one on
- * PATH, so that anyone can add a verb.
+ * PATH, so that anyone can add a verb. Where there is a program incise-VERB-WORD beside this
+ * one, incise VERB WORD … runs that.
  */
 #include <dirent.h>
 #include <errno.h>
@@ -14,9 +15,12 @@
 #include <unistd.h>
 #include <incise/version.h>
 
+#define WORD "abcdefghijklmnopqrstuvwxyz"
+
 static const struct {
 	const char *name, *does;
 } verbs[] = {
+	{"calibrate", "measure what turns readings into mm, N and s"},
 	{"capture", "record the streams of a rig in sync"},
 	{"verify", "prove that a recording is complete"},
 	{"export", "make a dataset of recordings, raw or averaged"},
@@ -81,7 +85,7 @@ static bool known(const char *verb)
 }
 
 /* The manual page, from the source tree when this runs in a build tree. */
-static int manual(const char *verb)
+static int manual(const char *verb, const char *word)
 {
 	char folder[PATH_MAX];
 	char *name, *page;
@@ -93,7 +97,8 @@ static int manual(const char *verb)
 			verb);
 		return 2;
 	}
-	if (asprintf(&name, "incise%s%s", verb ? "-" : "", verb ? verb : "") < 0 ||
+	if (asprintf(&name, "incise%s%s%s%.64s", verb ? "-" : "", verb ? verb : "",
+		     word ? "-" : "", word ? word : "") < 0 ||
 	    asprintf(&page, "%s/../../man/%s.1", folder, name) < 0)
 		return 1;
 	if (!access(page, R_OK))
@@ -132,7 +137,7 @@ int main(int argc, char **argv)
 	}
 	if (!strcmp(verb, "help")) {
 		if (argc > 2)
-			return manual(argv[2]);
+			return manual(argv[2], argv[3]);
 		help();
 		return finish();
 	}
@@ -142,6 +147,12 @@ int main(int argc, char **argv)
 		return 2;
 	}
 	own_folder(folder, sizeof(folder));
+	if (argc > 2 && argv[2][strspn(argv[2], WORD)] == 0 && *argv[2]) {
+		snprintf(program, sizeof(program), "%s/incise-%s-%.64s", folder, verb,
+			 argv[2]);
+		if (!access(program, X_OK))
+			execv(program, argv + 2);
+	}
 	snprintf(program, sizeof(program), "%s/incise-%s", folder, verb);
 	execv(program, argv + 1);
 	snprintf(program, sizeof(program), "incise-%s", verb);

@@ -6,6 +6,8 @@
 #ifndef INCISE_CALIBRATION_H
 #define INCISE_CALIBRATION_H
 
+#include <stdbool.h>
+#include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
@@ -21,6 +23,8 @@ struct incise_calibration {
 	double force_delay_ms, force_delay_sd_ms;
 	double tracker_delay_ms, tracker_delay_sd_ms;
 	double camera_delay_ms, camera_delay_sd_ms;
+	/** Tip of the blade in the frame of what rig.conf's tip_mm leads to; default 0 0 0. */
+	double tip_mm[3];
 };
 
 /** The paper's figures. */
@@ -35,6 +39,57 @@ INCISE_API void incise_calibration_nominal(struct incise_calibration *calibratio
 INCISE_API int incise_calibration_load(const char *path,
 				       struct incise_calibration *calibration,
 				       struct incise_error *err);
+
+/** A coefficient that a calibration has measured. */
+struct incise_calibration_value {
+	char key[32];  /**< of calibration.conf */
+	char unit[16]; /**< mV/N, mm/px, ms, … */
+	double found;  /**< what was in force before; NAN: nothing */
+	double left;   /**< what is from now on */
+	double u;      /**< its standard uncertainty; U is twice that (k = 2) */
+};
+
+#define INCISE_CALIBRATION_VALUES 16
+
+/** One calibration, as it stands in the history of calibration.conf. */
+struct incise_calibration_record {
+	char kind[16];	  /**< force, depth, tip, delay, stepper */
+	char date[32];	  /**< ISO 8601, UTC */
+	char device[64];
+	char method[120]; /**< in words */
+	char raw[200];	  /**< name of the file with the raw data; empty: none was kept */
+	uint32_t raw_crc; /**< CRC32C of it */
+	int n;		  /**< values */
+	struct incise_calibration_value values[INCISE_CALIBRATION_VALUES];
+	/** Of values i and j, i >= j, at i(i + 1)/2 + j; n_covariance 0: not stated. */
+	double covariance[INCISE_CALIBRATION_VALUES * (INCISE_CALIBRATION_VALUES + 1) / 2];
+	int n_covariance;
+	double low, high;    /**< it is valid from … to; NAN: not stated */
+	char range_unit[16]; /**< of these: N, mm, … */
+	bool pass;
+	char verdict[200]; /**< why, in words */
+};
+
+/**
+ * Append a calibration to a file, and put its values in force if it has passed. The file is
+ * made where there is none, and replaced whole: whatever happens, the old or the new one is
+ * there.
+ *
+ * @return 0; as incise_calibration_load(), of incise_outfile_commit()
+ */
+INCISE_API int incise_calibration_append(const char *path,
+					 const struct incise_calibration_record *record,
+					 struct incise_error *err);
+
+/**
+ * The history of a file, oldest first.
+ *
+ * @param records to be freed with free(3)
+ * @return how many; negative as incise_calibration_load()
+ */
+INCISE_API int incise_calibration_history(const char *path,
+					  struct incise_calibration_record **records,
+					  struct incise_error *err);
 
 INCISE_END_DECLS
 #endif

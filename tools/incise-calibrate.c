@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise calibrate: says what can be calibrated; each is a program of its own,
+ * incise-calibrate-WORD.
+ */
+#include <getopt.h>
+#include "cli.h"
+
+static const struct cli_option options[] = {{0}};
+
+static const struct cli_verb verb = {
+	.name = "calibrate",
+	.synopsis = "force | depth | tip | delay | stepper | check [OPTIONS]",
+	.summary =
+		"Measure what turns readings into mm, N and s, and write it to calibration.conf.\n"
+		"force: mV/N of the force channel, with weights.\n"
+		"depth: mm per pixel of the camera, from two points or a board.\n"
+		"tip: where the tip is in the tracker's sensor, by turning it about a point.\n"
+		"delay: how late tracker, force and camera are, from a motion or a pulse.\n"
+		"stepper: force per microstep of the actuator, its backlash and its limits.\n"
+		"check: what is calibrated, how old it is, and what is due.",
+	.options = options,
+	.notes = "'incise calibrate WORD --help' lists the options of each.\n"
+		 "Exit codes: 0 done, 1 failed or refused, 2 bad usage.",
+};
+
+int main(int argc, char **argv)
+{
+	while (cli_next(&verb, argc, argv) != CLI_END)
+		;
+	if (optind < argc)
+		cli_usage("there is nothing called '%s' to calibrate", argv[optind]);
+	cli_usage("what? force, depth, tip, delay, stepper or check");
+}
