@@ -40,7 +40,7 @@ has_vision := $(if $(shell $(CXX) -E -x c++ $(opencv_cflags) -include opencv2/im
 # One shared object per group of rooms; a process maps only the ones it uses.
 libraries := incise incise-learn incise-record
 rooms_incise := base fixed model tissue scene loop sim device
-rooms_incise-learn := learn
+rooms_incise-learn := learn calib
 rooms_incise-record := record
 pc_incise := libconfig
 pc_incise-learn := lapacke lapack blas
@@ -72,6 +72,9 @@ uses_plan := incise
 uses_replay := incise incise-record
 uses_demo := incise incise-learn
 uses_bench := incise incise-learn incise-record
+uses_calibrate := incise
+$(foreach word,$(filter calibrate-%,$(verbs)),\
+	$(eval uses_$(word) := incise incise-learn incise-record))
 
 all: libs tools
 

@@ -5,8 +5,42 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdlib.h>
 #include <incise/calibration.h>
+#include "calibration_file.h"
 #include "conf.h"
+
+#define NUMBER(key, unit, low, high)                                                  \
+	{                                                                             \
+#key, unit, low, high, offsetof(struct incise_calibration, key), NULL \
+	}
+#define TIP(axis, i)                                                             \
+	{                                                                        \
+		"tip_" axis "_mm", "mm", -1e6, 1e6,                              \
+			offsetof(struct incise_calibration, tip_mm[i]), "tip_mm" \
+	}
+
+const struct calibration_key incise_calibration_keys[] = {
+	NUMBER(force_mV_N, "mV/N", 1, 100000),
+	NUMBER(force_zero_mV, "mV", -10000, 10000),
+	NUMBER(depth_mm_px, "mm/px", 0.0001, 10),
+	TIP("x", 0),
+	TIP("y", 1),
+	TIP("z", 2),
+	/* a camera may stamp the end of an exposure: later than its middle, or not */
+	NUMBER(force_delay_ms, "ms", -1000, 1000),
+	NUMBER(force_delay_sd_ms, "ms", 0, 1000),
+	NUMBER(tracker_delay_ms, "ms", -1000, 1000),
+	NUMBER(tracker_delay_sd_ms, "ms", 0, 1000),
+	NUMBER(camera_delay_ms, "ms", -1000, 1000),
+	NUMBER(camera_delay_sd_ms, "ms", 0, 1000),
+	NUMBER(stepper_N_step, "N", -100, 100),
+	NUMBER(stepper_backlash_mm, "mm", 0, 100),
+	NUMBER(stepper_hysteresis_N, "N", 0, 1000),
+	NUMBER(stepper_stiction_N, "N", 0, 1000),
+	NUMBER(stepper_steps_s, "1/s", 0, 1e7),
+	{NULL},
+};
 
 void incise_calibration_nominal(struct incise_calibration *calibration)
 {
@@ -20,45 +54,55 @@ void incise_calibration_nominal(struct incise_calibration *calibration)
 		.tracker_delay_sd_ms = NAN,
 		.camera_delay_ms = NAN,
 		.camera_delay_sd_ms = NAN,
+		.stepper_N_step = NAN,
+		.stepper_backlash_mm = NAN,
+		.stepper_hysteresis_N = NAN,
+		.stepper_stiction_N = NAN,
+		.stepper_steps_s = NAN,
 	};
 }
 
-int incise_calibration_load(const char *path, struct incise_calibration *calibration,
-			    struct incise_error *err)
+double *incise_calibration_at(struct incise_calibration *calibration,
+			      const struct calibration_key *key)
 {
-	struct incise_calibration loaded;
-	const struct {
-		const char *key;
-		double low, high, *to;
-	} numbers[] = {
-		{"force_mV_N", 1, 100000, &loaded.force_mV_N},
-		{"force_zero_mV", -10000, 10000, &loaded.force_zero_mV},
-		{"depth_mm_px", 0.0001, 10, &loaded.depth_mm_px},
-		/* a camera may stamp the end of an exposure: later than its middle, or not */
-		{"force_delay_ms", -1000, 1000, &loaded.force_delay_ms},
-		{"force_delay_sd_ms", 0, 1000, &loaded.force_delay_sd_ms},
-		{"tracker_delay_ms", -1000, 1000, &loaded.tracker_delay_ms},
-		{"tracker_delay_sd_ms", 0, 1000, &loaded.tracker_delay_sd_ms},
-		{"camera_delay_ms", -1000, 1000, &loaded.camera_delay_ms},
-		{"camera_delay_sd_ms", 0, 1000, &loaded.camera_delay_sd_ms},
-	};
-	enum { NUMBERS = sizeof(numbers) / sizeof(*numbers) };
-	const char *keys[NUMBERS + 1] = {NULL};
+	return (double *)((char *)calibration + key->offset);
+}
+
+int incise_calibration_file_read(struct calibration_file *file, const char *path,
+				 struct incise_error *err)
+{
+	const char *names[CALIBRATION_KEYS + 2] = {NULL};
+	const struct calibration_key *key;
 	const config_setting_t *root;
 	config_t config;
-	int rc;
+	int rc, n = 0;
 
-	for (int i = 0; i < NUMBERS; i++)
-		keys[i] = numbers[i].key;
+	*file = (struct calibration_file){0};
 	rc = incise_conf_read(&config, path, err);
 	if (rc)
 		return rc;
-	incise_calibration_nominal(&loaded);
+	incise_calibration_nominal(&file->in_force);
 	root = config_root_setting(&config);
-	rc = incise_conf_known(root, path, keys, err);
-	for (int i = 0; i < NUMBERS && !rc; i++)
-		rc = incise_conf_number(root, path, numbers[i].key, numbers[i].low,
-					numbers[i].high, numbers[i].to, err);
+	for (key = incise_calibration_keys; key->name; key++) {
+		const char *name = key->vector ? key->vector : key->name;
+
+		file->present[key - incise_calibration_keys] =
+			config_setting_get_member(root, name);
+		if (!n || names[n - 1] != name)
+			names[n++] = name;
+	}
+	names[n] = "history";
+	rc = incise_conf_known(root, path, names, err);
+	for (key = incise_calibration_keys; key->name && !rc; key++)
+		if (!key->vector)
+			rc = incise_conf_number(
+				root, path, key->name, key->low, key->high,
+				incise_calibration_at(&file->in_force, key), err);
+	if (!rc)
+		rc = incise_conf_vector(root, path, "tip_mm", file->in_force.tip_mm, err);
+	if (!rc)
+		rc = incise_calibration_history_read(root, path, &file->records, &file->n,
+						     err);
 	config_destroy(&config);
 	if (rc) {
 		/* One errno for every fault of the file, as the header promises. */
@@ -67,6 +111,18 @@ int incise_calibration_load(const char *path, struct incise_calibration *calibra
 		errno = EINVAL;
 		return -EINVAL;
 	}
-	*calibration = loaded;
+	return 0;
+}
+
+int incise_calibration_load(const char *path, struct incise_calibration *calibration,
+			    struct incise_error *err)
+{
+	struct calibration_file file;
+	int rc = incise_calibration_file_read(&file, path, err);
+
+	if (rc)
+		return rc;
+	free(file.records);
+	*calibration = file.in_force;
 	return 0;
 }

@@ -190,7 +190,7 @@ int incise_conf_known(const config_setting_t *group, const char *path,
 	for (int i = 0; i < config_setting_length(group); i++) {
 		const config_setting_t *setting = config_setting_get_elem(group, i);
 		const char *own = config_setting_name(setting);
-		char name[120], known[240] = "";
+		char name[120], known[360] = "";
 		size_t length = 0, alike = 0;
 		const char *meant = NULL;
 		int found = 0;
@@ -252,6 +252,21 @@ int incise_conf_string(const config_setting_t *group, const char *path, const ch
 	if (config_setting_type(setting) != CONFIG_TYPE_STRING)
 		return setting_error(setting, path, EINVAL, err, "text in quotes");
 	*value = config_setting_get_string(setting);
+	return 0;
+}
+
+int incise_conf_text(const config_setting_t *group, const char *path, const char *key,
+		     char *value, size_t size, struct incise_error *err)
+{
+	const char *text = NULL;
+	int rc = incise_conf_string(group, path, key, &text, err);
+
+	if (rc || !text)
+		return rc;
+	if (strlen(text) >= size)
+		return setting_error(config_setting_get_member(group, key), path, EINVAL,
+				     err, "text of at most %zu bytes", size - 1);
+	strcpy(value, text);
 	return 0;
 }
 
@@ -318,6 +333,30 @@ int incise_conf_vector(const config_setting_t *group, const char *path, const ch
 		number[i] = number_of(element);
 	}
 	v3_copy(value, number);
+	return 0;
+}
+
+int incise_conf_numbers(const config_setting_t *group, const char *path, const char *key,
+			double *values, int max, int *n, struct incise_error *err)
+{
+	const config_setting_t *setting = config_setting_get_member(group, key);
+
+	*n = 0;
+	if (!setting)
+		return 0;
+	if (!(config_setting_is_array(setting) || config_setting_is_list(setting)) ||
+	    config_setting_length(setting) > max)
+		return setting_error(setting, path, EINVAL, err,
+				     "at most %d numbers [a, b, …]", max);
+	for (int i = 0; i < config_setting_length(setting); i++) {
+		const config_setting_t *element = config_setting_get_elem(setting, i);
+
+		if (!is_number(element) || !isfinite(number_of(element)))
+			return setting_error(setting, path, EINVAL, err,
+					     "numbers that are finite");
+		values[i] = number_of(element);
+	}
+	*n = config_setting_length(setting);
 	return 0;
 }
 

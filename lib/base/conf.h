@@ -36,6 +36,10 @@ int incise_conf_bool(const config_setting_t *group, const char *path, const char
 int incise_conf_vector(const config_setting_t *group, const char *path, const char *key,
 		       double value[3], struct incise_error *err);
 
+/* At most @max finite numbers [a, b, …]; *@n is 0 where the key is absent. */
+int incise_conf_numbers(const config_setting_t *group, const char *path, const char *key,
+			double *values, int max, int *n, struct incise_error *err);
+
 /* A direction [x, y, z] of length 1e-6 or more, made unit. */
 int incise_conf_direction(const config_setting_t *group, const char *path,
 			  const char *key, double value[3], struct incise_error *err);
@@ -47,6 +51,10 @@ int incise_conf_need(const config_setting_t *group, const char *path, const char
 /* Read a string if the key is there; it lives as long as the config. */
 int incise_conf_string(const config_setting_t *group, const char *path, const char *key,
 		       const char **value, struct incise_error *err);
+
+/* The same into @value of @size bytes, untouched when absent; fails where it is longer. */
+int incise_conf_text(const config_setting_t *group, const char *path, const char *key,
+		     char *value, size_t size, struct incise_error *err);
 
 /*
  * Read `point_mm` and `normal` of the group `surface` within @group, if it is there; the

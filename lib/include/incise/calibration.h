@@ -25,13 +25,20 @@ struct incise_calibration {
 	double camera_delay_ms, camera_delay_sd_ms;
 	/** Tip of the blade in the frame of what rig.conf's tip_mm leads to; default 0 0 0. */
 	double tip_mm[3];
+	/* The actuator, as the force channel has seen it; NAN: not known. */
+	double stepper_N_step;	     /**< force per microstep, with its sign */
+	double stepper_backlash_mm;  /**< travel lost where it turns round */
+	double stepper_hysteresis_N; /**< between the two ways, at one position */
+	double stepper_stiction_N;   /**< force at which it begins to move */
+	double stepper_steps_s;	     /**< the largest rate that loses no step */
 };
 
 /** The paper's figures. */
 INCISE_API void incise_calibration_nominal(struct incise_calibration *calibration);
 
 /**
- * Read calibration.conf; keys that are absent keep their nominal value.
+ * Read calibration.conf; keys that are absent keep their nominal value. Its history is
+ * checked too, see incise_calibration_history().
  *
  * @return 0; negative errno of fopen(3), -EINVAL (syntax, unknown key, a value out of
  *         range: file and line are named).
@@ -42,7 +49,7 @@ INCISE_API int incise_calibration_load(const char *path,
 
 /** A coefficient that a calibration has measured. */
 struct incise_calibration_value {
-	char key[32];  /**< of calibration.conf */
+	char key[32]; /**< of calibration.conf; tip_x_mm, tip_y_mm, tip_z_mm for tip_mm */
 	char unit[16]; /**< mV/N, mm/px, ms, … */
 	double found;  /**< what was in force before; NAN: nothing */
 	double left;   /**< what is from now on */
@@ -53,8 +60,8 @@ struct incise_calibration_value {
 
 /** One calibration, as it stands in the history of calibration.conf. */
 struct incise_calibration_record {
-	char kind[16];	  /**< force, depth, tip, delay, stepper */
-	char date[32];	  /**< ISO 8601, UTC */
+	char kind[16]; /**< force, depth, tip, delay, stepper: letters a to z */
+	char date[32]; /**< UTC, as 2026-11-21T14:48:16Z; empty for append: now */
 	char device[64];
 	char method[120]; /**< in words */
 	char raw[200];	  /**< name of the file with the raw data; empty: none was kept */
@@ -62,7 +69,8 @@ struct incise_calibration_record {
 	int n;		  /**< values */
 	struct incise_calibration_value values[INCISE_CALIBRATION_VALUES];
 	/** Of values i and j, i >= j, at i(i + 1)/2 + j; n_covariance 0: not stated. */
-	double covariance[INCISE_CALIBRATION_VALUES * (INCISE_CALIBRATION_VALUES + 1) / 2];
+	double covariance[INCISE_CALIBRATION_VALUES * (INCISE_CALIBRATION_VALUES + 1) /
+			  2];
 	int n_covariance;
 	double low, high;    /**< it is valid from … to; NAN: not stated */
 	char range_unit[16]; /**< of these: N, mm, … */
@@ -73,9 +81,11 @@ struct incise_calibration_record {
 /**
  * Append a calibration to a file, and put its values in force if it has passed. The file is
  * made where there is none, and replaced whole: whatever happens, the old or the new one is
- * there.
+ * there. Lines of comment before the history are kept, at the top; numbers are written so
+ * that the same ones are read. Control characters in text become '?'.
  *
- * @return 0; as incise_calibration_load(), of incise_outfile_commit()
+ * @return 0; as incise_calibration_load(), of incise_outfile_commit(); -EINVAL (a value of
+ *         @record is not finite, out of the range of its key, or of an unknown key)
  */
 INCISE_API int incise_calibration_append(const char *path,
 					 const struct incise_calibration_record *record,

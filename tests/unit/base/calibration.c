@@ -51,6 +51,7 @@ static void all_keys_are_read(void **state)
 		    c.depth_mm_px == 0.12);
 	assert_true(c.force_delay_ms == 0.1 && c.force_delay_sd_ms == 0.01);
 	assert_true(c.tracker_delay_ms == 8.5 && c.tracker_delay_sd_ms == 0.2);
+	assert_true(isnan(c.stepper_N_step) && isnan(c.stepper_steps_s));
 	assert_true(c.camera_delay_ms == -3.5 && c.camera_delay_sd_ms == 0.5);
 	temp_file_free(&file);
 }
@@ -69,11 +70,12 @@ static void faults_leave_the_calibration_alone(void **state)
 		{"depth_mm_px = \"x\";",
 		 ":1: depth_mm_px: expected a number from 0.0001 to "
 		 "10, found \"x\"; correct it"},
-		{"gain = 1;", ":1: gain: unknown key; expected one of force_mV_N, "
-			      "force_zero_mV, depth_mm_px, force_delay_ms, "
-			      "force_delay_sd_ms, tracker_delay_ms, "
-			      "tracker_delay_sd_ms, camera_delay_ms, "
-			      "camera_delay_sd_ms"},
+		{"gain = 1;",
+		 ":1: gain: unknown key; expected one of force_mV_N, force_zero_mV, "
+		 "depth_mm_px, tip_mm, force_delay_ms, force_delay_sd_ms, "
+		 "tracker_delay_ms, tracker_delay_sd_ms, camera_delay_ms, "
+		 "camera_delay_sd_ms, stepper_N_step, stepper_backlash_mm, "
+		 "stepper_hysteresis_N, stepper_stiction_N, stepper_steps_s, history"},
 		{"force_mV_N", ":1: syntax error: expected `key = value;`; correct it"},
 	};
 
