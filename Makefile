@@ -48,6 +48,7 @@ pc_incise-record := sqlite3
 libs_incise := -lm -ldl
 libs_incise-learn := -lm
 libs_incise-record := -lm -ldl -pthread
+also_incise := lib/record/crc32c.o
 also_incise-record := lib/base/ring.o lib/device/module.o lib/device/thread.o \
 	lib/tissue/predict.o
 about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop

@@ -517,6 +517,7 @@ int main(int argc, char **argv)
 	if (wish.calibration &&
 	    incise_calibration_load(wish.calibration, &calibration, &err))
 		cli_fail_with(&err);
+	setup.calibration_path = wish.calibration;
 	run.rig = open_rig(&wish);
 	setup.planned_s = planned_s(&wish, run.rig);
 	setup.vision = take_vision(&wish, run.rig, &vision) ? &vision : NULL;

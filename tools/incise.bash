@@ -12,10 +12,10 @@ _incise_verbs()
 		{ list = 0 }'
 }
 
-# The options of `incise VERB --help`: the words with dashes that begin a line.
+# The options of `incise VERB [WORD] --help`: the words with dashes that begin a line.
 _incise_options()
 {
-	"$1" "$2" --help 2>/dev/null | awk '
+	"$@" --help 2>/dev/null | awk '
 		/^Options:/ { list = 1; next }
 		/^[^ ]/ { list = 0 }
 		list && /^ +-/ {
@@ -70,7 +70,7 @@ _incise_buses()
 _incise()
 {
 	local word=${COMP_WORDS[COMP_CWORD]}
-	local program=${COMP_WORDS[0]} verb=${COMP_WORDS[1]} words=
+	local program=${COMP_WORDS[0]} verb=${COMP_WORDS[1]} words= part=()
 
 	COMPREPLY=()
 	if ((COMP_CWORD == 1)); then
@@ -82,8 +82,10 @@ _incise()
 		mapfile -t COMPREPLY < <(compgen -W "$(_incise_buses "${COMP_WORDS[2]}")" \
 			-- "${word#:}")
 	elif [[ $word == -* ]]; then
+		# each word of calibrate is a program of its own
+		[[ $verb != calibrate || ${COMP_WORDS[2]} == -* ]] || part=("${COMP_WORDS[2]}")
 		mapfile -t COMPREPLY < <(compgen -W \
-			"$(_incise_options "$program" "$verb")" -- "$word")
+			"$(_incise_options "$program" "$verb" "${part[@]}")" -- "$word")
 	else
 		((COMP_CWORD > 2)) || words=$(_incise_words "$program" "$verb")
 		[[ $words != *FILE* ]] || _incise_files "$word"

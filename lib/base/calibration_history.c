@@ -13,6 +13,7 @@
 #include <time.h>
 #include <incise/calibration.h>
 #include <incise/outfile.h>
+#include "../record/crc32c.h"
 #include "calibration_file.h"
 #include "conf.h"
 
@@ -278,6 +279,32 @@ int incise_calibration_history(const char *path,
 
 	*records = rc ? NULL : file.records;
 	return rc ? rc : file.n;
+}
+
+int incise_calibration_raw(struct incise_calibration_record *record, const char *path,
+			   struct incise_error *err)
+{
+	const char *name = strrchr(path, '/');
+	FILE *in = fopen(path, "re");
+	char bytes[4096];
+	uint32_t crc = 0;
+	size_t n;
+	int rc = 0;
+
+	if (!in)
+		return incise_error_set(err, errno, "%.200s: cannot be read: %s", path,
+					strerror(errno));
+	while ((n = fread(bytes, 1, sizeof(bytes), in)))
+		crc = incise_crc32c(crc, bytes, n);
+	if (ferror(in))
+		rc = incise_error_set(err, errno, "%.200s: cannot be read: %s", path,
+				      strerror(errno));
+	fclose(in);
+	if (rc)
+		return rc;
+	snprintf(record->raw, sizeof(record->raw), "%s", name ? name + 1 : path);
+	record->raw_crc = crc;
+	return 0;
 }
 
 /*

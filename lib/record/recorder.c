@@ -81,7 +81,7 @@ static int begin(struct incise_recorder *rec, const struct incise_recorder_setup
 	int rc = incise_recorder_preflight(rec, setup->planned_s, err);
 
 	if (!rc)
-		rc = incise_recorder_open_database(rec, err);
+		rc = incise_recorder_open_database(rec, setup->calibration_path, err);
 	if (!rc && rec->streams[INCISE_LEDGER_CAMERA].there)
 		rc = incise_recorder_open_camera(rec, setup->vision, err);
 	if (!rc && setup->armed && incise_recorder_hold(rec))

@@ -227,7 +227,8 @@ bool incise_recorder_disk_full(struct incise_recorder *rec);
 int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err);
 
 /* Make the database in the folder, with what is known at the start. Returns 0 or -errno. */
-int incise_recorder_open_database(struct incise_recorder *rec, struct incise_error *err);
+int incise_recorder_open_database(struct incise_recorder *rec,
+				  const char *calibration_path, struct incise_error *err);
 
 /* Make what came so far safe, with its counts and its ledger. Returns 0 or -errno. */
 int incise_recorder_commit(struct incise_recorder *rec, int64_t now_ns, bool last,
@@ -246,7 +247,7 @@ int incise_recorder_set_integer(struct incise_recorder *rec, const char *key,
 int incise_recorder_set_real(struct incise_recorder *rec, const char *key, double value);
 
 /* All that is known at the start. Returns SQLite codes, or'ed. */
-int incise_recorder_write_meta(struct incise_recorder *rec);
+int incise_recorder_write_meta(struct incise_recorder *rec, const char *calibration_path);
 
 /* A block of the ledger for each stream that has rows since the last. SQLite code. */
 int incise_recorder_ledger(struct incise_recorder *rec);

@@ -90,7 +90,8 @@ int incise_recorder_commit(struct incise_recorder *rec, int64_t now_ns, bool las
 	return 0;
 }
 
-int incise_recorder_open_database(struct incise_recorder *rec, struct incise_error *err)
+int incise_recorder_open_database(struct incise_recorder *rec,
+				  const char *calibration_path, struct incise_error *err)
 {
 	bool real = incise_clock_is_real(incise_rig_clock(rec->rig));
 	char *file = NULL;
@@ -123,7 +124,7 @@ int incise_recorder_open_database(struct incise_recorder *rec, struct incise_err
 		rc = sqlite3_prepare_v3(rec->db, sql[i], -1, SQLITE_PREPARE_PERSISTENT,
 					&rec->stmt[i], NULL);
 	if (rc == SQLITE_OK)
-		rc = incise_recorder_write_meta(rec);
+		rc = incise_recorder_write_meta(rec, calibration_path);
 	if (rc != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	return incise_recorder_commit(rec, incise_clock_now(incise_rig_clock(rec->rig)),

@@ -5,6 +5,7 @@
  */
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/utsname.h>
 #include <time.h>
@@ -12,6 +13,7 @@
 #include "recorder.h"
 
 #define SETTINGS_MAX 16384
+#define CALIBRATION_MAX (1 << 20) /* with the history of years */
 
 /* Run a bound statement. Returns an SQLite code. */
 int incise_recorder_run(sqlite3_stmt *stmt)
@@ -101,23 +103,39 @@ int incise_recorder_note(struct incise_recorder *rec, const char *kind, const ch
 	return rc;
 }
 
-/* The text of rig.conf as it is now, so that it is known what each device was set to. */
-static int set_settings(struct incise_recorder *rec)
+/* A file's text as it is now, up to @max bytes; a file that cannot be read is left out. */
+static int set_file(struct incise_recorder *rec, const char *key, const char *path,
+		    size_t max)
 {
-	const char *spec = incise_rig_spec(rec->rig);
-	char text[SETTINGS_MAX + 1];
-	FILE *file = strncmp(spec, "sim:", 4) ? fopen(spec, "re") : NULL;
-	size_t n;
+	FILE *file = fopen(path, "re");
+	char *text = file ? malloc(max + 1) : NULL;
+	int rc = SQLITE_OK;
 
-	if (!file)
-		return SQLITE_OK;
-	n = fread(text, 1, SETTINGS_MAX, file);
-	fclose(file);
-	text[n] = 0;
-	return incise_recorder_set_text(rec, "rig_conf", text);
+	if (text) {
+		text[fread(text, 1, max, file)] = 0;
+		rc = incise_recorder_set_text(rec, key, text);
+	}
+	free(text);
+	if (file)
+		fclose(file);
+	return rc;
 }
 
-int incise_recorder_write_meta(struct incise_recorder *rec)
+/* What each device was set to, and all that is known of the calibration. */
+static int set_settings(struct incise_recorder *rec, const char *calibration_path)
+{
+	const char *spec = incise_rig_spec(rec->rig);
+	int bad = SQLITE_OK;
+
+	if (strncmp(spec, "sim:", 4))
+		bad |= set_file(rec, "rig_conf", spec, SETTINGS_MAX);
+	if (calibration_path)
+		bad |= set_file(rec, "calibration_conf", calibration_path,
+				CALIBRATION_MAX);
+	return bad;
+}
+
+int incise_recorder_write_meta(struct incise_recorder *rec, const char *calibration_path)
 {
 	const char *const axes[] = {"x", "y", "z"};
 	char started[32];
@@ -136,7 +154,7 @@ int incise_recorder_write_meta(struct incise_recorder *rec)
 	bad |= incise_recorder_set_text(rec, "kernel", host.release);
 	bad |= incise_recorder_set_text(rec, "started", started);
 	bad |= incise_recorder_set_text(rec, "rig", incise_rig_spec(rec->rig));
-	bad |= set_settings(rec);
+	bad |= set_settings(rec, calibration_path);
 	bad |= incise_recorder_set_text(
 		rec, "clock",
 		incise_clock_is_real(incise_rig_clock(rec->rig)) ? "real" : "simulated");

@@ -76,6 +76,17 @@ END
 	[ ! -e b.rec/camera.mkv ]
 }
 
+@test "a recording keeps the calibration it was made with, with its history" {
+	printf '# of today\nforce_mV_N = 1250;\nhistory = ( );\n' >calibration.conf
+	incise capture -o a.rec --rig sim:clock=simulated --duration 600ms -c calibration.conf
+	[ "$(ask a.rec "SELECT value FROM meta WHERE key = 'calibration_conf'")" = \
+		"$(cat calibration.conf)" ]
+	[ "$(ask a.rec "SELECT value FROM meta WHERE key = 'force_mV_N'")" = 1250.0 ]
+	incise verify a.rec
+	incise capture -o b.rec --rig sim:clock=simulated --duration 600ms
+	[ "$(ask b.rec "SELECT count(*) FROM meta WHERE key = 'calibration_conf'")" = 0 ]
+}
+
 @test "a camera that is not there, and a wish that is none" {
 	printf 'clock = "simulated"; tracker = "sim:"; force = "sim:";\n' >rig.conf
 	run -1 --separate-stderr incise capture -o a.rec --duration 1s --camera pictures

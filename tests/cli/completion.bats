@@ -51,6 +51,22 @@ complete_words() {
 	done
 }
 
+@test "words of calibrate are completed, and the options of each" {
+	complete_words incise calibrate ""
+	[ "${COMPREPLY[*]}" = "force depth tip delay stepper check" ]
+	complete_words incise calibrate st
+	[ "${COMPREPLY[*]}" = stepper ]
+	complete_words incise calibrate --h
+	[ "${COMPREPLY[*]}" = --help ]
+	for program in "$root"/tools/incise-calibrate-*.c; do
+		[ -e "$program" ] || continue
+		word=$(basename "$program" .c)
+		complete_words incise calibrate "${word##*-}" --
+		[ "${#COMPREPLY[@]}" -eq "$("$word" --help |
+			grep -cE '^  (-[A-Za-z],|   ) --[a-z]')" ]
+	done
+}
+
 @test "what bench measures is completed" {
 	touch stale.csv
 	complete_words incise bench ""

@@ -6,28 +6,38 @@ load cli
 setup() {
 	verbs=$(incise --help | awk '/^Verbs:/ { on = 1; next } on && !NF { exit } on { print $1 }')
 	[ "$(wc -w <<<"$verbs")" -ge 8 ]
+	# "calibrate force": incise-calibrate-force
+	words=$(cd "$root/tools" && find . -name 'incise-calibrate-*.c' | sed 's/.*incise-//; s/-/ /; s/\.c$//')
+	mapfile -t all < <(printf '%s\n' "$verbs" "$words" | sed '/^$/d')
+}
+
+# "calibrate force" → incise-calibrate-force
+program() {
+	echo "incise-${1// /-}"
 }
 
 # Options that lines of --help begin with, long and short.
 options_of_help() {
-	"incise-$1" --help | awk '/^  +-/ { sub(/  [^ -].*/, ""); print }' |
+	"$(program "$1")" --help | awk '/^  +-/ { sub(/  [^ -].*/, ""); print }' |
 		grep -oE -- '(^|[ ,])--?[A-Za-z][a-z-]*' | tr -d ' ,' | sort -u
 }
 
 # Options that items of the page's lists are headed by: ".It Fl o , Fl -output Ar FILE".
 options_of_page() {
-	sed -n 's/^\.It Fl/ Fl/p' "$root/man/incise-$1.1" | grep -oE ' Fl [-A-Za-z][a-z-]*' |
+	sed -n 's/^\.It Fl/ Fl/p' "$root/man/$(program "$1").1" | grep -oE ' Fl [-A-Za-z][a-z-]*' |
 		sed 's/ Fl /-/' | sort -u
 }
 
 @test "every verb explains itself" {
-	for verb in $verbs; do
-		run -0 --separate-stderr incise "$verb" --help
+	for verb in "${all[@]}"; do
+		# shellcheck disable=SC2086 # "calibrate force" is two words
+		run -0 --separate-stderr incise $verb --help
 		[ -z "$stderr" ]
 		[[ "${lines[0]}" == "Usage: incise $verb "* ]]
 		[[ "$output" == *"Options:"* ]]
 		help=$output
-		run -0 incise "$verb" -h
+		# shellcheck disable=SC2086
+		run -0 incise $verb -h
 		[ "$output" = "$help" ]
 		run -1 --separate-stderr bash -c "incise $verb --help >/dev/full"
 		[ "${#stderr_lines[@]}" -eq 1 ]
@@ -35,8 +45,8 @@ options_of_page() {
 }
 
 @test "help and manual name the same options" {
-	for verb in $verbs; do
-		[ -f "$root/man/incise-$verb.1" ]
+	for verb in "${all[@]}"; do
+		[ -f "$root/man/$(program "$verb").1" ]
 		# at least --help, -h, --version, -V: the patterns found something
 		[ "$(options_of_help "$verb" | wc -l)" -ge 4 ]
 		diff <(options_of_help "$verb") <(options_of_page "$verb")
@@ -63,11 +73,13 @@ options_of_page() {
 }
 
 @test "a wrong option is named, and where help is" {
-	for verb in $verbs; do
-		run --separate-stderr incise "$verb" --no-such-option
+	for verb in "${all[@]}"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise $verb --no-such-option
 		bad_usage --no-such-option
 		[ -z "$output" ]
-		run --separate-stderr incise "$verb" -%
+		# shellcheck disable=SC2086
+		run --separate-stderr incise $verb -%
 		bad_usage "-%"
 	done
 }

@@ -92,6 +92,14 @@ INCISE_API int incise_calibration_append(const char *path,
 					 struct incise_error *err);
 
 /**
+ * Say in a record which file holds its raw data: its name, without folders, and CRC32C.
+ *
+ * @return 0; negative errno of open(2) and read(2)
+ */
+INCISE_API int incise_calibration_raw(struct incise_calibration_record *record,
+				      const char *path, struct incise_error *err);
+
+/**
  * The history of a file, oldest first.
  *
  * @param records to be freed with free(3)

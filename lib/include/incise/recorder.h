@@ -21,6 +21,8 @@ INCISE_BEGIN_DECLS
 /** How to record. */
 struct incise_recorder_setup {
 	const struct incise_calibration *calibration;
+	/** Its file, whose text the recording keeps; NULL: none. */
+	const char *calibration_path;
 	/** Look for the scalpel in the camera's pictures; NULL: pictures only. Its
 	 * depth_mm_px is of the calibration. */
 	const struct incise_vision_setup *vision;

@@ -172,6 +172,21 @@ static void every_key_comes_back(void **state)
 	temp_file_free(&file);
 }
 
+static void raw_data_are_named_and_sealed(void **state)
+{
+	/* RFC 3720, B.4: check value of CRC32C */
+	struct temp_file file = temp_file_new("pairs.csv", "123456789");
+	struct incise_calibration_record record = {.raw = "as it was"};
+
+	assert_int_equal(incise_calibration_raw(&record, "/nowhere/x", NULL), -ENOENT);
+	assert_int_equal(incise_calibration_raw(&record, file.dir, NULL), -EISDIR);
+	assert_string_equal(record.raw, "as it was");
+	assert_int_equal(incise_calibration_raw(&record, file.path, NULL), 0);
+	assert_string_equal(record.raw, "pairs.csv");
+	assert_int_equal(record.raw_crc, 0xe3069283);
+	temp_file_free(&file);
+}
+
 static void wrong_records_change_nothing(void **state)
 {
 	struct temp_file file = temp_file_new("calibration.conf", "force_mV_N = 1200;\n");
@@ -312,6 +327,7 @@ int main(void)
 		cmocka_unit_test(what_is_appended_is_read),
 		cmocka_unit_test(what_failed_is_not_in_force),
 		cmocka_unit_test(every_key_comes_back),
+		cmocka_unit_test(raw_data_are_named_and_sealed),
 		cmocka_unit_test(wrong_records_change_nothing),
 		cmocka_unit_test(wrong_files_are_named),
 		cmocka_unit_test(a_killed_writer_leaves_a_whole_file),
