@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A straight line beside outliers; see robust_line.h. Deterministic: with many points the
+ * lines tried are a fixed choice.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include "robust_line.h"
+
+/* Through every two of up to 150 points; of more points, so many lines. */
+#define LINES_MAX (150 * 149 / 2)
+#define LINES 1000
+/* A good reading in 16000 lies as far off as this many sd. */
+#define FAR 4.0
+
+/*
+ * The same in 16000, where the sd itself is of few others: Student's t for FAR, by D. L.
+ * Wallace (Ann. Math. Stat. 30, 1959).
+ */
+static double far_of(int freedom)
+{
+	const double v = freedom, z = FAR * (8 * v + 3) / (8 * v + 1);
+
+	return sqrt(v * expm1(z * z / v));
+}
+
+static int by_size(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+
+	return (x > y) - (x < y);
+}
+
+/*
+ * Of few points, half of them always lie on some line by luck, and make the others look far:
+ * there three quarters are to be near it.
+ */
+static int quantile(int n)
+{
+	return n < 20 ? 3 * n / 4 : n / 2;
+}
+
+/* Median of |y - line|, or the quantile of few points; @room for n numbers. */
+static double median_distance(const double *x, const double *y, int n, double slope,
+			      double zero, double *room)
+{
+	for (int i = 0; i < n; i++)
+		room[i] = fabs(y[i] - zero - slope * x[i]);
+	qsort(room, n, sizeof(*room), by_size);
+	return room[quantile(n)];
+}
+
+static void try_line(const double *x, const double *y, int n, int i, int j,
+		     struct robust_line *line, double *best, double *room)
+{
+	double slope, zero, distance;
+
+	if (x[i] == x[j])
+		return;
+	slope = (y[j] - y[i]) / (x[j] - x[i]);
+	zero = y[i] - slope * x[i];
+	distance = median_distance(x, y, n, slope, zero, room);
+	if (distance < *best) {
+		*best = distance;
+		line->slope = slope;
+		line->zero = zero;
+	}
+}
+
+/* Least squares of the points that are no outliers; false: they do not carry a line. */
+static bool least_squares(const double *x, const double *y, int n, const bool *outlier,
+			  struct robust_line *line, double *far)
+{
+	double mx = 0, my = 0, xx = 0, xy = 0, rr = 0;
+	int m = 0;
+
+	for (int i = 0; i < n; i++)
+		if (!outlier[i]) {
+			m++;
+			mx += (x[i] - mx) / m;
+			my += (y[i] - my) / m;
+		}
+	for (int i = 0; i < n; i++)
+		if (!outlier[i]) {
+			xx += (x[i] - mx) * (x[i] - mx);
+			xy += (x[i] - mx) * (y[i] - my);
+		}
+	if (m < 3 || !(xx > 0))
+		return false;
+	line->slope = xy / xx;
+	line->zero = my - line->slope * mx;
+	for (int i = 0; i < n; i++)
+		if (!outlier[i]) {
+			double r = y[i] - line->zero - line->slope * x[i];
+
+			rr += r * r;
+		}
+	line->sd = sqrt(rr / (m - 2));
+	*far = far_of(m - 2);
+	return true;
+}
+
+int incise_robust_line(const double *x, const double *y, int n, double sd_min,
+		       struct robust_line *line, bool *outlier)
+{
+	double best = INFINITY, far = FAR, *room = malloc(n * sizeof(*room));
+	uint64_t choice = 1;
+
+	if (!room)
+		return -ENOMEM;
+	*line = (struct robust_line){0};
+	if ((int64_t)n * (n - 1) / 2 <= LINES_MAX)
+		for (int i = 0; i < n; i++)
+			for (int j = 0; j < i; j++)
+				try_line(x, y, n, i, j, line, &best, room);
+	else
+		for (int k = 0; k < LINES; k++) {
+			int i, j;
+
+			/* Knuth's MMIX; the high bits are the good ones */
+			choice = choice * 6364136223846793005u + 1442695040888963407u;
+			i = (choice >> 33) % n;
+			choice = choice * 6364136223846793005u + 1442695040888963407u;
+			j = (choice >> 33) % n;
+			try_line(x, y, n, i, j, line, &best, room);
+		}
+	free(room);
+	if (!isfinite(best))
+		return -EDOM;
+	/* Rousseeuw and Leroy 1987, chapter 5: to an sd of normal errors, for small n too. */
+	line->sd = (n < 20 ? 0.869 : 1.4826) * (1 + 5.0 / (n > 2 ? n - 2 : 1)) * best;
+	for (int round = 0; round < 10; round++) {
+		const double limit = hypot(far * line->sd, FAR * sd_min);
+
+		for (int i = 0; i < n; i++)
+			outlier[i] = fabs(y[i] - line->zero - line->slope * x[i]) > limit;
+		if (!least_squares(x, y, n, outlier, line, &far))
+			return -EDOM;
+	}
+	return 0;
+}
