@@ -20,6 +20,8 @@ extra_haptic := $(addprefix $(O)/obj/tools/,scene_argument.o stepper_counters.o 
 extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o picture.o \
 	replay_picture.o)
 extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stopwatch.o)
+extra_calibrate-force := $(addprefix $(O)/obj/tools/,picture.o calibrate_pairs.o \
+	calibrate_weights.o calibrate_force_report.o)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o \
 	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \

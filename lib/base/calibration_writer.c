@@ -22,12 +22,19 @@ static void put_number(double value, FILE *out)
 	fprintf(out, "%s%s", text, strpbrk(text, ".e") ? "" : ".0");
 }
 
-static void put_text(const char *key, const char *text, FILE *out)
+static void put_quoted(const char *key, const char *text, FILE *out)
 {
-	fprintf(out, "  %s = \"", key);
+	fprintf(out, "%s = \"", key);
 	for (; *text; text++)
 		fprintf(out, *text == '"' || *text == '\\' ? "\\%c" : "%c", *text);
-	fputs("\";\n", out);
+	fputs("\";", out);
+}
+
+static void put_text(const char *key, const char *text, FILE *out)
+{
+	fputs("  ", out);
+	put_quoted(key, text, out);
+	fputc('\n', out);
 }
 
 /* The last calibration that put a key's value in force; NULL: a person did. */
@@ -93,6 +100,10 @@ static void put_in_force(const struct calibration_file *file, FILE *out)
 static void put_value(const struct incise_calibration_value *value, FILE *out)
 {
 	fprintf(out, "    { key = \"%s\"; ", value->key);
+	if (*value->unit) {
+		put_quoted("unit", value->unit, out);
+		fputc(' ', out);
+	}
 	if (isfinite(value->found)) {
 		fputs("found = ", out);
 		put_number(value->found, out);
@@ -102,10 +113,7 @@ static void put_value(const struct incise_calibration_value *value, FILE *out)
 	put_number(value->left, out);
 	fputs("; u = ", out);
 	put_number(value->u, out);
-	fputs(";", out);
-	if (*value->unit)
-		put_text("unit", value->unit, out);
-	fputs("    }", out);
+	fputs("; }", out);
 }
 
 static void put_record(const struct incise_calibration_record *record, FILE *out)

@@ -165,7 +165,7 @@ void incise_calibrate_force_line(struct work *w, struct incise_calibrate_force *
 
 	measure_scatter(w, result);
 	/* Noise of half a code and more makes means finer than a code. */
-	if (result->scatter_sd_mV < w->setup->step_mV / 2)
+	if (!w->setup->dithered && result->scatter_sd_mV < w->setup->step_mV / 2)
 		code_u_mV = w->setup->step_mV / sqrt(12);
 	t = student(result->freedom);
 	turn = fmax(t / 2, 1);

@@ -27,6 +27,7 @@ struct incise_sim *incise_sim_new(const struct incise_sim_config *config,
 	sim->config = *config;
 	sim->clock = clock;
 	sim->start_ns = incise_clock_now(clock);
+	sim->load_N = NAN;
 	incise_surgeon_init(&sim->surgeon, &sim->config);
 	incise_tissue_init(&sim->tissue, &sim->config);
 	incise_surgeon_blade(&sim->surgeon, 0, &sim->blade);
@@ -87,7 +88,15 @@ void incise_sim_sense(const struct incise_sim *sim, int64_t t_ns,
 		*blade = sim->blade;
 	else
 		incise_surgeon_blade(&sim->surgeon, t_ns, blade);
-	*force_N = incise_tissue_force(&sim->tissue, blade, (t_ns - sim->t_ns) * NS);
+	*force_N = isnan(sim->load_N) ? incise_tissue_force(&sim->tissue, blade,
+							    (t_ns - sim->t_ns) * NS)
+				      : sim->load_N;
+}
+
+void incise_sim_load(struct incise_sim *sim, double load_N)
+{
+	incise_sim_advance(sim);
+	sim->load_N = isfinite(load_N) ? load_N : NAN;
 }
 
 void incise_sim_advance(struct incise_sim *sim)

@@ -39,6 +39,7 @@ struct incise_sim {
 	struct incise_tissue tissue;
 	struct incise_blade blade; /* at t_ns */
 	struct incise_sim_stream *streams;
+	double load_N; /* hung on the sensor; NAN: the blade is on it */
 };
 
 /* Let a stream listen from the present tick on; its t_ns must not lie before that. */

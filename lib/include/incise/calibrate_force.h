@@ -41,8 +41,11 @@ struct incise_calibrate_force_setup {
 	double scale_g;
 	double low_mV, high_mV; /**< ends of the converter; NAN: not known */
 	double step_mV;		/**< one code; 0: not known */
-	double nominal_mV_N;	/**< 1240 */
-	double tolerance;	/**< 0.05 of it */
+	/** Each reading is a mean over noise of half a code or more, so it is finer than a
+	 * code. */
+	bool dithered;
+	double nominal_mV_N; /**< 1240 */
+	double tolerance;    /**< 0.05 of it */
 };
 
 /** What became of a pair. */

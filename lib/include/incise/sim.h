@@ -113,6 +113,12 @@ INCISE_API int64_t incise_sim_duration(const struct incise_sim *sim);
 /** The truth at the clock's present time. */
 INCISE_API void incise_sim_truth(struct incise_sim *sim, struct incise_sim_truth *truth);
 
+/**
+ * Hang a weight on the force sensor, in place of the blade, from the clock's present time on:
+ * nobody else can on a virtual rig. 0 is the empty pan; NAN gives it the blade back.
+ */
+INCISE_API void incise_sim_load(struct incise_sim *sim, double load_N);
+
 /** Force without saw-tooth and boundary effect: what a model can at best learn. */
 INCISE_API double incise_sim_mean_force(const struct incise_sim_config *config,
 					double depth_mm, double velocity_mm_s);

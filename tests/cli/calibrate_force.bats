@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise calibrate force: on the virtual rig against its truth, and on files that are wrong.
+
+load cli
+
+setup() {
+	work_folder
+}
+
+# Pairs of three ascending series and a descending one, 1250 mV/N and 180 mV, noise of 1 mV
+# or so that is the same in each run; lines can be changed by an awk condition on i.
+made_weights() {
+	awk "BEGIN { print \"mass_g,reading_mV,series,direction\"
+		for (s = 1; s <= 4; s++) for (k = 0; k <= 6; k++) {
+			i++; m = 50 * (s == 4 ? 6 - k : k)
+			r = 180 + 1250 * m * 1e-3 * 9.80665 * (1 - 1.2 / 7950) + sin(7 * i)
+			d = s == 4 ? \"down\" : \"up\"
+			$1
+			print m \",\" r \",\" s \",\" d } }"
+}
+
+@test "the virtual rig's sensitivity is found, kept, reported and put in force" {
+	command -v gnuplot || skip "gnuplot is not installed"
+	run -0 --separate-stderr incise calibrate force \
+		--rig sim:clock=simulated,seed=5,force_mV_N=1265.5,force_zero_mV=160 \
+		--weights 50g,100g,0.15kg,200g,300g --keep pairs.csv --report r --zero </dev/null
+	# the sim's force is exact: codes and noise leave 0.01 %
+	mV_N=$(key r/report.json sensitivity_mV_N)
+	holds "$mV_N > 1265.5 * 0.9999 && $mV_N < 1265.5 * 1.0001"
+	zero=$(key r/report.json zero_mV)
+	holds "$zero > 159.9 && $zero < 160.1"
+	holds "$(key r/report.json zero_return_percent) < 0.01"
+	holds "$(key r/report.json clips_N) > 3.8 && $(key r/report.json clips_N) < 3.85"
+	[ "$(key r/report.json pass)" = 1 ]
+	[ -s r/fit.png ] && [ -s r/residuals.png ]
+	grep -q "^resolution of the scale *B" r/report.txt
+	grep -qE "^force_mV_N = 1265\.[0-9]+; ## mV/N, U = " calibration.conf
+	grep -q '^force_zero_mV = 1' calibration.conf
+	grep -q 'raw = "pairs.csv"' calibration.conf
+	[[ "${stderr_lines[0]}" == "1   up        0 g"* ]]
+	# once more from what was kept: the same, and the history grows
+	run -0 incise calibrate force --from pairs.csv --json
+	echo "$output" >again.json
+	holds "$(key again.json sensitivity_mV_N) - $mV_N < 0.01"
+	[ "$(grep -c 'kind = "force"' calibration.conf)" = 2 ]
+	incise capture -o a.rec --rig sim:clock=simulated --duration 600ms -c calibration.conf
+	[ "$(sqlite3 a.rec/recording.db \
+		"SELECT value FROM meta WHERE key = 'calibration_conf'")" = "$(cat calibration.conf)" ]
+}
+
+@test "a dry run, and one that does not pass, put nothing in force" {
+	made_weights "" >w.csv
+	incise calibrate force --from w.csv --dry-run
+	[ ! -e calibration.conf ]
+	run --separate-stderr incise calibrate force --from w.csv --nominal 1500
+	failed_with "not in force" "-16.67 % from the nominal 1500 mV/N, more than 5 %"
+	! grep -q '^force_mV_N' calibration.conf
+	grep -q 'pass = false;' calibration.conf
+	run -0 incise calibrate force --from w.csv --latitude 48 --altitude 300
+	[[ "$output" == *"1240.00 mV/N as found"* ]]
+	grep -q '^force_mV_N = ' calibration.conf
+}
+
+@test "outliers up to one in ten are listed, more are refused" {
+	made_weights "if (i == 9 || i == 20) r += 400" >w.csv
+	run -0 incise calibrate force --from w.csv --report r
+	[[ "$output" == *"26 of 28 used"*"2 outliers"* ]]
+	[[ "$output" == *"pair 9 "*"outlier"*"pair 20 "*"outlier"* ]]
+	cp calibration.conf before
+	made_weights "if (i % 7 == 3) r += 400 + 50 * s" >w.csv
+	run --separate-stderr incise calibrate force --from w.csv --report r
+	failed_with "refused" "of 28 pairs lie far from the line" "calibration.conf stays as it was"
+	cmp calibration.conf before
+	grep -q "^refused: " r/report.txt
+	[ "$(grep -c 'outlier$' r/report.txt)" = 4 ]
+}
+
+@test "saturated readings are left out and named" {
+	made_weights "if (r > 3000) r = 3000" >w.csv
+	for range in "" "--range 0,3000"; do
+		# shellcheck disable=SC2086
+		run -0 incise calibrate force --from w.csv --dry-run $range
+		[[ "$output" == *"8 saturated, 0 outliers"* ]]
+		[[ "$output" == *"pair 6 "*"saturated"* ]]
+	done
+	# a rig whose converter ends at 3.89 N: 400 g are beyond
+	run -0 --separate-stderr incise calibrate force --rig sim:clock=simulated --dry-run \
+		--weights 100g,200g,300g,400g --time 500ms </dev/null
+	[[ "$output" == *"3 saturated"* ]]
+}
+
+@test "what cannot be is refused by name" {
+	made_weights "" | awk -F, -v OFS=, 'NR > 1 { t = $1; $1 = $2; $2 = t } 1' >swapped.csv
+	made_weights "m = 100; r = 1400" >one.csv
+	made_weights "if (i > 4) continue" >few.csv
+	made_weights "m /= 1000" >kg.csv
+	made_weights "r = 5000 - r" >falls.csv
+	while read -r file said; do
+		run --separate-stderr incise calibrate force --from "$file.csv"
+		failed_with "refused" "$said"
+	done <<-END
+		swapped the columns of loads and readings are swapped
+		one one repeated weight
+		few 5 pairs of 3 loads are the least
+		kg the masses seem to be in kg
+		falls the reading does not grow with the load
+	END
+	[ ! -e calibration.conf ]
+}
+
+@test "files that are no pairs are named with their line" {
+	while IFS='|' read -r text said; do
+		printf '%b' "$text" >w.csv
+		run --separate-stderr incise calibrate force --from w.csv
+		failed_with "w.csv" "$said"
+	done <<-'END'
+		mass,reading_mV\n1,2\n|w.csv:1: expected a line that names the columns
+		mass_g,reading_mV\n1,2\n1,x\n|w.csv:3: reading_mV: expected a number, found 'x'
+		mass_g,reading_mV\n1\n|w.csv:2: reading_mV: expected a number, found ''
+		mass_g,reading_mV\nnan,1\n|w.csv:2: mass_g: expected a number
+		mass_g,reading_mV,direction\n1,1,left\n|w.csv:2: direction: expected up or down
+		mass_g,reading_mV,series\n1,1,1.5\n|w.csv:2: series: expected a whole number
+		|no pairs in it
+	END
+	run --separate-stderr incise calibrate force --from none.csv
+	failed_with "none.csv: cannot be read"
+	echo 'force_mV_N = "x";' >calibration.conf
+	made_weights "" >w.csv
+	run --separate-stderr incise calibrate force --from w.csv
+	failed_with "calibration.conf:1: force_mV_N: expected a number"
+}
+
+@test "what is not a wish" {
+	run --separate-stderr incise calibrate force --from w.csv --weights 0,1,2
+	bad_usage "--from takes the place of a rig"
+	run --separate-stderr incise calibrate force --rig sim: </dev/null
+	bad_usage "no terminal to ask for weights"
+	run --separate-stderr incise calibrate force --rig sim: --weights 100g
+	bad_usage "2 weights or more beside the empty pan"
+	run --separate-stderr incise calibrate force --rig sim: --weights 100g,100g,50g
+	bad_usage "100 g is there twice"
+	run --separate-stderr incise calibrate force --range 5,1
+	bad_usage "the first is to be the lower one"
+	run --separate-stderr incise calibrate force extra
+	bad_usage "'extra' is too much"
+}
+
+@test "stopped in the middle, the old calibration stays" {
+	echo 'force_mV_N = 1234;' >calibration.conf
+	cp calibration.conf before
+	incise calibrate force --rig sim: --weights 50g,100g,200g </dev/null 2>said &
+	pid=$!
+	for _ in $(seq 100); do
+		! grep -q "50 g" said || break
+		sleep 0.1
+	done
+	kill -INT "$pid"
+	status=0
+	wait "$pid" || status=$?
+	[ "$status" = 1 ]
+	grep -q "stopped; the calibration stays as it was" said
+	cmp calibration.conf before
+}
