@@ -6,6 +6,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 #include <incise/calibration.h>
 #include "calibration_file.h"
 #include "conf.h"
@@ -66,6 +67,18 @@ double *incise_calibration_at(struct incise_calibration *calibration,
 			      const struct calibration_key *key)
 {
 	return (double *)((char *)calibration + key->offset);
+}
+
+double incise_calibration_get(const struct incise_calibration *calibration,
+			      const char *name)
+{
+	struct incise_calibration copy = *calibration;
+
+	for (const struct calibration_key *key = incise_calibration_keys; key->name;
+	     key++)
+		if (!strcmp(key->name, name))
+			return *incise_calibration_at(&copy, key);
+	return NAN;
 }
 
 int incise_calibration_file_read(struct calibration_file *file, const char *path,

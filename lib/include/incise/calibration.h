@@ -47,6 +47,10 @@ INCISE_API int incise_calibration_load(const char *path,
 				       struct incise_calibration *calibration,
 				       struct incise_error *err);
 
+/** What is in force under a key of the history; NAN: not known, or there is no such key. */
+INCISE_API double incise_calibration_get(const struct incise_calibration *calibration,
+					 const char *key);
+
 /** A coefficient that a calibration has measured. */
 struct incise_calibration_value {
 	char key[32]; /**< of calibration.conf; tip_x_mm, tip_y_mm, tip_z_mm for tip_mm */

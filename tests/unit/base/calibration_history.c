@@ -161,6 +161,11 @@ static void every_key_comes_back(void **state)
 	assert_int_equal(incise_calibration_append(file.path, &record, NULL), 0);
 	assert_int_equal(incise_calibration_load(file.path, &c, NULL), 0);
 	assert_true(c.tip_mm[0] == 1 && c.tip_mm[1] == -2 && c.tip_mm[2] == 3.25);
+	for (int i = 0; i < record.n; i++)
+		assert_true(incise_calibration_get(&c, record.values[i].key) ==
+			    record.values[i].left);
+	assert_true(isnan(incise_calibration_get(&c, "force_zero_mV")));
+	assert_true(isnan(incise_calibration_get(&c, "tip_mm")));
 	assert_true(c.stepper_N_step == -1e-3 && c.stepper_backlash_mm == 0.05 &&
 		    c.stepper_hysteresis_N == 0.1 && c.stepper_stiction_N == 0.2 &&
 		    c.stepper_steps_s == 5000);

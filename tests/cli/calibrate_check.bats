@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise calibrate check: what is due, and tracker against camera.
+
+load cli
+
+setup_file() {
+	# 8 s with a camera: two cuts
+	export INCISE_CHECK_REC=$BATS_FILE_TMPDIR/a.rec
+	printf '%s\n' 'clock = "simulated"; tracker = "sim:"; force = "sim:"; camera = "sim:";' \
+		'sim = { depth_mm = [5.0, 10.0]; times = [1, 1]; cut_s = 3.0; };' \
+		>"$BATS_FILE_TMPDIR/rig.conf"
+	"$INCISE_BUILD/bin/incise" capture -o "$INCISE_CHECK_REC" -r "$BATS_FILE_TMPDIR/rig.conf"
+}
+
+setup() {
+	work_folder
+}
+
+# An entry of the history: kind, key, value, date, pass.
+entry() {
+	printf '{ kind = "%s"; date = "%s"; pass = %s; verdict = "said so";
+		values = ( { key = "%s"; left = %s; u = 0.5; unit = "x"; } ); }' \
+		"$1" "$4" "$5" "$2" "$3"
+}
+
+today=$(date -u +%Y-%m-%dT00:00:00Z)
+
+@test "nothing calibrated is nominal, and due" {
+	run -1 incise calibrate check
+	[[ "$output" == *"0 calibrations"*"force    due: never calibrated: nominal, 1240 mV/N"* ]]
+	[ "$(grep -c 'never calibrated' <<<"$output")" = 5 ]
+	run -1 incise calibrate check --json
+	echo "$output" >c.json
+	[ "$(key c.json due)" = 5 ]
+	[ "$(key c.json kinds[1].kind)" = depth ]
+}
+
+@test "what is in force, old, failed, changed by hand or of the future" {
+	cat >calibration.conf <<-END
+		force_mV_N = 1250.0; depth_mm_px = 0.12; force_delay_ms = 3.0;
+		stepper_N_step = 0.001; tip_mm = [1.0, 2.0, 3.0];
+		history = ( $(entry force force_mV_N 1250.0 "$today" true),
+			$(entry depth depth_mm_px 0.12 2020-01-01T00:00:00Z true),
+			$(entry delay force_delay_ms 3.0 "$today" true),
+			$(entry delay force_delay_ms 900.0 "$today" false),
+			$(entry stepper stepper_N_step 0.002 "$today" true),
+			$(entry tip tip_x_mm 1.0 2999-01-01T00:00:00Z true) );
+	END
+	run -1 incise calibrate check
+	[[ "$output" == *"6 calibrations"* ]]
+	grep -q "^force    good, ${today%T*}, 0 days old" <<<"$output"
+	grep -q 'force_mV_N  *1250 x, U = 1 (k = 2)' <<<"$output"
+	grep -q "^depth    due, 2020-01-01, .*: older than 365 days" <<<"$output"
+	grep -q "^delay    FAILED, .*: the last one, of ${today%T*}, failed" <<<"$output"
+	grep -q "^stepper  due, .*: stepper_N_step was changed by hand since" <<<"$output"
+	grep -q "in force: 0.001" <<<"$output"
+	grep -q "^tip      due, .*: its date is in the future" <<<"$output"
+	run -0 incise calibrate check --only force
+	[ "$(grep -cE '^(depth|delay|tip|stepper)' <<<"$output")" = 0 ]
+	run -0 incise calibrate check --only force,depth --due 100y
+	run -1 incise calibrate check --only force,depth --due 7d --json
+	echo "$output" >c.json
+	[ "$(key c.json due)" = 1 ]
+	[ "$(key c.json kinds[0].due)" = 0 ]
+	holds "$(key c.json kinds[1].age_days) > 2000"
+	[ "$(key c.json kinds[1].values[0].left)" = 0.12 ]
+}
+
+@test "camera and tracker of the virtual rig agree" {
+	run -1 incise calibrate check --recording "$INCISE_CHECK_REC" --json
+	echo "$output" >c.json
+	[ "$(key c.json recording.agree)" = 1 ]
+	# vision's bias is below 0.05 px, the tracker's time below 0.2 ms at 20 mm/s
+	holds "$(key c.json recording.bias_mm) > -0.02 && $(key c.json recording.bias_mm) < 0.02"
+	holds "$(key c.json recording.place_mm) < 0.05"
+	holds "$(key c.json recording.travel_mm) > 50"
+}
+
+# altered SQL : a copy of the recording with another camera or tracker.
+altered() {
+	rm -rf b.rec
+	cp -r "$INCISE_CHECK_REC" b.rec
+	sqlite3 b.rec/recording.db "$1"
+	run -1 incise calibrate check --recording b.rec
+}
+
+@test "a shifted camera, metal nearby and a wrong scale are told apart" {
+	altered "UPDATE frames SET depth_mm = depth_mm + 1.2 WHERE depth_mm > 0"
+	[[ "$output" == *"shifted camera? they differ by +1."* ]]
+	altered "UPDATE tracker SET z_mm = z_mm + 2 * max(0, x_mm - 25) / 25"
+	[[ "$output" == *"metal nearby?"* ]]
+	altered "UPDATE frames SET depth_mm = depth_mm * 1.08 WHERE depth_mm > 0"
+	[[ "$output" == *"wrong scale? they differ by 8."* ]]
+}
+
+@test "a recording without a camera, and what is none" {
+	incise capture -o n.rec --rig sim:clock=simulated,cut_s=1 --duration 3s
+	run --separate-stderr incise calibrate check --recording n.rec
+	failed_with "n.rec: 0 pictures within 0 seconds" "record a few slow cuts with the camera"
+	run --separate-stderr incise calibrate check --recording none.rec
+	failed_with "none.rec"
+	echo 'history = 1;' >calibration.conf
+	run --separate-stderr incise calibrate check
+	failed_with "calibration.conf:1: history: expected a list"
+	run --separate-stderr incise calibrate check --only knife
+	bad_usage "there is no 'knife'"
+	run --separate-stderr incise calibrate check --due soon
+	bad_usage "--due"
+	run --separate-stderr incise calibrate check a.rec
+	bad_usage "'a.rec' is too much"
+}

@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise calibrate check: what is calibrated, how old it is, and what is due; and whether
+ * tracker and camera of a recording agree about the depth.
+ */
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <incise/calibration.h>
+#include <incise/redundancy.h>
+#include "cli.h"
+#include "json.h"
+
+enum { OPT_DUE = CLI_LONG, OPT_ONLY, OPT_RECORDING, OPT_JSON };
+
+static const struct cli_option options[] = {
+	{'c', "calibration", "FILE", "to look at (default calibration.conf)"},
+	{OPT_DUE, "due", "AGE", "a calibration older than this is due (default 365d)"},
+	{OPT_ONLY, "only", "LIST",
+	 "what this rig needs, of force,depth,tip,delay,stepper (default all)"},
+	{OPT_RECORDING, "recording", "NAME.rec",
+	 "see whether its tracker and camera agree about the depth"},
+	{OPT_JSON, "json", NULL, "report as JSON"},
+	{0}};
+
+static const struct cli_verb verb = {
+	.name = "calibrate check",
+	.synopsis = "[-c FILE] [--due AGE] [--recording NAME.rec]",
+	.summary =
+		"Say what is calibrated, how old it is and what is due; and whether the "
+		"tracker and\nthe camera of a recording agree.",
+	.options = options,
+	.notes =
+		"Exit codes: 0 all is well, 1 something is due, failed or disagrees, 2 bad "
+		"usage.",
+};
+
+/* Kinds of calibration, and the keys that tell whether the last one is in force. */
+static const struct {
+	const char *name, *nominal;
+} kinds[] = {
+	{"force", "1240 mV/N"},	  {"depth", "0.11875 mm/px"},
+	{"tip", "0 0 0 mm"},	  {"delay", "what the devices say"},
+	{"stepper", "not known"},
+};
+
+enum { KINDS = sizeof(kinds) / sizeof(*kinds) };
+
+struct wish {
+	const char *calibration, *recording;
+	double due_s;
+	bool json, only[KINDS];
+};
+
+/* What is known of one kind. */
+struct status {
+	const struct incise_calibration_record *last, *passed;
+	double age_s;	  /* of the one that passed; NAN: none */
+	bool due, failed; /* failed: the last one did not pass */
+	char why[160];
+};
+
+struct comparison {
+	struct incise_redundancy redundancy;
+	bool bad;
+	char verdict[240];
+};
+
+static void take_only(struct wish *wish, char *list)
+{
+	char *items[KINDS];
+	int n = cli_list("only", list, items, KINDS);
+
+	memset(wish->only, 0, sizeof(wish->only));
+	for (int i = 0; i < n; i++) {
+		int k = 0;
+
+		while (k < KINDS && strcmp(kinds[k].name, items[i]))
+			k++;
+		if (k == KINDS)
+			cli_usage("--only: there is no '%s': force, depth, tip, delay or "
+				  "stepper",
+				  items[i]);
+		wish->only[k] = true;
+	}
+}
+
+static void take_options(struct wish *wish, int argc, char **argv)
+{
+	static const struct cli_unit ages[] = {
+		{"d", 86400}, {"h", 3600}, {"w", 7 * 86400}, {"y", 365.25 * 86400}, {0}};
+	int id;
+
+	while ((id = cli_next(&verb, argc, argv)) != CLI_END)
+		switch (id) {
+		case 'c':
+			wish->calibration = optarg;
+			break;
+		case OPT_DUE:
+			wish->due_s = cli_quantity("--due", optarg, ages, 0, 1e10);
+			break;
+		case OPT_ONLY:
+			take_only(wish, optarg);
+			break;
+		case OPT_RECORDING:
+			wish->recording = optarg;
+			break;
+		case OPT_JSON:
+			wish->json = true;
+			break;
+		}
+	if (optind < argc)
+		cli_usage("'%s' is too much: a recording goes with --recording",
+			  argv[optind]);
+}
+
+/* Seconds since a date of the history, which is well formed; below 0: in the future. */
+static double age_of(const char *date)
+{
+	struct tm utc = {0};
+
+	strptime(date, "%Y-%m-%dT%H:%M:%SZ", &utc);
+	return difftime(time(NULL), timegm(&utc));
+}
+
+/* The first key whose value is not what the calibration left; NULL: all are. */
+static const char *altered(const struct incise_calibration *c,
+			   const struct incise_calibration_record *record)
+{
+	for (int i = 0; i < record->n; i++)
+		if (incise_calibration_get(c, record->values[i].key) !=
+		    record->values[i].left)
+			return record->values[i].key;
+	return NULL;
+}
+
+static void judge(const struct wish *wish, int kind,
+		  const struct incise_calibration *calibration,
+		  const struct incise_calibration_record *records, int n,
+		  struct status *s)
+{
+	const char *key;
+
+	*s = (struct status){.age_s = NAN};
+	for (int i = 0; i < n; i++)
+		if (!strcmp(records[i].kind, kinds[kind].name)) {
+			s->last = &records[i];
+			if (records[i].pass)
+				s->passed = &records[i];
+		}
+	s->failed = s->last && !s->last->pass;
+	if (s->passed)
+		s->age_s = age_of(s->passed->date);
+	s->due = true;
+	if (!s->passed && !s->last)
+		snprintf(s->why, sizeof(s->why), "never calibrated: nominal, %s",
+			 kinds[kind].nominal);
+	else if (!s->passed)
+		snprintf(s->why, sizeof(s->why), "none has passed: nominal, %s",
+			 kinds[kind].nominal);
+	else if (s->failed)
+		snprintf(s->why, sizeof(s->why), "the last one, of %.10s, failed",
+			 s->last->date);
+	else if ((key = altered(calibration, s->passed)))
+		snprintf(s->why, sizeof(s->why), "%s was changed by hand since", key);
+	else if (s->age_s < -60)
+		snprintf(s->why, sizeof(s->why),
+			 "its date is in the future: look at the clock");
+	else if (s->age_s > wish->due_s)
+		snprintf(s->why, sizeof(s->why), "older than %.4g days",
+			 wish->due_s / 86400);
+	else
+		s->due = false;
+}
+
+static void print_status(const struct incise_calibration *calibration, int kind,
+			 const struct status *s)
+{
+	const struct incise_calibration_record *r = s->passed;
+
+	printf("%-8s %s", kinds[kind].name,
+	       s->due ? s->failed ? "FAILED" : "due" : "good");
+	if (r) {
+		printf(", %.10s, %.0f days old", r->date, floor(s->age_s / 86400));
+		if (isfinite(r->low) && isfinite(r->high))
+			printf(", for %.4g to %.4g %s", r->low, r->high, r->range_unit);
+	}
+	printf("%s%s\n", *s->why ? ": " : "", s->why);
+	for (int i = 0; r && i < r->n; i++) {
+		const struct incise_calibration_value *v = &r->values[i];
+		double now = incise_calibration_get(calibration, v->key);
+
+		printf("         %-22s %.8g %s, U = %.2g (k = 2)", v->key, v->left,
+		       v->unit, 2 * v->u);
+		if (now != v->left)
+			printf("; in force: %.8g", now);
+		putchar('\n');
+	}
+	if (s->last && *s->last->verdict)
+		printf("         %s\n", s->last->verdict);
+}
+
+static json_t *json_status(const struct incise_calibration *calibration, int kind,
+			   const struct status *s)
+{
+	const struct incise_calibration_record *r = s->passed;
+	json_t *values = json_array();
+
+	for (int i = 0; r && i < r->n; i++) {
+		const struct incise_calibration_value *v = &r->values[i];
+
+		json_array_append_new(
+			values,
+			json_pack(
+				"{s:s, s:o, s:o, s:o, s:o, s:o}", "key", v->key, "unit",
+				json_text(v->unit), "in_force",
+				json_number(incise_calibration_get(calibration, v->key)),
+				"found", json_number(v->found), "left",
+				json_number(v->left), "U", json_number(2 * v->u)));
+	}
+	return json_pack("{s:s, s:b, s:b, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o}",
+			 "kind", kinds[kind].name, "due", s->due, "failed", s->failed,
+			 "why", s->why, "date", r ? json_text(r->date) : json_null(),
+			 "age_days", json_number(s->age_s / 86400), "low",
+			 json_number(r ? r->low : NAN), "high",
+			 json_number(r ? r->high : NAN), "range_unit",
+			 json_text(r ? r->range_unit : ""), "verdict",
+			 json_text(s->last ? s->last->verdict : ""), "values", values);
+}
+
+static void compare(const char *path, struct comparison *c)
+{
+	struct incise_error err = {0};
+	struct incise_recording *recording = incise_recording_open(path, &err);
+	struct incise_redundancy *r = &c->redundancy;
+	struct incise_redundancy_limits limits;
+	struct incise_depth_pair *pairs;
+	int n;
+
+	if (!recording)
+		cli_fail_with(&err);
+	n = incise_depth_pairs(recording, &pairs, &err);
+	if (n < 0)
+		cli_fail_with(&err);
+	incise_redundancy_limits_init(&limits);
+	if (incise_redundancy(pairs, n, &limits, r, &err))
+		cli_fail("%s: %s", path, err.text);
+	free(pairs);
+	incise_recording_close(recording);
+	c->bad = r->bias_bad || r->place_bad || r->trend_bad;
+	if (r->place_bad)
+		snprintf(
+			c->verdict, sizeof(c->verdict),
+			"metal nearby? camera and tracker differ by %.2f mm between places; "
+			"more than %g mm: move steel away from tracker and scalpel",
+			r->place_mm, limits.place_mm);
+	else if (r->trend_bad)
+		snprintf(
+			c->verdict, sizeof(c->verdict),
+			"wrong scale? they differ by %.1f %% of the depth; more than %g %%: "
+			"calibrate depth",
+			100 * r->trend, 100 * limits.trend);
+	else if (r->bias_bad)
+		snprintf(
+			c->verdict, sizeof(c->verdict),
+			"shifted camera? they differ by %+.2f mm everywhere; more than %g "
+			"mm: calibrate depth and tip, or look at the surface in rig.conf",
+			r->bias_mm, limits.bias_mm);
+	else
+		snprintf(c->verdict, sizeof(c->verdict), "camera and tracker agree");
+}
+
+static void print_comparison(const char *path, const struct comparison *c)
+{
+	const struct incise_redundancy *r = &c->redundancy;
+
+	printf("\n%s: camera - tracker, of %d pictures\n", path, r->n);
+	printf("         bias     %+.3f mm, U = %.2g mm\n", r->bias_mm, 2 * r->bias_u_mm);
+	if (isfinite(r->trend))
+		printf("         trend    %+.2f %% of the depth, U = %.2g %%, over %.1f to "
+		       "%.1f mm\n",
+		       100 * r->trend, 200 * r->trend_u, r->depth_low_mm,
+		       r->depth_high_mm);
+	printf("         places   %.3f mm apart, U = %.2g mm, over %.0f mm\n",
+	       r->place_mm, 2 * r->place_u_mm, r->travel_mm);
+	printf("         scatter  sd %.3f mm\n         %s\n", r->scatter_sd_mm,
+	       c->verdict);
+}
+
+static json_t *json_comparison(const struct comparison *c)
+{
+	const struct incise_redundancy *r = &c->redundancy;
+
+	return json_pack("{s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:b, s:s}",
+			 "pictures", r->n, "bias_mm", json_number(r->bias_mm),
+			 "bias_U_mm", json_number(2 * r->bias_u_mm), "trend",
+			 json_number(r->trend), "trend_U", json_number(2 * r->trend_u),
+			 "place_mm", json_number(r->place_mm), "place_U_mm",
+			 json_number(2 * r->place_u_mm), "travel_mm",
+			 json_number(r->travel_mm), "scatter_sd_mm",
+			 json_number(r->scatter_sd_mm), "agree", !c->bad, "verdict",
+			 c->verdict);
+}
+
+int main(int argc, char **argv)
+{
+	struct wish wish = {.calibration = "calibration.conf", .due_s = 365 * 86400.0};
+	struct incise_calibration_record *records;
+	struct incise_calibration calibration;
+	struct comparison comparison = {0};
+	struct status status[KINDS];
+	struct incise_error err = {0};
+	int n, rc, bad = 0;
+
+	memset(wish.only, 1, sizeof(wish.only));
+	take_options(&wish, argc, argv);
+	n = incise_calibration_history(wish.calibration, &records, &err);
+	rc = n < 0 ? n : incise_calibration_load(wish.calibration, &calibration, &err);
+	if (rc == -ENOENT) { /* nothing was ever calibrated here */
+		n = 0;
+		incise_calibration_nominal(&calibration);
+	} else if (rc) {
+		cli_fail_with(&err);
+	}
+	if (wish.recording)
+		compare(wish.recording, &comparison);
+	for (int k = 0; k < KINDS; k++) {
+		judge(&wish, k, &calibration, records, n, &status[k]);
+		bad += wish.only[k] && status[k].due;
+	}
+	if (wish.json) {
+		json_t *list = json_array(), *root;
+
+		for (int k = 0; k < KINDS; k++)
+			if (wish.only[k])
+				json_array_append_new(list, json_status(&calibration, k,
+									&status[k]));
+		root = json_pack(
+			"{s:o, s:i, s:i, s:o, s:o}", "path", json_text(wish.calibration),
+			"calibrations", n, "due", bad, "kinds", list, "recording",
+			wish.recording ? json_comparison(&comparison) : json_null());
+		json_print(root);
+	} else {
+		printf("%s: %d calibrations in its history\n", wish.calibration, n);
+		for (int k = 0; k < KINDS; k++)
+			if (wish.only[k])
+				print_status(&calibration, k, &status[k]);
+		if (wish.recording)
+			print_comparison(wish.recording, &comparison);
+	}
+	cli_finish();
+	free(records);
+	return bad || comparison.bad;
+}
