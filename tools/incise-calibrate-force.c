@@ -64,8 +64,8 @@ static const struct cli_option options[] = {
 	 "resolution of the scale that weighed the loads (default 0.5g)"},
 	{OPT_DENSITY, "density", "KG_M3", "of the weights (default 7950)"},
 	{OPT_RANGE, "range", "LOW,HIGH",
-	 "ends of the converter in mV (default: those of the rig; of\n"
-	 "--from: not known)"},
+	 "ends of the converter in mV (default: those of the rig,\n"
+	 "or not known, with --from)"},
 	{OPT_NOMINAL, "nominal", "MV_N", "to compare with (default 1240)"},
 	{OPT_TOLERANCE, "tolerance", "PERCENT", "of it, to pass (default 5)"},
 	{OPT_ZERO, "zero", NULL,

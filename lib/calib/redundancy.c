@@ -149,7 +149,6 @@ static void compare(struct work *w, const struct incise_redundancy_limits *limit
 
 	r->n = w->n;
 	r->bias_mm = median(w->off, w->n, w->room);
-	r->bias_u_mm = mean_u(w, w->off, NULL);
 	r->depth_low_mm = INFINITY;
 	r->depth_high_mm = -INFINITY;
 	for (int i = 0; i < w->n; i++) {
@@ -165,12 +164,15 @@ static void compare(struct work *w, const struct incise_redundancy_limits *limit
 	if (r->depth_high_mm - r->depth_low_mm > 1 &&
 	    !incise_robust_line(w->depth, w->off, w->n, 0, &line, w->wild)) {
 		r->trend = line.slope;
-		/* as if the slope were a difference of means at one sd to each side */
-		r->trend_u = r->bias_u_mm / sqrt(squares / w->n);
 	} else {
 		line.slope = 0;
 	}
 	find_places(w, &line, r);
+	/* find_places() has left what lies off the trend */
+	r->bias_u_mm = mean_u(w, w->room + w->n, NULL);
+	/* as if the slope were a difference of means at one sd to each side */
+	if (isfinite(r->trend))
+		r->trend_u = r->bias_u_mm / sqrt(squares / w->n);
 	for (int i = 0; i < w->n; i++)
 		w->off[i] = fabs(w->off[i] - line.zero - line.slope * w->depth[i]);
 	distance = median(w->off, w->n, w->room);

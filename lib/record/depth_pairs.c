@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Depth by the camera beside depth by the tracker, of a recording; see incise/redundancy.h.
+ * Depth by the camera beside depth by the tracker, of a recording; see incise/depth_pairs.h.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
-#include <incise/redundancy.h>
+#include <incise/depth_pairs.h>
 #include "../base/vector.h"
 #include "depth.h"
 #include "recording.h"

@@ -54,7 +54,7 @@ made_weights() {
 	[ ! -e calibration.conf ]
 	run --separate-stderr incise calibrate force --from w.csv --nominal 1500
 	failed_with "not in force" "-16.67 % from the nominal 1500 mV/N, more than 5 %"
-	! grep -q '^force_mV_N' calibration.conf
+	run ! grep -q '^force_mV_N' calibration.conf
 	grep -q 'pass = false;' calibration.conf
 	run -0 incise calibrate force --from w.csv --latitude 48 --altitude 300
 	[[ "$output" == *"1240.00 mV/N as found"* ]]
