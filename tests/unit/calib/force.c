@@ -172,6 +172,49 @@ static void figures_are_those_put_in(void **state)
 	assert_true(isnan(result.repeatability) && isnan(result.hysteresis));
 }
 
+/* A sensor that bends by 0.6 % in the middle: no line explains it, and U says so. */
+static void what_is_not_straight_widens_the_interval(void **state)
+{
+	struct rig straight = plain_rig(8), bent;
+	struct incise_calibrate_force a, b;
+	struct incise_calibrate_force_setup setup;
+
+	incise_calibrate_force_init(&setup);
+	setup.gravity_u_m_s2 = 0;
+	for (int i = 0; i < straight.n; i++)
+		straight.pair[i].reading_mV += normal(&straight);
+	bent = straight;
+	for (int i = 0; i < bent.n; i++) {
+		double share = bent.pair[i].mass_g / 300;
+
+		bent.pair[i].reading_mV += 0.006 * 3650 * 4 * share * (1 - share);
+	}
+	assert_int_equal(run(&straight, &setup, &a, NULL, NULL), 0);
+	assert_int_equal(run(&bent, &setup, &b, NULL, NULL), 0);
+	assert_true(a.misfit == 1 && b.misfit > 2);
+	assert_true(b.sensitivity_u_mV_N > 2 * a.sensitivity_u_mV_N);
+	/* a parabola of height h is at most h from its best line, and at least h/3 */
+	assert_true(b.linearity > 0.2 && b.linearity < 0.6);
+}
+
+/* Means over noise are finer than a code; without it, the code is a source of its own. */
+static void a_code_counts_where_no_noise_dithers(void **state)
+{
+	struct rig rig = plain_rig(9);
+	struct incise_calibrate_force_setup setup;
+	struct incise_calibrate_force coarse, fine;
+
+	incise_calibrate_force_init(&setup);
+	setup.step_mV = 5000.0 / 4096;
+	assert_int_equal(run(&rig, &setup, &coarse, NULL, NULL), 0);
+	setup.dithered = true;
+	assert_int_equal(run(&rig, &setup, &fine, NULL, NULL), 0);
+	assert_int_equal(coarse.parts, fine.parts + 1);
+	assert_string_equal(coarse.part[2].source, "resolution of the converter");
+	assert_float_equal(coarse.part[2].u, 5000.0 / 4096 / sqrt(12), 1e-12);
+	assert_true(coarse.zero_u_mV > fine.zero_u_mV);
+}
+
 static void one_in_ten_wrong_is_found(void **state)
 {
 	for (int seed = 1; seed <= 50; seed++) {
@@ -378,6 +421,8 @@ int main(void)
 		cmocka_unit_test(exact_data_give_exact_figures),
 		cmocka_unit_test(uncertainty_is_that_of_the_weighted_line),
 		cmocka_unit_test(figures_are_those_put_in),
+		cmocka_unit_test(what_is_not_straight_widens_the_interval),
+		cmocka_unit_test(a_code_counts_where_no_noise_dithers),
 		cmocka_unit_test(one_in_ten_wrong_is_found),
 		cmocka_unit_test(a_weight_noted_wrong_is_no_plateau),
 		cmocka_unit_test(saturated_readings_are_left_out),
