@@ -141,12 +141,63 @@ static void info_names_the_channel(void **state)
 	incise_clock_free(clock);
 }
 
+/* A weight takes the place of the blade, until it is taken off and the blade is back. */
+static void a_weight_hangs_in_place_of_the_blade(void **state)
+{
+	/* in the middle of the first cut */
+	static const struct {
+		double at_s, load_N;
+		int code;
+	} row[] = {
+		{3, 2, (180 + 1240 * 2) * 4096 / 5000},
+		{3.1, 0, 180 * 4096 / 5000},
+		{3.2, 9, 4095},
+		{3.3, NAN, -1}, /* of the cut: anything but these */
+		{3.4, INFINITY, -1},
+	};
+	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
+	struct incise_sim_config config;
+	struct incise_sim_truth truth;
+	struct incise_force *force;
+	struct incise_sim *sim;
+	int n = 0;
+
+	incise_sim_config_init(&config);
+	config.force_noise_mV = 0;
+	sim = incise_sim_new(&config, clock, NULL);
+	force = incise_sim_force_new(sim);
+	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
+		incise_clock_wait_until(clock, START_NS + llround(row[i].at_s * 1e9));
+		incise_sim_load(sim, row[i].load_N);
+		while (incise_force_read(force, sample, MAX) == MAX)
+			;
+		incise_clock_wait_until(clock,
+					START_NS + llround((row[i].at_s + 0.05) * 1e9));
+		n = incise_force_read(force, sample, MAX);
+		/* 50 ms at 10 kHz; what was before its tick of 1 ms has been read */
+		assert_in_range(n, 490, 510);
+		incise_sim_truth(sim, &truth);
+		for (int k = 10; k < n; k++)
+			if (row[i].code >= 0)
+				assert_in_range(sample[k].code, row[i].code,
+						row[i].code + 1);
+		if (row[i].code < 0)
+			assert_true(fabs(truth.force_N -
+					 (sample[n - 1].code * 5000 / 4096.0 - 180) /
+						 1240) < 0.05);
+	}
+	force->ops->close(force);
+	incise_sim_free(sim);
+	incise_clock_free(clock);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(codes_follow_the_truth),
 		cmocka_unit_test(noise_is_as_configured),
 		cmocka_unit_test(codes_stay_in_range),
+		cmocka_unit_test(a_weight_hangs_in_place_of_the_blade),
 		cmocka_unit_test(info_names_the_channel),
 	};
 
