@@ -21,9 +21,16 @@ setup() {
 	[ "$output" = "$help" ]
 }
 
-@test "every program that is built is a verb of --help" {
+@test "every program that is built is a verb of --help, or a word of one" {
 	for program in "$INCISE_BUILD"/bin/incise-*; do
-		incise --help | grep -q "^  ${program##*/incise-} "
+		name=${program##*/incise-}
+		if [[ $name == *-* ]]; then
+			"incise-${name%%-*}" --help | grep -q "^${name#*-}: "
+			run -0 incise "${name%%-*}" "${name#*-}" --help
+			[[ "${lines[0]}" == "Usage: incise ${name/-/ } "* ]]
+		else
+			incise --help | grep -q "^  $name "
+		fi
 	done
 }
 
