@@ -8,10 +8,10 @@
 #include <string.h>
 #include "tip.h"
 
-#define STARTS 100
+#define STARTS 60
 #define FINALISTS 5
 #define START_POSES 4  /* two fix five of the six unknowns, three all: one to spare */
-#define SAMPLE_MAX 500 /* poses that the search looks at */
+#define SAMPLE_MAX 200 /* poses that the search looks at */
 #define SHARE 0.6      /* of them that are fitted */
 #define STEPS 10
 

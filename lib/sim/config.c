@@ -35,6 +35,8 @@ struct key {
 static const struct key keys[] = {
 	/* What libconfig reads without a suffix; it wraps round beyond that. */
 	KEY(KEY_UINT64, seed, 1, 0, 2147483647.0),
+	KEY(KEY_INT, motion, 0, 0, 2),
+	KEY(KEY_DOUBLE, cone_deg, 80, 0, 170),
 	ARRAY(KEY_DOUBLE, depth_mm, 0.1, 40),
 	ARRAY(KEY_INT, times, 1, 1000),
 	KEY(KEY_DOUBLE, cut_s, 8, 0.5, 3600),
@@ -53,6 +55,9 @@ static const struct key keys[] = {
 	KEY(KEY_DOUBLE, tracker_latency_ms, 4.2, 0, 1000),
 	KEY(KEY_DOUBLE, tracker_jitter_ms, 0.2, 0, 100),
 	KEY(KEY_DOUBLE, tracker_drift_ppm, 50, -10000, 10000),
+	KEY(KEY_DOUBLE, tip_x_mm, 0, -1000, 1000),
+	KEY(KEY_DOUBLE, tip_y_mm, 0, -1000, 1000),
+	KEY(KEY_DOUBLE, tip_z_mm, 0, -1000, 1000),
 	KEY(KEY_DOUBLE, force_hz, 10000, 1, 200000),
 	KEY(KEY_DOUBLE, force_mV_N, 1240, 1, 100000),
 	KEY(KEY_DOUBLE, force_zero_mV, 180, -10000, 10000),

@@ -12,6 +12,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include "../base/vector.h"
 #include "random.h"
 #include "sim.h"
 #include "world.h"
@@ -62,15 +63,17 @@ static void sim_tracker_sample(struct incise_sim_stream *stream,
 	const struct incise_sim_config *config = &sim->config;
 	struct incise_tracker_sample sample = {.status = ' ', .station = 1};
 	struct incise_blade blade;
-	double draw[7], shake[3], delay_ms;
+	const double tip_mm[3] = {config->tip_x_mm, config->tip_y_mm, config->tip_z_mm};
+	double draw[7], shake[3], arm_mm[3], delay_ms;
 
 	for (int i = 0; i < 7; i++)
 		draw[i] = incise_random_normal(t->key, t->n * DRAWS + i);
 	incise_surgeon_blade(&sim->surgeon, stream->t_ns, &blade);
 	incise_surgeon_grip(&sim->surgeon, stream->t_ns, sample.quaternion);
+	v3_rotate(arm_mm, sample.quaternion, tip_mm);
 	for (int i = 0; i < 3; i++) {
-		sample.position_mm[i] =
-			blade.position_mm[i] + config->tracker_noise_mm * draw[i];
+		sample.position_mm[i] = blade.position_mm[i] - arm_mm[i] +
+					config->tracker_noise_mm * draw[i];
 		shake[i] = ATTITUDE_NOISE * draw[3 + i];
 	}
 	turn(sample.quaternion, shake);

@@ -30,6 +30,13 @@
 #define DRIFT_TURNS 2.6 /* per cut */
 #define ONSET_S 0.15	/* the hand's time to reach speed and to stop */
 
+/* Pressing: how far above and below the surface, how often, and how that swings. */
+#define PRESS_FROM_MM 3.0
+#define PRESS_TO_MM 8.0
+#define PRESS_HZ 2.0
+#define PRESS_SWING_HZ 1.1
+#define PRESS_SWING_TURNS 0.13 /* per second */
+
 /* Golden angle: phases of consecutive cuts spread evenly, however many there are. */
 #define GOLDEN 2.39996322972865332
 
@@ -211,6 +218,31 @@ static void blade_pausing(const struct incise_surgeon *surgeon, int cut, double 
 	blade->velocity_mm_s[2] = (AIR_MM - CLEARANCE_MM) * lift.slope / pause;
 }
 
+/* The tip rests in a dimple; how the tool leans, incise_surgeon_grip() says. */
+static void blade_turning(struct incise_blade *blade)
+{
+	*blade = (struct incise_blade){.cut = -1, .position_mm = {START_MM, 0, 0}};
+}
+
+/*
+ * Pressing on the tissue: from PRESS_FROM_MM above to PRESS_TO_MM below the surface, at a
+ * rate that swings between PRESS_HZ ± PRESS_SWING_HZ, so that no two strokes are alike.
+ */
+static void blade_pressing(const struct incise_surgeon *surgeon, double t,
+			   struct incise_blade *blade)
+{
+	double s = fmax(0, t - surgeon->config->pause_s);
+	double w = 2 * M_PI * PRESS_SWING_TURNS;
+	double angle = 2 * M_PI * (PRESS_HZ * s + PRESS_SWING_HZ / w * (1 - cos(w * s)));
+	double rate = 2 * M_PI * (PRESS_HZ + PRESS_SWING_HZ * sin(w * s));
+	double half = (PRESS_FROM_MM + PRESS_TO_MM) / 2;
+
+	*blade = (struct incise_blade){.cut = -1, .position_mm = {START_MM, 0, 0}};
+	blade->position_mm[2] = PRESS_FROM_MM - half + half * cos(angle);
+	if (s > 0)
+		blade->velocity_mm_s[2] = -half * rate * sin(angle);
+}
+
 void incise_surgeon_init(struct incise_surgeon *surgeon,
 			 const struct incise_sim_config *config)
 {
@@ -240,6 +272,16 @@ void incise_surgeon_blade(const struct incise_surgeon *surgeon, int64_t t_ns,
 	int64_t within;
 	const double *v = blade->velocity_mm_s;
 
+	if (surgeon->config->motion == INCISE_SURGEON_TURNS) {
+		blade_turning(blade);
+		return;
+	}
+	if (surgeon->config->motion == INCISE_SURGEON_PRESSES) {
+		blade_pressing(surgeon, t_ns * NS, blade);
+		blade->speed_mm_s = fabs(v[2]);
+		blade->depth_mm = fmax(0, -blade->position_mm[2]);
+		return;
+	}
 	if (cut > surgeon->cuts)
 		cut = surgeon->cuts;
 	within = t_ns - cut * period;
@@ -269,8 +311,19 @@ void incise_surgeon_grip(const struct incise_surgeon *surgeon, int64_t t_ns,
 	double roll = 0.03 * sin(2 * M_PI * 0.31 * t + surgeon->tremor_phase[0]);
 	double lean = 0.10 + 0.03 * sin(2 * M_PI * 0.23 * t + surgeon->tremor_phase[1]);
 	double yaw = 0.02 * sin(2 * M_PI * 0.17 * t);
-	double angle = sqrt(roll * roll + lean * lean + yaw * yaw); /* ≥ 0.07 */
-	double scale = sin(angle / 2) / angle;
+	double angle, scale;
+
+	if (surgeon->config->motion == INCISE_SURGEON_TURNS) {
+		/* it leans all ways in turns, and turns about itself a little */
+		double half = surgeon->config->cone_deg * M_PI / 360;
+		double tilt = half * (0.75 + 0.25 * sin(2 * M_PI * 0.37 * t));
+
+		roll = tilt * cos(2 * M_PI * 0.29 * t);
+		lean = tilt * sin(2 * M_PI * 0.29 * t);
+		yaw = 0.3 * sin(2 * M_PI * 0.11 * t);
+	}
+	angle = sqrt(roll * roll + lean * lean + yaw * yaw);
+	scale = angle > 1e-9 ? sin(angle / 2) / angle : 0.5;
 
 	quaternion[0] = cos(angle / 2);
 	quaternion[1] = roll * scale;

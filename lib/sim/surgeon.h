@@ -8,6 +8,13 @@
 
 #include <incise/sim.h>
 
+/* Values of the key `motion`. */
+enum incise_surgeon_motion {
+	INCISE_SURGEON_CUTS,
+	INCISE_SURGEON_TURNS,
+	INCISE_SURGEON_PRESSES,
+};
+
 struct incise_surgeon {
 	const struct incise_sim_config *config;
 	uint64_t key;

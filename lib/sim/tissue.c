@@ -41,7 +41,8 @@ void incise_tissue_init(struct incise_tissue *tissue,
 void incise_tissue_advance(struct incise_tissue *tissue, const struct incise_blade *blade,
 			   double dt_s)
 {
-	if (blade->depth_mm <= 0)
+	/* what is not cut has no teeth */
+	if (blade->depth_mm <= 0 || tissue->config->motion != INCISE_SURGEON_CUTS)
 		return;
 	tissue->path_mm += blade->speed_mm_s * dt_s;
 	while (tissue->path_mm >= tissue->fracture_mm + tissue->tooth_mm)
@@ -69,12 +70,13 @@ static double bound_factor(const struct incise_tissue *tissue,
 double incise_tissue_force(const struct incise_tissue *tissue,
 			   const struct incise_blade *blade, double ahead_s)
 {
+	bool cuts = tissue->config->motion == INCISE_SURGEON_CUTS;
 	double path_mm = tissue->path_mm + blade->speed_mm_s * ahead_s;
 
 	if (blade->depth_mm <= 0)
 		return 0;
 	return incise_sim_mean_force(tissue->config, blade->depth_mm, blade->speed_mm_s) *
-	       tooth_factor(tissue, path_mm) * bound_factor(tissue, blade);
+	       (cuts ? tooth_factor(tissue, path_mm) : 1) * bound_factor(tissue, blade);
 }
 
 double incise_sim_mean_force(const struct incise_sim_config *config, double depth_mm,

@@ -27,6 +27,12 @@ INCISE_BEGIN_DECLS
 struct incise_sim_config {
 	uint64_t seed; /**< 1 */
 
+	/* What the surgeon does, for as long as the cuts would take: 0 cuts; 1 turns the
+	 * tool about its tip, which rests at the start of the cuts; 2 presses on the tissue
+	 * over and over, without cutting it: then it has no teeth. */
+	int motion;	 /**< 0 */
+	double cone_deg; /**< 80; that the tool sweeps when it is turned, 0 … 170 */
+
 	/* The surgeon: a list of cuts, each nominal depth repeated, then rest. */
 	int n_depths;				/**< 4 */
 	double depth_mm[INCISE_SIM_DEPTHS_MAX]; /**< 5 10 15 20 (paper 1) */
@@ -52,6 +58,8 @@ struct incise_sim_config {
 	double tracker_latency_ms; /**< 4.2 */
 	double tracker_jitter_ms;  /**< 0.2; sd of extra latency, never negative */
 	double tracker_drift_ppm;  /**< 50; its clock runs this much fast */
+	/** 0 0 0; of the true tip from what the tracker takes for it, in the scalpel's frame */
+	double tip_x_mm, tip_y_mm, tip_z_mm;
 
 	/* Force channel. */
 	double force_hz;       /**< 10000 */
