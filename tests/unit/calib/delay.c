@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Delays of streams of one motion: truth within the stated intervals, with stiffness and
+ * viscosity that are not known; each motion that cannot tell is refused with its reason; and
+ * pulses. An argument is the number of data sets, 200 or what is given.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/calibrate_delay.h>
+
+#define MOTION_MAX 20000
+#define OTHER_MAX 200000
+
+static struct incise_delay_point motion[MOTION_MAX], other[OTHER_MAX];
+static int n_motion, n_other;
+static uint64_t seed;
+static int force_runs = 40;
+
+static double uniform(void)
+{
+	seed = seed * 6364136223846793005u + 1442695040888963407u;
+	return ((seed >> 11) + 0.5) * 0x1p-53;
+}
+
+static double normal(void)
+{
+	return sqrt(-2 * log(uniform())) * cos(2 * M_PI * uniform());
+}
+
+/* A tool that is moved up and down, by hand; mm and mm/s, into the tissue is positive. */
+struct hand {
+	double hz, swing_hz, half_mm, middle_mm, phase;
+};
+
+static double depth_at(const struct hand *h, double t, double *v)
+{
+	double w = 2 * M_PI * 0.13;
+	double angle = 2 * M_PI * (h->hz * t - h->swing_hz / w * cos(w * t)) + h->phase;
+
+	*v = -h->half_mm * 2 * M_PI * (h->hz + h->swing_hz * sin(w * t)) * sin(angle);
+	return h->middle_mm + h->half_mm * cos(angle);
+}
+
+static const struct hand usual = {2, 1.1, 5.5, 2.5, 0.7};
+
+/* What is between motion and the other stream. */
+struct link {
+	double delay_ms, drift_ms; /* of the motion's stamps */
+	double contact_mm;
+	double stiff[2]; /* N/mm, N/mm² */
+	double viscous;	 /* of the stiffness, s/mm: the force leads */
+	double even;	 /* of the stiffness, as the virtual tissue's */
+	double noise_mm, noise, hz, other_hz, span_s;
+	double clip; /* a larger force is none */
+};
+
+static const struct link force_link = {
+	.contact_mm = 0.4,
+	.stiff = {0.045, 0.0028},
+	.viscous = 0.002,
+	.even = 0.35,
+	.noise_mm = 0.02,
+	.noise = 0.0024,
+	.hz = 120,
+	.other_hz = 2500,
+	.span_s = 15,
+	.clip = 100,
+};
+
+static void make_motion(const struct hand *h, const struct link *l)
+{
+	n_motion = (int)(l->span_s * l->hz);
+	for (int i = 0; i < n_motion; i++) {
+		double t = i / l->hz, v;
+		double delay = l->delay_ms + l->drift_ms * (t / l->span_s - 0.5);
+
+		motion[i].t_ns = 1000000000 + (int64_t)(t * 1e9);
+		motion[i].value =
+			depth_at(h, t - delay * 1e-3, &v) + l->noise_mm * normal();
+	}
+}
+
+static void make_force(const struct hand *h, const struct link *l)
+{
+	make_motion(h, l);
+	n_other = (int)(l->span_s * l->other_hz);
+	for (int i = 0; i < n_other; i++) {
+		double t = i / l->other_hz, v, x = depth_at(h, t, &v) - l->contact_mm;
+		double f = 0;
+
+		if (x > 0)
+			f = (l->stiff[0] * x + l->stiff[1] * x * x) *
+			    (1 + l->viscous * v + l->even * fabs(v) / (fabs(v) + 15));
+		f += l->noise * normal();
+		other[i].t_ns = 1000000000 + (int64_t)(t * 1e9);
+		other[i].value = f > l->clip ? NAN : f;
+	}
+}
+
+/* A camera that sees depth below the surface only, at 50 Hz. */
+static void make_camera(const struct hand *h, const struct link *l)
+{
+	make_motion(h, l);
+	n_other = (int)(l->span_s * l->other_hz);
+	for (int i = 0; i < n_other; i++) {
+		double t = i / l->other_hz + 0.0037, v, x = depth_at(h, t, &v);
+
+		other[i].t_ns = 1000000000 + (int64_t)(t * 1e9);
+		other[i].value = 1.01 * fmax(l->contact_mm, x) + l->noise * normal();
+	}
+}
+
+static int fit(enum incise_delay_relation relation, double range_ms,
+	       struct incise_delay_fit *f, struct incise_error *err)
+{
+	memset(err, 0, sizeof(*err));
+	return incise_calibrate_delay(motion, n_motion, other, n_other, relation,
+				      range_ms, f, err);
+}
+
+/* Binomial: 2.6 sd about 95 % of n; of 200 that is 92 to 98 %, said with the issue. */
+static void check_share(const char *what, int in, int by_u, int n, double worst)
+{
+	double slack = 2.6 * sqrt(0.95 * 0.05 / n) * n;
+
+	if (n == 200)
+		slack = 6;
+	print_message("%s: %d data sets, 95 %% interval holds %.1f %%, ±2 u %.1f %%, "
+		      "farthest %.3f ms\n",
+		      what, n, 100.0 * in / n, 100.0 * by_u / n, worst);
+	assert_true(in >= 0.95 * n - slack - 0.5 && in <= 0.95 * n + slack + 0.5);
+	assert_true(worst < 0.3); /* asked */
+}
+
+static void draw_hand(struct hand *h)
+{
+	*h = usual;
+	h->hz = 1.7 + 0.6 * uniform();
+	h->swing_hz = 0.8 + 0.5 * uniform();
+	h->phase = 2 * M_PI * uniform();
+}
+
+static void test_force_intervals(void **state)
+{
+	int in = 0, by_u = 0;
+	double worst = 0;
+
+	for (int run = 1; run <= force_runs; run++) {
+		struct link l = force_link;
+		struct incise_delay_fit f;
+		struct incise_error err;
+		struct hand h;
+
+		seed = (uint64_t)run;
+		draw_hand(&h);
+		l.delay_ms = 40 * uniform() - 10;
+		l.contact_mm = 2 * uniform() - 1;
+		l.viscous = 0.004 * uniform();
+		l.even = 0.5 * uniform();
+		make_force(&h, &l);
+		if (fit(INCISE_DELAY_FORCE, 100, &f, &err))
+			fail_msg("run %d: %s", run, err.text);
+		in += l.delay_ms >= f.low_ms && l.delay_ms <= f.high_ms;
+		by_u += fabs(l.delay_ms - f.delay_ms) <= 2 * f.sd_ms;
+		worst = fmax(worst, fabs(l.delay_ms - f.delay_ms));
+	}
+	check_share("force", in, by_u, force_runs, worst);
+}
+
+static void test_camera_intervals(void **state)
+{
+	int in = 0, by_u = 0;
+	double worst = 0;
+
+	for (int run = 1; run <= 200; run++) {
+		struct link l = force_link;
+		struct incise_delay_fit f;
+		struct incise_error err;
+		struct hand h;
+
+		seed = (uint64_t)run;
+		draw_hand(&h);
+		l.delay_ms = 60 * uniform() - 50;
+		l.contact_mm = run % 2 ? -100 : 0.5 * uniform();
+		l.other_hz = 50;
+		l.noise = 0.02;
+		make_camera(&h, &l);
+		if (fit(INCISE_DELAY_ALIKE, 100, &f, &err))
+			fail_msg("run %d: %s", run, err.text);
+		in += l.delay_ms >= f.low_ms && l.delay_ms <= f.high_ms;
+		by_u += fabs(l.delay_ms - f.delay_ms) <= 2 * f.sd_ms;
+		worst = fmax(worst, fabs(l.delay_ms - f.delay_ms));
+	}
+	check_share("camera", in, by_u, 200, worst);
+}
+
+/* A delay that grows is found to, and one that does not is not. */
+static void test_drift(void **state)
+{
+	for (int drifts = 0; drifts < 2; drifts++) {
+		struct link l = force_link;
+		struct incise_delay_fit f;
+		struct incise_error err;
+
+		seed = 9;
+		l.delay_ms = 5;
+		l.drift_ms = drifts ? 3 : 0;
+		make_force(&usual, &l);
+		assert_int_equal(fit(INCISE_DELAY_FORCE, 100, &f, &err), 0);
+		assert_true(fabs(f.drift_ms - l.drift_ms) < 4 * f.drift_sd_ms);
+		assert_true(f.drift_sd_ms < 0.5);
+		assert_true(fabs(f.delay_ms - 5) < 0.3);
+		assert_true(f.correlation > 0.99);
+	}
+}
+
+static void test_refusals(void **state)
+{
+	const struct hand even = {8, 0, 5.5, 2.5, 0}, small = {2, 1.1, 0.2, 2.5, 0};
+	struct link brief = force_link, loud = force_link, late = force_link,
+		    clipped = force_link;
+	struct incise_delay_fit f;
+	struct incise_error err;
+
+	brief.span_s = 5;
+	loud.noise = 5;
+	late.delay_ms = 118;
+	clipped.clip = 0.01;
+	const struct {
+		const struct hand *hand;
+		const struct link *link;
+		const char *said;
+	} cases[] = {
+		{&even, &force_link, "periodic"}, {&small, &force_link, "the motion is"},
+		{&usual, &brief, "in common"},	  {&usual, &loud, "too little alike"},
+		{&usual, &late, "beyond"},	  {&usual, &clipped, "clipped"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		seed = 3;
+		make_force(cases[i].hand, cases[i].link);
+		if (!fit(INCISE_DELAY_FORCE, i == 4 ? 100 : 150, &f, &err))
+			fail_msg("case %zu is taken: %g ms", i, f.delay_ms);
+		if (!strstr(err.text, cases[i].said))
+			fail_msg("case %zu: %s", i, err.text);
+	}
+	make_force(&usual, &force_link);
+	motion[50].t_ns = motion[49].t_ns;
+	assert_int_equal(fit(INCISE_DELAY_FORCE, 100, &f, &err), -EINVAL);
+}
+
+/* Steps at edges, seen by a camera: means of 20 ms, some of them lost, one misled. */
+static void test_pulse(void **state)
+{
+	int in = 0;
+	double worst = 0;
+
+	for (int run = 1; run <= 200; run++) {
+		int64_t edges[60];
+		struct incise_delay_fit f;
+		struct incise_error err;
+		double delay_ms;
+
+		seed = (uint64_t)run;
+		delay_ms = 30 * uniform();
+		for (int i = 0; i < 60; i++)
+			edges[i] = 1000000000LL + i * 263000000LL +
+				   (int64_t)(37e6 * uniform());
+		n_other = 850;
+		for (int i = 0; i < n_other; i++) {
+			int on = 0;
+
+			other[i].t_ns = 900000000LL + i * 20000000LL;
+			for (int e = 0; e < 60; e++)
+				on += (double)edges[e] + delay_ms * 1e6 <
+				      (double)other[i].t_ns;
+			other[i].value = 100 * (on % 2) + normal();
+		}
+		assert_int_equal(incise_calibrate_delay_pulse(edges, 60, other, n_other,
+							      &f, &err),
+				 0);
+		in += fabs(f.delay_ms - delay_ms) <= 1.96 * f.sd_ms;
+		worst = fmax(worst, fabs(f.delay_ms - delay_ms) / f.sd_ms);
+	}
+	print_message("pulse: the interval holds %.1f %%, farthest %.1f sd\n", in / 2.0,
+		      worst);
+	assert_in_range(in, 184, 196);
+	struct incise_delay_fit f;
+	struct incise_error err;
+	int64_t none[20];
+
+	for (int i = 0; i < 20; i++)
+		none[i] = 1000000000LL + i * 100000000LL;
+	/* noise takes a step here and there, by chance */
+	for (int i = 0; i < n_other; i++)
+		other[i].value = 1;
+	assert_int_equal(incise_calibrate_delay_pulse(none, 20, other, n_other, &f, &err),
+			 -EDOM);
+	assert_non_null(strstr(err.text, "edges"));
+}
+
+int main(int argc, char **argv)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_force_intervals),
+		cmocka_unit_test(test_camera_intervals),
+		cmocka_unit_test(test_drift),
+		cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_pulse),
+	};
+
+	if (argc > 1)
+		force_runs = atoi(argv[1]);
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
