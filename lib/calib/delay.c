@@ -24,8 +24,8 @@
 #define FAST_MM_S 50.0
 
 #define ITERATIONS 12
-#define BLOCK_S 0.5
-#define BLOCKS_MIN 12
+#define BLOCK_S 1.0
+#define BLOCKS_MIN 7
 #define DRAWS 400
 #define UNKNOWNS (DELAY_COLUMNS + 3) /* and delay, contact, drift */
 #define TINY 1e-12

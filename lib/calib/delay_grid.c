@@ -18,6 +18,7 @@
 #define SIGMA_MIN_STEPS 2.0
 #define SIGMA_PERIODS 0.8
 #define REACH_SIGMAS 4
+#define SPEED_REACH 12 /* ±48 ms: less noise than of ±20 ms, which biased by 0.18 ms */
 
 #define GAP_PERIODS 4 /* farther apart, points have nothing to say of what is between */
 
@@ -160,17 +161,44 @@ static void mark_good(struct delay_grid *grid)
 {
 	double *streams[] = {grid->motion, grid->other};
 
+	int reach = grid->reach + SPEED_REACH;
+
 	for (int i = 0; i < grid->n; i++)
-		grid->good[i] = i >= grid->reach && i < grid->n - grid->reach;
+		grid->good[i] = i >= reach && i < grid->n - reach;
 	for (int s = 0; s < 2; s++)
 		for (int i = 0; i < grid->n; i++) {
 			if (isfinite(streams[s][i]))
 				continue;
 			streams[s][i] = 0;
-			for (int k = -grid->reach; k <= grid->reach; k++)
+			for (int k = -reach; k <= reach; k++)
 				if (i + k >= 0 && i + k < grid->n)
 					grid->good[i + k] = false;
 		}
+}
+
+/*
+ * Derivative of a cubic through 2·SPEED_REACH + 1 steps about each (Savitzky and Golay, Anal.
+ * Chem. 36, 1964): what it knows of slow motion is exact, so that viscosity is not mistaken.
+ */
+static void make_speed(struct delay_grid *grid)
+{
+	double s2 = 0, s4 = 0, s6 = 0, weight[SPEED_REACH + 1];
+
+	for (int k = 1; k <= SPEED_REACH; k++) {
+		s2 += 2 * pow(k, 2);
+		s4 += 2 * pow(k, 4);
+		s6 += 2 * pow(k, 6);
+	}
+	for (int k = 1; k <= SPEED_REACH; k++)
+		weight[k] = (s6 * k - s4 * pow(k, 3)) / (s2 * s6 - s4 * s4);
+	for (int i = 0; i < grid->n; i++) {
+		bool inside = i >= SPEED_REACH && i < grid->n - SPEED_REACH;
+		double sum = 0;
+
+		for (int k = 1; k <= SPEED_REACH && inside; k++)
+			sum += weight[k] * (grid->motion[i + k] - grid->motion[i - k]);
+		grid->speed[i] = sum / DELAY_STEP_S;
+	}
 }
 
 static bool make_room(struct delay_grid *grid)
@@ -261,8 +289,6 @@ int delay_grid_make(struct delay_grid *grid, const struct incise_delay_point *mo
 	put(grid->other, grid->n, grid->start_ns, other, n_other, periods[1]);
 	mark_good(grid);
 	delay_grid_filter(grid, grid->other, grid->target);
-	delay_grid_filter(grid, grid->motion, grid->speed);
-	for (int i = 0; i < grid->n; i++)
-		grid->speed[i] /= DELAY_STEP_S;
+	make_speed(grid);
 	return 0;
 }
