@@ -13,6 +13,8 @@ $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o): cppflags 
 extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
 extra_info := $(extra_demo) $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o \
 	bus_report.o stream_report.o)
+extra_calibrate-tip := $(addprefix $(O)/obj/tools/,calibrate_result.o tip_poses.o picture.o)
+extra_calibrate-delay := $(addprefix $(O)/obj/tools/,calibrate_result.o delay_streams.o picture.o)
 extra_capture := $(addprefix $(O)/obj/tools/,capture_view.o keyboard.o stopwatch.o stream_report.o)
 extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
 	stepper_status.o stepper_counters.o)

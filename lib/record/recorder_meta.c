@@ -186,6 +186,8 @@ int incise_recorder_write_meta(struct incise_recorder *rec, const char *calibrat
 	for (int i = 0; i < 3; i++) {
 		char key[32];
 
+		snprintf(key, sizeof(key), "tip_%s_mm", axes[i]);
+		bad |= incise_recorder_set_real(rec, key, rec->calibration.tip_mm[i]);
 		snprintf(key, sizeof(key), "surface_point_%s_mm", axes[i]);
 		bad |= incise_recorder_set_real(rec, key, rec->depth.point_mm[i]);
 		snprintf(key, sizeof(key), "surface_normal_%s", axes[i]);

@@ -12,6 +12,7 @@
  */
 #include <errno.h>
 #include <math.h>
+#include "../base/vector.h"
 #include "recorder.h"
 
 /*
@@ -155,6 +156,16 @@ static bool finite_record(const struct incise_tracker_sample *sample)
 	return true;
 }
 
+/* Where the tip of the blade is: rows keep what the device gave, depth is the tip's. */
+static void tip_of(const struct incise_recorder *rec,
+		   const struct incise_tracker_sample *sample, double tip_mm[3])
+{
+	double arm_mm[3];
+
+	v3_rotate(arm_mm, sample->quaternion, rec->calibration.tip_mm);
+	v3_add(tip_mm, sample->position_mm, 1, arm_mm);
+}
+
 int incise_recorder_write_tracker(struct incise_recorder *rec,
 				  const struct incise_recorder_tracker_row *row,
 				  struct incise_error *err)
@@ -163,8 +174,10 @@ int incise_recorder_write_tracker(struct incise_recorder *rec,
 	sqlite3_stmt *stmt = rec->stmt[INSERT_TRACKER];
 	struct incise_ledger_row entry;
 	struct incise_depth_row depth;
+	double tip_mm[3];
 	int rc;
 
+	tip_of(rec, sample, tip_mm);
 	sqlite3_bind_int64(stmt, 1, sample->seq);
 	sqlite3_bind_int64(stmt, 2, row->t_ns);
 	sqlite3_bind_int64(stmt, 3, sample->t_ns);
@@ -181,8 +194,7 @@ int incise_recorder_write_tracker(struct incise_recorder *rec,
 	rc = enter(rec, &rec->streams[INCISE_LEDGER_TRACKER], &entry, err);
 	/* A record that the tracker itself doubts is kept, but not believed. */
 	if (!rc && sample->status == ' ' &&
-	    incise_depth_push(&rec->depth, sample->seq, row->t_ns, sample->position_mm,
-			      &depth))
+	    incise_depth_push(&rec->depth, sample->seq, row->t_ns, tip_mm, &depth))
 		rc = write_depth(rec, &depth, err);
 	return rc;
 }
@@ -194,6 +206,7 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_TRACKER];
 	struct incise_recorder_tracker_row row = {.sample = *sample};
 	struct incise_error why = {0};
+	double tip_mm[3];
 	int rc = 0;
 
 	/* A line through both would bend, and bend the times of either. */
@@ -212,7 +225,8 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 			       : incise_recorder_fail(rec, err);
 	}
 	if (sample->status == ' ') {
-		rec->stats.depth_mm = incise_depth_of(&rec->depth, sample->position_mm);
+		tip_of(rec, sample, tip_mm);
+		rec->stats.depth_mm = incise_depth_of(&rec->depth, tip_mm);
 		incise_recorder_zero_depth(rec, row.t_ns, rec->stats.depth_mm);
 	}
 	if (sample->button != rec->stats.button) {

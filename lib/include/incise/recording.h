@@ -13,6 +13,7 @@
 #include <incise/error.h>
 #include <incise/export.h>
 #include <incise/stream.h>
+#include <incise/tracker.h>
 
 INCISE_BEGIN_DECLS
 
@@ -51,6 +52,36 @@ INCISE_API void incise_recording_close(struct incise_recording *recording);
 INCISE_API int incise_recording_info(struct incise_recording *recording,
 				     struct incise_recording_info *info,
 				     struct incise_error *err);
+
+/** One value of a stream. */
+struct incise_recording_value {
+	int64_t t_ns; /**< best time of its acquisition, CLOCK_MONOTONIC */
+	double value;
+};
+
+/**
+ * All of a stream in memory: "force", N (NAN where it is clipped; from the converter's 0 V
+ * where its zero is not known); "depth", mm by the tracker; "camera", mm by vision, those
+ * pictures alone in which it saw the scalpel.
+ *
+ * @param values to be freed with free(3)
+ * @return how many, 0 of a stream that it has not; -EINVAL (no such name, a row that cannot
+ *         be), -EIO, -ENOMEM.
+ */
+INCISE_API int incise_recording_values(struct incise_recording *recording,
+				       const char *name,
+				       struct incise_recording_value **values,
+				       struct incise_error *err);
+
+/**
+ * All poses of the tracker as it gave them, with their best times.
+ *
+ * @param poses to be freed with free(3)
+ * @return how many; -EINVAL (a row that cannot be), -EIO, -ENOMEM.
+ */
+INCISE_API int incise_recording_poses(struct incise_recording *recording,
+				      struct incise_tracker_sample **poses,
+				      struct incise_error *err);
 
 /** How to export. */
 struct incise_export_options {
