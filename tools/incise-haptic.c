@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <incise/calibration.h>
 #include <incise/loop.h>
 #include <incise/outfile.h>
 #include "cli.h"
@@ -32,6 +33,9 @@ static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
 	 "file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n"
 	 "(default: ./rig.conf, else /etc/incise/rig.conf)"},
+	{'c', "calibration", "FILE",
+	 "calibration.conf, for where the tip is (default: where the\n"
+	 "tracker takes it to be)"},
 	{OPT_MODEL, "model", "FILE", "use this model instead of the scene's"},
 	{OPT_ARITH, "arith", "KIND", "fixed or double, instead of the scene's"},
 	{OPT_TOOL, "tool", "KIND",
@@ -59,7 +63,7 @@ static const struct cli_verb verb = {
 
 struct job {
 	struct scene_argument scene;
-	const char *rig, *log;
+	const char *rig, *log, *calibration;
 	enum incise_tool tool;
 	double duration;
 	bool json, home;
@@ -84,6 +88,9 @@ static void parse(struct job *job, int argc, char **argv)
 		switch (opt) {
 		case 'r':
 			job->rig = optarg;
+			break;
+		case 'c':
+			job->calibration = optarg;
 			break;
 		case OPT_MODEL:
 			job->scene.model = optarg;
@@ -344,6 +351,7 @@ int main(int argc, char **argv)
 {
 	struct incise_loop_options loop = {.stop = &cli_stop};
 	static struct incise_loop_stats stats;
+	struct incise_calibration calibration;
 	struct incise_error err = {0};
 	struct incise_outfile *file = NULL;
 	struct incise_scene *scene;
@@ -355,6 +363,10 @@ int main(int argc, char **argv)
 	int rc;
 
 	parse(&job, argc, argv);
+	incise_calibration_nominal(&calibration);
+	if (job.calibration &&
+	    incise_calibration_load(job.calibration, &calibration, &err))
+		cli_fail_with(&err);
 	scene = scene_argument_load(&job.scene);
 	rig = incise_rig_open(cli_rig(job.rig), INCISE_RIG_TRACKER | INCISE_RIG_STEPPER,
 			      &err);
@@ -364,6 +376,7 @@ int main(int argc, char **argv)
 	if (!plan)
 		cli_fail_with(&err);
 	incise_plan_set_tool(plan, job.tool);
+	incise_plan_set_tip(plan, calibration.tip_mm);
 	loop.rate_hz = incise_scene_rate_hz(scene);
 	loop.duration_ns = (int64_t)(job.duration * INCISE_NS_PER_S);
 	if (job.log) {

@@ -47,6 +47,9 @@ static int meta(struct incise_recording *rec, const char *key,
 	return rc;
 }
 
+/* As calibration.conf has it. */
+#define TIP_MAX_MM 1e6
+
 struct text {
 	char *to;
 	size_t size;
@@ -99,6 +102,23 @@ static int take_known(sqlite3_stmt *stmt, void *to)
 	return sqlite3_column_type(stmt, 0) == SQLITE_NULL ? 0 : take_real(stmt, to);
 }
 
+/* Recordings from before have none: the device's own tip is the blade's. */
+static int read_tip(struct incise_recording *rec, struct incise_error *err)
+{
+	static const char *const keys[] = {"tip_x_mm", "tip_y_mm", "tip_z_mm"};
+	int rc = 0;
+
+	for (int i = 0; i < 3 && !rc; i++) {
+		rc = meta(rec, keys[i], take_real, &rec->meta.tip_mm[i], true, err);
+		if (!rc && !(fabs(rec->meta.tip_mm[i]) <= TIP_MAX_MM))
+			rc = incise_error_set(err, EINVAL,
+					      "%s: damaged: '%s' in table meta is %g, "
+					      "which cannot be",
+					      rec->path, keys[i], rec->meta.tip_mm[i]);
+	}
+	return rc;
+}
+
 static int read_meta(struct incise_recording *rec, struct incise_error *err)
 {
 	struct incise_recording_info *info = &rec->meta;
@@ -138,6 +158,8 @@ static int read_meta(struct incise_recording *rec, struct incise_error *err)
 	/* Recordings from before have none, and begin at 0 V. */
 	if (!rc)
 		rc = meta(rec, "force_offset_V", take_real, &info->offset_V, true, err);
+	if (!rc)
+		rc = read_tip(rec, err);
 	if (rc)
 		return rc;
 	/* No converter has more than 31 bits; figures of 1e±9 keep all that follows finite. */

@@ -161,6 +161,7 @@ static int begin(struct replay *replay, const struct incise_scene *scene)
 				       meta->surface_normal, replay->err);
 	if (!replay->plan)
 		return -errno;
+	incise_plan_set_tip(replay->plan, meta->tip_mm);
 	v3_unit(replay->normal, meta->surface_normal, 0);
 	replay->report->tracker = source->info;
 	return incise_plan_set_tool(replay->plan, replay->options->tool);

@@ -379,6 +379,14 @@ int incise_plan_feed(struct incise_plan *plan,
 	return taken;
 }
 
+int incise_plan_set_tip(struct incise_plan *plan, const double tip_mm[3])
+{
+	if (!v3_finite(tip_mm) || v3_length(tip_mm) > 1e6)
+		return -EINVAL;
+	v3_copy(plan->tip_mm, tip_mm);
+	return 0;
+}
+
 int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool)
 {
 	if ((unsigned int)tool > INCISE_TOOL_TUBE)

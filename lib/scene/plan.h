@@ -49,6 +49,7 @@ struct incise_plan {
 	int64_t pose_age_ns;
 	double velocity_mm_s[3]; /* of what is held: of the tip, or the handle's end */
 	double attitude[4];
+	double tip_mm[3]; /* of the blade in the frame of the tracker's poses */
 
 	/* tool, contact, normal */
 	struct incise_instrument instrument;

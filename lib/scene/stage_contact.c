@@ -30,10 +30,14 @@ static void take_handle(struct incise_plan *plan, struct incise_tracker_sample s
 static void take(struct incise_plan *plan, struct incise_tracker_sample *samples, int n,
 		 int64_t now_ns)
 {
+	double arm_mm[3];
+
 	for (int i = 0; i < n; i++) {
 		/* A stamp from the future would keep all later poses out. */
 		if (samples[i].t_ns > now_ns)
 			samples[i].t_ns = now_ns;
+		v3_rotate(arm_mm, samples[i].quaternion, plan->tip_mm);
+		v3_add(samples[i].position_mm, samples[i].position_mm, 1, arm_mm);
 		incise_predict_add(&plan->predict, &samples[i]);
 		if (plan->inserts)
 			take_handle(plan, samples[i]);

@@ -127,6 +127,14 @@ INCISE_API int incise_plan_feed(struct incise_plan *plan,
 				const struct incise_tracker_sample *samples, int n);
 
 /**
+ * Say where the tip of the blade is in the frame of what the tracker's poses are of: the
+ * calibration's tip_mm; by default 0 0 0. Before the first tick.
+ *
+ * @return 0, -EINVAL (not finite, or more than 1e6 mm)
+ */
+INCISE_API int incise_plan_set_tip(struct incise_plan *plan, const double tip_mm[3]);
+
+/**
  * Say what the hand holds from now on; by default INCISE_TOOL_AUTO. It changes out of the
  * tissue only. Without insertion in the scene there is only the blade.
  *

@@ -31,7 +31,9 @@ struct incise_recording_info {
 	double full_scale_V, offset_V; /**< 2^bits codes span that; code 0 is this */
 	double force_mV_N, zero_mV, depth_mm_px; /**< calibration it was made with */
 	double surface_normal[3], surface_point_mm[3];
-	int cuts; /**< stretches with the blade in the tissue */
+	double tip_mm
+		[3]; /**< calibrated; rows of poses are without it, depth is with it */
+	int cuts;    /**< stretches with the blade in the tissue */
 	double depth_max_mm, force_max_N;
 	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< of form 2 */
 	int n_streams;
