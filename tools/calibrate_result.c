@@ -127,7 +127,7 @@ void calibrate_end(const struct calibrate_wish *wish,
 
 	/* The report first: what is in force is to have one. */
 	if (file) {
-		json_dumpf(all, file, JSON_INDENT(2));
+		json_dumpf(all, file, JSON_INDENT(2) | JSON_REAL_PRECISION(12));
 		putc('\n', file);
 		calibrate_report_end(wish, file);
 	}

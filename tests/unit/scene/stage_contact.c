@@ -57,6 +57,30 @@ static void test_poses_of_the_future_are_of_now(void **state)
 	assert_int_equal(incise_stage_pose(&plan, &tick), -ENODEV);
 }
 
+/* A quarter turn about x takes the tip's y to z. */
+static void test_tip_of_the_calibration(void **state)
+{
+	struct incise_tracker_sample sample = {
+		.t_ns = 1000000000,
+		.position_mm = {1, 2, 3},
+		.quaternion = {M_SQRT1_2, M_SQRT1_2},
+	};
+	struct incise_plan plan = {.pose_age_ns = 20000000, .fed = &sample, .n_fed = 1};
+	struct incise_tick tick = {.t_ns = 1000000000};
+	const double tip_mm[3] = {10, 20, 0}, huge[3] = {1e7}, none[3] = {NAN};
+
+	assert_int_equal(incise_plan_set_tip(&plan, huge), -EINVAL);
+	assert_int_equal(incise_plan_set_tip(&plan, none), -EINVAL);
+	assert_int_equal(incise_plan_set_tip(&plan, tip_mm), 0);
+	incise_predict_init(&plan.predict, &info);
+	incise_stage_fed(&plan, &tick);
+	incise_stage_predict(&plan, &tick);
+	/* rounding of the quarter turn */
+	assert_true(fabs(tick.position_mm[0] - 11) < 1e-12);
+	assert_true(fabs(tick.position_mm[1] - 2) < 1e-12);
+	assert_true(fabs(tick.position_mm[2] - 23) < 1e-12);
+}
+
 /* A plan over the plane z = 0, the blade 1 mm above it. */
 static struct incise_plan plan_over(struct incise_surface *surface)
 {
@@ -170,6 +194,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_poses_of_the_future_are_of_now),
+		cmocka_unit_test(test_tip_of_the_calibration),
 		cmocka_unit_test(test_a_cut_from_its_begin_to_its_end),
 		cmocka_unit_test(test_an_instrument_leaves_no_cut),
 		cmocka_unit_test(test_the_end_of_what_is_held),

@@ -18,11 +18,12 @@ static void velocity_is_the_derivative(void **state)
 	struct incise_surgeon surgeon;
 
 	incise_sim_config_init(&config);
+	config.motion = *(const int *)*state;
 	incise_surgeon_init(&surgeon, &config);
 	/*
 	 * Central difference over ±50 µs: its error is h²/6·jerk ≈ 4e-10·jerk, and at
 	 * joints of the path, where acceleration jumps, h/4·jump: at most 600 mm/s² in a
-	 * pause and 2·25·2π·1.6·0.9 in a cut, so 0.02 mm/s is ample and far below any
+	 * pause, 2·25·2π·1.6·0.9 in a cut and 5.5·(4π)² where pressing begins, so 0.02 mm/s is ample and far below any
 	 * wrong term.
 	 */
 	for (int64_t t = 50000; t < incise_surgeon_duration(&surgeon); t += 1234567) {
@@ -133,10 +134,71 @@ static void grip_is_a_rotation(void **state)
 	}
 }
 
+/* The tip rests while the tool sweeps the cone that was asked for, and no more. */
+static void a_turn_is_about_the_tip(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_surgeon surgeon;
+	double farthest = 1;
+
+	incise_sim_config_init(&config);
+	config.motion = INCISE_SURGEON_TURNS;
+	config.cone_deg = 90;
+	incise_surgeon_init(&surgeon, &config);
+	for (int64_t t = 0; t < 20 * INCISE_NS_PER_S; t += 10000001) {
+		struct incise_blade blade;
+		double q[4], norm, up;
+
+		incise_surgeon_blade(&surgeon, t, &blade);
+		assert_true(blade.position_mm[0] == 5 && blade.position_mm[1] == 0 &&
+			    blade.position_mm[2] == 0 && blade.speed_mm_s == 0);
+		incise_surgeon_grip(&surgeon, t, q);
+		norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+		assert_true(fabs(norm - 1) < 1e-14);
+		up = 1 - 2 * (q[1] * q[1] + q[2] * q[2]);
+		farthest = fmin(farthest, up);
+	}
+	/* half the cone; turning about itself on the way takes a little off */
+	assert_true(farthest > cos(45 * M_PI / 180) - 1e-9);
+	assert_true(farthest < cos(42 * M_PI / 180));
+}
+
+static void pressing_goes_into_the_tissue_and_out(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_surgeon surgeon;
+	double low = 0, high = 0;
+	int strokes = 0;
+	bool inside = false;
+
+	incise_sim_config_init(&config);
+	config.motion = INCISE_SURGEON_PRESSES;
+	incise_surgeon_init(&surgeon, &config);
+	for (int64_t t = 0; t < 11 * INCISE_NS_PER_S; t += 1000001) {
+		struct incise_blade blade;
+
+		incise_surgeon_blade(&surgeon, t, &blade);
+		assert_int_equal(blade.cut, -1);
+		assert_true(t > INCISE_NS_PER_S || blade.position_mm[2] == 3);
+		low = fmin(low, blade.position_mm[2]);
+		high = fmax(high, blade.position_mm[2]);
+		strokes += !inside && blade.depth_mm > 0;
+		inside = blade.depth_mm > 0;
+	}
+	assert_true(fabs(low + 8) < 1e-3 && fabs(high - 3) < 1e-3);
+	assert_in_range(strokes, 15, 25); /* about twice a second */
+}
+
 int main(void)
 {
+	static int cuts = INCISE_SURGEON_CUTS, turns = INCISE_SURGEON_TURNS,
+		   presses = INCISE_SURGEON_PRESSES;
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(velocity_is_the_derivative),
+		cmocka_unit_test_prestate(velocity_is_the_derivative, &cuts),
+		cmocka_unit_test_prestate(velocity_is_the_derivative, &turns),
+		cmocka_unit_test_prestate(velocity_is_the_derivative, &presses),
+		cmocka_unit_test(a_turn_is_about_the_tip),
+		cmocka_unit_test(pressing_goes_into_the_tissue_and_out),
 		cmocka_unit_test(protocol_is_kept),
 		cmocka_unit_test(every_depth_at_every_speed),
 		cmocka_unit_test(grip_is_a_rotation),

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise calibrate tip: the tip of the virtual rig is found, used, and refused where the motion
+# cannot tell it.
+
+load cli
+
+rig=sim:clock=simulated,motion=1,tip_x_mm=3,tip_y_mm=-20,tip_z_mm=60
+
+setup() {
+	work_folder
+}
+
+# By how many of its expanded uncertainties a value of r.json is off.
+within() {
+	local left u
+	left=$(key r.json "values[$1].left")
+	u=$(key r.json "values[$1].U")
+	# 1.5 U is 3 sd; and 0.1 mm is what is asked
+	holds "($left - $2)^2 < ($u * 1.5)^2 && ($left - $2)^2 < 0.1^2 && $u > 0"
+}
+
+@test "the tip of the virtual rig is found, with its uncertainty, and kept" {
+	incise calibrate tip --rig $rig --time 20s --keep p.csv --report rep --json >r.json </dev/null
+	within 0 3
+	within 1 -20
+	within 2 60
+	[ "$(key r.json pass)" = 1 ]
+	holds "$(key r.json details.cone_deg) > 60"
+	# 0.02 mm and 0.025 degrees at 63 mm: hypot(0.02 √3, 0.0275 √2) = 0.052
+	holds "$(key r.json details.rms_mm) > 0.045 && $(key r.json details.rms_mm) < 0.06"
+	grep -q '^tip_mm = \[' calibration.conf
+	[ "$(key rep/report.json 'values[2].left')" = "$(key r.json 'values[2].left')" ]
+	grep -q 'U = .* (k = 2)' rep/report.txt
+	if command -v gnuplot; then
+		[ -s rep/fit.png ]
+		[ -s rep/residuals.png ]
+	fi
+	# what was kept gives the same again, and a dry run changes nothing
+	cp calibration.conf before
+	incise calibrate tip --from p.csv --dry-run --json >again.json
+	[ "$(key again.json 'values[0].left')" = "$(key r.json 'values[0].left')" ]
+	cmp before calibration.conf
+}
+
+@test "capture, and the loop, take the calibrated tip" {
+	incise calibrate tip --rig $rig --time 20s </dev/null
+	cut=${rig/motion=1/motion=0}
+	incise capture -o a.rec --rig "$cut" --duration 4s -c calibration.conf
+	incise capture -o b.rec --rig sim:clock=simulated --duration 4s
+	# raw rows are without the tip
+	holds "$(sqlite3 a.rec/recording.db 'SELECT abs(max(z_mm)) FROM tracker') > 40"
+	# depth of the same cut, to 6 sd of two records' noise and the tip's 0.01 mm
+	holds "$(sqlite3 a.rec/recording.db "ATTACH 'b.rec/recording.db' AS b;
+		SELECT max(abs(d.depth_mm - e.depth_mm)) FROM depth d JOIN b.depth e
+		USING (seq)") < 0.35"
+	incise haptic "$root/scenes/liver.scene" --rig "$cut" --duration 3s -c calibration.conf \
+		--log a.csv
+	incise haptic "$root/scenes/liver.scene" --rig sim:clock=simulated --duration 3s --log b.csv
+	holds "$(paste -d, a.csv b.csv | awk -F, 'NR == 1 {
+			for (i = 1; i <= NF / 2; i++) if ($i == "depth_mm") c = i
+			n = NF / 2; next }
+		{ d = $c - $(c + n); if (d * d > m) m = d * d } END { print m }') < 0.35 ^ 2"
+	holds "$(awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == "depth_mm") c = i; next }
+		$c > m { m = $c } END { print m }' a.csv) > 0.5"
+}
+
+@test "poses of a recording will do" {
+	# without the tip the tool seems to be in the tissue, so the zero is to be known
+	echo 'force_zero_mV = 180.0;' >zero.conf
+	incise capture -o a.rec --rig $rig --duration 15s -c zero.conf
+	incise calibrate tip --from a.rec --dry-run --json >r.json
+	within 2 60
+}
+
+@test "what cannot tell the tip is refused, and nothing is changed" {
+	run --separate-stderr incise calibrate tip --rig "$rig,cone_deg=40" --time 10s </dev/null
+	failed_with "a cone of" "60 are needed"
+	run --separate-stderr incise calibrate tip --rig sim:clock=simulated --time 10s </dev/null
+	failed_with "one axis only"
+	incise calibrate tip --rig $rig --time 10s --keep p.csv --dry-run </dev/null
+	head -n 10 p.csv >few.csv
+	run --separate-stderr incise calibrate tip --from few.csv
+	failed_with "too few"
+	sed '1s/x_mm,y_mm/y_mm,x_mm/' p.csv >swapped.csv
+	run --separate-stderr incise calibrate tip --from swapped.csv
+	failed_with "columns swapped"
+	sed '1s/qw,qx,qy,qz/qx,qy,qz,qw/' p.csv >last.csv
+	run --separate-stderr incise calibrate tip --from last.csv
+	failed_with "swapped"
+	awk -F, -v OFS=, 'NR > 500 { $2 += 3 } { print }' p.csv >moved.csv
+	run --separate-stderr incise calibrate tip --from moved.csv
+	failed_with "pivot moved"
+	sed '7s/,[^,]*$/,nan/' p.csv >nan.csv
+	run --separate-stderr incise calibrate tip --from nan.csv
+	failed_with "nan.csv: line 7: qz"
+	sed '1s/qz/foo/' p.csv >name.csv
+	run --separate-stderr incise calibrate tip --from name.csv
+	failed_with "no column 'qz'"
+	[ ! -e calibration.conf ]
+	run --separate-stderr incise calibrate tip --rig $rig </dev/null
+	bad_usage "--time or --from"
+	# every tenth pose is wrong: found, listed, left out
+	awk -F, -v OFS=, 'NR % 10 == 5 { $3 += 2 } { print }' p.csv >outliers.csv
+	incise calibrate tip --from outliers.csv --json >r.json
+	within 2 60
+	n=$(wc -l <p.csv)
+	[ "$(key r.json details.inliers)" -le $((n - n / 10)) ]
+	[ "$(key r.json 'details.outliers[0]')" = 4 ]
+}
