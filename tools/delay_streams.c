@@ -2,6 +2,7 @@
 /*
  * Streams for incise calibrate delay; see delay_streams.h.
  */
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -59,35 +60,18 @@ void delay_streams_read(struct delay_stream streams[DELAY_STREAMS], const char *
 	incise_recording_close(recording);
 }
 
-void delay_streams_record(const char *spec, const struct incise_calibration *calibration,
-			  double time_s, bool camera, const char *path)
+/* Poll until the time is over, a signal comes or it fails: 0 or not. */
+static int record(struct incise_recorder *recorder, struct incise_clock *clock,
+		  double time_s, struct incise_error *err)
 {
-	unsigned int devices = INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_CAMERA |
-			       (camera ? 0 : INCISE_RIG_IF_NAMED);
-	struct incise_recorder_setup setup = {.calibration = calibration,
-					      .planned_s = time_s};
-	struct incise_error err = {0}, second = {0};
-	struct incise_rig *rig = incise_rig_open(cli_rig(spec), devices, &err);
-	struct incise_vision_setup vision;
+	int64_t start = incise_clock_now(clock), now = start;
 	struct incise_recorder_stats stats;
-	struct incise_recorder *recorder;
-	struct incise_clock *clock;
-	int64_t start, now;
 	int rc = 0;
 
-	if (!rig)
-		cli_fail_with(&err);
-	if (incise_rig_camera(rig) && !incise_rig_vision(rig, &vision))
-		setup.vision = &vision;
-	recorder = incise_recorder_new(path, rig, &setup, &err);
-	if (!recorder)
-		cli_fail_with(&err);
-	clock = incise_rig_clock(rig);
-	start = now = incise_clock_now(clock);
 	while (!rc && !cli_stop && (now - start) * 1e-9 < time_s) {
 		incise_clock_wait_until(clock, now + POLL_NS);
 		now = incise_clock_now(clock);
-		rc = incise_recorder_poll(recorder, &err);
+		rc = incise_recorder_poll(recorder, err);
 		incise_recorder_stats(recorder, &stats);
 		cli_progress("%s  %.0f s left, depth %.1f mm, force %.2f N",
 			     (now - start) * 1e-9 < 1 ? "hold the tool free  "
@@ -96,9 +80,35 @@ void delay_streams_record(const char *spec, const struct incise_calibration *cal
 			     stats.force_N);
 	}
 	cli_progress_end();
-	if (incise_recorder_close(recorder, rc ? &second : &err) || rc)
-		cli_fail_with(&err);
+	return rc;
+}
+
+int delay_streams_record(const char *spec, const struct incise_calibration *calibration,
+			 double time_s, bool camera, const char *path,
+			 struct incise_error *err)
+{
+	unsigned int devices = INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_CAMERA |
+			       (camera ? 0 : INCISE_RIG_IF_NAMED);
+	struct incise_recorder_setup setup = {.calibration = calibration,
+					      .planned_s = time_s};
+	struct incise_rig *rig = incise_rig_open(cli_rig(spec), devices, err);
+	struct incise_error second = {0};
+	struct incise_recorder *recorder;
+	struct incise_vision_setup vision;
+	int rc;
+
+	if (!rig)
+		return -1;
+	if (incise_rig_camera(rig) && !incise_rig_vision(rig, &vision))
+		setup.vision = &vision;
+	recorder = incise_recorder_new(path, rig, &setup, err);
+	rc = recorder ? record(recorder, incise_rig_clock(rig), time_s, err) : -1;
+	if (recorder && incise_recorder_close(recorder, rc ? &second : err))
+		rc = -1;
 	incise_rig_close(rig);
-	if (cli_stop)
-		cli_fail("stopped; the old calibration stays");
+	if (!rc && cli_stop) {
+		incise_error_set(err, EINTR, "stopped; the old calibration stays");
+		rc = -1;
+	}
+	return rc ? -1 : 0;
 }

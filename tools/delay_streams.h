@@ -26,9 +26,10 @@ void delay_streams_read(struct delay_stream streams[DELAY_STREAMS], const char *
 
 /*
  * Record a rig for some time into @path, which ends in .rec, with its camera where rig.conf
- * names one or @camera says so. Fails the program.
+ * names one or @camera says so. Returns 0, or -1 with *err: then part of it may lie there.
  */
-void delay_streams_record(const char *rig, const struct incise_calibration *calibration,
-			  double time_s, bool camera, const char *path);
+int delay_streams_record(const char *rig, const struct incise_calibration *calibration,
+			 double time_s, bool camera, const char *path,
+			 struct incise_error *err);
 
 #endif

@@ -108,21 +108,24 @@ static void take_options(struct wish *wish, int argc, char **argv)
 
 /* --- recording now --------------------------------------------------------------------- */
 
-static void remove_recording(const char *folder, const char *path)
+/* What is there of a recording, whole or interrupted. */
+static void remove_recording(const char *path)
 {
 	static const char *const files[] = {"recording.db", "recording.db-wal",
-					    "recording.db-shm", "camera.mkv"};
+					    "recording.db-shm", "camera.mkv", ""};
 
-	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++) {
+	for (size_t i = 0; i < 2 * sizeof(files) / sizeof(*files); i++) {
 		char *file;
 
-		if (asprintf(&file, "%s/%s", path, files[i]) < 0)
+		if (asprintf(&file, "%s%s/%s", path, i % 2 ? ".part" : "", files[i / 2]) <
+		    0)
 			cli_fail("no memory");
-		unlink(file);
+		if (*files[i / 2])
+			unlink(file);
+		else
+			rmdir(file);
 		free(file);
 	}
-	rmdir(path);
-	rmdir(folder);
 }
 
 static void record_now(const struct wish *wish, struct delay_stream *streams)
@@ -130,6 +133,8 @@ static void record_now(const struct wish *wish, struct delay_stream *streams)
 	const char *base = getenv("TMPDIR");
 	char *folder = NULL, *path = NULL;
 	double time_s = wish->time_s > 0 ? wish->time_s : 15;
+	struct incise_error err = {0};
+	int rc;
 
 	if (isatty(STDIN_FILENO)) {
 		fprintf(stderr,
@@ -140,22 +145,28 @@ static void record_now(const struct wish *wish, struct delay_stream *streams)
 			;
 	}
 	if (wish->common.keep) {
-		delay_streams_record(wish->common.rig, &wish->common.found, time_s,
-				     wish->camera, wish->common.keep);
+		if (delay_streams_record(wish->common.rig, &wish->common.found, time_s,
+					 wish->camera, wish->common.keep, &err))
+			cli_fail_with(&err);
 		delay_streams_read(streams, wish->common.keep);
 		return;
 	}
-	if (asprintf(&folder, "%s/incise-XXXXXX", base && *base ? base : "/tmp") < 0 ||
-	    !mkdtemp(folder))
+	if (asprintf(&folder, "%s/incise-XXXXXX", base && *base ? base : "/tmp") < 0)
+		cli_fail("no memory");
+	if (!mkdtemp(folder))
 		cli_fail("%s: %s", folder, strerror(errno));
 	if (asprintf(&path, "%s/delay.rec", folder) < 0)
 		cli_fail("no memory");
-	delay_streams_record(wish->common.rig, &wish->common.found, time_s, wish->camera,
-			     path);
-	delay_streams_read(streams, path);
-	remove_recording(folder, path);
+	rc = delay_streams_record(wish->common.rig, &wish->common.found, time_s,
+				  wish->camera, path, &err);
+	if (!rc)
+		delay_streams_read(streams, path);
+	remove_recording(path);
+	rmdir(folder);
 	free(path);
 	free(folder);
+	if (rc)
+		cli_fail_with(&err);
 }
 
 /* --- fits ------------------------------------------------------------------------------ */
@@ -377,6 +388,8 @@ int main(int argc, char **argv)
 	raw = wish.common.keep ? wish.common.keep : wish.common.from;
 	if (raw)
 		snprintf(record.raw, sizeof(record.raw), "%s", raw);
+	snprintf(record.device, sizeof(record.device), "%s",
+		 streams[DELAY_TRACKER].about.device);
 	snprintf(record.method, sizeof(record.method),
 		 "least squares of one motion of %.0f s, against the %s",
 		 pairs[DELAY_FORCE].there ? pairs[DELAY_FORCE].fit.span_s

@@ -80,8 +80,9 @@ static bool look(const struct tip_list *list)
 }
 
 static void take_live(const struct calibrate_wish *wish, double time_s,
-		      struct tip_list *list)
+		      struct tip_list *list, char device[64])
 {
+	struct incise_tracker_info info;
 	struct incise_error err = {0};
 	struct incise_rig *rig =
 		incise_rig_open(cli_rig(wish->rig), INCISE_RIG_TRACKER, &err);
@@ -100,6 +101,8 @@ static void take_live(const struct calibrate_wish *wish, double time_s,
 		while (getchar() != '\n' && !feof(stdin) && !cli_stop)
 			;
 	}
+	incise_tracker_info(incise_rig_tracker(rig), &info);
+	snprintf(device, 64, "%s", info.name);
 	clock = incise_rig_clock(rig);
 	now = incise_clock_now(clock);
 	end = now + llround(time_s * INCISE_NS_PER_S);
@@ -319,7 +322,7 @@ int main(int argc, char **argv)
 	if (wish.from)
 		tip_list_read(&list, wish.from);
 	else
-		take_live(&wish, time_s > 0 ? time_s : 20, &list);
+		take_live(&wish, time_s > 0 ? time_s : 20, &list, record.device);
 	if (wish.keep)
 		tip_list_write(&list, wish.keep);
 	inlier = calloc((size_t)list.n + 1, sizeof(*inlier));

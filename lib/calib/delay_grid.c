@@ -12,6 +12,7 @@
 #include "delay.h"
 
 #define NS_PER_STEP 4000000LL
+#define TIME_MAX_NS (INT64_MAX / 4)
 #define STEPS_MAX 150000 /* 10 minutes */
 
 /* The filter passes what the slower stream can carry, and no more than a hand can do. */
@@ -35,6 +36,9 @@ static double period_of(const struct incise_delay_point *points, int n)
 	int m = n - 1 < 1001 ? n - 1 : 1001;
 	double steps[1001];
 
+	/* so that differences of times fit their type */
+	if (points[0].t_ns < -TIME_MAX_NS || points[n - 1].t_ns > TIME_MAX_NS)
+		return -1;
 	for (int i = 1; i < n; i++)
 		if (points[i].t_ns <= points[i - 1].t_ns)
 			return -1;
@@ -251,7 +255,8 @@ int delay_grid_make(struct delay_grid *grid, const struct incise_delay_point *mo
 	periods[1] = period_of(other, n_other);
 	if (periods[0] < 0 || periods[1] < 0)
 		return incise_error_set(err, EINVAL,
-					"times of a stream do not ascend; sort them");
+					"times of a stream do not ascend, or cannot be; "
+					"sort them");
 	grid->start_ns = motion->t_ns > other->t_ns ? motion->t_ns : other->t_ns;
 	end_ns = motion[n_motion - 1].t_ns < other[n_other - 1].t_ns
 			 ? motion[n_motion - 1].t_ns

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <incise/calibrate_delay.h>
 
+#define TIME_MAX_NS (INT64_MAX / 4)
 #define EDGES_MIN 10
 #define WINDOW_MAX_NS 200e6
 #define WINDOW_SHARE 0.45 /* of the least time between edges */
@@ -97,6 +98,11 @@ static double step_of(const struct incise_delay_point *stream, int n, int64_t ed
 static bool ascends(const int64_t *edges_ns, int n_edges,
 		    const struct incise_delay_point *stream, int n)
 {
+	/* so that differences of times fit their type */
+	if (n_edges < 1 || n < 1 || edges_ns[0] < -TIME_MAX_NS ||
+	    stream[0].t_ns < -TIME_MAX_NS || edges_ns[n_edges - 1] > TIME_MAX_NS ||
+	    stream[n - 1].t_ns > TIME_MAX_NS)
+		return false;
 	for (int i = 1; i < n_edges; i++)
 		if (edges_ns[i] <= edges_ns[i - 1])
 			return false;
@@ -153,7 +159,8 @@ int incise_calibrate_delay_pulse(const int64_t *edges_ns, int n_edges,
 	*fit = (struct incise_delay_fit){
 		.delay_ms = NAN, .sd_ms = NAN, .contact_mm = NAN};
 	if (!ascends(edges_ns, n_edges, stream, n))
-		return incise_error_set(err, EINVAL, "times do not ascend; sort them");
+		return incise_error_set(err, EINVAL,
+					"times are missing or do not ascend; sort them");
 	delay = malloc(3 * (size_t)(n_edges > 0 ? n_edges : 1) * sizeof(*delay));
 	if (!delay)
 		return incise_error_set(err, ENOMEM, "out of memory");

@@ -471,12 +471,14 @@ static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *give
 	if (!u)
 		return incise_error_set(err, ENOMEM, "out of memory");
 	for (int i = 0; i < n; i++) {
-		double span = (double)(given[poses->n - 1].t_ns - given[0].t_ns);
+		/* apart, as their difference may not fit its type */
+		double first = (double)given[0].t_ns;
+		double span = (double)given[poses->n - 1].t_ns - first;
 
-		u[i] = span > 0 ? 2.0 * (given[poses->list[i]].t_ns - given[0].t_ns) /
-						  span -
-					  1
-				: 2.0 * i / n - 1;
+		u[i] = span > 0
+			       ? 2 * ((double)given[poses->list[i]].t_ns - first) / span -
+					 1
+			       : 2.0 * i / n - 1;
 	}
 	sum = 0;
 	for (int i = 0; i < n; i++)
