@@ -9,322 +9,36 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <lapacke.h>
 #include "delay.h"
 
 #define MOTION_MIN_MM 1.0
-#define COARSE_KNOTS 5
-#define COARSE_STRIDE 2 /* rows; neighbours are alike through the filter */
-#define COARSE_LAG 2
-#define CONTACTS 24
-#define NEAR_LAGS 5
-
-/* What grows with speed, whichever way, does so by then. */
-#define SLOW_MM_S 10.0
-#define FAST_MM_S 50.0
-
 #define ITERATIONS 12
-#define BLOCK_S 1.0
-#define BLOCKS_MIN 7
-#define DRAWS 400
-#define UNKNOWNS (DELAY_COLUMNS + 3) /* and delay, contact, drift */
-#define TINY 1e-12
-
-struct delay {
-	struct delay_grid grid;
-	enum incise_delay_relation relation;
-	double low_mm, high_mm; /* of the motion: 2 and 98 % */
-	double floor_mm;	/* it never is below */
-	int range;		/* steps */
-	/* The fit: */
-	double shift, contact_mm, c[DELAY_COLUMNS];
-	bool touches; /* contact begins within the motion, and is fitted along */
-};
-
-/* --- normal equations ------------------------------------------------------------------ */
-
-struct normal {
-	int m;
-	double a[UNKNOWNS * UNKNOWNS], b[UNKNOWNS], yy;
-};
-
-static void add_row(struct normal *normal, const double *row, double y)
-{
-	int m = normal->m;
-
-	for (int i = 0; i < m; i++) {
-		normal->b[i] += row[i] * y;
-		for (int j = 0; j <= i; j++)
-			normal->a[i * m + j] += row[i] * row[j];
-	}
-	normal->yy += y * y;
-}
-
-static void add_normal(struct normal *to, const struct normal *from, double times)
-{
-	for (int i = 0; i < to->m * to->m; i++)
-		to->a[i] += times * from->a[i];
-	for (int i = 0; i < to->m; i++)
-		to->b[i] += times * from->b[i];
-	to->yy += times * from->yy;
-}
-
-/* x of the least squares; columns are scaled alike first, and those that are none are 0. */
-static bool solve(const struct normal *normal, double *x)
-{
-	double a[UNKNOWNS * UNKNOWNS] = {0}, scale[UNKNOWNS];
-	int m = normal->m;
-
-	for (int i = 0; i < m; i++) {
-		double diagonal = normal->a[i * m + i];
-
-		if (!(diagonal >= 0) || !isfinite(diagonal))
-			return false;
-		scale[i] = diagonal > 0 ? 1 / sqrt(diagonal) : 0;
-	}
-	for (int i = 0; i < m; i++) {
-		for (int j = 0; j < i; j++)
-			a[i * m + j] = normal->a[i * m + j] * scale[i] * scale[j];
-		a[i * m + i] = 1 + TINY;
-		x[i] = normal->b[i] * scale[i];
-	}
-	if (LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', m, 1, a, m, x, 1))
-		return false;
-	for (int i = 0; i < m; i++)
-		x[i] *= scale[i];
-	return true;
-}
-
-/* --- columns --------------------------------------------------------------------------- */
-
-static void filter_column(struct delay_grid *grid, int k)
-{
-	delay_grid_filter(grid, grid->scratch, grid->column[k]);
-}
-
-/* What the other stream is made of, for a contact that begins at a depth. */
-static void make_columns(struct delay *d, double contact_mm)
-{
-	struct delay_grid *grid = &d->grid;
-	double scale = d->high_mm - d->low_mm;
-
-	grid->columns = d->relation == INCISE_DELAY_FORCE ? DELAY_COLUMNS : 1;
-	for (int k = 0; k < grid->columns; k++) {
-		for (int i = 0; i < grid->n; i++) {
-			double x = fmax(0, grid->motion[i] - contact_mm) / scale;
-			double v = grid->speed[i] / scale;
-			double slow =
-				fabs(grid->speed[i]) / (fabs(grid->speed[i]) + SLOW_MM_S);
-			double fast =
-				fabs(grid->speed[i]) / (fabs(grid->speed[i]) + FAST_MM_S);
-			const double all[DELAY_COLUMNS] = {
-				x,
-				x * x,
-				x * x * x,
-				v * x,
-				v * x * x,
-				slow * x,
-				slow * x * x,
-				fast * x,
-				fast * x * x,
-			};
-
-			grid->scratch[i] = all[k];
-		}
-		filter_column(grid, k);
-	}
-}
-
-/* Straight pieces that can bend into any curve: good enough for the search. */
-static void make_coarse_columns(struct delay *d)
-{
-	struct delay_grid *grid = &d->grid;
-
-	grid->columns = d->relation == INCISE_DELAY_FORCE ? COARSE_KNOTS : 1;
-	for (int k = 0; k < grid->columns; k++) {
-		double knot = k ? d->low_mm + k * (d->high_mm - d->low_mm) / COARSE_KNOTS
-				: d->floor_mm;
-
-		for (int i = 0; i < grid->n; i++)
-			grid->scratch[i] = fmax(0, grid->motion[i] - knot);
-		filter_column(grid, k);
-	}
-}
-
-/* Rows that can be compared at any delay within the range. */
-static bool usable(const struct delay *d, int i, int shift)
-{
-	const struct delay_grid *grid = &d->grid;
-	int from = i + shift - 2, to = i + shift + 3;
-
-	return grid->good[i] && from >= 0 && to < grid->n && grid->good[from] &&
-	       grid->good[to];
-}
-
-static void coarse_normal(const struct delay *d, int shift, struct normal *normal)
-{
-	const struct delay_grid *grid = &d->grid;
-	double row[UNKNOWNS];
-
-	memset(normal, 0, sizeof(*normal));
-	normal->m = grid->columns;
-	for (int i = 0; i < grid->n; i += COARSE_STRIDE) {
-		if (!usable(d, i, shift))
-			continue;
-		for (int k = 0; k < grid->columns; k++)
-			row[k] = grid->column[k][i + shift];
-		add_row(normal, row, grid->target[i]);
-	}
-}
-
-/* Correlation of the target and what the columns make of it; negative for a mirror image. */
-static double correlation(const struct normal *normal)
-{
-	double x[UNKNOWNS], explained = 0, slope = 0;
-	int m = normal->m;
-
-	if (!(normal->yy > 0) || !solve(normal, x))
-		return 0;
-	for (int k = 0; k < m; k++) {
-		explained += x[k] * normal->b[k];
-		/* with the first column, which is the motion itself */
-		slope += x[k] * normal->a[k * m];
-	}
-	explained = sqrt(fmax(0, fmin(1, explained / normal->yy)));
-	return slope < 0 ? -explained : explained;
-}
-
-/* --- the search ------------------------------------------------------------------------ */
-
-static int search(struct delay *d, struct incise_delay_fit *fit, struct incise_error *err)
-{
-	int lags = 2 * (d->range / COARSE_LAG) + 1, best = 0;
-	double *r = calloc((size_t)lags, sizeof(*r));
-	double second = 0, peak;
-
-	if (!r)
-		return incise_error_set(err, ENOMEM, "out of memory");
-	make_coarse_columns(d);
-	for (int l = 0; l < lags; l++) {
-		struct normal normal;
-
-		coarse_normal(d, (l - lags / 2) * COARSE_LAG, &normal);
-		r[l] = correlation(&normal);
-		if (r[l] > r[best])
-			best = l;
-	}
-	peak = r[best];
-	for (int l = 1; l < lags - 1; l++)
-		if (l != best && r[l] >= r[l - 1] && r[l] >= r[l + 1])
-			second = fmax(second, r[l]);
-	/* one that goes on rising at the end may be anything beyond */
-	if (lags > 1 && best != 0 && r[0] > r[1])
-		second = fmax(second, r[0]);
-	if (lags > 1 && best != lags - 1 && r[lags - 1] > r[lags - 2])
-		second = fmax(second, r[lags - 1]);
-	free(r);
-	d->shift = (best - lags / 2) * COARSE_LAG;
-	fit->delay_ms = d->shift * DELAY_STEP_S * 1e3;
-	fit->correlation = peak;
-	fit->second = peak > 0 ? second / peak : 1;
-	if (peak < INCISE_DELAY_CORRELATION_MIN)
-		return incise_error_set(
-			err, EDOM,
-			"the streams are too little alike (correlation %.2f, %g is needed); "
-			"tap on, or press, something springy, quickly and unevenly",
-			peak, INCISE_DELAY_CORRELATION_MIN);
-	if (fit->second > INCISE_DELAY_SECOND_MAX)
-		return incise_error_set(err, EDOM,
-					"the motion is periodic: another delay fits "
-					"%.0f %% as well; tap unevenly",
-					100 * fit->second);
-	if (best == 0 || best == lags - 1)
-		return incise_error_set(err, EDOM,
-					"the delay is beyond %.0f ms; look farther",
-					d->range * DELAY_STEP_S * 1e3);
-	return 0;
-}
-
-/* What is left unexplained with the present columns; HUGE_VAL where nothing can be said. */
-static double coarse_rest(const struct delay *d, int shift)
-{
-	struct normal normal;
-	double x[UNKNOWNS], rest;
-
-	coarse_normal(d, shift, &normal);
-	if (!(normal.yy > 0) || !solve(&normal, x))
-		return HUGE_VAL;
-	rest = normal.yy;
-	for (int k = 0; k < normal.m; k++)
-		rest -= x[k] * normal.b[k];
-	return rest / normal.yy;
-}
-
-/*
- * Where contact begins, of some depths, and the delay anew, as viscosity has moved the peak
- * of the correlation; the fit goes on from there.
- */
-static void search_contact(struct delay *d)
-{
-	double least = HUGE_VAL;
-	int middle = (int)d->shift;
-
-	d->contact_mm = d->floor_mm;
-	for (int at = 0; at < CONTACTS; at++) {
-		double contact = at ? d->low_mm + (at - 0.5) * 0.8 *
-							  (d->high_mm - d->low_mm) /
-							  CONTACTS
-				    : d->floor_mm;
-
-		make_columns(d, contact);
-		for (int lag = -NEAR_LAGS; lag <= NEAR_LAGS; lag++) {
-			double rest = abs(middle + lag) > d->range
-					      ? HUGE_VAL
-					      : coarse_rest(d, middle + lag);
-
-			if (rest >= least)
-				continue;
-			least = rest;
-			d->shift = middle + lag;
-			d->contact_mm = contact;
-			d->touches = at > 0;
-		}
-	}
-	if (d->relation == INCISE_DELAY_ALIKE)
-		d->touches = d->contact_mm > d->low_mm;
-}
+#define BEYOND 2 /* steps that a fit may leave the range by */
 
 /* --- the fit --------------------------------------------------------------------------- */
 
-/* Rows of the derivatives by all unknowns at the present fit, and the rest. */
-struct tangent {
-	int n, m;
-	double *row;  /* n × m: columns, delay, contact, drift */
-	double *rest; /* n; NAN: not to be used */
-};
-
 /* Sum of squares of the rest; the coefficients are the best for delay and contact as they
  * are. Negative: there are none. */
-static double make_tangent(struct delay *d, struct tangent *t)
+static double make_tangent(struct delay *d, struct delay_tangent *t)
 {
 	struct delay_grid *grid = &d->grid;
 	double h = 0.02 * (d->high_mm - d->low_mm), squares = 0;
 	int k_delay, whole = (int)floor(d->shift);
-	struct normal normal = {0};
+	struct delay_normal normal = {0};
 
-	make_columns(d, d->contact_mm);
+	delay_columns(d, d->contact_mm);
 	k_delay = normal.m = grid->columns;
 	t->m = grid->columns + 3;
 	for (int i = 0; i < grid->n; i++) {
 		double *row = t->row + (size_t)i * t->m;
 
-		t->rest[i] = usable(d, i, whole) ? 0 : NAN;
+		t->rest[i] = delay_usable(d, i, whole) ? 0 : NAN;
 		for (int k = 0; k < grid->columns && !isnan(t->rest[i]); k++)
 			row[k] = delay_grid_at(grid->column[k], i, d->shift);
 		if (!isnan(t->rest[i]))
-			add_row(&normal, row, grid->target[i]);
+			delay_add_row(&normal, row, grid->target[i]);
 	}
-	if (!solve(&normal, d->c))
+	if (!delay_solve(&normal, d->c))
 		return -1;
 	for (int i = 0; i < grid->n; i++) {
 		double *row = t->row + (size_t)i * t->m, slope = 0, sum = 0;
@@ -344,7 +58,7 @@ static double make_tangent(struct delay *d, struct tangent *t)
 		squares += t->rest[i] * t->rest[i];
 	}
 	for (int side = -1; d->touches && side <= 1; side += 2) {
-		make_columns(d, d->contact_mm + side * h);
+		delay_columns(d, d->contact_mm + side * h);
 		for (int i = 0; i < grid->n; i++)
 			for (int k = 0; k < grid->columns && !isnan(t->rest[i]); k++)
 				t->row[(size_t)i * t->m + k_delay + 1] +=
@@ -354,27 +68,26 @@ static double make_tangent(struct delay *d, struct tangent *t)
 	return squares;
 }
 
-/* Of all rows, or of those of one block; the last `without` unknowns are left out. */
-static void tangent_normal(const struct tangent *t, int from, int to, int without,
-			   struct normal *normal)
+void delay_tangent_normal(const struct delay_tangent *t, int from, int to, int without,
+			  struct delay_normal *normal)
 {
 	memset(normal, 0, sizeof(*normal));
 	normal->m = t->m - without;
 	for (int i = from; i < to && i < t->n; i++)
 		if (!isnan(t->rest[i]))
-			add_row(normal, t->row + (size_t)i * t->m, t->rest[i]);
+			delay_add_row(normal, t->row + (size_t)i * t->m, t->rest[i]);
 }
 
 /* Steps of delay and contact that make it better; a step that does not is halved. */
-static bool refine(struct delay *d, struct tangent *t)
+static bool refine(struct delay *d, struct delay_tangent *t)
 {
-	double step[UNKNOWNS], scale = d->high_mm - d->low_mm, moved = 1;
+	double step[DELAY_UNKNOWNS], scale = d->high_mm - d->low_mm, moved = 1;
 	double squares = make_tangent(d, t), shift, contact;
-	struct normal normal;
+	struct delay_normal normal;
 
 	for (int pass = 0; pass < ITERATIONS && moved > 1e-4 && squares > 0; pass++) {
-		tangent_normal(t, 0, t->n, 1, &normal);
-		if (!solve(&normal, step))
+		delay_tangent_normal(t, 0, t->n, 1, &normal);
+		if (!delay_solve(&normal, step))
 			return false;
 		shift = fmax(-3, fmin(3, step[d->grid.columns]));
 		contact =
@@ -394,7 +107,7 @@ static bool refine(struct delay *d, struct tangent *t)
 				d->touches = false;
 				d->contact_mm = d->floor_mm;
 			}
-			if (fabs(d->shift) > d->range + COARSE_LAG)
+			if (fabs(d->shift) > d->range + BEYOND)
 				return false;
 			now = make_tangent(d, t);
 			if ((now >= 0 && now <= squares) || share < 0.01) {
@@ -409,7 +122,7 @@ static bool refine(struct delay *d, struct tangent *t)
 	return squares >= 0;
 }
 
-/* --- how well it is known -------------------------------------------------------------- */
+/* --- the whole ------------------------------------------------------------------------- */
 
 static int ascending(const void *a, const void *b)
 {
@@ -417,81 +130,6 @@ static int ascending(const void *a, const void *b)
 
 	return (x > y) - (x < y);
 }
-
-/* Standard deviation of `value` n times; few blocks have Student's tails, k = 2 holds them. */
-static double spread(const double *value, int n, int blocks)
-{
-	double mean = 0, sum = 0, freedom = blocks - 2;
-
-	for (int i = 0; i < n; i++)
-		mean += value[i] / n;
-	for (int i = 0; i < n; i++)
-		sum += (value[i] - mean) * (value[i] - mean);
-	return sqrt(sum / (n - 1) * blocks / freedom) * (1 + 1.21 / freedom);
-}
-
-/* Draw blocks of the run again and again, and solve for each. */
-static int bootstrap(struct delay *d, const struct tangent *t,
-		     struct incise_delay_fit *fit, struct incise_error *err)
-{
-	int length = (int)(BLOCK_S / DELAY_STEP_S), n = t->n / length, used = 0;
-	int at = d->grid.columns;
-	struct normal *blocks = malloc((size_t)(n + 1) * sizeof(*blocks));
-	double delays[DRAWS], drifts[DRAWS], x[UNKNOWNS], wider, plain, ms;
-	uint64_t state = 1;
-
-	if (!blocks)
-		return incise_error_set(err, ENOMEM, "out of memory");
-	for (int b = 0; b < n; b++) {
-		tangent_normal(t, b * length, (b + 1) * length, 0, &blocks[used]);
-		used += blocks[used].yy > 0;
-	}
-	fit->blocks = used;
-	if (used < BLOCKS_MIN) {
-		free(blocks);
-		return incise_error_set(err, EDOM,
-					"too much of the motion is missing; record "
-					"longer");
-	}
-	for (int draw = 0; draw < DRAWS; draw++) {
-		struct normal sum = {.m = t->m}, without;
-
-		for (int b = 0; b < used; b++) {
-			state = state * 6364136223846793005u + 1442695040888963407u;
-			add_normal(&sum, &blocks[(state >> 33) % (unsigned int)used], 1);
-		}
-		drifts[draw] = solve(&sum, x) ? x[t->m - 1] : 0;
-		without = (struct normal){.m = t->m - 1, .yy = sum.yy};
-		for (int i = 0; i < without.m; i++) {
-			without.b[i] = sum.b[i];
-			for (int j = 0; j <= i; j++)
-				without.a[i * without.m + j] = sum.a[i * sum.m + j];
-		}
-		delays[draw] = solve(&without, x) ? x[at] : 0;
-	}
-	ms = DELAY_STEP_S * 1e3;
-	fit->sd_ms = spread(delays, DRAWS, used) * ms;
-	fit->drift_sd_ms = spread(drifts, DRAWS, used) * ms;
-	{
-		struct normal sum = {.m = t->m};
-
-		for (int b = 0; b < used; b++)
-			add_normal(&sum, &blocks[b], 1);
-		fit->drift_ms = solve(&sum, x) ? x[t->m - 1] * ms : NAN;
-	}
-	free(blocks);
-	/* the quantiles, as much wider as the standard deviation was made */
-	qsort(delays, DRAWS, sizeof(*delays), ascending);
-	plain = 0;
-	for (int i = 0; i < DRAWS; i++)
-		plain += delays[i] * delays[i] / DRAWS;
-	wider = plain > 0 ? fit->sd_ms / (sqrt(plain) * ms) : 1;
-	fit->low_ms = fit->delay_ms + delays[DRAWS / 40] * wider * ms;
-	fit->high_ms = fit->delay_ms + delays[DRAWS - 1 - DRAWS / 40] * wider * ms;
-	return 0;
-}
-
-/* --- the whole ------------------------------------------------------------------------- */
 
 static int measure_motion(struct delay *d, struct incise_error *err)
 {
@@ -521,16 +159,16 @@ static int fit_delay(struct delay *d, struct incise_delay_fit *fit,
 		     struct incise_error *err)
 {
 	struct delay_grid *grid = &d->grid;
-	struct tangent t = {.n = grid->n};
+	struct delay_tangent t = {.n = grid->n};
 	double rest = 0, all = 0;
 	int rc = measure_motion(d, err);
 
 	if (!rc)
-		rc = search(d, fit, err);
+		rc = delay_search(d, fit, err);
 	if (rc)
 		return rc;
-	search_contact(d);
-	t.row = malloc((size_t)grid->n * UNKNOWNS * sizeof(double));
+	delay_search_contact(d);
+	t.row = malloc((size_t)grid->n * DELAY_UNKNOWNS * sizeof(double));
 	t.rest = malloc((size_t)grid->n * sizeof(double));
 	if (!t.row || !t.rest)
 		rc = incise_error_set(err, ENOMEM, "out of memory");
@@ -547,7 +185,7 @@ static int fit_delay(struct delay *d, struct incise_delay_fit *fit,
 		fit->correlation = sqrt(fmax(0, 1 - rest / all));
 		fit->delay_ms = d->shift * DELAY_STEP_S * 1e3;
 		fit->contact_mm = d->touches ? d->contact_mm : NAN;
-		rc = bootstrap(d, &t, fit, err);
+		rc = delay_bootstrap(d, &t, fit, err);
 	}
 	free(t.row);
 	free(t.rest);
