@@ -1,0 +1,407 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Scale of the picture from two points and from a line; see incise/calibrate_depth.h.
+ *
+ *     pairs ─ start that bears outliers ─ which are near ─ least squares ─ budget
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/calibrate_depth.h>
+#include "repeats.h"
+
+/* What calibration.conf takes for depth_mm_px is wider; no camera of a cut is outside. */
+#define SCALE_MIN 1e-4
+#define SCALE_MAX 1.0
+
+#define OUTLIERS_MAX 0.3
+#define POINTS_NEAR 5.0 /* robust standard deviations */
+#define PAIRS_NEAR 4.0	/* of which noise exceeds once in 16000 */
+#define FLOOR_PX 0.01	/* noise below is rounding */
+#define FEW 10		/* points, whose robust standard deviation is chance */
+#define FEW_FLOOR_PX 0.2
+#define MEDIANS_MAX 2000 /* pairs in the repeated median; its time is their square */
+#define ROUNDS 20
+
+static void add_part(struct incise_depth_fit *fit, const char *name, char type, double u,
+		     const char *unit, double sensitivity)
+{
+	fit->part[fit->n_parts++] =
+		(struct incise_depth_part){name, type, u, unit, sensitivity};
+}
+
+static double budget(const struct incise_depth_part *part, int n)
+{
+	double sum = 0;
+
+	for (int i = 0; i < n; i++)
+		sum += part[i].u * part[i].sensitivity * part[i].u * part[i].sensitivity;
+	return sqrt(sum);
+}
+
+static int check_values(const double *values, int n, const char *name, bool positive,
+			struct incise_error *err)
+{
+	for (int i = 0; i < n; i++)
+		if (!isfinite(values[i]) || (positive && !(values[i] > 0)))
+			return incise_error_set(err, EINVAL, "%s %d is %g; give a %s",
+						name, i + 1, values[i],
+						positive ? "number above 0" : "number");
+	return 0;
+}
+
+static int check_outliers(int n, int inliers, struct incise_error *err)
+{
+	if (n - inliers <= OUTLIERS_MAX * n)
+		return 0;
+	return incise_error_set(
+		err, EDOM,
+		"%d of %d readings are outliers; more than 30 %% is no "
+		"calibration: see that the scalpel is found in the pictures",
+		n - inliers, n);
+}
+
+static int check_scale(double mm_px, struct incise_error *err)
+{
+	if (mm_px >= SCALE_MIN && mm_px <= SCALE_MAX)
+		return 0;
+	return incise_error_set(
+		err, EDOM,
+		"%.5g mm per pixel is no scale of a camera over a cut: are "
+		"mm and pixels swapped?",
+		mm_px);
+}
+
+/* ---- two points --------------------------------------------------------------------- */
+
+int incise_calibrate_depth_points(const struct incise_depth_points *points, bool *inlier,
+				  struct incise_depth_fit *fit, struct incise_error *err)
+{
+	const double *px = points->length_px;
+	double median, spread, mean = 0, u_mean;
+	double *copy;
+	bool *near;
+	int n = points->n, rc, k = 0;
+
+	*fit = (struct incise_depth_fit){.mm_px = NAN, .u_mm_px = NAN, .n = n};
+	fit->bend_mm = fit->bend_sd_mm = NAN;
+	if (n < 1)
+		return incise_error_set(err, EDOM, "no length in pixels was given");
+	rc = check_values(px, n, "length", true, err);
+	if (!rc)
+		rc = check_values(&points->length_mm, 1, "the known length, mm: number",
+				  true, err);
+	if (!rc && (!(points->u_length_mm >= 0) || !(points->u_px >= 0) ||
+		    !isfinite(points->u_length_mm + points->u_px)))
+		rc = incise_error_set(err, EINVAL, "an uncertainty is below 0");
+	if (rc)
+		return rc;
+	copy = malloc(n * sizeof(*copy));
+	near = malloc(n * sizeof(*near));
+	if (!copy || !near) {
+		rc = incise_error_set(err, ENOMEM, "out of memory");
+		goto out;
+	}
+	memcpy(copy, px, n * sizeof(*copy));
+	median = repeats_median(copy, n);
+	for (int i = 0; i < n; i++)
+		copy[i] = fabs(px[i] - median);
+	spread = fmax(repeats_sd(copy, n), n < FEW ? FEW_FLOOR_PX : FLOOR_PX);
+	for (int i = 0; i < n; i++) {
+		near[i] = n < 5 || fabs(px[i] - median) <= POINTS_NEAR * spread;
+		if (near[i])
+			copy[k++] = px[i];
+	}
+	if (inlier)
+		memcpy(inlier, near, n * sizeof(*near));
+	fit->inliers = k;
+	rc = check_outliers(n, k, err);
+	if (rc)
+		goto out;
+	fit->low_px = fit->high_px = copy[0];
+	for (int i = 0; i < k; i++) {
+		mean += copy[i] / k;
+		fit->low_px = fmin(fit->low_px, copy[i]);
+		fit->high_px = fmax(fit->high_px, copy[i]);
+	}
+	for (int i = 0; i < k; i++)
+		copy[i] -= mean;
+	u_mean = repeats_u(copy, k, 1, &fit->effective);
+	fit->full_px = mean;
+	fit->mm_px = points->length_mm / mean;
+	for (int i = 0; i < k; i++) {
+		fit->sd_mm += copy[i] * copy[i];
+		fit->largest_mm = fmax(fit->largest_mm, fabs(copy[i]) * fit->mm_px);
+	}
+	fit->sd_mm = k > 1 ? sqrt(fit->sd_mm / (k - 1)) * fit->mm_px : NAN;
+	add_part(fit, "known length", 'B', points->u_length_mm, "mm", 1 / mean);
+	add_part(fit, "ends of the length, in all repeats", 'B', points->u_px, "px",
+		 -fit->mm_px / mean);
+	add_part(fit, "repeatability", 'A', u_mean, "px", -fit->mm_px / mean);
+	fit->u_mm_px = budget(fit->part, fit->n_parts);
+	fit->u_full_px = hypot(points->u_px, u_mean);
+	fit->covariance = -fit->mm_px / mean * fit->u_full_px * fit->u_full_px;
+	rc = check_scale(fit->mm_px, err);
+out:
+	free(copy);
+	free(near);
+	return rc;
+}
+
+/* ---- line --------------------------------------------------------------------------- */
+
+struct line {
+	double slope, middle_px,
+		middle_mm; /* depth = middle_mm + slope (px - middle_px) */
+	double sxx;
+};
+
+static double off_line(const struct line *line, double px, double mm)
+{
+	return mm - line->middle_mm - line->slope * (px - line->middle_px);
+}
+
+/* Repeated medians: of the slopes from each pair to all others, and of those. */
+static int start_line(const struct incise_depth_pairs *p, struct line *line)
+{
+	int step = 1 + (p->n - 1) / MEDIANS_MAX, m = 0, rc = -ENOMEM;
+	double *slopes = malloc(p->n * sizeof(*slopes));
+	double *each = malloc(p->n * sizeof(*each));
+
+	if (!slopes || !each)
+		goto out;
+	for (int i = 0; i < p->n; i += step) {
+		int k = 0;
+
+		for (int j = 0; j < p->n; j += step)
+			if (fabs(p->length_px[j] - p->length_px[i]) > 1)
+				slopes[k++] = (p->depth_mm[j] - p->depth_mm[i]) /
+					      (p->length_px[j] - p->length_px[i]);
+		if (k)
+			each[m++] = repeats_median(slopes, k);
+	}
+	rc = -EDOM;
+	if (!m)
+		goto out;
+	line->slope = repeats_median(each, m);
+	line->middle_px = 0;
+	m = 0;
+	for (int i = 0; i < p->n; i++)
+		each[m++] = p->depth_mm[i] - line->slope * p->length_px[i];
+	line->middle_mm = repeats_median(each, m);
+	rc = 0;
+out:
+	free(slopes);
+	free(each);
+	return rc;
+}
+
+/* Least squares of those that are near. */
+static void fit_line(const struct incise_depth_pairs *p, const bool *near,
+		     struct line *line)
+{
+	double sxy = 0;
+	int k = 0;
+
+	line->middle_px = line->middle_mm = line->sxx = 0;
+	for (int i = 0; i < p->n; i++)
+		k += near[i];
+	for (int i = 0; i < p->n; i++)
+		if (near[i]) {
+			line->middle_px += p->length_px[i] / k;
+			line->middle_mm += p->depth_mm[i] / k;
+		}
+	for (int i = 0; i < p->n; i++)
+		if (near[i]) {
+			double x = p->length_px[i] - line->middle_px;
+
+			line->sxx += x * x;
+			sxy += x * (p->depth_mm[i] - line->middle_mm);
+		}
+	line->slope = sxy / line->sxx;
+}
+
+/* How many are near, and whether that is another set than before. */
+static int choose(const struct incise_depth_pairs *p, const struct line *line,
+		  double *residual, bool *near, bool *changed)
+{
+	double spread;
+	int k = 0;
+
+	for (int i = 0; i < p->n; i++)
+		residual[i] = fabs(off_line(line, p->length_px[i], p->depth_mm[i]));
+	spread = repeats_sd(residual, p->n);
+	spread = fmax(spread, FLOOR_PX * fabs(line->slope));
+	*changed = false;
+	for (int i = 0; i < p->n; i++) {
+		bool now = fabs(off_line(line, p->length_px[i], p->depth_mm[i])) <=
+			   PAIRS_NEAR * spread;
+
+		*changed |= now != near[i];
+		near[i] = now;
+		k += now;
+	}
+	return k;
+}
+
+/* What a parabola adds at the ends of the lengths; q = x² without its part along 1, x. */
+static void find_bend(const struct incise_depth_pairs *p, const bool *near,
+		      const struct line *line, struct incise_depth_fit *fit)
+{
+	double sx2 = 0, sx3 = 0, sqq = 0, sqr = 0, srr = 0, factor, end = 0;
+	int k = fit->inliers;
+
+	for (int i = 0; i < p->n; i++)
+		if (near[i]) {
+			double x = p->length_px[i] - line->middle_px;
+
+			sx2 += x * x / k;
+			sx3 += x * x * x;
+		}
+	for (int i = 0; i < p->n; i++)
+		if (near[i]) {
+			double x = p->length_px[i] - line->middle_px;
+			double q = x * x - sx2 - sx3 / line->sxx * x;
+			double r = off_line(line, p->length_px[i], p->depth_mm[i]);
+
+			sqq += q * q;
+			sqr += q * r;
+			srr += r * r;
+			end = fmax(end, fabs(q));
+		}
+	/* Two depths only have no parabola. */
+	if (!(sqq > 1e-6 * k * sx2 * sx2)) {
+		fit->bend_mm = fit->bend_sd_mm = NAN;
+		return;
+	}
+	factor = (double)k / fit->effective;
+	fit->bend_mm = fabs(sqr / sqq) * end;
+	fit->bend_sd_mm =
+		sqrt(fmax(0, srr - sqr * sqr / sqq) / (k - 3) / sqq * factor) * end;
+}
+
+static int check_line(const struct line *line, const struct incise_depth_fit *fit,
+		      struct incise_error *err)
+{
+	double slope = line->slope;
+
+	if (fit->high_px - fit->low_px < INCISE_DEPTH_SPAN_MIN_PX &&
+	    fabs(slope) < SCALE_MAX)
+		return incise_error_set(
+			err, EDOM,
+			"the lengths span %.1f pixels only, %.1f to %.1f: "
+			"give depths over at least %g pixels",
+			fit->high_px - fit->low_px, fit->low_px, fit->high_px,
+			INCISE_DEPTH_SPAN_MIN_PX);
+	if (fabs(slope) > SCALE_MAX && 1 / fabs(slope) > SCALE_MIN)
+		return incise_error_set(
+			err, EDOM,
+			"the columns are swapped: %.4g mm per pixel, which "
+			"the other way round would be %.4g",
+			fabs(slope), 1 / fabs(slope));
+	if (slope > 0)
+		return incise_error_set(
+			err, EDOM,
+			"the length grows with the depth, %.4g mm per "
+			"pixel: what is exposed must shrink; is the sign of "
+			"the depth turned?",
+			slope);
+	return check_scale(-slope, err);
+}
+
+static int fit_pairs(const struct incise_depth_pairs *p, bool *near, double *residual,
+		     struct incise_depth_fit *fit, struct incise_error *err)
+{
+	struct line line = {0};
+	bool changed = true;
+	double u_slope, u_middle, mean_px, zero, *r;
+	int rc, k = 0;
+
+	if (start_line(p, &line) == -ENOMEM)
+		return incise_error_set(err, ENOMEM, "out of memory");
+	/* Lengths all alike: the start has nothing, and the check below names it. */
+	fit->low_px = HUGE_VAL;
+	fit->high_px = -HUGE_VAL;
+	for (int i = 0; i < p->n; i++) {
+		fit->low_px = fmin(fit->low_px, p->length_px[i]);
+		fit->high_px = fmax(fit->high_px, p->length_px[i]);
+	}
+	if (fit->high_px - fit->low_px <= 1)
+		line.slope = 0;
+	rc = check_line(&line, fit, err);
+	if (rc)
+		return rc;
+	for (int round = 0; round < ROUNDS && changed; round++) {
+		k = choose(p, &line, residual, near, &changed);
+		fit->inliers = k;
+		rc = check_outliers(p->n, k, err);
+		if (rc)
+			return rc;
+		fit_line(p, near, &line);
+	}
+	fit->low_px = HUGE_VAL;
+	fit->high_px = -HUGE_VAL;
+	r = residual;
+	for (int i = 0; i < p->n; i++)
+		if (near[i]) {
+			fit->low_px = fmin(fit->low_px, p->length_px[i]);
+			fit->high_px = fmax(fit->high_px, p->length_px[i]);
+			*r++ = off_line(&line, p->length_px[i], p->depth_mm[i]);
+		}
+	rc = check_line(&line, fit, err);
+	if (rc)
+		return rc;
+	if (k < INCISE_DEPTH_PAIRS_MIN)
+		return incise_error_set(err, EDOM, "%d pairs are left: give at least %d",
+					k, INCISE_DEPTH_PAIRS_MIN);
+	for (int i = 0; i < k; i++) {
+		fit->sd_mm += residual[i] * residual[i];
+		fit->largest_mm = fmax(fit->largest_mm, fabs(residual[i]));
+	}
+	fit->sd_mm = sqrt(fit->sd_mm / (k - 2));
+	u_middle = repeats_u(residual, k, 2, &fit->effective);
+	u_slope = u_middle * sqrt(k / line.sxx);
+	fit->mm_px = -line.slope;
+	mean_px = line.middle_px;
+	fit->full_px = mean_px + line.middle_mm / fit->mm_px;
+	add_part(fit, "scatter about the line", 'A', u_slope, "mm/px", 1);
+	add_part(fit, "scale of the gauge", 'B', p->u_scale, "1", fit->mm_px);
+	fit->u_mm_px = budget(fit->part, fit->n_parts);
+	/* full = middle + depth there / slope; a gauge's scale falls out of it but for the
+	 * depth of the middle, where its zero is. */
+	zero = hypot(u_middle, p->u_depth_mm) / fit->mm_px;
+	fit->u_full_px = hypot(zero, line.middle_mm / fit->mm_px / fit->mm_px * u_slope);
+	fit->covariance = -line.middle_mm / fit->mm_px / fit->mm_px * u_slope * u_slope;
+	find_bend(p, near, &line, fit);
+	return 0;
+}
+
+int incise_calibrate_depth_line(const struct incise_depth_pairs *pairs, bool *inlier,
+				struct incise_depth_fit *fit, struct incise_error *err)
+{
+	bool *near = calloc(pairs->n > 0 ? pairs->n : 1, sizeof(*near));
+	double *residual = calloc(pairs->n > 0 ? pairs->n : 1, sizeof(*residual));
+	int rc = 0;
+
+	*fit = (struct incise_depth_fit){.mm_px = NAN, .u_mm_px = NAN, .n = pairs->n};
+	if (!near || !residual)
+		rc = incise_error_set(err, ENOMEM, "out of memory");
+	else if (pairs->n < INCISE_DEPTH_PAIRS_MIN)
+		rc = incise_error_set(err, EDOM, "%d pairs: give at least %d", pairs->n,
+				      INCISE_DEPTH_PAIRS_MIN);
+	else if (!(pairs->u_scale >= 0) || !(pairs->u_depth_mm >= 0) ||
+		 !isfinite(pairs->u_scale + pairs->u_depth_mm))
+		rc = incise_error_set(err, EINVAL, "an uncertainty is below 0");
+	if (!rc)
+		rc = check_values(pairs->depth_mm, pairs->n, "depth", false, err);
+	if (!rc)
+		rc = check_values(pairs->length_px, pairs->n, "length", false, err);
+	if (!rc)
+		rc = fit_pairs(pairs, near, residual, fit, err);
+	if (inlier && near)
+		memcpy(inlier, near, (pairs->n > 0 ? pairs->n : 0) * sizeof(*near));
+	free(near);
+	free(residual);
+	return rc;
+}
