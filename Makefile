@@ -36,6 +36,9 @@ cflags := -std=gnu11 -fPIC -fvisibility=hidden -fno-math-errno -ffp-contract=off
 opencv_cflags := $(or $(shell $(PKG_CONFIG) --cflags opencv4 2>/dev/null),-I/usr/include/opencv4)
 has_vision := $(if $(shell $(CXX) -E -x c++ $(opencv_cflags) -include opencv2/imgproc.hpp \
 	-include cstdio -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes),yes)
+# Boards are found where more of it is.
+has_board := $(if $(has_vision),$(if $(shell $(CXX) -E -x c++ $(opencv_cflags) \
+	-include opencv2/calib3d.hpp /dev/null >/dev/null 2>&1 && echo yes),yes))
 
 # One shared object per group of rooms; a process maps only the ones it uses.
 libraries := incise incise-learn incise-record

@@ -109,6 +109,14 @@ objects_vision_opencv := $(addprefix $(O)/obj/,$(addsuffix .o,$(basename \
 libs_vision_opencv := -lopencv_imgproc -lopencv_core -ljpeg -lstdc++
 $(objects_vision_opencv): pc_cflags = $(opencv_cflags)
 
+# What finds a board in them; more of OpenCV, which who measures depth need not map.
+device_modules += $(if $(has_board),board_opencv)
+pc_board_opencv :=
+objects_board_opencv := $(addprefix $(O)/obj/lib/,vision/picture.o vision/jpeg.o \
+	board/board_opencv.o)
+libs_board_opencv := -lopencv_calib3d $(libs_vision_opencv)
+$(O)/obj/lib/board/board_opencv.o: pc_cflags = $(opencv_cflags)
+
 # Pictures in a file; lib/record loads it.
 has_frames := $(shell $(PKG_CONFIG) --exists libavformat libavcodec libavutil && echo yes)
 device_modules += $(if $(has_frames),frames_mkv)

@@ -133,6 +133,19 @@ struct incise_vision {
 	const struct incise_vision_ops *ops;
 };
 
+struct incise_board;
+
+/** Nor is what finds a board, see incise/board.h; it needs nothing of the request. */
+struct incise_board_ops {
+	int (*find)(struct incise_board *board, const struct incise_camera_frame *frame,
+		    int columns, int rows, double *corners, struct incise_error *err);
+	void (*close)(struct incise_board *board);
+};
+
+struct incise_board {
+	const struct incise_board_ops *ops;
+};
+
 /** Changes when any struct of this header does. */
 #define INCISE_BACKEND_ABI 4
 
@@ -161,7 +174,7 @@ struct incise_backend_request {
  */
 struct incise_backend {
 	unsigned int abi; /**< INCISE_BACKEND_ABI */
-	const char *kind; /**< "tracker", "force", "camera", "stepper" or "vision" */
+	const char *kind; /**< "tracker", "force", "camera", "stepper", … */
 	const char *name; /**< letters a to z, digits, underscores; below 32 */
 	/**
 	 * Open a device. Whatever was powered when it is closed must be brought to rest.

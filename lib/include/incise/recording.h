@@ -85,6 +85,28 @@ INCISE_API int incise_recording_poses(struct incise_recording *recording,
 				      struct incise_tracker_sample **poses,
 				      struct incise_error *err);
 
+/** Exposed length in a picture beside the tracker's depth when it was taken. */
+struct incise_recording_length {
+	int64_t t_ns; /**< of the picture, CLOCK_MONOTONIC */
+	double length_px;
+	double quality;	 /**< as incise/vision.h */
+	double depth_mm; /**< below 0 in the air */
+	double velocity_mm_s;
+};
+
+/**
+ * All pictures in which the scalpel was found when they were recorded, in order, with the
+ * depth interpolated between the tracker's records around each; those without a record
+ * within 50 ms on both sides are left out.
+ *
+ * @param lengths to be freed with free(3); NULL for none
+ * @return how many; -EINVAL (a row that cannot be; a recording of form 1 has no pictures),
+ *         -E2BIG (more than 10 million), -EIO, -ENOMEM
+ */
+INCISE_API int incise_recording_lengths(struct incise_recording *recording,
+					struct incise_recording_length **lengths,
+					struct incise_error *err);
+
 /** How to export. */
 struct incise_export_options {
 	double rate_hz; /**< rows per second of raw export, averaged over the force samples

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The module that finds a chessboard, on OpenCV; see incise/board.h. No exception gets past
+ * this file.
+ */
+#include <cerrno>
+#include <new>
+#include <vector>
+#include <opencv2/calib3d.hpp>
+#include <incise/backend.h>
+#include <incise/board.h>
+#include "../vision/picture.h"
+
+namespace
+{
+
+int find(const struct incise_camera_frame &frame, int columns, int rows, double *corners,
+	 struct incise_error *err)
+{
+	vision::picture picture;
+	int ret = picture.take(frame);
+
+	if (ret)
+		return incise_error_set(err, -ret,
+					"board: the picture's sizes do not fit");
+	if (columns < 3 || columns > 100 || rows < 3 || rows > 100)
+		return incise_error_set(err, EINVAL,
+					"board: %d x %d inner corners: give 3 to 100",
+					columns, rows);
+	ret = picture.bring(cv::Rect(cv::Point(), picture.size));
+	if (ret)
+		return incise_error_set(err, -ret,
+					"board: the picture cannot be decoded");
+
+	cv::Mat grey(picture.size, CV_8U);
+	std::vector<cv::Point2f> found;
+
+	for (int y = 0; y < grey.rows; y++)
+		for (int x = 0; x < grey.cols; x++) {
+			float v[3];
+
+			picture.pixel(x, y, v);
+			if (picture.channels() == 3)
+				v[0] = 0.299f * v[0] + 0.587f * v[1] + 0.114f * v[2];
+			grey.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(v[0]);
+		}
+	if (!cv::findChessboardCornersSB(grey, cv::Size(columns, rows), found,
+					 cv::CALIB_CB_EXHAUSTIVE | cv::CALIB_CB_ACCURACY |
+						 cv::CALIB_CB_NORMALIZE_IMAGE) ||
+	    (int)found.size() != columns * rows)
+		return incise_error_set(
+			err, ENODATA,
+			"board: no chessboard of %d x %d inner corners is "
+			"to be seen: show all of it, sharp and evenly lit, "
+			"with white around it",
+			columns, rows);
+	/* OpenCV counts from the middle of the first pixel. */
+	for (const cv::Point2f &corner : found) {
+		*corners++ = corner.x + 0.5;
+		*corners++ = corner.y + 0.5;
+	}
+	return 0;
+}
+
+int opencv_find(struct incise_board *, const struct incise_camera_frame *frame,
+		int columns, int rows, double *corners, struct incise_error *err)
+{
+	try {
+		return find(*frame, columns, rows, corners, err);
+	} catch (const std::bad_alloc &) {
+		return incise_error_set(err, ENOMEM, "board: out of memory");
+	} catch (...) {
+		return incise_error_set(err, EIO, "board: OpenCV failed");
+	}
+}
+
+void opencv_close(struct incise_board *)
+{
+}
+
+/* There is nothing to keep from one picture to the next. */
+void *opencv_open(const struct incise_backend_request *, struct incise_error *)
+{
+	static const struct incise_board_ops ops = {opencv_find, opencv_close};
+	static struct incise_board board = {&ops};
+
+	cv::setNumThreads(1);
+	return &board;
+}
+
+} // namespace
+
+extern "C" {
+INCISE_API extern const struct incise_backend incise_backend;
+
+const struct incise_backend incise_backend = {INCISE_BACKEND_ABI, "board", "opencv",
+					      opencv_open, nullptr};
+}
