@@ -147,6 +147,15 @@ $(O)/tests/frames: tests/bench/frames.c $(O)/lib/libincise-tests.a
 check-frames: $(O)/tests/frames ## CPU per picture and bytes per hour of each format
 	$(O)/tests/frames $(O)/tests
 
+# Virtual rigs with known truth, seen through the module of vision.
+$(O)/tests/calibrate_depth: tests/bench/calibrate_depth.c libs
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
+		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise -lincise-learn -lm
+
+check-depth: $(O)/tests/calibrate_depth ## whether stated intervals of depth hold the truth on 200 virtual rigs
+	$(O)/tests/calibrate_depth
+
 TRACKER_SECONDS ?= 600
 check-tracker: $(O)/tests/tracker_line ## a FASTRAK at a serial line for ten minutes, clean and with harm on the way
 	$(O)/tests/tracker_line $(TRACKER_SECONDS)
@@ -155,4 +164,4 @@ check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the sh
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 
-.PHONY: check-exhaustive check-frames check-tracker
+.PHONY: check-exhaustive check-frames check-tracker check-depth

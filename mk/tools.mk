@@ -24,6 +24,8 @@ extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o pictu
 extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stopwatch.o)
 extra_calibrate-force := $(addprefix $(O)/obj/tools/,picture.o calibrate_pairs.o \
 	calibrate_weights.o calibrate_force_report.o)
+extra_calibrate-depth := $(addprefix $(O)/obj/tools/,picture.o depth_picture.o depth_frames.o \
+	depth_lengths.o depth_corners.o depth_report.o)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o \
 	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
@@ -34,6 +36,11 @@ extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/jpeg_camera.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 libs_bench := $(if $(has_jpeg),-ljpeg)
+
+# Picture files that depth is calibrated from.
+has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
+$(O)/obj/tools/depth_picture.o: cppflags += $(if $(has_png),-DHAVE_PNG)
+libs_calibrate-depth := $(if $(has_png),-lpng)
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
 # built where its headers are. It is for measuring, and is not installed.

@@ -122,7 +122,7 @@ int incise_recording_lengths(struct incise_recording *recording,
 	if (rc)
 		return rc;
 	rc = incise_rows_open(&l.frames, recording, "frames",
-			      "seq, t_ns, ifnull(length_px, 0), ifnull(quality, 0)",
+			      "seq, t_ns, ifnull(length_px, 0.0), ifnull(quality, 0.0)",
 			      "iirr", UINT64_MAX, err);
 	if (!rc)
 		rc = incise_rows_open(&l.depth, recording, "depth",
