@@ -24,7 +24,7 @@
 #define U_SQUARE 0.02 /* % */
 #define U_PLANE_MM 0.1
 #define U_WORST 0.005 /* 2 u of more than that, relative, is no calibration */
-#define BEND_MM 0.2 /* that one number is off, within a handle's length */
+#define BEND_MM 0.2   /* that one number is off, within a handle's length */
 #define BEND_SD 4.0
 #define FILES_MAX 1000
 
