@@ -34,6 +34,7 @@ struct depth_source {
 	double every_s;	  /* between two, of a board */
 	const char *pick; /* "X,Y", or NULL */
 	bool guided;	  /* ask on the terminal */
+	bool each;	  /* for each picture, as a board is moved in between */
 	char device[64];  /* out: where they came from */
 	bool found_setup; /* out: setup says what the handle looks like */
 	struct incise_vision_setup setup;

@@ -74,7 +74,7 @@ static void of_camera(struct depth_source *source, int pictures, const char *pro
 		struct incise_camera_frame frame;
 		char name[20];
 
-		if (source->guided && (source->every_s > 0 || !taken)) {
+		if (source->guided && (source->each || !taken)) {
 			ask(prompt, taken + 1);
 			drop_old(rig);
 		} else if (taken && source->every_s > 0) {

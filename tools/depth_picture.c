@@ -69,7 +69,7 @@ static size_t number(const uint8_t *d, size_t size, size_t at, unsigned long *va
 	bool any = false;
 
 	*value = 0;
-	while (at < size && (d[at] == '#' || strchr(" \t\r\n", d[at]))) {
+	while (at < size && (d[at] == '#' || memchr(" \t\r\n", d[at], 4))) {
 		if (d[at] == '#')
 			while (at < size && d[at] != '\n')
 				at++;
