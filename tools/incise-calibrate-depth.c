@@ -277,7 +277,7 @@ static void by_lengths(struct wish *wish, struct depth_result *result,
 	int rc;
 
 	if (wish->pixels) {
-		char *items[FILES_MAX], name[20];
+		char *items[FILES_MAX], name[30];
 		int n = cli_list("pixels", wish->pixels, items, FILES_MAX);
 
 		for (int i = 0; i < n; i++) {
