@@ -76,6 +76,11 @@ static const struct key keys[] = {
 	KEY(KEY_DOUBLE, hand_N_mm, 1, 0, 1000),
 	/* Some damping always: it takes up what the moving nut puts in. */
 	KEY(KEY_DOUBLE, hand_N_s_mm, 0.01, 0.0001, 10),
+	KEY(KEY_INT, bench, 0, 0, 1),
+	KEY(KEY_DOUBLE, backlash_mm, 0, 0, 10),
+	KEY(KEY_DOUBLE, hysteresis_N, 0, 0, 10),
+	KEY(KEY_DOUBLE, stiction_N, 0, 0, 10),
+	KEY(KEY_DOUBLE, stall_mm_s, 0, 0, 10000),
 };
 
 #define N_KEYS (sizeof(keys) / sizeof(keys[0]))

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * The virtual force channel: force on the blade → bridge, amplifier → 12-bit converter
- * over 5 V, in codes. Samples lie on the exact grid n / force_hz.
+ * over 5 V, in codes. On the bench the force is that of the actuator. Samples lie on the exact grid n / force_hz.
  */
 #include <errno.h>
 #include <math.h>
@@ -43,9 +43,12 @@ static void sim_force_sample(struct incise_sim_stream *stream,
 	const struct incise_sim_config *config = &sim->config;
 	struct incise_force_sample sample;
 	struct incise_blade blade;
-	double force_N;
+	double force_N = 0;
 
-	incise_sim_sense(sim, stream->t_ns, &blade, &force_N);
+	if (!config->bench)
+		incise_sim_sense(sim, stream->t_ns, &blade, &force_N);
+	else if (sim->press_N)
+		force_N = sim->press_N(sim->stepper, stream->t_ns);
 	sample = (struct incise_force_sample){
 		.t_ns = sim->start_ns + stream->t_ns,
 		.seq = f->n - f->first,

@@ -10,11 +10,14 @@
  *   speed   limit  ____________
  *                 /            \         slopes: the largest acceleration
  *           _____/              \_____
+ *
+ * On the bench the handle presses a stiff sensor instead: see bench.h.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include "bench.h"
 #include "sim.h"
 #include "world.h"
 
@@ -33,6 +36,8 @@ struct sim_stepper {
 	long steps_max; /* whole microsteps in the travel */
 	double target_mm, nut_mm, nut_mm_s;
 	double handle_mm, handle_mm_s;
+	double limit_mm_s; /* of the nut: that of the screw, or of a jog */
+	struct incise_bench bench;
 };
 
 static struct sim_stepper *of_stepper(const struct incise_stepper *stepper)
@@ -68,7 +73,7 @@ static void move_nut(struct sim_stepper *s)
 	double change = config->screw_mm_s2 * TICK_S;
 	double v = stopping_speed(s->target_mm - s->nut_mm, config->screw_mm_s2);
 
-	v = fmax(-config->screw_mm_s, fmin(config->screw_mm_s, v));
+	v = fmax(-s->limit_mm_s, fmin(s->limit_mm_s, v));
 	v = fmax(s->nut_mm_s - change, fmin(s->nut_mm_s + change, v));
 	s->nut_mm += v * TICK_S;
 	s->nut_mm_s = v;
@@ -107,13 +112,29 @@ static void advance(struct sim_stepper *s, int64_t now)
 			s->faults |= INCISE_STEPPER_DEADMAN;
 		}
 		move_nut(s);
-		move_handle(s, (before + nut_held(s)) / 2);
+		if (s->sim->config.bench)
+			incise_bench_follow(&s->bench, &s->sim->config, nut_held(s),
+					    s->nut_mm_s);
+		else
+			move_handle(s, (before + nut_held(s)) / 2);
 		s->t_ns += INCISE_SIM_TICK_NS;
 	}
 }
 
+/* For the force channel, which asks at its own times, none of them later than ours. */
+static double press_N(struct incise_stepper *stepper, int64_t t_ns)
+{
+	struct sim_stepper *s = of_stepper(stepper);
+
+	advance(s, t_ns);
+	return s->bench.force_N;
+}
+
 static int64_t script_now(const struct sim_stepper *s)
 {
+	/* Samples from before a target must not show what it does. */
+	if (s->sim->config.bench)
+		incise_sim_advance(s->sim);
 	return incise_clock_now(s->sim->clock) - s->sim->start_ns;
 }
 
@@ -127,6 +148,7 @@ static int sim_stepper_set(struct incise_stepper *stepper, double position_mm)
 	/* Neither a target nor a sign of life. */
 	if (!isfinite(position_mm))
 		return -EDOM;
+	s->limit_mm_s = s->sim->config.screw_mm_s;
 	s->faults = position_mm < 0 || position_mm > s->sim->config.travel_mm
 			    ? INCISE_STEPPER_TRAVEL
 			    : 0;
@@ -135,6 +157,30 @@ static int sim_stepper_set(struct incise_stepper *stepper, double position_mm)
 	s->set_ns = now;
 	s->watched = true;
 	return 0;
+}
+
+/* The bench alone has it: there a speed is what is asked for. */
+static int sim_stepper_jog(struct incise_stepper *stepper, double velocity_mm_s)
+{
+	struct sim_stepper *s = of_stepper(stepper);
+	const struct incise_sim_config *config = &s->sim->config;
+	double stop_mm;
+	int rc;
+
+	if (!config->bench)
+		return -EOPNOTSUPP;
+	if (!isfinite(velocity_mm_s))
+		return -EDOM;
+	advance(s, script_now(s));
+	stop_mm = s->nut_mm +
+		  copysign(s->nut_mm_s * s->nut_mm_s / (2 * config->screw_mm_s2),
+			   s->nut_mm_s);
+	rc = sim_stepper_set(stepper, velocity_mm_s > 0	  ? config->travel_mm
+				      : velocity_mm_s < 0 ? 0
+							  : stop_mm);
+	if (velocity_mm_s != 0)
+		s->limit_mm_s = fmin(fabs(velocity_mm_s), config->screw_mm_s);
+	return rc;
 }
 
 /* A target where it stands. The virtual actuator is always powered. */
@@ -185,6 +231,9 @@ static int sim_stepper_status(struct incise_stepper *stepper,
 
 	advance(s, script_now(s));
 	nut = nut_held(s);
+	/* On the bench nobody holds it, and what it presses is for the force channel. */
+	if (s->sim->config.bench)
+		s->handle_mm = 0;
 	*status = (struct incise_stepper_status){
 		.t_ns = s->sim->start_ns + s->t_ns,
 		.position_mm = nut,
@@ -219,11 +268,18 @@ static void sim_stepper_info(const struct incise_stepper *stepper,
 
 static void sim_stepper_close(struct incise_stepper *stepper)
 {
-	free(of_stepper(stepper));
+	struct sim_stepper *s = of_stepper(stepper);
+
+	if (s->sim->stepper == stepper) {
+		s->sim->press_N = NULL;
+		s->sim->stepper = NULL;
+	}
+	free(s);
 }
 
 static const struct incise_stepper_ops ops = {
 	.set = sim_stepper_set,
+	.jog = sim_stepper_jog,
 	.status = sim_stepper_status,
 	.enable = sim_stepper_enable,
 	.disable = sim_stepper_disable,
@@ -244,8 +300,11 @@ struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim)
 	s->stepper.ops = &ops;
 	s->sim = sim;
 	s->step_mm = config->lead_mm / config->steps_per_turn;
+	s->limit_mm_s = config->screw_mm_s;
 	/* A travel of whole steps must not lose one to the rounding of the division. */
 	s->steps_max = (long)(config->travel_mm / s->step_mm * (1 + 1e-12));
 	s->t_ns = script_now(s) / INCISE_SIM_TICK_NS * INCISE_SIM_TICK_NS;
+	sim->press_N = press_N;
+	sim->stepper = &s->stepper;
 	return &s->stepper;
 }

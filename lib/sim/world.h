@@ -16,6 +16,7 @@
 
 #include <stddef.h>
 #include <incise/sim.h>
+#include <incise/stepper.h>
 #include "surgeon.h"
 #include "tissue.h"
 
@@ -40,6 +41,9 @@ struct incise_sim {
 	struct incise_blade blade; /* at t_ns */
 	struct incise_sim_stream *streams;
 	double load_N; /* hung on the sensor; NAN: the blade is on it */
+	/* What presses the force sensor on the bench, at a script time; or NULL. */
+	double (*press_N)(struct incise_stepper *stepper, int64_t t_ns);
+	struct incise_stepper *stepper;
 };
 
 /* Let a stream listen from the present tick on; its t_ns must not lie before that. */

@@ -82,6 +82,13 @@ struct incise_sim_config {
 	double handle_friction_N; /**< 0.01; Coulomb */
 	double hand_N_mm;	  /**< 1; stiffness of the hand's grip */
 	double hand_N_s_mm;	  /**< 0.01; damping of the hand's grip */
+
+	/* Bench: the handle presses the force sensor, and the force channel shows that. */
+	int bench;	     /**< 0; 1: the actuator stands on the bench */
+	double backlash_mm;  /**< 0; play in front of the spring */
+	double hysteresis_N; /**< 0; loss of the spring between the two ways */
+	double stiction_N;   /**< 0; that the handle holds more than it rubs */
+	double stall_mm_s;   /**< 0; a faster nut loses its steps; 0: none does */
 };
 
 /** What is true at one instant, which no device shows undisturbed. */
