@@ -18,6 +18,9 @@ extra_calibrate-delay := $(addprefix $(O)/obj/tools/,calibrate_result.o delay_st
 extra_capture := $(addprefix $(O)/obj/tools/,capture_view.o keyboard.o stopwatch.o stream_report.o)
 extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
 	stepper_status.o stepper_counters.o)
+extra_calibrate-stepper := $(addprefix $(O)/obj/tools/,calibrate_stepper_series.o \
+	calibrate_stepper_live.o calibrate_stepper_rate.o calibrate_stepper_report.o \
+	stepper_drive.o stepper_status.o stepper_counters.o picture.o)
 extra_haptic := $(addprefix $(O)/obj/tools/,scene_argument.o stepper_counters.o loop_report.o)
 extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o picture.o \
 	replay_picture.o)

@@ -23,11 +23,16 @@
 void stepper_drive_open(struct stepper_drive *drive, const char *rig, bool watch,
 			const char *doing)
 {
-	unsigned int devices = INCISE_RIG_STEPPER | (watch ? INCISE_RIG_WATCH : 0);
+	stepper_drive_open_with(drive, rig, watch ? INCISE_RIG_WATCH : 0, doing);
+}
+
+void stepper_drive_open_with(struct stepper_drive *drive, const char *rig,
+			     unsigned int devices, const char *doing)
+{
 	struct incise_error err = {0};
 
 	*drive = (struct stepper_drive){.doing = doing};
-	drive->rig = incise_rig_open(cli_rig(rig), devices, &err);
+	drive->rig = incise_rig_open(cli_rig(rig), INCISE_RIG_STEPPER | devices, &err);
 	if (!drive->rig)
 		cli_fail_with(&err);
 	drive->clock = incise_rig_clock(drive->rig);

@@ -35,6 +35,10 @@ struct stepper_drive {
 void stepper_drive_open(struct stepper_drive *drive, const char *rig, bool watch,
 			const char *doing);
 
+/* The same as its owner, with other devices of the rig: INCISE_RIG_FORCE. */
+void stepper_drive_open_with(struct stepper_drive *drive, const char *rig,
+			     unsigned int devices, const char *doing);
+
 /* Power it; from here on signals set cli_stop. */
 void stepper_drive_power(struct stepper_drive *drive);
 
