@@ -124,6 +124,17 @@ static void read_point(struct reader *r, char **columns, struct stepper_series *
 		r->counted = fabs(steps - r->first_steps);
 		r->mm = fabs(mm - r->first_mm);
 	}
+	if (fabs(steps - round(steps)) > 1e-3)
+		cli_fail("%s:%d: steps is %.6g and no whole number; are columns swapped?",
+			 r->path, r->line, steps);
+	/* From the second place on that is another: all of them are to be as far apart. */
+	if (r->counted > 0 && r->mm > 0 && r->position >= 0 &&
+	    fabs(fabs(mm - r->first_mm) -
+		 fabs(steps - r->first_steps) * r->mm / r->counted) >
+		    1.5 * r->mm / r->counted + 0.01 * r->mm)
+		cli_fail(
+			"%s:%d: position_mm and steps do not go together; are columns swapped?",
+			r->path, r->line);
 	if (series->n == POINTS_MAX)
 		cli_fail("%s:%d: more than %d points; take every tenth", r->path, r->line,
 			 POINTS_MAX);
