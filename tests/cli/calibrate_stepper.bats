@@ -133,7 +133,6 @@ made_points() {
 		if (n > 180) F -= 0.1|steps were lost
 		if (F > 2) F = 2|does not follow
 		y = x; x = F; F = y|swapped
-		s = F|swapped
 	END
 	made_points '' | awk -F, 'NR < 70' >p.csv
 	stepper --from p.csv
