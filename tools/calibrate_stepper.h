@@ -58,7 +58,6 @@ struct stepper_live {
 	bool retreating; /* it is on its way from too much force */
 	int64_t begin_ns;
 	int strokes;
-	bool quiet;
 };
 
 /*
@@ -89,7 +88,6 @@ struct stepper_report {
 	const struct stepper_rate *rate;
 	const struct incise_calibration_record *record;
 	const char *source; /* device, or file */
-	double max_N;	    /* NAN: from a file */
 };
 
 void stepper_report_text(const struct stepper_report *report, FILE *out);

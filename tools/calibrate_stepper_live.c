@@ -210,7 +210,7 @@ void stepper_live_plan(struct stepper_live *live)
 }
 
 /* On a terminal, somebody has to say that nothing is in the way. */
-static void confirm(const struct stepper_live *live)
+static void confirm(struct stepper_live *live)
 {
 	int c;
 
@@ -225,7 +225,7 @@ static void confirm(const struct stepper_live *live)
 		live->low_mm, live->high_mm, live->max_N);
 	while ((c = getchar()) != '\n')
 		if (c == EOF)
-			stepper_drive_fail((struct stepper_drive *)&live->drive,
+			stepper_drive_fail(&live->drive,
 					   "not confirmed; nothing was moved");
 }
 

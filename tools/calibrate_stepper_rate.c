@@ -141,7 +141,8 @@ void stepper_live_rate(struct stepper_live *live,
 {
 	const struct incise_stepper_info *info = &live->drive.info;
 	const double range_mm = live->high_mm - live->low_mm;
-	double most, at, kept = 0, loss = NAN, was_N, lost_mm;
+	/* Slower than it creeps would tell nothing: the creeping would lose as well. */
+	double most, at, kept = live->creep_mm_s, loss = NAN, was_N, lost_mm;
 
 	*rate = (struct stepper_rate){.lost_1_s = NAN};
 	if (incise_stepper_jog(live->drive.stepper, 0) == -EOPNOTSUPP) {
@@ -173,7 +174,7 @@ void stepper_live_rate(struct stepper_live *live,
 		if (live->high_mm + live->off_mm > info->travel_mm ||
 		    live->low_mm + live->off_mm < -0.05 * range_mm)
 			break;
-		if (!isnan(loss) && (loss - kept < CLOSE * loss || loss < 0.1))
+		if (!isnan(loss) && loss - kept < CLOSE * loss)
 			break;
 		at = isnan(loss) ? fmin(most, at * RISE) : (kept + loss) / 2;
 	}

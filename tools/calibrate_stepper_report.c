@@ -38,7 +38,12 @@ static void put_rate(const struct stepper_rate *rate, FILE *out)
 		fprintf(out, "largest step rate  not measured: %s\n", rate->why);
 	if (!rate->tried)
 		return;
-	if (isnan(rate->lost_1_s))
+	if (!(rate->kept_1_s > 0))
+		fprintf(out,
+			"largest step rate  none found: even %.0f /s lost %.4f mm, and the strokes "
+			"above were not much slower; see what blocks it\n",
+			rate->lost_1_s, rate->lost_mm);
+	else if (isnan(rate->lost_1_s))
 		fprintf(out,
 			"largest step rate  %.0f /s lost no step, which is as fast as this range "
 			"and rig.conf let it go\n",

@@ -272,8 +272,7 @@ int main(int argc, char **argv)
 					.fit = &fit,
 					.setup = &setup,
 					.rate = &rate,
-					.record = &record,
-					.max_N = NAN};
+					.record = &record};
 	struct job job;
 
 	parse(&job, argc, argv);
@@ -291,7 +290,6 @@ int main(int argc, char **argv)
 		stepper_live_open(&live, job.rig);
 		stepper_live_plan(&live);
 		report.source = live.drive.info.name;
-		report.max_N = live.max_N;
 		setup.spring_N_mm = live.drive.info.spring_N_mm;
 		setup.low_N = live.low_N;
 		setup.high_N = live.high_N;
