@@ -38,6 +38,14 @@ double incise_stepper_off(const struct stepper_work *w, const struct stroke *str
  */
 int incise_stepper_lines(struct stepper_work *w, double skip_mm);
 
+/* Whether the force changes at all; -EDOM, -ENOMEM. */
+int incise_stepper_check_moves(const struct stepper_work *w, struct incise_error *err);
+
+/* Whether the lines can be those of an actuator; counts outliers. -EDOM, -ENOMEM. */
+int incise_stepper_check_lines(const struct stepper_work *w,
+			       struct incise_calibrate_stepper *result,
+			       struct incise_error *err);
+
 /* What happens behind the turns, from the lines. Returns 0, -ENOMEM. */
 int incise_stepper_turn(const struct stepper_work *w,
 			struct incise_calibrate_stepper *result);
