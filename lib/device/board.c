@@ -5,9 +5,9 @@
  * The module is not unloaded: OpenCV leaves in threads that used it what runs when they end.
  */
 #include <errno.h>
-#include <limits.h>
 #include <incise/board.h>
 #include "backends.h"
+#include "module.h"
 
 #define KIND "board"
 #define NAME "opencv"
@@ -18,17 +18,11 @@ int incise_board_find(const struct incise_camera_frame *frame, int columns, int 
 	struct incise_backend_request request = {.arguments = "", .where = KIND};
 	struct incise_loaded loaded;
 	struct incise_board *board;
-	char folder[PATH_MAX];
 	int rc = incise_backend_find(&loaded, KIND, NAME, KIND, err);
 
 	if (rc == -ENODEV)
-		return incise_error_set(
-			err, ENOENT,
-			KIND ": there is no module " KIND "_" NAME
-			     ".so in %.300s; build and install incise where "
-			     "libopencv-calib3d-dev is, or set INCISE_MODULE_PATH",
-			incise_backend_folder(folder, sizeof(folder)) ? folder
-								      : "any folder");
+		return incise_module_absent(KIND "_" NAME ".so", KIND,
+					    "libopencv-calib3d-dev is", err);
 	if (rc)
 		return rc;
 	board = loaded.backend->open(&request, err);
