@@ -39,7 +39,7 @@ static double length4(const double q[4])
 
 static struct incise_predict start(void)
 {
-	struct incise_tracker_info info = {"test", 120, LATENCY_NS, 1};
+	struct incise_tracker_info info = {"test", 120, LATENCY_NS, 1, 0};
 	struct incise_predict p;
 
 	incise_predict_init(&p, &info);
@@ -97,7 +97,8 @@ static void test_gains_are_kalmans(void **state)
 
 	for (int i = 0; i < 5; i++) {
 		for (int n = 0; n < 3; n++) {
-			struct incise_tracker_info info = {"test", hz[i], LATENCY_NS, 1};
+			struct incise_tracker_info info = {"test", hz[i], LATENCY_NS, 1,
+							   0};
 			struct incise_predict p;
 			double k[3];
 
@@ -399,7 +400,8 @@ static void test_only_numbers(void **state)
 	uint64_t seed = 7;
 
 	for (int run = 0; run < 45; run++) {
-		struct incise_tracker_info info = {"", hz[run % 9], latency[run % 5], 1};
+		struct incise_tracker_info info = {"", hz[run % 9], latency[run % 5], 1,
+						   0};
 		struct incise_predict p;
 		int64_t t_ns = 0;
 
