@@ -204,6 +204,14 @@ static void bring(const struct calibrate_weights *weights, double mass_g)
 		cli_fail("stopped; the calibration stays as it was");
 }
 
+/* A reading at the converter's end does not say how far it is to the next. */
+static bool within(const struct calibrate_weights *weights,
+		   const struct incise_calibrate_force_pair *pair)
+{
+	return pair && pair->reading_mV > weights->setup->low_mV &&
+	       pair->reading_mV < weights->setup->high_mV;
+}
+
 static void read_load(const struct calibrate_weights *weights,
 		      struct calibrate_pairs *pairs, int series, bool descending, int k)
 {
@@ -221,7 +229,8 @@ static void read_load(const struct calibrate_weights *weights,
 		change_N = incise_calibrate_force_of(&pair, weights->setup) -
 			   incise_calibrate_force_of(last, weights->setup);
 	wait_steady(weights, mass_g, last ? last->reading_mV : NAN,
-		    change_N * weights->setup->nominal_mV_N);
+		    within(weights, last) ? change_N * weights->setup->nominal_mV_N
+					  : weights->setup->step_mV);
 	mean = read_for(weights->rig, weights->mean_s);
 	pair.reading_mV = mean.mV;
 	weights->setup->dithered &= sd_of(&mean) >= weights->setup->step_mV / 2;

@@ -75,6 +75,13 @@ made_weights() {
 	[ "$(grep -c 'outlier$' r/report.txt)" = 4 ]
 }
 
+@test "a weight beyond the converter's end does not hold up those after it" {
+	# 5 V less 180 mV at 1260 mV/N are 3.83 N: 500 g are too much
+	incise calibrate force --rig sim:clock=simulated,force_mV_N=1260 \
+		--weights 0,100g,200g,300g,500g --series 3 >out 2>err
+	grep -q 'pairs  *18 of 21 used, 4 loads, 3 series; 3 saturated, 0 outliers' out
+}
+
 @test "saturated readings are left out and named" {
 	made_weights "if (r > 3000) r = 3000" >w.csv
 	for range in "" "--range 0,3000"; do
