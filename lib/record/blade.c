@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <string.h>
+#include "../base/vector.h"
 #include "blade.h"
 #include "force_near.h"
 #include "schema.h"
@@ -30,6 +31,19 @@ static double nominal_hz(struct incise_recording *recording)
 static double dot4(const double a[4], const double b[4])
 {
 	return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+}
+
+/* From the device's tip to that of the blade; where they are the same, not a bit moves. */
+static void go_to_tip(const struct incise_blade *blade, const double q[4],
+		      double position_mm[3])
+{
+	const double *tip_mm = blade->tip_mm;
+	double arm_mm[3];
+
+	if (tip_mm[0] == 0 && tip_mm[1] == 0 && tip_mm[2] == 0)
+		return;
+	v3_rotate(arm_mm, q, tip_mm);
+	v3_add(position_mm, position_mm, 1, arm_mm);
 }
 
 /* What is the same for all rows between two poses. */
@@ -67,6 +81,7 @@ static int more_pose(struct incise_blade *blade, struct incise_error *err)
 	norm = sqrt(dot4(pose->q, pose->q));
 	for (int i = 0; i < 4; i++)
 		pose->q[i] = norm > 0 ? pose->q[i] / norm : NAN;
+	go_to_tip(blade, pose->q, pose->position_mm);
 	status = (const char *)sqlite3_column_text(stmt, 9);
 	pose->error = status[strspn(status, " ")] != 0;
 	pose->station = sqlite3_column_int(stmt, 10);
@@ -82,6 +97,7 @@ static int feed(struct incise_blade *blade, struct incise_error *err)
 	sqlite3_stmt *stmt = blade->depth.stmt;
 	int rc = incise_rows_next(&blade->depth, err);
 	struct incise_smooth_record record;
+	double q[4];
 
 	if (rc < 0)
 		return rc;
@@ -96,6 +112,9 @@ static int feed(struct incise_blade *blade, struct incise_error *err)
 	};
 	for (int i = 0; i < 3; i++)
 		record.position_mm[i] = sqlite3_column_double(stmt, 3 + i);
+	for (int i = 0; i < 4; i++)
+		q[i] = sqlite3_column_double(stmt, 6 + i);
+	go_to_tip(blade, q, record.position_mm);
 	record.t_sd_s = incise_row_times_sd(&blade->depth.times, record.seq);
 	incise_smooth_push(&blade->smooth, &record);
 	return 1;
@@ -140,6 +159,7 @@ int incise_blade_open(struct incise_blade *blade, struct incise_recording *recor
 	int rc;
 
 	*blade = (struct incise_blade){0};
+	memcpy(blade->tip_mm, recording->meta.tip_mm, sizeof(blade->tip_mm));
 	for (int i = 0; i < 2; i++)
 		blade->pose[i].t_ns = blade->deep[i].t_ns = INCISE_TIME_NONE;
 	if (incise_smooth_init(&blade->smooth, nominal_hz(recording)))
@@ -155,8 +175,8 @@ int incise_blade_open(struct incise_blade *blade, struct incise_recording *recor
 	if (!rc)
 		rc = incise_rows_open_joined(
 			&blade->depth, recording, "depth", "tracker",
-			"depth.seq, depth.t_ns, depth_mm, x_mm, y_mm, z_mm", "iirrrr",
-			recording->depth_rows, err);
+			"depth.seq, depth.t_ns, depth_mm, x_mm, y_mm, z_mm, qw, qx, qy, qz",
+			"iirrrrrrrr", recording->depth_rows, err);
 	if (!rc && given) {
 		incise_rows_calibrate(&blade->tracker, given);
 		incise_rows_calibrate(&blade->depth, given);

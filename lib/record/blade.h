@@ -35,7 +35,9 @@ struct incise_blade_depth {
 struct incise_blade {
 	struct incise_rows tracker, depth;
 	struct incise_smooth smooth;
-	bool ended; /* the depth's rows */
+	double tip_mm
+		[3]; /* of the recording's calibration: rows are of the device's own */
+	bool ended;  /* the depth's rows */
 	/* before and after the row */
 	struct incise_blade_pose pose[2];
 	struct incise_blade_depth deep[2];

@@ -56,6 +56,7 @@ static int seek(struct reader *reader, int64_t t_ns, struct incise_error *err)
 {
 	while (reader->after.t_ns < t_ns) {
 		sqlite3_stmt *stmt = reader->tracker.stmt;
+		double q[4], arm_mm[3];
 		int rc = incise_rows_next(&reader->tracker, err);
 
 		if (rc <= 0)
@@ -66,6 +67,10 @@ static int seek(struct reader *reader, int64_t t_ns, struct incise_error *err)
 							   reader->tracker.t_ns);
 		for (int i = 0; i < 3; i++)
 			reader->after.position_mm[i] = sqlite3_column_double(stmt, 2 + i);
+		for (int i = 0; i < 4; i++)
+			q[i] = sqlite3_column_double(stmt, 5 + i);
+		v3_rotate(arm_mm, q, reader->recording->meta.tip_mm);
+		v3_add(reader->after.position_mm, reader->after.position_mm, 1, arm_mm);
 	}
 	return 1;
 }
@@ -148,8 +153,8 @@ int incise_depth_pairs(struct incise_recording *recording,
 		rc = incise_recording_line(recording, "camera", &reader.camera_line, err);
 	if (!rc)
 		rc = incise_rows_open(&reader.tracker, recording, "tracker",
-				      "seq, t_ns, x_mm, y_mm, z_mm", "iirrr",
-				      info.tracker, err);
+				      "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz",
+				      "iirrrrrrr", info.tracker, err);
 	if (!rc)
 		rc = incise_rows_open(
 			&reader.frames, recording, "frames",

@@ -404,3 +404,21 @@ read_mcap() {
 		                name == "velocity_mm_s") + 5.1e-5 * name.endswith("_mm") + 1e-6 * abs(text), (name, value, text)
 	END
 }
+
+@test "resampled positions are those of the calibrated tip" {
+	printf 'tip_mm = [60.0, 0.0, 0.0];\n' >tip.conf
+	incise capture -o plain.rec --rig sim:clock=simulated --duration 4s
+	incise capture -o far.rec --rig sim:clock=simulated,tip_x_mm=60 -c tip.conf --duration 4s
+	for name in plain far; do
+		incise export $name.rec -o $name.csv --resample --rate 100
+	done
+	# Noise of 0.025 degrees turns an arm of 60 mm by 0.026 mm; both have the tracker's 0.02
+	# mm: within 6 sd of 0.04 mm. Without the tip x_mm is 60 mm off, or turned.
+	paste -d, plain.csv far.csv | awk -F, 'NR == 1 { for (i = 1; i <= NF; i++)
+			if ($i ~ /^(x|y|z|depth)_mm$/) { if ($i in at) pair[at[$i]] = i; else at[$i] = i }; next }
+		{ for (i in pair) if ($i != "" && $i != "nan") { d = $i - $pair[i]; n++
+			if (d > 0.24 || d < -0.24) { print "row " NR ": " $i " and " $pair[i]; bad = 1 } } }
+		END { exit bad || n < 1000 }'
+	sqlite3 far.rec/recording.db "SELECT avg(abs(x_mm)) > 30 FROM tracker" | grep -qx 1 ||
+		sqlite3 far.rec/recording.db "SELECT avg(abs(z_mm)) > 30 FROM tracker" | grep -qx 1
+}
