@@ -27,7 +27,7 @@ $(O)/obj/fuzz/%.o: %.cc
 		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
 # What a target needs beside that.
-fuzz_vision_frame := lib/base/error.c lib/device/vision.c $(vision_linked) \
+fuzz_vision_frame := lib/base/error.c lib/device/vision.c lib/device/module.c $(vision_linked) \
 	$(wildcard lib/vision/*.c lib/vision/*.cc)
 fuzz_libs_vision_frame := $(libs_vision_opencv)
 fuzz_slcan_line := lib/device/can/slcan_line.c

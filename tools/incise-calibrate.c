@@ -16,7 +16,7 @@ static const struct cli_verb verb = {
 		"force: mV/N of the force channel, with weights.\n"
 		"depth: mm per pixel of the camera, from two points or a board.\n"
 		"tip: where the tip is in the tracker's sensor, by turning it about a point.\n"
-		"delay: how late tracker, force and camera are, from a motion or a pulse.\n"
+		"delay: how late tracker, force and camera are, from a motion.\n"
 		"stepper: force per microstep of the actuator, its backlash and its limits.\n"
 		"check: what is calibrated, how old it is, and what is due.",
 	.options = options,
