@@ -164,6 +164,9 @@ ask() {
 	sed -E 's/^(tracker|force|camera) = "[^"]*"/\1 = "sim:"/' \
 		"$root/doc/rig-sources.conf.example" >rig.conf
 	[ "$(grep -c '"sim:"' rig.conf)" = 3 ]
+	# the pictures too: a host that stands still loses none where time waits for it
+	sed -i 's/^clock = "real"/clock = "simulated"/' rig.conf
+	grep -q '^clock = ' rig.conf || echo 'clock = "simulated";' >>rig.conf
 	incise capture -o a.rec --duration 600ms
 	# and its settings with it: none that is wrong goes by
 	sed -i 's/rate_hz = 10000.0/rate_hz = 0.5/' rig.conf
