@@ -5,8 +5,15 @@ load cli
 
 quick=sim:clock=simulated
 
+# Two of the tests are in real time, and a host that stands still for seconds loses samples.
+BATS_TEST_RETRIES=2
+
 setup() {
-	work_folder
+	memory_folder
+}
+
+teardown() {
+	left_memory
 }
 
 ask() {

@@ -10,8 +10,28 @@ PATH=$INCISE_BUILD/bin:$PATH
 
 # A folder to work in that is empty; bats keeps files of its own beside it.
 work_folder() {
+	rm -rf "$BATS_TEST_TMPDIR/work" # of a try before, where a test may retry
 	mkdir "$BATS_TEST_TMPDIR/work"
 	cd "$BATS_TEST_TMPDIR/work"
+}
+
+# The same in memory, where there is room: a disk that others keep busy can stand still for
+# seconds, and a test of what is lost in real time is not about that one. left_memory() at
+# the end.
+memory_folder() {
+	local free
+	free=$(df -k --output=avail /dev/shm 2>/dev/null | tail -n 1)
+	if [ "${free:-0}" -gt 1000000 ] && [ -w /dev/shm ]; then
+		in_memory=$(mktemp -d /dev/shm/incise-XXXXXX)
+		cd "$in_memory"
+	else
+		work_folder
+	fi
+}
+
+left_memory() {
+	cd /
+	[ -z "$in_memory" ] || rm -rf "$in_memory"
 }
 
 complain() {
