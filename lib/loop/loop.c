@@ -11,6 +11,20 @@
 #include <math.h>
 #include <string.h>
 #include <incise/loop.h>
+#include "control.h"
+
+struct run {
+	struct incise_plan *plan;
+	struct incise_clock *clock;
+	const struct incise_loop_options *options;
+	struct incise_loop_stats *stats;
+	int64_t period_ns, due_ns, end_ns;
+	bool fading;
+	int64_t fade_end_ns; /* latest, when it fades to stop */
+	unsigned int in_row; /* overruns, up to now */
+	unsigned int flags;  /* of the last tick */
+	int64_t stale_ns;    /* time of the tick from which on poses were old */
+};
 
 static void count(uint64_t *histogram, int64_t value)
 {
@@ -37,28 +51,166 @@ static void count_tick(struct incise_loop_stats *stats, const struct incise_tick
 	stats->limited += !!(tick->flags & (INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED));
 }
 
-/* One tick with its statistics; start_ns is when it began. */
-static int run_tick(struct incise_plan *plan, const struct incise_clock *clock,
-		    struct incise_tick *tick, struct incise_loop_stats *stats,
-		    int64_t start_ns)
+static void tell(const struct run *run, enum incise_loop_event_kind kind, int64_t t_ns,
+		 double value)
 {
-	int rc = incise_plan_tick(plan, start_ns, tick);
-	int64_t cost_ns = incise_clock_now(clock) - start_ns;
+	struct incise_loop_event event = {t_ns, run->stats->ticks, value, kind};
 
-	if (cost_ns > stats->tick_max_ns)
-		stats->tick_max_ns = cost_ns;
-	count(stats->tick_100ns, cost_ns / 100);
-	count_tick(stats, tick);
+	if (run->options->control)
+		incise_loop_control_event(run->options->control, &event);
+}
+
+/* What of a tick is new. */
+static void tell_changes(struct run *run, const struct incise_tick *tick)
+{
+	unsigned int begun = tick->flags & ~run->flags, ended = run->flags & ~tick->flags;
+
+	if (begun & INCISE_TICK_STALE) {
+		run->stale_ns = tick->t_ns;
+		tell(run, INCISE_LOOP_STALE, tick->t_ns, 0);
+	}
+	if (ended & INCISE_TICK_STALE)
+		tell(run, INCISE_LOOP_FRESH, tick->t_ns,
+		     (double)(tick->t_ns - run->stale_ns) * 1e-6);
+	if (begun & INCISE_TICK_NOT_FINITE)
+		tell(run, INCISE_LOOP_NOT_FINITE, tick->t_ns, 0);
+	run->flags = tick->flags;
+}
+
+/* One tick with its statistics; start_ns is when it began. */
+static int run_tick(struct run *run, struct incise_tick *tick, int64_t start_ns)
+{
+	int rc = incise_plan_tick(run->plan, start_ns, tick);
+	int64_t cost_ns = incise_clock_now(run->clock) - start_ns;
+
+	if (cost_ns > run->stats->tick_max_ns)
+		run->stats->tick_max_ns = cost_ns;
+	count(run->stats->tick_100ns, cost_ns / 100);
+	count_tick(run->stats, tick);
+	tell_changes(run, tick);
+	if (run->options->control)
+		incise_loop_control_ticked(run->options->control, run->stats->ticks);
 	return rc;
+}
+
+/* A stall over the end leaves out what was still due, and no more. */
+static int skip(struct run *run, int64_t now_ns)
+{
+	int64_t ticks = (now_ns - run->due_ns) / run->period_ns;
+	int64_t left = (run->end_ns - run->due_ns - 1) / run->period_ns + 1;
+
+	if (!ticks) {
+		run->in_row = 0;
+		return 0;
+	}
+	run->stats->skipped += ticks < left ? ticks : left;
+	run->stats->overruns++;
+	run->in_row++;
+	tell(run, INCISE_LOOP_OVERRUN, now_ns, (double)(ticks < left ? ticks : left));
+	run->due_ns += ticks * run->period_ns;
+	return run->options->overruns_most && run->in_row >= run->options->overruns_most
+		       ? -ETIME
+		       : 0;
+}
+
+/* To be asked before each tick: whether it ends, faded as it should be. */
+static bool stops(struct run *run)
+{
+	const struct incise_loop_options *options = run->options;
+
+	if (run->due_ns >= run->end_ns)
+		return true;
+	if (!options->stop || !*options->stop)
+		return false;
+	if (!run->fading) {
+		run->fading = true;
+		run->fade_end_ns = run->due_ns + incise_plan_fade_ns(run->plan);
+		incise_plan_fade(run->plan, true);
+	}
+	return incise_plan_faded(run->plan) || run->due_ns > run->fade_end_ns;
+}
+
+/* Another plan that waits comes into force where the one before asks for none. */
+static void change_plan(struct run *run, int64_t now_ns)
+{
+	bool waits = !run->fading && run->options->control &&
+		     incise_loop_control_waiting(run->options->control);
+	struct incise_plan *next = NULL;
+
+	if (run->fading)
+		return;
+	incise_plan_fade(run->plan, waits);
+	if (waits && incise_plan_faded(run->plan))
+		next = incise_loop_control_swap(run->options->control, run->plan);
+	if (!next)
+		return;
+	run->plan = next;
+	tell(run, INCISE_LOOP_PLAN, now_ns, 0);
+}
+
+static void count_lateness(struct run *run, int64_t now_ns)
+{
+	int64_t lag_ns = now_ns - run->due_ns + incise_clock_lag_ns(run->clock);
+
+	if (lag_ns > run->stats->lateness_max_ns)
+		run->stats->lateness_max_ns = lag_ns;
+	count(run->stats->lateness_us, lag_ns / 1000);
+}
+
+/* Until it ends; what a device or options->ticked answered. */
+static int run_ticks(struct run *run, int *ended)
+{
+	const struct incise_loop_options *options = run->options;
+	struct incise_loop_stats *stats = run->stats;
+	int rc = 0;
+
+	while (!rc && !*ended && !stops(run)) {
+		struct incise_tick own, *tick = &own;
+		int64_t now_ns;
+
+		if (incise_clock_wait_until(run->clock, run->due_ns) == -EINTR)
+			continue;
+		now_ns = incise_clock_now(run->clock);
+		count_lateness(run, now_ns);
+		rc = skip(run, now_ns);
+		if (rc || run->due_ns >= run->end_ns)
+			break;
+		change_plan(run, now_ns);
+		if (stats->logged < options->log_size)
+			tick = &options->log[stats->logged++];
+		rc = run_tick(run, tick, now_ns);
+		run->due_ns += run->period_ns;
+		if (!rc && options->ticked)
+			*ended = options->ticked(options->context, tick);
+	}
+	return rc;
+}
+
+static int why(const struct run *run, int rc, struct incise_error *err)
+{
+	unsigned long long ticks = run->stats->ticks;
+	char cause[300];
+
+	if (rc == -ETIME)
+		return incise_error_set(
+			err, ETIME,
+			"%u ticks in a row came a period late or more, the last at tick %llu: "
+			"the force was taken away; this machine is too slow or too busy for "
+			"%g Hz",
+			run->in_row, ticks, run->options->rate_hz);
+	incise_plan_cause(run->plan, cause, sizeof(cause));
+	return incise_error_set(
+		err, -rc, "a device failed at tick %llu: %s; the force was taken away",
+		ticks, cause);
 }
 
 int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		    const struct incise_loop_options *options,
 		    struct incise_loop_stats *stats, struct incise_error *err)
 {
-	int64_t period_ns, due_ns, end_ns;
-	int rc = 0, ended = 0;
-	char cause[300];
+	struct run run = {
+		.plan = plan, .clock = clock, .options = options, .stats = stats};
+	int rc, ended = 0;
 
 	memset(stats, 0, sizeof(*stats));
 	if (options->duration_ns < 0)
@@ -67,49 +219,12 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		return incise_error_set(err, EINVAL,
 					"the loop's rate is %g Hz: expected 1 to 20000",
 					options->rate_hz);
-	period_ns = llrint(INCISE_NS_PER_S / options->rate_hz);
-	due_ns = incise_clock_now(clock) + period_ns;
-	end_ns = options->duration_ns ? due_ns + options->duration_ns : INT64_MAX;
-	while (due_ns < end_ns && !ended && !(options->stop && *options->stop)) {
-		struct incise_tick own, *tick = &own;
-		int64_t now_ns, late_ns, lag_ns;
-
-		if (incise_clock_wait_until(clock, due_ns) == -EINTR)
-			continue;
-		now_ns = incise_clock_now(clock);
-		late_ns = now_ns - due_ns;
-		lag_ns = late_ns + incise_clock_lag_ns(clock);
-		if (lag_ns > stats->lateness_max_ns)
-			stats->lateness_max_ns = lag_ns;
-		count(stats->lateness_us, lag_ns / 1000);
-		if (late_ns >= period_ns) {
-			int64_t skip = late_ns / period_ns;
-			int64_t left = (end_ns - due_ns - 1) / period_ns + 1;
-
-			/* A stall over the end leaves out what was still due, and no more. */
-			stats->skipped += skip < left ? skip : left;
-			if (skip >= left)
-				break;
-			due_ns += skip * period_ns;
-		}
-		if (stats->logged < options->log_size)
-			tick = &options->log[stats->logged++];
-		rc = run_tick(plan, clock, tick, stats, now_ns);
-		if (rc)
-			break;
-		due_ns += period_ns;
-		if (options->ticked)
-			ended = options->ticked(options->context, tick);
-	}
-	incise_plan_release(plan);
-	if (rc) {
-		incise_plan_cause(plan, cause, sizeof(cause));
-		incise_error_set(
-			err, -rc,
-			"a device failed at tick %llu: %s; the force was taken away",
-			(unsigned long long)stats->ticks, cause);
-	}
-	return rc ? rc : ended;
+	run.period_ns = llrint(INCISE_NS_PER_S / options->rate_hz);
+	run.due_ns = incise_clock_now(clock) + run.period_ns;
+	run.end_ns = options->duration_ns ? run.due_ns + options->duration_ns : INT64_MAX;
+	rc = run_ticks(&run, &ended);
+	incise_plan_release(run.plan);
+	return rc ? why(&run, rc, err) : ended;
 }
 
 double incise_loop_quantile(const uint64_t *histogram, double share)

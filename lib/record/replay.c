@@ -5,6 +5,7 @@
  * what it does live.
  */
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 #include <incise/clock.h>
@@ -14,6 +15,9 @@
 
 /* What a plan takes before a tick. */
 #define POSES 32
+
+/* What nobody else who is told of ticks answers. */
+#define STOPPED INT_MIN
 
 struct replay {
 	struct incise_replay_source source;
@@ -111,6 +115,9 @@ static int ticked(void *context, const struct incise_tick *tick)
 		if (rc)
 			return rc;
 	}
+	/* At once: nobody holds what a loop would let go of first. */
+	if (replay->options->stop && *replay->options->stop)
+		return STOPPED;
 	return feed(replay, tick->t_ns + replay->period_ns);
 }
 
@@ -121,7 +128,6 @@ static int run(struct replay *replay, double rate_hz, struct incise_loop_stats *
 	struct incise_loop_options loop = {
 		.rate_hz = rate_hz,
 		.duration_ns = replay->source.last_ns - replay->first_ns + 1,
-		.stop = options->stop,
 		.ticked = ticked,
 		.context = replay,
 	};
@@ -136,6 +142,8 @@ static int run(struct replay *replay, double rate_hz, struct incise_loop_stats *
 	rc = feed(replay, replay->first_ns);
 	if (!rc)
 		rc = incise_loop_run(replay->plan, clock, &loop, stats, replay->err);
+	if (rc == STOPPED)
+		rc = 0;
 	incise_clock_free(clock);
 	/* Rows behind the last tick are checked too. */
 	if (!rc && !(options->stop && *options->stop))

@@ -396,6 +396,25 @@ int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool)
 	return 0;
 }
 
+void incise_plan_fade(struct incise_plan *plan, bool fading)
+{
+	plan->fading = fading;
+}
+
+bool incise_plan_faded(const struct incise_plan *plan)
+{
+	/* A gain of 0 asks for nothing; the slew may still be on its way there. */
+	return plan->fading && !(plan->start.gain > 0) &&
+	       v3_length(plan->limit.last_N) == 0;
+}
+
+int64_t incise_plan_fade_ns(const struct incise_plan *plan)
+{
+	double slew_s = plan->scene->limits.force_N / plan->scene->limits.slew_N_s;
+
+	return (int64_t)((plan->start.fade_s + slew_s) * INCISE_NS_PER_S);
+}
+
 void incise_plan_release(struct incise_plan *plan)
 {
 	/* If this fails, the actuator's own deadman does it. */

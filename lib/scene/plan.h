@@ -81,6 +81,7 @@ struct incise_plan {
 	/* guard, start, limit */
 	struct incise_guard *guard; /* with stage guard */
 	struct incise_start start;
+	bool fading; /* asked to let go of the force */
 	struct incise_limit limit;
 	int64_t last_ns; /* of the last tick; 0: none */
 

@@ -31,8 +31,9 @@ int incise_stage_start(struct incise_plan *plan, struct incise_tick *tick)
 	double dt_s = plan->last_ns && tick->t_ns > plan->last_ns
 			      ? (double)gone_ns / INCISE_NS_PER_S
 			      : 0;
-	double gain = incise_start_gain(&plan->start, v3_length(plan->force_N),
-					!(tick->flags & INCISE_TICK_STALE), dt_s);
+	bool fresh = !(tick->flags & INCISE_TICK_STALE) && !plan->fading;
+	double gain =
+		incise_start_gain(&plan->start, v3_length(plan->force_N), fresh, dt_s);
 
 	plan->last_ns = tick->t_ns;
 	if (gain < 1)

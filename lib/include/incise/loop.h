@@ -2,10 +2,11 @@
 /*
  * The real-time loop: runs a plan at the times start + n·period of CLOCK_MONOTONIC.
  *
- * The next wake-up follows from the previous one, never from now. A tick that would
- * start more than a period late is skipped and counted, so that a stall is not followed
- * by a burst. On a paced clock (incise/clock.h) every tick has its own time, however late it
- * runs, so that none is skipped.
+ * The next wake-up follows from the previous one, never from now. The rule for overruns: a
+ * tick that would start a period late or more is skipped and counted, so that a stall is not
+ * followed by a burst; after options->overruns_most of them in a row, with no tick in time in
+ * between, the loop takes the force away and ends. On a paced clock (incise/clock.h) every
+ * tick has its own time, however late it runs, so that none is skipped.
  */
 #ifndef INCISE_LOOP_H
 #define INCISE_LOOP_H
@@ -16,6 +17,7 @@
 #include <incise/clock.h>
 #include <incise/error.h>
 #include <incise/export.h>
+#include <incise/loop_control.h>
 #include <incise/plan.h>
 
 INCISE_BEGIN_DECLS
@@ -29,8 +31,15 @@ struct incise_loop_options {
 	/** Where every tick is written, or NULL: room for log_size; more are not kept. */
 	struct incise_tick *log;
 	size_t log_size;
-	/** Set by a signal handler to end the loop, or NULL. */
+	/**
+	 * Set by a signal handler to end the loop, or NULL. The force fades out first, which
+	 * takes no longer than incise_plan_fade_ns(); these ticks count as any.
+	 */
 	const volatile sig_atomic_t *stop;
+	/** Overruns in a row that end it; 0: none do. */
+	unsigned int overruns_most;
+	/** Through which it is given other plans and tells of events, or NULL. */
+	struct incise_loop_control *control;
 	/**
 	 * Told of each tick after it, outside of its cost; what is not 0 ends the loop, and is
 	 * what incise_loop_run() returns. Or NULL. For what is not live: it takes the time of
@@ -42,8 +51,9 @@ struct incise_loop_options {
 
 /** Statistics of a run. */
 struct incise_loop_stats {
-	uint64_t ticks;	  /**< run */
-	uint64_t skipped; /**< not run because they would have been a period late */
+	uint64_t ticks;	   /**< run */
+	uint64_t skipped;  /**< not run because they would have been a period late */
+	uint64_t overruns; /**< times that some were skipped */
 	uint64_t flagged[INCISE_TICK_FLAGS]; /**< ticks with flag 1 << i */
 	uint64_t limited; /**< ticks with INCISE_TICK_CLAMPED, _SLEWED or both */
 	size_t logged;
@@ -62,8 +72,9 @@ struct incise_loop_stats {
  * allocation and no system call but the clock's, and what options->ticked makes.
  *
  * @param stats caller's memory, some 300 KiB; zeroed here
- * @return 0 at the end of the time or when stopped; -EINVAL (options), or the errno of
- *         the device that failed; what options->ticked returned, which sets @err itself.
+ * @return 0 at the end of the time or when stopped; -EINVAL (options), -ETIME (too many
+ *         overruns in a row), or the errno of the device that failed; what options->ticked
+ *         returned, which sets @err itself.
  */
 INCISE_API int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 			       const struct incise_loop_options *options,

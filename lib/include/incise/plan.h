@@ -142,6 +142,19 @@ INCISE_API int incise_plan_set_tip(struct incise_plan *plan, const double tip_mm
  */
 INCISE_API int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool);
 
+/**
+ * From the next tick on let the force fade out over the scene's limits.fade_ms, and ask for
+ * none from then on; or let it come back, as it does after poses were missing. No change of
+ * the force is above the scene's slew. Real-time safe; in the thread that ticks.
+ */
+INCISE_API void incise_plan_fade(struct incise_plan *plan, bool fading);
+
+/** Whether a plan that fades asks for no force any more. Real-time safe. */
+INCISE_API bool incise_plan_faded(const struct incise_plan *plan);
+
+/** How long that takes at most, ns: limits.fade_ms, and the largest force at its slew. */
+INCISE_API int64_t incise_plan_fade_ns(const struct incise_plan *plan);
+
 /** What one tick came to. */
 struct incise_tick {
 	int64_t t_ns;

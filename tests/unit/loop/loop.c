@@ -10,6 +10,7 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
+#include <string.h>
 #include <time.h>
 #include <incise/loop.h>
 #include "../scene/felt.h"
@@ -304,6 +305,245 @@ static void test_quantile(void **state)
 	assert_true(incise_loop_quantile(histogram, 1) == INCISE_LOOP_BINS);
 }
 
+/* Poses of a scalpel held still, that deep; or none any more. */
+static double held_mm;
+static bool silent;
+static struct incise_clock *held_clock;
+static uint64_t held_seq;
+
+static int held_tracker(struct incise_tracker *tracker,
+			struct incise_tracker_sample *samples, int n)
+{
+	samples[0] = (struct incise_tracker_sample){
+		.t_ns = incise_clock_now(held_clock),
+		.seq = held_seq++,
+		.position_mm = {0, 0, -held_mm},
+		.quaternion = {1, 0, 0, 0},
+		.status = ' ',
+		.station = 1,
+	};
+	return !silent;
+}
+
+/* What of a run is looked at from within. */
+struct seen {
+	struct felt *f;
+	struct incise_loop_control *control;
+	struct incise_plan *next;
+	volatile sig_atomic_t stop;
+	int n, stop_at, offer_at, silent_at, back_at;
+	double slew_N, last_N, most_change_N, at_stop_N, last_but_stop_N;
+	double after_N; /* largest force after the change of plans */
+	bool changed;
+};
+
+static int look(void *context, const struct incise_tick *tick)
+{
+	struct seen *seen = context;
+	double force_N = sqrt(tick->command_N[0] * tick->command_N[0] +
+			      tick->command_N[1] * tick->command_N[1] +
+			      tick->command_N[2] * tick->command_N[2]);
+
+	seen->most_change_N = fmax(seen->most_change_N, fabs(force_N - seen->last_N));
+	seen->last_N = force_N;
+	seen->n++;
+	/* In slowly, then it rests there. */
+	held_mm = fmin(10, 0.02 * seen->n);
+	if (seen->n == seen->silent_at)
+		silent = true;
+	if (seen->n == seen->back_at)
+		silent = false;
+	if (seen->n == seen->stop_at) {
+		seen->at_stop_N = force_N;
+		seen->stop = 1;
+	}
+	if (seen->n == seen->offer_at) {
+		seen->at_stop_N = force_N;
+		assert_int_equal(incise_loop_control_offer(seen->control, seen->next), 0);
+		assert_int_equal(incise_loop_control_offer(seen->control, seen->next),
+				 -EBUSY);
+	}
+	if (seen->changed)
+		seen->after_N = fmax(seen->after_N, force_N);
+	else if (seen->control && incise_loop_control_retired(seen->control))
+		seen->changed = true;
+	return 0;
+}
+
+static void held_start(struct felt *f, struct incise_tracker_ops *ops, struct seen *seen)
+{
+	felt_start(f, "double", INCISE_RIG_TRACKER);
+	*ops = *f->tracker_ops;
+	ops->read = held_tracker;
+	incise_rig_tracker(f->rig)->ops = ops;
+	held_clock = incise_rig_clock(f->rig);
+	held_seq = 0;
+	held_mm = 0;
+	silent = false;
+	seen->f = f;
+
+	seen->slew_N = FELT_SLEW_N_S / 1000;
+}
+
+static void test_stop_fades(void **state)
+{
+	struct seen seen = {.stop_at = 600};
+	struct incise_loop_options options = {
+		.rate_hz = 1000, .stop = &seen.stop, .ticked = look, .context = &seen};
+	struct incise_tracker_ops ops;
+	struct felt f;
+	int64_t most_ms;
+
+	held_start(&f, &ops, &seen);
+	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
+					 &stats, NULL),
+			 0);
+	/* There was a force, it went in steps within the slew, and is 0. */
+	assert_true(seen.at_stop_N > 0.5);
+	assert_true(seen.most_change_N <= seen.slew_N * (1 + 1e-9));
+	assert_true(seen.last_N == 0);
+	most_ms = incise_plan_fade_ns(f.plan) / 1000000;
+	assert_in_range(stats.ticks, 602, 600 + most_ms + 1);
+	felt_end(&f);
+}
+
+/* In the tissue: the old force fades, the new plan waits for a small one. */
+static void test_another_plan(void **state)
+{
+	struct seen seen = {.offer_at = 600};
+	struct incise_loop_options options = {.rate_hz = 1000,
+					      .duration_ns = 2 * INCISE_NS_PER_S,
+					      .ticked = look,
+					      .context = &seen};
+	struct incise_loop_event events[20];
+	struct incise_tracker_ops ops;
+	struct felt f;
+	int n;
+
+	held_start(&f, &ops, &seen);
+	seen.control = options.control = incise_loop_control_new();
+	seen.next = incise_plan_new(f.scene, f.rig, NULL);
+	assert_non_null(seen.next);
+	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
+					 &stats, NULL),
+			 0);
+	assert_true(seen.at_stop_N > 0.5);
+	assert_true(seen.changed);
+	assert_true(seen.most_change_N <= seen.slew_N * (1 + 1e-9));
+	assert_true(seen.after_N == 0);
+	assert_int_equal(incise_loop_control_ticks(options.control), 2000);
+	n = incise_loop_control_events(options.control, events, 20);
+	assert_true(n > 0);
+	for (int i = 0; i < n; i++)
+		if (events[i].kind == INCISE_LOOP_PLAN)
+			assert_in_range(events[i].tick, 600,
+					601 + incise_plan_fade_ns(seen.next) / 1000000 +
+						1);
+	incise_plan_free(seen.next);
+	incise_loop_control_free(options.control);
+	felt_end(&f);
+}
+
+/* What was offered and is withdrawn in the fade leaves the old plan, whose force is back. */
+static struct incise_loop_control *withdrawn_from;
+
+static int look_and_withdraw(void *context, const struct incise_tick *tick)
+{
+	struct seen *seen = context;
+	int rc = look(context, tick);
+
+	if (seen->n == seen->offer_at + 3)
+		assert_ptr_equal(incise_loop_control_withdraw(withdrawn_from),
+				 seen->next);
+	return rc;
+}
+
+static void test_a_plan_withdrawn(void **state)
+{
+	struct seen seen = {.offer_at = 600};
+	struct incise_loop_options options = {.rate_hz = 1000,
+					      .duration_ns = 2 * INCISE_NS_PER_S,
+					      .ticked = look_and_withdraw,
+					      .context = &seen};
+	struct incise_tracker_ops ops;
+	struct felt f;
+
+	held_start(&f, &ops, &seen);
+	withdrawn_from = seen.control = options.control = incise_loop_control_new();
+	seen.next = incise_plan_new(f.scene, f.rig, NULL);
+	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
+					 &stats, NULL),
+			 0);
+	assert_false(seen.changed);
+	assert_true(seen.last_N > 0.9 * seen.at_stop_N);
+	assert_true(seen.most_change_N <= seen.slew_N * (1 + 1e-9));
+	incise_plan_free(seen.next);
+	incise_loop_control_free(options.control);
+	felt_end(&f);
+}
+
+static void test_events(void **state)
+{
+	static const enum incise_loop_event_kind expected[] = {INCISE_LOOP_STALE,
+							       INCISE_LOOP_FRESH};
+	struct seen seen = {.silent_at = 600, .back_at = 700};
+	struct incise_loop_options options = {.rate_hz = 1000,
+					      .duration_ns = INCISE_NS_PER_S,
+					      .ticked = look,
+					      .context = &seen};
+	struct incise_loop_event events[20];
+	struct incise_tracker_ops ops;
+	struct felt f;
+
+	held_start(&f, &ops, &seen);
+	options.control = incise_loop_control_new();
+	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
+					 &stats, NULL),
+			 0);
+	assert_int_equal(incise_loop_control_events(options.control, events, 20), 2);
+	for (int i = 0; i < 2; i++)
+		assert_int_equal(events[i].kind, expected[i]);
+	/* The spell that the loop tells of is the one between the two. */
+	assert_true(events[1].value == (events[1].t_ns - events[0].t_ns) * 1e-6);
+	assert_in_range(events[0].tick, 600, 600 + 100);
+	assert_int_equal(events[1].tick, 700 + 1);
+	assert_int_equal(incise_loop_control_events_lost(options.control), 0);
+	incise_loop_control_free(options.control);
+	felt_end(&f);
+}
+
+/* Takes two and a half periods at each tick from the tenth on. */
+static int always_slow(struct incise_tracker *tracker,
+		       struct incise_tracker_sample *samples, int n)
+{
+	if (++calls >= 10)
+		incise_clock_wait_until(stalled, incise_clock_now(stalled) + 2500000);
+	return 0;
+}
+
+static void test_too_many_overruns(void **state)
+{
+	struct incise_loop_options options = {
+		.rate_hz = 1000, .duration_ns = INCISE_NS_PER_S, .overruns_most = 5};
+	struct incise_tracker_ops ops;
+	struct incise_error err = {0};
+	struct felt f;
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	ops = *f.tracker_ops;
+	ops.read = always_slow;
+	incise_rig_tracker(f.rig)->ops = &ops;
+	stalled = incise_rig_clock(f.rig);
+	calls = 0;
+	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, &err),
+			 -ETIME);
+	/* Ticks 10 to 14 are slow, and the wake-up after each is an overrun. */
+	assert_int_equal(stats.overruns, 5);
+	assert_int_equal(stats.ticks, 14);
+	assert_non_null(strstr(err.text, "5 ticks in a row"));
+	felt_end(&f);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -319,6 +559,11 @@ int main(void)
 		cmocka_unit_test(test_who_is_told_of_ticks_ends_the_loop),
 		cmocka_unit_test(test_paced_clock),
 		cmocka_unit_test(test_quantile),
+		cmocka_unit_test(test_stop_fades),
+		cmocka_unit_test(test_another_plan),
+		cmocka_unit_test(test_a_plan_withdrawn),
+		cmocka_unit_test(test_events),
+		cmocka_unit_test(test_too_many_overruns),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

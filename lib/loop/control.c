@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The door between a running loop and the rest of its program; see incise/loop_control.h.
+ */
+#include <errno.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include "../base/ring.h"
+#include "control.h"
+
+/* More than a second of a loop that overruns at each tick of 100 Hz … 500 Hz. */
+#define EVENTS 512
+
+struct incise_loop_control {
+	_Atomic(struct incise_plan *) offered, retired;
+	_Atomic uint64_t ticks;
+	struct incise_ring events;
+};
+
+struct incise_loop_control *incise_loop_control_new(void)
+{
+	/* The ring keeps its two sides on different lines of the cache. */
+	struct incise_loop_control *control =
+		aligned_alloc(_Alignof(struct incise_loop_control), sizeof(*control));
+
+	if (!control)
+		return NULL;
+	*control = (struct incise_loop_control){0};
+	if (!incise_ring_init(&control->events, sizeof(struct incise_loop_event), EVENTS))
+		return control;
+	free(control);
+	errno = ENOMEM;
+	return NULL;
+}
+
+void incise_loop_control_free(struct incise_loop_control *control)
+{
+	if (!control)
+		return;
+	incise_ring_free(&control->events);
+	free(control);
+}
+
+int incise_loop_control_offer(struct incise_loop_control *control,
+			      struct incise_plan *plan)
+{
+	struct incise_plan *none = NULL;
+
+	/* The loop has one place to put the old one. */
+	if (atomic_load_explicit(&control->retired, memory_order_acquire))
+		return -EBUSY;
+	return atomic_compare_exchange_strong(&control->offered, &none, plan) ? 0
+									      : -EBUSY;
+}
+
+struct incise_plan *incise_loop_control_withdraw(struct incise_loop_control *control)
+{
+	return atomic_exchange(&control->offered, NULL);
+}
+
+struct incise_plan *incise_loop_control_retired(struct incise_loop_control *control)
+{
+	return atomic_exchange(&control->retired, NULL);
+}
+
+uint64_t incise_loop_control_ticks(const struct incise_loop_control *control)
+{
+	return atomic_load_explicit(&control->ticks, memory_order_relaxed);
+}
+
+int incise_loop_control_events(struct incise_loop_control *control,
+			       struct incise_loop_event *events, int n)
+{
+	return incise_ring_take(&control->events, events, n);
+}
+
+uint64_t incise_loop_control_events_lost(const struct incise_loop_control *control)
+{
+	return incise_ring_dropped(&control->events);
+}
+
+struct incise_plan *incise_loop_control_waiting(const struct incise_loop_control *control)
+{
+	return atomic_load_explicit(&control->offered, memory_order_acquire);
+}
+
+struct incise_plan *incise_loop_control_swap(struct incise_loop_control *control,
+					     struct incise_plan *old)
+{
+	struct incise_plan *plan = atomic_exchange(&control->offered, NULL);
+
+	if (plan)
+		atomic_store_explicit(&control->retired, old, memory_order_release);
+	return plan;
+}
+
+void incise_loop_control_event(struct incise_loop_control *control,
+			       const struct incise_loop_event *event)
+{
+	incise_ring_put(&control->events, event);
+}
+
+void incise_loop_control_ticked(struct incise_loop_control *control, uint64_t ticks)
+{
+	atomic_store_explicit(&control->ticks, ticks, memory_order_relaxed);
+}

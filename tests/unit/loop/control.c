@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The loop's door: what is offered is taken once or withdrawn once, events keep their order
+ * and what finds no room is counted. What loops do with it is in tests/unit/loop/loop.c.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include "../../../lib/loop/control.h"
+
+/* Never looked into. */
+static struct incise_plan *plan(int i)
+{
+	static char plans[8];
+
+	return (struct incise_plan *)&plans[i];
+}
+
+static void test_one_place(void **state)
+{
+	struct incise_loop_control *control = incise_loop_control_new();
+
+	assert_null(incise_loop_control_waiting(control));
+	assert_null(incise_loop_control_withdraw(control));
+	assert_null(incise_loop_control_swap(control, plan(0)));
+	assert_null(incise_loop_control_retired(control));
+
+	assert_int_equal(incise_loop_control_offer(control, plan(1)), 0);
+	assert_int_equal(incise_loop_control_offer(control, plan(2)), -EBUSY);
+	assert_ptr_equal(incise_loop_control_waiting(control), plan(1));
+	assert_ptr_equal(incise_loop_control_withdraw(control), plan(1));
+	assert_null(incise_loop_control_swap(control, plan(0)));
+
+	assert_int_equal(incise_loop_control_offer(control, plan(1)), 0);
+	assert_ptr_equal(incise_loop_control_swap(control, plan(0)), plan(1));
+	/* The place of the old one is not free yet. */
+	assert_int_equal(incise_loop_control_offer(control, plan(2)), -EBUSY);
+	assert_null(incise_loop_control_withdraw(control));
+	assert_ptr_equal(incise_loop_control_retired(control), plan(0));
+	assert_null(incise_loop_control_retired(control));
+	assert_int_equal(incise_loop_control_offer(control, plan(2)), 0);
+	incise_loop_control_free(control);
+	incise_loop_control_free(NULL);
+}
+
+static void test_events(void **state)
+{
+	struct incise_loop_control *control = incise_loop_control_new();
+	struct incise_loop_event events[100];
+	uint64_t seen = 0;
+	int n;
+
+	for (uint64_t i = 0; i < 1000; i++)
+		incise_loop_control_event(control,
+					  &(struct incise_loop_event){.tick = i});
+	while ((n = incise_loop_control_events(control, events, 100)) > 0)
+		for (int i = 0; i < n; i++)
+			assert_int_equal(events[i].tick, seen++);
+	/* The oldest are kept: they say how it began. */
+	assert_true(seen > 0);
+	assert_int_equal(incise_loop_control_events_lost(control), 1000 - seen);
+	incise_loop_control_free(control);
+}
+
+/* A loop that does nothing but change plans. */
+struct changer {
+	struct incise_loop_control *control;
+	atomic_bool end;
+	long swaps;
+};
+
+static void *change(void *argument)
+{
+	struct changer *changer = argument;
+	struct incise_plan *now = plan(0);
+
+	while (!atomic_load(&changer->end)) {
+		struct incise_plan *next = NULL;
+
+		if (incise_loop_control_waiting(changer->control))
+			next = incise_loop_control_swap(changer->control, now);
+		if (next) {
+			now = next;
+			changer->swaps++;
+		}
+		incise_loop_control_ticked(changer->control, (uint64_t)changer->swaps);
+	}
+	return now;
+}
+
+/* Nobody's plan is lost, and none is at two places, however the two threads meet. */
+static void test_two_threads(void **state)
+{
+	struct changer changer = {.control = incise_loop_control_new()};
+	struct incise_plan *owned = plan(1), *retired;
+	long taken = 0, withdrawn = 0;
+	pthread_t thread;
+	void *last;
+
+	assert_int_equal(pthread_create(&thread, NULL, change, &changer), 0);
+	for (long i = 0; i < 20000; i++) {
+		assert_int_equal(incise_loop_control_offer(changer.control, owned), 0);
+		if (incise_loop_control_withdraw(changer.control)) {
+			withdrawn++;
+			continue;
+		}
+		/* It was taken, or is on the way. */
+		do
+			retired = incise_loop_control_retired(changer.control);
+		while (!retired);
+		assert_ptr_not_equal(retired, owned);
+		owned = retired;
+		taken++;
+	}
+	atomic_store(&changer.end, true);
+	pthread_join(thread, &last);
+	assert_ptr_not_equal(last, owned);
+	assert_int_equal(taken + withdrawn, 20000);
+	assert_int_equal(changer.swaps, taken);
+	assert_int_equal(incise_loop_control_ticks(changer.control), taken);
+	incise_loop_control_free(changer.control);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_one_place),
+		cmocka_unit_test(test_events),
+		cmocka_unit_test(test_two_threads),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
