@@ -3,6 +3,7 @@
  * The stages from the tracker's poses to where the tool is in the tissue.
  */
 #include <errno.h>
+#include <string.h>
 #include "../base/vector.h"
 #include "stages.h"
 
@@ -66,6 +67,7 @@ int incise_stage_predict(struct incise_plan *plan, struct incise_tick *tick)
 		tick->flags |= INCISE_TICK_STALE;
 	incise_predict_at(&plan->predict, tick->t_ns, tick->position_mm,
 			  plan->velocity_mm_s, plan->attitude);
+	memcpy(tick->quaternion, plan->attitude, sizeof(tick->quaternion));
 	v3_copy(tick->tool_mm, tick->position_mm);
 	tick->velocity_mm_s = v3_length(plan->velocity_mm_s);
 	return 0;

@@ -159,6 +159,8 @@ INCISE_API int64_t incise_plan_fade_ns(const struct incise_plan *plan);
 struct incise_tick {
 	int64_t t_ns;
 	double position_mm[3]; /**< of the tip, predicted */
+	/** Of the scalpel: w first, unit; all 0 when a fault came before it was known. */
+	double quaternion[4];
 	double tool_mm[3];     /**< of what the hand holds: Pfing */
 	double proxy_mm[3]; /**< of the surface that belongs to it: Pprxy; in contact */
 	double normal[3];   /**< along which the tissue pushes; in contact */

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The file of a state page; see state_file.h.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "state_file.h"
+#include "state_page.h"
+
+/* Names to try: more that start at once there will not be. */
+#define TRIES 100
+
+int incise_state_file_held(int fd)
+{
+	/* One for reading would wait for a writer's only. */
+	struct flock lock = {.l_type = F_RDLCK, .l_whence = SEEK_SET};
+
+	if (fcntl(fd, F_OFD_GETLK, &lock))
+		return -errno;
+	return lock.l_type != F_UNLCK;
+}
+
+static int busy(const char *path, int fd, struct incise_error *err)
+{
+	struct state_head head;
+
+	if (pread(fd, &head, sizeof(head), 0) != (ssize_t)sizeof(head))
+		head.pid = 0;
+	return incise_error_set(
+		err, EBUSY,
+		"%s: another loop runs there, as process %lld: stop it, or "
+		"give another path",
+		path, (long long)head.pid);
+}
+
+/* 0: nothing, or what may be replaced. */
+static int look(const char *path, struct incise_error *err)
+{
+	char magic[sizeof(STATE_MAGIC) - 1];
+	struct stat st;
+	ssize_t n = 0;
+	int fd, rc;
+
+	if (lstat(path, &st))
+		return errno == ENOENT ? 0
+				       : incise_error_set(err, errno, "%s: %s", path,
+							  strerror(errno));
+	fd = S_ISREG(st.st_mode)
+		     ? open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)
+		     : -1;
+	if (fd >= 0)
+		n = pread(fd, magic, sizeof(magic), 0);
+	/* An empty one holds nothing that anybody could miss. */
+	if (fd < 0 || n < 0 ||
+	    (n && (n < (ssize_t)sizeof(magic) || memcmp(magic, STATE_MAGIC, n))))
+		rc = incise_error_set(err, EEXIST,
+				      "%s: is there and is no state of a loop: give "
+				      "another path",
+				      path);
+	else
+		rc = incise_state_file_held(fd) == 1 ? busy(path, fd, err) : 0;
+	if (fd >= 0)
+		close(fd);
+	return rc;
+}
+
+/* The hidden name for a try. */
+static void try_name(struct incise_state_file *file, unsigned int n)
+{
+	const char *slash = strrchr(file->path, '/');
+	int dir = slash ? (int)(slash - file->path) + 1 : 0;
+
+	snprintf(file->hidden, strlen(file->path) + 9, "%.*s.%s.%06u", dir, file->path,
+		 file->path + dir, ((unsigned int)getpid() + n) % 1000000u);
+}
+
+static int create(struct incise_state_file *file)
+{
+	char *slash = strrchr(file->path, '/');
+	char *dir = slash ? strndup(file->path, (size_t)(slash - file->path) + 1)
+			  : strdup(".");
+	int fd;
+
+	if (!dir)
+		return -ENOMEM;
+	fd = open(dir, O_TMPFILE | O_RDWR | O_CLOEXEC, 0644);
+	free(dir);
+	for (unsigned int n = 0; fd < 0 && n < TRIES; n++) {
+		if (!file->hidden)
+			file->hidden = malloc(strlen(file->path) + 9);
+		if (!file->hidden)
+			return -ENOMEM;
+		try_name(file, n);
+		fd = open(file->hidden, O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0644);
+		if (fd < 0 && errno != EEXIST)
+			break;
+	}
+	if (fd < 0 && file->hidden) {
+		int rc = -errno;
+
+		free(file->hidden);
+		file->hidden = NULL;
+		return rc;
+	}
+	file->fd = fd;
+	return 0;
+}
+
+static int fill(struct incise_state_file *file, size_t size)
+{
+	struct flock lock = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+	int rc;
+
+	/* Whatever the umask: anybody may look. */
+	if (fchmod(file->fd, 0644) || fcntl(file->fd, F_OFD_SETLK, &lock))
+		return -errno;
+	/* Room that is not there would be found out by a signal, in the loop. */
+	rc = posix_fallocate(file->fd, 0, (off_t)size);
+	if (rc)
+		return -rc;
+	file->page = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE,
+			  file->fd, 0);
+	if (file->page == MAP_FAILED) {
+		file->page = NULL;
+		return -errno;
+	}
+	file->size = size;
+	/* Written once, each page is the loop's own, and costs no fault there. */
+	memset(file->page, 0, size);
+	return 0;
+}
+
+int incise_state_file_new(struct incise_state_file *file, const char *path, size_t size,
+			  struct incise_error *err)
+{
+	int rc;
+
+	*file = (struct incise_state_file){.fd = -1};
+	rc = look(path, err);
+	if (rc)
+		return rc;
+	file->path = strdup(path);
+	rc = file->path ? create(file) : -ENOMEM;
+	if (!rc)
+		rc = fill(file, size);
+	if (rc) {
+		incise_state_file_close(file);
+		return incise_error_set(
+			err, -rc,
+			"%s: the loop's state cannot be put there: %s; give "
+			"another path",
+			path, strerror(-rc));
+	}
+	return 0;
+}
+
+/* Give a file without a name a hidden one. */
+static int name_hidden(struct incise_state_file *file)
+{
+	char proc[32];
+
+	if (file->hidden)
+		return 0;
+	file->hidden = malloc(strlen(file->path) + 9);
+	if (!file->hidden)
+		return -ENOMEM;
+	snprintf(proc, sizeof(proc), "/proc/self/fd/%d", file->fd);
+	for (unsigned int n = 0; n < TRIES; n++) {
+		try_name(file, n);
+		if (!linkat(AT_FDCWD, proc, AT_FDCWD, file->hidden, AT_SYMLINK_FOLLOW))
+			return 0;
+		if (errno != EEXIST)
+			break;
+	}
+	free(file->hidden);
+	file->hidden = NULL;
+	return -errno;
+}
+
+/*
+ * What was at the path is under the hidden name now. If another loop put it there since one
+ * looked, it gets its name back.
+ */
+static int swapped(struct incise_state_file *file, struct incise_error *err)
+{
+	int rc = look(file->hidden, NULL);
+
+	if (!rc)
+		return 0;
+	renameat2(AT_FDCWD, file->hidden, AT_FDCWD, file->path, RENAME_EXCHANGE);
+	return incise_error_set(
+		err, -rc,
+		"%s: another loop starts there just now: stop it, or give "
+		"another path",
+		file->path);
+}
+
+int incise_state_file_publish(struct incise_state_file *file, struct incise_error *err)
+{
+	int rc = name_hidden(file);
+
+	if (rc)
+		goto failed;
+	for (int n = 0; n < TRIES; n++) {
+		/* In the place of nothing, or of one that can still be looked at then. */
+		if (!renameat2(AT_FDCWD, file->hidden, AT_FDCWD, file->path,
+			       RENAME_NOREPLACE)) {
+			free(file->hidden);
+			file->hidden = NULL;
+			return 0;
+		}
+		if (errno == EEXIST && !renameat2(AT_FDCWD, file->hidden, AT_FDCWD,
+						  file->path, RENAME_EXCHANGE)) {
+			rc = swapped(file, err);
+			unlink(file->hidden);
+			free(file->hidden);
+			file->hidden = NULL;
+			return rc;
+		}
+		if (errno != EEXIST && errno != ENOENT)
+			break;
+	}
+	rc = -errno;
+	/* A file system without that. */
+	if ((rc == -EINVAL || rc == -ENOSYS) && !rename(file->hidden, file->path)) {
+		free(file->hidden);
+		file->hidden = NULL;
+		return 0;
+	}
+failed:
+	return incise_error_set(err, -rc,
+				"%s: cannot be put there: %s; give another path",
+				file->path, strerror(-rc));
+}
+
+void incise_state_file_close(struct incise_state_file *file)
+{
+	if (file->hidden)
+		unlink(file->hidden);
+	if (file->page)
+		munmap(file->page, file->size);
+	if (file->fd >= 0)
+		close(file->fd);
+	free(file->hidden);
+	free(file->path);
+	*file = (struct incise_state_file){.fd = -1};
+}

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The writer of a state page; see incise/state.h. Each part has a copy here, so that the
+ * writer never reads what others could have changed.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <incise/clock.h>
+#include <incise/state.h>
+#include "../base/monotonic.h"
+#include "../base/vector.h"
+#include "state_file.h"
+#include "state_page.h"
+#include "state_words.h"
+#include "state_work.h"
+
+struct incise_state_writer {
+	struct incise_state_file file;
+	struct state_page *page;
+	struct state_run run; /* the normal thread's */
+	bool felt;	      /* a scene was told */
+	/* The loop's, on lines of the cache that are not the other's. */
+	_Alignas(64) struct state_live live;
+	struct incise_work work;
+	uint64_t written;
+};
+
+/* Cut where it is too long, between characters, and printable. */
+static void put_text(char *to, size_t size, const char *text)
+{
+	size_t n = text ? strlen(text) : 0;
+
+	if (n >= size) {
+		n = size - 1;
+		while (n && ((unsigned char)text[n] & 0xc0) == 0x80)
+			n--;
+	}
+	memset(to, 0, size);
+	for (size_t i = 0; i < n; i++)
+		to[i] = (unsigned char)text[i] < ' ' || text[i] == 0x7f ? '?' : text[i];
+}
+
+/* Of a long path the end says more. */
+static void put_path(char *to, size_t size, const char *path)
+{
+	size_t n = path ? strlen(path) : 0;
+
+	if (n >= size) {
+		path += n - (size - 4);
+		while (((unsigned char)*path & 0xc0) == 0x80)
+			path++;
+		put_text(to, size - 3, path);
+		memmove(to + 3, to, size - 3);
+		memcpy(to, "...", 3);
+	} else {
+		put_text(to, size, path);
+	}
+}
+
+static struct state_part part(size_t offset, size_t size, size_t count)
+{
+	return (struct state_part){.offset = offset, .size = size, .count = count};
+}
+
+static void put_head(struct state_head *head, const struct incise_state_setup *setup)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_REALTIME, &now);
+	head->start_realtime_ns = now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
+	head->start_ns = incise_monotonic_ns();
+	head->major = STATE_MAJOR;
+	head->minor = STATE_MINOR;
+	head->size = sizeof(struct state_page);
+	head->head = part(0, sizeof(*head), 1);
+	head->run = part(offsetof(struct state_page, run), sizeof(struct state_run), 1);
+	head->live =
+		part(offsetof(struct state_page, live), sizeof(struct state_live), 1);
+	head->lateness = part(offsetof(struct state_page, lateness), sizeof(uint64_t),
+			      INCISE_STATE_BUCKETS);
+	head->cost = part(offsetof(struct state_page, cost), sizeof(uint64_t),
+			  INCISE_STATE_BUCKETS);
+	head->ring = part(offsetof(struct state_page, written), sizeof(struct state_slot),
+			  INCISE_STATE_TICKS);
+	head->pid = getpid();
+	head->rate_hz = setup->rate_hz;
+	put_text(head->rig, sizeof(head->rig), setup->rig);
+	put_text(head->policy, sizeof(head->policy), setup->policy);
+	memcpy(head->magic, STATE_MAGIC, sizeof(head->magic));
+}
+
+static void publish_run(struct incise_state_writer *w)
+{
+	state_publish(&w->page->run, &w->run, sizeof(w->run));
+}
+
+struct incise_state_writer *incise_state_new(const char *path,
+					     const struct incise_state_setup *setup,
+					     struct incise_error *err)
+{
+	struct incise_state_writer *w;
+
+	if (!(setup->rate_hz > 0) || !isfinite(setup->rate_hz)) {
+		incise_error_set(err, EINVAL,
+				 "the loop's rate is %g Hz: expected one above 0",
+				 setup->rate_hz);
+		return NULL;
+	}
+	w = aligned_alloc(64, sizeof(*w));
+	if (!w) {
+		incise_error_set(err, ENOMEM, "%s: no memory for the loop's state", path);
+		return NULL;
+	}
+	memset(w, 0, sizeof(*w));
+	if (incise_state_file_new(&w->file, path, sizeof(*w->page), err))
+		goto failed;
+	w->page = w->file.page;
+	put_head(&w->page->head, setup);
+	incise_state_run(w, INCISE_RUN_STARTING, NULL);
+	if (incise_state_file_publish(&w->file, err))
+		goto failed_file;
+	return w;
+failed_file:
+	incise_state_file_close(&w->file);
+failed:
+	free(w);
+	return NULL;
+}
+
+/*
+ * The place of tick n is also that of tick n - slots. Who reads it looks at the count of
+ * ticks afterwards: it is as high as what was read is new, because it was raised before a
+ * word of the next tick was written.
+ */
+static void put_slot(struct incise_state_writer *w, const struct state_tick *tick)
+{
+	struct state_slot *slot = &w->page->slot[w->written % INCISE_STATE_TICKS];
+
+	__atomic_thread_fence(__ATOMIC_RELEASE);
+	__atomic_store_n(&slot->number, w->written + 1, __ATOMIC_RELAXED);
+	state_put(&slot->tick, tick, sizeof(*tick));
+	w->written++;
+	__atomic_store_n(&w->page->written, w->written, __ATOMIC_RELEASE);
+}
+
+static void count_tick(struct state_live *live, const struct incise_tick *tick,
+		       uint64_t skipped)
+{
+	double force_N = v3_length(tick->command_N);
+
+	if (!live->ticks++)
+		live->first_ns = tick->t_ns;
+	live->skipped += skipped;
+	live->overruns += !!skipped;
+	live->limited += !!(tick->flags & (INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED));
+	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
+		live->flagged[i] += tick->flags >> i & 1;
+	live->force_N = force_N;
+	if (force_N > live->force_max_N)
+		live->force_max_N = force_N;
+}
+
+static void count_times(struct state_live *live, int64_t lateness_ns, int64_t cost_ns)
+{
+	live->lateness_ns = lateness_ns;
+	live->cost_ns = cost_ns;
+	if (lateness_ns > live->lateness_max_ns)
+		live->lateness_max_ns = lateness_ns;
+	if (cost_ns > live->cost_max_ns)
+		live->cost_max_ns = cost_ns;
+}
+
+void incise_state_tick(struct incise_state_writer *w, const struct incise_tick *tick,
+		       int64_t lateness_ns, int64_t cost_ns, uint64_t skipped)
+{
+	if (!w)
+		return;
+	if (lateness_ns < 0)
+		lateness_ns = 0;
+	if (cost_ns < 0)
+		cost_ns = 0;
+	count_tick(&w->live, tick, skipped);
+	count_times(&w->live, lateness_ns, cost_ns);
+	incise_work_add(&w->work, tick);
+	w->live.absorbed_mJ = w->work.absorbed.value;
+	w->live.returned_mJ = w->work.returned.value;
+	incise_state_pack(&w->live.tick, tick);
+	state_count(&w->page->lateness[incise_state_bucket(lateness_ns)]);
+	state_count(&w->page->cost[incise_state_bucket(cost_ns)]);
+	put_slot(w, &w->live.tick);
+	state_publish(&w->page->live, &w->live, sizeof(w->live));
+}
+
+void incise_state_run(struct incise_state_writer *w, enum incise_run run,
+		      const char *reason)
+{
+	if (!w)
+		return;
+	if ((uint32_t)run != w->run.run || !w->run.since_ns)
+		w->run.since_ns = incise_monotonic_ns();
+	w->run.run = (uint32_t)run;
+	put_text(w->run.reason, 300, reason);
+	publish_run(w);
+}
+
+void incise_state_scene(struct incise_state_writer *w, const char *path,
+			const struct incise_plan *plan)
+{
+	const char *name, *why;
+	uint32_t n = 0;
+
+	if (!w)
+		return;
+	put_path(w->run.scene, sizeof(w->run.scene), path);
+	memset(w->run.stage, 0, sizeof(w->run.stage));
+	while (plan && n < INCISE_PLAN_STAGES_MAX &&
+	       (name = incise_plan_stage(plan, n))) {
+		put_text(w->run.stage[n], sizeof(w->run.stage[n]), name);
+		n++;
+	}
+	w->run.n_stages = n;
+	w->run.left_out = 0;
+	while (plan && incise_plan_left_out(plan, (int)w->run.left_out, &why))
+		w->run.left_out++;
+	w->run.reloads += w->felt;
+	w->felt = true;
+	publish_run(w);
+}
+
+void incise_state_refused(struct incise_state_writer *w, const char *reason)
+{
+	if (!w)
+		return;
+	w->run.refused++;
+	put_text(w->run.reason, 300, reason);
+	publish_run(w);
+}
+
+void incise_state_free(struct incise_state_writer *w)
+{
+	if (!w)
+		return;
+	incise_state_file_close(&w->file);
+	free(w);
+}
