@@ -239,6 +239,18 @@ void incise_state_refused(struct incise_state_writer *w, const char *reason)
 	publish_run(w);
 }
 
+void incise_state_counts(struct incise_state_writer *w,
+			 const struct incise_realtime_counts *counts)
+{
+	if (!w)
+		return;
+	w->run.minor_faults = counts->minor_faults;
+	w->run.major_faults = counts->major_faults;
+	w->run.voluntary = counts->voluntary;
+	w->run.involuntary = counts->involuntary;
+	publish_run(w);
+}
+
 void incise_state_free(struct incise_state_writer *w)
 {
 	if (!w)

@@ -19,6 +19,7 @@
 #include <incise/error.h>
 #include <incise/export.h>
 #include <incise/plan.h>
+#include <incise/realtime.h>
 
 INCISE_BEGIN_DECLS
 
@@ -99,6 +100,10 @@ INCISE_API void incise_state_scene(struct incise_state_writer *writer, const cha
 /** Tell that a reload was refused, and count it. @param reason in the place of the state's */
 INCISE_API void incise_state_refused(struct incise_state_writer *writer,
 				     const char *reason);
+
+/** Tell what the loop's thread met: incise_realtime_count(). */
+INCISE_API void incise_state_counts(struct incise_state_writer *writer,
+				    const struct incise_realtime_counts *counts);
 
 /** Let go of the page; the file stays, with what was told last. */
 INCISE_API void incise_state_free(struct incise_state_writer *writer);
