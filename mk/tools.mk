@@ -21,16 +21,18 @@ extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
 extra_calibrate-stepper := $(addprefix $(O)/obj/tools/,calibrate_stepper_series.o \
 	calibrate_stepper_live.o calibrate_stepper_rate.o calibrate_stepper_report.o \
 	stepper_drive.o stepper_status.o stepper_counters.o picture.o)
-extra_haptic := $(addprefix $(O)/obj/tools/,scene_argument.o stepper_counters.o loop_report.o)
+extra_haptic := $(addprefix $(O)/obj/tools/,scene_argument.o stepper_counters.o loop_report.o \
+	stroke.o notify.o haptic_actuator.o haptic_report.o haptic_self_test.o \
+	haptic_supervisor.o)
 extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o picture.o \
 	replay_picture.o)
-extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stopwatch.o)
+extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stroke.o stopwatch.o)
 extra_calibrate-force := $(addprefix $(O)/obj/tools/,picture.o calibrate_pairs.o \
 	calibrate_weights.o calibrate_force_report.o)
 extra_calibrate-depth := $(addprefix $(O)/obj/tools/,picture.o depth_picture.o depth_frames.o \
 	depth_lengths.o depth_corners.o depth_report.o)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
-	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o \
+	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o stroke.o \
 	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
 	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o \
 	bench_vision.o scalpel_picture.o bench_capture.o jpeg_camera.o)

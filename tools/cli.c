@@ -11,6 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <syslog.h>
 #include <unistd.h>
 #include <incise/version.h>
 #include "cli.h"
@@ -18,7 +20,7 @@
 #define OPTIONS_MAX 40
 
 static const struct cli_verb *current;
-static bool status_line;
+static bool status_line, verbose;
 static int status_above; /* lines above its last one */
 
 volatile sig_atomic_t cli_stop;
@@ -113,9 +115,22 @@ int cli_next(const struct cli_verb *verb, int argc, char **argv)
 	return id;
 }
 
-static void say(const char *level, const char *fmt, va_list args)
+/* Whether stderr is the journal, which the manager has told so. */
+static bool to_journal(void)
 {
-	char text[700];
+	const char *stream = getenv("JOURNAL_STREAM");
+	unsigned long long device, inode;
+	struct stat status;
+
+	return stream && sscanf(stream, "%llu:%llu", &device, &inode) == 2 &&
+	       !fstat(STDERR_FILENO, &status) && status.st_dev == device &&
+	       status.st_ino == inode;
+}
+
+/* @level: of syslog(3) */
+static void say(int level, const char *kind, const char *fmt, va_list args)
+{
+	char text[700], prefix[8] = "";
 
 	cli_progress_end();
 	vsnprintf(text, sizeof(text), fmt, args);
@@ -124,8 +139,10 @@ static void say(const char *level, const char *fmt, va_list args)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '?';
 	fflush(stdout);
-	fprintf(stderr, "incise%s%s: %s%s\n", current ? " " : "",
-		current ? current->name : "", level, text);
+	if (to_journal())
+		snprintf(prefix, sizeof(prefix), "<%d>", level);
+	fprintf(stderr, "%sincise%s%s: %s%s\n", prefix, current ? " " : "",
+		current ? current->name : "", kind, text);
 }
 
 void cli_fail(const char *fmt, ...)
@@ -133,7 +150,7 @@ void cli_fail(const char *fmt, ...)
 	va_list args;
 
 	va_start(args, fmt);
-	say("", fmt, args);
+	say(LOG_ERR, "", fmt, args);
 	va_end(args);
 	exit(1);
 }
@@ -148,7 +165,7 @@ void cli_usage(const char *fmt, ...)
 	va_list args;
 
 	va_start(args, fmt);
-	say("", fmt, args);
+	say(LOG_ERR, "", fmt, args);
 	va_end(args);
 	fprintf(stderr, "Try 'incise %s --help'.\n", current ? current->name : "");
 	exit(2);
@@ -159,8 +176,24 @@ void cli_warn(const char *fmt, ...)
 	va_list args;
 
 	va_start(args, fmt);
-	say("warning: ", fmt, args);
+	say(LOG_WARNING, "warning: ", fmt, args);
 	va_end(args);
+}
+
+void cli_note(const char *fmt, ...)
+{
+	va_list args;
+
+	if (!verbose)
+		return;
+	va_start(args, fmt);
+	say(LOG_INFO, "", fmt, args);
+	va_end(args);
+}
+
+void cli_be_verbose(void)
+{
+	verbose = true;
 }
 
 double cli_number(const char *option, const char *text, double min, double max)

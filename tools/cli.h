@@ -3,7 +3,8 @@
  * The habits that all verbs share: options and --help from one table, numbers with units,
  * one line per error, progress on a terminal, signals that end a run cleanly.
  *
- * Exit codes: 0 success, 1 failure, 2 bad usage.
+ * Exit codes: 0 success, 1 failure, 2 bad usage. Where stderr is the journal of systemd its
+ * lines have a level, as in sd-daemon(3).
  */
 #ifndef INCISE_CLI_H
 #define INCISE_CLI_H
@@ -49,6 +50,10 @@ _Noreturn void cli_usage(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
 /* A line "incise VERB: warning: …" on stderr. */
 void cli_warn(const char *fmt, ...) INCISE_PRINTF(1, 2);
+
+/* A line "incise VERB: …" on stderr that is no warning; nothing before cli_be_verbose(). */
+void cli_note(const char *fmt, ...) INCISE_PRINTF(1, 2);
+void cli_be_verbose(void);
 
 /* Arguments of options; out of range or malformed is bad usage. */
 double cli_number(const char *option, const char *text, double min, double max);

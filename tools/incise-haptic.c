@@ -1,23 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise haptic SCENE: the real-time loop, tracker in, force out, with tick statistics.
+ * incise haptic SCENE: the real-time loop, tracker in, force out. By hand with a report at the
+ * end, or for months as a service.
  */
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
-#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <incise/calibration.h>
-#include <incise/loop.h>
-#include <incise/outfile.h>
 #include "cli.h"
-#include "json.h"
-#include "loop_report.h"
-#include "scene_argument.h"
-#include "stepper_counters.h"
+#include "haptic_actuator.h"
+#include "haptic_report.h"
+#include "haptic_self_test.h"
+#include "haptic_supervisor.h"
 
 enum {
 	OPT_MODEL = CLI_LONG,
@@ -25,6 +24,13 @@ enum {
 	OPT_TOOL,
 	OPT_DURATION,
 	OPT_HOME,
+	OPT_RECOVER,
+	OPT_POLICY,
+	OPT_PRIORITY,
+	OPT_CPU,
+	OPT_NO_RT,
+	OPT_OVERRUNS,
+	OPT_STATE,
 	OPT_LOG,
 	OPT_JSON
 };
@@ -44,8 +50,20 @@ static const struct cli_option options[] = {
 	{OPT_DURATION, "duration", "TIME",
 	 "stop after this time, e.g. 10s (default: at SIGINT)"},
 	{OPT_HOME, "home", NULL, "find the actuator's 0 first, unless it is known"},
+	{OPT_RECOVER, "recover", NULL,
+	 "clear first what a program that died left latched in the actuator"},
+	{OPT_POLICY, "policy", "POLICY", "fifo or deadline (default: fifo)"},
+	{OPT_PRIORITY, "priority", "N", "of fifo, 1 to 84 (default: 80)"},
+	{OPT_CPU, "cpu", "N", "run the loop's thread on this CPU alone (default: any)"},
+	{OPT_NO_RT, "no-rt", NULL, "run without real time: ticks may be late"},
+	{OPT_OVERRUNS, "overruns", "N",
+	 "end after this many overruns in a row; 0: never (default: 100)"},
+	{OPT_STATE, "state", "FILE",
+	 "page that others read, none for no page (default: NAME.state of the\n"
+	 "scene's name, in /run/incise or $XDG_RUNTIME_DIR/incise)"},
 	{OPT_LOG, "log", "FILE", "write every tick as CSV at the end; needs --duration"},
 	{OPT_JSON, "json", NULL, "report as JSON"},
+	{'v', "verbose", NULL, "say on stderr what happens meanwhile"},
 	{0},
 };
 
@@ -57,357 +75,339 @@ static const struct cli_verb verb = {
 		"actuator, at the scene's rate. Not a safety device, not a medical device.",
 	.options = options,
 	.notes =
+		"SCENE is a file, or a name such as liver: ./liver.scene, else the one in\n"
+		"/etc/incise/scenes, else the one that is installed.\n\n"
 		"Example:\n  incise haptic scenes/liver.scene --rig sim: --duration 10s\n\n"
 		"Exit: 0 ended as asked, 1 failed, 2 bad usage. See incise-haptic(1).",
 };
 
 struct job {
-	struct scene_argument scene;
-	const char *rig, *log, *calibration;
-	enum incise_tool tool;
+	struct haptic haptic;
+	struct incise_realtime_setup realtime;
+	const char *rig, *log, *calibration, *state;
 	double duration;
-	bool json, home;
+	bool json, home, recover, no_rt;
 };
+
+static int one_of(const char *option, const char *text, const char *const *names, int n,
+		  const char *list)
+{
+	for (int i = 0; i < n; i++)
+		if (!strcmp(text, names[i]))
+			return i;
+	cli_usage("--%s: '%s' is none of %s", option, text, list);
+}
 
 static enum incise_tool tool_named(const char *name)
 {
 	static const char *const names[] = {"auto", "blade", "handle", "tube"};
 
-	for (int i = 0; i < 4; i++)
-		if (!strcmp(name, names[i]))
-			return (enum incise_tool)i;
-	cli_usage("--tool: '%s' is none of auto, blade, handle, tube", name);
+	return (enum incise_tool)one_of("tool", name, names, 4,
+					"auto, blade, handle, tube");
+}
+
+static enum incise_realtime_policy policy_named(const char *name)
+{
+	static const char *const names[] = {"fifo", "deadline"};
+
+	return (enum incise_realtime_policy)one_of("policy", name, names, 2,
+						   "fifo, deadline");
+}
+
+static void take_option(struct job *job, int opt)
+{
+	switch (opt) {
+	case 'r':
+		job->rig = optarg;
+		break;
+	case 'c':
+		job->calibration = optarg;
+		break;
+	case OPT_MODEL:
+		job->haptic.argument.model = optarg;
+		break;
+	case OPT_ARITH:
+		scene_argument_arith(&job->haptic.argument, optarg);
+		break;
+	case OPT_TOOL:
+		job->haptic.tool = tool_named(optarg);
+		break;
+	case OPT_DURATION:
+		job->duration = cli_duration("duration", optarg, 0.01, 86400);
+		break;
+	case OPT_HOME:
+		job->home = true;
+		break;
+	case OPT_RECOVER:
+		job->recover = true;
+		break;
+	case OPT_POLICY:
+		job->realtime.policy = policy_named(optarg);
+		break;
+	case OPT_PRIORITY:
+		job->realtime.priority = (int)cli_integer("priority", optarg, 1,
+							  INCISE_REALTIME_PRIORITY_MAX);
+		break;
+	case OPT_CPU:
+		job->realtime.cpu = (int)cli_integer("cpu", optarg, 0, 1023);
+		break;
+	case OPT_NO_RT:
+		job->no_rt = true;
+		break;
+	case OPT_OVERRUNS:
+		job->haptic.loop.overruns_most =
+			(unsigned int)cli_integer("overruns", optarg, 0, 1000000);
+		break;
+	case OPT_STATE:
+		job->state = optarg;
+		break;
+	case OPT_LOG:
+		job->log = optarg;
+		break;
+	case OPT_JSON:
+		job->json = true;
+		break;
+	case 'v':
+		cli_be_verbose();
+		break;
+	}
 }
 
 static void parse(struct job *job, int argc, char **argv)
 {
 	int opt;
 
-	*job = (struct job){0};
+	job->realtime = (struct incise_realtime_setup){
+		.priority = INCISE_REALTIME_PRIORITY, .cpu = INCISE_REALTIME_ANY_CPU};
+	job->haptic.loop.overruns_most = 100;
 	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
-		switch (opt) {
-		case 'r':
-			job->rig = optarg;
-			break;
-		case 'c':
-			job->calibration = optarg;
-			break;
-		case OPT_MODEL:
-			job->scene.model = optarg;
-			break;
-		case OPT_ARITH:
-			scene_argument_arith(&job->scene, optarg);
-			break;
-		case OPT_TOOL:
-			job->tool = tool_named(optarg);
-			break;
-		case OPT_DURATION:
-			job->duration = cli_duration("duration", optarg, 0.01, 86400);
-			break;
-		case OPT_HOME:
-			job->home = true;
-			break;
-		case OPT_LOG:
-			job->log = optarg;
-			break;
-		case OPT_JSON:
-			job->json = true;
-			break;
-		}
-	scene_argument_operand(&job->scene, argc, argv, optind);
+		take_option(job, opt);
+	scene_argument_operand(&job->haptic.argument, argc, argv, optind);
 	if (job->log && !job->duration)
 		cli_usage("--log keeps all ticks in memory: it needs --duration");
 	if (job->json && job->log && !strcmp(job->log, "-"))
 		cli_usage("--json and --log - would both write to standard output");
 }
 
-static const char *const phases[] = {"free", "cutting", "insertion"};
-
-static void write_log(struct incise_outfile *file, const struct incise_tick *ticks,
-		      size_t n)
+/* Whoever looks at the page later is to find why it failed. */
+static _Noreturn void fail(struct job *job, const struct incise_error *err)
 {
+	incise_state_run(job->haptic.state, INCISE_RUN_FAULT, err->text);
+	incise_state_free(job->haptic.state);
+	cli_fail_with(err);
+}
+
+/* ---- the page ---- */
+
+static bool is_folder(const char *path)
+{
+	struct stat status;
+
+	return !stat(path, &status) && S_ISDIR(status.st_mode) && !access(path, W_OK);
+}
+
+/* Where the page is by default; false: nowhere. */
+static bool state_path(const char *scene, char *path, size_t size)
+{
+	const char *own = getenv("XDG_RUNTIME_DIR"), *slash = strrchr(scene, '/');
+	char folder[3000] = "/run/incise", name[256];
+
+	snprintf(name, sizeof(name), "%s", slash ? slash + 1 : scene);
+	if (strlen(name) > 6 && !strcmp(name + strlen(name) - 6, ".scene"))
+		name[strlen(name) - 6] = 0;
+	if (!is_folder(folder)) {
+		if (!own || *own != '/')
+			return false;
+		snprintf(folder, sizeof(folder), "%s/incise", own);
+		mkdir(folder, 0700);
+		if (!is_folder(folder))
+			return false;
+	}
+	return snprintf(path, size, "%s/%s.state", folder, name) < (int)size;
+}
+
+static void open_state(struct job *job, bool real)
+{
+	struct haptic *haptic = &job->haptic;
+	struct incise_state_setup setup = {
+		.rate_hz = haptic->loop.rate_hz,
+		.rig = incise_rig_spec(haptic->rig),
+		.policy = haptic->scheduling,
+	};
 	struct incise_error err = {0};
-	char flags[INCISE_TICK_FLAGS + 1];
-	FILE *out;
+	char path[4096];
 
-	out = incise_outfile_stream(file);
-	fputs("t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags,phase,"
-	      "command_x_N,command_y_N,command_z_N\n",
-	      out);
-	for (size_t i = 0; i < n; i++) {
-		const struct incise_tick *t = &ticks[i];
-
-		fprintf(out,
-			"%.6f,%.4f,%.4f,%.4f,%.4f,%.3f,%.5f,%.5f,%s,%s,%.5f,%.5f,%.5f\n",
-			(t->t_ns - ticks[0].t_ns) * 1e-9, t->position_mm[0],
-			t->position_mm[1], t->position_mm[2], t->depth_mm,
-			t->velocity_mm_s,
-			sqrt(t->command_N[0] * t->command_N[0] +
-			     t->command_N[1] * t->command_N[1] +
-			     t->command_N[2] * t->command_N[2]),
-			t->rendered_N, loop_flags_text(t->flags, flags), phases[t->phase],
-			t->command_N[0], t->command_N[1], t->command_N[2]);
-	}
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
-}
-
-/* Room for all ticks of the run, of half of this machine's memory at most. */
-static void make_log(const struct job *job, struct incise_loop_options *loop)
-{
-	double most = 0.5 * (double)sysconf(_SC_PHYS_PAGES) *
-		      (double)sysconf(_SC_PAGESIZE) / sizeof(*loop->log);
-	double ticks = ceil(job->duration * loop->rate_hz) + 1;
-
-	if (ticks <= most)
-		loop->log = calloc((size_t)ticks, sizeof(*loop->log));
-	if (!loop->log)
-		cli_fail("--log: no memory for %.0f ticks; a --duration of up to %.0f s "
-			 "fits in half of it",
-			 ticks, floor(most / loop->rate_hz));
-	loop->log_size = (size_t)ticks;
-	/* Touch the pages now: a fault in the loop is a late tick. */
-	memset(loop->log, 0xff, loop->log_size * sizeof(*loop->log));
-}
-
-/* How far the actuator's force was from the one asked of it at the tick before, rms. */
-static double render_error(const struct incise_loop_stats *stats)
-{
-	return stats->ticks > 1 ? sqrt(stats->rendered_off2 / (stats->ticks - 1)) : NAN;
-}
-
-static const char *scheduling(bool real)
-{
-	int policy = sched_getscheduler(0);
-
-	if (!real)
-		return "simulated time";
-	return policy == SCHED_FIFO ? "SCHED_FIFO"
-	       : policy == SCHED_RR ? "SCHED_RR"
-				    : "SCHED_OTHER";
-}
-
-static json_t *cost_json(const struct incise_loop_stats *s)
-{
-	return json_pack("{so so so}", "median",
-			 json_number(loop_quantile(s->tick_100ns, 0.5, 100)), "p999",
-			 json_number(loop_quantile(s->tick_100ns, 0.999, 100)), "max",
-			 json_number(s->tick_max_ns));
-}
-
-static uint64_t ticks_with(const struct incise_loop_stats *s, enum incise_tick_flag flag)
-{
-	return s->flagged[__builtin_ctz(flag)];
-}
-
-static void report_json(const struct incise_loop_stats *s, const struct incise_plan *plan,
-			struct incise_stepper *stepper, bool real, double rate_hz,
-			double rms_N)
-{
-	json_t *stages = json_array();
-
-	for (int i = 0; incise_plan_stage(plan, i); i++)
-		json_array_append_new(stages, json_string(incise_plan_stage(plan, i)));
-	json_print(json_pack(
-		"{sI sI sf so so sI sI sI sI so sf so so ss so so}", "ticks",
-		(json_int_t)s->ticks, "skipped", (json_int_t)s->skipped, "rate_hz",
-		rate_hz, "lateness_us", real ? loop_lateness_json(s) : json_null(),
-		"tick_ns", real ? cost_json(s) : json_null(), "contact",
-		(json_int_t)ticks_with(s, INCISE_TICK_CONTACT), "extrapolated",
-		(json_int_t)ticks_with(s, INCISE_TICK_EXTRAPOLATED), "stale",
-		(json_int_t)ticks_with(s, INCISE_TICK_STALE), "limited",
-		(json_int_t)s->limited, "flags", loop_flags_json(s->flagged),
-		"force_max_N", s->force_max_N, "rendered_rms_error_N", json_number(rms_N),
-		"actuator", stepper ? stepper_counters_json(stepper) : json_null(),
-		"scheduling", scheduling(real), "stages", stages, "stopped_by",
-		cli_stop ? json_string(strsignal(cli_stop)) : json_null()));
-}
-
-static void report_text(const struct incise_loop_stats *s, const struct incise_plan *plan,
-			struct incise_stepper *stepper, bool real, double rate_hz,
-			double rms_N)
-{
-	char a[32], b[32];
-
-	printf("%llu ticks at %g Hz, %llu skipped (%s)\nstages    ",
-	       (unsigned long long)s->ticks, rate_hz, (unsigned long long)s->skipped,
-	       scheduling(real));
-	for (int i = 0; incise_plan_stage(plan, i); i++)
-		printf(" %s", incise_plan_stage(plan, i));
-	putchar('\n');
-	/* In simulated time a tick takes none and is never late. */
-	if (real) {
-		loop_lateness_line(s);
-		printf("tick       median %s, 99.9 %% %s, max %.1f us\n",
-		       loop_below(a, sizeof(a), loop_quantile(s->tick_100ns, 0.5, 0.1)),
-		       loop_below(b, sizeof(b), loop_quantile(s->tick_100ns, 0.999, 0.1)),
-		       s->tick_max_ns * 1e-3);
-	}
-	printf("force      largest %.3f N", s->force_max_N);
-	if (!isnan(rms_N))
-		printf(", actuator off by %.4f N rms", rms_N);
-	printf("\nticks      %llu in contact, %llu outside the model's support, %llu without a "
-	       "fresh pose, %llu limited\n",
-	       (unsigned long long)ticks_with(s, INCISE_TICK_CONTACT),
-	       (unsigned long long)ticks_with(s, INCISE_TICK_EXTRAPOLATED),
-	       (unsigned long long)ticks_with(s, INCISE_TICK_STALE),
-	       (unsigned long long)s->limited);
-	printf("held       %llu at the largest force, %llu at the largest slew, %llu at the end "
-	       "of the travel, %llu by the guard, %llu starting or fading\n",
-	       (unsigned long long)ticks_with(s, INCISE_TICK_CLAMPED),
-	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
-	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
-	       (unsigned long long)ticks_with(s, INCISE_TICK_GUARDED),
-	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
-	if (stepper)
-		stepper_counters_line(stepper);
-}
-
-static int home(struct incise_stepper *stepper, struct incise_error *err)
-{
-	int rc = incise_stepper_enable(stepper, err);
-
-	if (!rc)
-		rc = incise_stepper_home(stepper, &cli_stop, err);
-	return rc ? rc : incise_stepper_disable(stepper, err);
-}
-
-/*
- * Poses that came while one was busy are old. To take them in the first tick would keep the
- * actuator waiting, longer than its deadman does.
- */
-static void drop_poses(struct incise_tracker *tracker)
-{
-	struct incise_tracker_sample samples[64];
-
-	while (incise_tracker_read(tracker, samples, 64) == 64)
-		continue;
-}
-
-/*
- * Power the actuator. Without its 0 a target is no position: that of a real machine must
- * be found, where it has a switch for that.
- */
-static void take_hold(const struct job *job, struct incise_rig *rig)
-{
-	struct incise_stepper *stepper = incise_rig_stepper(rig);
-	struct incise_stepper_status status;
-	struct incise_stepper_info info;
-	struct incise_error err = {0};
-	int rc = incise_stepper_status(stepper, &status);
-
-	incise_stepper_info(stepper, &info);
-	if (rc)
-		cli_fail("%s: %s", info.name, strerror(-rc));
-	if (!status.homed && !job->home) {
-		if (info.can_home)
-			cli_fail(
-				"%s is not homed; run `incise stepper home --rig %s`, or "
-				"give --home",
-				info.name, incise_rig_spec(rig));
-		cli_warn("%s cannot be homed: its 0 is where it stands", info.name);
-	}
-	if (!status.homed && job->home)
-		rc = home(stepper, &err);
-	if (!rc)
-		drop_poses(incise_rig_tracker(rig));
-	if (!rc)
-		rc = incise_stepper_enable(stepper, &err);
-	if (!rc)
+	if (job->state && !strcmp(job->state, "none"))
 		return;
-	/* Steps that are made in this program do not lose their power with it. */
-	incise_rig_close(rig);
-	cli_fail_with(&err);
+	if (job->state)
+		snprintf(path, sizeof(path), "%s", job->state);
+	/* In simulated time there is nothing to look at. */
+	else if (!real || !state_path(haptic->argument.path, path, sizeof(path)))
+		return;
+	haptic->state = incise_state_new(path, &setup, &err);
+	if (!haptic->state)
+		fail(job, &err);
+	haptic->loop.state = haptic->state;
+	incise_state_scene(haptic->state, haptic->argument.path, haptic->plan);
 }
 
-/* To where there is no force, then without power. */
-static void let_go(struct incise_rig *rig)
-{
-	struct incise_stepper *stepper = incise_rig_stepper(rig);
-	struct incise_clock *clock = incise_rig_clock(rig);
-	struct incise_stepper_status status;
-	struct incise_stepper_info info;
-	struct incise_error err = {0};
-	int64_t now = incise_clock_now(clock), end;
+/* ---- start ---- */
 
-	incise_stepper_info(stepper, &info);
-	/* The virtual one has no power to lose: it goes there by itself. */
-	end = info.measures_handle
-		      ? now
-		      : now + (int64_t)((1 + info.travel_mm / info.velocity_mm_s) *
-					INCISE_NS_PER_S);
-	while (now < end && !incise_stepper_set(stepper, 0) &&
-	       !incise_stepper_status(stepper, &status) &&
-	       (status.position_mm > info.step_mm / 2 ||
-		status.state == INCISE_STEPPER_MOVING)) {
-		incise_clock_wait_until(clock, now + 2000000);
-		now = incise_clock_now(clock);
+static void enter_real_time(struct job *job)
+{
+	struct haptic *haptic = &job->haptic;
+	static char text[40];
+	struct incise_error err = {0};
+
+	haptic->scheduling = "SCHED_OTHER";
+	if (job->no_rt) {
+		cli_note("without real time, as asked: ticks may be late");
+		return;
 	}
-	if (incise_stepper_disable(stepper, &err))
-		cli_warn("%s", err.text);
+	job->realtime.period_ns = llrint(INCISE_NS_PER_S / haptic->loop.rate_hz);
+	haptic->realtime = incise_realtime_new(&job->realtime, &err);
+	if (!haptic->realtime)
+		cli_fail("%s; or give --no-rt to run without", err.text);
+	if (job->realtime.policy == INCISE_REALTIME_DEADLINE)
+		haptic->scheduling = "SCHED_DEADLINE";
+	else
+		snprintf(text, sizeof(text), "SCHED_FIFO %d", job->realtime.priority);
+	if (job->realtime.policy == INCISE_REALTIME_FIFO)
+		haptic->scheduling = text;
+}
+
+static void advise(const struct incise_realtime_setup *setup)
+{
+	struct incise_realtime_check checks[INCISE_REALTIME_CHECKS];
+	int n = incise_realtime_checks(setup, checks, INCISE_REALTIME_CHECKS);
+
+	for (int i = 0; i < n && i < INCISE_REALTIME_CHECKS; i++)
+		if (!checks[i].ok)
+			cli_note("real time: %s%s%s", checks[i].found,
+				 *checks[i].fix ? "; better: " : "", checks[i].fix);
+}
+
+static void take_calibration(struct job *job)
+{
+	struct incise_calibration calibration;
+	struct incise_error err = {0};
+
+	incise_calibration_nominal(&calibration);
+	if (job->calibration &&
+	    incise_calibration_load(job->calibration, &calibration, &err))
+		cli_fail_with(&err);
+	memcpy(job->haptic.tip_mm, calibration.tip_mm, sizeof(calibration.tip_mm));
+}
+
+/* Before any device is opened: what is refused then has not moved anything. */
+static bool has_real_clock(const char *spec)
+{
+	struct incise_error err = {0};
+	struct incise_rig *rig = incise_rig_open(spec, 0, &err);
+	bool real;
+
+	if (!rig)
+		cli_fail_with(&err);
+	real = incise_clock_is_real(incise_rig_clock(rig));
+	incise_rig_close(rig);
+	return real;
+}
+
+/* All but power: scene, real time, devices, plan, self-test. */
+static void set_up(struct job *job)
+{
+	struct haptic *haptic = &job->haptic;
+	const char *spec = cli_rig(job->rig);
+	struct incise_error err = {0};
+	struct self_test test;
+	bool real;
+
+	take_calibration(job);
+	haptic->scene = scene_argument_load(&haptic->argument);
+	haptic->loop.rate_hz = incise_scene_rate_hz(haptic->scene);
+	haptic->loop.duration_ns = (int64_t)(job->duration * INCISE_NS_PER_S);
+	haptic->scheduling = "simulated time";
+	real = has_real_clock(spec);
+	if (real)
+		enter_real_time(job);
+	haptic->rig =
+		incise_rig_open(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, &err);
+	if (!haptic->rig)
+		cli_fail_with(&err);
+	if (haptic_self_test(haptic->scene, incise_rig_tracker(haptic->rig), &test, &err))
+		cli_fail("%s: %s", haptic->argument.path, err.text);
+	haptic->plan = haptic_plan(haptic, haptic->scene, &err);
+	if (!haptic->plan)
+		cli_fail_with(&err);
+	open_state(job, real);
+	if (haptic->realtime)
+		advise(&job->realtime);
+	cli_note(
+		"self-test: %u ticks in the tissue, at most %.3f N; no force %.0f ms after the "
+		"last pose (at most %.0f)",
+		test.contact, test.force_max_N, test.silent_ms, test.silent_max_ms);
+}
+
+static void finish(struct job *job)
+{
+	struct haptic *haptic = &job->haptic;
+
+	incise_plan_free(haptic->plan);
+	incise_rig_close(haptic->rig);
+	incise_scene_free(haptic->scene);
+	incise_realtime_free(haptic->realtime);
+	free(haptic->loop.log);
 }
 
 int main(int argc, char **argv)
 {
-	struct incise_loop_options loop = {.stop = &cli_stop};
 	static struct incise_loop_stats stats;
-	struct incise_calibration calibration;
-	struct incise_error err = {0};
 	struct incise_outfile *file = NULL;
-	struct incise_scene *scene;
-	struct incise_plan *plan;
-	struct incise_rig *rig;
-	struct job job;
-	double rms_N;
-	bool real;
+	struct incise_error err = {0};
+	struct haptic *haptic;
+	struct job job = {0};
 	int rc;
 
+	/* Before there is another thread. */
+	incise_realtime_prepare();
 	parse(&job, argc, argv);
-	incise_calibration_nominal(&calibration);
-	if (job.calibration &&
-	    incise_calibration_load(job.calibration, &calibration, &err))
-		cli_fail_with(&err);
-	scene = scene_argument_load(&job.scene);
-	rig = incise_rig_open(cli_rig(job.rig), INCISE_RIG_TRACKER | INCISE_RIG_STEPPER,
-			      &err);
-	if (!rig)
-		cli_fail_with(&err);
-	plan = incise_plan_new(scene, rig, &err);
-	if (!plan)
-		cli_fail_with(&err);
-	incise_plan_set_tool(plan, job.tool);
-	incise_plan_set_tip(plan, calibration.tip_mm);
-	loop.rate_hz = incise_scene_rate_hz(scene);
-	loop.duration_ns = (int64_t)(job.duration * INCISE_NS_PER_S);
+	haptic = &job.haptic;
+	haptic->stats = &stats;
+	haptic->loop.stop = &cli_stop;
+	set_up(&job);
 	if (job.log) {
 		/* A path that cannot be is said before the run, not after. */
 		file = incise_outfile_open(job.log, &err);
 		if (!file)
-			cli_fail_with(&err);
-		make_log(&job, &loop);
+			fail(&job, &err);
+		haptic_make_log(job.duration, &haptic->loop);
 	}
-	real = incise_clock_is_real(incise_rig_clock(rig));
 	cli_catch_signals();
-	take_hold(&job, rig);
-	cli_progress("%s: %g Hz, Ctrl-C ends", job.scene.path, loop.rate_hz);
-	rc = incise_loop_run(plan, incise_rig_clock(rig), &loop, &stats, &err);
+	haptic_catch_reload();
+	if (haptic_take_hold(haptic->rig, job.home, job.recover, &err)) {
+		/* Steps that are made in this program do not lose their power with it. */
+		incise_rig_close(haptic->rig);
+		fail(&job, &err);
+	}
+	cli_progress("%s: %g Hz, Ctrl-C ends", haptic->argument.path,
+		     haptic->loop.rate_hz);
+	rc = haptic_supervise(haptic, &err);
 	cli_progress_end();
-	let_go(rig);
-	rms_N = incise_rig_stepper(rig) ? render_error(&stats) : NAN;
+	haptic_let_go(haptic->rig);
+	incise_state_run(haptic->state, rc ? INCISE_RUN_FAULT : INCISE_RUN_STOPPED,
+			 rc	    ? err.text
+			 : cli_stop ? strsignal(cli_stop)
+				    : "");
+	incise_state_free(haptic->state);
 	if (job.log)
-		write_log(file, loop.log, stats.logged);
+		haptic_write_log(file, haptic->loop.log, stats.logged);
 	if (job.json)
-		report_json(&stats, plan, incise_rig_stepper(rig), real, loop.rate_hz,
-			    rms_N);
+		haptic_report_json(haptic);
 	else if (!job.log || strcmp(job.log, "-"))
-		report_text(&stats, plan, incise_rig_stepper(rig), real, loop.rate_hz,
-			    rms_N);
+		haptic_report_text(haptic);
 	cli_finish();
-	incise_plan_free(plan);
-	incise_rig_close(rig);
-	incise_scene_free(scene);
-	free(loop.log);
+	finish(&job);
 	if (rc)
-		cli_fail("%s: %s", job.scene.path, err.text);
+		cli_fail("%s: %s", haptic->argument.path, err.text);
 	return 0;
 }

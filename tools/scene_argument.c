@@ -2,7 +2,11 @@
 /*
  * The scene that a verb is given; see scene_argument.h.
  */
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 #include "cli.h"
 #include "scene_argument.h"
 
@@ -13,22 +17,63 @@ void scene_argument_arith(struct scene_argument *argument, const char *text)
 	argument->arith = text;
 }
 
+/* A name is a scene of this folder, of this machine, or one that came with the program. */
+static void find(struct scene_argument *argument, const char *name)
+{
+	static char path[PATH_MAX];
+	char own[PATH_MAX];
+	ssize_t length = readlink("/proc/self/exe", own, sizeof(own) - 1);
+	const char *places[] = {".", "/etc/incise/scenes", own};
+
+	own[length > 0 ? length : 0] = 0;
+	for (int i = 0; i < 2 && strrchr(own, '/'); i++)
+		*strrchr(own, '/') = 0;
+	if (strlen(own) + sizeof("/share/incise/scenes") <= sizeof(own))
+		strcat(own, "/share/incise/scenes");
+	for (size_t i = 0; i < sizeof(places) / sizeof(*places); i++) {
+		if (snprintf(path, sizeof(path), "%s/%s.scene", places[i], name) <
+			    (int)sizeof(path) &&
+		    !access(path, F_OK)) {
+			argument->path = !i ? path + 2 : path;
+			return;
+		}
+	}
+	cli_fail("there is no file %s, and no %s.scene in this folder, in %s or in %s",
+		 name, name, places[1], own);
+}
+
 void scene_argument_operand(struct scene_argument *argument, int argc, char **argv,
 			    int first)
 {
 	if (first + 1 != argc)
 		cli_usage("expected one scene, got %d", argc - first);
 	argument->path = argv[first];
+	if (!strchr(argv[first], '/') && access(argv[first], F_OK) &&
+	    !strstr(argv[first], ".scene"))
+		find(argument, argv[first]);
+}
+
+struct incise_scene *scene_argument_read(const struct scene_argument *argument,
+					 struct incise_error *err)
+{
+	struct incise_scene *scene =
+		incise_scene_load(argument->path, argument->model, err);
+
+	if (!scene || !argument->arith)
+		return scene;
+	if (!incise_scene_set_arithmetic(scene, argument->arith, err))
+		return scene;
+	incise_scene_free(scene);
+	errno = EINVAL;
+	return NULL;
 }
 
 struct incise_scene *scene_argument_load(const struct scene_argument *argument)
 {
 	struct incise_error err = {0};
-	struct incise_scene *scene =
-		incise_scene_load(argument->path, argument->model, &err);
+	struct incise_scene *scene = scene_argument_read(argument, &err);
 
-	if (!scene || (argument->arith &&
-		       incise_scene_set_arithmetic(scene, argument->arith, &err)))
+	if (!scene)
 		cli_fail_with(&err);
 	return scene;
 }

@@ -16,9 +16,16 @@ struct scene_argument {
 /* Take --arith; what is none is bad usage. */
 void scene_argument_arith(struct scene_argument *argument, const char *text);
 
-/* Take the one operand; another number of them is bad usage. */
+/*
+ * Take the one operand; another number of them is bad usage. A name such as "liver", which is
+ * no file, is ./liver.scene, else that of /etc/incise/scenes, else that which is installed.
+ */
 void scene_argument_operand(struct scene_argument *argument, int argc, char **argv,
 			    int first);
+
+/* Read it; NULL with errno and @err when that fails. To be freed. */
+struct incise_scene *scene_argument_read(const struct scene_argument *argument,
+					 struct incise_error *err);
 
 /* Read it, or fail the program. To be freed. */
 struct incise_scene *scene_argument_load(const struct scene_argument *argument);

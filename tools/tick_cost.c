@@ -7,62 +7,14 @@
 #include <string.h>
 #include "cli.h"
 #include "stopwatch.h"
+#include "stroke.h"
 #include "tick_cost.h"
-
-#define NS 1e-9
-#define ABOVE_MM 5.0
-#define DEPTH_MM 1.0
-#define DOWN_S 0.2
-#define REACH_MM 5.0
-#define STROKE_HZ 1.27 /* 5 mm · 2π · 1.27 Hz = 40 mm/s */
 
 static const struct incise_tracker_info usual_tracker = {
 	.name = "usual",
 	.rate_hz = 120,
 	.latency_ns = 4200000,
 };
-
-struct stroke {
-	const struct incise_tracker_info *tracker;
-	struct incise_touch top;
-	double along[3]; /* in the surface */
-};
-
-static void stroke_begin(struct stroke *stroke, const struct incise_plan *plan)
-{
-	const double *n = stroke->top.normal;
-	double size;
-
-	incise_plan_top(plan, &stroke->top);
-	/* Across the normal, in the plane of its largest part and the next axis. */
-	memset(stroke->along, 0, sizeof(stroke->along));
-	for (int i = 0; i < 3; i++)
-		if (fabs(n[i]) >= fabs(n[(i + 1) % 3]) &&
-		    fabs(n[i]) >= fabs(n[(i + 2) % 3])) {
-			size = hypot(n[i], n[(i + 1) % 3]);
-			stroke->along[(i + 1) % 3] = n[i] / size;
-			stroke->along[i] = -n[(i + 1) % 3] / size;
-			break;
-		}
-}
-
-static void stroke_pose(const struct stroke *stroke, int64_t pose,
-			struct incise_tracker_sample *sample)
-{
-	double t = (double)pose / stroke->tracker->rate_hz, down = fmin(t / DOWN_S, 1);
-	double above = ABOVE_MM - (ABOVE_MM + DEPTH_MM) * down;
-	double off = REACH_MM * sin(2 * M_PI * STROKE_HZ * t);
-
-	*sample = (struct incise_tracker_sample){
-		.t_ns = llrint(t / NS) + stroke->tracker->latency_ns,
-		.quaternion = {1},
-		.status = ' ',
-	};
-	for (int i = 0; i < 3; i++)
-		sample->position_mm[i] = stroke->top.point_mm[i] +
-					 above * stroke->top.normal[i] +
-					 off * stroke->along[i];
-}
 
 /* What reading the clock twice adds to a time, ns. */
 static double clock_cost(void)
@@ -90,14 +42,14 @@ static int run(const struct incise_scene *scene,
 	struct incise_error err = {0};
 	struct incise_plan *plan = incise_plan_new_fed(scene, tracker, &err);
 	struct incise_tracker_sample sample;
-	struct stroke stroke = {.tracker = tracker};
+	struct stroke stroke;
 	int n = 0;
 
 	_Static_assert(INCISE_PLAN_STAGES_MAX == 16, "room for the stages");
 	if (!plan)
 		cli_fail_with(&err);
 	incise_plan_set_tool(plan, tool);
-	stroke_begin(&stroke, plan);
+	stroke_begin(&stroke, plan, tracker);
 	stroke_pose(&stroke, 0, &sample);
 	for (int i = 0; i < ticks; i++) {
 		int64_t t_ns = (i + 1) * period_ns;

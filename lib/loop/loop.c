@@ -21,6 +21,8 @@ struct run {
 	int64_t period_ns, due_ns, end_ns;
 	bool fading;
 	int64_t fade_end_ns; /* latest, when it fades to stop */
+	int64_t lag_ns;	     /* of this tick */
+	uint64_t skipped;    /* before this tick */
 	unsigned int in_row; /* overruns, up to now */
 	unsigned int flags;  /* of the last tick */
 	int64_t stale_ns;    /* time of the tick from which on poses were old */
@@ -80,6 +82,7 @@ static void tell_changes(struct run *run, const struct incise_tick *tick)
 /* One tick with its statistics; start_ns is when it began. */
 static int run_tick(struct run *run, struct incise_tick *tick, int64_t start_ns)
 {
+	const struct incise_loop_options *options = run->options;
 	int rc = incise_plan_tick(run->plan, start_ns, tick);
 	int64_t cost_ns = incise_clock_now(run->clock) - start_ns;
 
@@ -88,8 +91,9 @@ static int run_tick(struct run *run, struct incise_tick *tick, int64_t start_ns)
 	count(run->stats->tick_100ns, cost_ns / 100);
 	count_tick(run->stats, tick);
 	tell_changes(run, tick);
-	if (run->options->control)
-		incise_loop_control_ticked(run->options->control, run->stats->ticks);
+	incise_state_tick(options->state, tick, run->lag_ns, cost_ns, run->skipped);
+	if (options->control)
+		incise_loop_control_ticked(options->control, run->stats->ticks);
 	return rc;
 }
 
@@ -99,14 +103,15 @@ static int skip(struct run *run, int64_t now_ns)
 	int64_t ticks = (now_ns - run->due_ns) / run->period_ns;
 	int64_t left = (run->end_ns - run->due_ns - 1) / run->period_ns + 1;
 
+	run->skipped = (uint64_t)(ticks < left ? ticks : left);
 	if (!ticks) {
 		run->in_row = 0;
 		return 0;
 	}
-	run->stats->skipped += ticks < left ? ticks : left;
+	run->stats->skipped += run->skipped;
 	run->stats->overruns++;
 	run->in_row++;
-	tell(run, INCISE_LOOP_OVERRUN, now_ns, (double)(ticks < left ? ticks : left));
+	tell(run, INCISE_LOOP_OVERRUN, now_ns, (double)run->skipped);
 	run->due_ns += ticks * run->period_ns;
 	return run->options->overruns_most && run->in_row >= run->options->overruns_most
 		       ? -ETIME
@@ -152,6 +157,7 @@ static void count_lateness(struct run *run, int64_t now_ns)
 {
 	int64_t lag_ns = now_ns - run->due_ns + incise_clock_lag_ns(run->clock);
 
+	run->lag_ns = lag_ns;
 	if (lag_ns > run->stats->lateness_max_ns)
 		run->stats->lateness_max_ns = lag_ns;
 	count(run->stats->lateness_us, lag_ns / 1000);

@@ -314,6 +314,12 @@ void incise_scene_free(struct incise_scene *scene)
 	free(scene);
 }
 
+void incise_scene_limits(const struct incise_scene *scene,
+			 struct incise_scene_limits *limits)
+{
+	*limits = scene->limits;
+}
+
 double incise_scene_rate_hz(const struct incise_scene *scene)
 {
 	return scene->rate_hz;

@@ -41,9 +41,7 @@ struct incise_scene {
 		double mass_kg, damping_N_s_mm, coulomb_N, encoder_mm;
 		int delay_ticks; /* or -1: the tracker's */
 	} device;
-	struct {
-		double force_N, slew_N_s, pose_age_ms, fade_ms, ramp_ms, start_N;
-	} limits;
+	struct incise_scene_limits limits;
 	struct {
 		bool wound, bleeding;
 	} picture;

@@ -19,6 +19,7 @@
 #include <incise/export.h>
 #include <incise/loop_control.h>
 #include <incise/plan.h>
+#include <incise/state.h>
 
 INCISE_BEGIN_DECLS
 
@@ -28,6 +29,8 @@ INCISE_BEGIN_DECLS
 struct incise_loop_options {
 	double rate_hz;	     /**< 1 … 20000 */
 	int64_t duration_ns; /**< 0: until stopped */
+	/** The page that others read; or NULL. */
+	struct incise_state_writer *state;
 	/** Where every tick is written, or NULL: room for log_size; more are not kept. */
 	struct incise_tick *log;
 	size_t log_size;

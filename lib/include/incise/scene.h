@@ -53,5 +53,18 @@ INCISE_API void incise_scene_free(struct incise_scene *scene);
 
 INCISE_API double incise_scene_rate_hz(const struct incise_scene *scene);
 
+/** The scene's group `limits`. */
+struct incise_scene_limits {
+	double force_N;	    /**< largest force */
+	double slew_N_s;    /**< largest change of it in a second */
+	double pose_age_ms; /**< without a younger pose the force fades … */
+	double fade_ms;	    /**< … in this time … */
+	double ramp_ms;	    /**< … and comes back in this */
+	double start_N;	    /**< no force before one as small as this is asked for */
+};
+
+INCISE_API void incise_scene_limits(const struct incise_scene *scene,
+				    struct incise_scene_limits *limits);
+
 INCISE_END_DECLS
 #endif
