@@ -270,20 +270,20 @@ rig() { # ARGUMENTS
 
 @test "haptic ends with the drive's own cause, and reports what went wrong on the way" {
 	rig failing
-	run --separate-stderr incise haptic liver.scene --duration 10s
+	run --separate-stderr incise haptic liver.scene --no-rt --duration 10s
 	[ "$status" -eq 1 ]
 	[[ "${stderr_lines[-1]}" == "incise haptic: liver.scene: a device failed at tick 21: over-voltage (3210h): see the supply, then clear; the force was taken away" ]]
 	[ "${lines[-1]}" = "actuator   SYNCs sent late: 3, emergencies: 1" ]
 	rig "mute, failing"
-	run --separate-stderr incise haptic liver.scene --duration 10s
+	run --separate-stderr incise haptic liver.scene --no-rt --duration 10s
 	[[ "${stderr_lines[-1]}" == *" tick 21: alarm of the power stage: see what it says, "* ]]
 }
 
 @test "haptic says nothing of a bus that is sound, but in JSON" {
 	rig sound
-	run -0 --separate-stderr incise haptic liver.scene --duration 0.1s
+	run -0 --separate-stderr incise haptic liver.scene --no-rt --duration 0.1s
 	[[ "$output" != *actuator\ \ * ]]
-	incise haptic liver.scene --duration 0.1s --json >r.json
+	incise haptic liver.scene --no-rt --duration 0.1s --json >r.json
 	[ "$(key r.json actuator.setpoints)" = 1234 ]
 	[ "$(key r.json actuator.sync_late)" = 0 ]
 	sim=sim:clock=simulated,depth_mm=5,times=1

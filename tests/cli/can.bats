@@ -16,7 +16,7 @@ setup_file() {
 		deadman_ms=1000
 		rig --homed
 		code=0
-		incise haptic "$root/scenes/liver.scene" --rig rig.conf --duration 60s --json \
+		incise haptic "$root/scenes/liver.scene" --no-rt --rig rig.conf --duration 60s --json \
 			>r.json 2>err 7>&- || code=$?
 		drive_tell report
 		drive_end
@@ -417,9 +417,9 @@ stopped_itself() {
 
 @test "incise haptic renders through it; a fault ends that, kill -9 too" {
 	rig
-	run --separate-stderr incise haptic "$root/scenes/liver.scene" --rig rig.conf --duration 1s
+	run --separate-stderr incise haptic "$root/scenes/liver.scene" --no-rt --rig rig.conf --duration 1s
 	failed_with "not homed"
-	run -0 --separate-stderr incise haptic "$root/scenes/liver.scene" --rig rig.conf --home --duration 3s
+	run -0 --separate-stderr incise haptic "$root/scenes/liver.scene" --no-rt --rig rig.conf --home --duration 3s
 	drive_is "switch-on disabled"
 	begin haptic "$root/scenes/liver.scene" --rig rig.conf --duration 20s
 	sleep 0.5

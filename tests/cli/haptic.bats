@@ -161,7 +161,7 @@ refuses() {
 }
 
 @test "in real time it keeps to the clock, and SIGINT ends it with the report" {
-	incise haptic liver.scene --rig sim: --json >r.json 2>err 3>&- &
+	incise haptic liver.scene --rig sim: --no-rt --json >r.json 2>err 3>&- &
 	pid=$!
 	# a signal before the program listens would not be the case in question
 	until_it_catches 2
@@ -188,9 +188,9 @@ refuses() {
 }
 
 @test "a log that cannot be is said before the run, and so is one that does not fit" {
-	run --separate-stderr timeout 5 incise haptic liver.scene --rig sim: --duration 1h --log none/l.csv
+	run --separate-stderr timeout 5 incise haptic liver.scene --rig sim: --no-rt --duration 1h --log none/l.csv
 	failed_with none/l.csv
-	run --separate-stderr timeout 5 incise haptic liver.scene --rig sim: --duration 24h \
+	run --separate-stderr timeout 5 incise haptic liver.scene --rig sim: --no-rt --duration 24h \
 		--log l.csv
 	# 86.4 million ticks of some 200 bytes: 17 GB, unless this machine has twice that
 	if [ "$(awk '/^MemTotal/ { print $2 }' /proc/meminfo)" -lt 30000000 ]; then
@@ -200,7 +200,7 @@ refuses() {
 }
 
 @test "SIGTERM ends it as well" {
-	incise haptic liver.scene --rig sim: --json >r.json 2>err 3>&- &
+	incise haptic liver.scene --rig sim: --no-rt --json >r.json 2>err 3>&- &
 	pid=$!
 	until_it_catches 0x4000
 	kill -TERM $pid

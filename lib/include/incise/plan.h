@@ -161,7 +161,7 @@ struct incise_tick {
 	double position_mm[3]; /**< of the tip, predicted */
 	/** Of the scalpel: w first, unit; all 0 when a fault came before it was known. */
 	double quaternion[4];
-	double tool_mm[3];     /**< of what the hand holds: Pfing */
+	double tool_mm[3];  /**< of what the hand holds: Pfing */
 	double proxy_mm[3]; /**< of the surface that belongs to it: Pprxy; in contact */
 	double normal[3];   /**< along which the tissue pushes; in contact */
 	double depth_mm;

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise haptic as a service manager meets it: real time, notifications, watchdog, another scene
+# while it runs, recovery by rule. What systemd makes of it is in tests/vm.
+
+load cli
+load stepper_module
+
+# A host that stands still for seconds takes the time that a watchdog gives.
+BATS_TEST_RETRIES=2
+
+setup() {
+	memory_folder
+	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" "$root/scenes/wall.scene" .
+	module_folder
+}
+
+teardown() {
+	[ -z "${pid:-}" ] || kill -9 "$pid" 2>/dev/null || :
+	[ -z "${listener:-}" ] || kill "$listener" 2>/dev/null || :
+	left_memory
+}
+
+listen() {
+	export NOTIFY_SOCKET=$PWD/notify
+	python3 "$root/tests/cli/listen.py" "$NOTIFY_SOCKET" >told 3>&- &
+	listener=$!
+	awaits listening
+}
+
+# Until what was told has a line with this, at most 10 s.
+awaits() {
+	for ((i = 0; i < 200; i++)); do
+		grep -qE -e "$1" told && return
+		sleep 0.05
+	done
+	complain "never told '$1': $(cat told err 2>/dev/null)"
+}
+
+# Runs in the background as $pid, without a terminal.
+serve() {
+	# shellcheck disable=SC2016
+	setsid --fork --wait sh -c 'echo $$ >pid; exec incise haptic "$@"' sh "$@" --no-rt \
+		--verbose --json >r.json 2>err 3>&- &
+	for ((i = 0; i < 200; i++)); do
+		pid=$(cat pid 2>/dev/null) || :
+		[ -n "$pid" ] && return
+		sleep 0.02
+	done
+	complain "it did not start: $(cat err)"
+}
+
+# Wait for its end: its exit code is that of setsid.
+ended() {
+	code=0
+	wait $! || code=$?
+	pid=
+	[ "$code" = "$1" ] || complain "exit $code: $(cat err)"
+}
+
+@test "a service manager is told: ready, how it goes, that ticks go on, stopping" {
+	listen
+	WATCHDOG_USEC=1000000 serve liver.scene --rig sim: --state page
+	awaits READY=1
+	grep -q "STATUS=runs at 1000 Hz" told
+	awaits "STATUS=[0-9]* of 1000 Hz"
+	[ "$(grep -c WATCHDOG=1 told)" -ge 1 ]
+	kill -TERM "$pid"
+	awaits STOPPING=1
+	ended 0
+	# In this order, and not before the first tick.
+	[ "$(grep -oE 'READY=1|STOPPING=1' told | tr '\n' ' ')" = "READY=1 STOPPING=1 " ]
+	[ "$(key r.json stopped_by)" = Terminated ]
+	grep -q "^incise haptic: self-test: " err
+	grep -q "^incise haptic: Terminated: the force fades" err
+}
+
+@test "the watchdog is fed only while ticks come" {
+	make_module stepper_mine mine INCISE_BACKEND_ABI
+	rig mine:hangs
+	listen
+	WATCHDOG_USEC=400000 serve liver.scene --rig rig.conf
+	awaits READY=1
+	# 500 ticks, then none for 3 s.
+	sleep 4.5
+	kill -TERM "$pid"
+	ended 0
+	# One gap between two of them is as long as it hung, less a period of each.
+	awk '/WATCHDOG=1/ { if (last && $1 - last > most) most = $1 - last; last = $1; n++ }
+		END { print most, n; exit !(most > 2.5 && n > 4) }' told
+}
+
+@test "SIGHUP reads the scene again, without a step; what is none is refused" {
+	listen
+	serve liver.scene --rig sim:depth_mm=10,times=1000,pause_s=0.2,cut_s=1 --state page
+	awaits READY=1
+	sed -i 's/force_N = [0-9.]*/force_N = 0.05/' liver.scene
+	grep -q 'force_N = 0.05' liver.scene
+	kill -HUP "$pid"
+	awaits RELOADING=1
+	awaits "READY=1$"
+	grep -q "liver.scene: read again and in force" err
+	echo "nonsense" >>liver.scene
+	: >told
+	kill -HUP "$pid"
+	awaits "not reloaded: liver.scene:[0-9]*: "
+	sed -i '$d' liver.scene
+	sed -i 's/rate_hz = [0-9.]*/rate_hz = 500.0/' liver.scene
+	: >told
+	kill -HUP "$pid"
+	awaits "not reloaded: liver.scene: rate_hz is 500, and the loop runs at 1000"
+	grep -q "warning: not reloaded, the scene before goes on: liver.scene:" err
+	incise status page --json >s.json
+	[ "$(key s.json reloads)" = 1 ]
+	[ "$(key s.json reloads_refused)" = 2 ]
+	[ "$(key s.json state)" = running ]
+	kill -TERM "$pid"
+	ended 0
+	# It went on all the time.
+	holds "$(key r.json ticks) > 500"
+}
+
+@test "what a program that died left latched is cleared by --recover, and nothing else" {
+	make_module stepper_mine mine INCISE_BACKEND_ABI
+	rig mine:left
+	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
+	[ "$status" -eq 1 ]
+	[[ "$stderr" != *cleared* ]]
+	run -0 --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --recover -v --duration 0.1s
+	[[ "$stderr" == *"mine at left: cleared what was left behind"* ]]
+	rig mine:latched
+	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --recover --duration 0.1s \
+		--state page
+	[ "$status" -eq 1 ]
+	[[ "$stderr" != *cleared* ]]
+	[[ "${stderr_lines[-1]}" == *"e-stop: release it, then clear"* ]]
+	# The page keeps why.
+	run -1 incise status page
+	[[ "$output" == *fault* && "$output" == *e-stop* ]]
+}
+
+@test "overruns in a row end it, with the force taken away" {
+	make_module stepper_mine mine INCISE_BACKEND_ABI
+	rig mine:slow
+	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --overruns 5 --duration 10s
+	[ "$status" -eq 1 ]
+	[[ "${stderr_lines[-1]}" == *"5 ticks in a row came a period late or more"*"too slow or too busy for 1000 Hz" ]]
+	[[ "$output" == *" skipped in 5 overruns "* ]] || [[ "$output" == *" skipped in "* ]]
+}
+
+@test "two loops of one scene do not share a page" {
+	serve liver.scene --rig sim: --state page
+	for ((i = 0; i < 100; i++)); do [ -s page ] && break; sleep 0.05; done
+	run --separate-stderr incise haptic liver.scene --rig sim: --no-rt --state page --duration 0.1s
+	failed_with page "$pid"
+	kill -TERM "$pid"
+	ended 0
+}
+
+@test "a scene by its name is that of this folder, else of the machine" {
+	run -0 incise haptic liver --rig sim:clock=simulated --duration 0.1s
+	run --separate-stderr incise haptic nothing --rig sim:clock=simulated --duration 0.1s
+	failed_with "there is no file nothing, and no nothing.scene in this folder, in /etc/incise/scenes"
+}
+
+# Rights that this test takes away; who has none to begin with needs not.
+as_nobody() {
+	if [ "$(id -u)" = 0 ]; then
+		setpriv --reuid=65534 --regid=65534 --clear-groups prlimit --rtprio=0 --memlock=65536 "$@"
+	else
+		prlimit --rtprio=0 --memlock=65536 "$@"
+	fi
+}
+
+@test "real time that is denied is refused with the command that grants it" {
+	chmod 755 . 2>/dev/null || :
+	as_nobody true 2>/dev/null || skip "rights cannot be given up here"
+	as_nobody test -x "$INCISE_BUILD/bin/incise-haptic" || skip "the build is not for others to see"
+	run --separate-stderr as_nobody incise haptic liver.scene --rig sim: --duration 0.1s
+	failed_with "RLIMIT_RTPRIO" "prlimit" "--no-rt"
+	run -0 as_nobody incise haptic liver.scene --rig sim: --duration 0.1s --no-rt
+	run -0 as_nobody incise haptic liver.scene --rig sim:clock=simulated --duration 0.1s
+}
+
+@test "in real time no page is faulted in, and little memory is held" {
+	chrt -f 80 true 2>/dev/null || skip "this machine gives no SCHED_FIFO"
+	incise haptic wall.scene --rig sim: --duration 3s --json >r.json 3>&- &
+	pid=$!
+	sleep 1.5
+	awk '/^VmRSS/ { print; exit !($2 > 0 && $2 <= 12 * 1024) }' /proc/$pid/status
+	awk '/^VmLck/ { print; exit !($2 > 1000) }' /proc/$pid/status
+	# Only what the scene needs, to the last library.
+	awk '$6 ~ /\.so/ { n = split($6, part, "/"); print part[n] }' /proc/$pid/maps | sort -u |
+		sed 's/\.so.*//' | grep -vxE 'ld-linux.*|libc|libm|libdl|libpthread' | tr '\n' ' ' >mapped
+	# AddressSanitizer and the like would be seen here, too.
+	[ "$(cat mapped)" = "libconfig libincise libjansson " ] || complain "$(cat mapped)"
+	wait $pid
+	pid=
+	[ "$(key r.json scheduling)" = "SCHED_FIFO 80" ]
+	[ "$(key r.json thread.minor_faults)" = 0 ]
+	[ "$(key r.json thread.major_faults)" = 0 ]
+}
+
+@test "haptic: bad usage of real time" {
+	for wrong in "--policy rr" "--priority 0" "--priority 85" "--cpu -1" "--overruns -1"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise haptic liver.scene --rig sim: $wrong
+		bad_usage "${wrong% *}"
+	done
+	run --separate-stderr incise haptic liver.scene --rig sim: --cpu 1000 --duration 0.1s
+	[ "$status" -eq 1 ]
+}
