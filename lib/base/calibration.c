@@ -40,7 +40,7 @@ const struct calibration_key incise_calibration_keys[] = {
 	NUMBER(stepper_hysteresis_N, "N", 0, 1000),
 	NUMBER(stepper_stiction_N, "N", 0, 1000),
 	NUMBER(stepper_steps_s, "1/s", 0, 1e7),
-	{NULL},
+	{0},
 };
 
 void incise_calibration_nominal(struct incise_calibration *calibration)

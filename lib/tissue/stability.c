@@ -18,6 +18,11 @@
 #include <incise/stability.h>
 #include "../base/units.h"
 
+/* glibc 2.36 has it for gcc alone. */
+#ifndef CMPLX
+#define CMPLX(re, im) __builtin_complex((double)(re), (double)(im))
+#endif
+
 /* What a held force makes of the device in one period, unit mass and period. */
 struct loop {
 	double decay; /* 1 - p */
