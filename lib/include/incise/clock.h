@@ -48,16 +48,16 @@ INCISE_API struct incise_clock *incise_clock_new_paced(int64_t start_ns);
 INCISE_API void incise_clock_free(struct incise_clock *clock);
 
 /** Nanoseconds since an arbitrary start. Real-time safe (vDSO). */
-INCISE_API int64_t incise_clock_now(const struct incise_clock *clock);
+INCISE_API int64_t incise_clock_now(const struct incise_clock *clock) INCISE_REALTIME;
 
 /** Whether time passes by itself. Real-time safe. */
-INCISE_API bool incise_clock_is_real(const struct incise_clock *clock);
+INCISE_API bool incise_clock_is_real(const struct incise_clock *clock) INCISE_REALTIME;
 
 /**
  * How far a paced clock was behind CLOCK_MONOTONIC when its last wait ended, ns; 0 for the
  * others. Real-time safe.
  */
-INCISE_API int64_t incise_clock_lag_ns(const struct incise_clock *clock);
+INCISE_API int64_t incise_clock_lag_ns(const struct incise_clock *clock) INCISE_REALTIME;
 
 /**
  * Wait until an absolute time; a time that has passed returns at once.

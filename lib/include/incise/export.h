@@ -12,7 +12,9 @@
  *  - `_free` and `_close` accept NULL.
  *  - There is no global state. Different objects may be used from different threads; one
  *    object from one thread at a time. "Real-time safe" means: no allocation, no lock,
- *    no system call.
+ *    no system call. INCISE_REALTIME says it to the compiler, where that can check it:
+ *    clang 20 and later, with -fsanitize=realtime while it runs, with -Wfunction-effects
+ *    before. Others see nothing of it.
  */
 #ifndef INCISE_EXPORT_H
 #define INCISE_EXPORT_H
@@ -31,6 +33,16 @@
 #else
 #define INCISE_API
 #define INCISE_PRINTF(fmt, args)
+#endif
+
+/* Of the type of a function; in this form C has it as well as C++. */
+#if defined(__clang__) && defined(__has_attribute)
+#if __has_attribute(nonblocking)
+#define INCISE_REALTIME __attribute__((nonblocking))
+#endif
+#endif
+#ifndef INCISE_REALTIME
+#define INCISE_REALTIME
 #endif
 
 #endif

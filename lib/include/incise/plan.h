@@ -124,7 +124,8 @@ INCISE_API double incise_plan_bound(const struct incise_plan *plan, double reach
  * @return how many were taken; -EINVAL when the plan has a rig. Real-time safe.
  */
 INCISE_API int incise_plan_feed(struct incise_plan *plan,
-				const struct incise_tracker_sample *samples, int n);
+				const struct incise_tracker_sample *samples,
+				int n) INCISE_REALTIME;
 
 /**
  * Say where the tip of the blade is in the frame of what the tracker's poses are of: the
@@ -140,7 +141,8 @@ INCISE_API int incise_plan_set_tip(struct incise_plan *plan, const double tip_mm
  *
  * @return 0, -EINVAL. Real-time safe; in the thread that ticks.
  */
-INCISE_API int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool);
+INCISE_API int incise_plan_set_tool(struct incise_plan *plan,
+				    enum incise_tool tool) INCISE_REALTIME;
 
 /**
  * From the next tick on let the force fade out over the scene's limits.fade_ms, and ask for
@@ -221,7 +223,7 @@ INCISE_API int incise_plan_cause(const struct incise_plan *plan, char *text, siz
  *         so; the one on the hand follows as fast as the actuator can.
  */
 INCISE_API int incise_plan_tick(struct incise_plan *plan, int64_t t_ns,
-				struct incise_tick *tick);
+				struct incise_tick *tick) INCISE_REALTIME;
 
 /**
  * The same, with how long each stage took, by CLOCK_MONOTONIC and with its cost.
@@ -229,7 +231,8 @@ INCISE_API int incise_plan_tick(struct incise_plan *plan, int64_t t_ns,
  * @param stage_ns room for INCISE_PLAN_STAGES_MAX; 0 for what did not run
  */
 INCISE_API int incise_plan_tick_timed(struct incise_plan *plan, int64_t t_ns,
-				      struct incise_tick *tick, int64_t *stage_ns);
+				      struct incise_tick *tick,
+				      int64_t *stage_ns) INCISE_REALTIME;
 
 INCISE_END_DECLS
 #endif

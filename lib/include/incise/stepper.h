@@ -115,7 +115,8 @@ struct incise_stepper;
  *         latched), -EPERM (opened to watch), -ENODEV (gone). Real-time safe: no system
  *         call.
  */
-INCISE_API int incise_stepper_set(struct incise_stepper *stepper, double position_mm);
+INCISE_API int incise_stepper_set(struct incise_stepper *stepper,
+				  double position_mm) INCISE_REALTIME;
 
 /**
  * Move at a speed until the next target, within the travel; by hand, for bring-up. As
@@ -130,7 +131,8 @@ INCISE_API int incise_stepper_jog(struct incise_stepper *stepper, double velocit
  * @return 0, -EIO, -ENODEV. Real-time safe: no system call but the clock.
  */
 INCISE_API int incise_stepper_status(struct incise_stepper *stepper,
-				     struct incise_stepper_status *status);
+				     struct incise_stepper_status *status)
+	INCISE_REALTIME;
 
 /**
  * Power it. Its target is where it stands; the deadman runs from here on.
