@@ -80,7 +80,8 @@ static void tell_changes(struct run *run, const struct incise_tick *tick)
 }
 
 /* One tick with its statistics; start_ns is when it began. */
-static int run_tick(struct run *run, struct incise_tick *tick, int64_t start_ns)
+static INCISE_REALTIME int run_tick(struct run *run, struct incise_tick *tick,
+				    int64_t start_ns)
 {
 	const struct incise_loop_options *options = run->options;
 	int rc = incise_plan_tick(run->plan, start_ns, tick);
@@ -98,7 +99,7 @@ static int run_tick(struct run *run, struct incise_tick *tick, int64_t start_ns)
 }
 
 /* A stall over the end leaves out what was still due, and no more. */
-static int skip(struct run *run, int64_t now_ns)
+static INCISE_REALTIME int skip(struct run *run, int64_t now_ns)
 {
 	int64_t ticks = (now_ns - run->due_ns) / run->period_ns;
 	int64_t left = (run->end_ns - run->due_ns - 1) / run->period_ns + 1;
@@ -119,7 +120,7 @@ static int skip(struct run *run, int64_t now_ns)
 }
 
 /* To be asked before each tick: whether it ends, faded as it should be. */
-static bool stops(struct run *run)
+static INCISE_REALTIME bool stops(struct run *run)
 {
 	const struct incise_loop_options *options = run->options;
 
@@ -136,7 +137,7 @@ static bool stops(struct run *run)
 }
 
 /* Another plan that waits comes into force where the one before asks for none. */
-static void change_plan(struct run *run, int64_t now_ns)
+static INCISE_REALTIME void change_plan(struct run *run, int64_t now_ns)
 {
 	bool waits = !run->fading && run->options->control &&
 		     incise_loop_control_waiting(run->options->control);
@@ -153,7 +154,7 @@ static void change_plan(struct run *run, int64_t now_ns)
 	tell(run, INCISE_LOOP_PLAN, now_ns, 0);
 }
 
-static void count_lateness(struct run *run, int64_t now_ns)
+static INCISE_REALTIME void count_lateness(struct run *run, int64_t now_ns)
 {
 	int64_t lag_ns = now_ns - run->due_ns + incise_clock_lag_ns(run->clock);
 
