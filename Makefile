@@ -93,6 +93,7 @@ include mk/lib.mk
 include mk/tools.mk
 include mk/test.mk
 include mk/fuzz.mk
+include mk/rtsan.mk
 include mk/vm.mk
 include mk/install.mk
 include mk/module.mk

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# RealtimeSanitizer: what a tick does is done by a library that ends the program at the first
+# allocation, lock or system call in a function marked INCISE_REALTIME. tests/rtsan/*.c are
+# programs of their own; of the unit tests those are run once more that drive what is marked.
+#
+#   make check-rtsan RTSAN_CC=clang-23   with another compiler
+
+# The first that can: the sanitizer came with clang 20, its run-time library is a package of
+# its own.
+can_rtsan = $(shell echo 'int main(void) { return 0; }' | \
+	$1 -fsanitize=realtime -x c -o /dev/null - 2>/dev/null && echo $1)
+RTSAN_CC ?= $(firstword $(foreach name,clang-22 clang-21 clang-20 clang,\
+	$(if $(shell command -v $(name)),$(call can_rtsan,$(name)))))
+
+rtsan_flags := -fsanitize=realtime
+check-rtsan: ## ticks under RealtimeSanitizer: no allocation, no lock, no system call
+	+@if [ -n "$(RTSAN_CC)" ]; then \
+		$(MAKE) --no-print-directory O=$(O)/rtsan CC=$(RTSAN_CC) \
+			CFLAGS="-O1 -g $(rtsan_flags)" LDFLAGS="$(rtsan_flags)" run-rtsan; \
+	else \
+		echo "skipped: rtsan, which needs clang 20 or later and its run-time library (mk/deps rtsan)"; \
+	fi
+
+# All of libincise, and what of its modules is in the loop's thread.
+rtsan_objects := $(filter $(O)/obj/lib/device/can/% $(O)/obj/lib/device/polhemus/% \
+	$(O)/obj/lib/device/gpio/%,$(test_objects))
+$(O)/lib/libincise-rtsan.a: $(call objects,incise) $(rtsan_objects)
+	@mkdir -p $(@D)
+	@rm -f $@
+	$(AR) qcs $@ $^
+
+rtsan_units := $(filter-out $(if $(has_libmnl),,can/can_stepper),\
+	can/can_stepper device/motor device/stepper_gpio device/stepper_kernel loop/loop \
+	scene/extreme scene/plan scene/procedure sim/sim_stepper)
+rtsan_programs := $(patsubst tests/rtsan/%.c,$(O)/tests/rtsan/%,$(wildcard tests/rtsan/*.c))
+rtsan_unit_programs := $(addprefix $(O)/again/tests/unit/,$(rtsan_units))
+
+rtsan_cc = $(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
+	-Wno-missing-prototypes -Wno-unused-parameter $(CFLAGS) -MMD -MP -MF $@.d $(LDFLAGS)
+rtsan_libs = $(shell $(PKG_CONFIG) --libs $(pc_incise)) \
+	$(if $(has_libmnl),$(shell $(PKG_CONFIG) --libs libmnl)) $(libs_incise) -pthread
+
+$(O)/again/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-rtsan.a
+	@mkdir -p $(@D)
+	$(rtsan_cc) $(ldflags_$*) $(shell $(PKG_CONFIG) --cflags cmocka) -o $@ $< \
+		$(O)/lib/libincise-rtsan.a $(rtsan_libs) $(shell $(PKG_CONFIG) --libs cmocka)
+
+$(O)/tests/rtsan/%: tests/rtsan/%.c $(O)/lib/libincise-rtsan.a $(emulator)
+	@mkdir -p $(@D)
+	$(rtsan_cc) -o $@ $(filter %.c %.o %.a,$^) $(rtsan_libs)
+
+# clang's own symbolizer is in a package that is not needed for anything else.
+rtsan_options := RTSAN_OPTIONS=external_symbolizer_path=$(shell command -v addr2line)
+
+run-rtsan: $(rtsan_programs) $(rtsan_unit_programs)
+	@for program in $(rtsan_programs); do $(rtsan_options) $$program || exit 1; done
+	@$(rtsan_options) tests/unit/run $(rtsan_unit_programs)
+
+.PHONY: check-rtsan run-rtsan

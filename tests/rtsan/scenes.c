@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Every shipped scene in both arithmetics through a cut and what can go wrong in it, in the
+ * loop, under RealtimeSanitizer: it ends this program at the first thing that no tick may
+ * do. What the ticks came to is counted, to show that they went where they should.
+ */
+#include <errno.h>
+#include <glob.h>
+#include <math.h>
+#include <string.h>
+#include <incise/loop.h>
+#include "hands.h"
+
+#define BEGIN 1000 /* ticks: in the middle of the cut */
+#define END 1300
+
+static bool is_now(void)
+{
+	return hands.reads >= BEGIN && hands.reads < END;
+}
+
+static int lost(struct incise_tracker_sample *samples, int n)
+{
+	(void)samples;
+	return is_now() ? 0 : n;
+}
+
+static int wild(struct incise_tracker_sample *samples, int n)
+{
+	static const double what[] = {NAN, INFINITY, -1e300, 1e6, 1e-320};
+
+	for (int i = 0; i < n && is_now(); i++)
+		samples[i].position_mm[hands.reads % 3] = what[hands.reads % 5];
+	return n;
+}
+
+static int gone(struct incise_tracker_sample *samples, int n)
+{
+	(void)samples;
+	return hands.reads >= BEGIN ? -ENODEV : n;
+}
+
+static int stopped(struct incise_stepper_status *status, int rc)
+{
+	if (hands.reads < BEGIN)
+		return rc;
+	status->state = INCISE_STEPPER_FAULT;
+	status->faults = INCISE_STEPPER_ESTOP;
+	return -EIO;
+}
+
+static int refused(int rc)
+{
+	return hands.reads < BEGIN ? rc : -EIO;
+}
+
+static const struct way {
+	const char *name;
+	unsigned int devices;
+	int (*poses)(struct incise_tracker_sample *samples, int n);
+	int (*status)(struct incise_stepper_status *status, int rc);
+	int (*set)(int rc);
+	int rc;	     /* of the loop */
+	int flagged; /* seen in some tick: bit of incise_tick_flag, or 0 */
+} ways[] = {
+	{"a cut", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, NULL, NULL, NULL, 0,
+	 INCISE_TICK_CONTACT},
+	{"a cut without an actuator", INCISE_RIG_TRACKER, NULL, NULL, NULL, 0,
+	 INCISE_TICK_CONTACT},
+	{"a tracker that is lost and found", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER,
+	 lost, NULL, NULL, 0, INCISE_TICK_STALE},
+	{"poses that are none", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, wild, NULL, NULL,
+	 0, 0},
+	{"a tracker that went away", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, gone, NULL,
+	 NULL, -ENODEV, INCISE_TICK_FAULT},
+	{"an e-stop", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, NULL, stopped, NULL, -EIO,
+	 INCISE_TICK_FAULT},
+	{"a stepper that refuses", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, NULL, NULL,
+	 refused, -EIO, INCISE_TICK_FAULT},
+};
+
+static struct seen {
+	uint64_t runs, ticks, contacts, insertions;
+} seen;
+
+/* Between ticks: what the hand holds. It takes effect out of the tissue. */
+static int change_tool(void *context, const struct incise_tick *tick)
+{
+	uint64_t *ticks = context;
+
+	seen.insertions += tick->phase == INCISE_PHASE_INSERTION;
+	if (++*ticks % 250 == 0)
+		incise_plan_set_tool(hands.plan, (enum incise_tool)(*ticks / 250 % 4));
+	return 0;
+}
+
+static void run(const char *scene, const char *arithmetic, bool full,
+		const struct way *way)
+{
+	static struct incise_loop_stats stats;
+	uint64_t ticks = 0;
+	struct incise_loop_options options = {.duration_ns = 3 * INCISE_NS_PER_S,
+					      .ticked = change_tool,
+					      .context = &ticks};
+	struct incise_error err = {0};
+	int rc;
+
+	hands_begin(scene, arithmetic, full, way->devices);
+	hands.poses = way->poses;
+	hands.status = way->status;
+	hands.set = way->set;
+	options.rate_hz = incise_scene_rate_hz(hands.scene);
+	rc = incise_loop_run(hands.plan, incise_rig_clock(hands.rig), &options, &stats,
+			     &err);
+	if (rc != way->rc)
+		hands_fail(way->name, rc ? err.text : "the loop did not end");
+	if (way->flagged && !stats.flagged[__builtin_ctz((unsigned int)way->flagged)])
+		hands_fail(way->name, "it made no difference to any tick");
+	seen.runs++;
+	seen.ticks += stats.ticks;
+	seen.contacts += stats.flagged[__builtin_ctz(INCISE_TICK_CONTACT)];
+	hands_end();
+}
+
+int main(void)
+{
+	static const char *const arithmetics[] = {"fixed", "double"};
+	glob_t scenes;
+
+	if (glob("scenes/*.scene", 0, NULL, &scenes))
+		hands_fail("scenes", "none here: run it in the project's folder");
+	for (size_t s = 0; s < scenes.gl_pathc; s++)
+		for (int a = 0; a < 4; a++)
+			for (size_t w = 0; w < sizeof(ways) / sizeof(*ways); w++)
+				run(scenes.gl_pathv[s], arithmetics[a % 2], a > 1,
+				    &ways[w]);
+	if (!seen.insertions)
+		hands_fail("tools", "handle and tube were never in the tissue");
+	printf("ok    rtsan: %zu scenes, %llu runs, %llu ticks, of them %llu in contact, "
+	       "%llu of handle or tube\n",
+	       scenes.gl_pathc, (unsigned long long)seen.runs,
+	       (unsigned long long)seen.ticks, (unsigned long long)seen.contacts,
+	       (unsigned long long)seen.insertions);
+	globfree(&scenes);
+	return 0;
+}
