@@ -120,11 +120,24 @@ check-sanitize: ## unit tests under AddressSanitizer and UBSan
 	+@$(MAKE) --no-print-directory O=$(O)/sanitize CFLAGS="-O1 -g $(sanitize_flags)" \
 		LDFLAGS="$(sanitize_flags)" check-unit
 
+# Threads that share memory without a lock, under ThreadSanitizer; what is not of the page
+# comes from the library as it is.
+tsan_programs := $(O)/tests/tsan/loop/state_reader
+$(tsan_programs): tests/unit/loop/state_reader.c $(wildcard lib/loop/state_*.c) $(O)/lib/libincise.so
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \
+		-Wno-unused-parameter -Wno-tsan $(shell $(PKG_CONFIG) --cflags cmocka) -O1 -g \
+		-fsanitize=thread -MMD -MP -MF $@.d -o $@ $(filter %.c,$^) -L$(O)/lib \
+		-Wl,-rpath,$(abspath $(O)/lib) -lincise $(shell $(PKG_CONFIG) --libs cmocka) -lm
+
+check-tsan: $(tsan_programs) ## what threads share without a lock, under ThreadSanitizer
+	@tests/unit/run $(tsan_programs)
+
 style_sources := $(shell find lib tools tests driver -name '*.[ch]' -o -path 'lib/*.cc' 2>/dev/null)
 check-style: ## the house's form: clang-format, an SPDX line in every file
 	@tests/style $(style_sources)
 
-.PHONY: check check-style check-unit check-cli check-attack check-sanitize can-drive mcap-reader
+.PHONY: check check-style check-unit check-cli check-attack check-sanitize check-tsan can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

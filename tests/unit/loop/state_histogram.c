@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/loop/state_histogram.c: buckets without gaps, and quantiles held against sorted times.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/state.h>
+
+static struct incise_state_histogram histogram;
+
+static void test_buckets_follow_each_other(void **state)
+{
+	assert_int_equal(incise_state_bucket(INT64_MIN), 0);
+	assert_int_equal(incise_state_bucket(-1), 0);
+	assert_int_equal(incise_state_bucket(0), 0);
+	assert_int_equal(incise_state_bucket(INT64_MAX), INCISE_STATE_BUCKETS - 1);
+	for (int i = 0; i < INCISE_STATE_BUCKETS - 1; i++) {
+		double last = incise_state_edge(i);
+		double first = i ? incise_state_edge(i - 1) + 1 : 0;
+
+		assert_int_equal(incise_state_bucket((int64_t)first), i);
+		assert_int_equal(incise_state_bucket((int64_t)last), i);
+		assert_int_equal(incise_state_bucket((int64_t)last + 1), i + 1);
+		/* What the header promises; below 32 ns each has one time. */
+		assert_true(last == first || (last - first) / first < 0.032);
+	}
+	/* All that is shorter than 10 s has a bucket that ends. */
+	assert_true(incise_state_edge(INCISE_STATE_BUCKETS - 2) > 10e9);
+	assert_true(isinf(incise_state_edge(INCISE_STATE_BUCKETS - 1)));
+	assert_true(isinf(incise_state_edge(INT32_MAX)));
+	assert_true(incise_state_edge(-1) == 0);
+}
+
+static int by_size(const void *a, const void *b)
+{
+	const int64_t *x = a, *y = b;
+
+	return (*x > *y) - (*x < *y);
+}
+
+static void test_quantiles(void **state)
+{
+	enum { N = 20000 };
+	static const double shares[] = {0, 0.001, 0.5, 0.9, 0.99, 0.999, 0.9999, 1};
+	static int64_t ns[N];
+	uint64_t seed = 1;
+
+	memset(&histogram, 0, sizeof(histogram));
+	for (int i = 0; i < N; i++) {
+		seed = seed * 6364136223846793005u + 1442695040888963407u;
+		/* Over 9 decades, each as likely. */
+		ns[i] = (int64_t)pow(10, (double)(seed >> 11) * 0x1p-53 * 9.5);
+		histogram.count[incise_state_bucket(ns[i])]++;
+	}
+	qsort(ns, N, sizeof(*ns), by_size);
+	assert_int_equal(incise_state_total(&histogram), N);
+	for (size_t i = 0; i < sizeof(shares) / sizeof(*shares); i++) {
+		int64_t rank = (int64_t)ceil(shares[i] * N);
+		double exact = (double)ns[rank ? rank - 1 : 0];
+		double told = incise_state_quantile(&histogram, shares[i]);
+
+		assert_true(told >= exact);
+		/* The width of a bucket. */
+		assert_true(told <= exact * 1.032 + 1);
+	}
+}
+
+static void test_nothing_and_too_much(void **state)
+{
+	memset(&histogram, 0, sizeof(histogram));
+	assert_int_equal(incise_state_total(&histogram), 0);
+	assert_true(incise_state_quantile(&histogram, 0.5) == 0);
+	histogram.count[INCISE_STATE_BUCKETS - 1] = 1;
+	assert_true(isinf(incise_state_quantile(&histogram, 0.5)));
+	/* A page of garbage: as full as can be, and finite work. */
+	memset(&histogram, 0xff, sizeof(histogram));
+	assert_true(incise_state_total(&histogram) == UINT64_MAX);
+	assert_true(incise_state_quantile(&histogram, 0) == 0);
+	assert_true(incise_state_quantile(&histogram, NAN) >= 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_buckets_follow_each_other),
+		cmocka_unit_test(test_quantiles),
+		cmocka_unit_test(test_nothing_and_too_much),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,450 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/loop/state_reader.c: a reader beside a writer, one that died, and pages that nobody
+ * should have written.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <sys/stat.h>
+#include "../../../lib/loop/state_page.h"
+#include "state_made.h"
+
+static struct incise_state_now now;
+static struct incise_tick ticks[INCISE_STATE_TICKS + 10];
+static struct state_page page;
+
+static void load(const char *path)
+{
+	FILE *file = fopen(path, "r");
+
+	assert_non_null(file);
+	assert_int_equal(fread(&page, sizeof(page), 1, file), 1);
+	fclose(file);
+}
+
+static void store(const char *path, size_t size)
+{
+	FILE *file = fopen(path, "w");
+
+	assert_non_null(file);
+	assert_int_equal(fwrite(&page, 1, size, file), size);
+	fclose(file);
+}
+
+static void test_ring(void **state)
+{
+	struct made made = made_page();
+	struct incise_state *reader = incise_state_open(made.path, NULL);
+	uint64_t early = 0, late = INCISE_STATE_NEWEST, lost = 0;
+
+	assert_int_equal(incise_state_ticks(reader, &early, ticks, 10, &lost), 0);
+	made_ticks(made.writer, 0, 100);
+	assert_int_equal(incise_state_ticks(reader, &late, ticks, 10, &lost), 0);
+	assert_int_equal(late, 100);
+	/* In parts, oldest first. */
+	for (int from = 0, n; from < 100; from += n) {
+		n = incise_state_ticks(reader, &early, ticks, 30, NULL);
+		assert_int_equal(n, from < 90 ? 30 : 10);
+		for (int i = 0; i < n; i++) {
+			struct incise_tick made_one = made_tick(from + i);
+
+			assert_true(made_same(&ticks[i], &made_one));
+		}
+	}
+	assert_int_equal(early, 100);
+	assert_int_equal(incise_state_ticks(reader, &early, ticks, 30, NULL), 0);
+	assert_int_equal(incise_state_ticks(reader, &early, ticks, 0, NULL), 0);
+	made_ticks(made.writer, 100, 103);
+	assert_int_equal(incise_state_ticks(reader, &late, ticks, 10, &lost), 3);
+	assert_int_equal(ticks[0].t_ns, 100);
+	assert_int_equal(lost, 0);
+	incise_state_close(reader);
+	made_free(&made);
+}
+
+static void test_ring_that_went_round(void **state)
+{
+	enum { N = 3 * INCISE_STATE_TICKS + 11 };
+	struct made made = made_page();
+	struct incise_state *reader = incise_state_open(made.path, NULL);
+	uint64_t cursor = 5, lost = 1;
+	int n;
+
+	made_ticks(made.writer, 0, N);
+	n = incise_state_ticks(reader, &cursor, ticks, INCISE_STATE_TICKS + 10, &lost);
+	/* The oldest slot may be in use again. */
+	assert_int_equal(n, INCISE_STATE_TICKS - 1);
+	assert_int_equal(cursor, N);
+	assert_int_equal(lost, 1 + N - 5 - n);
+	for (int i = 0; i < n; i++)
+		assert_int_equal(ticks[i].t_ns, N - n + i);
+	/* A cursor from elsewhere finds nothing, and is put right. */
+	cursor = N + 1;
+	assert_int_equal(incise_state_ticks(reader, &cursor, ticks, 10, &lost), 0);
+	assert_int_equal(cursor, N);
+	incise_state_close(reader);
+	made_free(&made);
+}
+
+struct busy {
+	struct made made;
+	atomic_bool stop;
+	int64_t told;
+};
+
+/* As a loop does, some ticks and a pause; the pause is what a reader gets in by. */
+static void *tell(void *arg)
+{
+	struct busy *busy = arg;
+
+	while (!atomic_load(&busy->stop)) {
+		int64_t more = 1 + busy->told % 50;
+
+		made_ticks(busy->made.writer, busy->told, busy->told + more);
+		busy->told += more;
+		for (int i = 0; i < 4; i++)
+			sched_yield();
+	}
+	return NULL;
+}
+
+/* Fields that are of one tick, in a copy that was told to be whole. */
+static void whole(void)
+{
+	struct incise_tick made_one = made_tick((int64_t)now.ticks - 1);
+
+	if (!now.ticks)
+		return;
+	assert_true(made_same(&now.tick, &made_one));
+	assert_true(now.force_N == made_one.command_N[2]);
+	assert_true(now.force_max_N == now.force_N);
+	assert_int_equal(now.lateness_ns, now.tick.t_ns);
+	assert_int_equal(now.cost_max_ns, 2 * now.tick.t_ns);
+}
+
+static void test_beside_a_writer(void **state)
+{
+	struct busy busy = {.made = made_page()};
+	struct incise_state *reader = incise_state_open(busy.made.path, NULL);
+	uint64_t cursor = 0, lost = 0, got = 0;
+	enum incise_run run = INCISE_RUN_STARTING;
+	int64_t next = 0;
+	pthread_t thread;
+
+	incise_state_run(busy.made.writer, run, incise_run_name(run));
+	pthread_create(&thread, NULL, tell, &busy);
+	for (int good = 0; good < 2000;) {
+		int rc = incise_state_read(reader, &now), n;
+
+		assert_true(rc == 0 || rc == -EAGAIN);
+		if (!rc) {
+			good++;
+			whole();
+			assert_true(now.alive && !now.torn);
+			/* The other half of the writer is of another thread. */
+			assert_string_equal(now.reason, incise_run_name(now.run));
+			incise_state_run(busy.made.writer, run, incise_run_name(run));
+			run = (enum incise_run)((run + 1) % INCISE_RUNS);
+		}
+		/* Not each time: then some are lost. */
+		if (good % 100)
+			continue;
+		n = incise_state_ticks(reader, &cursor, ticks, INCISE_STATE_TICKS, &lost);
+		assert_true(n >= 0);
+		for (int i = 0; i < n; i++) {
+			struct incise_tick made_one = made_tick(ticks[i].t_ns);
+
+			assert_true(made_same(&ticks[i], &made_one));
+			assert_true(ticks[i].t_ns >= next);
+			next = ticks[i].t_ns + 1;
+		}
+		got += (uint64_t)n;
+		assert_int_equal(got + lost, cursor);
+	}
+	atomic_store(&busy.stop, true);
+	pthread_join(thread, NULL);
+	assert_int_equal(incise_state_read(reader, &now), 0);
+	assert_int_equal(now.ticks, busy.told);
+	whole();
+	incise_state_close(reader);
+	made_free(&busy.made);
+}
+
+/* In the middle of writing: a living writer is waited for, a dead one is not. */
+static void test_half_written(void **state)
+{
+	static const size_t parts[] = {offsetof(struct state_page, run),
+				       offsetof(struct state_page, live)};
+
+	for (int i = 0; i < 2; i++) {
+		struct made made = made_page();
+		struct incise_state *reader = incise_state_open(made.path, NULL);
+		int fd = open(made.path, O_WRONLY);
+		uint64_t odd = 77;
+
+		made_ticks(made.writer, 0, 3);
+		assert_int_equal(pwrite(fd, &odd, sizeof(odd), (off_t)parts[i]), 8);
+		assert_int_equal(incise_state_read(reader, &now), -EAGAIN);
+		incise_state_free(made.writer);
+		made.writer = NULL;
+		assert_int_equal(incise_state_read(reader, &now), 0);
+		assert_true(now.torn && !now.alive);
+		assert_int_equal(now.ticks, 3);
+		close(fd);
+		incise_state_close(reader);
+		made_free(&made);
+	}
+}
+
+/* What a dead writer left odd does not stay so when it was just slow. */
+static void test_healed(void **state)
+{
+	struct made made = made_page();
+	struct incise_state *reader = incise_state_open(made.path, NULL);
+	int fd = open(made.path, O_WRONLY);
+	uint64_t odd = 77;
+
+	pwrite(fd, &odd, sizeof(odd), offsetof(struct state_page, live));
+	made_ticks(made.writer, 0, 1);
+	assert_int_equal(incise_state_read(reader, &now), 0);
+	assert_int_equal(now.ticks, 1);
+	close(fd);
+	incise_state_close(reader);
+	made_free(&made);
+}
+
+static void refused(const char *path, int code, const char *text)
+{
+	struct incise_error err = {0};
+	struct incise_state *reader = incise_state_open(path, &err);
+
+	if (reader)
+		print_error("opened: %s\n", text);
+	assert_null(reader);
+	assert_int_equal(errno, code);
+	assert_int_equal(err.code, code);
+	assert_non_null(strstr(err.text, path));
+	assert_non_null(strstr(err.text, text));
+}
+
+static void test_what_is_no_page(void **state)
+{
+	struct made made = made_page();
+	struct state_page good;
+
+	load(made.path);
+	good = page;
+	incise_state_free(made.writer);
+	made.writer = NULL;
+	refused("/nosuch/a.state", ENOENT, "No such file");
+	refused("/dev/null", EINVAL, "no state of a loop");
+	refused(made.dir, EINVAL, "no state of a loop");
+	store(made.path, 0);
+	refused(made.path, EINVAL, "no state of a loop");
+	store(made.path, sizeof(page.head) - 1);
+	refused(made.path, EINVAL, "no state of a loop");
+	store(made.path, sizeof(page) - 8);
+	refused(made.path, EINVAL, "cut off");
+	page.head.magic[3]++;
+	store(made.path, sizeof(page));
+	refused(made.path, EINVAL, "no state of a loop");
+	page = good;
+	page.head.major++;
+	store(made.path, sizeof(page));
+	refused(made.path, EPROTO, "version 2.0");
+	page = good;
+	page.head.rate_hz = NAN;
+	store(made.path, sizeof(page));
+	refused(made.path, EINVAL, "damaged");
+	unlink(made.path);
+	assert_int_equal(mkfifo(made.path, 0600), 0);
+	refused(made.path, EINVAL, "no state of a loop"); /* and does not wait */
+	made_free(&made);
+}
+
+/* Each number of the head that leads somewhere, led astray. */
+static void test_places_astray(void **state)
+{
+	static const uint64_t values[] = {0,
+					  1,
+					  7,
+					  UINT64_MAX,
+					  UINT64_MAX - 7,
+					  1ULL << 63,
+					  (1ULL << 61) + 8,
+					  sizeof(struct state_page),
+					  sizeof(struct state_page) + 8,
+					  sizeof(struct state_page) - 8};
+	struct made made = made_page();
+	struct state_page good;
+	size_t begin = offsetof(struct state_head, head);
+	size_t end = offsetof(struct state_head, pid);
+	int opened = 0;
+
+	made_ticks(made.writer, 0, 100);
+	load(made.path);
+	good = page;
+	incise_state_free(made.writer);
+	made.writer = NULL;
+	for (size_t at = begin; at < end; at += 8)
+		for (size_t i = 0; i < sizeof(values) / sizeof(*values); i++) {
+			struct incise_state *reader;
+			uint64_t cursor = 0;
+
+			page = good;
+			memcpy((char *)&page + at, &values[i], 8);
+			store(made.path, sizeof(page));
+			reader = incise_state_open(made.path, NULL);
+			if (!reader)
+				continue;
+			/* Wrong numbers may be read, but within the file. */
+			opened++;
+			incise_state_read(reader, &now);
+			incise_state_ticks(reader, &cursor, ticks, 100, NULL);
+			incise_state_close(reader);
+		}
+	/* A histogram of 0 entries is none, and so on: hardly one is let pass. */
+	assert_true(opened < 30);
+	made_free(&made);
+}
+
+/* A later release of the same major version has more of everything. */
+static void test_larger_parts(void **state)
+{
+	struct made made = made_page();
+	struct incise_tick made_one = made_tick(2);
+	struct state_head *head = &page.head;
+	uint64_t cursor = 0, lost = 0;
+	struct incise_state *reader;
+	static unsigned char ring[64 + 3 * 512];
+
+	made_ticks(made.writer, 0, 3);
+	load(made.path);
+	incise_state_free(made.writer);
+	made.writer = NULL;
+	/* Slots of 512 bytes, 3 of them, in the place of what was there. */
+	memcpy(ring, &page.written, 8);
+	for (int i = 0; i < 3; i++)
+		memcpy(ring + 8 + i * 512, &page.slot[i], sizeof(page.slot[i]));
+	memcpy(&page.written, ring, sizeof(ring));
+	head->minor = 4;
+	head->ring.size = 512;
+	head->ring.count = 3;
+	head->head.size += 8;
+	store(made.path, sizeof(page));
+	reader = incise_state_open(made.path, NULL);
+	assert_non_null(reader);
+	assert_int_equal(incise_state_read(reader, &now), 0);
+	assert_int_equal(now.ticks, 3);
+	assert_int_equal(incise_state_ticks(reader, &cursor, ticks, 10, &lost), 2);
+	assert_true(made_same(&ticks[1], &made_one));
+	assert_int_equal(lost, 1);
+	incise_state_close(reader);
+	made_free(&made);
+}
+
+/* Cut off after it was opened: an errno, and no SIGBUS. */
+static void test_cut_off_later(void **state)
+{
+	struct made made = made_page();
+	struct incise_state *reader = incise_state_open(made.path, NULL);
+	const off_t all = offsetof(struct state_page, cost) + sizeof(page.cost);
+	uint64_t cursor = 0;
+
+	made_ticks(made.writer, 0, 3);
+	incise_state_free(made.writer);
+	made.writer = NULL;
+	for (off_t size = sizeof(page) - 8; size > -4000; size -= 4000) {
+		assert_int_equal(truncate(made.path, size > 0 ? size : 0), 0);
+		cursor = 0;
+		/* The ring is behind all the rest. */
+		assert_int_equal(incise_state_read(reader, &now), size < all ? -EIO : 0);
+	}
+	assert_int_equal(incise_state_ticks(reader, &cursor, ticks, 10, NULL), -EIO);
+	incise_state_close(reader);
+	made_free(&made);
+}
+
+/* Garbage in some places of a good page, a thousand times. */
+static void test_garbage(void **state)
+{
+	struct made made = made_page();
+	struct state_page good;
+	uint64_t seed = 1;
+	int read = 0, bad = 0;
+	int fd;
+
+	made_ticks(made.writer, 0, INCISE_STATE_TICKS + 100);
+	incise_state_run(made.writer, INCISE_RUN_RUNNING, "all is well");
+	load(made.path);
+	good = page;
+	incise_state_free(made.writer);
+	made.writer = NULL;
+	fd = open(made.path, O_WRONLY);
+	for (int round = 0; round < 1000; round++) {
+		struct incise_state *reader;
+		uint64_t cursor = 0, lost = 0;
+		/* In front of the ring, and a little of it. */
+		const size_t reach = offsetof(struct state_page, slot[3]);
+		int rc, n;
+
+		memcpy(&page, &good, reach);
+		for (int i = round % 40; i >= 0; i--) {
+			seed = seed * 6364136223846793005u + 1442695040888963407u;
+			/* Half of it in the head and the run part. */
+			((unsigned char *)&page)[(seed >> 33) % (i % 2 ? reach : 2000)] =
+				(unsigned char)(seed >> 20);
+		}
+		assert_int_equal(pwrite(fd, &page, reach, 0), reach);
+		reader = incise_state_open(made.path, NULL);
+		if (!reader)
+			continue;
+		rc = incise_state_read(reader, &now);
+		assert_true(rc == 0 || rc == -EIO);
+		read += !rc;
+		bad += !!rc;
+		assert_true(memchr(now.reason, 0, sizeof(now.reason)));
+		assert_true(memchr(now.scene, 0, sizeof(now.scene)));
+		assert_true((unsigned int)now.run < INCISE_RUNS);
+		assert_true(now.n_stages >= 0 && now.n_stages <= INCISE_PLAN_STAGES_MAX);
+		n = incise_state_ticks(reader, &cursor, ticks, INCISE_STATE_TICKS + 10,
+				       &lost);
+		assert_true(n >= -EIO && n <= INCISE_STATE_TICKS);
+		for (int i = 0; i < n; i++)
+			assert_true((unsigned int)ticks[i].phase <=
+				    INCISE_PHASE_INSERTION);
+		incise_state_quantile(&now.lateness, 0.99);
+		incise_state_close(reader);
+	}
+	/* Both ways were taken. */
+	assert_true(read > 10 && bad > 10);
+	close(fd);
+	made_free(&made);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_ring),
+		cmocka_unit_test(test_ring_that_went_round),
+		cmocka_unit_test(test_beside_a_writer),
+		cmocka_unit_test(test_half_written),
+		cmocka_unit_test(test_healed),
+		cmocka_unit_test(test_what_is_no_page),
+		cmocka_unit_test(test_places_astray),
+		cmocka_unit_test(test_larger_parts),
+		cmocka_unit_test(test_cut_off_later),
+		cmocka_unit_test(test_garbage),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
