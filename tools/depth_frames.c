@@ -43,8 +43,7 @@ static void drop_old(struct incise_rig *rig)
 {
 	struct incise_camera_frame frame;
 
-	while (incise_camera_read(incise_rig_camera(rig), &frame) > 0)
-		;
+	incise_camera_newest(incise_rig_camera(rig), &frame);
 }
 
 static void ask(const char *prompt, int n)

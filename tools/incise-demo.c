@@ -440,7 +440,7 @@ static void figure_camera(void)
 	incise_clock_wait_until(incise_rig_clock(rig),
 				incise_clock_now(incise_rig_clock(rig)) +
 					6 * INCISE_NS_PER_S);
-	if (incise_camera_read(incise_rig_camera(rig), &frame) != 1)
+	if (incise_camera_newest(incise_rig_camera(rig), &frame) != 1)
 		cli_fail("the virtual camera gave no picture");
 	data = picture_data(folder, "camera.rgb");
 	for (int y = 0; y < frame.height; y++)

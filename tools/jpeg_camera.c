@@ -15,6 +15,7 @@
 
 #define PICTURES 64 /* 1.3 s: in the air and in the tissue */
 #define QUALITY 85
+#define WAIT_MOST 24	     /* pictures, for a reader that is held up */
 #define FIRST_NS 800000000LL /* the plunge of the first cut begins at 1 s */
 
 struct picture {
@@ -79,6 +80,7 @@ static int code_all(struct jpeg_camera *c, struct incise_rig *rig)
 	int n = 0, rc = 0;
 
 	incise_clock_wait_until(clock, incise_clock_now(clock) + FIRST_NS);
+	incise_camera_newest(camera, &frame);
 	while (n < PICTURES && !rc) {
 		incise_clock_wait_until(clock, incise_clock_now(clock) + 10000000);
 		if (incise_camera_read(camera, &frame) != 1)
@@ -135,8 +137,8 @@ static int camera_read(struct incise_camera *camera, struct incise_camera_frame 
 	(void)camera;
 	if (now_ns < due_ns(c, c->next))
 		return 0;
-	/* As of a driver with a few buffers: what is older than the newest is lost. */
-	while (now_ns >= due_ns(c, c->next + 1)) {
+	/* As of a driver with so many buffers: what has no room is lost. */
+	while (now_ns >= due_ns(c, c->next + WAIT_MOST)) {
 		c->next++;
 		c->lost++;
 	}

@@ -5,9 +5,28 @@
 #include <stdio.h>
 #include <incise/backend.h>
 
+/* Pictures that wait are no more in any camera; who reads slowly must come to an end. */
+#define WAIT_MOST 32
+
 int incise_camera_read(struct incise_camera *camera, struct incise_camera_frame *frame)
 {
 	return camera->ops->read(camera, frame);
+}
+
+int incise_camera_newest(struct incise_camera *camera, struct incise_camera_frame *frame)
+{
+	struct incise_camera_frame next;
+	int found = 0, rc = 1;
+
+	for (int i = 0; i < WAIT_MOST && rc == 1; i++) {
+		rc = incise_camera_read(camera, &next);
+		if (rc == 1) {
+			*frame = next;
+			found = 1;
+		}
+	}
+	/* An error is said again by the next read. */
+	return found ? found : rc;
 }
 
 void incise_camera_info(const struct incise_camera *camera,

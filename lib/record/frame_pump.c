@@ -55,6 +55,7 @@ struct incise_frame_pump {
 	/* The camera thread's. */
 	uint64_t order, lost_before;
 	bool begun;
+	int64_t begun_ns; /* by the clock */
 
 	/* Errors are whole before their flag is set. */
 	struct incise_error camera_error, file_error;
@@ -152,9 +153,12 @@ static int step(struct incise_frame_pump *p, bool wait)
 	}
 	if (!rc)
 		return 0;
-	/* What is older than the first picture was lost by nobody: it was not asked for. */
-	if (!p->begun)
+	/* What was shot before it began was not asked for, and lost by nobody. */
+	if (!p->begun) {
 		p->lost_before = incise_camera_lost(p->setup.camera);
+		if (frame.t_ns < p->begun_ns)
+			return 1;
+	}
 	p->begun = true;
 	count(&p->read);
 	hand_on(p, &frame, incise_clock_now(p->setup.clock), wait);
@@ -381,6 +385,7 @@ static int make(struct incise_frame_pump *p)
 	size_t size;
 	int rc;
 
+	p->begun_ns = incise_clock_now(p->setup.clock);
 	incise_camera_info(p->setup.camera, &info);
 	if (info.width < INCISE_FRAMES_SIDE_MIN || info.width > INCISE_FRAMES_SIDE_MAX ||
 	    info.height < INCISE_FRAMES_SIDE_MIN || info.height > INCISE_FRAMES_SIDE_MAX)

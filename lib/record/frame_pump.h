@@ -26,7 +26,8 @@
 #include "frames.h"
 
 struct incise_frame_pump_setup {
-	struct incise_camera *camera;	     /* nobody else reads it meanwhile */
+	/* Nobody else reads it meanwhile. What it shot before is passed over, and not lost. */
+	struct incise_camera *camera;
 	struct incise_clock *clock;	     /* the rig's */
 	struct incise_vision *vision;	     /* NULL: none; nobody else's meanwhile */
 	struct incise_frames_writer *writer; /* the pump's from now on, which closes it */

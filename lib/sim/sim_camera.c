@@ -39,6 +39,8 @@
 
 #define LIVER_PERIOD 1024 /* pixels, after which the texture repeats */
 #define NOISE_SIZE 65536
+#define WAIT_MOST 24 /* pictures, for a reader that is held up */
+
 #define NOISE_LEVELS 2.0 /* sd of the sensor's noise */
 
 /* Far enough from 0 and 255 that noise, 6.7 sd at most, cannot overflow. */
@@ -192,7 +194,7 @@ static int sim_camera_read(struct incise_camera *camera,
 	double hz = c->sim->config.camera_hz;
 	int64_t now = incise_clock_now(c->sim->clock) - c->sim->start_ns;
 	struct incise_blade blade;
-	uint64_t newest;
+	uint64_t newest, n;
 
 	if (incise_sim_time(c->next, hz) > now)
 		return 0;
@@ -201,14 +203,15 @@ static int sim_camera_read(struct incise_camera *camera,
 		newest--;
 	if (newest < c->next)
 		newest = c->next;
-	c->lost += newest - c->next;
-	c->next = newest + 1;
+	n = newest - c->next < WAIT_MOST ? c->next : newest - WAIT_MOST + 1;
+	c->lost += n - c->next;
+	c->next = n + 1;
 	/* The surgeon is a function of time: the world need not stop for a picture. */
-	incise_surgeon_blade(&c->sim->surgeon, incise_sim_time(newest, hz), &blade);
-	draw(c, newest, &blade);
+	incise_surgeon_blade(&c->sim->surgeon, incise_sim_time(n, hz), &blade);
+	draw(c, n, &blade);
 	*frame = (struct incise_camera_frame){
-		.t_ns = c->sim->start_ns + incise_sim_time(newest, hz),
-		.seq = newest - c->first,
+		.t_ns = c->sim->start_ns + incise_sim_time(n, hz),
+		.seq = n - c->first,
 		.width = WIDTH,
 		.height = HEIGHT,
 		.stride = STRIDE,

@@ -71,7 +71,7 @@ static void look(struct incise_rig *rig, struct incise_vision *vision, struct se
 		if (incise_clock_wait_until(clock, incise_clock_now(clock) + 200000000))
 			exit(1);
 		incise_sim_truth(incise_rig_sim(rig), &truth);
-		if (incise_camera_read(incise_rig_camera(rig), &frame) != 1)
+		if (incise_camera_newest(incise_rig_camera(rig), &frame) != 1)
 			continue;
 		seen = truth.depth_mm > 0.5 ? tissue : air;
 		if (seen->n == (seen == air ? IN_AIR : IN_TISSUE) ||

@@ -68,7 +68,7 @@ static uint8_t *shoot(enum incise_pixels pixels, size_t size)
 
 		incise_clock_wait_until(clock, incise_clock_now(clock) +
 						       (i ? 50000000LL : 3000000000LL));
-		if (incise_camera_read(incise_rig_camera(rig), &frame) != 1)
+		if (incise_camera_newest(incise_rig_camera(rig), &frame) != 1)
 			exit(1);
 		if (pixels == INCISE_PIXELS_RGB)
 			memcpy(shots + size * i, frame.data, size);

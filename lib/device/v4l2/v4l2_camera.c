@@ -3,7 +3,7 @@
  * A camera of the kernel; see v4l2_camera.h.
  *
  *   v4l2_camera_open(): format ─▶ controls ─▶ stream ─▶ thread: step, step, check controls …
- *                                                          │ newest
+ *                                                          │ waiting
  *   incise_camera_read() ◀─────────────────────────────────┘
  *
  * When the stream ends the thread leaves the reason, and read() gives it behind the last

@@ -16,11 +16,11 @@
 #include "v4l2_stream.h"
 
 #define NONE (-1)
-#define ASKED 12	       /* buffers: 0.2 s at 60 Hz for a thread that is held up */
-#define FEWEST 4	       /* newest, held, returned, and one for the driver */
-#define ERRORS_MOST 10	       /* in a row, that taking a picture may fail */
-#define ERROR_MS 10	       /* of rest after each */
-#define DAMAGED_ROW 30	       /* damaged pictures in a row: it is of no use */
+#define ASKED 32       /* buffers: 24 wait: 0.4 s at 60 Hz for a reader that is held up */
+#define FEWEST 4       /* one waits, one is held, one returned, one the driver's */
+#define ERRORS_MOST 10 /* in a row, that taking a picture may fail */
+#define ERROR_MS 10    /* of rest after each */
+#define DAMAGED_ROW 30 /* damaged pictures in a row: it is of no use */
 #define SILENT_NS 5000000000LL /* without any picture; or so many periods: */
 #define SILENT_PERIODS 20
 #define STALE_NS 10000000000LL /* age of a picture that is not believed */
@@ -144,7 +144,6 @@ int v4l2_stream_start(struct v4l2_stream *s, int fd, const struct v4l2_shape *sh
 	s->exposure_ns = exposure_ns;
 	s->where = where;
 	s->held = NONE;
-	atomic_init(&s->newest, NONE);
 	rc = take_buffers(s, err);
 	for (int i = 0; i < s->n && !rc; i++)
 		rc = queue(s, i, err);
@@ -283,12 +282,49 @@ static int drop_damaged(struct v4l2_stream *s, int i, struct incise_error *err)
 		s->where, DAMAGED_ROW);
 }
 
-/* Hand it over; one that nobody has taken was lost. */
+/*
+ * The queue of those that wait: the thread alone moves the head, and whoever takes the oldest
+ * moves the tail over it. A number is thus taken once, and its place, of as many as there are
+ * buffers at most, is written again only when it was.
+ */
+static int waiting_at(const struct v4l2_stream *s, unsigned long long n)
+{
+	return atomic_load_explicit(&s->waiting[n % V4L2_BUFFERS_MOST],
+				    memory_order_relaxed);
+}
+
+/* Whether number @tail was there, and not yet taken by the other thread. */
+static bool take_tail(struct v4l2_stream *s, unsigned long long tail)
+{
+	return atomic_compare_exchange_strong_explicit(
+		&s->tail, &tail, tail + 1, memory_order_acq_rel, memory_order_relaxed);
+}
+
+/* How many may wait. Some drivers keep a few to fill: a quarter is for those, and the reader. */
+static unsigned int room(const struct v4l2_stream *s)
+{
+	int others = s->n / 4;
+
+	return (unsigned int)(s->n - (others < FEWEST - 1 ? FEWEST - 1 : others));
+}
+
+/* Hand it over; where there is no room the oldest, which nobody has taken, was lost. */
 static int publish(struct v4l2_stream *s, int i, struct incise_error *err)
 {
-	int old = atomic_exchange_explicit(&s->newest, i, memory_order_acq_rel);
+	unsigned long long head = atomic_load_explicit(&s->head, memory_order_relaxed);
+	unsigned long long tail = atomic_load_explicit(&s->tail, memory_order_acquire);
+	int old = NONE;
 
+	if (head - tail >= room(s)) {
+		old = waiting_at(s, tail);
+		/* Else it was read just now, and there is room. */
+		if (!take_tail(s, tail))
+			old = NONE;
+	}
 	s->damaged_row = 0;
+	atomic_store_explicit(&s->waiting[head % V4L2_BUFFERS_MOST], (signed char)i,
+			      memory_order_relaxed);
+	atomic_store_explicit(&s->head, head + 1, memory_order_release);
 	if (old == NONE)
 		return 0;
 	atomic_fetch_add_explicit(&s->lost, 1, memory_order_relaxed);
@@ -393,11 +429,17 @@ int v4l2_stream_step(struct v4l2_stream *s, int timeout_ms, struct incise_error 
 
 int v4l2_stream_read(struct v4l2_stream *s, struct incise_camera_frame *frame)
 {
-	int i = atomic_exchange_explicit(&s->newest, NONE, memory_order_acq_rel);
+	unsigned long long tail;
 	const struct v4l2_slot *slot;
+	int i;
 
-	if (i == NONE)
-		return 0;
+	/* Again only where the thread, which has no room, was there first. */
+	do {
+		tail = atomic_load_explicit(&s->tail, memory_order_relaxed);
+		if (tail == atomic_load_explicit(&s->head, memory_order_acquire))
+			return 0;
+		i = waiting_at(s, tail);
+	} while (!take_tail(s, tail));
 	if (s->held != NONE)
 		atomic_fetch_or_explicit(&s->returned, 1u << s->held,
 					 memory_order_release);

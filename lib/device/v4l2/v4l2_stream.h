@@ -3,14 +3,16 @@
  * A camera's pictures, in memory that the driver fills and that is mapped here: nothing is
  * copied. A buffer is in one of five places:
  *
- *      driver ──dequeued──▶ thread ──whole──▶ newest ──read──▶ held by the caller
+ *      driver ──dequeued──▶ thread ──whole──▶ waiting ──read──▶ held by the caller
  *        ▲                    │                  │                    │
- *        └──────queued────────┴── damaged,       │ a newer one came   │ the next read
+ *        └──────queued────────┴── damaged,       │ no room: oldest    │ the next read
  *                                 late ◀─────────┘         returned ◀─┘
  *
- * One thread steps; another one reads, without a lock or a system call: it swaps the newest
- * for none, and leaves the one it held before in a set that the thread queues again. So what
- * a caller holds is never written to, and four buffers suffice that none is waited for.
+ * One thread steps; another one reads, without a lock or a system call: it takes the oldest
+ * that waits, and leaves the one it held before in a set that the thread queues again. Three
+ * quarters of the buffers may wait (24 of 32), and all but 3 at most: one is held, one
+ * returned, one the driver's. So what a caller holds is never written to, and four buffers
+ * suffice that none is waited for.
  */
 #ifndef INCISE_V4L2_STREAM_H
 #define INCISE_V4L2_STREAM_H
@@ -42,8 +44,10 @@ struct v4l2_stream {
 	bool runs;
 	struct v4l2_slot slot[V4L2_BUFFERS_MOST];
 	/* Between the two threads. */
-	_Alignas(64) atomic_int newest; /* -1: none */
-	atomic_uint returned;		/* a bit per slot */
+	_Alignas(64) atomic_ullong tail; /* first that waits; both threads move it */
+	atomic_ullong head;		 /* behind the last; the thread's */
+	_Atomic signed char waiting[V4L2_BUFFERS_MOST];
+	atomic_uint returned; /* a bit per slot */
 	atomic_ullong lost, damaged;
 	/* The reader's. */
 	_Alignas(64) int held;
@@ -71,7 +75,7 @@ int v4l2_stream_start(struct v4l2_stream *stream, int fd, const struct v4l2_shap
 int v4l2_stream_step(struct v4l2_stream *stream, int timeout_ms,
 		     struct incise_error *err);
 
-/* The newest picture; 1 or 0. Real-time safe. */
+/* The oldest picture that waits; 1 or 0. Real-time safe. */
 int v4l2_stream_read(struct v4l2_stream *stream, struct incise_camera_frame *frame);
 
 /* No thread may step or read any more. */

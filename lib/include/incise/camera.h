@@ -20,7 +20,7 @@ enum incise_pixels {
 	INCISE_PIXELS_MJPEG, /**< a JPEG picture; stride is 0 */
 };
 
-/** One picture; its pixels belong to the camera until the next read. */
+/** One picture; its pixels belong to the camera until the next read that gives one. */
 struct incise_camera_frame {
 	int64_t t_ns; /**< middle of the exposure */
 	uint64_t seq; /**< counts from 0; a gap is a lost picture */
@@ -56,7 +56,9 @@ struct incise_camera_setup {
 struct incise_camera;
 
 /**
- * Take the newest picture, without waiting. Older ones not yet taken count as lost.
+ * Take the oldest picture that waits, without waiting for one. Up to 24 wait for a reader that
+ * is held up; fewer where the driver of a camera has fewer than 32 buffers: three quarters of
+ * them, and all but 3 at most. Where there is no more room the oldest is lost, and counted.
  *
  * @return 1 with a picture, 0 with none; -EIO, -ENODEV (unplugged): then
  *         incise_camera_cause() says why, and no picture will come any more.
@@ -66,6 +68,15 @@ INCISE_API int incise_camera_read(struct incise_camera *camera,
 
 INCISE_API void incise_camera_info(const struct incise_camera *camera,
 				   struct incise_camera_info *info);
+
+/**
+ * Take all that wait, and keep the newest: for who looks, and does not record. Those before
+ * it do not count as lost.
+ *
+ * @return as incise_camera_read(); -EIO, -ENODEV only where no picture waited
+ */
+INCISE_API int incise_camera_newest(struct incise_camera *camera,
+				    struct incise_camera_frame *frame);
 
 /** Pictures lost so far. */
 INCISE_API uint64_t incise_camera_lost(const struct incise_camera *camera);

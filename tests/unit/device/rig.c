@@ -47,7 +47,7 @@ static void devices_share_one_world(void **state)
 	assert_int_equal(force[0].t_ns, 1000000000LL);
 	/* 2.4 s of 120 Hz, the last one on its way. */
 	assert_int_equal(incise_tracker_read(incise_rig_tracker(rig), tracker, 400), 288);
-	assert_int_equal(incise_camera_read(incise_rig_camera(rig), &frame), 1);
+	assert_int_equal(incise_camera_newest(incise_rig_camera(rig), &frame), 1);
 	assert_int_equal(frame.seq, 120);
 	assert_int_equal(incise_stepper_set(incise_rig_stepper(rig), 1), 0);
 	incise_rig_close(rig);

@@ -96,7 +96,7 @@ static const struct incise_frames_shape shapes[] = {
 struct film_camera {
 	struct incise_camera camera;
 	const struct incise_frames_shape *shape;
-	int64_t from_ns;
+	_Atomic int64_t from_ns; /* since the first read */
 	uint64_t next;
 	uint8_t bytes[64 * 48 * 3];
 };
@@ -112,8 +112,11 @@ static int64_t clock_ns(void)
 static int camera_read(struct incise_camera *camera, struct incise_camera_frame *frame)
 {
 	struct film_camera *c = (struct film_camera *)camera;
-	int64_t t_ns = c->from_ns + (int64_t)c->next * 5 * MS;
+	int64_t t_ns;
 
+	if (!c->from_ns)
+		c->from_ns = clock_ns();
+	t_ns = c->from_ns + (int64_t)c->next * 5 * MS;
 	if (t_ns > clock_ns())
 		return 0;
 	*frame = film_frame(c->shape, c->next++, 0, c->bytes);
@@ -161,7 +164,6 @@ static void record(const char *path, const struct incise_frames_shape *shape,
 	struct incise_frame_pump *pump;
 
 	camera.shape = shape;
-	camera.from_ns = clock_ns();
 	pump = incise_frame_pump_new(
 		&(struct incise_frame_pump_setup){
 			.camera = &camera.camera,
@@ -169,6 +171,8 @@ static void record(const char *path, const struct incise_frames_shape *shape,
 			.writer = mkv_writer_new(path, shape, NULL, NULL),
 		},
 		NULL);
+	while (!camera.from_ns)
+		usleep(100);
 	told->from_ns = camera.from_ns;
 	for (int64_t before_ns = camera.from_ns;;) {
 		int64_t now_ns = clock_ns();

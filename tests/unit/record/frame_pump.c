@@ -21,11 +21,12 @@
 #define SIDE 16
 #define MS 1000000LL
 
-/* A picture every 1/hz s of the clock; none is lost if it is not read in time. */
+/* A picture every 1/hz s of the clock; all wait until they are read. */
 struct fake_camera {
 	struct incise_camera camera;
 	struct incise_clock *clock;
-	int64_t from_ns;
+	int64_t from_ns;  /* 0: since the first read */
+	int64_t ahead_ns; /* they come so long before their time */
 	double hz;
 	uint64_t next, last; /* ends at */
 	int end;	     /* negative errno of the end; 0: no more pictures */
@@ -36,11 +37,14 @@ struct fake_camera {
 static int camera_read(struct incise_camera *camera, struct incise_camera_frame *frame)
 {
 	struct fake_camera *c = (struct fake_camera *)camera;
-	int64_t t_ns = c->from_ns + (int64_t)((double)c->next / c->hz * 1e9);
+	int64_t now_ns = incise_clock_now(c->clock), t_ns;
 
 	if (c->next == c->last)
 		return c->end;
-	if (t_ns > incise_clock_now(c->clock))
+	if (!c->from_ns)
+		c->from_ns = now_ns;
+	t_ns = c->from_ns + (int64_t)((double)c->next / c->hz * 1e9);
+	if (t_ns - c->ahead_ns > now_ns)
 		return 0;
 	memset(c->bytes, (int)c->next, sizeof(c->bytes));
 	*frame = (struct incise_camera_frame){
@@ -89,7 +93,6 @@ static struct fake_camera camera_of(struct incise_clock *clock, double hz, uint6
 	return (struct fake_camera){
 		.camera = {&camera_ops},
 		.clock = clock,
-		.from_ns = incise_clock_now(clock),
 		.hz = hz,
 		.last = last,
 		.lost = 7, /* before it was recorded */
@@ -252,6 +255,42 @@ static void nothing_is_lost_where_time_waits(void **state)
 	incise_clock_free(clock);
 }
 
+/* What waited in the camera before the pump began is no part of the recording, nor lost. */
+static void what_was_shot_before_is_passed_over(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_simulated(1000 * MS);
+	struct fake_camera camera = camera_of(clock, 100, 30);
+	struct fake_file file = {.writer = {&file_ops}, .at = UINT64_MAX};
+	struct incise_frame_pump_stats stats;
+	struct incise_frame_record record[30];
+	struct incise_frame_pump *pump;
+
+	/* Pictures 0 … 20 are before. */
+	camera.from_ns = 1000 * MS;
+	incise_clock_wait_until(clock, 1205 * MS);
+	pump = begin(&camera, &file, NULL);
+	incise_clock_wait_until(clock, 1290 * MS);
+	/* It loses while those before are read. */
+	for (int i = 0; i < 30; i++) {
+		camera.lost += i < 10;
+		assert_int_equal(incise_frame_pump_step(pump), 1);
+	}
+	camera.lost++;
+	assert_int_equal(incise_frame_pump_step(pump), 0);
+	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
+	assert_int_equal(incise_frame_pump_take(pump, record, 30), 9);
+	for (int i = 0; i < 9; i++) {
+		assert_int_equal(record[i].seq, 21 + i);
+		assert_int_equal(record[i].t_ns, (1210 + 10 * i) * MS);
+	}
+	incise_frame_pump_stats(pump, &stats);
+	assert_int_equal(stats.read, 9);
+	assert_int_equal(stats.written, 9);
+	assert_int_equal(stats.lost + stats.dropped + stats.unwritten, 0);
+	incise_frame_pump_free(pump);
+	incise_clock_free(clock);
+}
+
 /* A disk that does not answer for 1.5 s, of the 2.5 s that there is room for. */
 static void a_stall_is_bridged(void **state)
 {
@@ -292,8 +331,7 @@ static void a_disk_that_hangs_holds_nobody(void **state)
 	struct incise_frame_record record[10];
 	struct incise_error err = {0};
 
-	/* As if 3 s had passed. */
-	camera.from_ns -= 3000 * MS;
+	camera.ahead_ns = 3000 * MS; /* all at once */
 	sem_init(&hang, 0, 0);
 	file.hang = &hang;
 	left = begin(&camera, &file, NULL);
@@ -402,7 +440,7 @@ static void slow_vision_holds_nobody(void **state)
 	struct incise_frame_pump *pump;
 	uint64_t looked = 0;
 
-	camera.from_ns -= 200 * MS; /* all at once */
+	camera.ahead_ns = 200 * MS; /* all at once */
 	pump = begin(&camera, &file, &vision);
 	stats = wait_for(pump, 200);
 	assert_int_equal(stats.written, 200);
@@ -425,6 +463,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(nothing_is_lost_where_time_waits),
+		cmocka_unit_test(what_was_shot_before_is_passed_over),
 		cmocka_unit_test(a_stall_is_bridged),
 		cmocka_unit_test(a_disk_that_hangs_holds_nobody),
 		cmocka_unit_test(a_full_disk_ends_the_file_alone),

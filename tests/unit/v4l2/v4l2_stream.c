@@ -9,12 +9,16 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include "../../../lib/device/v4l2/v4l2_stream.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"
 #define PERIOD_NS 33333333
+#define WAIT_MOST 24 /* of 32 buffers */
 
 static struct v4l2_stream stream;
 static struct incise_error err;
@@ -104,16 +108,20 @@ static void what_is_held_is_not_written_to(void **state)
 	driver_shoot(7);
 	assert_int_equal(step(), 1);
 	assert_int_equal(v4l2_stream_read(&stream, &held), 1);
-	/* More pictures than there are buffers; each but the last is passed over. */
+	/* More pictures than there are buffers: what has no room is passed over. */
 	for (uint32_t i = 1; i <= 50; i++) {
 		driver_shoot(7 + i);
 		assert_int_equal(step(), 1);
 		assert_int_equal(held.data[0], 7);
 		assert_int_equal(held.data[255], 7);
 	}
-	losses(49, 0);
-	assert_int_equal(v4l2_stream_read(&stream, &next), 1);
-	assert_true(next.seq == 50 && next.data[0] == 57);
+	losses(50 - WAIT_MOST, 0);
+	for (uint32_t i = 50 - WAIT_MOST + 1; i <= 50; i++) {
+		assert_int_equal(v4l2_stream_read(&stream, &next), 1);
+		assert_true(next.seq == i && next.data[0] == 7 + i);
+	}
+	assert_int_equal(v4l2_stream_read(&stream, &next), 0);
+	assert_true(next.data[0] == 57);
 	/* All buffers but the one held are with the driver again. */
 	assert_int_equal(step(), 0);
 	for (uint32_t i = 0; i < driver.given; i++)
@@ -136,6 +144,88 @@ static void four_buffers_suffice(void **state)
 			assert_int_equal(v4l2_stream_read(&stream, &frame), 1);
 	}
 	end();
+}
+
+static void as_many_wait_as_there_is_room(void **state)
+{
+	/* Of so many buffers so many pictures: all but a quarter, and but 3 at most. */
+	static const struct {
+		uint32_t buffers, waiting;
+	} cases[] = {{4, 1}, {5, 2}, {8, 5}, {12, 9}, {13, 10}, {16, 12}, {32, 24}};
+	struct incise_camera_frame frame;
+
+	for (size_t k = 0; k < sizeof(cases) / sizeof(cases[0]); k++) {
+		uint32_t n = cases[k].waiting;
+
+		driver_reset();
+		driver.count = cases[k].buffers;
+		assert_int_equal(start(INCISE_PIXELS_YUYV, 0), 0);
+		for (uint32_t i = 0; i < n; i++) {
+			driver_shoot(i);
+			assert_int_equal(step(), 1);
+		}
+		losses(0, 0);
+		driver_shoot(n);
+		assert_int_equal(step(), 1);
+		losses(1, 0);
+		/* The oldest was. */
+		for (uint32_t i = 1; i <= n; i++) {
+			assert_int_equal(v4l2_stream_read(&stream, &frame), 1);
+			assert_true(frame.seq == i && frame.data[0] == i);
+		}
+		assert_int_equal(v4l2_stream_read(&stream, &frame), 0);
+		end();
+	}
+}
+
+/* One thread steps and one reads: all there were come in order, or are lost. */
+static atomic_bool ended;
+
+static void *read_all(void *argument)
+{
+	uint64_t *taken = argument, next = 0;
+	struct incise_camera_frame frame;
+	bool last = false;
+
+	for (;;) {
+		if (v4l2_stream_read(&stream, &frame) == 1) {
+			if (frame.seq < next || frame.data[0] != (uint8_t)frame.seq)
+				abort();
+			next = frame.seq + 1;
+			++*taken;
+		} else if (last) {
+			return NULL;
+		} else {
+			last = atomic_load(&ended);
+		}
+	}
+}
+
+static void two_threads_take_each_once(void **state)
+{
+	/* Of few buffers they meet at the same picture more often. */
+	static const uint32_t buffers[] = {4, 32};
+
+	for (int k = 0; k < 2; k++) {
+		uint64_t taken = 0;
+		pthread_t reader;
+
+		driver_reset();
+		driver.count = buffers[k];
+		assert_int_equal(start(INCISE_PIXELS_YUYV, 0), 0);
+		atomic_store(&ended, false);
+		assert_int_equal(pthread_create(&reader, NULL, read_all, &taken), 0);
+		for (uint32_t i = 0; i < 20000; i++) {
+			driver_shoot(i);
+			assert_int_equal(step(), 1);
+		}
+		atomic_store(&ended, true);
+		assert_int_equal(pthread_join(reader, NULL), 0);
+		assert_true(taken + atomic_load(&stream.lost) == 20000);
+		/* The last one at least: it is there when the reader ends. */
+		assert_true(taken > 0);
+		end();
+	}
 }
 
 static void all_that_is_lost_is_counted(void **state)
@@ -202,16 +292,17 @@ static void stamps_that_cannot_be_are_damage(void **state)
 		begin();
 		last = driver_shoot(0)->t_ns;
 		assert_int_equal(step(), 1);
+		assert_int_equal(v4l2_stream_read(&stream, &frame), 1);
 		shot = driver_shoot(1);
 		shot->t_ns += cases[i].from_now_ns;
 		if (cases[i].from_last_ns)
 			shot->t_ns = last + cases[i].from_last_ns +
 				     (cases[i].from_last_ns < 0);
 		assert_int_equal(step(), 1);
-		if ((v4l2_stream_read(&stream, &frame) == 1 && frame.seq == 1) !=
-		    cases[i].good)
+		if (v4l2_stream_read(&stream, &frame) != cases[i].good ||
+		    frame.seq != cases[i].good)
 			fail_msg("case %zu", i);
-		losses(1, !cases[i].good);
+		losses(!cases[i].good, !cases[i].good);
 		end();
 	}
 }
@@ -543,6 +634,8 @@ int main(void)
 		cmocka_unit_test(pictures_come_in_order_with_their_stamps),
 		cmocka_unit_test(what_is_held_is_not_written_to),
 		cmocka_unit_test(four_buffers_suffice),
+		cmocka_unit_test(as_many_wait_as_there_is_room),
+		cmocka_unit_test(two_threads_take_each_once),
 		cmocka_unit_test(all_that_is_lost_is_counted),
 		cmocka_unit_test(damage_that_a_driver_does_not_count),
 		cmocka_unit_test(stamps_that_cannot_be_are_damage),
