@@ -418,7 +418,16 @@ int v4l2_stream_step(struct v4l2_stream *s, int timeout_ms, struct incise_error 
 		return 0;
 	if (!rc)
 		return check_silence(s, err);
-	rc = rc < 0 ? -errno : v4l2_ask(s->fd, VIDIOC_DQBUF, &buffer);
+	if (rc < 0)
+		return no_picture(s, -errno, ready.revents, err);
+	/*
+	 * What came back meanwhile, too: v4l2loopback, where its feeder is faster than this
+	 * thread, goes on with a buffer that was not yet queued.
+	 */
+	rc = take_back(s, err);
+	if (rc)
+		return rc;
+	rc = v4l2_ask(s->fd, VIDIOC_DQBUF, &buffer);
 	if (rc)
 		return no_picture(s, rc, ready.revents, err);
 	s->errors = 0;

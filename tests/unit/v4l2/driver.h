@@ -67,8 +67,9 @@ static struct driver {
 	short events; /* of poll(), beside POLLIN */
 	int opened, mapped, streams;
 	int64_t now_ns;
-	bool stands;	/* the clock, unless pictures are shot */
-	uint32_t given; /* buffers asked for */
+	bool stands;		 /* the clock, unless pictures are shot */
+	uint32_t given;		 /* buffers asked for */
+	void (*meanwhile)(void); /* what another thread does in poll(), once */
 } driver;
 
 int __real_open(const char *path, int flags, ...);
@@ -444,8 +445,12 @@ int __wrap_munmap(void *at, size_t size)
 /* Waiting lets the clock go on. */
 int __wrap_poll(struct pollfd *fds, nfds_t n, int timeout)
 {
+	void (*meanwhile)(void) = driver.meanwhile;
 	bool ready;
 
+	driver.meanwhile = NULL;
+	if (meanwhile)
+		meanwhile();
 	pthread_mutex_lock(&driver.lock);
 	ready = n && (driver.taken < driver.shots || driver.events || driver.dqbuf_error);
 	if (n)
