@@ -16,6 +16,8 @@ mandir ?= $(datadir)/man
 # systemd reads these below /usr/local too
 udevrulesdir ?= $(prefix)/lib/udev/rules.d
 sysusersdir ?= $(prefix)/lib/sysusers.d
+tmpfilesdir ?= $(prefix)/lib/tmpfiles.d
+unitdir ?= $(prefix)/lib/systemd/system
 completiondir ?= $(datadir)/bash-completion/completions
 
 CFLAGS ?= -O2 -g

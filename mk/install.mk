@@ -7,6 +7,8 @@ scenes := $(wildcard scenes/*.scene scenes/*.fis)
 examples := $(wildcard doc/*.example)
 udev_rules := $(wildcard udev/*.rules)
 sysusers := $(wildcard udev/*.sysusers)
+tmpfiles := $(wildcard udev/*.tmpfiles)
+units := $(wildcard udev/*.service udev/*.service.in)
 
 # Every file that `install` makes, relative to nothing: uninstall removes just these.
 installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
@@ -20,10 +22,24 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(addprefix $(datadir)/incise/,$(notdir $(examples))) \
 	$(completiondir)/incise \
 	$(addprefix $(udevrulesdir)/,$(notdir $(udev_rules))) \
-	$(addprefix $(sysusersdir)/,$(patsubst %.sysusers,%.conf,$(notdir $(sysusers))))
+	$(addprefix $(sysusersdir)/,$(patsubst %.sysusers,%.conf,$(notdir $(sysusers)))) \
+	$(addprefix $(tmpfilesdir)/,$(patsubst %.tmpfiles,%.conf,$(notdir $(tmpfiles)))) \
+	$(addprefix $(unitdir)/,$(patsubst %.in,%,$(notdir $(units))))
+
+folders = $(patsubst %/,%,$(sort $(dir $(installed))))
+
+# What folders install had to make, so that uninstall removes these and no one else's, be
+# they empty: /usr/local of a fresh Debian is full of empty ones.
+made_folders = $(datadir)/incise/.folders
 
 install: all ## install below $(DESTDIR)$(prefix)
-	$(INSTALL) -d $(addprefix $(DESTDIR),$(sort $(dir $(installed))))
+	@made=$$(for folder in $(folders); do \
+		while [ ! -d "$(DESTDIR)$$folder" ] && [ "$$folder" != / ]; do \
+			echo "$$folder"; folder=$$(dirname "$$folder"); \
+		done; \
+	done | sort -u) && \
+	$(INSTALL) -d $(addprefix $(DESTDIR),$(folders)) && \
+	printf '%s\n' $$made >>$(DESTDIR)$(made_folders)
 	$(INSTALL) -m 755 $(programs) $(DESTDIR)$(bindir)
 	for lib in $(libraries); do \
 		$(INSTALL) -m 644 $(O)/lib/lib$$lib.so.$(version) $(DESTDIR)$(libdir) && \
@@ -50,11 +66,21 @@ install: all ## install below $(DESTDIR)$(prefix)
 		$(INSTALL) -m 644 $$file \
 			$(DESTDIR)$(sysusersdir)/$$(basename $$file .sysusers).conf || exit 1; \
 	done
+	for file in $(tmpfiles); do \
+		$(INSTALL) -m 644 $$file \
+			$(DESTDIR)$(tmpfilesdir)/$$(basename $$file .tmpfiles).conf || exit 1; \
+	done
+	for file in $(units); do \
+		sed 's|@bindir@|$(bindir)|' $$file \
+			>$(DESTDIR)$(unitdir)/$$(basename $$file .in) || exit 1; \
+	done
 
 uninstall: ## remove what install installed
-	rm -f $(addprefix $(DESTDIR),$(installed))
-	for dir in $(libdir)/incise $(includedir)/incise $(datadir)/incise/scenes $(datadir)/incise; do \
-		rmdir "$(DESTDIR)$$dir" 2>/dev/null || :; \
+	@made=$$(sort -ru $(DESTDIR)$(made_folders) 2>/dev/null) || \
+		made="$(libdir)/incise $(includedir)/incise $(datadir)/incise/scenes $(datadir)/incise"; \
+	rm -f $(addprefix $(DESTDIR),$(installed) $(made_folders)); \
+	for folder in $$made; do \
+		rmdir "$(DESTDIR)$$folder" 2>/dev/null || :; \
 	done
 
 dist: ## a tarball of the committed tree

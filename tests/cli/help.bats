@@ -64,7 +64,7 @@ options_of_page() {
 }
 
 @test "manual pages of ours that others refer to exist" {
-	grep -hoE '^\.Xr (incise|libincise|rig|calibration)[a-z.-]* [1-8]' "$root"/man/*.[1-8] |
+	grep -hoE '^\.Xr (incise|libincise|rig|calibration)[a-z.@-]* [1-8]' "$root"/man/*.[1-8] |
 		sort -u >"$BATS_TEST_TMPDIR/references"
 	[ "$(wc -l <"$BATS_TEST_TMPDIR/references")" -ge 10 ]
 	while read -r _ name section; do

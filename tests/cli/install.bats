@@ -46,7 +46,8 @@ setup() {
 	for header in "$root"/lib/include/incise/*.h; do
 		cmp "$header" "$dest/usr/include/incise/${header##*/}"
 	done
-	for example in rig.conf.example rig-can.conf.example rig-sources.conf.example; do
+	for example in rig.conf.example rig-can.conf.example rig-sources.conf.example \
+		haptic.env.example; do
 		cmp "$root/doc/$example" "$dest/usr/share/incise/$example"
 	done
 	cmp "$root/scenes/liver.scene" "$dest/usr/share/incise/scenes/liver.scene"
@@ -102,6 +103,22 @@ setup() {
 	[ "$(find "$dest" ! -type d | sort)" = \
 		"$(printf '%s\n' "$dest/usr/bin/other" "$dest/usr/lib/other.so")" ]
 	[ -z "$(find "$dest" -type d -name '*incise*')" ]
+}
+
+@test "uninstall leaves no folder that was not there before, and each that was" {
+	for prefix in /usr /usr/local /opt/incise; do
+		mkdir -p "$dest$prefix/include" "$dest$prefix/share/man/man1"
+		find "$dest" | sort >before
+		project -s install DESTDIR="$dest" prefix="$prefix"
+		project -s install DESTDIR="$dest" prefix="$prefix"
+		[ -x "$dest$prefix/bin/incise" ]
+		project -s uninstall DESTDIR="$dest" prefix="$prefix"
+		find "$dest" | sort | diff before -
+		rm -r "$dest"
+	done
+	project -s install DESTDIR="$dest" prefix=/usr
+	project -s uninstall DESTDIR="$dest" prefix=/usr
+	[ -z "$(ls -A "$dest")" ]
 }
 
 @test "uninstall leaves a folder that holds a file of mine" {
