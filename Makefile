@@ -20,6 +20,12 @@ tmpfilesdir ?= $(prefix)/lib/tmpfiles.d
 unitdir ?= $(prefix)/lib/systemd/system
 completiondir ?= $(datadir)/bash-completion/completions
 
+# Programs and libraries find each other by where they are, whatever the prefix. With rpath=no
+# the system's own folders are all that is searched, as distributions want it.
+rpath ?= yes
+runpath = $(if $(filter-out no,$(rpath)),-Wl$(comma)-rpath$(comma)'$$ORIGIN$1')
+comma := ,
+
 CFLAGS ?= -O2 -g
 PKG_CONFIG ?= pkg-config
 INSTALL ?= install

@@ -88,4 +88,8 @@ dist: ## a tarball of the committed tree
 	git archive --prefix=incise-$(version)/ -o $(O)/incise-$(version).tar.gz HEAD
 	@echo $(O)/incise-$(version).tar.gz
 
-.PHONY: install uninstall dist
+deb: ## Debian packages of the tree as it is, in build/deb
+	@mk/deps build deb
+	+@mk/deb $(abspath $(O))/deb $(version)
+
+.PHONY: install uninstall dist deb

@@ -28,7 +28,7 @@ $(O)/lib/lib$1.so.$(version): $$(call objects,$1) lib/lib$1.map \
 		$$(foreach lib,$$(needs_$1),$(O)/lib/lib$$(lib).so)
 	@mkdir -p $$(@D)
 	$$(CC) -shared -Wl,-soname,lib$1.so.$(soversion) -Wl,-z,defs -Wl,--as-needed \
-		-Wl,--version-script,lib/lib$1.map -Wl,-rpath,'$$$$ORIGIN' \
+		-Wl,--version-script,lib/lib$1.map $$(call runpath) \
 		-L$(O)/lib $$(CFLAGS) $$(LDFLAGS) -o $$@ $$(call objects,$1) \
 		$$(addprefix -l,$$(needs_$1)) $$(pc_libs_$1) $$(libs_$1)
 
@@ -134,7 +134,7 @@ $(objects_export_hdf5): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_export_h
 define device_module
 $(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
 	@mkdir -p $$(@D)
-	$$(CC) -shared -Wl,-z,defs -Wl,--as-needed -Wl,-rpath,'$$$$ORIGIN/..' -L$(O)/lib \
+	$$(CC) -shared -Wl,-z,defs -Wl,--as-needed $$(call runpath,/..) -L$(O)/lib \
 		$$(CFLAGS) $$(LDFLAGS) -o $$@ $$(objects_$1) -lincise \
 		$$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1))) $$(libs_$1) -lm -pthread
 

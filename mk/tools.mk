@@ -59,7 +59,7 @@ $(O)/lib/incise/peer_%.so: tools/peers/%.cc $(O)/lib/libincise.so
 		-MMD -MP -MF $(O)/obj/tools/peers/$*.d -shared $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -lincise -l$*
 
-link_tool = $(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed -Wl,-rpath,'$$ORIGIN/../lib' \
+link_tool = $(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed $(call runpath,/../lib) \
 	-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $(filter %.o,$^) $1 \
 	$(shell $(PKG_CONFIG) --libs jansson) -lm
 
