@@ -79,6 +79,7 @@ uses_eval := incise
 uses_compile := incise
 uses_info := incise incise-record
 uses_haptic := incise
+uses_status := incise
 uses_stepper := incise
 uses_plan := incise
 uses_replay := incise incise-record

@@ -107,11 +107,18 @@ $(O)/tests/attack/%.so: tests/attack/%.c
 		$(CFLAGS) -MMD -MP -MF $@.d -shared $(LDFLAGS) -o $@ $< -ldl \
 		$(shell $(PKG_CONFIG) --libs sqlite3)
 
+# A loop that tells its state, for who reads it.
+$(O)/tests/state/loop: tests/state/loop.c $(O)/lib/libincise.so
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
+		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../../lib' -lincise
+
 attack_bats = INCISE_BUILD=$(abspath $(O)) bats --print-output-on-failure tests/attack
 check-attack: all $(attack_programs) ## attacks on recordings with their full counts: 100 kills, thousands of faults
 	ATTACK=full $(attack_bats)
 
-check-cli: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(attack_programs) ## command-line tests of the real programs
+check-cli: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
+		$(attack_programs) ## command-line tests of the real programs
 	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli tests/attack
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.

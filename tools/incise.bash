@@ -67,6 +67,16 @@ _incise_buses()
 	esac
 }
 
+# Loops that told their state here.
+_incise_loops()
+{
+	local page
+
+	for page in /run/incise/*.state ${XDG_RUNTIME_DIR:+"$XDG_RUNTIME_DIR"/incise/*.state}; do
+		[ ! -f "$page" ] || basename "$page" .state
+	done
+}
+
 _incise()
 {
 	local word=${COMP_WORDS[COMP_CWORD]}
@@ -88,6 +98,7 @@ _incise()
 			"$(_incise_options "$program" "$verb" "${part[@]}")" -- "$word")
 	else
 		((COMP_CWORD > 2)) || words=$(_incise_words "$program" "$verb")
+		[[ $verb != status ]] || words="FILE $(_incise_loops)"
 		[[ $words != *FILE* ]] || _incise_files "$word"
 		mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY < <(compgen -W \
 			"${words//FILE/}" -- "$word")

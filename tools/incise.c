@@ -30,6 +30,7 @@ static const struct {
 	{"info", "say what a recording, model or stepper module holds"},
 	{"plan", "show what a scene runs and what it leaves out"},
 	{"haptic", "run the real-time loop of a scene"},
+	{"status", "say what the loops on this machine do, or did last"},
 	{"replay", "run the loop on a recording, predicted beside measured"},
 	{"stepper", "look at the actuator and move it by hand"},
 	{"bench", "measure error against run time"},

@@ -79,6 +79,7 @@ struct state_live {
 	double force_N, force_max_N;
 	int64_t lateness_ns, lateness_max_ns, cost_ns, cost_max_ns;
 	double absorbed_mJ, returned_mJ;
+	uint64_t lateness_sum_ns, cost_sum_ns;
 	int64_t first_ns;
 	struct state_tick tick;
 };
@@ -103,7 +104,7 @@ struct state_page {
 _Static_assert(sizeof(struct state_head) == 584, "head");
 _Static_assert(sizeof(struct state_tick) == 200, "tick");
 _Static_assert(sizeof(struct state_run) == 1280, "run");
-_Static_assert(sizeof(struct state_live) == 440, "live");
+_Static_assert(sizeof(struct state_live) == 456, "live");
 _Static_assert(sizeof(struct state_slot) == 208, "slot");
 _Static_assert(INCISE_TICK_FLAGS <= STATE_FLAGS, "a counter for each flag");
 

@@ -251,6 +251,8 @@ static int take_live(struct incise_state_now *now, const struct state_live *live
 	now->lateness_max_ns = live->lateness_max_ns;
 	now->cost_ns = live->cost_ns;
 	now->cost_max_ns = live->cost_max_ns;
+	now->lateness_sum_ns = live->lateness_sum_ns;
+	now->cost_sum_ns = live->cost_sum_ns;
 	now->absorbed_mJ = live->absorbed_mJ;
 	now->returned_mJ = live->returned_mJ;
 	now->first_ns = live->first_ns;

@@ -167,6 +167,8 @@ static void count_times(struct state_live *live, int64_t lateness_ns, int64_t co
 {
 	live->lateness_ns = lateness_ns;
 	live->cost_ns = cost_ns;
+	live->lateness_sum_ns += (uint64_t)lateness_ns;
+	live->cost_sum_ns += (uint64_t)cost_ns;
 	if (lateness_ns > live->lateness_max_ns)
 		live->lateness_max_ns = lateness_ns;
 	if (cost_ns > live->cost_max_ns)

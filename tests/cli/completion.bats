@@ -23,7 +23,7 @@ complete_words() {
 
 @test "verbs are completed" {
 	complete_words incise ""
-	for verb in capture verify export train eval info haptic replay bench demo help; do
+	for verb in capture verify export train eval info haptic status replay bench demo help; do
 		[[ " ${COMPREPLY[*]} " == *" $verb "* ]]
 	done
 	complete_words incise tr
@@ -39,7 +39,7 @@ complete_words() {
 	[ "${COMPREPLY[*]}" = "--mf --mf-type" ]
 	complete_words incise haptic --lo
 	[ "${COMPREPLY[*]}" = --log ]
-	for verb in capture verify export train eval info haptic replay stepper bench demo; do
+	for verb in capture verify export train eval info haptic status replay stepper bench demo; do
 		complete_words incise "$verb" --
 		for option in "${COMPREPLY[@]}"; do
 			"incise-$verb" --help | grep -qE -- "^ .*$option( |\$)"
@@ -65,6 +65,14 @@ complete_words() {
 		[ "${#COMPREPLY[@]}" -eq "$("$word" --help |
 			grep -cE '^  (-[A-Za-z],|   ) --[a-z]')" ]
 	done
+}
+
+@test "loops that told their state are completed, beside files" {
+	mkdir -p run/incise
+	touch run/incise/neck.state run/incise/nose.state nest.state
+	export XDG_RUNTIME_DIR=$PWD/run
+	complete_words incise status ne
+	[ "${COMPREPLY[*]}" = "nest.state neck" ]
 }
 
 @test "what bench measures is completed" {

@@ -170,6 +170,7 @@ struct incise_state_now {
 	double force_N, force_max_N;	     /**< size of the force asked for */
 	int64_t lateness_ns, lateness_max_ns;
 	int64_t cost_ns, cost_max_ns;
+	uint64_t lateness_sum_ns, cost_sum_ns; /**< over all ticks */
 	double absorbed_mJ;	 /**< work that the hand did on the tissue */
 	double returned_mJ;	 /**< work that the tissue did on the hand, ≥ 0 */
 	int64_t first_ns;	 /**< time of the first tick, by the loop's clock */

@@ -86,6 +86,8 @@ static void test_ticks(void **state)
 	assert_int_equal(now.lateness_max_ns, 12000);
 	assert_int_equal(now.cost_ns, 700);
 	assert_int_equal(now.cost_max_ns, 5000);
+	assert_int_equal(now.lateness_sum_ns, 12000);
+	assert_int_equal(now.cost_sum_ns, 5700);
 	assert_int_equal(now.first_ns, 1000);
 	assert_true(now.absorbed_mJ == 6 && now.returned_mJ == 0);
 	assert_true(made_same(&now.tick, &tick));
