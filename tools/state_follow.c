@@ -118,10 +118,13 @@ bool state_follow(const struct state_page_file *page, bool json)
 		screen(false);
 	if (err.code)
 		cli_fail_with(&err);
-	/* The last look stays; of a loop that had ended before it is the only one. */
+	/* Of a loop that had ended before there is one look; that of a view stays. */
 	if (view || !look.now) {
 		look.now = &looks[i];
-		show(&look, false, json);
+		if (view)
+			state_report_text(stdout, &look);
+		else
+			show(&look, false, json);
 	}
 	return state_is_well(&look);
 }
