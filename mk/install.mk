@@ -92,4 +92,11 @@ deb: ## Debian packages of the tree as it is, in build/deb
 	@mk/deps build deb
 	+@mk/deb $(abspath $(O))/deb $(version)
 
-.PHONY: install uninstall dist deb
+check-deb: ## the packages: lintian, then installed, tried and purged in a clean Debian
+	@if mk/deps build deb; then \
+		mk/deb $(abspath $(O))/deb $(version) && tests/debian/packages $(abspath $(O))/deb; \
+	else \
+		echo "skipped: Debian packages, for what builds them is missing"; \
+	fi
+
+.PHONY: install uninstall dist deb check-deb

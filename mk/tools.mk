@@ -24,7 +24,6 @@ extra_calibrate-stepper := $(addprefix $(O)/obj/tools/,calibrate_stepper_series.
 extra_haptic := $(addprefix $(O)/obj/tools/,scene_argument.o stepper_counters.o loop_report.o \
 	stroke.o notify.o haptic_actuator.o haptic_report.o haptic_self_test.o \
 	haptic_supervisor.o)
-extra_haptic := $(addprefix $(O)/obj/tools/,scene_argument.o stepper_counters.o loop_report.o)
 extra_status := $(addprefix $(O)/obj/tools/,state_pages.o state_report.o state_follow.o \
 	state_prometheus.o loop_report.o)
 extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o picture.o \
