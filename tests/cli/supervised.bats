@@ -109,10 +109,10 @@ ended() {
 	kill -HUP "$pid"
 	awaits "not reloaded: liver.scene: rate_hz is 500, and the loop runs at 1000"
 	grep -q "warning: not reloaded, the scene before goes on: liver.scene:" err
-	incise status page --json >s.json
-	[ "$(key s.json reloads)" = 1 ]
-	[ "$(key s.json reloads_refused)" = 2 ]
-	[ "$(key s.json state)" = running ]
+	incise status ./page --json >s.json
+	[ "$(key s.json 'loops[0].reloads')" = 1 ]
+	[ "$(key s.json 'loops[0].reloads_refused')" = 2 ]
+	[ "$(key s.json 'loops[0].state')" = running ]
 	kill -TERM "$pid"
 	ended 0
 	# It went on all the time.
@@ -134,7 +134,7 @@ ended() {
 	[[ "$stderr" != *cleared* ]]
 	[[ "${stderr_lines[-1]}" == *"e-stop: release it, then clear"* ]]
 	# The page keeps why.
-	run -1 incise status page
+	run -1 incise status ./page
 	[[ "$output" == *fault* && "$output" == *e-stop* ]]
 }
 
