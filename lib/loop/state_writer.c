@@ -6,7 +6,9 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include <linux/magic.h>
 #include <string.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 #include <incise/clock.h>
 #include <incise/state.h>
@@ -128,6 +130,14 @@ failed_file:
 failed:
 	free(w);
 	return NULL;
+}
+
+bool incise_state_in_memory(const struct incise_state_writer *w)
+{
+	struct statfs fs;
+
+	return w && !fstatfs(w->file.fd, &fs) &&
+	       (fs.f_type == TMPFS_MAGIC || fs.f_type == RAMFS_MAGIC);
 }
 
 /*

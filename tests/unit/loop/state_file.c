@@ -10,7 +10,9 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
+#include <linux/magic.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <sys/wait.h>
 #include "../../../lib/loop/state_file.h"
 #include "state_made.h"
@@ -191,6 +193,27 @@ static void test_anybody_may_look(void **state)
 	made_free(&made);
 }
 
+static void test_in_memory(void **state)
+{
+	const char *shm = "/dev/shm/incise-test-state-XXXXXX";
+	char path[60];
+	struct incise_state_writer *writer;
+	struct statfs fs;
+	int fd;
+
+	assert_false(incise_state_in_memory(NULL));
+	strcpy(path, shm);
+	fd = mkstemp(path);
+	if (fd < 0 || fstatfs(fd, &fs) || fs.f_type != TMPFS_MAGIC)
+		skip();
+	close(fd);
+	writer = incise_state_new(path, &made_setup, NULL);
+	assert_non_null(writer);
+	assert_true(incise_state_in_memory(writer));
+	incise_state_free(writer);
+	unlink(path);
+}
+
 static void test_places_that_are_none(void **state)
 {
 	struct incise_error err = {0};
@@ -219,6 +242,7 @@ int main(void)
 		cmocka_unit_test(test_what_is_no_page_is_kept),
 		cmocka_unit_test(test_two_at_once),
 		cmocka_unit_test(test_anybody_may_look),
+		cmocka_unit_test(test_in_memory),
 		cmocka_unit_test(test_places_that_are_none),
 	};
 
