@@ -57,11 +57,16 @@ static void add(struct state_pages *pages, const char *path, struct incise_state
 	if (!more)
 		cli_fail("no memory");
 	pages->page = more;
-	pages->page[pages->n++] = (struct state_page_file){
+	more += pages->n++;
+	*more = (struct state_page_file){
 		.name = text("%.*s", n ? (int)n : (int)strlen(file), file),
 		.path = text("%s", path),
 		.state = state,
 	};
+	/* Others may name files there: a terminal is not to obey them. */
+	for (char *c = more->name; *c; c++)
+		if ((unsigned char)*c < ' ' || *c == 0x7f)
+			*c = '?';
 }
 
 static int by_name(const void *a, const void *b)

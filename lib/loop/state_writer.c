@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The writer of a state page; see incise/state.h. Each part has a copy here, so that the
- * writer never reads what others could have changed.
+ * The writer of a state page; see incise/state.h. Each part has a copy here: what somebody
+ * else wrote into the file does not mislead the loop.
  */
 #include <errno.h>
+#include <linux/magic.h>
 #include <math.h>
 #include <stdlib.h>
-#include <linux/magic.h>
 #include <string.h>
 #include <sys/vfs.h>
 #include <unistd.h>

@@ -288,6 +288,13 @@ until_ticks() {
 	PYTHON
 }
 
+@test "names of files cannot give orders to a terminal" {
+	"$loop" $'incise/a\e[2Jb.state' done
+	run -0 incise status $'incise/a\e[2Jb.state'
+	[[ "${lines[0]}" == 'a?[2Jb: stopped since '* ]]
+	[[ "$output" != *$'\e'* ]]
+}
+
 @test "a page that is no page, or of another release, is refused" {
 	echo "rate_hz = 1000.0;" >a.state
 	run --separate-stderr incise status a.state

@@ -363,6 +363,35 @@ static void test_feed(void **state)
 	felt_end(&f);
 }
 
+/* The scalpel's attitude is told with each tick, whichever end of it is held. */
+static void test_attitude(void **state)
+{
+	static const double turned[4] = {0.6, 0, 0.8, 0};
+	static const enum incise_tool tools[] = {INCISE_TOOL_BLADE, INCISE_TOOL_HANDLE};
+
+	for (int k = 0; k < 2; k++) {
+		struct fed fed = fed_start("scenes/neck.scene", true);
+		struct incise_tracker_sample pose = {.position_mm = {0, 0, 300}};
+		struct incise_tick t;
+
+		memcpy(pose.quaternion, turned, sizeof(turned));
+		assert_int_equal(incise_plan_set_tool(fed.plan, tools[k]), 0);
+		/* Before the first pose it is none: 1 0 0 0. */
+		assert_int_equal(incise_plan_tick(fed.plan, 1000000, &t), 0);
+		assert_true(t.quaternion[0] == 1 && t.quaternion[2] == 0);
+		for (int i = 1; i < 100; i++) {
+			pose.t_ns = i * INT64_C(8333333);
+			assert_int_equal(incise_plan_feed(fed.plan, &pose, 1), 1);
+			assert_int_equal(incise_plan_tick(fed.plan, pose.t_ns + 1, &t),
+					 0);
+		}
+		assert_int_equal(t.tool, tools[k]);
+		for (int i = 0; i < 4; i++)
+			assert_true(fabs(t.quaternion[i] - turned[i]) < 1e-9);
+		fed_end(&fed);
+	}
+}
+
 /* A pose from the future is one of now: it does not keep the later ones out. */
 static void test_feed_from_the_future(void **state)
 {
@@ -733,6 +762,7 @@ int main(void)
 		cmocka_unit_test(test_stalled_tracker_fades_out),
 		cmocka_unit_test(test_fault_is_zero_force_for_good),
 		cmocka_unit_test(test_feed),
+		cmocka_unit_test(test_attitude),
 		cmocka_unit_test(test_feed_from_the_future),
 		cmocka_unit_test(test_set_tool),
 		cmocka_unit_test(test_stale_handle),
