@@ -109,7 +109,8 @@ _Static_assert(sizeof(struct state_slot) == 208, "slot");
 _Static_assert(INCISE_TICK_FLAGS <= STATE_FLAGS, "a counter for each flag");
 
 /* Between the page's tick and the library's. */
-void incise_state_pack(struct state_tick *to, const struct incise_tick *from);
+void incise_state_pack(struct state_tick *to,
+		       const struct incise_tick *from) INCISE_REALTIME;
 /* Returns 0, -EIO: what stands there is no tick. */
 int incise_state_unpack(struct incise_tick *to, const struct state_tick *from);
 

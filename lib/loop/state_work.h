@@ -17,7 +17,7 @@ struct incise_sum {
 	double value, error;
 };
 
-void incise_sum_add(struct incise_sum *sum, double value);
+void incise_sum_add(struct incise_sum *sum, double value) INCISE_REALTIME;
 
 /* Begins with {0}. */
 struct incise_work {
@@ -29,6 +29,7 @@ struct incise_work {
 };
 
 /* Real-time safe. */
-void incise_work_add(struct incise_work *work, const struct incise_tick *tick);
+void incise_work_add(struct incise_work *work,
+		     const struct incise_tick *tick) INCISE_REALTIME;
 
 #endif

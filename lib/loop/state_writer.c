@@ -24,6 +24,7 @@ struct incise_state_writer {
 	struct state_page *page;
 	struct state_run run; /* the normal thread's */
 	bool felt;	      /* a scene was told */
+	int64_t running_ns;   /* since when it runs */
 	/* The loop's, on lines of the cache that are not the other's. */
 	_Alignas(64) struct state_live live;
 	struct incise_work work;
@@ -213,6 +214,11 @@ void incise_state_run(struct incise_state_writer *w, enum incise_run run,
 		return;
 	if ((uint32_t)run != w->run.run || !w->run.since_ns)
 		w->run.since_ns = incise_monotonic_ns();
+	/* It ran while it read another scene. */
+	if (run == INCISE_RUN_RUNNING && w->run.run == INCISE_RUN_RELOADING)
+		w->run.since_ns = w->running_ns;
+	else if (run == INCISE_RUN_RUNNING)
+		w->running_ns = w->run.since_ns;
 	w->run.run = (uint32_t)run;
 	put_text(w->run.reason, 300, reason);
 	publish_run(w);

@@ -84,7 +84,7 @@ INCISE_API bool incise_state_in_memory(const struct incise_state_writer *writer)
  */
 INCISE_API void incise_state_tick(struct incise_state_writer *writer,
 				  const struct incise_tick *tick, int64_t lateness_ns,
-				  int64_t cost_ns, uint64_t skipped);
+				  int64_t cost_ns, uint64_t skipped) INCISE_REALTIME;
 
 /**
  * Tell of a change of state. This and the functions below are the normal thread's.
@@ -124,10 +124,10 @@ struct incise_state_histogram {
 };
 
 /** The bucket of a time; times below 0 are in the first. Real-time safe. */
-INCISE_API int incise_state_bucket(int64_t ns);
+INCISE_API int incise_state_bucket(int64_t ns) INCISE_REALTIME;
 
 /** The longest time of a bucket, ns; INFINITY for the open one. Real-time safe. */
-INCISE_API double incise_state_edge(int bucket);
+INCISE_API double incise_state_edge(int bucket) INCISE_REALTIME;
 
 /** How many were counted. */
 INCISE_API uint64_t incise_state_total(const struct incise_state_histogram *histogram);
@@ -155,7 +155,7 @@ struct incise_state_now {
 	char policy[128];
 
 	enum incise_run run;
-	int64_t since_ns; /**< CLOCK_MONOTONIC when it came to that */
+	int64_t since_ns; /**< CLOCK_MONOTONIC when it came to that; a reload is no end of it */
 	char reason[300];
 	char scene[512];
 	int n_stages;

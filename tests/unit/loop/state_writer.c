@@ -130,6 +130,13 @@ static void test_states(void **state)
 	look(&made);
 	assert_int_equal(now.since_ns, since);
 	assert_string_equal(now.reason, "");
+	/* So it has after a reload. */
+	incise_state_run(made.writer, INCISE_RUN_RELOADING, NULL);
+	look(&made);
+	assert_true(now.since_ns > since);
+	incise_state_run(made.writer, INCISE_RUN_RUNNING, NULL);
+	look(&made);
+	assert_int_equal(now.since_ns, since);
 	incise_state_refused(made.writer, "neck.scene:3: syntax error");
 	look(&made);
 	assert_int_equal(now.run, INCISE_RUN_RUNNING);
