@@ -14,6 +14,7 @@
 #ifndef INCISE_BASE_RING_H
 #define INCISE_BASE_RING_H
 
+#include <incise/export.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -37,7 +38,7 @@ void incise_ring_free(struct incise_ring *ring);
 bool incise_ring_put(struct incise_ring *ring, const void *record);
 
 /* The reader's: how many of at most @n were taken, oldest first. Real-time safe. */
-int incise_ring_take(struct incise_ring *ring, void *records, int n);
+int incise_ring_take(struct incise_ring *ring, void *records, int n) INCISE_REALTIME;
 
 /* Records that found no room, so far; any thread's. */
 uint64_t incise_ring_dropped(const struct incise_ring *ring);

@@ -101,7 +101,7 @@ static int drivable(struct incise_motor *motor)
 	return 0;
 }
 
-static int motor_set(struct incise_stepper *stepper, double position_mm)
+static INCISE_REALTIME int motor_set(struct incise_stepper *stepper, double position_mm)
 {
 	struct incise_motor *motor = of(stepper);
 	int rc;
@@ -151,8 +151,8 @@ static enum incise_stepper_state state_of(unsigned int abi)
 	}
 }
 
-static int motor_status(struct incise_stepper *stepper,
-			struct incise_stepper_status *status)
+static INCISE_REALTIME int motor_status(struct incise_stepper *stepper,
+					struct incise_stepper_status *status)
 {
 	struct incise_motor *motor = of(stepper);
 	const struct incise_abi_status *last = &motor->last;

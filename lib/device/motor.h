@@ -25,7 +25,7 @@ struct incise_motor_door {
 	int (*clear)(struct incise_motor *motor, struct incise_error *err);
 	int (*origin)(struct incise_motor *motor, int32_t steps, bool homed);
 	void (*close)(struct incise_motor *motor);
-	int64_t (*now)(struct incise_motor *motor);
+	int64_t (*now)(struct incise_motor *motor) INCISE_REALTIME;
 	int (*wait)(struct incise_motor *motor, int64_t ns); /* NULL: sleep */
 };
 

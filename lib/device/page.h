@@ -12,12 +12,13 @@
 #ifndef INCISE_PAGE_H
 #define INCISE_PAGE_H
 
+#include <incise/export.h>
 #include <stdint.h>
 #include "abi.h"
 
 /* Write a set-point; mode is INCISE_STEPPER_MODE_…. Heals a seq that a dead owner left. */
 void incise_page_put_setpoint(struct incise_stepper_setpoint *slot, unsigned int mode,
-			      int64_t target, int64_t t_ns);
+			      int64_t target, int64_t t_ns) INCISE_REALTIME;
 
 /*
  * Take a set-point that is newer than @seq. Returns 1 (taken: @copy; @seq is its), 0
@@ -35,6 +36,6 @@ void incise_page_put_status(struct incise_abi_status *slot,
  * it was), -EIO (what stands there makes no sense).
  */
 int incise_page_get_status(const struct incise_abi_status *slot,
-			   struct incise_abi_status *copy);
+			   struct incise_abi_status *copy) INCISE_REALTIME;
 
 #endif

@@ -78,7 +78,7 @@ static int kernel_origin(struct incise_motor *motor, int32_t steps, bool homed)
 	return request(of(motor), INCISE_STEPPER_SET_POSITION, &origin);
 }
 
-static int64_t kernel_now(struct incise_motor *motor)
+static INCISE_REALTIME int64_t kernel_now(struct incise_motor *motor)
 {
 	(void)motor;
 	return incise_monotonic_ns();

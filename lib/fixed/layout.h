@@ -92,9 +92,12 @@ static inline uint64_t incise_fx_le64(uint64_t v)
 uint32_t incise_fx_crc(const uint8_t *bytes, uint32_t n);
 
 /* Evaluators; inputs are distances from the support's lower end, clamped. Q16.16. */
-int64_t incise_fx_direct(const struct incise_fixed *fx, const uint32_t *from_min);
-int64_t incise_fx_table(const struct incise_fixed *fx, const uint32_t *from_min);
-int64_t incise_fx_force(const struct incise_fixed *fx, const uint32_t *from_min);
+int64_t incise_fx_direct(const struct incise_fixed *fx,
+			 const uint32_t *from_min) INCISE_REALTIME;
+int64_t incise_fx_table(const struct incise_fixed *fx,
+			const uint32_t *from_min) INCISE_REALTIME;
+int64_t incise_fx_force(const struct incise_fixed *fx,
+			const uint32_t *from_min) INCISE_REALTIME;
 
 /*
  * The value of a table's column within a cell: from + (to - from)·frac/2^shift, floored.

@@ -48,7 +48,7 @@ const char *incise_mf_fault(enum incise_mf_type type, const double *p);
  * trapezoid is zero, its log is given as 0 and *gap is the distance to its nearer foot in
  * widths (foot to foot), above 0; everywhere else *gap is 0. x is not NaN.
  */
-double incise_mf_log(const struct incise_mf *mf, double x, double *gap);
+double incise_mf_log(const struct incise_mf *mf, double x, double *gap) INCISE_REALTIME;
 
 bool incise_mf_type_known(enum incise_mf_type type);
 
@@ -65,6 +65,6 @@ void incise_model_classify(struct incise_model *model);
 bool incise_model_firing_rules(const struct incise_model *model, const double *x,
 			       double *w);
 bool incise_model_firing_grid(const struct incise_model *model, const double *x,
-			      double *w);
+			      double *w) INCISE_REALTIME;
 
 #endif

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include "stages.h"
 
-typedef int run_fn(struct incise_plan *plan, struct incise_tick *tick);
+typedef int run_fn(struct incise_plan *plan, struct incise_tick *tick) INCISE_REALTIME;
 
 /* How a stage is done, where there are several ways. */
 

@@ -26,7 +26,7 @@ struct incise_stage {
 	/* Also runs while there is no fresh pose; the others stand still then. */
 	bool always;
 	/* Returns 0, or a negative errno of a device. */
-	int (*run)(struct incise_plan *plan, struct incise_tick *tick);
+	int (*run)(struct incise_plan *plan, struct incise_tick *tick) INCISE_REALTIME;
 };
 
 struct incise_plan {

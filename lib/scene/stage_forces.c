@@ -45,7 +45,7 @@ int incise_stage_reaction(struct incise_plan *plan, struct incise_tick *tick)
 
 int incise_stage_reaction_fixed(struct incise_plan *plan, struct incise_tick *tick)
 {
-	static const double origin[3];
+	const double origin[3] = {0};
 	struct incise_fixed_spring spring;
 	double below[3] = {0};
 
@@ -105,7 +105,7 @@ int incise_stage_plane(struct incise_plan *plan, struct incise_tick *tick)
 
 int incise_stage_plane_fixed(struct incise_plan *plan, struct incise_tick *tick)
 {
-	static const double origin[3];
+	const double origin[3] = {0};
 
 	if (tick->phase != INCISE_PHASE_CUTTING)
 		return 0;

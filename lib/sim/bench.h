@@ -33,6 +33,6 @@ struct incise_bench {
 /* The nut's count is at @nut_mm now, at a speed of @mm_s. */
 void incise_bench_follow(struct incise_bench *bench,
 			 const struct incise_sim_config *config, double nut_mm,
-			 double mm_s);
+			 double mm_s) INCISE_REALTIME;
 
 #endif

@@ -7,6 +7,7 @@
 #ifndef INCISE_SIM_RANDOM_H
 #define INCISE_SIM_RANDOM_H
 
+#include <incise/export.h>
 #include <stdint.h>
 
 enum incise_random_purpose {
@@ -24,9 +25,9 @@ uint64_t incise_random_key(uint64_t seed, enum incise_random_purpose purpose);
 uint64_t incise_random_bits(uint64_t key, uint64_t n);
 
 /* Evenly distributed in 0 … 1, 1 excluded. */
-double incise_random_uniform(uint64_t key, uint64_t n);
+double incise_random_uniform(uint64_t key, uint64_t n) INCISE_REALTIME;
 
 /* Normally distributed with mean 0 and sd 1; never beyond 6.7. */
-double incise_random_normal(uint64_t key, uint64_t n);
+double incise_random_normal(uint64_t key, uint64_t n) INCISE_REALTIME;
 
 #endif

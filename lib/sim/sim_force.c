@@ -35,8 +35,8 @@ static int32_t code_of(double mV)
 	return (int32_t)fmax(0, fmin((1 << BITS) - 1, code));
 }
 
-static void sim_force_sample(struct incise_sim_stream *stream,
-			     const struct incise_sim *sim)
+static INCISE_REALTIME void sim_force_sample(struct incise_sim_stream *stream,
+					     const struct incise_sim *sim)
 {
 	struct sim_force *f =
 		(struct sim_force *)((char *)stream - offsetof(struct sim_force, stream));

@@ -122,7 +122,7 @@ static void advance(struct sim_stepper *s, int64_t now)
 }
 
 /* For the force channel, which asks at its own times, none of them later than ours. */
-static double press_N(struct incise_stepper *stepper, int64_t t_ns)
+static INCISE_REALTIME double press_N(struct incise_stepper *stepper, int64_t t_ns)
 {
 	struct sim_stepper *s = of_stepper(stepper);
 
@@ -138,7 +138,8 @@ static int64_t script_now(const struct sim_stepper *s)
 	return incise_clock_now(s->sim->clock) - s->sim->start_ns;
 }
 
-static int sim_stepper_set(struct incise_stepper *stepper, double position_mm)
+static INCISE_REALTIME int sim_stepper_set(struct incise_stepper *stepper,
+					   double position_mm)
 {
 	struct sim_stepper *s = of_stepper(stepper);
 	double most = s->steps_max * s->step_mm;
@@ -223,8 +224,8 @@ static enum incise_stepper_state sim_stepper_state(const struct sim_stepper *s)
 						  : INCISE_STEPPER_MOVING;
 }
 
-static int sim_stepper_status(struct incise_stepper *stepper,
-			      struct incise_stepper_status *status)
+static INCISE_REALTIME int sim_stepper_status(struct incise_stepper *stepper,
+					      struct incise_stepper_status *status)
 {
 	struct sim_stepper *s = of_stepper(stepper);
 	double nut;

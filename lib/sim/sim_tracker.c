@@ -54,8 +54,8 @@ static void turn(double q[4], const double r[3])
 		q[i] /= norm;
 }
 
-static void sim_tracker_sample(struct incise_sim_stream *stream,
-			       const struct incise_sim *sim)
+static INCISE_REALTIME void sim_tracker_sample(struct incise_sim_stream *stream,
+					       const struct incise_sim *sim)
 {
 	struct sim_tracker *t =
 		(struct sim_tracker *)((char *)stream -
@@ -88,8 +88,8 @@ static void sim_tracker_sample(struct incise_sim_stream *stream,
 	stream->t_ns = incise_sim_time(++t->n, t->hz);
 }
 
-static int sim_tracker_read(struct incise_tracker *tracker,
-			    struct incise_tracker_sample *samples, int n)
+static INCISE_REALTIME int sim_tracker_read(struct incise_tracker *tracker,
+					    struct incise_tracker_sample *samples, int n)
 {
 	struct sim_tracker *t = of_tracker(tracker);
 	const struct incise_tracker_sample *oldest;

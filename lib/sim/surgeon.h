@@ -43,13 +43,13 @@ int64_t incise_surgeon_duration(const struct incise_surgeon *surgeon);
 
 /* @t_ns since the script's start. */
 void incise_surgeon_blade(const struct incise_surgeon *surgeon, int64_t t_ns,
-			  struct incise_blade *blade);
+			  struct incise_blade *blade) INCISE_REALTIME;
 
 /*
  * How the scalpel is held: its axes in the frame of incise/sim.h. Its z runs from the tip
  * up the handle, its x along the edge in the direction of the cut, its y across the flat.
  */
 void incise_surgeon_grip(const struct incise_surgeon *surgeon, int64_t t_ns,
-			 double quaternion[4]);
+			 double quaternion[4]) INCISE_REALTIME;
 
 #endif

@@ -5,6 +5,7 @@
 #ifndef INCISE_SIM_TISSUE_H
 #define INCISE_SIM_TISSUE_H
 
+#include <incise/export.h>
 #include "surgeon.h"
 
 struct incise_tissue {
@@ -22,10 +23,11 @@ void incise_tissue_init(struct incise_tissue *tissue,
 
 /* Let the blade move on at its speed for a short time. */
 void incise_tissue_advance(struct incise_tissue *tissue, const struct incise_blade *blade,
-			   double dt_s);
+			   double dt_s) INCISE_REALTIME;
 
 /* Force on a blade that has moved on for @ahead_s since the last advance, N. */
 double incise_tissue_force(const struct incise_tissue *tissue,
-			   const struct incise_blade *blade, double ahead_s);
+			   const struct incise_blade *blade,
+			   double ahead_s) INCISE_REALTIME;
 
 #endif

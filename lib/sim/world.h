@@ -28,7 +28,8 @@ struct incise_sim_stream {
 	struct incise_sim_stream *next;
 	int64_t t_ns; /* script time of the next sample */
 	/* Take the sample at t_ns and set t_ns to that of the one after it. */
-	void (*sample)(struct incise_sim_stream *stream, const struct incise_sim *sim);
+	void (*sample)(struct incise_sim_stream *stream,
+		       const struct incise_sim *sim) INCISE_REALTIME;
 };
 
 struct incise_sim {
@@ -42,7 +43,7 @@ struct incise_sim {
 	struct incise_sim_stream *streams;
 	double load_N; /* hung on the sensor; NAN: the blade is on it */
 	/* What presses the force sensor on the bench, at a script time; or NULL. */
-	double (*press_N)(struct incise_stepper *stepper, int64_t t_ns);
+	double (*press_N)(struct incise_stepper *stepper, int64_t t_ns) INCISE_REALTIME;
 	struct incise_stepper *stepper;
 };
 
@@ -51,15 +52,15 @@ void incise_sim_listen(struct incise_sim *sim, struct incise_sim_stream *stream)
 void incise_sim_unlisten(struct incise_sim *sim, struct incise_sim_stream *stream);
 
 /* Go forward to the clock's time. Real-time safe. */
-void incise_sim_advance(struct incise_sim *sim);
+void incise_sim_advance(struct incise_sim *sim) INCISE_REALTIME;
 
 /* The blade and the force on it at a time within the present tick. */
 void incise_sim_sense(const struct incise_sim *sim, int64_t t_ns,
-		      struct incise_blade *blade, double *force_N);
+		      struct incise_blade *blade, double *force_N) INCISE_REALTIME;
 
 /* Number and script time of the samples of a device of so many Hz. */
 uint64_t incise_sim_first(const struct incise_sim *sim, double hz);
-int64_t incise_sim_time(uint64_t n, double hz);
+int64_t incise_sim_time(uint64_t n, double hz) INCISE_REALTIME;
 
 /* Samples on their way to a reader: records of one size, first in, first out. */
 struct incise_sim_ring {
@@ -73,10 +74,11 @@ struct incise_sim_ring {
 int incise_sim_ring_init(struct incise_sim_ring *ring, size_t size, double hz,
 			 double extra_s);
 void incise_sim_ring_free(struct incise_sim_ring *ring);
-void incise_sim_ring_push(struct incise_sim_ring *ring, const void *record);
+void incise_sim_ring_push(struct incise_sim_ring *ring,
+			  const void *record) INCISE_REALTIME;
 
 /* The oldest record, or NULL; stays until popped. */
-const void *incise_sim_ring_peek(const struct incise_sim_ring *ring);
-void incise_sim_ring_pop(struct incise_sim_ring *ring);
+const void *incise_sim_ring_peek(const struct incise_sim_ring *ring) INCISE_REALTIME;
+void incise_sim_ring_pop(struct incise_sim_ring *ring) INCISE_REALTIME;
 
 #endif

@@ -6,6 +6,7 @@
 #ifndef INCISE_AVERAGE_H
 #define INCISE_AVERAGE_H
 
+#include <incise/export.h>
 #define INCISE_AVERAGE_MAX 64
 
 struct incise_average {
@@ -22,7 +23,7 @@ struct incise_average {
 void incise_average_init(struct incise_average *a, int n);
 
 /* Forget all: when a contact begins. */
-void incise_average_reset(struct incise_average *a);
+void incise_average_reset(struct incise_average *a) INCISE_REALTIME;
 
 /*
  * Take a unit normal in and give the average of the last n, or of those that there are
@@ -33,6 +34,6 @@ void incise_average_reset(struct incise_average *a);
  * vanishes, the last average that there was is given again; before the first, 0 0 0.
  */
 void incise_average_add(struct incise_average *a, const double normal[3],
-			double averaged[3]);
+			double averaged[3]) INCISE_REALTIME;
 
 #endif

@@ -23,14 +23,17 @@
 #ifndef INCISE_EFFECTS_H
 #define INCISE_EFFECTS_H
 
+#include <incise/export.h>
 /* Fn, with the size of the force: Kn d, or what paper 1's model says. */
-void incise_effect_reaction(double force[3], double size_N, const double n[3]);
+void incise_effect_reaction(double force[3], double size_N,
+			    const double n[3]) INCISE_REALTIME;
 
 /* Fx: the blade stays in the plane of its cut; side is Sx(0), the blade's unit normal. */
 void incise_effect_plane(double force[3], double k_N_mm, const double p[3],
-			 const double p0[3], const double side[3]);
+			 const double p0[3], const double side[3]) INCISE_REALTIME;
 
-void incise_effect_damping(double force[3], double k_N_s_mm, const double v[3]);
+void incise_effect_damping(double force[3], double k_N_s_mm,
+			   const double v[3]) INCISE_REALTIME;
 
 /*
  * Fort, aligned … 1: how much a flat instrument is held up by its turn. flat is the unit
@@ -38,9 +41,9 @@ void incise_effect_damping(double force[3], double k_N_s_mm, const double v[3]);
  * cut their product is 0, which is easy, but not free; across the cut it is 1.
  */
 double incise_orientation_factor(const double flat[3], const double along[3],
-				 double aligned);
+				 double aligned) INCISE_REALTIME;
 
 void incise_effect_spread(double force[3], double k_N_mm, const double p[3],
-			  const double p0[3], const double n[3]);
+			  const double p0[3], const double n[3]) INCISE_REALTIME;
 
 #endif

@@ -11,6 +11,7 @@
 #ifndef INCISE_INCISION_H
 #define INCISE_INCISION_H
 
+#include <incise/export.h>
 #include <stdbool.h>
 
 struct incise_incision {
@@ -23,13 +24,14 @@ struct incise_incision {
 
 /* A cut begins and takes the place of the one before. side and normal are unit. */
 void incise_incision_begin(struct incise_incision *incision, const double at_mm[3],
-			   const double normal[3], const double side[3]);
+			   const double normal[3], const double side[3]) INCISE_REALTIME;
 
 /* The blade meets the surface here now. */
-void incise_incision_extend(struct incise_incision *incision, const double at_mm[3]);
+void incise_incision_extend(struct incise_incision *incision,
+			    const double at_mm[3]) INCISE_REALTIME;
 
 /* Whether a point of the surface lies within reach of the cut. */
 bool incise_incision_holds(const struct incise_incision *incision, const double at_mm[3],
-			   double reach_mm);
+			   double reach_mm) INCISE_REALTIME;
 
 #endif

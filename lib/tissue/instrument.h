@@ -14,6 +14,7 @@
 #define INCISE_INSTRUMENT_H
 
 #include <stdbool.h>
+#include <incise/export.h>
 #include <incise/tool.h>
 
 struct incise_instrument {
@@ -32,11 +33,11 @@ struct incise_instrument {
  */
 bool incise_instrument_choose(struct incise_instrument *instrument,
 			      const double attitude[4], const double normal[3],
-			      bool touching);
+			      bool touching) INCISE_REALTIME;
 
 /* Where the end of the held one is, mm. */
 void incise_instrument_end(const struct incise_instrument *instrument,
 			   const double tip_mm[3], const double attitude[4],
-			   double end_mm[3]);
+			   double end_mm[3]) INCISE_REALTIME;
 
 #endif

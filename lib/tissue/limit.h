@@ -14,6 +14,7 @@
 #ifndef INCISE_LIMIT_H
 #define INCISE_LIMIT_H
 
+#include <incise/export.h>
 struct incise_limit {
 	/* Settings; none at or below 0, and not a number, is 0. */
 	double force_N;
@@ -38,9 +39,10 @@ enum incise_limit_event {
  *
  * Returns which of them held it back: a bit for each, 0 if it is as asked for.
  */
-unsigned int incise_limit_apply(struct incise_limit *limit, double force_N[3]);
+unsigned int incise_limit_apply(struct incise_limit *limit,
+				double force_N[3]) INCISE_REALTIME;
 
 /* No force from now on, at once: for faults, where no slew applies. */
-void incise_limit_zero(struct incise_limit *limit);
+void incise_limit_zero(struct incise_limit *limit) INCISE_REALTIME;
 
 #endif

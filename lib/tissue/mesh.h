@@ -60,11 +60,11 @@ size_t mesh_memory(const struct mesh *mesh);
 
 /* The touch of a point whose nearest place, or proxy, is a spot. */
 void mesh_touch(const struct mesh *mesh, const struct mesh_spot *spot, const double p[3],
-		struct incise_touch *touch);
+		struct incise_touch *touch) INCISE_REALTIME;
 
 /* The nearest spot is at the border of an open mesh, and p lies over that border. */
 bool mesh_beyond_border(const struct mesh *mesh, const struct mesh_spot *spot,
-			const double p[3]);
+			const double p[3]) INCISE_REALTIME;
 
 /* The highest place; of many the one nearest to the middle. */
 void mesh_top(const struct mesh *mesh, struct incise_touch *touch);
@@ -75,21 +75,21 @@ void mesh_top(const struct mesh *mesh, struct incise_touch *touch);
  * begin with. Returns a distance that no part of the mesh is nearer than.
  */
 double mesh_nearest(const struct mesh *mesh, const double p[3], uint32_t hint,
-		    double share, struct mesh_spot *spot);
+		    double share, struct mesh_spot *spot) INCISE_REALTIME;
 
 /*
  * The first front face that the straight way meets at @least mm from its start or later.
  * It goes through no edge and no corner: what lies on them counts as met.
  */
 bool mesh_enters(const struct mesh *mesh, const double from[3], const double to[3],
-		 double least, struct mesh_spot *spot);
+		 double least, struct mesh_spot *spot) INCISE_REALTIME;
 
 /*
  * Glide over the surface from a spot towards where p is nearest, at most @reach mm from
  * where it was. Returns whether it has got to the nearest place around.
  */
 bool mesh_glide(const struct mesh *mesh, const double p[3], double reach,
-		struct mesh_spot *spot);
+		struct mesh_spot *spot) INCISE_REALTIME;
 
 static inline int mesh_on_face(const struct mesh *mesh, uint32_t face, const double p[3],
 			       double x[3])

@@ -69,7 +69,7 @@ void incise_predict_init_noise(struct incise_predict *p,
  * through the tissue, so there is then no blend either; the force's limits do the rest.
  */
 void incise_predict_add(struct incise_predict *p,
-			const struct incise_tracker_sample *sample);
+			const struct incise_tracker_sample *sample) INCISE_REALTIME;
 
 /*
  * Position, velocity and attitude (unit quaternion, w first) at @t_ns. Before the first
@@ -82,9 +82,9 @@ void incise_predict_add(struct incise_predict *p,
  */
 void incise_predict_at(const struct incise_predict *p, int64_t t_ns,
 		       double position_mm[3], double velocity_mm_s[3],
-		       double attitude[4]);
+		       double attitude[4]) INCISE_REALTIME;
 
 /* Age of the last pose at @t_ns, ≥ 0; INT64_MAX before the first. */
-int64_t incise_predict_age(const struct incise_predict *p, int64_t t_ns);
+int64_t incise_predict_age(const struct incise_predict *p, int64_t t_ns) INCISE_REALTIME;
 
 #endif

@@ -122,7 +122,7 @@ static double meets(const double from[3], const double way[3], const double cent
 bool capsule_enters(const struct capsule *capsule, const double from[3],
 		    const double to[3], struct incise_touch *touch)
 {
-	static const double up[3] = {0, 0, 1};
+	const double up[3] = {0, 0, 1};
 	double way[3], unit[3] = {0}, axis[3], point[3], length, axis_length, first;
 
 	v3_sub(way, to, from);

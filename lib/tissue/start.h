@@ -14,6 +14,7 @@
 #ifndef INCISE_START_H
 #define INCISE_START_H
 
+#include <incise/export.h>
 #include <stdbool.h>
 
 struct incise_start {
@@ -40,6 +41,6 @@ struct incise_start {
  * The ramp is the protection: what comes back does so in ramp_s, not at once.
  */
 double incise_start_gain(struct incise_start *start, double wanted_N, bool fresh,
-			 double dt_s);
+			 double dt_s) INCISE_REALTIME;
 
 #endif

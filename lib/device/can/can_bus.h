@@ -24,7 +24,7 @@ struct can_bus;
 
 struct can_bus_ops {
 	/* CLOCK_MONOTONIC, ns; a test's own clock. */
-	int64_t (*now)(struct can_bus *bus);
+	int64_t (*now)(struct can_bus *bus) INCISE_REALTIME;
 	/*
 	 * 0; -ENOBUFS (the queue is full; the frame was not taken, nothing else was hurt),
 	 * -ENETDOWN, -ENODEV, -EIO, -EINVAL (no frame for a bus: an error frame, too long).

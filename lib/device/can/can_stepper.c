@@ -134,7 +134,7 @@ static int can_clear(struct incise_motor *motor, struct incise_error *err)
 	return rc;
 }
 
-static int64_t can_now(struct incise_motor *motor)
+static INCISE_REALTIME int64_t can_now(struct incise_motor *motor)
 {
 	return now_of(of(motor)->link.bus);
 }

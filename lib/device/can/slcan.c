@@ -54,7 +54,7 @@ static struct slcan *of(struct can_bus *bus)
 	return (struct slcan *)bus;
 }
 
-static int64_t slcan_now(struct can_bus *bus)
+static INCISE_REALTIME int64_t slcan_now(struct can_bus *bus)
 {
 	(void)bus;
 	return incise_monotonic_ns();

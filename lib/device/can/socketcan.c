@@ -23,6 +23,7 @@
 #include <linux/can/raw.h>
 #include <linux/errqueue.h>
 #include <linux/net_tstamp.h>
+#include "../../base/monotonic.h"
 #include "can_bus.h"
 #include "can_netlink.h"
 #include "can_owner.h"
@@ -54,10 +55,10 @@ static int64_t clock_ns(clockid_t clock)
 	return now.tv_sec * NS_PER_S + now.tv_nsec;
 }
 
-static int64_t socketcan_now(struct can_bus *bus)
+static INCISE_REALTIME int64_t socketcan_now(struct can_bus *bus)
 {
 	(void)bus;
-	return clock_ns(CLOCK_MONOTONIC);
+	return incise_monotonic_ns();
 }
 
 static int failed(struct socketcan *s, int code)

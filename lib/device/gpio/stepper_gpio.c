@@ -193,7 +193,7 @@ static int gpio_origin(struct incise_motor *motor, int32_t steps, bool homed)
 	return ask(of(motor), homed ? HOMED : ORIGIN);
 }
 
-static int64_t gpio_now(struct incise_motor *motor)
+static INCISE_REALTIME int64_t gpio_now(struct incise_motor *motor)
 {
 	(void)motor;
 	return incise_monotonic_ns();

@@ -48,7 +48,7 @@ int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *byt
 
 /* One other thread; real-time safe. */
 int polhemus_stream_take(struct polhemus_stream *stream,
-			 struct incise_tracker_sample *samples, int n);
+			 struct incise_tracker_sample *samples, int n) INCISE_REALTIME;
 uint64_t polhemus_stream_lost(const struct polhemus_stream *stream);
 
 #endif

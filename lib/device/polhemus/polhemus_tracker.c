@@ -122,8 +122,8 @@ static void *run(void *argument)
 	return NULL;
 }
 
-static int tracker_read(struct incise_tracker *tracker,
-			struct incise_tracker_sample *samples, int n)
+static INCISE_REALTIME int tracker_read(struct incise_tracker *tracker,
+					struct incise_tracker_sample *samples, int n)
 {
 	struct polhemus_tracker *t = of_tracker(tracker);
 	/* Before the ring is looked into: what came before the end is still in it. */

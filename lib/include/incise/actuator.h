@@ -80,11 +80,12 @@ struct incise_actuator {
 };
 
 /** One microstep, mm. */
-INCISE_API double incise_actuator_step_mm(const struct incise_actuator *actuator);
+INCISE_API double incise_actuator_step_mm(const struct incise_actuator *actuator)
+	INCISE_REALTIME;
 
 /** The microstep nearest to a position, within the travel; 0 for what is no number. */
 INCISE_API int32_t incise_actuator_steps(const struct incise_actuator *actuator,
-					 double position_mm);
+					 double position_mm) INCISE_REALTIME;
 
 /** The same of a speed, within the largest; microsteps/s. */
 INCISE_API int64_t incise_actuator_rate(const struct incise_actuator *actuator,

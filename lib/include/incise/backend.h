@@ -20,8 +20,9 @@
 #include <incise/vision.h>
 
 struct incise_tracker_ops {
+	/** INCISE_REALTIME where a haptic loop is to read it. */
 	int (*read)(struct incise_tracker *tracker, struct incise_tracker_sample *samples,
-		    int n);
+		    int n) INCISE_REALTIME;
 	void (*info)(const struct incise_tracker *tracker,
 		     struct incise_tracker_info *info);
 	uint64_t (*lost)(const struct incise_tracker *tracker);
@@ -80,10 +81,10 @@ struct incise_stepper_homing {
  */
 struct incise_stepper_ops {
 	/** See the functions of incise/stepper.h; @err may be NULL. */
-	int (*set)(struct incise_stepper *stepper, double position_mm);
+	int (*set)(struct incise_stepper *stepper, double position_mm) INCISE_REALTIME;
 	int (*jog)(struct incise_stepper *stepper, double velocity_mm_s);
 	int (*status)(struct incise_stepper *stepper,
-		      struct incise_stepper_status *status);
+		      struct incise_stepper_status *status) INCISE_REALTIME;
 	int (*enable)(struct incise_stepper *stepper, struct incise_error *err);
 	int (*disable)(struct incise_stepper *stepper, struct incise_error *err);
 	int (*clear)(struct incise_stepper *stepper, struct incise_error *err);

@@ -86,7 +86,8 @@ INCISE_API int incise_fixed_open(struct incise_fixed *fx, const void *blob,
  * @param x n_inputs values, Q16.16
  * @return output, Q16.16, saturated. Real-time safe; builds in a kernel.
  */
-INCISE_API int32_t incise_fixed_eval(const struct incise_fixed *fx, const int32_t *x);
+INCISE_API int32_t incise_fixed_eval(const struct incise_fixed *fx,
+				     const int32_t *x) INCISE_REALTIME;
 
 #ifndef __KERNEL__
 struct incise_model;
@@ -171,7 +172,7 @@ INCISE_API void incise_fixed_eval_batch(const struct incise_fixed *fx, const int
  * in incise_model_eval(). Real-time safe.
  */
 INCISE_API double incise_fixed_eval_double(const struct incise_fixed *fx,
-					   const double *x);
+					   const double *x) INCISE_REALTIME;
 #endif
 
 INCISE_END_DECLS

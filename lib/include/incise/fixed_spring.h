@@ -49,14 +49,16 @@ struct incise_fixed_spring {
  * @return (P - P0)·u, Q16.16 mm, held to ±INT32_MAX. Real-time safe; builds in a kernel.
  */
 INCISE_API int32_t incise_fixed_spring_pull(const struct incise_fixed_spring *spring,
-					    const int32_t p[3], int32_t force[3]);
+					    const int32_t p[3],
+					    int32_t force[3]) INCISE_REALTIME;
 
 /**
  * The same for a spring that pushes only, as tissue does: the reaction. There is no force
  * where (P - P0)·u ≥ 0.
  */
 INCISE_API int32_t incise_fixed_spring_push(const struct incise_fixed_spring *spring,
-					    const int32_t p[3], int32_t force[3]);
+					    const int32_t p[3],
+					    int32_t force[3]) INCISE_REALTIME;
 
 #ifndef __KERNEL__
 /**
@@ -70,7 +72,7 @@ INCISE_API int32_t incise_fixed_spring_push(const struct incise_fixed_spring *sp
  */
 INCISE_API int incise_fixed_spring_set(struct incise_fixed_spring *spring,
 				       double stiffness_N_mm, const double anchor_mm[3],
-				       const double direction[3]);
+				       const double direction[3]) INCISE_REALTIME;
 
 /**
  * The certified error of either force: the length of its difference, as a vector, from

@@ -70,14 +70,14 @@ INCISE_API void incise_guard_init(struct incise_guard *guard, double mass_kg,
 				  double period_s, double reserve_N_mm);
 
 /** A contact begins: no energy went in or out yet, no force is held. */
-INCISE_API void incise_guard_reset(struct incise_guard *guard);
+INCISE_API void incise_guard_reset(struct incise_guard *guard) INCISE_REALTIME;
 
 /**
  * The point that is watched is elsewhere now, and did not go there: another end of the
  * instrument, or a tracker's leap. Up to the next apply() no energy is counted; debt and
  * credit stay.
  */
-INCISE_API void incise_guard_leap(struct incise_guard *guard);
+INCISE_API void incise_guard_leap(struct incise_guard *guard) INCISE_REALTIME;
 
 /**
  * Once per tick, out of contact too: observe the force that was held since the last call,
@@ -94,13 +94,15 @@ INCISE_API void incise_guard_leap(struct incise_guard *guard);
  */
 INCISE_API bool incise_guard_apply(struct incise_guard *guard,
 				   const double position_mm[3],
-				   const double velocity_mm_s[3], double force_N[3]);
+				   const double velocity_mm_s[3],
+				   double force_N[3]) INCISE_REALTIME;
 
 /**
  * What is really held from now on, after limits. Where an actuator takes some ticks, it
  * is the force that takes effect now. Without a call the last one counts as held on.
  */
-INCISE_API void incise_guard_sent(struct incise_guard *guard, const double force_N[3]);
+INCISE_API void incise_guard_sent(struct incise_guard *guard,
+				  const double force_N[3]) INCISE_REALTIME;
 
 INCISE_END_DECLS
 #endif

@@ -209,7 +209,7 @@ INCISE_API const char *incise_mf_type_name(enum incise_mf_type type);
  * @return finite output. Real-time safe.
  */
 INCISE_API double incise_model_eval(const struct incise_model *model, const double *x,
-				    unsigned int *flags);
+				    unsigned int *flags) INCISE_REALTIME;
 
 /**
  * Normalised firing strengths w(r)/Σw of all rules, as incise_model_eval() weighs them;

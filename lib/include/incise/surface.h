@@ -128,7 +128,7 @@ INCISE_API void incise_surface_nearest(const struct incise_surface *surface,
  */
 INCISE_API bool incise_surface_enters(const struct incise_surface *surface,
 				      const double from[3], const double to[3],
-				      struct incise_touch *touch);
+				      struct incise_touch *touch) INCISE_REALTIME;
 
 /**
  * The proxy of one tool on one surface. Its fields may be read; they are set by
@@ -159,7 +159,8 @@ struct incise_proxy {
  *                 outside of it
  */
 INCISE_API void incise_proxy_init(struct incise_proxy *proxy,
-				  const struct incise_surface *surface, double leave_mm);
+				  const struct incise_surface *surface,
+				  double leave_mm) INCISE_REALTIME;
 
 /**
  * Follow the tool to a new place.
@@ -178,7 +179,8 @@ INCISE_API void incise_proxy_init(struct incise_proxy *proxy,
  * @param tool_mm beyond 1e9 it counts as there; one that is not finite changes nothing but
  *                `began`. Real-time safe.
  */
-INCISE_API void incise_proxy_move(struct incise_proxy *proxy, const double tool_mm[3]);
+INCISE_API void incise_proxy_move(struct incise_proxy *proxy,
+				  const double tool_mm[3]) INCISE_REALTIME;
 
 INCISE_END_DECLS
 #endif

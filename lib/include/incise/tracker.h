@@ -61,7 +61,8 @@ struct incise_tracker;
  *         the virtual rig and for trackers of Polhemus; another backend says so itself.
  */
 INCISE_API int incise_tracker_read(struct incise_tracker *tracker,
-				   struct incise_tracker_sample *samples, int n);
+				   struct incise_tracker_sample *samples,
+				   int n) INCISE_REALTIME;
 
 INCISE_API void incise_tracker_info(const struct incise_tracker *tracker,
 				    struct incise_tracker_info *info);
