@@ -12,11 +12,14 @@ can_rtsan = $(shell echo 'int main(void) { return 0; }' | \
 RTSAN_CC ?= $(firstword $(foreach name,clang-22 clang-21 clang-20 clang,\
 	$(if $(shell command -v $(name)),$(call can_rtsan,$(name)))))
 
+# What the sanitizer sees is what ran. That no function on a tick's way calls one that may
+# wait, whether it runs in a test or not, the compiler shows: -Wfunction-effects.
 rtsan_flags := -fsanitize=realtime
+rtsan_warnings := -Wfunction-effects -Werror=function-effects
 check-rtsan: ## ticks under RealtimeSanitizer: no allocation, no lock, no system call
 	+@if [ -n "$(RTSAN_CC)" ]; then \
 		$(MAKE) --no-print-directory O=$(O)/rtsan CC=$(RTSAN_CC) \
-			CFLAGS="-O1 -g $(rtsan_flags)" LDFLAGS="$(rtsan_flags)" run-rtsan; \
+			CFLAGS="-O1 -g $(rtsan_flags) $(rtsan_warnings)" LDFLAGS="$(rtsan_flags)" run-rtsan; \
 	else \
 		echo "skipped: rtsan, which needs clang 20 or later and its run-time library (mk/deps rtsan)"; \
 	fi
@@ -36,7 +39,8 @@ rtsan_programs := $(patsubst tests/rtsan/%.c,$(O)/tests/rtsan/%,$(wildcard tests
 rtsan_unit_programs := $(addprefix $(O)/again/tests/unit/,$(rtsan_units))
 
 rtsan_cc = $(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
-	-Wno-missing-prototypes -Wno-unused-parameter $(CFLAGS) -MMD -MP -MF $@.d $(LDFLAGS)
+	-Wno-missing-prototypes -Wno-unused-parameter $(CFLAGS) -Wno-function-effects \
+	-MMD -MP -MF $@.d $(LDFLAGS)
 rtsan_libs = $(shell $(PKG_CONFIG) --libs $(pc_incise)) \
 	$(if $(has_libmnl),$(shell $(PKG_CONFIG) --libs libmnl)) $(libs_incise) -pthread
 
@@ -53,6 +57,12 @@ $(O)/tests/rtsan/%: tests/rtsan/%.c $(O)/lib/libincise-rtsan.a $(emulator)
 rtsan_options := RTSAN_OPTIONS=external_symbolizer_path=$(shell command -v addr2line)
 
 run-rtsan: $(rtsan_programs) $(rtsan_unit_programs)
+	@if $(CC) $(cppflags) -std=gnu11 $(rtsan_warnings) -fsyntax-only tests/rtsan/refused/waits.c \
+			2>&1 | grep -q 'error: .*Wfunction-effects'; then \
+		echo "ok    rtsan: the compiler refuses a tick that could wait"; \
+	else \
+		echo "FAIL  rtsan: the compiler takes tests/rtsan/refused/waits.c"; exit 1; \
+	fi
 	@for program in $(rtsan_programs); do $(rtsan_options) $$program || exit 1; done
 	@$(rtsan_options) tests/unit/run $(rtsan_unit_programs)
 
