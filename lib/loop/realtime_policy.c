@@ -105,8 +105,7 @@ int realtime_take_policy(const struct incise_realtime_setup *setup)
 
 	if (setup->policy == INCISE_REALTIME_DEADLINE)
 		return take_deadline(setup);
-	return pthread_setschedparam(pthread_self(), SCHED_FIFO | SCHED_RESET_ON_FORK,
-				     &priority);
+	return pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
 }
 
 int realtime_take_cpu(const struct incise_realtime_setup *setup)

@@ -99,7 +99,8 @@ INCISE_API bool incise_realtime_holds_idle(const struct incise_realtime *realtim
 
 /**
  * In the loop's thread, before its first tick: touch its stack, go to the CPU, take the
- * policy. A child process would not inherit it. The thread must end when this fails.
+ * policy. The thread must end when this fails. With a CPU, threads that it starts run there
+ * too: start those of devices elsewhere.
  *
  * @return 0, or -EPERM, -EINVAL, -EBUSY: as above, of rights that went since
  */
