@@ -17,6 +17,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -265,8 +266,30 @@ static long status_kB(const char *key)
 
 static void *wait_there(void *argument)
 {
+	/* Of one heap for all: another would be 64 MiB of addresses. */
+	free(malloc(100));
 	pthread_barrier_wait(argument);
 	return NULL;
+}
+
+/* What is mapped from now on is there as well. */
+static void map_more(void)
+{
+	const size_t page = (size_t)sysconf(_SC_PAGESIZE);
+	int tid = (int)syscall(SYS_gettid);
+	struct incise_realtime_counts before, after;
+	volatile char *more;
+
+	more = mmap(NULL, 64 * page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS,
+		    -1, 0);
+	CHECK(more != MAP_FAILED);
+	CHECK(!incise_realtime_count(tid, &before));
+	CHECK(!incise_realtime_count(tid, &before));
+	for (int i = 0; i < 64; i++)
+		more[(size_t)i * page] = 1;
+	CHECK(!incise_realtime_count(tid, &after));
+	CHECK(after.minor_faults == before.minor_faults);
+	munmap((void *)more, 64 * page);
 }
 
 static void granted(const struct incise_realtime_setup *setup)
@@ -274,6 +297,7 @@ static void granted(const struct incise_realtime_setup *setup)
 	struct incise_error err = {0};
 	struct entered entered = {0};
 	struct incise_realtime *realtime;
+	long size_kB;
 	pthread_t loop, others[3];
 	pthread_barrier_t barrier;
 
@@ -282,6 +306,7 @@ static void granted(const struct incise_realtime_setup *setup)
 	if (!realtime && (errno == EPERM || errno == EBUSY))
 		_exit(SKIPPED);
 	CHECK(realtime);
+	size_kB = status_kB("VmSize");
 	entered.realtime = realtime;
 	pthread_barrier_init(&barrier, NULL, 4);
 	for (int i = 0; i < 3; i++)
@@ -310,6 +335,8 @@ static void granted(const struct incise_realtime_setup *setup)
 		 * that a unit test is linked to.
 		 */
 		CHECK(status_kB("RssAnon") < 6000);
+		CHECK(status_kB("VmSize") - size_kB < 6000);
+		map_more();
 	}
 	pthread_barrier_wait(&barrier);
 	for (int i = 0; i < 3; i++)
@@ -408,9 +435,20 @@ static void small_stack(void)
 	CHECK(!small.rc);
 }
 
-static void test_small_stack(void **state)
+/* Of a large one, that of the first thread, no more is touched than ticks need. */
+static void large_stack(void)
 {
-	if (!in_child(small_stack))
+	struct incise_realtime *realtime = incise_realtime_new(&fifo, NULL);
+
+	if (!realtime)
+		_exit(SKIPPED);
+	CHECK(!incise_realtime_enter(realtime, NULL));
+	CHECK(HAS_ASAN || status_kB("VmStk") < 500);
+}
+
+static void test_stacks(void **state)
+{
+	if (!in_child(small_stack) || !in_child(large_stack))
 		skip();
 }
 
@@ -423,7 +461,7 @@ int main(void)
 		cmocka_unit_test(test_soft_limits),
 		cmocka_unit_test(test_granted),
 		cmocka_unit_test(test_no_such_cpu),
-		cmocka_unit_test(test_small_stack),
+		cmocka_unit_test(test_stacks),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
