@@ -12,6 +12,7 @@ unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
 # One counts allocations, others play the kernel.
 ldflags_scene/jail := $(foreach name,malloc calloc realloc free,-Wl,--wrap=$(name))
+ldflags_loop/epoch := -Wl,--wrap=incise_clock_new_simulated
 ldflags_device/stepper_kernel := $(foreach name,open close ioctl mmap munmap clock_nanosleep \
 	nanosleep,-Wl,--wrap=$(name))
 ldflags_daq/comedi_force := -Wl,--wrap=read
@@ -118,7 +119,7 @@ check-attack: all $(attack_programs) ## attacks on recordings with their full co
 	ATTACK=full $(attack_bats)
 
 check-cli: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
-		$(attack_programs) ## command-line tests of the real programs
+		$(O)/tests/day $(attack_programs) ## command-line tests of the real programs
 	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli tests/attack
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
@@ -180,8 +181,19 @@ TRACKER_SECONDS ?= 600
 check-tracker: $(O)/tests/tracker_line ## a FASTRAK at a serial line for ten minutes, clean and with harm on the way
 	$(O)/tests/tracker_line $(TRACKER_SECONDS)
 
+# A day of ticks; the rig's clock starts where the test says.
+$(O)/tests/day: tests/bench/day.c $(O)/lib/libincise-tests.a
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
+		$(LDFLAGS) -Wl,--wrap=incise_clock_new_simulated -o $@ $(filter %.c %.a,$^) \
+		$(all_libs) -lm -pthread
+
+DAY_HOURS ?= 24
+check-day: $(O)/tests/day ## 24 h of the wall scene in simulated time: no drift, leak or counter wrap
+	$(O)/tests/day scenes/wall.scene $(DAY_HOURS)
+
 check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the shipped model, about a minute
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 
-.PHONY: check-exhaustive check-frames check-tracker check-depth
+.PHONY: check-exhaustive check-frames check-tracker check-depth check-day
