@@ -35,6 +35,8 @@ extra_calibrate-depth := $(addprefix $(O)/obj/tools/,picture.o depth_picture.o d
 	depth_lengths.o depth_corners.o depth_report.o)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o stroke.o \
+	bench_tick.o bench_wakeup.o wakeup_run.o bench_rate.o bench_load.o cyclictest.o child.o \
+	memory_file.o loop_picture.o \
 	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
 	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o \
 	bench_vision.o scalpel_picture.o bench_capture.o jpeg_camera.o)
@@ -95,7 +97,7 @@ bench: ## measure error against run time on this machine; chart in build/bench/
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise bench precision --plot $(O)/bench/precision
 	$(O)/bin/incise bench training
-	$(O)/bin/incise bench loop
+	$(O)/bin/incise bench loop --plot $(O)/bench/loop
 	$(O)/bin/incise bench stability --plot $(O)/bench/stability
 	$(O)/bin/incise bench vision
 	$(O)/bin/incise bench capture

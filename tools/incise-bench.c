@@ -12,14 +12,18 @@
 #include "bench_vision.h"
 #include "cli.h"
 
-enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION };
+enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION, OPT_LOAD };
 
 static const struct cli_option options[] = {
 	{OPT_JSON, "json", NULL, "report as JSON"},
 	{OPT_PLOT, "plot", "NAME",
 	 "draw error over time as NAME.png and NAME.svg;\n"
-	 "stability: NAME-map, NAME-guard, NAME-integrators"},
-	{OPT_DURATION, "duration", "TIME", "of each run of capture: 10min; default 10s"},
+	 "stability: NAME-map, NAME-guard, NAME-integrators;\n"
+	 "loop: NAME-wakeups, NAME-rates"},
+	{OPT_DURATION, "duration", "TIME",
+	 "of each run of capture, and each of loop's wake-ups:\n10min; default 10s"},
+	{OPT_LOAD, "load", "NAME",
+	 "loop: wake-ups under one load only: idle, cpu,\nmemory, disk or view"},
 	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
 	{0},
 };
@@ -36,8 +40,9 @@ static const struct cli_verb verb = {
 		"stability: find how stiff a virtual wall may be, simulated and computed; the\n"
 		"guard of passivity on and off; integrators of a stiff spring.\n"
 		"loop: measure what a tick of the haptic loop costs with all forces, on a plane\n"
-		"and on meshes of 20 000 and 500 000 triangles, or of SCENE; and how late the\n"
-		"machine wakes it.\n"
+		"and on meshes of 20 000 and 500 000 triangles, or of SCENE; how late the machine\n"
+		"wakes it, idle and under loads, beside cyclictest; and the error of the force over\n"
+		"the loop's rate.\n"
 		"vision: measure error and run time of the exposed length in pictures whose truth\n"
 		"is known.\n"
 		"capture: measure how much of a core it takes to record all streams in real time,\n"
@@ -51,7 +56,7 @@ static const struct cli_verb verb = {
 struct job {
 	bool json, quick;
 	double seconds; /* 0: not given */
-	const char *plot, *operand;
+	const char *plot, *load, *operand;
 };
 
 static void precision(const struct job *job)
@@ -71,7 +76,16 @@ static void stability(const struct job *job)
 
 static void loop(const struct job *job)
 {
-	bench_loop(job->operand, job->json, job->quick);
+	const struct bench_loop bench = {
+		.scene = job->operand,
+		.load = job->load,
+		.seconds = job->seconds,
+		.json = job->json,
+		.quick = job->quick,
+		.plot = job->plot,
+	};
+
+	bench_loop(&bench);
 }
 
 static void vision(const struct job *job)
@@ -90,7 +104,7 @@ static const struct {
 	void (*run)(const struct job *job);
 } words[] = {
 	{"precision", true, true, precision},  {"training", false, false, training},
-	{"stability", false, true, stability}, {"loop", true, false, loop},
+	{"stability", false, true, stability}, {"loop", true, true, loop},
 	{"vision", false, false, vision},      {"capture", true, false, capture},
 };
 #define WORDS (int)(sizeof(words) / sizeof(*words))
@@ -111,6 +125,9 @@ int main(int argc, char **argv)
 		case OPT_DURATION:
 			job.seconds = cli_duration("duration", optarg, 1, 86400);
 			break;
+		case OPT_LOAD:
+			job.load = optarg;
+			break;
 		case OPT_QUICK:
 			job.quick = true;
 			break;
@@ -123,9 +140,11 @@ int main(int argc, char **argv)
 			"expected 'training', 'stability', 'vision', 'precision' and at most one "
 			"model, 'loop' and at most one scene, or 'capture' and at most one run");
 	if (job.plot && !words[what].plot)
-		cli_usage("--plot goes with 'precision' and 'stability'");
-	if (job.seconds > 0 && words[what].run != capture)
-		cli_usage("--duration goes with 'capture'");
+		cli_usage("--plot goes with 'precision', 'stability' and 'loop'");
+	if (job.seconds > 0 && words[what].run != capture && words[what].run != loop)
+		cli_usage("--duration goes with 'capture' and 'loop'");
+	if (job.load && words[what].run != loop)
+		cli_usage("--load goes with 'loop'");
 	job.operand = argc - optind == 2 ? argv[optind + 1] : NULL;
 	words[what].run(&job);
 	cli_finish();

@@ -165,8 +165,19 @@ of() {
 		FROM json_each(readfile('r.json'), '\$.$1') e) WHERE ${3:-1}"
 }
 
-@test "bench loop times ticks over a plane and meshes" {
-	incise bench loop --quick --json >r.json
+# Of one program: in order, and as many as there were. The quantiles are edges of 1 us.
+in_order() {
+	local q last
+	last=$(key r.json "$1.min")
+	for q in median p99 p999 p9999; do
+		holds "$last <= $(key r.json "$1.$q")"
+		last=$(key r.json "$1.$q")
+	done
+	holds "$last <= $(key r.json "$1.max") + 1.001 || $last == 20001"
+}
+
+@test "bench loop times ticks over a plane and meshes, and wake-ups beside cyclictest" {
+	incise bench loop --quick --load idle --json >r.json
 	for i in 0 1 2 3 4; do
 		holds "$(key r.json "rows[$i].tick_ns.median") > 0"
 		holds "$(key r.json "rows[$i].tick_ns.median") <= $(key r.json "rows[$i].tick_ns.p999")"
@@ -176,17 +187,123 @@ of() {
 	[ "$(key r.json "rows[4].triangles")" = 500000 ]
 	holds "$(key r.json "rows[4].memory_bytes") > 10 * $(key r.json "rows[3].memory_bytes")"
 	[ "$(key r.json tick_ns)" = "$(key r.json "rows[0].tick_ns")" ]
+	[ "$(key r.json wakeups.seconds)" = 0.5 ]
+	for i in 0 1; do
+		hz=$((i ? 4000 : 1000))
+		row=wakeups.rows[$i]
+		[ "$(key r.json $row.load) $(key r.json $row.rate_hz)" = "idle $hz.0" ]
+		in_order $row.lateness_us
+		holds "$(key r.json $row.lateness_us.ticks) + $(key r.json $row.skipped) == $((hz / 2))"
+		[ -n "$(key r.json $row.no_cyclictest)" ] && continue
+		in_order $row.cyclictest_us
+		# it has a count of its own
+		holds "$(key r.json $row.cyclictest_us.ticks) == $((hz / 2))"
+		holds "$(key r.json $row.skipped_by_machine) <= $(key r.json $row.skipped)"
+		holds "$(key r.json $row.lateness_us.p999) / $(key r.json $row.cyclictest_us.p999) \
+			/ $(key r.json $row.ratio_p999) - 1 < 1e-9"
+	done
 	holds "$(key r.json lateness_us.ticks) + $(key r.json lateness_us.skipped) == 500"
-	run -0 key r.json cyclictest_us
-	[ -z "$output" ]
-	run -0 --separate-stderr incise bench loop --quick "$root/scenes/wall.scene"
+	[ "$(key r.json cyclictest_us)" = "$(key r.json wakeups.rows[0].cyclictest_us)" ]
+	if command -v cyclictest >/dev/null && [ "$(key r.json wakeups.policy)" = fifo ]; then
+		[ -z "$(key r.json wakeups.rows[0].no_cyclictest)" ]
+	else
+		[ -z "$(key r.json cyclictest_us)" ]
+	fi
+}
+
+@test "bench loop without cyclictest and without loads says so" {
+	mkdir bin
+	for program in sh rm; do # what shell there is must go on
+		ln -s "$(command -v $program)" bin/
+	done
+	PATH=$PWD/bin run -0 --separate-stderr "$INCISE_BUILD/bin/incise" bench loop --quick \
+		--load cpu "$root/scenes/wall.scene"
 	[ -z "$stderr" ]
 	[[ "$output" == *wall.scene* ]]
+	[[ "$output" == *"1000 cpu    stress-ng is not installed: apt-get install stress-ng"* ]]
+	PATH=$PWD/bin "$INCISE_BUILD/bin/incise" bench loop --quick --load idle --json \
+		"$root/scenes/wall.scene" >r.json
+	[[ "$(key r.json wakeups.rows[0].no_cyclictest)" == *"not"* ]]
+	[ -z "$(key r.json cyclictest_us)" ]
+	[ -z "$(key r.json wakeups.rows[0].skipped_by_machine)" ]
+	holds "$(key r.json lateness_us.ticks) > 0"
+}
+
+@test "bench loop under load leaves nothing behind" {
+	command -v stress-ng >/dev/null || skip "stress-ng is not installed, it makes the load"
+	mkdir t
+	TMPDIR=$PWD/t incise bench loop --quick --load disk --json "$root/scenes/wall.scene" >r.json
+	[ -z "$(ls -A t)" ]
+	[ "$(key r.json wakeups.rows[0].load)" = disk ]
+	[ -z "$(key r.json wakeups.rows[0].no_load)" ]
+	in_order wakeups.rows[0].lateness_us
+	TMPDIR=$PWD/t run --separate-stderr timeout --preserve-status -s INT 12 \
+		incise bench loop --quick --load disk --duration 1min "$root/scenes/wall.scene"
+	failed_with interrupted
+	[ -z "$(ls -A t)" ]
+}
+
+# One value of a row of `rates`: rate wall exact 1000 hold_N.
+rate() {
+	sqlite3 :memory: "SELECT json_extract(value, '\$.$4')
+		FROM json_each(readfile('r.json'), '\$.rates')
+		WHERE json_extract(value, '\$.wall') = '$1' AND json_extract(value, '\$.poses') = '$2'
+		AND json_extract(value, '\$.rate_hz') = $3"
+}
+
+# In simulated time, the same on each machine.
+@test "bench loop: the error of the force falls with the rate, as theory says" {
+	incise bench loop --quick --load view --json "$root/scenes/wall.scene" >r.json
+	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '$.rates')")" = 18 ]
+	# of a mean slope T/sqrt(3); the predictor's noise of some 50 uN is beside it
+	for hz in 250 500 1000 2000; do
+		hold=$(rate wall exact $hz hold_N)
+		holds "$(rate wall exact $hz command.rms_N) > 0.99 * $hold"
+		holds "$(rate wall exact $hz command.rms_N) < 1.03 * $hold + 5e-5"
+		holds "($(rate wall exact 250 hold_N) * 250 / $hz / $hold - 1) ^ 2 < 1e-18"
+	done
+	for poses in tracker exact; do
+		last=1
+		for hz in 250 500 1000 2000 4000 8000; do
+			holds "$(rate wall $poses $hz command.rms_N) < $last"
+			last=$(rate wall $poses $hz command.rms_N)
+			# of 3.4 N at most
+			holds "$(rate wall $poses $hz command.max_N) < 0.1"
+			holds "$(rate wall $poses $hz rendered.rms_N) > $last"
+			holds "$(rate wall $poses $hz rendered.max_N) < 0.2"
+			holds "$(rate wall $poses $hz command.relative) > $last / 3.5"
+			holds "$(rate wall $poses $hz tick_ns) > 0"
+			[ -z "$(rate wall $poses $hz failed)" ]
+		done
+	done
+	for hz in 250 500; do
+		[[ "$(rate stiff exact $hz failed)" == "not stable: "* ]]
+		[ -z "$(rate stiff exact $hz command.rms_N)" ]
+	done
+	holds "$(rate stiff exact 1000 limit_N_mm) > $(rate stiff exact 1000 stiffness_N_mm)"
+}
+
+@test "bench loop draws lateness and error" {
+	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
+	run -0 --separate-stderr incise bench loop --quick --load idle --plot "a folder/w" \
+		"$root/scenes/wall.scene"
+	[ -z "$stderr" ]
+	for part in wakeups rates; do
+		[ "$(head -c 8 "a folder/w-$part.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
+		grep -q '<svg' "a folder/w-$part.svg"
+	done
+	grep -q 'exact poses' "a folder/w-rates.svg"
+	grep -q '1 kHz, idle' "a folder/w-wakeups.svg"
 }
 
 @test "bench loop: bad usage" {
 	run -2 --separate-stderr incise bench loop a b
-	run -2 --separate-stderr incise bench loop --plot x
+	run --separate-stderr incise bench loop --plot a/
+	bad_usage "--plot"
+	run --separate-stderr incise bench loop --load much
+	bad_usage "'much' is none of idle, cpu, memory, disk and view"
+	run --separate-stderr incise bench training --load cpu
+	bad_usage "--load goes with 'loop'"
 	run --separate-stderr incise bench loop none.scene
 	failed_with none.scene
 }
@@ -336,7 +453,7 @@ needs_pictures() {
 	TMPDIR=$PWD/t incise bench capture without_camera --duration 1s >text
 	grep -q '^without_camera ' text
 	run --separate-stderr incise bench vision --duration 1s
-	bad_usage "--duration goes with 'capture'"
+	bad_usage "--duration goes with 'capture' and 'loop'"
 }
 
 @test "bench capture that is interrupted, or has no room, leaves nothing behind" {

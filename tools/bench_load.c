@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * What keeps the machine busy; see bench_load.h.
+ */
+#include <errno.h>
+#include <ftw.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "bench_load.h"
+#include "child.h"
+#include "cli.h"
+
+#define UNDER_WAY_US 500000
+#define LONGER_S 30 /* than it is needed: the end of one whose bench was killed */
+
+/* One worker per processor, and one at the disk. */
+static const struct {
+	const char *name;
+	const char *arguments[6]; /* of stress-ng */
+} loads[LOADS] = {
+	[LOAD_IDLE] = {"idle", {NULL}},
+	[LOAD_CPU] = {"cpu", {"--cpu", "0"}},
+	[LOAD_MEMORY] = {"memory", {"--vm", "0", "--vm-bytes", "128m"}},
+	[LOAD_DISK] = {"disk", {"--hdd", "1", "--hdd-bytes", "64m"}},
+	[LOAD_VIEW] = {"view", {NULL}},
+};
+
+const char *load_name(enum load load)
+{
+	return loads[load].name;
+}
+
+static void make_folder(struct load_run *run)
+{
+	const char *where = getenv("TMPDIR");
+	int length = snprintf(run->folder, sizeof(run->folder), "%s/incise-bench-XXXXXX",
+			      where && *where ? where : "/tmp");
+
+	if (length >= (int)sizeof(run->folder))
+		cli_fail("TMPDIR: is too long for a name; set another");
+	if (!mkdtemp(run->folder))
+		cli_fail("%s: no folder to keep the disk busy in: %s; set TMPDIR",
+			 run->folder, strerror(errno));
+}
+
+static int remove_one(const char *path, const struct stat *status, int type,
+		      struct FTW *place)
+{
+	(void)status;
+	(void)type;
+	(void)place;
+	return remove(path);
+}
+
+static const char *begin_stress(enum load load, double seconds, struct load_run *run)
+{
+	const char *argv[16] = {"stress-ng", "--quiet", "--timeout"};
+	char time[24];
+	int n = 3;
+
+	if (!child_possible("stress-ng"))
+		return "stress-ng is not installed: apt-get install stress-ng";
+	snprintf(time, sizeof(time), "%.0f", seconds + LONGER_S);
+	argv[n++] = time;
+	for (int i = 0; i < 6 && loads[load].arguments[i]; i++)
+		argv[n++] = loads[load].arguments[i];
+	/* It makes a folder there for any of its workers. */
+	make_folder(run);
+	argv[n++] = "--temp-path";
+	argv[n++] = run->folder;
+	run->pid = child_begin((char *const *)argv, -1);
+	return NULL;
+}
+
+static const char *begin_view(const char *scene, struct load_run *run)
+{
+	char path[PATH_MAX + 20];
+	const char *argv[] = {path, scene, NULL};
+	ssize_t n = readlink("/proc/self/exe", path, PATH_MAX - 1);
+	char *slash;
+
+	path[n > 0 ? n : 0] = 0;
+	slash = strrchr(path, '/');
+	strcpy(slash ? slash + 1 : path, "incise-view");
+	if (access(path, X_OK))
+		return "incise-view is not there";
+	run->pid = child_begin((char *const *)argv, -1);
+	return NULL;
+}
+
+const char *load_begin(enum load load, const char *scene, double seconds,
+		       struct load_run *run)
+{
+	const char *why;
+	int status;
+
+	*run = (struct load_run){0};
+	if (load == LOAD_IDLE)
+		return NULL;
+	why = load == LOAD_VIEW ? begin_view(scene, run)
+				: begin_stress(load, seconds, run);
+	if (why)
+		return why;
+	usleep(UNDER_WAY_US);
+	if (child_ended(run->pid, &status)) {
+		run->pid = 0;
+		load_end(run);
+		return "it ended at once; run it by hand to see why";
+	}
+	return NULL;
+}
+
+void load_end(struct load_run *run)
+{
+	if (run->pid)
+		child_end(run->pid, 0);
+	if (*run->folder)
+		nftw(run->folder, remove_one, 8, FTW_DEPTH | FTW_PHYS);
+	*run = (struct load_run){0};
+}

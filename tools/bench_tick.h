@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * What a tick of the haptic loop costs: all forces, guard and limits, over a plane, a sphere
+ * and meshes; or over a user's scene.
+ */
+#ifndef INCISE_BENCH_TICK_H
+#define INCISE_BENCH_TICK_H
+
+#include <jansson.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include "memory_file.h"
+#include "tick_cost.h"
+
+#define BENCH_TICK_ROWS 5
+
+struct tick_row {
+	const char *name;
+	size_t memory, triangles;
+	double load_s;
+	struct tick_cost cost;
+};
+
+/* The bench's own scenes, or @scene. Returns how many rows. */
+int bench_tick(const char *scene, bool quick, struct tick_row rows[BENCH_TICK_ROWS]);
+
+/* The bench's own plane as a file, for so many ticks a second. */
+struct memory_file bench_tick_plane(double rate_hz);
+
+json_t *tick_row_json(const struct tick_row *row);
+
+/* {"median", "p99", "p999"} in ns. */
+json_t *tick_cost_json(const struct tick_cost *cost);
+
+void tick_rows_print(const struct tick_row *rows, int n);
+
+#endif

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * How late the machine wakes the haptic loop, idle and under loads, and cyclictest at the
+ * same time.
+ */
+#ifndef INCISE_BENCH_WAKEUP_H
+#define INCISE_BENCH_WAKEUP_H
+
+#include <jansson.h>
+#include <stdbool.h>
+#include "bench_load.h"
+#include "wakeup_run.h"
+
+struct wakeup_row {
+	enum load load;
+	double rate_hz;
+	const char *no_load; /* why it was not measured, or NULL */
+	struct wakeup got;
+};
+
+struct wakeups {
+	struct wakeup_row *row;
+	int n;
+	double seconds; /* of each */
+	bool realtime;	/* SCHED_FIFO and locked memory, else what the shell has */
+	int cpu;	/* of both programs */
+};
+
+/*
+ * @scene: or NULL for the bench's own, at 1 and 4 kHz; @only: a load, or LOADS for all. The
+ * rows live as long as the program.
+ */
+void bench_wakeup(const char *scene, enum load only, double seconds,
+		  struct wakeups *wakeups);
+
+/* {"min", "median", "p99", "p999", "p9999", "max", "ticks"}, or null. */
+json_t *lateness_json(const struct lateness *lateness);
+
+json_t *wakeups_json(const struct wakeups *wakeups);
+void wakeups_print(const struct wakeups *wakeups);
+
+#endif
