@@ -89,6 +89,30 @@ until_ticks() {
 	[[ "${lines[0]}" == "neck: stopped since "* ]]
 }
 
+@test "a real loop tells its state, by the name of its scene" {
+	incise haptic "$root/scenes/wall.scene" --rig sim: --no-rt --duration 60s \
+		--state incise/wall.state >/dev/null 2>&1 3>&- &
+	played=$!
+	for ((i = 0; i < 100; i++)); do
+		[ ! -e incise/wall.state ] || break
+		sleep 0.1
+	done
+	# the self-test comes first
+	for ((i = 0; i < 100; i++)); do
+		! incise status wall | grep -q '^wall: running' || break
+		sleep 0.1
+	done
+	incise status wall --json >report.json
+	[ "$(key report.json 'loops[0].state')" = running ]
+	[ "$(key report.json 'loops[0].pid')" = "$played" ]
+	[ "$(key report.json 'loops[0].scene')" = "$root/scenes/wall.scene" ]
+	[[ "$(key report.json 'loops[0].stages')" == *'"contact"'* ]]
+	kill -TERM "$played"
+	wait "$played"
+	run -0 incise status wall
+	[[ "${lines[0]}" == "wall: stopped since "* ]]
+}
+
 @test "a loop without ticks yet is well" {
 	play neck start
 	run -0 incise status neck
