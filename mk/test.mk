@@ -177,6 +177,15 @@ $(O)/tests/calibrate_depth: tests/bench/calibrate_depth.c libs
 check-depth: $(O)/tests/calibrate_depth ## whether stated intervals of depth hold the truth on 200 virtual rigs
 	$(O)/tests/calibrate_depth
 
+# What it costs the loop to tell its state.
+$(O)/tests/state_tick: tests/bench/state_tick.c libs
+	@mkdir -p $(@D)
+	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
+		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise
+
+check-state: $(O)/tests/state_tick ## what it costs the loop to tell its state, ns
+	$(O)/tests/state_tick
+
 TRACKER_SECONDS ?= 600
 check-tracker: $(O)/tests/tracker_line ## a FASTRAK at a serial line for ten minutes, clean and with harm on the way
 	$(O)/tests/tracker_line $(TRACKER_SECONDS)
@@ -196,4 +205,4 @@ check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the sh
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 
-.PHONY: check-exhaustive check-frames check-tracker check-depth check-day
+.PHONY: check-exhaustive check-frames check-tracker check-depth check-day check-state

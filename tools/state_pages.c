@@ -148,14 +148,26 @@ static void open_name(struct state_pages *pages, const char *name, char *list[FO
 			name, name);
 }
 
+/* "scenes/neck.scene" is the loop neck; NULL: it is no scene. */
+static char *name_of_scene(const char *asked)
+{
+	const char *slash = strrchr(asked, '/'), *file = slash ? slash + 1 : asked;
+	size_t n = strlen(file), end = strlen(".scene");
+
+	return n > end && !strcmp(file + n - end, ".scene")
+		       ? text("%.*s", (int)(n - end), file)
+		       : NULL;
+}
+
 void state_pages_open(struct state_pages *pages, const char *asked)
 {
 	struct incise_error err = {0};
 	struct incise_state *state;
 	char *list[FOLDERS];
+	char *name = asked ? name_of_scene(asked) : NULL;
 
 	*pages = (struct state_pages){0};
-	if (asked && (strchr(asked, '/') || name_length(asked))) {
+	if (asked && !name && (strchr(asked, '/') || name_length(asked))) {
 		state = incise_state_open(asked, &err);
 		if (!state)
 			cli_fail_with(&err);
@@ -164,11 +176,12 @@ void state_pages_open(struct state_pages *pages, const char *asked)
 	}
 	folders(list);
 	if (asked)
-		open_name(pages, asked, list);
+		open_name(pages, name ? name : asked, list);
 	else
 		open_all(pages, list);
 	for (int i = 0; i < FOLDERS; i++)
 		free(list[i]);
+	free(name);
 }
 
 int state_pages_try(const struct state_page_file *page, struct incise_state_now *now,

@@ -20,7 +20,7 @@ struct state_pages {
 };
 
 /*
- * The one asked for, a name or a file, or where it is NULL all; fails where there is none.
+ * The one asked for, a name, a scene or a page, or where it is NULL all; fails where there is none.
  * Of two of a name, the one whose loop lives. Pages that cannot be read are warned of.
  */
 void state_pages_open(struct state_pages *pages, const char *asked);

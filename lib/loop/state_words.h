@@ -16,6 +16,8 @@
 #include <stdint.h>
 #include <string.h>
 
+_Static_assert(__atomic_always_lock_free(sizeof(uint64_t), 0), "words of 8 bytes");
+
 /* Inlined: with its size known a copy is a line of moves. */
 #define STATE_INLINE static inline __attribute__((always_inline))
 

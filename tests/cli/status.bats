@@ -68,7 +68,9 @@ until_ticks() {
 	# 999 ways of 0.01 mm against 2 N
 	[[ "$output" == *"energy     19.98 mJ into the tissue, 0.00 mJ back"* ]]
 	[[ "$output" == *"thread     11 minor and 12 major page faults, 13 waits, 14 times put off"* ]]
-	# the same by the file, and where it is the only one
+	# the same by the scene and by the file
+	run -0 incise status scenes/neck.scene
+	[[ "${lines[0]}" == "neck: stopped since "* ]]
 	run -0 incise status incise/neck.state
 	[[ "${lines[0]}" == "neck: stopped since "* ]]
 	mv incise/neck.state other
@@ -256,7 +258,7 @@ until_ticks() {
 
 @test "--follow ends at SIGINT, and with the one who reads" {
 	play neck run
-	run -0 timeout --preserve-status -s INT 1.5 incise status neck --follow
+	run -0 timeout --preserve-status -s INT 3 incise status neck --follow
 	[ "${#lines[@]}" -ge 1 ]
 	run -0 bash -c 'incise status neck --follow --json | head -n 1'
 	echo "$output" >report.json
@@ -279,7 +281,7 @@ until_ticks() {
 		if pid == 0:
 		    fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack('HHHH', 8, 40, 0, 0))
 		    os.execvp('incise', ['incise', 'status', 'neck', '--follow'])
-		end, out = time.monotonic() + 2, b''
+		end, out = time.monotonic() + 3, b''
 		while True:
 		    try:
 		        part = os.read(master, 65536)
@@ -300,7 +302,7 @@ until_ticks() {
 		assert text.count(begin) == 1 and text.count(end) == 1
 		view, after = text.split(begin)[1].split(end)
 		frames = view.split('\x1b[H')[1:]
-		# five a second for two; a machine that is slow has fewer
+		# five a second for three; a machine that is slow has fewer
 		assert len(frames) >= 3, len(frames)
 		for frame in frames:
 		    rows = frame.replace('\x1b[K', '').replace('\x1b[J', '').split('\r\n')

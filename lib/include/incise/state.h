@@ -70,8 +70,8 @@ INCISE_API struct incise_state_writer *incise_state_new(
 INCISE_API bool incise_state_in_memory(const struct incise_state_writer *writer);
 
 /**
- * Tell of a tick. Real-time safe: 35 ns where its memory is in the cache, 0.3 us where not; no allocation, lock or system call. In
- * the thread that ticks, only.
+ * Tell of a tick. Real-time safe: 35 ns where its memory is in the cache, half a us where
+ * not; no allocation, lock or system call. In the thread that ticks, only.
  *
  * The work of the tissue is counted here: the force that one tick asked for, along the way
  * to where the tool is at the next one. Ways that are no motion are left out: from one tool
