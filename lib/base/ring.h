@@ -35,7 +35,7 @@ int incise_ring_init(struct incise_ring *ring, size_t size, size_t count);
 void incise_ring_free(struct incise_ring *ring);
 
 /* The writer's: false, and one more dropped, when it is full. Real-time safe. */
-bool incise_ring_put(struct incise_ring *ring, const void *record);
+bool incise_ring_put(struct incise_ring *ring, const void *record) INCISE_REALTIME;
 
 /* The reader's: how many of at most @n were taken, oldest first. Real-time safe. */
 int incise_ring_take(struct incise_ring *ring, void *records, int n) INCISE_REALTIME;

@@ -9,19 +9,20 @@
 #include <incise/loop_control.h>
 
 /* What waits to be run, and stays there; NULL for none. */
-struct incise_plan *incise_loop_control_waiting(
-	const struct incise_loop_control *control);
+struct incise_plan *incise_loop_control_waiting(const struct incise_loop_control *control)
+	INCISE_REALTIME;
 
 /*
  * Take what waits in the place of @old, which is given back. NULL, and nothing is done, when
  * it was withdrawn meanwhile.
  */
 struct incise_plan *incise_loop_control_swap(struct incise_loop_control *control,
-					     struct incise_plan *old);
+					     struct incise_plan *old) INCISE_REALTIME;
 
 void incise_loop_control_event(struct incise_loop_control *control,
-			       const struct incise_loop_event *event);
+			       const struct incise_loop_event *event) INCISE_REALTIME;
 
-void incise_loop_control_ticked(struct incise_loop_control *control, uint64_t ticks);
+void incise_loop_control_ticked(struct incise_loop_control *control,
+				uint64_t ticks) INCISE_REALTIME;
 
 #endif

@@ -149,13 +149,13 @@ INCISE_API int incise_plan_set_tool(struct incise_plan *plan,
  * none from then on; or let it come back, as it does after poses were missing. No change of
  * the force is above the scene's slew. Real-time safe; in the thread that ticks.
  */
-INCISE_API void incise_plan_fade(struct incise_plan *plan, bool fading);
+INCISE_API void incise_plan_fade(struct incise_plan *plan, bool fading) INCISE_REALTIME;
 
 /** Whether a plan that fades asks for no force any more. Real-time safe. */
-INCISE_API bool incise_plan_faded(const struct incise_plan *plan);
+INCISE_API bool incise_plan_faded(const struct incise_plan *plan) INCISE_REALTIME;
 
 /** How long that takes at most, ns: limits.fade_ms, and the largest force at its slew. */
-INCISE_API int64_t incise_plan_fade_ns(const struct incise_plan *plan);
+INCISE_API int64_t incise_plan_fade_ns(const struct incise_plan *plan) INCISE_REALTIME;
 
 /** What one tick came to. */
 struct incise_tick {
