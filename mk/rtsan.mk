@@ -33,7 +33,8 @@ $(O)/lib/libincise-rtsan.a: $(call objects,incise) $(rtsan_objects)
 	$(AR) qcs $@ $^
 
 rtsan_units := $(filter-out $(if $(has_libmnl),,can/can_stepper),\
-	can/can_stepper device/motor device/stepper_gpio device/stepper_kernel loop/loop \
+	can/can_stepper device/motor device/stepper_gpio device/stepper_kernel loop/control \
+	loop/loop loop/state_tick \
 	scene/extreme scene/plan scene/procedure sim/sim_stepper)
 rtsan_programs := $(patsubst tests/rtsan/%.c,$(O)/tests/rtsan/%,$(wildcard tests/rtsan/*.c))
 rtsan_unit_programs := $(addprefix $(O)/again/tests/unit/,$(rtsan_units))

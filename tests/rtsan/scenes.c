@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Every shipped scene in both arithmetics through a cut and what can go wrong in it, in the
- * loop, under RealtimeSanitizer: it ends this program at the first thing that no tick may
- * do. What the ticks came to is counted, to show that they went where they should.
+ * loop with its page of state and its control, under RealtimeSanitizer: it ends this program
+ * at the first thing that no tick may do. What the ticks came to is counted, to show that
+ * they went where they should.
  */
 #include <errno.h>
 #include <glob.h>
 #include <math.h>
+#include <signal.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/loop.h>
+#include <incise/loop_control.h>
+#include <incise/state.h>
 #include "hands.h"
 
 #define BEGIN 1000 /* ticks: in the middle of the cut */
@@ -79,29 +84,48 @@ static const struct way {
 	 refused, -EIO, INCISE_TICK_FAULT},
 };
 
+#define OFFERED_AT 700 /* ticks: another plan */
+#define STOPPED_AT 2900
+
 static struct seen {
-	uint64_t runs, ticks, contacts, insertions;
+	uint64_t runs, ticks, contacts, insertions, reloads, fades;
 } seen;
 
-/* Between ticks: what the hand holds. It takes effect out of the tissue. */
-static int change_tool(void *context, const struct incise_tick *tick)
-{
-	uint64_t *ticks = context;
+static struct between {
+	struct incise_loop_control *control;
+	struct incise_plan *next; /* of the same scene */
+	uint64_t ticks;
+	volatile sig_atomic_t stop;
+} between;
 
+/*
+ * Between ticks: what the hand holds, which takes effect out of the tissue; another plan; the
+ * end.
+ */
+static int meddle(void *context, const struct incise_tick *tick)
+{
+	enum incise_tool tool = (enum incise_tool)(++between.ticks / 250 % 4);
+
+	(void)context;
 	seen.insertions += tick->phase == INCISE_PHASE_INSERTION;
-	if (++*ticks % 250 == 0)
-		incise_plan_set_tool(hands.plan, (enum incise_tool)(*ticks / 250 % 4));
+	if (between.ticks % 250 == 0) {
+		incise_plan_set_tool(hands.plan, tool);
+		incise_plan_set_tool(between.next, tool);
+	}
+	if (between.ticks == OFFERED_AT)
+		incise_loop_control_offer(between.control, between.next);
+	between.stop = between.ticks >= STOPPED_AT;
 	return 0;
 }
 
 static void run(const char *scene, const char *arithmetic, bool full,
-		const struct way *way)
+		const struct way *way, const char *page)
 {
 	static struct incise_loop_stats stats;
-	uint64_t ticks = 0;
 	struct incise_loop_options options = {.duration_ns = 3 * INCISE_NS_PER_S,
-					      .ticked = change_tool,
-					      .context = &ticks};
+					      .ticked = meddle,
+					      .stop = &between.stop};
+	struct incise_state_setup setup = {0};
 	struct incise_error err = {0};
 	int rc;
 
@@ -109,7 +133,13 @@ static void run(const char *scene, const char *arithmetic, bool full,
 	hands.poses = way->poses;
 	hands.status = way->status;
 	hands.set = way->set;
-	options.rate_hz = incise_scene_rate_hz(hands.scene);
+	setup.rate_hz = options.rate_hz = incise_scene_rate_hz(hands.scene);
+	options.state = incise_state_new(page, &setup, &err);
+	between = (struct between){.control = incise_loop_control_new()};
+	options.control = between.control;
+	between.next = incise_plan_new(hands.scene, hands.rig, &err);
+	if (!options.state || !between.control || !between.next)
+		hands_fail(way->name, err.text);
 	rc = incise_loop_run(hands.plan, incise_rig_clock(hands.rig), &options, &stats,
 			     &err);
 	if (rc != way->rc)
@@ -119,28 +149,42 @@ static void run(const char *scene, const char *arithmetic, bool full,
 	seen.runs++;
 	seen.ticks += stats.ticks;
 	seen.contacts += stats.flagged[__builtin_ctz(INCISE_TICK_CONTACT)];
+	seen.reloads += !!incise_loop_control_retired(between.control);
+	seen.fades += between.stop;
+	incise_loop_control_free(between.control);
+	incise_state_free(options.state);
+	incise_plan_free(between.next);
 	hands_end();
 }
 
 int main(void)
 {
 	static const char *const arithmetics[] = {"fixed", "double"};
+	char page[] = "/tmp/incise-rtsan-XXXXXX";
 	glob_t scenes;
+	int fd = mkstemp(page);
 
+	if (fd < 0)
+		hands_fail("state", "no place for a page");
+	close(fd);
 	if (glob("scenes/*.scene", 0, NULL, &scenes))
 		hands_fail("scenes", "none here: run it in the project's folder");
 	for (size_t s = 0; s < scenes.gl_pathc; s++)
 		for (int a = 0; a < 4; a++)
 			for (size_t w = 0; w < sizeof(ways) / sizeof(*ways); w++)
 				run(scenes.gl_pathv[s], arithmetics[a % 2], a > 1,
-				    &ways[w]);
+				    &ways[w], page);
+	unlink(page);
 	if (!seen.insertions)
 		hands_fail("tools", "handle and tube were never in the tissue");
+	if (!seen.reloads || !seen.fades)
+		hands_fail("control", "no plan was changed, or no loop was stopped");
 	printf("ok    rtsan: %zu scenes, %llu runs, %llu ticks, of them %llu in contact, "
-	       "%llu of handle or tube\n",
+	       "%llu of handle or tube; %llu plans changed, %llu loops stopped\n",
 	       scenes.gl_pathc, (unsigned long long)seen.runs,
 	       (unsigned long long)seen.ticks, (unsigned long long)seen.contacts,
-	       (unsigned long long)seen.insertions);
+	       (unsigned long long)seen.insertions, (unsigned long long)seen.reloads,
+	       (unsigned long long)seen.fades);
 	globfree(&scenes);
 	return 0;
 }
