@@ -13,7 +13,8 @@
 #include "cli.h"
 #include "cyclictest.h"
 
-#define SPIKES_MAX 100000
+#define SPIKES_MAX 200000
+#define SPIKES_TEXT "200000"
 #define END_S 5 /* after the time that it should take, which has passed */
 
 /* Its histogram, and ours, whose last bin is all above. */
@@ -34,11 +35,21 @@ void cyclictest_begin(struct cyclictest *c, double rate_hz, int priority, int cp
 {
 	char text[7][48];
 	const char *argv[] = {
-		"cyclictest",	 "--quiet",	"--mlockall",
-		"--policy=fifo", "--threads=1", "--histogram=" TRACKED_US,
-		text[6],	 text[0],	text[1],
-		text[2],	 text[3],	text[4],
-		text[5],	 NULL,
+		"cyclictest",
+		"--quiet",
+		"--mlockall",
+		"--policy=fifo",
+		"--threads=1",
+		"--histogram=" TRACKED_US,
+		"--spike-nodes=" SPIKES_TEXT,
+		text[6],
+		text[0],
+		text[1],
+		text[2],
+		text[3],
+		text[4],
+		text[5],
+		NULL,
 	};
 
 	c->report = memory_file_begin("cyclictest");

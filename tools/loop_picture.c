@@ -129,13 +129,14 @@ void loop_picture_wakeups(const struct wakeups *wakeups, const char *folder,
 			       330 * lines + 60);
 	fprintf(script,
 		"set multiplot layout %d,%d title \"How late the loop's thread wakes, and "
-		"cyclictest beside it: %s, %.3g s each\" font ',13'\n"
+		"cyclictest beside it%s%s, %.3g s each\" font ',13'\n"
 		"set logscale xy\nset xrange [0.9:20000]\nset yrange [%g:1]\n"
 		"set format y '10^{%%L}'\nset format x '10^{%%L}'\nset termoption enhanced\n"
 		"set xlabel 'late / us'\nset ylabel 'share of wake-ups'\n"
 		"set style fill solid\nset key top right samplen 2\ndata = '%s'\n",
-		lines, columns, wakeups->realtime ? "SCHED_FIFO" : "SCHED_OTHER",
-		wakeups->seconds, 0.5 / most, p.data);
+		lines, columns, columns > 1 ? ": " : "\\n",
+		wakeups->realtime ? "SCHED_FIFO" : "SCHED_OTHER", wakeups->seconds,
+		0.5 / most, p.data);
 	for (int i = 0; i < wakeups->n; i++) {
 		const struct wakeup_row *row = &wakeups->row[i];
 
