@@ -71,8 +71,10 @@ check: ## install what is missing, build, and run all tests
 	@mk/deps build check demo
 	@mk/deps vm || echo "going on without what the test bed needs"
 	@mk/deps module || echo "going on without what checking the module needs"
+	@mk/deps rtsan || echo "going on without RealtimeSanitizer"
+	@mk/deps deb debian || echo "going on without what building packages needs"
 	+@$(MAKE) --no-print-directory all
-	+@$(MAKE) --no-print-directory check-style check-unit check-cli check-sanitize check-fuzz check-module check-vm
+	+@$(MAKE) --no-print-directory check-style check-unit check-cli check-sanitize check-fuzz check-rtsan check-module check-deb check-vm
 
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8
