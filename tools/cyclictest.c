@@ -34,21 +34,22 @@ void cyclictest_begin(struct cyclictest *c, double rate_hz, int priority, int cp
 		      uint64_t cycles, double phase_us)
 {
 	char text[7][48];
+	/* The room for spikes is taken only behind the option that asks for them. */
 	const char *argv[] = {
 		"cyclictest",
 		"--quiet",
 		"--mlockall",
 		"--policy=fifo",
 		"--threads=1",
-		"--histogram=" TRACKED_US,
-		"--spike-nodes=" SPIKES_TEXT,
-		text[6],
 		text[0],
 		text[1],
 		text[2],
 		text[3],
 		text[4],
 		text[5],
+		text[6],
+		"--spike-nodes=" SPIKES_TEXT,
+		"--histogram=" TRACKED_US,
 		NULL,
 	};
 
