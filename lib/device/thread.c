@@ -22,3 +22,13 @@ int incise_thread_start(pthread_t *thread, void *(*run)(void *), void *argument,
 	*real_time = !pthread_setschedparam(*thread, SCHED_FIFO, &priority);
 	return 0;
 }
+
+void incise_thread_hurry(bool hurry)
+{
+	struct sched_param priority = {.sched_priority =
+					       hurry ? INCISE_THREAD_PRIORITY : 0};
+
+	/* Denied it was at the start as well. */
+	pthread_setschedparam(pthread_self(), hurry ? SCHED_FIFO : SCHED_OTHER,
+			      &priority);
+}

@@ -16,4 +16,10 @@
 int incise_thread_start(pthread_t *thread, void *(*run)(void *), void *argument,
 			bool *real_time);
 
+/*
+ * The calling thread is in no hurry, or again in as much as it was at its start: a search for
+ * a device takes milliseconds of a processor, which a loop may need.
+ */
+void incise_thread_hurry(bool hurry);
+
 #endif

@@ -71,7 +71,8 @@ static void tell_changes(struct run *run, const struct incise_tick *tick)
 		run->stale_ns = tick->t_ns;
 		tell(run, INCISE_LOOP_STALE, tick->t_ns, 0);
 	}
-	if (ended & INCISE_TICK_STALE)
+	/* A tick that failed read no pose. */
+	if (ended & INCISE_TICK_STALE && !(tick->flags & INCISE_TICK_FAULT))
 		tell(run, INCISE_LOOP_FRESH, tick->t_ns,
 		     (double)(tick->t_ns - run->stale_ns) * 1e-6);
 	if (begun & INCISE_TICK_NOT_FINITE)

@@ -444,6 +444,8 @@ int incise_plan_cause(const struct incise_plan *plan, char *text, size_t size)
 	/* Only of an actuator that has one: else a tracker's failure would go under. */
 	if (plan->fault && plan->actuator_faults)
 		length = incise_stepper_cause(plan->stepper, text, size);
+	else if (plan->fault && !plan->actuator_off && plan->tracker)
+		length = incise_tracker_cause(plan->tracker, text, size);
 	/* It may have been cleared since, by someone else. */
 	return length > 0 ? length : snprintf(text, size, "%s", fault ? fault : "");
 }

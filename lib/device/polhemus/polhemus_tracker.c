@@ -107,8 +107,10 @@ static void *run(void *argument)
 			polhemus_stream_silent(&t->stream, incise_monotonic_ns());
 		if (n >= 0 && !is_dumb(t, silent_ms, noise))
 			continue;
+		incise_thread_hurry(false);
 		if (!recover(t))
 			break;
+		incise_thread_hurry(true);
 		silent_ms = 0;
 		before_ms = now_ms();
 		noise = 0;
