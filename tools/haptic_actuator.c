@@ -57,6 +57,7 @@ int haptic_take_hold(struct incise_rig *rig, bool home, bool recover,
 	struct incise_stepper *stepper = incise_rig_stepper(rig);
 	struct incise_stepper_status status;
 	struct incise_stepper_info info;
+	char cause[300];
 	int rc = incise_stepper_status(stepper, &status);
 
 	incise_stepper_info(stepper, &info);
@@ -67,6 +68,11 @@ int haptic_take_hold(struct incise_rig *rig, bool home, bool recover,
 	if (rc)
 		return rc;
 	if (!status.homed && !home) {
+		/* Homing, too, is refused before that is cleared. */
+		if (status.faults & ~(unsigned int)INCISE_STEPPER_TRAVEL) {
+			incise_stepper_cause(stepper, cause, sizeof(cause));
+			return incise_error_set(err, EPERM, "%s: %s", info.name, cause);
+		}
 		if (info.can_home)
 			return incise_error_set(
 				err, EPERM,
