@@ -663,8 +663,8 @@ static void walk(const char *loop_time)
 	step("Run the haptic loop in real time, in fixed point");
 	write_scene();
 	json_object_set_new(summary, "haptic",
-			    RUN("haptic", scene, "--rig", live, "--duration", duration,
-				"--log", log, "--json"));
+			    RUN("haptic", scene, "--rig", live, "--no-rt", "--duration",
+				duration, "--log", log, "--json"));
 	free(rec), free(new_rec), free(raw), free(pairs), free(by_cut), free(new_csv);
 	free(paper), free(model), free(initial), free(scene), free(history), free(log);
 	free(sim), free(seed_text), free(new_sim), free(live), free(duration);
