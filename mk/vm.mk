@@ -17,10 +17,21 @@ $(O)/tests/vm/%: tests/vm/guest/%.c $(guest_shared) $(guest_headers) \
 		$(all_libs) -lm
 
 # Virtual time for whatever asserts on time, two processors for races.
-vm_boots := main:deterministic second:deterministic main:smp
+vm_boots := main:deterministic second:deterministic main:service main:smp
 
-check-vm: all $(guest_programs) $(O)/tests/polhemus/fastrak ## tests of the kernel modules, on Debian's kernels in QEMU
+# For tests/vm/system, in a Debian that systemd has booted.
+system_programs := $(patsubst tests/vm/system/%.c,$(O)/tests/vm/%,$(wildcard tests/vm/system/*.c))
+
+$(system_programs): $(O)/tests/vm/%: tests/vm/system/%.c tests/vm/simulator.c \
+		tests/vm/simulator.h driver/sim/incise_sim.h
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< tests/vm/simulator.c
+
+check-vm: all $(guest_programs) $(system_programs) $(O)/tests/polhemus/fastrak ## tests of the kernel modules, on Debian's kernels in QEMU
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed $(vm_boots)
+
+check-service: all $(system_programs) $(O)/tests/polhemus/fastrak ## of check-vm the boot of systemd, with our packages and the service
+	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check main:service
 
 # In real time only: with every access checked its timers are late by up to a millisecond,
 # in virtual time too, so that nothing about time can be asserted.
@@ -29,4 +40,4 @@ check-vm-debug: all $(guest_programs) $(O)/tests/polhemus/fastrak ## the same on
 	+@tests/vm/debug-kernel >/dev/null
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed debug:smp
 
-.PHONY: check-vm check-vm-debug
+.PHONY: check-vm check-service check-vm-debug
