@@ -49,28 +49,38 @@ has_board := $(if $(has_vision),$(if $(shell $(CXX) -E -x c++ $(opencv_cflags) \
 	-include opencv2/calib3d.hpp /dev/null >/dev/null 2>&1 && echo yes),yes))
 
 # One shared object per group of rooms; a process maps only the ones it uses.
-libraries := incise incise-learn incise-record
+# Pictures of a scene need a screen's libraries; without them that library and its verb are not
+# built.
+has_view := $(shell $(PKG_CONFIG) --exists sdl2 epoxy cairo egl && echo yes)
+libraries := incise incise-learn incise-record $(if $(has_view),incise-view)
 rooms_incise := base fixed model tissue scene loop sim device
 rooms_incise-learn := learn calib
 rooms_incise-record := record
+rooms_incise-view := view
 pc_incise := libconfig
 pc_incise-learn := lapacke lapack blas
 pc_incise-record := sqlite3
+pc_incise-view := sdl2 epoxy cairo egl
 libs_incise := -lm -ldl
 libs_incise-learn := -lm
 libs_incise-record := -lm -ldl -pthread
+libs_incise-view := -lm
 also_incise := lib/record/crc32c.o
 also_incise-record := lib/base/ring.o lib/device/module.o lib/device/thread.o \
 	lib/tissue/predict.o
 about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop
 about_incise-learn := haptic cutting: learning models from data
 about_incise-record := haptic cutting: recordings and what is exported of them
+about_incise-view := haptic cutting: the picture of a scene, its wound and its blood
 needs_incise :=
 needs_incise-learn := incise
 needs_incise-record := incise
+needs_incise-view := incise
 
 # One program per verb, and the libraries it is linked to.
-verbs := $(patsubst tools/incise-%.c,%,$(wildcard tools/incise-*.c))
+verbs := $(filter-out $(if $(has_view),,view),$(patsubst tools/incise-%.c,%,\
+	$(wildcard tools/incise-*.c)))
+uses_view := incise incise-view incise-record
 uses_capture := incise incise-record
 uses_export := incise incise-record
 uses_verify := incise incise-record

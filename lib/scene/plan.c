@@ -348,6 +348,11 @@ void incise_plan_top(const struct incise_plan *plan, struct incise_touch *touch)
 	incise_surface_top(plan->surface, touch);
 }
 
+const struct incise_surface *incise_plan_surface(const struct incise_plan *plan)
+{
+	return plan->surface;
+}
+
 void incise_plan_stability(const struct incise_plan *plan,
 			   struct incise_plan_stability *stability)
 {

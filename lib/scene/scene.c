@@ -171,7 +171,6 @@ static int read_switches(struct incise_scene *scene, const config_setting_t *roo
 	static const char *const effects_keys[] = {"average_ticks", "guard", NULL};
 	static const char *const tool_keys[] = {"side", "axis", NULL};
 	static const char *const device_keys[] = {"delay_ticks", NULL};
-	static const char *const picture_keys[] = {"wound", "bleeding", NULL};
 	const char *path = scene->path;
 	const config_setting_t *group;
 	int rc = read_group(scene, root, "effects", NULL, effects_keys, &group, err);
@@ -192,14 +191,7 @@ static int read_switches(struct incise_scene *scene, const config_setting_t *roo
 	if (!rc && group)
 		rc = incise_conf_integer(group, path, "delay_ticks", 0, 64,
 					 &scene->device.delay_ticks, err);
-	if (!rc)
-		rc = read_group(scene, root, "picture", NULL, picture_keys, &group, err);
-	if (!rc && group)
-		rc = incise_conf_bool(group, path, "wound", &scene->picture.wound, err);
-	if (!rc && group)
-		rc = incise_conf_bool(group, path, "bleeding", &scene->picture.bleeding,
-				      err);
-	return rc;
+	return rc ? rc : incise_scene_read_picture(scene, root, err);
 }
 
 static int read_scene(struct incise_scene *scene, const config_setting_t *root,
@@ -256,6 +248,7 @@ static void set_defaults(struct incise_scene *scene)
 	scene->limits.fade_ms = 20;
 	scene->limits.ramp_ms = 200;
 	scene->limits.start_N = 0.1;
+	incise_scene_picture_defaults(&scene->picture);
 }
 
 struct incise_scene *incise_scene_load(const char *path, const char *model,

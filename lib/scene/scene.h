@@ -42,14 +42,17 @@ struct incise_scene {
 		int delay_ticks; /* or -1: the tracker's */
 	} device;
 	struct incise_scene_limits limits;
-	struct {
-		bool wound, bleeding;
-	} picture;
+	struct incise_scene_picture picture;
 };
 
 /* Read the group `surface`, if it is there; files are relative to the scene's folder. */
 int incise_scene_read_surface(struct incise_scene *scene, const config_setting_t *root,
 			      struct incise_error *err);
+
+/* Read the group `picture`, if it is there. */
+int incise_scene_read_picture(struct incise_scene *scene, const config_setting_t *root,
+			      struct incise_error *err);
+void incise_scene_picture_defaults(struct incise_scene_picture *picture);
 
 /* A name in a scene is relative to the scene's folder. To be freed; NULL: no memory. */
 char *incise_scene_beside(const struct incise_scene *scene, const char *name);

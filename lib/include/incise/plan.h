@@ -87,6 +87,10 @@ INCISE_API size_t incise_plan_memory(const struct incise_plan *plan);
 INCISE_API void incise_plan_top(const struct incise_plan *plan,
 				struct incise_touch *touch);
 
+/** The surface that is felt: the scene's, or the rig's plane; as long as the plan. */
+INCISE_API const struct incise_surface *incise_plan_surface(
+	const struct incise_plan *plan);
+
 /** What is known of a plan's stability before its first tick. */
 struct incise_plan_stability {
 	/** Its delay may be above INCISE_STABILITY_DELAY_MAX where it is the tracker's. */

@@ -63,6 +63,29 @@ struct incise_scene_limits {
 	double start_N;	    /**< no force before one as small as this is asked for */
 };
 
+/** What tissue looks like from above. */
+enum incise_skin {
+	INCISE_SKIN_PLAIN, /**< one colour */
+	INCISE_SKIN_NECK,  /**< pores, creases, veins */
+	INCISE_SKIN_LIVER,
+};
+
+/** The scene's group `picture`; see incise/view.h. */
+struct incise_scene_picture {
+	bool wound;    /**< cuts are drawn */
+	bool bleeding; /**< they bleed */
+	enum incise_skin skin;
+	bool larynx;	   /**< it shows through: seen, not felt */
+	int texture_px;	   /**< side of the texture: 256, 512 … 4096 */
+	double gravity[3]; /**< unit vector: where blood runs, in the tracker's frame */
+	double blood_ul_s_mm2;	/**< for each mm of length and of depth of a fresh cut */
+	double viscosity_mPa_s; /**< of blood */
+	int seed;
+};
+
+INCISE_API void incise_scene_picture(const struct incise_scene *scene,
+				     struct incise_scene_picture *picture);
+
 INCISE_API void incise_scene_limits(const struct incise_scene *scene,
 				    struct incise_scene_limits *limits);
 

@@ -295,7 +295,8 @@ static void test_unknown_keys(void **state)
 		{"limits", "fade_s", "expected fade_ms, in that unit"},
 		{"limits", "ramp_s", "expected ramp_ms, in that unit"},
 		{"limits", "start_mN", "expected start_N, in that unit"},
-		{"picture", "blood", "expected one of wound, bleeding"},
+		{"picture", "colour", "expected one of wound, bleeding"},
+		{"picture", "blood", "expected blood_ul_s_mm2, in that unit"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The group `picture` of a scene: what it says, what it does not say, what it cannot say.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <incise/scene.h>
+
+static char path[] = "/tmp/incise-picture-XXXXXX";
+
+static struct incise_scene *scene(const char *group, struct incise_error *err)
+{
+	FILE *out = fopen(path, "w");
+
+	assert_non_null(out);
+	fprintf(out, "tissue = { reaction_N_mm = 0.1; };\n%s\n", group);
+	fclose(out);
+	return incise_scene_load(path, NULL, err);
+}
+
+static void test_said_and_not_said(void **state)
+{
+	struct incise_scene_picture p;
+	struct incise_scene *s = scene("", NULL);
+
+	assert_non_null(s);
+	incise_scene_picture(s, &p);
+	assert_false(p.wound || p.bleeding || p.larynx);
+	assert_int_equal(p.skin, INCISE_SKIN_PLAIN);
+	assert_int_equal(p.texture_px, 2048);
+	assert_true(p.gravity[0] == 0 && p.gravity[1] == 0 && p.gravity[2] == -1);
+	incise_scene_free(s);
+
+	s = scene(
+		"picture = { wound = true; bleeding = true; larynx = true; skin = \"neck\";\n"
+		"texture_px = 512; gravity = [0.0, 3.0, -4.0]; blood_ul_s_mm2 = 0.5;\n"
+		"viscosity_mPa_s = 12.0; seed = 7; };",
+		NULL);
+	assert_non_null(s);
+	incise_scene_picture(s, &p);
+	assert_true(p.wound && p.bleeding && p.larynx);
+	assert_int_equal(p.skin, INCISE_SKIN_NECK);
+	assert_int_equal(p.texture_px, 512);
+	/* Made unit; 3, 4, 5 to the last digits. */
+	assert_true(fabs(p.gravity[1] - 0.6) < 1e-15 && fabs(p.gravity[2] + 0.8) < 1e-15);
+	assert_true(p.blood_ul_s_mm2 == 0.5 && p.viscosity_mPa_s == 12);
+	assert_int_equal(p.seed, 7);
+	incise_scene_free(s);
+}
+
+static void test_refused(void **state)
+{
+	static const struct {
+		const char *group, *says;
+	} cases[] = {
+		{"picture = { colour = 1; };", "colour"},
+		{"picture = { wound = 1; };", "wound"},
+		{"picture = { skin = \"fish\"; };", "picture.skin: expected \"plain\""},
+		{"picture = { skin = 3; };", "skin"},
+		{"picture = { texture_px = 1000; };", "picture.texture_px: expected 256"},
+		{"picture = { texture_px = 8192; };", "texture_px"},
+		{"picture = { gravity = [0.0, 0.0, 0.0]; };", "gravity"},
+		{"picture = { blood_ul_s_mm2 = -1.0; };", "blood_ul_s_mm2"},
+		{"picture = { viscosity_mPa_s = 0.0; };", "viscosity_mPa_s"},
+		{"picture = { seed = -1; };", "seed"},
+		{"picture = 3;", "picture"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		assert_null(scene(cases[i].group, &err));
+		if (!strstr(err.text, cases[i].says) || !strstr(err.text, ":2"))
+			fail_msg("%s: %s", cases[i].group, err.text);
+	}
+}
+
+static int begin(void **state)
+{
+	int fd = mkstemp(path);
+
+	return fd < 0 ? -1 : close(fd);
+}
+
+static int end(void **state)
+{
+	return unlink(path);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_said_and_not_said),
+		cmocka_unit_test(test_refused),
+	};
+
+	return cmocka_run_group_tests(tests, begin, end);
+}
