@@ -9,6 +9,7 @@
 #include <incise/rig.h>
 #include "../base/c_locale.h"
 #include "../base/conf.h"
+#include "../sim/surgeon.h"
 #include "../sim/sim.h"
 #include "actuator.h"
 #include "rig_plan.h"
@@ -285,6 +286,9 @@ static int plan_word(struct incise_rig_plan *plan, char *word, struct incise_err
 	double number;
 
 	snprintf(where, sizeof(where), "sim:%.60s", word);
+	if (!strcmp(word, "mouse"))
+		return plan_sim_key(&plan->config, where, "motion", INCISE_SURGEON_HAND,
+				    err);
 	if (!value || value == word || !value[1])
 		return incise_error_set(err, EINVAL, "%s: expected KEY=VALUE; correct it",
 					where);

@@ -35,7 +35,7 @@ struct key {
 static const struct key keys[] = {
 	/* What libconfig reads without a suffix; it wraps round beyond that. */
 	KEY(KEY_UINT64, seed, 1, 0, 2147483647.0),
-	KEY(KEY_INT, motion, 0, 0, 2),
+	KEY(KEY_INT, motion, 0, 0, 3),
 	KEY(KEY_DOUBLE, cone_deg, 80, 0, 170),
 	ARRAY(KEY_DOUBLE, depth_mm, 0.1, 40),
 	ARRAY(KEY_INT, times, 1, 1000),

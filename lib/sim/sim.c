@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../base/vector.h"
 #include "sim.h"
 #include "world.h"
 
@@ -97,6 +98,20 @@ void incise_sim_load(struct incise_sim *sim, double load_N)
 {
 	incise_sim_advance(sim);
 	sim->load_N = isfinite(load_N) ? load_N : NAN;
+}
+
+int incise_sim_hold(struct incise_sim *sim, const double position_mm[3],
+		    const double velocity_mm_s[3], const double quaternion[4])
+{
+	double length2 = quaternion[0] * quaternion[0] + quaternion[1] * quaternion[1] +
+			 quaternion[2] * quaternion[2] + quaternion[3] * quaternion[3];
+
+	if (sim->config.motion != INCISE_SURGEON_HAND || !v3_finite(position_mm) ||
+	    !v3_finite(velocity_mm_s) || v3_length(position_mm) > 1e6 ||
+	    v3_length(velocity_mm_s) > 1e6 || !(fabs(length2 - 1) < 1e-6))
+		return -EINVAL;
+	incise_hand_move(&sim->surgeon.hand, position_mm, velocity_mm_s, quaternion);
+	return 0;
 }
 
 void incise_sim_advance(struct incise_sim *sim)

@@ -15,6 +15,7 @@
  * is across the cut and along z only: along x it would hide the slow phases.
  */
 #include <math.h>
+#include "../base/vector.h"
 #include "random.h"
 #include "surgeon.h"
 
@@ -243,6 +244,17 @@ static void blade_pressing(const struct incise_surgeon *surgeon, double t,
 		blade->velocity_mm_s[2] = -half * rate * sin(angle);
 }
 
+static void blade_held(const struct incise_surgeon *surgeon, struct incise_blade *blade)
+{
+	double attitude[4];
+
+	*blade = (struct incise_blade){.cut = -1};
+	incise_hand_look(&surgeon->hand, blade->position_mm, blade->velocity_mm_s,
+			 attitude);
+	blade->speed_mm_s = v3_length(blade->velocity_mm_s);
+	blade->depth_mm = fmax(0, -blade->position_mm[2]);
+}
+
 void incise_surgeon_init(struct incise_surgeon *surgeon,
 			 const struct incise_sim_config *config)
 {
@@ -252,6 +264,7 @@ void incise_surgeon_init(struct incise_surgeon *surgeon,
 		.cut_ns = llround(config->cut_s * INCISE_NS_PER_S),
 		.pause_ns = llround(config->pause_s * INCISE_NS_PER_S),
 	};
+	incise_hand_init(&surgeon->hand);
 	for (int i = 0; i < config->n_depths; i++)
 		surgeon->cuts += config->times[i];
 	for (int i = 0; i < 2; i++)
@@ -274,6 +287,10 @@ void incise_surgeon_blade(const struct incise_surgeon *surgeon, int64_t t_ns,
 
 	if (surgeon->config->motion == INCISE_SURGEON_TURNS) {
 		blade_turning(blade);
+		return;
+	}
+	if (surgeon->config->motion == INCISE_SURGEON_HAND) {
+		blade_held(surgeon, blade);
 		return;
 	}
 	if (surgeon->config->motion == INCISE_SURGEON_PRESSES) {
@@ -313,6 +330,12 @@ void incise_surgeon_grip(const struct incise_surgeon *surgeon, int64_t t_ns,
 	double yaw = 0.02 * sin(2 * M_PI * 0.17 * t);
 	double angle, scale;
 
+	if (surgeon->config->motion == INCISE_SURGEON_HAND) {
+		double position_mm[3], velocity_mm_s[3];
+
+		incise_hand_look(&surgeon->hand, position_mm, velocity_mm_s, quaternion);
+		return;
+	}
 	if (surgeon->config->motion == INCISE_SURGEON_TURNS) {
 		/* it leans all ways in turns, and turns about itself a little */
 		double half = surgeon->config->cone_deg * M_PI / 360;

@@ -7,12 +7,14 @@
 #define INCISE_SIM_SURGEON_H
 
 #include <incise/sim.h>
+#include "hand.h"
 
 /* Values of the key `motion`. */
 enum incise_surgeon_motion {
 	INCISE_SURGEON_CUTS,
 	INCISE_SURGEON_TURNS,
 	INCISE_SURGEON_PRESSES,
+	INCISE_SURGEON_HAND,
 };
 
 struct incise_surgeon {
@@ -21,6 +23,7 @@ struct incise_surgeon {
 	int cuts;
 	int64_t cut_ns, pause_ns;
 	double tremor_phase[2];
+	struct incise_hand hand; /* with that motion */
 };
 
 /* The blade at one time. */

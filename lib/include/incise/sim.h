@@ -29,7 +29,8 @@ struct incise_sim_config {
 
 	/* What the surgeon does, for as long as the cuts would take: 0 cuts; 1 turns the
 	 * tool about its tip, which rests at the start of the cuts; 2 presses on the tissue
-	 * over and over, without cutting it: then it has no teeth. */
+	 * over and over, without cutting it: then it has no teeth; 3 is where
+	 * incise_sim_hold() says. */
 	int motion;	 /**< 0 */
 	double cone_deg; /**< 80; that the tool sweeps when it is turned, 0 … 170 */
 
@@ -133,6 +134,17 @@ INCISE_API void incise_sim_truth(struct incise_sim *sim, struct incise_sim_truth
  * nobody else can on a virtual rig. 0 is the empty pan; NAN gives it the blade back.
  */
 INCISE_API void incise_sim_load(struct incise_sim *sim, double load_N);
+
+/**
+ * Hold the scalpel there from now on, with motion 3: what moves it is a mouse, or a script.
+ * From one thread, beside the one that reads the devices; real-time safe.
+ *
+ * @param position_mm   of the tip; @param velocity_mm_s how it moves
+ * @param quaternion    unit, w first
+ * @return 0, -EINVAL (another motion, or not finite, or more than 1e6 mm)
+ */
+INCISE_API int incise_sim_hold(struct incise_sim *sim, const double position_mm[3],
+			       const double velocity_mm_s[3], const double quaternion[4]);
 
 /** Force without saw-tooth and boundary effect: what a model can at best learn. */
 INCISE_API double incise_sim_mean_force(const struct incise_sim_config *config,
