@@ -66,6 +66,7 @@ libs_incise-learn := -lm
 libs_incise-record := -lm -ldl -pthread
 libs_incise-view := -lm
 also_incise := lib/record/crc32c.o
+also_incise-view := lib/device/module.o
 also_incise-record := lib/base/ring.o lib/device/module.o lib/device/thread.o \
 	lib/tissue/predict.o
 about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop

@@ -124,6 +124,12 @@ pc_frames_mkv := libavformat libavcodec libavutil
 objects_frames_mkv := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/frames/*.c))
 $(objects_frames_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
 
+# Films of pictures; lib/view loads it.
+device_modules += $(if $(has_view),$(if $(has_frames),film_mkv))
+pc_film_mkv := $(pc_frames_mkv)
+objects_film_mkv := $(O)/obj/lib/film/film_mkv.o
+$(objects_film_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_film_mkv))
+
 # What writes HDF5; libincise-record loads it.
 has_hdf5 := $(shell $(PKG_CONFIG) --exists hdf5 zlib && echo yes)
 device_modules += $(if $(has_hdf5),export_hdf5)

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A film: the module that codes it, and its file's name; see incise/film.h.
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "../device/module.h"
+#include "film.h"
+
+#define FILE_NAME "film_mkv.so"
+
+struct incise_film {
+	const struct incise_film_module *module;
+	struct incise_film_coder *coder;
+	char *path, *part;
+	uint64_t pictures;
+	int failed;
+};
+
+/* It stays, as the one in lib/record/frames.c does. */
+static const struct incise_film_module *load(struct incise_error *err)
+{
+	const struct incise_film_module *film;
+	struct incise_module module;
+
+	if (incise_module_find(&module, FILE_NAME, INCISE_FILM_SYMBOL, "film",
+			       "libavformat-dev and libavcodec-dev are", err))
+		return NULL;
+	film = module.symbol;
+	if (film->abi == INCISE_FILM_ABI)
+		return film;
+	errno = -incise_module_refuse(&module, FILE_NAME, "film", err);
+	return NULL;
+}
+
+static void forget(struct incise_film *film)
+{
+	free(film->path);
+	free(film->part);
+	free(film);
+}
+
+struct incise_film *incise_film_new(const char *path, int width, int height, int rate_hz,
+				    struct incise_error *err)
+{
+	struct incise_film *film;
+
+	if (width < 16 || height < 16 || width > INCISE_FILM_SIDE_MAX ||
+	    height > INCISE_FILM_SIDE_MAX || width % 2 || height % 2 || rate_hz < 1 ||
+	    rate_hz > 1000) {
+		incise_error_set(
+			err, EINVAL,
+			"%.300s: a film of %d x %d at %d Hz: expected even sides "
+			"from 16 to %d and 1 to 1000 Hz",
+			path, width, height, rate_hz, INCISE_FILM_SIDE_MAX);
+		errno = EINVAL;
+		return NULL;
+	}
+	film = calloc(1, sizeof(*film));
+	if (film)
+		film->path = strdup(path);
+	if (!film || !film->path || asprintf(&film->part, "%s.part", path) < 0) {
+		if (film)
+			film->part = NULL;
+		incise_error_set(err, ENOMEM, "no memory for a film");
+		errno = ENOMEM;
+		goto fail;
+	}
+	film->module = load(err);
+	if (film->module)
+		film->coder = film->module->open(film->part, width, height, rate_hz, err);
+	if (film->coder)
+		return film;
+fail:
+	if (film) {
+		int code = errno;
+
+		forget(film);
+		errno = code;
+	}
+	return NULL;
+}
+
+int incise_film_add(struct incise_film *film, const uint8_t *rgb,
+		    struct incise_error *err)
+{
+	if (film->failed)
+		return incise_error_set(err, -film->failed,
+					"%s: the film has ended with an error",
+					film->path);
+	film->failed = film->module->add(film->coder, rgb, err);
+	film->pictures += !film->failed;
+	return film->failed;
+}
+
+int incise_film_close(struct incise_film *film, struct incise_error *err)
+{
+	int rc;
+
+	if (!film)
+		return 0;
+	rc = film->module->close(film->coder, err);
+	if (!rc && film->failed)
+		rc = incise_error_set(err, -film->failed,
+				      "%s: the film has ended with an error", film->path);
+	if (!rc && film->pictures && rename(film->part, film->path))
+		rc = incise_error_set(err, errno, "%s: %s", film->path, strerror(errno));
+	if (rc || !film->pictures)
+		unlink(film->part);
+	forget(film);
+	return rc;
+}
+
+void incise_film_drop(struct incise_film *film)
+{
+	if (!film)
+		return;
+	film->module->close(film->coder, NULL);
+	unlink(film->part);
+	forget(film);
+}

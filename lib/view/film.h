@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * What a module for films exports, as the symbol `incise_film_module`.
+ */
+#ifndef INCISE_VIEW_FILM_H
+#define INCISE_VIEW_FILM_H
+
+#include <incise/film.h>
+
+#define INCISE_FILM_ABI 1
+#define INCISE_FILM_SYMBOL "incise_film_module"
+
+struct incise_film_coder;
+
+struct incise_film_module {
+	int abi;
+	/* As in incise/film.h, of the file at that very path. */
+	struct incise_film_coder *(*open)(const char *path, int width, int height,
+					  int rate_hz, struct incise_error *err);
+	int (*add)(struct incise_film_coder *coder, const uint8_t *rgb,
+		   struct incise_error *err);
+	/* Frees it. */
+	int (*close)(struct incise_film_coder *coder, struct incise_error *err);
+};
+
+#endif
