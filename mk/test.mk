@@ -5,8 +5,8 @@
 unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_netlink.c) \
 	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \
 	$(if $(has_libusb),,%/polhemus_usb.c %/polhemus_usb_find.c) \
-	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/frames/%) \
-	$(if $(has_hdf5),,tests/unit/hdf5/%),\
+	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/frames/% tests/unit/film/%) \
+	$(if $(has_hdf5),,tests/unit/hdf5/%) $(if $(has_view),,tests/unit/view/%),\
 	$(wildcard tests/unit/*/*.c))
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
@@ -44,8 +44,12 @@ $(filter $(O)/tests/unit/vision/%,$(unit_programs)): $(vision_linked)
 
 # What of pictures in a file is in a module is linked to its own tests.
 libs_frames_tests = $(shell $(PKG_CONFIG) --libs $(pc_frames_mkv))
-$(filter $(O)/tests/unit/frames/%,$(unit_programs)): private CPPFLAGS += \
+$(filter $(O)/tests/unit/frames/% $(O)/tests/unit/film/%,$(unit_programs)): private CPPFLAGS += \
 	$(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
+
+# They read pictures by cairo, and play SDL's part.
+$(filter $(O)/tests/unit/view/%,$(unit_programs)): private CPPFLAGS += \
+	$(shell $(PKG_CONFIG) --cflags $(pc_incise-view))
 
 # The module of HDF5 is linked to its own tests, which read with the library itself.
 $(filter $(O)/tests/unit/hdf5/%,$(unit_programs)): $(objects_export_hdf5)
@@ -64,7 +68,7 @@ $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(if $(filter vision/%,$*),$(vision_linked)) \
 		$(if $(filter hdf5/%,$*),$(objects_export_hdf5) $(shell $(PKG_CONFIG) --libs $(pc_export_hdf5))) \
 		$(O)/lib/libincise-tests.a $(if $(filter vision/%,$*),$(libs_vision_opencv)) \
-		$(if $(filter frames/%,$*),$(libs_frames_tests)) \
+		$(if $(filter frames/% film/%,$*),$(libs_frames_tests)) \
 		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm
 
 check: ## install what is missing, build, and run all tests

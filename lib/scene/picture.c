@@ -34,6 +34,12 @@ static int read_skin(struct incise_scene *scene, const config_setting_t *group,
 	return refuse(scene, group, "skin", "\"plain\", \"neck\" or \"liver\"", err);
 }
 
+static bool is_side(int texture_px)
+{
+	return texture_px >= 256 && texture_px <= 4096 &&
+	       !(texture_px & (texture_px - 1));
+}
+
 static int read_switches(struct incise_scene *scene, const config_setting_t *group,
 			 struct incise_error *err)
 {
@@ -66,7 +72,7 @@ static int read_numbers(struct incise_scene *scene, const config_setting_t *grou
 	if (!rc)
 		rc = incise_conf_integer(group, path, "texture_px", 256, 4096,
 					 &to->texture_px, err);
-	if (!rc && (to->texture_px & (to->texture_px - 1)))
+	if (!rc && !is_side(to->texture_px))
 		rc = refuse(scene, group, "texture_px", "256, 512, 1024, 2048 or 4096",
 			    err);
 	return rc;
@@ -105,4 +111,12 @@ void incise_scene_picture(const struct incise_scene *scene,
 			  struct incise_scene_picture *picture)
 {
 	*picture = scene->picture;
+}
+
+int incise_scene_set_texture(struct incise_scene *scene, int texture_px)
+{
+	if (!is_side(texture_px))
+		return -EINVAL;
+	scene->picture.texture_px = texture_px;
+	return 0;
 }

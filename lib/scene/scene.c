@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../base/conf.h"
+#include "../base/vector.h"
 #include "scene.h"
 
 #define KEYS_MAX 12
@@ -307,10 +308,23 @@ void incise_scene_free(struct incise_scene *scene)
 	free(scene);
 }
 
+double incise_scene_handle_mm(const struct incise_scene *scene)
+{
+	return scene->tool.handle_mm;
+}
+
 void incise_scene_limits(const struct incise_scene *scene,
 			 struct incise_scene_limits *limits)
 {
 	*limits = scene->limits;
+}
+
+void incise_scene_scalpel(const struct incise_scene *scene,
+			  struct incise_scene_scalpel *scalpel)
+{
+	v3_copy(scalpel->axis, scene->tool.axis);
+	v3_copy(scalpel->side, scene->tool.side);
+	scalpel->handle_mm = scene->tool.handle_mm;
 }
 
 double incise_scene_rate_hz(const struct incise_scene *scene)

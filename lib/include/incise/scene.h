@@ -44,6 +44,14 @@ INCISE_API int incise_scene_set_arithmetic(struct incise_scene *scene, const cha
 					   struct incise_error *err);
 
 /**
+ * Use a texture of another size than the file's for the picture.
+ *
+ * @param texture_px 256, 512, 1024, 2048 or 4096
+ * @return 0, -EINVAL
+ */
+INCISE_API int incise_scene_set_texture(struct incise_scene *scene, int texture_px);
+
+/**
  * Keep every stage in the plan, with what the scene does not ask for set neutral: to
  * measure what leaving out saves. The forces are the same, to the bit.
  */
@@ -62,6 +70,9 @@ struct incise_scene_limits {
 	double ramp_ms;	    /**< … and comes back in this */
 	double start_N;	    /**< no force before one as small as this is asked for */
 };
+
+/** From the blade's tip to the other end of the scalpel, mm. */
+INCISE_API double incise_scene_handle_mm(const struct incise_scene *scene);
 
 /** What tissue looks like from above. */
 enum incise_skin {
@@ -85,6 +96,16 @@ struct incise_scene_picture {
 
 INCISE_API void incise_scene_picture(const struct incise_scene *scene,
 				     struct incise_scene_picture *picture);
+
+/** The scene's group `tool`: the scalpel, in its own frame, which poses turn. */
+struct incise_scene_scalpel {
+	double axis[3];	  /**< unit, from the tip to the handle's end */
+	double side[3];	  /**< unit, normal of the flat side of blade and handle */
+	double handle_mm; /**< the handle's end from the tip */
+};
+
+INCISE_API void incise_scene_scalpel(const struct incise_scene *scene,
+				     struct incise_scene_scalpel *scalpel);
 
 INCISE_API void incise_scene_limits(const struct incise_scene *scene,
 				    struct incise_scene_limits *limits);

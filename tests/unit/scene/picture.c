@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <setjmp.h>
 #include <cmocka.h>
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -83,6 +84,27 @@ static void test_refused(void **state)
 	}
 }
 
+static void test_texture_is_set(void **state)
+{
+	static const struct {
+		int px, rc;
+	} cases[] = {{256, 0},	      {4096, 0},       {2048, 0},    {128, -EINVAL},
+		     {8192, -EINVAL}, {1000, -EINVAL}, {0, -EINVAL}, {-512, -EINVAL}};
+	struct incise_error err = {0};
+	struct incise_scene *s = scene("picture = { texture_px = 512; };", &err);
+	struct incise_scene_picture p;
+	int now = 512;
+
+	assert_non_null(s);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		assert_int_equal(incise_scene_set_texture(s, cases[i].px), cases[i].rc);
+		now = cases[i].rc ? now : cases[i].px;
+		incise_scene_picture(s, &p);
+		assert_int_equal(p.texture_px, now);
+	}
+	incise_scene_free(s);
+}
+
 static int begin(void **state)
 {
 	int fd = mkstemp(path);
@@ -100,6 +122,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_said_and_not_said),
 		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_texture_is_set),
 	};
 
 	return cmocka_run_group_tests(tests, begin, end);

@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The map between a scene's surface and its texture, and the triangles that are drawn.
+ *
+ *         px[0] ──►  size                     right (tangent)
+ *       ┌──────────────┐               ────►
+ * px[1] │ texel (0, 0) │             ▲ normal, towards who looks
+ *   │   │ has its      │          down = right × normal
+ *   ▼   │ centre at .5 │
+ *       └──────────────┘  seen from outside the picture is not mirrored
+ *
+ * The middle of the texture is the surface's top, but where the surface ends sooner than the
+ * texture would. By the kind of surface:
+ *   capsule    its wall unrolled: x along the axis (from a to b), y around it, at most
+ *              160 mm along and ±80° around; on the round ends arcs go on as meridians
+ *   mesh with texture coordinates   its own triangles; u = px[0] / size, v = 1 - px[1] / size
+ *   all others, and a capsule that stands   seen straight from above the top, at most
+ *              120 × 120 mm
+ * Lengths in mm, in the tracker's frame; texels as doubles. A chart does not change once
+ * made and may be read by several threads. It keeps the surface, which has to live longer.
+ */
+#ifndef INCISE_CHART_H
+#define INCISE_CHART_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <incise/scene.h>
+#include <incise/surface.h>
+
+/* What stands above what is felt is no higher than this. */
+#define CHART_RELIEF_MAX_MM 5.0
+
+struct incise_chart_vertex {
+	float position_mm[3]; /* as drawn, with the relief */
+	float normal[3];      /* unit, of what is drawn */
+	float tangent[4]; /* unit, towards +px[0]; [3] (normal × tangent) is +px[1] */
+	float px[2];	  /* texels */
+};
+
+/* Triangles of a mesh in texture space, to find the one that a texel is in. */
+struct chart_atlas;
+
+struct incise_chart {
+	int size; /* of the texture, texels */
+	int n_vertices, n_indices;
+	struct incise_chart_vertex *vertices;
+	uint32_t *indices; /* triangles, counter-clockwise seen from outside */
+
+	/* The rest is the chart's own. */
+	const struct incise_surface *surface;
+	enum { CHART_FROM_ABOVE, CHART_UNROLLED, CHART_ATLAS } kind;
+	bool larynx;
+	double wide_mm, high_mm; /* of the whole texture */
+	double top_mm[2];	 /* the surface's top, from the texture's middle */
+	/* From above: the texture's middle; unrolled: where the axis begins; the frame. */
+	double origin[3], right[3], down[3], up[3];
+	double above_mm, below_mm; /* the surface lies between, from the origin */
+	double radius_mm, axis_mm, middle_mm; /* unrolled; the texture's middle along */
+	struct chart_atlas *atlas;
+};
+
+/*
+ * About 20 000 triangles; of a mesh with texture coordinates its own. NULL with errno:
+ * ENOMEM, EINVAL (texture_px is no power of 2 from 16 to 16384).
+ */
+struct incise_chart *incise_chart_new(const struct incise_surface *surface,
+				      const struct incise_scene_picture *picture,
+				      struct incise_error *err);
+void incise_chart_free(struct incise_chart *chart);
+
+/* Of a point on the surface, or near it; false: outside of the texture, or not finite. */
+bool incise_chart_px(const struct incise_chart *chart, const double point_mm[3],
+		     double px[2]);
+
+/*
+ * The point of the surface, as it is felt, and its outward unit normal; false: there is no
+ * surface at that place of the texture, and nothing is written.
+ */
+bool incise_chart_point(const struct incise_chart *chart, const double px[2],
+			double point_mm[3], double normal[3]);
+
+/*
+ * By how much the surface's point moves when px does by one texel. Where there is no
+ * surface: of the nearest texel of the texture's border, or as on flat ground.
+ */
+void incise_chart_metric(const struct incise_chart *chart, const double px[2],
+			 double right_mm[3], double down_mm[3]);
+
+/*
+ * By how much what is seen stands above what is felt, along the normal: 0 to
+ * CHART_RELIEF_MAX_MM, 0 without a larynx. The head is towards -px[0], the membrane that a
+ * cricothyroidotomy cuts on the surface's top. A mesh with texture coordinates is drawn as
+ * it is.
+ */
+double incise_chart_relief_mm(const struct incise_chart *chart, const double px[2]);
+
+#endif

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Smooth noise over a texture.
+ */
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include "noise.h"
+
+/* 1 over the standard deviation of uniform numbers in ±1 after cubic B-splines both ways. */
+#define NORMALIZE 3.61F
+
+struct noise {
+	float fade;
+	int size, columns, rows;
+	double cell_y;
+	float *lattice; /* rows × columns */
+	float *blend;	/* of four rows of the lattice */
+	int *column;	/* of each texel's column: the first of its four */
+	float (*weight)[4];
+};
+
+/* The finisher of splitmix64 (Steele, Lea, Flood 2014). */
+static uint64_t mix(uint64_t x)
+{
+	x = (x ^ x >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+	x = (x ^ x >> 27) * UINT64_C(0x94d049bb133111eb);
+	return x ^ x >> 31;
+}
+
+float noise_at(uint64_t seed, int x, int y)
+{
+	uint64_t place = (uint64_t)(uint32_t)x << 32 | (uint32_t)y;
+
+	seed = mix(seed + UINT64_C(0x9e3779b97f4a7c15));
+	return (float)(mix(place + seed) >> 40) * 0x1p-24F;
+}
+
+static void spline(float t, float weight[4])
+{
+	float u = 1 - t;
+
+	weight[0] = u * u * u / 6;
+	weight[1] = (3 * t * t * t - 6 * t * t + 4) / 6;
+	weight[2] = (3 * u * u * u - 6 * u * u + 4) / 6;
+	weight[3] = t * t * t / 6;
+}
+
+struct noise *noise_new(uint64_t seed, int size, double cell_x, double cell_y)
+{
+	struct noise *noise = calloc(1, sizeof(*noise));
+	double cell = fmin(cell_x, cell_y);
+	size_t n;
+
+	if (!noise)
+		return NULL;
+	/* A cell that is not a number has no noise either. */
+	noise->fade = (float)fmin(fmax((cell - 1.5) / 1.5, 0), 1);
+	if (noise->fade <= 0)
+		return noise;
+	noise->size = size;
+	noise->cell_y = cell_y;
+	noise->columns = (int)(size / cell_x) + 4;
+	noise->rows = (int)(size / cell_y) + 4;
+	n = (size_t)noise->columns * (size_t)noise->rows;
+	noise->lattice = calloc(n, sizeof(*noise->lattice));
+	noise->blend = calloc((size_t)noise->columns, sizeof(*noise->blend));
+	noise->column = calloc((size_t)size, sizeof(*noise->column));
+	noise->weight = calloc((size_t)size, sizeof(*noise->weight));
+	if (!noise->lattice || !noise->blend || !noise->column || !noise->weight) {
+		noise_free(noise);
+		return NULL;
+	}
+	for (size_t i = 0; i < n; i++)
+		noise->lattice[i] = noise->fade * NORMALIZE *
+				    (2 * noise_at(seed, (int)i % noise->columns,
+						  (int)i / noise->columns) -
+				     1);
+	for (int x = 0; x < size; x++) {
+		double at = (x + 0.5) / cell_x;
+
+		noise->column[x] = (int)at;
+		spline((float)(at - (int)at), noise->weight[x]);
+	}
+	return noise;
+}
+
+void noise_free(struct noise *noise)
+{
+	if (!noise)
+		return;
+	free(noise->lattice);
+	free(noise->blend);
+	free(noise->column);
+	free(noise->weight);
+	free(noise);
+}
+
+void noise_row(struct noise *noise, int y, float gain, float *restrict row)
+{
+	double at;
+	const float *from;
+	float weight[4];
+
+	if (noise->fade <= 0)
+		return;
+	at = (y + 0.5) / noise->cell_y;
+	from = noise->lattice + (size_t)(int)at * (size_t)noise->columns;
+	spline((float)(at - (int)at), weight);
+	for (int i = 0; i < noise->columns; i++)
+		noise->blend[i] = gain * (weight[0] * from[i] +
+					  weight[1] * from[i + noise->columns] +
+					  weight[2] * from[i + 2 * noise->columns] +
+					  weight[3] * from[i + 3 * noise->columns]);
+	for (int x = 0; x < noise->size; x++) {
+		const float *b = noise->blend + noise->column[x], *w = noise->weight[x];
+
+		row[x] += w[0] * b[0] + w[1] * b[1] + w[2] * b[2] + w[3] * b[3];
+	}
+}

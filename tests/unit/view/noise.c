@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Noise, held against the sum over its lattice by the closed form of the B-spline.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include "../../../lib/view/noise.h"
+
+#define SIZE 256
+
+static double spline(double x)
+{
+	x = fabs(x);
+	if (x >= 2)
+		return 0;
+	if (x >= 1)
+		return pow(2 - x, 3) / 6;
+	return (3 * x * x * x - 6 * x * x + 4) / 6;
+}
+
+static void test_is_a_spline(void **state)
+{
+	static const double cells[][2] = {{3, 3}, {7.3, 4.1}, {40, 90}, {1000, 333}};
+	float row[SIZE];
+
+	for (size_t k = 0; k < sizeof(cells) / sizeof(*cells); k++) {
+		const double *cell = cells[k];
+		struct noise *noise = noise_new(9, SIZE, cell[0], cell[1]);
+
+		assert_non_null(noise);
+		for (int y = 0; y < SIZE; y += 51) {
+			for (int x = 0; x < SIZE; x++)
+				row[x] = 1;
+			noise_row(noise, y, 0.5F, row);
+			for (int x = 0; x < SIZE; x++) {
+				double u = (x + 0.5) / cell[0] + 1;
+				double v = (y + 0.5) / cell[1] + 1, sum = 0;
+
+				for (int j = (int)v - 1; j <= (int)v + 2; j++)
+					for (int i = (int)u - 1; i <= (int)u + 2; i++)
+						sum += spline(u - i) * spline(v - j) *
+						       (2 * (double)noise_at(9, i, j) -
+							1);
+				/* Floats of up to 4; deviation 1 is 3.61 times as much. */
+				assert_true(fabs(row[x] - 1 - 0.5 * 3.61 * sum) < 1e-5);
+			}
+		}
+		noise_free(noise);
+	}
+	noise_free(NULL);
+}
+
+static void test_mean_and_deviation(void **state)
+{
+	struct noise *noise = noise_new(4, SIZE, 4, 4);
+	double sum = 0, square = 0;
+
+	for (int y = 0; y < SIZE; y++) {
+		float row[SIZE] = {0};
+
+		noise_row(noise, y, 1, row);
+		for (int x = 0; x < SIZE; x++) {
+			sum += row[x];
+			square += (double)row[x] * row[x];
+			assert_true(fabsf(row[x]) < 4);
+		}
+	}
+	/* Of 4096 cells: 1/64 each, times 3; neighbours are alike, which widens it. */
+	assert_true(fabs(sum) / (SIZE * SIZE) < 0.1);
+	assert_true(fabs(sqrt(square / (SIZE * SIZE)) - 1) < 0.1);
+	noise_free(noise);
+}
+
+/* What is finer than texels fades, and what is no size is nothing. */
+static void test_fades(void **state)
+{
+	static const struct {
+		double cell;
+		float share;
+	} cases[] = {{0, 0},	   {-5, 0}, {1.5, 0},	{NAN, 0},
+		     {2.25, 0.5F}, {3, 1},  {1e300, 1}, {INFINITY, 1}};
+
+	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
+		struct noise *noise = noise_new(4, SIZE, cases[k].cell, cases[k].cell);
+		double most = 0;
+
+		assert_non_null(noise);
+		for (int y = 0; y < SIZE; y++) {
+			float row[SIZE] = {0};
+
+			noise_row(noise, y, 1, row);
+			for (int x = 0; x < SIZE; x++)
+				most = fmax(most, fabsf(row[x]));
+		}
+		if (cases[k].share == 0)
+			assert_true(most == 0);
+		else
+			assert_true(most > 0 && most < 4 * cases[k].share);
+		noise_free(noise);
+	}
+}
+
+/* Numbers of places that are neighbours, or of seeds, have nothing in common. */
+static void test_places(void **state)
+{
+	double sum = 0, product[3] = {0};
+
+	for (int y = -50; y < 50; y++)
+		for (int x = -50; x < 50; x++) {
+			double here = noise_at(7, x, y) - 0.5;
+
+			assert_true(here >= -0.5 && here < 0.5);
+			sum += here;
+			product[0] += here * (noise_at(7, x + 1, y) - 0.5);
+			product[1] += here * (noise_at(7, x, y + 1) - 0.5);
+			product[2] += here * (noise_at(8, x, y) - 0.5);
+		}
+	/* Deviations of 10 000: of the mean 0.29 / 100, of a product 0.083 / 100; times 4. */
+	assert_true(fabs(sum / 1e4) < 0.012);
+	for (int k = 0; k < 3; k++)
+		assert_true(fabs(product[k] / 1e4) < 0.0034);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_is_a_spline),
+		cmocka_unit_test(test_mean_and_deviation),
+		cmocka_unit_test(test_fades),
+		cmocka_unit_test(test_places),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
