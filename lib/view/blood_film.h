@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The film of blood on the surface: what drops leave, and what wets the wound. Each texel
+ * has a volume and says how dry it is.
+ *
+ * Volumes are whole units of BLOOD_UNIT_UL, so that none is lost or made by rounding:
+ * whatever is taken from one place is put to another.
+ *
+ * A film thins as it drains (Nusselt: on a slope of sine s a film of thickness h moves at
+ * rho g h² s / (3 mu) on average), into what is wet already: its edge on dry skin is pinned.
+ * As it dries and clots mu grows, until it stands.
+ *
+ * Tiles without blood cost nothing; tiles in which nothing moves or dries any more sleep.
+ */
+#ifndef INCISE_VIEW_BLOOD_FILM_H
+#define INCISE_VIEW_BLOOD_FILM_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <incise/scene.h>
+#include "canvas.h"
+#include "chart.h"
+#include "ground.h"
+
+#define BLOOD_UNIT_UL 1e-7
+#define FILM_TEXELS (CANVAS_TILE * CANVAS_TILE)
+#define FILM_DRY 255
+#define FILM_CLOT 110	   /* so dry, it stands */
+#define FILM_ROUND_STEPS 8 /* see blood_drain.c */
+
+/* Edges of drops and films follow the skin's roughness: over this length, by that part. */
+#define FILM_ROUGH_KEY 0x736b696e
+#define FILM_ROUGH_MM 0.8f
+#define FILM_ROUGH 0.28f
+
+/* No spot is wider, texels. */
+#define FILM_SPOT_PX 320
+
+/* What a tile's middle says of its texels. */
+struct film_tile {
+	bool known, there; /* the chart was asked; there is a surface */
+	bool awake;	   /* something flows or dries */
+	uint8_t period;	   /* rounds between two visits: fewer where less flows */
+	uint32_t last;	   /* round of the last one */
+	float area_mm2, texel_mm, slope;
+	float down_px[2]; /* unit, texels; 0 where level */
+};
+
+struct film {
+	const struct incise_chart *chart;
+	double gravity[3];
+	double drain; /* rho g / (3 mu), 1/(mm s) */
+	int size, tiles;
+	uint32_t *volume; /* units, tile after tile */
+	uint8_t *dry;	  /* 0 … FILM_DRY, the same */
+	struct film_tile *tile;
+	uint8_t *dirty; /* tiles², to be painted */
+	int n_dirty;
+	uint64_t step;
+	int next;		  /* tile to begin with */
+	float *height;		  /* of a spot: room for FILM_SPOT_PX² */
+	int64_t units, off_units; /* all that is here; all that ran off the texture */
+};
+
+bool film_init(struct film *film, const struct incise_chart *chart,
+	       const struct incise_scene_picture *picture);
+void film_free(struct film *film);
+size_t film_memory(const struct film *film);
+
+/* What the tile at a texel says; never NULL for one of the texture. */
+const struct film_tile *film_tile(struct film *film, int x, int y);
+
+/* Thickness, mm; 0 outside of the texture. */
+double film_thickness_mm(struct film *film, double x, double y);
+
+/*
+ * Bring a round spot nearer to a thickness, highest in its middle: by the part @share of what
+ * is missing, or of what is too much and still wet. Returns by how many units it is more
+ * than before (less: below 0); it gets no more than @most.
+ */
+int64_t film_level(struct film *film, const double px[2], double radius_mm,
+		   double thickness_mm, double share, int64_t most);
+
+/* Put all of a volume into a round spot. */
+void film_add(struct film *film, const double px[2], double radius_mm, int64_t units);
+
+/* 10 ms: some of the tiles drain and dry. */
+void film_step(struct film *film);
+
+/* For what drains. */
+static inline bool film_inside(const struct film *film, int x, int y)
+{
+	return x >= 0 && y >= 0 && x < film->size && y < film->size;
+}
+
+/* Of a texel of the texture. */
+static inline size_t film_index(const struct film *film, int x, int y)
+{
+	return ((size_t)(y / CANVAS_TILE) * film->tiles + x / CANVAS_TILE) * FILM_TEXELS +
+	       y % CANVAS_TILE * CANVAS_TILE + x % CANVAS_TILE;
+}
+
+/* Fresh blood on old wets it again. */
+void film_put(struct film *film, size_t at, uint32_t units);
+
+/* Which round of visits it is. */
+uint32_t film_round(const struct film *film);
+
+/* Something changed at a texel: its tile is to be painted and visited. */
+struct film_tile *film_wake(struct film *film, int x, int y);
+
+/* Texels are to be painted; the last ones too. */
+void film_mark(struct film *film, int left, int top, int right, int bottom);
+
+#endif

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The texture that is drawn; see canvas.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+#include "canvas.h"
+
+#define LEVELS_MAX 15
+/* From this level on a tile is one texel or less: they are done once for all rectangles. */
+#define LEVEL_SMALL 5
+/* The sum of four 16-bit linear values, to 14 bits: finer than a step of 8-bit sRGB. */
+#define SUM_SHIFT 4
+#define SUM_STEPS (1 << 14)
+
+struct incise_canvas {
+	int size, levels, tiles; /* tiles along a side */
+	const uint8_t *base;
+	int n_layers;
+	uint8_t *layer[CANVAS_LAYERS_MAX];
+	uint8_t *level[LEVELS_MAX];
+	uint8_t *dirty; /* tiles² */
+	int n_dirty;
+	uint16_t linear[256];	 /* of an sRGB value, 65535 is white */
+	uint8_t srgb[SUM_STEPS]; /* of the sum of four of them >> SUM_SHIFT */
+};
+
+static void make_tables(struct incise_canvas *canvas)
+{
+	for (int i = 0; i < 256; i++) {
+		double v = i / 255.0;
+
+		v = v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4);
+		canvas->linear[i] = (uint16_t)(v * 65535 + 0.5);
+	}
+	for (int i = 0; i < SUM_STEPS; i++) {
+		double v = (i + 0.5) / SUM_STEPS;
+
+		v = v <= 0.0031308 ? v * 12.92 : 1.055 * pow(v, 1 / 2.4) - 0.055;
+		canvas->srgb[i] = (uint8_t)(v * 255 + 0.5);
+	}
+}
+
+struct incise_canvas *incise_canvas_new(int size, const uint8_t *base_rgba,
+					struct incise_error *err)
+{
+	struct incise_canvas *canvas;
+	bool there = true;
+
+	if (size < CANVAS_TILE || size > 16384 || (size & (size - 1)) || !base_rgba) {
+		incise_error_set(err, EINVAL,
+				 "canvas: a side of %d texels: expected a power of 2, "
+				 "32 … 16384",
+				 size);
+		return NULL;
+	}
+	canvas = calloc(1, sizeof(*canvas));
+	if (!canvas)
+		goto no_memory;
+	canvas->size = size;
+	canvas->base = base_rgba;
+	canvas->tiles = size / CANVAS_TILE;
+	canvas->dirty = malloc((size_t)canvas->tiles * canvas->tiles);
+	for (int side = size; side; side >>= 1) {
+		uint8_t *level = malloc((size_t)side * side * 4);
+
+		canvas->level[canvas->levels++] = level;
+		there = there && level;
+	}
+	if (!canvas->dirty || !there)
+		goto no_memory;
+	make_tables(canvas);
+	canvas->n_dirty = canvas->tiles * canvas->tiles;
+	memset(canvas->dirty, 1, canvas->n_dirty);
+	return canvas;
+
+no_memory:
+	incise_canvas_free(canvas);
+	incise_error_set(err, ENOMEM, "canvas: no memory for %d × %d texels", size, size);
+	return NULL;
+}
+
+void incise_canvas_free(struct incise_canvas *canvas)
+{
+	if (!canvas)
+		return;
+	for (int i = 0; i < canvas->n_layers; i++)
+		free(canvas->layer[i]);
+	for (int i = 0; i < canvas->levels; i++)
+		free(canvas->level[i]);
+	free(canvas->dirty);
+	free(canvas);
+}
+
+int incise_canvas_add_layer(struct incise_canvas *canvas)
+{
+	uint8_t *layer;
+
+	if (canvas->n_layers == CANVAS_LAYERS_MAX)
+		return -ENOSPC;
+	/* From calloc, pages that nobody writes are not there. */
+	layer = calloc((size_t)canvas->size * canvas->size, 4);
+	if (!layer)
+		return -ENOMEM;
+	canvas->layer[canvas->n_layers] = layer;
+	return canvas->n_layers++;
+}
+
+uint8_t *incise_canvas_layer(struct incise_canvas *canvas, int layer)
+{
+	return layer >= 0 && layer < canvas->n_layers ? canvas->layer[layer] : NULL;
+}
+
+/* The tiles that a stretch touches: false when none. */
+static bool tiles_of(int from, int length, int size, int *first, int *last)
+{
+	int64_t end = (int64_t)from + length;
+
+	if (length <= 0 || end <= 0 || from >= size)
+		return false;
+	*first = (from < 0 ? 0 : from) / CANVAS_TILE;
+	*last = (int)((end > size ? size : end) - 1) / CANVAS_TILE;
+	return true;
+}
+
+void incise_canvas_dirty(struct incise_canvas *canvas, struct incise_rect rect)
+{
+	int left, right, top, bottom;
+
+	if (!tiles_of(rect.x, rect.w, canvas->size, &left, &right) ||
+	    !tiles_of(rect.y, rect.h, canvas->size, &top, &bottom))
+		return;
+	for (int y = top; y <= bottom; y++)
+		for (int x = left; x <= right; x++) {
+			uint8_t *dirty = &canvas->dirty[y * canvas->tiles + x];
+
+			canvas->n_dirty += !*dirty;
+			*dirty = 1;
+		}
+}
+
+/* round(a b / 255), exact for 8-bit values. */
+static inline unsigned int times(unsigned int a, unsigned int b)
+{
+	unsigned int v = a * b + 128;
+
+	return (v + (v >> 8)) >> 8;
+}
+
+static void blend(uint8_t *to, const uint8_t *over, int n)
+{
+	for (int i = 0; i < n; i++, to += 4, over += 4) {
+		unsigned int clear = 255 - over[3];
+
+		if (clear == 255)
+			continue;
+		for (int c = 0; c < 3; c++) {
+			unsigned int v = over[c] + times(to[c], clear);
+
+			to[c] = v > 255 ? 255 : (uint8_t)v;
+		}
+	}
+}
+
+static void compose_rect(struct incise_canvas *canvas, const struct incise_rect *rect)
+{
+	for (int y = rect->y; y < rect->y + rect->h; y++) {
+		size_t at = ((size_t)y * canvas->size + rect->x) * 4;
+		uint8_t *to = canvas->level[0] + at;
+
+		memcpy(to, canvas->base + at, (size_t)rect->w * 4);
+		for (int i = 0; i < rect->w; i++)
+			to[4 * i + 3] = 255;
+		for (int i = 0; i < canvas->n_layers; i++)
+			blend(to, canvas->layer[i] + at, rect->w);
+	}
+}
+
+static void shrink_rect(struct incise_canvas *canvas, int level,
+			const struct incise_rect *rect)
+{
+	int side = canvas->size >> level, from_stride = side * 2 * 4;
+	const uint16_t *linear = canvas->linear;
+
+	for (int y = rect->y; y < rect->y + rect->h; y++) {
+		const uint8_t *a = canvas->level[level - 1] +
+				   ((size_t)2 * y * side * 2 + 2 * rect->x) * 4;
+		uint8_t *to = canvas->level[level] + ((size_t)y * side + rect->x) * 4;
+
+		for (int x = 0; x < rect->w; x++, a += 8, to += 4) {
+			const uint8_t *b = a + from_stride;
+
+			for (int c = 0; c < 3; c++)
+				to[c] = canvas->srgb[((unsigned int)linear[a[c]] +
+						      linear[a[c + 4]] + linear[b[c]] +
+						      linear[b[c + 4]]) >>
+						     SUM_SHIFT];
+			to[3] = 255;
+		}
+	}
+}
+
+/* The texels of the next level that a rectangle of one is part of. */
+static void halve(struct incise_rect *rect)
+{
+	int right = (rect->x + rect->w + 1) / 2, bottom = (rect->y + rect->h + 1) / 2;
+
+	rect->x /= 2;
+	rect->y /= 2;
+	rect->w = right - rect->x;
+	rect->h = bottom - rect->y;
+}
+
+static void enclose(struct incise_rect *all, const struct incise_rect *rect)
+{
+	int right = all->x + all->w, bottom = all->y + all->h;
+
+	if (!all->w) {
+		*all = *rect;
+		return;
+	}
+	if (rect->x + rect->w > right)
+		right = rect->x + rect->w;
+	if (rect->y + rect->h > bottom)
+		bottom = rect->y + rect->h;
+	if (rect->x < all->x)
+		all->x = rect->x;
+	if (rect->y < all->y)
+		all->y = rect->y;
+	all->w = right - all->x;
+	all->h = bottom - all->y;
+}
+
+/* Whether every tile of a stretch of a row of tiles is dirty; they are clean then. */
+static bool take_row(struct incise_canvas *canvas, int x, int y, int w)
+{
+	uint8_t *row = canvas->dirty + (size_t)y * canvas->tiles + x;
+
+	for (int i = 0; i < w; i++)
+		if (!row[i])
+			return false;
+	memset(row, 0, w);
+	canvas->n_dirty -= w;
+	return true;
+}
+
+/*
+ * Take a rectangle of dirty tiles that begins at one: as far to the right as they go, and
+ * as far down as the whole width does.
+ */
+static struct incise_rect take_rect(struct incise_canvas *canvas, int x, int y)
+{
+	const uint8_t *row = canvas->dirty + (size_t)y * canvas->tiles;
+	int w = 1, h = 1;
+
+	while (x + w < canvas->tiles && row[x + w])
+		w++;
+	take_row(canvas, x, y, w);
+	while (y + h < canvas->tiles && take_row(canvas, x, y + h, w))
+		h++;
+	return (struct incise_rect){x * CANVAS_TILE, y * CANVAS_TILE, w * CANVAS_TILE,
+				    h * CANVAS_TILE};
+}
+
+/* A rectangle at all levels on which it is more than a texel or so. Returns how many. */
+static int do_rect(struct incise_canvas *canvas, struct incise_rect rect,
+		   struct incise_upload *uploads)
+{
+	int n = 0;
+
+	compose_rect(canvas, &rect);
+	uploads[n++] = (struct incise_upload){0, rect};
+	for (int level = 1; level < LEVEL_SMALL && level < canvas->levels; level++) {
+		halve(&rect);
+		shrink_rect(canvas, level, &rect);
+		uploads[n++] = (struct incise_upload){level, rect};
+	}
+	return n;
+}
+
+int incise_canvas_compose(struct incise_canvas *canvas, struct incise_upload *uploads,
+			  int n)
+{
+	struct incise_rect all = {0};
+	int done = 0, at = 0;
+
+	if (n < CANVAS_UPLOADS_MIN)
+		return -EINVAL;
+	n -= LEVELS_MAX - LEVEL_SMALL; /* kept for the small levels */
+	for (; canvas->n_dirty && done + LEVEL_SMALL <= n; at++) {
+		struct incise_rect rect;
+
+		if (!canvas->dirty[at])
+			continue;
+		rect = take_rect(canvas, at % canvas->tiles, at / canvas->tiles);
+		enclose(&all, &rect);
+		done += do_rect(canvas, rect, uploads + done);
+	}
+	if (!done)
+		return 0;
+	for (int level = 1; level < canvas->levels; level++) {
+		halve(&all);
+		if (level < LEVEL_SMALL)
+			continue;
+		shrink_rect(canvas, level, &all);
+		uploads[done++] = (struct incise_upload){level, all};
+	}
+	return done;
+}
+
+int incise_canvas_size(const struct incise_canvas *canvas)
+{
+	return canvas->size;
+}
+
+int incise_canvas_levels(const struct incise_canvas *canvas)
+{
+	return canvas->levels;
+}
+
+const uint8_t *incise_canvas_pixels(const struct incise_canvas *canvas, int level,
+				    int *stride)
+{
+	if (level < 0 || level >= canvas->levels)
+		return NULL;
+	if (stride)
+		*stride = (canvas->size >> level) * 4;
+	return canvas->level[level];
+}
+
+size_t incise_canvas_memory(const struct incise_canvas *canvas)
+{
+	size_t bytes = sizeof(*canvas) + (size_t)canvas->tiles * canvas->tiles;
+
+	for (int side = canvas->size; side; side >>= 1)
+		bytes += (size_t)side * side * 4;
+	return bytes + (size_t)canvas->n_layers * canvas->size * canvas->size * 4;
+}

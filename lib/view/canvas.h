@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The texture that is drawn: skin below, layers of wound and blood over it, and the same
+ * at half the size, a quarter … for who looks from afar. Only what is dirty is done anew.
+ *
+ *     base (opaque) ◀─ layer 0 ◀─ layer 1    premultiplied RGBA, "over", sRGB values
+ *            └────────────┴───────┴──▶ level 0 ─▶ level 1 ─▶ … ─▶ 1 × 1
+ *                                      tiles of 32 × 32 texels
+ *
+ * Layers are blended in sRGB values, as painters and browsers do. A level is the mean of
+ * 2 × 2 texels of the one before in linear light, as a texture of format sRGB is filtered
+ * by the card: else fine dark lines, a cut, would be too dark from afar.
+ *
+ * What comes out is the same to the bit as composing everything anew. One thread at a time.
+ */
+#ifndef INCISE_VIEW_CANVAS_H
+#define INCISE_VIEW_CANVAS_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <incise/error.h>
+
+#define CANVAS_TILE 32
+#define CANVAS_LAYERS_MAX 4
+
+/* Texels; x right, y down. */
+struct incise_rect {
+	int x, y, w, h;
+};
+
+/* A rectangle of a level that has changed; in texels of that level. */
+struct incise_upload {
+	int level;
+	struct incise_rect rect;
+};
+
+struct incise_canvas;
+
+/*
+ * All of it is dirty at first.
+ *
+ * size       a power of 2, CANVAS_TILE … 16384
+ * base_rgba  size² texels, kept by the caller as long as the canvas; its alpha is not read
+ * Returns NULL with errno EINVAL, ENOMEM.
+ */
+struct incise_canvas *incise_canvas_new(int size, const uint8_t *base_rgba,
+					struct incise_error *err);
+
+/*
+ * Put a clear layer over those that are there. Returns its index, or -ENOSPC, -ENOMEM. Its
+ * memory is taken from the system where it is written only.
+ */
+int incise_canvas_add_layer(struct incise_canvas *canvas);
+
+/*
+ * size² texels, premultiplied: no colour is above its alpha. To be written by whoever then
+ * says incise_canvas_dirty().
+ */
+uint8_t *incise_canvas_layer(struct incise_canvas *canvas, int layer);
+
+/* A rectangle is to be done anew, in whole tiles; what is outside of the canvas is cut off. */
+void incise_canvas_dirty(struct incise_canvas *canvas, struct incise_rect rect);
+
+/*
+ * Compose what is dirty, at all levels, and say what has changed.
+ *
+ * uploads, n   room for at least CANVAS_UPLOADS_MIN. When there is more to be said the rest
+ *              stays dirty: call again until it returns 0
+ * Returns how many; -EINVAL.
+ */
+#define CANVAS_UPLOADS_MIN 32
+int incise_canvas_compose(struct incise_canvas *canvas, struct incise_upload *uploads,
+			  int n);
+
+int incise_canvas_size(const struct incise_canvas *canvas);
+int incise_canvas_levels(const struct incise_canvas *canvas);
+
+/* A level's RGBA, alpha 255, as of the last incise_canvas_compose(). stride: bytes, or NULL. */
+const uint8_t *incise_canvas_pixels(const struct incise_canvas *canvas, int level,
+				    int *stride);
+
+/* Bytes that were asked for, without the base. */
+size_t incise_canvas_memory(const struct incise_canvas *canvas);
+
+void incise_canvas_free(struct incise_canvas *canvas);
+
+#endif

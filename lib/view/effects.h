@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * What ticks do to the texture: a wound where the blade went, and blood that runs from it.
+ *
+ *     ticks ─▶ [wound] ─ fresh cuts ─▶ [blood]      state: a function of the ticks alone
+ *                 │                       │
+ *              paint                    paint       pixels: a function of the state alone
+ *                 └─▶ layers of a canvas ◀┘
+ *
+ * Time is the ticks'. Lips and blood move in steps of 10 ms of it, however many ticks there
+ * are. So the same ticks give the same texture to the bit, however often it is painted.
+ * Nothing is there that the scene does not ask for: without `wound` no wound layer (and no
+ * blood), without `bleeding` no blood.
+ *
+ * Ticks are not trusted: what is not finite, too far or too fast for a hand is no cut. One
+ * thread at a time.
+ */
+#ifndef INCISE_VIEW_EFFECTS_H
+#define INCISE_VIEW_EFFECTS_H
+
+#include <stdint.h>
+#include <incise/error.h>
+#include <incise/plan.h>
+#include <incise/scene.h>
+#include "canvas.h"
+#include "chart.h"
+
+#define EFFECTS_STEP_NS 10000000 /* 10 ms */
+/*
+ * After a gap in the ticks at most so many steps are made up; what is longer is passed over,
+ * as if lips and blood had stood still in it.
+ */
+#define EFFECTS_STEPS_MAX 100
+
+struct incise_effects;
+
+/*
+ * chart and canvas must live longer, and be of one size; layers are added to the canvas.
+ * Returns NULL with errno EINVAL, ENOMEM, ENOSPC.
+ */
+struct incise_effects *incise_effects_new(const struct incise_scene_picture *picture,
+					  const struct incise_chart *chart,
+					  struct incise_canvas *canvas,
+					  struct incise_error *err);
+
+/* Each tick, in order. */
+void incise_effects_tick(struct incise_effects *effects, const struct incise_tick *tick);
+
+/* Bring the canvas's layers up to date; before incise_canvas_compose(). */
+void incise_effects_paint(struct incise_effects *effects);
+
+struct incise_effects_report {
+	double cut_mm;	 /* length of all strokes of the blade, on the surface */
+	uint64_t stamps; /* stretches of them that were drawn */
+	/* µl: emitted = drops + trails + off. */
+	double blood_ul_emitted;
+	double blood_ul_drops;	/* that can run, or hang at the wound */
+	double blood_ul_trails; /* films, wet or dried */
+	double blood_ul_off;	/* ran off the texture */
+	int drops;
+	uint64_t steps_lost; /* of 10 ms, in gaps that were too long */
+};
+void incise_effects_report(const struct incise_effects *effects,
+			   struct incise_effects_report *report);
+
+/* Bytes that were asked for, without layers and canvas. */
+size_t incise_effects_memory(const struct incise_effects *effects);
+
+void incise_effects_free(struct incise_effects *effects);
+
+#endif

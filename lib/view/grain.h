@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Numbers that look random and are a function of where, or of which: so nothing depends on
+ * the order in which they are asked for.
+ */
+#ifndef INCISE_VIEW_GRAIN_H
+#define INCISE_VIEW_GRAIN_H
+
+#include <math.h>
+#include <stdint.h>
+
+/* The output function of splitmix64 (Steele, Lea, Flood 2014) of the n-th number of a key. */
+static inline uint64_t noise_bits(uint64_t key, uint64_t n)
+{
+	uint64_t x = key + (n + 1) * 0x9e3779b97f4a7c15ULL;
+
+	x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
+	x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
+	return x ^ (x >> 31);
+}
+
+/* 0 … 1, 1 excluded. */
+static inline double noise_uniform(uint64_t key, uint64_t n)
+{
+	return (double)(noise_bits(key, n) >> 11) * 0x1p-53;
+}
+
+/* -1 … 1 at a point of a grid; cheap, for pixels. */
+static inline float noise_grid(uint32_t key, int x, int y)
+{
+	uint32_t h = key ^ ((uint32_t)x * 0x8da6b343u) ^ ((uint32_t)y * 0xd8163841u);
+
+	h = (h ^ (h >> 15)) * 0x2c1b3c6du;
+	h = (h ^ (h >> 12)) * 0x297a2d39u;
+	h ^= h >> 15;
+	return (float)(h >> 8) * (2.0f / 16777216.0f) - 1.0f;
+}
+
+/* -1 … 1, smooth between the points of a grid; x and y within ±1e9. */
+static inline float noise_smooth(uint32_t key, float x, float y)
+{
+	float fx = floorf(x), fy = floorf(y);
+	int ix = (int)fx, iy = (int)fy;
+	float u = x - fx, v = y - fy;
+	float a, b;
+
+	u = u * u * (3 - 2 * u);
+	v = v * v * (3 - 2 * v);
+	a = noise_grid(key, ix, iy) * (1 - u) + noise_grid(key, ix + 1, iy) * u;
+	b = noise_grid(key, ix, iy + 1) * (1 - u) + noise_grid(key, ix + 1, iy + 1) * u;
+	return a * (1 - v) + b * v;
+}
+
+#endif

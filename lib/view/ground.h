@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The surface at a place of the texture: how long a texel is there, and which way is down.
+ *
+ *     a step of (dx, dy) texels is (a dx + b dy, c dy) mm in a frame of the surface whose
+ *     first axis is along the rows of the texture
+ *
+ * What is seen, with the relief, is what blood runs over.
+ */
+#ifndef INCISE_VIEW_GROUND_H
+#define INCISE_VIEW_GROUND_H
+
+#include <stdbool.h>
+#include "chart.h"
+
+struct ground_metric {
+	float a, b, c; /* mm per texel; a, c > 0 */
+};
+
+struct ground {
+	struct ground_metric metric;
+	double area_mm2;     /* of a texel */
+	double slope;	     /* sine of the angle to the level, 0 … 1 */
+	double down_px[2];   /* texels per mm of way downhill; 0 where it is level */
+	double across_px[2]; /* the same to the right of it, along the level */
+};
+
+/* false: there is no surface there, or the chart is degenerate; nothing is written. */
+bool ground_metric(const struct incise_chart *chart, const double px[2],
+		   struct ground_metric *metric);
+bool ground_at(const struct incise_chart *chart, const double gravity[3],
+	       const double px[2], struct ground *ground);
+
+/* Length of a step, mm. */
+double ground_length_mm(const struct ground_metric *metric, double dx, double dy);
+
+#endif

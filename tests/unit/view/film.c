@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * A film's file: what is no film is refused, a module that is not there is named, and nothing
+ * half is left. What is in it is in tests/unit/film.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <incise/film.h>
+
+static char folder[] = "/tmp/incise-films-XXXXXX";
+
+static void test_sizes(void **state)
+{
+	static const struct {
+		int width, height, rate;
+	} cases[] = {{15, 16, 30},   {16, 15, 30},    {17, 16, 30},   {16, 16, 0},
+		     {16, 16, 1001}, {-16, 16, 30},   {8194, 16, 30}, {16, 1 << 30, 30},
+		     {0, 0, 0},	     {1 << 30, 16, 1}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		assert_null(incise_film_new("x.mkv", cases[i].width, cases[i].height,
+					    cases[i].rate, &err));
+		assert_int_equal(errno, EINVAL);
+		assert_non_null(strstr(err.text, "x.mkv"));
+	}
+}
+
+static void test_no_module(void **state)
+{
+	struct incise_error err = {0};
+	char path[100];
+
+	setenv("INCISE_MODULE_PATH", folder, 1);
+	snprintf(path, sizeof(path), "%s/x.mkv", folder);
+	assert_null(incise_film_new(path, 16, 16, 30, &err));
+	assert_int_equal(errno, ENOENT);
+	assert_non_null(strstr(err.text, "film_mkv.so"));
+	assert_int_equal(access(path, F_OK), -1);
+	assert_int_equal(incise_film_close(NULL, &err), 0);
+	incise_film_drop(NULL);
+}
+
+static int begin(void **state)
+{
+	return !mkdtemp(folder);
+}
+
+static int end(void **state)
+{
+	return rmdir(folder);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_sizes),
+		cmocka_unit_test(test_no_module),
+	};
+
+	return cmocka_run_group_tests(tests, begin, end);
+}

@@ -1,0 +1,410 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The wound: without a gap at any speed and tick rate, opened by what is put in, closed
+ * after it, the same however often it is painted, and nothing of ticks that make no sense.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <stdlib.h>
+#include "ground.h"
+#include "../../../lib/view/wound.h"
+
+#define SIDE 512
+#define PI_2 (2 * M_PI)
+
+/* A curved way, mm from the middle: 40 mm long or so, at u = 0 … 1. */
+static void way(double u, double *x, double *y)
+{
+	*x = -18 + 36 * u;
+	*y = 6 * sin(PI_2 * u * 0.8);
+}
+
+static double lift(struct wound *wound, double t_s)
+{
+	struct incise_tick tick = tick_free(t_s);
+	struct wound_stroke stroke;
+
+	return wound_tick(wound, &tick, &stroke) ? stroke.length_mm : 0;
+}
+
+/* Cut along the way in so many seconds at a rate; returns the sum of the strokes. */
+static double cut(struct wound *wound, const struct field *field, double s,
+		  double rate_hz, double depth_mm)
+{
+	int n = (int)(s * rate_hz);
+	double sum = 0, x, y;
+
+	for (int i = 0; i <= n; i++) {
+		struct wound_stroke stroke;
+		struct incise_tick tick;
+
+		way((double)i / n, &x, &y);
+		tick = tick_at(field, i / rate_hz, INCISE_TOOL_BLADE, x, y, depth_mm);
+		if (wound_tick(wound, &tick, &stroke))
+			sum += stroke.length_mm;
+	}
+	return sum + lift(wound, (n + 1) / rate_hz);
+}
+
+static double inside(const struct wound *wound, const struct field *field, double x,
+		     double y)
+{
+	return wound_inside_mm(wound, (int)floor(SIDE / 2.0 + x / field->mm),
+			       (int)floor(SIDE / 2.0 + y / field->mm));
+}
+
+/* Every texel under the way is well inside of the lips, from the first to the last. */
+static void test_no_gap(void **state)
+{
+	static const struct {
+		double s, rate_hz;
+	} cases[] = {{2, 1000}, {2, 120},   {0.1, 1000}, {0.02, 1000},
+		     {1, 10},	{0.2, 120}, {2, 5000},	 {0.012, 5000}};
+	struct field field;
+
+	field_new(&field, SIDE, 0);
+	for (size_t c = 0; c < sizeof(cases) / sizeof(*cases); c++) {
+		struct wound *wound = wound_new(field.chart, NULL);
+		double rate = cases[c].rate_hz, off = 0, x, y;
+		int n = (int)(cases[c].s * rate);
+		double sum;
+
+		assert_non_null(wound);
+		sum = cut(wound, &field, cases[c].s, rate, 3);
+		/* Strokes are the way, to the last piece; ground_length_mm() is in floats. */
+		/* Strokes are all of the way; from point to point, 0.25 mm, it is shorter by
+		 * a curve's 1e-4 of it. */
+		assert_true(fabs(sum - wound_cut_mm(wound)) < 0.01);
+		for (int i = 1; i < 2000; i++) {
+			/* On the chords between ticks: what the blade swept. */
+			double u = i / 2000.0 * n, x1, y1;
+
+			way(floor(u) / n, &x, &y);
+			way((floor(u) + 1) / n, &x1, &y1);
+			x += (u - floor(u)) * (x1 - x);
+			y += (u - floor(u)) * (y1 - y);
+			off = inside(wound, &field, x, y);
+			/*
+			 * 0.59 mm of half-width at 3 mm, an eighth of it at the very ends.
+			 * A texel's middle is up to 0.7 texels away; a line between points
+			 * 0.25 mm apart is by less than 0.01 mm another than the way.
+			 */
+			if (i > 100 && i < 1900)
+				assert_true(off > 0.59 - 0.71 * field.mm - 0.02);
+			else
+				assert_true(off > 0.07 - 0.71 * field.mm - 0.02);
+		}
+		/* And there is nothing where the blade was not. */
+		assert_true(inside(wound, &field, -24, 0) < 0);
+		assert_true(inside(wound, &field, 0, -9) < 0);
+		wound_free(wound);
+	}
+	field_free(&field);
+}
+
+/* Deeper is wider, and a second cut over the first is the union of both. */
+static void test_union(void **state)
+{
+	struct field field;
+	struct wound *wound, *both;
+
+	field_new(&field, SIDE, 0);
+	wound = wound_new(field.chart, NULL);
+	both = wound_new(field.chart, NULL);
+	cut(wound, &field, 1, 1000, 4);
+	cut(both, &field, 1, 1000, 4);
+	cut(both, &field, 1, 1000, 1);
+	for (int y = 0; y < SIDE; y++)
+		for (int x = 0; x < SIDE; x++)
+			assert_true(wound_inside_mm(wound, x, y) ==
+				    wound_inside_mm(both, x, y));
+	wound_free(wound);
+	wound_free(both);
+	field_free(&field);
+}
+
+struct painted {
+	struct wound *wound;
+	struct incise_canvas *canvas;
+	uint8_t *base;
+};
+
+static void painted_new(struct painted *p, const struct field *field)
+{
+	p->base = calloc(SIDE * SIDE, 4);
+	p->canvas = incise_canvas_new(SIDE, p->base, NULL);
+	assert_non_null(p->canvas);
+	assert_int_equal(incise_canvas_add_layer(p->canvas), 0);
+	p->wound = wound_new(field->chart, NULL);
+	assert_non_null(p->wound);
+}
+
+static void painted_free(struct painted *p)
+{
+	wound_free(p->wound);
+	incise_canvas_free(p->canvas);
+	free(p->base);
+}
+
+/* Width of what is not skin across the cut at right_mm, mm: alpha of flesh, not of halo. */
+static double open_mm(const struct painted *p, const struct field *field, double right_mm)
+{
+	const uint8_t *layer = incise_canvas_layer(p->canvas, 0);
+	int x = (int)(SIDE / 2.0 + right_mm / field->mm), n = 0;
+
+	for (int y = 0; y < SIDE; y++)
+		n += layer[(y * SIDE + x) * 4 + 3] > 190;
+	return n * field->mm;
+}
+
+/* 10 ms of time with something at a place, or nothing; painted now and then, or not. */
+static void hold(struct painted *p, const struct field *field, double *t_s, double s,
+		 enum incise_tool tool, bool in, bool paint)
+{
+	for (double end = *t_s + s; *t_s < end; *t_s += 0.01) {
+		struct incise_tick tick =
+			in ? tick_at(field, *t_s, tool, 0, 0, 6) : tick_free(*t_s);
+		struct wound_stroke stroke;
+
+		wound_tick(p->wound, &tick, &stroke);
+		wound_step(p->wound);
+		if (paint)
+			wound_paint(p->wound, p->canvas, 0);
+	}
+	wound_paint(p->wound, p->canvas, 0);
+}
+
+static void straight(struct painted *p, const struct field *field, double *t_s)
+{
+	for (int i = 0; i <= 1000; i++, *t_s += 0.001) {
+		struct incise_tick tick =
+			tick_at(field, *t_s, INCISE_TOOL_BLADE, -15 + i * 0.03, 0, 3);
+		struct wound_stroke stroke;
+
+		wound_tick(p->wound, &tick, &stroke);
+	}
+	lift(p->wound, *t_s);
+	wound_paint(p->wound, p->canvas, 0);
+}
+
+/* The cut opens to the tool's width where that is, less beside it; and closes in a second. */
+static void test_opens_and_closes(void **state)
+{
+	static const struct {
+		enum incise_tool tool;
+		double wide_mm;
+	} cases[] = {{INCISE_TOOL_HANDLE, 3}, {INCISE_TOOL_TUBE, 4}};
+	struct field field;
+
+	field_new(&field, SIDE, 0);
+	for (int c = 0; c < 2; c++) {
+		double t = 0, rest, rest_far, shut;
+		struct painted p;
+
+		painted_new(&p, &field);
+		straight(&p, &field, &t);
+		rest = open_mm(&p, &field, 0);
+		rest_far = open_mm(&p, &field, 11);
+		/* Twice 0.59 mm, by whole texels on both sides, and soft edges. */
+		assert_true(fabs(rest - 1.18) < 2 * field.mm);
+		hold(&p, &field, &t, 0.5, cases[c].tool, true, false);
+		assert_true(fabs(open_mm(&p, &field, 0) - cases[c].wide_mm) <
+			    2 * field.mm);
+		assert_true(open_mm(&p, &field, 3) < open_mm(&p, &field, 0));
+		assert_true(open_mm(&p, &field, 3) > rest + field.mm);
+		assert_true(open_mm(&p, &field, 11) == rest_far);
+		hold(&p, &field, &t, 0.2, cases[c].tool, false, false);
+		assert_true(open_mm(&p, &field, 0) > rest + 2 * field.mm);
+		hold(&p, &field, &t, 1.0, cases[c].tool, false, false);
+		shut = open_mm(&p, &field, 0);
+		/* Wider by an eighth of what it was opened by, on each side. */
+		assert_true(shut >= rest &&
+			    shut < rest + 0.3 * (cases[c].wide_mm - rest) + field.mm);
+		hold(&p, &field, &t, 1.0, cases[c].tool, false, false);
+		assert_true(open_mm(&p, &field, 0) == shut);
+		painted_free(&p);
+	}
+	field_free(&field);
+}
+
+/* Painted at each tick or at the end only: the same to the bit. */
+static void test_painting_changes_nothing(void **state)
+{
+	struct field field;
+	struct painted p[2];
+
+	field_new(&field, SIDE, 0);
+	for (int i = 0; i < 2; i++) {
+		double t = 0;
+
+		painted_new(&p[i], &field);
+		for (int k = 0; k < 300; k++, t += 0.001) {
+			struct incise_tick tick =
+				tick_at(&field, t, INCISE_TOOL_BLADE, -10 + k * 0.06,
+					k % 7 * 0.05, 2 + sin(k * 0.1));
+			struct wound_stroke stroke;
+
+			wound_tick(p[i].wound, &tick, &stroke);
+			if (i && k % 3 == 0)
+				wound_paint(p[i].wound, p[i].canvas, 0);
+		}
+		/* While the blade is in the tissue too. */
+		wound_paint(p[i].wound, p[i].canvas, 0);
+	}
+	for (int stage = 0; stage < 3; stage++) {
+		assert_memory_equal(incise_canvas_layer(p[0].canvas, 0),
+				    incise_canvas_layer(p[1].canvas, 0), SIDE * SIDE * 4);
+		for (int i = 0; i < 2 && stage < 2; i++) {
+			double t = 1 + stage;
+
+			hold(&p[i], &field, &t, 0.3, INCISE_TOOL_TUBE, !stage, i);
+		}
+	}
+	painted_free(&p[0]);
+	painted_free(&p[1]);
+	field_free(&field);
+}
+
+/* Cutting without end: no more points than there is room for, and nothing disappears. */
+static void test_endless(void **state)
+{
+	struct field field;
+	struct wound *wound;
+	size_t memory;
+
+	field_new(&field, SIDE, 0);
+	wound = wound_new(field.chart, NULL);
+	memory = wound_memory(wound);
+	cut(wound, &field, 1, 1000, 3);
+	for (int i = 0; i < 3 * WOUND_POINTS; i++) {
+		struct incise_tick tick =
+			tick_at(&field, 2 + i * 1e-3, INCISE_TOOL_BLADE,
+				20 * cos(i * 0.05), 20 * sin(i * 0.0503), 1);
+		struct wound_stroke stroke;
+
+		wound_tick(wound, &tick, &stroke);
+	}
+	assert_int_equal(wound_points(wound), WOUND_POINTS);
+	assert_true(wound_memory(wound) == memory);
+	for (int i = 100; i < 1900; i++) {
+		double x, y;
+
+		way(i / 2000.0, &x, &y);
+		assert_true(inside(wound, &field, x, y) > 0.59 - 0.71 * field.mm - 0.02);
+	}
+	wound_free(wound);
+	field_free(&field);
+}
+
+/* What is no cut: flags, phases, tools, leaps, gaps, and what is no number. */
+static void test_no_cut(void **state)
+{
+	struct field field;
+	struct wound *wound;
+
+	field_new(&field, SIDE, 0);
+	wound = wound_new(field.chart, NULL);
+	for (int k = 0; k < 15; k++)
+		for (int i = 0; i < 4; i++) {
+			struct incise_tick tick = tick_at(
+				&field, k + i * 0.001, INCISE_TOOL_BLADE, i * 0.5, 0, 3);
+			struct wound_stroke stroke;
+
+			switch (k) {
+			case 0:
+				tick.flags = 0;
+				break;
+			case 1:
+				tick.flags |= INCISE_TICK_STALE;
+				break;
+			case 2:
+				tick.flags |= INCISE_TICK_FAULT;
+				break;
+			case 3:
+				tick.phase = INCISE_PHASE_FREE;
+				break;
+			case 4:
+				tick.tool = INCISE_TOOL_TUBE;
+				break;
+			case 5:
+				tick.depth_mm = NAN;
+				break;
+			case 6:
+				tick.depth_mm = INFINITY;
+				break;
+			case 7:
+				tick.depth_mm = 0.01;
+				break;
+			case 8:
+				tick.depth_mm = -3;
+				break;
+			case 9:
+				tick.proxy_mm[i % 3] = NAN;
+				break;
+			case 10:
+				tick.proxy_mm[0] = INFINITY;
+				break;
+			case 11:
+				tick.proxy_mm[1] = -1e300;
+				break;
+			case 12:
+				tick.proxy_mm[1] = 1e5;
+				break;
+			case 13:
+				tick.phase = (enum incise_phase)99;
+				break;
+			default:
+				tick.tool = (enum incise_tool) - 7;
+			}
+			assert_false(wound_tick(wound, &tick, &stroke));
+			wound_step(wound);
+		}
+	assert_true(wound_cut_mm(wound) == 0 && wound_stamps(wound) == 0);
+	wound_free(wound);
+	field_free(&field);
+}
+
+/* Pricks where a hand cannot have gone from one to the next are not joined. */
+static void test_leaps(void **state)
+{
+	static const int64_t after_ns[] = {1000000, -1000000, 600000000, INT64_MAX / 2,
+					   INT64_MIN};
+	struct field field;
+
+	field_new(&field, SIDE, 0);
+	for (int i = 0; i < 5; i++) {
+		struct wound *wound = wound_new(field.chart, NULL);
+		struct incise_tick tick =
+			tick_at(&field, 1, INCISE_TOOL_BLADE, -20, 0, 3);
+		struct wound_stroke stroke;
+
+		wound_tick(wound, &tick, &stroke);
+		tick = tick_at(&field, 1, INCISE_TOOL_BLADE, 20, 0, 3);
+		tick.t_ns =
+			after_ns[i] == INT64_MIN ? INT64_MIN : tick.t_ns + after_ns[i];
+		wound_tick(wound, &tick, &stroke);
+		lift(wound, 2);
+		assert_true(wound_cut_mm(wound) == 0);
+		assert_true(inside(wound, &field, 0, 0) < 0);
+		wound_free(wound);
+	}
+	field_free(&field);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_no_gap),
+		cmocka_unit_test(test_union),
+		cmocka_unit_test(test_opens_and_closes),
+		cmocka_unit_test(test_painting_changes_nothing),
+		cmocka_unit_test(test_endless),
+		cmocka_unit_test(test_no_cut),
+		cmocka_unit_test(test_leaps),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
