@@ -79,7 +79,7 @@ needs_incise-record := incise
 needs_incise-view := incise
 
 # One program per verb, and the libraries it is linked to.
-verbs := $(filter-out $(if $(has_view),,view),$(patsubst tools/incise-%.c,%,\
+verbs := $(filter-out $(if $(has_view),,view bench-view),$(patsubst tools/incise-%.c,%,\
 	$(wildcard tools/incise-*.c)))
 uses_view := incise incise-view incise-record
 uses_capture := incise incise-record
@@ -99,6 +99,7 @@ uses_calibrate-tip := incise incise-learn incise-record
 uses_calibrate-delay := incise incise-learn incise-record
 uses_demo := incise incise-learn
 uses_bench := incise incise-learn incise-record
+uses_bench-view := incise incise-view
 uses_calibrate := incise
 $(foreach word,$(filter calibrate-%,$(verbs)),\
 	$(eval uses_$(word) := incise incise-learn incise-record))

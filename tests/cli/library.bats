@@ -11,6 +11,8 @@ setup() {
 }
 
 parts="libincise libincise-learn libincise-record"
+# built where a screen's libraries are
+[ ! -e "$INCISE_BUILD/lib/libincise-view.so" ] || parts="$parts libincise-view"
 
 # Functions that a shared object gives to others.
 exported_by() {
@@ -119,6 +121,19 @@ maps() {
 	grep -q libincise.so mapped
 }
 
+@test "SDL, OpenGL and cairo are mapped by who draws, and by no one else" {
+	screen='libSDL|libepoxy|libcairo|libEGL|libOpenGL|libGL'
+	for file in "$INCISE_BUILD"/lib/lib*.so "$INCISE_BUILD"/bin/*; do
+		case ${file##*/} in
+		libincise-view.so | incise-view | incise-bench-view)
+			ldd "$file" | grep -qE "$screen" ;;
+		*)
+			ldd "$file" >linked
+			run ! grep -E "$screen" linked ;;
+		esac
+	done
+}
+
 @test "OpenCV is mapped by who looks at pictures, and by no one else" {
 	for file in "$INCISE_BUILD"/lib/lib*.so "$INCISE_BUILD"/bin/*; do
 		ldd "$file" >linked
@@ -140,6 +155,18 @@ maps() {
 	maps incise bench vision --quick
 	grep -q vision_opencv.so mapped
 	grep -q libopencv_core mapped
+}
+
+@test "a screen's libraries are mapped by who shows pictures, and by no one else" {
+	# libavcodec has cairo behind it: its modules are left out
+	for file in "$INCISE_BUILD"/lib/lib*.so "$INCISE_BUILD"/lib/incise/[!f]*.so "$INCISE_BUILD"/bin/*; do
+		case ${file##*/} in libincise-view.so | incise-view | incise-bench-view) continue ;; esac
+		ldd "$file" >linked
+		run ! grep -E 'libSDL|libepoxy|libEGL|libcairo|libincise-view' linked
+	done
+	[ -x "$INCISE_BUILD/bin/incise-view" ] || skip "incise view was not built"
+	ldd "$INCISE_BUILD/bin/incise-view" >linked
+	grep -q libSDL linked
 }
 
 @test "without its module vision says where that was looked for" {
@@ -164,6 +191,7 @@ maps() {
 			grep -vxE '_end|_edata|__bss_start' >exported
 		case $module in
 		*/frames_mkv.so) symbol=incise_frames ;;
+		*/film_mkv.so) symbol=incise_film_module ;;
 		*) symbol=incise_backend ;;
 		esac
 		[ "$(cat exported)" = "$symbol" ] || complain "$module: $(cat exported)"

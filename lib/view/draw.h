@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * A picture by OpenGL 3.3 core, in the context that is current: the surface with its
+ * texture, the instrument, images over it. Lengths in mm in the tracker's frame; pixels
+ * with x from the left and y from the top.
+ *
+ *     surface ─▶ instrument ─▶ target (samples) ─▶ resolved ─▶ images over it ─▶ read, show
+ *
+ * What is wet shines; the shader tells it by the colour of fresh blood.
+ */
+#ifndef INCISE_VIEW_DRAW_H
+#define INCISE_VIEW_DRAW_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <incise/error.h>
+#include <incise/plan.h>
+#include <incise/view.h>
+#include "canvas.h"
+#include "chart.h"
+
+struct incise_draw;
+
+struct incise_draw_setup {
+	const struct incise_chart *chart;   /* read while it is made only */
+	const struct incise_canvas *canvas; /* as well; all levels are uploaded */
+	const uint8_t *normal_rgb;	    /* size² of the chart; or NULL: smooth */
+	enum incise_skin look; /* liver is moist all over; round a neck lies a cloth */
+	struct incise_scene_scalpel scalpel;
+	int samples; /* 0: what is cheap here; 1: none; 4 */
+};
+
+/* NULL with errno ENOTSUP (texture too large, no framebuffer), EIO (shader), ENOMEM. */
+struct incise_draw *incise_draw_new(const struct incise_draw_setup *setup,
+				    struct incise_error *err);
+void incise_draw_free(struct incise_draw *draw);
+
+/* Send what changed. Rectangles that are not within their level are left out. */
+void incise_draw_upload(struct incise_draw *draw, const struct incise_canvas *canvas,
+			const struct incise_upload *uploads, int n);
+
+/*
+ * Draw the surface, and the instrument where a tick says (NULL: none).
+ *
+ * Returns 0, -EINVAL (size), -EIO (the graphics failed, or lost their context), -ENOMEM.
+ */
+int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera *camera,
+		      const struct incise_tick *pose, int width, int height,
+		      struct incise_error *err);
+
+/*
+ * Lay an image over the frame, premultiplied bgra as cairo's ARGB32 is, its top left at
+ * x, y. @slot: 0 … 3, one for each image; it is sent when @version is another than the
+ * slot's last.
+ */
+int incise_draw_overlay(struct incise_draw *draw, int slot, const uint8_t *bgra, int w,
+			int h, uint64_t version, int x, int y);
+
+/* The last frame's pixels, rows from the top. 0, -EINVAL (another size), -EIO. */
+int incise_draw_read(struct incise_draw *draw, uint8_t *rgb, int width, int height);
+
+/* Copy the last frame to the window's own framebuffer. */
+void incise_draw_show(struct incise_draw *draw);
+
+/* Wait until the last frame is drawn. */
+void incise_draw_finish(struct incise_draw *draw);
+
+/* A ball round the surface. */
+void incise_draw_bounds(const struct incise_draw *draw, double middle_mm[3],
+			double *reach_mm);
+
+/* Chosen samples per pixel; OpenGL's name of the renderer. */
+int incise_draw_samples(const struct incise_draw *draw);
+const char *incise_draw_renderer(const struct incise_draw *draw);
+
+#endif

@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * An OpenGL 3.3 core context without a screen, by EGL. What is drawn goes into a
+ * framebuffer object: see target.h.
+ */
+#ifndef INCISE_VIEW_EGL_H
+#define INCISE_VIEW_EGL_H
+
+#include <incise/error.h>
+
+struct incise_egl;
+
+/*
+ * The context is made current in the calling thread. NULL with errno ENOTSUP and a line
+ * that names the packages, ENOMEM.
+ */
+struct incise_egl *incise_egl_new(struct incise_error *err);
+
+/* Make it current. 0, -EIO. */
+int incise_egl_current(struct incise_egl *egl, struct incise_error *err);
+
+/* Takes the context from the thread it is current in. */
+void incise_egl_free(struct incise_egl *egl);
+
+#endif

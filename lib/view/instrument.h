@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Meshes of what the hand holds: scalpel, which is its handle too, and tube. In mm, in a
+ * frame of their own:
+ *
+ *      z ▲ ▓ end of the handle, z = handle_mm      z ▲ ╱╱ tube, open, curved in the
+ *        │ ▓                                         │┃┃  plane of x and z above
+ *        │ ▓ flat side to ±y                         │┃┃  what goes in
+ *        │ ▌╲ edge of the blade to +x                │┃┃
+ *        ○───▶ x, tip at 0                           ○───▶ x, end at 0
+ */
+#ifndef INCISE_VIEW_INSTRUMENT_H
+#define INCISE_VIEW_INSTRUMENT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <incise/plan.h>
+
+struct incise_instrument_vertex {
+	float position_mm[3], normal[3];
+	float rgb[3]; /* sRGB 0 … 1 */
+	float metal;  /* 0 plastic … 1 steel */
+};
+
+struct incise_instrument_mesh {
+	int n_vertices, n_indices;
+	struct incise_instrument_vertex *vertices;
+	uint32_t *indices; /* triangles, counter-clockwise from outside */
+};
+
+/* Of a few hundred triangles. 0, -ENOMEM. To be freed; the mesh is empty then. */
+int incise_instrument_scalpel(double handle_mm, struct incise_instrument_mesh *mesh);
+int incise_instrument_tube(struct incise_instrument_mesh *mesh);
+void incise_instrument_free(struct incise_instrument_mesh *mesh);
+
+/* Where an instrument stands: columns x, y, z, origin of its frame. */
+struct incise_instrument_place {
+	double x[3], y[3], z[3], origin_mm[3];
+	bool tube; /* else the scalpel */
+};
+
+/*
+ * From a tick: the scalpel's tip and attitude are the pose's; the tube's end is the tool's
+ * place. False when it is nowhere: no attitude yet, or numbers that make no place.
+ */
+bool incise_instrument_place(const struct incise_scene_scalpel *scalpel,
+			     const struct incise_tick *tick,
+			     struct incise_instrument_place *place);
+
+#endif

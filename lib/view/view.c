@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The picture of a scene, put together; see incise/view.h.
+ *
+ *     chart ─┬─▶ skin ─▶ canvas ─▶ draw ─▶ window, pixels
+ *            └─▶ effects ──▲         ▲
+ *     ticks ──────╯  ╰──────────▶ overlay
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <incise/view.h>
+#include "../base/vector.h"
+#include "eye.h"
+#include "view_parts.h"
+
+#define FAR_MM 1e6 /* what is beyond is no place of a tool */
+#define MARGIN_PX 14
+#define ROOM_PX (800 * 450) /* with less there is no panel */
+
+enum { SLOT_PANEL, SLOT_KEYS };
+
+static double seconds(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return (double)now.tv_sec + now.tv_nsec * 1e-9;
+}
+
+struct incise_view *incise_view_new(const struct incise_scene *scene,
+				    const struct incise_plan *plan,
+				    const struct incise_view_setup *setup,
+				    struct incise_error *err)
+{
+	struct incise_view *view;
+	int rc;
+
+	if (setup->width < 16 || setup->height < 16 ||
+	    setup->width > INCISE_VIEW_SIDE_MAX || setup->height > INCISE_VIEW_SIDE_MAX) {
+		incise_error_set(err, EINVAL,
+				 "picture: %d × %d pixels; expected 16 to %d each",
+				 setup->width, setup->height, INCISE_VIEW_SIDE_MAX);
+		return NULL;
+	}
+	view = calloc(1, sizeof(*view));
+	if (!view) {
+		incise_error_set(err, ENOMEM, "picture: no memory");
+		return NULL;
+	}
+	view->surface = incise_plan_surface(plan);
+	incise_scene_picture(scene, &view->picture);
+	incise_scene_scalpel(scene, &view->scalpel);
+	view->width = setup->width;
+	view->height = setup->height;
+	view->panel = true;
+	rc = incise_view_make(view, plan, setup, err);
+	if (rc) {
+		incise_view_free(view);
+		errno = -rc;
+		return NULL;
+	}
+	return view;
+}
+
+static int current(struct incise_view *view, struct incise_error *err)
+{
+	return view->window ? incise_window_current(view->window, err)
+			    : incise_egl_current(view->egl, err);
+}
+
+void incise_view_free(struct incise_view *view)
+{
+	if (!view)
+		return;
+	if (view->draw && !current(view, NULL))
+		incise_draw_free(view->draw);
+	incise_overlay_free(view->overlay);
+	incise_effects_free(view->effects);
+	incise_canvas_free(view->canvas);
+	incise_chart_free(view->chart);
+	free(view->base);
+	incise_window_free(view->window);
+	incise_egl_free(view->egl);
+	free(view);
+}
+
+static bool near(const double p[3])
+{
+	return fabs(p[0]) <= FAR_MM && fabs(p[1]) <= FAR_MM && fabs(p[2]) <= FAR_MM;
+}
+
+void incise_view_ticks(struct incise_view *view, const struct incise_tick *ticks, int n)
+{
+	double begin = seconds();
+
+	for (int i = 0; i < n; i++) {
+		const struct incise_tick *tick = &ticks[i];
+
+		incise_overlay_tick(view->overlay, tick);
+		if (!near(tick->position_mm) || !near(tick->tool_mm) ||
+		    !near(tick->proxy_mm) || !near(tick->normal))
+			continue;
+		incise_effects_tick(view->effects, tick);
+		view->tick = *tick;
+		view->ticked = true;
+	}
+	view->ticks += n > 0 ? (uint64_t)n : 0;
+	view->ticks_s += seconds() - begin;
+}
+
+/*
+ * What is seen may stand above what is felt, as a larynx does: the instrument goes up by as
+ * much, or it would be in the skin before it touches it.
+ */
+static double relief_at(const struct incise_view *view, const double point_mm[3],
+			double normal[3])
+{
+	struct incise_touch touch;
+	double px[2];
+
+	if (!view->picture.larynx)
+		return 0;
+	incise_surface_nearest(view->surface, point_mm, &touch);
+	v3_copy(normal, touch.normal);
+	return incise_chart_px(view->chart, touch.point_mm, px)
+		       ? incise_chart_relief_mm(view->chart, px)
+		       : 0;
+}
+
+static void lift(const struct incise_view *view, struct incise_tick *tick)
+{
+	double normal[3] = {0};
+	double mm = relief_at(view, tick->tool_mm, normal);
+
+	v3_add(tick->position_mm, tick->position_mm, mm, normal);
+	v3_add(tick->tool_mm, tick->tool_mm, mm, normal);
+}
+
+static void send(struct incise_view *view)
+{
+	struct incise_upload uploads[VIEW_UPLOADS];
+	int n;
+
+	incise_effects_paint(view->effects);
+	while ((n = incise_canvas_compose(view->canvas, uploads, VIEW_UPLOADS)) > 0) {
+		incise_draw_upload(view->draw, view->canvas, uploads, n);
+		view->uploads += (uint64_t)n;
+		for (int i = 0; i < n; i++)
+			view->uploaded_texels +=
+				(uint64_t)uploads[i].rect.w * (uint64_t)uploads[i].rect.h;
+	}
+}
+
+static void lay_over(struct incise_view *view, const struct incise_view_status *status)
+{
+	const struct incise_overlay_image *image;
+
+	/* In a small picture it would hide what it is about. */
+	if (view->panel && view->width * view->height >= ROOM_PX &&
+	    (image = incise_overlay_panel(view->overlay, status)))
+		incise_draw_overlay(view->draw, SLOT_PANEL, image->pixels, image->width,
+				    image->height, image->version, MARGIN_PX,
+				    view->height - MARGIN_PX - image->height);
+	if (view->keys && (image = incise_overlay_keys(view->overlay)))
+		incise_draw_overlay(view->draw, SLOT_KEYS, image->pixels, image->width,
+				    image->height, image->version,
+				    view->width - MARGIN_PX - image->width, MARGIN_PX);
+}
+
+int incise_view_frame(struct incise_view *view, const struct incise_view_status *status,
+		      struct incise_error *err)
+{
+	struct incise_tick pose = view->tick;
+	int rc, width = view->width, height = view->height;
+	double begin, sent;
+
+	if (view->window)
+		incise_window_size(view->window, &width, &height);
+	if (width < 1 || height < 1)
+		return 0;
+	rc = current(view, err);
+	if (rc)
+		return rc;
+	view->width = width;
+	view->height = height;
+	begin = seconds();
+	send(view);
+	sent = seconds();
+	if (view->ticked)
+		lift(view, &pose);
+	rc = incise_draw_frame(view->draw, &view->orbit.camera,
+			       view->ticked ? &pose : NULL, width, height, err);
+	if (rc)
+		return rc;
+	lay_over(view, status);
+	view->drawn = true;
+	if (view->window) {
+		incise_draw_show(view->draw);
+		incise_window_show(view->window);
+	} else {
+		incise_draw_finish(view->draw);
+	}
+	view->texture_s += sent - begin;
+	view->draw_s += seconds() - sent;
+	view->frames++;
+	return 0;
+}
+
+void incise_view_size(const struct incise_view *view, int *width, int *height)
+{
+	*width = view->width;
+	*height = view->height;
+}
+
+int incise_view_pixels(struct incise_view *view, uint8_t *rgb)
+{
+	int rc;
+
+	if (!view->drawn)
+		return -ENODATA;
+	rc = current(view, NULL);
+	return rc ? rc : incise_draw_read(view->draw, rgb, view->width, view->height);
+}
+
+void incise_view_panel(struct incise_view *view, bool panel, bool keys)
+{
+	view->panel = panel;
+	view->keys = keys;
+}
+
+int incise_view_keys(struct incise_view *view, const char *const *lines, int n)
+{
+	static const char *const own[] = {
+		"right button\tturn the camera (or arrows)",
+		"middle button\tmove it",
+		"wheel\tnearer, farther (or page up, down)",
+		"Home\tthe camera as at first",
+		"F1, h\tthis help",
+		"g\tgraphs",
+	};
+	enum { OWN = sizeof(own) / sizeof(own[0]), MOST = 24 };
+	const char *all[MOST];
+	int count = 0;
+
+	for (int i = 0; i < n && count < MOST - OWN; i++)
+		all[count++] = lines[i];
+	for (int i = 0; i < OWN; i++)
+		all[count++] = own[i];
+	return incise_overlay_set_keys(view->overlay, all, count);
+}
+
+void incise_view_camera(const struct incise_view *view, struct incise_view_camera *camera)
+{
+	*camera = view->orbit.camera;
+}
+
+void incise_view_set_camera(struct incise_view *view,
+			    const struct incise_view_camera *camera)
+{
+	struct incise_view_camera held = *camera;
+
+	if (incise_eye_hold(&held))
+		view->orbit.camera = held;
+}
+
+void incise_view_ray(const struct incise_view *view, double x_px, double y_px,
+		     struct incise_view_ray *ray)
+{
+	struct incise_touch touch;
+	struct incise_eye eye;
+	double up_mm = 0, up[3] = {0};
+
+	memset(ray, 0, sizeof(*ray));
+	if (!isfinite(x_px) || !isfinite(y_px))
+		return;
+	incise_eye_look(&view->orbit.camera, view->width, view->height, 1, &eye);
+	v3_copy(ray->from_mm, eye.eye_mm);
+	incise_eye_way(&eye, view->width, view->height, x_px, y_px, ray->way);
+	/*
+	 * What is seen there stands above what is felt by a relief that is known where the
+	 * ray meets it only: so some rounds, each with the last one's.
+	 */
+	for (int i = 0; i < 4; i++) {
+		double from[3], to[3];
+
+		v3_add(from, ray->from_mm, -up_mm, up);
+		v3_add(to, from, 2 * view->orbit.camera.distance_mm + 1e4, ray->way);
+		ray->met = incise_surface_enters(view->surface, from, to, &touch);
+		if (!ray->met)
+			return;
+		v3_copy(ray->point_mm, touch.point_mm);
+		v3_copy(ray->normal, touch.normal);
+		up_mm = relief_at(view, ray->point_mm, up);
+		if (up_mm == 0)
+			return;
+	}
+}
+
+int incise_view_event(struct incise_view *view, struct incise_view_event *event)
+{
+	if (!view->window || !incise_window_event(view->window, event))
+		return 0;
+	if (event->type == INCISE_VIEW_MOTION || event->type == INCISE_VIEW_BUTTON ||
+	    event->type == INCISE_VIEW_WHEEL)
+		incise_view_ray(view, event->x_px, event->y_px, &event->ray);
+	event->used = incise_orbit_event(&view->orbit, event, view->height);
+	if (event->type == INCISE_VIEW_KEY && event->pressed && !event->repeat) {
+		bool help = event->key == INCISE_VIEW_F1 || event->key == 'h';
+
+		view->keys ^= help;
+		view->panel ^= event->key == 'g';
+		event->used |= help || event->key == 'g';
+	}
+	return 1;
+}
+
+void incise_view_report(const struct incise_view *view, struct incise_view_report *report)
+{
+	struct incise_effects_report effects;
+
+	incise_effects_report(view->effects, &effects);
+	*report = (struct incise_view_report){
+		.cut_mm = effects.cut_mm,
+		.stamps = effects.stamps,
+		.blood_ul_emitted = effects.blood_ul_emitted,
+		.blood_ul_drops = effects.blood_ul_drops,
+		.blood_ul_trails = effects.blood_ul_trails,
+		.blood_ul_off = effects.blood_ul_off,
+		.drops = effects.drops,
+		.uploads = view->uploads,
+		.uploaded_texels = view->uploaded_texels,
+		.ticks = view->ticks,
+		.frames = view->frames,
+		.ticks_s = view->ticks_s,
+		.texture_s = view->texture_s,
+		.draw_s = view->draw_s,
+		.triangles = view->chart->n_indices / 3,
+		.texture_px = view->chart->size,
+		.renderer = incise_draw_renderer(view->draw),
+		.samples = incise_draw_samples(view->draw),
+	};
+}

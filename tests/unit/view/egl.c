@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Contexts without a screen.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <epoxy/gl.h>
+#include "look.h"
+
+static void test_two_do_not_meddle(void **state)
+{
+	struct incise_egl *a = look_context(), *b;
+	unsigned texture = 0;
+
+	if (!a)
+		skip();
+	assert_true(epoxy_gl_version() >= 33);
+	glGenTextures(1, &texture);
+	glBindTexture(GL_TEXTURE_2D, texture);
+	assert_true(glIsTexture(texture));
+	b = incise_egl_new(NULL);
+	assert_non_null(b);
+	assert_false(glIsTexture(texture));
+	assert_int_equal(incise_egl_current(a, NULL), 0);
+	assert_true(glIsTexture(texture));
+	/* One that is not current goes without harm for the one that is. */
+	incise_egl_free(b);
+	assert_true(glIsTexture(texture));
+	assert_int_equal(glGetError(), GL_NO_ERROR);
+	incise_egl_free(a);
+	incise_egl_free(NULL);
+}
+
+static void test_again_and_again(void **state)
+{
+	for (int i = 0; i < 5; i++) {
+		struct incise_egl *egl = look_context();
+
+		if (!egl)
+			skip();
+		assert_int_equal(incise_egl_current(egl, NULL), 0);
+		incise_egl_free(egl);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_two_do_not_meddle),
+		cmocka_unit_test(test_again_and_again),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Instruments' meshes, and where a tick puts them.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <string.h>
+#include "../../../lib/base/vector.h"
+#include "../../../lib/view/instrument.h"
+
+static const struct incise_scene_scalpel scalpel = {{0, 0, 1}, {0, 1, 0}, 120};
+
+static double signed_volume(const struct incise_instrument_mesh *mesh)
+{
+	double volume = 0;
+
+	for (int i = 0; i < mesh->n_indices; i += 3) {
+		double p[3][3], c[3];
+
+		for (int j = 0; j < 3; j++)
+			for (int k = 0; k < 3; k++)
+				p[j][k] = mesh->vertices[mesh->indices[i + j]]
+						  .position_mm[k];
+		v3_cross(c, p[1], p[2]);
+		volume += v3_dot(p[0], c) / 6;
+	}
+	return volume;
+}
+
+static void check(const struct incise_instrument_mesh *mesh, double low[3],
+		  double high[3])
+{
+	assert_in_range(mesh->n_indices / 3, 100, 999);
+	assert_int_equal(mesh->n_indices % 3, 0);
+	for (int k = 0; k < 3; k++) {
+		low[k] = INFINITY;
+		high[k] = -INFINITY;
+	}
+	for (int i = 0; i < mesh->n_vertices; i++) {
+		const struct incise_instrument_vertex *v = &mesh->vertices[i];
+		double n = 0;
+
+		for (int k = 0; k < 3; k++) {
+			assert_true(isfinite(v->position_mm[k]));
+			low[k] = fmin(low[k], v->position_mm[k]);
+			high[k] = fmax(high[k], v->position_mm[k]);
+			n += v->normal[k] * v->normal[k];
+			assert_true(v->rgb[k] >= 0 && v->rgb[k] <= 1);
+		}
+		/* The shader makes it unit; steel's leans on purpose. */
+		assert_true(n > 0.2 && n < 4);
+	}
+	for (int i = 0; i < mesh->n_indices; i++)
+		assert_true(mesh->indices[i] < (uint32_t)mesh->n_vertices);
+}
+
+static void test_scalpel(void **state)
+{
+	static const double lengths[] = {1, 40, 120, 1000};
+	struct incise_instrument_mesh mesh;
+	double low[3], high[3];
+
+	for (int i = 0; i < 4; i++) {
+		double h = lengths[i];
+
+		assert_int_equal(incise_instrument_scalpel(h, &mesh), 0);
+		check(&mesh, low, high);
+		/* From the tip to the handle's end; floats. */
+		assert_true(fabs(low[2]) < 1e-5 && fabs(high[2] - h) < 1e-3);
+		/* Flat side to y. */
+		assert_true(high[0] - low[0] > 1.5 * (high[1] - low[1]));
+		/* Turned outwards: a volume, of about 8 × 4 × 90 mm for the usual one. */
+		assert_true(signed_volume(&mesh) > 0);
+		if (h == 120)
+			assert_true(signed_volume(&mesh) > 1500 &&
+				    signed_volume(&mesh) < 4500);
+		incise_instrument_free(&mesh);
+		assert_null(mesh.vertices);
+	}
+}
+
+static void test_tube(void **state)
+{
+	struct incise_instrument_mesh mesh;
+	double low[3], high[3];
+
+	assert_int_equal(incise_instrument_tube(&mesh), 0);
+	check(&mesh, low, high);
+	assert_true(fabs(low[2]) < 1e-5);
+	/* 8 mm thick at its end, 15 mm at the top, and bent to -x. */
+	assert_true(fabs(high[1] - 7.5) < 1e-3 && fabs(low[1] + 7.5) < 1e-3);
+	assert_true(high[0] < 8 && low[0] < -25);
+	incise_instrument_free(&mesh);
+}
+
+static void expect(const struct incise_instrument_place *place, const double x[3],
+		   const double z[3])
+{
+	double y[3];
+
+	for (int k = 0; k < 3; k++) {
+		assert_true(fabs(place->x[k] - x[k]) < 1e-12);
+		assert_true(fabs(place->z[k] - z[k]) < 1e-12);
+	}
+	v3_cross(y, place->z, place->x);
+	for (int k = 0; k < 3; k++)
+		assert_true(fabs(place->y[k] - y[k]) < 1e-12);
+}
+
+static void test_place(void **state)
+{
+	struct incise_instrument_place place;
+	struct incise_tick tick = {.position_mm = {1, 2, 3},
+				   .tool_mm = {4, 5, 6},
+				   .quaternion = {1, 0, 0, 0},
+				   .tool = INCISE_TOOL_BLADE};
+
+	assert_true(incise_instrument_place(&scalpel, &tick, &place));
+	expect(&place, (double[]){1, 0, 0}, (double[]){0, 0, 1});
+	assert_true(!place.tube && place.origin_mm[0] == 1);
+	/* A quarter round x: what was up is -y. A handle is the scalpel's, at its tip. */
+	tick.quaternion[0] = tick.quaternion[1] = M_SQRT1_2;
+	tick.tool = INCISE_TOOL_HANDLE;
+	assert_true(incise_instrument_place(&scalpel, &tick, &place));
+	expect(&place, (double[]){1, 0, 0}, (double[]){0, -1, 0});
+	assert_true(!place.tube && place.origin_mm[2] == 3);
+	tick.tool = INCISE_TOOL_TUBE;
+	assert_true(incise_instrument_place(&scalpel, &tick, &place));
+	assert_true(place.tube && place.origin_mm[0] == 4);
+}
+
+static void test_nowhere(void **state)
+{
+	static const struct incise_scene_scalpel odd = {{0, 0, 1}, {0, 0, 1}, 120};
+	const struct incise_tick good = {.quaternion = {1, 0, 0, 0},
+					 .tool = INCISE_TOOL_BLADE};
+	struct incise_instrument_place place;
+	struct incise_tick tick = good;
+
+	/* Side along the axis: some frame, a right one. */
+	assert_true(incise_instrument_place(&odd, &tick, &place));
+	assert_true(fabs(v3_length(place.x) - 1) < 1e-12);
+	assert_true(fabs(v3_dot(place.x, place.z)) < 1e-12);
+
+	tick.quaternion[0] = 0;
+	assert_false(incise_instrument_place(&scalpel, &tick, &place));
+	tick.quaternion[2] = NAN;
+	assert_false(incise_instrument_place(&scalpel, &tick, &place));
+	tick = good;
+	tick.position_mm[1] = INFINITY;
+	assert_false(incise_instrument_place(&scalpel, &tick, &place));
+	tick.position_mm[1] = 1e7;
+	assert_false(incise_instrument_place(&scalpel, &tick, &place));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_scalpel),
+		cmocka_unit_test(test_tube),
+		cmocka_unit_test(test_place),
+		cmocka_unit_test(test_nowhere),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
