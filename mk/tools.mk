@@ -10,8 +10,9 @@ $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 # The kernel module's own interface, for those who look at it past the library.
 $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o): cppflags += -Idriver
 
-extra_demo := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
-extra_info := $(extra_demo) $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o \
+demo_pictures := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
+extra_demo := $(demo_pictures) $(O)/obj/tools/demo_scene.o
+extra_info := $(demo_pictures) $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o \
 	bus_report.o stream_report.o)
 extra_calibrate-tip := $(addprefix $(O)/obj/tools/,calibrate_result.o tip_poses.o picture.o)
 extra_calibrate-delay := $(addprefix $(O)/obj/tools/,calibrate_result.o delay_streams.o picture.o)
@@ -41,6 +42,14 @@ extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o \
 	bench_vision.o scalpel_picture.o bench_capture.o jpeg_camera.o)
 
+extra_view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o state_pages.o view_hand.o \
+	view_live.o view_output.o png_file.o)
+
+extra_bench-view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o view_script.o \
+	similarity.o picture.o machine.o stopwatch.o memory_file.o bench_view_frames.o \
+	bench_view_error.o bench_view_live.o view_live.o bench_wakeup.o wakeup_run.o \
+	bench_load.o cyclictest.o child.o bench_tick.o tick_cost.o stroke.o)
+
 # Pictures that incise bench has coded before it measures.
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/jpeg_camera.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
@@ -48,7 +57,8 @@ libs_bench := $(if $(has_jpeg),-ljpeg)
 
 # Picture files that depth is calibrated from.
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
-$(O)/obj/tools/depth_picture.o: cppflags += $(if $(has_png),-DHAVE_PNG)
+$(O)/obj/tools/depth_picture.o $(O)/obj/tools/png_file.o: cppflags += $(if $(has_png),-DHAVE_PNG)
+libs_view := $(if $(has_png),-lpng)
 libs_calibrate-depth := $(if $(has_png),-lpng)
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
@@ -101,5 +111,6 @@ bench: ## measure error against run time on this machine; chart in build/bench/
 	$(O)/bin/incise bench stability --plot $(O)/bench/stability
 	$(O)/bin/incise bench vision
 	$(O)/bin/incise bench capture
+	$(if $(has_view),$(O)/bin/incise bench view --plot $(O)/bench/view)
 
 .PHONY: tools deps demo bench

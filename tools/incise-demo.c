@@ -27,11 +27,12 @@
 #include <incise/sim.h>
 #include <incise/version.h>
 #include "cli.h"
+#include "demo_scene.h"
 #include "json.h"
 #include "model_picture.h"
 #include "picture.h"
 
-enum { OPT_SEED = CLI_LONG, OPT_LOOP, OPT_FORCE, OPT_JSON };
+enum { OPT_SEED = CLI_LONG, OPT_LOOP, OPT_SCENE, OPT_FORCE, OPT_JSON };
 
 /* What the paper reports after 80 epochs, §4.3. Its data are not published. */
 #define PAPER_MSE_TRAIN 0.036
@@ -50,6 +51,8 @@ static const struct cli_option options[] = {
 	{'o', "output", "DIR", "folder to leave everything in (default demo.out)"},
 	{OPT_SEED, "seed", "N", "of the virtual rig (default 1)"},
 	{OPT_LOOP, "loop", "TIME", "length of the haptic loop (default 10s)"},
+	{OPT_SCENE, "scene", "SCENE",
+	 "paper 2 instead: a film and a strip of a procedure on this scene, as neck"},
 	{OPT_FORCE, "force", NULL, "write into a folder that exists"},
 	{OPT_JSON, "json", NULL, "print the summary as JSON, and nothing else"},
 	{0},
@@ -686,7 +689,7 @@ static void draw_all(const struct incise_model *model)
 
 int main(int argc, char **argv)
 {
-	const char *loop_time = "10s";
+	const char *loop_time = "10s", *scene = NULL;
 	struct incise_model *model;
 	struct timespec begin, end;
 	bool force = false;
@@ -705,6 +708,9 @@ int main(int argc, char **argv)
 			cli_duration("loop", optarg, 0.2, 3600);
 			loop_time = optarg;
 			break;
+		case OPT_SCENE:
+			scene = optarg;
+			break;
 		case OPT_FORCE:
 			force = true;
 			break;
@@ -714,6 +720,12 @@ int main(int argc, char **argv)
 		}
 	if (optind != argc)
 		cli_usage("'%s': demo takes options only", argv[optind]);
+	if (scene && quiet)
+		cli_usage("--scene makes pictures, and has nothing to say as JSON");
+	if (scene) {
+		demo_scene(scene, folder, force);
+		return 0;
+	}
 	if (!picture_possible())
 		cli_fail(
 			"gnuplot is not installed, it draws the pictures: apt-get install "

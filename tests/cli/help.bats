@@ -8,6 +8,8 @@ setup() {
 	[ "$(wc -w <<<"$verbs")" -ge 8 ]
 	# "calibrate force": incise-calibrate-force
 	words=$(cd "$root/tools" && find . -name 'incise-calibrate-*.c' | sed 's/.*incise-//; s/-/ /; s/\.c$//')
+	# built where a screen's libraries are
+	[ ! -e "$INCISE_BUILD/bin/incise-bench-view" ] || words+=$'\nbench view'
 	mapfile -t all < <(printf '%s\n' "$verbs" "$words" | sed '/^$/d')
 }
 

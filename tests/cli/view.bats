@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise view, as a user meets it: to files without a screen, and in a window of an X server of
+# its own, moved by a mouse.
+
+load cli
+
+setup_file() {
+	export XDG_RUNTIME_DIR="$BATS_FILE_TMPDIR/run"
+	mkdir -p "$XDG_RUNTIME_DIR"
+}
+
+setup() {
+	work_folder
+	[ -x "$INCISE_BUILD/bin/incise-view" ] ||
+		skip "incise view was not built: SDL2, epoxy, cairo or EGL were absent"
+	cp "$root"/scenes/*.scene "$root"/scenes/*.fis .
+	# Small, so that a drawing processor has little to do.
+	small="--size 160x120 --no-panel"
+	sed -i 's/picture = {/picture = {\n  texture_px = 512;/' neck.scene
+	incise view wall --procedure --strip probe.png --at 0s --duration 0.05s $small 2>why ||
+		skip "no OpenGL here: $(cat why)"
+}
+
+teardown() {
+	for one in $pid $server; do
+		kill -9 "$one" 2>/dev/null || :
+	done
+}
+
+@test "the same ticks make the same pictures, however many are drawn" {
+	incise view neck --procedure --frames a --fps 4 --duration 4s $small
+	incise view neck --procedure --frames b --fps 12 --duration 4s $small
+	[ "$(find a -name 'frame-*.png' | wc -l)" -ge 16 ]
+	for i in 0 4 8 12 15; do
+		cmp "a/frame-$(printf %06d $i).png" "b/frame-$(printf %06d $((3 * i))).png"
+	done
+	# They do show something: the cut begins after 1 s.
+	! cmp -s a/frame-000003.png a/frame-000012.png
+}
+
+@test "a scene shows what it says, and counts it" {
+	incise view neck --procedure --frames f --fps 2 --duration 8s --json $small >r.json
+	# 30 mm by script, less what the threshold of a depth leaves out at its ends
+	holds "$(key r.json cut_mm) > 25 && $(key r.json cut_mm) < 33"
+	holds "$(key r.json blood_ul) > 0"
+	# what came is somewhere: sums of doubles of 1e6 steps
+	seen="$(key r.json blood_in_drops_ul) + $(key r.json blood_in_trails_ul)"
+	gone=$(key r.json blood_off_ul)
+	holds "($(key r.json blood_ul) - ($seen) - $gone)^2 < 1e-12 * $(key r.json blood_ul)^2"
+	sed -i 's/bleeding = true/bleeding = false/' neck.scene
+	incise view neck --procedure --frames f --fps 2 --duration 4s --json $small >r.json
+	holds "$(key r.json cut_mm) > 25"
+	[ "$(key r.json blood_ul)" = 0.0 ]
+	sed -i 's/wound = true/wound = false/' neck.scene
+	incise view neck --procedure --frames f --fps 2 --duration 4s --json $small >r.json
+	[ "$(key r.json stamps)" = 0 ]
+	[ "$(key r.json texels_uploaded)" = 0 ]
+}
+
+@test "a film and a strip are whole files, or none" {
+	[ -e "$INCISE_BUILD/lib/incise/film_mkv.so" ] || skip "film_mkv.so is not built"
+	incise view neck --procedure --video n.mkv --strip n.png --at 1s,2s --fps 10 --duration 3s $small
+	[ "$(head -c 4 n.mkv | od -An -tx1 | tr -d ' \n')" = 1a45dfa3 ]
+	[ "$(stat -c %s n.mkv)" -gt 2000 ]
+	[ ! -e n.mkv.part ]
+	[ "$(head -c 24 n.png | tail -c 8 | od -An -tu1 | tr -s ' \n' ' ')" = " 0 0 1 64 0 0 0 120 " ]
+	run --separate-stderr incise view neck --procedure --video no/n.mkv --duration 1s $small
+	failed_with no/n.mkv.part "No such file"
+	run --separate-stderr incise view neck --procedure --video /dev/full/x --duration 1s $small
+	failed_with /dev/full
+	run --separate-stderr incise view neck --procedure --frames wall.scene --duration 1s $small
+	failed_with wall.scene
+	run --separate-stderr incise view neck --procedure --strip n.png --at 1s,9s --fps 10 --duration 2s $small
+	[ "$status" -eq 0 ]
+	[[ "$stderr" == *"ends before its picture 2, at 9 s"* ]]
+}
+
+@test "a loop that runs is seen, and not held up" {
+	# Nothing of it is lost: the page holds 8 s.
+	incise haptic neck.scene --rig sim: --no-rt --state "$XDG_RUNTIME_DIR/incise/neck.state" --json \
+		>h.json 2>err 3>&- &
+	pid=$!
+	mkdir -p "$XDG_RUNTIME_DIR/incise"
+	kill -9 $pid && wait $pid || :
+	incise haptic neck.scene --rig sim: --no-rt --state "$XDG_RUNTIME_DIR/incise/neck.state" --json \
+		>h.json 2>err 3>&- &
+	pid=$!
+	for ((i = 0; i < 100; i++)); do
+		incise status neck >/dev/null 2>&1 && break
+		sleep 0.05
+	done
+	incise view neck --frames f --fps 10 --duration 2s --json $small >r.json
+	holds "$(key r.json frames) > 0"
+	[ "$(key r.json ticks_lost)" = 0 ]
+	kill -TERM $pid
+	wait $pid
+	pid=
+	holds "$(key h.json ticks) > 500"
+	run --separate-stderr incise view liver --frames f --duration 1s $small
+	failed_with liver "incise haptic"
+}
+
+@test "a recording is seen through its loop" {
+	incise capture -o r.rec --rig sim:seed=1,clock=simulated,depth_mm=5,times=1 2>/dev/null
+	sed -i 's/skin = "liver"/& ; texture_px = 512/' liver.scene
+	incise view liver.scene --from r.rec --frames f --fps 2 --json $small >r.json
+	# the skin of a plane is 120 mm wide, and the cut begins at its middle
+	holds "$(key r.json cut_mm) > 20 && $(key r.json cut_mm) < 60"
+	run --separate-stderr incise view liver.scene --from none.rec --frames f $small
+	failed_with none.rec
+}
+
+@test "a window: the mouse presses the blade in, and draws it through the skin" {
+	command -v Xvfb >/dev/null && command -v xdotool >/dev/null || skip "Xvfb or xdotool are not installed"
+	Xvfb -displayfd 5 -screen 0 800x600x24 5>display >/dev/null 2>&1 3>&- &
+	server=$!
+	for ((i = 0; i < 200; i++)); do [ -s display ] && break; sleep 0.05; done
+	DISPLAY=:$(cat display)
+	export DISPLAY
+	SDL_VIDEODRIVER=x11 incise view neck.scene --rig sim:mouse --size 640x480 --camera 15,45,140 --json \
+		>r.json 2>err 3>&- &
+	pid=$!
+	window=
+	for ((i = 0; i < 400; i++)); do
+		window=$(xdotool search --name neck.scene 2>/dev/null | head -n 1)
+		[ -n "$window" ] && break
+		sleep 0.05
+	done
+	[ -n "$window" ] || complain "no window: $(cat err)"
+	sleep 1
+	xdotool mousemove --window "$window" 170 170
+	sleep 0.5
+	xdotool mousedown 1
+	sleep 1
+	for ((x = 170; x <= 290; x += 4)); do
+		xdotool mousemove --window "$window" $x 170
+		sleep 0.03
+	done
+	sleep 0.3
+	xdotool mouseup 1
+	sleep 3
+	xdotool key --window "$window" s
+	for ((i = 0; i < 100; i++)); do [ -s neck-1.png ] && break; sleep 0.05; done
+	xdotool key --window "$window" q
+	code=0
+	wait $pid || code=$?
+	pid=
+	[ "$code" = 0 ] || complain "exit $code: $(cat err)"
+	# What a person would look at.
+	mkdir -p "$INCISE_BUILD/artefacts"
+	cp neck-1.png "$INCISE_BUILD/artefacts/view-window.png"
+	# 120 pixels are some 35 mm of skin there, seen aslant; a mouse that was late is shorter.
+	holds "$(key r.json cut_mm) > 10 && $(key r.json cut_mm) < 90"
+	holds "$(key r.json blood_ul) > 0"
+	[ "$(key r.json ticks_lost)" = 0 ]
+}
+
+@test "view: bad usage, and a screen that is not there" {
+	run --separate-stderr incise view
+	bad_usage "one scene, got 0"
+	for wrong in "--procedure --rig sim:" "--procedure --from x.rec" "--frames f" "--strip x.png" "--at 1s" \
+		"--size 10x10" "--size big" "--size 640x480x3" "--fps 0" "--camera 1,2" "--procedure --at 2s,1s --strip x" \
+		"--procedure --video x --size 641x480"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr incise view neck $wrong
+		[ "$status" -eq 2 ] || complain "$wrong: $status $stderr"
+	done
+	run --separate-stderr incise view neck --rig sim:clock=simulated --duration 1s --frames f
+	failed_with "simulated time"
+	run --separate-stderr env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=x11 incise view neck --procedure
+	failed_with "without a screen give --frames"
+}

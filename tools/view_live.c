@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Ticks of a loop that runs; see view_live.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "view_live.h"
+
+#define BATCH 512
+
+struct view_live {
+	struct incise_state *state;
+	uint64_t cursor, lost;
+	struct incise_state_now now;
+	struct incise_tick ticks[BATCH];
+
+	/* A loop of this program. */
+	bool own, started;
+	char page[64];
+	pthread_t thread;
+	struct incise_plan *plan;
+	struct incise_clock *clock;
+	struct incise_loop_options options;
+	struct incise_loop_stats stats;
+	struct incise_error err;
+	volatile sig_atomic_t stop;
+	atomic_int tool, rc;
+	atomic_bool ended;
+};
+
+struct view_live *view_live_open(const char *page, struct incise_error *err)
+{
+	struct view_live *live = calloc(1, sizeof(*live));
+
+	if (!live) {
+		incise_error_set(err, ENOMEM, "no memory to look at a loop");
+		errno = ENOMEM;
+		return NULL;
+	}
+	live->state = incise_state_open(page, err);
+	if (!live->state) {
+		free(live);
+		return NULL;
+	}
+	/* What was cut before one looks is cut. */
+	live->cursor = 0;
+	return live;
+}
+
+static int take_tool(void *context, const struct incise_tick *tick)
+{
+	struct view_live *live = context;
+
+	(void)tick;
+	incise_plan_set_tool(live->plan, (enum incise_tool)atomic_load_explicit(
+						 &live->tool, memory_order_relaxed));
+	return 0;
+}
+
+static void *run(void *argument)
+{
+	struct view_live *live = argument;
+
+	atomic_store(&live->rc, incise_loop_run(live->plan, live->clock, &live->options,
+						&live->stats, &live->err));
+	atomic_store(&live->ended, true);
+	return NULL;
+}
+
+static int start(struct view_live *live, struct incise_error *err)
+{
+	sigset_t all, before;
+	int rc;
+
+	sigfillset(&all);
+	pthread_sigmask(SIG_SETMASK, &all, &before);
+	rc = pthread_create(&live->thread, NULL, run, live);
+	pthread_sigmask(SIG_SETMASK, &before, NULL);
+	live->started = !rc;
+	return rc ? incise_error_set(err, rc, "the loop's thread: %s", strerror(rc)) : 0;
+}
+
+struct view_live *view_live_begin(struct incise_plan *plan, struct incise_rig *rig,
+				  double rate_hz, struct incise_error *err)
+{
+	struct incise_state_setup setup = {.rate_hz = rate_hz,
+					   .rig = incise_rig_spec(rig)};
+	struct view_live *live = calloc(1, sizeof(*live));
+	int rc = -ENOMEM;
+
+	if (!live)
+		return NULL;
+	live->own = true;
+	live->plan = plan;
+	live->clock = incise_rig_clock(rig);
+	live->options = (struct incise_loop_options){.rate_hz = rate_hz,
+						     .stop = &live->stop,
+						     .ticked = take_tool,
+						     .context = live};
+	snprintf(live->page, sizeof(live->page), "/dev/shm/incise-view-%d.state",
+		 (int)getpid());
+	live->options.state = incise_state_new(live->page, &setup, err);
+	if (live->options.state) {
+		incise_state_run(live->options.state, INCISE_RUN_RUNNING, "");
+		live->state = incise_state_open(live->page, err);
+		rc = live->state ? start(live, err) : -errno;
+		/* Nobody else is to find it. */
+		unlink(live->page);
+	} else {
+		rc = -errno;
+	}
+	if (!rc)
+		return live;
+	view_live_close(live);
+	errno = -rc;
+	return NULL;
+}
+
+void view_live_tool(struct view_live *live, enum incise_tool tool)
+{
+	atomic_store_explicit(&live->tool, (int)tool, memory_order_relaxed);
+}
+
+static void tell(const struct view_live *live, struct incise_view_status *status)
+{
+	const struct incise_state_now *now = &live->now;
+
+	*status = (struct incise_view_status){
+		.state = now->alive ? incise_run_name(now->run) : "ended",
+		.rate_hz = now->rate_hz,
+		.lateness_median_us = NAN,
+		.lateness_999_us = NAN,
+		.lost = live->lost,
+	};
+	if (!now->ticks)
+		return;
+	status->lateness_median_us = incise_state_quantile(&now->lateness, 0.5) * 1e-3;
+	status->lateness_999_us = incise_state_quantile(&now->lateness, 0.999) * 1e-3;
+}
+
+int view_live_take(struct view_live *live, struct incise_view *view,
+		   struct incise_view_status *status, struct incise_error *err)
+{
+	int n = BATCH, rc = incise_state_read(live->state, &live->now);
+
+	if (rc && rc != -EAGAIN)
+		return incise_error_set(err, -rc, "the loop's page cannot be read: %s",
+					strerror(-rc));
+	while (n == BATCH) {
+		n = incise_state_ticks(live->state, &live->cursor, live->ticks, BATCH,
+				       &live->lost);
+		if (n < 0)
+			return incise_error_set(err, -n,
+						"the loop's page cannot be read: %s",
+						strerror(-n));
+		incise_view_ticks(view, live->ticks, n);
+	}
+	tell(live, status);
+	if (live->own && atomic_load(&live->ended)) {
+		rc = atomic_load(&live->rc);
+		if (rc)
+			*err = live->err;
+		return rc ? rc : 1;
+	}
+	return !live->own && !live->now.alive;
+}
+
+void view_live_close(struct view_live *live)
+{
+	if (!live)
+		return;
+	live->stop = 1;
+	if (live->started)
+		pthread_join(live->thread, NULL);
+	incise_state_close(live->state);
+	incise_state_free(live->options.state);
+	free(live);
+}
