@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <ftw.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +14,7 @@
 #include "cli.h"
 
 #define UNDER_WAY_US 500000
+#define BLEEDING_S 4
 #define LONGER_S 30 /* than it is needed: the end of one whose bench was killed */
 
 /* One worker per processor, and one at the disk. */
@@ -74,10 +76,11 @@ static const char *begin_stress(enum load load, double seconds, struct load_run 
 	return NULL;
 }
 
-static const char *begin_view(const char *scene, struct load_run *run)
+static const char *begin_view(const char *scene, double seconds, struct load_run *run)
 {
-	char path[PATH_MAX + 20];
-	const char *argv[] = {path, scene, NULL};
+	char path[PATH_MAX + 20], time[24];
+	const char *argv[] = {path,	    scene, "--procedure", "--no-output",
+			      "--duration", time,  NULL};
 	ssize_t n = readlink("/proc/self/exe", path, PATH_MAX - 1);
 	char *slash;
 
@@ -86,7 +89,11 @@ static const char *begin_view(const char *scene, struct load_run *run)
 	strcpy(slash ? slash + 1 : path, "incise-view");
 	if (access(path, X_OK))
 		return "incise-view is not there";
-	run->pid = child_begin((char *const *)argv, -1);
+	snprintf(time, sizeof(time), "%.0f", seconds + LONGER_S);
+	run->said = memory_file_begin("view");
+	run->pid = child_begin((char *const *)argv, fileno(run->said.file));
+	/* Until the skin is painted and the cut bleeds. */
+	sleep(BLEEDING_S);
 	return NULL;
 }
 
@@ -99,7 +106,7 @@ const char *load_begin(enum load load, const char *scene, double seconds,
 	*run = (struct load_run){0};
 	if (load == LOAD_IDLE)
 		return NULL;
-	why = load == LOAD_VIEW ? begin_view(scene, run)
+	why = load == LOAD_VIEW ? begin_view(scene, seconds, run)
 				: begin_stress(load, seconds, run);
 	if (why)
 		return why;
@@ -112,11 +119,20 @@ const char *load_begin(enum load load, const char *scene, double seconds,
 	return NULL;
 }
 
-void load_end(struct load_run *run)
+double load_end(struct load_run *run)
 {
+	double frames_hz = NAN;
+
 	if (run->pid)
 		child_end(run->pid, 0);
+	if (run->said.file) {
+		rewind(run->said.file);
+		if (fscanf(run->said.file, "%lf", &frames_hz) != 1)
+			frames_hz = NAN;
+		fclose(run->said.file);
+	}
 	if (*run->folder)
 		nftw(run->folder, remove_one, 8, FTW_DEPTH | FTW_PHYS);
 	*run = (struct load_run){0};
+	return frames_hz;
 }

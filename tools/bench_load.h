@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * What keeps the machine busy while wake-ups are measured: nothing, stress-ng on processors,
- * memory or disk, or the picture of `incise view` being drawn.
+ * memory or disk, or the picture of `incise view`, which is drawn 60 times a second.
  */
 #ifndef INCISE_BENCH_LOAD_H
 #define INCISE_BENCH_LOAD_H
@@ -9,6 +9,7 @@
 #include <limits.h>
 #include <stdbool.h>
 #include <sys/types.h>
+#include "memory_file.h"
 
 enum load { LOAD_IDLE, LOAD_CPU, LOAD_MEMORY, LOAD_DISK, LOAD_VIEW, LOADS };
 
@@ -18,6 +19,7 @@ const char *load_name(enum load load);
 struct load_run {
 	pid_t pid;	       /* 0: nothing runs */
 	char folder[PATH_MAX]; /* where a disk is kept busy, or empty */
+	struct memory_file said;
 };
 
 /*
@@ -27,6 +29,7 @@ struct load_run {
 const char *load_begin(enum load load, const char *scene, double seconds,
 		       struct load_run *run);
 
-void load_end(struct load_run *run);
+/* Returns how many pictures were drawn in a second; NaN of other loads. */
+double load_end(struct load_run *run);
 
 #endif

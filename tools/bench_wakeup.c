@@ -40,7 +40,7 @@ static void measure(const char *scene, const struct wakeups *wakeups,
 		cli_progress("wake-ups at %g Hz, %s, %.3g s", row->rate_hz,
 			     load_name(row->load), wakeups->seconds);
 		wakeup_run(&setup, &row->got);
-		load_end(&load);
+		row->frames_hz = load_end(&load);
 	}
 	if (no_cyclictest)
 		row->got.no_cyclictest = no_cyclictest;
@@ -48,8 +48,7 @@ static void measure(const char *scene, const struct wakeups *wakeups,
 		fclose(own.file);
 }
 
-/* The last one: interrupts are more often the first one's. */
-static int last_cpu(void)
+int wakeup_cpu(void)
 {
 	cpu_set_t cpus;
 	int last = 0;
@@ -75,8 +74,7 @@ static double scene_rate(const char *path)
 	return rate_hz;
 }
 
-/* As incise haptic does it, with the CPU; NULL where it is not granted. */
-static struct incise_realtime *ask_realtime(int cpu)
+struct incise_realtime *wakeup_realtime(int cpu)
 {
 	const struct incise_realtime_setup setup = {
 		.policy = INCISE_REALTIME_FIFO,
@@ -95,12 +93,12 @@ void bench_wakeup(const char *scene, enum load only, double seconds,
 	int rates = scene ? 1 : sizeof(own_rates_hz) / sizeof(*own_rates_hz);
 	struct incise_realtime *realtime;
 
-	*wakeups = (struct wakeups){.seconds = seconds, .cpu = last_cpu()};
+	*wakeups = (struct wakeups){.seconds = seconds, .cpu = wakeup_cpu()};
 	wakeups->row = calloc((size_t)rates * LOADS, sizeof(*wakeups->row));
 	if (!wakeups->row)
 		cli_fail("no memory");
 	incise_realtime_prepare();
-	realtime = ask_realtime(wakeups->cpu);
+	realtime = wakeup_realtime(wakeups->cpu);
 	wakeups->realtime = realtime;
 	cli_catch_signals();
 	for (int i = 0; i < rates; i++)
@@ -112,6 +110,7 @@ void bench_wakeup(const char *scene, enum load only, double seconds,
 			row->load = load;
 			row->rate_hz = scene ? scene_rate(scene) : own_rates_hz[i];
 			row->got.ratio = NAN;
+			row->frames_hz = NAN;
 			measure(scene, wakeups, realtime, row);
 			wakeups->n++;
 		}
@@ -148,7 +147,7 @@ json_t *wakeups_json(const struct wakeups *wakeups)
 
 		json_array_append_new(
 			list,
-			json_pack("{ss so so so so so sI so so so}", "load",
+			json_pack("{ss so so so so so sI so so so so}", "load",
 				  load_name(row->load), "rate_hz",
 				  json_number(row->rate_hz), "no_load",
 				  text_or_null(row->no_load), "no_cyclictest",
@@ -161,7 +160,8 @@ json_t *wakeups_json(const struct wakeups *wakeups)
 				  "ratio_p999", json_number(row->got.ratio),
 				  "tick_max_us",
 				  json_number(row->got.loop.bins ? row->got.tick_max_us
-								 : NAN)));
+								 : NAN),
+				  "frames_hz", json_number(row->frames_hz)));
 	}
 	return json_pack("{sf ss so si so}", "seconds", wakeups->seconds, "policy",
 			 wakeups->realtime ? "fifo" : "other", "priority",
@@ -179,6 +179,7 @@ static void print_lateness(const char *program, const struct lateness *l)
 void wakeups_print(const struct wakeups *wakeups)
 {
 	const char *said = NULL;
+	double drawn_hz = NAN;
 
 	printf("\nwake-ups, us late; %.3g s each; %s", wakeups->seconds,
 	       wakeups->realtime ? "SCHED_FIFO"
@@ -198,6 +199,8 @@ void wakeups_print(const struct wakeups *wakeups)
 		}
 		print_lateness("loop", &row->got.loop);
 		printf(" %8llu", (unsigned long long)row->got.skipped);
+		if (row->frames_hz > 0)
+			drawn_hz = row->frames_hz;
 		if (row->got.no_cyclictest) {
 			said = row->got.no_cyclictest;
 			printf("\n");
@@ -208,6 +211,8 @@ void wakeups_print(const struct wakeups *wakeups)
 		print_lateness("cyclictest", &row->got.cyclictest);
 		printf("\n");
 	}
+	if (drawn_hz > 0)
+		printf("view: %.1f pictures a second\n", drawn_hz);
 	if (said)
 		printf("%s\n", said);
 }

@@ -16,6 +16,7 @@ struct wakeup_row {
 	double rate_hz;
 	const char *no_load; /* why it was not measured, or NULL */
 	struct wakeup got;
+	double frames_hz; /* pictures drawn meanwhile, of the view; or NaN */
 };
 
 struct wakeups {
@@ -32,6 +33,12 @@ struct wakeups {
  */
 void bench_wakeup(const char *scene, enum load only, double seconds,
 		  struct wakeups *wakeups);
+
+/* The last CPU: interrupts are more often the first one's. */
+int wakeup_cpu(void);
+
+/* As incise haptic asks for it, with the CPU; NULL where it is not granted. */
+struct incise_realtime *wakeup_realtime(int cpu);
 
 /* {"min", "median", "p99", "p999", "p9999", "max", "ticks"}, or null. */
 json_t *lateness_json(const struct lateness *lateness);

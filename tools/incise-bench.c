@@ -32,7 +32,7 @@ static const struct cli_verb verb = {
 	.name = "bench",
 	.synopsis =
 		"precision [MODEL.fis] | training | stability | loop [SCENE] | vision | capture "
-		"[RUN] [OPTIONS]",
+		"[RUN] | view [SCENE] [OPTIONS]",
 	.summary =
 		"precision: measure error against run time of a model's arithmetics. Without\n"
 		"MODEL a model of the paper's size (20 rules) is made.\n"
@@ -46,7 +46,9 @@ static const struct cli_verb verb = {
 		"vision: measure error and run time of the exposed length in pictures whose truth\n"
 		"is known.\n"
 		"capture: measure how much of a core it takes to record all streams in real time,\n"
-		"and with parts left out; or one RUN of these.",
+		"and with parts left out; or one RUN of these.\n"
+		"view: measure what the picture of a scene costs, and how far off it is; see\n"
+		"'incise bench view --help'.",
 	.options = options,
 	.notes =
 		"Exit: 0 measured, 1 failed or simulation and theory differ, 2 bad usage.\n"
@@ -134,6 +136,9 @@ int main(int argc, char **argv)
 		}
 	while (optind < argc && what < WORDS && strcmp(argv[optind], words[what].word))
 		what++;
+	if (optind < argc && !strcmp(argv[optind], "view"))
+		cli_usage("'view' stands right behind 'incise bench', and is built where "
+			  "SDL2, libepoxy, cairo and EGL are");
 	if (optind >= argc || what == WORDS ||
 	    argc - optind > (words[what].operand ? 2 : 1))
 		cli_usage(

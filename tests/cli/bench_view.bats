@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise bench view, as a user meets it: the form of what it says. Times are not judged here.
+
+load cli
+
+setup() {
+	[ -e "$INCISE_BUILD/bin/incise-bench-view" ] ||
+		skip "incise-bench-view is not built: SDL2, epoxy, cairo or EGL was absent"
+	work_folder
+}
+
+# Whether OpenGL draws here without a screen.
+draws() {
+	incise view "$root/scenes/neck.scene" --procedure --no-output --duration 0.1s \
+		>out 2>err || skip "nothing draws here: $(cat err)"
+}
+
+@test "incise view --no-output says how often it drew" {
+	draws
+	[ "$(wc -l <out)" = 1 ]
+	[[ "$(cat out)" =~ ^[0-9.]+\ frames\ per\ second:\ [0-9]+\ in\ [0-9.]+\ s,\ 1280x720,\ 2048\ texels,\ .+ ]]
+	run --separate-stderr incise view "$root/scenes/neck.scene" --procedure --no-output \
+		--strip a.png --at 1s
+	bad_usage "--no-output"
+}
+
+@test "bench view reports as JSON, and draws a chart" {
+	draws
+	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
+	run -0 --separate-stderr incise bench view --quick --json --plot "a folder/v"
+	[ -z "$stderr" ]
+	echo "$output" >r.json
+	[ "$(key r.json quick)" = 1 ]
+	[ -n "$(key r.json renderer)" ]
+	[ "$(key r.json frames[0].texture_px) $(key r.json frames[0].width)" = "2048 1280" ]
+	holds "$(key r.json frames[0].triangles) >= 19000"
+	for i in 0 1 2 3 4 5; do
+		for part in effects texture draw whole; do
+			median=$(key r.json "frames[$i].${part}_ms.median")
+			holds "$median > 0 && $median <= $(key r.json "frames[$i].${part}_ms.p99")"
+		done
+		holds "$(key r.json "frames[$i].texels") > 0"
+	done
+	# of the same ticks: the finer the texture, the nearer; the more frames, the nearer
+	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '$.shown.rows')")" = 15 ]
+	exact() {
+		sqlite3 :memory: "SELECT json_extract(value, '\$.$2')
+			FROM json_each(readfile('r.json'), '\$.shown.rows')
+			WHERE json_extract(value, '\$.texture_px') = $1
+			AND json_extract(value, '\$.fps') IS ${3:-NULL}"
+	}
+	holds "$(exact 512 rms) > $(exact 1024 rms) && $(exact 1024 rms) > $(exact 2048 rms)"
+	holds "$(exact 512 ssim) < $(exact 1024 ssim) && $(exact 2048 ssim) < 1"
+	holds "$(exact 4096 rms 15) > $(exact 4096 rms 60) && $(exact 4096 rms 60) > 0"
+	holds "$(exact 2048 rms 15) > $(exact 2048 rms)"
+	# no cut is lost, however busy the machine
+	[ "$(key r.json absorbed.lost)" = 0 ]
+	holds "$(key r.json absorbed.ticks) > 0 && $(key r.json absorbed.stamps) > 0"
+	[ "$(key r.json beside.runs[0].load) $(key r.json beside.runs[1].load)" = "idle view" ]
+	holds "$(key r.json beside.runs[1].frames_hz) > 0"
+	holds "$(key r.json beside.p999_us) > 0 && $(key r.json beside.p999_view_us) > 0"
+	[ "$(head -c 8 "a folder/v.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
+	grep -q 'texture 2048' "a folder/v.svg"
+}
+
+@test "bench view: bad usage" {
+	run --separate-stderr incise bench view a b
+	bad_usage "at most one scene"
+	run --separate-stderr incise bench view --plot a/
+	bad_usage "--plot"
+	run --separate-stderr incise bench view none.scene
+	failed_with none.scene
+	run --separate-stderr incise bench --json view
+	bad_usage "'view' stands right behind"
+}
