@@ -12,7 +12,7 @@
 #define ROUND_S (FILM_ROUND_STEPS * 0.01)
 #define ROUNDS_MOST 10
 /* In a step, so that there is an end to its time however much blood there is. */
-#define VISITS_MOST 64
+#define VISITS_MOST 24
 /* No texel gives more than that part of itself in a visit: the scheme is explicit. */
 #define FLOW_MOST 0.4
 /* With less in a round it is not visited in each, or each fourth. */

@@ -16,7 +16,7 @@
 /* Difference of the cosines of the advancing and the receding angle, on dry skin. */
 #define HYSTERESIS 0.05
 /* Part of it that is left on wet skin, and while a drop moves. */
-#define WET 0.35
+#define WET 0.7
 #define MOVING 0.75
 /* C of the drag: some 6 ln(r / slip length) / angle, both sides of the wedge. */
 #define DRAG 110.0
@@ -50,13 +50,15 @@
 #define LEAST_UNITS (int64_t)(0.03 / BLOOD_UNIT_UL)
 /* A change that is seen, in mm. */
 #define SEEN_MM 0.04
+/* It is looked for in each so many steps, not in all drops at once. */
+#define SHOWN_EACH 3
 #define SEEN 0.03
 /* 1 / sqrt(1 - FILM_ROUGH), rounded up. */
 #define ROUGHEST 1.2
-/* Shapes of drops, in radii of a round one, and by what part they change in a step. */
+/* Shapes of drops, in radii of a round one, and by what part they change when shown. */
 #define HANGS_ALONG 1.7
 #define HANGS_ACROSS 0.7
-#define TURNS_INTO 0.08
+#define TURNS_INTO 0.22
 
 void drops_init(struct drops *drops, struct film *film,
 		const struct incise_scene_picture *picture, uint32_t key)
@@ -329,6 +331,9 @@ static void step_drop(struct drops *drops, struct drop *drop)
 	}
 	if (drop->source < 0 && drop->units < LEAST_UNITS)
 		sink(drops, drop, radius, drop->units);
+	if (drop->units &&
+	    (drops->film->step + (uint64_t)(drop - drops->drop)) % SHOWN_EACH)
+		return;
 	if (drop->units)
 		show(drops, drop, &ground);
 	else
