@@ -188,6 +188,43 @@ static void write_data(const struct shown_rows *rows, FILE *out)
 	}
 }
 
+/* Of 1, 2, 5, 10 … all that are near the axis. */
+static void set_axis(FILE *script, char axis, double low, double high)
+{
+	double decade = pow(10, floor(log10(low)));
+
+	fprintf(script, "set %crange [%g:%g]\nset %ctics (", axis, low / 1.3, high * 1.5,
+		axis);
+	for (int i = 0; decade < high * 2; i++) {
+		static const double part[] = {1, 2, 5};
+
+		fprintf(script, "%s%g", i ? ", " : "", part[i % 3] * decade);
+		if (i % 3 == 2)
+			decade *= 10;
+	}
+	fputs(")\n", script);
+}
+
+static void set_axes(FILE *script, const struct shown_rows *rows, bool ssim)
+{
+	double low = INFINITY, high = 0, fast = INFINITY, slow = 0;
+
+	for (int i = 0; i < rows->n; i++) {
+		const struct shown_row *row = &rows->row[i];
+		/* Where two are the same to the last digit there is no place of 0. */
+		double error = fmax(ssim ? 1 - row->ssim : row->rms, 1e-6);
+
+		if (row->fps == INT_MAX)
+			continue;
+		low = fmin(low, error);
+		high = fmax(high, error);
+		fast = fmin(fast, row->ms_s);
+		slow = fmax(slow, row->ms_s);
+	}
+	set_axis(script, 'x', fast, slow);
+	set_axis(script, 'y', low, high);
+}
+
 static void draw_panel(FILE *script, int column)
 {
 	fputs("plot \\\n", script);
@@ -215,12 +252,14 @@ void shown_rows_draw(const struct shown_rows *rows, const char *folder, const ch
 		"set multiplot layout 1,2 title \"What a screen shows of a cut that bleeds, "
 		"at 15, 30 and 60 frames a second, against a texture of %d² at that very "
 		"moment\" font ',13'\n"
-		"set logscale xy\ndata = '%s'\nset key top right\nset autoscale fix\n"
+		"set logscale xy\ndata = '%s'\nset key bottom left\n"
 		"set xlabel 'run time for a second that is shown / ms'\n"
 		"set ylabel 'rms error / values of sRGB'\n",
 		FINEST_PX, data);
+	set_axes(script, rows, false);
 	draw_panel(script, 2);
 	fputs("set ylabel '1 - structural similarity'\n", script);
+	set_axes(script, rows, true);
 	draw_panel(script, 3);
 	fputs("unset multiplot\n", script);
 	if (!picture_draw(script, folder, name))
