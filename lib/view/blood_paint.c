@@ -3,6 +3,7 @@
  * Blood as colour; see blood_paint.h.
  */
 #include <math.h>
+#include <string.h>
 #include "blood_paint.h"
 #include "grain.h"
 
@@ -121,7 +122,8 @@ static void colour(const struct wet_texel *texel, float dry, uint8_t rgba[4])
 	rgba[3] = (uint8_t)(alpha * 255 + 0.5f);
 }
 
-static void paint_tile(struct film *film, const struct shape *shapes, int n, int number,
+/* Whether a texel of it is another one now. */
+static bool paint_tile(struct film *film, const struct shape *shapes, int n, int number,
 		       uint8_t *rgba)
 {
 	int x0 = number % film->tiles * CANVAS_TILE,
@@ -129,6 +131,7 @@ static void paint_tile(struct film *film, const struct shape *shapes, int n, int
 	const struct film_tile *tile = film_tile(film, x0, y0);
 	size_t first = (size_t)number * FILM_TEXELS;
 	struct wet_texel texels[FILM_TEXELS];
+	bool changed = false;
 	float unit = (float)(BLOOD_UNIT_UL / tile->area_mm2);
 
 	for (int i = 0; i < FILM_TEXELS; i++)
@@ -139,12 +142,14 @@ static void paint_tile(struct film *film, const struct shape *shapes, int n, int
 		uint8_t *to = rgba + ((size_t)(y0 + i / CANVAS_TILE) * film->size + x0 +
 				      i % CANVAS_TILE) *
 					     4;
+		uint8_t is[4] = {0};
 
 		if (texels[i].thick > NOTHING_MM)
-			colour(&texels[i], film->dry[first + i] * (1.0f / FILM_DRY), to);
-		else
-			to[0] = to[1] = to[2] = to[3] = 0;
+			colour(&texels[i], film->dry[first + i] * (1.0f / FILM_DRY), is);
+		changed |= memcmp(to, is, sizeof(is)) != 0;
+		memcpy(to, is, sizeof(is));
 	}
+	return changed;
 }
 
 void blood_paint_layer(struct film *film, const struct drops *drops,
@@ -163,10 +168,11 @@ void blood_paint_layer(struct film *film, const struct drops *drops,
 			continue;
 		film->dirty[i] = 0;
 		film->n_dirty--;
-		paint_tile(film, shapes, n, i, rgba);
-		incise_canvas_dirty(canvas,
-				    (struct incise_rect){i % film->tiles * CANVAS_TILE,
-							 i / film->tiles * CANVAS_TILE,
-							 CANVAS_TILE, CANVAS_TILE});
+		/* A film drains and dries by less than a step of colour, mostly. */
+		if (paint_tile(film, shapes, n, i, rgba))
+			incise_canvas_dirty(canvas, (struct incise_rect){
+							    i % film->tiles * CANVAS_TILE,
+							    i / film->tiles * CANVAS_TILE,
+							    CANVAS_TILE, CANVAS_TILE});
 	}
 }
