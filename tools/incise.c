@@ -31,6 +31,7 @@ static const struct {
 	{"plan", "show what a scene runs and what it leaves out"},
 	{"haptic", "run the real-time loop of a scene"},
 	{"status", "say what the loops on this machine do, or did last"},
+	{"view", "show a scene: tissue, wound, blood, instrument"},
 	{"replay", "run the loop on a recording, predicted beside measured"},
 	{"stepper", "look at the actuator and move it by hand"},
 	{"bench", "measure error against run time"},

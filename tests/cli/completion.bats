@@ -23,7 +23,7 @@ complete_words() {
 
 @test "verbs are completed" {
 	complete_words incise ""
-	for verb in capture verify export train eval info haptic status replay bench demo help; do
+	for verb in capture verify export train eval info haptic status view replay bench demo help; do
 		[[ " ${COMPREPLY[*]} " == *" $verb "* ]]
 	done
 	complete_words incise tr
@@ -78,7 +78,7 @@ complete_words() {
 @test "what bench measures is completed" {
 	touch stale.csv
 	complete_words incise bench ""
-	[ "${COMPREPLY[*]}" = "precision training stability loop vision capture" ]
+	[ "${COMPREPLY[*]}" = "precision training stability loop vision capture view" ]
 	complete_words incise bench st
 	[ "${COMPREPLY[*]}" = stability ]
 	complete_words incise bench precision st
