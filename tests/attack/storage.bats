@@ -6,6 +6,10 @@
 
 load ../cli/cli
 
+# What is killed before it got to its first commit, on a host that does other things, has shown
+# nothing.
+BATS_TEST_RETRIES=2
+
 setup() {
 	work_folder
 	export INCISE_MODULE_PATH=$INCISE_BUILD/lib/incise
