@@ -4,7 +4,6 @@
  */
 #include <dlfcn.h>
 #include <errno.h>
-#include <libgen.h>
 #include <limits.h>
 #include <math.h>
 #include <stdarg.h>
@@ -301,12 +300,10 @@ static void add_batch(struct arithmetics *all, const struct incise_fixed *fx,
 /* Beside this program, in the build tree; it is not installed. */
 static const struct peer *load_peer(const char **why)
 {
-	char self[PATH_MAX], *path;
-	ssize_t n = readlink("/proc/self/exe", self, sizeof(self) - 1);
 	void *object;
+	char *path;
 
-	self[n > 0 ? n : 0] = 0;
-	if (asprintf(&path, "%s/../lib/incise/peer_fuzzylite.so", dirname(self)) < 0)
+	if (asprintf(&path, "%s/../lib/incise/peer_fuzzylite.so", cli_folder()) < 0)
 		cli_fail("no memory");
 	*why = "not built in: libfuzzylite-dev was absent";
 	if (access(path, F_OK)) {

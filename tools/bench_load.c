@@ -81,12 +81,8 @@ static const char *begin_view(const char *scene, double seconds, struct load_run
 	char path[PATH_MAX + 20], time[24];
 	const char *argv[] = {path,	    scene, "--procedure", "--no-output",
 			      "--duration", time,  NULL};
-	ssize_t n = readlink("/proc/self/exe", path, PATH_MAX - 1);
-	char *slash;
 
-	path[n > 0 ? n : 0] = 0;
-	slash = strrchr(path, '/');
-	strcpy(slash ? slash + 1 : path, "incise-view");
+	snprintf(path, sizeof(path), "%s/incise-view", cli_folder());
 	if (access(path, X_OK))
 		return "incise-view is not there";
 	snprintf(time, sizeof(time), "%.0f", seconds + LONGER_S);

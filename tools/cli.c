@@ -5,6 +5,8 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <getopt.h>
+#include <libgen.h>
+#include <limits.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -309,6 +311,15 @@ const char *cli_rig(const char *given)
 	cli_fail(
 		"there is neither ./rig.conf nor /etc/incise/rig.conf; name the rig with "
 		"--rig FILE, or try the virtual one: --rig sim:");
+}
+
+const char *cli_folder(void)
+{
+	static char path[PATH_MAX];
+	ssize_t n = readlink("/proc/self/exe", path, sizeof(path) - 1);
+
+	path[n > 0 ? n : 0] = 0;
+	return dirname(path);
 }
 
 /* The terminal has come to be another's, who may have written to it. */

@@ -82,6 +82,9 @@ int cli_list(const char *option, char *text, char **items, int max);
 /* The rig to use: the one given, else ./rig.conf, else /etc/incise/rig.conf, else fail. */
 const char *cli_rig(const char *given);
 
+/* The folder that this program is in, where its siblings are; lives as long as it. */
+const char *cli_folder(void);
+
 /* Overwrite the status line, or lines, on stderr; nothing when that is not a terminal. */
 void cli_progress(const char *fmt, ...) INCISE_PRINTF(1, 2);
 

@@ -3,7 +3,6 @@
  * Paper 2 as pictures; see demo_scene.h.
  */
 #include <errno.h>
-#include <libgen.h>
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,13 +17,11 @@
 
 static int run(char *const *argv)
 {
-	char self[PATH_MAX - 16], program[PATH_MAX];
-	ssize_t n = readlink("/proc/self/exe", self, sizeof(self) - 1);
+	char program[PATH_MAX + 16];
 	int status;
 	pid_t child;
 
-	self[n > 0 ? n : 0] = 0;
-	snprintf(program, sizeof(program), "%s/incise-view", dirname(self));
+	snprintf(program, sizeof(program), "%s/incise-view", cli_folder());
 	fputs("$ incise", stdout);
 	for (char *const *arg = argv; *arg; arg++)
 		printf(" %s", *arg);

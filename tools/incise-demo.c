@@ -9,7 +9,6 @@
  */
 #include <errno.h>
 #include <getopt.h>
-#include <libgen.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -99,16 +98,14 @@ static char *text(const char *fmt, ...)
 /* Run the verb in argv (argv[0] is its name) and read the JSON it prints. */
 static json_t *run(char *const *argv)
 {
-	char self[PATH_MAX], *program;
-	ssize_t n = readlink("/proc/self/exe", self, sizeof(self) - 1);
+	char *program;
 	int pipe_fd[2], status;
 	json_error_t why;
 	json_t *report;
 	FILE *in;
 	pid_t child;
 
-	self[n > 0 ? n : 0] = 0;
-	program = text("%s/incise-%s", dirname(self), argv[0]);
+	program = text("%s/incise-%s", cli_folder(), argv[0]);
 	if (!quiet) {
 		printf("$ incise");
 		for (char *const *arg = argv; *arg; arg++)

@@ -6,7 +6,6 @@
  */
 #include <dirent.h>
 #include <errno.h>
-#include <libgen.h>
 #include <limits.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -14,6 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/version.h>
+#include "cli.h"
 
 #define WORD "abcdefghijklmnopqrstuvwxyz"
 
@@ -49,16 +49,6 @@ static void help(void)
 	       "manual.\n'incise demo' is a good start.\n");
 }
 
-/* The folder this program stands in. */
-static void own_folder(char *folder, size_t size)
-{
-	char path[PATH_MAX];
-	ssize_t n = readlink("/proc/self/exe", path, sizeof(path) - 1);
-
-	path[n > 0 ? n : 0] = 0;
-	snprintf(folder, size, "%s", dirname(path));
-}
-
 /* Whether PATH leads to a file of this name, runnable or not. */
 static bool on_path(const char *name)
 {
@@ -92,7 +82,7 @@ static int manual(const char *verb, const char *word)
 	char folder[PATH_MAX];
 	char *name, *page;
 
-	own_folder(folder, sizeof(folder));
+	snprintf(folder, sizeof(folder), "%s", cli_folder());
 	if (verb && !known(verb)) {
 		fprintf(stderr,
 			"incise: there is no verb '%.64s'; 'incise --help' lists them\n",
@@ -148,7 +138,7 @@ int main(int argc, char **argv)
 			"incise: '%.64s' is no verb; 'incise --help' lists them\n", verb);
 		return 2;
 	}
-	own_folder(folder, sizeof(folder));
+	snprintf(folder, sizeof(folder), "%s", cli_folder());
 	if (argc > 2 && argv[2][strspn(argv[2], WORD)] == 0 && *argv[2]) {
 		snprintf(program, sizeof(program), "%s/incise-%s-%.64s", folder, verb,
 			 argv[2]);

@@ -10,30 +10,6 @@
 #include "loop_picture.h"
 #include "picture.h"
 
-/* "NAME-part", and "NAME-part.dat" for the data. */
-struct place {
-	const char *folder;
-	char *name, *data;
-};
-
-static struct place place(const char *folder, const char *name, const char *part)
-{
-	struct place p = {.folder = folder};
-
-	if (asprintf(&p.name, "%s-%s", name, part) < 0 ||
-	    asprintf(&p.data, "%s.dat", p.name) < 0)
-		cli_fail("no memory");
-	return p;
-}
-
-static void draw(FILE *script, struct place *p)
-{
-	if (!picture_draw(script, p->folder, p->name))
-		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", p->folder, p->name);
-	free(p->name);
-	free(p->data);
-}
-
 /* ---- wake-ups ---- */
 
 /* Bins of the picture are a tenth wider than the ones before, whole µs at least. */
@@ -111,12 +87,12 @@ void loop_picture_wakeups(const struct wakeups *wakeups, const char *folder,
 {
 	int lines, columns = columns_of(wakeups, &lines), block = 0;
 	double most = 1;
-	struct place p;
+	struct picture_part p;
 	FILE *out, *script;
 
 	if (!columns)
 		return;
-	p = place(folder, name, "wakeups");
+	p = picture_part(folder, name, "wakeups");
 	out = picture_data(p.folder, p.data);
 	for (int i = 0; i < wakeups->n; i++)
 		if (wakeups->row[i].got.loop.bins) {
@@ -146,7 +122,7 @@ void loop_picture_wakeups(const struct wakeups *wakeups, const char *folder,
 		block += 2;
 	}
 	fputs("unset multiplot\n", script);
-	draw(script, &p);
+	picture_part_draw(script, &p);
 }
 
 /* ---- rates ---- */
@@ -184,7 +160,7 @@ static void draw_lines(FILE *script, const struct rates *rates, const char *x)
 
 void loop_picture_rates(const struct rates *rates, const char *folder, const char *name)
 {
-	struct place p = place(folder, name, "rates");
+	struct picture_part p = picture_part(folder, name, "rates");
 	FILE *out = picture_data(p.folder, p.data), *script;
 
 	write_rates(out, rates);
@@ -207,5 +183,5 @@ void loop_picture_rates(const struct rates *rates, const char *folder, const cha
 		rates->row[0].stiffness_N_mm);
 	draw_lines(script, rates, "5");
 	fputs("  NaN\nunset multiplot\n", script);
-	draw(script, &p);
+	picture_part_draw(script, &p);
 }

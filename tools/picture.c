@@ -133,3 +133,22 @@ bool picture_draw(FILE *script, const char *folder, const char *name)
 		cli_fail("%s/plot/%s.gp: %s", folder, name, strerror(errno));
 	return draw(folder, name, "png") && draw(folder, name, "svg");
 }
+
+struct picture_part picture_part(const char *folder, const char *name, const char *part)
+{
+	struct picture_part p = {.folder = folder};
+
+	if (asprintf(&p.name, "%s-%s", name, part) < 0 ||
+	    asprintf(&p.data, "%s.dat", p.name) < 0)
+		cli_fail("no memory");
+	return p;
+}
+
+void picture_part_draw(FILE *script, struct picture_part *part)
+{
+	if (!picture_draw(script, part->folder, part->name))
+		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", part->folder,
+			 part->name);
+	free(part->name);
+	free(part->data);
+}

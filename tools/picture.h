@@ -34,4 +34,15 @@ FILE *picture_begin(const char *folder, const char *name, int width, int height)
 /* End the script and draw. Returns whether both files were made. */
 bool picture_draw(FILE *script, const char *folder, const char *name);
 
+/* One of several pictures of a name: "NAME-part", and "NAME-part.dat" for its data. */
+struct picture_part {
+	const char *folder;
+	char *name, *data;
+};
+
+struct picture_part picture_part(const char *folder, const char *name, const char *part);
+
+/* End its script and draw, or fail the program; the part is of no more use. */
+void picture_part_draw(FILE *script, struct picture_part *part);
+
 #endif

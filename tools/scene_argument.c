@@ -21,15 +21,10 @@ void scene_argument_arith(struct scene_argument *argument, const char *text)
 static void find(struct scene_argument *argument, const char *name)
 {
 	static char path[PATH_MAX];
-	char own[PATH_MAX];
-	ssize_t length = readlink("/proc/self/exe", own, sizeof(own) - 1);
+	char own[PATH_MAX + 30];
 	const char *places[] = {".", "/etc/incise/scenes", own};
 
-	own[length > 0 ? length : 0] = 0;
-	for (int i = 0; i < 2 && strrchr(own, '/'); i++)
-		*strrchr(own, '/') = 0;
-	if (strlen(own) + sizeof("/share/incise/scenes") <= sizeof(own))
-		strcat(own, "/share/incise/scenes");
+	snprintf(own, sizeof(own), "%s/../share/incise/scenes", cli_folder());
 	for (size_t i = 0; i < sizeof(places) / sizeof(*places); i++) {
 		if (snprintf(path, sizeof(path), "%s/%s.scene", places[i], name) <
 			    (int)sizeof(path) &&

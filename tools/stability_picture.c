@@ -13,30 +13,6 @@
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
 
-/* "NAME-part", and "NAME-part.dat" for the data. */
-struct place {
-	const char *folder;
-	char *name, *data;
-};
-
-static struct place place(const char *folder, const char *name, const char *part)
-{
-	struct place p = {.folder = folder};
-
-	if (asprintf(&p.name, "%s-%s", name, part) < 0 ||
-	    asprintf(&p.data, "%s.dat", p.name) < 0)
-		cli_fail("no memory");
-	return p;
-}
-
-static void draw(FILE *script, struct place *p)
-{
-	if (!picture_draw(script, p->folder, p->name))
-		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", p->folder, p->name);
-	free(p->name);
-	free(p->data);
-}
-
 /* The values that a parameter has, in the order of their first coming. */
 static int values_of(const struct ratios *ratios, int param, double *values, int max)
 {
@@ -71,7 +47,7 @@ static double limit(double delta, double beta, int delay)
 }
 
 /* Blocks: for each wall and delay the curve, then the points. */
-static void write_map(const struct ratios *exact, const struct place *p,
+static void write_map(const struct ratios *exact, const struct picture_part *p,
 		      const double *walls, int n_walls, const double *delays,
 		      int n_delays)
 {
@@ -105,7 +81,7 @@ void stability_picture_map(const struct ratios *exact, const char *folder,
 	double walls[MAP_MAX], delays[MAP_MAX];
 	int n_walls = values_of(exact, 1, walls, MAP_MAX);
 	int n_delays = values_of(exact, 2, delays, MAP_MAX);
-	struct place p = place(folder, name, "map");
+	struct picture_part p = picture_part(folder, name, "map");
 	FILE *script;
 
 	write_map(exact, &p, walls, n_walls, delays, n_delays);
@@ -133,7 +109,7 @@ void stability_picture_map(const struct ratios *exact, const char *folder,
 		fputs("  NaN\n", script);
 	}
 	fputs("unset multiplot\n", script);
-	draw(script, &p);
+	picture_part_draw(script, &p);
 }
 
 /* ---- guard ---- */
@@ -147,7 +123,7 @@ static bool plain(const struct guard_bench *bench, int i, enum guard_setting set
 
 /* Blocks: a curve per delay with the guard on; then caps that are bounded, and those that
  * are not. */
-static int write_guard(const struct guard_bench *bench, const struct place *p,
+static int write_guard(const struct guard_bench *bench, const struct picture_part *p,
 		       int *delays, int max)
 {
 	FILE *out = picture_data(p->folder, p->data);
@@ -208,7 +184,7 @@ static void count(const struct guard_bench *bench, enum guard_setting setting,
 void stability_picture_guard(const struct guard_bench *bench, const char *folder,
 			     const char *name)
 {
-	struct place p = place(folder, name, "guard");
+	struct picture_part p = picture_part(folder, name, "guard");
 	char grow[GUARD_SETTINGS][32];
 	int delays[16], n = write_guard(bench, &p, delays, 16);
 	FILE *script = picture_begin(folder, p.name, 1320, 540);
@@ -247,7 +223,7 @@ void stability_picture_guard(const struct guard_bench *bench, const char *folder
 		"'grows at some'\n"
 		"unset multiplot\n",
 		INCISE_GUARD_SHARE, n, n + 1);
-	draw(script, &p);
+	picture_part_draw(script, &p);
 }
 
 /* ---- integrators ---- */
@@ -255,7 +231,8 @@ void stability_picture_guard(const struct guard_bench *bench, const char *folder
 #define DIVERGED 10 /* its place on the axis */
 
 /* Blocks: for each stiffness of the sweep and then for steps of 1 ms, one per kind. */
-static void write_integrators(const struct integrator_bench *bench, const struct place *p)
+static void write_integrators(const struct integrator_bench *bench,
+			      const struct picture_part *p)
 {
 	static const double swept[] = {1e3, 1e5};
 	FILE *out = picture_data(p->folder, p->data);
@@ -296,7 +273,7 @@ void stability_picture_integrators(const struct integrator_bench *bench,
 	static const char *const titles[] = {"1 kN/m, steps from 1 ms down",
 					     "100 kN/m, from the largest step that holds",
 					     "steps of 1 ms; at the top: diverged"};
-	struct place p = place(folder, name, "integrators");
+	struct picture_part p = picture_part(folder, name, "integrators");
 	FILE *script;
 
 	write_integrators(bench, &p);
@@ -330,5 +307,5 @@ void stability_picture_integrators(const struct integrator_bench *bench,
 		fputs("  NaN\n", script);
 	}
 	fputs("unset multiplot\n", script);
-	draw(script, &p);
+	picture_part_draw(script, &p);
 }
