@@ -89,7 +89,12 @@ $(O)/bin/incise: $(O)/obj/tools/incise.o $(tool_shared) $(O)/lib/libincise.so
 	@mkdir -p $(@D)
 	$(call link_tool,-lincise)
 
-tools: $(programs) $(peer)
+# Scenes by name, as after installation.
+$(O)/share/incise/scenes:
+	@mkdir -p $(@D)
+	ln -s $(abspath scenes) $@
+
+tools: $(programs) $(peer) | $(O)/share/incise/scenes
 
 DEMO ?= demo.out
 

@@ -144,7 +144,9 @@ ended() {
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --overruns 5 --duration 10s
 	[ "$status" -eq 1 ]
 	[[ "${stderr_lines[-1]}" == *"5 ticks in a row came a period late or more"*"too slow or too busy for 1000 Hz" ]]
-	[[ "$output" == *" skipped in 5 overruns "* ]] || [[ "$output" == *" skipped in "* ]]
+	# those, and what the host was late with before
+	overruns=$(sed -n 's/.* skipped in \([0-9]*\) overruns .*/\1/p' <<<"$output")
+	[ "$overruns" -ge 5 ]
 }
 
 @test "two loops of one scene do not share a page" {
@@ -158,6 +160,11 @@ ended() {
 
 @test "a scene by its name is that of this folder, else of the machine" {
 	run -0 incise haptic liver --rig sim:clock=simulated --duration 0.1s
+	# one that came with the program; that of this folder comes first
+	run -0 incise haptic neck --rig sim:clock=simulated --duration 0.1s
+	echo nonsense >neck.scene
+	run --separate-stderr incise haptic neck --rig sim:clock=simulated --duration 0.1s
+	failed_with neck.scene: syntax
 	run --separate-stderr incise haptic nothing --rig sim:clock=simulated --duration 0.1s
 	failed_with "there is no file nothing, and no nothing.scene in this folder, in /etc/incise/scenes"
 }
