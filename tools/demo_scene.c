@@ -14,6 +14,8 @@
 
 /* In the script of `incise view --procedure`: cut, bleeding, enlarging, tube. */
 #define MOMENTS "2.4s,8.5s,12.2s,20s"
+/* Near the cut, from a little beside and above. */
+#define NEAR "18,40,150"
 
 static int run(char *const *argv)
 {
@@ -57,7 +59,7 @@ void demo_scene(const char *scene, const char *folder, bool force)
 				"--fps", "30", NULL}) ||
 	    run((char *const[]){"view", (char *)scene, "--procedure", "--strip", strip,
 				"--at", MOMENTS, "--size", "640x480", "--no-panel",
-				"--fps", "10", NULL}))
+				"--camera", NEAR, "--fps", "10", NULL}))
 		cli_fail("'incise view' failed, see the line above");
 	printf("\n%s\n%s\n", film, strip);
 	cli_finish();
