@@ -11,10 +11,11 @@
 #include "arithmetics.h"
 #include "bench_precision.h"
 #include "cli.h"
+#include "figures.h"
+#include "harness.h"
 #include "json.h"
 #include "machine.h"
 #include "picture.h"
-#include "stopwatch.h"
 
 /* Points for the errors. Times are of the first of them, so few that inputs and outputs
  * stay in the cache and the arithmetic is what is measured. */
@@ -23,15 +24,16 @@
 #define REPEATS 101
 #define QUICK_REPEATS 5
 
-/* Of one arithmetic: nanoseconds per evaluation, errors in the output's unit. */
-struct figures {
-	double ns, ns_p5, ns_p95, max_error, rms_error, bound;
+/* Of one arithmetic: time per evaluation, errors in the output's unit. */
+struct measured {
+	struct harness_time time;
+	double max_error, rms_error, bound;
 };
 
 struct bench {
 	struct arithmetics all;
 	struct points points;
-	struct figures figures[ARITHMETICS_MAX];
+	struct measured figures[ARITHMETICS_MAX];
 	struct machine machine;
 	int repeats;
 };
@@ -63,9 +65,9 @@ static void measure_errors(struct bench *b)
 {
 	for (int i = 0; i < b->all.n; i++) {
 		struct arithmetic *a = &b->all.row[i];
-		struct figures *f = &b->figures[i];
+		struct measured *f = &b->figures[i];
 
-		*f = (struct figures){NAN, NAN, NAN, NAN, NAN, NAN};
+		*f = (struct measured){.max_error = NAN, .rms_error = NAN, .bound = NAN};
 		if (*a->failed)
 			continue;
 		arithmetic_errors(a, &b->points, &f->max_error, &f->rms_error);
@@ -83,39 +85,37 @@ static void measure_errors(struct bench *b)
 	}
 }
 
+/* What a way of the harness does. */
+struct timed {
+	const struct arithmetic *arithmetic;
+	const struct points *points;
+};
+
+static void run_timed(void *context)
+{
+	const struct timed *t = context;
+
+	t->arithmetic->run(t->arithmetic, t->points);
+}
+
 static void measure_times(struct bench *b)
 {
-	static double times[ARITHMETICS_MAX][REPEATS];
-	struct points timed = b->points;
+	struct harness_way ways[ARITHMETICS_MAX];
+	struct timed timed[ARITHMETICS_MAX];
+	struct harness_time times[ARITHMETICS_MAX];
+	struct points points = b->points;
 
-	timed.n = TIMED_POINTS;
-	/* Interleaved, so that a busy moment of the machine meets them all; a first run each
-	 * brings an arithmetic's tables back into the cache. */
-	for (int rep = 0; rep < b->repeats; rep++) {
-		cli_progress("repeat %d of %d", rep + 1, b->repeats);
-		for (int i = 0; i < b->all.n; i++) {
-			const struct arithmetic *a = &b->all.row[i];
-			double begin;
-
-			if (isnan(b->figures[i].max_error))
-				continue;
-			a->run(a, &timed);
-			begin = stopwatch_ns();
-			a->run(a, &timed);
-			times[i][rep] = (stopwatch_ns() - begin) / timed.n;
-		}
-	}
-	cli_progress_end();
+	points.n = TIMED_POINTS;
 	for (int i = 0; i < b->all.n; i++) {
-		struct figures *f = &b->figures[i];
+		bool wrong = isnan(b->figures[i].max_error);
 
-		if (isnan(f->max_error))
-			continue;
-		stopwatch_sort(times[i], b->repeats);
-		f->ns = stopwatch_quantile(times[i], b->repeats, 0.5);
-		f->ns_p5 = stopwatch_quantile(times[i], b->repeats, 0.05);
-		f->ns_p95 = stopwatch_quantile(times[i], b->repeats, 0.95);
+		timed[i] = (struct timed){&b->all.row[i], &points};
+		ways[i] = (struct harness_way){run_timed, &timed[i],
+					       wrong ? 0 : TIMED_POINTS};
 	}
+	harness_times(ways, b->all.n, b->repeats, times);
+	for (int i = 0; i < b->all.n; i++)
+		b->figures[i].time = times[i];
 }
 
 /* How many times as fast as fuzzylite; NaN without it. */
@@ -123,7 +123,8 @@ static double against_peer(const struct bench *b, int i)
 {
 	for (int k = 0; k < b->all.n; k++)
 		if (b->all.row[k].kind == ARITHMETIC_PEER)
-			return b->figures[k].ns / b->figures[i].ns;
+			return b->figures[k].time.ns.median /
+			       b->figures[i].time.ns.median;
 	return NAN;
 }
 
@@ -150,12 +151,12 @@ static void print_table(const struct bench *b, const struct incise_model *model)
 	       "arithmetic", "median ns", "5 %", "95 %", "largest / N", "rms / N",
 	       "bound / N", "x fuzzylite");
 	for (int i = 0; i < b->all.n; i++) {
-		const struct figures *f = &b->figures[i];
+		const struct measured *f = &b->figures[i];
 
 		printf("%-18s", b->all.row[i].name);
-		print_number(" %*.1f", 9, f->ns);
-		print_number(" %*.1f", 8, f->ns_p5);
-		print_number(" %*.1f", 8, f->ns_p95);
+		print_number(" %*.1f", 9, f->time.ns.median);
+		print_number(" %*.1f", 8, f->time.ns.p5);
+		print_number(" %*.1f", 8, f->time.ns.p95);
 		print_number(" %*.3g", 11, f->max_error);
 		print_number(" %*.3g", 11, f->rms_error);
 		print_number(" %*.3g", 11, f->bound);
@@ -171,31 +172,40 @@ static void print_table(const struct bench *b, const struct incise_model *model)
 static json_t *row_json(const struct bench *b, int i)
 {
 	const struct arithmetic *a = &b->all.row[i];
-	const struct figures *f = &b->figures[i];
+	const struct measured *f = &b->figures[i];
 	json_t *size = a->fixed ? json_integer(a->fixed->size) : json_null();
 	json_t *failed = *a->failed ? json_string(a->failed) : json_null();
 
 	return json_pack("{ss so so so so so so so so sb so}", "name", a->name, "ns",
-			 json_number(f->ns), "ns_p5", json_number(f->ns_p5), "ns_p95",
-			 json_number(f->ns_p95), "max_error_N", json_number(f->max_error),
-			 "rms_error_N", json_number(f->rms_error), "bound_N",
-			 json_number(f->bound), "size_bytes", size, "times_fuzzylite",
+			 json_number(f->time.ns.median), "ns_p5",
+			 json_number(f->time.ns.p5), "ns_p95",
+			 json_number(f->time.ns.p95), "max_error_N",
+			 json_number(f->max_error), "rms_error_N",
+			 json_number(f->rms_error), "bound_N", json_number(f->bound),
+			 "size_bytes", size, "times_fuzzylite",
 			 json_number(against_peer(b, i)), "peer",
 			 a->kind == ARITHMETIC_PEER, "failed", failed);
 }
 
 static void print_json(const struct bench *b, const struct incise_model *model)
 {
-	json_t *rows = json_array();
+	json_t *rows = json_array(), *figures = figures_new();
 
-	for (int i = 0; i < b->all.n; i++)
+	for (int i = 0; i < b->all.n; i++) {
+		const char *name = b->all.row[i].name;
+
 		json_array_append_new(rows, row_json(b, i));
-	json_print(json_pack(
-		"{so si si si so ss? so}", "model", json_text(incise_model_name(model)),
-		"rules", incise_model_n_rules(model), "points", (int)b->points.n,
-		"repeats", b->repeats, "machine", machine_json(&b->machine),
-		"fuzzylite_version", *b->all.peer_version ? b->all.peer_version : NULL,
-		"rows", rows));
+		figures_time(figures, &b->figures[i].time, "ns", "%s", name);
+		figures_exact(figures, b->figures[i].max_error, "N", "%s largest error",
+			      name);
+	}
+	json_print(json_pack("{so si si si so ss? so so}", "model",
+			     json_text(incise_model_name(model)), "rules",
+			     incise_model_n_rules(model), "points", (int)b->points.n,
+			     "repeats", b->repeats, "machine", machine_json(&b->machine),
+			     "fuzzylite_version",
+			     *b->all.peer_version ? b->all.peer_version : NULL, "rows",
+			     rows, "figures", figures));
 }
 
 /* ---- the work-precision chart ---- */
@@ -214,14 +224,15 @@ static void write_data(const struct bench *b, const char *folder, const char *na
 		/* A block without points would shift the numbers of those behind it. */
 		fputs("none NaN NaN NaN NaN NaN\n", out);
 		for (int i = 0; i < b->all.n; i++) {
-			const struct figures *f = &b->figures[i];
+			const struct measured *f = &b->figures[i];
 
 			if (b->all.row[i].kind != (enum arithmetic_kind)kind ||
-			    isnan(f->ns))
+			    isnan(f->time.ns.median))
 				continue;
 			/* An error of 0 has no place on a logarithmic axis. */
-			fprintf(out, "%s %g %g %g %g %g\n", b->all.row[i].name, f->ns,
-				f->ns_p5, f->ns_p95, fmax(f->max_error, 1e-18), f->bound);
+			fprintf(out, "%s %g %g %g %g %g\n", b->all.row[i].name,
+				f->time.ns.median, f->time.ns.p5, f->time.ns.p95,
+				fmax(f->max_error, 1e-18), f->bound);
 		}
 		fputs("\n\n", out);
 	}
@@ -239,8 +250,8 @@ static void draw(const struct bench *b, const struct incise_model *model,
 
 	/* With room for the last label. */
 	for (int i = 0; i < b->all.n; i++) {
-		least = fmin(least, b->figures[i].ns);
-		most = fmax(most, b->figures[i].ns);
+		least = fmin(least, b->figures[i].time.ns.median);
+		most = fmax(most, b->figures[i].time.ns.median);
 	}
 	write_data(b, folder, name);
 	script = picture_begin(folder, name, 1100, 800);

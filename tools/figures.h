@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * The figures of a bench in the one form that all benches share, for holding one report
+ * against another: each a name, a value and how sure it is.
+ *
+ *   {"name": "fixed_table", "kind": "time", "unit": "ns", "value": 51.2, "low": 50.9,
+ *    "high": 51.8, "yardsticks": 0.00171, "yardsticks_low": …, "yardsticks_high": …}
+ *
+ * Kinds: "time", compared in yardsticks (harness.h); "measured", whose value differs from
+ * run to run; "exact", whose value is the same in every run of the same program.
+ */
+#ifndef INCISE_FIGURES_H
+#define INCISE_FIGURES_H
+
+#include <jansson.h>
+#include <incise/error.h>
+#include "harness.h"
+
+/* An array; all below append to it. A value that is not finite is left out. */
+json_t *figures_new(void);
+
+/* A time of so many ns in a @unit ("ns", "us", "ms": 1, 1e3, 1e6). The name is printf's. */
+void figures_time(json_t *figures, const struct harness_time *time, const char *unit,
+		  const char *fmt, ...) INCISE_PRINTF(4, 5);
+
+void figures_measured(json_t *figures, const struct harness_spread *spread,
+		      const char *unit, const char *fmt, ...) INCISE_PRINTF(4, 5);
+
+void figures_exact(json_t *figures, double value, const char *unit, const char *fmt, ...)
+	INCISE_PRINTF(4, 5);
+
+#endif
