@@ -36,6 +36,7 @@ struct bench {
 	struct measured figures[ARITHMETICS_MAX];
 	struct machine machine;
 	int repeats;
+	bool quick;
 };
 
 /* Paper 1's shape with a force surface of its kind. */
@@ -199,11 +200,11 @@ static void print_json(const struct bench *b, const struct incise_model *model)
 		figures_exact(figures, b->figures[i].max_error, "N", "%s largest error",
 			      name);
 	}
-	json_print(json_pack("{so si si si so ss? so so}", "model",
+	json_print(json_pack("{so si si si sb so ss? so so}", "model",
 			     json_text(incise_model_name(model)), "rules",
 			     incise_model_n_rules(model), "points", (int)b->points.n,
-			     "repeats", b->repeats, "machine", machine_json(&b->machine),
-			     "fuzzylite_version",
+			     "repeats", b->repeats, "quick", b->quick, "machine",
+			     machine_json(&b->machine), "fuzzylite_version",
 			     *b->all.peer_version ? b->all.peer_version : NULL, "rows",
 			     rows, "figures", figures));
 }
@@ -298,6 +299,7 @@ void bench_precision(const char *path, bool json, bool quick, const char *plot)
 	model = path ? incise_model_load(path, &err) : own_model();
 	if (!model)
 		cli_fail_with(&err);
+	b->quick = quick;
 	b->repeats = quick ? QUICK_REPEATS : REPEATS;
 	machine_init(&b->machine);
 	arithmetics_init(&b->all, model);

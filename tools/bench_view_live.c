@@ -12,6 +12,7 @@
 #include <incise/sim.h>
 #include "bench_view_live.h"
 #include "cli.h"
+#include "harness.h"
 #include "json.h"
 #include "stopwatch.h"
 #include "view_live.h"
@@ -113,7 +114,7 @@ static struct cutting *open_cutting(const char *path)
 	c->view = incise_view_new(c->scene, c->plan, &setup, &err);
 	if (!c->view)
 		cli_fail_with(&err);
-	c->realtime = wakeup_realtime(wakeup_cpu());
+	c->realtime = wakeup_realtime(harness_cpu());
 	begin_loop(c);
 	return c;
 }

@@ -4,7 +4,6 @@
  * is in wakeup_run.c.
  */
 #include <math.h>
-#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <incise/scene.h>
@@ -12,6 +11,7 @@
 #include "bench_wakeup.h"
 #include "cli.h"
 #include "cyclictest.h"
+#include "harness.h"
 #include "json.h"
 
 static const double own_rates_hz[] = {1000, 4000};
@@ -48,19 +48,6 @@ static void measure(const char *scene, const struct wakeups *wakeups,
 		fclose(own.file);
 }
 
-int wakeup_cpu(void)
-{
-	cpu_set_t cpus;
-	int last = 0;
-
-	if (sched_getaffinity(0, sizeof(cpus), &cpus))
-		return 0;
-	for (int i = 0; i < CPU_SETSIZE; i++)
-		if (CPU_ISSET(i, &cpus))
-			last = i;
-	return last;
-}
-
 static double scene_rate(const char *path)
 {
 	struct incise_error err = {0};
@@ -93,7 +80,7 @@ void bench_wakeup(const char *scene, enum load only, double seconds,
 	int rates = scene ? 1 : sizeof(own_rates_hz) / sizeof(*own_rates_hz);
 	struct incise_realtime *realtime;
 
-	*wakeups = (struct wakeups){.seconds = seconds, .cpu = wakeup_cpu()};
+	*wakeups = (struct wakeups){.seconds = seconds, .cpu = harness_cpu()};
 	wakeups->row = calloc((size_t)rates * LOADS, sizeof(*wakeups->row));
 	if (!wakeups->row)
 		cli_fail("no memory");

@@ -34,9 +34,6 @@ struct wakeups {
 void bench_wakeup(const char *scene, enum load only, double seconds,
 		  struct wakeups *wakeups);
 
-/* The last CPU: interrupts are more often the first one's. */
-int wakeup_cpu(void);
-
 /* As incise haptic asks for it, with the CPU; NULL where it is not granted. */
 struct incise_realtime *wakeup_realtime(int cpu);
 

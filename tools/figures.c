@@ -29,57 +29,73 @@ static double unit_ns(const char *unit)
 }
 
 /* Release what was begun, or append it; a figure that is none is left out. */
-static void append(json_t *figures, const char *fmt, va_list args, double value,
-		   json_t *figure)
+static json_t *append(json_t *figures, const char *fmt, va_list args, double value,
+		      json_t *figure)
 {
 	char name[200];
 
 	if (!isfinite(value)) {
 		json_decref(figure);
-		return;
+		return NULL;
 	}
 	vsnprintf(name, sizeof(name), fmt, args);
 	json_object_set_new(figure, "name", json_text(name));
 	json_array_append_new(figures, figure);
+	return figure;
 }
 
-void figures_time(json_t *figures, const struct harness_time *time, const char *unit,
-		  const char *fmt, ...)
+json_t *figures_time(json_t *figures, const struct harness_time *time, const char *unit,
+		     const char *fmt, ...)
 {
 	const struct harness_spread *ns = &time->ns, *y = &time->yardsticks;
 	double k = 1 / unit_ns(unit);
+	json_t *figure;
 	va_list args;
 
 	va_start(args, fmt);
-	append(figures, fmt, args, ns->median,
-	       json_pack("{ss ss so so so so so so}", "kind", "time", "unit", unit,
-			 "value", json_number(k * ns->median), "low",
-			 json_number(k * ns->low), "high", json_number(k * ns->high),
-			 "yardsticks", json_number(y->median), "yardsticks_low",
-			 json_number(y->low), "yardsticks_high", json_number(y->high)));
+	figure = append(
+		figures, fmt, args, ns->median,
+		json_pack("{ss ss so so so so so so}", "kind", "time", "unit", unit,
+			  "value", json_number(k * ns->median), "low",
+			  json_number(k * ns->low), "high", json_number(k * ns->high),
+			  "yardsticks", json_number(y->median), "yardsticks_low",
+			  json_number(y->low), "yardsticks_high", json_number(y->high)));
 	va_end(args);
+	return figure;
 }
 
-void figures_measured(json_t *figures, const struct harness_spread *spread,
-		      const char *unit, const char *fmt, ...)
+json_t *figures_measured(json_t *figures, const struct harness_spread *spread,
+			 const char *unit, const char *fmt, ...)
 {
+	json_t *figure;
 	va_list args;
 
 	va_start(args, fmt);
-	append(figures, fmt, args, spread->median,
-	       json_pack("{ss ss so so so}", "kind", "measured", "unit", unit, "value",
-			 json_number(spread->median), "low", json_number(spread->low),
-			 "high", json_number(spread->high)));
+	figure = append(figures, fmt, args, spread->median,
+			json_pack("{ss ss so so so}", "kind", "measured", "unit", unit,
+				  "value", json_number(spread->median), "low",
+				  json_number(spread->low), "high",
+				  json_number(spread->high)));
 	va_end(args);
+	return figure;
 }
 
-void figures_exact(json_t *figures, double value, const char *unit, const char *fmt, ...)
+json_t *figures_exact(json_t *figures, double value, const char *unit, const char *fmt,
+		      ...)
 {
+	json_t *figure;
 	va_list args;
 
 	va_start(args, fmt);
-	append(figures, fmt, args, value,
-	       json_pack("{ss ss so}", "kind", "exact", "unit", unit, "value",
-			 json_number(value)));
+	figure = append(figures, fmt, args, value,
+			json_pack("{ss ss so}", "kind", "exact", "unit", unit, "value",
+				  json_number(value)));
 	va_end(args);
+	return figure;
+}
+
+void figures_more_is_better(json_t *figure)
+{
+	if (figure)
+		json_object_set_new(figure, "better", json_string("more"));
 }

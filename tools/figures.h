@@ -7,7 +7,8 @@
  *    "high": 51.8, "yardsticks": 0.00171, "yardsticks_low": …, "yardsticks_high": …}
  *
  * Kinds: "time", compared in yardsticks (harness.h); "measured", whose value differs from
- * run to run; "exact", whose value is the same in every run of the same program.
+ * run to run; "exact", whose value is the same in every run of the same program. What to
+ * compare is in compare.h.
  */
 #ifndef INCISE_FIGURES_H
 #define INCISE_FIGURES_H
@@ -16,17 +17,21 @@
 #include <incise/error.h>
 #include "harness.h"
 
-/* An array; all below append to it. A value that is not finite is left out. */
+/* An array; all below append to it and return what they appended. A value that is not finite
+ * is left out: NULL. */
 json_t *figures_new(void);
 
 /* A time of so many ns in a @unit ("ns", "us", "ms": 1, 1e3, 1e6). The name is printf's. */
-void figures_time(json_t *figures, const struct harness_time *time, const char *unit,
-		  const char *fmt, ...) INCISE_PRINTF(4, 5);
+json_t *figures_time(json_t *figures, const struct harness_time *time, const char *unit,
+		     const char *fmt, ...) INCISE_PRINTF(4, 5);
 
-void figures_measured(json_t *figures, const struct harness_spread *spread,
-		      const char *unit, const char *fmt, ...) INCISE_PRINTF(4, 5);
+json_t *figures_measured(json_t *figures, const struct harness_spread *spread,
+			 const char *unit, const char *fmt, ...) INCISE_PRINTF(4, 5);
 
-void figures_exact(json_t *figures, double value, const char *unit, const char *fmt, ...)
-	INCISE_PRINTF(4, 5);
+json_t *figures_exact(json_t *figures, double value, const char *unit, const char *fmt,
+		      ...) INCISE_PRINTF(4, 5);
+
+/* Less is better unless this is said. */
+void figures_more_is_better(json_t *figure);
 
 #endif

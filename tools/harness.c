@@ -143,8 +143,9 @@ void harness_time_of(const double *ns, int n, struct harness_time *time)
 	free(ratios);
 }
 
-static double run_ns(const struct harness_way *way)
+static double run_ns(void *context)
 {
+	const struct harness_way *way = context;
 	double begin;
 
 	/* Its tables are in the cache, its branches learnt. */
@@ -166,8 +167,8 @@ static bool pin(cpu_set_t *before)
 	return !sched_setaffinity(0, sizeof(one), &one);
 }
 
-void harness_times(const struct harness_way *ways, int n, int turns,
-		   struct harness_time *times)
+void harness_timers(const struct harness_timer *timers, int n, int turns,
+		    struct harness_time *times)
 {
 	double *ns = calloc((size_t)2 * n * turns + 1, sizeof(*ns)), *ratios;
 	cpu_set_t before;
@@ -183,9 +184,9 @@ void harness_times(const struct harness_way *ways, int n, int turns,
 
 		cli_progress("turn %d of %d", turn + 1, turns);
 		for (int i = 0; i < n; i++) {
-			if (!(ways[i].units > 0))
+			if (!timers[i].ns)
 				continue;
-			ns[i * turns + turn] = run_ns(&ways[i]);
+			ns[i * turns + turn] = timers[i].ns(timers[i].context);
 			ratios[i * turns + turn] = ns[i * turns + turn] / unit;
 		}
 	}
@@ -193,10 +194,24 @@ void harness_times(const struct harness_way *ways, int n, int turns,
 	if (pinned)
 		sched_setaffinity(0, sizeof(before), &before);
 	for (int i = 0; i < n; i++) {
-		int taken = ways[i].units > 0 ? turn : 0;
+		int taken = timers[i].ns ? turn : 0;
 
 		harness_spread(ns + i * turns, taken, &times[i].ns);
 		harness_spread(ratios + i * turns, taken, &times[i].yardsticks);
 	}
 	free(ns);
+}
+
+void harness_times(const struct harness_way *ways, int n, int turns,
+		   struct harness_time *times)
+{
+	struct harness_timer *timers = calloc((size_t)n + 1, sizeof(*timers));
+
+	if (!timers)
+		cli_fail("no memory");
+	for (int i = 0; i < n; i++)
+		if (ways[i].units > 0)
+			timers[i] = (struct harness_timer){run_ns, (void *)&ways[i]};
+	harness_timers(timers, n, turns, times);
+	free(timers);
 }

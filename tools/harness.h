@@ -42,6 +42,16 @@ struct harness_time {
 void harness_times(const struct harness_way *ways, int n, int turns,
 		   struct harness_time *times);
 
+/* One that warms up and times itself: returns ns of a unit. NULL leaves it out. */
+struct harness_timer {
+	double (*ns)(void *context);
+	void *context;
+};
+
+/* The same of these. */
+void harness_timers(const struct harness_timer *timers, int n, int turns,
+		    struct harness_time *times);
+
 /*
  * The same of times in ns that were taken elsewhere, in threads or other programs: the
  * yardstick is timed now. NaN of none.

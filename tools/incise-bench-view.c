@@ -9,16 +9,19 @@
 #include "bench_view_frames.h"
 #include "bench_view_live.h"
 #include "cli.h"
+#include "compare.h"
 #include "json.h"
 #include "machine.h"
 #include "memory_file.h"
 #include "picture.h"
 #include "scene_argument.h"
 
-enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION };
+enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION, OPT_AGAINST };
 
 static const struct cli_option options[] = {
 	{OPT_JSON, "json", NULL, "report as JSON"},
+	{OPT_AGAINST, "against", "OLD.json",
+	 "compare with an older report of --json: what changed\nbeyond noise"},
 	{OPT_PLOT, "plot", "NAME", "draw error over run time as NAME.png and NAME.svg"},
 	{OPT_DURATION, "duration", "TIME",
 	 "of each run beside a loop, and of that of cuts: 10min;\ndefault 10s"},
@@ -35,7 +38,8 @@ static const struct cli_verb verb = {
 		"frames, over that time; whether cuts of a loop of 5 kHz are all seen; how late a\n"
 		"loop is with and without it. Without SCENE that is paper 2's neck.",
 	.options = options,
-	.notes = "Exit: 0 measured, 1 failed, 2 bad usage. See incise-bench-view(1).",
+	.notes = "Exit: 0 measured, 1 failed or figures got worse, 2 bad usage.\n"
+		 "See incise-bench-view(1).",
 };
 
 #define UNTIL_S 14.0 /* of the procedure: cut, bleeding, enlarging */
@@ -59,7 +63,7 @@ static const char neck[] =
 	"  blood_ul_s_mm2 = 0.3; gravity = [0.0, -0.5, -0.9]; };\n";
 
 struct job {
-	const char *scene, *plot, *folder, *name;
+	const char *scene, *plot, *against, *folder, *name;
 	bool json, quick;
 	double seconds;
 };
@@ -128,6 +132,9 @@ static void parse(struct job *job, int argc, char **argv)
 		case OPT_QUICK:
 			job->quick = true;
 			break;
+		case OPT_AGAINST:
+			job->against = optarg;
+			break;
 		}
 	if (argc - optind > 1)
 		cli_usage("expected at most one scene");
@@ -147,6 +154,10 @@ int main(int argc, char **argv)
 	struct job job;
 
 	parse(&job, argc, argv);
+	if (job.against) {
+		compare_against(job.against, job.json);
+		job.json = true;
+	}
 	incise_realtime_prepare();
 	cli_catch_signals();
 	if (!job.scene) {

@@ -11,11 +11,14 @@
 #include "bench_training.h"
 #include "bench_vision.h"
 #include "cli.h"
+#include "compare.h"
 
-enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION, OPT_LOAD };
+enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION, OPT_LOAD, OPT_AGAINST };
 
 static const struct cli_option options[] = {
 	{OPT_JSON, "json", NULL, "report as JSON"},
+	{OPT_AGAINST, "against", "OLD.json",
+	 "compare with an older report of --json: what changed\nbeyond noise"},
 	{OPT_PLOT, "plot", "NAME",
 	 "draw error over time as NAME.png and NAME.svg;\n"
 	 "stability: NAME-map, NAME-guard, NAME-integrators;\n"
@@ -32,7 +35,7 @@ static const struct cli_verb verb = {
 	.name = "bench",
 	.synopsis =
 		"precision [MODEL.fis] | training | stability | loop [SCENE] | vision | capture "
-		"[RUN] | view [SCENE] [OPTIONS]",
+		"[RUN] | view [SCENE] | compare OLD.json NEW.json [OPTIONS]",
 	.summary =
 		"precision: measure error against run time of a model's arithmetics. Without\n"
 		"MODEL a model of the paper's size (20 rules) is made.\n"
@@ -48,17 +51,19 @@ static const struct cli_verb verb = {
 		"capture: measure how much of a core it takes to record all streams in real time,\n"
 		"and with parts left out; or one RUN of these.\n"
 		"view: measure what the picture of a scene costs, and how far off it is; see\n"
-		"'incise bench view --help'.",
+		"'incise bench view --help'.\n"
+		"compare: say what changed beyond noise between two reports of --json.",
 	.options = options,
 	.notes =
-		"Exit: 0 measured, 1 failed or simulation and theory differ, 2 bad usage.\n"
+		"Exit: 0 measured, 1 failed, simulation and theory differ, or figures got worse,\n"
+		"2 bad usage.\n"
 		"See incise-bench(1).",
 };
 
 struct job {
 	bool json, quick;
 	double seconds; /* 0: not given */
-	const char *plot, *load, *operand;
+	const char *plot, *load, *against, *operand;
 };
 
 static void precision(const struct job *job)
@@ -111,6 +116,29 @@ static const struct {
 };
 #define WORDS (int)(sizeof(words) / sizeof(*words))
 
+static int compare(const struct job *job, int argc, char **argv)
+{
+	struct incise_error err = {0};
+	json_t *reports[2], *comparison = NULL;
+
+	if (argc != 3)
+		cli_usage("expected 'compare' and two reports");
+	if (job->plot || job->load || job->against || job->quick || job->seconds > 0)
+		cli_usage("'compare' takes no option but --json");
+	for (int i = 0; i < 2; i++) {
+		reports[i] = compare_load(argv[1 + i], &err);
+		if (!reports[i])
+			cli_fail_with(&err);
+	}
+	comparison = compare_reports(reports[0], argv[1], reports[1], argv[2], &err);
+	if (!comparison)
+		cli_fail_with(&err);
+	json_decref(reports[0]);
+	json_decref(reports[1]);
+	compare_finish(comparison, job->json);
+	return 0;
+}
+
 int main(int argc, char **argv)
 {
 	struct job job = {0};
@@ -133,7 +161,12 @@ int main(int argc, char **argv)
 		case OPT_QUICK:
 			job.quick = true;
 			break;
+		case OPT_AGAINST:
+			job.against = optarg;
+			break;
 		}
+	if (optind < argc && !strcmp(argv[optind], "compare"))
+		return compare(&job, argc - optind, argv + optind);
 	while (optind < argc && what < WORDS && strcmp(argv[optind], words[what].word))
 		what++;
 	if (optind < argc && !strcmp(argv[optind], "view"))
@@ -143,7 +176,8 @@ int main(int argc, char **argv)
 	    argc - optind > (words[what].operand ? 2 : 1))
 		cli_usage(
 			"expected 'training', 'stability', 'vision', 'precision' and at most one "
-			"model, 'loop' and at most one scene, or 'capture' and at most one run");
+			"model, 'loop' and at most one scene, 'capture' and at most one run, or "
+			"'compare' and two reports");
 	if (job.plot && !words[what].plot)
 		cli_usage("--plot goes with 'precision', 'stability' and 'loop'");
 	if (job.seconds > 0 && words[what].run != capture && words[what].run != loop)
@@ -151,6 +185,10 @@ int main(int argc, char **argv)
 	if (job.load && words[what].run != loop)
 		cli_usage("--load goes with 'loop'");
 	job.operand = argc - optind == 2 ? argv[optind + 1] : NULL;
+	if (job.against) {
+		compare_against(job.against, job.json);
+		job.json = true;
+	}
 	words[what].run(&job);
 	cli_finish();
 	return 0;
