@@ -10,6 +10,7 @@
 #include "bench_device.h"
 #include "bench_guard.h"
 #include "cli.h"
+#include "figures.h"
 #include "json.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
@@ -255,4 +256,16 @@ json_t *guard_bench_json(const struct guard_bench *bench)
 				  json_number(r->largest_N)));
 	}
 	return rows;
+}
+
+void guard_bench_figures(const struct guard_bench *bench, json_t *figures)
+{
+	int bounded[GUARD_SETTINGS] = {0};
+
+	for (int i = 0; i < bench->swept; i++)
+		bounded[bench->row[i].setting] += bench->row[i].bounded;
+	for (int s = 0; s < GUARD_SETTINGS; s++)
+		figures_more_is_better(figures_exact(figures, bounded[s], "1",
+						     "guard %s walls held",
+						     setting_names[s]));
 }

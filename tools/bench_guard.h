@@ -44,4 +44,7 @@ int guard_bench_missed(const struct guard_bench *bench);
 void guard_bench_print(const struct guard_bench *bench);
 json_t *guard_bench_json(const struct guard_bench *bench);
 
+/* How many of the late walls each setting holds. */
+void guard_bench_figures(const struct guard_bench *bench, json_t *figures);
+
 #endif

@@ -9,13 +9,14 @@
 #include "bench_integrators.h"
 #include "cli.h"
 #include "json.h"
-#include "stopwatch.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
 #define TICK_S PERIOD_S
 #define TICKS 2000
-#define REPEATS 15
-#define QUICK_REPEATS 3
+#define REPEATS 49
+#define QUICK_REPEATS 5
+/* Of a run that is timed, at least: short ones need no whole second of motion. */
+#define TIMED_STEPS 4000
 /* Beyond so many times the truth it is not coming back. */
 #define DIVERGED 1e6
 /* An exact one is exact to the roundings of 1000 steps with the force held, and to those
@@ -56,9 +57,9 @@ static void true_places(double K_N_m, double *places)
 	}
 }
 
-static void run(struct integration *in, int substeps, double *places)
+static void run(struct integration *in, int substeps, int ticks, double *places)
 {
-	for (int k = 0; k < TICKS; k++) {
+	for (int k = 0; k < ticks; k++) {
 		double f = force(k);
 
 		for (int i = 0; i < substeps; i++)
@@ -75,7 +76,7 @@ static void measure_error(struct integrator_row *row, const double *truth)
 	double largest = 0, worst = 0, sum = 0;
 
 	integration_init(&in, row->kind, &s, row->step_s);
-	run(&in, lround(TICK_S / row->step_s), places);
+	run(&in, lround(TICK_S / row->step_s), TICKS, places);
 	for (int k = 0; k < TICKS; k++)
 		largest = fmax(largest, fabs(truth[k]));
 	for (int k = 0; k < TICKS; k++) {
@@ -93,38 +94,42 @@ static void measure_error(struct integrator_row *row, const double *truth)
 	row->rms_error = sqrt(sum / TICKS);
 }
 
-static double time_of(const struct integrator_row *row)
+static int timed_ticks(const struct integrator_row *row)
+{
+	int substeps = lround(TICK_S / row->step_s);
+
+	return (TIMED_STEPS + substeps - 1) / substeps < TICKS
+		       ? (TIMED_STEPS + substeps - 1) / substeps
+		       : TICKS;
+}
+
+static void run_timed(void *context)
 {
 	static double places[TICKS];
+	const struct integrator_row *row = context;
 	struct spring s = spring(row->K_N_m);
 	struct integration in;
-	double begin;
 
 	integration_init(&in, row->kind, &s, row->step_s);
-	begin = stopwatch_ns();
-	run(&in, lround(TICK_S / row->step_s), places);
-	return (stopwatch_ns() - begin) / TICKS;
+	run(&in, lround(TICK_S / row->step_s), timed_ticks(row), places);
 }
 
 static void measure_times(struct integrator_bench *bench, int repeats)
 {
-	static double times[INTEGRATOR_ROWS_MAX][REPEATS];
+	static struct harness_way ways[INTEGRATOR_ROWS_MAX];
+	static struct harness_time times[INTEGRATOR_ROWS_MAX];
 
-	/* In turn, so that a busy moment of the machine meets them all. */
-	for (int r = 0; r < repeats; r++)
-		for (int i = 0; i < bench->n; i++) {
-			if (i % 16 == 0)
-				cli_progress("integrators: time %d of %d", r + 1,
-					     repeats);
-			times[i][r] = time_of(&bench->row[i]);
-		}
-	for (int i = 0; i < bench->n; i++) {
-		struct integrator_row *row = &bench->row[i];
+	for (int i = 0; i < bench->n; i++)
+		ways[i] = (struct harness_way){run_timed, &bench->row[i],
+					       timed_ticks(&bench->row[i])};
+	harness_times(ways, bench->n, repeats, times);
+	for (int i = 0; i < bench->n; i++)
+		bench->row[i].ms_time = times[i];
+}
 
-		stopwatch_sort(times[i], repeats);
-		row->ns_per_ms = times[i][repeats / 2];
-		row->ns_per_step = row->ns_per_ms * row->step_s / TICK_S;
-	}
+static double ns_per_step(const struct integrator_row *row)
+{
+	return row->ms_time.ns.median * row->step_s / TICK_S;
 }
 
 static void add(struct integrator_bench *bench, enum integrator kind, double K,
@@ -191,7 +196,7 @@ static void print_work(const struct integrator_bench *bench, double K,
 
 			if (row->kind == kind && row->K_N_m == K &&
 			    row->max_error <= errors[e])
-				least = fmin(least, row->ns_per_ms);
+				least = fmin(least, row->ms_time.ns.median);
 		}
 		if (isinf(least))
 			printf("%12s", "-");
@@ -217,7 +222,7 @@ void integrator_bench_print(const struct integrator_bench *bench)
 			else
 				printf("%10.2g", bench->row[i].max_error);
 		/* Of the second stiffness: nothing overflows there. */
-		printf("%10.1f\n", bench->row[INTEGRATORS + kind].ns_per_step);
+		printf("%10.1f\n", ns_per_step(&bench->row[INTEGRATORS + kind]));
 	}
 	printf("ns for 1 ms of motion, by the largest error that it has with the best of the "
 	       "steps tried\n%21s%10s%12s%12s%12s%12s\n",
@@ -235,16 +240,36 @@ json_t *integrator_bench_json(const struct integrator_bench *bench)
 	for (int i = 0; i < bench->n; i++) {
 		const struct integrator_row *row = &bench->row[i];
 
+		const struct harness_spread *ms = &row->ms_time.ns;
+
 		json_array_append_new(
-			rows, json_pack("{ss so so so so so so ss?}", "integrator",
+			rows, json_pack("{ss so so so so so so so so ss?}", "integrator",
 					integrator_name(row->kind), "K_N_m",
 					json_number(row->K_N_m), "step_s",
 					json_number(row->step_s), "max_error",
 					json_number(row->max_error), "rms_error",
 					json_number(row->rms_error), "ns_per_step",
-					json_number(row->ns_per_step), "ns_per_ms",
-					json_number(row->ns_per_ms), "failed",
+					json_number(ns_per_step(row)), "ns_per_ms",
+					json_number(ms->median), "ns_per_ms_p5",
+					json_number(ms->p5), "ns_per_ms_p95",
+					json_number(ms->p95), "failed",
 					row->diverged ? "diverged" : NULL));
 	}
 	return rows;
+}
+
+void integrator_bench_figures(const struct integrator_bench *bench, json_t *figures)
+{
+	for (int i = 0; i < bench->table; i++) {
+		const struct integrator_row *row = &bench->row[i];
+
+		/* A time of one spring tells that of all. */
+		if (row->K_N_m == swept[0])
+			figures_time(figures, &row->ms_time, "ns", "%s step",
+				     integrator_name(row->kind));
+		if (row->K_N_m == swept[0] || row->K_N_m == swept[1])
+			figures_exact(figures, row->max_error, "1",
+				      "%s largest error at %g N/m",
+				      integrator_name(row->kind), row->K_N_m);
+	}
 }

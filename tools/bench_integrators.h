@@ -13,6 +13,7 @@
 
 #include <stdbool.h>
 #include <jansson.h>
+#include "figures.h"
 #include "integrators.h"
 
 #define INTEGRATOR_ROWS_MAX 256
@@ -22,7 +23,7 @@ struct integrator_row {
 	double K_N_m, step_s;
 	/* Of the places at whole milliseconds, as part of the largest true one. */
 	double max_error, rms_error;
-	double ns_per_step, ns_per_ms; /* of run time, for a ms of motion */
+	struct harness_time ms_time; /* of run time, for a ms of motion */
 	bool diverged;
 };
 
@@ -39,5 +40,8 @@ int integrator_bench_missed(const struct integrator_bench *bench);
 
 void integrator_bench_print(const struct integrator_bench *bench);
 json_t *integrator_bench_json(const struct integrator_bench *bench);
+
+/* Times and errors at 1 kHz. */
+void integrator_bench_figures(const struct integrator_bench *bench, json_t *figures);
 
 #endif

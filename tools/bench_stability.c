@@ -2,6 +2,7 @@
 /*
  * How stiff a virtual wall may be; see bench_stability.h.
  */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include "bench_energy.h"
@@ -10,6 +11,7 @@
 #include "bench_limits.h"
 #include "bench_stability.h"
 #include "cli.h"
+#include "figures.h"
 #include "json.h"
 #include "machine.h"
 #include "picture.h"
@@ -115,6 +117,30 @@ static void print_text(const struct stability *s, bool quick)
 	integrator_bench_print(&s->integrators);
 }
 
+/* How far the worst ratio of each experiment is off, and how many were tried. */
+static json_t *figures_of(const struct stability *s)
+{
+	json_t *figures = figures_new();
+
+	for (size_t i = 0; i < EXPERIMENTS; i++) {
+		const struct ratios *r = &s->ratios[i];
+		double worst = 0;
+
+		for (int k = 0; k < r->n; k++) {
+			double off = ratios_value(&r->row[k]) - 1;
+
+			/* Where theory is a lower bound more is not wrong. */
+			worst = fmax(worst, r->row[k].at_least ? -off : fabs(off));
+		}
+		figures_exact(figures, worst, "1", "%s worst ratio off", r->key);
+		figures_more_is_better(
+			figures_exact(figures, r->n, "1", "%s tried", r->key));
+	}
+	guard_bench_figures(&s->guard, figures);
+	integrator_bench_figures(&s->integrators, figures);
+	return figures;
+}
+
 static void print_json(const struct stability *s, bool quick)
 {
 	json_t *all = json_object();
@@ -125,6 +151,7 @@ static void print_json(const struct stability *s, bool quick)
 	json_object_set_new(all, "integrators", integrator_bench_json(&s->integrators));
 	json_object_set_new(all, "quick", json_boolean(quick));
 	json_object_set_new(all, "machine", machine_json(&s->machine));
+	json_object_set_new(all, "figures", figures_of(s));
 	json_print(all);
 }
 

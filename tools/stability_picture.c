@@ -251,7 +251,8 @@ static void write_integrators(const struct integrator_bench *bench,
 					fprintf(out, "%g %g\n", r->K_N_m, error);
 				else if (s < N(swept) && r->K_N_m == swept[s] &&
 					 !r->diverged)
-					fprintf(out, "%g %g\n", r->ns_per_ms, error);
+					fprintf(out, "%g %g\n", r->ms_time.ns.median,
+						error);
 			}
 			fputs("\n\n", out);
 		}
