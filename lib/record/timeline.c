@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Times of acquisition; see timeline.h.
+ * Times of acquisition; see incise/timeline.h.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -35,6 +35,20 @@ void incise_timeline_begin(struct incise_timeline *timeline,
 	if (timeline->period_ns > 0)
 		incise_envelope_init(&timeline->envelope, timeline->period_ns,
 				     (double)timeline->setup.grain_ns);
+}
+
+struct incise_timeline *incise_timeline_new(const struct incise_timeline_setup *setup)
+{
+	struct incise_timeline *timeline = malloc(sizeof(*timeline));
+
+	if (timeline)
+		incise_timeline_begin(timeline, setup);
+	return timeline;
+}
+
+void incise_timeline_free(struct incise_timeline *timeline)
+{
+	free(timeline);
 }
 
 void incise_timeline_init(struct incise_timeline *timeline, int64_t latency_ns)

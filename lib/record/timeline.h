@@ -1,56 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * From the time a sample arrived to the time it was acquired, for one stream.
- *
- *     acquisition ──── delay ────► earliest ──── jitter ────► arrival    (CLOCK_MONOTONIC, ns)
- *                                  arrival       ≥ 0
- *
- * Stamped by the kernel: the stamp less the delay. Not stamped: the line of the device's own
- * clock below all arrivals (envelope.h), less what the line is expected to be too high, less
- * the delay. The delay is that of the quickest samples; it is from calibration, with its
- * standard deviation.
- *
- * Times never stand still or run backwards, whatever the device says, so that readers may
- * rely on it. Nothing here allocates, locks or calls the system; the work per sample is
- * bounded. One thread at a time.
+ * A timeline as it is inside; see incise/timeline.h. Nothing here allocates, locks or calls
+ * the system.
  */
-#ifndef INCISE_TIMELINE_H
-#define INCISE_TIMELINE_H
+#ifndef INCISE_TIMELINE_PRIVATE_H
+#define INCISE_TIMELINE_PRIVATE_H
 
-#include <stdbool.h>
-#include <stdint.h>
+#include <incise/timeline.h>
 #include "envelope.h"
-
-struct incise_timeline_setup {
-	bool stamped;	/* by the kernel, when it was acquired but for the delay */
-	double rate_hz; /* nominal, 0.001 to 1e7; else no line can be drawn */
-	int64_t delay_ns, delay_sd_ns;
-	/* Not stamped: arrivals come on a grid, 1000000 for frames of USB; 0 for none. */
-	int64_t grain_ns;
-};
-
-struct incise_timeline_report {
-	uint64_t samples;
-	double rate_hz;			/* measured */
-	double drift_ppm, drift_sd_ppm; /* of the device's rate; fast is positive */
-	double jitter_ns;		/* standard deviation of arrivals or stamps */
-	double jitter_max_ns;		/* farthest above the line */
-	uint64_t late;			/* more than a period above the line */
-	int lines;	     /* begun: more than 1 after a gap in the device's clock */
-	double offset_ns;    /* taken off from the line */
-	double offset_sd_ns; /* of the time given to the last sample */
-};
-
-/* The line bends here: between two knots time is linear in the number. */
-struct incise_timeline_knot {
-	uint64_t seq;
-	int64_t t_ns;
-	double sd_ns;
-	bool begins; /* a new line, which does not go on from the knot before */
-};
-
-#define INCISE_TIMELINE_KNOTS 256
-#define INCISE_TIMELINE_KNOTS_MAX (INCISE_TIMELINE_KNOTS + 3) /* of a line that goes on */
 
 struct incise_timeline_line {
 	uint64_t seq;
@@ -83,30 +40,9 @@ struct incise_timeline {
 	double knot_step_ns; /* to the next */
 };
 
-/* @setup's delay is taken as it is; a rate that is no number or out of range: not known. */
+/* As incise_timeline_new(), in the caller's memory. */
 void incise_timeline_begin(struct incise_timeline *timeline,
 			   const struct incise_timeline_setup *setup);
-
-/* Acquisition time of sample @seq: later than any before, and 0 or more. */
-int64_t incise_timeline_sample(struct incise_timeline *timeline, uint64_t seq,
-			       int64_t arrival_ns);
-
-/* The device was plugged in again: numbers go on, but the phase of its clock is another. */
-void incise_timeline_replug(struct incise_timeline *timeline);
-
-/* What was seen up to now. What is not known is NaN. */
-void incise_timeline_report(const struct incise_timeline *timeline,
-			    struct incise_timeline_report *report);
-
-/*
- * For streams without stamps: the best line afterwards, from what came before and after.
- * Returns the number of knots, at most INCISE_TIMELINE_KNOTS_MAX: 0 before two samples.
- */
-int incise_timeline_knots(const struct incise_timeline *timeline,
-			  struct incise_timeline_knot *knots);
-
-/* Time of @seq between knots, or beyond the last of them; @n is 2 or more. */
-int64_t incise_timeline_at(const struct incise_timeline_knot *knots, int n, uint64_t seq);
 
 /* One line through all knots after the last begin. 0, or -ENODATA. */
 int incise_timeline_line(const struct incise_timeline *timeline,

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Where the tip is now; see predict.h. Gains after Kalata's tracking index
+ * Where the tip is now; see incise/predict.h. Gains after Kalata's tracking index
  * Λ = σa T²/σx, where σa is what acceleration changes in one period T and σx what the
  * tracker sees: Kalata, The tracking index, IEEE Trans. AES-20(2), 1984; the closed form
  * is Gray and Murray's, IEEE Trans. AES-29(3), 1993.
  */
 #include <math.h>
+#include <stdlib.h>
 #include <incise/clock.h>
 #include "../base/vector.h"
 #include "predict.h"
@@ -75,6 +76,21 @@ void incise_predict_init(struct incise_predict *p,
 			 const struct incise_tracker_info *tracker)
 {
 	incise_predict_init_noise(p, tracker, NOISE_MM);
+}
+
+struct incise_predict *incise_predict_new(const struct incise_tracker_info *tracker,
+					  double noise_mm)
+{
+	struct incise_predict *p = malloc(sizeof(*p));
+
+	if (p)
+		incise_predict_init_noise(p, tracker, noise_mm > 0 ? noise_mm : NOISE_MM);
+	return p;
+}
+
+void incise_predict_free(struct incise_predict *p)
+{
+	free(p);
 }
 
 /* Never negative, and no overflow for any two times. */

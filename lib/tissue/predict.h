@@ -1,33 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * From a tracker's 60–240 poses a second, milliseconds old, to where the tip is now: a
- * steady-state constant-acceleration Kalman filter (alpha-beta-gamma) per axis,
- * extrapolated. What is shown never jumps: the difference between what was shown and
- * what a new pose says is blended out, linearly, over one tracker period.
- *
- *   shown   ·····.                 the old prediction
- *                 '·.  difference × (1 - (t - arrival) / period)
- *                    '·.__________ the new prediction
- *   time         |    |
- *             arrival  + period
- *
- * The blend begins when a pose arrives at the host (sample->t_ns), not when it is taken
- * in. So it does not matter how many poses are taken in at one tick. A pose must be taken
- * in before the first tick after its arrival is asked for; when it is late by d, what is
- * shown steps by d / period of the difference.
- *
- * mm, s; times of the host's clock in ns. No function allocates, locks or calls the
- * system, and none gives anything but finite numbers, whatever the poses are.
+ * The predictor of poses as it is inside; see incise/predict.h. Who is in the library has
+ * it in his own memory.
  */
-#ifndef INCISE_PREDICT_H
-#define INCISE_PREDICT_H
+#ifndef INCISE_PREDICT_PRIVATE_H
+#define INCISE_PREDICT_PRIVATE_H
 
 #include <stdbool.h>
 #include <stdint.h>
-#include <incise/tracker.h>
-
-/* At 60 Hz a hand that misses a pose by this is faster than 1 m/s. */
-#define INCISE_PREDICT_JUMP_MM 20.0
+#include <incise/predict.h>
 
 struct incise_predict {
 	double alpha, beta, gamma; /* of a miss: to x, v · period, a · period² */
@@ -48,10 +29,7 @@ struct incise_predict {
 	double q_shown[4];
 };
 
-/*
- * For a tracker with the noise of a magnetic one near its source. A rate outside
- * 1 … 10000 Hz and a latency outside 0 … 1 s are taken as the nearest inside.
- */
+/* As incise_predict_new() of noise 0. */
 void incise_predict_init(struct incise_predict *p,
 			 const struct incise_tracker_info *tracker);
 
@@ -59,32 +37,5 @@ void incise_predict_init(struct incise_predict *p,
 void incise_predict_init_noise(struct incise_predict *p,
 			       const struct incise_tracker_info *tracker,
 			       double noise_mm);
-
-/*
- * Take a pose in. One whose position is not finite or metres away, or that is not newer
- * than the last, is passed over. A quaternion that is none leaves the attitude as it was.
- *
- * After a gap of more than five periods velocity starts from 0. So it does when a pose is
- * more than 20 mm from where it should be: no hand did that, and it must not be dragged
- * through the tissue, so there is then no blend either; the force's limits do the rest.
- */
-void incise_predict_add(struct incise_predict *p,
-			const struct incise_tracker_sample *sample) INCISE_REALTIME;
-
-/*
- * Position, velocity and attitude (unit quaternion, w first) at @t_ns. Before the first
- * pose all is 0 and the attitude 1.
- *
- * Position and velocity are blended each by itself: velocity is the filter's, and not the
- * derivative of the position shown, which holds the speed of the correction too. Further
- * than a gap after the last pose they stay as they were then. The attitude is not
- * extrapolated.
- */
-void incise_predict_at(const struct incise_predict *p, int64_t t_ns,
-		       double position_mm[3], double velocity_mm_s[3],
-		       double attitude[4]) INCISE_REALTIME;
-
-/* Age of the last pose at @t_ns, ≥ 0; INT64_MAX before the first. */
-int64_t incise_predict_age(const struct incise_predict *p, int64_t t_ns) INCISE_REALTIME;
 
 #endif

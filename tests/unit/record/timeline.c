@@ -561,6 +561,23 @@ static void nothing_is_made_up(void **state)
 	}
 }
 
+static void new_is_begin(void **state)
+{
+	struct incise_timeline_setup setup = {.rate_hz = 120, .delay_ns = 4200000};
+	struct incise_timeline *made = incise_timeline_new(&setup), begun;
+
+	assert_non_null(made);
+	incise_timeline_begin(&begun, &setup);
+	for (int i = 0; i < 500; i++) {
+		int64_t arrival_ns = 1000000000 + i * 8334000LL + i * 7919 % 997 * 1000;
+
+		assert_int_equal(incise_timeline_sample(made, i, arrival_ns),
+				 incise_timeline_sample(&begun, i, arrival_ns));
+	}
+	incise_timeline_free(made);
+	incise_timeline_free(NULL);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -578,6 +595,7 @@ int main(void)
 		cmocka_unit_test(memory_is_bounded),
 		cmocka_unit_test(hostile_streams),
 		cmocka_unit_test(nothing_is_made_up),
+		cmocka_unit_test(new_is_begin),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -434,6 +434,36 @@ static void test_only_numbers(void **state)
 	}
 }
 
+/* Made on the heap it is the same, to the bit; no noise is the noise of init. */
+static void test_new_is_init(void **state)
+{
+	static const double noise_mm[] = {0, 0.005, 0.1};
+	struct incise_tracker_info info = {"test", 240, LATENCY_NS, 1, 0};
+
+	for (int i = 0; i < 3; i++) {
+		struct incise_predict *p = incise_predict_new(&info, noise_mm[i]), q;
+
+		if (i)
+			incise_predict_init_noise(&q, &info, noise_mm[i]);
+		else
+			incise_predict_init(&q, &info);
+		assert_non_null(p);
+		for (int n = 0; n < 20; n++) {
+			struct incise_tracker_sample s =
+				at(n * PERIOD_NS, sin(n), 0.1 * n, 1);
+			struct pose one, other;
+
+			incise_predict_add(p, &s);
+			incise_predict_add(&q, &s);
+			one = pose_at(p, s.t_ns + 1000000);
+			other = pose_at(&q, s.t_ns + 1000000);
+			assert_memory_equal(&one, &other, sizeof(one));
+		}
+		incise_predict_free(p);
+	}
+	incise_predict_free(NULL);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -448,6 +478,7 @@ int main(void)
 		cmocka_unit_test(test_never_further_ahead_than_a_gap),
 		cmocka_unit_test(test_speed_is_bounded),
 		cmocka_unit_test(test_only_numbers),
+		cmocka_unit_test(test_new_is_init),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
