@@ -40,7 +40,8 @@ extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o harne
 	memory_file.o loop_picture.o \
 	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
 	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o \
-	bench_vision.o scalpel_picture.o bench_capture.o jpeg_camera.o)
+	bench_vision.o scalpel_picture.o bench_capture.o jpeg_camera.o \
+	bench_pose.o motions.o pose_methods.o pose_error.o pose_picture.o)
 
 extra_view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o state_pages.o view_hand.o \
 	view_live.o view_output.o png_file.o)

@@ -6,6 +6,7 @@
 #include <string.h>
 #include "bench_capture.h"
 #include "bench_loop.h"
+#include "bench_pose.h"
 #include "bench_precision.h"
 #include "bench_stability.h"
 #include "bench_training.h"
@@ -105,6 +106,11 @@ static void capture(const struct job *job)
 	bench_capture(job->operand, job->seconds, job->json, job->quick);
 }
 
+static void pose(const struct job *job)
+{
+	bench_pose(job->json, job->quick, job->plot);
+}
+
 static const struct {
 	const char *word;
 	bool operand, plot; /* takes one */
@@ -113,6 +119,7 @@ static const struct {
 	{"precision", true, true, precision},  {"training", false, false, training},
 	{"stability", false, true, stability}, {"loop", true, true, loop},
 	{"vision", false, false, vision},      {"capture", true, false, capture},
+	{"pose", false, true, pose},
 };
 #define WORDS (int)(sizeof(words) / sizeof(*words))
 

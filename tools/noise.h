@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Random numbers of a bench: the same in each run, and not the virtual rig's.
+ */
+#ifndef INCISE_NOISE_H
+#define INCISE_NOISE_H
+
+#include <math.h>
+#include <stdint.h>
+
+struct noise {
+	uint64_t state; /* set it to a seed */
+};
+
+/* 0 … 1, without 1. splitmix64: Steele, Lea and Flood, OOPSLA 2014. */
+static inline double noise_uniform(struct noise *noise)
+{
+	uint64_t z = noise->state += 0x9e3779b97f4a7c15;
+
+	z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
+	z = (z ^ z >> 27) * 0x94d049bb133111eb;
+	return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
+}
+
+/* Of mean 0 and sd 1; of Box and Muller's two one. */
+static inline double noise_normal(struct noise *noise)
+{
+	double size = sqrt(-2 * log(1 - noise_uniform(noise)));
+
+	return size * cos(2 * M_PI * noise_uniform(noise));
+}
+
+/* Of mean 1. */
+static inline double noise_exponential(struct noise *noise)
+{
+	return -log(1 - noise_uniform(noise));
+}
+
+#endif
