@@ -41,7 +41,8 @@ extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o harne
 	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
 	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o \
 	bench_vision.o scalpel_picture.o bench_capture.o jpeg_camera.o \
-	bench_pose.o motions.o pose_methods.o pose_error.o pose_picture.o)
+	bench_pose.o motions.o pose_methods.o pose_error.o pose_picture.o \
+	bench_timeline.o drifting_stream.o time_methods.o timeline_picture.o)
 
 extra_view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o state_pages.o view_hand.o \
 	view_live.o view_output.o png_file.o)
@@ -121,6 +122,8 @@ bench: ## measure error against run time on this machine; chart in build/bench/
 	$(O)/bin/incise bench stability --plot $(O)/bench/stability
 	$(O)/bin/incise bench vision
 	$(O)/bin/incise bench capture
+	$(O)/bin/incise bench pose --plot $(O)/bench/pose
+	$(O)/bin/incise bench timeline --plot $(O)/bench/timeline
 	$(if $(has_view),$(O)/bin/incise bench view --plot $(O)/bench/view)
 
 .PHONY: tools deps demo bench

@@ -9,6 +9,7 @@
 #include "bench_pose.h"
 #include "bench_precision.h"
 #include "bench_stability.h"
+#include "bench_timeline.h"
 #include "bench_training.h"
 #include "bench_vision.h"
 #include "cli.h"
@@ -23,7 +24,8 @@ static const struct cli_option options[] = {
 	{OPT_PLOT, "plot", "NAME",
 	 "draw error over time as NAME.png and NAME.svg;\n"
 	 "stability: NAME-map, NAME-guard, NAME-integrators;\n"
-	 "loop: NAME-wakeups, NAME-rates"},
+	 "loop: NAME-wakeups, NAME-rates;\n"
+	 "pose: NAME, NAME-rates; timeline: NAME, NAME-windows"},
 	{OPT_DURATION, "duration", "TIME",
 	 "of each run of capture, and each of loop's wake-ups:\n10min; default 10s"},
 	{OPT_LOAD, "load", "NAME",
@@ -36,7 +38,7 @@ static const struct cli_verb verb = {
 	.name = "bench",
 	.synopsis =
 		"precision [MODEL.fis] | training | stability | loop [SCENE] | vision | capture "
-		"[RUN] | view [SCENE] | compare OLD.json NEW.json [OPTIONS]",
+		"[RUN] | pose | timeline | view [SCENE] | compare OLD.json NEW.json [OPTIONS]",
 	.summary =
 		"precision: measure error against run time of a model's arithmetics. Without\n"
 		"MODEL a model of the paper's size (20 rules) is made.\n"
@@ -51,6 +53,10 @@ static const struct cli_verb verb = {
 		"is known.\n"
 		"capture: measure how much of a core it takes to record all streams in real time,\n"
 		"and with parts left out; or one RUN of these.\n"
+		"pose: measure how far off the pose is that the loop is given, over the rate and\n"
+		"the delay of the tracker and what it costs; and what losses of poses do.\n"
+		"timeline: measure how far off the times are that samples get which come late, by\n"
+		"a clock that drifts, over how much was seen and what it costs.\n"
 		"view: measure what the picture of a scene costs, and how far off it is; see\n"
 		"'incise bench view --help'.\n"
 		"compare: say what changed beyond noise between two reports of --json.",
@@ -111,6 +117,11 @@ static void pose(const struct job *job)
 	bench_pose(job->json, job->quick, job->plot);
 }
 
+static void timeline(const struct job *job)
+{
+	bench_timeline(job->json, job->quick, job->plot);
+}
+
 static const struct {
 	const char *word;
 	bool operand, plot; /* takes one */
@@ -119,7 +130,7 @@ static const struct {
 	{"precision", true, true, precision},  {"training", false, false, training},
 	{"stability", false, true, stability}, {"loop", true, true, loop},
 	{"vision", false, false, vision},      {"capture", true, false, capture},
-	{"pose", false, true, pose},
+	{"pose", false, true, pose},	       {"timeline", false, true, timeline},
 };
 #define WORDS (int)(sizeof(words) / sizeof(*words))
 
@@ -182,11 +193,12 @@ int main(int argc, char **argv)
 	if (optind >= argc || what == WORDS ||
 	    argc - optind > (words[what].operand ? 2 : 1))
 		cli_usage(
-			"expected 'training', 'stability', 'vision', 'precision' and at most one "
-			"model, 'loop' and at most one scene, 'capture' and at most one run, or "
-			"'compare' and two reports");
+			"expected 'training', 'stability', 'vision', 'pose', 'timeline', "
+			"'precision' and at most one model, 'loop' and at most one scene, "
+			"'capture' and at most one run, or 'compare' and two reports");
 	if (job.plot && !words[what].plot)
-		cli_usage("--plot goes with 'precision', 'stability' and 'loop'");
+		cli_usage("--plot goes with 'precision', 'stability', 'loop', 'pose' and "
+			  "'timeline'");
 	if (job.seconds > 0 && words[what].run != capture && words[what].run != loop)
 		cli_usage("--duration goes with 'capture' and 'loop'");
 	if (job.load && words[what].run != loop)

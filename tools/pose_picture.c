@@ -55,19 +55,21 @@ static void begin(FILE *script, const struct pose_table *rows, const char *what,
 }
 
 /* The colour of a method; the exact pose is black, and has no cost. */
-static const char *style(int method, char text[24])
+static const char *style(int method)
 {
-	if (method == POSE_METHODS)
-		return "lc rgb 'black' dt 3";
-	snprintf(text, 24, "ls %d", method + 1);
-	return text;
+	static const char *const styles[POSE_ROWS] = {
+		"lc rgb '#999999' lw 1.3", "lc rgb '#c0392b' lw 1.3",
+		"lc rgb '#2e8b57' lw 1.3", "lc rgb '#1f4e9c' lw 2.2",
+		"lc rgb '#d68910' lw 1.3", "lc rgb '#17a2b8' lw 1.3",
+		"lc rgb '#8e44ad' lw 1.3", "lc rgb 'black' lw 1 dt 3",
+	};
+
+	return styles[method];
 }
 
 /* The sixth panel is the key. */
 static void draw_key(FILE *script, bool exact)
 {
-	char text[24];
-
 	fputs("unset logscale\nunset xlabel\nunset ylabel\nunset title\nunset xtics\n"
 	      "unset ytics\nunset border\nunset grid\nset key at graph 0.9, 0.95 top right "
 	      "Left reverse samplen 3 spacing 1.4 font ',12'\n"
@@ -75,16 +77,16 @@ static void draw_key(FILE *script, bool exact)
 	      script);
 	for (int method = 0; method < POSE_METHODS + exact; method++)
 		fprintf(script, "  NaN with linespoints %s pt %d title '%s', \\\n",
-			style(method, text), method < POSE_METHODS ? 7 : 0,
+			style(method), method < POSE_METHODS ? 7 : 0,
 			method < POSE_METHODS ? pose_methods[method].name
-					      : "exact, as late");
+					      : "exact, as late as the tracker");
 	fputs("  NaN notitle\nunset multiplot\n", script);
 }
 
 void pose_picture_cost(const struct pose_table *rows, const char *folder,
 		       const char *name)
 {
-	char *data, text[24];
+	char *data;
 	FILE *script;
 
 	if (!rows->n)
@@ -95,7 +97,7 @@ void pose_picture_cost(const struct pose_table *rows, const char *folder,
 	script = picture_begin(folder, name, 1320, 860);
 	begin(script, rows, "its cost", data);
 	fputs("set xlabel 'time per tick / ns (bars: 5 to 95 %)'\nset termoption noenhanced\n"
-	      "set offsets 0, 0, graph 0.08, graph 0.05\n",
+	      "set xrange [2:400]\nset yrange [0.01:1]\n",
 	      script);
 	for (int motion = 0; motion < MOTIONS; motion++) {
 		fprintf(script, "set title '%s: %s'\nplot \\\n", motions[motion].name,
@@ -104,10 +106,10 @@ void pose_picture_cost(const struct pose_table *rows, const char *folder,
 			fprintf(script,
 				"  data index %d using 4:2 with lines %s, \\\n"
 				"  '' index %d using 4:2:5:6 with xerrorbars %s pt 7 ps 0.7, \\\n"
-				"  '' index %d using 4:2:(sprintf('%%g', $1)) with labels left "
-				"offset 0.4,0.4 font ',7', \\\n",
-				motion * POSE_ROWS + method, style(method, text),
-				motion * POSE_ROWS + method, style(method, text),
+				"  '' index %d using 4:2:($1 == 60 || $1 == 1000 ? sprintf('%%g', $1) : '') with labels left "
+				"offset 0.4,0.4 font ',8', \\\n",
+				motion * POSE_ROWS + method, style(method),
+				motion * POSE_ROWS + method, style(method),
 				motion * POSE_ROWS + method);
 		fputs("  NaN\n", script);
 	}
@@ -123,7 +125,6 @@ void pose_picture_rates(const struct pose_table *rows, const char *folder,
 {
 	struct picture_part p;
 	FILE *script;
-	char text[24];
 
 	if (!rows->n)
 		return;
@@ -140,7 +141,7 @@ void pose_picture_rates(const struct pose_table *rows, const char *folder,
 		for (int method = 0; method < POSE_ROWS; method++)
 			fprintf(script,
 				"  data index %d using 1:2 with linespoints %s pt %d ps 0.8, \\\n",
-				motion * POSE_ROWS + method, style(method, text),
+				motion * POSE_ROWS + method, style(method),
 				method < POSE_METHODS ? 7 : 0);
 		fputs("  NaN\n", script);
 	}
