@@ -133,8 +133,6 @@ void *opencv_open(const struct incise_backend_request *, struct incise_error *)
 } // namespace
 
 extern "C" {
-INCISE_API extern const struct incise_backend incise_backend;
-
 const struct incise_backend incise_backend = {INCISE_BACKEND_ABI, "board", "opencv",
 					      opencv_open, nullptr};
 }

@@ -4,8 +4,6 @@
  */
 #include "vision_opencv.h"
 
-INCISE_API extern const struct incise_backend incise_backend;
-
 const struct incise_backend incise_backend = {
 	.abi = INCISE_BACKEND_ABI,
 	.kind = "vision",

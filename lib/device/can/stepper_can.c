@@ -18,8 +18,6 @@ static int scan(const char *arguments, incise_scan_found *found, void *context,
 	return can_stepper_scan(&can_transport_socketcan, arguments, found, context, err);
 }
 
-INCISE_API extern const struct incise_backend incise_backend;
-
 const struct incise_backend incise_backend = {
 	.abi = INCISE_BACKEND_ABI,
 	.kind = "stepper",

@@ -5,8 +5,6 @@
  */
 #include "comedi_force.h"
 
-INCISE_API extern const struct incise_backend incise_backend;
-
 const struct incise_backend incise_backend = {
 	.abi = INCISE_BACKEND_ABI,
 	.kind = "force",

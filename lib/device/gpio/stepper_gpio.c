@@ -392,8 +392,6 @@ static void *gpio_open(const struct incise_backend_request *asked,
 	return NULL;
 }
 
-INCISE_API extern const struct incise_backend incise_backend;
-
 const struct incise_backend incise_backend = {
 	.abi = INCISE_BACKEND_ABI,
 	.kind = "stepper",

@@ -98,8 +98,6 @@ static int scan(const char *arguments, incise_scan_found *found, void *context,
 	return found(context, &device);
 }
 
-INCISE_API extern const struct incise_backend incise_backend;
-
 const struct incise_backend incise_backend = {
 	.abi = INCISE_BACKEND_ABI,
 	.kind = "tracker",

@@ -18,8 +18,6 @@ static void *open_tracker(const struct incise_backend_request *request,
 		    : NULL;
 }
 
-INCISE_API extern const struct incise_backend incise_backend;
-
 const struct incise_backend incise_backend = {
 	.abi = INCISE_BACKEND_ABI,
 	.kind = "tracker",

@@ -6,8 +6,6 @@
 #include <incise/backend.h>
 #include "v4l2_camera.h"
 
-INCISE_API extern const struct incise_backend incise_backend;
-
 const struct incise_backend incise_backend = {
 	.abi = INCISE_BACKEND_ABI,
 	.kind = "camera",

@@ -1,8 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * What stands behind a device: a table of functions per backend and kind. A backend
- * embeds the kind's struct as its first member. For those who write one; who only uses
- * devices needs the header of their kind.
+ * embeds the kind's struct as its first member. For those who write one (doc/device-backend.md
+ * goes through a whole one); who only uses devices needs the header of their kind.
+ *
+ * What holds for every table:
+ *
+ *  - read() takes what has arrived and never waits: 0 is "nothing yet", an errno "it is over".
+ *    Who has to wait for a device does so in a thread of his own.
+ *  - All of them are called by one thread at a time, between open and close.
+ *  - close() frees what open() made, the struct itself too. It is called once.
  */
 #ifndef INCISE_BACKEND_H
 #define INCISE_BACKEND_H
@@ -19,8 +26,11 @@
 #include <incise/tracker.h>
 #include <incise/vision.h>
 
+INCISE_BEGIN_DECLS
+
+/** What a tracker answers with; see incise/tracker.h. */
 struct incise_tracker_ops {
-	/** INCISE_REALTIME where a haptic loop is to read it. */
+	/** As incise_tracker_read(); INCISE_REALTIME, where a haptic loop is to read it. */
 	int (*read)(struct incise_tracker *tracker, struct incise_tracker_sample *samples,
 		    int n) INCISE_REALTIME;
 	void (*info)(const struct incise_tracker *tracker,
@@ -31,11 +41,14 @@ struct incise_tracker_ops {
 	int (*cause)(struct incise_tracker *tracker, char *text, size_t size);
 };
 
+/** A tracker: the first member of what its backend opens. */
 struct incise_tracker {
 	const struct incise_tracker_ops *ops;
 };
 
+/** What a force channel answers with; see incise/force.h. */
 struct incise_force_ops {
+	/** As incise_force_read(). */
 	int (*read)(struct incise_force *force, struct incise_force_sample *samples,
 		    int n);
 	void (*info)(const struct incise_force *force, struct incise_force_info *info);
@@ -45,11 +58,14 @@ struct incise_force_ops {
 	int (*cause)(struct incise_force *force, char *text, size_t size);
 };
 
+/** A force channel: the first member of what its backend opens. */
 struct incise_force {
 	const struct incise_force_ops *ops;
 };
 
+/** What a camera answers with; see incise/camera.h. */
 struct incise_camera_ops {
+	/** As incise_camera_read(). */
 	int (*read)(struct incise_camera *camera, struct incise_camera_frame *frame);
 	void (*info)(const struct incise_camera *camera, struct incise_camera_info *info);
 	uint64_t (*lost)(const struct incise_camera *camera);
@@ -58,6 +74,7 @@ struct incise_camera_ops {
 	int (*cause)(struct incise_camera *camera, char *text, size_t size);
 };
 
+/** A camera: the first member of what its backend opens. */
 struct incise_camera {
 	const struct incise_camera_ops *ops;
 };
@@ -113,6 +130,7 @@ struct incise_stepper_ops {
 	int (*wait)(struct incise_stepper *stepper, int64_t ns);
 };
 
+/** A stepper: the first member of what its backend opens. */
 struct incise_stepper {
 	const struct incise_stepper_ops *ops;
 };
@@ -130,6 +148,7 @@ struct incise_vision_ops {
 	void (*close)(struct incise_vision *vision);
 };
 
+/** The first member of what the module of vision opens. */
 struct incise_vision {
 	const struct incise_vision_ops *ops;
 };
@@ -143,6 +162,7 @@ struct incise_board_ops {
 	void (*close)(struct incise_board *board);
 };
 
+/** The first member of what the module of boards opens. */
 struct incise_board {
 	const struct incise_board_ops *ops;
 };
@@ -193,4 +213,8 @@ struct incise_backend {
 		    struct incise_error *err);
 };
 
+/** What a module exports, and nothing else of its own. */
+INCISE_API extern const struct incise_backend incise_backend;
+
+INCISE_END_DECLS
 #endif

@@ -342,8 +342,6 @@ static void *hdf5_open(const struct incise_backend_request *request,
 	return (void *)&format;
 }
 
-INCISE_API extern const struct incise_backend incise_backend;
-
 /* No device, but found as one: what opens is a format. */
 const struct incise_backend incise_backend = {
 	.abi = INCISE_BACKEND_ABI,

@@ -18,8 +18,6 @@
 #include <incise/backend.h>
 #include "../../../lib/device/gpio/gpio_lines.h"
 
-extern const struct incise_backend incise_backend;
-
 /* A chip; levels, not what they mean. */
 struct gpio_lines {
 	int line[INCISE_LINES];

@@ -18,8 +18,6 @@
 #include <incise/backend.h>
 #include "../../../lib/record/table_writer.h"
 
-extern const struct incise_backend incise_backend;
-
 static const struct incise_column columns[] = {
 	{"cut", "1", "a name", INCISE_COLUMN_NAME, 0},
 	{"t_s", "s", "a time", INCISE_COLUMN_REAL, 6},
