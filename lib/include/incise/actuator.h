@@ -57,6 +57,7 @@ struct incise_actuator_can {
 	int master; /**< node id of this program's heartbeat, 1 … 127 */
 };
 
+/** What rig.conf says of an actuator. Lengths in mm, times as their names say. */
 struct incise_actuator {
 	double spring_N_mm, travel_mm;
 	double lead_mm;	    /**< per turn */

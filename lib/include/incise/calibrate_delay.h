@@ -26,7 +26,9 @@
 
 INCISE_BEGIN_DECLS
 
+/** A motion that is shorter is refused. */
 #define INCISE_DELAY_SPAN_MIN_S 8.0
+/** Streams that agree less are refused. */
 #define INCISE_DELAY_CORRELATION_MIN 0.8
 #define INCISE_DELAY_SECOND_MAX 0.8 /**< of a second peak, relative to the first */
 #define INCISE_DELAY_SD_MAX_MS 0.5  /**< a motion that tells it worse is refused */
@@ -43,6 +45,7 @@ enum incise_delay_relation {
 	INCISE_DELAY_FORCE, /**< force of something that is pressed on */
 };
 
+/** The delay between two streams, and how well they tell it. */
 struct incise_delay_fit {
 	double delay_ms; /**< how much later the motion is stamped than the other stream */
 	double sd_ms;	 /**< standard uncertainty */

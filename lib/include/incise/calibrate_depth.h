@@ -25,7 +25,9 @@
 
 INCISE_BEGIN_DECLS
 
+/** Lines that a budget has at most. */
 #define INCISE_DEPTH_BUDGET 6
+/** Pairs that a line needs. */
 #define INCISE_DEPTH_PAIRS_MIN 6
 #define INCISE_DEPTH_SPAN_MIN_PX 20.0 /**< of lengths in a line; else it is too short */
 
@@ -99,6 +101,7 @@ INCISE_API int incise_calibrate_depth_line(const struct incise_depth_pairs *pair
 
 /* ---- board -------------------------------------------------------------------------- */
 
+/** Pictures of a board that are taken at most. */
 #define INCISE_BOARD_VIEWS 40
 #define INCISE_BOARD_CORNERS 400 /**< of one view */
 
@@ -124,6 +127,7 @@ struct incise_board_views {
 	int width, height;	/**< of the picture */
 };
 
+/** What the views of a board say: lens, plane and scale. u: standard uncertainty. */
 struct incise_board_fit {
 	struct incise_board_lens lens, u_lens;
 	double mm_px, u_mm_px;	      /**< over the axis from end to end */

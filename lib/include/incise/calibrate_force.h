@@ -65,8 +65,10 @@ struct incise_calibrate_force_part {
 	double u_mV_N; /**< what it adds to the sensitivity's uncertainty, in squares */
 };
 
+/** Lines that a budget has at most. */
 #define INCISE_CALIBRATE_FORCE_PARTS 6
 
+/** What the pairs say: the line, what it holds for, and what makes its uncertainty. */
 struct incise_calibrate_force {
 	double sensitivity_mV_N, sensitivity_u_mV_N; /**< U is twice that (k = 2) */
 	double zero_mV, zero_u_mV;
@@ -91,6 +93,7 @@ struct incise_calibrate_force {
 	struct incise_calibrate_force_part part[INCISE_CALIBRATE_FORCE_PARTS];
 };
 
+/** Defaults as documented above. */
 INCISE_API void incise_calibrate_force_init(struct incise_calibrate_force_setup *setup);
 
 /**

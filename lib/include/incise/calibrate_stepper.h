@@ -68,8 +68,10 @@ struct incise_calibrate_stepper_part {
 	double u_N_step; /**< what it adds to that of N_step, in squares */
 };
 
+/** Lines that a budget has. */
 #define INCISE_CALIBRATE_STEPPER_PARTS 3
 
+/** What the strokes say of the actuator. */
 struct incise_calibrate_stepper {
 	double N_step, N_step_u; /**< force per microstep; U is twice that (k = 2) */
 	double N_mm,
@@ -95,6 +97,7 @@ struct incise_calibrate_stepper {
 	struct incise_calibrate_stepper_part part[INCISE_CALIBRATE_STEPPER_PARTS];
 };
 
+/** Defaults as documented above. */
 INCISE_API void incise_calibrate_stepper_init(
 	struct incise_calibrate_stepper_setup *setup);
 

@@ -60,6 +60,7 @@ struct incise_calibration_value {
 	double u;      /**< its standard uncertainty; U is twice that (k = 2) */
 };
 
+/** Values that one calibration gives at most. */
 #define INCISE_CALIBRATION_VALUES 16
 
 /** One calibration, as it stands in the history of calibration.conf. */

@@ -66,6 +66,7 @@ struct incise_camera;
 INCISE_API int incise_camera_read(struct incise_camera *camera,
 				  struct incise_camera_frame *frame);
 
+/** What it says of itself. */
 INCISE_API void incise_camera_info(const struct incise_camera *camera,
 				   struct incise_camera_info *info);
 

@@ -16,6 +16,7 @@
 
 INCISE_BEGIN_DECLS
 
+/** Nanoseconds in a second. */
 #define INCISE_NS_PER_S 1000000000LL
 
 struct incise_clock;
@@ -45,6 +46,7 @@ INCISE_API struct incise_clock *incise_clock_new_simulated(int64_t start_ns);
  */
 INCISE_API struct incise_clock *incise_clock_new_paced(int64_t start_ns);
 
+/** NULL is accepted. */
 INCISE_API void incise_clock_free(struct incise_clock *clock);
 
 /** Nanoseconds since an arbitrary start. Real-time safe (vDSO). */

@@ -33,8 +33,10 @@ INCISE_API struct incise_dataset *incise_dataset_read(const char *path,
 						      const char *group,
 						      struct incise_error *err);
 
+/** NULL is accepted. */
 INCISE_API void incise_dataset_free(struct incise_dataset *data);
 
+/** How many rows there are. */
 INCISE_API size_t incise_dataset_rows(const struct incise_dataset *data);
 
 /** Row @row: one value per column, in the order asked for; owned by the dataset. */

@@ -23,15 +23,16 @@
 #define INCISE_BEGIN_DECLS extern "C" {
 #define INCISE_END_DECLS }
 #else
-#define INCISE_BEGIN_DECLS
-#define INCISE_END_DECLS
+#define INCISE_BEGIN_DECLS /**< C linkage begins, where this is C++ */
+#define INCISE_END_DECLS   /**< and ends */
 #endif
 
 #if defined(__GNUC__)
 #define INCISE_API __attribute__((visibility("default")))
 #define INCISE_PRINTF(fmt, args) __attribute__((format(printf, fmt, args)))
 #else
-#define INCISE_API
+#define INCISE_API /**< a shared object gives it to others */
+/** The compiler checks arguments as those of printf(3). */
 #define INCISE_PRINTF(fmt, args)
 #endif
 

@@ -16,6 +16,7 @@ INCISE_BEGIN_DECLS
 
 struct incise_film;
 
+/** Largest width and height, pixels. */
 #define INCISE_FILM_SIDE_MAX 8192
 
 /**

@@ -26,8 +26,11 @@
 
 INCISE_BEGIN_DECLS
 
+/** Inputs of a compiled model. */
 #define INCISE_FIXED_INPUTS_MAX 2
+/** Membership functions of one input. */
 #define INCISE_FIXED_MFS_MAX 32
+/** Rules. */
 #define INCISE_FIXED_RULES_MAX 256
 #define INCISE_FIXED_SIZE_MAX (1 << 22) /**< bytes of a blob */
 

@@ -52,6 +52,7 @@ struct incise_force;
 INCISE_API int incise_force_read(struct incise_force *force,
 				 struct incise_force_sample *samples, int n);
 
+/** What it says of itself, with the counts of now. */
 INCISE_API void incise_force_info(const struct incise_force *force,
 				  struct incise_force_info *info);
 

@@ -26,6 +26,7 @@ INCISE_BEGIN_DECLS
 /** Histogram of latenesses: bin i counts [i, i+1) µs, the last one all above. */
 #define INCISE_LOOP_BINS 20001
 
+/** How a loop runs. Set it to {0} but for rate_hz before use. */
 struct incise_loop_options {
 	double rate_hz;	     /**< 1 … 20000 */
 	int64_t duration_ns; /**< 0: until stopped */

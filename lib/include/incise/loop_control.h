@@ -53,6 +53,7 @@ INCISE_API struct incise_plan *incise_loop_control_retired(
 /** Ticks that have run, so far: what does not grow does not live. Any thread's. */
 INCISE_API uint64_t incise_loop_control_ticks(const struct incise_loop_control *control);
 
+/** What a loop tells of, and what its value then is. */
 enum incise_loop_event_kind {
 	INCISE_LOOP_OVERRUN,	/**< late by a period or more: value ticks were skipped */
 	INCISE_LOOP_STALE,	/**< no fresh pose from here on: the force fades */

@@ -25,8 +25,10 @@
 
 INCISE_BEGIN_DECLS
 
+/** Inputs of a model. */
 #define INCISE_MODEL_INPUTS_MAX 8
 #define INCISE_MODEL_MFS_MAX 32 /**< membership functions of one input */
+/** Rules of a model. */
 #define INCISE_MODEL_RULES_MAX 256
 #define INCISE_MODEL_NAME_MAX 64 /**< bytes, the final NUL included */
 
@@ -127,17 +129,24 @@ INCISE_API struct incise_model *incise_model_copy(const struct incise_model *mod
 /** Make @to equal to @from, without an allocation. */
 INCISE_API void incise_model_assign(struct incise_model *to,
 				    const struct incise_model *from);
+/** NULL is accepted. */
 INCISE_API void incise_model_free(struct incise_model *model);
 
+/** Its name in the .fis file; owned by the model. */
 INCISE_API const char *incise_model_name(const struct incise_model *model);
+/** Name it; what is beyond INCISE_MODEL_NAME_MAX is cut off. */
 INCISE_API void incise_model_set_name(struct incise_model *model, const char *name);
+/** How many inputs it has, 1 … INCISE_MODEL_INPUTS_MAX. */
 INCISE_API int incise_model_n_inputs(const struct incise_model *model);
+/** How many rules it has. */
 INCISE_API int incise_model_n_rules(const struct incise_model *model);
+/** How many membership functions input @input has. */
 INCISE_API int incise_model_n_mfs(const struct incise_model *model, int input);
 
 /** Input @input, 0 … n_inputs-1; owned by the model. */
 INCISE_API const struct incise_variable *incise_model_input(
 	const struct incise_model *model, int input);
+/** Name and range of the output; owned by the model. */
 INCISE_API const struct incise_variable *incise_model_output(
 	const struct incise_model *model);
 
@@ -154,6 +163,7 @@ INCISE_API const struct incise_mf *incise_model_mf(const struct incise_model *mo
 INCISE_API int incise_model_set_mf(struct incise_model *model, int input, int mf,
 				   const double p[4]);
 
+/** How the memberships of a rule are joined. */
 INCISE_API enum incise_and_method incise_model_and_method(
 	const struct incise_model *model);
 

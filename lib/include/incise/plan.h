@@ -26,6 +26,7 @@
 
 INCISE_BEGIN_DECLS
 
+/** Stages of a plan at most. */
 #define INCISE_PLAN_STAGES_MAX 16
 
 struct incise_plan;
@@ -68,6 +69,7 @@ INCISE_API struct incise_plan *incise_plan_new_fed_on(
 	const struct incise_scene *scene, const struct incise_tracker_info *tracker,
 	const double point_mm[3], const double normal[3], struct incise_error *err);
 
+/** NULL is accepted. The scene and the rig stay as they are. */
 INCISE_API void incise_plan_free(struct incise_plan *plan);
 
 /** Names of the stages in order; NULL from the first index that is not there. */
@@ -110,6 +112,7 @@ struct incise_plan_stability {
 	double guard_N_s_mm;
 };
 
+/** Stiffness and damping of the plan, and what its device holds. */
 INCISE_API void incise_plan_stability(const struct incise_plan *plan,
 				      struct incise_plan_stability *stability);
 

@@ -56,12 +56,15 @@
 
 INCISE_BEGIN_DECLS
 
+/** Shortest tick. */
 #define INCISE_PROFILE_TICK_MIN_NS 50000
+/** Longest tick. */
 #define INCISE_PROFILE_TICK_MAX_NS 2000000
 #define INCISE_PROFILE_VELOCITY_MAX 200000     /**< steps/s */
 #define INCISE_PROFILE_POSITION_MAX 1000000000 /**< steps, to either side */
 #define INCISE_PROFILE_AVERAGE_MAX 256	       /**< ticks */
 
+/** What a motion keeps within. */
 struct incise_profile_limits {
 	uint32_t tick_ns;      /**< INCISE_PROFILE_TICK_MIN_NS … _MAX_NS */
 	uint32_t velocity;     /**< steps/s, 1 … INCISE_PROFILE_VELOCITY_MAX */
@@ -71,6 +74,7 @@ struct incise_profile_limits {
 	uint64_t jerk;	       /**< steps/s³; 0: not limited */
 };
 
+/** What a target is. */
 enum incise_profile_mode {
 	INCISE_PROFILE_POSITION, /**< target in steps */
 	INCISE_PROFILE_VELOCITY, /**< target in steps/s */

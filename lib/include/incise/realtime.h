@@ -20,6 +20,7 @@
 
 INCISE_BEGIN_DECLS
 
+/** Policies of the scheduler that a loop may ask for. */
 enum incise_realtime_policy {
 	INCISE_REALTIME_FIFO, /**< SCHED_FIFO: what it is for is RLIMIT_RTPRIO */
 	/**
@@ -31,9 +32,12 @@ enum incise_realtime_policy {
 
 /** Threads of devices are at 85: what makes the loop move must not be held up by it. */
 #define INCISE_REALTIME_PRIORITY 80
+/** Highest that may be asked for: below those of devices. */
 #define INCISE_REALTIME_PRIORITY_MAX 84
+/** The loop may run anywhere. */
 #define INCISE_REALTIME_ANY_CPU (-1)
 
+/** What a loop asks of the kernel. */
 struct incise_realtime_setup {
 	enum incise_realtime_policy policy;
 	int priority;	   /**< 1 … INCISE_REALTIME_PRIORITY_MAX; of SCHED_FIFO */

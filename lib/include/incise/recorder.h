@@ -95,6 +95,7 @@ INCISE_API void incise_recorder_trigger(struct incise_recorder *recorder);
 INCISE_API int incise_recorder_mark(struct incise_recorder *recorder, const char *kind,
 				    const char *text, struct incise_error *err);
 
+/** What was recorded so far. */
 INCISE_API void incise_recorder_stats(const struct incise_recorder *recorder,
 				      struct incise_recorder_stats *stats);
 

@@ -48,6 +48,7 @@ struct incise_recording_info {
  */
 INCISE_API struct incise_recording *incise_recording_open(const char *path,
 							  struct incise_error *err);
+/** NULL is accepted. */
 INCISE_API void incise_recording_close(struct incise_recording *recording);
 
 /** @return 0, -EINVAL (a row that cannot be), -EIO. */
@@ -129,6 +130,7 @@ struct incise_export_options {
 	void *context;
 };
 
+/** Raw, every force sample of each cut, by what the recordings hold. */
 INCISE_API void incise_export_options_init(struct incise_export_options *options);
 
 /** What was exported. */

@@ -37,6 +37,7 @@ struct incise_redundancy {
 	bool bias_bad, place_bad, trend_bad; /**< above the limit by twice its u */
 };
 
+/** Defaults as documented above. */
 INCISE_API void incise_redundancy_limits_init(struct incise_redundancy_limits *limits);
 
 /**

@@ -60,6 +60,7 @@ enum incise_rig_device {
 INCISE_API struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
 					      struct incise_error *err);
 
+/** Close its devices, the modules behind them and its clock. NULL is accepted. */
 INCISE_API void incise_rig_close(struct incise_rig *rig);
 
 /** What was given as @spec. */
@@ -70,8 +71,11 @@ INCISE_API struct incise_clock *incise_rig_clock(struct incise_rig *rig);
 
 /** A device that was opened, else NULL; owned by the rig. */
 INCISE_API struct incise_tracker *incise_rig_tracker(struct incise_rig *rig);
+/** @see incise_rig_tracker() */
 INCISE_API struct incise_force *incise_rig_force(struct incise_rig *rig);
+/** @see incise_rig_tracker() */
 INCISE_API struct incise_camera *incise_rig_camera(struct incise_rig *rig);
+/** @see incise_rig_tracker() */
 INCISE_API struct incise_stepper *incise_rig_stepper(struct incise_rig *rig);
 
 /** The virtual rig behind the `sim:` devices, or NULL when there is none. */

@@ -12,6 +12,7 @@
 
 INCISE_BEGIN_DECLS
 
+/** Properties that a device has at most. */
 #define INCISE_SCAN_PROPERTIES 24
 
 /** Something known of a device. */

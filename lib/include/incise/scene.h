@@ -57,8 +57,10 @@ INCISE_API int incise_scene_set_texture(struct incise_scene *scene, int texture_
  */
 INCISE_API void incise_scene_set_full(struct incise_scene *scene, bool full);
 
+/** NULL is accepted. */
 INCISE_API void incise_scene_free(struct incise_scene *scene);
 
+/** Ticks per second that it asks for. */
 INCISE_API double incise_scene_rate_hz(const struct incise_scene *scene);
 
 /** The scene's group `limits`. */
@@ -94,6 +96,7 @@ struct incise_scene_picture {
 	int seed;
 };
 
+/** What it says of its picture, defaults filled in. */
 INCISE_API void incise_scene_picture(const struct incise_scene *scene,
 				     struct incise_scene_picture *picture);
 
@@ -104,9 +107,11 @@ struct incise_scene_scalpel {
 	double handle_mm; /**< the handle's end from the tip */
 };
 
+/** What it says of the scalpel, defaults filled in. */
 INCISE_API void incise_scene_scalpel(const struct incise_scene *scene,
 				     struct incise_scene_scalpel *scalpel);
 
+/** What it says of limits, defaults filled in. */
 INCISE_API void incise_scene_limits(const struct incise_scene *scene,
 				    struct incise_scene_limits *limits);
 

@@ -18,6 +18,7 @@
 
 INCISE_BEGIN_DECLS
 
+/** Nominal depths that cuts take turns at, at most. */
 #define INCISE_SIM_DEPTHS_MAX 8
 
 /**
@@ -105,6 +106,7 @@ struct incise_sim_truth {
 
 struct incise_sim;
 
+/** Defaults as documented above. */
 INCISE_API void incise_sim_config_init(struct incise_sim_config *config);
 
 /**
@@ -117,6 +119,7 @@ INCISE_API struct incise_sim *incise_sim_new(const struct incise_sim_config *con
 					     struct incise_clock *clock,
 					     struct incise_error *err);
 
+/** NULL is accepted. */
 INCISE_API void incise_sim_free(struct incise_sim *sim);
 
 /** The configuration in use; owned by @sim. */

@@ -119,6 +119,7 @@ INCISE_API void incise_state_free(struct incise_state_writer *writer);
  * each octave has 32, so that none is wider than 3.2 %; the last one is open, from 17.2 s on.
  */
 #define INCISE_STATE_BUCKETS 961
+/** How many durations fell into each bucket. */
 struct incise_state_histogram {
 	uint64_t count[INCISE_STATE_BUCKETS];
 };
@@ -225,6 +226,7 @@ INCISE_API int incise_state_ticks(struct incise_state *state, uint64_t *cursor,
 /** Whether the writer lives. @return 1 or 0; -EIO */
 INCISE_API int incise_state_alive(struct incise_state *state);
 
+/** NULL is accepted. The page stays. */
 INCISE_API void incise_state_close(struct incise_state *state);
 
 INCISE_END_DECLS

@@ -185,6 +185,7 @@ INCISE_API int incise_stepper_home_edge(struct incise_stepper *stepper,
 					struct incise_stepper_edge_found *edge,
 					struct incise_error *err);
 
+/** What is fixed about it. */
 INCISE_API void incise_stepper_info(const struct incise_stepper *stepper,
 				    struct incise_stepper_info *info);
 

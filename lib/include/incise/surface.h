@@ -24,8 +24,10 @@
 
 INCISE_BEGIN_DECLS
 
+/** Triangles of a mesh at most. */
 #define INCISE_SURFACE_TRIANGLES_MAX 4000000
 
+/** What a surface is made of. */
 enum incise_surface_kind {
 	INCISE_SURFACE_PLANE,
 	INCISE_SURFACE_SPHERE,
@@ -91,8 +93,10 @@ INCISE_API struct incise_surface *incise_surface_load_heights(const char *path,
 							      const double at_mm[3],
 							      struct incise_error *err);
 
+/** NULL is accepted. */
 INCISE_API void incise_surface_free(struct incise_surface *surface);
 
+/** Which kind it is. */
 INCISE_API enum incise_surface_kind incise_surface_kind(
 	const struct incise_surface *surface);
 

@@ -64,6 +64,7 @@ INCISE_API int incise_tracker_read(struct incise_tracker *tracker,
 				   struct incise_tracker_sample *samples,
 				   int n) INCISE_REALTIME;
 
+/** What it says of itself. */
 INCISE_API void incise_tracker_info(const struct incise_tracker *tracker,
 				    struct incise_tracker_info *info);
 

@@ -32,6 +32,7 @@ struct incise_pairs {
 typedef void (*incise_train_progress)(void *user, int epoch, double train_rmse,
 				      double check_rmse);
 
+/** How to train; incise_train_options_init() fills in the defaults. */
 struct incise_train_options {
 	int epochs;  /**< at most, 1 …; default 80, the paper's */
 	double step; /**< initial step of the premises, default 0.01; classic only */

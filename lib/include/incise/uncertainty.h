@@ -61,6 +61,7 @@ INCISE_API struct incise_uncertainty *incise_uncertainty_load(
 INCISE_API int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 				       const char *path, struct incise_error *err);
 
+/** NULL is accepted. */
 INCISE_API void incise_uncertainty_free(struct incise_uncertainty *uncertainty);
 
 /** The noise, in the unit of the output. */

@@ -43,6 +43,7 @@ struct incise_verify_finding {
 	const char *text;	   /**< all that as one line; valid during the call */
 };
 
+/** Streams that a recording has at most. */
 #define INCISE_VERIFY_STREAMS 3
 
 /** One stream. */
@@ -68,6 +69,7 @@ struct incise_verify_pictures {
 			     when the camera died: no fault */
 };
 
+/** What was found, in sum. */
 struct incise_verify_report {
 	bool complete; /**< closed, nothing lost, nothing altered: no findings */
 	bool intact;   /**< all that was committed is there and as it was written; samples

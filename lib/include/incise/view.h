@@ -54,6 +54,7 @@ INCISE_API struct incise_view *incise_view_new(const struct incise_scene *scene,
 					       const struct incise_view_setup *setup,
 					       struct incise_error *err);
 
+/** NULL is accepted. In the thread that made it. */
 INCISE_API void incise_view_free(struct incise_view *view);
 
 /**
@@ -129,6 +130,7 @@ struct incise_view_camera {
 	double fov_deg;	      /**< across the height; 5 … 120 */
 };
 
+/** Where it is seen from. */
 INCISE_API void incise_view_camera(const struct incise_view *view,
 				   struct incise_view_camera *camera);
 
@@ -149,6 +151,7 @@ struct incise_view_ray {
 INCISE_API void incise_view_ray(const struct incise_view *view, double x_px, double y_px,
 				struct incise_view_ray *ray);
 
+/** What happened at the window. */
 enum incise_view_event_type {
 	INCISE_VIEW_KEY,
 	INCISE_VIEW_MOTION, /**< of the mouse, a pen or a finger */
@@ -232,6 +235,7 @@ struct incise_view_report {
 	int samples;	      /**< per pixel */
 };
 
+/** What was drawn so far, and what it took. */
 INCISE_API void incise_view_report(const struct incise_view *view,
 				   struct incise_view_report *report);
 
