@@ -151,7 +151,14 @@ style_sources := $(shell find lib tools tests driver -name '*.[ch]' -o -path 'li
 check-style: ## the house's form: clang-format, an SPDX line in every file
 	@tests/style $(style_sources)
 
-.PHONY: check check-style check-unit check-cli check-attack check-sanitize check-tsan can-drive mcap-reader
+doc: ## reference of the public headers in build/doc/html; fails where a comment is missing
+	@mk/deps doc
+	@mk/doc $(abspath $(O))/doc $(version)
+	@echo $(O)/doc/html/index.html
+
+check-doc: doc
+
+.PHONY: doc check-doc check check-style check-unit check-cli check-attack check-sanitize check-tsan can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
