@@ -210,9 +210,15 @@ maps() {
 	done
 }
 
-@test "the example in libincise(3) compiles and runs" {
-	example_in "$root/man/libincise.3" "int main" >program.c
-	grep -q incise_model_load program.c
+@test "libincise(3) says of each header what it is for, and of none that there is not" {
+	# the table's rows: room, headers, what for
+	sed -n 's/^\.It [a-z]* *Ta \([a-z_, ]*\) Ta .*/\1/p' "$root/man/libincise.3" |
+		grep -v '^ *$' | tr -d ' ' | tr , '\n' | sort >told
+	(cd "$include/incise" && printf '%s\n' *.h) | sed 's/\.h$//' | sort | diff told -
+}
+
+@test "the model of libincise(3)'s example compiles and runs" {
+	example_in "$root/man/libincise.3" incise_model_load >program.c
 	$CC -std=c11 -Wall -Wextra -Werror -I"$include" program.c -o program \
 		-L"$INCISE_BUILD/lib" -Wl,-rpath,"$INCISE_BUILD/lib" -lincise
 	example_in "$root/man/incise-fis.5" "[Rules]" >m.fis
