@@ -4,12 +4,12 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <stdlib.h>
+#include <stdbool.h>
 #include <incise/depth_pairs.h>
 #include "../base/vector.h"
 #include "depth.h"
 #include "recording.h"
-#include "rows.h"
+#include "rows_array.h"
 
 #define QUALITY 0.5
 #define DEPTH_MM \
@@ -22,13 +22,11 @@ struct place {
 
 struct reader {
 	struct incise_recording *recording;
-	struct incise_rows tracker, frames;
-	struct incise_recording_line tracker_line, camera_line;
+	struct incise_rows tracker;
+	struct incise_rows_array frames; /* a pair for each that is one */
 	struct place before, after;
 	struct incise_depth depth;
 	double axis[2][3]; /* along the surface */
-	struct incise_depth_pair *pairs;
-	int n, room;
 };
 
 /* Two unit vectors along the surface. */
@@ -62,9 +60,7 @@ static int seek(struct reader *reader, int64_t t_ns, struct incise_error *err)
 		if (rc <= 0)
 			return rc;
 		reader->before = reader->after;
-		reader->after.t_ns = incise_recording_time(&reader->tracker_line,
-							   sqlite3_column_int64(stmt, 0),
-							   reader->tracker.t_ns);
+		reader->after.t_ns = reader->tracker.t_ns;
 		for (int i = 0; i < 3; i++)
 			reader->after.position_mm[i] = sqlite3_column_double(stmt, 2 + i);
 		for (int i = 0; i < 4; i++)
@@ -75,62 +71,48 @@ static int seek(struct reader *reader, int64_t t_ns, struct incise_error *err)
 	return 1;
 }
 
-static int add(struct reader *reader, int64_t t_ns, double camera_mm,
-	       struct incise_error *err)
+/* Fill the tracker's side of a pair; false: it has no record close by, or too little depth. */
+static bool pair_up(const struct reader *reader, struct incise_depth_pair *pair)
 {
 	const struct place *a = &reader->before, *b = &reader->after;
-	struct incise_depth_pair pair = {.t_ns = t_ns, .camera_mm = camera_mm};
 	double span = (double)(b->t_ns - a->t_ns), share, position[3];
 
 	if (a->t_ns < 0 || span <= 0 || span > INCISE_DEPTH_GAP_NS)
-		return 0;
-	share = (double)(t_ns - a->t_ns) / span;
+		return false;
+	share = (double)(pair->t_ns - a->t_ns) / span;
 	for (int i = 0; i < 3; i++)
 		position[i] = a->position_mm[i] +
 			      share * (b->position_mm[i] - a->position_mm[i]);
-	pair.tracker_mm = incise_depth_of(&reader->depth, position);
-	if (!(pair.tracker_mm >= DEPTH_MM && pair.camera_mm >= DEPTH_MM))
-		return 0;
-	pair.rate_mm_s = (incise_depth_of(&reader->depth, b->position_mm) -
-			  incise_depth_of(&reader->depth, a->position_mm)) /
-			 (span * 1e-9);
+	pair->tracker_mm = incise_depth_of(&reader->depth, position);
+	if (!(pair->tracker_mm >= DEPTH_MM))
+		return false;
+	pair->rate_mm_s = (incise_depth_of(&reader->depth, b->position_mm) -
+			   incise_depth_of(&reader->depth, a->position_mm)) /
+			  (span * 1e-9);
 	for (int k = 0; k < 2; k++)
-		pair.place_mm[k] = v3_dot(reader->axis[k], position);
-	if (reader->n == reader->room) {
-		int room = reader->room ? 2 * reader->room : 1024;
-		struct incise_depth_pair *more =
-			realloc(reader->pairs, room * sizeof(*more));
-
-		if (!more)
-			return incise_error_set(err, ENOMEM, "%s: out of memory",
-						reader->recording->path);
-		reader->pairs = more;
-		reader->room = room;
-	}
-	reader->pairs[reader->n++] = pair;
-	return 0;
+		pair->place_mm[k] = v3_dot(reader->axis[k], position);
+	return true;
 }
 
 static int read_pairs(struct reader *reader, struct incise_error *err)
 {
+	struct incise_depth_pair *pair;
 	int rc;
 
-	while ((rc = incise_rows_next(&reader->frames, err)) > 0) {
-		sqlite3_stmt *stmt = reader->frames.stmt;
-		double depth_mm = sqlite3_column_double(stmt, 2);
-		int64_t t_ns;
+	while ((pair = incise_rows_array_next(&reader->frames, &rc, err))) {
+		sqlite3_stmt *stmt = reader->frames.rows.stmt;
 
-		if (depth_mm < DEPTH_MM || sqlite3_column_double(stmt, 3) < QUALITY)
+		*pair = (struct incise_depth_pair){
+			.t_ns = reader->frames.rows.t_ns,
+			.camera_mm = sqlite3_column_double(stmt, 2),
+		};
+		if (pair->camera_mm < DEPTH_MM ||
+		    sqlite3_column_double(stmt, 3) < QUALITY)
 			continue;
-		t_ns = incise_recording_time(&reader->camera_line,
-					     sqlite3_column_int64(stmt, 0),
-					     reader->frames.t_ns);
-		rc = seek(reader, t_ns, err);
+		rc = seek(reader, pair->t_ns, err);
 		if (rc <= 0)
-			return rc;
-		rc = add(reader, t_ns, depth_mm, err);
-		if (rc)
-			return rc;
+			break;
+		reader->frames.n += pair_up(reader, pair);
 	}
 	return rc;
 }
@@ -148,26 +130,18 @@ int incise_depth_pairs(struct incise_recording *recording,
 		return rc;
 	incise_depth_init(&reader.depth, info.surface_point_mm, info.surface_normal);
 	find_axes(&reader);
-	rc = incise_recording_line(recording, "tracker", &reader.tracker_line, err);
+	rc = incise_rows_open(&reader.tracker, recording, "tracker",
+			      "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz", "iirrrrrrr",
+			      info.tracker, err);
 	if (!rc)
-		rc = incise_recording_line(recording, "camera", &reader.camera_line, err);
-	if (!rc)
-		rc = incise_rows_open(&reader.tracker, recording, "tracker",
-				      "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz",
-				      "iirrrrrrr", info.tracker, err);
-	if (!rc)
-		rc = incise_rows_open(
+		rc = incise_rows_array_open(
 			&reader.frames, recording, "frames",
 			"seq, t_ns, ifnull(depth_mm, 0.0), ifnull(quality, 0.0)", "iirr",
-			UINT64_MAX, err);
+			sizeof(**pairs), err);
 	if (!rc)
 		rc = read_pairs(&reader, err);
 	incise_rows_close(&reader.tracker);
-	incise_rows_close(&reader.frames);
-	if (rc < 0) {
-		free(reader.pairs);
-		return rc;
-	}
-	*pairs = reader.pairs;
-	return reader.n;
+	rc = incise_rows_array_end(&reader.frames, rc);
+	*pairs = reader.frames.list;
+	return rc;
 }

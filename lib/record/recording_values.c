@@ -5,77 +5,17 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "recording.h"
-#include "rows.h"
+#include "rows_array.h"
 
-#define ROWS_MAX 100000000 /* of a stream: an hour at 27 kHz */
-#define NOT_SEEN (-1e300)
-
-/* What a table holds, and on whose line its times are. */
 static const struct source {
-	const char *name, *table, *line, *columns, *types;
+	const char *name, *table, *columns, *types;
 } sources[] = {
-	{"force", "force", "force", "seq, t_ns, code", "iii"},
-	{"depth", "depth", "tracker", "seq, t_ns, depth_mm", "iir"},
-	{"camera", "frames", "camera", "seq, t_ns, ifnull(depth_mm, -1e300)", "iir"},
-	{"poses", "tracker", "tracker",
-	 "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status", "iirrrrrrrt"},
+	{"force", "force", "seq, t_ns, code", "iii"},
+	{"depth", "depth", "seq, t_ns, depth_mm", "iir"},
+	{"camera", "frames", "seq, t_ns, depth_mm", "iin"},
 };
-
-struct walk {
-	struct incise_rows rows;
-	struct incise_recording_line *line;
-	void *list;
-	size_t size; /* of an element */
-	int n, room;
-};
-
-static int walk_open(struct walk *walk, struct incise_recording *recording,
-		     const struct source *source, size_t size, struct incise_error *err)
-{
-	int rc;
-
-	*walk = (struct walk){.size = size};
-	walk->line = calloc(1, sizeof(*walk->line));
-	if (!walk->line)
-		return incise_error_set(err, ENOMEM, "out of memory");
-	rc = incise_recording_line(recording, source->line, walk->line, err);
-	return rc ? rc
-		  : incise_rows_open(&walk->rows, recording, source->table,
-				     source->columns, source->types, UINT64_MAX, err);
-}
-
-/* Room for the next row: 1, 0 at the end, -errno. */
-static int walk_next(struct walk *walk, int64_t *t_ns, struct incise_error *err)
-{
-	int rc = incise_rows_next(&walk->rows, err);
-	void *list;
-
-	if (rc <= 0)
-		return rc;
-	*t_ns = incise_recording_time(walk->line,
-				      (uint64_t)sqlite3_column_int64(walk->rows.stmt, 0),
-				      walk->rows.t_ns);
-	if (walk->n < walk->room)
-		return 1;
-	walk->room = walk->room ? 2 * walk->room : 4096;
-	list = walk->room <= ROWS_MAX
-		       ? realloc(walk->list, (size_t)walk->room * walk->size)
-		       : NULL;
-	if (!list)
-		return incise_error_set(err, ENOMEM, "%s: too long for the memory",
-					walk->rows.recording->path);
-	walk->list = list;
-	return 1;
-}
-
-static void walk_close(struct walk *walk)
-{
-	incise_rows_close(&walk->rows);
-	free(walk->line);
-}
 
 static double force_of(const struct incise_recording_info *meta, int64_t code)
 {
@@ -94,7 +34,8 @@ int incise_recording_values(struct incise_recording *recording, const char *name
 			    struct incise_error *err)
 {
 	const struct source *source = NULL;
-	struct walk walk;
+	struct incise_recording_value *to;
+	struct incise_rows_array array;
 	int rc;
 
 	*values = NULL;
@@ -106,65 +47,48 @@ int incise_recording_values(struct incise_recording *recording, const char *name
 					name);
 	if (source == &sources[2] && recording->form < 2)
 		return 0;
-	rc = walk_open(&walk, recording, source, sizeof(**values), err);
-	while (!rc) {
-		struct incise_recording_value *to;
-		int64_t t_ns;
+	rc = incise_rows_array_open(&array, recording, source->table, source->columns,
+				    source->types, sizeof(*to), err);
+	while (!rc && (to = incise_rows_array_next(&array, &rc, err))) {
+		sqlite3_stmt *stmt = array.rows.stmt;
 
-		rc = walk_next(&walk, &t_ns, err);
-		if (rc <= 0)
-			break;
-		rc = 0;
-		to = (struct incise_recording_value *)walk.list + walk.n;
-		to->t_ns = t_ns;
-		to->value = source == sources
-				    ? force_of(&recording->meta,
-					       sqlite3_column_int64(walk.rows.stmt, 2))
-				    : sqlite3_column_double(walk.rows.stmt, 2);
-		walk.n += to->value > NOT_SEEN / 2 || isnan(to->value);
+		to->t_ns = array.rows.t_ns;
+		to->value = source == sources ? force_of(&recording->meta,
+							 sqlite3_column_int64(stmt, 2))
+					      : sqlite3_column_double(stmt, 2);
+		array.n += sqlite3_column_type(stmt, 2) != SQLITE_NULL;
 	}
-	walk_close(&walk);
-	if (rc < 0) {
-		free(walk.list);
-		return rc;
-	}
-	*values = walk.list;
-	return walk.n;
+	rc = incise_rows_array_end(&array, rc);
+	*values = array.list;
+	return rc;
 }
 
 int incise_recording_poses(struct incise_recording *recording,
 			   struct incise_tracker_sample **poses, struct incise_error *err)
 {
-	struct walk walk;
-	int rc = walk_open(&walk, recording, &sources[3], sizeof(**poses), err);
+	struct incise_rows_array array;
+	struct incise_tracker_sample *to;
+	int rc = incise_rows_array_open(
+		&array, recording, "tracker",
+		"seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status", "iirrrrrrrt",
+		sizeof(*to), err);
 
-	*poses = NULL;
-	while (!rc) {
-		struct incise_tracker_sample *to;
-		int64_t t_ns;
+	while (!rc && (to = incise_rows_array_next(&array, &rc, err))) {
+		sqlite3_stmt *stmt = array.rows.stmt;
 
-		rc = walk_next(&walk, &t_ns, err);
-		if (rc <= 0)
-			break;
-		rc = 0;
-		to = (struct incise_tracker_sample *)walk.list + walk.n;
 		*to = (struct incise_tracker_sample){
-			.t_ns = t_ns,
-			.seq = (uint64_t)sqlite3_column_int64(walk.rows.stmt, 0),
-			.status = *(const char *)sqlite3_column_text(walk.rows.stmt, 9),
+			.t_ns = array.rows.t_ns,
+			.seq = (uint64_t)sqlite3_column_int64(stmt, 0),
+			.status = *(const char *)sqlite3_column_text(stmt, 9),
 			.station = 1,
 		};
 		for (int i = 0; i < 3; i++)
-			to->position_mm[i] = sqlite3_column_double(walk.rows.stmt, 2 + i);
+			to->position_mm[i] = sqlite3_column_double(stmt, 2 + i);
 		for (int i = 0; i < 4; i++)
-			to->quaternion[i] = sqlite3_column_double(walk.rows.stmt, 5 + i);
-		walk.n++;
+			to->quaternion[i] = sqlite3_column_double(stmt, 5 + i);
+		array.n++;
 	}
-	walk_close(&walk);
-	if (rc < 0) {
-		free(walk.list);
-		return rc;
-	}
-	*poses = walk.list;
-	return walk.n;
+	rc = incise_rows_array_end(&array, rc);
+	*poses = array.list;
+	return rc;
 }

@@ -4,7 +4,6 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "depth.h"
 #include "replay_source.h"
@@ -45,7 +44,7 @@ static int step(struct incise_replay_stream *s, struct incise_error *err)
 	seq = sqlite3_column_int64(s->rows.stmt, 0);
 	if (seq < 0 || seq > COUNT_MAX)
 		return damaged(s, "seq is no count", err);
-	s->t_ns = incise_recording_time(s->line, seq, s->rows.t_ns);
+	s->t_ns = s->rows.t_ns;
 	return 1;
 }
 
@@ -143,21 +142,6 @@ static int take_info(struct incise_replay_source *source, struct incise_error *e
 	return 0;
 }
 
-static int open_stream(struct incise_replay_stream *s, struct incise_recording *recording,
-		       const char *table, const char *line, const char *columns,
-		       const char *types, uint64_t rows, struct incise_error *err)
-{
-	int rc;
-
-	s->line = calloc(1, sizeof(*s->line));
-	if (!s->line)
-		return incise_error_set(err, ENOMEM, "out of memory");
-	rc = incise_recording_line(recording, line, s->line, err);
-	return rc ? rc
-		  : incise_rows_open(&s->rows, recording, table, columns, types, rows,
-				     err);
-}
-
 static int open_streams(struct incise_replay_source *source, struct incise_error *err)
 {
 	struct incise_recording *recording = source->recording;
@@ -167,17 +151,17 @@ static int open_streams(struct incise_replay_source *source, struct incise_error
 				      "qy, qz, status, station, button"
 				    : "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, "
 				      "qy, qz, status, 1, 0";
-	int rc = open_stream(&source->tracker, recording, "tracker", "tracker", poses,
-			     "iiirrrrrrrtii", recording->meta.tracker, err);
+	int rc = incise_rows_open(&source->tracker.rows, recording, "tracker", poses,
+				  "iiirrrrrrrtii", recording->meta.tracker, err);
 
 	if (!rc)
-		rc = open_stream(&source->force, recording, "force", "force",
-				 "seq, t_ns, code", "iii", recording->meta.force, err);
-	/* Depth rows carry the tracker's numbers, and are on its line. */
+		rc = incise_rows_open(&source->force.rows, recording, "force",
+				      "seq, t_ns, code", "iii", recording->meta.force,
+				      err);
 	if (!rc)
-		rc = open_stream(&source->depth, recording, "depth", "tracker",
-				 "seq, t_ns, depth_mm, velocity_mm_s", "iirr",
-				 recording->depth_rows, err);
+		rc = incise_rows_open(&source->depth.rows, recording, "depth",
+				      "seq, t_ns, depth_mm, velocity_mm_s", "iirr",
+				      recording->depth_rows, err);
 	return rc;
 }
 
@@ -199,7 +183,7 @@ static int find_last(struct incise_replay_source *source, const char *table,
 	if (sqlite3_step(stmt) == SQLITE_ROW) {
 		t_ns = sqlite3_column_int64(stmt, 1);
 		if (best)
-			t_ns = incise_recording_time(s->line,
+			t_ns = incise_recording_time(&s->rows.times.line,
 						     sqlite3_column_int64(stmt, 0), t_ns);
 		if (t_ns > source->last_ns)
 			source->last_ns = t_ns;
@@ -286,14 +270,9 @@ int incise_replay_source_open(struct incise_replay_source *source,
 
 void incise_replay_source_close(struct incise_replay_source *source)
 {
-	struct incise_replay_stream *streams[] = {&source->tracker, &source->force,
-						  &source->depth};
-
-	for (int i = 0; i < 3; i++) {
-		incise_rows_close(&streams[i]->rows);
-		free(streams[i]->line);
-		streams[i]->line = NULL;
-	}
+	incise_rows_close(&source->tracker.rows);
+	incise_rows_close(&source->force.rows);
+	incise_rows_close(&source->depth.rows);
 }
 
 /* --- going on ------------------------------------------------------------------------ */

@@ -11,12 +11,10 @@
 #include "recording.h"
 #include "rows.h"
 
-/* A stream's rows, and the line that their best times are on. */
 struct incise_replay_stream {
 	struct incise_rows rows;
-	struct incise_recording_line *line;
-	bool live; /* there is a row */
-	int64_t t_ns;
+	bool live;    /* there is a row */
+	int64_t t_ns; /* when it is replayed: its own time, or that of its arrival */
 };
 
 struct incise_replay_source {

@@ -102,7 +102,7 @@ struct incise_recording_length {
  *
  * @param lengths to be freed with free(3); NULL for none
  * @return how many; -EINVAL (a row that cannot be; a recording of form 1 has no pictures),
- *         -E2BIG (more than 10 million), -EIO, -ENOMEM
+ *         -EIO, -ENOMEM
  */
 INCISE_API int incise_recording_lengths(struct incise_recording *recording,
 					struct incise_recording_length **lengths,
