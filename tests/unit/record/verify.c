@@ -3,39 +3,10 @@
  * Tests of lib/record/verify*.c: a good recording is proved, and of each kind of tampering it
  * is said what and where.
  */
-#include "recorded.h"
-#include <incise/verify.h>
+#include "verified.h"
 
 #define SIM "sim:clock=simulated"
 #define DB "a.rec/recording.db"
-
-/* What was found. */
-struct findings {
-	struct incise_verify_finding first;
-	char text[2000]; /* all lines */
-};
-
-static void found(void *user, const struct incise_verify_finding *finding)
-{
-	struct findings *findings = user;
-	size_t n = strlen(findings->text);
-
-	assert_null(strchr(finding->text, '\n'));
-	snprintf(findings->text + n, sizeof(findings->text) - n, "%s\n", finding->text);
-	if (n == 0)
-		findings->first = *finding;
-}
-
-static void verify(const char *path, struct incise_verify_report *report,
-		   struct findings *findings)
-{
-	struct incise_verify_watch watch = {.found = found, .user = findings};
-	struct incise_error err = {0};
-
-	memset(findings, 0, sizeof(*findings));
-	if (incise_verify(path, &watch, report, &err))
-		fail_msg("%s", err.text);
-}
 
 static void good_recording_is_complete(void **state)
 {

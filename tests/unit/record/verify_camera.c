@@ -3,10 +3,8 @@
  * Tests of lib/record/verify_camera.c: pictures that are missing, altered or too many are
  * found in camera.mkv, and where; a file that is ahead of an interrupted recording is right.
  */
-#include "recorded.h"
+#include "verified.h"
 #include <fcntl.h>
-#include <limits.h>
-#include <incise/verify.h>
 #include "../../../lib/record/frames.h"
 #include "../../../lib/record/ledger_seal.h"
 
@@ -183,160 +181,92 @@ static void seal(bool whole)
 	}
 }
 
-struct findings {
-	struct incise_verify_finding first;
-	char text[2000]; /* all lines */
-};
-
-static void found(void *user, const struct incise_verify_finding *finding)
-{
-	struct findings *findings = user;
-	size_t n = strlen(findings->text);
-
-	snprintf(findings->text + n, sizeof(findings->text) - n, "%s\n", finding->text);
-	if (n == 0)
-		findings->first = *finding;
-}
-
-static void verify(struct incise_verify_report *report, struct findings *findings)
-{
-	struct incise_verify_watch watch = {.found = found, .user = findings};
-	struct incise_error err = {0};
-
-	memset(findings, 0, sizeof(*findings));
-	if (incise_verify("a.rec", &watch, report, &err))
-		fail_msg("%s", err.text);
-}
-
 static const struct change none = {.at = -1};
+
+/* A recording with all pictures, and rows of the first @n; @closed, or cut off. */
+static void record_pictures(int n, bool closed)
+{
+	struct incise_frame_record rows[PICTURES];
+
+	record("a.rec", "sim:clock=simulated", 600 * MS);
+	write_pictures(PICTURES, &none, rows);
+	add_camera(rows, n, closed);
+	seal(closed);
+}
 
 static void pictures_are_held_against_their_rows(void **state)
 {
 	static const struct {
 		struct change change;
 		const char *text;
-		int64_t first_seq, last_seq;
-		uint64_t present, missing, altered, extra;
+		int64_t seq, last_seq; /* 0: of one picture */
+		uint64_t missing, altered, extra;
 	} cases[] = {
-		{{.at = 7, .left_out = true},
-		 "camera: 1 missing in camera.mkv, number 12, at ",
-		 12,
-		 12,
-		 PICTURES - 1,
-		 1,
-		 0,
-		 0},
-		{{.at = 7, .left_out = true, .left_out_n = 4},
-		 "camera: 4 missing in camera.mkv, numbers 12 to 15, ",
-		 12,
-		 15,
-		 PICTURES - 4,
-		 4,
-		 0,
-		 0},
+		{.change = {.at = 7, .left_out = true},
+		 .text = "camera: 1 missing in camera.mkv, number 12, at ",
+		 .seq = 12,
+		 .missing = 1},
+		{.change = {.at = 7, .left_out = true, .left_out_n = 4},
+		 .text = "camera: 4 missing in camera.mkv, numbers 12 to 15, ",
+		 .seq = 12,
+		 .last_seq = 15,
+		 .missing = 4},
 		/* pts are of the first picture in the file: all that follow seem moved */
-		{{.at = 28, .left_out = true, .left_out_n = 2},
-		 "camera: 2 missing in camera.mkv, numbers 33 to 34, ",
-		 33,
-		 34,
-		 PICTURES - 2,
-		 2,
-		 0,
-		 0},
-		{{.at = 7, .byte = 100},
-		 "camera: 1 altered in camera.mkv, number 12, at 0.1167 s: its bytes are",
-		 12,
-		 12,
-		 PICTURES - 1,
-		 0,
-		 1,
-		 0},
-		{{.at = 0, .byte = 100},
-		 "altered in camera.mkv, number 5",
-		 5,
-		 5,
-		 PICTURES - 1,
-		 0,
-		 1,
-		 0},
-		{{.at = 29, .byte = 100},
-		 "altered in camera.mkv, number 34",
-		 34,
-		 34,
-		 PICTURES - 1,
-		 0,
-		 1,
-		 0},
-		{{.at = 7, .shorter = 1},
-		 "number 12, at 0.1167 s: its size is",
-		 12,
-		 12,
-		 PICTURES - 1,
-		 0,
-		 1,
-		 0},
+		{.change = {.at = 28, .left_out = true, .left_out_n = 2},
+		 .text = "camera: 2 missing in camera.mkv, numbers 33 to 34, ",
+		 .seq = 33,
+		 .last_seq = 34,
+		 .missing = 2},
+		{.change = {.at = 7, .byte = 100},
+		 .text = "camera: 1 altered in camera.mkv, number 12, at 0.1167 s: its bytes are",
+		 .seq = 12,
+		 .altered = 1},
+		{.change = {.at = 0, .byte = 100},
+		 .text = "altered in camera.mkv, number 5",
+		 .seq = 5,
+		 .altered = 1},
+		{.change = {.at = 29, .byte = 100},
+		 .text = "altered in camera.mkv, number 34",
+		 .seq = 34,
+		 .altered = 1},
+		{.change = {.at = 7, .shorter = 1},
+		 .text = "number 12, at 0.1167 s: its size is",
+		 .seq = 12,
+		 .altered = 1},
 		/* too little for the ms of Matroska */
-		{{.at = 7, .t_ns = 1},
-		 "number 12, at 0.1167 s: its time is",
-		 12,
-		 12,
-		 PICTURES - 1,
-		 0,
-		 1,
-		 0},
-		{{.at = 7, .t_ns = 2000000},
-		 "number 12, at 0.1167 s: its time is",
-		 12,
-		 12,
-		 PICTURES - 1,
-		 0,
-		 1,
-		 0},
+		{.change = {.at = 7, .t_ns = 1},
+		 .text = "number 12, at 0.1167 s: its time is",
+		 .seq = 12,
+		 .altered = 1},
+		{.change = {.at = 7, .t_ns = 2000000},
+		 .text = "number 12, at 0.1167 s: its time is",
+		 .seq = 12,
+		 .altered = 1},
 		/* a number that is another's, and one that nobody has */
-		{{.at = 7, .seq = 3},
-		 "number 12, at 0.1167 s: its number is",
-		 12,
-		 12,
-		 PICTURES - 1,
-		 0,
-		 1,
-		 0},
-		{{.at = 7, .seq = 1ULL << 63},
-		 "number 12, at 0.1167 s: its number is",
-		 12,
-		 12,
-		 PICTURES - 1,
-		 0,
-		 1,
-		 0},
-		{{.at = 7, .twice = true},
-		 "camera: 1 in camera.mkv that no row has, number 1000, at ",
-		 1000,
-		 1000,
-		 PICTURES,
-		 0,
-		 0,
-		 1},
-		{{.at = 29, .twice = true},
-		 "camera: 1 in camera.mkv that no row has, number 1000, at ",
-		 1000,
-		 1000,
-		 PICTURES,
-		 0,
-		 0,
-		 1},
+		{.change = {.at = 7, .seq = 3},
+		 .text = "number 12, at 0.1167 s: its number is",
+		 .seq = 12,
+		 .altered = 1},
+		{.change = {.at = 7, .seq = 1ULL << 63},
+		 .text = "number 12, at 0.1167 s: its number is",
+		 .seq = 12,
+		 .altered = 1},
+		{.change = {.at = 7, .twice = true},
+		 .text = "camera: 1 in camera.mkv that no row has, number 1000, at ",
+		 .seq = 1000,
+		 .extra = 1},
+		{.change = {.at = 29, .twice = true},
+		 .text = "camera: 1 in camera.mkv that no row has, number 1000, at ",
+		 .seq = 1000,
+		 .extra = 1},
 	};
-	struct incise_frame_record rows[PICTURES];
 	struct incise_verify_report report;
 	struct findings findings;
 
 	if (!has_frames())
 		skip();
-	record("a.rec", "sim:clock=simulated", 600 * MS);
-	write_pictures(PICTURES, &none, rows);
-	add_camera(rows, PICTURES, true);
-	seal(true);
-	verify(&report, &findings);
+	record_pictures(PICTURES, true);
+	verify("a.rec", &report, &findings);
 	if (!report.complete || !report.intact)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.n_streams, 3);
@@ -348,14 +278,16 @@ static void pictures_are_held_against_their_rows(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		write_pictures(PICTURES, &cases[i].change, NULL);
 		seal(true); /* a file's head has a random number of its own */
-		verify(&report, &findings);
+		verify("a.rec", &report, &findings);
 		if (report.complete || report.intact || report.findings != 1 ||
 		    !strstr(findings.text, cases[i].text))
 			fail_msg("%zu: %d: %s", i, report.complete, findings.text);
 		assert_int_equal(findings.first.kind, INCISE_VERIFY_PICTURES);
-		assert_int_equal(findings.first.first_seq, cases[i].first_seq);
-		assert_int_equal(findings.first.last_seq, cases[i].last_seq);
-		assert_int_equal(report.pictures.present, cases[i].present);
+		assert_int_equal(findings.first.first_seq, cases[i].seq);
+		assert_int_equal(findings.first.last_seq,
+				 cases[i].last_seq ? cases[i].last_seq : cases[i].seq);
+		assert_int_equal(report.pictures.present,
+				 PICTURES - cases[i].missing - cases[i].altered);
 		assert_int_equal(report.pictures.missing, cases[i].missing);
 		assert_int_equal(report.pictures.altered, cases[i].altered);
 		assert_int_equal(report.pictures.extra, cases[i].extra);
@@ -386,21 +318,17 @@ static void rows_of_pictures_are_in_the_ledger(void **state)
 		 "FROM ledger WHERE stream = 'camera'",
 		 "camera: 30 rows were written, and the ledger has 0"},
 	};
-	struct incise_frame_record rows[PICTURES];
 	struct incise_verify_report report;
 	struct findings findings;
 
 	if (!has_frames())
 		skip();
-	record("a.rec", "sim:clock=simulated", 600 * MS);
-	write_pictures(PICTURES, &none, rows);
-	add_camera(rows, PICTURES, true);
-	seal(true);
+	record_pictures(PICTURES, true);
 	assert_int_equal(system("cp -r a.rec good.rec"), 0);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
 		change(DB, cases[i].sql);
-		verify(&report, &findings);
+		verify("a.rec", &report, &findings);
 		if (report.complete || report.intact ||
 		    !strstr(findings.text, cases[i].text))
 			fail_msg("%s: %s", cases[i].sql, findings.text);
@@ -410,7 +338,6 @@ static void rows_of_pictures_are_in_the_ledger(void **state)
 /* Any byte of the pictures is some picture's, or of the form of the file. */
 static void damaged_file(void **state)
 {
-	struct incise_frame_record rows[PICTURES];
 	struct incise_verify_report report;
 	struct findings findings;
 	uint8_t first[64];
@@ -419,10 +346,7 @@ static void damaged_file(void **state)
 
 	if (!has_frames())
 		skip();
-	record("a.rec", "sim:clock=simulated", 600 * MS);
-	write_pictures(PICTURES, &none, rows);
-	add_camera(rows, PICTURES, true);
-	seal(true);
+	record_pictures(PICTURES, true);
 	assert_int_equal(stat(FILE_NAME, &st), 0);
 	assert_int_equal(system("cp " FILE_NAME " good.mkv"), 0);
 
@@ -443,7 +367,7 @@ static void damaged_file(void **state)
 		}
 	}
 	fclose(file);
-	verify(&report, &findings);
+	verify("a.rec", &report, &findings);
 	if (report.intact ||
 	    !strstr(findings.text, "1 altered in camera.mkv, number 12, "))
 		fail_msg("%s", findings.text);
@@ -455,7 +379,7 @@ static void damaged_file(void **state)
 		fseek(file, at, SEEK_SET);
 		fputc(0x55, file); /* no byte there is */
 		fclose(file);
-		verify(&report, &findings);
+		verify("a.rec", &report, &findings);
 		if (report.intact)
 			fail_msg("byte %ld", at);
 	}
@@ -464,7 +388,7 @@ static void damaged_file(void **state)
 	for (off_t size = st.st_size - 1; size > 0; size -= 397) {
 		assert_int_equal(system("cp good.mkv " FILE_NAME), 0);
 		assert_int_equal(truncate(FILE_NAME, size), 0);
-		verify(&report, &findings);
+		verify("a.rec", &report, &findings);
 		if (report.intact ||
 		    report.pictures.present + report.pictures.missing +
 				    report.pictures.altered !=
@@ -473,12 +397,12 @@ static void damaged_file(void **state)
 			fail_msg("%ld bytes: %s", (long)size, findings.text);
 	}
 	assert_int_equal(system("echo nothing >" FILE_NAME), 0);
-	verify(&report, &findings);
+	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
 	assert_non_null(strstr(findings.text, "the pictures are not verified"));
 	assert_int_equal(findings.first.kind, INCISE_VERIFY_DAMAGED);
 	unlink(FILE_NAME);
-	verify(&report, &findings);
+	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
 	assert_non_null(
 		strstr(findings.text, "camera.mkv is missing, and 30 pictures with it"));
@@ -488,24 +412,20 @@ static void damaged_file(void **state)
 /* A kill comes after a picture and before its row. */
 static void file_is_ahead_of_an_interrupted_recording(void **state)
 {
-	struct incise_frame_record rows[PICTURES];
 	struct incise_verify_report report;
 	struct findings findings;
 
 	if (!has_frames())
 		skip();
-	record("a.rec", "sim:clock=simulated", 600 * MS);
-	write_pictures(PICTURES, &none, rows);
-	add_camera(rows, PICTURES - 4, false);
-	seal(false);
-	verify(&report, &findings);
+	record_pictures(PICTURES - 4, false);
+	verify("a.rec", &report, &findings);
 	if (!report.interrupted || !report.intact || report.findings != 1)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.pictures.present, PICTURES - 4);
 	assert_int_equal(report.pictures.ahead, 4);
 
 	seal(true);
-	verify(&report, &findings);
+	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
 	assert_non_null(strstr(findings.text,
 			       "4 in camera.mkv that no row has, numbers 31 to 34"));
@@ -514,18 +434,14 @@ static void file_is_ahead_of_an_interrupted_recording(void **state)
 
 static void without_the_module_it_is_said(void **state)
 {
-	struct incise_frame_record rows[PICTURES];
 	struct incise_verify_report report;
 	struct findings findings;
 
 	if (!has_frames())
 		skip();
-	record("a.rec", "sim:clock=simulated", 600 * MS);
-	write_pictures(PICTURES, &none, rows);
-	add_camera(rows, PICTURES, true);
-	seal(true);
+	record_pictures(PICTURES, true);
 	setenv("INCISE_MODULE_PATH", "/nonexistent", 1);
-	verify(&report, &findings);
+	verify("a.rec", &report, &findings);
 	assert_false(report.complete);
 	assert_false(report.intact);
 	assert_true(report.unverified);
@@ -559,12 +475,12 @@ static void recorder_and_verification_agree(void **state)
 	if (!recorder)
 		fail_msg("%s", err.text);
 	assert_int_equal(poll_for(recorder, rig, 550 * MS, &err), 0);
-	verify(&report, &findings); /* as it is written */
+	verify("a.rec", &report, &findings); /* as it is written */
 	if (!report.interrupted || !report.intact || report.findings != 1)
 		fail_msg("%s", findings.text);
 	assert_int_equal(incise_recorder_close(recorder, &err), 0);
 	incise_rig_close(rig);
-	verify(&report, &findings);
+	verify("a.rec", &report, &findings);
 	if (!report.complete || !report.intact)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.n_streams, 3);
@@ -574,7 +490,7 @@ static void recorder_and_verification_agree(void **state)
 	assert_int_equal(ask(DB, "SELECT delay_ns FROM streams WHERE name = 'camera'"),
 			 2500000);
 	change(DB, "UPDATE streams SET delay_ns = 0 WHERE name = 'camera'");
-	verify(&report, &findings);
+	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
 	assert_non_null(strstr(findings.text, "its time is not as written"));
 	assert_non_null(strstr(findings.text, "table streams is altered"));
