@@ -14,14 +14,16 @@ demo_pictures := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
 extra_demo := $(demo_pictures) $(O)/obj/tools/demo_scene.o
 extra_info := $(demo_pictures) $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o \
 	bus_report.o stream_report.o)
-extra_calibrate-tip := $(addprefix $(O)/obj/tools/,calibrate_result.o tip_poses.o picture.o)
-extra_calibrate-delay := $(addprefix $(O)/obj/tools/,calibrate_result.o delay_streams.o picture.o)
+calibrate_all := $(addprefix $(O)/obj/tools/,calibrate_wish.o calibrate_report.o \
+	calibrate_result.o picture.o)
+extra_calibrate-tip := $(calibrate_all) $(O)/obj/tools/tip_poses.o
+extra_calibrate-delay := $(calibrate_all) $(O)/obj/tools/delay_streams.o
 extra_capture := $(addprefix $(O)/obj/tools/,capture_view.o keyboard.o stopwatch.o stream_report.o)
 extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
 	stepper_status.o stepper_counters.o)
-extra_calibrate-stepper := $(addprefix $(O)/obj/tools/,calibrate_stepper_series.o \
-	calibrate_stepper_live.o calibrate_stepper_rate.o calibrate_stepper_report.o \
-	stepper_drive.o stepper_status.o stepper_counters.o picture.o)
+extra_calibrate-stepper := $(calibrate_all) $(addprefix $(O)/obj/tools/,\
+	calibrate_stepper_series.o calibrate_stepper_live.o calibrate_stepper_rate.o \
+	calibrate_stepper_report.o stepper_drive.o stepper_status.o stepper_counters.o)
 extra_haptic := $(addprefix $(O)/obj/tools/,scene_argument.o stepper_counters.o loop_report.o \
 	stroke.o notify.o haptic_actuator.o haptic_report.o haptic_self_test.o \
 	haptic_supervisor.o)
@@ -30,11 +32,14 @@ extra_status := $(addprefix $(O)/obj/tools/,state_pages.o state_report.o state_f
 extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o picture.o \
 	replay_picture.o)
 extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stroke.o stopwatch.o)
-extra_calibrate-force := $(addprefix $(O)/obj/tools/,picture.o calibrate_pairs.o \
+extra_calibrate-force := $(calibrate_all) $(addprefix $(O)/obj/tools/,calibrate_pairs.o \
 	calibrate_weights.o calibrate_force_report.o)
 extra_calibrate-depth := $(addprefix $(O)/obj/tools/,picture.o depth_picture.o depth_frames.o \
 	depth_lengths.o depth_corners.o depth_report.o)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o harness.o figures.o compare.o \
+extra_calibrate-depth := $(calibrate_all) $(addprefix $(O)/obj/tools/,depth_wish.o \
+	depth_picture.o depth_frames.o depth_lengths.o depth_corners.o depth_report.o)
+extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o stroke.o \
 	bench_tick.o bench_wakeup.o wakeup_run.o bench_rate.o bench_load.o cyclictest.o child.o \
 	memory_file.o loop_picture.o \

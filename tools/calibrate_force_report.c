@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <incise/outfile.h>
 #include "calibrate_force_report.h"
+#include "calibrate_report.h"
 #include "cli.h"
 #include "json.h"
 #include "picture.h"
@@ -204,27 +204,6 @@ json_t *calibrate_force_json(const struct calibrate_force_report *report)
 	return root;
 }
 
-static FILE *begin_file(const char *folder, const char *name,
-			struct incise_outfile **file)
-{
-	struct incise_error err = {0};
-	char path[4200];
-
-	snprintf(path, sizeof(path), "%s/%s", folder, name);
-	*file = incise_outfile_open(path, &err);
-	if (!*file)
-		cli_fail_with(&err);
-	return incise_outfile_stream(*file);
-}
-
-static void end_file(struct incise_outfile *file)
-{
-	struct incise_error err = {0};
-
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
-}
-
 /* Both pictures from one file: force, reading, residual, and whether it was used. */
 static void draw(const struct calibrate_force_report *report, const char *folder)
 {
@@ -281,14 +260,10 @@ void calibrate_force_write(const struct calibrate_force_report *report,
 		if (mkdir(folder, 0777) && errno != EEXIST)
 			cli_fail("%s: %s", folder, strerror(errno));
 	}
-	out = begin_file(folder, "report.txt", &file);
+	out = calibrate_report_text(folder, &file);
 	calibrate_force_print(report, true, out);
-	end_file(file);
-	out = begin_file(folder, "report.json", &file);
+	calibrate_report_end(file);
 	json = calibrate_force_json(report);
-	if (!json || json_dumpf(json, out, JSON_INDENT(2) | JSON_REAL_PRECISION(12)))
-		cli_fail("%s/report.json: no memory", folder);
+	calibrate_report_json(folder, json);
 	json_decref(json);
-	fputc('\n', out);
-	end_file(file);
 }

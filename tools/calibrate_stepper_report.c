@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <incise/outfile.h>
+#include "calibrate_report.h"
 #include "calibrate_stepper.h"
 #include "cli.h"
 #include "json.h"
@@ -179,38 +179,13 @@ json_t *stepper_report_json(const struct stepper_report *report)
 	return object;
 }
 
-/* A file of the report, whole or not at all. */
-static void put_file(const struct stepper_report *report, const char *folder,
-		     const char *name, bool json)
-{
-	struct incise_error err = {0};
-	struct incise_outfile *out;
-	json_t *object;
-	char *path;
-
-	if (asprintf(&path, "%s/%s", folder, name) < 0)
-		cli_fail("no memory");
-	out = incise_outfile_open(path, &err);
-	if (!out)
-		cli_fail_with(&err);
-	if (json) {
-		object = stepper_report_json(report);
-		json_dumpf(object, incise_outfile_stream(out),
-			   JSON_INDENT(2) | JSON_REAL_PRECISION(12));
-		fputc('\n', incise_outfile_stream(out));
-		json_decref(object);
-	} else
-		stepper_report_text(report, incise_outfile_stream(out));
-	if (incise_outfile_commit(out, &err))
-		cli_fail_with(&err);
-	free(path);
-}
-
 void stepper_report_folder(const struct stepper_report *report, const char *folder)
 {
 	const struct incise_calibrate_stepper *fit = report->fit;
 	const struct stepper_series *series = report->series;
 	const char *place, *name;
+	struct incise_outfile *file;
+	json_t *object;
 	double before = NAN;
 	char *path;
 	FILE *data, *script;
@@ -248,7 +223,10 @@ void stepper_report_folder(const struct stepper_report *report, const char *fold
 			"  '' using 1:($5>1?$3:1/0) pt 7 title 'left out'\n");
 	if (!picture_draw(script, place, "residuals"))
 		cli_fail("gnuplot could not draw %s/residuals", place);
-	put_file(report, place, "report.txt", false);
-	put_file(report, place, "report.json", true);
+	stepper_report_text(report, calibrate_report_text(place, &file));
+	calibrate_report_end(file);
+	object = stepper_report_json(report);
+	calibrate_report_json(place, object);
+	json_decref(object);
 	free(path);
 }

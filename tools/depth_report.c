@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/outfile.h>
+#include "calibrate_report.h"
 #include "cli.h"
 #include "depth_report.h"
 #include "json.h"
@@ -349,28 +349,6 @@ static void draw(const struct depth_result *r, const char *folder)
 		cli_fail("gnuplot could not draw %s/residuals", folder);
 }
 
-static FILE *begin(const char *folder, const char *name, struct incise_outfile **file)
-{
-	struct incise_error err = {0};
-	char *path;
-
-	if (asprintf(&path, "%s/%s", folder, name) < 0)
-		cli_fail("no memory");
-	*file = incise_outfile_open(path, &err);
-	if (!*file)
-		cli_fail_with(&err);
-	free(path);
-	return incise_outfile_stream(*file);
-}
-
-static void end(struct incise_outfile *file)
-{
-	struct incise_error err = {0};
-
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
-}
-
 void depth_report_folder(const struct depth_result *r, const char *dir)
 {
 	struct incise_outfile *file;
@@ -382,13 +360,10 @@ void depth_report_folder(const struct depth_result *r, const char *dir)
 	if (asprintf(&path, "%s/fit", dir) < 0)
 		cli_fail("no memory");
 	picture_place("report", path, &folder, &name);
-	out = begin(folder, "report.txt", &file);
+	out = calibrate_report_text(folder, &file);
 	depth_report_text(r, out);
-	end(file);
-	out = begin(folder, "report.json", &file);
-	json_dumpf(object, out, JSON_INDENT(2) | JSON_REAL_PRECISION(12));
-	fputc('\n', out);
-	end(file);
+	calibrate_report_end(file);
+	calibrate_report_json(folder, object);
 	json_decref(object);
 	draw(r, folder);
 	free(path);

@@ -13,6 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/calibrate_delay.h>
+#include "calibrate_report.h"
 #include "calibrate_result.h"
 #include "delay_streams.h"
 #include "json.h"
@@ -325,7 +326,8 @@ static void state(const struct wish *wish, const struct delay_stream *streams,
 	const double found[][2] = {{c->force_delay_ms, c->force_delay_sd_ms},
 				   {c->tracker_delay_ms, c->tracker_delay_sd_ms},
 				   {c->camera_delay_ms, c->camera_delay_sd_ms}};
-	FILE *out = calibrate_report_file(&wish->common, "report.txt");
+	struct incise_outfile *file;
+	FILE *out = calibrate_report_text(wish->common.report, &file);
 
 	if (out) {
 		fprintf(out, "Delays against the %s\n\n",
@@ -358,7 +360,7 @@ static void state(const struct wish *wish, const struct delay_stream *streams,
 	}
 	if (out)
 		fprintf(out, "\npass\n");
-	calibrate_report_end(&wish->common, out);
+	calibrate_report_end(file);
 	if (out)
 		draw(&wish->common, streams, pairs);
 }

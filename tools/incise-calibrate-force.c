@@ -2,7 +2,6 @@
 /*
  * incise calibrate force: sensitivity of the force channel, from weights.
  */
-#include <errno.h>
 #include <getopt.h>
 #include <math.h>
 #include <stdlib.h>
@@ -11,17 +10,13 @@
 #include <unistd.h>
 #include <incise/calibration.h>
 #include "calibrate_force_report.h"
+#include "calibrate_result.h"
 #include "calibrate_weights.h"
 #include "cli.h"
 #include "json.h"
 
 enum {
-	OPT_FROM = CLI_LONG,
-	OPT_KEEP,
-	OPT_REPORT,
-	OPT_DRY_RUN,
-	OPT_JSON,
-	OPT_WEIGHTS,
+	OPT_WEIGHTS = CALIBRATE_OWN,
 	OPT_SERIES,
 	OPT_TIME,
 	OPT_TIMEOUT,
@@ -41,13 +36,13 @@ static const struct cli_option options[] = {
 	 "rig.conf, or sim:KEY=VALUE,... (default ./rig.conf, then /etc/incise)"},
 	{'c', "calibration", "FILE",
 	 "read as found, and written (default calibration.conf)"},
-	{OPT_FROM, "from", "FILE",
+	{CALIBRATE_FROM, "from", "FILE",
 	 "pairs instead of a rig: CSV with mass_g or force_N, reading_mV,\n"
 	 "and perhaps series and direction (up, down)"},
-	{OPT_KEEP, "keep", "FILE", "write the pairs there, as --from reads them"},
-	{OPT_REPORT, "report", "DIR", "report.txt, report.json and pictures"},
-	{OPT_DRY_RUN, "dry-run", NULL, "leave the calibration as it is"},
-	{OPT_JSON, "json", NULL, "report as JSON"},
+	{CALIBRATE_KEEP, "keep", "FILE", "write the pairs there, as --from reads them"},
+	{CALIBRATE_REPORT, "report", "DIR", "report.txt, report.json and pictures"},
+	{CALIBRATE_DRY_RUN, "dry-run", NULL, "leave the calibration as it is"},
+	{CALIBRATE_JSON, "json", NULL, "report as JSON"},
 	{OPT_WEIGHTS, "weights", "LIST",
 	 "loads such as 0,50g,100g,0.2kg; without it they are asked for"},
 	{OPT_SERIES, "series", "N",
@@ -86,8 +81,8 @@ static const struct cli_verb verb = {
 };
 
 struct wish {
-	const char *rig, *calibration, *from, *keep, *report;
-	bool dry_run, json, zero, ranged;
+	struct calibrate_wish common;
+	bool zero, ranged;
 	double latitude_deg, altitude_m;
 	const char *gravity; /* where it comes from */
 	struct calibrate_weights weights;
@@ -116,27 +111,6 @@ static void take_options(struct wish *wish, int argc, char **argv)
 	cli_negative_numbers(argc, argv);
 	while ((id = cli_next(&verb, argc, argv)) != CLI_END)
 		switch (id) {
-		case 'r':
-			wish->rig = optarg;
-			break;
-		case 'c':
-			wish->calibration = optarg;
-			break;
-		case OPT_FROM:
-			wish->from = optarg;
-			break;
-		case OPT_KEEP:
-			wish->keep = optarg;
-			break;
-		case OPT_REPORT:
-			wish->report = optarg;
-			break;
-		case OPT_DRY_RUN:
-			wish->dry_run = true;
-			break;
-		case OPT_JSON:
-			wish->json = true;
-			break;
 		case OPT_WEIGHTS:
 			calibrate_weights_list(&wish->weights, optarg);
 			break;
@@ -182,10 +156,13 @@ static void take_options(struct wish *wish, int argc, char **argv)
 		case OPT_ZERO:
 			wish->zero = true;
 			break;
+		default:
+			calibrate_option(&wish->common, id);
 		}
 	if (optind < argc)
 		cli_usage("'%s' is too much: pairs are given with --from", argv[optind]);
-	if (wish->from && (wish->rig || wish->weights.n || wish->keep))
+	if (wish->common.from &&
+	    (wish->common.rig || wish->weights.n || wish->common.keep))
 		cli_usage("--from takes the place of a rig: leave --rig, --weights and "
 			  "--keep out");
 	if (!isnan(wish->latitude_deg) && wish->gravity)
@@ -214,7 +191,7 @@ static void read_rig(struct wish *wish, struct calibrate_pairs *pairs, char *dev
 {
 	struct incise_error err = {0};
 	struct incise_force_info info;
-	const char *spec = cli_rig(wish->rig);
+	const char *spec = cli_rig(wish->common.rig);
 
 	if (!wish->weights.n) {
 		if (!isatty(STDIN_FILENO))
@@ -235,37 +212,24 @@ static void read_rig(struct wish *wish, struct calibrate_pairs *pairs, char *dev
 	snprintf(device, size, "%s", info.name);
 	calibrate_weights_read(&wish->weights, pairs);
 	incise_rig_close(wish->weights.rig);
-	if (wish->keep)
-		calibrate_pairs_write(pairs, wish->keep);
+	if (wish->common.keep)
+		calibrate_pairs_write(pairs, wish->common.keep);
 }
 
-/* What is in force; a file that is not there yet is nominal. */
-static void read_found(const char *path, struct incise_calibration *found)
-{
-	struct incise_error err = {0};
-	int rc = incise_calibration_load(path, found, &err);
-
-	if (rc == -ENOENT)
-		incise_calibration_nominal(found);
-	else if (rc)
-		cli_fail_with(&err);
-}
-
-static void fill_record(const struct wish *wish, const struct incise_calibration *found,
+static void fill_record(const struct wish *wish,
 			const struct incise_calibrate_force *result,
 			struct incise_calibration_record *record)
 {
+	const struct incise_calibration *found = &wish->common.found;
 	const double S = result->sensitivity_mV_N;
 	const double off = 100 * (S / wish->setup.nominal_mV_N - 1);
 
 	snprintf(record->kind, sizeof(record->kind), "force");
-	record->n = wish->zero ? 2 : 1;
-	record->values[0] = (struct incise_calibration_value){
-		"force_mV_N", "mV/N", found->force_mV_N, S, result->sensitivity_u_mV_N};
-	record->values[1] =
-		(struct incise_calibration_value){"force_zero_mV", "mV",
-						  found->force_zero_mV, result->zero_mV,
-						  result->zero_u_mV};
+	calibrate_value(record, "force_mV_N", "mV/N", found->force_mV_N, S,
+			result->sensitivity_u_mV_N);
+	if (wish->zero)
+		calibrate_value(record, "force_zero_mV", "mV", found->force_zero_mV,
+				result->zero_mV, result->zero_u_mV);
 	record->covariance[0] = pow(result->sensitivity_u_mV_N, 2);
 	record->covariance[1] = result->covariance;
 	record->covariance[2] = pow(result->zero_u_mV, 2);
@@ -285,7 +249,7 @@ static void fill_record(const struct wish *wish, const struct incise_calibration
 static void begin_record(const struct wish *wish, const char *device,
 			 struct incise_calibration_record *record)
 {
-	const char *raw = wish->from ? wish->from : wish->keep;
+	const char *raw = wish->common.from ? wish->common.from : wish->common.keep;
 	const time_t now = time(NULL);
 	struct incise_error err = {0};
 	struct tm utc;
@@ -304,14 +268,12 @@ static void begin_record(const struct wish *wish, const char *device,
 
 int main(int argc, char **argv)
 {
-	struct wish wish = {.calibration = "calibration.conf",
-			    .latitude_deg = NAN,
+	struct wish wish = {.latitude_deg = NAN,
 			    .weights = {.series = 3, .mean_s = 2, .timeout_s = 60}};
 	struct incise_calibration_record record;
 	struct calibrate_pairs pairs = {0};
 	enum incise_calibrate_force_state *states;
 	struct incise_calibrate_force result;
-	struct incise_calibration found;
 	struct calibrate_force_report report;
 	struct incise_error err = {0};
 	char device[64] = "";
@@ -321,9 +283,9 @@ int main(int argc, char **argv)
 	take_options(&wish, argc, argv);
 	take_gravity(&wish);
 	cli_catch_signals();
-	read_found(wish.calibration, &found);
-	if (wish.from)
-		calibrate_pairs_read(&pairs, wish.from);
+	calibrate_find(&wish.common);
+	if (wish.common.from)
+		calibrate_pairs_read(&pairs, wish.common.from);
 	else
 		read_rig(&wish, &pairs, device, sizeof(device));
 	begin_record(&wish, device, &record);
@@ -332,24 +294,30 @@ int main(int argc, char **argv)
 		cli_fail("no memory");
 	rc = incise_calibrate_force(pairs.pair, pairs.n, &wish.setup, &result, states,
 				    &err);
-	report = (struct calibrate_force_report){&pairs,	   &wish.setup,
-						 &result,	   states,
-						 &record,	   rc ? err.text : NULL,
-						 found.force_mV_N, wish.gravity};
+	report = (struct calibrate_force_report){&pairs,
+						 &wish.setup,
+						 &result,
+						 states,
+						 &record,
+						 rc ? err.text : NULL,
+						 wish.common.found.force_mV_N,
+						 wish.gravity};
 	if (!rc)
-		fill_record(&wish, &found, &result, &record);
-	if (wish.report)
-		calibrate_force_write(&report, wish.report);
-	if (wish.json)
+		fill_record(&wish, &result, &record);
+	if (wish.common.report)
+		calibrate_force_write(&report, wish.common.report);
+	if (wish.common.json)
 		json_print(calibrate_force_json(&report));
 	else if (!rc)
 		calibrate_force_print(&report, false, stdout);
 	cli_finish();
 	if (rc)
-		cli_fail("refused: %s; %s stays as it was", err.text, wish.calibration);
+		cli_fail("refused: %s; %s stays as it was", err.text,
+			 wish.common.calibration);
 	if (cli_stop)
-		cli_fail("stopped; %s stays as it was", wish.calibration);
-	if (!wish.dry_run && incise_calibration_append(wish.calibration, &record, &err))
+		cli_fail("stopped; %s stays as it was", wish.common.calibration);
+	if (!wish.common.dry_run &&
+	    incise_calibration_append(wish.common.calibration, &record, &err))
 		cli_fail_with(&err);
 	if (!record.pass)
 		cli_fail("not in force: %s", record.verdict);

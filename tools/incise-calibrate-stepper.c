@@ -3,27 +3,16 @@
  * incise calibrate stepper: force per microstep of the actuator, its backlash, hysteresis and
  * stiction, and the largest step rate that loses no step.
  */
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "calibrate_result.h"
 #include "calibrate_stepper.h"
 #include "cli.h"
 #include "json.h"
 
-enum {
-	OPT_FROM = CLI_LONG,
-	OPT_KEEP,
-	OPT_REPORT,
-	OPT_DRY_RUN,
-	OPT_JSON,
-	OPT_RANGE,
-	OPT_STROKES,
-	OPT_MAX_FORCE,
-	OPT_NO_RATE,
-	OPT_STEP_MM
-};
+enum { OPT_RANGE = CALIBRATE_OWN, OPT_STROKES, OPT_MAX_FORCE, OPT_NO_RATE, OPT_STEP_MM };
 
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
@@ -31,13 +20,13 @@ static const struct cli_option options[] = {
 	 "(default: ./rig.conf, else /etc/incise/rig.conf)"},
 	{'c', "calibration", "FILE",
 	 "read as found, and written (default: calibration.conf)"},
-	{OPT_FROM, "from", "FILE",
+	{CALIBRATE_FROM, "from", "FILE",
 	 "CSV with position_mm or steps, and force_N, instead of devices"},
-	{OPT_KEEP, "keep", "FILE", "write the points there as CSV"},
-	{OPT_REPORT, "report", "DIR",
+	{CALIBRATE_KEEP, "keep", "FILE", "write the points there as CSV"},
+	{CALIBRATE_REPORT, "report", "DIR",
 	 "pictures of fit and residuals, report.txt and report.json"},
-	{OPT_DRY_RUN, "dry-run", NULL, "leave the calibration as it is"},
-	{OPT_JSON, "json", NULL, "report as JSON"},
+	{CALIBRATE_DRY_RUN, "dry-run", NULL, "leave the calibration as it is"},
+	{CALIBRATE_JSON, "json", NULL, "report as JSON"},
 	{OPT_RANGE, "range", "MM..MM",
 	 "of the strokes, e.g. 0mm..1.5mm (default: from 0 to 70 % of what\n"
 	 "the force channel reads)"},
@@ -67,8 +56,8 @@ static const struct cli_verb verb = {
 };
 
 struct job {
-	const char *rig, *calibration, *from, *keep, *report;
-	bool dry_run, json, no_rate;
+	struct calibrate_wish wish;
+	bool no_rate;
 	double low_mm, high_mm, max_N, step_mm;
 	int strokes;
 	bool has_strokes;
@@ -93,11 +82,11 @@ static void parse_range(struct job *job, char *text)
 
 static void check_options(const struct job *job)
 {
-	if (!isnan(job->step_mm) && !job->from)
+	if (!isnan(job->step_mm) && !job->wish.from)
 		cli_usage(
 			"--step-mm is for --from: a rig says itself how far a step goes");
-	if (job->from && (job->rig || job->keep || !isnan(job->low_mm) ||
-			  !isnan(job->max_N) || job->has_strokes || job->no_rate))
+	if (job->wish.from && (job->wish.rig || job->wish.keep || !isnan(job->low_mm) ||
+			       !isnan(job->max_N) || job->has_strokes || job->no_rate))
 		cli_usage(
 			"--from drives nothing: it does not go with --rig, --keep, --range, "
 			"--strokes, --max-force or --no-rate");
@@ -108,35 +97,13 @@ static void parse(struct job *job, int argc, char **argv)
 	static const struct cli_unit forces[] = {{"N", 1}, {"mN", 1e-3}, {0}};
 	int opt;
 
-	*job = (struct job){.calibration = "calibration.conf",
-			    .low_mm = NAN,
+	*job = (struct job){.low_mm = NAN,
 			    .high_mm = NAN,
 			    .max_N = NAN,
 			    .step_mm = NAN,
 			    .strokes = 3};
 	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
 		switch (opt) {
-		case 'r':
-			job->rig = optarg;
-			break;
-		case 'c':
-			job->calibration = optarg;
-			break;
-		case OPT_FROM:
-			job->from = optarg;
-			break;
-		case OPT_KEEP:
-			job->keep = optarg;
-			break;
-		case OPT_REPORT:
-			job->report = optarg;
-			break;
-		case OPT_DRY_RUN:
-			job->dry_run = true;
-			break;
-		case OPT_JSON:
-			job->json = true;
-			break;
 		case OPT_RANGE:
 			parse_range(job, optarg);
 			break;
@@ -154,31 +121,28 @@ static void parse(struct job *job, int argc, char **argv)
 		case OPT_STEP_MM:
 			job->step_mm = cli_number("step-mm", optarg, 1e-7, 100);
 			break;
+		default:
+			calibrate_option(&job->wish, opt);
 		}
 	if (optind < argc)
 		cli_usage("there is nothing to do with '%s'", argv[optind]);
 	check_options(job);
 }
 
-/* What is in force, and how sure the force channel's sensitivity is. */
-static void load_calibration(const struct job *job, struct incise_calibration *found,
-			     double *sensor_u)
+/* How sure the force channel's sensitivity is, where the history says it. */
+static void find_sensor_u(const struct calibrate_wish *wish, double *sensor_u)
 {
 	struct incise_calibration_record *records = NULL;
 	struct incise_error err = {0};
-	int n, rc = incise_calibration_load(job->calibration, found, &err);
+	int n = incise_calibration_history(wish->calibration, &records, &err);
 	bool known = false;
 
-	if (rc == -ENOENT)
-		incise_calibration_nominal(found);
-	else if (rc)
-		cli_fail_with(&err);
-	n = rc ? 0 : incise_calibration_history(job->calibration, &records, &err);
 	for (int i = 0; i < n; i++)
 		for (int j = 0; j < records[i].n && records[i].pass; j++) {
 			const struct incise_calibration_value *v = &records[i].values[j];
 
-			if (strcmp(v->key, "force_mV_N") || v->left != found->force_mV_N)
+			if (strcmp(v->key, "force_mV_N") ||
+			    v->left != wish->found.force_mV_N)
 				continue;
 			*sensor_u = fmin(0.9, v->u / fabs(v->left));
 			known = true;
@@ -188,19 +152,7 @@ static void load_calibration(const struct job *job, struct incise_calibration *f
 		cli_warn(
 			"how sure force_mV_N is does not stand in %s: taken is 5 %%; run "
 			"incise calibrate force",
-			job->calibration);
-}
-
-static void add_value(struct incise_calibration_record *record, const char *key,
-		      const char *unit, double found, double left, double u)
-{
-	struct incise_calibration_value *v = &record->values[record->n++];
-
-	snprintf(v->key, sizeof(v->key), "%s", key);
-	snprintf(v->unit, sizeof(v->unit), "%s", unit);
-	v->found = found;
-	v->left = left;
-	v->u = u;
+			wish->calibration);
 }
 
 static void fill_record(struct incise_calibration_record *record,
@@ -214,21 +166,21 @@ static void fill_record(struct incise_calibration_record *record,
 		record->method, sizeof(record->method),
 		"%d strokes against the force sensor, lines of one slope, turns told apart",
 		fit->strokes);
-	add_value(record, "stepper_N_step", "N", found->stepper_N_step, fit->N_step,
-		  fit->N_step_u);
-	add_value(record, "stepper_backlash_mm", "mm", found->stepper_backlash_mm,
-		  fit->backlash_mm, fit->backlash_u_mm);
-	add_value(record, "stepper_hysteresis_N", "N", found->stepper_hysteresis_N,
-		  fit->hysteresis_N, fit->hysteresis_u_N);
-	add_value(record, "stepper_stiction_N", "N", found->stepper_stiction_N,
-		  fit->stiction_N, fit->stiction_u_N);
+	calibrate_value(record, "stepper_N_step", "N", found->stepper_N_step, fit->N_step,
+			fit->N_step_u);
+	calibrate_value(record, "stepper_backlash_mm", "mm", found->stepper_backlash_mm,
+			fit->backlash_mm, fit->backlash_u_mm);
+	calibrate_value(record, "stepper_hysteresis_N", "N", found->stepper_hysteresis_N,
+			fit->hysteresis_N, fit->hysteresis_u_N);
+	calibrate_value(record, "stepper_stiction_N", "N", found->stepper_stiction_N,
+			fit->stiction_N, fit->stiction_u_N);
 	/* Between what kept and what lost, anywhere. */
 	if (rate->tried && rate->kept_1_s > 0)
-		add_value(record, "stepper_steps_s", "1/s", found->stepper_steps_s,
-			  rate->kept_1_s,
-			  isnan(rate->lost_1_s)
-				  ? 0
-				  : (rate->lost_1_s - rate->kept_1_s) / sqrt(12));
+		calibrate_value(record, "stepper_steps_s", "1/s", found->stepper_steps_s,
+				rate->kept_1_s,
+				isnan(rate->lost_1_s)
+					? 0
+					: (rate->lost_1_s - rate->kept_1_s) / sqrt(12));
 	record->low = fit->low_mm;
 	record->high = fit->high_mm;
 	snprintf(record->range_unit, sizeof(record->range_unit), "mm");
@@ -264,7 +216,6 @@ int main(int argc, char **argv)
 	struct incise_calibrate_stepper_setup setup;
 	struct incise_calibrate_stepper fit;
 	struct stepper_rate rate = {.lost_1_s = NAN};
-	struct incise_calibration found;
 	struct stepper_series series = {.step_mm = NAN};
 	struct stepper_live live;
 	struct incise_error err = {0};
@@ -277,17 +228,18 @@ int main(int argc, char **argv)
 
 	parse(&job, argc, argv);
 	incise_calibrate_stepper_init(&setup);
-	load_calibration(&job, &found, &setup.sensor_u);
-	if (job.from) {
-		stepper_series_read(&series, job.from, job.step_mm);
-		report.source = job.from;
+	calibrate_find(&job.wish);
+	find_sensor_u(&job.wish, &setup.sensor_u);
+	if (job.wish.from) {
+		stepper_series_read(&series, job.wish.from, job.step_mm);
+		report.source = job.wish.from;
 	} else {
-		live = (struct stepper_live){.calibration = found,
+		live = (struct stepper_live){.calibration = job.wish.found,
 					     .low_mm = job.low_mm,
 					     .high_mm = job.high_mm,
 					     .max_N = job.max_N,
 					     .strokes = job.strokes};
-		stepper_live_open(&live, job.rig);
+		stepper_live_open(&live, job.wish.rig);
 		stepper_live_plan(&live);
 		report.source = live.drive.info.name;
 		setup.spring_N_mm = live.drive.info.spring_N_mm;
@@ -297,14 +249,14 @@ int main(int argc, char **argv)
 			 live.drive.info.name);
 		stepper_live_start(&live);
 		stepper_live_strokes(&live, &series);
-		if (job.keep)
-			stepper_series_write(&series, job.keep);
+		if (job.wish.keep)
+			stepper_series_write(&series, job.wish.keep);
 	}
 	setup.step_mm = series.step_mm;
 	if (incise_calibrate_stepper(series.points, series.n, &setup, &fit, series.states,
 				     &err))
-		refuse(job.from ? NULL : &live, &err);
-	if (!job.from) {
+		refuse(job.wish.from ? NULL : &live, &err);
+	if (!job.wish.from) {
 		if (!job.no_rate)
 			stepper_live_rate(&live, &fit, &rate);
 		else
@@ -312,18 +264,20 @@ int main(int argc, char **argv)
 		stepper_drive_end(&live.drive);
 	} else
 		rate.why = "a file does not drive";
-	fill_record(&record, &fit, &setup, &rate, &found);
-	if ((job.from || job.keep) &&
-	    incise_calibration_raw(&record, job.from ? job.from : job.keep, &err))
+	fill_record(&record, &fit, &setup, &rate, &job.wish.found);
+	if ((job.wish.from || job.wish.keep) &&
+	    incise_calibration_raw(&record, job.wish.from ? job.wish.from : job.wish.keep,
+				   &err))
 		cli_fail_with(&err);
-	if (job.report)
-		stepper_report_folder(&report, job.report);
+	if (job.wish.report)
+		stepper_report_folder(&report, job.wish.report);
 	/* Only now: whatever failed before has changed nothing. */
 	if (cli_stop)
 		cli_fail("%s: nothing has changed", strsignal(cli_stop));
-	if (!job.dry_run && incise_calibration_append(job.calibration, &record, &err))
+	if (!job.wish.dry_run &&
+	    incise_calibration_append(job.wish.calibration, &record, &err))
 		cli_fail_with(&err);
-	if (job.json)
+	if (job.wish.json)
 		json_print(stepper_report_json(&report));
 	else {
 		stepper_report_text(&report, stdout);

@@ -10,6 +10,7 @@
 #include <unistd.h>
 #include <incise/calibrate_tip.h>
 #include <incise/rig.h>
+#include "calibrate_report.h"
 #include "calibrate_result.h"
 #include "json.h"
 #include "picture.h"
@@ -214,7 +215,8 @@ static void write_report(const struct calibrate_wish *wish, const struct tip_lis
 			 const bool *inlier, const struct incise_tip_fit *fit)
 {
 	static const char axes[] = "xyz";
-	FILE *out = calibrate_report_file(wish, "report.txt");
+	struct incise_outfile *file;
+	FILE *out = calibrate_report_text(wish->report, &file);
 	int listed = 0;
 
 	if (!out)
@@ -251,7 +253,7 @@ static void write_report(const struct calibrate_wish *wish, const struct tip_lis
 	if (listed > OUTLIERS_LISTED)
 		fprintf(out, " and %d more", listed - OUTLIERS_LISTED);
 	fprintf(out, "\npass\n");
-	calibrate_report_end(wish, out);
+	calibrate_report_end(file);
 	draw(wish, list, inlier, fit);
 }
 
