@@ -95,12 +95,9 @@ uses_stepper := incise
 uses_plan := incise
 uses_replay := incise incise-record
 uses_calibrate := incise
-uses_calibrate-tip := incise incise-learn incise-record
-uses_calibrate-delay := incise incise-learn incise-record
 uses_demo := incise incise-learn
 uses_bench := incise incise-learn incise-record
 uses_bench-view := incise incise-view
-uses_calibrate := incise
 $(foreach word,$(filter calibrate-%,$(verbs)),\
 	$(eval uses_$(word) := incise incise-learn incise-record))
 
