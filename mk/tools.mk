@@ -11,7 +11,8 @@ $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o): cppflags += -Idriver
 
 demo_pictures := $(addprefix $(O)/obj/tools/,picture.o model_picture.o)
-extra_demo := $(demo_pictures) $(O)/obj/tools/demo_scene.o
+extra_demo := $(demo_pictures) $(addprefix $(O)/obj/tools/,demo.o demo_walk.o demo_figures.o \
+	demo_summary.o demo_scene.o verb.o)
 extra_info := $(demo_pictures) $(addprefix $(O)/obj/tools/,stepper_module.o stepper_module_report.o \
 	bus_report.o stream_report.o)
 calibrate_all := $(addprefix $(O)/obj/tools/,calibrate_wish.o calibrate_report.o \
