@@ -50,8 +50,8 @@ extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
 	bench_pose.o motions.o pose_methods.o pose_error.o pose_picture.o \
 	bench_timeline.o drifting_stream.o time_methods.o timeline_picture.o)
 
-extra_view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o state_pages.o view_hand.o \
-	view_live.o view_output.o png_file.o)
+extra_view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o state_pages.o view_job.o \
+	view_real_time.o view_simulated.o view_hand.o view_live.o view_output.o png_file.o)
 
 extra_bench-view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o view_script.o \
 	similarity.o picture.o machine.o stopwatch.o memory_file.o bench_view_frames.o \
