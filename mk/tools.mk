@@ -19,6 +19,7 @@ calibrate_all := $(addprefix $(O)/obj/tools/,calibrate_wish.o calibrate_report.o
 	calibrate_result.o picture.o)
 extra_calibrate-tip := $(calibrate_all) $(O)/obj/tools/tip_poses.o
 extra_calibrate-delay := $(calibrate_all) $(O)/obj/tools/delay_streams.o
+extra_train := $(addprefix $(O)/obj/tools/,train_wish.o train_side.o train_report.o)
 extra_capture := $(addprefix $(O)/obj/tools/,capture_view.o keyboard.o stopwatch.o stream_report.o)
 extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
 	stepper_status.o stepper_counters.o)
