@@ -36,12 +36,10 @@ extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o pictu
 extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stroke.o stopwatch.o)
 extra_calibrate-force := $(calibrate_all) $(addprefix $(O)/obj/tools/,calibrate_pairs.o \
 	calibrate_weights.o calibrate_force_report.o)
-extra_calibrate-depth := $(addprefix $(O)/obj/tools/,picture.o depth_picture.o depth_frames.o \
-	depth_lengths.o depth_corners.o depth_report.o)
-extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o harness.o figures.o compare.o \
 extra_calibrate-depth := $(calibrate_all) $(addprefix $(O)/obj/tools/,depth_wish.o \
 	depth_picture.o depth_frames.o depth_lengths.o depth_corners.o depth_report.o)
-extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o \
+extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o harness.o figures.o \
+	compare.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o stroke.o \
 	bench_tick.o bench_wakeup.o wakeup_run.o bench_rate.o bench_load.o cyclictest.o child.o \
 	memory_file.o loop_picture.o \
