@@ -288,9 +288,9 @@ void pose_error(const struct pose_run *run, const struct pose_method *method,
 	else if (error->place_mm.rms > error->spread_mm)
 		snprintf(
 			error->failed, sizeof(error->failed),
-			"worse than no tracker: the motion is %.3g mm rms from its middle, "
-			"and this is off by %.3g mm",
-			error->spread_mm, error->place_mm.rms);
+			"worse than no tracker: off by %.3g mm, where the middle of the motion "
+			"is by %.3g mm",
+			error->place_mm.rms, error->spread_mm);
 	free(place);
 	free(speed);
 	free(turn);

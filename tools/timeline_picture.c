@@ -67,7 +67,9 @@ void timeline_picture_cost(const struct timeline_table *table, const char *folde
 	write_data(table, folder, data);
 	script = picture_begin(folder, name, 1320, 620);
 	begin(script, table, "their cost", data);
-	fputs("set xlabel 'time per sample / ns (bars: 5 to 95 %; numbers: s seen)'\n",
+	/* Room below for the key. */
+	fputs("set xlabel 'time per sample / ns (bars: 5 to 95 %)'\nset xrange [2:2000]\n"
+	      "set yrange [0.05:30000]\n",
 	      script);
 	for (int late = 0; late < LATE_KINDS; late++) {
 		fprintf(script, "set title 'lateness: %s'\nplot \\\n",
@@ -79,8 +81,8 @@ void timeline_picture_cost(const struct timeline_table *table, const char *folde
 				"  data index %d using 5:2 with lines %s notitle, \\\n"
 				"  '' index %d using 5:2:6:7 with xerrorbars %s pt 7 ps 0.7 "
 				"title '%s', \\\n"
-				"  '' index %d using 5:2:($1 == 1 || $1 == 10 || $1 == 120 ? "
-				"sprintf('%%g', $1) : '') with labels left offset 0.5,0.4 "
+				"  '' index %d using 5:2:($1 == 1 || $1 == 120 ? "
+				"sprintf('%%g s', $1) : '') with labels left offset 0.5,0.4 "
 				"font ',8' notitle, \\\n",
 				block, styles[method], block, styles[method],
 				time_methods[method].name, block);

@@ -62,7 +62,7 @@ INCISE_API void incise_predict_add(struct incise_predict *p,
 	INCISE_REALTIME;
 
 /**
- * Position, velocity and attitude (unit quaternion, w first) at @t_ns. Before the first
+ * Position, velocity and attitude (unit quaternion, w first) at t_ns. Before the first
  * pose all is 0 and the attitude 1.
  *
  * Position and velocity are blended each by itself: velocity is the filter's, and not the
@@ -74,7 +74,7 @@ INCISE_API void incise_predict_at(const struct incise_predict *p, int64_t t_ns,
 				  double position_mm[3], double velocity_mm_s[3],
 				  double attitude[4]) INCISE_REALTIME;
 
-/** Age of the last pose at @t_ns, ≥ 0; INT64_MAX before the first. Real-time safe. */
+/** Age of the last pose at t_ns, ≥ 0; INT64_MAX before the first. Real-time safe. */
 INCISE_API int64_t incise_predict_age(const struct incise_predict *p,
 				      int64_t t_ns) INCISE_REALTIME;
 

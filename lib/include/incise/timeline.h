@@ -67,7 +67,7 @@ INCISE_API struct incise_timeline *incise_timeline_new(
 	const struct incise_timeline_setup *setup);
 INCISE_API void incise_timeline_free(struct incise_timeline *timeline);
 
-/** Acquisition time of sample @seq: later than any before, and 0 or more. */
+/** Acquisition time of sample seq: later than any before, and 0 or more. */
 INCISE_API int64_t incise_timeline_sample(struct incise_timeline *timeline, uint64_t seq,
 					  int64_t arrival_ns);
 
@@ -89,7 +89,7 @@ INCISE_API void incise_timeline_report(const struct incise_timeline *timeline,
 INCISE_API int incise_timeline_knots(const struct incise_timeline *timeline,
 				     struct incise_timeline_knot *knots);
 
-/** Time of @seq between knots, or beyond the last of them; @n is 2 or more. */
+/** Time of seq between knots, or beyond the last of them; n is 2 or more. */
 INCISE_API int64_t incise_timeline_at(const struct incise_timeline_knot *knots, int n,
 				      uint64_t seq);
 
