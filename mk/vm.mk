@@ -16,6 +16,12 @@ $(O)/tests/vm/%: tests/vm/guest/%.c $(guest_shared) $(guest_headers) \
 		$(LDFLAGS) -o $@ $< $(guest_shared) $(O)/lib/libincise-tests.a \
 		$(all_libs) -lm
 
+# What scripts in tests/vm/guest take as the liver's model.
+guest_model := $(O)/tests/vm/liver.fx
+$(guest_model): scenes/liver.fis $(O)/bin/incise $(O)/bin/incise-compile
+	@mkdir -p $(@D)
+	$(O)/bin/incise compile $< -o $@ >/dev/null
+
 # Virtual time for whatever asserts on time, two processors for races.
 vm_boots := main:deterministic second:deterministic main:service main:smp
 
@@ -27,7 +33,7 @@ $(system_programs): $(O)/tests/vm/%: tests/vm/system/%.c tests/vm/simulator.c \
 	@mkdir -p $(@D)
 	$(CC) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< tests/vm/simulator.c
 
-check-vm: all $(guest_programs) $(system_programs) $(O)/tests/polhemus/fastrak ## tests of the kernel modules, on Debian's kernels in QEMU
+check-vm: all $(guest_programs) $(guest_model) $(system_programs) $(O)/tests/polhemus/fastrak ## tests of the kernel modules, on Debian's kernels in QEMU
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed $(vm_boots)
 
 check-service: all $(system_programs) $(O)/tests/polhemus/fastrak ## of check-vm the boot of systemd, with our packages and the service
@@ -35,7 +41,7 @@ check-service: all $(system_programs) $(O)/tests/polhemus/fastrak ## of check-vm
 
 # In real time only: with every access checked its timers are late by up to a millisecond,
 # in virtual time too, so that nothing about time can be asserted.
-check-vm-debug: all $(guest_programs) $(O)/tests/polhemus/fastrak ## the same on a kernel with KASAN, lockdep, kmemleak; built once
+check-vm-debug: all $(guest_programs) $(guest_model) $(O)/tests/polhemus/fastrak ## the same on a kernel with KASAN, lockdep, kmemleak; built once
 	@mk/deps vm vm-debug
 	+@tests/vm/debug-kernel >/dev/null
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed debug:smp
