@@ -78,7 +78,7 @@ check: ## install what is missing, build, and run all tests
 	@mk/deps rtsan || echo "going on without RealtimeSanitizer"
 	@mk/deps deb debian || echo "going on without what building packages needs"
 	+@$(MAKE) --no-print-directory all
-	+@$(MAKE) --no-print-directory check-style check-unit check-cli check-sanitize check-fuzz check-rtsan check-module check-deb check-vm
+	+@$(MAKE) --no-print-directory check-style check-cli check-unit-once check-fuzz check-rtsan check-module check-deb check-vm
 
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8
@@ -130,9 +130,21 @@ check-cli: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(O)/
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
 sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all
+skipped_there := $(O)/sanitize/skipped
 check-sanitize: ## unit tests under AddressSanitizer and UBSan
-	+@$(MAKE) --no-print-directory O=$(O)/sanitize CFLAGS="-O1 -g $(sanitize_flags)" \
-		LDFLAGS="$(sanitize_flags)" check-unit
+	@mkdir -p $(O)/sanitize
+	+@SKIPPED=$(abspath $(skipped_there)) $(MAKE) --no-print-directory O=$(O)/sanitize \
+		CFLAGS="-O1 -g1 $(sanitize_flags)" LDFLAGS="$(sanitize_flags)" check-unit
+
+# Plainly, after that, those that skipped something there, those that do less there and so
+# name __SANITIZE_ADDRESS__, and those about bits, which are of the flags that are shipped.
+plain_programs = $(sort $(filter $(O)/tests/unit/fixed/% $(O)/tests/unit/model/% \
+	$(patsubst tests/%.c,$(O)/tests/%,$(shell grep -l __SANITIZE_ADDRESS__ $(unit_sources))) \
+	$(addprefix $(O)/tests/unit/,$(shell cat $(skipped_there))),$(unit_programs)))
+check-unit-once: check-sanitize ## check-sanitize, and of check-unit what differs plainly
+	@echo "unit tests: all ran under the sanitizers; plainly run $(words $(plain_programs)) that skip" \
+		"or do less there, or are about bits; make check-unit runs all"
+	+@$(MAKE) --no-print-directory check-unit unit_programs="$(plain_programs)"
 
 # Threads that share memory without a lock, under ThreadSanitizer; what is not of the page
 # comes from the library as it is.
@@ -158,7 +170,7 @@ doc: ## reference of the public headers in build/doc/html; fails where a comment
 
 check-doc: doc
 
-.PHONY: doc check-doc check check-style check-unit check-cli check-attack check-sanitize check-tsan can-drive mcap-reader
+.PHONY: doc check-doc check check-style check-unit check-unit-once check-cli check-attack check-sanitize check-tsan can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
