@@ -157,16 +157,17 @@ static void put_extremes(void *values, size_t n, int64_t limit, uint64_t *seed)
 }
 
 /* Blobs that no compiler made, whose numbers are as large as validation lets through. */
-static void check_extreme(int n_inputs, int arithmetic, int32_t shift_a, int32_t shift_b,
+static void check_extreme(const struct incise_fixed *fx, int32_t shift_a, int32_t shift_b,
 			  uint64_t seed)
 {
-	struct incise_fixed *fx = compiled(n_inputs, 5, 4, arithmetic, 8, 1), extreme;
+	struct incise_fixed extreme;
 	struct incise_fx_header *head = malloc(fx->size);
 	uint8_t *bytes = (uint8_t *)head;
 	uint32_t data;
 	/* Half of what g + x·h may add up to, each. */
-	int64_t limit =
-		arithmetic == INCISE_FIXED_TABLE && n_inputs == 2 ? 1 << 30 : INT32_MAX;
+	int64_t limit = fx->arithmetic == INCISE_FIXED_TABLE && fx->n_inputs == 2
+				? 1 << 30
+				: INT32_MAX;
 
 	memcpy(head, fx->blob, fx->size);
 	head->shift_a = (int32_t)incise_fx_le32((uint32_t)shift_a);
@@ -178,20 +179,27 @@ static void check_extreme(int n_inputs, int arithmetic, int32_t shift_a, int32_t
 	assert_int_equal(incise_fixed_open(&extreme, head, fx->size), 0);
 	check(&extreme, 20000, seed);
 	free(head);
-	incise_fixed_free(fx);
 }
 
 static void test_extreme_blobs(void **state)
 {
+	struct incise_fixed *line = compiled(1, 5, 4, INCISE_FIXED_TABLE, 8, 1),
+			    *line_force = compiled(1, 5, 4, INCISE_FIXED_FORCE, 8, 1),
+			    *grid = compiled(2, 5, 4, INCISE_FIXED_TABLE, 8, 1),
+			    *grid_force = compiled(2, 5, 4, INCISE_FIXED_FORCE, 8, 1);
+
 	for (int shift_a = 17; shift_a <= 30; shift_a++) {
-		check_extreme(1, INCISE_FIXED_TABLE, shift_a, 0, shift_a);
-		check_extreme(1, INCISE_FIXED_FORCE, shift_a, 0, shift_a);
-		check_extreme(2, INCISE_FIXED_FORCE, shift_a, 0, shift_a);
+		check_extreme(line, shift_a, 0, shift_a);
+		check_extreme(line_force, shift_a, 0, shift_a);
+		check_extreme(grid_force, shift_a, 0, shift_a);
 		/* x·h, with |x| < 2^20, shifted by 20 to 62 bits: as large as g, or nothing. */
 		for (int to_g = 20; to_g <= 62; to_g += 7)
-			check_extreme(2, INCISE_FIXED_TABLE, shift_a, to_g - 16 + shift_a,
-				      to_g);
+			check_extreme(grid, shift_a, to_g - 16 + shift_a, to_g);
 	}
+	incise_fixed_free(line);
+	incise_fixed_free(line_force);
+	incise_fixed_free(grid);
+	incise_fixed_free(grid_force);
 }
 
 /* Arrays that begin at any word: 13 results, and nothing beside them. */
