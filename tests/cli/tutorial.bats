@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# doc/tutorial.md, as a newcomer without a rig follows it: each block for the virtual rig, in
+# order, in an empty folder. What comes out is held against the virtual rig's truth.
+
+load cli
+load document
+
+setup() {
+	work_folder
+	page=$root/doc/tutorial.md
+	export XDG_RUNTIME_DIR=$PWD/runtime
+	mkdir runtime
+}
+
+@test "every block of the tutorial that is said to run on the virtual rig is run here" {
+	commands_in "$page" "virtual rig" >commands
+	commands_in "$page" "virtual rig with a screen's libraries" >screen
+	[ "$(grep -c '^# virtual rig$' commands screen | cut -d: -f2 | paste -sd+ | bc)" = \
+		"$(grep -c '^# virtual rig$' "$page")" ]
+}
+
+@test "the tutorial's commands run in their order, and find the virtual rig's truth" {
+	commands_in "$page" "virtual rig" >commands
+	if [ -e "$INCISE_BUILD/lib/incise/vision_opencv.so" ] && [ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ]; then
+		has_pictures=yes
+	else # what looks at pictures was not built
+		sed -i '/^incise calibrate depth/d; /^incise capture -o look/d; s/^incise calibrate check$/& --only force,tip,delay,stepper/' commands
+	fi
+	bash -euo pipefail commands >out 2>err </dev/null || complain "$(tail -n 5 out err)"
+	# the liver's force at 5 mm and 20 mm/s, as its formula has it (incise/sim.h)
+	truth=$(awk 'BEGIN { d = 5; v = 20; print (0.045 * d + 0.0028 * d * d) * (1 + 0.35 * v / (v + 15)) }')
+	read -r force sd < <(echo '5 20' | incise eval liver.fis --sd)
+	# within its own 95 % interval
+	holds "$force - $truth < 2 * $sd && $truth - $force < 2 * $sd"
+	# mV/N, mm/px and ms that the virtual rig has (incise/sim.h)
+	force_mV_N=$(sed -n 's/^force_mV_N *= *\([0-9.]*\);.*/\1/p' calibration.conf)
+	holds "$force_mV_N > 1240 - 5 && $force_mV_N < 1240 + 5"
+	grep -q "liver.rec: complete: all is there" out
+	grep -q "certified to 0\.0" out
+	grep -q "^liver: running since" out
+	[ "$(awk -F, 'NR > 1' felt.csv | wc -l)" -gt 100000 ]
+	if [ "${has_pictures-}" ] && [ -x "$INCISE_BUILD/bin/incise-view" ]; then
+		commands_in "$page" "virtual rig with a screen's libraries" >commands
+		run bash -euo pipefail commands
+		if [ "$status" -ne 0 ]; then
+			[[ "$output" == *OpenGL* ]] || complain "$output"
+		else
+			[ "$(find frames -name '*.png' | wc -l)" -ge 10 ]
+		fi
+	fi
+}
+
+@test "what the documents link to is there" {
+	cd "$root/doc"
+	for document in *.md ../README.md ../CONTRIBUTING.md ../CHANGELOG.md; do
+		[ -f "$document" ] || complain "$document is not there"
+		for link in $(grep -oE '\]\([^)]*\)' "$document" | sed 's/](//; s/)$//; s/#.*//' |
+			grep -v '^https*:' | sort -u); do
+			[ -e "$(dirname "$document")/$link" ] || complain "$document: $link"
+		done
+	done
+}
+
+@test "options in the tutorial are options of their programs" {
+	# "incise calibrate force --scale": each --option stands in that program's --help
+	grep -oE 'incise [a-z]+( [a-z-]+)?( [^`|]*)?' "$root"/doc/*.md "$root/README.md" -h |
+		grep -e ' --' >lines
+	[ "$(wc -l <lines)" -ge 20 ]
+	while read -r line; do
+		line=${line%%#*}
+		read -r _ verb word _ <<<"$line"
+		[ -x "$INCISE_BUILD/bin/incise-$verb" ] || continue
+		[ ! -x "$INCISE_BUILD/bin/incise-$verb-$word" ] || verb=$verb-$word
+		"incise-$verb" --help >help
+		for option in $(grep -oE -- '--[a-z][a-z-]*' <<<"$line"); do
+			grep -qE -- "$option([ =,]|$)" help || complain "incise-$verb has no $option: $line"
+		done
+	done <lines
+}
