@@ -18,9 +18,11 @@ extra_info := $(demo_pictures) $(addprefix $(O)/obj/tools/,stepper_module.o step
 calibrate_all := $(addprefix $(O)/obj/tools/,calibrate_wish.o calibrate_report.o \
 	calibrate_result.o picture.o)
 extra_calibrate-tip := $(calibrate_all) $(O)/obj/tools/tip_poses.o
-extra_calibrate-delay := $(calibrate_all) $(O)/obj/tools/delay_streams.o
+extra_calibrate-delay := $(calibrate_all) $(addprefix $(O)/obj/tools/,delay_streams.o \
+	recording_folder.o)
 extra_train := $(addprefix $(O)/obj/tools/,train_wish.o train_side.o train_report.o)
-extra_capture := $(addprefix $(O)/obj/tools/,capture_view.o keyboard.o stopwatch.o stream_report.o)
+extra_capture := $(addprefix $(O)/obj/tools/,capture_wish.o capture_view.o capture_report.o \
+	recording_folder.o keyboard.o stopwatch.o stream_report.o)
 extra_stepper := $(addprefix $(O)/obj/tools/,stepper_motion.o stepper_drive.o \
 	stepper_status.o stepper_counters.o)
 extra_calibrate-stepper := $(calibrate_all) $(addprefix $(O)/obj/tools/,\

@@ -18,6 +18,7 @@
 #include "delay_streams.h"
 #include "json.h"
 #include "picture.h"
+#include "recording_folder.h"
 
 /* A drift that is this many times its uncertainty is real. */
 #define DRIFT_SIGMAS 4
@@ -112,21 +113,13 @@ static void take_options(struct wish *wish, int argc, char **argv)
 /* What is there of a recording, whole or interrupted. */
 static void remove_recording(const char *path)
 {
-	static const char *const files[] = {"recording.db", "recording.db-wal",
-					    "recording.db-shm", "camera.mkv", ""};
+	char *part;
 
-	for (size_t i = 0; i < 2 * sizeof(files) / sizeof(*files); i++) {
-		char *file;
-
-		if (asprintf(&file, "%s%s/%s", path, i % 2 ? ".part" : "", files[i / 2]) <
-		    0)
-			cli_fail("no memory");
-		if (*files[i / 2])
-			unlink(file);
-		else
-			rmdir(file);
-		free(file);
-	}
+	if (asprintf(&part, "%s.part", path) < 0)
+		cli_fail("no memory");
+	recording_folder_remove(path);
+	recording_folder_remove(part);
+	free(part);
 }
 
 static void record_now(const struct wish *wish, struct delay_stream *streams)

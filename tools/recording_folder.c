@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The folder of a recording; see recording_folder.h.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "cli.h"
+#include "recording_folder.h"
+
+void recording_folder_remove(const char *path)
+{
+	static const char *const files[] = {"recording.db", "recording.db-wal",
+					    "recording.db-shm", "recording.db-journal",
+					    "camera.mkv"};
+	int folder = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+
+	if (folder < 0 && errno == ENOENT)
+		return;
+	if (folder < 0)
+		cli_fail("%s: cannot be replaced: %s", path, strerror(errno));
+	if (flock(folder, LOCK_EX | LOCK_NB) && errno == EWOULDBLOCK)
+		cli_fail(
+			"%s: another incise capture is writing it; end that one, or take "
+			"another name",
+			path);
+	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
+		if (unlinkat(folder, files[i], 0) && errno != ENOENT)
+			cli_fail("%s/%s: cannot be removed: %s", path, files[i],
+				 strerror(errno));
+	close(folder);
+	if (rmdir(path))
+		cli_fail("%s: cannot be removed: %s", path, strerror(errno));
+}
+
+void recording_folder_check(const char *path)
+{
+	char file[PATH_MAX];
+	struct stat st;
+
+	if (lstat(path, &st)) {
+		if (errno == ENOENT)
+			return;
+		cli_fail("%s: %s", path, strerror(errno));
+	}
+	snprintf(file, sizeof(file), "%s/recording.db", path);
+	if (!S_ISDIR(st.st_mode) || (access(file, F_OK) && rmdir(path)))
+		cli_fail(
+			"%s: is no recording, so --force does not replace it; take another "
+			"name",
+			path);
+}
+
+void recording_folder_replace(const char *new, const char *path)
+{
+	if (access(path, F_OK)) {
+		if (rename(new, path))
+			cli_fail("%s: %s; the recording is in %s", path, strerror(errno),
+				 new);
+		return;
+	}
+	if (renameat2(AT_FDCWD, new, AT_FDCWD, path, RENAME_EXCHANGE)) {
+		if (errno != EINVAL && errno != ENOSYS)
+			cli_fail("%s: %s; the recording is in %s", path, strerror(errno),
+				 new);
+		recording_folder_remove(path); /* a file system without that call */
+		if (rename(new, path))
+			cli_fail("%s: %s; the recording is in %s", path, strerror(errno),
+				 new);
+		return;
+	}
+	recording_folder_remove(new);
+}
