@@ -1,23 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * From a camera to its file; see frame_pump.h.
- *
- * What passes between threads is in rings, in atomics, or (errors) written once before the
- * atomic that says so. A semaphore wakes who waits for pictures: to post it never blocks.
+ * From a camera to its file: beginning and end; see frame_pump.h.
  */
 #include <errno.h>
 #include <math.h>
-#include <pthread.h>
-#include <semaphore.h>
 #include <signal.h>
-#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include "../base/ring.h"
 #include "../device/thread.h"
-#include "frame_pump.h"
-#include "frame_slots.h"
+#include "frame_pump_threads.h"
 
 #define SLOTS_S 2.5 /* an fdatasync(2) that takes 0.3 s, several times over */
 #define SLOTS_MIN 16
@@ -25,313 +17,8 @@
 #define RECORDS 8192 /* more than a minute of 120 Hz */
 /* Read so often in a period, but for the sake of the computer not more than 4 kHz. */
 #define READS 8
-#define NAP_MIN_NS 250000LL
 #define NAP_MAX_NS 4000000LL
 #define PATIENCE_NS (5 * INCISE_NS_PER_S)
-
-struct looked {
-	uint64_t order;
-	double length_px, sd_px, depth_mm, quality;
-};
-
-/* As it goes through the ring of records. */
-struct written {
-	uint64_t order;
-	bool looked_at;
-	struct incise_frame_record record;
-};
-
-struct incise_frame_pump {
-	struct incise_frame_pump_setup setup;
-	int64_t nap_ns;
-	struct incise_frame_slots slots, vision_slots;
-	struct incise_ring records, results;
-	sem_t filled, vision_filled, ended;
-	pthread_t camera_thread, file_thread, vision_thread;
-	bool camera_runs, file_runs, vision_runs;
-	bool real_time, stopped, leaked;
-	atomic_bool stop, drain, give_up;
-
-	/* The camera thread's. */
-	uint64_t order, lost_before;
-	bool begun;
-	int64_t begun_ns; /* by the clock */
-
-	/* Errors are whole before their flag is set. */
-	struct incise_error camera_error, file_error;
-	atomic_bool camera_ended, file_failed;
-
-	_Atomic uint64_t read, written, lost, dropped, unwritten, unlooked, unrecorded,
-		waiting_most;
-	_Atomic int64_t bytes;
-
-	uint64_t unanswered; /* pictures that waited when the disk was given up */
-
-	/* take()'s. */
-	struct written next;
-	struct looked result;
-	bool has_next, has_result;
-};
-
-static void count(_Atomic uint64_t *n)
-{
-	atomic_fetch_add_explicit(n, 1, memory_order_relaxed);
-}
-
-static bool is(atomic_bool *flag)
-{
-	return atomic_load_explicit(flag, memory_order_acquire);
-}
-
-static void say(atomic_bool *flag)
-{
-	atomic_store_explicit(flag, true, memory_order_release);
-}
-
-static void nap(int64_t ns)
-{
-	struct timespec time = {ns / INCISE_NS_PER_S, ns % INCISE_NS_PER_S};
-
-	clock_nanosleep(CLOCK_MONOTONIC, 0, &time, NULL);
-}
-
-/* --- camera ------------------------------------------------------------------------ */
-
-/* Copy a picture to whoever is to have it. @wait: until there is room. */
-static void hand_on(struct incise_frame_pump *p, const struct incise_camera_frame *frame,
-		    int64_t arrival_ns, bool wait)
-{
-	struct incise_frame_slot slot = {
-		.frame = *frame,
-		.arrival_ns = arrival_ns,
-		.order = p->order,
-	};
-	uint64_t waiting;
-
-	while (wait && !incise_frame_slots_room(&p->slots) && !is(&p->file_failed))
-		nap(NAP_MIN_NS);
-	while (wait && p->vision_runs && !incise_frame_slots_room(&p->vision_slots))
-		nap(NAP_MIN_NS);
-	if (is(&p->file_failed)) {
-		count(&p->unwritten);
-		return;
-	}
-	if (!incise_frame_slots_room(&p->slots) || frame->size > p->slots.size) {
-		count(&p->dropped);
-		return;
-	}
-	if (p->vision_runs) {
-		slot.looked_at = incise_frame_slots_put(&p->vision_slots, &slot);
-		if (slot.looked_at)
-			sem_post(&p->vision_filled);
-		else
-			count(&p->unlooked);
-	}
-	incise_frame_slots_put(&p->slots, &slot);
-	sem_post(&p->filled);
-	p->order++;
-	waiting = incise_frame_slots_wait(&p->slots);
-	if (waiting > atomic_load_explicit(&p->waiting_most, memory_order_relaxed))
-		atomic_store_explicit(&p->waiting_most, waiting, memory_order_relaxed);
-}
-
-static int step(struct incise_frame_pump *p, bool wait)
-{
-	struct incise_camera_frame frame;
-	char text[sizeof(p->camera_error.text)];
-	int rc;
-
-	if (is(&p->camera_ended))
-		return -p->camera_error.code;
-	rc = incise_camera_read(p->setup.camera, &frame);
-	if (rc < 0) {
-		incise_camera_cause(p->setup.camera, text, sizeof(text));
-		incise_error_set(&p->camera_error, -rc, "%s",
-				 *text ? text : strerror(-rc));
-		say(&p->camera_ended);
-		return rc;
-	}
-	if (!rc)
-		return 0;
-	/* What was shot before it began was not asked for, and lost by nobody. */
-	if (!p->begun) {
-		p->lost_before = incise_camera_lost(p->setup.camera);
-		if (frame.t_ns < p->begun_ns)
-			return 1;
-	}
-	p->begun = true;
-	count(&p->read);
-	hand_on(p, &frame, incise_clock_now(p->setup.clock), wait);
-	atomic_store_explicit(&p->lost,
-			      incise_camera_lost(p->setup.camera) - p->lost_before,
-			      memory_order_relaxed);
-	return 1;
-}
-
-static void *camera_run(void *argument)
-{
-	struct incise_frame_pump *p = argument;
-	int rc = 0;
-
-	while (rc >= 0 && !is(&p->stop)) {
-		rc = step(p, false);
-		if (!rc)
-			nap(p->nap_ns);
-	}
-	return NULL;
-}
-
-int incise_frame_pump_step(struct incise_frame_pump *pump)
-{
-	return pump->camera_runs || pump->stopped ? 0 : step(pump, true);
-}
-
-/* --- file -------------------------------------------------------------------------- */
-
-static void put(struct incise_frame_pump *p, const struct incise_frame_slot *slot)
-{
-	struct incise_frames_stored stored;
-	struct incise_error err = {0};
-	struct written written;
-	int rc;
-
-	if (is(&p->file_failed) || is(&p->give_up)) {
-		count(&p->unwritten);
-		return;
-	}
-	rc = incise_frames_put(p->setup.writer, &slot->frame, &stored, &err);
-	if (rc) {
-		count(&p->unwritten);
-		/* EINVAL: a picture that is not as the camera said; the next may be. */
-		if (rc == -EINVAL)
-			return;
-		p->file_error = err;
-		say(&p->file_failed);
-		return;
-	}
-	written = (struct written){
-		.order = slot->order,
-		.looked_at = slot->looked_at,
-		.record =
-			{
-				.seq = slot->frame.seq,
-				.t_ns = slot->frame.t_ns,
-				.arrival_ns = slot->arrival_ns,
-				.pts_ms = stored.pts_ms,
-				.bytes = stored.bytes,
-				.crc = stored.crc,
-				.length_px = NAN,
-				.sd_px = NAN,
-				.depth_mm = NAN,
-				.quality = NAN,
-			},
-	};
-	count(&p->written);
-	atomic_fetch_add_explicit(&p->bytes, stored.bytes, memory_order_relaxed);
-	if (!incise_ring_put(&p->records, &written))
-		count(&p->unrecorded);
-}
-
-static void *file_run(void *argument)
-{
-	struct incise_frame_pump *p = argument;
-	const struct incise_frame_slot *slot;
-	struct incise_error err = {0};
-	int rc;
-
-	for (;;) {
-		/* Read before looking: what was put before it is seen. */
-		bool last = is(&p->drain);
-
-		while ((slot = incise_frame_slots_oldest(&p->slots))) {
-			put(p, slot);
-			incise_frame_slots_drop(&p->slots);
-		}
-		if (last)
-			break;
-		while (sem_wait(&p->filled))
-			;
-	}
-	rc = incise_frames_writer_close(p->setup.writer, &err);
-	if (rc && !is(&p->file_failed)) {
-		p->file_error = err;
-		say(&p->file_failed);
-	}
-	sem_post(&p->ended);
-	return NULL;
-}
-
-/* --- vision ------------------------------------------------------------------------ */
-
-static void *vision_run(void *argument)
-{
-	struct incise_frame_pump *p = argument;
-	const struct incise_frame_slot *slot;
-
-	for (;;) {
-		bool last = is(&p->drain);
-
-		while ((slot = incise_frame_slots_oldest(&p->vision_slots))) {
-			struct incise_vision_result seen = {0};
-			struct looked looked = {slot->order, NAN, NAN, NAN, 0};
-
-			if (!incise_vision_measure(p->setup.vision, &slot->frame,
-						   &seen) &&
-			    seen.found)
-				looked = (struct looked){slot->order, seen.length_px,
-							 seen.sd_px, seen.depth_mm,
-							 seen.quality};
-			incise_ring_put(&p->results, &looked);
-			incise_frame_slots_drop(&p->vision_slots);
-		}
-		if (last)
-			return NULL;
-		while (sem_wait(&p->vision_filled))
-			;
-	}
-}
-
-/*
- * Join what was seen to a record. False: it is not known yet. Both rings are in order, and
- * what has no partner (a picture that was not written) is passed over.
- */
-static bool join(struct incise_frame_pump *p, struct written *written)
-{
-	if (!written->looked_at)
-		return true;
-	while (!p->has_result || p->result.order < written->order) {
-		p->has_result = incise_ring_take(&p->results, &p->result, 1) == 1;
-		if (!p->has_result)
-			return p->stopped;
-	}
-	if (p->result.order != written->order)
-		return true;
-	p->has_result = false;
-	written->record.length_px = p->result.length_px;
-	written->record.sd_px = p->result.sd_px;
-	written->record.depth_mm = p->result.depth_mm;
-	written->record.quality = p->result.quality;
-	return true;
-}
-
-int incise_frame_pump_take(struct incise_frame_pump *pump,
-			   struct incise_frame_record *records, int n)
-{
-	int taken = 0;
-
-	while (taken < n) {
-		if (!pump->has_next)
-			pump->has_next =
-				incise_ring_take(&pump->records, &pump->next, 1) == 1;
-		if (!pump->has_next || !join(pump, &pump->next))
-			break;
-		pump->has_next = false;
-		records[taken++] = pump->next.record;
-	}
-	return taken;
-}
-
-/* --- beginning and end ------------------------------------------------------------- */
 
 void incise_frame_pump_stats(struct incise_frame_pump *p,
 			     struct incise_frame_pump_stats *stats)
@@ -350,9 +37,9 @@ void incise_frame_pump_stats(struct incise_frame_pump *p,
 		.bytes = p->bytes,
 		.real_time = p->real_time,
 	};
-	if (is(&p->camera_ended))
+	if (frame_pump_is(&p->camera_ended))
 		stats->camera = p->camera_error;
-	if (is(&p->file_failed))
+	if (frame_pump_is(&p->file_failed))
 		stats->file = p->file_error;
 }
 
@@ -398,27 +85,28 @@ static int make(struct incise_frame_pump *p)
 	} else {
 		slots = 150; /* a camera that does not say is taken for one of 60 Hz */
 	}
-	if (p->nap_ns < NAP_MIN_NS)
-		p->nap_ns = p->nap_ns ? NAP_MIN_NS : NAP_MAX_NS / 2;
+	if (p->nap_ns < FRAME_PUMP_NAP_NS)
+		p->nap_ns = p->nap_ns ? FRAME_PUMP_NAP_NS : NAP_MAX_NS / 2;
 	if (p->nap_ns > NAP_MAX_NS)
 		p->nap_ns = NAP_MAX_NS;
 	rc = incise_frame_slots_init(&p->slots, size, slots);
 	if (!rc)
-		rc = incise_ring_init(&p->records, sizeof(struct written), RECORDS);
+		rc = incise_ring_init(&p->records, sizeof(struct frame_written), RECORDS);
 	if (!rc && p->setup.vision)
 		rc = incise_frame_slots_init(&p->vision_slots, size, VISION_SLOTS);
 	if (!rc && p->setup.vision)
-		rc = incise_ring_init(&p->results, sizeof(struct looked), RECORDS);
+		rc = incise_ring_init(&p->results, sizeof(struct frame_looked), RECORDS);
 	if (rc)
 		return rc;
-	rc = start(&p->file_thread, file_run, p);
+	rc = start(&p->file_thread, incise_frame_pump_file, p);
 	p->file_runs = !rc;
 	if (!rc && p->setup.vision) {
-		rc = start(&p->vision_thread, vision_run, p);
+		rc = start(&p->vision_thread, incise_frame_pump_vision, p);
 		p->vision_runs = !rc;
 	}
 	if (!rc && incise_clock_is_real(p->setup.clock)) {
-		rc = incise_thread_start(&p->camera_thread, camera_run, p, &p->real_time);
+		rc = incise_thread_start(&p->camera_thread, incise_frame_pump_camera, p,
+					 &p->real_time);
 		p->camera_runs = !rc;
 	}
 	return rc;
@@ -480,16 +168,16 @@ int incise_frame_pump_stop(struct incise_frame_pump *p, int64_t patience_ns,
 {
 
 	if (!p->stopped) {
-		say(&p->stop);
+		frame_pump_say(&p->stop);
 		if (p->camera_runs)
 			pthread_join(p->camera_thread, NULL);
-		say(&p->drain);
+		frame_pump_say(&p->drain);
 		sem_post(&p->filled);
 		sem_post(&p->vision_filled);
 		if (p->file_runs && !wait_for_file(p, patience_ns)) {
 			p->unanswered = incise_frame_slots_wait(&p->slots);
 			/* It may sit in write(2) for ever, with memory of ours. */
-			say(&p->give_up);
+			frame_pump_say(&p->give_up);
 			pthread_detach(p->file_thread);
 			p->leaked = true;
 		} else if (p->file_runs) {
@@ -505,7 +193,7 @@ int incise_frame_pump_stop(struct incise_frame_pump *p, int64_t patience_ns,
 			"camera: disk or coder did not get on; %llu pictures "
 			"are not written",
 			(unsigned long long)p->unanswered);
-	if (is(&p->file_failed)) {
+	if (frame_pump_is(&p->file_failed)) {
 		if (err)
 			*err = p->file_error;
 		errno = p->file_error.code;
