@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../base/ascending.h"
 #include "delay.h"
 
 #define MOTION_MIN_MM 1.0
@@ -123,13 +124,6 @@ static bool refine(struct delay *d, struct delay_tangent *t)
 }
 
 /* --- the whole ------------------------------------------------------------------------- */
-
-static int ascending(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
 
 static int measure_motion(struct delay *d, struct incise_error *err)
 {

@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../base/ascending.h"
 #include "delay.h"
 
 #define NS_PER_STEP 4000000LL
@@ -22,13 +23,6 @@
 #define SPEED_REACH 12 /* ±48 ms: less noise than of ±20 ms, which biased by 0.18 ms */
 
 #define GAP_PERIODS 4 /* farther apart, points have nothing to say of what is between */
-
-static int ascending(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
 
 /* Median time between points, ns; negative where they do not ascend. */
 static double period_of(const struct incise_delay_point *points, int n)

@@ -12,6 +12,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 #include <incise/calibrate_delay.h>
+#include "../base/ascending.h"
 
 #define TIME_MAX_NS (INT64_MAX / 4)
 #define EDGES_MIN 10
@@ -20,13 +21,6 @@
 #define LEVEL_MAX 200	  /* values that a level is the median of */
 #define STEP_MIN 5	  /* times what the levels scatter */
 #define FAR 5
-
-static int ascending(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
 
 /* Median of some values, and how they scatter. */
 static double median(double *values, int n, double *scatter)

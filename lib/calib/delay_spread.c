@@ -6,18 +6,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../base/ascending.h"
 #include "delay.h"
 
 #define BLOCK_S 1.0
 #define BLOCKS_MIN 7
 #define DRAWS 400
-
-static int ascending(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
 
 /* Standard deviation of `value` n times; few blocks have Student's tails, k = 2 holds them. */
 static double spread(const double *value, int n, int blocks)

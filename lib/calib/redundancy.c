@@ -11,6 +11,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <incise/redundancy.h>
+#include "../base/ascending.h"
 #include "robust_line.h"
 
 #define RATE_MM_S 20 /* 1 ms of error of time is 0.02 mm then, a tracker's noise */
@@ -32,18 +33,11 @@ void incise_redundancy_limits_init(struct incise_redundancy_limits *limits)
 	*limits = (struct incise_redundancy_limits){0.5, 0.3, 0.02};
 }
 
-static int by_size(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
 static double median(const double *values, int n, double *room)
 {
 	for (int i = 0; i < n; i++)
 		room[i] = values[i];
-	qsort(room, n, sizeof(*room), by_size);
+	qsort(room, n, sizeof(*room), ascending);
 	return n % 2 ? room[n / 2] : 0.5 * (room[n / 2 - 1] + room[n / 2]);
 }
 

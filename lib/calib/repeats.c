@@ -4,21 +4,15 @@
  */
 #include <math.h>
 #include <stdlib.h>
+#include "../base/ascending.h"
 #include "repeats.h"
 
 #define FEW 20
 #define LAGS_MAX 200 /* four seconds of pictures */
 
-static int compare(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
 double repeats_median(double *values, int n)
 {
-	qsort(values, n, sizeof(*values), compare);
+	qsort(values, n, sizeof(*values), ascending);
 	return (values[n / 2] + values[(n - 1) / 2]) / 2;
 }
 

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include "../base/ascending.h"
 #include "robust_line.h"
 
 /* Through every two of up to 150 points; of more points, so many lines. */
@@ -26,13 +27,6 @@ static double far_of(int freedom)
 	return sqrt(v * expm1(z * z / v));
 }
 
-static int by_size(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
 /*
  * Of few points, half of them always lie on some line by luck, and make the others look far:
  * there three quarters are to be near it.
@@ -48,7 +42,7 @@ static double median_distance(const double *x, const double *y, int n, double sl
 {
 	for (int i = 0; i < n; i++)
 		room[i] = fabs(y[i] - zero - slope * x[i]);
-	qsort(room, n, sizeof(*room), by_size);
+	qsort(room, n, sizeof(*room), ascending);
 	return room[quantile(n)];
 }
 

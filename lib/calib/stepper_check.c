@@ -6,17 +6,11 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include "../base/ascending.h"
 #include "stepper_work.h"
 
 #define BLOCKS 8  /* of the range, that are looked at one by one */
 #define SLIP 0.01 /* of full scale, that strokes of one way may be apart */
-
-static int by_size(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
 
 /* Noise is what three points in a row are off a line; the force has to go much further. */
 int incise_stepper_check_moves(const struct stepper_work *w, struct incise_error *err)
@@ -30,11 +24,11 @@ int incise_stepper_check_moves(const struct stepper_work *w, struct incise_error
 		room[m++] = fabs(w->points[i - 1].force_N - 2 * w->points[i].force_N +
 				 w->points[i + 1].force_N) /
 			    sqrt(6);
-	qsort(room, m, sizeof(*room), by_size);
+	qsort(room, m, sizeof(*room), ascending);
 	noise = fmax(1.4826 * room[m / 2], w->setup->resolution_N);
 	for (int i = 0; i < w->n; i++)
 		room[i] = w->points[i].force_N;
-	qsort(room, w->n, sizeof(*room), by_size);
+	qsort(room, w->n, sizeof(*room), ascending);
 	spread = room[w->n - 1 - w->n / 10] - room[w->n / 10];
 	free(room);
 	if (spread > 10 * noise)
@@ -48,7 +42,7 @@ int incise_stepper_check_moves(const struct stepper_work *w, struct incise_error
 
 static double median(double *values, int n)
 {
-	qsort(values, n, sizeof(*values), by_size);
+	qsort(values, n, sizeof(*values), ascending);
 	return values[n / 2];
 }
 

@@ -8,19 +8,13 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include "../base/ascending.h"
 #include "stepper_work.h"
 
 #define PAIRS 4000
 #define ROUNDS 10
 /* A good reading in 150000 lies as far off as this many sd. */
 #define FAR 4.5
-
-static int by_size(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
 
 double incise_stepper_off(const struct stepper_work *w, const struct stroke *stroke,
 			  int i)
@@ -73,7 +67,7 @@ static int slope_of_pairs(struct stepper_work *w, double *room)
 	}
 	if (n < 10)
 		return -EDOM;
-	qsort(room, n, sizeof(*room), by_size);
+	qsort(room, n, sizeof(*room), ascending);
 	w->slope = room[n / 2];
 	return 0;
 }
@@ -93,7 +87,7 @@ static int medians(struct stepper_work *w, double *room)
 				room[n++] = incise_stepper_off(w, s, i);
 		if (n < 4)
 			return -EDOM;
-		qsort(room, n, sizeof(*room), by_size);
+		qsort(room, n, sizeof(*room), ascending);
 		s->zero_N = n % 2 ? room[n / 2] : (room[n / 2 - 1] + room[n / 2]) / 2;
 	}
 	for (int k = 0; k < w->n_strokes; k++)
@@ -101,7 +95,7 @@ static int medians(struct stepper_work *w, double *room)
 			if (w->states[i] == INCISE_CALIBRATE_STEPPER_USED)
 				room[all++] =
 					fabs(incise_stepper_off(w, &w->strokes[k], i));
-	qsort(room, all, sizeof(*room), by_size);
+	qsort(room, all, sizeof(*room), ascending);
 	w->sd = 1.4826 * room[all / 2];
 	return 0;
 }

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../base/ascending.h"
 #include "tip.h"
 
 #define STARTS 60
@@ -21,13 +22,6 @@
  */
 #define MEDIAN_LENGTH 1.538
 #define FAR 5.0
-
-static int ascending(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
 
 /* The same sequence each time: a fit is to be repeatable. */
 static unsigned int draw(uint64_t *state, unsigned int n)

@@ -11,14 +11,8 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include "../base/ascending.h"
 #include "posterior.h"
-
-static int ascending(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
 
 /* The 97.5 % quantile of Student's t, to 0.1 %. */
 static double student(int freedom)
