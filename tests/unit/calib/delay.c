@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Delays of streams of one motion: truth within the stated intervals, with stiffness and
- * viscosity that are not known; each motion that cannot tell is refused with its reason; and
- * pulses. An argument is the number of data sets, 200 or what is given.
+ * viscosity that are not known; each motion that cannot tell is refused with its reason. An
+ * argument is the number of data sets, 200 or what is given.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -263,56 +263,6 @@ static void test_refusals(void **state)
 	assert_int_equal(fit(INCISE_DELAY_FORCE, 100, &f, &err), -EINVAL);
 }
 
-/* Steps at edges, seen by a camera: means of 20 ms, some of them lost, one misled. */
-static void test_pulse(void **state)
-{
-	int in = 0;
-	double worst = 0;
-
-	for (int run = 1; run <= 200; run++) {
-		int64_t edges[60];
-		struct incise_delay_fit f;
-		struct incise_error err;
-		double delay_ms;
-
-		seed = (uint64_t)run;
-		delay_ms = 30 * uniform();
-		for (int i = 0; i < 60; i++)
-			edges[i] = 1000000000LL + i * 263000000LL +
-				   (int64_t)(37e6 * uniform());
-		n_other = 850;
-		for (int i = 0; i < n_other; i++) {
-			int on = 0;
-
-			other[i].t_ns = 900000000LL + i * 20000000LL;
-			for (int e = 0; e < 60; e++)
-				on += (double)edges[e] + delay_ms * 1e6 <
-				      (double)other[i].t_ns;
-			other[i].value = 100 * (on % 2) + normal();
-		}
-		assert_int_equal(incise_calibrate_delay_pulse(edges, 60, other, n_other,
-							      &f, &err),
-				 0);
-		in += fabs(f.delay_ms - delay_ms) <= 1.96 * f.sd_ms;
-		worst = fmax(worst, fabs(f.delay_ms - delay_ms) / f.sd_ms);
-	}
-	print_message("pulse: the interval holds %.1f %%, farthest %.1f sd\n", in / 2.0,
-		      worst);
-	assert_in_range(in, 184, 196);
-	struct incise_delay_fit f;
-	struct incise_error err;
-	int64_t none[20];
-
-	for (int i = 0; i < 20; i++)
-		none[i] = 1000000000LL + i * 100000000LL;
-	/* noise takes a step here and there, by chance */
-	for (int i = 0; i < n_other; i++)
-		other[i].value = 1;
-	assert_int_equal(incise_calibrate_delay_pulse(none, 20, other, n_other, &f, &err),
-			 -EDOM);
-	assert_non_null(strstr(err.text, "edges"));
-}
-
 int main(int argc, char **argv)
 {
 	const struct CMUnitTest tests[] = {
@@ -320,7 +270,6 @@ int main(int argc, char **argv)
 		cmocka_unit_test(test_camera_intervals),
 		cmocka_unit_test(test_drift),
 		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_pulse),
 	};
 
 	if (argc > 1)
