@@ -3,6 +3,8 @@
  * What lens and pose say of the cutting plane; see board.h. Every figure is a function of
  * the lens and of the pose in the plane, 14 numbers; its variance is gᵀ C g with a gradient
  * by differences of a tenth of each number's own standard deviation.
+ *
+ * A part of one noun: tests/unit/calib/board.c tests it through its door.
  */
 #include <math.h>
 #include <string.h>

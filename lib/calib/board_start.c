@@ -7,6 +7,8 @@
  *
  *     w (h11 h12 + h21 h22) + h31 h32 = 0
  *     w (h11² + h21² - h12² - h22²) + h31² - h32² = 0
+ *
+ * A part of one noun: tests/unit/calib/board.c tests it through its door.
  */
 #include <errno.h>
 #include <math.h>

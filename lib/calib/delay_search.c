@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * A delay roughly: the peak of the correlation, and where the contact begins; see delay.h.
+ *
+ * A part of one noun: tests/unit/calib/delay.c tests it through its door.
  */
 #include <errno.h>
 #include <math.h>

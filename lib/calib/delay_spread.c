@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * How well a delay is known: blocks of the run, drawn again and again; see delay.h.
+ *
+ * A part of one noun: tests/unit/calib/delay.c tests it through its door.
  */
 #include <errno.h>
 #include <math.h>

@@ -3,6 +3,8 @@
  * What is told of a force channel beside its line, in the words of ISO 376: linearity,
  * hysteresis, repeatability, zero return. In percent of full scale, the reading of the largest
  * load above the zero.
+ *
+ * A part of one noun: tests/unit/calib/force.c tests it through its door.
  */
 #include <math.h>
 #include "force_work.h"

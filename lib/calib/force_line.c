@@ -5,6 +5,8 @@
  * The readings of a load share the error of the weight, which more readings do not take away:
  * the variance of a load's mean is scatter²/n + (S u_load)², and its inverse the weight. The
  * slope is then S = Σ c_k mean_k, and each source adds by these c_k (GUM, JCGM 100:2008, 5.1.2).
+ *
+ * A part of one noun: tests/unit/calib/force.c tests it through its door.
  */
 #include <math.h>
 #include <stdio.h>

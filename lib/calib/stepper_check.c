@@ -2,6 +2,8 @@
 /*
  * What the calibration of an actuator refuses, each by its own line: a sensor that does not
  * move or does not follow, a reversed sign, lost steps, too small a range, too many outliers.
+ *
+ * A part of one noun: tests/unit/calib/stepper.c tests it through its door.
  */
 #include <errno.h>
 #include <math.h>

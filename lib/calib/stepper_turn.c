@@ -12,6 +12,8 @@
  *
  * Four models, the simple ones first: that turn is just the lines' distance D; a leap; a rest;
  * both. One with more in it has to explain much more.
+ *
+ * A part of one noun: tests/unit/calib/stepper.c tests it through its door.
  */
 #include <errno.h>
 #include <math.h>

@@ -2,6 +2,8 @@
 /*
  * Which poses are about one pivot: least trimmed squares by concentration steps (Rousseeuw
  * and Van Driessen, Data Min. Knowl. Discov. 12, 2006), then all that are near it.
+ *
+ * A part of one noun: tests/unit/calib/tip.c tests it through its door.
  */
 #include <math.h>
 #include <stdlib.h>
