@@ -42,6 +42,9 @@ extra_calibrate-depth := $(calibrate_all) $(addprefix $(O)/obj/tools/,depth_wish
 	depth_picture.o depth_frames.o depth_lengths.o depth_corners.o depth_report.o)
 extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o harness.o figures.o \
 	compare.o \
+extra_calibrate-depth := $(addprefix $(O)/obj/tools/,picture.o depth_picture.o depth_frames.o \
+	depth_lengths.o depth_corners.o depth_report.o)
+extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o harness.o yardstick.o figures.o compare.o \
 	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o stroke.o \
 	bench_tick.o bench_wakeup.o wakeup_run.o bench_rate.o bench_load.o cyclictest.o child.o \
 	memory_file.o loop_picture.o \
@@ -57,7 +60,7 @@ extra_view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o state_pag
 extra_bench-view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o view_script.o \
 	similarity.o picture.o machine.o stopwatch.o memory_file.o bench_view_frames.o \
 	bench_view_error.o bench_view_live.o view_live.o bench_wakeup.o wakeup_run.o \
-	bench_load.o cyclictest.o child.o bench_tick.o tick_cost.o stroke.o harness.o figures.o compare.o)
+	bench_load.o cyclictest.o child.o bench_tick.o tick_cost.o stroke.o harness.o yardstick.o figures.o compare.o)
 
 # What it was built with, for who reads a bench's figures; without the build's own folder.
 $(O)/obj/tools/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \

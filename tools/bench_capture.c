@@ -22,12 +22,14 @@
 #include <incise/vision.h>
 #include "bench_capture.h"
 #include "cli.h"
+#include "figures.h"
 #include "jpeg_camera.h"
 #include "json.h"
 #include "machine.h"
 
-#define SECONDS 10
-#define QUICK_SECONDS 2
+#define SECONDS 7
+#define QUICK_SECONDS 0.8
+#define PARTS 12 /* of a run, for how sure its processor time is */
 #define CAMERA_HZ 60
 #define POLL_NS 10000000LL /* as incise capture */
 #define BATCH 256
@@ -54,6 +56,8 @@ struct run {
 	struct incise_rig *rig;
 	struct incise_recorder *recorder; /* NULL: what is read is dropped */
 	double cpu_percent;
+	double part_percent[PARTS];
+	int parts;
 	double late_ms; /* the latest wake */
 	double held_up; /* share of the time that wakes were late, by a period or more */
 	double rss_MB[2]; /* memory at a quarter of the time, and at its end */
@@ -126,16 +130,28 @@ static double memory_MB(void)
 	return (double)pages * (double)sysconf(_SC_PAGESIZE) / 1e6;
 }
 
+/* Processor time of each part of the run. */
+static void end_part(struct run *run, int64_t now, int64_t *part_begin, double *part_cpu)
+{
+	double cpu = cpu_ns(CLOCK_PROCESS_CPUTIME_ID);
+
+	if (run->parts < PARTS && now > *part_begin)
+		run->part_percent[run->parts++] =
+			100 * (cpu - *part_cpu) / (double)(now - *part_begin);
+	*part_begin = now;
+	*part_cpu = cpu;
+}
+
 /* Opening and closing are not measured: they happen once. */
 static int capture(struct run *run, double seconds, struct incise_error *err)
 {
 	struct incise_clock *clock = incise_rig_clock(run->rig);
-	int64_t length_ns = (int64_t)(seconds * INCISE_NS_PER_S), start, now, next;
-	double cpu, held_up_ns = 0;
+	int64_t length_ns = (int64_t)(seconds * INCISE_NS_PER_S), start, now, next, part;
+	double cpu, part_cpu, held_up_ns = 0;
 	int rc = 0;
 
-	start = now = next = incise_clock_now(clock);
-	cpu = cpu_ns(CLOCK_PROCESS_CPUTIME_ID);
+	start = now = next = part = incise_clock_now(clock);
+	cpu = part_cpu = cpu_ns(CLOCK_PROCESS_CPUTIME_ID);
 	while (!rc && !cli_stop && now - start < length_ns) {
 		next = now > next + POLL_NS ? now : next + POLL_NS;
 		incise_clock_wait_until(clock, next);
@@ -149,6 +165,8 @@ static int capture(struct run *run, double seconds, struct incise_error *err)
 			incise_error_set(err, -rc, "the virtual rig: %s", strerror(-rc));
 		if (!rc && (rc = take_frame(run)))
 			incise_error_set(err, -rc, "a picture: %s", strerror(-rc));
+		if (now - part >= length_ns / PARTS)
+			end_part(run, now, &part, &part_cpu);
 		if (!run->rss_MB[0] && now - start >= length_ns / 4)
 			run->rss_MB[0] = memory_MB();
 	}
@@ -255,7 +273,7 @@ static void run_all(struct run *runs, struct jpeg_camera *camera, const char *on
 	for (int i = 0; i < RUNS && !rc && !cli_stop; i++) {
 		if (only && strcmp(only, parts[i].name))
 			continue;
-		cli_progress("%s, %.0f s", parts[i].name, seconds);
+		cli_progress("%s, %.2g s", parts[i].name, seconds);
 		rc = do_run(&runs[i], &parts[i], camera, folder, seconds, &err);
 		runs[i].done = true;
 	}
@@ -290,7 +308,7 @@ static void print_text(const struct run *runs, const struct machine *machine,
 	size_t bytes = jpeg_camera_bytes(camera, &n);
 
 	printf("%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz, JPEG of %.0f "
-	       "kB; %.0f s each, in real time\n%-15s %6s %6s %9s %5s %8s %5s %7s %5s %8s %7s "
+	       "kB; %.2g s each, in real time\n%-15s %6s %6s %9s %5s %8s %5s %7s %5s %8s %7s "
 	       "%7s\n",
 	       machine->cpu, full->force_info.rate_hz, full->tracker_info.rate_hz,
 	       full->camera_info.width, full->camera_info.height,
@@ -314,8 +332,28 @@ static void print_text(const struct run *runs, const struct machine *machine,
 	       (unsigned long long)full->unlooked);
 }
 
+static json_t *figures_of(const struct run *runs)
+{
+	json_t *figures = figures_new();
+	struct harness_spread cpu, memory;
+
+	for (int i = 0; i < RUNS; i++) {
+		const double *rss = runs[i].rss_MB;
+
+		if (!runs[i].done)
+			continue;
+		harness_spread(runs[i].part_percent, runs[i].parts, &cpu);
+		figures_measured(figures, &cpu, "%", "%s processor", parts[i].name);
+		memory = (struct harness_spread){.median = rss[1],
+						 .low = fmin(rss[0], rss[1]),
+						 .high = fmax(rss[0], rss[1])};
+		figures_measured(figures, &memory, "MB", "%s memory", parts[i].name);
+	}
+	return figures;
+}
+
 static void print_json(const struct run *runs, const struct machine *machine,
-		       double seconds)
+		       double seconds, bool quick)
 {
 	const struct run *full = first(runs);
 	json_t *list = json_array();
@@ -324,8 +362,8 @@ static void print_json(const struct run *runs, const struct machine *machine,
 		if (runs[i].done)
 			json_array_append_new(
 				list,
-				json_pack("{ss so so sI sI sI sI sI sI so so so}", "name",
-					  parts[i].name, "cpu_percent",
+				json_pack("{ss so so sI sI sI sI sI sI so so so sn}",
+					  "name", parts[i].name, "cpu_percent",
 					  json_number(runs[i].cpu_percent), "net_percent",
 					  json_number(net(runs, i)), "force",
 					  (json_int_t)runs[i].force, "force_lost",
@@ -336,14 +374,15 @@ static void print_json(const struct run *runs, const struct machine *machine,
 					  (json_int_t)runs[i].frames_lost, "late_ms",
 					  json_number(runs[i].late_ms), "quarter_MB",
 					  json_number(runs[i].rss_MB[0]), "end_MB",
-					  json_number(runs[i].rss_MB[1])));
-	json_print(json_pack("{so so so so so si si sI so}", "machine",
-			     machine_json(machine), "seconds", json_number(seconds),
-			     "force_hz", json_number(full->force_info.rate_hz),
-			     "tracker_hz", json_number(full->tracker_info.rate_hz),
-			     "camera_hz", json_number(full->camera_info.rate_hz), "width",
-			     full->camera_info.width, "height", full->camera_info.height,
-			     "unlooked", (json_int_t)full->unlooked, "rows", list));
+					  json_number(runs[i].rss_MB[1]), "failed"));
+	json_print(json_pack(
+		"{so sb so so so so si si sI so so}", "machine", machine_json(machine),
+		"quick", quick, "seconds", json_number(seconds), "force_hz",
+		json_number(full->force_info.rate_hz), "tracker_hz",
+		json_number(full->tracker_info.rate_hz), "camera_hz",
+		json_number(full->camera_info.rate_hz), "width", full->camera_info.width,
+		"height", full->camera_info.height, "unlooked",
+		(json_int_t)full->unlooked, "rows", list, "figures", figures_of(runs)));
 }
 
 void bench_capture(const char *only, double seconds, bool json, bool quick)
@@ -364,7 +403,7 @@ void bench_capture(const char *only, double seconds, bool json, bool quick)
 		cli_fail_with(&err);
 	run_all(runs, camera, only, seconds);
 	if (json)
-		print_json(runs, &machine, seconds);
+		print_json(runs, &machine, seconds, quick);
 	else
 		print_text(runs, &machine, seconds, camera);
 	jpeg_camera_free(camera);

@@ -10,12 +10,13 @@
 #include "bench_tick.h"
 #include "bench_wakeup.h"
 #include "cli.h"
+#include "figures.h"
 #include "json.h"
 #include "loop_picture.h"
 #include "machine.h"
 #include "picture.h"
 
-#define AWAKE_S 10
+#define AWAKE_S 5
 #define QUICK_AWAKE_S 0.5
 
 static enum load load_named(const char *name)
@@ -70,15 +71,21 @@ void bench_loop(const struct bench_loop *bench)
 	machine_init(&machine);
 	n = bench_tick(bench->scene, bench->quick, ticks);
 	bench_rate(bench->quick, &rates);
-	bench_wakeup(bench->scene, only, seconds, &wakeups);
+	bench_wakeup(bench->scene, only, bench->quick, seconds, &wakeups);
 	if (bench->json) {
-		json_print(json_pack(
-			"{so so so so so so so}", "machine", machine_json(&machine),
-			"tick_ns", tick_cost_json(&ticks[0].cost), "rows",
-			rows_json(ticks, n), "lateness_us",
-			loop_lateness(&wakeups.row[0]), "cyclictest_us",
-			lateness_json(&wakeups.row[0].got.cyclictest), "wakeups",
-			wakeups_json(&wakeups), "rates", rates_json(&rates)));
+		json_t *figures = figures_new();
+
+		tick_rows_figures(ticks, n, figures);
+		rates_figures(&rates, figures);
+		wakeups_figures(&wakeups, figures);
+		json_print(json_pack("{so sb so so so so so so so}", "machine",
+				     machine_json(&machine), "quick", bench->quick,
+				     "tick_ns", tick_cost_json(&ticks[0].cost), "rows",
+				     rows_json(ticks, n), "lateness_us",
+				     loop_lateness(&wakeups.row[0]), "cyclictest_us",
+				     lateness_json(&wakeups.row[0].got.cyclictest),
+				     "wakeups", wakeups_json(&wakeups), "rates",
+				     rates_json(&rates), "figures", figures));
 	} else {
 		printf("%s, %s\n\n", machine.cpu, machine.kernel);
 		tick_rows_print(ticks, n);

@@ -196,7 +196,10 @@ static void print_json(const struct bench *b, const struct incise_model *model)
 		const char *name = b->all.row[i].name;
 
 		json_array_append_new(rows, row_json(b, i));
-		figures_time(figures, &b->figures[i].time, "ns", "%s", name);
+		/* A peer's hangs on where its heap lies: of one build and model it was
+		 * from 1.7 to 3.5 us, by the process. */
+		if (b->all.row[i].kind != ARITHMETIC_PEER)
+			figures_time(figures, &b->figures[i].time, "ns", "%s", name);
 		figures_exact(figures, b->figures[i].max_error, "N", "%s largest error",
 			      name);
 	}

@@ -23,12 +23,14 @@
 #include <incise/sim.h>
 #include "bench_rate.h"
 #include "cli.h"
+#include "figures.h"
 #include "json.h"
 #include "memory_file.h"
 #include "tick_cost.h"
 
+/* Whole numbers of ns, and multiples of all rates. */
 #define POINT_HZ 64000
-#define POINT_NS (INCISE_NS_PER_S / POINT_HZ) /* 15625, exactly */
+#define QUICK_POINT_HZ 16000
 
 /* Of the stroke's time that the cost of a tick is taken of. */
 #define COST_S 20
@@ -87,13 +89,14 @@ static void exact_info(const struct incise_tracker *tracker,
 struct sums {
 	double command2, rendered2, exact2, slope2;
 	double command_max, rendered_max, before;
+	int point_hz;
 	uint64_t n;
 };
 
 static void add(struct sums *sums, double exact_N, double command_N, double rendered_N)
 {
 	double command = command_N - exact_N, rendered = rendered_N - exact_N;
-	double slope = (exact_N - sums->before) * POINT_HZ;
+	double slope = (exact_N - sums->before) * sums->point_hz;
 
 	if (sums->n++)
 		sums->slope2 += slope * slope;
@@ -119,22 +122,24 @@ static void finish(const struct sums *sums, struct rate_row *row)
 }
 
 /* Returns 0 or a negative errno of a tick. */
-static int cut(struct incise_plan *plan, struct incise_rig *rig, struct rate_row *row)
+static int cut(struct incise_plan *plan, struct incise_rig *rig, int point_hz,
+	       struct rate_row *row)
 {
 	struct incise_clock *clock = incise_rig_clock(rig);
 	struct incise_sim *sim = incise_rig_sim(rig);
 	int64_t start_ns = incise_clock_now(clock);
-	int64_t points = incise_sim_duration(sim) / POINT_NS;
-	int every = (int)(POINT_HZ / row->rate_hz);
+	int64_t point_ns = INCISE_NS_PER_S / point_hz;
+	int64_t points = incise_sim_duration(sim) / point_ns;
+	int every = (int)(point_hz / row->rate_hz);
 	struct incise_tick tick = {0};
-	struct sums sums = {0};
+	struct sums sums = {.point_hz = point_hz};
 
 	for (int64_t k = 1; k <= points; k++) {
 		struct incise_stepper_status status;
 		struct incise_sim_truth truth;
 		int rc = 0;
 
-		incise_clock_wait_until(clock, start_ns + k * POINT_NS);
+		incise_clock_wait_until(clock, start_ns + k * point_ns);
 		if (k % every == 0)
 			rc = incise_plan_tick(plan, incise_clock_now(clock), &tick);
 		if (!rc)
@@ -150,7 +155,7 @@ static int cut(struct incise_plan *plan, struct incise_rig *rig, struct rate_row
 	return 0;
 }
 
-static void run_plan(struct incise_scene *scene, struct incise_rig *rig,
+static void run_plan(struct incise_scene *scene, struct incise_rig *rig, int point_hz,
 		     struct rate_row *row)
 {
 	struct incise_plan_stability stability;
@@ -169,7 +174,7 @@ static void run_plan(struct incise_scene *scene, struct incise_rig *rig,
 	}
 	incise_plan_stability(plan, &stability);
 	row->limit_N_mm = stability.limit_N_mm;
-	rc = cut(plan, rig, row);
+	rc = cut(plan, rig, point_hz, row);
 	if (rc)
 		snprintf(row->failed, sizeof(row->failed), "a tick failed: %s",
 			 strerror(-rc));
@@ -219,7 +224,7 @@ static void measure(const struct series *s, bool quick, struct rate_row *row)
 		incise_rig_tracker(rig)->ops = &tracker.ops;
 	}
 	incise_tracker_info(incise_rig_tracker(rig), &info);
-	run_plan(scene, rig, row);
+	run_plan(scene, rig, quick ? QUICK_POINT_HZ : POINT_HZ, row);
 	if (!*row->failed) {
 		tick_cost(scene, &info, quick ? QUICK_COST_S : COST_S, &cost);
 		row->tick_ns = cost.median;
@@ -277,8 +282,8 @@ json_t *rates_json(const struct rates *rates)
 
 		json_array_append_new(
 			list,
-			json_pack("{ss ss so so so so so so so so so}", "wall", row->wall,
-				  "poses", row->poses, "rate_hz",
+			json_pack("{ss ss so so so so so so so so so so so so so}",
+				  "wall", row->wall, "poses", row->poses, "rate_hz",
 				  json_number(row->rate_hz), "stiffness_N_mm",
 				  json_number(row->stiffness_N_mm), "limit_N_mm",
 				  json_number(row->limit_N_mm), "command",
@@ -286,10 +291,30 @@ json_t *rates_json(const struct rates *rates)
 				  error_json(&row->rendered), "hold_N",
 				  json_number(row->hold_N), "tick_ns",
 				  json_number(row->tick_ns), "ns_per_s",
-				  json_number(row->ns_per_s), "failed",
+				  json_number(row->ns_per_s), "rms_N",
+				  json_number(row->command.rms_N), "max_N",
+				  json_number(row->command.max_N), "rendered_rms_N",
+				  json_number(row->rendered.rms_N), "rendered_max_N",
+				  json_number(row->rendered.max_N), "failed",
 				  *row->failed ? json_text(row->failed) : json_null()));
 	}
 	return list;
+}
+
+void rates_figures(const struct rates *rates, json_t *figures)
+{
+	for (int i = 0; i < rates->n; i++) {
+		const struct rate_row *row = &rates->row[i];
+
+		if (row->rate_hz != 1000)
+			continue;
+		figures_exact(figures, row->command.rms_N, "N",
+			      "%s %s command rms at 1 kHz", row->wall, row->poses);
+		figures_exact(figures, row->rendered.rms_N, "N",
+			      "%s %s rendered rms at 1 kHz", row->wall, row->poses);
+		figures_exact(figures, row->rendered.max_N, "N",
+			      "%s %s rendered largest at 1 kHz", row->wall, row->poses);
+	}
 }
 
 void rates_print(const struct rates *rates)

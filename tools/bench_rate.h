@@ -36,6 +36,8 @@ struct rates {
 void bench_rate(bool quick, struct rates *rates);
 
 json_t *rates_json(const struct rates *rates);
+/* Errors at 1 kHz, and how far they are from those of a hold. */
+void rates_figures(const struct rates *rates, json_t *figures);
 void rates_print(const struct rates *rates);
 
 #endif

@@ -22,6 +22,9 @@
 /* Of the stroke's time, which goes by faster. */
 #define MEASURED_S 60
 #define QUICK_MEASURED_S 4
+#define TURN_TICKS 2000
+#define TURNS 49
+#define QUICK_TURNS 7
 
 static const char all_forces[] =
 	"rate_hz = %.1f;\narithmetic = \"%s\";\n"
@@ -68,27 +71,56 @@ static struct memory_file write_sheet(int cells)
 	return file;
 }
 
-static void measure(const char *path, bool quick, struct tick_row *row)
+static void load(const char *path, struct tick_row *row)
 {
 	struct incise_error err = {0};
-	struct incise_scene *scene;
 	struct incise_plan *plan;
 	double begin = stopwatch_ns();
 
-	scene = incise_scene_load(path, NULL, &err);
-	if (!scene)
+	row->scene = incise_scene_load(path, NULL, &err);
+	if (!row->scene)
 		cli_fail_with(&err);
 	row->load_s = (stopwatch_ns() - begin) * 1e-9;
-	plan = incise_plan_new(scene, NULL, &err);
+	plan = incise_plan_new(row->scene, NULL, &err);
 	if (!plan)
 		cli_fail_with(&err);
 	row->memory = incise_plan_memory(plan);
 	incise_plan_free(plan);
-	tick_cost(scene, NULL, quick ? QUICK_MEASURED_S : MEASURED_S, &row->cost);
-	if (!row->cost.ticks)
-		cli_fail("%s: a stroke over its top met no tissue: nothing to time",
-			 path);
-	incise_scene_free(scene);
+}
+
+static double turn_ns(void *context)
+{
+	static double room[TURN_TICKS];
+	const struct tick_row *row = context;
+
+	/* Caches and branches are those of the ways before. */
+	tick_course_ns(row->course, TURN_TICKS / 4, room);
+	return tick_course_ns(row->course, TURN_TICKS, room);
+}
+
+/* Quantiles of a long run each, and then medians in turn. */
+static void measure(struct tick_row *rows, int n, bool quick)
+{
+	struct harness_timer timers[BENCH_TICK_ROWS];
+	struct harness_time times[BENCH_TICK_ROWS];
+
+	for (int i = 0; i < n; i++) {
+		cli_progress("%s", rows[i].name);
+		tick_cost(rows[i].scene, NULL, quick ? QUICK_MEASURED_S : MEASURED_S,
+			  &rows[i].cost);
+		if (!rows[i].cost.ticks)
+			cli_fail(
+				"%s: a stroke over its top met no tissue: nothing to time",
+				rows[i].name);
+		rows[i].course = tick_course_new(rows[i].scene, NULL, rows[i].cost.tool);
+		timers[i] = (struct harness_timer){turn_ns, &rows[i]};
+	}
+	harness_timers(timers, n, quick ? QUICK_TURNS : TURNS, times);
+	for (int i = 0; i < n; i++) {
+		rows[i].time = times[i];
+		tick_course_free(rows[i].course);
+		incise_scene_free(rows[i].scene);
+	}
 }
 
 static struct memory_file write_scene(int i, const char *sheet, double rate_hz)
@@ -102,7 +134,7 @@ static struct memory_file write_scene(int i, const char *sheet, double rate_hz)
 	return file;
 }
 
-static void measure_own(int i, bool quick, struct tick_row *row)
+static void load_own(int i, struct tick_row *row)
 {
 	struct memory_file sheet = {0}, scene;
 
@@ -112,7 +144,7 @@ static void measure_own(int i, bool quick, struct tick_row *row)
 	scene = write_scene(i, sheet.path, 1000);
 	row->name = own[i].name;
 	row->triangles = 2 * (size_t)own[i].cells * own[i].cells;
-	measure(scene.path, quick, row);
+	load(scene.path, row);
 	fclose(scene.file);
 	if (sheet.file)
 		fclose(sheet.file);
@@ -127,13 +159,12 @@ int bench_tick(const char *scene, bool quick, struct tick_row rows[BENCH_TICK_RO
 {
 	if (scene) {
 		rows[0].name = scene;
-		measure(scene, quick, &rows[0]);
-		return 1;
+		load(scene, &rows[0]);
 	}
-	for (int i = 0; i < OWN; i++)
-		measure_own(i, quick, &rows[i]);
-	cli_progress_end();
-	return OWN;
+	for (int i = 0; i < OWN && !scene; i++)
+		load_own(i, &rows[i]);
+	measure(rows, scene ? 1 : OWN, quick);
+	return scene ? 1 : OWN;
 }
 
 /* ---- report ---- */
@@ -146,10 +177,13 @@ json_t *tick_cost_json(const struct tick_cost *cost)
 
 json_t *tick_row_json(const struct tick_row *row)
 {
-	return json_pack("{so sI sI so si so}", "name", json_text(row->name), "triangles",
-			 (json_int_t)row->triangles, "memory_bytes",
+	return json_pack("{so sI sI so si so so so so sn}", "name", json_text(row->name),
+			 "triangles", (json_int_t)row->triangles, "memory_bytes",
 			 (json_int_t)row->memory, "load_s", json_number(row->load_s),
-			 "ticks", row->cost.ticks, "tick_ns", tick_cost_json(&row->cost));
+			 "ticks", row->cost.ticks, "tick_ns", tick_cost_json(&row->cost),
+			 "ns", json_number(row->time.ns.median), "ns_p5",
+			 json_number(row->time.ns.p5), "ns_p95",
+			 json_number(row->time.ns.p95), "failed");
 }
 
 void tick_rows_print(const struct tick_row *rows, int n)
@@ -160,4 +194,10 @@ void tick_rows_print(const struct tick_row *rows, int n)
 		printf("%-12s %9.0f %9.0f %9.0f %9.1f %10.1f\n", rows[i].name,
 		       rows[i].cost.median, rows[i].cost.p99, rows[i].cost.p999,
 		       rows[i].load_s * 1e3, (double)rows[i].memory / 1024);
+}
+
+void tick_rows_figures(const struct tick_row *rows, int n, json_t *figures)
+{
+	for (int i = 0; i < n; i++)
+		figures_time(figures, &rows[i].time, "ns", "tick %s", rows[i].name);
 }

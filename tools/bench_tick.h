@@ -9,6 +9,7 @@
 #include <jansson.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include "figures.h"
 #include "memory_file.h"
 #include "tick_cost.h"
 
@@ -19,6 +20,10 @@ struct tick_row {
 	size_t memory, triangles;
 	double load_s;
 	struct tick_cost cost;
+	struct harness_time time; /* of a tick, in turn with the others */
+	/* While they are measured: */
+	struct incise_scene *scene;
+	struct tick_course *course;
 };
 
 /* The bench's own scenes, or @scene. Returns how many rows. */
@@ -32,6 +37,7 @@ json_t *tick_row_json(const struct tick_row *row);
 /* {"median", "p99", "p999"} in ns. */
 json_t *tick_cost_json(const struct tick_cost *cost);
 
+void tick_rows_figures(const struct tick_row *rows, int n, json_t *figures);
 void tick_rows_print(const struct tick_row *rows, int n);
 
 #endif

@@ -235,7 +235,7 @@ void bench_view_beside(const char *scene, double seconds, bool quick,
 	for (int i = 0; i < beside->n; i++) {
 		struct wakeups wakeups;
 
-		bench_wakeup(scene, order[i], seconds, &wakeups);
+		bench_wakeup(scene, order[i], false, seconds, &wakeups);
 		beside->run[i] = wakeups.row[0];
 		beside->realtime = wakeups.realtime;
 		if (wakeups.row[0].no_load)

@@ -6,11 +6,13 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <incise/loop.h>
 #include <incise/scene.h>
 #include "bench_tick.h"
 #include "bench_wakeup.h"
 #include "cli.h"
 #include "cyclictest.h"
+#include "figures.h"
 #include "harness.h"
 #include "json.h"
 
@@ -74,7 +76,13 @@ struct incise_realtime *wakeup_realtime(int cpu)
 	return incise_realtime_new(&setup, &ignored);
 }
 
-void bench_wakeup(const char *scene, enum load only, double seconds,
+/* A load takes seconds to begin and to end. */
+static bool of_quick(enum load load, int rate)
+{
+	return (load == LOAD_IDLE || load == LOAD_CPU) && !rate;
+}
+
+void bench_wakeup(const char *scene, enum load only, bool quick, double seconds,
 		  struct wakeups *wakeups)
 {
 	int rates = scene ? 1 : sizeof(own_rates_hz) / sizeof(*own_rates_hz);
@@ -92,7 +100,8 @@ void bench_wakeup(const char *scene, enum load only, double seconds,
 		for (int load = 0; load < LOADS && !cli_stop; load++) {
 			struct wakeup_row *row = &wakeups->row[wakeups->n];
 
-			if (only != LOADS && only != (enum load)load)
+			if (only == LOADS ? quick && !of_quick((enum load)load, i)
+					  : only != (enum load)load)
 				continue;
 			row->load = load;
 			row->rate_hz = scene ? scene_rate(scene) : own_rates_hz[i];
@@ -124,6 +133,12 @@ static json_t *text_or_null(const char *text)
 	return text ? json_text(text) : json_null();
 }
 
+/* NaN where it was not measured. */
+static json_t *late_json(const uint64_t *bins, double us)
+{
+	return json_number(bins ? us : NAN);
+}
+
 json_t *wakeups_json(const struct wakeups *wakeups)
 {
 	json_t *list = json_array();
@@ -134,8 +149,8 @@ json_t *wakeups_json(const struct wakeups *wakeups)
 
 		json_array_append_new(
 			list,
-			json_pack("{ss so so so so so sI so so so so}", "load",
-				  load_name(row->load), "rate_hz",
+			json_pack("{ss so so so so so sI so so so so so so so so so so}",
+				  "load", load_name(row->load), "rate_hz",
 				  json_number(row->rate_hz), "no_load",
 				  text_or_null(row->no_load), "no_cyclictest",
 				  text_or_null(row->got.no_cyclictest), "lateness_us",
@@ -148,13 +163,57 @@ json_t *wakeups_json(const struct wakeups *wakeups)
 				  "tick_max_us",
 				  json_number(row->got.loop.bins ? row->got.tick_max_us
 								 : NAN),
-				  "frames_hz", json_number(row->frames_hz)));
+				  "frames_hz", json_number(row->frames_hz),
+				  "late_median_us",
+				  late_json(row->got.loop.bins, row->got.loop.median),
+				  "late_p99_us",
+				  late_json(row->got.loop.bins, row->got.loop.p99),
+				  "late_p999_us",
+				  late_json(row->got.loop.bins, row->got.loop.p999),
+				  "late_max_us",
+				  late_json(row->got.loop.bins, row->got.loop.max),
+				  "cyclictest_p999_us",
+				  late_json(row->got.cyclictest.bins,
+					    row->got.cyclictest.p999),
+				  "failed", text_or_null(row->no_load)));
 	}
 	return json_pack("{sf ss so si so}", "seconds", wakeups->seconds, "policy",
 			 wakeups->realtime ? "fifo" : "other", "priority",
 			 wakeups->realtime ? json_integer(INCISE_REALTIME_PRIORITY)
 					   : json_null(),
 			 "cpu", wakeups->cpu, "rows", list);
+}
+
+/* By ranks, as if a wake-up did not know of the one before: those of one run alone. */
+static struct harness_spread quantile_of(const struct lateness *l, double q)
+{
+	double off = 1.96 * sqrt(q * (1 - q) / fmax((double)l->ticks, 1));
+
+	return (struct harness_spread){
+		.median = incise_loop_quantile(l->bins, q),
+		.low = incise_loop_quantile(l->bins, fmax(q - off, 0)),
+		.high = incise_loop_quantile(l->bins, fmin(q + off, 1)),
+	};
+}
+
+void wakeups_figures(const struct wakeups *wakeups, json_t *figures)
+{
+	static const struct {
+		const char *name;
+		double q;
+	} told[] = {{"median", 0.5}, {"99.9 %", 0.999}};
+
+	for (int i = 0; i < wakeups->n; i++) {
+		const struct wakeup_row *row = &wakeups->row[i];
+
+		for (size_t k = 0; k < 2 && row->got.loop.bins; k++) {
+			struct harness_spread at = quantile_of(&row->got.loop, told[k].q);
+
+			figures_measured(figures, &at, "us", "late at %g Hz, %s, %s",
+					 row->rate_hz, load_name(row->load),
+					 told[k].name);
+		}
+	}
 }
 
 static void print_lateness(const char *program, const struct lateness *l)

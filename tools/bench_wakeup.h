@@ -9,6 +9,7 @@
 #include <jansson.h>
 #include <stdbool.h>
 #include "bench_load.h"
+#include "figures.h"
 #include "wakeup_run.h"
 
 struct wakeup_row {
@@ -28,10 +29,10 @@ struct wakeups {
 };
 
 /*
- * @scene: or NULL for the bench's own, at 1 and 4 kHz; @only: a load, or LOADS for all. The
- * rows live as long as the program.
+ * @scene: or NULL for the bench's own, at 1 and 4 kHz; @only: a load, or LOADS for all,
+ * which with @quick are few. The rows live as long as the program.
  */
-void bench_wakeup(const char *scene, enum load only, double seconds,
+void bench_wakeup(const char *scene, enum load only, bool quick, double seconds,
 		  struct wakeups *wakeups);
 
 /* As incise haptic asks for it, with the CPU; NULL where it is not granted. */
@@ -41,6 +42,8 @@ struct incise_realtime *wakeup_realtime(int cpu);
 json_t *lateness_json(const struct lateness *lateness);
 
 json_t *wakeups_json(const struct wakeups *wakeups);
+/* Lateness of the loop under each load. */
+void wakeups_figures(const struct wakeups *wakeups, json_t *figures);
 void wakeups_print(const struct wakeups *wakeups);
 
 #endif

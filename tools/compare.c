@@ -14,6 +14,7 @@
 #include <unistd.h>
 #include "cli.h"
 #include "compare.h"
+#include "figures.h"
 #include "json.h"
 #include "memory_file.h"
 
@@ -29,8 +30,11 @@ struct figure {
 	const char *name, *unit;
 	enum kind kind;
 	double value;
-	/* What is compared: yardsticks of a time, else the value. */
-	double middle, low, high;
+	/* What is compared: a time in each yardstick, else the value. */
+	struct interval {
+		double middle, low, high;
+	} by[YARDSTICKS];
+	int scales;
 	bool more_is_better, met;
 };
 
@@ -151,10 +155,34 @@ static int read_kind(const json_t *from, struct figure *f, const char *where,
 	return 0;
 }
 
+/* Its ends have the names of @prefix, or none. */
+static int read_interval(const json_t *from, const char *key, const char *prefix,
+			 struct interval *interval, const char *where,
+			 struct incise_error *err)
+{
+	char low[40], high[40];
+	int rc;
+
+	snprintf(low, sizeof(low), "%s%slow", prefix, *prefix ? "_" : "");
+	snprintf(high, sizeof(high), "%s%shigh", prefix, *prefix ? "_" : "");
+	rc = number(from, key, &interval->middle, where, err);
+	if (!rc)
+		rc = number(from, low, &interval->low, where, err);
+	if (!rc)
+		rc = number(from, high, &interval->high, where, err);
+	if (!rc &&
+	    !(interval->low <= interval->middle && interval->middle <= interval->high))
+		rc = incise_error_set(
+			err, EINVAL,
+			"%s: '%s', %g, is not between %g and %g, its interval", where,
+			key, interval->middle, interval->low, interval->high);
+	return rc;
+}
+
 static int read_figure(const json_t *from, struct figure *f, const char *where,
 		       struct incise_error *err)
 {
-	const char *prefix, *better;
+	const char *better;
 	int rc;
 
 	*f = (struct figure){0};
@@ -171,22 +199,17 @@ static int read_figure(const json_t *from, struct figure *f, const char *where,
 		rc = text(from, "better", &better, where, err);
 		f->more_is_better = !rc && !strcmp(better, "more");
 	}
-	f->middle = f->low = f->high = f->value;
-	if (rc || f->kind == EXACT)
+	if (rc)
 		return rc;
-	prefix = f->kind == TIME ? "yardsticks_" : "";
+	f->scales = 1;
+	f->by[0] = (struct interval){f->value, f->value, f->value};
+	if (f->kind == MEASURED)
+		return read_interval(from, "value", "", &f->by[0], where, err);
 	if (f->kind == TIME)
-		rc = number(from, "yardsticks", &f->middle, where, err);
-	if (!rc)
-		rc = number(from, *prefix ? "yardsticks_low" : "low", &f->low, where,
-			    err);
-	if (!rc)
-		rc = number(from, *prefix ? "yardsticks_high" : "high", &f->high, where,
-			    err);
-	if (!rc && !(f->low <= f->middle && f->middle <= f->high))
-		rc = incise_error_set(err, EINVAL,
-				      "%s: %g is not between %g and %g, its interval",
-				      where, f->middle, f->low, f->high);
+		for (f->scales = 0; !rc && f->scales < YARDSTICKS; f->scales++)
+			rc = read_interval(from, figures_yardsticks[f->scales],
+					   figures_yardsticks[f->scales],
+					   &f->by[f->scales], where, err);
 	return rc;
 }
 
@@ -290,16 +313,53 @@ static struct figure *find(const struct figures *all, const struct figure *like)
 									     : NULL;
 }
 
-/* Beyond noise: 1 more, -1 less, else 0. */
+/*
+ * By how much the yardsticks disagree about a time, as part of it: one of the machines, or
+ * of its hours, was slower at some work than at other, and at which this is, is not known.
+ */
+static double disagreement(const struct figure *was, const struct figure *is)
+{
+	double least = INFINITY, most = 0;
+
+	for (int i = 0; i < is->scales; i++) {
+		double ratio = fabs(is->by[i].middle / was->by[i].middle);
+
+		least = fmin(least, ratio);
+		most = fmax(most, ratio);
+	}
+	return is->scales > 1 && isfinite(most / least) ? most / least - 1 : 0;
+}
+
+/* Beyond noise: 1 more, -1 less, else 0. A time is, where it is so in each yardstick. */
 static int changed(const struct figure *was, const struct figure *is)
 {
-	static const double noise[KINDS] = {COMPARE_TIME_NOISE, COMPARE_MEASURED_NOISE,
-					    COMPARE_EXACT};
-	double least = noise[is->kind] * fmax(fabs(was->middle), fabs(is->middle));
+	static const double noises[KINDS] = {COMPARE_TIME_NOISE, COMPARE_MEASURED_NOISE,
+					     COMPARE_EXACT};
+	double noise = noises[is->kind] + disagreement(was, is);
+	int more = 0, less = 0;
 
-	if (is->low - was->high > least)
-		return 1;
-	return was->low - is->high > least ? -1 : 0;
+	for (int i = 0; i < is->scales; i++) {
+		const struct interval *a = &was->by[i], *b = &is->by[i];
+		double least = noise * fmax(fabs(a->middle), fabs(b->middle));
+
+		more += b->low - a->high > least;
+		less += a->low - b->high > least;
+	}
+	return (more == is->scales) - (less == is->scales);
+}
+
+/* New by old; of a time the one that is nearest to 1, by which it is judged. */
+static double ratio(const struct figure *was, const struct figure *is)
+{
+	double nearest = is->by[0].middle / was->by[0].middle;
+
+	for (int i = 1; i < is->scales; i++) {
+		double other = is->by[i].middle / was->by[i].middle;
+
+		if (fabs(log(other)) < fabs(log(nearest)))
+			nearest = other;
+	}
+	return nearest;
 }
 
 static json_t *figure_json(const struct figure *f)
@@ -314,7 +374,7 @@ static json_t *change_json(const struct figure *was, const struct figure *is, bo
 
 	json_object_set_new(change, "old", json_number(was->value));
 	json_object_set_new(change, "new", json_number(is->value));
-	json_object_set_new(change, "ratio", json_number(is->middle / was->middle));
+	json_object_set_new(change, "ratio", json_number(ratio(was, is)));
 	json_object_set_new(change, "worse", json_boolean(worse));
 	return change;
 }

@@ -4,9 +4,10 @@
  * changed beyond noise, what is gone and what is new. A report is that of one word, an object
  * with `figures`, or of several, an object whose members are such objects.
  *
- *   time      in yardsticks: the intervals are apart, and by more than two runs of one
- *   measured  build are              ├──old──┤  noise  ├──new──┤
- *   exact     more than the digits of a report are off
+ *   time      in each of the yardsticks, by more than these disagree, and
+ *   measured  in its unit: the intervals are apart by more than two runs of one build are
+ *               ├──old──┤  noise  ├──new──┤
+ *   exact     by more than the digits of a report
  */
 #ifndef INCISE_COMPARE_H
 #define INCISE_COMPARE_H
@@ -17,7 +18,7 @@
 
 /* Gaps between the intervals of the same build's runs, as part of the value; measured, see
  * incise-bench(1). */
-#define COMPARE_TIME_NOISE 0.1
+#define COMPARE_TIME_NOISE 0.05
 #define COMPARE_MEASURED_NOISE 0.5
 /* A report's numbers have 12 digits. */
 #define COMPARE_EXACT 1e-9

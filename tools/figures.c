@@ -10,6 +10,9 @@
 #include "figures.h"
 #include "json.h"
 
+const char *const figures_yardsticks[YARDSTICKS] = {"yardsticks", "wide_yardsticks",
+						    "memory_yardsticks"};
+
 json_t *figures_new(void)
 {
 	return json_array();
@@ -44,22 +47,34 @@ static json_t *append(json_t *figures, const char *fmt, va_list args, double val
 	return figure;
 }
 
+/* "NAME", "NAME_low" and "NAME_high" */
+static void set_interval(json_t *figure, const char *name, double k,
+			 const struct harness_spread *spread)
+{
+	const double values[] = {spread->median, spread->low, spread->high};
+	static const char *const ends[] = {"", "_low", "_high"};
+	char key[40];
+
+	for (int i = 0; i < 3; i++) {
+		snprintf(key, sizeof(key), "%s%s", name, ends[i]);
+		json_object_set_new(figure, key, json_number(k * values[i]));
+	}
+}
+
 json_t *figures_time(json_t *figures, const struct harness_time *time, const char *unit,
 		     const char *fmt, ...)
 {
-	const struct harness_spread *ns = &time->ns, *y = &time->yardsticks;
 	double k = 1 / unit_ns(unit);
-	json_t *figure;
+	json_t *figure = json_pack("{ss ss so so so}", "kind", "time", "unit", unit,
+				   "value", json_number(k * time->ns.median), "low",
+				   json_number(k * time->ns.low), "high",
+				   json_number(k * time->ns.high));
 	va_list args;
 
+	for (int y = 0; y < YARDSTICKS; y++)
+		set_interval(figure, figures_yardsticks[y], 1, &time->by[y]);
 	va_start(args, fmt);
-	figure = append(
-		figures, fmt, args, ns->median,
-		json_pack("{ss ss so so so so so so}", "kind", "time", "unit", unit,
-			  "value", json_number(k * ns->median), "low",
-			  json_number(k * ns->low), "high", json_number(k * ns->high),
-			  "yardsticks", json_number(y->median), "yardsticks_low",
-			  json_number(y->low), "yardsticks_high", json_number(y->high)));
+	figure = append(figures, fmt, args, time->ns.median, figure);
 	va_end(args);
 	return figure;
 }

@@ -4,7 +4,8 @@
  * against another: each a name, a value and how sure it is.
  *
  *   {"name": "fixed_table", "kind": "time", "unit": "ns", "value": 51.2, "low": 50.9,
- *    "high": 51.8, "yardsticks": 0.00171, "yardsticks_low": …, "yardsticks_high": …}
+ *    "high": 51.8, "yardsticks": 0.00171, "yardsticks_low": …, "yardsticks_high": …,
+ *    "wide_yardsticks": …, "memory_yardsticks": …}
  *
  * Kinds: "time", compared in yardsticks (harness.h); "measured", whose value differs from
  * run to run; "exact", whose value is the same in every run of the same program. What to
@@ -16,6 +17,9 @@
 #include <jansson.h>
 #include <incise/error.h>
 #include "harness.h"
+
+/* Keys of a time in each yardstick; with "_low" and "_high" behind them of its interval. */
+extern const char *const figures_yardsticks[YARDSTICKS];
 
 /* An array; all below append to it and return what they appended. A value that is not finite
  * is left out: NULL. */

@@ -4,7 +4,6 @@
  */
 #include <math.h>
 #include <sched.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -12,44 +11,12 @@
 #include "harness.h"
 #include "stopwatch.h"
 
-/* Fixed work, some tens of microseconds of it: integers and doubles that wait for each
- * other, and a table in the first cache. Changing it makes older reports incomparable. */
-#define YARDSTICK_STEPS 8192
-#define YARDSTICK_TABLE 1024
 #define YARDSTICK_RUNS 101
 
 /* Stretches whose medians are ranked: from the 3rd to the 10th of 12 is an interval of
  * 1 - 2 (1 + 12 + 66) / 2^12 = 96 %. */
 #define STRETCHES 12
 #define STRETCH_RANK 2
-
-static double yardstick_table[YARDSTICK_TABLE];
-static volatile double yardstick_result;
-
-static void yardstick(void)
-{
-	uint64_t x = 88172645463325252u;
-	double sum = 0;
-
-	for (int i = 0; i < YARDSTICK_STEPS; i++) {
-		x ^= x << 13;
-		x ^= x >> 7;
-		x ^= x << 17;
-		sum = 0.75 * sum + yardstick_table[x % YARDSTICK_TABLE];
-		yardstick_table[i % YARDSTICK_TABLE] = 1 + sum * 0x1p-8;
-	}
-	yardstick_result = sum;
-}
-
-static double yardstick_ns(void)
-{
-	double begin;
-
-	yardstick();
-	begin = stopwatch_ns();
-	yardstick();
-	return stopwatch_ns() - begin;
-}
 
 int harness_cpu(void)
 {
@@ -87,8 +54,8 @@ static void interval_of_stretches(const double *values, int n,
 	if (!part)
 		cli_fail("no memory");
 	for (int i = 0; i < STRETCHES; i++) {
-		int from = (int64_t)n * i / STRETCHES,
-		    to = (int64_t)n * (i + 1) / STRETCHES;
+		int from = (long long)n * i / STRETCHES,
+		    to = (long long)n * (i + 1) / STRETCHES;
 
 		memcpy(part, values + from, (to - from) * sizeof(*part));
 		stopwatch_sort(part, to - from);
@@ -126,21 +93,31 @@ void harness_spread(const double *values, int n, struct harness_spread *spread)
 	free(sorted);
 }
 
+/* All n values as multiples of a unit each. */
+static void ratios_spread(const double *ns, const double *units, int n, double *room,
+			  struct harness_spread *spread)
+{
+	for (int i = 0; i < n; i++)
+		room[i] = ns[i] / units[i];
+	harness_spread(room, n, spread);
+}
+
 void harness_time_of(const double *ns, int n, struct harness_time *time)
 {
-	double runs[YARDSTICK_RUNS], unit, *ratios = malloc((n + 1) * sizeof(*ratios));
+	double runs[YARDSTICK_RUNS], *units = calloc(2 * (size_t)n + 1, sizeof(*units));
 
-	if (!ratios)
+	if (!units)
 		cli_fail("no memory");
-	for (int i = 0; i < YARDSTICK_RUNS; i++)
-		runs[i] = yardstick_ns();
-	stopwatch_sort(runs, YARDSTICK_RUNS);
-	unit = stopwatch_quantile(runs, YARDSTICK_RUNS, 0.5);
-	for (int i = 0; i < n; i++)
-		ratios[i] = ns[i] / unit;
 	harness_spread(ns, n, &time->ns);
-	harness_spread(ratios, n, &time->yardsticks);
-	free(ratios);
+	for (int y = 0; y < YARDSTICKS; y++) {
+		for (int i = 0; i < YARDSTICK_RUNS; i++)
+			runs[i] = yardstick_ns((enum yardstick)y);
+		stopwatch_sort(runs, YARDSTICK_RUNS);
+		for (int i = 0; i < n; i++)
+			units[i] = stopwatch_quantile(runs, YARDSTICK_RUNS, 0.5);
+		ratios_spread(ns, units, n, units + n, &time->by[y]);
+	}
+	free(units);
 }
 
 static double run_ns(void *context)
@@ -170,34 +147,37 @@ static bool pin(cpu_set_t *before)
 void harness_timers(const struct harness_timer *timers, int n, int turns,
 		    struct harness_time *times)
 {
-	double *ns = calloc((size_t)2 * n * turns + 1, sizeof(*ns)), *ratios;
+	/* Of each timer its turns, of each yardstick its turns, and room for as many. */
+	double *ns = calloc((size_t)(n + YARDSTICKS + 1) * turns + 1, sizeof(*ns)),
+	       *units;
 	cpu_set_t before;
 	bool pinned;
 	int turn;
 
 	if (!ns)
 		cli_fail("no memory");
-	ratios = ns + (size_t)n * turns;
+	units = ns + (size_t)n * turns;
 	pinned = pin(&before);
 	for (turn = 0; turn < turns && !cli_stop; turn++) {
-		double unit = yardstick_ns();
-
 		cli_progress("turn %d of %d", turn + 1, turns);
-		for (int i = 0; i < n; i++) {
-			if (!timers[i].ns)
-				continue;
-			ns[i * turns + turn] = timers[i].ns(timers[i].context);
-			ratios[i * turns + turn] = ns[i * turns + turn] / unit;
-		}
+		for (int y = 0; y < YARDSTICKS; y++)
+			units[y * turns + turn] = yardstick_ns((enum yardstick)y);
+		for (int i = 0; i < n; i++)
+			if (timers[i].ns)
+				ns[(size_t)i * turns + turn] =
+					timers[i].ns(timers[i].context);
 	}
 	cli_progress_end();
 	if (pinned)
 		sched_setaffinity(0, sizeof(before), &before);
 	for (int i = 0; i < n; i++) {
+		const double *own = ns + (size_t)i * turns;
 		int taken = timers[i].ns ? turn : 0;
 
-		harness_spread(ns + i * turns, taken, &times[i].ns);
-		harness_spread(ratios + i * turns, taken, &times[i].yardsticks);
+		harness_spread(own, taken, &times[i].ns);
+		for (int y = 0; y < YARDSTICKS; y++)
+			ratios_spread(own, units + y * turns, taken,
+				      units + YARDSTICKS * turns, &times[i].by[y]);
 	}
 	free(ns);
 }

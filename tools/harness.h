@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * How incise bench times ways of doing the same thing: all on one processor, each warmed up
- * before it is timed, all taking turns, and a yardstick of fixed work among them.
+ * before it is timed, all taking turns, and yardsticks among them.
  *
- *     turn 1              turn 2              turn 3
- *     A B C yardstick     A B C yardstick     A B C yardstick   …
+ *     turn 1               turn 2               turn 3
+ *     yardsticks A B C     yardsticks A B C     yardsticks A B C   …
  *
- * A moment in which the machine is busy meets them all. A time as a multiple of the
- * yardstick's in the same turn can be held against one of another day or another machine.
+ * A moment in which the machine is busy meets them all. A time as a multiple of a
+ * yardstick's in the same turn can be held against one of another day.
  */
 #ifndef INCISE_HARNESS_H
 #define INCISE_HARNESS_H
 
-#include <stdbool.h>
+#include "yardstick.h"
 
 /* The most turns of a run. */
 #define HARNESS_TURNS 512
@@ -30,8 +30,8 @@ struct harness_spread {
 };
 
 struct harness_time {
-	struct harness_spread ns;	  /* of one unit */
-	struct harness_spread yardsticks; /* the same as multiples of a yardstick */
+	struct harness_spread ns;	      /* of one unit */
+	struct harness_spread by[YARDSTICKS]; /* the same as multiples of yardsticks */
 };
 
 /*
@@ -54,7 +54,7 @@ void harness_timers(const struct harness_timer *timers, int n, int turns,
 
 /*
  * The same of times in ns that were taken elsewhere, in threads or other programs: the
- * yardstick is timed now. NaN of none.
+ * yardsticks are timed now. NaN of none.
  */
 void harness_time_of(const double *ns, int n, struct harness_time *time);
 

@@ -30,84 +30,131 @@ static double clock_cost(void)
 	return stopwatch_middle(times, n);
 }
 
-/*
- * Run the stroke. With @stage_ns, room for @ticks times of each stage, it is the stages
- * that are timed, else the ticks. Returns how many ticks were in contact.
- */
-static int run(const struct incise_scene *scene,
-	       const struct incise_tracker_info *tracker, enum incise_tool tool,
-	       int ticks, double *tick_ns, double *stage_ns)
-{
-	int64_t period_ns = llrint(1e9 / incise_scene_rate_hz(scene)), pose = 0, own[16];
-	struct incise_error err = {0};
-	struct incise_plan *plan = incise_plan_new_fed(scene, tracker, &err);
-	struct incise_tracker_sample sample;
+struct tick_course {
+	struct incise_plan *plan;
+	const struct incise_tracker_info *tracker;
 	struct stroke stroke;
+	struct incise_tracker_sample sample; /* the next one */
+	int64_t period_ns, t_ns, pose;
+	double clock_ns;
+};
+
+struct tick_course *tick_course_new(const struct incise_scene *scene,
+				    const struct incise_tracker_info *tracker,
+				    enum incise_tool tool)
+{
+	struct tick_course *course = calloc(1, sizeof(*course));
+	struct incise_error err = {0};
+
+	if (!course)
+		cli_fail("no memory");
+	course->tracker = tracker ? tracker : &usual_tracker;
+	course->period_ns = llrint(1e9 / incise_scene_rate_hz(scene));
+	course->clock_ns = clock_cost();
+	course->plan = incise_plan_new_fed(scene, course->tracker, &err);
+	if (!course->plan)
+		cli_fail_with(&err);
+	incise_plan_set_tool(course->plan, tool);
+	stroke_begin(&course->stroke, course->plan, course->tracker);
+	stroke_pose(&course->stroke, 0, &course->sample);
+	return course;
+}
+
+void tick_course_free(struct tick_course *course)
+{
+	incise_plan_free(course->plan);
+	free(course);
+}
+
+/*
+ * Go on with the stroke. With @stage_ns, room for @ticks times of each stage, it is the
+ * stages that are timed, else the ticks. Returns how many ticks were in contact.
+ */
+static int go_on(struct tick_course *c, int ticks, double *tick_ns, double *stage_ns)
+{
+	int64_t own[INCISE_PLAN_STAGES_MAX];
 	int n = 0;
 
-	_Static_assert(INCISE_PLAN_STAGES_MAX == 16, "room for the stages");
-	if (!plan)
-		cli_fail_with(&err);
-	incise_plan_set_tool(plan, tool);
-	stroke_begin(&stroke, plan, tracker);
-	stroke_pose(&stroke, 0, &sample);
 	for (int i = 0; i < ticks; i++) {
-		int64_t t_ns = (i + 1) * period_ns;
 		struct incise_tick tick;
 		double begin, ns;
 
-		while (sample.t_ns <= t_ns) {
-			incise_plan_feed(plan, &sample, 1);
-			stroke_pose(&stroke, ++pose, &sample);
+		c->t_ns += c->period_ns;
+		while (c->sample.t_ns <= c->t_ns) {
+			incise_plan_feed(c->plan, &c->sample, 1);
+			stroke_pose(&c->stroke, ++c->pose, &c->sample);
 		}
 		if (stage_ns) {
-			incise_plan_tick_timed(plan, t_ns, &tick, own);
+			incise_plan_tick_timed(c->plan, c->t_ns, &tick, own);
 			ns = 0;
 		} else {
 			begin = stopwatch_ns();
-			incise_plan_tick(plan, t_ns, &tick);
+			incise_plan_tick(c->plan, c->t_ns, &tick);
 			ns = stopwatch_ns() - begin;
 		}
 		if (!(tick.flags & INCISE_TICK_CONTACT))
 			continue;
-		for (int k = 0; stage_ns && incise_plan_stage(plan, k); k++)
+		for (int k = 0; stage_ns && incise_plan_stage(c->plan, k); k++)
 			stage_ns[k * ticks + n] = (double)own[k];
 		if (tick_ns)
 			tick_ns[n] = ns;
 		n++;
 	}
-	incise_plan_free(plan);
 	return n;
 }
 
-/* The cost with one tool. */
-static void cost_with(const struct incise_scene *scene,
+double tick_course_ns(struct tick_course *course, int ticks, double *room)
+{
+	int n = go_on(course, ticks, room, NULL);
+
+	if (!n)
+		return NAN;
+	stopwatch_sort(room, n);
+	return fmax(stopwatch_middle(room, n) - course->clock_ns, 0);
+}
+
+static bool has_insertion(const struct incise_plan *plan)
+{
+	for (int k = 0; incise_plan_stage(plan, k); k++)
+		if (!strcmp(incise_plan_stage(plan, k), "insertion"))
+			return true;
+	return false;
+}
+
+/* The cost with one tool. Returns whether there is another one. */
+static bool cost_with(const struct incise_scene *scene,
 		      const struct incise_tracker_info *tracker, enum incise_tool tool,
 		      int ticks, double *times, struct tick_cost *cost)
 {
-	double own = clock_cost();
+	struct tick_course *course = tick_course_new(scene, tracker, tool);
+	bool insertion = has_insertion(course->plan);
+	double own = course->clock_ns;
 	int n;
 
-	/* The first run brings code and surface into the caches. */
-	run(scene, tracker, tool, ticks / 4, times, NULL);
-	n = cost->ticks = run(scene, tracker, tool, ticks, times, NULL);
+	cost->tool = tool;
+	/* The first part brings code and surface into the caches. */
+	go_on(course, ticks / 4, times, NULL);
+	n = cost->ticks = go_on(course, ticks, times, NULL);
 	if (!n) {
 		cost->median = cost->p99 = cost->p999 = NAN;
 		for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)
 			cost->stage[k] = NAN;
-		return;
+		tick_course_free(course);
+		return insertion;
 	}
 	stopwatch_sort(times, n);
 	cost->median = fmax(stopwatch_quantile(times, n, 0.5) - own, 0);
 	cost->p99 = fmax(stopwatch_quantile(times, n, 0.99) - own, 0);
 	cost->p999 = fmax(stopwatch_quantile(times, n, 0.999) - own, 0);
-	n = run(scene, tracker, tool, ticks, NULL, times);
+	n = go_on(course, ticks, NULL, times);
 	for (int k = 0; k < INCISE_PLAN_STAGES_MAX && n; k++) {
 		double *stage = times + (size_t)k * ticks;
 
 		stopwatch_sort(stage, n);
 		cost->stage[k] = fmax(stopwatch_middle(stage, n) - own, 0);
 	}
+	tick_course_free(course);
+	return insertion;
 }
 
 void tick_cost(const struct incise_scene *scene,
@@ -116,17 +163,19 @@ void tick_cost(const struct incise_scene *scene,
 {
 	int ticks = (int)fmax(seconds * incise_scene_rate_hz(scene), 1000);
 	double *times = calloc((size_t)ticks * INCISE_PLAN_STAGES_MAX, sizeof(*times));
-	struct tick_cost blade = {0}, tube = {0};
+	struct tick_cost tube = {0};
 
 	if (!times)
 		cli_fail("no memory for the times of %d ticks", ticks);
-	if (!tracker)
-		tracker = &usual_tracker;
-	cost_with(scene, tracker, INCISE_TOOL_BLADE, ticks, times, &blade);
-	/* In a scene without insertion this is the blade once more. */
-	cost_with(scene, tracker, INCISE_TOOL_TUBE, ticks, times, &tube);
+	*cost = (struct tick_cost){0};
+	if (cost_with(scene, tracker, INCISE_TOOL_BLADE, ticks, times, cost)) {
+		struct tick_cost blade = *cost;
+
+		cost_with(scene, tracker, INCISE_TOOL_TUBE, ticks, times, &tube);
+		if (tube.median > blade.median)
+			*cost = tube;
+		for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)
+			cost->stage[k] = fmax(blade.stage[k], tube.stage[k]);
+	}
 	free(times);
-	*cost = tube.median > blade.median ? tube : blade;
-	for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)
-		cost->stage[k] = fmax(blade.stage[k], tube.stage[k]);
 }

@@ -15,6 +15,7 @@
 
 struct tick_cost {
 	int ticks;			      /* timed: those in contact */
+	enum incise_tool tool;		      /* the costlier one */
 	double median, p99, p999;	      /* ns, the clock's own cost taken off */
 	double stage[INCISE_PLAN_STAGES_MAX]; /* means of the middle half, ns, the same */
 };
@@ -28,5 +29,14 @@ struct tick_cost {
 void tick_cost(const struct incise_scene *scene,
 	       const struct incise_tracker_info *tracker, double seconds,
 	       struct tick_cost *cost);
+
+/* The stroke by parts, for times that take turns with others. Fails the program. */
+struct tick_course *tick_course_new(const struct incise_scene *scene,
+				    const struct incise_tracker_info *tracker,
+				    enum incise_tool tool);
+
+/* Mean of the middle half of so many ticks more, ns, with @room for them; NaN without contact. */
+double tick_course_ns(struct tick_course *course, int ticks, double *room);
+void tick_course_free(struct tick_course *course);
 
 #endif
