@@ -2,7 +2,7 @@
 /*
  * Error of what is shown; see bench_view_error.h.
  *
- * Moments are steps of 1/240 s, each 17th of them: that meets every place between two frames
+ * Moments are steps of 1/240 s, each 49th of them: that meets every place between two frames
  * of 15, 30 and 60 a second alike, and the frames that are shown at a moment are never older
  * than the moment before, so that one view per texture draws all of them in order.
  */
@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include "bench_view_error.h"
 #include "cli.h"
+#include "figures.h"
 #include "json.h"
 #include "picture.h"
 #include "similarity.h"
@@ -19,11 +20,13 @@
 #define WIDTH 1280
 #define HEIGHT 720
 #define STEP_HZ 240
-#define STRIDE 17
-#define QUICK_STRIDE (7 * STRIDE)
+#define STRIDE 49
+#define QUICK_STRIDE 119
 #define FINEST_PX 4096
 
+/* The finest takes seconds to make; quick ones end at 1024. */
 static const int textures_px[] = {512, 1024, 2048, FINEST_PX};
+#define QUICK_TEXTURES 2
 static const int rates[] = {15, 30, 60, INT_MAX};
 #define TEXTURES 4
 #define RATES 4
@@ -32,6 +35,7 @@ _Static_assert(TEXTURES *RATES == SHOWN_ROWS, "room for each");
 
 struct compared {
 	struct fed_view exact, shown[TEXTURES];
+	int textures;
 	uint8_t *rgb, *exact_rgb;
 	double square[SHOWN_ROWS], max[SHOWN_ROWS], ssim[SHOWN_ROWS];
 };
@@ -55,7 +59,7 @@ static int drawn_at(int step, int fps)
 static void compare(struct compared *c, int step)
 {
 	draw(&c->exact, (double)step / STEP_HZ, c->exact_rgb);
-	for (int i = 0; i < TEXTURES; i++)
+	for (int i = 0; i < c->textures; i++)
 		for (int k = 0; k < RATES; k++) {
 			int row = i * RATES + k, at = drawn_at(step, rates[k]);
 			struct similarity is;
@@ -68,15 +72,16 @@ static void compare(struct compared *c, int step)
 		}
 }
 
-static void open_views(struct compared *c, const struct view_script *script)
+static void open_views(struct compared *c, const struct view_script *script, int textures)
 {
-	*c = (struct compared){.rgb = malloc(WIDTH * HEIGHT * 3),
+	*c = (struct compared){.textures = textures,
+			       .rgb = malloc(WIDTH * HEIGHT * 3),
 			       .exact_rgb = malloc(WIDTH * HEIGHT * 3)};
 	if (!c->rgb || !c->exact_rgb)
 		cli_fail("no memory");
-	fed_view_open(&c->exact, script, FINEST_PX, WIDTH, HEIGHT);
+	fed_view_open(&c->exact, script, textures_px[textures - 1], WIDTH, HEIGHT);
 	incise_view_panel(c->exact.view, false, false);
-	for (int i = 0; i < TEXTURES; i++) {
+	for (int i = 0; i < textures; i++) {
 		fed_view_open(&c->shown[i], script, textures_px[i], WIDTH, HEIGHT);
 		incise_view_panel(c->shown[i].view, false, false);
 	}
@@ -85,7 +90,7 @@ static void open_views(struct compared *c, const struct view_script *script)
 static void close_views(struct compared *c)
 {
 	fed_view_close(&c->exact);
-	for (int i = 0; i < TEXTURES; i++)
+	for (int i = 0; i < c->textures; i++)
 		fed_view_close(&c->shown[i]);
 	free(c->rgb);
 	free(c->exact_rgb);
@@ -97,9 +102,10 @@ void bench_view_error(const struct view_script *script, double until_s, bool qui
 	int stride = quick ? QUICK_STRIDE : STRIDE;
 	struct compared c;
 
-	*rows = (struct shown_rows){0};
+	*rows = (struct shown_rows){.textures = quick ? QUICK_TEXTURES : TEXTURES};
+	rows->exact_px = textures_px[rows->textures - 1];
 	cli_progress("pictures beside finer ones");
-	open_views(&c, script);
+	open_views(&c, script, rows->textures);
 	for (int step = (int)(FRAMES_FROM_S * STEP_HZ); step < until_s * STEP_HZ;
 	     step += stride) {
 		if (cli_stop)
@@ -110,13 +116,13 @@ void bench_view_error(const struct view_script *script, double until_s, bool qui
 			     (double)step / STEP_HZ, until_s);
 	}
 	close_views(&c);
-	for (int i = 0; i < SHOWN_ROWS; i++) {
+	for (int i = 0; i < rows->textures * RATES; i++) {
 		struct shown_row *row = &rows->row[rows->n];
 
 		row->texture_px = textures_px[i / RATES];
 		row->fps = rates[i % RATES];
 		/* That is the exact one. */
-		if (row->texture_px == FINEST_PX && row->fps == INT_MAX)
+		if (row->texture_px == rows->exact_px && row->fps == INT_MAX)
 			continue;
 		row->rms = sqrt(c.square[i] / rows->moments);
 		row->rms_max = c.max[i];
@@ -138,7 +144,7 @@ json_t *shown_rows_json(const struct shown_rows *rows)
 		const struct shown_row *row = &rows->row[i];
 
 		json_array_append_new(
-			list, json_pack("{si so so so so so so}", "texture_px",
+			list, json_pack("{si so so so so so so sn}", "texture_px",
 					row->texture_px, "fps",
 					row->fps == INT_MAX ? json_null()
 							    : json_integer(row->fps),
@@ -146,17 +152,17 @@ json_t *shown_rows_json(const struct shown_rows *rows)
 					json_number(row->rms_max), "ssim",
 					json_number(row->ssim), "frame_ms",
 					json_number(row->ms), "ms_per_s",
-					json_number(row->ms_s)));
+					json_number(row->ms_s), "failed"));
 	}
 	return json_pack("{si si so}", "moments", rows->moments, "exact_texture_px",
-			 FINEST_PX, "rows", list);
+			 rows->exact_px, "rows", list);
 }
 
 void shown_rows_print(const struct shown_rows *rows)
 {
 	printf("\nwhat is shown, against texture %d at that very moment; %d moments\n"
 	       "%7s %6s %8s %8s %8s %9s %9s\n",
-	       FINEST_PX, rows->moments, "texture", "fps", "rms", "largest", "SSIM",
+	       rows->exact_px, rows->moments, "texture", "fps", "rms", "largest", "SSIM",
 	       "ms/frame", "ms/s");
 	for (int i = 0; i < rows->n; i++) {
 		const struct shown_row *row = &rows->row[i];
@@ -225,17 +231,17 @@ static void set_axes(FILE *script, const struct shown_rows *rows, bool ssim)
 	set_axis(script, 'y', low, high);
 }
 
-static void draw_panel(FILE *script, int column)
+static void draw_panel(FILE *script, int textures, int column)
 {
 	fputs("plot \\\n", script);
-	for (int i = 0; i < TEXTURES; i++)
+	for (int i = 0; i < textures; i++)
 		fprintf(script,
 			"  data index %d using 1:%d with linespoints ls %d pt 7 ps 0.9 title "
 			"'texture %d²', \\\n"
 			"  '' index %d using 1:%d:4 with labels offset 0.6,0.6 left font ',9' "
 			"notitle%s\n",
 			i, column, i + 1, textures_px[i], i, column,
-			i < TEXTURES - 1 ? ", \\" : "");
+			i < textures - 1 ? ", \\" : "");
 }
 
 void shown_rows_draw(const struct shown_rows *rows, const char *folder, const char *name)
@@ -255,13 +261,32 @@ void shown_rows_draw(const struct shown_rows *rows, const char *folder, const ch
 		"set logscale xy\ndata = '%s'\nset key bottom left\n"
 		"set xlabel 'run time for a second that is shown / ms'\n"
 		"set ylabel 'rms error / values of sRGB'\n",
-		FINEST_PX, data);
+		rows->exact_px, data);
 	set_axes(script, rows, false);
-	draw_panel(script, 2);
+	draw_panel(script, rows->textures, 2);
 	fputs("set ylabel '1 - structural similarity'\n", script);
 	set_axes(script, rows, true);
-	draw_panel(script, 3);
+	draw_panel(script, rows->textures, 3);
 	fputs("unset multiplot\n", script);
 	if (!picture_draw(script, folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
+}
+
+void shown_rows_figures(const struct shown_rows *rows, json_t *figures)
+{
+	for (int i = 0; i < rows->n; i++) {
+		const struct shown_row *row = &rows->row[i];
+		char fps[20] = "exact";
+
+		if (row->fps != INT_MAX && row->fps != 60)
+			continue;
+		if (row->fps != INT_MAX)
+			snprintf(fps, sizeof(fps), "%d fps", row->fps);
+		figures_exact(figures, row->rms, "1", "texture %d, %s rms",
+			      row->texture_px, fps);
+		figures_exact(figures, row->rms_max, "1", "texture %d, %s largest rms",
+			      row->texture_px, fps);
+		figures_exact(figures, 1 - row->ssim, "1", "texture %d, %s dissimilarity",
+			      row->texture_px, fps);
+	}
 }

@@ -25,13 +25,15 @@ struct shown_row {
 
 struct shown_rows {
 	struct shown_row row[SHOWN_ROWS];
-	int n, moments;
+	int n, moments, textures;
+	int exact_px; /* of the texture of what they are compared with */
 };
 
 /* @frames: what they cost. */
 void bench_view_error(const struct view_script *script, double until_s, bool quick,
 		      const struct frame_rows *frames, struct shown_rows *rows);
 
+void shown_rows_figures(const struct shown_rows *rows, json_t *figures);
 json_t *shown_rows_json(const struct shown_rows *rows);
 void shown_rows_print(const struct shown_rows *rows);
 

@@ -228,8 +228,7 @@ void bench_view_beside(const char *scene, double seconds, bool quick,
 		       struct beside *beside)
 {
 	static const enum load order[BESIDE_RUNS] = {LOAD_IDLE, LOAD_VIEW, LOAD_VIEW,
-						     LOAD_IDLE, LOAD_VIEW, LOAD_IDLE,
-						     LOAD_IDLE, LOAD_VIEW};
+						     LOAD_IDLE};
 
 	*beside = (struct beside){.n = quick ? 2 : BESIDE_RUNS, .seconds = seconds};
 	for (int i = 0; i < beside->n; i++) {
@@ -304,4 +303,27 @@ void beside_print(const struct beside *beside)
 		       beside->cyclictest_us[1],
 		       beside->cyclictest_us[1] / beside->cyclictest_us[0]);
 	printf("\n");
+}
+
+void absorbed_figures(const struct absorbed *a, json_t *figures)
+{
+	/* However busy the machine: that none is lost is promised. */
+	figures_exact(figures, (double)a->lost, "1", "cuts lost");
+}
+
+void beside_figures(const struct beside *beside, json_t *figures)
+{
+	for (int view = 0; view < 2; view++) {
+		double median[BESIDE_RUNS];
+		struct harness_spread spread;
+		int n = 0;
+
+		for (int i = 0; i < beside->n; i++)
+			if ((beside->run[i].load == LOAD_VIEW) == view)
+				median[n++] = beside->run[i].got.loop.median;
+		harness_spread(median, n, &spread);
+		figures_measured(figures, &spread, "us",
+				 "loop late %s the picture, median",
+				 view ? "with" : "without");
+	}
 }

@@ -9,6 +9,7 @@
 #include <jansson.h>
 #include <stdbool.h>
 #include "bench_wakeup.h"
+#include "figures.h"
 
 /* Cuts at 5 kHz. */
 struct absorbed {
@@ -18,11 +19,12 @@ struct absorbed {
 };
 
 void bench_view_absorbed(const char *scene, double seconds, struct absorbed *absorbed);
+void absorbed_figures(const struct absorbed *absorbed, json_t *figures);
 json_t *absorbed_json(const struct absorbed *absorbed);
 void absorbed_print(const struct absorbed *absorbed);
 
-/* The scene's loop without and with the picture: A B B A, and again. */
-#define BESIDE_RUNS 8
+/* The scene's loop without and with the picture: A B B A. */
+#define BESIDE_RUNS 4
 
 struct beside {
 	struct wakeup_row run[BESIDE_RUNS];
@@ -35,6 +37,7 @@ struct beside {
 
 void bench_view_beside(const char *scene, double seconds, bool quick,
 		       struct beside *beside);
+void beside_figures(const struct beside *beside, json_t *figures);
 json_t *beside_json(const struct beside *beside);
 void beside_print(const struct beside *beside);
 

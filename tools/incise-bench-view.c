@@ -10,6 +10,7 @@
 #include "bench_view_live.h"
 #include "cli.h"
 #include "compare.h"
+#include "figures.h"
 #include "json.h"
 #include "machine.h"
 #include "memory_file.h"
@@ -24,7 +25,7 @@ static const struct cli_option options[] = {
 	 "compare with an older report of --json: what changed\nbeyond noise"},
 	{OPT_PLOT, "plot", "NAME", "draw error over run time as NAME.png and NAME.svg"},
 	{OPT_DURATION, "duration", "TIME",
-	 "of each run beside a loop, and of that of cuts: 10min;\ndefault 10s"},
+	 "of each run beside a loop, and of that of cuts: 10min;\ndefault 4s"},
 	{OPT_QUICK, "quick", NULL, "fewer frames and runs: a look, not a measurement"},
 	{0},
 };
@@ -46,7 +47,7 @@ static const struct cli_verb verb = {
 #define QUICK_UNTIL_S 1.5
 #define ERROR_UNTIL_S 8.0
 #define QUICK_ERROR_UNTIL_S 2.5
-#define LIVE_S 10.0
+#define LIVE_S 4.0
 #define QUICK_LIVE_S 0.5
 
 /* As scenes/neck.scene, so that figures of a release do not hang on what is installed. */
@@ -85,7 +86,8 @@ static void measure(const struct job *job, struct measured *m)
 	bench_view_beside(job->scene, job->seconds, job->quick, &m->beside);
 	view_script_begin(&script, job->scene,
 			  job->quick ? QUICK_ERROR_UNTIL_S : UNTIL_S);
-	bench_view_frames(&script, job->quick ? QUICK_UNTIL_S : UNTIL_S, &m->frames);
+	bench_view_frames(&script, job->quick ? QUICK_UNTIL_S : UNTIL_S, job->quick,
+			  &m->frames);
 	bench_view_error(&script, job->quick ? QUICK_ERROR_UNTIL_S : ERROR_UNTIL_S,
 			 job->quick, &m->frames, &m->shown);
 	view_script_end(&script);
@@ -95,12 +97,18 @@ static void measure(const struct job *job, struct measured *m)
 static void report(const struct job *job, const struct measured *m)
 {
 	if (job->json) {
+		json_t *figures = figures_new();
+
+		frame_rows_figures(&m->frames, figures);
+		shown_rows_figures(&m->shown, figures);
+		absorbed_figures(&m->absorbed, figures);
+		beside_figures(&m->beside, figures);
 		json_print(json_pack(
-			"{so ss sb so so so so}", "machine", machine_json(&m->machine),
+			"{so ss sb so so so so so}", "machine", machine_json(&m->machine),
 			"renderer", m->frames.renderer, "quick", job->quick, "frames",
 			frame_rows_json(&m->frames), "shown", shown_rows_json(&m->shown),
 			"absorbed", absorbed_json(&m->absorbed), "beside",
-			beside_json(&m->beside)));
+			beside_json(&m->beside), "figures", figures));
 	} else {
 		printf("%s, %s\n\n", m->machine.cpu, m->machine.kernel);
 		frame_rows_print(&m->frames);
