@@ -37,6 +37,9 @@ extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o pictu
 	replay_picture.o)
 extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stroke.o stopwatch.o)
 extra_calibrate-force := $(calibrate_all) $(addprefix $(O)/obj/tools/,calibrate_pairs.o \
+extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stroke.o stopwatch.o \
+	mapped_libraries.o)
+extra_calibrate-force := $(addprefix $(O)/obj/tools/,picture.o calibrate_pairs.o \
 	calibrate_weights.o calibrate_force_report.o)
 extra_calibrate-depth := $(calibrate_all) $(addprefix $(O)/obj/tools/,depth_wish.o \
 	depth_picture.o depth_frames.o depth_lengths.o depth_corners.o depth_report.o)

@@ -12,6 +12,7 @@
 #include <incise/plan.h>
 #include "cli.h"
 #include "json.h"
+#include "mapped_libraries.h"
 #include "scene_argument.h"
 #include "tick_cost.h"
 
@@ -47,21 +48,6 @@ static const struct cli_verb verb = {
 /* Depth that the fixed-point error is stated for: paper 1's deepest cut. */
 #define REACH_MM 20
 
-/* What a process without need of it should not have mapped. */
-static const struct {
-	const char *part, *name;
-} heavy[] = {
-	{"libsqlite3", "SQLite"},
-	{"liblapack", "LAPACK"},
-	{"libavformat", "libavformat"},
-	{"libopencv", "OpenCV"},
-	{"libGL", "OpenGL"},
-	{"libSDL2", "SDL2"},
-	{"libusb", "libusb"},
-	{"libgpiod", "libgpiod"},
-};
-#define HEAVY (sizeof(heavy) / sizeof(*heavy))
-
 struct job {
 	struct scene_argument scene;
 	const char *rig;
@@ -92,34 +78,6 @@ static void parse(struct job *job, int argc, char **argv)
 			break;
 		}
 	scene_argument_operand(&job->scene, argc, argv, optind);
-}
-
-/* The shared objects that this process has mapped, each once; and which heavy ones. */
-static json_t *mapped_libraries(bool *found)
-{
-	FILE *maps = fopen("/proc/self/maps", "re");
-	json_t *list = json_array();
-	char line[4096];
-
-	while (maps && fgets(line, sizeof(line), maps)) {
-		char *name = strrchr(line, '/');
-		bool known = false;
-
-		if (!name || !strstr(name, ".so"))
-			continue;
-		name++;
-		name[strcspn(name, "\n")] = 0;
-		for (size_t i = 0; i < json_array_size(list); i++)
-			known |=
-				!strcmp(json_string_value(json_array_get(list, i)), name);
-		if (!known)
-			json_array_append_new(list, json_text(name));
-		for (size_t i = 0; i < HEAVY; i++)
-			found[i] |= !!strstr(name, heavy[i].part);
-	}
-	if (maps)
-		fclose(maps);
-	return list;
 }
 
 static double margin(const struct incise_plan_stability *s)
@@ -164,9 +122,8 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 			const struct tick_cost *cost)
 {
 	json_t *kept = json_array(), *stages = json_array(), *left = json_array();
-	json_t *absent = json_array(), *mapped, *object;
+	json_t *mapped = mapped_libraries(0), *object;
 	struct incise_plan_stability stability;
-	bool found[HEAVY] = {0};
 	const char *name, *why;
 
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++) {
@@ -181,10 +138,6 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 	for (int i = 0; (name = incise_plan_left_out(plan, i, &why)); i++)
 		json_array_append_new(left,
 				      json_pack("{ss ss}", "stage", name, "why", why));
-	mapped = mapped_libraries(found);
-	for (size_t i = 0; i < HEAVY; i++)
-		if (!found[i])
-			json_array_append_new(absent, json_string(heavy[i].name));
 	incise_plan_stability(plan, &stability);
 	object = json_pack(
 		"{so so so so so so so sI sf so so so so}", "scene",
@@ -197,7 +150,7 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 		"untouched_devices",
 		job->rig ? json_pack("[ss]", "force", "camera")
 			 : json_pack("[ssss]", "tracker", "stepper", "force", "camera"),
-		"libraries", mapped, "unmapped_libraries", absent);
+		"libraries", mapped, "unmapped_libraries", unmapped_libraries(mapped));
 	json_object_update_new(object, stability_json(&stability));
 	json_print(object);
 }
@@ -247,10 +200,9 @@ static void print_stability(const struct incise_plan *plan)
 static void report_text(const struct job *job, const struct incise_plan *plan,
 			const struct tick_cost *cost)
 {
-	bool found[HEAVY] = {0};
-	const char *name, *why, *comma = "";
+	json_t *mapped = mapped_libraries(0), *absent = unmapped_libraries(mapped);
+	const char *name, *why;
 	double bound_N = incise_plan_bound(plan, REACH_MM);
-	json_t *mapped;
 
 	if (cost->ticks)
 		printf("%s: %.0f ns a tick (99.9 %% below %.0f), ", job->scene.path,
@@ -272,14 +224,12 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 	printf("\ndevices     %s; not touched: %s\n",
 	       job->rig ? "tracker, stepper" : "none without --rig",
 	       job->rig ? "force, camera" : "tracker, stepper, force, camera");
-	mapped = mapped_libraries(found);
-	json_decref(mapped);
 	printf("libraries   not mapped: ");
-	for (size_t i = 0; i < HEAVY; i++)
-		if (!found[i]) {
-			printf("%s%s", comma, heavy[i].name);
-			comma = ", ";
-		}
+	for (size_t i = 0; i < json_array_size(absent); i++)
+		printf("%s%s", i ? ", " : "",
+		       json_string_value(json_array_get(absent, i)));
+	json_decref(mapped);
+	json_decref(absent);
 	printf("\narithmetic  %s", bound_N > 0 ? "fixed" : "double");
 	if (bound_N > 0)
 		printf(", reaction and plane within %.3g mN, certified", bound_N * 1e3);
