@@ -35,35 +35,33 @@ extra_status := $(addprefix $(O)/obj/tools/,state_pages.o state_report.o state_f
 	state_prometheus.o loop_report.o)
 extra_replay := $(addprefix $(O)/obj/tools/,scene_argument.o loop_report.o picture.o \
 	replay_picture.o)
-extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stroke.o stopwatch.o)
-extra_calibrate-force := $(calibrate_all) $(addprefix $(O)/obj/tools/,calibrate_pairs.o \
 extra_plan := $(addprefix $(O)/obj/tools/,scene_argument.o tick_cost.o stroke.o stopwatch.o \
 	mapped_libraries.o)
-extra_calibrate-force := $(addprefix $(O)/obj/tools/,picture.o calibrate_pairs.o \
+extra_calibrate-force := $(calibrate_all) $(addprefix $(O)/obj/tools/,calibrate_pairs.o \
 	calibrate_weights.o calibrate_force_report.o)
 extra_calibrate-depth := $(calibrate_all) $(addprefix $(O)/obj/tools/,depth_wish.o \
 	depth_picture.o depth_frames.o depth_lengths.o depth_corners.o depth_report.o)
-extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o harness.o figures.o \
-	compare.o \
-extra_calibrate-depth := $(addprefix $(O)/obj/tools/,picture.o depth_picture.o depth_frames.o \
-	depth_lengths.o depth_corners.o depth_report.o)
-extra_bench := $(addprefix $(O)/obj/tools/,picture.o machine.o stopwatch.o harness.o yardstick.o figures.o compare.o \
-	bench_precision.o arithmetics.o bench_training.o bench_loop.o tick_cost.o stroke.o \
-	bench_tick.o bench_wakeup.o wakeup_run.o bench_rate.o bench_load.o cyclictest.o child.o \
-	memory_file.o loop_picture.o \
-	bench_stability.o bench_limits.o bench_energy.o bench_guard.o \
-	bench_integrators.o sampled_wall.o integrators.o ratios.o stability_picture.o \
-	bench_vision.o scalpel_picture.o bench_capture.o jpeg_camera.o \
-	bench_pose.o motions.o pose_methods.o pose_error.o pose_picture.o \
-	bench_timeline.o drifting_stream.o time_methods.o timeline_picture.o)
+
+# What all benches share, a line per word, and what of these bench view uses too.
+bench_all := picture machine stopwatch harness yardstick figures compare memory_file
+bench_wakeups := bench_wakeup wakeup_run bench_load cyclictest child bench_tick tick_cost stroke
+extra_bench := $(patsubst %,$(O)/obj/tools/%.o,$(bench_all) $(bench_wakeups) \
+	bench_precision arithmetics \
+	bench_training \
+	bench_loop bench_rate loop_picture \
+	bench_stability bench_limits bench_energy bench_guard bench_integrators sampled_wall \
+	integrators ratios stability_picture \
+	bench_vision scalpel_picture \
+	bench_capture jpeg_camera \
+	bench_pose motions pose_methods pose_error pose_picture \
+	bench_timeline drifting_stream time_methods timeline_picture)
 
 extra_view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o state_pages.o view_job.o \
 	view_real_time.o view_simulated.o view_hand.o view_live.o view_output.o png_file.o)
 
-extra_bench-view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o view_script.o \
-	similarity.o picture.o machine.o stopwatch.o memory_file.o bench_view_frames.o \
-	bench_view_error.o bench_view_live.o view_live.o bench_wakeup.o wakeup_run.o \
-	bench_load.o cyclictest.o child.o bench_tick.o tick_cost.o stroke.o harness.o yardstick.o figures.o compare.o)
+extra_bench-view := $(patsubst %,$(O)/obj/tools/%.o,$(bench_all) $(bench_wakeups) \
+	scene_argument procedure view_script view_live similarity bench_view_frames \
+	bench_view_error bench_view_live)
 
 # What it was built with, for who reads a bench's figures; without the build's own folder.
 $(O)/obj/tools/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \

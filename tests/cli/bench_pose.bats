@@ -65,12 +65,14 @@ at_most() {
 	incise bench pose --quick --json >r.json
 	smooth="motion IN ('line', 'stroke', 'surgeon')"
 	holds "$(at_most library held rms "$smooth") < 0.7"
-	holds "$(at_most library held rms "$smooth AND hz < 1000 AND late = 12") < 0.3"
+	holds "$(at_most library held rms "$smooth AND late = 12") < 0.3"
 	# and even than exact ones that are late, of a tracker of 240 Hz
 	holds "$(at_most library exact_delayed rms "$smooth AND hz = 240") < 0.5"
 	# what it shows does not jump as a pose does that is taken as it is
 	holds "$(at_most library line jump "$smooth") < 0.5"
-	holds "$(at_most library held jump "$smooth") < 0.6"
+	# (at 1000 Hz and 12 ms the noise of a pose is carried twelve periods on)
+	holds "$(at_most library held jump "$smooth AND late = 4") < 0.4"
+	holds "$(at_most library held jump "$smooth") < 0.75"
 	# not told that poses are late it is, as these are
 	holds "$(at_most exact_delayed library_punctual rms "motion = 'stroke'") < 1"
 }

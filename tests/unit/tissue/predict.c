@@ -16,6 +16,7 @@
 
 #define PERIOD_NS (INCISE_NS_PER_S / 120)
 #define LATENCY_NS 4200000
+#define MS_NS 1000000
 #define HAND_MM2_S5 4e6 /* of predict.c */
 #define S 1e-9
 
@@ -369,6 +370,23 @@ static void test_never_further_ahead_than_a_gap(void **state)
 	assert_int_equal(incise_predict_age(&p, INT64_MIN), 0);
 }
 
+/* 12 ms are more than five periods of 1000 Hz, and are made up for all the same. */
+static void test_latency_of_many_periods(void **state)
+{
+	struct incise_tracker_info info = {"test", 1000, 12000000, 1, 0};
+	struct incise_tracker_sample s = {.quaternion = {1}};
+	struct incise_predict p;
+
+	incise_predict_init(&p, &info);
+	for (int i = 0; i < 500; i++) {
+		s.t_ns = i * MS_NS + info.latency_ns;
+		s.position_mm[0] = 0.06 * i;
+		incise_predict_add(&p, &s);
+	}
+	/* An even motion is exact once the start has died away, by 1e-15 and more. */
+	assert_true(fabs(pose_at(&p, s.t_ns + MS_NS).x[0] - 0.06 * (499 + 13)) < 1e-6);
+}
+
 /* Poses a nanosecond apart, each 9 mm on: 9 000 km/s. */
 static void test_speed_is_bounded(void **state)
 {
@@ -476,6 +494,7 @@ int main(void)
 		cmocka_unit_test(test_nonsense_is_passed_over),
 		cmocka_unit_test(test_gap_starts_anew),
 		cmocka_unit_test(test_never_further_ahead_than_a_gap),
+		cmocka_unit_test(test_latency_of_many_periods),
 		cmocka_unit_test(test_speed_is_bounded),
 		cmocka_unit_test(test_only_numbers),
 		cmocka_unit_test(test_new_is_init),
