@@ -5,6 +5,7 @@ headers := $(wildcard lib/include/incise/*.h)
 man_pages := $(wildcard man/*.[1-8])
 scenes := $(wildcard scenes/*.scene scenes/*.fis)
 examples := $(wildcard doc/*.example)
+documents := doc/tutorial.md doc/device-backend.md CHANGELOG.md
 udev_rules := $(wildcard udev/*.rules)
 sysusers := $(wildcard udev/*.sysusers)
 tmpfiles := $(wildcard udev/*.tmpfiles)
@@ -20,6 +21,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
 	$(addprefix $(datadir)/incise/scenes/,$(notdir $(scenes))) \
 	$(addprefix $(datadir)/incise/,$(notdir $(examples))) \
+	$(addprefix $(docdir)/,$(notdir $(documents))) \
 	$(completiondir)/incise \
 	$(addprefix $(udevrulesdir)/,$(notdir $(udev_rules))) \
 	$(addprefix $(sysusersdir)/,$(patsubst %.sysusers,%.conf,$(notdir $(sysusers)))) \
@@ -60,6 +62,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 	done
 	$(INSTALL) -m 644 $(scenes) $(DESTDIR)$(datadir)/incise/scenes
 	$(INSTALL) -m 644 $(examples) $(DESTDIR)$(datadir)/incise
+	$(INSTALL) -m 644 $(documents) $(DESTDIR)$(docdir)
 	$(INSTALL) -m 644 tools/incise.bash $(DESTDIR)$(completiondir)/incise
 	$(INSTALL) -m 644 $(udev_rules) $(DESTDIR)$(udevrulesdir)
 	for file in $(sysusers); do \

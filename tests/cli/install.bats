@@ -50,6 +50,9 @@ setup() {
 		haptic.env.example; do
 		cmp "$root/doc/$example" "$dest/usr/share/incise/$example"
 	done
+	for document in doc/tutorial.md doc/device-backend.md CHANGELOG.md; do
+		cmp "$root/$document" "$dest/usr/share/doc/incise/${document##*/}"
+	done
 	cmp "$root/scenes/liver.scene" "$dest/usr/share/incise/scenes/liver.scene"
 	cmp "$root/tools/incise.bash" "$dest/usr/share/bash-completion/completions/incise"
 	for lib in incise incise-learn incise-record; do
