@@ -6,6 +6,8 @@
 
 [ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ] || skip "a capture" "frames_mkv.so was not built"
 command -v sqlite3 >/dev/null || skip "a capture" "there is no sqlite3 to look into it with"
+# What it asks of the kernel is in camera_vivid and camera_loopback, for each kernel.
+[ "$INCISE_VM_KERNEL" != second ] || skip "a capture" "one kernel is enough for it"
 modprobe vivid n_devs=1 node_types=1 num_inputs=1 input_types=0 2>/dev/null ||
 	skip "vivid" "this kernel has no vivid"
 name=$(cd /sys/class/video4linux && grep -l '^vivid-.*-vid-cap$' video*/name | head -n 1)
@@ -45,8 +47,9 @@ until_rows()
 {
 	i=0
 	until [ "$(sqlite3 -readonly a.rec.part/recording.db "SELECT count(*) FROM $1" \
-		2>/dev/null || echo 0)" -gt "$2" ] || [ $i = 300 ]; do
-		sleep 0.1
+		2>/dev/null || echo 0)" -gt "$2" ] || [ $i = 60 ]; do
+		# starting sqlite3 is most of the work in here
+		sleep 0.5
 		i=$((i + 1))
 	done
 }

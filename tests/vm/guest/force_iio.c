@@ -28,7 +28,7 @@
 
 #define HZ 10000
 #define PERIOD_NS 100000
-#define SECONDS 60
+#define SECONDS 20
 #define MANY (HZ * SECONDS)
 
 static struct incise_force_sample samples[MANY + 65536];
@@ -447,7 +447,7 @@ int main(int argc, char **argv)
 	memset(samples, 1, sizeof(samples));
 	mlockall(MCL_CURRENT | MCL_FUTURE);
 	is_listed();
-	/* The minute on one kernel only: it takes as long as emulated. */
+	/* The long one on one kernel only: it takes as long as emulated. */
 	all_come(INCISE_SIM_TRIGGER, "own trigger",
 		 !virtual_time			     ? 2
 		 : kernel && !strcmp(kernel, "main") ? 10
