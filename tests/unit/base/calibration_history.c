@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/base/calibration_history.c: what is appended is read back the same, what failed is not
  * in force, and a file that is wrong or half written is never taken.

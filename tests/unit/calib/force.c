@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/calib/force.c: figures of made data with known truth; what is wrong is named; the stated
  * interval holds the truth as often as it says.

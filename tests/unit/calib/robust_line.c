@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/calib/robust_line.c: nearly half of the points may be anywhere; without outliers it is
  * the line of least squares.

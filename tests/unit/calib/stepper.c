@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/calib/stepper*.c: actuators of known truth, and what must be refused. The actuator here
  * is not the virtual rig's: its turns are written down in closed form, from the way since the

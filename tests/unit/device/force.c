@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/device/force.c: every call reaches the backend with its arguments, and what the
  * backend says comes back.

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/device/rig_plan.c: what rig.conf and the shorthand say, and what they are refused for.
  */

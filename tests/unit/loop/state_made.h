@@ -1,4 +1,4 @@
-/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * A folder with a state page in it, and ticks of which each number tells the tick's own: a
  * mixture of two shows.

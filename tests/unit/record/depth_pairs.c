@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/record/depth_pairs.c: pictures are put into a recording of the virtual rig by SQL, half
  * way between records of the tracker, where the depth is known by hand.

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/sim/bench.c: backlash, loss, friction and lost steps, each where it can be told by hand;
  * and the force channel, which shows it.

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/sim/random.c: distributions, and streams that keep apart. The seeds are fixed, so
  * a bound of 5 sd is not a matter of luck from run to run.

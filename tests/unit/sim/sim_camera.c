@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/sim/sim_camera.c: the scalpel in the picture is as long as the truth says, measured
  * here from pixels alone; pictures keep their times and count their losses.

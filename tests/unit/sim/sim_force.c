@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/sim/sim_force.c: codes against the true force, noise, clipping, the grid of times.
  */

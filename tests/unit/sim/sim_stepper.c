@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/sim/sim_stepper.c: limits kept, faults told, and a handle that moves as the
  * equation of motion says, however stiff.

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/sim/surgeon.c: smooth motion, the protocol kept, every depth met at every speed.
  */

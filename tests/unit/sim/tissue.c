@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/sim/tissue.c: the stated law, a saw-tooth about 1, a boundary of the stated size.
  */
