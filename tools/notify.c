@@ -29,13 +29,6 @@ static socklen_t address(struct sockaddr_un *to)
 	return (socklen_t)(offsetof(struct sockaddr_un, sun_path) + length);
 }
 
-bool notify_wanted(void)
-{
-	struct sockaddr_un to;
-
-	return address(&to) > 0;
-}
-
 void notify_send(const char *fmt, ...)
 {
 	struct sockaddr_un to;

@@ -7,12 +7,8 @@
 #ifndef INCISE_NOTIFY_H
 #define INCISE_NOTIFY_H
 
-#include <stdbool.h>
 #include <stdint.h>
 #include <incise/export.h>
-
-/* Whether somebody listens. */
-bool notify_wanted(void);
 
 /* Send lines such as "READY=1\nSTATUS=runs". What cannot be sent is lost, and never waits. */
 void notify_send(const char *fmt, ...) INCISE_PRINTF(1, 2);

@@ -35,7 +35,7 @@ long long stepper_steps(const struct incise_stepper_info *info, double mm)
 	return info->step_mm > 0 ? llround(mm / info->step_mm) : 0;
 }
 
-const char *stepper_faults(unsigned int faults, char *text, size_t size)
+static const char *faults_text(unsigned int faults, char *text, size_t size)
 {
 	size_t used = 0;
 
@@ -76,9 +76,8 @@ static bool own_cause(struct incise_stepper *stepper, unsigned int faults, char 
 const char *stepper_why(struct incise_stepper *stepper, unsigned int faults, char *text,
 			size_t size)
 {
-	return own_cause(stepper, faults, text, size)
-		       ? text
-		       : stepper_faults(faults, text, size);
+	return own_cause(stepper, faults, text, size) ? text
+						      : faults_text(faults, text, size);
 }
 
 /* "home, e-stop", or what to say when there is none. */

@@ -12,10 +12,10 @@
 /* Whole microsteps. */
 long long stepper_steps(const struct incise_stepper_info *info, double mm);
 
-/* "e-stop: release it, then clear; late: …"; "" without a fault. Returns text. */
-const char *stepper_faults(unsigned int faults, char *text, size_t size);
-
-/* The same, or, where the device itself tells the cause, that. */
+/*
+ * "e-stop: release it, then clear; late: …", or the cause where the device itself tells it;
+ * "" without a fault. Returns text.
+ */
 const char *stepper_why(struct incise_stepper *stepper, unsigned int faults, char *text,
 			size_t size);
 

@@ -115,11 +115,6 @@ struct incise_realtime *incise_realtime_new(const struct incise_realtime_setup *
 	return realtime;
 }
 
-bool incise_realtime_holds_idle(const struct incise_realtime *realtime)
-{
-	return realtime->idle_fd >= 0;
-}
-
 /* A function of its own, so that what it takes of the stack is free again. */
 static __attribute__((noinline)) void touch(size_t bytes)
 {

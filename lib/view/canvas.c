@@ -330,12 +330,3 @@ const uint8_t *incise_canvas_pixels(const struct incise_canvas *canvas, int leve
 		*stride = (canvas->size >> level) * 4;
 	return canvas->level[level];
 }
-
-size_t incise_canvas_memory(const struct incise_canvas *canvas)
-{
-	size_t bytes = sizeof(*canvas) + (size_t)canvas->tiles * canvas->tiles;
-
-	for (int side = canvas->size; side; side >>= 1)
-		bytes += (size_t)side * side * 4;
-	return bytes + (size_t)canvas->n_layers * canvas->size * canvas->size * 4;
-}

@@ -79,9 +79,6 @@ int incise_canvas_levels(const struct incise_canvas *canvas);
 const uint8_t *incise_canvas_pixels(const struct incise_canvas *canvas, int level,
 				    int *stride);
 
-/* Bytes that were asked for, without the base. */
-size_t incise_canvas_memory(const struct incise_canvas *canvas);
-
 void incise_canvas_free(struct incise_canvas *canvas);
 
 #endif

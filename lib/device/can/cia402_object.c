@@ -17,7 +17,8 @@ const struct cia402_object cia402_operation = {0x6060, 0, 1, "mode of operation"
 const struct cia402_object cia402_operation_now = {0x6061, 0, 1,
 						   "mode of operation display"};
 
-bool cia402_lacks(const struct canopen *master, int rc)
+/* Of the last one that failed: the drive does not have the object. */
+static bool lacks(const struct canopen *master, int rc)
 {
 	return rc == -EREMOTEIO &&
 	       (master->abort == ABORT_NO_OBJECT || master->abort == ABORT_NO_SUB);
@@ -128,7 +129,7 @@ int cia402_ask_if(const struct cia402_talk *talk, const struct cia402_object *ob
 	int rc = read_object(talk, object, value);
 
 	*has = !rc;
-	if (!rc || cia402_lacks(talk->master, rc))
+	if (!rc || lacks(talk->master, rc))
 		return 0;
 	return cia402_failed(talk, object, "read", rc);
 }
@@ -139,7 +140,7 @@ int cia402_keep_if(const struct cia402_talk *talk, const struct cia402_object *o
 	int rc = write_object(talk, object, value);
 
 	*has = !rc;
-	if (cia402_lacks(talk->master, rc))
+	if (lacks(talk->master, rc))
 		return 0;
 	return rc ? cia402_failed(talk, object, "written", rc)
 		  : check(talk, object, value);

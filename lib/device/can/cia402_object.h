@@ -21,9 +21,6 @@ struct cia402_talk {
 	struct incise_error *err;
 };
 
-/* Of the last one that failed: the drive does not have the object. */
-bool cia402_lacks(const struct canopen *master, int rc);
-
 /*
  * Read; write; write and read back. 0; -EOPNOTSUPP (aborted), -ETIMEDOUT, -EPROTO (no sense;
  * not kept), of the bus; the line is made.

@@ -98,9 +98,6 @@ struct incise_realtime;
 INCISE_API struct incise_realtime *incise_realtime_new(
 	const struct incise_realtime_setup *setup, struct incise_error *err);
 
-/** Whether /dev/cpu_dma_latency is held at 0. */
-INCISE_API bool incise_realtime_holds_idle(const struct incise_realtime *realtime);
-
 /**
  * In the loop's thread, before its first tick: touch its stack, go to the CPU, take the
  * policy. The thread must end when this fails. With a CPU, threads that it starts run there
