@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Tests. tests/unit/ROOM/NAME.c tests lib/ROOM/NAME.c, tests/unit/driver what of driver/ builds
-# without a kernel; tests/cli runs the real programs.
+# without a kernel, tests/unit/tools what of tools/ others rest on; tests/cli runs the real programs.
 
 unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_netlink.c) \
 	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \
@@ -34,6 +34,11 @@ emulator := $(O)/obj/tests/polhemus/emulator.o
 unit_emulator = $(if $(filter polhemus/%,$*),$(emulator))
 $(filter $(O)/tests/unit/polhemus/%,$(unit_programs)): $(emulator)
 
+# What of the tools has tests of its own is linked to them.
+unit_tools := $(addprefix $(O)/obj/tools/,harness.o yardstick.o stopwatch.o figures.o compare.o \
+	memory_file.o json.o cli.o)
+$(filter $(O)/tests/unit/tools/%,$(unit_programs)): $(unit_tools)
+
 # They play libusb.
 $(filter %/polhemus_usb %/polhemus_usb_find,$(unit_programs)): private CPPFLAGS += \
 	$(shell $(PKG_CONFIG) --cflags libusb-1.0)
@@ -66,10 +71,12 @@ $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
 		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
 		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(if $(filter vision/%,$*),$(vision_linked)) \
+		$(if $(filter tools/%,$*),$(unit_tools)) \
 		$(if $(filter hdf5/%,$*),$(objects_export_hdf5) $(shell $(PKG_CONFIG) --libs $(pc_export_hdf5))) \
 		$(O)/lib/libincise-tests.a $(if $(filter vision/%,$*),$(libs_vision_opencv)) \
 		$(if $(filter frames/% film/%,$*),$(libs_frames_tests)) \
-		$(all_libs) $(shell $(PKG_CONFIG) --libs cmocka) -lm
+		$(all_libs) $(if $(filter tools/%,$*),$(shell $(PKG_CONFIG) --libs jansson)) \
+		$(shell $(PKG_CONFIG) --libs cmocka) -lm
 
 check: ## install what is missing, build, and run all tests
 	@mk/deps build check demo

@@ -32,9 +32,9 @@ draws() {
 	echo "$output" >r.json
 	[ "$(key r.json quick)" = 1 ]
 	[ -n "$(key r.json renderer)" ]
-	[ "$(key r.json frames[0].texture_px) $(key r.json frames[0].width)" = "2048 1280" ]
+	[ "$(key r.json frames[0].texture_px) $(key r.json frames[0].width)" = "1024 1280" ]
 	holds "$(key r.json frames[0].triangles) >= 19000"
-	for i in 0 1 2 3 4 5; do
+	for i in 0 1 2; do
 		for part in effects texture draw whole; do
 			median=$(key r.json "frames[$i].${part}_ms.median")
 			holds "$median > 0 && $median <= $(key r.json "frames[$i].${part}_ms.p99")"
@@ -42,17 +42,19 @@ draws() {
 		holds "$(key r.json "frames[$i].texels") > 0"
 	done
 	# of the same ticks: the finer the texture, the nearer; the more frames, the nearer
-	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '$.shown.rows')")" = 15 ]
+	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '$.shown.rows')")" = 7 ]
+	[ "$(key r.json shown.exact_texture_px)" = 1024 ]
 	exact() {
 		sqlite3 :memory: "SELECT json_extract(value, '\$.$2')
 			FROM json_each(readfile('r.json'), '\$.shown.rows')
 			WHERE json_extract(value, '\$.texture_px') = $1
 			AND json_extract(value, '\$.fps') IS ${3:-NULL}"
 	}
-	holds "$(exact 512 rms) > $(exact 1024 rms) && $(exact 1024 rms) > $(exact 2048 rms)"
-	holds "$(exact 512 ssim) < $(exact 1024 ssim) && $(exact 2048 ssim) < 1"
-	holds "$(exact 4096 rms 15) > $(exact 4096 rms 60) && $(exact 4096 rms 60) > 0"
-	holds "$(exact 2048 rms 15) > $(exact 2048 rms)"
+	holds "$(exact 512 rms) > 0 && $(exact 512 rms 60) > $(exact 1024 rms 60)"
+	holds "$(exact 512 ssim 60) < $(exact 1024 ssim 60) && $(exact 512 ssim) < 1"
+	holds "$(exact 1024 rms 15) > $(exact 1024 rms 60) && $(exact 1024 rms 60) > 0"
+	holds "$(exact 512 rms 15) > $(exact 512 rms)"
+	incise bench compare r.json r.json
 	# no cut is lost, however busy the machine
 	[ "$(key r.json absorbed.lost)" = 0 ]
 	holds "$(key r.json absorbed.ticks) > 0 && $(key r.json absorbed.stamps) > 0"
@@ -60,7 +62,7 @@ draws() {
 	holds "$(key r.json beside.runs[1].frames_hz) > 0"
 	holds "$(key r.json beside.p999_us) > 0 && $(key r.json beside.p999_view_us) > 0"
 	[ "$(head -c 8 "a folder/v.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
-	grep -q 'texture 2048' "a folder/v.svg"
+	grep -q 'texture 1024' "a folder/v.svg"
 }
 
 @test "bench view: bad usage" {

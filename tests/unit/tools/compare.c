@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * tools/compare.c, on reports that are made: how often it calls two runs of one distribution
+ * different, and what it finds.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <math.h>
+#include "../../../tools/compare.h"
+#include "../../../tools/figures.h"
+
+#define TURNS 101
+#define PAIRS 500
+#define BENCH_NS 100
+
+static double uniform(uint64_t *state)
+{
+	*state = *state * 6364136223846793005u + 1442695040888963407u;
+	return ((*state >> 11) + 0.5) * 0x1p-53;
+}
+
+static double normal(uint64_t *state)
+{
+	double angle = 2 * M_PI * uniform(state);
+
+	return sqrt(-2 * log(uniform(state))) * cos(angle);
+}
+
+/* What slows each kind of work down. */
+struct made {
+	double slower, chain, wide, memory;
+};
+
+static json_t *report_of(json_t *figures)
+{
+	return json_pack("{so}", "figures", figures);
+}
+
+/* Values that are off by a tenth, around what the machine and the build make of them. */
+static json_t *made_report(const struct made *made, uint64_t *random)
+{
+	const double unit[YARDSTICKS] = {made->chain, made->wide, made->memory};
+	double ns[TURNS], by[TURNS];
+	struct harness_time time;
+	json_t *figures = figures_new();
+
+	for (int i = 0; i < TURNS; i++)
+		ns[i] = BENCH_NS * made->slower * exp(0.1 * normal(random));
+	harness_spread(ns, TURNS, &time.ns);
+	for (int y = 0; y < YARDSTICKS; y++) {
+		for (int i = 0; i < TURNS; i++)
+			by[i] = ns[i] / (1e4 * unit[y]);
+		harness_spread(by, TURNS, &time.by[y]);
+	}
+	figures_time(figures, &time, "ns", "time");
+	figures_measured(figures, &time.ns, "ns", "measured");
+	figures_exact(figures, 1.0 / 3, "N", "exact");
+	return report_of(figures);
+}
+
+static json_t *compared(json_t *was, json_t *is)
+{
+	struct incise_error err = {0};
+	json_t *comparison = compare_reports(was, "OLD", is, "NEW", &err);
+
+	if (!comparison)
+		fail_msg("%s", err.text);
+	json_decref(was);
+	json_decref(is);
+	return comparison;
+}
+
+static int count(const json_t *comparison, const char *key)
+{
+	const json_t *is = json_object_get(comparison, key);
+
+	return json_is_array(is) ? (int)json_array_size(is) : (int)json_integer_value(is);
+}
+
+/* How many figures of so many pairs get worse, and better. */
+static void tally(const struct made *was, const struct made *is, int *worse, int *better)
+{
+	uint64_t random = 1;
+
+	*worse = *better = 0;
+	for (int i = 0; i < PAIRS; i++) {
+		json_t *old = made_report(was, &random);
+		json_t *comparison = compared(old, made_report(is, &random));
+
+		assert_int_equal(count(comparison, "same") + count(comparison, "changed"),
+				 3);
+		*worse += count(comparison, "worse");
+		*better += count(comparison, "better");
+		json_decref(comparison);
+	}
+}
+
+static const struct made steady = {1, 1, 1, 1};
+
+static void test_the_same_is_the_same(void **state)
+{
+	int worse, better;
+
+	tally(&steady, &steady, &worse, &better);
+	/* At most 5 % of the pairs: intervals of 95 % that are apart are rare even without a
+	 * floor below which nothing is called. */
+	assert_true(worse + better <= PAIRS / 20);
+}
+
+static void test_slower_is_found(void **state)
+{
+	struct made slow = {1.15, 1, 1, 1};
+	int worse, better;
+
+	/* Of a median of 101 values that are off by a tenth half an interval is 3 %: twice that
+	 * and the 5 % that are called nothing are all but always below 15 %. */
+	tally(&steady, &slow, &worse, &better);
+	assert_true(worse > PAIRS * 0.6 && !better);
+	tally(&slow, &steady, &worse, &better);
+	assert_true(better > PAIRS * 0.6 && !worse);
+}
+
+/* One figure of a time, in each yardstick, all off by 1 %: as a quiet machine gives it. */
+static json_t *sharp(double value, double chain, double wide, double memory)
+{
+	const double unit[YARDSTICKS] = {chain, wide, memory};
+	struct harness_time time;
+	json_t *figures = figures_new();
+
+	time.ns = (struct harness_spread){value, value, value, value, value};
+	for (int y = 0; y < YARDSTICKS; y++) {
+		double by = value / unit[y];
+
+		time.by[y] = (struct harness_spread){by, by, by, 0.99 * by, 1.01 * by};
+	}
+	figures_time(figures, &time, "us", "time");
+	return report_of(figures);
+}
+
+static void test_sharp_times(void **state)
+{
+	static const struct {
+		double slower, chain, wide, memory;
+		int worse, better;
+	} cases[] = {
+		{1, 1, 1, 1, 0, 0},	     {1.03, 1, 1, 1, 0, 0},
+		{1.1, 1, 1, 1, 1, 0}, /* ten percent are found */
+		{0.9, 1, 1, 1, 0, 1},	     {2, 2, 2, 2, 0, 0}, /* it is the machine */
+		{2.2, 2, 2, 2, 1, 0},				 /* and the program */
+		{1.5, 1.05, 1.5, 1.3, 0, 0}, /* of a core that is shared */
+		{1.8, 1.05, 1.5, 1.3, 0, 0}, /* it cannot be told */
+		{3, 1.05, 1.5, 1.3, 1, 0},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		json_t *c = compared(sharp(7, 1, 1, 1),
+				     sharp(7 * cases[i].slower, cases[i].chain,
+					   cases[i].wide, cases[i].memory));
+
+		if (count(c, "worse") != cases[i].worse ||
+		    count(c, "better") != cases[i].better)
+			fail_msg("case %zu: %d worse, %d better", i, count(c, "worse"),
+				 count(c, "better"));
+		json_decref(c);
+	}
+}
+
+static json_t *exact(double a, double b, bool more)
+{
+	json_t *figures = figures_new(), *figure;
+
+	figures_exact(figures, a, "N", "a");
+	figure = figures_exact(figures, b, "N", "b");
+	if (more)
+		figures_more_is_better(figure);
+	return report_of(figures);
+}
+
+static void test_exact_ones(void **state)
+{
+	static const struct {
+		double was, is;
+		bool more;
+		int worse, better, gone, new_ones;
+	} cases[] = {
+		{1, 1, false, 0, 0, 0, 0},
+		{1, 1 + 1e-11, false, 0, 0, 0, 0}, /* a digit that is not printed */
+		{1, 1.0001, false, 1, 0, 0, 0},
+		{1, 1.0001, true, 0, 1, 0, 0},
+		{1, 0.5, false, 0, 1, 0, 0},
+		{1, 0.5, true, 1, 0, 0, 0},
+		{0, 0, false, 0, 0, 0, 0},
+		{0, 1e-30, false, 1, 0, 0, 0}, /* no longer nothing */
+		{-1, 1, false, 1, 0, 0, 0},
+		{1, NAN, false, 0, 0, 1, 0}, /* it failed: is not there */
+		{INFINITY, 1, false, 0, 0, 0, 1},
+		{1e308, -1e308, false, 0, 1, 0, 0},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		json_t *c = compared(exact(5, cases[i].was, cases[i].more),
+				     exact(5, cases[i].is, cases[i].more));
+
+		if (count(c, "worse") != cases[i].worse ||
+		    count(c, "better") != cases[i].better ||
+		    count(c, "gone") != cases[i].gone ||
+		    count(c, "new") != cases[i].new_ones)
+			fail_msg("case %zu: %d worse, %d better, %d gone, %d new", i,
+				 count(c, "worse"), count(c, "better"), count(c, "gone"),
+				 count(c, "new"));
+		assert_int_equal(compare_worse(c), cases[i].worse + cases[i].gone);
+		json_decref(c);
+	}
+}
+
+static void test_another_unit_is_another_figure(void **state)
+{
+	json_t *was = figures_new(), *is = figures_new(), *c;
+
+	figures_exact(was, 1, "N", "a");
+	figures_exact(is, 1, "mN", "a");
+	figures_exact(was, 1, "N", "b");
+	figures_exact(is, 1, "N", "b");
+	c = compared(report_of(was), report_of(is));
+	assert_int_equal(count(c, "gone"), 1);
+	assert_int_equal(count(c, "new"), 1);
+	assert_int_equal(count(c, "same"), 1);
+	json_decref(c);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_the_same_is_the_same),
+		cmocka_unit_test(test_slower_is_found),
+		cmocka_unit_test(test_sharp_times),
+		cmocka_unit_test(test_exact_ones),
+		cmocka_unit_test(test_another_unit_is_another_figure),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
