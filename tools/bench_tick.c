@@ -48,7 +48,7 @@ static const struct {
 
 _Static_assert(OWN == BENCH_TICK_ROWS, "room for each");
 
-static struct memory_file write_sheet(int cells)
+struct memory_file bench_tick_sheet(int cells)
 {
 	struct memory_file file = memory_file_begin("sheet");
 	int side = cells + 1;
@@ -140,7 +140,7 @@ static void load_own(int i, struct tick_row *row)
 
 	cli_progress("%s", own[i].name);
 	if (own[i].cells)
-		sheet = write_sheet(own[i].cells);
+		sheet = bench_tick_sheet(own[i].cells);
 	scene = write_scene(i, sheet.path, 1000);
 	row->name = own[i].name;
 	row->triangles = 2 * (size_t)own[i].cells * own[i].cells;

@@ -32,6 +32,9 @@ int bench_tick(const char *scene, bool quick, struct tick_row rows[BENCH_TICK_RO
 /* The bench's own plane as a file, for so many ticks a second. */
 struct memory_file bench_tick_plane(double rate_hz);
 
+/* A sheet of waves as an OBJ file, with so many cells of two triangles along each side. */
+struct memory_file bench_tick_sheet(int cells);
+
 json_t *tick_row_json(const struct tick_row *row);
 
 /* {"median", "p99", "p999"} in ns. */

@@ -8,6 +8,7 @@
 #include "bench_loop.h"
 #include "bench_pose.h"
 #include "bench_precision.h"
+#include "bench_scenes.h"
 #include "bench_stability.h"
 #include "bench_timeline.h"
 #include "bench_training.h"
@@ -15,7 +16,15 @@
 #include "cli.h"
 #include "compare.h"
 
-enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION, OPT_LOAD, OPT_AGAINST };
+enum {
+	OPT_JSON = CLI_LONG,
+	OPT_PLOT,
+	OPT_QUICK,
+	OPT_DURATION,
+	OPT_LOAD,
+	OPT_PROFILE,
+	OPT_AGAINST,
+};
 
 static const struct cli_option options[] = {
 	{OPT_JSON, "json", NULL, "report as JSON"},
@@ -30,36 +39,32 @@ static const struct cli_option options[] = {
 	 "of each run of capture, and each of loop's wake-ups:\n10min; default 10s"},
 	{OPT_LOAD, "load", "NAME",
 	 "loop: wake-ups under one load only: idle, cpu,\nmemory, disk or view"},
+	{OPT_PROFILE, "profile", "WHICH",
+	 "scenes: only run some ticks of one, with the stages\nthat it needs or with all: needed or full; for perf\nstat or callgrind"},
 	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
 	{0},
 };
 
 static const struct cli_verb verb = {
 	.name = "bench",
-	.synopsis =
-		"precision [MODEL.fis] | training | stability | loop [SCENE] | vision | capture "
-		"[RUN] | pose | timeline | view [SCENE] | compare OLD.json NEW.json [OPTIONS]",
+	.synopsis = "WORD [OPERAND...] [OPTIONS]\n"
+		    "       incise bench compare OLD.json NEW.json [--json]",
 	.summary =
-		"precision: measure error against run time of a model's arithmetics. Without\n"
-		"MODEL a model of the paper's size (20 rules) is made.\n"
-		"training: measure how long training takes on data of the paper's size.\n"
-		"stability: find how stiff a virtual wall may be, simulated and computed; the\n"
-		"guard of passivity on and off; integrators of a stiff spring.\n"
-		"loop: measure what a tick of the haptic loop costs with all forces, on a plane\n"
-		"and on meshes of 20 000 and 500 000 triangles, or of SCENE; how late the machine\n"
-		"wakes it, idle and under loads, beside cyclictest; and the error of the force over\n"
-		"the loop's rate.\n"
-		"vision: measure error and run time of the exposed length in pictures whose truth\n"
-		"is known.\n"
-		"capture: measure how much of a core it takes to record all streams in real time,\n"
-		"and with parts left out; or one RUN of these.\n"
-		"pose: measure how far off the pose is that the loop is given, over the rate and\n"
-		"the delay of the tracker and what it costs; and what losses of poses do.\n"
-		"timeline: measure how far off the times are that samples get which come late, by\n"
-		"a clock that drifts, over how much was seen and what it costs.\n"
-		"view: measure what the picture of a scene costs, and how far off it is; see\n"
-		"'incise bench view --help'.\n"
-		"compare: say what changed beyond noise between two reports of --json.",
+		"Measure error against run time, and what is stable; tables, JSON, pictures.\n"
+		"  precision [MODEL.fis]  arithmetics of a model, without MODEL of the paper's size\n"
+		"  training               error on unseen cuts over the seconds that training takes\n"
+		"  stability              how stiff a virtual wall may be, simulated and computed;\n"
+		"                         the guard of passivity; integrators of a stiff spring\n"
+		"  loop [SCENE]           cost of a tick; how late the machine wakes the loop, idle\n"
+		"                         and under loads, beside cyclictest; error over its rate\n"
+		"  pose                   error of the pose over the tracker's rate, delay and cost\n"
+		"  timeline               error of times of samples that come late, by a clock that\n"
+		"                         drifts, over how much was seen and the cost\n"
+		"  vision                 error of the exposed length over the time per picture\n"
+		"  capture [RUN]          how much of a core it takes to record all streams\n"
+		"  scenes [SCENE...]      what each scene leaves out, and what that saves\n"
+		"  view [SCENE]           the picture of a scene: see 'incise bench view --help'\n"
+		"compare says what changed beyond noise between two reports of --json.",
 	.options = options,
 	.notes =
 		"Exit: 0 measured, 1 failed, simulation and theory differ, or figures got worse,\n"
@@ -70,7 +75,10 @@ static const struct cli_verb verb = {
 struct job {
 	bool json, quick;
 	double seconds; /* 0: not given */
-	const char *plot, *load, *against, *operand;
+	const char *plot, *load, *profile, *against;
+	const char *operand; /* the first, or NULL */
+	char **operands;
+	int n_operands;
 };
 
 static void precision(const struct job *job)
@@ -122,15 +130,34 @@ static void timeline(const struct job *job)
 	bench_timeline(job->json, job->quick, job->plot);
 }
 
+static void scenes(const struct job *job)
+{
+	if (job->profile && job->n_operands != 1)
+		cli_usage("--profile is of one scene, got %d", job->n_operands);
+	if (job->profile)
+		bench_scenes_profile(job->operand, !strcmp(job->profile, "full"));
+	else
+		bench_scenes(job->operands, job->n_operands, job->json, job->quick,
+			     job->plot);
+}
+
+/* Options that not every word takes. */
+enum { PLOT = 1, DURATION = 2, LOAD = 4, PROFILE = 8 };
+
 static const struct {
 	const char *word;
-	bool operand, plot; /* takes one */
+	int operands, options; /* at most; of those above */
 	void (*run)(const struct job *job);
 } words[] = {
-	{"precision", true, true, precision},  {"training", false, false, training},
-	{"stability", false, true, stability}, {"loop", true, true, loop},
-	{"vision", false, false, vision},      {"capture", true, false, capture},
-	{"pose", false, true, pose},	       {"timeline", false, true, timeline},
+	{"precision", 1, PLOT, precision},
+	{"training", 0, 0, training},
+	{"stability", 0, PLOT, stability},
+	{"loop", 1, PLOT | DURATION | LOAD, loop},
+	{"pose", 0, PLOT, pose},
+	{"timeline", 0, PLOT, timeline},
+	{"vision", 0, 0, vision},
+	{"capture", 1, DURATION, capture},
+	{"scenes", BENCH_SCENES_MOST, PLOT | PROFILE, scenes},
 };
 #define WORDS (int)(sizeof(words) / sizeof(*words))
 
@@ -141,7 +168,8 @@ static int compare(const struct job *job, int argc, char **argv)
 
 	if (argc != 3)
 		cli_usage("expected 'compare' and two reports");
-	if (job->plot || job->load || job->against || job->quick || job->seconds > 0)
+	if (job->plot || job->load || job->profile || job->against || job->quick ||
+	    job->seconds > 0)
 		cli_usage("'compare' takes no option but --json");
 	for (int i = 0; i < 2; i++) {
 		reports[i] = compare_load(argv[1 + i], &err);
@@ -157,53 +185,86 @@ static int compare(const struct job *job, int argc, char **argv)
 	return 0;
 }
 
-int main(int argc, char **argv)
+/* An option that was given goes with the word, or is bad usage. */
+static void allow(int what, bool given, int option, const char *name)
 {
-	struct job job = {0};
-	int opt, what = 0;
+	if (given && !(words[what].options & option))
+		cli_usage("--%s does not go with '%s'", name, words[what].word);
+}
 
+static int word_of(int argc, char **argv)
+{
+	if (argc < 1)
+		cli_usage("expected what to measure, such as 'precision'");
+	for (int i = 0; i < WORDS; i++) {
+		if (strcmp(argv[0], words[i].word))
+			continue;
+		if (argc - 1 > words[i].operands)
+			cli_usage("'%s' takes at most %d operand%s, got %d",
+				  words[i].word, words[i].operands,
+				  words[i].operands == 1 ? "" : "s", argc - 1);
+		return i;
+	}
+	if (!strcmp(argv[0], "view") || !strcmp(argv[0], "all"))
+		cli_usage("'%s' stands right behind 'incise bench'%s", argv[0],
+			  *argv[0] == 'a' ? ""
+					  : ", and is built where SDL2, libepoxy, cairo "
+					    "and EGL are");
+	cli_usage("'%s' is nothing that can be measured", argv[0]);
+}
+
+static void parse(struct job *job, int argc, char **argv)
+{
+	int opt;
+
+	*job = (struct job){0};
 	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
 		switch (opt) {
 		case OPT_JSON:
-			job.json = true;
+			job->json = true;
 			break;
 		case OPT_PLOT:
-			job.plot = optarg;
+			job->plot = optarg;
 			break;
 		case OPT_DURATION:
-			job.seconds = cli_duration("duration", optarg, 1, 86400);
+			job->seconds = cli_duration("duration", optarg, 1, 86400);
 			break;
 		case OPT_LOAD:
-			job.load = optarg;
+			job->load = optarg;
+			break;
+		case OPT_PROFILE:
+			job->profile = optarg;
+			if (strcmp(optarg, "needed") && strcmp(optarg, "full"))
+				cli_usage("--profile: '%s' is neither needed nor full",
+					  optarg);
 			break;
 		case OPT_QUICK:
-			job.quick = true;
+			job->quick = true;
 			break;
 		case OPT_AGAINST:
-			job.against = optarg;
+			job->against = optarg;
 			break;
 		}
-	if (optind < argc && !strcmp(argv[optind], "compare"))
-		return compare(&job, argc - optind, argv + optind);
-	while (optind < argc && what < WORDS && strcmp(argv[optind], words[what].word))
-		what++;
-	if (optind < argc && !strcmp(argv[optind], "view"))
-		cli_usage("'view' stands right behind 'incise bench', and is built where "
-			  "SDL2, libepoxy, cairo and EGL are");
-	if (optind >= argc || what == WORDS ||
-	    argc - optind > (words[what].operand ? 2 : 1))
-		cli_usage(
-			"expected 'training', 'stability', 'vision', 'pose', 'timeline', "
-			"'precision' and at most one model, 'loop' and at most one scene, "
-			"'capture' and at most one run, or 'compare' and two reports");
-	if (job.plot && !words[what].plot)
-		cli_usage("--plot goes with 'precision', 'stability', 'loop', 'pose' and "
-			  "'timeline'");
-	if (job.seconds > 0 && words[what].run != capture && words[what].run != loop)
-		cli_usage("--duration goes with 'capture' and 'loop'");
-	if (job.load && words[what].run != loop)
-		cli_usage("--load goes with 'loop'");
-	job.operand = argc - optind == 2 ? argv[optind + 1] : NULL;
+}
+
+int main(int argc, char **argv)
+{
+	struct job job;
+	int what;
+
+	parse(&job, argc, argv);
+	argc -= optind;
+	argv += optind;
+	if (argc && !strcmp(argv[0], "compare"))
+		return compare(&job, argc, argv);
+	what = word_of(argc, argv);
+	allow(what, job.plot, PLOT, "plot");
+	allow(what, job.seconds > 0, DURATION, "duration");
+	allow(what, job.load, LOAD, "load");
+	allow(what, job.profile, PROFILE, "profile");
+	job.operands = argv + 1;
+	job.n_operands = argc - 1;
+	job.operand = argc > 1 ? argv[1] : NULL;
 	if (job.against) {
 		compare_against(job.against, job.json);
 		job.json = true;

@@ -46,8 +46,11 @@ json_t *mapped_libraries(pid_t pid)
 	maps = fopen(line, "re");
 	while (maps && fgets(line, sizeof(line), maps)) {
 		char *name = strrchr(line, '/');
+		char code = 0;
 
-		if (!name || !strstr(name, ".so"))
+		/* Those with code: the loader maps a list of all names for a moment. */
+		if (sscanf(line, "%*s %*c%*c%c", &code) != 1 || code != 'x' || !name ||
+		    !strstr(name, ".so"))
 			continue;
 		name++;
 		name[strcspn(name, "\n")] = 0;

@@ -17,24 +17,37 @@ void scene_argument_arith(struct scene_argument *argument, const char *text)
 	argument->arith = text;
 }
 
-/* A name is a scene of this folder, of this machine, or one that came with the program. */
-static void find(struct scene_argument *argument, const char *name)
-{
-	static char path[PATH_MAX];
-	char own[PATH_MAX + 30];
-	const char *places[] = {".", "/etc/incise/scenes", own};
+#define OF_MACHINE "/etc/incise/scenes"
 
-	snprintf(own, sizeof(own), "%s/../share/incise/scenes", cli_folder());
+const char *scene_argument_shipped(void)
+{
+	static char folder[PATH_MAX + 30];
+
+	snprintf(folder, sizeof(folder), "%s/../share/incise/scenes", cli_folder());
+	return folder;
+}
+
+bool scene_argument_find(struct scene_argument *argument, const char *operand)
+{
+	const char *places[] = {".", OF_MACHINE, scene_argument_shipped()};
+	char path[PATH_MAX];
+
+	argument->path = operand;
+	if (strchr(operand, '/') || !access(operand, F_OK) || strstr(operand, ".scene"))
+		return true;
+	/* A name is a scene of this folder, of this machine, or a shipped one. */
 	for (size_t i = 0; i < sizeof(places) / sizeof(*places); i++) {
-		if (snprintf(path, sizeof(path), "%s/%s.scene", places[i], name) <
-			    (int)sizeof(path) &&
-		    !access(path, F_OK)) {
-			argument->path = !i ? path + 2 : path;
-			return;
-		}
+		if (snprintf(path, sizeof(path), "%s/%s.scene", places[i], operand) >=
+			    (int)sizeof(path) ||
+		    access(path, F_OK))
+			continue;
+		/* Lives as long as the program. */
+		argument->path = strdup(!i ? path + 2 : path);
+		if (!argument->path)
+			cli_fail("no memory");
+		return true;
 	}
-	cli_fail("there is no file %s, and no %s.scene in this folder, in %s or in %s",
-		 name, name, places[1], own);
+	return false;
 }
 
 void scene_argument_operand(struct scene_argument *argument, int argc, char **argv,
@@ -42,10 +55,10 @@ void scene_argument_operand(struct scene_argument *argument, int argc, char **ar
 {
 	if (first + 1 != argc)
 		cli_usage("expected one scene, got %d", argc - first);
-	argument->path = argv[first];
-	if (!strchr(argv[first], '/') && access(argv[first], F_OK) &&
-	    !strstr(argv[first], ".scene"))
-		find(argument, argv[first]);
+	if (!scene_argument_find(argument, argv[first]))
+		cli_fail(
+			"there is no file %s, and no %s.scene in this folder, in %s or in %s",
+			argv[first], argv[first], OF_MACHINE, scene_argument_shipped());
 }
 
 struct incise_scene *scene_argument_read(const struct scene_argument *argument,

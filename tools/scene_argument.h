@@ -5,6 +5,7 @@
 #ifndef INCISE_SCENE_ARGUMENT_H
 #define INCISE_SCENE_ARGUMENT_H
 
+#include <stdbool.h>
 #include <incise/scene.h>
 
 struct scene_argument {
@@ -22,6 +23,12 @@ void scene_argument_arith(struct scene_argument *argument, const char *text);
  */
 void scene_argument_operand(struct scene_argument *argument, int argc, char **argv,
 			    int first);
+
+/* The same of one of several operands. @return false: there is none of that name. */
+bool scene_argument_find(struct scene_argument *argument, const char *operand);
+
+/* The folder of the scenes that came with the program; lives as long as it. */
+const char *scene_argument_shipped(void);
 
 /* Read it; NULL with errno and @err when that fails. To be freed. */
 struct incise_scene *scene_argument_read(const struct scene_argument *argument,

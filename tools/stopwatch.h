@@ -9,6 +9,9 @@
 /* CLOCK_MONOTONIC, ns. */
 double stopwatch_ns(void);
 
+/* What reading it twice adds to a time, ns: measured now. */
+double stopwatch_own_ns(void);
+
 void stopwatch_sort(double *times, int n);
 
 /* Of sorted times: nearest rank; q from 0 to 1. */

@@ -16,20 +16,6 @@ static const struct incise_tracker_info usual_tracker = {
 	.latency_ns = 4200000,
 };
 
-/* What reading the clock twice adds to a time, ns. */
-static double clock_cost(void)
-{
-	static double times[10001];
-	const int n = sizeof(times) / sizeof(*times);
-
-	for (int i = 0; i < n; i++) {
-		times[i] = stopwatch_ns();
-		times[i] = stopwatch_ns() - times[i];
-	}
-	stopwatch_sort(times, n);
-	return stopwatch_middle(times, n);
-}
-
 struct tick_course {
 	struct incise_plan *plan;
 	const struct incise_tracker_info *tracker;
@@ -50,7 +36,7 @@ struct tick_course *tick_course_new(const struct incise_scene *scene,
 		cli_fail("no memory");
 	course->tracker = tracker ? tracker : &usual_tracker;
 	course->period_ns = llrint(1e9 / incise_scene_rate_hz(scene));
-	course->clock_ns = clock_cost();
+	course->clock_ns = stopwatch_own_ns();
 	course->plan = incise_plan_new_fed(scene, course->tracker, &err);
 	if (!course->plan)
 		cli_fail_with(&err);

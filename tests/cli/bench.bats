@@ -253,9 +253,9 @@ row() {
 	run --separate-stderr incise bench
 	bad_usage "'precision'"
 	run --separate-stderr incise bench nothing
-	bad_usage "'precision'"
+	bad_usage "'nothing' is nothing that can be measured"
 	run --separate-stderr incise bench precision a b
-	bad_usage "at most one model"
+	bad_usage "'precision' takes at most 1 operand, got 2"
 	for name in "" a/ a/.png "a'b" 'a;b' '$(id)' 'a b'; do
 		run --separate-stderr incise bench precision --quick --plot "$name"
 		bad_usage "--plot"
@@ -432,7 +432,7 @@ rate() {
 	run --separate-stderr incise bench loop --load much
 	bad_usage "'much' is none of idle, cpu, memory, disk and view"
 	run --separate-stderr incise bench training --load cpu
-	bad_usage "--load goes with 'loop'"
+	bad_usage "--load does not go with 'training'"
 	run --separate-stderr incise bench loop none.scene
 	failed_with none.scene
 }
@@ -539,7 +539,7 @@ rate() {
 		holds "$(key r.json "rows[$k].us") <= $(key r.json "rows[$k].us_p99")"
 	done
 	run -2 --separate-stderr incise bench vision --plot x
-	bad_usage "--plot goes with"
+	bad_usage "--plot does not go with 'vision'"
 }
 
 # Pictures need modules: OpenCV's for the run `full`, libavformat's and libjpeg for all.
@@ -582,7 +582,7 @@ needs_pictures() {
 	TMPDIR=$PWD/t incise bench capture without_camera --duration 1s >text
 	grep -q '^without_camera ' text
 	run --separate-stderr incise bench vision --duration 1s
-	bad_usage "--duration goes with 'capture' and 'loop'"
+	bad_usage "--duration does not go with 'vision'"
 }
 
 @test "bench capture that is interrupted, or has no room, leaves nothing behind" {

@@ -186,7 +186,7 @@ at_most() {
 		run --separate-stderr incise bench $word more
 		bad_usage "'$word'"
 		run --separate-stderr incise bench $word --duration 1s
-		bad_usage "--duration goes with"
+		bad_usage "--duration does not go with"
 		run --separate-stderr incise bench $word --plot a/
 		bad_usage "--plot"
 	done

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Scenes for incise bench scenes; see made_scenes.h.
+ */
+#include "bench_tick.h"
+#include "made_scenes.h"
+
+#define ALL                                                    \
+	"tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; " \
+	"damping_N_s_mm = 0.0005;\n  insertion_N_mm = 0.28; "  \
+	"spread_N_mm = 0.22; };\neffects = { average_ticks = 8; guard = true; };\n"
+#define SPHERE                                                           \
+	"surface = { kind = \"sphere\"; centre_mm = [0.0, 0.0, -50.0]; " \
+	"radius_mm = 50.0; };\n"
+#define REACTION "tissue = { reaction_N_mm = 0.14; };\n"
+#define MESH "surface = { kind = \"mesh\"; file = \"%s\"; };\n"
+
+/* Along each side of the sheet, two triangles each: 20 000. */
+#define CELLS 100
+
+static const struct {
+	const char *name, *text;
+	bool mesh, kept;
+} scenes[] = {
+	{"plane_reaction", REACTION, false, false},
+	{"plane_kept", REACTION, false, true},
+	{"plane_constraint", "tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; };\n",
+	 false, false},
+	{"sphere_all", SPHERE ALL, false, false},
+	{"sphere_all_fixed", "arithmetic = \"fixed\";\n" SPHERE ALL, false, false},
+	{"mesh_reaction", MESH REACTION, true, false},
+	{"mesh_all", MESH ALL, true, false},
+};
+
+_Static_assert(sizeof(scenes) / sizeof(*scenes) == MADE_SCENES, "room for each");
+
+void made_scene_begin(struct made_scene *made, int number)
+{
+	*made = (struct made_scene){
+		.name = scenes[number].name,
+		.kept = scenes[number].kept,
+		.scene = memory_file_begin(scenes[number].name),
+	};
+	if (scenes[number].mesh) {
+		made->sheet = bench_tick_sheet(CELLS);
+		fprintf(made->scene.file, scenes[number].text, made->sheet.path);
+	} else {
+		fputs(scenes[number].text, made->scene.file);
+	}
+	memory_file_written(&made->scene);
+}
+
+void made_scene_end(struct made_scene *made)
+{
+	fclose(made->scene.file);
+	if (made->sheet.file)
+		fclose(made->sheet.file);
+}
