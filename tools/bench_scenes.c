@@ -248,6 +248,8 @@ static json_t *row_json(const struct scene_row *row)
 	json_object_set_new(object, "times_cheaper", json_number(times_cheaper(row)));
 	json_object_set_new(object, "ticks_compared",
 			    json_integer(row->saving.ticks_compared));
+	json_object_set_new(object, "ticks_in_contact",
+			    json_integer(row->saving.ticks_in_contact));
 	json_object_set_new(object, "first_difference",
 			    row->saving.first_difference < 0
 				    ? json_null()

@@ -12,6 +12,8 @@
 #define SPHERE                                                           \
 	"surface = { kind = \"sphere\"; centre_mm = [0.0, 0.0, -50.0]; " \
 	"radius_mm = 50.0; };\n"
+#define DOUBLE "arithmetic = \"double\";\n"
+#define FIXED "arithmetic = \"fixed\";\n"
 #define REACTION "tissue = { reaction_N_mm = 0.14; };\n"
 #define MESH "surface = { kind = \"mesh\"; file = \"%s\"; };\n"
 
@@ -22,14 +24,14 @@ static const struct {
 	const char *name, *text;
 	bool mesh, kept;
 } scenes[] = {
-	{"plane_reaction", REACTION, false, false},
-	{"plane_kept", REACTION, false, true},
-	{"plane_constraint", "tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; };\n",
-	 false, false},
-	{"sphere_all", SPHERE ALL, false, false},
-	{"sphere_all_fixed", "arithmetic = \"fixed\";\n" SPHERE ALL, false, false},
-	{"mesh_reaction", MESH REACTION, true, false},
-	{"mesh_all", MESH ALL, true, false},
+	{"plane_reaction", DOUBLE REACTION, false, false},
+	{"plane_kept", DOUBLE REACTION, false, true},
+	{"plane_constraint",
+	 DOUBLE "tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; };\n", false, false},
+	{"sphere_all", DOUBLE SPHERE ALL, false, false},
+	{"sphere_all_fixed", FIXED SPHERE ALL, false, false},
+	{"mesh_reaction", DOUBLE MESH REACTION, true, false},
+	{"mesh_all", DOUBLE MESH ALL, true, false},
 };
 
 _Static_assert(sizeof(scenes) / sizeof(*scenes) == MADE_SCENES, "room for each");

@@ -106,6 +106,7 @@ void scene_saving_compare(struct scene_saving *saving)
 		incise_plan_tick(few->plan, course_feed(few), &of_few);
 		incise_plan_tick(full->plan, course_feed(full), &of_full);
 		saving->ticks_compared++;
+		saving->ticks_in_contact += !!(of_few.flags & INCISE_TICK_CONTACT);
 		if (memcmp(of_few.command_N, of_full.command_N,
 			   sizeof(of_few.command_N)) &&
 		    saving->first_difference < 0)
@@ -283,17 +284,15 @@ const char *scene_savings_count(struct scene_saving *const *savings, int n, bool
 
 void scene_profile(const char *path, bool full)
 {
-	struct scene_saving saving = {0};
-	struct incise_error err = {0};
+	struct scene_saving saving;
 
-	if (!open_way(&saving.few, path, full, &err))
-		cli_fail_with(&err);
-	start(&saving);
+	/* Both are made, as the course of the one depends on what the other needs. */
+	scene_saving_begin(&saving, path, false);
+	if (*saving.failed)
+		cli_fail("%s", saving.failed);
 	callgrind_here();
-	run_course(&saving.few.walk);
-	course_end(&saving.course);
-	incise_plan_free(saving.few.plan);
-	incise_scene_free(saving.few.scene);
+	run_course(full ? &saving.full.walk : &saving.few.walk);
+	scene_saving_end(&saving);
 }
 
 void scene_saving_end(struct scene_saving *saving)

@@ -27,7 +27,7 @@ struct scene_saving {
 	const char *path;
 	bool kept;
 	struct course course;
-	long ticks_compared;
+	long ticks_compared, ticks_in_contact;
 	long first_difference; /* number of the tick; -1: none */
 	char failed[520];      /* why there is nothing of it, or "" */
 };
