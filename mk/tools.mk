@@ -137,6 +137,7 @@ bench: ## measure error against run time on this machine; chart in build/bench/
 	$(O)/bin/incise bench capture
 	$(O)/bin/incise bench pose --plot $(O)/bench/pose
 	$(O)/bin/incise bench timeline --plot $(O)/bench/timeline
+	$(O)/bin/incise bench scenes --plot $(O)/bench/scenes
 	$(if $(has_view),$(O)/bin/incise bench view --plot $(O)/bench/view)
 
 .PHONY: tools deps demo bench

@@ -47,8 +47,10 @@ static const struct cli_option options[] = {
 
 static const struct cli_verb verb = {
 	.name = "bench",
-	.synopsis = "WORD [OPERAND...] [OPTIONS]\n"
-		    "       incise bench compare OLD.json NEW.json [--json]",
+	.synopsis =
+		"precision [MODEL.fis] | training | stability | loop [SCENE] | pose | timeline | "
+		"vision | capture [RUN] | scenes [SCENE...] | view [SCENE] | "
+		"compare OLD.json NEW.json [OPTIONS]",
 	.summary =
 		"Measure error against run time, and what is stable; tables, JSON, pictures.\n"
 		"  precision [MODEL.fis]  arithmetics of a model, without MODEL of the paper's size\n"
@@ -67,8 +69,8 @@ static const struct cli_verb verb = {
 		"compare says what changed beyond noise between two reports of --json.",
 	.options = options,
 	.notes =
-		"Exit: 0 measured, 1 failed, simulation and theory differ, or figures got worse,\n"
-		"2 bad usage.\n"
+		"Exit: 0 measured, 1 failed, simulation and theory or the forces of two ways differ,\n"
+		"or figures got worse, 2 bad usage.\n"
 		"See incise-bench(1).",
 };
 
