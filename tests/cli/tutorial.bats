@@ -39,6 +39,10 @@ setup() {
 	grep -q "certified to 0\.0" out
 	grep -q "^liver: running since" out
 	[ "$(awk -F, 'NR > 1' felt.csv | wc -l)" -gt 100000 ]
+	# the scene that the service is given
+	bash -c "$(grep -o "sed 's/model = .*;/'" "$page") $root/scenes/liver.scene" >mine.scene
+	grep -q '"liver.fx"' mine.scene
+	incise plan mine.scene --rig live.conf | grep -q "margin"
 	if [ "${has_pictures-}" ] && [ -x "$INCISE_BUILD/bin/incise-view" ]; then
 		commands_in "$page" "virtual rig with a screen's libraries" >commands
 		run bash -euo pipefail commands
