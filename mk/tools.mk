@@ -3,7 +3,7 @@
 # the build tree as after installation.
 
 programs := $(O)/bin/incise $(addprefix $(O)/bin/incise-,$(verbs))
-tool_shared := $(addprefix $(O)/obj/tools/,cli.o json.o)
+tool_shared := $(addprefix $(O)/obj/tools/,cli.o json.o whole_file.o)
 
 $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 

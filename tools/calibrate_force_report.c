@@ -262,7 +262,7 @@ void calibrate_force_write(const struct calibrate_force_report *report,
 	}
 	out = calibrate_report_text(folder, &file);
 	calibrate_force_print(report, true, out);
-	calibrate_report_end(file);
+	whole_file_end(file);
 	json = calibrate_force_json(report);
 	calibrate_report_json(folder, json);
 	json_decref(json);

@@ -7,9 +7,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/outfile.h>
 #include "calibrate_pairs.h"
 #include "cli.h"
+#include "whole_file.h"
 
 #define COLUMNS_MAX 32
 
@@ -164,16 +164,12 @@ void calibrate_pairs_read(struct calibrate_pairs *pairs, const char *path)
 
 void calibrate_pairs_write(const struct calibrate_pairs *pairs, const char *path)
 {
-	struct incise_error err = {0};
-	struct incise_outfile *file = incise_outfile_open(path, &err);
-	FILE *out;
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(path, &file);
 	bool masses = false;
 
-	if (!file)
-		cli_fail_with(&err);
 	for (int i = 0; i < pairs->n; i++)
 		masses |= !isnan(pairs->pair[i].mass_g);
-	out = incise_outfile_stream(file);
 	fprintf(out, "%s,reading_mV,series,direction\n", names[masses ? MASS : FORCE]);
 	for (int i = 0; i < pairs->n; i++) {
 		const struct incise_calibrate_force_pair *pair = &pairs->pair[i];
@@ -181,6 +177,5 @@ void calibrate_pairs_write(const struct calibrate_pairs *pairs, const char *path
 		fprintf(out, "%.10g,%.6f,%d,%s\n", masses ? pair->mass_g : pair->force_N,
 			pair->reading_mV, pair->series, pair->descending ? "down" : "up");
 	}
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
+	whole_file_end(file);
 }

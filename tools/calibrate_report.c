@@ -6,42 +6,31 @@
 #include "calibrate_report.h"
 #include "cli.h"
 
-static struct incise_outfile *begin(const char *folder, const char *name)
+static FILE *begin(const char *folder, const char *name, struct incise_outfile **file)
 {
-	struct incise_error err = {0};
-	struct incise_outfile *file;
+	FILE *out;
 	char *path;
 
 	if (asprintf(&path, "%s/%s", folder, name) < 0)
 		cli_fail("no memory");
-	file = incise_outfile_open(path, &err);
-	if (!file)
-		cli_fail_with(&err);
+	out = whole_file_begin(path, file);
 	free(path);
-	return file;
+	return out;
 }
 
 FILE *calibrate_report_text(const char *folder, struct incise_outfile **file)
 {
-	*file = folder ? begin(folder, "report.txt") : NULL;
-	return *file ? incise_outfile_stream(*file) : NULL;
-}
-
-void calibrate_report_end(struct incise_outfile *file)
-{
-	struct incise_error err = {0};
-
-	if (file && incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
+	*file = NULL;
+	return folder ? begin(folder, "report.txt", file) : NULL;
 }
 
 void calibrate_report_json(const char *folder, const json_t *object)
 {
-	struct incise_outfile *file = begin(folder, "report.json");
-	FILE *out = incise_outfile_stream(file);
+	struct incise_outfile *file;
+	FILE *out = begin(folder, "report.json", &file);
 
 	if (!object || json_dumpf(object, out, JSON_INDENT(2) | JSON_REAL_PRECISION(12)))
 		cli_fail("%s/report.json: no memory", folder);
 	fputc('\n', out);
-	calibrate_report_end(file);
+	whole_file_end(file);
 }

@@ -7,11 +7,10 @@
 
 #include <stdio.h>
 #include <jansson.h>
-#include <incise/outfile.h>
+#include "whole_file.h"
 
-/* DIR/report.txt, to be ended; both NULL without a DIR. Fails the program. */
+/* DIR/report.txt, for whole_file_end(); both NULL without a DIR. Fails the program. */
 FILE *calibrate_report_text(const char *folder, struct incise_outfile **file);
-void calibrate_report_end(struct incise_outfile *file);
 
 /* DIR/report.json. */
 void calibrate_report_json(const char *folder, const json_t *object);

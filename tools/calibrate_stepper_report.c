@@ -224,7 +224,7 @@ void stepper_report_folder(const struct stepper_report *report, const char *fold
 	if (!picture_draw(script, place, "residuals"))
 		cli_fail("gnuplot could not draw %s/residuals", place);
 	stepper_report_text(report, calibrate_report_text(place, &file));
-	calibrate_report_end(file);
+	whole_file_end(file);
 	object = stepper_report_json(report);
 	calibrate_report_json(place, object);
 	json_decref(object);

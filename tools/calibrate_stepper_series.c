@@ -9,9 +9,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/outfile.h>
 #include "calibrate_stepper.h"
 #include "cli.h"
+#include "whole_file.h"
 
 #define COLUMNS 32
 #define POINTS_MAX 1000000
@@ -195,18 +195,13 @@ void stepper_series_read(struct stepper_series *series, const char *path, double
 
 void stepper_series_write(const struct stepper_series *series, const char *path)
 {
-	struct incise_error err = {0};
-	struct incise_outfile *out = incise_outfile_open(path, &err);
-	FILE *f;
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(path, &file);
 
-	if (!out)
-		cli_fail_with(&err);
-	f = incise_outfile_stream(out);
-	fprintf(f, "t_s,steps,position_mm,force_N\n");
+	fprintf(out, "t_s,steps,position_mm,force_N\n");
 	for (int i = 0; i < series->n; i++)
-		fprintf(f, "%.4f,%lld,%.9g,%.6f\n", series->t_s[i],
+		fprintf(out, "%.4f,%lld,%.9g,%.6f\n", series->t_s[i],
 			llround(series->points[i].position_mm / series->step_mm),
 			series->points[i].position_mm, series->points[i].force_N);
-	if (incise_outfile_commit(out, &err))
-		cli_fail_with(&err);
+	whole_file_end(file);
 }

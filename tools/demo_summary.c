@@ -6,12 +6,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <incise/fixed.h>
-#include <incise/outfile.h>
 #include <incise/sim.h>
 #include <incise/version.h>
 #include "cli.h"
 #include "demo.h"
 #include "json.h"
+#include "whole_file.h"
 
 /* What the paper reports after 80 epochs, §4.3. Its data are not published. */
 #define PAPER_MSE_TRAIN 0.036
@@ -154,23 +154,15 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 
 void demo_summary_save(const struct demo *demo, double seconds)
 {
-	struct incise_error err = {0};
-	char *json = demo_path(demo, "summary.json"),
-	     *txt = demo_path(demo, "summary.txt");
-	struct incise_outfile *file = incise_outfile_open(json, &err);
+	char *json = demo_path(demo, "summary.json");
+	char *txt = demo_path(demo, "summary.txt");
+	struct incise_outfile *file;
 
-	if (!file)
-		cli_fail_with(&err);
-	json_dumpf(demo->summary, incise_outfile_stream(file),
+	json_dumpf(demo->summary, whole_file_begin(json, &file),
 		   JSON_INDENT(2) | JSON_REAL_PRECISION(12));
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
-	file = incise_outfile_open(txt, &err);
-	if (!file)
-		cli_fail_with(&err);
-	demo_summary_print(demo, incise_outfile_stream(file), seconds);
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
+	whole_file_end(file);
+	demo_summary_print(demo, whole_file_begin(txt, &file), seconds);
+	whole_file_end(file);
 	free(json);
 	free(txt);
 }

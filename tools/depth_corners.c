@@ -9,9 +9,9 @@
 #include <incise/board.h>
 #include <incise/calibrate_depth.h>
 #include <incise/dataset.h>
-#include <incise/outfile.h>
 #include "cli.h"
 #include "depth_data.h"
+#include "whole_file.h"
 
 #define PICTURES 8
 
@@ -119,18 +119,13 @@ void depth_corners_read(struct depth_corners *c, const char *path)
 
 void depth_corners_write(const struct depth_corners *c, const char *path)
 {
-	struct incise_error err = {0};
-	struct incise_outfile *file = incise_outfile_open(path, &err);
-	FILE *out;
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(path, &file);
 
-	if (!file)
-		cli_fail_with(&err);
-	out = incise_outfile_stream(file);
 	fprintf(out, "view,row,column,x_px,y_px,width_px,height_px\n");
 	for (int i = 0; i < c->n * c->columns * c->rows; i++)
 		fprintf(out, "%d,%d,%d,%.5f,%.5f,%d,%d\n", i / c->columns / c->rows + 1,
 			i / c->columns % c->rows + 1, i % c->columns + 1, c->px[2 * i],
 			c->px[2 * i + 1], c->width, c->height);
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
+	whole_file_end(file);
 }

@@ -8,10 +8,10 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <incise/dataset.h>
-#include <incise/outfile.h>
 #include <incise/recording.h>
 #include "cli.h"
 #include "depth_data.h"
+#include "whole_file.h"
 
 #define AIR_MM 0.5 /* so far off the surface there is no doubt which side it is */
 #define VISION_PX 0.03
@@ -194,19 +194,14 @@ void depth_lengths_measure(struct depth_lengths *lengths, struct depth_source *s
 
 void depth_lengths_write(const struct depth_lengths *lengths, const char *path, bool line)
 {
-	struct incise_error err = {0};
-	struct incise_outfile *file = incise_outfile_open(path, &err);
-	FILE *out;
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(path, &file);
 
-	if (!file)
-		cli_fail_with(&err);
-	out = incise_outfile_stream(file);
 	fprintf(out, line ? "depth_mm,length_px\n" : "length_px\n");
 	for (int i = 0; i < lengths->n; i++) {
 		if (line)
 			fprintf(out, "%.6f,", lengths->mm[i]);
 		fprintf(out, "%.5f\n", lengths->px[i]);
 	}
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
+	whole_file_end(file);
 }

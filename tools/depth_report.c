@@ -362,7 +362,7 @@ void depth_report_folder(const struct depth_result *r, const char *dir)
 	picture_place("report", path, &folder, &name);
 	out = calibrate_report_text(folder, &file);
 	depth_report_text(r, out);
-	calibrate_report_end(file);
+	whole_file_end(file);
 	calibrate_report_json(folder, object);
 	json_decref(object);
 	draw(r, folder);

@@ -353,7 +353,7 @@ static void state(const struct wish *wish, const struct delay_stream *streams,
 	}
 	if (out)
 		fprintf(out, "\npass\n");
-	calibrate_report_end(file);
+	whole_file_end(file);
 	if (out)
 		draw(&wish->common, streams, pairs);
 }

@@ -253,7 +253,7 @@ static void write_report(const struct calibrate_wish *wish, const struct tip_lis
 	if (listed > OUTLIERS_LISTED)
 		fprintf(out, " and %d more", listed - OUTLIERS_LISTED);
 	fprintf(out, "\npass\n");
-	calibrate_report_end(file);
+	whole_file_end(file);
 	draw(wish, list, inlier, fit);
 }
 

@@ -7,13 +7,13 @@
 #include <stdio.h>
 #include <string.h>
 #include <incise/calibration.h>
-#include <incise/outfile.h>
 #include <incise/replay.h>
 #include "cli.h"
 #include "json.h"
 #include "loop_report.h"
 #include "replay_picture.h"
 #include "scene_argument.h"
+#include "whole_file.h"
 
 enum {
 	OPT_CSV = CLI_LONG,
@@ -286,11 +286,8 @@ int main(int argc, char **argv)
 	table.name = job.recording;
 	table.bar = !job.csv || strcmp(job.csv, "-");
 	if (job.csv) {
-		file = incise_outfile_open(job.csv, &err);
-		if (!file)
-			cli_fail_with(&err);
 		table.name = job.csv;
-		table.out = incise_outfile_stream(file);
+		table.out = whole_file_begin(job.csv, &file);
 		fputs("t_s,cut,depth_mm,velocity_mm_s,predicted_N,measured_N,clipped,"
 		      "flags\n",
 		      table.out);

@@ -9,12 +9,12 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <incise/dataset.h>
-#include <incise/outfile.h>
 #include <incise/train.h>
 #include "cli.h"
 #include "train_report.h"
 #include "train_side.h"
 #include "train_wish.h"
+#include "whole_file.h"
 
 struct history {
 	FILE *csv; /* or NULL */
@@ -41,7 +41,6 @@ static void on_epoch(void *user, int epoch, double train_rmse, double check_rmse
  */
 static void check_writable(const struct train_wish *wish, const char *path)
 {
-	struct incise_error err = {0};
 	struct incise_outfile *file;
 	struct stat data, out;
 
@@ -54,9 +53,7 @@ static void check_writable(const struct train_wish *wish, const char *path)
 	/* A pipe's reader would take the trial for the end. */
 	if (!stat(path, &out) && !S_ISREG(out.st_mode) && !S_ISDIR(out.st_mode))
 		return;
-	file = incise_outfile_open(path, &err);
-	if (!file)
-		cli_fail_with(&err);
+	whole_file_begin(path, &file);
 	incise_outfile_abort(file);
 }
 
@@ -104,10 +101,7 @@ static void train(struct train_wish *wish, struct incise_model *model,
 	struct history history = {.epochs = wish->train.epochs};
 
 	if (wish->history) {
-		file = incise_outfile_open(wish->history, &err);
-		if (!file)
-			cli_fail_with(&err);
-		history.csv = incise_outfile_stream(file);
+		history.csv = whole_file_begin(wish->history, &file);
 		fprintf(history.csv, "epoch,train_rmse,check_rmse\n");
 	}
 	wish->train.progress = on_epoch;
@@ -120,8 +114,7 @@ static void train(struct train_wish *wish, struct incise_model *model,
 	}
 	cli_progress_end();
 	judge_interval(&result->interval, model, check);
-	if (file && incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
+	whole_file_end(file);
 }
 
 int main(int argc, char **argv)

@@ -9,10 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <incise/outfile.h>
 #include <incise/recording.h>
 #include "cli.h"
 #include "tip_poses.h"
+#include "whole_file.h"
 
 #define COLUMNS 8
 #define CSV_MAX 32 /* columns that a file may have */
@@ -162,13 +162,9 @@ void tip_list_read(struct tip_list *list, const char *path)
 
 void tip_list_write(const struct tip_list *list, const char *path)
 {
-	struct incise_error err = {0};
-	struct incise_outfile *file = incise_outfile_open(path, &err);
-	FILE *out;
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(path, &file);
 
-	if (!file)
-		cli_fail_with(&err);
-	out = incise_outfile_stream(file);
 	fprintf(out, "t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n");
 	for (int i = 0; i < list->n; i++) {
 		const struct incise_tip_pose *pose = &list->poses[i];
@@ -180,6 +176,5 @@ void tip_list_write(const struct tip_list *list, const char *path)
 			fprintf(out, ",%.17g", pose->quaternion[k]);
 		putc('\n', out);
 	}
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
+	whole_file_end(file);
 }
