@@ -19,7 +19,8 @@ int incise_thread_start(pthread_t *thread, void *(*run)(void *), void *argument,
 	pthread_sigmask(SIG_SETMASK, &before, NULL);
 	if (rc)
 		return -rc;
-	*real_time = !pthread_setschedparam(*thread, SCHED_FIFO, &priority);
+	if (real_time)
+		*real_time = !pthread_setschedparam(*thread, SCHED_FIFO, &priority);
 	return 0;
 }
 

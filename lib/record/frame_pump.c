@@ -4,7 +4,6 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -41,19 +40,6 @@ void incise_frame_pump_stats(struct incise_frame_pump *p,
 		stats->camera = p->camera_error;
 	if (frame_pump_is(&p->file_failed))
 		stats->file = p->file_error;
-}
-
-/* A thread that signals, which are the program's, pass by. */
-static int start(pthread_t *thread, void *(*run)(void *), struct incise_frame_pump *p)
-{
-	sigset_t all, before;
-	int rc;
-
-	sigfillset(&all);
-	pthread_sigmask(SIG_SETMASK, &all, &before);
-	rc = pthread_create(thread, NULL, run, p);
-	pthread_sigmask(SIG_SETMASK, &before, NULL);
-	return -rc;
 }
 
 /* Bytes of the largest picture. A JPEG of a noisy scene is less than what it is made of. */
@@ -98,10 +84,11 @@ static int make(struct incise_frame_pump *p)
 		rc = incise_ring_init(&p->results, sizeof(struct frame_looked), RECORDS);
 	if (rc)
 		return rc;
-	rc = start(&p->file_thread, incise_frame_pump_file, p);
+	rc = incise_thread_start(&p->file_thread, incise_frame_pump_file, p, NULL);
 	p->file_runs = !rc;
 	if (!rc && p->setup.vision) {
-		rc = start(&p->vision_thread, incise_frame_pump_vision, p);
+		rc = incise_thread_start(&p->vision_thread, incise_frame_pump_vision, p,
+					 NULL);
 		p->vision_runs = !rc;
 	}
 	if (!rc && incise_clock_is_real(p->setup.clock)) {
