@@ -97,8 +97,8 @@ static void by_lengths(struct depth_wish *wish, struct depth_result *result,
 	if (!inlier)
 		cli_fail("no memory");
 	if (line) {
-		struct incise_depth_pairs pairs = {l->mm, l->px, l->n,
-						   wish->u_gauge / 100, wish->u_zero_mm};
+		struct incise_depth_lengths pairs = {
+			l->mm, l->px, l->n, wish->u_gauge / 100, wish->u_zero_mm};
 
 		rc = incise_calibrate_depth_line(&pairs, inlier, &fit, &err);
 	} else {

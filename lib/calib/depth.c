@@ -163,7 +163,7 @@ static double off_line(const struct line *line, double px, double mm)
 }
 
 /* Repeated medians: of the slopes from each pair to all others, and of those. */
-static int start_line(const struct incise_depth_pairs *p, struct line *line)
+static int start_line(const struct incise_depth_lengths *p, struct line *line)
 {
 	int step = 1 + (p->n - 1) / MEDIANS_MAX, m = 0, rc = -ENOMEM;
 	double *slopes = malloc(p->n * sizeof(*slopes));
@@ -198,7 +198,7 @@ out:
 }
 
 /* Least squares of those that are near. */
-static void fit_line(const struct incise_depth_pairs *p, const bool *near,
+static void fit_line(const struct incise_depth_lengths *p, const bool *near,
 		     struct line *line)
 {
 	double sxy = 0;
@@ -223,7 +223,7 @@ static void fit_line(const struct incise_depth_pairs *p, const bool *near,
 }
 
 /* How many are near, and whether that is another set than before. */
-static int choose(const struct incise_depth_pairs *p, const struct line *line,
+static int choose(const struct incise_depth_lengths *p, const struct line *line,
 		  double *residual, bool *near, bool *changed)
 {
 	double spread;
@@ -246,7 +246,7 @@ static int choose(const struct incise_depth_pairs *p, const struct line *line,
 }
 
 /* What a parabola adds at the ends of the lengths; q = x² without its part along 1, x. */
-static void find_bend(const struct incise_depth_pairs *p, const bool *near,
+static void find_bend(const struct incise_depth_lengths *p, const bool *near,
 		      const struct line *line, struct incise_depth_fit *fit)
 {
 	double sx2 = 0, sx3 = 0, sqq = 0, sqr = 0, srr = 0, factor, end = 0;
@@ -310,7 +310,7 @@ static int check_line(const struct line *line, const struct incise_depth_fit *fi
 	return check_scale(-slope, err);
 }
 
-static int fit_pairs(const struct incise_depth_pairs *p, bool *near, double *residual,
+static int fit_pairs(const struct incise_depth_lengths *p, bool *near, double *residual,
 		     struct incise_depth_fit *fit, struct incise_error *err)
 {
 	struct line line = {0};
@@ -377,7 +377,7 @@ static int fit_pairs(const struct incise_depth_pairs *p, bool *near, double *res
 	return 0;
 }
 
-int incise_calibrate_depth_line(const struct incise_depth_pairs *pairs, bool *inlier,
+int incise_calibrate_depth_line(const struct incise_depth_lengths *pairs, bool *inlier,
 				struct incise_depth_fit *fit, struct incise_error *err)
 {
 	bool *near = calloc(pairs->n > 0 ? pairs->n : 1, sizeof(*near));

@@ -123,8 +123,8 @@ int main(void)
 			.n = air.n,
 			.u_px = U_VISION_PX,
 		};
-		struct incise_depth_pairs pairs = {tissue.mm, tissue.px, tissue.n,
-						   U_GAUGE, 0};
+		struct incise_depth_lengths pairs = {tissue.mm, tissue.px, tissue.n,
+						     U_GAUGE, 0};
 
 		gauge = 1 + U_GAUGE * normal();
 		for (int i = 0; i < tissue.n; i++)

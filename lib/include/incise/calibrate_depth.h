@@ -77,7 +77,7 @@ INCISE_API int incise_calibrate_depth_points(const struct incise_depth_points *p
 					     struct incise_error *err);
 
 /** Pairs of depth and length. */
-struct incise_depth_pairs {
+struct incise_depth_lengths {
 	const double *depth_mm;	 /**< by a gauge, or the tracker */
 	const double *length_px; /**< by vision */
 	int n;
@@ -95,7 +95,7 @@ struct incise_depth_pairs {
  * @return as incise_calibrate_depth_points(); -EDOM too for columns that are swapped, a
  *         length that grows with the depth, one depth only, too few pairs
  */
-INCISE_API int incise_calibrate_depth_line(const struct incise_depth_pairs *pairs,
+INCISE_API int incise_calibrate_depth_line(const struct incise_depth_lengths *pairs,
 					   bool *inlier, struct incise_depth_fit *fit,
 					   struct incise_error *err);
 

@@ -205,16 +205,17 @@ static void make_line(struct line_data *d, int n, double noise_mm)
 	}
 }
 
-static struct incise_depth_pairs pairs_of(const struct line_data *d, int n)
+static struct incise_depth_lengths pairs_of(const struct line_data *d, int n)
 {
-	return (struct incise_depth_pairs){.depth_mm = d->mm, .length_px = d->px, .n = n};
+	return (struct incise_depth_lengths){
+		.depth_mm = d->mm, .length_px = d->px, .n = n};
 }
 
 /* Without noise: the line itself. */
 static void test_exact_line(void **state)
 {
 	struct line_data d;
-	struct incise_depth_pairs pairs = pairs_of(&d, 10);
+	struct incise_depth_lengths pairs = pairs_of(&d, 10);
 	struct incise_depth_fit fit;
 
 	for (int i = 0; i < 10; i++) {
@@ -240,7 +241,7 @@ static void test_line_truth(void **state)
 
 		for (int rig = 1; rig <= RIGS; rig++) {
 			struct line_data d;
-			struct incise_depth_pairs pairs = pairs_of(&d, n);
+			struct incise_depth_lengths pairs = pairs_of(&d, n);
 			struct incise_depth_fit fit;
 			struct incise_error err = {0};
 			bool inlier[PAIRS];
@@ -282,7 +283,7 @@ static void test_line_truth(void **state)
 static void test_bend(void **state)
 {
 	struct line_data d;
-	struct incise_depth_pairs pairs = pairs_of(&d, PAIRS);
+	struct incise_depth_lengths pairs = pairs_of(&d, PAIRS);
 	struct incise_depth_fit fit;
 
 	seed = 3;
@@ -355,7 +356,7 @@ static void test_line_refused(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct line_data d;
-		struct incise_depth_pairs pairs = pairs_of(&d, cases[i].n);
+		struct incise_depth_lengths pairs = pairs_of(&d, cases[i].n);
 		struct incise_depth_fit fit;
 		struct incise_error err = {0};
 
