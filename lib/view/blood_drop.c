@@ -4,6 +4,7 @@
  */
 #include <math.h>
 #include "blood_drop.h"
+#include "blood_drop_shape.h"
 #include "grain.h"
 
 #define STEP_S 0.01
@@ -48,17 +49,8 @@
 #define PINNED_S 4.0
 #define SINK 0.006
 #define LEAST_UNITS (int64_t)(0.03 / BLOOD_UNIT_UL)
-/* A change that is seen, in mm. */
-#define SEEN_MM 0.04
-/* It is looked for in each so many steps, not in all drops at once. */
+/* How a drop looks is seen to in each so many steps, not in all drops at once. */
 #define SHOWN_EACH 3
-#define SEEN 0.03
-/* 1 / sqrt(1 - FILM_ROUGH), rounded up. */
-#define ROUGHEST 1.2
-/* Shapes of drops, in radii of a round one, and by what part they change when shown. */
-#define HANGS_ALONG 1.7
-#define HANGS_ACROSS 0.7
-#define TURNS_INTO 0.22
 
 void drops_init(struct drops *drops, struct film *film,
 		const struct incise_scene_picture *picture, uint32_t key)
@@ -70,99 +62,6 @@ void drops_init(struct drops *drops, struct film *film,
 double drop_radius_mm(int64_t units)
 {
 	return cbrt((double)units * (BLOOD_UNIT_UL / CAP));
-}
-
-bool drop_box(const struct film *film, const struct drop *drop, struct drop_box *box)
-{
-	struct ground_metric *m = &box->metric;
-	double u, v, length, along, beside, half_u, half_v, half_x;
-
-	if (!(drop->drawn_mm > 0) || !ground_metric(film->chart, drop->drawn_px, m))
-		return false;
-	u = m->a * drop->axis_px[0] + m->b * drop->axis_px[1];
-	v = m->c * drop->axis_px[1];
-	length = sqrt(u * u + v * v);
-	box->axis[0] = length > 0 ? u / length : 0;
-	box->axis[1] = length > 0 ? v / length : 1;
-	/* Of the ellipse that holds both halves, at its roughest. */
-	along = drop->drawn_mm * fmax(drop->before, drop->behind) * ROUGHEST;
-	beside = drop->drawn_mm * drop->beside * ROUGHEST;
-	half_u = hypot(along * box->axis[0], beside * box->axis[1]);
-	half_v = hypot(along * box->axis[1], beside * box->axis[0]);
-	half_x = (half_u + half_v * fabs(m->b) / m->c) / m->a;
-	box->left = (int)floor(drop->drawn_px[0] - half_x);
-	box->right = (int)floor(drop->drawn_px[0] + half_x);
-	box->top = (int)floor(drop->drawn_px[1] - half_v / m->c);
-	box->bottom = (int)floor(drop->drawn_px[1] + half_v / m->c);
-	return true;
-}
-
-static void mark(struct drops *drops, const struct drop *drop)
-{
-	struct drop_box box;
-
-	if (drop_box(drops->film, drop, &box))
-		film_mark(drops->film, box.left, box.top, box.right, box.bottom);
-}
-
-static bool nearer(double *value, double to)
-{
-	if (fabs(*value - to) < SEEN)
-		return false;
-	*value += (to - *value) * TURNS_INTO;
-	return true;
-}
-
-/*
- * What is drawn follows when it would be seen; always by the drops' own steps. A drop that
- * hangs lies along its cut; one that runs has a round head and is drawn out behind.
- */
-static void show(struct drops *drops, struct drop *drop, const struct ground *ground)
-{
-	double radius = drop_radius_mm(drop->units);
-	double moved = ground_length_mm(&ground->metric, drop->px[0] - drop->drawn_px[0],
-					drop->px[1] - drop->drawn_px[1]);
-	double fast = fmin(drop->speed_mm_s / 15, 1);
-	struct drop is = *drop;
-	bool other;
-
-	if (drop->source < 0) {
-		other = nearer(&is.before, 0.8);
-		other = nearer(&is.behind, 0.9 + 1.6 * fast) || other;
-		other = nearer(&is.beside, 0.9 - 0.25 * fast) || other;
-		for (int i = 0; i < 2 && drop->speed_mm_s > 0; i++)
-			is.axis_px[i] = drop->heading[0] * ground->down_px[i] +
-					drop->heading[1] * ground->across_px[i];
-	} else {
-		other = false;
-	}
-	if (!other && fabs(radius - drop->drawn_mm) < SEEN_MM && moved < SEEN_MM)
-		return;
-	mark(drops, drop);
-	*drop = is;
-	drop->drawn_mm = radius;
-	drop->drawn_px[0] = drop->px[0];
-	drop->drawn_px[1] = drop->px[1];
-	mark(drops, drop);
-}
-
-/* It leaves its cut: the same shape, seen along another axis. */
-static void turn_round(struct drop *drop, const struct ground *ground)
-{
-	const struct ground_metric *m = &ground->metric;
-	double u = m->a * drop->axis_px[0] + m->b * drop->axis_px[1];
-	double v = m->c * drop->axis_px[1], length = sqrt(u * u + v * v);
-	double a = m->a * ground->down_px[0] + m->b * ground->down_px[1];
-	double b = m->c * ground->down_px[1], along, across;
-
-	if (!(length > 0))
-		return;
-	along = fabs(u * a + v * b) / length;
-	across = sqrt(fmax(1 - along * along, 0));
-	drop->before = drop->behind = along * HANGS_ALONG + across * HANGS_ACROSS;
-	drop->beside = along * HANGS_ACROSS + across * HANGS_ALONG;
-	drop->axis_px[0] = ground->down_px[0];
-	drop->axis_px[1] = ground->down_px[1];
 }
 
 int drops_new(struct drops *drops, const double px[2], const double along_px[2],
@@ -184,9 +83,9 @@ int drops_new(struct drops *drops, const double px[2], const double along_px[2],
 			.source = source,
 			.metric = ground.metric,
 			.axis_px = {along_px[0], along_px[1]},
-			.before = HANGS_ALONG,
-			.behind = HANGS_ALONG,
-			.beside = HANGS_ACROSS,
+			.before = DROP_HANGS_ALONG,
+			.behind = DROP_HANGS_ALONG,
+			.beside = DROP_HANGS_ACROSS,
 		};
 		return i;
 	}
@@ -195,7 +94,7 @@ int drops_new(struct drops *drops, const double px[2], const double along_px[2],
 
 static void vanish(struct drops *drops, struct drop *drop)
 {
-	mark(drops, drop);
+	drops_mark(drops, drop);
 	drop->units = 0;
 	drop->drawn_mm = 0;
 }
@@ -298,7 +197,7 @@ static void run(struct drops *drops, struct drop *drop, const struct ground *gro
 		drop->px[i] += way * (drop->heading[0] * ground->down_px[i] +
 				      drop->heading[1] * ground->across_px[i]);
 	if (drop->source >= 0)
-		turn_round(drop, ground);
+		drop_turn_round(drop, ground);
 	drop->source = -1;
 }
 
@@ -335,7 +234,7 @@ static void step_drop(struct drops *drops, struct drop *drop)
 	    (drops->film->step + (uint64_t)(drop - drops->drop)) % SHOWN_EACH)
 		return;
 	if (drop->units)
-		show(drops, drop, &ground);
+		drops_show(drops, drop, &ground);
 	else
 		vanish(drops, drop);
 }

@@ -63,16 +63,6 @@ int drops_new(struct drops *drops, const double px[2], const double along_px[2],
 /* 10 ms. */
 void drops_step(struct drops *drops);
 
-/* Where a drop is drawn. */
-struct drop_box {
-	struct ground_metric metric;
-	double axis[2];		      /* unit, in the metric's frame */
-	int left, top, right, bottom; /* texels that it can cover, the last ones too */
-};
-
-/* false: it is not drawn. */
-bool drop_box(const struct film *film, const struct drop *drop, struct drop_box *box);
-
 double drop_radius_mm(int64_t units);
 int64_t drops_units(const struct drops *drops);
 int drops_count(const struct drops *drops);

@@ -4,6 +4,7 @@
  */
 #include <math.h>
 #include <string.h>
+#include "blood_drop_shape.h"
 #include "blood_paint.h"
 #include "grain.h"
 
