@@ -52,7 +52,7 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 	holds "$(key $file haptic.contact) > 0"
 	holds "$(key $file seconds) > 2"
 	for name in note paper.mse_train paper.mse_check export_raw export_by_cut \
-		capture_new_cut export_new_cut haptic.lateness_us.p999; do
+		capture_new_cut export_new_cut haptic.lateness_us.max; do
 		[ -n "$(key $file $name)" ]
 	done
 }
