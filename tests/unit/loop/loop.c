@@ -62,6 +62,16 @@ static void test_log_and_times(void **state)
 	felt_end(&f);
 }
 
+/* Have the rig's tracker read by a function of ours. */
+static void read_by(struct felt *f, struct incise_tracker_ops *ops,
+		    int (*read)(struct incise_tracker *, struct incise_tracker_sample *,
+				int))
+{
+	*ops = *f->tracker_ops;
+	ops->read = read;
+	incise_rig_tracker(f->rig)->ops = ops;
+}
+
 static struct incise_clock *stalled;
 static int calls;
 
@@ -83,9 +93,7 @@ static void test_overrun_skips_and_counts(void **state)
 	struct felt f;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	ops = *f.tracker_ops;
-	ops.read = slow_tracker;
-	incise_rig_tracker(f.rig)->ops = &ops;
+	read_by(&f, &ops, slow_tracker);
 	stalled = incise_rig_clock(f.rig);
 	calls = 0;
 	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, NULL), 0);
@@ -109,9 +117,7 @@ static void test_overrun_over_the_end(void **state)
 	struct felt f;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	ops = *f.tracker_ops;
-	ops.read = slow_tracker;
-	incise_rig_tracker(f.rig)->ops = &ops;
+	read_by(&f, &ops, slow_tracker);
 	stalled = incise_rig_clock(f.rig);
 	calls = 0;
 	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, NULL), 0);
@@ -136,9 +142,7 @@ static void test_stop_flag(void **state)
 	struct felt f;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	ops = *f.tracker_ops;
-	ops.read = stopping_tracker;
-	incise_rig_tracker(f.rig)->ops = &ops;
+	read_by(&f, &ops, stopping_tracker);
 	calls = stop = 0;
 	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
 					 &stats, NULL),
@@ -181,9 +185,7 @@ static void test_device_failure_ends_the_loop(void **state)
 	struct felt f;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	ops = *f.tracker_ops;
-	ops.read = failing_tracker;
-	incise_rig_tracker(f.rig)->ops = &ops;
+	read_by(&f, &ops, failing_tracker);
 	calls = 0;
 	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
 					 &stats, &err),
@@ -530,9 +532,7 @@ static void test_too_many_overruns(void **state)
 	struct felt f;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	ops = *f.tracker_ops;
-	ops.read = always_slow;
-	incise_rig_tracker(f.rig)->ops = &ops;
+	read_by(&f, &ops, always_slow);
 	stalled = incise_rig_clock(f.rig);
 	calls = 0;
 	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, &err),

@@ -118,11 +118,9 @@ __attribute__((unused)) static int poll_for(struct incise_recorder *recorder,
 	return rc;
 }
 
-/* Record a whole script, or the first duration_ns of it. */
-__attribute__((unused)) static void record(const char *path, const char *spec,
-					   int64_t duration_ns)
+__attribute__((unused)) static struct incise_recorder *start_recorder(
+	const char *path, struct incise_rig *rig)
 {
-	struct incise_rig *rig = open_rig(spec);
 	struct incise_calibration calibration;
 	struct incise_error err = {0};
 	struct incise_recorder *recorder;
@@ -133,6 +131,17 @@ __attribute__((unused)) static void record(const char *path, const char *spec,
 		&err);
 	if (!recorder)
 		fail_msg("%s", err.text);
+	return recorder;
+}
+
+/* Record a whole script, or the first duration_ns of it. */
+__attribute__((unused)) static void record(const char *path, const char *spec,
+					   int64_t duration_ns)
+{
+	struct incise_rig *rig = open_rig(spec);
+	struct incise_recorder *recorder = start_recorder(path, rig);
+	struct incise_error err = {0};
+
 	if (!duration_ns)
 		duration_ns = incise_sim_duration(incise_rig_sim(rig));
 	if (poll_for(recorder, rig, duration_ns, &err) ||

@@ -14,21 +14,6 @@
 #define SIM "sim:clock=simulated"
 #define DB "a.rec/recording.db"
 
-static struct incise_recorder *start(const char *path, struct incise_rig *rig)
-{
-	struct incise_calibration calibration;
-	struct incise_error err = {0};
-	struct incise_recorder *recorder;
-
-	incise_calibration_nominal(&calibration);
-	recorder = incise_recorder_new(
-		path, rig, &(struct incise_recorder_setup){.calibration = &calibration},
-		&err);
-	if (!recorder)
-		fail_msg("%s", err.text);
-	return recorder;
-}
-
 /* --- values ------------------------------------------------------------------------ */
 
 static void rows_are_the_samples(void **state)
@@ -203,7 +188,7 @@ static void short_recording_makes_do(void **state)
 static void stats_count_what_is_written(void **state)
 {
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
 	struct incise_recorder_stats stats;
 	struct incise_error err = {0};
 
@@ -267,7 +252,7 @@ static void existing_names_are_refused(void **state)
 static void name_taken_meanwhile_is_kept(void **state)
 {
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
 	struct incise_error err = {0};
 	struct incise_recording *recording;
 
@@ -294,7 +279,7 @@ static pid_t record_forever(const char *spec, int64_t duration_ns, int *polls)
 	if (!pid) {
 		struct incise_rig *rig = open_rig(spec);
 		struct incise_clock *clock = incise_rig_clock(rig);
-		struct incise_recorder *rec = start("a.rec", rig);
+		struct incise_recorder *rec = start_recorder("a.rec", rig);
 		int64_t end = incise_clock_now(clock) + duration_ns;
 
 		while (incise_clock_now(clock) < end) {
@@ -363,7 +348,7 @@ static void sigkill(void **state)
 static void interrupted_recording_knows_its_losses(void **state)
 {
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
 	struct incise_recording_info info;
 	struct incise_recording *recording;
 	struct incise_error err = {0};
@@ -518,7 +503,7 @@ static void force_is_that_of_the_voltage(void **state)
 			force_fault = NULL;
 			tracker_fault = NULL;
 			force_ops.info = from_minus_2_5_V;
-			rec = start(path, rig);
+			rec = start_recorder(path, rig);
 			assert_int_equal(poll_for(rec, rig, 4000 * MS, &err), 0);
 			assert_int_equal(incise_recorder_close(rec, &err), 0);
 			incise_rig_close(rig);
@@ -556,7 +541,7 @@ static void failures_of_devices(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_rig *rig = faulty_rig();
-		struct incise_recorder *rec = start("a.rec", rig);
+		struct incise_recorder *rec = start_recorder("a.rec", rig);
 		struct incise_stream streams[INCISE_STREAMS_MAX];
 		struct incise_recorder_stats stats;
 		struct incise_error err = {0};
@@ -596,7 +581,7 @@ static int tracker_gone(struct incise_tracker_sample *samples, int n)
 static void ends_when_no_device_is_left(void **state)
 {
 	struct incise_rig *rig = faulty_rig();
-	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
 	struct incise_error err = {0};
 
 	force_fault = gone;
@@ -625,7 +610,7 @@ static void refuses_a_zero_that_is_none(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_rig *rig = faulty_rig();
-		struct incise_recorder *rec = start("a.rec", rig);
+		struct incise_recorder *rec = start_recorder("a.rec", rig);
 		struct incise_error err = {0};
 
 		force_fault = cases[i].force;
@@ -663,7 +648,7 @@ static int doubtful(struct incise_tracker_sample *samples, int n)
 static void losses_are_counted_and_doubts_kept(void **state)
 {
 	struct incise_rig *rig = faulty_rig();
-	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
 	struct incise_recorder_stats stats;
 	struct incise_error err = {0};
 
@@ -695,7 +680,7 @@ static void full_disk_keeps_what_was_committed(void **state)
 {
 	struct rlimit before, limit;
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
 	struct incise_recording_info info;
 	struct incise_recording *recording;
 	struct incise_error err = {0}, second = {0};
@@ -725,7 +710,7 @@ static void full_disk_at_the_end(void **state)
 {
 	struct rlimit before, limit;
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
 	struct incise_recording *recording;
 	struct incise_error err = {0};
 	struct stat st;
@@ -750,7 +735,7 @@ static void full_disk_at_the_end(void **state)
 static void reader_does_not_stop_the_end(void **state)
 {
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start("a.rec", rig);
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
 	struct incise_recording_info info;
 	struct incise_recording *recording;
 	struct incise_error err = {0};
@@ -800,7 +785,7 @@ static void reader_does_not_stop_the_start(void **state)
 	assert_true(reader);
 	for (int i = 0; i < 40; i++) {
 		struct incise_rig *rig = open_rig(SIM);
-		struct incise_recorder *rec = start("a.rec", rig);
+		struct incise_recorder *rec = start_recorder("a.rec", rig);
 		struct incise_error err = {0};
 
 		if (poll_for(rec, rig, 100 * MS, &err) ||

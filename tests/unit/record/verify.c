@@ -183,18 +183,13 @@ static void tampering_is_found(void **state)
 static void losses_are_no_alteration(void **state)
 {
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_calibration calibration;
 	struct incise_verify_report report;
 	struct incise_force_sample drop[2000];
 	struct findings findings;
 	struct incise_error err = {0};
 	struct incise_recorder *recorder;
 
-	incise_calibration_nominal(&calibration);
-	recorder = incise_recorder_new(
-		"a.rec", rig,
-		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
-	assert_non_null(recorder);
+	recorder = start_recorder("a.rec", rig);
 	assert_int_equal(poll_for(recorder, rig, 700 * MS, &err), 0);
 	/* someone else takes what the recorder should have had: 700 to 730 ms */
 	incise_clock_wait_until(incise_rig_clock(rig),
@@ -220,16 +215,12 @@ static void losses_are_no_alteration(void **state)
 static void interrupted_is_intact(void **state)
 {
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_calibration calibration;
 	struct incise_verify_report report;
 	struct findings findings;
 	struct incise_error err = {0};
 	struct incise_recorder *recorder;
 
-	incise_calibration_nominal(&calibration);
-	recorder = incise_recorder_new(
-		"a.rec", rig,
-		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
+	recorder = start_recorder("a.rec", rig);
 	verify("a.rec", &report, &findings); /* not a row */
 	assert_true(report.interrupted && report.intact && report.findings == 1);
 	assert_int_equal(poll_for(recorder, rig, 750 * MS, &err), 0);
