@@ -2,10 +2,8 @@
 /*
  * What is said of a calibrated actuator; see calibrate_stepper.h.
  */
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 #include "calibrate_report.h"
 #include "calibrate_stepper.h"
 #include "cli.h"
