@@ -98,6 +98,7 @@ uses_replay := incise incise-record
 uses_calibrate := incise
 uses_demo := incise incise-learn
 uses_bench := incise incise-learn incise-record
+uses_bench-all := incise
 uses_bench-view := incise incise-view
 $(foreach word,$(filter calibrate-%,$(verbs)),\
 	$(eval uses_$(word) := incise incise-learn incise-record))

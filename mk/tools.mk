@@ -69,6 +69,10 @@ extra_bench-view := $(patsubst %,$(O)/obj/tools/%.o,$(bench_all) $(bench_wakeups
 $(O)/obj/tools/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \
 	-ffile-prefix-map=% -fdebug-prefix-map=% -fmacro-prefix-map=%,$(CFLAGS))))"'
 
+extra_bench-all := $(addprefix $(O)/obj/tools/,report_measure.o report_folder.o report_document.o \
+	report_sections.o report_table.o document.o document_html.o document_markdown.o picture.o \
+	machine.o memory_file.o child.o)
+
 # Pictures that incise bench has coded before it measures.
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/jpeg_camera.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
@@ -126,18 +130,9 @@ demo: ## walk paper 1 on the virtual rig; pictures and summary in demo.out/
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise demo -o $(DEMO) --force
 
-bench: ## measure error against run time on this machine; chart in build/bench/
+bench: ## measure everything on this machine; one report in build/bench/
 	@mk/deps build bench
 	+@$(MAKE) --no-print-directory all
-	$(O)/bin/incise bench precision --plot $(O)/bench/precision
-	$(O)/bin/incise bench training
-	$(O)/bin/incise bench loop --plot $(O)/bench/loop
-	$(O)/bin/incise bench stability --plot $(O)/bench/stability
-	$(O)/bin/incise bench vision
-	$(O)/bin/incise bench capture
-	$(O)/bin/incise bench pose --plot $(O)/bench/pose
-	$(O)/bin/incise bench timeline --plot $(O)/bench/timeline
-	$(O)/bin/incise bench scenes --plot $(O)/bench/scenes
-	$(if $(has_view),$(O)/bin/incise bench view --plot $(O)/bench/view)
+	$(O)/bin/incise bench all --report $(O)/bench
 
 .PHONY: tools deps demo bench

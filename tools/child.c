@@ -25,7 +25,21 @@ bool child_possible(const char *program)
 	return !system(command);
 }
 
+/* Let a descriptor of the child be one of ours, or lead nowhere. */
+static void lead(posix_spawn_file_actions_t *files, int from, int to)
+{
+	if (to < 0)
+		posix_spawn_file_actions_addopen(files, from, "/dev/null", O_WRONLY, 0);
+	else
+		posix_spawn_file_actions_adddup2(files, to, from);
+}
+
 pid_t child_begin(char *const argv[], int out)
+{
+	return child_begin_heard(argv, out, -1);
+}
+
+pid_t child_begin_heard(char *const argv[], int out, int err)
 {
 	posix_spawn_file_actions_t files;
 	posix_spawnattr_t attributes;
@@ -35,11 +49,8 @@ pid_t child_begin(char *const argv[], int out)
 	if (posix_spawn_file_actions_init(&files) || posix_spawnattr_init(&attributes))
 		cli_fail("no memory");
 	posix_spawn_file_actions_addopen(&files, 0, "/dev/null", O_RDONLY, 0);
-	posix_spawn_file_actions_addopen(&files, 2, "/dev/null", O_WRONLY, 0);
-	if (out < 0)
-		posix_spawn_file_actions_addopen(&files, 1, "/dev/null", O_WRONLY, 0);
-	else
-		posix_spawn_file_actions_adddup2(&files, out, 1);
+	lead(&files, 1, out);
+	lead(&files, 2, err);
 	posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
 	posix_spawnattr_setpgroup(&attributes, 0);
 	rc = posix_spawnp(&pid, argv[0], &files, &attributes, argv, environ);

@@ -19,6 +19,9 @@ bool child_possible(const char *program);
  */
 pid_t child_begin(char *const argv[], int out);
 
+/* The same, and what it says on standard error goes to a descriptor as well. */
+pid_t child_begin_heard(char *const argv[], int out, int err);
+
 /* Whether it has ended by itself; then it is gone, and *status as waitpid(2) gives it. */
 bool child_ended(pid_t pid, int *status);
 

@@ -49,7 +49,7 @@ static const struct cli_verb verb = {
 	.name = "bench",
 	.synopsis =
 		"precision [MODEL.fis] | training | stability | loop [SCENE] | pose | timeline | "
-		"vision | capture [RUN] | scenes [SCENE...] | view [SCENE] | "
+		"vision | capture [RUN] | scenes [SCENE...] | view [SCENE] | all | "
 		"compare OLD.json NEW.json [OPTIONS]",
 	.summary =
 		"Measure error against run time, and what is stable; tables, JSON, pictures.\n"
@@ -66,6 +66,7 @@ static const struct cli_verb verb = {
 		"  capture [RUN]          how much of a core it takes to record all streams\n"
 		"  scenes [SCENE...]      what each scene leaves out, and what that saves\n"
 		"  view [SCENE]           the picture of a scene: see 'incise bench view --help'\n"
+		"  all                    all of these, and one report: see 'incise bench all --help'\n"
 		"compare says what changed beyond noise between two reports of --json.",
 	.options = options,
 	.notes =

@@ -92,8 +92,8 @@ _incise()
 		mapfile -t COMPREPLY < <(compgen -W "$(_incise_buses "${COMP_WORDS[2]}")" \
 			-- "${word#:}")
 	elif [[ $word == -* ]]; then
-		# each word of calibrate, and one of bench, is a program of its own
-		[[ $verb != calibrate && "$verb ${COMP_WORDS[2]}" != "bench view" ||
+		# each word of calibrate, and two of bench, is a program of its own
+		[[ $verb != calibrate && ! "$verb ${COMP_WORDS[2]}" =~ ^bench\ (view|all)$ ||
 			${COMP_WORDS[2]} == -* ]] || part=("${COMP_WORDS[2]}")
 		mapfile -t COMPREPLY < <(compgen -W \
 			"$(_incise_options "$program" "$verb" "${part[@]}")" -- "$word")

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The folder of a report; see report_folder.h.
+ */
+#include <dirent.h>
+#include <errno.h>
+#include <ftw.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <incise/outfile.h>
+#include "cli.h"
+#include "document.h"
+#include "report_document.h"
+#include "report_folder.h"
+
+static const char *const parts[] = {"data", "pictures", "report.json", "report.html",
+				    "report.md"};
+#define PARTS (int)(sizeof(parts) / sizeof(*parts))
+
+static char *in(const char *folder, const char *name)
+{
+	char *path;
+
+	if (asprintf(&path, "%s/%s", folder, name) < 0)
+		cli_fail("no memory");
+	return path;
+}
+
+static int remove_one(const char *path, const struct stat *about, int kind,
+		      struct FTW *place)
+{
+	(void)about, (void)kind, (void)place;
+	return remove(path);
+}
+
+/* With all that is in it; links are not followed. */
+static void remove_all(const char *path)
+{
+	if (nftw(path, remove_one, 16, FTW_DEPTH | FTW_PHYS) && errno != ENOENT)
+		cli_fail("%s: cannot be removed: %s", path, strerror(errno));
+}
+
+static void make(const char *path)
+{
+	if (mkdir(path, 0777))
+		cli_fail("%s: %s", path, strerror(errno));
+}
+
+/* A report, or one that was never finished; or nothing at all. */
+static bool may_be_replaced(const char *path)
+{
+	DIR *folder = opendir(path);
+	struct dirent *entry;
+	bool empty = true, report = false;
+
+	if (!folder)
+		cli_fail("%s: %s", path, strerror(errno));
+	while ((entry = readdir(folder))) {
+		char *file = in(path, entry->d_name);
+		json_t *json;
+
+		if (!strcmp(entry->d_name, "report.json")) {
+			json = json_load_file(file, 0, NULL);
+			report = json_is_object(json_object_get(json, "words"));
+			json_decref(json);
+		}
+		free(file);
+		empty &= *entry->d_name == '.' &&
+			 (!strcmp(entry->d_name, ".") || !strcmp(entry->d_name, "..") ||
+			  !strcmp(entry->d_name, ".unfinished"));
+	}
+	closedir(folder);
+	return empty || report;
+}
+
+/* Folders above it that are missing. */
+static void make_above(const char *path)
+{
+	char *above = strdup(path);
+
+	if (!above)
+		cli_fail("no memory");
+	for (char *slash = strchr(above + 1, '/'); slash;
+	     slash = strchr(slash + 1, '/')) {
+		*slash = 0;
+		if (mkdir(above, 0777) && errno != EEXIST)
+			cli_fail("%s: %s", above, strerror(errno));
+		*slash = '/';
+	}
+	free(above);
+}
+
+void report_folder_begin(struct report_folder *folder, const char *path)
+{
+	char *part;
+
+	*folder = (struct report_folder){.path = path,
+					 .unfinished = in(path, ".unfinished")};
+	make_above(path);
+	folder->made = !mkdir(path, 0777);
+	if (!folder->made && errno != EEXIST)
+		cli_fail("%s: %s", path, strerror(errno));
+	if (!folder->made && !may_be_replaced(path))
+		cli_fail("%s: is there, and is no report; give another --report DIR",
+			 path);
+	remove_all(folder->unfinished);
+	make(folder->unfinished);
+	for (int i = 0; i < 2; i++) {
+		part = in(folder->unfinished, parts[i]);
+		make(part);
+		free(part);
+	}
+}
+
+void report_folder_finish(struct report_folder *folder)
+{
+	for (int i = 0; i < PARTS; i++) {
+		char *from = in(folder->unfinished, parts[i]),
+		     *to = in(folder->path, parts[i]);
+
+		remove_all(to);
+		if (rename(from, to))
+			cli_fail("%s: %s", to, strerror(errno));
+		free(from);
+		free(to);
+	}
+	remove_all(folder->unfinished);
+	free(folder->unfinished);
+}
+
+void report_folder_abandon(struct report_folder *folder)
+{
+	remove_all(folder->unfinished);
+	if (folder->made)
+		rmdir(folder->path);
+	free(folder->unfinished);
+}
+
+json_t *report_folder_load(const char *path)
+{
+	char *file = in(path, "report.json");
+	json_error_t why;
+	json_t *report = json_load_file(file, 0, &why);
+
+	if (!report)
+		cli_fail("%s: %s", file, why.text);
+	if (!json_is_object(json_object_get(report, "words")))
+		cli_fail("%s: is no report of 'incise bench all'", file);
+	free(file);
+	return report;
+}
+
+static struct incise_outfile *open_part(const char *folder, const char *name)
+{
+	struct incise_error err = {0};
+	char *path = in(folder, name);
+	struct incise_outfile *file = incise_outfile_open(path, &err);
+
+	if (!file)
+		cli_fail_with(&err);
+	free(path);
+	return file;
+}
+
+static void close_part(struct incise_outfile *file)
+{
+	struct incise_error err = {0};
+
+	if (incise_outfile_commit(file, &err))
+		cli_fail_with(&err);
+}
+
+/* Documents are of what a reader of report.json gets, rounded as it is. */
+void report_folder_write(const char *path, const json_t *report)
+{
+	struct incise_outfile *file = open_part(path, "report.json");
+	struct incise_error err = {0};
+	struct document *document;
+	json_t *read;
+
+	json_dumpf(report, incise_outfile_stream(file),
+		   JSON_INDENT(1) | JSON_REAL_PRECISION(12));
+	fputc('\n', incise_outfile_stream(file));
+	close_part(file);
+	read = report_folder_load(path);
+	document = report_document(read, path);
+	file = open_part(path, "report.html");
+	if (document_html(document, path, incise_outfile_stream(file), &err))
+		cli_fail_with(&err);
+	close_part(file);
+	file = open_part(path, "report.md");
+	document_markdown(document, incise_outfile_stream(file));
+	close_part(file);
+	document_free(document);
+	json_decref(read);
+}
