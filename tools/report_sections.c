@@ -52,11 +52,16 @@ const struct report_fact report_facts[] = {
 	 "name=double_libm", NUMBER("ns", NULL, 3)},
 	{1, "training", "Training on unseen cuts: least error, all methods", "N rms",
 	 "rows", NULL, PART(LEAST, "rmse_unseen_N", NULL, 3)},
-	{1, "pose",
-	 "Pose of the loop: least and largest rms error, all methods and rates", "mm",
-	 "rows", NULL, PART(RANGE, "rms_mm", NULL, 3)},
-	{1, "timeline", "Times of samples: least and largest rms error, all windows",
-	 "µs", "rows", NULL, PART(RANGE, "rms_us", NULL, 3)},
+	{1, "pose", "Pose of the loop in a cut, tracker of 120 Hz 4 ms late: rms error",
+	 "mm", "rows", "name=library,motion=surgeon,delay_ms=4,tracker_hz=120",
+	 NUMBER("rms_mm", NULL, 3)},
+	{1, "pose", "… of the last pose that has come", "mm", "rows",
+	 "name=held,motion=surgeon,delay_ms=4,tracker_hz=120", NUMBER("rms_mm", NULL, 3)},
+	{1, "timeline",
+	 "Time of a sample up to 20 ms late, after 30 s: largest rms error", "µs", "rows",
+	 "name=line_live,window_s=30", PART(LARGEST, "rms_us", NULL, 3)},
+	{1, "timeline", "… by its arrival", "µs", "rows", "name=arrival,window_s=30",
+	 PART(LARGEST, "rms_us", NULL, 3)},
 	{1, "loop", "A tick with all forces, on a plane", "ns", "rows", "name=plane",
 	 NUMBER("tick_ns.median", NULL, 3)},
 	{1, "loop", "… on a mesh of 500 000 triangles", "ns", "rows", "name=mesh_500000",
@@ -94,6 +99,8 @@ const struct report_fact report_facts[] = {
 	 PART(SUM, "refused", NULL, 9)},
 	{2, "extremes", "… NaN, overflow, over the limit or hung", "", "rows", NULL,
 	 PART(SUM, "wrong", NULL, 9)},
+	{2, "extremes", "Walls of 10 N/m to 1 GN/m pressed: motions that stay bounded",
+	 "", "stiff", NULL, PART(HOLDING, "bounded", NULL, 0)},
 	{3, "scenes", "Scenes whose forces are those of the full pipeline, to the bit",
 	 "", "rows", NULL, PART(HOLDING, "identical", NULL, 0)},
 	{3, "scenes", "Cost of a tick, as part of the full pipeline's: time", "", "rows",
@@ -248,63 +255,97 @@ const struct report_section report_sections[] = {
 			"How far is the pose that the loop is given from where the tool is, "
 			"by tracker, delay and way of predicting?",
 		.method =
-			"A virtual tool moves along known ways; a tracker of some rate, noise "
-			"and delay reports it; each way predicts to the tick.",
+			"Motions are known at any time. A tracker sees them late, with noise, and "
+			"loses some; at each millisecond the pose shown is held against the truth. "
+			"held: the last pose that has come; line, parabola: through the last ones; "
+			"library: as the loop has it; the others of it are told a wrong noise, or "
+			"that poses are not late. Jump is the largest step beside that of the "
+			"motion: a force follows it.",
 		.reference =
 			"The true pose at each tick. exact_delayed is the true pose, as "
-			"late as the tracker's: what no prediction would give.",
-		.limits = "Motions of the virtual surgeon; a real hand differs.",
-		.pictures = {{"", "Error of the pose over its cost.",
-			      "A curve for each way of predicting."}},
-		.tables = {{
-				   "Largest over all motions",
-				   "rows",
-				   NULL,
-				   {TEXT("name", "way"),
-				    NUMBER("delay_ms", "delay, ms", 3),
-				    NUMBER("tracker_hz", "tracker, Hz", 4),
-				    PART(ROWS, "", "motions", 0),
-				    PART(LARGEST, "rms_mm", "rms error, mm", 3),
-				    PART(LARGEST, "p99_mm", "99 %, mm", 3),
-				    PART(LARGEST, "max_mm", "largest, mm", 3),
-				    PART(MEDIAN, "ns", "ns per tick", 3),
-				    PART(HOLDING, "failed", "failed", 0)},
-			   },
-			   {
-				   "After reports were lost",
-				   "losses",
-				   NULL,
-				   {TEXT("name", "way"), NUMBER("gap_ms", "gap, ms", 3),
-				    NUMBER("rms_mm", "rms error, mm", 3),
-				    NUMBER("max_mm", "largest, mm", 3)},
-			   }},
+			"late as the tracker's: a tracker without noise is no better to "
+			"who does not predict.",
+		.limits = "Motions of a virtual hand; a real one differs.",
+		.pictures =
+			{{"",
+			  "Error of the pose over the time of a tick; numbers are the "
+			  "tracker's rate in Hz.",
+			  "A panel for each motion, a curve for each way, a point for each rate of the tracker."},
+			 {"rates", "Error of the pose over the tracker's rate.",
+			  "A panel for each motion, a curve for each way."}},
+		.tables =
+			{{"Two cuts of the virtual rig, tracker 4 ms late",
+			  "rows",
+			  "motion=surgeon,delay_ms=4",
+			  {TEXT("name", "way"), NUMBER("tracker_hz", "tracker, Hz", 4),
+			   NUMBER("rms_mm", "rms error, mm", 3),
+			   NUMBER("p99_mm", "99 %, mm", 3),
+			   NUMBER("max_mm", "largest, mm", 3),
+			   NUMBER("jump_mm", "jump, mm", 3),
+			   NUMBER("rms_mm_s", "velocity, rms, mm/s", 3),
+			   NUMBER("rms_deg", "angle, rms, degrees", 2),
+			   NUMBER("ns", "ns per tick", 3)}},
+			 {"All motions, delays and rates",
+			  "rows",
+			  NULL,
+			  {TEXT("name", "way"), PART(ROWS, "", "runs", 0),
+			   PART(RANGE, "rms_mm", "rms error, mm", 2),
+			   PART(LARGEST, "max_mm", "largest, mm", 3),
+			   PART(LARGEST, "jump_mm", "largest jump, mm", 3),
+			   PART(RANGE, "ns", "ns per tick", 3),
+			   PART(HOLDING, "failed", "failed", 0)}},
+			 {"When nothing comes for a while: strokes at 120 Hz, each gap and the "
+			  "100 ms after it",
+			  "losses",
+			  NULL,
+			  {TEXT("name", "way"), NUMBER("gap_ms", "gap, ms", 3),
+			   NUMBER("rms_mm", "rms error, mm", 3),
+			   NUMBER("max_mm", "largest, mm", 3),
+			   NUMBER("jump_mm", "jump, mm", 3)}}},
 	},
 	{
 		.word = "timeline",
 		.program = "incise-bench",
 		.title = "Timeline: error of times over the window",
 		.question =
-			"How far is the time of a sample from when it was acquired, by the "
-			"window that its line is fitted to?",
+			"How far is the time that a late sample is given from when it was "
+			"acquired, by how much of the stream was seen?",
 		.method =
-			"Streams of the virtual rig, whose clocks run fast or slow and whose "
-			"samples arrive late; times come from the line below all arrivals.",
-		.reference = "The true time of each sample.",
+			"240 samples a second by a clock that is off by −200, 0 or 200 ppm arrive "
+			"up to 20 ms late, in order, and 1 % never. arrival: the time of arrival "
+			"less the delay; lowest: as early as the earliest; squares: least squares "
+			"of all arrivals; line: the library's line below the arrivals, live, or of "
+			"all of the window afterwards.",
+		.reference =
+			"The true time of each sample. squares_known is told the mean "
+			"lateness, which no one knows outside of a bench.",
 		.limits =
-			"Lateness of the virtual rig; a bus that is late by the same time in "
-			"all samples cannot be told from one that is not.",
-		.pictures = {{"", "Error of a sample's time over the window.",
-			      "A curve for each stream."}},
-		.tables = {{
-			"Windows",
-			"rows",
-			NULL,
-			{TEXT("name", "stream"), NUMBER("window_s", "window, s", 3),
-			 NUMBER("rms_us", "rms error, µs", 3),
-			 NUMBER("p99_us", "99 %, µs", 3),
-			 NUMBER("max_us", "largest, µs", 3),
-			 NUMBER("ns_per_sample", "ns per sample", 3)},
-		}},
+			"A delay that is the same for all samples cannot be told from none: "
+			"it is calibrated, see incise calibrate delay.",
+		.pictures =
+			{{"", "Error of a sample's time over what it costs.",
+			  "A panel for each kind of lateness, a curve for each method."},
+			 {"windows", "Error of a sample's time over how much was seen.",
+			  "A panel for each kind of lateness, a curve for each method."}},
+		.tables = {{"After 30 s, all drifts",
+			    "rows",
+			    "window_s=30",
+			    {TEXT("name", "method"), TEXT("late", "lateness"),
+			     PART(LARGEST, "rms_us", "rms error, µs", 3),
+			     PART(LARGEST, "p99_us", "99 %, µs", 3),
+			     PART(LARGEST, "max_us", "largest, µs", 3),
+			     PART(LARGEST, "stated_us", "as stated, µs", 3),
+			     PART(LEAST, "within_2sd", "within twice of that", 3),
+			     PART(MEDIAN, "ns_per_sample", "ns per sample", 3),
+			     PART(HOLDING, "failed", "failed", 0)}},
+			   {"The library's line by how much was seen; all drifts",
+			    "rows",
+			    "name=line_live",
+			    {TEXT("late", "lateness"), NUMBER("window_s", "window, s", 3),
+			     PART(LARGEST, "rms_us", "rms error, µs", 3),
+			     PART(LARGEST, "p99_us", "99 %, µs", 3),
+			     PART(LARGEST, "max_us", "largest, µs", 3),
+			     PART(MEDIAN, "ns_per_sample", "ns per sample", 3)}}},
 	},
 	{
 		.word = "loop",
@@ -491,31 +532,54 @@ const struct report_section report_sections[] = {
 			"Which stages, libraries, devices and memory does a scene take, what "
 			"does a tick cost, and are the forces those of the full pipeline?",
 		.method =
-			"Each scene runs as it is, and with every stage kept and neutral; "
-			"libraries are those that the process of its loop maps.",
-		.reference = "The full pipeline: each force is compared bit by bit.",
+			"Each scene that ships, and some that are made, runs as it is and with "
+			"every stage kept and neutral. Libraries, devices and memory are those "
+			"of the process of its loop while it runs.",
+		.reference =
+			"The full pipeline: forces are compared bit by bit, tick by tick.",
 		.limits =
-			"Instructions where the machine counts them; what is not counted is a "
-			"dash.",
-		.pictures = {{"", "Cost of a tick beside that of the full pipeline.",
-			      "A pair of bars for each scene."}},
-		.tables = {{"Cost of a tick",
-			    "rows",
-			    NULL,
-			    {TEXT("name", "scene"), NUMBER("tick_ns", "time, ns", 3),
-			     NUMBER("full_ns", "full pipeline, ns", 3),
-			     NUMBER("tick_ns/full_ns", "part", 2),
-			     NUMBER("instructions", "instructions", 7),
-			     NUMBER("full_instructions", "full pipeline", 7),
-			     NUMBER("instructions/full_instructions", "part", 2),
-			     NUMBER("memory_KiB", "memory, KiB", 4),
-			     TEXT("identical", "same to the bit")}},
-			   {"What is kept, and what is left out",
-			    "rows",
-			    NULL,
-			    {TEXT("name", "scene"), TEXT("stages", "stages"),
-			     TEXT("left_out", "left out"), TEXT("libraries", "libraries"),
-			     TEXT("devices", "devices")}}},
+			"Instructions are counted where perf stat or callgrind can; a dash is "
+			"what was not counted.",
+		.pictures =
+			{{"",
+			  "Time and instructions of a tick, each scene over its full "
+			  "pipeline.",
+			  "A pair of bars for each scene; the upper one, with what the scene "
+			  "needs, is shorter."}},
+		.tables =
+			{{"Cost of a tick",
+			  "rows",
+			  NULL,
+			  {TEXT("name", "scene"), NUMBER("tick_ns", "time, ns", 3),
+			   NUMBER("full_ns", "full pipeline, ns", 3),
+			   NUMBER("tick_ns/full_ns", "part of it", 2),
+			   NUMBER("instructions", "instructions", 7),
+			   NUMBER("full_instructions", "full pipeline", 7),
+			   NUMBER("instructions/full_instructions", "part of it", 2),
+			   NUMBER("ticks_compared", "ticks compared", 9),
+			   NUMBER("ticks_in_contact", "in contact", 9),
+			   TEXT("identical", "same to the bit")}},
+			 {"Memory, KiB",
+			  "rows",
+			  NULL,
+			  {TEXT("name", "scene"), NUMBER("plan_memory_KiB", "plan", 3),
+			   NUMBER("full_memory_KiB", "full pipeline's plan", 3),
+			   NUMBER("memory_KiB", "memory", 4),
+			   NUMBER("process_own_KiB", "process, its own", 6),
+			   NUMBER("process_memory_KiB", "with shared libraries", 6),
+			   NUMBER("libraries_mapped", "libraries", 3)}},
+			 {"What is kept, and what is left out",
+			  "rows",
+			  NULL,
+			  {TEXT("name", "scene"), TEXT("stages", "stages"),
+			   TEXT("left_out", "left out"),
+			   TEXT("libraries_not_mapped", "libraries not mapped"),
+			   TEXT("devices", "devices"), TEXT("files_open", "files open")}},
+			 {"Why it is left out, and what it would cost",
+			  "left_out",
+			  NULL,
+			  {TEXT("scene", "scene"), TEXT("stage", "stage"),
+			   NUMBER("ns", "ns per tick, neutral", 2), TEXT("why", "why")}}},
 	},
 	{
 		.word = "extremes",
@@ -525,31 +589,40 @@ const struct report_section report_sections[] = {
 			"Does any input, however extreme, yield NaN, an overflow, a force "
 			"over the limit, or an endless loop?",
 		.method =
-			"Each part is fed with its worst: the largest and smallest numbers, "
-			"NaN, infinities, walls of 10 N/m to 1 GN/m, files that are damaged. "
-			"What comes out is held, refused with a reason, or wrong.",
-		.reference =
-			"The limits that a scene states; none of the outputs may be over "
-			"them.",
+			"Each door of the library is given numbers and bytes that nobody should "
+			"send: the largest and smallest, NaN, infinities, files that are damaged. "
+			"What comes out is held within its limits, refused with a reason, or wrong. "
+			"Walls of 10 N/m to 1 GN/m are pressed for 12 s with a device of 50 g, in a "
+			"whole plan and alone, with the guard of passivity and without, behind a "
+			"limit of force; those that a scene would be refused for are forced.",
+		.reference = "The limits that are stated; for walls the limit of theory.",
 		.limits =
-			"So many cases, and no proof: what is certified is said with the "
-			"evaluator. Fuzzers try more, see make check-fuzz.",
-		.pictures = {{"", "Walls of 10 N/m to 1 GN/m: accepted, or refused.",
-			      "Stiff walls are refused from a stiffness on."}},
-		.tables =
-			{{"What was tried",
-			  "rows",
-			  NULL,
-			  {TEXT("name", "part"), TEXT("what", "what"),
-			   NUMBER("tried", "tried", 9), NUMBER("held", "held", 9),
-			   NUMBER("refused", "refused", 9), NUMBER("wrong", "wrong", 9)}},
-			 {"Stiff walls",
-			  "stiff",
-			  NULL,
-			  {NUMBER("K_N_m", "wall, N/m", 2), TEXT("accepted", "accepted"),
-			   NUMBER("limit_N_m", "limit, N/m", 3),
-			   NUMBER("largest_mm", "largest way, mm", 3),
-			   NUMBER("largest_N", "largest force, N", 3)}}},
+			"So many cases, and no proof; what is certified is said with the "
+			"evaluator. Fuzzers try more: make check-fuzz.",
+		.pictures =
+			{{"", "Walls of 10 N/m to 1 GN/m: way, motion at the end, force.",
+			  "Above the limit of theory motions do not end, and stay bounded "
+			  "behind the limit of force."}},
+		.tables = {{"What was tried",
+			    "rows",
+			    NULL,
+			    {TEXT("name", "door"), TEXT("what", "with"),
+			     NUMBER("tried", "tried", 9), NUMBER("held", "held", 9),
+			     NUMBER("refused", "refused", 9),
+			     NUMBER("wrong", "wrong", 9)}},
+			   {"Stiff walls",
+			    "stiff",
+			    NULL,
+			    {TEXT("path", "what"), TEXT("guard", "guard"),
+			     TEXT("accepted", "accepted"), PART(ROWS, "", "walls", 0),
+			     PART(RANGE, "K_N_m", "stiffness, N/m", 2),
+			     PART(LEAST, "theory_limit_N_m", "limit of theory, N/m", 3),
+			     PART(HOLDING, "bounded", "bounded", 0),
+			     PART(LARGEST, "largest_N", "largest force, N", 3),
+			     PART(LARGEST, "largest_mm", "largest way, mm", 3),
+			     PART(LARGEST, "late_mm", "motion at the end, mm", 2),
+			     PART(SUM, "not_finite", "not finite", 6),
+			     PART(HOLDING, "failed", "failed", 0)}}},
 	},
 	{0},
 };

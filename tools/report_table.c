@@ -282,6 +282,10 @@ static void cell_text(const struct rows *rows, const int *group, int which,
 		snprintf(text, size, "%d of %d", holding, n);
 		break;
 	case PART_RANGE:
+		if (isnan(summed_up(rows, group, which, column, PART_LEAST))) {
+			snprintf(text, size, "–");
+			break;
+		}
 		report_number(summed_up(rows, group, which, column, PART_LEAST),
 			      column->digits, least, sizeof(least));
 		report_number(summed_up(rows, group, which, column, PART_RANGE),

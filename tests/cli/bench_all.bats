@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise bench all, as a user meets it: that the report holds all of it, says the same in each
+# form, and can be read. Times are not judged here: the machine is shared.
+
+load cli
+
+# One report for all that only look at it. What fails here is in it, with the reason.
+setup_file() {
+	cd "$BATS_FILE_TMPDIR"
+	PATH=$INCISE_BUILD/bin:$PATH
+	incise bench all --quick --report r >out 2>err && echo 0 >status || echo $? >status
+}
+
+setup() {
+	work_folder
+	r=$BATS_FILE_TMPDIR/r
+}
+
+words="precision training stability pose timeline loop vision capture view scenes extremes"
+
+# A folder that is a report to incise bench all, of this JSON.
+report_of() {
+	mkdir -p made
+	printf '%s\n' "$1" >made/report.json
+}
+
+@test "one command measures every word, and leaves one report" {
+	for file in report.html report.md report.json; do
+		[ -s "$r/$file" ]
+	done
+	[ ! -e "$r/.unfinished" ]
+	[ -n "$(key "$r/report.json" machine.cpu)" ]
+	[ -n "$(key "$r/report.json" date)" ]
+	[ "$(key "$r/report.json" quick)" = 1 ]
+	[ "$(key "$r/report.json" command)" = "incise bench all --report DIR --quick" ]
+	[ "incise $(key "$r/report.json" version)" = "$(incise --version)" ]
+	for word in $words; do
+		case $(key "$r/report.json" "runs.$word.state") in
+		measured)
+			cmp <(sqlite3 :memory: "SELECT json_extract(readfile('$r/report.json'),
+				'\$.words.$word')") <(sqlite3 :memory: "SELECT json(readfile(
+				'$r/data/$word.json'))")
+			grep -qF "(data/$word.json)" "$r/report.md" ;;
+		failed | "left out")
+			grep -qE "^- $word: (failed|left out): .{10}" "$r/report.md" ;;
+		*) complain "$word: what came out?" ;;
+		esac
+	done
+	# what needs no screen, camera or real time
+	for word in precision training stability; do
+		[ "$(key "$r/report.json" "runs.$word.state")" = measured ]
+	done
+	holds "$(key "$r/report.json" "figures[0].value") > 0"
+	[[ "$(key "$r/report.json" "figures[0].name")" == "precision: "* ]]
+}
+
+@test "it fails when a word failed, and says where that stands" {
+	n=$(sqlite3 :memory: "SELECT json_array_length(readfile('$r/report.json'), '\$.failed')")
+	if [ "$n" = 0 ]; then
+		[ "$(cat "$BATS_FILE_TMPDIR/status")" = 0 ]
+		[ ! -s "$BATS_FILE_TMPDIR/err" ]
+	else
+		[ "$(cat "$BATS_FILE_TMPDIR/status")" = 1 ]
+		[ "$(cat "$BATS_FILE_TMPDIR/err")" = \
+			"incise bench all: $n of 11 words failed; r/report.md says why" ]
+	fi
+}
+
+@test "HTML and Markdown say the same" {
+	python3 "$BATS_TEST_DIRNAME/report_cells.py" "$r/report.html" >html
+	python3 "$BATS_TEST_DIRNAME/report_cells.py" "$r/report.md" >md
+	# the list of contents is behind the title in both
+	[ "$(wc -l <html)" -gt 500 ]
+	diff html md
+	grep -qx fixed_table html
+	grep -qx "picture .*" html
+}
+
+@test "every picture is there, in both" {
+	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the pictures"
+	grep -oE '\(pictures/[a-z-]+\.svg\)' "$r/report.md" | tr -d '()' >named
+	(cd "$r" && ls pictures/*.svg) >there
+	diff <(sort named) there
+	[ "$(grep -c . named)" -ge 4 ]
+	[ "$(grep -o 'src="data:image/svg+xml;base64,' "$r/report.html" | wc -l)" = "$(grep -c . named)" ]
+	while read -r file; do
+		base64 -w0 <"$r/$file" >coded
+		grep -qFf coded "$r/report.html"
+	done <named
+}
+
+@test "no number is missing by its name, and nothing comes from elsewhere" {
+	python3 "$BATS_TEST_DIRNAME/report_cells.py" "$r/report.md" >cells
+	run ! grep -iwE '^[+-]?(nan|null|inf)$|^null| null' cells
+	run ! grep -oE '(src|href)="(https?:)?//[^"]*' "$r/report.html"
+	run ! grep -E '<script|<link [^>]*stylesheet|@import|url\(' "$r/report.html"
+	run ! grep -F '://' "$r/report.md"
+	if command -v tidy >/dev/null; then
+		run -0 tidy -q -e --drop-empty-elements no "$r/report.html"
+		[ -z "$output" ]
+	fi
+}
+
+@test "--from writes the same again" {
+	cp -r "$r" again
+	rm again/report.html again/report.md
+	run -0 --separate-stderr incise bench all --from again
+	[ -z "$stderr" ]
+	for file in report.html report.md report.json; do
+		cmp "$r/$file" "again/$file"
+	done
+}
+
+@test "a word that fails stands in the report, and the others go on" {
+	mkdir modules
+	export INCISE_MODULE_PATH=$PWD/modules
+	run --separate-stderr incise bench all --quick --report r --only precision,vision
+	failed_with "1 of 2 words failed" r/report.md
+	grep -qE "^- vision: failed: vision: there is no module vision_opencv\.so" r/report.md
+	grep -qE "see “What failed or was left out”" r/report.md
+	[ "$(key r/report.json 'failed[0]')" = vision ]
+	[ ! -e r/data/vision.json ]
+	grep -q "^## Evaluator" r/report.md
+	run ! grep "^## Vision" r/report.md
+	# it is replaced by the next one
+	unset INCISE_MODULE_PATH
+	incise bench all --quick --report r --only training --json >r.json
+	cmp <(sqlite3 :memory: "SELECT json(readfile('r.json'))") \
+		<(sqlite3 :memory: "SELECT json(readfile('r/report.json'))")
+	[ "$(ls r)" = "$(printf '%s\n' data pictures report.html report.json report.md)" ]
+	[ "$(ls r/data)" = training.json ]
+}
+
+@test "what a report holds is shown as it is, whatever it is" {
+	report_of '{"words": {"training": {"rows": [
+		{"name": "<script>alert(1)</script>", "ms": 1.5, "failed": "a|b *c* [d](e) `f` & \"g\""},
+		{"name": "\\| --- \u0007_x_ <!--", "ms": 1e300, "failed": null}, 7, null],
+		"figures": 3}, "no_such_word": {}, "loop": [], "pose": {"rows": {"a": 1}}},
+		"runs": {"training": 5, "view": {"state": "failed", "why": "</p><b>x", "warnings": ["1. x", 2]}},
+		"machine": {"cpu": "\"<i>\u00e9"}, "failed": ["view"], "command": "`$(x)`", "date": 3}'
+	incise bench all --from made
+	run ! grep -E '<(script|i|b)>|<!--' made/report.html
+	grep -qF '&lt;script&gt;alert(1)&lt;/script&gt;' made/report.html
+	grep -qF '| \<script\>alert(1)\</script\> |' made/report.md
+	grep -qF 'a\|b \*c\* \[d\](e) \`f\` \& "g"' made/report.md
+	grep -qF '1.00×10³⁰⁰' made/report.md
+	diff <(python3 "$BATS_TEST_DIRNAME/report_cells.py" made/report.html) \
+		<(python3 "$BATS_TEST_DIRNAME/report_cells.py" made/report.md)
+}
+
+@test "what is no report is refused, and stays" {
+	mkdir other
+	echo mine >other/report.json
+	run --separate-stderr incise bench all --report other
+	failed_with "other: is there, and is no report; give another --report DIR"
+	[ "$(cat other/report.json)" = mine ]
+	[ "$(ls -A other)" = report.json ]
+	touch file
+	run --separate-stderr incise bench all --report file
+	failed_with "file: Not a directory"
+	run --separate-stderr incise bench all --from other
+	failed_with other/report.json
+	run --separate-stderr incise bench all --from nowhere
+	failed_with nowhere/report.json
+	echo '{"rows": []}' >other/report.json
+	run --separate-stderr incise bench all --from other
+	failed_with "other/report.json: is no report"
+}
+
+@test "bad usage of bench all" {
+	run --separate-stderr incise bench all
+	bad_usage "expected --report DIR, or --from DIR"
+	run --separate-stderr incise bench all --report a --from b
+	bad_usage "expected --report DIR, or --from DIR"
+	run --separate-stderr incise bench all --report a --only precision,nosuch
+	bad_usage "'nosuch' is no word of incise bench"
+	run --separate-stderr incise bench all --from b --quick
+	bad_usage "--from measures nothing"
+	run --separate-stderr incise bench all --report ""
+	bad_usage "the folder has no name"
+	run --separate-stderr incise bench all --report a precision
+	bad_usage "takes options only"
+	[ ! -e a ]
+}
+
+@test "an interrupted one leaves what was there, and ends what it started" {
+	cp -r "$r" old
+	cp old/report.json was.json
+	for folder in old "new/one"; do
+		incise bench all --report "$folder" --only stability 2>err &
+		pid=$!
+		until [ -e "$folder/.unfinished/data/stability.json" ]; do sleep 0.05; done
+		child=$(ps -o pid= --ppid "$pid" | tr -d ' ')
+		[ -n "$child" ]
+		kill -INT "$pid"
+		wait "$pid" && complain "it went on" || [ "$?" = 1 ]
+		grep -qx "incise bench all: Interrupt: $folder is as it was" err
+		run ! kill -0 "$child"
+	done
+	cmp old/report.json was.json
+	[ ! -e old/.unfinished ]
+	[ ! -e new/one ]
+}
+
+# ---- in a browser ----
+
+browser() {
+	command -v chromium >/dev/null || skip "chromium is not installed"
+	chromium --headless=new --no-sandbox --disable-gpu --hide-scrollbars --no-first-run \
+		--user-data-dir="$PWD/profile" --enable-logging=stderr --force-prefers-reduced-motion \
+		"$@" 2>said || complain "chromium: $(tail -n 3 said)"
+}
+
+# The page as it is, with a script that has it say how it came out.
+asked() {
+	sed '/<\/main>/r /dev/stdin' "$r/report.html" <<-'EOF'
+		<script>
+		addEventListener("load", () => {
+			const small = [...document.querySelectorAll("p, li, td, th, figcaption, pre")]
+				.filter(e => parseFloat(getComputedStyle(e).fontSize) < 16).length;
+			const blank = [...document.images].filter(image => {
+				const canvas = document.createElement("canvas");
+				canvas.width = 300;
+				canvas.height = 300;
+				const context = canvas.getContext("2d");
+				context.drawImage(image, 0, 0, 300, 300);
+				return new Set(new Uint32Array(
+					context.getImageData(0, 0, 300, 300).data.buffer)).size < 20;
+			}).length;
+			const broken = [...document.querySelectorAll('a[href^="#"]')]
+				.filter(a => !document.getElementById(a.hash.slice(1))).length;
+			const ids = [...document.querySelectorAll("[id]")].map(e => e.id);
+			parent.postMessage([innerWidth, document.documentElement.scrollWidth,
+				small, document.images.length, blank, broken,
+				ids.length - new Set(ids).size].join(" "), "*");
+		});
+		</script>
+	EOF
+}
+
+@test "a browser shows it: no error, no text that is small, nothing wider than a phone" {
+	browser --dump-dom 'data:text/html,<script>console.error("heard")</script>' >/dev/null
+	grep -q 'CONSOLE.*heard' said # so that silence means something
+	asked >asked.html
+	for width in 390 1280; do
+		# a window is no narrower than 500 pixels; a frame may be
+		cat >frame.html <<-EOF
+			<script>addEventListener("message",
+				e => document.body.dataset.asked = e.data);</script>
+			<body><iframe src="asked.html" style="width:${width}px;height:844px;border:0">
+		EOF
+		browser --virtual-time-budget=10000 --dump-dom "file://$PWD/frame.html" >dom
+		run ! grep CONSOLE said
+		answer=$(grep -oE 'data-asked="[^"]*' dom | cut -d'"' -f2)
+		echo "$width: $answer"
+		read -r inner page small pictures blank broken twice <<<"$answer"
+		[ "$inner" = "$width" ]
+		[ "$page" -le "$width" ]
+		[ "$small $blank $broken $twice" = "0 0 0 0" ]
+		[ "$pictures" = "$(grep -c '^!\[' "$r/report.md")" ]
+	done
+}
+
+@test "pictures of the report, and its pages" {
+	mkdir -p "$INCISE_BUILD/artefacts"
+	for size in 390,844 1280,2000; do
+		browser --window-size=$size --screenshot="$PWD/$size.png" "file://$r/report.html"
+		run ! grep CONSOLE said
+		# a page of one colour is some kilobytes
+		[ "$(wc -c <"$size.png")" -gt 30000 ]
+		cp "$size.png" "$INCISE_BUILD/artefacts/report-${size/,/x}.png"
+	done
+	browser --no-pdf-header-footer --print-to-pdf="$PWD/report.pdf" "file://$r/report.html"
+	[[ "$(head -c 5 report.pdf)" == %PDF- ]]
+	# each section begins a page
+	[ "$(grep -ac '/Type */Page\b' report.pdf)" -ge "$(grep -c '^## ' "$r/report.md")" ]
+	cp report.pdf "$INCISE_BUILD/artefacts/report.pdf"
+}
