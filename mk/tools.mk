@@ -69,9 +69,9 @@ extra_bench-view := $(patsubst %,$(O)/obj/tools/%.o,$(bench_all) $(bench_wakeups
 $(O)/obj/tools/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \
 	-ffile-prefix-map=% -fdebug-prefix-map=% -fmacro-prefix-map=%,$(CFLAGS))))"'
 
-extra_bench-all := $(addprefix $(O)/obj/tools/,report_measure.o report_folder.o report_document.o \
-	report_sections.o report_table.o document.o document_html.o document_markdown.o picture.o \
-	machine.o memory_file.o child.o)
+extra_bench-all := $(patsubst %,$(O)/obj/tools/%.o,$(bench_all) child report_measure \
+	report_folder report_document report_sections report_table document document_html \
+	document_markdown)
 
 # Pictures that incise bench has coded before it measures.
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
