@@ -59,30 +59,35 @@ void scenes_picture(const struct scene_row *rows, int n, const struct machine *m
 		    const char *folder, const char *name)
 {
 	char data[300];
+	bool counted = false;
 	FILE *script;
-	int drawn;
+	int drawn, height;
 
 	if (snprintf(data, sizeof(data), "%s.dat", name) >= (int)sizeof(data))
 		cli_fail("%s is too long a name", name);
 	drawn = write_data(rows, n, folder, data);
 	if (!drawn)
 		return;
-	script = picture_begin(folder, name, 1150, 150 + 46 * drawn);
+	for (int i = 0; i < n; i++)
+		counted |= isfinite(rows[i].saving.few.instructions);
+	height = 160 + 46 * drawn;
+	script = picture_begin(folder, name, 1150, height);
 	fprintf(script,
 		"data = '%s'\n"
 		"set multiplot layout 1,2 title \"A tick of each scene, against the full "
 		"pipeline\\n%s, %s\" font ',12'\n"
 		"set yrange [%g:-0.6]\nset xrange [0:*]\nset offsets 0, graph 0.12, 0, 0\n"
 		"set ytics nomirror scale 0\nset grid noytics\nset border 3\n"
-		"set key outside bottom center horizontal\nset lmargin at screen 0.17\n"
+		"set key at screen 0.57,screen %g center maxrows 1\nset bmargin 5\n"
+		"set lmargin at screen 0.17\n"
 		"set rmargin at screen 0.56\n"
 		"set xlabel 'median time of a tick / ns'\n",
-		data, machine->cpu, machine->kernel, drawn - 0.4);
+		data, machine->cpu, machine->kernel, drawn - 0.4, 18.0 / height);
 	plot_bars(script, 3, 7, ":ytic(2)");
-	fputs("set format y ''\nset lmargin at screen 0.6\nset rmargin at screen 0.97\n"
+	fputs("unset key\nset format y ''\nset lmargin at screen 0.6\nset rmargin at screen 0.97\n"
 	      "set xlabel 'instructions of a tick'\n",
 	      script);
-	if (isfinite(rows[0].saving.few.instructions))
+	if (counted)
 		plot_bars(script, 6, 10, "");
 	fputs("unset multiplot\n", script);
 	if (!picture_draw(script, folder, name))
