@@ -266,7 +266,6 @@ static void run_all(struct run *runs, struct jpeg_camera *camera, const char *on
 			  where && *where ? where : "/tmp");
 	if (length >= (int)sizeof(folder))
 		cli_fail("TMPDIR: is too long for a name; set another");
-	cli_catch_signals();
 	if (!mkdtemp(folder))
 		cli_fail("%s: no folder for the recording: %s; set TMPDIR", folder,
 			 strerror(errno));
@@ -398,6 +397,8 @@ void bench_capture(const char *only, double seconds, bool json, bool quick)
 	if (!(seconds > 0))
 		seconds = quick ? QUICK_SECONDS : SECONDS;
 	machine_init(&machine);
+	/* Coding pictures takes a second where others are busy. */
+	cli_catch_signals();
 	camera = jpeg_camera_new(CAMERA_HZ, &err);
 	if (!camera)
 		cli_fail_with(&err);
