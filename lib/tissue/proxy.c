@@ -23,9 +23,6 @@
 
 #define BUDGET 2
 
-/* Farther away a place counts as there: no square of it overflows. */
-#define PLACE_MAX_MM 1e9
-
 /*
  * A tool this near is on the mesh, on whichever side rounding shows it; a contact ends
  * farther outside than that. A way that ends or begins on the surface then cannot slip
@@ -235,8 +232,7 @@ void incise_proxy_move(struct incise_proxy *proxy, const double tool_mm[3])
 	proxy->began = false;
 	if (!v3_finite(tool_mm))
 		return;
-	for (int i = 0; i < 3; i++)
-		tool[i] = fmin(fmax(tool_mm[i], -PLACE_MAX_MM), PLACE_MAX_MM);
+	surface_place(tool, tool_mm);
 	if (!proxy->surface->mesh) {
 		move_on_shape(proxy, tool);
 	} else if (!proxy->placed) {

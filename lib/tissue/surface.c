@@ -164,9 +164,12 @@ void incise_surface_top(const struct incise_surface *surface, struct incise_touc
 		capsule_top(&surface->capsule, touch);
 }
 
-void incise_surface_nearest(const struct incise_surface *surface, const double p[3],
-			    struct incise_touch *touch)
+void incise_surface_nearest(const struct incise_surface *surface,
+			    const double place_mm[3], struct incise_touch *touch)
 {
+	double p[3];
+
+	surface_place(p, place_mm);
 	if (surface->kind == INCISE_SURFACE_PLANE) {
 		plane_nearest(&surface->plane, p, touch);
 	} else if (surface->mesh) {
@@ -179,11 +182,14 @@ void incise_surface_nearest(const struct incise_surface *surface, const double p
 	}
 }
 
-bool incise_surface_enters(const struct incise_surface *surface, const double from[3],
-			   const double to[3], struct incise_touch *touch)
+bool incise_surface_enters(const struct incise_surface *surface, const double from_mm[3],
+			   const double to_mm[3], struct incise_touch *touch)
 {
 	struct mesh_spot spot;
+	double from[3], to[3];
 
+	surface_place(from, from_mm);
+	surface_place(to, to_mm);
 	if (surface->kind == INCISE_SURFACE_PLANE)
 		return plane_enters(&surface->plane, from, to, touch);
 	if (!surface->mesh)

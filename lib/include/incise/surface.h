@@ -116,7 +116,7 @@ INCISE_API void incise_surface_top(const struct incise_surface *surface,
 /**
  * The nearest point of the whole surface.
  *
- * @param p any finite point
+ * @param p beyond 1e9 it counts as there, and the depth is from there
  * @param touch result; finite, its normal of length 1. Real-time safe, in a time that
  *              grows with the logarithm of the number of triangles; only where very many
  *              are equally near, as in the middle of a sphere, does it look at all these.
@@ -125,7 +125,7 @@ INCISE_API void incise_surface_nearest(const struct incise_surface *surface,
 				       const double p[3], struct incise_touch *touch);
 
 /**
- * Where a straight way from outside enters the tissue first.
+ * Where a straight way from outside enters the tissue first. Ends beyond 1e9 count as there.
  *
  * @param touch result when there is one; its depth is 0
  * @return whether the way crosses the surface inwards. Real-time safe.

@@ -59,6 +59,38 @@ static void test_normals_of_any_length(void **state)
 	}
 }
 
+/* Squares of such places overflow; on a mesh no triangle was near one, and one was read. */
+static void test_places_beyond_all(void **state)
+{
+	static const double places[][3] = {{1e308, 0, 0},     {0, -DBL_MAX, DBL_MAX},
+					   {1e155, 1e155, 3}, {INFINITY, 0, 0},
+					   {0, NAN, 0},	      {1e9, -1e9, 1e9}};
+	struct solid *cube = solid_cube();
+	struct incise_surface *surfaces[4];
+
+	surfaces[0] = incise_surface_new_plane(zero, (double[3]){0, 0, 1}, NULL);
+	surfaces[1] = incise_surface_new_sphere(zero, 10, NULL);
+	surfaces[2] = incise_surface_new_capsule(zero, (double[3]){9, 0, 0}, 10, NULL);
+	surfaces[3] = solid_surface(cube);
+	for (int s = 0; s < 4; s++) {
+		for (size_t k = 0; k < sizeof(places) / sizeof(*places); k++) {
+			const double *p = places[k];
+			struct incise_touch touch;
+
+			incise_surface_nearest(surfaces[s], p, &touch);
+			assert_true(isfinite(touch.depth_mm));
+			assert_true(fabs(v3_length(touch.normal) - 1) < 1e-9);
+			for (int i = 0; i < 3; i++)
+				assert_true(fabs(touch.point_mm[i]) <= 1e9);
+			if (incise_surface_enters(surfaces[s], p, zero, &touch))
+				assert_true(isfinite(touch.point_mm[2]));
+			incise_surface_enters(surfaces[s], zero, p, &touch);
+		}
+		incise_surface_free(surfaces[s]);
+	}
+	free(cube);
+}
+
 static void test_tops_and_kinds(void **state)
 {
 	struct {
@@ -100,6 +132,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_refused),
 		cmocka_unit_test(test_normals_of_any_length),
+		cmocka_unit_test(test_places_beyond_all),
 		cmocka_unit_test(test_tops_and_kinds),
 	};
 
