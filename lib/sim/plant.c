@@ -203,9 +203,12 @@ static double go(struct incise_plant *plant, double force_N, double left)
 
 static bool valid(const struct incise_plant *p, double force_N, double period_s)
 {
+	double sum = p->mass_kg + p->damping_N_s_mm + p->coulomb_N + p->wall_N_mm +
+		     p->wall_N_s_mm;
+
 	return p->mass_kg > 0 && p->damping_N_s_mm >= 0 && p->coulomb_N >= 0 &&
-	       p->wall_N_mm >= 0 && p->wall_N_s_mm >= 0 && isfinite(force_N) &&
-	       period_s >= 0 && isfinite(period_s);
+	       p->wall_N_mm >= 0 && p->wall_N_s_mm >= 0 && isfinite(sum) &&
+	       isfinite(force_N) && period_s >= 0 && isfinite(period_s);
 }
 
 void incise_plant_step(struct incise_plant *plant, double force_N, double period_s)

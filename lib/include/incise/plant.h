@@ -44,7 +44,7 @@ struct incise_plant {
 /**
  * Go on for a period under a constant force.
  *
- * With settings out of their ranges, or a force or period that is not finite, position and
+ * With settings out of their ranges or not finite, or a force or period that is not finite, position and
  * velocity become NaN. After a million events in one period its rest is left out.
  *
  * @param force_N  held, on the mass, besides the wall's

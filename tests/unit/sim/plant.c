@@ -285,6 +285,11 @@ static void test_whatever_comes(void **state)
 
 		incise_plant_step(&p, 0, 1);
 		assert_true(isnan(p.position_mm) && isnan(p.velocity_mm_s));
+		/* Friction without end made an infinite velocity. */
+		p = (struct incise_plant){
+			.mass_kg = 1, .coulomb_N = INFINITY, .velocity_mm_s = -9};
+		incise_plant_step(&p, 1, 1);
+		assert_true(isnan(p.position_mm) && isnan(p.velocity_mm_s));
 		p = (struct incise_plant){.mass_kg = 1};
 		incise_plant_step(&p, NAN, 1);
 		assert_true(isnan(p.position_mm));
