@@ -56,7 +56,10 @@ extra_bench := $(patsubst %,$(O)/obj/tools/%.o,$(bench_all) $(bench_wakeups) \
 	bench_pose motions pose_methods pose_error pose_picture \
 	bench_timeline drifting_stream time_methods timeline_picture \
 	bench_scenes scenes_picture scene_saving scene_argument made_scenes course instructions \
-	loop_process mapped_libraries)
+	loop_process mapped_libraries \
+	bench_extremes extremes extremes_model extremes_fixed extremes_surface extremes_guard \
+	extremes_motion extremes_plan extremes_ground extremes_wall extremes_device \
+	extremes_files stiff_sweep stiff_report)
 
 extra_view := $(addprefix $(O)/obj/tools/,scene_argument.o procedure.o state_pages.o view_job.o \
 	view_real_time.o view_simulated.o view_hand.o view_live.o view_output.o png_file.o)

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Numbers and turns that no tracker should send, the same in every run.
+ * Numbers and turns that no tracker should send, the same in every run: for incise bench
+ * extremes and the unit tests. Each source that includes it has a generator of its own.
  */
-#ifndef INCISE_TEST_ANY_POSE_H
-#define INCISE_TEST_ANY_POSE_H
+#ifndef INCISE_ANY_POSE_H
+#define INCISE_ANY_POSE_H
 
 #include <float.h>
 #include <math.h>

@@ -3,8 +3,10 @@
  * incise bench WHAT: a word for each bench_*.h.
  */
 #include <getopt.h>
+#include <limits.h>
 #include <string.h>
 #include "bench_capture.h"
+#include "bench_extremes.h"
 #include "bench_loop.h"
 #include "bench_pose.h"
 #include "bench_precision.h"
@@ -23,6 +25,7 @@ enum {
 	OPT_DURATION,
 	OPT_LOAD,
 	OPT_PROFILE,
+	OPT_SEED,
 	OPT_AGAINST,
 };
 
@@ -41,6 +44,7 @@ static const struct cli_option options[] = {
 	 "loop: wake-ups under one load only: idle, cpu,\nmemory, disk or view"},
 	{OPT_PROFILE, "profile", "WHICH",
 	 "scenes: only run some ticks of one, with the stages\nthat it needs or with all: needed or full; for perf\nstat or callgrind"},
+	{OPT_SEED, "seed", "N", "extremes: another set of cases; default 1"},
 	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
 	{0},
 };
@@ -49,7 +53,7 @@ static const struct cli_verb verb = {
 	.name = "bench",
 	.synopsis =
 		"precision [MODEL.fis] | training | stability | loop [SCENE] | pose | timeline | "
-		"vision | capture [RUN] | scenes [SCENE...] | view [SCENE] | all | "
+		"vision | capture [RUN] | scenes [SCENE...] | extremes | view [SCENE] | all | "
 		"compare OLD.json NEW.json [OPTIONS]",
 	.summary =
 		"Measure error against run time, and what is stable; tables, JSON, pictures.\n"
@@ -65,6 +69,8 @@ static const struct cli_verb verb = {
 		"  vision                 error of the exposed length over the time per picture\n"
 		"  capture [RUN]          how much of a core it takes to record all streams\n"
 		"  scenes [SCENE...]      what each scene leaves out, and what that saves\n"
+		"  extremes               numbers and bytes that nobody should send, at each door of\n"
+		"                         the library; walls of 10 N/m to 1 GN/m\n"
 		"  view [SCENE]           the picture of a scene: see 'incise bench view --help'\n"
 		"  all                    all of these, and one report: see 'incise bench all --help'\n"
 		"compare says what changed beyond noise between two reports of --json.",
@@ -78,6 +84,7 @@ static const struct cli_verb verb = {
 struct job {
 	bool json, quick;
 	double seconds; /* 0: not given */
+	long seed;	/* the same */
 	const char *plot, *load, *profile, *against;
 	const char *operand; /* the first, or NULL */
 	char **operands;
@@ -144,8 +151,14 @@ static void scenes(const struct job *job)
 			     job->plot);
 }
 
+static void extremes(const struct job *job)
+{
+	bench_extremes(job->seed ? (uint64_t)job->seed : 1, job->json, job->quick,
+		       job->plot);
+}
+
 /* Options that not every word takes. */
-enum { PLOT = 1, DURATION = 2, LOAD = 4, PROFILE = 8 };
+enum { PLOT = 1, DURATION = 2, LOAD = 4, PROFILE = 8, SEED = 16 };
 
 static const struct {
 	const char *word;
@@ -161,6 +174,7 @@ static const struct {
 	{"vision", 0, 0, vision},
 	{"capture", 1, DURATION, capture},
 	{"scenes", BENCH_SCENES_MOST, PLOT | PROFILE, scenes},
+	{"extremes", 0, PLOT | SEED, extremes},
 };
 #define WORDS (int)(sizeof(words) / sizeof(*words))
 
@@ -172,7 +186,7 @@ static int compare(const struct job *job, int argc, char **argv)
 	if (argc != 3)
 		cli_usage("expected 'compare' and two reports");
 	if (job->plot || job->load || job->profile || job->against || job->quick ||
-	    job->seconds > 0)
+	    job->seed || job->seconds > 0)
 		cli_usage("'compare' takes no option but --json");
 	for (int i = 0; i < 2; i++) {
 		reports[i] = compare_load(argv[1 + i], &err);
@@ -241,6 +255,9 @@ static void parse(struct job *job, int argc, char **argv)
 				cli_usage("--profile: '%s' is neither needed nor full",
 					  optarg);
 			break;
+		case OPT_SEED:
+			job->seed = cli_integer("seed", optarg, 1, LONG_MAX);
+			break;
 		case OPT_QUICK:
 			job->quick = true;
 			break;
@@ -265,6 +282,7 @@ int main(int argc, char **argv)
 	allow(what, job.seconds > 0, DURATION, "duration");
 	allow(what, job.load, LOAD, "load");
 	allow(what, job.profile, PROFILE, "profile");
+	allow(what, job.seed, SEED, "seed");
 	job.operands = argv + 1;
 	job.n_operands = argc - 1;
 	job.operand = argc > 1 ? argv[1] : NULL;
