@@ -47,7 +47,7 @@ bench_all := picture machine stopwatch harness yardstick figures compare memory_
 bench_wakeups := bench_wakeup wakeup_run bench_load cyclictest child bench_tick tick_cost stroke
 extra_bench := $(patsubst %,$(O)/obj/tools/%.o,$(bench_all) $(bench_wakeups) \
 	bench_precision arithmetics \
-	bench_training \
+	bench_training training_data training_peer \
 	bench_loop bench_rate loop_picture \
 	bench_stability bench_limits bench_energy bench_guard bench_integrators sampled_wall \
 	integrators ratios stability_picture \
@@ -98,6 +98,13 @@ $(O)/lib/incise/peer_%.so: tools/peers/%.cc $(O)/lib/libincise.so
 	$(CXX) -std=c++14 -fPIC -fvisibility=hidden -Wall -Wextra $(cppflags) $(CPPFLAGS) $(CFLAGS) \
 		-MMD -MP -MF $(O)/obj/tools/peers/$*.d -shared $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -lincise -l$*
+
+# And one that is a script, which runs where Python has it.
+peer += $(O)/lib/incise/peer_scikit_learn.py
+
+$(O)/lib/incise/peer_%.py: tools/peers/%.py
+	@mkdir -p $(@D)
+	cp $< $@
 
 link_tool = $(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed $(call runpath,/../lib) \
 	-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $(filter %.o,$^) $1 \

@@ -7,6 +7,6 @@
 
 #include <stdbool.h>
 
-void bench_vision(bool json, bool quick);
+void bench_vision(bool json, bool quick, const char *plot);
 
 #endif

@@ -98,7 +98,7 @@ static void precision(const struct job *job)
 
 static void training(const struct job *job)
 {
-	bench_training(job->json, job->quick);
+	bench_training(job->json, job->quick, job->plot);
 }
 
 static void stability(const struct job *job)
@@ -122,7 +122,7 @@ static void loop(const struct job *job)
 
 static void vision(const struct job *job)
 {
-	bench_vision(job->json, job->quick);
+	bench_vision(job->json, job->quick, job->plot);
 }
 
 static void capture(const struct job *job)
@@ -166,12 +166,12 @@ static const struct {
 	void (*run)(const struct job *job);
 } words[] = {
 	{"precision", 1, PLOT, precision},
-	{"training", 0, 0, training},
+	{"training", 0, PLOT, training},
 	{"stability", 0, PLOT, stability},
 	{"loop", 1, PLOT | DURATION | LOAD, loop},
 	{"pose", 0, PLOT, pose},
 	{"timeline", 0, PLOT, timeline},
-	{"vision", 0, 0, vision},
+	{"vision", 0, PLOT, vision},
 	{"capture", 1, DURATION, capture},
 	{"scenes", BENCH_SCENES_MOST, PLOT | PROFILE, scenes},
 	{"extremes", 0, PLOT | SEED, extremes},

@@ -77,7 +77,7 @@ of() {
 	run --separate-stderr incise bench extremes --seed 0
 	bad_usage "seed"
 	run --separate-stderr incise bench training --seed 2
-	bad_usage "--seed goes with 'extremes'"
+	bad_usage "--seed does not go with 'training'"
 	TMPDIR=$PWD/none run --separate-stderr incise bench extremes --quick
 	failed_with "$PWD/none/" TMPDIR
 }
