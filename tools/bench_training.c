@@ -428,7 +428,7 @@ static void draw(const struct bench *b, const char *folder, const char *name)
 		"set ylabel 'rms error on unseen cuts / N (bars: 5 to 95 %% of %d data sets)'\n"
 		"set logscale xy\nset format x '%%.0e'\nset format y '%%g'\n"
 		"set yrange [*:*] extend\nset xrange [%g:%g]\n"
-		"set key outside bottom center horizontal\ndata = '%s.dat'\nplot \\\n",
+		"set key outside bottom center horizontal maxcols 2\ndata = '%s.dat'\nplot \\\n",
 		TRAINING_PAIRS, b->machine.cpu, b->machine.kernel, b->seeds, fast / 2,
 		slow * 6, name);
 	for (int kind = 0; kind < KINDS; kind++)
