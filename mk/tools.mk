@@ -144,13 +144,5 @@ bench: ## measure everything on this machine; one report in build/bench/
 	@mk/deps build bench
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise bench all --report $(O)/bench
-	$(O)/bin/incise bench precision --plot $(O)/bench/precision
-	$(O)/bin/incise bench training --plot $(O)/bench/training
-	$(O)/bin/incise bench loop --plot $(O)/bench/loop
-	$(O)/bin/incise bench stability --plot $(O)/bench/stability
-	$(O)/bin/incise bench vision --plot $(O)/bench/vision
-	$(O)/bin/incise bench extremes --plot $(O)/bench/stiff
-	$(O)/bin/incise bench capture
-	$(if $(has_view),$(O)/bin/incise bench view --plot $(O)/bench/view)
 
 .PHONY: tools deps demo bench
