@@ -2,7 +2,7 @@
 /*
  * Error of what is shown; see bench_view_error.h.
  *
- * Moments are steps of 1/240 s, each 49th of them: that meets every place between two frames
+ * Moments are steps of 1/240 s, each 65th of them: that meets every place between two frames
  * of 15, 30 and 60 a second alike, and the frames that are shown at a moment are never older
  * than the moment before, so that one view per texture draws all of them in order.
  */
@@ -20,7 +20,7 @@
 #define WIDTH 1280
 #define HEIGHT 720
 #define STEP_HZ 240
-#define STRIDE 49
+#define STRIDE 65
 #define QUICK_STRIDE 119
 #define FINEST_PX 4096
 

@@ -16,7 +16,7 @@
 #include "stopwatch.h"
 
 #define FPS 60
-#define IN_A_ROW 24
+#define IN_A_ROW 18
 #define EVERY_S 1.3
 #define PARTS 12
 

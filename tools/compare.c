@@ -223,12 +223,21 @@ static int add(struct figures *all, const char *word, const json_t *list,
 	       struct incise_error *err)
 {
 	char where[600], key[2 * NAME_MAX_BYTES + 2];
+	struct figure *room;
 	const json_t *from;
 	size_t i;
 
 	if (!json_is_array(list))
 		return incise_error_set(err, EINVAL, "%s: %s%s'figures' is no list",
 					all->report, word ? word : "", word ? ": " : "");
+	if (all->n + json_array_size(list) > FIGURES_MAX)
+		return incise_error_set(err, E2BIG, "%s: more than %d figures",
+					all->report, FIGURES_MAX);
+	room = realloc(all->figure,
+		       (all->n + json_array_size(list) + 1) * sizeof(*all->figure));
+	if (!room)
+		return incise_error_set(err, ENOMEM, "%s: no memory", all->report);
+	all->figure = room;
 	json_array_foreach((json_t *)list, i, from)
 	{
 		struct figure f;
@@ -244,9 +253,6 @@ static int add(struct figures *all, const char *word, const json_t *list,
 		if (json_object_get(all->index, key))
 			return incise_error_set(err, EINVAL, "%s: '%s' stands twice",
 						where, f.name);
-		if (all->n == FIGURES_MAX)
-			return incise_error_set(err, E2BIG, "%s: more than %d figures",
-						all->report, FIGURES_MAX);
 		if (json_object_set_new(all->index, key, json_integer(all->n)))
 			return incise_error_set(err, ENOMEM, "%s: no memory",
 						all->report);
@@ -264,8 +270,7 @@ static int read_figures(const json_t *report, const char *name, struct figures *
 	int rc = 0;
 
 	*all = (struct figures){.report = name, .index = json_object()};
-	all->figure = malloc(FIGURES_MAX * sizeof(*all->figure));
-	if (!all->figure || !all->index)
+	if (!all->index)
 		return incise_error_set(err, ENOMEM, "%s: no memory", name);
 	if (list)
 		return add(all, NULL, list, err);
@@ -379,28 +384,34 @@ static json_t *change_json(const struct figure *was, const struct figure *is, bo
 	return change;
 }
 
+static bool has_word(const struct figures *all, const char *word)
+{
+	for (int i = 0; i < all->n; i++)
+		if (all->figure[i].word && !strcmp(all->figure[i].word, word))
+			return true;
+	return false;
+}
+
 /* Figures of @from that @to has not. A word that is not there at all is one line. */
 static json_t *missing(const struct figures *from, const struct figures *to)
 {
-	json_t *list = json_array(), *last = NULL;
+	const char *word = NULL;
+	bool known = true;
+	json_t *list = json_array();
 
 	for (int i = 0; i < from->n; i++) {
 		const struct figure *f = &from->figure[i];
-		bool word = false;
 
-		if (find(to, f))
-			continue;
-		for (int k = 0; f->word && k < to->n && !word; k++)
-			word = to->figure[k].word && !strcmp(to->figure[k].word, f->word);
-		if (!f->word || word) {
-			json_array_append_new(list, figure_json(f));
-			continue;
+		/* Figures of a word are together. */
+		if (f->word && f->word != word) {
+			word = f->word;
+			known = has_word(to, word);
+			if (!known)
+				json_array_append_new(list, json_pack("{ss sn}", "word",
+								      word, "name"));
 		}
-		if (last && !strcmp(json_string_value(last), f->word))
-			continue;
-		last = json_string(f->word);
-		json_array_append_new(list,
-				      json_pack("{so ss?}", "word", last, "name", NULL));
+		if (known && !find(to, f))
+			json_array_append_new(list, figure_json(f));
 	}
 	return list;
 }
