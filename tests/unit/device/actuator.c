@@ -3,48 +3,15 @@
  * lib/device/actuator.c: what the group says becomes steps and limits, what does not fit
  * is refused with its line.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
-#include "../../../lib/device/actuator.h"
+#include "actuator_text.h"
 #include "../../../lib/device/motor.h"
-
-#define NEEDED "spring_N_mm = 2.0; travel_mm = 20.0; lead_mm = 2.0; "
-
-static int read_text(struct incise_actuator *actuator, const char *inside,
-		     struct incise_error *err)
-{
-	char text[2000];
-	config_t config;
-	int rc;
-
-	snprintf(text, sizeof(text), "actuator = {\n%s\n};", inside);
-	config_init(&config);
-	assert_true(config_read_string(&config, text));
-	rc = incise_actuator_read(actuator, config_lookup(&config, "actuator"), "r", err);
-	config_destroy(&config);
-	return rc;
-}
-
-static struct incise_actuator read_good(const char *inside)
-{
-	struct incise_actuator actuator;
-	struct incise_error err = {0};
-
-	if (read_text(&actuator, inside, &err))
-		fail_msg("%s", err.text);
-	return actuator;
-}
 
 static void defaults_are_those_of_the_manual(void **state)
 {
-	struct incise_actuator a = read_good(NEEDED);
+	struct incise_actuator a = actuator_good("", NEEDED);
 
 	assert_true(a.spring_N_mm == 2 && a.travel_mm == 20 && a.lead_mm == 2);
 	assert_true(a.steps_per_turn == 200 && a.microsteps == 16 && !a.invert);
@@ -55,12 +22,13 @@ static void defaults_are_those_of_the_manual(void **state)
 	assert_true(a.home_mm_s == 2 && a.home_mm == 0 && a.origin_mm == 0);
 	assert_false(a.has_lines);
 	/* Not faster than it goes at all. */
-	assert_true(read_good(NEEDED "velocity_mm_s = 0.5;").home_mm_s == 0.5);
+	assert_true(actuator_good("", NEEDED "velocity_mm_s = 0.5;").home_mm_s == 0.5);
 }
 
 static void every_key_is_taken_in_its_unit(void **state)
 {
-	struct incise_actuator a = read_good(
+	struct incise_actuator a = actuator_good(
+		"",
 		"spring_N_mm = 1.5; travel_mm = 12; lead_mm = 4; steps_per_turn = 400;\n"
 		"microsteps = 8; invert = true; velocity_mm_s = 7.5;\n"
 		"acceleration_mm_s2 = 321.0; jerk_mm_s3 = 1e5; deadman_ms = 50;\n"
@@ -143,13 +111,14 @@ static void what_does_not_fit_is_refused_with_its_line(void **state)
 		struct incise_actuator actuator;
 		struct incise_error err = {0};
 
-		assert_int_equal(read_text(&actuator, cases[i].inside, &err), -EINVAL);
+		assert_int_equal(actuator_read(&actuator, "", cases[i].inside, &err),
+				 -EINVAL);
 		if (!strstr(err.text, cases[i].says))
 			fail_msg("case %zu: \"%s\" has no \"%s\"", i, err.text,
 				 cases[i].says);
 	}
 	/* One beyond the jerk that is refused is not. */
-	read_good(NEEDED "jerk_mm_s3 = 15790.0;");
+	actuator_good("", NEEDED "jerk_mm_s3 = 15790.0;");
 }
 
 static void millimetres_become_steps(void **state)
@@ -162,7 +131,7 @@ static void millimetres_become_steps(void **state)
 		{0.0003124, 0}, {0.0003126, 1},	   {-1, 0},	{1e300, 32000},
 		{-INFINITY, 0}, {INFINITY, 32000}, {NAN, 0},
 	};
-	struct incise_actuator a = read_good(NEEDED "jerk_mm_s3 = 1e5;");
+	struct incise_actuator a = actuator_good("", NEEDED "jerk_mm_s3 = 1e5;");
 	struct incise_profile_limits limits;
 
 	assert_true(incise_actuator_step_mm(&a) == 0.000625);
@@ -187,7 +156,7 @@ static void millimetres_become_steps(void **state)
 
 static void the_machine_must_hold_the_rate(void **state)
 {
-	struct incise_actuator a = read_good(NEEDED);
+	struct incise_actuator a = actuator_good("", NEEDED);
 	struct incise_stepper_config config;
 	struct incise_error err = {0};
 
@@ -198,19 +167,19 @@ static void the_machine_must_hold_the_rate(void **state)
 	assert_true(config.motor == 3 && config.velocity == 16000 &&
 		    config.high_ns == 8000);
 	assert_true(config.deadman_ns == 100000000 && config.position_max == 32000);
-	a = read_good(NEEDED);
+	a = actuator_good("", NEEDED);
 	assert_int_equal(incise_motor_fit(&a, "m", 20000, 100, &err), 0);
 	assert_true(a.high_ns == 5000 && a.low_ns == 5000);
-	a = read_good(NEEDED);
+	a = actuator_good("", NEEDED);
 	assert_int_equal(incise_motor_fit(&a, "m", 15999, 100, &err), -ERANGE);
 	assert_non_null(strstr(err.text, "asks for 16000 steps/s"));
 	assert_non_null(strstr(err.text, "holds 15999 at most"));
 	assert_non_null(strstr(err.text, "at most 9.9993 mm/s"));
 	/* Pulses so long that the rate does not fit: 2·40 µs are 12 500 steps/s. */
-	a = read_good(NEEDED);
+	a = actuator_good("", NEEDED);
 	assert_int_equal(incise_motor_fit(&a, "m", 20000, 40000, &err), -ERANGE);
 	assert_non_null(strstr(err.text, "holds 12500 at most"));
-	a = read_good(NEEDED "high_us = 7.0;");
+	a = actuator_good("", NEEDED "high_us = 7.0;");
 	assert_int_equal(incise_motor_fit(&a, "m", 20000, 8000, &err), -ERANGE);
 	assert_non_null(strstr(err.text, "no less than 8"));
 }

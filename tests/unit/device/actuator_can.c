@@ -3,46 +3,12 @@
  * lib/device/actuator_can.c: each key in its unit and up to its ends, each refusal with its
  * line, and that the gain that csv may have is half of what a loop with that delay holds.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "../../../lib/device/actuator.h"
 #include "../../../lib/device/actuator_can.h"
-
-/* Through the group around it, as a person meets it. */
-static int read_text(struct incise_actuator *actuator, const char *inside,
-		     struct incise_error *err)
-{
-	char text[2000];
-	config_t config;
-	int rc;
-
-	snprintf(
-		text, sizeof(text),
-		"actuator = { spring_N_mm = 2.0; travel_mm = 20.0; lead_mm = 2.0;\n%s\n};",
-		inside);
-	config_init(&config);
-	assert_true(config_read_string(&config, text));
-	rc = incise_actuator_read(actuator, config_lookup(&config, "actuator"), "r", err);
-	config_destroy(&config);
-	return rc;
-}
-
-static struct incise_actuator read_good(const char *inside)
-{
-	struct incise_actuator actuator;
-	struct incise_error err = {0};
-
-	if (read_text(&actuator, inside, &err))
-		fail_msg("%s: %s", inside, err.text);
-	return actuator;
-}
+#include "actuator_text.h"
 
 static void defaults_are_those_of_the_manual(void **state)
 {
@@ -54,7 +20,7 @@ static void defaults_are_those_of_the_manual(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_actuator a = read_good(cases[i]);
+		struct incise_actuator a = actuator_good(NEEDED, cases[i]);
 
 		assert_int_equal(a.can.mode, INCISE_ACTUATOR_CSP);
 		assert_int_equal(a.can.bitrate, 0);
@@ -97,7 +63,8 @@ static void following_is_a_tenth_of_the_travel_up_to_a_millimetre(void **state)
 
 static void every_key_is_taken_in_its_unit(void **state)
 {
-	struct incise_actuator a = read_good(
+	struct incise_actuator a = actuator_good(
+		NEEDED,
 		"can = { mode = \"csv\"; bitrate = 500000; cycle_us = 1250;\n"
 		"counts_per_turn = 51200; velocity_per_turn_s = 60.0;\n"
 		"acceleration_per_turn_s2 = 3600; following_mm = 0.25; following_ms = 20;\n"
@@ -117,8 +84,8 @@ static void every_key_is_taken_in_its_unit(void **state)
 	assert_true(a.can.damping_permille_s_mm == 0.75);
 	assert_true(a.can.torque_max_permille == 300);
 	assert_int_equal(a.can.master, 5);
-	a = read_good("can = { mode = \"cst\"; stiffness_permille_mm = 40;\n"
-		      "torque_max_permille = 300; };");
+	a = actuator_good(NEEDED, "can = { mode = \"cst\"; stiffness_permille_mm = 40;\n"
+				  "torque_max_permille = 300; };");
 	assert_int_equal(a.can.mode, INCISE_ACTUATOR_CST);
 	assert_true(a.can.damping_permille_s_mm == 0);
 }
@@ -159,7 +126,7 @@ static void every_range_ends_where_the_manual_says(void **state)
 				 values[k]);
 			snprintf(says, sizeof(says), "r:3: actuator.can.%s: expected",
 				 cases[i].key);
-			rc = read_text(&actuator, text, &err);
+			rc = actuator_read(&actuator, NEEDED, text, &err);
 			if (rc != (good ? 0 : -EINVAL) ||
 			    (!good && !strstr(err.text, says)))
 				fail_msg("%s: %d, \"%s\"", text, rc, err.text);
@@ -178,11 +145,11 @@ static void bit_rates_are_those_of_adapters(void **state)
 
 	for (size_t i = 0; i < sizeof(good) / sizeof(*good); i++) {
 		snprintf(text, sizeof(text), "can = { bitrate = %d; };", good[i]);
-		assert_int_equal(read_good(text).can.bitrate, good[i]);
+		assert_int_equal(actuator_good(NEEDED, text).can.bitrate, good[i]);
 	}
 	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++) {
 		snprintf(text, sizeof(text), "can = { bitrate = %d; };", bad[i]);
-		assert_int_equal(read_text(&actuator, text, &err), -EINVAL);
+		assert_int_equal(actuator_read(&actuator, NEEDED, text, &err), -EINVAL);
 		assert_non_null(strstr(err.text, "125000, 250000, 500000"));
 	}
 }
@@ -205,7 +172,7 @@ static void cycles_are_those_that_a_drive_can_keep(void **state)
 		char text[100];
 
 		snprintf(text, sizeof(text), "can = { cycle_us = %d; };", us);
-		assert_int_equal(read_text(&actuator, text, &err),
+		assert_int_equal(actuator_read(&actuator, NEEDED, text, &err),
 				 fits_60C2(us) ? 0 : -EINVAL);
 	}
 }
@@ -248,14 +215,15 @@ static void what_does_not_fit_is_refused_with_its_line(void **state)
 		struct incise_actuator actuator;
 		struct incise_error err = {0};
 
-		assert_int_equal(read_text(&actuator, cases[i].inside, &err), -EINVAL);
+		assert_int_equal(actuator_read(&actuator, NEEDED, cases[i].inside, &err),
+				 -EINVAL);
 		if (!strstr(err.text, cases[i].says))
 			fail_msg("case %zu: \"%s\" has no \"%s\"", i, err.text,
 				 cases[i].says);
 	}
-	read_good("can = { mode = \"csv\"; position_gain_1_s = 222.5; };");
+	actuator_good(NEEDED, "can = { mode = \"csv\"; position_gain_1_s = 222.5; };");
 	/* It is of csv alone. */
-	read_good("can = { position_gain_1_s = 223; };");
+	actuator_good(NEEDED, "can = { position_gain_1_s = 223; };");
 }
 
 /*
