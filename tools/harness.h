@@ -14,9 +14,6 @@
 
 #include "yardstick.h"
 
-/* The most turns of a run. */
-#define HARNESS_TURNS 512
-
 struct harness_way {
 	void (*run)(void *context);
 	void *context;
