@@ -15,19 +15,22 @@
 #include <time.h>
 #include <incise/version.h>
 #include "cli.h"
+#include "compare.h"
 #include "json.h"
 #include "machine.h"
 #include "report_folder.h"
 #include "report_measure.h"
 #include "report_sections.h"
 
-enum { OPT_REPORT = CLI_LONG, OPT_FROM, OPT_ONLY, OPT_QUICK, OPT_JSON };
+enum { OPT_REPORT = CLI_LONG, OPT_FROM, OPT_AGAINST, OPT_ONLY, OPT_QUICK, OPT_JSON };
 
 static const struct cli_option options[] = {
 	{OPT_REPORT, "report", "DIR",
 	 "folder to leave everything in; a report that is there\nis replaced"},
 	{OPT_FROM, "from", "DIR",
 	 "measure nothing: write report.html and report.md of\nDIR/report.json again"},
+	{OPT_AGAINST, "against", "OLD.json",
+	 "say what changed beyond noise since that report.json"},
 	{OPT_ONLY, "only", "WORD,…", "these words only"},
 	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
 	{OPT_JSON, "json", NULL, "print report.json, too"},
@@ -41,14 +44,15 @@ static const struct cli_verb verb = {
 		"Run every bench and leave one report: report.html to read, on a phone and on\n"
 		"paper, too; report.md, the same; report.json; pictures; the JSON of each word.",
 	.options = options,
-	.notes = "Exit: 0 done, 1 failed, or a word has: the report says which and why;\n"
-		 "2 bad usage. See incise-bench-all(1).",
+	.notes =
+		"Exit: 0 done, 1 failed, a word has, or figures got worse: the report says\n"
+		"which and why; 2 bad usage. See incise-bench-all(1).",
 };
 
 #define WORDS 32
 
 struct job {
-	const char *folder, *from;
+	const char *folder, *from, *against;
 	char *only[WORDS];
 	int n_only;
 	bool quick, json;
@@ -105,10 +109,46 @@ static json_t *begin_report(const struct job *job)
 			 json_array());
 }
 
+/* Of a report of all words; of one word it is that. */
+static const json_t *words_of(const json_t *report)
+{
+	const json_t *words = json_object_get(report, "words");
+
+	return words ? words : report;
+}
+
+/* The report to compare with, found to be one before minutes are spent. */
+static json_t *load_old(const char *path)
+{
+	struct incise_error err = {0};
+	json_t *old = compare_load(path, &err), *itself;
+
+	itself = old ? compare_reports(words_of(old), path, words_of(old), path, &err)
+		     : NULL;
+	if (!itself)
+		cli_fail_with(&err);
+	json_decref(itself);
+	return old;
+}
+
+/* What changed goes into the report; that it cannot be told does, too. */
+static void compare(const char *path, const json_t *old, json_t *report)
+{
+	struct incise_error err = {0};
+	json_t *comparison =
+		compare_reports(words_of(old), path, words_of(report), "this run", &err);
+
+	if (!comparison)
+		comparison = json_pack("{so}", "failed", json_text(err.text));
+	json_object_set_new(comparison, "file", json_text(path));
+	json_object_set_new(report, "against", comparison);
+}
+
 static json_t *measure(const struct job *job)
 {
 	struct report_folder folder;
 	struct report_measure m = {.quick = job->quick};
+	json_t *old = job->against ? load_old(job->against) : NULL;
 	int n = 0, of = 0;
 
 	report_folder_begin(&folder, job->folder);
@@ -123,6 +163,9 @@ static json_t *measure(const struct job *job)
 		report_folder_abandon(&folder);
 		cli_fail("%s: %s is as it was", strsignal(cli_stop), job->folder);
 	}
+	if (old)
+		compare(job->against, old, m.report);
+	json_decref(old);
 	report_folder_write(folder.unfinished, m.report);
 	report_folder_finish(&folder);
 	return m.report;
@@ -141,6 +184,9 @@ static void parse(struct job *job, int argc, char **argv)
 		case OPT_FROM:
 			job->from = optarg;
 			break;
+		case OPT_AGAINST:
+			job->against = optarg;
+			break;
 		case OPT_ONLY:
 			job->n_only = cli_list("only", optarg, job->only, WORDS);
 			break;
@@ -155,18 +201,37 @@ static void parse(struct job *job, int argc, char **argv)
 		cli_usage("'%s': bench all takes options only", argv[optind]);
 	if (!job->folder == !job->from)
 		cli_usage("expected --report DIR, or --from DIR");
-	if (job->from && (job->quick || job->n_only))
-		cli_usage("--from measures nothing; --quick and --only go with --report");
+	if (job->from && (job->quick || job->n_only || job->against))
+		cli_usage(
+			"--from measures nothing; --against, --only and --quick go with "
+			"--report");
 	if (!*(job->folder ? job->folder : job->from))
 		cli_usage("the folder has no name");
 	check_words(job);
+}
+
+/* The one line of what is not as it should be, and what of it is first. */
+static void judge(const struct job *job, const json_t *report)
+{
+	const json_t *against = json_object_get(report, "against");
+	size_t failed = json_array_size(json_object_get(report, "failed"));
+	const char *why = json_string_value(json_object_get(against, "failed"));
+	int worse = compare_worse(against);
+
+	if (failed)
+		cli_fail("%zu of %zu words failed; %s/report.md says why", failed,
+			 json_object_size(json_object_get(report, "runs")), job->folder);
+	if (why)
+		cli_fail("%s", why);
+	if (worse)
+		cli_fail("%d figure%s worse or gone against %s; %s/report.md says which",
+			 worse, worse > 1 ? "s are" : " is", job->against, job->folder);
 }
 
 int main(int argc, char **argv)
 {
 	struct job job;
 	json_t *report;
-	size_t failed, all, measured;
 
 	parse(&job, argc, argv);
 	cli_catch_signals();
@@ -176,17 +241,16 @@ int main(int argc, char **argv)
 	} else {
 		report = measure(&job);
 	}
-	failed = json_array_size(json_object_get(report, "failed"));
-	all = json_object_size(json_object_get(report, "runs"));
-	measured = json_object_size(json_object_get(report, "words"));
 	if (job.json)
-		json_print(report);
+		json_print(json_incref(report));
 	else
 		printf("%s/report.html, report.md, report.json: figures of %zu of %zu words\n",
-		       job.folder ? job.folder : job.from, measured, all);
+		       job.folder ? job.folder : job.from,
+		       json_object_size(json_object_get(report, "words")),
+		       json_object_size(json_object_get(report, "runs")));
 	cli_finish();
-	if (failed && job.folder)
-		cli_fail("%zu of %zu words failed; %s/report.md says why", failed, all,
-			 job.folder);
+	if (job.folder)
+		judge(&job, report);
+	json_decref(report);
 	return 0;
 }

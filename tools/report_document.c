@@ -157,33 +157,138 @@ static void put_way(struct document *d, const json_t *report)
 	put_times(d, report);
 }
 
-/* ---- what failed ---- */
+/* ---- what changed ---- */
 
-/* Rows that say why they failed, wherever they are. */
-static void put_failed_rows(struct document *d, const char *word, const json_t *value)
+static void put_names(struct document *d, const char *title, const json_t *figures)
 {
-	static const char *const names[] = {"name", "integrator", "wall", "load"};
-	const json_t *member;
-	const char *key, *why = text_at(value, "failed");
+	const json_t *figure;
 	size_t i;
 
-	if (*why) {
-		const char *name = "";
+	json_array_foreach((json_t *)figures, i, figure)
+	{
+		const char *name = text_at(figure, "name");
 
-		for (i = 0; i < sizeof(names) / sizeof(*names) && !*name; i++)
-			name = text_at(value, names[i]);
-		document_item(d, "%s: %s: %s", word, name, why);
+		document_item(d, "%s: %s%s%s", title, text_at(figure, "word"),
+			      *name ? ": " : "", name);
 	}
-	json_array_foreach((json_t *)value, i, member) put_failed_rows(d, word, member);
+}
+
+static void put_changed(struct document *d, const json_t *against)
+{
+	static const struct report_table changed = {
+		"Changed beyond noise; the ratio of times is of multiples of a yardstick",
+		"changed",
+		NULL,
+		{{"word", "word", 0, PART_VALUE, 0},
+		 {"name", "figure", 0, PART_VALUE, 0},
+		 {"kind", "kind", 0, PART_VALUE, 0},
+		 {"unit", "unit", 0, PART_VALUE, 0},
+		 {"old", "old", 4, PART_VALUE, 0},
+		 {"new", "new", 4, PART_VALUE, 0},
+		 {"ratio", "ratio", 4, PART_VALUE, 0},
+		 {"worse", "worse", 0, PART_VALUE, 0}}};
+	const json_t *differs = json_object_get(against, "differs"), *key;
+	size_t i;
+
+	document_section(d, "What changed");
+	document_text(d, "Against %s.", text_at(against, "file"));
+	if (*text_at(against, "failed")) {
+		document_notice(d, "They cannot be compared: %s.",
+				text_at(against, "failed"));
+		return;
+	}
+	document_text(d,
+		      "%lld figures are the same within noise, %lld better, %lld worse.",
+		      (long long)json_integer_value(json_object_get(against, "same")),
+		      (long long)json_integer_value(json_object_get(against, "better")),
+		      (long long)json_integer_value(json_object_get(against, "worse")));
+	json_array_foreach((json_t *)differs, i, key)
+		document_item(d, "Another machine or build: %s differs",
+			      json_is_string(key) ? json_string_value(key) : "it");
+	report_table_put(d, &changed, against);
+	put_names(d, "Gone", json_object_get(against, "gone"));
+	put_names(d, "New", json_object_get(against, "new"));
+}
+
+/* ---- what failed ---- */
+
+#define MOST_FAILED 40 /* rows of a word; the JSON has all */
+
+/* What tells a row that failed from its neighbours: its texts, and what was set for it. */
+static void row_name(const json_t *row, char *name, size_t size)
+{
+	static const char *const set[] = {"rate_hz", "tracker_hz", "delay_ms",
+					  "gap_ms",  "window_s",   "drift_ppm",
+					  "K_N_m",   "K_N_mm",	   "stiffness_N_mm"};
+	const json_t *value;
+	const char *key;
+	size_t n = 0;
+
+	*name = 0;
+	json_object_foreach((json_t *)row, key, value)
+	{
+		bool told = json_is_string(value) && strcmp(key, "failed");
+		char number[64];
+
+		for (size_t i = 0; i < sizeof(set) / sizeof(*set) && !told; i++)
+			told = json_is_number(value) && !strcmp(key, set[i]);
+		if (!told || n >= size)
+			continue;
+		report_number(json_number_value(value), 4, number, sizeof(number));
+		n += (size_t)snprintf(name + n, size - n, "%s%s%s%s", n ? ", " : "",
+				      json_is_string(value) ? "" : key,
+				      json_is_string(value) ? "" : " ",
+				      json_is_string(value) ? json_string_value(value)
+							    : number);
+	}
+}
+
+struct failed_rows {
+	struct document *d;
+	bool begun; /* the table */
+	int n;	    /* of this word */
+};
+
+static void put_failed_row(struct failed_rows *rows, const char *word, const char *name,
+			   const char *why)
+{
+	if (!rows->begun) {
+		document_table(rows->d, "Rows that failed");
+		document_column(rows->d, "word", false);
+		document_column(rows->d, "row", false);
+		document_column(rows->d, "why", false);
+		rows->begun = true;
+	}
+	document_cell(rows->d, "%s", word);
+	document_cell(rows->d, "%s", name);
+	document_cell(rows->d, "%s", why);
+}
+
+/* Rows that say why they failed, wherever they are. */
+static void put_failed_rows(struct failed_rows *rows, const char *word,
+			    const json_t *value)
+{
+	const json_t *member;
+	const char *key, *why = text_at(value, "failed");
+	char name[200];
+	size_t i;
+
+	if (*why && rows->n++ < MOST_FAILED) {
+		row_name(value, name, sizeof(name));
+		put_failed_row(rows, word, name, why);
+	}
+	json_array_foreach((json_t *)value, i, member)
+		put_failed_rows(rows, word, member);
 	json_object_foreach((json_t *)value, key, member)
 	{
 		if (strcmp(key, "integrators"))
-			put_failed_rows(d, word, member);
+			put_failed_rows(rows, word, member);
 	}
 }
 
 static void put_failed(struct document *d, const json_t *report)
 {
+	struct failed_rows rows = {.d = d};
 	const json_t *run, *word_json;
 	const char *word;
 
@@ -205,7 +310,16 @@ static void put_failed(struct document *d, const json_t *report)
 			document_item(d, "%s: %s", word, json_string_value(line));
 	}
 	json_object_foreach(json_object_get(report, "words"), word, word_json)
-		put_failed_rows(d, word, word_json);
+	{
+		char more[40];
+
+		rows.n = 0;
+		put_failed_rows(&rows, word, word_json);
+		if (rows.n > MOST_FAILED) {
+			snprintf(more, sizeof(more), "%d more", rows.n - MOST_FAILED);
+			put_failed_row(&rows, word, more, "as in its JSON");
+		}
+	}
 }
 
 /* ---- words ---- */
@@ -229,6 +343,8 @@ static void put_pictures(struct document *d, const struct report_section *s,
 static void put_section(struct document *d, const struct report_section *s,
 			const json_t *word, const char *folder)
 {
+	const json_t *value;
+	const char *key;
 	char file[100];
 
 	document_section(d, s->title);
@@ -236,6 +352,14 @@ static void put_section(struct document *d, const struct report_section *s,
 	put_pictures(d, s, folder);
 	for (const struct report_table *t = s->tables; t->rows; t++)
 		report_table_put(d, t, word);
+	json_object_foreach((json_t *)word, key, value)
+	{
+		size_t n = strlen(key);
+
+		if (json_is_string(value) && n > 7 && !strcmp(key + n - 7, "_failed"))
+			document_text(d, "Failed: %.*s. Why: %s", (int)n - 7, key,
+				      json_string_value(value));
+	}
 	document_item(d, "Method: %s", s->method);
 	document_item(d, "Reference: %s", s->reference);
 	document_item(d, "Limits: %s", s->limits);
@@ -250,6 +374,8 @@ struct document *report_document(const json_t *report, const char *folder)
 
 	put_summary(d, report);
 	put_way(d, report);
+	if (json_is_object(json_object_get(report, "against")))
+		put_changed(d, json_object_get(report, "against"));
 	for (const struct report_section *s = report_sections; s->word; s++) {
 		const json_t *word = word_of(report, s->word);
 

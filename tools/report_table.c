@@ -259,7 +259,7 @@ static void cell_text(const struct rows *rows, const int *group, int which,
 		      const struct report_column *column, char *text, size_t size)
 {
 	char least[64], largest[64];
-	int n = 0, holding = 0, first = -1;
+	int n = 0, asked = 0, holding = 0, first = -1;
 
 	for (int i = 0; i < rows->n; i++) {
 		const json_t *value;
@@ -270,6 +270,7 @@ static void cell_text(const struct rows *rows, const int *group, int which,
 		first = first < 0 ? i : first;
 		value = at_path(rows->row[i].object, column->key, strlen(column->key));
 		holding += json_is_true(value) || json_is_string(value);
+		asked += json_is_boolean(value);
 	}
 	switch (column->part) {
 	case PART_VALUE:
@@ -279,7 +280,8 @@ static void cell_text(const struct rows *rows, const int *group, int which,
 		snprintf(text, size, "%d", n);
 		break;
 	case PART_HOLDING:
-		snprintf(text, size, "%d of %d", holding, n);
+		/* Where the answer is yes or no, of those that were asked. */
+		snprintf(text, size, "%d of %d", holding, asked ? asked : n);
 		break;
 	case PART_RANGE:
 		if (isnan(summed_up(rows, group, which, column, PART_LEAST))) {
@@ -290,7 +292,10 @@ static void cell_text(const struct rows *rows, const int *group, int which,
 			      column->digits, least, sizeof(least));
 		report_number(summed_up(rows, group, which, column, PART_RANGE),
 			      column->digits, largest, sizeof(largest));
-		snprintf(text, size, "%s to %s", least, largest);
+		if (strcmp(least, largest))
+			snprintf(text, size, "%s to %s", least, largest);
+		else
+			snprintf(text, size, "%s", least);
 		break;
 	default:
 		report_number(summed_up(rows, group, which, column, column->part),

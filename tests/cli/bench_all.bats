@@ -131,6 +131,35 @@ report_of() {
 	[ "$(ls r/data)" = training.json ]
 }
 
+@test "what changed since another report stands in it" {
+	# figures that are exact, of the same program
+	incise bench all --quick --report r --only timeline
+	run --separate-stderr incise bench all --quick --report r --only timeline,training \
+		--against r/report.json
+	grep -q "^## What changed" r/report.md
+	holds "$(key r/report.json against.same) > 50"
+	[ "$(key r/report.json against.file)" = r/report.json ]
+	n=$(sqlite3 :memory: "SELECT json_array_length(readfile('r/report.json'), '\$.against.gone')
+		+ json_extract(readfile('r/report.json'), '\$.against.worse')")
+	[ "$n" = 0 ] && [ "$status" = 0 ] || failed_with "$n figure" "against r/report.json"
+	# of an older one that was better, and had more
+	sqlite3 :memory: "SELECT json_set(readfile('r/report.json'),
+		'\$.words.timeline.figures[0].value', 1e-9,
+		'\$.words.timeline.figures[#]', json('{\"name\": \"other\", \"kind\": \"exact\",
+		\"unit\": \"mm\", \"value\": 1}'))" >old.json
+	run --separate-stderr incise bench all --quick --report r --only timeline --against old.json
+	failed_with "worse or gone against old.json; r/report.md says which"
+	grep -qF -- "- Gone: timeline: other" r/report.md
+	grep -qE "^\| timeline \| .* \| 1.000×10⁻⁹ \| .* \| yes \|$" r/report.md
+	# what is none is said before anything is measured
+	echo '{}' >none.json
+	run --separate-stderr incise bench all --quick --report new --against none.json
+	failed_with none.json
+	[ ! -e new ]
+	run --separate-stderr incise bench all --from r --against old.json
+	bad_usage "--from measures nothing"
+}
+
 @test "what a report holds is shown as it is, whatever it is" {
 	report_of '{"words": {"training": {"rows": [
 		{"name": "<script>alert(1)</script>", "ms": 1.5, "failed": "a|b *c* [d](e) `f` & \"g\""},
