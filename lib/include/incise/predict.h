@@ -46,6 +46,7 @@ struct incise_predict;
  */
 INCISE_API struct incise_predict *incise_predict_new(
 	const struct incise_tracker_info *tracker, double noise_mm);
+/** NULL is accepted. */
 INCISE_API void incise_predict_free(struct incise_predict *p);
 
 /**

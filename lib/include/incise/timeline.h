@@ -24,6 +24,7 @@
 
 INCISE_BEGIN_DECLS
 
+/** What is known of a stream before its first sample. */
 struct incise_timeline_setup {
 	bool stamped;	/**< by the kernel, when it was acquired but for the delay */
 	double rate_hz; /**< nominal, 0.001 to 1e7; else no line can be drawn */
@@ -32,6 +33,7 @@ struct incise_timeline_setup {
 	int64_t grain_ns;
 };
 
+/** What its samples showed. */
 struct incise_timeline_report {
 	uint64_t samples;
 	double rate_hz;			/**< measured */
@@ -52,6 +54,7 @@ struct incise_timeline_knot {
 	bool begins; /**< a new line, which does not go on from the knot before */
 };
 
+/** At most, of one line. */
 #define INCISE_TIMELINE_KNOTS 256
 #define INCISE_TIMELINE_KNOTS_MAX \
 	(INCISE_TIMELINE_KNOTS + 3) /**< of a line that goes on */
@@ -65,6 +68,7 @@ struct incise_timeline;
  */
 INCISE_API struct incise_timeline *incise_timeline_new(
 	const struct incise_timeline_setup *setup);
+/** NULL is accepted. */
 INCISE_API void incise_timeline_free(struct incise_timeline *timeline);
 
 /** Acquisition time of sample seq: later than any before, and 0 or more. */
