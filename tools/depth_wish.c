@@ -50,7 +50,7 @@ static const struct cli_option options[] = {
 	{OPT_LENGTH, "length", "LENGTH", "two-point: known length (default: 47.5mm)"},
 	{OPT_LENGTH_U, "length-u", "LENGTH",
 	 "two-point: its standard uncertainty (default: 0.012mm)"},
-	{OPT_PIXELS, "pixels", "PX,…", "two-point: the length in pixels, once or more"},
+	{OPT_PIXELS, "pixels", "PX,...", "two-point: the length in pixels, once or more"},
 	{OPT_PIXELS_U, "pixels-u", "PX",
 	 "two-point: standard uncertainty that all have alike\n(default: 0.7 of --pixels, 0.03 by vision)"},
 	{OPT_PICTURES, "pictures", "N",

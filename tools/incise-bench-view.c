@@ -25,7 +25,7 @@ static const struct cli_option options[] = {
 	 "compare with an older report of --json: what changed\nbeyond noise"},
 	{OPT_PLOT, "plot", "NAME", "draw error over run time as NAME.png and NAME.svg"},
 	{OPT_DURATION, "duration", "TIME",
-	 "of each run beside a loop, and of that of cuts,\nsuch as 10min (default 4s)"},
+	 "of each run beside a loop, and of that of cuts,\nsuch as 10min (default: 4s)"},
 	{OPT_QUICK, "quick", NULL, "fewer frames and runs: a look, not a measurement"},
 	{0},
 };

@@ -39,12 +39,12 @@ static const struct cli_option options[] = {
 	 "loop: NAME-wakeups, NAME-rates;\n"
 	 "pose: NAME, NAME-rates; timeline: NAME, NAME-windows"},
 	{OPT_DURATION, "duration", "TIME",
-	 "of each run of capture, and each of loop's wake-ups,\nsuch as 10min (default 7s and 5s)"},
+	 "of each run of capture, and each of loop's wake-ups,\nsuch as 10min (default: 7s and 5s)"},
 	{OPT_LOAD, "load", "NAME",
 	 "loop: wake-ups under one load only: idle, cpu,\nmemory, disk or view"},
 	{OPT_PROFILE, "profile", "WHICH",
 	 "scenes: only run some ticks of one, with the stages\nthat it needs or with all: needed or full; for perf\nstat or callgrind"},
-	{OPT_SEED, "seed", "N", "extremes: another set of cases (default 1)"},
+	{OPT_SEED, "seed", "N", "extremes: another set of cases (default: 1)"},
 	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
 	{0},
 };

@@ -17,10 +17,10 @@
 enum { OPT_DUE = CLI_LONG, OPT_ONLY, OPT_RECORDING, OPT_JSON };
 
 static const struct cli_option options[] = {
-	{'c', "calibration", "FILE", "to look at (default calibration.conf)"},
-	{OPT_DUE, "due", "AGE", "a calibration older than this is due (default 365d)"},
+	{'c', "calibration", "FILE", "to look at (default: calibration.conf)"},
+	{OPT_DUE, "due", "AGE", "a calibration older than this is due (default: 365d)"},
 	{OPT_ONLY, "only", "LIST",
-	 "what this rig needs, of force,depth,tip,delay,stepper (default all)"},
+	 "what this rig needs, of force,depth,tip,delay,stepper (default: all)"},
 	{OPT_RECORDING, "recording", "NAME.rec",
 	 "see whether its tracker and camera agree about the depth"},
 	{OPT_JSON, "json", NULL, "report as JSON"},

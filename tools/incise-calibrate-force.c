@@ -33,9 +33,9 @@ enum {
 
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
-	 "rig.conf, or sim:KEY=VALUE,... (default ./rig.conf, then /etc/incise)"},
+	 "rig.conf, or sim:KEY=VALUE,... (default: ./rig.conf, then /etc/incise)"},
 	{'c', "calibration", "FILE",
-	 "read as found, and written (default calibration.conf)"},
+	 "read as found, and written (default: calibration.conf)"},
 	{CALIBRATE_FROM, "from", "FILE",
 	 "pairs instead of a rig: CSV with mass_g or force_N, reading_mV,\n"
 	 "and perhaps series and direction (up, down)"},
@@ -46,23 +46,23 @@ static const struct cli_option options[] = {
 	{OPT_WEIGHTS, "weights", "LIST",
 	 "loads such as 0,50g,100g,0.2kg; without it they are asked for"},
 	{OPT_SERIES, "series", "N",
-	 "times up by all loads, the last one down as well (default 3)"},
-	{OPT_TIME, "time", "TIME", "mean of each reading (default 2s)"},
+	 "times up by all loads, the last one down as well (default: 3)"},
+	{OPT_TIME, "time", "TIME", "mean of each reading (default: 2s)"},
 	{OPT_TIMEOUT, "timeout", "TIME",
-	 "for a load to come and be steady (default 1min)"},
+	 "for a load to come and be steady (default: 1min)"},
 	{OPT_GRAVITY, "gravity", "M_S2",
-	 "local gravity (default 9.80665, with the uncertainty of not\n"
+	 "local gravity (default: 9.80665, with the uncertainty of not\n"
 	 "knowing where)"},
 	{OPT_LATITUDE, "latitude", "DEG", "compute gravity for this place"},
-	{OPT_ALTITUDE, "altitude", "M", "above the sea (default 0)"},
+	{OPT_ALTITUDE, "altitude", "M", "above the sea (default: 0)"},
 	{OPT_SCALE, "scale", "MASS",
-	 "resolution of the scale that weighed the loads (default 0.5g)"},
-	{OPT_DENSITY, "density", "KG_M3", "of the weights (default 7950)"},
+	 "resolution of the scale that weighed the loads (default: 0.5g)"},
+	{OPT_DENSITY, "density", "KG_M3", "of the weights (default: 7950)"},
 	{OPT_RANGE, "range", "LOW,HIGH",
 	 "ends of the converter in mV (default: those of the rig,\n"
 	 "or not known, with --from)"},
-	{OPT_NOMINAL, "nominal", "MV_N", "to compare with (default 1240)"},
-	{OPT_TOLERANCE, "tolerance", "PERCENT", "of it, to pass (default 5)"},
+	{OPT_NOMINAL, "nominal", "MV_N", "to compare with (default: 1240)"},
+	{OPT_TOLERANCE, "tolerance", "PERCENT", "of it, to pass (default: 5)"},
 	{OPT_ZERO, "zero", NULL,
 	 "put the zero in force as well; else it is measured at each\n"
 	 "recording's start"},

@@ -20,7 +20,7 @@ static const struct cli_option options[] = {
 	 "write the compiled model there (.fx); '-' is standard output"},
 	{OPT_BUDGET, "budget", "ERROR",
 	 "largest error that may be certified, e.g. 0.1mN, 50uN or\n"
-	 "1e-4 in the output's unit (default 0.1mN)"},
+	 "1e-4 in the output's unit (default: 0.1mN)"},
 	{OPT_ARITH, "arith", "KIND",
 	 "direct, table or force (default: the cheapest within the\n"
 	 "budget)"},

@@ -20,9 +20,9 @@
 enum { OPT_SEED = CLI_LONG, OPT_LOOP, OPT_SCENE, OPT_FORCE, OPT_JSON };
 
 static const struct cli_option options[] = {
-	{'o', "output", "DIR", "folder to leave everything in (default demo.out)"},
-	{OPT_SEED, "seed", "N", "of the virtual rig (default 1)"},
-	{OPT_LOOP, "loop", "TIME", "length of the haptic loop (default 10s)"},
+	{'o', "output", "DIR", "folder to leave everything in (default: demo.out)"},
+	{OPT_SEED, "seed", "N", "of the virtual rig (default: 1)"},
+	{OPT_LOOP, "loop", "TIME", "length of the haptic loop (default: 10s)"},
 	{OPT_SCENE, "scene", "SCENE",
 	 "paper 2 instead: a film and a strip of a procedure on this scene, as neck"},
 	{OPT_FORCE, "force", NULL, "write into a folder that exists"},

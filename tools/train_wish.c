@@ -28,21 +28,21 @@ enum {
 static const struct cli_option options[] = {
 	{'o', "output-model", "FILE",
 	 "write the model there (.fis); '-' is standard output"},
-	{OPT_INPUTS, "inputs", "A,B", "input columns (default depth_mm,velocity_mm_s)"},
-	{OPT_OUTPUT, "output", "Y", "output column (default force_N)"},
+	{OPT_INPUTS, "inputs", "A,B", "input columns (default: depth_mm,velocity_mm_s)"},
+	{OPT_OUTPUT, "output", "Y", "output column (default: force_N)"},
 	{OPT_GROUP, "group", "COLUMN",
 	 "column naming the cut; data are split by whole cuts"},
 	{OPT_CHECK, "check", "SHARE", "keep this share back as unseen data, e.g. 0.3"},
-	{OPT_SEED, "seed", "N", "of every random choice (default 1)"},
+	{OPT_SEED, "seed", "N", "of every random choice (default: 1)"},
 	{OPT_MF, "mf", "N,M",
-	 "membership functions per input (default 5,4; else 3 each),\n"
+	 "membership functions per input (default: 5,4; else 3 each),\n"
 	 "or 'auto': chosen by cross-validation"},
 	{OPT_MF_TYPE, "mf-type", "KIND", "gaussmf (default) or gbellmf"},
-	{OPT_EPOCHS, "epochs", "N", "epochs, at most (default 80)"},
+	{OPT_EPOCHS, "epochs", "N", "epochs, at most (default: 80)"},
 	{OPT_STEP, "step", "K",
-	 "initial step of the premises (default 0.01); --classic only"},
+	 "initial step of the premises (default: 0.01); --classic only"},
 	{OPT_RIDGE, "ridge", "R", "ridge on scaled data (default: by cross-validation)"},
-	{OPT_STARTS, "starts", "N", "premises to start from (default 3)"},
+	{OPT_STARTS, "starts", "N", "premises to start from (default: 3)"},
 	{OPT_CLASSIC, "classic", NULL,
 	 "as MATLAB's anfis: no scaling, no ridge but 1e-6;\n"
 	 "the check data choose the epoch"},
