@@ -70,7 +70,7 @@ static const struct cli_option options[] = {
 
 static const struct cli_verb verb = {
 	.name = "calibrate force",
-	.synopsis = "[--weights LIST | --from PAIRS.csv] [OPTIONS]",
+	.synopsis = "[--weights LIST | --from FILE] [OPTIONS]",
 	.summary =
 		"Measure the sensitivity of the force channel with weights (procedure after "
 		"ISO 376)\nand put it in force in calibration.conf.",
