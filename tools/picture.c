@@ -43,10 +43,11 @@ void picture_place(const char *option, const char *path, const char **folder,
 
 	if (n > 4 && (!strcmp(last + n - 4, ".png") || !strcmp(last + n - 4, ".svg")))
 		n -= 4;
-	/* The name stands in a script and in a command. */
-	if (!n || *last == '.' || strspn(last, NAME_CHARACTERS) != strlen(last))
+	/* The name stands in a script and in a command: '-' begins an option of gnuplot. */
+	if (!n || *last == '.' || *last == '-' ||
+	    strspn(last, NAME_CHARACTERS) != strlen(last))
 		cli_usage("--%s: '%s' is no name for a picture: letters, digits, '.', "
-			  "'_' and '-'",
+			  "'_' and '-', and not '.' or '-' first",
 			  option, last);
 	if (!picture_possible())
 		cli_fail("gnuplot is not installed, it draws the pictures: apt-get "
