@@ -120,7 +120,7 @@ include mk/module.mk
 
 help:
 	@sed -n 's/^\([a-z][a-z0-9_-]*\):.*## /\1  /p' $(MAKEFILE_LIST) | sort | \
-		awk '{ name = $$1; $$1 = ""; printf "%-17s%s\n", name, $$0 }'
+		awk '{ name = $$1; $$1 = ""; printf "%-21s%s\n", name, $$0 }'
 
 clean: ## remove what was built
 	rm -rf $(O)

@@ -25,7 +25,7 @@ setup() {
 	for program in "$INCISE_BUILD"/bin/incise-*; do
 		name=${program##*/incise-}
 		if [[ $name == *-* ]]; then
-			"incise-${name%%-*}" --help | grep -q "^${name#*-}: "
+			"incise-${name%%-*}" --help | grep -qE "^ *${name#*-}[: ]"
 			run -0 incise "${name%%-*}" "${name#*-}" --help
 			[[ "${lines[0]}" == "Usage: incise ${name/-/ } "* ]]
 		else
