@@ -1,42 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * Pivot calibration; see incise/calibrate_tip.h. Lengths in mm.
- *
- * With c eliminated the six unknowns are three: n(I - R̄ᵀR̄) t = -Σ (R_i - R̄)ᵀ(p_i - p̄). The
- * eigenvalues of the matrix say what the motion fixes: of a direction that all poses leave
- * where it is, nothing, and its eigenvalue is 0.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <lapacke.h>
 #include "../base/vector.h"
 #include "tip.h"
-
-#define EIGENVALUE_MIN 1e-9 /* noise of 0.025 degrees makes 2e-7 of none */
-#define OUTLIERS_MAX 0.3
-#define RMS_MAX_MM 1.0
-#define CHI2_MOVED 16.27 /* of three, which chance exceeds once in 1000 */
-#define MOVED_MIN_MM 0.1
-#define ROUNDING_MM 1e-9
-#define BLOCK_TIMES 4
-#define DIRECTIONS_MAX 1500 /* compared each with each */
-
-/* Shortest tip that tells where the tool points; a shorter one is a correction. */
-#define TOOL_MIN_MM 10.0
-
-static void turn(double to[3], const double r[9], const double v[3])
-{
-	for (int i = 0; i < 3; i++)
-		to[i] = v3_dot(r + 3 * i, v);
-}
-
-static void turn_back(double to[3], const double r[9], const double v[3])
-{
-	for (int i = 0; i < 3; i++)
-		to[i] = r[i] * v[0] + r[3 + i] * v[1] + r[6 + i] * v[2];
-}
 
 /* Columns are where the axes go to. */
 static void rotation(double r[9], const double q[4])
@@ -53,343 +24,6 @@ static void rotation(double r[9], const double q[4])
 			r[3 * i + k] = to[i];
 	}
 }
-
-bool tip_solve(const struct tip_poses *poses, const int *list, int n,
-	       struct tip_solution *s)
-{
-	double mean_p[3] = {0}, right[3] = {0}, step[3];
-
-	memset(s, 0, sizeof(*s));
-	s->n = n;
-	if (n < 2)
-		return false;
-	for (int i = 0; i < n; i++) {
-		int at = list ? list[i] : i;
-
-		for (int k = 0; k < 3; k++)
-			mean_p[k] += poses->p[at][k] / n;
-		for (int k = 0; k < 9; k++)
-			s->mean_r[k] += poses->r[at][k] / n;
-	}
-	for (int i = 0; i < n; i++) {
-		int at = list ? list[i] : i;
-		double d[9], dp[3], part[3];
-
-		for (int k = 0; k < 9; k++)
-			d[k] = poses->r[at][k] - s->mean_r[k];
-		v3_sub(dp, poses->p[at], mean_p);
-		turn_back(part, d, dp);
-		v3_add(right, right, -1.0 / n, part);
-		/* not I - R̄ᵀR̄, which would cancel where they turn little */
-		for (int a = 0; a < 3; a++)
-			for (int b = 0; b <= a; b++)
-				s->vectors[3 * a + b] +=
-					(d[a] * d[b] + d[3 + a] * d[3 + b] +
-					 d[6 + a] * d[6 + b]) /
-					n;
-	}
-	if (LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'V', 'L', 3, s->vectors, 3, s->values) ||
-	    !(s->values[0] > EIGENVALUE_MIN))
-		return false;
-	turn_back(step, s->vectors, right);
-	for (int k = 0; k < 3; k++)
-		step[k] /= s->values[k];
-	turn(s->t, s->vectors, step);
-	turn(s->c, s->mean_r, s->t);
-	v3_add(s->c, s->c, 1, mean_p);
-	return v3_finite(s->t) && v3_finite(s->c);
-}
-
-void tip_residuals(struct tip_poses *poses, const struct tip_solution *s)
-{
-	for (int i = 0; i < poses->n; i++) {
-		double *r = poses->residual[i];
-
-		turn(r, poses->r[i], s->t);
-		v3_add(r, r, 1, poses->p[i]);
-		v3_sub(r, r, s->c);
-		poses->square[i] = v3_dot(r, r);
-	}
-}
-
-/* --- what the motion was --------------------------------------------------------------- */
-
-/* Largest angle between two directions that an axis of the sensor took. */
-static double swept_deg(const struct tip_poses *poses, int n, const double axis[3])
-{
-	int stride = 1 + n / DIRECTIONS_MAX, m = 0;
-	double least = 1;
-	double(*to)[3] = malloc((size_t)(n / stride + 1) * sizeof(*to));
-
-	if (!to)
-		return 0;
-	for (int i = 0; i < n; i += stride)
-		turn(to[m++], poses->r[poses->list[i]], axis);
-	for (int i = 0; i < m; i++)
-		for (int j = 0; j < i; j++)
-			least = fmin(least, v3_dot(to[i], to[j]));
-	free(to);
-	return acos(fmax(-1, least)) * 180 / M_PI;
-}
-
-static void describe_motion(const struct tip_poses *poses, int n,
-			    const struct tip_solution *s, struct incise_tip_fit *fit)
-{
-	double largest = sqrt(fmax(0, 1 - s->values[0])), tool[3];
-
-	for (int k = 0; k < 3; k++)
-		fit->least[k] = s->vectors[3 * k];
-	fit->least_deg = swept_deg(poses, n, fit->least);
-	fit->cone_deg = fit->least_deg;
-	if (v3_unit(tool, s->t, TOOL_MIN_MM))
-		fit->cone_deg = swept_deg(poses, n, tool);
-	/* singular values of [R -I] are √(n(1 ± s)), s those of R̄ */
-	fit->condition = sqrt((1 + largest) / fmax(s->values[0] / (1 + largest), 1e-300));
-}
-
-/* --- uncertainty ----------------------------------------------------------------------- */
-
-/* Autocorrelation time of the residuals, in poses; 1 where each stands for itself. */
-static double time_of(const struct tip_poses *poses, int n)
-{
-	double zero = 0, time = 1, noise = 3 / sqrt(3.0 * n);
-
-	for (int i = 0; i < n; i++)
-		zero += poses->square[poses->list[i]];
-	if (zero < n * ROUNDING_MM * ROUNDING_MM)
-		return 1;
-	for (int lag = 1; lag <= n / 10; lag++) {
-		double sum = 0;
-
-		for (int i = lag; i < n; i++)
-			sum += v3_dot(poses->residual[poses->list[i]],
-				      poses->residual[poses->list[i - lag]]);
-		if (sum / zero < noise)
-			break;
-		time += 2 * sum / zero;
-	}
-	return time;
-}
-
-/* Poses in a row that count as one: of noise that lasts, BLOCK_TIMES times as long. */
-static int block_of(double time)
-{
-	return time > 1 ? (int)ceil(BLOCK_TIMES * time) : 1;
-}
-
-/*
- * What a variance from sums over blocks is too small by: borders between blocks cut off half
- * a time each (Flegal and Jones, Ann. Stat. 38, 2010), six unknowns are two poses' worth of
- * equations, and few blocks have Student's tails, which k = 2 is to hold too.
- */
-static double correction(int block, int blocks)
-{
-	double freedom = fmax(1, blocks - 2), student = 1 + 1.21 / freedom;
-	double border = block > 1 ? 1 / (1 - 0.5 / BLOCK_TIMES) : 1;
-
-	return blocks / freedom * border * student * student;
-}
-
-/*
- * Sandwich of the fit with a pivot that moves evenly: unknowns t and the pivot's move per
- * half of the run, w. Or without: w 0.
- */
-struct sandwich {
-	int m; /* unknowns, 3 or 6 */
-	double left[36], middle[36], right[6];
-};
-
-static void score_rows(double rows[3][6], const struct tip_poses *poses, int at,
-		       const struct tip_solution *s, double u)
-{
-	for (int e = 0; e < 3; e++)
-		for (int k = 0; k < 3; k++) {
-			rows[e][k] = poses->r[at][3 * e + k] - s->mean_r[3 * e + k];
-			rows[e][3 + k] = e == k ? -u : 0;
-		}
-}
-
-/* x = left⁻¹ right, and its covariance into middle. False: singular. */
-static bool sandwich(struct tip_poses *poses, int n, const double *u,
-		     const struct tip_solution *s, int block, struct sandwich *w)
-{
-	int m = w->m, blocks = n / block;
-	double sum[6] = {0}, x[6];
-
-	memset(w->left, 0, sizeof(w->left));
-	memset(w->right, 0, sizeof(w->right));
-	memset(w->middle, 0, sizeof(w->middle));
-	for (int i = 0; i < n; i++) {
-		const double *r = poses->residual[poses->list[i]];
-		double rows[3][6];
-
-		score_rows(rows, poses, poses->list[i], s, u[i]);
-		for (int e = 0; e < 3; e++)
-			for (int a = 0; a < m; a++) {
-				w->right[a] -= rows[e][a] * r[e];
-				for (int b = 0; b < m; b++)
-					w->left[a * m + b] += rows[e][a] * rows[e][b];
-			}
-	}
-	if (LAPACKE_dpotrf(LAPACK_ROW_MAJOR, 'L', m, w->left, m))
-		return false;
-	memcpy(x, w->right, sizeof(x));
-	LAPACKE_dpotrs(LAPACK_ROW_MAJOR, 'L', m, 1, w->left, m, x, 1);
-	for (int i = 0; i < n; i++) {
-		double r[3], rows[3][6];
-
-		v3_copy(r, poses->residual[poses->list[i]]);
-		score_rows(rows, poses, poses->list[i], s, u[i]);
-		for (int e = 0; e < 3; e++) {
-			for (int a = 0; a < m; a++)
-				r[e] += rows[e][a] * x[a];
-			for (int a = 0; a < m; a++)
-				sum[a] += rows[e][a] * r[e];
-		}
-		/* what is left over goes with the last block */
-		if (i != n - 1 && ((i + 1) % block || (i + 1) / block == blocks))
-			continue;
-		for (int a = 0; a < m; a++)
-			for (int b = 0; b < m; b++)
-				w->middle[a * m + b] += sum[a] * sum[b];
-		memset(sum, 0, sizeof(sum));
-	}
-	/* middle = left⁻¹ middle left⁻¹, symmetric in between once it is transposed */
-	for (int side = 0; side < 2; side++) {
-		LAPACKE_dpotrs(LAPACK_ROW_MAJOR, 'L', m, m, w->left, m, w->middle, m);
-		for (int a = 0; a < m; a++)
-			for (int b = 0; b < a; b++) {
-				double keep = w->middle[a * m + b];
-
-				w->middle[a * m + b] = w->middle[b * m + a];
-				w->middle[b * m + a] = keep;
-			}
-	}
-	for (int i = 0; i < m * m; i++)
-		w->middle[i] *= correction(block, blocks);
-	memcpy(w->right, x, sizeof(x));
-	return true;
-}
-
-static void state_uncertainty(struct tip_poses *poses, int n, const double *u,
-			      const struct tip_solution *s, struct incise_tip_fit *fit,
-			      double *chi2)
-{
-	struct sandwich still = {.m = 3}, moving = {.m = 6};
-	double c[9], move[3];
-
-	if (sandwich(poses, n, u, s, fit->block, &still))
-		memcpy(fit->covariance, still.middle, sizeof(fit->covariance));
-	*chi2 = 0;
-	if (!sandwich(poses, n, u, s, fit->block, &moving))
-		return;
-	for (int a = 0; a < 3; a++)
-		for (int b = 0; b < 3; b++)
-			c[3 * a + b] = moving.middle[(3 + a) * 6 + 3 + b];
-	v3_copy(move, moving.right + 3);
-	fit->moved_mm = 2 * v3_length(move);
-	fit->moved_sd_mm = 2 * sqrt((c[0] + c[4] + c[8]) / 3);
-	if (!LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', 3, 1, c, 3, move, 1))
-		*chi2 = v3_dot(move, moving.right + 3);
-}
-
-/* Each half's residuals under the fit of the other; blocks of 1/20 take turns. */
-static double held_out(struct tip_poses *poses, int n)
-{
-	int length = n / 20 > 0 ? n / 20 : 1, m;
-	int *half = malloc((size_t)n * sizeof(*half));
-	struct tip_solution s;
-	double sum = 0;
-
-	if (!half)
-		return NAN;
-	for (int side = 0; side < 2; side++) {
-		m = 0;
-		for (int i = 0; i < n; i++)
-			if (i / length % 2 == side)
-				half[m++] = poses->list[i];
-		if (!tip_solve(poses, half, m, &s)) {
-			sum = NAN;
-			break;
-		}
-		tip_residuals(poses, &s);
-		for (int i = 0; i < n; i++)
-			if (i / length % 2 != side)
-				sum += poses->square[poses->list[i]];
-	}
-	free(half);
-	return sqrt(sum / n);
-}
-
-/* --- whether to believe it ------------------------------------------------------------- */
-
-static int refuse(struct incise_error *err, const char *text)
-{
-	return incise_error_set(err, EDOM, "%s", text);
-}
-
-/* Whether those left out lie together at an end: the pivot moved there. */
-static bool outliers_at_end(const struct tip_poses *poses)
-{
-	int outliers = 0, late = 0;
-
-	for (int i = 0; i < poses->n; i++)
-		if (!poses->in[i]) {
-			outliers++;
-			late += i >= poses->n / 2;
-		}
-	return late > 0.8 * outliers || late < 0.2 * outliers;
-}
-
-static int judge(const struct tip_poses *poses, const struct incise_tip_fit *fit,
-		 double chi2, struct incise_error *err)
-{
-	if (fit->least_deg < INCISE_TIP_LEAST_DEG)
-		return incise_error_set(
-			err, EDOM,
-			"it turned about one axis only: the direction (%.2f %.2f %.2f) "
-			"of the sensor swept %.0f degrees; turn the tool all ways",
-			fit->least[0], fit->least[1], fit->least[2], fit->least_deg);
-	if (fit->n - fit->inliers > OUTLIERS_MAX * fit->n) {
-		if (outliers_at_end(poses))
-			return incise_error_set(
-				err, EDOM,
-				"the pivot moved: %d of %d poses are about another point "
-				"than the rest; keep the tip in its dimple",
-				fit->n - fit->inliers, fit->n);
-		return incise_error_set(
-			err, EDOM,
-			"%d of %d poses are not about the pivot of the others; keep the "
-			"tip in its dimple, or are columns swapped?",
-			fit->n - fit->inliers, fit->n);
-	}
-	if (fit->rms_mm > RMS_MAX_MM)
-		return incise_error_set(
-			err, EDOM,
-			"poses miss their pivot by %.2f mm rms, more than %g mm; keep the "
-			"tip in its dimple, or are columns swapped (quaternion w first)?",
-			fit->rms_mm, RMS_MAX_MM);
-	if (fit->cone_deg < INCISE_TIP_CONE_DEG)
-		return incise_error_set(
-			err, EDOM,
-			"the tool swept a cone of %.0f degrees only; %g are needed",
-			fit->cone_deg, INCISE_TIP_CONE_DEG);
-	if (chi2 > CHI2_MOVED && fit->moved_mm > MOVED_MIN_MM)
-		return incise_error_set(
-			err, EDOM,
-			"the pivot moved by %.2f mm while it turned; keep the tip in its "
-			"dimple, and the dimple where it is",
-			fit->moved_mm);
-	if (fit->blocks < INCISE_TIP_POSES_MIN)
-		return incise_error_set(
-			err, EDOM,
-			"%d poses are worth %d independent ones, %d are needed; turn the "
-			"tool longer",
-			fit->n, fit->blocks, INCISE_TIP_POSES_MIN);
-	return 0;
-}
-
-/* --- the whole ------------------------------------------------------------------------- */
 
 static int take(struct tip_poses *to, const struct incise_tip_pose *from,
 		struct incise_error *err)
@@ -444,6 +78,34 @@ static bool make_room(struct tip_poses *poses, int n)
 	       poses->list && poses->sorted;
 }
 
+/* Each half's residuals under the fit of the other; blocks of 1/20 take turns. */
+static double held_out(struct tip_poses *poses, int n)
+{
+	int length = n / 20 > 0 ? n / 20 : 1, m;
+	int *half = malloc((size_t)n * sizeof(*half));
+	struct tip_solution s;
+	double sum = 0;
+
+	if (!half)
+		return NAN;
+	for (int side = 0; side < 2; side++) {
+		m = 0;
+		for (int i = 0; i < n; i++)
+			if (i / length % 2 == side)
+				half[m++] = poses->list[i];
+		if (!tip_solve(poses, half, m, &s)) {
+			sum = NAN;
+			break;
+		}
+		tip_residuals(poses, &s);
+		for (int i = 0; i < n; i++)
+			if (i / length % 2 != side)
+				sum += poses->square[poses->list[i]];
+	}
+	free(half);
+	return sqrt(sum / n);
+}
+
 static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *given,
 		     struct incise_tip_fit *fit, struct incise_error *err)
 {
@@ -452,9 +114,10 @@ static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *give
 	int n;
 
 	if (!tip_robust(poses, &s))
-		return refuse(
-			err, "the tool did not turn, or about one axis only; turn it all "
-			     "ways, the tip in its dimple");
+		return incise_error_set(
+			err, EDOM,
+			"the tool did not turn, or about one axis only; turn it all "
+			"ways, the tip in its dimple");
 	n = fit->inliers = tip_listed(poses);
 	v3_copy(fit->tip_mm, s.t);
 	v3_copy(fit->pivot_mm, s.c);
@@ -464,8 +127,8 @@ static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *give
 			fmax(fit->largest_mm, sqrt(poses->square[poses->list[i]]));
 	}
 	fit->rms_mm = sqrt(sum / n);
-	describe_motion(poses, n, &s, fit);
-	fit->block = block_of(time_of(poses, n));
+	tip_motion(poses, n, &s, fit);
+	fit->block = tip_block(poses, n);
 	fit->blocks = n / fit->block;
 	u = malloc((size_t)n * sizeof(*u));
 	if (!u)
@@ -485,10 +148,10 @@ static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *give
 		sum += u[i] / n;
 	for (int i = 0; i < n; i++)
 		u[i] -= sum;
-	state_uncertainty(poses, n, u, &s, fit, &chi2);
+	tip_uncertainty(poses, n, u, &s, fit, &chi2);
 	free(u);
 	fit->held_out_mm = held_out(poses, n);
-	return judge(poses, fit, chi2, err);
+	return tip_judge(poses, fit, chi2, err);
 }
 
 int incise_calibrate_tip(const struct incise_tip_pose *poses, int n, bool *inlier,
