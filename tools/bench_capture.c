@@ -8,7 +8,6 @@
  *   by the pump:  JPEG pictures, made before ─ camera.mkv, vision
  */
 #include <errno.h>
-#include <ftw.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -23,6 +22,7 @@
 #include "bench_capture.h"
 #include "cli.h"
 #include "figures.h"
+#include "folder.h"
 #include "jpeg_camera.h"
 #include "json.h"
 #include "machine.h"
@@ -244,31 +244,15 @@ static int do_run(struct run *run, const struct part *part, struct jpeg_camera *
 	return rc ? rc : ended;
 }
 
-static int remove_one(const char *path, const struct stat *status, int type,
-		      struct FTW *place)
-{
-	(void)status;
-	(void)type;
-	(void)place;
-	return remove(path);
-}
-
 /* All runs; the recordings go into a folder that is gone afterwards, come what may. */
 static void run_all(struct run *runs, struct jpeg_camera *camera, const char *only,
 		    double seconds)
 {
-	const char *where = getenv("TMPDIR");
 	struct incise_error err = {0};
 	char folder[PATH_MAX - 80];
-	int rc = 0, length;
+	int rc = 0;
 
-	length = snprintf(folder, sizeof(folder), "%s/incise-bench-XXXXXX",
-			  where && *where ? where : "/tmp");
-	if (length >= (int)sizeof(folder))
-		cli_fail("TMPDIR: is too long for a name; set another");
-	if (!mkdtemp(folder))
-		cli_fail("%s: no folder for the recording: %s; set TMPDIR", folder,
-			 strerror(errno));
+	folder_make(folder, sizeof(folder), "for the recording");
 	for (int i = 0; i < RUNS && !rc && !cli_stop; i++) {
 		if (only && strcmp(only, parts[i].name))
 			continue;
@@ -277,7 +261,7 @@ static void run_all(struct run *runs, struct jpeg_camera *camera, const char *on
 		runs[i].done = true;
 	}
 	cli_progress_end();
-	nftw(folder, remove_one, 8, FTW_DEPTH | FTW_PHYS);
+	folder_remove(folder);
 	if (cli_stop)
 		cli_fail("interrupted");
 	if (rc)

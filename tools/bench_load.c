@@ -2,16 +2,14 @@
 /*
  * What keeps the machine busy; see bench_load.h.
  */
-#include <errno.h>
-#include <ftw.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include "bench_load.h"
 #include "child.h"
 #include "cli.h"
+#include "folder.h"
 
 #define UNDER_WAY_US 500000
 #define BLEEDING_S 4
@@ -34,28 +32,6 @@ const char *load_name(enum load load)
 	return loads[load].name;
 }
 
-static void make_folder(struct load_run *run)
-{
-	const char *where = getenv("TMPDIR");
-	int length = snprintf(run->folder, sizeof(run->folder), "%s/incise-bench-XXXXXX",
-			      where && *where ? where : "/tmp");
-
-	if (length >= (int)sizeof(run->folder))
-		cli_fail("TMPDIR: is too long for a name; set another");
-	if (!mkdtemp(run->folder))
-		cli_fail("%s: no folder to keep the disk busy in: %s; set TMPDIR",
-			 run->folder, strerror(errno));
-}
-
-static int remove_one(const char *path, const struct stat *status, int type,
-		      struct FTW *place)
-{
-	(void)status;
-	(void)type;
-	(void)place;
-	return remove(path);
-}
-
 static const char *begin_stress(enum load load, double seconds, struct load_run *run)
 {
 	const char *argv[16] = {"stress-ng", "--quiet", "--timeout"};
@@ -69,7 +45,7 @@ static const char *begin_stress(enum load load, double seconds, struct load_run 
 	for (int i = 0; i < 6 && loads[load].arguments[i]; i++)
 		argv[n++] = loads[load].arguments[i];
 	/* It makes a folder there for any of its workers. */
-	make_folder(run);
+	folder_make(run->folder, sizeof(run->folder), "to keep the disk busy in");
 	argv[n++] = "--temp-path";
 	argv[n++] = run->folder;
 	run->pid = child_begin((char *const *)argv, -1);
@@ -128,7 +104,7 @@ double load_end(struct load_run *run)
 		fclose(run->said.file);
 	}
 	if (*run->folder)
-		nftw(run->folder, remove_one, 8, FTW_DEPTH | FTW_PHYS);
+		folder_remove(run->folder);
 	*run = (struct load_run){0};
 	return frames_hz;
 }

@@ -2,8 +2,7 @@
 /*
  * Files from outside with broken bytes: each is refused with one line, or works.
  */
-#include <errno.h>
-#include <ftw.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,6 +19,7 @@
 #include "cli.h"
 #include "extremes.h"
 #include "extremes_ground.h"
+#include "folder.h"
 #include "memory_file.h"
 
 #define SIZE_MAX_BYTES (1 << 20)
@@ -288,15 +288,6 @@ static void try_file(struct extremes *all, const char *name, const char *what,
 
 /* ---- recordings ---- */
 
-static int remove_one(const char *path, const struct stat *status, int type,
-		      struct FTW *where)
-{
-	(void)status;
-	(void)type;
-	(void)where;
-	return remove(path);
-}
-
 static void record(const char *path)
 {
 	struct incise_recorder_setup setup = {.planned_s = 1};
@@ -348,16 +339,11 @@ static void try_recording(struct extremes *all)
 	struct extremes_row *row = extremes_begin(
 		all, "recording_bytes",
 		"a recording whose database has broken bytes: refused with one line, or read");
-	const char *where = getenv("TMPDIR");
-	char folder[200], path[240], database[280];
+	char folder[PATH_MAX - 80], path[PATH_MAX - 60], database[PATH_MAX];
 	struct bytes bytes = {0};
 	FILE *file;
 
-	snprintf(folder, sizeof(folder), "%s/incise-extremes-XXXXXX",
-		 where && *where && strlen(where) < 150 ? where : "/tmp");
-	if (!mkdtemp(folder))
-		cli_fail("%s: no folder for a recording: %s; set TMPDIR", folder,
-			 strerror(errno));
+	folder_make(folder, sizeof(folder), "for a recording");
 	snprintf(path, sizeof(path), "%s/a.rec", folder);
 	snprintf(database, sizeof(database), "%s/recording.db", path);
 	record(path);
@@ -380,7 +366,7 @@ static void try_recording(struct extremes *all)
 			cli_fail("%s: no room", database);
 		judge(row, open_recording(path, &err), &err);
 	}
-	nftw(folder, remove_one, 8, FTW_DEPTH | FTW_PHYS);
+	folder_remove(folder);
 	free(bytes.whole);
 	free(bytes.broken);
 }

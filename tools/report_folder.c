@@ -4,7 +4,6 @@
  */
 #include <dirent.h>
 #include <errno.h>
-#include <ftw.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +12,7 @@
 #include <incise/outfile.h>
 #include "cli.h"
 #include "document.h"
+#include "folder.h"
 #include "report_document.h"
 #include "report_folder.h"
 
@@ -29,18 +29,12 @@ static char *in(const char *folder, const char *name)
 	return path;
 }
 
-static int remove_one(const char *path, const struct stat *about, int kind,
-		      struct FTW *place)
-{
-	(void)about, (void)kind, (void)place;
-	return remove(path);
-}
-
-/* With all that is in it; links are not followed. */
 static void remove_all(const char *path)
 {
-	if (nftw(path, remove_one, 16, FTW_DEPTH | FTW_PHYS) && errno != ENOENT)
-		cli_fail("%s: cannot be removed: %s", path, strerror(errno));
+	int rc = folder_remove(path);
+
+	if (rc && rc != -ENOENT)
+		cli_fail("%s: cannot be removed: %s", path, strerror(-rc));
 }
 
 static void make(const char *path)

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Folders for a while; see folder.h.
+ */
+#include <errno.h>
+#include <ftw.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include "cli.h"
+#include "folder.h"
+
+void folder_make(char *path, size_t size, const char *purpose)
+{
+	const char *where = getenv("TMPDIR");
+	int length = snprintf(path, size, "%s/incise-bench-XXXXXX",
+			      where && *where ? where : "/tmp");
+
+	if (length >= (int)size)
+		cli_fail("TMPDIR: is too long for a name; set another");
+	if (!mkdtemp(path))
+		cli_fail("%s: no folder %s: %s; set TMPDIR", path, purpose,
+			 strerror(errno));
+}
+
+static int remove_one(const char *path, const struct stat *about, int kind,
+		      struct FTW *place)
+{
+	(void)about, (void)kind, (void)place;
+	return remove(path);
+}
+
+int folder_remove(const char *path)
+{
+	return nftw(path, remove_one, 16, FTW_DEPTH | FTW_PHYS) ? -errno : 0;
+}
