@@ -22,7 +22,8 @@ double ratios_value(const struct ratio *row)
 	return row->simulated / row->theory;
 }
 
-bool ratios_hold(const struct ratios *ratios, const struct ratio *row)
+/* Whether it is as it should be. */
+static bool holds(const struct ratios *ratios, const struct ratio *row)
 {
 	double ratio = ratios_value(row);
 
@@ -36,7 +37,7 @@ const struct ratio *ratios_first_missed(const struct ratios *ratios, int *missed
 
 	*missed = 0;
 	for (int i = 0; i < ratios->n; i++)
-		if (!ratios_hold(ratios, &ratios->row[i])) {
+		if (!holds(ratios, &ratios->row[i])) {
 			if (!first)
 				first = &ratios->row[i];
 			(*missed)++;
@@ -69,7 +70,7 @@ void ratios_print(const struct ratios *ratios)
 			printf("%14g", row->param[p]);
 		printf("%16.6g%16.6g%9.4f  %s%s\n", row->simulated, row->theory,
 		       ratios_value(row), row->at_least ? "at least " : "",
-		       ratios_hold(ratios, row) ? "ok" : "MISSED");
+		       holds(ratios, row) ? "ok" : "MISSED");
 	}
 	if (ratios->note)
 		printf("%s\n", ratios->note);
@@ -94,7 +95,7 @@ json_t *ratios_json(const struct ratios *ratios)
 		json_object_set_new(row, ratios->theory, json_number(r->theory));
 		json_object_set_new(row, "ratio", json_number(ratios_value(r)));
 		json_object_set_new(row, "at_least", json_boolean(r->at_least));
-		json_object_set_new(row, "ok", json_boolean(ratios_hold(ratios, r)));
+		json_object_set_new(row, "ok", json_boolean(holds(ratios, r)));
 		json_array_append_new(rows, row);
 	}
 	return rows;

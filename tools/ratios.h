@@ -36,9 +36,6 @@ void ratios_add(struct ratios *ratios, struct ratio row);
 /* simulated/theory; 1 where both find that there is none. */
 double ratios_value(const struct ratio *row);
 
-/* Whether it is as it should be. */
-bool ratios_hold(const struct ratios *ratios, const struct ratio *row);
-
 /* The first row that does not hold, or NULL; *missed counts them. */
 const struct ratio *ratios_first_missed(const struct ratios *ratios, int *missed);
 

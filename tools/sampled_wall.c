@@ -3,6 +3,7 @@
  * A sampled wall in time; see sampled_wall.h.
  */
 #include <math.h>
+#include <stdbool.h>
 #include "bench_device.h"
 #include "sampled_wall.h"
 
@@ -32,7 +33,8 @@ static struct run plan(const struct sampled_wall *wall, double stiffness_N_mm)
 	return run;
 }
 
-bool sampled_wall_grows(const struct sampled_wall *wall, double stiffness_N_mm)
+/* Whether a push at the wall of this stiffness grows. */
+static bool grows(const struct sampled_wall *wall, double stiffness_N_mm)
 {
 	struct run run = plan(wall, stiffness_N_mm);
 	struct incise_plant plant = wall->plant;
@@ -75,9 +77,9 @@ double sampled_wall_limit(const struct sampled_wall *wall)
 	double unit = wall->plant.mass_kg * N_S2_PER_MM_KG / (T * T);
 	double lo = 2e-5 * unit, hi;
 
-	if (sampled_wall_grows(wall, lo))
+	if (grows(wall, lo))
 		return 0;
-	for (hi = 2 * lo; !sampled_wall_grows(wall, hi); hi *= 2) {
+	for (hi = 2 * lo; !grows(wall, hi); hi *= 2) {
 		if (hi > 1e6 * unit)
 			return INFINITY;
 		lo = hi;
@@ -85,7 +87,7 @@ double sampled_wall_limit(const struct sampled_wall *wall)
 	while (hi > lo * (1 + 1e-4)) {
 		double mid = sqrt(lo * hi);
 
-		if (sampled_wall_grows(wall, mid))
+		if (grows(wall, mid))
 			hi = mid;
 		else
 			lo = mid;

@@ -8,7 +8,6 @@
 #ifndef INCISE_SAMPLED_WALL_H
 #define INCISE_SAMPLED_WALL_H
 
-#include <stdbool.h>
 #include <incise/plant.h>
 
 struct sampled_wall {
@@ -18,9 +17,6 @@ struct sampled_wall {
 	double period_s;
 	int delay;
 };
-
-/* Whether a push at the wall of this stiffness grows. */
-bool sampled_wall_grows(const struct sampled_wall *wall, double stiffness_N_mm);
 
 /*
  * The stiffness from which on it grows, found by climbing from a very soft wall and then
