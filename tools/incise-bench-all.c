@@ -31,7 +31,7 @@ static const struct cli_option options[] = {
 	 "measure nothing: write report.html and report.md of\nDIR/report.json again"},
 	{OPT_AGAINST, "against", "OLD.json",
 	 "say what changed beyond noise since that report.json"},
-	{OPT_ONLY, "only", "WORD,…", "these words only"},
+	{OPT_ONLY, "only", "WORD,...", "these words only"},
 	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
 	{OPT_JSON, "json", NULL, "print report.json, too"},
 	{0},
