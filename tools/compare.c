@@ -494,11 +494,10 @@ static int comparable(const struct figures *was, const struct figures *is,
 	for (int i = 0; i < is->n; i++)
 		if (find(was, &is->figure[i]))
 			return 0;
-	return incise_error_set(
-		err, EINVAL,
-		"%s and %s have no figure in common; are they of the same "
-		"word?",
-		was->report, is->report);
+	return incise_error_set(err, EINVAL,
+				"%s and %s have no figure in common: compare two of one "
+				"word, or two of incise bench all",
+				was->report, is->report);
 }
 
 json_t *compare_reports(const json_t *old_report, const char *old_name,
