@@ -94,8 +94,8 @@ static double turn_ns(void *context)
 	const struct tick_row *row = context;
 
 	/* Caches and branches are those of the ways before. */
-	tick_course_ns(row->course, TURN_TICKS / 4, room);
-	return tick_course_ns(row->course, TURN_TICKS, room);
+	tick_stroke_ns(row->timed, TURN_TICKS / 4, room);
+	return tick_stroke_ns(row->timed, TURN_TICKS, room);
 }
 
 /* Quantiles of a long run each, and then medians in turn. */
@@ -112,13 +112,13 @@ static void measure(struct tick_row *rows, int n, bool quick)
 			cli_fail(
 				"%s: a stroke over its top met no tissue: nothing to time",
 				rows[i].name);
-		rows[i].course = tick_course_new(rows[i].scene, NULL, rows[i].cost.tool);
+		rows[i].timed = tick_stroke_new(rows[i].scene, NULL, rows[i].cost.tool);
 		timers[i] = (struct harness_timer){turn_ns, &rows[i]};
 	}
 	harness_timers(timers, n, quick ? QUICK_TURNS : TURNS, times);
 	for (int i = 0; i < n; i++) {
 		rows[i].time = times[i];
-		tick_course_free(rows[i].course);
+		tick_stroke_free(rows[i].timed);
 		incise_scene_free(rows[i].scene);
 	}
 }

@@ -23,7 +23,7 @@ struct tick_row {
 	struct harness_time time; /* of a tick, in turn with the others */
 	/* While they are measured: */
 	struct incise_scene *scene;
-	struct tick_course *course;
+	struct tick_stroke *timed;
 };
 
 /* The bench's own scenes, or @scene. Returns how many rows. */

@@ -16,7 +16,7 @@ static const struct incise_tracker_info usual_tracker = {
 	.latency_ns = 4200000,
 };
 
-struct tick_course {
+struct tick_stroke {
 	struct incise_plan *plan;
 	const struct incise_tracker_info *tracker;
 	struct stroke stroke;
@@ -25,38 +25,38 @@ struct tick_course {
 	double clock_ns;
 };
 
-struct tick_course *tick_course_new(const struct incise_scene *scene,
+struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 				    const struct incise_tracker_info *tracker,
 				    enum incise_tool tool)
 {
-	struct tick_course *course = calloc(1, sizeof(*course));
+	struct tick_stroke *timed = calloc(1, sizeof(*timed));
 	struct incise_error err = {0};
 
-	if (!course)
+	if (!timed)
 		cli_fail("no memory");
-	course->tracker = tracker ? tracker : &usual_tracker;
-	course->period_ns = llrint(1e9 / incise_scene_rate_hz(scene));
-	course->clock_ns = stopwatch_own_ns();
-	course->plan = incise_plan_new_fed(scene, course->tracker, &err);
-	if (!course->plan)
+	timed->tracker = tracker ? tracker : &usual_tracker;
+	timed->period_ns = llrint(1e9 / incise_scene_rate_hz(scene));
+	timed->clock_ns = stopwatch_own_ns();
+	timed->plan = incise_plan_new_fed(scene, timed->tracker, &err);
+	if (!timed->plan)
 		cli_fail_with(&err);
-	incise_plan_set_tool(course->plan, tool);
-	stroke_begin(&course->stroke, course->plan, course->tracker);
-	stroke_pose(&course->stroke, 0, &course->sample);
-	return course;
+	incise_plan_set_tool(timed->plan, tool);
+	stroke_begin(&timed->stroke, timed->plan, timed->tracker);
+	stroke_pose(&timed->stroke, 0, &timed->sample);
+	return timed;
 }
 
-void tick_course_free(struct tick_course *course)
+void tick_stroke_free(struct tick_stroke *timed)
 {
-	incise_plan_free(course->plan);
-	free(course);
+	incise_plan_free(timed->plan);
+	free(timed);
 }
 
 /*
  * Go on with the stroke. With @stage_ns, room for @ticks times of each stage, it is the
  * stages that are timed, else the ticks. Returns how many ticks were in contact.
  */
-static int go_on(struct tick_course *c, int ticks, double *tick_ns, double *stage_ns)
+static int go_on(struct tick_stroke *c, int ticks, double *tick_ns, double *stage_ns)
 {
 	int64_t own[INCISE_PLAN_STAGES_MAX];
 	int n = 0;
@@ -89,14 +89,14 @@ static int go_on(struct tick_course *c, int ticks, double *tick_ns, double *stag
 	return n;
 }
 
-double tick_course_ns(struct tick_course *course, int ticks, double *room)
+double tick_stroke_ns(struct tick_stroke *timed, int ticks, double *room)
 {
-	int n = go_on(course, ticks, room, NULL);
+	int n = go_on(timed, ticks, room, NULL);
 
 	if (!n)
 		return NAN;
 	stopwatch_sort(room, n);
-	return fmax(stopwatch_middle(room, n) - course->clock_ns, 0);
+	return fmax(stopwatch_middle(room, n) - timed->clock_ns, 0);
 }
 
 static bool has_insertion(const struct incise_plan *plan)
@@ -112,34 +112,34 @@ static bool cost_with(const struct incise_scene *scene,
 		      const struct incise_tracker_info *tracker, enum incise_tool tool,
 		      int ticks, double *times, struct tick_cost *cost)
 {
-	struct tick_course *course = tick_course_new(scene, tracker, tool);
-	bool insertion = has_insertion(course->plan);
-	double own = course->clock_ns;
+	struct tick_stroke *timed = tick_stroke_new(scene, tracker, tool);
+	bool insertion = has_insertion(timed->plan);
+	double own = timed->clock_ns;
 	int n;
 
 	cost->tool = tool;
 	/* The first part brings code and surface into the caches. */
-	go_on(course, ticks / 4, times, NULL);
-	n = cost->ticks = go_on(course, ticks, times, NULL);
+	go_on(timed, ticks / 4, times, NULL);
+	n = cost->ticks = go_on(timed, ticks, times, NULL);
 	if (!n) {
 		cost->median = cost->p99 = cost->p999 = NAN;
 		for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)
 			cost->stage[k] = NAN;
-		tick_course_free(course);
+		tick_stroke_free(timed);
 		return insertion;
 	}
 	stopwatch_sort(times, n);
 	cost->median = fmax(stopwatch_quantile(times, n, 0.5) - own, 0);
 	cost->p99 = fmax(stopwatch_quantile(times, n, 0.99) - own, 0);
 	cost->p999 = fmax(stopwatch_quantile(times, n, 0.999) - own, 0);
-	n = go_on(course, ticks, NULL, times);
+	n = go_on(timed, ticks, NULL, times);
 	for (int k = 0; k < INCISE_PLAN_STAGES_MAX && n; k++) {
 		double *stage = times + (size_t)k * ticks;
 
 		stopwatch_sort(stage, n);
 		cost->stage[k] = fmax(stopwatch_middle(stage, n) - own, 0);
 	}
-	tick_course_free(course);
+	tick_stroke_free(timed);
 	return insertion;
 }
 

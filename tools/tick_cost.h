@@ -31,12 +31,12 @@ void tick_cost(const struct incise_scene *scene,
 	       struct tick_cost *cost);
 
 /* The stroke by parts, for times that take turns with others. Fails the program. */
-struct tick_course *tick_course_new(const struct incise_scene *scene,
+struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 				    const struct incise_tracker_info *tracker,
 				    enum incise_tool tool);
 
 /* Mean of the middle half of so many ticks more, ns, with @room for them; NaN without contact. */
-double tick_course_ns(struct tick_course *course, int ticks, double *room);
-void tick_course_free(struct tick_course *course);
+double tick_stroke_ns(struct tick_stroke *timed, int ticks, double *room);
+void tick_stroke_free(struct tick_stroke *timed);
 
 #endif
