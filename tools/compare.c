@@ -18,7 +18,7 @@
 #include "json.h"
 #include "memory_file.h"
 
-#define FILE_MAX (64 << 20)
+#define FILE_MAX (16 << 20) /* a report of all words has less than 1 */
 #define FIGURES_MAX 100000
 #define NAME_MAX_BYTES 300
 
@@ -42,7 +42,7 @@ struct figures {
 	const char *report; /* as messages name it */
 	struct figure *figure;
 	int n;
-	json_t *index; /* place by word and name */
+	json_t *index; /* place by word and name; of a word alone it is there, too */
 };
 
 /* ---- reading ---- */
@@ -68,7 +68,9 @@ static json_t *read_file(FILE *file, const char *path, struct incise_error *err)
 			path, FILE_MAX >> 20);
 	} else {
 		report = json_loadb(text, n, JSON_REJECT_DUPLICATES, &wrong);
-		if (!report) {
+		if (!report && !*wrong.text) {
+			incise_error_set(err, ENOMEM, "%s: no memory", path);
+		} else if (!report) {
 			for (char *c = wrong.text; *c; c++)
 				if ((unsigned char)*c < ' ' || (unsigned char)*c >= 0x7f)
 					*c = '?';
@@ -219,6 +221,13 @@ static void key_of(const struct figure *f, char *key, size_t size)
 	snprintf(key, size, "%s\n%s", f->word ? f->word : "", f->name);
 }
 
+/* No figure's: names are not empty. */
+static const char *key_of_word(const char *word, char *key, size_t size)
+{
+	snprintf(key, size, "%s\n", word);
+	return key;
+}
+
 static int add(struct figures *all, const char *word, const json_t *list,
 	       struct incise_error *err)
 {
@@ -238,6 +247,10 @@ static int add(struct figures *all, const char *word, const json_t *list,
 	if (!room)
 		return incise_error_set(err, ENOMEM, "%s: no memory", all->report);
 	all->figure = room;
+	if (word && json_array_size(list) &&
+	    json_object_set_new(all->index, key_of_word(word, key, sizeof(key)),
+				json_integer(all->n)))
+		return incise_error_set(err, ENOMEM, "%s: no memory", all->report);
 	json_array_foreach((json_t *)list, i, from)
 	{
 		struct figure f;
@@ -384,17 +397,10 @@ static json_t *change_json(const struct figure *was, const struct figure *is, bo
 	return change;
 }
 
-static bool has_word(const struct figures *all, const char *word)
-{
-	for (int i = 0; i < all->n; i++)
-		if (all->figure[i].word && !strcmp(all->figure[i].word, word))
-			return true;
-	return false;
-}
-
 /* Figures of @from that @to has not. A word that is not there at all is one line. */
 static json_t *missing(const struct figures *from, const struct figures *to)
 {
+	char key[NAME_MAX_BYTES + 2];
 	const char *word = NULL;
 	bool known = true;
 	json_t *list = json_array();
@@ -405,7 +411,8 @@ static json_t *missing(const struct figures *from, const struct figures *to)
 		/* Figures of a word are together. */
 		if (f->word && f->word != word) {
 			word = f->word;
-			known = has_word(to, word);
+			known = json_object_get(to->index,
+						key_of_word(word, key, sizeof(key)));
 			if (!known)
 				json_array_append_new(list, json_pack("{ss sn}", "word",
 								      word, "name"));

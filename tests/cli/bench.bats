@@ -157,6 +157,15 @@ row() {
 	failed_with none.json "No such file"
 	run --separate-stderr incise bench compare . good.json
 	failed_with "."
+	run --separate-stderr incise bench compare good.json /dev/zero
+	failed_with "/dev/zero: more than 16 MiB"
+	# Short, and a gibibyte once it is read.
+	{ echo '[{}'; yes ',{}' | head -n 4000000 | tr -d '\n'; echo ']'; } >many.json
+	(
+		ulimit -v 500000
+		run --separate-stderr incise bench compare good.json many.json
+		failed_with "many.json: no memory"
+	)
 	echo "{\"quick\": true, \"figures\": [{$good}]}" >quick.json
 	echo "{\"quick\": false, \"figures\": [{$good}]}" >full.json
 	run --separate-stderr incise bench compare quick.json full.json
@@ -256,7 +265,7 @@ row() {
 	bad_usage "'nothing' is nothing that can be measured"
 	run --separate-stderr incise bench precision a b
 	bad_usage "'precision' takes at most 1 operand, got 2"
-	for name in "" a/ a/.png "a'b" 'a;b' '$(id)' 'a b'; do
+	for name in "" -a - a/ a/.png "a'b" 'a;b' '$(id)' 'a b'; do
 		run --separate-stderr incise bench precision --quick --plot "$name"
 		bad_usage "--plot"
 	done

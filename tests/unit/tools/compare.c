@@ -231,6 +231,29 @@ static void test_another_unit_is_another_figure(void **state)
 	json_decref(c);
 }
 
+/* A word that is not there is one line; of many that takes no more than one look each. */
+static void test_many_words(void **state)
+{
+	enum { WORDS = 20000 };
+	json_t *was = json_object(), *is = json_object(), *c;
+	char word[20];
+
+	for (int i = 0; i < WORDS; i++) {
+		snprintf(word, sizeof(word), "old%d", i);
+		json_object_set_new(was, word, exact(1, 2, false));
+		snprintf(word, sizeof(word), "new%d", i);
+		json_object_set_new(is, word, exact(1, 2, false));
+	}
+	json_object_set_new(was, "both", exact(1, 2, false));
+	json_object_set_new(is, "both", exact(1, 2, false));
+	json_object_set_new(is, "empty", report_of(figures_new()));
+	c = compared(was, is);
+	assert_int_equal(count(c, "same"), 2);
+	assert_int_equal(count(c, "gone"), WORDS);
+	assert_int_equal(count(c, "new"), WORDS);
+	json_decref(c);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -239,6 +262,7 @@ int main(void)
 		cmocka_unit_test(test_sharp_times),
 		cmocka_unit_test(test_exact_ones),
 		cmocka_unit_test(test_another_unit_is_another_figure),
+		cmocka_unit_test(test_many_words),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
