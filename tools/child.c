@@ -5,10 +5,10 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include "child.h"
@@ -26,12 +26,11 @@ bool child_possible(const char *program)
 }
 
 /* Let a descriptor of the child be one of ours, or lead nowhere. */
-static void lead(posix_spawn_file_actions_t *files, int from, int to)
+static bool lead(int from, int to)
 {
 	if (to < 0)
-		posix_spawn_file_actions_addopen(files, from, "/dev/null", O_WRONLY, 0);
-	else
-		posix_spawn_file_actions_adddup2(files, to, from);
+		to = open("/dev/null", from ? O_WRONLY : O_RDONLY);
+	return to >= 0 && dup2(to, from) == from;
 }
 
 pid_t child_begin(char *const argv[], int out)
@@ -39,25 +38,36 @@ pid_t child_begin(char *const argv[], int out)
 	return child_begin_heard(argv, out, -1);
 }
 
+struct start {
+	char *const *argv;
+	int out, err;
+	pid_t parent;
+	volatile int why; /* it could not be; 0: it is */
+};
+
+static _Noreturn void become(struct start *start)
+{
+	if (!prctl(PR_SET_PDEATHSIG, SIGTERM) && getppid() == start->parent &&
+	    !setpgid(0, 0) && lead(0, -1) && lead(1, start->out) && lead(2, start->err))
+		execvp(start->argv[0], start->argv);
+	start->why = errno;
+	_exit(127);
+}
+
 pid_t child_begin_heard(char *const argv[], int out, int err)
 {
-	posix_spawn_file_actions_t files;
-	posix_spawnattr_t attributes;
-	pid_t pid;
-	int rc;
+	struct start start = {argv, out, err, getpid(), 0};
+	/* posix_spawn(3) cannot make it end with us. */
+	pid_t pid = vfork();
 
-	if (posix_spawn_file_actions_init(&files) || posix_spawnattr_init(&attributes))
-		cli_fail("no memory");
-	posix_spawn_file_actions_addopen(&files, 0, "/dev/null", O_RDONLY, 0);
-	lead(&files, 1, out);
-	lead(&files, 2, err);
-	posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-	posix_spawnattr_setpgroup(&attributes, 0);
-	rc = posix_spawnp(&pid, argv[0], &files, &attributes, argv, environ);
-	posix_spawn_file_actions_destroy(&files);
-	posix_spawnattr_destroy(&attributes);
-	if (rc)
-		cli_fail("%s: cannot be started: %s", argv[0], strerror(rc));
+	if (!pid)
+		become(&start);
+	if (pid < 0)
+		start.why = errno;
+	else if (start.why)
+		waitpid(pid, NULL, 0);
+	if (start.why)
+		cli_fail("%s: cannot be started: %s", start.argv[0], strerror(start.why));
 	return pid;
 }
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * Another program beside a measurement. Started without fork(2), after which this process
- * would copy each page that it writes to.
+ * would copy each page that it writes to. It is asked to end when the thread that started it
+ * does, even by SIGKILL.
  */
 #ifndef INCISE_CHILD_H
 #define INCISE_CHILD_H

@@ -76,9 +76,10 @@ void callgrind_begin(struct callgrind *callgrind, const char *function,
 		     char *const argv[])
 {
 	char toggle[100], out[100];
-	char *all[ARGUMENTS_MOST] = {"valgrind", "-q",	 "--tool=callgrind",
-				     FROM,	 toggle, out};
-	int n = 6;
+	/* Without vgdb there are no files of it in TMPDIR, which stay where it is killed. */
+	char *all[ARGUMENTS_MOST] = {
+		"valgrind", "-q", "--tool=callgrind", "--vgdb=no", FROM, toggle, out};
+	int n = 7;
 
 	callgrind->report = memory_file_begin("callgrind");
 	snprintf(toggle, sizeof(toggle), "--toggle-collect=%s", function);

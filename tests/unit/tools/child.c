@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * tools/child.c: what is started ends with who started it.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include "../../../tools/child.h"
+
+static char *const sleeps[] = {"sleep", "1000", NULL};
+
+static void test_ends_when_asked(void **state)
+{
+	pid_t pid = child_begin(sleeps, -1);
+	int status;
+
+	assert_int_equal(getpgid(pid), pid);
+	assert_false(child_ended(pid, &status));
+	status = child_end(pid, 0);
+	assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM);
+}
+
+static void test_ends_with_who_is_killed(void **state)
+{
+	int to[2], status;
+	pid_t parent, pid;
+
+	/* What the killed one leaves is ours. */
+	assert_int_equal(prctl(PR_SET_CHILD_SUBREAPER, 1), 0);
+	assert_int_equal(pipe(to), 0);
+	parent = fork();
+	if (!parent) {
+		pid = child_begin(sleeps, -1);
+		if (write(to[1], &pid, sizeof(pid)) != sizeof(pid))
+			_exit(1);
+		pause();
+		_exit(1);
+	}
+	assert_int_equal(read(to[0], &pid, sizeof(pid)), sizeof(pid));
+	kill(parent, SIGKILL);
+	assert_int_equal(waitpid(parent, &status, 0), parent);
+	assert_int_equal(waitpid(pid, &status, 0), pid);
+	assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM);
+	close(to[0]);
+	close(to[1]);
+}
+
+static void test_writes_where_it_is_told(void **state)
+{
+	char *const says[] = {"sh", "-c", "cat; echo out; echo err >&2", NULL};
+	char text[20] = "";
+	int to[2], status = 0;
+	pid_t pid;
+
+	assert_int_equal(pipe(to), 0);
+	pid = child_begin_heard(says, to[1], -1);
+	status = child_end(pid, 10);
+	close(to[1]);
+	assert_int_equal(status, 0);
+	assert_int_equal(read(to[0], text, sizeof(text) - 1), 4);
+	assert_string_equal(text, "out\n");
+	close(to[0]);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_ends_when_asked),
+		cmocka_unit_test(test_ends_with_who_is_killed),
+		cmocka_unit_test(test_writes_where_it_is_told),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
