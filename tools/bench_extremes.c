@@ -98,6 +98,8 @@ void bench_extremes(uint64_t seed, bool json, bool quick, const char *plot)
 	extremes_files(all);
 	stiff_sweep(stiff, quick);
 	cli_progress_end();
+	if (cli_stop)
+		cli_fail("interrupted");
 	if (json)
 		print_json(all, stiff);
 	else

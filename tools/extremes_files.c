@@ -288,32 +288,56 @@ static void try_file(struct extremes *all, const char *name, const char *what,
 
 /* ---- recordings ---- */
 
-static void record(const char *path)
+static int record(const char *path, struct incise_error *err)
 {
 	struct incise_recorder_setup setup = {.planned_s = 1};
 	struct incise_calibration calibration;
-	struct incise_error err = {0};
 	struct incise_rig *rig =
 		incise_rig_open("sim:clock=simulated,times=1,cut_s=0.5,pause_s=0.6,"
 				"force_hz=1000",
-				INCISE_RIG_TRACKER | INCISE_RIG_FORCE, &err);
+				INCISE_RIG_TRACKER | INCISE_RIG_FORCE, err);
 	struct incise_recorder *recorder;
 	struct incise_clock *clock;
+	int rc = 0;
 
 	if (!rig)
-		cli_fail_with(&err);
+		return -1;
 	incise_calibration_nominal(&calibration);
 	setup.calibration = &calibration;
-	recorder = incise_recorder_new(path, rig, &setup, &err);
+	recorder = incise_recorder_new(path, rig, &setup, err);
 	clock = incise_rig_clock(rig);
-	for (int i = 0; recorder && i < 20; i++) {
+	for (int i = 0; recorder && rc >= 0 && i < 20; i++) {
 		incise_clock_wait_until(clock, incise_clock_now(clock) + 50000000);
-		if (incise_recorder_poll(recorder, &err) < 0)
-			cli_fail_with(&err);
+		rc = incise_recorder_poll(recorder, err);
 	}
-	if (!recorder || incise_recorder_close(recorder, &err))
-		cli_fail_with(&err);
+	if (!recorder || rc < 0 || incise_recorder_close(recorder, err))
+		rc = -1;
 	incise_rig_close(rig);
+	return rc < 0 ? -1 : 0;
+}
+
+static int read_whole(struct bytes *bytes, const char *path, struct incise_error *err)
+{
+	FILE *file = fopen(path, "r");
+
+	if (!file)
+		return incise_error_set(err, errno, "%s: %s", path, strerror(errno));
+	bytes->n = fread(bytes->whole, 1, SIZE_MAX_BYTES, file);
+	fclose(file);
+	return 0;
+}
+
+static int write_broken(const struct bytes *bytes, const char *path,
+			struct incise_error *err)
+{
+	FILE *file = fopen(path, "w");
+	bool written = file &&
+		       fwrite(bytes->broken, 1, bytes->n_broken, file) == bytes->n_broken;
+
+	if (file && fclose(file))
+		written = false;
+	return written ? 0
+		       : incise_error_set(err, errno, "%s: %s", path, strerror(errno));
 }
 
 static int open_recording(const char *path, struct incise_error *err)
@@ -340,33 +364,34 @@ static void try_recording(struct extremes *all)
 		all, "recording_bytes",
 		"a recording whose database has broken bytes: refused with one line, or read");
 	char folder[PATH_MAX - 80], path[PATH_MAX - 60], database[PATH_MAX];
+	struct incise_error failed = {0};
 	struct bytes bytes = {0};
-	FILE *file;
+	int rc;
 
+	bytes.whole = malloc(SIZE_MAX_BYTES);
+	bytes.broken = malloc(2 * SIZE_MAX_BYTES + 64);
+	if (!bytes.whole || !bytes.broken)
+		cli_fail("no memory");
+	/* The folder is gone afterwards, come what may. */
+	cli_catch_signals();
 	folder_make(folder, sizeof(folder), "for a recording");
 	snprintf(path, sizeof(path), "%s/a.rec", folder);
 	snprintf(database, sizeof(database), "%s/recording.db", path);
-	record(path);
-	file = fopen(database, "r");
-	bytes.whole = malloc(SIZE_MAX_BYTES);
-	bytes.broken = malloc(2 * SIZE_MAX_BYTES + 64);
-	if (!file || !bytes.whole || !bytes.broken)
-		cli_fail("%s: cannot be read", database);
-	bytes.n = fread(bytes.whole, 1, SIZE_MAX_BYTES, file);
-	fclose(file);
+	rc = record(path, &failed);
+	if (!rc)
+		rc = read_whole(&bytes, database, &failed);
 	rng = extremes_seed(all, row);
-	for (long k = extremes_cases(all, 2000); k; k--) {
+	for (long k = extremes_cases(all, 2000); k && !rc && !cli_stop; k--) {
 		struct incise_error err = {0};
 
 		break_bytes(&bytes);
-		file = fopen(database, "w");
-		if (!file ||
-		    fwrite(bytes.broken, 1, bytes.n_broken, file) != bytes.n_broken ||
-		    fclose(file))
-			cli_fail("%s: no room", database);
-		judge(row, open_recording(path, &err), &err);
+		rc = write_broken(&bytes, database, &failed);
+		if (!rc)
+			judge(row, open_recording(path, &err), &err);
 	}
 	folder_remove(folder);
+	if (rc)
+		cli_fail_with(&failed);
 	free(bytes.whole);
 	free(bytes.broken);
 }

@@ -231,7 +231,7 @@ void stiff_sweep(struct stiff_sweep *sweep, bool quick)
 	for (int path = 0; path < STIFF_PATHS; path++)
 		for (int guard = 0; guard < 2; guard++)
 			/* 10 N/m to 1e9, and so in N/mm. */
-			for (int k = 0; k <= 24; k += quick ? 6 : 1) {
+			for (int k = 0; k <= 24 && !cli_stop; k += quick ? 6 : 1) {
 				struct stiff_row *row = &sweep->row[sweep->n++];
 
 				*row = (struct stiff_row){.path = path,
