@@ -13,6 +13,8 @@
 #include "conf.h"
 #include "vector.h"
 
+#define FILE_MAX (4 << 20)
+
 /* "sim.seed": the setting's name with those of the groups around it. */
 static void setting_name(const config_setting_t *setting, const char *key, char *name,
 			 size_t size)
@@ -120,37 +122,11 @@ static int include_line(FILE *stream)
 	return found;
 }
 
-int incise_conf_read(config_t *config, const char *path, struct incise_error *err)
+static int parse(config_t *config, const char *path, FILE *stream,
+		 struct incise_error *err)
 {
-	struct stat st;
-	FILE *stream;
-	int rc = 0, line;
+	int rc = 0;
 
-	/* On a folder the parser would end the process, on a pipe it would wait. */
-	if (!stat(path, &st) && !S_ISREG(st.st_mode))
-		return incise_error_set(err, S_ISDIR(st.st_mode) ? EISDIR : EINVAL,
-					"%.200s: cannot be read: %s; give the path of a "
-					"configuration file",
-					path,
-					S_ISDIR(st.st_mode) ? strerror(EISDIR)
-							    : "not a regular file");
-	stream = fopen(path, "re");
-	if (!stream)
-		return incise_error_set(err, errno,
-					"%.200s: cannot be read: %s; give the path of a "
-					"configuration file",
-					path, strerror(errno));
-	line = include_line(stream);
-	if (line || fseek(stream, 0, SEEK_SET)) {
-		fclose(stream);
-		return incise_error_set(
-			err, EINVAL,
-			line ? "%.200s:%d: @include is not supported: write it "
-			       "all in one file"
-			     : "%.200s:%d: cannot be read twice: give a regular "
-			       "file",
-			path, line);
-	}
 	config_init(config);
 	if (!config_read(config, stream)) {
 		const char *file = config_error_file(config);
@@ -162,7 +138,71 @@ int incise_conf_read(config_t *config, const char *path, struct incise_error *er
 				      syntax ? ": expected `key = value;`" : "");
 		config_destroy(config);
 	}
-	fclose(stream);
+	return rc;
+}
+
+static int unreadable(const char *path, int code, const char *why,
+		      struct incise_error *err)
+{
+	return incise_error_set(err, code,
+				"%.200s: cannot be read: %s; give the path of a "
+				"configuration file",
+				path, why);
+}
+
+/* What is in the file, to be freed. */
+static int read_all(const char *path, char **text, size_t *size, struct incise_error *err)
+{
+	FILE *file = fopen(path, "re");
+	int code = 0;
+
+	if (!file)
+		return unreadable(path, errno, strerror(errno), err);
+	*text = malloc(FILE_MAX + 1);
+	*size = *text ? fread(*text, 1, FILE_MAX + 1, file) : 0;
+	if (!*text || ferror(file))
+		code = errno;
+	else if (*size > FILE_MAX)
+		code = EFBIG;
+	fclose(file);
+	if (!code)
+		return 0;
+	free(*text);
+	return unreadable(path, code, strerror(code), err);
+}
+
+int incise_conf_read(config_t *config, const char *path, struct incise_error *err)
+{
+	struct stat st;
+	FILE *stream;
+	char *text = NULL;
+	size_t size = 0;
+	int rc, line;
+
+	/* On a pipe reading would wait. */
+	if (!stat(path, &st) && !S_ISREG(st.st_mode))
+		return unreadable(path, S_ISDIR(st.st_mode) ? EISDIR : EINVAL,
+				  S_ISDIR(st.st_mode) ? strerror(EISDIR)
+						      : "not a regular file",
+				  err);
+	rc = read_all(path, &text, &size, err);
+	if (rc)
+		return rc;
+	/* Where a disk fails to read the parser would end the process; memory does not. */
+	stream = fmemopen(text, size, "r");
+	line = stream ? include_line(stream) : 0;
+	if (line)
+		rc = incise_error_set(err, EINVAL,
+				      "%.200s:%d: @include is not supported: write it "
+				      "all in one file",
+				      path, line);
+	else if (!stream || fseek(stream, 0, SEEK_SET))
+		rc = unreadable(path, ENOMEM, strerror(ENOMEM), err);
+	else
+		rc = parse(config, path, stream, err);
+	if (stream)
+		fclose(stream);
+	free(text);
 	return rc;
 }
 

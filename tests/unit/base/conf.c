@@ -9,6 +9,7 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
+#include <string.h>
 #include "../../../lib/base/conf.h"
 #include "temp_file.h"
 
@@ -205,6 +206,9 @@ static void unreadable_files_are_named(void **state)
 	assert_string_equal(err.text,
 			    "/: cannot be read: Is a directory; give the path of a "
 			    "configuration file");
+	/* As a disk that fails: nothing is at address 0. */
+	assert_int_equal(incise_conf_read(&config, "/proc/self/mem", &err), -EIO);
+	assert_non_null(strstr(err.text, "/proc/self/mem: cannot be read: "));
 }
 
 int main(void)
