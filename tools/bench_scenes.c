@@ -42,6 +42,10 @@ static void add_given(struct bench *b, const char *operand)
 	struct scene_argument argument = {0};
 
 	row->name = copy(operand, strlen(operand));
+	/* It may be the name of a file, that another gave: no line is broken by it. */
+	for (char *c = row->name; *c; c++)
+		if ((unsigned char)*c < ' ' || *c == 0x7f)
+			*c = '?';
 	if (scene_argument_find(&argument, operand))
 		row->path = argument.path;
 }

@@ -106,6 +106,8 @@ in_plan() {
 	[ -z "$(of stiff.scene stages)" ]
 	[ -z "$(of stiff.scene identical)" ]
 	[[ "$(of none failed)" == *"no scene of that name"* ]]
+	run -1 --separate-stderr incise bench scenes --quick $'no\e[2J'
+	[[ "$output" == *"no?[2J"* && "$output" != *$'\e'* ]]
 	holds "$(of wall tick_ns) > 0"
 	[ "$(of wall identical)" = 1 ]
 }
