@@ -3,6 +3,7 @@
  * Files from outside with broken bytes: each is refused with one line, or works.
  */
 #include <limits.h>
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
