@@ -43,7 +43,8 @@ extra_calibrate-depth := $(calibrate_all) $(addprefix $(O)/obj/tools/,depth_wish
 	depth_picture.o depth_frames.o depth_lengths.o depth_corners.o depth_report.o)
 
 # What all benches share, a line per word, and what of these bench view uses too.
-bench_all := picture machine stopwatch harness yardstick figures compare memory_file folder
+bench_all := picture machine stopwatch harness yardstick figures reported_figures compare \
+	compare_against memory_file folder
 bench_wakeups := bench_wakeup wakeup_run bench_load cyclictest child bench_tick tick_cost stroke
 extra_bench := $(patsubst %,$(O)/obj/tools/%.o,$(bench_all) $(bench_wakeups) \
 	bench_precision arithmetics \

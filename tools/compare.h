@@ -23,9 +23,6 @@
 /* A report's numbers have 12 digits. */
 #define COMPARE_EXACT 1e-9
 
-/* A report of a file, which may hold anything; NULL and the reason. */
-json_t *compare_load(const char *path, struct incise_error *err);
-
 /*
  * Compare; messages call the reports by these names. Returns an object as in incise-bench(1),
  * which the caller releases; NULL and the reason where a report is none, where they have no

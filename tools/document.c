@@ -184,6 +184,15 @@ void document_cell_to(struct document *d, const char *section, const char *text)
 	append_cell(d, copy(text), copy(section));
 }
 
+int document_control(const char *text)
+{
+	const unsigned char *c = (const unsigned char *)text;
+
+	if (*c == 0xc2 && c[1] >= 0x80 && c[1] < 0xa0)
+		return 2;
+	return (*c && *c < ' ') || *c == 0x7f;
+}
+
 void document_anchor(const char *title, char *anchor, size_t size)
 {
 	size_t n = 0;

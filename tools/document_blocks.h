@@ -46,4 +46,7 @@ struct document {
  */
 void document_anchor(const char *title, char *anchor, size_t size);
 
+/* How many bytes of UTF-8 a control character here has, of ASCII or of Latin-1; 0: none is. */
+int document_control(const char *text);
+
 #endif

@@ -6,6 +6,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include "document_blocks.h"
 
 /* Text of so many bytes takes several lines of its column. */
@@ -73,7 +74,14 @@ static const char style[] =
 
 static void put(FILE *out, const char *text)
 {
-	for (; *text; text++)
+	for (; *text; text++) {
+		int control = *text == '\n' ? 0 : document_control(text);
+
+		if (control) {
+			fputc(' ', out);
+			text += control - 1;
+			continue;
+		}
 		switch (*text) {
 		case '&':
 			fputs("&amp;", out);
@@ -88,12 +96,9 @@ static void put(FILE *out, const char *text)
 			fputs("&quot;", out);
 			break;
 		default:
-			fputc(((unsigned char)*text < ' ' && *text != '\n') ||
-					      *text == 0x7f
-				      ? ' '
-				      : *text,
-			      out);
+			fputc(*text, out);
 		}
+	}
 }
 
 static void put_in(FILE *out, const char *element, const char *text)
@@ -177,6 +182,20 @@ static void put_base64(FILE *out, const unsigned char *bytes, size_t n)
 	}
 }
 
+/* No folder, and nothing that never ends. */
+static FILE *fopen_regular(const char *path)
+{
+	struct stat status;
+
+	if (stat(path, &status))
+		return NULL;
+	if (!S_ISREG(status.st_mode)) {
+		errno = EINVAL;
+		return NULL;
+	}
+	return fopen(path, "re");
+}
+
 /* As data of an <img>: in the page itself the names within one would meet those of others. */
 static int put_picture(FILE *out, const struct block *b, const char *folder,
 		       struct incise_error *err)
@@ -185,13 +204,13 @@ static int put_picture(FILE *out, const struct block *b, const char *folder,
 	char *path;
 	FILE *file;
 	size_t n;
+	int rc = 0;
 
 	if (asprintf(&path, "%s/%s", folder, b->file) < 0)
 		return -ENOMEM;
-	file = fopen(path, "re");
+	file = fopen_regular(path);
 	if (!file) {
-		int rc = incise_error_set(err, -errno, "%s: %s", path, strerror(errno));
-
+		rc = incise_error_set(err, errno, "%s: %s", path, strerror(errno));
 		free(path);
 		return rc;
 	}
@@ -205,9 +224,11 @@ static int put_picture(FILE *out, const struct block *b, const char *folder,
 	fputs("\"></div>\n", out);
 	put_in(out, "figcaption", b->text);
 	fputs("</figure>\n", out);
+	if (ferror(file))
+		rc = incise_error_set(err, EIO, "%s: cannot be read", path);
 	fclose(file);
 	free(path);
-	return 0;
+	return rc;
 }
 
 static int put_block(FILE *out, const struct block *b, const char *folder,

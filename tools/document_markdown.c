@@ -21,12 +21,26 @@ static void put(FILE *out, const char *text)
 	if (strchr("#+-=~", *text) && *text)
 		fputc('\\', out);
 	for (const char *c = text; *c; c++) {
+		if (document_control(c)) {
+			fputc(' ', out);
+			c += document_control(c) - 1;
+			continue;
+		}
 		if ((*c == '_' && !in_word(text, c)) || strchr("\\`*[]<>|&", *c) ||
 		    (digits && c == text + digits && strchr(".)", *c) &&
 		     strchr(" ", c[1])))
 			fputc('\\', out);
-		fputc((unsigned char)*c < ' ' || *c == 0x7f ? ' ' : *c, out);
+		fputc(*c, out);
 	}
+}
+
+/* Between fences nothing is escaped: what would end them is none of a command's. */
+static void put_command(FILE *out, const char *text)
+{
+	fputs("```sh\n", out);
+	for (const char *c = text; *c; c += document_control(c) ? document_control(c) : 1)
+		fputc(document_control(c) ? ' ' : *c == '`' ? '\'' : *c, out);
+	fputs("\n```", out);
 }
 
 static void put_link(FILE *out, const char *section, const char *text)
@@ -93,7 +107,7 @@ static void put_block(FILE *out, const struct block *b)
 		put(out, b->text);
 		break;
 	case BLOCK_COMMAND:
-		fprintf(out, "```sh\n%s\n```", b->text);
+		put_command(out, b->text);
 		break;
 	case BLOCK_FILE:
 		put(out, b->text);

@@ -121,7 +121,7 @@ static const json_t *words_of(const json_t *report)
 static json_t *load_old(const char *path)
 {
 	struct incise_error err = {0};
-	json_t *old = compare_load(path, &err), *itself;
+	json_t *old = json_read(path, &err), *itself;
 
 	itself = old ? compare_reports(words_of(old), path, words_of(old), path, &err)
 		     : NULL;
@@ -148,6 +148,7 @@ static json_t *measure(const struct job *job)
 {
 	struct report_folder folder;
 	struct report_measure m = {.quick = job->quick};
+	struct incise_error err = {0};
 	json_t *old = job->against ? load_old(job->against) : NULL;
 	int n = 0, of = 0;
 
@@ -166,7 +167,10 @@ static json_t *measure(const struct job *job)
 	if (old)
 		compare(job->against, old, m.report);
 	json_decref(old);
-	report_folder_write(folder.unfinished, m.report);
+	if (report_folder_write(folder.unfinished, m.report, &err)) {
+		report_folder_abandon(&folder);
+		cli_fail_with(&err);
+	}
 	report_folder_finish(&folder);
 	return m.report;
 }
@@ -218,6 +222,8 @@ static void judge(const struct job *job, const json_t *report)
 	const char *why = json_string_value(json_object_get(against, "failed"));
 	int worse = compare_worse(against);
 
+	if (!json_object_size(json_object_get(report, "words")) && !failed)
+		cli_fail("nothing was measured; %s/report.md says why", job->folder);
 	if (failed)
 		cli_fail("%zu of %zu words failed; %s/report.md says why", failed,
 			 json_object_size(json_object_get(report, "runs")), job->folder);
@@ -230,6 +236,7 @@ static void judge(const struct job *job, const json_t *report)
 
 int main(int argc, char **argv)
 {
+	struct incise_error err = {0};
 	struct job job;
 	json_t *report;
 
@@ -237,7 +244,8 @@ int main(int argc, char **argv)
 	cli_catch_signals();
 	if (job.from) {
 		report = report_folder_load(job.from);
-		report_folder_write(job.from, report);
+		if (report_folder_write(job.from, report, &err))
+			cli_fail_with(&err);
 	} else {
 		report = measure(&job);
 	}

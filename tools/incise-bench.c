@@ -17,6 +17,7 @@
 #include "bench_vision.h"
 #include "cli.h"
 #include "compare.h"
+#include "json.h"
 
 enum {
 	OPT_JSON = CLI_LONG,
@@ -189,7 +190,7 @@ static int compare(const struct job *job, int argc, char **argv)
 	    job->seed || job->seconds > 0)
 		cli_usage("'compare' takes no option but --json");
 	for (int i = 0; i < 2; i++) {
-		reports[i] = compare_load(argv[1 + i], &err);
+		reports[i] = json_read(argv[1 + i], &err);
 		if (!reports[i])
 			cli_fail_with(&err);
 	}

@@ -2,12 +2,15 @@
 /*
  * Reports as JSON; see json.h.
  */
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
 #include "json.h"
+
+#define READ_MOST (16 << 20) /* a report of all benches has less than 1 */
 
 json_t *json_number(double value)
 {
@@ -41,4 +44,53 @@ void json_print(json_t *object)
 	putchar('\n');
 	json_decref(object);
 	cli_finish();
+}
+
+json_t *json_read_from(FILE *file, const char *path, struct incise_error *err)
+{
+	char *text = malloc(READ_MOST + 1);
+	json_error_t wrong;
+	json_t *report = NULL;
+	size_t n;
+
+	if (!text) {
+		incise_error_set(err, ENOMEM, "%s: no memory", path);
+		return NULL;
+	}
+	n = fread(text, 1, READ_MOST + 1, file);
+	if (ferror(file)) {
+		incise_error_set(err, errno, "%s: %s", path, strerror(errno));
+	} else if (n > READ_MOST) {
+		incise_error_set(
+			err, EFBIG,
+			"%s: more than %d MiB; no report of incise bench is so large",
+			path, READ_MOST >> 20);
+	} else {
+		report = json_loadb(text, n, JSON_REJECT_DUPLICATES, &wrong);
+		if (!report && !*wrong.text) {
+			incise_error_set(err, ENOMEM, "%s: no memory", path);
+		} else if (!report) {
+			for (char *c = wrong.text; *c; c++)
+				if ((unsigned char)*c < ' ' || (unsigned char)*c >= 0x7f)
+					*c = '?';
+			incise_error_set(err, EINVAL, "%s:%d: no JSON: %s", path,
+					 wrong.line, wrong.text);
+		}
+	}
+	free(text);
+	return report;
+}
+
+json_t *json_read(const char *path, struct incise_error *err)
+{
+	FILE *file = fopen(path, "re");
+	json_t *report;
+
+	if (!file) {
+		incise_error_set(err, errno, "%s: %s", path, strerror(errno));
+		return NULL;
+	}
+	report = json_read_from(file, path, err);
+	fclose(file);
+	return report;
 }

@@ -13,6 +13,7 @@
 #include "cli.h"
 #include "document.h"
 #include "folder.h"
+#include "json.h"
 #include "report_document.h"
 #include "report_folder.h"
 
@@ -57,7 +58,7 @@ static bool may_be_replaced(const char *path)
 		json_t *json;
 
 		if (!strcmp(entry->d_name, "report.json")) {
-			json = json_load_file(file, 0, NULL);
+			json = json_read(file, NULL);
 			report = json_is_object(json_object_get(json, "words"));
 			json_decref(json);
 		}
@@ -136,58 +137,81 @@ void report_folder_abandon(struct report_folder *folder)
 json_t *report_folder_load(const char *path)
 {
 	char *file = in(path, "report.json");
-	json_error_t why;
-	json_t *report = json_load_file(file, 0, &why);
+	struct incise_error err = {0};
+	json_t *report = json_read(file, &err);
 
 	if (!report)
-		cli_fail("%s: %s", file, why.text);
+		cli_fail_with(&err);
 	if (!json_is_object(json_object_get(report, "words")))
 		cli_fail("%s: is no report of 'incise bench all'", file);
 	free(file);
 	return report;
 }
 
-static struct incise_outfile *open_part(const char *folder, const char *name)
+/* Begin a part under another name; NULL and the reason. */
+static struct incise_outfile *open_part(const char *folder, const char *name,
+					struct incise_error *err)
 {
-	struct incise_error err = {0};
 	char *path = in(folder, name);
-	struct incise_outfile *file = incise_outfile_open(path, &err);
+	struct incise_outfile *file = incise_outfile_open(path, err);
 
-	if (!file)
-		cli_fail_with(&err);
 	free(path);
 	return file;
 }
 
-static void close_part(struct incise_outfile *file)
+static int write_json(const char *path, const json_t *report, struct incise_error *err)
 {
-	struct incise_error err = {0};
+	struct incise_outfile *file = open_part(path, "report.json", err);
 
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
-}
-
-/* Documents are of what a reader of report.json gets, rounded as it is. */
-void report_folder_write(const char *path, const json_t *report)
-{
-	struct incise_outfile *file = open_part(path, "report.json");
-	struct incise_error err = {0};
-	struct document *document;
-	json_t *read;
-
+	if (!file)
+		return -errno;
 	json_dumpf(report, incise_outfile_stream(file),
 		   JSON_INDENT(1) | JSON_REAL_PRECISION(12));
 	fputc('\n', incise_outfile_stream(file));
-	close_part(file);
+	return incise_outfile_commit(file, err);
+}
+
+static int write_html(const char *path, const struct document *document,
+		      struct incise_error *err)
+{
+	struct incise_outfile *file = open_part(path, "report.html", err);
+	int rc;
+
+	if (!file)
+		return -errno;
+	rc = document_html(document, path, incise_outfile_stream(file), err);
+	if (!rc)
+		return incise_outfile_commit(file, err);
+	incise_outfile_abort(file);
+	return rc;
+}
+
+static int write_markdown(const char *path, const struct document *document,
+			  struct incise_error *err)
+{
+	struct incise_outfile *file = open_part(path, "report.md", err);
+
+	if (!file)
+		return -errno;
+	document_markdown(document, incise_outfile_stream(file));
+	return incise_outfile_commit(file, err);
+}
+
+/* Documents are of what a reader of report.json gets, rounded as it is. */
+int report_folder_write(const char *path, const json_t *report, struct incise_error *err)
+{
+	struct document *document;
+	json_t *read;
+	int rc = write_json(path, report, err);
+
+	if (rc)
+		return rc;
 	read = report_folder_load(path);
 	document = report_document(read, path);
-	file = open_part(path, "report.html");
-	if (document_html(document, path, incise_outfile_stream(file), &err))
-		cli_fail_with(&err);
-	close_part(file);
-	file = open_part(path, "report.md");
-	document_markdown(document, incise_outfile_stream(file));
-	close_part(file);
+	rc = write_html(path, document, err);
+	if (!rc)
+		rc = write_markdown(path, document, err);
 	document_free(document);
 	json_decref(read);
+	return rc;
 }

@@ -10,6 +10,7 @@
 
 #include <jansson.h>
 #include <stdbool.h>
+#include <incise/error.h>
 
 struct report_folder {
 	const char *path;
@@ -27,7 +28,8 @@ void report_folder_abandon(struct report_folder *folder);
 /* Its report.json; fails the program where there is none. */
 json_t *report_folder_load(const char *path);
 
-/* report.json as given, report.html and report.md of it, each of them whole or not at all. */
-void report_folder_write(const char *path, const json_t *report);
+/* report.json as given, report.html and report.md of it, each of them whole or not at all.
+ * 0 or a negative errno, and the reason. */
+int report_folder_write(const char *path, const json_t *report, struct incise_error *err);
 
 #endif

@@ -114,8 +114,11 @@ static void add_figures(json_t *report, const char *word, const json_t *json)
 	json_array_foreach(json_object_get(json, "figures"), i, figure)
 	{
 		const char *name = json_string_value(json_object_get(figure, "name"));
-		json_t *copy = json_copy((json_t *)figure);
+		json_t *copy;
 
+		if (!json_is_object(figure))
+			continue;
+		copy = json_copy((json_t *)figure);
 		json_object_set_new(copy, "name",
 				    json_sprintf("%s: %s", word, name ? name : ""));
 		json_array_append_new(json_object_get(report, "figures"), copy);
@@ -160,7 +163,7 @@ void report_measure(const struct report_measure *m, const struct report_section 
 	char why[600] = "";
 	double begin = now_s();
 	json_t *json, *warnings;
-	json_error_t wrong;
+	struct incise_error err = {0};
 	int status;
 
 	if (access(program, X_OK)) {
@@ -170,14 +173,14 @@ void report_measure(const struct report_measure *m, const struct report_section 
 		note(m, s->word, "left out", 0, why, json_array());
 	} else {
 		status = run(m, s, program, data, said.file, number, of);
-		json = json_load_file(data, 0, &wrong);
+		json = json_read(data, &err);
 		warnings = read_warnings(said.file, status != 0, why, sizeof(why));
 		if (WIFSIGNALED(status))
 			snprintf(why, sizeof(why), "ended by a signal: %s",
 				 strsignal(WTERMSIG(status)));
 		else if (!json_is_object(json) && !status)
 			snprintf(why, sizeof(why), "what it reported is no JSON: %s",
-				 wrong.text);
+				 *err.text ? err.text : "no object");
 		else if (!status)
 			*why = 0;
 		note(m, s->word, *why ? "failed" : "measured", now_s() - begin, why,
