@@ -305,3 +305,17 @@ asked() {
 	[ "$(grep -ac '/Type */Page\b' report.pdf)" -ge "$(grep -c '^## ' "$r/report.md")" ]
 	cp report.pdf "$INCISE_BUILD/artefacts/report.pdf"
 }
+
+@test "README's figures are facts of the report, put there by mk/readme-figures" {
+	facts=$(tr -d '\n\t"' <"$root/tools/report_sections.c")
+	figures=$(sed -n '/^<!-- figures: make bench/,/^<!-- end of figures/p' "$root/README.md")
+	[ "$(grep -c '^\*\*' <<<"$figures")" = 3 ]
+	n=0
+	while read -r name; do
+		[[ "$facts" == *"$name"* ]] || complain "no fact: $name"
+		n=$((n + 1))
+	done < <(sed -n 's/^| \([^|]*\) | .* |$/\1/p' <<<"$figures" | grep -v -e '^what$' -e '^---')
+	((n > 20))
+	run -1 --separate-stderr "$root/mk/readme-figures" "$PWD/none"
+	[[ "$stderr" == *"'make bench' makes one"* ]]
+}
