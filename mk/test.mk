@@ -85,7 +85,7 @@ check: ## install what is missing, build, and run all tests
 	@mk/deps rtsan || echo "going on without RealtimeSanitizer"
 	@mk/deps deb debian || echo "going on without what building packages needs"
 	+@$(MAKE) --no-print-directory all
-	+@$(MAKE) --no-print-directory check-style check-cli check-unit-once check-fuzz check-rtsan check-module check-deb check-vm
+	+@$(MAKE) --no-print-directory cli_filter="--filter-tags '!slow'" check-style check-cli check-unit-once check-fuzz check-rtsan check-module check-deb check-vm
 
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8
@@ -131,9 +131,11 @@ attack_bats = INCISE_BUILD=$(abspath $(O)) bats --print-output-on-failure tests/
 check-attack: all $(attack_programs) ## attacks on recordings with their full counts: 100 kills, thousands of faults
 	ATTACK=full $(attack_bats)
 
+# Benches measure for seconds: tests that are tagged slow are not in `check`.
 check-cli: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
 		$(O)/tests/day $(attack_programs) ## command-line tests of the real programs
-	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure tests/cli tests/attack
+	@$(if $(cli_filter),echo "left out: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests of benches; make check-cli runs them; bench_all.bats runs each word once")
+	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure $(cli_filter) tests/cli tests/attack
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
 sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all

@@ -28,8 +28,11 @@ bool child_possible(const char *program)
 /* Let a descriptor of the child be one of ours, or lead nowhere. */
 static bool lead(int from, int to)
 {
+	/* Where @from is closed the new one is it, and is to stay. */
 	if (to < 0)
-		to = open("/dev/null", from ? O_WRONLY : O_RDONLY);
+		to = open("/dev/null", (from ? O_WRONLY : O_RDONLY) | O_CLOEXEC);
+	if (to == from)
+		return !fcntl(to, F_SETFD, 0);
 	return to >= 0 && dup2(to, from) == from;
 }
 

@@ -123,10 +123,18 @@ void document_item(struct document *d, const char *fmt, ...)
 void document_command(struct document *d, const char *fmt, ...)
 {
 	va_list args;
+	char *text;
 
 	va_start(args, fmt);
-	append(d, BLOCK_COMMAND, print(fmt, args));
+	text = print(fmt, args);
 	va_end(args);
+	/* One line, which cannot end the fence that it stands in. */
+	for (char *c = text; *c; c++)
+		if (*c == '`')
+			*c = '\'';
+		else if ((unsigned char)*c < ' ')
+			*c = ' ';
+	append(d, BLOCK_COMMAND, text);
 }
 
 void document_file(struct document *d, const char *file, const char *text)

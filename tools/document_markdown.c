@@ -34,15 +34,6 @@ static void put(FILE *out, const char *text)
 	}
 }
 
-/* Between fences nothing is escaped: what would end them is none of a command's. */
-static void put_command(FILE *out, const char *text)
-{
-	fputs("```sh\n", out);
-	for (const char *c = text; *c; c += document_control(c) ? document_control(c) : 1)
-		fputc(document_control(c) ? ' ' : *c == '`' ? '\'' : *c, out);
-	fputs("\n```", out);
-}
-
 static void put_link(FILE *out, const char *section, const char *text)
 {
 	char anchor[200];
@@ -107,7 +98,7 @@ static void put_block(FILE *out, const struct block *b)
 		put(out, b->text);
 		break;
 	case BLOCK_COMMAND:
-		put_command(out, b->text);
+		fprintf(out, "```sh\n%s\n```", b->text);
 		break;
 	case BLOCK_FILE:
 		put(out, b->text);

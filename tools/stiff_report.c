@@ -147,7 +147,7 @@ void stiff_sweep_draw(const struct stiff_sweep *sweep, const char *folder,
 		"1 N, behind a limit of 4 N; 12 s at 1 kHz\"\n"
 		"set logscale xy\nset format x '%%.0e'\nset xrange [7:1.5e9]\n"
 		"set xlabel 'stiffness of the wall / (N/m)'\nset lmargin 12\nset bmargin 4\n"
-		"set key outside bottom center horizontal\ndata = '%s.dat'\n",
+		"set key inside top right\ndata = '%s.dat'\n",
 		name);
 	for (int p = 0; p < STIFF_PATHS; p++) {
 		double limit = sweep->row[p * sweep->n / 2].limit_N_mm * 1e3;
@@ -164,7 +164,7 @@ void stiff_sweep_draw(const struct stiff_sweep *sweep, const char *folder,
 			panels[k].title, panels[k].range,
 			panels[k].column == 4 ? "set format y '%.0e'\n"
 					      : "set format y '%g'\n",
-			k == 2 ? "on" : "off");
+			k == 0 ? "on" : "off");
 		for (int i = 0; i < 4; i++)
 			fprintf(script,
 				"data index %d using 1:%d with linespoints lc %d dt %d pt %d "

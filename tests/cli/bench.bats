@@ -30,7 +30,7 @@ row() {
 }
 
 @test "bench precision reports as JSON" {
-	incise bench precision --quick --json >r.json
+	quick_report precision
 	for name in $names; do
 		[ -z "$(row r.json $name failed)" ]
 		holds "$(row r.json $name ns) > 0"
@@ -66,7 +66,7 @@ row() {
 }
 
 @test "bench says what machine and build its figures are of" {
-	incise bench precision --quick --json >r.json
+	quick_report precision
 	[ "$(key r.json machine.version)" = "$(incise --version | awk '{ print $2 }')" ]
 	[ "$(key r.json machine.processors)" = "$(nproc)" ]
 	holds "$(key r.json machine.timed_on) >= 0 && $(key r.json machine.memory_MB) > 100"
@@ -79,7 +79,7 @@ row() {
 }
 
 @test "bench compare: a run is as itself, and what is made worse is found" {
-	incise bench precision --quick --json >r.json
+	quick_report precision
 	run -0 --separate-stderr incise bench compare r.json r.json
 	[ -z "$stderr" ]
 	[[ "$output" == *" same, 0 better, 0 worse, 0 gone, 0 new" ]]
@@ -177,7 +177,7 @@ row() {
 }
 
 @test "bench --against compares what was just measured" {
-	incise bench stability --quick --json >r.json
+	quick_report stability
 	# what is exact is the same in every run; of times nothing is judged here
 	run --separate-stderr incise bench stability --quick --against r.json
 	[[ "$output" == *"same, "*" 0 gone, 0 new"* ]]
@@ -194,7 +194,7 @@ row() {
 }
 
 @test "bench precision lists what fails, and why" {
-	incise bench precision --quick --json >r.json
+	quick_report precision
 	# 256 x 256 cells and more are over 256 KiB
 	[[ "$(row r.json force_table_256 failed)" == *bytes* ]]
 	[ -z "$(row r.json force_table_256 ns)" ]
@@ -204,7 +204,7 @@ row() {
 }
 
 @test "bench precision has fuzzylite as a row, or says why not" {
-	incise bench precision --quick --json >r.json
+	quick_report precision
 	if [ -e "$INCISE_BUILD/lib/incise/peer_fuzzylite.so" ]; then
 		[ "$(row r.json fuzzylite peer)" = 1 ]
 		[ -n "$(key r.json fuzzylite_version)" ]
@@ -272,7 +272,7 @@ row() {
 }
 
 @test "bench training gives error on unseen cuts over time, by method and epochs" {
-	incise bench training --quick --json >r.json
+	quick_report training
 	[ "$(key r.json rows[0].name)$(key r.json rows[1].name)" = classicdefault ]
 	for name in classic default mean linear knn classic_1 classic_40 classic_3x3 default_3x3 \
 		default_chosen; do
@@ -302,6 +302,7 @@ row() {
 	done
 }
 
+# bats test_tags=slow
 @test "bench training as a table, with a chart" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
 	run -0 --separate-stderr incise bench training --quick --plot c
@@ -334,6 +335,7 @@ in_order() {
 	holds "$last <= $(key r.json "$1.max") + 1.001 || $last == 20001"
 }
 
+# bats test_tags=slow
 @test "bench loop times ticks over a plane and meshes, and wake-ups beside cyclictest" {
 	incise bench loop --quick --load idle --json >r.json
 	for i in 0 1 2 3 4; do
@@ -372,6 +374,7 @@ in_order() {
 	fi
 }
 
+# bats test_tags=slow
 @test "bench loop without cyclictest and without loads says so" {
 	mkdir bin
 	run -0 --separate-stderr env PATH="$PWD/bin" "$INCISE_BUILD/bin/incise" bench loop --quick \
@@ -387,6 +390,7 @@ in_order() {
 	holds "$(key r.json lateness_us.ticks) > 0"
 }
 
+# bats test_tags=slow
 @test "bench loop under load leaves nothing behind" {
 	command -v stress-ng >/dev/null || skip "stress-ng is not installed, it makes the load"
 	mkdir t
@@ -420,6 +424,7 @@ rate() {
 }
 
 # In simulated time, the same on each machine.
+# bats test_tags=slow
 @test "bench loop: the error of the force falls with the rate, as theory says" {
 	incise bench loop --quick --load view --json "$root/scenes/wall.scene" >r.json
 	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '$.rates')")" = 18 ]
@@ -451,6 +456,7 @@ rate() {
 	holds "$(rate stiff exact 1000 limit_N_mm) > $(rate stiff exact 1000 stiffness_N_mm)"
 }
 
+# bats test_tags=slow
 @test "bench loop draws lateness and error" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
 	run -0 --separate-stderr incise bench loop --quick --load idle --plot "a folder/w" \
@@ -477,7 +483,7 @@ rate() {
 }
 
 @test "bench stability finds in time what theory says" {
-	incise bench stability --quick --json >r.json
+	quick_report stability
 	# the tolerances of the manual
 	for list in exact_limit:0.01 colgate:0.01 gil:0.02 amplitude:0.03 quantisation:0.01 \
 		leak:0.03 break_even:0.03; do
@@ -503,7 +509,7 @@ rate() {
 }
 
 @test "bench stability: the guard holds what is not held without it" {
-	incise bench stability --quick --json >r.json
+	quick_report stability
 	late="late = 'wall' AND clamp_N IS NULL"
 	holds "$(of guard 'count(*)' "$late AND guard = 'on' AND share = 0.5") >= 6"
 	[ "$(of guard 'min(bounded)' "late = 'wall' AND guard = 'on' AND share = 0.5")" = 1 ]
@@ -520,7 +526,7 @@ rate() {
 }
 
 @test "bench stability lists integrators that diverge, and the exact ones are exact" {
-	incise bench stability --quick --json >r.json
+	quick_report stability
 	ms="step_s = 0.001 AND K_N_m"
 	for name in explicit_euler semi_implicit_euler rk4; do
 		[ "$(of integrators failed "$ms = 1e7 AND integrator = '$name'")" = diverged ]
@@ -568,9 +574,10 @@ rate() {
 	bad_usage "--plot"
 }
 
+# bats test_tags=slow
 @test "bench vision reports error and time of each kind of picture" {
 	[ -e "$INCISE_BUILD/lib/incise/vision_opencv.so" ] || skip "OpenCV's headers were absent"
-	incise bench vision --quick --json >r.json
+	quick_report vision
 	for k in {0..17}; do
 		holds "$(key r.json "rows[$k].found") >= 7 && $(key r.json "rows[$k].pictures") == 10"
 		holds "$(key r.json "rows[$k].bias_px") < 0.1 && $(key r.json "rows[$k].bias_px") > -0.1"
@@ -595,6 +602,7 @@ needs_pictures() {
 	done
 }
 
+# bats test_tags=slow
 @test "bench capture tells what a whole capture takes, and leaves nothing behind" {
 	needs_pictures
 	mkdir t

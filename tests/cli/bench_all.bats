@@ -166,13 +166,15 @@ report_of() {
 		{"name": "\\| --- \u0007_x_ <!--", "ms": 1e300, "failed": null}, 7, null],
 		"figures": 3}, "no_such_word": {}, "loop": [], "pose": {"rows": {"a": 1}}},
 		"runs": {"training": 5, "view": {"state": "failed", "why": "</p><b>x", "warnings": ["1. x", 2]}},
-		"machine": {"cpu": "\"<i>\u00e9"}, "failed": ["view"], "command": "`$(x)`", "date": 3}'
+		"machine": {"cpu": "\"<i>\u00e9"}, "failed": ["view"], "command": "`$(x)`\n```<b>", "date": 3}'
 	incise bench all --from made
 	run ! grep -E '<(script|i|b)>|<!--' made/report.html
 	grep -qF '&lt;script&gt;alert(1)&lt;/script&gt;' made/report.html
 	grep -qF '| \<script\>alert(1)\</script\> |' made/report.md
 	grep -qF 'a\|b \*c\* \[d\](e) \`f\` \& "g"' made/report.md
 	grep -qF '1.00×10³⁰⁰' made/report.md
+	# no fence that a command would end
+	grep -qxF "'\$(x)' '''<b>" made/report.md
 	diff <(python3 "$BATS_TEST_DIRNAME/report_cells.py" made/report.html) \
 		<(python3 "$BATS_TEST_DIRNAME/report_cells.py" made/report.md)
 }

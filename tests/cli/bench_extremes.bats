@@ -36,6 +36,7 @@ of() {
 	[ "$(key r.json seed) $(key r.json quick)" = "1 1" ]
 }
 
+# bats test_tags=slow
 @test "bench extremes: the same cases by seed" {
 	incise bench extremes --quick --json >a.json
 	incise bench extremes --quick --json >b.json
@@ -47,7 +48,7 @@ of() {
 }
 
 @test "bench extremes: stiff walls are accepted up to the limit of theory, and bounded beyond" {
-	incise bench extremes --quick --json >r.json
+	quick_report extremes
 	[ "$(of stiff 'count(*)')" = 20 ]
 	[ "$(of stiff 'count(*)' 'accepted@ != (K_N_m@ <= theory_limit_N_m@)')" = 0 ]
 	[ "$(of stiff 'min(bounded@)')" = 1 ]
@@ -61,6 +62,7 @@ of() {
 	holds "($(of stiff 'min(theory_limit_N_m@)') / 400 - 1) ^ 2 < 0.01 ^ 2"
 }
 
+# bats test_tags=slow
 @test "bench extremes prints a table and draws the walls" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
 	run -0 --separate-stderr incise bench extremes --quick --plot "a folder/stiff"
@@ -82,6 +84,7 @@ of() {
 	failed_with "$PWD/none/" TMPDIR
 }
 
+# bats test_tags=slow
 @test "bench extremes that is interrupted, or has no room, leaves nothing behind" {
 	mkdir t
 	TMPDIR=$PWD/t incise bench extremes --quick >out 2>err &

@@ -20,7 +20,7 @@ of() {
 }
 
 @test "bench pose has a row for each method, motion, rate and delay" {
-	incise bench pose --quick --json >r.json
+	quick_report pose
 	[ "$(of rows 'count(*)')" = $((8 * 5 * 4 * 2)) ]
 	[ "$(of losses 'count(*)')" = $((8 * 5)) ]
 	[ "$(of rows 'count(*)' 'rms_mm IS NULL OR max_mm IS NULL OR rms_mm_s IS NULL')" = 0 ]
@@ -34,7 +34,7 @@ of() {
 }
 
 @test "bench pose: a held pose is off by velocity times age" {
-	incise bench pose --quick --json >r.json
+	quick_report pose
 	# exactly so at even speed; ages are the same, the noise is that of some 400 poses
 	of rows 'name, rms_mm, held_theory_mm' "name = 'held' AND motion = 'line'"
 	holds "$(of rows 'max(abs(rms_mm / held_theory_mm - 1))' \
@@ -62,7 +62,7 @@ at_most() {
 }
 
 @test "bench pose: the predictor is better than held poses where the motion is smooth" {
-	incise bench pose --quick --json >r.json
+	quick_report pose
 	smooth="motion IN ('line', 'stroke', 'surgeon')"
 	holds "$(at_most library held rms "$smooth") < 0.7"
 	holds "$(at_most library held rms "$smooth AND late = 12") < 0.3"
@@ -78,7 +78,7 @@ at_most() {
 }
 
 @test "bench pose lists what is worse than no tracker, and why" {
-	incise bench pose --quick --json >r.json
+	quick_report pose
 	[ "$(of rows 'count(*)' '(failed IS NULL) <> (rms_mm <= spread_mm)')" = 0 ]
 	[ "$(of rows 'count(*)' "failed NOT LIKE 'worse than no tracker: off by % mm, where%'")" = 0 ]
 	# two noisy poses a millisecond apart say nothing of a tremor that is 12 ms away
@@ -92,7 +92,7 @@ at_most() {
 }
 
 @test "bench pose: the longer nothing comes the farther off, and never beyond the motion" {
-	incise bench pose --quick --json >r.json
+	quick_report pose
 	for name in held line library library_100um; do
 		last=0
 		for gap in 25 50 100 200 500; do
@@ -109,7 +109,7 @@ at_most() {
 }
 
 @test "bench timeline has a row for each method, lateness, clock and window" {
-	incise bench timeline --quick --json >r.json
+	quick_report timeline
 	[ "$(of rows 'count(*)')" = $((8 * 3 * 3 * 7)) ]
 	[ "$(of rows 'count(*)' 'rms_us IS NULL OR max_us IS NULL OR ns_per_sample IS NULL')" = 0 ]
 	[ "$(of rows 'count(*)' 'rms_us > max_us OR p99_us > max_us OR abs(mean_us) > rms_us')" = 0 ]
@@ -126,7 +126,7 @@ at_most() {
 }
 
 @test "bench timeline: the library's line is within what it states" {
-	incise bench timeline --quick --json >r.json
+	quick_report timeline
 	# over all streams; twice the standard uncertainty
 	for name in line_live line_final; do
 		holds "$(of rows 'avg(within_2sd)' "name = '$name'") >= 0.95"
@@ -144,7 +144,7 @@ at_most() {
 }
 
 @test "bench timeline lists who is surer than he may be, and worse than arrivals" {
-	incise bench timeline --quick --json >r.json
+	quick_report timeline
 	# bursts whose phases never change: 20 ms are 4.8 periods
 	[ "$(of rows 'count(*)' "name = 'line_untold' AND late = 'bursts' AND drift_ppm = 0
 		AND window_s >= 10 AND failed LIKE 'surer than it may be: %'")" = 4 ]
@@ -156,6 +156,7 @@ at_most() {
 	[[ "$output" == *"* lowest, bursts, -200 ppm, 120 s: worse than arrivals as they are: "* ]]
 }
 
+# bats test_tags=slow
 @test "bench pose and timeline are the same in each run" {
 	for word in pose timeline; do
 		for i in 1 2; do

@@ -22,7 +22,7 @@ in_plan() {
 }
 
 @test "bench scenes has the scenes that ship and its own, and no force differs" {
-	incise bench scenes --quick --json >r.json
+	quick_report scenes
 	for scene in liver neck wall plane_reaction plane_kept plane_constraint sphere_all \
 		sphere_all_fixed mesh_reaction mesh_all; do
 		[ -z "$(of $scene failed)" ]

@@ -24,6 +24,7 @@ draws() {
 	bad_usage "--no-output"
 }
 
+# bats test_tags=slow
 @test "bench view reports as JSON, and draws a chart" {
 	draws
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
