@@ -84,8 +84,8 @@ check: ## install what is missing, build, and run all tests
 	@mk/deps module || echo "going on without what checking the module needs"
 	@mk/deps rtsan || echo "going on without RealtimeSanitizer"
 	@mk/deps deb debian || echo "going on without what building packages needs"
-	+@$(MAKE) --no-print-directory all
-	+@$(MAKE) --no-print-directory cli_filter="--filter-tags '!slow'" check-style check-cli check-unit-once check-fuzz check-rtsan check-module check-deb check-vm
+	+@$(MAKE) --no-print-directory check-style cli-needs
+	+@$(MAKE) --no-print-directory cli_filter="--filter-tags '!slow'" check-cli check-unit-once check-fuzz check-rtsan check-module check-deb check-vm
 
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8
@@ -132,8 +132,10 @@ check-attack: all $(attack_programs) ## attacks on recordings with their full co
 	ATTACK=full $(attack_bats)
 
 # Benches measure for seconds: tests that are tagged slow are not in `check`.
-check-cli: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
-		$(O)/tests/day $(attack_programs) ## command-line tests of the real programs
+cli-needs: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
+		$(O)/tests/day $(attack_programs)
+
+check-cli: cli-needs ## command-line tests of the real programs
 	@$(if $(cli_filter),echo "left out: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests of benches; make check-cli runs them; bench_all.bats runs each word once")
 	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure $(cli_filter) tests/cli tests/attack
 
@@ -179,7 +181,7 @@ doc: ## reference of the public headers in build/doc/html; fails where a comment
 
 check-doc: doc
 
-.PHONY: doc check-doc check check-style check-unit check-unit-once check-cli check-attack check-sanitize check-tsan can-drive mcap-reader
+.PHONY: doc check-doc check check-style check-unit check-unit-once check-cli cli-needs check-attack check-sanitize check-tsan can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
