@@ -161,10 +161,11 @@ static void stamps(struct can_bus *bus, int peer)
 		bus->ops->wait(bus, after + MS);
 		usleep(1000);
 		good &= next(bus, &frame, &t_ns) == 1;
-		/* Both clocks are read one after the other: a few µs apart, more where a
-		 * processor was taken away between, which only makes a frame younger. */
+		/* Both clocks are read one after the other: as far apart as an interrupt
+		 * between takes, some 7 µs here; a frame that is stamped when it is read is
+		 * a millisecond late. */
 		good &= t_ns >= last && t_ns <= bus->ops->now(bus);
-		good &= (t_ns >= before - 1000 && t_ns <= after + MS / 2) ||
+		good &= (t_ns >= before - 20000 && t_ns <= after + MS / 2) ||
 			strcmp(getenv("INCISE_VM_PROFILE") ?: "", "deterministic");
 		last = t_ns;
 	}
