@@ -85,7 +85,7 @@ check: ## install what is missing, build, and run all tests
 	@mk/deps rtsan || echo "going on without RealtimeSanitizer"
 	@mk/deps deb debian || echo "going on without what building packages needs"
 	+@$(MAKE) --no-print-directory check-style cli-needs
-	+@$(MAKE) --no-print-directory cli_filter="--filter-tags '!slow'" check-cli check-unit-once check-fuzz check-rtsan check-module check-deb check-vm
+	+@$(MAKE) --no-print-directory cli_filter="--filter-tags '!slow'" cli-tests check-unit-once check-fuzz check-rtsan check-module check-deb check-vm
 
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8
@@ -136,6 +136,10 @@ cli-needs: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(O)/
 		$(O)/tests/day $(attack_programs)
 
 check-cli: cli-needs ## command-line tests of the real programs
+	+@$(MAKE) --no-print-directory cli-tests
+
+# Of what is there; the first that `check` begins.
+cli-tests:
 	@$(if $(cli_filter),echo "left out: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests of benches; make check-cli runs them; bench_all.bats runs each word once")
 	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure $(cli_filter) tests/cli tests/attack
 
@@ -181,7 +185,7 @@ doc: ## reference of the public headers in build/doc/html; fails where a comment
 
 check-doc: doc
 
-.PHONY: doc check-doc check check-style check-unit check-unit-once check-cli cli-needs check-attack check-sanitize check-tsan can-drive mcap-reader
+.PHONY: doc check-doc check check-style check-unit check-unit-once check-cli cli-needs cli-tests check-attack check-sanitize check-tsan can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
