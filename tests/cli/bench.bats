@@ -2,21 +2,13 @@
 # incise bench, as a user meets it. Times are not judged here: the machine is shared.
 
 load cli
+load report
 
 names="double_libm double_separable double_library float fixed_direct fixed_table_64 \
 	fixed_table_1024 fixed_table force_table_32 force_table batch batch_force"
 
 setup() {
 	work_folder
-}
-
-# A value of the row with a name: row r.json fixed_table bound_N.
-row() {
-	local k
-	k=$(sqlite3 :memory: "SELECT key FROM json_each(readfile('$1'), '\$.rows')
-		WHERE json_extract(value, '\$.name') = '$2'")
-	[ -n "$k" ] || complain "no row $2" || return
-	key "$1" "rows[$k].$3"
 }
 
 @test "bench precision measures a model of its own, and says where" {
@@ -310,18 +302,6 @@ row() {
 	[[ "$output" == *$'\n'"classic "*$'\n'"default "* ]]
 	grep -q '>default_chosen<' c.svg
 	run -2 incise bench nothing
-}
-
-# One number over a list of the stability report: of LIST 'max(ratio)' ['condition'].
-# Names of columns are keys of its objects; bT_m and BT_m are one to SQL.
-of() {
-	local keys
-	keys=$(sqlite3 :memory: "SELECT group_concat(DISTINCT
-		'json_extract(e.value, ''\$.' || o.key || ''') AS ' || o.key)
-		FROM json_each(readfile('r.json'), '\$.$1') e, json_each(e.value) o")
-	[ -n "$keys" ] || complain "no list $1" || return
-	sqlite3 :memory: "SELECT $2 FROM (SELECT $keys
-		FROM json_each(readfile('r.json'), '\$.$1') e) WHERE ${3:-1}"
 }
 
 # Of one program: in order, and as many as there were. The quantiles are edges of 1 us.

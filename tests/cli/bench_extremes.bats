@@ -2,35 +2,30 @@
 # incise bench extremes: every case is held or refused, and stiff walls are as theory says.
 
 load cli
+load report
 
 setup() {
 	work_folder
-}
-
-# One number over a list of r.json, keys with an @ behind: of rows 'sum(tried@)' ['condition'].
-of() {
-	local sql="SELECT $2 FROM json_each(readfile('r.json'), '\$.$1') WHERE ${3:-1}"
-	sqlite3 :memory: "$(sed -E "s/([A-Za-z_]+)@/json_extract(value, '\$.\1')/g" <<<"$sql")"
 }
 
 @test "bench extremes: nothing is wrong, each door is tried, and it leaves nothing behind" {
 	mkdir t
 	TMPDIR=$PWD/t incise bench extremes --quick --json >r.json
 	[ -z "$(ls -A t)" ]
-	[ "$(of rows 'sum(wrong@)')" = 0 ]
-	[ "$(of rows 'count(*)' 'failed@ IS NOT NULL')" = 0 ]
-	[ "$(of rows 'count(*)' 'tried@ != held@ + refused@ OR tried@ < 90')" = 0 ]
-	holds "$(of rows 'sum(tried@)') > 1e6"
+	[ "$(of rows 'sum(wrong)')" = 0 ]
+	[ "$(of rows 'count(*)' 'failed IS NOT NULL')" = 0 ]
+	[ "$(of rows 'count(*)' 'tried != held + refused OR tried < 90')" = 0 ]
+	holds "$(of rows 'sum(tried)') > 1e6"
 	for row in model_double fixed_direct fixed_table force_table fixed_batch fixed_blob plane \
 		sphere capsule mesh heights guard plant stability_limit spring profile pose_nan \
 		pose_huge time_back time_1ns time_1h rates wall scenes device_fault \
 		device_nonsense scene_bytes fis_bytes fx_bytes mesh_bytes rig_bytes \
 		calibration_bytes recording_bytes; do
-		holds "$(of rows 'held@' "name@ = '$row'") > 0"
+		holds "$(of rows 'held' "name = '$row'") > 0"
 	done
 	# What is broken is refused, but not everything.
 	for row in fixed_blob wall scene_bytes fis_bytes mesh_bytes recording_bytes; do
-		holds "$(of rows 'refused@' "name@ = '$row'") > 0"
+		holds "$(of rows 'refused' "name = '$row'") > 0"
 	done
 	[ -n "$(key r.json machine.cpu)" ]
 	[ "$(key r.json seed) $(key r.json quick)" = "1 1" ]
@@ -50,16 +45,16 @@ of() {
 @test "bench extremes: stiff walls are accepted up to the limit of theory, and bounded beyond" {
 	quick_report extremes
 	[ "$(of stiff 'count(*)')" = 20 ]
-	[ "$(of stiff 'count(*)' 'accepted@ != (K_N_m@ <= theory_limit_N_m@)')" = 0 ]
-	[ "$(of stiff 'min(bounded@)')" = 1 ]
-	[ "$(of stiff 'sum(not_finite@)')" = 0 ]
-	holds "$(of stiff 'max(largest_N@)') <= 4"
+	[ "$(of stiff 'count(*)' 'accepted != (K_N_m <= theory_limit_N_m)')" = 0 ]
+	[ "$(of stiff 'min(bounded)')" = 1 ]
+	[ "$(of stiff 'sum(not_finite)')" = 0 ]
+	holds "$(of stiff 'max(largest_N)') <= 4"
 	# What is accepted is still at last; what a plan refuses moves by millimetres.
-	holds "$(of stiff 'max(late_mm@)' 'accepted@') < 0.11"
-	holds "$(of stiff 'min(late_mm@)' "NOT accepted@ AND path@ = 'plan'") > 1"
+	holds "$(of stiff 'max(late_mm)' 'accepted') < 0.11"
+	holds "$(of stiff 'min(late_mm)' "NOT accepted AND path = 'plan'") > 1"
 	# Known: 2 b/T = 20 N/mm for little damping, and 0.40 N/mm of incise-scene(5).
-	holds "($(of stiff 'max(theory_limit_N_m@)') / 20000 - 1) ^ 2 < 0.05 ^ 2"
-	holds "($(of stiff 'min(theory_limit_N_m@)') / 400 - 1) ^ 2 < 0.01 ^ 2"
+	holds "($(of stiff 'max(theory_limit_N_m)') / 20000 - 1) ^ 2 < 0.05 ^ 2"
+	holds "($(of stiff 'min(theory_limit_N_m)') / 400 - 1) ^ 2 < 0.01 ^ 2"
 }
 
 # bats test_tags=slow

@@ -3,20 +3,10 @@
 # each machine, but for times, which are not judged here.
 
 load cli
+load report
 
 setup() {
 	work_folder
-}
-
-# One number over a list of the report: of rows 'max(rms_mm)' 'condition'.
-of() {
-	local keys
-	keys=$(sqlite3 :memory: "SELECT group_concat(DISTINCT
-		'json_extract(e.value, ''\$.' || o.key || ''') AS ' || o.key)
-		FROM json_each(readfile('r.json'), '\$.$1') e, json_each(e.value) o")
-	[ -n "$keys" ] || complain "no list $1" || return
-	sqlite3 :memory: "SELECT $2 FROM (SELECT $keys
-		FROM json_each(readfile('r.json'), '\$.$1') e) WHERE ${3:-1}"
 }
 
 @test "bench pose has a row for each method, motion, rate and delay" {

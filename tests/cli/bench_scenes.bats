@@ -2,18 +2,10 @@
 # incise bench scenes, as a user meets it. Times are not judged here: the machine is shared.
 
 load cli
+load report
 
 setup() {
 	work_folder
-}
-
-# A value of the row with a name: of wall stages.
-of() {
-	local k
-	k=$(sqlite3 :memory: "SELECT key FROM json_each(readfile('r.json'), '\$.rows')
-		WHERE json_extract(value, '\$.name') = '$1'")
-	[ -n "$k" ] || complain "no row $1" || return
-	key r.json "rows[$k].$2"
 }
 
 # A list of incise plan's report as the text that it is in a row.
@@ -25,33 +17,33 @@ in_plan() {
 	quick_report scenes
 	for scene in liver neck wall plane_reaction plane_kept plane_constraint sphere_all \
 		sphere_all_fixed mesh_reaction mesh_all; do
-		[ -z "$(of $scene failed)" ]
-		[ "$(of $scene identical)" = 1 ]
-		[ -z "$(of $scene first_difference)" ]
-		holds "$(of $scene ticks_compared) >= 100000"
+		[ -z "$(row r.json $scene failed)" ]
+		[ "$(row r.json $scene identical)" = 1 ]
+		[ -z "$(row r.json $scene first_difference)" ]
+		holds "$(row r.json $scene ticks_compared) >= 100000"
 		# they were in the tissue for most of it: no force is easily the same
-		holds "$(of $scene ticks_in_contact) > 0.7 * $(of $scene ticks_compared)"
-		holds "$(of $scene tick_ns) > 0 && $(of $scene full_ns) > 0"
-		holds "$(of $scene plan_memory_KiB) <= $(of $scene full_memory_KiB)"
+		holds "$(row r.json $scene ticks_in_contact) > 0.7 * $(row r.json $scene ticks_compared)"
+		holds "$(row r.json $scene tick_ns) > 0 && $(row r.json $scene full_ns) > 0"
+		holds "$(row r.json $scene plan_memory_KiB) <= $(row r.json $scene full_memory_KiB)"
 	done
 	# what has all stages leaves none of them out; the plain one has none of the rest
-	[ "$(of sphere_all left_out)" = "actuate, wound, bleeding" ]
-	[ "$(of plane_kept stages)" = "$(of sphere_all stages)" ]
-	[ "$(of plane_constraint stages)" = \
-		"$(of plane_reaction stages | sed 's/reaction, /reaction, plane, /')" ]
+	[ "$(row r.json sphere_all left_out)" = "actuate, wound, bleeding" ]
+	[ "$(row r.json plane_kept stages)" = "$(row r.json sphere_all stages)" ]
+	[ "$(row r.json plane_constraint stages)" = \
+		"$(row r.json plane_reaction stages | sed 's/reaction, /reaction, plane, /')" ]
 	# the model and the mesh are in memory
-	holds "$(of mesh_reaction plan_memory_KiB) > 100 * $(of plane_reaction plan_memory_KiB)"
-	holds "$(of mesh_reaction process_own_KiB) > $(of mesh_reaction plan_memory_KiB)"
+	holds "$(row r.json mesh_reaction plan_memory_KiB) > 100 * $(row r.json plane_reaction plan_memory_KiB)"
+	holds "$(row r.json mesh_reaction process_own_KiB) > $(row r.json mesh_reaction plan_memory_KiB)"
 	# a loop cannot keep what its scene does not need
-	[ -z "$(of plane_kept process_memory_KiB)" ]
+	[ -z "$(row r.json plane_kept process_memory_KiB)" ]
 }
 
 @test "stages and reasons are those of incise plan" {
 	incise bench scenes --quick --json liver neck >r.json
 	for scene in liver neck; do
 		incise plan $scene --json >p.json
-		[ "$(of $scene stages)" = "$(in_plan kept value)" ]
-		[ "$(of $scene left_out)" = \
+		[ "$(row r.json $scene stages)" = "$(in_plan kept value)" ]
+		[ "$(row r.json $scene left_out)" = \
 			"$(in_plan left_out "json_extract(value, '\$.stage')")" ]
 		[ "$(sqlite3 :memory: "SELECT json_group_array(json_array(
 			json_extract(value, '\$.stage'), json_extract(value, '\$.why')))
@@ -65,25 +57,25 @@ in_plan() {
 
 @test "the loop maps what it is linked to and no more, and opens no device" {
 	incise bench scenes --quick --json neck >r.json
-	of neck libraries | sed 's/, /\n/g' | sort >mapped
+	row r.json neck libraries | sed 's/, /\n/g' | sort >mapped
 	# the loader's names are links to the files that are mapped
 	ldd "$INCISE_BUILD/bin/incise-haptic" | grep -o '/[^ ]*' | xargs -n 1 realpath |
 		xargs -n 1 basename | sort >linked
 	diff mapped linked
-	[ "$(of neck libraries_mapped)" = "$(wc -l <linked)" ]
+	[ "$(row r.json neck libraries_mapped)" = "$(wc -l <linked)" ]
 	for name in SQLite LAPACK libavformat OpenCV OpenGL SDL2; do
-		[[ "$(of neck libraries_not_mapped)" == *$name* ]]
+		[[ "$(row r.json neck libraries_not_mapped)" == *$name* ]]
 	done
-	[ "$(of neck devices)" = "tracker, stepper" ]
-	[[ "$(of neck files_open)" != */dev/* ]]
+	[ "$(row r.json neck devices)" = "tracker, stepper" ]
+	[[ "$(row r.json neck files_open)" != */dev/* ]]
 }
 
 @test "the full pipeline takes more instructions where stages are left out" {
 	command -v valgrind >/dev/null || skip "valgrind is not installed, it counts instructions"
 	incise bench scenes --json wall >r.json
 	[ -n "$(key r.json instructions_by)" ] || skip "$(key r.json instructions_failed)"
-	holds "$(of wall instructions) > 100"
-	holds "$(of wall full_instructions) > 1.1 * $(of wall instructions)"
+	holds "$(row r.json wall instructions) > 100"
+	holds "$(row r.json wall full_instructions) > 1.1 * $(row r.json wall instructions)"
 }
 
 @test "without a counter and valgrind instructions are null, and why is said" {
@@ -92,7 +84,7 @@ in_plan() {
 	[ "$(key r.json instructions_by)" != callgrind ]
 	if [ -z "$(key r.json instructions_by)" ]; then
 		[[ "$(key r.json instructions_failed)" == *valgrind* ]]
-		[ -z "$(of wall instructions)" ]
+		[ -z "$(row r.json wall instructions)" ]
 	fi
 }
 
@@ -101,15 +93,15 @@ in_plan() {
 	run -1 --separate-stderr incise bench scenes --quick --json stiff.scene none wall
 	echo "$output" >r.json
 	failed_with stiff.scene "not measured" "not stable"
-	[[ "$(of stiff.scene failed)" == *"not stable"* ]]
-	[ -z "$(of stiff.scene tick_ns)" ]
-	[ -z "$(of stiff.scene stages)" ]
-	[ -z "$(of stiff.scene identical)" ]
-	[[ "$(of none failed)" == *"no scene of that name"* ]]
+	[[ "$(row r.json stiff.scene failed)" == *"not stable"* ]]
+	[ -z "$(row r.json stiff.scene tick_ns)" ]
+	[ -z "$(row r.json stiff.scene stages)" ]
+	[ -z "$(row r.json stiff.scene identical)" ]
+	[[ "$(row r.json none failed)" == *"no scene of that name"* ]]
 	run -1 --separate-stderr incise bench scenes --quick $'no\e[2J'
 	[[ "$output" == *"no?[2J"* && "$output" != *$'\e'* ]]
-	holds "$(of wall tick_ns) > 0"
-	[ "$(of wall identical)" = 1 ]
+	holds "$(row r.json wall tick_ns) > 0"
+	[ "$(row r.json wall identical)" = 1 ]
 }
 
 @test "bench scenes says it as text, and draws bars" {

@@ -96,14 +96,3 @@ example_in() {
 		/^\.Ed/ { if (inside && index(text, word)) { printf "%s", text; exit }; inside = 0 }
 		inside { text = text $0 "\n" }' "$1" | sed 's/\\e/\\/g; s/\\-/-/g'
 }
-
-# The report of a bench as r.json: one that the tests of a file share.
-quick_report() {
-	local report=$BATS_FILE_TMPDIR/$1.json
-
-	if [ ! -e "$report" ]; then
-		incise bench "$1" --quick --json >"$report.part" || return
-		mv "$report.part" "$report"
-	fi
-	cp "$report" r.json
-}
