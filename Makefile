@@ -79,29 +79,9 @@ needs_incise-learn := incise
 needs_incise-record := incise
 needs_incise-view := incise
 
-# One program per verb, and the libraries it is linked to.
+# One program per verb.
 verbs := $(filter-out $(if $(has_view),,view bench-view),$(patsubst tools/incise-%.c,%,\
 	$(wildcard tools/incise-*.c)))
-uses_view := incise incise-view incise-record
-uses_capture := incise incise-record
-uses_export := incise incise-record
-uses_verify := incise incise-record
-uses_train := incise incise-learn
-uses_eval := incise
-uses_compile := incise
-uses_info := incise incise-record
-uses_haptic := incise
-uses_status := incise
-uses_stepper := incise
-uses_plan := incise
-uses_replay := incise incise-record
-uses_calibrate := incise
-uses_demo := incise incise-learn
-uses_bench := incise incise-learn incise-record
-uses_bench-all := incise
-uses_bench-view := incise incise-view
-$(foreach word,$(filter calibrate-%,$(verbs)),\
-	$(eval uses_$(word) := incise incise-learn incise-record))
 
 all: libs tools
 

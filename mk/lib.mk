@@ -160,7 +160,7 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(filter-out %/camera_v4l2.c,\
 	$(filter $(O)/obj/lib/device/polhemus/%,$(filter-out %/tracker_tty.o,$(objects_tracker_tty))) \
 	$(if $(has_vision),$(filter-out %/vision_opencv.o,$(objects_vision_opencv))) \
 	$(if $(has_frames),$(objects_frames_mkv) $(objects_film_mkv)) \
-	$(O)/obj/tools/scalpel_picture.o
+	$(O)/obj/tools/bench/scalpel_picture.o
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@

@@ -35,8 +35,7 @@ unit_emulator = $(if $(filter polhemus/%,$*),$(emulator))
 $(filter $(O)/tests/unit/polhemus/%,$(unit_programs)): $(emulator)
 
 # What of the tools has tests of its own is linked to them.
-unit_tools := $(addprefix $(O)/obj/tools/,harness.o yardstick.o stopwatch.o figures.o reported_figures.o compare.o \
-	memory_file.o json.o cli.o child.o)
+unit_tools := $(tool_parts)
 $(filter $(O)/tests/unit/tools/%,$(unit_programs)): $(unit_tools)
 
 # They play libusb.

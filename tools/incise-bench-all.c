@@ -14,13 +14,13 @@
 #include <string.h>
 #include <time.h>
 #include <incise/version.h>
-#include "cli.h"
-#include "compare.h"
-#include "json.h"
-#include "machine.h"
-#include "report_folder.h"
-#include "report_measure.h"
-#include "report_sections.h"
+#include "cli/cli.h"
+#include "bench/compare.h"
+#include "cli/json.h"
+#include "bench/machine.h"
+#include "bench/report_folder.h"
+#include "bench/report_measure.h"
+#include "bench/report_sections.h"
 
 enum { OPT_REPORT = CLI_LONG, OPT_FROM, OPT_AGAINST, OPT_ONLY, OPT_QUICK, OPT_JSON };
 

@@ -5,17 +5,17 @@
  */
 #include <getopt.h>
 #include <stdio.h>
-#include "bench_view_error.h"
-#include "bench_view_frames.h"
-#include "bench_view_live.h"
-#include "cli.h"
-#include "compare.h"
-#include "figures.h"
-#include "json.h"
-#include "machine.h"
-#include "memory_file.h"
-#include "picture.h"
-#include "scene_argument.h"
+#include "bench/bench_view_error.h"
+#include "bench/bench_view_frames.h"
+#include "bench/bench_view_live.h"
+#include "cli/cli.h"
+#include "bench/compare.h"
+#include "bench/figures.h"
+#include "cli/json.h"
+#include "bench/machine.h"
+#include "cli/memory_file.h"
+#include "cli/picture.h"
+#include "cli/scene_argument.h"
 
 enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION, OPT_AGAINST };
 

@@ -5,19 +5,19 @@
 #include <getopt.h>
 #include <limits.h>
 #include <string.h>
-#include "bench_capture.h"
-#include "bench_extremes.h"
-#include "bench_loop.h"
-#include "bench_pose.h"
-#include "bench_precision.h"
-#include "bench_scenes.h"
-#include "bench_stability.h"
-#include "bench_timeline.h"
-#include "bench_training.h"
-#include "bench_vision.h"
-#include "cli.h"
-#include "compare.h"
-#include "json.h"
+#include "bench/bench_capture.h"
+#include "bench/bench_extremes.h"
+#include "bench/bench_loop.h"
+#include "bench/bench_pose.h"
+#include "bench/bench_precision.h"
+#include "bench/bench_scenes.h"
+#include "bench/bench_stability.h"
+#include "bench/bench_timeline.h"
+#include "bench/bench_training.h"
+#include "bench/bench_vision.h"
+#include "cli/cli.h"
+#include "bench/compare.h"
+#include "cli/json.h"
 
 enum {
 	OPT_JSON = CLI_LONG,

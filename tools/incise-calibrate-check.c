@@ -11,8 +11,8 @@
 #include <time.h>
 #include <incise/calibration.h>
 #include <incise/redundancy.h>
-#include "cli.h"
-#include "json.h"
+#include "cli/cli.h"
+#include "cli/json.h"
 
 enum { OPT_DUE = CLI_LONG, OPT_ONLY, OPT_RECORDING, OPT_JSON };
 

@@ -13,12 +13,12 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/calibrate_delay.h>
-#include "calibrate_report.h"
-#include "calibrate_result.h"
-#include "delay_streams.h"
-#include "json.h"
-#include "picture.h"
-#include "recording_folder.h"
+#include "calibrate/calibrate_report.h"
+#include "calibrate/calibrate_result.h"
+#include "calibrate/delay_streams.h"
+#include "cli/json.h"
+#include "cli/picture.h"
+#include "cli/recording_folder.h"
 
 /* A drift that is this many times its uncertainty is real. */
 #define DRIFT_SIGMAS 4

@@ -9,10 +9,10 @@
 #include <string.h>
 #include <incise/calibrate_depth.h>
 #include <incise/calibration.h>
-#include "calibrate_result.h"
-#include "depth_report.h"
-#include "depth_wish.h"
-#include "json.h"
+#include "calibrate/calibrate_result.h"
+#include "calibrate/depth_report.h"
+#include "calibrate/depth_wish.h"
+#include "cli/json.h"
 
 #define U_CLICKS_PX 0.7 /* two ends, half a pixel each */
 #define U_WORST 0.005	/* 2 u of more than that, relative, is no calibration */

@@ -9,11 +9,11 @@
 #include <time.h>
 #include <unistd.h>
 #include <incise/calibration.h>
-#include "calibrate_force_report.h"
-#include "calibrate_result.h"
-#include "calibrate_weights.h"
-#include "cli.h"
-#include "json.h"
+#include "calibrate/calibrate_force_report.h"
+#include "calibrate/calibrate_result.h"
+#include "calibrate/calibrate_weights.h"
+#include "cli/cli.h"
+#include "cli/json.h"
 
 enum {
 	OPT_WEIGHTS = CALIBRATE_OWN,

@@ -7,10 +7,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "calibrate_result.h"
-#include "calibrate_stepper.h"
-#include "cli.h"
-#include "json.h"
+#include "calibrate/calibrate_result.h"
+#include "calibrate/calibrate_stepper.h"
+#include "cli/cli.h"
+#include "cli/json.h"
 
 enum { OPT_RANGE = CALIBRATE_OWN, OPT_STROKES, OPT_MAX_FORCE, OPT_NO_RATE, OPT_STEP_MM };
 

@@ -10,11 +10,11 @@
 #include <unistd.h>
 #include <incise/calibrate_tip.h>
 #include <incise/rig.h>
-#include "calibrate_report.h"
-#include "calibrate_result.h"
-#include "json.h"
-#include "picture.h"
-#include "tip_poses.h"
+#include "calibrate/calibrate_report.h"
+#include "calibrate/calibrate_result.h"
+#include "cli/json.h"
+#include "cli/picture.h"
+#include "calibrate/tip_poses.h"
 
 #define POLL_NS 10000000LL
 #define LOOK_NS 1000000000LL

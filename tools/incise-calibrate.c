@@ -4,7 +4,7 @@
  * incise-calibrate-WORD.
  */
 #include <getopt.h>
-#include "cli.h"
+#include "cli/cli.h"
 
 static const struct cli_option options[] = {{0}};
 

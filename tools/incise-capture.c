@@ -9,12 +9,12 @@
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
-#include "capture_report.h"
-#include "capture_view.h"
-#include "capture_wish.h"
-#include "cli.h"
-#include "keyboard.h"
-#include "recording_folder.h"
+#include "capture/capture_report.h"
+#include "capture/capture_view.h"
+#include "capture/capture_wish.h"
+#include "cli/cli.h"
+#include "capture/keyboard.h"
+#include "cli/recording_folder.h"
 
 #define POLL_NS 10000000LL
 

@@ -10,8 +10,8 @@
 #include <string.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
-#include "cli.h"
-#include "json.h"
+#include "cli/cli.h"
+#include "cli/json.h"
 
 enum { OPT_BUDGET = CLI_LONG, OPT_ARITH, OPT_CELLS, OPT_C_SOURCE, OPT_JSON };
 

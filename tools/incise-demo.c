@@ -11,11 +11,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
-#include "cli.h"
-#include "demo.h"
-#include "demo_scene.h"
-#include "json.h"
-#include "picture.h"
+#include "cli/cli.h"
+#include "demo/demo.h"
+#include "demo/demo_scene.h"
+#include "cli/json.h"
+#include "cli/picture.h"
 
 enum { OPT_SEED = CLI_LONG, OPT_LOOP, OPT_SCENE, OPT_FORCE, OPT_JSON };
 

@@ -11,8 +11,8 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/uncertainty.h>
-#include "cli.h"
-#include "json.h"
+#include "cli/cli.h"
+#include "cli/json.h"
 
 enum { OPT_ARITH = CLI_LONG, OPT_NO_CLAMP, OPT_GRID, OPT_SD, OPT_JSON };
 

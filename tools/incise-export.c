@@ -8,8 +8,8 @@
 #include <string.h>
 #include <incise/calibration.h>
 #include <incise/recording.h>
-#include "cli.h"
-#include "json.h"
+#include "cli/cli.h"
+#include "cli/json.h"
 
 #define BINS_MAX 1000
 

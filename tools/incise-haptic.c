@@ -12,11 +12,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include <incise/calibration.h>
-#include "cli.h"
-#include "haptic_actuator.h"
-#include "haptic_report.h"
-#include "haptic_self_test.h"
-#include "haptic_supervisor.h"
+#include "cli/cli.h"
+#include "haptic/haptic_actuator.h"
+#include "haptic/haptic_report.h"
+#include "haptic/haptic_self_test.h"
+#include "haptic/haptic_supervisor.h"
 
 enum {
 	OPT_MODEL = CLI_LONG,

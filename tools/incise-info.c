@@ -12,13 +12,13 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/recording.h>
-#include "bus_report.h"
-#include "cli.h"
-#include "json.h"
-#include "stream_report.h"
-#include "model_picture.h"
-#include "picture.h"
-#include "stepper_module_report.h"
+#include "stepper/bus_report.h"
+#include "cli/cli.h"
+#include "cli/json.h"
+#include "cli/stream_report.h"
+#include "cli/model_picture.h"
+#include "cli/picture.h"
+#include "stepper/stepper_module_report.h"
 
 enum { OPT_JSON = CLI_LONG, OPT_PLOT };
 

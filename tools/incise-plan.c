@@ -10,11 +10,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/plan.h>
-#include "cli.h"
-#include "json.h"
-#include "mapped_libraries.h"
-#include "scene_argument.h"
-#include "tick_cost.h"
+#include "cli/cli.h"
+#include "cli/json.h"
+#include "cli/mapped_libraries.h"
+#include "cli/scene_argument.h"
+#include "cli/tick_cost.h"
 
 enum { OPT_MODEL = CLI_LONG, OPT_ARITH, OPT_FULL, OPT_JSON };
 

@@ -8,12 +8,12 @@
 #include <string.h>
 #include <incise/calibration.h>
 #include <incise/replay.h>
-#include "cli.h"
-#include "json.h"
-#include "loop_report.h"
-#include "replay_picture.h"
-#include "scene_argument.h"
-#include "whole_file.h"
+#include "cli/cli.h"
+#include "cli/json.h"
+#include "cli/loop_report.h"
+#include "cli/replay_picture.h"
+#include "cli/scene_argument.h"
+#include "cli/whole_file.h"
 
 enum {
 	OPT_CSV = CLI_LONG,

@@ -6,12 +6,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <time.h>
-#include "cli.h"
-#include "json.h"
-#include "state_follow.h"
-#include "state_pages.h"
-#include "state_prometheus.h"
-#include "state_report.h"
+#include "cli/cli.h"
+#include "cli/json.h"
+#include "status/state_follow.h"
+#include "status/state_pages.h"
+#include "status/state_prometheus.h"
+#include "status/state_report.h"
 
 enum { OPT_JSON = CLI_LONG, OPT_PROMETHEUS };
 

@@ -9,10 +9,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "cli.h"
-#include "stepper_command.h"
-#include "stepper_counters.h"
-#include "stepper_status.h"
+#include "cli/cli.h"
+#include "stepper/stepper_command.h"
+#include "cli/stepper_counters.h"
+#include "stepper/stepper_status.h"
 
 enum { OPT_BY = CLI_LONG, OPT_UNHOMED, OPT_HOLD, OPT_FOR, OPT_REPEAT, OPT_JSON };
 

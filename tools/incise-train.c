@@ -10,11 +10,11 @@
 #include <sys/stat.h>
 #include <incise/dataset.h>
 #include <incise/train.h>
-#include "cli.h"
-#include "train_report.h"
-#include "train_side.h"
-#include "train_wish.h"
-#include "whole_file.h"
+#include "cli/cli.h"
+#include "train/train_report.h"
+#include "train/train_side.h"
+#include "train/train_wish.h"
+#include "cli/whole_file.h"
 
 struct history {
 	FILE *csv; /* or NULL */

@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 #include <incise/verify.h>
-#include "cli.h"
-#include "json.h"
+#include "cli/cli.h"
+#include "cli/json.h"
 
 /* More in one JSON object is of no use to anyone. */
 #define FINDINGS_MAX 1000

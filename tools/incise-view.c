@@ -11,9 +11,9 @@
 #include <math.h>
 #include <stdio.h>
 #include <incise/clock.h>
-#include "cli.h"
-#include "json.h"
-#include "view_job.h"
+#include "cli/cli.h"
+#include "cli/json.h"
+#include "view/view_job.h"
 
 enum {
 	OPT_FROM = CLI_LONG,

@@ -13,7 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/version.h>
-#include "cli.h"
+#include "cli/cli.h"
 
 #define WORD "abcdefghijklmnopqrstuvwxyz"
 

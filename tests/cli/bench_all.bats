@@ -309,7 +309,7 @@ asked() {
 }
 
 @test "README's figures are facts of the report, put there by mk/readme-figures" {
-	facts=$(tr -d '\n\t"' <"$root/tools/report_sections.c")
+	facts=$(tr -d '\n\t"' <"$root/tools/bench/report_sections.c")
 	figures=$(sed -n '/^<!-- figures: make bench/,/^<!-- end of figures/p' "$root/README.md")
 	[ "$(grep -c '^\*\*' <<<"$figures")" = 3 ]
 	n=0

@@ -84,10 +84,10 @@ declared_by() {
 }
 
 @test "tools use public headers only" {
-	for file in "$root"/tools/*.[ch]; do
+	for file in "$root"/tools/*.[ch] "$root"/tools/*/*.[ch]; do
 		for name in $(sed -n 's/^#include "\(.*\)"/\1/p' "$file"); do
-			[[ "$name" != */* ]] || complain "$file: $name"
-			[ -f "$root/tools/$name" ] || complain "$file: $name"
+			name=$(realpath "$(dirname "$file")/$name") || complain "$file: $name"
+			[[ "$name" == "$root"/tools/* ]] || complain "$file: $name"
 		done
 		for name in $(sed -n 's/^#include <\(incise\/.*\)>/\1/p' "$file"); do
 			[ -f "$include/$name" ] || complain "$file: $name"

@@ -17,7 +17,7 @@
 #include <errno.h>
 #include <float.h>
 #include <math.h>
-#include "../../../tools/any_pose.h"
+#include "../../../tools/bench/any_pose.h"
 #include "fed_run.h"
 
 #ifdef __SANITIZE_ADDRESS__

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * tools/child.c: what is started ends with who started it.
+ * tools/cli/child.c: what is started ends with who started it.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,7 +11,7 @@
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include "../../../tools/child.h"
+#include "../../../tools/cli/child.h"
 
 static char *const sleeps[] = {"sleep", "1000", NULL};
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * tools/compare.c, on reports that are made: how often it calls two runs of one distribution
+ * tools/bench/compare.c, on reports that are made: how often it calls two runs of one distribution
  * different, and what it finds.
  */
 #include <stdarg.h>
@@ -9,8 +9,8 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <math.h>
-#include "../../../tools/compare.h"
-#include "../../../tools/figures.h"
+#include "../../../tools/bench/compare.h"
+#include "../../../tools/bench/figures.h"
 
 #define TURNS 101
 #define PAIRS 500

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * tools/harness.c: whether the interval of a median holds the median as often as it says, on
+ * tools/bench/harness.c: whether the interval of a median holds the median as often as it says, on
  * values whose median is known; and that ways take turns.
  */
 #include <stdarg.h>
@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include <string.h>
-#include "../../../tools/harness.h"
+#include "../../../tools/bench/harness.h"
 
 #define TRIALS 4000
 #define VALUES_MAX 200

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/vision.h>
-#include "../../../tools/scalpel_picture.h"
+#include "../../../tools/bench/scalpel_picture.h"
 
 static struct incise_camera_frame drawn(enum incise_pixels pixels, double noise,
 					double *length)

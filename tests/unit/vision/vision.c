@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/vision/vision.cc, handle.cc, edge.cc: the exposed length against pictures whose truth
- * is known, which are drawn apart from the library (tools/scalpel_picture.c), and against
+ * is known, which are drawn apart from the library (tools/bench/scalpel_picture.c), and against
  * the virtual camera's. Figures are printed, so that a log has what was reached.
  */
 #include <stdarg.h>
@@ -15,7 +15,7 @@
 #include <string.h>
 #include <incise/vision.h>
 #include "../../../lib/sim/sim.h"
-#include "../../../tools/scalpel_picture.h"
+#include "../../../tools/bench/scalpel_picture.h"
 
 #define FRAMES 16
 

@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Two reports of incise bench; see compare.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "../cli/cli.h"
+#include "compare.h"
+#include "../cli/json.h"
+#include "reported_figures.h"
+
+/*
+ * By how much the yardsticks disagree about a time, as part of it: one of the machines, or
+ * of its hours, was slower at some work than at other, and at which this is, is not known.
+ */
+static double disagreement(const struct figure *was, const struct figure *is)
+{
+	double least = INFINITY, most = 0;
+
+	for (int i = 0; i < is->scales; i++) {
+		double ratio = fabs(is->by[i].middle / was->by[i].middle);
+
+		least = fmin(least, ratio);
+		most = fmax(most, ratio);
+	}
+	return is->scales > 1 && isfinite(most / least) ? most / least - 1 : 0;
+}
+
+/* Beyond noise: 1 more, -1 less, else 0. A time is, where it is so in each yardstick. */
+static int changed(const struct figure *was, const struct figure *is)
+{
+	static const double noises[FIGURE_KINDS] = {
+		COMPARE_TIME_NOISE, COMPARE_MEASURED_NOISE, COMPARE_EXACT};
+	double noise = noises[is->kind] + disagreement(was, is);
+	int more = 0, less = 0;
+
+	for (int i = 0; i < is->scales; i++) {
+		const struct interval *a = &was->by[i], *b = &is->by[i];
+		double least = noise * fmax(fabs(a->middle), fabs(b->middle));
+
+		more += b->low - a->high > least;
+		less += a->low - b->high > least;
+	}
+	return (more == is->scales) - (less == is->scales);
+}
+
+/* New by old; of a time the one that is nearest to 1, by which it is judged. */
+static double ratio(const struct figure *was, const struct figure *is)
+{
+	double nearest = is->by[0].middle / was->by[0].middle;
+
+	for (int i = 1; i < is->scales; i++) {
+		double other = is->by[i].middle / was->by[i].middle;
+
+		if (fabs(log(other)) < fabs(log(nearest)))
+			nearest = other;
+	}
+	return nearest;
+}
+
+static json_t *figure_json(const struct figure *f)
+{
+	return json_pack("{ss? ss ss ss}", "word", f->word, "name", f->name, "kind",
+			 figure_kind_names[f->kind], "unit", f->unit);
+}
+
+static json_t *change_json(const struct figure *was, const struct figure *is, bool worse)
+{
+	json_t *change = figure_json(is);
+
+	json_object_set_new(change, "old", json_number(was->value));
+	json_object_set_new(change, "new", json_number(is->value));
+	json_object_set_new(change, "ratio", json_number(ratio(was, is)));
+	json_object_set_new(change, "worse", json_boolean(worse));
+	return change;
+}
+
+/* Figures of @from that @to has not. A word that is not there at all is one line. */
+static json_t *missing(const struct reported_figures *from,
+		       const struct reported_figures *to)
+{
+	const char *word = NULL;
+	bool known = true;
+	json_t *list = json_array();
+
+	for (int i = 0; i < from->n; i++) {
+		const struct figure *f = &from->figure[i];
+
+		/* Figures of a word are together. */
+		if (f->word && f->word != word) {
+			word = f->word;
+			known = reported_figures_have(to, word);
+			if (!known)
+				json_array_append_new(list, json_pack("{ss sn}", "word",
+								      word, "name"));
+		}
+		if (known && !reported_figures_find(to, f))
+			json_array_append_new(list, figure_json(f));
+	}
+	return list;
+}
+
+static const json_t *part_of(const json_t *report, const char *key)
+{
+	const json_t *is = json_object_get(report, key), *member;
+	const char *word;
+
+	if (is)
+		return is;
+	json_object_foreach((json_t *)report, word, member)
+	{
+		is = json_object_get(member, key);
+		if (is && json_object_get(member, "figures"))
+			return is;
+	}
+	return NULL;
+}
+
+/* What of machine and build is not the same, by its key. */
+static json_t *differing(const json_t *old_report, const json_t *new_report)
+{
+	static const char *const keys[] = {"version",	 "cpu",	       "compiler",
+					   "flags",	 "kernel",     "vectors",
+					   "preempt_rt", "hypervisor", "processors",
+					   "governor"};
+	const json_t *was = part_of(old_report, "machine"),
+		     *is = part_of(new_report, "machine");
+	json_t *list = json_array();
+
+	for (size_t i = 0; i < sizeof(keys) / sizeof(*keys); i++) {
+		const json_t *a = json_object_get(was, keys[i]),
+			     *b = json_object_get(is, keys[i]);
+
+		if ((a || b) && !json_equal(a, b))
+			json_array_append_new(list, json_string(keys[i]));
+	}
+	return list;
+}
+
+static json_t *compare_all(struct reported_figures *was, struct reported_figures *is,
+			   const json_t *differs)
+{
+	json_t *list = json_array();
+	int same = 0, better = 0, worse = 0;
+
+	for (int i = 0; i < is->n; i++) {
+		const struct figure *f = &is->figure[i],
+				    *before = reported_figures_find(was, f);
+		int way = before ? changed(before, f) : 0;
+		bool bad = way > 0 ? !f->more_is_better : f->more_is_better;
+
+		if (!way) {
+			same += before != NULL;
+			continue;
+		}
+		worse += bad;
+		better += !bad;
+		json_array_append_new(list, change_json(before, f, bad));
+	}
+	return json_pack("{sO so so so si si si}", "differs", differs, "changed", list,
+			 "gone", missing(was, is), "new", missing(is, was), "same", same,
+			 "better", better, "worse", worse);
+}
+
+static int comparable(const struct reported_figures *was,
+		      const struct reported_figures *is, const json_t *old_report,
+		      const json_t *new_report, struct incise_error *err)
+{
+	const json_t *old_quick = part_of(old_report, "quick"),
+		     *new_quick = part_of(new_report, "quick");
+
+	if (json_is_boolean(old_quick) && json_is_boolean(new_quick) &&
+	    json_is_true(old_quick) != json_is_true(new_quick))
+		return incise_error_set(
+			err, EINVAL,
+			"%s is of --quick and %s is not: they measured "
+			"other things",
+			json_is_true(old_quick) ? was->report : is->report,
+			json_is_true(old_quick) ? is->report : was->report);
+	for (int i = 0; i < is->n; i++)
+		if (reported_figures_find(was, &is->figure[i]))
+			return 0;
+	return incise_error_set(err, EINVAL,
+				"%s and %s have no figure in common: compare two of one "
+				"word, or two of incise bench all",
+				was->report, is->report);
+}
+
+json_t *compare_reports(const json_t *old_report, const char *old_name,
+			const json_t *new_report, const char *new_name,
+			struct incise_error *err)
+{
+	json_t *comparison = NULL, *differs = NULL;
+	struct reported_figures was, is = {0};
+	int rc = reported_figures_read(old_report, old_name, &was, err);
+
+	if (!rc)
+		rc = reported_figures_read(new_report, new_name, &is, err);
+	if (!rc)
+		rc = comparable(&was, &is, old_report, new_report, err);
+	if (!rc) {
+		differs = differing(old_report, new_report);
+		comparison = compare_all(&was, &is, differs);
+		json_decref(differs);
+		if (!comparison)
+			incise_error_set(err, ENOMEM, "no memory for a comparison");
+	}
+	reported_figures_free(&was);
+	reported_figures_free(&is);
+	return comparison;
+}
+
+int compare_worse(const json_t *comparison)
+{
+	return (int)json_integer_value(json_object_get(comparison, "worse")) +
+	       (int)json_array_size(json_object_get(comparison, "gone"));
+}
+
+/* ---- report ---- */
+
+static const char *text_of(const json_t *object, const char *key)
+{
+	return json_string_value(json_object_get(object, key));
+}
+
+static void name_of(const json_t *figure, char *name, size_t size)
+{
+	const char *word = text_of(figure, "word"), *is = text_of(figure, "name");
+
+	snprintf(name, size, "%s%s%s", word ? word : "", word && is ? ": " : "",
+		 is ? is : "");
+}
+
+static void print_names(const json_t *comparison, const char *key)
+{
+	const json_t *figure;
+	char name[2 * REPORTED_NAME_BYTES];
+	size_t i;
+
+	json_array_foreach(json_object_get(comparison, key), i, figure)
+	{
+		name_of(figure, name, sizeof(name));
+		printf("%s: %s\n", key, name);
+	}
+}
+
+void compare_print(const json_t *comparison)
+{
+	const json_t *differs = json_object_get(comparison, "differs"),
+		     *list = json_object_get(comparison, "changed"), *change;
+	char name[2 * REPORTED_NAME_BYTES];
+	size_t i;
+
+	for (i = 0; i < json_array_size(differs); i++)
+		printf("%s%s", i ? ", " : "another machine or build: ",
+		       json_string_value(json_array_get(differs, i)));
+	if (i)
+		printf("\n");
+	if (json_array_size(list))
+		printf("%-52s %12s %12s %8s\n", "changed beyond noise", "old", "new",
+		       "ratio");
+	json_array_foreach((json_t *)list, i, change)
+	{
+		name_of(change, name, sizeof(name));
+		printf("%-52s %12.5g %12.5g", name,
+		       json_number_value(json_object_get(change, "old")),
+		       json_number_value(json_object_get(change, "new")));
+		/* From 0 there is none. */
+		if (json_is_null(json_object_get(change, "ratio")))
+			printf(" %8s", "-");
+		else
+			printf(" %8.3f",
+			       json_number_value(json_object_get(change, "ratio")));
+		printf(" %s, %s\n", text_of(change, "unit"),
+		       json_is_true(json_object_get(change, "worse")) ? "worse"
+								      : "better");
+	}
+	print_names(comparison, "gone");
+	print_names(comparison, "new");
+	printf("%lld same, %lld better, %lld worse, %zu gone, %zu new\n",
+	       (long long)json_integer_value(json_object_get(comparison, "same")),
+	       (long long)json_integer_value(json_object_get(comparison, "better")),
+	       (long long)json_integer_value(json_object_get(comparison, "worse")),
+	       json_array_size(json_object_get(comparison, "gone")),
+	       json_array_size(json_object_get(comparison, "new")));
+}
+
+void compare_finish(json_t *comparison, bool json)
+{
+	int worse = compare_worse(comparison);
+
+	if (json) {
+		json_print(comparison);
+	} else {
+		compare_print(comparison);
+		json_decref(comparison);
+		cli_finish();
+	}
+	if (worse)
+		cli_fail("%d figure%s worse or gone, see above", worse,
+			 worse > 1 ? "s are" : " is");
+}

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Devices that fail or tell nonsense below a plan on the virtual rig: a fault is latched
+ * with its reason, and no force is asked for after it.
+ *
+ *   tracker ─▶ ?! ─▶ plan ─▶ targets ─▶ ?! ─▶ actuator
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <incise/backend.h>
+#include <incise/plan.h>
+#include <incise/rig.h>
+#include <incise/sim.h>
+#include "any_pose.h"
+#include "../cli/cli.h"
+#include "extremes.h"
+#include "../cli/memory_file.h"
+
+#define RUNS 2400
+#define TICKS 250
+#define MS INT64_C(1000000)
+#define TRAVEL_mm 20
+
+enum failure { FAILS_READ, FAILS_SET, FAILS_STATUS, FAILS_FAULT, FAILS_NEVER };
+
+/* What a run's devices do; ops have no context. */
+static struct hostile {
+	const struct incise_tracker_ops *tracker;
+	const struct incise_stepper_ops *stepper;
+	struct incise_tracker_ops tracker_ops;
+	struct incise_stepper_ops stepper_ops;
+	int fails_at; /* ticks until it fails; below 0: never */
+	int rc;	      /* with that */
+	enum failure what;
+	unsigned int faults;
+	bool nonsense;	  /* numbers that cannot be */
+	double target_mm; /* the last one */
+	bool beyond;	  /* a target that cannot be */
+} hostile;
+
+static bool fails(enum failure what)
+{
+	return hostile.fails_at <= 0 && hostile.what == what;
+}
+
+static int hostile_read(struct incise_tracker *tracker,
+			struct incise_tracker_sample *samples, int n)
+{
+	int got = hostile.tracker->read(tracker, samples, n);
+
+	if (fails(FAILS_READ))
+		return hostile.rc;
+	for (int i = 0; hostile.nonsense && i < got; i++)
+		if (!below(4)) {
+			for (int a = 0; a < 3; a++)
+				samples[i].position_mm[a] = special();
+			any_attitude(samples[i].quaternion);
+			samples[i].t_ns = below(4) ? samples[i].t_ns : (int64_t)any();
+		}
+	return got;
+}
+
+static int hostile_set(struct incise_stepper *stepper, double position_mm)
+{
+	hostile.target_mm = position_mm;
+	hostile.beyond |= !(position_mm >= 0 && position_mm <= TRAVEL_mm);
+	if (fails(FAILS_SET) || fails(FAILS_FAULT))
+		return fails(FAILS_FAULT) ? -EIO : hostile.rc;
+	return hostile.stepper->set(stepper, position_mm);
+}
+
+static int hostile_status(struct incise_stepper *stepper,
+			  struct incise_stepper_status *status)
+{
+	int rc = hostile.stepper->status(stepper, status);
+
+	if (fails(FAILS_STATUS))
+		return hostile.rc;
+	if (fails(FAILS_FAULT)) {
+		status->faults |= hostile.faults;
+		status->state = INCISE_STEPPER_FAULT;
+	}
+	if (hostile.nonsense && !below(4)) {
+		status->position_mm = special();
+		status->handle_mm = special();
+		status->force_N = special();
+		status->velocity_mm_s = special();
+	}
+	return rc;
+}
+
+static void take_devices(struct incise_rig *rig)
+{
+	struct incise_tracker *tracker = incise_rig_tracker(rig);
+	struct incise_stepper *stepper = incise_rig_stepper(rig);
+
+	hostile.tracker = tracker->ops;
+	hostile.tracker_ops = *tracker->ops;
+	hostile.tracker_ops.read = hostile_read;
+	tracker->ops = &hostile.tracker_ops;
+	hostile.stepper = stepper->ops;
+	hostile.stepper_ops = *stepper->ops;
+	hostile.stepper_ops.set = hostile_set;
+	hostile.stepper_ops.status = hostile_status;
+	stepper->ops = &hostile.stepper_ops;
+}
+
+static void give_back_devices(struct incise_rig *rig)
+{
+	incise_rig_tracker(rig)->ops = hostile.tracker;
+	incise_rig_stepper(rig)->ops = hostile.stepper;
+}
+
+static void prepare(bool nonsense)
+{
+	static const int codes[] = {EIO, ENODEV, EDOM, EPERM, ETIMEDOUT, EPROTO};
+
+	hostile.nonsense = nonsense;
+	hostile.what = nonsense ? FAILS_NEVER : (enum failure)below(4);
+	hostile.fails_at = (int)below(TICKS - 10);
+	hostile.rc = -codes[below(6)];
+	hostile.faults = 1U << below(INCISE_STEPPER_FAULTS);
+	/* Held within the travel is none. */
+	if (hostile.faults == INCISE_STEPPER_TRAVEL)
+		hostile.faults = INCISE_STEPPER_ESTOP;
+	hostile.beyond = false;
+}
+
+static bool finite_tick(const struct incise_tick *t, double limit_N)
+{
+	double force2 = 0;
+
+	for (int i = 0; i < 3; i++) {
+		force2 += t->command_N[i] * t->command_N[i];
+		if (!isfinite(t->position_mm[i]) || !isfinite(t->tool_mm[i]))
+			return false;
+	}
+	return sqrt(force2) <= limit_N && isfinite(t->rendered_N) &&
+	       isfinite(t->actuated_N) && isfinite(t->depth_mm);
+}
+
+/* One tick's case; @failed: of a tick before. */
+static bool judge(struct incise_plan *plan, int rc, int failed,
+		  const struct incise_tick *t)
+{
+	const char *why = incise_plan_fault(plan);
+	bool zero = t->command_N[0] == 0 && t->command_N[1] == 0 && t->command_N[2] == 0;
+	bool must = hostile.fails_at <= 0 && hostile.what != FAILS_NEVER;
+	char cause[200];
+
+	if (hostile.beyond || !finite_tick(t, 4))
+		return false;
+	if (!must)
+		return !rc && !failed && !why;
+	return rc < 0 && (!failed || rc == failed) && zero &&
+	       (t->flags & INCISE_TICK_FAULT) && why && *why &&
+	       incise_plan_cause(plan, cause, sizeof(cause)) > 0;
+}
+
+static void run(struct extremes_row *row, const struct incise_scene *scene, bool nonsense)
+{
+	char spec[100];
+	struct incise_error err = {0};
+	struct incise_tick tick;
+	struct incise_plan *plan;
+	struct incise_clock *clock;
+	struct incise_rig *rig;
+	int failed = 0;
+
+	snprintf(spec, sizeof(spec), "sim:clock=simulated,seed=%u,pause_s=0.1,cut_s=1",
+		 1 + below(1000));
+	rig = incise_rig_open(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, &err);
+	if (!rig)
+		cli_fail_with(&err);
+	clock = incise_rig_clock(rig);
+	plan = incise_plan_new(scene, rig, &err);
+	if (!plan)
+		cli_fail_with(&err);
+	prepare(nonsense);
+	take_devices(rig);
+	for (int k = 0; k < TICKS; k++, hostile.fails_at--) {
+		int rc;
+
+		incise_clock_wait_until(clock, incise_clock_now(clock) + MS);
+		rc = incise_plan_tick(plan, incise_clock_now(clock), &tick);
+		if (extremes_first_wrong(row, judge(plan, rc, failed, &tick)))
+			extremes_tell(
+				row,
+				"tick %d: %d after %d, force (%a, %a, %a), rendered %a, target "
+				"%a, flags %#x, fault '%s'; failure %d with %d and faults %#x, "
+				"case %ld of %s",
+				k, rc, failed, tick.command_N[0], tick.command_N[1],
+				tick.command_N[2], tick.rendered_N, hostile.target_mm,
+				tick.flags, incise_plan_fault(plan) ?: "", hostile.what,
+				hostile.rc, hostile.faults, row->tried, spec);
+		failed = rc;
+	}
+	give_back_devices(rig);
+	incise_plan_free(plan);
+	incise_rig_close(rig);
+}
+
+void extremes_device(struct extremes *all)
+{
+	static const struct {
+		const char *name, *what;
+	} rows[] = {
+		{"device_fault",
+		 "a tracker or an actuator of the virtual rig fails, or latches a fault, at any "
+		 "tick of a cut: that tick and all after it tell it with its reason, and ask for "
+		 "no force"},
+		{"device_nonsense",
+		 "both tell numbers that cannot be: forces within the limit, and targets within "
+		 "the travel"},
+	};
+	struct memory_file file = memory_file_begin("scene");
+	struct incise_error err = {0};
+	struct incise_scene *scene;
+
+	fputs("tissue = { reaction_N_mm = 0.3; plane_N_mm = 0.05; };\n"
+	      "effects = { guard = true; };\ndevice = { delay_ticks = 12; };\nlimits = { ramp_ms = 10.0; };\n",
+	      file.file);
+	memory_file_written(&file);
+	scene = incise_scene_load(file.path, NULL, &err);
+	if (!scene)
+		cli_fail_with(&err);
+	for (int nonsense = 0; nonsense < 2; nonsense++) {
+		struct extremes_row *row =
+			extremes_begin(all, rows[nonsense].name, rows[nonsense].what);
+
+		rng = extremes_seed(all, row);
+		for (long k = extremes_cases(all, RUNS / 2); k; k--)
+			run(row, scene, nonsense);
+	}
+	incise_scene_free(scene);
+	fclose(file.file);
+}

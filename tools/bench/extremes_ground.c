@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Scenes on each kind of ground; see extremes_ground.h.
+ */
+#include <math.h>
+#include <stdbool.h>
+#include "../cli/cli.h"
+#include "extremes_ground.h"
+#include "../cli/memory_file.h"
+
+void ground_write_model(FILE *out)
+{
+	fputs("[System]\nName='extremes'\nType='sugeno'\nVersion=2.0\nNumInputs=2\n"
+	      "NumOutputs=1\nNumRules=4\nAndMethod='prod'\nOrMethod='probor'\n"
+	      "ImpMethod='prod'\nAggMethod='sum'\nDefuzzMethod='wtaver'\n\n",
+	      out);
+	fputs("[Input1]\nName='depth_mm'\nRange=[0 20]\nNumMFs=2\n"
+	      "MF1='a':'gaussmf',[8.5 0]\nMF2='b':'gaussmf',[8.5 20]\n\n"
+	      "[Input2]\nName='velocity_mm_s'\nRange=[0 50]\nNumMFs=2\n"
+	      "MF1='a':'gaussmf',[21 0]\nMF2='b':'gaussmf',[21 50]\n\n"
+	      "[Output1]\nName='force_N'\nRange=[0 4]\nNumMFs=4\n"
+	      "MF1='a':'linear',[0.1 0.001 0]\nMF2='b':'linear',[0.1 0.002 0.02]\n"
+	      "MF3='c':'linear',[0.1 0.001 0.04]\nMF4='d':'linear',[0.1 0.001 0]\n\n"
+	      "[Rules]\n1 1, 1 (1) : 1\n1 2, 2 (1) : 1\n2 1, 3 (1) : 1\n2 2, 4 (1) : 1\n",
+	      out);
+}
+
+/* Slices from pole to pole; turned inside out with a radius below 0. */
+static void write_ball(FILE *out, double radius_mm)
+{
+	const int slices = 16, stacks = 9, last = 2 + slices * (stacks - 1);
+
+	fprintf(out, "v 0 0 %.17g\n", radius_mm);
+	for (int i = 1; i < stacks; i++)
+		for (int k = 0; k < slices; k++) {
+			double across = fabs(radius_mm) * sin(M_PI * i / stacks);
+
+			fprintf(out, "v %.17g %.17g %.17g\n",
+				across * cos(2 * M_PI * k / slices),
+				across * sin(2 * M_PI * k / slices),
+				radius_mm * cos(M_PI * i / stacks));
+		}
+	fprintf(out, "v 0 0 %.17g\n", -radius_mm);
+	for (int k = 0; k < slices; k++) {
+		int next = (k + 1) % slices, bottom = 2 + slices * (stacks - 2);
+
+		fprintf(out, "f 1 %d %d\n", 2 + k, 2 + next);
+		for (int i = 0; i + 2 < stacks; i++)
+			fprintf(out, "f %d %d %d %d\n", 2 + slices * i + k,
+				2 + slices * (i + 1) + k, 2 + slices * (i + 1) + next,
+				2 + slices * i + next);
+		fprintf(out, "f %d %d %d\n", last, bottom + next, bottom + k);
+	}
+}
+
+static void write_solid(FILE *out)
+{
+	write_ball(out, 40);
+}
+
+static void write_cavity(FILE *out)
+{
+	write_ball(out, -60);
+}
+
+static void write_waves(FILE *out)
+{
+	fputs("ncols 25\nnrows 25\nxllcenter -60\nyllcenter -60\ncellsize 5\n", out);
+	for (int j = 0; j < 25; j++)
+		for (int i = 0; i < 25; i++)
+			fprintf(out, "%.17g%c",
+				2 * cos(0.5 * (i - 12)) * cos(0.5 * (j - 12)),
+				i < 24 ? ' ' : '\n');
+}
+
+#define KINDS 6
+static const struct {
+	const char *name, *surface; /* %s: its file */
+	void (*write)(FILE *out);
+	double away_mm;
+} kinds[KINDS] = {
+	{"plane", "kind = \"plane\";", NULL, 80},
+	{"sphere", "kind = \"sphere\"; centre_mm = [0.0, 0.0, -40.0]; radius_mm = 40.0;",
+	 NULL, 80},
+	{"capsule",
+	 "kind = \"capsule\"; from_mm = [-60.0, 0.0, -55.0]; to_mm = [160.0, 0.0, -55.0]; "
+	 "radius_mm = 55.0;",
+	 NULL, 80},
+	{"heights", "kind = \"heights\"; file = \"%s\";", write_waves, 80},
+	{"mesh", "kind = \"mesh\"; file = \"%s\"; at_mm = [0.0, 0.0, -40.0];",
+	 write_solid, 80},
+	/* Tissue around a hole. */
+	{"cavity", "kind = \"mesh\"; file = \"%s\";", write_cavity, 50},
+};
+
+static struct incise_scene *make(int kind, bool fixed, bool model)
+{
+	struct memory_file scene = memory_file_begin("scene"),
+			   ground = memory_file_begin("ground"),
+			   force = memory_file_begin("model");
+	struct incise_error err = {0};
+	struct incise_scene *made;
+
+	if (kinds[kind].write)
+		kinds[kind].write(ground.file);
+	ground_write_model(force.file);
+	fprintf(scene.file, "arithmetic = \"%s\";\nsurface = { ",
+		fixed ? "fixed" : "double");
+	fprintf(scene.file, kinds[kind].surface, ground.path);
+	fputs(" };\n", scene.file);
+	if (model)
+		fprintf(scene.file, "model = \"%s\";\n", force.path);
+	fprintf(scene.file,
+		"tissue = { %s plane_N_mm = 0.3; damping_N_s_mm = 0.001;\n"
+		"  insertion_N_mm = 0.5; spread_N_mm = 0.4; leave_mm = 0.25; };\n"
+		"effects = { average_ticks = 8; guard = true; };\n"
+		"tool = { handle_mm = 30.0; };\n"
+		"device = { damping_N_s_mm = 0.03; delay_ticks = 12; };\n"
+		"limits = { force_N = 2.0; slew_N_s = 400.0; pose_age_ms = 50.0;\n"
+		"  ramp_ms = 50.0; fade_ms = 20.0; };\n",
+		model ? "" : "reaction_N_mm = 0.25;");
+	memory_file_written(&ground);
+	memory_file_written(&force);
+	memory_file_written(&scene);
+	made = incise_scene_load(scene.path, model ? force.path : NULL, &err);
+	if (!made)
+		cli_fail_with(&err);
+	fclose(scene.file);
+	fclose(ground.file);
+	fclose(force.file);
+	return made;
+}
+
+void grounds_make(struct grounds *grounds)
+{
+	*grounds = (struct grounds){0};
+	for (int kind = 0; kind < KINDS; kind++)
+		for (int fixed = 0; fixed < 2; fixed++) {
+			int n = grounds->n++;
+
+			grounds->ground[n] =
+				(struct ground){kinds[kind].name, kinds[kind].away_mm};
+			grounds->scene[n] = make(kind, fixed, (kind + fixed) % 2);
+		}
+}
+
+void grounds_free(struct grounds *grounds)
+{
+	for (int i = 0; i < grounds->n; i++)
+		incise_scene_free(grounds->scene[i]);
+}

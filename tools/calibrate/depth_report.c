@@ -1,0 +1,370 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Reports of a calibration of depth; see depth_report.h.
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "calibrate_report.h"
+#include "../cli/cli.h"
+#include "depth_report.h"
+#include "../cli/json.h"
+#include "../cli/picture.h"
+
+#define OUTLIERS_SHOWN 20
+
+static const struct incise_depth_part *parts(const struct depth_result *r, int *n)
+{
+	*n = r->fit ? r->fit->n_parts : r->board->n_parts;
+	return r->fit ? r->fit->part : r->board->part;
+}
+
+static double residual(const struct depth_result *r, int i)
+{
+	const struct incise_depth_fit *fit = r->fit;
+
+	if (!strcmp(r->way, "line"))
+		return r->lengths->mm[i] -
+		       fit->mm_px * (fit->full_px - r->lengths->px[i]);
+	return (r->lengths->px[i] - fit->full_px) * fit->mm_px;
+}
+
+static void budget_text(const struct depth_result *r, FILE *out)
+{
+	double value = r->record->values[0].left, u = r->record->values[0].u;
+	int n;
+	const struct incise_depth_part *part = parts(r, &n);
+
+	fprintf(out, "\n%-36s type  %-18s %-14s contribution\n", "budget of depth_mm_px",
+		"u", "sensitivity");
+	for (int i = 0; i < n; i++) {
+		char text[40];
+
+		snprintf(text, sizeof(text), "%.3g %s", part[i].u, part[i].unit);
+		fprintf(out, "%-36s %c     %-18s %-14.4g %.3g mm/px\n", part[i].name,
+			part[i].type, text, part[i].sensitivity,
+			fabs(part[i].u * part[i].sensitivity));
+	}
+	fprintf(out, "%-36s       %-18s %-14s %.3g mm/px (%.3f %%)\n", "together", "", "",
+		u, 100 * u / value);
+}
+
+static void lengths_text(const struct depth_result *r, FILE *out)
+{
+	const struct incise_depth_fit *fit = r->fit;
+	int shown = 0;
+
+	fprintf(out, "full_px        %.3f, u %.3f\n", fit->full_px, fit->u_full_px);
+	fprintf(out, "readings       %d, of which %d were believed, worth %d\n", fit->n,
+		fit->inliers, fit->effective);
+	if (isfinite(fit->sd_mm))
+		fprintf(out, "residuals      sd %.4f mm, largest %.4f mm\n", fit->sd_mm,
+			fit->largest_mm);
+	if (isfinite(fit->bend_mm))
+		fprintf(out,
+			"bend           %.4f mm, u %.4f mm: what a parabola adds at the "
+			"ends\n",
+			fit->bend_mm, fit->bend_sd_mm);
+	fprintf(out, "range          %.1f to %.1f px\n", fit->low_px, fit->high_px);
+	for (int i = 0; i < fit->n; i++)
+		if (!r->inlier[i] && shown++ < OUTLIERS_SHOWN)
+			fprintf(out, "outlier        %s: %.2f px%s\n",
+				r->lengths->name[i], r->lengths->px[i],
+				!strcmp(r->way, "line") &&
+						r->lengths->mm[i] > r->lengths->px[i]
+					? ", columns swapped?"
+					: "");
+	if (shown > OUTLIERS_SHOWN)
+		fprintf(out, "outliers       %d more\n", shown - OUTLIERS_SHOWN);
+}
+
+static void board_text(const struct depth_result *r, FILE *out)
+{
+	const struct incise_board_fit *b = r->board;
+	const struct incise_board_lens *l = &b->lens, *u = &b->u_lens;
+
+	fprintf(out, "views          %d, of which %d were believed, %.1f degrees apart\n",
+		b->n, b->views, b->spread_deg);
+	fprintf(out,
+		"corners        %.3f px (rms) off the board; in the plane %.4f mm, "
+		"largest %.4f mm\n",
+		b->rms_px, b->plane_rms_mm, b->plane_largest_mm);
+	fprintf(out,
+		"lens           fx %.2f (u %.2f), fy %.2f (u %.2f), cx %.2f (u %.2f), "
+		"cy %.2f (u %.2f) px\n",
+		l->fx, u->fx, l->fy, u->fy, l->cx, u->cx, l->cy, u->cy);
+	fprintf(out,
+		"distortion     k1 %.4f (u %.4f), k2 %.4f (u %.4f), p1 %.5f (u %.5f), "
+		"p2 %.5f (u %.5f)\n",
+		l->k1, u->k1, l->k2, u->k2, l->p1, u->p1, l->p2, u->p2);
+	fprintf(out,
+		"plane          tilted by %.2f degrees, at most %.2f (k = 2); %.0f mm "
+		"away\n",
+		b->tilt_deg, b->tilt_deg + 2 * b->u_tilt_deg, b->distance_mm);
+	fprintf(out, "region         %.6f to %.6f mm/px along the handle\n", b->low_mm_px,
+		b->high_mm_px);
+	fprintf(out, "one number     is off by up to %.4f mm along the handle\n",
+		b->bend_mm);
+	fprintf(out, "homography     [%.6g %.6g %.6g; %.6g %.6g %.6g; %.6g %.6g %.6g]\n",
+		b->homography[0], b->homography[1], b->homography[2], b->homography[3],
+		b->homography[4], b->homography[5], b->homography[6], b->homography[7],
+		b->homography[8]);
+	for (int v = 0; v < b->n; v++)
+		if (!b->believed[v])
+			fprintf(out, "outlier        view %s: %.2f px\n",
+				r->corners->name[v], b->view_rms_px[v]);
+}
+
+static void vision_text(const struct depth_result *r, FILE *out)
+{
+	const struct incise_vision_setup *s = &r->source->setup;
+
+	if (!r->fit || !r->source->found_setup)
+		return;
+	fprintf(out,
+		"\nfor rig.conf:\nvision = {\n\thue = [%d, %d];\n\tsaturation = [%d, %d];\n"
+		"\tvalue = [%d, %d];\n\tfull_px = %.3f;\n};\n",
+		s->hue[0], s->hue[1], s->saturation[0], s->saturation[1], s->value[0],
+		s->value[1], r->fit->full_px);
+}
+
+void depth_report_text(const struct depth_result *r, FILE *out)
+{
+	const struct incise_calibration_value *value = &r->record->values[0];
+
+	fprintf(out, "depth_mm_px    %.7f mm/px, U %.7f (k = 2), %.3f %%\n", value->left,
+		2 * value->u, 200 * value->u / value->left);
+	fprintf(out, "as found       %.7f, changed by %+.3f %%\n", value->found,
+		100 * (value->left / value->found - 1));
+	fprintf(out, "method         %s\n", r->record->method);
+	if (r->fit)
+		lengths_text(r, out);
+	else
+		board_text(r, out);
+	budget_text(r, out);
+	fprintf(out, "\n%s: %s\n", r->record->pass ? "pass" : "fail", r->record->verdict);
+	vision_text(r, out);
+}
+
+/* --- JSON ---------------------------------------------------------------------------- */
+
+static void set(json_t *object, const char *key, double value)
+{
+	json_object_set_new(object, key, json_number(value));
+}
+
+static void lengths_json(const struct depth_result *r, json_t *object)
+{
+	const struct incise_depth_fit *fit = r->fit;
+	json_t *outliers = json_array();
+
+	set(object, "full_px", fit->full_px);
+	set(object, "full_u_px", fit->u_full_px);
+	json_object_set_new(object, "readings", json_integer(fit->n));
+	json_object_set_new(object, "inliers", json_integer(fit->inliers));
+	json_object_set_new(object, "effective", json_integer(fit->effective));
+	set(object, "residual_sd_mm", fit->sd_mm);
+	set(object, "residual_max_mm", fit->largest_mm);
+	set(object, "bend_mm", fit->bend_mm);
+	set(object, "bend_u_mm", fit->bend_sd_mm);
+	for (int i = 0; i < fit->n; i++)
+		if (!r->inlier[i])
+			json_array_append_new(outliers, json_text(r->lengths->name[i]));
+	json_object_set_new(object, "outliers", outliers);
+	if (r->source->found_setup) {
+		const struct incise_vision_setup *s = &r->source->setup;
+
+		json_object_set_new(object, "vision",
+				    json_pack("{s[ii]s[ii]s[ii]}", "hue", s->hue[0],
+					      s->hue[1], "saturation", s->saturation[0],
+					      s->saturation[1], "value", s->value[0],
+					      s->value[1]));
+	}
+}
+
+static void board_json(const struct depth_result *r, json_t *object)
+{
+	static const char *const names[] = {"fx_px", "fy_px", "cx_px", "cy_px",
+					    "k1",    "k2",    "p1",    "p2"};
+	const struct incise_board_fit *b = r->board;
+	const double lens[] = {b->lens.fx, b->lens.fy, b->lens.cx, b->lens.cy,
+			       b->lens.k1, b->lens.k2, b->lens.p1, b->lens.p2};
+	json_t *values = json_object(), *h = json_array(), *outliers = json_array();
+
+	for (int i = 0; i < 8; i++)
+		set(values, names[i], lens[i]);
+	json_object_set_new(object, "lens", values);
+	for (int i = 0; i < 9; i++)
+		json_array_append_new(h, json_number(b->homography[i]));
+	json_object_set_new(object, "homography", h);
+	json_object_set_new(object, "views", json_integer(b->n));
+	json_object_set_new(object, "inliers", json_integer(b->views));
+	set(object, "rms_px", b->rms_px);
+	set(object, "plane_rms_mm", b->plane_rms_mm);
+	set(object, "plane_max_mm", b->plane_largest_mm);
+	set(object, "tilt_deg", b->tilt_deg);
+	set(object, "tilt_bound_deg", b->tilt_deg + 2 * b->u_tilt_deg);
+	set(object, "distance_mm", b->distance_mm);
+	set(object, "spread_deg", b->spread_deg);
+	set(object, "low_mm_px", b->low_mm_px);
+	set(object, "high_mm_px", b->high_mm_px);
+	set(object, "bend_mm", b->bend_mm);
+	for (int v = 0; v < b->n; v++)
+		if (!b->believed[v])
+			json_array_append_new(outliers, json_text(r->corners->name[v]));
+	json_object_set_new(object, "outliers", outliers);
+}
+
+json_t *depth_report_json(const struct depth_result *r)
+{
+	const struct incise_calibration_value *value = &r->record->values[0];
+	json_t *object = json_object(), *budget = json_array();
+	int n;
+	const struct incise_depth_part *part = parts(r, &n);
+
+	json_object_set_new(object, "way", json_string(r->way));
+	json_object_set_new(object, "pass", json_boolean(r->record->pass));
+	json_object_set_new(object, "in_force", json_boolean(r->in_force));
+	json_object_set_new(object, "verdict", json_text(r->record->verdict));
+	set(object, "depth_mm_px", value->left);
+	set(object, "u_mm_px", value->u);
+	set(object, "U_mm_px", 2 * value->u);
+	set(object, "found_mm_px", value->found);
+	for (int i = 0; i < n; i++) {
+		char kind[2] = {part[i].type, 0};
+
+		json_array_append_new(budget,
+				      json_pack("{ssssssso so}", "name", part[i].name,
+						"type", kind, "unit", part[i].unit, "u",
+						json_number(part[i].u), "sensitivity",
+						json_number(part[i].sensitivity)));
+	}
+	json_object_set_new(object, "budget", budget);
+	if (r->fit)
+		lengths_json(r, object);
+	else
+		board_json(r, object);
+	return object;
+}
+
+/* --- folder -------------------------------------------------------------------------- */
+
+static void lengths_data(const struct depth_result *r, FILE *data)
+{
+	for (int i = 0; i < r->fit->n; i++)
+		fprintf(data, "%d %.5f %.6f %.6f %d\n", i + 1, r->lengths->px[i],
+			r->lengths->mm[i], residual(r, i), r->inlier[i]);
+}
+
+static void board_data(const struct depth_result *r, FILE *data)
+{
+	const struct incise_board_views *v = r->views;
+	int corners = v->columns * v->rows;
+	double sx = 0, sy = 0, at[2], c = 0, s = 0, angle, mean[2] = {0};
+
+	/* The board's own frame: corners on the plane are turned and moved onto it. */
+	for (int i = 0; i < corners; i++) {
+		const double *px = v->corners + 2 * ((size_t)corners * v->plane + i);
+
+		incise_board_plane(r->board, px[0], px[1], at);
+		mean[0] += at[0] / corners;
+		mean[1] += at[1] / corners;
+		sx += (double)(i % v->columns) / corners;
+		sy += (double)(i / v->columns) / corners;
+	}
+	for (int i = 0; i < corners; i++) {
+		const double *px = v->corners + 2 * ((size_t)corners * v->plane + i);
+		double x = (i % v->columns - sx) * v->square_mm;
+		double y = (i / v->columns - sy) * v->square_mm;
+
+		incise_board_plane(r->board, px[0], px[1], at);
+		c += x * (at[0] - mean[0]) + y * (at[1] - mean[1]);
+		s += x * (at[1] - mean[1]) - y * (at[0] - mean[0]);
+	}
+	angle = atan2(s, c);
+	for (int i = 0; i < corners; i++) {
+		const double *px = v->corners + 2 * ((size_t)corners * v->plane + i);
+		double x = (i % v->columns - sx) * v->square_mm;
+		double y = (i / v->columns - sy) * v->square_mm, dx, dy;
+
+		incise_board_plane(r->board, px[0], px[1], at);
+		dx = at[0] - mean[0];
+		dy = at[1] - mean[1];
+		fprintf(data, "%.3f %.3f %.5f %.5f %.5f %.5f\n", px[0], px[1], x, y,
+			dx * cos(angle) + dy * sin(angle) - x,
+			dy * cos(angle) - dx * sin(angle) - y);
+	}
+}
+
+static void draw(const struct depth_result *r, const char *folder)
+{
+	FILE *script, *data = picture_data(folder, "depth.dat");
+	bool line = !strcmp(r->way, "line");
+
+	if (r->fit)
+		lengths_data(r, data);
+	else
+		board_data(r, data);
+	picture_data_end(data, folder);
+	script = picture_begin(folder, "fit", 900, 600);
+	if (line)
+		fprintf(script,
+			"set xlabel 'exposed length / px'\nset ylabel 'depth / mm'\n"
+			"set key top right\n"
+			"plot 'depth.dat' using 2:($5 > 0 ? $3 : 1/0) pt 7 ps 0.5 lc rgb '#1b6ca8' "
+			"title 'pairs', \\\n"
+			"  '' using 2:($5 > 0 ? 1/0 : $3) pt 2 lc rgb '#c0392b' title 'outliers', \\\n"
+			"  %.12g * (%.12g - x) ls 3 title 'fit'\n",
+			r->fit->mm_px, r->fit->full_px);
+	else if (r->fit)
+		fprintf(script,
+			"set xlabel 'reading'\nset ylabel 'length / px'\nset key top right\n"
+			"plot 'depth.dat' using 1:($5 > 0 ? $2 : 1/0) pt 7 ps 0.7 lc rgb '#1b6ca8' "
+			"title 'lengths', \\\n"
+			"  '' using 1:($5 > 0 ? 1/0 : $2) pt 2 lc rgb '#c0392b' title 'outliers', \\\n"
+			"  %.12g ls 3 title 'mean'\n",
+			r->fit->full_px);
+	else
+		fprintf(script,
+			"set xlabel 'x / px'\nset ylabel 'y / px'\nset yrange [*:*] reverse\n"
+			"set size ratio -1\n"
+			"plot 'depth.dat' using 1:2 pt 1 lc rgb '#1b6ca8'\n");
+	if (!picture_draw(script, folder, "fit"))
+		cli_fail("gnuplot could not draw %s/fit", folder);
+	script = picture_begin(folder, "residuals", 900, 600);
+	if (r->fit)
+		fprintf(script,
+			"set xlabel '%s'\nset ylabel 'residual / mm'\n"
+			"plot 'depth.dat' using %d:($5 > 0 ? $4 : 1/0) pt 7 ps 0.5 lc rgb "
+			"'#1b6ca8', 0 ls 3\n",
+			line ? "exposed length / px" : "reading", line ? 2 : 1);
+	else
+		fprintf(script,
+			"set xlabel 'x on the board / mm'\nset ylabel 'y on the board / mm'\n"
+			"set title 'corners in the plane, off by, 100 times as large'\n"
+			"set size ratio -1\n"
+			"plot 'depth.dat' using 3:4:($5 * 100):($6 * 100) with vectors lc rgb "
+			"'#1b6ca8'\n");
+	if (!picture_draw(script, folder, "residuals"))
+		cli_fail("gnuplot could not draw %s/residuals", folder);
+}
+
+void depth_report_folder(const struct depth_result *r, const char *dir)
+{
+	struct incise_outfile *file;
+	const char *folder, *name;
+	json_t *object = depth_report_json(r);
+	char *path;
+	FILE *out;
+
+	if (asprintf(&path, "%s/fit", dir) < 0)
+		cli_fail("no memory");
+	picture_place("report", path, &folder, &name);
+	out = calibrate_report_text(folder, &file);
+	depth_report_text(r, out);
+	whole_file_end(file);
+	calibrate_report_json(folder, object);
+	json_decref(object);
+	draw(r, folder);
+	free(path);
+}

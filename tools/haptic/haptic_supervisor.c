@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The thread of the loop, and the one that looks after it; see haptic_supervisor.h.
+ *
+ *   loop      tick tick tick tick …          (real time; no lock, no file, no log)
+ *               │ control: events, ticks, plans        │ state page
+ *   supervisor  └─▶ log, sd_notify, watchdog, reload   └─▶ incise status, incise view …
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <sys/resource.h>
+#include <unistd.h>
+#include "../cli/cli.h"
+#include "haptic_self_test.h"
+#include "haptic_supervisor.h"
+#include "notify.h"
+
+#define LOOK_MS 100
+#define SAY_NS INCISE_NS_PER_S
+
+static volatile sig_atomic_t reload_asked;
+
+/* What the loop's thread and its supervisor share until it is joined. */
+struct supervisor {
+	struct haptic *haptic;
+	struct incise_clock *time; /* of the log; the rig's may be a simulated one */
+	pthread_t thread;
+	int ended_fd; /* readable when the loop has ended */
+	_Atomic int tid;
+	int rc;
+	struct incise_error err;
+
+	/* A scene that is to take the place of the one in force. */
+	struct incise_scene *next_scene;
+	struct incise_plan *next_plan;
+
+	bool ready, stopping;
+	uint64_t fed_ticks; /* when the watchdog was last fed */
+	uint64_t said_ticks;
+	uint64_t overruns, skipped; /* since the last line of the log */
+	uint64_t overruns_all, skipped_all;
+	bool stale;
+	char refused[530]; /* why the last scene was, until another is taken */
+	int64_t say_ns, feed_ns, watchdog_ns;
+};
+
+/* ---- the loop's thread ---- */
+
+static void take_counts(struct incise_realtime_counts *counts, int sign)
+{
+	struct rusage usage;
+
+	getrusage(RUSAGE_THREAD, &usage);
+	counts->minor_faults += (uint64_t)(sign * usage.ru_minflt);
+	counts->major_faults += (uint64_t)(sign * usage.ru_majflt);
+	counts->voluntary += (uint64_t)(sign * usage.ru_nvcsw);
+	counts->involuntary += (uint64_t)(sign * usage.ru_nivcsw);
+}
+
+static void *run_loop(void *argument)
+{
+	struct supervisor *s = argument;
+	struct haptic *haptic = s->haptic;
+	uint64_t one = 1;
+
+	s->tid = gettid();
+	if (haptic->realtime)
+		s->rc = incise_realtime_enter(haptic->realtime, &s->err);
+	if (!s->rc) {
+		take_counts(&haptic->counts, -1);
+		s->rc = incise_loop_run(haptic->plan, incise_rig_clock(haptic->rig),
+					&haptic->loop, haptic->stats, &s->err);
+		take_counts(&haptic->counts, 1);
+	}
+	if (write(s->ended_fd, &one, sizeof(one)) < 0)
+		abort();
+	return NULL;
+}
+
+static int start_thread(struct supervisor *s, struct incise_error *err)
+{
+	sigset_t all, before;
+	int rc;
+
+	/* Signals are the supervisor's: in the loop they would be late ticks. */
+	sigfillset(&all);
+	pthread_sigmask(SIG_SETMASK, &all, &before);
+	rc = pthread_create(&s->thread, NULL, run_loop, s);
+	pthread_sigmask(SIG_SETMASK, &before, NULL);
+	return rc ? incise_error_set(err, rc, "the loop's thread: %s", strerror(rc)) : 0;
+}
+
+/* ---- another scene ---- */
+
+static void on_reload(int number)
+{
+	(void)number;
+	reload_asked = 1;
+}
+
+void haptic_catch_reload(void)
+{
+	struct sigaction action = {.sa_handler = on_reload};
+	int terminal = open("/dev/tty", O_RDONLY | O_CLOEXEC | O_NOCTTY);
+
+	if (terminal >= 0)
+		close(terminal);
+	else
+		sigaction(SIGHUP, &action, NULL);
+}
+
+struct incise_plan *haptic_plan(const struct haptic *haptic,
+				const struct incise_scene *scene,
+				struct incise_error *err)
+{
+	struct incise_plan *plan = incise_plan_new(scene, haptic->rig, err);
+
+	if (plan) {
+		incise_plan_set_tool(plan, haptic->tool);
+		incise_plan_set_tip(plan, haptic->tip_mm);
+	}
+	return plan;
+}
+
+static void forget_next(struct supervisor *s)
+{
+	incise_plan_free(s->next_plan);
+	incise_scene_free(s->next_scene);
+	s->next_plan = NULL;
+	s->next_scene = NULL;
+}
+
+static int prepare_next(struct supervisor *s, struct incise_error *err)
+{
+	struct haptic *haptic = s->haptic;
+	struct self_test test;
+	double rate_hz;
+	int rc;
+
+	s->next_scene = scene_argument_read(&haptic->argument, err);
+	if (!s->next_scene)
+		return -errno;
+	rate_hz = incise_scene_rate_hz(s->next_scene);
+	if (rate_hz != haptic->loop.rate_hz)
+		return incise_error_set(err, EINVAL,
+					"%s: rate_hz is %g, and the loop runs at %g: "
+					"restart it",
+					haptic->argument.path, rate_hz,
+					haptic->loop.rate_hz);
+	rc = haptic_self_test(s->next_scene, incise_rig_tracker(haptic->rig), &test, err);
+	if (rc)
+		return rc;
+	s->next_plan = haptic_plan(haptic, s->next_scene, err);
+	return s->next_plan ? 0 : -errno;
+}
+
+static void begin_reload(struct supervisor *s)
+{
+	struct incise_error err = {0};
+	int rc = 0;
+
+	reload_asked = 0;
+	/* One at a time; the last one asked for counts. */
+	if (s->next_plan || s->stopping) {
+		reload_asked = !s->stopping;
+		return;
+	}
+	notify_reloading();
+	incise_state_run(s->haptic->state, INCISE_RUN_RELOADING, "");
+	rc = prepare_next(s, &err);
+	if (!rc)
+		rc = incise_loop_control_offer(s->haptic->loop.control, s->next_plan);
+	if (!rc)
+		return;
+	forget_next(s);
+	incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
+	incise_state_refused(s->haptic->state, err.text);
+	cli_warn("not reloaded, the scene before goes on: %s", err.text);
+	snprintf(s->refused, sizeof(s->refused), "; not reloaded: %s", err.text);
+	notify_send("READY=1");
+}
+
+static void end_reload(struct supervisor *s)
+{
+	struct haptic *haptic = s->haptic;
+	struct incise_plan *old = incise_loop_control_retired(haptic->loop.control);
+
+	if (!old)
+		return;
+	incise_plan_free(old);
+	incise_scene_free(haptic->scene);
+	haptic->plan = s->next_plan;
+	haptic->scene = s->next_scene;
+	s->next_plan = NULL;
+	s->next_scene = NULL;
+	incise_state_scene(haptic->state, haptic->argument.path, haptic->plan);
+	incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
+	s->refused[0] = 0;
+	cli_note("%s: read again and in force", haptic->argument.path);
+	notify_send("READY=1");
+}
+
+/* ---- what is told ---- */
+
+static void take_events(struct supervisor *s)
+{
+	struct incise_loop_event events[32];
+	int n;
+
+	while ((n = incise_loop_control_events(s->haptic->loop.control, events, 32)) > 0)
+		for (int i = 0; i < n; i++)
+			switch (events[i].kind) {
+			case INCISE_LOOP_OVERRUN:
+				s->overruns++;
+				s->skipped += (uint64_t)events[i].value;
+				break;
+			case INCISE_LOOP_STALE:
+				s->stale = true;
+				/* The first pose is on its way. */
+				if (events[i].tick)
+					cli_note("no fresh pose: the force fades");
+				break;
+			case INCISE_LOOP_FRESH:
+				s->stale = false;
+				if (events[i].value > 100)
+					cli_note("poses again, after %.0f ms",
+						 events[i].value);
+				break;
+			case INCISE_LOOP_NOT_FINITE:
+				cli_warn("the force was no number: none was asked for");
+				break;
+			case INCISE_LOOP_PLAN:
+				break;
+			}
+}
+
+/* Once a second: what piled up, and how it goes. */
+static void say(struct supervisor *s, uint64_t ticks, int64_t now_ns)
+{
+	struct haptic *haptic = s->haptic;
+	struct incise_realtime_counts counts;
+	double seconds = (double)(now_ns - s->say_ns + SAY_NS) / INCISE_NS_PER_S;
+	double rate_hz = (double)(ticks - s->said_ticks) / seconds;
+	char text[200];
+
+	s->overruns_all += s->overruns;
+	s->skipped_all += s->skipped;
+	if (s->overruns)
+		cli_note("%llu overruns, %llu ticks skipped",
+			 (unsigned long long)s->overruns, (unsigned long long)s->skipped);
+	s->overruns = s->skipped = 0;
+	if (s->tid && !incise_realtime_count(s->tid, &counts))
+		incise_state_counts(haptic->state, &counts);
+	snprintf(text, sizeof(text), "%.0f of %g Hz, %llu overruns, %llu ticks skipped%s",
+		 rate_hz, haptic->loop.rate_hz, (unsigned long long)s->overruns_all,
+		 (unsigned long long)s->skipped_all, s->stale ? ", no fresh pose" : "");
+	notify_send("STATUS=%s%s", text, s->refused);
+	cli_progress("%s: %s; Ctrl-C ends", haptic->argument.path, text);
+	s->said_ticks = ticks;
+}
+
+static void look(struct supervisor *s)
+{
+	struct haptic *haptic = s->haptic;
+	uint64_t ticks = incise_loop_control_ticks(haptic->loop.control);
+	int64_t now_ns = incise_clock_now(s->time);
+
+	take_events(s);
+	if (!s->ready && ticks) {
+		s->ready = true;
+		incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
+		notify_send("READY=1\nSTATUS=runs at %g Hz", haptic->loop.rate_hz);
+		cli_note("%s: runs at %g Hz, %s", haptic->argument.path,
+			 haptic->loop.rate_hz, haptic->scheduling);
+	}
+	/* Only while ticks come: else the manager is to end what hangs. */
+	if (s->watchdog_ns && now_ns >= s->feed_ns && ticks != s->fed_ticks) {
+		notify_send("WATCHDOG=1");
+		s->fed_ticks = ticks;
+		s->feed_ns = now_ns + s->watchdog_ns / 4;
+	}
+	if (cli_stop && !s->stopping) {
+		s->stopping = true;
+		incise_state_run(s->haptic->state, INCISE_RUN_STOPPING,
+				 strsignal(cli_stop));
+		notify_send("STOPPING=1\nSTATUS=the force fades");
+		cli_note("%s: the force fades", strsignal(cli_stop));
+	}
+	end_reload(s);
+	if (reload_asked && s->ready)
+		begin_reload(s);
+	if (now_ns >= s->say_ns) {
+		say(s, ticks, now_ns);
+		s->say_ns = now_ns + SAY_NS;
+	}
+}
+
+/* What was prepared and came to nothing, as the loop has ended. */
+static void settle(struct supervisor *s)
+{
+	take_events(s);
+	end_reload(s);
+	if (s->next_plan)
+		incise_loop_control_withdraw(s->haptic->loop.control);
+	forget_next(s);
+}
+
+static int supervise(struct supervisor *s, struct incise_error *err)
+{
+	struct pollfd ended = {.fd = s->ended_fd, .events = POLLIN};
+	int rc = start_thread(s, err);
+
+	if (rc)
+		return rc;
+	while (poll(&ended, 1, LOOK_MS) <= 0)
+		look(s);
+	pthread_join(s->thread, NULL);
+	settle(s);
+	if (s->rc)
+		*err = s->err;
+	return s->rc;
+}
+
+int haptic_supervise(struct haptic *haptic, struct incise_error *err)
+{
+	struct supervisor s = {.haptic = haptic,
+			       .ended_fd = eventfd(0, EFD_CLOEXEC),
+			       .time = incise_clock_new_real(),
+			       .watchdog_ns = notify_watchdog_ns()};
+	int rc;
+
+	haptic->loop.control = incise_loop_control_new();
+	if (!haptic->loop.control || !s.time || s.ended_fd < 0) {
+		rc = incise_error_set(err, errno, "the loop cannot be looked after: %s",
+				      strerror(errno));
+	} else {
+		s.say_ns = incise_clock_now(s.time) + SAY_NS;
+		rc = supervise(&s, err);
+	}
+	if (s.ended_fd >= 0)
+		close(s.ended_fd);
+	incise_clock_free(s.time);
+	incise_loop_control_free(haptic->loop.control);
+	haptic->loop.control = NULL;
+	return rc;
+}

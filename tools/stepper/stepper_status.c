@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Where an actuator stands, in words and as JSON; see stepper_status.h.
+ */
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include "../cli/json.h"
+#include "../cli/stepper_counters.h"
+#include "stepper_status.h"
+
+/* From the lowest bit on; a person's word, and the key of JSON. */
+static const struct {
+	const char *word, *key;
+} inputs[] = {
+	{"limit at 0", "limit_min"},
+	{"limit at the end", "limit_max"},
+	{"home", "home"},
+	{"e-stop", "estop"},
+	{"alarm", "alarm"},
+};
+#define INPUTS (sizeof(inputs) / sizeof(*inputs))
+
+static const char *const fault_keys[] = {
+	"deadman", "travel", "limit_min", "limit_max", "estop",
+	"alarm",   "late",   "setpoint",  "owner",     "suspend",
+	"gone",	   "line",   "bus",	  "lost",      "following",
+};
+_Static_assert(sizeof(fault_keys) / sizeof(*fault_keys) == INCISE_STEPPER_FAULTS,
+	       "a key for each fault");
+
+long long stepper_steps(const struct incise_stepper_info *info, double mm)
+{
+	return info->step_mm > 0 ? llround(mm / info->step_mm) : 0;
+}
+
+static const char *faults_text(unsigned int faults, char *text, size_t size)
+{
+	size_t used = 0;
+
+	text[0] = 0;
+	for (unsigned int bit = 0; bit < INCISE_STEPPER_FAULTS && used < size; bit++)
+		if (faults & 1u << bit)
+			used += snprintf(text + used, size - used, "%s%s",
+					 used ? "; " : "",
+					 incise_stepper_fault_text(1u << bit));
+	return text;
+}
+
+/* What begins with the device's name is printed where that was said. */
+static void drop_name(struct incise_stepper *stepper, char *text)
+{
+	const char *rest = strstr(text, ": ");
+	struct incise_stepper_info info = {0};
+
+	incise_stepper_info(stepper, &info);
+	/* The name may say more than the line does, such as "not real-time". */
+	if (rest && !strncmp(text, info.name, (size_t)(rest - text)))
+		memmove(text, rest + 2, strlen(rest + 2) + 1);
+}
+
+/* The device's own words for its fault; false where it has none beyond those of the bit. */
+static bool own_cause(struct incise_stepper *stepper, unsigned int faults, char *text,
+		      size_t size)
+{
+	if (!faults || incise_stepper_cause(stepper, text, size) <= 0)
+		return false;
+	for (unsigned int bit = 0; bit < INCISE_STEPPER_FAULTS; bit++)
+		if (!strcmp(text, incise_stepper_fault_text(1u << bit)))
+			return false;
+	drop_name(stepper, text);
+	return true;
+}
+
+const char *stepper_why(struct incise_stepper *stepper, unsigned int faults, char *text,
+			size_t size)
+{
+	return own_cause(stepper, faults, text, size) ? text
+						      : faults_text(faults, text, size);
+}
+
+/* "home, e-stop", or what to say when there is none. */
+static void put_inputs(unsigned int bits, const char *none)
+{
+	const char *comma = "";
+
+	for (unsigned int i = 0; i < INPUTS; i++)
+		if (bits & 1u << i) {
+			printf("%s%s", comma, inputs[i].word);
+			comma = ", ";
+		}
+	if (!bits)
+		fputs(none, stdout);
+}
+
+static void put_limits(const struct incise_stepper_info *info)
+{
+	printf("limits     0 to %g mm in steps of %g um, up to %g mm/s and %g mm/s^2",
+	       info->travel_mm, info->step_mm * 1e3, info->velocity_mm_s,
+	       info->acceleration_mm_s2);
+	if (info->jerk_mm_s3 > 0)
+		printf(" and %g mm/s^3", info->jerk_mm_s3);
+	if (info->rate_max_hz > 0 && info->step_mm > 0)
+		printf("; %g steps/s of at most %g",
+		       round(info->velocity_mm_s / info->step_mm), info->rate_max_hz);
+	putchar('\n');
+}
+
+void stepper_status_text(struct incise_stepper *stepper,
+			 const struct incise_stepper_info *info,
+			 const struct incise_stepper_status *status)
+{
+	char cause[300];
+
+	printf("%s: %s at %.4f mm (step %lld), %s\n", info->name,
+	       incise_stepper_state_name(status->state), status->position_mm,
+	       stepper_steps(info, status->position_mm),
+	       status->homed ? "homed"
+			     : "not homed: a count, until `incise stepper home`");
+	printf("velocity   %.3f mm/s\n", status->velocity_mm_s);
+	if (info->measures_handle)
+		printf("handle     at %.4f mm, %.4f N on the hand\n", status->handle_mm,
+		       status->force_N);
+	printf("inputs     ");
+	put_inputs(status->inputs, info->inputs ? "none active" : "none wired");
+	if (info->inputs) {
+		printf(" (wired: ");
+		put_inputs(info->inputs, "");
+		putchar(')');
+	}
+	putchar('\n');
+	for (unsigned int bit = 0; bit < INCISE_STEPPER_FAULTS; bit++)
+		if (status->faults & 1u << bit)
+			printf("fault      %s\n", incise_stepper_fault_text(1u << bit));
+	if (!status->faults)
+		puts("faults     none");
+	if (own_cause(stepper, status->faults, cause, sizeof(cause)))
+		printf("cause      %s\n", cause);
+	put_limits(info);
+	printf("deadman    %g ms without a target\nlate       %llu steps\n",
+	       info->deadman_s * 1e3, (unsigned long long)status->late);
+	stepper_counters_text(stepper);
+}
+
+void stepper_status_line(struct incise_stepper *stepper,
+			 const struct incise_stepper_status *status, double t_s)
+{
+	char text[400];
+
+	printf("%.3f s  %s at %.4f mm, %.3f mm/s, %s; inputs ", t_s,
+	       incise_stepper_state_name(status->state), status->position_mm,
+	       status->velocity_mm_s, status->homed ? "homed" : "not homed");
+	put_inputs(status->inputs, "none");
+	if (status->faults)
+		printf("; %s", stepper_why(stepper, status->faults, text, sizeof(text)));
+	putchar('\n');
+}
+
+static json_t *inputs_json(unsigned int bits)
+{
+	json_t *list = json_array();
+
+	for (unsigned int i = 0; i < INPUTS; i++)
+		if (bits & 1u << i)
+			json_array_append_new(list, json_string(inputs[i].key));
+	return list;
+}
+
+static json_t *faults_json(unsigned int faults)
+{
+	json_t *list = json_array();
+
+	for (unsigned int bit = 0; bit < INCISE_STEPPER_FAULTS; bit++)
+		if (faults & 1u << bit)
+			json_array_append_new(
+				list,
+				json_pack("{ss ss}", "fault", fault_keys[bit], "text",
+					  incise_stepper_fault_text(1u << bit)));
+	return list;
+}
+
+/* Without measures_handle there is nothing to believe in these two. */
+static json_t *measured(const struct incise_stepper_info *info, double value)
+{
+	return info->measures_handle ? json_number(value) : json_null();
+}
+
+/* In the device's own words, else those of its first fault; null without one. */
+static json_t *cause_json(struct incise_stepper *stepper, unsigned int faults)
+{
+	char text[300];
+
+	return faults && incise_stepper_cause(stepper, text, sizeof(text)) > 0
+		       ? json_text(text)
+		       : json_null();
+}
+
+json_t *stepper_status_json(struct incise_stepper *stepper,
+			    const struct incise_stepper_info *info,
+			    const struct incise_stepper_status *status)
+{
+	return json_pack(
+		"{so sI ss so sI so sb so so so so so so sI so so so so so so so so so}",
+		"name", json_text(info->name), "t_ns", (json_int_t)status->t_ns, "state",
+		incise_stepper_state_name(status->state), "position_mm",
+		json_number(status->position_mm), "position_steps",
+		(json_int_t)stepper_steps(info, status->position_mm), "velocity_mm_s",
+		json_number(status->velocity_mm_s), "homed", status->homed, "handle_mm",
+		measured(info, status->handle_mm), "force_N",
+		measured(info, status->force_N), "inputs", inputs_json(status->inputs),
+		"inputs_wired", inputs_json(info->inputs), "faults",
+		faults_json(status->faults), "cause", cause_json(stepper, status->faults),
+		"late_steps", (json_int_t)status->late, "travel_mm",
+		json_number(info->travel_mm), "step_mm", json_number(info->step_mm),
+		"velocity_max_mm_s", json_number(info->velocity_mm_s),
+		"acceleration_max_mm_s2", json_number(info->acceleration_mm_s2),
+		"jerk_max_mm_s3",
+		info->jerk_mm_s3 > 0 ? json_number(info->jerk_mm_s3) : json_null(),
+		"deadman_s", json_number(info->deadman_s), "rate_max_hz",
+		info->rate_max_hz > 0 ? json_number(info->rate_max_hz) : json_null(),
+		"spring_N_mm", json_number(info->spring_N_mm), "counters",
+		stepper_counters_json(stepper));
+}
