@@ -4,6 +4,7 @@
 #   O=DIR          build there instead of build/
 #   prefix, DESTDIR, bindir, libdir, includedir, mandir …   as usual
 #   CFLAGS, LDFLAGS, CPPFLAGS   yours; the project's own flags are kept apart
+#   V=1            show whole commands
 #   DEPS=no        let `make demo` and `make check` install no packages
 
 O ?= build
@@ -54,9 +55,9 @@ has_board := $(if $(has_vision),$(if $(shell $(CXX) -E -x c++ $(opencv_cflags) \
 # built.
 has_view := $(shell $(PKG_CONFIG) --exists sdl2 epoxy cairo egl && echo yes)
 libraries := incise incise-learn incise-record $(if $(has_view),incise-view)
-rooms_incise := base fixed model tissue scene loop sim device
+rooms_incise := base fixed model surface tissue control sim device scene loop
 rooms_incise-learn := learn calib
-rooms_incise-record := record
+rooms_incise-record := $(addprefix record,/ /time /write /read /verify /export /replay)
 rooms_incise-view := view
 pc_incise := libconfig
 pc_incise-learn := lapacke lapack blas
@@ -66,10 +67,9 @@ libs_incise := -lm -ldl
 libs_incise-learn := -lm
 libs_incise-record := -lm -ldl -pthread
 libs_incise-view := -lm
-also_incise := lib/record/crc32c.o
 also_incise-view := lib/device/module.o
-also_incise-record := lib/base/ring.o lib/device/module.o lib/device/thread.o \
-	lib/tissue/predict.o
+also_incise-record := lib/base/crc32c.o lib/base/ring.o lib/device/module.o lib/device/thread.o \
+	lib/control/predict.o
 about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop
 about_incise-learn := haptic cutting: learning models from data
 about_incise-record := haptic cutting: recordings and what is exported of them
@@ -82,6 +82,10 @@ needs_incise-view := incise
 # One program per verb.
 verbs := $(filter-out $(if $(has_view),,view bench-view),$(patsubst tools/incise-%.c,%,\
 	$(wildcard tools/incise-*.c)))
+
+# A short line for each step of the build; V=1 shows the whole commands.
+Q := $(if $(V),,@)
+step = $(if $(V),,@printf '  %-4s %s\n' $1 '$(patsubst $(O)/%,%,$@)')
 
 all: libs tools
 

@@ -7,11 +7,13 @@ objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))) $
 
 $(O)/obj/%.o: %.c
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
+	$(call step,CC)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
 
 $(O)/obj/%.o: %.cc
 	@mkdir -p $(@D)
-	$(CXX) $(cppflags) $(CPPFLAGS) $(cxxflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
+	$(call step,CXX)
+	$(Q)$(CXX) $(cppflags) $(CPPFLAGS) $(cxxflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
 
 # The integer core builds without any library and, where the compiler can be told so,
 # without floating-point registers: it will be linked into a kernel.
@@ -27,7 +29,8 @@ $$(call objects,$1): pc_cflags = $$(pc_flags_$1)
 $(O)/lib/lib$1.so.$(version): $$(call objects,$1) lib/lib$1.map \
 		$$(foreach lib,$$(needs_$1),$(O)/lib/lib$$(lib).so)
 	@mkdir -p $$(@D)
-	$$(CC) -shared -Wl,-soname,lib$1.so.$(soversion) -Wl,-z,defs -Wl,--as-needed \
+	$$(call step,LD)
+	$$(Q)$$(CC) -shared -Wl,-soname,lib$1.so.$(soversion) -Wl,-z,defs -Wl,--as-needed \
 		-Wl,--version-script,lib/lib$1.map $$(call runpath) \
 		-L$(O)/lib $$(CFLAGS) $$(LDFLAGS) -o $$@ $$(call objects,$1) \
 		$$(addprefix -l,$$(needs_$1)) $$(pc_libs_$1) $$(libs_$1)
@@ -113,34 +116,35 @@ $(objects_vision_opencv): pc_cflags = $(opencv_cflags)
 device_modules += $(if $(has_board),board_opencv)
 pc_board_opencv :=
 objects_board_opencv := $(addprefix $(O)/obj/lib/,vision/picture.o vision/jpeg.o \
-	board/board_opencv.o)
+	vision/board/board_opencv.o)
 libs_board_opencv := -lopencv_calib3d $(libs_vision_opencv)
-$(O)/obj/lib/board/board_opencv.o: pc_cflags = $(opencv_cflags)
+$(O)/obj/lib/vision/board/board_opencv.o: pc_cflags = $(opencv_cflags)
 
 # Pictures in a file; lib/record loads it.
 has_frames := $(shell $(PKG_CONFIG) --exists libavformat libavcodec libavutil && echo yes)
 device_modules += $(if $(has_frames),frames_mkv)
 pc_frames_mkv := libavformat libavcodec libavutil
-objects_frames_mkv := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/frames/*.c))
+objects_frames_mkv := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/record/mkv/*.c))
 $(objects_frames_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
 
 # Films of pictures; lib/view loads it.
 device_modules += $(if $(has_view),$(if $(has_frames),film_mkv))
 pc_film_mkv := $(pc_frames_mkv)
-objects_film_mkv := $(O)/obj/lib/film/film_mkv.o
+objects_film_mkv := $(O)/obj/lib/view/film/film_mkv.o
 $(objects_film_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_film_mkv))
 
 # What writes HDF5; libincise-record loads it.
 has_hdf5 := $(shell $(PKG_CONFIG) --exists hdf5 zlib && echo yes)
 device_modules += $(if $(has_hdf5),export_hdf5)
 pc_export_hdf5 := hdf5 zlib
-objects_export_hdf5 := $(O)/obj/lib/record/hdf5/export_hdf5.o
+objects_export_hdf5 := $(O)/obj/lib/record/export/hdf5/export_hdf5.o
 $(objects_export_hdf5): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_export_hdf5))
 
 define device_module
 $(O)/lib/incise/$1.so: $$(objects_$1) $(O)/lib/libincise.so
 	@mkdir -p $$(@D)
-	$$(CC) -shared -Wl,-z,defs -Wl,--as-needed $$(call runpath,/..) -L$(O)/lib \
+	$$(call step,LD)
+	$$(Q)$$(CC) -shared -Wl,-z,defs -Wl,--as-needed $$(call runpath,/..) -L$(O)/lib \
 		$$(CFLAGS) $$(LDFLAGS) -o $$@ $$(objects_$1) -lincise \
 		$$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1))) $$(libs_$1) -lm -pthread
 
@@ -165,7 +169,8 @@ $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $
 	@mkdir -p $(@D)
 	@rm -f $@
 	# q, not r: two rooms may have a file of the same name
-	$(AR) qcs $@ $^
+	$(call step,AR)
+	$(Q)$(AR) qcs $@ $^
 
 all_libs = $(if $(has_libmnl),$(shell $(PKG_CONFIG) --libs libmnl)) \
 	$(if $(has_libiio),$(shell $(PKG_CONFIG) --libs libiio)) \

@@ -30,7 +30,8 @@ rtsan_objects := $(filter $(O)/obj/lib/device/can/% $(O)/obj/lib/device/polhemus
 $(O)/lib/libincise-rtsan.a: $(call objects,incise) $(rtsan_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
-	$(AR) qcs $@ $^
+	$(call step,AR)
+	$(Q)$(AR) qcs $@ $^
 
 rtsan_units := $(filter-out $(if $(has_libmnl),,can/can_stepper),\
 	can/can_stepper device/motor device/stepper_gpio device/stepper_kernel loop/control \

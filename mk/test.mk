@@ -5,7 +5,7 @@
 unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_netlink.c) \
 	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \
 	$(if $(has_libusb),,%/polhemus_usb.c %/polhemus_usb_find.c) \
-	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/frames/% tests/unit/film/%) \
+	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/mkv/% tests/unit/film/%) \
 	$(if $(has_hdf5),,tests/unit/hdf5/%) $(if $(has_view),,tests/unit/view/%),\
 	$(wildcard tests/unit/*/*.c))
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
@@ -17,7 +17,7 @@ ldflags_device/stepper_kernel := $(foreach name,open close ioctl mmap munmap clo
 	nanosleep,-Wl,--wrap=$(name))
 ldflags_daq/comedi_force := -Wl,--wrap=read
 ldflags_daq/iio_source := -Wl,--wrap=open
-ldflags_frames/mkv_writer := -Wl,--wrap=write
+ldflags_mkv/mkv_writer := -Wl,--wrap=write
 ldflags_can/slcan := -Wl,--wrap=write
 ldflags_can/slcan_tty := -Wl,--wrap=write
 ldflags_can/socketcan := $(foreach name,socket bind setsockopt send recvmsg ppoll close \
@@ -48,7 +48,7 @@ $(filter $(O)/tests/unit/vision/%,$(unit_programs)): $(vision_linked)
 
 # What of pictures in a file is in a module is linked to its own tests.
 libs_frames_tests = $(shell $(PKG_CONFIG) --libs $(pc_frames_mkv))
-$(filter $(O)/tests/unit/frames/% $(O)/tests/unit/film/%,$(unit_programs)): private CPPFLAGS += \
+$(filter $(O)/tests/unit/mkv/% $(O)/tests/unit/film/%,$(unit_programs)): private CPPFLAGS += \
 	$(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
 
 # They read pictures by cairo, and play SDL's part.
@@ -62,18 +62,20 @@ $(filter $(O)/tests/unit/hdf5/%,$(unit_programs)): private CPPFLAGS += \
 
 $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
 		$(filter %.c,$^) -lm -pthread
 
 $(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
 		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
 		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(if $(filter vision/%,$*),$(vision_linked)) \
 		$(if $(filter tools/%,$*),$(unit_tools)) \
 		$(if $(filter hdf5/%,$*),$(objects_export_hdf5) $(shell $(PKG_CONFIG) --libs $(pc_export_hdf5))) \
 		$(O)/lib/libincise-tests.a $(if $(filter vision/%,$*),$(libs_vision_opencv)) \
-		$(if $(filter frames/% film/%,$*),$(libs_frames_tests)) \
+		$(if $(filter mkv/% film/%,$*),$(libs_frames_tests)) \
 		$(all_libs) $(if $(filter tools/%,$*),$(shell $(PKG_CONFIG) --libs jansson)) \
 		$(shell $(PKG_CONFIG) --libs cmocka) -lm
 
@@ -83,7 +85,7 @@ check: ## install what is missing, build, and run all tests
 	@mk/deps module || echo "going on without what checking the module needs"
 	@mk/deps rtsan || echo "going on without RealtimeSanitizer"
 	@mk/deps deb debian || echo "going on without what building packages needs"
-	+@$(MAKE) --no-print-directory check-style cli-needs
+	+@$(MAKE) --no-print-directory check-style check-layers cli-needs
 	+@$(MAKE) --no-print-directory cli_filter="--filter-tags '!slow'" cli-tests check-unit-once check-fuzz check-rtsan check-module check-deb check-vm
 
 # A locale with a decimal comma, to show that files do not depend on it.
@@ -110,20 +112,23 @@ attack_programs := $(addprefix $(O)/tests/attack/,kill faults damage record watc
 $(addprefix $(O)/tests/attack/,kill faults): tests/attack/round.c
 $(O)/tests/attack/%: tests/attack/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
 		$(LDFLAGS) -o $@ $(filter %.c,$^) $(O)/lib/libincise-tests.a $(all_libs) -lm -pthread
 
 # Loaded into the real programs; under a sanitizer it would have to come behind its library.
 $(O)/tests/attack/%.so: tests/attack/%.c
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -fPIC $(warnings) -Wno-missing-prototypes \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -fPIC $(warnings) -Wno-missing-prototypes \
 		$(CFLAGS) -MMD -MP -MF $@.d -shared $(LDFLAGS) -o $@ $< -ldl \
 		$(shell $(PKG_CONFIG) --libs sqlite3)
 
 # A loop that tells its state, for who reads it.
 $(O)/tests/state/loop: tests/state/loop.c $(O)/lib/libincise.so
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../../lib' -lincise
 
 attack_bats = INCISE_BUILD=$(abspath $(O)) bats --print-output-on-failure tests/attack
@@ -165,7 +170,8 @@ check-unit-once: check-sanitize ## check-sanitize, and of check-unit what differ
 tsan_programs := $(O)/tests/tsan/loop/state_reader
 $(tsan_programs): tests/unit/loop/state_reader.c $(wildcard lib/loop/state_*.c) $(O)/lib/libincise.so
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \
 		-Wno-unused-parameter -Wno-tsan $(shell $(PKG_CONFIG) --cflags cmocka) -O1 -g \
 		-fsanitize=thread -MMD -MP -MF $@.d -o $@ $(filter %.c,$^) -L$(O)/lib \
 		-Wl,-rpath,$(abspath $(O)/lib) -lincise $(shell $(PKG_CONFIG) --libs cmocka) -lm
@@ -177,6 +183,9 @@ style_sources := $(shell find lib tools tests driver -name '*.[ch]' -o -path 'li
 check-style: ## the house's form: clang-format, an SPDX line in every file
 	@tests/style $(style_sources)
 
+check-layers: libs ## no layer of lib/ uses a higher one
+	@tests/layers $(O)
+
 doc: ## reference of the public headers in build/doc/html; fails where a comment is missing
 	@mk/deps doc
 	@mk/doc $(abspath $(O))/doc $(version)
@@ -184,24 +193,27 @@ doc: ## reference of the public headers in build/doc/html; fails where a comment
 
 check-doc: doc
 
-.PHONY: doc check-doc check check-style check-unit check-unit-once check-cli cli-needs cli-tests check-attack check-sanitize check-tsan can-drive mcap-reader
+.PHONY: doc check-doc check check-style check-layers check-unit check-unit-once check-cli cli-needs cli-tests check-attack check-sanitize check-tsan can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise -lm -pthread
 
 # A tracker at a line, in real time.
 $(O)/tests/tracker_line: tests/bench/tracker_line.c $(emulator) $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
 		$(LDFLAGS) -o $@ $^ $(all_libs) -lm -pthread
 
 # Pictures into a file, what they cost.
 $(O)/tests/frames: tests/bench/frames.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
 		$(LDFLAGS) -o $@ $(filter %.c %.a,$^) $(libs_frames_tests) $(all_libs) -lm -pthread
 
 check-frames: $(O)/tests/frames ## CPU per picture and bytes per hour of each format
@@ -210,7 +222,8 @@ check-frames: $(O)/tests/frames ## CPU per picture and bytes per hour of each fo
 # Virtual rigs with known truth, seen through the module of vision.
 $(O)/tests/calibrate_depth: tests/bench/calibrate_depth.c libs
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise -lincise-learn -lm
 
 check-depth: $(O)/tests/calibrate_depth ## whether stated intervals of depth hold the truth on 200 virtual rigs
@@ -219,7 +232,8 @@ check-depth: $(O)/tests/calibrate_depth ## whether stated intervals of depth hol
 # What it costs the loop to tell its state.
 $(O)/tests/state_tick: tests/bench/state_tick.c libs
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise
 
 check-state: $(O)/tests/state_tick ## what it costs the loop to tell its state, ns
@@ -232,7 +246,8 @@ check-tracker: $(O)/tests/tracker_line ## a FASTRAK at a serial line for ten min
 # A day of ticks; the rig's clock starts where the test says.
 $(O)/tests/day: tests/bench/day.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
 		$(LDFLAGS) -Wl,--wrap=incise_clock_new_simulated -o $@ $(filter %.c %.a,$^) \
 		$(all_libs) -lm -pthread
 

@@ -26,7 +26,8 @@ $(O)/obj/tools/calibrate/depth_picture.o $(O)/obj/tools/cli/png_file.o: cppflags
 tool_parts := $(O)/obj/tools/parts.a
 $(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tools/*/*.c))
 	@rm -f $@
-	$(AR) rcs $@ $^
+	$(call step,AR)
+	$(Q)$(AR) rcs $@ $^
 
 tool_libs := $(patsubst %,-l%,$(libraries)) $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
 
@@ -38,7 +39,8 @@ peer := $(if $(shell $(CXX) -E -x c++ -include fl/Headers.h /dev/null >/dev/null
 
 $(O)/lib/incise/peer_%.so: tools/bench/peers/%.cc $(O)/lib/libincise.so
 	@mkdir -p $(@D) $(O)/obj/tools/bench/peers
-	$(CXX) -std=c++14 -fPIC -fvisibility=hidden -Wall -Wextra $(cppflags) $(CPPFLAGS) $(CFLAGS) \
+	$(call step,LD)
+	$(Q)$(CXX) -std=c++14 -fPIC -fvisibility=hidden -Wall -Wextra $(cppflags) $(CPPFLAGS) $(CFLAGS) \
 		-MMD -MP -MF $(O)/obj/tools/bench/peers/$*.d -shared $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -lincise -l$*
 
@@ -51,7 +53,8 @@ $(O)/lib/incise/peer_%.py: tools/bench/peers/%.py
 
 $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(libraries),$(O)/lib/lib$(lib).so)
 	@mkdir -p $(@D)
-	$(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed $(call runpath,/../lib) \
+	$(call step,LD)
+	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed $(call runpath,/../lib) \
 		-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $< $(tool_parts) $(tool_libs) \
 		$(shell $(PKG_CONFIG) --libs jansson)
 

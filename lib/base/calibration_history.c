@@ -13,7 +13,7 @@
 #include <time.h>
 #include <incise/calibration.h>
 #include <incise/outfile.h>
-#include "../record/crc32c.h"
+#include "crc32c.h"
 #include "calibration_file.h"
 #include "conf.h"
 

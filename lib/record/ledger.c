@@ -4,7 +4,7 @@
  */
 #include <math.h>
 #include <string.h>
-#include "crc32c.h"
+#include "../base/crc32c.h"
 #include "ledger.h"
 
 const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_STREAMS] = {

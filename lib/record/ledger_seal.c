@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "crc32c.h"
+#include "../base/crc32c.h"
 #include "ledger_seal.h"
 
 /* More than a writer puts before the first picture. */

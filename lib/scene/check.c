@@ -13,7 +13,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <incise/slope.h>
-#include "../tissue/pose_loop.h"
+#include "../control/pose_loop.h"
 #include "plan.h"
 
 /* The largest slopes of the model, by depth and by speed. */

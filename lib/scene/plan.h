@@ -10,12 +10,12 @@
 #include <incise/guard.h>
 #include <incise/model.h>
 #include <incise/plan.h>
-#include "../tissue/average.h"
+#include "../surface/average.h"
 #include "../tissue/incision.h"
 #include "../tissue/instrument.h"
-#include "../tissue/limit.h"
-#include "../tissue/predict.h"
-#include "../tissue/start.h"
+#include "../control/limit.h"
+#include "../control/predict.h"
+#include "../control/start.h"
 #include "scene.h"
 
 /* Poses taken at one tick; more than a tracker sends in a period, even after a stall. */

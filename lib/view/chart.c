@@ -5,7 +5,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include "../base/vector.h"
-#include "../tissue/surface.h"
+#include "../surface/surface.h"
 #include "chart_kind.h"
 #include "larynx.h"
 

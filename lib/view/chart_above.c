@@ -10,7 +10,7 @@
  *            ╎/  ╎   ╎   ╎  \╎       what lies under an overhang is not seen
  */
 #include "../base/vector.h"
-#include "../tissue/surface.h"
+#include "../surface/surface.h"
 #include "chart_kind.h"
 
 #define SIDE_MAX_MM 120.0

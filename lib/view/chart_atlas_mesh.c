@@ -6,7 +6,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include "../base/vector.h"
-#include "../tissue/surface.h"
+#include "../surface/surface.h"
 #include "chart_kind.h"
 
 /* So many vertices of one place are compared; beyond, equal ones may stand twice. */

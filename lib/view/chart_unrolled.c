@@ -12,7 +12,7 @@
  *          ───┼───► down
  */
 #include "../base/vector.h"
-#include "../tissue/surface.h"
+#include "../surface/surface.h"
 #include "chart_kind.h"
 
 #define WIDE_MAX_MM 160.0

@@ -21,7 +21,7 @@
 #include <sqlite3.h>
 #include <incise/recording.h>
 #include <incise/verify.h>
-#include "../../lib/record/crc32c.h"
+#include "../../lib/base/crc32c.h"
 #include "../../lib/record/frames.h"
 
 #define BYTES_MAX 8

@@ -13,7 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 #include <incise/rig.h>
-#include "../../lib/frames/mkv.h"
+#include "../../lib/record/mkv/mkv.h"
 
 #define WIDTH 640
 #define HEIGHT 480

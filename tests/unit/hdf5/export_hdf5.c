@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/hdf5/export_hdf5.c: what it wrote is read back through libhdf5's
+ * Tests of lib/record/export/hdf5/export_hdf5.c: what it wrote is read back through libhdf5's
  * own interface.
  */
 #include <stdarg.h>
@@ -16,7 +16,7 @@
 #include <cmocka.h>
 #include <hdf5.h>
 #include <incise/backend.h>
-#include "../../../lib/record/table_writer.h"
+#include "../../../lib/record/export/table_writer.h"
 
 static const struct incise_column columns[] = {
 	{"cut", "1", "a name", INCISE_COLUMN_NAME, 0},

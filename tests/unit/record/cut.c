@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/cut.c; the stream of samples is tested by export.c too.
+ * Tests of lib/record/read/cut.c; the stream of samples is tested by export.c too.
  */
 #include "recorded.h"
-#include "../../../lib/record/cut.h"
-#include "../../../lib/record/depth.h"
+#include "../../../lib/record/read/cut.h"
+#include "../../../lib/record/read/depth.h"
 
 static void hysteresis(void **state)
 {

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 #include <cmocka.h>
-#include "../../../lib/record/depth.h"
+#include "../../../lib/record/read/depth.h"
 
 #define RECORDS 2000
 #define PERIOD_NS 8333333LL /* 120 Hz */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/record/depth_pairs.c: pictures are put into a recording of the virtual rig by SQL, half
+ * lib/record/read/depth_pairs.c: pictures are put into a recording of the virtual rig by SQL, half
  * way between records of the tracker, where the depth is known by hand.
  */
 #include "recorded.h"

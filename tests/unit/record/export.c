@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/export.c: against the same done by brute force from the tables,
+ * Tests of lib/record/export/export.c: against the same done by brute force from the tables,
  * all in memory, with nothing of the library.
  */
 #include "recorded.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/record/frame_pump.c, with a camera, a file and a vision that do as they are told:
+ * lib/record/write/frame_pump.c, with a camera, a file and a vision that do as they are told:
  * every picture is in the file or in a count, whoever is slow, ends or hangs.
  */
 #include <stdarg.h>
@@ -16,7 +16,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/backend.h>
-#include "../../../lib/record/frame_pump.h"
+#include "../../../lib/record/write/frame_pump.h"
 
 #define SIDE 16
 #define MS 1000000LL

@@ -5,7 +5,7 @@
  */
 #include "recorded.h"
 #include <fcntl.h>
-#include "../../../lib/record/crc32c.h"
+#include "../../../lib/base/crc32c.h"
 #include "../../../lib/record/ledger_seal.h"
 #include "../../../lib/record/schema.h"
 

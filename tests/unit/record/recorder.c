@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/recorder.c: on the virtual rig, whose devices are made to fail by
+ * Tests of lib/record/write/recorder.c: on the virtual rig, whose devices are made to fail by
  * putting other functions before theirs.
  */
 #include "recorded.h"
@@ -9,7 +9,7 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <incise/backend.h>
-#include "../../../lib/record/cut.h"
+#include "../../../lib/record/read/cut.h"
 
 #define SIM "sim:clock=simulated"
 #define DB "a.rec/recording.db"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/recorder_camera.c: a camera beside the others, one that dies, and one
+ * Tests of lib/record/write/recorder_camera.c: a camera beside the others, one that dies, and one
  * whose file is taken away.
  */
 #include "recorded.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/recorder_disk.c: what it expects a recording to take, against what one
+ * Tests of lib/record/write/recorder_disk.c: what it expects a recording to take, against what one
  * takes, and the room that it asks for. (A disk that fills is in tests/cli/capture.bats.)
  */
 #include "recorded.h"

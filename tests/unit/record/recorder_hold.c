@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/recorder_hold.c: the last second before a trigger, and no more.
+ * Tests of lib/record/write/recorder_hold.c: the last second before a trigger, and no more.
  */
 #include "recorded.h"
 #include <incise/verify.h>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/recorder_streams.c: times of a whole recording against the truth. The
+ * Tests of lib/record/write/recorder_streams.c: times of a whole recording against the truth. The
  * truth is the same virtual tracker without jitter, whose arrivals less the latency are the
  * times of acquisition.
  */
 #include "recorded.h"
-#include "../../../lib/record/recording.h"
+#include "../../../lib/record/read/recording.h"
 
 struct errors {
 	double rms_ms, worst_ms;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/recording.c: what a recording says of itself, and that no damaged
+ * Tests of lib/record/read/recording.c: what a recording says of itself, and that no damaged
  * one is believed.
  */
 #include "recorded.h"

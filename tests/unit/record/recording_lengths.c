@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/recording_lengths.c: lengths of pictures beside the depth at their time, also
+ * Tests of lib/record/read/recording_lengths.c: lengths of pictures beside the depth at their time, also
  * where there is none, and where somebody wrote into the tables what cannot be.
  */
 #include "recorded.h"

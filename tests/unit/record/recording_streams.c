@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/recording_streams.c: the tables streams and knots, also where somebody
+ * Tests of lib/record/read/recording_streams.c: the tables streams and knots, also where somebody
  * wrote into them what cannot be.
  */
 #include "recorded.h"
-#include "../../../lib/record/recording.h"
+#include "../../../lib/record/read/recording.h"
 
 #define DB "a.rec/recording.db"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/recording_values.c: arrays hold what the tables do, at the best times;
+ * Tests of lib/record/read/recording_values.c: arrays hold what the tables do, at the best times;
  * depth is the calibrated tip's; and no damaged row is believed.
  */
 #include "recorded.h"

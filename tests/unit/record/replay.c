@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/replay.c: the forces are those that the live loop had on the same
+ * Tests of lib/record/replay/replay.c: the forces are those that the live loop had on the same
  * poses, to the bit; what is told of them is the same as by plain sums.
  */
 #include "recorded.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/replay_source.c: what a recording of hand-written rows says at each
+ * Tests of lib/record/replay/replay_source.c: what a recording of hand-written rows says at each
  * tick, against the same told by plain sums over the rows.
  */
 #include "recorded.h"
-#include "../../../lib/record/replay_source.h"
+#include "../../../lib/record/replay/replay_source.h"
 
 #define DB "known.rec/recording.db"
 #define START_NS 10000000000LL /* of the hand-written rows */

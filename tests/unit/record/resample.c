@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/resample.c: the filter against what is said of it, rows against
+ * Tests of lib/record/export/resample.c: the filter against what is said of it, rows against
  * signals that are put into a recording and known at any time.
  */
 #include "recorded.h"
-#include "../../../lib/record/force_near.h"
-#include "../../../lib/record/resample.h"
+#include "../../../lib/record/export/force_near.h"
+#include "../../../lib/record/export/resample.h"
 
 static int record_once(void **state)
 {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/rows_array.c: a long table grows the array, only elements that count are
+ * Tests of lib/record/read/rows_array.c: a long table grows the array, only elements that count are
  * kept, and there is no list of nothing, or after a failure.
  */
 #include "recorded.h"
-#include "../../../lib/record/rows_array.h"
+#include "../../../lib/record/read/rows_array.h"
 
 #define DB "a.rec/recording.db"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/table_writer.c and of the CSV that comes of it: numbers are held
+ * Tests of lib/record/export/table_writer.c and of the CSV that comes of it: numbers are held
  * against printf(3), blocks against rows given one by one.
  */
 #include <stdarg.h>
@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
-#include "../../../lib/record/table_writer.h"
+#include "../../../lib/record/export/table_writer.h"
 
 static const struct incise_column columns[] = {
 	{"name", "1", "a name", INCISE_COLUMN_NAME, 0},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/timeline.c, with all that it is made of, on streams whose
+ * Tests of lib/record/time/timeline.c, with all that it is made of, on streams whose
  * truth is known (stream.h).
  */
 #include <float.h>
@@ -11,7 +11,7 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include "../../../lib/record/timeline.h"
+#include "../../../lib/record/time/timeline.h"
 #include "stream.h"
 
 #define KNOTS (INCISE_TIMELINE_KNOTS + 3)

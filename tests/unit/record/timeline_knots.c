@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/timeline_knots.c: times between knots. How good knots are is in
+ * Tests of lib/record/time/timeline_knots.c: times between knots. How good knots are is in
  * timeline.c.
  */
 #include <stdarg.h>
@@ -8,7 +8,7 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include "../../../lib/record/timeline.h"
+#include "../../../lib/record/time/timeline.h"
 
 static void between_and_beyond(void **state)
 {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/verify_camera.c: pictures that are missing, altered or too many are
+ * Tests of lib/record/verify/verify_camera.c: pictures that are missing, altered or too many are
  * found in camera.mkv, and where; a file that is ahead of an interrupted recording is right.
  */
 #include "verified.h"

@@ -11,7 +11,7 @@
 #include <errno.h>
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/chart.h"
-#include "../tissue/solid.h"
+#include "../surface/solid.h"
 
 #define SIZE 512
 #define HILL 24

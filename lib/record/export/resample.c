@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A recording on one grid of time; see resample.h. Memory is that of what is near a row.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include "blade.h"
+#include "camera_near.h"
+#include "force_near.h"
+#include "../read/recording.h"
+#include "resample.h"
+
+#define SINGLE(name, unit, about, decimals)                       \
+	{                                                         \
+		name, unit, about, INCISE_COLUMN_SINGLE, decimals \
+	}
+#define FLAG(name, about)                               \
+	{                                               \
+		name, "1", about, INCISE_COLUMN_FLAG, 0 \
+	}
+#define POSITION "position of the tip"
+#define ORIENTATION "orientation, unit quaternion"
+
+const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
+						   INCISE_RESAMPLE_CAMERA_COLUMNS] = {
+	{"recording", "1", "its name", INCISE_COLUMN_NAME, 0},
+	{"cut", "1", "number of the cut, 0 outside", INCISE_COLUMN_INTEGER, 0},
+	{"t_s", "s", "since the recording's first force sample", INCISE_COLUMN_REAL, 6},
+	SINGLE("x_mm", "mm", POSITION, 4),
+	SINGLE("y_mm", "mm", POSITION, 4),
+	SINGLE("z_mm", "mm", POSITION, 4),
+	SINGLE("position_u_mm", "mm",
+	       "standard uncertainty of x, y and z from noise and time", 4),
+	SINGLE("qw", "1", ORIENTATION, 6),
+	SINGLE("qx", "1", ORIENTATION, 6),
+	SINGLE("qy", "1", ORIENTATION, 6),
+	SINGLE("qz", "1", ORIENTATION, 6),
+	{"station", "1", "which of the tracker's sensors, 0 not known",
+	 INCISE_COLUMN_INTEGER, 0},
+	FLAG("button", "1: the stylus's button was pressed"),
+	SINGLE("depth_mm", "mm", "of the tip below the surface", 4),
+	SINGLE("depth_u_mm", "mm", "standard uncertainty from noise and time", 4),
+	SINGLE("velocity_mm_s", "mm/s", "speed of the tip, smoothed", 3),
+	SINGLE("force_N", "N", "on the blade", 5),
+	SINGLE("force_u_N", "N", "standard uncertainty of force_N from noise", 6),
+	FLAG("clipped", "1: the converter was at an end"),
+	FLAG("interpolated", "1: a tracker record is missing here"),
+	FLAG("tracker_error", "1: the tracker told of an error"),
+	SINGLE("camera_depth_mm", "mm", "depth by the pictures", 4),
+	SINGLE("camera_depth_sd_mm", "mm",
+	       "standard deviation of the edge in the pictures", 4),
+	SINGLE("camera_depth_u_mm", "mm", "standard uncertainty from the edge and time",
+	       4),
+	SINGLE("quality", "1", "of the pictures, 0 to 1", 3),
+	FLAG("low_quality", "1: below 0.5 in a picture, or not seen"),
+};
+
+/* No session takes a hundred days; a grid over forged times has no end. */
+#define SPAN_MAX_NS 1e16
+
+struct resample {
+	struct incise_force_near force;
+	struct incise_blade blade;
+	struct incise_camera_near camera;
+	double t_sd_s; /* of times of force */
+
+	const struct incise_export_options *options;
+	struct incise_table *table;
+	struct incise_export_report *report;
+	int64_t name, first_ns;
+	uint64_t samples, all;
+	struct incise_error *err;
+};
+
+int incise_resample_width(struct incise_recording *const *recordings, int n,
+			  struct incise_error *err)
+{
+	for (int i = 0; i < n; i++) {
+		int any = incise_camera_near_any(recordings[i], err);
+
+		if (any)
+			return any < 0 ? any
+				       : INCISE_RESAMPLE_COLUMNS +
+						 INCISE_RESAMPLE_CAMERA_COLUMNS;
+	}
+	return INCISE_RESAMPLE_COLUMNS;
+}
+
+static double least(double a, double b)
+{
+	return isnan(b) ? a : fmax(a, b);
+}
+
+/*
+ * Twelve bits of an uncertainty are more than is known of it, and a file with no more of
+ * them is smaller and sooner written.
+ */
+static double coarse(double u)
+{
+	union {
+		float real;
+		uint32_t bits;
+	} single = {.real = u};
+
+	if (isfinite(single.real))
+		single.bits = (single.bits + 0x800) & ~0xfffU;
+	return single.real;
+}
+
+static int put_row(struct resample *r, int64_t t_ns,
+		   const struct incise_force_value *force)
+{
+	const struct incise_export_options *o = r->options;
+	struct incise_export_report *report = r->report;
+	struct incise_camera_value camera;
+	struct incise_blade_value blade;
+	int rc = incise_blade_at(&r->blade, t_ns, r->t_sd_s, &blade, r->err);
+
+	if (!rc && r->table->n_columns > INCISE_RESAMPLE_COLUMNS)
+		rc = incise_camera_near_at(&r->camera, t_ns, r->t_sd_s, &camera, r->err);
+	else
+		camera = (struct incise_camera_value){0};
+	if (rc)
+		return rc;
+	report->clipped += force->clipped;
+	report->depth_max_mm = least(report->depth_max_mm, blade.depth_mm);
+	report->velocity_max_mm_s = least(report->velocity_max_mm_s, blade.velocity_mm_s);
+	rc = incise_table_add(r->table,
+			      (union incise_cell[]){
+				      {.integer = r->name},
+				      {.integer = blade.cut},
+				      {.real = (double)(t_ns - r->first_ns) * 1e-9},
+				      {.real = blade.position_mm[0]},
+				      {.real = blade.position_mm[1]},
+				      {.real = blade.position_mm[2]},
+				      {.real = coarse(blade.position_u_mm)},
+				      {.real = blade.q[0]},
+				      {.real = blade.q[1]},
+				      {.real = blade.q[2]},
+				      {.real = blade.q[3]},
+				      {.integer = blade.station},
+				      {.integer = blade.button},
+				      {.real = blade.depth_mm},
+				      {.real = coarse(blade.depth_u_mm)},
+				      {.real = blade.velocity_mm_s},
+				      {.real = force->force_N},
+				      {.real = coarse(force->u_N)},
+				      {.integer = force->clipped},
+				      {.integer = blade.interpolated},
+				      {.integer = blade.error},
+				      {.real = camera.depth_mm},
+				      {.real = coarse(camera.sd_mm)},
+				      {.real = coarse(camera.u_mm)},
+				      {.real = camera.quality},
+				      {.integer = camera.low_quality},
+			      },
+			      r->err);
+	if (!rc && (++report->rows & 0xfff) == 0 && o->progress &&
+	    o->progress(o->context,
+			fmin(1, (r->samples + r->force.rows.n) / fmax(1, r->all))))
+		rc = incise_error_set(r->err, EINTR, "interrupted");
+	return rc;
+}
+
+/* A row for each force sample, told with 8 to each side for the noise. */
+static int on_force(struct resample *r)
+{
+	struct incise_force_near *near = &r->force;
+	struct incise_force_value value;
+	size_t at = 0;
+	int rc = 1, bad = 0;
+
+	for (; !bad; at++) {
+		while (rc > 0 && near->n < at + INCISE_FORCE_HALF + 1)
+			rc = incise_force_near_more(near, r->err);
+		if (rc < 0 || at >= near->n)
+			return rc < 0 ? rc : 0;
+		if (at > INCISE_FORCE_HALF)
+			at -= incise_force_near_forget(near, at - INCISE_FORCE_HALF);
+		incise_force_near_sample(near, at, &value);
+		bad = put_row(r, near->samples[at].t_ns, &value);
+	}
+	return bad;
+}
+
+/* A row for each multiple of 1/rate from the first force sample to the last. */
+static int on_grid(struct resample *r, double force_hz)
+{
+	struct incise_force_near *near = &r->force;
+	double row_ns = 1e9 / r->options->rate_hz;
+	bool drops = r->options->rate_hz < force_hz;
+	/* Two samples of force to each side are enough for a line. */
+	double reach_ns = INCISE_FORCE_HALF * row_ns;
+	int rc = 1, bad;
+
+	if (!drops)
+		reach_ns = fmax(reach_ns, 2e9 / force_hz);
+	for (int64_t k = 0;; k++) {
+		int64_t t_ns = r->first_ns + llround(k * row_ns);
+		struct incise_force_value value;
+		size_t old = 0;
+
+		if (t_ns > near->last_ns)
+			break;
+		while (rc > 0 && near->samples[near->n - 1].t_ns < t_ns + reach_ns)
+			rc = incise_force_near_more(near, r->err);
+		if (rc < 0)
+			return rc;
+		/* The last one stays, to say how far the samples go. */
+		while (old + 1 < near->n && near->samples[old].t_ns < t_ns - reach_ns)
+			old++;
+		incise_force_near_forget(near, old);
+		if (drops)
+			incise_force_near_filter(near, t_ns, row_ns, &value);
+		else
+			incise_force_near_line(near, t_ns, &value);
+		bad = put_row(r, t_ns, &value);
+		if (bad)
+			return bad;
+	}
+	/* What is behind is checked as well. */
+	while (rc > 0) {
+		near->n = 0;
+		rc = incise_force_near_more(near, r->err);
+	}
+	return rc;
+}
+
+int incise_resample(struct incise_recording *recording, const char *name,
+		    const struct incise_export_options *options,
+		    struct incise_table *table, struct incise_export_report *report,
+		    uint64_t samples, uint64_t all, struct incise_error *err)
+{
+	const struct incise_calibration *given = options->calibration;
+	struct resample r = {
+		.options = options,
+		.table = table,
+		.report = report,
+		.name = incise_table_name(table, name),
+		.samples = samples,
+		.all = all,
+		.err = err,
+	};
+	double span_ns;
+	int rc = 0;
+
+	if (r.name < 0)
+		return incise_error_set(err, ENOMEM, "out of memory");
+	rc = incise_force_near_open(&r.force, recording, given, err);
+	if (!rc)
+		rc = incise_blade_open(&r.blade, recording, given, err);
+	if (!rc)
+		rc = incise_camera_near_open(&r.camera, recording, given, err);
+	if (!rc && r.force.n) {
+		r.first_ns = r.force.samples[0].t_ns;
+		r.t_sd_s = incise_row_times_sd(&r.force.rows.times, 0);
+		span_ns = (double)(r.force.last_ns - r.first_ns);
+		if (span_ns > SPAN_MAX_NS)
+			rc = incise_error_set(err, EINVAL,
+					      "%s: damaged: table force: times from %lld "
+					      "to %lld ns cannot be",
+					      recording->path, (long long)r.first_ns,
+					      (long long)r.force.last_ns);
+		else
+			rc = options->rate_hz > 0
+				     ? on_grid(&r, span_ns > 0
+							   ? (recording->meta.force - 1) *
+								     1e9 / span_ns
+							   : 1)
+				     : on_force(&r);
+	}
+	report->cuts += r.blade.cut.count;
+	incise_force_near_close(&r.force);
+	incise_blade_close(&r.blade);
+	incise_camera_near_close(&r.camera);
+	return rc;
+}

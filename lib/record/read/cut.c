@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The cuts of a recording; see cut.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include "cut.h"
+#include "depth.h"
+#include "../schema.h"
+
+bool incise_cut_step(struct incise_cut *cut, double depth_mm)
+{
+	if (!cut->inside && depth_mm > INCISE_CUT_BEGIN_MM) {
+		cut->inside = true;
+		cut->count++;
+	} else if (cut->inside && depth_mm < INCISE_CUT_END_MM) {
+		cut->inside = false;
+	}
+	return cut->inside;
+}
+
+static int bad_row(const struct incise_cuts *cuts, const char *table, sqlite3_stmt *stmt,
+		   const char *what, struct incise_error *err)
+{
+	return incise_error_set(
+		err, EINVAL,
+		"%s: damaged: table %s, row %lld: %s; `sqlite3 %s/%s` shows it",
+		cuts->recording->path, table, (long long)sqlite3_column_int64(stmt, 0),
+		what, cuts->recording->path, INCISE_SCHEMA_DB);
+}
+
+/* Step to a row and find its best time. Returns 1, 0 at the end, -errno. */
+static int step(struct incise_cuts *cuts, sqlite3_stmt *stmt, const char *table,
+		struct incise_row_times *times, int64_t *t_ns, struct incise_error *err)
+{
+	int rc = sqlite3_step(stmt);
+
+	if (rc == SQLITE_DONE)
+		return 0;
+	if (rc != SQLITE_ROW)
+		return incise_schema_fail(cuts->recording->db, cuts->recording->path,
+					  err);
+	if (sqlite3_column_type(stmt, 1) != SQLITE_INTEGER ||
+	    sqlite3_column_int64(stmt, 1) < 0)
+		return bad_row(cuts, table, stmt, "t_ns is no time", err);
+	if (!incise_row_times_next(times, sqlite3_column_int64(stmt, 0),
+				   sqlite3_column_int64(stmt, 1), t_ns))
+		return bad_row(cuts, table, stmt, "t_ns does not increase", err);
+	return 1;
+}
+
+static int step_force(struct incise_cuts *cuts, int64_t *t_ns, int32_t *code,
+		      struct incise_error *err)
+{
+	sqlite3_stmt *stmt = cuts->force;
+	int rc = step(cuts, stmt, "force", &cuts->force_times, t_ns, err);
+	sqlite3_int64 value;
+
+	if (rc == 0 && cuts->force_rows != cuts->recording->meta.force)
+		return incise_error_set(err, EINVAL,
+					"%s: damaged: table force has %llu rows of %llu",
+					cuts->recording->path,
+					(unsigned long long)cuts->force_rows,
+					(unsigned long long)cuts->recording->meta.force);
+	if (rc <= 0)
+		return rc;
+	value = sqlite3_column_int64(stmt, 2);
+	if (sqlite3_column_type(stmt, 2) != SQLITE_INTEGER || value < 0 ||
+	    value > cuts->top)
+		return bad_row(cuts, "force", stmt,
+			       "code is out of the converter's range", err);
+	*code = value;
+	if (!cuts->force_rows++)
+		cuts->first_ns = *t_ns;
+	cuts->last_ns = *t_ns;
+	return 1;
+}
+
+/* Move on to the next depth row, if there is one. */
+static int step_depth(struct incise_cuts *cuts, struct incise_error *err)
+{
+	sqlite3_stmt *stmt = cuts->depth;
+	struct incise_cut_depth next;
+	int rc = step(cuts, stmt, "depth", &cuts->depth_times, &next.t_ns, err);
+
+	cuts->before = cuts->after;
+	cuts->has_before = cuts->has_after;
+	cuts->has_after = rc > 0;
+	if (rc == 0 && cuts->depth_rows != cuts->recording->depth_rows)
+		return incise_error_set(err, EINVAL,
+					"%s: damaged: table depth has %llu rows of %llu",
+					cuts->recording->path,
+					(unsigned long long)cuts->depth_rows,
+					(unsigned long long)cuts->recording->depth_rows);
+	if (rc <= 0)
+		return rc;
+	next.depth_mm = sqlite3_column_double(stmt, 2);
+	next.velocity_mm_s = sqlite3_column_double(stmt, 3);
+	/* A rig is some metres wide; light is slow enough for the other bound. */
+	if (sqlite3_column_type(stmt, 2) != SQLITE_FLOAT || !(fabs(next.depth_mm) < 1e6))
+		return bad_row(cuts, "depth", stmt, "depth_mm is no depth", err);
+	if (sqlite3_column_type(stmt, 3) != SQLITE_FLOAT ||
+	    !(next.velocity_mm_s >= 0 && next.velocity_mm_s < 1e12))
+		return bad_row(cuts, "depth", stmt, "velocity_mm_s is no speed", err);
+	cuts->after = next;
+	cuts->depth_rows++;
+	cuts->depth_max_mm = fmax(cuts->depth_max_mm, next.depth_mm);
+	return 1;
+}
+
+static void scale(struct incise_cuts *cuts, double force_mV_N, double zero_mV)
+{
+	const struct incise_recording_info *meta = &cuts->recording->meta;
+
+	cuts->n_per_code = meta->full_scale_V * 1e3 / (1LL << meta->bits) / force_mV_N;
+	cuts->zero_N = (zero_mV - meta->offset_V * 1e3) / force_mV_N;
+}
+
+void incise_cuts_calibrate(struct incise_cuts *cuts,
+			   const struct incise_calibration *calibration)
+{
+	scale(cuts, calibration->force_mV_N,
+	      isnan(calibration->force_zero_mV) ? cuts->recording->meta.zero_mV
+						: calibration->force_zero_mV);
+	incise_row_times_calibrate(&cuts->force_times, calibration);
+	incise_row_times_calibrate(&cuts->depth_times, calibration);
+}
+
+int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recording,
+		     struct incise_error *err)
+{
+	const struct incise_recording_info *meta = &recording->meta;
+	int rc;
+
+	*cuts = (struct incise_cuts){
+		.recording = recording,
+		.top = (1LL << meta->bits) - 1,
+		.depth_max_mm = -INFINITY,
+	};
+	scale(cuts, meta->force_mV_N, meta->zero_mV);
+	if (sqlite3_prepare_v2(recording->db,
+			       "SELECT seq, t_ns, code FROM force ORDER BY seq", -1,
+			       &cuts->force, NULL) != SQLITE_OK ||
+	    sqlite3_prepare_v2(
+		    recording->db,
+		    "SELECT seq, t_ns, depth_mm, velocity_mm_s FROM depth ORDER BY seq",
+		    -1, &cuts->depth, NULL) != SQLITE_OK) {
+		rc = incise_schema_fail(recording->db, recording->path, err);
+		incise_cuts_close(cuts);
+		return rc;
+	}
+	rc = incise_row_times_open(&cuts->force_times, recording, "force", err);
+	if (!rc)
+		rc = incise_row_times_open(&cuts->depth_times, recording, "depth", err);
+	if (rc)
+		incise_cuts_close(cuts);
+	return rc;
+}
+
+void incise_cuts_close(struct incise_cuts *cuts)
+{
+	sqlite3_finalize(cuts->force);
+	sqlite3_finalize(cuts->depth);
+	cuts->force = cuts->depth = NULL;
+}
+
+/* Depth and velocity at the time of a force sample; false where no row is near. */
+static bool interpolate(const struct incise_cuts *cuts, struct incise_cut_sample *sample)
+{
+	const struct incise_cut_depth *a = &cuts->before, *b = &cuts->after;
+	double share;
+
+	if (!cuts->has_before || !cuts->has_after ||
+	    b->t_ns - a->t_ns > INCISE_DEPTH_GAP_NS)
+		return false;
+	share = (double)(sample->t_ns - a->t_ns) / (b->t_ns - a->t_ns);
+	sample->depth_mm = a->depth_mm + share * (b->depth_mm - a->depth_mm);
+	sample->velocity_mm_s =
+		a->velocity_mm_s + share * (b->velocity_mm_s - a->velocity_mm_s);
+	return true;
+}
+
+int incise_cuts_next(struct incise_cuts *cuts, struct incise_cut_sample *sample,
+		     struct incise_error *err)
+{
+	int32_t code = 0;
+	int rc;
+
+	while ((rc = step_force(cuts, &sample->t_ns, &code, err)) > 0) {
+		while ((cuts->has_after || !cuts->depth_rows) &&
+		       (!cuts->has_after || cuts->after.t_ns <= sample->t_ns)) {
+			rc = step_depth(cuts, err);
+			if (rc < 0)
+				return rc;
+			if (!rc)
+				break;
+		}
+		if (!interpolate(cuts, sample) ||
+		    !incise_cut_step(&cuts->cut, sample->depth_mm))
+			continue;
+		sample->cut = cuts->cut.count;
+		sample->force_N = code * cuts->n_per_code - cuts->zero_N;
+		sample->clipped = code == 0 || code == cuts->top;
+		return 1;
+	}
+	/* What stands behind the last force sample is checked too. */
+	while (!rc && cuts->has_after)
+		rc = step_depth(cuts, err) < 0 ? -errno : 0;
+	return rc;
+}

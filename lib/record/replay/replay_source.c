@@ -1,0 +1,383 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A recording as the loop meets it; see replay_source.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include "../read/depth.h"
+#include "replay_source.h"
+#include "../schema.h"
+
+/* Capture takes no longer ones; a row that says otherwise would be waited for. */
+#define SPAN_MAX_NS 1000000000000000LL
+#define COUNT_MAX (1LL << 53)
+
+/* Columns of the table tracker behind seq and t_ns. */
+#define ARRIVAL 2
+#define POSITION 3
+#define QUATERNION 6
+#define STATUS 10
+#define STATION 11
+#define BUTTON 12
+
+static int damaged(const struct incise_replay_stream *s, const char *what,
+		   struct incise_error *err)
+{
+	return incise_error_set(err, EINVAL,
+				"%s: damaged: table %s, row %lld: %s; `sqlite3 %s/%s` "
+				"shows it",
+				s->rows.recording->path, s->rows.table,
+				(long long)sqlite3_column_int64(s->rows.stmt, 0), what,
+				s->rows.recording->path, INCISE_SCHEMA_DB);
+}
+
+/* Go to the next row: 1, 0 at the end, -errno. */
+static int step(struct incise_replay_stream *s, struct incise_error *err)
+{
+	int rc = incise_rows_next(&s->rows, err);
+	int64_t seq;
+
+	s->live = rc > 0;
+	if (rc <= 0)
+		return rc;
+	seq = sqlite3_column_int64(s->rows.stmt, 0);
+	if (seq < 0 || seq > COUNT_MAX)
+		return damaged(s, "seq is no count", err);
+	s->t_ns = s->rows.t_ns;
+	return 1;
+}
+
+static int step_force(struct incise_replay_source *source, struct incise_error *err)
+{
+	struct incise_replay_stream *s = &source->force;
+	int rc = step(s, err);
+	int64_t code;
+
+	if (rc <= 0)
+		return rc;
+	code = sqlite3_column_int64(s->rows.stmt, 2);
+	if (code < 0 || code > source->top)
+		return damaged(s, "code is out of the converter's range", err);
+	return 1;
+}
+
+/* A pose's time is that at which the loop gets it. */
+static int step_pose(struct incise_replay_source *source, struct incise_error *err)
+{
+	struct incise_replay_stream *s = &source->tracker;
+	int64_t before_ns = s->live ? s->t_ns : 0;
+	int rc = step(s, err);
+
+	if (rc <= 0)
+		return rc;
+	if (source->at == INCISE_REPLAY_ACQUISITION)
+		return 1;
+	s->t_ns = sqlite3_column_int64(s->rows.stmt, ARRIVAL);
+	/* The clock does not go back; one from far ahead would hold up all behind it. */
+	if (s->t_ns < before_ns)
+		return damaged(s, "arrival_ns goes back", err);
+	return 1;
+}
+
+static int step_depth(struct incise_replay_source *source, struct incise_error *err)
+{
+	struct incise_replay_stream *s = &source->depth;
+	int rc = step(s, err);
+
+	source->deep[0] = source->deep[1];
+	source->deep[1].t_ns = -1;
+	if (rc > 0)
+		source->deep[1] = (struct incise_cut_depth){
+			.t_ns = s->t_ns,
+			.depth_mm = sqlite3_column_double(s->rows.stmt, 2),
+		};
+	return rc;
+}
+
+/* --- opening ------------------------------------------------------------------------- */
+
+/* A number of table meta within bounds. */
+static int number(const struct incise_recording *recording, const char *key, double least,
+		  double most, double *to, struct incise_error *err)
+{
+	sqlite3_stmt *stmt;
+	bool good;
+
+	if (sqlite3_prepare_v2(recording->db, "SELECT value FROM meta WHERE key = ?", -1,
+			       &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(recording->db, recording->path, err);
+	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
+	good = sqlite3_step(stmt) == SQLITE_ROW &&
+	       (sqlite3_column_type(stmt, 0) == SQLITE_FLOAT ||
+		sqlite3_column_type(stmt, 0) == SQLITE_INTEGER);
+	*to = sqlite3_column_double(stmt, 0);
+	sqlite3_finalize(stmt);
+	if (good && *to >= least && *to <= most)
+		return 0;
+	return incise_error_set(err, EINVAL,
+				"%s: damaged: '%s' in table meta is missing, or no value "
+				"it can have",
+				recording->path, key);
+}
+
+/* As the predictor takes rates and latencies; lib/tissue/predict.h. */
+static int take_info(struct incise_replay_source *source, struct incise_error *err)
+{
+	double rate_hz, latency_ns;
+	int rc = number(source->recording, "tracker_hz", 1, 1e4, &rate_hz, err);
+
+	if (!rc)
+		rc = number(source->recording, "tracker_latency_ns", 0, 1e9, &latency_ns,
+			    err);
+	if (rc)
+		return rc;
+	source->info = (struct incise_tracker_info){
+		.name = "recorded",
+		.rate_hz = rate_hz,
+		.latency_ns =
+			source->at == INCISE_REPLAY_ARRIVAL ? llrint(latency_ns) : 0,
+		.stations = 1,
+	};
+	return 0;
+}
+
+static int open_streams(struct incise_replay_source *source, struct incise_error *err)
+{
+	struct incise_recording *recording = source->recording;
+	/* Form 1 knows of no stations. */
+	const char *poses = recording->form > 1
+				    ? "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, "
+				      "qy, qz, status, station, button"
+				    : "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, "
+				      "qy, qz, status, 1, 0";
+	int rc = incise_rows_open(&source->tracker.rows, recording, "tracker", poses,
+				  "iiirrrrrrrtii", recording->meta.tracker, err);
+
+	if (!rc)
+		rc = incise_rows_open(&source->force.rows, recording, "force",
+				      "seq, t_ns, code", "iii", recording->meta.force,
+				      err);
+	if (!rc)
+		rc = incise_rows_open(&source->depth.rows, recording, "depth",
+				      "seq, t_ns, depth_mm, velocity_mm_s", "iirr",
+				      recording->depth_rows, err);
+	return rc;
+}
+
+/* Time of the last row, if there is one; it is checked when its turn has come. */
+static int find_last(struct incise_replay_source *source, const char *table,
+		     const struct incise_replay_stream *s, const char *column,
+		     struct incise_error *err)
+{
+	struct incise_recording *recording = source->recording;
+	bool best = strcmp(column, "arrival_ns") != 0;
+	sqlite3_stmt *stmt;
+	char sql[100];
+	int64_t t_ns;
+
+	snprintf(sql, sizeof(sql), "SELECT seq, %s FROM %s ORDER BY seq DESC LIMIT 1",
+		 column, table);
+	if (sqlite3_prepare_v2(recording->db, sql, -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(recording->db, recording->path, err);
+	if (sqlite3_step(stmt) == SQLITE_ROW) {
+		t_ns = sqlite3_column_int64(stmt, 1);
+		if (best)
+			t_ns = incise_recording_time(&s->rows.times.line,
+						     sqlite3_column_int64(stmt, 0), t_ns);
+		if (t_ns > source->last_ns)
+			source->last_ns = t_ns;
+	}
+	sqlite3_finalize(stmt);
+	return 0;
+}
+
+static int find_span(struct incise_replay_source *source, struct incise_error *err)
+{
+	bool arrival = source->at == INCISE_REPLAY_ARRIVAL;
+	const char *path = source->recording->path;
+	int rc;
+
+	if (!source->tracker.live)
+		return incise_error_set(err, ENODATA,
+					"%s: there is no pose to replay: its tracker "
+					"gave none",
+					path);
+	source->origin_ns =
+		source->force.live ? source->force.t_ns : source->tracker.t_ns;
+	source->first_ns = source->tracker.t_ns < source->origin_ns ? source->tracker.t_ns
+								    : source->origin_ns;
+	source->last_ns = source->first_ns;
+	rc = find_last(source, "tracker", &source->tracker,
+		       arrival ? "arrival_ns" : "t_ns", err);
+	if (!rc)
+		rc = find_last(source, "force", &source->force, "t_ns", err);
+	if (rc)
+		return rc;
+	/* The difference of the two could be too large for its type. */
+	if (source->first_ns < 0 || source->last_ns > INT64_MAX / 2 ||
+	    source->last_ns - source->first_ns > SPAN_MAX_NS)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: damaged: it begins at %.0f s and ends at %.0f "
+			"s, which cannot be",
+			path, source->first_ns * 1e-9, source->last_ns * 1e-9);
+	return 0;
+}
+
+static void take_force_scale(struct incise_replay_source *source,
+			     const struct incise_calibration *given)
+{
+	const struct incise_recording_info *meta = &source->recording->meta;
+	double mV_N = given ? given->force_mV_N : meta->force_mV_N;
+	double zero_mV = given && !isnan(given->force_zero_mV) ? given->force_zero_mV
+							       : meta->zero_mV;
+
+	source->n_per_code = meta->full_scale_V * 1e3 / (1LL << meta->bits) / mV_N;
+	source->zero_N = (zero_mV - meta->offset_V * 1e3) / mV_N;
+	source->top = (1LL << meta->bits) - 1;
+}
+
+int incise_replay_source_open(struct incise_replay_source *source,
+			      struct incise_recording *recording,
+			      enum incise_replay_at at,
+			      const struct incise_calibration *calibration,
+			      struct incise_error *err)
+{
+	int rc;
+
+	*source = (struct incise_replay_source){
+		.recording = recording,
+		.at = at,
+		.deep = {{.t_ns = -1}, {.t_ns = -1}},
+	};
+	take_force_scale(source, calibration);
+	rc = take_info(source, err);
+	if (!rc)
+		rc = open_streams(source, err);
+	if (!rc)
+		rc = step_pose(source, err);
+	if (rc >= 0)
+		rc = step_force(source, err);
+	if (rc >= 0)
+		rc = step_depth(source, err);
+	if (rc >= 0)
+		rc = find_span(source, err);
+	if (rc < 0)
+		incise_replay_source_close(source);
+	return rc;
+}
+
+void incise_replay_source_close(struct incise_replay_source *source)
+{
+	incise_rows_close(&source->tracker.rows);
+	incise_rows_close(&source->force.rows);
+	incise_rows_close(&source->depth.rows);
+}
+
+/* --- going on ------------------------------------------------------------------------ */
+
+static void take_pose(const struct incise_replay_stream *s,
+		      struct incise_tracker_sample *pose)
+{
+	sqlite3_stmt *stmt = s->rows.stmt;
+
+	*pose = (struct incise_tracker_sample){
+		.t_ns = s->t_ns,
+		.seq = sqlite3_column_int64(stmt, 0),
+		.status = *(const char *)sqlite3_column_text(stmt, STATUS),
+		.station = sqlite3_column_int(stmt, STATION),
+		.button = sqlite3_column_int(stmt, BUTTON),
+	};
+	for (int i = 0; i < 3; i++)
+		pose->position_mm[i] = sqlite3_column_double(stmt, POSITION + i);
+	for (int i = 0; i < 4; i++)
+		pose->quaternion[i] = sqlite3_column_double(stmt, QUATERNION + i);
+}
+
+int incise_replay_source_poses(struct incise_replay_source *source, int64_t t_ns,
+			       struct incise_tracker_sample *poses, int n,
+			       struct incise_error *err)
+{
+	int taken = 0;
+
+	while (taken < n && source->tracker.live && source->tracker.t_ns <= t_ns) {
+		int rc;
+
+		take_pose(&source->tracker, &poses[taken++]);
+		rc = step_pose(source, err);
+		if (rc < 0)
+			return rc;
+	}
+	return taken;
+}
+
+/* Each sample belongs to the tick that it is nearest to. */
+static int average(struct incise_replay_source *source, int64_t t_ns, int64_t period_ns,
+		   struct incise_replay_measure *measure, struct incise_error *err)
+{
+	const struct incise_replay_stream *s = &source->force;
+	int64_t from_ns = t_ns - period_ns / 2, end_ns = from_ns + period_ns, sum = 0;
+	int n = 0, rc = 0;
+
+	while (rc >= 0 && s->live && s->t_ns < end_ns) {
+		int32_t code = sqlite3_column_int(s->rows.stmt, 2);
+
+		if (s->t_ns >= from_ns) {
+			sum += code;
+			n++;
+			measure->clipped |= code == 0 || code == source->top;
+		}
+		rc = step_force(source, err);
+	}
+	measure->force_N =
+		n ? (double)sum / n * source->n_per_code - source->zero_N : NAN;
+	return rc < 0 ? rc : 0;
+}
+
+/* On the line between the rows before and after, if they are near each other. */
+static int find_depth(struct incise_replay_source *source, int64_t t_ns,
+		      struct incise_replay_measure *measure, struct incise_error *err)
+{
+	const struct incise_cut_depth *a = &source->deep[0], *b = &source->deep[1];
+	int rc = 0;
+
+	while (rc >= 0 && source->depth.live && source->depth.t_ns <= t_ns)
+		rc = step_depth(source, err);
+	if (rc < 0)
+		return rc;
+	measure->depth_mm = NAN;
+	if (a->t_ns < 0 || b->t_ns <= a->t_ns || t_ns < a->t_ns ||
+	    b->t_ns - a->t_ns > INCISE_DEPTH_GAP_NS)
+		return 0;
+	measure->depth_mm = a->depth_mm + (double)(t_ns - a->t_ns) / (b->t_ns - a->t_ns) *
+						  (b->depth_mm - a->depth_mm);
+	if (incise_cut_step(&source->cut, measure->depth_mm))
+		measure->cut = source->cut.count;
+	return 0;
+}
+
+int incise_replay_source_measure(struct incise_replay_source *source, int64_t t_ns,
+				 int64_t period_ns, struct incise_replay_measure *measure,
+				 struct incise_error *err)
+{
+	int rc;
+
+	*measure = (struct incise_replay_measure){0};
+	rc = average(source, t_ns, period_ns, measure, err);
+	return rc ? rc : find_depth(source, t_ns, measure, err);
+}
+
+int incise_replay_source_finish(struct incise_replay_source *source,
+				struct incise_error *err)
+{
+	int rc = 0;
+
+	while (rc >= 0 && source->tracker.live)
+		rc = step_pose(source, err);
+	while (rc >= 0 && source->force.live)
+		rc = step_force(source, err);
+	while (rc >= 0 && source->depth.live)
+		rc = step_depth(source, err);
+	return rc < 0 ? rc : 0;
+}

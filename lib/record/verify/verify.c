@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Proof that a recording is complete; see incise/verify.h and verify.h.
+ */
+#include <errno.h>
+#include <string.h>
+#include "../schema.h"
+#include "verify.h"
+
+/* One number by SQL; @otherwise where it is NULL or cannot be had. */
+static int64_t ask(struct incise_verification *verify, const char *sql, int64_t otherwise)
+{
+	sqlite3_stmt *stmt;
+
+	if (sqlite3_prepare_v2(verify->recording->db, sql, -1, &stmt, NULL) != SQLITE_OK)
+		return otherwise;
+	if (sqlite3_step(stmt) == SQLITE_ROW &&
+	    sqlite3_column_type(stmt, 0) == SQLITE_INTEGER)
+		otherwise = sqlite3_column_int64(stmt, 0);
+	sqlite3_finalize(stmt);
+	return otherwise;
+}
+
+/* --- what is not of one stream -------------------------------------------------------- */
+
+static int tell_of_pages(void *user)
+{
+	return incise_verify_progress(user, -1);
+}
+
+/* SQLite's own look at every page. Returns 0 or -ECANCELED. */
+static int check_pages(struct incise_verification *verify)
+{
+	sqlite3 *db = verify->recording->db;
+	sqlite3_stmt *stmt = NULL;
+	int rc;
+
+	/* in steps of SQLite's machine; some ms */
+	sqlite3_progress_handler(db, 100000, tell_of_pages, verify);
+	rc = sqlite3_prepare_v2(db, "PRAGMA integrity_check(20)", -1, &stmt, NULL);
+	while (rc == SQLITE_OK && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
+		const char *text = (const char *)sqlite3_column_text(stmt, 0);
+
+		if (!text || strcmp(text, "ok")) {
+			struct incise_verify_finding found =
+				incise_verify_finding(INCISE_VERIFY_DAMAGED);
+
+			incise_verify_found(verify, &found, "%s is damaged: %s",
+					    INCISE_SCHEMA_DB,
+					    text ? text : "out of memory");
+		}
+		rc = SQLITE_OK;
+	}
+	sqlite3_progress_handler(db, 0, NULL, NULL);
+	if (rc != SQLITE_DONE && rc != SQLITE_INTERRUPT) {
+		struct incise_verify_finding found =
+			incise_verify_finding(INCISE_VERIFY_DAMAGED);
+
+		incise_verify_found(verify, &found, "%s is damaged: %s", INCISE_SCHEMA_DB,
+				    sqlite3_errmsg(db));
+	}
+	sqlite3_finalize(stmt);
+	return rc == SQLITE_INTERRUPT ? -ECANCELED : 0;
+}
+
+/* Of an interrupted recording; a closed one has a seal of it. */
+static void check_depth(struct incise_verification *verify)
+{
+	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_COUNT);
+	uint64_t rows = ask(verify, "SELECT count(*) FROM depth", -1);
+
+	found.count = verify->recording->depth_rows;
+	if (rows != found.count)
+		incise_verify_found(verify, &found, "table depth has %lld rows of %llu",
+				    (long long)rows, (unsigned long long)found.count);
+}
+
+/* Streams that this version does not know would be taken for verified. */
+#define STREAMS "'force', 'tracker', 'camera'"
+#define SEALS                                                                           \
+	"'table:depth', 'table:events', 'table:knots', 'table:meta', 'table:streams', " \
+	"'file:camera.mkv'"
+static void check_names(struct incise_verification *verify)
+{
+	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_LEDGER);
+
+	if (ask(verify,
+		verify->report->interrupted
+			? "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS ")"
+			: "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS
+			  ", " SEALS ")",
+		-1))
+		incise_verify_found(
+			verify, &found,
+			"the ledger has entries of streams that there are not");
+}
+
+/* How many samples a device that died would still have given nobody knows. */
+static void tell_of_ends(struct incise_verification *verify)
+{
+	sqlite3_stmt *stmt;
+
+	if (sqlite3_prepare_v2(
+		    verify->recording->db,
+		    "SELECT name, ended, (SELECT max(last_ns) FROM ledger WHERE "
+		    "stream = name AND count > 0) FROM streams WHERE ended IS NOT NULL",
+		    -1, &stmt, NULL) != SQLITE_OK)
+		return; /* pages and seals tell of it */
+	while (sqlite3_step(stmt) == SQLITE_ROW) {
+		struct incise_verify_finding found =
+			incise_verify_finding(INCISE_VERIFY_ENDED);
+		const char *name = (const char *)sqlite3_column_text(stmt, 0);
+		const char *why = (const char *)sqlite3_column_text(stmt, 1);
+
+		found.stream = name ? name : "";
+		if (sqlite3_column_type(stmt, 2) == SQLITE_INTEGER)
+			found.last_ns = sqlite3_column_int64(stmt, 2);
+		if (found.last_ns < 0)
+			incise_verify_found(verify, &found, "%s: gave nothing: %s",
+					    found.stream, why ? why : "");
+		else
+			incise_verify_found(
+				verify, &found,
+				"%s: ended at %.4f s, before the recording did: %s",
+				found.stream, incise_verify_s(verify, found.last_ns),
+				why ? why : "");
+	}
+	sqlite3_finalize(stmt);
+}
+
+static void tell_of_interruption(struct incise_verification *verify)
+{
+	struct incise_verify_finding found =
+		incise_verify_finding(INCISE_VERIFY_INTERRUPTED);
+
+	if (!verify->report->interrupted)
+		return;
+	found.last_ns =
+		ask(verify,
+		    "SELECT max(last_ns) FROM ledger WHERE stream IN (" STREAMS ")", -1);
+	if (found.last_ns < 0)
+		incise_verify_found(verify, &found,
+				    "interrupted, or being written: not a row in it yet");
+	else
+		incise_verify_found(
+			verify, &found,
+			"interrupted, or being written: it ends with its last commit, at "
+			"%.4f s; tables depth, events, knots, meta and streams have no "
+			"seal before the end: nothing proves them",
+			incise_verify_s(verify, found.last_ns));
+}
+
+/* --- all of it ------------------------------------------------------------------------- */
+
+/* Whatever says so, since anything may have been removed. */
+static bool has_camera(struct incise_verification *verify)
+{
+	return ask(
+		verify,
+		"SELECT EXISTS(SELECT 1 FROM ledger WHERE stream = 'camera') OR "
+		"EXISTS(SELECT 1 FROM streams WHERE name = 'camera') OR "
+		"EXISTS(SELECT 1 FROM meta WHERE key = 'frames_rows' AND value > 0) OR "
+		"EXISTS(SELECT 1 FROM frames)",
+		1);
+}
+
+/* Streams one after the other. Returns 0 or -ECANCELED. */
+static int check_streams(struct incise_verification *verify)
+{
+	const struct incise_recording_info *meta = &verify->recording->meta;
+	struct incise_verify_report *report = verify->report;
+	const struct {
+		uint64_t rows, lost;
+	} counted[INCISE_LEDGER_STREAMS] = {
+		[INCISE_LEDGER_FORCE] = {meta->force, meta->force_lost},
+		[INCISE_LEDGER_TRACKER] = {meta->tracker, meta->tracker_lost},
+		[INCISE_LEDGER_CAMERA] = {
+			ask(verify, "SELECT value FROM meta WHERE key = 'frames_rows'",
+			    0),
+			ask(verify, "SELECT value FROM meta WHERE key = 'frames_lost'",
+			    0)}};
+	int rc = 0;
+
+	verify->camera = has_camera(verify);
+	verify->rows = meta->force + meta->tracker;
+	if (verify->camera) {
+		verify->frames = ask(verify, "SELECT count(*) FROM frames", 0);
+		verify->rows += verify->frames * INCISE_VERIFY_PICTURE_ROWS;
+	}
+
+	for (int i = 0; i < INCISE_LEDGER_STREAMS && !rc; i++) {
+		if (i == INCISE_LEDGER_CAMERA && !verify->camera)
+			continue;
+		rc = incise_verify_stream(verify, &incise_ledger_forms[i],
+					  counted[i].rows, counted[i].lost,
+					  &report->streams[report->n_streams++]);
+	}
+	if (!rc && verify->camera)
+		rc = incise_verify_camera(verify);
+	return rc;
+}
+
+int incise_verify(const char *path, const struct incise_verify_watch *watch,
+		  struct incise_verify_report *report, struct incise_error *err)
+{
+	struct incise_verification verify = {.watch = watch, .report = report};
+	int rc;
+
+	*report = (struct incise_verify_report){0};
+	verify.recording = incise_recording_open(path, err);
+	if (!verify.recording)
+		return -errno;
+	if (verify.recording->form < 2) {
+		rc = incise_error_set(
+			err, ENODATA,
+			"%s: made by an older incise (form %d), which kept no ledger: "
+			"there is nothing to verify it by; `incise info` reads it",
+			path, verify.recording->form);
+		goto out;
+	}
+	report->interrupted = !verify.recording->meta.complete;
+	verify.origin_ns = ask(
+		&verify,
+		"SELECT min(first_ns) FROM ledger WHERE count > 0 AND stream IN (" STREAMS
+		")",
+		0);
+	rc = check_streams(&verify);
+	if (!rc) {
+		if (report->interrupted)
+			check_depth(&verify);
+		check_names(&verify);
+		if (!report->interrupted)
+			rc = incise_verify_seals(&verify);
+	}
+	if (!rc)
+		rc = check_pages(&verify);
+	if (rc) {
+		rc = incise_error_set(err, ECANCELED, "%s: stopped; not verified", path);
+		goto out;
+	}
+	tell_of_ends(&verify);
+	tell_of_interruption(&verify);
+	report->complete = !report->findings;
+	report->intact = !verify.altered;
+out:
+	incise_recording_close(verify.recording);
+	return rc;
+}

@@ -1,0 +1,363 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * camera.mkv against the rows of table frames, both in order and a picture at a time; see
+ * verify.h.
+ *
+ *     rows      1 2 3 4 5   7 8 |
+ *     pictures  1 2   4 5 6 7 8 | 9      9: only of an interrupted recording, whose file is
+ *                  └ missing └ extra     ahead of the table
+ *
+ * A damaged picture may say any number, so one is known by its number and by what else is in
+ * its row: the stamp in the file, or size and CRC.
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+#include "../frames.h"
+#include "verify.h"
+
+struct row {
+	int64_t seq, t_ns, pts_ms, bytes, crc;
+};
+
+/* Pictures in a row that are wrong in the same way. */
+struct run {
+	enum { NONE, MISSING, ALTERED, EXTRA } what;
+	const char *why; /* of ALTERED */
+	int64_t first_seq, last_seq;
+	int64_t first_ns, last_ns;
+	uint64_t count;
+};
+
+struct walk {
+	struct incise_verification *verify;
+	struct incise_verify_pictures *out;
+	sqlite3_stmt *rows, *by_seq;
+	struct row row; /* next, where has_row */
+	bool has_row;
+	int64_t last_ns; /* of the row before */
+	bool stamped;	 /* rows have the pictures' times, less the delay */
+	int64_t delay_ns;
+	bool ended; /* it died, maybe in mid-picture */
+	struct run run;
+};
+
+static struct incise_verify_finding finding(enum incise_verify_kind kind)
+{
+	struct incise_verify_finding found = incise_verify_finding(kind);
+
+	found.stream = "camera";
+	return found;
+}
+
+/* --- findings --------------------------------------------------------------------- */
+
+static void flush_run(struct walk *walk)
+{
+	const struct run *run = &walk->run;
+	struct incise_verify_finding found = finding(INCISE_VERIFY_PICTURES);
+	char where[120];
+
+	if (run->what == NONE)
+		return;
+	found.count = run->count;
+	found.first_seq = run->first_seq;
+	found.last_seq = run->last_seq;
+	found.first_ns = run->first_ns;
+	found.last_ns = run->last_ns;
+	if (run->count == 1)
+		snprintf(where, sizeof(where), "number %lld, at %.4f s",
+			 (long long)run->first_seq,
+			 incise_verify_s(walk->verify, run->first_ns));
+	else
+		snprintf(where, sizeof(where), "numbers %lld to %lld, %.4f to %.4f s",
+			 (long long)run->first_seq, (long long)run->last_seq,
+			 incise_verify_s(walk->verify, run->first_ns),
+			 incise_verify_s(walk->verify, run->last_ns));
+	if (run->what == ALTERED)
+		incise_verify_found(walk->verify, &found,
+				    "camera: %llu altered in " INCISE_FRAMES_FILE
+				    ", %s: %s not as written",
+				    (unsigned long long)run->count, where, run->why);
+	else
+		incise_verify_found(
+			walk->verify, &found,
+			run->what == MISSING
+				? "camera: %llu missing in " INCISE_FRAMES_FILE ", %s"
+				: "camera: %llu in " INCISE_FRAMES_FILE
+				  " that no row has, %s",
+			(unsigned long long)run->count, where);
+	walk->run.what = NONE;
+}
+
+static void add_to_run(struct walk *walk, int what, const char *why, int64_t seq,
+		       int64_t t_ns)
+{
+	struct run *run = &walk->run;
+
+	if (run->what != NONE && ((int)run->what != what || run->why != why))
+		flush_run(walk);
+	if (run->what == NONE)
+		*run = (struct run){what, why, seq, seq, t_ns, t_ns, 0};
+	run->last_seq = seq;
+	run->last_ns = t_ns;
+	run->count++;
+}
+
+/* --- rows ------------------------------------------------------------------------- */
+
+static void read_row(sqlite3_stmt *stmt, struct row *row)
+{
+	*row = (struct row){
+		sqlite3_column_int64(stmt, 0), sqlite3_column_int64(stmt, 1),
+		sqlite3_column_int64(stmt, 2), sqlite3_column_int64(stmt, 3),
+		sqlite3_column_int64(stmt, 4),
+	};
+}
+
+/* Returns 0 or -EIO, which verify_stream.c has told of. */
+static int next_row(struct walk *walk)
+{
+	int rc = sqlite3_step(walk->rows);
+
+	walk->has_row = rc == SQLITE_ROW;
+	if (walk->has_row)
+		read_row(walk->rows, &walk->row);
+	return walk->has_row || rc == SQLITE_DONE ? 0 : -EIO;
+}
+
+static int skip_row(struct walk *walk)
+{
+	walk->out->missing++;
+	add_to_run(walk, MISSING, NULL, walk->row.seq, walk->row.t_ns);
+	walk->last_ns = walk->row.t_ns;
+	return next_row(walk);
+}
+
+/* --- pictures --------------------------------------------------------------------- */
+
+struct picture {
+	struct incise_camera_frame frame;
+	struct incise_frames_stored stored;
+	bool good; /* by the reader */
+};
+
+static bool is_like(const struct row *row, const struct picture *picture)
+{
+	return row->pts_ms == picture->stored.pts_ms ||
+	       (row->crc == picture->stored.crc && row->bytes == picture->stored.bytes);
+}
+
+/* Whether a row further on is this picture's: those between have none. */
+static bool is_further_on(struct walk *walk, const struct picture *picture)
+{
+	struct row row;
+	bool is = false;
+
+	if (picture->frame.seq > INT64_MAX ||
+	    (int64_t)picture->frame.seq <= walk->row.seq)
+		return false;
+	sqlite3_bind_int64(walk->by_seq, 1, picture->frame.seq);
+	if (sqlite3_step(walk->by_seq) == SQLITE_ROW) {
+		read_row(walk->by_seq, &row);
+		is = is_like(&row, picture);
+	}
+	sqlite3_reset(walk->by_seq);
+	return is;
+}
+
+/* A stamp that stood still was moved on by 1 ns; see timeline.h. */
+static bool is_time(const struct walk *walk, int64_t t_ns)
+{
+	int64_t late_ns;
+
+	if (!walk->stamped)
+		return true;
+	if (__builtin_sub_overflow(t_ns, walk->row.t_ns, &late_ns))
+		return false;
+	return late_ns == walk->delay_ns ||
+	       (late_ns < walk->delay_ns && walk->row.t_ns == walk->last_ns + 1);
+}
+
+/* What of the picture of walk->row is not as written; NULL: all is. */
+static const char *difference(const struct walk *walk, const struct picture *picture)
+{
+	const struct row *row = &walk->row;
+
+	if (row->bytes != picture->stored.bytes)
+		return "its size is";
+	if (row->crc != picture->stored.crc)
+		return "its bytes are";
+	if (row->seq < 0 || (uint64_t)row->seq != picture->frame.seq)
+		return "its number is";
+	if (row->pts_ms != picture->stored.pts_ms || !is_time(walk, picture->frame.t_ns))
+		return "its time is";
+	return picture->good ? NULL : "its note or the file's head is";
+}
+
+static int take_picture(struct walk *walk, const struct picture *picture)
+{
+	const struct incise_camera_frame *frame = &picture->frame;
+	const char *why;
+	int rc = 0;
+
+	if (walk->has_row && frame->seq != (uint64_t)walk->row.seq) {
+		if (is_further_on(walk, picture)) {
+			while (!rc && walk->has_row &&
+			       walk->row.seq < (int64_t)frame->seq)
+				rc = skip_row(walk);
+			if (rc)
+				return rc;
+		} else if (!is_like(&walk->row, picture)) {
+			walk->out->extra++;
+			add_to_run(walk, EXTRA, NULL, frame->seq, frame->t_ns);
+			return 0;
+		}
+	}
+	if (!walk->has_row) {
+		/* Pictures are in the file before their rows are in the table. */
+		if (walk->verify->report->interrupted ||
+		    (walk->ended && !picture->good)) {
+			walk->out->ahead++;
+			return 0;
+		}
+		walk->out->extra++;
+		add_to_run(walk, EXTRA, NULL, frame->seq, frame->t_ns);
+		return 0;
+	}
+	why = difference(walk, picture);
+	if (why) {
+		walk->out->altered++;
+		add_to_run(walk, ALTERED, why, walk->row.seq, walk->row.t_ns);
+	} else {
+		flush_run(walk);
+		walk->out->present++;
+	}
+	walk->last_ns = walk->row.t_ns;
+	return next_row(walk);
+}
+
+/* Returns 0, -ECANCELED, -EIO. */
+static int walk_through(struct walk *walk, struct incise_frames_reader *reader)
+{
+	struct incise_verification *verify = walk->verify;
+	struct incise_error err = {0};
+	int rc = next_row(walk), got = 1;
+
+	while (!rc) {
+		struct picture picture;
+
+		got = incise_frames_next(reader, &picture.frame, &picture.stored, &err);
+		if (got != 1 && got != -EBADMSG)
+			break;
+		picture.good = got == 1;
+		/* The first one shows that the file's head is right; then CRCs are enough. */
+		reader->undecoded |= picture.good;
+		rc = take_picture(walk, &picture);
+		verify->rows_done += INCISE_VERIFY_PICTURE_ROWS;
+		if (!rc)
+			rc = incise_verify_progress(
+				verify, verify->rows_done < verify->rows
+						? (double)verify->rows_done / verify->rows
+						: 1);
+	}
+	if (!rc && got < 0) {
+		struct incise_verify_finding found =
+			finding(got == -ENOMEM ? INCISE_VERIFY_UNVERIFIED
+					       : INCISE_VERIFY_DAMAGED);
+
+		flush_run(walk);
+		incise_verify_found(verify, &found, "%s", err.text);
+		return 0;
+	}
+	while (!rc && walk->has_row)
+		rc = skip_row(walk);
+	flush_run(walk);
+	walk->out->checked = !rc;
+	return rc;
+}
+
+/* Nothing is known of the pictures. */
+static void tell_unopened(struct incise_verification *verify, const char *path,
+			  const struct incise_error *err)
+{
+	struct incise_verify_finding found = finding(INCISE_VERIFY_PICTURES);
+
+	if (access(path, F_OK) && errno == ENOENT) {
+		found.count = verify->report->pictures.missing = verify->frames;
+		incise_verify_found(verify, &found,
+				    "camera: " INCISE_FRAMES_FILE
+				    " is missing, and %llu pictures with it",
+				    (unsigned long long)verify->frames);
+		return;
+	}
+	found.kind =
+		err->code == EINVAL ? INCISE_VERIFY_DAMAGED : INCISE_VERIFY_UNVERIFIED;
+	found.count = verify->frames;
+	incise_verify_found(verify, &found, "camera: the pictures are not verified: %s",
+			    err->text);
+}
+
+static int prepare(struct walk *walk)
+{
+	static const char sql[] = "SELECT seq, t_ns, pts, bytes, crc FROM frames ";
+	sqlite3 *db = walk->verify->recording->db;
+	sqlite3_stmt *stmt = NULL;
+	char text[120];
+	int rc;
+
+	snprintf(text, sizeof(text), "%sORDER BY seq", sql);
+	rc = sqlite3_prepare_v2(db, text, -1, &walk->rows, NULL);
+	snprintf(text, sizeof(text), "%sWHERE seq = ?", sql);
+	if (rc == SQLITE_OK)
+		rc = sqlite3_prepare_v2(db, text, -1, &walk->by_seq, NULL);
+	if (rc == SQLITE_OK)
+		rc = sqlite3_prepare_v2(
+			db,
+			"SELECT stamped, delay_ns, ended IS NOT NULL FROM streams WHERE "
+			"name = 'camera'",
+			-1, &stmt, NULL);
+	if (rc == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW) {
+		walk->stamped = sqlite3_column_int(stmt, 0);
+		walk->delay_ns = sqlite3_column_int64(stmt, 1);
+		walk->ended = sqlite3_column_int(stmt, 2);
+	}
+	sqlite3_finalize(stmt);
+	return rc == SQLITE_OK ? 0 : -EIO;
+}
+
+int incise_verify_camera(struct incise_verification *verify)
+{
+	struct walk walk = {.verify = verify, .out = &verify->report->pictures};
+	struct incise_frames_reader *reader = NULL;
+	struct incise_error err = {0};
+	char *path = NULL;
+	int rc = 0;
+
+	if (asprintf(&path, "%s/" INCISE_FRAMES_FILE, verify->recording->path) < 0) {
+		path = NULL;
+		incise_error_set(&err, ENOMEM, INCISE_FRAMES_FILE ": out of memory");
+	} else if (access(path, F_OK)) {
+		/* A camera that died before its first picture has no file. */
+		if (verify->frames)
+			tell_unopened(verify, path, &err);
+		goto out;
+	} else {
+		reader = incise_frames_reader_new(path, &err);
+	}
+	if (!reader) {
+		tell_unopened(verify, path ? path : "", &err);
+		goto out;
+	}
+	rc = prepare(&walk);
+	if (!rc)
+		rc = walk_through(&walk, reader);
+	sqlite3_finalize(walk.rows);
+	sqlite3_finalize(walk.by_seq);
+	incise_frames_reader_close(reader);
+out:
+	free(path);
+	/* What SQLite cannot read was told when the rows were walked through. */
+	return rc == -ECANCELED ? rc : 0;
+}

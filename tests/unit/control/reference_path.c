@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * How far lib/control/predict.c is off, and how much its corrections move a force, on the
+ * reference path and on the virtual rig.
+ *
+ * The reference path: a hand in one direction as a tracker sees it, mm and s.
+ *
+ *   path(t) = 3.2 sin(2π 1.1 t + φ0) + 1.7 sin(2π 3.1 t + φ1) voluntary
+ *           + 0.03 sin(2π 10 t + φ2)                          tremor
+ *
+ * It is rebuilt from figures that were given without their path. Velocity taken by finite
+ * differences of 1 kHz samples quantised by 30, 5 and 1 µm was off by 44, 7.5 and 1.7 % of
+ * its rms, which asks for 28 mm/s rms and about 470 mm/s² rms. The amplitudes make 28.2
+ * and 476, and differences off by 44.6, 7.3 and 1.7 %. A tracker with 4.2 ms of latency
+ * and 0.02 mm of noise then shows, rms in mm, here and as given:
+ *
+ *              hold the last pose    constant velocity, extrapolated
+ *     240 Hz      .183   .163            .043   .025
+ *     120 Hz      .245   .243            .057   .054
+ *      60 Hz      .376   .379            .090   .090
+ *
+ * and corrections of up to 0.3 mm at 120 Hz (0.2). Only at 240 Hz, where noise decides,
+ * is this tracker worse than that of the figures.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <incise/clock.h>
+#include <incise/rig.h>
+#include <incise/sim.h>
+#include <incise/tracker.h>
+#include "../../../lib/base/vector.h"
+#include "../../../lib/sim/random.h"
+#include "../../../lib/control/predict.h"
+
+#define REFERENCE_LATENCY_NS 4200000
+#define REFERENCE_NOISE_MM 0.02
+
+static const struct {
+	double mm, hz, phase;
+} reference_part[3] = {{3.2, 1.1, 0.3}, {1.7, 3.1, 1.9}, {0.03, 10, 4.1}};
+
+static double reference_mm(double t)
+{
+	double x = 0;
+
+	for (int i = 0; i < 3; i++)
+		x += reference_part[i].mm *
+		     sin(2 * M_PI * reference_part[i].hz * t + reference_part[i].phase);
+	return x;
+}
+
+static double reference_mm_s(double t)
+{
+	double v = 0;
+
+	for (int i = 0; i < 3; i++) {
+		double w = 2 * M_PI * reference_part[i].hz;
+
+		v += reference_part[i].mm * w * cos(w * t + reference_part[i].phase);
+	}
+	return v;
+}
+
+#define S 1e-9
+
+/* All that is asked for at one time. */
+struct pose {
+	double x[3], v[3], q[4];
+};
+
+/* The constant-velocity Kalman filter to compare with; of Kalata's gains too. */
+struct constant_velocity {
+	double alpha, beta, x, v, t;
+};
+
+static void constant_velocity_init(struct constant_velocity *c, double period)
+{
+	/* 800 mm/s² is near the best for each of the rates. */
+	double index = 800 * period * period / REFERENCE_NOISE_MM;
+	double r = (4 + index - sqrt(8 * index + index * index)) / 4;
+
+	*c = (struct constant_velocity){.alpha = 1 - r * r,
+					.beta = 2 * (1 - r) * (1 - r)};
+}
+
+static void constant_velocity_add(struct constant_velocity *c, double t, double x)
+{
+	double dt = t - c->t, miss = x - c->x - c->v * dt;
+
+	c->x += c->v * dt + c->alpha * miss;
+	if (dt > 0)
+		c->v += c->beta / dt * miss;
+	c->t = t;
+}
+
+/* The filter without the blend. */
+static double bare(const struct incise_predict *p, int64_t t_ns)
+{
+	double dt = (double)(t_ns - p->t_ns) * S;
+
+	return p->x[0] + p->v[0] * dt + p->a[0] * dt * dt / 2;
+}
+
+/* What a run at 1 kHz came to; errors rms, steps largest in one tick. */
+struct result {
+	double hold, constant_velocity, bare, shown; /* mm */
+	double velocity;			     /* mm/s */
+	double bare_step, step, blend_step;	     /* relative to the force */
+};
+
+/*
+ * 40 s of the reference path about a depth of 7 mm: 2.1 to 11.9 mm, so that at 1 N/mm the
+ * force is 2.1 to 11.9 N. A step is the change of the force shown in one tick less the
+ * change of the true force in it, against the true force then. In blend_step only what
+ * the blend changes in a tick is counted.
+ */
+static struct result run(int rate)
+{
+	struct incise_tracker_info info = {"test", rate, REFERENCE_LATENCY_NS, 1, 0};
+	struct incise_predict p;
+	struct constant_velocity c;
+	struct result sum = {0};
+	double last_shown = 0, last_bare = 0, last_truth = 0, last_z = 0;
+	int count = 0;
+
+	incise_predict_init(&p, &info);
+	constant_velocity_init(&c, 1.0 / rate);
+	for (int64_t tick = 0, n = 0; tick < 40000; tick++) {
+		int64_t now = tick * 1000000;
+		double truth = 7 + reference_mm(now * S), without;
+		struct pose pose;
+
+		for (;; n++) {
+			int64_t then = n * INCISE_NS_PER_S / rate;
+			double z = 7 + reference_mm(then * S) +
+				   REFERENCE_NOISE_MM * incise_random_normal(1, n);
+
+			if (then + REFERENCE_LATENCY_NS > now)
+				break;
+			incise_predict_add(&p,
+					   &(struct incise_tracker_sample){
+						   .t_ns = then + REFERENCE_LATENCY_NS,
+						   .position_mm = {z},
+						   .quaternion = {1}});
+			constant_velocity_add(&c, then * S, z);
+			last_z = z;
+		}
+		incise_predict_at(&p, now, pose.x, pose.v, pose.q);
+		without = bare(&p, now);
+		/* Half a second is ten times what the filters need to settle. */
+		if (tick > 500) {
+			double moved = truth - last_truth;
+
+			sum.hold += pow(last_z - truth, 2);
+			sum.constant_velocity +=
+				pow(c.x + c.v * (now * S - c.t) - truth, 2);
+			sum.bare += pow(without - truth, 2);
+			sum.shown += pow(pose.x[0] - truth, 2);
+			sum.velocity += pow(pose.v[0] - reference_mm_s(now * S), 2);
+			sum.bare_step = fmax(sum.bare_step,
+					     fabs(without - last_bare - moved) / truth);
+			sum.step = fmax(sum.step,
+					fabs(pose.x[0] - last_shown - moved) / truth);
+			sum.blend_step = fmax(sum.blend_step, fabs(p.x_shown[0]) * 1e-3 /
+								      p.period_s / truth);
+			count++;
+		}
+		last_shown = pose.x[0];
+		last_bare = without;
+		last_truth = truth;
+	}
+	sum.hold = sqrt(sum.hold / count);
+	sum.constant_velocity = sqrt(sum.constant_velocity / count);
+	sum.bare = sqrt(sum.bare / count);
+	sum.shown = sqrt(sum.shown / count);
+	sum.velocity = sqrt(sum.velocity / count);
+	return sum;
+}
+
+static void test_reference_path(void **state)
+{
+	static const struct {
+		int rate;
+		double hold, constant_velocity; /* as given, mm */
+		double shown_mm;		/* not above */
+		double velocity_mm_s;		/* not above */
+	} rates[] = {
+		/* 0.06 mm at 120 Hz was asked for; the others are a tenth above what is. */
+		{240, 0.163, 0.025, 0.039, 4.2},
+		{120, 0.243, 0.054, 0.060, 5.5},
+		{60, 0.379, 0.090, 0.108, 8.4},
+	};
+
+	for (int i = 0; i < 3; i++) {
+		struct result r = run(rates[i].rate);
+
+		print_message(
+			"%3d Hz: hold %.4f cv %.4f unblended %.4f shown %.4f mm, "
+			"velocity %.2f mm/s, steps %.2f %% unblended, %.2f %% shown, "
+			"%.2f %% of the blend\n",
+			rates[i].rate, r.hold, r.constant_velocity, r.bare, r.shown,
+			r.velocity, 100 * r.bare_step, 100 * r.step, 100 * r.blend_step);
+		/* The path is like the one of the figures: see there, and why not at 240 Hz. */
+		assert_true(fabs(r.hold / rates[i].hold - 1) < (i ? 0.02 : 0.14));
+		if (i)
+			assert_true(
+				fabs(r.constant_velocity / rates[i].constant_velocity -
+				     1) < 0.06);
+		assert_true(r.bare < r.constant_velocity);
+		assert_true(r.shown < rates[i].shown_mm);
+		assert_true(r.step < 0.02 && r.blend_step < 0.02);
+		assert_true(r.bare_step > 0.03);
+		assert_true(r.velocity < rates[i].velocity_mm_s);
+	}
+}
+
+/*
+ * 1 kHz samples of the reference path, quantised: noise of Δ/√12. The figures for a filter
+ * of this kind are 4.9, 1.7 and 0.7 % of the rms speed, and for finite differences 44,
+ * 7.5 and 1.7 %.
+ */
+static void test_velocity_from_quantised_position(void **state)
+{
+	static const struct {
+		double step_mm, filtered, difference;
+	} cases[] = {{0.030, 0.049, 0.44}, {0.005, 0.017, 0.075}, {0.001, 0.007, 0.017}};
+	struct incise_tracker_info info = {"encoder", 1000, 0, 1, 0};
+
+	for (int i = 0; i < 3; i++) {
+		double step = cases[i].step_mm, last = 0, filtered = 0, difference = 0;
+		double speed = 0;
+		struct incise_predict p;
+
+		incise_predict_init_noise(&p, &info, step / sqrt(12));
+		for (int tick = 0; tick < 20000; tick++) {
+			double t = tick * 1e-3, v = reference_mm_s(t);
+			struct incise_tracker_sample s = {.t_ns = tick * 1000000LL,
+							  .quaternion = {1}};
+
+			s.position_mm[0] = round(reference_mm(t) / step) * step;
+			incise_predict_add(&p, &s);
+			if (tick > 1000) {
+				/* Nothing is looked at later than the sample: no lag. */
+				filtered += pow(p.v[0] - v, 2);
+				difference +=
+					pow((s.position_mm[0] - last) / 1e-3 - v, 2);
+				speed += v * v;
+			}
+			last = s.position_mm[0];
+		}
+		filtered = sqrt(filtered / speed);
+		difference = sqrt(difference / speed);
+		print_message("%2.0f µm: %.2f %%, by differences %.1f %%\n", step * 1e3,
+			      100 * filtered, 100 * difference);
+		assert_true(filtered <= cases[i].filtered);
+		assert_true(fabs(difference / cases[i].difference - 1) < 0.05);
+	}
+}
+
+/* The virtual surgeon at 120 Hz: jitter of 0.2 ms, a clock 50 ppm off, three axes. */
+static void test_virtual_rig(void **state)
+{
+	struct incise_rig *rig = incise_rig_open(
+		"sim:clock=simulated,depth_mm=10,times=1", INCISE_RIG_TRACKER, NULL);
+	struct incise_clock *clock = incise_rig_clock(rig);
+	struct incise_tracker_info info;
+	struct incise_predict p;
+	double error[3] = {0}, last_miss[3] = {0}, step = 0, speed = 0;
+
+	assert_non_null(rig);
+	incise_tracker_info(incise_rig_tracker(rig), &info);
+	incise_predict_init(&p, &info);
+	for (int tick = 0; tick < 9500; tick++) {
+		struct incise_tracker_sample samples[8];
+		struct incise_sim_truth truth;
+		struct pose pose;
+		int n;
+
+		incise_clock_wait_until(clock, incise_clock_now(clock) + 1000000);
+		n = incise_tracker_read(incise_rig_tracker(rig), samples, 8);
+		for (int i = 0; i < n; i++)
+			incise_predict_add(&p, &samples[i]);
+		incise_sim_truth(incise_rig_sim(rig), &truth);
+		incise_predict_at(&p, incise_clock_now(clock), pose.x, pose.v, pose.q);
+		for (int i = 0; i < 3; i++) {
+			double miss = pose.x[i] - truth.position_mm[i];
+
+			if (tick > 500) {
+				error[i] += miss * miss / 8999;
+				step = fmax(step, fabs(miss - last_miss[i]));
+			}
+			last_miss[i] = miss;
+		}
+		if (tick > 500)
+			speed += pow(v3_length(pose.v) - truth.velocity_mm_s, 2) / 8999;
+	}
+	print_message("virtual rig: %.4f %.4f %.4f mm, speed %.2f mm/s, step %.4f mm\n",
+		      sqrt(error[0]), sqrt(error[1]), sqrt(error[2]), sqrt(speed), step);
+	for (int i = 0; i < 3; i++)
+		assert_true(sqrt(error[i]) < 0.06);
+	/* 2 % of the force 1 N/mm has at 2 mm. */
+	assert_true(step < 0.04);
+	assert_true(sqrt(speed) < 5);
+	incise_rig_close(rig);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_reference_path),
+		cmocka_unit_test(test_velocity_from_quantised_position),
+		cmocka_unit_test(test_virtual_rig),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

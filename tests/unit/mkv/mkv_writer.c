@@ -1,0 +1,543 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/record/mkv/mkv_writer.c: what is put comes back to the byte, with its times; a file that
+ * is cut off at any byte gives all that is whole before it; a disk that is full,
+ * writes little at once, or fails; kill -9.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <errno.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+#include "../../../lib/record/mkv/mkv.h"
+#include "film.h"
+
+#define ROOM (1 << 20)
+
+static const struct incise_frames_shape shapes[] = {
+	{64, 48, INCISE_PIXELS_RGB, 60},   {66, 50, INCISE_PIXELS_GREY, 60},
+	{64, 48, INCISE_PIXELS_YUYV, 60},  {64, 48, INCISE_PIXELS_MJPEG, 60},
+	{17, 19, INCISE_PIXELS_RGB, 0},	   {17, 16, INCISE_PIXELS_GREY, 7.5},
+	{18, 17, INCISE_PIXELS_YUYV, 1e3}, {16, 8192, INCISE_PIXELS_YUYV, 30},
+};
+
+/* A disk that writes at most so much at once, or fails. 0: as it is. */
+static struct {
+	size_t most;
+	int64_t room; /* bytes until it fails with EIO; below 0: for ever */
+} disk = {0, -1};
+
+ssize_t __real_write(int fd, const void *bytes, size_t n);
+ssize_t __wrap_write(int fd, const void *bytes, size_t n)
+{
+	if (disk.room >= 0 && (int64_t)n > disk.room) {
+		n = (size_t)disk.room;
+		if (!n) {
+			errno = EIO;
+			return -1;
+		}
+	}
+	if (disk.most && n > disk.most)
+		n = disk.most;
+	if (disk.room >= 0)
+		disk.room -= (int64_t)n;
+	return __real_write(fd, bytes, n);
+}
+
+static struct incise_frames_writer *begin(const char *path,
+					  const struct incise_frames_shape *shape)
+{
+	struct incise_error err = {0};
+	struct incise_frames_writer *writer = mkv_writer_new(path, shape, NULL, &err);
+
+	if (!writer)
+		fail_msg("%s", err.text);
+	return writer;
+}
+
+static void put(struct incise_frames_writer *writer,
+		const struct incise_camera_frame *frame,
+		struct incise_frames_stored *stored)
+{
+	struct incise_error err = {0};
+
+	if (writer->ops->put(writer, frame, stored, &err))
+		fail_msg("%s", err.text);
+}
+
+/* That @frame is picture @n of the film, row by row. */
+static void is_picture(const struct incise_camera_frame *frame,
+		       const struct incise_frames_shape *shape, uint64_t n, int pad)
+{
+	static uint8_t bytes[ROOM];
+	struct incise_camera_frame want = film_frame(shape, n, pad, bytes);
+	size_t row = incise_frames_row(shape->pixels, shape->width);
+
+	assert_int_equal(frame->t_ns, want.t_ns);
+	assert_int_equal(frame->seq, n);
+	assert_int_equal(frame->width, shape->width);
+	assert_int_equal(frame->height, shape->height);
+	assert_int_equal(frame->pixels, shape->pixels);
+	if (!row) {
+		assert_int_equal(frame->size, want.size);
+		assert_memory_equal(frame->data, want.data, want.size);
+		return;
+	}
+	assert_int_equal(frame->stride, row);
+	assert_int_equal(frame->size, row * (size_t)shape->height);
+	for (int y = 0; y < shape->height; y++)
+		assert_memory_equal(frame->data + row * (size_t)y,
+				    want.data + want.stride * (size_t)y, row);
+}
+
+/* How many pictures a file has; all but the last are those of the film. */
+static uint64_t count(const char *path, const struct incise_frames_shape *shape)
+{
+	struct incise_error err = {0};
+	struct incise_frames_reader *reader = mkv_reader_new(path, &err);
+	struct incise_camera_frame frame;
+	struct incise_frames_stored stored;
+	uint64_t n = 0;
+	int rc;
+
+	/* Killed before there was a file. */
+	if (!reader && err.code == ENOENT)
+		return 0;
+	if (!reader)
+		fail_msg("%s", err.text);
+	while ((rc = reader->ops->next(reader, &frame, &stored, &err)) == 1)
+		is_picture(&frame, shape, n++, 0);
+	/* The last may be torn, and then says so. */
+	assert_true(rc == 0 || rc == -EBADMSG);
+	if (rc == -EBADMSG)
+		assert_int_equal(reader->ops->next(reader, &frame, &stored, &err), 0);
+	reader->ops->close(reader);
+	return n;
+}
+
+static void comes_back_to_the_byte(void **state)
+{
+	static uint8_t bytes[ROOM];
+
+	for (size_t i = 0; i < sizeof(shapes) / sizeof(*shapes); i++) {
+		const struct incise_frames_shape *shape = &shapes[i];
+		int pad = i % 2 ? 0 : 13, pictures = shape->height > 1000 ? 2 : 12;
+		struct incise_frames_stored put_as[12], stored;
+		struct incise_frames_writer *writer;
+		struct incise_frames_reader *reader;
+		struct incise_camera_frame frame;
+		struct incise_error err = {0};
+		struct stat before, after;
+		char path[64];
+
+		film_path(path, sizeof(path));
+		writer = begin(path, shape);
+		for (int n = 0; n < pictures; n++) {
+			frame = film_frame(shape, (uint64_t)n, pad, bytes);
+			put(writer, &frame, &put_as[n]);
+			/* 16.666667 ms a picture, to the nearest. */
+			assert_int_equal(put_as[n].pts_ms,
+					 (n * FILM_STEP_NS + 500000) / 1000000);
+		}
+		assert_int_equal(stat(path, &before), 0);
+		assert_int_equal(writer->ops->close(writer, &err), 0);
+		/* A file that is ended is no other than one that is not. */
+		assert_int_equal(stat(path, &after), 0);
+		assert_int_equal(after.st_size, before.st_size);
+		reader = mkv_reader_new(path, &err);
+		if (!reader)
+			fail_msg("%s", err.text);
+		for (int n = 0; n < pictures; n++) {
+			assert_int_equal(reader->ops->next(reader, &frame, &stored, &err),
+					 1);
+			is_picture(&frame, shape, (uint64_t)n, pad);
+			assert_int_equal(stored.pts_ms, put_as[n].pts_ms);
+			assert_int_equal(stored.bytes, put_as[n].bytes);
+			assert_int_equal(stored.crc, put_as[n].crc);
+		}
+		assert_int_equal(reader->ops->next(reader, &frame, &stored, &err), 0);
+		assert_int_equal(reader->ops->next(reader, &frame, &stored, &err), 0);
+		reader->ops->close(reader);
+		film_remove(path);
+	}
+}
+
+/* Times that no camera should give: what is noted is exact, pts goes on. */
+static void any_time_is_kept(void **state)
+{
+	static const struct {
+		int64_t t_ns, pts_ms;
+	} row[] = {
+		{1000, 0},
+		{1000, 1}, /* again */
+		{1500000 + 1000, 2},
+		{2499999 + 1000, 3}, /* 2 is taken */
+		{999, 4},	     /* before the first */
+		{INT64_MIN, 5},
+		{100499999 + 1000, 100},
+		{100500000 + 1000, 101},
+		{7200000000000LL + 1000, 7200000}, /* two hours on: one cluster each */
+	};
+	const struct incise_frames_shape *shape = &shapes[3];
+	struct incise_frames_stored stored;
+	struct incise_frames_reader *reader;
+	struct incise_frames_writer *writer;
+	struct incise_camera_frame frame;
+	uint8_t bytes[6000];
+	char path[64];
+
+	film_path(path, sizeof(path));
+	writer = begin(path, shape);
+	for (size_t i = 0; i < sizeof(row) / sizeof(*row); i++) {
+		frame = film_frame(shape, i, 0, bytes);
+		frame.t_ns = row[i].t_ns;
+		frame.seq = UINT64_MAX - i;
+		put(writer, &frame, &stored);
+		assert_int_equal(stored.pts_ms, row[i].pts_ms);
+	}
+	assert_int_equal(writer->ops->close(writer, NULL), 0);
+	reader = mkv_reader_new(path, NULL);
+	assert_non_null(reader);
+	for (size_t i = 0; i < sizeof(row) / sizeof(*row); i++) {
+		assert_int_equal(reader->ops->next(reader, &frame, &stored, NULL), 1);
+		assert_true(frame.t_ns == row[i].t_ns);
+		assert_true(frame.seq == UINT64_MAX - i);
+		assert_int_equal(stored.pts_ms, row[i].pts_ms);
+	}
+	reader->ops->close(reader);
+	film_remove(path);
+}
+
+static void refuses(void **state)
+{
+	static const struct incise_frames_shape none[] = {
+		{15, 48, INCISE_PIXELS_GREY, 60},	{48, 15, INCISE_PIXELS_MJPEG, 60},
+		{8194, 48, INCISE_PIXELS_RGB, 60},	{65, 48, INCISE_PIXELS_YUYV, 60},
+		{64, 48, (enum incise_pixels)9, 0},	{64, 48, INCISE_PIXELS_RGB, -1},
+		{64, 48, INCISE_PIXELS_RGB, 0.0 / 0.0},
+	};
+	struct incise_frames_writer *writer;
+	struct incise_frames_stored stored;
+	struct incise_camera_frame frame;
+	struct incise_error err = {0};
+	static uint8_t bytes[ROOM];
+	char path[64];
+
+	film_path(path, sizeof(path));
+	for (size_t i = 0; i < sizeof(none) / sizeof(*none); i++) {
+		errno = 0;
+		assert_null(mkv_writer_new(path, &none[i], NULL, &err));
+		assert_int_equal(errno, EINVAL);
+	}
+	assert_null(mkv_reader_new(path, &err));
+	assert_int_equal(err.code, ENOENT);
+	writer = begin(path, &shapes[0]);
+	errno = 0;
+	assert_null(mkv_writer_new(path, &shapes[0], NULL, &err));
+	assert_int_equal(errno, EEXIST);
+	for (int i = 0; i < 5; i++) {
+		frame = film_frame(&shapes[0], 0, 0, bytes);
+		if (i == 0)
+			frame.width--;
+		else if (i == 1)
+			frame.pixels = INCISE_PIXELS_GREY;
+		else if (i == 2)
+			frame.size--;
+		else if (i == 3)
+			frame.stride--;
+		else
+			frame.data = NULL;
+		assert_int_equal(writer->ops->put(writer, &frame, &stored, &err),
+				 -EINVAL);
+	}
+	/* That did it no harm. */
+	frame = film_frame(&shapes[0], 0, 0, bytes);
+	put(writer, &frame, &stored);
+	assert_int_equal(writer->ops->close(writer, &err), 0);
+	assert_int_equal(count(path, &shapes[0]), 1);
+	film_remove(path);
+}
+
+/* Where each picture ends in the file. */
+static void write_film(const char *path, const struct incise_frames_shape *shape, int n,
+		       off_t *ends)
+{
+	struct incise_frames_writer *writer = begin(path, shape);
+	static uint8_t bytes[ROOM];
+	struct stat st;
+
+	for (int i = 0; i < n; i++) {
+		struct incise_camera_frame frame =
+			film_frame(shape, (uint64_t)i, 0, bytes);
+		struct incise_frames_stored stored;
+
+		put(writer, &frame, &stored);
+		assert_int_equal(stat(path, &st), 0);
+		ends[i] = st.st_size;
+	}
+	assert_int_equal(writer->ops->close(writer, NULL), 0);
+}
+
+static void cut_off_anywhere(void **state)
+{
+	for (size_t i = 0; i < 4; i++) {
+		off_t ends[6];
+		char path[64];
+
+		film_path(path, sizeof(path));
+		write_film(path, &shapes[i], 6, ends);
+		/* From the back, so that one file will do; 61 meets every kind of place. */
+		for (off_t size = ends[5]; size >= 0; size -= 61) {
+			uint64_t whole = 0, found;
+
+			assert_int_equal(truncate(path, size), 0);
+			while (whole < 6 && ends[whole] <= size)
+				whole++;
+			found = count(path, &shapes[i]);
+			/* What is behind the picture's bytes need not be there. */
+			assert_in_range(found, whole, whole + 1);
+		}
+		film_remove(path);
+	}
+}
+
+static void altered_bytes_are_found(void **state)
+{
+	/* decoded, and by the CRC alone */
+	for (size_t i = 0; i < 8; i++) {
+		const struct incise_frames_shape *shape = &shapes[i % 4];
+		bool undecoded = i >= 4 && shape->pixels != INCISE_PIXELS_MJPEG;
+		struct incise_frames_stored stored;
+		struct incise_frames_reader *reader;
+		struct incise_camera_frame frame;
+		off_t ends[6];
+		char path[64];
+		FILE *file;
+
+		film_path(path, sizeof(path));
+		write_film(path, shape, 6, ends);
+		file = fopen(path, "r+");
+		assert_non_null(file);
+		/* In the middle of picture 3's bytes. */
+		assert_int_equal(fseek(file, (ends[2] + ends[3]) / 2, SEEK_SET), 0);
+		int c = fgetc(file);
+		assert_int_equal(fseek(file, -1, SEEK_CUR), 0);
+		fputc(c ^ 1, file);
+		fclose(file);
+		reader = mkv_reader_new(path, NULL);
+		assert_non_null(reader);
+		reader->undecoded = i >= 4;
+		for (uint64_t n = 0; n < 6; n++) {
+			struct incise_error err = {0};
+			int rc = reader->ops->next(reader, &frame, &stored, &err);
+
+			assert_int_equal(rc, n == 3 ? -EBADMSG : 1);
+			assert_int_equal(frame.seq, n);
+			assert_int_equal(!frame.data, n == 3 || undecoded);
+		}
+		assert_int_equal(reader->ops->next(reader, &frame, &stored, NULL), 0);
+		reader->ops->close(reader);
+		film_remove(path);
+	}
+}
+
+/* Any byte may be any: it must come to an end, and a sanitizer have nothing to say. */
+static void noise_ends(void **state)
+{
+	for (uint64_t round = 0; round < 60; round++) {
+		const struct incise_frames_shape *shape = &shapes[round % 4];
+		struct incise_frames_stored stored;
+		struct incise_frames_reader *reader;
+		struct incise_camera_frame frame;
+		off_t ends[3];
+		char path[64];
+		FILE *file;
+		int steps = 0;
+
+		film_path(path, sizeof(path));
+		write_film(path, shape, 3, ends);
+		file = fopen(path, "r+");
+		assert_non_null(file);
+		for (size_t k = 0; k < 1 + round % 5; k++) {
+			/* The headers more often than what is behind them. */
+			off_t end = round % 3 ? 600 : ends[2];
+
+			fseek(file, (round * 7919 + k * 104729) % end, SEEK_SET);
+			fputc(film_byte(round, 64 + k), file);
+		}
+		fclose(file);
+		reader = mkv_reader_new(path, NULL);
+		while (reader && steps++ < 100) {
+			int rc = reader->ops->next(reader, &frame, &stored, NULL);
+
+			if (rc != 1 && rc != -EBADMSG)
+				break;
+		}
+		assert_true(steps < 100);
+		if (reader)
+			reader->ops->close(reader);
+		film_remove(path);
+	}
+}
+
+/* A limit on the file's size stands for a full disk: write(2) gets short, then fails. */
+static void full_disk(void **state)
+{
+	const struct rlimit limit = {100000, RLIM_INFINITY};
+	struct rlimit before;
+	char path[64];
+
+	signal(SIGXFSZ, SIG_IGN);
+	assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+	for (size_t i = 0; i < 4; i++) {
+		struct incise_frames_writer *writer;
+		struct incise_frames_stored stored;
+		struct incise_camera_frame frame;
+		struct incise_error err = {0};
+		static uint8_t bytes[ROOM];
+		uint64_t n = 0;
+		int rc;
+
+		film_path(path, sizeof(path));
+		writer = begin(path, &shapes[i]);
+		assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+		do {
+			frame = film_frame(&shapes[i], n++, 0, bytes);
+			rc = writer->ops->put(writer, &frame, &stored, &err);
+		} while (!rc && n < 1000);
+		assert_int_equal(rc, -EFBIG);
+		assert_non_null(strstr(err.text, "disk full"));
+		/* It stays so. */
+		assert_int_equal(writer->ops->put(writer, &frame, &stored, &err), -EFBIG);
+		assert_int_equal(writer->ops->close(writer, &err), -EFBIG);
+		assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+		assert_int_equal(count(path, &shapes[i]), n - 1);
+		film_remove(path);
+	}
+}
+
+static void short_writes_are_gone_on_with(void **state)
+{
+	off_t ends[6];
+	char path[64];
+
+	film_path(path, sizeof(path));
+	disk.most = 100;
+	write_film(path, &shapes[0], 6, ends);
+	disk.most = 0;
+	assert_int_equal(count(path, &shapes[0]), 6);
+	film_remove(path);
+}
+
+/* Wherever it fails, what was put before is there, and the rest is cut off. */
+static void a_disk_that_fails(void **state)
+{
+	static uint8_t bytes[ROOM];
+
+	for (int64_t room = 0; room < 20000; room += 777) {
+		struct incise_frames_writer *writer;
+		struct incise_frames_stored stored;
+		struct incise_error err = {0};
+		uint64_t n = 0;
+		char path[64];
+		int rc = 0;
+
+		film_path(path, sizeof(path));
+		disk.room = room;
+		writer = mkv_writer_new(path, &shapes[3], NULL, &err);
+		while (writer && !rc && n < 100) {
+			struct incise_camera_frame frame =
+				film_frame(&shapes[3], n++, 0, bytes);
+
+			rc = writer->ops->put(writer, &frame, &stored, &err);
+		}
+		disk.room = -1;
+		assert_int_equal(err.code, EIO);
+		if (!writer) {
+			/* Nothing is left of what could not be begun. */
+			assert_int_equal(access(path, F_OK), -1);
+			film_remove(path);
+			continue;
+		}
+		assert_int_equal(rc, -EIO);
+		assert_int_equal(writer->ops->close(writer, &err), -EIO);
+		assert_int_equal(count(path, &shapes[3]), n - 1);
+		film_remove(path);
+	}
+}
+
+/* 20 writers are killed at 20 moments: every picture that was put is there. */
+static void killed(void **state)
+{
+	volatile uint64_t *done = mmap(NULL, 4096, PROT_READ | PROT_WRITE,
+				       MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	uint64_t most = 0;
+
+	assert_true(done != MAP_FAILED);
+	srandom((unsigned int)time(NULL));
+	for (int round = 0; round < 20; round++) {
+		const struct incise_frames_shape *shape = &shapes[round % 4];
+		useconds_t after = 1000 + (useconds_t)random() % 60000;
+		uint64_t was, found;
+		char path[64];
+		pid_t child;
+
+		film_path(path, sizeof(path));
+		*done = 0;
+		child = fork();
+		assert_true(child >= 0);
+		if (!child) {
+			struct incise_frames_writer *writer =
+				mkv_writer_new(path, shape, NULL, NULL);
+			static uint8_t bytes[ROOM];
+
+			for (uint64_t n = 0; writer; n++) {
+				struct incise_camera_frame frame =
+					film_frame(shape, n, 0, bytes);
+				struct incise_frames_stored stored;
+
+				if (writer->ops->put(writer, &frame, &stored, NULL))
+					break;
+				*done = n + 1;
+			}
+			_exit(1);
+		}
+		usleep(after);
+		assert_int_equal(kill(child, SIGKILL), 0);
+		assert_int_equal(waitpid(child, NULL, 0), child);
+		was = *done;
+		found = count(path, shape);
+		/* The one that was on its way may be there or not. */
+		assert_in_range(found, was, was + 1);
+		most = found > most ? found : most;
+		film_remove(path);
+	}
+	munmap((void *)done, 4096);
+	/* Else nobody was killed while writing. */
+	assert_true(most > 10);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(comes_back_to_the_byte),
+		cmocka_unit_test(any_time_is_kept),
+		cmocka_unit_test(refuses),
+		cmocka_unit_test(cut_off_anywhere),
+		cmocka_unit_test(altered_bytes_are_found),
+		cmocka_unit_test(noise_ends),
+		cmocka_unit_test(full_disk),
+		cmocka_unit_test(short_writes_are_gone_on_with),
+		cmocka_unit_test(a_disk_that_fails),
+		cmocka_unit_test(killed),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
