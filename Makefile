@@ -29,6 +29,8 @@ runpath = $(if $(filter-out no,$(rpath)),-Wl$(comma)-rpath$(comma)'$$ORIGIN$1')
 comma := ,
 
 CFLAGS ?= -O2 -g
+# Objects come from ccache where it is installed; CCACHE= turns it off.
+CCACHE ?= $(shell command -v ccache 2>/dev/null)
 PKG_CONFIG ?= pkg-config
 INSTALL ?= install
 
@@ -37,6 +39,7 @@ version := $(shell sed -n 's/^\#define INCISE_VERSION "\(.*\)"/\1/p' lib/include
 soversion := 1
 
 cppflags := -D_GNU_SOURCE -Ilib/include
+CCACHE := $(CCACHE)
 cxxflags := -std=c++14 -fPIC -fvisibility=hidden -ffp-contract=off -Wall -Wextra
 warnings := -Wall -Wextra -Wmissing-prototypes -Wstrict-prototypes -Wvla
 cflags := -std=gnu11 -fPIC -fvisibility=hidden -fno-math-errno -ffp-contract=off $(warnings)

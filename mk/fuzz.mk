@@ -18,16 +18,18 @@ fuzz_flags := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined \
 
 $(O)/obj/fuzz/%.o: %.c
 	@mkdir -p $(@D)
-	$(CLANG) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \
+	$(call step,CC)
+	$(Q)$(CCACHE) $(CLANG) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \
 		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
 $(O)/obj/fuzz/%.o: %.cc
 	@mkdir -p $(@D)
-	$(CLANG) $(cppflags) $(CPPFLAGS) $(cxxflags) $(opencv_cflags) \
+	$(call step,CC)
+	$(Q)$(CCACHE) $(CLANG) $(cppflags) $(CPPFLAGS) $(cxxflags) $(opencv_cflags) \
 		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
 # What a target needs beside that.
-fuzz_vision_frame := lib/base/error.c lib/device/vision.c lib/device/module.c $(vision_linked) \
+fuzz_vision_frame := lib/base/error.c lib/device/vision.c lib/device/module.c tests/vision/linked.c \
 	$(wildcard lib/vision/*.c lib/vision/*.cc)
 fuzz_libs_vision_frame := $(libs_vision_opencv)
 fuzz_slcan_line := lib/device/can/slcan_line.c
@@ -46,7 +48,8 @@ define fuzz_program
 $(O)/tests/fuzz/$1: $(O)/obj/fuzz/tests/fuzz/$1.o $(fuzz_core) \
 		$$(addprefix $(O)/obj/fuzz/,$$(addsuffix .o,$$(basename $$(fuzz_$1))))
 	@mkdir -p $$(@D)
-	$$(CLANG) $$(fuzz_flags) -fsanitize=fuzzer -o $$@ $$^ $$(fuzz_libs_$1) -lm
+	$$(call step,LD)
+	$$(Q)$$(CLANG) $$(fuzz_flags) -fsanitize=fuzzer -o $$@ $$^ $$(fuzz_libs_$1) -lm
 endef
 $(foreach name,$(basename $(notdir $(fuzz_sources))),$(eval $(call fuzz_program,$(name))))
 

@@ -8,12 +8,12 @@ objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))) $
 $(O)/obj/%.o: %.c
 	@mkdir -p $(@D)
 	$(call step,CC)
-	$(Q)$(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
+	$(Q)$(CCACHE) $(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
 
 $(O)/obj/%.o: %.cc
 	@mkdir -p $(@D)
 	$(call step,CXX)
-	$(Q)$(CXX) $(cppflags) $(CPPFLAGS) $(cxxflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
+	$(Q)$(CCACHE) $(CXX) $(cppflags) $(CPPFLAGS) $(cxxflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
 
 # The integer core builds without any library and, where the compiler can be told so,
 # without floating-point registers: it will be linked into a kernel.
@@ -171,10 +171,5 @@ $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $
 	# q, not r: two rooms may have a file of the same name
 	$(call step,AR)
 	$(Q)$(AR) qcs $@ $^
-
-all_libs = $(if $(has_libmnl),$(shell $(PKG_CONFIG) --libs libmnl)) \
-	$(if $(has_libiio),$(shell $(PKG_CONFIG) --libs libiio)) \
-	$(if $(has_comedilib),$(shell $(PKG_CONFIG) --libs comedilib)) \
-	$(foreach lib,$(libraries),$(pc_libs_$(lib)) $(libs_$(lib)))
 
 .PHONY: libs

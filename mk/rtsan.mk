@@ -42,18 +42,25 @@ rtsan_unit_programs := $(addprefix $(O)/again/tests/unit/,$(rtsan_units))
 
 rtsan_cc = $(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
 	-Wno-missing-prototypes -Wno-unused-parameter $(CFLAGS) -Wno-function-effects \
-	-MMD -MP -MF $@.d $(LDFLAGS)
+	-MMD -MP -MF $@.d
 rtsan_libs = $(shell $(PKG_CONFIG) --libs $(pc_incise)) \
 	$(if $(has_libmnl),$(shell $(PKG_CONFIG) --libs libmnl)) $(libs_incise) -pthread
 
-$(O)/again/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-rtsan.a
+$(O)/obj/again/%.o: tests/unit/%.c
 	@mkdir -p $(@D)
-	$(rtsan_cc) $(ldflags_$*) $(shell $(PKG_CONFIG) --cflags cmocka) -o $@ $< \
-		$(O)/lib/libincise-rtsan.a $(rtsan_libs) $(shell $(PKG_CONFIG) --libs cmocka)
+	$(call step,CC)
+	$(Q)$(rtsan_cc) -c $(test_cflags) -o $@ $<
+
+$(O)/again/tests/unit/%: $(O)/obj/again/%.o $(O)/lib/libincise-rtsan.a
+	@mkdir -p $(@D)
+	$(call step,LD)
+	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) $(wraps) -o $@ $< $(O)/lib/libincise-rtsan.a \
+		$(rtsan_libs) $(shell $(PKG_CONFIG) --libs cmocka)
 
 $(O)/tests/rtsan/%: tests/rtsan/%.c $(O)/lib/libincise-rtsan.a $(emulator)
 	@mkdir -p $(@D)
-	$(rtsan_cc) -o $@ $(filter %.c %.o %.a,$^) $(rtsan_libs)
+	$(call step,LD)
+	$(Q)$(rtsan_cc) $(LDFLAGS) -o $@ $(filter %.c %.o %.a,$^) $(rtsan_libs)
 
 # clang's own symbolizer is in a package that is not needed for anything else.
 rtsan_options := RTSAN_OPTIONS=external_symbolizer_path=$(shell command -v addr2line)

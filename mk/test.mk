@@ -10,74 +10,44 @@ unit_sources := $(filter-out $(if $(has_libmnl),,%/can/socketcan.c %/can/can_net
 	$(wildcard tests/unit/*/*.c))
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
-# One counts allocations, others play the kernel.
-ldflags_scene/jail := $(foreach name,malloc calloc realloc free,-Wl,--wrap=$(name))
-ldflags_loop/epoch := -Wl,--wrap=incise_clock_new_simulated
-ldflags_device/stepper_kernel := $(foreach name,open close ioctl mmap munmap clock_nanosleep \
-	nanosleep,-Wl,--wrap=$(name))
-ldflags_daq/comedi_force := -Wl,--wrap=read
-ldflags_daq/iio_source := -Wl,--wrap=open
-ldflags_mkv/mkv_writer := -Wl,--wrap=write
-ldflags_can/slcan := -Wl,--wrap=write
-ldflags_can/slcan_tty := -Wl,--wrap=write
-ldflags_can/socketcan := $(foreach name,socket bind setsockopt send recvmsg ppoll close \
-	clock_gettime can_netlink_ask,-Wl,--wrap=$(name))
-ldflags_can/can_netlink := $(foreach name,mnl_socket_open2 mnl_socket_sendto mnl_socket_recvfrom \
-	mnl_socket_get_portid setsockopt clock_gettime,-Wl,--wrap=$(name))
-# All of them meet the same driver, tests/unit/v4l2/driver.h.
-ldflags_v4l2 := $(foreach name,open close ioctl mmap munmap poll clock_gettime,-Wl,--wrap=$(name))
-$(foreach test,$(wildcard tests/unit/v4l2/*.c),\
-	$(eval ldflags_v4l2/$(basename $(notdir $(test))) := $(ldflags_v4l2)))
-
-# The tracker that is not there is of several tests, and a program of its own.
+# A tracker that is not there: some tests, and a program of its own.
 emulator := $(O)/obj/tests/polhemus/emulator.o
-unit_emulator = $(if $(filter polhemus/%,$*),$(emulator))
+
+test_packages := cmocka jansson $(if $(has_libmnl),libmnl) $(if $(has_libiio),libiio) \
+	$(if $(has_comedilib),comedilib) $(if $(has_libusb),libusb-1.0) \
+	$(if $(has_frames),$(pc_frames_mkv)) $(if $(has_hdf5),$(pc_export_hdf5)) \
+	$(foreach lib,$(libraries),$(pc_$(lib)))
+test_cflags = $(eval test_cflags := $(shell $(PKG_CONFIG) --cflags $(test_packages)))$(test_cflags)
+# A test maps only what it uses of these.
+test_libs = $(eval test_libs := -Wl,--as-needed $(shell $(PKG_CONFIG) --libs $(test_packages)) \
+	$(if $(has_vision),$(libs_vision_opencv)) -lm -ldl -pthread)$(test_libs)
+
+$(O)/obj/tests/%.o: tests/%.c
+	@mkdir -p $(@D)
+	$(call step,CC)
+	$(Q)$(CCACHE) $(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
+		-Wno-missing-prototypes -Wno-unused-parameter $(test_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
+
+# A test that defines __wrap_NAME plays NAME for all that it is linked to.
+wraps = $$(nm $(filter %/$*.o,$^) | sed -n 's/.* T __wrap_\(.*\)/-Wl,--wrap=\1/p')
+$(filter $(O)/tests/unit/tools/%,$(unit_programs)): $(tool_parts)
 $(filter $(O)/tests/unit/polhemus/%,$(unit_programs)): $(emulator)
-
-# What of the tools has tests of its own is linked to them.
-unit_tools := $(tool_parts)
-$(filter $(O)/tests/unit/tools/%,$(unit_programs)): $(unit_tools)
-
-# They play libusb.
-$(filter %/polhemus_usb %/polhemus_usb_find,$(unit_programs)): private CPPFLAGS += \
-	$(shell $(PKG_CONFIG) --cflags libusb-1.0)
-
-# What of vision is in a module is linked to its own tests, which then map OpenCV, alone.
-vision_linked := tests/vision/linked.c
-$(filter $(O)/tests/unit/vision/%,$(unit_programs)): $(vision_linked)
-
-# What of pictures in a file is in a module is linked to its own tests.
-libs_frames_tests = $(shell $(PKG_CONFIG) --libs $(pc_frames_mkv))
-$(filter $(O)/tests/unit/mkv/% $(O)/tests/unit/film/%,$(unit_programs)): private CPPFLAGS += \
-	$(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
-
-# They read pictures by cairo, and play SDL's part.
-$(filter $(O)/tests/unit/view/%,$(unit_programs)): private CPPFLAGS += \
-	$(shell $(PKG_CONFIG) --cflags $(pc_incise-view))
-
-# The module of HDF5 is linked to its own tests, which read with the library itself.
+# Modules that only their own tests link, ahead of the archive: that of HDF5, and vision's,
+# which is then found without being loaded.
 $(filter $(O)/tests/unit/hdf5/%,$(unit_programs)): $(objects_export_hdf5)
-$(filter $(O)/tests/unit/hdf5/%,$(unit_programs)): private CPPFLAGS += \
-	$(shell $(PKG_CONFIG) --cflags hdf5)
+$(filter $(O)/tests/unit/vision/%,$(unit_programs)): $(O)/obj/tests/vision/linked.o
+$(O)/tests/unit/%: $(O)/obj/tests/unit/%.o $(O)/lib/libincise-tests.a
+	@mkdir -p $(@D)
+	$(call step,LD)
+	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) $(wraps) -o $@ $(filter %.o,$^) $(filter %/parts.a,$^) \
+		$(O)/lib/libincise-tests.a $(test_libs)
+.SECONDARY: $(unit_programs:$(O)/tests/%=$(O)/obj/tests/%.o)
 
 $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
 		$(filter %.c,$^) -lm -pthread
-
-$(O)/tests/unit/%: tests/unit/%.c $(O)/lib/libincise-tests.a
-	@mkdir -p $(@D)
-	$(call step,LD)
-	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
-		-Wno-missing-prototypes -Wno-unused-parameter $(shell $(PKG_CONFIG) --cflags cmocka $(pc_incise-learn)) $(CFLAGS) \
-		-MMD -MP -MF $@.d $(LDFLAGS) $(ldflags_$*) -o $@ $< $(unit_emulator) $(if $(filter vision/%,$*),$(vision_linked)) \
-		$(if $(filter tools/%,$*),$(unit_tools)) \
-		$(if $(filter hdf5/%,$*),$(objects_export_hdf5) $(shell $(PKG_CONFIG) --libs $(pc_export_hdf5))) \
-		$(O)/lib/libincise-tests.a $(if $(filter vision/%,$*),$(libs_vision_opencv)) \
-		$(if $(filter mkv/% film/%,$*),$(libs_frames_tests)) \
-		$(all_libs) $(if $(filter tools/%,$*),$(shell $(PKG_CONFIG) --libs jansson)) \
-		$(shell $(PKG_CONFIG) --libs cmocka) -lm
 
 check: ## install what is missing, build, and run all tests
 	@mk/deps build check demo
@@ -114,7 +84,7 @@ $(O)/tests/attack/%: tests/attack/%.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
-		$(LDFLAGS) -o $@ $(filter %.c,$^) $(O)/lib/libincise-tests.a $(all_libs) -lm -pthread
+		$(LDFLAGS) -o $@ $(filter %.c,$^) $(O)/lib/libincise-tests.a $(test_libs)
 
 # Loaded into the real programs; under a sanitizer it would have to come behind its library.
 $(O)/tests/attack/%.so: tests/attack/%.c
@@ -207,14 +177,14 @@ $(O)/tests/tracker_line: tests/bench/tracker_line.c $(emulator) $(O)/lib/libinci
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
-		$(LDFLAGS) -o $@ $^ $(all_libs) -lm -pthread
+		$(LDFLAGS) -o $@ $^ $(test_libs)
 
 # Pictures into a file, what they cost.
 $(O)/tests/frames: tests/bench/frames.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
-		$(LDFLAGS) -o $@ $(filter %.c %.a,$^) $(libs_frames_tests) $(all_libs) -lm -pthread
+		$(LDFLAGS) -o $@ $(filter %.c %.a,$^) $(test_libs)
 
 check-frames: $(O)/tests/frames ## CPU per picture and bytes per hour of each format
 	$(O)/tests/frames $(O)/tests
@@ -249,7 +219,7 @@ $(O)/tests/day: tests/bench/day.c $(O)/lib/libincise-tests.a
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
 		$(LDFLAGS) -Wl,--wrap=incise_clock_new_simulated -o $@ $(filter %.c %.a,$^) \
-		$(all_libs) -lm -pthread
+		$(test_libs)
 
 DAY_HOURS ?= 24
 check-day: $(O)/tests/day ## 24 h of the wall scene in simulated time: no drift, leak or counter wrap

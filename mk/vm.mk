@@ -14,7 +14,7 @@ $(O)/tests/vm/%: tests/vm/guest/%.c $(guest_shared) $(guest_headers) \
 	@mkdir -p $(@D)
 	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) $(CFLAGS) \
 		$(LDFLAGS) -o $@ $< $(guest_shared) $(O)/lib/libincise-tests.a \
-		$(all_libs) -lm
+		$(test_libs)
 
 # What scripts in tests/vm/guest take as the liver's model.
 guest_model := $(O)/tests/vm/liver.fx
