@@ -29,8 +29,6 @@ $(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tools/*/*.c))
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
 
-tool_libs := $(patsubst %,-l%,$(libraries)) $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
-
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
 # built where its headers are. It is for measuring, and is not installed.
 peer := $(if $(shell $(CXX) -E -x c++ -include fl/Headers.h /dev/null >/dev/null 2>&1 && \
@@ -51,12 +49,20 @@ $(O)/lib/incise/peer_%.py: tools/bench/peers/%.py
 	@mkdir -p $(@D)
 	cp $< $@
 
+# Benchmarks also measure parts that the shared objects do not export; the linker takes those
+# from the archive.
+$(filter $(O)/bin/incise-bench%,$(programs)): tool_inside = $(O)/lib/libincise-tests.a $(shell $(PKG_CONFIG) \
+	--libs $(foreach lib,$(libraries),$(pc_$(lib)))) -ldl -pthread
+$(filter $(O)/bin/incise-bench%,$(programs)): $(O)/lib/libincise-tests.a
+tool_libs := $(patsubst %,-l%,$(libraries))
+tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
+
 $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(libraries),$(O)/lib/lib$(lib).so)
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed $(call runpath,/../lib) \
 		-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $< $(tool_parts) $(tool_libs) \
-		$(shell $(PKG_CONFIG) --libs jansson)
+		$(tool_inside) $(tool_more_libs) $(shell $(PKG_CONFIG) --libs jansson)
 
 # Scenes by name, as after installation.
 $(O)/share/incise/scenes:
