@@ -41,7 +41,8 @@ soversion := 1
 cppflags := -D_GNU_SOURCE -Ilib/include
 CCACHE := $(CCACHE)
 cxxflags := -std=c++14 -fPIC -fvisibility=hidden -ffp-contract=off -Wall -Wextra
-warnings := -Wall -Wextra -Wmissing-prototypes -Wstrict-prototypes -Wvla
+warnings := -Wall -Wextra -Wmissing-prototypes -Wstrict-prototypes -Wvla \
+	-Werror=implicit-function-declaration
 cflags := -std=gnu11 -fPIC -fvisibility=hidden -fno-math-errno -ffp-contract=off $(warnings)
 
 # Vision is built where the headers of OpenCV are, which is in C++. Debian's opencv4.pc is in

@@ -3,7 +3,7 @@
  * Passivity observer and controller; see incise/guard.h. N, mm, s.
  */
 #include <string.h>
-#include <incise/guard.h>
+#include "guard.h"
 #include "../base/units.h"
 #include "../base/vector.h"
 

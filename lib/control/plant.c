@@ -11,7 +11,7 @@
  * exponentials in which nothing is subtracted that could be equal.
  */
 #include <math.h>
-#include <incise/plant.h>
+#include "plant.h"
 #include "../base/units.h"
 
 #define EVENTS_MAX 1000000

@@ -12,7 +12,7 @@
 #include <stdbool.h>
 #include <string.h>
 #include <incise/clock.h>
-#include <incise/plant.h>
+#include "plant.h"
 #include "../base/units.h"
 #include "pose_loop.h"
 

@@ -6,7 +6,6 @@
  * is Gray and Murray's, IEEE Trans. AES-29(3), 1993.
  */
 #include <math.h>
-#include <stdlib.h>
 #include <incise/clock.h>
 #include "../base/vector.h"
 #include "predict.h"
@@ -58,8 +57,8 @@ static void set_gains(struct incise_predict *p, double index)
 	p->gamma = 2 * pow(1 - s, 3) / (1 + s);
 }
 
-void incise_predict_init_noise(struct incise_predict *p,
-			       const struct incise_tracker_info *tracker, double noise_mm)
+void incise_predict_init(struct incise_predict *p,
+			 const struct incise_tracker_info *tracker, double noise_mm)
 {
 	double period_s = 1 / within(tracker->rate_hz, 1, 1e4);
 	double change = sqrt(HAND_MM2_S5 * period_s);
@@ -72,28 +71,8 @@ void incise_predict_init_noise(struct incise_predict *p,
 		.q = {1},
 		.q_shown = {1},
 	};
-	set_gains(p, change * period_s * period_s / within(noise_mm, 1e-9, FAR_MM));
-}
-
-void incise_predict_init(struct incise_predict *p,
-			 const struct incise_tracker_info *tracker)
-{
-	incise_predict_init_noise(p, tracker, NOISE_MM);
-}
-
-struct incise_predict *incise_predict_new(const struct incise_tracker_info *tracker,
-					  double noise_mm)
-{
-	struct incise_predict *p = malloc(sizeof(*p));
-
-	if (p)
-		incise_predict_init_noise(p, tracker, noise_mm > 0 ? noise_mm : NOISE_MM);
-	return p;
-}
-
-void incise_predict_free(struct incise_predict *p)
-{
-	free(p);
+	set_gains(p, change * period_s * period_s /
+			     within(noise_mm > 0 ? noise_mm : NOISE_MM, 1e-9, FAR_MM));
 }
 
 /* Never negative, and no overflow for any two times. */

@@ -1,14 +1,37 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The predictor of poses as it is inside; see incise/predict.h. Who is in the library has
- * it in his own memory.
+ * From a tracker's 60–240 poses a second, milliseconds old, to where the tip is now.
+ *
+ * A steady-state constant-acceleration Kalman filter (alpha-beta-gamma) per axis,
+ * extrapolated. What is shown never jumps: the difference between what was shown and what
+ * a new pose says is blended out, linearly, over one tracker period.
+ *
+ *   shown   ·····.                 the old prediction
+ *                 '·.  difference × (1 - (t - arrival) / period)
+ *                    '·.__________ the new prediction
+ *   time         |    |
+ *             arrival  + period
+ *
+ * The blend begins when a pose arrives at the host (sample->t_ns), not when it is taken
+ * in. So it does not matter how many poses are taken in at one tick. A pose must be taken
+ * in before the first tick after its arrival is asked for; when it is late by d, what is
+ * shown steps by d / period of the difference.
+ *
+ * mm, s; times of the host's clock in ns. All numbers given are finite, whatever the poses
+ * are. `incise bench pose` measures how far off it is. Gains after Kalata, The tracking
+ * index, IEEE Trans. AES-20(2), 1984, in the closed form of Gray and Murray, IEEE Trans.
+ * AES-29(3), 1993.
  */
-#ifndef INCISE_PREDICT_PRIVATE_H
-#define INCISE_PREDICT_PRIVATE_H
+#ifndef INCISE_PREDICT_H
+#define INCISE_PREDICT_H
 
 #include <stdbool.h>
 #include <stdint.h>
-#include <incise/predict.h>
+#include <incise/export.h>
+#include <incise/tracker.h>
+
+/* At 60 Hz a hand that misses a pose by this is faster than 1 m/s. */
+#define INCISE_PREDICT_JUMP_MM 20.0
 
 struct incise_predict {
 	double alpha, beta, gamma; /* of a miss: to x, v · period, a · period² */
@@ -29,13 +52,41 @@ struct incise_predict {
 	double q_shown[4];
 };
 
-/* As incise_predict_new() of noise 0. */
+/*
+ * Start without a pose. A rate of @tracker outside 1 … 10000 Hz and a latency outside 0 … 1 s
+ * count as the nearest inside. @noise_mm of its positions, sd per axis; 0: 0.02, that of a
+ * magnetic tracker near its source.
+ */
 void incise_predict_init(struct incise_predict *p,
-			 const struct incise_tracker_info *tracker);
+			 const struct incise_tracker_info *tracker, double noise_mm);
 
-/* The same for positions with a noise of @noise_mm, sd per axis. */
-void incise_predict_init_noise(struct incise_predict *p,
-			       const struct incise_tracker_info *tracker,
-			       double noise_mm);
+/*
+ * Take a pose in. One whose position is not finite or metres away, or that is not newer
+ * than the last, is passed over. A quaternion that is none leaves the attitude as it was.
+ *
+ * After a gap of more than five periods velocity starts from 0. So it does when a pose is
+ * more than INCISE_PREDICT_JUMP_MM from where it should be: no hand did that, and it must
+ * not be dragged through the tissue, so there is then no blend either; the force's limits
+ * do the rest. Real-time safe.
+ */
+void incise_predict_add(struct incise_predict *p,
+			const struct incise_tracker_sample *sample) INCISE_REALTIME;
+
+/*
+ * Position, velocity and attitude (unit quaternion, w first) at t_ns. Before the first
+ * pose all is 0 and the attitude 1.
+ *
+ * Position and velocity are blended each by itself: velocity is the filter's, and not the
+ * derivative of the position shown, which holds the speed of the correction too. Further
+ * than five periods, or 40 ms of a tracker of more than 125 Hz, after the last pose was
+ * acquired they stay as they were then, so that a latency above that is made up for in part
+ * only. The attitude is not extrapolated. Real-time safe.
+ */
+void incise_predict_at(const struct incise_predict *p, int64_t t_ns,
+		       double position_mm[3], double velocity_mm_s[3],
+		       double attitude[4]) INCISE_REALTIME;
+
+/* Age of the last pose at t_ns, ≥ 0; INT64_MAX before the first. Real-time safe. */
+int64_t incise_predict_age(const struct incise_predict *p, int64_t t_ns) INCISE_REALTIME;
 
 #endif

@@ -15,7 +15,7 @@
 #include <complex.h>
 #include <math.h>
 #include <stdbool.h>
-#include <incise/stability.h>
+#include "stability.h"
 #include "../base/units.h"
 
 /* glibc 2.36 has it for gcc alone. */

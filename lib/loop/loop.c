@@ -11,6 +11,7 @@
 #include <math.h>
 #include <string.h>
 #include <incise/loop.h>
+#include "../scene/plan.h"
 #include "control.h"
 
 struct run {

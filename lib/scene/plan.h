@@ -7,7 +7,7 @@
 
 #include <incise/fixed.h>
 #include <incise/fixed_spring.h>
-#include <incise/guard.h>
+#include "../control/guard.h"
 #include <incise/model.h>
 #include <incise/plan.h>
 #include "../surface/average.h"
@@ -98,6 +98,15 @@ struct incise_plan {
 
 /* Fill in the stages that the scene and the rig need, and why the others are left out. */
 void incise_plan_choose(struct incise_plan *plan);
+
+/* Ramp the force to zero, or let it return. The plan goes on. Real-time safe. */
+void incise_plan_fade(struct incise_plan *plan, bool fading) INCISE_REALTIME;
+
+/* Whether a force that fades has reached zero. Real-time safe. */
+bool incise_plan_faded(const struct incise_plan *plan) INCISE_REALTIME;
+
+/* The reason of a fault in a few words, without what the device says; NULL: no fault. */
+const char *incise_plan_fault(const struct incise_plan *plan);
 
 /*
  * What is known of the scene's stability on this device, and whether it is stable, with

@@ -197,7 +197,7 @@ static int equip(struct incise_plan *plan, const struct incise_tracker_info *tra
 	    (average && !plan->average) || (guard && !plan->guard))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	if (handle)
-		incise_predict_init(plan->handle, tracker);
+		incise_predict_init(plan->handle, tracker, 0);
 	if (average)
 		incise_average_init(plan->average, plan->average_ticks);
 	if (guard)
@@ -241,7 +241,7 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 		rc = take_model(plan, err);
 	if (!rc) {
 		take_tissue(plan);
-		incise_predict_init(&plan->predict, &tracker);
+		incise_predict_init(&plan->predict, &tracker, 0);
 		rc = incise_plan_check(plan, &tracker, err);
 	}
 	if (!rc) {

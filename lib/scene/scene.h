@@ -10,7 +10,7 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/scene.h>
-#include <incise/surface.h>
+#include "../surface/surface.h"
 
 struct incise_scene {
 	char *path;

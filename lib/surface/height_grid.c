@@ -15,7 +15,7 @@
 #include <string.h>
 #include <strings.h>
 #include "../base/text.h"
-#include "reader.h"
+#include "mesh.h"
 
 enum key { NCOLS, NROWS, XLL_CORNER, XLL_CENTER, YLL_CORNER, YLL_CENTER, CELL, NODATA };
 

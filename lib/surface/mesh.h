@@ -13,9 +13,157 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <incise/error.h>
 #include <incise/surface.h>
-#include "bvh.h"
-#include "triangle.h"
+#include "../base/vector.h"
+
+/*
+ * The point of a triangle that is nearest to a point, and the part of the triangle that
+ * it lies on.
+ *
+ *              c               FACE          within
+ *            ╱   ╲             EDGE + i      between corner i and the next
+ *    EDGE+2 ╱     ╲ EDGE+1     CORNER + i    at corner i
+ *          ╱       ╲
+ *         a ─────── b          seen from outside: a, b, c turn counter-clockwise
+ *           EDGE+0
+ *
+ * Which part it is comes from signs, not from a distance to a border, and the point on an
+ * edge is computed from the edge's two ends only, in an order of their own. So the two
+ * faces of an edge, and all faces around a corner, find the same point to the bit, and a
+ * walk from face to face needs no epsilon.
+ */
+enum triangle_part { TRIANGLE_FACE = 0, TRIANGLE_EDGE = 1, TRIANGLE_CORNER = 4 };
+
+static inline double v3_distance2(const double a[3], const double b[3])
+{
+	double d[3];
+
+	v3_sub(d, a, b);
+	return v3_dot(d, d);
+}
+
+/* Outward, as long as twice the area. */
+static inline void triangle_area_normal(double n[3], const double *a, const double *b,
+					const double *c)
+{
+	double ab[3], ac[3];
+
+	v3_sub(ab, b, a);
+	v3_sub(ac, c, a);
+	v3_cross(n, ab, ac);
+}
+
+/* Towards the inside of the triangle at its edge from a to b: > 0 inside of it. */
+static inline double triangle_side(const double n[3], const double *a, const double *b,
+				   const double p[3])
+{
+	double ab[3], in[3], ap[3];
+
+	v3_sub(ab, b, a);
+	v3_sub(ap, p, a);
+	v3_cross(in, n, ab);
+	return v3_dot(in, ap);
+}
+
+/*
+ * The nearest point of an edge; @end is 0 at a, 1 at b, -1 between them. Its ends are
+ * taken in the order of their addresses, which both faces of the edge agree on.
+ */
+static inline void triangle_edge_nearest(const double *a, const double *b,
+					 const double p[3], double x[3], int *end)
+{
+	const double *lo = a < b ? a : b, *hi = a < b ? b : a;
+	double e[3], w[3], along, whole;
+
+	v3_sub(e, hi, lo);
+	v3_sub(w, p, lo);
+	along = v3_dot(w, e);
+	whole = v3_dot(e, e);
+	*end = -1;
+	if (along <= 0) {
+		v3_copy(x, lo);
+		*end = lo == b;
+	} else if (along >= whole) {
+		v3_copy(x, hi);
+		*end = hi == b;
+	} else {
+		v3_add(x, lo, along / whole, e);
+	}
+}
+
+/* The nearest point of the triangle to p, and its part. Slivers are as good as others. */
+static inline int triangle_nearest(const double *const corner[3], const double p[3],
+				   double x[3])
+{
+	double n[3], best = INFINITY;
+	bool outside = false;
+	int part = TRIANGLE_FACE;
+
+	triangle_area_normal(n, corner[0], corner[1], corner[2]);
+	for (int i = 0; i < 3; i++) {
+		const double *a = corner[i], *b = corner[i == 2 ? 0 : i + 1];
+		double y[3], d;
+		int end;
+
+		if (triangle_side(n, a, b, p) >= 0)
+			continue;
+		outside = true;
+		triangle_edge_nearest(a, b, p, y, &end);
+		d = v3_distance2(y, p);
+		if (!(d < best))
+			continue;
+		best = d;
+		v3_copy(x, y);
+		part = end < 0	  ? TRIANGLE_EDGE + i
+		       : end == 0 ? TRIANGLE_CORNER + i
+				  : TRIANGLE_CORNER + (i == 2 ? 0 : i + 1);
+	}
+	if (!outside) {
+		double ap[3];
+
+		v3_sub(ap, p, corner[0]);
+		v3_add(x, p, -v3_dot(ap, n) / v3_dot(n, n), n);
+	}
+	return part;
+}
+
+/*
+ * A tree of boxes around triangles, in mm. Each node holds the boxes of its two children,
+ * so that one cache line decides where to go on. Boxes are in float, rounded outwards
+ * and then a little wider, so that no rounding in a query can miss what lies on a side.
+ */
+/* A child is a node's index, or a leaf: a run of up to 7 triangles. */
+#define BVH_LEAF 0x80000000u
+#define BVH_FIRST(child) ((child)&0x0fffffffu)
+#define BVH_COUNT(child) (((child) >> 28) & 7u)
+
+/* Halving 2^28 triangles down to leaves of two is 27 levels deep. */
+#define BVH_DEPTH_MAX 32
+
+struct bvh_node {
+	float lo[2][3], hi[2][3];
+	uint32_t child[2];
+	uint32_t unused[2]; /* to 64 bytes */
+};
+
+struct bvh {
+	struct bvh_node *node;
+	uint32_t n_nodes;
+};
+
+/* From a double to a float that is surely below it (or above it, for @up). */
+float bvh_outwards(double x, int up);
+
+/*
+ * Build a tree over n ≥ 1 boxes; order[i] is the box that became the i-th of the leaves.
+ * Takes n log n steps. Returns 0 or -ENOMEM.
+ */
+int bvh_build(struct bvh *bvh, const float (*box)[2][3], uint32_t n, uint32_t *order);
+void bvh_free(struct bvh *bvh);
+
+/* Triangles of a mesh at most. */
+#define INCISE_SURFACE_TRIANGLES_MAX 4000000
 
 #define MESH_NONE UINT32_MAX
 
@@ -49,7 +197,7 @@ struct mesh_draft {
 /* A place on a mesh. */
 struct mesh_spot {
 	uint32_t face;
-	int part; /* of the face: see triangle.h */
+	int part; /* of the face: enum triangle_part */
 	double point[3];
 };
 
@@ -57,6 +205,11 @@ struct mesh_spot {
 struct mesh *mesh_new(const struct mesh_draft *draft, struct incise_error *err);
 void mesh_free(struct mesh *mesh);
 size_t mesh_memory(const struct mesh *mesh);
+
+/* Readers of files. NULL with errno as in incise_surface_load_mesh(). */
+struct mesh *obj_load(const char *path, const double at_mm[3], struct incise_error *err);
+struct mesh *height_grid_load(const char *path, const double at_mm[3],
+			      struct incise_error *err);
 
 /* The touch of a point whose nearest place, or proxy, is a spot. */
 void mesh_touch(const struct mesh *mesh, const struct mesh_spot *spot, const double p[3],

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../base/text.h"
-#include "reader.h"
+#include "mesh.h"
 
 #define UV_NONE UINT32_MAX
 #define POINTS_MAX (3 * (size_t)INCISE_SURFACE_TRIANGLES_MAX)

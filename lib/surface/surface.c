@@ -4,7 +4,7 @@
  */
 #include <errno.h>
 #include <stdlib.h>
-#include "reader.h"
+#include "../base/vector.h"
 #include "surface.h"
 
 static const double up[3] = {0, 0, 1};
@@ -199,4 +199,170 @@ bool incise_surface_enters(const struct incise_surface *surface, const double fr
 	mesh_touch(surface->mesh, &spot, spot.point, touch);
 	touch->depth_mm = 0;
 	return true;
+}
+
+/*
+ * Plane and capsule in closed form.
+ *
+ *            ╭───────────────────╮
+ *            │   a ───────── b   │  radius around the segment from a to b
+ *            ╰───────────────────╯
+ */
+
+/* Nothing of a mesh. */
+static void no_face(struct incise_touch *touch)
+{
+	touch->face = -1;
+	touch->uv[0] = touch->uv[1] = 0;
+}
+
+void plane_nearest(const struct plane *plane, const double p[3],
+		   struct incise_touch *touch)
+{
+	double out[3];
+
+	no_face(touch);
+	v3_sub(out, p, plane->point);
+	touch->depth_mm = -v3_dot(out, plane->normal);
+	v3_copy(touch->normal, plane->normal);
+	v3_add(touch->point_mm, p, touch->depth_mm, plane->normal);
+}
+
+bool plane_enters(const struct plane *plane, const double from[3], const double to[3],
+		  struct incise_touch *touch)
+{
+	double out[3], way[3], above, below;
+
+	v3_sub(out, from, plane->point);
+	above = v3_dot(out, plane->normal);
+	v3_sub(out, to, plane->point);
+	below = v3_dot(out, plane->normal);
+	if (!(above >= 0 && below <= 0 && above > below))
+		return false;
+	v3_sub(way, to, from);
+	v3_add(out, from, above / (above - below), way);
+	plane_nearest(plane, out, touch);
+	touch->depth_mm = 0;
+	return true;
+}
+
+/* A unit vector across the axis, towards @wish where that is possible. */
+static void across(const double axis[3], const double wish[3], double normal[3])
+{
+	const double *const tries[] = {wish, (const double[3]){0, 0, 1},
+				       (const double[3]){1, 0, 0}};
+	double side[3];
+
+	for (int i = 0; i < 3; i++) {
+		v3_add(side, tries[i], -v3_dot(tries[i], axis), axis);
+		if (v3_unit(normal, side, 1e-6))
+			return;
+	}
+}
+
+void capsule_nearest(const struct capsule *capsule, const double p[3],
+		     const double last[3], struct incise_touch *touch)
+{
+	double axis[3], ap[3], on[3], out[3], length2, t = 0, distance;
+
+	no_face(touch);
+	v3_sub(axis, capsule->b, capsule->a);
+	v3_sub(ap, p, capsule->a);
+	length2 = v3_dot(axis, axis);
+	if (length2 > 0)
+		t = fmin(fmax(v3_dot(ap, axis) / length2, 0), 1);
+	v3_add(on, capsule->a, t, axis);
+	v3_sub(out, p, on);
+	distance = v3_length(out);
+	touch->depth_mm = capsule->radius - distance;
+	/* Nearer to the axis than a double can tell there is no direction. */
+	if (!v3_unit(touch->normal, out, 1e-12 * capsule->radius)) {
+		double unit[3] = {0}, ahead;
+
+		v3_unit(unit, axis, 0);
+		ahead = v3_dot(last, unit);
+		/* At an end the half sphere beyond it is as near. */
+		if ((t == 0 && ahead <= 0) || (t == 1 && ahead >= 0))
+			v3_copy(touch->normal, last);
+		else
+			across(unit, last, touch->normal);
+	}
+	v3_add(touch->point_mm, on, capsule->radius, touch->normal);
+}
+
+/*
+ * Where a line from outside meets a ball or, with an axis, the wall of a cylinder through
+ * its centre: mm along the line, whose @way is a unit vector; INFINITY where it does not.
+ */
+static double meets(const double from[3], const double way[3], const double centre[3],
+		    const double *axis, double radius)
+{
+	double m[3], d[3], side[3], along, dd, rest;
+
+	v3_sub(m, from, centre);
+	v3_copy(d, way);
+	if (axis) {
+		v3_add(m, m, -v3_dot(m, axis), axis);
+		v3_add(d, d, -v3_dot(d, axis), axis);
+	}
+	dd = v3_dot(d, d);
+	along = -v3_dot(m, d);
+	if (!(along >= 0) || !(dd > 1e-24))
+		return INFINITY;
+	along /= dd;
+	/* The line's nearest point first: from far away the difference of squares is lost. */
+	v3_add(side, m, along, d);
+	rest = radius * radius - v3_dot(side, side);
+	if (!(rest >= 0))
+		return INFINITY;
+	/* A start on the surface may come out a rounding before it. */
+	return fmax(along - sqrt(rest / dd), 0);
+}
+
+bool capsule_enters(const struct capsule *capsule, const double from[3],
+		    const double to[3], struct incise_touch *touch)
+{
+	const double up[3] = {0, 0, 1};
+	double way[3], unit[3] = {0}, axis[3], point[3], length, axis_length, first;
+
+	v3_sub(way, to, from);
+	length = v3_length(way);
+	capsule_nearest(capsule, from, up, touch);
+	/* Only from outside: more than rounding within is inside. */
+	if (!v3_unit(unit, way, 0) || touch->depth_mm > 1e-12 * capsule->radius)
+		return false;
+	first = fmin(meets(from, unit, capsule->a, NULL, capsule->radius),
+		     meets(from, unit, capsule->b, NULL, capsule->radius));
+	v3_sub(way, capsule->b, capsule->a);
+	axis_length = v3_length(way);
+	if (v3_unit(axis, way, 0)) {
+		double wall = meets(from, unit, capsule->a, axis, capsule->radius), at;
+
+		if (wall < first) {
+			v3_add(point, from, wall, unit);
+			v3_sub(way, point, capsule->a);
+			at = v3_dot(way, axis);
+			if (at >= 0 && at <= axis_length)
+				first = wall;
+		}
+	}
+	if (!(first <= length))
+		return false;
+	v3_add(point, from, first, unit);
+	capsule_nearest(capsule, point, up, touch);
+	touch->depth_mm = 0;
+	return true;
+}
+
+void capsule_top(const struct capsule *capsule, struct incise_touch *touch)
+{
+	double a = capsule->a[2], b = capsule->b[2], top[3];
+
+	for (int i = 0; i < 3; i++)
+		top[i] = a > b	 ? capsule->a[i]
+			 : b > a ? capsule->b[i]
+				 : capsule->a[i] / 2 + capsule->b[i] / 2;
+	top[2] += capsule->radius;
+	capsule_nearest(capsule, top, (const double[3]){0, 0, 1}, touch);
+	touch->depth_mm = 0;
 }

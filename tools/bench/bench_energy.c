@@ -4,8 +4,8 @@
  */
 #include <math.h>
 #include <stddef.h>
-#include <incise/plant.h>
-#include <incise/stability.h>
+#include "../../lib/control/plant.h"
+#include "../../lib/control/stability.h"
 #include "bench_device.h"
 #include "bench_energy.h"
 #include "../cli/cli.h"

@@ -5,8 +5,8 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <incise/guard.h>
-#include <incise/plant.h>
+#include "../../lib/control/guard.h"
+#include "../../lib/control/plant.h"
 #include "bench_device.h"
 #include "bench_guard.h"
 #include "../cli/cli.h"

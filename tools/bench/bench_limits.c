@@ -4,7 +4,7 @@
  */
 #include <math.h>
 #include <stddef.h>
-#include <incise/stability.h>
+#include "../../lib/control/stability.h"
 #include "bench_device.h"
 #include "bench_limits.h"
 #include "../cli/cli.h"

@@ -9,9 +9,9 @@
 #include <stdio.h>
 #include <string.h>
 #include <incise/backend.h>
-#include <incise/plan.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
+#include "../../lib/scene/plan.h"
 #include "any_pose.h"
 #include "../cli/cli.h"
 #include "extremes.h"

@@ -15,7 +15,7 @@
 #include <incise/recorder.h>
 #include <incise/recording.h>
 #include <incise/rig.h>
-#include <incise/surface.h>
+#include "../../lib/surface/surface.h"
 #include "any_pose.h"
 #include "../cli/cli.h"
 #include "extremes.h"

@@ -4,9 +4,9 @@
  */
 #include <stdio.h>
 #include <string.h>
-#include <incise/guard.h>
-#include <incise/plant.h>
-#include <incise/stability.h>
+#include "../../lib/control/guard.h"
+#include "../../lib/control/plant.h"
+#include "../../lib/control/stability.h"
 #include "any_pose.h"
 #include "extremes.h"
 

@@ -4,7 +4,7 @@
  */
 #include <stdio.h>
 #include <string.h>
-#include <incise/surface.h>
+#include "../../lib/surface/surface.h"
 #include "any_pose.h"
 #include "../cli/cli.h"
 #include "extremes.h"

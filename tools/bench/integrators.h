@@ -7,7 +7,7 @@
 #ifndef INCISE_INTEGRATORS_H
 #define INCISE_INTEGRATORS_H
 
-#include <incise/plant.h>
+#include "../../lib/control/plant.h"
 
 enum integrator {
 	EXPLICIT_EULER,

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/clock.h>
-#include <incise/predict.h>
+#include "../../lib/control/predict.h"
 #include "../cli/cli.h"
 #include "pose_methods.h"
 
@@ -141,13 +141,13 @@ static void *library_begin(const struct pose_method *method,
 			   const struct incise_tracker_info *info)
 {
 	struct incise_tracker_info told = *info;
-	struct incise_predict *predict;
+	struct incise_predict *predict = malloc(sizeof(*predict));
 
 	if (method->punctual)
 		told.latency_ns = 0;
-	predict = incise_predict_new(&told, method->noise_mm);
 	if (!predict)
 		cli_fail("no memory");
+	incise_predict_init(predict, &told, method->noise_mm);
 	return predict;
 }
 
@@ -162,12 +162,7 @@ static void library_at(const void *state, int64_t t_ns, struct motion_state *sho
 			  shown->quaternion);
 }
 
-static void library_end(void *state)
-{
-	incise_predict_free(state);
-}
-
-#define LIBRARY library_begin, library_add, library_at, library_end
+#define LIBRARY library_begin, library_add, library_at, free
 
 const struct pose_method pose_methods[POSE_METHODS] = {
 	{"held", last_begin, held_add, held_at, free, 0, false},

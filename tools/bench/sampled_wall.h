@@ -8,7 +8,7 @@
 #ifndef INCISE_SAMPLED_WALL_H
 #define INCISE_SAMPLED_WALL_H
 
-#include <incise/plant.h>
+#include "../../lib/control/plant.h"
 
 struct sampled_wall {
 	/* Device and whatever it is tied to; no Coulomb friction. */

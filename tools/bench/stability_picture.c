@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <incise/guard.h>
+#include "../../lib/control/guard.h"
 #include <incise/stability.h>
 #include "../cli/cli.h"
 #include "../cli/picture.h"

@@ -5,9 +5,9 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <incise/guard.h>
+#include "../../lib/control/guard.h"
 #include <incise/plan.h>
-#include <incise/plant.h>
+#include "../../lib/control/plant.h"
 #include "bench_device.h"
 #include "../cli/cli.h"
 #include "../cli/memory_file.h"

@@ -151,17 +151,7 @@ INCISE_API int incise_plan_set_tip(struct incise_plan *plan, const double tip_mm
 INCISE_API int incise_plan_set_tool(struct incise_plan *plan,
 				    enum incise_tool tool) INCISE_REALTIME;
 
-/**
- * From the next tick on let the force fade out over the scene's limits.fade_ms, and ask for
- * none from then on; or let it come back, as it does after poses were missing. No change of
- * the force is above the scene's slew. Real-time safe; in the thread that ticks.
- */
-INCISE_API void incise_plan_fade(struct incise_plan *plan, bool fading) INCISE_REALTIME;
-
-/** Whether a plan that fades asks for no force any more. Real-time safe. */
-INCISE_API bool incise_plan_faded(const struct incise_plan *plan) INCISE_REALTIME;
-
-/** How long that takes at most, ns: limits.fade_ms, and the largest force at its slew. */
+/** Longest time that a force takes to fade, ns: limits.fade_ms, and the largest force at its slew. */
 INCISE_API int64_t incise_plan_fade_ns(const struct incise_plan *plan) INCISE_REALTIME;
 
 /** What one tick came to. */
@@ -205,16 +195,8 @@ enum incise_tick_flag {
 INCISE_API void incise_plan_release(struct incise_plan *plan);
 
 /**
- * Why a plan's ticks fail: the fault of the actuator that is latched, with what to do, or
- * what a device answered.
- *
- * @return words; NULL while none failed
- */
-INCISE_API const char *incise_plan_fault(const struct incise_plan *plan);
-
-/**
- * The same in a line, with what the actuator itself tells of its fault;
- * incise_stepper_cause().
+ * The reason why a plan's ticks fail, in one line: the actuator's latched fault and the way
+ * to clear it, or the error of a device.
  *
  * @param text always a string; empty while none failed
  * @return length of the line, as snprintf(3). For people: not real-time safe.

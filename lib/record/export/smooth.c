@@ -50,7 +50,7 @@ int incise_smooth_init(struct incise_smooth *smooth, double rate_hz)
 	double a, b, g;
 
 	*smooth = (struct incise_smooth){0};
-	incise_predict_init(p, &(struct incise_tracker_info){.rate_hz = rate_hz});
+	incise_predict_init(p, &(struct incise_tracker_info){.rate_hz = rate_hz}, 0);
 	smooth->period_s = p->period_s;
 	/*
 	 * The filter's covariance of velocity with x, v and a, for a noise of 1 and times

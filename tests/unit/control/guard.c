@@ -10,7 +10,7 @@
 #include <float.h>
 #include <math.h>
 #include <string.h>
-#include <incise/guard.h>
+#include "../../../lib/control/guard.h"
 
 #define MASS_KG 0.05
 #define PERIOD_S 1e-3

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <float.h>
 #include <math.h>
-#include <incise/plant.h>
+#include "../../../lib/control/plant.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
 #define G 1e-3 /* N s²/mm of a kg */

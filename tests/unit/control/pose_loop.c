@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include <incise/clock.h>
-#include <incise/plant.h>
+#include "../../../lib/control/plant.h"
 #include "../../../lib/control/pose_loop.h"
 
 #define TICK_S 1e-3
@@ -23,7 +23,7 @@ static void set_predict(struct incise_predict *predict, double rate_hz, double l
 		.latency_ns = llround(latency_s * INCISE_NS_PER_S),
 	};
 
-	incise_predict_init(predict, &tracker);
+	incise_predict_init(predict, &tracker, 0);
 }
 
 static struct incise_haptic_device device_of(double mass_kg, double bT_m)

@@ -43,7 +43,7 @@ static struct incise_predict start(void)
 	struct incise_tracker_info info = {"test", 120, LATENCY_NS, 1, 0};
 	struct incise_predict p;
 
-	incise_predict_init(&p, &info);
+	incise_predict_init(&p, &info, 0);
 	return p;
 }
 
@@ -103,7 +103,7 @@ static void test_gains_are_kalmans(void **state)
 			struct incise_predict p;
 			double k[3];
 
-			incise_predict_init_noise(&p, &info, noise_mm[n]);
+			incise_predict_init(&p, &info, noise_mm[n]);
 			riccati(sqrt(HAND_MM2_S5 / hz[i]) / (hz[i] * hz[i]) / noise_mm[n],
 				k);
 			/* 2e4 steps of rounding, each 1e-16 of P's condition of 1e6. */
@@ -113,7 +113,7 @@ static void test_gains_are_kalmans(void **state)
 			if (n == 1) {
 				struct incise_predict same;
 
-				incise_predict_init(&same, &info);
+				incise_predict_init(&same, &info, 0);
 				assert_true(same.alpha == p.alpha &&
 					    same.gamma == p.gamma);
 			}
@@ -377,7 +377,7 @@ static void test_latency_of_many_periods(void **state)
 	struct incise_tracker_sample s = {.quaternion = {1}};
 	struct incise_predict p;
 
-	incise_predict_init(&p, &info);
+	incise_predict_init(&p, &info, 0);
 	for (int i = 0; i < 500; i++) {
 		s.t_ns = i * MS_NS + info.latency_ns;
 		s.position_mm[0] = 0.06 * i;
@@ -423,7 +423,7 @@ static void test_only_numbers(void **state)
 		struct incise_predict p;
 		int64_t t_ns = 0;
 
-		incise_predict_init(&p, &info);
+		incise_predict_init(&p, &info, 0);
 		for (int i = 0; i < 2000; i++) {
 			struct incise_tracker_sample s = {.quaternion = {1}};
 			double spread = i % 3 ? 9 : 9999;
@@ -452,36 +452,6 @@ static void test_only_numbers(void **state)
 	}
 }
 
-/* Made on the heap it is the same, to the bit; no noise is the noise of init. */
-static void test_new_is_init(void **state)
-{
-	static const double noise_mm[] = {0, 0.005, 0.1};
-	struct incise_tracker_info info = {"test", 240, LATENCY_NS, 1, 0};
-
-	for (int i = 0; i < 3; i++) {
-		struct incise_predict *p = incise_predict_new(&info, noise_mm[i]), q;
-
-		if (i)
-			incise_predict_init_noise(&q, &info, noise_mm[i]);
-		else
-			incise_predict_init(&q, &info);
-		assert_non_null(p);
-		for (int n = 0; n < 20; n++) {
-			struct incise_tracker_sample s =
-				at(n * PERIOD_NS, sin(n), 0.1 * n, 1);
-			struct pose one, other;
-
-			incise_predict_add(p, &s);
-			incise_predict_add(&q, &s);
-			one = pose_at(p, s.t_ns + 1000000);
-			other = pose_at(&q, s.t_ns + 1000000);
-			assert_memory_equal(&one, &other, sizeof(one));
-		}
-		incise_predict_free(p);
-	}
-	incise_predict_free(NULL);
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -497,7 +467,6 @@ int main(void)
 		cmocka_unit_test(test_latency_of_many_periods),
 		cmocka_unit_test(test_speed_is_bounded),
 		cmocka_unit_test(test_only_numbers),
-		cmocka_unit_test(test_new_is_init),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -127,7 +127,7 @@ static struct result run(int rate)
 	double last_shown = 0, last_bare = 0, last_truth = 0, last_z = 0;
 	int count = 0;
 
-	incise_predict_init(&p, &info);
+	incise_predict_init(&p, &info, 0);
 	constant_velocity_init(&c, 1.0 / rate);
 	for (int64_t tick = 0, n = 0; tick < 40000; tick++) {
 		int64_t now = tick * 1000000;
@@ -235,7 +235,7 @@ static void test_velocity_from_quantised_position(void **state)
 		double speed = 0;
 		struct incise_predict p;
 
-		incise_predict_init_noise(&p, &info, step / sqrt(12));
+		incise_predict_init(&p, &info, step / sqrt(12));
 		for (int tick = 0; tick < 20000; tick++) {
 			double t = tick * 1e-3, v = reference_mm_s(t);
 			struct incise_tracker_sample s = {.t_ns = tick * 1000000LL,
@@ -273,7 +273,7 @@ static void test_virtual_rig(void **state)
 
 	assert_non_null(rig);
 	incise_tracker_info(incise_rig_tracker(rig), &info);
-	incise_predict_init(&p, &info);
+	incise_predict_init(&p, &info, 0);
 	for (int tick = 0; tick < 9500; tick++) {
 		struct incise_tracker_sample samples[8];
 		struct incise_sim_truth truth;

@@ -13,7 +13,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
-#include <incise/stability.h>
+#include "../../../lib/control/stability.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
 

@@ -20,7 +20,7 @@
 #include <unistd.h>
 #include <incise/clock.h>
 #include <incise/plan.h>
-#include <incise/plant.h>
+#include "../../../lib/control/plant.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
 #define HAND_N 1.0

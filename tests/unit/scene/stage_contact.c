@@ -39,7 +39,7 @@ static void test_poses_of_the_future_are_of_now(void **state)
 	struct incise_plan plan = {.tracker = &tracker, .pose_age_ns = 20000000};
 	struct incise_tick tick = {.t_ns = 1000000000};
 
-	incise_predict_init(&plan.predict, &info);
+	incise_predict_init(&plan.predict, &info, 0);
 	read_rc = 0;
 	assert_int_equal(incise_stage_pose(&plan, &tick), 0);
 	assert_int_equal(plan.predict.t_ns, tick.t_ns - info.latency_ns);
@@ -72,7 +72,7 @@ static void test_tip_of_the_calibration(void **state)
 	assert_int_equal(incise_plan_set_tip(&plan, huge), -EINVAL);
 	assert_int_equal(incise_plan_set_tip(&plan, none), -EINVAL);
 	assert_int_equal(incise_plan_set_tip(&plan, tip_mm), 0);
-	incise_predict_init(&plan.predict, &info);
+	incise_predict_init(&plan.predict, &info, 0);
 	incise_stage_fed(&plan, &tick);
 	incise_stage_predict(&plan, &tick);
 	/* rounding of the quarter turn */
@@ -172,8 +172,8 @@ static void test_the_end_of_what_is_held(void **state)
 			       .held = INCISE_TOOL_BLADE},
 	};
 
-	incise_predict_init(&plan.predict, &info);
-	incise_predict_init(&handle, &info);
+	incise_predict_init(&plan.predict, &info, 0);
+	incise_predict_init(&handle, &info, 0);
 	incise_proxy_init(&plan.proxy, surface, 0.5);
 	for (int late = 0; late < 2; late++) {
 		struct incise_tick tick = {.t_ns = 1000000000 + late * 100000000};

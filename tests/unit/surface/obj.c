@@ -9,7 +9,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 #include <errno.h>
-#include <incise/surface.h>
+#include "../../../lib/surface/surface.h"
 #include "../base/temp_file.h"
 #include "solid.h"
 

@@ -9,7 +9,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 #include <float.h>
-#include <incise/surface.h>
+#include "../../../lib/surface/surface.h"
 #include "solid.h"
 #include "wavy.h"
 

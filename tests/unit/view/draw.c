@@ -12,7 +12,7 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
-#include <incise/surface.h>
+#include "../../../lib/surface/surface.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/draw.h"
 #include "../../../lib/view/eye.h"

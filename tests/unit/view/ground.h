@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <string.h>
+#include "../../../lib/surface/surface.h"
 #include "../../../lib/view/effects.h"
 
 struct field {

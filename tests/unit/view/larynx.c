@@ -8,6 +8,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 #include "../../../lib/base/vector.h"
+#include "../../../lib/surface/surface.h"
 #include "../../../lib/view/chart.h"
 #include "../../../lib/view/larynx.h"
 

@@ -26,22 +26,20 @@
 #include <stdbool.h>
 #include <incise/export.h>
 
-INCISE_BEGIN_DECLS
-
-/** Zero it, then set what is there; all of it may be changed between two steps. */
+/* Zero it, then set what is there; all of it may be changed between two steps. */
 struct incise_plant {
-	double mass_kg;	       /**< > 0 */
-	double damping_N_s_mm; /**< viscous, ≥ 0 */
-	double coulomb_N;      /**< dry friction, sliding and holding, ≥ 0 */
-	double wall_N_mm;      /**< stiffness of a continuous wall, ≥ 0 */
-	double wall_N_s_mm;    /**< damping of the wall, ≥ 0 */
-	double wall_mm;	       /**< the wall is at x < wall_mm */
-	bool tied; /**< the wall pulls too: a spring with its rest at wall_mm */
+	double mass_kg;	       /* > 0 */
+	double damping_N_s_mm; /* viscous, ≥ 0 */
+	double coulomb_N;      /* dry friction, sliding and holding, ≥ 0 */
+	double wall_N_mm;      /* stiffness of a continuous wall, ≥ 0 */
+	double wall_N_s_mm;    /* damping of the wall, ≥ 0 */
+	double wall_mm;	       /* the wall is at x < wall_mm */
+	bool tied; /* the wall pulls too: a spring with its rest at wall_mm */
 	double position_mm;
 	double velocity_mm_s;
 };
 
-/**
+/*
  * Go on for a period under a constant force.
  *
  * With settings out of their ranges or not finite, or a force or period that is not finite, position and
@@ -50,8 +48,7 @@ struct incise_plant {
  * @param force_N  held, on the mass, besides the wall's
  * @param period_s ≥ 0
  */
-INCISE_API void incise_plant_step(struct incise_plant *plant, double force_N,
+void incise_plant_step(struct incise_plant *plant, double force_N,
 				  double period_s);
 
-INCISE_END_DECLS
 #endif

@@ -33,30 +33,28 @@
 #include <stdbool.h>
 #include <incise/export.h>
 
-INCISE_BEGIN_DECLS
-
-/**
+/*
  * Part of m/T that the damping may reach. `incise bench stability` tries others: from 0.5
  * to 1 all is bounded; 0.5 keeps a factor of two for a tick of delay in the velocity.
  */
 #define INCISE_GUARD_SHARE 0.5
 
-/** Made by incise_guard_init(). Settings may be changed, state may be read. */
+/* Made by incise_guard_init(). Settings may be changed, state may be read. */
 struct incise_guard {
-	double cap_N_s_mm;   /**< setting: most damping; 0: off */
-	double reserve_N_mm; /**< setting: most energy that can be owed; 0: off */
-	double period_s;     /**< setting */
-	/** Energy that was pressed in and may come out again, up to reserve_N_mm; below 0:
+	double cap_N_s_mm;   /* setting: most damping; 0: off */
+	double reserve_N_mm; /* setting: most energy that can be owed; 0: off */
+	double period_s;     /* setting */
+	/* Energy that was pressed in and may come out again, up to reserve_N_mm; below 0:
 	 * so much more came out. */
 	double energy_N_mm;
-	double damping_N_s_mm; /**< of the last apply(), 0 … cap_N_s_mm */
-	double force_N[3];     /**< held since the last apply() */
-	double position_mm[3]; /**< at the last apply() */
-	bool placed;	       /**< position_mm is set */
-	bool watching;	       /**< force_N is set too */
+	double damping_N_s_mm; /* of the last apply(), 0 … cap_N_s_mm */
+	double force_N[3];     /* held since the last apply() */
+	double position_mm[3]; /* at the last apply() */
+	bool placed;	       /* position_mm is set */
+	bool watching;	       /* force_N is set too */
 };
 
-/**
+/*
  * Begin with no contact.
  *
  * @param mass_kg      moving mass of the device, without the hand; > 0
@@ -66,20 +64,20 @@ struct incise_guard {
  *                     when an argument is not a positive number, the guard is off: forces
  *                     pass to the bit.
  */
-INCISE_API void incise_guard_init(struct incise_guard *guard, double mass_kg,
+void incise_guard_init(struct incise_guard *guard, double mass_kg,
 				  double period_s, double reserve_N_mm);
 
-/** A contact begins: no energy went in or out yet, no force is held. */
-INCISE_API void incise_guard_reset(struct incise_guard *guard) INCISE_REALTIME;
+/* A contact begins: no energy went in or out yet, no force is held. */
+void incise_guard_reset(struct incise_guard *guard) INCISE_REALTIME;
 
-/**
+/*
  * The point that is watched is elsewhere now, and did not go there: another end of the
  * instrument, or a tracker's leap. Up to the next apply() no energy is counted; debt and
  * credit stay.
  */
-INCISE_API void incise_guard_leap(struct incise_guard *guard) INCISE_REALTIME;
+void incise_guard_leap(struct incise_guard *guard) INCISE_REALTIME;
 
-/**
+/*
  * Once per tick, out of contact too: observe the force that was held since the last call,
  * and add damping to the next one where more energy came out than went in. What a stiff
  * wall made is often seen when the device has left it already; asked in contact only, the
@@ -92,17 +90,16 @@ INCISE_API void incise_guard_leap(struct incise_guard *guard) INCISE_REALTIME;
  * @param force_N       on the device; damping is added
  * @return whether damping was added
  */
-INCISE_API bool incise_guard_apply(struct incise_guard *guard,
+bool incise_guard_apply(struct incise_guard *guard,
 				   const double position_mm[3],
 				   const double velocity_mm_s[3],
 				   double force_N[3]) INCISE_REALTIME;
 
-/**
+/*
  * What is really held from now on, after limits. Where an actuator takes some ticks, it
  * is the force that takes effect now. Without a call the last one counts as held on.
  */
-INCISE_API void incise_guard_sent(struct incise_guard *guard,
+void incise_guard_sent(struct incise_guard *guard,
 				  const double force_N[3]) INCISE_REALTIME;
 
-INCISE_END_DECLS
 #endif
