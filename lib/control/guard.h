@@ -64,8 +64,8 @@ struct incise_guard {
  *                     when an argument is not a positive number, the guard is off: forces
  *                     pass to the bit.
  */
-void incise_guard_init(struct incise_guard *guard, double mass_kg,
-				  double period_s, double reserve_N_mm);
+void incise_guard_init(struct incise_guard *guard, double mass_kg, double period_s,
+		       double reserve_N_mm);
 
 /* A contact begins: no energy went in or out yet, no force is held. */
 void incise_guard_reset(struct incise_guard *guard) INCISE_REALTIME;
@@ -90,16 +90,14 @@ void incise_guard_leap(struct incise_guard *guard) INCISE_REALTIME;
  * @param force_N       on the device; damping is added
  * @return whether damping was added
  */
-bool incise_guard_apply(struct incise_guard *guard,
-				   const double position_mm[3],
-				   const double velocity_mm_s[3],
-				   double force_N[3]) INCISE_REALTIME;
+bool incise_guard_apply(struct incise_guard *guard, const double position_mm[3],
+			const double velocity_mm_s[3], double force_N[3]) INCISE_REALTIME;
 
 /*
  * What is really held from now on, after limits. Where an actuator takes some ticks, it
  * is the force that takes effect now. Without a call the last one counts as held on.
  */
 void incise_guard_sent(struct incise_guard *guard,
-				  const double force_N[3]) INCISE_REALTIME;
+		       const double force_N[3]) INCISE_REALTIME;
 
 #endif

@@ -34,7 +34,7 @@ struct incise_plant {
 	double wall_N_mm;      /* stiffness of a continuous wall, ≥ 0 */
 	double wall_N_s_mm;    /* damping of the wall, ≥ 0 */
 	double wall_mm;	       /* the wall is at x < wall_mm */
-	bool tied; /* the wall pulls too: a spring with its rest at wall_mm */
+	bool tied;	       /* the wall pulls too: a spring with its rest at wall_mm */
 	double position_mm;
 	double velocity_mm_s;
 };
@@ -48,7 +48,6 @@ struct incise_plant {
  * @param force_N  held, on the mass, besides the wall's
  * @param period_s ≥ 0
  */
-void incise_plant_step(struct incise_plant *plant, double force_N,
-				  double period_s);
+void incise_plant_step(struct incise_plant *plant, double force_N, double period_s);
 
 #endif
