@@ -37,7 +37,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command verb = {
 	.name = "bench all",
 	.synopsis = "--report DIR [OPTIONS]",
 	.summary =

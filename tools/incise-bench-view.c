@@ -13,8 +13,8 @@
 #include "bench/figures.h"
 #include "cli/json.h"
 #include "bench/machine.h"
-#include "cli/memory_file.h"
-#include "cli/picture.h"
+#include "cli/file.h"
+#include "cli/plot.h"
 #include "cli/scene_argument.h"
 
 enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION, OPT_AGAINST };
@@ -30,7 +30,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command verb = {
 	.name = "bench view",
 	.synopsis = "[SCENE] [OPTIONS]",
 	.summary =
@@ -152,7 +152,7 @@ static void parse(struct job *job, int argc, char **argv)
 	if (!(job->seconds > 0))
 		job->seconds = job->quick ? QUICK_LIVE_S : LIVE_S;
 	if (job->plot)
-		picture_place("plot", job->plot, &job->folder, &job->name);
+		plot_place("plot", job->plot, &job->folder, &job->name);
 }
 
 int main(int argc, char **argv)

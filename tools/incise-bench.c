@@ -50,7 +50,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command verb = {
 	.name = "bench",
 	.synopsis =
 		"precision [MODEL.fis] | training | stability | loop [SCENE] | pose | timeline | "

@@ -26,7 +26,7 @@ static const struct cli_option options[] = {
 	{OPT_JSON, "json", NULL, "report as JSON"},
 	{0}};
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "calibrate check",
 	.synopsis = "[-c FILE] [--due AGE] [--recording NAME.rec]",
 	.summary =
@@ -94,7 +94,7 @@ static void take_options(struct wish *wish, int argc, char **argv)
 		{"d", 86400}, {"h", 3600}, {"w", 7 * 86400}, {"y", 365.25 * 86400}, {0}};
 	int id;
 
-	while ((id = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((id = cli_next(&command, argc, argv)) != CLI_END)
 		switch (id) {
 		case 'c':
 			wish->calibration = optarg;

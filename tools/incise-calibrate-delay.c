@@ -17,8 +17,8 @@
 #include "calibrate/calibrate_result.h"
 #include "calibrate/delay_streams.h"
 #include "cli/json.h"
-#include "cli/picture.h"
-#include "cli/recording_folder.h"
+#include "cli/plot.h"
+#include "cli/recording.h"
 
 /* A drift that is this many times its uncertainty is real. */
 #define DRIFT_SIGMAS 4
@@ -45,7 +45,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "calibrate delay",
 	.synopsis = "[--rig RIG | --from NAME.rec] [OPTIONS]",
 	.summary =
@@ -85,7 +85,7 @@ static void take_options(struct wish *wish, int argc, char **argv)
 	size_t length;
 	int id;
 
-	while ((id = cli_next(&verb, argc, argv)) != CLI_END) {
+	while ((id = cli_next(&command, argc, argv)) != CLI_END) {
 		if (calibrate_option(common, id))
 			continue;
 		if (id == OPT_TIME)
@@ -117,8 +117,8 @@ static void remove_recording(const char *path)
 
 	if (asprintf(&part, "%s.part", path) < 0)
 		cli_fail("no memory");
-	recording_folder_remove(path);
-	recording_folder_remove(part);
+	recording_remove(path);
+	recording_remove(part);
 	free(part);
 }
 
@@ -269,30 +269,30 @@ static void draw(const struct calibrate_wish *wish, const struct delay_stream *s
 	char *path;
 	FILE *script;
 
-	if (!picture_possible()) {
+	if (!plot_possible()) {
 		cli_warn("no pictures: gnuplot is not installed, apt-get install "
 			 "gnuplot-nox");
 		return;
 	}
 	if (asprintf(&path, "%s/fit", wish->report) < 0)
 		cli_fail("no memory");
-	picture_place("report", path, &folder, &name);
+	plot_place("report", path, &folder, &name);
 	for (int i = 0; i < DELAY_STREAMS; i++) {
 		int stride = 1 + streams[i].n / 4000;
 		FILE *data;
 		char file[40];
 
 		snprintf(file, sizeof(file), "%s.dat", delay_stream_names[i]);
-		data = picture_data(folder, file);
+		data = plot_data(folder, file);
 		for (int k = 0; k < streams[i].n; k += stride)
 			fprintf(data, "%.5f %.5f\n",
 				(streams[i].points[k].t_ns -
 				 streams[DELAY_TRACKER].points[0].t_ns) *
 					1e-9,
 				streams[i].points[k].value);
-		picture_data_end(data, folder);
+		plot_data_end(data, folder);
 	}
-	script = picture_begin(folder, "fit", 1000, 500);
+	script = plot_begin(folder, "fit", 1000, 500);
 	fprintf(script,
 		"set xlabel 'time, s'\nset ylabel 'depth, mm'\nset y2label 'force, N'\n"
 		"set y2tics\nset key top right\n"
@@ -307,7 +307,7 @@ static void draw(const struct calibrate_wish *wish, const struct delay_stream *s
 			 pairs[DELAY_FORCE].fit.delay_ms) *
 				1e-3);
 	putc('\n', script);
-	if (!picture_draw(script, folder, "fit"))
+	if (!plot_draw(script, folder, "fit"))
 		cli_warn("fit.png could not be drawn");
 	free(path);
 }

@@ -68,7 +68,7 @@ static const struct cli_option options[] = {
 	 "recording's start"},
 	{0}};
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "calibrate force",
 	.synopsis = "[--weights LIST | --from FILE] [OPTIONS]",
 	.summary =
@@ -109,7 +109,7 @@ static void take_options(struct wish *wish, int argc, char **argv)
 	int id;
 
 	cli_negative_numbers(argc, argv);
-	while ((id = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((id = cli_next(&command, argc, argv)) != CLI_END)
 		switch (id) {
 		case OPT_WEIGHTS:
 			calibrate_weights_list(&wish->weights, optarg);

@@ -39,7 +39,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "calibrate stepper",
 	.synopsis = "[--from FILE.csv] [OPTIONS]",
 	.summary =
@@ -102,7 +102,7 @@ static void parse(struct job *job, int argc, char **argv)
 			    .max_N = NAN,
 			    .step_mm = NAN,
 			    .strokes = 3};
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		switch (opt) {
 		case OPT_RANGE:
 			parse_range(job, optarg);

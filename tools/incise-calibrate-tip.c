@@ -13,7 +13,7 @@
 #include "calibrate/calibrate_report.h"
 #include "calibrate/calibrate_result.h"
 #include "cli/json.h"
-#include "cli/picture.h"
+#include "cli/plot.h"
 #include "calibrate/tip_poses.h"
 
 #define POLL_NS 10000000LL
@@ -48,7 +48,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "calibrate tip",
 	.synopsis = "[--rig RIG | --from FILE] [OPTIONS]",
 	.summary =
@@ -170,15 +170,15 @@ static void draw(const struct calibrate_wish *wish, const struct tip_list *list,
 	char *path;
 	FILE *data, *script;
 
-	if (!picture_possible()) {
+	if (!plot_possible()) {
 		cli_warn("no pictures: gnuplot is not installed, apt-get install "
 			 "gnuplot-nox");
 		return;
 	}
 	if (asprintf(&path, "%s/residuals", wish->report) < 0)
 		cli_fail("no memory");
-	picture_place("report", path, &folder, &name);
-	data = picture_data(folder, "poses.dat");
+	plot_place("report", path, &folder, &name);
+	data = plot_data(folder, "poses.dat");
 	for (int i = 0; i < list->n; i++) {
 		double r[3];
 
@@ -188,9 +188,9 @@ static void draw(const struct calibrate_wish *wish, const struct tip_list *list,
 			r[2], inlier[i], list->poses[i].position_mm[0],
 			list->poses[i].position_mm[1]);
 	}
-	picture_data_end(data, folder);
+	plot_data_end(data, folder);
 	for (int i = 0; i < 2; i++) {
-		script = picture_begin(folder, pictures[i], 900, 500);
+		script = plot_begin(folder, pictures[i], 900, 500);
 		if (!i)
 			fprintf(script,
 				"set xlabel 'time, s'\nset ylabel 'residual, mm'\n"
@@ -205,7 +205,7 @@ static void draw(const struct calibrate_wish *wish, const struct tip_list *list,
 				"plot 'poses.dat' using 6:(int($5) ? $7 : NaN) with points pt "
 				"7 ps 0.3 lc 1 title 'believed', '' using 6:(int($5) ? NaN : "
 				"$7) with points pt 2 ps 1 lc 2 title 'left out'\n");
-		if (!picture_draw(script, folder, pictures[i]))
+		if (!plot_draw(script, folder, pictures[i]))
 			cli_warn("%s.png could not be drawn", pictures[i]);
 	}
 	free(path);
@@ -310,7 +310,7 @@ int main(int argc, char **argv)
 	bool *inlier;
 	int id;
 
-	while ((id = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((id = cli_next(&command, argc, argv)) != CLI_END)
 		if (!calibrate_option(&wish, id))
 			time_s = cli_duration("time", optarg, 1, 600);
 	if (optind < argc)

@@ -8,7 +8,7 @@
 
 static const struct cli_option options[] = {{0}};
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "calibrate",
 	.synopsis = "force | depth | tip | delay | stepper | check [OPTIONS]",
 	.summary =
@@ -26,7 +26,7 @@ static const struct cli_verb verb = {
 
 int main(int argc, char **argv)
 {
-	while (cli_next(&verb, argc, argv) != CLI_END)
+	while (cli_next(&command, argc, argv) != CLI_END)
 		;
 	if (optind < argc)
 		cli_usage("there is nothing called '%s' to calibrate", argv[optind]);

@@ -14,7 +14,7 @@
 #include "capture/capture_wish.h"
 #include "cli/cli.h"
 #include "capture/keyboard.h"
-#include "cli/recording_folder.h"
+#include "cli/recording.h"
 
 #define POLL_NS 10000000LL
 
@@ -149,7 +149,7 @@ static void keep_old(const struct run *run, const char *new)
 	if (stats->force || stats->tracker || stats->frames ||
 	    (!stats->armed && !run->wish->force))
 		return;
-	recording_folder_remove(new);
+	recording_remove(new);
 	if (run->result.early.code)
 		cli_fail_with(&run->result.early);
 	cli_fail("%s: %s; nothing was recorded%s", run->wish->output,
@@ -193,12 +193,12 @@ static void clear(const struct capture_wish *wish, const char *target)
 {
 	char part[PATH_MAX + 8];
 
-	recording_folder_check(wish->output);
+	recording_check(wish->output);
 	snprintf(part, sizeof(part), "%s.part", wish->output);
-	recording_folder_remove(part);
+	recording_remove(part);
 	snprintf(part, sizeof(part), "%s.part", target);
-	recording_folder_remove(part);
-	recording_folder_remove(target);
+	recording_remove(part);
+	recording_remove(target);
 }
 
 static double planned_s(const struct capture_wish *wish, struct incise_rig *rig)
@@ -261,7 +261,7 @@ int main(int argc, char **argv)
 	incise_rig_close(run.rig);
 	keep_old(&run, target);
 	if (wish.force)
-		recording_folder_replace(target, wish.output);
+		recording_replace(target, wish.output);
 	capture_report(&run.result, wish.json);
 	capture_judge(&run.result);
 	return 0;

@@ -32,7 +32,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "compile",
 	.synopsis = "MODEL.fis -o MODEL.fx [OPTIONS]",
 	.summary =
@@ -135,7 +135,7 @@ int main(int argc, char **argv)
 	int opt;
 
 	incise_fixed_options_init(&o);
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		switch (opt) {
 		case 'o':
 			output = optarg;

@@ -15,7 +15,7 @@
 #include "demo/demo.h"
 #include "demo/demo_scene.h"
 #include "cli/json.h"
-#include "cli/picture.h"
+#include "cli/plot.h"
 
 enum { OPT_SEED = CLI_LONG, OPT_LOOP, OPT_SCENE, OPT_FORCE, OPT_JSON };
 
@@ -30,7 +30,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "demo",
 	.synopsis = "[OPTIONS]",
 	.summary =
@@ -51,7 +51,7 @@ int main(int argc, char **argv)
 	double seconds;
 	int opt;
 
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		switch (opt) {
 		case 'o':
 			demo.folder = optarg;
@@ -81,7 +81,7 @@ int main(int argc, char **argv)
 		demo_scene(scene, demo.folder, force);
 		return 0;
 	}
-	if (!picture_possible())
+	if (!plot_possible())
 		cli_fail(
 			"gnuplot is not installed, it draws the pictures: apt-get install "
 			"gnuplot-nox, or run 'make demo'");

@@ -29,7 +29,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "eval",
 	.synopsis = "MODEL.fis|MODEL.fx [FILE] [OPTIONS]",
 	.summary =
@@ -257,7 +257,7 @@ int main(int argc, char **argv)
 	FILE *in;
 	int opt;
 
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		switch (opt) {
 		case OPT_ARITH:
 			arith = optarg;

@@ -48,7 +48,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "export",
 	.synopsis = "NAME.rec… [-o FILE] [OPTIONS]",
 	.summary =
@@ -134,7 +134,7 @@ int main(int argc, char **argv)
 	int id;
 
 	incise_export_options_init(&how);
-	while ((id = cli_next(&verb, argc, argv)) != CLI_END) {
+	while ((id = cli_next(&command, argc, argv)) != CLI_END) {
 		switch (id) {
 		case 'o':
 			output = optarg;

@@ -67,7 +67,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "haptic",
 	.synopsis = "SCENE [OPTIONS]",
 	.summary =
@@ -180,7 +180,7 @@ static void parse(struct job *job, int argc, char **argv)
 	job->realtime = (struct incise_realtime_setup){
 		.priority = INCISE_REALTIME_PRIORITY, .cpu = INCISE_REALTIME_ANY_CPU};
 	job->haptic.loop.overruns_most = 100;
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		take_option(job, opt);
 	scene_argument_operand(&job->haptic.argument, argc, argv, optind);
 	if (job->log && !job->duration)

@@ -16,8 +16,8 @@
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/stream_report.h"
-#include "cli/model_picture.h"
-#include "cli/picture.h"
+#include "cli/model_plot.h"
+#include "cli/plot.h"
 #include "stepper/stepper_module_report.h"
 
 enum { OPT_JSON = CLI_LONG, OPT_PLOT };
@@ -30,7 +30,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "info",
 	.synopsis = "MODEL.fis|MODEL.fx|NAME.rec|stepper|/dev/incise-stepperN|can:IFACE|"
 		    "slcan:TTY|devices [OPTIONS]",
@@ -189,7 +189,7 @@ static void show_model(const char *path, bool json, const char *plot)
 	struct incise_fixed *fixed;
 
 	if (plot)
-		picture_place("plot", plot, &folder, &name);
+		plot_place("plot", plot, &folder, &name);
 	model = incise_model_load(path, &err);
 	if (!model)
 		cli_fail_with(&err);
@@ -200,7 +200,7 @@ static void show_model(const char *path, bool json, const char *plot)
 		model_text(model, fixed, refused.text);
 	cli_finish();
 	if (plot)
-		model_picture_draw(model, folder, name);
+		model_plot_draw(model, folder, name);
 	incise_fixed_free(fixed);
 	incise_model_free(model);
 }
@@ -371,7 +371,7 @@ int main(int argc, char **argv)
 	bool json = false;
 	int opt;
 
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		switch (opt) {
 		case OPT_JSON:
 			json = true;

@@ -30,7 +30,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "plan",
 	.synopsis = "SCENE [OPTIONS]",
 	.summary =
@@ -59,7 +59,7 @@ static void parse(struct job *job, int argc, char **argv)
 	int opt;
 
 	*job = (struct job){0};
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		switch (opt) {
 		case 'r':
 			job->rig = optarg;

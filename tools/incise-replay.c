@@ -13,7 +13,7 @@
 #include "cli/loop_report.h"
 #include "cli/replay_picture.h"
 #include "cli/scene_argument.h"
-#include "cli/whole_file.h"
+#include "cli/file.h"
 
 enum {
 	OPT_CSV = CLI_LONG,
@@ -46,7 +46,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "replay",
 	.synopsis = "NAME.rec SCENE [OPTIONS]",
 	.summary =
@@ -80,7 +80,7 @@ static void parse(struct job *job, int argc, char **argv)
 	int opt;
 
 	*job = (struct job){.how.stop = &cli_stop};
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		switch (opt) {
 		case OPT_CSV:
 			job->csv = optarg;

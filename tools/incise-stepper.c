@@ -32,7 +32,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "stepper",
 	.synopsis = "status | enable | disable | move MM | jog MM_S | home | clear "
 		    "[OPTIONS]",
@@ -220,7 +220,7 @@ static void parse(struct stepper_job *job, int argc, char **argv)
 
 	*job = (struct stepper_job){0};
 	cli_negative_numbers(argc, argv);
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		switch (opt) {
 		case 'r':
 			job->rig = optarg;

@@ -14,7 +14,7 @@
 #include "train/train_report.h"
 #include "train/train_side.h"
 #include "train/train_wish.h"
-#include "cli/whole_file.h"
+#include "cli/file.h"
 
 struct history {
 	FILE *csv; /* or NULL */

@@ -18,7 +18,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "verify",
 	.synopsis = "NAME.rec [OPTIONS]",
 	.summary =
@@ -171,7 +171,7 @@ int main(int argc, char **argv)
 	bool json = false;
 	int id;
 
-	while ((id = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((id = cli_next(&command, argc, argv)) != CLI_END)
 		json |= id == OPT_JSON;
 	if (optind == argc)
 		cli_usage("which recording?");

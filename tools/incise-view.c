@@ -58,7 +58,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "view",
 	.synopsis = "SCENE [OPTIONS]",
 	.summary =
@@ -174,7 +174,7 @@ static void parse(struct view_job *job, int argc, char **argv)
 	int opt;
 
 	*job = (struct view_job){.output = {.width = 1280, .height = 720, .fps = 60}};
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		take_option(job, opt);
 	scene_argument_operand(&job->argument, argc, argv, optind);
 	if (!!job->rig + !!job->from + job->procedure > 1)

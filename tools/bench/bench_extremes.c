@@ -12,7 +12,7 @@
 #include "figures.h"
 #include "../cli/json.h"
 #include "machine.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "stiff_sweep.h"
 
 /* What was tried, within a column, broken between words. */
@@ -84,7 +84,7 @@ void bench_extremes(uint64_t seed, bool json, bool quick, const char *plot)
 	if (!all || !stiff)
 		cli_fail("no memory");
 	if (plot)
-		picture_place("plot", plot, &folder, &name);
+		plot_place("plot", plot, &folder, &name);
 	all->seed = seed;
 	all->quick = quick;
 	extremes_model(all);

@@ -48,7 +48,7 @@ static const char *begin_stress(enum load load, double seconds, struct load_run 
 	folder_make(run->folder, sizeof(run->folder), "to keep the disk busy in");
 	argv[n++] = "--temp-path";
 	argv[n++] = run->folder;
-	run->pid = child_begin((char *const *)argv, -1);
+	run->pid = child_start((char *const *)argv, -1, -1);
 	return NULL;
 }
 
@@ -63,7 +63,7 @@ static const char *begin_view(const char *scene, double seconds, struct load_run
 		return "incise-view is not there";
 	snprintf(time, sizeof(time), "%.0f", seconds + LONGER_S);
 	run->said = memory_file_begin("view");
-	run->pid = child_begin((char *const *)argv, fileno(run->said.file));
+	run->pid = child_start((char *const *)argv, fileno(run->said.file), -1);
 	/* Until the skin is painted and the cut bleeds. */
 	sleep(BLEEDING_S);
 	return NULL;

@@ -9,7 +9,7 @@
 #include <limits.h>
 #include <stdbool.h>
 #include <sys/types.h>
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 enum load { LOAD_IDLE, LOAD_CPU, LOAD_MEMORY, LOAD_DISK, LOAD_VIEW, LOADS };
 

@@ -14,7 +14,7 @@
 #include "../cli/json.h"
 #include "loop_picture.h"
 #include "machine.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 
 #define AWAKE_S 5
 #define QUICK_AWAKE_S 0.5
@@ -65,7 +65,7 @@ void bench_loop(const struct bench_loop *bench)
 	int n;
 
 	if (bench->plot)
-		picture_place("plot", bench->plot, &folder, &name);
+		plot_place("plot", bench->plot, &folder, &name);
 	if (!(seconds > 0))
 		seconds = bench->quick ? QUICK_AWAKE_S : AWAKE_S;
 	machine_init(&machine);

@@ -11,7 +11,7 @@
 #include "figures.h"
 #include "../cli/json.h"
 #include "machine.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "pose_picture.h"
 
 #define TICKS 16000
@@ -297,7 +297,7 @@ void bench_pose(bool json, bool quick, const char *plot)
 	if (!b)
 		cli_fail("no memory");
 	if (plot)
-		picture_place("plot", plot, &folder, &name);
+		plot_place("plot", plot, &folder, &name);
 	b->quick = quick;
 	b->ticks = quick ? QUICK_TICKS : TICKS;
 	b->repeats = quick ? QUICK_REPEATS : REPEATS;

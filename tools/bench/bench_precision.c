@@ -15,7 +15,7 @@
 #include "harness.h"
 #include "../cli/json.h"
 #include "machine.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 
 /* Points for the errors. Times are of the first of them, so few that inputs and outputs
  * stay in the cache and the arithmetic is what is measured. */
@@ -222,7 +222,7 @@ static void write_data(const struct bench *b, const char *folder, const char *na
 
 	if (asprintf(&data, "%s.dat", name) < 0)
 		cli_fail("no memory");
-	out = picture_data(folder, data);
+	out = plot_data(folder, data);
 	free(data);
 	for (int kind = 0; kind < ARITHMETIC_KINDS; kind++) {
 		/* A block without points would shift the numbers of those behind it. */
@@ -240,7 +240,7 @@ static void write_data(const struct bench *b, const char *folder, const char *na
 		}
 		fputs("\n\n", out);
 	}
-	picture_data_end(out, folder);
+	plot_data_end(out, folder);
 }
 
 static void draw(const struct bench *b, const struct incise_model *model,
@@ -258,7 +258,7 @@ static void draw(const struct bench *b, const struct incise_model *model,
 		most = fmax(most, b->figures[i].time.ns.median);
 	}
 	write_data(b, folder, name);
-	script = picture_begin(folder, name, 1100, 800);
+	script = plot_begin(folder, name, 1100, 800);
 	fprintf(script,
 		"set title \"Error over run time, %d rules\\n%s, %s\"\n"
 		"set xlabel 'time per evaluation / ns (bars: 5 to 95 %% of the runs)'\n"
@@ -284,7 +284,7 @@ static void draw(const struct bench *b, const struct incise_model *model,
 			kind, style, number, kind, style, number, titles[kind], kind);
 	}
 	fputs("  NaN\n", script);
-	if (!picture_draw(script, folder, name))
+	if (!plot_draw(script, folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
 }
 
@@ -298,7 +298,7 @@ void bench_precision(const char *path, bool json, bool quick, const char *plot)
 	if (!b)
 		cli_fail("no memory");
 	if (plot)
-		picture_place("plot", plot, &folder, &name);
+		plot_place("plot", plot, &folder, &name);
 	model = path ? incise_model_load(path, &err) : own_model();
 	if (!model)
 		cli_fail_with(&err);

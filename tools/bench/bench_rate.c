@@ -25,7 +25,7 @@
 #include "../cli/cli.h"
 #include "figures.h"
 #include "../cli/json.h"
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 #include "../cli/tick_cost.h"
 
 /* Whole numbers of ns, and multiples of all rates. */

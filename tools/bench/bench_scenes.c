@@ -13,7 +13,7 @@
 #include "../cli/json.h"
 #include "machine.h"
 #include "../cli/mapped_libraries.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "../cli/scene_argument.h"
 #include "scene_row.h"
 #include "scenes_picture.h"
@@ -445,7 +445,7 @@ void bench_scenes(char *const *scenes, int n, bool json, bool quick, const char 
 	if (!b)
 		cli_fail("no memory");
 	if (plot)
-		picture_place("plot", plot, &folder, &name);
+		plot_place("plot", plot, &folder, &name);
 	machine_init(&b->machine);
 	for (int i = 0; i < n; i++)
 		add_given(b, scenes[i]);

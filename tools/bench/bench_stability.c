@@ -14,7 +14,7 @@
 #include "figures.h"
 #include "../cli/json.h"
 #include "machine.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "stability_picture.h"
 
 /* Simulation beside theory: what is measured, how near it shall come, and why not nearer. */
@@ -193,7 +193,7 @@ void bench_stability(bool json, bool quick, const char *plot)
 		cli_fail("no memory");
 	/* A name that cannot be is said before the work, not after. */
 	if (plot)
-		picture_place("plot", plot, &folder, &name);
+		plot_place("plot", plot, &folder, &name);
 	measure(s, quick);
 	if (json)
 		print_json(s, quick);

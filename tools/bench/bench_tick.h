@@ -10,7 +10,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include "figures.h"
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 #include "../cli/tick_cost.h"
 
 #define BENCH_TICK_ROWS 5

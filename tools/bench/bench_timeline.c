@@ -14,7 +14,7 @@
 #include "figures.h"
 #include "../cli/json.h"
 #include "machine.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "../cli/stopwatch.h"
 #include "timeline_picture.h"
 
@@ -342,7 +342,7 @@ void bench_timeline(bool json, bool quick, const char *plot)
 	if (!b)
 		cli_fail("no memory");
 	if (plot)
-		picture_place("plot", plot, &folder, &name);
+		plot_place("plot", plot, &folder, &name);
 	b->quick = quick;
 	b->repeats = quick ? QUICK_REPEATS : REPEATS;
 	machine_init(&b->machine);

@@ -12,7 +12,7 @@
 #include "figures.h"
 #include "../cli/json.h"
 #include "machine.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "training_data.h"
 #include "training_peer.h"
 
@@ -405,7 +405,7 @@ static void draw(const struct bench *b, const char *folder, const char *name)
 	}
 	if (asprintf(&data, "%s.dat", name) < 0)
 		cli_fail("no memory");
-	out = picture_data(folder, data);
+	out = plot_data(folder, data);
 	free(data);
 	for (int kind = 0; kind < KINDS; kind++) {
 		fputs("none NaN NaN NaN NaN\n", out);
@@ -420,8 +420,8 @@ static void draw(const struct bench *b, const char *folder, const char *name)
 		}
 		fputs("\n\n", out);
 	}
-	picture_data_end(out, folder);
-	out = picture_begin(folder, name, 1100, 800);
+	plot_data_end(out, folder);
+	out = plot_begin(folder, name, 1100, 800);
 	fprintf(out,
 		"set title \"Error on unseen cuts over the time of training, %d pairs\\n%s, "
 		"%s\"\nset xlabel 'time of training / s'\n"
@@ -438,7 +438,7 @@ static void draw(const struct bench *b, const char *folder, const char *name)
 			"offset 0.6,0.3 font ',8' notitle, \\\n",
 			kind, kind + 1, kind_titles[kind], kind);
 	fputs("  NaN notitle\n", out);
-	if (!picture_draw(out, folder, name))
+	if (!plot_draw(out, folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
 }
 
@@ -450,7 +450,7 @@ void bench_training(bool json, bool quick, const char *plot)
 	if (!b)
 		cli_fail("no memory");
 	if (plot)
-		picture_place("plot", plot, &folder, &name);
+		plot_place("plot", plot, &folder, &name);
 	b->seeds = quick ? QUICK_SEEDS : SEEDS;
 	b->repeats = quick ? QUICK_REPEATS : REPEATS;
 	machine_init(&b->machine);

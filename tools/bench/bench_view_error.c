@@ -14,7 +14,7 @@
 #include "../cli/cli.h"
 #include "figures.h"
 #include "../cli/json.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "similarity.h"
 
 #define WIDTH 1280
@@ -250,10 +250,10 @@ void shown_rows_draw(const struct shown_rows *rows, const char *folder, const ch
 	char data[300];
 
 	snprintf(data, sizeof(data), "%s.dat", name);
-	out = picture_data(folder, data);
+	out = plot_data(folder, data);
 	write_data(rows, out);
-	picture_data_end(out, folder);
-	script = picture_begin(folder, name, 1320, 620);
+	plot_data_end(out, folder);
+	script = plot_begin(folder, name, 1320, 620);
 	fprintf(script,
 		"set multiplot layout 1,2 title \"What a screen shows of a cut that bleeds, "
 		"at 15, 30 and 60 frames a second, against a texture of %d² at that very "
@@ -268,7 +268,7 @@ void shown_rows_draw(const struct shown_rows *rows, const char *folder, const ch
 	set_axes(script, rows, true);
 	draw_panel(script, rows->textures, 3);
 	fputs("unset multiplot\n", script);
-	if (!picture_draw(script, folder, name))
+	if (!plot_draw(script, folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
 }
 

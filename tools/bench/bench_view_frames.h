@@ -8,7 +8,7 @@
 #include <jansson.h>
 #include <stdbool.h>
 #include "figures.h"
-#include "../view/view_script.h"
+#include "../view/procedure.h"
 
 /* Of the frames of a run, ms. */
 struct frame_times {

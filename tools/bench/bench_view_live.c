@@ -15,7 +15,7 @@
 #include "harness.h"
 #include "../cli/json.h"
 #include "../cli/stopwatch.h"
-#include "../view/view_live.h"
+#include "../view/live.h"
 
 /* ---- cuts at 5 kHz ---- */
 

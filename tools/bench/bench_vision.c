@@ -14,7 +14,7 @@
 #include "figures.h"
 #include "../cli/json.h"
 #include "machine.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "scalpel_picture.h"
 #include "../cli/stopwatch.h"
 
@@ -284,7 +284,7 @@ static void draw_chart(const struct bench *b, const char *folder, const char *na
 
 	if (asprintf(&data, "%s.dat", name) < 0)
 		cli_fail("no memory");
-	out = picture_data(folder, data);
+	out = plot_data(folder, data);
 	free(data);
 	for (int region = 0; region < REGIONS; region++) {
 		fputs("none NaN NaN NaN NaN NaN\n", out);
@@ -304,8 +304,8 @@ static void draw_chart(const struct bench *b, const char *folder, const char *na
 		}
 		fputs("\n\n", out);
 	}
-	picture_data_end(out, folder);
-	out = picture_begin(folder, name, 1100, 800);
+	plot_data_end(out, folder);
+	out = plot_begin(folder, name, 1100, 800);
 	fprintf(out,
 		"set title \"Error of the exposed length over run time\\n%s, %s\"\n"
 		"set xlabel 'processor time of a picture / ms (bars: 5 to 95 %%)'\n"
@@ -323,7 +323,7 @@ static void draw_chart(const struct bench *b, const char *folder, const char *na
 			region, region + 1, region, region + 1, titles[region], region,
 			region ? 20 : -20, region ? 0.3 : -0.3);
 	fputs("  NaN notitle\n", out);
-	if (!picture_draw(out, folder, name))
+	if (!plot_draw(out, folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
 }
 
@@ -336,7 +336,7 @@ void bench_vision(bool json, bool quick, const char *plot)
 		cli_fail("no memory");
 	incise_vision_free(vision_of(0)); /* fails before anything is drawn */
 	if (plot)
-		picture_place("plot", plot, &folder, &name);
+		plot_place("plot", plot, &folder, &name);
 	b->rounds = quick ? QUICK_ROUNDS : ROUNDS;
 	machine_init(&b->machine);
 	for (int k = 0; k < KINDS; k++) {

@@ -13,7 +13,7 @@
 #include "../cli/cli.h"
 #include "compare.h"
 #include "../cli/json.h"
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 /* In the first process: what the other one said, and how it ended. */
 static void wait_and_compare(pid_t pid, const struct memory_file *said, const char *path,

@@ -62,7 +62,7 @@ void cyclictest_begin(struct cyclictest *c, double rate_hz, int priority, int cp
 	snprintf(text[4], sizeof(text[4]), "--spike=%.0f", 0.25e6 / rate_hz);
 	snprintf(text[5], sizeof(text[5]), "--json=%s", c->report.path);
 	snprintf(text[6], sizeof(text[6]), "--secaligned=%.0f", phase_us);
-	c->pid = child_begin((char *const *)argv, fileno(c->out.file));
+	c->pid = child_start((char *const *)argv, fileno(c->out.file), -1);
 }
 
 static void take_spikes(FILE *lines, struct cyclictest_result *result)

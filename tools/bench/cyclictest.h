@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <sys/types.h>
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 /* A wake-up that was late by more than a quarter of a period. */
 struct cyclictest_spike {

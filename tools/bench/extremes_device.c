@@ -15,7 +15,7 @@
 #include "any_pose.h"
 #include "../cli/cli.h"
 #include "extremes.h"
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 #define RUNS 2400
 #define TICKS 250

@@ -21,7 +21,7 @@
 #include "extremes.h"
 #include "extremes_ground.h"
 #include "../cli/folder.h"
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 #define SIZE_MAX_BYTES (1 << 20)
 

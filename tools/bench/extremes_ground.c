@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include "../cli/cli.h"
 #include "extremes_ground.h"
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 void ground_write_model(FILE *out)
 {

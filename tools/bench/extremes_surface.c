@@ -8,7 +8,7 @@
 #include "any_pose.h"
 #include "../cli/cli.h"
 #include "extremes.h"
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 #define SURFACES 2000
 #define MESHES 1200

@@ -11,7 +11,7 @@
 #include "any_pose.h"
 #include "../cli/cli.h"
 #include "extremes.h"
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 #define SCENES 6000
 #define TICKS 200

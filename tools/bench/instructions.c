@@ -88,7 +88,7 @@ void callgrind_begin(struct callgrind *callgrind, const char *function,
 		 fileno(callgrind->report.file));
 	for (int i = 0; argv[i] && n < ARGUMENTS_MOST - 1; i++)
 		all[n++] = argv[i];
-	callgrind->pid = child_begin(all, -1);
+	callgrind->pid = child_start(all, -1, -1);
 }
 
 void callgrind_here(void)

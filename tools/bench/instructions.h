@@ -10,7 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <sys/types.h>
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 struct instruction_counter {
 	int fd; /* below 0: there is none */

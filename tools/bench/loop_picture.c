@@ -8,7 +8,7 @@
 #include <incise/loop.h>
 #include "../cli/cli.h"
 #include "loop_picture.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 
 /* ---- wake-ups ---- */
 
@@ -87,22 +87,22 @@ void loop_picture_wakeups(const struct wakeups *wakeups, const char *folder,
 {
 	int lines, columns = columns_of(wakeups, &lines), block = 0;
 	double most = 1;
-	struct picture_part p;
+	struct plot_part p;
 	FILE *out, *script;
 
 	if (!columns)
 		return;
-	p = picture_part(folder, name, "wakeups");
-	out = picture_data(p.folder, p.data);
+	p = plot_part(folder, name, "wakeups");
+	out = plot_data(p.folder, p.data);
 	for (int i = 0; i < wakeups->n; i++)
 		if (wakeups->row[i].got.loop.bins) {
 			write_histogram(out, &wakeups->row[i].got.loop);
 			write_histogram(out, &wakeups->row[i].got.cyclictest);
 			most = fmax(most, (double)wakeups->row[i].got.loop.ticks);
 		}
-	picture_data_end(out, p.folder);
-	script = picture_begin(folder, p.name, columns > 1 ? 330 * columns + 60 : 640,
-			       330 * lines + 60);
+	plot_data_end(out, p.folder);
+	script = plot_begin(folder, p.name, columns > 1 ? 330 * columns + 60 : 640,
+			    330 * lines + 60);
 	fprintf(script,
 		"set multiplot layout %d,%d title \"How late the loop's thread wakes, and "
 		"cyclictest beside it%s%s, %.3g s each\" font ',13'\n"
@@ -122,7 +122,7 @@ void loop_picture_wakeups(const struct wakeups *wakeups, const char *folder,
 		block += 2;
 	}
 	fputs("unset multiplot\n", script);
-	picture_part_draw(script, &p);
+	plot_part_draw(script, &p);
 }
 
 /* ---- rates ---- */
@@ -160,12 +160,12 @@ static void draw_lines(FILE *script, const struct rates *rates, const char *x)
 
 void loop_picture_rates(const struct rates *rates, const char *folder, const char *name)
 {
-	struct picture_part p = picture_part(folder, name, "rates");
-	FILE *out = picture_data(p.folder, p.data), *script;
+	struct plot_part p = plot_part(folder, name, "rates");
+	FILE *out = plot_data(p.folder, p.data), *script;
 
 	write_rates(out, rates);
-	picture_data_end(out, p.folder);
-	script = picture_begin(folder, p.name, 1320, 620);
+	plot_data_end(out, p.folder);
+	script = plot_begin(folder, p.name, 1320, 620);
 	fprintf(script,
 		"set multiplot layout 1,2 title \"Error of the force over a cut of some 3 N, "
 		"against the exact force of a plain wall\" font ',13'\n"
@@ -183,5 +183,5 @@ void loop_picture_rates(const struct rates *rates, const char *folder, const cha
 		rates->row[0].stiffness_N_mm);
 	draw_lines(script, rates, "5");
 	fputs("  NaN\nunset multiplot\n", script);
-	picture_part_draw(script, &p);
+	plot_part_draw(script, &p);
 }

@@ -27,7 +27,7 @@ void loop_process_begin(struct loop_process *process, const char *scene)
 
 	*process = (struct loop_process){.report = memory_file_begin("report")};
 	snprintf(program, sizeof(program), "%s/incise-haptic", cli_folder());
-	process->pid = child_begin(argv, fileno(process->report.file));
+	process->pid = child_start(argv, fileno(process->report.file), -1);
 }
 
 /* A number of a file of /proc, in KiB: the sum of its lines with that word. */

@@ -8,7 +8,7 @@
 
 #include <jansson.h>
 #include <sys/types.h>
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 struct loop_process {
 	pid_t pid; /* 0: it has ended */

@@ -7,7 +7,7 @@
 #define INCISE_MADE_SCENES_H
 
 #include <stdbool.h>
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 
 #define MADE_SCENES 7
 

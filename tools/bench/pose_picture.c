@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../cli/cli.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "pose_picture.h"
 
 /* Of the two delays the shorter one is drawn: a block per motion and method. */
@@ -19,7 +19,7 @@ static bool drawn(const struct pose_row *row, const struct pose_row *first)
 static void write_data(const struct pose_table *rows, const char *folder,
 		       const char *data)
 {
-	FILE *out = picture_data(folder, data);
+	FILE *out = plot_data(folder, data);
 
 	for (int motion = 0; motion < MOTIONS; motion++)
 		for (int method = 0; method < POSE_ROWS; method++) {
@@ -39,7 +39,7 @@ static void write_data(const struct pose_table *rows, const char *folder,
 			}
 			fputs("\n\n", out);
 		}
-	picture_data_end(out, folder);
+	plot_data_end(out, folder);
 }
 
 static void begin(FILE *script, const struct pose_table *rows, const char *what,
@@ -94,7 +94,7 @@ void pose_picture_cost(const struct pose_table *rows, const char *folder,
 	if (asprintf(&data, "%s.dat", name) < 0)
 		cli_fail("no memory");
 	write_data(rows, folder, data);
-	script = picture_begin(folder, name, 1320, 860);
+	script = plot_begin(folder, name, 1320, 860);
 	begin(script, rows, "its cost", data);
 	fputs("set xlabel 'time per tick / ns (bars: 5 to 95 %)'\nset termoption noenhanced\n"
 	      "set xrange [2:400]\nset yrange [0.01:1]\n",
@@ -116,21 +116,21 @@ void pose_picture_cost(const struct pose_table *rows, const char *folder,
 	fputs("set label 1 'numbers: Hz of the tracker' at graph 0.1, 0.05\n", script);
 	draw_key(script, false);
 	free(data);
-	if (!picture_draw(script, folder, name))
+	if (!plot_draw(script, folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
 }
 
 void pose_picture_rates(const struct pose_table *rows, const char *folder,
 			const char *name)
 {
-	struct picture_part p;
+	struct plot_part p;
 	FILE *script;
 
 	if (!rows->n)
 		return;
-	p = picture_part(folder, name, "rates");
+	p = plot_part(folder, name, "rates");
 	write_data(rows, p.folder, p.data);
-	script = picture_begin(p.folder, p.name, 1320, 860);
+	script = plot_begin(p.folder, p.name, 1320, 860);
 	begin(script, rows, "the tracker's rate", p.data);
 	fputs("set xlabel 'rate of the tracker / Hz'\nset xrange [50:1200]\n"
 	      "set xtics (60, 120, 240, 500, 1000)\nset termoption noenhanced\n",
@@ -146,5 +146,5 @@ void pose_picture_rates(const struct pose_table *rows, const char *folder,
 		fputs("  NaN\n", script);
 	}
 	draw_key(script, true);
-	picture_part_draw(script, &p);
+	plot_part_draw(script, &p);
 }

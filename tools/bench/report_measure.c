@@ -14,8 +14,8 @@
 #include "../cli/child.h"
 #include "../cli/cli.h"
 #include "../cli/json.h"
-#include "../cli/memory_file.h"
-#include "../cli/picture.h"
+#include "../cli/file.h"
+#include "../cli/plot.h"
 #include "report_measure.h"
 
 #define POLL_US 50000
@@ -142,12 +142,11 @@ static int run(const struct report_measure *m, const struct report_section *s,
 	argv[n++] = "--json";
 	if (m->quick)
 		argv[n++] = "--quick";
-	if (s->pictures[0].part && picture_possible()) {
+	if (s->pictures[0].part && plot_possible()) {
 		argv[n++] = "--plot";
 		argv[n++] = picture;
 	}
-	status = wait_for(child_begin_heard((char *const *)argv, fileno(out),
-					    fileno(said)),
+	status = wait_for(child_start((char *const *)argv, fileno(out), fileno(said)),
 			  s->word, number, of);
 	fclose(out);
 	free(picture);

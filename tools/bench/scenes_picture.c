@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include "../cli/cli.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "scenes_picture.h"
 
 #define BAR 0.36 /* of the room of a scene; two of them, and a gap */
@@ -15,7 +15,7 @@
 static int write_data(const struct scene_row *rows, int n, const char *folder,
 		      const char *name)
 {
-	FILE *out = picture_data(folder, name);
+	FILE *out = plot_data(folder, name);
 	int drawn = 0;
 
 	for (int i = 0; i < n; i++) {
@@ -29,7 +29,7 @@ static int write_data(const struct scene_row *rows, int n, const char *folder,
 			few->instructions, full->time.ns.median, full->time.ns.p5,
 			full->time.ns.p95, full->instructions);
 	}
-	picture_data_end(out, folder);
+	plot_data_end(out, folder);
 	return drawn;
 }
 
@@ -71,7 +71,7 @@ void scenes_picture(const struct scene_row *rows, int n, const struct machine *m
 	for (int i = 0; i < n; i++)
 		counted |= isfinite(rows[i].saving.few.instructions);
 	height = 160 + 46 * drawn;
-	script = picture_begin(folder, name, 1150, height);
+	script = plot_begin(folder, name, 1150, height);
 	fprintf(script,
 		"data = '%s'\n"
 		"set multiplot layout 1,2 title \"A tick of each scene, against the full "
@@ -90,6 +90,6 @@ void scenes_picture(const struct scene_row *rows, int n, const struct machine *m
 	if (counted)
 		plot_bars(script, 6, 10, "");
 	fputs("unset multiplot\n", script);
-	if (!picture_draw(script, folder, name))
+	if (!plot_draw(script, folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
 }

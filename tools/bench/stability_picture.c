@@ -8,7 +8,7 @@
 #include "../../lib/control/guard.h"
 #include <incise/stability.h>
 #include "../cli/cli.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "stability_picture.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
@@ -47,11 +47,11 @@ static double limit(double delta, double beta, int delay)
 }
 
 /* Blocks: for each wall and delay the curve, then the points. */
-static void write_map(const struct ratios *exact, const struct picture_part *p,
+static void write_map(const struct ratios *exact, const struct plot_part *p,
 		      const double *walls, int n_walls, const double *delays,
 		      int n_delays)
 {
-	FILE *out = picture_data(p->folder, p->data);
+	FILE *out = plot_data(p->folder, p->data);
 
 	for (int w = 0; w < n_walls; w++)
 		for (int d = 0; d < n_delays; d++) {
@@ -72,7 +72,7 @@ static void write_map(const struct ratios *exact, const struct picture_part *p,
 			}
 			fputs("\n\n", out);
 		}
-	picture_data_end(out, p->folder);
+	plot_data_end(out, p->folder);
 }
 
 void stability_picture_map(const struct ratios *exact, const char *folder,
@@ -81,11 +81,11 @@ void stability_picture_map(const struct ratios *exact, const char *folder,
 	double walls[MAP_MAX], delays[MAP_MAX];
 	int n_walls = values_of(exact, 1, walls, MAP_MAX);
 	int n_delays = values_of(exact, 2, delays, MAP_MAX);
-	struct picture_part p = picture_part(folder, name, "map");
+	struct plot_part p = plot_part(folder, name, "map");
 	FILE *script;
 
 	write_map(exact, &p, walls, n_walls, delays, n_delays);
-	script = picture_begin(folder, p.name, 420 * n_walls + 60, 520);
+	script = plot_begin(folder, p.name, 420 * n_walls + 60, 520);
 	fprintf(script,
 		"set multiplot layout 1,%d title \"Largest stable stiffness of a sampled wall: "
 		"lines computed, points simulated in time; stable below; triangle: none is\" font ',13'\n"
@@ -109,7 +109,7 @@ void stability_picture_map(const struct ratios *exact, const char *folder,
 		fputs("  NaN\n", script);
 	}
 	fputs("unset multiplot\n", script);
-	picture_part_draw(script, &p);
+	plot_part_draw(script, &p);
 }
 
 /* ---- guard ---- */
@@ -123,10 +123,10 @@ static bool plain(const struct guard_bench *bench, int i, enum guard_setting set
 
 /* Blocks: a curve per delay with the guard on; then caps that are bounded, and those that
  * are not. */
-static int write_guard(const struct guard_bench *bench, const struct picture_part *p,
+static int write_guard(const struct guard_bench *bench, const struct plot_part *p,
 		       int *delays, int max)
 {
-	FILE *out = picture_data(p->folder, p->data);
+	FILE *out = plot_data(p->folder, p->data);
 	int n = 0;
 
 	for (int i = 0; i < bench->swept; i++) {
@@ -163,7 +163,7 @@ static int write_guard(const struct guard_bench *bench, const struct picture_par
 		}
 		fputs("\n\n", out);
 	}
-	picture_data_end(out, p->folder);
+	plot_data_end(out, p->folder);
 	return n;
 }
 
@@ -184,10 +184,10 @@ static void count(const struct guard_bench *bench, enum guard_setting setting,
 void stability_picture_guard(const struct guard_bench *bench, const char *folder,
 			     const char *name)
 {
-	struct picture_part p = picture_part(folder, name, "guard");
+	struct plot_part p = plot_part(folder, name, "guard");
 	char grow[GUARD_SETTINGS][32];
 	int delays[16], n = write_guard(bench, &p, delays, 16);
-	FILE *script = picture_begin(folder, p.name, 1320, 540);
+	FILE *script = plot_begin(folder, p.name, 1320, 540);
 
 	for (int s = 0; s < GUARD_SETTINGS; s++)
 		count(bench, s, grow[s]);
@@ -223,7 +223,7 @@ void stability_picture_guard(const struct guard_bench *bench, const char *folder
 		"'grows at some'\n"
 		"unset multiplot\n",
 		INCISE_GUARD_SHARE, n, n + 1);
-	picture_part_draw(script, &p);
+	plot_part_draw(script, &p);
 }
 
 /* ---- integrators ---- */
@@ -232,10 +232,10 @@ void stability_picture_guard(const struct guard_bench *bench, const char *folder
 
 /* Blocks: for each stiffness of the sweep and then for steps of 1 ms, one per kind. */
 static void write_integrators(const struct integrator_bench *bench,
-			      const struct picture_part *p)
+			      const struct plot_part *p)
 {
 	static const double swept[] = {1e3, 1e5};
-	FILE *out = picture_data(p->folder, p->data);
+	FILE *out = plot_data(p->folder, p->data);
 
 	for (size_t s = 0; s <= N(swept); s++)
 		for (int kind = 0; kind < INTEGRATORS; kind++) {
@@ -256,7 +256,7 @@ static void write_integrators(const struct integrator_bench *bench,
 			}
 			fputs("\n\n", out);
 		}
-	picture_data_end(out, p->folder);
+	plot_data_end(out, p->folder);
 }
 
 void stability_picture_integrators(const struct integrator_bench *bench,
@@ -274,11 +274,11 @@ void stability_picture_integrators(const struct integrator_bench *bench,
 	static const char *const titles[] = {"1 kN/m, steps from 1 ms down",
 					     "100 kN/m, from the largest step that holds",
 					     "steps of 1 ms; at the top: diverged"};
-	struct picture_part p = picture_part(folder, name, "integrators");
+	struct plot_part p = plot_part(folder, name, "integrators");
 	FILE *script;
 
 	write_integrators(bench, &p);
-	script = picture_begin(folder, p.name, 1500, 560);
+	script = plot_begin(folder, p.name, 1500, 560);
 	fprintf(script,
 		"set multiplot layout 1,3 title \"Integrators of a mass on a spring: 50 g, ratio "
 		"of damping 0.1\" font ',13'\n"
@@ -308,5 +308,5 @@ void stability_picture_integrators(const struct integrator_bench *bench,
 		fputs("  NaN\n", script);
 	}
 	fputs("unset multiplot\n", script);
-	picture_part_draw(script, &p);
+	plot_part_draw(script, &p);
 }

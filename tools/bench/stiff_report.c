@@ -8,7 +8,7 @@
 #include "../cli/cli.h"
 #include "figures.h"
 #include "../cli/json.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "stiff_sweep.h"
 
 static const char *const paths[STIFF_PATHS] = {"plan", "wall"};
@@ -113,7 +113,7 @@ static void write_data(const struct stiff_sweep *sweep, const char *folder,
 
 	if (asprintf(&data, "%s.dat", name) < 0)
 		cli_fail("no memory");
-	out = picture_data(folder, data);
+	out = plot_data(folder, data);
 	free(data);
 	for (int i = 0; i < sweep->n; i++) {
 		const struct stiff_row *r = &sweep->row[i];
@@ -126,7 +126,7 @@ static void write_data(const struct stiff_sweep *sweep, const char *folder,
 		else
 			fprintf(out, "%g NaN NaN NaN\n", r->K_N_mm * 1e3);
 	}
-	picture_data_end(out, folder);
+	plot_data_end(out, folder);
 }
 
 void stiff_sweep_draw(const struct stiff_sweep *sweep, const char *folder,
@@ -141,7 +141,7 @@ void stiff_sweep_draw(const struct stiff_sweep *sweep, const char *folder,
 	FILE *script;
 
 	write_data(sweep, folder, name);
-	script = picture_begin(folder, name, 1100, 1300);
+	script = plot_begin(folder, name, 1100, 1300);
 	fprintf(script,
 		"set multiplot layout 3,1 title \"Stiff walls: 50 g, 0.01 N s/mm, pressed by "
 		"1 N, behind a limit of 4 N; 12 s at 1 kHz\"\n"
@@ -174,6 +174,6 @@ void stiff_sweep_draw(const struct stiff_sweep *sweep, const char *folder,
 				i < 3 ? ", " : "\n");
 	}
 	fputs("unset multiplot\n", script);
-	if (!picture_draw(script, folder, name))
+	if (!plot_draw(script, folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
 }

@@ -10,7 +10,7 @@
 #include "../../lib/control/plant.h"
 #include "bench_device.h"
 #include "../cli/cli.h"
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 #include "stiff_sweep.h"
 
 /* The device of a scene that describes none. */

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include "../cli/cli.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 #include "timeline_picture.h"
 
 static const char *const styles[TIME_METHODS] = {
@@ -20,7 +20,7 @@ static void write_data(const struct timeline_table *table, const char *folder,
 		       const char *data)
 {
 	double drift_ppm = table->row[(table->n - 1)].drift_ppm;
-	FILE *out = picture_data(folder, data);
+	FILE *out = plot_data(folder, data);
 
 	for (int late = 0; late < LATE_KINDS; late++)
 		for (int method = 0; method < TIME_METHODS; method++) {
@@ -38,7 +38,7 @@ static void write_data(const struct timeline_table *table, const char *folder,
 			}
 			fputs("\n\n", out);
 		}
-	picture_data_end(out, folder);
+	plot_data_end(out, folder);
 }
 
 static void begin(FILE *script, const struct timeline_table *table, const char *what,
@@ -65,7 +65,7 @@ void timeline_picture_cost(const struct timeline_table *table, const char *folde
 	if (asprintf(&data, "%s.dat", name) < 0)
 		cli_fail("no memory");
 	write_data(table, folder, data);
-	script = picture_begin(folder, name, 1320, 620);
+	script = plot_begin(folder, name, 1320, 620);
 	begin(script, table, "their cost", data);
 	/* Room below for the key. */
 	fputs("set xlabel 'time per sample / ns (bars: 5 to 95 %)'\nset xrange [2:2000]\n"
@@ -91,21 +91,21 @@ void timeline_picture_cost(const struct timeline_table *table, const char *folde
 	}
 	fputs("unset multiplot\n", script);
 	free(data);
-	if (!picture_draw(script, folder, name))
+	if (!plot_draw(script, folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
 }
 
 void timeline_picture_windows(const struct timeline_table *table, const char *folder,
 			      const char *name)
 {
-	struct picture_part p;
+	struct plot_part p;
 	FILE *script;
 
 	if (!table->n)
 		return;
-	p = picture_part(folder, name, "windows");
+	p = plot_part(folder, name, "windows");
 	write_data(table, p.folder, p.data);
-	script = picture_begin(p.folder, p.name, 1320, 620);
+	script = plot_begin(p.folder, p.name, 1320, 620);
 	begin(script, table, "how much was seen", p.data);
 	fputs("set xlabel 'seen / s'\nset xrange [0.8:150]\n"
 	      "set xtics (1, 2, 5, 10, 30, 60, 120)\n",
@@ -129,5 +129,5 @@ void timeline_picture_windows(const struct timeline_table *table, const char *fo
 		fputs("  NaN notitle\n", script);
 	}
 	fputs("unset multiplot\n", script);
-	picture_part_draw(script, &p);
+	plot_part_draw(script, &p);
 }

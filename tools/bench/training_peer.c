@@ -11,7 +11,7 @@
 #include <jansson.h>
 #include "../cli/child.h"
 #include "../cli/cli.h"
-#include "../cli/memory_file.h"
+#include "../cli/file.h"
 #include "training_peer.h"
 
 #define WAIT_S 120
@@ -44,7 +44,7 @@ static json_t *ask(const char *python, const char *script, const char *question,
 	} else if (access(script, R_OK)) {
 		snprintf(why, size, "runs from the build tree only");
 	} else {
-		status = child_end(child_begin(argv, fileno(answer.file)), WAIT_S);
+		status = child_end(child_start(argv, fileno(answer.file), -1), WAIT_S);
 		rewind(answer.file);
 		if (WIFEXITED(status) && WEXITSTATUS(status) == NOT_THERE)
 			snprintf(why, size,

@@ -10,7 +10,7 @@
 #include "calibrate_report.h"
 #include "../cli/cli.h"
 #include "../cli/json.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 
 static const char *const states[] = {
 	[INCISE_CALIBRATE_FORCE_USED] = "used",
@@ -207,7 +207,7 @@ json_t *calibrate_force_json(const struct calibrate_force_report *report)
 static void draw(const struct calibrate_force_report *report, const char *folder)
 {
 	const struct incise_calibrate_force *r = report->result;
-	FILE *data = picture_data(folder, "pairs.dat"), *script;
+	FILE *data = plot_data(folder, "pairs.dat"), *script;
 
 	for (int i = 0; i < report->pairs->n; i++) {
 		const struct incise_calibrate_force_pair *p = &report->pairs->pair[i];
@@ -219,8 +219,8 @@ static void draw(const struct calibrate_force_report *report, const char *folder
 			: p->descending	  ? 1
 					  : 0);
 	}
-	picture_data_end(data, folder);
-	script = picture_begin(folder, "fit", 1000, 700);
+	plot_data_end(data, folder);
+	script = plot_begin(folder, "fit", 1000, 700);
 	fprintf(script,
 		"set xlabel 'force / N'\nset ylabel 'reading / mV'\nset key top left\n"
 		"plot %.10g + %.10g * x with lines ls 1 title '%.2f mV/N', \\\n"
@@ -228,15 +228,15 @@ static void draw(const struct calibrate_force_report *report, const char *folder
 		"  '' using ($4 == 1 ? $1 : 1/0):2 with points pt 11 title 'down', \\\n"
 		"  '' using ($4 == 2 ? $1 : 1/0):2 with points pt 2 title 'left out'\n",
 		r->zero_mV, r->sensitivity_mV_N, r->sensitivity_mV_N);
-	if (!picture_draw(script, folder, "fit"))
+	if (!plot_draw(script, folder, "fit"))
 		cli_fail("gnuplot could not draw %s/fit", folder);
-	script = picture_begin(folder, "residuals", 1000, 700);
+	script = plot_begin(folder, "residuals", 1000, 700);
 	fprintf(script,
 		"set xlabel 'force / N'\nset ylabel 'reading - line / mV'\nset key top left\n"
 		"plot 0 with lines ls 1 notitle, \\\n"
 		"  'pairs.dat' using ($4 == 0 ? $1 : 1/0):3 with points pt 9 title 'up', \\\n"
 		"  '' using ($4 == 1 ? $1 : 1/0):3 with points pt 11 title 'down'\n");
-	if (!picture_draw(script, folder, "residuals"))
+	if (!plot_draw(script, folder, "residuals"))
 		cli_fail("gnuplot could not draw %s/residuals", folder);
 }
 
@@ -250,8 +250,8 @@ void calibrate_force_write(const struct calibrate_force_report *report,
 	FILE *out;
 
 	snprintf(fit, sizeof(fit), "%s/fit", folder);
-	if (picture_possible()) {
-		picture_place("report", fit, &where, &name);
+	if (plot_possible()) {
+		plot_place("report", fit, &where, &name);
 		if (!report->refused)
 			draw(report, folder);
 	} else {

@@ -9,7 +9,7 @@
 #include <string.h>
 #include "calibrate_pairs.h"
 #include "../cli/cli.h"
-#include "../cli/whole_file.h"
+#include "../cli/file.h"
 
 #define COLUMNS_MAX 32
 

@@ -7,7 +7,7 @@
 
 #include <stdio.h>
 #include <jansson.h>
-#include "../cli/whole_file.h"
+#include "../cli/file.h"
 
 /* DIR/report.txt, for whole_file_end(); both NULL without a DIR. Fails the program. */
 FILE *calibrate_report_text(const char *folder, struct incise_outfile **file);

@@ -8,7 +8,7 @@
 #include "calibrate_stepper.h"
 #include "../cli/cli.h"
 #include "../cli/json.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 
 #define LISTED 20 /* outliers, at most */
 
@@ -191,8 +191,8 @@ void stepper_report_folder(const struct stepper_report *report, const char *fold
 
 	if (asprintf(&path, "%s/fit", folder) < 0)
 		cli_fail("no memory");
-	picture_place("report", path, &place, &name);
-	data = picture_data(place, "points.dat");
+	plot_place("report", path, &place, &name);
+	data = plot_data(place, "points.dat");
 	for (int i = 0; i < series->n; i++) {
 		const struct incise_calibrate_stepper_point *p = &series->points[i];
 		double line;
@@ -204,22 +204,22 @@ void stepper_report_folder(const struct stepper_report *report, const char *fold
 		fprintf(data, "%.6f %.6f %.6f %d %d\n", p->position_mm, p->force_N,
 			p->force_N - line, up, (int)series->states[i]);
 	}
-	picture_data_end(data, place);
-	script = picture_begin(place, "fit", 1000, 700);
+	plot_data_end(data, place);
+	script = plot_begin(place, "fit", 1000, 700);
 	fprintf(script,
 		"set xlabel 'position / mm'\nset ylabel 'force / N'\nset key top left\n"
 		"plot 'points.dat' using 1:($4==1?$2:1/0) with points pt 8 title 'up', \\\n"
 		"  '' using 1:($4==0?$2:1/0) with points pt 10 title 'down', \\\n"
 		"  %.9g+%.9g*x title 'line up', %.9g+%.9g*x title 'line down'\n",
 		fit->up_N, fit->N_mm, fit->down_N, fit->N_mm);
-	if (!picture_draw(script, place, "fit"))
+	if (!plot_draw(script, place, "fit"))
 		cli_fail("gnuplot could not draw %s/fit", place);
-	script = picture_begin(place, "residuals", 1000, 700);
+	script = plot_begin(place, "residuals", 1000, 700);
 	fprintf(script, "set xlabel 'position / mm'\nset ylabel 'off the line / N'\n"
 			"plot 'points.dat' using 1:($5==0?$3:1/0) title 'used', \\\n"
 			"  '' using 1:($5==1?$3:1/0) title 'behind turns', \\\n"
 			"  '' using 1:($5>1?$3:1/0) pt 7 title 'left out'\n");
-	if (!picture_draw(script, place, "residuals"))
+	if (!plot_draw(script, place, "residuals"))
 		cli_fail("gnuplot could not draw %s/residuals", place);
 	stepper_report_text(report, calibrate_report_text(place, &file));
 	whole_file_end(file);

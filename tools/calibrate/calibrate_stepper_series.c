@@ -11,7 +11,7 @@
 #include <string.h>
 #include "calibrate_stepper.h"
 #include "../cli/cli.h"
-#include "../cli/whole_file.h"
+#include "../cli/file.h"
 
 #define COLUMNS 32
 #define POINTS_MAX 1000000

@@ -11,7 +11,7 @@
 #include <incise/dataset.h>
 #include "../cli/cli.h"
 #include "depth_data.h"
-#include "../cli/whole_file.h"
+#include "../cli/file.h"
 
 #define PICTURES 8
 

@@ -11,7 +11,7 @@
 #include <incise/recording.h>
 #include "../cli/cli.h"
 #include "depth_data.h"
-#include "../cli/whole_file.h"
+#include "../cli/file.h"
 
 #define AIR_MM 0.5 /* so far off the surface there is no doubt which side it is */
 #define VISION_PX 0.03

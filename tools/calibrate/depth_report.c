@@ -9,7 +9,7 @@
 #include "../cli/cli.h"
 #include "depth_report.h"
 #include "../cli/json.h"
-#include "../cli/picture.h"
+#include "../cli/plot.h"
 
 #define OUTLIERS_SHOWN 20
 
@@ -298,15 +298,15 @@ static void board_data(const struct depth_result *r, FILE *data)
 
 static void draw(const struct depth_result *r, const char *folder)
 {
-	FILE *script, *data = picture_data(folder, "depth.dat");
+	FILE *script, *data = plot_data(folder, "depth.dat");
 	bool line = !strcmp(r->way, "line");
 
 	if (r->fit)
 		lengths_data(r, data);
 	else
 		board_data(r, data);
-	picture_data_end(data, folder);
-	script = picture_begin(folder, "fit", 900, 600);
+	plot_data_end(data, folder);
+	script = plot_begin(folder, "fit", 900, 600);
 	if (line)
 		fprintf(script,
 			"set xlabel 'exposed length / px'\nset ylabel 'depth / mm'\n"
@@ -329,9 +329,9 @@ static void draw(const struct depth_result *r, const char *folder)
 			"set xlabel 'x / px'\nset ylabel 'y / px'\nset yrange [*:*] reverse\n"
 			"set size ratio -1\n"
 			"plot 'depth.dat' using 1:2 pt 1 lc rgb '#1b6ca8'\n");
-	if (!picture_draw(script, folder, "fit"))
+	if (!plot_draw(script, folder, "fit"))
 		cli_fail("gnuplot could not draw %s/fit", folder);
-	script = picture_begin(folder, "residuals", 900, 600);
+	script = plot_begin(folder, "residuals", 900, 600);
 	if (r->fit)
 		fprintf(script,
 			"set xlabel '%s'\nset ylabel 'residual / mm'\n"
@@ -345,7 +345,7 @@ static void draw(const struct depth_result *r, const char *folder)
 			"set size ratio -1\n"
 			"plot 'depth.dat' using 3:4:($5 * 100):($6 * 100) with vectors lc rgb "
 			"'#1b6ca8'\n");
-	if (!picture_draw(script, folder, "residuals"))
+	if (!plot_draw(script, folder, "residuals"))
 		cli_fail("gnuplot could not draw %s/residuals", folder);
 }
 
@@ -359,7 +359,7 @@ void depth_report_folder(const struct depth_result *r, const char *dir)
 
 	if (asprintf(&path, "%s/fit", dir) < 0)
 		cli_fail("no memory");
-	picture_place("report", path, &folder, &name);
+	plot_place("report", path, &folder, &name);
 	out = calibrate_report_text(folder, &file);
 	depth_report_text(r, out);
 	whole_file_end(file);

@@ -75,7 +75,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "calibrate depth",
 	.synopsis = "two-point | line | board [OPTIONS]",
 	.summary =
@@ -197,7 +197,7 @@ void depth_wish_take(struct depth_wish *wish, int argc, char **argv)
 		.u_square = U_SQUARE,
 		.u_plane_mm = U_PLANE_MM,
 	};
-	while ((id = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((id = cli_next(&command, argc, argv)) != CLI_END)
 		take_option(wish, id);
 	if (optind == argc)
 		cli_usage("how? two-point, line or board");

@@ -12,7 +12,7 @@
 #include <incise/recording.h>
 #include "../cli/cli.h"
 #include "tip_poses.h"
-#include "../cli/whole_file.h"
+#include "../cli/file.h"
 
 #define COLUMNS 8
 #define CSV_MAX 32 /* columns that a file may have */

@@ -36,7 +36,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "capture",
 	.synopsis = "-o NAME.rec [--rig RIG] [OPTIONS]",
 	.summary =
@@ -75,7 +75,7 @@ void capture_wish_take(struct capture_wish *wish, int argc, char **argv)
 	size_t length;
 	int id;
 
-	while ((id = cli_next(&verb, argc, argv)) != CLI_END) {
+	while ((id = cli_next(&command, argc, argv)) != CLI_END) {
 		switch (id) {
 		case 'o':
 			wish->output = optarg;

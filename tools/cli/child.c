@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Another program beside a measurement; see child.h.
+ * A program that runs next to this one; see child.h.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -15,7 +15,7 @@
 #include "cli.h"
 
 #define POLL_US 10000
-#define ASKED_S 3 /* to end by itself once asked */
+#define TERM_S 3 /* between SIGTERM and SIGKILL */
 
 bool child_possible(const char *program)
 {
@@ -25,10 +25,10 @@ bool child_possible(const char *program)
 	return !system(command);
 }
 
-/* Let a descriptor of the child be one of ours, or lead nowhere. */
-static bool lead(int from, int to)
+/* Make descriptor @from of the child one of ours; @to -1: /dev/null. */
+static bool redirect(int from, int to)
 {
-	/* Where @from is closed the new one is it, and is to stay. */
+	/* If @from is closed, the new descriptor is @from and must stay open. */
 	if (to < 0)
 		to = open("/dev/null", (from ? O_WRONLY : O_RDONLY) | O_CLOEXEC);
 	if (to == from)
@@ -36,41 +36,38 @@ static bool lead(int from, int to)
 	return to >= 0 && dup2(to, from) == from;
 }
 
-pid_t child_begin(char *const argv[], int out)
-{
-	return child_begin_heard(argv, out, -1);
-}
-
 struct start {
 	char *const *argv;
 	int out, err;
 	pid_t parent;
-	volatile int why; /* it could not be; 0: it is */
+	volatile int code; /* errno of a start that failed; 0: it runs */
 };
 
-static _Noreturn void become(struct start *start)
+static _Noreturn void exec_child(struct start *start)
 {
 	if (!prctl(PR_SET_PDEATHSIG, SIGTERM) && getppid() == start->parent &&
-	    !setpgid(0, 0) && lead(0, -1) && lead(1, start->out) && lead(2, start->err))
+	    !setpgid(0, 0) && redirect(0, -1) && redirect(1, start->out) &&
+	    redirect(2, start->err))
 		execvp(start->argv[0], start->argv);
-	start->why = errno;
+	start->code = errno;
 	_exit(127);
 }
 
-pid_t child_begin_heard(char *const argv[], int out, int err)
+pid_t child_start(char *const argv[], int out, int err)
 {
 	struct start start = {argv, out, err, getpid(), 0};
-	/* posix_spawn(3) cannot make it end with us. */
+	/* posix_spawn(3) has no PR_SET_PDEATHSIG. */
 	pid_t pid = vfork();
 
 	if (!pid)
-		become(&start);
+		exec_child(&start);
 	if (pid < 0)
-		start.why = errno;
-	else if (start.why)
+		start.code = errno;
+	else if (start.code)
 		waitpid(pid, NULL, 0);
-	if (start.why)
-		cli_fail("%s: cannot be started: %s", start.argv[0], strerror(start.why));
+	if (start.code)
+		cli_fail("%s: cannot be started: %s", start.argv[0],
+			 strerror(start.code));
 	return pid;
 }
 
@@ -89,7 +86,7 @@ int child_end(pid_t pid, double wait_s)
 		usleep(POLL_US);
 	}
 	kill(-pid, SIGTERM);
-	for (double s = 0; s < ASKED_S; s += POLL_US * 1e-6) {
+	for (double s = 0; s < TERM_S; s += POLL_US * 1e-6) {
 		if (child_ended(pid, &status))
 			return status;
 		usleep(POLL_US);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The habits that all verbs share; see cli.h.
+ * The conventions of all commands; see cli.h.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -21,17 +21,17 @@
 
 #define OPTIONS_MAX 40
 
-static const struct cli_verb *current;
+static const struct cli_command *current;
 static bool status_line, verbose;
 static int status_above; /* lines above its last one */
 
 volatile sig_atomic_t cli_stop;
 
-static void print_help(const struct cli_verb *verb)
+static void print_help(const struct cli_command *command)
 {
-	printf("Usage: incise %s %s\n\n%s\n\nOptions:\n", verb->name, verb->synopsis,
-	       verb->summary);
-	for (const struct cli_option *opt = verb->options; opt->name; opt++) {
+	printf("Usage: incise %s %s\n\n%s\n\nOptions:\n", command->name,
+	       command->synopsis, command->summary);
+	for (const struct cli_option *opt = command->options; opt->name; opt++) {
 		char left[64];
 		const char *help = opt->help;
 
@@ -49,14 +49,13 @@ static void print_help(const struct cli_verb *verb)
 	}
 	printf("  -h, --help                  show this\n"
 	       "  -V, --version               show the version\n");
-	if (verb->notes)
-		printf("\n%s\n", verb->notes);
+	if (command->notes)
+		printf("\n%s\n", command->notes);
 }
 
 /*
- * Where a standard stream was closed, the next file that is opened would take its place: a
- * device, that then gets what is printed. One that cannot be written to takes it instead, so
- * that what is printed is an error.
+ * If a standard stream is closed, the next open(2) takes its number, and a device would get
+ * the program's output. A file that cannot be written to takes the number first.
  */
 static void fill_streams(void)
 {
@@ -69,7 +68,7 @@ static void fill_streams(void)
 		close(fd);
 }
 
-int cli_next(const struct cli_verb *verb, int argc, char **argv)
+int cli_next(const struct cli_command *command, int argc, char **argv)
 {
 	struct option longs[OPTIONS_MAX + 3] = {0};
 	char shorts[3 * OPTIONS_MAX + 8] = ":hV";
@@ -79,8 +78,8 @@ int cli_next(const struct cli_verb *verb, int argc, char **argv)
 
 	if (!current)
 		fill_streams();
-	current = verb;
-	for (const struct cli_option *opt = verb->options; opt->name; opt++) {
+	current = command;
+	for (const struct cli_option *opt = command->options; opt->name; opt++) {
 		if (n == OPTIONS_MAX)
 			abort();
 		longs[n++] = (struct option){opt->name,
@@ -98,7 +97,7 @@ int cli_next(const struct cli_verb *verb, int argc, char **argv)
 	id = getopt_long(argc, argv, shorts, longs, NULL);
 	switch (id) {
 	case 'h':
-		print_help(verb);
+		print_help(command);
 		cli_finish();
 		exit(0);
 	case 'V':
@@ -117,7 +116,7 @@ int cli_next(const struct cli_verb *verb, int argc, char **argv)
 	return id;
 }
 
-/* Whether stderr is the journal, which the manager has told so. */
+/* Whether stderr is the journal, by the service manager's variable. */
 static bool to_journal(void)
 {
 	const char *stream = getenv("JOURNAL_STREAM");
@@ -136,7 +135,7 @@ static void say(int level, const char *kind, const char *fmt, va_list args)
 
 	cli_progress_end();
 	vsnprintf(text, sizeof(text), fmt, args);
-	/* A name from outside must not break the line or steer the terminal. */
+	/* Text from outside must not break the line or control the terminal. */
 	for (char *c = text; *c; c++)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '?';
@@ -224,7 +223,7 @@ long cli_integer(const char *option, const char *text, long min, long max)
 	return value;
 }
 
-/* A number and maybe a unit, nothing else; NAN is as good as no number. */
+/* A number, or a number and a unit. */
 static bool in_units(const char *text, const struct cli_unit *units, double *value)
 {
 	char *end;
@@ -277,7 +276,7 @@ void cli_negative_numbers(int argc, char **argv)
 
 		if (arg[0] != '-' || !(arg[1] == '.' || (arg[1] >= '0' && arg[1] <= '9')))
 			continue;
-		/* A space keeps getopt away, and is nothing to strtod. */
+		/* getopt takes it for an operand, and strtod skips the space. */
 		if (asprintf(&spaced, " %s", arg) < 0)
 			abort();
 		argv[i] = spaced;
@@ -322,7 +321,7 @@ const char *cli_folder(void)
 	return dirname(path);
 }
 
-/* The terminal has come to be another's, who may have written to it. */
+/* Another program has the terminal, and may have written to it. */
 static bool in_background(void)
 {
 	pid_t front = tcgetpgrp(STDERR_FILENO);
@@ -358,7 +357,7 @@ void cli_progress(const char *fmt, ...)
 		rows = window.ws_row ? window.ws_row : rows;
 	}
 	cli_progress_end();
-	/* A line that wraps, or has left at the top, could not be found again. */
+	/* A line that wraps, or scrolled off the top, could not be overwritten. */
 	for (;; line = end + 1) {
 		size_t length = strcspn(line, "\n");
 
@@ -395,7 +394,7 @@ void cli_catch_signals(void)
 
 	sigaction(SIGINT, &action, NULL);
 	sigaction(SIGTERM, &action, NULL);
-	/* A terminal that closes sends two: the kernel's, and the shell's to its jobs. */
+	/* When a terminal closes, the kernel and the shell each send one. */
 	action.sa_flags = 0;
 	sigaction(SIGHUP, &action, NULL);
 }
@@ -408,7 +407,7 @@ void cli_finish(void)
 		return;
 	if (errno == EPIPE)
 		exit(1);
-	/* An earlier write has failed, and its errno is gone. */
+	/* The failed write was an earlier one. */
 	if (!errno)
 		cli_fail("standard output: writing failed; is the disk full?");
 	cli_fail("standard output: %s", strerror(errno));

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The habits that all verbs share: options and --help from one table, numbers with units,
+ * The conventions of all commands: options and --help from one table, numbers with units,
  * one line per error, progress on a terminal, signals that end a run cleanly.
  *
- * Exit codes: 0 success, 1 failure, 2 bad usage. Where stderr is the journal of systemd its
- * lines have a level, as in sd-daemon(3).
+ * Exit codes: 0 success, 1 failure, 2 bad usage. If stderr is the journal of systemd, lines
+ * begin with a level as of sd-daemon(3).
  */
 #ifndef INCISE_CLI_H
 #define INCISE_CLI_H
@@ -25,7 +25,7 @@ struct cli_option {
 #define CLI_LONG 256 /* first id of options without a letter */
 #define CLI_END (-1)
 
-struct cli_verb {
+struct cli_command {
 	const char *name;     /* "train" */
 	const char *synopsis; /* "DATA.csv -o MODEL.fis" */
 	const char *summary;  /* one sentence for --help */
@@ -37,21 +37,21 @@ struct cli_verb {
  * Next option's id, or CLI_END with optind at the first operand. Handles --help and
  * --version itself; a wrong option ends the program with 2.
  */
-int cli_next(const struct cli_verb *verb, int argc, char **argv);
+int cli_next(const struct cli_command *command, int argc, char **argv);
 
-/* Fail with one line "incise VERB: …": exit 1. */
+/* Fail with one line "incise COMMAND: …": exit 1. */
 _Noreturn void cli_fail(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
-/* Fail with the line of an error: exit 1. */
+/* Fail with the text of an error: exit 1. */
 _Noreturn void cli_fail_with(const struct incise_error *err);
 
 /* Bad usage: one line and a hint to --help; exit 2. */
 _Noreturn void cli_usage(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
-/* A line "incise VERB: warning: …" on stderr. */
+/* A line "incise COMMAND: warning: …" on stderr. */
 void cli_warn(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
-/* A line "incise VERB: …" on stderr that is no warning; nothing before cli_be_verbose(). */
+/* A line "incise COMMAND: …" on stderr, printed only after cli_be_verbose(). */
 void cli_note(const char *fmt, ...) INCISE_PRINTF(1, 2);
 void cli_be_verbose(void);
 
@@ -63,8 +63,8 @@ long cli_integer(const char *option, const char *text, long min, long max);
 double cli_duration(const char *option, const char *text, double min, double max);
 
 /*
- * A quantity such as "10", "10mm", "-500um", in the first of these units; what names it in
- * the message, "--for" say. Units end with {0}.
+ * A quantity such as "10", "10mm", "-500um", in the first of these units, which end with {0};
+ * @what: its name in messages, for example "--for".
  */
 struct cli_unit {
 	const char *name;
@@ -73,31 +73,28 @@ struct cli_unit {
 double cli_quantity(const char *what, const char *text, const struct cli_unit *units,
 		    double min, double max);
 
-/* Have "-5" read as a number and not as options; for verbs whose operands are numbers. */
+/* Read "-5" as a number, not as options: for commands whose operands are numbers. */
 void cli_negative_numbers(int argc, char **argv);
 
 /* "a,b,c" to at most max strings; the text is cut in place. Returns how many. */
 int cli_list(const char *option, char *text, char **items, int max);
 
-/* The rig to use: the one given, else ./rig.conf, else /etc/incise/rig.conf, else fail. */
+/* The rig to use: @given, else ./rig.conf, else /etc/incise/rig.conf, else fail. */
 const char *cli_rig(const char *given);
 
-/* The folder that this program is in, where its siblings are; lives as long as it. */
+/* The folder of this program, and of the other commands; lives as long as the program. */
 const char *cli_folder(void);
 
-/* Overwrite the status line, or lines, on stderr; nothing when that is not a terminal. */
+/* Replace the status lines on stderr; does nothing if that is not a terminal. */
 void cli_progress(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
 /* Remove them. */
 void cli_progress_end(void);
 
-/* Leave them: others have written below them. */
+/* Keep them on the screen: others have written below them. */
 void cli_progress_forget(void);
 
-/*
- * SIGINT, SIGTERM and SIGHUP set cli_stop instead of killing; a second one kills, but for
- * SIGHUP.
- */
+/* SIGINT, SIGTERM and SIGHUP set cli_stop. A second SIGINT or SIGTERM kills. */
 void cli_catch_signals(void);
 extern volatile sig_atomic_t cli_stop;
 

@@ -3,17 +3,17 @@
  * A replay as a picture; see replay_picture.h.
  */
 #include "cli.h"
-#include "picture.h"
+#include "plot.h"
 #include "replay_picture.h"
 
 void replay_picture_begin(struct replay_picture *picture, const char *path)
 {
 	*picture = (struct replay_picture){.drawn = -1};
-	picture_place("plot", path, &picture->folder, &picture->name);
+	plot_place("plot", path, &picture->folder, &picture->name);
 	if (snprintf(picture->file, sizeof(picture->file), "%s.dat", picture->name) >=
 	    (int)sizeof(picture->file))
 		cli_usage("--plot: '%s' is too long a name", picture->name);
-	picture->data = picture_data(picture->folder, picture->file);
+	picture->data = plot_data(picture->folder, picture->file);
 }
 
 void replay_picture_add(struct replay_picture *picture,
@@ -33,8 +33,8 @@ void replay_picture_draw(struct replay_picture *picture)
 {
 	FILE *script;
 
-	picture_data_end(picture->data, picture->folder);
-	script = picture_begin(picture->folder, picture->name, 1200, 800);
+	plot_data_end(picture->data, picture->folder);
+	script = plot_begin(picture->folder, picture->name, 1200, 800);
 	fprintf(script,
 		"set multiplot layout 2,1\n"
 		"set xlabel 'time / s'\nset key top right\nset ylabel 'force / N'\n"
@@ -45,6 +45,6 @@ void replay_picture_draw(struct replay_picture *picture)
 		"  '' using 1:5 with lines ls 1 title 'in the loop'\n"
 		"unset multiplot\n",
 		picture->file, picture->file);
-	if (!picture_draw(script, picture->folder, picture->name))
+	if (!plot_draw(script, picture->folder, picture->name))
 		cli_fail("gnuplot could not draw %s/%s", picture->folder, picture->name);
 }

@@ -10,12 +10,12 @@
 #include "../cli/cli.h"
 #include "demo.h"
 #include "../cli/json.h"
-#include "../cli/model_picture.h"
-#include "../cli/picture.h"
+#include "../cli/model_plot.h"
+#include "../cli/plot.h"
 
 static void draw(const struct demo *demo, FILE *script, const char *name)
 {
-	if (!picture_draw(script, demo->folder, name))
+	if (!plot_draw(script, demo->folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", demo->folder, name);
 	json_array_append_new(demo->pictures, json_string(name));
 }
@@ -48,7 +48,7 @@ static void figure_force(const struct demo *demo)
 	static double sum[N_NOMINAL][SLOTS];
 	static int count[N_NOMINAL][SLOTS];
 	size_t rows = incise_dataset_rows(raw), first = 0;
-	FILE *data = picture_data(demo->folder, "force-raw.dat");
+	FILE *data = plot_data(demo->folder, "force-raw.dat");
 	FILE *script;
 
 	/* A block per cut, its nominal depth as the last column. */
@@ -76,8 +76,8 @@ static void figure_force(const struct demo *demo)
 		fputs("\n\n", data);
 		first = i + 1;
 	}
-	picture_data_end(data, demo->folder);
-	data = picture_data(demo->folder, "force-averaged.dat");
+	plot_data_end(data, demo->folder);
+	data = plot_data(demo->folder, "force-averaged.dat");
 	for (int d = 0; d < N_NOMINAL; d++) {
 		for (int s = 0; s < SLOTS; s++)
 			if (count[d][s])
@@ -85,8 +85,8 @@ static void figure_force(const struct demo *demo)
 					sum[d][s] / count[d][s]);
 		fputs("\n\n", data);
 	}
-	picture_data_end(data, demo->folder);
-	script = picture_begin(demo->folder, "fig2-force", 1200, 800);
+	plot_data_end(data, demo->folder);
+	script = plot_begin(demo->folder, "fig2-force", 1200, 800);
 	fputs("set multiplot layout 2,1 title 'Cutting force, virtual liver (as paper 1, fig. 2)'\n"
 	      "set xlabel 'time in the recording / s'\nset ylabel 'force / N'\n"
 	      "set title '(a) raw: cuts at 5, 10, 15 and 20 mm'\n"
@@ -113,18 +113,18 @@ static void figure_membership(const struct demo *demo, const struct incise_model
 	struct incise_model *before = demo_model(demo, "liver-initial.fis");
 	FILE *script;
 
-	model_picture_functions(before, demo->folder, "membership-before.dat");
-	model_picture_functions(model, demo->folder, "membership-after.dat");
-	script = picture_begin(demo->folder, "fig3a-membership", 1200, 700);
+	model_plot_write_functions(before, demo->folder, "membership-before.dat");
+	model_plot_write_functions(model, demo->folder, "membership-after.dat");
+	script = plot_begin(demo->folder, "fig3a-membership", 1200, 700);
 	fputs("set multiplot layout 2,2 title 'Membership functions before and after training "
 	      "(as paper 1, fig. 3a)'\nset key outside right center\n",
 	      script);
 	for (int i = 0; i < 2; i++)
-		model_picture_plot_functions(script, before, i, "membership-before.dat",
-					     "before training", names[i]);
+		model_plot_functions(script, before, i, "membership-before.dat",
+				     "before training", names[i]);
 	for (int i = 0; i < 2; i++)
-		model_picture_plot_functions(script, model, i, "membership-after.dat",
-					     "after training", names[i]);
+		model_plot_functions(script, model, i, "membership-after.dat",
+				     "after training", names[i]);
 	fputs("unset multiplot\n", script);
 	draw(demo, script, "fig3a-membership");
 	incise_model_free(before);
@@ -134,9 +134,9 @@ static void figure_surface(const struct demo *demo, const struct incise_model *m
 {
 	FILE *script;
 
-	model_picture_surface(model, demo->folder, "surface.dat");
-	script = picture_begin(demo->folder, "fig3b-surface", 1000, 800);
-	model_picture_plot_surface(
+	model_plot_write_surface(model, demo->folder, "surface.dat");
+	script = plot_begin(demo->folder, "fig3b-surface", 1000, 800);
+	model_plot_surface(
 		script, model, "surface.dat",
 		"Force of the trained model (as paper 1, fig. 3b); dots: the averaged pairs",
 		", \\\n  'pairs.dat' with points pt 7 ps 0.6 lc rgb 'black'");
@@ -147,14 +147,14 @@ static void write_pairs(const struct demo *demo)
 {
 	static const char *const columns[] = {"depth_mm", "velocity_mm_s", "force_N"};
 	struct incise_dataset *pairs = demo_dataset(demo, "pairs.csv", columns, 3, NULL);
-	FILE *data = picture_data(demo->folder, "pairs.dat");
+	FILE *data = plot_data(demo->folder, "pairs.dat");
 
 	for (size_t i = 0; i < incise_dataset_rows(pairs); i++) {
 		const double *row = incise_dataset_row(pairs, i);
 
 		fprintf(data, "%g %g %g\n", row[0], row[1], row[2]);
 	}
-	picture_data_end(data, demo->folder);
+	plot_data_end(data, demo->folder);
 	incise_dataset_free(pairs);
 }
 
@@ -168,7 +168,7 @@ static double figure_prediction(const struct demo *demo, const struct incise_mod
 		demo_dataset(demo, "new-cut.csv", raw_columns, 4, "cut");
 	struct incise_dataset *log = demo_dataset(demo, "haptic.csv", ticks, 4, NULL);
 	size_t n = incise_dataset_rows(cut);
-	FILE *data = picture_data(demo->folder, "prediction.dat");
+	FILE *data = plot_data(demo->folder, "prediction.dat");
 	double sum = 0, contact = -1;
 	FILE *script;
 
@@ -180,9 +180,9 @@ static double figure_prediction(const struct demo *demo, const struct incise_mod
 		fprintf(data, "%.4f %.5f %.5f\n", row[0] - incise_dataset_row(cut, 0)[0],
 			row[3], y);
 	}
-	picture_data_end(data, demo->folder);
+	plot_data_end(data, demo->folder);
 	/* Both begin where the blade meets the tissue. */
-	data = picture_data(demo->folder, "rendered.dat");
+	data = plot_data(demo->folder, "rendered.dat");
 	for (size_t i = 0; i < incise_dataset_rows(log); i++) {
 		const double *row = incise_dataset_row(log, i);
 
@@ -195,8 +195,8 @@ static double figure_prediction(const struct demo *demo, const struct incise_mod
 	}
 	if (contact < 0)
 		fputs("0 0 0\n", data);
-	picture_data_end(data, demo->folder);
-	script = picture_begin(demo->folder, "fig5-prediction", 1200, 800);
+	plot_data_end(data, demo->folder);
+	script = plot_begin(demo->folder, "fig5-prediction", 1200, 800);
 	fputs("set multiplot layout 2,1 title 'A new cut at 5 mm (as paper 1, fig. 5)'\n"
 	      "set xlabel 'time in the cut / s'\nset ylabel 'force / N'\nset key top right\n"
 	      "set xrange [0:*]\nset yrange [0:*]\n"
@@ -221,7 +221,7 @@ static void figure_lateness(const struct demo *demo, const json_t *haptic)
 	const json_t *histogram = json_object_get(lateness, "histogram");
 	char *median = demo_quantile_us(haptic, "lateness_us", "median", 1);
 	char *p999 = demo_quantile_us(haptic, "lateness_us", "p999", 1);
-	FILE *data = picture_data(demo->folder, "lateness.dat");
+	FILE *data = plot_data(demo->folder, "lateness.dat");
 	size_t i;
 	json_t *bin;
 	FILE *script;
@@ -229,8 +229,8 @@ static void figure_lateness(const struct demo *demo, const json_t *haptic)
 	json_array_foreach(histogram, i, bin)
 		fprintf(data, "%g %g\n", json_number_value(json_array_get(bin, 0)) + 0.5,
 			json_number_value(json_array_get(bin, 1)));
-	picture_data_end(data, demo->folder);
-	script = picture_begin(demo->folder, "tick-lateness", 1000, 500);
+	plot_data_end(data, demo->folder);
+	script = plot_begin(demo->folder, "tick-lateness", 1000, 500);
 	fprintf(script,
 		"set title 'Lateness of %g ticks at 1 kHz (this machine, %s): median %s, "
 		"99.9 %% %s, largest %.0f us'\n"
@@ -265,12 +265,12 @@ static void figure_camera(const struct demo *demo)
 					6 * INCISE_NS_PER_S);
 	if (incise_camera_newest(incise_rig_camera(rig), &frame) != 1)
 		cli_fail("the virtual camera gave no picture");
-	data = picture_data(demo->folder, "camera.rgb");
+	data = plot_data(demo->folder, "camera.rgb");
 	for (int y = 0; y < frame.height; y++)
 		fwrite(frame.data + (size_t)y * frame.stride, 3, frame.width, data);
-	picture_data_end(data, demo->folder);
-	script = picture_begin(demo->folder, "camera", frame.width + 160,
-			       frame.height + 120);
+	plot_data_end(data, demo->folder);
+	script =
+		plot_begin(demo->folder, "camera", frame.width + 160, frame.height + 120);
 	fprintf(script,
 		"set title 'Virtual camera: %g mm/px, scalpel 10 mm deep'\nset size ratio -1\n"
 		"unset grid\nset xrange [0:%d]\nset yrange [%d:0]\nset xlabel 'px'\n"

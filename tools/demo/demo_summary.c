@@ -11,7 +11,7 @@
 #include "../cli/cli.h"
 #include "demo.h"
 #include "../cli/json.h"
-#include "../cli/whole_file.h"
+#include "../cli/file.h"
 
 /* What the paper reports after 80 epochs, §4.3. Its data are not published. */
 #define PAPER_MSE_TRAIN 0.036

@@ -53,7 +53,7 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_verb verb = {
+static const struct cli_command command = {
 	.name = "train",
 	.synopsis = "DATA.csv -o MODEL.fis [OPTIONS]",
 	.summary = "Learn a Takagi-Sugeno force model from data (ANFIS).",
@@ -96,7 +96,7 @@ void train_wish_take(struct train_wish *wish, int argc, char **argv)
 		.output = "force_N",
 	};
 	incise_train_options_init(&wish->train);
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
 		switch (opt) {
 		case 'o':
 			wish->model = optarg;

@@ -13,7 +13,7 @@
 #include <incise/view.h>
 #include "../cli/scene_argument.h"
 #include "view_hand.h"
-#include "view_live.h"
+#include "live.h"
 #include "view_output.h"
 
 struct view_job {

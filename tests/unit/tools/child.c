@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * tools/cli/child.c: what is started ends with who started it.
+ * tools/cli/child.c: a child ends with the program that started it.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,7 +17,7 @@ static char *const sleeps[] = {"sleep", "1000", NULL};
 
 static void test_ends_when_asked(void **state)
 {
-	pid_t pid = child_begin(sleeps, -1);
+	pid_t pid = child_start(sleeps, -1, -1);
 	int status;
 
 	assert_int_equal(getpgid(pid), pid);
@@ -26,17 +26,17 @@ static void test_ends_when_asked(void **state)
 	assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM);
 }
 
-static void test_ends_with_who_is_killed(void **state)
+static void test_ends_with_its_killed_parent(void **state)
 {
 	int to[2], status;
 	pid_t parent, pid;
 
-	/* What the killed one leaves is ours. */
+	/* The child of the killed parent becomes ours. */
 	assert_int_equal(prctl(PR_SET_CHILD_SUBREAPER, 1), 0);
 	assert_int_equal(pipe(to), 0);
 	parent = fork();
 	if (!parent) {
-		pid = child_begin(sleeps, -1);
+		pid = child_start(sleeps, -1, -1);
 		if (write(to[1], &pid, sizeof(pid)) != sizeof(pid))
 			_exit(1);
 		pause();
@@ -51,7 +51,7 @@ static void test_ends_with_who_is_killed(void **state)
 	close(to[1]);
 }
 
-static void test_writes_where_it_is_told(void **state)
+static void test_output_goes_to_its_descriptor(void **state)
 {
 	char *const says[] = {"sh", "-c", "cat; echo out; echo err >&2", NULL};
 	char text[20] = "";
@@ -59,7 +59,7 @@ static void test_writes_where_it_is_told(void **state)
 	pid_t pid;
 
 	assert_int_equal(pipe(to), 0);
-	pid = child_begin_heard(says, to[1], -1);
+	pid = child_start(says, to[1], -1);
 	status = child_end(pid, 10);
 	close(to[1]);
 	assert_int_equal(status, 0);
@@ -72,8 +72,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_ends_when_asked),
-		cmocka_unit_test(test_ends_with_who_is_killed),
-		cmocka_unit_test(test_writes_where_it_is_told),
+		cmocka_unit_test(test_ends_with_its_killed_parent),
+		cmocka_unit_test(test_output_goes_to_its_descriptor),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

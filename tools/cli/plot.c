@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Pictures by gnuplot; see picture.h.
+ * Plots by gnuplot; see plot.h.
  */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include "cli.h"
-#include "picture.h"
+#include "plot.h"
 
 #define NAME_CHARACTERS \
 	"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-"
@@ -34,8 +34,8 @@ static void make_folders(char *path)
 	}
 }
 
-void picture_place(const char *option, const char *path, const char **folder,
-		   const char **name)
+void plot_place(const char *option, const char *path, const char **folder,
+		const char **name)
 {
 	const char *slash = strrchr(path, '/'), *last = slash ? slash + 1 : path;
 	size_t n = strlen(last);
@@ -43,13 +43,13 @@ void picture_place(const char *option, const char *path, const char **folder,
 
 	if (n > 4 && (!strcmp(last + n - 4, ".png") || !strcmp(last + n - 4, ".svg")))
 		n -= 4;
-	/* The name stands in a script and in a command: '-' begins an option of gnuplot. */
+	/* The name is part of a script and a command: '-' would be an option of gnuplot. */
 	if (!n || *last == '.' || *last == '-' ||
 	    strspn(last, NAME_CHARACTERS) != strlen(last))
 		cli_usage("--%s: '%s' is no name for a picture: letters, digits, '.', "
 			  "'_' and '-', and not '.' or '-' first",
 			  option, last);
-	if (!picture_possible())
+	if (!plot_possible())
 		cli_fail("gnuplot is not installed, it draws the pictures: apt-get "
 			 "install gnuplot-nox");
 	*name = strndup(last, n);
@@ -60,7 +60,7 @@ void picture_place(const char *option, const char *path, const char **folder,
 	free(plot);
 }
 
-bool picture_possible(void)
+bool plot_possible(void)
 {
 	return !system("command -v gnuplot >/dev/null 2>&1");
 }
@@ -76,12 +76,12 @@ static FILE *open_plot(const char *folder, const char *name, const char *suffix)
 	return file;
 }
 
-FILE *picture_data(const char *folder, const char *name)
+FILE *plot_data(const char *folder, const char *name)
 {
 	return open_plot(folder, name, "");
 }
 
-void picture_data_end(FILE *data, const char *folder)
+void plot_data_end(FILE *data, const char *folder)
 {
 	bool failed = ferror(data);
 
@@ -91,7 +91,7 @@ void picture_data_end(FILE *data, const char *folder)
 			 strerror(errno ? errno : EIO));
 }
 
-FILE *picture_begin(const char *folder, const char *name, int width, int height)
+FILE *plot_begin(const char *folder, const char *name, int width, int height)
 {
 	FILE *script = open_plot(folder, name, ".gp");
 
@@ -115,7 +115,7 @@ static bool draw(const char *folder, const char *name, const char *ext)
 	char *command;
 	int status;
 
-	/* A folder's name goes through the environment: it may hold any character. */
+	/* In the environment the folder's name may hold any character. */
 	setenv("INCISE_PICTURE_FOLDER", folder, 1);
 	if (asprintf(
 		    &command,
@@ -127,7 +127,7 @@ static bool draw(const char *folder, const char *name, const char *ext)
 	return status == 0;
 }
 
-bool picture_draw(FILE *script, const char *folder, const char *name)
+bool plot_draw(FILE *script, const char *folder, const char *name)
 {
 	fputs("\nunset output\n", script);
 	if (fclose(script))
@@ -135,9 +135,9 @@ bool picture_draw(FILE *script, const char *folder, const char *name)
 	return draw(folder, name, "png") && draw(folder, name, "svg");
 }
 
-struct picture_part picture_part(const char *folder, const char *name, const char *part)
+struct plot_part plot_part(const char *folder, const char *name, const char *part)
 {
-	struct picture_part p = {.folder = folder};
+	struct plot_part p = {.folder = folder};
 
 	if (asprintf(&p.name, "%s-%s", name, part) < 0 ||
 	    asprintf(&p.data, "%s.dat", p.name) < 0)
@@ -145,9 +145,9 @@ struct picture_part picture_part(const char *folder, const char *name, const cha
 	return p;
 }
 
-void picture_part_draw(FILE *script, struct picture_part *part)
+void plot_part_draw(FILE *script, struct plot_part *part)
 {
-	if (!picture_draw(script, part->folder, part->name))
+	if (!plot_draw(script, part->folder, part->name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", part->folder,
 			 part->name);
 	free(part->name);

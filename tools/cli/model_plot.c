@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What a model looks like; see model_picture.h.
+ * Plots of a model; see model_plot.h.
  */
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
-#include "model_picture.h"
-#include "picture.h"
+#include "model_plot.h"
+#include "plot.h"
 
 #define SAMPLES 200 /* of a curve */
 #define MESH 40	    /* of the surface, per input */
@@ -33,7 +33,7 @@ static void put_label(FILE *script, const struct incise_variable *v)
 		unit = units[i].unit;
 		n -= suffix;
 	}
-	/* A file's name may hold anything: a quote would end the string, a line it all. */
+	/* A name in a file may hold anything, also what would end the string. */
 	fputc('\'', script);
 	for (size_t i = 0; i < n; i++)
 		fputc(strchr("'\\\n\r`", v->name[i]) ? ' ' : v->name[i], script);
@@ -47,10 +47,10 @@ static void put_axis(FILE *script, const char *axis, const struct incise_variabl
 	fputc('\n', script);
 }
 
-void model_picture_functions(const struct incise_model *model, const char *folder,
-			     const char *data)
+void model_plot_write_functions(const struct incise_model *model, const char *folder,
+				const char *data)
 {
-	FILE *out = picture_data(folder, data);
+	FILE *out = plot_data(folder, data);
 
 	for (int i = 0; i < incise_model_n_inputs(model); i++) {
 		const struct incise_variable *v = incise_model_input(model, i);
@@ -65,12 +65,11 @@ void model_picture_functions(const struct incise_model *model, const char *folde
 			fputs("\n\n", out);
 		}
 	}
-	picture_data_end(out, folder);
+	plot_data_end(out, folder);
 }
 
-void model_picture_plot_functions(FILE *script, const struct incise_model *model,
-				  int input, const char *data, const char *title,
-				  const char *names)
+void model_plot_functions(FILE *script, const struct incise_model *model, int input,
+			  const char *data, const char *title, const char *names)
 {
 	int first = 0, n = incise_model_n_mfs(model, input);
 
@@ -94,11 +93,11 @@ void model_picture_plot_functions(FILE *script, const struct incise_model *model
 		first, first + n - 1, data, first, first);
 }
 
-void model_picture_surface(const struct incise_model *model, const char *folder,
-			   const char *data)
+void model_plot_write_surface(const struct incise_model *model, const char *folder,
+			      const char *data)
 {
 	const struct incise_variable *a = incise_model_input(model, 0), *b = a;
-	FILE *out = picture_data(folder, data);
+	FILE *out = plot_data(folder, data);
 	double x[INCISE_MODEL_INPUTS_MAX];
 	int n = incise_model_n_inputs(model);
 
@@ -117,11 +116,11 @@ void model_picture_surface(const struct incise_model *model, const char *folder,
 		x[0] = between(a, i, SAMPLES);
 		fprintf(out, "%g %g\n", x[0], incise_model_eval(model, x, NULL));
 	}
-	picture_data_end(out, folder);
+	plot_data_end(out, folder);
 }
 
-void model_picture_plot_surface(FILE *script, const struct incise_model *model,
-				const char *data, const char *title, const char *more)
+void model_plot_surface(FILE *script, const struct incise_model *model, const char *data,
+			const char *title, const char *more)
 {
 	fprintf(script, "set title '%s'\n", title);
 	put_axis(script, "x", incise_model_input(model, 0));
@@ -146,8 +145,8 @@ void model_picture_plot_surface(FILE *script, const struct incise_model *model,
 #define PANEL_HEIGHT 300
 #define SURFACE_HEIGHT 700
 
-void model_picture_draw(const struct incise_model *model, const char *folder,
-			const char *name)
+void model_plot_draw(const struct incise_model *model, const char *folder,
+		     const char *name)
 {
 	int n = incise_model_n_inputs(model), columns = n > 1 ? 2 : 1;
 	int rows = (n + columns - 1) / columns;
@@ -159,22 +158,22 @@ void model_picture_draw(const struct incise_model *model, const char *folder,
 	if (asprintf(&functions, "%s-functions.dat", name) < 0 ||
 	    asprintf(&surface, "%s-surface.dat", name) < 0)
 		cli_fail("no memory");
-	model_picture_functions(model, folder, functions);
-	model_picture_surface(model, folder, surface);
-	script = picture_begin(folder, name, width, height);
+	model_plot_write_functions(model, folder, functions);
+	model_plot_write_surface(model, folder, surface);
+	script = plot_begin(folder, name, width, height);
 	fputs("set multiplot\nset key outside right center\n", script);
 	for (int i = 0; i < n; i++) {
 		fprintf(script, "set size %g,%g\nset origin %g,%g\n", 1.0 / columns,
 			panel, (double)(i % columns) / columns,
 			1 - (i / columns + 1) * panel);
-		model_picture_plot_functions(script, model, i, functions, "", NULL);
+		model_plot_functions(script, model, i, functions, "", NULL);
 	}
 	fprintf(script, "set size 1,%g\nset origin 0,0\nunset key\n", 1 - rows * panel);
-	model_picture_plot_surface(
-		script, model, surface,
-		n > 2 ? "the other inputs at the middle of their support" : "", "");
+	model_plot_surface(script, model, surface,
+			   n > 2 ? "the other inputs at the middle of their support" : "",
+			   "");
 	fputs("unset multiplot\n", script);
-	if (!picture_draw(script, folder, name))
+	if (!plot_draw(script, folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
 	free(functions);
 	free(surface);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The folder of a recording; see recording_folder.h.
+ * The folder of a recording; see recording.h.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -11,9 +11,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "cli.h"
-#include "recording_folder.h"
+#include "recording.h"
 
-void recording_folder_remove(const char *path)
+void recording_remove(const char *path)
 {
 	static const char *const files[] = {"recording.db", "recording.db-wal",
 					    "recording.db-shm", "recording.db-journal",
@@ -38,7 +38,7 @@ void recording_folder_remove(const char *path)
 		cli_fail("%s: cannot be removed: %s", path, strerror(errno));
 }
 
-void recording_folder_check(const char *path)
+void recording_check(const char *path)
 {
 	char file[PATH_MAX];
 	struct stat st;
@@ -56,7 +56,7 @@ void recording_folder_check(const char *path)
 			path);
 }
 
-void recording_folder_replace(const char *new, const char *path)
+void recording_replace(const char *new, const char *path)
 {
 	if (access(path, F_OK)) {
 		if (rename(new, path))
@@ -68,11 +68,11 @@ void recording_folder_replace(const char *new, const char *path)
 		if (errno != EINVAL && errno != ENOSYS)
 			cli_fail("%s: %s; the recording is in %s", path, strerror(errno),
 				 new);
-		recording_folder_remove(path); /* a file system without that call */
+		recording_remove(path); /* a file system without that call */
 		if (rename(new, path))
 			cli_fail("%s: %s; the recording is in %s", path, strerror(errno),
 				 new);
 		return;
 	}
-	recording_folder_remove(new);
+	recording_remove(new);
 }

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "view_live.h"
+#include "live.h"
 
 #define BATCH 512
 

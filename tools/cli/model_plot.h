@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Plots of a model: its membership functions and its force surface, as data and gnuplot
+ * commands within a plot; see plot.h.
+ */
+#ifndef INCISE_MODEL_PLOT_H
+#define INCISE_MODEL_PLOT_H
+
+#include <stdio.h>
+#include <incise/model.h>
+
+/* Write degrees over each input's support: a block per function, input after input. */
+void model_plot_write_functions(const struct incise_model *model, const char *folder,
+				const char *data);
+
+/* Plot one input's functions from such data. @names: for the legend; NULL: the model's. */
+void model_plot_functions(FILE *script, const struct incise_model *model, int input,
+			  const char *data, const char *title, const char *names);
+
+/* Write the output over the first one or two inputs, the others at the middle of their
+ * support. */
+void model_plot_write_surface(const struct incise_model *model, const char *folder,
+			      const char *data);
+
+/* Plot that surface. @more: further elements of the plot, beginning with a comma, or "". */
+void model_plot_surface(FILE *script, const struct incise_model *model, const char *data,
+			const char *title, const char *more);
+
+/* All of it as one plot, FOLDER/NAME.png and .svg; fails the program on an error. */
+void model_plot_draw(const struct incise_model *model, const char *folder,
+		     const char *name);
+
+#endif

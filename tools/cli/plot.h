@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * A plot by gnuplot: script and data in FOLDER/plot/, the result as FOLDER/NAME.png and
+ * .svg. The script stays, so that anyone can draw the plot again:
+ *
+ *     cd FOLDER/plot && gnuplot -e "ext='png'" NAME.gp
+ */
+#ifndef INCISE_PLOT_H
+#define INCISE_PLOT_H
+
+#include <stdbool.h>
+#include <stdio.h>
+
+/*
+ * Split the argument of @option, "a/b/name", perhaps with .png or .svg, into folder "a/b" and
+ * "name", and make missing folders. Fails the program without gnuplot, or at a name that a
+ * script cannot hold. Both strings live as long as the program.
+ */
+void plot_place(const char *option, const char *path, const char **folder,
+		const char **name);
+
+/* Whether gnuplot is installed. */
+bool plot_possible(void);
+
+/* Open FOLDER/plot/NAME for writing data; fails the program on an error. */
+FILE *plot_data(const char *folder, const char *name);
+
+/* Close it; fails the program when not all of it was written. */
+void plot_data_end(FILE *data, const char *folder);
+
+/* Open the script of a plot of width × height pixels; gnuplot commands follow. */
+FILE *plot_begin(const char *folder, const char *name, int width, int height);
+
+/* Close the script and draw. Returns whether both files were made. */
+bool plot_draw(FILE *script, const char *folder, const char *name);
+
+/* One of several plots of a name: "NAME-part", and "NAME-part.dat" for its data. */
+struct plot_part {
+	const char *folder;
+	char *name, *data;
+};
+
+struct plot_part plot_part(const char *folder, const char *name, const char *part);
+
+/* Close its script, draw or fail the program, and free the part. */
+void plot_part_draw(FILE *script, struct plot_part *part);
+
+#endif
