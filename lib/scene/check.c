@@ -3,10 +3,6 @@
  * Whether a scene is stable on its device, before its first tick: the largest stiffness
  * of the scene against the limit of the loop with the tracker's poses, or, where the scene
  * says how late its device answers, against the exact limit of a wall so late.
- *
- *   cutting     reaction (along the normal) + plane (along the blade's side): when the
- *               blade lies flat both act along one line
- *   insertion   the larger of insertion (along the normal) and spread (across it)
  */
 #include <errno.h>
 #include <limits.h>
@@ -132,12 +128,39 @@ static void name_delay(const struct incise_plan_stability *s,
 			 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
 }
 
+/*
+ * The largest stiffness in any phase, and the largest damping. Springs along the normal and
+ * across it act along different lines, one to a side along a line that may be either.
+ */
+static void add_up(struct incise_plan *plan, double model_N_mm)
+{
+	struct incise_plan_stability *s = &plan->stability;
+
+	for (int phase = 0; phase < 3; phase++) {
+		double sum[INCISE_FRICTION + 1] = {0};
+
+		for (int i = 0; i < incise_n_tissue_forces; i++) {
+			const struct incise_acting_force *own = &plan->acting[i];
+			bool model = own->force->model && (plan->model || plan->fixed);
+
+			if (own->force->phases >> phase & 1)
+				sum[own->force->kind] +=
+					model ? model_N_mm : own->number[0];
+		}
+		s->stiffness_N_mm =
+			fmax(s->stiffness_N_mm,
+			     fmax(sum[INCISE_SPRING_NORMAL], sum[INCISE_SPRING_ACROSS]) +
+				     sum[INCISE_SPRING_SIDE]);
+		s->damping_N_s_mm = fmax(s->damping_N_s_mm, sum[INCISE_DAMPER]);
+	}
+}
+
 int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,
 		      struct incise_error *err)
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_scene *scene = plan->scene;
-	double reaction_N_mm = plan->reaction_N_mm, gain;
+	double model_N_mm = 0, gain;
 	char delay[64], advice[64];
 
 	s->device = (struct incise_haptic_device){
@@ -149,11 +172,9 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	};
 	set_delay(plan, tracker);
 	s->certified = true;
-	if ((plan->model || plan->fixed) && survey_model(plan, &reaction_N_mm))
+	if ((plan->model || plan->fixed) && survey_model(plan, &model_N_mm))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
-	s->stiffness_N_mm = fmax(reaction_N_mm + plan->plane_N_mm,
-				 fmax(plan->insertion_N_mm, plan->spread_N_mm));
-	s->damping_N_s_mm = plan->damping_N_s_mm;
+	add_up(plan, model_N_mm);
 	s->limit_N_mm = limit_N_mm(plan, s->damping_N_s_mm);
 	if (stable(plan, 1))
 		return 0;

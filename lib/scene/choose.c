@@ -1,36 +1,19 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Which stages a scene needs, and why it does not need the others. In the order in which
- * they run. With everything kept (incise_scene_set_full()) the ones that are not needed
- * are neutral.
+ * Which stages a scene needs, and why it does not need the others, in the order in which
+ * they run: these, with the forces of forces.c before the guard. With everything kept
+ * (incise_scene_set_full()) the ones that are not needed are neutral.
  */
 #include <stddef.h>
 #include "stages.h"
 
-typedef int run_fn(struct incise_plan *plan, struct incise_tick *tick) INCISE_REALTIME;
-
-/* How a stage is done, where there are several ways. */
-
-static run_fn *pose(const struct incise_plan *plan)
+/* A stage can be done in several ways. */
+static incise_stage_fn *pose(const struct incise_plan *plan)
 {
 	return plan->tracker ? incise_stage_pose : incise_stage_fed;
 }
 
-static run_fn *reaction(const struct incise_plan *plan)
-{
-	if (plan->fixed)
-		return incise_stage_fuzzy_fixed;
-	if (plan->model)
-		return incise_stage_fuzzy;
-	return plan->scene->fixed ? incise_stage_reaction_fixed : incise_stage_reaction;
-}
-
-static run_fn *plane(const struct incise_plan *plan)
-{
-	return plan->scene->fixed ? incise_stage_plane_fixed : incise_stage_plane;
-}
-
-/* Why a stage is not needed, or NULL. */
+/* Reasons why a stage is not needed, or NULL. */
 
 /* A constant may be 0 because of the gain, whatever the file says of it. */
 static const char *zero(const struct incise_plan *plan, const char *why)
@@ -40,10 +23,7 @@ static const char *zero(const struct incise_plan *plan, const char *why)
 
 static const char *no_tool(const struct incise_plan *plan)
 {
-	if (plan->inserts)
-		return NULL;
-	return zero(plan, "nothing is inserted: tissue.insertion_N_mm and "
-			  "tissue.spread_N_mm are 0");
+	return plan->inserts ? NULL : zero(plan, plan->no_tool);
 }
 
 static const char *no_normal(const struct incise_plan *plan)
@@ -55,61 +35,38 @@ static const char *no_normal(const struct incise_plan *plan)
 		       : "effects.average_ticks is 1";
 }
 
-static const char *no_reaction(const struct incise_plan *plan)
-{
-	if (plan->fixed || plan->model)
-		return zero(plan, NULL);
-	return plan->reaction_N_mm > 0
-		       ? NULL
-		       : zero(plan, "no model, and tissue.reaction_N_mm is 0");
-}
-
-static const char *no_plane(const struct incise_plan *plan)
-{
-	return plan->plane_N_mm > 0 ? NULL : zero(plan, "tissue.plane_N_mm is 0");
-}
-
-static const char *no_damping(const struct incise_plan *plan)
-{
-	return plan->damping_N_s_mm > 0 ? NULL : zero(plan, "tissue.damping_N_s_mm is 0");
-}
-
-static const char *no_insertion(const struct incise_plan *plan)
-{
-	return plan->insertion_N_mm > 0 ? NULL : zero(plan, "tissue.insertion_N_mm is 0");
-}
-
-static const char *no_spread(const struct incise_plan *plan)
-{
-	return plan->spread_N_mm > 0 ? NULL : zero(plan, "tissue.spread_N_mm is 0");
-}
-
 static const char *no_guard(const struct incise_plan *plan)
 {
 	return plan->scene->effects.guard ? NULL : "effects.guard is false";
 }
 
+static const char *no_force(const struct incise_plan *plan,
+			    const struct incise_acting_force *own)
+{
+	if (own->force->model && (plan->model || plan->fixed))
+		return zero(plan, NULL);
+	return own->number[0] > 0 ? NULL : zero(plan, own->force->zero);
+}
+
 static const struct {
 	const char *name;
 	bool always;
-	run_fn *run; /* or @how */
-	run_fn *(*how)(const struct incise_plan *plan);
+	incise_stage_fn *run; /* or @how */
+	incise_stage_fn *(*how)(const struct incise_plan *plan);
 	const char *(*why_not)(const struct incise_plan *plan); /* NULL: always needed */
+	bool forces;						/* come before it */
 } all[] = {
-	{"pose", true, NULL, pose, NULL},
-	{"predict", true, incise_stage_predict, NULL, NULL},
-	{"tool", true, incise_stage_tool, NULL, no_tool},
-	{"contact", false, incise_stage_contact, NULL, NULL},
-	{"normal", false, incise_stage_normal, NULL, no_normal},
-	{"reaction", false, NULL, reaction, no_reaction},
-	{"plane", false, NULL, plane, no_plane},
-	{"damping", false, incise_stage_damping, NULL, no_damping},
-	{"insertion", false, incise_stage_insertion, NULL, no_insertion},
-	{"spread", false, incise_stage_spread, NULL, no_spread},
-	{"guard", false, incise_stage_guard, NULL, no_guard},
-	{"start", true, incise_stage_start, NULL, NULL},
-	{"limit", true, incise_stage_limit, NULL, NULL},
+	{"pose", true, NULL, pose, NULL, false},
+	{"predict", true, incise_stage_predict, NULL, NULL, false},
+	{"tool", true, incise_stage_tool, NULL, no_tool, false},
+	{"contact", false, incise_stage_contact, NULL, NULL, false},
+	{"normal", false, incise_stage_normal, NULL, no_normal, false},
+	{"guard", false, incise_stage_guard, NULL, no_guard, true},
+	{"start", true, incise_stage_start, NULL, NULL, false},
+	{"limit", true, incise_stage_limit, NULL, NULL, false},
 };
+_Static_assert(sizeof(all) / sizeof(*all) + 1 == INCISE_PLAN_OTHER_STAGES,
+	       "with actuate these are INCISE_PLAN_OTHER_STAGES");
 
 static void leave_out(struct incise_plan *plan, const char *name, const char *why)
 {
@@ -117,9 +74,34 @@ static void leave_out(struct incise_plan *plan, const char *name, const char *wh
 	plan->left_out[plan->n_left_out++].why = why;
 }
 
-static void keep(struct incise_plan *plan, const char *name, bool always, run_fn *run)
+static void keep(struct incise_plan *plan, struct incise_stage stage)
 {
-	plan->stage[plan->n_stages++] = (struct incise_stage){name, always, run};
+	plan->stage[plan->n_stages++] = stage;
+}
+
+static incise_force_fn *way(const struct incise_plan *plan,
+			    const struct incise_tissue_force *force)
+{
+	if (force->model && plan->fixed)
+		return force->model_fixed;
+	if (force->model && plan->model)
+		return force->model;
+	return plan->scene->fixed && force->fixed ? force->fixed : force->run;
+}
+
+static void choose_forces(struct incise_plan *plan)
+{
+	for (int i = 0; i < incise_n_tissue_forces; i++) {
+		struct incise_acting_force *own = &plan->acting[i];
+		const char *why = no_force(plan, own);
+
+		if (why && !plan->scene->full)
+			leave_out(plan, own->force->name, why);
+		else
+			keep(plan, (struct incise_stage){.name = own->force->name,
+							 .add = way(plan, own->force),
+							 .own = own});
+	}
 }
 
 void incise_plan_choose(struct incise_plan *plan)
@@ -127,17 +109,24 @@ void incise_plan_choose(struct incise_plan *plan)
 	const char *drawn = "the loop draws nothing: that is for incise view";
 
 	for (size_t i = 0; i < sizeof(all) / sizeof(*all); i++) {
-		run_fn *run = all[i].how ? all[i].how(plan) : all[i].run;
 		const char *why = all[i].why_not ? all[i].why_not(plan) : NULL;
 
+		if (all[i].forces)
+			choose_forces(plan);
 		if (why && !plan->scene->full)
 			leave_out(plan, all[i].name, why);
 		else
-			keep(plan, all[i].name, all[i].always, run);
+			keep(plan,
+			     (struct incise_stage){.name = all[i].name,
+						   .always = all[i].always,
+						   .run = all[i].how ? all[i].how(plan)
+								     : all[i].run});
 	}
 	/* A device that is not there cannot be kept. */
 	if (plan->stepper)
-		keep(plan, "actuate", true, incise_stage_actuate);
+		keep(plan, (struct incise_stage){.name = "actuate",
+						 .always = true,
+						 .run = incise_stage_actuate});
 	else
 		leave_out(plan, "actuate",
 			  plan->tracker ? "the rig has no stepper"

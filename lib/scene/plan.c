@@ -1,14 +1,338 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The plan of a scene: an array of stages, each a few lines, run in order at each tick.
+ * The plan of a scene: an array of stages, each a few lines, that run in order at each tick.
  * A stage that the scene or the rig does not need is not in the array.
  */
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "../base/monotonic.h"
 #include "../base/vector.h"
+#include "../model/model.h"
 #include "plan.h"
+
+/* Without a rig poses are as of this tracker: a magnetic one of 120 Hz. */
+static const struct incise_tracker_info fed_tracker = {
+	.name = "fed",
+	.rate_hz = 120,
+	.latency_ns = 4200000,
+};
+
+/* Where the rig's plane lies. */
+struct place {
+	double point_mm[3], normal[3];
+};
+
+static const struct place floor_place = {.normal = {0, 0, 1}};
+
+/* The model in the scene's arithmetic. */
+static int take_model(struct incise_plan *plan, struct incise_error *err)
+{
+	const struct incise_scene *scene = plan->scene;
+	struct incise_error why = {0};
+
+	if (scene->compiled && !scene->fixed)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: its model is compiled: it cannot run in double; use the "
+			".fis it was made of",
+			scene->path);
+	plan->fixed = scene->compiled;
+	if (!scene->model)
+		return 0;
+	if (!scene->fixed) {
+		plan->model = scene->model;
+		return 0;
+	}
+	plan->fixed = plan->own_fixed = incise_fixed_compile(scene->model, NULL, &why);
+	if (!plan->fixed)
+		return incise_error_set(err, why.code, "%s: its model: %s", scene->path,
+					why.text);
+	return 0;
+}
+
+/*
+ * @tracker: that of the poses that are fed, or, with a rig, the rig's from here on, and
+ * @place as well.
+ */
+static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
+		    struct incise_tracker_info *tracker, struct place place,
+		    struct incise_error *err)
+{
+	if (rig) {
+		plan->tracker = incise_rig_tracker(rig);
+		plan->stepper = incise_rig_stepper(rig);
+		if (!plan->tracker)
+			return incise_error_set(
+				err, ENODEV,
+				"%s: the rig has no tracker: name one in rig.conf",
+				plan->scene->path);
+		incise_tracker_info(plan->tracker, tracker);
+		incise_rig_surface(rig, place.point_mm, place.normal);
+	}
+	v3_copy(plan->axis, place.normal);
+	if (plan->stepper)
+		incise_stepper_info(plan->stepper, &plan->actuator);
+	plan->surface = plan->scene->surface;
+	if (!plan->surface)
+		plan->surface = plan->own_surface =
+			incise_surface_new_plane(place.point_mm, plan->axis, err);
+	return plan->surface ? 0 : -errno;
+}
+
+static void take_tissue(struct incise_plan *plan)
+{
+	const struct incise_scene *scene = plan->scene;
+
+	plan->gain = scene->tissue.gain;
+	for (int i = 0; i < incise_n_tissue_forces; i++) {
+		plan->acting[i].force = &incise_tissue_forces[i];
+		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++)
+			plan->acting[i].number[k] =
+				(k ? 1 : plan->gain) * scene->tissue.force[i][k];
+	}
+}
+
+/*
+ * The most energy that the tissue can have stored, N mm: of a spring at the largest force
+ * F²/(2K), of a model that force over all of its support.
+ */
+static double reserve(const struct incise_plan *plan)
+{
+	double force_N = plan->scene->limits.force_N, most = 0;
+
+	for (int i = 0; i < incise_n_tissue_forces; i++) {
+		const struct incise_acting_force *own = &plan->acting[i];
+
+		if (own->force->kind <= INCISE_SPRING_SIDE && own->number[0] > 0)
+			most = fmax(most, force_N * force_N / (2 * own->number[0]));
+	}
+	if (plan->fixed)
+		most = fmax(most, force_N * plan->fixed->input[0].max / INCISE_FIXED_ONE);
+	else if (plan->model)
+		most = fmax(most, force_N * incise_model_input(plan->model, 0)->max);
+	return fmax(most, 0);
+}
+
+static void set_guard(struct incise_plan *plan)
+{
+	const struct incise_haptic_device *device = &plan->stability.device;
+	/* Damping that acts d ticks late is itself stable below this, in m/T. */
+	double late = 2 * sin(M_PI / (4.0 * device->delay_ticks + 2));
+
+	incise_guard_init(plan->guard, device->mass_kg, device->period_s,
+			  plan->scene->effects.guard ? reserve(plan) : 0);
+	if (!plan->scene->effects.guard)
+		return;
+	plan->guard->cap_N_s_mm *= fmin(1, late);
+	/*
+	 * What the guard adds must not make a wall hum that did not; half of what is spare,
+	 * as the guard's own share is half of what is stable.
+	 */
+	plan->guard->cap_N_s_mm =
+		incise_plan_spare_damping(plan, 2 * plan->guard->cap_N_s_mm) / 2;
+	plan->stability.guard_N_s_mm = plan->guard->cap_N_s_mm;
+}
+
+static void set_limits(struct incise_plan *plan)
+{
+	const struct incise_scene *scene = plan->scene;
+
+	plan->pose_age_ns = (int64_t)(scene->limits.pose_age_ms * 1e6);
+	plan->start = (struct incise_start){
+		.small_N = scene->limits.start_N,
+		.ramp_s = scene->limits.ramp_ms * 1e-3,
+		.fade_s = scene->limits.fade_ms * 1e-3,
+	};
+	plan->limit = (struct incise_limit){
+		.force_N = scene->limits.force_N,
+		.slew_N = scene->limits.slew_N_s / scene->rate_hz,
+	};
+}
+
+/* Whether anything resists insertion, and the reason why nothing is inserted. */
+static void find_insertion(struct incise_plan *plan)
+{
+	size_t size = sizeof(plan->no_tool), n;
+
+	n = (size_t)snprintf(plan->no_tool, size, "nothing is inserted:");
+	for (int i = 0, k = 0; i < incise_n_tissue_forces && n < size; i++) {
+		const struct incise_tissue_force *force = &incise_tissue_forces[i];
+
+		if (force->phases != 1U << INCISE_PHASE_INSERTION)
+			continue;
+		plan->inserts |= plan->acting[i].number[0] > 0;
+		n += (size_t)snprintf(plan->no_tool + n, size - n, "%s tissue.%s",
+				      k++ ? " and" : "", force->number[0].key);
+	}
+	if (n < size)
+		snprintf(plan->no_tool + n, size - n, " are 0");
+}
+
+static void set_tool(struct incise_plan *plan)
+{
+	struct incise_touch top;
+
+	v3_copy(plan->instrument.axis, plan->scene->tool.axis);
+	v3_copy(plan->instrument.side, plan->scene->tool.side);
+	plan->instrument.handle_mm = plan->scene->tool.handle_mm;
+	plan->instrument.held = INCISE_TOOL_BLADE;
+	find_insertion(plan);
+	/* Without insertion there is only the blade. */
+	if (!plan->inserts)
+		plan->instrument.wanted = INCISE_TOOL_BLADE;
+	incise_surface_top(plan->surface, &top);
+	v3_copy(plan->up, top.normal);
+	incise_proxy_init(&plan->proxy, plan->surface, plan->scene->tissue.leave_mm);
+	/* The average of what never changes is a rounding beside it. */
+	plan->average_ticks = incise_surface_kind(plan->surface) == INCISE_SURFACE_PLANE
+				      ? 1
+				      : plan->scene->effects.average_ticks;
+}
+
+static bool keeps(const struct incise_plan *plan, const char *stage)
+{
+	for (int i = 0; i < plan->n_stages; i++)
+		if (!strcmp(plan->stage[i].name, stage))
+			return true;
+	return false;
+}
+
+/* What only some stages need, for those that are kept. */
+static int equip(struct incise_plan *plan, const struct incise_tracker_info *tracker,
+		 struct incise_error *err)
+{
+	bool handle = keeps(plan, "tool"), average = keeps(plan, "normal"),
+	     guard = keeps(plan, "guard");
+
+	if (!plan->tracker)
+		plan->fed = calloc(INCISE_PLAN_POSES, sizeof(*plan->fed));
+	if (handle)
+		plan->handle = calloc(1, sizeof(*plan->handle));
+	if (average)
+		plan->average = calloc(1, sizeof(*plan->average));
+	if (guard)
+		plan->guard = calloc(1, sizeof(*plan->guard));
+	if ((!plan->tracker && !plan->fed) || (handle && !plan->handle) ||
+	    (average && !plan->average) || (guard && !plan->guard))
+		return incise_error_set(err, ENOMEM, "no memory for a plan");
+	if (handle)
+		incise_predict_init(plan->handle, tracker, 0);
+	if (average)
+		incise_average_init(plan->average, plan->average_ticks);
+	if (guard)
+		set_guard(plan);
+	return 0;
+}
+
+/* A pose that is used for the last time is its latency and a period old. */
+static int check_age(const struct incise_plan *plan,
+		     const struct incise_tracker_info *tracker, struct incise_error *err)
+{
+	double least_ms = (double)tracker->latency_ns * 1e-6 + 1e3 / tracker->rate_hz;
+
+	if (plan->scene->limits.pose_age_ms >= least_ms)
+		return 0;
+	return incise_error_set(
+		err, EDOM,
+		"%s: limits.pose_age_ms: no pose of a tracker of %g Hz that is %g ms late is "
+		"always younger than %g ms: there would be no force; set it to %.1f or more",
+		plan->scene->path, tracker->rate_hz, (double)tracker->latency_ns * 1e-6,
+		plan->scene->limits.pose_age_ms, ceil(least_ms * 10) / 10);
+}
+
+static struct incise_plan *new_plan(const struct incise_scene *scene,
+				    struct incise_rig *rig,
+				    struct incise_tracker_info tracker,
+				    const struct place *place, struct incise_error *err)
+{
+	struct incise_plan *plan = calloc(1, sizeof(*plan));
+	int rc;
+
+	if (!plan) {
+		incise_error_set(err, ENOMEM, "no memory for a plan");
+		return NULL;
+	}
+	plan->scene = scene;
+	rc = take_rig(plan, rig, &tracker, *place, err);
+	if (!rc)
+		rc = check_age(plan, &tracker, err);
+	if (!rc)
+		rc = take_model(plan, err);
+	if (!rc) {
+		take_tissue(plan);
+		incise_predict_init(&plan->predict, &tracker, 0);
+		rc = incise_plan_check(plan, &tracker, err);
+	}
+	if (!rc) {
+		set_tool(plan);
+		set_limits(plan);
+		incise_plan_choose(plan);
+		rc = equip(plan, &tracker, err);
+	}
+	if (rc) {
+		incise_plan_free(plan);
+		errno = -rc;
+		return NULL;
+	}
+	return plan;
+}
+
+struct incise_plan *incise_plan_new(const struct incise_scene *scene,
+				    struct incise_rig *rig, struct incise_error *err)
+{
+	return new_plan(scene, rig, fed_tracker, &floor_place, err);
+}
+
+struct incise_plan *incise_plan_new_fed(const struct incise_scene *scene,
+					const struct incise_tracker_info *tracker,
+					struct incise_error *err)
+{
+	return incise_plan_new_fed_on(scene, tracker, floor_place.point_mm,
+				      floor_place.normal, err);
+}
+
+struct incise_plan *incise_plan_new_fed_on(const struct incise_scene *scene,
+					   const struct incise_tracker_info *tracker,
+					   const double point_mm[3],
+					   const double normal[3],
+					   struct incise_error *err)
+{
+	struct place place;
+
+	if (!(tracker->rate_hz > 0) || !isfinite(tracker->rate_hz) ||
+	    tracker->latency_ns < 0) {
+		incise_error_set(err, EINVAL,
+				 "a tracker of %g Hz and %g ms: expected a rate above 0 "
+				 "and no negative latency",
+				 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
+		errno = EINVAL;
+		return NULL;
+	}
+	v3_copy(place.point_mm, point_mm);
+	if (!v3_finite(point_mm) || !v3_unit(place.normal, normal, 0)) {
+		incise_error_set(err, EINVAL,
+				 "the tissue's plane has no place or no normal");
+		errno = EINVAL;
+		return NULL;
+	}
+	return new_plan(scene, NULL, *tracker, &place, err);
+}
+
+void incise_plan_free(struct incise_plan *plan)
+{
+	if (!plan)
+		return;
+	incise_fixed_free(plan->own_fixed);
+	incise_surface_free(plan->own_surface);
+	free(plan->fed);
+	free(plan->handle);
+	free(plan->average);
+	free(plan->guard);
+	free(plan);
+}
 
 int incise_plan_feed(struct incise_plan *plan,
 		     const struct incise_tracker_sample *samples, int n)
@@ -105,6 +429,15 @@ static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 	return rc;
 }
 
+/* Only in the phases of the force, and while poses are fresh. */
+static inline void add_force(struct incise_plan *plan, struct incise_tick *tick,
+			     const struct incise_stage *stage)
+{
+	if (stage->own->force->phases >> tick->phase & 1 &&
+	    !(tick->flags & INCISE_TICK_STALE))
+		stage->add(plan, tick, stage->own);
+}
+
 /* Inlined into both, so that the one without times does not pay for them. */
 static inline __attribute__((always_inline)) int run_stages(struct incise_plan *plan,
 							    int64_t t_ns,
@@ -119,7 +452,9 @@ static inline __attribute__((always_inline)) int run_stages(struct incise_plan *
 		int64_t begin = stage_ns ? incise_monotonic_ns() : 0;
 		int rc = 0;
 
-		if (stage->always || !(tick->flags & INCISE_TICK_STALE))
+		if (stage->own)
+			add_force(plan, tick, stage);
+		else if (stage->always || !(tick->flags & INCISE_TICK_STALE))
 			rc = stage->run(plan, tick);
 		if (stage_ns)
 			stage_ns[i] = incise_monotonic_ns() - begin;
@@ -140,4 +475,63 @@ int incise_plan_tick_timed(struct incise_plan *plan, int64_t t_ns,
 	/* A stage that a fault kept from running took no time. */
 	memset(stage_ns, 0, INCISE_PLAN_STAGES_MAX * sizeof(*stage_ns));
 	return run_stages(plan, t_ns, tick, stage_ns);
+}
+
+const char *incise_plan_stage(const struct incise_plan *plan, int index)
+{
+	return index >= 0 && index < plan->n_stages ? plan->stage[index].name : NULL;
+}
+
+const char *incise_plan_left_out(const struct incise_plan *plan, int index,
+				 const char **why)
+{
+	if (index < 0 || index >= plan->n_left_out)
+		return NULL;
+	if (why)
+		*why = plan->left_out[index].why;
+	return plan->left_out[index].name;
+}
+
+size_t incise_plan_memory(const struct incise_plan *plan)
+{
+	size_t size = sizeof(*plan) + incise_surface_memory(plan->surface);
+
+	size += plan->fed ? INCISE_PLAN_POSES * sizeof(*plan->fed) : 0;
+	size += plan->handle ? sizeof(*plan->handle) : 0;
+	size += plan->average ? sizeof(*plan->average) : 0;
+	size += plan->guard ? sizeof(*plan->guard) : 0;
+	if (plan->fixed)
+		size += sizeof(*plan->fixed) + plan->fixed->size;
+	if (plan->scene->model)
+		size += sizeof(*plan->scene->model);
+	return size;
+}
+
+void incise_plan_top(const struct incise_plan *plan, struct incise_touch *touch)
+{
+	incise_surface_top(plan->surface, touch);
+}
+
+const struct incise_surface *incise_plan_surface(const struct incise_plan *plan)
+{
+	return plan->surface;
+}
+
+void incise_plan_stability(const struct incise_plan *plan,
+			   struct incise_plan_stability *stability)
+{
+	*stability = plan->stability;
+}
+
+double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
+{
+	double bound_N = plan->fixed ? plan->gain * incise_fixed_bound(plan->fixed) : 0;
+
+	for (int i = 0; plan->scene->fixed && i < incise_n_tissue_forces; i++) {
+		const struct incise_acting_force *own = &plan->acting[i];
+
+		if (own->force->fixed && own->number[0] > 0)
+			bound_N += incise_fixed_spring_bound(own->number[0], reach_mm);
+	}
+	return bound_N;
 }

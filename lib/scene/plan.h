@@ -6,28 +6,39 @@
 #define INCISE_PLAN_INTERNAL_H
 
 #include <incise/fixed.h>
-#include <incise/fixed_spring.h>
-#include "../control/guard.h"
 #include <incise/model.h>
 #include <incise/plan.h>
-#include "../surface/average.h"
-#include "../tissue/incision.h"
-#include "../tissue/instrument.h"
+#include "../control/guard.h"
 #include "../control/limit.h"
 #include "../control/predict.h"
 #include "../control/start.h"
+#include "../surface/average.h"
+#include "../surface/surface.h"
+#include "../tissue/incision.h"
+#include "../tissue/instrument.h"
 #include "scene.h"
 
 /* Poses taken at one tick; more than a tracker sends in a period, even after a stall. */
 #define INCISE_PLAN_POSES 32
 
+/* Returns 0, or a negative errno of a device. */
+typedef int incise_stage_fn(struct incise_plan *plan,
+			    struct incise_tick *tick) INCISE_REALTIME;
+
 struct incise_stage {
 	const char *name;
 	/* Also runs while there is no fresh pose; the others stand still then. */
 	bool always;
-	/* Returns 0, or a negative errno of a device. */
-	int (*run)(struct incise_plan *plan, struct incise_tick *tick) INCISE_REALTIME;
+	incise_stage_fn *run; /* or a force: */
+	incise_force_fn *add;
+	struct incise_acting_force *own;
 };
+
+/* Stages besides forces; those that no loop has are always left out. */
+#define INCISE_PLAN_OTHER_STAGES 9
+#define INCISE_PLAN_NO_STAGES 2
+_Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES_MAX <= INCISE_PLAN_STAGES_MAX,
+	       "raise INCISE_PLAN_STAGES_MAX");
 
 struct incise_plan {
 	const struct incise_scene *scene;
@@ -35,7 +46,7 @@ struct incise_plan {
 	int n_stages;
 	struct {
 		const char *name, *why;
-	} left_out[INCISE_PLAN_STAGES_MAX];
+	} left_out[INCISE_PLAN_STAGES_MAX + INCISE_PLAN_NO_STAGES];
 	int n_left_out;
 	struct incise_plan_stability stability;
 	int fault; /* negative errno of the device that failed, or 0 */
@@ -54,6 +65,7 @@ struct incise_plan {
 	/* tool, contact, normal */
 	struct incise_instrument instrument;
 	bool inserts;		       /* handle and tube can be held */
+	char no_tool[128];	       /* the reason why not */
 	struct incise_predict *handle; /* its end's position; with stage tool */
 	const struct incise_surface *surface;
 	struct incise_surface *own_surface; /* the rig's plane, when it is that */
@@ -67,16 +79,13 @@ struct incise_plan {
 	int average_ticks;
 	struct incise_average *average; /* with stage normal */
 
-	/* forces; the constants times the gain */
+	/* forces */
 	double force_N[3]; /* of this tick, before guard and limits */
 	double gain;
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;
 	struct incise_fixed *own_fixed; /* compiled here */
-	double reaction_N_mm, plane_N_mm, damping_N_s_mm, insertion_N_mm, spread_N_mm;
-	struct incise_fixed_spring
-		plane;	  /* in fixed point, as it was when contact began */
-	bool in_incision; /* the instrument went in where the blade had cut */
+	struct incise_acting_force acting[INCISE_FORCES_MAX];
 
 	/* guard, start, limit */
 	struct incise_guard *guard; /* with stage guard */

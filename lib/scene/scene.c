@@ -11,7 +11,8 @@
 #include "../base/vector.h"
 #include "scene.h"
 
-#define KEYS_MAX 12
+/* Of the largest group, tissue: gain, leave_mm and the numbers of all forces. */
+#define KEYS_MAX (2 + INCISE_FORCES_MAX * INCISE_FORCE_NUMBERS)
 
 /* A number of a group. */
 struct number {
@@ -24,18 +25,6 @@ struct number {
 	{                                                                  \
 #name, min, max, offsetof(struct incise_scene, group.name) \
 	}
-
-static const struct number tissue[] = {
-	NUMBER(tissue, gain, 0, 10),
-	NUMBER(tissue, reaction_N_mm, 0, 1000),
-	NUMBER(tissue, plane_N_mm, 0, 1000),
-	NUMBER(tissue, damping_N_s_mm, 0, 1),
-	NUMBER(tissue, insertion_N_mm, 0, 1000),
-	NUMBER(tissue, aligned, 0, 1),
-	NUMBER(tissue, spread_N_mm, 0, 1000),
-	NUMBER(tissue, leave_mm, 0, 5),
-	{0},
-};
 
 static const struct number tool[] = {
 	NUMBER(tool, handle_mm, 1, 1000),
@@ -59,6 +48,7 @@ static const struct number limits[] = {
 	NUMBER(limits, start_N, 0, 100),
 	{0},
 };
+_Static_assert(sizeof(limits) / sizeof(*limits) <= KEYS_MAX, "raise KEYS_MAX");
 
 /*
  * Read the numbers of a group, if it is there. Its keys are these and the ones of @more, a
@@ -90,7 +80,8 @@ static int read_group(struct incise_scene *scene, const config_setting_t *root,
 	return rc;
 }
 
-char *incise_scene_beside(const struct incise_scene *scene, const char *name)
+/* A name in a scene is relative to the scene's folder. To be freed; NULL: no memory. */
+static char *beside(const struct incise_scene *scene, const char *name)
 {
 	const char *slash = strrchr(scene->path, '/');
 	char *path = NULL;
@@ -101,6 +92,248 @@ char *incise_scene_beside(const struct incise_scene *scene, const char *name)
 	    0)
 		return NULL;
 	return path;
+}
+
+/* A surface as the file has it. */
+struct named {
+	double point_mm[3], to_mm[3], normal[3], radius_mm;
+	const char *file;
+};
+
+static struct incise_surface *plane(const struct named *n, struct incise_error *err)
+{
+	return incise_surface_new_plane(n->point_mm, n->normal, err);
+}
+
+static struct incise_surface *sphere(const struct named *n, struct incise_error *err)
+{
+	return incise_surface_new_sphere(n->point_mm, n->radius_mm, err);
+}
+
+static struct incise_surface *capsule(const struct named *n, struct incise_error *err)
+{
+	return incise_surface_new_capsule(n->point_mm, n->to_mm, n->radius_mm, err);
+}
+
+static struct incise_surface *heights(const struct named *n, struct incise_error *err)
+{
+	return incise_surface_load_heights(n->file, n->point_mm, err);
+}
+
+static struct incise_surface *mesh(const struct named *n, struct incise_error *err)
+{
+	return incise_surface_load_mesh(n->file, n->point_mm, err);
+}
+
+/* The keys of each kind; those without an @optional mark must be there. */
+static const struct kind {
+	const char *name;
+	const char *point; /* the key of its point */
+	bool optional;	   /* the point is */
+	const char *keys[5];
+	struct incise_surface *(*make)(const struct named *named,
+				       struct incise_error *err);
+} kinds[] = {
+	{"plane", "point_mm", true, {"kind", "point_mm", "normal"}, plane},
+	{"sphere", "centre_mm", false, {"kind", "centre_mm", "radius_mm"}, sphere},
+	{"capsule", "from_mm", false, {"kind", "from_mm", "to_mm", "radius_mm"}, capsule},
+	{"heights", "at_mm", true, {"kind", "file", "at_mm"}, heights},
+	{"mesh", "at_mm", true, {"kind", "file", "at_mm"}, mesh},
+};
+#define KINDS (sizeof(kinds) / sizeof(*kinds))
+
+static const struct kind *kind_of(const char *name)
+{
+	for (size_t i = 0; i < KINDS; i++)
+		if (!strcmp(kinds[i].name, name))
+			return &kinds[i];
+	return NULL;
+}
+
+static bool has(const struct kind *kind, const char *key)
+{
+	for (int i = 0; kind->keys[i]; i++)
+		if (!strcmp(kind->keys[i], key))
+			return true;
+	return false;
+}
+
+static int read_named(struct named *named, const struct kind *kind,
+		      const config_setting_t *group, const char *path,
+		      struct incise_error *err)
+{
+	int rc = incise_conf_known(group, path, kind->keys, err);
+
+	if (!rc && !kind->optional)
+		rc = incise_conf_need(group, path, kind->point, err);
+	if (!rc)
+		rc = incise_conf_vector(group, path, kind->point, named->point_mm, err);
+	if (!rc && has(kind, "normal"))
+		rc = incise_conf_direction(group, path, "normal", named->normal, err);
+	if (!rc && has(kind, "to_mm"))
+		rc = incise_conf_need(group, path, "to_mm", err);
+	if (!rc && has(kind, "to_mm"))
+		rc = incise_conf_vector(group, path, "to_mm", named->to_mm, err);
+	if (!rc && has(kind, "radius_mm"))
+		rc = incise_conf_need(group, path, "radius_mm", err);
+	if (!rc && has(kind, "radius_mm"))
+		rc = incise_conf_number(group, path, "radius_mm", 0.1, 1e5,
+					&named->radius_mm, err);
+	if (!rc && has(kind, "file"))
+		rc = incise_conf_need(group, path, "file", err);
+	if (!rc && has(kind, "file"))
+		rc = incise_conf_string(group, path, "file", &named->file, err);
+	return rc;
+}
+
+static int read_surface(struct incise_scene *scene, const config_setting_t *root,
+			struct incise_error *err)
+{
+	const config_setting_t *group = config_setting_get_member(root, "surface");
+	struct named named = {.normal = {0, 0, 1}};
+	struct incise_error why = {0};
+	const char *name = "plane";
+	const struct kind *kind;
+	char *file = NULL;
+	int rc;
+
+	if (!group)
+		return 0;
+	if (!config_setting_is_group(group))
+		return incise_error_set(err, EINVAL,
+					"%s:%d: surface: expected a group "
+					"{ kind = \"plane\"; … }; correct it",
+					scene->path, config_setting_source_line(group));
+	rc = incise_conf_string(group, scene->path, "kind", &name, err);
+	if (rc)
+		return rc;
+	kind = kind_of(name);
+	if (!kind)
+		return incise_error_set(err, EINVAL,
+					"%s:%d: surface.kind: expected \"plane\", "
+					"\"sphere\", \"capsule\", \"heights\" or "
+					"\"mesh\", found \"%.40s\"; correct it",
+					scene->path,
+					config_setting_source_line(
+						config_setting_get_member(group, "kind")),
+					name);
+	rc = read_named(&named, kind, group, scene->path, err);
+	if (rc)
+		return rc;
+	if (named.file) {
+		file = beside(scene, named.file);
+		if (!file)
+			return incise_error_set(err, ENOMEM, "%s: no memory",
+						scene->path);
+		named.file = file;
+	}
+	scene->surface = kind->make(&named, &why);
+	free(file);
+	if (!scene->surface)
+		return incise_error_set(err, why.code, "%s:%d: its surface: %s",
+					scene->path, config_setting_source_line(group),
+					why.text);
+	return 0;
+}
+
+static int refuse(const struct incise_scene *scene, const config_setting_t *group,
+		  const char *key, const char *expected, struct incise_error *err)
+{
+	const config_setting_t *at = config_setting_get_member(group, key);
+
+	return incise_error_set(err, EINVAL, "%s:%u: picture.%s: expected %s",
+				scene->path, config_setting_source_line(at), key,
+				expected);
+}
+
+static int read_skin(struct incise_scene *scene, const config_setting_t *group,
+		     struct incise_error *err)
+{
+	static const char *const names[] = {"plain", "neck", "liver"};
+	const char *name = NULL;
+	int rc = incise_conf_string(group, scene->path, "skin", &name, err);
+
+	if (rc || !name)
+		return rc;
+	for (int i = 0; i < 3; i++)
+		if (!strcmp(name, names[i])) {
+			scene->picture.skin = (enum incise_skin)i;
+			return 0;
+		}
+	return refuse(scene, group, "skin", "\"plain\", \"neck\" or \"liver\"", err);
+}
+
+static bool is_side(int texture_px)
+{
+	return texture_px >= 256 && texture_px <= 4096 &&
+	       !(texture_px & (texture_px - 1));
+}
+
+static int read_picture_switches(struct incise_scene *scene,
+				 const config_setting_t *group, struct incise_error *err)
+{
+	struct incise_scene_picture *to = &scene->picture;
+	int rc = incise_conf_bool(group, scene->path, "wound", &to->wound, err);
+
+	if (!rc)
+		rc = incise_conf_bool(group, scene->path, "bleeding", &to->bleeding, err);
+	if (!rc)
+		rc = incise_conf_bool(group, scene->path, "larynx", &to->larynx, err);
+	return rc ? rc : read_skin(scene, group, err);
+}
+
+static int read_picture_numbers(struct incise_scene *scene, const config_setting_t *group,
+				struct incise_error *err)
+{
+	struct incise_scene_picture *to = &scene->picture;
+	const char *path = scene->path;
+	int rc = incise_conf_number(group, path, "blood_ul_s_mm2", 0, 100,
+				    &to->blood_ul_s_mm2, err);
+
+	if (!rc)
+		rc = incise_conf_number(group, path, "viscosity_mPa_s", 0.5, 1000,
+					&to->viscosity_mPa_s, err);
+	if (!rc)
+		rc = incise_conf_direction(group, path, "gravity", to->gravity, err);
+	if (!rc)
+		rc = incise_conf_integer(group, path, "seed", 0, INT32_MAX, &to->seed,
+					 err);
+	if (!rc)
+		rc = incise_conf_integer(group, path, "texture_px", 256, 4096,
+					 &to->texture_px, err);
+	if (!rc && !is_side(to->texture_px))
+		rc = refuse(scene, group, "texture_px", "256, 512, 1024, 2048 or 4096",
+			    err);
+	return rc;
+}
+
+static void set_picture_defaults(struct incise_scene_picture *picture)
+{
+	*picture = (struct incise_scene_picture){
+		.texture_px = 2048,
+		.gravity = {0, 0, -1},
+		.blood_ul_s_mm2 = 0.05,
+		.viscosity_mPa_s = 4,
+		.seed = 1,
+	};
+}
+
+static int read_picture(struct incise_scene *scene, const config_setting_t *root,
+			struct incise_error *err)
+{
+	static const char *const keys[] = {"wound",   "bleeding",	"larynx",
+					   "skin",    "blood_ul_s_mm2", "viscosity_mPa_s",
+					   "gravity", "seed",		"texture_px",
+					   NULL};
+	const config_setting_t *group = config_setting_get_member(root, "picture");
+	int rc;
+
+	if (!group)
+		return 0;
+	rc = incise_conf_known(group, scene->path, keys, err);
+	if (!rc)
+		rc = read_picture_switches(scene, group, err);
+	return rc ? rc : read_picture_numbers(scene, group, err);
 }
 
 static bool ends_with(const char *text, const char *end)
@@ -121,7 +354,7 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 
 	if (rc || (!name && !override))
 		return rc;
-	path = override ? strdup(override) : incise_scene_beside(scene, name);
+	path = override ? strdup(override) : beside(scene, name);
 	if (!path)
 		return incise_error_set(err, ENOMEM, "%s: no memory", scene->path);
 	if (ends_with(path, ".fx"))
@@ -143,27 +376,51 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	return 0;
 }
 
+static int read_tissue(struct incise_scene *scene, const config_setting_t *root,
+		       struct incise_error *err)
+{
+	struct number numbers[KEYS_MAX + 1] = {NUMBER(tissue, gain, 0, 10)};
+	const config_setting_t *group;
+	int n = 1;
+
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++) {
+			const struct incise_force_number *from =
+				&incise_tissue_forces[i].number[k];
+			double *to = &scene->tissue.force[i][k];
+
+			if (from->key)
+				numbers[n++] = (struct number){
+					from->key, 0, from->max,
+					(size_t)((char *)to - (char *)scene)};
+		}
+	numbers[n] = (struct number)NUMBER(tissue, leave_mm, 0, 5);
+	return read_group(scene, root, "tissue", numbers, NULL, &group, err);
+}
+
 /* One reaction, and any force at all. */
 static int check_forces(const struct incise_scene *scene, struct incise_error *err)
 {
-	bool model = scene->model || scene->compiled;
+	bool model = scene->model || scene->compiled, any = model;
 
-	if (model && scene->tissue.reaction_N_mm > 0)
-		return incise_error_set(
-			err, EINVAL,
-			"%s: both a model and tissue.reaction_N_mm: a scene has one "
-			"reaction; remove one of them",
-			scene->path);
-	if (!model && !(scene->tissue.reaction_N_mm > 0) &&
-	    !(scene->tissue.plane_N_mm > 0) && !(scene->tissue.damping_N_s_mm > 0) &&
-	    !(scene->tissue.insertion_N_mm > 0) && !(scene->tissue.spread_N_mm > 0))
-		return incise_error_set(
-			err, EINVAL,
-			"%s: no model and no other force: expected model = "
-			"\"FILE.fis\", or tissue = { reaction_N_mm = K; }, or give "
-			"--model",
-			scene->path);
-	return 0;
+	for (int i = 0; i < incise_n_tissue_forces; i++) {
+		bool there = scene->tissue.force[i][0] > 0;
+
+		any |= there;
+		if (there && model && incise_tissue_forces[i].model)
+			return incise_error_set(
+				err, EINVAL,
+				"%s: both a model and tissue.%s: a scene has one "
+				"reaction; remove one of them",
+				scene->path, incise_tissue_forces[i].number[0].key);
+	}
+	if (any)
+		return 0;
+	return incise_error_set(
+		err, EINVAL,
+		"%s: no model and no other force: expected model = \"FILE.fis\", or "
+		"tissue = { reaction_N_mm = K; }, or give --model",
+		scene->path);
 }
 
 static int read_switches(struct incise_scene *scene, const config_setting_t *root,
@@ -192,7 +449,7 @@ static int read_switches(struct incise_scene *scene, const config_setting_t *roo
 	if (!rc && group)
 		rc = incise_conf_integer(group, path, "delay_ticks", 0, 64,
 					 &scene->device.delay_ticks, err);
-	return rc ? rc : incise_scene_read_picture(scene, root, err);
+	return rc ? rc : read_picture(scene, root, err);
 }
 
 static int read_scene(struct incise_scene *scene, const config_setting_t *root,
@@ -214,13 +471,13 @@ static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 	if (!rc && arithmetic)
 		rc = incise_scene_set_arithmetic(scene, arithmetic, err);
 	if (!rc)
-		rc = read_group(scene, root, "tissue", tissue, NULL, &group, err);
+		rc = read_tissue(scene, root, err);
 	if (!rc)
 		rc = read_group(scene, root, "limits", limits, NULL, &group, err);
 	if (!rc)
 		rc = read_switches(scene, root, err);
 	if (!rc)
-		rc = incise_scene_read_surface(scene, root, err);
+		rc = read_surface(scene, root, err);
 	if (!rc)
 		rc = read_model(scene, root, model, err);
 	return rc ? rc : check_forces(scene, err);
@@ -232,7 +489,10 @@ static void set_defaults(struct incise_scene *scene)
 	scene->rate_hz = 1000;
 	scene->fixed = true;
 	scene->tissue.gain = 1;
-	scene->tissue.aligned = 0.2;
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++)
+			scene->tissue.force[i][k] =
+				incise_tissue_forces[i].number[k].initial;
 	/* Of a tracker with ±0.05 mm of noise the poses shown have ±0.16 mm. */
 	scene->tissue.leave_mm = 0.2;
 	scene->effects.average_ticks = 1;
@@ -249,7 +509,7 @@ static void set_defaults(struct incise_scene *scene)
 	scene->limits.fade_ms = 20;
 	scene->limits.ramp_ms = 200;
 	scene->limits.start_N = 0.1;
-	incise_scene_picture_defaults(&scene->picture);
+	set_picture_defaults(&scene->picture);
 }
 
 struct incise_scene *incise_scene_load(const char *path, const char *model,
@@ -330,4 +590,18 @@ void incise_scene_scalpel(const struct incise_scene *scene,
 double incise_scene_rate_hz(const struct incise_scene *scene)
 {
 	return scene->rate_hz;
+}
+
+void incise_scene_picture(const struct incise_scene *scene,
+			  struct incise_scene_picture *picture)
+{
+	*picture = scene->picture;
+}
+
+int incise_scene_set_texture(struct incise_scene *scene, int texture_px)
+{
+	if (!is_side(texture_px))
+		return -EINVAL;
+	scene->picture.texture_px = texture_px;
+	return 0;
 }

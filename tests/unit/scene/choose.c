@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Leaving stages out: each optional stage against the same scene with all stages there and
- * the unneeded ones neutral. To the bit the same ticks, from fewer stages in no more
- * memory, and a reason for each.
+ * lib/scene/choose.c: each optional stage left out, compared with the same scene with all
+ * stages there and the unneeded ones neutral. The ticks are bit-identical, from fewer stages
+ * in no more memory, with a reason for each.
  *
  * What leaving out costs or saves cannot be timed in a test: it counts the stages that run.
  * `incise plan` shows their ns.
@@ -12,6 +12,7 @@
 #include <stdint.h>
 #include <setjmp.h>
 #include <cmocka.h>
+#include "../../../lib/scene/forces.h"
 #include "fed.h"
 
 #define TICKS 2500
@@ -31,43 +32,69 @@ static const struct surface {
 #define PLANE (&surfaces[0])
 #define CAPSULE (&surfaces[1])
 
-/* All stages that there are, in order. */
-static const char *const all[] = {
-	"pose",	 "predict", "tool",	 "contact",  "normal", "reaction",
-	"plane", "damping", "insertion", "spread",   "guard",  "start",
-	"limit", "actuate", "wound",	 "bleeding",
-};
-#define ALL (sizeof(all) / sizeof(*all))
+/* All stages that there are, in order; the forces come before the guard. */
+static const char *all[INCISE_PLAN_STAGES_MAX + 2];
+static size_t n_all;
 
-/* Everything that has a stage. */
-struct wishes {
-	bool model;
-	double gain, reaction, plane, damping, insertion, spread;
-	int average;
-	bool guard;
+static void list_stages(void)
+{
+	static const char *const before[] = {"pose", "predict", "tool", "contact",
+					     "normal"};
+	static const char *const after[] = {"guard",   "start", "limit",
+					    "actuate", "wound", "bleeding"};
+
+	for (size_t i = 0; i < sizeof(before) / sizeof(*before); i++)
+		all[n_all++] = before[i];
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		all[n_all++] = incise_tissue_forces[i].name;
+	for (size_t i = 0; i < sizeof(after) / sizeof(*after); i++)
+		all[n_all++] = after[i];
+}
+
+/* Everything that has a stage, but for these. */
+struct lacking {
+	const char *force; /* the name of one, or "insertion forces", or "all forces" */
+	bool model;	   /* in the place of the reaction */
+	bool no_gain, no_average, no_guard;
 };
-static const struct wishes everything = {false, 1, 0.3, 0.4, 0.002, 0.5, 0.4, 8, true};
+
+static bool has(const struct lacking *w, const struct incise_tissue_force *force)
+{
+	if (force->model && w->model)
+		return false;
+	if (!w->force)
+		return true;
+	if (!strcmp(w->force, "insertion forces"))
+		return force->phases != 1U << INCISE_PHASE_INSERTION;
+	return strcmp(w->force, "all forces") && strcmp(w->force, force->name);
+}
 
 /* A device that holds all this; limits that the stroke runs into. */
-static struct incise_scene *scene_of(const struct wishes *w,
+static struct incise_scene *scene_of(const struct lacking *w,
 				     const struct surface *surface,
 				     const char *arithmetic)
 {
-	char text[1200];
+	char text[1600], tissue[800] = "";
 	struct incise_error err = {0};
 	struct incise_scene *scene;
 
+	for (int i = 0; i < incise_n_tissue_forces; i++) {
+		const struct incise_force_number *number = incise_tissue_forces[i].number;
+		size_t n = strlen(tissue);
+
+		/* Twice as stiff as skin, so that limits are met; 0 is what is tested. */
+		snprintf(tissue + n, sizeof(tissue) - n, "  %s = %#.17g;\n", number->key,
+			 has(w, &incise_tissue_forces[i]) ? 2 * number->skin : 0.0);
+	}
 	snprintf(text, sizeof(text),
 		 "%s arithmetic = \"%s\"; surface = %s;\n"
-		 "tissue = { gain = %.17g; reaction_N_mm = %.17g; plane_N_mm = %.17g;\n"
-		 "  damping_N_s_mm = %.17g; insertion_N_mm = %.17g;\n"
-		 "  spread_N_mm = %.17g; };\n"
+		 "tissue = { gain = %.1f;\n%s };\n"
 		 "effects = { average_ticks = %d; guard = %s; };\n"
 		 "device = { delay_ticks = 0; };\n"
 		 "limits = { force_N = 1.2; slew_N_s = 200.0; ramp_ms = 50.0; };\n",
-		 w->model ? "model = \"m.fis\";" : "", arithmetic, surface->text, w->gain,
-		 w->reaction, w->plane, w->damping, w->insertion, w->spread, w->average,
-		 w->guard ? "true" : "false");
+		 w->model ? "model = \"m.fis\";" : "", arithmetic, surface->text,
+		 w->no_gain ? 0.0 : 1.0, tissue, w->no_average ? 1 : 8,
+		 w->no_guard ? "false" : "true");
 	scene = fed_scene(&folder, text, &err);
 	if (!scene)
 		fail_msg("%s", err.text);
@@ -188,7 +215,7 @@ static void assert_complete(const struct incise_plan *plan)
 {
 	int kept = 0, out = 0;
 
-	for (size_t i = 0; i < ALL; i++) {
+	for (size_t i = 0; i < n_all; i++) {
 		const char *stage = incise_plan_stage(plan, kept), *why = NULL;
 		const char *left = incise_plan_left_out(plan, out, &why);
 
@@ -206,48 +233,46 @@ static void assert_complete(const struct incise_plan *plan)
 	assert_null(incise_plan_left_out(plan, -1, NULL));
 }
 
-/* A scene that lacks something, and how it says so. */
+/* A scene that lacks something, and the reason that the plan gives. */
 struct lack {
 	const char *stage, *why;
-	struct wishes wishes;
+	struct lacking lacking;
 	const char *also; /* another stage that goes with it */
 };
 
+/* One for each force comes before these. */
 static const struct lack lacks[] = {
-	{"tool", "nothing is inserted", {false, 1, 0.3, 0.4, 0.002, 0, 0, 8, true}, NULL},
-	{"normal",
-	 "average_ticks is 1",
-	 {false, 1, 0.3, 0.4, 0.002, 0.5, 0.4, 1, true},
-	 NULL},
-	{"reaction",
-	 "reaction_N_mm is 0",
-	 {false, 1, 0, 0.4, 0.002, 0.5, 0.4, 8, true},
-	 NULL},
-	{"plane", "plane_N_mm is 0", {false, 1, 0.3, 0, 0.002, 0.5, 0.4, 8, true}, NULL},
-	{"plane", "plane_N_mm is 0", {true, 1, 0, 0, 0.002, 0.5, 0.4, 8, true}, NULL},
-	{"damping",
-	 "damping_N_s_mm is 0",
-	 {false, 1, 0.3, 0.4, 0, 0.5, 0.4, 8, true},
-	 NULL},
-	{"insertion",
-	 "insertion_N_mm is 0",
-	 {false, 1, 0.3, 0.4, 0.002, 0, 0.4, 8, true},
-	 NULL},
-	{"spread",
-	 "spread_N_mm is 0",
-	 {false, 1, 0.3, 0.4, 0.002, 0.5, 0, 8, true},
-	 NULL},
+	{"tool", "nothing is inserted", {.force = "insertion forces"}, NULL},
+	{"normal", "average_ticks is 1", {.no_average = true}, NULL},
+	{"plane", "plane_N_mm is 0", {.force = "plane", .model = true}, NULL},
+	{"guard", "guard is false", {.no_guard = true}, NULL},
+	/* One that lacks nearly all: paper 1's. */
 	{"guard",
 	 "guard is false",
-	 {false, 1, 0.3, 0.4, 0.002, 0.5, 0.4, 8, false},
+	 {.force = "all forces", .model = true, .no_average = true, .no_guard = true},
 	 NULL},
-	/* One that lacks nearly all: paper 1's. */
-	{"guard", "guard is false", {true, 1, 0, 0, 0, 0, 0, 1, false}, NULL},
 	/* Nothing is felt, whatever the constants are. */
-	{"reaction", "gain is 0", {true, 0, 0, 0.4, 0.002, 0.5, 0.4, 8, true}, "plane"},
-	{"spread", "gain is 0", {false, 0, 0.3, 0.4, 0.002, 0.5, 0.4, 8, true}, "tool"},
+	{"reaction", "gain is 0", {.model = true, .no_gain = true}, "plane"},
+	{"spread", "gain is 0", {.no_gain = true}, "tool"},
 };
-#define LACKS (sizeof(lacks) / sizeof(*lacks))
+#define LACKS (incise_n_tissue_forces + (int)(sizeof(lacks) / sizeof(*lacks)))
+
+static struct lack lack_of(int i)
+{
+	const struct incise_tissue_force *force = &incise_tissue_forces[i];
+
+	if (i >= incise_n_tissue_forces)
+		return lacks[i - incise_n_tissue_forces];
+	return (struct lack){.stage = force->name,
+			     .why = force->zero,
+			     .lacking = {.force = force->name}};
+}
+
+/* All stages but actuate, of no rig, and those of pictures. */
+static int stages_of_a_loop(void)
+{
+	return (int)n_all - 3;
+}
 
 static void test_lean_is_full_to_the_bit(const struct surface *surface,
 					 const char *arithmetic)
@@ -258,9 +283,10 @@ static void test_lean_is_full_to_the_bit(const struct surface *surface,
 				 INCISE_TICK_STARTING | INCISE_TICK_GUARDED |
 				 INCISE_TICK_EXTRAPOLATED;
 
-	for (size_t i = 0; i < LACKS; i++) {
-		const struct lack *lack = &lacks[i];
-		struct incise_scene *scene = scene_of(&lack->wishes, surface, arithmetic);
+	for (int i = 0; i < LACKS; i++) {
+		const struct lack one = lack_of(i), *lack = &one;
+		struct incise_scene *scene =
+			scene_of(&lack->lacking, surface, arithmetic);
 		struct incise_plan *lean = plan_of(scene), *full;
 
 		incise_scene_set_full(scene, true);
@@ -268,7 +294,7 @@ static void test_lean_is_full_to_the_bit(const struct surface *surface,
 		assert_complete(lean);
 		assert_complete(full);
 		/* The rest, and the actuator of no rig, cannot be kept. */
-		assert_int_equal(stages(full), 13);
+		assert_int_equal(stages(full), stages_of_a_loop());
 		assert_true(stages(lean) < stages(full));
 		/* What only a stage that is left out needs is not there. */
 		assert_true(incise_plan_memory(lean) <= incise_plan_memory(full));
@@ -278,7 +304,7 @@ static void test_lean_is_full_to_the_bit(const struct surface *surface,
 		assert_false(keeps(lean, lack->stage));
 		if (!why_not(lean, lack->stage) ||
 		    !strstr(why_not(lean, lack->stage), lack->why))
-			fail_msg("case %zu: %s left out: %s", i, lack->stage,
+			fail_msg("case %d: %s left out: %s", i, lack->stage,
 				 why_not(lean, lack->stage));
 		if (lack->also)
 			assert_non_null(strstr(why_not(lean, lack->also), lack->why));
@@ -293,7 +319,7 @@ static void test_lean_is_full_to_the_bit(const struct surface *surface,
 	assert_int_equal(seen.phases, 7);
 	assert_int_equal(seen.tools, 1 << INCISE_TOOL_BLADE | 1 << INCISE_TOOL_HANDLE |
 					     1 << INCISE_TOOL_TUBE);
-	assert_true(seen.ticks_with_force > TICKS * (int)LACKS / 4);
+	assert_true(seen.ticks_with_force > TICKS * LACKS / 4);
 }
 
 static void test_plane(void **state)
@@ -314,22 +340,22 @@ static void test_mesh(void **state)
 	test_lean_is_full_to_the_bit(&surfaces[2], arithmetics[1]);
 }
 
-/* All wishes: all is kept, but for what no loop runs and what no rig has. */
+/* A scene that lacks nothing keeps all, but for what no loop runs and what no rig has. */
 static void test_everything(void **state)
 {
-	struct incise_scene *scene = scene_of(&everything, CAPSULE, "fixed");
+	struct incise_scene *scene = scene_of(&(struct lacking){0}, CAPSULE, "fixed");
 	struct incise_plan *plan = plan_of(scene);
 
 	assert_complete(plan);
-	assert_int_equal(stages(plan), 13);
+	assert_int_equal(stages(plan), stages_of_a_loop());
 	assert_non_null(strstr(why_not(plan, "wound"), "picture.wound is false"));
 	assert_non_null(strstr(why_not(plan, "bleeding"), "picture.bleeding is false"));
 	incise_plan_free(plan);
 	incise_scene_free(scene);
 	/* On a plane there is nothing to average. */
-	scene = scene_of(&everything, PLANE, "fixed");
+	scene = scene_of(&(struct lacking){0}, PLANE, "fixed");
 	plan = plan_of(scene);
-	assert_int_equal(stages(plan), 12);
+	assert_int_equal(stages(plan), stages_of_a_loop() - 1);
 	assert_non_null(strstr(why_not(plan, "normal"), "one normal"));
 	incise_plan_free(plan);
 	incise_scene_free(scene);
@@ -351,68 +377,79 @@ static void test_picture(void **state)
 	incise_scene_free(scene);
 }
 
-/* One effect at a time, on a scene that has the reaction or the plane constraint only. */
-static const struct {
-	const char *stage, *with, *neutral;
-} effects[] = {
-	{"reaction", "tissue = { plane_N_mm = 0.4; reaction_N_mm = 0.3; };",
-	 "tissue = { plane_N_mm = 0.4; reaction_N_mm = 0.0; };"},
-	{"plane", "tissue = { plane_N_mm = 0.4; reaction_N_mm = 0.3; };",
-	 "tissue = { reaction_N_mm = 0.3; plane_N_mm = 0.0; };"},
-	{"damping", "tissue = { reaction_N_mm = 0.3; damping_N_s_mm = 0.002; };",
-	 "tissue = { reaction_N_mm = 0.3; damping_N_s_mm = 0.0; };"},
-	{"insertion", "tissue = { reaction_N_mm = 0.3; insertion_N_mm = 0.5; };",
-	 "tissue = { reaction_N_mm = 0.3; insertion_N_mm = 0.0; };"},
-	{"spread", "tissue = { reaction_N_mm = 0.3; spread_N_mm = 0.4; };",
-	 "tissue = { reaction_N_mm = 0.3; spread_N_mm = 0.0; };"},
-	{"normal",
-	 "tissue = { reaction_N_mm = 0.3; }; effects = { average_ticks = 16; };",
-	 "tissue = { reaction_N_mm = 0.3; }; effects = { average_ticks = 1; };"},
-	{"guard", "tissue = { reaction_N_mm = 0.3; }; effects = { guard = true; };",
-	 "tissue = { reaction_N_mm = 0.3; }; effects = { guard = false; };"},
-};
+/*
+ * One stage at a time, on a scene that has the reaction or the plane constraint only: scene
+ * 0 has it, 1 sets it to its neutral value, 2 never names it.
+ */
+static void one_effect(const char *stage, const char *const text[3], int way)
+{
+	struct incise_scene *scene[3];
+	struct incise_plan *plan[3];
+	struct seen seen = {0};
+
+	for (int k = 0; k < 3; k++) {
+		char all_of_it[800];
+
+		snprintf(all_of_it, sizeof(all_of_it),
+			 "arithmetic = \"%s\"; surface = %s;\n%s\n"
+			 "device = { delay_ticks = 0; };\n",
+			 arithmetics[way & 1], surfaces[1 + way / 2].text, text[k]);
+		scene[k] = fed_scene(&folder, all_of_it, NULL);
+		assert_non_null(scene[k]);
+		plan[k] = plan_of(scene[k]);
+		assert_complete(plan[k]);
+		assert_int_equal(keeps(plan[k], stage), !k);
+	}
+	assert_int_equal(stages(plan[1]), stages(plan[2]));
+	assert_true(stages(plan[0]) > stages(plan[1]));
+	compare(plan[1], plan[2], &seen);
+	assert_true(seen.ticks_with_force > 100);
+	for (int k = 0; k < 3; k++) {
+		incise_plan_free(plan[k]);
+		incise_scene_free(scene[k]);
+	}
+}
+
+static void test_one_force(void **state)
+{
+	for (int i = 0; i < incise_n_tissue_forces; i++) {
+		const struct incise_force_number *number = incise_tissue_forces[i].number;
+		const char *other = i ? "reaction_N_mm = 0.3;" : "plane_N_mm = 0.4;";
+		char text[3][120];
+		const char *const texts[] = {text[0], text[1], text[2]};
+
+		snprintf(text[0], sizeof(text[0]), "tissue = { %s %s = %#.9g; };", other,
+			 number->key, number->skin);
+		snprintf(text[1], sizeof(text[1]), "tissue = { %s %s = 0.0; };", other,
+			 number->key);
+		snprintf(text[2], sizeof(text[2]), "tissue = { %s };", other);
+		for (int way = 0; way < 4; way++)
+			one_effect(incise_tissue_forces[i].name, texts, way);
+	}
+}
 
 static void test_one_effect(void **state)
 {
-	for (size_t i = 0; i < sizeof(effects) / sizeof(*effects); i++) {
-		for (int a = 0; a < 4; a++) {
-			const char *text[3] = {effects[i].with, effects[i].neutral,
-					       i ? "tissue = { reaction_N_mm = 0.3; };"
-						 : "tissue = { plane_N_mm = 0.4; };"};
-			struct incise_scene *scene[3];
-			struct incise_plan *plan[3];
-			struct seen seen = {0};
+	static const char tissue[] = "tissue = { reaction_N_mm = 0.3; };";
+	static const char *const average[] = {
+		"tissue = { reaction_N_mm = 0.3; }; effects = { average_ticks = 16; };",
+		"tissue = { reaction_N_mm = 0.3; }; effects = { average_ticks = 1; };",
+		tissue};
+	static const char *const guard[] = {
+		"tissue = { reaction_N_mm = 0.3; }; effects = { guard = true; };",
+		"tissue = { reaction_N_mm = 0.3; }; effects = { guard = false; };",
+		tissue};
 
-			for (int k = 0; k < 3; k++) {
-				char all_of_it[800];
-
-				snprintf(all_of_it, sizeof(all_of_it),
-					 "arithmetic = \"%s\"; surface = %s;\n%s\n"
-					 "device = { delay_ticks = 0; };\n",
-					 arithmetics[a & 1], surfaces[1 + a / 2].text,
-					 text[k]);
-				scene[k] = fed_scene(&folder, all_of_it, NULL);
-				assert_non_null(scene[k]);
-				plan[k] = plan_of(scene[k]);
-				assert_complete(plan[k]);
-				assert_int_equal(keeps(plan[k], effects[i].stage), !k);
-			}
-			/* Set to its neutral value it is as if it were never named. */
-			assert_int_equal(stages(plan[1]), stages(plan[2]));
-			assert_true(stages(plan[0]) > stages(plan[1]));
-			compare(plan[1], plan[2], &seen);
-			assert_true(seen.ticks_with_force > 100);
-			for (int k = 0; k < 3; k++) {
-				incise_plan_free(plan[k]);
-				incise_scene_free(scene[k]);
-			}
-		}
+	for (int way = 0; way < 4; way++) {
+		one_effect("normal", average, way);
+		one_effect("guard", guard, way);
 	}
 }
 
 static int set_up(void **state)
 {
 	fed_folder_make(&folder);
+	list_stages();
 	return 0;
 }
 
@@ -425,9 +462,10 @@ static int tear_down(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_plane),	cmocka_unit_test(test_capsule),
-		cmocka_unit_test(test_mesh),	cmocka_unit_test(test_everything),
-		cmocka_unit_test(test_picture), cmocka_unit_test(test_one_effect),
+		cmocka_unit_test(test_plane),	   cmocka_unit_test(test_capsule),
+		cmocka_unit_test(test_mesh),	   cmocka_unit_test(test_everything),
+		cmocka_unit_test(test_picture),	   cmocka_unit_test(test_one_force),
+		cmocka_unit_test(test_one_effect),
 	};
 
 	return cmocka_run_group_tests(tests, set_up, tear_down);

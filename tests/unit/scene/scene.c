@@ -12,6 +12,20 @@
 #include "../../../lib/scene/scene.h"
 #include "felt.h"
 
+/* A number of a force by its key. */
+static double number(const struct incise_scene *scene, const char *key)
+{
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++) {
+			const char *name = incise_tissue_forces[i].number[k].key;
+
+			if (name && !strcmp(name, key))
+				return scene->tissue.force[i][k];
+		}
+	fail_msg("no force has the number %s", key);
+	return NAN;
+}
+
 static char dir[] = "/tmp/incise-scene-XXXXXX";
 static char path[64], model_path[64];
 
@@ -54,10 +68,12 @@ static void test_defaults(void **state)
 	assert_true(scene->limits.pose_age_ms == 50 && scene->limits.fade_ms == 20);
 	assert_true(scene->limits.ramp_ms == 200 && scene->limits.start_N == 0.1);
 	/* No force of paper 2's without being asked for. */
-	assert_true(scene->tissue.gain == 1 && scene->tissue.aligned == 0.2);
-	assert_true(scene->tissue.reaction_N_mm == 0 && scene->tissue.plane_N_mm == 0);
-	assert_true(scene->tissue.damping_N_s_mm == 0);
-	assert_true(scene->tissue.insertion_N_mm == 0 && scene->tissue.spread_N_mm == 0);
+	assert_true(scene->tissue.gain == 1 && number(scene, "aligned") == 0.2);
+	assert_true(number(scene, "reaction_N_mm") == 0 &&
+		    number(scene, "plane_N_mm") == 0);
+	assert_true(number(scene, "damping_N_s_mm") == 0);
+	assert_true(number(scene, "insertion_N_mm") == 0 &&
+		    number(scene, "spread_N_mm") == 0);
 	assert_true(scene->tissue.leave_mm == 0.2);
 	assert_true(scene->effects.average_ticks == 1 && !scene->effects.guard);
 	assert_true(scene->tool.side[1] == 1 && scene->tool.axis[2] == 1);
@@ -109,11 +125,12 @@ static void test_every_new_key(void **state)
 
 	if (!scene)
 		fail_msg("%s", err.text);
-	assert_true(scene->tissue.gain == 0.5 && scene->tissue.reaction_N_mm == 0.11);
-	assert_true(scene->tissue.plane_N_mm == 0.12);
-	assert_true(scene->tissue.damping_N_s_mm == 0.013);
-	assert_true(scene->tissue.insertion_N_mm == 0.14);
-	assert_true(scene->tissue.aligned == 0.15 && scene->tissue.spread_N_mm == 0.16);
+	assert_true(scene->tissue.gain == 0.5 && number(scene, "reaction_N_mm") == 0.11);
+	assert_true(number(scene, "plane_N_mm") == 0.12);
+	assert_true(number(scene, "damping_N_s_mm") == 0.013);
+	assert_true(number(scene, "insertion_N_mm") == 0.14);
+	assert_true(number(scene, "aligned") == 0.15 &&
+		    number(scene, "spread_N_mm") == 0.16);
 	assert_true(scene->tissue.leave_mm == 0.17);
 	assert_true(scene->effects.average_ticks == 9 && scene->effects.guard);
 	assert_true(scene->tool.side[0] == 1 && scene->tool.side[1] == 0);

@@ -1,18 +1,195 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * From the tissue's force to the actuator, stage by stage, on a plan made by hand.
+ * lib/scene/stages.c, stage by stage, on a plan made by hand.
  */
 #include <stdarg.h>
 #include <stddef.h>
-#include <stdint.h>
 #include <setjmp.h>
+#include <stdint.h>
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <incise/backend.h>
+#include "../../../lib/base/vector.h"
 #include "../../../lib/scene/stages.h"
+
+static const struct incise_tracker_info info = {.rate_hz = 100, .latency_ns = 5000000};
+
+static int read_rc;
+
+static int told_read(struct incise_tracker *tracker,
+		     struct incise_tracker_sample *samples, int n)
+{
+	if (read_rc < 0)
+		return read_rc;
+	samples[0] = (struct incise_tracker_sample){
+		.t_ns = INT64_MAX,
+		.position_mm = {1, 2, 3},
+		.quaternion = {1},
+	};
+	return 1;
+}
+
+static const struct incise_tracker_ops ops = {.read = told_read};
+
+static void test_poses_of_the_future_are_of_now(void **state)
+{
+	struct incise_tracker tracker = {.ops = &ops};
+	struct incise_plan plan = {.tracker = &tracker, .pose_age_ns = 20000000};
+	struct incise_tick tick = {.t_ns = 1000000000};
+
+	incise_predict_init(&plan.predict, &info, 0);
+	read_rc = 0;
+	assert_int_equal(incise_stage_pose(&plan, &tick), 0);
+	assert_int_equal(plan.predict.t_ns, tick.t_ns - info.latency_ns);
+	assert_int_equal(incise_stage_predict(&plan, &tick), 0);
+	assert_int_equal(tick.flags, 0);
+	assert_true(tick.position_mm[2] == 3 && tick.tool_mm[2] == 3);
+	/* A pose is 5 ms old when it comes, and stale from 20 ms on. */
+	tick.t_ns += 15000000;
+	incise_stage_predict(&plan, &tick);
+	assert_int_equal(tick.flags, 0);
+	tick.t_ns += 1;
+	incise_stage_predict(&plan, &tick);
+	assert_int_equal(tick.flags, INCISE_TICK_STALE);
+	read_rc = -ENODEV;
+	assert_int_equal(incise_stage_pose(&plan, &tick), -ENODEV);
+}
+
+/* A quarter turn about x takes the tip's y to z. */
+static void test_tip_of_the_calibration(void **state)
+{
+	struct incise_tracker_sample sample = {
+		.t_ns = 1000000000,
+		.position_mm = {1, 2, 3},
+		.quaternion = {M_SQRT1_2, M_SQRT1_2},
+	};
+	struct incise_plan plan = {.pose_age_ns = 20000000, .fed = &sample, .n_fed = 1};
+	struct incise_tick tick = {.t_ns = 1000000000};
+	const double tip_mm[3] = {10, 20, 0}, huge[3] = {1e7}, none[3] = {NAN};
+
+	assert_int_equal(incise_plan_set_tip(&plan, huge), -EINVAL);
+	assert_int_equal(incise_plan_set_tip(&plan, none), -EINVAL);
+	assert_int_equal(incise_plan_set_tip(&plan, tip_mm), 0);
+	incise_predict_init(&plan.predict, &info, 0);
+	incise_stage_fed(&plan, &tick);
+	incise_stage_predict(&plan, &tick);
+	/* rounding of the quarter turn */
+	assert_true(fabs(tick.position_mm[0] - 11) < 1e-12);
+	assert_true(fabs(tick.position_mm[1] - 2) < 1e-12);
+	assert_true(fabs(tick.position_mm[2] - 23) < 1e-12);
+}
+
+/* A plan over the plane z = 0, the blade 1 mm above it. */
+static struct incise_plan plan_over(struct incise_surface *surface)
+{
+	struct incise_plan plan = {
+		.surface = surface,
+		.attitude = {M_SQRT1_2, 0, 0, M_SQRT1_2},
+		.instrument = {.side = {0, 1, 0}, .held = INCISE_TOOL_BLADE},
+		.force_N = {1, 1, 1},
+	};
+	struct incise_tick tick = {.tool_mm = {0, 0, 1}};
+
+	incise_proxy_init(&plan.proxy, surface, 0.5);
+	incise_stage_contact(&plan, &tick);
+	assert_int_equal(tick.phase, INCISE_PHASE_FREE);
+	return plan;
+}
+
+static struct incise_surface *ground(void)
+{
+	static const double point[3] = {0}, up[3] = {0, 0, 1};
+
+	return incise_surface_new_plane(point, up, NULL);
+}
+
+static void test_a_cut_from_its_begin_to_its_end(void **state)
+{
+	static const struct {
+		double z_mm, depth_mm;
+		bool contact;
+	} way[] = {{-1, 1, true},  {-3, 3, true},      {0, 0, true},
+		   {0.5, 0, true}, {0.5001, 0, false}, {0.25, 0, false}};
+	struct incise_surface *surface = ground();
+	struct incise_plan plan = plan_over(surface);
+
+	for (size_t i = 0; i < sizeof(way) / sizeof(*way); i++) {
+		struct incise_tick tick = {.tool_mm = {2.0 * i, 0, way[i].z_mm}};
+
+		plan.force_N[0] = 5;
+		assert_int_equal(incise_stage_contact(&plan, &tick), 0);
+		/* Each tick's force begins with none. */
+		assert_true(v3_length(plan.force_N) == 0);
+		assert_int_equal(tick.phase == INCISE_PHASE_CUTTING, way[i].contact);
+		assert_int_equal(!!(tick.flags & INCISE_TICK_CONTACT), way[i].contact);
+		assert_true(tick.depth_mm == way[i].depth_mm);
+	}
+	/* It came in at 0, half way down from 1 to -1. */
+	assert_true(v3_length(plan.p0_mm) < 1e-15);
+	/* A quarter turn about z: the blade's side lies along -x, its cut along y, and
+	 * the way along x does not make it longer. */
+	assert_true(fabs(plan.incision.side[0] + 1) < 1e-15);
+	assert_true(fabs(fabs(plan.incision.along[1]) - 1) < 1e-15);
+	assert_true(fabs(plan.incision.to_mm - plan.incision.from_mm) < 1e-14);
+	incise_surface_free(surface);
+}
+
+static void test_an_instrument_leaves_no_cut(void **state)
+{
+	struct incise_surface *surface = ground();
+	struct incise_plan plan = plan_over(surface);
+	struct incise_tick tick = {.tool_mm = {0, 0, -1}};
+
+	plan.instrument.held = INCISE_TOOL_TUBE;
+	assert_int_equal(incise_stage_contact(&plan, &tick), 0);
+	assert_int_equal(tick.phase, INCISE_PHASE_INSERTION);
+	assert_int_equal(tick.tool, INCISE_TOOL_TUBE);
+	assert_false(plan.incision.there);
+	incise_surface_free(surface);
+}
+
+/* Another tool in the hand, also while no poses come: its end is where it is said to be. */
+static void test_the_end_of_what_is_held(void **state)
+{
+	struct incise_surface *surface = ground();
+	struct incise_predict handle;
+	struct incise_tracker_sample pose = {.t_ns = 1000000000,
+					     .position_mm = {0, 0, 50},
+					     .quaternion = {0, 1, 0, 0}};
+	struct incise_plan plan = {
+		.surface = surface,
+		.handle = &handle,
+		.inserts = true,
+		.fed = &pose,
+		.n_fed = 1,
+		.up = {0, 0, 1},
+		.pose_age_ns = 20000000,
+		.instrument = {.axis = {0, 0, 1},
+			       .side = {0, 1, 0},
+			       .handle_mm = 40,
+			       .held = INCISE_TOOL_BLADE},
+	};
+
+	incise_predict_init(&plan.predict, &info, 0);
+	incise_predict_init(&handle, &info, 0);
+	incise_proxy_init(&plan.proxy, surface, 0.5);
+	for (int late = 0; late < 2; late++) {
+		struct incise_tick tick = {.t_ns = 1000000000 + late * 100000000};
+
+		incise_stage_fed(&plan, &tick);
+		incise_stage_predict(&plan, &tick);
+		incise_stage_tool(&plan, &tick);
+		assert_int_equal(!!(tick.flags & INCISE_TICK_STALE), late);
+		/* Upside down: the handle is 40 mm below the tip. */
+		assert_int_equal(tick.tool, INCISE_TOOL_HANDLE);
+		assert_true(tick.position_mm[2] == 50);
+		assert_true(fabs(tick.tool_mm[2] - 10) < 1e-13);
+	}
+	incise_surface_free(surface);
+}
 
 /* An actuator that tells what it was asked, and says what it is told. */
 struct told {
@@ -48,13 +225,13 @@ static int told_cause(struct incise_stepper *stepper, char *text, size_t size)
 	return cause ? snprintf(text, size, "%s", cause) : 0;
 }
 
-static const struct incise_stepper_ops ops = {
+static const struct incise_stepper_ops stepper_ops = {
 	.set = told_set, .status = told_status, .cause = told_cause};
 
 /* A spring of 2 N/mm and a travel of 20 mm, pushing along z. */
 static struct incise_plan plan_on(struct told *told)
 {
-	*told = (struct told){.stepper = {.ops = &ops}};
+	*told = (struct told){.stepper = {.ops = &stepper_ops}};
 	return (struct incise_plan){
 		.stepper = &told->stepper,
 		.actuator = {.spring_N_mm = 2,
@@ -286,6 +463,11 @@ static void test_a_leap_is_no_work(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_poses_of_the_future_are_of_now),
+		cmocka_unit_test(test_tip_of_the_calibration),
+		cmocka_unit_test(test_a_cut_from_its_begin_to_its_end),
+		cmocka_unit_test(test_an_instrument_leaves_no_cut),
+		cmocka_unit_test(test_the_end_of_what_is_held),
 		cmocka_unit_test(test_the_nut_goes_where_its_spring_gives_the_force),
 		cmocka_unit_test(test_the_pose_says_where_the_handle_is),
 		cmocka_unit_test(test_a_fault_of_the_actuator_is_named),

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The forces of paper 2, and paper 1's model as the first of them. P is the tool's end, P0
+ * where the contact began, n the outward normal (the paper's Sn, or Snavg), d the depth.
+ *
+ *   cutting     reaction    F += Kn d n                      §2.2, Fn
+ *               plane       F -= Kx ((P-P0)·s) s             §2.2, Fx
+ *   insertion   insertion   F += Ky d n Fort                 §2.3, Fy
+ *               spread      F -= Kxz (I - n nᵀ)(P-P0)        §2.3, Fxz
+ *   both        damping     F -= Kd v                        §2.2, Fd
+ *
+ * Compared with the paper's print:
+ *
+ * - Fn and Fy print (P-P0)·Sn for the depth and call it the depth of penetration along
+ *   Sn. On a plane the two are one. On a curved surface they part: the blade that glides
+ *   along a neck without pressing has (P-P0)·Sn > 0, which would pull it in. Here d is
+ *   the depth below the surface.
+ * - Fd prints +Kd v. It is to damp, so it opposes v.
+ * - Fxz prints a product of three distances along (Q0-P0), which is always zero when the
+ *   contact begins on the surface. Its sentence asks for a force proportional to the
+ *   distance of the instrument from where its contact began: that is what stands here.
+ */
+#include <math.h>
+#include <incise/fixed.h>
+#include "../base/vector.h"
+#include "forces.h"
+#include "plan.h"
+
+/* Distance from a cut within which an instrument goes in: half a handle's width. */
+#define REACH_MM 5.0
+
+static int32_t to_fixed(double x)
+{
+	return (int32_t)lrint(fmax(-32767, fmin(32767, x)) * INCISE_FIXED_ONE);
+}
+
+/* A spring in integers between two points; only their difference has to fit. */
+static void add_fixed(double force[3], const struct incise_fixed_spring *spring,
+		      const double p[3], const double p0[3], bool push)
+{
+	int32_t off[3], f[3] = {0};
+
+	for (int i = 0; i < 3; i++)
+		off[i] = to_fixed(p[i] - p0[i]);
+	if (push)
+		incise_fixed_spring_push(spring, off, f);
+	else
+		incise_fixed_spring_pull(spring, off, f);
+	for (int i = 0; i < 3; i++)
+		force[i] += (double)f[i] / INCISE_FIXED_ONE;
+}
+
+static incise_force_fn reaction, reaction_fixed, reaction_model, reaction_model_fixed,
+	plane, plane_fixed, damping, insertion, spread;
+
+static void reaction(struct incise_plan *plan, struct incise_tick *tick,
+		     struct incise_acting_force *own)
+{
+	(void)tick;
+	v3_add(plan->force_N, plan->force_N, own->number[0] * plan->depth_mm,
+	       plan->normal);
+}
+
+static void reaction_fixed(struct incise_plan *plan, struct incise_tick *tick,
+			   struct incise_acting_force *own)
+{
+	const double origin[3] = {0};
+	struct incise_fixed_spring spring;
+	double below[3] = {0};
+
+	(void)tick;
+	v3_add(below, below, -plan->depth_mm, plan->normal);
+	if (!incise_fixed_spring_set(&spring, own->number[0], origin, plan->normal))
+		add_fixed(plan->force_N, &spring, below, origin, true);
+}
+
+/* Paper 1, eq. (3), as the size of paper 2's Fn; tissue does not pull. */
+static void add_model(struct incise_plan *plan, struct incise_tick *tick, double size_N,
+		      bool outside)
+{
+	/* With no gain the model is asked only to keep the stage, not for a force. */
+	if (outside && plan->gain > 0)
+		tick->flags |= INCISE_TICK_EXTRAPOLATED;
+	v3_add(plan->force_N, plan->force_N, fmax(plan->gain * size_N, 0), plan->normal);
+}
+
+static void reaction_model(struct incise_plan *plan, struct incise_tick *tick,
+			   struct incise_acting_force *own)
+{
+	double x[] = {plan->depth_mm, tick->velocity_mm_s};
+	unsigned int flags = 0;
+	double size_N;
+
+	(void)own;
+	if (!(plan->depth_mm > 0))
+		return;
+	size_N = incise_model_eval(plan->model, x, &flags);
+	add_model(plan, tick, size_N, flags);
+}
+
+static void reaction_model_fixed(struct incise_plan *plan, struct incise_tick *tick,
+				 struct incise_acting_force *own)
+{
+	double x[] = {plan->depth_mm, tick->velocity_mm_s};
+	bool outside = false;
+
+	(void)own;
+	if (!(plan->depth_mm > 0))
+		return;
+	for (int i = 0; i < 2; i++)
+		outside |= x[i] * INCISE_FIXED_ONE < plan->fixed->input[i].min ||
+			   x[i] * INCISE_FIXED_ONE > plan->fixed->input[i].max;
+	add_model(plan, tick, incise_fixed_eval_double(plan->fixed, x), outside);
+}
+
+/* The blade stays in the plane of its cut: s is Sx(0), its side when the cut began. */
+static void plane(struct incise_plan *plan, struct incise_tick *tick,
+		  struct incise_acting_force *own)
+{
+	double off[3];
+
+	v3_sub(off, tick->tool_mm, plan->p0_mm);
+	v3_add(plan->force_N, plan->force_N,
+	       -own->number[0] * v3_dot(off, plan->incision.side), plan->incision.side);
+}
+
+static void plane_fixed(struct incise_plan *plan, struct incise_tick *tick,
+			struct incise_acting_force *own)
+{
+	const double origin[3] = {0};
+
+	if (plan->proxy.began)
+		incise_fixed_spring_set(&own->state.spring, own->number[0], origin,
+					plan->incision.side);
+	add_fixed(plan->force_N, &own->state.spring, tick->tool_mm, plan->p0_mm, false);
+}
+
+static void damping(struct incise_plan *plan, struct incise_tick *tick,
+		    struct incise_acting_force *own)
+{
+	(void)tick;
+	v3_add(plan->force_N, plan->force_N, -own->number[0], plan->velocity_mm_s);
+}
+
+/*
+ * Fort, aligned … 1: a flat instrument goes in easily, but not freely, when its flat lies
+ * along the cut. Its flat's normal across the cut direction then gives 0; 1 is a quarter turn.
+ */
+static double orientation(const struct incise_plan *plan, double aligned)
+{
+	double flat[3], across;
+
+	v3_rotate(flat, plan->attitude, plan->instrument.side);
+	across = fmin(fabs(v3_dot(flat, plan->incision.along)), 1);
+	return aligned + (1 - aligned) * across;
+}
+
+/* A tube is round: it goes into a cut in any turn. Next to the cut skin holds up either. */
+static void insertion(struct incise_plan *plan, struct incise_tick *tick,
+		      struct incise_acting_force *own)
+{
+	double aligned = own->number[1], factor = 1;
+
+	if (plan->proxy.began)
+		own->state.in_incision = incise_incision_holds(
+			&plan->incision, plan->proxy.first.point_mm, REACH_MM);
+	if (own->state.in_incision)
+		factor = tick->tool == INCISE_TOOL_TUBE ? aligned
+							: orientation(plan, aligned);
+	v3_add(plan->force_N, plan->force_N, own->number[0] * plan->depth_mm * factor,
+	       plan->normal);
+}
+
+/* The tissue around an instrument gives way to a limited extent. */
+static void spread(struct incise_plan *plan, struct incise_tick *tick,
+		   struct incise_acting_force *own)
+{
+	double off[3];
+
+	v3_sub(off, tick->tool_mm, plan->p0_mm);
+	v3_add(off, off, -v3_dot(off, plan->normal), plan->normal);
+	v3_add(plan->force_N, plan->force_N, -own->number[0], off);
+}
+
+#define CUTTING (1U << INCISE_PHASE_CUTTING)
+#define INSERTION (1U << INCISE_PHASE_INSERTION)
+
+const struct incise_tissue_force incise_tissue_forces[] = {
+	{
+		.name = "reaction",
+		.phases = CUTTING,
+		.kind = INCISE_SPRING_NORMAL,
+		.number = {{"reaction_N_mm", 1000, 0, 0.14}},
+		.zero = "no model, and tissue.reaction_N_mm is 0",
+		.run = reaction,
+		.fixed = reaction_fixed,
+		.model = reaction_model,
+		.model_fixed = reaction_model_fixed,
+	},
+	{
+		.name = "plane",
+		.phases = CUTTING,
+		.kind = INCISE_SPRING_SIDE,
+		.number = {{"plane_N_mm", 1000, 0, 0.17}},
+		.zero = "tissue.plane_N_mm is 0",
+		.run = plane,
+		.fixed = plane_fixed,
+	},
+	{
+		.name = "damping",
+		.phases = CUTTING | INSERTION,
+		.kind = INCISE_DAMPER,
+		.number = {{"damping_N_s_mm", 1, 0, 0.0005}},
+		.zero = "tissue.damping_N_s_mm is 0",
+		.run = damping,
+	},
+	{
+		.name = "insertion",
+		.phases = INSERTION,
+		.kind = INCISE_SPRING_NORMAL,
+		.number = {{"insertion_N_mm", 1000, 0, 0.28}, {"aligned", 1, 0.2, 0.2}},
+		.zero = "tissue.insertion_N_mm is 0",
+		.run = insertion,
+	},
+	{
+		.name = "spread",
+		.phases = INSERTION,
+		.kind = INCISE_SPRING_ACROSS,
+		.number = {{"spread_N_mm", 1000, 0, 0.22}},
+		.zero = "tissue.spread_N_mm is 0",
+		.run = spread,
+	},
+};
+const int incise_n_tissue_forces =
+	sizeof(incise_tissue_forces) / sizeof(*incise_tissue_forces);
+_Static_assert(sizeof(incise_tissue_forces) / sizeof(*incise_tissue_forces) <=
+		       INCISE_FORCES_MAX,
+	       "raise INCISE_FORCES_MAX, and INCISE_PLAN_STAGES_MAX with it");

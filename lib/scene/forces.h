@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The forces of a scene's tissue, a row each. Reading a scene, choosing and running stages,
+ * the gain, the stability check, the guard's reserve and the fixed-point bound walk these
+ * rows, so a new force is a row and its function in forces.c, its test, and its text in
+ * incise-scene(5) and incise-haptic(1), which a test compares with the rows.
+ */
+#ifndef INCISE_FORCES_H
+#define INCISE_FORCES_H
+
+#include <stdbool.h>
+#include <incise/export.h>
+#include <incise/fixed_spring.h>
+
+/* A plan keeps at most INCISE_PLAN_STAGES_MAX stages, forces among them. */
+#define INCISE_FORCES_MAX 7
+#define INCISE_FORCE_NUMBERS 2
+
+struct incise_plan;
+struct incise_tick;
+
+/* What the first number of a force is a constant of. Springs store energy: F²/2K at most. */
+enum incise_force_kind {
+	INCISE_SPRING_NORMAL, /* N/mm along the normal of the surface */
+	INCISE_SPRING_ACROSS, /* N/mm across the normal, every direction */
+	INCISE_SPRING_SIDE, /* N/mm along one direction, which may be either of the two */
+	INCISE_DAMPER,	    /* N s/mm against the velocity */
+	INCISE_FRICTION,    /* N against the motion */
+};
+
+/* A number of the group `tissue` of a scene: 0 … max. */
+struct incise_force_number {
+	const char *key;
+	double max, initial;
+	double skin; /* of neck.scene: what tests and benchmarks take */
+};
+
+/* What a force keeps from tick to tick, for one plan. Zeroed with the plan. */
+union incise_force_state {
+	struct incise_fixed_spring
+		spring;	  /* plane in fixed point, set when contact begins */
+	bool in_incision; /* insertion: the instrument went in where the blade had cut */
+};
+
+/* A force as a plan runs it. */
+struct incise_acting_force {
+	const struct incise_tissue_force *force;
+	double number[INCISE_FORCE_NUMBERS]; /* of the scene; the first times the gain */
+	union incise_force_state state;
+};
+
+/* Adds to plan->force_N. Called in the phases of the force only. */
+typedef void incise_force_fn(struct incise_plan *plan, struct incise_tick *tick,
+			     struct incise_acting_force *own) INCISE_REALTIME;
+
+struct incise_tissue_force {
+	const char *name;    /* of its stage */
+	unsigned int phases; /* bits 1 << enum incise_phase */
+	enum incise_force_kind kind;
+	/* The stage is left out where the first number is 0, for the reason @zero. */
+	struct incise_force_number number[INCISE_FORCE_NUMBERS];
+	const char *zero;
+	incise_force_fn *run;
+	incise_force_fn *fixed; /* with arithmetic = "fixed"; NULL: as @run */
+	/* A model takes the place of the first number; NULL: it does not. */
+	incise_force_fn *model, *model_fixed;
+};
+
+/* In the order in which they run. */
+extern const struct incise_tissue_force incise_tissue_forces[];
+extern const int incise_n_tissue_forces;
+
+#endif

@@ -1,0 +1,656 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/scene/forces.c: each force of paper 2 compared with its formula, written out here by
+ * components, and with what the paper's words ask for; where the print cannot be meant, its
+ * formula stands here and shows why. Then the phases of each force, fixed point compared with
+ * double, and the manual pages.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../../../lib/base/vector.h"
+#include "../../../lib/scene/plan.h"
+#include "felt.h"
+
+/* A force by name on a plan made by hand. */
+static struct incise_acting_force *acting(struct incise_plan *plan, const char *name)
+{
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		if (!strcmp(incise_tissue_forces[i].name, name))
+			return &plan->acting[i];
+	abort();
+}
+
+static void run(struct incise_plan *plan, struct incise_tick *tick, const char *name)
+{
+	struct incise_acting_force *own = acting(plan, name);
+
+	own->force->run(plan, tick, own);
+}
+
+static void run_fixed(struct incise_plan *plan, struct incise_tick *tick,
+		      const char *name)
+{
+	struct incise_acting_force *own = acting(plan, name);
+
+	own->force->fixed(plan, tick, own);
+}
+
+static void give(struct incise_plan *plan, const char *name, double number)
+{
+	acting(plan, name)->number[0] = number;
+}
+
+static struct incise_plan plan_with_forces(void)
+{
+	struct incise_plan plan = {.gain = 1, .attitude = {1}};
+
+	for (int i = 0; i < incise_n_tissue_forces; i++) {
+		plan.acting[i].force = &incise_tissue_forces[i];
+		plan.acting[i].number[1] = incise_tissue_forces[i].number[1].initial;
+	}
+	return plan;
+}
+
+/* The formulas, one call each: what the force of that name adds. */
+
+static void effect(double force[3], struct incise_plan *plan, const double p[3],
+		   const char *name, double number)
+{
+	struct incise_tick tick = {0};
+
+	if (p)
+		v3_copy(tick.tool_mm, p);
+	v3_copy(plan->force_N, force);
+	give(plan, name, number);
+	run(plan, &tick, name);
+	v3_copy(force, plan->force_N);
+}
+
+static void reaction(double force[3], double size_N, const double n[3])
+{
+	struct incise_plan plan = plan_with_forces();
+
+	plan.depth_mm = size_N;
+	v3_copy(plan.normal, n);
+	effect(force, &plan, NULL, "reaction", 1);
+}
+
+static void plane(double force[3], double k_N_mm, const double p[3], const double p0[3],
+		  const double side[3])
+{
+	struct incise_plan plan = plan_with_forces();
+
+	v3_copy(plan.p0_mm, p0);
+	v3_copy(plan.incision.side, side);
+	effect(force, &plan, p, "plane", k_N_mm);
+}
+
+static void damping(double force[3], double k_N_s_mm, const double v[3])
+{
+	struct incise_plan plan = plan_with_forces();
+
+	v3_copy(plan.velocity_mm_s, v);
+	effect(force, &plan, NULL, "damping", k_N_s_mm);
+}
+
+static void spread(double force[3], double k_N_mm, const double p[3], const double p0[3],
+		   const double n[3])
+{
+	struct incise_plan plan = plan_with_forces();
+
+	v3_copy(plan.p0_mm, p0);
+	v3_copy(plan.normal, n);
+	effect(force, &plan, p, "spread", k_N_mm);
+}
+
+/* Fort: of a handle in a cut along @along whose flat's normal is @flat, 1 N deep. */
+static double orientation(const double flat[3], const double along[3], double aligned)
+{
+	struct incise_plan plan = plan_with_forces();
+	double force[3] = {0};
+
+	plan.depth_mm = 1;
+	plan.normal[2] = 1;
+	v3_copy(plan.instrument.side, flat);
+	v3_copy(plan.incision.along, along);
+	acting(&plan, "insertion")->state.in_incision = true;
+	acting(&plan, "insertion")->number[1] = aligned;
+	effect(force, &plan, NULL, "insertion", 1);
+	return force[2];
+}
+
+#define CASES 2000
+/* Products of three numbers up to 50 and some sums: a dozen roundings of 1e5 · 2^-53. */
+#define ROUNDING 1e-9
+
+static double dot(const double a[3], const double b[3])
+{
+	return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static double any(double most)
+{
+	return most * (2.0 * rand() / RAND_MAX - 1);
+}
+
+static void any_vector(double v[3], double most)
+{
+	for (int i = 0; i < 3; i++)
+		v[i] = any(most);
+}
+
+static void any_unit(double v[3])
+{
+	double length;
+
+	do {
+		any_vector(v, 1);
+		length = sqrt(dot(v, v));
+	} while (length < 0.1 || length > 1);
+	for (int i = 0; i < 3; i++)
+		v[i] /= length;
+}
+
+static void assert_vector(const double got[3], const double want[3])
+{
+	for (int i = 0; i < 3; i++)
+		assert_true(fabs(got[i] - want[i]) < ROUNDING);
+}
+
+/* What the paper prints, with the signs that it prints. */
+static void printed_fn(double f[3], double k, const double p[3], const double p0[3],
+		       const double sn[3])
+{
+	double along =
+		(p[0] - p0[0]) * sn[0] + (p[1] - p0[1]) * sn[1] + (p[2] - p0[2]) * sn[2];
+
+	for (int i = 0; i < 3; i++)
+		f[i] = -k * along * sn[i];
+}
+
+/* Fxz = Kxz {[(Q - P) - (Q0 - P0)]·(Q - P)} (Q0 - P0) */
+static void printed_fxz(double f[3], double k, const double p[3], const double q[3],
+			const double p0[3], const double q0[3])
+{
+	double brace = 0;
+
+	for (int i = 0; i < 3; i++)
+		brace += ((q[i] - p[i]) - (q0[i] - p0[i])) * (q[i] - p[i]);
+	for (int i = 0; i < 3; i++)
+		f[i] = k * brace * (q0[i] - p0[i]);
+}
+
+/* Each adds to what is there already. */
+static void test_formulas(void **state)
+{
+	srand(1);
+	for (int c = 0; c < CASES; c++) {
+		double was[3], n[3], p[3], p0[3], v[3], got[3], want[3];
+		double k = 5 + any(5), size = 5 + any(5), off;
+
+		any_vector(was, 4);
+		any_unit(n);
+		any_vector(p, 50);
+		any_vector(p0, 50);
+		any_vector(v, 200);
+
+		memcpy(got, was, sizeof(got));
+		reaction(got, size, n);
+		for (int i = 0; i < 3; i++)
+			want[i] = was[i] + size * n[i];
+		assert_vector(got, want);
+
+		/* Fx is printed as it is meant: the same formula as Fn, along Sx(0). */
+		memcpy(got, was, sizeof(got));
+		plane(got, k, p, p0, n);
+		printed_fn(want, k, p, p0, n);
+		for (int i = 0; i < 3; i++)
+			want[i] += was[i];
+		assert_vector(got, want);
+
+		memcpy(got, was, sizeof(got));
+		damping(got, k, v);
+		for (int i = 0; i < 3; i++)
+			want[i] = was[i] - k * v[i];
+		assert_vector(got, want);
+
+		/* The matrix I - n nᵀ in full. */
+		memcpy(got, was, sizeof(got));
+		spread(got, k, p, p0, n);
+		for (int i = 0; i < 3; i++) {
+			off = 0;
+			for (int j = 0; j < 3; j++)
+				off += ((i == j) - n[i] * n[j]) * (p[j] - p0[j]);
+			want[i] = was[i] - k * off;
+		}
+		assert_vector(got, want);
+	}
+}
+
+/* "The user feels greater resistance as the scalpel is penetrated deeper into the skin." */
+static void test_reaction_is_outward_and_grows(void **state)
+{
+	srand(2);
+	for (int c = 0; c < CASES; c++) {
+		double n[3], last = 0;
+
+		any_unit(n);
+		for (double depth = 0; depth < 8; depth += 0.5) {
+			double f[3] = {0};
+
+			reaction(f, 0.25 * depth, n);
+			assert_true(depth > 0 ? dot(f, n) > last : dot(f, n) == 0);
+			last = dot(f, n);
+		}
+	}
+}
+
+/* "A correction force is applied whenever the scalpel drifts from the plane." */
+static void test_plane_is_free_within_and_opposes_leaving(void **state)
+{
+	srand(3);
+	for (int c = 0; c < CASES; c++) {
+		double side[3], p0[3], way[3], p[3], off = any(5);
+		double within[3] = {0}, beside[3] = {0};
+
+		any_unit(side);
+		any_vector(p0, 50);
+		any_vector(way, 20);
+		/* Any way within the plane of the cut. */
+		for (int i = 0; i < 3; i++)
+			p[i] = p0[i] + way[i] - dot(way, side) * side[i];
+		plane(within, 0.3, p, p0, side);
+		for (int i = 0; i < 3; i++) {
+			assert_true(fabs(within[i]) < ROUNDING);
+			p[i] += off * side[i];
+		}
+		plane(beside, 0.3, p, p0, side);
+		assert_true(fabs(dot(beside, side) + 0.3 * off) < ROUNDING);
+	}
+}
+
+/* As printed, +Kd V, it would drive the blade on: F·v = Kd v² > 0. */
+static void test_damping_takes_power(void **state)
+{
+	srand(4);
+	for (int c = 0; c < CASES; c++) {
+		double v[3], f[3] = {0};
+
+		any_vector(v, 500);
+		damping(f, 0.001 * c, v);
+		assert_true(dot(f, v) <= 0);
+	}
+}
+
+/*
+ * "Easily inserted if it is oriented along the cut direction": the flat's normal is then
+ * across the cut. Turned by t about the normal of the surface it is aligned +
+ * (1 - aligned) |sin t|.
+ */
+static void test_orientation(void **state)
+{
+	static const double along[3] = {1, 0, 0};
+
+	for (int a = 0; a <= 10; a++) {
+		double aligned = a / 10.0;
+
+		for (int t = -180; t <= 180; t += 5) {
+			double flat[3] = {-sin(t * M_PI / 180), cos(t * M_PI / 180), 0};
+			double fort = orientation(flat, along, aligned);
+			double want = aligned + (1 - aligned) * fabs(sin(t * M_PI / 180));
+
+			assert_true(fort >= aligned && fort <= 1);
+			assert_true(fabs(fort - want) < 1e-15);
+		}
+	}
+	/* A product that rounding makes larger than 1 does not. */
+	assert_true(orientation((double[]){1 + 1e-12, 0, 0}, along, 0.2) == 1);
+}
+
+/* "Proportional to the distance of the instrument from its initial contact position." */
+static void test_spread_is_proportional(void **state)
+{
+	static const double n[3] = {0, 0, 1}, p0[3] = {3, -2, 0};
+
+	for (int i = -50; i <= 50; i++) {
+		double p[3] = {3 + 0.06 * i, -2 + 0.08 * i, -4}, f[3] = {0};
+
+		spread(f, 0.4, p, p0, n);
+		assert_true(fabs(f[0] + 0.4 * 0.06 * i) < ROUNDING);
+		assert_true(fabs(f[1] + 0.4 * 0.08 * i) < ROUNDING);
+		/* How deep it is does not count: that is Fy's. */
+		assert_true(f[2] == 0);
+	}
+}
+
+/*
+ * The print of Fxz: contact starts on the surface, Q(0) = P(0), so its last factor is 0
+ * and the force is zero for ever, wherever the instrument goes. Ours is not.
+ */
+static void test_printed_spread_is_zero_for_ever(void **state)
+{
+	static const double n[3] = {0, 0, 1}, p0[3] = {3, -2, 0};
+	double f[3], ours[3] = {0}, late[3] = {3, -2, -0.1};
+
+	srand(5);
+	for (int c = 0; c < CASES; c++) {
+		double p[3] = {any(10), any(10), -fabs(any(10))}, q[3] = {p[0], p[1], 0};
+
+		printed_fxz(f, 0.4, p, q, p0, p0);
+		assert_true(f[0] == 0 && f[1] == 0 && f[2] == 0);
+	}
+	spread(ours, 0.4, (double[]){4, -2, -3}, p0, n);
+	assert_true(fabs(ours[0] + 0.4) < ROUNDING);
+	/*
+	 * Nor would a contact that is seen late save it: 0.1 mm deep at first, 3 mm now, a
+	 * force of (3 - 0.1) · 3 · 0.1 along the normal, and none sideways however far it
+	 * is pushed.
+	 */
+	printed_fxz(f, 0.4, (double[]){13, -2, -3}, (double[]){13, -2, 0}, late, p0);
+	assert_true(f[0] == 0 && f[1] == 0);
+	assert_true(fabs(f[2] - 0.4 * 2.9 * 3 * 0.1) < ROUNDING);
+}
+
+/* On a plane the printed depth is ours: P(0) lies in it, whatever the way. */
+static void test_printed_depth_on_a_plane(void **state)
+{
+	srand(6);
+	for (int c = 0; c < CASES; c++) {
+		double n[3], p0[3], way[3], p[3], depth = 4 + any(4);
+		double ours[3] = {0}, printed[3];
+
+		any_unit(n);
+		any_vector(p0, 50);
+		any_vector(way, 20);
+		for (int i = 0; i < 3; i++)
+			p[i] = p0[i] + way[i] - dot(way, n) * n[i] - depth * n[i];
+		reaction(ours, 0.25 * depth, n);
+		printed_fn(printed, 0.25, p, p0, n);
+		assert_vector(ours, printed);
+	}
+}
+
+/*
+ * On a neck of 55 mm radius a blade glides 20 mm around without pressing at all. The
+ * print takes R (1 - cos(20/55)) = 3.60 mm for its depth, to the outside: it pulls the
+ * blade in with 0.90 N. Pressed in by 3 mm there, it still pulls, with 0.15 N, where skin
+ * pushes with 0.75 N.
+ */
+static void test_printed_depth_on_a_sphere_pulls_in(void **state)
+{
+	static const struct {
+		double depth_mm, printed_N, ours_N;
+	} cases[] = {{0, -0.899, 0}, {3, -0.149, 0.75}};
+	const double r = 55, k = 0.25, turn = 20 / r;
+	const double n[3] = {sin(turn), 0, cos(turn)}, p0[3] = {0, 0, r};
+
+	for (size_t c = 0; c < sizeof(cases) / sizeof(*cases); c++) {
+		double d = cases[c].depth_mm, printed[3], ours[3] = {0};
+		double p[3] = {(r - d) * n[0], 0, (r - d) * n[2]};
+
+		printed_fn(printed, k, p, p0, n);
+		reaction(ours, k * d, n);
+		print_message("glided 20 mm, %g mm deep: printed %.3f N, ours %.3f N\n",
+			      d, dot(printed, n), dot(ours, n));
+		/* Half a unit of the last digit written here. */
+		assert_true(fabs(dot(printed, n) - cases[c].printed_N) < 5e-4);
+		assert_true(fabs(dot(ours, n) - cases[c].ours_N) < ROUNDING);
+	}
+}
+
+/* 2 mm deep, 1 mm to both sides of where the contact began, at 10 mm/s along x. */
+static struct incise_plan plan_in_tissue(void)
+{
+	struct incise_plan plan = plan_with_forces();
+
+	plan.normal[2] = 1;
+	plan.depth_mm = 2;
+	plan.velocity_mm_s[0] = 10;
+	plan.instrument.side[1] = plan.incision.side[1] = plan.incision.along[0] = 1;
+	plan.incision.there = plan.proxy.began = true;
+	give(&plan, "reaction", 0.5);
+	give(&plan, "plane", 0.25);
+	give(&plan, "damping", 0.01);
+	give(&plan, "insertion", 0.75);
+	give(&plan, "spread", 0.125);
+	return plan;
+}
+
+static struct incise_tick tick_in(enum incise_phase phase)
+{
+	return (struct incise_tick){
+		.phase = phase,
+		.tool = phase == INCISE_PHASE_INSERTION ? INCISE_TOOL_HANDLE
+							: INCISE_TOOL_BLADE,
+		.tool_mm = {1, 1, -2},
+	};
+}
+
+/* Also that no force is without a case here. */
+static void test_each_force_has_its_phases(void **state)
+{
+	static const struct {
+		const char *name;
+		bool fixed;
+		double cutting_N[3], insertion_N[3];
+	} cases[] = {
+		{"reaction", false, {0, 0, 1}, {0}},
+		{"reaction", true, {0, 0, 1}, {0}},
+		{"plane", false, {0, -0.25, 0}, {0}},
+		{"plane", true, {0, -0.25, 0}, {0}},
+		{"damping", false, {-0.1, 0, 0}, {-0.1, 0, 0}},
+		/* The flat side along the cut: aligned. */
+		{"insertion", false, {0}, {0, 0, 0.3}},
+		{"spread", false, {0}, {-0.125, -0.125, 0}},
+	};
+	bool seen[INCISE_FORCES_MAX] = {0}, seen_fixed[INCISE_FORCES_MAX] = {0};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
+		for (int phase = 0; phase < 3; phase++) {
+			const double none[3] = {0};
+			const double *want =
+				phase == INCISE_PHASE_CUTTING	  ? cases[i].cutting_N
+				: phase == INCISE_PHASE_INSERTION ? cases[i].insertion_N
+								  : none;
+			struct incise_plan plan = plan_in_tissue();
+			struct incise_tick tick = tick_in(phase);
+			struct incise_acting_force *own = acting(&plan, cases[i].name);
+			/* Added to what is there. */
+			const double before[3] = {1, 2, 3};
+			bool acts = want[0] != 0 || want[1] != 0 || want[2] != 0;
+
+			(cases[i].fixed ? seen_fixed : seen)[own - plan.acting] = true;
+			/* The plan runs it in just these phases. */
+			assert_int_equal(own->force->phases >> phase & 1, acts);
+			v3_copy(plan.force_N, before);
+			if (!acts)
+				continue;
+			(cases[i].fixed ? run_fixed : run)(&plan, &tick, cases[i].name);
+			for (int k = 0; k < 3; k++)
+				/* Numbers that fixed point holds; sums of ulps of 3. */
+				if (!(fabs(plan.force_N[k] - before[k] - want[k]) <
+				      1e-15))
+					fail_msg("%s in phase %d: part %d is %.17g",
+						 cases[i].name, phase, k,
+						 plan.force_N[k] - before[k]);
+		}
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		if (!seen[i] || (incise_tissue_forces[i].fixed && !seen_fixed[i]))
+			fail_msg("%s has no case", incise_tissue_forces[i].name);
+}
+
+static void test_insertion_by_turn_and_place(void **state)
+{
+	/* A quarter turn about z lays the flat across the cut. */
+	static const struct {
+		double attitude[4], at_mm[3];
+		enum incise_tool tool;
+		double want_N;
+	} cases[] = {
+		{{1, 0, 0, 0}, {0, 0, 0}, INCISE_TOOL_HANDLE, 0.3},
+		{{M_SQRT1_2, 0, 0, M_SQRT1_2}, {0, 0, 0}, INCISE_TOOL_HANDLE, 1.5},
+		{{M_SQRT1_2, 0, 0, M_SQRT1_2}, {0, 0, 0}, INCISE_TOOL_TUBE, 0.3},
+		{{1, 0, 0, 0}, {0, 4.9, 0}, INCISE_TOOL_HANDLE, 0.3},
+		{{1, 0, 0, 0}, {0, 5.1, 0}, INCISE_TOOL_HANDLE, 1.5},
+		{{1, 0, 0, 0}, {0, 5.1, 0}, INCISE_TOOL_TUBE, 1.5},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_plan plan = plan_in_tissue();
+		struct incise_tick tick = tick_in(INCISE_PHASE_INSERTION);
+
+		tick.tool = cases[i].tool;
+		memcpy(plan.attitude, cases[i].attitude, sizeof(plan.attitude));
+		v3_copy(plan.proxy.first.point_mm, cases[i].at_mm);
+		run(&plan, &tick, "insertion");
+		if (!(fabs(plan.force_N[2] - cases[i].want_N) < 1e-15))
+			fail_msg("case %zu: %.17g N", i, plan.force_N[2]);
+		/* What the begin decided holds for the contact, wherever it goes. */
+		plan.proxy.began = false;
+		plan.proxy.first.point_mm[1] = 100;
+		plan.force_N[2] = 0;
+		run(&plan, &tick, "insertion");
+		assert_true(fabs(plan.force_N[2] - cases[i].want_N) < 1e-15);
+	}
+}
+
+static double some(unsigned int *seed, double size)
+{
+	return size * (2.0 * rand_r(seed) / RAND_MAX - 1);
+}
+
+/* Springs in integers beside the same in double, within what is certified for them. */
+static void test_fixed_is_within_its_bound(void **state)
+{
+	unsigned int seed = 3;
+	int apart = 0;
+
+	for (int i = 0; i < 100000; i++) {
+		struct incise_plan plan = plan_in_tissue(), fixed;
+		struct incise_tick tick = tick_in(INCISE_PHASE_CUTTING);
+		double n[3] = {some(&seed, 1), some(&seed, 1), some(&seed, 1)};
+		double off[3], bound_N, reaction_N_mm, plane_N_mm;
+
+		if (!v3_unit(plan.normal, n, 0.1))
+			continue;
+		v3_unit(plan.incision.side, n, 0.1);
+		for (int k = 0; k < 3; k++) {
+			/* Far away, too: only the difference has to fit. */
+			plan.p0_mm[k] = some(&seed, 1e5);
+			tick.tool_mm[k] = plan.p0_mm[k] + some(&seed, 10);
+		}
+		plan.depth_mm = fabs(some(&seed, 20));
+		reaction_N_mm = fabs(some(&seed, 2));
+		plane_N_mm = fabs(some(&seed, 2));
+		give(&plan, "reaction", reaction_N_mm);
+		give(&plan, "plane", plane_N_mm);
+		fixed = plan;
+		run(&plan, &tick, "reaction");
+		run(&plan, &tick, "plane");
+		run_fixed(&fixed, &tick, "reaction");
+		run_fixed(&fixed, &tick, "plane");
+		v3_sub(off, plan.force_N, fixed.force_N);
+		/* 20 mm deep, and 10 mm along each axis. */
+		bound_N = incise_fixed_spring_bound(reaction_N_mm, 20) +
+			  incise_fixed_spring_bound(plane_N_mm, 10 * sqrt(3));
+		/* Rounding of the double beside it: some ulp of 100 N. */
+		assert_true(v3_length(off) <= bound_N + 1e-13);
+		apart += v3_length(off) > 0;
+	}
+	/* They are two arithmetics, not one. */
+	assert_true(apart > 90000);
+}
+
+static void test_tissue_does_not_pull_and_gain_counts(void **state)
+{
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 0.1);
+
+	for (int sign = -1; sign <= 1; sign += 2) {
+		for (int r = 0; r < 20; r++) {
+			double p[] = {sign * 0.5, 0, 0};
+
+			incise_model_set_consequent(model, r, p);
+		}
+		for (int deep = 0; deep < 2; deep++) {
+			struct incise_plan plan = plan_in_tissue();
+			struct incise_tick tick = tick_in(INCISE_PHASE_CUTTING);
+
+			plan.model = model;
+			plan.gain = 3;
+			plan.depth_mm = deep;
+			acting(&plan, "reaction")
+				->force->model(&plan, &tick, acting(&plan, "reaction"));
+			/* Weights that add up to 1 within some ulp. */
+			assert_true(fabs(plan.force_N[2] - (sign > 0 && deep ? 1.5 : 0)) <
+				    1e-14);
+		}
+	}
+	incise_model_free(model);
+}
+
+static char *page(const char *name)
+{
+	char path[256], *text = calloc(1, 200000);
+	const char *root = getenv("INCISE_ROOT");
+	FILE *in;
+
+	snprintf(path, sizeof(path), "%s/man/%s", root ? root : ".", name);
+	in = fopen(path, "r");
+	if (!in)
+		fail_msg("%s: run from the top of the tree, or set INCISE_ROOT", path);
+	assert_true(fread(text, 1, 199999, in) > 0);
+	fclose(in);
+	return text;
+}
+
+/* Each number of a force is in incise-scene(5), its stage there and in incise-haptic(1). */
+static void test_manual_has_each_force(void **state)
+{
+	char *scene = page("incise-scene.5"), *haptic = page("incise-haptic.1"), item[64];
+
+	for (int i = 0; i < incise_n_tissue_forces; i++) {
+		const struct incise_tissue_force *force = &incise_tissue_forces[i];
+
+		for (int k = 0; k < INCISE_FORCE_NUMBERS && force->number[k].key; k++) {
+			snprintf(item, sizeof(item), ".It Ic %s\n", force->number[k].key);
+			if (!strstr(scene, item))
+				fail_msg("incise-scene(5) has no %s", item);
+		}
+		snprintf(item, sizeof(item), " %s ", force->name);
+		if (!strstr(strstr(scene, ".Sh FORCES"), item))
+			fail_msg("incise-scene(5), FORCES, has no%s", item);
+		snprintf(item, sizeof(item), "Op Li %s", force->name);
+		if (!strstr(haptic, item))
+			fail_msg("incise-haptic(1) has no %s", item);
+	}
+	free(scene);
+	free(haptic);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_formulas),
+		cmocka_unit_test(test_reaction_is_outward_and_grows),
+		cmocka_unit_test(test_plane_is_free_within_and_opposes_leaving),
+		cmocka_unit_test(test_damping_takes_power),
+		cmocka_unit_test(test_orientation),
+		cmocka_unit_test(test_spread_is_proportional),
+		cmocka_unit_test(test_printed_spread_is_zero_for_ever),
+		cmocka_unit_test(test_printed_depth_on_a_plane),
+		cmocka_unit_test(test_printed_depth_on_a_sphere_pulls_in),
+		cmocka_unit_test(test_each_force_has_its_phases),
+		cmocka_unit_test(test_insertion_by_turn_and_place),
+		cmocka_unit_test(test_fixed_is_within_its_bound),
+		cmocka_unit_test(test_tissue_does_not_pull_and_gain_counts),
+		cmocka_unit_test(test_manual_has_each_force),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
