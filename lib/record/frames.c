@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Pictures in a file: finding the module that does it; see frames.h.
+ * Frames in a file: loads the module that writes and reads it; see frames.h.
  *
- * It is not unloaded: libavcodec leaves in threads that used it what runs when they end.
+ * The module is not unloaded: libavcodec leaves destructors in the threads that used it.
  */
 #include <errno.h>
 #include "../device/module.h"

@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Pictures in a file, NAME.rec/camera.mkv: Matroska with one track of video, MJPEG as it came
- * or FFV1, which loses nothing. What writes and reads it is a module on libavformat,
- * frames_mkv.so, mapped at first use, to stay.
+ * Frames of a camera in a file, NAME.rec/camera.mkv: Matroska with one video track, MJPEG as
+ * the camera sent it or lossless FFV1. A module on libavformat, frames_mkv.so, writes and reads
+ * it; it is loaded at first use and stays loaded.
  *
  *     camera ─► pump (frame_pump.h) ─► writer ─► camera.mkv ─► reader
  *
  * In the file:
- *   * one cluster per picture, whole in the kernel when put() returns: a kill costs no
- *     picture that was put. There is no index and nothing is patched in at the end, so a
- *     file that was cut off has the form of one that was not.
- *   * the time of a block is ms after the first picture: Matroska's usual scale, and the one
- *     that libavformat writes. It says t_ns to ± 0.5 ms; where pictures are closer than 1 ms
- *     it is made to step by 1 ms. Nothing is lost by it, because beside each picture is
- *   * BlockAdditional 1, 24 bytes, big-endian, which players pass over:
+ *   * one cluster per frame, whole in the kernel when put() returns: a kill costs no
+ *     frame that was put. There is no index and nothing is patched in at the end, so a
+ *     truncated file has the form of a whole one.
+ *   * the time of a block is ms after the first frame: Matroska's usual scale, and the one
+ *     that libavformat writes. It is t_ns to ± 0.5 ms; where frames are closer than 1 ms
+ *     it steps by 1 ms. The exact time is in
+ *   * BlockAdditional 1, 24 bytes, big-endian, which players ignore:
  *       0  'I' 'N' 'C' 1      4  CRC-32 (as zlib's) of the block's bytes
  *       8  t_ns, of CLOCK_MONOTONIC, signed      16  seq
- *   * FFV1: version 3, every picture by itself, 4 slices with a CRC each, Golomb-Rice.
+ *   * FFV1: version 3, intra only, 4 slices with a CRC each, Golomb-Rice.
  *     YUYV is yuv422p in it, grey gray8, RGB bgr0.
  *   * CRC-32 of each cluster, as Matroska has it.
  */
@@ -31,9 +31,9 @@
 #define INCISE_FRAMES_FILE "camera.mkv" /* inside the folder NAME.rec */
 #define INCISE_FRAMES_SIDE_MIN 16	/* pixels */
 #define INCISE_FRAMES_SIDE_MAX 8192
-#define INCISE_FRAMES_BYTES_MAX ((size_t)1 << 28) /* of a picture: 8192² RGB fits */
+#define INCISE_FRAMES_BYTES_MAX ((size_t)1 << 28) /* of a frame: 8192² RGB fits */
 
-/* What does not change from picture to picture. YUYV is of even width. */
+/* The form of all frames of a file. YUYV has an even width. */
 struct incise_frames_shape {
 	int width, height;
 	enum incise_pixels pixels;
@@ -42,14 +42,24 @@ struct incise_frames_shape {
 
 struct incise_frames_options {
 	int threads;	 /* of FFV1, 1 to 4; 0: 1, the one that calls put() */
-	int64_t sync_ns; /* fdatasync(2) in put() so often; 0: in close() only */
+	int64_t sync_ns; /* between two fdatasync(2) in put(); 0: in close() only */
 };
 
-/* How a picture is in the file. */
+/* A frame in the file. */
 struct incise_frames_stored {
 	int64_t pts_ms; /* unique, ascending */
 	uint32_t bytes;
 	uint32_t crc; /* CRC-32 of them */
+};
+
+/* A row of the table frames: a frame in the file, and vision's result. */
+struct incise_frame_record {
+	uint64_t seq;
+	int64_t t_ns, arrival_ns;
+	int64_t pts_ms;
+	uint32_t bytes, crc;
+	/* By vision. NaN: not looked at, or no handle found (then the quality is 0). */
+	double length_px, sd_px, depth_mm, quality;
 };
 
 /* --- writer ------------------------------------------------------------------------ */
@@ -63,14 +73,14 @@ struct incise_frames_writer_ops {
 	int (*close)(struct incise_frames_writer *writer, struct incise_error *err);
 };
 
-/* One thread at a time. Blocks as long as the disk does. */
+/* For one thread at a time. Blocks as long as the disk does. */
 struct incise_frames_writer {
 	const struct incise_frames_writer_ops *ops;
 };
 
 /*
- * Begin a file, which must not exist.
- * NULL with errno: EINVAL (a shape that is none), EEXIST, ENOMEM, those of open(2) and
+ * Create a file, which must not exist.
+ * NULL with errno: EINVAL (an impossible shape), EEXIST, ENOMEM, those of open(2) and
  * write(2), and ENOENT, ENOEXEC (the module).
  */
 struct incise_frames_writer *incise_frames_writer_new(
@@ -78,9 +88,9 @@ struct incise_frames_writer *incise_frames_writer_new(
 	const struct incise_frames_options *options, struct incise_error *err);
 
 /*
- * 0: the picture is in the kernel, and a kill cannot take it. -EINVAL: it is not of the
- * shape, and the next one may be. Else (-ENOSPC, -EIO, …) the file ends behind the last
- * picture that was put, and every further call gives the same error.
+ * 0: the frame is in the kernel, and a kill does not lose it. -EINVAL: it is not of the
+ * shape; the next one may be. Any other error (-ENOSPC, -EIO, …) ends the file behind the last
+ * frame that was put, and every further call returns the same error.
  */
 int incise_frames_put(struct incise_frames_writer *writer,
 		      const struct incise_camera_frame *frame,
@@ -101,26 +111,25 @@ struct incise_frames_reader_ops {
 	void (*close)(struct incise_frames_reader *reader);
 };
 
-/* One thread at a time. */
+/* For one thread at a time. */
 struct incise_frames_reader {
 	const struct incise_frames_reader_ops *ops;
-	/* May be set between two pictures: FFV1 is not decoded, which takes some 25 ms, and
-	 * pictures of it have no data. Their bytes are held against their CRC as ever. */
+	/* May be set between two frames: FFV1 is not decoded, which saves some 25 ms each, and
+	 * frames have no data. Their CRC is still checked. */
 	bool undecoded;
 };
 
 /*
- * Open a file, which may be cut off, or still grow. NULL with errno: EINVAL (it is no file of
+ * Open a file, which may be truncated or still grow. NULL with errno: EINVAL (not a file of
  * this kind), ENOMEM, those of open(2), and ENOENT, ENOEXEC (the module).
  */
 struct incise_frames_reader *incise_frames_reader_new(const char *path,
 						      struct incise_error *err);
 
 /*
- * The next picture, as it was put, with stride of its width; its bytes are the reader's until
- * the next call. 1; 0 at the end, also where it was cut off; -EBADMSG: one that is
- * altered (its t_ns and seq are as the file says, its data NULL), and the next may be read;
- * -EIO, -ENOMEM.
+ * Read the next frame as it was put, without row padding; its bytes are valid until the next
+ * call. 1; 0 at the end, also that of a truncated file; -EBADMSG: an altered frame (with t_ns
+ * and seq of the file, data NULL), and the next may be read; -EIO, -ENOMEM.
  */
 int incise_frames_next(struct incise_frames_reader *reader,
 		       struct incise_camera_frame *frame,
@@ -133,7 +142,7 @@ void incise_frames_reader_close(struct incise_frames_reader *reader);
 #define INCISE_FRAMES_ABI 2
 #define INCISE_FRAMES_SYMBOL "incise_frames"
 
-/* What frames_mkv.so exports. */
+/* Exported by frames_mkv.so. */
 struct incise_frames_module {
 	unsigned int abi;
 	struct incise_frames_writer *(*create)(

@@ -20,7 +20,7 @@
 #include <stdint.h>
 #include <sqlite3.h>
 #include <incise/tracker.h>
-#include "write/frame_pump.h"
+#include "frames.h"
 
 /* A stream, its table, and how the columns of a row are encoded. */
 struct incise_ledger_form {

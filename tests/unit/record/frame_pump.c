@@ -302,7 +302,7 @@ static void a_stall_is_bridged(void **state)
 	struct incise_frame_record record;
 
 	assert_int_equal(stats.written, 120);
-	assert_int_equal(stats.room, 150);
+	assert_int_equal(stats.capacity, 150);
 	/* It did stall: of 90 pictures most have waited. */
 	assert_true(stats.waiting_most > 45);
 	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
