@@ -142,7 +142,6 @@ void incise_frames_reader_close(struct incise_frames_reader *reader);
 #define INCISE_FRAMES_ABI 2
 #define INCISE_FRAMES_SYMBOL "incise_frames"
 
-/* Exported by frames_mkv.so. */
 struct incise_frames_module {
 	unsigned int abi;
 	struct incise_frames_writer *(*create)(
@@ -150,6 +149,9 @@ struct incise_frames_module {
 		const struct incise_frames_options *options, struct incise_error *err);
 	struct incise_frames_reader *(*open)(const char *path, struct incise_error *err);
 };
+
+/* Exported by frames_mkv.so. */
+INCISE_API extern const struct incise_frames_module incise_frames;
 
 /* Bytes of a row without padding; 0: MJPEG has none. */
 static inline size_t incise_frames_row(enum incise_pixels pixels, int width)

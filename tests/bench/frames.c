@@ -13,7 +13,7 @@
 #include <time.h>
 #include <unistd.h>
 #include <incise/rig.h>
-#include "../../lib/record/mkv/mkv.h"
+#include "../../lib/record/frames.h"
 
 #define WIDTH 640
 #define HEIGHT 480
@@ -107,7 +107,7 @@ int main(int argc, char **argv)
 
 		snprintf(path, sizeof(path), "%s/bench-%s.mkv", argv[1], names[f]);
 		unlink(path);
-		writer = mkv_writer_new(path, &shape, &options, &err);
+		writer = incise_frames.create(path, &shape, &options, &err);
 		cpu = seconds(CLOCK_PROCESS_CPUTIME_ID);
 		wall = seconds(CLOCK_MONOTONIC);
 		for (int i = 0; writer && i < pictures; i++) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/record/mkv/mkv_writer.c: what is put comes back to the byte, with its times; a file that
- * is cut off at any byte gives all that is whole before it; a disk that is full,
- * writes little at once, or fails; kill -9.
+ * lib/record/mkv/frames_mkv.c: frames come back to the byte, with their times; a file truncated
+ * at any byte gives all whole frames before it; a disk that is full, writes short, or fails;
+ * kill -9, also of the pump of the virtual camera.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,15 +11,84 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
-#include "../../../lib/record/mkv/mkv.h"
-#include "film.h"
+#include <unistd.h>
+#include <incise/backend.h>
+#include <incise/rig.h>
+#include "../../../lib/record/frames.h"
+#include "../../../lib/record/write/frame_pump.h"
 
 #define ROOM (1 << 20)
+#define MS 1000000LL
+#define PICTURES 20
+
+/* --- made-up frames ------------------------------------------------------------------ */
+
+#define FILM_FROM_NS 5000000000LL /* of the clock, when the first is taken */
+#define FILM_STEP_NS 16666667LL
+
+/* The same bytes for the same number: smooth in places, noise in others. */
+static uint8_t film_byte(uint64_t n, size_t i)
+{
+	uint64_t x = (n + 1) * 0x9e3779b97f4a7c15ULL + i * 0xbf58476d1ce4e5b9ULL;
+
+	x ^= x >> 29;
+	x *= 0x94d049bb133111ebULL;
+	return (uint8_t)(i / 64 % 2 ? x >> 56 : i / 7 + n);
+}
+
+/*
+ * Picture @n. Rows are @pad bytes longer than their pixels. An "MJPEG" one is of any length
+ * and of bytes that no decoder would take: they must come back all the same.
+ */
+static struct incise_camera_frame film_frame(const struct incise_frames_shape *s,
+					     uint64_t n, int pad, uint8_t *bytes)
+{
+	struct incise_camera_frame frame = {
+		.t_ns = FILM_FROM_NS + (int64_t)n * FILM_STEP_NS,
+		.seq = n,
+		.width = s->width,
+		.height = s->height,
+		.pixels = s->pixels,
+		.data = bytes,
+	};
+
+	if (s->pixels == INCISE_PIXELS_MJPEG) {
+		frame.size = 1 + (n * 977) % 5000;
+	} else {
+		frame.stride = (int)incise_frames_row(s->pixels, s->width) + pad;
+		frame.size = (size_t)frame.stride * (size_t)s->height;
+	}
+	for (size_t i = 0; i < frame.size; i++)
+		bytes[i] = film_byte(n, i);
+	return frame;
+}
+
+/* A new folder; the path of the file in it. */
+static void film_path(char *path, size_t size)
+{
+	char folder[] = "/tmp/incise-film-XXXXXX";
+
+	if (!mkdtemp(folder))
+		abort();
+	snprintf(path, size, "%s/camera.mkv", folder);
+}
+
+static void film_remove(char *path)
+{
+	unlink(path);
+	*strrchr(path, '/') = '\0';
+	rmdir(path);
+}
+
+/* --- the file ------------------------------------------------------------------------ */
 
 static const struct incise_frames_shape shapes[] = {
 	{64, 48, INCISE_PIXELS_RGB, 60},   {66, 50, INCISE_PIXELS_GREY, 60},
@@ -55,7 +124,8 @@ static struct incise_frames_writer *begin(const char *path,
 					  const struct incise_frames_shape *shape)
 {
 	struct incise_error err = {0};
-	struct incise_frames_writer *writer = mkv_writer_new(path, shape, NULL, &err);
+	struct incise_frames_writer *writer =
+		incise_frames.create(path, shape, NULL, &err);
 
 	if (!writer)
 		fail_msg("%s", err.text);
@@ -101,7 +171,7 @@ static void is_picture(const struct incise_camera_frame *frame,
 static uint64_t count(const char *path, const struct incise_frames_shape *shape)
 {
 	struct incise_error err = {0};
-	struct incise_frames_reader *reader = mkv_reader_new(path, &err);
+	struct incise_frames_reader *reader = incise_frames.open(path, &err);
 	struct incise_camera_frame frame;
 	struct incise_frames_stored stored;
 	uint64_t n = 0;
@@ -151,7 +221,7 @@ static void comes_back_to_the_byte(void **state)
 		/* A file that is ended is no other than one that is not. */
 		assert_int_equal(stat(path, &after), 0);
 		assert_int_equal(after.st_size, before.st_size);
-		reader = mkv_reader_new(path, &err);
+		reader = incise_frames.open(path, &err);
 		if (!reader)
 			fail_msg("%s", err.text);
 		for (int n = 0; n < pictures; n++) {
@@ -203,7 +273,7 @@ static void any_time_is_kept(void **state)
 		assert_int_equal(stored.pts_ms, row[i].pts_ms);
 	}
 	assert_int_equal(writer->ops->close(writer, NULL), 0);
-	reader = mkv_reader_new(path, NULL);
+	reader = incise_frames.open(path, NULL);
 	assert_non_null(reader);
 	for (size_t i = 0; i < sizeof(row) / sizeof(*row); i++) {
 		assert_int_equal(reader->ops->next(reader, &frame, &stored, NULL), 1);
@@ -233,14 +303,14 @@ static void refuses(void **state)
 	film_path(path, sizeof(path));
 	for (size_t i = 0; i < sizeof(none) / sizeof(*none); i++) {
 		errno = 0;
-		assert_null(mkv_writer_new(path, &none[i], NULL, &err));
+		assert_null(incise_frames.create(path, &none[i], NULL, &err));
 		assert_int_equal(errno, EINVAL);
 	}
-	assert_null(mkv_reader_new(path, &err));
+	assert_null(incise_frames.open(path, &err));
 	assert_int_equal(err.code, ENOENT);
 	writer = begin(path, &shapes[0]);
 	errno = 0;
-	assert_null(mkv_writer_new(path, &shapes[0], NULL, &err));
+	assert_null(incise_frames.create(path, &shapes[0], NULL, &err));
 	assert_int_equal(errno, EEXIST);
 	for (int i = 0; i < 5; i++) {
 		frame = film_frame(&shapes[0], 0, 0, bytes);
@@ -331,7 +401,7 @@ static void altered_bytes_are_found(void **state)
 		assert_int_equal(fseek(file, -1, SEEK_CUR), 0);
 		fputc(c ^ 1, file);
 		fclose(file);
-		reader = mkv_reader_new(path, NULL);
+		reader = incise_frames.open(path, NULL);
 		assert_non_null(reader);
 		reader->undecoded = i >= 4;
 		for (uint64_t n = 0; n < 6; n++) {
@@ -373,7 +443,7 @@ static void noise_ends(void **state)
 			fputc(film_byte(round, 64 + k), file);
 		}
 		fclose(file);
-		reader = mkv_reader_new(path, NULL);
+		reader = incise_frames.open(path, NULL);
 		while (reader && steps++ < 100) {
 			int rc = reader->ops->next(reader, &frame, &stored, NULL);
 
@@ -451,7 +521,7 @@ static void a_disk_that_fails(void **state)
 
 		film_path(path, sizeof(path));
 		disk.room = room;
-		writer = mkv_writer_new(path, &shapes[3], NULL, &err);
+		writer = incise_frames.create(path, &shapes[3], NULL, &err);
 		while (writer && !rc && n < 100) {
 			struct incise_camera_frame frame =
 				film_frame(&shapes[3], n++, 0, bytes);
@@ -495,7 +565,7 @@ static void killed(void **state)
 		assert_true(child >= 0);
 		if (!child) {
 			struct incise_frames_writer *writer =
-				mkv_writer_new(path, shape, NULL, NULL);
+				incise_frames.create(path, shape, NULL, NULL);
 			static uint8_t bytes[ROOM];
 
 			for (uint64_t n = 0; writer; n++) {
@@ -524,6 +594,226 @@ static void killed(void **state)
 	assert_true(most > 10);
 }
 
+/* --- the pump and the file ----------------------------------------------------------- */
+
+static void virtual_camera_comes_back(void **state)
+{
+	struct incise_rig *rig =
+		incise_rig_open("sim:clock=simulated", INCISE_RIG_CAMERA, NULL);
+	struct incise_frame_record record[PICTURES];
+	struct incise_frame_pump_setup setup = {0};
+	struct incise_frames_stored stored;
+	struct incise_frames_shape shape;
+	struct incise_frames_reader *reader;
+	struct incise_camera_frame frame;
+	struct incise_camera_info info;
+	struct incise_frame_pump *pump;
+	struct incise_error err = {0};
+	int64_t from_ns;
+	char path[64];
+	int read = 0;
+
+	assert_non_null(rig);
+	film_path(path, sizeof(path));
+	setup.camera = incise_rig_camera(rig);
+	setup.clock = incise_rig_clock(rig);
+	incise_camera_info(setup.camera, &info);
+	shape = (struct incise_frames_shape){info.width, info.height, info.pixels,
+					     info.rate_hz};
+	setup.writer = incise_frames.create(path, &shape, NULL, NULL);
+	assert_non_null(setup.writer);
+	pump = incise_frame_pump_new(&setup, NULL);
+	assert_non_null(pump);
+	from_ns = incise_clock_now(setup.clock);
+	for (int ms = 0; read < PICTURES; ms++) {
+		incise_clock_wait_until(setup.clock, from_ns + ms * MS);
+		read += incise_frame_pump_step(pump);
+	}
+	assert_int_equal(incise_frame_pump_stop(pump, 60000 * MS, NULL), 0);
+	assert_int_equal(incise_frame_pump_take(pump, record, PICTURES), PICTURES);
+	incise_frame_pump_free(pump);
+	incise_rig_close(rig);
+
+	/* The same world once more, which is a function of its clock. */
+	rig = incise_rig_open("sim:clock=simulated", INCISE_RIG_CAMERA, NULL);
+	reader = incise_frames.open(path, &err);
+	assert_true(rig && reader);
+	for (int i = 0; i < PICTURES; i++) {
+		struct incise_camera_frame truth;
+
+		incise_clock_wait_until(incise_rig_clock(rig), record[i].arrival_ns);
+		assert_int_equal(incise_camera_read(incise_rig_camera(rig), &truth), 1);
+		assert_int_equal(reader->ops->next(reader, &frame, &stored, &err), 1);
+		assert_int_equal(frame.seq, record[i].seq);
+		assert_int_equal(frame.t_ns, record[i].t_ns);
+		assert_int_equal(frame.t_ns, truth.t_ns);
+		assert_int_equal(stored.pts_ms, record[i].pts_ms);
+		assert_int_equal(stored.bytes, record[i].bytes);
+		assert_int_equal(stored.crc, record[i].crc);
+		assert_int_equal(frame.size, truth.size);
+		assert_memory_equal(frame.data, truth.data, truth.size);
+	}
+	assert_int_equal(reader->ops->next(reader, &frame, &stored, &err), 0);
+	reader->ops->close(reader);
+	incise_rig_close(rig);
+	film_remove(path);
+}
+
+/* --- kill -9 ----------------------------------------------------------------------- */
+
+static const struct incise_frames_shape live_shapes[] = {
+	{64, 48, INCISE_PIXELS_YUYV, 200},
+	{64, 48, INCISE_PIXELS_MJPEG, 200},
+};
+
+/* 200 pictures of the film a second, each at its time. */
+struct film_camera {
+	struct incise_camera camera;
+	const struct incise_frames_shape *shape;
+	_Atomic int64_t from_ns; /* since the first read */
+	uint64_t next;
+	uint8_t bytes[64 * 48 * 3];
+};
+
+static int64_t clock_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
+}
+
+static int camera_read(struct incise_camera *camera, struct incise_camera_frame *frame)
+{
+	struct film_camera *c = (struct film_camera *)camera;
+	int64_t t_ns;
+
+	if (!c->from_ns)
+		c->from_ns = clock_ns();
+	t_ns = c->from_ns + (int64_t)c->next * 5 * MS;
+	if (t_ns > clock_ns())
+		return 0;
+	*frame = film_frame(c->shape, c->next++, 0, c->bytes);
+	frame->t_ns = t_ns;
+	return 1;
+}
+
+static void camera_info(const struct incise_camera *camera,
+			struct incise_camera_info *info)
+{
+	const struct film_camera *c = (const struct film_camera *)camera;
+
+	*info = (struct incise_camera_info){
+		.rate_hz = c->shape->rate_hz,
+		.width = c->shape->width,
+		.height = c->shape->height,
+		.pixels = c->shape->pixels,
+	};
+}
+
+static uint64_t camera_lost(const struct incise_camera *camera)
+{
+	return 0;
+}
+
+static const struct incise_camera_ops camera_ops = {
+	.read = camera_read,
+	.info = camera_info,
+	.lost = camera_lost,
+};
+
+/* What the child tells: since when it takes pictures, and of how many it has rows. */
+struct told {
+	_Atomic int64_t from_ns;
+	_Atomic uint64_t rows;
+	_Atomic bool stood_still; /* the computer did, so that times say nothing */
+};
+
+static void record(const char *path, const struct incise_frames_shape *shape,
+		   struct told *told)
+{
+	static struct film_camera camera = {.camera = {&camera_ops}};
+	struct incise_clock *clock = incise_clock_new_real();
+	struct incise_frame_record records[16];
+	struct incise_frame_pump *pump;
+
+	camera.shape = shape;
+	pump = incise_frame_pump_new(
+		&(struct incise_frame_pump_setup){
+			.camera = &camera.camera,
+			.clock = clock,
+			.writer = incise_frames.create(path, shape, NULL, NULL),
+		},
+		NULL);
+	while (!camera.from_ns)
+		usleep(100);
+	told->from_ns = camera.from_ns;
+	for (int64_t before_ns = camera.from_ns;;) {
+		int64_t now_ns = clock_ns();
+
+		if (now_ns - before_ns > 50 * MS)
+			told->stood_still = true;
+		before_ns = now_ns;
+		told->rows += (uint64_t)incise_frame_pump_take(pump, records, 16);
+		usleep(1000);
+	}
+}
+
+static void a_kill_costs_200_ms_at_most(void **state)
+{
+	struct told *told = mmap(NULL, sizeof(*told), PROT_READ | PROT_WRITE,
+				 MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+
+	assert_true(told != MAP_FAILED);
+	srandom((unsigned int)time(NULL));
+	for (int round = 0; round < 20; round++) {
+		const struct incise_frames_shape *shape = &live_shapes[round % 2];
+		static uint8_t bytes[64 * 48 * 3];
+		struct incise_frames_reader *reader;
+		struct incise_frames_stored stored;
+		struct incise_camera_frame frame;
+		struct incise_error err = {0};
+		int64_t killed_ns, last_ns = 0;
+		uint64_t n = 0;
+		char path[64];
+		pid_t child;
+
+		film_path(path, sizeof(path));
+		told->from_ns = 0;
+		told->rows = 0;
+		told->stood_still = false;
+		child = fork();
+		assert_true(child >= 0);
+		if (!child)
+			record(path, shape, told);
+		while (!told->from_ns)
+			usleep(1000);
+		usleep((useconds_t)random() % 250000);
+		killed_ns = clock_ns();
+		assert_int_equal(kill(child, SIGKILL), 0);
+		assert_int_equal(waitpid(child, NULL, 0), child);
+		reader = incise_frames.open(path, &err);
+		if (!reader)
+			fail_msg("%s", err.text);
+		while (reader->ops->next(reader, &frame, &stored, &err) == 1) {
+			struct incise_camera_frame want = film_frame(shape, n, 0, bytes);
+
+			assert_int_equal(frame.seq, n++);
+			assert_int_equal(frame.size, want.size);
+			assert_memory_equal(frame.data, want.data, want.size);
+			last_ns = frame.t_ns;
+		}
+		reader->ops->close(reader);
+		/* Rows are never ahead of the file. */
+		assert_true(n >= told->rows);
+		/* The bound of issue 8. */
+		if (killed_ns - told->from_ns > 200 * MS && !told->stood_still)
+			assert_true(last_ns > killed_ns - 200 * MS);
+		film_remove(path);
+	}
+	munmap(told, sizeof(*told));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -537,6 +827,8 @@ int main(void)
 		cmocka_unit_test(short_writes_are_gone_on_with),
 		cmocka_unit_test(a_disk_that_fails),
 		cmocka_unit_test(killed),
+		cmocka_unit_test(virtual_camera_comes_back),
+		cmocka_unit_test(a_kill_costs_200_ms_at_most),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
