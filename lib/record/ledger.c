@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Rows and blocks of the ledger; see ledger.h.
+ * Rows, blocks and seals of the ledger; see ledger.h.
  */
+#include <errno.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include "../base/crc32c.h"
 #include "ledger.h"
 
@@ -144,17 +147,27 @@ void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_
 		open->first_ns = row->t_ns;
 		open->lost = 0;
 	}
-	/* Unsigned: whatever a damaged row holds, the difference is defined. */
-	if (ledger->begun)
+	/* Unsigned: the difference is defined for any damaged row. */
+	if (ledger->started)
 		open->lost += (uint64_t)row->seq - (uint64_t)ledger->last_seq - 1;
 	open->count++;
 	open->crc = incise_crc32c(open->crc, row->bytes, row->n);
-	ledger->begun = true;
+	ledger->started = true;
 	ledger->last_seq = row->seq;
 	ledger->last_ns = row->t_ns;
 }
 
-void incise_ledger_seal_block(struct incise_ledger_block *block)
+bool incise_ledger_same(const struct incise_ledger_block *a,
+			const struct incise_ledger_block *b)
+{
+	return a->block == b->block && a->first_seq == b->first_seq &&
+	       a->last_seq == b->last_seq && a->first_ns == b->first_ns &&
+	       a->last_ns == b->last_ns && a->count == b->count && a->lost == b->lost &&
+	       a->crc == b->crc;
+}
+
+/* Take the fields of an entry into its CRC, which so far is that of its rows. */
+static void seal_block(struct incise_ledger_block *block)
 {
 	uint8_t bytes[7 * 8], *to = bytes;
 
@@ -168,21 +181,12 @@ void incise_ledger_seal_block(struct incise_ledger_block *block)
 	block->crc = incise_crc32c(block->crc, bytes, sizeof(bytes));
 }
 
-bool incise_ledger_same(const struct incise_ledger_block *a,
-			const struct incise_ledger_block *b)
-{
-	return a->block == b->block && a->first_seq == b->first_seq &&
-	       a->last_seq == b->last_seq && a->first_ns == b->first_ns &&
-	       a->last_ns == b->last_ns && a->count == b->count && a->lost == b->lost &&
-	       a->crc == b->crc;
-}
-
-/* The open block with its last fields; the next one goes on from its CRC. */
-static void seal(struct incise_ledger *ledger, struct incise_ledger_block *block)
+/* End the open block; the next one goes on from its CRC. */
+static void end_block(struct incise_ledger *ledger, struct incise_ledger_block *block)
 {
 	struct incise_ledger_block *open = &ledger->open;
 
-	incise_ledger_seal_block(open);
+	seal_block(open);
 	*block = *open;
 	ledger->lost += open->lost;
 	open->block++;
@@ -195,7 +199,7 @@ bool incise_ledger_end(struct incise_ledger *ledger, struct incise_ledger_block 
 		return false;
 	ledger->open.last_seq = ledger->last_seq;
 	ledger->open.last_ns = ledger->last_ns;
-	seal(ledger, block);
+	end_block(ledger, block);
 	return true;
 }
 
@@ -208,5 +212,117 @@ void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
 	open->last_seq = (uint64_t)ledger->last_seq + lost;
 	open->first_ns = open->last_ns = ledger->last_ns;
 	open->lost = lost;
-	seal(ledger, block);
+	end_block(ledger, block);
+}
+
+/* --- seals ------------------------------------------------------------------------- */
+
+/* More than a writer puts before the first frame. */
+#define HEAD_MAX 65536
+
+const char *const incise_ledger_sealed[] = {"depth", "events",	"knots",
+					    "meta",  "streams", NULL};
+
+/* Columns by name, in a defined order: a copy by .dump has the same seals. */
+static const struct {
+	const char *table, *sql;
+} tables[] = {
+	{"depth", "SELECT seq, t_ns, depth_mm, velocity_mm_s FROM depth ORDER BY seq"},
+	{"events", "SELECT t_ns, kind, text FROM events ORDER BY rowid"},
+	{"knots", "SELECT stream, knot, seq, t_ns, sd_ns, begins FROM knots "
+		  "ORDER BY stream, knot"},
+	{"meta", "SELECT key, value FROM meta ORDER BY key"},
+	{"streams",
+	 "SELECT name, device, stamped, nominal_hz, delay_ns, delay_sd_ns, grain_ns, "
+	 "rows, lost, late, rate_hz, drift_ppm, drift_sd_ppm, jitter_ns, jitter_max_ns, "
+	 "offset_ns, offset_sd_ns, ended FROM streams ORDER BY rowid"},
+};
+
+static uint32_t add_number(uint32_t crc, char type, uint64_t value)
+{
+	uint8_t bytes[9] = {type};
+
+	put(bytes + 1, value);
+	return incise_crc32c(crc, bytes, sizeof(bytes));
+}
+
+static uint32_t add_value(uint32_t crc, sqlite3_stmt *stmt, int column)
+{
+	uint64_t bits;
+	double real;
+	const void *bytes;
+	int n;
+
+	switch (sqlite3_column_type(stmt, column)) {
+	case SQLITE_INTEGER:
+		return add_number(crc, 'i', sqlite3_column_int64(stmt, column));
+	case SQLITE_FLOAT:
+		real = sqlite3_column_double(stmt, column);
+		memcpy(&bits, &real, sizeof(bits));
+		return add_number(crc, 'r', bits);
+	case SQLITE_TEXT:
+		bytes = sqlite3_column_text(stmt, column); /* before its length */
+		n = sqlite3_column_bytes(stmt, column);
+		crc = add_number(crc, 't', n);
+		return bytes ? incise_crc32c(crc, bytes, n) : crc;
+	case SQLITE_BLOB:
+		bytes = sqlite3_column_blob(stmt, column);
+		n = sqlite3_column_bytes(stmt, column);
+		crc = add_number(crc, 'b', n);
+		return bytes ? incise_crc32c(crc, bytes, n) : crc;
+	default:
+		return incise_crc32c(crc, "n", 1);
+	}
+}
+
+int incise_ledger_seal(sqlite3 *db, const char *table, struct incise_ledger_block *block)
+{
+	sqlite3_stmt *stmt;
+	size_t i = 0;
+	int rc;
+
+	while (i < sizeof(tables) / sizeof(*tables) && strcmp(tables[i].table, table))
+		i++;
+	if (i == sizeof(tables) / sizeof(*tables))
+		return SQLITE_ERROR;
+	rc = sqlite3_prepare_v2(db, tables[i].sql, -1, &stmt, NULL);
+	if (rc != SQLITE_OK)
+		return rc;
+	*block = (struct incise_ledger_block){0};
+	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW) {
+		block->count++;
+		for (int j = 0; j < sqlite3_column_count(stmt); j++)
+			block->crc = add_value(block->crc, stmt, j);
+	}
+	seal_block(block);
+	return sqlite3_finalize(stmt); /* reports a failed step too */
+}
+
+int incise_ledger_seal_head(int fd, struct incise_ledger_block *block)
+{
+	static const uint8_t cluster[] = {0x1f, 0x43, 0xb6,
+					  0x75}; /* its ID in Matroska */
+	uint8_t *head = malloc(HEAD_MAX), *found;
+	size_t n = 0;
+	ssize_t got;
+
+	if (!head)
+		return -ENOMEM;
+	while (n < HEAD_MAX && (got = pread(fd, head + n, HEAD_MAX - n, n)) != 0) {
+		if (got < 0 && errno != EINTR) {
+			free(head);
+			return -errno;
+		}
+		n += got > 0 ? got : 0;
+	}
+	found = memmem(head, n, cluster, sizeof(cluster));
+	if (found)
+		n = found - head;
+	*block = (struct incise_ledger_block){
+		.count = n,
+		.crc = incise_crc32c(0, head, n),
+	};
+	free(head);
+	seal_block(block);
+	return 0;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The ledger of a recording: which rows a stream was written with, in blocks of one
- * commit each, so that whatever is missing or altered later is found, and where.
+ * The ledger of a recording: the rows that each stream was written with, in blocks of one
+ * commit each. It shows later which rows are missing or altered.
  *
  *     rows    ├─ block 0 ─┤├─ block 1 ─┤├─ … ─┤ end
  *     CRC32C  0 ─────────► c0 ────────► c1 … ► cn          each goes on from the one before
@@ -9,8 +9,8 @@
  * A block's CRC is that of its rows and then of its own fields (all of them but the name of
  * the stream and the CRC), each integer 64 bits, little-endian. The end is a block without
  * rows: its count is 0, and its lost are the samples that the device lost and that no gap
- * in the numbers shows. What has no blocks is sealed, see ledger_seal.h. Described for
- * users in incise-recording(5).
+ * in the numbers shows. Tables without blocks are sealed. Described for users in
+ * incise-recording(5).
  */
 #ifndef INCISE_LEDGER_H
 #define INCISE_LEDGER_H
@@ -22,7 +22,7 @@
 #include <incise/tracker.h>
 #include "frames.h"
 
-/* A stream, its table, and how the columns of a row are encoded. */
+/* A stream, its table, and the encoding of its columns. */
 struct incise_ledger_form {
 	const char *stream, *table;
 	const char *columns; /* seq and t_ns are first */
@@ -54,11 +54,11 @@ void incise_ledger_row_force(struct incise_ledger_row *row, uint64_t seq, int64_
 			     int32_t code);
 void incise_ledger_row_tracker(struct incise_ledger_row *row, int64_t t_ns,
 			       const struct incise_tracker_sample *sample);
-/* NaN is a column that is NULL: bind it so. Its t_ns is the time as in the table. */
+/* NaN stands for a column that is NULL; t_ns is the time as in the table. */
 void incise_ledger_row_frame(struct incise_ledger_row *row,
 			     const struct incise_frame_record *record);
 
-/* The row that a SELECT of a form's columns is at. Returns false when it cannot be one. */
+/* Encode the row of a SELECT of a form's columns. False: a column has a wrong type. */
 bool incise_ledger_row_read(struct incise_ledger_row *row,
 			    const struct incise_ledger_form *form, sqlite3_stmt *stmt);
 
@@ -67,35 +67,61 @@ struct incise_ledger_block {
 	int64_t block;
 	int64_t first_seq, last_seq;
 	int64_t first_ns, last_ns;
-	int64_t count,
-		lost; /* rows; gaps in their numbers, before the first and within */
+	int64_t count; /* rows */
+	int64_t lost;  /* gaps in their numbers, before the first and within */
 	uint32_t crc;
 };
 
 /* One stream's, while it is written or recomputed. */
 struct incise_ledger {
-	bool begun;		   /* there were rows */
+	bool started;		   /* there were rows */
 	int64_t last_seq, last_ns; /* of the row before; -1 and 0 before the first */
 	uint64_t lost;		   /* of all blocks so far */
-	struct incise_ledger_block open; /* crc: of what came so far */
+	struct incise_ledger_block open; /* crc: of its rows so far */
 };
 
 void incise_ledger_init(struct incise_ledger *ledger);
 
-/* The next row; numbers increase. */
+/* Add the next row; numbers increase. */
 void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_row *row);
 
 /* End the block. Returns false, and does nothing, when it has no rows. */
 bool incise_ledger_end(struct incise_ledger *ledger, struct incise_ledger_block *block);
 
-/* The end of the ledger, after the last block; @lost: that no gap shows. */
+/* End the ledger after the last block; @lost: losses that no gap shows. */
 void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
 			 struct incise_ledger_block *block);
 
-/* Take the fields of an entry into its CRC, which is that of what it counts. */
-void incise_ledger_seal_block(struct incise_ledger_block *block);
-
 bool incise_ledger_same(const struct incise_ledger_block *a,
 			const struct incise_ledger_block *b);
+
+/* --- seals ------------------------------------------------------------------------- */
+
+/*
+ * Tables without blocks (they are rewritten while a recording goes on) and the head of
+ * camera.mkv are sealed once, in the transaction that marks the recording complete, and sealed
+ * again to verify it.
+ */
+#define INCISE_LEDGER_TABLE "table:" /* and the name, as stream */
+#define INCISE_LEDGER_HEAD "file:camera.mkv"
+
+/* Names of the sealed tables; ends with NULL. */
+extern const char *const incise_ledger_sealed[];
+
+/*
+ * The ledger's entry of one of these tables: count is the number of its rows, crc is over all
+ * of them in a fixed order, then over the fields of the entry. Of each value a letter and then
+ *
+ *     i  8 bytes     r  8 bytes     t, b  8 bytes of length, the bytes     n  nothing
+ *
+ * little-endian; t is UTF-8. Returns an SQLite code; SQLITE_ERROR for another table.
+ */
+int incise_ledger_seal(sqlite3 *db, const char *table, struct incise_ledger_block *block);
+
+/*
+ * The entry of the head of camera.mkv, the bytes before its first frame, which a decoder
+ * needs: count is bytes. The offset of @fd is not used. Returns 0 or a negative errno.
+ */
+int incise_ledger_seal_head(int fd, struct incise_ledger_block *block);
 
 #endif

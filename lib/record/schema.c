@@ -155,7 +155,7 @@ static int pragma(sqlite3 *db, const char *sql, sqlite3_int64 *value)
 	if (rc != SQLITE_OK)
 		return rc;
 	*value = sqlite3_step(stmt) == SQLITE_ROW ? sqlite3_column_int64(stmt, 0) : 0;
-	return sqlite3_finalize(stmt); /* tells of a failed step as well */
+	return sqlite3_finalize(stmt); /* reports a failed step too */
 }
 
 static int check_tables(sqlite3 *db, const char *path, int form, struct incise_error *err)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What is sealed against its seals; see verify.h and ledger_seal.h.
+ * What is sealed against its seals; see verify.h and ledger.h.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -9,7 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 #include "../frames.h"
-#include "../ledger_seal.h"
+#include "../ledger.h"
 #include "verify.h"
 
 /* Entries of @stream in the ledger; the first in @entry. -1: it cannot be read. */

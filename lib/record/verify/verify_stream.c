@@ -264,7 +264,7 @@ static int take_block(struct walk *walk, const struct incise_ledger_block *block
 		walk->chain[1] = walk->chain[0];
 		walk->chain[1].open.crc = block->crc;
 		if (block->count) {
-			walk->chain[1].begun = true;
+			walk->chain[1].started = true;
 			walk->chain[1].last_seq = block->last_seq;
 			walk->chain[1].last_ns = block->last_ns;
 		}

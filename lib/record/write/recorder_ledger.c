@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <unistd.h>
 #include "../frames.h"
-#include "../ledger_seal.h"
+#include "../ledger.h"
 #include "recorder.h"
 
 static int put_block(struct incise_recorder *rec, const char *stream,
