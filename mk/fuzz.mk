@@ -41,7 +41,7 @@ fuzz_polhemus_records := lib/base/ring.c $(addprefix lib/device/polhemus/polhemu
 	records.c stream.c)
 fuzz_polhemus_status := lib/device/polhemus/polhemus_reply.c
 
-fuzz_state_page := lib/base/error.c $(addprefix lib/loop/state_,file.c histogram.c reader.c tick.c)
+fuzz_state_page := lib/base/error.c $(addprefix lib/loop/state_,file.c page.c reader.c)
 
 fuzz_core := $(patsubst %.c,$(O)/obj/fuzz/%.o,$(wildcard lib/fixed/*.c))
 define fuzz_program

@@ -94,12 +94,12 @@ $(O)/tests/attack/%.so: tests/attack/%.c
 		$(CFLAGS) -MMD -MP -MF $@.d -shared $(LDFLAGS) -o $@ $< -ldl \
 		$(shell $(PKG_CONFIG) --libs sqlite3)
 
-# A loop that tells its state, for who reads it.
-$(O)/tests/state/loop: tests/state/loop.c $(O)/lib/libincise.so
+# A loop that publishes its state, for tests of readers.
+$(O)/tests/state/loop: tests/state/loop.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(call step,LD)
-	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
-		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../../lib' -lincise
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $^ \
+		$(test_libs)
 
 attack_bats = INCISE_BUILD=$(abspath $(O)) bats --print-output-on-failure tests/attack
 check-attack: all $(attack_programs) ## attacks on recordings with their full counts: 100 kills, thousands of faults
@@ -199,12 +199,12 @@ $(O)/tests/calibrate_depth: tests/bench/calibrate_depth.c libs
 check-depth: $(O)/tests/calibrate_depth ## whether stated intervals of depth hold the truth on 200 virtual rigs
 	$(O)/tests/calibrate_depth
 
-# What it costs the loop to tell its state.
-$(O)/tests/state_tick: tests/bench/state_tick.c libs
+# Time that the loop needs to publish its state.
+$(O)/tests/state_tick: tests/bench/state_tick.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(call step,LD)
-	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
-		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $^ \
+		$(test_libs)
 
 check-state: $(O)/tests/state_tick ## what it costs the loop to tell its state, ns
 	$(O)/tests/state_tick

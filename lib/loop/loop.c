@@ -12,7 +12,8 @@
 #include <string.h>
 #include <incise/loop.h>
 #include "../scene/plan.h"
-#include "control.h"
+#include "loop_control.h"
+#include "state_page.h"
 
 struct run {
 	struct incise_plan *plan;
@@ -21,12 +22,12 @@ struct run {
 	struct incise_loop_stats *stats;
 	int64_t period_ns, due_ns, end_ns;
 	bool fading;
-	int64_t fade_end_ns; /* latest, when it fades to stop */
+	int64_t fade_end_ns; /* latest end of the fade that stops it */
 	int64_t lag_ns;	     /* of this tick */
 	uint64_t skipped;    /* before this tick */
-	unsigned int in_row; /* overruns, up to now */
+	unsigned int in_row; /* consecutive overruns */
 	unsigned int flags;  /* of the last tick */
-	int64_t stale_ns;    /* time of the tick from which on poses were old */
+	int64_t stale_ns;    /* time of the first tick without a fresh pose */
 };
 
 static void count(uint64_t *histogram, int64_t value)
@@ -42,7 +43,7 @@ static void count_tick(struct incise_loop_stats *stats, const struct incise_tick
 
 	for (int i = 0; i < 3; i++)
 		force += tick->command_N[i] * tick->command_N[i];
-	/* What a tick reads of the actuator answers to the command of the one before. */
+	/* The actuator's reading in a tick answers the command of the tick before. */
 	if (stats->ticks)
 		stats->rendered_off2 += off * off;
 	stats->force_N = sqrt(force);
@@ -54,8 +55,8 @@ static void count_tick(struct incise_loop_stats *stats, const struct incise_tick
 	stats->limited += !!(tick->flags & (INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED));
 }
 
-static void tell(const struct run *run, enum incise_loop_event_kind kind, int64_t t_ns,
-		 double value)
+static void send_event(const struct run *run, enum incise_loop_event_kind kind,
+		       int64_t t_ns, double value)
 {
 	struct incise_loop_event event = {t_ns, run->stats->ticks, value, kind};
 
@@ -63,25 +64,25 @@ static void tell(const struct run *run, enum incise_loop_event_kind kind, int64_
 		incise_loop_control_event(run->options->control, &event);
 }
 
-/* What of a tick is new. */
-static void tell_changes(struct run *run, const struct incise_tick *tick)
+/* Report flags that changed. */
+static void report_changes(struct run *run, const struct incise_tick *tick)
 {
 	unsigned int begun = tick->flags & ~run->flags, ended = run->flags & ~tick->flags;
 
 	if (begun & INCISE_TICK_STALE) {
 		run->stale_ns = tick->t_ns;
-		tell(run, INCISE_LOOP_STALE, tick->t_ns, 0);
+		send_event(run, INCISE_LOOP_STALE, tick->t_ns, 0);
 	}
 	/* A tick that failed read no pose. */
 	if (ended & INCISE_TICK_STALE && !(tick->flags & INCISE_TICK_FAULT))
-		tell(run, INCISE_LOOP_FRESH, tick->t_ns,
-		     (double)(tick->t_ns - run->stale_ns) * 1e-6);
+		send_event(run, INCISE_LOOP_FRESH, tick->t_ns,
+			   (double)(tick->t_ns - run->stale_ns) * 1e-6);
 	if (begun & INCISE_TICK_NOT_FINITE)
-		tell(run, INCISE_LOOP_NOT_FINITE, tick->t_ns, 0);
+		send_event(run, INCISE_LOOP_NOT_FINITE, tick->t_ns, 0);
 	run->flags = tick->flags;
 }
 
-/* One tick with its statistics; start_ns is when it began. */
+/* One tick with its statistics. */
 static INCISE_REALTIME int run_tick(struct run *run, struct incise_tick *tick,
 				    int64_t start_ns)
 {
@@ -93,14 +94,14 @@ static INCISE_REALTIME int run_tick(struct run *run, struct incise_tick *tick,
 		run->stats->tick_max_ns = cost_ns;
 	count(run->stats->tick_100ns, cost_ns / 100);
 	count_tick(run->stats, tick);
-	tell_changes(run, tick);
+	report_changes(run, tick);
 	incise_state_tick(options->state, tick, run->lag_ns, cost_ns, run->skipped);
 	if (options->control)
 		incise_loop_control_ticked(options->control, run->stats->ticks);
 	return rc;
 }
 
-/* A stall over the end leaves out what was still due, and no more. */
+/* A stall past the end skips only the ticks that were still due. */
 static INCISE_REALTIME int skip(struct run *run, int64_t now_ns)
 {
 	int64_t ticks = (now_ns - run->due_ns) / run->period_ns;
@@ -114,14 +115,14 @@ static INCISE_REALTIME int skip(struct run *run, int64_t now_ns)
 	run->stats->skipped += run->skipped;
 	run->stats->overruns++;
 	run->in_row++;
-	tell(run, INCISE_LOOP_OVERRUN, now_ns, (double)run->skipped);
+	send_event(run, INCISE_LOOP_OVERRUN, now_ns, (double)run->skipped);
 	run->due_ns += ticks * run->period_ns;
 	return run->options->overruns_most && run->in_row >= run->options->overruns_most
 		       ? -ETIME
 		       : 0;
 }
 
-/* To be asked before each tick: whether it ends, faded as it should be. */
+/* Whether the loop ends before the next tick: after its duration, or stopped and faded. */
 static INCISE_REALTIME bool stops(struct run *run)
 {
 	const struct incise_loop_options *options = run->options;
@@ -138,7 +139,7 @@ static INCISE_REALTIME bool stops(struct run *run)
 	return incise_plan_faded(run->plan) || run->due_ns > run->fade_end_ns;
 }
 
-/* Another plan that waits comes into force where the one before asks for none. */
+/* A waiting plan takes over at a tick at which the old one requests no force. */
 static INCISE_REALTIME void change_plan(struct run *run, int64_t now_ns)
 {
 	bool waits = !run->fading && run->options->control &&
@@ -153,7 +154,7 @@ static INCISE_REALTIME void change_plan(struct run *run, int64_t now_ns)
 	if (!next)
 		return;
 	run->plan = next;
-	tell(run, INCISE_LOOP_PLAN, now_ns, 0);
+	send_event(run, INCISE_LOOP_PLAN, now_ns, 0);
 }
 
 static INCISE_REALTIME void count_lateness(struct run *run, int64_t now_ns)
@@ -166,7 +167,7 @@ static INCISE_REALTIME void count_lateness(struct run *run, int64_t now_ns)
 	count(run->stats->lateness_us, lag_ns / 1000);
 }
 
-/* Until it ends; what a device or options->ticked answered. */
+/* Returns 0 or a device's errno; *ended is the result of options->ticked(). */
 static int run_ticks(struct run *run, int *ended)
 {
 	const struct incise_loop_options *options = run->options;
@@ -195,7 +196,7 @@ static int run_ticks(struct run *run, int *ended)
 	return rc;
 }
 
-static int why(const struct run *run, int rc, struct incise_error *err)
+static int explain(const struct run *run, int rc, struct incise_error *err)
 {
 	unsigned long long ticks = run->stats->ticks;
 	char cause[300];
@@ -233,7 +234,7 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 	run.end_ns = options->duration_ns ? run.due_ns + options->duration_ns : INT64_MAX;
 	rc = run_ticks(&run, &ended);
 	incise_plan_release(run.plan);
-	return rc ? why(&run, rc, err) : ended;
+	return rc ? explain(&run, rc, err) : ended;
 }
 
 double incise_loop_quantile(const uint64_t *histogram, double share)

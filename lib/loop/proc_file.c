@@ -43,7 +43,7 @@ int proc_file_read(const char *root, const char *path, char *text, size_t size)
 	text[0] = 0;
 	if (snprintf(whole, sizeof(whole), "%s%s", root, path) >= (int)sizeof(whole))
 		return -ENAMETOOLONG;
-	/* What lies there may be a pipe, in a test or by mistake: it must not hold us up. */
+	/* The file may be a pipe, in a test or by mistake: do not wait for it. */
 	fd = open(whole, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
 	if (fd < 0)
 		return -errno;
@@ -74,7 +74,7 @@ bool proc_file_integer(const char *text, long long *value)
 	return !errno && !*end;
 }
 
-/* A number of at most nine digits: what follows it, or NULL. */
+/* A number of at most nine digits; returns the text behind it, or NULL. */
 static const char *number(const char *text, int *value)
 {
 	int length = 0;

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A small file of /proc or /sys: words of the kernel, which may be missing, cut off or
- * anything else.
+ * Reads a small file of /proc or /sys, which may be missing, truncated or malformed.
  */
 #ifndef INCISE_LOOP_PROC_FILE_H
 #define INCISE_LOOP_PROC_FILE_H
@@ -10,16 +9,16 @@
 #include <stddef.h>
 
 /*
- * The first @size - 1 bytes of the file @root@path as a string, without blanks at its end; what
- * is no printable character but a newline or a tab is '?'. Returns its length, or a negative
- * errno with an empty string. Allocates nothing.
+ * The first @size - 1 bytes of the file @root@path as a string, without trailing blanks;
+ * unprintable characters other than newline and tab become '?'. Returns the length, or a
+ * negative errno with an empty string. Allocates nothing.
  */
 int proc_file_read(const char *root, const char *path, char *text, size_t size);
 
 /* A whole number and nothing else. */
 bool proc_file_integer(const char *text, long long *value);
 
-/* Whether a list of CPUs as "0-2,5" has this one; of anything else: no. */
+/* Whether a list of CPUs such as "0-2,5" has this one; a malformed list has none. */
 bool proc_file_lists(const char *list, int cpu);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Real time inside: what is tried on the kernel, apart from what is made of its answers, so
- * that tests can give answers of their own.
+ * The two halves of incise/realtime.h: trials on the kernel (realtime.c), and the judgement of
+ * its answers (realtime_checks.c), to which tests give answers of their own.
  *
  *   try ──▶ answers (errno, limits) ─┐
  *                                    ├──▶ judge ──▶ checks
@@ -15,26 +15,18 @@
 #include <sys/resource.h>
 #include <incise/realtime.h>
 
-/* What the kernel said; errors are 0 or a positive errno. */
+/* The kernel's answers; errors are 0 or a positive errno. */
 struct realtime_answers {
 	int policy_error;
 	int cpu_error;	/* of going to the set-up's CPU */
 	int lock_error; /* of lock_bytes of memory */
 	int idle_error; /* of opening /dev/cpu_dma_latency to write */
 	rlim_t rtprio, memlock;
-	uint64_t lock_bytes; /* what the process and its devices may come to */
+	uint64_t lock_bytes; /* that the process and its devices may need */
 	int64_t clock_resolution_ns;
 };
 
-/* 0, -EINVAL with a line, -ENOTSUP for what does not go together. */
-int realtime_check_setup(const struct incise_realtime_setup *setup,
-			 struct incise_error *err);
-
-/* Take the policy and the CPU, for the calling thread. 0 or a positive errno. */
-int realtime_take_policy(const struct incise_realtime_setup *setup);
-int realtime_take_cpu(const struct incise_realtime_setup *setup);
-
-/* 0, or -EAGAIN, -ENOMEM: there was no thread to try it on. */
+/* 0; -EAGAIN, -ENOMEM: no thread for the trial. */
 int realtime_try(const struct incise_realtime_setup *setup,
 		 struct realtime_answers *answers);
 
@@ -43,7 +35,7 @@ int realtime_judge(const struct incise_realtime_setup *setup,
 		   const struct realtime_answers *answers, const char *root,
 		   struct incise_realtime_check *checks, int n);
 
-/* One line of all that is needed and denied; the errno that goes with the first. */
+/* One line with everything that is needed and denied; the errno of the first. */
 int realtime_denied(const struct realtime_answers *answers,
 		    const struct incise_realtime_check *checks, int n,
 		    struct incise_error *err);

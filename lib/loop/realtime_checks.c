@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What the kernel's answers mean for a loop, in words and commands: what is needed, and all
- * checks in their order; see realtime_checks.h. Pure text: nothing is changed here.
+ * The kernel's answers judged for a loop, in sentences and commands: first everything that is
+ * needed, then advice against lateness. Pure text: nothing is changed here.
  */
 #include <errno.h>
 #include <stdarg.h>
@@ -9,9 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include "proc_file.h"
-#include "realtime_checks.h"
+#include "realtime.h"
 
-/* One for both limits: who needs the one needs the other. */
+#define CPUS "/sys/devices/system/cpu/"
+#define CLOCKSOURCE "/sys/devices/system/clocksource/clocksource0/"
+
+/* Raises both limits: whoever needs one needs the other. */
 #define GRANT "sudo prlimit --pid $$ --rtprio=90 --memlock=unlimited"
 #define GRANT_FOR_GOOD                                                       \
 	"printf '%s - rtprio 90\\n%s - memlock unlimited\\n' $USER $USER | " \
@@ -20,7 +23,15 @@
 /* Bit of CAP_SYS_NICE in /proc/self/status. */
 #define CAP_SYS_NICE_BIT 23
 
-void realtime_found(struct incise_realtime_check *check, const char *fmt, ...)
+struct judgement {
+	const struct incise_realtime_setup *setup;
+	const struct realtime_answers *answers;
+	const char *root;
+};
+
+/* Text that is too long is cut. */
+INCISE_PRINTF(2, 3)
+static void set_found(struct incise_realtime_check *check, const char *fmt, ...)
 {
 	va_list args;
 
@@ -29,7 +40,8 @@ void realtime_found(struct incise_realtime_check *check, const char *fmt, ...)
 	va_end(args);
 }
 
-void realtime_fix(struct incise_realtime_check *check, const char *fmt, ...)
+INCISE_PRINTF(2, 3)
+static void set_fix(struct incise_realtime_check *check, const char *fmt, ...)
 {
 	va_list args;
 
@@ -38,12 +50,14 @@ void realtime_fix(struct incise_realtime_check *check, const char *fmt, ...)
 	va_end(args);
 }
 
-void realtime_keep(struct incise_realtime_check *check, const char *command)
+static void set_keep(struct incise_realtime_check *check, const char *command)
 {
 	snprintf(check->keep, sizeof(check->keep), "%s", command);
 }
 
-bool realtime_line(const struct judgement *j, const char *path, char *text, size_t size)
+/* The first line of a file below the root; false and "" when there is none. */
+static bool read_line(const struct judgement *j, const char *path, char *text,
+		      size_t size)
 {
 	int length = proc_file_read(j->root, path, text, size);
 
@@ -62,19 +76,18 @@ static bool has_cap_sys_nice(const struct judgement *j)
 	return at && strtoull(at + 8, NULL, 16) >> CAP_SYS_NICE_BIT & 1;
 }
 
-/* Denied though the limit is wide: by a control group or a sandbox. */
+/* Denied in spite of a sufficient limit: by a control group or a sandbox. */
 static void fifo_group(const struct judgement *j, struct incise_realtime_check *check)
 {
 	char text[32];
 	bool v2 = proc_file_read(j->root, "/sys/fs/cgroup/cgroup.procs", text,
 				 sizeof(text)) >= 0;
 
-	realtime_found(
-		check,
-		"SCHED_FIFO is denied by the control group (no real-time share) or a "
-		"sandbox (RestrictRealtime=), not by RLIMIT_RTPRIO");
-	realtime_fix(check, "echo $$ | sudo tee /sys/fs/cgroup/%scgroup.procs",
-		     v2 ? "" : "cpu/");
+	set_found(check,
+		  "SCHED_FIFO is denied by the control group (no real-time share) or a "
+		  "sandbox (RestrictRealtime=), not by RLIMIT_RTPRIO");
+	set_fix(check, "echo $$ | sudo tee /sys/fs/cgroup/%scgroup.procs",
+		v2 ? "" : "cpu/");
 }
 
 static void check_fifo(const struct judgement *j, struct incise_realtime_check *check)
@@ -83,23 +96,22 @@ static void check_fifo(const struct judgement *j, struct incise_realtime_check *
 
 	check->ok = !error;
 	if (!error) {
-		realtime_found(check, "SCHED_FIFO at priority %d", priority);
+		set_found(check, "SCHED_FIFO at priority %d", priority);
 	} else if (error == EPERM && j->answers->rtprio < (rlim_t)priority) {
-		realtime_found(
-			check,
-			"SCHED_FIFO at priority %d is denied: RLIMIT_RTPRIO is %llu",
-			priority, (unsigned long long)j->answers->rtprio);
-		realtime_fix(check, "%s", GRANT);
-		realtime_keep(check, GRANT_FOR_GOOD);
+		set_found(check,
+			  "SCHED_FIFO at priority %d is denied: RLIMIT_RTPRIO is %llu",
+			  priority, (unsigned long long)j->answers->rtprio);
+		set_fix(check, "%s", GRANT);
+		set_keep(check, GRANT_FOR_GOOD);
 	} else if (error == EPERM) {
 		fifo_group(j, check);
 	} else {
-		realtime_found(check, "SCHED_FIFO at priority %d: %s", priority,
-			       strerror(error));
+		set_found(check, "SCHED_FIFO at priority %d: %s", priority,
+			  strerror(error));
 	}
 }
 
-/* A shell that may. As a file's capability it would hide the library from the program. */
+/* A shell with the capability. On the program's file it would disable the rpath. */
 #define NICE_SHELL                                                      \
 	"sudo setpriv --reuid=$(id -u) --regid=$(id -g) --init-groups " \
 	"--inh-caps=+sys_nice,+ipc_lock --ambient-caps=+sys_nice,+ipc_lock $SHELL"
@@ -121,29 +133,27 @@ static void check_deadline(const struct judgement *j, struct incise_realtime_che
 
 	check->ok = !error;
 	if (!error) {
-		realtime_found(check, "SCHED_DEADLINE, half of each period of %lld us",
-			       (long long)j->setup->period_ns / 1000);
+		set_found(check, "SCHED_DEADLINE, half of each period of %lld us",
+			  (long long)j->setup->period_ns / 1000);
 	} else if (lacks_nice(j)) {
-		realtime_found(check, "SCHED_DEADLINE is denied: it needs CAP_SYS_NICE");
-		realtime_fix(check, "%s", NICE_SHELL);
-		realtime_keep(check, NICE_SERVICE);
+		set_found(check, "SCHED_DEADLINE is denied: it needs CAP_SYS_NICE");
+		set_fix(check, "%s", NICE_SHELL);
+		set_keep(check, NICE_SERVICE);
 	} else if (error == EPERM) {
-		realtime_found(
-			check,
-			"SCHED_DEADLINE is denied: this program may not run on all "
-			"CPUs, or a sandbox refuses it");
-		/* What goes into a command is a list of numbers, whatever the file says. */
-		if (realtime_line(j, CPUS "online", cpus, sizeof(cpus)) &&
+		set_found(check,
+			  "SCHED_DEADLINE is denied: this program may not run on all "
+			  "CPUs, or a sandbox refuses it");
+		/* Only a list of numbers goes into a command, whatever the file says. */
+		if (read_line(j, CPUS "online", cpus, sizeof(cpus)) &&
 		    !cpus[strspn(cpus, "0123456789,-")])
-			realtime_fix(check, "taskset -pc %s $$", cpus);
+			set_fix(check, "taskset -pc %s $$", cpus);
 	} else if (error == EBUSY) {
-		realtime_found(
-			check,
-			"SCHED_DEADLINE is denied: too much of the CPUs is promised to "
-			"others already");
-		realtime_fix(check, "ps -eo pid,cls,comm | grep -w DLN");
+		set_found(check,
+			  "SCHED_DEADLINE is denied: too much of the CPUs is promised to "
+			  "others already");
+		set_fix(check, "ps -eo pid,cls,comm | grep -w DLN");
 	} else {
-		realtime_found(check, "SCHED_DEADLINE: %s", strerror(error));
+		set_found(check, "SCHED_DEADLINE: %s", strerror(error));
 	}
 }
 
@@ -163,21 +173,21 @@ static void check_memory(const struct judgement *j, struct incise_realtime_check
 
 	check->ok = !a->lock_error;
 	if (check->ok) {
-		realtime_found(check, "%llu MiB of addresses can be locked", need_MiB);
+		set_found(check, "%llu MiB of addresses can be locked", need_MiB);
 		return;
 	}
 	if (a->memlock == RLIM_INFINITY)
-		realtime_found(check, "%llu MiB of addresses cannot be locked: %s",
-			       need_MiB, strerror(a->lock_error));
+		set_found(check, "%llu MiB of addresses cannot be locked: %s", need_MiB,
+			  strerror(a->lock_error));
 	else
-		realtime_found(
+		set_found(
 			check,
 			"%llu MiB of addresses cannot be locked: RLIMIT_MEMLOCK is %llu "
 			"KiB",
 			need_MiB, (unsigned long long)a->memlock >> 10);
 	/* The shell that may use SCHED_DEADLINE may lock memory as well. */
-	realtime_fix(check, "%s", lacks_nice(j) ? NICE_SHELL : GRANT);
-	realtime_keep(check, GRANT_FOR_GOOD);
+	set_fix(check, "%s", lacks_nice(j) ? NICE_SHELL : GRANT);
+	set_keep(check, GRANT_FOR_GOOD);
 }
 
 static void check_cpu(const struct judgement *j, struct incise_realtime_check *check)
@@ -187,17 +197,188 @@ static void check_cpu(const struct judgement *j, struct incise_realtime_check *c
 
 	check->ok = !error;
 	if (!error)
-		realtime_found(check, "CPU %d", cpu);
+		set_found(check, "CPU %d", cpu);
 	else if (error != EINVAL)
-		realtime_found(check, "CPU %d cannot be had: %s", cpu, strerror(error));
-	else if (!realtime_line(j, CPUS "online", cpus, sizeof(cpus)) ||
+		set_found(check, "CPU %d cannot be had: %s", cpu, strerror(error));
+	else if (!read_line(j, CPUS "online", cpus, sizeof(cpus)) ||
 		 proc_file_lists(cpus, cpu))
-		realtime_found(
-			check,
-			"CPU %d cannot be had: it is not in the cpuset of this program",
-			cpu);
+		set_found(check,
+			  "CPU %d cannot be had: it is not in the cpuset of this program",
+			  cpu);
 	else
-		realtime_found(check, "CPU %d cannot be had: there are %s", cpu, cpus);
+		set_found(check, "CPU %d cannot be had: there are %s", cpu, cpus);
+}
+
+static void check_kernel(const struct judgement *j, struct incise_realtime_check *check)
+{
+	char text[16];
+
+	check->ok = read_line(j, "/sys/kernel/realtime", text, sizeof(text)) &&
+		    !strcmp(text, "1");
+	if (check->ok) {
+		set_found(check, "PREEMPT_RT");
+		return;
+	}
+	set_found(check,
+		  "not PREEMPT_RT: a busy kernel makes wake-ups late (then: reboot)");
+#if defined(__x86_64__)
+	set_fix(check, "sudo apt-get install linux-image-rt-amd64");
+#elif defined(__aarch64__)
+	set_fix(check, "sudo apt-get install linux-image-rt-arm64");
+#endif
+}
+
+/* Throttling is welcome as long as it stops only a loop that hangs. */
+static void check_throttling(const struct judgement *j,
+			     struct incise_realtime_check *check)
+{
+	char text[32];
+	long long runtime_us, period_us;
+
+	check->ok = true;
+	if (!read_line(j, "/proc/sys/kernel/sched_rt_runtime_us", text, sizeof(text))) {
+		set_found(check, "the kernel has none");
+		return;
+	}
+	if (!proc_file_integer(text, &runtime_us) || runtime_us < -1)
+		runtime_us = 0;
+	if (!read_line(j, "/proc/sys/kernel/sched_rt_period_us", text, sizeof(text)) ||
+	    !proc_file_integer(text, &period_us) || period_us < 1)
+		period_us = 1000000;
+	if (runtime_us == -1) {
+		set_found(check, "off: only RLIMIT_RTTIME ends a loop that hangs");
+		return;
+	}
+	check->ok = runtime_us >= 0.9 * (double)period_us;
+	set_found(check, "real-time threads have %.0f %% of a CPU at most",
+		  100 * (double)runtime_us / (double)period_us);
+	if (check->ok)
+		return;
+	set_fix(check, "sudo sysctl -w kernel.sched_rt_period_us=1000000 "
+		       "kernel.sched_rt_runtime_us=950000");
+	set_keep(check, "printf 'kernel.sched_rt_period_us=1000000\\n"
+			"kernel.sched_rt_runtime_us=950000\\n' | "
+			"sudo tee /etc/sysctl.d/60-incise.conf");
+}
+
+/* Of the set-up's CPU, or of all. */
+static void check_governor(const struct judgement *j, struct incise_realtime_check *check)
+{
+	char online[256], path[128], text[32], other[32] = "";
+	int seen = 0, slow = 0, of = -1;
+
+	if (!read_line(j, CPUS "online", online, sizeof(online)))
+		snprintf(online, sizeof(online), "0");
+	for (int cpu = 0; cpu < 1024; cpu++) {
+		if (j->setup->cpu >= 0 ? cpu != j->setup->cpu
+				       : !proc_file_lists(online, cpu))
+			continue;
+		snprintf(path, sizeof(path), CPUS "cpu%d/cpufreq/scaling_governor", cpu);
+		if (!read_line(j, path, text, sizeof(text)))
+			continue;
+		seen++;
+		if (!strcmp(text, "performance"))
+			continue;
+		if (!slow++) {
+			snprintf(other, sizeof(other), "%s", text);
+			of = cpu;
+		}
+	}
+	check->ok = !slow;
+	if (!seen) {
+		set_found(check, "the kernel does not change frequencies here");
+	} else if (!slow) {
+		set_found(check, "performance");
+	} else {
+		set_found(check,
+			  "%s, of CPU %d and %d others: it slows down between ticks",
+			  other, of, slow - 1);
+		set_fix(check, "echo performance | sudo tee "
+			       "/sys/devices/system/cpu/cpu*/cpufreq/scaling_governor");
+		set_keep(
+			check,
+			"echo 'w /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor - - "
+			"- - performance' | sudo tee /etc/tmpfiles.d/incise-governor.conf");
+	}
+}
+
+static void check_idle(const struct judgement *j, struct incise_realtime_check *check)
+{
+	int error = j->answers->idle_error;
+	char driver[32];
+
+	check->ok = true;
+	if (!read_line(j, CPUS "cpuidle/current_driver", driver, sizeof(driver)) ||
+	    !strcmp(driver, "none")) {
+		set_found(check, "the kernel knows no deep idle states here");
+	} else if (!error) {
+		set_found(check, "/dev/cpu_dma_latency can be held at 0");
+	} else {
+		check->ok = false;
+		set_found(check,
+			  "/dev/cpu_dma_latency: %s: deep idle states make wake-ups late",
+			  strerror(error));
+		if (error != EACCES && error != EPERM)
+			return;
+		set_fix(check, "sudo chown $USER /dev/cpu_dma_latency");
+		set_keep(
+			check,
+			"echo 'KERNEL==\"cpu_dma_latency\", GROUP=\"incise\", "
+			"MODE=\"0660\"' | sudo tee /etc/udev/rules.d/70-incise-latency.rules "
+			"&& sudo udevadm trigger /dev/cpu_dma_latency && sudo usermod -aG "
+			"incise $USER");
+	}
+}
+
+static void check_clock(const struct judgement *j, struct incise_realtime_check *check)
+{
+	static const char *const slow[] = {"hpet", "acpi_pm", "pit", "jiffies",
+					   "refined-jiffies"};
+	int64_t resolution_ns = j->answers->clock_resolution_ns;
+	char source[32];
+
+	check->ok = true;
+	if (resolution_ns > 1000) {
+		check->ok = false;
+		set_found(check,
+			  "timers come every %.3g ms only: the kernel was started with "
+			  "highres=off, or its clock cannot do better",
+			  (double)resolution_ns * 1e-6);
+		return;
+	}
+	if (!read_line(j, CLOCKSOURCE "current_clocksource", source, sizeof(source)))
+		snprintf(source, sizeof(source), "unknown");
+	for (size_t i = 0; i < sizeof(slow) / sizeof(*slow); i++)
+		check->ok &= !!strcmp(source, slow[i]);
+	if (check->ok) {
+		set_found(check, "%s", source);
+	} else {
+		set_found(check,
+			  "%s: to read it takes a system call, about a microsecond or "
+			  "more of each tick",
+			  source);
+		set_fix(check, "cat " CLOCKSOURCE "available_clocksource");
+	}
+}
+
+static void check_isolated(const struct judgement *j, struct incise_realtime_check *check)
+{
+	int cpu = j->setup->cpu;
+	char cpus[256];
+
+	check->ok = read_line(j, CPUS "isolated", cpus, sizeof(cpus)) &&
+		    proc_file_lists(cpus, cpu);
+	if (check->ok) {
+		set_found(check, "CPU %d is kept for those who ask for it", cpu);
+		return;
+	}
+	set_found(check, "CPU %d is not isolated: others run on it too (then: reboot)",
+		  cpu);
+	set_fix(check,
+		"echo 'GRUB_CMDLINE_LINUX=\"$GRUB_CMDLINE_LINUX "
+		"isolcpus=managed_irq,domain,%d nohz_full=%d\"' | sudo tee "
+		"/etc/default/grub.d/incise.cfg && sudo update-grub",
+		cpu, cpu);
 }
 
 static const struct {
@@ -208,12 +389,12 @@ static const struct {
 	{"scheduling", check_scheduling, true, false},
 	{"memory", check_memory, true, false},
 	{"cpu", check_cpu, true, true},
-	{"kernel", realtime_check_kernel, false, false},
-	{"throttling", realtime_check_throttling, false, false},
-	{"governor", realtime_check_governor, false, false},
-	{"idle", realtime_check_idle, false, false},
-	{"clock", realtime_check_clock, false, false},
-	{"isolated", realtime_check_isolated, false, true},
+	{"kernel", check_kernel, false, false},
+	{"throttling", check_throttling, false, false},
+	{"governor", check_governor, false, false},
+	{"idle", check_idle, false, false},
+	{"clock", check_clock, false, false},
+	{"isolated", check_isolated, false, true},
 };
 _Static_assert(sizeof(looks) / sizeof(*looks) == INCISE_REALTIME_CHECKS, "all of them");
 
@@ -237,7 +418,7 @@ int realtime_judge(const struct incise_realtime_setup *setup,
 	return count;
 }
 
-/* Commands of all that is denied, each once, to be run one after the other. */
+/* Append a text, each only once. */
 static void collect(char *text, size_t size, const char *command)
 {
 	size_t length = strlen(text);
@@ -254,7 +435,7 @@ static int code(const struct incise_realtime_check *check,
 		return answers->policy_error;
 	if (!strcmp(check->name, "cpu"))
 		return answers->cpu_error;
-	/* mlock(2) says ENOMEM where it means that it is not allowed. */
+	/* mlock(2) returns ENOMEM for a missing right. */
 	return EPERM;
 }
 
@@ -279,7 +460,7 @@ int realtime_denied(const struct realtime_answers *answers,
 	length = snprintf(text, sizeof(text), "no real time: %s%s%s%s", reasons,
 			  *fixes ? "; run `" : "", fixes,
 			  *fixes ? "` and start again" : "");
-	/* Of a command a half is worse than none. */
+	/* Half a command is worse than none. */
 	if (err && *keeps &&
 	    (size_t)length + strlen(keeps) + sizeof("; to make it last: ``") <=
 		    sizeof(err->text))

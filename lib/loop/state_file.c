@@ -15,12 +15,12 @@
 #include "state_file.h"
 #include "state_page.h"
 
-/* Names to try: more that start at once there will not be. */
+/* Names to try: no more loops start at once. */
 #define TRIES 100
 
 int incise_state_file_held(int fd)
 {
-	/* One for reading would wait for a writer's only. */
+	/* A lock for reading conflicts with a writer's only. */
 	struct flock lock = {.l_type = F_RDLCK, .l_whence = SEEK_SET};
 
 	if (fcntl(fd, F_OFD_GETLK, &lock))
@@ -41,7 +41,7 @@ static int busy(const char *path, int fd, struct incise_error *err)
 		path, (long long)head.pid);
 }
 
-/* 0: nothing, or what may be replaced. */
+/* 0: there is nothing, or a page that may be replaced. */
 static int look(const char *path, struct incise_error *err)
 {
 	char magic[sizeof(STATE_MAGIC) - 1];
@@ -58,7 +58,7 @@ static int look(const char *path, struct incise_error *err)
 		     : -1;
 	if (fd >= 0)
 		n = pread(fd, magic, sizeof(magic), 0);
-	/* An empty one holds nothing that anybody could miss. */
+	/* An empty file may be replaced. */
 	if (fd < 0 || n < 0 ||
 	    (n && (n < (ssize_t)sizeof(magic) || memcmp(magic, STATE_MAGIC, n))))
 		rc = incise_error_set(err, EEXIST,
@@ -72,7 +72,7 @@ static int look(const char *path, struct incise_error *err)
 	return rc;
 }
 
-/* The hidden name for a try. */
+/* The n-th hidden name. */
 static void try_name(struct incise_state_file *file, unsigned int n)
 {
 	const char *slash = strrchr(file->path, '/');
@@ -80,6 +80,12 @@ static void try_name(struct incise_state_file *file, unsigned int n)
 
 	snprintf(file->hidden, strlen(file->path) + 9, "%.*s.%s.%06u", dir, file->path,
 		 file->path + dir, ((unsigned int)getpid() + n) % 1000000u);
+}
+
+static void forget_hidden(struct incise_state_file *file)
+{
+	free(file->hidden);
+	file->hidden = NULL;
 }
 
 static int create(struct incise_state_file *file)
@@ -106,8 +112,7 @@ static int create(struct incise_state_file *file)
 	if (fd < 0 && file->hidden) {
 		int rc = -errno;
 
-		free(file->hidden);
-		file->hidden = NULL;
+		forget_hidden(file);
 		return rc;
 	}
 	file->fd = fd;
@@ -119,10 +124,10 @@ static int fill(struct incise_state_file *file, size_t size)
 	struct flock lock = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
 	int rc;
 
-	/* Whatever the umask: anybody may look. */
+	/* Anybody may read it, whatever the umask. */
 	if (fchmod(file->fd, 0644) || fcntl(file->fd, F_OFD_SETLK, &lock))
 		return -errno;
-	/* Room that is not there would be found out by a signal, in the loop. */
+	/* A full disk would otherwise end the loop by SIGBUS. */
 	rc = posix_fallocate(file->fd, 0, (off_t)size);
 	if (rc)
 		return -rc;
@@ -133,7 +138,7 @@ static int fill(struct incise_state_file *file, size_t size)
 		return -errno;
 	}
 	file->size = size;
-	/* Written once, each page is the loop's own, and costs no fault there. */
+	/* Written once here, pages cost the loop no fault. */
 	memset(file->page, 0, size);
 	return 0;
 }
@@ -162,7 +167,7 @@ int incise_state_file_new(struct incise_state_file *file, const char *path, size
 	return 0;
 }
 
-/* Give a file without a name a hidden one. */
+/* Give an unnamed file a hidden name. */
 static int name_hidden(struct incise_state_file *file)
 {
 	char proc[32];
@@ -180,14 +185,13 @@ static int name_hidden(struct incise_state_file *file)
 		if (errno != EEXIST)
 			break;
 	}
-	free(file->hidden);
-	file->hidden = NULL;
+	forget_hidden(file);
 	return -errno;
 }
 
 /*
- * What was at the path is under the hidden name now. If another loop put it there since one
- * looked, it gets its name back.
+ * The previous file has the hidden name now. If another loop put it at the path meanwhile, it
+ * gets its name back.
  */
 static int swapped(struct incise_state_file *file, struct incise_error *err)
 {
@@ -210,29 +214,26 @@ int incise_state_file_publish(struct incise_state_file *file, struct incise_erro
 	if (rc)
 		goto failed;
 	for (int n = 0; n < TRIES; n++) {
-		/* In the place of nothing, or of one that can still be looked at then. */
+		/* If there is a file already, exchange it, so that it can still be checked. */
 		if (!renameat2(AT_FDCWD, file->hidden, AT_FDCWD, file->path,
 			       RENAME_NOREPLACE)) {
-			free(file->hidden);
-			file->hidden = NULL;
+			forget_hidden(file);
 			return 0;
 		}
 		if (errno == EEXIST && !renameat2(AT_FDCWD, file->hidden, AT_FDCWD,
 						  file->path, RENAME_EXCHANGE)) {
 			rc = swapped(file, err);
 			unlink(file->hidden);
-			free(file->hidden);
-			file->hidden = NULL;
+			forget_hidden(file);
 			return rc;
 		}
 		if (errno != EEXIST && errno != ENOENT)
 			break;
 	}
 	rc = -errno;
-	/* A file system without that. */
+	/* The file system has no such flags. */
 	if ((rc == -EINVAL || rc == -ENOSYS) && !rename(file->hidden, file->path)) {
-		free(file->hidden);
-		file->hidden = NULL;
+		forget_hidden(file);
 		return 0;
 	}
 failed:

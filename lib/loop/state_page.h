@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The bytes of a state page; incise-state(5) says the same for others. Numbers are the
- * machine's own, all of 8 bytes but where it says otherwise; strings end with 0.
+ * The bytes of a state page, as incise-state(5) documents them. Numbers are in the machine's
+ * byte order, of 8 bytes unless stated otherwise; strings end with 0.
  *
  *   0 ┌──────────────┐
  *     │ head         │ constant
@@ -17,8 +17,15 @@
  *     │ slots        │ number + 1, tick
  *     └──────────────┘
  *
- * The head has the place and size of each, which only grow within a major version: readers
- * take what they know. Each word behind the head is written as an atomic, see state_words.h.
+ * The head has the place and size of each part. Parts only grow within a major version;
+ * readers use the beginning that they know.
+ *
+ * Each word behind the head is written as an atomic, so that a race is a torn copy, which seq
+ * reveals, and never undefined. The pattern is from H.-J. Boehm, 'Can seqlocks get along with
+ * programming language memory models?', MSPC 2012, figure 6; as in device/page.c.
+ *
+ *   writer   seq odd ── words ── seq even         one at a time per part
+ *   reader   seq even ── copy ── the same seq     else once more
  */
 #ifndef INCISE_STATE_PAGE_H
 #define INCISE_STATE_PAGE_H
@@ -29,7 +36,7 @@
 #define STATE_MAGIC "INCSTATE"
 #define STATE_MAJOR 1
 #define STATE_MINOR 0
-#define STATE_FLAGS 16 /* counters of flags, with room */
+#define STATE_FLAGS 16 /* counters of flags, some unused */
 
 struct state_part {
 	uint64_t offset; /* from the beginning of the page, a multiple of 8 */
@@ -65,7 +72,7 @@ struct state_run {
 	uint32_t run; /* enum incise_run */
 	uint32_t n_stages;
 	int64_t since_ns;
-	char reason[304]; /* the last 4 are room */
+	char reason[304]; /* the last 4 are unused */
 	char scene[512];
 	char stage[INCISE_PLAN_STAGES_MAX][24];
 	uint64_t left_out, reloads, refused;
@@ -95,12 +102,12 @@ struct state_page {
 	_Alignas(64) struct state_live live;
 	_Alignas(64) uint64_t lateness[INCISE_STATE_BUCKETS];
 	uint64_t cost[INCISE_STATE_BUCKETS];
-	/* How many ticks were written; then the slots. */
+	/* Number of ticks written, then the slots. */
 	_Alignas(64) uint64_t written;
 	struct state_slot slot[INCISE_STATE_TICKS];
 };
 
-/* Who reads with another compiler meets the same places. */
+/* Readers from other compilers rely on these sizes. */
 _Static_assert(sizeof(struct state_head) == 584, "head");
 _Static_assert(sizeof(struct state_tick) == 200, "tick");
 _Static_assert(sizeof(struct state_run) == 1280, "run");
@@ -111,7 +118,27 @@ _Static_assert(INCISE_TICK_FLAGS <= STATE_FLAGS, "a counter for each flag");
 /* Between the page's tick and the library's. */
 void incise_state_pack(struct state_tick *to,
 		       const struct incise_tick *from) INCISE_REALTIME;
-/* Returns 0, -EIO: what stands there is no tick. */
+/* Returns 0; -EIO: @from is no tick. */
 int incise_state_unpack(struct incise_tick *to, const struct state_tick *from);
+
+/*
+ * Publish a tick. Real-time safe: 35 ns with the page in the cache, half a us without; no
+ * allocation, lock or system call. In the thread that ticks, only.
+ *
+ * The tissue's work is summed here: the force that one tick requested, along the way to the
+ * place of the tool at the next one. Ways that are no motion are left out: from one tool to
+ * another, to or from a tick without a fresh pose or with a fault.
+ *
+ * @writer      NULL: nothing happens
+ * @lateness_ns from the time that the tick was due to its start; below 0 counts as 0
+ * @cost_ns     duration of the tick
+ * @skipped     ticks that were left out just before this one; an overrun when not 0
+ */
+void incise_state_tick(struct incise_state_writer *writer, const struct incise_tick *tick,
+		       int64_t lateness_ns, int64_t cost_ns,
+		       uint64_t skipped) INCISE_REALTIME;
+
+/* The bucket of a time; times below 0 are in the first. */
+int incise_state_bucket(int64_t ns) INCISE_REALTIME;
 
 #endif

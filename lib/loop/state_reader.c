@@ -2,10 +2,10 @@
 /*
  * The reader of a state page; see incise/state.h.
  *
- * It copies by pread(2), so that a file that is cut off is a short read and no signal, and
- * checks its copy, which nobody can change any more. The order of its loads is that of the
- * calls: a fence holds for what the kernel loads in them too. Words of 8 bytes at a multiple
- * of 8 are copied whole; a seq that was not would not be found twice.
+ * It copies by pread(2), so that a truncated file is a short read and no signal, and checks its
+ * copy, which nobody else can change. Its loads happen in the order of the calls: a fence also
+ * orders the kernel's loads in them. Aligned words of 8 bytes are copied whole; a seq that was
+ * not would differ when it is read again.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -18,10 +18,10 @@
 #include "state_file.h"
 #include "state_page.h"
 
-/* A writer is in a part for some 30 ns; a reader that is so often unlucky is not unlucky. */
+/* A write takes some 30 ns: after so many tries the writer must have stopped in the middle. */
 #define TRIES 100
 #define CHUNK 64	/* slots at a time */
-#define ENTRY_MAX 65536 /* bytes of any part, and of a slot: far more than there are */
+#define ENTRY_MAX 65536 /* bytes of any part or slot: far more than needed */
 #define COUNT_MAX (1 << 24)
 
 struct incise_state {
@@ -61,7 +61,7 @@ static bool sound_part(const struct state_part *part, uint64_t size, uint64_t co
 
 static bool sound_head(const struct state_head *head, uint64_t size)
 {
-	/* In front of the slots is the count of ticks. */
+	/* The number of ticks precedes the slots. */
 	const struct state_part slots = {head->ring.offset + sizeof(uint64_t),
 					 head->ring.size, head->ring.count};
 	const uint64_t word = sizeof(uint64_t);
@@ -133,7 +133,7 @@ no_memory:
 failed:
 	close(state->fd);
 	free(state);
-	/* close() may have said something else. */
+	/* close() may have changed errno. */
 	errno = err ? err->code : EINVAL;
 	return NULL;
 }
@@ -171,7 +171,7 @@ static int try_part(const struct incise_state *state, uint64_t offset, void *to,
 	return before == after && !(before & 1) ? 0 : -EAGAIN;
 }
 
-/* What a writer left half written when it died is given as it stands. */
+/* A part that a dead writer left half written is returned as it is. */
 static int read_part(struct incise_state *state, uint64_t offset, void *to, size_t size,
 		     struct incise_state_now *now)
 {
@@ -188,16 +188,16 @@ static int read_part(struct incise_state *state, uint64_t offset, void *to, size
 	if (alive)
 		return alive < 0 ? -EIO : -EAGAIN;
 	now->alive = false;
-	/* It may have ended in good order just now. */
+	/* It may have ended properly just now. */
 	rc = try_part(state, offset, to, size);
 	now->torn |= rc == -EAGAIN;
 	return rc == -EAGAIN ? 0 : rc;
 }
 
-/* A string that ends, and that a terminal can be shown. */
-static void take_text(char *to, size_t size, const char *from, size_t room)
+/* A terminated, printable string. */
+static void take_text(char *to, size_t size, const char *from, size_t capacity)
 {
-	size_t n = strnlen(from, room < size ? room : size - 1);
+	size_t n = strnlen(from, capacity < size ? capacity : size - 1);
 
 	memset(to, 0, size);
 	for (size_t i = 0; i < n; i++)
@@ -284,7 +284,7 @@ int incise_state_read(struct incise_state *state, struct incise_state_now *now)
 	return rc ? rc : copy(state, &now->cost, sizeof(now->cost), head->cost.offset);
 }
 
-/* Ticks first … first + n, which lie side by side; returns how many are good, or -EIO. */
+/* Ticks first … first + n, in adjacent slots; returns the number of valid ones, or -EIO. */
 static int take_slots(struct incise_state *state, uint64_t first, uint64_t n,
 		      struct incise_tick *ticks)
 {
@@ -303,7 +303,7 @@ static int take_slots(struct incise_state *state, uint64_t first, uint64_t n,
 		struct state_slot slot;
 
 		memcpy(&slot, state->slots + i * ring->size, sizeof(slot));
-		/* That far behind its place is being written, or was. */
+		/* Older slots may have been overwritten. */
 		if (written - (first + i) < ring->count && slot.number == first + i + 1 &&
 		    !incise_state_unpack(&ticks[good], &slot.tick))
 			good++;

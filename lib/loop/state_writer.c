@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The writer of a state page; see incise/state.h. Each part has a copy here: what somebody
- * else wrote into the file does not mislead the loop.
+ * The writer of a state page; see incise/state.h. It keeps a copy of each part, so that foreign
+ * writes into the file do not mislead the loop.
  */
 #include <errno.h>
 #include <linux/magic.h>
@@ -16,22 +16,106 @@
 #include "../base/vector.h"
 #include "state_file.h"
 #include "state_page.h"
-#include "state_words.h"
-#include "state_work.h"
+
+_Static_assert(__atomic_always_lock_free(sizeof(uint64_t), 0), "words of 8 bytes");
+
+/* Inlined, so that a copy of a known size is a sequence of moves. */
+#define STATE_INLINE static inline __attribute__((always_inline))
+
+STATE_INLINE void state_put(void *to, const void *from, size_t size)
+{
+	uint64_t *words = to, word;
+
+	for (size_t i = 0; i < size / sizeof(word); i++) {
+		memcpy(&word, (const char *)from + i * sizeof(word), sizeof(word));
+		__atomic_store_n(words + i, word, __ATOMIC_RELAXED);
+	}
+}
+
+/* With one writer, no locked operation is needed. */
+STATE_INLINE void state_count(uint64_t *counter)
+{
+	__atomic_store_n(counter, __atomic_load_n(counter, __ATOMIC_RELAXED) + 1,
+			 __ATOMIC_RELAXED);
+}
+
+/* Copy a part; its first word is seq, which is not taken from the copy. */
+STATE_INLINE void state_publish(void *part, const void *from, size_t size)
+{
+	uint64_t *seq = part;
+	uint64_t even = __atomic_load_n(seq, __ATOMIC_RELAXED) & ~(uint64_t)1;
+
+	__atomic_store_n(seq, even + 1, __ATOMIC_RELAXED);
+	__atomic_thread_fence(__ATOMIC_RELEASE);
+	state_put(seq + 1, (const char *)from + sizeof(*seq), size - sizeof(*seq));
+	__atomic_store_n(seq, even + 2, __ATOMIC_RELEASE);
+}
+
+/* A sum that stays accurate over 1e9 additions; W. Kahan, CACM 8 (1965) 40. */
+struct sum {
+	double value, error;
+};
+
+static void add(struct sum *sum, double value)
+{
+	double more = value - sum->error;
+	double next = sum->value + more;
+
+	sum->error = (next - sum->value) - more;
+	sum->value = next;
+}
+
+/* No hand does more work between two ticks; more would saturate the sums. */
+#define WORK_MAX_mJ 1e9
+
+/*
+ * The work of hand and tissue on each other, mJ (N·mm).
+ *
+ *     tick      k-1             k
+ *     force    f(k-1) ────────▶          held between them
+ *     tool     x(k-1)          x(k)      work on the tissue: -f(k-1)·(x(k) - x(k-1))
+ */
+struct work {
+	struct sum absorbed; /* by the tissue */
+	struct sum returned; /* to the hand; ≥ 0 */
+	double tool_mm[3], force_N[3];
+	enum incise_tool tool;
+	bool known; /* tool_mm and force_N are those of the last tick */
+};
+
+static void add_work(struct work *work, const struct incise_tick *tick)
+{
+	bool known = !(tick->flags & (INCISE_TICK_STALE | INCISE_TICK_FAULT));
+	double way_mm[3], work_mJ;
+
+	/* A change of the tool is no motion. */
+	if (known && work->known && tick->tool == work->tool) {
+		v3_sub(way_mm, tick->tool_mm, work->tool_mm);
+		work_mJ = -v3_dot(work->force_N, way_mm);
+		if (work_mJ > 0 && work_mJ < WORK_MAX_mJ)
+			add(&work->absorbed, work_mJ);
+		else if (work_mJ < 0 && work_mJ > -WORK_MAX_mJ)
+			add(&work->returned, -work_mJ);
+	}
+	v3_copy(work->tool_mm, tick->tool_mm);
+	v3_copy(work->force_N, tick->command_N);
+	work->tool = tick->tool;
+	work->known = known;
+}
 
 struct incise_state_writer {
 	struct incise_state_file file;
 	struct state_page *page;
 	struct state_run run; /* the normal thread's */
-	bool felt;	      /* a scene was told */
-	int64_t running_ns;   /* since when it runs */
-	/* The loop's, on lines of the cache that are not the other's. */
+	bool has_scene;
+	int64_t running_ns; /* when it started to run */
+	/* The loop's, on cache lines of its own. */
 	_Alignas(64) struct state_live live;
-	struct incise_work work;
+	struct work work;
 	uint64_t written;
 };
 
-/* Cut where it is too long, between characters, and printable. */
+/* Printable, and cut between characters. */
 static void put_text(char *to, size_t size, const char *text)
 {
 	size_t n = text ? strlen(text) : 0;
@@ -46,7 +130,7 @@ static void put_text(char *to, size_t size, const char *text)
 		to[i] = (unsigned char)text[i] < ' ' || text[i] == 0x7f ? '?' : text[i];
 }
 
-/* Of a long path the end says more. */
+/* Keep the end of a long path. */
 static void put_path(char *to, size_t size, const char *path)
 {
 	size_t n = path ? strlen(path) : 0;
@@ -142,9 +226,8 @@ bool incise_state_in_memory(const struct incise_state_writer *w)
 }
 
 /*
- * The place of tick n is also that of tick n - slots. Who reads it looks at the count of
- * ticks afterwards: it is as high as what was read is new, because it was raised before a
- * word of the next tick was written.
+ * Tick n takes the slot of tick n - slots. A reader checks the number of ticks after its copy:
+ * that number was raised before any word of the next tick was written.
  */
 static void put_slot(struct incise_state_writer *w, const struct state_tick *tick)
 {
@@ -197,7 +280,7 @@ void incise_state_tick(struct incise_state_writer *w, const struct incise_tick *
 		cost_ns = 0;
 	count_tick(&w->live, tick, skipped);
 	count_times(&w->live, lateness_ns, cost_ns);
-	incise_work_add(&w->work, tick);
+	add_work(&w->work, tick);
 	w->live.absorbed_mJ = w->work.absorbed.value;
 	w->live.returned_mJ = w->work.returned.value;
 	incise_state_pack(&w->live.tick, tick);
@@ -214,7 +297,7 @@ void incise_state_run(struct incise_state_writer *w, enum incise_run run,
 		return;
 	if ((uint32_t)run != w->run.run || !w->run.since_ns)
 		w->run.since_ns = incise_monotonic_ns();
-	/* It ran while it read another scene. */
+	/* It kept running while it read another scene. */
 	if (run == INCISE_RUN_RUNNING && w->run.run == INCISE_RUN_RELOADING)
 		w->run.since_ns = w->running_ns;
 	else if (run == INCISE_RUN_RUNNING)
@@ -243,8 +326,8 @@ void incise_state_scene(struct incise_state_writer *w, const char *path,
 	w->run.left_out = 0;
 	while (plan && incise_plan_left_out(plan, (int)w->run.left_out, &why))
 		w->run.left_out++;
-	w->run.reloads += w->felt;
-	w->felt = true;
+	w->run.reloads += w->has_scene;
+	w->has_scene = true;
 	publish_run(w);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What it costs the loop to tell its state: one tick after the other, and at 1 kHz, when its
+ * Time that the loop needs to publish its state: one tick after the other, and at 1 kHz, when its
  * memory is no longer in the cache. ns; times at 1 kHz are with the clock's own, which is told.
  */
 #include <stdio.h>
@@ -8,7 +8,7 @@
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
-#include <incise/state.h>
+#include "../../lib/loop/state_page.h"
 
 enum { PACED = 5000, CLOSE = 10000000 };
 

@@ -13,8 +13,7 @@
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
-#include <incise/realtime.h>
-#include <incise/state.h>
+#include "../../lib/loop/state_page.h"
 
 static volatile sig_atomic_t stop;
 

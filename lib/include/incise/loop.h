@@ -23,31 +23,30 @@
 
 INCISE_BEGIN_DECLS
 
-/** Histogram of latenesses: bin i counts [i, i+1) µs, the last one all above. */
+/** Histogram of latenesses: bin i counts [i, i+1) µs, the last one everything above. */
 #define INCISE_LOOP_BINS 20001
 
-/** How a loop runs. Set it to {0} but for rate_hz before use. */
+/** Options of a loop. Start from {0} and set rate_hz. */
 struct incise_loop_options {
 	double rate_hz;	     /**< 1 … 20000 */
 	int64_t duration_ns; /**< 0: until stopped */
-	/** The page that others read; or NULL. */
+	/** The page for readers, or NULL. */
 	struct incise_state_writer *state;
-	/** Where every tick is written, or NULL: room for log_size; more are not kept. */
+	/** Buffer for the first log_size ticks, or NULL. */
 	struct incise_tick *log;
 	size_t log_size;
 	/**
-	 * Set by a signal handler to end the loop, or NULL. The force fades out first, which
-	 * takes no longer than incise_plan_fade_ns(); these ticks count as any.
+	 * Set by a signal handler to end the loop, or NULL. The force fades out first, within
+	 * incise_plan_fade_ns(); these ticks count.
 	 */
 	const volatile sig_atomic_t *stop;
-	/** Overruns in a row that end it; 0: none do. */
+	/** Consecutive overruns that end the loop; 0: any number is allowed. */
 	unsigned int overruns_most;
-	/** Through which it is given other plans and tells of events, or NULL. */
+	/** Carries new plans to the loop and events from it, or NULL. */
 	struct incise_loop_control *control;
 	/**
-	 * Told of each tick after it, outside of its cost; what is not 0 ends the loop, and is
-	 * what incise_loop_run() returns. Or NULL. For what is not live: it takes the time of
-	 * the next tick.
+	 * Called after each tick, outside of its cost, or NULL. A result other than 0 ends the
+	 * loop, and incise_loop_run() returns it. Not for live loops: it delays the next tick.
 	 */
 	int (*ticked)(void *context, const struct incise_tick *tick);
 	void *context;
@@ -57,7 +56,7 @@ struct incise_loop_options {
 struct incise_loop_stats {
 	uint64_t ticks;	   /**< run */
 	uint64_t skipped;  /**< not run because they would have been a period late */
-	uint64_t overruns; /**< times that some were skipped */
+	uint64_t overruns; /**< gaps of one or more skipped ticks */
 	uint64_t flagged[INCISE_TICK_FLAGS]; /**< ticks with flag 1 << i */
 	uint64_t limited; /**< ticks with INCISE_TICK_CLAMPED, _SLEWED or both */
 	size_t logged;
@@ -72,13 +71,13 @@ struct incise_loop_stats {
 };
 
 /**
- * Run a plan, and let go of the actuator at the end, however it comes. Makes no
- * allocation and no system call but the clock's, and what options->ticked makes.
+ * Run a plan, and release the actuator at the end in every case. Makes no allocation and no
+ * system call other than the clock's and those of options->ticked.
  *
  * @param stats caller's memory, some 300 KiB; zeroed here
  * @return 0 at the end of the time or when stopped; -EINVAL (options), -ETIME (too many
- *         overruns in a row), or the errno of the device that failed; what options->ticked
- *         returned, which sets @err itself.
+ *         overruns in a row), or the errno of the device that failed; the result of
+ *         options->ticked, which sets @err itself.
  */
 INCISE_API int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 			       const struct incise_loop_options *options,

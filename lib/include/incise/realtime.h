@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Real time for a program: what a process and its loop's thread ask of the kernel, and,
- * where the kernel says no, the command that grants it.
+ * Real time for a program: the requests of a process and its loop's thread to the kernel, and
+ * the command that grants a denied one.
  *
  *   main()  ── prepare ── checks? ── new ── open devices ───────────────────── free
  *                                            │
@@ -22,30 +22,30 @@ INCISE_BEGIN_DECLS
 
 /** Policies of the scheduler that a loop may ask for. */
 enum incise_realtime_policy {
-	INCISE_REALTIME_FIFO, /**< SCHED_FIFO: what it is for is RLIMIT_RTPRIO */
+	INCISE_REALTIME_FIFO, /**< SCHED_FIFO: needs RLIMIT_RTPRIO */
 	/**
-	 * SCHED_DEADLINE: half of each period at most, so that a loop that hangs cannot take
+	 * SCHED_DEADLINE: at most half of each period, so that a loop that hangs does not block
 	 * a CPU. Needs CAP_SYS_NICE, periods of 0.1 ms to 4 s, and all CPUs to run on.
 	 */
 	INCISE_REALTIME_DEADLINE,
 };
 
-/** Threads of devices are at 85: what makes the loop move must not be held up by it. */
+/** Threads of devices are at 85: the loop must not delay them. */
 #define INCISE_REALTIME_PRIORITY 80
-/** Highest that may be asked for: below those of devices. */
+/** Highest priority: below those of devices. */
 #define INCISE_REALTIME_PRIORITY_MAX 84
-/** The loop may run anywhere. */
+/** The loop may run on any CPU. */
 #define INCISE_REALTIME_ANY_CPU (-1)
 
-/** What a loop asks of the kernel. */
+/** A loop's requests to the kernel. */
 struct incise_realtime_setup {
 	enum incise_realtime_policy policy;
 	int priority;	   /**< 1 … INCISE_REALTIME_PRIORITY_MAX; of SCHED_FIFO */
-	int cpu;	   /**< the loop's alone, or INCISE_REALTIME_ANY_CPU */
+	int cpu;	   /**< for the loop alone, or INCISE_REALTIME_ANY_CPU */
 	int64_t period_ns; /**< of the loop; 50000 … 10⁹ (20 kHz … 1 Hz) */
 };
 
-/** Something that was looked at. */
+/** One check and its result. */
 struct incise_realtime_check {
 	/**
 	 * scheduling, memory, cpu (needed); kernel, throttling, governor, idle, clock,
@@ -55,66 +55,66 @@ struct incise_realtime_check {
 	bool needed; /**< without it incise_realtime_new() fails */
 	bool ok;
 	char found[160]; /**< one line */
-	/** When not ok: the command to run in a shell, as it is; empty: there is none. */
+	/** When not ok: the command to run in a shell, or empty. */
 	char fix[240];
-	/** The command that makes it last, or empty: the fix lasts, or there is none. */
+	/** The command that makes the fix permanent, or empty: it is, or there is none. */
 	char keep[240];
 };
 
-/** How many checks there may be. */
+/** Maximum number of checks. */
 #define INCISE_REALTIME_CHECKS 9
 
 /**
- * Small stacks, one heap that is never given back, no huge pages: what is locked later is
- * then small, and no page of it comes or goes. The first thing in main(), before there is
- * another thread. Changes the whole process, needs no right and cannot fail.
+ * Set small stacks, one heap that never shrinks, and no huge pages: the memory that is locked
+ * later is then small and constant. Call it first in main(), before there is another thread.
+ * Changes the whole process, needs no right and cannot fail.
  */
 INCISE_API void incise_realtime_prepare(void);
 
 /**
- * Look at all that a loop of this set-up needs and at what makes it late. The policy and the
- * CPU are tried on a thread that ends at once, the memory on an empty range; nothing
- * stays, but that soft limits RLIMIT_RTPRIO and RLIMIT_MEMLOCK are raised to the hard ones.
+ * Check everything that a loop of this set-up needs, and causes of lateness. The policy and the
+ * CPU are tried on a thread that ends at once, the memory on an empty range. The only lasting
+ * change: soft limits RLIMIT_RTPRIO and RLIMIT_MEMLOCK are raised to the hard ones.
  *
- * @param checks room for @n; what is needed comes first
- * @return how many there are, which may be more than @n; -EINVAL (set-up out of its range),
- *         -ENOMEM or -EAGAIN (no thread to try it on)
+ * @param checks capacity @n; required ones come first
+ * @return their number, which may be more than @n; -EINVAL (set-up out of its range), -ENOMEM
+ *         or -EAGAIN (no thread for the trial)
  */
 INCISE_API int incise_realtime_checks(const struct incise_realtime_setup *setup,
 				      struct incise_realtime_check *checks, int n);
 
-/** What a process holds. */
+/** Real time of a process. */
 struct incise_realtime;
 
 /**
- * Lock the memory of this process, now and from now on, and hold the CPUs off deep idle
- * states where that may be. In a normal thread, before devices are opened. What is needed
- * is checked first; @err then has the commands that grant all of it.
+ * Lock the present and future memory of this process, and keep the CPUs out of deep idle states
+ * where that is allowed. In a normal thread, before devices are opened. Required rights are
+ * checked first; @err then has the commands that grant all of them.
  *
  * @return to be freed with incise_realtime_free(); NULL with errno EPERM (denied), EINVAL
- *         (set-up out of its range, or a CPU that cannot be had), EBUSY (SCHED_DEADLINE: the
- *         CPUs are promised to others), ENOTSUP (SCHED_DEADLINE with a CPU), EAGAIN, ENOMEM
+ *         (set-up out of its range, or the CPU is not available), EBUSY (SCHED_DEADLINE: others
+ *         have reserved the CPUs), ENOTSUP (SCHED_DEADLINE with a CPU), EAGAIN, ENOMEM
  */
 INCISE_API struct incise_realtime *incise_realtime_new(
 	const struct incise_realtime_setup *setup, struct incise_error *err);
 
 /**
- * In the loop's thread, before its first tick: touch its stack, go to the CPU, take the
- * policy. The thread must end when this fails. With a CPU, threads that it starts run there
- * too: start those of devices elsewhere.
+ * In the loop's thread, before its first tick: touch its stack, move to the CPU, take the policy.
+ * The thread must end when this fails. Threads that it starts inherit its CPU: start those of
+ * devices elsewhere.
  *
- * @return 0, or -EPERM, -EINVAL, -EBUSY: as above, of rights that went since
+ * @return 0, or -EPERM, -EINVAL, -EBUSY: as above, for rights that were lost since
  */
 INCISE_API int incise_realtime_enter(const struct incise_realtime *realtime,
 				     struct incise_error *err);
 
-/** Let go of it, when the loop's thread is gone. Memory is unlocked. */
+/** Release it after the loop's thread has ended. Unlocks memory. */
 INCISE_API void incise_realtime_free(struct incise_realtime *realtime);
 
-/** What a thread has had since it began: of a loop that runs, the differences are to be 0. */
+/** Counts of a thread since its start: faults should not increase while a loop runs. */
 struct incise_realtime_counts {
 	uint64_t minor_faults, major_faults; /**< pages mapped, pages read from a disk */
-	/** Waits, one for each tick; and the times that another took the CPU from it. */
+	/** Waits, one for each tick; and preemptions. */
 	uint64_t voluntary, involuntary;
 };
 
@@ -122,7 +122,7 @@ struct incise_realtime_counts {
  * Read them, from /proc/self/task/TID, in another thread.
  *
  * @param tid gettid(2) of a thread of this process
- * @return 0, -ESRCH (no such thread), -EIO (not what proc(5) says)
+ * @return 0, -ESRCH (no such thread), -EIO (format not as in proc(5))
  */
 INCISE_API int incise_realtime_count(int tid, struct incise_realtime_counts *counts);
 

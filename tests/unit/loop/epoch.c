@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The loop on clocks that began long ago: what it does depends on times that went by, never
- * on the time it is. So four seconds of the virtual rig are the same to the bit wherever the
- * clock begins: at 0, across what 32 bits hold of ns, µs and ms, across 2^53 ns, where a
- * double loses them, and close to the end of 64 bits.
+ * The loop on clocks that started long ago: its results depend on elapsed time only.
+ * Four seconds of the virtual rig are the same to the bit wherever the
+ * clock starts: at 0, across 32 bits of ns, µs and ms, across 2^53 ns, where a
+ * double loses precision, and close to the end of 64 bits.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -16,12 +16,12 @@
 
 #define TICKS 4000
 
-/* Without what pads it at its end. */
+/* Without trailing padding. */
 #define TICK_BYTES (offsetof(struct incise_tick, tool) + sizeof(enum incise_tool))
 
 static int64_t start_ns;
 
-/* The rig's clock, which would begin at 1 s. */
+/* Replaces the rig's clock, which starts at 1 s. */
 struct incise_clock *__real_incise_clock_new_simulated(int64_t ns);
 struct incise_clock *__wrap_incise_clock_new_simulated(int64_t ns)
 {
@@ -67,7 +67,7 @@ static void test_same_to_the_bit(void **state)
 	};
 
 	run(second, usual);
-	/* It presses: there is something to compare. */
+	/* There is a force to compare. */
 	assert_true(stats.force_max_N > 0.1);
 	assert_true(stats.flagged[0] > 100);
 	for (size_t i = 0; i < sizeof(starts) / sizeof(*starts); i++) {

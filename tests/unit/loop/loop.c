@@ -12,6 +12,7 @@
 #include <math.h>
 #include <string.h>
 #include <time.h>
+#include "../../../lib/loop/loop_control.h"
 #include <incise/loop.h>
 #include "../scene/felt.h"
 
@@ -62,7 +63,7 @@ static void test_log_and_times(void **state)
 	felt_end(&f);
 }
 
-/* Have the rig's tracker read by a function of ours. */
+/* Replace the read function of the rig's tracker. */
 static void read_by(struct felt *f, struct incise_tracker_ops *ops,
 		    int (*read)(struct incise_tracker *, struct incise_tracker_sample *,
 				int))
@@ -75,7 +76,7 @@ static void read_by(struct felt *f, struct incise_tracker_ops *ops,
 static struct incise_clock *stalled;
 static int calls;
 
-/* Takes 3.4 periods at the tenth tick: as a stall of the machine would. */
+/* The tenth tick takes 3.4 periods, like a stall of the machine. */
 static int slow_tracker(struct incise_tracker *tracker,
 			struct incise_tracker_sample *samples, int n)
 {
@@ -157,7 +158,7 @@ static int failing_tracker(struct incise_tracker *tracker,
 	return ++calls == 5 ? -ENODEV : 0;
 }
 
-/* However a run ends, the actuator is let go. */
+/* The actuator is released at each kind of end. */
 static void test_end_lets_go(void **state)
 {
 	struct incise_loop_options options = {.rate_hz = 1000,
@@ -170,7 +171,7 @@ static void test_end_lets_go(void **state)
 	clock = incise_rig_clock(f.rig);
 	assert_int_equal(incise_loop_run(f.plan, clock, &options, &stats, NULL), 0);
 	assert_true(stats.force_N > 0.1);
-	/* Before the device's own deadman of 100 ms could do it. */
+	/* Earlier than the device's own deadman of 100 ms. */
 	incise_clock_wait_until(clock, incise_clock_now(clock) + 90000000);
 	assert_int_equal(incise_stepper_status(incise_rig_stepper(f.rig), &status), 0);
 	assert_true(fabs(status.force_N) < 0.1 * stats.force_N);
@@ -307,7 +308,7 @@ static void test_quantile(void **state)
 	assert_true(incise_loop_quantile(histogram, 1) == INCISE_LOOP_BINS);
 }
 
-/* Poses of a scalpel held still, that deep; or none any more. */
+/* Poses of a scalpel held still at a depth; or no more poses. */
 static double held_mm;
 static bool silent;
 static struct incise_clock *held_clock;
@@ -327,7 +328,7 @@ static int held_tracker(struct incise_tracker *tracker,
 	return !silent;
 }
 
-/* What of a run is looked at from within. */
+/* Observations from inside a run. */
 struct seen {
 	struct felt *f;
 	struct incise_loop_control *control;
@@ -446,7 +447,7 @@ static void test_another_plan(void **state)
 	felt_end(&f);
 }
 
-/* What was offered and is withdrawn in the fade leaves the old plan, whose force is back. */
+/* A plan that is withdrawn during the fade leaves the old plan, and its force returns. */
 static struct incise_loop_control *withdrawn_from;
 
 static int look_and_withdraw(void *context, const struct incise_tick *tick)
@@ -505,7 +506,7 @@ static void test_events(void **state)
 	assert_int_equal(incise_loop_control_events(options.control, events, 20), 2);
 	for (int i = 0; i < 2; i++)
 		assert_int_equal(events[i].kind, expected[i]);
-	/* The spell that the loop tells of is the one between the two. */
+	/* The reported duration is the one between the two. */
 	assert_true(events[1].value == (events[1].t_ns - events[0].t_ns) * 1e-6);
 	assert_in_range(events[0].tick, 600, 600 + 100);
 	assert_int_equal(events[1].tick, 700 + 1);

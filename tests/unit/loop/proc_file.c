@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/loop/proc_file.c: whatever lies there becomes a string, a number or a list, or is none.
+ * lib/loop/proc_file.c: any file becomes a string, a number or a list, or is rejected.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -25,7 +25,7 @@ static void test_reads(void **state)
 		{"\x1b[2J\xff", 5, "?[2J?"},
 		{"a\0b", 3, "a?b"},
 		{" \n\t", 3, ""},
-		/* 15 bytes are what there is room for */
+		/* the buffer has 15 bytes */
 		{"0123456789abcdefghij", 20, "0123456789abcde"},
 	};
 	struct root_folder root;
@@ -44,7 +44,7 @@ static void test_reads(void **state)
 	strcpy(text, "before");
 	assert_int_equal(proc_file_read(root.path, "/sys", text, sizeof(text)), -EISDIR);
 	assert_string_equal(text, "");
-	/* A pipe that nobody writes holds nobody up. */
+	/* A pipe without a writer does not block. */
 	snprintf(path, sizeof(path), "%s/pipe", root.path);
 	assert_int_equal(mkfifo(path, 0600), 0);
 	assert_int_equal(proc_file_read(root.path, "/pipe", text, sizeof(text)), 0);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/loop/realtime.c and realtime_policy.c on this machine, in children, since what they do
- * is of a whole process: with all rights where there are any, and without.
+ * lib/loop/realtime.c on this machine, in children, since it changes the whole process: with all
+ * rights where there are any, and without. Counts of a thread: from given files, and those of a
+ * real thread against getrusage(2).
  *
  *     test ── fork ──▶ child: rights away? ──▶ prepare ──▶ new ──▶ threads ──▶ exit status
  */
@@ -21,8 +22,10 @@
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 #include "../../../lib/loop/realtime.h"
+#include "root_folder.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 #define HAS_ASAN 1
@@ -30,7 +33,7 @@
 #define HAS_ASAN 0
 #endif
 
-/* Of a child that cannot have what its test is about. */
+/* Exit status of a child without the rights for its test. */
 #define SKIPPED 77
 
 static const struct incise_realtime_setup fifo = {
@@ -38,7 +41,7 @@ static const struct incise_realtime_setup fifo = {
 static const struct incise_realtime_setup deadline = {
 	.policy = INCISE_REALTIME_DEADLINE, .cpu = -1, .period_ns = 1000000};
 
-/* In a child: a line and its end. */
+/* In a child: print a line and exit. */
 #define CHECK(what)                                                                \
 	do {                                                                       \
 		if (!(what)) {                                                     \
@@ -98,21 +101,21 @@ static void test_refused_setups(void **state)
 							INCISE_REALTIME_CHECKS),
 				 -rows[i].error);
 	}
-	/* What the limits of each allow. */
-	assert_int_equal(
-		realtime_check_setup(&(struct incise_realtime_setup){INCISE_REALTIME_FIFO,
-								     84, 1023, 50000},
-				     NULL),
-		0);
-	assert_int_equal(realtime_check_setup(
+	/* The limits themselves are in range. */
+	assert_int_equal(incise_realtime_checks(
+				 &(struct incise_realtime_setup){INCISE_REALTIME_FIFO, 84,
+								 1023, 50000},
+				 NULL, 0),
+			 9);
+	assert_int_equal(incise_realtime_checks(
 				 &(struct incise_realtime_setup){INCISE_REALTIME_DEADLINE,
 								 0, -1, 100000},
-				 NULL),
-			 0);
+				 NULL, 0),
+			 7);
 	incise_realtime_free(NULL);
 }
 
-/* What it looks at it leaves as it was. */
+/* Checks change nothing. */
 static void test_checks_leave_nothing(void **state)
 {
 	struct incise_realtime_check checks[INCISE_REALTIME_CHECKS];
@@ -134,7 +137,7 @@ static void test_checks_leave_nothing(void **state)
 	assert_int_equal(after.sched_priority, before.sched_priority);
 	assert_int_equal(sched_getaffinity(0, sizeof(cpus), &cpus_after), 0);
 	assert_true(CPU_EQUAL(&cpus, &cpus_after));
-	/* With a CPU that no machine of this test has, or else two more checks. */
+	/* With a CPU there are two more checks, whether it exists or not. */
 	assert_int_equal(incise_realtime_checks(
 				 &(struct incise_realtime_setup){
 					 .priority = 1, .cpu = 1023, .period_ns = 50000},
@@ -181,7 +184,7 @@ static void test_denied(void **state)
 	assert_true(in_child(without_rights));
 }
 
-/* A soft limit is the program's own to raise. */
+/* The program raises its soft limits itself. */
 static void with_soft_limits(void)
 {
 	struct rlimit limit;
@@ -209,7 +212,7 @@ struct entered {
 	struct incise_realtime_counts counts;
 };
 
-/* As deep as a tick may go. */
+/* Uses as much stack as a tick may. */
 static __attribute__((noinline)) int use_stack(void)
 {
 	volatile char stack[96 << 10];
@@ -240,7 +243,7 @@ static void *enter(void *argument)
 		pthread_attr_destroy(&attributes);
 	}
 	entered->sized = size == 256 << 10;
-	/* Once for the code itself. */
+	/* The first call maps the code itself. */
 	incise_realtime_count(entered->tid, &before);
 	incise_realtime_count(entered->tid, &before);
 	use_stack();
@@ -266,13 +269,13 @@ static long status_kB(const char *key)
 
 static void *wait_there(void *argument)
 {
-	/* Of one heap for all: another would be 64 MiB of addresses. */
+	/* One heap for all threads: another would map 64 MiB of addresses. */
 	free(malloc(100));
 	pthread_barrier_wait(argument);
 	return NULL;
 }
 
-/* What is mapped from now on is there as well. */
+/* Memory that is mapped from now on is resident, too. */
 static void map_more(void)
 {
 	const size_t page = (size_t)sysconf(_SC_PAGESIZE);
@@ -323,10 +326,10 @@ static void granted(const struct incise_realtime_setup *setup)
 	else
 		CHECK(entered.policy == 6);
 	CHECK(setup->cpu < 0 || entered.n_cpus == 1);
-	/* The caller stays what it was. */
+	/* The caller keeps its policy. */
 	CHECK(sched_getscheduler(0) == SCHED_OTHER);
 	if (!HAS_ASAN) {
-		/* All of it is here, and none of it comes while it runs. */
+		/* All memory is resident, and no page is mapped later. */
 		CHECK(status_kB("VmLck") > 1000);
 		CHECK(!entered.counts.minor_faults && !entered.counts.major_faults);
 		/*
@@ -397,7 +400,7 @@ static void on_no_cpu(void)
 	setup.cpu = 1023;
 	CHECK(!incise_realtime_new(&setup, &err));
 	CHECK(strstr(err.text, "CPU 1023 cannot be had"));
-	/* What else is denied here comes first. */
+	/* Another denied right may come first. */
 	CHECK(errno == EINVAL || errno == EPERM);
 }
 
@@ -419,7 +422,7 @@ static void *enter_small(void *argument)
 	return NULL;
 }
 
-/* A stack that its owner made small is not run over. */
+/* A small stack does not overflow. */
 static void small_stack(void)
 {
 	struct small small = {incise_realtime_new(&fifo, NULL), 1};
@@ -435,7 +438,7 @@ static void small_stack(void)
 	CHECK(!small.rc);
 }
 
-/* Of a large one, that of the first thread, no more is touched than ticks need. */
+/* Of the first thread's large stack only the part for ticks is touched. */
 static void large_stack(void)
 {
 	struct incise_realtime *realtime = incise_realtime_new(&fifo, NULL);
@@ -452,6 +455,109 @@ static void test_stacks(void **state)
 		skip();
 }
 
+#define TID 42
+#define STATUS                                      \
+	"Name:\tx\nvoluntary_ctxt_switches:\t150\n" \
+	"nonvoluntary_ctxt_switches:\t545\n"
+
+static void test_counts_table(void **state)
+{
+	static const struct {
+		const char *stat, *status;
+		int rc;
+		struct incise_realtime_counts counts;
+	} rows[] = {
+		{"42 (incise) S 1 2 3 0 -1 4194560 7 8 9 10 11 12",
+		 STATUS,
+		 0,
+		 {7, 9, 150, 545}},
+		/* A thread's name may have any characters. */
+		{"42 (a) R 5 (b) ) S 1 2 3 0 -1 4194560 70 8 90 10 11",
+		 STATUS,
+		 0,
+		 {70, 90, 150, 545}},
+		{"42 (x) S 1 2 3 0 -1 4194560 18446744073709551615 8 1 0",
+		 STATUS,
+		 0,
+		 {UINT64_MAX, 1, 150, 545}},
+		{"42 (x) S 1 2 3 0 -1 4194560 18446744073709551616 8 1 0",
+		 STATUS,
+		 -EIO,
+		 {0}},
+		{"42 (x) S 1 2 3 0 -1 4194560 -7 8 9", STATUS, -EIO, {0}},
+		{"42 (x) S 1 2 3 0 -1 4194560 7 8", STATUS, -EIO, {0}},
+		{"42 (x", STATUS, -EIO, {0}},
+		{"42 (x)", STATUS, -EIO, {0}},
+		{"", STATUS, -EIO, {0}},
+		{"42 (x) S 1 2 3 0 -1 4194560 7 8 9", "", -EIO, {0}},
+		{"42 (x) S 1 2 3 0 -1 4194560 7 8 9",
+		 "\nvoluntary_ctxt_switches: many\nnonvoluntary_ctxt_switches: 1\n",
+		 -EIO,
+		 {0}},
+		{"42 (x) S 1 2 3 0 -1 4194560 7 8 9",
+		 "\nvoluntary_ctxt_switches:\t1\n",
+		 -EIO,
+		 {0}},
+	};
+	struct incise_realtime_counts counts;
+	struct root_folder root;
+
+	root_folder_make(&root);
+	assert_int_equal(realtime_count_below(root.path, TID, &counts), -ESRCH);
+	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++) {
+		memset(&counts, 0xff, sizeof(counts));
+		root_folder_say(&root, "/42/stat", rows[i].stat);
+		root_folder_say(&root, "/42/status", rows[i].status);
+		assert_int_equal(realtime_count_below(root.path, TID, &counts),
+				 rows[i].rc);
+		assert_memory_equal(&counts, &rows[i].counts, sizeof(counts));
+	}
+	root_folder_remove(&root);
+}
+
+static void test_counts_of_own_thread(void **state)
+{
+	const size_t size = 100 * (size_t)sysconf(_SC_PAGESIZE);
+	struct incise_realtime_counts before, after;
+	struct rusage from, to;
+	volatile char *memory;
+	int tid = (int)syscall(SYS_gettid);
+
+	memory = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1,
+		      0);
+	assert_true(memory != MAP_FAILED);
+	madvise((void *)memory, size, MADV_NOHUGEPAGE);
+	assert_int_equal(incise_realtime_count(tid, &before), 0);
+	assert_int_equal(getrusage(RUSAGE_THREAD, &from), 0);
+	for (size_t i = 0; i < size; i += size / 100)
+		memory[i] = 1;
+	for (int i = 0; i < 5; i++)
+		nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
+	assert_int_equal(getrusage(RUSAGE_THREAD, &to), 0);
+	assert_int_equal(incise_realtime_count(tid, &after), 0);
+	munmap((void *)memory, size);
+	/* Faults between the two readings are in ours only. */
+	assert_true(after.minor_faults - before.minor_faults >=
+		    (uint64_t)(to.ru_minflt - from.ru_minflt));
+	assert_true(to.ru_minflt - from.ru_minflt >= 100);
+	assert_true(after.minor_faults - before.minor_faults < 200);
+	/* On a late machine some sleeps end at once, but not all. */
+	assert_true(after.voluntary > before.voluntary);
+	assert_true(after.involuntary >= before.involuntary);
+	assert_true(after.major_faults >= before.major_faults);
+}
+
+static void test_counts_of_no_thread(void **state)
+{
+	static const int none[] = {-1, 0, INT32_MAX};
+	struct incise_realtime_counts counts;
+
+	for (size_t i = 0; i < sizeof(none) / sizeof(*none); i++)
+		assert_int_equal(incise_realtime_count(none[i], &counts), -ESRCH);
+	/* A thread of another process is not found. */
+	assert_int_equal(incise_realtime_count(1, &counts), -ESRCH);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -462,6 +568,9 @@ int main(void)
 		cmocka_unit_test(test_granted),
 		cmocka_unit_test(test_no_such_cpu),
 		cmocka_unit_test(test_stacks),
+		cmocka_unit_test(test_counts_table),
+		cmocka_unit_test(test_counts_of_own_thread),
+		cmocka_unit_test(test_counts_of_no_thread),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

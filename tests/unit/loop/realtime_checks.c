@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/loop/realtime_checks.c and realtime_advice.c: what answers and files of any kind come
- * to. The answers are given here and the files lie in a folder; nothing is asked of this
- * machine.
+ * lib/loop/realtime_checks.c with given answers and files in a folder; it asks this machine nothing.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -48,7 +46,7 @@ static const struct row rows[] = {
 	 {.policy_error = EPERM, .rtprio = 79},
 	 .fix = PRLIMIT,
 	 .found = "RLIMIT_RTPRIO is 79"},
-	/* Not by the limit. */
+	/* The limit is wide enough. */
 	{"scheduling",
 	 FIFO,
 	 {.policy_error = EPERM, .rtprio = 80},
@@ -108,7 +106,7 @@ static const struct row rows[] = {
 	 {.lock_error = ENOMEM, .memlock = RLIM_INFINITY},
 	 .found = "Cannot allocate",
 	 .fix = PRLIMIT},
-	/* Who may do the one may do the other. */
+	/* One right implies the other. */
 	{"memory",
 	 DEADLINE,
 	 {.lock_error = ENOMEM, .policy_error = EPERM},
@@ -164,7 +162,7 @@ static const struct row rows[] = {
 	 FILES({CPUS "online", "0-1"}, {GOVERNOR(0), "performance\n"},
 	       {GOVERNOR(1), "schedutil\n"}),
 	 .found = "schedutil, of CPU 1 and 0 others", .fix = "echo performance"},
-	/* Of another CPU than the loop's it does not matter. */
+	/* Only the loop's CPU matters. */
 	{"governor", ON_CPU(0),
 	 FILES({CPUS "online", "0-1"}, {GOVERNOR(0), "performance\n"},
 	       {GOVERNOR(1), "powersave\n"}),
@@ -235,7 +233,7 @@ static const struct incise_realtime_check *named(
 	return NULL;
 }
 
-/* A line and whole commands, where the text was not cut off. */
+/* One line with whole commands. */
 static void assert_words(const struct incise_realtime_check *check)
 {
 	assert_true(*check->found && !strchr(check->found, '\n'));
@@ -244,7 +242,7 @@ static void assert_words(const struct incise_realtime_check *check)
 	assert_true(strlen(check->keep) < sizeof(check->keep) - 1);
 	if (check->ok)
 		assert_true(!*check->fix && !*check->keep);
-	/* What lasts is told only of what can be done now. */
+	/* A permanent command comes only with an immediate one. */
 	if (!*check->fix)
 		assert_true(!*check->keep);
 }
@@ -276,7 +274,7 @@ static void test_table(void **state)
 	}
 }
 
-/* What is needed comes first; room for less is no harm. */
+/* Required checks come first; a smaller array is allowed. */
 static void test_order_and_room(void **state)
 {
 	static const char *const order[] = {"scheduling", "memory",	"cpu",
@@ -330,7 +328,7 @@ static void test_denied(void **state)
 		 EINVAL,
 		 {"no real time: CPU 900 cannot be had", NULL, NULL},
 		 "run `"},
-		/* What lasts does not fit in the line any more: not half of it. */
+		/* The permanent command no longer fits: all of it is left out. */
 		{"a capability",
 		 DEADLINE,
 		 {.policy_error = EPERM, .lock_error = ENOMEM},
@@ -359,7 +357,7 @@ static void test_denied(void **state)
 				fail_msg("%s: %s", denials[i].name, err.text);
 		if (denials[i].without && strstr(err.text, denials[i].without))
 			fail_msg("%s: %s", denials[i].name, err.text);
-		/* No half commands: as many quotes as it takes. */
+		/* Commands are whole: quotes come in pairs. */
 		for (char *c = strchr(err.text, '`'); c; c = strchr(c + 1, '`')) {
 			c = strchr(c + 1, '`');
 			assert_non_null(c);
@@ -369,7 +367,7 @@ static void test_denied(void **state)
 	}
 }
 
-/* Files of any bytes: something is said of them, and no more than there is room for. */
+/* Files of random bytes: each check has a text that fits its buffer. */
 static void test_garbage(void **state)
 {
 	static const char *const paths[] = {"/sys/kernel/realtime",

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * A folder in the place of /, with what a test wants /proc and /sys to say.
+ * A folder in the place of /, with files of /proc and /sys that a test chooses.
  */
 #ifndef INCISE_TEST_ROOT_FOLDER_H
 #define INCISE_TEST_ROOT_FOLDER_H
@@ -38,7 +38,7 @@ static inline void root_folder_remove(const struct root_folder *root)
 	nftw(root->path, root_folder_unlink, 16, FTW_DEPTH | FTW_PHYS);
 }
 
-/* A file with the folders it is in. */
+/* Write a file, with its folders. */
 static inline void root_folder_put(const struct root_folder *root, const char *path,
 				   const void *data, size_t n)
 {

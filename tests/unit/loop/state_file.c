@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/loop/state_file.c: who may put a page where, and who lives.
+ * lib/loop/state_file.c: paths that may be replaced, and the lock of a living writer.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -54,7 +54,7 @@ static void test_a_dead_one_is_replaced(void **state)
 	struct incise_state *reader = incise_state_open(made.path, NULL);
 
 	incise_state_free(made.writer);
-	/* A page stays, and who has it open keeps what it told. */
+	/* The page stays, and readers keep its last state. */
 	assert_int_equal(inode(made.path), old);
 	made.writer = incise_state_new(made.path, &made_setup, NULL);
 	assert_non_null(made.writer);
@@ -102,7 +102,7 @@ static void test_killed(void **state)
 	made_free(&made);
 }
 
-/* A reader cannot pass for a writer: what it may lock keeps nobody away. */
+/* A reader's lock does not count as a writer's. */
 static void test_readers_do_not_hold_it(void **state)
 {
 	struct made made = made_page();
@@ -146,14 +146,14 @@ static void test_what_is_no_page_is_kept(void **state)
 	assert_int_equal(errno, EEXIST);
 	unlink(made.path);
 	unlink(other);
-	/* An empty file is nothing to keep. */
+	/* An empty file is replaced. */
 	put(made.path, "");
 	made.writer = incise_state_new(made.path, &made_setup, NULL);
 	assert_non_null(made.writer);
 	made_free(&made);
 }
 
-/* Two that start at once: both saw that nothing, or a dead one, was there. */
+/* Two that start at once: both found nothing, or a page with a dead writer. */
 static void test_two_at_once(void **state)
 {
 	for (int dead = 0; dead < 2; dead++) {

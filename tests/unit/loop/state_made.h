@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * A folder with a state page in it, and ticks of which each number tells the tick's own: a
- * mixture of two shows.
+ * A folder with a state page, and ticks whose every field depends on their number, so that a
+ * mixture of two is detected.
  */
 #ifndef INCISE_TEST_STATE_MADE_H
 #define INCISE_TEST_STATE_MADE_H
@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <incise/state.h>
+#include "../../../lib/loop/state_page.h"
 
 struct made {
 	char dir[200], path[256];

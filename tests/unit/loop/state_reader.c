@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/loop/state_reader.c: a reader beside a writer, one that died, and pages that nobody
- * should have written.
+ * lib/loop/state_reader.c: a reader next to a living and a dead writer, and malformed
+ * pages.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,7 +15,6 @@
 #include <sched.h>
 #include <stdatomic.h>
 #include <sys/stat.h>
-#include "../../../lib/loop/state_page.h"
 #include "state_made.h"
 
 static struct incise_state_now now;
@@ -87,7 +86,7 @@ static void test_ring_that_went_round(void **state)
 	assert_int_equal(lost, 1 + N - 5 - n);
 	for (int i = 0; i < n; i++)
 		assert_int_equal(ticks[i].t_ns, N - n + i);
-	/* A cursor from elsewhere finds nothing, and is put right. */
+	/* A cursor beyond the end is corrected. */
 	cursor = N + 1;
 	assert_int_equal(incise_state_ticks(reader, &cursor, ticks, 10, &lost), 0);
 	assert_int_equal(cursor, N);
@@ -101,7 +100,7 @@ struct busy {
 	int64_t told;
 };
 
-/* As a loop does, some ticks and a pause; the pause is what a reader gets in by. */
+/* Like a loop: some ticks, then a pause in which a reader succeeds. */
 static void *tell(void *arg)
 {
 	struct busy *busy = arg;
@@ -117,7 +116,7 @@ static void *tell(void *arg)
 	return NULL;
 }
 
-/* Fields that are of one tick, in a copy that was told to be whole. */
+/* A copy that is reported as whole has fields of one tick only. */
 static void whole(void)
 {
 	struct incise_tick made_one = made_tick((int64_t)now.ticks - 1);
@@ -150,7 +149,7 @@ static void test_beside_a_writer(void **state)
 			good++;
 			whole();
 			assert_true(now.alive && !now.torn);
-			/* The other half of the writer is of another thread. */
+			/* Another thread writes the other half. */
 			assert_string_equal(now.reason, incise_run_name(now.run));
 			incise_state_run(busy.made.writer, run, incise_run_name(run));
 			run = (enum incise_run)((run + 1) % INCISE_RUNS);
@@ -179,7 +178,7 @@ static void test_beside_a_writer(void **state)
 	made_free(&busy.made);
 }
 
-/* In the middle of writing: a living writer is waited for, a dead one is not. */
+/* In the middle of a write: the reader waits for a living writer, not for a dead one. */
 static void test_half_written(void **state)
 {
 	static const size_t parts[] = {offsetof(struct state_page, run),
@@ -205,7 +204,7 @@ static void test_half_written(void **state)
 	}
 }
 
-/* What a dead writer left odd does not stay so when it was just slow. */
+/* An odd seq is repaired by the next write. */
 static void test_healed(void **state)
 {
 	struct made made = made_page();
@@ -271,7 +270,7 @@ static void test_what_is_no_page(void **state)
 	made_free(&made);
 }
 
-/* Each number of the head that leads somewhere, led astray. */
+/* Each offset, size and count of the head, changed. */
 static void test_places_astray(void **state)
 {
 	static const uint64_t values[] = {0,
@@ -312,12 +311,12 @@ static void test_places_astray(void **state)
 			incise_state_ticks(reader, &cursor, ticks, 100, NULL);
 			incise_state_close(reader);
 		}
-	/* A histogram of 0 entries is none, and so on: hardly one is let pass. */
+	/* Nearly every changed number is rejected. */
 	assert_true(opened < 30);
 	made_free(&made);
 }
 
-/* A later release of the same major version has more of everything. */
+/* A later minor version has larger parts. */
 static void test_larger_parts(void **state)
 {
 	struct made made = made_page();
@@ -400,7 +399,7 @@ static void test_garbage(void **state)
 		memcpy(&page, &good, reach);
 		for (int i = round % 40; i >= 0; i--) {
 			seed = seed * 6364136223846793005u + 1442695040888963407u;
-			/* Half of it in the head and the run part. */
+			/* Half of the bytes are in the head and the run part. */
 			((unsigned char *)&page)[(seed >> 33) % (i % 2 ? reach : 2000)] =
 				(unsigned char)(seed >> 20);
 		}

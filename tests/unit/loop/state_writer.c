@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/loop/state_writer.c: what is told is what is read; what does not fit is cut.
+ * lib/loop/state_writer.c: a reader gets back every value, text that is too long is cut; the work
+ * of a spring and of friction.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -125,12 +126,12 @@ static void test_states(void **state)
 	assert_int_equal(now.run, INCISE_RUN_RUNNING);
 	assert_string_equal(now.reason, "as asked");
 	since = now.since_ns;
-	/* The same state with another reason has been for as long. */
+	/* Another reason does not change the time of the state. */
 	incise_state_run(made.writer, INCISE_RUN_RUNNING, NULL);
 	look(&made);
 	assert_int_equal(now.since_ns, since);
 	assert_string_equal(now.reason, "");
-	/* So it has after a reload. */
+	/* A reload does not change that. */
 	incise_state_run(made.writer, INCISE_RUN_RELOADING, NULL);
 	look(&made);
 	assert_true(now.since_ns > since);
@@ -146,7 +147,7 @@ static void test_states(void **state)
 	look(&made);
 	assert_true(now.since_ns > since);
 	assert_string_equal(now.reason, "e-stop?was?[2J pressed");
-	/* It stays so when the writer has gone. */
+	/* The state stays after the writer has closed the page. */
 	incise_state_free(made.writer);
 	made.writer = NULL;
 	look(&made);
@@ -176,7 +177,7 @@ static void test_scene(void **state)
 	assert_true(n > 3 && out > 0);
 	assert_int_equal(now.n_stages, n);
 	assert_int_equal(now.left_out, out);
-	/* The first is no reload. */
+	/* The first scene is no reload. */
 	assert_int_equal(now.reloads, 0);
 	incise_state_scene(made.writer, "b.scene", NULL);
 	look(&made);
@@ -229,7 +230,7 @@ static void test_what_is_too_long(void **state)
 	made_free(&made);
 }
 
-/* A loop without a page has no branch of its own. */
+/* A loop without a page makes the same calls with NULL. */
 static void test_without_a_page(void **state)
 {
 	struct incise_tick tick = made_tick(1);
@@ -252,6 +253,128 @@ static void test_names(void **state)
 	assert_string_equal(incise_run_name((enum incise_run) - 1), "unknown");
 }
 
+static struct incise_tick at(double x_mm, double force_N)
+{
+	return (struct incise_tick){.tool_mm = {0, 0, x_mm},
+				    .command_N = {0, 0, force_N},
+				    .tool = INCISE_TOOL_BLADE};
+}
+
+/* In and out of a spring of 0.5 N/mm, along -z: k x²/2 each way. */
+static void test_work_of_a_spring(void **state)
+{
+	struct made made = made_page();
+	const int n = 10000;
+	const double k = 0.5, depth_mm = 10, exact = k * depth_mm * depth_mm / 2;
+
+	for (int i = 0; i <= 2 * n; i++) {
+		double x = -depth_mm * (n - fabs((double)i - n)) / n;
+		struct incise_tick tick = at(x, -k * x);
+
+		incise_state_tick(made.writer, &tick, 0, 0, 0);
+	}
+	look(&made);
+	/* The force is held over a way of depth/n: less on the way in, more out. */
+	assert_true(fabs(now.absorbed_mJ - exact) <= exact / n * 1.01);
+	assert_true(fabs(now.returned_mJ - exact) <= exact / n * 1.01);
+	assert_true(now.returned_mJ > now.absorbed_mJ);
+	made_free(&made);
+}
+
+/* Friction returns no work. */
+static void test_work_of_friction(void **state)
+{
+	struct made made = made_page();
+
+	for (int i = 0; i <= 2000; i++) {
+		struct incise_tick tick = at(i < 1000 ? i : 2000 - i, i < 1000 ? -2 : 2);
+
+		incise_state_tick(made.writer, &tick, 0, 0, 0);
+	}
+	look(&made);
+	/* 1000 mm there and 1000 mm back against 2 N; whole numbers are exact. */
+	assert_true(now.absorbed_mJ == 4000);
+	assert_true(now.returned_mJ == 0);
+	made_free(&made);
+}
+
+static void test_changes_that_are_no_motion(void **state)
+{
+	static const struct {
+		unsigned int flags[2];
+		enum incise_tool tool[2];
+		double work_mJ;
+	} cases[] = {
+		{{0, 0}, {INCISE_TOOL_BLADE, INCISE_TOOL_BLADE}, 20},
+		{{INCISE_TICK_CONTACT, INCISE_TICK_CLAMPED},
+		 {INCISE_TOOL_TUBE, INCISE_TOOL_TUBE},
+		 20},
+		{{0, 0}, {INCISE_TOOL_BLADE, INCISE_TOOL_HANDLE}, 0},
+		{{INCISE_TICK_STALE, 0}, {INCISE_TOOL_BLADE, INCISE_TOOL_BLADE}, 0},
+		{{0, INCISE_TICK_STALE}, {INCISE_TOOL_BLADE, INCISE_TOOL_BLADE}, 0},
+		{{0, INCISE_TICK_FAULT}, {INCISE_TOOL_BLADE, INCISE_TOOL_BLADE}, 0},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct made made = made_page();
+
+		for (int k = 0; k < 2; k++) {
+			struct incise_tick tick = at(-10 * k, 2);
+
+			tick.flags = cases[i].flags[k];
+			tick.tool = cases[i].tool[k];
+			incise_state_tick(made.writer, &tick, 0, 0, 0);
+		}
+		look(&made);
+		assert_true(now.absorbed_mJ == cases[i].work_mJ);
+		assert_true(now.returned_mJ == 0);
+		made_free(&made);
+	}
+}
+
+static void test_work_without_numbers(void **state)
+{
+	static const double ways[] = {NAN, INFINITY, -INFINITY, 1e300};
+	struct made made = made_page();
+
+	for (size_t i = 0; i < sizeof(ways) / sizeof(*ways); i++) {
+		struct incise_tick bad = at(ways[i], 1e300), good = at(0, -1);
+
+		incise_state_tick(made.writer, &bad, 0, 0, 0);
+		incise_state_tick(made.writer, &good, 0, 0, 0);
+	}
+	look(&made);
+	assert_true(isfinite(now.absorbed_mJ) && isfinite(now.returned_mJ));
+	made_free(&made);
+}
+
+/*
+ * As after years: each addition lies below the last bit of the sum, and would be lost without
+ * the correction. Ten million times 5e-11 are 5e-4.
+ */
+static void test_long_sum_of_work(void **state)
+{
+	struct made made = made_page();
+	struct incise_tick tick = at(0, 2);
+	double naive = 1e6;
+
+	incise_state_tick(made.writer, &tick, 0, 0, 0);
+	/* 1e6 mJ at once; another tool, and short ways to and fro, each against the force. */
+	tick = at(-5e5, 2);
+	incise_state_tick(made.writer, &tick, 0, 0, 0);
+	for (int i = 0; i <= 10000000; i++) {
+		tick = i % 2 ? at(-2.5e-11, -2) : at(0, 2);
+		tick.tool = INCISE_TOOL_HANDLE;
+		incise_state_tick(made.writer, &tick, 0, 0, 0);
+		naive += i ? 5e-11 : 0;
+	}
+	look(&made);
+	assert_true(naive == 1e6);
+	/* The last bit of 1e6. */
+	assert_true(fabs(now.absorbed_mJ - 1e6 - 5e-4) <= 0x1p-33);
+	made_free(&made);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -264,6 +387,11 @@ int main(void)
 		cmocka_unit_test(test_what_is_too_long),
 		cmocka_unit_test(test_without_a_page),
 		cmocka_unit_test(test_names),
+		cmocka_unit_test(test_work_of_a_spring),
+		cmocka_unit_test(test_work_of_friction),
+		cmocka_unit_test(test_changes_that_are_no_motion),
+		cmocka_unit_test(test_work_without_numbers),
+		cmocka_unit_test(test_long_sum_of_work),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

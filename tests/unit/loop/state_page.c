@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/loop/state_histogram.c: buckets without gaps, and quantiles held against sorted times.
+ * lib/loop/state_page.c: buckets without gaps, quantiles compared with sorted times; a tick there
+ * and back.
  */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <errno.h>
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#include <incise/state.h>
+#include "state_made.h"
 
 static struct incise_state_histogram histogram;
 
@@ -27,10 +27,10 @@ static void test_buckets_follow_each_other(void **state)
 		assert_int_equal(incise_state_bucket((int64_t)first), i);
 		assert_int_equal(incise_state_bucket((int64_t)last), i);
 		assert_int_equal(incise_state_bucket((int64_t)last + 1), i + 1);
-		/* What the header promises; below 32 ns each has one time. */
+		/* The width that the header states; below 32 ns each has one time. */
 		assert_true(last == first || (last - first) / first < 0.032);
 	}
-	/* All that is shorter than 10 s has a bucket that ends. */
+	/* Each time below 10 s is in a closed bucket. */
 	assert_true(incise_state_edge(INCISE_STATE_BUCKETS - 2) > 10e9);
 	assert_true(isinf(incise_state_edge(INCISE_STATE_BUCKETS - 1)));
 	assert_true(isinf(incise_state_edge(INT32_MAX)));
@@ -63,11 +63,11 @@ static void test_quantiles(void **state)
 	for (size_t i = 0; i < sizeof(shares) / sizeof(*shares); i++) {
 		int64_t rank = (int64_t)ceil(shares[i] * N);
 		double exact = (double)ns[rank ? rank - 1 : 0];
-		double told = incise_state_quantile(&histogram, shares[i]);
+		double found = incise_state_quantile(&histogram, shares[i]);
 
-		assert_true(told >= exact);
+		assert_true(found >= exact);
 		/* The width of a bucket. */
-		assert_true(told <= exact * 1.032 + 1);
+		assert_true(found <= exact * 1.032 + 1);
 	}
 }
 
@@ -78,11 +78,44 @@ static void test_nothing_and_too_much(void **state)
 	assert_true(incise_state_quantile(&histogram, 0.5) == 0);
 	histogram.count[INCISE_STATE_BUCKETS - 1] = 1;
 	assert_true(isinf(incise_state_quantile(&histogram, 0.5)));
-	/* A page of garbage: as full as can be, and finite work. */
+	/* A page of garbage: counts saturate, and the work is finite. */
 	memset(&histogram, 0xff, sizeof(histogram));
 	assert_true(incise_state_total(&histogram) == UINT64_MAX);
 	assert_true(incise_state_quantile(&histogram, 0) == 0);
 	assert_true(incise_state_quantile(&histogram, NAN) >= 0);
+}
+
+static void test_there_and_back(void **state)
+{
+	for (int64_t n = 0; n < 5000; n++) {
+		struct incise_tick tick = made_tick(n), back;
+		struct state_tick packed;
+
+		/* Every byte must be overwritten. */
+		memset(&packed, 0xee, sizeof(packed));
+		memset(&back, 0xee, sizeof(back));
+		incise_state_pack(&packed, &tick);
+		assert_int_equal(incise_state_unpack(&back, &packed), 0);
+		assert_true(made_same(&back, &tick));
+	}
+}
+
+static void test_what_is_no_tick(void **state)
+{
+	struct incise_tick tick = made_tick(7), back;
+	struct state_tick packed;
+
+	incise_state_pack(&packed, &tick);
+	packed.phase = INCISE_PHASE_INSERTION + 1;
+	assert_int_equal(incise_state_unpack(&back, &packed), -EIO);
+	packed.phase = 0;
+	packed.tool = INCISE_TOOL_TUBE + 1;
+	assert_int_equal(incise_state_unpack(&back, &packed), -EIO);
+	packed.tool = 0;
+	/* Flags of a later release are cleared. */
+	packed.flags = ~0u;
+	assert_int_equal(incise_state_unpack(&back, &packed), 0);
+	assert_int_equal(back.flags, (1 << INCISE_TICK_FLAGS) - 1);
 }
 
 int main(void)
@@ -91,6 +124,8 @@ int main(void)
 		cmocka_unit_test(test_buckets_follow_each_other),
 		cmocka_unit_test(test_quantiles),
 		cmocka_unit_test(test_nothing_and_too_much),
+		cmocka_unit_test(test_there_and_back),
+		cmocka_unit_test(test_what_is_no_tick),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

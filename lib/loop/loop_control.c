@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The door between a running loop and the rest of its program; see incise/loop_control.h.
+ * The interface between a running loop and the rest of its program; see incise/loop_control.h.
  */
 #include <errno.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include "../base/ring.h"
-#include "control.h"
+#include "loop_control.h"
 
 /* More than a second of a loop that overruns at each tick of 100 Hz … 500 Hz. */
 #define EVENTS 512
@@ -19,7 +19,7 @@ struct incise_loop_control {
 
 struct incise_loop_control *incise_loop_control_new(void)
 {
-	/* The ring keeps its two sides on different lines of the cache. */
+	/* The two sides of the ring are on different cache lines. */
 	struct incise_loop_control *control =
 		aligned_alloc(_Alignof(struct incise_loop_control), sizeof(*control));
 
@@ -46,7 +46,7 @@ int incise_loop_control_offer(struct incise_loop_control *control,
 {
 	struct incise_plan *none = NULL;
 
-	/* The loop has one place to put the old one. */
+	/* There is one place for the retired plan. */
 	if (atomic_load_explicit(&control->retired, memory_order_acquire))
 		return -EBUSY;
 	return atomic_compare_exchange_strong(&control->offered, &none, plan) ? 0

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The loop's door: what is offered is taken once or withdrawn once, events keep their order
- * and what finds no room is counted. What loops do with it is in tests/unit/loop/loop.c.
+ * lib/loop/loop_control.c: an offered plan is taken once or withdrawn once, events keep their order
+ * and dropped ones are counted. tests/unit/loop/loop.c tests the loop with it.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,9 +11,9 @@
 #include <errno.h>
 #include <pthread.h>
 #include <stdatomic.h>
-#include "../../../lib/loop/control.h"
+#include "../../../lib/loop/loop_control.h"
 
-/* Never looked into. */
+/* Never dereferenced. */
 static struct incise_plan *plan(int i)
 {
 	static char plans[8];
@@ -61,13 +61,13 @@ static void test_events(void **state)
 	while ((n = incise_loop_control_events(control, events, 100)) > 0)
 		for (int i = 0; i < n; i++)
 			assert_int_equal(events[i].tick, seen++);
-	/* The oldest are kept: they say how it began. */
+	/* The oldest events are kept. */
 	assert_true(seen > 0);
 	assert_int_equal(incise_loop_control_events_lost(control), 1000 - seen);
 	incise_loop_control_free(control);
 }
 
-/* A loop that does nothing but change plans. */
+/* A loop that only changes plans. */
 struct changer {
 	struct incise_loop_control *control;
 	atomic_bool end;
@@ -93,7 +93,7 @@ static void *change(void *argument)
 	return now;
 }
 
-/* Nobody's plan is lost, and none is at two places, however the two threads meet. */
+/* No interleaving of the two threads loses or doubles a plan. */
 static void test_two_threads(void **state)
 {
 	struct changer changer = {.control = incise_loop_control_new()};
@@ -109,7 +109,7 @@ static void test_two_threads(void **state)
 			withdrawn++;
 			continue;
 		}
-		/* It was taken, or is on the way. */
+		/* The loop took it, or is about to. */
 		do
 			retired = incise_loop_control_retired(changer.control);
 		while (!retired);
