@@ -19,7 +19,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "random.h"
+#include "../base/random.h"
 #include "sim.h"
 #include "world.h"
 

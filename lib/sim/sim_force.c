@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include "random.h"
+#include "../base/random.h"
 #include "sim.h"
 #include "world.h"
 

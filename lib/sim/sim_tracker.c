@@ -13,7 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include "../base/vector.h"
-#include "random.h"
+#include "../base/random.h"
 #include "sim.h"
 #include "world.h"
 

@@ -16,7 +16,7 @@
  */
 #include <math.h>
 #include "../base/vector.h"
-#include "random.h"
+#include "../base/random.h"
 #include "surgeon.h"
 
 #define NS 1e-9

@@ -16,7 +16,7 @@
  * Withdrawal follows the same law: the edge still lies in the cut and meets its walls.
  */
 #include <math.h>
-#include "random.h"
+#include "../base/random.h"
 #include "tissue.h"
 
 static void next_tooth(struct incise_tissue *tissue)

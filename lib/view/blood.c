@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include "../base/random.h"
 #include "blood.h"
 #include "blood_drop.h"
 #include "blood_film.h"
@@ -51,7 +52,7 @@ struct blood {
 
 static double draw(struct blood *blood)
 {
-	return noise_uniform(blood->key, blood->drawn++);
+	return incise_random_uniform(blood->key, blood->drawn++);
 }
 
 struct blood *blood_new(const struct incise_chart *chart,
@@ -65,7 +66,7 @@ struct blood *blood_new(const struct incise_chart *chart,
 		incise_error_set(err, ENOMEM, "view: no memory for blood");
 		return NULL;
 	}
-	blood->key = noise_bits(0x626c6f6f64, (uint64_t)(int64_t)picture->seed);
+	blood->key = incise_random_bits(0x626c6f6f64, (uint64_t)(int64_t)picture->seed);
 	blood->ul_s_mm2 = picture->blood_ul_s_mm2;
 	blood->last = -1;
 	drops_init(&blood->drops, &blood->film, picture, (uint32_t)blood->key);

@@ -9,22 +9,6 @@
 #include <math.h>
 #include <stdint.h>
 
-/* The output function of splitmix64 (Steele, Lea, Flood 2014) of the n-th number of a key. */
-static inline uint64_t noise_bits(uint64_t key, uint64_t n)
-{
-	uint64_t x = key + (n + 1) * 0x9e3779b97f4a7c15ULL;
-
-	x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
-	x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
-	return x ^ (x >> 31);
-}
-
-/* 0 … 1, 1 excluded. */
-static inline double noise_uniform(uint64_t key, uint64_t n)
-{
-	return (double)(noise_bits(key, n) >> 11) * 0x1p-53;
-}
-
 /* -1 … 1 at a point of a grid; cheap, for pixels. */
 static inline float noise_grid(uint32_t key, int x, int y)
 {

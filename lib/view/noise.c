@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
+#include "../base/random.h"
 #include "noise.h"
 
 /* 1 over the standard deviation of uniform numbers in ±1 after cubic B-splines both ways. */
@@ -20,20 +21,12 @@ struct noise {
 	float (*weight)[4];
 };
 
-/* The finisher of splitmix64 (Steele, Lea, Flood 2014). */
-static uint64_t mix(uint64_t x)
-{
-	x = (x ^ x >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-	x = (x ^ x >> 27) * UINT64_C(0x94d049bb133111eb);
-	return x ^ x >> 31;
-}
-
 float noise_at(uint64_t seed, int x, int y)
 {
 	uint64_t place = (uint64_t)(uint32_t)x << 32 | (uint32_t)y;
 
-	seed = mix(seed + UINT64_C(0x9e3779b97f4a7c15));
-	return (float)(mix(place + seed) >> 40) * 0x1p-24F;
+	seed = incise_random_bits(seed, 0);
+	return (float)(incise_random_mix(place + seed) >> 40) * 0x1p-24F;
 }
 
 static void spline(float t, float weight[4])

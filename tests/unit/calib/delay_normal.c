@@ -13,7 +13,7 @@
 #include <string.h>
 #include <lapacke.h>
 #include "../../../lib/calib/delay.h"
-#include "../../../lib/sim/random.h"
+#include "../../../lib/base/random.h"
 
 #define ROWS 60
 #define M 4

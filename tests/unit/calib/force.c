@@ -13,7 +13,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <incise/calibrate_force.h>
-#include "../../../lib/sim/random.h"
+#include "../../../lib/base/random.h"
 
 #define MAX 64
 

@@ -11,7 +11,7 @@
 #include <math.h>
 #include <string.h>
 #include <incise/redundancy.h>
-#include "../../../lib/sim/random.h"
+#include "../../../lib/base/random.h"
 
 #define PAIRS 1000
 

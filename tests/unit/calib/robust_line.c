@@ -11,7 +11,7 @@
 #include <errno.h>
 #include <math.h>
 #include "../../../lib/calib/robust_line.h"
-#include "../../../lib/sim/random.h"
+#include "../../../lib/base/random.h"
 
 #define MAX 400
 

@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/calibrate_stepper.h>
-#include "../../../lib/sim/random.h"
+#include "../../../lib/base/random.h"
 
 #define STEP_MM 0.000625
 #define POINTS_MAX 2000

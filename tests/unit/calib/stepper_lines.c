@@ -11,7 +11,7 @@
 #include <errno.h>
 #include <math.h>
 #include "../../../lib/calib/stepper_work.h"
-#include "../../../lib/sim/random.h"
+#include "../../../lib/base/random.h"
 
 #define POINTS 101 /* of a stroke */
 #define RANGE_MM 2.0

@@ -33,7 +33,7 @@
 #include <incise/sim.h>
 #include <incise/tracker.h>
 #include "../../../lib/base/vector.h"
-#include "../../../lib/sim/random.h"
+#include "../../../lib/base/random.h"
 #include "../../../lib/control/predict.h"
 
 #define REFERENCE_LATENCY_NS 4200000

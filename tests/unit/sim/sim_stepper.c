@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
-#include "../../../lib/sim/random.h"
+#include "../../../lib/base/random.h"
 #include "../../../lib/sim/sim.h"
 
 #define START_NS INCISE_NS_PER_S

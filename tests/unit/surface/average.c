@@ -11,7 +11,7 @@
 #include <math.h>
 #include <string.h>
 #include "../../../lib/base/vector.h"
-#include "../../../lib/sim/random.h"
+#include "../../../lib/base/random.h"
 #include "../../../lib/surface/average.h"
 
 static void unit_at_random(uint64_t n, double normal[3])

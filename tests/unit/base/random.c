@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/sim/random.c: distributions, and streams that keep apart. The seeds are fixed, so
- * a bound of 5 sd is not a matter of luck from run to run.
+ * lib/base/random.h: distributions, and independence of streams. The seeds are fixed, so
+ * that a bound of 5 sd does not depend on luck.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <math.h>
-#include "../../../lib/sim/random.h"
+#include "../../../lib/base/random.h"
 
 #define N 200000
 
