@@ -117,20 +117,6 @@ static const json_t *words_of(const json_t *report)
 	return words ? words : report;
 }
 
-/* The report to compare with, found to be one before minutes are spent. */
-static json_t *load_old(const char *path)
-{
-	struct incise_error err = {0};
-	json_t *old = json_read(path, &err), *itself;
-
-	itself = old ? compare_reports(words_of(old), path, words_of(old), path, &err)
-		     : NULL;
-	if (!itself)
-		cli_fail_with(&err);
-	json_decref(itself);
-	return old;
-}
-
 /* What changed goes into the report; that it cannot be told does, too. */
 static void compare(const char *path, const json_t *old, json_t *report)
 {
@@ -149,7 +135,7 @@ static json_t *measure(const struct job *job)
 	struct report_folder folder;
 	struct report_measure m = {.quick = job->quick};
 	struct incise_error err = {0};
-	json_t *old = job->against ? load_old(job->against) : NULL;
+	json_t *old = job->against ? compare_load(job->against) : NULL;
 	int n = 0, of = 0;
 
 	report_folder_begin(&folder, job->folder);

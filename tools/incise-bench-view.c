@@ -10,7 +10,7 @@
 #include "bench/bench_view_live.h"
 #include "cli/cli.h"
 #include "bench/compare.h"
-#include "bench/figures.h"
+#include "bench/metrics.h"
 #include "cli/json.h"
 #include "bench/machine.h"
 #include "cli/file.h"
@@ -97,7 +97,7 @@ static void measure(const struct job *job, struct measured *m)
 static void report(const struct job *job, const struct measured *m)
 {
 	if (job->json) {
-		json_t *figures = figures_new();
+		json_t *figures = json_array();
 
 		frame_rows_figures(&m->frames, figures);
 		shown_rows_figures(&m->shown, figures);

@@ -21,7 +21,7 @@
 #include <incise/vision.h>
 #include "bench_capture.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/folder.h"
 #include "jpeg_camera.h"
 #include "../cli/json.h"
@@ -317,7 +317,7 @@ static void print_text(const struct run *runs, const struct machine *machine,
 
 static json_t *figures_of(const struct run *runs)
 {
-	json_t *figures = figures_new();
+	json_t *figures = json_array();
 	struct harness_spread cpu, memory;
 
 	for (int i = 0; i < RUNS; i++) {
@@ -326,11 +326,11 @@ static json_t *figures_of(const struct run *runs)
 		if (!runs[i].done)
 			continue;
 		harness_spread(runs[i].part_percent, runs[i].parts, &cpu);
-		figures_measured(figures, &cpu, "%", "%s processor", parts[i].name);
+		metrics_measured(figures, &cpu, "%", "%s processor", parts[i].name);
 		memory = (struct harness_spread){.median = rss[1],
 						 .low = fmin(rss[0], rss[1]),
 						 .high = fmax(rss[0], rss[1])};
-		figures_measured(figures, &memory, "MB", "%s memory", parts[i].name);
+		metrics_measured(figures, &memory, "MB", "%s memory", parts[i].name);
 	}
 	return figures;
 }

@@ -9,7 +9,7 @@
 #include "bench_extremes.h"
 #include "../cli/cli.h"
 #include "extremes.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "machine.h"
 #include "../cli/plot.h"
@@ -52,7 +52,7 @@ static void print_table(const struct extremes *all, const struct stiff_sweep *st
 
 static void print_json(const struct extremes *all, const struct stiff_sweep *stiff)
 {
-	json_t *rows = json_array(), *figures = figures_new();
+	json_t *rows = json_array(), *figures = json_array();
 	struct machine machine;
 
 	machine_init(&machine);
@@ -66,7 +66,7 @@ static void print_json(const struct extremes *all, const struct stiff_sweep *sti
 				  r->what, "tried", (json_int_t)r->tried, "held",
 				  (json_int_t)r->held, "refused", (json_int_t)r->refused,
 				  "wrong", (json_int_t)r->wrong, "failed", failed));
-		figures_exact(figures, (double)r->wrong, "cases", "%s wrong", r->name);
+		metrics_exact(figures, (double)r->wrong, "cases", "%s wrong", r->name);
 	}
 	stiff_sweep_figures(stiff, figures);
 	json_print(json_pack("{so sI sb so so so}", "machine", machine_json(&machine),

@@ -10,7 +10,7 @@
 #include "bench_device.h"
 #include "bench_guard.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))
@@ -265,7 +265,7 @@ void guard_bench_figures(const struct guard_bench *bench, json_t *figures)
 	for (int i = 0; i < bench->swept; i++)
 		bounded[bench->row[i].setting] += bench->row[i].bounded;
 	for (int s = 0; s < GUARD_SETTINGS; s++)
-		figures_more_is_better(figures_exact(figures, bounded[s], "1",
+		metrics_more_is_better(metrics_exact(figures, bounded[s], "1",
 						     "guard %s walls held",
 						     setting_names[s]));
 }

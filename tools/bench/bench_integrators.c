@@ -116,12 +116,13 @@ static void run_timed(void *context)
 
 static void measure_times(struct integrator_bench *bench, int repeats)
 {
-	static struct harness_way ways[INTEGRATOR_ROWS_MAX];
+	static struct harness_variant ways[INTEGRATOR_ROWS_MAX];
 	static struct harness_time times[INTEGRATOR_ROWS_MAX];
 
 	for (int i = 0; i < bench->n; i++)
-		ways[i] = (struct harness_way){run_timed, &bench->row[i],
-					       timed_ticks(&bench->row[i])};
+		ways[i] = (struct harness_variant){.run = run_timed,
+						   .context = &bench->row[i],
+						   .units = timed_ticks(&bench->row[i])};
 	harness_times(ways, bench->n, repeats, times);
 	for (int i = 0; i < bench->n; i++)
 		bench->row[i].ms_time = times[i];
@@ -265,10 +266,10 @@ void integrator_bench_figures(const struct integrator_bench *bench, json_t *figu
 
 		/* A time of one spring tells that of all. */
 		if (row->K_N_m == swept[0])
-			figures_time(figures, &row->ms_time, "ns", "%s step",
+			metrics_time(figures, &row->ms_time, "ns", "%s step",
 				     integrator_name(row->kind));
 		if (row->K_N_m == swept[0] || row->K_N_m == swept[1])
-			figures_exact(figures, row->max_error, "1",
+			metrics_exact(figures, row->max_error, "1",
 				      "%s largest error at %g N/m",
 				      integrator_name(row->kind), row->K_N_m);
 	}

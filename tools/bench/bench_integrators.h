@@ -13,7 +13,7 @@
 
 #include <stdbool.h>
 #include <jansson.h>
-#include "figures.h"
+#include "metrics.h"
 #include "integrators.h"
 
 #define INTEGRATOR_ROWS_MAX 256

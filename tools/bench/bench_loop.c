@@ -10,7 +10,7 @@
 #include "bench_tick.h"
 #include "bench_wakeup.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "loop_picture.h"
 #include "machine.h"
@@ -73,7 +73,7 @@ void bench_loop(const struct bench_loop *bench)
 	bench_rate(bench->quick, &rates);
 	bench_wakeup(bench->scene, only, bench->quick, seconds, &wakeups);
 	if (bench->json) {
-		json_t *figures = figures_new();
+		json_t *figures = json_array();
 
 		tick_rows_figures(ticks, n, figures);
 		rates_figures(&rates, figures);

@@ -8,7 +8,7 @@
 #include <string.h>
 #include "bench_pose.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "machine.h"
 #include "../cli/plot.h"
@@ -56,7 +56,7 @@ static void measure(struct pose_table *table, const struct pose_condition *condi
 	struct harness_time none;
 	struct pose_run run;
 
-	harness_timers(&(struct harness_timer){0}, 1, 0, &none); /* left out: NaN */
+	harness_times(&(struct harness_variant){0}, 1, 0, &none); /* left out: NaN */
 	pose_run_begin(&run, condition);
 	for (int i = 0; i < POSE_ROWS; i++) {
 		const struct pose_method *method =
@@ -123,7 +123,7 @@ static void run_timed(void *context)
 
 static void measure_times(struct bench *b)
 {
-	struct harness_way ways[RATES * POSE_METHODS];
+	struct harness_variant ways[RATES * POSE_METHODS];
 	struct timed timed[RATES * POSE_METHODS];
 	struct pose_run runs[RATES];
 
@@ -136,7 +136,8 @@ static void measure_times(struct bench *b)
 	for (int i = 0; i < RATES * POSE_METHODS; i++) {
 		timed[i] = (struct timed){&runs[i / POSE_METHODS],
 					  &pose_methods[i % POSE_METHODS]};
-		ways[i] = (struct harness_way){run_timed, &timed[i], TIMED_TICKS};
+		ways[i] = (struct harness_variant){
+			.run = run_timed, .context = &timed[i], .units = TIMED_TICKS};
 	}
 	harness_times(ways, RATES * POSE_METHODS, b->repeats, b->times[0]);
 	for (int r = 0; r < RATES; r++)
@@ -261,18 +262,18 @@ static json_t *table_json(const struct pose_table *table)
 
 static json_t *figures_of(const struct bench *b)
 {
-	json_t *figures = figures_new();
+	json_t *figures = json_array();
 
 	for (int r = 0; r < RATES; r++)
 		for (int i = 0; i < POSE_METHODS; i++)
-			figures_time(figures, &b->times[r][i], "ns", "%s, %g Hz",
+			metrics_time(figures, &b->times[r][i], "ns", "%s, %g Hz",
 				     pose_methods[i].name, rates_hz[r]);
 	for (int i = 0; i < b->rows.n; i++) {
 		const struct pose_row *row = &b->rows.row[i];
 
 		if (row->condition.delay_ms == USUAL_MS &&
 		    row->condition.tracker_hz == USUAL_HZ)
-			figures_exact(figures, row->error.place_mm.rms, "mm",
+			metrics_exact(figures, row->error.place_mm.rms, "mm",
 				      "%s, %s, rms", row->name,
 				      row->condition.motion->name);
 	}

@@ -11,7 +11,7 @@
 #include "arithmetics.h"
 #include "bench_precision.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "harness.h"
 #include "../cli/json.h"
 #include "machine.h"
@@ -101,7 +101,7 @@ static void run_timed(void *context)
 
 static void measure_times(struct bench *b)
 {
-	struct harness_way ways[ARITHMETICS_MAX];
+	struct harness_variant ways[ARITHMETICS_MAX];
 	struct timed timed[ARITHMETICS_MAX];
 	struct harness_time times[ARITHMETICS_MAX];
 	struct points points = b->points;
@@ -111,8 +111,9 @@ static void measure_times(struct bench *b)
 		bool wrong = isnan(b->figures[i].max_error);
 
 		timed[i] = (struct timed){&b->all.row[i], &points};
-		ways[i] = (struct harness_way){run_timed, &timed[i],
-					       wrong ? 0 : TIMED_POINTS};
+		ways[i] = (struct harness_variant){.run = run_timed,
+						   .context = &timed[i],
+						   .units = wrong ? 0 : TIMED_POINTS};
 	}
 	harness_times(ways, b->all.n, b->repeats, times);
 	for (int i = 0; i < b->all.n; i++)
@@ -190,7 +191,7 @@ static json_t *row_json(const struct bench *b, int i)
 
 static void print_json(const struct bench *b, const struct incise_model *model)
 {
-	json_t *rows = json_array(), *figures = figures_new();
+	json_t *rows = json_array(), *figures = json_array();
 
 	for (int i = 0; i < b->all.n; i++) {
 		const char *name = b->all.row[i].name;
@@ -199,8 +200,8 @@ static void print_json(const struct bench *b, const struct incise_model *model)
 		/* A peer's hangs on where its heap lies: of one build and model it was
 		 * from 1.7 to 3.5 us, by the process. */
 		if (b->all.row[i].kind != ARITHMETIC_PEER)
-			figures_time(figures, &b->figures[i].time, "ns", "%s", name);
-		figures_exact(figures, b->figures[i].max_error, "N", "%s largest error",
+			metrics_time(figures, &b->figures[i].time, "ns", "%s", name);
+		metrics_exact(figures, b->figures[i].max_error, "N", "%s largest error",
 			      name);
 	}
 	json_print(json_pack("{so si si si sb so ss? so so}", "model",

@@ -23,7 +23,7 @@
 #include <incise/sim.h>
 #include "bench_rate.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "../cli/file.h"
 #include "../cli/tick_cost.h"
@@ -308,11 +308,11 @@ void rates_figures(const struct rates *rates, json_t *figures)
 
 		if (row->rate_hz != 1000)
 			continue;
-		figures_exact(figures, row->command.rms_N, "N",
+		metrics_exact(figures, row->command.rms_N, "N",
 			      "%s %s command rms at 1 kHz", row->wall, row->poses);
-		figures_exact(figures, row->rendered.rms_N, "N",
+		metrics_exact(figures, row->rendered.rms_N, "N",
 			      "%s %s rendered rms at 1 kHz", row->wall, row->poses);
-		figures_exact(figures, row->rendered.max_N, "N",
+		metrics_exact(figures, row->rendered.max_N, "N",
 			      "%s %s rendered largest at 1 kHz", row->wall, row->poses);
 	}
 }

@@ -9,7 +9,7 @@
 #include <string.h>
 #include "bench_scenes.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "machine.h"
 #include "../cli/mapped_libraries.h"
@@ -283,17 +283,17 @@ static void add_figures(json_t *figures, const struct scene_row *row)
 {
 	const struct scene_way *few = &row->saving.few, *full = &row->saving.full;
 
-	figures_time(figures, &few->time, "ns", "%s tick", row->name);
-	figures_time(figures, &full->time, "ns", "%s full tick", row->name);
-	figures_exact(figures, round(few->instructions), "instructions",
+	metrics_time(figures, &few->time, "ns", "%s tick", row->name);
+	metrics_time(figures, &full->time, "ns", "%s full tick", row->name);
+	metrics_exact(figures, round(few->instructions), "instructions",
 		      "%s instructions", row->name);
-	figures_exact(figures, round(full->instructions), "instructions",
+	metrics_exact(figures, round(full->instructions), "instructions",
 		      "%s full instructions", row->name);
 }
 
 static void print_json(const struct bench *b, bool quick)
 {
-	json_t *rows = json_array(), *left = json_array(), *figures = figures_new();
+	json_t *rows = json_array(), *left = json_array(), *figures = json_array();
 
 	for (int i = 0; i < b->n; i++) {
 		json_array_append_new(rows, row_json(&b->row[i]));

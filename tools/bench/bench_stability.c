@@ -11,7 +11,7 @@
 #include "bench_limits.h"
 #include "bench_stability.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "machine.h"
 #include "../cli/plot.h"
@@ -120,7 +120,7 @@ static void print_text(const struct stability *s, bool quick)
 /* How far the worst ratio of each experiment is off, and how many were tried. */
 static json_t *figures_of(const struct stability *s)
 {
-	json_t *figures = figures_new();
+	json_t *figures = json_array();
 
 	for (size_t i = 0; i < EXPERIMENTS; i++) {
 		const struct ratios *r = &s->ratios[i];
@@ -132,9 +132,9 @@ static json_t *figures_of(const struct stability *s)
 			/* Where theory is a lower bound more is not wrong. */
 			worst = fmax(worst, r->row[k].at_least ? -off : fabs(off));
 		}
-		figures_exact(figures, worst, "1", "%s worst ratio off", r->key);
-		figures_more_is_better(
-			figures_exact(figures, r->n, "1", "%s tried", r->key));
+		metrics_exact(figures, worst, "1", "%s worst ratio off", r->key);
+		metrics_more_is_better(
+			metrics_exact(figures, r->n, "1", "%s tried", r->key));
 	}
 	guard_bench_figures(&s->guard, figures);
 	integrator_bench_figures(&s->integrators, figures);

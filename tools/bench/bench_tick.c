@@ -101,7 +101,7 @@ static double turn_ns(void *context)
 /* Quantiles of a long run each, and then medians in turn. */
 static void measure(struct tick_row *rows, int n, bool quick)
 {
-	struct harness_timer timers[BENCH_TICK_ROWS];
+	struct harness_variant timers[BENCH_TICK_ROWS];
 	struct harness_time times[BENCH_TICK_ROWS];
 
 	for (int i = 0; i < n; i++) {
@@ -113,9 +113,9 @@ static void measure(struct tick_row *rows, int n, bool quick)
 				"%s: a stroke over its top met no tissue: nothing to time",
 				rows[i].name);
 		rows[i].timed = tick_stroke_new(rows[i].scene, NULL, rows[i].cost.tool);
-		timers[i] = (struct harness_timer){turn_ns, &rows[i]};
+		timers[i] = (struct harness_variant){.ns = turn_ns, .context = &rows[i]};
 	}
-	harness_timers(timers, n, quick ? QUICK_TURNS : TURNS, times);
+	harness_times(timers, n, quick ? QUICK_TURNS : TURNS, times);
 	for (int i = 0; i < n; i++) {
 		rows[i].time = times[i];
 		tick_stroke_free(rows[i].timed);
@@ -199,5 +199,5 @@ void tick_rows_print(const struct tick_row *rows, int n)
 void tick_rows_figures(const struct tick_row *rows, int n, json_t *figures)
 {
 	for (int i = 0; i < n; i++)
-		figures_time(figures, &rows[i].time, "ns", "tick %s", rows[i].name);
+		metrics_time(figures, &rows[i].time, "ns", "tick %s", rows[i].name);
 }

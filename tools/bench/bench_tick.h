@@ -9,7 +9,7 @@
 #include <jansson.h>
 #include <stdbool.h>
 #include <stddef.h>
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/file.h"
 #include "../cli/tick_cost.h"
 

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include "bench_timeline.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "machine.h"
 #include "../cli/plot.h"
@@ -228,7 +228,7 @@ static void run_timed(void *context)
 
 static void measure_times(struct bench *b)
 {
-	struct harness_way ways[WINDOWS * TIME_METHODS];
+	struct harness_variant ways[WINDOWS * TIME_METHODS];
 	struct timed timed[WINDOWS * TIME_METHODS];
 	struct drifting_stream streams[WINDOWS];
 
@@ -238,7 +238,8 @@ static void measure_times(struct bench *b)
 		const struct drifting_stream *stream = &streams[i / TIME_METHODS];
 
 		timed[i] = (struct timed){&time_methods[i % TIME_METHODS], stream, 0};
-		ways[i] = (struct harness_way){run_timed, &timed[i], stream->n};
+		ways[i] = (struct harness_variant){
+			.run = run_timed, .context = &timed[i], .units = stream->n};
 	}
 	harness_times(ways, WINDOWS * TIME_METHODS, b->repeats, b->times[0]);
 	for (int w = 0; w < WINDOWS; w++)
@@ -311,21 +312,21 @@ static json_t *row_json(const struct timeline_row *row)
 
 static void print_json(const struct bench *b)
 {
-	json_t *rows = json_array(), *figures = figures_new();
+	json_t *rows = json_array(), *figures = json_array();
 
 	for (int i = 0; i < b->table.n; i++) {
 		const struct timeline_row *row = &b->table.row[i];
 
 		json_array_append_new(rows, row_json(row));
 		if (row->window_s == 1 || row->window_s == 30)
-			figures_exact(figures, row->rms_us, "us",
+			metrics_exact(figures, row->rms_us, "us",
 				      "%s, %s, %+g ppm, %g s, rms", row->name,
 				      lateness_kinds[row->late], row->drift_ppm,
 				      row->window_s);
 	}
 	for (int w = 0; w < WINDOWS; w++)
 		for (int i = 0; i < TIME_METHODS; i++)
-			figures_time(figures, &b->times[w][i], "ns", "%s, %g s",
+			metrics_time(figures, &b->times[w][i], "ns", "%s, %g s",
 				     time_methods[i].name, windows_s[w]);
 	json_print(json_pack("{so sb si sf si si so so}", "machine",
 			     machine_json(&b->machine), "quick", b->quick, "rate_hz",

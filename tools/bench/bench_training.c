@@ -9,7 +9,7 @@
 #include <incise/train.h>
 #include "bench_training.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "machine.h"
 #include "../cli/plot.h"
@@ -274,7 +274,7 @@ static void run_timed(void *context)
 
 static void measure(struct bench *b)
 {
-	struct harness_way ways[ROWS_MAX];
+	struct harness_variant ways[ROWS_MAX];
 	struct timed timed[ROWS_MAX];
 	struct harness_time times[ROWS_MAX];
 
@@ -282,7 +282,8 @@ static void measure(struct bench *b)
 		for (int s = 0; s < b->seeds; s++)
 			measure_errors(b, &b->row[i], s);
 		timed[i] = (struct timed){b, &b->row[i].method};
-		ways[i] = (struct harness_way){run_timed, &timed[i], 1};
+		ways[i] = (struct harness_variant){
+			.run = run_timed, .context = &timed[i], .units = 1};
 		cli_progress("training: %s", b->row[i].method.name);
 	}
 	harness_times(ways, b->n, b->repeats, times);
@@ -372,7 +373,7 @@ static json_t *row_json(const struct bench *b, const struct row *r)
 
 static void print_json(const struct bench *b, bool quick)
 {
-	json_t *rows = json_array(), *figures = figures_new();
+	json_t *rows = json_array(), *figures = json_array();
 
 	for (int i = 0; i < b->n; i++) {
 		const struct row *r = &b->row[i];
@@ -381,8 +382,8 @@ static void print_json(const struct bench *b, bool quick)
 		/* A peer's answers are those of its version. */
 		if (r->method.kind == KIND_PEER)
 			continue;
-		figures_time(figures, &r->time, "ms", "%s", r->method.name);
-		figures_exact(figures, norm(b, r, NORM_RMSE).median, "N",
+		metrics_time(figures, &r->time, "ms", "%s", r->method.name);
+		metrics_exact(figures, norm(b, r, NORM_RMSE).median, "N",
 			      "%s error on unseen cuts", r->method.name);
 	}
 	json_print(json_pack("{so sb si si si si so so}", "machine",

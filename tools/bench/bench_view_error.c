@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include "bench_view_error.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "../cli/plot.h"
 #include "similarity.h"
@@ -282,11 +282,11 @@ void shown_rows_figures(const struct shown_rows *rows, json_t *figures)
 			continue;
 		if (row->fps != INT_MAX)
 			snprintf(fps, sizeof(fps), "%d fps", row->fps);
-		figures_exact(figures, row->rms, "1", "texture %d, %s rms",
+		metrics_exact(figures, row->rms, "1", "texture %d, %s rms",
 			      row->texture_px, fps);
-		figures_exact(figures, row->rms_max, "1", "texture %d, %s largest rms",
+		metrics_exact(figures, row->rms_max, "1", "texture %d, %s largest rms",
 			      row->texture_px, fps);
-		figures_exact(figures, 1 - row->ssim, "1", "texture %d, %s dissimilarity",
+		metrics_exact(figures, 1 - row->ssim, "1", "texture %d, %s dissimilarity",
 			      row->texture_px, fps);
 	}
 }

@@ -237,7 +237,7 @@ void frame_rows_figures(const struct frame_rows *rows, json_t *figures)
 	for (int i = 0; i < rows->n; i++) {
 		const struct frame_row *row = &rows->row[i];
 
-		figures_time(figures, &row->time, "ms", "frame %dx%d, texture %d",
+		metrics_time(figures, &row->time, "ms", "frame %dx%d, texture %d",
 			     row->width, row->height, row->texture_px);
 	}
 }

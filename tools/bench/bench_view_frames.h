@@ -7,7 +7,7 @@
 
 #include <jansson.h>
 #include <stdbool.h>
-#include "figures.h"
+#include "metrics.h"
 #include "../view/procedure.h"
 
 /* Of the frames of a run, ms. */

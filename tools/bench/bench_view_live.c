@@ -308,7 +308,7 @@ void beside_print(const struct beside *beside)
 void absorbed_figures(const struct absorbed *a, json_t *figures)
 {
 	/* However busy the machine: that none is lost is promised. */
-	figures_exact(figures, (double)a->lost, "1", "cuts lost");
+	metrics_exact(figures, (double)a->lost, "1", "cuts lost");
 }
 
 void beside_figures(const struct beside *beside, json_t *figures)
@@ -322,7 +322,7 @@ void beside_figures(const struct beside *beside, json_t *figures)
 			if ((beside->run[i].load == LOAD_VIEW) == view)
 				median[n++] = beside->run[i].got.loop.median;
 		harness_spread(median, n, &spread);
-		figures_measured(figures, &spread, "us",
+		metrics_measured(figures, &spread, "us",
 				 "loop late %s the picture, median",
 				 view ? "with" : "without");
 	}

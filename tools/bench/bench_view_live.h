@@ -9,7 +9,7 @@
 #include <jansson.h>
 #include <stdbool.h>
 #include "bench_wakeup.h"
-#include "figures.h"
+#include "metrics.h"
 
 /* Cuts at 5 kHz. */
 struct absorbed {

@@ -11,7 +11,7 @@
 #include <incise/vision.h>
 #include "bench_vision.h"
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "machine.h"
 #include "../cli/plot.h"
@@ -256,15 +256,15 @@ static json_t *row_json(const struct row *r)
 
 static void print_json(const struct bench *b, bool quick)
 {
-	json_t *rows = json_array(), *figures = figures_new();
+	json_t *rows = json_array(), *figures = json_array();
 
 	for (int i = 0; i < ROWS; i++) {
 		const struct row *r = &b->row[i];
 
 		json_array_append_new(rows, row_json(r));
-		figures_time(figures, &r->time, "us", "%s, %s", kinds[r->kind].name,
+		metrics_time(figures, &r->time, "us", "%s, %s", kinds[r->kind].name,
 			     regions[r->region]);
-		figures_exact(figures, r->rms_px, "px", "%s, %s, error",
+		metrics_exact(figures, r->rms_px, "px", "%s, %s, error",
 			      kinds[r->kind].name, regions[r->region]);
 	}
 	json_print(json_pack("{so sb si si si so so}", "machine",

@@ -12,7 +12,7 @@
 #include "bench_wakeup.h"
 #include "../cli/cli.h"
 #include "cyclictest.h"
-#include "figures.h"
+#include "metrics.h"
 #include "harness.h"
 #include "../cli/json.h"
 
@@ -209,7 +209,7 @@ void wakeups_figures(const struct wakeups *wakeups, json_t *figures)
 		for (size_t k = 0; k < 2 && row->got.loop.bins; k++) {
 			struct harness_spread at = quantile_of(&row->got.loop, told[k].q);
 
-			figures_measured(figures, &at, "us", "late at %g Hz, %s, %s",
+			metrics_measured(figures, &at, "us", "late at %g Hz, %s, %s",
 					 row->rate_hz, load_name(row->load),
 					 told[k].name);
 		}

@@ -9,7 +9,7 @@
 #include <jansson.h>
 #include <stdbool.h>
 #include "bench_load.h"
-#include "figures.h"
+#include "metrics.h"
 #include "wakeup_run.h"
 
 struct wakeup_row {

@@ -4,18 +4,31 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include "../cli/cli.h"
 #include "compare.h"
 #include "../cli/json.h"
-#include "reported_figures.h"
+#include "../cli/file.h"
+#include "metrics.h"
+
+/* Gaps between the intervals of the same build's runs, as part of the value; measured, see
+ * incise-bench(1). */
+#define TIME_NOISE 0.05
+#define MEASURED_NOISE 0.5
+/* A report's numbers have 12 digits. */
+#define EXACT_NOISE 1e-9
 
 /*
- * By how much the yardsticks disagree about a time, as part of it: one of the machines, or
+ * By how much the workloads disagree about a time, as part of it: one of the machines, or
  * of its hours, was slower at some work than at other, and at which this is, is not known.
  */
-static double disagreement(const struct figure *was, const struct figure *is)
+static double disagreement(const struct metric *was, const struct metric *is)
 {
 	double least = INFINITY, most = 0;
 
@@ -28,11 +41,11 @@ static double disagreement(const struct figure *was, const struct figure *is)
 	return is->scales > 1 && isfinite(most / least) ? most / least - 1 : 0;
 }
 
-/* Beyond noise: 1 more, -1 less, else 0. A time is, where it is so in each yardstick. */
-static int changed(const struct figure *was, const struct figure *is)
+/* Beyond noise: 1 more, -1 less, else 0. A time changed if it did by each workload. */
+static int changed(const struct metric *was, const struct metric *is)
 {
-	static const double noises[FIGURE_KINDS] = {
-		COMPARE_TIME_NOISE, COMPARE_MEASURED_NOISE, COMPARE_EXACT};
+	static const double noises[METRIC_KINDS] = {TIME_NOISE, MEASURED_NOISE,
+						    EXACT_NOISE};
 	double noise = noises[is->kind] + disagreement(was, is);
 	int more = 0, less = 0;
 
@@ -47,7 +60,7 @@ static int changed(const struct figure *was, const struct figure *is)
 }
 
 /* New by old; of a time the one that is nearest to 1, by which it is judged. */
-static double ratio(const struct figure *was, const struct figure *is)
+static double ratio(const struct metric *was, const struct metric *is)
 {
 	double nearest = is->by[0].middle / was->by[0].middle;
 
@@ -60,15 +73,15 @@ static double ratio(const struct figure *was, const struct figure *is)
 	return nearest;
 }
 
-static json_t *figure_json(const struct figure *f)
+static json_t *metric_json(const struct metric *m)
 {
-	return json_pack("{ss? ss ss ss}", "word", f->word, "name", f->name, "kind",
-			 figure_kind_names[f->kind], "unit", f->unit);
+	return json_pack("{ss? ss ss ss}", "word", m->bench, "name", m->name, "kind",
+			 metric_kind_names[m->kind], "unit", m->unit);
 }
 
-static json_t *change_json(const struct figure *was, const struct figure *is, bool worse)
+static json_t *change_json(const struct metric *was, const struct metric *is, bool worse)
 {
-	json_t *change = figure_json(is);
+	json_t *change = metric_json(is);
 
 	json_object_set_new(change, "old", json_number(was->value));
 	json_object_set_new(change, "new", json_number(is->value));
@@ -77,27 +90,26 @@ static json_t *change_json(const struct figure *was, const struct figure *is, bo
 	return change;
 }
 
-/* Figures of @from that @to has not. A word that is not there at all is one line. */
-static json_t *missing(const struct reported_figures *from,
-		       const struct reported_figures *to)
+/* Metrics of @from that @to lacks. A benchmark that is not there at all is one line. */
+static json_t *missing(const struct metrics *from, const struct metrics *to)
 {
-	const char *word = NULL;
+	const char *bench = NULL;
 	bool known = true;
 	json_t *list = json_array();
 
 	for (int i = 0; i < from->n; i++) {
-		const struct figure *f = &from->figure[i];
+		const struct metric *m = &from->metric[i];
 
-		/* Figures of a word are together. */
-		if (f->word && f->word != word) {
-			word = f->word;
-			known = reported_figures_have(to, word);
+		/* Metrics of a benchmark are together. */
+		if (m->bench && m->bench != bench) {
+			bench = m->bench;
+			known = metrics_have(to, bench);
 			if (!known)
 				json_array_append_new(list, json_pack("{ss sn}", "word",
-								      word, "name"));
+								      bench, "name"));
 		}
-		if (known && !reported_figures_find(to, f))
-			json_array_append_new(list, figure_json(f));
+		if (known && !metrics_find(to, m))
+			json_array_append_new(list, metric_json(m));
 	}
 	return list;
 }
@@ -105,11 +117,11 @@ static json_t *missing(const struct reported_figures *from,
 static const json_t *part_of(const json_t *report, const char *key)
 {
 	const json_t *is = json_object_get(report, key), *member;
-	const char *word;
+	const char *bench;
 
 	if (is)
 		return is;
-	json_object_foreach((json_t *)report, word, member)
+	json_object_foreach((json_t *)report, bench, member)
 	{
 		is = json_object_get(member, key);
 		if (is && json_object_get(member, "figures"))
@@ -118,7 +130,7 @@ static const json_t *part_of(const json_t *report, const char *key)
 	return NULL;
 }
 
-/* What of machine and build is not the same, by its key. */
+/* Keys of machine and build that differ. */
 static json_t *differing(const json_t *old_report, const json_t *new_report)
 {
 	static const char *const keys[] = {"version",	 "cpu",	       "compiler",
@@ -139,17 +151,16 @@ static json_t *differing(const json_t *old_report, const json_t *new_report)
 	return list;
 }
 
-static json_t *compare_all(struct reported_figures *was, struct reported_figures *is,
+static json_t *compare_all(const struct metrics *was, const struct metrics *is,
 			   const json_t *differs)
 {
 	json_t *list = json_array();
 	int same = 0, better = 0, worse = 0;
 
 	for (int i = 0; i < is->n; i++) {
-		const struct figure *f = &is->figure[i],
-				    *before = reported_figures_find(was, f);
-		int way = before ? changed(before, f) : 0;
-		bool bad = way > 0 ? !f->more_is_better : f->more_is_better;
+		const struct metric *m = &is->metric[i], *before = metrics_find(was, m);
+		int way = before ? changed(before, m) : 0;
+		bool bad = way > 0 ? !m->more_is_better : m->more_is_better;
 
 		if (!way) {
 			same += before != NULL;
@@ -157,16 +168,16 @@ static json_t *compare_all(struct reported_figures *was, struct reported_figures
 		}
 		worse += bad;
 		better += !bad;
-		json_array_append_new(list, change_json(before, f, bad));
+		json_array_append_new(list, change_json(before, m, bad));
 	}
 	return json_pack("{sO so so so si si si}", "differs", differs, "changed", list,
 			 "gone", missing(was, is), "new", missing(is, was), "same", same,
 			 "better", better, "worse", worse);
 }
 
-static int comparable(const struct reported_figures *was,
-		      const struct reported_figures *is, const json_t *old_report,
-		      const json_t *new_report, struct incise_error *err)
+static int comparable(const struct metrics *was, const struct metrics *is,
+		      const json_t *old_report, const json_t *new_report,
+		      struct incise_error *err)
 {
 	const json_t *old_quick = part_of(old_report, "quick"),
 		     *new_quick = part_of(new_report, "quick");
@@ -180,7 +191,7 @@ static int comparable(const struct reported_figures *was,
 			json_is_true(old_quick) ? was->report : is->report,
 			json_is_true(old_quick) ? is->report : was->report);
 	for (int i = 0; i < is->n; i++)
-		if (reported_figures_find(was, &is->figure[i]))
+		if (metrics_find(was, &is->metric[i]))
 			return 0;
 	return incise_error_set(err, EINVAL,
 				"%s and %s have no figure in common: compare two of one "
@@ -193,11 +204,11 @@ json_t *compare_reports(const json_t *old_report, const char *old_name,
 			struct incise_error *err)
 {
 	json_t *comparison = NULL, *differs = NULL;
-	struct reported_figures was, is = {0};
-	int rc = reported_figures_read(old_report, old_name, &was, err);
+	struct metrics was, is = {0};
+	int rc = metrics_read(old_report, old_name, &was, err);
 
 	if (!rc)
-		rc = reported_figures_read(new_report, new_name, &is, err);
+		rc = metrics_read(new_report, new_name, &is, err);
 	if (!rc)
 		rc = comparable(&was, &is, old_report, new_report, err);
 	if (!rc) {
@@ -207,9 +218,21 @@ json_t *compare_reports(const json_t *old_report, const char *old_name,
 		if (!comparison)
 			incise_error_set(err, ENOMEM, "no memory for a comparison");
 	}
-	reported_figures_free(&was);
-	reported_figures_free(&is);
+	metrics_free(&was);
+	metrics_free(&is);
 	return comparison;
+}
+
+json_t *compare_load(const char *path)
+{
+	struct incise_error err = {0};
+	json_t *report = json_read(path, &err), *itself;
+
+	itself = report ? compare_reports(report, path, report, path, &err) : NULL;
+	if (!itself)
+		cli_fail_with(&err);
+	json_decref(itself);
+	return report;
 }
 
 int compare_worse(const json_t *comparison)
@@ -218,16 +241,16 @@ int compare_worse(const json_t *comparison)
 	       (int)json_array_size(json_object_get(comparison, "gone"));
 }
 
-/* ---- report ---- */
+/* --- printed --- */
 
 static const char *text_of(const json_t *object, const char *key)
 {
 	return json_string_value(json_object_get(object, key));
 }
 
-static void name_of(const json_t *figure, char *name, size_t size)
+static void name_of(const json_t *metric, char *name, size_t size)
 {
-	const char *word = text_of(figure, "word"), *is = text_of(figure, "name");
+	const char *word = text_of(metric, "word"), *is = text_of(metric, "name");
 
 	snprintf(name, size, "%s%s%s", word ? word : "", word && is ? ": " : "",
 		 is ? is : "");
@@ -235,22 +258,22 @@ static void name_of(const json_t *figure, char *name, size_t size)
 
 static void print_names(const json_t *comparison, const char *key)
 {
-	const json_t *figure;
-	char name[2 * REPORTED_NAME_BYTES];
+	const json_t *metric;
+	char name[2 * METRIC_NAME_BYTES];
 	size_t i;
 
-	json_array_foreach(json_object_get(comparison, key), i, figure)
+	json_array_foreach(json_object_get(comparison, key), i, metric)
 	{
-		name_of(figure, name, sizeof(name));
+		name_of(metric, name, sizeof(name));
 		printf("%s: %s\n", key, name);
 	}
 }
 
-void compare_print(const json_t *comparison)
+static void print(const json_t *comparison)
 {
 	const json_t *differs = json_object_get(comparison, "differs"),
 		     *list = json_object_get(comparison, "changed"), *change;
-	char name[2 * REPORTED_NAME_BYTES];
+	char name[2 * METRIC_NAME_BYTES];
 	size_t i;
 
 	for (i = 0; i < json_array_size(differs); i++)
@@ -294,11 +317,68 @@ void compare_finish(json_t *comparison, bool json)
 	if (json) {
 		json_print(comparison);
 	} else {
-		compare_print(comparison);
+		print(comparison);
 		json_decref(comparison);
 		cli_finish();
 	}
 	if (worse)
 		cli_fail("%d figure%s worse or gone, see above", worse,
 			 worse > 1 ? "s are" : " is");
+}
+
+/* --- --against --- */
+
+/* In the first process: compare what the other one reported, and end as it did. */
+static _Noreturn void wait_and_compare(pid_t pid, const struct memory_file *said,
+				       const char *path, json_t *old_report, bool json)
+{
+	struct incise_error err = {0};
+	json_t *report, *comparison;
+	int status, worse;
+
+	/* A Ctrl-C is for the process that measures. */
+	signal(SIGINT, SIG_IGN);
+	while (waitpid(pid, &status, 0) < 0)
+		if (errno != EINTR)
+			cli_fail("what measures is lost: %s", strerror(errno));
+	rewind(said->file);
+	/* One that failed before it had a report has said why. */
+	report = json_read_from(said->file, "the report", &err);
+	if (!report && status)
+		_exit(WIFEXITED(status) ? WEXITSTATUS(status) : 1);
+	comparison = report ? compare_reports(old_report, path, report, "this run", &err)
+			    : NULL;
+	if (!comparison)
+		cli_fail_with(&err);
+	if (json) {
+		worse = compare_worse(comparison);
+		json_object_set_new(report, "against", comparison);
+		json_print(report);
+		if (worse)
+			cli_fail("%d worse or gone against %s", worse, path);
+	} else {
+		compare_finish(comparison, false);
+	}
+	exit(WIFEXITED(status) ? WEXITSTATUS(status) : 1);
+}
+
+void compare_against(const char *path, bool json)
+{
+	struct memory_file said = memory_file_begin("report");
+	json_t *old_report = compare_load(path);
+	pid_t parent = getpid(), pid;
+
+	fflush(stdout);
+	pid = fork();
+	if (pid < 0)
+		cli_fail("no process to measure in: %s", strerror(errno));
+	if (pid)
+		wait_and_compare(pid, &said, path, old_report, json);
+	prctl(PR_SET_PDEATHSIG, SIGTERM);
+	if (getppid() != parent)
+		_exit(1);
+	if (dup2(fileno(said.file), STDOUT_FILENO) < 0)
+		cli_fail("no output to report to: %s", strerror(errno));
+	fclose(said.file);
+	json_decref(old_report);
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Times of ways of doing the same thing; see harness.h.
+ * Run times of variants of the same work; see harness.h.
  */
 #include <math.h>
 #include <sched.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -11,12 +12,85 @@
 #include "harness.h"
 #include "../cli/stopwatch.h"
 
-#define YARDSTICK_RUNS 101
+#define WORKLOAD_RUNS 101
 
 /* Stretches whose medians are ranked: from the 3rd to the 10th of 12 is an interval of
  * 1 - 2 (1 + 12 + 66) / 2^12 = 96 %. */
 #define STRETCHES 12
 #define STRETCH_RANK 2
+
+/* --- reference workloads --- */
+
+#define STEPS 8192
+#define TABLE 1024
+#define LINES 8192 /* of 64 bytes */
+#define LINE_WORDS 8
+
+static volatile double result; /* keeps the work from being left out */
+
+static void chain(void)
+{
+	static double table[TABLE];
+	uint64_t x = 88172645463325252u;
+	double sum = 0;
+
+	for (int i = 0; i < STEPS; i++) {
+		x ^= x << 13;
+		x ^= x >> 7;
+		x ^= x << 17;
+		sum = 0.75 * sum + table[x % TABLE];
+		table[i % TABLE] = 1 + sum * 0x1p-8;
+	}
+	result = sum;
+}
+
+/* Six chains at once, of a multiplication, a sum and a load each. */
+static void wide(void)
+{
+	static const uint32_t factor = 2891336453u;
+	static uint32_t table[TABLE];
+	uint32_t a = 1, b = 2, c = 3, d = 4, e = 5, f = 6, sum = 0;
+
+	for (int i = 0; i < STEPS; i++) {
+		a = a * factor + 1;
+		b = b * factor + 3;
+		c = c * factor + 5;
+		d = d * factor + 7;
+		e = e * factor + 9;
+		f = f * factor + 11;
+		sum += table[a % TABLE] + table[b % TABLE] + table[c % TABLE] +
+		       table[d % TABLE] + table[e % TABLE] + table[f % TABLE];
+	}
+	table[0] = sum;
+	result = sum;
+}
+
+static void memory(void)
+{
+	static uint32_t next[LINES * LINE_WORDS];
+	uint32_t at = 0;
+
+	/* An odd step through a power of two, mixed: a walk that comes by each line once. */
+	if (!next[0])
+		for (uint32_t i = 0; i < LINES; i++)
+			next[i * LINE_WORDS] = (i * 5 + 4321) % LINES * LINE_WORDS;
+	for (int i = 0; i < LINES; i++)
+		at = next[at];
+	result = at;
+}
+
+static double workload_ns(enum workload workload)
+{
+	static void (*const works[WORKLOADS])(void) = {chain, wide, memory};
+	double begin;
+
+	works[workload]();
+	begin = stopwatch_ns();
+	works[workload]();
+	return stopwatch_ns() - begin;
+}
+
+/* --- medians and their intervals --- */
 
 int harness_cpu(void)
 {
@@ -99,43 +173,45 @@ void harness_spread(const double *values, int n, struct harness_spread *spread)
 	free(sorted);
 }
 
-/* All n values as multiples of a unit each. */
-static void ratios_spread(const double *ns, const double *units, int n, double *room,
-			  struct harness_spread *spread)
+/* --- timing --- */
+
+static void spread_of_ratios(const double *ns, const double *units, int n, double *buffer,
+			     struct harness_spread *spread)
 {
 	for (int i = 0; i < n; i++)
-		room[i] = ns[i] / units[i];
-	harness_spread(room, n, spread);
+		buffer[i] = ns[i] / units[i];
+	harness_spread(buffer, n, spread);
 }
 
 void harness_time_of(const double *ns, int n, struct harness_time *time)
 {
-	double runs[YARDSTICK_RUNS], *units = calloc(2 * (size_t)n + 1, sizeof(*units));
+	double runs[WORKLOAD_RUNS], *units = calloc(2 * (size_t)n + 1, sizeof(*units));
 
 	if (!units)
 		cli_fail("no memory");
 	harness_spread(ns, n, &time->ns);
-	for (int y = 0; y < YARDSTICKS; y++) {
-		for (int i = 0; i < YARDSTICK_RUNS; i++)
-			runs[i] = yardstick_ns((enum yardstick)y);
-		stopwatch_sort(runs, YARDSTICK_RUNS);
+	for (int w = 0; w < WORKLOADS; w++) {
+		for (int i = 0; i < WORKLOAD_RUNS; i++)
+			runs[i] = workload_ns((enum workload)w);
+		stopwatch_sort(runs, WORKLOAD_RUNS);
 		for (int i = 0; i < n; i++)
-			units[i] = stopwatch_quantile(runs, YARDSTICK_RUNS, 0.5);
-		ratios_spread(ns, units, n, units + n, &time->by[y]);
+			units[i] = stopwatch_quantile(runs, WORKLOAD_RUNS, 0.5);
+		spread_of_ratios(ns, units, n, units + n, &time->by[w]);
 	}
 	free(units);
 }
 
-static double run_ns(void *context)
+static double unit_ns(const struct harness_variant *variant)
 {
-	const struct harness_way *way = context;
 	double begin;
 
+	if (variant->ns)
+		return variant->ns(variant->context);
 	/* Its tables are in the cache, its branches learnt. */
-	way->run(way->context);
+	variant->run(variant->context);
 	begin = stopwatch_ns();
-	way->run(way->context);
-	return (stopwatch_ns() - begin) / way->units;
+	variant->run(variant->context);
+	return (stopwatch_ns() - begin) / variant->units;
 }
 
 /* On one processor; returns whether @before is to be restored. */
@@ -150,12 +226,16 @@ static bool pin(cpu_set_t *before)
 	return !sched_setaffinity(0, sizeof(one), &one);
 }
 
-void harness_timers(const struct harness_timer *timers, int n, int turns,
-		    struct harness_time *times)
+static bool is_timed(const struct harness_variant *variant)
 {
-	/* Of each timer its turns, of each yardstick its turns, and room for as many. */
-	double *ns = calloc((size_t)(n + YARDSTICKS + 1) * turns + 1, sizeof(*ns)),
-	       *units;
+	return variant->ns || variant->units > 0;
+}
+
+void harness_times(const struct harness_variant *variants, int n, int turns,
+		   struct harness_time *times)
+{
+	/* For each variant its turns, for each workload its turns, and a buffer. */
+	double *ns = calloc((size_t)(n + WORKLOADS + 1) * turns + 1, sizeof(*ns)), *units;
 	cpu_set_t before;
 	bool pinned;
 	int turn;
@@ -166,38 +246,23 @@ void harness_timers(const struct harness_timer *timers, int n, int turns,
 	pinned = pin(&before);
 	for (turn = 0; turn < turns && !cli_stop; turn++) {
 		cli_progress("turn %d of %d", turn + 1, turns);
-		for (int y = 0; y < YARDSTICKS; y++)
-			units[y * turns + turn] = yardstick_ns((enum yardstick)y);
+		for (int w = 0; w < WORKLOADS; w++)
+			units[w * turns + turn] = workload_ns((enum workload)w);
 		for (int i = 0; i < n; i++)
-			if (timers[i].ns)
-				ns[(size_t)i * turns + turn] =
-					timers[i].ns(timers[i].context);
+			if (is_timed(&variants[i]))
+				ns[(size_t)i * turns + turn] = unit_ns(&variants[i]);
 	}
 	cli_progress_end();
 	if (pinned)
 		sched_setaffinity(0, sizeof(before), &before);
 	for (int i = 0; i < n; i++) {
 		const double *own = ns + (size_t)i * turns;
-		int taken = timers[i].ns ? turn : 0;
+		int taken = is_timed(&variants[i]) ? turn : 0;
 
 		harness_spread(own, taken, &times[i].ns);
-		for (int y = 0; y < YARDSTICKS; y++)
-			ratios_spread(own, units + y * turns, taken,
-				      units + YARDSTICKS * turns, &times[i].by[y]);
+		for (int w = 0; w < WORKLOADS; w++)
+			spread_of_ratios(own, units + w * turns, taken,
+					 units + WORKLOADS * turns, &times[i].by[w]);
 	}
 	free(ns);
-}
-
-void harness_times(const struct harness_way *ways, int n, int turns,
-		   struct harness_time *times)
-{
-	struct harness_timer *timers = calloc((size_t)n + 1, sizeof(*timers));
-
-	if (!timers)
-		cli_fail("no memory");
-	for (int i = 0; i < n; i++)
-		if (ways[i].units > 0)
-			timers[i] = (struct harness_timer){run_ns, (void *)&ways[i]};
-	harness_timers(timers, n, turns, times);
-	free(timers);
 }

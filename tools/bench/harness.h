@@ -1,23 +1,36 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * How incise bench times ways of doing the same thing: all on one processor, each warmed up
- * before it is timed, all taking turns, and yardsticks among them.
+ * Run times of variants of the same work: all on one processor, each warmed up before it is
+ * timed, all in turns, with reference workloads among them.
  *
  *     turn 1               turn 2               turn 3
- *     yardsticks A B C     yardsticks A B C     yardsticks A B C   …
+ *     references A B C     references A B C     references A B C   …
  *
- * A moment in which the machine is busy meets them all. A time as a multiple of a
- * yardstick's in the same turn can be held against one of another day.
+ * A moment in which the machine is busy affects all of them. A time as a multiple of a
+ * reference workload's in the same turn can be compared with that of another day.
  */
 #ifndef INCISE_HARNESS_H
 #define INCISE_HARNESS_H
 
-#include "yardstick.h"
+/*
+ * Fixed work. Three of them, as no machine is slower evenly: where two processors share a
+ * core, work that fills the core takes half as long again while the other one is busy, and
+ * work that waits for its own results takes as long as before.
+ *
+ *   chain   each step waits for the one before: bound by latency
+ *   wide    steps are independent: bound by how many the core does at once
+ *   memory  a random walk through half a MiB: bound by the second cache
+ *
+ * A change of them makes older reports incomparable.
+ */
+enum workload { WORKLOAD_CHAIN, WORKLOAD_WIDE, WORKLOAD_MEMORY, WORKLOADS };
 
-struct harness_way {
+struct harness_variant {
 	void (*run)(void *context);
 	void *context;
-	double units; /* done by a run: times are of one; 0 leaves the way out */
+	double units; /* done by a run: times are of one; 0 leaves the variant out */
+	/* Instead of run(): warms up and times itself, returns ns of a unit. */
+	double (*ns)(void *context);
 };
 
 /* Of measured values in the order in which they came. */
@@ -27,31 +40,22 @@ struct harness_spread {
 };
 
 struct harness_time {
-	struct harness_spread ns;	      /* of one unit */
-	struct harness_spread by[YARDSTICKS]; /* the same as multiples of yardsticks */
+	struct harness_spread ns; /* of one unit */
+	struct harness_spread
+		by[WORKLOADS]; /* as multiples of the reference workloads' */
 };
 
 /*
- * Time n ways for so many turns. Ways that are left out get NaN. The process is back on the
- * processors that it had before when it returns; fails the program without memory. On
- * SIGINT it ends after a turn, with those that were taken.
+ * Time n variants for so many turns. Variants that are left out get NaN. The process is back
+ * on the processors that it had before when it returns; fails the program without memory. On
+ * SIGINT it ends after a turn and uses the turns so far.
  */
-void harness_times(const struct harness_way *ways, int n, int turns,
+void harness_times(const struct harness_variant *variants, int n, int turns,
 		   struct harness_time *times);
 
-/* One that warms up and times itself: returns ns of a unit. NULL leaves it out. */
-struct harness_timer {
-	double (*ns)(void *context);
-	void *context;
-};
-
-/* The same of these. */
-void harness_timers(const struct harness_timer *timers, int n, int turns,
-		    struct harness_time *times);
-
 /*
- * The same of times in ns that were taken elsewhere, in threads or other programs: the
- * yardsticks are timed now. NaN of none.
+ * The same for times in ns that were taken elsewhere, in threads or other programs: the
+ * reference workloads are timed now. NaN of none.
  */
 void harness_time_of(const double *ns, int n, struct harness_time *time);
 
@@ -63,7 +67,7 @@ void harness_time_of(const double *ns, int n, struct harness_time *time);
  */
 void harness_spread(const double *values, int n, struct harness_spread *spread);
 
-/* The processor that ways are timed on: the last one, as interrupts are more often the
+/* The processor that variants are timed on: the last one, as interrupts are more often the
  * first one's. */
 int harness_cpu(void);
 

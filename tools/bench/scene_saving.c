@@ -166,7 +166,7 @@ static void time_single(struct scene_way *way, int courses)
 
 void scene_savings_time(struct scene_saving *const *savings, int n, bool quick)
 {
-	struct harness_way *ways = calloc(2 * n + 1, sizeof(*ways));
+	struct harness_variant *ways = calloc(2 * n + 1, sizeof(*ways));
 	struct harness_time *times = calloc(2 * n + 1, sizeof(*times));
 
 	if (!ways || !times)
@@ -174,10 +174,13 @@ void scene_savings_time(struct scene_saving *const *savings, int n, bool quick)
 	for (int i = 0; i < n; i++) {
 		double ticks = *savings[i]->failed ? 0 : savings[i]->course.ticks;
 
-		ways[2 * i] =
-			(struct harness_way){run_course, &savings[i]->few.walk, ticks};
+		ways[2 * i] = (struct harness_variant){.run = run_course,
+						       .context = &savings[i]->few.walk,
+						       .units = ticks};
 		ways[2 * i + 1] =
-			(struct harness_way){run_course, &savings[i]->full.walk, ticks};
+			(struct harness_variant){.run = run_course,
+						 .context = &savings[i]->full.walk,
+						 .units = ticks};
 	}
 	harness_times(ways, 2 * n, quick ? QUICK_TURNS : TURNS, times);
 	for (int i = 0; i < n; i++) {

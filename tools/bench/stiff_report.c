@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include "../cli/cli.h"
-#include "figures.h"
+#include "metrics.h"
 #include "../cli/json.h"
 #include "../cli/plot.h"
 #include "stiff_sweep.h"
@@ -98,7 +98,7 @@ void stiff_sweep_figures(const struct stiff_sweep *sweep, json_t *figures)
 		const struct stiff_row *r = &sweep->row[i];
 
 		if (was_run(r))
-			figures_exact(figures, r->largest_mm, "mm",
+			metrics_exact(figures, r->largest_mm, "mm",
 				      "%s, %.4g N/m, guard %s, largest", paths[r->path],
 				      r->K_N_mm * 1e3, r->guard ? "on" : "off");
 	}

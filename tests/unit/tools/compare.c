@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include "../../../tools/bench/compare.h"
-#include "../../../tools/bench/figures.h"
+#include "../../../tools/bench/metrics.h"
 
 #define TURNS 101
 #define PAIRS 500
@@ -34,31 +34,31 @@ struct made {
 	double slower, chain, wide, memory;
 };
 
-static json_t *report_of(json_t *figures)
+static json_t *report_of(json_t *metrics)
 {
-	return json_pack("{so}", "figures", figures);
+	return json_pack("{so}", "figures", metrics);
 }
 
 /* Values that are off by a tenth, around what the machine and the build make of them. */
 static json_t *made_report(const struct made *made, uint64_t *random)
 {
-	const double unit[YARDSTICKS] = {made->chain, made->wide, made->memory};
+	const double unit[WORKLOADS] = {made->chain, made->wide, made->memory};
 	double ns[TURNS], by[TURNS];
 	struct harness_time time;
-	json_t *figures = figures_new();
+	json_t *metrics = json_array();
 
 	for (int i = 0; i < TURNS; i++)
 		ns[i] = BENCH_NS * made->slower * exp(0.1 * normal(random));
 	harness_spread(ns, TURNS, &time.ns);
-	for (int y = 0; y < YARDSTICKS; y++) {
+	for (int w = 0; w < WORKLOADS; w++) {
 		for (int i = 0; i < TURNS; i++)
-			by[i] = ns[i] / (1e4 * unit[y]);
-		harness_spread(by, TURNS, &time.by[y]);
+			by[i] = ns[i] / (1e4 * unit[w]);
+		harness_spread(by, TURNS, &time.by[w]);
 	}
-	figures_time(figures, &time, "ns", "time");
-	figures_measured(figures, &time.ns, "ns", "measured");
-	figures_exact(figures, 1.0 / 3, "N", "exact");
-	return report_of(figures);
+	metrics_time(metrics, &time, "ns", "time");
+	metrics_measured(metrics, &time.ns, "ns", "measured");
+	metrics_exact(metrics, 1.0 / 3, "N", "exact");
+	return report_of(metrics);
 }
 
 static json_t *compared(json_t *was, json_t *is)
@@ -80,7 +80,7 @@ static int count(const json_t *comparison, const char *key)
 	return json_is_array(is) ? (int)json_array_size(is) : (int)json_integer_value(is);
 }
 
-/* How many figures of so many pairs get worse, and better. */
+/* How many metrics of so many pairs get worse, and better. */
 static void tally(const struct made *was, const struct made *is, int *worse, int *better)
 {
 	uint64_t random = 1;
@@ -123,21 +123,21 @@ static void test_slower_is_found(void **state)
 	assert_true(better > PAIRS * 0.6 && !worse);
 }
 
-/* One figure of a time, in each yardstick, all off by 1 %: as a quiet machine gives it. */
+/* One metric of a time, by each reference workload, all off by 1 %: as a quiet machine gives it. */
 static json_t *sharp(double value, double chain, double wide, double memory)
 {
-	const double unit[YARDSTICKS] = {chain, wide, memory};
+	const double unit[WORKLOADS] = {chain, wide, memory};
 	struct harness_time time;
-	json_t *figures = figures_new();
+	json_t *metrics = json_array();
 
 	time.ns = (struct harness_spread){value, value, value, value, value};
-	for (int y = 0; y < YARDSTICKS; y++) {
-		double by = value / unit[y];
+	for (int w = 0; w < WORKLOADS; w++) {
+		double by = value / unit[w];
 
-		time.by[y] = (struct harness_spread){by, by, by, 0.99 * by, 1.01 * by};
+		time.by[w] = (struct harness_spread){by, by, by, 0.99 * by, 1.01 * by};
 	}
-	figures_time(figures, &time, "us", "time");
-	return report_of(figures);
+	metrics_time(metrics, &time, "us", "time");
+	return report_of(metrics);
 }
 
 static void test_sharp_times(void **state)
@@ -170,13 +170,13 @@ static void test_sharp_times(void **state)
 
 static json_t *exact(double a, double b, bool more)
 {
-	json_t *figures = figures_new(), *figure;
+	json_t *metrics = json_array(), *metric;
 
-	figures_exact(figures, a, "N", "a");
-	figure = figures_exact(figures, b, "N", "b");
+	metrics_exact(metrics, a, "N", "a");
+	metric = metrics_exact(metrics, b, "N", "b");
 	if (more)
-		figures_more_is_better(figure);
-	return report_of(figures);
+		metrics_more_is_better(metric);
+	return report_of(metrics);
 }
 
 static void test_exact_ones(void **state)
@@ -216,14 +216,14 @@ static void test_exact_ones(void **state)
 	}
 }
 
-static void test_another_unit_is_another_figure(void **state)
+static void test_another_unit_is_another_metric(void **state)
 {
-	json_t *was = figures_new(), *is = figures_new(), *c;
+	json_t *was = json_array(), *is = json_array(), *c;
 
-	figures_exact(was, 1, "N", "a");
-	figures_exact(is, 1, "mN", "a");
-	figures_exact(was, 1, "N", "b");
-	figures_exact(is, 1, "N", "b");
+	metrics_exact(was, 1, "N", "a");
+	metrics_exact(is, 1, "mN", "a");
+	metrics_exact(was, 1, "N", "b");
+	metrics_exact(is, 1, "N", "b");
 	c = compared(report_of(was), report_of(is));
 	assert_int_equal(count(c, "gone"), 1);
 	assert_int_equal(count(c, "new"), 1);
@@ -246,7 +246,7 @@ static void test_many_words(void **state)
 	}
 	json_object_set_new(was, "both", exact(1, 2, false));
 	json_object_set_new(is, "both", exact(1, 2, false));
-	json_object_set_new(is, "empty", report_of(figures_new()));
+	json_object_set_new(is, "empty", report_of(json_array()));
 	c = compared(was, is);
 	assert_int_equal(count(c, "same"), 2);
 	assert_int_equal(count(c, "gone"), WORDS);
@@ -261,7 +261,7 @@ int main(void)
 		cmocka_unit_test(test_slower_is_found),
 		cmocka_unit_test(test_sharp_times),
 		cmocka_unit_test(test_exact_ones),
-		cmocka_unit_test(test_another_unit_is_another_figure),
+		cmocka_unit_test(test_another_unit_is_another_metric),
 		cmocka_unit_test(test_many_words),
 	};
 

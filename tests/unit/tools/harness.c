@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * tools/bench/harness.c: whether the interval of a median holds the median as often as it says, on
- * values whose median is known; and that ways take turns.
+ * values whose median is known; and that variants take turns.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -105,20 +105,21 @@ static double say(void *context)
 	return 1000 + (double)strlen(order);
 }
 
-static void test_ways_take_turns(void **state)
+static void test_variants_take_turns(void **state)
 {
-	const struct harness_timer timers[] = {{say, "a"}, {NULL, NULL}, {say, "b"}};
+	const struct harness_variant variants[] = {
+		{.ns = say, .context = "a"}, {0}, {.ns = say, .context = "b"}};
 	struct harness_time times[3];
 
 	*order = 0;
-	harness_timers(timers, 3, 4, times);
+	harness_times(variants, 3, 4, times);
 	assert_string_equal(order, "abababab");
 	/* 1001, 1003, 1005, 1007: nearest rank, the upper one of two */
 	assert_true(times[0].ns.median == 1005);
 	assert_true(isnan(times[1].ns.median) && isnan(times[1].by[0].median));
-	for (int y = 0; y < YARDSTICKS; y++)
-		assert_true(times[2].by[y].low > 0 &&
-			    times[2].by[y].low <= times[2].by[y].high);
+	for (int w = 0; w < WORKLOADS; w++)
+		assert_true(times[2].by[w].low > 0 &&
+			    times[2].by[w].low <= times[2].by[w].high);
 }
 
 int main(void)
@@ -127,7 +128,7 @@ int main(void)
 		cmocka_unit_test(test_intervals_hold_the_median),
 		cmocka_unit_test(test_a_slow_while_widens_it),
 		cmocka_unit_test(test_few_values),
-		cmocka_unit_test(test_ways_take_turns),
+		cmocka_unit_test(test_variants_take_turns),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
