@@ -24,10 +24,20 @@ $(O)/obj/tools/calibrate/depth_picture.o $(O)/obj/tools/cli/png_file.o: cppflags
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
 tool_parts := $(O)/obj/tools/parts.a
-$(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tools/*/*.c))
+tool_texts := $(wildcard tools/bench/*.md tools/bench/*.css tools/bench/plots/*.gp)
+$(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tools/*/*.c)) $(tool_texts:%=$(O)/obj/%.o)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
+
+# A text that benchmarks print from: report.md becomes the string text_report_md.
+$(tool_texts:%=$(O)/obj/%.o): $(O)/obj/%.o: %
+	@mkdir -p $(@D)
+	$(call step,CC)
+	$(Q){ echo 'extern const char text_$(subst .,_,$(notdir $<))[];'; \
+		echo 'const char text_$(subst .,_,$(notdir $<))[] ='; \
+		sed 's/[\\"]/\\&/g; s/.*/"&\\n"/' $<; echo ';'; } | \
+		$(CC) $(cflags) $(CFLAGS) -x c -c -o $@ -
 
 # Another project's evaluator beside ours in incise bench: a shared object of its own,
 # built where its headers are. It is for measuring, and is not installed.
@@ -35,17 +45,17 @@ peer := $(if $(shell $(CXX) -E -x c++ -include fl/Headers.h /dev/null >/dev/null
 	echo yes),\
 	$(O)/lib/incise/peer_fuzzylite.so)
 
-$(O)/lib/incise/peer_%.so: tools/bench/peers/%.cc $(O)/lib/libincise.so
-	@mkdir -p $(@D) $(O)/obj/tools/bench/peers
+$(O)/lib/incise/peer_%.so: tools/bench/references/%.cc $(O)/lib/libincise.so
+	@mkdir -p $(@D) $(O)/obj/tools/bench/references
 	$(call step,LD)
 	$(Q)$(CXX) -std=c++14 -fPIC -fvisibility=hidden -Wall -Wextra $(cppflags) $(CPPFLAGS) $(CFLAGS) \
-		-MMD -MP -MF $(O)/obj/tools/bench/peers/$*.d -shared $(LDFLAGS) -o $@ $< \
+		-MMD -MP -MF $(O)/obj/tools/bench/references/$*.d -shared $(LDFLAGS) -o $@ $< \
 		-L$(O)/lib -lincise -l$*
 
 # And one that is a script, which runs where Python has it.
 peer += $(O)/lib/incise/peer_scikit_learn.py
 
-$(O)/lib/incise/peer_%.py: tools/bench/peers/%.py
+$(O)/lib/incise/peer_%.py: tools/bench/references/%.py
 	@mkdir -p $(@D)
 	cp $< $@
 

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench WHAT: a word for each bench_*.h.
+ * incise bench NAME: the benchmarks of bench/bench.h by their names.
  */
 #include <getopt.h>
 #include <limits.h>
+#include <stdio.h>
 #include <string.h>
+#include "bench/bench.h"
 #include "bench/bench_capture.h"
 #include "bench/bench_extremes.h"
 #include "bench/bench_loop.h"
 #include "bench/bench_pose.h"
-#include "bench/bench_precision.h"
 #include "bench/bench_scenes.h"
 #include "bench/bench_stability.h"
 #include "bench/bench_timeline.h"
-#include "bench/bench_training.h"
 #include "bench/bench_vision.h"
-#include "cli/cli.h"
 #include "bench/compare.h"
+#include "cli/cli.h"
 #include "cli/json.h"
 
 enum {
@@ -50,144 +50,185 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-static const struct cli_command verb = {
-	.name = "bench",
-	.synopsis =
-		"precision [MODEL.fis] | training | stability | loop [SCENE] | pose | timeline | "
-		"vision | capture [RUN] | scenes [SCENE...] | extremes | view [SCENE] | all | "
-		"compare OLD.json NEW.json [OPTIONS]",
-	.summary =
-		"Measure error against run time, and what is stable; tables, JSON, pictures.\n"
-		"  precision [MODEL.fis]  arithmetics of a model, without MODEL of the paper's size\n"
-		"  training               error on unseen cuts over the seconds that training takes\n"
-		"  stability              how stiff a virtual wall may be, simulated and computed;\n"
-		"                         the guard of passivity; integrators of a stiff spring\n"
-		"  loop [SCENE]           cost of a tick; how late the machine wakes the loop, idle\n"
-		"                         and under loads, beside cyclictest; error over its rate\n"
-		"  pose                   error of the pose over the tracker's rate, delay and cost\n"
-		"  timeline               error of times of samples that come late, by a clock that\n"
-		"                         drifts, over how much was seen and the cost\n"
-		"  vision                 error of the exposed length over the time per picture\n"
-		"  capture [RUN]          how much of a core it takes to record all streams\n"
-		"  scenes [SCENE...]      what each scene leaves out, and what that saves\n"
-		"  extremes               numbers and bytes that nobody should send, at each door of\n"
-		"                         the library; walls of 10 N/m to 1 GN/m\n"
-		"  view [SCENE]           the picture of a scene: see 'incise bench view --help'\n"
-		"  all                    all of these, and one report: see 'incise bench all --help'\n"
-		"compare says what changed beyond noise between two reports of --json.",
-	.options = options,
-	.notes =
-		"Exit: 0 measured, 1 failed, simulation and theory or the forces of two ways differ,\n"
-		"or figures got worse, 2 bad usage.\n"
-		"See incise-bench(1).",
-};
+/* --- not declared yet --- */
 
-struct job {
-	bool json, quick;
-	double seconds; /* 0: not given */
-	long seed;	/* the same */
-	const char *plot, *load, *profile, *against;
-	const char *operand; /* the first, or NULL */
-	char **operands;
-	int n_operands;
-};
-
-static void precision(const struct job *job)
+static void stability(struct bench_run *run)
 {
-	bench_precision(job->operand, job->json, job->quick, job->plot);
+	bench_stability(run->json, run->quick, run->plot);
 }
 
-static void training(const struct job *job)
-{
-	bench_training(job->json, job->quick, job->plot);
-}
-
-static void stability(const struct job *job)
-{
-	bench_stability(job->json, job->quick, job->plot);
-}
-
-static void loop(const struct job *job)
+static void loop(struct bench_run *run)
 {
 	const struct bench_loop bench = {
-		.scene = job->operand,
-		.load = job->load,
-		.seconds = job->seconds,
-		.json = job->json,
-		.quick = job->quick,
-		.plot = job->plot,
+		.scene = run->operands[0],
+		.load = run->load,
+		.seconds = run->seconds,
+		.json = run->json,
+		.quick = run->quick,
+		.plot = run->plot,
 	};
 
 	bench_loop(&bench);
 }
 
-static void vision(const struct job *job)
+static void vision(struct bench_run *run)
 {
-	bench_vision(job->json, job->quick, job->plot);
+	bench_vision(run->json, run->quick, run->plot);
 }
 
-static void capture(const struct job *job)
+static void capture(struct bench_run *run)
 {
-	bench_capture(job->operand, job->seconds, job->json, job->quick);
+	bench_capture(run->operands[0], run->seconds, run->json, run->quick);
 }
 
-static void pose(const struct job *job)
+static void pose(struct bench_run *run)
 {
-	bench_pose(job->json, job->quick, job->plot);
+	bench_pose(run->json, run->quick, run->plot);
 }
 
-static void timeline(const struct job *job)
+static void timeline(struct bench_run *run)
 {
-	bench_timeline(job->json, job->quick, job->plot);
+	bench_timeline(run->json, run->quick, run->plot);
 }
 
-static void scenes(const struct job *job)
+static void scenes(struct bench_run *run)
 {
-	if (job->profile && job->n_operands != 1)
-		cli_usage("--profile is of one scene, got %d", job->n_operands);
-	if (job->profile)
-		bench_scenes_profile(job->operand, !strcmp(job->profile, "full"));
+	if (run->profile && run->n_operands != 1)
+		cli_usage("--profile is of one scene, got %d", run->n_operands);
+	if (run->profile)
+		bench_scenes_profile(run->operands[0], !strcmp(run->profile, "full"));
 	else
-		bench_scenes(job->operands, job->n_operands, job->json, job->quick,
-			     job->plot);
+		bench_scenes(run->operands, run->n_operands, run->json, run->quick,
+			     run->plot);
 }
 
-static void extremes(const struct job *job)
+static void extremes(struct bench_run *run)
 {
-	bench_extremes(job->seed ? (uint64_t)job->seed : 1, job->json, job->quick,
-		       job->plot);
+	bench_extremes(run->seed ? (uint64_t)run->seed : 1, run->json, run->quick,
+		       run->plot);
 }
 
-/* Options that not every word takes. */
-enum { PLOT = 1, DURATION = 2, LOAD = 4, PROFILE = 8, SEED = 16 };
+static const struct bench_plot some_plot[] = {{0}};
 
-static const struct {
-	const char *word;
-	int operands, options; /* at most; of those above */
-	void (*run)(const struct job *job);
-} words[] = {
-	{"precision", 1, PLOT, precision},
-	{"training", 0, PLOT, training},
-	{"stability", 0, PLOT, stability},
-	{"loop", 1, PLOT | DURATION | LOAD, loop},
-	{"pose", 0, PLOT, pose},
-	{"timeline", 0, PLOT, timeline},
-	{"vision", 0, PLOT, vision},
-	{"capture", 1, DURATION, capture},
-	{"scenes", BENCH_SCENES_MOST, PLOT | PROFILE, scenes},
-	{"extremes", 0, PLOT | SEED, extremes},
+static const struct bench
+	old_stability =
+		{.name = "stability",
+		 .summary = "how stiff a virtual wall may be, simulated and computed;\n"
+			    "the guard of passivity; integrators of a stiff spring",
+		 .plots = some_plot,
+		 .all = stability},
+	old_loop = {.name = "loop",
+		    .operands = "[SCENE]",
+		    .summary =
+			    "cost of a tick; how late the machine wakes the loop, idle\n"
+			    "and under loads, beside cyclictest; error over its rate",
+		    .n_operands = 1,
+		    .takes_duration = true,
+		    .takes_load = true,
+		    .plots = some_plot,
+		    .all = loop},
+	old_pose = {.name = "pose",
+		    .summary =
+			    "error of the pose over the tracker's rate, delay and cost",
+		    .plots = some_plot,
+		    .all = pose},
+	old_timeline =
+		{.name = "timeline",
+		 .summary = "error of times of samples that come late, by a clock that\n"
+			    "drifts, over how much was seen and the cost",
+		 .plots = some_plot,
+		 .all = timeline},
+	old_vision = {.name = "vision",
+		      .summary = "error of the exposed length over the time per picture",
+		      .plots = some_plot,
+		      .all = vision},
+	old_capture = {.name = "capture",
+		       .operands = "[RUN]",
+		       .summary = "how much of a core it takes to record all streams",
+		       .n_operands = 1,
+		       .takes_duration = true,
+		       .all = capture},
+	old_scenes = {.name = "scenes",
+		      .operands = "[SCENE...]",
+		      .summary = "what each scene leaves out, and what that saves",
+		      .n_operands = BENCH_SCENES_MOST,
+		      .takes_profile = true,
+		      .plots = some_plot,
+		      .all = scenes},
+	old_extremes = {
+		.name = "extremes",
+		.summary = "numbers and bytes that nobody should send, at each door of\n"
+			   "the library; walls of 10 N/m to 1 GN/m",
+		.takes_seed = true,
+		.plots = some_plot,
+		.all = extremes};
+
+static const struct bench *const benches[] = {
+	&bench_precision, &bench_training, &old_stability, &old_loop,	&old_pose,
+	&old_timeline,	  &old_vision,	   &old_capture,   &old_scenes, &old_extremes,
 };
-#define WORDS (int)(sizeof(words) / sizeof(*words))
+#define BENCHES (int)(sizeof(benches) / sizeof(*benches))
 
-static int compare(const struct job *job, int argc, char **argv)
+/* --- help --- */
+
+/* "  loop [SCENE]           ", and further lines below the summary. */
+static void add_summary(char *text, const char *name, const char *operands,
+			const char *summary)
+{
+	char title[40];
+
+	snprintf(title, sizeof(title), "%s%s%s", name, *operands ? " " : "", operands);
+	for (const char *line = summary; line; line = strchr(line, '\n')) {
+		line += *line == '\n';
+		sprintf(text + strlen(text), "  %-22s %.*s\n",
+			line == summary ? title : "", (int)strcspn(line, "\n"), line);
+	}
+}
+
+static const struct cli_command *help(void)
+{
+	static char synopsis[400], summary[4000];
+	static struct cli_command command = {
+		.name = "bench",
+		.synopsis = synopsis,
+		.summary = summary,
+		.options = options,
+		.notes =
+			"Exit: 0 measured, 1 failed, simulation and theory or the forces of two ways differ,\n"
+			"or figures got worse, 2 bad usage.\n"
+			"See incise-bench(1).",
+	};
+
+	strcpy(summary,
+	       "Measure error against run time, and what is stable; tables, JSON, pictures.\n");
+	for (int i = 0; i < BENCHES; i++) {
+		const char *operands = benches[i]->operands ? benches[i]->operands : "";
+
+		sprintf(synopsis + strlen(synopsis), "%s%s%s | ", benches[i]->name,
+			*operands ? " " : "", operands);
+		add_summary(summary, benches[i]->name, operands, benches[i]->summary);
+	}
+	strcat(synopsis, "view [SCENE] | all | compare OLD.json NEW.json [OPTIONS]");
+	add_summary(summary, "view", "[SCENE]",
+		    "the picture of a scene: see 'incise bench view --help'");
+	add_summary(summary, "all", "",
+		    "all of these, and one report: see 'incise bench all --help'");
+	strcat(summary,
+	       "compare says what changed beyond noise between two reports of --json.");
+	return &command;
+}
+
+/* --- the command line --- */
+
+static _Noreturn void compare(const struct bench_run *run, int argc, char **argv)
 {
 	struct incise_error err = {0};
 	json_t *reports[2], *comparison = NULL;
 
 	if (argc != 3)
 		cli_usage("expected 'compare' and two reports");
-	if (job->plot || job->load || job->profile || job->against || job->quick ||
-	    job->seed || job->seconds > 0)
+	if (run->plot || run->load || run->profile || run->against || run->quick ||
+	    run->seed || run->seconds > 0)
 		cli_usage("'compare' takes no option but --json");
 	for (int i = 0; i < 2; i++) {
 		reports[i] = json_read(argv[1 + i], &err);
@@ -199,29 +240,31 @@ static int compare(const struct job *job, int argc, char **argv)
 		cli_fail_with(&err);
 	json_decref(reports[0]);
 	json_decref(reports[1]);
-	compare_finish(comparison, job->json);
-	return 0;
+	compare_finish(comparison, run->json);
+	exit(0);
 }
 
-/* An option that was given goes with the word, or is bad usage. */
-static void allow(int what, bool given, int option, const char *name)
+/* An option that was given goes with the benchmark, or is bad usage. */
+static void allow(const struct bench *bench, bool given, bool taken, const char *name)
 {
-	if (given && !(words[what].options & option))
-		cli_usage("--%s does not go with '%s'", name, words[what].word);
+	if (given && !taken)
+		cli_usage("--%s does not go with '%s'", name, bench->name);
 }
 
-static int word_of(int argc, char **argv)
+static const struct bench *bench_of(int argc, char **argv)
 {
 	if (argc < 1)
 		cli_usage("expected what to measure, such as 'precision'");
-	for (int i = 0; i < WORDS; i++) {
-		if (strcmp(argv[0], words[i].word))
+	for (int i = 0; i < BENCHES; i++) {
+		const struct bench *bench = benches[i];
+
+		if (strcmp(argv[0], bench->name))
 			continue;
-		if (argc - 1 > words[i].operands)
-			cli_usage("'%s' takes at most %d operand%s, got %d",
-				  words[i].word, words[i].operands,
-				  words[i].operands == 1 ? "" : "s", argc - 1);
-		return i;
+		if (argc - 1 > bench->n_operands)
+			cli_usage("'%s' takes at most %d operand%s, got %d", bench->name,
+				  bench->n_operands, bench->n_operands == 1 ? "" : "s",
+				  argc - 1);
+		return bench;
 	}
 	if (!strcmp(argv[0], "view") || !strcmp(argv[0], "all"))
 		cli_usage("'%s' stands right behind 'incise bench'%s", argv[0],
@@ -231,67 +274,70 @@ static int word_of(int argc, char **argv)
 	cli_usage("'%s' is nothing that can be measured", argv[0]);
 }
 
-static void parse(struct job *job, int argc, char **argv)
+static void parse(struct bench_run *run, int argc, char **argv)
 {
+	const struct cli_command *command = help();
 	int opt;
 
-	*job = (struct job){0};
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
+	while ((opt = cli_next(command, argc, argv)) != CLI_END)
 		switch (opt) {
 		case OPT_JSON:
-			job->json = true;
+			run->json = true;
 			break;
 		case OPT_PLOT:
-			job->plot = optarg;
+			run->plot = optarg;
 			break;
 		case OPT_DURATION:
-			job->seconds = cli_duration("duration", optarg, 1, 86400);
+			run->seconds = cli_duration("duration", optarg, 1, 86400);
 			break;
 		case OPT_LOAD:
-			job->load = optarg;
+			run->load = optarg;
 			break;
 		case OPT_PROFILE:
-			job->profile = optarg;
+			run->profile = optarg;
 			if (strcmp(optarg, "needed") && strcmp(optarg, "full"))
 				cli_usage("--profile: '%s' is neither needed nor full",
 					  optarg);
 			break;
 		case OPT_SEED:
-			job->seed = cli_integer("seed", optarg, 1, LONG_MAX);
+			run->seed = cli_integer("seed", optarg, 1, LONG_MAX);
 			break;
 		case OPT_QUICK:
-			job->quick = true;
+			run->quick = true;
 			break;
 		case OPT_AGAINST:
-			job->against = optarg;
+			run->against = optarg;
 			break;
 		}
 }
 
 int main(int argc, char **argv)
 {
-	struct job job;
-	int what;
+	static struct bench_run run;
+	const struct bench *bench;
 
-	parse(&job, argc, argv);
+	parse(&run, argc, argv);
 	argc -= optind;
 	argv += optind;
 	if (argc && !strcmp(argv[0], "compare"))
-		return compare(&job, argc, argv);
-	what = word_of(argc, argv);
-	allow(what, job.plot, PLOT, "plot");
-	allow(what, job.seconds > 0, DURATION, "duration");
-	allow(what, job.load, LOAD, "load");
-	allow(what, job.profile, PROFILE, "profile");
-	allow(what, job.seed, SEED, "seed");
-	job.operands = argv + 1;
-	job.n_operands = argc - 1;
-	job.operand = argc > 1 ? argv[1] : NULL;
-	if (job.against) {
-		compare_against(job.against, job.json);
-		job.json = true;
+		compare(&run, argc, argv);
+	run.bench = bench = bench_of(argc, argv);
+	allow(bench, run.plot, bench->plots, "plot");
+	allow(bench, run.seconds > 0, bench->takes_duration, "duration");
+	allow(bench, run.load, bench->takes_load, "load");
+	allow(bench, run.profile, bench->takes_profile, "profile");
+	allow(bench, run.seed, bench->takes_seed, "seed");
+	run.operands = argv + 1;
+	run.n_operands = argc - 1;
+	if (run.against) {
+		compare_against(run.against, run.json);
+		run.json = true;
 	}
-	words[what].run(&job);
+	if (!bench->all) {
+		bench_measure(&run);
+		return 0;
+	}
+	bench->all(&run);
 	cli_finish();
 	return 0;
 }

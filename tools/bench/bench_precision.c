@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Error against run time of a model's arithmetics; see bench_precision.h.
+ * incise bench precision: error against run time of the evaluators of one model, the plainest
+ * and another project's among them, over the same points.
  */
+#include <dlfcn.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
-#include "arithmetics.h"
-#include "bench_precision.h"
+#include "bench.h"
 #include "../cli/cli.h"
-#include "metrics.h"
-#include "harness.h"
 #include "../cli/json.h"
-#include "machine.h"
-#include "../cli/plot.h"
+#include "noise.h"
+#include "reference.h"
 
 /* Points for the errors. Times are of the first of them, so few that inputs and outputs
  * stay in the cache and the arithmetic is what is measured. */
@@ -23,36 +24,447 @@
 #define TIMED_POINTS 2000
 #define REPEATS 101
 #define QUICK_REPEATS 5
+#define ROWS_MAX 32
 
-/* Of one arithmetic: time per evaluation, errors in the output's unit. */
-struct measured {
-	struct harness_time time;
-	double max_error, rms_error, bound;
+/* At random over the model's support, an evaluation's inputs side by side, in the form that
+ * each evaluator takes; and buffers for the answers. */
+struct points {
+	size_t n;
+	int n_inputs;
+	double *x, *y;
+	float *x_float, *y_float;
+	int32_t *x_fixed, *y_fixed;
+	double *truth; /* eq. (3) in long double */
 };
 
-struct bench {
-	struct arithmetics all;
-	struct points points;
-	struct measured figures[ARITHMETICS_MAX];
-	struct machine machine;
-	int repeats;
-	bool quick;
+static const char floating[] = "floating point", direct[] = "fixed, direct",
+		  table[] = "fixed, tables of weights", force[] = "fixed, force table",
+		  batch[] = "batch", other[] = "fuzzylite";
+
+struct row {
+	char name[32];
+	const char *kind;
+	char failed[600]; /* why it cannot be measured, or is wrong; else empty */
+
+	/* Evaluate all points, leaving the answers in the form of its own. */
+	void (*run)(const struct row *row, const struct points *points);
+	const void *context;
+	const struct incise_fixed *fixed; /* whose bound is certified, or NULL */
+	const struct points *timed;
+
+	struct harness_time time; /* of an evaluation */
+	double max_error, rms_error, bound, times_reference;
+	int size_bytes;
+	bool is_reference;
 };
+
+struct evaluators {
+	struct row row[ROWS_MAX];
+	int n;
+	const char *reference_version; /* of fuzzylite, or NULL */
+};
+
+/* --- the model as plain numbers, for evaluators outside the library --- */
+
+#define INPUTS INCISE_FIXED_INPUTS_MAX
+#define MFS INCISE_FIXED_MFS_MAX
+#define RULES INCISE_FIXED_RULES_MAX
+
+struct plain {
+	int n_inputs, n_rules, n_mfs[INPUTS];
+	double centre[INPUTS][MFS], width[INPUTS][MFS];
+	int mf[RULES][INPUTS];
+	double p[RULES][INPUTS + 1];
+};
+
+/* The model has a fixed-point form: a grid of Gaussians, last input fastest. */
+static struct plain *plain_new(const struct incise_model *model)
+{
+	struct plain *m = bench_alloc(1, sizeof(*m));
+
+	m->n_inputs = incise_model_n_inputs(model);
+	m->n_rules = incise_model_n_rules(model);
+	for (int i = 0; i < m->n_inputs; i++) {
+		m->n_mfs[i] = incise_model_n_mfs(model, i);
+		for (int k = 0; k < m->n_mfs[i]; k++) {
+			const struct incise_mf *mf = incise_model_mf(model, i, k);
+
+			m->width[i][k] = mf->p[0];
+			m->centre[i][k] = mf->p[1];
+		}
+	}
+	for (int r = 0; r < m->n_rules; r++) {
+		for (int i = 0; i < m->n_inputs; i++)
+			m->mf[r][i] = incise_model_rule_mf(model, r, i);
+		memcpy(m->p[r], incise_model_consequent(model, r),
+		       (m->n_inputs + 1) * sizeof(double));
+	}
+	return m;
+}
+
+#define REAL double
+#define EXP exp
+#define NAME(x) x##_double
+#include "separable.inc"
+#undef REAL
+#undef EXP
+#undef NAME
+
+#define REAL float
+#define EXP expf
+#define NAME(x) x##_float
+#include "separable.inc"
+
+/* Eq. (3) in long double, and apart from the library: the truth. The largest exponent is
+ * taken off all, without which narrow functions would leave 0/0. */
+static double true_output(const struct plain *m, const double *x)
+{
+	long double exponent[RULES], largest = -HUGE_VALL, sum = 0, weights = 0;
+
+	for (int r = 0; r < m->n_rules; r++) {
+		exponent[r] = 0;
+		for (int i = 0; i < m->n_inputs; i++) {
+			int k = m->mf[r][i];
+			long double z =
+				(x[i] - (long double)m->centre[i][k]) / m->width[i][k];
+
+			exponent[r] -= z * z / 2;
+		}
+		largest = fmaxl(largest, exponent[r]);
+	}
+	for (int r = 0; r < m->n_rules; r++) {
+		long double y = m->p[r][0], w = expl(exponent[r] - largest);
+
+		for (int i = 0; i < m->n_inputs; i++)
+			y += (long double)m->p[r][i + 1] * x[i];
+		sum += w * y;
+		weights += w;
+	}
+	return (double)(sum / weights);
+}
+
+static void points_init(struct points *p, const struct incise_model *model, size_t n)
+{
+	struct plain *m = plain_new(model);
+	size_t values = n * m->n_inputs;
+	uint64_t seed = 1;
+
+	*p = (struct points){
+		.n = n,
+		.n_inputs = m->n_inputs,
+		.x = bench_alloc(values, sizeof(double)),
+		.y = bench_alloc(n, sizeof(double)),
+		.x_float = bench_alloc(values, sizeof(float)),
+		.y_float = bench_alloc(n, sizeof(float)),
+		.x_fixed = bench_alloc(values, sizeof(int32_t)),
+		.y_fixed = bench_alloc(n, sizeof(int32_t)),
+		.truth = bench_alloc(n, sizeof(double)),
+	};
+	for (size_t k = 0; k < values; k++) {
+		const struct incise_variable *v =
+			incise_model_input(model, (int)(k % m->n_inputs));
+
+		p->x[k] = v->min + (v->max - v->min) * lcg_uniform(&seed);
+		p->x_float[k] = (float)p->x[k];
+		p->x_fixed[k] = (int32_t)lrint(p->x[k] * INCISE_FIXED_ONE);
+	}
+	for (size_t k = 0; k < n; k++)
+		p->truth[k] = true_output(m, p->x + k * m->n_inputs);
+	free(m);
+}
+
+/* --- evaluators --- */
+
+/* Eq. (1) to (3) as they are printed: an exponential per rule and input. */
+static void run_libm(const struct row *row, const struct points *p)
+{
+	const struct plain *m = row->context;
+
+	for (size_t k = 0; k < p->n; k++) {
+		const double *x = p->x + k * m->n_inputs;
+		double sum = 0, weights = 0;
+
+		for (int r = 0; r < m->n_rules; r++) {
+			double w = 1, y = m->p[r][0];
+
+			for (int i = 0; i < m->n_inputs; i++) {
+				double z = (x[i] - m->centre[i][m->mf[r][i]]) /
+					   m->width[i][m->mf[r][i]];
+
+				w *= exp(-0.5 * z * z);
+				y += m->p[r][i + 1] * x[i];
+			}
+			sum += w * y;
+			weights += w;
+		}
+		p->y[k] = sum / weights;
+	}
+}
+
+static void run_double(const struct row *row, const struct points *p)
+{
+	for (size_t k = 0; k < p->n; k++)
+		p->y[k] = separable_eval_double(row->context, p->x + k * p->n_inputs);
+}
+
+static void run_float(const struct row *row, const struct points *p)
+{
+	for (size_t k = 0; k < p->n; k++)
+		p->y_float[k] =
+			separable_eval_float(row->context, p->x_float + k * p->n_inputs);
+}
+
+/* The library's: any kind and shape of model, any input, and its flags. */
+static void run_library(const struct row *row, const struct points *p)
+{
+	unsigned int flags;
+
+	for (size_t k = 0; k < p->n; k++)
+		p->y[k] = incise_model_eval(row->context, p->x + k * p->n_inputs, &flags);
+}
+
+static void run_fixed(const struct row *row, const struct points *p)
+{
+	const int32_t *x = p->x_fixed;
+	int32_t *y = p->y_fixed;
+	int n_inputs = p->n_inputs;
+
+	for (size_t k = 0; k < p->n; k++, x += n_inputs)
+		y[k] = incise_fixed_eval(row->context, x);
+}
+
+static void run_batch(const struct row *row, const struct points *p)
+{
+	incise_fixed_eval_batch(row->context, p->x_fixed, p->y_fixed, p->n);
+}
+
+struct opened {
+	const struct reference *reference;
+	void *handle;
+};
+
+static void run_reference(const struct row *row, const struct points *p)
+{
+	const struct opened *opened = row->context;
+
+	opened->reference->run(opened->handle, p->x, p->y, p->n);
+}
+
+/* --- the list of them --- */
+
+static struct row *add(struct evaluators *all, const char *kind,
+		       void (*run)(const struct row *, const struct points *),
+		       const void *context, const char *fmt, ...) INCISE_PRINTF(5, 6);
+static struct row *add(struct evaluators *all, const char *kind,
+		       void (*run)(const struct row *, const struct points *),
+		       const void *context, const char *fmt, ...)
+{
+	struct row *row = &all->row[all->n++];
+	va_list args;
+
+	if (all->n > ROWS_MAX)
+		abort();
+	*row = (struct row){.kind = kind, .run = run, .context = context};
+	va_start(args, fmt);
+	vsnprintf(row->name, sizeof(row->name), fmt, args);
+	va_end(args);
+	return row;
+}
+
+/* The row of a compiled model; without one it says why. */
+static struct row *add_compiled(struct evaluators *all, const char *kind,
+				const struct incise_fixed *fixed, const char *name,
+				const char *why)
+{
+	struct row *row =
+		add(all, kind, kind == batch ? run_batch : run_fixed, fixed, "%s", name);
+
+	row->fixed = fixed;
+	if (fixed)
+		row->size_bytes = (int)fixed->size;
+	else
+		snprintf(row->failed, sizeof(row->failed), "%s", why);
+	return row;
+}
+
+static const struct incise_fixed *add_fixed(struct evaluators *all,
+					    const struct incise_model *model,
+					    enum incise_fixed_arithmetic arithmetic,
+					    int cells, double budget, const char *name)
+{
+	static const char *const kinds[] = {
+		[INCISE_FIXED_DIRECT] = direct,
+		[INCISE_FIXED_TABLE] = table,
+		[INCISE_FIXED_FORCE] = force,
+	};
+	struct incise_fixed_options o = {budget, arithmetic, cells};
+	struct incise_error err = {0};
+	const struct incise_fixed *fixed = incise_fixed_compile(model, &o, &err);
+	struct row *row = add_compiled(all, kinds[arithmetic], fixed, name, err.text);
+
+	if (cells)
+		snprintf(row->name, sizeof(row->name), "%s_%d", name, cells);
+	return fixed;
+}
+
+/* Beside this program, in the build tree; it is not installed. */
+static const struct reference *load_reference(const char **why)
+{
+	const struct reference *found = NULL;
+	void *object;
+	char *path;
+
+	if (asprintf(&path, "%s/../lib/incise/peer_fuzzylite.so", cli_folder()) < 0)
+		cli_fail("no memory");
+	*why = "not built in: libfuzzylite-dev was absent";
+	if (!access(path, F_OK)) {
+		object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+		*why = object ? "no peer in its file" : dlerror();
+		found = object ? dlsym(object, "incise_reference") : NULL;
+	}
+	free(path);
+	return found;
+}
+
+static void add_reference(struct evaluators *all, const struct incise_model *model)
+{
+	static struct opened opened;
+	struct row *row = add(all, other, run_reference, &opened, "fuzzylite");
+	const char *why;
+
+	row->is_reference = true;
+	opened.reference = load_reference(&why);
+	if (!opened.reference) {
+		snprintf(row->failed, sizeof(row->failed), "%s", why);
+		return;
+	}
+	all->reference_version = opened.reference->version;
+	opened.handle = opened.reference->open(model, row->failed, sizeof(row->failed));
+}
+
+static void add_all(struct evaluators *all, const struct incise_model *model)
+{
+	static const int table_cells[] = {64, 128, 256, 512, 1024};
+	static const int force_cells[] = {32, 64, 128, 256, 512, 1024, 2048, 4096};
+	const struct incise_fixed *fixed_table, *finest = NULL, *finer;
+	struct incise_fixed_options any = {.arithmetic = -1};
+	struct incise_error err = {0};
+	struct incise_fixed *fixed;
+	struct plain *plain;
+
+	/* Without a budget only the model's kind or shape can stand against it. */
+	fixed = incise_fixed_compile(model, &any, &err);
+	if (!fixed)
+		cli_fail_with(&err);
+	incise_fixed_free(fixed);
+	plain = plain_new(model);
+	add(all, floating, run_libm, plain, "double_libm");
+	add(all, floating, run_double, separable_new_double(plain), "double_separable");
+	add(all, floating, run_library, model, "double_library");
+	add(all, floating, run_float, separable_new_float(plain), "float");
+	add_fixed(all, model, INCISE_FIXED_DIRECT, 0, 0, "fixed_direct");
+	for (size_t i = 0; i < sizeof(table_cells) / sizeof(*table_cells); i++)
+		add_fixed(all, model, INCISE_FIXED_TABLE, table_cells[i], 0,
+			  "fixed_table");
+	incise_fixed_options_init(&any);
+	fixed_table =
+		add_fixed(all, model, INCISE_FIXED_TABLE, 0, any.budget, "fixed_table");
+	/* Up to the first that does not fit; that one is listed as well. */
+	for (size_t i = 0; i < sizeof(force_cells) / sizeof(*force_cells); i++) {
+		finer = add_fixed(all, model, INCISE_FIXED_FORCE, force_cells[i], 0,
+				  "force_table");
+		if (!finer)
+			break;
+		finest = finer;
+	}
+	/* The finest that fits stands under its own name, too. */
+	add_compiled(all, force, finest, "force_table", "no size of it fits");
+	add_compiled(all, batch, fixed_table, "batch", "fixed_table failed");
+	add_compiled(all, batch, finest, "batch_force", "force_table failed");
+	add_reference(all, model);
+}
+
+/* --- measurement --- */
+
+static double answer(const struct row *row, const struct points *p, size_t k)
+{
+	if (row->fixed)
+		return p->y_fixed[k] / (double)INCISE_FIXED_ONE;
+	return row->run == run_float ? p->y_float[k] : p->y[k];
+}
+
+static void measure_error(struct row *row, const struct points *p)
+{
+	double sum = 0, largest = 0;
+
+	row->max_error = row->rms_error = row->bound = NAN;
+	if (*row->failed)
+		return;
+	row->run(row, p);
+	for (size_t k = 0; k < p->n; k++) {
+		double e = fabs(answer(row, p, k) - p->truth[k]);
+
+		/* Not fmax: a NaN must not be lost. */
+		if (!(e <= largest))
+			largest = e;
+		sum += e * e / p->n;
+	}
+	row->max_error = largest;
+	row->rms_error = sqrt(sum);
+	if (row->fixed)
+		row->bound = incise_fixed_bound(row->fixed);
+	if (largest > row->bound)
+		snprintf(row->failed, sizeof(row->failed),
+			 "its error of %.3g exceeds its certified bound of %.3g: a "
+			 "fault of incise, please report it with the model",
+			 largest, row->bound);
+	else if (!isfinite(largest))
+		snprintf(row->failed, sizeof(row->failed), "an answer is not a number");
+}
+
+static void run_timed(void *context)
+{
+	const struct row *row = context;
+
+	row->run(row, row->timed);
+}
+
+static void measure_times(struct evaluators *all, const struct points *points,
+			  int repeats)
+{
+	struct harness_variant variants[ROWS_MAX] = {{0}};
+	struct harness_time times[ROWS_MAX];
+	struct points timed = *points;
+
+	timed.n = TIMED_POINTS;
+	for (int i = 0; i < all->n; i++) {
+		all->row[i].timed = &timed;
+		variants[i] = (struct harness_variant){
+			.run = run_timed,
+			.context = &all->row[i],
+			.units = isnan(all->row[i].max_error) ? 0 : TIMED_POINTS,
+		};
+	}
+	harness_times(variants, all->n, repeats, times);
+	for (int i = 0; i < all->n; i++) {
+		/* The reference is the last one. */
+		all->row[i].time = times[i];
+		all->row[i].times_reference =
+			times[all->n - 1].ns.median / times[i].ns.median;
+	}
+}
 
 /* Paper 1's shape with a force surface of its kind. */
-static struct incise_model *own_model(void)
+static struct incise_model *own_model(struct incise_error *err)
 {
 	static const struct incise_variable in[] = {{"depth_mm", 0, 20},
 						    {"velocity_mm_s", 0, 50}};
 	static const struct incise_variable out = {"force_N", 0, 3};
 	static const int mfs[] = {5, 4};
-	struct incise_error err = {0};
 	struct incise_model *model =
-		incise_model_new_grid(2, in, mfs, INCISE_MF_GAUSS, &out, &err);
+		incise_model_new_grid(2, in, mfs, INCISE_MF_GAUSS, &out, err);
 
-	if (!model)
-		cli_fail_with(&err);
-	for (int r = 0; r < incise_model_n_rules(model); r++) {
+	for (int r = 0; model && r < incise_model_n_rules(model); r++) {
 		double d = r / 4 * 5.0, v = r % 4 * 50.0 / 3;
 		double p[] = {0.05 * d + 0.01 * v - 0.3, 0.05 + 0.002 * d,
 			      0.01 - 0.0001 * v};
@@ -62,262 +474,86 @@ static struct incise_model *own_model(void)
 	return model;
 }
 
-static void measure_errors(struct bench *b)
-{
-	for (int i = 0; i < b->all.n; i++) {
-		struct arithmetic *a = &b->all.row[i];
-		struct measured *f = &b->figures[i];
+/* --- report --- */
 
-		*f = (struct measured){.max_error = NAN, .rms_error = NAN, .bound = NAN};
-		if (*a->failed)
-			continue;
-		arithmetic_errors(a, &b->points, &f->max_error, &f->rms_error);
-		if (a->fixed)
-			f->bound = incise_fixed_bound(a->fixed);
-		if (f->max_error > f->bound)
-			snprintf(
-				a->failed, sizeof(a->failed),
-				"its error of %.3g exceeds its certified bound of %.3g: a "
-				"fault of incise, please report it with the model",
-				f->max_error, f->bound);
-		else if (!isfinite(f->max_error))
-			snprintf(a->failed, sizeof(a->failed),
-				 "an answer is not a number");
-	}
+/* The reference's time hangs on where its heap lies: of one build and model it was from 1.7
+ * to 3.5 us, by the process. */
+static bool is_ours(const void *row)
+{
+	return !((const struct row *)row)->is_reference;
 }
 
-/* What a way of the harness does. */
-struct timed {
-	const struct arithmetic *arithmetic;
-	const struct points *points;
+static bool is_timed(const void *row)
+{
+	return !isnan(((const struct row *)row)->time.ns.median);
+}
+
+static const struct bench_table rows_table = {
+	.key = "rows",
+	.row_bytes = sizeof(struct row),
+	.columns = {COLUMN(row, "name", name, "%-18s", "arithmetic"),
+		    COLUMN(row, "ns", time.ns.median, "%9.1f", "median ns"),
+		    COLUMN(row, "ns_p5", time.ns.p5, "%8.1f", "5 %"),
+		    COLUMN(row, "ns_p95", time.ns.p95, "%8.1f", "95 %"),
+		    COLUMN(row, "max_error_N", max_error, "%11.3g", "largest / N"),
+		    COLUMN(row, "rms_error_N", rms_error, "%11.3g", "rms / N"),
+		    COLUMN(row, "bound_N", bound, "%11.3g", "bound / N"),
+		    COLUMN(row, "size_bytes", size_bytes, .optional = true),
+		    COLUMN(row, "times_fuzzylite", times_reference, "%11.0f",
+			   "x fuzzylite"),
+		    COLUMN(row, "peer", is_reference), COLUMN(row, "failed", failed),
+		    COLUMN(row, "kind", kind, .data = true)},
+	.metrics = {METRIC(TIME, row, time, "ns", "{name}", is_ours),
+		    METRIC(EXACT, row, max_error, "N", "{name} largest error")},
 };
 
-static void run_timed(void *context)
+static void run(struct bench_run *run)
 {
-	const struct timed *t = context;
-
-	t->arithmetic->run(t->arithmetic, t->points);
-}
-
-static void measure_times(struct bench *b)
-{
-	struct harness_variant ways[ARITHMETICS_MAX];
-	struct timed timed[ARITHMETICS_MAX];
-	struct harness_time times[ARITHMETICS_MAX];
-	struct points points = b->points;
-
-	points.n = TIMED_POINTS;
-	for (int i = 0; i < b->all.n; i++) {
-		bool wrong = isnan(b->figures[i].max_error);
-
-		timed[i] = (struct timed){&b->all.row[i], &points};
-		ways[i] = (struct harness_variant){.run = run_timed,
-						   .context = &timed[i],
-						   .units = wrong ? 0 : TIMED_POINTS};
-	}
-	harness_times(ways, b->all.n, b->repeats, times);
-	for (int i = 0; i < b->all.n; i++)
-		b->figures[i].time = times[i];
-}
-
-/* How many times as fast as fuzzylite; NaN without it. */
-static double against_peer(const struct bench *b, int i)
-{
-	for (int k = 0; k < b->all.n; k++)
-		if (b->all.row[k].kind == ARITHMETIC_PEER)
-			return b->figures[k].time.ns.median /
-			       b->figures[i].time.ns.median;
-	return NAN;
-}
-
-/* ---- report ---- */
-
-static void print_number(const char *fmt, int width, double value)
-{
-	if (isnan(value))
-		printf(" %*s", width, "-");
-	else
-		printf(fmt, width, value);
-}
-
-static void print_table(const struct bench *b, const struct incise_model *model)
-{
-	const struct machine *m = &b->machine;
-
-	printf("model %s, %d rules; errors at %zu points, times of %d runs in turn\n"
-	       "%s; %s; vectors: %s; %s%s%s\n\n"
-	       "%-18s %9s %8s %8s %11s %11s %11s %11s\n",
-	       incise_model_name(model), incise_model_n_rules(model), b->points.n,
-	       b->repeats, m->cpu, m->kernel, m->vectors, m->compiler,
-	       *b->all.peer_version ? "; fuzzylite " : "", b->all.peer_version,
-	       "arithmetic", "median ns", "5 %", "95 %", "largest / N", "rms / N",
-	       "bound / N", "x fuzzylite");
-	for (int i = 0; i < b->all.n; i++) {
-		const struct measured *f = &b->figures[i];
-
-		printf("%-18s", b->all.row[i].name);
-		print_number(" %*.1f", 9, f->time.ns.median);
-		print_number(" %*.1f", 8, f->time.ns.p5);
-		print_number(" %*.1f", 8, f->time.ns.p95);
-		print_number(" %*.3g", 11, f->max_error);
-		print_number(" %*.3g", 11, f->rms_error);
-		print_number(" %*.3g", 11, f->bound);
-		print_number(" %*.0f", 11, against_peer(b, i));
-		putchar('\n');
-	}
-	putchar('\n');
-	for (int i = 0; i < b->all.n; i++)
-		if (*b->all.row[i].failed)
-			printf("%s: %s\n", b->all.row[i].name, b->all.row[i].failed);
-}
-
-static json_t *row_json(const struct bench *b, int i)
-{
-	const struct arithmetic *a = &b->all.row[i];
-	const struct measured *f = &b->figures[i];
-	json_t *size = a->fixed ? json_integer(a->fixed->size) : json_null();
-	json_t *failed = *a->failed ? json_string(a->failed) : json_null();
-
-	return json_pack("{ss so so so so so so so so sb so}", "name", a->name, "ns",
-			 json_number(f->time.ns.median), "ns_p5",
-			 json_number(f->time.ns.p5), "ns_p95",
-			 json_number(f->time.ns.p95), "max_error_N",
-			 json_number(f->max_error), "rms_error_N",
-			 json_number(f->rms_error), "bound_N", json_number(f->bound),
-			 "size_bytes", size, "times_fuzzylite",
-			 json_number(against_peer(b, i)), "peer",
-			 a->kind == ARITHMETIC_PEER, "failed", failed);
-}
-
-static void print_json(const struct bench *b, const struct incise_model *model)
-{
-	json_t *rows = json_array(), *figures = json_array();
-
-	for (int i = 0; i < b->all.n; i++) {
-		const char *name = b->all.row[i].name;
-
-		json_array_append_new(rows, row_json(b, i));
-		/* A peer's hangs on where its heap lies: of one build and model it was
-		 * from 1.7 to 3.5 us, by the process. */
-		if (b->all.row[i].kind != ARITHMETIC_PEER)
-			metrics_time(figures, &b->figures[i].time, "ns", "%s", name);
-		metrics_exact(figures, b->figures[i].max_error, "N", "%s largest error",
-			      name);
-	}
-	json_print(json_pack("{so si si si sb so ss? so so}", "model",
-			     json_text(incise_model_name(model)), "rules",
-			     incise_model_n_rules(model), "points", (int)b->points.n,
-			     "repeats", b->repeats, "quick", b->quick, "machine",
-			     machine_json(&b->machine), "fuzzylite_version",
-			     *b->all.peer_version ? b->all.peer_version : NULL, "rows",
-			     rows, "figures", figures));
-}
-
-/* ---- the work-precision chart ---- */
-
-/* A block per kind: name, ns, its percentiles, largest error, bound. */
-static void write_data(const struct bench *b, const char *folder, const char *name)
-{
-	char *data;
-	FILE *out;
-
-	if (asprintf(&data, "%s.dat", name) < 0)
-		cli_fail("no memory");
-	out = plot_data(folder, data);
-	free(data);
-	for (int kind = 0; kind < ARITHMETIC_KINDS; kind++) {
-		/* A block without points would shift the numbers of those behind it. */
-		fputs("none NaN NaN NaN NaN NaN\n", out);
-		for (int i = 0; i < b->all.n; i++) {
-			const struct measured *f = &b->figures[i];
-
-			if (b->all.row[i].kind != (enum arithmetic_kind)kind ||
-			    isnan(f->time.ns.median))
-				continue;
-			/* An error of 0 has no place on a logarithmic axis. */
-			fprintf(out, "%s %g %g %g %g %g\n", b->all.row[i].name,
-				f->time.ns.median, f->time.ns.p5, f->time.ns.p95,
-				fmax(f->max_error, 1e-18), f->bound);
-		}
-		fputs("\n\n", out);
-	}
-	plot_data_end(out, folder);
-}
-
-static void draw(const struct bench *b, const struct incise_model *model,
-		 const char *folder, const char *name)
-{
-	static const char *const titles[ARITHMETIC_KINDS] = {
-		"floating point",     "fixed, direct", "fixed, tables of weights",
-		"fixed, force table", "batch",	       "fuzzylite"};
-	double least = INFINITY, most = 0;
-	FILE *script;
-
-	/* With room for the last label. */
-	for (int i = 0; i < b->all.n; i++) {
-		least = fmin(least, b->figures[i].time.ns.median);
-		most = fmax(most, b->figures[i].time.ns.median);
-	}
-	write_data(b, folder, name);
-	script = plot_begin(folder, name, 1100, 800);
-	fprintf(script,
-		"set title \"Error over run time, %d rules\\n%s, %s\"\n"
-		"set xlabel 'time per evaluation / ns (bars: 5 to 95 %% of the runs)'\n"
-		"set ylabel 'largest error / N (thin lines: up to the certified bound)'\n"
-		"set logscale xy\nset format y '%%.0e'\nset xrange [%g:%g]\n"
-		"set yrange [*:*] extend\nset offsets 0, 0, graph 0.1, graph 0.05\n"
-		"set key outside bottom center horizontal\ndata = '%s.dat'\nplot \\\n",
-		incise_model_n_rules(model), b->machine.cpu, b->machine.kernel,
-		least / 1.5, most * 3, name);
-	for (int kind = 0; kind < ARITHMETIC_KINDS; kind++) {
-		const char *style = kind == ARITHMETIC_PEER ? "lc rgb 'black'" : "ls";
-		char number[4] = "";
-
-		if (kind != ARITHMETIC_PEER)
-			snprintf(number, sizeof(number), " %d", kind + 1);
-		fprintf(script,
-			"  data index %d using 2:5:(0):($6-$5) with vectors nohead %s%s lw 0.5, "
-			"\\\n"
-			"  '' index %d using 2:5:3:4 with xerrorbars %s%s pt 7 ps 0.8 "
-			"title '%s', \\\n"
-			"  '' index %d using 2:5:1 with labels left rotate by 25 offset 0.5,0.3 font ',8',  "
-			"\\\n",
-			kind, style, number, kind, style, number, titles[kind], kind);
-	}
-	fputs("  NaN\n", script);
-	if (!plot_draw(script, folder, name))
-		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
-}
-
-void bench_precision(const char *path, bool json, bool quick, const char *plot)
-{
-	struct bench *b = calloc(1, sizeof(*b));
-	const char *folder, *name;
+	struct evaluators *all = bench_alloc(1, sizeof(*all));
 	struct incise_error err = {0};
-	struct incise_model *model;
+	struct incise_model *model = run->n_operands
+					     ? incise_model_load(run->operands[0], &err)
+					     : own_model(&err);
+	int repeats = run->quick ? QUICK_REPEATS : REPEATS;
+	struct points points;
 
-	if (!b)
-		cli_fail("no memory");
-	if (plot)
-		plot_place("plot", plot, &folder, &name);
-	model = path ? incise_model_load(path, &err) : own_model();
 	if (!model)
 		cli_fail_with(&err);
-	b->quick = quick;
-	b->repeats = quick ? QUICK_REPEATS : REPEATS;
-	machine_init(&b->machine);
-	arithmetics_init(&b->all, model);
-	points_init(&b->points, model, quick ? TIMED_POINTS : POINTS);
-	measure_errors(b);
-	measure_times(b);
-	if (json)
-		print_json(b, model);
-	else
-		print_table(b, model);
-	cli_finish();
-	if (plot)
-		draw(b, model, folder, name);
-	/* Arithmetics and points live as long as the program. */
-	incise_model_free(model);
-	free(b);
+	add_all(all, model);
+	points_init(&points, model, run->quick ? TIMED_POINTS : POINTS);
+	for (int i = 0; i < all->n; i++)
+		measure_error(&all->row[i], &points);
+	measure_times(all, &points, repeats);
+
+	bench_value(run, "model", json_text(incise_model_name(model)));
+	bench_value(run, "rules", json_integer(incise_model_n_rules(model)));
+	bench_value(run, "points", json_integer((json_int_t)points.n));
+	bench_value(run, "repeats", json_integer(repeats));
+	bench_value(run, "fuzzylite_version", json_pack("s?", all->reference_version));
+	bench_text(run,
+		   "model %s, %d rules; errors at %zu points, times of %d runs in turn\n"
+		   "%s; %s; vectors: %s; %s%s%s\n\n",
+		   incise_model_name(model), incise_model_n_rules(model), points.n,
+		   repeats, bench_machine(run, "cpu"), bench_machine(run, "kernel"),
+		   bench_machine(run, "vectors"), bench_machine(run, "compiler"),
+		   all->reference_version ? "; fuzzylite " : "",
+		   all->reference_version ? all->reference_version : "");
+	bench_table(run, &rows_table, all->row, all->n);
 }
+
+static const struct bench_plot plots[] = {
+	{.script = text_precision_gp,
+	 .width = 1100,
+	 .height = 800,
+	 .data = {&rows_table, "kind", is_timed}},
+	{0},
+};
+
+const struct bench bench_precision = {
+	.name = "precision",
+	.operands = "[MODEL.fis]",
+	.summary = "arithmetics of a model, without MODEL of the paper's size",
+	.n_operands = 1,
+	.run = run,
+	.plots = plots,
+};

@@ -1,20 +1,25 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Error on unseen cuts over the time of training, by method; see bench_training.h.
+ * incise bench training: error on unseen cuts against the time that training takes.
+ *
+ * Data are of paper 1's size and made of a known truth: 12 cuts with 10 averaged pairs each,
+ * every cut harder or softer as a whole, with noise; unseen cuts have the exact force.
+ *
+ *   F(d, v) = (0.045 d + 0.0028 d²) (1 + 0.35 v/(v + 15)) N, d in mm, v in mm/s
  */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include <incise/train.h>
-#include "bench_training.h"
+#include "bench.h"
+#include "../cli/child.h"
 #include "../cli/cli.h"
-#include "metrics.h"
+#include "../cli/file.h"
 #include "../cli/json.h"
-#include "machine.h"
-#include "../cli/plot.h"
-#include "training_data.h"
-#include "training_peer.h"
+#include "noise.h"
 
 #define EPOCHS 80
 #define REPEATS 9
@@ -23,116 +28,221 @@
 #define QUICK_SEEDS 2
 #define ROWS_MAX 40
 
-enum kind { KIND_BASELINE, KIND_CLASSIC, KIND_DEFAULT, KIND_PEER, KINDS };
-static const char *const kind_titles[KINDS] = {"baselines", "classic ANFIS by epochs",
-					       "the default of incise", "scikit-learn"};
+/* --- data --- */
 
-/* What is learnt by a method: a model of a grid, or one of the baselines. */
-struct method {
-	char name[40];
-	enum kind kind;
-	enum { FIT_MEAN, FIT_LINEAR, FIT_KNN, FIT_MODEL, FIT_CHOSEN } fit;
-	int epochs, mfs[2];
+#define DEPTH_mm 20
+#define SPEED_mm_s 50
+#define PAIRS 120
+#define PER_CUT 10
+#define HARDER 0.05  /* sd of a cut's factor */
+#define NOISE_N 0.02 /* sd of a pair */
+#define UNSEEN_CUTS 20
+#define UNSEEN 1200
+
+struct data {
+	double row[PAIRS][3]; /* depth_mm, velocity_mm_s, force_N */
+	int group[PAIRS];     /* its cut */
 };
+
+static double truth_N(double depth_mm, double speed_mm_s)
+{
+	return depth_mm * (0.045 + 0.0028 * depth_mm) *
+	       (1 + 0.35 * speed_mm_s / (speed_mm_s + 15));
+}
+
+/* Near enough to a normal distribution, of sd 1. */
+static double spread(uint64_t *state)
+{
+	double sum = -6;
+
+	for (int i = 0; i < 12; i++)
+		sum += lcg_uniform(state);
+	return sum;
+}
+
+static void make_data(struct data *data, uint64_t seed)
+{
+	uint64_t state = seed * 0x9e3779b97f4a7c15;
+	double harder = 1;
+
+	for (int i = 0; i < PAIRS; i++) {
+		double *row = data->row[i];
+
+		if (i % PER_CUT == 0)
+			harder = 1 + HARDER * spread(&state);
+		row[0] = DEPTH_mm * lcg_uniform(&state);
+		row[1] = SPEED_mm_s * lcg_uniform(&state);
+		row[2] = harder * truth_N(row[0], row[1]) + NOISE_N * spread(&state);
+		data->group[i] = i / PER_CUT;
+	}
+}
+
+static void make_unseen(double row[UNSEEN][3])
+{
+	const int points = UNSEEN / UNSEEN_CUTS;
+
+	for (int i = 0; i < UNSEEN; i++) {
+		double cut = (i / points + 0.5) / UNSEEN_CUTS,
+		       along = (i % points + 0.5) / points;
+
+		/* A hand sinks in a little, and is fast in the middle. */
+		row[i][0] = DEPTH_mm * (0.03 + 0.9 * cut + 0.05 * along);
+		row[i][1] = SPEED_mm_s * (0.5 - 0.48 * cos(2 * M_PI * (along + cut)));
+		row[i][2] = truth_N(row[i][0], row[i][1]);
+	}
+}
+
+/* --- rows --- */
+
+static const char baselines[] = "baselines", classic[] = "classic ANFIS by epochs",
+		  ours[] = "the default of incise", scikit_learn[] = "scikit-learn";
+
+enum fit { FIT_MEAN, FIT_LINEAR, FIT_KNN, FIT_MODEL, FIT_CHOSEN };
 
 /* Norms of the error on unseen cuts, N. */
 enum norm { NORM_RMSE, NORM_MAX, NORM_MEAN, NORMS };
 
 struct row {
-	struct method method;
+	char name[40];
+	const char *kind;
+	enum fit fit;
+	int epochs, mfs[2], rules;
+	bool is_reference;
+	const struct data *timed;
+
 	double norm[NORMS][SEEDS];
+	struct harness_spread rmse, max, mean; /* of these over the data sets */
 	struct harness_time time;
 	char failed[200];
 };
 
-struct bench {
+struct training {
 	struct row row[ROWS_MAX];
 	int n, seeds, repeats;
-	struct training_data data[SEEDS];
-	double unseen[TRAINING_UNSEEN][3];
-	struct machine machine;
+	struct data data[SEEDS];
+	double unseen[UNSEEN][3];
 };
 
-/* ---- methods ---- */
-
-static void train(const struct method *method, const struct training_data *data,
-		  struct incise_model **model)
+static struct row *add(struct training *t, struct row row)
 {
-	static const struct incise_variable in[] = {{"depth_mm", 0, 20},
-						    {"velocity_mm_s", 0, 50}};
+	if (t->n == ROWS_MAX)
+		cli_fail("training: more than %d rows", ROWS_MAX);
+	row.rules = row.mfs[0] * row.mfs[1];
+	t->row[t->n] = row;
+	return &t->row[t->n++];
+}
+
+static void add_grid(struct training *t, const char *kind, int epochs, int a, int b,
+		     const char *suffix)
+{
+	struct row row = {
+		.kind = kind, .fit = FIT_MODEL, .epochs = epochs, .mfs = {a, b}};
+
+	snprintf(row.name, sizeof(row.name), "%s%s", kind == ours ? "default" : "classic",
+		 suffix);
+	add(t, row);
+}
+
+static void add_all(struct training *t, bool quick)
+{
+	static const int epochs[] = {1, 2, 5, 10, 20, 40};
+	static const int grids[][2] = {{3, 3}, {2, 2}, {4, 3}};
+	char suffix[20];
+
+	add_grid(t, classic, EPOCHS, 5, 4, "");
+	add_grid(t, ours, EPOCHS, 5, 4, "");
+	add(t, (struct row){.name = "mean", .kind = baselines, .fit = FIT_MEAN});
+	add(t, (struct row){.name = "linear", .kind = baselines, .fit = FIT_LINEAR});
+	add(t, (struct row){.name = "knn", .kind = baselines, .fit = FIT_KNN});
+	for (size_t i = 0; i < sizeof(epochs) / sizeof(*epochs); i++) {
+		snprintf(suffix, sizeof(suffix), "_%d", epochs[i]);
+		add_grid(t, classic, epochs[i], 5, 4, suffix);
+	}
+	for (size_t i = 0; i < (quick ? 1 : sizeof(grids) / sizeof(*grids)); i++) {
+		snprintf(suffix, sizeof(suffix), "_%dx%d", grids[i][0], grids[i][1]);
+		add_grid(t, classic, EPOCHS, grids[i][0], grids[i][1], suffix);
+		add_grid(t, ours, EPOCHS, grids[i][0], grids[i][1], suffix);
+	}
+	add(t, (struct row){.name = "default_chosen",
+			    .kind = ours,
+			    .fit = FIT_CHOSEN,
+			    .epochs = EPOCHS});
+}
+
+/* --- methods --- */
+
+static struct incise_model *train(const struct row *row, const struct data *data)
+{
+	static const struct incise_variable in[] = {{"depth_mm", 0, DEPTH_mm},
+						    {"velocity_mm_s", 0, SPEED_mm_s}};
 	static const struct incise_variable out = {"force_N", 0, 3};
-	struct incise_pairs pairs = {data->row[0], TRAINING_PAIRS, 2};
+	struct incise_pairs pairs = {data->row[0], PAIRS, 2};
 	struct incise_train_options options;
-	int mfs[2] = {method->mfs[0], method->mfs[1]};
+	int mfs[2] = {row->mfs[0], row->mfs[1]};
 	struct incise_error err = {0};
+	struct incise_model *model;
 
 	incise_train_options_init(&options);
-	options.classic = method->kind == KIND_CLASSIC;
-	options.epochs = method->epochs;
+	options.classic = row->kind == classic;
+	options.epochs = row->epochs;
 	options.groups = data->group;
-	if (method->fit == FIT_CHOSEN &&
+	if (row->fit == FIT_CHOSEN &&
 	    incise_train_choose_grid(&pairs, in, INCISE_MF_GAUSS, &options, mfs, &err))
 		cli_fail_with(&err);
-	*model = incise_model_new_grid(2, in, mfs, INCISE_MF_GAUSS, &out, &err);
-	if (!*model || incise_train(*model, &pairs, NULL, &options, NULL, &err))
+	model = incise_model_new_grid(2, in, mfs, INCISE_MF_GAUSS, &out, &err);
+	if (!model || incise_train(model, &pairs, NULL, &options, NULL, &err))
 		cli_fail_with(&err);
+	return model;
 }
 
-/* A plane through the pairs: three normal equations, by Cramer's rule. */
-static void fit_linear(const struct training_data *data, double p[3])
+/* A plane through the pairs: three normal equations, which need no pivots. */
+static void fit_linear(const struct data *data, double p[3])
 {
-	double a[3][3] = {0}, b[3] = {0};
+	double m[3][4] = {{0}};
 
-	for (int i = 0; i < TRAINING_PAIRS; i++) {
-		const double x[3] = {1, data->row[i][0], data->row[i][1]};
+	for (int i = 0; i < PAIRS; i++) {
+		const double x[4] = {1, data->row[i][0], data->row[i][1],
+				     data->row[i][2]};
 
+		for (int r = 0; r < 3; r++)
+			for (int c = 0; c < 4; c++)
+				m[r][c] += x[r] * x[c];
+	}
+	for (int i = 0; i < 3; i++)
 		for (int r = 0; r < 3; r++) {
-			b[r] += x[r] * data->row[i][2];
-			for (int c = 0; c < 3; c++)
-				a[r][c] += x[r] * x[c];
-		}
-	}
-	for (int k = -1; k < 3; k++) {
-		static double whole;
-		double m[3][3], det;
+			double share = m[r][i] / m[i][i];
 
-		memcpy(m, a, sizeof(m));
-		for (int r = 0; k >= 0 && r < 3; r++)
-			m[r][k] = b[r];
-		det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-		      m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-		      m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-		if (k < 0)
-			whole = det;
-		else
-			p[k] = det / whole;
-	}
+			for (int c = i; r != i && c < 4; c++)
+				m[r][c] -= share * m[i][c];
+		}
+	for (int i = 0; i < 3; i++)
+		p[i] = m[i][3] / m[i][i];
 }
 
-static int fit_k(const struct training_data *data)
+static int fit_k(const struct data *data)
 {
-	struct incise_pairs pairs = {data->row[0], TRAINING_PAIRS, 2};
-	struct incise_baselines baselines;
+	struct incise_pairs pairs = {data->row[0], PAIRS, 2};
+	struct incise_baselines found;
 	struct incise_error err = {0};
 
-	if (incise_baselines(&pairs, data->group, &pairs, &baselines, &err))
+	if (incise_baselines(&pairs, data->group, &pairs, &found, &err))
 		cli_fail_with(&err);
-	return baselines.k;
+	return found.k;
 }
 
 /* Mean of the k nearest; both inputs are spread evenly, so their ranges are the scales. */
-static double nearest(const struct training_data *data, int k, const double *x)
+static double nearest(const struct data *data, int k, const double *x)
 {
-	bool taken[TRAINING_PAIRS] = {false};
+	bool taken[PAIRS] = {false};
 	double sum = 0;
 
 	for (int n = 0; n < k; n++) {
 		double best = INFINITY;
 		int at = 0;
 
-		for (int i = 0; i < TRAINING_PAIRS; i++) {
-			double away = hypot((x[0] - data->row[i][0]) / 20,
-					    (x[1] - data->row[i][1]) / 50);
+		for (int i = 0; i < PAIRS; i++) {
+			double away = hypot((x[0] - data->row[i][0]) / DEPTH_mm,
+					    (x[1] - data->row[i][1]) / SPEED_mm_s);
 
 			if (!taken[i] && away < best) {
 				best = away;
@@ -145,34 +255,30 @@ static double nearest(const struct training_data *data, int k, const double *x)
 	return sum / k;
 }
 
-/* What a method has learnt. */
+/* The result of a method: a model, a plane or a number of neighbours. */
 struct learnt {
 	struct incise_model *model;
-	double p[3]; /* of a plane */
+	double p[3];
 	int k;
 };
 
-static void learn(const struct method *method, const struct training_data *data,
-		  struct learnt *learnt)
+static struct learnt learn(const struct row *row, const struct data *data)
 {
-	*learnt = (struct learnt){0};
-	switch (method->fit) {
-	case FIT_MEAN:
-		for (int i = 0; i < TRAINING_PAIRS; i++)
-			learnt->p[0] += data->row[i][2] / TRAINING_PAIRS;
-		break;
-	case FIT_LINEAR:
-		fit_linear(data, learnt->p);
-		break;
-	case FIT_KNN:
-		learnt->k = fit_k(data);
-		break;
-	default:
-		train(method, data, &learnt->model);
-	}
+	struct learnt learnt = {0};
+
+	if (row->fit == FIT_MEAN)
+		for (int i = 0; i < PAIRS; i++)
+			learnt.p[0] += data->row[i][2] / PAIRS;
+	else if (row->fit == FIT_LINEAR)
+		fit_linear(data, learnt.p);
+	else if (row->fit == FIT_KNN)
+		learnt.k = fit_k(data);
+	else
+		learnt.model = train(row, data);
+	return learnt;
 }
 
-static double predict(const struct learnt *learnt, const struct training_data *data,
+static double predict(const struct learnt *learnt, const struct data *data,
 		      const double *x)
 {
 	if (learnt->model)
@@ -182,292 +288,235 @@ static double predict(const struct learnt *learnt, const struct training_data *d
 	return learnt->p[0] + learnt->p[1] * x[0] + learnt->p[2] * x[1];
 }
 
-static void measure_errors(const struct bench *b, struct row *row, int seed)
-{
-	const struct training_data *data = &b->data[seed];
-	double square = 0, sum = 0, largest = 0;
-	struct learnt learnt;
+/* --- measurement --- */
 
-	learn(&row->method, data, &learnt);
-	for (int i = 0; i < TRAINING_UNSEEN; i++) {
+static void measure_error(const struct training *t, struct row *row, int seed)
+{
+	const struct data *data = &t->data[seed];
+	struct learnt learnt = learn(row, data);
+	double square = 0, sum = 0, largest = 0;
+
+	for (int i = 0; i < UNSEEN; i++) {
 		double error =
-			fabs(predict(&learnt, data, b->unseen[i]) - b->unseen[i][2]);
+			fabs(predict(&learnt, data, t->unseen[i]) - t->unseen[i][2]);
 
 		square += error * error;
 		sum += error;
 		largest = fmax(largest, error);
 	}
 	incise_model_free(learnt.model);
-	row->norm[NORM_RMSE][seed] = sqrt(square / TRAINING_UNSEEN);
+	row->norm[NORM_RMSE][seed] = sqrt(square / UNSEEN);
 	row->norm[NORM_MAX][seed] = largest;
-	row->norm[NORM_MEAN][seed] = sum / TRAINING_UNSEEN;
+	row->norm[NORM_MEAN][seed] = sum / UNSEEN;
 }
-
-/* ---- the rows ---- */
-
-static void add(struct bench *b, struct method method)
-{
-	if (b->n == ROWS_MAX)
-		cli_fail("training: more than %d rows", ROWS_MAX);
-	b->row[b->n++].method = method;
-}
-
-static void add_all(struct bench *b, bool quick)
-{
-	static const int epochs[] = {1, 2, 5, 10, 20, 40};
-	static const int grids[][2] = {{3, 3}, {2, 2}, {4, 3}};
-
-	add(b, (struct method){.name = "classic",
-			       .kind = KIND_CLASSIC,
-			       .fit = FIT_MODEL,
-			       .epochs = EPOCHS,
-			       .mfs = {5, 4}});
-	add(b, (struct method){.name = "default",
-			       .kind = KIND_DEFAULT,
-			       .fit = FIT_MODEL,
-			       .epochs = EPOCHS,
-			       .mfs = {5, 4}});
-	add(b, (struct method){.name = "mean", .fit = FIT_MEAN});
-	add(b, (struct method){.name = "linear", .fit = FIT_LINEAR});
-	add(b, (struct method){.name = "knn", .fit = FIT_KNN});
-	for (size_t i = 0; i < sizeof(epochs) / sizeof(*epochs); i++) {
-		struct method m = {.kind = KIND_CLASSIC,
-				   .fit = FIT_MODEL,
-				   .epochs = epochs[i],
-				   .mfs = {5, 4}};
-
-		snprintf(m.name, sizeof(m.name), "classic_%d", epochs[i]);
-		add(b, m);
-	}
-	for (size_t i = 0; i < (quick ? 1 : sizeof(grids) / sizeof(*grids)); i++)
-		for (int kind = KIND_CLASSIC; kind <= KIND_DEFAULT; kind++) {
-			struct method m = {.kind = (enum kind)kind,
-					   .fit = FIT_MODEL,
-					   .epochs = EPOCHS,
-					   .mfs = {grids[i][0], grids[i][1]}};
-
-			snprintf(m.name, sizeof(m.name), "%s_%dx%d",
-				 kind == KIND_CLASSIC ? "classic" : "default",
-				 grids[i][0], grids[i][1]);
-			add(b, m);
-		}
-	add(b, (struct method){.name = "default_chosen",
-			       .kind = KIND_DEFAULT,
-			       .fit = FIT_CHOSEN,
-			       .epochs = EPOCHS});
-}
-
-/* What a way of the harness does. */
-struct timed {
-	const struct bench *bench;
-	const struct method *method;
-};
 
 static void run_timed(void *context)
 {
-	const struct timed *t = context;
-	struct learnt learnt;
+	const struct row *row = context;
 
-	learn(t->method, &t->bench->data[0], &learnt);
-	incise_model_free(learnt.model);
+	incise_model_free(learn(row, row->timed).model);
 }
 
-static void measure(struct bench *b)
+static void measure(struct training *t)
 {
-	struct harness_variant ways[ROWS_MAX];
-	struct timed timed[ROWS_MAX];
+	struct harness_variant variants[ROWS_MAX];
 	struct harness_time times[ROWS_MAX];
 
-	for (int i = 0; i < b->n; i++) {
-		for (int s = 0; s < b->seeds; s++)
-			measure_errors(b, &b->row[i], s);
-		timed[i] = (struct timed){b, &b->row[i].method};
-		ways[i] = (struct harness_variant){
-			.run = run_timed, .context = &timed[i], .units = 1};
-		cli_progress("training: %s", b->row[i].method.name);
+	for (int i = 0; i < t->n; i++) {
+		cli_progress("training: %s", t->row[i].name);
+		for (int s = 0; s < t->seeds; s++)
+			measure_error(t, &t->row[i], s);
+		t->row[i].timed = &t->data[0];
+		variants[i] = (struct harness_variant){
+			.run = run_timed, .context = &t->row[i], .units = 1};
 	}
-	harness_times(ways, b->n, b->repeats, times);
-	for (int i = 0; i < b->n; i++)
-		b->row[i].time = times[i];
+	harness_times(variants, t->n, t->repeats, times);
+	for (int i = 0; i < t->n; i++)
+		t->row[i].time = times[i];
 }
 
-static void add_peers(struct bench *b)
+/* --- scikit-learn on the same data, in a process of its own; it is not installed --- */
+
+#define WAIT_S 120
+#define ABSENT 3 /* exit status of the script where there is no scikit-learn */
+
+static json_t *rows_json(const double (*row)[3], int n)
 {
-	struct training_peer peers[TRAINING_PEERS];
+	json_t *list = json_array();
 
-	training_peers(peers, b->data, b->seeds, b->unseen);
-	for (int p = 0; p < TRAINING_PEERS; p++) {
-		struct method m = {.kind = KIND_PEER};
-		struct row *row = &b->row[b->n];
+	for (int i = 0; i < n; i++)
+		json_array_append_new(list, json_pack("[fff]", row[i][0], row[i][1],
+						      row[i][2]));
+	return list;
+}
 
-		snprintf(m.name, sizeof(m.name), "%s", peers[p].name);
-		add(b, m);
-		snprintf(row->failed, sizeof(row->failed), "%s", peers[p].failed);
-		for (int s = 0; s < b->seeds; s++) {
-			row->norm[NORM_RMSE][s] = peers[p].rmse[s];
-			row->norm[NORM_MAX][s] = peers[p].max[s];
-			row->norm[NORM_MEAN][s] = peers[p].mean[s];
-		}
-		harness_time_of(peers[p].ns, *row->failed ? 0 : b->seeds, &row->time);
+/* Run the script by one Python; its answer, or NULL with the reason. */
+static json_t *ask(const char *python, const char *script, const char *question,
+		   char *why, size_t size)
+{
+	char *argv[] = {(char *)python, (char *)script, (char *)question, NULL};
+	struct memory_file answer = memory_file_begin("answer");
+	json_t *got = NULL;
+	int status;
+
+	if (!child_possible(python)) {
+		snprintf(why, size, "%s is not installed", python);
+	} else if (access(script, R_OK)) {
+		snprintf(why, size, "runs from the build tree only");
+	} else {
+		status = child_end(child_start(argv, fileno(answer.file), -1), WAIT_S);
+		rewind(answer.file);
+		if (WIFEXITED(status) && WEXITSTATUS(status) == ABSENT)
+			snprintf(why, size,
+				 "scikit-learn is not installed: apt-get install "
+				 "python3-sklearn");
+		else if (status)
+			snprintf(why, size, "scikit-learn failed: status %d", status);
+		else if (!(got = json_loadf(answer.file, 0, NULL)))
+			snprintf(why, size, "scikit-learn's answer is no JSON");
 	}
+	fclose(answer.file);
+	return got;
 }
 
-/* ---- report ---- */
-
-static struct harness_spread norm(const struct bench *b, const struct row *row,
-				  enum norm norm)
+/* The answer for all data sets, or NULL with the reason. */
+static json_t *ask_all(const struct training *t, char *why, size_t size)
 {
-	struct harness_spread spread;
+	/* The first in PATH may be another than the system's, which has its packages. */
+	static const char *const pythons[] = {"python3", "/usr/bin/python3"};
+	struct memory_file question = memory_file_begin("question");
+	json_t *all = json_object(), *sets = json_array(), *answer = NULL;
+	char *script;
 
-	harness_spread(row->norm[norm], *row->failed ? 0 : b->seeds, &spread);
-	return spread;
-}
-
-static void print_table(const struct bench *b)
-{
-	printf("%s\n%d pairs of 12 cuts, 20 unseen cuts whose force is exact; errors: median "
-	       "of %d data sets (5 to 95 %%), times: of %d runs in turn\n"
-	       "%-16s %6s %10s %9s %9s %10s %20s %10s %10s\n",
-	       b->machine.cpu, TRAINING_PAIRS, b->seeds, b->repeats, "method", "epochs",
-	       "median ms", "5 %", "95 %", "rmse / N", "", "largest/N", "mean |.|/N");
-	for (int i = 0; i < b->n; i++) {
-		const struct row *r = &b->row[i];
-		struct harness_spread rmse = norm(b, r, NORM_RMSE);
-		char epochs[12] = "-";
-
-		if (*r->failed) {
-			printf("%-16s %s\n", r->method.name, r->failed);
-			continue;
-		}
-		if (r->method.epochs)
-			snprintf(epochs, sizeof(epochs), "%d", r->method.epochs);
-		printf("%-16s %6s %10.3g %9.3g %9.3g %10.4f   (%.4f to %.4f) %10.4f %10.4f\n",
-		       r->method.name, epochs, r->time.ns.median * 1e-6,
-		       r->time.ns.p5 * 1e-6, r->time.ns.p95 * 1e-6, rmse.median, rmse.p5,
-		       rmse.p95, norm(b, r, NORM_MAX).median,
-		       norm(b, r, NORM_MEAN).median);
-	}
-}
-
-static json_t *row_json(const struct bench *b, const struct row *r)
-{
-	struct harness_spread rmse = norm(b, r, NORM_RMSE), max = norm(b, r, NORM_MAX);
-	bool grid = r->method.mfs[0] > 0;
-
-	return json_pack(
-		"{ss so so so so so so so so so so so so sb so}", "name", r->method.name,
-		"epochs", r->method.epochs ? json_integer(r->method.epochs) : json_null(),
-		"rules",
-		grid ? json_integer(r->method.mfs[0] * r->method.mfs[1]) : json_null(),
-		"ms", json_number(r->time.ns.median * 1e-6), "ms_min",
-		json_number(r->time.ns.p5 * 1e-6), "ms_max",
-		json_number(r->time.ns.p95 * 1e-6), "seconds",
-		json_number(r->time.ns.median * 1e-9), "rmse_unseen_N",
-		json_number(rmse.median), "rmse_unseen_N_p5", json_number(rmse.p5),
-		"rmse_unseen_N_p95", json_number(rmse.p95), "max_unseen_N",
-		json_number(max.median), "max_unseen_N_p95", json_number(max.p95),
-		"mean_abs_unseen_N", json_number(norm(b, r, NORM_MEAN).median), "peer",
-		r->method.kind == KIND_PEER, "failed",
-		*r->failed ? json_string(r->failed) : json_null());
-}
-
-static void print_json(const struct bench *b, bool quick)
-{
-	json_t *rows = json_array(), *figures = json_array();
-
-	for (int i = 0; i < b->n; i++) {
-		const struct row *r = &b->row[i];
-
-		json_array_append_new(rows, row_json(b, r));
-		/* A peer's answers are those of its version. */
-		if (r->method.kind == KIND_PEER)
-			continue;
-		metrics_time(figures, &r->time, "ms", "%s", r->method.name);
-		metrics_exact(figures, norm(b, r, NORM_RMSE).median, "N",
-			      "%s error on unseen cuts", r->method.name);
-	}
-	json_print(json_pack("{so sb si si si si so so}", "machine",
-			     machine_json(&b->machine), "quick", quick, "pairs",
-			     TRAINING_PAIRS, "epochs", EPOCHS, "repeats", b->repeats,
-			     "seeds", b->seeds, "rows", rows, "figures", figures));
-}
-
-/* ---- the work-precision chart ---- */
-
-static void draw(const struct bench *b, const char *folder, const char *name)
-{
-	double fast = INFINITY, slow = 0;
-	char *data;
-	FILE *out;
-
-	for (int i = 0; i < b->n; i++) {
-		fast = fmin(fast, b->row[i].time.ns.median * 1e-9);
-		slow = fmax(slow, b->row[i].time.ns.median * 1e-9);
-	}
-	if (asprintf(&data, "%s.dat", name) < 0)
+	for (int s = 0; s < t->seeds; s++)
+		json_array_append_new(sets, rows_json(t->data[s].row, PAIRS));
+	json_object_set_new(all, "train", sets);
+	json_object_set_new(all, "unseen", rows_json(t->unseen, UNSEEN));
+	if (asprintf(&script, "%s/../lib/incise/peer_scikit_learn.py", cli_folder()) <
+		    0 ||
+	    json_dumpf(all, question.file, 0))
 		cli_fail("no memory");
-	out = plot_data(folder, data);
-	free(data);
-	for (int kind = 0; kind < KINDS; kind++) {
-		fputs("none NaN NaN NaN NaN\n", out);
-		for (int i = 0; i < b->n; i++) {
-			const struct row *r = &b->row[i];
-			struct harness_spread rmse = norm(b, r, NORM_RMSE);
-
-			if (r->method.kind == (enum kind)kind && !*r->failed)
-				fprintf(out, "%s %g %g %g %g\n", r->method.name,
-					r->time.ns.median * 1e-9, rmse.median, rmse.p5,
-					rmse.p95);
-		}
-		fputs("\n\n", out);
-	}
-	plot_data_end(out, folder);
-	out = plot_begin(folder, name, 1100, 800);
-	fprintf(out,
-		"set title \"Error on unseen cuts over the time of training, %d pairs\\n%s, "
-		"%s\"\nset xlabel 'time of training / s'\n"
-		"set ylabel 'rms error on unseen cuts / N (bars: 5 to 95 %% of %d data sets)'\n"
-		"set logscale xy\nset format x '%%.0e'\nset format y '%%g'\n"
-		"set yrange [*:*] extend\nset xrange [%g:%g]\n"
-		"set key outside bottom center horizontal maxcols 2\ndata = '%s.dat'\nplot \\\n",
-		TRAINING_PAIRS, b->machine.cpu, b->machine.kernel, b->seeds, fast / 2,
-		slow * 6, name);
-	for (int kind = 0; kind < KINDS; kind++)
-		fprintf(out,
-			"  data index %d using 2:3:4:5 with yerrorbars ls %d pt 7 ps 0.8 title "
-			"'%s', \\\n  '' index %d using 2:3:1 with labels left rotate by 20 "
-			"offset 0.6,0.3 font ',8' notitle, \\\n",
-			kind, kind + 1, kind_titles[kind], kind);
-	fputs("  NaN notitle\n", out);
-	if (!plot_draw(out, folder, name))
-		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", folder, name);
+	memory_file_written(&question);
+	for (size_t i = 0; i < sizeof(pythons) / sizeof(*pythons) && !answer; i++)
+		answer = ask(pythons[i], script, question.path, why, size);
+	json_decref(all);
+	free(script);
+	fclose(question.file);
+	return answer;
 }
 
-void bench_training(bool json, bool quick, const char *plot)
+static void add_references(struct training *t)
 {
-	struct bench *b = calloc(1, sizeof(*b));
-	const char *folder, *name;
+	static const char *const names[] = {"gaussian_process", "neural_network",
+					    "kernel_ridge"};
+	static const char *const norms[NORMS] = {"rmse", "max", "mean"};
+	char why[sizeof(t->row->failed)] = "";
+	json_t *answer = ask_all(t, why, sizeof(why));
 
-	if (!b)
-		cli_fail("no memory");
-	if (plot)
-		plot_place("plot", plot, &folder, &name);
-	b->seeds = quick ? QUICK_SEEDS : SEEDS;
-	b->repeats = quick ? QUICK_REPEATS : REPEATS;
-	machine_init(&b->machine);
-	for (int s = 0; s < b->seeds; s++)
-		training_data_make(&b->data[s], (uint64_t)s + 1);
-	training_data_unseen(b->unseen);
-	add_all(b, quick);
-	measure(b);
-	add_peers(b);
-	cli_progress_end();
-	if (json)
-		print_json(b, quick);
-	else
-		print_table(b);
-	cli_finish();
-	if (plot)
-		draw(b, folder, name);
-	free(b);
+	for (size_t i = 0; i < sizeof(names) / sizeof(*names); i++) {
+		struct row *row =
+			add(t, (struct row){.kind = scikit_learn, .is_reference = true});
+		double ns[SEEDS];
+
+		snprintf(row->name, sizeof(row->name), "%s", names[i]);
+		snprintf(row->failed, sizeof(row->failed), "%s", why);
+		for (int s = 0; answer && s < t->seeds; s++) {
+			const json_t *one = json_array_get(
+				json_object_get(answer, row->name), (size_t)s);
+
+			ns[s] = json_number_value(json_object_get(one, "seconds")) * 1e9;
+			for (int k = 0; k < NORMS; k++)
+				row->norm[k][s] =
+					json_number_value(json_object_get(one, norms[k]));
+			if (!(row->norm[NORM_RMSE][s] > 0))
+				snprintf(row->failed, sizeof(row->failed),
+					 "scikit-learn gave no figure");
+		}
+		harness_time_of(ns, *row->failed ? 0 : t->seeds, &row->time);
+	}
+	json_decref(answer);
 }
+
+/* --- report --- */
+
+/* A reference's answers are those of its version. */
+static bool is_ours(const void *row)
+{
+	return !((const struct row *)row)->is_reference;
+}
+
+static bool is_measured(const void *row)
+{
+	return !*((const struct row *)row)->failed;
+}
+
+static const struct bench_table rows_table = {
+	.key = "rows",
+	.row_bytes = sizeof(struct row),
+	.failed_after = 1,
+	.columns = {COLUMN(row, "name", name, "%-16s", "method"),
+		    COLUMN(row, "epochs", epochs, "%6.0f", "epochs", .optional = true),
+		    COLUMN(row, "rules", rules, .optional = true),
+		    COLUMN(row, "ms", time.ns.median, "%10.3g", "median ms", 1e-6),
+		    COLUMN(row, "ms_min", time.ns.p5, "%9.3g", "5 %", 1e-6),
+		    COLUMN(row, "ms_max", time.ns.p95, "%9.3g", "95 %", 1e-6),
+		    COLUMN(row, "seconds", time.ns.median, .scale = 1e-9),
+		    COLUMN(row, "rmse_unseen_N", rmse.median, "%10.4f", "rmse / N"),
+		    COLUMN(row, "rmse_unseen_N_p5", rmse.p5, "  (%6.4f", ""),
+		    COLUMN(row, "rmse_unseen_N_p95", rmse.p95, "to %6.4f)", ""),
+		    COLUMN(row, "max_unseen_N", max.median, "%10.4f", "largest/N"),
+		    COLUMN(row, "max_unseen_N_p95", max.p95),
+		    COLUMN(row, "mean_abs_unseen_N", mean.median, "%10.4f", "mean |.|/N"),
+		    COLUMN(row, "peer", is_reference), COLUMN(row, "failed", failed),
+		    COLUMN(row, "kind", kind, .data = true)},
+	.metrics = {METRIC(TIME, row, time, "ms", "{name}", is_ours),
+		    METRIC(EXACT, row, rmse.median, "N", "{name} error on unseen cuts",
+			   is_ours)},
+};
+
+static void run(struct bench_run *run)
+{
+	struct training *t = bench_alloc(1, sizeof(*t));
+
+	t->seeds = run->quick ? QUICK_SEEDS : SEEDS;
+	t->repeats = run->quick ? QUICK_REPEATS : REPEATS;
+	for (int s = 0; s < t->seeds; s++)
+		make_data(&t->data[s], (uint64_t)s + 1);
+	make_unseen(t->unseen);
+	add_all(t, run->quick);
+	measure(t);
+	add_references(t);
+	for (int i = 0; i < t->n; i++) {
+		struct row *row = &t->row[i];
+		int n = *row->failed ? 0 : t->seeds;
+
+		harness_spread(row->norm[NORM_RMSE], n, &row->rmse);
+		harness_spread(row->norm[NORM_MAX], n, &row->max);
+		harness_spread(row->norm[NORM_MEAN], n, &row->mean);
+	}
+	bench_value(run, "pairs", json_integer(PAIRS));
+	bench_value(run, "epochs", json_integer(EPOCHS));
+	bench_value(run, "repeats", json_integer(t->repeats));
+	bench_value(run, "seeds", json_integer(t->seeds));
+	bench_text(
+		run,
+		"%s\n%d pairs of 12 cuts, 20 unseen cuts whose force is exact; errors: median "
+		"of %d data sets (5 to 95 %%), times: of %d runs in turn\n",
+		bench_machine(run, "cpu"), PAIRS, t->seeds, t->repeats);
+	bench_table(run, &rows_table, t->row, t->n);
+}
+
+static const struct bench_plot plots[] = {
+	{.script = text_training_gp,
+	 .width = 1100,
+	 .height = 800,
+	 .data = {&rows_table, "kind", is_measured}},
+	{0},
+};
+
+const struct bench bench_training = {
+	.name = "training",
+	.summary = "error on unseen cuts over the seconds that training takes",
+	.run = run,
+	.plots = plots,
+};

@@ -36,4 +36,11 @@ static inline double noise_exponential(struct noise *noise)
 	return -log(1 - noise_uniform(noise));
 }
 
+/* 0 … 1, without 1, by Knuth's linear congruential generator. */
+static inline double lcg_uniform(uint64_t *state)
+{
+	*state = *state * 6364136223846793005u + 1442695040888963407u;
+	return (double)(*state >> 11) * 0x1p-53;
+}
+
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * fuzzylite as a peer of incise bench. The model is handed over by fuzzylite's own
+ * fuzzylite as a reference implementation for incise bench. The model is handed over by fuzzylite's own
  * interface, in double: its .fis files hold three decimals.
  */
 #include <cstdio>
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 #include <fl/Headers.h>
-#include "../peer.h"
+#include "../reference.h"
 
 namespace
 {
@@ -93,9 +93,9 @@ void *open(const incise_model *model, char *why, std::size_t size)
 	}
 }
 
-void run(void *peer, const double *x, double *y, std::size_t n)
+void run(void *handle, const double *x, double *y, std::size_t n)
 {
-	auto e = static_cast<engine *>(peer);
+	auto e = static_cast<engine *>(handle);
 
 	for (std::size_t k = 0; k < n; k++) {
 		for (auto input : e->inputs)
@@ -105,13 +105,8 @@ void run(void *peer, const double *x, double *y, std::size_t n)
 	}
 }
 
-void close(void *peer)
-{
-	delete static_cast<engine *>(peer);
-}
-
 const std::string version = fl::fuzzylite::version();
 
 } /* namespace */
 
-const struct peer incise_peer = {"fuzzylite", version.c_str(), open, run, close};
+const struct reference incise_reference = {version.c_str(), open, run};

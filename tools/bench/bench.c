@@ -1,0 +1,598 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Reports of benchmarks from their declarations; see bench.h.
+ */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "bench.h"
+#include "../cli/cli.h"
+#include "../cli/json.h"
+#include "machine.h"
+#include "../cli/plot.h"
+
+#define TEXT_BYTES 600
+
+void *bench_alloc(size_t n, size_t size)
+{
+	void *memory = calloc(n ? n : 1, size);
+
+	if (!memory)
+		cli_fail("no memory");
+	return memory;
+}
+
+/* --- members of a row --- */
+
+/* NaN where there is none, and of text. */
+static double number_of(const struct bench_column *c, const void *row)
+{
+	const char *member = (const char *)row + c->offset;
+	double value = NAN;
+
+	switch (c->type) {
+	case BENCH_NUMBER:
+		value = *(const double *)member;
+		break;
+	case BENCH_INT:
+		value = *(const int *)member;
+		break;
+	case BENCH_INT64:
+		value = (double)*(const long *)member;
+		break;
+	case BENCH_UINT64:
+		value = (double)*(const unsigned long *)member;
+		break;
+	case BENCH_BOOL:
+		value = *(const bool *)member;
+		break;
+	default:
+		break;
+	}
+	if (c->optional && value == 0)
+		return NAN;
+	return value * (c->scale != 0 ? c->scale : 1);
+}
+
+/* NULL where there is none, and of numbers. */
+static const char *text_of(const struct bench_column *c, const void *row)
+{
+	const char *member = (const char *)row + c->offset, *text = NULL;
+
+	if (c->type == BENCH_TEXT)
+		text = *(const char *const *)member;
+	else if (c->type == BENCH_CHARS)
+		text = member;
+	return text && *text ? text : NULL;
+}
+
+static json_t *json_of(const struct bench_column *c, const void *row)
+{
+	json_t *value = NULL;
+
+	switch (c->type) {
+	case BENCH_JSON:
+		value = *(json_t *const *)((const char *)row + c->offset);
+		return value ? json_incref(value) : json_null();
+	case BENCH_TEXT:
+	case BENCH_CHARS:
+		return text_of(c, row) ? json_text(text_of(c, row)) : json_null();
+	case BENCH_BOOL:
+		return json_boolean(number_of(c, row) != 0);
+	case BENCH_NUMBER:
+		return json_number(number_of(c, row));
+	default:
+		if (c->scale != 0 || isnan(number_of(c, row)))
+			return json_number(number_of(c, row));
+		return json_integer((json_int_t)number_of(c, row));
+	}
+}
+
+/* As a word: a text, or a number in a format. */
+static void word_of(const struct bench_column *c, const void *row, const char *format,
+		    char *word, size_t size)
+{
+	if (text_of(c, row))
+		snprintf(word, size, "%s", text_of(c, row));
+	else
+		snprintf(word, size, format, number_of(c, row));
+}
+
+static const struct bench_column *column_of(const struct bench_table *table,
+					    const char *key, size_t length)
+{
+	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+		if (c->key && strlen(c->key) == length && !strncmp(c->key, key, length))
+			return c;
+	cli_fail("%.*s: no such column", (int)length, key);
+}
+
+static const char *failed_of(const struct bench_table *table, const void *row)
+{
+	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+		if (c->key && !strcmp(c->key, "failed"))
+			return text_of(c, row);
+	return NULL;
+}
+
+static const void *row_at(const struct bench_table *table, const void *rows, int i)
+{
+	return (const char *)rows + (size_t)i * table->row_bytes;
+}
+
+/* --- text --- */
+
+void bench_text(const struct bench_run *run, const char *fmt, ...)
+{
+	va_list args;
+
+	if (run->json)
+		return;
+	va_start(args, fmt);
+	vprintf(fmt, args);
+	va_end(args);
+}
+
+/* "%-18s" takes 18 characters, "  (%6.3f)" ten; below 0 at the left. */
+static int width_of(const char *format)
+{
+	const char *percent = strchr(format, '%'), *end;
+	bool left = percent[1] == '-';
+	int width =
+		(int)strtol(percent + 1 + strspn(percent + 1, "-+"), (char **)&end, 10);
+
+	end += strcspn(end, "sfge");
+	width += (int)(percent - format) + (*end ? (int)strlen(end + 1) : 0);
+	return left ? -width : width;
+}
+
+static void print_cell(const struct bench_column *c, const void *row)
+{
+	double value = number_of(c, row) * (c->text_scale != 0 ? c->text_scale : 1);
+
+	if (text_of(c, row))
+		printf(c->format, text_of(c, row));
+	else if (isnan(value))
+		printf("%*s", width_of(c->format), "-");
+	else
+		printf(c->format, value);
+}
+
+static void print_headings(const struct bench_column *columns)
+{
+	for (const struct bench_column *c = columns; c->key || c->heading; c++)
+		if (c->heading)
+			printf("%s%*s", c == columns ? "" : " ", width_of(c->format),
+			       c->heading);
+	putchar('\n');
+}
+
+static void print_line(const struct bench_table *table, const void *row)
+{
+	const char *failed = table->failed_after ? failed_of(table, row) : NULL;
+	int n = 0;
+
+	for (const struct bench_column *c = table->columns; c->key || c->heading; c++) {
+		if (!c->heading)
+			continue;
+		if (failed && n == table->failed_after)
+			break;
+		fputs(n++ ? " " : "", stdout);
+		print_cell(c, row);
+	}
+	printf(failed ? " %s\n" : "\n", failed);
+}
+
+void bench_lines(const struct bench_run *run, const struct bench_table *table,
+		 const void *rows, int n)
+{
+	bool any = false;
+
+	if (run->json)
+		return;
+	print_headings(table->columns);
+	for (int i = 0; i < n; i++)
+		print_line(table, row_at(table, rows, i));
+	for (int i = 0; i < n && !table->failed_after; i++) {
+		const void *row = row_at(table, rows, i);
+
+		if (!failed_of(table, row))
+			continue;
+		printf("%s%s: %s\n", any ? "" : "\n", text_of(table->columns, row),
+		       failed_of(table, row));
+		any = true;
+	}
+}
+
+void bench_block(const struct bench_run *run, const struct bench_block *block,
+		 size_t row_bytes, const void *rows, int n, int n_across, int usual)
+{
+	const char *row = rows;
+
+	if (run->json)
+		return;
+	printf("%*s", width_of(block->line.format), block->corner);
+	for (int k = 0; k < n_across; k++) {
+		putchar(' ');
+		print_cell(&block->across, row + (size_t)k * n * row_bytes);
+	}
+	printf("%s", block->between);
+	for (const struct bench_column *c = block->columns; c->heading; c++)
+		printf(" %*s", width_of(c->format), c->heading);
+	putchar('\n');
+	for (int i = 0; i < n; i++, row += row_bytes) {
+		print_cell(&block->line, row);
+		for (int k = 0; k < n_across; k++) {
+			const char *cell = row + (size_t)k * n * row_bytes;
+			const char *failed = cell + block->failed;
+
+			putchar(' ');
+			if (*failed && !block->mark)
+				printf("%*s", width_of(block->cell.format), failed);
+			else
+				print_cell(&block->cell, cell);
+			if (block->mark)
+				putchar(*failed ? '*' : ' ');
+		}
+		if (block->columns->heading)
+			printf("%*s", (int)strlen(block->between), "");
+		for (const struct bench_column *c = block->columns; c->heading; c++) {
+			putchar(' ');
+			print_cell(c, row + (size_t)usual * n * row_bytes);
+		}
+		putchar('\n');
+	}
+}
+
+/* --- JSON and metrics --- */
+
+/* "a.b" is b of the object a, which is made where it is missing. */
+static void set(json_t *object, const char *path, json_t *value)
+{
+	const char *dot = strchr(path, '.');
+	char first[64];
+	json_t *inner;
+
+	if (!dot) {
+		json_object_set_new(object, path, value);
+		return;
+	}
+	snprintf(first, sizeof(first), "%.*s", (int)(dot - path), path);
+	inner = json_object_get(object, first);
+	if (!inner) {
+		inner = json_object();
+		json_object_set_new(object, first, inner);
+	}
+	set(inner, dot + 1, value);
+}
+
+void bench_value(struct bench_run *run, const char *key, json_t *value)
+{
+	set(run->report, key, value);
+}
+
+static json_t *row_json(const struct bench_table *table, const void *row)
+{
+	json_t *object = json_object();
+
+	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+		if (c->key && !c->data)
+			set(object, c->key, json_of(c, row));
+	return object;
+}
+
+/* "{name}, {rate_hz:%g} Hz" of a row's columns. */
+static void expand(const struct bench_table *table, const void *row, const char *template,
+		   char *text, size_t size)
+{
+	size_t n = 0;
+
+	while (*template && n + 1 < size) {
+		size_t length = strcspn(template + 1, ":}");
+		char format[16] = "%g";
+
+		if (*template != '{') {
+			text[n++] = *template ++;
+			continue;
+		}
+		if (template[1 + length] == ':')
+			sscanf(template + 2 + length, "%15[^}]", format);
+		word_of(column_of(table, template + 1, length), row, format, text + n,
+			size - n);
+		n += strlen(text + n);
+		template += strcspn(template, "}") + 1;
+	}
+	text[n] = 0;
+}
+
+static void add_metric(json_t *metrics, const struct bench_table *table,
+		       const struct bench_metric *metric, const void *row)
+{
+	const void *member = (const char *)row + metric->offset;
+	char name[METRIC_NAME_BYTES];
+	json_t *added;
+
+	expand(table, row, metric->name, name, sizeof(name));
+	if (metric->kind == METRIC_TIME)
+		added = metrics_time(metrics, member, metric->unit, "%s", name);
+	else if (metric->kind == METRIC_MEASURED)
+		added = metrics_measured(metrics, member, metric->unit, "%s", name);
+	else
+		added = metrics_exact(metrics, *(const double *)member, metric->unit,
+				      "%s", name);
+	if (metric->more_is_better)
+		metrics_more_is_better(added);
+}
+
+void bench_rows(struct bench_run *run, const struct bench_table *table, const void *rows,
+		int n)
+{
+	json_t *list = json_array();
+
+	if (run->n_rows == BENCH_TABLES)
+		cli_fail("more than %d tables", BENCH_TABLES);
+	run->rows[run->n_rows++] = (struct bench_rows){table, rows, n};
+	for (int i = 0; i < n; i++) {
+		const void *row = row_at(table, rows, i);
+
+		json_array_append_new(list, row_json(table, row));
+		for (const struct bench_metric *m = table->metrics; m->name; m++)
+			if (!m->when || m->when(row))
+				add_metric(run->metrics, table, m, row);
+	}
+	if (table->key)
+		bench_value(run, table->key, list);
+	else
+		json_decref(list);
+}
+
+void bench_table(struct bench_run *run, const struct bench_table *table, const void *rows,
+		 int n)
+{
+	bench_rows(run, table, rows, n);
+	bench_lines(run, table, rows, n);
+}
+
+/* --- plots --- */
+
+const struct bench_table bench_points = {
+	.row_bytes = sizeof(struct bench_point),
+	.columns = {COLUMN(bench_point, "block", block), COLUMN(bench_point, "x", x),
+		    COLUMN(bench_point, "y", y), COLUMN(bench_point, "z", z)},
+};
+
+/* Words in the order of their first coming. */
+struct words {
+	char (*word)[TEXT_BYTES];
+	int n;
+};
+
+static void add_word(struct words *words, const char *word)
+{
+	for (int i = 0; i < words->n; i++)
+		if (!strcmp(words->word[i], word))
+			return;
+	words->word = realloc(words->word, (size_t)(words->n + 1) * sizeof(*words->word));
+	if (!words->word)
+		cli_fail("no memory");
+	snprintf(words->word[words->n++], TEXT_BYTES, "%s", word);
+}
+
+static bool drawn(const struct bench_data *data, const void *row)
+{
+	return !data->when || data->when(row);
+}
+
+/* The value of each key of "motion,name", with spaces between them; of @only that alone. */
+static void block_of(const struct bench_data *data, const char *only, const void *row,
+		     char block[TEXT_BYTES])
+{
+	int n = 0;
+
+	for (const char *key = only ? only : data->blocks; *key;) {
+		size_t length = strcspn(key, ",");
+
+		if (n)
+			block[n++] = ' ';
+		word_of(column_of(data->table, key, length), row, "%g", block + n,
+			TEXT_BYTES - (size_t)n);
+		n += (int)strlen(block + n);
+		key += length + (key[length] == ',');
+		if (only)
+			break;
+	}
+}
+
+static const struct bench_rows *rows_of(const struct bench_run *run,
+					const struct bench_table *table)
+{
+	for (int i = 0; i < run->n_rows; i++)
+		if (run->rows[i].table == table && run->rows[i].n)
+			return &run->rows[i];
+	return NULL;
+}
+
+/* Blocks, or with a key its values. */
+static struct words words_of(const struct bench_data *data, const char *key,
+			     const struct bench_rows *rows)
+{
+	struct words words = {0};
+	char word[TEXT_BYTES];
+
+	for (int i = 0; i < rows->n; i++) {
+		const void *row = row_at(data->table, rows->rows, i);
+
+		if (!drawn(data, row))
+			continue;
+		block_of(data, key, row, word);
+		add_word(&words, word);
+	}
+	return words;
+}
+
+static void write_line(FILE *out, const struct bench_table *table, const void *row)
+{
+	char word[TEXT_BYTES];
+
+	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+		if (c->key) {
+			if (row)
+				word_of(c, row, "%.10g", word, sizeof(word));
+			fprintf(out, "%s%s", c == table->columns ? "" : "\t",
+				row ? word : c->key);
+		}
+	fputc('\n', out);
+}
+
+static void write_data(const struct bench_run *run, const char *file,
+		       const struct bench_data *data, const struct bench_rows *rows)
+{
+	struct words blocks = words_of(data, NULL, rows);
+	FILE *out = plot_data(run->folder, file);
+	char block[TEXT_BYTES];
+
+	for (int k = 0; k < blocks.n; k++) {
+		fprintf(out, "# %s\n", blocks.word[k]);
+		write_line(out, data->table, NULL);
+		for (int i = 0; i < rows->n; i++) {
+			const void *row = row_at(data->table, rows->rows, i);
+
+			if (!drawn(data, row))
+				continue;
+			block_of(data, NULL, row, block);
+			if (!strcmp(block, blocks.word[k]))
+				write_line(out, data->table, row);
+		}
+		fputs("\n\n", out);
+	}
+	plot_data_end(out, run->folder);
+	free(blocks.word);
+}
+
+static void write_words(FILE *script, const char *name, const char *key,
+			struct words words)
+{
+	fprintf(script, "%s_%s = \"", name, key);
+	for (int i = 0; i < words.n; i++)
+		fprintf(script, "%s'%s'", i ? " " : "", words.word[i]);
+	fputs("\"\n", script);
+	free(words.word);
+}
+
+/* The file and the lists of blocks as variables of a script. */
+static void write_variables(FILE *script, const char *name, const char *file,
+			    const struct bench_data *data, const struct bench_rows *rows)
+{
+	fprintf(script, "%s = '%s'\n", name, file);
+	write_words(script, name, "blocks", words_of(data, NULL, rows));
+	for (const char *key = data->blocks; *key;) {
+		size_t length = strcspn(key, ",");
+		char one[64];
+
+		snprintf(one, sizeof(one), "%.*s", (int)length, key);
+		write_words(script, name, one, words_of(data, key, rows));
+		key += length + (key[length] == ',');
+	}
+}
+
+static void write_scalars(FILE *script, const json_t *object)
+{
+	const json_t *value;
+	const char *key;
+
+	json_object_foreach((json_t *)object, key, value)
+	{
+		if (json_is_number(value))
+			fprintf(script, "%s = %.10g\n", key, json_number_value(value));
+		else if (json_is_string(value) &&
+			 !strpbrk(json_string_value(value), "\"\\`"))
+			fprintf(script, "%s = \"%s\"\n", key, json_string_value(value));
+	}
+}
+
+static int values_of(const struct bench_plot *plot, const char *key,
+		     const struct bench_rows *rows)
+{
+	struct words words = {.n = 1};
+
+	if (key)
+		words = words_of(&plot->data, key, rows);
+	free(words.word);
+	return words.n;
+}
+
+static void draw(const struct bench_run *run, const struct bench_plot *plot)
+{
+	const struct bench_rows *rows = rows_of(run, plot->data.table),
+				*more = rows_of(run, plot->more.table);
+	char name[TEXT_BYTES], file[2][TEXT_BYTES + 16];
+	FILE *script;
+
+	if (!rows)
+		return;
+	snprintf(name, sizeof(name), "%s%s%s", run->name, plot->suffix ? "-" : "",
+		 plot->suffix ? plot->suffix : "");
+	snprintf(file[0], sizeof(file[0]), "%s.dat", name);
+	snprintf(file[1], sizeof(file[1]), "%s-more.dat", name);
+	write_data(run, file[0], &plot->data, rows);
+	if (more)
+		write_data(run, file[1], &plot->more, more);
+	script = plot_begin(run->folder, name,
+			    plot->width * values_of(plot, plot->across, rows),
+			    plot->height * values_of(plot, plot->down, rows));
+	fputs("set datafile columnheaders separator tab\n", script);
+	write_scalars(script, run->machine);
+	write_scalars(script, run->report);
+	write_variables(script, "data", file[0], &plot->data, rows);
+	if (more)
+		write_variables(script, "more", file[1], &plot->more, more);
+	fputs(plot->script, script);
+	if (!plot_draw(script, run->folder, name))
+		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", run->folder, name);
+}
+
+/* --- a run --- */
+
+const char *bench_machine(const struct bench_run *run, const char *key)
+{
+	return json_string_value(json_object_get(run->machine, key));
+}
+
+void bench_fail(struct bench_run *run, const char *fmt, ...)
+{
+	va_list args;
+
+	if (*run->failed)
+		return;
+	va_start(args, fmt);
+	vsnprintf(run->failed, sizeof(run->failed), fmt, args);
+	va_end(args);
+}
+
+void bench_measure(struct bench_run *run)
+{
+	struct machine machine;
+
+	/* A name that cannot be is said before the work, not after. */
+	if (run->plot)
+		plot_place("plot", run->plot, &run->folder, &run->name);
+	machine_init(&machine);
+	run->machine = machine_json(&machine);
+	run->metrics = json_array();
+	run->report = json_pack("{sO sb}", "machine", run->machine, "quick", run->quick);
+	run->bench->run(run);
+	cli_progress_end();
+	json_object_set_new(run->report, "figures", run->metrics);
+	if (run->json)
+		json_print(json_incref(run->report));
+	cli_finish();
+	for (const struct bench_plot *p = run->bench->plots; run->plot && p && p->script;
+	     p++)
+		draw(run, p);
+	if (*run->failed)
+		cli_fail("%s", run->failed);
+	json_decref(run->report);
+	json_decref(run->machine);
+}

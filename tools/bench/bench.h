@@ -1,0 +1,223 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Benchmarks of incise bench. Each is declared by a struct bench, a measurement and tables of
+ * its rows; from these the shared code makes the text, the JSON, the metrics and the plots.
+ *
+ *   run() ─▶ rows ─▶ bench_table ─┬─▶ text table        (without --json)
+ *                                 ├─▶ JSON, metrics     (--json, compare, bench all)
+ *                                 └─▶ data, bench_plot  (--plot)
+ *
+ * Places in the report of incise bench all are in report.md, by keys of the JSON.
+ */
+#ifndef INCISE_BENCH_H
+#define INCISE_BENCH_H
+
+#include <jansson.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include "metrics.h"
+
+/* --- declaration --- */
+
+enum bench_type {
+	BENCH_NUMBER, /* double; NaN is none */
+	BENCH_INT,
+	BENCH_INT64,
+	BENCH_UINT64,
+	BENCH_BOOL,
+	BENCH_TEXT,  /* const char *; NULL and "" are none */
+	BENCH_CHARS, /* char[], the same */
+	BENCH_JSON,  /* json_t *, borrowed; NULL is none */
+};
+
+struct bench_column {
+	const char *key; /* of the JSON, "a.b" leads inwards; NULL: in the text only */
+	size_t offset;
+	enum bench_type type;
+	const char *format;  /* printf's in the text: for a string, else for a double */
+	const char *heading; /* in the text; NULL: in the JSON only */
+	double scale;	     /* of the number; 0: 1 */
+	double text_scale;   /* in the text on top of that; 0: 1 */
+	bool optional;	     /* 0 is none */
+	bool data; /* neither in the text nor in the JSON: for plots and metrics */
+};
+
+#define BENCH_MEMBER(row, member) \
+	.offset = offsetof(struct row, member),              \
+	.type = _Generic(((struct row *)NULL)->member,       \
+			double: BENCH_NUMBER,                \
+			int: BENCH_INT,                      \
+			long: BENCH_INT64,                   \
+			unsigned long: BENCH_UINT64,         \
+			bool: BENCH_BOOL,                    \
+			const char *: BENCH_TEXT,            \
+			char *: BENCH_CHARS,                 \
+			json_t *: BENCH_JSON)
+
+/* COLUMN(row, "ns_p5", time.ns.p5, "%8.1f", "5 %") of struct row. */
+#define COLUMN(row, key_, member, ...)                              \
+	{                                                           \
+		.key = key_, BENCH_MEMBER(row, member), __VA_ARGS__ \
+	}
+
+/* A metric of each row. Its name is a template of keys, "{name}, {drift_ppm:%+g} ppm". */
+struct bench_metric {
+	enum metric_kind kind;
+	size_t offset; /* struct harness_time, struct harness_spread or double */
+	const char *unit, *name;
+	bool (*when)(const void *row); /* NULL: of all rows */
+	bool more_is_better;
+};
+
+#define METRIC(kind_, row, member, ...)                                         \
+	{                                                                       \
+		.kind = METRIC_##kind_, .offset = offsetof(struct row, member), \
+		__VA_ARGS__                                                     \
+	}
+
+#define BENCH_COLUMNS 32
+#define BENCH_METRICS 8
+
+/*
+ * A column "failed" has the reason why a row failed. In the text such a row ends with it
+ * behind so many columns; with 0 the reasons stand below the table.
+ */
+struct bench_table {
+	const char *
+		key; /* of the list in the JSON, "a.b" leads inwards; NULL: it has none */
+	size_t row_bytes;
+	int failed_after;
+	struct bench_column columns[BENCH_COLUMNS];
+	struct bench_metric metrics[BENCH_METRICS];
+};
+
+/* Rows that a plot draws, in blocks by the values of keys: "motion,name". */
+struct bench_data {
+	const struct bench_table *table;
+	const char *blocks;
+	bool (*when)(const void *row); /* NULL: all rows */
+};
+
+/*
+ * A plot: a script of tools/bench/plots. It finds
+ *
+ *   data, more         file names; blocks are separated by two empty lines, each has a name
+ *                      for "index", its keys' values with spaces between them, and a line of
+ *                      keys for "using"
+ *   data_blocks        names of all blocks, as a list of words; more_blocks
+ *   data_KEY           values of each key of the blocks, as a list of words; more_KEY
+ *   NAME               each scalar of bench_value(); cpu and kernel
+ */
+struct bench_plot {
+	const char *suffix; /* the plot is NAME-suffix; NULL: NAME */
+	const char *script;
+	int width,
+		height; /* pixels; with across and down of a panel of a value of that key */
+	const char *across, *down;
+	struct bench_data data, more;
+};
+
+extern const char text_precision_gp[], text_training_gp[];
+
+struct bench_run;
+
+struct bench {
+	const char *name, *operands; /* "loop", "[SCENE]" */
+	const char *summary;	     /* in --help, one line or more */
+	int n_operands;		     /* at most */
+	bool takes_duration, takes_load, takes_profile, takes_seed;
+	void (*run)(struct bench_run *run);
+	const struct bench_plot *plots;	    /* ends with {0}; NULL: --plot is bad usage */
+	void (*all)(struct bench_run *run); /* of a benchmark that is not declared yet */
+};
+
+extern const struct bench bench_precision, bench_training;
+
+/* --- a run --- */
+
+#define BENCH_TABLES 16 /* of a report */
+
+struct bench_run {
+	const struct bench *bench;
+	bool json, quick;
+	double seconds;				     /* 0: not given */
+	long seed;				     /* the same */
+	const char *plot, *load, *profile, *against; /* NULL: not given */
+	char **operands;
+	int n_operands;
+
+	json_t *machine, *report, *metrics;
+	char failed[600];
+	const char *folder, *name; /* of plots */
+	struct bench_rows {
+		const struct bench_table *table;
+		const char *rows;
+		int n;
+	} rows[BENCH_TABLES];
+	int n_rows;
+};
+
+/* Memory of zeros; fails the program without. */
+void *bench_alloc(size_t n, size_t size);
+
+/* As of the options: begins with the machine's state. Run the benchmark, print and draw its
+ * report, and fail the program with what bench_fail() was told. */
+void bench_measure(struct bench_run *run);
+
+/* Of machine and build: "cpu", "kernel", "compiler", "vectors". */
+const char *bench_machine(const struct bench_run *run, const char *key);
+
+/* A member of the JSON; takes the value. */
+void bench_value(struct bench_run *run, const char *key, json_t *value);
+
+/* printf() of the text; nothing with --json. */
+void bench_text(const struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3);
+
+/*
+ * Report rows: as JSON and metrics, for plots, and as a text table. The rows, and what they
+ * point to, live until the end of the run.
+ */
+void bench_table(struct bench_run *run, const struct bench_table *table, const void *rows,
+		 int n);
+
+/* The same without the text, and the text alone. */
+void bench_rows(struct bench_run *run, const struct bench_table *table, const void *rows,
+		int n);
+void bench_lines(const struct bench_run *run, const struct bench_table *table,
+		 const void *rows, int n);
+
+/*
+ * A block of text with a line for each of n rows, and the same rows under n_across
+ * conditions side by side:
+ *
+ *   corner           60 Hz   120 Hz     120 Hz:  99 %  largest
+ *   held            0.1234   0.0612              0.23     0.31
+ *
+ * Rows stand condition by condition. A cell that failed is marked with '*', or without a mark
+ * holds the reason. Behind the cells stand columns of the condition @usual, @between in
+ * front of their headings.
+ */
+struct bench_block {
+	const char *corner;
+	struct bench_column line, across,
+		cell;  /* with formats of name, condition and cell */
+	size_t failed; /* the reason: a char[] */
+	bool mark;
+	const char *between;
+	struct bench_column columns[8];
+};
+void bench_block(const struct bench_run *run, const struct bench_block *block,
+		 size_t row_bytes, const void *rows, int n, int n_across, int usual);
+
+/* After the report fail the program with this line; the first one counts. */
+void bench_fail(struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3);
+
+/* Points of a plot that are no rows of the JSON. */
+struct bench_point {
+	char block[48];
+	double x, y, z;
+};
+extern const struct bench_table bench_points;
+
+#endif
