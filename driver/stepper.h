@@ -79,7 +79,7 @@ struct stepper_lines {
 	struct stepper_irq irq[STEPPER_INPUTS];
 };
 
-/* What the timer does when it fires next. */
+/* The next action of the timer. */
 enum stepper_next {
 	STEPPER_NEXT_TICK,  /* read the set-point, run the profile */
 	STEPPER_NEXT_DIR,   /* change of direction */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * What this machine can do, measured at bind, without moving anything: a hard timer
+ * The limits of this machine, measured at bind without moving anything: a hard timer
  * fires SHOTS times, and each time does what a tick and a leading edge do to the lines: it
  * reads all inputs of a motor, and writes its step line with the value that it has. A
  * config that asks for more is refused.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * What a program does with /dev/incise-stepperN; see uapi/incise_stepper.h. Whoever
+ * The file operations of /dev/incise-stepperN; see uapi/incise_stepper.h. Whoever
  * opens it for writing is the owner, others watch. After unbind every call gives ENODEV
  * and poll tells HUP; pages that are mapped stay memory.
  *
@@ -143,7 +143,7 @@ static int stepper_file_mask(struct stepper *stepper, unsigned int command, u32 
 	}
 }
 
-/* What an ioctl brings and takes, one at a time. */
+/* The arguments of the ioctls, one at a time. */
 union stepper_argument {
 	u32 mask;
 	struct incise_stepper_info info;

@@ -31,7 +31,7 @@
 /* Intervals may be 1/2^CATCH_UP shorter than the profile has them. */
 #define CATCH_UP 3
 
-/* What is due next, and when: only from the state of the motor, so that it may be asked
+/* The next action and its time: only from the state of the motor, so that it may be asked
  * for as often as one likes, after whatever has come between.
  */
 static enum stepper_next stepper_motor_plan(const struct stepper_motor *motor, s64 *due,

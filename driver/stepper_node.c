@@ -22,7 +22,7 @@ struct fwnode_handle *stepper_node_motor(struct device *dev, unsigned int motor)
 	return node;
 }
 
-/* How many motors there are, 0 … N-1 without a gap; errors are told. */
+/* The number of motors, 0 … N-1 without a gap, or a negative errno. */
 int stepper_node_count(struct device *dev)
 {
 	struct fwnode_handle *node = NULL;

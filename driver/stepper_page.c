@@ -17,7 +17,7 @@
 #include <linux/math64.h>
 #else
 #include <errno.h>
-/* What the same words mean in a program; a test has a READ_ONCE() of its own. */
+/* The same names in a program; a test has a READ_ONCE() of its own. */
 #define ARRAY_SIZE(array) (sizeof(array) / sizeof((array)[0]))
 #ifndef READ_ONCE
 #define READ_ONCE(x) __atomic_load_n(&(x), __ATOMIC_RELAXED)

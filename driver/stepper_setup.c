@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * What is set up by ioctl: enable, disable, clear, config, origin. The caller holds
+ * Set-up by ioctl: enable, disable, clear, config, origin. The caller holds
  * stepper.mutex, so that only the motor's timer and its interrupts come between.
  *
  *   DISABLED ──(enable)──▶ READY ◀──▶ MOVING

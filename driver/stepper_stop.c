@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * How a motor comes to rest when something is wrong. A fault is latched with its
+ * Stopping a motor when something is wrong. A fault is latched with its
  * cause; what it does depends on the fault:
  *
  *   at once    limit, e-stop, driver, late, line     no further step, power off

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-only */
 /*
- * What is wired to which line of which chip, as configfs was told: what
- * stepper_configfs.c fills and stepper_nodes.c makes a device of.
+ * The lines of chips that signals are wired to: stepper_configfs.c fills them in,
+ * stepper_nodes.c makes a device of them.
  */
 #ifndef INCISE_DRIVER_STEPPER_WIRES_H
 #define INCISE_DRIVER_STEPPER_WIRES_H

@@ -28,7 +28,7 @@ $(O)/obj/fuzz/%.o: %.cc
 	$(Q)$(CCACHE) $(CLANG) $(cppflags) $(CPPFLAGS) $(cxxflags) $(opencv_cflags) \
 		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
-# What a target needs beside that.
+# Further sources of a target.
 fuzz_vision_frame := lib/base/error.c lib/device/vision.c lib/device/module.c tests/vision/linked.c \
 	$(wildcard lib/vision/*.c lib/vision/*.cc)
 fuzz_libs_vision_frame := $(libs_vision_opencv)

@@ -30,7 +30,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 
 folders = $(patsubst %/,%,$(sort $(dir $(installed))))
 
-# What folders install had to make, so that uninstall removes these and no one else's, be
+# The folders that install had to make, so that uninstall removes just these, be
 # they empty: /usr/local of a fresh Debian is full of empty ones.
 made_folders = $(datadir)/incise/.folders
 

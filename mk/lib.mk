@@ -104,7 +104,7 @@ pc_tracker_tty :=
 objects_tracker_tty := $(polhemus_core) $(O)/obj/lib/device/tty.o \
 	$(patsubst %,$(O)/obj/lib/device/polhemus/%.o,polhemus_tty tracker_tty)
 
-# What looks at pictures, in C++.
+# Detection of the scalpel in frames, in C++.
 device_modules += $(if $(has_vision),vision_opencv)
 pc_vision_opencv :=
 objects_vision_opencv := $(addprefix $(O)/obj/,$(addsuffix .o,$(basename \
@@ -112,7 +112,7 @@ objects_vision_opencv := $(addprefix $(O)/obj/,$(addsuffix .o,$(basename \
 libs_vision_opencv := -lopencv_imgproc -lopencv_core -ljpeg -lstdc++
 $(objects_vision_opencv): pc_cflags = $(opencv_cflags)
 
-# What finds a board in them; more of OpenCV, which who measures depth need not map.
+# Detection of a board; it needs more of OpenCV, which a measurement of depth need not map.
 device_modules += $(if $(has_board),board_opencv)
 pc_board_opencv :=
 objects_board_opencv := $(addprefix $(O)/obj/lib/,vision/picture.o vision/jpeg.o \
@@ -133,7 +133,7 @@ pc_film_mkv := $(pc_frames_mkv)
 objects_film_mkv := $(O)/obj/lib/view/film/film_mkv.o
 $(objects_film_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_film_mkv))
 
-# What writes HDF5; libincise-record loads it.
+# Writing HDF5; libincise-record loads it.
 has_hdf5 := $(shell $(PKG_CONFIG) --exists hdf5 zlib && echo yes)
 device_modules += $(if $(has_hdf5),export_hdf5)
 pc_export_hdf5 := hdf5 zlib

@@ -12,7 +12,7 @@ can_rtsan = $(shell echo 'int main(void) { return 0; }' | \
 RTSAN_CC ?= $(firstword $(foreach name,clang-22 clang-21 clang-20 clang,\
 	$(if $(shell command -v $(name)),$(call can_rtsan,$(name)))))
 
-# What the sanitizer sees is what ran. That no function on a tick's way calls one that may
+# The sanitizer sees only code that runs. That no function on a tick's way calls one that may
 # wait, whether it runs in a test or not, the compiler shows: -Wfunction-effects.
 rtsan_flags := -fsanitize=realtime
 rtsan_warnings := -Wfunction-effects -Werror=function-effects

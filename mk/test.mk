@@ -112,7 +112,7 @@ cli-needs: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(O)/
 check-cli: cli-needs ## command-line tests of the real programs
 	+@$(MAKE) --no-print-directory cli-tests
 
-# Of what is there; the first that `check` begins.
+# Without building first; `check` starts with these.
 cli-tests:
 	@$(if $(cli_filter),echo "left out: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests of benches; make check-cli runs them; bench_all.bats runs each word once")
 	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure $(cli_filter) tests/cli tests/attack

@@ -16,7 +16,7 @@ $(O)/tests/vm/%: tests/vm/guest/%.c $(guest_shared) $(guest_headers) \
 		$(LDFLAGS) -o $@ $< $(guest_shared) $(O)/lib/libincise-tests.a \
 		$(test_libs)
 
-# What scripts in tests/vm/guest take as the liver's model.
+# The liver's model for the scripts in tests/vm/guest.
 guest_model := $(O)/tests/vm/liver.fx
 $(guest_model): scenes/liver.fis $(O)/bin/incise $(O)/bin/incise-compile
 	@mkdir -p $(@D)

@@ -55,7 +55,7 @@ static void parts_config(struct kunit *test)
 	KUNIT_EXPECT_EQ(test, stepper_page_config(&config, &info), -EINVAL);
 }
 
-/* Who reads too late finds the newest events, and a gap in seq. */
+/* A late reader finds the newest events, and a gap in seq. */
 static void parts_events(struct kunit *test)
 {
 	struct stepper *stepper = kunit_kzalloc(test, sizeof(*stepper), GFP_KERNEL);

@@ -100,7 +100,7 @@ bool sim_adc_take(struct sim_adc *adc, struct sim_conversion *conversion)
 	return some;
 }
 
-/* What the last buffer left behind is not of the next one. */
+/* Samples that the last buffer left do not belong to the next one. */
 void sim_adc_start(struct sim_adc *adc)
 {
 	unsigned long flags;

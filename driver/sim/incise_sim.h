@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: (GPL-2.0-only WITH Linux-syscall-note) OR LGPL-2.1-or-later */
 /*
- * What incise_sim.ko, the simulated GPIO chip and ADC of the tests, shares
+ * Shared by incise_sim.ko, the simulated GPIO chip and ADC of the tests,
  * with programs in user space. All of it lives in debugfs, in the folder
  * INCISE_SIM_DIR; a write that is not understood is refused with EINVAL and
  * changes nothing.

@@ -32,7 +32,7 @@ void sim_script_count_locked(struct sim *sim, unsigned int line, bool value)
 	}
 }
 
-/* What a script drives may fire the next one. Each fires once: it ends. */
+/* A script may drive a line that fires the next one. Each fires once: it ends. */
 void sim_script_fire_locked(struct sim *sim)
 {
 	while (sim->fired) {

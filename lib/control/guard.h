@@ -83,7 +83,7 @@ void incise_guard_leap(struct incise_guard *guard) INCISE_REALTIME;
  * wall made is often seen when the device has left it already; asked in contact only, the
  * guard does not hold walls that it holds otherwise (`incise bench stability` shows it).
  *
- * What is not finite is neither observed nor damped, and is left as it is.
+ * Arguments that are not finite are neither observed nor damped, and stay as they are.
  *
  * @param position_mm   of the device, the point that the force acts on
  * @param velocity_mm_s of the same
@@ -94,8 +94,8 @@ bool incise_guard_apply(struct incise_guard *guard, const double position_mm[3],
 			const double velocity_mm_s[3], double force_N[3]) INCISE_REALTIME;
 
 /*
- * What is really held from now on, after limits. Where an actuator takes some ticks, it
- * is the force that takes effect now. Without a call the last one counts as held on.
+ * Set the force that is really held from now on, after limits. Where an actuator takes some
+ * ticks, this is the force that takes effect now. Without a call the last one counts as held.
  */
 void incise_guard_sent(struct incise_guard *guard,
 		       const double force_N[3]) INCISE_REALTIME;

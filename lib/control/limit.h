@@ -22,7 +22,7 @@ struct incise_limit {
 	double last_N[3];
 };
 
-/* What held a force back, bits. */
+/* The limits that a force met, bits. */
 enum incise_limit_event {
 	INCISE_LIMIT_FORCE = 1,
 	INCISE_LIMIT_SLEW = 2,

@@ -129,7 +129,7 @@ static void run_period(const struct loop *loop, struct run *run)
 		take_pose(run, i * loop->pose_s - lead_s);
 }
 
-/* What a period makes of each state; column by column. */
+/* The effect of a period on each state, column by column. */
 static void measure(const struct loop *loop, double matrix[STATES][STATES])
 {
 	for (int column = 0; column < loop->states; column += 3) {

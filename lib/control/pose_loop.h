@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * How stiff a wall may be that is felt through a tracker: the loop of device, tracker,
- * predictor and wall as it is, extrapolation and blending with it.
+ * Largest stable stiffness of a wall felt through a tracker: the loop of device, tracker,
+ * predictor (with extrapolation and blending) and wall.
  *
  *   device ──pose, P apart──▶ latency ──▶ predict ──each tick T──▶ f = -K x - B v ──┐
  *      ▲                                                                            │

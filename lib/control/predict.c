@@ -85,7 +85,7 @@ static int64_t since(int64_t t_ns, int64_t from_ns)
 	return gone < INT64_MAX ? (int64_t)gone : INT64_MAX;
 }
 
-/* What the filter says of @t_ns: an old pose is not thrown across the room. */
+/* The filter's state at @t_ns. Extrapolation ends early: an old pose must not run away. */
 static void extrapolate(const struct incise_predict *p, int64_t t_ns, double x[3],
 			double v[3])
 {
@@ -117,7 +117,7 @@ static void turn_between(double q[4], const double from[4], const double to[4],
 		q[i] /= length;
 }
 
-/* How much is left of what was shown when the last pose arrived: 1 … 0. */
+/* Share left of the difference that was shown when the last pose arrived: 1 … 0. */
 static double left(const struct incise_predict *p, int64_t t_ns)
 {
 	double gone_s = (double)since(t_ns, p->arrival_ns) / INCISE_NS_PER_S;

@@ -23,7 +23,7 @@
 #define CMPLX(re, im) __builtin_complex((double)(re), (double)(im))
 #endif
 
-/* What a held force makes of the device in one period, unit mass and period. */
+/* The effect of a held force on the device in one period, unit mass and period. */
 struct loop {
 	double decay; /* 1 - p */
 	double a, c;  /* velocity and position for a unit force */
@@ -223,7 +223,7 @@ double incise_stability_limit(const struct incise_haptic_device *d, double dampi
 	return isfinite(kappa) ? kappa * m / (T * T) : 0;
 }
 
-/* How late the held force is on average. */
+/* Mean delay of the held force. */
 static double lag_s(const struct incise_haptic_device *d)
 {
 	return d->period_s * (0.5 + d->delay_ticks);

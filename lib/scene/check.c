@@ -30,7 +30,7 @@ static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 }
 
 /*
- * How late a force answers a pose, as the scene says, or as the tracker is: its latency
+ * Set the delay of a force behind a pose: that of the scene, or the tracker's: its latency
  * and the period for which a pose is used. The second is what the guard goes by.
  */
 static void set_delay(struct incise_plan *plan, const struct incise_tracker_info *tracker)

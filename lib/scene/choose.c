@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Which stages a scene needs, and why it does not need the others, in the order in which
- * they run: these, with the forces of forces.c before the guard. With everything kept
- * (incise_scene_set_full()) the ones that are not needed are neutral.
+ * The choice of stages that a scene needs, in the order in which they run, with a reason for
+ * each that is left out. The forces of forces.c come before the guard. With everything kept
+ * (incise_scene_set_full()) the stages that are not needed are neutral.
  */
 #include <stddef.h>
 #include "stages.h"

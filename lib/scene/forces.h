@@ -19,7 +19,7 @@
 struct incise_plan;
 struct incise_tick;
 
-/* What the first number of a force is a constant of. Springs store energy: F²/2K at most. */
+/* The meaning of a force's first number. Springs store energy: F²/2K at most. */
 enum incise_force_kind {
 	INCISE_SPRING_NORMAL, /* N/mm along the normal of the surface */
 	INCISE_SPRING_ACROSS, /* N/mm across the normal, every direction */
@@ -35,7 +35,7 @@ struct incise_force_number {
 	double skin; /* of neck.scene: what tests and benchmarks take */
 };
 
-/* What a force keeps from tick to tick, for one plan. Zeroed with the plan. */
+/* State of a force from tick to tick, in one plan. Zeroed with the plan. */
 union incise_force_state {
 	struct incise_fixed_spring
 		spring;	  /* plane in fixed point, set when contact begins */

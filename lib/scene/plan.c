@@ -200,7 +200,7 @@ static bool keeps(const struct incise_plan *plan, const char *stage)
 	return false;
 }
 
-/* What only some stages need, for those that are kept. */
+/* Allocate the parts that only some stages need, for those that are kept. */
 static int equip(struct incise_plan *plan, const struct incise_tracker_info *tracker,
 		 struct incise_error *err)
 {

@@ -118,7 +118,7 @@ bool incise_plan_faded(const struct incise_plan *plan) INCISE_REALTIME;
 const char *incise_plan_fault(const struct incise_plan *plan);
 
 /*
- * What is known of the scene's stability on this device, and whether it is stable, with
+ * Compute the scene's stability on this device, and whether it is stable, with
  * the plan's predictor.
  * Returns 0; -EDOM (not stable: the message names the largest gain), -ENOMEM.
  */

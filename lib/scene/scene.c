@@ -483,7 +483,7 @@ static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 	return rc ? rc : check_forces(scene, err);
 }
 
-/* What a scene has that its file says nothing of; incise-scene(5) gives the reasons. */
+/* Defaults; incise-scene(5) gives the reasons. */
 static void set_defaults(struct incise_scene *scene)
 {
 	scene->rate_hz = 1000;

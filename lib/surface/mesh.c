@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What a place on a mesh is: its normal, its texture coordinates, its border.
+ * Places on a mesh: normal, texture coordinates, border; searches; gliding.
  *
  * The normal on an edge is the middle of its faces', and at a corner that of the faces
  * around it weighted by their angles: with it the sign of (p - nearest) · normal tells

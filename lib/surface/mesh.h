@@ -28,7 +28,7 @@
  *         a ─────── b          seen from outside: a, b, c turn counter-clockwise
  *           EDGE+0
  *
- * Which part it is comes from signs, not from a distance to a border, and the point on an
+ * Signs decide which part it is, not a distance to a border, and the point on an
  * edge is computed from the edge's two ends only, in an order of their own. So the two
  * faces of an edge, and all faces around a corner, find the same point to the bit, and a
  * walk from face to face needs no epsilon.
@@ -184,7 +184,7 @@ struct mesh {
 	struct bvh bvh;
 };
 
-/* What a reader makes of a file. */
+/* The content of a file, as a reader returns it. */
 struct mesh_draft {
 	const char *path;
 	size_t n_points, n_triangles;

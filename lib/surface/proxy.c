@@ -31,7 +31,7 @@
 #define ON_MM 1e-9
 #define OFF_MM (2 * ON_MM)
 
-/* How often contact can end on one part of a mesh and begin on another in one tick. */
+/* Contact ends on one part of a mesh and begins on another at most so often in one tick. */
 #define PARTS_MAX 4
 
 static const double up[3] = {0, 0, 1};

@@ -31,7 +31,7 @@ static inline void surface_place(double to[3], const double place_mm[3])
 		to[i] = fmin(fmax(place_mm[i], -PLACE_MAX_MM), PLACE_MAX_MM);
 }
 
-/* What a surface is made of. */
+/* The kinds of surfaces. */
 enum incise_surface_kind {
 	INCISE_SURFACE_PLANE,
 	INCISE_SURFACE_SPHERE,
@@ -116,7 +116,7 @@ struct incise_surface *incise_surface_load_heights(const char *path,
 /* NULL is accepted. */
 void incise_surface_free(struct incise_surface *surface);
 
-/* Which kind it is. */
+/* Get the kind. */
 enum incise_surface_kind incise_surface_kind(const struct incise_surface *surface);
 
 /* Memory it holds, bytes. */

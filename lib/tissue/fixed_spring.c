@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What lib/fixed/spring.c, which has no floating point, cannot do: take a spring from
+ * Floating-point companions of lib/fixed/spring.c: take a spring from
  * double, and bound its error; see incise/fixed_spring.h.
  */
 #include <errno.h>
@@ -15,7 +15,7 @@
 /* P - P0 is held at 16384. */
 #define REACH_MAX 16383.0
 
-/* How far a direction may be from length 1. */
+/* Tolerance of a direction's length 1. */
 #define UNIT 1e-6
 
 int incise_fixed_spring_set(struct incise_fixed_spring *spring, double stiffness_N_mm,

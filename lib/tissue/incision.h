@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What the blade left in the tissue: where its cut began, along which line it runs in the
+ * The cut that the blade left in the tissue: where it began, along which line it runs in the
  * surface, and how far. An instrument put in later is easy to insert there.
  *
  *              side = Sx(0)

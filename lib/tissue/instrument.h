@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What the hand holds: blade, handle or tube, and where its end is. The scalpel can be
+ * The instrument in the hand: blade, handle or tube, and the place of its end. The scalpel can be
  * turned round: then its handle goes first.
  *
  *          blade            handle

@@ -18,7 +18,7 @@
 #define AT_ONCE 4096 /* edges that are read at a time */
 
 /*
- * How late a step may be against the profile, beyond 1/8 of a step at full speed, from which
+ * The delay that a step may have behind the profile, beyond 1/8 of a step at full speed, from which
  * on the module puts its time line off, and what a change of direction costs: what the timer
  * was late in virtual time at most (measured 10 us), and again for the edge before.
  */

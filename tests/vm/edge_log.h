@@ -43,7 +43,7 @@ struct edge_log_stop {
 	unsigned int allowed;
 };
 
-/* What a motor promises. */
+/* The timing that a motor guarantees. */
 struct edge_log_motor {
 	unsigned int step, dir, enable;	    /* lines */
 	bool step_low, dir_low, enable_low; /* active low; dir: up is low */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What a program prints for tests/vm/suite: "ok FACT" or "not ok FACT", a line per fact,
+ * Output of a program for tests/vm/suite: "ok FACT" or "not ok FACT", a line per fact,
  * and lines with # for a person.
  */
 #ifndef INCISE_VM_TAP_H

@@ -93,7 +93,7 @@ INCISE_API void incise_plan_top(const struct incise_plan *plan,
 INCISE_API const struct incise_surface *incise_plan_surface(
 	const struct incise_plan *plan);
 
-/** What is known of a plan's stability before its first tick. */
+/** A plan's stability, computed before its first tick. */
 struct incise_plan_stability {
 	/** Its delay may be above INCISE_STABILITY_DELAY_MAX where it is the tracker's. */
 	struct incise_haptic_device device;
@@ -154,7 +154,7 @@ INCISE_API int incise_plan_set_tool(struct incise_plan *plan,
 /** Longest time that a force takes to fade, ns: limits.fade_ms, and the largest force at its slew. */
 INCISE_API int64_t incise_plan_fade_ns(const struct incise_plan *plan) INCISE_REALTIME;
 
-/** What one tick came to. */
+/** The result of one tick. */
 struct incise_tick {
 	int64_t t_ns;
 	double position_mm[3]; /**< of the tip, predicted */

@@ -76,7 +76,7 @@ struct incise_scene_limits {
 /** From the blade's tip to the other end of the scalpel, mm. */
 INCISE_API double incise_scene_handle_mm(const struct incise_scene *scene);
 
-/** What tissue looks like from above. */
+/** The look of the tissue from above. */
 enum incise_skin {
 	INCISE_SKIN_PLAIN, /**< one colour */
 	INCISE_SKIN_NECK,  /**< pores, creases, veins */
@@ -96,7 +96,7 @@ struct incise_scene_picture {
 	int seed;
 };
 
-/** What it says of its picture, defaults filled in. */
+/** Get the group `picture` of the scene, with defaults filled in. */
 INCISE_API void incise_scene_picture(const struct incise_scene *scene,
 				     struct incise_scene_picture *picture);
 
@@ -107,11 +107,11 @@ struct incise_scene_scalpel {
 	double handle_mm; /**< the handle's end from the tip */
 };
 
-/** What it says of the scalpel, defaults filled in. */
+/** Get the group `tool` of the scene, with defaults filled in. */
 INCISE_API void incise_scene_scalpel(const struct incise_scene *scene,
 				     struct incise_scene_scalpel *scalpel);
 
-/** What it says of limits, defaults filled in. */
+/** Get the group `limits` of the scene, with defaults filled in. */
 INCISE_API void incise_scene_limits(const struct incise_scene *scene,
 				    struct incise_scene_limits *limits);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * How stiff a virtual wall may be: what a sampled loop makes of a spring and a damper.
+ * Largest stable stiffness of a virtual wall: a spring and a damper in a sampled loop.
  *
  *   position  x_k ──▶ f = -K x_k - B (x_k - x_{k-1})/T ──▶ delay_ticks ──▶ held for T
  *      ▲                                                                      │

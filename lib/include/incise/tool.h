@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What the hand holds, and what happens between it and the tissue.
+ * The tool in the hand, and the phases of its contact with the tissue.
  *
  *     free ──▶ cutting    with the blade
  *      ▲  ╲
@@ -10,7 +10,7 @@
 #ifndef INCISE_TOOL_H
 #define INCISE_TOOL_H
 
-/** What the hand holds. */
+/** The tool in the hand. */
 enum incise_tool {
 	INCISE_TOOL_AUTO, /**< blade or handle, whichever end of the scalpel is down */
 	INCISE_TOOL_BLADE,

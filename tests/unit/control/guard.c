@@ -169,7 +169,7 @@ static void test_a_sampled_wall_stays_bounded(void **state)
 	}
 }
 
-/* What a bounce brings is what the guard sees to have come out; f·v T sees none of it. */
+/* The guard observes all the energy that a bounce brings; f·v T observes none of it. */
 static void test_a_bounce(void **state)
 {
 	struct incise_guard guard = made(1e6);

@@ -234,7 +234,7 @@ static void test_brute_force(void **state)
 	}
 }
 
-/* What friction takes is never given back: energy only falls without a force. */
+/* Friction never gives energy back: without a force the energy only falls. */
 static void test_energy_falls(void **state)
 {
 	for (size_t i = 0; i < N(kinds); i++) {

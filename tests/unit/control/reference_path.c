@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * How far lib/control/predict.c is off, and how much its corrections move a force, on the
+ * The error of lib/control/predict.c, and the change of force that its corrections cause, on the
  * reference path and on the virtual rig.
  *
  * The reference path: a hand in one direction as a tracker sees it, mm and s.
@@ -105,7 +105,7 @@ static double bare(const struct incise_predict *p, int64_t t_ns)
 	return p->x[0] + p->v[0] * dt + p->a[0] * dt * dt / 2;
 }
 
-/* What a run at 1 kHz came to; errors rms, steps largest in one tick. */
+/* The result of a run at 1 kHz; errors rms, steps largest in one tick. */
 struct result {
 	double hold, constant_velocity, bare, shown; /* mm */
 	double velocity;			     /* mm/s */

@@ -33,7 +33,7 @@ static double limit(double delta, double beta, int delay)
 	return incise_stability_limit(&device, beta);
 }
 
-/* What one period makes of x, v and a held force, in long double. */
+/* The effect of one period on x, v and a held force, in long double. */
 struct held {
 	long double p, a, c;
 };

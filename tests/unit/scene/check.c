@@ -261,7 +261,7 @@ static void test_guard_lets_rest(void **state)
 }
 
 /*
- * What it does not do is to hold a wall that hums: without and with it the hum grows
+ * It does not hold a wall that hums: without and with it the hum grows
  * until the device leaves the wall at each swing, and stays so. 1.90 and 1.93 mm here.
  */
 static void test_guard_beyond_the_limit(void **state)

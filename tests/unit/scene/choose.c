@@ -4,7 +4,7 @@
  * stages there and the unneeded ones neutral. The ticks are bit-identical, from fewer stages
  * in no more memory, with a reason for each.
  *
- * What leaving out costs or saves cannot be timed in a test: it counts the stages that run.
+ * The time that leaving out saves cannot be tested: the test counts the stages that run.
  * `incise plan` shows their ns.
  */
 #include <stdarg.h>
@@ -147,7 +147,7 @@ static bool same(const struct incise_tick *a, const struct incise_tick *b)
 #undef SAME
 }
 
-/* What the stroke went through. */
+/* Conditions that the stroke met. */
 struct seen {
 	unsigned int flags, phases, tools;
 	int ticks_with_force;

@@ -216,7 +216,7 @@ static void check_free(struct run *run)
 }
 
 /*
- * What the guard is still owed it takes in free air, by damping: force against speed, and
+ * The guard takes energy that it is still owed in free air, by damping: force against speed, and
  * no other force.
  */
 static void wave(struct run *run, const double attitude[4])

@@ -14,7 +14,7 @@
 #define MS 1000000
 #define YEAR_NS 31557600000000000
 
-/* What must have been met for the test to mean anything. */
+/* Conditions that must have been met for the test to mean anything. */
 enum met {
 	MET_CONTACT,
 	MET_INSERTION,

@@ -163,7 +163,7 @@ static void assert_vector(const double got[3], const double want[3])
 		assert_true(fabs(got[i] - want[i]) < ROUNDING);
 }
 
-/* What the paper prints, with the signs that it prints. */
+/* The formula as the paper prints it, with its signs. */
 static void printed_fn(double f[3], double k, const double p[3], const double p0[3],
 		       const double sn[3])
 {

@@ -23,7 +23,7 @@
 #define MODELS 6     /* of them, plans with a model */
 #define TEXT_MAX 4000
 
-/* What they are made of; of the heights and the mesh there is no shipped scene. */
+/* Starting points; no shipped scene has heights or a mesh. */
 static const struct {
 	const char *name;
 	const char *shipped; /* file, or NULL: @text */

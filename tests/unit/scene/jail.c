@@ -56,7 +56,7 @@ void __wrap_free(void *old)
 	__real_free(old);
 }
 
-/* What a child tells. */
+/* The report of a child process. */
 struct told {
 	long ticks, contacts, insertions, guarded, stale, free, allocations;
 	double force_N; /* largest */

@@ -665,7 +665,7 @@ static void test_timed_tick_is_the_same(void **state)
 	fed_end(&b);
 }
 
-/* What a fault keeps from running took no time. */
+/* Stages that a fault keeps from running take no time. */
 static void test_timed_fault(void **state)
 {
 	int64_t ns[INCISE_PLAN_STAGES_MAX];

@@ -37,7 +37,7 @@
  */
 #define AT_REST_N 5e-3
 
-/* What the hand holds is the scalpel; its end that goes first is where it is said to be. */
+/* The hand holds the scalpel; the end that goes first is at the given place. */
 struct held {
 	double end[3];	/* of blade, tube or handle */
 	double about_x; /* π: turned round */
@@ -83,7 +83,7 @@ static void hand(void *own, double t_s, struct incise_tracker_sample *pose)
 		pose->position_mm[i] = h.end[i] - (h.by_handle ? HANDLE_MM * axis[i] : 0);
 }
 
-/* What holds at every tick. */
+/* Conditions that hold at every tick. */
 static void one_tick(struct theatre *th)
 {
 	struct incise_tick was = th->tick;
@@ -577,7 +577,7 @@ static int count_contacts(double z, const char *leave)
 }
 
 /*
- * What is extrapolated over 4 to 13 ms shows the noise of the poses three times as large: sd
+ * Extrapolation over 4 to 13 ms shows the noise of the poses three times as large: sd
  * 0.055 mm of 0.029, and at most 0.154 of 0.05. Each new contact would be a new cut.
  */
 static void test_noise_does_not_end_contacts(void **state)

@@ -223,7 +223,7 @@ static void test_ranges(void **state)
 	}
 }
 
-/* What is no number. */
+/* Values that are no number. */
 static void test_other_types(void **state)
 {
 	static const struct {

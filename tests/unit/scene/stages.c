@@ -316,7 +316,7 @@ static void test_the_pose_says_where_the_handle_is(void **state)
 	}
 }
 
-/* What is latched ends the ticks, and is said. */
+/* A latched fault ends the ticks, and is reported. */
 static void test_a_fault_of_the_actuator_is_named(void **state)
 {
 	static const struct {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What decides something, to the ulp and to the ns: where a contact begins and ends, when
+ * Thresholds, to the ulp and to the ns: where a contact begins and ends, when
  * a pose is too old; and what is no way at all.
  */
 #include <stdarg.h>

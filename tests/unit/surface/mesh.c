@@ -458,7 +458,7 @@ static void path_at(enum path path, int tick, int ticks, uint64_t *random, doubl
 }
 
 /*
- * How steeply the distance to the tool falls from the proxy in the steepest of 64
+ * The slope at which the distance to the tool falls from the proxy in the steepest of 64
  * directions: 0 at the nearest place around. By the sheet's own formula, without its
  * triangles. A face is often nearest by itself, with another nearer one beyond a ridge;
  * what is asked is whether there is a way down, so steps are small.

@@ -13,7 +13,7 @@
 #include "../../../lib/surface/surface.h"
 #include "solid.h"
 
-/* What a mesh promises to those that walk on it. */
+/* The invariants of a mesh. */
 static void check(const struct solid *s, const struct mesh *mesh)
 {
 	uint32_t *corners = calloc(mesh->n_vertices, sizeof(*corners));

@@ -139,7 +139,7 @@ static void random_point(uint64_t *random, double reach, double p[3])
 		p[i] = reach * (2 * solid_random(random) - 1);
 }
 
-/* How far p is from the axis of a capsule, by trying its points. */
+/* Distance of p from the axis of a capsule, by trying its points. */
 static double axis_distance(const struct capsule *c, const double p[3])
 {
 	double best = INFINITY;

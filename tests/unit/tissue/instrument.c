@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What is held, by turn and by word, and where its end is.
+ * lib/tissue/instrument.c: the tool that is held, by attitude and by name, and its end.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -77,7 +77,7 @@ static void test_turn(void **state)
 	}
 }
 
-/* What is asked for by name is held in any turn, once out of the tissue. */
+/* A tool that is asked for by name is held in any attitude, once out of the tissue. */
 static void test_by_name(void **state)
 {
 	static const enum incise_tool tools[] = {BLADE, HANDLE, TUBE};

@@ -180,7 +180,7 @@ static void a_hundred(struct feeder *f, struct incise_camera *camera)
 	check(incise_camera_lost(camera) == 0, "none is lost");
 }
 
-/* How many come up to picture @last; each is as it was shot, and they are in order. */
+/* Count the frames up to @last; each is as it was shot, and they are in order. */
 static int take_all(struct incise_camera *camera, int first, int last)
 {
 	struct incise_camera_frame frame = {0};
@@ -252,7 +252,7 @@ static void another_clock(struct feeder *f, struct incise_camera *camera)
 	check(strstr(text, "CLOCK_MONOTONIC"), "the cause: %s", text);
 }
 
-/* What the virtual rig's camera sees, through the kernel and back. */
+/* Frames of the simulated rig's camera, through the kernel and back. */
 static void virtual_rig(void)
 {
 	struct feeder f = {.width = 640,

@@ -256,7 +256,7 @@ static void controls(void)
 	close(other);
 }
 
-/* What vivid does to pictures on demand: all of it is counted. */
+/* Damage that vivid does to frames on demand: all of it is counted. */
 static void losses(void)
 {
 	static const struct incise_camera_setup setup = {

@@ -6,7 +6,7 @@
 
 [ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ] || skip "a capture" "frames_mkv.so was not built"
 command -v sqlite3 >/dev/null || skip "a capture" "there is no sqlite3 to look into it with"
-# What it asks of the kernel is in camera_vivid and camera_loopback, for each kernel.
+# camera_vivid and camera_loopback test its use of the kernel, for each kernel.
 [ "$INCISE_VM_KERNEL" != second ] || skip "a capture" "one kernel is enough for it"
 modprobe vivid n_devs=1 node_types=1 num_inputs=1 input_types=0 2>/dev/null ||
 	skip "vivid" "this kernel has no vivid"

@@ -82,7 +82,7 @@ static double apart_us(double a, double b)
 	return remainder(a - b, SAW_US);
 }
 
-/* How far codes are from the time that seq says, us; the most of all. */
+/* Largest distance of a code from the time that seq gives, us. */
 static double disorder_us(int n)
 {
 	double most = 0;
@@ -97,7 +97,7 @@ static double disorder_us(int n)
 	return most;
 }
 
-/* How far stamps are from when it was converted, us. */
+/* Distance of timestamps from the conversion, us. */
 static void stamps_off(int n, double *least, double *most)
 {
 	*least = INFINITY;

@@ -97,7 +97,7 @@ static void feed_ramp(void)
 /*
  * Samples of @seconds. In virtual time spacing is within 5 us, but where the timer meets another
  * interrupt in that very moment: 7.3 us were seen. It makes one gap long and the next one short.
- * How often depends on the phase in which the kernel's tick happens to stand to the timer: 0 of
+ * The number depends on the phase of the kernel's tick against the timer: 0 of
  * 600000 and 170 of 100000 were seen. A tick of 250 Hz comes once in 40 gaps, and makes two of
  * them so at most; none is by so much that it could be taken for another.
  */
@@ -300,7 +300,7 @@ static void refusals(void)
 		force->ops->close(force);
 }
 
-/* What a killed program leaves running is no hindrance. */
+/* A converter that a killed program left running does not hinder the next. */
 static void after_a_kill(void)
 {
 	struct incise_force *force;
@@ -371,7 +371,7 @@ static void is_listed(void)
 	check(!iio_force_scan("", found, &n, &err) && n == 1, "it is listed once");
 }
 
-/* What udev would run, from the rules themselves; and then as one of the group. */
+/* The commands of the udev rules; then access as a member of the group. */
 #define GROUP 31337
 static void is_for_the_group(void)
 {

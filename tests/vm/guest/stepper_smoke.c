@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What the stepper module promises, one promise after the other, on the simulated chip:
+ * The guarantees of the stepper module, one after the other, on the simulated chip:
  *
  *   stepper_smoke /dev/incise-stepperN DRIVER_DIR DEVICE
  *
