@@ -32,10 +32,8 @@ $(O)/obj/fuzz/%.o: %.cc
 fuzz_vision_frame := lib/base/error.c lib/device/vision.c lib/device/module.c tests/vision/linked.c \
 	$(wildcard lib/vision/*.c lib/vision/*.cc)
 fuzz_libs_vision_frame := $(libs_vision_opencv)
-fuzz_slcan_line := lib/device/can/slcan_line.c
-fuzz_can_frames := lib/base/error.c $(addprefix lib/device/can/,canopen.c canopen_sdo.c \
-	canopen_text.c cia402.c cia402_homing.c cia402_limits.c cia402_object.c cia402_pdo.c \
-	cia402_power.c cia402_setup.c cia402_units.c)
+fuzz_slcan_line := lib/device/can/bus/slcan_line.c
+fuzz_can_frames := lib/base/error.c $(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/cia402*.c)
 
 fuzz_polhemus_records := lib/base/ring.c $(addprefix lib/device/polhemus/polhemus_,gaps.c model.c \
 	records.c stream.c)

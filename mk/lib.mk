@@ -59,20 +59,17 @@ objects_stepper_gpio := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o
 	gpio/stepper_gpio.o \
 	$(if $(shell $(PKG_CONFIG) --atleast-version=2 libgpiod && echo yes),gpio/gpio_v2.o,gpio/gpio_v1.o))
 
-# One drive on two kinds of bus; each module has just its own.
-can_socketcan := socketcan can_netlink can_owner
-can_slcan := slcan slcan_tty slcan_status slcan_line
-can_transports := $(patsubst %,lib/device/can/%.c,$(can_socketcan) $(can_slcan))
-can_modules := $(addprefix lib/device/can/,stepper_can.c stepper_slcan.c)
+# A drive on one of two kinds of bus: each module has the files of its own transport only.
 can_core := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o thread.o) \
-	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(can_transports) $(can_modules),\
-		$(wildcard lib/device/can/*.c)))
+	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/*.c) \
+		lib/device/can/bus/bus_load.c)
+can_socketcan := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/bus/socketcan*.c))
+can_slcan := $(O)/obj/lib/device/tty.o \
+	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/bus/slcan*.c))
 pc_stepper_can := libmnl
-objects_stepper_can := $(can_core) \
-	$(patsubst %,$(O)/obj/lib/device/can/%.o,$(can_socketcan) stepper_can)
+objects_stepper_can := $(can_core) $(can_socketcan) $(O)/obj/lib/device/can/stepper_can.o
 pc_stepper_slcan :=
-objects_stepper_slcan := $(can_core) $(O)/obj/lib/device/tty.o \
-	$(patsubst %,$(O)/obj/lib/device/can/%.o,$(can_slcan) stepper_slcan)
+objects_stepper_slcan := $(can_core) $(can_slcan) $(O)/obj/lib/device/can/stepper_slcan.o
 
 # Needs nothing but the kernel's headers.
 device_modules += camera_v4l2
@@ -156,8 +153,7 @@ $(foreach name,$(device_modules),$(eval $(call device_module,$(name))))
 test_objects := $(patsubst %.c,$(O)/obj/%.o,$(filter-out %/camera_v4l2.c,\
 		$(wildcard lib/device/v4l2/*.c))) \
 	$(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
-	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(can_modules) \
-		$(if $(has_libmnl),,%/socketcan.c %/can_netlink.c),$(wildcard lib/device/can/*.c))) \
+	$(filter $(O)/obj/lib/device/can/%,$(can_core) $(can_slcan) $(if $(has_libmnl),$(can_socketcan))) \
 	$(addprefix $(O)/obj/lib/device/daq/,daq_feed.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(if $(has_libiio),$(daq_iio)) \
 		$(if $(has_comedilib),$(daq_comedi))) \

@@ -16,7 +16,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../../lib/device/can/cia402.h"
+#include "../../lib/device/can/cia402/cia402.h"
 
 #define NODE 0x10
 #define OWN 0x7f

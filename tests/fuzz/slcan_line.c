@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <linux/can/netlink.h>
-#include "../../lib/device/can/slcan_line.h"
+#include "../../lib/device/can/bus/slcan_line.h"
 
 static void wrong(const char *what)
 {

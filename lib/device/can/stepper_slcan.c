@@ -4,7 +4,7 @@
  * "slcan:/dev/ttyACM0:0x10". All it does is in can_stepper.h.
  */
 #include <incise/backend.h>
-#include "can_stepper.h"
+#include "cia402/can_stepper.h"
 
 static void *open_drive(const struct incise_backend_request *request,
 			struct incise_error *err)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/bus_load.c: against frames whose bits are laid out and stuffed here, and
+ * lib/device/can/bus/bus_load.c: against frames whose bits are laid out and stuffed here, and
  * against the sums that shared facts of CAN give.
  */
 #include <stdarg.h>
@@ -8,7 +8,7 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include "../../../lib/device/can/bus_load.h"
+#include "../../../lib/device/can/bus/bus_load.h"
 
 /* Longest frame that any bits make: a run of 5, then runs of 4 with each stuffed bit. */
 static uint32_t stuffed_by_hand(unsigned int bytes)

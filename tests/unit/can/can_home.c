@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/can_home.c: a drive that finds its own 0, or does not.
+ * lib/device/can/cia402/can_home.c: a drive that finds its own 0, or does not.
  */
 #include <stdarg.h>
 #include <stddef.h>

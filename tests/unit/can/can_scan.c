@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/can_scan.c: who is on a bus, found without a word written to them.
+ * lib/device/can/cia402/can_scan.c: who is on a bus, found without a word written to them.
  */
 #include <stdarg.h>
 #include <stddef.h>

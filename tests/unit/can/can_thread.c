@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/can_thread.c with a real thread and the computer's clock, which the
+ * lib/device/can/cia402/can_thread.c with a real thread and the computer's clock, which the
  * simulated drive follows. No time is judged.
  */
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/can_watch.c: looking at a drive without driving it.
+ * lib/device/can/cia402/can_watch.c: looking at a drive without driving it.
  */
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/canopen.c: what is heard and said, against a simulated drive and against
+ * lib/device/can/canopen/canopen.c: what is heard and said, against a simulated drive and against
  * frames that no drive sends.
  */
 #include <stdarg.h>

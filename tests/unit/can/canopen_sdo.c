@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/canopen_sdo.c: against the SDO server of a simulated drive, and against
+ * lib/device/can/canopen/canopen_sdo.c: against the SDO server of a simulated drive, and against
  * answers that are scripted byte by byte.
  */
 #include <stdarg.h>

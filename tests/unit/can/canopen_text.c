@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/canopen_text.c: every code is named and carries its number.
+ * lib/device/can/canopen/canopen_text.c: every code is named and carries its number.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,7 +9,7 @@
 #include <cmocka.h>
 #include <stdio.h>
 #include <string.h>
-#include "../../../lib/device/can/canopen.h"
+#include "../../../lib/device/can/canopen/canopen.h"
 
 /* CiA 301 V4.2, table 22. */
 static const uint32_t aborts[] = {

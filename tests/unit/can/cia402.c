@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402.c: every statusword against the standard's table, PDOs bit by bit.
+ * lib/device/can/cia402/cia402.c: every statusword against the standard's table, PDOs bit by bit.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -8,7 +8,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <string.h>
-#include "../../../lib/device/can/cia402.h"
+#include "../../../lib/device/can/cia402/cia402.h"
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402_homing.c: a drive homes as it was told to, and says whether it has.
+ * lib/device/can/cia402/cia402_homing.c: a drive homes as it was told to, and says whether it has.
  */
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402_limits.c: what a drive was told to hold, it holds by itself; what it was
+ * lib/device/can/cia402/cia402_limits.c: what a drive was told to hold, it holds by itself; what it was
  * told before does not stay.
  */
 #include <stdarg.h>

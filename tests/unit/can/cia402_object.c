@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402_object.c: what an SDO says becomes a line that names where, which object,
+ * lib/device/can/cia402/cia402_object.c: what an SDO says becomes a line that names where, which object,
  * why, and what to do.
  */
 #include <stdarg.h>
@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "led.h"
-#include "../../../lib/device/can/cia402_object.h"
+#include "../../../lib/device/can/cia402/cia402_object.h"
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
 

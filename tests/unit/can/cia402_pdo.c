@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402_pdo.c: PDOs are set up on drives that are strict about the order, each in
+ * lib/device/can/cia402/cia402_pdo.c: PDOs are set up on drives that are strict about the order, each in
  * its own way, and only what is meant for this side is sent.
  */
 #include <stdarg.h>

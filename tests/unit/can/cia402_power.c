@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402_power.c: power goes away, faults go when their cause has, modes are
+ * lib/device/can/cia402/cia402_power.c: power goes away, faults go when their cause has, modes are
  * taken; and nothing of it leads to operation enabled.
  */
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402_setup.c, with all that it calls: a drive does what it
+ * lib/device/can/cia402/cia402_setup.c, with all that it calls: a drive does what it
  * was set up to do, and whatever goes wrong at whatever step, it ends in a line, in bounded
  * time, and without power.
  */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402_units.c: who a drive is, and units of drives that people have.
+ * lib/device/can/cia402/cia402_units.c: who a drive is, and units of drives that people have.
  */
 #include <stdarg.h>
 #include <stddef.h>

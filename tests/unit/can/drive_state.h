@@ -12,7 +12,7 @@
 #include <string.h>
 #include <linux/can/error.h>
 #include <linux/can/netlink.h>
-#include "../../../lib/device/can/cia402.h"
+#include "../../../lib/device/can/cia402/cia402.h"
 
 #define DRIVE_MS 1000000LL
 #define DRIVE_TICK_NS 250000 /* of its motion and of its timers */

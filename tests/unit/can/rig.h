@@ -15,7 +15,7 @@
 #define INCISE_TEST_CAN_RIG_H
 
 #include <incise/backend.h>
-#include "../../../lib/device/can/can_stepper.h"
+#include "../../../lib/device/can/cia402/can_stepper.h"
 #include "can_drive.h"
 
 struct can_rig {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/slcan.c on a pseudo terminal: the test is the adapter at its other end.
+ * lib/device/can/bus/slcan.c on a pseudo terminal: the test is the adapter at its other end.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,7 +18,7 @@
 #include <unistd.h>
 #include <linux/can/error.h>
 #include <linux/can/netlink.h>
-#include "../../../lib/device/can/can_bus.h"
+#include "../../../lib/device/can/bus/can_bus.h"
 
 #define MS 1000000
 

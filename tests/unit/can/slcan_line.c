@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/slcan_line.c against lines written by hand from Lawicel's manual, and
+ * lib/device/can/bus/slcan_line.c against lines written by hand from Lawicel's manual, and
  * against itself: what it says it must read back.
  */
 #include <stdarg.h>
@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <linux/can/netlink.h>
-#include "../../../lib/device/can/slcan_line.h"
+#include "../../../lib/device/can/bus/slcan_line.h"
 
 /* The last kind that is not SLCAN_NONE, of all bytes. */
 static enum slcan_kind take(struct slcan_line *line, const char *bytes, size_t n,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/slcan_status.c; the same over a pty is in slcan.c.
+ * lib/device/can/bus/slcan_status.c; the same over a pty is in slcan.c.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,7 +10,7 @@
 #include <errno.h>
 #include <linux/can/error.h>
 #include <linux/can/netlink.h>
-#include "../../../lib/device/can/slcan_status.h"
+#include "../../../lib/device/can/bus/slcan_status.h"
 
 #define MS INT64_C(1000000)
 

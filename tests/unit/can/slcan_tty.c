@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/slcan_tty.c on a pseudo terminal. What it does for a bus is in slcan.c.
+ * lib/device/can/bus/slcan_tty.c on a pseudo terminal. What it does for a bus is in slcan.c.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -16,7 +16,7 @@
 #include <sys/stat.h>
 #include <termios.h>
 #include <unistd.h>
-#include "../../../lib/device/can/slcan_tty.h"
+#include "../../../lib/device/can/bus/slcan_tty.h"
 
 /* What write() does next: takes so many bytes (-1: all), after so many signals, or fails. */
 static ssize_t write_most;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/socketcan.c on a kernel that a test makes: the linker hands its system
+ * lib/device/can/bus/socketcan.c on a kernel that a test makes: the linker hands its system
  * calls, and its question what an interface is, to functions here. The real kernel is asked
  * in tests/vm/guest/can_bus.c. The lock of a node is real.
  */
@@ -19,8 +19,8 @@
 #include <linux/can/raw.h>
 #include <linux/errqueue.h>
 #include <linux/net_tstamp.h>
-#include "../../../lib/device/can/can_bus.h"
-#include "../../../lib/device/can/can_netlink.h"
+#include "../../../lib/device/can/bus/can_bus.h"
+#include "../../../lib/device/can/bus/socketcan_netlink.h"
 
 #define FD 7777
 #define INDEX 42

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/socketcan.c on a real kernel, over a vcan that is there and up:
+ * lib/device/can/bus/socketcan.c on a real kernel, over a vcan that is there and up:
  *
  *   can_bus INTERFACE
  *
@@ -18,7 +18,7 @@
 #include <unistd.h>
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
-#include "../../../lib/device/can/can_bus.h"
+#include "../../../lib/device/can/bus/can_bus.h"
 #include "../tap.h"
 
 #define MS INT64_C(1000000)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/can_netlink.c on a controller of a real kernel, held against what ip says
+ * lib/device/can/bus/socketcan_netlink.c on a controller of a real kernel, held against what ip says
  * of it: the kernel's slcan, on a pty whose other end just reads. Prints "ok …" and
  * "not ok …".
  *
@@ -19,8 +19,8 @@
 #include <unistd.h>
 #include <linux/can/netlink.h>
 #include <linux/tty.h>
-#include "../../../lib/device/can/can_bus.h"
-#include "../../../lib/device/can/can_netlink.h"
+#include "../../../lib/device/can/bus/can_bus.h"
+#include "../../../lib/device/can/bus/socketcan_netlink.h"
 #include "../tap.h"
 
 static int run(const char *format, const char *name)

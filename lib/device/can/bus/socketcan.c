@@ -1,0 +1,400 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A CAN bus of the kernel: a raw socket on can0, vcan0 …
+ *
+ *   controller ─▶ driver ─▶ exact filters ─▶ queue of the socket ─▶ receive
+ *                   ╰─ stamp, CLOCK_REALTIME    ╰─ counts what it loses
+ *
+ * What an interface is and is set to, the kernel is asked once, when it is opened; the state
+ * is then kept by error frames.
+ *
+ * The queue is as long as the kernel has it, some 220 frames: 70 ms of a drive's traffic at
+ * 1 kHz. Who does not read for so long has missed more than that: the drive's deadman.
+ */
+#include <errno.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+#include <linux/can/error.h>
+#include <linux/can/netlink.h>
+#include <linux/can/raw.h>
+#include <linux/errqueue.h>
+#include <linux/net_tstamp.h>
+#include "../../../base/monotonic.h"
+#include "can_bus.h"
+#include "socketcan_netlink.h"
+#include "socketcan_owner.h"
+
+#define NS_PER_S INT64_C(1000000000)
+/* What is no frame is passed over, but not without end. */
+#define SHORT_MAX 16
+
+struct socketcan {
+	struct can_bus bus;
+	int fd;
+	int owner;	 /* socket that holds the node; -1: none */
+	int gone;	 /* -ENETDOWN, -ENODEV: for good */
+	int state;	 /* enum can_state; -EOPNOTSUPP: not known */
+	uint32_t lost;	 /* by the kernel's count, which turns over */
+	int64_t last_ns; /* stamp of the last frame */
+};
+
+static struct socketcan *of(struct can_bus *bus)
+{
+	return (struct socketcan *)bus;
+}
+
+static int64_t clock_ns(clockid_t clock)
+{
+	struct timespec now;
+
+	clock_gettime(clock, &now);
+	return now.tv_sec * NS_PER_S + now.tv_nsec;
+}
+
+static INCISE_REALTIME int64_t socketcan_now(struct can_bus *bus)
+{
+	(void)bus;
+	return incise_monotonic_ns();
+}
+
+static int failed(struct socketcan *s, int code)
+{
+	/* A socket whose interface is gone is bound to none: ENXIO. */
+	if (code == ENODEV || code == ENXIO)
+		s->gone = -ENODEV;
+	else if (code == ENETDOWN)
+		s->gone = -ENETDOWN;
+	else
+		return -EIO;
+	return s->gone;
+}
+
+static int socketcan_send(struct can_bus *bus, const struct can_frame *frame)
+{
+	struct socketcan *s = of(bus);
+	ssize_t n;
+
+	if (s->gone)
+		return s->gone;
+	if (frame->can_id & CAN_ERR_FLAG || frame->can_dlc > CAN_MAX_DLEN)
+		return -EINVAL;
+	do
+		n = send(s->fd, frame, sizeof(*frame), MSG_DONTWAIT);
+	while (n < 0 && errno == EINTR);
+	if (n == sizeof(*frame)) {
+		bus->counts.sent++;
+		return 0;
+	}
+	if (n >= 0)
+		return -EIO;
+	/* The queue of the interface, or what a socket may have in it. */
+	if (errno == ENOBUFS || errno == EAGAIN) {
+		bus->counts.full++;
+		return -ENOBUFS;
+	}
+	return failed(s, errno);
+}
+
+/* Stamps are wall time, which may be set meanwhile: what makes no sense came now. */
+static int64_t stamp(struct socketcan *s, const struct timespec *came)
+{
+	int64_t now = clock_ns(CLOCK_MONOTONIC), t = now;
+
+	if (came && (came->tv_sec || came->tv_nsec)) {
+		int64_t age = clock_ns(CLOCK_REALTIME) -
+			      (came->tv_sec * NS_PER_S + came->tv_nsec);
+
+		if (age > 0)
+			t = now - age;
+	}
+	s->last_ns = t > s->last_ns ? t : s->last_ns;
+	return s->last_ns;
+}
+
+static void note_state(struct socketcan *s, const struct can_frame *frame)
+{
+	if (s->state == -EOPNOTSUPP)
+		return;
+	if (frame->can_id & CAN_ERR_RESTARTED)
+		s->state = CAN_STATE_ERROR_ACTIVE;
+	if (frame->can_id & CAN_ERR_CRTL) {
+		uint8_t what = frame->data[1];
+
+		if (what & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE))
+			s->state = CAN_STATE_ERROR_PASSIVE;
+		else if (what & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING))
+			s->state = CAN_STATE_ERROR_WARNING;
+		else if (what & CAN_ERR_CRTL_ACTIVE)
+			s->state = CAN_STATE_ERROR_ACTIVE;
+	}
+	if (frame->can_id & CAN_ERR_BUSOFF)
+		s->state = CAN_STATE_BUS_OFF;
+}
+
+/* One message. As recvmsg; *came: its stamp, 0 where there is none. */
+static ssize_t read_one(struct socketcan *s, struct can_frame *frame,
+			struct timespec *came)
+{
+	union {
+		char bytes[CMSG_SPACE(sizeof(struct scm_timestamping)) +
+			   CMSG_SPACE(sizeof(uint32_t)) + 64];
+		struct cmsghdr align;
+	} control;
+	struct iovec iov = {frame, sizeof(*frame)};
+	struct msghdr msg = {.msg_iov = &iov,
+			     .msg_iovlen = 1,
+			     .msg_control = &control,
+			     .msg_controllen = sizeof(control)};
+	ssize_t n;
+
+	memset(came, 0, sizeof(*came));
+	do
+		n = recvmsg(s->fd, &msg, MSG_DONTWAIT);
+	while (n < 0 && errno == EINTR);
+	if (n < 0)
+		return n;
+	for (struct cmsghdr *c = CMSG_FIRSTHDR(&msg); c; c = CMSG_NXTHDR(&msg, c)) {
+		if (c->cmsg_level != SOL_SOCKET)
+			continue;
+		if (c->cmsg_type == SO_RXQ_OVFL &&
+		    c->cmsg_len >= CMSG_LEN(sizeof(uint32_t))) {
+			uint32_t lost;
+
+			memcpy(&lost, CMSG_DATA(c), sizeof(lost));
+			s->bus.counts.overflow += (uint32_t)(lost - s->lost);
+			s->lost = lost;
+		} else if (c->cmsg_type == SCM_TIMESTAMPING &&
+			   c->cmsg_len >= CMSG_LEN(sizeof(*came))) {
+			/* The first of three is the software's. */
+			memcpy(came, CMSG_DATA(c), sizeof(*came));
+		}
+	}
+	return n;
+}
+
+static int socketcan_receive(struct can_bus *bus, struct can_frame *frame, int64_t *t_ns)
+{
+	struct socketcan *s = of(bus);
+
+	if (s->gone)
+		return s->gone;
+	for (int i = 0; i < SHORT_MAX; i++) {
+		struct timespec came;
+		ssize_t n = read_one(s, frame, &came);
+
+		if (n < 0)
+			return errno == EAGAIN ? 0 : failed(s, errno);
+		if (n != sizeof(*frame) || frame->can_dlc > CAN_MAX_DLEN) {
+			bus->counts.broken++;
+			continue;
+		}
+		*t_ns = stamp(s, &came);
+		if (frame->can_id & CAN_ERR_FLAG) {
+			bus->counts.errors++;
+			note_state(s, frame);
+		} else {
+			bus->counts.received++;
+		}
+		return 1;
+	}
+	return 0;
+}
+
+static int socketcan_wait(struct can_bus *bus, int64_t until_ns)
+{
+	struct socketcan *s = of(bus);
+	struct pollfd poll = {.fd = s->fd, .events = POLLIN};
+	int64_t now = socketcan_now(bus), left = until_ns > now ? until_ns - now : 0;
+	struct timespec timeout = {left / NS_PER_S, left % NS_PER_S};
+
+	if (s->gone)
+		return s->gone;
+	return ppoll(&poll, 1, &timeout, NULL) < 0 ? -errno : 0;
+}
+
+static int socketcan_filter(struct can_bus *bus, const struct can_filter *filter, int n)
+{
+	/* One that lets all pass: to the kernel, none at all is to receive nothing. */
+	static const struct can_filter all = {0};
+
+	if (n < 0 || n > CAN_BUS_FILTERS)
+		return -EINVAL;
+	if (!n)
+		filter = &all;
+	return setsockopt(of(bus)->fd, SOL_CAN_RAW, CAN_RAW_FILTER, filter,
+			  (socklen_t)((n ? (size_t)n : 1) * sizeof(*filter))) < 0
+		       ? -errno
+		       : 0;
+}
+
+static int socketcan_state(struct can_bus *bus)
+{
+	return of(bus)->state;
+}
+
+static void socketcan_close(struct can_bus *bus)
+{
+	struct socketcan *s = of(bus);
+
+	if (s->fd >= 0)
+		close(s->fd);
+	if (s->owner >= 0)
+		close(s->owner);
+	free(s);
+}
+
+static const struct can_bus_ops socketcan_ops = {
+	.now = socketcan_now,
+	.send = socketcan_send,
+	.receive = socketcan_receive,
+	.wait = socketcan_wait,
+	.filter = socketcan_filter,
+	.state = socketcan_state,
+	.close = socketcan_close,
+};
+
+/* Whether what it is set to is what is asked for. */
+static int check_rate(struct socketcan *s, const struct can_bus_request *request,
+		      struct incise_error *err)
+{
+	const char *name = s->bus.name;
+
+	if (!request->bitrate || !s->bus.bitrate || request->bitrate == s->bus.bitrate)
+		return 0;
+	return incise_error_set(
+		err, EINVAL,
+		"%s: %s runs at %u bit/s, bitrate is %u: correct it, or run ip link set %s "
+		"down, then ip link set %s up type can bitrate %u",
+		request->where, name, s->bus.bitrate, request->bitrate, name, name,
+		request->bitrate);
+}
+
+static int not_known(const struct can_bus_request *request, int code,
+		     struct incise_error *err)
+{
+	if (code == ENODEV)
+		return incise_error_set(
+			err, ENODEV,
+			"%s: there is no interface %.40s: is the adapter plugged in, "
+			"its driver loaded? Then ip link set can0 up type can bitrate "
+			"1000000; ip -br link lists what there is",
+			request->where, request->device);
+	return incise_error_set(err, code == ENOMEM ? ENOMEM : EIO,
+				"%s: the kernel does not tell of %s: %s", request->where,
+				request->device, strerror(code));
+}
+
+/* The interface's number; or -errno, and the line says what to do. */
+static int look_up(struct socketcan *s, const struct can_bus_request *request,
+		   struct incise_error *err)
+{
+	const char *where = request->where, *name = request->device;
+	struct can_netlink told;
+	int rc = can_netlink_ask(name, &told);
+
+	if (rc)
+		return not_known(request, -rc, err);
+	if (!told.is_can)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: %s is no CAN interface: ip -br link show type "
+			"can lists those there are",
+			where, name);
+	if (!told.is_up)
+		return incise_error_set(
+			err, ENETDOWN, "%s: %s is down: ip link set %s up%s", where, name,
+			name,
+			strcmp(told.kind, "can") ? "" : " type can bitrate 1000000");
+	memcpy(s->bus.name, told.name, sizeof(told.name));
+	s->bus.bitrate = told.bitrate;
+	s->bus.restart_ms = told.restart_ms;
+	s->state = told.state;
+	rc = check_rate(s, request, err);
+	return rc ? rc : told.index;
+}
+
+static int set_up(struct socketcan *s, const struct can_bus_request *request, int index,
+		  struct incise_error *err)
+{
+	static const int on = 1, stamps = SOF_TIMESTAMPING_RX_SOFTWARE |
+					  SOF_TIMESTAMPING_SOFTWARE;
+	static const can_err_mask_t errors = CAN_ERR_MASK;
+	struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = index};
+	int code;
+
+	if (setsockopt(s->fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof(errors)) ||
+	    setsockopt(s->fd, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof(on)) ||
+	    setsockopt(s->fd, SOL_SOCKET, SO_TIMESTAMPING, &stamps, sizeof(stamps)) ||
+	    bind(s->fd, (struct sockaddr *)&address, sizeof(address))) {
+		code = errno == ENODEV ? ENODEV : errno == ENETDOWN ? ENETDOWN : EIO;
+		return incise_error_set(err, code, "%s: %s: %s", request->where,
+					request->device, strerror(errno));
+	}
+	return 0;
+}
+
+static int open_socket(struct socketcan *s, const struct can_bus_request *request,
+		       struct incise_error *err)
+{
+	s->fd = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
+	if (s->fd >= 0)
+		return 0;
+	switch (errno) {
+	case EAFNOSUPPORT:
+	case EPROTONOSUPPORT:
+		return incise_error_set(
+			err, EAFNOSUPPORT,
+			"%s: this kernel has no CAN sockets: modprobe can_raw; "
+			"where it has no such module, a serial adapter works "
+			"as slcan:/dev/ttyACM0",
+			request->where);
+	case EACCES:
+	case EPERM:
+		return incise_error_set(err, EACCES, "%s: no right to open a CAN socket",
+					request->where);
+	default:
+		return incise_error_set(err, errno == ENOMEM ? ENOMEM : EIO,
+					"%s: CAN socket: %s", request->where,
+					strerror(errno));
+	}
+}
+
+static int socketcan_open(struct can_bus **bus, const struct can_bus_request *request,
+			  struct incise_error *err)
+{
+	struct socketcan *s = calloc(1, sizeof(*s));
+	int index, rc;
+
+	if (!s)
+		return incise_error_set(err, ENOMEM, "%s: out of memory", request->where);
+	s->bus.ops = &socketcan_ops;
+	s->fd = s->owner = -1;
+	s->state = -EOPNOTSUPP;
+	s->last_ns = clock_ns(CLOCK_MONOTONIC);
+	rc = open_socket(s, request, err);
+	if (!rc) {
+		index = look_up(s, request, err);
+		rc = index < 0 ? index : 0;
+	}
+	if (!rc && request->node) {
+		s->owner =
+			can_owner_take(s->bus.name, request->node, request->where, err);
+		rc = s->owner < 0 ? s->owner : 0;
+	}
+	if (!rc)
+		rc = set_up(s, request, index, err);
+	if (rc) {
+		socketcan_close(&s->bus);
+		errno = -rc;
+		return rc;
+	}
+	*bus = &s->bus;
+	return 0;
+}
+
+const struct can_transport can_transport_socketcan = {.name = "can",
+						      .open = socketcan_open};

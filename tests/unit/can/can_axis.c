@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/can/cia402/can_axis.c and axis_check.c, cycle by cycle: what comes from the bus may be
+ * anything, and gives the drive no power. What each fault comes to as a whole is in
+ * can_stepper.c.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include "../../../lib/device/can/cia402/can_axis_check.h"
+#include "../../../lib/device/page.h"
+#include "led.h"
+
+#define MS DRIVE_MS
+
+struct bench {
+	struct led led;
+	struct can_axis axis;
+	struct incise_stepper_setpoint setpoint;
+	struct incise_abi_status slot;
+};
+
+static void start(struct bench *b)
+{
+	const struct can_axis_setup setup = {
+		.config = {.tick_ns = MS,
+			   .velocity = 10000,
+			   .acceleration = 200000,
+			   .position_max = 100000,
+			   .deadman_ns = 100 * MS},
+		.step_mm = 0.001,
+		.mode = CIA402_CSP,
+		.counts_per_step = 1,
+		.silence_ns = 150 * MS,
+		.following = 500,
+		.following_ns = 20 * MS,
+		.inputs = true,
+		.wired = INCISE_STEPPER_LINE_LIMIT_MIN | INCISE_STEPPER_LINE_LIMIT_MAX |
+			 INCISE_STEPPER_LINE_HOME | INCISE_STEPPER_LINE_ESTOP,
+	};
+
+	memset(b, 0, sizeof(*b));
+	led_init(&b->led);
+	assert_int_equal(led_configure(&b->led), 0);
+	canopen_await(&b->led.master, NULL, b->led.drive.now_ns + 50 * MS);
+	b->axis.motion.setpoint = &b->setpoint;
+	b->axis.motion.slot = &b->slot;
+	assert_int_equal(can_axis_init(&b->axis, &setup), 0);
+	b->axis.master = &b->led.master;
+}
+
+/* Cycles; targets come as long as @mm is not negative. */
+static void cycles(struct bench *b, int n, int64_t target)
+{
+	for (int i = 0; i < n; i++) {
+		if (target >= 0)
+			incise_page_put_setpoint(&b->setpoint,
+						 INCISE_STEPPER_MODE_POSITION, target,
+						 b->led.drive.now_ns);
+		can_axis_cycle(&b->axis, b->led.drive.now_ns, 0, 0);
+		drive_advance(&b->led.drive, MS);
+	}
+}
+
+static void power(struct bench *b)
+{
+	b->led.drive.tripped = false;
+	assert_int_equal(can_axis_power(&b->axis, b->led.drive.now_ns, 0), 1);
+	for (int i = 0; i < 100 && b->axis.result == 1; i++)
+		cycles(b, 1, -1);
+	assert_int_equal(b->axis.result, 0);
+	assert_int_equal(b->led.drive.state, CIA402_ENABLED);
+}
+
+static void it_takes_no_target_before_it_heard_where_it_is(void **state)
+{
+	struct bench b;
+
+	start(&b);
+	b.led.drive.position = b.led.drive.demand = 4321;
+	power(&b);
+	/* The first targets were where it stood. */
+	assert_in_range(b.led.drive.least_target, 4320, 4322);
+	assert_in_range(b.led.drive.most_target, 4320, 4322);
+	assert_int_equal(b.slot.position, 4321);
+}
+
+static void outside_of_its_travel_it_gets_no_power(void **state)
+{
+	/* A cycle at the largest speed is 10 steps; a count is rounded. */
+	static const struct {
+		int32_t at;
+		int rc;
+	} cases[] = {{-11, 1}, {-12, -ERANGE}, {100011, 1}, {100012, -ERANGE}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct bench b;
+
+		start(&b);
+		b.led.drive.position = b.led.drive.demand = cases[i].at;
+		cycles(&b, 3, -1);
+		assert_int_equal(can_axis_power(&b.axis, b.led.drive.now_ns, 0),
+				 cases[i].rc);
+	}
+}
+
+/* Disabled while it starts, runs and stops: it ends without power and without a fault. */
+static void it_can_be_disabled_at_any_time(void **state)
+{
+	for (int n = 0; n < 150; n++) {
+		struct bench b;
+
+		start(&b);
+		assert_int_equal(can_axis_power(&b.axis, b.led.drive.now_ns, 0), 1);
+		cycles(&b, n, 5000);
+		can_axis_disable(&b.axis);
+		can_axis_disable(&b.axis);
+		cycles(&b, 300, 5000);
+		assert_int_equal(b.slot.state, INCISE_STEPPER_STATE_DISABLED);
+		assert_int_equal(b.slot.faults, 0);
+		assert_int_equal(b.axis.phase, CAN_AXIS_IDLE);
+		assert_false(cia402_powered(b.led.drive.state));
+		assert_true(b.axis.result <= 0);
+	}
+}
+
+static void a_drive_that_does_not_start_is_left(void **state)
+{
+	struct bench b;
+
+	start(&b);
+	b.led.drive.enable_ns = 10000 * MS;
+	assert_int_equal(can_axis_power(&b.axis, b.led.drive.now_ns, 0), 1);
+	cycles(&b, 3000, -1);
+	assert_int_equal(b.axis.result, -ETIMEDOUT);
+	assert_int_equal(b.axis.why, CAN_AXIS_NO_START);
+	assert_int_equal(b.slot.state, INCISE_STEPPER_STATE_DISABLED);
+	assert_false(cia402_powered(b.led.drive.state));
+	drive_advance(&b.led.drive, 20000 * MS);
+	assert_false(cia402_powered(b.led.drive.state));
+}
+
+static void a_few_set_points_may_wait_for_the_queue(void **state)
+{
+	struct bench b;
+
+	start(&b);
+	power(&b);
+	cycles(&b, 50, 20000);
+	/* The next frames: a set-point, a SYNC and a heartbeat at times. */
+	b.led.drive.send_error = -ENOBUFS;
+	b.led.drive.send_errors = 10;
+	cycles(&b, 50, 20000);
+	assert_int_equal(b.slot.faults, 0);
+	b.led.drive.send_error = -ENOBUFS;
+	b.led.drive.send_errors = 0;
+	cycles(&b, 50, 20000);
+	assert_int_equal(b.slot.faults, INCISE_ABI_FAULT_BUS);
+	assert_int_equal(b.axis.why, CAN_AXIS_QUEUE_FULL);
+}
+
+static void what_is_late_is_counted(void **state)
+{
+	struct bench b;
+
+	start(&b);
+	power(&b);
+	cycles(&b, 10, 100);
+	can_axis_cycle(&b.axis, b.led.drive.now_ns, MS / 2, 0);
+	assert_int_equal(b.axis.counts.sync_late, 0);
+	drive_advance(&b.led.drive, MS);
+	can_axis_cycle(&b.axis, b.led.drive.now_ns, MS / 2 + 1, 0);
+	assert_int_equal(b.axis.counts.sync_late, 1);
+	drive_advance(&b.led.drive, MS);
+	can_axis_cycle(&b.axis, b.led.drive.now_ns, 0, 7);
+	assert_int_equal(b.axis.counts.sync_late, 8);
+	assert_int_equal(b.slot.late, 8);
+	/* A cycle too early for the answer to the last SYNC. */
+	can_axis_cycle(&b.axis, b.led.drive.now_ns, 0, 0);
+	assert_int_equal(b.axis.counts.tpdo_missing, 1);
+}
+
+static uint64_t random_state = 88172645463325252ULL;
+
+static uint64_t draw(void)
+{
+	random_state ^= random_state << 13;
+	random_state ^= random_state >> 7;
+	random_state ^= random_state << 17;
+	return random_state;
+}
+
+/* Ids of this drive with anything in them, for hours of cycles. */
+static void whatever_comes_gives_no_power(void **state)
+{
+	static const uint32_t ids[] = {0x080,
+				       0x090,
+				       0x190,
+				       0x290,
+				       0x590,
+				       0x710,
+				       0x77f,
+				       0x210,
+				       CAN_ERR_FLAG | CAN_ERR_BUSOFF,
+				       CAN_EFF_FLAG | 0x190,
+				       CAN_RTR_FLAG | 0x190};
+	struct bench b;
+
+	start(&b);
+	for (int i = 0; i < 20000; i++) {
+		struct can_frame frame = {
+			.can_id = ids[draw() % (sizeof(ids) / sizeof(*ids))],
+			.can_dlc = (uint8_t)(draw() % 9),
+		};
+		uint64_t data = draw(), enables = b.led.drive.enables;
+
+		memcpy(frame.data, &data, sizeof(data));
+		drive_say(&b.led.drive, &frame);
+		cycles(&b, 1, (int64_t)(draw() % 200000));
+		assert_int_equal(b.led.drive.enables, enables);
+		assert_false(b.axis.motion.powered);
+	}
+	/* With power, it is a fault sooner or later, and stays one. */
+	for (int k = 0; k < 200; k++) {
+		uint64_t enables;
+
+		start(&b);
+		power(&b);
+		enables = b.led.drive.enables;
+		for (int i = 0; i < 300; i++) {
+			struct can_frame frame = {
+				.can_id = ids[draw() % (sizeof(ids) / sizeof(*ids))],
+				.can_dlc = (uint8_t)(draw() % 9),
+			};
+			uint64_t data = draw();
+
+			memcpy(frame.data, &data, sizeof(data));
+			drive_say(&b.led.drive, &frame);
+			cycles(&b, 1, 50000);
+		}
+		cycles(&b, 3000, 50000);
+		assert_true(b.slot.faults);
+		assert_int_equal(b.slot.state, INCISE_STEPPER_STATE_FAULT);
+		assert_int_equal(b.led.drive.enables, enables);
+		assert_int_equal(b.led.drive.velocity, 0);
+	}
+}
+
+static void a_flood_is_taken_in_parts(void **state)
+{
+	const struct can_frame noise = {.can_id = 0x590, .can_dlc = 8};
+	struct bench b;
+
+	start(&b);
+	for (int i = 0; i < 200; i++)
+		drive_say(&b.led.drive, &noise);
+	drive_advance(&b.led.drive, MS);
+	can_axis_cycle(&b.axis, b.led.drive.now_ns, 0, 0);
+	assert_int_equal(b.led.drive.to_master.n, 200 - 64);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(it_takes_no_target_before_it_heard_where_it_is),
+		cmocka_unit_test(outside_of_its_travel_it_gets_no_power),
+		cmocka_unit_test(it_can_be_disabled_at_any_time),
+		cmocka_unit_test(a_drive_that_does_not_start_is_left),
+		cmocka_unit_test(a_few_set_points_may_wait_for_the_queue),
+		cmocka_unit_test(what_is_late_is_counted),
+		cmocka_unit_test(whatever_comes_gives_no_power),
+		cmocka_unit_test(a_flood_is_taken_in_parts),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

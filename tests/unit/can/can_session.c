@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/can/cia402/can_session.c: how a drive is found and set up, and what keeps it from being so.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <math.h>
+#include "rig.h"
+
+#define MS DRIVE_MS
+#define COUNTS_PER_MM 12800 /* 51200 a turn of 4 mm */
+
+static struct can_rig rig;
+
+/* Whatever the drive refuses, or leaves without an answer, on its way to power. */
+static void no_step_of_the_start_hangs_or_gives_power(void **state)
+{
+	uint32_t requests;
+
+	can_rig_init(&rig);
+	can_rig_open_or_fail(&rig);
+	requests = (uint32_t)rig.drive.requests;
+	can_rig_close(&rig);
+	assert_true(requests > 40);
+	for (uint32_t k = 1; k <= requests; k++)
+		for (int drop = 0; drop < 2; drop++) {
+			struct incise_error err = {0};
+			int64_t begin;
+
+			can_rig_init(&rig);
+			if (drop)
+				rig.drive.drop_at = k;
+			else
+				rig.drive.abort_at = k;
+			begin = rig.drive.now_ns;
+			if (can_rig_open(&rig, &err)) {
+				/* One that it can do without. */
+				can_rig_enable_or_fail(&rig);
+				can_rig_close(&rig);
+			} else if (!strstr(err.text, "rig.conf:3: stepper: ") || !errno) {
+				fail_msg("request %u: \"%s\"", k, err.text);
+			}
+			assert_false(drive_powered(&rig.drive));
+			assert_int_equal(rig.drive.enabled_unasked, 0);
+			/* An answer is waited for 0.2 s; all else goes by the cycle. */
+			if (rig.drive.now_ns - begin > 3000 * MS)
+				fail_msg("request %u took %lld ms", k,
+					 (long long)((rig.drive.now_ns - begin) / MS));
+		}
+}
+
+static void why_it_cannot_begin_is_said(void **state)
+{
+	static const struct {
+		const char *arguments;
+		int master;
+		double deadman_s;
+		uint32_t bitrate;
+		int code;
+		const char *says;
+	} cases[] = {
+		{"can0", 127, 0.1, 1000000, EINVAL, "expected can:DEVICE:NODE"},
+		{"can0:", 127, 0.1, 1000000, EINVAL, "expected can:DEVICE:NODE"},
+		{"can0:0", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
+		{"can0:128", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
+		{"can0:-1", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
+		{"can0:0x10x", 127, 0.1, 1000000, EINVAL, "a node id of 1 to 127"},
+		{":0x10", 127, 0.1, 1000000, EINVAL, "expected can:DEVICE:NODE"},
+		{"c:0x10", 16, 0.1, 1000000, EINVAL, "also actuator.can.master"},
+		{"c:0x11", 127, 0.1, 1000000, ENODEV, "nobody answers"},
+		{"c:0x10", 127, 0.01, 1000000, EINVAL, "expected at least 20"},
+		/* 305 bits of 1 kHz, by the lengths of three frames, are 122 % … */
+		{"c:0x10", 127, 0.1, 250000, ERANGE, "may take 80 %"},
+		/* … and fit into twice that. */
+		{"c:0x10", 127, 0.1, 500000, 0, ""},
+		{"c:0x10", 127, 0.1, 0, 0, ""},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		can_rig_init(&rig);
+		rig.arguments = cases[i].arguments;
+		rig.actuator.can.master = cases[i].master;
+		rig.actuator.deadman_s = cases[i].deadman_s;
+		rig.drive.bus.bitrate = cases[i].bitrate;
+		if (can_rig_open(&rig, &err))
+			can_rig_close(&rig);
+		if (err.code != cases[i].code || !strstr(err.text, cases[i].says))
+			fail_msg("case %zu: %d, \"%s\"", i, err.code, err.text);
+	}
+}
+
+static void another_master_is_not_disturbed(void **state)
+{
+	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
+	struct incise_error err = {0};
+
+	can_rig_init(&rig);
+	drive_say(&rig.drive, &sync);
+	assert_null(can_rig_open(&rig, &err));
+	assert_int_equal(err.code, EBUSY);
+	assert_non_null(strstr(err.text, "another master"));
+	assert_int_equal(rig.drive.requests, 0);
+}
+
+/* Its watch is switched off by who leaves in good order, and by nobody else. */
+static void who_goes_leaves_it_stopped_or_watched(void **state)
+{
+	static const struct {
+		bool unplugged, mute;
+		uint32_t consumer;
+	} cases[] = {
+		{false, false, 0},
+		{true, false, 127 << 16 | 100},
+		{false, true, 127 << 16 | 100},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		can_rig_init(&rig);
+		can_rig_open_or_fail(&rig);
+		can_rig_enable_or_fail(&rig);
+		can_rig_hold(&rig, 15, 200 * MS);
+		rig.drive.unplugged = cases[i].unplugged;
+		rig.drive.mute = cases[i].mute;
+		can_rig_close(&rig);
+		assert_int_equal(rig.drive.od[OD_CONSUMER].value, cases[i].consumer);
+		drive_advance(&rig.drive, 500 * MS);
+		assert_false(drive_powered(&rig.drive));
+		assert_int_equal(rig.drive.velocity, 0);
+		assert_int_equal(rig.drive.enabled_unasked, 0);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(who_goes_leaves_it_stopped_or_watched),
+		cmocka_unit_test(no_step_of_the_start_hangs_or_gives_power),
+		cmocka_unit_test(why_it_cannot_begin_is_said),
+		cmocka_unit_test(another_master_is_not_disturbed),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/device/can/cia402/can_units.c: rig.conf in the units of a drive, held against figures made by
+ * hand.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <math.h>
+#include "../../../lib/device/can/cia402/can_units.h"
+#include "rig.h"
+
+/* 4 mm a turn; 10 mm/s are 2.5 turns/s, 500 mm/s² are 125. */
+static void make(struct can_link *link, double counts_per_turn)
+{
+	static struct can_rig rig;
+
+	can_rig_init(&rig);
+	*link = (struct can_link){
+		.bus = &rig.drive.bus,
+		.actuator = rig.actuator,
+		.units = {counts_per_turn, 60, 60},
+	};
+	link->master.bus = link->bus;
+}
+
+static void steps_are_as_fine_as_may_be(void **state)
+{
+	static const struct {
+		double counts_per_turn, velocity_mm_s;
+		int steps_per_turn;
+	} cases[] = {
+		{51200, 10, 51200},
+		{3600, 10, 3600},
+		{0.5, 10, 1},
+		{2000.7, 10, 2000},
+		/* 150000 steps/s at the most: 60000 of 2.5 turns/s, 1500 of 100. */
+		{131072, 10, 60000},
+		{1e9, 10, 60000},
+		{51200, 400, 1500},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		struct can_link link;
+
+		make(&link, cases[i].counts_per_turn);
+		link.actuator.velocity_mm_s = cases[i].velocity_mm_s;
+		can_fit_steps(&link);
+		assert_int_equal(link.actuator.steps_per_turn, cases[i].steps_per_turn);
+		can_fit_setup(&link);
+		assert_int_equal(can_fit_axis(&link, "here", &err), 0);
+		/* A turn is a turn, however it is counted. */
+		assert_true(
+			fabs(link.axis.setup.counts_per_step * cases[i].steps_per_turn -
+			     cases[i].counts_per_turn) <=
+			1e-9 * cases[i].counts_per_turn);
+	}
+}
+
+static void limits_are_the_drives_with_room(void **state)
+{
+	struct incise_error err = {0};
+	struct can_link link;
+
+	make(&link, 51200);
+	can_fit_steps(&link);
+	can_fit_setup(&link);
+	assert_int_equal(can_fit_axis(&link, "here", &err), 0);
+	/* In rpm: 150 and 7500 rpm/s, and a quarter more. */
+	assert_int_equal(link.setup.velocity, 188);
+	assert_int_equal(link.setup.acceleration, 9375);
+	assert_int_equal(link.setup.following, 12800);
+	assert_int_equal(link.setup.following_ms, 50);
+	assert_int_equal(link.setup.deadman_ms, 100);
+	assert_int_equal(link.setup.beat_ms, 25);
+	link.is_homed = true;
+	link.axis.zero_counts = 6400;
+	can_fit_range(&link);
+	assert_true(link.setup.limited);
+	assert_int_equal(link.setup.position_min, 6400 - 12800);
+	assert_int_equal(link.setup.position_max, 6400 + 21 * 12800);
+	/* Turned round, with a home below 0. */
+	link.actuator.invert = true;
+	link.actuator.home_mm = -2;
+	assert_int_equal(can_fit_axis(&link, "here", &err), 0);
+	can_fit_range(&link);
+	assert_int_equal(link.setup.position_min, 6400 - 21 * 12800);
+	assert_int_equal(link.setup.position_max, 6400 + 3 * 12800);
+	assert_int_equal(link.axis.setup.config.position_min, -2 * 12800);
+	/* A jerk that would take more ticks than there is room for. */
+	link.actuator.jerk_mm_s3 = 1;
+	assert_int_equal(can_fit_axis(&link, "here", &err), -ERANGE);
+	assert_non_null(strstr(err.text, "jerk_mm_s3 = 1"));
+}
+
+static void a_bus_that_is_too_slow_is_refused(void **state)
+{
+	static const struct {
+		uint32_t bitrate, cycle_ns;
+		bool fits;
+	} cases[] = {
+		{1000000, 1000000, true}, {800000, 1000000, true},
+		{500000, 1000000, true},  {250000, 1000000, false},
+		{1000000, 500000, true},  {500000, 500000, false},
+		{500000, 2000000, true},  {250000, 2000000, true},
+		{125000, 2000000, false}, {10000, 2000000, false},
+		{0, 500000, true},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		struct can_link link;
+		int rc;
+
+		make(&link, 51200);
+		link.bus->bitrate = cases[i].bitrate;
+		link.actuator.can.cycle_ns = cases[i].cycle_ns;
+		can_fit_steps(&link);
+		can_fit_setup(&link);
+		rc = can_fit_load(&link, "here", &err);
+		if (rc != (cases[i].fits ? 0 : -ERANGE))
+			fail_msg("case %zu: %d, %u %%", i, rc, link.load_percent);
+		if (!cases[i].fits)
+			assert_non_null(strstr(err.text, "may take 80 %"));
+		assert_int_equal(!link.load_percent, !cases[i].bitrate);
+	}
+}
+
+static void whole_units(void **state)
+{
+	assert_int_equal(can_fit_units(0), 1);
+	assert_int_equal(can_fit_units(0.2), 1);
+	assert_int_equal(can_fit_units(1.2), 2);
+	assert_int_equal(can_fit_units(1e300), UINT32_MAX);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(steps_are_as_fine_as_may_be),
+		cmocka_unit_test(limits_are_the_drives_with_room),
+		cmocka_unit_test(a_bus_that_is_too_slow_is_refused),
+		cmocka_unit_test(whole_units),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
