@@ -32,7 +32,7 @@ $(O)/obj/fuzz/%.o: %.cc
 fuzz_vision_frame := lib/base/error.c lib/device/vision.c lib/device/module.c tests/vision/linked.c \
 	$(wildcard lib/vision/*.c lib/vision/*.cc)
 fuzz_libs_vision_frame := $(libs_vision_opencv)
-fuzz_slcan_line := lib/device/can/bus/slcan_line.c
+fuzz_slcan_line := lib/device/can/bus/slcan_protocol.c
 fuzz_can_frames := lib/base/error.c $(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/cia402*.c)
 
 fuzz_polhemus_records := lib/base/ring.c $(addprefix lib/device/polhemus/polhemus_,gaps.c model.c \

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/bus/slcan.c on a pseudo terminal: the test is the adapter at its other end.
+ * lib/device/can/bus/slcan.c on a pseudo terminal: the test plays the adapter at the other end.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
@@ -22,20 +23,44 @@
 
 #define MS 1000000
 
-/* The tty takes at most so many bytes at once; -1: as many as it does. */
+/* write() takes at most so many bytes at once (-1: all), after so many signals, or fails. */
 static ssize_t write_most = -1;
+static int write_interrupts, write_error;
+/* Then it takes so many bytes in all (-1: any number). */
+static ssize_t write_left = -1;
 
 ssize_t __real_write(int fd, const void *bytes, size_t n);
 
 ssize_t __wrap_write(int fd, const void *bytes, size_t n)
 {
+	ssize_t done;
+
+	if (write_interrupts-- > 0) {
+		errno = EINTR;
+		return -1;
+	}
+	if (write_error) {
+		errno = write_error;
+		return -1;
+	}
 	if (write_most >= 0 && n > (size_t)write_most)
 		n = (size_t)write_most;
+	if (write_left >= 0 && n > (size_t)write_left)
+		n = (size_t)write_left;
 	if (!n) {
 		errno = EAGAIN;
 		return -1;
 	}
-	return __real_write(fd, bytes, n);
+	done = __real_write(fd, bytes, n);
+	if (write_left >= 0 && done > 0)
+		write_left -= done;
+	return done;
+}
+
+static void write_all(void)
+{
+	write_most = write_left = -1;
+	write_interrupts = write_error = 0;
 }
 
 struct adapter {
@@ -50,7 +75,7 @@ static void adapter_new(struct adapter *a)
 	assert_true(a->fd >= 0 && !grantpt(a->fd) && !unlockpt(a->fd));
 	assert_int_equal(ptsname_r(a->fd, a->path, sizeof(a->path)), 0);
 	a->bus = NULL;
-	write_most = -1;
+	write_all();
 }
 
 static int open_device(struct adapter *a, const char *device, uint32_t bitrate,
@@ -67,14 +92,14 @@ static int adapter_open(struct adapter *a, uint32_t bitrate, struct incise_error
 	return open_device(a, a->path, bitrate, err);
 }
 
-/* What the adapter was told, as far as it goes; CR is shown as a dot. */
-static const char *told(struct adapter *a)
+/* Returns the bytes that the adapter received; CR is shown as a dot. */
+static const char *received(struct adapter *a)
 {
 	static char text[4096];
 	struct pollfd poll_fd = {.fd = a->fd, .events = POLLIN};
 	size_t n = 0;
 
-	/* A pty hands bytes on by a kernel worker: wait for the first ones. */
+	/* A kernel worker passes the bytes of a pty on: wait for the first ones. */
 	while (n < sizeof(text) - 1 && poll(&poll_fd, 1, n ? 20 : 1000) == 1) {
 		ssize_t got = read(a->fd, text + n, sizeof(text) - 1 - n);
 
@@ -89,14 +114,14 @@ static const char *told(struct adapter *a)
 	return text;
 }
 
-static void tell(struct adapter *a, const char *bytes, size_t n)
+static void send_bytes(struct adapter *a, const char *bytes, size_t n)
 {
 	assert_int_equal(__real_write(a->fd, bytes, n), n);
 }
 
-#define TELL(a, text) tell(a, text, sizeof(text) - 1)
+#define SEND(a, text) send_bytes(a, text, sizeof(text) - 1)
 
-/* The next frame or error frame; 0 where none comes within 50 ms. */
+/* The next frame or error frame; 0: none within 50 ms. */
 static int next(struct adapter *a, struct can_frame *frame)
 {
 	int64_t end = a->bus->ops->now(a->bus) + 50 * MS, t_ns;
@@ -122,7 +147,7 @@ static int setup(void **state)
 	adapter_new(&a);
 	if (adapter_open(&a, 500000, &err))
 		fail_msg("%s", err.text);
-	assert_string_equal(told(&a), ".C.S6.O.");
+	assert_string_equal(received(&a), ".C.S6.O.");
 	*state = &a;
 	return 0;
 }
@@ -131,7 +156,7 @@ static int teardown(void **state)
 {
 	struct adapter *a = *state;
 
-	write_most = -1;
+	write_all();
 	if (a->bus)
 		a->bus->ops->close(a->bus);
 	if (a->fd >= 0)
@@ -139,7 +164,7 @@ static int teardown(void **state)
 	return 0;
 }
 
-static void it_goes_on_the_bus_and_off(void **state)
+static void the_adapter_goes_on_the_bus_and_off(void **state)
 {
 	static const struct {
 		uint32_t bitrate, is;
@@ -159,7 +184,7 @@ static void it_goes_on_the_bus_and_off(void **state)
 
 		adapter_new(&a);
 		assert_int_equal(adapter_open(&a, cases[i].bitrate, &err), 0);
-		assert_string_equal(told(&a), cases[i].said);
+		assert_string_equal(received(&a), cases[i].said);
 		assert_int_equal(a.bus->bitrate, cases[i].is);
 		assert_string_equal(a.bus->name, a.path);
 		assert_int_equal(a.bus->ops->state(a.bus), -EOPNOTSUPP);
@@ -168,7 +193,7 @@ static void it_goes_on_the_bus_and_off(void **state)
 		assert_int_equal(t.c_iflag & (IXON | IXOFF | ICRNL), 0);
 		assert_int_equal(t.c_oflag & OPOST, 0);
 		a.bus->ops->close(a.bus);
-		assert_string_equal(told(&a), "C.");
+		assert_string_equal(received(&a), "C.");
 		close(a.fd);
 	}
 }
@@ -185,7 +210,7 @@ static void a_rate_that_none_has_is_refused(void **state)
 	close(a.fd);
 }
 
-static void the_rate_may_stand_behind_the_tty(void **state)
+static void the_rate_may_follow_the_tty(void **state)
 {
 	static const struct {
 		const char *behind;
@@ -223,7 +248,7 @@ static void the_rate_may_stand_behind_the_tty(void **state)
 		if (rc != cases[i].rc || (rc && !strstr(err.text, cases[i].said)))
 			fail_msg("case %zu: %d: %s", i, rc, err.text);
 		if (!rc) {
-			assert_string_equal(told(&a), cases[i].said);
+			assert_string_equal(received(&a), cases[i].said);
 			assert_int_equal(a.bus->bitrate, atoi(cases[i].behind + 1));
 			assert_string_equal(a.bus->name, a.path);
 			a.bus->ops->close(a.bus);
@@ -273,7 +298,9 @@ static void one_program_at_a_time(void **state)
 	struct incise_error err = {0};
 
 	assert_int_equal(adapter_open(&other, 0, &err), -EBUSY);
-	assert_non_null(strstr(err.text, "another program has /dev/pts/"));
+	assert_ptr_equal(strstr(err.text,
+				"rig.conf:1: stepper: another program has /dev/pts/"),
+			 err.text);
 	a->bus->ops->close(a->bus);
 	a->bus = NULL;
 	assert_int_equal(adapter_open(a, 0, &err), 0);
@@ -288,13 +315,13 @@ static void frames_go_both_ways(void **state)
 			 in;
 
 	assert_int_equal(a->bus->ops->send(a->bus, &out), 0);
-	assert_string_equal(told(a), "t21060F00FFEEDDCC.");
+	assert_string_equal(received(a), "t21060F00FFEEDDCC.");
 	out.can_dlc = 9;
 	assert_int_equal(a->bus->ops->send(a->bus, &out), -EINVAL);
-	/* Its own C, S and O, as python-can sends them, are nothing to this side. */
-	TELL(a, "C\rS8\rO\rz\rt190237AB12");
+	/* This side ignores C, S and O, which python-can sends. */
+	SEND(a, "C\rS8\rO\rz\rt190237AB12");
 	assert_int_equal(next(a, &in), 0);
-	TELL(a, "34\rT1FFFFFFF0\r");
+	SEND(a, "34\rT1FFFFFFF0\r");
 	assert_int_equal(next(a, &in), 1);
 	assert_int_equal(in.can_id, 0x190);
 	assert_int_equal(in.can_dlc, 2);
@@ -308,19 +335,19 @@ static void frames_go_both_ways(void **state)
 	assert_int_equal(a->bus->counts.errors, 0);
 }
 
-static void junk_is_counted_and_left_behind(void **state)
+static void junk_is_counted_and_skipped(void **state)
 {
 	static char junk[9000];
 	struct adapter *a = *state;
 	struct can_frame in;
 
 	memset(junk, 'x', sizeof(junk));
-	TELL(a, "\0\0t12\0\rt1231A\r");
+	SEND(a, "\0\0t12\0\rt1231A\r");
 	for (size_t at = 0; at < sizeof(junk); at += 3000) {
-		tell(a, junk + at, 3000);
+		send_bytes(a, junk + at, 3000);
 		assert_int_equal(next(a, &in), 0);
 	}
-	TELL(a, "\rt1230\r");
+	SEND(a, "\rt1230\r");
 	assert_int_equal(next(a, &in), 1);
 	assert_int_equal(in.can_id, 0x123);
 	assert_int_equal(a->bus->counts.broken, 3);
@@ -338,37 +365,37 @@ static void filters_are_exact(void **state)
 	int n = 0;
 
 	assert_int_equal(a->bus->ops->filter(a->bus, exact, 2), 0);
-	tell(a, all, sizeof(all) - 1);
+	send_bytes(a, all, sizeof(all) - 1);
 	assert_int_equal(next(a, &in), 1);
 	assert_int_equal(in.can_id, 0x190);
 	assert_int_equal(next(a, &in), 1);
 	assert_int_equal(in.can_id, 0x710);
 	assert_int_equal(next(a, &in), 0);
 	assert_int_equal(a->bus->ops->filter(a->bus, &other, 1), 0);
-	tell(a, all, sizeof(all) - 1);
+	send_bytes(a, all, sizeof(all) - 1);
 	while (next(a, &in)) {
 		assert_int_not_equal(in.can_id, 0x190);
 		n++;
 	}
 	assert_int_equal(n, 5);
 	assert_int_equal(a->bus->ops->filter(a->bus, NULL, 0), 0);
-	tell(a, all, sizeof(all) - 1);
+	send_bytes(a, all, sizeof(all) - 1);
 	for (n = 0; next(a, &in); n++)
 		;
 	assert_int_equal(n, 6);
 	assert_int_equal(a->bus->ops->filter(a->bus, many, CAN_BUS_FILTERS + 1), -EINVAL);
 }
 
-/* Send until the adapter is asked for its status: 100 ms. */
-static void until_asked(struct adapter *a)
+/* Send until the adapter is queried for its status: 100 ms. */
+static void until_queried(struct adapter *a)
 {
 	const struct can_frame sync = {.can_id = 0x080};
 
 	nanosleep(&(struct timespec){.tv_nsec = 101 * MS}, NULL);
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	assert_string_equal(told(a), "t0800.F.");
+	assert_string_equal(received(a), "t0800.F.");
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	assert_string_equal(told(a), "t0800.");
+	assert_string_equal(received(a), "t0800.");
 }
 
 static void status_becomes_error_frames(void **state)
@@ -398,9 +425,9 @@ static void status_becomes_error_frames(void **state)
 	struct can_frame in;
 	uint64_t errors = 0;
 
-	until_asked(a);
+	until_queried(a);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		tell(a, cases[i].answer, strlen(cases[i].answer));
+		send_bytes(a, cases[i].answer, strlen(cases[i].answer));
 		assert_int_equal(next(a, &in), !!cases[i].id);
 		assert_int_equal(a->bus->ops->state(a->bus), cases[i].state);
 		if (!cases[i].id)
@@ -420,9 +447,9 @@ static void refusals_are_errors_but_for_the_start(void **state)
 	struct adapter *a = *state;
 	struct can_frame in;
 
-	TELL(a, "\a\a\r\a");
+	SEND(a, "\a\a\r\a");
 	assert_int_equal(next(a, &in), 0);
-	TELL(a, "\a\a");
+	SEND(a, "\a\a");
 	assert_int_equal(next(a, &in), 1);
 	assert_int_equal(in.can_id, CAN_ERR_FLAG | CAN_ERR_CRTL);
 	assert_int_equal(in.data[1], CAN_ERR_CRTL_TX_OVERFLOW);
@@ -430,26 +457,26 @@ static void refusals_are_errors_but_for_the_start(void **state)
 	assert_int_equal(a->bus->counts.errors, 1);
 }
 
-static void who_does_not_know_the_question_is_left_alone(void **state)
+static void an_adapter_without_the_query_is_left_alone(void **state)
 {
 	const struct can_frame sync = {.can_id = 0x080};
 	struct adapter *a = *state;
 	struct can_frame in;
 
-	TELL(a, "\a\a\a\a");
+	SEND(a, "\a\a\a\a");
 	assert_int_equal(next(a, &in), 0);
 	for (int i = 0; i < 3; i++) {
-		until_asked(a);
-		TELL(a, "\r\a");
+		until_queried(a);
+		SEND(a, "\r\a");
 		assert_int_equal(next(a, &in), 0);
 	}
 	nanosleep(&(struct timespec){.tv_nsec = 101 * MS}, NULL);
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	assert_string_equal(told(a), "t0800.");
+	assert_string_equal(received(a), "t0800.");
 	assert_int_equal(a->bus->counts.errors, 0);
 }
 
-/* An adapter that does not read: what was taken arrives whole and in order, once it does. */
+/* An adapter that does not read for a while: accepted frames arrive whole and in order. */
 static void a_frame_is_sent_whole_or_not(void **state)
 {
 	struct adapter *a = *state;
@@ -473,7 +500,7 @@ static void a_frame_is_sent_whole_or_not(void **state)
 		if (byte != '\r') {
 			line[n++] = byte;
 			assert_true(n < sizeof(line));
-			/* The last line may end here: it is the rest that goes out now. */
+			/* The last line may end here: now its rest goes out. */
 			if (seen == sent - 1)
 				a->bus->ops->wait(a->bus, 0);
 			continue;
@@ -496,7 +523,6 @@ static void a_frame_is_sent_whole_or_not(void **state)
 	assert_int_equal(n, 0);
 }
 
-/* The tty takes three bytes at a time. */
 static void a_torn_line_is_finished_first(void **state)
 {
 	struct adapter *a = *state;
@@ -505,16 +531,136 @@ static void a_torn_line_is_finished_first(void **state)
 	write_most = 0;
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), -ENOBUFS);
 	write_most = 3;
+	write_interrupts = 5;
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
 	assert_int_equal(a->bus->ops->send(a->bus, &other), 0);
-	write_most = -1;
-	assert_string_equal(told(a), "t0800.t1230.");
-	assert_int_equal(a->bus->counts.full, 1);
-	assert_int_equal(a->bus->counts.sent, 2);
+	assert_string_equal(received(a), "t0800.t1230.");
+	/* Two bytes went out, and then none do: the rest is kept, ahead of later frames. */
+	write_left = 2;
+	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
+	assert_int_equal(a->bus->ops->send(a->bus, &other), -ENOBUFS);
+	assert_int_equal(a->bus->ops->wait(a->bus, 0), 0);
+	assert_string_equal(received(a), "t0");
+	write_all();
+	assert_int_equal(a->bus->ops->send(a->bus, &other), 0);
+	assert_string_equal(received(a), "800.t1230.");
+	assert_int_equal(a->bus->counts.full, 2);
+	assert_int_equal(a->bus->counts.sent, 4);
 }
 
-/* A reader that is late: what was sent before the end waits in the pty, and stays there. */
-static void what_was_sent_last_arrives(void **state)
+static void an_error_of_the_line_is_permanent(void **state)
+{
+	static const struct {
+		int error, rc;
+	} cases[] = {{EIO, -ENODEV}, {ENXIO, -ENODEV}, {ENODEV, -ENODEV}, {EPERM, -EIO}};
+	const struct can_frame sync = {.can_id = 0x080};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct can_frame in;
+		struct adapter a;
+		int64_t t_ns;
+
+		adapter_new(&a);
+		assert_int_equal(adapter_open(&a, 0, NULL), 0);
+		write_error = cases[i].error;
+		assert_int_equal(a.bus->ops->send(a.bus, &sync), cases[i].rc);
+		write_error = 0;
+		assert_int_equal(a.bus->ops->send(a.bus, &sync), cases[i].rc);
+		assert_int_equal(a.bus->ops->receive(a.bus, &in, &t_ns), cases[i].rc);
+		a.bus->ops->close(a.bus);
+		close(a.fd);
+	}
+}
+
+/* No byte is translated, dropped or taken for flow control. */
+static void bytes_arrive_unchanged(void **state)
+{
+	struct adapter *a = *state;
+	struct can_frame in;
+	char all[256];
+
+	for (size_t i = 0; i < sizeof(all); i++)
+		all[i] = (char)i;
+	/* BEL and CR end broken lines; the line behind CR is too long. */
+	send_bytes(a, all, sizeof(all));
+	assert_int_equal(next(a, &in), 0);
+	assert_int_equal(a->bus->counts.broken, 2);
+	SEND(a, "\r");
+	assert_int_equal(next(a, &in), 0);
+	assert_int_equal(a->bus->counts.broken, 3);
+	/* A byte that is dropped would leave a frame. */
+	for (int byte = 0; byte < 256; byte++) {
+		char line[] = {'t', '1', '2', '3', '0', (char)byte, '\r'};
+
+		if (byte != '\r' && byte != '\a')
+			send_bytes(a, line, sizeof(line));
+	}
+	assert_int_equal(next(a, &in), 0);
+	assert_int_equal(a->bus->counts.broken, 3 + 254);
+}
+
+/* The speed that stty set stays; the default of a port that nobody set does not. */
+static void the_speed_is_the_users(void **state)
+{
+	static const struct {
+		speed_t set, is;
+	} cases[] = {{B9600, B115200}, {B115200, B115200}, {B1000000, B1000000}};
+	struct adapter *a = *state;
+	struct incise_error err = {0};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct termios t;
+
+		assert_int_equal(tcgetattr(a->fd, &t), 0);
+		cfsetspeed(&t, cases[i].set);
+		assert_int_equal(tcsetattr(a->fd, TCSANOW, &t), 0);
+		a->bus->ops->close(a->bus);
+		a->bus = NULL;
+		assert_int_equal(adapter_open(a, 0, &err), 0);
+		assert_int_equal(tcgetattr(a->fd, &t), 0);
+		assert_int_equal(cfgetospeed(&t), cases[i].is);
+		assert_int_equal(t.c_lflag & (ICANON | ECHO | ISIG), 0);
+	}
+}
+
+static void a_path_that_is_no_tty_is_refused(void **state)
+{
+	char folder[] = "/tmp/incise-tty-XXXXXX", file[64], pipe[64];
+	struct {
+		const char *path;
+		int code;
+		const char *words;
+	} cases[] = {
+		{file, -EINVAL, "is no serial line"},
+		{pipe, -EINVAL, "is no serial line"},
+		{folder, -EINVAL, "is no serial line"},
+		{"/dev/null", -EINVAL, "is no serial line"},
+		{"", -ENODEV, "is not there"},
+		{"/dev/ttyACM4711", -ENODEV, "is the adapter plugged in"},
+	};
+	int fd;
+
+	assert_non_null(mkdtemp(folder));
+	snprintf(file, sizeof(file), "%s/file", folder);
+	snprintf(pipe, sizeof(pipe), "%s/pipe", folder);
+	fd = open(file, O_CREAT | O_WRONLY, 0600);
+	close(fd);
+	assert_int_equal(mkfifo(pipe, 0600), 0);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		struct adapter a;
+
+		assert_int_equal(open_device(&a, cases[i].path, 0, &err), cases[i].code);
+		assert_int_equal(err.code, -cases[i].code);
+		assert_non_null(strstr(err.text, cases[i].words));
+	}
+	unlink(file);
+	unlink(pipe);
+	rmdir(folder);
+}
+
+/* A late reader: frames sent before close() wait in the pty, and stay there. */
+static void the_last_frames_arrive(void **state)
 {
 	const struct can_frame last = {.can_id = 0x000, .can_dlc = 2, .data = {0x80, 16}};
 	struct adapter *a = *state;
@@ -530,7 +676,7 @@ static void what_was_sent_last_arrives(void **state)
 	a->bus->ops->close(a->bus);
 	a->bus = NULL;
 	do {
-		text = told(a);
+		text = received(a);
 		for (const char *at = strchr(text, 't'); at; at = strchr(at + 1, 't'))
 			frames++;
 		if (strlen(text) >= 12 &&
@@ -541,7 +687,8 @@ static void what_was_sent_last_arrives(void **state)
 	assert_int_equal(frames, 701);
 }
 
-static void to_close_a_line_that_is_stuck_ends(void **state)
+/* And it ends too where the line is gone: see an_error_of_the_line_is_permanent(). */
+static void closing_a_stuck_line_ends(void **state)
 {
 	struct adapter *a = *state;
 	const struct can_frame sync = {.can_id = 0x080};
@@ -558,7 +705,7 @@ static void an_adapter_that_is_unplugged_is_gone(void **state)
 	const struct can_frame sync = {.can_id = 0x080};
 	struct can_frame in;
 
-	TELL(a, "t1230\r");
+	SEND(a, "t1230\r");
 	assert_int_equal(next(a, &in), 1);
 	close(a->fd);
 	a->fd = -1;
@@ -568,7 +715,7 @@ static void an_adapter_that_is_unplugged_is_gone(void **state)
 	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MAX), -ENODEV);
 }
 
-static void sending_finds_that_it_is_gone(void **state)
+static void sending_finds_a_lost_line(void **state)
 {
 	struct adapter *a = *state;
 	const struct can_frame sync = {.can_id = 0x080};
@@ -585,13 +732,13 @@ static void waiting_ends(void **state)
 	struct can_frame in;
 	int64_t t_ns;
 
-	/* In the past: at once, however little it says. */
+	/* A time in the past: at once, even without input. */
 	assert_int_equal(a->bus->ops->wait(a->bus, 0), 0);
 	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MIN + begin), 0);
 	assert_int_equal(a->bus->ops->wait(a->bus, begin + 5 * MS), 0);
 	assert_true(a->bus->ops->now(a->bus) >= begin + 5 * MS);
-	/* No frame can come but by these bytes; two came at once, so that the other waits. */
-	TELL(a, "t1230\rt1240\r");
+	/* Two frames arrive at once: the second one needs no wait. */
+	SEND(a, "t1230\rt1240\r");
 	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MAX), 0);
 	assert_int_equal(a->bus->ops->receive(a->bus, &in, &t_ns), 1);
 	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MAX), 0);
@@ -602,24 +749,28 @@ static void waiting_ends(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(it_goes_on_the_bus_and_off),
+		cmocka_unit_test(the_adapter_goes_on_the_bus_and_off),
 		cmocka_unit_test(a_rate_that_none_has_is_refused),
-		cmocka_unit_test(the_rate_may_stand_behind_the_tty),
+		cmocka_unit_test(the_rate_may_follow_the_tty),
 		cmocka_unit_test(a_path_may_have_an_at),
 		cmocka_unit_test(a_path_of_any_length_is_safe),
 		WITH(one_program_at_a_time),
 		WITH(frames_go_both_ways),
-		WITH(junk_is_counted_and_left_behind),
+		WITH(junk_is_counted_and_skipped),
 		WITH(filters_are_exact),
 		WITH(status_becomes_error_frames),
 		WITH(refusals_are_errors_but_for_the_start),
-		WITH(who_does_not_know_the_question_is_left_alone),
+		WITH(an_adapter_without_the_query_is_left_alone),
 		WITH(a_frame_is_sent_whole_or_not),
 		WITH(a_torn_line_is_finished_first),
-		WITH(what_was_sent_last_arrives),
-		WITH(to_close_a_line_that_is_stuck_ends),
+		cmocka_unit_test(an_error_of_the_line_is_permanent),
+		WITH(bytes_arrive_unchanged),
+		WITH(the_speed_is_the_users),
+		cmocka_unit_test(a_path_that_is_no_tty_is_refused),
+		WITH(the_last_frames_arrive),
+		WITH(closing_a_stuck_line_ends),
 		WITH(an_adapter_that_is_unplugged_is_gone),
-		WITH(sending_finds_that_it_is_gone),
+		WITH(sending_finds_a_lost_line),
 		WITH(waiting_ends),
 	};
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/bus/socketcan.c on a kernel that a test makes: the linker hands its system
- * calls, and its question what an interface is, to functions here. The real kernel is asked
- * in tests/vm/guest/can_bus.c. The lock of a node is real.
+ * lib/device/can/bus/socketcan.c on a simulated kernel: the linker replaces its system calls
+ * and the query for the interface by functions here. tests/vm/guest/can_bus.c runs on the real
+ * kernel. The lock of a node is real, and so are its names on this machine.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,9 +11,12 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <poll.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <time.h>
+#include <unistd.h>
 #include <linux/can/error.h>
 #include <linux/can/netlink.h>
 #include <linux/can/raw.h>
@@ -26,11 +29,11 @@
 #define INDEX 42
 #define S INT64_C(1000000000)
 
-/* Two interfaces of CAN, can0 and vcan0, and lo; and how they shall misbehave. */
+/* CAN interfaces, can0 and vcan…, and lo; and the errors to inject. */
 static struct {
 	int socket_error, option_error, bind_error, poll_error;
 	bool down;
-	int ask_error;
+	int query_error;
 	uint32_t bitrate, restart_ms;
 	int state;
 	int opened, bound;
@@ -38,7 +41,7 @@ static struct {
 	struct can_filter filter[64];
 	int n_filters;
 	can_err_mask_t errors;
-	int overflow_on, stamps;
+	int overflow_on, timestamps;
 	/* send */
 	int send_error, send_interrupts;
 	struct can_frame sent;
@@ -47,7 +50,7 @@ static struct {
 	int receive_error;
 	struct can_frame frames[64];
 	ssize_t size[64];
-	struct timespec stamp;
+	struct timespec timestamp;
 	uint32_t lost;
 	int n_frames, next;
 	/* clocks */
@@ -107,33 +110,33 @@ int __wrap_setsockopt(int fd, int level, int name, const void *value, socklen_t 
 	} else if (level == SOL_SOCKET && name == SO_RXQ_OVFL) {
 		memcpy(&kernel.overflow_on, value, size);
 	} else if (level == SOL_SOCKET && name == SO_TIMESTAMPING) {
-		memcpy(&kernel.stamps, value, size);
+		memcpy(&kernel.timestamps, value, size);
 	} else {
 		return answer(ENOPROTOOPT);
 	}
 	return 0;
 }
 
-/* can0 has a second name, adapter. */
-int __wrap_can_netlink_ask(const char *name, struct can_netlink *told)
+/* can0 has an alternative name, adapter. */
+int __wrap_can_netlink_query(const char *name, struct can_netlink *link)
 {
 	bool is_can0 = !strcmp(name, "can0") || !strcmp(name, "adapter");
-	bool is_can = is_can0 || !strcmp(name, "vcan0");
+	bool is_can = is_can0 || !strncmp(name, "vcan", 4);
 
-	if (kernel.ask_error)
-		return -kernel.ask_error;
+	if (kernel.query_error)
+		return -kernel.query_error;
 	if (!is_can && strcmp(name, "lo") != 0)
 		return -ENODEV;
-	*told = (struct can_netlink){.index = INDEX,
+	*link = (struct can_netlink){.index = INDEX,
 				     .is_can = is_can,
 				     .is_up = !kernel.down,
 				     .state = -EOPNOTSUPP};
-	strcpy(told->name, is_can0 ? "can0" : name);
-	strcpy(told->kind, is_can0 ? "can" : is_can ? "vcan" : "");
+	strcpy(link->name, is_can0 ? "can0" : name);
+	strcpy(link->kind, is_can0 ? "can" : is_can ? "vcan" : "");
 	if (is_can0) {
-		told->bitrate = kernel.bitrate;
-		told->restart_ms = kernel.restart_ms;
-		told->state = kernel.state;
+		link->bitrate = kernel.bitrate;
+		link->restart_ms = kernel.restart_ms;
+		link->state = kernel.state;
 	}
 	return 0;
 }
@@ -153,7 +156,7 @@ ssize_t __wrap_send(int fd, const void *bytes, size_t n, int flags)
 
 ssize_t __wrap_recvmsg(int fd, struct msghdr *msg, int flags)
 {
-	struct scm_timestamping stamps = {.ts = {kernel.stamp}};
+	struct scm_timestamping timestamps = {.ts = {kernel.timestamp}};
 	struct cmsghdr *c;
 	ssize_t n;
 
@@ -165,15 +168,15 @@ ssize_t __wrap_recvmsg(int fd, struct msghdr *msg, int flags)
 				     : (ssize_t)sizeof(struct can_frame);
 	memcpy(msg->msg_iov->iov_base, &kernel.frames[kernel.next++],
 	       sizeof(struct can_frame));
-	/* As the kernel does: stamp first, what was lost only if something was. */
+	/* As the kernel does: the timestamp first, the loss only if there was one. */
 	c = CMSG_FIRSTHDR(msg);
 	c->cmsg_level = SOL_SOCKET;
 	c->cmsg_type = SCM_TIMESTAMPING;
-	c->cmsg_len = CMSG_LEN(sizeof(stamps));
-	memcpy(CMSG_DATA(c), &stamps, sizeof(stamps));
-	memset((char *)c + CMSG_SPACE(sizeof(stamps)), 0, sizeof(*c));
+	c->cmsg_len = CMSG_LEN(sizeof(timestamps));
+	memcpy(CMSG_DATA(c), &timestamps, sizeof(timestamps));
+	memset((char *)c + CMSG_SPACE(sizeof(timestamps)), 0, sizeof(*c));
 	if (!kernel.lost) {
-		msg->msg_controllen = CMSG_SPACE(sizeof(stamps));
+		msg->msg_controllen = CMSG_SPACE(sizeof(timestamps));
 		return n;
 	}
 	c = CMSG_NXTHDR(msg, c);
@@ -183,7 +186,7 @@ ssize_t __wrap_recvmsg(int fd, struct msghdr *msg, int flags)
 	c->cmsg_len = CMSG_LEN(sizeof(kernel.lost));
 	memcpy(CMSG_DATA(c), &kernel.lost, sizeof(kernel.lost));
 	msg->msg_controllen =
-		CMSG_SPACE(sizeof(stamps)) + CMSG_SPACE(sizeof(kernel.lost));
+		CMSG_SPACE(sizeof(timestamps)) + CMSG_SPACE(sizeof(kernel.lost));
 	return n;
 }
 
@@ -206,7 +209,7 @@ int __wrap_clock_gettime(clockid_t clock, struct timespec *t)
 	return 0;
 }
 
-static void kernel_begin(void)
+static void kernel_init(void)
 {
 	memset(&kernel, 0, sizeof(kernel));
 	kernel.now_ns = 1000 * S;
@@ -233,7 +236,7 @@ static int setup(void **state)
 {
 	struct incise_error err = {0};
 
-	kernel_begin();
+	kernel_init();
 	return open_bus(&bus, "can0", 0, 0, &err);
 }
 
@@ -244,7 +247,7 @@ static int teardown(void **state)
 	return 0;
 }
 
-static void what_cannot_be_opened_is_said(void **state)
+static void a_failed_open_has_a_message(void **state)
 {
 	static const struct {
 		const char *device;
@@ -253,7 +256,7 @@ static void what_cannot_be_opened_is_said(void **state)
 		bool down;
 		int code;
 		const char *words;
-		int ask_error;
+		int query_error;
 	} cases[] = {
 		{"can0", 0, EAFNOSUPPORT, 0, 0, false, -EAFNOSUPPORT, "modprobe can_raw",
 		 0},
@@ -286,12 +289,12 @@ static void what_cannot_be_opened_is_said(void **state)
 		struct incise_error err = {0};
 		int rc;
 
-		kernel_begin();
+		kernel_init();
 		kernel.socket_error = cases[i].socket_error;
 		kernel.option_error = cases[i].option_error;
 		kernel.bind_error = cases[i].bind_error;
 		kernel.down = cases[i].down;
-		kernel.ask_error = cases[i].ask_error;
+		kernel.query_error = cases[i].query_error;
 		rc = open_bus(&bus, cases[i].device, cases[i].bitrate, 0, &err);
 		if (rc != cases[i].code || !strstr(err.text, cases[i].words))
 			fail_msg("case %zu: %d: %s", i, rc, err.text);
@@ -302,7 +305,7 @@ static void what_cannot_be_opened_is_said(void **state)
 	}
 }
 
-static void what_it_is_set_to_is_the_kernels(void **state)
+static void settings_are_those_of_the_kernel(void **state)
 {
 	static const struct {
 		const char *device;
@@ -320,7 +323,7 @@ static void what_it_is_set_to_is_the_kernels(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_error err = {0};
 
-		kernel_begin();
+		kernel_init();
 		kernel.bitrate = cases[i].set;
 		assert_int_equal(
 			open_bus(&bus, cases[i].device, cases[i].asked_for, 0, &err), 0);
@@ -337,7 +340,7 @@ static void the_socket_is_set_up(void **state)
 	assert_int_equal(kernel.bound, INDEX);
 	assert_int_equal(kernel.errors, CAN_ERR_MASK);
 	assert_int_equal(kernel.overflow_on, 1);
-	assert_int_equal(kernel.stamps,
+	assert_int_equal(kernel.timestamps,
 			 SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE);
 }
 
@@ -348,7 +351,7 @@ static void filters_are_the_kernels(void **state)
 	assert_int_equal(bus->ops->filter(bus, filter, 3), 0);
 	assert_int_equal(kernel.n_filters, 3);
 	assert_memory_equal(kernel.filter, filter, 3 * sizeof(*filter));
-	/* All: one that everything passes. To the kernel none means nothing. */
+	/* All: one filter that passes everything; without any the kernel passes nothing. */
 	assert_int_equal(bus->ops->filter(bus, NULL, 0), 0);
 	assert_int_equal(kernel.n_filters, 1);
 	assert_int_equal(kernel.filter[0].can_mask, 0);
@@ -359,7 +362,7 @@ static void filters_are_the_kernels(void **state)
 	assert_int_equal(bus->ops->filter(bus, filter, 1), -ENOMEM);
 }
 
-static void sending_says_what_became_of_it(void **state)
+static void sending_returns_its_errors(void **state)
 {
 	struct can_frame frame = {.can_id = 0x210, .can_dlc = 8, .data = {1, 2, 3}};
 	static const struct {
@@ -386,7 +389,7 @@ static void sending_says_what_became_of_it(void **state)
 	assert_int_equal(bus->ops->receive(bus, &frame, &kernel.now_ns), -ENETDOWN);
 }
 
-static void what_is_no_frame_is_not_sent(void **state)
+static void an_invalid_frame_is_not_sent(void **state)
 {
 	struct can_frame frame = {.can_id = CAN_ERR_FLAG | CAN_ERR_BUSOFF, .can_dlc = 8};
 
@@ -403,13 +406,13 @@ static void what_is_no_frame_is_not_sent(void **state)
 	assert_int_equal(bus->counts.sent, 0);
 }
 
-/* A frame came so long ago; returns its stamp. */
-static int64_t came(int64_t ago_ns)
+/* Receive a frame that arrived so long ago; returns its timestamp. */
+static int64_t receive_aged(int64_t ago_ns)
 {
 	struct can_frame frame;
 	int64_t t_ns = -1, wall_ns = kernel.wall_ns - ago_ns;
 
-	kernel.stamp = (struct timespec){wall_ns / S, wall_ns % S};
+	kernel.timestamp = (struct timespec){wall_ns / S, wall_ns % S};
 	kernel.n_frames = 1;
 	kernel.next = 0;
 	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), 1);
@@ -417,27 +420,27 @@ static int64_t came(int64_t ago_ns)
 	return t_ns;
 }
 
-static void stamps_are_monotonic(void **state)
+static void timestamps_are_monotonic(void **state)
 {
 	int64_t now;
 
 	kernel.now_ns += 10 * S;
 	kernel.wall_ns += 10 * S;
 	now = kernel.now_ns;
-	assert_int_equal(came(3000), now - 3000);
-	assert_int_equal(came(2000), now - 2000);
-	/* Two processors stamp: the second frame is not before the first. */
-	assert_int_equal(came(2500), now - 2000);
+	assert_int_equal(receive_aged(3000), now - 3000);
+	assert_int_equal(receive_aged(2000), now - 2000);
+	/* Two processors set timestamps: the second frame is not before the first. */
+	assert_int_equal(receive_aged(2500), now - 2000);
 	/* The wall clock is set back, then far forward, with a frame in the queue. */
-	assert_int_equal(came(-3600 * S), now);
+	assert_int_equal(receive_aged(-3600 * S), now);
 	kernel.now_ns += S;
-	assert_int_equal(came(3600 * S), now);
-	assert_int_equal(came(1), now + S - 1);
-	/* No stamp: now. */
-	assert_int_equal(came(kernel.wall_ns), now + S);
+	assert_int_equal(receive_aged(3600 * S), now);
+	assert_int_equal(receive_aged(1), now + S - 1);
+	/* Without a timestamp: now. */
+	assert_int_equal(receive_aged(kernel.wall_ns), now + S);
 }
 
-static void what_the_kernel_lost_is_counted(void **state)
+static void lost_frames_are_counted(void **state)
 {
 	static const struct {
 		uint32_t kernel;
@@ -452,12 +455,12 @@ static void what_the_kernel_lost_is_counted(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		kernel.lost = cases[i].kernel;
-		came(0);
+		receive_aged(0);
 		assert_true(bus->counts.overflow == cases[i].counted);
 	}
 }
 
-static void error_frames_tell_the_state(void **state)
+static void error_frames_set_the_state(void **state)
 {
 	static const struct {
 		canid_t id;
@@ -493,7 +496,7 @@ static void error_frames_tell_the_state(void **state)
 	assert_int_equal(bus->counts.received, 0);
 }
 
-static void what_is_no_frame_is_passed_over(void **state)
+static void an_invalid_frame_is_skipped(void **state)
 {
 	struct can_frame frame;
 	int64_t t_ns;
@@ -516,7 +519,7 @@ static void what_is_no_frame_is_passed_over(void **state)
 	assert_true(kernel.next < 64);
 }
 
-static void receiving_finds_what_went(void **state)
+static void receiving_finds_a_lost_interface(void **state)
 {
 	struct can_frame frame;
 	int64_t t_ns;
@@ -525,7 +528,7 @@ static void receiving_finds_what_went(void **state)
 	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), -EIO);
 	kernel.receive_error = ENODEV;
 	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), -ENODEV);
-	/* For good, although the socket then says nothing more. */
+	/* Permanent, although the socket then reports no more errors. */
 	kernel.receive_error = 0;
 	assert_int_equal(bus->ops->receive(bus, &frame, &t_ns), -ENODEV);
 	frame = (struct can_frame){.can_id = 0x080};
@@ -550,27 +553,55 @@ static void waiting_has_an_end(void **state)
 	assert_int_equal(bus->ops->wait(bus, now + 1), -EINTR);
 }
 
-static void one_program_drives_a_node(void **state)
+/* Names of owners are real: these are of this process. */
+static char interface[IF_NAMESIZE];
+
+static void a_node_has_one_owner(void **state)
 {
 	struct can_bus *first, *second = NULL;
 	struct incise_error err = {0};
+	char longer[sizeof(interface) + 1], name[64];
 
-	kernel_begin();
-	assert_int_equal(open_bus(&first, "vcan0", 0, 113, &err), 0);
-	assert_int_equal(open_bus(&second, "vcan0", 0, 113, &err), -EBUSY);
-	assert_non_null(strstr(err.text, "another program drives it: "));
+	kernel_init();
+	assert_int_equal(open_bus(&first, interface, 0, 113, &err), 0);
+	assert_int_equal(open_bus(&second, interface, 0, 113, &err), -EBUSY);
+	assert_int_equal(err.code, EBUSY);
+	assert_ptr_equal(strstr(err.text,
+				"rig.conf:1: stepper: another program drives it: "),
+			 err.text);
+	/* The message has the name that ss prints. */
+	snprintf(name, sizeof(name), "@incise-can/%s/113)", interface);
+	assert_non_null(strstr(err.text, name));
 	assert_int_equal(kernel.opened, 1);
-	/* The other interface, another node and who just looks are free. */
-	assert_int_equal(open_bus(&second, "can0", 0, 113, &err), 0);
+	/* Another interface, another node and a bus that only watches are free. */
+	snprintf(longer, sizeof(longer), "%s1", interface);
+	assert_int_equal(open_bus(&second, longer, 0, 113, &err), 0);
 	second->ops->close(second);
-	assert_int_equal(open_bus(&second, "vcan0", 0, 11, &err), 0);
+	assert_int_equal(open_bus(&second, interface, 0, 11, &err), 0);
 	second->ops->close(second);
-	assert_int_equal(open_bus(&second, "vcan0", 0, 0, &err), 0);
+	assert_int_equal(open_bus(&second, interface, 0, 0, &err), 0);
 	second->ops->close(second);
 	first->ops->close(first);
-	assert_int_equal(open_bus(&first, "vcan0", 0, 113, &err), 0);
+	assert_int_equal(open_bus(&first, interface, 0, 113, &err), 0);
 	first->ops->close(first);
 	assert_int_equal(kernel.opened, 0);
+}
+
+static void a_dead_process_owns_nothing(void **state)
+{
+	struct incise_error err = {0};
+	pid_t child;
+	int status;
+
+	kernel_init();
+	child = fork();
+	assert_true(child >= 0);
+	if (!child)
+		_exit(open_bus(&bus, interface, 0, 17, NULL) < 0);
+	assert_int_equal(waitpid(child, &status, 0), child);
+	assert_int_equal(status, 0);
+	assert_int_equal(open_bus(&bus, interface, 0, 17, &err), 0);
+	bus->ops->close(bus);
 }
 
 #define WITH(test) cmocka_unit_test_setup_teardown(test, setup, teardown)
@@ -578,20 +609,22 @@ static void one_program_drives_a_node(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(what_cannot_be_opened_is_said),
-		cmocka_unit_test(what_it_is_set_to_is_the_kernels),
-		cmocka_unit_test(one_program_drives_a_node),
+		cmocka_unit_test(a_failed_open_has_a_message),
+		cmocka_unit_test(settings_are_those_of_the_kernel),
+		cmocka_unit_test(a_node_has_one_owner),
+		cmocka_unit_test(a_dead_process_owns_nothing),
 		WITH(the_socket_is_set_up),
 		WITH(filters_are_the_kernels),
-		WITH(sending_says_what_became_of_it),
-		WITH(what_is_no_frame_is_not_sent),
-		WITH(stamps_are_monotonic),
-		WITH(what_the_kernel_lost_is_counted),
-		WITH(error_frames_tell_the_state),
-		WITH(what_is_no_frame_is_passed_over),
-		WITH(receiving_finds_what_went),
+		WITH(sending_returns_its_errors),
+		WITH(an_invalid_frame_is_not_sent),
+		WITH(timestamps_are_monotonic),
+		WITH(lost_frames_are_counted),
+		WITH(error_frames_set_the_state),
+		WITH(an_invalid_frame_is_skipped),
+		WITH(receiving_finds_a_lost_interface),
 		WITH(waiting_has_an_end),
 	};
 
+	snprintf(interface, sizeof(interface), "vcan%ld", (long)getpid());
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

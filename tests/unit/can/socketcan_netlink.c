@@ -152,41 +152,41 @@ static void put_error(struct datagram *d, int code, uint32_t sequence, uint32_t 
 }
 
 /* Of memory that ends where the datagram does, so that a read behind it is found. */
-static int parse(const void *bytes, size_t n, struct can_netlink *told)
+static int parse(const void *bytes, size_t n, struct can_netlink *link)
 {
 	void *copy = malloc(n ? n : 1);
 	int rc;
 
 	assert_non_null(copy);
 	memcpy(copy, bytes, n);
-	rc = can_netlink_parse(copy, n, SEQUENCE, PORT, told);
+	rc = can_netlink_parse(copy, n, SEQUENCE, PORT, link);
 	free(copy);
 	return rc;
 }
 
-static int parse_interface(const struct interface *i, struct can_netlink *told)
+static int parse_interface(const struct interface *i, struct can_netlink *link)
 {
 	struct datagram d = {.n = 0};
 
 	put_link(&d, i, SEQUENCE, PORT);
-	return parse(d.bytes, d.n, told);
+	return parse(d.bytes, d.n, link);
 }
 
 static void a_controller_is_told(void **state)
 {
 	struct interface i = can0;
-	struct can_netlink told;
+	struct can_netlink link;
 
 	for (int n = 0; n < 2; n++) {
-		assert_int_equal(parse_interface(&i, &told), 1);
-		assert_string_equal(told.name, "can0");
-		assert_string_equal(told.kind, "can");
-		assert_int_equal(told.index, 5);
-		assert_true(told.is_can && told.is_up);
-		assert_int_equal(told.bitrate, 500000);
-		assert_int_equal(told.restart_ms, 100);
-		assert_int_equal(told.state, CAN_STATE_ERROR_PASSIVE);
-		/* In whatever order it is told. */
+		assert_int_equal(parse_interface(&i, &link), 1);
+		assert_string_equal(link.name, "can0");
+		assert_string_equal(link.kind, "can");
+		assert_int_equal(link.index, 5);
+		assert_true(link.is_can && link.is_up);
+		assert_int_equal(link.bitrate, 500000);
+		assert_int_equal(link.restart_ms, 100);
+		assert_int_equal(link.state, CAN_STATE_ERROR_PASSIVE);
+		/* In whatever order it is link. */
 		i.data_first = true;
 	}
 }
@@ -194,21 +194,21 @@ static void a_controller_is_told(void **state)
 static void what_is_not_known_is_not_made_up(void **state)
 {
 	struct interface i = can0;
-	struct can_netlink told;
+	struct can_netlink link;
 
 	i.bitrate = UINT32_MAX;
 	i.state = CAN_STATE_MAX;
 	i.flags = 0;
-	assert_int_equal(parse_interface(&i, &told), 1);
-	assert_int_equal(told.bitrate, 0);
-	assert_int_equal(told.state, -EOPNOTSUPP);
-	assert_false(told.is_up);
+	assert_int_equal(parse_interface(&i, &link), 1);
+	assert_int_equal(link.bitrate, 0);
+	assert_int_equal(link.state, -EOPNOTSUPP);
+	assert_false(link.is_up);
 	i = can0;
 	i.no_data = true;
-	assert_int_equal(parse_interface(&i, &told), 1);
-	assert_int_equal(told.bitrate, 0);
-	assert_int_equal(told.restart_ms, 0);
-	assert_int_equal(told.state, -EOPNOTSUPP);
+	assert_int_equal(parse_interface(&i, &link), 1);
+	assert_int_equal(link.bitrate, 0);
+	assert_int_equal(link.restart_ms, 0);
+	assert_int_equal(link.state, -EOPNOTSUPP);
 }
 
 /* Their data is not a controller's, though the numbers of its attributes are the same. */
@@ -228,17 +228,17 @@ static void other_kinds_tell_no_rate(void **state)
 
 	for (size_t n = 0; n < sizeof(cases) / sizeof(*cases); n++) {
 		struct interface i = can0;
-		struct can_netlink told;
+		struct can_netlink link;
 
 		i.kind = cases[n].kind;
 		i.type = cases[n].type;
 		i.state_size = 1;
-		assert_int_equal(parse_interface(&i, &told), 1);
-		assert_string_equal(told.kind, cases[n].is);
-		assert_int_equal(told.is_can, cases[n].type == ARPHRD_CAN);
-		assert_int_equal(told.bitrate, 0);
-		assert_int_equal(told.restart_ms, 0);
-		assert_int_equal(told.state, -EOPNOTSUPP);
+		assert_int_equal(parse_interface(&i, &link), 1);
+		assert_string_equal(link.kind, cases[n].is);
+		assert_int_equal(link.is_can, cases[n].type == ARPHRD_CAN);
+		assert_int_equal(link.bitrate, 0);
+		assert_int_equal(link.restart_ms, 0);
+		assert_int_equal(link.state, -EOPNOTSUPP);
 	}
 }
 
@@ -247,7 +247,7 @@ static void what_has_not_its_size_is_refused(void **state)
 	struct interface cases[] = {can0, can0, can0, can0, can0, can0,
 				    can0, can0, can0, can0, can0};
 	size_t n = sizeof(cases) / sizeof(*cases);
-	struct can_netlink told;
+	struct can_netlink link;
 
 	cases[0].timing_size = sizeof(struct can_bittiming) - 1;
 	cases[1].timing_size = 4;
@@ -261,34 +261,34 @@ static void what_has_not_its_size_is_refused(void **state)
 	cases[9].open_kind = true;
 	cases[10].index = 0;
 	for (size_t i = 0; i < n; i++)
-		if (parse_interface(&cases[i], &told) != -EBADMSG)
+		if (parse_interface(&cases[i], &link) != -EBADMSG)
 			fail_msg("case %zu", i);
 	/* A later kernel may say more of the timing. */
 	cases[0].timing_size = sizeof(struct can_bittiming) + 8;
-	assert_int_equal(parse_interface(&cases[0], &told), 1);
-	assert_int_equal(told.bitrate, 500000);
+	assert_int_equal(parse_interface(&cases[0], &link), 1);
+	assert_int_equal(link.bitrate, 500000);
 }
 
 /* A datagram that ends early, and one that also says so in its header. */
 static void what_is_cut_off_is_refused(void **state)
 {
 	struct datagram d = {.n = 0};
-	struct can_netlink told;
+	struct can_netlink link;
 	int whole = 0;
 
 	put_link(&d, &can0, SEQUENCE, PORT);
 	for (size_t n = 1; n < d.n; n++)
-		assert_int_equal(parse(d.bytes, n, &told), -EBADMSG);
+		assert_int_equal(parse(d.bytes, n, &link), -EBADMSG);
 	for (uint32_t n = 0; n < d.n; n++) {
 		memcpy(d.bytes, &n, sizeof(n));
-		whole += parse(d.bytes, n, &told) == 1;
+		whole += parse(d.bytes, n, &link) == 1;
 	}
 	/* Whatever else it says of its length. */
 	for (int shift = 10; shift < 32; shift++) {
 		uint32_t length = 1u << shift;
 
 		memcpy(d.bytes, &length, sizeof(length));
-		assert_int_equal(parse(d.bytes, d.n, &told), -EBADMSG);
+		assert_int_equal(parse(d.bytes, d.n, &link), -EBADMSG);
 	}
 	/* Only where an attribute after the name would begin: behind the name or one of the
 	 * three bytes that fill it up, behind IFLA_STATS and behind IFLA_LINKINFO. */
@@ -303,21 +303,21 @@ static void whatever_comes_is_read_within_it(void **state)
 	put_link(&whole, &can0, SEQUENCE, PORT);
 	for (int i = 0; i < 50000; i++) {
 		struct datagram d = whole;
-		struct can_netlink told;
+		struct can_netlink link;
 		int rc;
 
 		for (int k = 0; k < 3; k++) {
 			seed = seed * 1664525 + 1013904223;
 			d.bytes[(seed >> 16) % d.n] = (unsigned char)(seed >> 8);
 		}
-		rc = parse(d.bytes, d.n, &told);
+		rc = parse(d.bytes, d.n, &link);
 		assert_true(rc >= -4095 && rc <= 1);
 		if (rc != 1)
 			continue;
-		assert_true(strnlen(told.name, IF_NAMESIZE) < IF_NAMESIZE);
-		assert_true(strnlen(told.kind, sizeof(told.kind)) < sizeof(told.kind));
-		assert_true(told.state == -EOPNOTSUPP ||
-			    (told.state >= 0 && told.state < CAN_STATE_MAX));
+		assert_true(strnlen(link.name, IF_NAMESIZE) < IF_NAMESIZE);
+		assert_true(strnlen(link.kind, sizeof(link.kind)) < sizeof(link.kind));
+		assert_true(link.state == -EOPNOTSUPP ||
+			    (link.state >= 0 && link.state < CAN_STATE_MAX));
 	}
 }
 
@@ -329,34 +329,34 @@ static void refusals_are_the_kernels(void **state)
 		{-ENODEV, -ENODEV}, {-EPERM, -EPERM},  {0, -EBADMSG},
 		{19, -EBADMSG},	    {-4096, -EBADMSG}, {INT32_MIN, -EBADMSG},
 	};
-	struct can_netlink told;
+	struct can_netlink link;
 	struct datagram d;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		d.n = 0;
 		put_error(&d, cases[i].code, SEQUENCE, PORT);
-		assert_int_equal(parse(d.bytes, d.n, &told), cases[i].rc);
+		assert_int_equal(parse(d.bytes, d.n, &link), cases[i].rc);
 	}
 	/* Too short for one. */
 	d.n = 0;
 	message_end(&d, message_begin(&d, NLMSG_ERROR, SEQUENCE, PORT));
-	assert_int_equal(parse(d.bytes, d.n, &told), -EBADMSG);
+	assert_int_equal(parse(d.bytes, d.n, &link), -EBADMSG);
 }
 
 static void what_is_for_others_is_passed_over(void **state)
 {
 	struct datagram d = {.n = 0};
-	struct can_netlink told;
+	struct can_netlink link;
 
-	assert_int_equal(parse(d.bytes, 0, &told), 0);
+	assert_int_equal(parse(d.bytes, 0, &link), 0);
 	put_error(&d, -ENODEV, SEQUENCE + 1, PORT);
 	put_error(&d, -ENODEV, SEQUENCE, PORT + 1);
 	put_error(&d, -ENODEV, 0, 0);
 	message_end(&d, message_begin(&d, NLMSG_NOOP, SEQUENCE, PORT));
-	assert_int_equal(parse(d.bytes, d.n, &told), 0);
+	assert_int_equal(parse(d.bytes, d.n, &link), 0);
 	put_link(&d, &can0, SEQUENCE, PORT);
-	assert_int_equal(parse(d.bytes, d.n, &told), 1);
-	assert_int_equal(told.bitrate, 500000);
+	assert_int_equal(parse(d.bytes, d.n, &link), 1);
+	assert_int_equal(link.bitrate, 500000);
 }
 
 /* The kernel at the other end of the socket, where fake.on. */
@@ -462,15 +462,15 @@ static int fake_end(void **state)
 
 static void the_question_is_by_name(void **state)
 {
-	struct can_netlink told;
+	struct can_netlink link;
 	struct nlmsghdr header;
 	struct nlattr attr;
 
 	put_link(&fake.answers[0], &can0, SEQUENCE, PORT);
 	fake.n = 1;
-	assert_int_equal(can_netlink_ask("can0", &told), 0);
-	assert_string_equal(told.name, "can0");
-	assert_int_equal(told.bitrate, 500000);
+	assert_int_equal(can_netlink_query("can0", &link), 0);
+	assert_string_equal(link.name, "can0");
+	assert_int_equal(link.bitrate, 500000);
 	memcpy(&header, fake.asked.bytes, sizeof(header));
 	assert_int_equal(header.nlmsg_type, RTM_GETLINK);
 	assert_int_equal(header.nlmsg_flags, NLM_F_REQUEST);
@@ -485,18 +485,18 @@ static void the_question_is_by_name(void **state)
 
 static void what_is_no_name_is_not_asked(void **state)
 {
-	struct can_netlink told;
+	struct can_netlink link;
 
-	assert_int_equal(can_netlink_ask("", &told), -ENODEV);
-	assert_int_equal(can_netlink_ask("sixteen-or-more-", &told), -ENODEV);
+	assert_int_equal(can_netlink_query("", &link), -ENODEV);
+	assert_int_equal(can_netlink_query("sixteen-or-more-", &link), -ENODEV);
 	assert_int_equal(fake.asked.n, 0);
-	assert_int_equal(can_netlink_ask("fifteen-at-most", &told), -ETIMEDOUT);
+	assert_int_equal(can_netlink_query("fifteen-at-most", &link), -ETIMEDOUT);
 	assert_true(fake.asked.n > 0);
 }
 
 static void what_fails_is_said(void **state)
 {
-	struct can_netlink told;
+	struct can_netlink link;
 	static const struct {
 		int open_error, send_error, receive_error, rc;
 	} cases[] = {
@@ -511,18 +511,18 @@ static void what_fails_is_said(void **state)
 		fake.send_error = cases[i].send_error;
 		fake.errors[0] = cases[i].receive_error;
 		fake.n = 1;
-		assert_int_equal(can_netlink_ask("can0", &told), cases[i].rc);
+		assert_int_equal(can_netlink_query("can0", &link), cases[i].rc);
 	}
 	fake_begin(NULL);
 	put_error(&fake.answers[0], -ENODEV, SEQUENCE, PORT);
 	fake.n = 1;
-	assert_int_equal(can_netlink_ask("can0", &told), -ENODEV);
+	assert_int_equal(can_netlink_query("can0", &link), -ENODEV);
 }
 
 /* No answer, signals without end, or others' messages without end. */
 static void every_wait_has_a_limit(void **state)
 {
-	struct can_netlink told;
+	struct can_netlink link;
 
 	for (int i = 0; i < 3; i++) {
 		fake_begin(NULL);
@@ -532,7 +532,7 @@ static void every_wait_has_a_limit(void **state)
 			fake.errors[0] = EINTR;
 		else if (i == 2)
 			put_link(&fake.answers[0], &can0, SEQUENCE, PORT + 1);
-		assert_int_equal(can_netlink_ask("can0", &told), -ETIMEDOUT);
+		assert_int_equal(can_netlink_query("can0", &link), -ETIMEDOUT);
 		assert_true(fake.now_ns <= 1000 * S + 2 * S);
 	}
 	/* But one that comes late still counts. */
@@ -541,21 +541,21 @@ static void every_wait_has_a_limit(void **state)
 	put_error(&fake.answers[1], -ENODEV, SEQUENCE + 1, PORT);
 	put_link(&fake.answers[2], &can0, SEQUENCE, PORT);
 	fake.n = 3;
-	assert_int_equal(can_netlink_ask("can0", &told), 0);
-	assert_int_equal(told.index, 5);
+	assert_int_equal(can_netlink_query("can0", &link), 0);
+	assert_int_equal(link.index, 5);
 }
 
 static void the_kernel_tells_of_lo(void **state)
 {
-	struct can_netlink told;
+	struct can_netlink link;
 
 	if (!if_nametoindex("lo"))
 		skip();
-	assert_int_equal(can_netlink_ask("lo", &told), 0);
-	assert_string_equal(told.name, "lo");
-	assert_int_equal(told.index, if_nametoindex("lo"));
-	assert_false(told.is_can);
-	assert_int_equal(can_netlink_ask("no-such-one", &told), -ENODEV);
+	assert_int_equal(can_netlink_query("lo", &link), 0);
+	assert_string_equal(link.name, "lo");
+	assert_int_equal(link.index, if_nametoindex("lo"));
+	assert_false(link.is_can);
+	assert_int_equal(can_netlink_query("no-such-one", &link), -ENODEV);
 }
 
 #define ON_FAKE(test) cmocka_unit_test_setup_teardown(test, fake_begin, fake_end)

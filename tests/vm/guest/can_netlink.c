@@ -70,12 +70,12 @@ static int open_bus(struct can_bus **bus, const char *name, uint32_t bitrate,
 static void as_ip_has_it(const char *name)
 {
 	struct incise_error err = {0};
-	struct can_netlink told;
+	struct can_netlink link;
 	struct can_bus *bus;
 
-	check(!can_netlink_ask(name, &told) && told.is_can && !told.is_up &&
-		      !strcmp(told.kind, "can") &&
-		      told.index == (int)if_nametoindex(name),
+	check(!can_netlink_query(name, &link) && link.is_can && !link.is_up &&
+		      !strcmp(link.kind, "can") &&
+		      link.index == (int)if_nametoindex(name),
 	      "a controller that is down is told of");
 	check(open_bus(&bus, name, 0, &err) == -ENETDOWN &&
 		      strstr(err.text, "up type can bitrate 1000000"),
@@ -83,12 +83,12 @@ static void as_ip_has_it(const char *name)
 	check(!run("ip link set %s type can bitrate 500000", name) &&
 		      !run("ip link set %s up", name),
 	      "ip sets its rate");
-	check(!can_netlink_ask(name, &told) && told.is_up && told.bitrate == 500000 &&
+	check(!can_netlink_query(name, &link) && link.is_up && link.bitrate == 500000 &&
 		      ip_says(name, "bitrate 500000"),
 	      "its rate is told as ip tells it");
-	check(told.state == CAN_STATE_ERROR_ACTIVE && ip_says(name, "state ERROR-ACTIVE"),
+	check(link.state == CAN_STATE_ERROR_ACTIVE && ip_says(name, "state ERROR-ACTIVE"),
 	      "and its state");
-	check(!told.restart_ms && ip_says(name, "restart-ms 0"),
+	check(!link.restart_ms && ip_says(name, "restart-ms 0"),
 	      "and that it does not leave bus-off");
 	if (check(!open_bus(&bus, name, 500000, &err), "it is opened")) {
 		check(bus->bitrate == 500000 &&
@@ -100,7 +100,7 @@ static void as_ip_has_it(const char *name)
 		      strstr(err.text, "runs at 500000 bit/s, bitrate is 250000"),
 	      "another rate is refused: %s", err.text);
 	check(!run("ip link property add dev %s altname a-servo", name) &&
-		      !can_netlink_ask("a-servo", &told) && !strcmp(told.name, name),
+		      !can_netlink_query("a-servo", &link) && !strcmp(link.name, name),
 	      "it is found by its other name, and tells its own");
 }
 
@@ -120,7 +120,7 @@ static pid_t adapter(int master)
 int main(void)
 {
 	char name[IF_NAMESIZE] = "";
-	struct can_netlink told;
+	struct can_netlink link;
 	int master, line = attach(&master, name);
 	pid_t child;
 
@@ -135,6 +135,6 @@ int main(void)
 	waitpid(child, NULL, 0);
 	close(line);
 	close(master);
-	check(can_netlink_ask(name, &told) == -ENODEV, "one that is away is not there");
+	check(can_netlink_query(name, &link) == -ENODEV, "one that is away is not there");
 	return 0;
 }

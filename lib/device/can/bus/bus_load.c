@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * How much of a CAN bus the traffic with one drive takes. A data frame with an 11-bit id:
+ * The load of a CAN bus by one drive; see bus_load.h. A data frame with an 11-bit id:
  *
  *   SOF id RTR IDE r0 DLC data CRC │ CRC-delimiter ACK EOF gap
  *   ╰──── 34 + 8n: stuffed ────────╯ ╰──────── 13 ───────────╯
  *
- * A bit is stuffed after 5 equal ones and counts for the next 5: at most one in 4.
+ * A bit is stuffed after 5 equal ones and counts among the next 5: at most one in 4.
  */
 #include "bus_load.h"
 
 #define NS_PER_S 1000000000ull
-#define BEAT_BYTES 1
+#define HEARTBEAT_BYTES 1
 #define INPUT_BYTES 4
-#define INPUT_NS 10000000 /* the inhibit time that TPDO2 is configured with */
+#define INPUT_NS 10000000 /* the inhibit time of TPDO2; see cia402_setup.c */
 
 uint32_t bus_load_bits(unsigned int bytes)
 {
@@ -21,21 +21,21 @@ uint32_t bus_load_bits(unsigned int bytes)
 	return stuffed + (stuffed - 1) / 4 + 13;
 }
 
-/* Rounded up. */
 static uint64_t per_second(uint64_t bits, uint64_t ns)
 {
 	return ns ? (bits * NS_PER_S + ns - 1) / ns : UINT32_MAX;
 }
 
 uint32_t bus_load_of(uint32_t cycle_ns, unsigned int rpdo_bytes, unsigned int tpdo_bytes,
-		     int64_t beat_ns)
+		     int64_t heartbeat_ns)
 {
 	uint32_t cycle =
 		bus_load_bits(0) + bus_load_bits(rpdo_bytes) + bus_load_bits(tpdo_bytes);
 	uint64_t load = per_second(cycle, cycle_ns);
 
 	load += per_second(bus_load_bits(INPUT_BYTES), INPUT_NS);
-	if (beat_ns > 0)
-		load += per_second(2 * bus_load_bits(BEAT_BYTES), (uint64_t)beat_ns);
+	if (heartbeat_ns > 0)
+		load += per_second(2 * bus_load_bits(HEARTBEAT_BYTES),
+				   (uint64_t)heartbeat_ns);
 	return load < UINT32_MAX ? (uint32_t)load : UINT32_MAX;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * How much of a CAN bus the traffic with one drive takes, with the most stuff bits that
- * frames of its lengths can have. Any thread; nothing here waits or fails.
+ * The load of a CAN bus by the traffic with one drive, bit/s, with as many stuff bits as frames
+ * of these lengths can have. Any thread; nothing here waits or fails.
  */
 #ifndef INCISE_BUS_LOAD_H
 #define INCISE_BUS_LOAD_H
@@ -9,19 +9,20 @@
 #include <stdint.h>
 
 /*
- * Bits of a frame with an 11-bit id and so many bytes, with the gap to the next: 55 … 135;
- * more than 8 bytes count as 8.
+ * Returns the bits of a frame with an 11-bit id and @bytes bytes, with the gap to the next
+ * frame: 55 … 135. More than 8 bytes count as 8.
  */
 uint32_t bus_load_bits(unsigned int bytes);
 
 /*
- * Cyclic traffic: SYNC, RPDO and TPDO per cycle, both heartbeats (@beat_ns; 0: none), inputs
- * as often as they may come. Bit/s; UINT32_MAX: more than that, or a cycle of 0.
+ * Returns the cyclic traffic, bit/s: SYNC, RPDO and TPDO per cycle, both heartbeats each
+ * @heartbeat_ns (0: none), inputs at their highest rate. UINT32_MAX: more than that, or a cycle
+ * of 0.
  */
 uint32_t bus_load_of(uint32_t cycle_ns, unsigned int rpdo_bytes, unsigned int tpdo_bytes,
-		     int64_t beat_ns);
+		     int64_t heartbeat_ns);
 
-/* The most that may be taken, %: the rest is for SDOs, EMCYs and what is sent again. */
+/* The largest load, %: the rest is for SDOs, EMCYs and repeated frames. */
 #define BUS_LOAD_MOST 80
 
 #endif

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A CAN bus behind a serial adapter that speaks slcan, on a tty; see slcan_line.h.
+ * A CAN bus behind a serial adapter that speaks slcan, on a tty; see slcan_protocol.h.
  *
  *   open   CR C Sn O       n: 0 … 8, 10 kbit/s … 1 Mbit/s
- *   send   t…, and F with it each 100 ms, which asks for the status of the controller
+ *   send   t…, each 100 ms followed by F, the query for the controller's status
  *   close  C
  *
- * Nothing here waits for an answer: many adapters give none, and what is at the other end
- * may be another program, such as python-can on a pty. What does come is taken as it is.
+ * Nothing here waits for an answer: many adapters give none, and the other end may be another
+ * program, for example python-can on a pty.
  *
- * The rate is that of the request, or stands behind the tty, as in "/dev/ttyACM0@500000".
- * One that nobody asked for is 1 Mbit/s, what drives have from the factory: most
- * adapters go on the bus with no rate of their own, and the rate must be known to say
- * whether the traffic fits.
+ * The bit rate is that of the request, or follows the tty, as in "/dev/ttyACM0@500000". The
+ * default is 1 Mbit/s, the factory setting of drives: most adapters have no rate of their own,
+ * and the load of the bus must be computed from a known one.
  */
 #include <errno.h>
 #include <limits.h>
@@ -20,19 +19,31 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
+#include <termios.h>
 #include <time.h>
+#include <unistd.h>
 #include <linux/can/error.h>
 #include "../../../base/monotonic.h"
+#include "../../tty.h"
 #include "can_bus.h"
-#include "slcan_line.h"
-#include "slcan_status.h"
-#include "slcan_tty.h"
+#include "slcan_protocol.h"
 
 #define NS_PER_S INT64_C(1000000000)
 #define BITRATE 1000000
 #define START_COMMANDS 4
-/* Bytes that one call of receive looks at: junk without end must not hold it. */
-#define LOOK_MAX 4096
+#define RECEIVE_BYTES_MAX 4096 /* of one call of receive, so that endless junk ends it */
+#define DRAIN_POLLS 20	       /* of 5 ms, until the last bytes have gone */
+#define SEND_MAX (SLCAN_LINE_MAX + 2) /* bytes sent at once: a frame and a query */
+
+/* The serial line, opened exclusively. Lines go out whole or not at all. */
+struct slcan_tty {
+	int fd;
+	int gone; /* -ENODEV, -EIO; permanent */
+	/* The rest of a line that was written in part; out_n of 0: none. */
+	char out[SEND_MAX];
+	unsigned int out_at, out_n;
+};
 
 struct slcan {
 	struct can_bus bus;
@@ -41,13 +52,143 @@ struct slcan {
 	struct slcan_line line;
 	unsigned char in[256];
 	unsigned int in_at, in_n;
-	int64_t in_ns; /* when it was read */
+	int64_t in_ns; /* time of reading them */
 
 	struct can_filter filter[CAN_BUS_FILTERS];
 	int n_filters;
 
 	struct slcan_status status;
 };
+
+/* An unplugged line returns EIO; it does not come back on this descriptor. */
+static int tty_failed(struct slcan_tty *tty, int code)
+{
+	tty->gone = code == EIO || code == ENXIO || code == ENODEV ? -ENODEV : -EIO;
+	return tty->gone;
+}
+
+/* Write the rest of a line. 0, -ENOBUFS (not all went out), -ENODEV, -EIO. */
+static int tty_flush(struct slcan_tty *tty)
+{
+	while (tty->out_at < tty->out_n) {
+		ssize_t n =
+			write(tty->fd, tty->out + tty->out_at, tty->out_n - tty->out_at);
+
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n < 0 && errno != EAGAIN)
+			return tty_failed(tty, errno);
+		if (n <= 0)
+			return -ENOBUFS;
+		tty->out_at += (unsigned int)n;
+	}
+	tty->out_at = tty->out_n = 0;
+	return 0;
+}
+
+/* Send all of @n bytes, now or later. 0; -ENOBUFS: none of them; -ENODEV, -EIO. */
+static int tty_send(struct slcan_tty *tty, const char *text, unsigned int n)
+{
+	int rc = tty->gone ? tty->gone : tty_flush(tty);
+
+	if (rc)
+		return rc;
+	memcpy(tty->out, text, n);
+	tty->out_n = n;
+	rc = tty_flush(tty);
+	if (rc == -ENOBUFS) {
+		if (tty->out_at)
+			return 0;
+		tty->out_n = 0;
+	}
+	return rc;
+}
+
+/* Returns the number of bytes read; 0: none yet; -ENODEV, -EIO. */
+static ssize_t tty_read(struct slcan_tty *tty, void *bytes, size_t size)
+{
+	ssize_t n;
+
+	if (tty->gone)
+		return tty->gone;
+	do
+		n = read(tty->fd, bytes, size);
+	while (n < 0 && errno == EINTR);
+	if (n < 0)
+		return errno == EAGAIN ? 0 : tty_failed(tty, errno);
+	/* VMIN is 1: no byte means end of file. */
+	return n ? n : tty_failed(tty, EIO);
+}
+
+static int refuse_tty(const char *path, int code, const char *where,
+		      struct incise_error *err)
+{
+	switch (code) {
+	case ENOENT:
+	case ENXIO:
+	case ENODEV:
+		return incise_error_set(err, ENODEV,
+					"%s: %s is not there: is the adapter plugged in? "
+					"/dev/serial/by-id lists those that are",
+					where, path);
+	case EACCES:
+	case EPERM:
+		return incise_error_set(
+			err, EACCES,
+			"%s: no right to open %s: join the group that owns "
+			"it, which mostly is dialout",
+			where, path);
+	case EBUSY:
+	case EWOULDBLOCK:
+		return incise_error_set(
+			err, EBUSY,
+			"%s: another program has %s open: end it first, or "
+			"drive from one place only",
+			where, path);
+	case ENOTTY:
+	case EINVAL:
+		return incise_error_set(
+			err, EINVAL,
+			"%s: %s is no serial line: expected the tty of an "
+			"adapter that speaks slcan, such as /dev/ttyACM0",
+			where, path);
+	case ENOMEM:
+		return incise_error_set(err, ENOMEM, "%s: out of memory", where);
+	default:
+		return incise_error_set(err, EIO, "%s: %s: %s", where, path,
+					strerror(code));
+	}
+}
+
+static int tty_open(struct slcan_tty *tty, const char *path, const char *where,
+		    struct incise_error *err)
+{
+	*tty = (struct slcan_tty){.fd = incise_tty_open(path, B0)};
+	return tty->fd < 0 ? refuse_tty(path, -tty->fd, where, err) : 0;
+}
+
+/*
+ * Send @last and wait until the adapter has read it, 100 ms at most. Then flush the rest, as
+ * close() of a tty may wait 30 s for it; but only then, as flushing a pty also discards bytes
+ * that its reader has not read yet.
+ */
+static void tty_close(struct slcan_tty *tty, const char *last, unsigned int n)
+{
+	bool sent = false, gone = false;
+	int left = 0;
+
+	for (int i = 0; i < DRAIN_POLLS && !gone && !tty->gone; i++) {
+		sent = sent || !tty_send(tty, last, n);
+		gone = sent && !tty_flush(tty) &&
+		       (ioctl(tty->fd, TIOCOUTQ, &left) < 0 || !left);
+		if (!gone)
+			nanosleep(&(struct timespec){.tv_nsec = 5000000}, NULL);
+	}
+	if (!gone)
+		tcflush(tty->fd, TCOFLUSH);
+	ioctl(tty->fd, TIOCNXCL);
+	close(tty->fd);
+}
 
 static struct slcan *of(struct can_bus *bus)
 {
@@ -63,26 +204,26 @@ static INCISE_REALTIME int64_t slcan_now(struct can_bus *bus)
 static int slcan_send(struct can_bus *bus, const struct can_frame *frame)
 {
 	struct slcan *s = of(bus);
-	char text[SLCAN_TTY_PUT_MAX];
-	size_t n = slcan_line_put(text, frame);
+	char text[SEND_MAX];
+	size_t n = slcan_line_format(text, frame);
 	int64_t now = slcan_now(bus);
-	bool ask = slcan_status_due(&s->status, now);
+	bool query = slcan_status_due(&s->status, now);
 	int rc;
 
 	if (!n)
 		return -EINVAL;
-	if (ask) {
+	if (query) {
 		text[n++] = 'F';
 		text[n++] = '\r';
 	}
-	rc = slcan_tty_put(&s->tty, text, (unsigned int)n);
+	rc = tty_send(&s->tty, text, (unsigned int)n);
 	if (rc == -ENOBUFS)
 		bus->counts.full++;
 	if (rc)
 		return rc;
 	bus->counts.sent++;
-	if (ask)
-		slcan_status_asked(&s->status, now);
+	if (query)
+		slcan_status_queried(&s->status, now);
 	return 0;
 }
 
@@ -98,24 +239,23 @@ static bool passes(const struct slcan *s, canid_t id)
 	return !s->n_filters;
 }
 
-/* True: *frame is one for the caller. */
-static bool take(struct slcan *s, unsigned char byte, struct can_frame *frame)
+/* Handle a byte. Returns true if *frame is one for the caller. */
+static bool receive_byte(struct slcan *s, unsigned char byte, struct can_frame *frame)
 {
-	enum slcan_kind kind;
-	struct slcan_told told;
+	struct slcan_message message;
+	enum slcan_kind kind = slcan_line_receive(&s->line, byte, &message);
 
-	kind = slcan_line_take(&s->line, byte, &told);
 	switch (kind) {
 	case SLCAN_FRAME:
-		if (!passes(s, told.frame.can_id))
+		if (!passes(s, message.frame.can_id))
 			return false;
 		s->bus.counts.received++;
-		*frame = told.frame;
+		*frame = message.frame;
 		return true;
 	case SLCAN_REFUSED:
 	case SLCAN_FLAGS:
 	case SLCAN_STATE:
-		if (!slcan_status_take(&s->status, kind, &told, frame))
+		if (!slcan_status_update(&s->status, kind, &message, frame))
 			return false;
 		s->bus.counts.errors++;
 		if (frame->data[1] & CAN_ERR_CRTL_RX_OVERFLOW)
@@ -131,14 +271,14 @@ static bool take(struct slcan *s, unsigned char byte, struct can_frame *frame)
 	return false;
 }
 
-/* 1 (there are bytes), 0 or -ENODEV. */
+/* Returns 1 (there are bytes), 0, -ENODEV or -EIO. */
 static int fill(struct slcan *s)
 {
 	ssize_t n;
 
 	if (s->in_at < s->in_n)
 		return 1;
-	n = slcan_tty_read(&s->tty, s->in, sizeof(s->in));
+	n = tty_read(&s->tty, s->in, sizeof(s->in));
 	if (n <= 0)
 		return (int)n;
 	s->in_at = 0;
@@ -151,12 +291,12 @@ static int slcan_receive(struct can_bus *bus, struct can_frame *frame, int64_t *
 {
 	struct slcan *s = of(bus);
 
-	for (int looked = 0; looked < LOOK_MAX; looked++) {
+	for (int i = 0; i < RECEIVE_BYTES_MAX; i++) {
 		int rc = fill(s);
 
 		if (rc <= 0)
 			return rc;
-		if (take(s, s->in[s->in_at++], frame)) {
+		if (receive_byte(s, s->in[s->in_at++], frame)) {
 			*t_ns = s->in_ns;
 			return 1;
 		}
@@ -181,9 +321,9 @@ static int slcan_wait(struct can_bus *bus, int64_t until_ns)
 			return s->tty.gone;
 		if (ppoll(&poll, 1, &timeout, NULL) < 0)
 			return -errno;
-		/* The rest of a line goes out meanwhile; if that fails, receive says so. */
+		/* The rest of a line goes out meanwhile; receive reports an error. */
 		if (poll.revents & POLLOUT)
-			slcan_tty_flush(&s->tty);
+			tty_flush(&s->tty);
 		if (poll.revents & ~POLLOUT || !left)
 			return 0;
 	}
@@ -210,7 +350,7 @@ static void slcan_close(struct can_bus *bus)
 {
 	struct slcan *s = of(bus);
 
-	slcan_tty_close(&s->tty, "C\r", 2);
+	tty_close(&s->tty, "C\r", 2);
 	free(s);
 }
 
@@ -224,7 +364,7 @@ static const struct can_bus_ops slcan_ops = {
 	.close = slcan_close,
 };
 
-/* The number n of Sn, or -1. */
+/* Returns the number n of Sn, or -1. */
 static int rate_number(uint32_t bitrate)
 {
 	static const uint32_t rates[] = {10000,	 20000,	 50000,	 100000, 125000,
@@ -246,10 +386,7 @@ static int refuse_rate(const struct can_bus_request *request, const char *rate,
 		request->where, rate);
 }
 
-/*
- * "/dev/ttyACM0@500000" in its parts. An @ that no digit follows is
- * of the path.
- */
+/* Split "/dev/ttyACM0@500000". An @ that no digit follows belongs to the path. */
 static int parse_device(const struct can_bus_request *request, char path[PATH_MAX],
 			uint32_t *bitrate, struct incise_error *err)
 {
@@ -289,10 +426,10 @@ static int start(struct slcan *s, const struct can_bus_request *request,
 	int rc;
 
 	text[4] = (char)('0' + rate_number(s->bus.bitrate));
-	rc = slcan_tty_put(&s->tty, text, sizeof(text) - 1);
+	rc = tty_send(&s->tty, text, sizeof(text) - 1);
 	if (!rc)
 		return 0;
-	slcan_tty_close(&s->tty, "", 0);
+	tty_close(&s->tty, "", 0);
 	return incise_error_set(
 		err, rc == -ENODEV ? ENODEV : EIO,
 		"%s: %s takes no bytes: unplug the adapter and plug it in "
@@ -320,9 +457,9 @@ static int slcan_open(struct can_bus **bus, const struct can_bus_request *reques
 	s->bus.ops = &slcan_ops;
 	s->bus.bitrate = bitrate;
 	snprintf(s->bus.name, sizeof(s->bus.name), "%.39s", path);
-	/* Each may be refused: C where it is closed, S where it has one rate only … */
-	slcan_status_begin(&s->status, START_COMMANDS, slcan_now(&s->bus));
-	rc = slcan_tty_open(&s->tty, path, request->where, err);
+	/* The adapter may refuse each: C when it is closed, S when it has one rate only … */
+	slcan_status_init(&s->status, START_COMMANDS, slcan_now(&s->bus));
+	rc = tty_open(&s->tty, path, request->where, err);
 	if (!rc)
 		rc = start(s, request, err);
 	if (rc) {

@@ -3,19 +3,22 @@
  * A CAN bus of the kernel: a raw socket on can0, vcan0 …
  *
  *   controller ─▶ driver ─▶ exact filters ─▶ queue of the socket ─▶ receive
- *                   ╰─ stamp, CLOCK_REALTIME    ╰─ counts what it loses
+ *                   ╰─ timestamp, CLOCK_REALTIME ╰─ counts lost frames
  *
- * What an interface is and is set to, the kernel is asked once, when it is opened; the state
- * is then kept by error frames.
+ * Kind, bit rate and state of the interface are read once, when it is opened; error frames
+ * then update the state.
  *
- * The queue is as long as the kernel has it, some 220 frames: 70 ms of a drive's traffic at
- * 1 kHz. Who does not read for so long has missed more than that: the drive's deadman.
+ * The socket's queue has the kernel's default length, about 220 frames: 70 ms of a drive's
+ * traffic at 1 kHz. The drive's deadman expires before that.
  */
 #include <errno.h>
 #include <poll.h>
+#include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
 #include <linux/can/error.h>
@@ -26,20 +29,18 @@
 #include "../../../base/monotonic.h"
 #include "can_bus.h"
 #include "socketcan_netlink.h"
-#include "socketcan_owner.h"
 
 #define NS_PER_S INT64_C(1000000000)
-/* What is no frame is passed over, but not without end. */
-#define SHORT_MAX 16
+#define SHORT_MAX 16 /* messages that are no frame, skipped in one call of receive */
 
 struct socketcan {
 	struct can_bus bus;
 	int fd;
 	int owner;	 /* socket that holds the node; -1: none */
-	int gone;	 /* -ENETDOWN, -ENODEV: for good */
-	int state;	 /* enum can_state; -EOPNOTSUPP: not known */
-	uint32_t lost;	 /* by the kernel's count, which turns over */
-	int64_t last_ns; /* stamp of the last frame */
+	int gone;	 /* -ENETDOWN, -ENODEV; permanent */
+	int state;	 /* enum can_state; -EOPNOTSUPP: unknown */
+	uint32_t lost;	 /* the kernel's count, modulo 2^32 */
+	int64_t last_ns; /* timestamp of the last frame */
 };
 
 static struct socketcan *of(struct can_bus *bus)
@@ -63,7 +64,7 @@ static INCISE_REALTIME int64_t socketcan_now(struct can_bus *bus)
 
 static int failed(struct socketcan *s, int code)
 {
-	/* A socket whose interface is gone is bound to none: ENXIO. */
+	/* A socket whose interface is gone is not bound any more: ENXIO. */
 	if (code == ENODEV || code == ENXIO)
 		s->gone = -ENODEV;
 	else if (code == ENETDOWN)
@@ -91,7 +92,7 @@ static int socketcan_send(struct can_bus *bus, const struct can_frame *frame)
 	}
 	if (n >= 0)
 		return -EIO;
-	/* The queue of the interface, or what a socket may have in it. */
+	/* The interface's queue is full, or the socket's share of it. */
 	if (errno == ENOBUFS || errno == EAGAIN) {
 		bus->counts.full++;
 		return -ENOBUFS;
@@ -99,14 +100,14 @@ static int socketcan_send(struct can_bus *bus, const struct can_frame *frame)
 	return failed(s, errno);
 }
 
-/* Stamps are wall time, which may be set meanwhile: what makes no sense came now. */
-static int64_t stamp(struct socketcan *s, const struct timespec *came)
+/* Timestamps are wall time, which may be set meanwhile: an impossible one counts as now. */
+static int64_t timestamp(struct socketcan *s, const struct timespec *wall)
 {
 	int64_t now = clock_ns(CLOCK_MONOTONIC), t = now;
 
-	if (came && (came->tv_sec || came->tv_nsec)) {
+	if (wall->tv_sec || wall->tv_nsec) {
 		int64_t age = clock_ns(CLOCK_REALTIME) -
-			      (came->tv_sec * NS_PER_S + came->tv_nsec);
+			      (wall->tv_sec * NS_PER_S + wall->tv_nsec);
 
 		if (age > 0)
 			t = now - age;
@@ -122,22 +123,22 @@ static void note_state(struct socketcan *s, const struct can_frame *frame)
 	if (frame->can_id & CAN_ERR_RESTARTED)
 		s->state = CAN_STATE_ERROR_ACTIVE;
 	if (frame->can_id & CAN_ERR_CRTL) {
-		uint8_t what = frame->data[1];
+		uint8_t controller = frame->data[1];
 
-		if (what & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE))
+		if (controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE))
 			s->state = CAN_STATE_ERROR_PASSIVE;
-		else if (what & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING))
+		else if (controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING))
 			s->state = CAN_STATE_ERROR_WARNING;
-		else if (what & CAN_ERR_CRTL_ACTIVE)
+		else if (controller & CAN_ERR_CRTL_ACTIVE)
 			s->state = CAN_STATE_ERROR_ACTIVE;
 	}
 	if (frame->can_id & CAN_ERR_BUSOFF)
 		s->state = CAN_STATE_BUS_OFF;
 }
 
-/* One message. As recvmsg; *came: its stamp, 0 where there is none. */
+/* Read one message; returns as recvmsg(). *wall: its timestamp, 0 without one. */
 static ssize_t read_one(struct socketcan *s, struct can_frame *frame,
-			struct timespec *came)
+			struct timespec *wall)
 {
 	union {
 		char bytes[CMSG_SPACE(sizeof(struct scm_timestamping)) +
@@ -151,7 +152,7 @@ static ssize_t read_one(struct socketcan *s, struct can_frame *frame,
 			     .msg_controllen = sizeof(control)};
 	ssize_t n;
 
-	memset(came, 0, sizeof(*came));
+	memset(wall, 0, sizeof(*wall));
 	do
 		n = recvmsg(s->fd, &msg, MSG_DONTWAIT);
 	while (n < 0 && errno == EINTR);
@@ -168,9 +169,9 @@ static ssize_t read_one(struct socketcan *s, struct can_frame *frame,
 			s->bus.counts.overflow += (uint32_t)(lost - s->lost);
 			s->lost = lost;
 		} else if (c->cmsg_type == SCM_TIMESTAMPING &&
-			   c->cmsg_len >= CMSG_LEN(sizeof(*came))) {
-			/* The first of three is the software's. */
-			memcpy(came, CMSG_DATA(c), sizeof(*came));
+			   c->cmsg_len >= CMSG_LEN(sizeof(*wall))) {
+			/* The first of three is the software timestamp. */
+			memcpy(wall, CMSG_DATA(c), sizeof(*wall));
 		}
 	}
 	return n;
@@ -183,8 +184,8 @@ static int socketcan_receive(struct can_bus *bus, struct can_frame *frame, int64
 	if (s->gone)
 		return s->gone;
 	for (int i = 0; i < SHORT_MAX; i++) {
-		struct timespec came;
-		ssize_t n = read_one(s, frame, &came);
+		struct timespec wall;
+		ssize_t n = read_one(s, frame, &wall);
 
 		if (n < 0)
 			return errno == EAGAIN ? 0 : failed(s, errno);
@@ -192,7 +193,7 @@ static int socketcan_receive(struct can_bus *bus, struct can_frame *frame, int64
 			bus->counts.broken++;
 			continue;
 		}
-		*t_ns = stamp(s, &came);
+		*t_ns = timestamp(s, &wall);
 		if (frame->can_id & CAN_ERR_FLAG) {
 			bus->counts.errors++;
 			note_state(s, frame);
@@ -218,7 +219,7 @@ static int socketcan_wait(struct can_bus *bus, int64_t until_ns)
 
 static int socketcan_filter(struct can_bus *bus, const struct can_filter *filter, int n)
 {
-	/* One that lets all pass: to the kernel, none at all is to receive nothing. */
+	/* A filter that passes everything: without any, the kernel passes nothing. */
 	static const struct can_filter all = {0};
 
 	if (n < 0 || n > CAN_BUS_FILTERS)
@@ -257,7 +258,7 @@ static const struct can_bus_ops socketcan_ops = {
 	.close = socketcan_close,
 };
 
-/* Whether what it is set to is what is asked for. */
+/* Compare the interface's bit rate with the requested one. */
 static int check_rate(struct socketcan *s, const struct can_bus_request *request,
 		      struct incise_error *err)
 {
@@ -273,8 +274,8 @@ static int check_rate(struct socketcan *s, const struct can_bus_request *request
 		request->bitrate);
 }
 
-static int not_known(const struct can_bus_request *request, int code,
-		     struct incise_error *err)
+static int refuse_query(const struct can_bus_request *request, int code,
+			struct incise_error *err)
 {
 	if (code == ENODEV)
 		return incise_error_set(
@@ -288,53 +289,84 @@ static int not_known(const struct can_bus_request *request, int code,
 				request->device, strerror(code));
 }
 
-/* The interface's number; or -errno, and the line says what to do. */
+/* Returns the interface's index, or -errno with a message. */
 static int look_up(struct socketcan *s, const struct can_bus_request *request,
 		   struct incise_error *err)
 {
 	const char *where = request->where, *name = request->device;
-	struct can_netlink told;
-	int rc = can_netlink_ask(name, &told);
+	struct can_netlink link;
+	int rc = can_netlink_query(name, &link);
 
 	if (rc)
-		return not_known(request, -rc, err);
-	if (!told.is_can)
+		return refuse_query(request, -rc, err);
+	if (!link.is_can)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: %s is no CAN interface: ip -br link show type "
 			"can lists those there are",
 			where, name);
-	if (!told.is_up)
+	if (!link.is_up)
 		return incise_error_set(
 			err, ENETDOWN, "%s: %s is down: ip link set %s up%s", where, name,
 			name,
-			strcmp(told.kind, "can") ? "" : " type can bitrate 1000000");
-	memcpy(s->bus.name, told.name, sizeof(told.name));
-	s->bus.bitrate = told.bitrate;
-	s->bus.restart_ms = told.restart_ms;
-	s->state = told.state;
+			strcmp(link.kind, "can") ? "" : " type can bitrate 1000000");
+	memcpy(s->bus.name, link.name, sizeof(link.name));
+	s->bus.bitrate = link.bitrate;
+	s->bus.restart_ms = link.restart_ms;
+	s->state = link.state;
 	rc = check_rate(s, request, err);
-	return rc ? rc : told.index;
+	return rc ? rc : link.index;
 }
 
 static int set_up(struct socketcan *s, const struct can_bus_request *request, int index,
 		  struct incise_error *err)
 {
-	static const int on = 1, stamps = SOF_TIMESTAMPING_RX_SOFTWARE |
-					  SOF_TIMESTAMPING_SOFTWARE;
+	static const int on = 1, timestamps = SOF_TIMESTAMPING_RX_SOFTWARE |
+					      SOF_TIMESTAMPING_SOFTWARE;
 	static const can_err_mask_t errors = CAN_ERR_MASK;
 	struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = index};
 	int code;
 
 	if (setsockopt(s->fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof(errors)) ||
 	    setsockopt(s->fd, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof(on)) ||
-	    setsockopt(s->fd, SOL_SOCKET, SO_TIMESTAMPING, &stamps, sizeof(stamps)) ||
+	    setsockopt(s->fd, SOL_SOCKET, SO_TIMESTAMPING, &timestamps,
+		       sizeof(timestamps)) ||
 	    bind(s->fd, (struct sockaddr *)&address, sizeof(address))) {
 		code = errno == ENODEV ? ENODEV : errno == ENETDOWN ? ENETDOWN : EIO;
 		return incise_error_set(err, code, "%s: %s: %s", request->where,
 					request->device, strerror(errno));
 	}
 	return 0;
+}
+
+/*
+ * A CAN socket keeps no other program out. The owner of a node binds a name,
+ * "@incise-can/can0/16", which ends with the process and belongs to the same network
+ * namespace as the interface. Returns its descriptor; closing that releases the node.
+ */
+static int own_node(const char *interface, uint8_t node, const char *where,
+		    struct incise_error *err)
+{
+	struct sockaddr_un name = {.sun_family = AF_UNIX};
+	int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0), code, n;
+
+	if (fd < 0)
+		return incise_error_set(err, EIO, "%s: socket: %s", where,
+					strerror(errno));
+	n = snprintf(name.sun_path + 1, sizeof(name.sun_path) - 1, "incise-can/%.40s/%u",
+		     interface, node);
+	if (!bind(fd, (struct sockaddr *)&name,
+		  (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1 + (size_t)n)))
+		return fd;
+	code = errno;
+	close(fd);
+	if (code == EADDRINUSE)
+		return incise_error_set(
+			err, EBUSY,
+			"%s: another program drives it: end that first (ss -xap shows the "
+			"one with @%s)",
+			where, name.sun_path + 1);
+	return incise_error_set(err, EIO, "%s: bind: %s", where, strerror(code));
 }
 
 static int open_socket(struct socketcan *s, const struct can_bus_request *request,
@@ -381,8 +413,7 @@ static int socketcan_open(struct can_bus **bus, const struct can_bus_request *re
 		rc = index < 0 ? index : 0;
 	}
 	if (!rc && request->node) {
-		s->owner =
-			can_owner_take(s->bus.name, request->node, request->where, err);
+		s->owner = own_node(s->bus.name, request->node, request->where, err);
 		rc = s->owner < 0 ? s->owner : 0;
 	}
 	if (!rc)

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What the kernel tells of a CAN interface; see can_netlink.h.
+ * Kind and settings of a CAN interface; see socketcan_netlink.h.
  *
- * The kernel answers before the question's sendto() is back. Where it does not, as the
- * socket's queue had no room, a limit ends the wait.
+ * The kernel answers before sendto() of the query returns. Where it cannot, because the
+ * socket's queue is full, a time limit ends the wait.
  */
 #include <errno.h>
 #include <net/if_arp.h>
@@ -18,15 +18,15 @@
 
 #define NS_PER_S INT64_C(1000000000)
 #define WAIT_S 1
-#define SEQUENCE 1 /* each question has a socket of its own */
-/* Most of an answer is counters, some 1500 bytes; the kernel builds none above 8 KiB. */
+#define SEQUENCE 1 /* each query has a socket of its own */
+/* An answer has some 1500 bytes, mostly counters; the kernel builds none above 8 KiB. */
 #define ANSWER_MAX 8192
 
-typedef int take_attribute(struct can_netlink *told, const struct nlattr *attr);
+typedef int read_attribute(struct can_netlink *link, const struct nlattr *attr);
 
-/* All attributes in @n bytes, which they must fill. */
-static int walk(struct can_netlink *told, const void *bytes, size_t n,
-		take_attribute *take)
+/* Call @read for all attributes in @n bytes, which they must fill. */
+static int walk(struct can_netlink *link, const void *bytes, size_t n,
+		read_attribute *read)
 {
 	const char *end = (const char *)bytes + n;
 	const struct nlattr *attr = bytes;
@@ -36,7 +36,7 @@ static int walk(struct can_netlink *told, const void *bytes, size_t n,
 
 		if (!mnl_attr_ok(attr, (int)(end - (const char *)attr)))
 			return -EBADMSG;
-		rc = take(told, attr);
+		rc = read(link, attr);
 		if (rc)
 			return rc;
 		attr = mnl_attr_next(attr);
@@ -44,15 +44,15 @@ static int walk(struct can_netlink *told, const void *bytes, size_t n,
 	return 0;
 }
 
-static int walk_nested(struct can_netlink *told, const struct nlattr *attr,
-		       take_attribute *take)
+static int walk_nested(struct can_netlink *link, const struct nlattr *attr,
+		       read_attribute *read)
 {
-	return walk(told, mnl_attr_get_payload(attr), mnl_attr_get_payload_len(attr),
-		    take);
+	return walk(link, mnl_attr_get_payload(attr), mnl_attr_get_payload_len(attr),
+		    read);
 }
 
-/* What does not fit is cut off: of the names that count here all do. */
-static int take_text(char *text, size_t size, const struct nlattr *attr)
+/* Longer text is cut off: the names that matter here all fit. */
+static int read_text(char *text, size_t size, const struct nlattr *attr)
 {
 	size_t n;
 
@@ -64,7 +64,7 @@ static int take_text(char *text, size_t size, const struct nlattr *attr)
 	return 0;
 }
 
-static int take_controller(struct can_netlink *told, const struct nlattr *attr)
+static int read_controller(struct can_netlink *link, const struct nlattr *attr)
 {
 	uint16_t size = mnl_attr_get_payload_len(attr);
 	struct can_bittiming timing;
@@ -75,71 +75,71 @@ static int take_controller(struct can_netlink *told, const struct nlattr *attr)
 		if (size < sizeof(timing))
 			return -EBADMSG;
 		memcpy(&timing, mnl_attr_get_payload(attr), sizeof(timing));
-		/* All ones: the driver does not know it either. */
-		told->bitrate = timing.bitrate == UINT32_MAX ? 0 : timing.bitrate;
+		/* All ones: unknown to the driver. */
+		link->bitrate = timing.bitrate == UINT32_MAX ? 0 : timing.bitrate;
 		return 0;
 	case IFLA_CAN_STATE:
 		if (size != sizeof(uint32_t))
 			return -EBADMSG;
 		if (mnl_attr_get_u32(attr) < CAN_STATE_MAX)
-			told->state = (int)mnl_attr_get_u32(attr);
+			link->state = (int)mnl_attr_get_u32(attr);
 		return 0;
 	case IFLA_CAN_RESTART_MS:
 		if (size != sizeof(uint32_t))
 			return -EBADMSG;
-		told->restart_ms = mnl_attr_get_u32(attr);
+		link->restart_ms = mnl_attr_get_u32(attr);
 		return 0;
 	default:
 		return 0;
 	}
 }
 
-static int take_kind(struct can_netlink *told, const struct nlattr *attr)
+static int read_kind(struct can_netlink *link, const struct nlattr *attr)
 {
 	if (mnl_attr_get_type(attr) != IFLA_INFO_KIND)
 		return 0;
-	return take_text(told->kind, sizeof(told->kind), attr);
+	return read_text(link->kind, sizeof(link->kind), attr);
 }
 
-/* Only a kind gives its data a meaning. */
-static int take_data(struct can_netlink *told, const struct nlattr *attr)
+/* The kind, which comes first, defines the meaning of the data. */
+static int read_data(struct can_netlink *link, const struct nlattr *attr)
 {
-	if (mnl_attr_get_type(attr) != IFLA_INFO_DATA || strcmp(told->kind, "can") != 0)
+	if (mnl_attr_get_type(attr) != IFLA_INFO_DATA || strcmp(link->kind, "can") != 0)
 		return 0;
-	return walk_nested(told, attr, take_controller);
+	return walk_nested(link, attr, read_controller);
 }
 
-static int take_link(struct can_netlink *told, const struct nlattr *attr)
+static int read_link(struct can_netlink *link, const struct nlattr *attr)
 {
 	int rc;
 
 	switch (mnl_attr_get_type(attr)) {
 	case IFLA_IFNAME:
-		return take_text(told->name, sizeof(told->name), attr);
+		return read_text(link->name, sizeof(link->name), attr);
 	case IFLA_LINKINFO:
-		rc = walk_nested(told, attr, take_kind);
-		return rc ? rc : walk_nested(told, attr, take_data);
+		rc = walk_nested(link, attr, read_kind);
+		return rc ? rc : walk_nested(link, attr, read_data);
 	default:
 		return 0;
 	}
 }
 
-static int parse_link(const struct nlmsghdr *message, struct can_netlink *told)
+static int parse_link(const struct nlmsghdr *message, struct can_netlink *link)
 {
 	size_t n = mnl_nlmsg_get_payload_len(message);
-	struct ifinfomsg link;
+	struct ifinfomsg info;
 	int rc;
 
-	*told = (struct can_netlink){.state = -EOPNOTSUPP};
-	if (n < sizeof(link))
+	*link = (struct can_netlink){.state = -EOPNOTSUPP};
+	if (n < sizeof(info))
 		return -EBADMSG;
-	memcpy(&link, mnl_nlmsg_get_payload(message), sizeof(link));
-	told->index = link.ifi_index;
-	told->is_can = link.ifi_type == ARPHRD_CAN;
-	told->is_up = link.ifi_flags & IFF_UP;
-	rc = walk(told, mnl_nlmsg_get_payload_offset(message, sizeof(link)),
-		  n - sizeof(link), take_link);
-	if (!rc && (told->index <= 0 || !*told->name))
+	memcpy(&info, mnl_nlmsg_get_payload(message), sizeof(info));
+	link->index = info.ifi_index;
+	link->is_can = info.ifi_type == ARPHRD_CAN;
+	link->is_up = info.ifi_flags & IFF_UP;
+	rc = walk(link, mnl_nlmsg_get_payload_offset(message, sizeof(info)),
+		  n - sizeof(info), read_link);
+	if (!rc && (link->index <= 0 || !*link->name))
 		rc = -EBADMSG;
 	return rc ? rc : 1;
 }
@@ -151,32 +151,32 @@ static int parse_error(const struct nlmsghdr *message)
 	if (mnl_nlmsg_get_payload_len(message) < sizeof(struct nlmsgerr))
 		return -EBADMSG;
 	memcpy(&code, mnl_nlmsg_get_payload(message), sizeof(code));
-	/* 0 says that it was done, which answers nothing. */
+	/* 0 acknowledges, which is no answer. */
 	return code < 0 && code > -4096 ? code : -EBADMSG;
 }
 
 int can_netlink_parse(const void *bytes, size_t n, uint32_t sequence, uint32_t port,
-		      struct can_netlink *told)
+		      struct can_netlink *link)
 {
 	const struct nlmsghdr *message = bytes;
 	int left = (int)n;
 
 	while (left > 0) {
-		/* libmnl takes a length above INT_MAX for a negative one, which fits. */
+		/* libmnl takes a length above INT_MAX as negative, and so as valid. */
 		if (!mnl_nlmsg_ok(message, left) || message->nlmsg_len > (size_t)left)
 			return -EBADMSG;
 		if (message->nlmsg_seq == sequence && message->nlmsg_pid == port) {
 			if (message->nlmsg_type == NLMSG_ERROR)
 				return parse_error(message);
 			if (message->nlmsg_type == RTM_NEWLINK)
-				return parse_link(message, told);
+				return parse_link(message, link);
 		}
 		message = mnl_nlmsg_next(message, &left);
 	}
 	return 0;
 }
 
-static int question(const struct mnl_socket *socket, const char *name)
+static int send_query(const struct mnl_socket *socket, const char *name)
 {
 	union {
 		struct nlmsghdr align;
@@ -193,8 +193,8 @@ static int question(const struct mnl_socket *socket, const char *name)
 	return mnl_socket_sendto(socket, message, message->nlmsg_len) < 0 ? -errno : 0;
 }
 
-/* What is not for us, and signals, do not make it longer. */
-static int answer(const struct mnl_socket *socket, struct can_netlink *told)
+/* Other messages and signals do not prolong the wait. */
+static int receive_answer(const struct mnl_socket *socket, struct can_netlink *link)
 {
 	union {
 		struct nlmsghdr align;
@@ -208,7 +208,7 @@ static int answer(const struct mnl_socket *socket, struct can_netlink *told)
 
 		if (n >= 0)
 			rc = can_netlink_parse(&buffer, (size_t)n, SEQUENCE,
-					       mnl_socket_get_portid(socket), told);
+					       mnl_socket_get_portid(socket), link);
 		else if (errno == EAGAIN)
 			return -ETIMEDOUT;
 		else if (errno == ENOSPC) /* it was longer than the buffer */
@@ -221,7 +221,7 @@ static int answer(const struct mnl_socket *socket, struct can_netlink *told)
 	return -ETIMEDOUT;
 }
 
-static int talk(struct mnl_socket *socket, const char *name, struct can_netlink *told)
+static int query(struct mnl_socket *socket, const char *name, struct can_netlink *link)
 {
 	const struct timeval limit = {.tv_sec = WAIT_S};
 	int rc;
@@ -230,22 +230,22 @@ static int talk(struct mnl_socket *socket, const char *name, struct can_netlink 
 		       sizeof(limit)) < 0 ||
 	    mnl_socket_bind(socket, 0, MNL_SOCKET_AUTOPID) < 0)
 		return -errno;
-	rc = question(socket, name);
-	return rc ? rc : answer(socket, told);
+	rc = send_query(socket, name);
+	return rc ? rc : receive_answer(socket, link);
 }
 
-int can_netlink_ask(const char *name, struct can_netlink *told)
+int can_netlink_query(const char *name, struct can_netlink *link)
 {
 	struct mnl_socket *socket;
 	int rc;
 
-	/* The kernel has no such names, and says so in other words. */
+	/* The kernel refuses such names with another error. */
 	if (!*name || strlen(name) >= IF_NAMESIZE)
 		return -ENODEV;
 	socket = mnl_socket_open2(NETLINK_ROUTE, SOCK_CLOEXEC);
 	if (!socket)
 		return -errno;
-	rc = talk(socket, name, told);
+	rc = query(socket, name, link);
 	mnl_socket_close(socket);
 	return rc;
 }

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What the kernel tells of a CAN interface, asked once, over rtnetlink:
+ * Kind and settings of a CAN interface, queried once over rtnetlink:
  *
  *   RTM_GETLINK, its name ─▶ kernel ─▶ RTM_NEWLINK: number, type, flags
- *                                        ╰─ kind ─ of "can" also: rate, state, restart
+ *                                        ╰─ kind; for "can" also rate, state, restart
  *                                      or NLMSG_ERROR: -ENODEV …
  *
- * "can" is a controller with a driver of its own. "vcan" and "vxcan" have none, and so no
- * bit rate and no state.
+ * "can" is a controller with a driver. "vcan" and "vxcan" have no bit rate and no state.
  */
 #ifndef INCISE_CAN_NETLINK_H
 #define INCISE_CAN_NETLINK_H
@@ -18,26 +17,26 @@
 #include <net/if.h>
 
 struct can_netlink {
-	char name[IF_NAMESIZE]; /* its own, where it was asked by another one */
-	char kind[16];		/* "can", "vcan" …; "": it has none */
+	char name[IF_NAMESIZE]; /* its own, also where @name was an alternative name */
+	char kind[16];		/* "can", "vcan" …; "": none */
 	int index;
 	bool is_can, is_up;
-	uint32_t bitrate;    /* bit/s; 0: there is none, or the driver does not know it */
-	uint32_t restart_ms; /* it leaves bus-off by itself after so long; 0: not */
-	int state;	     /* enum can_state; -EOPNOTSUPP: not told */
+	uint32_t bitrate;    /* bit/s; 0: none, or unknown to the driver */
+	uint32_t restart_ms; /* automatic restart after bus-off; 0: none */
+	int state;	     /* enum can_state; -EOPNOTSUPP: not reported */
 };
 
 /*
- * Waits 2 s at most. 0; -ENODEV (there is none of that name), -ETIMEDOUT, -EBADMSG (the
- * answer is cut off, or an attribute has not the size of its type), or what the kernel says.
+ * Waits 2 s at most. Returns 0; -ENODEV (no such name), -ETIMEDOUT, -EBADMSG (the answer is
+ * cut off, or an attribute has not the size of its type), or the kernel's error.
  */
-int can_netlink_ask(const char *name, struct can_netlink *told);
+int can_netlink_query(const char *name, struct can_netlink *link);
 
 /*
- * One datagram. 1 (*told is the answer), 0 (nothing in it is for us), or as above.
- * @bytes is aligned as a struct nlmsghdr.
+ * Parse one datagram. Returns 1 (*link is the answer), 0 (no message in it is the answer), or
+ * an error as above. @bytes is aligned as a struct nlmsghdr.
  */
 int can_netlink_parse(const void *bytes, size_t n, uint32_t sequence, uint32_t port,
-		      struct can_netlink *told);
+		      struct can_netlink *link);
 
 #endif
