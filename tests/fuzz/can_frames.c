@@ -135,7 +135,7 @@ static void take(struct canopen *master)
 	while (of(master->bus)->size) {
 		if (bus_receive(master->bus, &frame, &t_ns) <= 0)
 			continue;
-		canopen_take(master, &frame, t_ns);
+		canopen_handle(master, &frame, t_ns);
 		if (cia402_get(&frame, &word, &position))
 			cia402_mode_name((int8_t)word);
 		cia402_get_inputs(&frame, &inputs);
@@ -149,7 +149,7 @@ static void ask(struct canopen *master, uint8_t what)
 		.cycle_ns = 1000000,
 		.deadman_ms = 100,
 		.master = OWN,
-		.beat_ms = 20,
+		.heartbeat_ms = 20,
 		.limited = true,
 		.position_max = 1000,
 		.velocity = 1,
@@ -216,7 +216,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 	struct fuzz_bus bus = {
 		.bus = {.ops = &ops, .name = "fuzz"}, .data = data, .size = size};
 	struct canopen master = {
-		.bus = &bus.bus, .node = NODE, .own = OWN, .beat_ns = 20000000};
+		.bus = &bus.bus, .node = NODE, .own = OWN, .heartbeat_ns = 20000000};
 	uint8_t what;
 
 	bus.now_ns = START_NS;

@@ -221,8 +221,8 @@ static inline void drive_tick(struct drive *d)
 		d->deadline_runs = false;
 		drive_connection_lost(d, 0x8250);
 	}
-	if (beat && d->now_ns >= d->beat_ns) {
-		d->beat_ns += beat;
+	if (beat && d->now_ns >= d->heartbeat_ns) {
+		d->heartbeat_ns += beat;
 		if (!d->no_heartbeat)
 			drive_say_bytes(d, CANOPEN_HEARTBEAT + d->node, &state, 1);
 	}

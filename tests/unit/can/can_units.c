@@ -75,7 +75,7 @@ static void limits_are_the_drives_with_room(void **state)
 	assert_int_equal(link.setup.following, 12800);
 	assert_int_equal(link.setup.following_ms, 50);
 	assert_int_equal(link.setup.deadman_ms, 100);
-	assert_int_equal(link.setup.beat_ms, 25);
+	assert_int_equal(link.setup.heartbeat_ms, 25);
 	link.is_homed = true;
 	link.axis.zero_counts = 6400;
 	can_fit_range(&link);

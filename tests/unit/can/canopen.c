@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/canopen/canopen.c: what is heard and said, against a simulated drive and against
- * frames that no drive sends.
+ * lib/device/can/canopen/canopen.c with a simulated drive as the node: frames, heartbeats and NMT;
+ * SDOs, with all the answers a node can give; the texts of codes.
  */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <stdio.h>
+#include <string.h>
+#include "../../../lib/device/can/canopen/canopen.h"
 #include "can_drive.h"
 
 #define OWN 0x7f
@@ -27,18 +30,18 @@ static int setup(void **state)
 	w.master = (struct canopen){.bus = &w.drive.bus,
 				    .node = N,
 				    .own = OWN,
-				    .beat_ns = 20 * DRIVE_MS,
+				    .heartbeat_ns = 20 * DRIVE_MS,
 				    .state = CANOPEN_UNKNOWN};
 	*state = &w;
 	return 0;
 }
 
-static uint32_t take(struct world *w, uint32_t id, uint8_t len, const char *bytes)
+static uint32_t handle(struct world *w, uint32_t id, uint8_t len, const char *bytes)
 {
 	struct can_frame frame = {.can_id = id, .len = len};
 
 	memcpy(frame.data, bytes, len < 8 ? len : 8);
-	return canopen_take(&w->master, &frame, 42);
+	return canopen_handle(&w->master, &frame, 42);
 }
 
 /* Which frames are whose, and what they are. */
@@ -80,7 +83,7 @@ static void test_functions(void **state)
 	for (size_t i = 0; i < COUNT(cases); i++) {
 		uint32_t before = w->master.foreign;
 
-		assert_int_equal(take(w, cases[i].id, cases[i].len, "\0\0\0\0\0\0\0"),
+		assert_int_equal(handle(w, cases[i].id, cases[i].len, "\0\0\0\0\0\0\0"),
 				 cases[i].function);
 		assert_int_equal(w->master.foreign - before, cases[i].foreign);
 	}
@@ -90,22 +93,22 @@ static void test_heartbeats(void **state)
 {
 	struct world *w = *state;
 
-	take(w, 0x700 + N, 1, "\x05");
+	handle(w, 0x700 + N, 1, "\x05");
 	assert_int_equal(w->master.state, CANOPEN_OPERATIONAL);
-	assert_int_equal(w->master.heard_ns, 42);
+	assert_int_equal(w->master.last_heartbeat_ns, 42);
 	/* Not one: too short, too long, of no state, somebody else's. */
-	take(w, 0x700 + N, 0, "");
-	take(w, 0x700 + N, 2, "\x7f\0");
-	take(w, 0x700 + N, 1, "\x33");
-	take(w, 0x701 + N, 1, "\x7f");
+	handle(w, 0x700 + N, 0, "");
+	handle(w, 0x700 + N, 2, "\x7f\0");
+	handle(w, 0x700 + N, 1, "\x33");
+	handle(w, 0x701 + N, 1, "\x7f");
 	assert_int_equal(w->master.state, CANOPEN_OPERATIONAL);
 	/* Node guarding toggles bit 7. */
-	take(w, 0x700 + N, 1, "\xff");
+	handle(w, 0x700 + N, 1, "\xff");
 	assert_int_equal(w->master.state, CANOPEN_PRE_OPERATIONAL);
-	take(w, 0x700 + N, 1, "\x04");
+	handle(w, 0x700 + N, 1, "\x04");
 	assert_int_equal(w->master.state, CANOPEN_STOPPED);
 	assert_int_equal(w->master.boots, 0);
-	take(w, 0x700 + N, 1, "\0");
+	handle(w, 0x700 + N, 1, "\0");
 	assert_int_equal(w->master.boots, 1);
 	assert_int_equal(w->master.state, CANOPEN_BOOT_UP);
 }
@@ -114,16 +117,16 @@ static void test_emcy(void **state)
 {
 	struct world *w = *state;
 
-	take(w, 0x80 + N, 8, "\x11\x86\x21VWXYZ");
+	handle(w, 0x80 + N, 8, "\x11\x86\x21VWXYZ");
 	assert_int_equal(w->master.emcy.code, 0x8611);
 	assert_int_equal(w->master.emcy.error_register, 0x21);
 	assert_memory_equal(w->master.emcy.vendor, "VWXYZ", 5);
-	take(w, 0x80 + N, 7, "\x10\x23\x01\0\0\0\0");
-	take(w, 0x81 + N, 8, "\x10\x23\x01\0\0\0\0\0");
+	handle(w, 0x80 + N, 7, "\x10\x23\x01\0\0\0\0");
+	handle(w, 0x81 + N, 8, "\x10\x23\x01\0\0\0\0\0");
 	assert_int_equal(w->master.emcy.code, 0x8611);
 	assert_int_equal(w->master.emcy.count, 1);
 	/* What it was is kept when it is over. */
-	take(w, 0x80 + N, 8, "\0\0\0\0\0\0\0\0");
+	handle(w, 0x80 + N, 8, "\0\0\0\0\0\0\0\0");
 	assert_int_equal(w->master.emcy.code, 0x8611);
 	assert_int_equal(w->master.emcy.count, 1);
 }
@@ -133,27 +136,27 @@ static void test_error_frames(void **state)
 	struct world *w = *state;
 
 	assert_int_equal(
-		take(w, CAN_ERR_FLAG | CAN_ERR_CRTL, 8, "\0\x30\0\0\0\0\x60\x08"), 0);
+		handle(w, CAN_ERR_FLAG | CAN_ERR_CRTL, 8, "\0\x30\0\0\0\0\x60\x08"), 0);
 	assert_int_equal(w->master.bus_error, CAN_ERR_CRTL);
 	assert_int_equal(w->master.bus_error_data[1], 0x30);
 	assert_int_equal(w->master.bus_offs, 0);
-	take(w, CAN_ERR_FLAG | CAN_ERR_BUSOFF, 1, "\x01");
+	handle(w, CAN_ERR_FLAG | CAN_ERR_BUSOFF, 1, "\x01");
 	assert_int_equal(w->master.bus_error, CAN_ERR_BUSOFF);
 	assert_int_equal(w->master.bus_error_data[1], 0);
 	assert_int_equal(w->master.bus_offs, 1);
-	take(w, CAN_ERR_FLAG | CAN_ERR_BUSOFF, 0xff, "\1\2\3\4\5\6\7\10");
+	handle(w, CAN_ERR_FLAG | CAN_ERR_BUSOFF, 0xff, "\1\2\3\4\5\6\7\10");
 	assert_int_equal(w->master.bus_error_data[7], 8);
 }
 
 /* This side's heartbeat: on time, not made up for, tried again when the queue was full. */
-static void test_beat(void **state)
+static void test_own_heartbeat(void **state)
 {
 	struct world *w = *state;
 	int64_t t = w->drive.now_ns;
 
 	w->drive.od[OD_CONSUMER].value = (uint32_t)OWN << 16 | 50;
 	for (int i = 0; i < 1000; i++) {
-		assert_int_equal(canopen_beat(&w->master, w->drive.now_ns), 0);
+		assert_int_equal(canopen_send_heartbeat(&w->master, w->drive.now_ns), 0);
 		drive_advance(&w->drive, DRIVE_MS);
 	}
 	/* At 0, 20, … 980 ms. */
@@ -163,21 +166,21 @@ static void test_beat(void **state)
 	drive_advance(&w->drive, 1000 * DRIVE_MS);
 	assert_int_equal(w->drive.emcys, 1); /* 8130h: it watches */
 	for (int i = 0; i < 3; i++)
-		canopen_beat(&w->master, w->drive.now_ns);
+		canopen_send_heartbeat(&w->master, w->drive.now_ns);
 	drive_advance(&w->drive, DRIVE_MS);
 	assert_int_equal(w->drive.master_beats, 51);
 
 	t = w->drive.now_ns + 20 * DRIVE_MS;
 	w->drive.send_error = -ENOBUFS;
-	assert_int_equal(canopen_beat(&w->master, t), -ENOBUFS);
-	assert_int_equal(canopen_beat(&w->master, t), 0); /* not yet */
-	assert_int_equal(canopen_beat(&w->master, t + DRIVE_MS), -ENOBUFS);
+	assert_int_equal(canopen_send_heartbeat(&w->master, t), -ENOBUFS);
+	assert_int_equal(canopen_send_heartbeat(&w->master, t), 0); /* not yet */
+	assert_int_equal(canopen_send_heartbeat(&w->master, t + DRIVE_MS), -ENOBUFS);
 	w->drive.send_error = 0;
-	assert_int_equal(canopen_beat(&w->master, t + 2 * DRIVE_MS), 0);
+	assert_int_equal(canopen_send_heartbeat(&w->master, t + 2 * DRIVE_MS), 0);
 
 	w->master.own = 0;
-	w->master.next_beat_ns = 0;
-	assert_int_equal(canopen_beat(&w->master, INT64_MAX), 0);
+	w->master.next_heartbeat_ns = 0;
+	assert_int_equal(canopen_send_heartbeat(&w->master, INT64_MAX), 0);
 	drive_advance(&w->drive, DRIVE_MS);
 	assert_int_equal(w->drive.master_beats, 52);
 }
@@ -186,15 +189,15 @@ static void test_nmt(void **state)
 {
 	struct world *w = *state;
 
-	assert_int_equal(canopen_nmt(&w->master, CANOPEN_START), 0);
+	assert_int_equal(canopen_send_nmt(&w->master, CANOPEN_START), 0);
 	drive_advance(&w->drive, DRIVE_MS);
 	assert_int_equal(w->drive.nmt, CANOPEN_OPERATIONAL);
 	w->master.node++; /* another node is meant */
-	assert_int_equal(canopen_nmt(&w->master, CANOPEN_STOP), 0);
+	assert_int_equal(canopen_send_nmt(&w->master, CANOPEN_STOP), 0);
 	drive_advance(&w->drive, DRIVE_MS);
 	assert_int_equal(w->drive.nmt, CANOPEN_OPERATIONAL);
 	w->drive.send_error = -ENETDOWN;
-	assert_int_equal(canopen_nmt(&w->master, CANOPEN_STOP), -ENETDOWN);
+	assert_int_equal(canopen_send_nmt(&w->master, CANOPEN_STOP), -ENETDOWN);
 }
 
 static bool operational(const struct canopen *master)
@@ -241,6 +244,344 @@ static void test_await(void **state)
 	assert_int_equal(canopen_await(&w->master, NULL, t + 200 * DRIVE_MS), -ENETDOWN);
 }
 
+static int setup_sdo(void **state)
+{
+	static struct world w;
+
+	drive_init(&w.drive);
+	w.master = (struct canopen){.bus = &w.drive.bus, .node = N};
+	*state = &w;
+	return 0;
+}
+
+static void test_numbers(void **state)
+{
+	struct world *w = *state;
+	uint32_t value = 0;
+
+	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), 0);
+	assert_int_equal(value, 0x00040192);
+	assert_int_equal(canopen_write(&w->master, 0x607d, 1, 4, 0xfedcba98), 0);
+	assert_int_equal(canopen_read(&w->master, 0x607d, 1, 4, &value), 0);
+	assert_int_equal(value, 0xfedcba98);
+	assert_int_equal(canopen_write(&w->master, 0x605a, 0, 2, 0xffffffff), 0);
+	assert_int_equal(canopen_read(&w->master, 0x605a, 0, 2, &value), 0);
+	assert_int_equal(value, 0xffff); /* not extended */
+	assert_int_equal(canopen_write(&w->master, 0x60c2, 2, 1, 0xfffffffd), 0);
+	assert_int_equal(canopen_read(&w->master, 0x60c2, 2, 1, &value), 0);
+	assert_int_equal(value, 0xfd);
+	/* Of another size than it has. */
+	assert_int_equal(canopen_read(&w->master, 0x605a, 0, 4, &value), -EPROTO);
+	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 2, &value), -EPROTO);
+	assert_int_equal(canopen_write(&w->master, 0x605a, 0, 4, 1), -EREMOTEIO);
+	assert_int_equal(w->master.abort, ABORT_LONG);
+	assert_int_equal(canopen_write(&w->master, 0x1000, 0, 4, 1), -EREMOTEIO);
+	assert_int_equal(w->master.abort, ABORT_READ_ONLY);
+	assert_int_equal(canopen_read(&w->master, 0x2000, 0, 4, &value), -EREMOTEIO);
+	assert_int_equal(w->master.abort, ABORT_NO_OBJECT);
+	assert_int_equal(canopen_read(&w->master, 0x1018, 9, 4, &value), -EREMOTEIO);
+	assert_int_equal(w->master.abort, ABORT_NO_SUB);
+	assert_int_equal(canopen_read(&w->master, 0x1018, 1, 4, &value), 0);
+	assert_int_equal(w->master.abort, 0);
+}
+
+static void test_text(void **state)
+{
+	static const struct {
+		const char *name;
+		size_t size;
+		const char *text;
+	} cases[] = {
+		{"simulated drive", 64, "simulated drive"},
+		{"7 chars", 64, "7 chars"},
+		{"14 characters.", 64, "14 characters."},
+		{"", 64, ""},
+		{"a", 64, "a"},
+		{"new\nline \xc3\xa4 \x7f", 64, "new?line ?? ?"},
+		{"simulated drive", 8, "simulat"},
+		{"simulated drive", 9, "simulate"},
+		{"simulated drive", 2, "s"},
+		{"simulated drive", 1, ""},
+	};
+	struct world *w = *state;
+	char text[65];
+	uint32_t value;
+
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		memset(text, 'x', sizeof(text));
+		w->drive.name = cases[i].name;
+		assert_int_equal(
+			canopen_read_text(&w->master, 0x1008, 0, text, cases[i].size), 0);
+		assert_string_equal(text, cases[i].text);
+		/* And what comes next is none the worse. */
+		assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), 0);
+	}
+	w->drive.name = NULL;
+	assert_int_equal(canopen_read_text(&w->master, 0x1008, 0, text, 64), -EREMOTEIO);
+	assert_string_equal(text, "");
+}
+
+static void test_silence(void **state)
+{
+	struct world *w = *state;
+	int64_t t = w->drive.now_ns;
+	uint32_t value;
+
+	w->drive.mute = true;
+	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), -ETIMEDOUT);
+	assert_int_equal(w->drive.now_ns, t + CANOPEN_ANSWER_NS);
+	drive_advance(&w->drive, DRIVE_MS);
+	assert_int_equal(w->drive.master_abort, ABORT_TIMEOUT);
+	w->master.answer_ns = 5 * DRIVE_MS;
+	t = w->drive.now_ns;
+	assert_int_equal(canopen_write(&w->master, 0x6060, 0, 1, 8), -ETIMEDOUT);
+	assert_int_equal(w->drive.now_ns, t + 5 * DRIVE_MS);
+
+	/* An answer that comes too late is not taken for that of the next request. */
+	w->drive.mute = false;
+	w->drive.answer_ns = 10 * DRIVE_MS;
+	assert_int_equal(canopen_read(&w->master, 0x1018, 2, 4, &value), -ETIMEDOUT);
+	w->drive.answer_ns = 0;
+	w->master.answer_ns = 0;
+	assert_int_equal(canopen_read(&w->master, 0x1018, 1, 4, &value), 0);
+	assert_int_equal(value, 0x286);
+}
+
+static void test_bus(void **state)
+{
+	struct world *w = *state;
+	int64_t t = w->drive.now_ns;
+	uint32_t value;
+
+	w->drive.send_error = -ENOBUFS;
+	w->drive.send_errors = 3;
+	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), 0);
+	assert_true(w->drive.now_ns >= t + 3 * DRIVE_MS);
+	w->drive.send_error = -ENOBUFS;
+	w->drive.send_errors = 0;
+	t = w->drive.now_ns;
+	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), -ENOBUFS);
+	assert_in_range(w->drive.now_ns - t, CANOPEN_ANSWER_NS,
+			CANOPEN_ANSWER_NS + 2 * DRIVE_MS);
+	w->drive.send_error = -ENETDOWN;
+	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), -ENETDOWN);
+	w->drive.send_error = 0;
+	w->drive.wait_error = -EINTR;
+	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), -EINTR);
+	w->drive.wait_error = 0;
+	w->drive.receive_error = -ENODEV;
+	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), -ENODEV);
+}
+
+/* Answers by script, one frame a line; the drive itself is mute. */
+static void script(struct world *w, uint8_t len, const char *bytes)
+{
+	struct can_frame frame = {.can_id = CANOPEN_SDO_ANSWER + N, .len = len};
+
+	memcpy(frame.data, bytes, 8);
+	w->drive.latency_ns += DRIVE_MS; /* after what is asked */
+	drive_say(&w->drive, &frame);
+	w->drive.latency_ns -= DRIVE_MS;
+}
+
+static void test_answers(void **state)
+{
+	static const struct {
+		const char *answer;
+		uint8_t len;
+		int rc;
+		uint32_t value;
+	} cases[] = {
+		{"\x43\x00\x10\x00\x92\x01\x02\x00", 8, 0, 0x00020192},
+		{"\x42\x00\x10\x00\x92\x01\x02\x00", 8, 0,
+		 0x00020192}, /* without a size */
+		{"\x43\x00\x10\x00\x92\x01\x02\x00", 7, -ETIMEDOUT, 0}, /* truncated */
+		{"\x43\x00\x10\x01\x92\x01\x02\x00", 8, -ETIMEDOUT, 0}, /* another sub */
+		{"\x43\x01\x10\x00\x92\x01\x02\x00", 8, -ETIMEDOUT,
+		 0}, /* another index */
+		{"\x43\x00\x11\x00\x92\x01\x02\x00", 8, -ETIMEDOUT, 0},
+		{"\x60\x00\x10\x00\x00\x00\x00\x00", 8, -EPROTO, 0}, /* answers a write */
+		{"\x00\x00\x10\x00\x00\x00\x00\x00", 8, -EPROTO, 0},
+		{"\xe0\x00\x10\x00\x00\x00\x00\x00", 8, -EPROTO, 0},
+		{"\x47\x00\x10\x00\x92\x01\x02\x00", 8, -EPROTO, 0}, /* three bytes */
+		{"\x80\x00\x10\x00\x00\x00\x00\x08", 8, -EREMOTEIO, 0},
+		{"\x80\x01\x10\x00\x00\x00\x00\x08", 8, -ETIMEDOUT, 0},
+		/* Announces segments that do not come. */
+		{"\x41\x00\x10\x00\xff\xff\xff\xff", 8, -ETIMEDOUT, 0},
+	};
+	struct world *w = *state;
+	uint32_t value;
+
+	w->drive.mute = true;
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		int64_t t = w->drive.now_ns;
+
+		value = 0;
+		script(w, cases[i].len, cases[i].answer);
+		assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value),
+				 cases[i].rc);
+		assert_int_equal(value, cases[i].value);
+		assert_true(w->drive.now_ns - t <= 2 * CANOPEN_ANSWER_NS);
+		drive_advance(&w->drive, DRIVE_MS);
+	}
+	script(w, 8, "\x43\x00\x10\x00\x00\x00\x00\x00");
+	assert_int_equal(canopen_write(&w->master, 0x1000, 0, 4, 1), -EPROTO);
+}
+
+static void test_segments(void **state)
+{
+	static const struct {
+		const char *answers[3];
+		int rc;
+		const char *text;
+	} cases[] = {
+		{{"\x41\x08\x10\x00\x09\0\0\0", "\x00ofwords", "\x1b\x31\x32xxxxx"},
+		 0,
+		 "ofwords12"},
+		/* The toggle bit stays. */
+		{{"\x41\x08\x10\x00\x09\0\0\0", "\x00ofwords", "\x0b\x31\x32xxxxx"},
+		 -EPROTO,
+		 ""},
+		{{"\x41\x08\x10\x00\x09\0\0\0", "\x10ofwords", "\x0b\x31\x32xxxxx"},
+		 -EPROTO,
+		 ""},
+		/* Nothing in it, and not the last. */
+		{{"\x41\x08\x10\x00\x09\0\0\0", "\x0eofwords", "\x1b\x31\x32xxxxx"},
+		 -EPROTO,
+		 ""},
+		/* It gives up half-way. */
+		{{"\x41\x08\x10\x00\x09\0\0\0", "\x00ofwords",
+		  "\x80\x08\x10\x00\x00\x00\x00\x08"},
+		 -EREMOTEIO,
+		 ""},
+		/* Expedited: four letters. */
+		{{"\x43\x08\x10\x00wxyz", "\x01zzzzzzz", "\x01zzzzzzz"}, 0, "wxyz"},
+		/* Another client's answer between. */
+		{{"\x41\x08\x10\x00\x09\0\0\0", "\x60\x08\x10\x00\0\0\0\0",
+		  "\x09zzz\0zzz"},
+		 0,
+		 "zzz"},
+	};
+	struct world *w = *state;
+	char text[64];
+
+	w->drive.mute = true;
+	w->master.answer_ns = 20 * DRIVE_MS;
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		canopen_await(&w->master, NULL, w->drive.now_ns + 50 * DRIVE_MS);
+		/* Frames come one by one, each after what asks for it. */
+		for (int j = 0; j < 3; j++) {
+			w->drive.latency_ns = (1 + 2 * j) * DRIVE_MS;
+			script(w, 8, cases[i].answers[j]);
+		}
+		w->drive.latency_ns = 100000;
+		assert_int_equal(canopen_read_text(&w->master, 0x1008, 0, text,
+						   sizeof(text)),
+				 cases[i].rc);
+		assert_string_equal(text, cases[i].text);
+	}
+}
+
+/* CiA 301 V4.2, table 22. */
+static const uint32_t aborts[] = {
+	0x05030000, 0x05040000, 0x05040001, 0x05040002, 0x05040003, 0x05040004,
+	0x05040005, 0x06010000, 0x06010001, 0x06010002, 0x06020000, 0x06040041,
+	0x06040042, 0x06040043, 0x06040047, 0x06060000, 0x06070010, 0x06070012,
+	0x06070013, 0x06090011, 0x06090030, 0x06090031, 0x06090032, 0x06090036,
+	0x060a0023, 0x08000000, 0x08000020, 0x08000021, 0x08000022, 0x08000023,
+	0x08000024,
+};
+
+static void test_aborts(void **state)
+{
+	char text[100], other[100], number[20];
+
+	for (size_t i = 0; i < COUNT(aborts); i++) {
+		canopen_abort_text(aborts[i], text, sizeof(text));
+		snprintf(number, sizeof(number), "(%08Xh)", aborts[i]);
+		assert_non_null(strstr(text, number));
+		assert_null(strstr(text, "does not have"));
+		/* Two codes do not read the same. */
+		for (size_t j = 0; j < i; j++) {
+			canopen_abort_text(aborts[j], other, sizeof(other));
+			assert_int_not_equal(
+				strncmp(text, other, strlen(text) - strlen(number)), 0);
+		}
+	}
+	assert_string_equal(canopen_abort_text(0x06020000, text, sizeof(text)),
+			    "object does not exist (06020000h)");
+	canopen_abort_text(0xdeadbeef, text, sizeof(text));
+	assert_non_null(strstr(text, "DEADBEEF"));
+	assert_non_null(strstr(text, "does not have"));
+}
+
+static void test_emcys(void **state)
+{
+	static const struct {
+		uint16_t code;
+		const char *text;
+	} cases[] = {
+		{0x0000, "no error, or reset (0000h)"},
+		{0x0001, "an error without a class (0001h)"},
+		{0x1000, "generic error (1000h)"},
+		{0x1234, "generic error (1234h)"},
+		{0x2310, "continuous over-current, motor side (2310h)"},
+		{0x2311, "continuous over-current, motor side (2311h)"},
+		{0x23ff, "current, motor side (23FFh)"},
+		{0x2fff, "current (2FFFh)"},
+		{0x3210, "DC link over-voltage (3210h)"},
+		{0x4210, "temperature of the device too high (4210h)"},
+		{0x5441, "contacts 1 (5441h)"},
+		{0x7305, "incremental sensor 1 (7305h)"},
+		{0x7320, "position sensor (7320h)"},
+		{0x7500, "communication inside the drive (7500h)"},
+		{0x8110, "CAN overrun: frames lost (8110h)"},
+		{0x8120, "CAN in error passive mode (8120h)"},
+		{0x8130, "life guard or heartbeat error (8130h)"},
+		{0x8140, "recovered from bus-off (8140h)"},
+		{0x8150, "CAN-ID collision (8150h)"},
+		{0x8611, "following error too large (8611h)"},
+		{0x8612, "reference limit (8612h)"},
+		{0xff42, "fault of the manufacturer's own (FF42h)"},
+		{0xf001, "additional functions (F001h)"},
+		{0xb000, "an error without a class (B000h)"},
+	};
+	char text[100];
+
+	for (size_t i = 0; i < COUNT(cases); i++)
+		assert_string_equal(canopen_emcy_text(cases[i].code, text, sizeof(text)),
+				    cases[i].text);
+}
+
+/* Any code, any room: it ends and says its number. */
+static void test_all_emcys(void **state)
+{
+	char text[100], number[12];
+
+	for (uint32_t code = 0; code <= UINT16_MAX; code++) {
+		canopen_emcy_text((uint16_t)code, text, sizeof(text));
+		snprintf(number, sizeof(number), "(%04Xh)", code);
+		assert_non_null(strstr(text, number));
+		assert_true(strlen(text) > strlen(number) + 3); /* "RAM" and a space */
+	}
+	for (size_t size = 1; size < 12; size++) {
+		memset(text, 'x', sizeof(text));
+		canopen_emcy_text(0x8611, text, size);
+		assert_int_equal(strlen(text), size - 1);
+		assert_int_equal(text[size], 'x');
+	}
+}
+
+static void test_states(void **state)
+{
+	assert_string_equal(canopen_state_name(CANOPEN_PRE_OPERATIONAL),
+			    "pre-operational");
+	assert_string_equal(canopen_state_name(CANOPEN_OPERATIONAL), "operational");
+	assert_string_equal(canopen_state_name(CANOPEN_STOPPED), "stopped");
+	assert_string_equal(canopen_state_name(CANOPEN_BOOT_UP), "booting");
+	assert_string_equal(canopen_state_name(CANOPEN_UNKNOWN), "not heard");
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -248,9 +589,19 @@ int main(void)
 		cmocka_unit_test_setup(test_heartbeats, setup),
 		cmocka_unit_test_setup(test_emcy, setup),
 		cmocka_unit_test_setup(test_error_frames, setup),
-		cmocka_unit_test_setup(test_beat, setup),
+		cmocka_unit_test_setup(test_own_heartbeat, setup),
 		cmocka_unit_test_setup(test_nmt, setup),
 		cmocka_unit_test_setup(test_await, setup),
+		cmocka_unit_test_setup(test_numbers, setup_sdo),
+		cmocka_unit_test_setup(test_text, setup_sdo),
+		cmocka_unit_test_setup(test_silence, setup_sdo),
+		cmocka_unit_test_setup(test_bus, setup_sdo),
+		cmocka_unit_test_setup(test_answers, setup_sdo),
+		cmocka_unit_test_setup(test_segments, setup_sdo),
+		cmocka_unit_test(test_aborts),
+		cmocka_unit_test(test_emcys),
+		cmocka_unit_test(test_all_emcys),
+		cmocka_unit_test(test_states),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

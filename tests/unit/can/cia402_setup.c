@@ -262,7 +262,7 @@ static void test_refused(void **state)
 			led->setup.deadman_ms = 65536;
 			break;
 		case 2:
-			led->setup.beat_ms = 0;
+			led->setup.heartbeat_ms = 0;
 			break;
 		case 3:
 			led->setup.master = led->master.own = DRIVE_NODE;
@@ -280,7 +280,7 @@ static void test_refused(void **state)
 			led->master.own = 0;
 			break;
 		case 8:
-			led->master.beat_ns = LED_DEADMAN_MS * DRIVE_MS;
+			led->master.heartbeat_ns = LED_DEADMAN_MS * DRIVE_MS;
 			break;
 		case 9:
 			led->setup.cycle_ns = 0;

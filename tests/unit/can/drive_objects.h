@@ -160,7 +160,7 @@ static inline uint32_t drive_write(struct drive *d, struct drive_object *o,
 	if (at == OD_RPDO1_TIMER)
 		d->deadline_runs = false;
 	if (at == OD_HEARTBEAT)
-		d->beat_ns = d->now_ns + value * DRIVE_MS;
+		d->heartbeat_ns = d->now_ns + value * DRIVE_MS;
 	return 0;
 }
 

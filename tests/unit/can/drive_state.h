@@ -208,7 +208,7 @@ struct drive {
 	struct drive_queue to_master, to_drive;
 	struct can_filter filters[16];
 	int filters_n; /* 0: all */
-	int64_t tick_ns, beat_ns, consumer_ns, deadline_ns, inhibit_ns, timer_ns;
+	int64_t tick_ns, heartbeat_ns, consumer_ns, deadline_ns, inhibit_ns, timer_ns;
 	int64_t enabled_at_ns;
 	bool watching, deadline_runs, enabling, rpdo_waits, own_stop, homed, homing,
 		homing_error, limit_active, had_reset_bit, had_home_bit;

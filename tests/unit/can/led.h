@@ -25,7 +25,7 @@ static inline void led_init(struct led *led)
 			  .cycle_ns = 1000000,
 			  .deadman_ms = LED_DEADMAN_MS,
 			  .master = LED_MASTER,
-			  .beat_ms = 20,
+			  .heartbeat_ms = 20,
 			  .limited = true,
 			  .position_min = -100,
 			  .position_max = 200000,
@@ -39,7 +39,7 @@ static inline void led_init(struct led *led)
 	led->master = (struct canopen){.bus = &led->drive.bus,
 				       .node = DRIVE_NODE,
 				       .own = LED_MASTER,
-				       .beat_ns = 20 * DRIVE_MS,
+				       .heartbeat_ns = 20 * DRIVE_MS,
 				       .state = CANOPEN_UNKNOWN};
 }
 

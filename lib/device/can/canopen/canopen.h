@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A small CANopen master (CiA 301) for one node: SDO, NMT, heartbeats both ways, EMCY. One
- * thread at a time. Only what a drive needs; no dictionary of our own.
+ * A small CANopen master (CiA 301) for one node: SDO, NMT, heartbeats both ways, EMCY. It has
+ * no object dictionary of its own. One thread at a time.
  *
  *   node: 0x000 NMT   0x080 SYNC   0x080+n EMCY   0x580+n, 0x600+n SDO   0x700+n heartbeat
  *
- * What waits, waits on the bus's clock for at most a given time, and meanwhile takes what
- * else comes and sends this side's heartbeat when it is due. Nothing that comes in is
- * trusted: lengths, toggle bits and sizes are checked.
+ * Functions that wait do so on the bus's clock for at most a given time; meanwhile they handle
+ * other frames and send this side's heartbeat when it is due. No input is trusted: lengths,
+ * toggle bits and sizes are checked.
  */
 #ifndef INCISE_CANOPEN_H
 #define INCISE_CANOPEN_H
@@ -41,95 +41,99 @@ enum canopen_state {
 	CANOPEN_STOPPED = 0x04,
 	CANOPEN_OPERATIONAL = 0x05,
 	CANOPEN_PRE_OPERATIONAL = 0x7f,
-	CANOPEN_UNKNOWN = 0xff, /* none was heard */
+	CANOPEN_UNKNOWN = 0xff, /* none was received */
 };
 
-/* The last that tells of an error; those that tell that it is over are not kept. */
+/* The last emergency message about an error; those about the end of one are not kept. */
 struct canopen_emcy {
-	uint16_t code;		/* 0: there was none */
+	uint16_t code;		/* 0: none */
 	uint8_t error_register; /* object 1001 */
 	uint8_t vendor[5];
-	uint32_t count; /* since it was opened */
+	uint32_t count; /* since the bus was opened */
 };
 
 struct canopen {
 	struct can_bus *bus;
-	uint8_t node;	   /* 1 … 127 */
-	uint8_t own;	   /* node id of this side's heartbeat; 0: none is sent */
-	int64_t beat_ns;   /* between two of them */
-	int64_t answer_ns; /* an SDO is answered within this; 0: CANOPEN_ANSWER_NS */
+	uint8_t node;	      /* 1 … 127 */
+	uint8_t own;	      /* node id of this side's heartbeat; 0: none is sent */
+	int64_t heartbeat_ns; /* its period */
+	int64_t answer_ns;    /* timeout of an SDO; 0: CANOPEN_ANSWER_NS */
 
-	/* What was heard of the node. */
+	/* Received from the node. */
 	enum canopen_state state;
-	int64_t heard_ns; /* its last heartbeat or boot-up; 0: none */
-	uint32_t boots;	  /* boot-up messages */
+	int64_t last_heartbeat_ns; /* or boot-up; 0: none */
+	uint32_t boots;		   /* boot-up messages */
 	struct canopen_emcy emcy;
-	/* The last error frame on the bus: CAN_ERR_… of can_id and its data; 0: none. */
+	/* The last error frame of the bus: CAN_ERR_… of can_id, and its data; 0: none. */
 	uint32_t bus_error;
 	uint8_t bus_error_data[8];
-	uint32_t bus_offs; /* times that it was bus-off */
-	/* SYNCs, NMT commands, heartbeats of our id, and PDOs to this node: not from us. */
+	uint32_t bus_offs; /* how often it was bus-off */
+	/* SYNCs, NMT commands, heartbeats of @own and PDOs to this node by another master. */
 	uint32_t foreign;
 
-	uint32_t abort; /* code of the last SDO that was aborted */
+	uint32_t abort; /* code of the last aborted SDO */
 
 	/* private */
-	int64_t next_beat_ns;
-	/* The answer that an SDO waits for: of this object, or the next segment. */
+	int64_t next_heartbeat_ns;
+	/* The answer that an SDO waits for: about this object, or the next segment. */
 	struct canopen_answer {
-		bool wanted, segment, came;
+		bool wanted, segment, received;
 		uint8_t object[3]; /* index and sub, as a frame has them */
 		uint8_t data[8];
 	} answer;
 };
 
-#define CANOPEN_ANSWER_NS 200000000 /* for an SDO: ample, for a drive that is busy */
+/* Little-endian numbers of @n bytes, at most 4, as frames have them. */
+void canopen_pack(uint8_t *bytes, int n, uint32_t value);
+uint32_t canopen_unpack(const uint8_t *bytes, int n);
+
+#define CANOPEN_ANSWER_NS 200000000 /* ample also for a busy drive */
 
 /*
- * Take a frame: heartbeat, boot-up, EMCY and error frames are noted. Returns its function:
- * can_id less the node, such as CANOPEN_TPDO1 or CANOPEN_SDO_ANSWER, for frames of this node;
- * 0 where it is none of them or was noted.
+ * Handle a received frame: heartbeats, boot-ups, EMCYs and error frames update @master. For
+ * other frames of this node returns the function, that is can_id less the node, for example
+ * CANOPEN_TPDO1 or CANOPEN_SDO_ANSWER; else 0.
  */
-uint32_t canopen_take(struct canopen *master, const struct can_frame *frame,
-		      int64_t t_ns);
+uint32_t canopen_handle(struct canopen *master, const struct can_frame *frame,
+			int64_t t_ns);
 
 /*
- * Send this side's heartbeat if it is due. 0 or what the bus says; with -ENOBUFS it is tried
- * again a millisecond later.
+ * Send this side's heartbeat if it is due. Returns 0 or an error of the bus; after -ENOBUFS it
+ * is due again a millisecond later.
  */
-int canopen_beat(struct canopen *master, int64_t now_ns);
+int canopen_send_heartbeat(struct canopen *master, int64_t now_ns);
 
-/* To the node alone. 0 or what the bus says. */
-int canopen_nmt(struct canopen *master, enum canopen_command command);
+/* Send a command to the node alone. Returns 0 or an error of the bus. */
+int canopen_send_nmt(struct canopen *master, enum canopen_command command);
 
 /*
- * Until @done of what was heard is so, or the time has come; NULL: until the time has come.
- * 0, -ETIMEDOUT, -EINTR where the bus's wait says so, of the bus.
+ * Handle frames until @done returns true, or @until_ns; NULL: until @until_ns. Returns 0,
+ * -ETIMEDOUT, -EINTR or an error of the bus.
  */
 int canopen_await(struct canopen *master, bool (*done)(const struct canopen *master),
 		  int64_t until_ns);
 
 /*
- * Read or write an object by SDO. Both: 0; -EREMOTEIO (aborted: master->abort), -ETIMEDOUT
- * (no answer; the node is told so), -EPROTO (an answer that makes no sense, or of another
- * size), -EINTR, and what the bus says. Answers for other objects are somebody else's and
- * are passed over.
+ * Read or write an object by SDO. Both return 0; -EREMOTEIO (aborted: master->abort),
+ * -ETIMEDOUT (no answer; the node receives an abort), -EPROTO (an invalid answer, or one of
+ * another size), -EINTR, or an error of the bus. Answers about other objects, which another
+ * master requested, are skipped.
  *
- * @size 1, 2 or 4 bytes; *value is not extended: 0xffff is -1 of 16 bits
+ * @size 1, 2 or 4 bytes; *value is not sign-extended: -1 of 16 bits is 0xffff
  */
 int canopen_read(struct canopen *master, uint16_t index, uint8_t sub, int size,
 		 uint32_t *value);
 int canopen_write(struct canopen *master, uint16_t index, uint8_t sub, int size,
 		  uint32_t value);
 
-/* A string such as 1008, device name: always ends with 0, printable, cut to @size. */
+/* Read a string, for example 1008, device name: printable, cut to @size, ends with 0. */
 int canopen_read_text(struct canopen *master, uint16_t index, uint8_t sub, char *text,
 		      size_t size);
 
-/* "object does not exist (06020000h)"; of any code. The text is in @text. */
+/* Write "object does not exist (06020000h)", for any code, to @text, and return that. */
 const char *canopen_abort_text(uint32_t code, char *text, size_t size);
 
-/* "following error too large (8611h)"; of any code, by its class where it is not known. */
+/* Likewise "following error too large (8611h)"; for an unknown code that of its class. */
 const char *canopen_emcy_text(uint16_t code, char *text, size_t size);
 
 /* "pre-operational" … */

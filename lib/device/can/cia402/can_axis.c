@@ -70,7 +70,7 @@ void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 		can_axis_quick_stop(axis, now_ns);
 	can_axis_sync(axis, now_ns);
 	if (may_beat(axis, powered, now_ns))
-		canopen_beat(axis->master, now_ns);
+		canopen_send_heartbeat(axis->master, now_ns);
 	m->status.late = axis->counts.sync_late;
 	incise_motion_publish(m, now_ns);
 }

@@ -69,7 +69,7 @@ void can_axis_hear(struct can_axis *axis, int64_t now)
 		rc = bus->ops->receive(bus, &frame, &t_ns);
 		if (rc <= 0)
 			break;
-		switch (canopen_take(axis->master, &frame, t_ns)) {
+		switch (canopen_handle(axis->master, &frame, t_ns)) {
 		case CANOPEN_TPDO1:
 			take_status(axis, &frame, now);
 			break;

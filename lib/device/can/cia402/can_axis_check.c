@@ -37,7 +37,7 @@ void can_axis_check_drive(struct can_axis *axis, int64_t now)
 	if (master->foreign != axis->foreign)
 		can_axis_fault(axis, INCISE_STEPPER_FAULT_SETPOINT, CAN_AXIS_FOREIGN, 0,
 			       0, now);
-	if (now - master->heard_ns > axis->setup.silence_ns)
+	if (now - master->last_heartbeat_ns > axis->setup.silence_ns)
 		can_axis_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_HEARTBEAT,
 			       axis->setup.silence_ns / MS, 0, now);
 	else if (master->state != CANOPEN_OPERATIONAL)

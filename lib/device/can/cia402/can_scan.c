@@ -180,7 +180,7 @@ static void describe(struct scan *scan, unsigned int node,
 	if (told)
 		incise_scan_tell(device, "device_type", "0x%08x", type);
 	add_identity(&asked, name, sizeof(name));
-	if (asked.master.heard_ns)
+	if (asked.master.last_heartbeat_ns)
 		incise_scan_tell(device, "nmt_state", "%s",
 				 canopen_state_name(asked.master.state));
 	/* What is no drive is listed too: that it is there is half of the answer. */

@@ -264,7 +264,7 @@ int can_link_open(struct can_link *link, const struct can_transport *transport,
 	if (!rc)
 		rc = check_alone(link, asked->where, err);
 	/* One that another master stopped answers nothing else. */
-	if (!rc && (rc = canopen_nmt(&link->master, CANOPEN_PREPARE)) < 0)
+	if (!rc && (rc = canopen_send_nmt(&link->master, CANOPEN_PREPARE)) < 0)
 		rc = incise_error_set(err, -rc, "%s: %s: cannot send: %s", asked->where,
 				      link->bus->name, strerror(-rc));
 	if (!rc)
@@ -446,7 +446,7 @@ void can_link_close(struct can_link *link)
 	if (link->is_setup && link->master.own &&
 	    !cia402_power_off(&link->master, link->where, NULL)) {
 		canopen_write(&link->master, 0x1016, 1, 4, 0);
-		canopen_nmt(&link->master, CANOPEN_PREPARE);
+		canopen_send_nmt(&link->master, CANOPEN_PREPARE);
 	}
 	link->bus->ops->close(link->bus);
 	link->bus = NULL;

@@ -42,7 +42,7 @@ static void obey(struct can_thread *t)
 /* Without power, and while it is borrowed: the mailbox, and now and then a cycle. */
 static int64_t idle(struct can_thread *t)
 {
-	int64_t now = now_of(t), beat_ns = t->link->master.beat_ns;
+	int64_t now = now_of(t), heartbeat_ns = t->link->master.heartbeat_ns;
 
 	if (!t->lent && now >= t->idle_ns) {
 		if (t->watches)
@@ -50,8 +50,8 @@ static int64_t idle(struct can_thread *t)
 		else
 			can_axis_cycle(&t->link->axis, now, 0, 0);
 		/* The drive's watch waits for no more than four heartbeats. */
-		t->idle_ns = now + (beat_ns > 0 && beat_ns < CAN_AXIS_IDLE_NS
-					    ? beat_ns
+		t->idle_ns = now + (heartbeat_ns > 0 && heartbeat_ns < CAN_AXIS_IDLE_NS
+					    ? heartbeat_ns
 					    : CAN_AXIS_IDLE_NS);
 	}
 	t->due_ns = now_of(t);

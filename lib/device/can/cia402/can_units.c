@@ -65,14 +65,14 @@ void can_fit_setup(struct can_link *link)
 		[INCISE_ACTUATOR_CST] = CIA402_CST,
 	};
 	uint32_t deadman_ms = (uint32_t)ceil(a->deadman_s * 1e3 - 1e-9);
-	uint32_t beat_ms = deadman_ms / 4 < 250 ? deadman_ms / 4 : 250;
+	uint32_t heartbeat_ms = deadman_ms / 4 < 250 ? deadman_ms / 4 : 250;
 
 	link->setup = (struct cia402_setup){
 		.mode = modes[can->mode],
 		.cycle_ns = can->cycle_ns,
 		.deadman_ms = deadman_ms,
 		.master = (uint8_t)can->master,
-		.beat_ms = beat_ms,
+		.heartbeat_ms = heartbeat_ms,
 		.velocity = can_fit_units(MARGIN * a->velocity_mm_s / a->lead_mm *
 					  link->units.velocity_per_turn_s),
 		.acceleration =
@@ -86,7 +86,7 @@ void can_fit_setup(struct can_link *link)
 					   : 0,
 	};
 	link->master.own = (uint8_t)can->master;
-	link->master.beat_ns = beat_ms * MS;
+	link->master.heartbeat_ns = heartbeat_ms * MS;
 }
 
 int can_fit_axis(struct can_link *link, const char *where, struct incise_error *err)
@@ -103,7 +103,8 @@ int can_fit_axis(struct can_link *link, const char *where, struct incise_error *
 		.torque_per_step = sign * a->can.stiffness_permille_mm * step_mm,
 		.torque_s_per_step = sign * a->can.damping_permille_s_mm * step_mm,
 		.torque_most = a->can.torque_max_permille,
-		.silence_ns = (link->setup.deadman_ms + 2 * link->setup.beat_ms) * MS,
+		.silence_ns =
+			(link->setup.deadman_ms + 2 * link->setup.heartbeat_ms) * MS,
 		.following = (int32_t)ceil(a->can.following_mm / step_mm),
 		.following_ns = (int64_t)(a->can.following_s * INCISE_NS_PER_S),
 	};
@@ -129,9 +130,9 @@ int can_fit_load(struct can_link *link, const char *where, struct incise_error *
 {
 	uint32_t cycle_ns = link->actuator.can.cycle_ns, bitrate = link->bus->bitrate;
 	unsigned int rpdo = link->setup.mode == CIA402_CST ? 4 : 6;
-	uint32_t load = bus_load_of(cycle_ns, rpdo, 6, link->master.beat_ns);
+	uint32_t load = bus_load_of(cycle_ns, rpdo, 6, link->master.heartbeat_ns);
 	/* What does not come in cycles is there with any. */
-	uint32_t fixed = bus_load_of(UINT32_MAX, rpdo, 6, link->master.beat_ns);
+	uint32_t fixed = bus_load_of(UINT32_MAX, rpdo, 6, link->master.heartbeat_ns);
 	double room = bitrate * (BUS_LOAD_MOST / 100.0) - fixed, least_us;
 	char slower[60] = "";
 

@@ -20,7 +20,7 @@ static void listen(struct can_watch *watch, struct can_link *link, int64_t now)
 
 	for (int i = 0;
 	     i < FRAMES && link->bus->ops->receive(link->bus, &frame, &t_ns) > 0; i++) {
-		uint32_t function = canopen_take(&link->master, &frame, t_ns);
+		uint32_t function = canopen_handle(&link->master, &frame, t_ns);
 
 		if (function == CANOPEN_TPDO1 &&
 		    cia402_get(&frame, &axis->statusword, &axis->position))

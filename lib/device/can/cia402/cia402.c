@@ -118,35 +118,20 @@ uint16_t cia402_up(enum cia402_state state)
 	return CIA402_DISABLE_VOLTAGE;
 }
 
-static void put_bytes(uint8_t *data, int n, uint32_t value)
-{
-	for (int i = 0; i < n; i++)
-		data[i] = (uint8_t)(value >> 8 * i);
-}
-
-static uint32_t get_bytes(const uint8_t *data, int n)
-{
-	uint32_t value = 0;
-
-	for (int i = 0; i < n; i++)
-		value |= (uint32_t)data[i] << 8 * i;
-	return value;
-}
-
 void cia402_put(struct can_frame *frame, uint8_t node, enum cia402_mode mode,
 		uint16_t controlword, int32_t target)
 {
 	memset(frame, 0, sizeof(*frame));
 	frame->can_id = CANOPEN_RPDO1 + (node & NODE);
-	put_bytes(frame->data, 2, controlword);
+	canopen_pack(frame->data, 2, controlword);
 	if (mode == CIA402_CST) {
 		frame->len = RPDO1_LENGTH_CST;
 		target = target > INT16_MAX ? INT16_MAX : target;
 		target = target < INT16_MIN ? INT16_MIN : target;
-		put_bytes(frame->data + 2, 2, (uint32_t)target);
+		canopen_pack(frame->data + 2, 2, (uint32_t)target);
 	} else {
 		frame->len = RPDO1_LENGTH;
-		put_bytes(frame->data + 2, 4, (uint32_t)target);
+		canopen_pack(frame->data + 2, 4, (uint32_t)target);
 	}
 }
 
@@ -162,8 +147,8 @@ bool cia402_get(const struct can_frame *frame, uint16_t *statusword, int32_t *po
 {
 	if (!is_pdo(frame, CANOPEN_TPDO1, TPDO1_LENGTH))
 		return false;
-	*statusword = (uint16_t)get_bytes(frame->data, 2);
-	*position = (int32_t)get_bytes(frame->data + 2, 4);
+	*statusword = (uint16_t)canopen_unpack(frame->data, 2);
+	*position = (int32_t)canopen_unpack(frame->data + 2, 4);
 	return true;
 }
 
@@ -171,6 +156,6 @@ bool cia402_get_inputs(const struct can_frame *frame, uint32_t *inputs)
 {
 	if (!is_pdo(frame, CANOPEN_TPDO2, TPDO2_LENGTH))
 		return false;
-	*inputs = get_bytes(frame->data, 4);
+	*inputs = canopen_unpack(frame->data, 4);
 	return true;
 }

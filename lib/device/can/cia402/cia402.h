@@ -116,8 +116,8 @@ struct cia402_setup {
 	uint32_t
 		deadman_ms; /* silence of this side after which it quick-stops by itself */
 	uint8_t master;	    /* node id of this side's heartbeat */
-	uint32_t beat_ms;   /* its own heartbeat: 1017 */
-	bool limited;	    /* the range of positions is that of the machine */
+	uint32_t heartbeat_ms; /* its own heartbeat: 1017 */
+	bool limited;	       /* the range of positions is that of the machine */
 	int32_t position_min, position_max; /* 607D */
 	uint32_t velocity;		    /* 607F: largest */
 	uint32_t acceleration;	  /* 60C5, 60C6: largest; 6085: of a quick stop */
@@ -139,7 +139,7 @@ struct cia402_taken {
  * Set a drive up that has no power: to pre-operational, PDOs, heartbeats, EMCY, what it does
  * when this side is silent (6007: quick stop) and how it does (605A: ramp, then without
  * power), limits, mode, interpolation period; then to operational. All that matters is read
- * back. Also after it rebooted. @master sends heartbeats from then on (own, beat_ns): they are
+ * back. Also after it rebooted. @master sends heartbeats from then on (own, heartbeat_ns): they are
  * what keeps the drive's deadman off. About 100 SDOs; in vain, it ends within seconds.
  *
  * 0; -EINVAL (setup that cannot be), -EBUSY (it has power), -EOPNOTSUPP (it lacks what is

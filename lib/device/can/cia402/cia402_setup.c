@@ -40,13 +40,13 @@ static int check_setup(const struct cia402_talk *talk, const struct cia402_setup
 
 	if (!setup->deadman_ms || setup->deadman_ms > UINT16_MAX)
 		what = "a deadman of less than 1 ms or more than 65 s";
-	else if (!setup->beat_ms || setup->beat_ms > UINT16_MAX)
+	else if (!setup->heartbeat_ms || setup->heartbeat_ms > UINT16_MAX)
 		what = "a heartbeat of less than 1 ms or more than 65 s";
 	else if (!setup->master || setup->master > 127 ||
 		 setup->master == talk->master->node)
 		what = "a node id of this program that is 0, over 127 or the drive's own";
-	else if (talk->master->own != setup->master || talk->master->beat_ns <= 0 ||
-		 talk->master->beat_ns >= setup->deadman_ms * MS_NS)
+	else if (talk->master->own != setup->master || talk->master->heartbeat_ns <= 0 ||
+		 talk->master->heartbeat_ns >= setup->deadman_ms * MS_NS)
 		what = "a deadman that this program's heartbeats do not keep off";
 	else if (setup->mode != CIA402_CSP && setup->mode != CIA402_CSV &&
 		 setup->mode != CIA402_CST)
@@ -76,14 +76,14 @@ static int check_power(const struct cia402_talk *talk)
 
 static int tell_nmt(const struct cia402_talk *talk, enum canopen_command command)
 {
-	int rc = canopen_nmt(talk->master, command);
+	int rc = canopen_send_nmt(talk->master, command);
 
 	/* The queue of the bus is full: it empties, or the bus is stuck. */
 	for (int i = 0; i < 10 && rc == -ENOBUFS; i++) {
 		rc = cia402_pause(talk, MS_NS);
 		if (rc)
 			return rc;
-		rc = canopen_nmt(talk->master, command);
+		rc = canopen_send_nmt(talk->master, command);
 	}
 	return rc ? cia402_failed(talk, &nmt, "changed", rc) : 0;
 }
@@ -163,7 +163,7 @@ static int set_watch(const struct cia402_talk *talk, const struct cia402_setup *
 	if (!rc && id != (uint32_t)CANOPEN_EMCY + master->node)
 		rc = cia402_keep(talk, &emcy_id, (uint32_t)CANOPEN_EMCY + master->node);
 	if (!rc)
-		rc = cia402_keep(talk, &producer, setup->beat_ms);
+		rc = cia402_keep(talk, &producer, setup->heartbeat_ms);
 	if (!rc)
 		rc = cia402_keep(talk, &consumer,
 				 (uint32_t)setup->master << 16 | setup->deadman_ms);
@@ -183,13 +183,13 @@ static int start(const struct cia402_talk *talk, const struct cia402_setup *setu
 	int rc;
 
 	/* The drive watches over heartbeats from the first one on. */
-	master->next_beat_ns = 0;
+	master->next_heartbeat_ns = 0;
 	master->state = CANOPEN_UNKNOWN;
 	rc = tell_nmt(talk, CANOPEN_START);
 	if (rc)
 		return rc;
 	rc = canopen_await(master, is_operational,
-			   bus->ops->now(bus) + NMT_NS + 2 * MS_NS * setup->beat_ms);
+			   bus->ops->now(bus) + NMT_NS + 2 * MS_NS * setup->heartbeat_ms);
 	if (rc == -ETIMEDOUT)
 		return incise_error_set(
 			talk->err, ETIMEDOUT,
