@@ -136,9 +136,9 @@ static void take(struct canopen *master)
 		if (bus_receive(master->bus, &frame, &t_ns) <= 0)
 			continue;
 		canopen_handle(master, &frame, t_ns);
-		if (cia402_get(&frame, &word, &position))
+		if (cia402_parse_status(&frame, &word, &position))
 			cia402_mode_name((int8_t)word);
-		cia402_get_inputs(&frame, &inputs);
+		cia402_parse_inputs(&frame, &inputs);
 	}
 }
 
@@ -158,8 +158,9 @@ static void ask(struct canopen *master, uint8_t what)
 	};
 	struct cia402_identity identity;
 	struct cia402_units units = {0};
-	struct cia402_taken taken;
+	struct cia402_supported supported;
 	struct incise_error err = {0};
+	const struct cia402_client client = {master, "here", &err};
 	char text[24];
 	uint32_t value;
 	bool homed;
@@ -179,10 +180,10 @@ static void ask(struct canopen *master, uint8_t what)
 		rc = 0;
 		break;
 	case 3:
-		rc = cia402_identify(master, &identity, "here", &err);
+		rc = cia402_identify(&client, &identity);
 		break;
 	case 4:
-		rc = cia402_units(master, &units, "here", &err);
+		rc = cia402_read_units(&client, &units);
 		if (!rc &&
 		    !(units.counts_per_turn >= 1 && units.velocity_per_turn_s > 0 &&
 		      units.velocity_per_turn_s < 1e300 &&
@@ -191,13 +192,13 @@ static void ask(struct canopen *master, uint8_t what)
 			abort();
 		break;
 	case 5:
-		rc = cia402_configure(master, &setup, &taken, "here", &err);
+		rc = cia402_configure(&client, &setup, &supported);
 		break;
 	case 6:
-		rc = cia402_clear(master, "here", &err);
+		rc = cia402_clear(&client);
 		break;
 	case 7:
-		rc = cia402_homed(master, CIA402_CSP, &homed, "here", &err);
+		rc = cia402_read_homed(&client, CIA402_CSP, &homed);
 		break;
 	}
 	if (rc && (err.code != -rc || !err.text[0]))

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402/can_axis.c and axis_check.c, cycle by cycle: what comes from the bus may be
- * anything, and gives the drive no power. What each fault comes to as a whole is in
- * can_stepper.c.
+ * lib/device/can/cia402/can_axis.c, cycle by cycle: frames with any content give the drive no power;
+ * each cause of a stop has a text that says what to do. can_stepper.c tests faults as a whole.
  */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include "../../../lib/device/can/cia402/can_axis_check.h"
+#include <errno.h>
+#include <string.h>
+#include "../../../lib/device/can/cia402/can_axis.h"
 #include "../../../lib/device/page.h"
 #include "led.h"
 
@@ -135,7 +136,7 @@ static void a_drive_that_does_not_start_is_left(void **state)
 	assert_int_equal(can_axis_power(&b.axis, b.led.drive.now_ns, 0), 1);
 	cycles(&b, 3000, -1);
 	assert_int_equal(b.axis.result, -ETIMEDOUT);
-	assert_int_equal(b.axis.why, CAN_AXIS_NO_START);
+	assert_int_equal(b.axis.cause, CAN_AXIS_NO_START);
 	assert_int_equal(b.slot.state, INCISE_STEPPER_STATE_DISABLED);
 	assert_false(cia402_powered(b.led.drive.state));
 	drive_advance(&b.led.drive, 20000 * MS);
@@ -158,7 +159,7 @@ static void a_few_set_points_may_wait_for_the_queue(void **state)
 	b.led.drive.send_errors = 0;
 	cycles(&b, 50, 20000);
 	assert_int_equal(b.slot.faults, INCISE_ABI_FAULT_BUS);
-	assert_int_equal(b.axis.why, CAN_AXIS_QUEUE_FULL);
+	assert_int_equal(b.axis.cause, CAN_AXIS_QUEUE_FULL);
 }
 
 static void what_is_late_is_counted(void **state)
@@ -261,6 +262,53 @@ static void a_flood_is_taken_in_parts(void **state)
 	assert_int_equal(b.led.drive.to_master.n, 200 - 64);
 }
 
+static void each_reason_has_its_own_line(void **state)
+{
+	static const struct {
+		enum can_axis_cause why;
+		int64_t a, b;
+		const char *says;
+	} cases[] = {
+		{CAN_AXIS_EMCY, 0x8611, 0x21, "(8611h), error register 21h"},
+		{CAN_AXIS_DRIVE_FAULT, 0, 0, "does not say why"},
+		{CAN_AXIS_NOT_ENABLED, CIA402_DISABLED, 0, "switch-on disabled"},
+		{CAN_AXIS_NO_HEARTBEAT, 150, 0, "no heartbeat of it for 150 ms"},
+		{CAN_AXIS_NO_TPDO, 150, 0, "(TPDO1) of it for 150 ms"},
+		{CAN_AXIS_NO_INPUTS, 300, 0, "not heard for 300 ms"},
+		{CAN_AXIS_REBOOTED, 0, 0, "began anew"},
+		{CAN_AXIS_NMT, CANOPEN_STOPPED, 0, "stopped"},
+		{CAN_AXIS_BUS_OFF, 0, 0, "the bus is off"},
+		{CAN_AXIS_QUEUE_FULL, 6, 0, "for 6 cycles"},
+		{CAN_AXIS_BUS_FAILED, ENETDOWN, 0, "Network is down"},
+		{CAN_AXIS_FOREIGN, 0, 0, "another program"},
+		{CAN_AXIS_OFF_TARGET, 200, 0, "by 1.5 mm"},
+		{CAN_AXIS_NO_START, CIA402_READY, 0, "stays in ready to switch on"},
+		{CAN_AXIS_NO_HOME, 0, 0, "its homing failed"},
+		{CAN_AXIS_HOME_TIME, 0, 0, "not done in time"},
+		{CAN_AXIS_OUTSIDE, -100, 0, "to -0.750 mm"},
+		{CAN_AXIS_NO_STOP, CIA402_ENABLED, 0, "operation enabled: switch"},
+	};
+	struct can_axis axis = {.setup.step_mm = 0.0075};
+	char text[300] = "as it was";
+
+	assert_int_equal(can_axis_cause_text(&axis, text, sizeof(text)), 0);
+	assert_string_equal(text, "as it was");
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		int length;
+
+		axis.cause = (int)cases[i].why;
+		axis.cause_a = cases[i].a;
+		axis.cause_b = cases[i].b;
+		length = can_axis_cause_text(&axis, text, sizeof(text));
+		if (length != (int)strlen(text) || !strstr(text, cases[i].says))
+			fail_msg("%d: \"%s\"", cases[i].why, text);
+		/* What to do: after a colon or a semicolon. */
+		assert_non_null(strpbrk(text, ":;"));
+	}
+	/* All of them, from the first to the last. */
+	assert_int_equal(sizeof(cases) / sizeof(*cases), CAN_AXIS_NO_STOP);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -272,6 +320,7 @@ int main(void)
 		cmocka_unit_test(what_is_late_is_counted),
 		cmocka_unit_test(whatever_comes_gives_no_power),
 		cmocka_unit_test(a_flood_is_taken_in_parts),
+		cmocka_unit_test(each_reason_has_its_own_line),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402/can_session.c: how a drive is found and set up, and what keeps it from being so.
+ * lib/device/can/cia402/can_session.c: how a drive is found and set up, what prevents that, and how a
+ * drive is watched.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -135,6 +136,44 @@ static void who_goes_leaves_it_stopped_or_watched(void **state)
 	}
 }
 
+static void a_watcher_looks_and_writes_nothing(void **state)
+{
+	struct incise_stepper_status s;
+	struct incise_error err = {0};
+	uint64_t enables;
+
+	can_rig_init(&rig);
+	rig.drive.absolute = true;
+	drive_reboot(&rig.drive);
+	rig.drive.position = 3 * COUNTS_PER_MM;
+	rig.actuator.can.absolute = true;
+	rig.watch = true;
+	can_rig_open_or_fail(&rig);
+	enables = rig.drive.enables;
+	can_rig_advance(&rig, 100 * MS);
+	s = can_rig_look(&rig);
+	assert_int_equal(s.state, INCISE_STEPPER_DISABLED);
+	assert_true(s.homed && fabs(s.position_mm - 3) < 1e-3);
+	assert_int_equal(incise_stepper_set(rig.stepper, 1), -EPERM);
+	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
+	/* Switches that are pressed by hand. */
+	rig.drive.inputs = CIA402_AT_MAX | CIA402_AT_HOME;
+	can_rig_advance(&rig, 100 * MS);
+	s = can_rig_look(&rig);
+	assert_int_equal(s.inputs, INCISE_STEPPER_AT_MAX | INCISE_STEPPER_AT_HOME);
+	drive_fault(&rig.drive, 0x4310);
+	can_rig_advance(&rig, 100 * MS);
+	s = can_rig_look(&rig);
+	assert_int_equal(s.state, INCISE_STEPPER_FAULT);
+	assert_int_equal(s.faults, INCISE_STEPPER_ALARM);
+	rig.drive.mute = true;
+	can_rig_advance(&rig, 1000 * MS);
+	assert_int_equal(can_rig_look(&rig).faults, INCISE_STEPPER_LOST);
+	assert_int_equal(rig.drive.enables, enables);
+	assert_int_equal(rig.drive.master_beats, 0);
+	can_rig_close(&rig);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -142,6 +181,7 @@ int main(void)
 		cmocka_unit_test(no_step_of_the_start_hangs_or_gives_power),
 		cmocka_unit_test(why_it_cannot_begin_is_said),
 		cmocka_unit_test(another_master_is_not_disturbed),
+		cmocka_unit_test(a_watcher_looks_and_writes_nothing),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -13,17 +13,19 @@
 #include "rig.h"
 
 /* 4 mm a turn; 10 mm/s are 2.5 turns/s, 500 mm/s² are 125. */
-static void make(struct can_link *link, double counts_per_turn)
+static void make(struct can_session *session, double counts_per_turn,
+		 struct incise_error *err)
 {
 	static struct can_rig rig;
 
 	can_rig_init(&rig);
-	*link = (struct can_link){
+	*session = (struct can_session){
 		.bus = &rig.drive.bus,
 		.actuator = rig.actuator,
 		.units = {counts_per_turn, 60, 60},
 	};
-	link->master.bus = link->bus;
+	session->master.bus = session->bus;
+	session->client = (struct cia402_client){&session->master, "here", err};
 }
 
 static void steps_are_as_fine_as_may_be(void **state)
@@ -44,55 +46,56 @@ static void steps_are_as_fine_as_may_be(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_error err = {0};
-		struct can_link link;
+		struct can_session session;
 
-		make(&link, cases[i].counts_per_turn);
-		link.actuator.velocity_mm_s = cases[i].velocity_mm_s;
-		can_fit_steps(&link);
-		assert_int_equal(link.actuator.steps_per_turn, cases[i].steps_per_turn);
-		can_fit_setup(&link);
-		assert_int_equal(can_fit_axis(&link, "here", &err), 0);
+		make(&session, cases[i].counts_per_turn, &err);
+		session.actuator.velocity_mm_s = cases[i].velocity_mm_s;
+		can_units_steps(&session);
+		assert_int_equal(session.actuator.steps_per_turn,
+				 cases[i].steps_per_turn);
+		can_units_setup(&session);
+		assert_int_equal(can_units_axis(&session), 0);
 		/* A turn is a turn, however it is counted. */
-		assert_true(
-			fabs(link.axis.setup.counts_per_step * cases[i].steps_per_turn -
-			     cases[i].counts_per_turn) <=
-			1e-9 * cases[i].counts_per_turn);
+		assert_true(fabs(session.axis.setup.counts_per_step *
+					 cases[i].steps_per_turn -
+				 cases[i].counts_per_turn) <=
+			    1e-9 * cases[i].counts_per_turn);
 	}
 }
 
 static void limits_are_the_drives_with_room(void **state)
 {
 	struct incise_error err = {0};
-	struct can_link link;
+	struct can_session session;
 
-	make(&link, 51200);
-	can_fit_steps(&link);
-	can_fit_setup(&link);
-	assert_int_equal(can_fit_axis(&link, "here", &err), 0);
+	make(&session, 51200, &err);
+	can_units_steps(&session);
+	can_units_setup(&session);
+	assert_int_equal(can_units_axis(&session), 0);
 	/* In rpm: 150 and 7500 rpm/s, and a quarter more. */
-	assert_int_equal(link.setup.velocity, 188);
-	assert_int_equal(link.setup.acceleration, 9375);
-	assert_int_equal(link.setup.following, 12800);
-	assert_int_equal(link.setup.following_ms, 50);
-	assert_int_equal(link.setup.deadman_ms, 100);
-	assert_int_equal(link.setup.heartbeat_ms, 25);
-	link.is_homed = true;
-	link.axis.zero_counts = 6400;
-	can_fit_range(&link);
-	assert_true(link.setup.limited);
-	assert_int_equal(link.setup.position_min, 6400 - 12800);
-	assert_int_equal(link.setup.position_max, 6400 + 21 * 12800);
+	assert_int_equal(session.setup.velocity, 188);
+	assert_int_equal(session.setup.acceleration, 9375);
+	assert_int_equal(session.setup.following, 12800);
+	assert_int_equal(session.setup.following_ms, 50);
+	assert_int_equal(session.setup.deadman_ms, 100);
+	assert_int_equal(session.setup.heartbeat_ms, 25);
+	session.is_homed = true;
+	session.axis.zero_counts = 6400;
+	can_units_range(&session);
+	assert_true(session.setup.limited);
+	assert_int_equal(session.setup.position_min, 6400 - 12800);
+	assert_int_equal(session.setup.position_max, 6400 + 21 * 12800);
 	/* Turned round, with a home below 0. */
-	link.actuator.invert = true;
-	link.actuator.home_mm = -2;
-	assert_int_equal(can_fit_axis(&link, "here", &err), 0);
-	can_fit_range(&link);
-	assert_int_equal(link.setup.position_min, 6400 - 21 * 12800);
-	assert_int_equal(link.setup.position_max, 6400 + 3 * 12800);
-	assert_int_equal(link.axis.setup.config.position_min, -2 * 12800);
+	session.actuator.invert = true;
+	session.actuator.home_mm = -2;
+	assert_int_equal(can_units_axis(&session), 0);
+	can_units_range(&session);
+	assert_int_equal(session.setup.position_min, 6400 - 21 * 12800);
+	assert_int_equal(session.setup.position_max, 6400 + 3 * 12800);
+	assert_int_equal(session.axis.setup.config.position_min, -2 * 12800);
 	/* A jerk that would take more ticks than there is room for. */
-	link.actuator.jerk_mm_s3 = 1;
-	assert_int_equal(can_fit_axis(&link, "here", &err), -ERANGE);
+	session.actuator.jerk_mm_s3 = 1;
+	assert_int_equal(can_units_axis(&session), -ERANGE);
 	assert_non_null(strstr(err.text, "jerk_mm_s3 = 1"));
 }
 
@@ -112,29 +115,29 @@ static void a_bus_that_is_too_slow_is_refused(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_error err = {0};
-		struct can_link link;
+		struct can_session session;
 		int rc;
 
-		make(&link, 51200);
-		link.bus->bitrate = cases[i].bitrate;
-		link.actuator.can.cycle_ns = cases[i].cycle_ns;
-		can_fit_steps(&link);
-		can_fit_setup(&link);
-		rc = can_fit_load(&link, "here", &err);
+		make(&session, 51200, &err);
+		session.bus->bitrate = cases[i].bitrate;
+		session.actuator.can.cycle_ns = cases[i].cycle_ns;
+		can_units_steps(&session);
+		can_units_setup(&session);
+		rc = can_units_load(&session);
 		if (rc != (cases[i].fits ? 0 : -ERANGE))
-			fail_msg("case %zu: %d, %u %%", i, rc, link.load_percent);
+			fail_msg("case %zu: %d, %u %%", i, rc, session.load_percent);
 		if (!cases[i].fits)
 			assert_non_null(strstr(err.text, "may take 80 %"));
-		assert_int_equal(!link.load_percent, !cases[i].bitrate);
+		assert_int_equal(!session.load_percent, !cases[i].bitrate);
 	}
 }
 
 static void whole_units(void **state)
 {
-	assert_int_equal(can_fit_units(0), 1);
-	assert_int_equal(can_fit_units(0.2), 1);
-	assert_int_equal(can_fit_units(1.2), 2);
-	assert_int_equal(can_fit_units(1e300), UINT32_MAX);
+	assert_int_equal(can_units_whole(0), 1);
+	assert_int_equal(can_units_whole(0.2), 1);
+	assert_int_equal(can_units_whole(1.2), 2);
+	assert_int_equal(can_units_whole(1e300), UINT32_MAX);
 }
 
 int main(void)

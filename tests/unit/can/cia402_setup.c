@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402/cia402_setup.c, with all that it calls: a drive does what it
- * was set up to do, and whatever goes wrong at whatever step, it ends in a line, in bounded
- * time, and without power.
+ * lib/device/can/cia402/cia402_setup.c: the drive then behaves as it was set up, holds its limits and
+ * sends only what is for this side; a failure at any step ends with a message, in bounded time and
+ * without power.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -60,9 +60,9 @@ static void test_objects(void **state)
 	for (size_t i = 0; i < COUNT(cases); i++)
 		assert_int_equal(led_value(led, cases[i].index, cases[i].sub),
 				 cases[i].value);
-	assert_true(led->taken.inputs && led->taken.position_limit &&
-		    led->taken.velocity_limit && led->taken.acceleration_limit &&
-		    led->taken.following_limit);
+	assert_true(led->supported.inputs && led->supported.position_limit &&
+		    led->supported.velocity_limit && led->supported.acceleration_limit &&
+		    led->supported.following_limit);
 	assert_int_equal(led->drive.nmt, CANOPEN_OPERATIONAL);
 	assert_int_equal(led->drive.state, CIA402_DISABLED);
 	assert_int_equal(led->drive.enables, 0);
@@ -100,7 +100,7 @@ static void test_deadman(void **state)
 				target += 20;
 			else if (k > 100)
 				target = cases[i].mode == CIA402_CSV ? 20000 : 500;
-			led_cycle(led, cia402_up(d->state), target);
+			led_cycle(led, cia402_next_controlword(d->state), target);
 		}
 		assert_int_equal(d->state, CIA402_ENABLED);
 		assert_true(d->velocity > 1000);
@@ -132,12 +132,12 @@ static void test_absences(void **state)
 		int rc;
 		size_t taken; /* offset of what is not taken; 0: nothing is lost */
 	} cases[] = {
-		{0x60fd, -1, 0, offsetof(struct cia402_taken, inputs)},
-		{0x1801, -1, 0, offsetof(struct cia402_taken, inputs)},
-		{0x607d, -1, 0, offsetof(struct cia402_taken, position_limit)},
-		{0x607f, -1, 0, offsetof(struct cia402_taken, velocity_limit)},
-		{0x60c5, -1, 0, offsetof(struct cia402_taken, acceleration_limit)},
-		{0x6065, -1, 0, offsetof(struct cia402_taken, following_limit)},
+		{0x60fd, -1, 0, offsetof(struct cia402_supported, inputs)},
+		{0x1801, -1, 0, offsetof(struct cia402_supported, inputs)},
+		{0x607d, -1, 0, offsetof(struct cia402_supported, position_limit)},
+		{0x607f, -1, 0, offsetof(struct cia402_supported, velocity_limit)},
+		{0x60c5, -1, 0, offsetof(struct cia402_supported, acceleration_limit)},
+		{0x6065, -1, 0, offsetof(struct cia402_supported, following_limit)},
 		{0x1400, 5, 0, SIZE_MAX},
 		{0x1006, -1, 0, SIZE_MAX},
 		{0x1007, -1, 0, SIZE_MAX},
@@ -149,7 +149,7 @@ static void test_absences(void **state)
 		{0x1401, -1, 0, SIZE_MAX},
 		{0x1802, -1, 0, SIZE_MAX},
 		{0x1801, 3, 0, SIZE_MAX},
-		{0x1801, 5, 0, offsetof(struct cia402_taken, inputs_timed)},
+		{0x1801, 5, 0, offsetof(struct cia402_supported, inputs_timed)},
 		{0x1016, -1, -EOPNOTSUPP, 0},
 		{0x1017, -1, -EOPNOTSUPP, 0},
 		{0x6007, -1, -EOPNOTSUPP, 0},
@@ -165,7 +165,7 @@ static void test_absences(void **state)
 	struct led *led = *state;
 
 	for (size_t i = 0; i < COUNT(cases); i++) {
-		bool *taken = (bool *)&led->taken;
+		bool *taken = (bool *)&led->supported;
 
 		led_init(led);
 		drive_lacks(&led->drive, cases[i].index, cases[i].sub);
@@ -181,10 +181,10 @@ static void test_absences(void **state)
 			assert_non_null(strstr(led->err.text, number));
 			continue;
 		}
-		for (size_t k = 0; k < sizeof(led->taken); k++) {
+		for (size_t k = 0; k < sizeof(led->supported); k++) {
 			/* What does not come does not come in time. */
-			if (k == offsetof(struct cia402_taken, inputs_timed) &&
-			    cases[i].taken == offsetof(struct cia402_taken, inputs))
+			if (k == offsetof(struct cia402_supported, inputs_timed) &&
+			    cases[i].taken == offsetof(struct cia402_supported, inputs))
 				continue;
 			assert_int_equal(taken[k], k != cases[i].taken);
 		}
@@ -353,7 +353,7 @@ static void test_every_step(void **state)
 						    led->drive.aborted == 0x1007 ||
 						    led->drive.aborted == 0x1a01);
 				if (led->drive.aborted == 0x1a01)
-					assert_false(led->taken.inputs);
+					assert_false(led->supported.inputs);
 				continue;
 			}
 			failed++;
@@ -429,6 +429,180 @@ static void test_bus_fails(void **state)
 	assert_non_null(strstr(led->err.text, "does not become operational"));
 }
 
+/* Of each mode its target, from what a drive was left with. */
+static void test_modes(void **state)
+{
+	static const struct {
+		enum cia402_mode mode;
+		uint32_t map;
+	} cases[] = {
+		{CIA402_CSP, 0x607a0020},
+		{CIA402_CSV, 0x60ff0020},
+		{CIA402_CST, 0x60710010},
+		{CIA402_CSP, 0x607a0020},
+	};
+	struct led *led = *state;
+
+	/* One after the other on the same drive: all of it is on already. */
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		led->setup.mode = cases[i].mode;
+		assert_int_equal(led_configure(led), 0);
+		assert_int_equal(led_value(led, 0x1600, 0), 2);
+		assert_int_equal(led_value(led, 0x1600, 2), cases[i].map);
+	}
+}
+
+/* Other ids, other bits 30, more objects than ours: what was there before goes. */
+static void test_left_over(void **state)
+{
+	struct led *led = *state;
+
+	drive_set(&led->drive, 0x1400, 1, 0x40000234);
+	drive_set(&led->drive, 0x1800, 1, 0x000001b4);
+	drive_set(&led->drive, 0x1801, 1, 0x80000280);
+	drive_set(&led->drive, 0x1a00, 0, 4);
+	drive_set(&led->drive, 0x1a00, 3, 0x60610008);
+	drive_set(&led->drive, 0x1a00, 4, 0x60610008);
+	assert_int_equal(led_configure(led), 0);
+	assert_int_equal(led_value(led, 0x1400, 1), 0x40000210);
+	assert_int_equal(led_value(led, 0x1800, 1), 0x00000190);
+	assert_int_equal(led_value(led, 0x1801, 1), 0x00000290);
+	assert_int_equal(led_value(led, 0x1a00, 0), 2);
+}
+
+/* What comes back, once it runs: TPDO1 at each SYNC, inputs at change, nothing else. */
+static void test_traffic(void **state)
+{
+	struct led *led = *state;
+	unsigned int actual = 0, inputs = 0, others = 0;
+	struct can_frame frame;
+	uint32_t bits = 0;
+	int64_t t_ns;
+
+	assert_int_equal(led_configure(led), 0);
+	canopen_await(&led->master, NULL, led->drive.now_ns + 5 * DRIVE_MS);
+	led->drive.od[OD_HEARTBEAT].value = 0;
+	for (int i = 0; i < 50; i++) {
+		const struct can_frame sync = {.can_id = CANOPEN_SYNC};
+
+		led->drive.inputs = i == 20   ? CIA402_AT_MIN
+				    : i == 21 ? 0
+					      : led->drive.inputs;
+		led->drive.bus.ops->send(&led->drive.bus, &sync);
+		drive_advance(&led->drive, DRIVE_MS);
+		while (led->drive.bus.ops->receive(&led->drive.bus, &frame, &t_ns) > 0) {
+			uint16_t word;
+			int32_t position;
+
+			if (cia402_parse_status(&frame, &word, &position))
+				actual++;
+			else if (cia402_parse_inputs(&frame, &bits))
+				inputs++;
+			else
+				others++;
+		}
+	}
+	assert_int_equal(actual, 50);
+	assert_int_equal(inputs, 2); /* on and off */
+	assert_int_equal(bits, 0);
+	assert_int_equal(others, 0);
+}
+
+/* A drive that maps no inputs has none for us, and its TPDO2 stays off. */
+static void test_unmapped_inputs(void **state)
+{
+	struct led *led = *state;
+
+	led->drive.od[OD_INPUTS].access = R_;
+	assert_int_equal(led_configure(led), 0);
+	assert_false(led->supported.inputs);
+	assert_true(led_value(led, 0x1801, 1) & 0x80000000);
+	assert_true(led->supported.position_limit);
+}
+
+/* Reasons differ; each of them is told. */
+static void test_fixed_mapping(void **state)
+{
+	static const uint32_t codes[] = {ABORT_ACCESS, 0x08000022, ABORT_READ_ONLY};
+	struct led *led = *state;
+
+	for (size_t i = 0; i < COUNT(codes); i++) {
+		char number[16];
+
+		led_init(led);
+		led->drive.abort_index = 0x1600;
+		led->drive.abort_sub = 0;
+		led->drive.abort_code = codes[i];
+		assert_int_equal(led_configure(led), -EOPNOTSUPP);
+		snprintf(number, sizeof(number), "(%08Xh)", codes[i]);
+		assert_non_null(strstr(led->err.text, number));
+		assert_non_null(strstr(led->err.text, "1600:0"));
+	}
+}
+
+/* Limits are the drive's own too. */
+static void test_limits(void **state)
+{
+	struct led *led = *state;
+
+	led->setup.position_max = 1000;
+	led->setup.following = UINT32_MAX;
+	assert_int_equal(led_configure(led), 0);
+	for (int k = 0; k < 500; k++)
+		led_cycle(led, cia402_next_controlword(led->drive.state),
+			  k < 50 ? 0 : 1000000);
+	assert_in_range((int)led->drive.position, 990, 1000);
+	assert_true(led->drive.fastest <= 50000);
+
+	led_init(led);
+	assert_int_equal(led_configure(led), 0);
+	for (int k = 0; k < 500; k++) {
+		led->drive.blocked = k > 100;
+		led_cycle(led, cia402_next_controlword(led->drive.state), k * 10);
+	}
+	assert_int_equal(led->drive.state, CIA402_FAULT);
+	assert_int_equal(led->master.emcy.code, 0x8611);
+	assert_int_equal(led->drive.enabled_unasked, 0);
+}
+
+/* Limits of before do not stay: a machine that is not homed has no range. */
+static void test_unlimited(void **state)
+{
+	struct led *led = *state;
+
+	drive_set(&led->drive, 0x607d, 1, 5);
+	drive_set(&led->drive, 0x607d, 2, 9);
+	led->setup.limited = false;
+	assert_int_equal(led_configure(led), 0);
+	assert_false(led->supported.position_limit);
+	assert_int_equal((int32_t)led_value(led, 0x607d, 1), INT32_MIN);
+	assert_int_equal((int32_t)led_value(led, 0x607d, 2), INT32_MAX);
+	assert_int_equal(cia402_set_range(&led->client, 10, 20), 0);
+	assert_int_equal(cia402_set_range(&led->client, 30, 40), 0);
+	assert_int_equal(led_value(led, 0x607d, 1), 30);
+	assert_int_equal(led_value(led, 0x607d, 2), 40);
+	assert_int_equal(cia402_set_range(&led->client, 40, 40), -EINVAL);
+}
+
+/* What is not limited here is left to the drive. */
+static void test_left_alone(void **state)
+{
+	struct led *led = *state;
+
+	drive_set(&led->drive, 0x607f, 0, 7);
+	drive_set(&led->drive, 0x60c5, 0, 8);
+	drive_set(&led->drive, 0x6065, 0, 9);
+	led->setup.velocity = led->setup.acceleration = led->setup.following = 0;
+	led->setup.torque_permille = 0;
+	assert_int_equal(led_configure(led), 0);
+	assert_false(led->supported.velocity_limit || led->supported.acceleration_limit ||
+		     led->supported.following_limit);
+	assert_int_equal(led_value(led, 0x607f, 0), 7);
+	assert_int_equal(led_value(led, 0x60c5, 0), 8);
+	assert_int_equal(led_value(led, 0x6065, 0), 9);
+	assert_int_equal(led_value(led, 0x6072, 0), 1000);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -440,6 +614,14 @@ int main(void)
 		cmocka_unit_test_setup(test_cycles, setup),
 		cmocka_unit_test_setup(test_every_step, setup),
 		cmocka_unit_test_setup(test_bus_fails, setup),
+		cmocka_unit_test_setup(test_modes, setup),
+		cmocka_unit_test_setup(test_left_over, setup),
+		cmocka_unit_test_setup(test_traffic, setup),
+		cmocka_unit_test_setup(test_unmapped_inputs, setup),
+		cmocka_unit_test_setup(test_fixed_mapping, setup),
+		cmocka_unit_test_setup(test_limits, setup),
+		cmocka_unit_test_setup(test_unlimited, setup),
+		cmocka_unit_test_setup(test_left_alone, setup),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

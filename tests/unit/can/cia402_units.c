@@ -115,8 +115,7 @@ static void test_units(void **state)
 
 		led_init(led);
 		put_all(led, &cases[i].factors);
-		assert_int_equal(cia402_units(&led->master, &units, "here", &led->err),
-				 0);
+		assert_int_equal(cia402_read_units(&led->client, &units), 0);
 		assert_near(units.counts_per_turn, cases[i].units.counts_per_turn);
 		assert_near(units.velocity_per_turn_s,
 			    cases[i].units.velocity_per_turn_s);
@@ -165,8 +164,7 @@ static void test_refused(void **state)
 
 		led_init(led);
 		put_all(led, &cases[i].factors);
-		assert_int_equal(cia402_units(&led->master, &units, "here", &led->err),
-				 -EPROTO);
+		assert_int_equal(cia402_read_units(&led->client, &units), -EPROTO);
 		assert_non_null(strstr(led->err.text, cases[i].key));
 		assert_true(units.counts_per_turn == 0); /* nothing by halves */
 	}
@@ -179,11 +177,11 @@ static void test_given(void **state)
 	struct led *led = *state;
 
 	led->drive.mute = true;
-	assert_int_equal(cia402_units(&led->master, &units, "here", &led->err), 0);
+	assert_int_equal(cia402_read_units(&led->client, &units), 0);
 	assert_true(units.counts_per_turn == 200 && units.velocity_per_turn_s == 60);
 	led->drive.mute = false;
 	units.velocity_per_turn_s = 0;
-	assert_int_equal(cia402_units(&led->master, &units, "here", &led->err), 0);
+	assert_int_equal(cia402_read_units(&led->client, &units), 0);
 	assert_true(units.counts_per_turn == 200);
 	assert_true(units.velocity_per_turn_s == 51200); /* its own increments/s */
 }
@@ -193,7 +191,7 @@ static void test_identity(void **state)
 	struct cia402_identity identity;
 	struct led *led = *state;
 
-	assert_int_equal(cia402_identify(&led->master, &identity, "here", &led->err), 0);
+	assert_int_equal(cia402_identify(&led->client, &identity), 0);
 	assert_int_equal(identity.type, 0x00040192);
 	assert_int_equal(identity.vendor, 0x286);
 	assert_int_equal(identity.product, 1270);
@@ -206,24 +204,20 @@ static void test_identity(void **state)
 	led->drive.name = NULL;
 	drive_lacks(&led->drive, 0x1018, -1);
 	drive_lacks(&led->drive, 0x6502, -1);
-	assert_int_equal(cia402_identify(&led->master, &identity, "here", &led->err), 0);
+	assert_int_equal(cia402_identify(&led->client, &identity), 0);
 	assert_int_equal(identity.vendor, 0);
 	assert_string_equal(identity.name, "");
 
 	drive_set(&led->drive, 0x1000, 0, 0x00020191); /* an I/O module */
-	assert_int_equal(cia402_identify(&led->master, &identity, "here", &led->err),
-			 -EPROTO);
+	assert_int_equal(cia402_identify(&led->client, &identity), -EPROTO);
 	assert_non_null(strstr(led->err.text, "401"));
 	drive_lacks(&led->drive, 0x1000, -1);
-	assert_int_equal(cia402_identify(&led->master, &identity, "here", &led->err),
-			 -EOPNOTSUPP);
+	assert_int_equal(cia402_identify(&led->client, &identity), -EOPNOTSUPP);
 	led->drive.mute = true;
-	assert_int_equal(cia402_identify(&led->master, &identity, "here", &led->err),
-			 -ENODEV);
+	assert_int_equal(cia402_identify(&led->client, &identity), -ENODEV);
 	assert_non_null(strstr(led->err.text, "nobody answers at node 0x10 on can-test"));
 	led->drive.send_error = -ENETDOWN;
-	assert_int_equal(cia402_identify(&led->master, &identity, "here", &led->err),
-			 -ENETDOWN);
+	assert_int_equal(cia402_identify(&led->client, &identity), -ENETDOWN);
 }
 
 int main(void)

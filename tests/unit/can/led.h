@@ -14,8 +14,9 @@ struct led {
 	struct drive drive;
 	struct canopen master;
 	struct cia402_setup setup;
-	struct cia402_taken taken;
+	struct cia402_supported supported;
 	struct incise_error err;
+	struct cia402_client client;
 };
 
 static inline void led_init(struct led *led)
@@ -41,12 +42,12 @@ static inline void led_init(struct led *led)
 				       .own = LED_MASTER,
 				       .heartbeat_ns = 20 * DRIVE_MS,
 				       .state = CANOPEN_UNKNOWN};
+	led->client = (struct cia402_client){&led->master, "here", &led->err};
 }
 
 static inline int led_configure(struct led *led)
 {
-	return cia402_configure(&led->master, &led->setup, &led->taken, "here",
-				&led->err);
+	return cia402_configure(&led->client, &led->setup, &led->supported);
 }
 
 /* To what @word leads, by SDO. */
@@ -75,7 +76,7 @@ static inline void led_cycle(struct led *led, uint16_t word, int32_t target)
 	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
 	struct can_frame frame;
 
-	cia402_put(&frame, DRIVE_NODE, led->setup.mode, word, target);
+	cia402_pack_rpdo(&frame, DRIVE_NODE, led->setup.mode, word, target);
 	led->drive.bus.ops->send(&led->drive.bus, &frame);
 	led->drive.bus.ops->send(&led->drive.bus, &sync);
 	canopen_await(&led->master, NULL, led->drive.now_ns + DRIVE_MS);

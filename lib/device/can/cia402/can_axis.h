@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * One drive, cycle by cycle: what a thread does at each SYNC. It knows no thread and no clock
- * of its own; tests run it in a time that they make.
+ * One drive, cycle by cycle: the work of each SYNC, without thread or clock, so that tests run
+ * it in simulated time.
  *
  *   cycle    ──┬──────────────────────────┬──────────────────────────┬──
  *   from it    TPDO of the last SYNC      TPDO                       TPDO
  *   to it        RPDO SYNC                  RPDO SYNC                  RPDO SYNC
- *                 │    ╰ the drive takes the target, and samples where it stands
+ *                 │    ╰ the drive takes the target, and samples its position
  *                 ╰ next point of the profile
  *
  *   IDLE ─ power ─▶ STARTING ─▶ RUNNING ─ rest ─▶ ENDING ─▶ IDLE
  *              ╰──▶ STARTING ─▶ HOMING ──────────▶ ENDING
  *                        any fault at once: QUICK_STOP ─▶ IDLE
  *
- * Lengths are steps here, units of the profile; counts are the drive's. Whatever the drive
- * does or says, an axis never gives it power again by itself.
+ * Lengths are steps, units of the profile; counts are the drive's. An axis never gives the
+ * drive power again by itself.
  */
 #ifndef INCISE_CAN_AXIS_H
 #define INCISE_CAN_AXIS_H
@@ -32,12 +32,12 @@ enum can_axis_phase {
 	CAN_AXIS_QUICK_STOP,
 };
 
-/* Why it stopped, more than a bit of status.faults says. */
-enum can_axis_why {
+/* The cause of a stop, in more detail than status.faults. */
+enum can_axis_cause {
 	CAN_AXIS_NO_REASON,
 	CAN_AXIS_EMCY,	       /* a: code, b: error register */
-	CAN_AXIS_DRIVE_FAULT,  /* the statusword says fault, and no EMCY why */
-	CAN_AXIS_NOT_ENABLED,  /* a: enum cia402_state it fell to */
+	CAN_AXIS_DRIVE_FAULT,  /* the statusword says fault, without an EMCY */
+	CAN_AXIS_NOT_ENABLED,  /* a: enum cia402_state */
 	CAN_AXIS_NO_HEARTBEAT, /* a: ms */
 	CAN_AXIS_NO_TPDO,      /* a: ms */
 	CAN_AXIS_NO_INPUTS,    /* a: ms */
@@ -48,33 +48,32 @@ enum can_axis_why {
 	CAN_AXIS_BUS_FAILED, /* a: errno */
 	CAN_AXIS_FOREIGN,    /* another master */
 	CAN_AXIS_OFF_TARGET, /* a: steps */
-	CAN_AXIS_NO_START,   /* a: enum cia402_state it stayed in */
-	CAN_AXIS_NO_HOME,    /* the drive says that homing failed */
+	CAN_AXIS_NO_START,   /* a: enum cia402_state */
+	CAN_AXIS_NO_HOME,    /* the drive reports that homing failed */
 	CAN_AXIS_HOME_TIME,
-	CAN_AXIS_OUTSIDE, /* a: steps; it gave way while it got power */
-	CAN_AXIS_NO_STOP, /* it did not say that it lost power */
+	CAN_AXIS_OUTSIDE, /* a: steps; it gave way while getting power */
+	CAN_AXIS_NO_STOP, /* a: enum cia402_state; it did not report to have no power */
 };
 
-/* What is fixed about it. */
 struct can_axis_setup {
 	struct incise_stepper_config config; /* tick_ns: of a cycle */
 	double step_mm;
 	enum cia402_mode mode;
-	double counts_per_step;	 /* negative where it is turned round */
+	double counts_per_step;	 /* negative if inverted */
 	double units_per_step_s; /* CSV: velocity units of a step/s; same sign */
 	double gain_1_s;	 /* CSV */
 	double torque_per_step, torque_s_per_step, torque_most; /* CST: ‰; same sign */
-	int64_t silence_ns;   /* of the drive: longer, and it is lost */
-	int32_t following;    /* steps off the target … */
-	int64_t following_ns; /* … for so long */
+	int64_t silence_ns;   /* of the drive until it counts as lost */
+	int32_t following;    /* more steps off the target … */
+	int64_t following_ns; /* … for so long are a fault */
 	bool inputs;	      /* it sends TPDO2 … */
 	bool inputs_timed;    /* … at each CIA402_INPUTS_MS */
-	unsigned int wired;   /* INCISE_STEPPER_LINE_… bits that count */
+	unsigned int wired;   /* INCISE_STEPPER_LINE_… bits that are valid */
 };
 
 struct can_axis_counts {
 	uint64_t setpoints;    /* RPDOs sent with power */
-	uint64_t sync_late;    /* SYNCs sent by half a cycle too late, or left out */
+	uint64_t sync_late;    /* SYNCs that were half a cycle late or left out */
 	uint64_t tpdo_missing; /* SYNCs without an answer until the next */
 };
 
@@ -85,69 +84,70 @@ struct can_axis {
 	double zero_counts; /* of the drive, at position 0 */
 	uint16_t statusword;
 	int32_t position; /* the drive's, counts */
-	bool heard;	  /* a TPDO1 came */
+	bool has_status;  /* a TPDO1 came */
 	enum can_axis_phase phase;
 	struct can_axis_counts counts;
 	/* Read by another thread once a fault is seen. */
-	atomic_int why; /* enum can_axis_why */
-	int64_t why_a, why_b;
+	atomic_int cause; /* enum can_axis_cause */
+	int64_t cause_a, cause_b;
 	atomic_int result; /* of the last power or home: 1 under way, 0, -errno */
 
 	/* private */
+	int64_t now_ns;	      /* of the cycle */
 	int64_t since_ns;     /* of the phase */
 	int64_t tpdo_ns;      /* the last that came */
-	int64_t off_ns;	      /* since when it is off its target; 0: it is not */
-	int64_t limit_ns;     /* homing ends by then */
+	int64_t off_ns;	      /* since when it is off its target; 0: not */
+	int64_t limit_ns;     /* end of homing */
 	int32_t commanded[4]; /* the last targets, steps */
 	double speed;	      /* measured, counts per cycle, smoothed */
 	uint32_t boots, emcys, bus_offs, foreign; /* when power was given */
-	int outcome;				  /* what result will be without power */
-	uint32_t full;	   /* set-points in a row that the bus did not take */
-	uint32_t unsynced; /* SYNCs in a row that the bus did not take */
-	uint32_t missed;   /* SYNCs in a row without an answer */
-	uint32_t answers;  /* cycles with one, in this phase */
-	bool put;	   /* a set-point, and its SYNC, went out in this cycle */
-	bool came;	   /* an answer, in this cycle */
-	uint16_t old_bits; /* of the statusword, that a homing before left */
-	int64_t inputs_ns; /* cycles with an answer since the inputs came, as a time */
-	bool told;	   /* the drive was told what this phase is about */
-	bool mute;	   /* no heartbeat: it did not stop when it was told to */
+	int outcome;				  /* result once without power */
+	uint32_t full;	      /* set-points in a row that the bus did not take */
+	uint32_t unsynced;    /* SYNCs in a row that the bus did not take */
+	uint32_t missed;      /* SYNCs in a row without an answer */
+	uint32_t answers;     /* cycles with one, in this phase */
+	bool setpoint_sent;   /* with its SYNC, in this cycle */
+	bool status_received; /* in this cycle */
+	uint16_t old_bits;    /* of the statusword, left by an earlier homing */
+	int64_t inputs_ns;  /* duration of cycles with an answer since the last inputs */
+	bool command_sent;  /* the command of this phase */
+	bool heartbeat_off; /* it did not obey a stop: leave it to its deadman */
 	bool answered, stop_homing, failed;
 };
 
-/* Without power. Returns 0, or as incise_profile_init() says. */
+/* Without power. Returns 0 or an error of incise_profile_init(). */
 int can_axis_init(struct can_axis *axis, const struct can_axis_setup *setup);
 
 /*
- * Do what belongs to one cycle, sending included. @late_ns: how late it is; @left_out: cycles
- * that were not run at all.
+ * Run one cycle, sending included. @late_ns: how late it is; @left_out: cycles that were not
+ * run at all.
  */
 void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 		    uint32_t left_out);
 
-/* Cycles without power may come as seldom as that. */
+/* The longest period of cycles without power. */
 #define CAN_AXIS_IDLE_NS 20000000
 
 /*
- * Begin to power it, in its mode or, where @homing_ns > 0, in homing mode, for at most so
- * long; the drive is set up. axis->result then says how it went. 1; or 0, -EPERM, -EBUSY,
- * -ERANGE (it stands outside of its travel).
+ * Start to power a drive that is set up, in its mode or, if @homing_ns > 0, in homing mode, for
+ * at most so long; axis->result is the outcome. Returns 1; 0, -EPERM, -EBUSY, -ERANGE (it is
+ * outside of its travel).
  */
 int can_axis_power(struct can_axis *axis, int64_t now_ns, int64_t homing_ns);
 
-/* A person cleared what was: nothing that it said before counts. */
+/* The user cleared the fault. */
 void can_axis_cleared(struct can_axis *axis);
 
-/* Come to rest, then without power. Homing is stopped. */
+/* Come to rest, then remove power. Stops homing. */
 void can_axis_disable(struct can_axis *axis);
 
-/* 60FD, however it came. */
+/* Update by 60FD. */
 void can_axis_inputs(struct can_axis *axis, uint32_t inputs);
 
-/* From counts, rounded. */
+/* Convert counts, rounded. */
 int64_t can_axis_steps(const struct can_axis *axis, int32_t counts);
 
-/* Why it stopped, in a line; 0 where there is nothing to say. */
-int can_axis_why(const struct can_axis *axis, char *text, size_t size);
+/* Write the cause of a stop and what to do; returns the length, 0 without a cause. */
+int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size);
 
 #endif

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Who is on a bus: each of 127 node ids is asked for its device type, all at once, and those
- * that answer are asked what they are. Only objects are read.
+ * A scan of a bus: request the device type of all 127 node ids at once, then identify those
+ * that answer. Only objects are read.
  */
 #include <errno.h>
 #include <stdio.h>
@@ -12,10 +12,9 @@
 
 #define MS 1000000LL
 #define NODES 128
-#define SPACING_NS \
-	(2 * MS) /* between two requests: a bus at 10 kbit/s still carries that */
+#define SPACING_NS (2 * MS)   /* between two requests; fits a bus at 10 kbit/s */
 #define ANSWERS_NS (150 * MS) /* after the last one */
-#define ANSWER_NS (100 * MS)  /* of one that answered before; there may be 127 */
+#define ANSWER_NS (100 * MS)  /* of a node that answered before; there may be 127 */
 
 struct scan {
 	const struct can_transport *transport;
@@ -24,8 +23,8 @@ struct scan {
 	bool there[NODES];
 };
 
-/* Whoever answers or beats. */
-static int hear(struct scan *scan, int64_t until_ns)
+/* Note the nodes that answer. */
+static int receive(struct scan *scan, int64_t until_ns)
 {
 	struct can_bus *bus = scan->bus;
 	struct can_frame frame;
@@ -50,7 +49,7 @@ static int hear(struct scan *scan, int64_t until_ns)
 	return 0;
 }
 
-static int ask_all(struct scan *scan, unsigned int only)
+static int request_all(struct scan *scan, unsigned int only)
 {
 	struct can_frame frame = {.can_dlc = 8, .data = {0x40, 0x00, 0x10}};
 	struct can_bus *bus = scan->bus;
@@ -61,72 +60,71 @@ static int ask_all(struct scan *scan, unsigned int only)
 			continue;
 		frame.can_id = CANOPEN_SDO_REQUEST + node;
 		rc = bus->ops->send(bus, &frame);
-		/* A full queue: nobody acknowledges, or it is slow. */
+		/* A full queue: no node acknowledges, or the bus is slow. */
 		for (int i = 0; rc == -ENOBUFS && i < 10; i++) {
-			rc = hear(scan, bus->ops->now(bus) + SPACING_NS);
+			rc = receive(scan, bus->ops->now(bus) + SPACING_NS);
 			if (!rc)
 				rc = bus->ops->send(bus, &frame);
 		}
 		if (!rc)
-			rc = hear(scan, bus->ops->now(bus) + SPACING_NS);
+			rc = receive(scan, bus->ops->now(bus) + SPACING_NS);
 	}
-	return rc ? rc : hear(scan, bus->ops->now(bus) + ANSWERS_NS);
+	return rc ? rc : receive(scan, bus->ops->now(bus) + ANSWERS_NS);
 }
 
-/* A node that is asked: once it is silent, it is asked nothing more. */
-struct asked {
+struct node {
 	struct canopen master;
 	struct incise_scan_device *device;
-	bool silent;
+	bool silent; /* it gets no more requests */
 };
 
-/* Whether it tells. */
-static bool tells(struct asked *asked, uint16_t index, uint8_t sub, int size,
-		  uint32_t *value)
+/* Returns whether the node has the object. */
+static bool read_object(struct node *n, uint16_t index, uint8_t sub, int size,
+			uint32_t *value)
 {
 	int rc;
 
 	*value = 0;
-	if (asked->silent)
+	if (n->silent)
 		return false;
-	rc = canopen_read(&asked->master, index, sub, size, value);
-	asked->silent = rc && rc != -EREMOTEIO && rc != -EPROTO;
+	rc = canopen_read(&n->master, index, sub, size, value);
+	n->silent = rc && rc != -EREMOTEIO && rc != -EPROTO;
 	return !rc;
 }
 
-static void add_modes(struct asked *asked)
+static void add_modes(struct node *n)
 {
 	static const char *const names[] = {"pp", "vl", "pv",  "tq",  NULL,
 					    "hm", "ip", "csp", "csv", "cst"};
 	char text[80] = "";
 	uint32_t modes;
 
-	if (!tells(asked, 0x6502, 0, 4, &modes))
+	if (!read_object(n, 0x6502, 0, 4, &modes))
 		return;
 	for (unsigned int i = 0; i < sizeof(names) / sizeof(*names); i++)
 		if (modes >> i & 1 && names[i])
 			snprintf(text + strlen(text), sizeof(text) - strlen(text), "%s%s",
 				 *text ? " " : "", names[i]);
-	incise_scan_tell(asked->device, "modes", "%s", text);
+	incise_scan_tell(n->device, "modes", "%s", text);
 }
 
-/* Of a drive: what it does, and what is wrong with it. */
-static void add_drive(struct asked *asked, const char *name)
+/* Add the state and error of a drive. */
+static void add_drive(struct node *n, const char *name)
 {
-	struct incise_scan_device *device = asked->device;
+	struct incise_scan_device *device = n->device;
 	const char *state = "it does not say its state";
 	char words[100] = "no fault";
 	uint32_t word, mode, code = 0;
 
-	if (tells(asked, 0x6041, 0, 2, &word)) {
+	if (read_object(n, 0x6041, 0, 2, &word)) {
 		state = cia402_state_name(cia402_state((uint16_t)word));
 		incise_scan_tell(device, "statusword", "0x%04x", word);
 		incise_scan_tell(device, "drive_state", "%s", state);
 	}
-	if (tells(asked, 0x6061, 0, 1, &mode))
+	if (read_object(n, 0x6061, 0, 1, &mode))
 		incise_scan_tell(device, "mode", "%s", cia402_mode_name((int8_t)mode));
-	add_modes(asked);
-	if (tells(asked, 0x603f, 0, 2, &code)) {
+	add_modes(n);
+	if (read_object(n, 0x603f, 0, 2, &code)) {
 		if (code)
 			canopen_emcy_text((uint16_t)code, words, sizeof(words));
 		incise_scan_tell(device, "error_code", "0x%04x", code);
@@ -137,8 +135,8 @@ static void add_drive(struct asked *asked, const char *name)
 		 code ? words : "");
 }
 
-/* Who it is; only what it tells. */
-static void add_identity(struct asked *asked, char *name, size_t size)
+/* Add the parts of its identity that the node has. */
+static void add_identity(struct node *n, char *name, size_t size)
 {
 	static const struct {
 		const char *key;
@@ -148,20 +146,19 @@ static void add_identity(struct asked *asked, char *name, size_t size)
 	uint32_t value;
 
 	*name = '\0';
-	if (!asked->silent && !canopen_read_text(&asked->master, 0x1008, 0, name, size) &&
-	    *name)
-		incise_scan_tell(asked->device, "name", "%s", name);
+	if (!n->silent && !canopen_read_text(&n->master, 0x1008, 0, name, size) && *name)
+		incise_scan_tell(n->device, "name", "%s", name);
 	for (size_t i = 0; i < sizeof(identity) / sizeof(*identity); i++)
-		if (tells(asked, 0x1018, identity[i].sub, 4, &value))
-			incise_scan_tell(asked->device, identity[i].key, "0x%08x", value);
-	if (tells(asked, 0x1001, 0, 1, &value))
-		incise_scan_tell(asked->device, "error_register", "0x%02x", value);
+		if (read_object(n, 0x1018, identity[i].sub, 4, &value))
+			incise_scan_tell(n->device, identity[i].key, "0x%08x", value);
+	if (read_object(n, 0x1001, 0, 1, &value))
+		incise_scan_tell(n->device, "error_register", "0x%02x", value);
 }
 
 static void describe(struct scan *scan, unsigned int node,
 		     struct incise_scan_device *device)
 {
-	struct asked asked = {
+	struct node n = {
 		.master = {.bus = scan->bus,
 			   .node = (uint8_t)node,
 			   .answer_ns = ANSWER_NS,
@@ -170,23 +167,23 @@ static void describe(struct scan *scan, unsigned int node,
 	};
 	char name[64];
 	uint32_t type;
-	bool told;
+	bool has_type;
 
 	*device = (struct incise_scan_device){0};
 	snprintf(device->device, sizeof(device->device), "%s:%.80s:0x%02x",
 		 scan->transport->name, scan->device, node);
 	incise_scan_tell(device, "node", "%u", node);
-	told = tells(&asked, 0x1000, 0, 4, &type);
-	if (told)
+	has_type = read_object(&n, 0x1000, 0, 4, &type);
+	if (has_type)
 		incise_scan_tell(device, "device_type", "0x%08x", type);
-	add_identity(&asked, name, sizeof(name));
-	if (asked.master.last_heartbeat_ns)
+	add_identity(&n, name, sizeof(name));
+	if (n.master.last_heartbeat_ns)
 		incise_scan_tell(device, "nmt_state", "%s",
-				 canopen_state_name(asked.master.state));
-	/* What is no drive is listed too: that it is there is half of the answer. */
-	if (told && (type & 0xffff) == 402)
-		add_drive(&asked, name);
-	else if (told)
+				 canopen_state_name(n.master.state));
+	/* List other nodes too. */
+	if (has_type && (type & 0xffff) == 402)
+		add_drive(&n, name);
+	else if (has_type)
 		snprintf(device->what, sizeof(device->what),
 			 "%.50s: CANopen profile %u, no CiA 402 drive",
 			 *name ? name : "a device", type & 0xffff);
@@ -194,14 +191,14 @@ static void describe(struct scan *scan, unsigned int node,
 		snprintf(device->what, sizeof(device->what),
 			 "%.50s: does not say what it is, no CiA 402 drive",
 			 *name ? name : "a device");
-	device->usable = told && (type & 0xffff) == 402;
+	device->usable = has_type && (type & 0xffff) == 402;
 }
 
 static int scan_bus(struct scan *scan, unsigned int only, incise_scan_found *found,
 		    void *context)
 {
 	struct incise_scan_device device;
-	int rc = ask_all(scan, only);
+	int rc = request_all(scan, only);
 
 	for (unsigned int node = 1; node < NODES && !rc; node++)
 		if (scan->there[node]) {
@@ -226,7 +223,7 @@ int can_stepper_scan(const struct can_transport *transport, const char *argument
 					"%s: expected a bus, such as can:can0 or "
 					"slcan:/dev/ttyACM0; correct it",
 					where);
-	if (can_link_parse(arguments, device, sizeof(device), &only))
+	if (can_session_parse(arguments, device, sizeof(device), &only))
 		snprintf(device, sizeof(device), "%s", arguments);
 	rc = transport->open(&scan.bus, &request, err);
 	if (rc)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A drive and the bus that leads to it; see can_link.h.
+ * A drive and the bus that leads to it; see can_session.h.
  */
 #include <errno.h>
 #include <math.h>
@@ -9,17 +9,26 @@
 #include <string.h>
 #include <linux/can/netlink.h>
 #include "can_units.h"
-#include "cia402_object.h"
 #include "can_session.h"
 
 #define MS 1000000LL
 #define DEVICE_MAX 200
 #define LISTEN_NS (60 * MS) /* for another master; a SYNC comes every 20 ms at least */
-#define READY_NS (500 * MS) /* until it says that it is operational */
+#define READY_NS (500 * MS) /* until the drive reports to be operational */
+#define WATCH_FRAMES 256    /* received in one look */
+#define WATCH_NS (200 * MS) /* without TPDOs for so long, no program drives it */
+#define STILL_STEPS_S 1	    /* slower is at rest */
 
 static const struct cia402_object digital_inputs = {0x60fd, 0, 4, "digital inputs"};
 
-int can_link_parse(const char *arguments, char *device, size_t size, unsigned int *node)
+/* The next messages begin with @where. */
+static void begin(struct can_session *s, const char *where, struct incise_error *err)
+{
+	s->client = (struct cia402_client){&s->master, where, err};
+}
+
+int can_session_parse(const char *arguments, char *device, size_t size,
+		      unsigned int *node)
 {
 	const char *colon = strrchr(arguments, ':');
 	size_t length = colon ? (size_t)(colon - arguments) : 0;
@@ -37,10 +46,10 @@ int can_link_parse(const char *arguments, char *device, size_t size, unsigned in
 	return 0;
 }
 
-/* Only what concerns this drive, and what would show another master. */
-static int set_filter(struct can_link *link)
+/* Receive frames of this drive and those that reveal another master. */
+static int set_filter(struct can_session *s)
 {
-	const uint32_t node = link->master.node;
+	const uint32_t node = s->master.node;
 	const uint32_t ids[] = {
 		CANOPEN_NMT,
 		CANOPEN_SYNC,
@@ -50,7 +59,7 @@ static int set_filter(struct can_link *link)
 		CANOPEN_RPDO1 + node,
 		CANOPEN_SDO_ANSWER + node,
 		CANOPEN_HEARTBEAT + node,
-		CANOPEN_HEARTBEAT + link->master.own,
+		CANOPEN_HEARTBEAT + s->master.own,
 	};
 	struct can_filter filter[sizeof(ids) / sizeof(*ids)];
 	int n = sizeof(ids) / sizeof(*ids);
@@ -58,19 +67,19 @@ static int set_filter(struct can_link *link)
 	for (int i = 0; i < n; i++)
 		filter[i] = (struct can_filter){ids[i], CAN_EFF_FLAG | CAN_RTR_FLAG |
 								CAN_SFF_MASK};
-	return link->bus->ops->filter(link->bus, filter, n);
+	return s->bus->ops->filter(s->bus, filter, n);
 }
 
-static int open_bus(struct can_link *link, const struct can_transport *transport,
-		    const struct incise_backend_request *asked, bool look,
-		    struct incise_error *err)
+static int open_bus(struct can_session *s, const struct can_transport *transport,
+		    const struct incise_backend_request *asked, bool watch)
 {
+	struct incise_error *err = s->client.err;
 	const struct incise_actuator_can *can = &asked->actuator->can;
 	char device[DEVICE_MAX];
 	struct can_bus_request request = {
 		.where = asked->where, .device = device, .bitrate = can->bitrate};
 	unsigned int node;
-	int rc = can_link_parse(asked->arguments, device, sizeof(device), &node);
+	int rc = can_session_parse(asked->arguments, device, sizeof(device), &node);
 
 	if (rc)
 		return incise_error_set(
@@ -89,14 +98,13 @@ static int open_bus(struct can_link *link, const struct can_transport *transport
 			"%s: node %u is also actuator.can.master, the id of "
 			"this program's heartbeat; give another one there",
 			asked->where, node);
-	request.node = look ? 0 : (uint8_t)node;
-	rc = transport->open(&link->bus, &request, err);
+	request.node = watch ? 0 : (uint8_t)node;
+	rc = transport->open(&s->bus, &request, err);
 	if (rc)
 		return rc;
-	link->master = (struct canopen){
-		.bus = link->bus, .node = (uint8_t)node, .state = CANOPEN_UNKNOWN};
-	snprintf(link->where, sizeof(link->where), "drive 0x%02x at %.36s", node,
-		 link->bus->name);
+	s->master = (struct canopen){
+		.bus = s->bus, .node = (uint8_t)node, .state = CANOPEN_UNKNOWN};
+	snprintf(s->name, sizeof(s->name), "drive 0x%02x at %.36s", node, s->bus->name);
 	return 0;
 }
 
@@ -105,61 +113,60 @@ static bool is_foreign(const struct canopen *master)
 	return master->foreign;
 }
 
-static int check_alone(struct can_link *link, const char *where, struct incise_error *err)
+static int check_alone(struct can_session *s)
 {
-	int64_t until = link->bus->ops->now(link->bus) + LISTEN_NS;
-	int rc = canopen_await(&link->master, is_foreign, until);
+	const struct cia402_client *client = &s->client;
+	int64_t until = s->bus->ops->now(s->bus) + LISTEN_NS;
+	int rc = canopen_await(&s->master, is_foreign, until);
 
 	if (rc == -ETIMEDOUT)
 		return 0;
 	if (rc)
-		return incise_error_set(err, -rc, "%s: %s: %s", where, link->bus->name,
-					strerror(-rc));
+		return incise_error_set(client->err, -rc, "%s: %s: %s", client->where,
+					s->bus->name, strerror(-rc));
 	return incise_error_set(
-		err, EBUSY,
+		client->err, EBUSY,
 		"%s: another master sends SYNCs, set-points or heartbeats of node 0x%02x on "
 		"%s; end it, or give another actuator.can.master",
-		where, link->master.own, link->bus->name);
+		client->where, s->master.own, s->bus->name);
 }
 
-/* Where it stands, and what of that is the machine's. @keep: a count that goes on. */
-static int take_position(struct can_link *link, bool keep, const char *where,
-			 struct incise_error *err)
+/* Read the position, and place 0. @keep: the drive's count continues. */
+static int read_position(struct can_session *s, bool keep)
 {
-	const struct incise_actuator *a = &link->actuator;
-	double per_mm = link->axis.setup.counts_per_step / incise_actuator_step_mm(a);
-	struct incise_abi_status *status = &link->axis.motion.status;
+	const struct incise_actuator *a = &s->actuator;
+	double per_mm = s->axis.setup.counts_per_step / incise_actuator_step_mm(a);
+	struct incise_abi_status *status = &s->axis.motion.status;
 	const struct cia402_object position = {0x6064, 0, 4, "position"};
-	const struct cia402_talk talk = {&link->master, where, err};
 	uint32_t counts;
-	int rc = cia402_ask(&talk, &position, &counts);
+	int rc = cia402_read(&s->client, &position, &counts);
 
 	if (rc)
 		return rc;
-	link->axis.position = (int32_t)counts;
-	if (link->is_homed)
-		link->axis.zero_counts = -a->home_mm * per_mm;
+	s->axis.position = (int32_t)counts;
+	if (s->is_homed)
+		s->axis.zero_counts = -a->home_mm * per_mm;
 	else if (!keep)
-		link->axis.zero_counts = (int32_t)counts;
-	status->position = can_axis_steps(&link->axis, link->axis.position);
+		s->axis.zero_counts = (int32_t)counts;
+	status->position = can_axis_steps(&s->axis, s->axis.position);
 	status->flags &= ~INCISE_STEPPER_FLAG_HOMED;
-	if (link->is_homed)
+	if (s->is_homed)
 		status->flags |= INCISE_STEPPER_FLAG_HOMED;
 	return 0;
 }
 
-static int ask_homed(struct can_link *link, const char *where, struct incise_error *err)
+static int read_homed(struct can_session *s)
 {
-	link->is_homed = link->actuator.can.absolute;
-	if (link->is_homed || !link->actuator.can.homing_method)
+	s->is_homed = s->actuator.can.absolute;
+	if (s->is_homed || !s->actuator.can.homing_method)
 		return 0;
-	return cia402_homed(&link->master, link->setup.mode, &link->is_homed, where, err);
+	return cia402_read_homed(&s->client, s->setup.mode, &s->is_homed);
 }
 
-/* Which of them are wired, only a person knows: all that 60FD has a bit for. */
-static void have_inputs(struct can_link *link, bool inputs)
+/* The drive does not report which inputs are wired: all that 60FD has a bit for. */
+static void set_inputs(struct can_session *s, bool inputs)
 {
-	struct can_axis_setup *setup = &link->axis.setup;
+	struct can_axis_setup *setup = &s->axis.setup;
 
 	setup->inputs = inputs;
 	setup->wired =
@@ -168,192 +175,197 @@ static void have_inputs(struct can_link *link, bool inputs)
 		       : 0;
 }
 
-/* All of it, also after it began anew. */
-static int set_up(struct can_link *link, const char *where, struct incise_error *err)
+/* Set the drive up, also after it restarted. */
+static int set_up(struct can_session *s)
 {
-	bool was_homed = link->is_homed, keep;
-	int rc = ask_homed(link, where, err);
+	bool was_homed = s->is_homed, keep;
+	int rc = read_homed(s);
 
-	keep = link->is_setup && link->boots == link->master.boots &&
-	       link->is_homed == was_homed;
-	link->is_setup = false;
+	keep = s->is_setup && s->boots == s->master.boots && s->is_homed == was_homed;
+	s->is_setup = false;
 	if (!rc)
-		rc = take_position(link, keep, where, err);
+		rc = read_position(s, keep);
 	if (rc)
 		return rc;
-	can_fit_range(link);
-	if (!link->in_range)
+	can_units_range(s);
+	if (!s->in_range)
 		return incise_error_set(
-			err, ERANGE,
+			s->client.err, ERANGE,
 			"%s: its position is %d counts, and with %g counts a turn the travel "
 			"goes beyond what 32 bits hold; switch its power off and on, or see "
 			"counts_per_turn in rig.conf",
-			where, link->axis.position, link->units.counts_per_turn);
-	link->boots = link->master.boots;
-	rc = cia402_configure(&link->master, &link->setup, &link->taken, where, err);
+			s->client.where, s->axis.position, s->units.counts_per_turn);
+	s->boots = s->master.boots;
+	rc = cia402_configure(&s->client, &s->setup, &s->supported);
 	if (rc)
 		return rc;
-	link->is_setup = true;
-	have_inputs(link, link->taken.inputs);
-	link->axis.setup.inputs_timed = link->taken.inputs && link->taken.inputs_timed;
+	s->is_setup = true;
+	set_inputs(s, s->supported.inputs);
+	s->axis.setup.inputs_timed = s->supported.inputs && s->supported.inputs_timed;
 	return 0;
 }
 
-void can_link_ask_why(struct can_link *link)
+/* Read why a drive is in fault, by its own error code; a known cause stays. */
+static void find_cause(struct can_session *s)
 {
-	struct can_axis *axis = &link->axis;
+	struct can_axis *axis = &s->axis;
 	uint32_t code;
 
-	if (axis->why != CAN_AXIS_NO_REASON)
+	if (axis->cause != CAN_AXIS_NO_REASON)
 		return;
-	if (canopen_read(&link->master, 0x603f, 0, 2, &code))
+	if (canopen_read(&s->master, 0x603f, 0, 2, &code))
 		code = 0;
-	axis->why_a = code;
-	axis->why = code ? CAN_AXIS_EMCY : CAN_AXIS_DRIVE_FAULT;
+	axis->cause_a = code;
+	axis->cause = code ? CAN_AXIS_EMCY : CAN_AXIS_DRIVE_FAULT;
 }
 
-/* A fault that it has from before: whoever drives it must hear of it. */
-static void take_fault(struct can_link *link)
+/* Report a fault that the drive has from before. */
+static void adopt_fault(struct can_session *s)
 {
-	struct can_axis *axis = &link->axis;
+	struct can_axis *axis = &s->axis;
 	uint32_t word = 0;
 
-	if (canopen_read(&link->master, 0x6041, 0, 2, &word))
+	if (canopen_read(&s->master, 0x6041, 0, 2, &word))
 		return;
 	axis->statusword = (uint16_t)word;
 	if (cia402_state(axis->statusword) != CIA402_FAULT)
 		return;
 	axis->motion.status.faults |= INCISE_STEPPER_FAULT_DRIVER;
 	axis->motion.status.state = INCISE_STEPPER_STATE_FAULT;
-	can_link_ask_why(link);
+	find_cause(s);
 }
 
-static int know(struct can_link *link, const char *where, struct incise_error *err)
+/* Identify the drive; compute setup and axis from its units and rig.conf. */
+static int prepare(struct can_session *s)
 {
-	const struct incise_actuator_can *can = &link->actuator.can;
-	int rc = set_filter(link);
+	const struct cia402_client *client = &s->client;
+	const struct incise_actuator_can *can = &s->actuator.can;
+	int rc = set_filter(s);
 
 	if (rc)
-		return incise_error_set(err, -rc, "%s: %s: cannot be filtered: %s", where,
-					link->bus->name, strerror(-rc));
-	link->units =
-		(struct cia402_units){can->counts_per_turn, can->velocity_per_turn_s,
-				      can->acceleration_per_turn_s2};
-	rc = cia402_identify(&link->master, &link->identity, where, err);
+		return incise_error_set(client->err, -rc,
+					"%s: %s: cannot be filtered: %s", client->where,
+					s->bus->name, strerror(-rc));
+	s->units = (struct cia402_units){can->counts_per_turn, can->velocity_per_turn_s,
+					 can->acceleration_per_turn_s2};
+	rc = cia402_identify(client, &s->identity);
 	if (!rc)
-		rc = cia402_units(&link->master, &link->units, where, err);
+		rc = cia402_read_units(client, &s->units);
 	if (rc)
 		return rc;
-	can_fit_steps(link);
-	can_fit_setup(link);
-	return can_fit_axis(link, where, err);
+	can_units_steps(s);
+	can_units_setup(s);
+	return can_units_axis(s);
 }
 
-int can_link_open(struct can_link *link, const struct can_transport *transport,
-		  const struct incise_backend_request *asked, struct incise_error *err)
+int can_session_open(struct can_session *s, const struct can_transport *transport,
+		     const struct incise_backend_request *asked, struct incise_error *err)
 {
-	int rc = can_fit_deadman(asked->actuator, asked->where, err);
+	int rc;
 
-	link->actuator = *asked->actuator;
+	begin(s, asked->where, err);
+	s->actuator = *asked->actuator;
+	rc = can_units_deadman(s);
 	if (!rc)
-		rc = open_bus(link, transport, asked, false, err);
+		rc = open_bus(s, transport, asked, false);
 	if (rc)
 		return rc;
-	link->master.own = (uint8_t)asked->actuator->can.master;
-	rc = set_filter(link);
+	s->master.own = (uint8_t)asked->actuator->can.master;
+	rc = set_filter(s);
 	if (!rc)
-		rc = check_alone(link, asked->where, err);
-	/* One that another master stopped answers nothing else. */
-	if (!rc && (rc = canopen_send_nmt(&link->master, CANOPEN_PREPARE)) < 0)
+		rc = check_alone(s);
+	/* A drive that another master stopped answers nothing else. */
+	if (!rc && (rc = canopen_send_nmt(&s->master, CANOPEN_PREPARE)) < 0)
 		rc = incise_error_set(err, -rc, "%s: %s: cannot send: %s", asked->where,
-				      link->bus->name, strerror(-rc));
+				      s->bus->name, strerror(-rc));
 	if (!rc)
-		rc = know(link, asked->where, err);
+		rc = prepare(s);
 	if (!rc)
-		rc = can_fit_load(link, asked->where, err);
-	/* What another left in motion, and its own deadman did not stop. */
+		rc = can_units_load(s);
+	/* Another program may have left it in motion, without a deadman that stops it. */
 	if (!rc)
-		rc = cia402_power_off(&link->master, asked->where, err);
+		rc = cia402_power_off(&s->client);
 	if (!rc)
-		rc = set_up(link, asked->where, err);
+		rc = set_up(s);
 	if (!rc)
-		take_fault(link);
+		adopt_fault(s);
 	return rc;
 }
 
 /*
- * Whether it is homed it tells in homing mode, and that is to be asked only where nobody
- * drives it: who owns it for a moment makes sure of that.
+ * The drive reports only in homing mode whether it is homed. Enter that as the node's owner for
+ * a moment, so that no other program drives it.
  */
-static int look_alone(struct can_link *link, const struct can_transport *transport,
-		      const struct incise_backend_request *asked,
-		      struct incise_error *err)
+static int watch_homed(struct can_session *s, const struct can_transport *transport,
+		       const struct incise_backend_request *asked)
 {
+	struct incise_error *err = s->client.err;
 	uint32_t word;
 	bool alone;
-	int rc = open_bus(link, transport, asked, false, err);
+	int rc = open_bus(s, transport, asked, false);
 
 	if (rc)
 		return rc;
-	link->master.own = (uint8_t)asked->actuator->can.master;
-	rc = know(link, asked->where, err);
-	/* Nor under a master that is none of ours. */
-	alone = !rc && !check_alone(link, asked->where, NULL);
-	if (alone && !canopen_read(&link->master, 0x6041, 0, 2, &word) &&
+	s->master.own = (uint8_t)asked->actuator->can.master;
+	rc = prepare(s);
+	/* Nor may another kind of master drive it. */
+	s->client.err = NULL;
+	alone = !rc && !check_alone(s);
+	s->client.err = err;
+	if (alone && !canopen_read(&s->master, 0x6041, 0, 2, &word) &&
 	    cia402_state((uint16_t)word) == CIA402_DISABLED)
-		rc = ask_homed(link, asked->where, err);
-	link->bus->ops->close(link->bus);
-	link->bus = NULL;
+		rc = read_homed(s);
+	s->bus->ops->close(s->bus);
+	s->bus = NULL;
 	return rc;
 }
 
-static int look_for_inputs(struct can_link *link, const char *where,
-			   struct incise_error *err)
+static int find_inputs(struct can_session *s)
 {
-	const struct cia402_talk talk = {&link->master, where, err};
 	uint32_t inputs;
 	bool has;
-	int rc = cia402_ask_if(&talk, &digital_inputs, &inputs, &has);
+	int rc = cia402_read_optional(&s->client, &digital_inputs, &inputs, &has);
 
 	if (!rc)
-		have_inputs(link, has);
+		set_inputs(s, has);
 	return rc;
 }
 
-int can_link_look(struct can_link *link, const struct can_transport *transport,
-		  const struct incise_backend_request *asked, struct incise_error *err)
+int can_session_watch(struct can_session *s, const struct can_transport *transport,
+		      const struct incise_backend_request *asked,
+		      struct incise_error *err)
 {
 	int rc;
 
-	link->actuator = *asked->actuator;
-	rc = look_alone(link, transport, asked, err);
+	begin(s, asked->where, err);
+	s->actuator = *asked->actuator;
+	rc = watch_homed(s, transport, asked);
 	if (rc && rc != -EBUSY)
 		return rc;
 	if (err)
 		*err = (struct incise_error){0};
-	rc = open_bus(link, transport, asked, true, err);
+	rc = open_bus(s, transport, asked, true);
 	if (!rc)
-		rc = know(link, asked->where, err);
-	/* It sends nothing of its own. */
-	link->master.own = 0;
+		rc = prepare(s);
+	/* No heartbeats. */
+	s->master.own = 0;
 	if (!rc)
-		rc = look_for_inputs(link, asked->where, err);
-	return rc ? rc : take_position(link, false, asked->where, err);
+		rc = find_inputs(s);
+	return rc ? rc : read_position(s, false);
 }
 
-/* An e-stop that is pressed forbids power, and one that was let go no longer does. */
-static int take_inputs(struct can_link *link, struct incise_error *err)
+/* A pressed e-stop forbids power, a released one allows it. */
+static int read_inputs(struct can_session *s)
 {
-	const struct cia402_talk talk = {&link->master, link->where, err};
 	uint32_t inputs;
 	int rc;
 
-	if (!link->taken.inputs)
+	if (!s->supported.inputs)
 		return 0;
-	rc = cia402_ask(&talk, &digital_inputs, &inputs);
+	rc = cia402_read(&s->client, &digital_inputs, &inputs);
 	if (rc)
 		return rc;
-	can_axis_inputs(&link->axis, inputs);
+	can_axis_inputs(&s->axis, inputs);
 	return 0;
 }
 
@@ -362,92 +374,186 @@ static bool is_operational(const struct canopen *master)
 	return master->state == CANOPEN_OPERATIONAL;
 }
 
-int can_link_ready(struct can_link *link, bool homing, struct incise_error *err)
+int can_session_ready(struct can_session *s, bool homing, struct incise_error *err)
 {
-	const struct incise_actuator *a = &link->actuator;
-	double per_turn_s = link->units.velocity_per_turn_s / a->lead_mm;
-	int64_t now = link->bus->ops->now(link->bus);
+	const struct incise_actuator *a = &s->actuator;
+	double per_turn_s = s->units.velocity_per_turn_s / a->lead_mm;
+	int64_t now = s->bus->ops->now(s->bus);
 	int rc = 0;
 
-	if (!link->is_setup || link->boots != link->master.boots)
-		rc = set_up(link, link->where, err);
-	/* Until it has: whether it fails, or is stopped on the way. */
-	link->is_homed = link->is_homed && (!homing || a->can.absolute);
+	begin(s, s->name, err);
+	if (!s->is_setup || s->boots != s->master.boots)
+		rc = set_up(s);
+	/* Unhomed until homing succeeds. */
+	s->is_homed = s->is_homed && (!homing || a->can.absolute);
 	if (!rc && homing)
 		rc = cia402_set_homing(
-			&link->master, a->can.homing_method,
-			can_fit_units(a->home_mm_s * per_turn_s),
-			can_fit_units(a->home_mm_s / 10 * per_turn_s),
-			can_fit_units(a->acceleration_mm_s2 / a->lead_mm *
-				      link->units.acceleration_per_turn_s2),
-			link->where, err);
+			&s->client, a->can.homing_method,
+			can_units_whole(a->home_mm_s * per_turn_s),
+			can_units_whole(a->home_mm_s / 10 * per_turn_s),
+			can_units_whole(a->acceleration_mm_s2 / a->lead_mm *
+					s->units.acceleration_per_turn_s2));
 	if (!rc)
-		rc = cia402_set_mode(&link->master,
-				     homing ? CIA402_HOMING : link->setup.mode,
-				     link->where, err);
+		rc = cia402_set_mode(&s->client, homing ? CIA402_HOMING : s->setup.mode);
 	if (!rc)
-		rc = take_inputs(link, err);
+		rc = read_inputs(s);
 	if (rc)
 		return rc;
-	rc = canopen_await(&link->master, is_operational, now + READY_NS);
+	rc = canopen_await(&s->master, is_operational, now + READY_NS);
 	return rc ? incise_error_set(
 			    err, -rc,
 			    "%s: does not become operational, and is %s: %s; see "
 			    "its power and cable",
-			    link->where, canopen_state_name(link->master.state),
-			    strerror(-rc))
+			    s->name, canopen_state_name(s->master.state), strerror(-rc))
 		  : 0;
 }
 
-int can_link_clear(struct can_link *link, struct incise_error *err)
+int can_session_clear(struct can_session *s, struct incise_error *err)
 {
-	int state = link->bus->ops->state(link->bus), rc;
+	int state = s->bus->ops->state(s->bus), rc;
 
+	begin(s, s->name, err);
 	if (state == CAN_STATE_BUS_OFF)
 		return incise_error_set(
 			err, EBUSY,
 			"%s: cannot be cleared: %s is still bus-off; `ip link set %s type can "
 			"restart`, then clear",
-			link->where, link->bus->name, link->bus->name);
-	rc = cia402_power_off(&link->master, link->where, err);
+			s->name, s->bus->name, s->bus->name);
+	rc = cia402_power_off(&s->client);
 	if (!rc)
-		rc = cia402_clear(&link->master, link->where, err);
-	/* Whatever it was, nobody need trust what it still knows. */
+		rc = cia402_clear(&s->client);
+	/* After a fault its old setup is not trusted. */
 	if (!rc)
-		rc = set_up(link, link->where, err);
+		rc = set_up(s);
 	if (!rc)
-		rc = take_inputs(link, err);
+		rc = read_inputs(s);
 	if (!rc)
-		can_axis_cleared(&link->axis);
+		can_axis_cleared(&s->axis);
 	return rc;
 }
 
-int can_link_homed(struct can_link *link, struct incise_error *err)
+int can_session_homed(struct can_session *s, struct incise_error *err)
 {
 	int rc;
 
-	link->is_homed = true;
-	rc = take_position(link, false, link->where, err);
+	begin(s, s->name, err);
+	s->is_homed = true;
+	rc = read_position(s, false);
 	if (rc)
 		return rc;
-	can_fit_range(link);
-	return cia402_set_range(&link->master, link->setup.position_min,
-				link->setup.position_max, link->where, err);
+	can_units_range(s);
+	return cia402_set_range(&s->client, s->setup.position_min, s->setup.position_max);
 }
 
-void can_link_close(struct can_link *link)
+void can_session_close(struct can_session *s)
 {
-	if (!link->bus)
+	if (!s->bus)
 		return;
+	begin(s, s->name, NULL);
 	/*
-	 * It need not watch over who has gone in good order; else its own watch is what stops
-	 * it now. That it has no power it must have said itself.
+	 * Only a drive that reports to have no power may stop watching this side: else its
+	 * deadman is what stops it now.
 	 */
-	if (link->is_setup && link->master.own &&
-	    !cia402_power_off(&link->master, link->where, NULL)) {
-		canopen_write(&link->master, 0x1016, 1, 4, 0);
-		canopen_send_nmt(&link->master, CANOPEN_PREPARE);
+	if (s->is_setup && s->master.own && !cia402_power_off(&s->client)) {
+		canopen_write(&s->master, 0x1016, 1, 4, 0);
+		canopen_send_nmt(&s->master, CANOPEN_PREPARE);
 	}
-	link->bus->ops->close(link->bus);
-	link->bus = NULL;
+	s->bus->ops->close(s->bus);
+	s->bus = NULL;
+}
+
+/* --- watching --- */
+
+static void receive(struct can_session *s, int64_t now)
+{
+	struct can_axis *axis = &s->axis;
+	struct can_frame frame;
+	uint32_t inputs;
+	int64_t t_ns;
+
+	for (int i = 0;
+	     i < WATCH_FRAMES && s->bus->ops->receive(s->bus, &frame, &t_ns) > 0; i++) {
+		uint32_t function = canopen_handle(&s->master, &frame, t_ns);
+
+		if (function == CANOPEN_TPDO1 &&
+		    cia402_parse_status(&frame, &axis->statusword, &axis->position))
+			s->watch.tpdo_ns = now;
+		else if (function == CANOPEN_TPDO2 &&
+			 cia402_parse_inputs(&frame, &inputs))
+			can_axis_inputs(axis, inputs);
+	}
+}
+
+static int read_status(struct can_session *s)
+{
+	struct can_axis *axis = &s->axis;
+	uint32_t word, counts, inputs;
+	int rc = canopen_read(&s->master, 0x6041, 0, 2, &word);
+
+	if (!rc)
+		rc = canopen_read(&s->master, 0x6064, 0, 4, &counts);
+	if (!rc && axis->setup.inputs)
+		rc = canopen_read(&s->master, 0x60fd, 0, 4, &inputs);
+	if (rc)
+		return rc;
+	if (axis->setup.inputs)
+		can_axis_inputs(axis, inputs);
+	axis->statusword = (uint16_t)word;
+	axis->position = (int32_t)counts;
+	return 0;
+}
+
+static unsigned int state_of(enum cia402_state state, bool moves)
+{
+	switch (state) {
+	case CIA402_ENABLED:
+		return moves ? INCISE_STEPPER_STATE_MOVING : INCISE_STEPPER_STATE_READY;
+	case CIA402_QUICK_STOP:
+	case CIA402_FAULT_REACTION:
+		return INCISE_STEPPER_STATE_STOPPING;
+	case CIA402_FAULT:
+		return INCISE_STEPPER_STATE_FAULT;
+	default:
+		return INCISE_STEPPER_STATE_DISABLED;
+	}
+}
+
+/* Publish the drive's own state, without faults that only the program driving it latched. */
+static void publish(struct can_session *s, int rc, int64_t now)
+{
+	struct can_axis *axis = &s->axis;
+	struct incise_motion *m = &axis->motion;
+	enum cia402_state state = cia402_state(axis->statusword);
+	double at = (double)can_axis_steps(axis, axis->position);
+	double dt = (double)(now - s->watch.looked_ns) / INCISE_NS_PER_S;
+	bool moves = s->watch.looked_ns && dt > 0 &&
+		     fabs(at - s->watch.position) > STILL_STEPS_S * dt;
+
+	s->watch.looked_ns = now;
+	s->watch.position = at;
+	m->status.position = (int64_t)at;
+	m->status.state = state_of(state, moves);
+	m->status.faults = 0;
+	if (rc)
+		m->status.faults = INCISE_ABI_FAULT_LOST;
+	else if (state == CIA402_FAULT)
+		m->status.faults = INCISE_STEPPER_FAULT_DRIVER;
+	if (m->status.faults)
+		m->status.state = INCISE_STEPPER_STATE_FAULT;
+	incise_motion_publish(m, now);
+}
+
+void can_session_watch_cycle(struct can_session *s)
+{
+	int64_t now = s->bus->ops->now(s->bus);
+	int rc = 0;
+
+	receive(s, now);
+	if (!s->watch.tpdo_ns || now - s->watch.tpdo_ns > WATCH_NS)
+		rc = read_status(s);
+	if (!rc && cia402_state(s->axis.statusword) == CIA402_FAULT)
+		find_cause(s);
+	else
+		s->axis.cause = CAN_AXIS_NO_REASON;
+	publish(s, rc, s->bus->ops->now(s->bus));
 }

@@ -1,67 +1,80 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A drive and the bus that leads to it: found, set up after rig.conf, made ready for power,
- * cleared. All of it blocks and goes by SDO; what is done in each cycle is the axis's.
+ * A session with a drive over its bus: find the drive, set it up after rig.conf, prepare it for
+ * power, clear it; or watch it. All of this blocks and uses SDOs; the axis does the work of
+ * each cycle.
  *
- *   rig.conf (mm) ─▶ link: counts, limits, load of the bus ─▶ drive
+ *   rig.conf (mm) ─▶ session: counts, limits, load of the bus ─▶ drive
  *                      ╰─▶ axis
  */
-#ifndef INCISE_CAN_LINK_H
-#define INCISE_CAN_LINK_H
+#ifndef INCISE_CAN_SESSION_H
+#define INCISE_CAN_SESSION_H
 
 #include <incise/actuator.h>
 #include <incise/backend.h>
 #include "can_axis.h"
 
-struct can_link {
+struct can_session {
 	struct can_bus *bus;
 	struct canopen master;
 	struct can_axis axis;
-	struct incise_actuator
-		actuator; /* steps are as fine as the profile can have them */
+	struct incise_actuator actuator; /* its steps as fine as the profile allows */
 	struct cia402_identity identity;
 	struct cia402_units units;
-	struct cia402_taken taken;
+	struct cia402_supported supported;
 	struct cia402_setup setup;
-	char where[64];	       /* "drive 0x10 at can0" */
+	char name[64];	       /* "drive 0x10 at can0" */
 	uint32_t load_percent; /* of the bus; 0: it has no bit rate */
 
 	/* private */
-	uint32_t boots; /* when it was set up */
+	struct cia402_client client;
+	uint32_t boots; /* at the setup */
 	bool is_setup, is_homed;
-	bool in_range; /* all of the travel, in the drive's 32-bit counts */
+	bool in_range; /* the travel fits the drive's 32-bit counts */
+	struct {
+		int64_t tpdo_ns; /* the last TPDO1 */
+		int64_t looked_ns;
+		double position; /* steps, at that time */
+	} watch;
 };
 
-/* "can0:0x10" in its parts. 0, -EINVAL. */
-int can_link_parse(const char *arguments, char *device, size_t size, unsigned int *node);
+/* Split "can0:0x10". Returns 0, -EINVAL. */
+int can_session_parse(const char *arguments, char *device, size_t size,
+		      unsigned int *node);
 
 /*
- * Open the bus and set the drive up, without power. can_link_close() in both cases. 0;
- * -EBUSY (another master drives it), -ERANGE (the bus cannot carry it, or the profile is
- * out of its range), and what can_bus.h and cia402.h say.
+ * Open the bus and set the drive up, without power. Call can_session_close() in any case.
+ * Returns 0; -EBUSY (another master drives it), -ERANGE (the bus cannot carry the traffic, or
+ * the profile is out of its range), and the errors of can_bus.h and cia402.h.
  */
-int can_link_open(struct can_link *link, const struct can_transport *transport,
-		  const struct incise_backend_request *request, struct incise_error *err);
+int can_session_open(struct can_session *session, const struct can_transport *transport,
+		     const struct incise_backend_request *request,
+		     struct incise_error *err);
 
 /*
- * The same to look: the drive is asked what it is. Nothing is written but, where nobody drives
- * it and it has no power, its mode for a moment: homing mode tells whether it has homed.
+ * Likewise for a drive that another program may drive. Nothing is written to it, except that
+ * a drive without power and without another master enters homing mode for a moment, where it
+ * reports whether it is homed.
  */
-int can_link_look(struct can_link *link, const struct can_transport *transport,
-		  const struct incise_backend_request *request, struct incise_error *err);
+int can_session_watch(struct can_session *session, const struct can_transport *transport,
+		      const struct incise_backend_request *request,
+		      struct incise_error *err);
 
-/* Before power: set up again where it rebooted, in its mode or in homing mode, operational. */
-int can_link_ready(struct can_link *link, bool homing, struct incise_error *err);
+/*
+ * Read the state of a watched drive into the axis, and publish it: from TPDOs while another
+ * master sends SYNCs, else by SDO. Some ms, and 1 s if the drive does not answer.
+ */
+void can_session_watch_cycle(struct can_session *session);
 
-/* Take it out of its fault, and set it up again. */
-int can_link_clear(struct can_link *link, struct incise_error *err);
+/* Prepare for power: set up again after a reboot, enter its mode or homing mode. */
+int can_session_ready(struct can_session *session, bool homing, struct incise_error *err);
 
-/* It has homed: its 0 is that of the machine from now on. */
-int can_link_homed(struct can_link *link, struct incise_error *err);
+/* Reset the fault, and set the drive up again. */
+int can_session_clear(struct can_session *session, struct incise_error *err);
 
-/* Note why a drive is in fault, by its own error code; a reason that is known stays. */
-void can_link_ask_why(struct can_link *link);
+/* The drive has homed: from now on its 0 is that of the machine. */
+int can_session_homed(struct can_session *session, struct incise_error *err);
 
-void can_link_close(struct can_link *link);
+void can_session_close(struct can_session *session);
 
 #endif

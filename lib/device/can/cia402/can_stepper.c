@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A drive on a CAN bus as a stepper; see can_stepper.h.
+ * A drive on a CAN bus as a stepper; see can_stepper.h. A drive homes by itself: power off,
+ * homing mode, the drive's search, then in its own mode to the start of the travel.
  *
  *   incise_stepper_…() ─▶ motor ─▶ pages ─▶ thread: axis ─▶ bus ─▶ drive
  *                           ╰──▶ mailbox ──▶ │
@@ -16,6 +17,7 @@
 
 #define MS 1000000LL
 #define START_MOST_NS (3 * INCISE_NS_PER_S) /* with the deadman: longer than any start */
+#define HOME_MOST_NS (60 * INCISE_NS_PER_S)
 #define POLL_NS MS
 
 static struct can_stepper *of(struct incise_motor *motor)
@@ -28,14 +30,14 @@ static int64_t now_of(struct can_bus *bus)
 	return bus->ops->now(bus);
 }
 
-/* Until power, or homing, has come to an end. */
+/* Wait until powering or homing has ended. */
 static int await_result(struct can_stepper *c, int64_t most_ns, const volatile int *stop)
 {
-	int64_t end = now_of(c->link.bus) + most_ns;
+	int64_t end = now_of(c->session.bus) + most_ns;
 	bool stopped = false;
 
-	while (c->link.axis.result == 1) {
-		if (now_of(c->link.bus) > end)
+	while (c->session.axis.result == 1) {
+		if (now_of(c->session.bus) > end)
 			return -ETIMEDOUT;
 		if (stop && *stop && !stopped) {
 			stopped = true;
@@ -43,34 +45,34 @@ static int await_result(struct can_stepper *c, int64_t most_ns, const volatile i
 		}
 		can_thread_nap(&c->thread, POLL_NS);
 	}
-	return c->link.axis.result;
+	return c->session.axis.result;
 }
 
-/* Why it has no power, in a line. */
-int can_stepper_say_why(struct can_stepper *c, int rc, const char *what,
-			struct incise_error *err)
+/* Make the message from the cause of the last stop; returns @rc if there is none. */
+static int refuse_by_cause(struct can_stepper *c, int rc, const char *what,
+			   struct incise_error *err)
 {
 	char why[300];
 
-	if (!can_axis_why(&c->link.axis, why, sizeof(why)))
+	if (!can_axis_cause_text(&c->session.axis, why, sizeof(why)))
 		return rc;
 	return incise_error_set(err, -rc, "%s: %s: %s", c->motor.name, what, why);
 }
 
-/* Give power, in its mode or to home. Returns when it has it, or has homed. */
-int can_stepper_power(struct can_stepper *c, int64_t homing_ns, const volatile int *stop,
-		      const char *what, struct incise_error *err)
+/* Power the drive in its mode, or home for at most so long; wait for the end of that. */
+static int power(struct can_stepper *c, int64_t homing_ns, const volatile int *stop,
+		 const char *what, struct incise_error *err)
 {
 	int64_t deadman_ns = (int64_t)(c->motor.actuator.deadman_s * INCISE_NS_PER_S);
-	struct can_axis *axis = &c->link.axis;
+	struct can_axis *axis = &c->session.axis;
 	int rc = can_thread_borrow(&c->thread, err);
 
 	if (rc)
 		return rc;
-	/* It looks at a statusword of now, not at one that is up to 20 ms old. */
-	rc = can_link_ready(&c->link, homing_ns > 0, err);
+	/* This reads a current statusword: the last one may be 20 ms old. */
+	rc = can_session_ready(&c->session, homing_ns > 0, err);
 	if (!rc)
-		rc = can_axis_power(axis, now_of(c->link.bus), homing_ns);
+		rc = can_axis_power(axis, now_of(c->session.bus), homing_ns);
 	can_thread_give_back(&c->thread);
 	if (rc == -ERANGE)
 		return incise_error_set(
@@ -82,10 +84,10 @@ int can_stepper_power(struct can_stepper *c, int64_t homing_ns, const volatile i
 	if (rc <= 0)
 		return rc;
 	rc = await_result(c, homing_ns + START_MOST_NS + deadman_ns, stop);
-	return rc ? can_stepper_say_why(c, rc, what, err) : 0;
+	return rc ? refuse_by_cause(c, rc, what, err) : 0;
 }
 
-enum incise_stepper_state can_stepper_state(struct can_stepper *c)
+static enum incise_stepper_state state_of(struct can_stepper *c)
 {
 	struct incise_stepper_status status;
 
@@ -97,17 +99,17 @@ static int can_enable(struct incise_motor *motor, struct incise_error *err)
 {
 	struct can_stepper *c = of(motor);
 
-	switch (can_stepper_state(c)) {
+	switch (state_of(c)) {
 	case INCISE_STEPPER_READY:
 	case INCISE_STEPPER_MOVING:
 		return 0;
 	case INCISE_STEPPER_STOPPING:
 		return -EBUSY;
 	case INCISE_STEPPER_FAULT:
-		can_stepper_say_why(c, -EPERM, "cannot be enabled", err);
+		refuse_by_cause(c, -EPERM, "cannot be enabled", err);
 		return -EPERM;
 	default:
-		return can_stepper_power(c, 0, NULL, "cannot be enabled", err);
+		return power(c, 0, NULL, "cannot be enabled", err);
 	}
 }
 
@@ -121,22 +123,22 @@ static int can_clear(struct incise_motor *motor, struct incise_error *err)
 	struct can_stepper *c = of(motor);
 	int rc;
 
-	if (can_stepper_state(c) != INCISE_STEPPER_FAULT)
-		return can_stepper_state(c) == INCISE_STEPPER_STOPPING ? -EBUSY : 0;
+	if (state_of(c) != INCISE_STEPPER_FAULT)
+		return state_of(c) == INCISE_STEPPER_STOPPING ? -EBUSY : 0;
 	rc = can_thread_borrow(&c->thread, err);
 	if (rc)
 		return rc;
-	rc = can_link_clear(&c->link, err);
+	rc = can_session_clear(&c->session, err);
 	if (!rc)
-		rc = incise_motion_clear(&c->link.axis.motion);
-	incise_motion_publish(&c->link.axis.motion, now_of(c->link.bus));
+		rc = incise_motion_clear(&c->session.axis.motion);
+	incise_motion_publish(&c->session.axis.motion, now_of(c->session.bus));
 	can_thread_give_back(&c->thread);
 	return rc;
 }
 
 static INCISE_REALTIME int64_t can_now(struct incise_motor *motor)
 {
-	return now_of(of(motor)->link.bus);
+	return now_of(of(motor)->session.bus);
 }
 
 static void can_close(struct incise_motor *motor)
@@ -146,11 +148,11 @@ static void can_close(struct incise_motor *motor)
 	if (c->thread.runs && !motor->watches)
 		motor->stepper.ops->disable(&motor->stepper, NULL);
 	can_thread_end(&c->thread);
-	can_link_close(&c->link);
+	can_session_close(&c->session);
 	free(c);
 }
 
-/* What a drive can do beside a motor. */
+/* --- functions of a drive that a plain motor does not have --- */
 
 static int stepper_cause(struct incise_stepper *stepper, char *text, size_t size)
 {
@@ -160,7 +162,7 @@ static int stepper_cause(struct incise_stepper *stepper, char *text, size_t size
 
 	stepper->ops->status(stepper, &status);
 	if (!(status.faults & ~INCISE_STEPPER_TRAVEL) ||
-	    !can_axis_why(&c->link.axis, why, sizeof(why)))
+	    !can_axis_cause_text(&c->session.axis, why, sizeof(why)))
 		return 0;
 	return snprintf(text, size, "%s: %s", c->motor.name, why);
 }
@@ -169,19 +171,19 @@ static int stepper_counter(struct incise_stepper *stepper, int i,
 			   struct incise_stepper_counter *counter)
 {
 	const struct can_stepper *c = (const struct can_stepper *)stepper;
-	const struct can_bus_counts *bus = &c->link.bus->counts;
-	const struct can_axis_counts *axis = &c->link.axis.counts;
+	const struct can_bus_counts *bus = &c->session.bus->counts;
+	const struct can_axis_counts *axis = &c->session.axis.counts;
 	const struct incise_stepper_counter counters[] = {
 		{"setpoints_sent", "set-points sent", axis->setpoints, false},
 		{"sync_late", "SYNCs late by half a cycle", axis->sync_late, true},
 		{"tpdo_missing", "SYNCs without an answer", axis->tpdo_missing, true},
 		{"bus_errors", "error frames", bus->errors, true},
-		{"bus_offs", "times bus-off", c->link.master.bus_offs, true},
+		{"bus_offs", "times bus-off", c->session.master.bus_offs, true},
 		{"frames_lost", "frames lost before they were read", bus->overflow, true},
 		{"sends_refused", "frames that the queue had no room for", bus->full,
 		 true},
 		{"lines_broken", "what came and was no frame", bus->broken, true},
-		{"emergencies", "emergency messages", c->link.master.emcy.count, true},
+		{"emergencies", "emergency messages", c->session.master.emcy.count, true},
 	};
 
 	if (i >= (int)(sizeof(counters) / sizeof(*counters)))
@@ -196,10 +198,96 @@ static void stepper_info(const struct incise_stepper *stepper,
 	const struct can_stepper *c = (const struct can_stepper *)stepper;
 
 	c->motor_ops->info(stepper, info);
-	/* What it measures is not what it was told: it follows. */
+	/* The drive follows its targets with a lag. */
 	info->within_mm = c->motor.actuator.can.following_mm;
 	info->settle_s = c->motor.actuator.can.following_s;
 	info->can_home = c->motor.actuator.can.homing_method != 0;
+}
+
+/*
+ * Move from the edge where homing ended to the start of the travel. Once the profile rests
+ * there, the drive may lag for following_ms.
+ */
+static int go_to_start(struct can_stepper *c, double home_mm, const volatile int *stop,
+		       struct incise_error *err)
+{
+	struct incise_stepper *stepper = &c->motor.stepper;
+	int64_t now = now_of(c->session.bus), begin = now, end = begin + HOME_MOST_NS;
+	int64_t rested = INT64_MAX, settle = c->session.axis.setup.following_ns;
+	double to_mm = fmax(home_mm, 0);
+	struct incise_stepper_status status;
+	int rc;
+
+	while (rested == INT64_MAX || now - rested < settle) {
+		rc = stepper->ops->set(stepper, to_mm);
+		if (rc)
+			return refuse_by_cause(c, rc, "homing", err);
+		can_thread_nap(&c->thread, POLL_NS);
+		stepper->ops->status(stepper, &status);
+		now = now_of(c->session.bus);
+		if (stop && *stop)
+			return incise_error_set(err, EINTR, "homing %s: stopped",
+						c->motor.name);
+		if (now > end)
+			return incise_error_set(
+				err, ETIMEDOUT,
+				"homing %s: it does not come to %g mm; see "
+				"that it moves",
+				c->motor.name, to_mm);
+		if (rested == INT64_MAX && c->motor.last.setpoint_t_ns >= begin &&
+		    status.state == INCISE_STEPPER_READY)
+			rested = now;
+	}
+	return 0;
+}
+
+static int stepper_home(struct incise_stepper *stepper, const volatile int *stop,
+			struct incise_stepper_edge_found *edge, struct incise_error *err)
+{
+	struct can_stepper *c = (struct can_stepper *)stepper;
+	const struct incise_actuator *actuator = &c->motor.actuator;
+	int64_t most_ns = HOME_MOST_NS + (int64_t)(actuator->travel_mm /
+						   actuator->home_mm_s * INCISE_NS_PER_S);
+	int rc;
+
+	if (!actuator->can.homing_method)
+		return incise_error_set(err, EOPNOTSUPP,
+					"homing %s: no homing_method in actuator.can of "
+					"rig.conf; give the drive's, such as 17",
+					c->motor.name);
+	if (c->motor.watches)
+		return incise_error_set(err, EPERM, "homing %s: it was opened to watch",
+					c->motor.name);
+	if (state_of(c) != INCISE_STEPPER_READY && state_of(c) != INCISE_STEPPER_MOVING)
+		return refuse_by_cause(
+			c,
+			incise_error_set(err, EIO,
+					 "homing %s: it is not powered; enable "
+					 "it first",
+					 c->motor.name),
+			"homing", err);
+	/* Change the mode only at rest. */
+	rc = stepper->ops->disable(stepper, err);
+	if (!rc)
+		rc = power(c, most_ns, stop, "homing", err);
+	if (rc == -EINTR)
+		return incise_error_set(err, EINTR,
+					"homing %s: stopped; its position is not that of "
+					"the machine: home again",
+					c->motor.name);
+	if (!rc && (rc = stepper->ops->disable(stepper, err)) == 0)
+		rc = can_thread_borrow(&c->thread, err);
+	if (rc)
+		return rc;
+	rc = can_session_homed(&c->session, err);
+	can_thread_give_back(&c->thread);
+	if (!rc)
+		rc = power(c, 0, NULL, "homing", err);
+	if (!rc)
+		rc = go_to_start(c, actuator->home_mm, stop, err);
+	if (!rc && edge)
+		*edge = (struct incise_stepper_edge_found){NAN, actuator->home_mm};
+	return rc;
 }
 
 static int can_wait(struct incise_motor *motor, int64_t ns)
@@ -216,8 +304,8 @@ static void set_ops(struct can_stepper *c)
 	c->ops.info = stepper_info;
 	c->ops.cause = stepper_cause;
 	c->ops.counter = stepper_counter;
-	c->ops.home = can_stepper_home;
-	/* It homes by itself: what a computer would need for that is not offered. */
+	c->ops.home = stepper_home;
+	/* It homes by itself: homing by the computer is not offered. */
 	c->ops.homing = NULL;
 	c->ops.edge = NULL;
 	c->ops.origin = NULL;
@@ -227,30 +315,30 @@ static void set_ops(struct can_stepper *c)
 static int set_up(struct can_stepper *c, const struct can_transport *transport,
 		  const struct incise_backend_request *asked, struct incise_error *err)
 {
-	struct can_link *link = &c->link;
+	struct can_session *session = &c->session;
 	bool real_time;
 	int rc;
 
-	link->axis.motion.setpoint = &c->setpoint;
-	link->axis.motion.slot = &c->status;
-	rc = asked->watch ? can_link_look(link, transport, asked, err)
-			  : can_link_open(link, transport, asked, err);
+	session->axis.motion.setpoint = &c->setpoint;
+	session->axis.motion.slot = &c->status;
+	rc = asked->watch ? can_session_watch(session, transport, asked, err)
+			  : can_session_open(session, transport, asked, err);
 	if (rc)
 		return rc;
-	c->motor.actuator = link->actuator;
-	c->motor.lines = link->axis.setup.wired;
-	snprintf(c->motor.name, sizeof(c->motor.name), "%s", link->where);
-	/* So that a look at it, first of all, is not at nothing. */
+	c->motor.actuator = session->actuator;
+	c->motor.lines = session->axis.setup.wired;
+	snprintf(c->motor.name, sizeof(c->motor.name), "%s", session->name);
+	/* The first status is valid from the start. */
 	if (asked->watch)
-		can_watch_cycle(&c->thread.watch, link);
+		can_session_watch_cycle(session);
 	else
-		incise_motion_publish(&link->axis.motion, now_of(link->bus));
-	/* So that no first use of a page comes in a cycle. It may be refused. */
+		incise_motion_publish(&session->axis.motion, now_of(session->bus));
+	/* No page fault in a cycle; mlock() may be refused. */
 	mlock(c, sizeof(*c));
 	rc = can_thread_start(&c->thread, &real_time);
 	if (!real_time)
 		snprintf(c->motor.name, sizeof(c->motor.name), "%.45s, not real-time",
-			 link->where);
+			 session->name);
 	return rc ? incise_error_set(err, -rc, "%s: cannot begin: %s", c->motor.name,
 				     strerror(-rc))
 		  : 0;
@@ -276,7 +364,7 @@ void *can_stepper_open(const struct can_transport *transport,
 		return NULL;
 	}
 	memset(c, 0, sizeof(*c));
-	c->thread.link = &c->link;
+	c->thread.session = &c->session;
 	c->thread.watches = asked->watch;
 	c->thread.sleep_until = transport->sleep_until;
 	c->motor.door = &door;

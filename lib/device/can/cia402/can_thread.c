@@ -7,13 +7,13 @@
 #include "../../thread.h"
 #include "can_thread.h"
 
-#define IDLE_LOOK_NS 2000000 /* between looks at the mailbox without power */
+#define IDLE_LOOK_NS 2000000 /* period of looking at the mailbox without power */
 #define ANSWER_NS 1000000000
 #define POLL_NS 250000
 
 static int64_t now_of(const struct can_thread *t)
 {
-	return t->link->bus->ops->now(t->link->bus);
+	return t->session->bus->ops->now(t->session->bus);
 }
 
 static void obey(struct can_thread *t)
@@ -23,7 +23,7 @@ static void obey(struct can_thread *t)
 		return;
 	case CAN_THREAD_DISABLE:
 		if (!t->watches)
-			can_axis_disable(&t->link->axis);
+			can_axis_disable(&t->session->axis);
 		break;
 	case CAN_THREAD_LEND:
 		t->lent = true;
@@ -39,17 +39,17 @@ static void obey(struct can_thread *t)
 	atomic_store_explicit(&t->command, CAN_THREAD_NONE, memory_order_release);
 }
 
-/* Without power, and while it is borrowed: the mailbox, and now and then a cycle. */
+/* Without power, and while the bus is borrowed: the mailbox, and sometimes a cycle. */
 static int64_t idle(struct can_thread *t)
 {
-	int64_t now = now_of(t), heartbeat_ns = t->link->master.heartbeat_ns;
+	int64_t now = now_of(t), heartbeat_ns = t->session->master.heartbeat_ns;
 
 	if (!t->lent && now >= t->idle_ns) {
 		if (t->watches)
-			can_watch_cycle(&t->watch, t->link);
+			can_session_watch_cycle(t->session);
 		else
-			can_axis_cycle(&t->link->axis, now, 0, 0);
-		/* The drive's watch waits for no more than four heartbeats. */
+			can_axis_cycle(&t->session->axis, now, 0, 0);
+		/* The drive's deadman expires after four heartbeats. */
 		t->idle_ns = now + (heartbeat_ns > 0 && heartbeat_ns < CAN_AXIS_IDLE_NS
 					    ? heartbeat_ns
 					    : CAN_AXIS_IDLE_NS);
@@ -59,12 +59,12 @@ static int64_t idle(struct can_thread *t)
 }
 
 /*
- * Do what is due; returns when it is to be called again. Times are start + n cycles; what is
- * late by a cycle or more is left out.
+ * Run the cycle that is due; returns the time of the next call. Cycles are due at start + n
+ * periods; those that are late by a period or more are left out.
  */
 static int64_t step(struct can_thread *t)
 {
-	struct can_axis *axis = &t->link->axis;
+	struct can_axis *axis = &t->session->axis;
 	int64_t cycle = axis->setup.config.tick_ns, now;
 	uint32_t left_out = 0;
 
@@ -97,7 +97,7 @@ static void *thread_run(void *argument)
 	return NULL;
 }
 
-/* Let time pass for a caller; in a test's time the thread's work is done meanwhile. */
+/* With a simulated clock the thread's work is done here. */
 void can_thread_nap(struct can_thread *t, int64_t ns)
 {
 	int64_t end = now_of(t) + ns, due;
@@ -108,11 +108,11 @@ void can_thread_nap(struct can_thread *t, int64_t ns)
 	}
 	do {
 		due = step(t);
-		t->sleep_until(t->link->bus, due < end ? due : end);
+		t->sleep_until(t->session->bus, due < end ? due : end);
 	} while (now_of(t) < end);
 }
 
-/* The callers' side of the mailbox. */
+/* --- the callers' side of the mailbox --- */
 
 int can_thread_ask(struct can_thread *t, enum can_thread_command command)
 {
@@ -135,7 +135,7 @@ int can_thread_borrow(struct can_thread *t, struct incise_error *err)
 	return rc ? incise_error_set(err, -rc,
 				     "%s: its thread does not answer; end this "
 				     "program",
-				     t->link->where)
+				     t->session->name)
 		  : 0;
 }
 

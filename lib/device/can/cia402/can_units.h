@@ -1,33 +1,32 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What rig.conf says in mm, in the units of a drive and of its axis; and whether the bus can
- * carry it.
+ * From rig.conf in mm to the units of a drive and of its axis, with a check that the bus can
+ * carry the traffic. Nothing here uses the bus.
  */
-#ifndef INCISE_CAN_FIT_H
-#define INCISE_CAN_FIT_H
+#ifndef INCISE_CAN_UNITS_H
+#define INCISE_CAN_UNITS_H
 
 #include "can_session.h"
 
-/* The actuator's steps: as fine as the drive's counts, or as the profile can take them. */
-void can_fit_steps(struct can_link *link);
+/* Set the actuator's steps: as fine as the drive's counts, or as the profile allows. */
+void can_units_steps(struct can_session *session);
 
-/* link->setup, and how often both beat. */
-void can_fit_setup(struct can_link *link);
+/* Compute session->setup, and the period of both heartbeats. */
+void can_units_setup(struct can_session *session);
 
-/* The range of positions in it, after where 0 is. */
-void can_fit_range(struct can_link *link);
+/* Compute the range of positions in the setup from the place of 0; sets in_range. */
+void can_units_range(struct can_session *session);
 
-/* link->axis. 0, -EINVAL, -ERANGE. */
-int can_fit_axis(struct can_link *link, const char *where, struct incise_error *err);
+/* Initialize session->axis. Returns 0, -EINVAL, -ERANGE. */
+int can_units_axis(struct can_session *session);
 
-/* How much of the bus it takes. 0; -ERANGE: more than it may. */
-int can_fit_load(struct can_link *link, const char *where, struct incise_error *err);
+/* Compute load_percent. Returns 0; -ERANGE: more than the bus can carry. */
+int can_units_load(struct can_session *session);
 
-/* 0; -EINVAL: a deadman that heartbeats in whole ms cannot keep. */
-int can_fit_deadman(const struct incise_actuator *actuator, const char *where,
-		    struct incise_error *err);
+/* Returns 0; -EINVAL: heartbeats in whole ms cannot keep such a short deadman off. */
+int can_units_deadman(const struct can_session *session);
 
-/* A speed or acceleration of the drive: whole, at least 1, rounded up. */
-uint32_t can_fit_units(double value);
+/* Returns a speed or acceleration in the drive's units: whole, at least 1, rounded up. */
+uint32_t can_units_whole(double value);
 
 #endif

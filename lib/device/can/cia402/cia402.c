@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What the words of a CiA 402 drive mean, and its PDOs; nothing here waits or fails.
+ * The words of a CiA 402 drive, its PDOs, and its objects by SDO; see cia402.h.
  *
  *   statusword   bit 6 5 . 3 2 1 0
  *                    │ │   │ ╰─┴─┴── operation enabled, switched on, ready
@@ -8,6 +8,7 @@
  *                    │ ╰── no quick stop
  *                    ╰── switch-on disabled
  */
+#include <errno.h>
 #include <string.h>
 #include "cia402.h"
 
@@ -16,6 +17,12 @@
 #define TPDO1_LENGTH 6
 #define TPDO2_LENGTH 4
 #define NODE 0x7fu
+
+#define ABORT_NO_OBJECT 0x06020000
+#define ABORT_NO_SUB 0x06090011
+#define POLL_NS 2000000
+
+const struct cia402_object cia402_statusword = {0x6041, 0, 2, "statusword"};
 
 enum cia402_state cia402_state(uint16_t statusword)
 {
@@ -98,7 +105,7 @@ const char *cia402_mode_name(int mode)
 	return mode < (int)(sizeof(names) / sizeof(names[0])) ? names[mode] : "unknown";
 }
 
-uint16_t cia402_up(enum cia402_state state)
+uint16_t cia402_next_controlword(enum cia402_state state)
 {
 	switch (state) {
 	case CIA402_DISABLED:
@@ -118,8 +125,8 @@ uint16_t cia402_up(enum cia402_state state)
 	return CIA402_DISABLE_VOLTAGE;
 }
 
-void cia402_put(struct can_frame *frame, uint8_t node, enum cia402_mode mode,
-		uint16_t controlword, int32_t target)
+void cia402_pack_rpdo(struct can_frame *frame, uint8_t node, enum cia402_mode mode,
+		      uint16_t controlword, int32_t target)
 {
 	memset(frame, 0, sizeof(*frame));
 	frame->can_id = CANOPEN_RPDO1 + (node & NODE);
@@ -135,7 +142,7 @@ void cia402_put(struct can_frame *frame, uint8_t node, enum cia402_mode mode,
 	}
 }
 
-/* A data frame of that function, long enough. */
+/* Returns whether it is a data frame of that function, long enough. */
 static bool is_pdo(const struct can_frame *frame, uint32_t function, unsigned int length)
 {
 	return !(frame->can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_ERR_FLAG)) &&
@@ -143,7 +150,8 @@ static bool is_pdo(const struct can_frame *frame, uint32_t function, unsigned in
 	       frame->len >= length && frame->len <= CAN_MAX_DLEN;
 }
 
-bool cia402_get(const struct can_frame *frame, uint16_t *statusword, int32_t *position)
+bool cia402_parse_status(const struct can_frame *frame, uint16_t *statusword,
+			 int32_t *position)
 {
 	if (!is_pdo(frame, CANOPEN_TPDO1, TPDO1_LENGTH))
 		return false;
@@ -152,10 +160,184 @@ bool cia402_get(const struct can_frame *frame, uint16_t *statusword, int32_t *po
 	return true;
 }
 
-bool cia402_get_inputs(const struct can_frame *frame, uint32_t *inputs)
+bool cia402_parse_inputs(const struct can_frame *frame, uint32_t *inputs)
 {
 	if (!is_pdo(frame, CANOPEN_TPDO2, TPDO2_LENGTH))
 		return false;
 	*inputs = canopen_unpack(frame->data, 4);
 	return true;
+}
+
+/* --- objects by SDO --- */
+
+/* Returns whether the failed SDO was about an object that the drive does not have. */
+static bool is_absent(const struct canopen *master, int rc)
+{
+	return rc == -EREMOTEIO &&
+	       (master->abort == ABORT_NO_OBJECT || master->abort == ABORT_NO_SUB);
+}
+
+int cia402_fail(const struct cia402_client *client, const struct cia402_object *object,
+		const char *verb, int rc)
+{
+	char why[100];
+
+	switch (rc) {
+	case -EREMOTEIO:
+		return incise_error_set(
+			client->err, EOPNOTSUPP,
+			"%s: the drive refuses to let %s (%04X:%u) be %s: %s; see its "
+			"manual whether it can do this, and its firmware",
+			client->where, object->name, object->index, object->sub, verb,
+			canopen_abort_text(client->master->abort, why, sizeof(why)));
+	case -ETIMEDOUT:
+		return incise_error_set(
+			client->err, ETIMEDOUT,
+			"%s: no answer when %s (%04X:%u) was to be %s; see the drive's "
+			"power, its wiring, node id and bit rate",
+			client->where, object->name, object->index, object->sub, verb);
+	case -EPROTO:
+		return incise_error_set(
+			client->err, EPROTO,
+			"%s: the answer makes no sense when %s (%04X:%u) was to be %s; see "
+			"that no other node has this id and that it is a CiA 402 drive",
+			client->where, object->name, object->index, object->sub, verb);
+	case -EINTR:
+		return incise_error_set(client->err, EINTR,
+					"%s: stopped when %s (%04X:%u) was to be %s",
+					client->where, object->name, object->index,
+					object->sub, verb);
+	default:
+		return incise_error_set(
+			client->err, -rc,
+			"%s: the bus %s failed when %s (%04X:%u) was to be %s: %s; see "
+			"`ip -details link`, cables and termination",
+			client->where, client->master->bus->name, object->name,
+			object->index, object->sub, verb, strerror(-rc));
+	}
+}
+
+static int read_object(const struct cia402_client *client,
+		       const struct cia402_object *object, uint32_t *value)
+{
+	return canopen_read(client->master, object->index, object->sub, object->size,
+			    value);
+}
+
+static int write_object(const struct cia402_client *client,
+			const struct cia402_object *object, uint32_t value)
+{
+	return canopen_write(client->master, object->index, object->sub, object->size,
+			     value);
+}
+
+static uint32_t truncate(const struct cia402_object *object, uint32_t value)
+{
+	return object->size < 4 ? value & ((1u << 8 * object->size) - 1) : value;
+}
+
+int cia402_read(const struct cia402_client *client, const struct cia402_object *object,
+		uint32_t *value)
+{
+	int rc = read_object(client, object, value);
+
+	return rc ? cia402_fail(client, object, "read", rc) : 0;
+}
+
+int cia402_write(const struct cia402_client *client, const struct cia402_object *object,
+		 uint32_t value)
+{
+	int rc = write_object(client, object, value);
+
+	return rc ? cia402_fail(client, object, "written", rc) : 0;
+}
+
+static int verify(const struct cia402_client *client, const struct cia402_object *object,
+		  uint32_t value)
+{
+	uint32_t kept;
+	int rc = cia402_read(client, object, &kept);
+
+	if (rc || kept == truncate(object, value))
+		return rc;
+	return incise_error_set(
+		client->err, EPROTO,
+		"%s: the drive did not keep %s (%04X:%u): %lld was written, %lld is read "
+		"(%Xh); see the range that its manual gives",
+		client->where, object->name, object->index, object->sub,
+		(long long)truncate(object, value), (long long)kept, kept);
+}
+
+int cia402_write_verified(const struct cia402_client *client,
+			  const struct cia402_object *object, uint32_t value)
+{
+	int rc = cia402_write(client, object, value);
+
+	return rc ? rc : verify(client, object, value);
+}
+
+int cia402_read_optional(const struct cia402_client *client,
+			 const struct cia402_object *object, uint32_t *value, bool *has)
+{
+	int rc = read_object(client, object, value);
+
+	*has = !rc;
+	if (!rc || is_absent(client->master, rc))
+		return 0;
+	return cia402_fail(client, object, "read", rc);
+}
+
+int cia402_write_optional(const struct cia402_client *client,
+			  const struct cia402_object *object, uint32_t value, bool *has)
+{
+	int rc = write_object(client, object, value);
+
+	*has = !rc;
+	if (is_absent(client->master, rc))
+		return 0;
+	return rc ? cia402_fail(client, object, "written", rc)
+		  : verify(client, object, value);
+}
+
+int cia402_ensure(const struct cia402_client *client, const struct cia402_object *object,
+		  uint32_t value)
+{
+	uint32_t is;
+	int rc = cia402_read(client, object, &is);
+
+	if (rc || is == truncate(object, value))
+		return rc;
+	return cia402_write_verified(client, object, value);
+}
+
+int cia402_pause(const struct cia402_client *client, int64_t ns)
+{
+	struct can_bus *bus = client->master->bus;
+	int rc = canopen_await(client->master, NULL, bus->ops->now(bus) + ns);
+
+	return rc ? cia402_fail(client, &cia402_statusword, "read", rc) : 0;
+}
+
+int cia402_await_state(const struct cia402_client *client,
+		       bool (*done)(enum cia402_state state), int64_t timeout_ns,
+		       enum cia402_state *state)
+{
+	struct can_bus *bus = client->master->bus;
+	int64_t until_ns = bus->ops->now(bus) + timeout_ns;
+	uint32_t word;
+	int rc;
+
+	for (;;) {
+		rc = cia402_read(client, &cia402_statusword, &word);
+		if (rc)
+			return rc;
+		*state = cia402_state((uint16_t)word);
+		if (done(*state))
+			return 0;
+		if (bus->ops->now(bus) >= until_ns)
+			return -ETIME;
+		rc = cia402_pause(client, POLL_NS);
+		if (rc)
+			return rc;
+	}
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Who a drive is, and what its units are (CiA 402-2, factor group). A turn is one of the
- * screw, which is the shaft behind the drive's own gear, if it has one.
+ * Identity and units of a drive (CiA 402-2, factor group). A turn is one of the screw, that is
+ * of the shaft behind the drive's gear, if it has one.
  *
  *   60A8, 60A9, 60AA   31 … 24        23 … 16     15 … 8   7 … 0
  *                      power of ten   numerator   per      –
@@ -9,7 +9,7 @@
 #include <errno.h>
 #include <math.h>
 #include <string.h>
-#include "cia402_object.h"
+#include "cia402.h"
 
 #define TWO_PI 6.283185307179586
 #define DRIVE_PROFILE 402
@@ -51,92 +51,92 @@ static const struct cia402_object encoder[] = {{0x608f, 1, 4, "encoder increment
 static const struct cia402_object gear[] = {{0x6091, 1, 4, "motor shaft revolutions"},
 					    {0x6091, 2, 4, "driving shaft revolutions"}};
 
-int cia402_identify(struct canopen *master, struct cia402_identity *identity,
-		    const char *where, struct incise_error *err)
+int cia402_identify(const struct cia402_client *client, struct cia402_identity *identity)
 {
-	const struct cia402_talk talk = {master, where, err};
 	uint32_t *const numbers[] = {&identity->vendor, &identity->product,
 				     &identity->revision, &identity->serial};
 	bool has;
 	int rc;
 
 	memset(identity, 0, sizeof(*identity));
-	rc = canopen_read(master, 0x1000, 0, 4, &identity->type);
+	rc = canopen_read(client->master, 0x1000, 0, 4, &identity->type);
 	if (rc == -ETIMEDOUT)
 		return incise_error_set(
-			err, ENODEV,
+			client->err, ENODEV,
 			"%s: nobody answers at node 0x%02x on %s; see the drive's power, "
 			"its wiring, node id and bit rate, and what else `incise info` "
 			"finds on this bus",
-			where, master->node, master->bus->name);
+			client->where, client->master->node, client->master->bus->name);
 	if (rc)
-		return cia402_failed(&talk, &device_type, "read", rc);
+		return cia402_fail(client, &device_type, "read", rc);
 	if ((identity->type & 0xffff) != DRIVE_PROFILE)
-		return incise_error_set(err, EPROTO,
+		return incise_error_set(client->err, EPROTO,
 					"%s: node %u is no CiA 402 drive: its device "
 					"profile is %u; see the node id",
-					where, master->node, identity->type & 0xffff);
+					client->where, client->master->node,
+					identity->type & 0xffff);
 	for (int i = 0; i < 4; i++) {
-		rc = cia402_ask_if(&talk, &identity_objects[i], numbers[i], &has);
+		rc = cia402_read_optional(client, &identity_objects[i], numbers[i], &has);
 		if (rc)
 			return rc;
 	}
-	rc = cia402_ask_if(&talk, &supported, &identity->modes, &has);
+	rc = cia402_read_optional(client, &supported, &identity->modes, &has);
 	if (rc)
 		return rc;
-	/* A name is for people: what is odd about it is no reason to refuse the drive. */
-	rc = canopen_read_text(master, 0x1008, 0, identity->name, sizeof(identity->name));
+	/* An invalid name, which is only displayed, is no reason to refuse the drive. */
+	rc = canopen_read_text(client->master, 0x1008, 0, identity->name,
+			       sizeof(identity->name));
 	if (rc && rc != -EREMOTEIO && rc != -EPROTO)
-		return cia402_failed(&talk,
-				     &(struct cia402_object){0x1008, 0, 4, "device name"},
-				     "read", rc);
+		return cia402_fail(client,
+				   &(struct cia402_object){0x1008, 0, 4, "device name"},
+				   "read", rc);
 	return 0;
 }
 
-/* How many per turn it may be, and mean it. */
-static bool sensible(double value)
+static bool is_plausible(double value)
 {
 	return isfinite(value) && value > 0 && value <= MOST_PER_TURN * 1e9;
 }
 
-/* *value stays as it is where the drive has no such ratio. */
-static int ratio(const struct cia402_talk *talk, const struct cia402_object pair[2],
-		 double *value, bool *has)
+/* Read a ratio; *value stays unchanged if the drive has no such ratio. */
+static int read_ratio(const struct cia402_client *client,
+		      const struct cia402_object pair[2], double *value, bool *has)
 {
 	uint32_t numerator = 0, denominator = 0;
-	int rc = cia402_ask_if(talk, &pair[0], &numerator, has);
+	int rc = cia402_read_optional(client, &pair[0], &numerator, has);
 
 	if (rc || !*has)
 		return rc;
-	rc = cia402_ask(talk, &pair[1], &denominator);
+	rc = cia402_read(client, &pair[1], &denominator);
 	if (rc)
 		return rc;
 	if (!numerator || !denominator)
 		return incise_error_set(
-			talk->err, EPROTO,
+			client->err, EPROTO,
 			"%s: the drive's %s (%04X) is %u/%u; set it there, "
 			"or give counts_per_turn in rig.conf",
-			talk->where, pair[0].name, pair[0].index, numerator, denominator);
+			client->where, pair[0].name, pair[0].index, numerator,
+			denominator);
 	*value = (double)numerator / denominator;
 	return 0;
 }
 
-/* Encoder increments per turn of the screw; *has false: the drive does not say. */
-static int increments(const struct cia402_talk *talk, double *value, bool *has)
+/* Read encoder increments per turn of the screw; *has false: the drive lacks them. */
+static int read_increments(const struct cia402_client *client, double *value, bool *has)
 {
 	double turns = 1;
 	bool geared;
-	int rc = ratio(talk, encoder, value, has);
+	int rc = read_ratio(client, encoder, value, has);
 
 	if (rc || !*has)
 		return rc;
-	rc = ratio(talk, gear, &turns, &geared);
+	rc = read_ratio(client, gear, &turns, &geared);
 	*value *= turns;
 	return rc;
 }
 
-/* Of an angle, per turn; 0: it is none. */
-static double angle(uint8_t unit)
+/* Returns units per turn; 0: the unit is no angle. */
+static double angle_per_turn(uint8_t unit)
 {
 	switch (unit) {
 	case UNIT_TURN:
@@ -161,75 +161,73 @@ static double power_of_ten(uint32_t unit)
 	return pow(10, (int8_t)(unit >> 24));
 }
 
-static int unknown_unit(const struct cia402_talk *talk,
-			const struct cia402_object *object, uint32_t unit,
-			const char *key)
+static int refuse_unit(const struct cia402_client *client,
+		       const struct cia402_object *object, uint32_t unit, const char *key)
 {
 	return incise_error_set(
-		talk->err, EPROTO,
+		client->err, EPROTO,
 		"%s: what the drive's %s (%04X) says, %08Xh, is not known "
 		"here; give %s in rig.conf",
-		talk->where, object->name, object->index, unit, key);
+		client->where, object->name, object->index, unit, key);
 }
 
-static int positions(const struct cia402_talk *talk, double *per_turn)
+static int read_positions(const struct cia402_client *client, double *per_turn)
 {
 	uint32_t unit = 0;
 	bool has = false;
 	uint8_t code;
-	int rc = cia402_ask_if(talk, &position_unit, &unit, &has);
+	int rc = cia402_read_optional(client, &position_unit, &unit, &has);
 
 	if (rc)
 		return rc;
 	code = (uint8_t)(unit >> 16);
-	if (has && angle(code) > 0) {
-		*per_turn = angle(code) / power_of_ten(unit);
+	if (has && angle_per_turn(code) > 0) {
+		*per_turn = angle_per_turn(code) / power_of_ten(unit);
 	} else if (has && code == UNIT_INCREMENT && !(unit >> 24)) {
-		rc = increments(talk, per_turn, &has);
+		rc = read_increments(client, per_turn, &has);
 		if (!rc && !has)
-			rc = ratio(talk, feed, per_turn, &has);
+			rc = read_ratio(client, feed, per_turn, &has);
 	} else if (!has || code == 0 || code == UNIT_METRE) {
-		rc = ratio(talk, feed, per_turn, &has);
+		rc = read_ratio(client, feed, per_turn, &has);
 		if (!rc && !has)
-			rc = increments(talk, per_turn, &has);
+			rc = read_increments(client, per_turn, &has);
 	} else {
-		return unknown_unit(talk, &position_unit, unit, "counts_per_turn");
+		return refuse_unit(client, &position_unit, unit, "counts_per_turn");
 	}
 	if (rc)
 		return rc;
-	if (!sensible(*per_turn) || *per_turn < 1 || *per_turn > MOST_PER_TURN)
+	if (!is_plausible(*per_turn) || *per_turn < 1 || *per_turn > MOST_PER_TURN)
 		return incise_error_set(
-			talk->err, EPROTO,
+			client->err, EPROTO,
 			"%s: the drive does not say how many counts a turn has (6092, 608F, "
 			"60A8: %g); give counts_per_turn in rig.conf",
-			talk->where, *per_turn);
+			client->where, *per_turn);
 	return 0;
 }
 
-/* A velocity's or an acceleration's; counts where it does not tell. @told may be NULL. */
-static int rates(const struct cia402_talk *talk, const struct cia402_object *object,
-		 double counts, bool squared, double *per_turn, bool *told,
-		 const char *key)
+/* Read the unit of velocity or acceleration; without one it is @counts. */
+static int read_rates(const struct cia402_client *client,
+		      const struct cia402_object *object, double counts, bool squared,
+		      double *per_turn, bool *reported, const char *key)
 {
 	uint32_t unit = 0;
 	uint8_t code, per;
 	double turn;
 	bool has = false;
-	int rc = cia402_ask_if(talk, object, &unit, &has);
+	int rc = cia402_read_optional(client, object, &unit, &has);
 
+	*reported = has;
 	if (rc)
 		return rc;
 	if (!has) {
 		*per_turn = counts;
 		return 0;
 	}
-	if (told)
-		*told = true;
 	code = (uint8_t)(unit >> 16);
 	per = (uint8_t)(unit >> 8);
-	turn = angle(code);
+	turn = angle_per_turn(code);
 	if (code == UNIT_INCREMENT) {
-		rc = increments(talk, &turn, &has);
+		rc = read_increments(client, &turn, &has);
 		if (rc)
 			return rc;
 		if (!has)
@@ -242,40 +240,39 @@ static int rates(const struct cia402_talk *talk, const struct cia402_object *obj
 	else if (per != (squared ? PER_SECOND_2 : PER_SECOND))
 		turn = 0;
 	*per_turn = turn / power_of_ten(unit);
-	if (turn <= 0 || !sensible(*per_turn))
-		return unknown_unit(talk, object, unit, key);
+	if (turn <= 0 || !is_plausible(*per_turn))
+		return refuse_unit(client, object, unit, key);
 	return 0;
 }
 
-int cia402_units(struct canopen *master, struct cia402_units *units, const char *where,
-		 struct incise_error *err)
+int cia402_read_units(const struct cia402_client *client, struct cia402_units *units)
 {
-	const struct cia402_talk talk = {master, where, err};
-	bool acceleration_told = false;
+	bool reported;
 	struct cia402_units found = *units;
 	int rc = 0;
 
 	if (found.counts_per_turn == 0)
-		rc = positions(&talk, &found.counts_per_turn);
+		rc = read_positions(client, &found.counts_per_turn);
 	if (!rc && found.velocity_per_turn_s == 0)
-		rc = rates(&talk, &velocity_unit, found.counts_per_turn, false,
-			   &found.velocity_per_turn_s, NULL, "velocity_per_turn_s");
+		rc = read_rates(client, &velocity_unit, found.counts_per_turn, false,
+				&found.velocity_per_turn_s, &reported,
+				"velocity_per_turn_s");
 	if (!rc && found.acceleration_per_turn_s2 == 0) {
-		rc = rates(&talk, &acceleration_unit, found.counts_per_turn, true,
-			   &found.acceleration_per_turn_s2, &acceleration_told,
-			   "acceleration_per_turn_s2");
+		rc = read_rates(client, &acceleration_unit, found.counts_per_turn, true,
+				&found.acceleration_per_turn_s2, &reported,
+				"acceleration_per_turn_s2");
 		/*
-		 * One that counts speeds in something else will not count accelerations in
-		 * counts: taken for that, its quick stop would have no ramp.
+		 * A drive with another unit of velocity does not count accelerations in counts:
+		 * if it did here, its quick stop would have no ramp.
 		 */
-		if (!rc && !acceleration_told &&
+		if (!rc && !reported &&
 		    found.velocity_per_turn_s != found.counts_per_turn)
 			rc = incise_error_set(
-				err, EPROTO,
+				client->err, EPROTO,
 				"%s: the unit of velocity is not a count per second, and the "
 				"drive does not say that of acceleration (60AA); give "
 				"acceleration_per_turn_s2 in rig.conf, see its manual",
-				where);
+				client->where);
 	}
 	if (rc)
 		return rc;
