@@ -156,7 +156,6 @@ static void ask(struct canopen *master, uint8_t what)
 		.acceleration = 1,
 		.following = 1,
 	};
-	struct cia402_identity identity;
 	struct cia402_units units = {0};
 	struct cia402_supported supported;
 	struct incise_error err = {0};
@@ -180,7 +179,7 @@ static void ask(struct canopen *master, uint8_t what)
 		rc = 0;
 		break;
 	case 3:
-		rc = cia402_identify(&client, &identity);
+		rc = cia402_identify(&client);
 		break;
 	case 4:
 		rc = cia402_read_units(&client, &units);

@@ -120,7 +120,6 @@ static void test_emcy(void **state)
 	handle(w, 0x80 + N, 8, "\x11\x86\x21VWXYZ");
 	assert_int_equal(w->master.emcy.code, 0x8611);
 	assert_int_equal(w->master.emcy.error_register, 0x21);
-	assert_memory_equal(w->master.emcy.vendor, "VWXYZ", 5);
 	handle(w, 0x80 + N, 7, "\x10\x23\x01\0\0\0\0");
 	handle(w, 0x81 + N, 8, "\x10\x23\x01\0\0\0\0\0");
 	assert_int_equal(w->master.emcy.code, 0x8611);
@@ -137,15 +136,11 @@ static void test_error_frames(void **state)
 
 	assert_int_equal(
 		handle(w, CAN_ERR_FLAG | CAN_ERR_CRTL, 8, "\0\x30\0\0\0\0\x60\x08"), 0);
-	assert_int_equal(w->master.bus_error, CAN_ERR_CRTL);
-	assert_int_equal(w->master.bus_error_data[1], 0x30);
 	assert_int_equal(w->master.bus_offs, 0);
 	handle(w, CAN_ERR_FLAG | CAN_ERR_BUSOFF, 1, "\x01");
-	assert_int_equal(w->master.bus_error, CAN_ERR_BUSOFF);
-	assert_int_equal(w->master.bus_error_data[1], 0);
 	assert_int_equal(w->master.bus_offs, 1);
 	handle(w, CAN_ERR_FLAG | CAN_ERR_BUSOFF, 0xff, "\1\2\3\4\5\6\7\10");
-	assert_int_equal(w->master.bus_error_data[7], 8);
+	assert_int_equal(w->master.bus_offs, 2);
 }
 
 /* This side's heartbeat: on time, not made up for, tried again when the queue was full. */

@@ -41,15 +41,6 @@ uint32_t canopen_unpack(const uint8_t *bytes, int n)
 
 /* --- frames of the node, heartbeats, NMT --- */
 
-static void handle_error_frame(struct canopen *master, const struct can_frame *frame)
-{
-	master->bus_error = frame->can_id & CAN_ERR_MASK;
-	memset(master->bus_error_data, 0, sizeof(master->bus_error_data));
-	memcpy(master->bus_error_data, frame->data,
-	       frame->len < CAN_MAX_DLEN ? frame->len : CAN_MAX_DLEN);
-	master->bus_offs += !!(frame->can_id & CAN_ERR_BUSOFF);
-}
-
 static void handle_heartbeat(struct canopen *master, const struct can_frame *frame,
 			     int64_t t_ns)
 {
@@ -75,7 +66,6 @@ static void handle_emcy(struct canopen *master, const struct can_frame *frame)
 		return;
 	emcy->code = code;
 	emcy->error_register = frame->data[2];
-	memcpy(emcy->vendor, frame->data + 3, sizeof(emcy->vendor));
 	emcy->count++;
 }
 
@@ -103,7 +93,7 @@ uint32_t canopen_handle(struct canopen *master, const struct can_frame *frame,
 	uint32_t id = frame->can_id, function = id & CAN_SFF_MASK & ~NODE;
 
 	if (id & CAN_ERR_FLAG) {
-		handle_error_frame(master, frame);
+		master->bus_offs += !!(id & CAN_ERR_BUSOFF);
 		return 0;
 	}
 	if (id & (CAN_EFF_FLAG | CAN_RTR_FLAG) || frame->len > CAN_MAX_DLEN)
@@ -156,6 +146,11 @@ int canopen_send_heartbeat(struct canopen *master, int64_t now_ns)
 	else /* late by more than one: missed ones are not made up for */
 		master->next_heartbeat_ns = now_ns + master->heartbeat_ns;
 	return rc;
+}
+
+bool canopen_is_operational(const struct canopen *master)
+{
+	return master->state == CANOPEN_OPERATIONAL;
 }
 
 int canopen_send_nmt(struct canopen *master, enum canopen_command command)

@@ -48,8 +48,7 @@ enum canopen_state {
 struct canopen_emcy {
 	uint16_t code;		/* 0: none */
 	uint8_t error_register; /* object 1001 */
-	uint8_t vendor[5];
-	uint32_t count; /* since the bus was opened */
+	uint32_t count;		/* since the bus was opened */
 };
 
 struct canopen {
@@ -64,9 +63,6 @@ struct canopen {
 	int64_t last_heartbeat_ns; /* or boot-up; 0: none */
 	uint32_t boots;		   /* boot-up messages */
 	struct canopen_emcy emcy;
-	/* The last error frame of the bus: CAN_ERR_… of can_id, and its data; 0: none. */
-	uint32_t bus_error;
-	uint8_t bus_error_data[8];
 	uint32_t bus_offs; /* how often it was bus-off */
 	/* SYNCs, NMT commands, heartbeats of @own and PDOs to this node by another master. */
 	uint32_t foreign;
@@ -102,6 +98,8 @@ uint32_t canopen_handle(struct canopen *master, const struct can_frame *frame,
  * is due again a millisecond later.
  */
 int canopen_send_heartbeat(struct canopen *master, int64_t now_ns);
+
+bool canopen_is_operational(const struct canopen *master);
 
 /* Send a command to the node alone. Returns 0 or an error of the bus. */
 int canopen_send_nmt(struct canopen *master, enum canopen_command command);

@@ -181,7 +181,7 @@ static void describe(struct scan *scan, unsigned int node,
 		incise_scan_tell(device, "nmt_state", "%s",
 				 canopen_state_name(n.master.state));
 	/* List other nodes too. */
-	if (has_type && (type & 0xffff) == 402)
+	if (has_type && (type & 0xffff) == CIA402_PROFILE)
 		add_drive(&n, name);
 	else if (has_type)
 		snprintf(device->what, sizeof(device->what),
@@ -191,7 +191,7 @@ static void describe(struct scan *scan, unsigned int node,
 		snprintf(device->what, sizeof(device->what),
 			 "%.50s: does not say what it is, no CiA 402 drive",
 			 *name ? name : "a device");
-	device->usable = has_type && (type & 0xffff) == 402;
+	device->usable = has_type && (type & 0xffff) == CIA402_PROFILE;
 }
 
 static int scan_bus(struct scan *scan, unsigned int only, incise_scan_found *found,

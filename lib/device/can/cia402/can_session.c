@@ -84,8 +84,9 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 	if (rc)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: expected %s:DEVICE:NODE such as %s with a node id of 1 to 127, "
-			"found %s:%.60s; `incise info %s` lists drives",
+			"%s: expected %s:DEVICE:NODE such as %s with a "
+			"node id of 1 to 127, found %s:%.60s; `incise "
+			"info %s` lists drives",
 			asked->where, transport->name,
 			strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0:0x10"
 						       : "can:can0:0x10",
@@ -93,11 +94,11 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 			strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0"
 						       : "can:can0");
 	if (node == (unsigned int)can->master)
-		return incise_error_set(
-			err, EINVAL,
-			"%s: node %u is also actuator.can.master, the id of "
-			"this program's heartbeat; give another one there",
-			asked->where, node);
+		return incise_error_set(err, EINVAL,
+					"%s: node %u is also actuator.can.master, the "
+					"id of this program's heartbeat; give another "
+					"one there",
+					asked->where, node);
 	request.node = watch ? 0 : (uint8_t)node;
 	rc = transport->open(&s->bus, &request, err);
 	if (rc)
@@ -122,13 +123,12 @@ static int check_alone(struct can_session *s)
 	if (rc == -ETIMEDOUT)
 		return 0;
 	if (rc)
-		return incise_error_set(client->err, -rc, "%s: %s: %s", client->where,
-					s->bus->name, strerror(-rc));
-	return incise_error_set(
-		client->err, EBUSY,
-		"%s: another master sends SYNCs, set-points or heartbeats of node 0x%02x on "
-		"%s; end it, or give another actuator.can.master",
-		client->where, s->master.own, s->bus->name);
+		return cia402_error(client, -rc, "%s: %s", s->bus->name, strerror(-rc));
+	return cia402_error(client, EBUSY,
+			    "another master sends SYNCs, set-points or heartbeats of "
+			    "node 0x%02x on %s; end it, or give another "
+			    "actuator.can.master",
+			    s->master.own, s->bus->name);
 }
 
 /* Read the position, and place 0. @keep: the drive's count continues. */
@@ -189,12 +189,12 @@ static int set_up(struct can_session *s)
 		return rc;
 	can_units_range(s);
 	if (!s->in_range)
-		return incise_error_set(
-			s->client.err, ERANGE,
-			"%s: its position is %d counts, and with %g counts a turn the travel "
-			"goes beyond what 32 bits hold; switch its power off and on, or see "
-			"counts_per_turn in rig.conf",
-			s->client.where, s->axis.position, s->units.counts_per_turn);
+		return cia402_error(&s->client, ERANGE,
+				    "its position is %d counts, and with %g counts a "
+				    "turn the travel goes beyond what 32 bits hold; "
+				    "switch its power off and on, or see "
+				    "counts_per_turn in rig.conf",
+				    s->axis.position, s->units.counts_per_turn);
 	s->boots = s->master.boots;
 	rc = cia402_configure(&s->client, &s->setup, &s->supported);
 	if (rc)
@@ -243,12 +243,11 @@ static int prepare(struct can_session *s)
 	int rc = set_filter(s);
 
 	if (rc)
-		return incise_error_set(client->err, -rc,
-					"%s: %s: cannot be filtered: %s", client->where,
-					s->bus->name, strerror(-rc));
+		return cia402_error(client, -rc, "%s: cannot be filtered: %s",
+				    s->bus->name, strerror(-rc));
 	s->units = (struct cia402_units){can->counts_per_turn, can->velocity_per_turn_s,
 					 can->acceleration_per_turn_s2};
-	rc = cia402_identify(client, &s->identity);
+	rc = cia402_identify(client);
 	if (!rc)
 		rc = cia402_read_units(client, &s->units);
 	if (rc)
@@ -369,11 +368,6 @@ static int read_inputs(struct can_session *s)
 	return 0;
 }
 
-static bool is_operational(const struct canopen *master)
-{
-	return master->state == CANOPEN_OPERATIONAL;
-}
-
 int can_session_ready(struct can_session *s, bool homing, struct incise_error *err)
 {
 	const struct incise_actuator *a = &s->actuator;
@@ -399,12 +393,12 @@ int can_session_ready(struct can_session *s, bool homing, struct incise_error *e
 		rc = read_inputs(s);
 	if (rc)
 		return rc;
-	rc = canopen_await(&s->master, is_operational, now + READY_NS);
-	return rc ? incise_error_set(
-			    err, -rc,
-			    "%s: does not become operational, and is %s: %s; see "
-			    "its power and cable",
-			    s->name, canopen_state_name(s->master.state), strerror(-rc))
+	rc = canopen_await(&s->master, canopen_is_operational, now + READY_NS);
+	return rc ? incise_error_set(err, -rc,
+				     "%s: does not become operational, and is %s: %s; "
+				     "see its power and cable",
+				     s->name, canopen_state_name(s->master.state),
+				     strerror(-rc))
 		  : 0;
 }
 
@@ -414,11 +408,10 @@ int can_session_clear(struct can_session *s, struct incise_error *err)
 
 	begin(s, s->name, err);
 	if (state == CAN_STATE_BUS_OFF)
-		return incise_error_set(
-			err, EBUSY,
-			"%s: cannot be cleared: %s is still bus-off; `ip link set %s type can "
-			"restart`, then clear",
-			s->name, s->bus->name, s->bus->name);
+		return incise_error_set(err, EBUSY,
+					"%s: cannot be cleared: %s is still bus-off; "
+					"`ip link set %s type can restart`, then clear",
+					s->name, s->bus->name, s->bus->name);
 	rc = cia402_power_off(&s->client);
 	if (!rc)
 		rc = cia402_clear(&s->client);

@@ -19,7 +19,6 @@ struct can_session {
 	struct canopen master;
 	struct can_axis axis;
 	struct incise_actuator actuator; /* its steps as fine as the profile allows */
-	struct cia402_identity identity;
 	struct cia402_units units;
 	struct cia402_supported supported;
 	struct cia402_setup setup;

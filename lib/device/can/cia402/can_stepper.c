@@ -9,41 +9,237 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <time.h>
+#include "../../motor.h"
+#include "../../thread.h"
+#include "can_session.h"
 #include "can_stepper.h"
 
 #define MS 1000000LL
 #define START_MOST_NS (3 * INCISE_NS_PER_S) /* with the deadman: longer than any start */
 #define HOME_MOST_NS (60 * INCISE_NS_PER_S)
 #define POLL_NS MS
+#define IDLE_LOOK_NS (2 * MS) /* period of looking at the mailbox without power */
+#define ANSWER_NS INCISE_NS_PER_S
+#define ASK_POLL_NS 250000
+
+enum command {
+	NONE,
+	DISABLE,
+	LEND,
+	RETURN,
+	END,
+};
+
+/*
+ * The thread owns the bus: it runs a cycle of the axis at each period while the drive has
+ * power, less often without. One caller at a time has the mailbox, and borrows the bus for SDOs.
+ *
+ *   caller   ── lend ─▶ (SDOs) ── give back ─▶
+ *   thread   ══cycles══╡        ╞══cycles══════
+ */
+struct can_stepper {
+	struct incise_motor motor;
+	struct incise_stepper_ops ops; /* the motor's, some replaced by a drive's */
+	const struct incise_stepper_ops *motor_ops;
+	/* The two pages. */
+	_Alignas(64) struct incise_stepper_setpoint setpoint;
+	_Alignas(64) struct incise_abi_status status;
+	/* Mailbox: written by the caller while it is NONE, else by the thread. */
+	_Alignas(64) atomic_int command;
+	/* Of a simulated clock; NULL: there is a thread. See can_bus.h. */
+	void (*sleep_until)(struct can_bus *bus, int64_t t_ns);
+	int64_t due_ns, idle_ns; /* the next cycle; the next without power */
+	bool lent, ended, runs;
+	pthread_t thread;
+	/* The thread's, or that of the caller who borrowed it. */
+	_Alignas(64) struct can_session session;
+};
 
 static struct can_stepper *of(struct incise_motor *motor)
 {
 	return (struct can_stepper *)motor;
 }
 
-static int64_t now_of(struct can_bus *bus)
+static int64_t now_of(const struct can_stepper *c)
 {
-	return bus->ops->now(bus);
+	return c->session.bus->ops->now(c->session.bus);
 }
+
+/* --- the thread --- */
+
+static void obey(struct can_stepper *c)
+{
+	switch (atomic_load_explicit(&c->command, memory_order_acquire)) {
+	case NONE:
+		return;
+	case DISABLE:
+		if (!c->motor.watches)
+			can_axis_disable(&c->session.axis);
+		break;
+	case LEND:
+		c->lent = true;
+		break;
+	case RETURN:
+		c->lent = false;
+		c->due_ns = now_of(c);
+		break;
+	case END:
+		c->ended = true;
+		break;
+	}
+	atomic_store_explicit(&c->command, NONE, memory_order_release);
+}
+
+/* Without power, and while the bus is borrowed: the mailbox, and sometimes a cycle. */
+static int64_t idle(struct can_stepper *c)
+{
+	int64_t now = now_of(c), heartbeat_ns = c->session.master.heartbeat_ns;
+
+	if (!c->lent && now >= c->idle_ns) {
+		if (c->motor.watches)
+			can_session_watch_cycle(&c->session);
+		else
+			can_axis_cycle(&c->session.axis, now, 0, 0);
+		/* The drive's deadman expires after four heartbeats. */
+		c->idle_ns = now + (heartbeat_ns > 0 && heartbeat_ns < CAN_AXIS_IDLE_NS
+					    ? heartbeat_ns
+					    : CAN_AXIS_IDLE_NS);
+	}
+	c->due_ns = now_of(c);
+	return c->due_ns + IDLE_LOOK_NS;
+}
+
+/*
+ * Run the cycle that is due; returns the time of the next call. Cycles are due at start + n
+ * periods; those that are late by a period or more are left out.
+ */
+static int64_t step(struct can_stepper *c)
+{
+	struct can_axis *axis = &c->session.axis;
+	int64_t cycle = axis->setup.config.tick_ns, now;
+	uint32_t left_out = 0;
+
+	obey(c);
+	if (c->lent || !axis->motion.powered)
+		return idle(c);
+	now = now_of(c);
+	if (now < c->due_ns)
+		return c->due_ns;
+	left_out = (uint32_t)((now - c->due_ns) / cycle);
+	c->due_ns += left_out * cycle;
+	can_axis_cycle(axis, now, now - c->due_ns, left_out);
+	c->due_ns += cycle;
+	return c->due_ns;
+}
+
+static void sleep_until(int64_t t_ns)
+{
+	struct timespec until = {t_ns / INCISE_NS_PER_S, t_ns % INCISE_NS_PER_S};
+
+	clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
+}
+
+static void *thread_run(void *argument)
+{
+	struct can_stepper *c = argument;
+
+	while (!c->ended)
+		sleep_until(step(c));
+	return NULL;
+}
+
+/* With a simulated clock the thread's work is done here. */
+static void nap(struct can_stepper *c, int64_t ns)
+{
+	int64_t end = now_of(c) + ns, due;
+
+	if (!c->sleep_until) {
+		sleep_until(end);
+		return;
+	}
+	do {
+		due = step(c);
+		c->sleep_until(c->session.bus, due < end ? due : end);
+	} while (now_of(c) < end);
+}
+
+/* --- the callers' side of the mailbox --- */
+
+static int ask(struct can_stepper *c, enum command command)
+{
+	int64_t end = now_of(c) + ANSWER_NS;
+
+	atomic_store_explicit(&c->command, command, memory_order_release);
+	while (atomic_load_explicit(&c->command, memory_order_acquire) != NONE) {
+		if (now_of(c) > end)
+			return -EIO;
+		nap(c, ASK_POLL_NS);
+	}
+	return 0;
+}
+
+static int borrow(struct can_stepper *c, struct incise_error *err)
+{
+	int rc = ask(c, LEND);
+
+	return rc ? incise_error_set(err, -rc,
+				     "%s: its thread does not answer; end this program",
+				     c->session.name)
+		  : 0;
+}
+
+static void give_back(struct can_stepper *c)
+{
+	ask(c, RETURN);
+}
+
+static int start_thread(struct can_stepper *c, bool *real_time)
+{
+	int rc = 0;
+
+	*real_time = true;
+	c->due_ns = c->idle_ns = now_of(c);
+	if (!c->sleep_until && c->motor.watches)
+		rc = -pthread_create(&c->thread, NULL, thread_run, c);
+	else if (!c->sleep_until)
+		rc = incise_thread_start(&c->thread, thread_run, c, real_time);
+	c->runs = !rc;
+	return rc;
+}
+
+static void end_thread(struct can_stepper *c)
+{
+	if (!c->runs)
+		return;
+	atomic_store_explicit(&c->command, END, memory_order_release);
+	if (!c->sleep_until)
+		pthread_join(c->thread, NULL);
+	c->runs = false;
+}
+
+/* --- functions of the motor --- */
 
 /* Wait until powering or homing has ended. */
 static int await_result(struct can_stepper *c, int64_t most_ns, const volatile int *stop)
 {
-	int64_t end = now_of(c->session.bus) + most_ns;
+	int64_t end = now_of(c) + most_ns;
 	bool stopped = false;
 
 	while (c->session.axis.result == 1) {
-		if (now_of(c->session.bus) > end)
+		if (now_of(c) > end)
 			return -ETIMEDOUT;
 		if (stop && *stop && !stopped) {
 			stopped = true;
-			can_thread_ask(&c->thread, CAN_THREAD_DISABLE);
+			ask(c, DISABLE);
 		}
-		can_thread_nap(&c->thread, POLL_NS);
+		nap(c, POLL_NS);
 	}
 	return c->session.axis.result;
 }
@@ -65,22 +261,22 @@ static int power(struct can_stepper *c, int64_t homing_ns, const volatile int *s
 {
 	int64_t deadman_ns = (int64_t)(c->motor.actuator.deadman_s * INCISE_NS_PER_S);
 	struct can_axis *axis = &c->session.axis;
-	int rc = can_thread_borrow(&c->thread, err);
+	int rc = borrow(c, err);
 
 	if (rc)
 		return rc;
 	/* This reads a current statusword: the last one may be 20 ms old. */
 	rc = can_session_ready(&c->session, homing_ns > 0, err);
 	if (!rc)
-		rc = can_axis_power(axis, now_of(c->session.bus), homing_ns);
-	can_thread_give_back(&c->thread);
+		rc = can_axis_power(axis, now_of(c), homing_ns);
+	give_back(c);
 	if (rc == -ERANGE)
-		return incise_error_set(
-			err, ERANGE,
-			"%s: stands at %.3f mm, outside of its travel: home "
-			"it, or move it there by hand",
-			c->motor.name,
-			(double)axis->motion.status.position * axis->setup.step_mm);
+		return incise_error_set(err, ERANGE,
+					"%s: stands at %.3f mm, outside of its travel: "
+					"home it, or move it there by hand",
+					c->motor.name,
+					(double)axis->motion.status.position *
+						axis->setup.step_mm);
 	if (rc <= 0)
 		return rc;
 	rc = await_result(c, homing_ns + START_MOST_NS + deadman_ns, stop);
@@ -115,7 +311,7 @@ static int can_enable(struct incise_motor *motor, struct incise_error *err)
 
 static int can_disable(struct incise_motor *motor)
 {
-	return can_thread_ask(&of(motor)->thread, CAN_THREAD_DISABLE);
+	return ask(of(motor), DISABLE);
 }
 
 static int can_clear(struct incise_motor *motor, struct incise_error *err)
@@ -125,29 +321,29 @@ static int can_clear(struct incise_motor *motor, struct incise_error *err)
 
 	if (state_of(c) != INCISE_STEPPER_FAULT)
 		return state_of(c) == INCISE_STEPPER_STOPPING ? -EBUSY : 0;
-	rc = can_thread_borrow(&c->thread, err);
+	rc = borrow(c, err);
 	if (rc)
 		return rc;
 	rc = can_session_clear(&c->session, err);
 	if (!rc)
 		rc = incise_motion_clear(&c->session.axis.motion);
-	incise_motion_publish(&c->session.axis.motion, now_of(c->session.bus));
-	can_thread_give_back(&c->thread);
+	incise_motion_publish(&c->session.axis.motion, now_of(c));
+	give_back(c);
 	return rc;
 }
 
 static INCISE_REALTIME int64_t can_now(struct incise_motor *motor)
 {
-	return now_of(of(motor)->session.bus);
+	return now_of(of(motor));
 }
 
 static void can_close(struct incise_motor *motor)
 {
 	struct can_stepper *c = of(motor);
 
-	if (c->thread.runs && !motor->watches)
+	if (c->runs && !motor->watches)
 		motor->stepper.ops->disable(&motor->stepper, NULL);
-	can_thread_end(&c->thread);
+	end_thread(c);
 	can_session_close(&c->session);
 	free(c);
 }
@@ -212,7 +408,7 @@ static int go_to_start(struct can_stepper *c, double home_mm, const volatile int
 		       struct incise_error *err)
 {
 	struct incise_stepper *stepper = &c->motor.stepper;
-	int64_t now = now_of(c->session.bus), begin = now, end = begin + HOME_MOST_NS;
+	int64_t now = now_of(c), begin = now, end = begin + HOME_MOST_NS;
 	int64_t rested = INT64_MAX, settle = c->session.axis.setup.following_ns;
 	double to_mm = fmax(home_mm, 0);
 	struct incise_stepper_status status;
@@ -222,18 +418,17 @@ static int go_to_start(struct can_stepper *c, double home_mm, const volatile int
 		rc = stepper->ops->set(stepper, to_mm);
 		if (rc)
 			return refuse_by_cause(c, rc, "homing", err);
-		can_thread_nap(&c->thread, POLL_NS);
+		nap(c, POLL_NS);
 		stepper->ops->status(stepper, &status);
-		now = now_of(c->session.bus);
+		now = now_of(c);
 		if (stop && *stop)
 			return incise_error_set(err, EINTR, "homing %s: stopped",
 						c->motor.name);
 		if (now > end)
-			return incise_error_set(
-				err, ETIMEDOUT,
-				"homing %s: it does not come to %g mm; see "
-				"that it moves",
-				c->motor.name, to_mm);
+			return incise_error_set(err, ETIMEDOUT,
+						"homing %s: it does not come to %g mm; "
+						"see that it moves",
+						c->motor.name, to_mm);
 		if (rested == INT64_MAX && c->motor.last.setpoint_t_ns >= begin &&
 		    status.state == INCISE_STEPPER_READY)
 			rested = now;
@@ -262,8 +457,7 @@ static int stepper_home(struct incise_stepper *stepper, const volatile int *stop
 		return refuse_by_cause(
 			c,
 			incise_error_set(err, EIO,
-					 "homing %s: it is not powered; enable "
-					 "it first",
+					 "homing %s: it is not powered; enable it first",
 					 c->motor.name),
 			"homing", err);
 	/* Change the mode only at rest. */
@@ -272,15 +466,15 @@ static int stepper_home(struct incise_stepper *stepper, const volatile int *stop
 		rc = power(c, most_ns, stop, "homing", err);
 	if (rc == -EINTR)
 		return incise_error_set(err, EINTR,
-					"homing %s: stopped; its position is not that of "
-					"the machine: home again",
+					"homing %s: stopped; its position is not that "
+					"of the machine: home again",
 					c->motor.name);
 	if (!rc && (rc = stepper->ops->disable(stepper, err)) == 0)
-		rc = can_thread_borrow(&c->thread, err);
+		rc = borrow(c, err);
 	if (rc)
 		return rc;
 	rc = can_session_homed(&c->session, err);
-	can_thread_give_back(&c->thread);
+	give_back(c);
 	if (!rc)
 		rc = power(c, 0, NULL, "homing", err);
 	if (!rc)
@@ -292,7 +486,7 @@ static int stepper_home(struct incise_stepper *stepper, const volatile int *stop
 
 static int can_wait(struct incise_motor *motor, int64_t ns)
 {
-	can_thread_nap(&of(motor)->thread, ns);
+	nap(of(motor), ns);
 	return 0;
 }
 
@@ -332,10 +526,10 @@ static int set_up(struct can_stepper *c, const struct can_transport *transport,
 	if (asked->watch)
 		can_session_watch_cycle(session);
 	else
-		incise_motion_publish(&session->axis.motion, now_of(session->bus));
+		incise_motion_publish(&session->axis.motion, now_of(c));
 	/* No page fault in a cycle; mlock() may be refused. */
 	mlock(c, sizeof(*c));
-	rc = can_thread_start(&c->thread, &real_time);
+	rc = start_thread(c, &real_time);
 	if (!real_time)
 		snprintf(c->motor.name, sizeof(c->motor.name), "%.45s, not real-time",
 			 session->name);
@@ -364,9 +558,7 @@ void *can_stepper_open(const struct can_transport *transport,
 		return NULL;
 	}
 	memset(c, 0, sizeof(*c));
-	c->thread.session = &c->session;
-	c->thread.watches = asked->watch;
-	c->thread.sleep_until = transport->sleep_until;
+	c->sleep_until = transport->sleep_until;
 	c->motor.door = &door;
 	c->motor.watches = asked->watch;
 	c->motor.setpoint = &c->setpoint;

@@ -114,12 +114,12 @@ int can_units_axis(struct can_session *s)
 	rc = can_axis_init(&s->axis, &setup);
 	s->axis.master = &s->master;
 	if (rc)
-		return incise_error_set(
-			s->client.err, -rc,
-			"%s: velocity_mm_s = %g, acceleration_mm_s2 = %g or jerk_mm_s3 = %g "
-			"is nothing that cycles of %g us can make; correct it",
-			s->client.where, a->velocity_mm_s, a->acceleration_mm_s2,
-			a->jerk_mm_s3, a->can.cycle_ns / 1e3);
+		return cia402_error(&s->client, -rc,
+				    "velocity_mm_s = %g, acceleration_mm_s2 = %g or "
+				    "jerk_mm_s3 = %g is nothing that cycles of %g us "
+				    "can make; correct it",
+				    a->velocity_mm_s, a->acceleration_mm_s2,
+				    a->jerk_mm_s3, a->can.cycle_ns / 1e3);
 	return 0;
 }
 
@@ -142,13 +142,13 @@ int can_units_load(struct can_session *s)
 				 : INFINITY;
 	if (least_us <= CYCLE_MOST_US)
 		snprintf(slower, sizeof(slower), ", or cycle_us = %g", least_us);
-	return incise_error_set(
-		s->client.err, ERANGE,
-		"%s: a cycle each %g us takes %u kbit/s, %u %% of the %u kbit/s of %s, and "
-		"may take %d %%; give a bit rate of at least %u kbit/s%s",
-		s->client.where, cycle_ns / 1e3, (load + 999) / 1000, s->load_percent,
-		bitrate / 1000, s->bus->name, BUS_LOAD_MOST,
-		(load * 100 / BUS_LOAD_MOST + 999) / 1000, slower);
+	return cia402_error(&s->client, ERANGE,
+			    "a cycle each %g us takes %u kbit/s, %u %% of the %u kbit/s "
+			    "of %s, and may take %d %%; give a bit rate of at least %u "
+			    "kbit/s%s",
+			    cycle_ns / 1e3, (load + 999) / 1000, s->load_percent,
+			    bitrate / 1000, s->bus->name, BUS_LOAD_MOST,
+			    (load * 100 / BUS_LOAD_MOST + 999) / 1000, slower);
 }
 
 int can_units_deadman(const struct can_session *s)
@@ -158,10 +158,10 @@ int can_units_deadman(const struct can_session *s)
 	if (a->deadman_s >= DEADMAN_LEAST_S * (1 - 1e-9) &&
 	    a->deadman_s * 1e9 >= 5.0 * a->can.cycle_ns)
 		return 0;
-	return incise_error_set(
-		s->client.err, EINVAL,
-		"%s: actuator.deadman_ms: expected at least %g for a drive on CAN, as its "
-		"heartbeats are in whole ms, found %g; correct it",
-		s->client.where, fmax(DEADMAN_LEAST_S * 1e3, 5e-6 * a->can.cycle_ns),
-		a->deadman_s * 1e3);
+	return cia402_error(&s->client, EINVAL,
+			    "actuator.deadman_ms: expected at least %g for a drive on "
+			    "CAN, as its heartbeats are in whole ms, found %g; correct "
+			    "it",
+			    fmax(DEADMAN_LEAST_S * 1e3, 5e-6 * a->can.cycle_ns),
+			    a->deadman_s * 1e3);
 }

@@ -9,6 +9,8 @@
  *                    ╰── switch-on disabled
  */
 #include <errno.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 #include "cia402.h"
 
@@ -177,43 +179,51 @@ static bool is_absent(const struct canopen *master, int rc)
 	       (master->abort == ABORT_NO_OBJECT || master->abort == ABORT_NO_SUB);
 }
 
+int cia402_error(const struct cia402_client *client, int code, const char *format, ...)
+{
+	char text[sizeof(client->err->text)];
+	va_list args;
+
+	va_start(args, format);
+	vsnprintf(text, sizeof(text), format, args);
+	va_end(args);
+	return incise_error_set(client->err, code, "%s: %s", client->where, text);
+}
+
 int cia402_fail(const struct cia402_client *client, const struct cia402_object *object,
 		const char *verb, int rc)
 {
-	char why[100];
+	char what[80], why[100];
 
+	snprintf(what, sizeof(what), "%s (%04X:%u)", object->name, object->index,
+		 object->sub);
 	switch (rc) {
 	case -EREMOTEIO:
-		return incise_error_set(
-			client->err, EOPNOTSUPP,
-			"%s: the drive refuses to let %s (%04X:%u) be %s: %s; see its "
-			"manual whether it can do this, and its firmware",
-			client->where, object->name, object->index, object->sub, verb,
-			canopen_abort_text(client->master->abort, why, sizeof(why)));
+		return cia402_error(client, EOPNOTSUPP,
+				    "the drive refuses to let %s be %s: %s; see its "
+				    "manual whether it can do this, and its firmware",
+				    what, verb,
+				    canopen_abort_text(client->master->abort, why,
+						       sizeof(why)));
 	case -ETIMEDOUT:
-		return incise_error_set(
-			client->err, ETIMEDOUT,
-			"%s: no answer when %s (%04X:%u) was to be %s; see the drive's "
-			"power, its wiring, node id and bit rate",
-			client->where, object->name, object->index, object->sub, verb);
+		return cia402_error(client, ETIMEDOUT,
+				    "no answer when %s was to be %s; see the drive's "
+				    "power, its wiring, node id and bit rate",
+				    what, verb);
 	case -EPROTO:
-		return incise_error_set(
-			client->err, EPROTO,
-			"%s: the answer makes no sense when %s (%04X:%u) was to be %s; see "
-			"that no other node has this id and that it is a CiA 402 drive",
-			client->where, object->name, object->index, object->sub, verb);
+		return cia402_error(client, EPROTO,
+				    "the answer makes no sense when %s was to be %s; "
+				    "see that no other node has this id and that it is "
+				    "a CiA 402 drive",
+				    what, verb);
 	case -EINTR:
-		return incise_error_set(client->err, EINTR,
-					"%s: stopped when %s (%04X:%u) was to be %s",
-					client->where, object->name, object->index,
-					object->sub, verb);
+		return cia402_error(client, EINTR, "stopped when %s was to be %s", what,
+				    verb);
 	default:
-		return incise_error_set(
-			client->err, -rc,
-			"%s: the bus %s failed when %s (%04X:%u) was to be %s: %s; see "
-			"`ip -details link`, cables and termination",
-			client->where, client->master->bus->name, object->name,
-			object->index, object->sub, verb, strerror(-rc));
+		return cia402_error(client, -rc,
+				    "the bus %s failed when %s was to be %s: %s; see "
+				    "`ip -details link`, cables and termination",
+				    client->master->bus->name, what, verb, strerror(-rc));
 	}
 }
 
@@ -260,12 +270,11 @@ static int verify(const struct cia402_client *client, const struct cia402_object
 
 	if (rc || kept == truncate(object, value))
 		return rc;
-	return incise_error_set(
-		client->err, EPROTO,
-		"%s: the drive did not keep %s (%04X:%u): %lld was written, %lld is read "
-		"(%Xh); see the range that its manual gives",
-		client->where, object->name, object->index, object->sub,
-		(long long)truncate(object, value), (long long)kept, kept);
+	return cia402_error(client, EPROTO,
+			    "the drive did not keep %s (%04X:%u): %lld was written, "
+			    "%lld is read (%Xh); see the range that its manual gives",
+			    object->name, object->index, object->sub,
+			    (long long)truncate(object, value), (long long)kept, kept);
 }
 
 int cia402_write_verified(const struct cia402_client *client,
@@ -318,20 +327,28 @@ int cia402_pause(const struct cia402_client *client, int64_t ns)
 	return rc ? cia402_fail(client, &cia402_statusword, "read", rc) : 0;
 }
 
+int cia402_read_state(const struct cia402_client *client, enum cia402_state *state)
+{
+	uint32_t word;
+	int rc = cia402_read(client, &cia402_statusword, &word);
+
+	if (!rc)
+		*state = cia402_state((uint16_t)word);
+	return rc;
+}
+
 int cia402_await_state(const struct cia402_client *client,
 		       bool (*done)(enum cia402_state state), int64_t timeout_ns,
 		       enum cia402_state *state)
 {
 	struct can_bus *bus = client->master->bus;
 	int64_t until_ns = bus->ops->now(bus) + timeout_ns;
-	uint32_t word;
 	int rc;
 
 	for (;;) {
-		rc = cia402_read(client, &cia402_statusword, &word);
+		rc = cia402_read_state(client, state);
 		if (rc)
 			return rc;
-		*state = cia402_state((uint16_t)word);
 		if (done(*state))
 			return 0;
 		if (bus->ops->now(bus) >= until_ns)

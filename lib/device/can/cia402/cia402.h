@@ -120,9 +120,16 @@ int cia402_write_optional(const struct cia402_client *client,
 int cia402_ensure(const struct cia402_client *client, const struct cia402_object *object,
 		  uint32_t value);
 
+/* Make a message that begins with client->where. Returns -code. */
+int cia402_error(const struct cia402_client *client, int code, const char *format, ...)
+	__attribute__((format(printf, 3, 4)));
+
 /* Make the message for @rc of canopen_read() or canopen_write(). Returns the error. */
 int cia402_fail(const struct cia402_client *client, const struct cia402_object *object,
 		const char *verb, int rc);
+
+/* Read the statusword's state. */
+int cia402_read_state(const struct cia402_client *client, enum cia402_state *state);
 
 /* Poll the statusword until @done returns true for *state. -ETIME has no message. */
 int cia402_await_state(const struct cia402_client *client,
@@ -132,17 +139,10 @@ int cia402_await_state(const struct cia402_client *client,
 /* Wait; received frames are handled meanwhile. */
 int cia402_pause(const struct cia402_client *client, int64_t ns);
 
-/* Missing objects are 0 or empty. */
-struct cia402_identity {
-	uint32_t type;	 /* 1000: the low half of a drive is 402 */
-	uint32_t vendor; /* 1018 */
-	uint32_t product, revision, serial;
-	char name[64];	/* 1008 */
-	uint32_t modes; /* 6502: bit mode - 1 */
-};
+#define CIA402_PROFILE 402 /* low half of 1000, device type */
 
-/* Identify the node. -ENODEV (no answer), -EPROTO (no CiA 402 drive). */
-int cia402_identify(const struct cia402_client *client, struct cia402_identity *identity);
+/* Check that the node is a drive. -ENODEV (no answer), -EPROTO (no CiA 402 drive). */
+int cia402_identify(const struct cia402_client *client);
 
 /* The drive's units per turn of the screw. */
 struct cia402_units {

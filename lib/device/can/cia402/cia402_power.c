@@ -42,11 +42,10 @@ static bool out_of_fault(enum cia402_state state)
 int cia402_power_off(const struct cia402_client *client)
 {
 	enum cia402_state state = CIA402_UNKNOWN;
-	uint32_t word = 0;
-	int rc = cia402_read(client, &cia402_statusword, &word);
+	int rc = cia402_read_state(client, &state);
 
 	/* A drive that moves stops on its ramp, unless it stays in its quick stop. */
-	if (!rc && cia402_state((uint16_t)word) == CIA402_ENABLED) {
+	if (!rc && state == CIA402_ENABLED) {
 		rc = cia402_write(client, &controlword, CIA402_QUICK_STOP_COMMAND);
 		if (!rc)
 			rc = cia402_await_state(client, without_power, STOP_NS, &state);
@@ -58,10 +57,10 @@ int cia402_power_off(const struct cia402_client *client)
 	if (!rc)
 		rc = cia402_await_state(client, without_power, RAMP_NS, &state);
 	if (rc == -ETIME)
-		return incise_error_set(client->err, ETIMEDOUT,
-					"%s: the drive still has power (%s) after it was "
-					"told to take it away; switch its supply off",
-					client->where, cia402_state_name(state));
+		return cia402_error(client, ETIMEDOUT,
+				    "the drive still has power (%s) after it was told "
+				    "to take it away; switch its supply off",
+				    cia402_state_name(state));
 	return rc;
 }
 
@@ -78,11 +77,10 @@ static int refuse_fault(const struct cia402_client *client)
 		return rc;
 	if (has && value)
 		code = (uint16_t)value;
-	return incise_error_set(client->err, EBUSY,
-				"%s: the drive stays in its fault: %s; remove the cause, "
-				"then clear again",
-				client->where,
-				canopen_emcy_text(code, text, sizeof(text)));
+	return cia402_error(client, EBUSY,
+			    "the drive stays in its fault: %s; remove the cause, then "
+			    "clear again",
+			    canopen_emcy_text(code, text, sizeof(text)));
 }
 
 int cia402_clear(const struct cia402_client *client)
@@ -117,12 +115,11 @@ int cia402_set_mode(const struct cia402_client *client, enum cia402_mode mode)
 		if (rc || is == (uint32_t)mode)
 			break;
 		if (bus->ops->now(bus) >= until_ns)
-			return incise_error_set(
-				client->err, ETIMEDOUT,
-				"%s: the drive does not take the mode %s and stays in %s; "
-				"see its manual",
-				client->where, cia402_mode_name(mode),
-				cia402_mode_name((int8_t)is));
+			return cia402_error(client, ETIMEDOUT,
+					    "the drive does not take the mode %s and "
+					    "stays in %s; see its manual",
+					    cia402_mode_name(mode),
+					    cia402_mode_name((int8_t)is));
 		rc = cia402_pause(client, POLL_NS);
 	}
 	return rc;
@@ -135,9 +132,8 @@ int cia402_set_homing(const struct cia402_client *client, int method, uint32_t s
 	int rc;
 
 	if (method < INT8_MIN || method > INT8_MAX)
-		return incise_error_set(client->err, EINVAL,
-					"%s: homing method %d is none; give -128 … 127",
-					client->where, method);
+		return cia402_error(client, EINVAL,
+				    "homing method %d is none; give -128 … 127", method);
 	rc = cia402_write_verified(client, &homing_method, (uint32_t)method);
 	/* A drive without the object has no offset. */
 	if (!rc)
@@ -155,18 +151,18 @@ int cia402_read_homed(const struct cia402_client *client, enum cia402_mode mode,
 		      bool *homed)
 {
 	struct cia402_client after = *client;
+	enum cia402_state state;
 	uint32_t word = 0;
-	int rc = cia402_read(client, &cia402_statusword, &word), back;
+	int rc = cia402_read_state(client, &state), back;
 
 	*homed = false;
 	if (rc)
 		return rc;
-	if (cia402_powered(cia402_state((uint16_t)word)))
-		return incise_error_set(client->err, EBUSY,
-					"%s: the drive has power (%s); disable it before "
-					"it is asked whether it is homed",
-					client->where,
-					cia402_state_name(cia402_state((uint16_t)word)));
+	if (cia402_powered(state))
+		return cia402_error(client, EBUSY,
+				    "the drive has power (%s); disable it before it is "
+				    "asked whether it is homed",
+				    cia402_state_name(state));
 	rc = cia402_set_mode(client, CIA402_HOMING);
 	if (!rc)
 		rc = cia402_read(client, &cia402_statusword, &word);

@@ -266,11 +266,10 @@ int cia402_set_range(const struct cia402_client *client, int32_t position_min,
 		     int32_t position_max)
 {
 	if (position_min >= position_max)
-		return incise_error_set(
-			client->err, EINVAL,
-			"%s: a range from %d to %d is none; see travel_mm "
-			"and counts_per_turn in rig.conf",
-			client->where, position_min, position_max);
+		return cia402_error(client, EINVAL,
+				    "a range from %d to %d is none; see travel_mm and "
+				    "counts_per_turn in rig.conf",
+				    position_min, position_max);
 	return write_range(client, position_min, position_max);
 }
 
@@ -345,25 +344,22 @@ static int check_setup(const struct cia402_client *client,
 		problem = "a mode that is not cyclic";
 	else if (!setup->cycle_ns)
 		problem = "a cycle of 0";
-	return problem ? incise_error_set(client->err, EINVAL,
-					  "%s: %s cannot be set up; see rig.conf",
-					  client->where, problem)
+	return problem ? cia402_error(client, EINVAL, "%s cannot be set up; see rig.conf",
+				      problem)
 		       : 0;
 }
 
 static int check_power(const struct cia402_client *client)
 {
-	uint32_t word;
-	int rc = cia402_read(client, &cia402_statusword, &word);
-	enum cia402_state state = rc ? CIA402_UNKNOWN : cia402_state((uint16_t)word);
+	enum cia402_state state;
+	int rc = cia402_read_state(client, &state);
 
 	if (rc || !cia402_powered(state))
 		return rc;
-	return incise_error_set(
-		client->err, EBUSY,
-		"%s: the drive has power (%s); somebody else leads it, or "
-		"it was left so: disable it first",
-		client->where, cia402_state_name(state));
+	return cia402_error(client, EBUSY,
+			    "the drive has power (%s); somebody else leads it, or it "
+			    "was left so: disable it first",
+			    cia402_state_name(state));
 }
 
 static int send_nmt(const struct cia402_client *client, enum canopen_command command)
@@ -404,12 +400,11 @@ static int set_cycle(const struct cia402_client *client, const struct cia402_set
 	if (rc)
 		return rc;
 	if (has && !(available & 1u << (setup->mode - 1)))
-		return incise_error_set(
-			client->err, EOPNOTSUPP,
-			"%s: the drive does not have the mode %s: its "
-			"6502:0 is %08Xh; choose another mode in rig.conf, "
-			"or see its firmware",
-			client->where, cia402_mode_name(setup->mode), available);
+		return cia402_error(client, EOPNOTSUPP,
+				    "the drive does not have the mode %s: its 6502:0 is "
+				    "%08Xh; choose another mode in rig.conf, or see its "
+				    "firmware",
+				    cia402_mode_name(setup->mode), available);
 	rc = cia402_set_mode(client, setup->mode);
 	if (!rc)
 		rc = cia402_ensure(client, &sync_id, SYNC_ID);
@@ -430,10 +425,10 @@ static int set_cycle(const struct cia402_client *client, const struct cia402_set
 		rc = cia402_ensure(client, &cycle, (uint32_t)(setup->cycle_ns / unit_ns));
 		return rc ? rc : cia402_ensure(client, &cycle_power, (uint32_t)powers[i]);
 	}
-	return incise_error_set(client->err, EINVAL,
-				"%s: a cycle of %u ns is no digit times a power of ten; "
-				"choose another cycle_us in rig.conf",
-				client->where, setup->cycle_ns);
+	return cia402_error(client, EINVAL,
+			    "a cycle of %u ns is no digit times a power of ten; choose "
+			    "another cycle_us in rig.conf",
+			    setup->cycle_ns);
 }
 
 /* Set the reaction to silence of this side, and the heartbeats that detect it. */
@@ -456,11 +451,6 @@ static int set_watch(const struct cia402_client *client, const struct cia402_set
 	return rc ? rc : cia402_write_verified(client, &consumer, watched);
 }
 
-static bool is_operational(const struct canopen *master)
-{
-	return master->state == CANOPEN_OPERATIONAL;
-}
-
 /* The drive's heartbeat reports the new state. */
 static int start(const struct cia402_client *client, const struct cia402_setup *setup)
 {
@@ -474,14 +464,14 @@ static int start(const struct cia402_client *client, const struct cia402_setup *
 	rc = send_nmt(client, CANOPEN_START);
 	if (rc)
 		return rc;
-	rc = canopen_await(master, is_operational,
+	rc = canopen_await(master, canopen_is_operational,
 			   bus->ops->now(bus) + NMT_NS + 2 * MS_NS * setup->heartbeat_ms);
 	if (rc == -ETIMEDOUT)
-		return incise_error_set(
-			client->err, ETIMEDOUT,
-			"%s: the drive does not become operational: its heartbeat says "
-			"%s; see its EMCY codes with `incise info` of this bus",
-			client->where, canopen_state_name(master->state));
+		return cia402_error(client, ETIMEDOUT,
+				    "the drive does not become operational: its "
+				    "heartbeat says %s; see its EMCY codes with `incise "
+				    "info` of this bus",
+				    canopen_state_name(master->state));
 	if (rc)
 		return cia402_fail(client, &nmt, "heard", rc);
 	return check_power(client);

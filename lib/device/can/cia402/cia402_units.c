@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Identity and units of a drive (CiA 402-2, factor group). A turn is one of the screw, that is
+ * Profile and units of a drive (CiA 402-2, factor group). A turn is one of the screw, that is
  * of the shaft behind the drive's gear, if it has one.
  *
  *   60A8, 60A9, 60AA   31 … 24        23 … 16     15 … 8   7 … 0
@@ -8,11 +8,9 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <string.h>
 #include "cia402.h"
 
 #define TWO_PI 6.283185307179586
-#define DRIVE_PROFILE 402
 #define MOST_PER_TURN 4294967296.0
 
 /* Numerators that belong to an angle. */
@@ -31,13 +29,6 @@
 #define PER_SECOND_2 0x57
 
 static const struct cia402_object device_type = {0x1000, 0, 4, "device type"};
-static const struct cia402_object identity_objects[] = {
-	{0x1018, 1, 4, "vendor"},
-	{0x1018, 2, 4, "product"},
-	{0x1018, 3, 4, "revision"},
-	{0x1018, 4, 4, "serial number"},
-};
-static const struct cia402_object supported = {0x6502, 0, 4, "supported drive modes"};
 static const struct cia402_object position_unit = {0x60a8, 0, 4, "SI unit position"};
 static const struct cia402_object velocity_unit = {0x60a9, 0, 4, "SI unit velocity"};
 static const struct cia402_object acceleration_unit = {0x60aa, 0, 4,
@@ -51,45 +42,25 @@ static const struct cia402_object encoder[] = {{0x608f, 1, 4, "encoder increment
 static const struct cia402_object gear[] = {{0x6091, 1, 4, "motor shaft revolutions"},
 					    {0x6091, 2, 4, "driving shaft revolutions"}};
 
-int cia402_identify(const struct cia402_client *client, struct cia402_identity *identity)
+int cia402_identify(const struct cia402_client *client)
 {
-	uint32_t *const numbers[] = {&identity->vendor, &identity->product,
-				     &identity->revision, &identity->serial};
-	bool has;
-	int rc;
+	uint32_t type;
+	int rc = canopen_read(client->master, device_type.index, device_type.sub,
+			      device_type.size, &type);
 
-	memset(identity, 0, sizeof(*identity));
-	rc = canopen_read(client->master, 0x1000, 0, 4, &identity->type);
 	if (rc == -ETIMEDOUT)
-		return incise_error_set(
-			client->err, ENODEV,
-			"%s: nobody answers at node 0x%02x on %s; see the drive's power, "
-			"its wiring, node id and bit rate, and what else `incise info` "
-			"finds on this bus",
-			client->where, client->master->node, client->master->bus->name);
+		return cia402_error(client, ENODEV,
+				    "nobody answers at node 0x%02x on %s; see the "
+				    "drive's power, its wiring, node id and bit rate, "
+				    "and what else `incise info` finds on this bus",
+				    client->master->node, client->master->bus->name);
 	if (rc)
 		return cia402_fail(client, &device_type, "read", rc);
-	if ((identity->type & 0xffff) != DRIVE_PROFILE)
-		return incise_error_set(client->err, EPROTO,
-					"%s: node %u is no CiA 402 drive: its device "
-					"profile is %u; see the node id",
-					client->where, client->master->node,
-					identity->type & 0xffff);
-	for (int i = 0; i < 4; i++) {
-		rc = cia402_read_optional(client, &identity_objects[i], numbers[i], &has);
-		if (rc)
-			return rc;
-	}
-	rc = cia402_read_optional(client, &supported, &identity->modes, &has);
-	if (rc)
-		return rc;
-	/* An invalid name, which is only displayed, is no reason to refuse the drive. */
-	rc = canopen_read_text(client->master, 0x1008, 0, identity->name,
-			       sizeof(identity->name));
-	if (rc && rc != -EREMOTEIO && rc != -EPROTO)
-		return cia402_fail(client,
-				   &(struct cia402_object){0x1008, 0, 4, "device name"},
-				   "read", rc);
+	if ((type & 0xffff) != CIA402_PROFILE)
+		return cia402_error(client, EPROTO,
+				    "node %u is no CiA 402 drive: its device profile is "
+				    "%u; see the node id",
+				    client->master->node, type & 0xffff);
 	return 0;
 }
 
@@ -111,12 +82,10 @@ static int read_ratio(const struct cia402_client *client,
 	if (rc)
 		return rc;
 	if (!numerator || !denominator)
-		return incise_error_set(
-			client->err, EPROTO,
-			"%s: the drive's %s (%04X) is %u/%u; set it there, "
-			"or give counts_per_turn in rig.conf",
-			client->where, pair[0].name, pair[0].index, numerator,
-			denominator);
+		return cia402_error(client, EPROTO,
+				    "the drive's %s (%04X) is %u/%u; set it there, or "
+				    "give counts_per_turn in rig.conf",
+				    pair[0].name, pair[0].index, numerator, denominator);
 	*value = (double)numerator / denominator;
 	return 0;
 }
@@ -164,11 +133,10 @@ static double power_of_ten(uint32_t unit)
 static int refuse_unit(const struct cia402_client *client,
 		       const struct cia402_object *object, uint32_t unit, const char *key)
 {
-	return incise_error_set(
-		client->err, EPROTO,
-		"%s: what the drive's %s (%04X) says, %08Xh, is not known "
-		"here; give %s in rig.conf",
-		client->where, object->name, object->index, unit, key);
+	return cia402_error(client, EPROTO,
+			    "what the drive's %s (%04X) says, %08Xh, is not known here; "
+			    "give %s in rig.conf",
+			    object->name, object->index, unit, key);
 }
 
 static int read_positions(const struct cia402_client *client, double *per_turn)
@@ -197,11 +165,11 @@ static int read_positions(const struct cia402_client *client, double *per_turn)
 	if (rc)
 		return rc;
 	if (!is_plausible(*per_turn) || *per_turn < 1 || *per_turn > MOST_PER_TURN)
-		return incise_error_set(
-			client->err, EPROTO,
-			"%s: the drive does not say how many counts a turn has (6092, 608F, "
-			"60A8: %g); give counts_per_turn in rig.conf",
-			client->where, *per_turn);
+		return cia402_error(client, EPROTO,
+				    "the drive does not say how many counts a turn has "
+				    "(6092, 608F, 60A8: %g); give counts_per_turn in "
+				    "rig.conf",
+				    *per_turn);
 	return 0;
 }
 
@@ -267,12 +235,12 @@ int cia402_read_units(const struct cia402_client *client, struct cia402_units *u
 		 */
 		if (!rc && !reported &&
 		    found.velocity_per_turn_s != found.counts_per_turn)
-			rc = incise_error_set(
-				client->err, EPROTO,
-				"%s: the unit of velocity is not a count per second, and the "
-				"drive does not say that of acceleration (60AA); give "
-				"acceleration_per_turn_s2 in rig.conf, see its manual",
-				client->where);
+			rc = cia402_error(client, EPROTO,
+					  "the unit of velocity is not a count per "
+					  "second, and the drive does not say that of "
+					  "acceleration (60AA); give "
+					  "acceleration_per_turn_s2 in rig.conf, see "
+					  "its manual");
 	}
 	if (rc)
 		return rc;

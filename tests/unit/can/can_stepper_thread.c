@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402/can_thread.c with a real thread and the computer's clock, which the
- * simulated drive follows. No time is judged.
+ * lib/device/can/cia402/can_stepper.c with a real thread and the computer's clock, which the
+ * simulated drive follows. Times are not checked.
  */
 #include <stdarg.h>
 #include <stddef.h>
