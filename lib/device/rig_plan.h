@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What is wanted of a rig, read from rig.conf or from the shorthand before anything is
- * opened.
+ * The plan of a rig, read from rig.conf or from the shorthand before anything is opened.
  */
 #ifndef INCISE_RIG_PLAN_H
 #define INCISE_RIG_PLAN_H
@@ -32,7 +31,6 @@ struct rig_real {
 	char where[240];
 };
 
-/* What is wanted of a rig. */
 struct incise_rig_plan {
 	bool simulated;
 	bool sim;	      /* one of the devices stands on the virtual rig */

@@ -1,34 +1,36 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Vision, which is in a module of its own, so that only who looks at pictures maps OpenCV;
- * see incise/vision.h.
+ * Depth measurement and board detection in camera frames; see incise/vision.h and
+ * incise/board.h. Each is a module of its own, so that only a program that uses it maps
+ * OpenCV.
  *
- * The module is not unloaded: OpenCV leaves in threads that used it what runs when they end.
+ * The modules are not unloaded: OpenCV leaves destructors in the threads that used it.
  */
 #include <errno.h>
+#include <stdio.h>
+#include <incise/board.h>
 #include "backends.h"
 #include "module.h"
 
-#define KIND "vision"
-#define NAME "opencv"
-
-static struct incise_vision *vision_open(const struct incise_vision_setup *setup,
-					 struct incise_error *err)
+/* Open what the module @kind provides, as its backend does: NULL with errno. */
+static void *open_module(const char *kind, const char *packages,
+			 const struct incise_vision_setup *setup,
+			 struct incise_error *err)
 {
 	struct incise_backend_request request = {
 		.arguments = "",
-		.where = KIND,
+		.where = kind,
 		.vision = setup,
 	};
 	struct incise_loaded loaded;
-	int rc = incise_backend_find(&loaded, KIND, NAME, KIND, err);
+	char file[40];
+	int rc = incise_backend_find(&loaded, kind, "opencv", kind, err);
 
 	if (!rc)
 		return loaded.backend->open(&request, err);
+	snprintf(file, sizeof(file), "%s_opencv.so", kind);
 	if (rc == -ENODEV)
-		rc = incise_module_absent(KIND "_" NAME ".so", KIND,
-					  "libopencv-imgproc-dev and libjpeg-dev are",
-					  err);
+		rc = incise_module_absent(file, kind, packages, err);
 	errno = -rc;
 	return NULL;
 }
@@ -36,7 +38,8 @@ static struct incise_vision *vision_open(const struct incise_vision_setup *setup
 struct incise_vision *incise_vision_new(const struct incise_vision_setup *setup,
 					struct incise_error *err)
 {
-	return vision_open(setup, err);
+	return open_module("vision", "libopencv-imgproc-dev and libjpeg-dev are", setup,
+			   err);
 }
 
 void incise_vision_free(struct incise_vision *vision)
@@ -56,14 +59,28 @@ int incise_vision_learn(const struct incise_camera_frame *frame,
 			const struct incise_vision_box *box,
 			struct incise_vision_setup *setup, struct incise_error *err)
 {
-	/* What is to be learnt need not be valid before. */
+	/* It need not be valid before it is learnt. */
 	static const struct incise_vision_setup any;
-	struct incise_vision *vision = vision_open(&any, err);
+	struct incise_vision *vision = incise_vision_new(&any, err);
 	int rc;
 
 	if (!vision)
 		return -errno;
 	rc = vision->ops->learn(vision, frame, box, setup, err);
 	vision->ops->close(vision);
+	return rc;
+}
+
+int incise_board_find(const struct incise_camera_frame *frame, int columns, int rows,
+		      double *corners, struct incise_error *err)
+{
+	struct incise_board *board =
+		open_module("board", "libopencv-calib3d-dev is", NULL, err);
+	int rc;
+
+	if (!board)
+		return -errno;
+	rc = board->ops->find(board, frame, columns, rows, corners, err);
+	board->ops->close(board);
 	return rc;
 }
