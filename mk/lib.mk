@@ -150,8 +150,7 @@ endef
 $(foreach name,$(device_modules),$(eval $(call device_module,$(name))))
 
 # For unit tests, which reach into what the shared objects hide.
-test_objects := $(patsubst %.c,$(O)/obj/%.o,$(filter-out %/camera_v4l2.c,\
-		$(wildcard lib/device/v4l2/*.c))) \
+test_objects := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c)) \
 	$(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
 	$(filter $(O)/obj/lib/device/can/%,$(can_core) $(can_slcan) $(if $(has_libmnl),$(can_socketcan))) \
 	$(addprefix $(O)/obj/lib/device/daq/,daq_feed.o) \

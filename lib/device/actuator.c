@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The actuator of rig.conf, and its mm in microsteps; see incise/actuator.h.
+ * The group `actuator` of rig.conf; see incise/backend.h.
  */
 #include <errno.h>
 #include <math.h>
@@ -8,62 +8,11 @@
 #include <string.h>
 #include "actuator.h"
 #include "actuator_can.h"
+#include "motor.h"
 
-#define US 1000.0      /* ns */
-#define MS 1000000.0   /* ns */
-#define MOST_STEPS 2e9 /* of speed and acceleration: what 32 bits hold */
+#define US 1000.0    /* ns */
+#define MS 1000000.0 /* ns */
 #define SECOND_NS 1e9
-
-double incise_actuator_step_mm(const struct incise_actuator *actuator)
-{
-	return actuator->lead_mm /
-	       ((double)actuator->steps_per_turn * actuator->microsteps);
-}
-
-/* Whole microsteps in the travel; the rounding of the division must not lose one. */
-static double travel_steps(const struct incise_actuator *actuator)
-{
-	return floor(actuator->travel_mm / incise_actuator_step_mm(actuator) *
-		     (1 + 1e-12));
-}
-
-int32_t incise_actuator_steps(const struct incise_actuator *actuator, double position_mm)
-{
-	double steps = position_mm / incise_actuator_step_mm(actuator);
-
-	if (isnan(steps))
-		return 0;
-	return (int32_t)fmax(0, fmin(travel_steps(actuator), round(steps)));
-}
-
-int64_t incise_actuator_rate(const struct incise_actuator *actuator, double velocity_mm_s)
-{
-	double most = actuator->velocity_mm_s;
-
-	if (isnan(velocity_mm_s))
-		return 0;
-	velocity_mm_s = fmax(-most, fmin(most, velocity_mm_s));
-	return llround(velocity_mm_s / incise_actuator_step_mm(actuator));
-}
-
-static double whole(double value)
-{
-	return fmin(MOST_STEPS, floor(value * (1 + 1e-12)));
-}
-
-void incise_actuator_limits(const struct incise_actuator *actuator,
-			    struct incise_profile_limits *limits)
-{
-	double step_mm = incise_actuator_step_mm(actuator);
-
-	*limits = (struct incise_profile_limits){
-		.tick_ns = actuator->tick_ns,
-		.velocity = (uint32_t)whole(actuator->velocity_mm_s / step_mm),
-		.acceleration = (uint32_t)whole(actuator->acceleration_mm_s2 / step_mm),
-		.position_max = (int32_t)travel_steps(actuator),
-		.jerk = (uint64_t)floor(actuator->jerk_mm_s3 / step_mm),
-	};
-}
 
 /* A key that is a number of the struct, in another unit there. */
 struct number {
@@ -234,13 +183,14 @@ static int check(const struct incise_actuator *actuator, const config_setting_t 
 			SECOND_NS / US / rate, pulse_ns / US,
 			floor(SECOND_NS / pulse_ns * step_mm * 1e4) / 1e4);
 	if (!(actuator->acceleration_mm_s2 / step_mm >= 1 &&
-	      actuator->acceleration_mm_s2 / step_mm <= MOST_STEPS))
+	      actuator->acceleration_mm_s2 / step_mm <= INCISE_MOTOR_STEPS_MAX))
 		return incise_error_set(
 			err, EINVAL,
 			"%.200s:%d: actuator.acceleration_mm_s2: expected 1 to %.0f "
 			"microsteps/s^2, that is %g to %g mm/s^2, found %g; correct it",
-			path, line_of(group, "acceleration_mm_s2"), MOST_STEPS, step_mm,
-			step_mm * MOST_STEPS, actuator->acceleration_mm_s2);
+			path, line_of(group, "acceleration_mm_s2"),
+			INCISE_MOTOR_STEPS_MAX, step_mm, step_mm * INCISE_MOTOR_STEPS_MAX,
+			actuator->acceleration_mm_s2);
 	incise_actuator_limits(actuator, &limits);
 	/* So that its average, 2a/(jT), has no more ticks than there is room for. */
 	jerk = 2 * actuator->acceleration_mm_s2 /

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Reading the group `actuator` of rig.conf; see incise/actuator.h.
+ * Reading the group `actuator` of rig.conf; see incise/backend.h.
  */
 #ifndef INCISE_ACTUATOR_CONF_H
 #define INCISE_ACTUATOR_CONF_H
 
-#include <incise/actuator.h>
+#include <incise/backend.h>
 #include "../base/conf.h"
 
 /*

@@ -5,7 +5,7 @@
 #ifndef INCISE_ACTUATOR_CAN_H
 #define INCISE_ACTUATOR_CAN_H
 
-#include <incise/actuator.h>
+#include <incise/backend.h>
 #include "../base/conf.h"
 
 /*

@@ -14,7 +14,7 @@
 #include "backends.h"
 #include "module.h"
 
-#define BUILT_IN_SIM "sim" /* rig.c makes it: it stands on a world of its own */
+#define BUILT_IN_SIM "sim" /* rig.c opens it, with the simulated world behind it */
 #define SYMBOL "incise_backend"
 
 static const struct incise_backend *const built_in[] = {&incise_stepper_kernel};
@@ -27,7 +27,7 @@ static bool plain(const char *name)
 	return length && length < 32 && !name[length];
 }
 
-/* "sim, kernel, gpio": what there is of a kind. */
+/* "sim, kernel, gpio": all backends of a kind. */
 static void list(const char *kind, const char *in, char *text, size_t size)
 {
 	size_t prefix = strlen(kind), length;
@@ -55,14 +55,14 @@ static void list(const char *kind, const char *in, char *text, size_t size)
 		closedir(dir);
 }
 
-int incise_backend_names(const char *kind, char names[][32], int room)
+int incise_backend_names(const char *kind, char names[][32], int capacity)
 {
 	char known[400], in[PATH_MAX], *rest = known, *name;
 	int n = 0;
 
 	list(kind, incise_module_folder(in, sizeof(in)) ? in : NULL, known,
 	     sizeof(known));
-	while ((name = strsep(&rest, ", ")) && n < room)
+	while ((name = strsep(&rest, ", ")) && n < capacity)
 		if (*name && strcmp(name, BUILT_IN_SIM))
 			snprintf(names[n++], sizeof(*names), "%.31s", name);
 	return n;

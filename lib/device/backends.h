@@ -1,17 +1,26 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The backends that rig.conf can name: those built in, and modules that are loaded for it.
+ * The backends that rig.conf can name: built in, or in a module that is loaded when it is
+ * named.
  *
  *   "kernel:/dev/…"     built in
  *   "gpio:…"            DIR/stepper_gpio.so, DIR: INCISE_MODULE_PATH, or the folder incise/
- *                       beside libincise.so
+ *                       next to libincise.so
  */
 #ifndef INCISE_BACKENDS_H
 #define INCISE_BACKENDS_H
 
 #include <incise/backend.h>
 
-extern const struct incise_backend incise_stepper_kernel;
+/* By their own names, for tests, which may link several. */
+extern const struct incise_backend incise_camera_v4l2, incise_force_comedi,
+	incise_force_iio, incise_stepper_gpio, incise_stepper_kernel, incise_tracker_tty,
+	incise_tracker_usb;
+
+/* Export a backend from its module as `incise_backend`; weak, as tests may link several. */
+#define INCISE_MODULE(backend)                                       \
+	INCISE_API extern const struct incise_backend incise_backend \
+		__attribute__((weak, alias(#backend)))
 
 /* A backend and the module that it came from. */
 struct incise_loaded {
@@ -27,8 +36,8 @@ struct incise_loaded {
 int incise_backend_find(struct incise_loaded *loaded, const char *kind, const char *name,
 			const char *where, struct incise_error *err);
 
-/* Those that there are of a kind, built in and in modules; "sim" not. Ends with n names. */
-int incise_backend_names(const char *kind, char names[][32], int room);
+/* All backends of a kind, built in and in modules, without "sim"; how many. */
+int incise_backend_names(const char *kind, char names[][32], int capacity);
 
 void incise_backend_unload(struct incise_loaded *loaded);
 

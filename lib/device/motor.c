@@ -58,6 +58,57 @@ static unsigned int own_bits(const struct bit *bit, unsigned int abi)
 	return own;
 }
 
+double incise_actuator_step_mm(const struct incise_actuator *actuator)
+{
+	return actuator->lead_mm /
+	       ((double)actuator->steps_per_turn * actuator->microsteps);
+}
+
+/* Whole microsteps in the travel; the rounding of the division must not lose one. */
+static double travel_steps(const struct incise_actuator *actuator)
+{
+	return floor(actuator->travel_mm / incise_actuator_step_mm(actuator) *
+		     (1 + 1e-12));
+}
+
+int32_t incise_actuator_steps(const struct incise_actuator *actuator, double position_mm)
+{
+	double steps = position_mm / incise_actuator_step_mm(actuator);
+
+	if (isnan(steps))
+		return 0;
+	return (int32_t)fmax(0, fmin(travel_steps(actuator), round(steps)));
+}
+
+int64_t incise_actuator_rate(const struct incise_actuator *actuator, double velocity_mm_s)
+{
+	double most = actuator->velocity_mm_s;
+
+	if (isnan(velocity_mm_s))
+		return 0;
+	velocity_mm_s = fmax(-most, fmin(most, velocity_mm_s));
+	return llround(velocity_mm_s / incise_actuator_step_mm(actuator));
+}
+
+static double whole(double value)
+{
+	return fmin(INCISE_MOTOR_STEPS_MAX, floor(value * (1 + 1e-12)));
+}
+
+void incise_actuator_limits(const struct incise_actuator *actuator,
+			    struct incise_profile_limits *limits)
+{
+	double step_mm = incise_actuator_step_mm(actuator);
+
+	*limits = (struct incise_profile_limits){
+		.tick_ns = actuator->tick_ns,
+		.velocity = (uint32_t)whole(actuator->velocity_mm_s / step_mm),
+		.acceleration = (uint32_t)whole(actuator->acceleration_mm_s2 / step_mm),
+		.position_max = (int32_t)travel_steps(actuator),
+		.jerk = (uint64_t)floor(actuator->jerk_mm_s3 / step_mm),
+	};
+}
+
 static struct incise_motor *of(const struct incise_stepper *stepper)
 {
 	return (struct incise_motor *)stepper;
@@ -114,7 +165,7 @@ static INCISE_REALTIME int motor_set(struct incise_stepper *stepper, double posi
 	motor->beyond = position_mm < 0 || position_mm > motor->actuator.travel_mm;
 	incise_page_put_setpoint(motor->setpoint, INCISE_STEPPER_MODE_POSITION,
 				 incise_actuator_steps(&motor->actuator, position_mm),
-				 motor->door->now(motor));
+				 motor->ops->now(motor));
 	return 0;
 }
 
@@ -131,7 +182,7 @@ static int motor_jog(struct incise_stepper *stepper, double velocity_mm_s)
 	motor->beyond = false;
 	incise_page_put_setpoint(motor->setpoint, INCISE_STEPPER_MODE_VELOCITY,
 				 incise_actuator_rate(&motor->actuator, velocity_mm_s),
-				 motor->door->now(motor));
+				 motor->ops->now(motor));
 	return 0;
 }
 
@@ -217,7 +268,7 @@ static int motor_enable(struct incise_stepper *stepper, struct incise_error *err
 {
 	struct incise_motor *motor = of(stepper);
 	struct incise_error why = {0};
-	int rc = motor->watches ? -EPERM : motor->door->enable(motor, &why);
+	int rc = motor->watches ? -EPERM : motor->ops->enable(motor, &why);
 
 	motor->beyond = false;
 	return told(motor, rc, "cannot be enabled", &why, err);
@@ -227,7 +278,7 @@ static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
 {
 	struct incise_motor *motor = of(stepper);
 	struct incise_error why = {0};
-	int rc = motor->watches ? -EPERM : motor->door->clear(motor, &why);
+	int rc = motor->watches ? -EPERM : motor->ops->clear(motor, &why);
 
 	return told(motor, rc, "cannot be cleared", &why, err);
 }
@@ -237,8 +288,8 @@ static int motor_wait(struct incise_stepper *stepper, int64_t ns)
 	struct incise_motor *motor = of(stepper);
 	struct timespec wait = {ns / INCISE_NS_PER_S, ns % INCISE_NS_PER_S};
 
-	if (motor->door->wait)
-		return motor->door->wait(motor, ns);
+	if (motor->ops->wait)
+		return motor->ops->wait(motor, ns);
 	/* Cut short by a signal: who waits looks again. */
 	clock_nanosleep(CLOCK_MONOTONIC, 0, &wait, NULL);
 	return 0;
@@ -247,7 +298,7 @@ static int motor_wait(struct incise_stepper *stepper, int64_t ns)
 static int motor_disable(struct incise_stepper *stepper, struct incise_error *err)
 {
 	struct incise_motor *motor = of(stepper);
-	int rc = motor->watches ? -EPERM : motor->door->disable(motor);
+	int rc = motor->watches ? -EPERM : motor->ops->disable(motor);
 	struct incise_profile_limits limits;
 	int64_t left_ns;
 
@@ -301,7 +352,7 @@ static void motor_info(const struct incise_stepper *stepper,
 
 static void motor_close(struct incise_stepper *stepper)
 {
-	of(stepper)->door->close(of(stepper));
+	of(stepper)->ops->close(of(stepper));
 }
 
 static int motor_homing(struct incise_stepper *stepper,
@@ -338,7 +389,7 @@ static int motor_origin(struct incise_stepper *stepper, double position_mm, bool
 	int32_t steps = incise_actuator_steps(&motor->actuator, position_mm);
 	int rc = drivable(motor);
 
-	return rc ? rc : motor->door->origin(motor, steps, homed);
+	return rc ? rc : motor->ops->origin(motor, steps, homed);
 }
 
 void incise_motor_init(struct incise_motor *motor)

@@ -9,9 +9,32 @@
 #ifndef INCISE_MOTOR_H
 #define INCISE_MOTOR_H
 
-#include <incise/actuator.h>
 #include <incise/backend.h>
+#include <incise/profile.h>
 #include "abi.h"
+
+/* Largest velocity and acceleration in microsteps: they are 32 bits. */
+#define INCISE_MOTOR_STEPS_MAX 2e9
+
+/*
+ *      microsteps ─▶ turns ─▶ mm        step_mm = lead_mm / (steps_per_turn · microsteps)
+ *      0 ─────────────────── travel     position 0 is where the spring gives no force
+ */
+
+/* One microstep, mm. */
+double incise_actuator_step_mm(const struct incise_actuator *actuator) INCISE_REALTIME;
+
+/* The microstep nearest to a position, within the travel; 0 for NaN. */
+int32_t incise_actuator_steps(const struct incise_actuator *actuator,
+			      double position_mm) INCISE_REALTIME;
+
+/* Microsteps/s of a speed, within the largest; 0 for NaN. */
+int64_t incise_actuator_rate(const struct incise_actuator *actuator,
+			     double velocity_mm_s);
+
+/* Limits in microsteps, for a profile; rounded towards the slower and nearer. */
+void incise_actuator_limits(const struct incise_actuator *actuator,
+			    struct incise_profile_limits *limits);
 
 struct incise_motor;
 
@@ -19,7 +42,7 @@ struct incise_motor;
  * Each returns 0 or a negative errno as the ioctl of the same name does. Who knows more of
  * the cause says so in @err, which is always there.
  */
-struct incise_motor_door {
+struct incise_motor_ops {
 	int (*enable)(struct incise_motor *motor, struct incise_error *err);
 	int (*disable)(struct incise_motor *motor); /* begins it */
 	int (*clear)(struct incise_motor *motor, struct incise_error *err);
@@ -31,7 +54,7 @@ struct incise_motor_door {
 
 struct incise_motor {
 	struct incise_stepper stepper;
-	const struct incise_motor_door *door;
+	const struct incise_motor_ops *ops;
 	struct incise_actuator actuator;
 	char name[64];
 	double rate_max_hz;

@@ -6,7 +6,7 @@
 #define INCISE_RIG_PLAN_H
 
 #include <stdbool.h>
-#include <incise/actuator.h>
+#include <incise/backend.h>
 #include <incise/camera.h>
 #include <incise/error.h>
 #include <incise/force.h>

@@ -323,7 +323,7 @@ static int set_up(struct kernel_stepper *k, const struct incise_backend_request 
 static void *kernel_open(const struct incise_backend_request *asked,
 			 struct incise_error *err)
 {
-	static const struct incise_motor_door door = {
+	static const struct incise_motor_ops ops = {
 		.enable = kernel_enable,
 		.disable = kernel_disable,
 		.clear = kernel_clear,
@@ -340,7 +340,7 @@ static void *kernel_open(const struct incise_backend_request *asked,
 	}
 	k->fd = -1;
 	k->page = (size_t)sysconf(_SC_PAGESIZE);
-	k->motor.door = &door;
+	k->motor.ops = &ops;
 	k->motor.actuator = *asked->actuator;
 	k->motor.watches = asked->watch;
 	incise_motor_init(&k->motor);

@@ -7,7 +7,7 @@
 #define INCISE_GPIO_LINES_H
 
 #include <stdbool.h>
-#include <incise/actuator.h>
+#include <incise/backend.h>
 
 struct gpio_lines;
 

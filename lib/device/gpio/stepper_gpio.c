@@ -20,6 +20,7 @@
 #include <time.h>
 #include <incise/clock.h>
 #include "../../base/monotonic.h"
+#include "../backends.h"
 #include "../motor.h"
 #include "../thread.h"
 #include "gpio_lines.h"
@@ -353,7 +354,7 @@ static int set_up(struct gpio_stepper *g, const struct incise_backend_request *a
 static void *gpio_open(const struct incise_backend_request *asked,
 		       struct incise_error *err)
 {
-	static const struct incise_motor_door door = {
+	static const struct incise_motor_ops ops = {
 		.enable = gpio_enable,
 		.disable = gpio_disable,
 		.clear = gpio_clear,
@@ -369,7 +370,7 @@ static void *gpio_open(const struct incise_backend_request *asked,
 		return NULL;
 	}
 	memset(g, 0, sizeof(*g));
-	g->motor.door = &door;
+	g->motor.ops = &ops;
 	g->motor.actuator = *asked->actuator;
 	g->motor.setpoint = &g->setpoint;
 	g->motor.slot = &g->status;
@@ -392,9 +393,11 @@ static void *gpio_open(const struct incise_backend_request *asked,
 	return NULL;
 }
 
-const struct incise_backend incise_backend = {
+const struct incise_backend incise_stepper_gpio = {
 	.abi = INCISE_BACKEND_ABI,
 	.kind = "stepper",
 	.name = "gpio",
 	.open = gpio_open,
 };
+
+INCISE_MODULE(incise_stepper_gpio);

@@ -1,32 +1,35 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A camera of the kernel; see v4l2_camera.h.
+ * A camera of the kernel, "v4l2:/dev/v4l/by-id/…", and the search for those attached.
  *
- *   v4l2_camera_open(): format ─▶ controls ─▶ stream ─▶ thread: step, step, check controls …
- *                                                          │ waiting
- *   incise_camera_read() ◀─────────────────────────────────┘
+ *   open ─▶ format ─▶ controls ─▶ stream ─▶ thread: step, step, check controls …
+ *                                              │ waiting
+ *   incise_camera_read() ◀─────────────────────┘
  *
- * When the stream ends the thread leaves the reason, and read() gives it behind the last
- * picture.
+ * When the stream ends, the thread keeps the reason; read() reports it after the last frame.
  */
 #include <errno.h>
+#include <glob.h>
 #include <pthread.h>
 #include <stdatomic.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include <linux/videodev2.h>
 #include "../../base/monotonic.h"
+#include "../backends.h"
+#include "../stable_path.h"
 #include "../thread.h"
-#include "v4l2_camera.h"
 #include "v4l2_controls.h"
 #include "v4l2_file.h"
+#include "v4l2_format.h"
 #include "v4l2_stream.h"
 
-#define WAIT_MS 100	      /* for a picture, and for the end at most */
-#define CHECK_NS 1000000000LL /* controls, once in so long, */
-#define CHECK_PICTURES 64     /* or in so many pictures */
+#define WAIT_MS 100	      /* for a frame; close takes no longer than that */
+#define CHECK_NS 1000000000LL /* between two checks of the controls, … */
+#define CHECK_FRAMES 64	      /* … or so many frames, whichever is first */
 
 struct v4l2_camera {
 	struct incise_camera camera;
@@ -38,7 +41,7 @@ struct v4l2_camera {
 	pthread_t thread;
 	bool runs;
 	atomic_bool stop;
-	atomic_int end; /* 0, or why the stream is at its end: then cause is there */
+	atomic_int end; /* 0, or the errno that ended the stream: then cause is set */
 	struct incise_error cause;
 };
 
@@ -51,19 +54,19 @@ static void *thread_run(void *argument)
 {
 	struct v4l2_camera *c = argument;
 	int64_t checked_ns = incise_monotonic_ns();
-	int pictures = 0, rc = 0;
+	int frames = 0, rc = 0;
 
 	while (rc >= 0 && !atomic_load_explicit(&c->stop, memory_order_relaxed)) {
 		rc = v4l2_stream_step(&c->stream, WAIT_MS, &c->cause);
 		if (rc < 0)
 			break;
-		pictures += rc;
-		if (pictures < CHECK_PICTURES &&
+		frames += rc;
+		if (frames < CHECK_FRAMES &&
 		    incise_monotonic_ns() - checked_ns < CHECK_NS)
 			continue;
 		rc = v4l2_controls_check(&c->controls, c->where, &c->cause);
 		checked_ns = incise_monotonic_ns();
-		pictures = 0;
+		frames = 0;
 	}
 	atomic_store_explicit(&c->end, rc < 0 ? rc : 0, memory_order_release);
 	return NULL;
@@ -72,7 +75,7 @@ static void *thread_run(void *argument)
 static int camera_read(struct incise_camera *camera, struct incise_camera_frame *frame)
 {
 	struct v4l2_camera *c = (struct v4l2_camera *)camera;
-	/* First, so that a picture before the end is not passed over. */
+	/* Read first, so that no frame before the end is left out. */
 	int end = atomic_load_explicit(&c->end, memory_order_acquire);
 	int rc = v4l2_stream_read(&c->stream, frame);
 
@@ -191,7 +194,7 @@ static int set_up(struct v4l2_camera *c, const struct incise_backend_request *as
 
 	if (rc)
 		return rc;
-	/* Other programs cannot set it then. Not every driver has that. */
+	/* Then other programs cannot change settings. Not every driver supports it. */
 	v4l2_ask(c->fd, VIDIOC_S_PRIORITY, &priority);
 	rc = v4l2_format_set(c->fd, setup, c->where, &shape, err);
 	if (rc)
@@ -203,7 +206,7 @@ static int set_up(struct v4l2_camera *c, const struct incise_backend_request *as
 			       c->where, err);
 	if (rc)
 		return rc;
-	/* Some cameras forget what they were set to when they begin. */
+	/* Some cameras forget their settings when they start. */
 	rc = v4l2_controls_check(&c->controls, c->where, err);
 	if (rc)
 		return rc;
@@ -215,8 +218,8 @@ static int set_up(struct v4l2_camera *c, const struct incise_backend_request *as
 	return 0;
 }
 
-void *v4l2_camera_open(const struct incise_backend_request *asked,
-		       struct incise_error *err)
+static void *camera_open(const struct incise_backend_request *asked,
+			 struct incise_error *err)
 {
 	struct v4l2_camera *c = aligned_alloc(64, sizeof(*c));
 	int rc;
@@ -236,3 +239,105 @@ void *v4l2_camera_open(const struct incise_backend_request *asked,
 	errno = -rc;
 	return NULL;
 }
+
+/*
+ * Search. A camera is named by a path that stays when it is plugged in elsewhere (by-id), or
+ * by that of its socket (by-path); /dev/video0 depends on the order of plugging.
+ */
+struct search {
+	incise_scan_found *found;
+	void *context;
+	bool denied;
+	int n;	    /* reported */
+	int answer; /* last return of @found */
+};
+
+static void describe(int fd, const char *path, const struct v4l2_identity *identity,
+		     struct incise_scan_device *device)
+{
+	char stable[sizeof(device->device) - 5], formats[60];
+
+	if (!incise_stable_path("/dev/v4l/by-id/*", path, stable, sizeof(stable)) &&
+	    !incise_stable_path("/dev/v4l/by-path/*", path, stable, sizeof(stable)))
+		snprintf(stable, sizeof(stable), "%s", path);
+	snprintf(device->device, sizeof(device->device), "v4l2:%s", stable);
+	device->usable = identity->capabilities & V4L2_CAP_STREAMING;
+	v4l2_format_list(fd, formats, sizeof(formats));
+	snprintf(device->what, sizeof(device->what), "%.32s (%.55s)", identity->card,
+		 *formats ? formats : "no formats");
+	incise_scan_tell(device, "name", "%s", identity->card);
+	incise_scan_tell(device, "driver", "%s", identity->driver);
+	incise_scan_tell(device, "driver_version", "%u.%u.%u",
+			 identity->version >> 16 & 0xff, identity->version >> 8 & 0xff,
+			 identity->version & 0xff);
+	incise_scan_tell(device, "bus", "%s", identity->bus);
+	incise_scan_tell(device, "path", "%.99s", path);
+	incise_scan_tell(device, "formats", "%s", formats);
+}
+
+/* Report the camera at @path. 0 or a negative errno. */
+static int look_at(struct search *s, const char *path)
+{
+	struct incise_scan_device device = {0};
+	struct v4l2_identity identity;
+	int fd = v4l2_open(path), rc;
+
+	if (fd < 0) {
+		s->denied |= fd == -EACCES || fd == -EPERM;
+		return fd;
+	}
+	rc = v4l2_identify(fd, &identity);
+	if (!rc && !(identity.capabilities & V4L2_CAP_VIDEO_CAPTURE))
+		rc = -ENOTTY;
+	if (!rc)
+		describe(fd, path, &identity, &device);
+	close(fd);
+	if (rc)
+		return rc;
+	s->n++;
+	s->answer = s->found(s->context, &device);
+	return 0;
+}
+
+/* One that cannot be opened is left out. */
+static void look_at_all(struct search *s)
+{
+	glob_t files;
+
+	if (glob("/dev/video[0-9]*", 0, NULL, &files))
+		return;
+	for (size_t i = 0; i < files.gl_pathc && !s->answer; i++)
+		look_at(s, files.gl_pathv[i]);
+	globfree(&files);
+}
+
+static int camera_scan(const char *arguments, incise_scan_found *found, void *context,
+		       struct incise_error *err)
+{
+	struct search s = {.found = found, .context = context};
+	int rc = 0;
+
+	if (*arguments)
+		rc = look_at(&s, arguments);
+	else
+		look_at_all(&s);
+	if (s.denied && !s.n)
+		return incise_error_set(err, EACCES,
+					"v4l2: cameras may not be opened; become a "
+					"member of the group that owns /dev/video*");
+	/* A missing device, or one that is no camera, was not found. */
+	if (rc && rc != -ENOENT && rc != -ENOTTY && rc != -ENXIO && rc != -ENODEV)
+		return incise_error_set(err, -rc, "v4l2: %.100s: %s", arguments,
+					strerror(-rc));
+	return s.answer;
+}
+
+const struct incise_backend incise_camera_v4l2 = {
+	.abi = INCISE_BACKEND_ABI,
+	.kind = "camera",
+	.name = "v4l2",
+	.open = camera_open,
+	.scan = camera_scan,
+};
+
+INCISE_MODULE(incise_camera_v4l2);

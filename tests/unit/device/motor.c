@@ -106,7 +106,7 @@ static void bench_close(struct incise_motor *motor)
 	(void)motor;
 }
 
-static const struct incise_motor_door door = {
+static const struct incise_motor_ops ops = {
 	.enable = bench_enable,
 	.disable = bench_disable,
 	.clear = bench_clear,
@@ -140,7 +140,7 @@ static void bench_start(struct bench *b, bool home, bool limits, bool invert,
 			int64_t late_ns)
 {
 	*b = (struct bench){
-		.motor = {.door = &door,
+		.motor = {.ops = &ops,
 			  .actuator = actuator,
 			  .name = "bench",
 			  .rate_max_hz = 20000,

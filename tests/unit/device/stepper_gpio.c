@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <incise/backend.h>
+#include "../../../lib/device/backends.h"
 #include "../../../lib/device/gpio/gpio_lines.h"
 
 /* A chip; levels, not what they mean. */
@@ -113,7 +113,7 @@ static struct incise_stepper *open_stepper(const char *arguments, bool watch,
 		.actuator = actuator,
 	};
 
-	return incise_backend.open(&request, err);
+	return incise_stepper_gpio.open(&request, err);
 }
 
 static void nap(void)

@@ -17,8 +17,8 @@
 #include <time.h>
 #include <unistd.h>
 #include <linux/videodev2.h>
+#include "../../../lib/device/backends.h"
 #include "../../../lib/device/thread.h"
-#include "../../../lib/device/v4l2/v4l2_camera.h"
 #include "../../../lib/sim/sim.h"
 #include "../tap.h"
 
@@ -128,7 +128,7 @@ static struct incise_camera *open_camera(enum incise_pixels pixels)
 	const struct incise_backend_request request = {
 		.arguments = path, .where = "rig.conf:1: camera", .camera = &setup};
 	struct incise_error err = {0};
-	struct incise_camera *camera = v4l2_camera_open(&request, &err);
+	struct incise_camera *camera = incise_camera_v4l2.open(&request, &err);
 
 	if (!camera)
 		note("%s", err.text);

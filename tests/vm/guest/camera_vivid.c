@@ -18,7 +18,7 @@
 #include <unistd.h>
 #include <incise/scan.h>
 #include <linux/videodev2.h>
-#include "../../../lib/device/v4l2/v4l2_camera.h"
+#include "../../../lib/device/backends.h"
 #include "../tap.h"
 
 #define PATIENCE_NS 10000000000LL
@@ -43,7 +43,7 @@ static struct incise_camera *open_camera(const struct incise_camera_setup *setup
 	struct incise_camera *camera;
 
 	err = (struct incise_error){0};
-	camera = v4l2_camera_open(&request, &err);
+	camera = incise_camera_v4l2.open(&request, &err);
 	if (!camera)
 		note("%s", err.text);
 	return camera;

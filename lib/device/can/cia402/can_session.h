@@ -10,7 +10,6 @@
 #ifndef INCISE_CAN_SESSION_H
 #define INCISE_CAN_SESSION_H
 
-#include <incise/actuator.h>
 #include <incise/backend.h>
 #include "can_axis.h"
 

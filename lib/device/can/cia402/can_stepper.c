@@ -542,7 +542,7 @@ void *can_stepper_open(const struct can_transport *transport,
 		       const struct incise_backend_request *asked,
 		       struct incise_error *err)
 {
-	static const struct incise_motor_door door = {
+	static const struct incise_motor_ops ops = {
 		.enable = can_enable,
 		.disable = can_disable,
 		.clear = can_clear,
@@ -559,7 +559,7 @@ void *can_stepper_open(const struct can_transport *transport,
 	}
 	memset(c, 0, sizeof(*c));
 	c->sleep_until = transport->sleep_until;
-	c->motor.door = &door;
+	c->motor.ops = &ops;
 	c->motor.watches = asked->watch;
 	c->motor.setpoint = &c->setpoint;
 	c->motor.slot = &c->status;
