@@ -86,20 +86,17 @@ pc_force_comedi := comedilib
 objects_force_comedi := $(daq_core) $(O)/obj/lib/device/stable_path.o \
 	$(patsubst %.c,$(O)/obj/%.o,$(daq_comedi) lib/device/daq/force_comedi.c)
 # One tracker on two kinds of line.
-polhemus_lines := polhemus_usb polhemus_usb_find polhemus_tty tracker_usb tracker_tty
+polhemus_lines := lib/device/polhemus/polhemus_usb.c lib/device/polhemus/polhemus_tty.c
 polhemus_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o) \
-	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(polhemus_lines:%=lib/device/polhemus/%.c),\
-		$(wildcard lib/device/polhemus/*.c)))
+	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(polhemus_lines),$(wildcard lib/device/polhemus/*.c)))
 has_libusb := $(shell $(PKG_CONFIG) --exists libusb-1.0 && echo yes)
 device_modules += $(if $(has_libusb),tracker_usb) tracker_tty
 pc_tracker_usb := libusb-1.0
-objects_tracker_usb := $(polhemus_core) \
-	$(patsubst %,$(O)/obj/lib/device/polhemus/%.o,polhemus_usb polhemus_usb_find tracker_usb)
-$(filter %/polhemus_usb.o %/polhemus_usb_find.o %/tracker_usb.o,$(objects_tracker_usb)): \
-	pc_cflags = $(shell $(PKG_CONFIG) --cflags libusb-1.0)
+objects_tracker_usb := $(polhemus_core) $(O)/obj/lib/device/polhemus/polhemus_usb.o
+$(O)/obj/lib/device/polhemus/polhemus_usb.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags libusb-1.0)
 pc_tracker_tty :=
 objects_tracker_tty := $(polhemus_core) $(O)/obj/lib/device/tty.o \
-	$(patsubst %,$(O)/obj/lib/device/polhemus/%.o,polhemus_tty tracker_tty)
+	$(O)/obj/lib/device/polhemus/polhemus_tty.o
 
 # Detection of the scalpel in frames, in C++.
 device_modules += $(if $(has_vision),vision_opencv)
@@ -156,7 +153,7 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c)) \
 	$(addprefix $(O)/obj/lib/device/daq/,daq_feed.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(if $(has_libiio),$(daq_iio)) \
 		$(if $(has_comedilib),$(daq_comedi))) \
-	$(filter $(O)/obj/lib/device/polhemus/%,$(filter-out %/tracker_tty.o,$(objects_tracker_tty))) \
+	$(filter $(O)/obj/lib/device/polhemus/%,$(objects_tracker_tty)) \
 	$(if $(has_vision),$(filter-out %/vision_opencv.o,$(objects_vision_opencv))) \
 	$(if $(has_frames),$(objects_frames_mkv) $(objects_film_mkv)) \
 	$(O)/obj/tools/bench/scalpel_picture.o

@@ -4,7 +4,7 @@
 
 unit_sources := $(filter-out $(if $(has_libmnl),,tests/unit/can/socketcan%) \
 	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \
-	$(if $(has_libusb),,%/polhemus_usb.c %/polhemus_usb_find.c) \
+	$(if $(has_libusb),,%/polhemus_usb.c) \
 	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/mkv/% tests/unit/film/%) \
 	$(if $(has_hdf5),,tests/unit/hdf5/%) $(if $(has_view),,tests/unit/view/%),\
 	$(wildcard tests/unit/*/*.c))

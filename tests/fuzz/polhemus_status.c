@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../../lib/device/polhemus/polhemus_reply.h"
+#include "../../lib/device/polhemus/polhemus_dialogue.h"
 
 static void wrong(const char *what)
 {

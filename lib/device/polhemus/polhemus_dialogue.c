@@ -1,20 +1,161 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Commands and answers over a line; see polhemus_dialogue.h.
+ * Commands to a tracker and its answers; see polhemus_dialogue.h.
  */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include "../../base/hex.h"
 #include "polhemus_dialogue.h"
+#include "polhemus_model.h"
 
-#define QUIET_MS 120   /* without a byte: it has ended; 10 records at 120 Hz */
-#define ANSWER_MS 1000 /* the manual gives none; a system cycle is 8 ms */
+/* --- parsing --- */
+
+enum { FLAG_BINARY = 1, FLAG_CM = 2, FLAG_COMPENSATED = 4, FLAG_CONTINUOUS = 8 };
+
+static bool is_digit(char c)
+{
+	return c >= '0' && c <= '9';
+}
+
+/* Copy @n characters without blanks at both ends; unprintable ones become '?'. */
+static void copy_text(char *to, const unsigned char *from, size_t n)
+{
+	while (n && (*from == ' ' || !*from)) {
+		from++;
+		n--;
+	}
+	while (n && (from[n - 1] == ' ' || !from[n - 1]))
+		n--;
+	for (size_t i = 0; i < n; i++)
+		to[i] = from[i] >= ' ' && from[i] <= '~' ? (char)from[i] : '?';
+	to[n] = '\0';
+}
+
+bool polhemus_status_read(const unsigned char *bytes, size_t n,
+			  struct polhemus_status *status)
+{
+	unsigned int flags = 0;
+	double error = 0;
+	char digits[4] = {0};
+
+	*status = (struct polhemus_status){0};
+	if (n != POLHEMUS_STATUS_LENGTH || bytes[0] != '2' || bytes[1] < '1' ||
+	    bytes[1] > '4' || bytes[2] != 'S' || bytes[53] != '\r' || bytes[54] != '\n')
+		return false;
+	for (int i = 3; i < 6; i++) {
+		if (incise_hex_digit(bytes[i]) < 0)
+			return false;
+		flags = flags * 16 + (unsigned int)incise_hex_digit(bytes[i]);
+	}
+	memcpy(digits, bytes + 6, 3);
+	if (polhemus_reply_numbers(digits, &error, 1) < 0)
+		return false;
+	status->station = bytes[1] - '0';
+	status->binary = flags & FLAG_BINARY;
+	status->centimetres = flags & FLAG_CM;
+	status->compensated = flags & FLAG_COMPENSATED;
+	status->continuous = flags & FLAG_CONTINUOUS;
+	status->test_error = (int)error;
+	status->sensors = incise_hex_digit(bytes[12]);
+	copy_text(status->version, bytes + 15, 6);
+	copy_text(status->id, bytes + 21, 32);
+	return true;
+}
+
+/* At most 9 digits in front of the point and up to 16 in all count. */
+int polhemus_reply_numbers(const char *text, double *values, int most)
+{
+	int n = 0;
+
+	for (;;) {
+		bool negative = false;
+		double value = 0, scale = 1;
+		int digits = 0;
+
+		while (*text == ' ')
+			text++;
+		if (!*text)
+			return n;
+		if (*text == '-' || *text == '+')
+			negative = *text++ == '-';
+		for (; is_digit(*text) && digits < 9; text++, digits++)
+			value = value * 10 + (*text - '0');
+		if (*text == '.')
+			for (text++; is_digit(*text); text++) {
+				if (digits++ > 15)
+					continue;
+				scale /= 10;
+				value += (*text - '0') * scale;
+			}
+		if (!digits || n == most)
+			return -1;
+		values[n++] = negative ? -value : value;
+		if (*text && *text != ' ' && *text != '-' && *text != '+' && *text != ',')
+			return -1;
+		if (*text == ',')
+			text++;
+	}
+}
+
+int polhemus_reply_fields(const char *text, int width, int *values, int most)
+{
+	size_t length = strlen(text);
+	int n = 0;
+
+	if (length % (size_t)width)
+		return -1;
+	for (; *text; text += width) {
+		double value = 0;
+		char field[16] = {0};
+
+		memcpy(field, text, (size_t)width);
+		if (n == most || polhemus_reply_numbers(field, &value, 1) != 1)
+			return -1;
+		values[n++] = (int)value;
+	}
+	return n;
+}
+
+int polhemus_frame_read(const unsigned char *b, size_t n, struct polhemus_frame *frame)
+{
+	size_t length;
+	int family;
+
+	if (n && b[0] != 'L' && b[0] != 'P')
+		return -1;
+	if (n > 1 && !(b[0] == 'L' && b[1] == 'Y') && !(b[0] == 'P' && b[1] == 'A'))
+		return -1;
+	if (n < 8)
+		return 0;
+	family = b[0] == 'L' ? POLHEMUS_LIBERTY : POLHEMUS_PATRIOT;
+	length = b[6] | (size_t)b[7] << 8;
+	if (length + 8 > POLHEMUS_FRAME_MAX)
+		return -1;
+	if (n < length + 8)
+		return 0;
+	*frame = (struct polhemus_frame){
+		.family = family,
+		.station = b[2],
+		.command = b[3],
+		.error = b[4],
+		.payload = b + 8,
+		.n = length,
+		.length = length + 8,
+	};
+	return 1;
+}
+
+/* --- over a line --- */
+
+#define QUIET_MS 120   /* without a byte ends a stream; 10 records at 120 Hz */
+#define ANSWER_MS 1000 /* the manual gives no limit; a system cycle is 8 ms */
 #define WAIT_MS 20
-#define HEARD_MS 5 /* what a read counts that brought bytes: they may never end */
-/* What does not stop for so long does not stop: 4 records at 9600 baud take 0.14 s. */
+#define RECEIVED_MS \
+	5 /* counted for a read that received bytes: a stream may be endless */
+/* A stream that lasts so long is endless: 4 records at 9600 baud take 0.14 s. */
 #define ENDLESS_NS INT64_C(500000000)
-
-/* All of it, from the first byte that was heard; see the test of a slow line. */
+/* For the whole dialogue, from the first byte; see the test of a slow line. */
 #define WHOLE_NS INT64_C(15000000000)
 
 static int gone(struct polhemus_dialogue *d, int rc)
@@ -32,8 +173,8 @@ int polhemus_say(struct polhemus_dialogue *d, const char *command)
 	return rc ? gone(d, rc) : 0;
 }
 
-/* How many bytes came; @t_ns, when there are some: when. */
-static ssize_t listen_at(struct polhemus_dialogue *d, int timeout_ms, int64_t *t_ns)
+/* How many bytes were received, the last at *t_ns. */
+static ssize_t receive_at(struct polhemus_dialogue *d, int timeout_ms, int64_t *t_ns)
 {
 	ssize_t n;
 
@@ -57,14 +198,14 @@ static ssize_t listen_at(struct polhemus_dialogue *d, int timeout_ms, int64_t *t
 	return n;
 }
 
-static ssize_t listen(struct polhemus_dialogue *d, int timeout_ms)
+static ssize_t receive(struct polhemus_dialogue *d, int timeout_ms)
 {
 	int64_t t_ns;
 
-	return listen_at(d, timeout_ms, &t_ns);
+	return receive_at(d, timeout_ms, &t_ns);
 }
 
-/* By the time of what comes: a byte now and then is no end either. */
+/* By the time of arrival: a byte now and then does not end it. */
 int polhemus_drain(struct polhemus_dialogue *d)
 {
 	int64_t first_ns = 0, t_ns = 0;
@@ -73,7 +214,7 @@ int polhemus_drain(struct polhemus_dialogue *d)
 		ssize_t n;
 
 		d->n = 0;
-		n = listen_at(d, QUIET_MS, &t_ns);
+		n = receive_at(d, QUIET_MS, &t_ns);
 		if (n <= 0)
 			return (int)n;
 		if (first)
@@ -89,7 +230,7 @@ int polhemus_collect(struct polhemus_dialogue *d)
 
 	d->n = 0;
 	for (bool first = true;; first = false) {
-		ssize_t n = listen_at(d, QUIET_MS, &t_ns);
+		ssize_t n = receive_at(d, QUIET_MS, &t_ns);
 
 		if (n < 0)
 			return (int)n;
@@ -137,7 +278,7 @@ static int refused(struct polhemus_dialogue *d, const char *command, const char 
 		d->where, d->line->name, text, said);
 }
 
-/* The first line in d->bytes, without its end, and out of there; false: there is none. */
+/* Take the first line out of d->bytes, without its end. */
 static bool next_line(struct polhemus_dialogue *d, char *text, size_t size)
 {
 	unsigned char *end = memchr(d->bytes, '\n', d->n);
@@ -147,7 +288,7 @@ static bool next_line(struct polhemus_dialogue *d, char *text, size_t size)
 		return false;
 	length = (size_t)(end - d->bytes);
 	n = length && d->bytes[length - 1] == '\r' ? length - 1 : length;
-	/* What is not text stands before it: a record's end. */
+	/* The end of a record may precede the text. */
 	if (n >= size)
 		n = size - 1;
 	for (size_t i = 0; i < n; i++)
@@ -166,12 +307,12 @@ int polhemus_ask(struct polhemus_dialogue *d, const char *command, char type, ch
 	d->n = 0;
 	rc = polhemus_say(d, command);
 	while (!rc && waited < ANSWER_MS) {
-		ssize_t n = listen(d, WAIT_MS);
+		ssize_t n = receive(d, WAIT_MS);
 
 		if (n < 0)
 			return (int)n;
-		/* What comes and comes is no answer either. */
-		waited += n ? HEARD_MS : WAIT_MS;
+		/* An endless stream is no answer. */
+		waited += n ? RECEIVED_MS : WAIT_MS;
 		while (next_line(d, text, sizeof(text))) {
 			if (strstr(text, "*ERROR*"))
 				return refused(d, command, text);
@@ -194,7 +335,7 @@ int polhemus_ask_status(struct polhemus_dialogue *d, struct polhemus_status *sta
 		return rc;
 	if (strlen(reply) != POLHEMUS_STATUS_LENGTH - 5)
 		return polhemus_not_taken(d, "S", reply);
-	/* Which station it is about was looked at, and does not matter. */
+	/* polhemus_ask() has dropped the station, which does not matter. */
 	memcpy(bytes, "21S", 3);
 	memcpy(bytes + 3, reply, POLHEMUS_STATUS_LENGTH - 5);
 	memcpy(bytes + POLHEMUS_STATUS_LENGTH - 2, "\r\n", 2);
@@ -214,12 +355,12 @@ int polhemus_ask_frame(struct polhemus_dialogue *d, const char *command,
 	rc = polhemus_say(d, command);
 	while (!rc && waited < ANSWER_MS) {
 		size_t before = d->n;
-		ssize_t n = listen(d, WAIT_MS);
+		ssize_t n = receive(d, WAIT_MS);
 
 		if (n < 0)
 			return (int)n;
-		waited += n ? HEARD_MS : WAIT_MS;
-		/* listen() began at the front again. */
+		waited += n ? RECEIVED_MS : WAIT_MS;
+		/* receive() started at the front again. */
 		if (d->n < before + (size_t)n)
 			at = 0;
 		while (at < d->n) {

@@ -1,65 +1,27 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Sets a tracker up, reads it back, starts and stops it; see polhemus_setup.h.
+ * Setting up a tracker in the language of its family; see polhemus_setup.h.
  */
 #include <errno.h>
+#include <math.h>
+#include <stdio.h>
 #include <string.h>
-#include "polhemus_family.h"
+#include "polhemus_dialogue.h"
+#include "polhemus_setup.h"
 
-#define STOPS 10
+#define NEAR 0.02 /* printed numbers have two to four decimals */
 
-static int no_answer(struct polhemus_dialogue *d)
+/* Bit 0 is station 1. */
+static uint8_t mask_of(const struct incise_tracker_setup *setup)
 {
-	return incise_error_set(
-		d->err, ETIMEDOUT,
-		"%s: no tracker answers at %s: is it on, is the baud rate what "
-		"its switches say, and the cable a null modem?",
-		d->where, d->line->name);
+	uint8_t mask = 0;
+
+	for (int i = 0; i < setup->n_stations; i++)
+		mask |= (uint8_t)(1 << (setup->stations[i] - 1));
+	return mask;
 }
 
-/*
- * An end to whatever flows. A CR ends half a command; c the stream of a FASTRAK; P that of the
- * others, where c and CR begin one, while a FASTRAK answers it with records. What they say
- * to the rest is thrown away.
- */
-static int quiet(struct polhemus_dialogue *d)
-{
-	const char *stop = d->line->family == POLHEMUS_FASTRAK ? "\rc"
-			   : d->line->family >= 0	       ? "\rP"
-							       : "\rc\rP";
-	int rc = -EBUSY;
-
-	/* Again and again: one that was just switched on did not hear the first. */
-	for (int i = 0; rc == -EBUSY && i < STOPS; i++) {
-		rc = polhemus_say(d, stop);
-		if (!rc)
-			rc = polhemus_drain(d);
-	}
-	if (rc == -EBUSY)
-		incise_error_set(d->err, EBUSY,
-				 "%s: the device at %s does not stop sending: is it a "
-				 "Polhemus tracker, and the baud rate its own?",
-				 d->where, d->line->name);
-	return rc;
-}
-
-/* Which family it is, where the line does not tell. */
-static int find_family(struct polhemus_dialogue *d, struct polhemus_identity *identity)
-{
-	int rc = d->line->family;
-
-	if (rc >= 0) {
-		identity->layout.family = (enum polhemus_family)rc;
-		return 0;
-	}
-	identity->layout.family = POLHEMUS_FASTRAK;
-	rc = polhemus_fastrak_identify(d, identity);
-	if (rc != -ETIMEDOUT && rc != -EINVAL)
-		return rc;
-	return polhemus_liberty_identify(d, identity);
-}
-
-/* The bytes @d has are one record of each station, in their order. */
+/* Whether the bytes in @d are one record of each station, in their order. */
 static bool fits(const struct polhemus_dialogue *d,
 		 const struct incise_tracker_setup *setup,
 		 const struct polhemus_layout *layout, int total)
@@ -77,10 +39,12 @@ static bool fits(const struct polhemus_dialogue *d,
 	return true;
 }
 
-/* How long a FASTRAK's switch is the manual does not say. */
-int polhemus_measure(struct polhemus_dialogue *d,
-		     const struct incise_tracker_setup *setup,
-		     struct polhemus_layout *layout)
+/*
+ * Ask for one record of each station with P, which confirms the setup. The length of a
+ * FASTRAK's switch, which its manual does not give, is found by it.
+ */
+static int measure(struct polhemus_dialogue *d, const struct incise_tracker_setup *setup,
+		   struct polhemus_layout *layout)
 {
 	static const uint8_t lengths[] = {1, 2, 4};
 	int rc = polhemus_say(d, "P"), total;
@@ -102,20 +66,399 @@ int polhemus_measure(struct polhemus_dialogue *d,
 		d->where, d->line->name, total, setup->n_stations);
 }
 
+/*
+ * --- FASTRAK ---
+ *
+ * For each command see chapter 9 of its manual. All is read back in ASCII; records are
+ * binary.
+ */
+
+static const int items[] = {2, 11, 16, 1};
+#define ITEMS ((int)(sizeof(items) / sizeof(*items)))
+
+static int fastrak_identify(struct polhemus_dialogue *d,
+			    struct polhemus_identity *identity)
+{
+	struct polhemus_status status;
+	int rc = polhemus_ask_status(d, &status);
+
+	if (rc)
+		return rc;
+	identity->sensors = status.sensors;
+	identity->test_error = status.test_error;
+	snprintf(identity->version, sizeof(identity->version), "%s", status.version);
+	snprintf(identity->name, sizeof(identity->name), "FASTRAK %s %s", status.version,
+		 status.id);
+	return 0;
+}
+
+/* Send a command, then a question whose answer must be @values; @width of a field, or 0. */
+static int fastrak_put(struct polhemus_dialogue *d, const char *command,
+		       const char *question, int width, const double *values, int n,
+		       const char *what)
+{
+	char reply[POLHEMUS_REPLY_MAX];
+	double got[8] = {0};
+	int fields[8] = {0}, m, rc = polhemus_say(d, command);
+
+	if (!rc)
+		rc = polhemus_ask(d, question, question[0], reply);
+	if (rc == -ETIMEDOUT)
+		return polhemus_not_taken(d, what, "");
+	if (rc)
+		return rc;
+	if (width) {
+		m = polhemus_reply_fields(reply, width, fields, 8);
+		for (int i = 0; i < m; i++)
+			got[i] = fields[i];
+	} else {
+		m = polhemus_reply_numbers(reply, got, 8);
+	}
+	for (int i = 0; i < n; i++)
+		if (m < n || !(fabs(got[i] - values[i]) <= NEAR))
+			return polhemus_not_taken(d, what, reply);
+	/* More items would make longer records. */
+	return width == 2 && m != n ? polhemus_not_taken(d, what, reply) : 0;
+}
+
+/* Switch on first: the last active station cannot be switched off. */
+static int fastrak_stations(struct polhemus_dialogue *d, uint8_t mask)
+{
+	char reply[POLHEMUS_REPLY_MAX], command[8];
+	int fields[POLHEMUS_STATIONS], rc = 0;
+
+	for (int on = 1; on >= 0; on--)
+		for (int i = 0; !rc && i < POLHEMUS_STATIONS; i++)
+			if ((mask >> i & 1) == on) {
+				snprintf(command, sizeof(command), "l%d,%d\r", i + 1, on);
+				rc = polhemus_say(d, command);
+			}
+	if (!rc)
+		rc = polhemus_ask(d, "l1\r", 'l', reply);
+	if (rc)
+		return rc == -ETIMEDOUT ? polhemus_not_taken(d, "its stations", "") : rc;
+	if (polhemus_reply_fields(reply, 1, fields, POLHEMUS_STATIONS) !=
+	    POLHEMUS_STATIONS)
+		return polhemus_not_taken(d, "its stations", reply);
+	for (int i = 0; i < POLHEMUS_STATIONS; i++) {
+		if (fields[i] == (mask >> i & 1))
+			continue;
+		if (fields[i])
+			return polhemus_not_taken(d, "its stations", reply);
+		return incise_error_set(
+			d->err, EIO,
+			"%s: station %d of the tracker at %s does not "
+			"switch on: plug its sensor in and set its switch, or "
+			"leave it out of tracker_setup",
+			d->where, i + 1, d->line->name);
+	}
+	return 0;
+}
+
+static int set_station(struct polhemus_dialogue *d, int station,
+		       const double hemisphere[3])
+{
+	static const double still[] = {0};
+	char command[64], question[8];
+	double list[ITEMS];
+	int rc;
+
+	for (int i = 0; i < ITEMS; i++)
+		list[i] = items[i];
+	snprintf(command, sizeof(command), "O%d,2,11,16,1\r", station);
+	snprintf(question, sizeof(question), "O%d\r", station);
+	rc = fastrak_put(d, command, question, 2, list, ITEMS, "its list of items");
+	if (rc)
+		return rc;
+	snprintf(command, sizeof(command), "I%d,0\r", station);
+	snprintf(question, sizeof(question), "I%d\r", station);
+	rc = fastrak_put(d, command, question, 0, still, 1, "an increment of 0");
+	if (rc)
+		return rc;
+	snprintf(command, sizeof(command), "H%d,%.4f,%.4f,%.4f\r", station, hemisphere[0],
+		 hemisphere[1], hemisphere[2]);
+	snprintf(question, sizeof(question), "H%d\r", station);
+	return fastrak_put(d, command, question, 0, hemisphere, 3, "its hemisphere");
+}
+
+static int set_sync(struct polhemus_dialogue *d, enum incise_tracker_sync sync)
+{
+	const double is[] = {(double)sync};
+	char command[8];
+
+	snprintf(command, sizeof(command), "y%d\r", (int)sync);
+	return fastrak_put(d, command, "y\r", 0, is, 1, "its sync mode");
+}
+
+static int fastrak_setup(struct polhemus_dialogue *d,
+			 const struct incise_tracker_setup *setup,
+			 struct polhemus_identity *identity)
+{
+	static const double unfiltered[] = {0, 1, 0, 0};
+	struct polhemus_status status;
+	int rc = polhemus_say(d, "Fu");
+
+	if (!rc)
+		rc = fastrak_identify(d, identity);
+	if (!rc)
+		rc = fastrak_stations(d, mask_of(setup));
+	for (int i = 0; !rc && i < setup->n_stations; i++)
+		rc = set_station(d, setup->stations[i], setup->hemisphere);
+	if (!rc)
+		rc = fastrak_put(d, "x0,1,0,0\r", "x\r", 0, unfiltered, 4,
+				 "no position filter");
+	if (!rc)
+		rc = fastrak_put(d, "v0,1,0,0\r", "v\r", 0, unfiltered, 4,
+				 "no attitude filter");
+	/* Internal sync for now: without pulses it may not answer P. */
+	if (!rc)
+		rc = set_sync(d, INCISE_TRACKER_INTERNAL);
+	/* The button mode cannot be read back, but a refusal would precede the status. */
+	if (!rc)
+		rc = polhemus_say(d, "e1,0\rf");
+	if (!rc)
+		rc = polhemus_ask_status(d, &status);
+	if (rc)
+		return rc;
+	if (!status.binary || !status.centimetres || status.continuous)
+		return polhemus_not_taken(d,
+					  !status.binary	? "binary output"
+					  : !status.centimetres ? "centimetres"
+								: "an end of its records",
+					  "the status S");
+	identity->layout = (struct polhemus_layout){.family = POLHEMUS_FASTRAK,
+						    .stations = mask_of(setup)};
+	rc = measure(d, setup, &identity->layout);
+	if (!rc && setup->sync != INCISE_TRACKER_INTERNAL)
+		rc = set_sync(d, setup->sync);
+	return rc ? rc : polhemus_say(d, "C");
+}
+
+/*
+ * --- LIBERTY and PATRIOT ---
+ *
+ * They answer in frames once F1 is set; numbers have 32 bits, float or integer,
+ * little-endian. Items 2 xyz, 7 quaternion, 9 count of frames, 10 stylus. (LIBERTY user
+ * manual, rev. H; PATRIOT, rev. J.)
+ */
+
+enum { CONTROL_U = 'U' & 31, CONTROL_V = 'V' & 31 };
+
+static int liberty_identify(struct polhemus_dialogue *d,
+			    struct polhemus_identity *identity)
+{
+	struct polhemus_frame frame;
+	char text[48] = {0};
+	size_t n = 0;
+	/* The CR ends a command for a FASTRAK; the answer to that is still text. */
+	int rc = polhemus_say(d, "\rF1\r");
+
+	if (!rc)
+		rc = polhemus_drain(d);
+	if (rc == -EBUSY)
+		return -ETIMEDOUT; /* an endless stream is no answer */
+	if (!rc)
+		rc = polhemus_ask_frame(d, "\026\r", CONTROL_V, &frame);
+	if (rc)
+		return rc;
+	for (size_t i = 0; i < frame.n && n + 1 < sizeof(text); i++)
+		if (frame.payload[i] > ' ' || (frame.payload[i] == ' ' && n))
+			text[n++] =
+				frame.payload[i] <= '~' ? (char)frame.payload[i] : '?';
+	identity->layout.family = (enum polhemus_family)frame.family;
+	identity->sensors = -1;
+	snprintf(identity->name, sizeof(identity->name), "%s %s",
+		 polhemus_family_name(identity->layout.family), text);
+	return 0;
+}
+
+/* Send a command, then a question whose answer must begin with @values. */
+static int liberty_put(struct polhemus_dialogue *d, const char *command,
+		       const char *question, bool reals, const double *values, int n,
+		       const char *what)
+{
+	struct polhemus_frame frame;
+	int rc = polhemus_say(d, command);
+
+	if (!rc)
+		rc = polhemus_ask_frame(d, question, (unsigned char)question[0], &frame);
+	if (rc)
+		return rc == -ETIMEDOUT ? polhemus_not_taken(d, what, "") : rc;
+	for (int i = 0; i < n; i++) {
+		const unsigned char *at = frame.payload + (size_t)i * 4;
+		double got;
+
+		if (frame.n < (size_t)(i + 1) * 4)
+			return polhemus_not_taken(d, what, "a short answer");
+		got = reals ? polhemus_real(at) : (double)polhemus_word(at);
+		if (!(fabs(got - values[i]) <= NEAR))
+			return polhemus_not_taken(d, what, "something else");
+	}
+	return 0;
+}
+
+/* The answer has the detected and the active stations, 16 or 32 bits each. */
+static int liberty_stations(struct polhemus_dialogue *d, uint8_t mask)
+{
+	struct polhemus_frame frame;
+	char command[12];
+	uint32_t active;
+	int rc = 0;
+
+	for (int on = 1; on >= 0; on--)
+		for (int i = 0; !rc && i < POLHEMUS_STATIONS; i++) {
+			/* A PATRIOT has two stations, and refuses others. */
+			if ((mask >> i & 1) != on)
+				continue;
+			snprintf(command, sizeof(command), "\025%d,%d\r", i + 1, on);
+			if (on)
+				rc = polhemus_say(d, command);
+			else if (!(rc = polhemus_say(d, command)))
+				rc = polhemus_drain(d);
+		}
+	if (rc == -EBUSY)
+		return polhemus_not_taken(d, "its stations", "more and more");
+	if (!rc)
+		rc = polhemus_ask_frame(d, "\0250\r", CONTROL_U, &frame);
+	if (rc)
+		return rc == -ETIMEDOUT ? polhemus_not_taken(d, "its stations", "") : rc;
+	if (frame.n < 4)
+		return polhemus_not_taken(d, "its stations", "a short answer");
+	active = frame.n >= 8 ? polhemus_word(frame.payload + 4)
+			      : polhemus_word(frame.payload) >> 16;
+	if ((active & 0xf) == mask)
+		return 0;
+	return incise_error_set(
+		d->err, EIO,
+		"%s: the tracker at %s has stations %#x active, not %#x: plug "
+		"its sensors in, or change tracker_setup",
+		d->where, d->line->name, (unsigned int)active, mask);
+}
+
+static int liberty_setup(struct polhemus_dialogue *d,
+			 const struct incise_tracker_setup *setup,
+			 struct polhemus_identity *identity)
+{
+	static const double one[] = {1}, fastest[] = {4}, unfiltered[] = {0, 1, 0, 0};
+	char command[64], question[8];
+	int rc = liberty_identify(d, identity);
+	bool liberty;
+
+	if (rc)
+		return rc;
+	if (setup->sync != INCISE_TRACKER_INTERNAL)
+		return incise_error_set(
+			d->err, EINVAL,
+			"%s: sync from outside is only known of a FASTRAK: "
+			"set sync = \"internal\" in tracker_setup",
+			d->where);
+	liberty = identity->layout.family == POLHEMUS_LIBERTY;
+	rc = liberty_put(d, "U1\r", "U\r", false, one, 1, "centimetres");
+	if (!rc && liberty)
+		rc = liberty_put(d, "R4\r", "R\r", false, fastest, 1, "240 Hz");
+	if (!rc)
+		rc = liberty_stations(d, mask_of(setup));
+	for (int i = 0; !rc && i < setup->n_stations; i++) {
+		int station = setup->stations[i];
+
+		snprintf(command, sizeof(command), "O%d,2,7,9,10\rL%d,0\r", station,
+			 station);
+		rc = polhemus_say(d, command);
+		snprintf(command, sizeof(command), "H%d,%.4f,%.4f,%.4f\r", station,
+			 setup->hemisphere[0], setup->hemisphere[1],
+			 setup->hemisphere[2]);
+		snprintf(question, sizeof(question), "H%d\r", station);
+		if (!rc)
+			rc = liberty_put(d, command, question, true, setup->hemisphere, 3,
+					 "its hemisphere");
+	}
+	if (!rc)
+		rc = liberty_put(d, "X0,1,0,0\r", "X\r", true, unfiltered, 4,
+				 "no position filter");
+	if (!rc)
+		rc = liberty_put(d, "Y0,1,0,0\r", "Y\r", true, unfiltered, 4,
+				 "no attitude filter");
+	if (rc)
+		return rc;
+	identity->layout.stations = mask_of(setup);
+	rc = measure(d, setup, &identity->layout);
+	return rc ? rc : polhemus_say(d, "C\r");
+}
+
+/* --- both --- */
+
+#define STOPS 10
+
+static int no_answer(struct polhemus_dialogue *d)
+{
+	return incise_error_set(
+		d->err, ETIMEDOUT,
+		"%s: no tracker answers at %s: is it on, is the baud rate what "
+		"its switches say, and the cable a null modem?",
+		d->where, d->line->name);
+}
+
+/*
+ * Stop any stream. CR ends an incomplete command, c the stream of a FASTRAK, P that of the
+ * others. For those, c and CR start a stream; a FASTRAK answers P with records. All answers are
+ * dropped.
+ */
+static int quiet(struct polhemus_dialogue *d)
+{
+	const char *stop = d->line->family == POLHEMUS_FASTRAK ? "\rc"
+			   : d->line->family >= 0	       ? "\rP"
+							       : "\rc\rP";
+	int rc = -EBUSY;
+
+	/* Repeatedly: one that was just switched on may miss the first. */
+	for (int i = 0; rc == -EBUSY && i < STOPS; i++) {
+		rc = polhemus_say(d, stop);
+		if (!rc)
+			rc = polhemus_drain(d);
+	}
+	if (rc == -EBUSY)
+		incise_error_set(d->err, EBUSY,
+				 "%s: the device at %s does not stop sending: is it a "
+				 "Polhemus tracker, and the baud rate its own?",
+				 d->where, d->line->name);
+	return rc;
+}
+
+/* The family as the line gives it, or by asking. */
+static int find_family(struct polhemus_dialogue *d, struct polhemus_identity *identity)
+{
+	int rc = d->line->family;
+
+	if (rc >= 0) {
+		identity->layout.family = (enum polhemus_family)rc;
+		return 0;
+	}
+	identity->layout.family = POLHEMUS_FASTRAK;
+	rc = fastrak_identify(d, identity);
+	if (rc != -ETIMEDOUT && rc != -EINVAL)
+		return rc;
+	return liberty_identify(d, identity);
+}
+
+static int identify(struct polhemus_dialogue *d, struct polhemus_identity *identity)
+{
+	int rc = quiet(d);
+
+	memset(identity, 0, sizeof(*identity));
+	return rc ? rc : find_family(d, identity);
+}
+
 int polhemus_setup(struct polhemus_line *line, const struct incise_tracker_setup *setup,
 		   struct polhemus_identity *identity, const char *where,
 		   struct incise_error *err)
 {
 	struct polhemus_dialogue d = {.line = line, .where = where, .err = err};
-	int rc = quiet(&d);
+	int rc = identify(&d, identity);
 
-	memset(identity, 0, sizeof(*identity));
-	if (!rc)
-		rc = find_family(&d, identity);
 	if (!rc && identity->layout.family == POLHEMUS_FASTRAK)
-		rc = polhemus_fastrak_setup(&d, setup, identity);
+		rc = fastrak_setup(&d, setup, identity);
 	else if (!rc)
-		rc = polhemus_liberty_setup(&d, setup, identity);
+		rc = liberty_setup(&d, setup, identity);
 	return rc == -ETIMEDOUT ? no_answer(&d) : rc;
 }
 
@@ -123,11 +466,8 @@ int polhemus_identify(struct polhemus_line *line, struct polhemus_identity *iden
 		      const char *where, struct incise_error *err)
 {
 	struct polhemus_dialogue d = {.line = line, .where = where, .err = err};
-	int rc = quiet(&d);
+	int rc = identify(&d, identity);
 
-	memset(identity, 0, sizeof(*identity));
-	if (!rc)
-		rc = find_family(&d, identity);
 	return rc == -ETIMEDOUT ? no_answer(&d) : rc;
 }
 

@@ -1,11 +1,284 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * From bytes of the device to samples in a ring; see polhemus_stream.h.
+ * From bytes of a tracker to samples; see polhemus_stream.h.
  */
 #include <string.h>
+#include "../../base/vector.h"
 #include "polhemus_stream.h"
 
-#define ROOM ((size_t)POLHEMUS_RING_S * 240 * POLHEMUS_STATIONS)
+/* --- gaps --- */
+
+#define REFUSED_MAX 2 /* in a row; then base_ns is wrong */
+#define FAR_NS (INT64_C(1) << 60)
+
+void polhemus_gaps_init(struct polhemus_gaps *gaps, const uint8_t *stations, int n,
+			bool counts, double hz, unsigned int length)
+{
+	*gaps = (struct polhemus_gaps){
+		.n = n,
+		.counts = counts,
+		.period_ns = hz > 0 ? (int64_t)(1e9 / hz + 0.5) : 0,
+		.length = length,
+	};
+	memcpy(gaps->order, stations, (size_t)n);
+}
+
+void polhemus_gaps_start(struct polhemus_gaps *gaps, int64_t t_ns)
+{
+	gaps->started = true;
+	gaps->last_ns = t_ns;
+}
+
+void polhemus_gaps_broken(struct polhemus_gaps *gaps)
+{
+	gaps->broken = gaps->begun || gaps->started;
+}
+
+/* Less one round, which may be on its way. */
+uint64_t polhemus_gaps_silent(const struct polhemus_gaps *gaps, int64_t t_ns)
+{
+	int64_t round_ns = gaps->n * gaps->period_ns;
+	int64_t rounds = (gaps->begun || gaps->started) && round_ns
+				 ? (t_ns - gaps->last_ns) / round_ns - 1
+				 : 0;
+
+	return rounds > 0 ? (uint64_t)(rounds * gaps->n) : 0;
+}
+
+static int place(const struct polhemus_gaps *gaps, uint8_t station)
+{
+	for (int i = 0; i < gaps->n; i++)
+		if (gaps->order[i] == station)
+			return i;
+	return 0;
+}
+
+static void restart_window(struct polhemus_gaps *gaps)
+{
+	gaps->in_window = 0;
+	gaps->moved = false;
+	gaps->least_ns = FAR_NS;
+}
+
+static void step(struct polhemus_gaps *gaps, uint64_t steps)
+{
+	gaps->seq += steps;
+	gaps->lost += steps - 1;
+}
+
+/* All stations of a counted frame have the time of the frame. */
+static int64_t due_ns(const struct polhemus_gaps *gaps, uint64_t seq)
+{
+	uint64_t n = gaps->counts ? (uint64_t)gaps->n : 1;
+
+	return (int64_t)((seq + gaps->first_place) / n * n) * gaps->period_ns;
+}
+
+static int64_t lateness(const struct polhemus_gaps *gaps, int64_t t_ns, uint64_t seq)
+{
+	return t_ns - gaps->base_ns - due_ns(gaps, seq);
+}
+
+/* Steps from the last record to the next one of @where, at least 1. */
+static uint64_t in_order(const struct polhemus_gaps *gaps, int where)
+{
+	return (uint64_t)((where - gaps->last - 1 + 2 * gaps->n) % gaps->n) + 1;
+}
+
+/* Whole rounds of the stations in @ns, to the nearest. */
+static uint64_t rounds(const struct polhemus_gaps *gaps, int64_t ns)
+{
+	int64_t round_ns = gaps->n * gaps->period_ns;
+
+	return ns > 0 && round_ns ? (uint64_t)((ns + round_ns / 2) / round_ns) : 0;
+}
+
+/*
+ * After a pause only time and order are known; time from the earliest possible arrival, as
+ * the last record before the pause may have been late.
+ */
+static void step_over(struct polhemus_gaps *gaps, int64_t t_ns, int where)
+{
+	uint64_t steps = in_order(gaps, where);
+	uint64_t more = rounds(gaps, lateness(gaps, t_ns, gaps->seq + steps));
+
+	/* Without a period count one round, so that the gap shows. */
+	if (!gaps->period_ns)
+		more = 1;
+	step(gaps, steps + more * (uint64_t)gaps->n);
+	gaps->base_ns = t_ns - due_ns(gaps, gaps->seq);
+	gaps->broken = gaps->settled = false;
+	gaps->restarted = true;
+	restart_window(gaps);
+}
+
+/* Too early by half a period: impossible, unless it repeats and base_ns is wrong. */
+static bool is_too_early(struct polhemus_gaps *gaps, int64_t late)
+{
+	if (late >= -gaps->period_ns / 2 || !gaps->settled ||
+	    gaps->refused >= REFUSED_MAX)
+		return false;
+	gaps->refused++;
+	return true;
+}
+
+/* Lateness that stayed for a window is missing records; the rest is drift. */
+static void look_back(struct polhemus_gaps *gaps, int64_t late)
+{
+	uint64_t missing = 0;
+
+	if (late < 0) {
+		gaps->moved |= late < -gaps->period_ns / 4;
+		gaps->base_ns += late;
+		late = 0;
+	}
+	if (!gaps->in_window)
+		gaps->first_ns = late;
+	if (late < gaps->least_ns)
+		gaps->least_ns = late;
+	if (++gaps->in_window < POLHEMUS_GAPS_WINDOW)
+		return;
+	/* Unless it shrinks: records that were held up arrive all at once. */
+	if (late >= gaps->first_ns - gaps->period_ns / 2) {
+		if (!gaps->counts)
+			missing = rounds(gaps, gaps->least_ns) * (uint64_t)gaps->n;
+		gaps->base_ns +=
+			(gaps->least_ns - (int64_t)missing * gaps->period_ns) / 4;
+	}
+	gaps->seq += missing;
+	gaps->lost += missing;
+	gaps->settled = !gaps->moved;
+	restart_window(gaps);
+}
+
+/* Two records in a row refused for their count agree: the count has restarted. */
+static bool count_restarted(struct polhemus_gaps *gaps,
+			    const struct polhemus_record *record)
+{
+	int64_t round_ns = gaps->n * gaps->period_ns;
+	int64_t frames = (int32_t)(record->frame - gaps->refused_frame);
+	int64_t apart_ns = record->t_ns - gaps->refused_ns - frames * round_ns;
+	bool restarted = gaps->refused && frames >= 0 && apart_ns > -4 * round_ns &&
+			 apart_ns < 4 * round_ns;
+
+	gaps->refused++;
+	gaps->refused_frame = record->frame;
+	gaps->refused_ns = record->t_ns;
+	return restarted;
+}
+
+static bool add_counted(struct polhemus_gaps *gaps, const struct polhemus_record *record,
+			int where)
+{
+	int64_t frames = (int32_t)(record->frame - gaps->frame);
+	int64_t steps = frames * gaps->n + where - gaps->last;
+	int64_t late = steps > 0
+			       ? lateness(gaps, record->t_ns, gaps->seq + (uint64_t)steps)
+			       : -FAR_NS;
+
+	/* A count of the past or of the future is damaged. */
+	if (steps <= 0 || late < -gaps->n * gaps->period_ns / 2) {
+		if (!count_restarted(gaps, record))
+			return false;
+		step_over(gaps, record->t_ns, where);
+		return true;
+	}
+	step(gaps, (uint64_t)steps);
+	look_back(gaps, late);
+	return true;
+}
+
+static bool add_timed(struct polhemus_gaps *gaps, const struct polhemus_record *record,
+		      int where)
+{
+	uint64_t steps = in_order(gaps, where), most, more;
+	int64_t late = lateness(gaps, record->t_ns, gaps->seq + steps);
+
+	/* Its station is damaged, or it is there twice. */
+	if (is_too_early(gaps, late))
+		return false;
+	if (record->skipped) {
+		/*
+		 * As many as the skipped bytes make, to the nearest, and fit into the
+		 * time: a late host must not turn one into two.
+		 */
+		most = (record->skipped + gaps->length / 2) / gaps->length;
+		more = rounds(gaps, late) * (uint64_t)gaps->n;
+		while (more && steps - 1 + more > most + (uint64_t)gaps->n - 1)
+			more -= (uint64_t)gaps->n;
+		steps += more;
+	}
+	step(gaps, steps);
+	look_back(gaps, lateness(gaps, record->t_ns, gaps->seq));
+	return true;
+}
+
+/* By order, and by skipped bytes of half a record or more. */
+static void add_ordered(struct polhemus_gaps *gaps, const struct polhemus_record *record,
+			int where)
+{
+	uint64_t steps = in_order(gaps, where);
+
+	if (gaps->n == 1)
+		steps += (record->skipped + gaps->length / 2) / gaps->length;
+	step(gaps, steps);
+}
+
+/*
+ * Before the first record, as many are missing as the skipped bytes make and fit into the
+ * time; where the link was gone, all since the start, less one round for the first.
+ */
+static void begin(struct polhemus_gaps *gaps, const struct polhemus_record *record,
+		  int where)
+{
+	uint64_t n = (uint64_t)gaps->n, missing = 0, most;
+
+	if (gaps->started) {
+		most = rounds(gaps, record->t_ns - gaps->last_ns) * n;
+		missing = (record->skipped + gaps->length / 2) / gaps->length;
+		if (gaps->period_ns && missing > most)
+			missing = most;
+		if (gaps->broken && polhemus_gaps_silent(gaps, record->t_ns) > missing)
+			missing = polhemus_gaps_silent(gaps, record->t_ns);
+	}
+	gaps->begun = true;
+	gaps->broken = false;
+	gaps->first_place = gaps->counts ? (uint64_t)where : 0;
+	/* Whole rounds, so that the stations keep their places. */
+	gaps->seq = gaps->lost = (missing + n - 1) / n * n;
+	gaps->base_ns = record->t_ns - due_ns(gaps, gaps->seq);
+	restart_window(gaps);
+}
+
+bool polhemus_gaps_add(struct polhemus_gaps *gaps, const struct polhemus_record *record,
+		       uint64_t *seq)
+{
+	int where = place(gaps, record->station);
+
+	gaps->restarted = false;
+	if (!gaps->begun) {
+		begin(gaps, record, where);
+	} else if (gaps->broken) {
+		step_over(gaps, record->t_ns, where);
+	} else if (gaps->counts) {
+		if (!add_counted(gaps, record, where))
+			return false;
+	} else if (!gaps->period_ns) {
+		add_ordered(gaps, record, where);
+	} else if (!add_timed(gaps, record, where)) {
+		return false;
+	}
+	gaps->refused = 0;
+	gaps->last_ns = record->t_ns;
+	gaps->last = where;
+	gaps->frame = record->frame;
+	*seq = gaps->seq;
+	return true;
+}
+
+/* --- samples --- */
+
+#define CAPACITY ((size_t)POLHEMUS_RING_S * 240 * POLHEMUS_STATIONS)
 
 int polhemus_stream_init(struct polhemus_stream *stream,
 			 const struct incise_tracker_setup *setup,
@@ -13,7 +286,7 @@ int polhemus_stream_init(struct polhemus_stream *stream,
 {
 	double hz = polhemus_family_hz(layout->family, setup->n_stations);
 
-	/* Pulses from outside come as they like; the others have no such input. */
+	/* Pulses from outside have no known rate; the others have no such input. */
 	if (layout->family == POLHEMUS_FASTRAK && setup->sync != INCISE_TRACKER_INTERNAL)
 		hz = 0;
 	memset(stream, 0, sizeof(*stream));
@@ -23,7 +296,7 @@ int polhemus_stream_init(struct polhemus_stream *stream,
 			   layout->family != POLHEMUS_FASTRAK, hz,
 			   (unsigned int)polhemus_layout_length(layout));
 	return incise_ring_init(&stream->ring, sizeof(struct incise_tracker_sample),
-				ROOM);
+				CAPACITY);
 }
 
 void polhemus_stream_start(struct polhemus_stream *stream, int64_t t_ns)
@@ -47,22 +320,9 @@ void polhemus_stream_broken(struct polhemus_stream *stream,
 void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns)
 {
 	atomic_store_explicit(&stream->lost,
-			      stream->gaps.lost + stream->no_room +
+			      stream->gaps.lost + stream->overflowed +
 				      polhemus_gaps_silent(&stream->gaps, t_ns),
 			      memory_order_relaxed);
-}
-
-/* to += v turned by the unit quaternion q: v + 2w(u × v) + 2u × (u × v). */
-static void add_turned(double to[3], const double q[4], const double v[3])
-{
-	double t[3], u[3] = {q[1], q[2], q[3]};
-
-	for (int i = 0; i < 3; i++)
-		t[i] = 2 * (u[(i + 1) % 3] * v[(i + 2) % 3] -
-			    u[(i + 2) % 3] * v[(i + 1) % 3]);
-	for (int i = 0; i < 3; i++)
-		to[i] += v[i] + q[0] * t[i] + u[(i + 1) % 3] * t[(i + 2) % 3] -
-			 u[(i + 2) % 3] * t[(i + 1) % 3];
 }
 
 static void put_sample(struct polhemus_stream *stream,
@@ -74,17 +334,18 @@ static void put_sample(struct polhemus_stream *stream,
 		.status = record->status,
 		.station = record->station,
 		.button = record->button,
-		.begins = stream->anew,
+		.begins = stream->restarted,
 	};
+	double tip[3];
 
-	memcpy(sample.position_mm, record->position_mm, sizeof(sample.position_mm));
 	memcpy(sample.quaternion, record->quaternion, sizeof(sample.quaternion));
-	add_turned(sample.position_mm, sample.quaternion, stream->setup.tip_mm);
-	/* Where the first one finds no room the next one tells it. */
+	v3_rotate(tip, sample.quaternion, stream->setup.tip_mm);
+	v3_add(sample.position_mm, record->position_mm, 1, tip);
+	/* Where the ring is full, the next sample has the mark. */
 	if (incise_ring_put(&stream->ring, &sample))
-		stream->anew = false;
+		stream->restarted = false;
 	else
-		stream->no_room++;
+		stream->overflowed++;
 }
 
 int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *bytes,
@@ -101,12 +362,12 @@ int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *byt
 		bytes += taken;
 		n -= taken;
 		for (; polhemus_records_next(&stream->records, &record); found++)
-			if (polhemus_gaps_take(&stream->gaps, &record, &seq)) {
-				stream->anew |= stream->gaps.anew;
+			if (polhemus_gaps_add(&stream->gaps, &record, &seq)) {
+				stream->restarted |= stream->gaps.restarted;
 				put_sample(stream, &record, seq);
 			}
 	}
-	atomic_store_explicit(&stream->lost, stream->gaps.lost + stream->no_room,
+	atomic_store_explicit(&stream->lost, stream->gaps.lost + stream->overflowed,
 			      memory_order_relaxed);
 	return found;
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The serial line to a tracker; see polhemus_tty.h.
+ * A tracker of Polhemus at a serial line, "tty:/dev/ttyUSB0:115200"; see polhemus_tty.h.
  */
+#include <dirent.h>
 #include <errno.h>
 #include <limits.h>
 #include <poll.h>
@@ -12,7 +13,10 @@
 #include <termios.h>
 #include <unistd.h>
 #include "../../base/monotonic.h"
+#include "../backends.h"
 #include "../tty.h"
+#include "polhemus_setup.h"
+#include "polhemus_tracker.h"
 #include "polhemus_tty.h"
 
 #define WRITE_MS 1000
@@ -39,7 +43,7 @@ static struct polhemus_tty *of_line(struct polhemus_line *line)
 	return (struct polhemus_tty *)line;
 }
 
-/* A line that was pulled out answers EIO, or nothing at all. */
+/* A line that was unplugged answers EIO, or nothing at all. */
 static int failed(int code)
 {
 	return code == EIO || code == ENXIO || code == ENODEV || code == EBADF ? -ENODEV
@@ -77,7 +81,7 @@ static ssize_t tty_read(struct polhemus_line *line, void *bytes, size_t size,
 
 	if (tty->fd < 0)
 		return -ENODEV;
-	/* While it is set up a signal of the program may come, which is no end of time. */
+	/* A signal that the program gets during the setup does not end the wait. */
 	while ((left_ns = end_ns - incise_monotonic_ns()) > 0) {
 		ssize_t n;
 
@@ -98,7 +102,7 @@ static void let_go(struct polhemus_tty *tty)
 {
 	if (tty->fd < 0)
 		return;
-	/* What it does not take must not hold up close(), for 30 s. */
+	/* Bytes that it does not accept must not delay close() by 30 s. */
 	tcflush(tty->fd, TCOFLUSH);
 	ioctl(tty->fd, TIOCNXCL);
 	close(tty->fd);
@@ -224,7 +228,7 @@ struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where
 		errno = EINVAL;
 		return NULL;
 	}
-	/* The end of a long path tells most. */
+	/* Of a long path, the end is the part that differs. */
 	tail = tty->path + strlen(tty->path);
 	if ((size_t)(tail - tty->path) >= sizeof(tty->line.name))
 		tail -= sizeof(tty->line.name) - 1;
@@ -242,3 +246,102 @@ struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where
 	}
 	return &tty->line;
 }
+
+/* --- backend --- */
+
+#define BY_ID "/dev/serial/by-id"
+
+static void *open_tracker(const struct incise_backend_request *request,
+			  struct incise_error *err)
+{
+	struct polhemus_line *line =
+		polhemus_tty_open(request->arguments, request->where, err);
+
+	return line ? polhemus_tracker_open(line, request->tracker, &POLHEMUS_TIMES,
+					    request->where, err)
+		    : NULL;
+}
+
+/* List all lines unasked: asking might disturb another device. */
+static int list_lines(incise_scan_found *found, void *context)
+{
+	DIR *folder = opendir(BY_ID);
+	struct dirent *entry;
+	int rc = 0;
+
+	while (folder && !rc && (entry = readdir(folder))) {
+		struct incise_scan_device device = {0};
+
+		if (entry->d_name[0] == '.')
+			continue;
+		if (snprintf(device.device, sizeof(device.device),
+			     "tty:" BY_ID "/%s:115200",
+			     entry->d_name) >= (int)sizeof(device.device))
+			continue;
+		device.usable = true;
+		snprintf(device.what, sizeof(device.what),
+			 "a serial line, not asked; behind it may be a tracker");
+		rc = found(context, &device);
+	}
+	if (folder)
+		closedir(folder);
+	return rc;
+}
+
+/* Ask a line that is named. */
+static int scan(const char *arguments, incise_scan_found *found, void *context,
+		struct incise_error *err)
+{
+	struct incise_scan_device device = {0};
+	struct polhemus_identity identity;
+	struct polhemus_line *line;
+	char where[120], sensors[8];
+	int rc;
+
+	if (!*arguments)
+		return list_lines(found, context);
+	snprintf(where, sizeof(where), "tty:%.100s", arguments);
+	line = polhemus_tty_open(arguments, where, err);
+	if (!line)
+		return -errno;
+	rc = polhemus_identify(line, &identity, where, err);
+	line->ops->close(line);
+	if (rc)
+		return rc;
+	if (snprintf(device.device, sizeof(device.device), "tty:%s", arguments) >=
+	    (int)sizeof(device.device))
+		return incise_error_set(
+			err, EINVAL,
+			"%s: the path is too long to be shown: name it by a "
+			"shorter one",
+			where);
+	device.usable = true;
+	snprintf(device.what, sizeof(device.what), "%s", identity.name);
+	incise_scan_tell(&device, "family", "%s",
+			 polhemus_family_name(identity.layout.family));
+	if (identity.version[0])
+		incise_scan_tell(&device, "firmware", "%s", identity.version);
+	if (identity.sensors >= 0) {
+		size_t n = 0;
+
+		for (int i = 0; i < POLHEMUS_STATIONS; i++)
+			if (identity.sensors >> i & 1)
+				sensors[n++] = (char)('1' + i);
+		sensors[n] = '\0';
+		incise_scan_tell(&device, "sensors", "%s", sensors);
+	}
+	/* From the self-test of a FASTRAK at power-on. */
+	if (identity.test_error)
+		incise_scan_tell(&device, "self_test_error", "%d", identity.test_error);
+	return found(context, &device);
+}
+
+const struct incise_backend incise_tracker_tty = {
+	.abi = INCISE_BACKEND_ABI,
+	.kind = "tracker",
+	.name = "tty",
+	.open = open_tracker,
+	.scan = scan,
+};
+
+INCISE_MODULE(incise_tracker_tty);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/polhemus/polhemus_tty.c: names that are no line, and bytes over one whose other end
- * the test holds. A tracker over it is in polhemus_tracker.c.
+ * lib/device/polhemus/polhemus_tty.c: names that are no line, bytes over a line whose other end the test has,
+ * and the backend "tty" with the emulator behind a pseudo terminal.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -13,7 +13,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "../../../lib/device/backends.h"
 #include "../../../lib/device/polhemus/polhemus_tty.h"
+#include "pty.h"
+
+/* --- polhemus_tty --- */
 
 static int master;
 static char path[64];
@@ -101,12 +105,79 @@ static void pulled_out(void **state)
 	line->ops->close(line);
 }
 
+/* --- tracker --- */
+
+static struct pty pty;
+
+static int tracker_begin(void **state)
+{
+	assert_int_equal(pty_begin(&pty, EMULATOR_FASTRAK), 0);
+	return 0;
+}
+
+static int tracker_end(void **state)
+{
+	pty_unplug(&pty);
+	pty_end(&pty);
+	return 0;
+}
+
+static int count_found(void *context, const struct incise_scan_device *device)
+{
+	struct incise_scan_device *last = context;
+
+	*last = *device;
+	return 0;
+}
+
+static void a_scan(void **state)
+{
+	struct incise_scan_device found = {0};
+	struct incise_error err = {0};
+	char arguments[80];
+
+	snprintf(arguments, sizeof(arguments), "%s:115200", pty.path);
+	if (incise_tracker_tty.scan(arguments, count_found, &found, &err))
+		fail_msg("%s", err.text);
+	assert_non_null(strstr(found.device, arguments));
+	assert_string_equal(found.what, "FASTRAK 3.02 OutputCompensat CPG2030-003-10");
+	assert_int_equal(found.n, 3);
+	assert_string_equal(found.property[2].text, "1");
+	assert_true(found.usable);
+	assert_int_equal(incise_tracker_tty.scan("/dev/not-there", count_found, &found,
+						 &err),
+			 -ENODEV);
+	assert_int_equal(incise_tracker_tty.scan("", count_found, &found, &err), 0);
+}
+
+static void opens(void **state)
+{
+	static const struct incise_tracker_setup setup = {
+		.n_stations = 1, .stations = {1}, .hemisphere = {1, 0, 0}};
+	struct incise_error err = {0};
+	struct incise_backend_request request = {
+		.arguments = pty.path, .where = "rig.conf:1: tracker", .tracker = &setup};
+	struct incise_tracker *tracker = incise_tracker_tty.open(&request, &err);
+	struct incise_tracker_info info;
+
+	if (!tracker)
+		fail_msg("%s", err.text);
+	incise_tracker_info(tracker, &info);
+	assert_true(info.rate_hz == 120 && info.stations == 1);
+	/* It is ours alone. */
+	assert_null(incise_tracker_tty.open(&request, &err));
+	assert_int_equal(errno, EBUSY);
+	tracker->ops->close(tracker);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(names),
 		cmocka_unit_test_setup_teardown(there_and_back, begin, end),
 		cmocka_unit_test_setup_teardown(pulled_out, begin, end),
+		cmocka_unit_test_setup_teardown(a_scan, tracker_begin, tracker_end),
+		cmocka_unit_test_setup_teardown(opens, tracker_begin, tracker_end),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,17 +1,333 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/polhemus/polhemus_usb.c and polhemus_usb_find.c over a bus that is not there: packets
- * and what may go wrong with them. Over the kernel's own USB it is in tests/vm.
+ * lib/device/polhemus/polhemus_usb.c over a simulated bus, in place of libusb: names of trackers, which
+ * device is taken, and packets with what may go wrong with them. Over the USB of the kernel it is in tests/vm.
  */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <errno.h>
 #include <stdio.h>
-#include "../../../lib/device/polhemus/polhemus_usb_find.c"
+#include <stdlib.h>
+#include <string.h>
 #include "../../../lib/device/polhemus/polhemus_usb.c"
 #include "usb_bus.h"
+
+/* --- name --- */
+
+#define LETTERS_63 "abcdefghijklmnopqrstuvwxyzabcdefghijklmnopqrstuvwxyz01234567890"
+/* The longest that there is: 7 hubs behind one another, 255 of everything. */
+#define LONGEST "255-255.255.255.255.255.255.255"
+
+static void good_names(void **state)
+{
+	static const struct {
+		const char *text;
+		struct usb_name name;
+	} cases[] = {
+		{"0f44:0002", {0x0f44, 0x0002, "", ""}},
+		{"0F44:FF12", {0x0f44, 0xff12, "", ""}},
+		{"ffff:0000", {0xffff, 0x0000, "", ""}},
+		{"0f44:0002@1-1", {0x0f44, 0x0002, "1-1", ""}},
+		{"0f44:0002@1-1.2", {0x0f44, 0x0002, "1-1.2", ""}},
+		{"0f44:0002@" LONGEST, {0x0f44, 0x0002, LONGEST, ""}},
+		{"0f44:0002#SN-77", {0x0f44, 0x0002, "", "SN-77"}},
+		/* A number of a device may be anything, also what looks like a place. */
+		{"0f44:0002##", {0x0f44, 0x0002, "", "#"}},
+		{"0f44:0002#@1-1", {0x0f44, 0x0002, "", "@1-1"}},
+		{"0f44:0002# a b ", {0x0f44, 0x0002, "", " a b "}},
+		{"0f44:0002#" LETTERS_63, {0x0f44, 0x0002, "", LETTERS_63}},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		const struct usb_name *is = &cases[i].name;
+		struct usb_name name;
+
+		memset(&name, 0xaa, sizeof(name));
+		if (read_name(cases[i].text, &name))
+			fail_msg("\"%s\" is refused", cases[i].text);
+		assert_int_equal(name.vendor, is->vendor);
+		assert_int_equal(name.product, is->product);
+		assert_string_equal(name.path, is->path);
+		assert_string_equal(name.serial, is->serial);
+	}
+}
+
+static void bad_names(void **state)
+{
+	static const char *const cases[] = {
+		"",
+		":",
+		"0",
+		"0f44",
+		"0f44:",
+		"0f44:000",
+		"0f44:00020",
+		"f44:0002",
+		"0f44-0002",
+		"0f44 0002",
+		" 0f44:0002",
+		"0f44:0002 ",
+		"0f44:0002\n",
+		"0x0f44:0002",
+		"0g44:0002",
+		"0f44:000g",
+		"+f44:0002",
+		"10f44:0002",
+		"0f44:0002:1",
+		"0f44:0002@",
+		"0f44:0002#",
+		"0f44:0002@1",
+		"0f44:0002@1-",
+		"0f44:0002@-1",
+		"0f44:0002@1.1",
+		"0f44:0002@1-.2",
+		"0f44:0002@1-1.",
+		"0f44:0002@1-1..2",
+		"0f44:0002@1--1",
+		"0f44:0002@1-1-1",
+		"0f44:0002@1-1.2 ",
+		"0f44:0002@1-1.2#SN-77",
+		"0f44:0002@1-1:1.0",
+		"0f44:0002@a-b",
+		/* As none is ever called. */
+		"0f44:0002@0-1",
+		"0f44:0002@01-1",
+		"0f44:0002@1-0",
+		"0f44:0002@256-1",
+		"0f44:0002@1-1.256",
+		"0f44:0002@1-1.1000",
+		"0f44:0002@" LONGEST ".1",
+		"0f44:0002#" LETTERS_63 "x",
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		/* Behind its end is nothing that may be read: a checker tells. */
+		char *text = strdup(cases[i]);
+		struct usb_name name;
+
+		assert_non_null(text);
+		if (read_name(text, &name) != -EINVAL)
+			fail_msg("\"%s\" is taken", text);
+		free(text);
+	}
+}
+
+static void places(void **state)
+{
+	static const struct {
+		unsigned int bus;
+		uint8_t ports[8];
+		int n;
+		const char *path;
+	} cases[] = {
+		{1, {0}, 0, "1-0"},
+		{1, {1}, 1, "1-1"},
+		{2, {1, 2}, 2, "2-1.2"},
+		{12, {10, 4, 3}, 3, "12-10.4.3"},
+		{255, {255, 255, 255, 255, 255, 255, 255}, 7, LONGEST},
+		/* More than USB has: what there is room for. */
+		{255, {255, 255, 255, 255, 255, 255, 255, 1}, 8, LONGEST},
+		{1, {1}, -1, "1-0"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		char path[USB_PATH_MAX], text[64] = "0f44:0002@";
+		struct usb_name name;
+
+		write_path(path, cases[i].bus, cases[i].ports, cases[i].n);
+		assert_string_equal(path, cases[i].path);
+		/* What a place is called can be said in rig.conf; a root hub is no tracker. */
+		if (cases[i].n < 1)
+			continue;
+		assert_int_equal(read_name(strcat(text, path), &name), 0);
+		assert_string_equal(name.path, path);
+	}
+}
+
+/* --- find --- */
+
+#define DEVICE(id, number, at, error, levels, ...)                                  \
+	{                                                                           \
+		.vendor = (id) >> 16, .product = (id)&0xffff, .serial = (number),   \
+		.bus = (at), .open_error = (error), .n_ports = (levels), .ports = { \
+			__VA_ARGS__                                                 \
+		}                                                                   \
+	}
+
+static const struct libusb_device one[] = {
+	DEVICE(0x1d6b0002, "0000:00:14.0", 1, 0, 0, 0),
+	DEVICE(0x0f440002, "SN-77", 1, 0, 1, 1),
+};
+static const struct libusb_device two[] = {
+	DEVICE(0x0f440002, "SN-77", 1, 0, 1, 1),
+	DEVICE(0x0f440002, NULL, 1, 0, 2, 2, 4),
+	DEVICE(0x0f44ff20, "\033[31m\"", 2, 0, 1, 1),
+};
+static const struct libusb_device unready[] = {
+	DEVICE(0x0f440001, "", 3, 0, 1, 2),
+};
+static const struct libusb_device locked[] = {
+	DEVICE(0x0f440002, "SN-77", 1, LIBUSB_ERROR_ACCESS, 1, 1),
+	DEVICE(0x0f440002, "SN-78", 1, LIBUSB_ERROR_NO_DEVICE, 1, 2),
+};
+
+#define BUS(is) is, sizeof(is) / sizeof(*(is))
+
+static void plug(const struct libusb_device *devices, size_t n)
+{
+	memset(&bus, 0, sizeof(bus));
+	memcpy(bus.device, devices, n * sizeof(*devices));
+	bus.n = (int)n;
+}
+
+static void which_one(void **state)
+{
+	static const struct {
+		const struct libusb_device *devices;
+		size_t n;
+		const char *name, *was;
+		int rc, index;
+		const char *says;
+	} cases[] = {
+		{BUS(one), "0f44:0002", "", 0, 1, NULL},
+		{BUS(one), "0f44:0002@1-1", "", 0, 1, NULL},
+		{BUS(one), "0f44:0002#SN-77", "", 0, 1, NULL},
+		/* Where it is the only one it may have moved. */
+		{BUS(one), "0f44:0002", "2-2", 0, 1, NULL},
+		{BUS(one), "0f44:0002@1-1.2", "", -ENODEV, 0, "incise info devices"},
+		{BUS(one), "0f44:0002#SN-7", "", -ENODEV, 0, "no 0f44:0002#SN-7 is"},
+		{BUS(one), "0f44:0003", "", -ENODEV, 0, "no 0f44:0003 is"},
+		{BUS(two), "0f44:0002", "", -EINVAL, 0, "2 devices"},
+		{BUS(two), "0f44:0002", "", -EINVAL, 0, "@1-1, @1-2.4"},
+		{BUS(two), "0f44:0002", "1-2.4", 0, 1, NULL},
+		{BUS(two), "0f44:0002", "1-3", -ENODEV, 0, "no 0f44:0002 is"},
+		{BUS(two), "0f44:0002@1-2.4", "", 0, 1, NULL},
+		{BUS(two), "0f44:0002#SN-77", "", 0, 0, NULL},
+		{BUS(two), "0f44:ff20", "", 0, 2, NULL},
+		{BUS(unready), "0f44:0002", "", -ENODEV, 0, "0f44:0001 at 3-2 has no"},
+		{BUS(locked), "0f44:0002@1-1", "", 0, 0, NULL},
+		{BUS(locked), "0f44:0002#SN-77", "", -EACCES, 0, "join the group"},
+		{BUS(locked), "0f44:0002#SN-78", "", -EACCES, 0, "join the group"},
+		{NULL, 0, "0f44:0002", "", -ENODEV, 0, "plug it in"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		const struct polhemus_model *model;
+		struct incise_error err = {0};
+		struct usb_name wanted;
+		libusb_device *device = NULL;
+		int rc;
+
+		if (cases[i].n)
+			plug(cases[i].devices, cases[i].n);
+		else
+			memset(&bus, 0, sizeof(bus));
+		assert_int_equal(read_wanted(cases[i].name, &wanted, &model, "rig.conf:1",
+					     &err),
+				 0);
+		rc = find_device(NULL, &wanted, cases[i].was, cases[i].name, &device,
+				 "rig.conf:1", &err);
+		if (rc != cases[i].rc ||
+		    (rc && (err.code != -rc || !strstr(err.text, cases[i].says))))
+			fail_msg("case %zu: %d: %s", i, rc, err.text);
+		if (!rc) {
+			assert_ptr_equal(device, &bus.device[cases[i].index]);
+			libusb_unref_device(device);
+		}
+		for (int k = 0; k < bus.n; k++)
+			assert_int_equal(bus.device[k].references, 0);
+		assert_int_equal(bus.opened, 0);
+	}
+}
+
+static void what_is_wanted(void **state)
+{
+	static const struct {
+		const char *name;
+		int rc;
+		const char *says;
+	} cases[] = {
+		{"", -EINVAL, "expected usb:0f44:0002"},
+		{"0f44:0002@", -EINVAL, "expected usb:0f44:0002"},
+		{"1d6b:0002", -EINVAL, "1d6b:0002 is no tracker"},
+		{"0f44:0004", -EINVAL, "no tracker"},
+		{"0f44:0001", -ENODEV, "fxload"},
+		{"0f44:ff11", -ENODEV, "a LIBERTY 0f44:ff11 has no firmware"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		const struct polhemus_model *model;
+		struct usb_name wanted;
+		struct incise_error err = {0};
+
+		assert_int_equal(read_wanted(cases[i].name, &wanted, &model, "rig.conf:1",
+					     &err),
+				 cases[i].rc);
+		assert_non_null(strstr(err.text, cases[i].says));
+	}
+}
+
+static int note(void *context, const struct incise_scan_device *device)
+{
+	char *text = context;
+	size_t at = strlen(text);
+
+	snprintf(text + at, 400 - at, "%s%s %s\n", device->usable ? "" : "! ",
+		 device->device, device->what);
+	return 0;
+}
+
+static int enough(void *context, const struct incise_scan_device *device)
+{
+	++*(int *)context;
+	return 7;
+}
+
+static void a_scan(void **state)
+{
+	static const struct {
+		const struct libusb_device *devices;
+		size_t n;
+		const char *arguments, *found;
+	} cases[] = {
+		{BUS(one), "", "usb:0f44:0002#SN-77 FASTRAK\n"},
+		/* A number that a line of rig.conf cannot have is not used as a name. */
+		{BUS(two), "",
+		 "usb:0f44:0002#SN-77 FASTRAK\n"
+		 "usb:0f44:0002@1-2.4 FASTRAK\n"
+		 "usb:0f44:ff20@2-1 LIBERTY HS\n"},
+		{BUS(two), "0f44:0002@1-2.4", "usb:0f44:0002@1-2.4 FASTRAK\n"},
+		{BUS(two), "0f44:0003", ""},
+		{BUS(unready), "",
+		 "! usb:0f44:0001@3-2 FASTRAK without firmware: load the maker's .hex "
+		 "file with fxload\n"},
+		/* Who may not ask for the number names the place. */
+		{BUS(locked), "",
+		 "usb:0f44:0002@1-1 FASTRAK\nusb:0f44:0002@1-2 FASTRAK\n"},
+	};
+	struct incise_error err = {0};
+	int n = 0;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		char text[400] = "";
+
+		plug(cases[i].devices, cases[i].n);
+		assert_int_equal(usb_scan(cases[i].arguments, note, text, &err), 0);
+		assert_string_equal(text, cases[i].found);
+		for (int k = 0; k < bus.n; k++)
+			assert_int_equal(bus.device[k].references, 0);
+		assert_int_equal(bus.opened, 0);
+	}
+	assert_int_equal(usb_scan("0f44", note, NULL, &err), -EINVAL);
+	plug(BUS(two));
+	assert_int_equal(usb_scan("", enough, &n, &err), 7);
+	assert_int_equal(n, 1);
+}
+
+/* --- polhemus_usb --- */
 
 enum { OUT = 0x02, IN = 0x82, INTERRUPT = 0x84 };
 
@@ -55,7 +371,7 @@ static int begin(void **state)
 	struct incise_error err = {0};
 
 	describe(LIBUSB_TRANSFER_TYPE_BULK, 64);
-	line = polhemus_usb_open("0f44:0002", "rig.conf:1", &err);
+	line = usb_open("0f44:0002", "rig.conf:1", &err);
 	return line ? 0 : -1;
 }
 
@@ -191,7 +507,7 @@ static void refuses(void **state)
 		bus.submit_error = cases[i].submit_error;
 		interfaces[0].bNumEndpoints = (uint8_t)cases[i].endpoints;
 		errno = 0;
-		assert_null(polhemus_usb_open("0f44:0002", "rig.conf:1", &err));
+		assert_null(usb_open("0f44:0002", "rig.conf:1", &err));
 		if (errno != cases[i].code || err.code != errno ||
 		    !strstr(err.text, cases[i].says))
 			fail_msg("case %zu: %s", i, err.text);
@@ -210,7 +526,7 @@ static void descriptors(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		describe(LIBUSB_TRANSFER_TYPE_INTERRUPT, cases[i].packet);
-		line = polhemus_usb_open("0f44:0002@1-1", "rig.conf:1", NULL);
+		line = usb_open("0f44:0002@1-1", "rig.conf:1", NULL);
 		assert_non_null(line);
 		for (int k = 0; k < bus.flights; k++)
 			assert_int_equal(bus.flight[k]->length, cases[i].length);
@@ -224,6 +540,12 @@ static void descriptors(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(good_names),
+		cmocka_unit_test(bad_names),
+		cmocka_unit_test(places),
+		cmocka_unit_test(which_one),
+		cmocka_unit_test(what_is_wanted),
+		cmocka_unit_test(a_scan),
 		cmocka_unit_test_setup_teardown(none_is_thrown_away, begin, end),
 		cmocka_unit_test_setup_teardown(a_small_reader, begin, end),
 		cmocka_unit_test_setup_teardown(empty_packets, begin, end),
