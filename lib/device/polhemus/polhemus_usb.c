@@ -626,7 +626,7 @@ static int take_device(struct polhemus_usb *usb, libusb_device *device)
 static int usb_attach(struct polhemus_usb *usb, const char *where,
 		      struct incise_error *err)
 {
-	libusb_device *device;
+	libusb_device *device = NULL;
 	int rc;
 
 	usb->gone = 0;
@@ -750,7 +750,7 @@ static struct polhemus_line *usb_open(const char *arguments, const char *where,
 				      struct incise_error *err)
 {
 	struct polhemus_usb *usb = calloc(1, sizeof(*usb));
-	const struct polhemus_model *model;
+	const struct polhemus_model *model = NULL;
 	int rc;
 
 	if (!usb) {
