@@ -76,15 +76,14 @@ device_modules += camera_v4l2
 pc_camera_v4l2 :=
 objects_camera_v4l2 := $(addprefix $(O)/obj/lib/device/,stable_path.o thread.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c))
-# Force samples from two kinds of converters; what is not of one is of both.
+# Force samples from two kinds of converters.
 daq_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o device/daq/daq_feed.o)
-daq_iio := $(wildcard lib/device/daq/iio_*.c)
-daq_comedi := $(wildcard lib/device/daq/comedi_*.c)
+daq_iio := $(addprefix $(O)/obj/lib/device/daq/,iio_source.o iio_force.o)
+daq_comedi := $(O)/obj/lib/device/daq/comedi_force.o
 pc_force_iio := libiio
-objects_force_iio := $(daq_core) $(patsubst %.c,$(O)/obj/%.o,$(daq_iio) lib/device/daq/force_iio.c)
+objects_force_iio := $(daq_core) $(daq_iio)
 pc_force_comedi := comedilib
-objects_force_comedi := $(daq_core) $(O)/obj/lib/device/stable_path.o \
-	$(patsubst %.c,$(O)/obj/%.o,$(daq_comedi) lib/device/daq/force_comedi.c)
+objects_force_comedi := $(daq_core) $(O)/obj/lib/device/stable_path.o $(daq_comedi)
 # One tracker on two kinds of line.
 polhemus_lines := lib/device/polhemus/polhemus_usb.c lib/device/polhemus/polhemus_tty.c
 polhemus_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o) \
@@ -150,9 +149,8 @@ $(foreach name,$(device_modules),$(eval $(call device_module,$(name))))
 test_objects := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c)) \
 	$(addprefix $(O)/obj/lib/device/gpio/,pulser.o stepper_gpio.o) \
 	$(filter $(O)/obj/lib/device/can/%,$(can_core) $(can_slcan) $(if $(has_libmnl),$(can_socketcan))) \
-	$(addprefix $(O)/obj/lib/device/daq/,daq_feed.o) \
-	$(patsubst %.c,$(O)/obj/%.o,$(if $(has_libiio),$(daq_iio)) \
-		$(if $(has_comedilib),$(daq_comedi))) \
+	$(O)/obj/lib/device/daq/daq_feed.o $(if $(has_libiio),$(daq_iio)) \
+	$(if $(has_comedilib),$(daq_comedi)) \
 	$(filter $(O)/obj/lib/device/polhemus/%,$(objects_tracker_tty)) \
 	$(if $(has_vision),$(filter-out %/vision_opencv.o,$(objects_vision_opencv))) \
 	$(if $(has_frames),$(objects_frames_mkv) $(objects_film_mkv)) \

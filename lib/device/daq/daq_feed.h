@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The way of force samples from a card's thread to whoever reads them, and the account of
- * what was lost on it; the same for every kind of card.
+ * Force samples on their way from a card's thread to the reader, and the count of losses;
+ * the same for every kind of card.
  *
  *   device ─▶ kernel's buffer ─▶ thread of the card ─▶ ring ─▶ incise_force_read()
  *                   │ full                              │ full

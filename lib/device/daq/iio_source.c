@@ -1,21 +1,253 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * An A/D converter of Linux IIO, set up for sampling; see iio_source.h.
+ * An A/D converter of Linux IIO; see iio_source.h.
  */
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
-#include "iio_rate.h"
 #include "iio_source.h"
-#include "iio_trigger.h"
+
+/* --- format --- */
+
+/* --- format --- */
+
+int iio_format_of(struct iio_format *format, const struct iio_data_format *data,
+		  unsigned int bits_max)
+{
+	unsigned int length = data->length;
+
+	if ((length != 8 && length != 16 && length != 32 && length != 64) ||
+	    !data->bits || data->bits > bits_max || data->bits > length ||
+	    data->shift > length - data->bits || data->repeat > 1)
+		return -EINVAL;
+	*format = (struct iio_format){
+		.bytes = length / 8,
+		.bits = data->bits,
+		.shift = data->shift,
+		.is_signed = data->is_signed,
+		.is_be = data->is_be,
+	};
+	return 0;
+}
+
+/* The bits at @at, shifted down; without regard to sign. */
+/* The bits at @at, shifted down; without regard to sign. */
+static uint64_t raw_value(const struct iio_format *format, const void *at)
+{
+	const unsigned char *byte = at;
+	uint64_t value = 0;
+
+	for (unsigned int i = 0; i < format->bytes; i++)
+		value = value << 8 | byte[format->is_be ? i : format->bytes - 1 - i];
+	value >>= format->shift;
+	return format->bits < 64 ? value & ((UINT64_C(1) << format->bits) - 1) : value;
+}
+
+/* The same as a code: 0 … 2^bits - 1, growing with the voltage. For bits up to 31. */
+/* The same as a code: 0 … 2^bits - 1, growing with the voltage. For bits up to 31. */
+static int32_t code_of(const struct iio_format *format, const void *at)
+{
+	uint64_t value = raw_value(format, at);
+
+	/* Two's complement with its top bit inverted is the number + 2^(bits-1). */
+	if (format->is_signed)
+		value ^= UINT64_C(1) << (format->bits - 1);
+	return (int32_t)value;
+}
+
+/*
+ * --- trigger ---
+ *
+ * An hrtimer trigger "incise-PID-N", made through configfs while a channel is open, on
+ * kernels that have iio-trig-hrtimer loaded.
+ */
+
+/*
+ * --- trigger ---
+ *
+ * An hrtimer trigger "incise-PID-N", made through configfs while a channel is open, on
+ * kernels that have iio-trig-hrtimer loaded.
+ */
+
+#define OURS_MAX 16 /* of one process */
+
+/* 0 and its name; -ENOENT (the kernel has none), -EACCES, -ENOSPC … */
+/* 0 and its name; -ENOENT (the kernel has none), -EACCES, -ENOSPC … */
+static int make_trigger(const char *folder, char *name, size_t size)
+{
+	char path[PATH_MAX];
+
+	for (int i = 0; i < OURS_MAX; i++) {
+		snprintf(name, size, "incise-%ld-%d", (long)getpid(), i);
+		snprintf(path, sizeof(path), "%s/%s", folder, name);
+		if (!mkdir(path, 0755))
+			return 0;
+		if (errno != EEXIST)
+			break;
+	}
+	name[0] = '\0';
+	return -errno;
+}
+
+/* @name may be empty. */
+/* @name may be empty. */
+static void remove_trigger(const char *folder, const char *name)
+{
+	char path[PATH_MAX];
+
+	if (!*name)
+		return;
+	snprintf(path, sizeof(path), "%s/%s", folder, name);
+	rmdir(path);
+}
+
+/* Remove triggers of processes that have ended. */
+/* Remove triggers of processes that have ended. */
+static void sweep_triggers(const char *folder)
+{
+	DIR *dir = opendir(folder);
+	struct dirent *entry;
+	int pid, number, end;
+
+	while (dir && (entry = readdir(dir))) {
+		end = 0;
+		if (sscanf(entry->d_name, "incise-%9d-%2d%n", &pid, &number, &end) == 2 &&
+		    !entry->d_name[end] && pid > 0 && kill(pid, 0) && errno == ESRCH)
+			remove_trigger(folder, entry->d_name);
+	}
+	if (dir)
+		closedir(dir);
+}
+
+/* --- rate --- */
+
+#define KEY "sampling_frequency"
+/* Accepted deviation from the requested rate: converters divide a clock. */
+#define TOLERANCE 0.01
+
+/* A device, or a channel of one. */
+struct rate_place {
+	const struct iio_device *device;
+	const struct iio_channel *channel;
+};
+
+static bool has_rate(const struct rate_place *place)
+{
+	return place->channel ? iio_channel_find_attr(place->channel, KEY) != NULL
+			      : place->device &&
+					iio_device_find_attr(place->device, KEY) != NULL;
+}
+
+static int write_rate(const struct rate_place *place, double rate_hz)
+{
+	long long mHz = llround(rate_hz * 1e3);
+	char text[40];
+	ssize_t rc;
+
+	/* Without "." where possible: some drivers take whole numbers only. */
+	if (mHz % 1000)
+		snprintf(text, sizeof(text), "%lld.%03lld", mHz / 1000, mHz % 1000);
+	else
+		snprintf(text, sizeof(text), "%lld", mHz / 1000);
+	rc = place->channel ? iio_channel_attr_write(place->channel, KEY, text)
+			    : iio_device_attr_write(place->device, KEY, text);
+	return rc < 0 ? (int)rc : 0;
+}
+
+static double read_rate(const struct rate_place *place)
+{
+	double rate_hz = 0;
+	int rc = place->channel
+			 ? iio_channel_attr_read_double(place->channel, KEY, &rate_hz)
+			 : iio_device_attr_read_double(place->device, KEY, &rate_hz);
+
+	return rc < 0 || !isfinite(rate_hz) ? 0 : rate_hz;
+}
+
+/* "5000 10000 20000", or "unknown". */
+static void read_available(const struct rate_place *place, char *text, size_t size)
+{
+	ssize_t rc = place->channel ? iio_channel_attr_read(place->channel,
+							    KEY "_available", text, size)
+				    : iio_device_attr_read(place->device,
+							   KEY "_available", text, size);
+
+	if (rc < 0)
+		snprintf(text, size, "unknown");
+	text[size - 1] = '\0';
+}
+
+/* @trigger: the one in use, or NULL. Sets s->rate_hz. */
+/* @trigger: the one in use, or NULL. Sets s->rate_hz. */
+static int set_rate(struct iio_source *s, const struct iio_device *trigger,
+		    struct incise_error *err)
+{
+	struct rate_place of_trigger = {trigger, NULL}, own = {s->device, NULL},
+			  *at = &own;
+	double asked = s->setup.rate_hz;
+	char known[160];
+	int rc;
+
+	if (!has_rate(&own))
+		own.channel = s->voltage;
+	if (has_rate(&of_trigger))
+		at = &of_trigger;
+	else if (!has_rate(&own))
+		return incise_error_set(
+			err, EOPNOTSUPP,
+			"%s: neither %s nor its trigger has a rate; name a timer in "
+			"force_setup.trigger",
+			s->where, iio_device_get_id(s->device));
+	rc = write_rate(at, asked);
+	if (rc == -EACCES)
+		return incise_error_set(
+			err, EACCES,
+			"%s: may not set the rate of %s; join the group that "
+			"may (udev/ has the rules), or be root",
+			s->where, iio_device_get_id(at->device));
+	s->rate_hz = read_rate(at);
+	if (fabs(s->rate_hz - asked) > asked * TOLERANCE) {
+		read_available(at, known, sizeof(known));
+		return incise_error_set(
+			err, EINVAL,
+			"%s: %s does not take %.9g Hz%s%s and runs at %.9g Hz; set "
+			"force_setup.rate_hz (available: %s)",
+			s->where, iio_device_get_id(at->device), asked, rc ? ": " : "",
+			rc ? strerror(-rc) : "", s->rate_hz, known);
+	}
+	/* A trigger cannot be faster than the converter's own rate. */
+	if (at == &own || !has_rate(&own))
+		return 0;
+	write_rate(&own, asked);
+	if (read_rate(&own) < s->rate_hz * (1 - TOLERANCE)) {
+		read_available(&own, known, sizeof(known));
+		return incise_error_set(
+			err, EINVAL,
+			"%s: %s converts at %.9g Hz, its trigger at %.9g Hz; set "
+			"force_setup.rate_hz (available: %s)",
+			s->where, iio_device_get_id(s->device), read_rate(&own),
+			s->rate_hz, known);
+	}
+	return 0;
+}
+
+/* --- set-up --- */
+
+/* --- set-up --- */
 
 #define CODE_BITS_MAX 31 /* of incise_force_sample.code */
 
-struct iio_channel *iio_source_voltage(const struct iio_device *device, int channel)
+/* "voltage0", or "voltage0-voltage1" of a differential one; NULL: none for a buffer. */
+/* "voltage0", or "voltage0-voltage1" of a differential one; NULL: none for a buffer. */
+static struct iio_channel *find_voltage(const struct iio_device *device, int channel)
 {
 	unsigned int n = iio_device_get_channels_count(device);
 	char id[24];
@@ -45,7 +277,7 @@ bool iio_source_volts(const struct iio_channel *channel, const struct iio_format
 	if (iio_channel_attr_read_double(channel, "offset", &offset) < 0 ||
 	    !isfinite(offset))
 		offset = 0;
-	/* Codes of a signed channel were moved up by half the range. */
+	/* Codes of a signed channel are moved up by half the range. */
 	if (format->is_signed)
 		offset -= ldexp(1, (int)format->bits - 1);
 	*full_scale_V = ldexp(scale_mV, (int)format->bits) / 1e3;
@@ -53,7 +285,7 @@ bool iio_source_volts(const struct iio_channel *channel, const struct iio_format
 	return true;
 }
 
-/* What there is, for a message: "incise-sim-adc (iio:device0), …". */
+/* All devices, or all triggers: "incise-sim-adc (iio:device0), …". */
 static void list(const struct iio_context *context, bool triggers, char *text,
 		 size_t size)
 {
@@ -95,7 +327,7 @@ static int find_device(struct iio_source *s, const char *name, struct incise_err
 				s->where, name, known);
 }
 
-/* A line for what was refused; @what: "set its clock". */
+/* @what: "set the rate". */
 static int refused(const struct iio_source *s, int rc, const char *what,
 		   struct incise_error *err)
 {
@@ -115,9 +347,9 @@ static int refused(const struct iio_source *s, int rc, const char *what,
 }
 
 /*
- * The file of a device opens once at a time: so it is known whether somebody samples. What
- * a program left running that was killed is ended, as nothing can be set meanwhile. The file
- * stays open: it is what samples are read from.
+ * The file of a device opens only once at a time, which shows whether another program
+ * samples. A buffer left running by a killed program is stopped, as it would block settings.
+ * The file stays open for reading samples.
  */
 static int check_alone(struct iio_source *s, struct incise_error *err)
 {
@@ -137,7 +369,7 @@ static int take_channels(struct iio_source *s, struct incise_error *err)
 	const char *id = iio_device_get_id(s->device);
 	const struct iio_data_format *data;
 
-	s->voltage = iio_source_voltage(s->device, s->setup.channel);
+	s->voltage = find_voltage(s->device, s->setup.channel);
 	if (!s->voltage)
 		return incise_error_set(
 			err, ENODEV,
@@ -145,9 +377,10 @@ static int take_channels(struct iio_source *s, struct incise_error *err)
 			"/sys/bus/iio/devices/%s/scan_elements` and set "
 			"force_setup.channel",
 			s->where, id, s->setup.channel, id);
-	s->stamp = iio_device_find_channel(s->device, "timestamp", false);
-	if (!s->stamp || !iio_channel_is_scan_element(s->stamp) ||
-	    iio_format_of(&s->stamp_format, iio_channel_get_data_format(s->stamp), 64))
+	s->timestamp = iio_device_find_channel(s->device, "timestamp", false);
+	if (!s->timestamp || !iio_channel_is_scan_element(s->timestamp) ||
+	    iio_format_of(&s->timestamp_format, iio_channel_get_data_format(s->timestamp),
+			  64))
 		return incise_error_set(
 			err, EOPNOTSUPP,
 			"%s: %s has no time stamps in its buffer, so losses "
@@ -174,7 +407,7 @@ static int set_clock(struct iio_source *s, struct incise_error *err)
 	if (rc < 0)
 		return refused(s, (int)rc, "set the clock of time stamps", err);
 	rc = iio_device_attr_read(s->device, key, is, sizeof(is));
-	/* Linux 6.1 gives a NUL behind the end of the line, of which libiio takes one. */
+	/* Linux 6.1 adds a NUL behind the end of the line; libiio removes only one of the two. */
 	is[strcspn(is, "\n")] = '\0';
 	if (rc < 0 || strcmp(is, "monotonic") != 0)
 		return incise_error_set(
@@ -201,7 +434,7 @@ static int set_volts(struct iio_source *s, struct incise_error *err)
 	return 0;
 }
 
-/* The trigger that @name names; @rc 0, or of setting it. */
+/* 0 or a negative errno. */
 static int use_trigger(struct iio_source *s, const char *name)
 {
 	struct iio_device *trigger = iio_context_find_device(s->context, name);
@@ -237,7 +470,7 @@ static int use_named(struct iio_source *s, struct incise_error *err)
 	return rc ? refused(s, rc, "set the trigger", err) : 0;
 }
 
-/* The named one, ours, or the one that is set; a device without triggers has none. */
+/* The one named in rig.conf, our own, or the one already set. */
 static int set_trigger(struct iio_source *s, struct incise_error *err)
 {
 	static const char key[] = "trigger/current_trigger";
@@ -249,11 +482,11 @@ static int set_trigger(struct iio_source *s, struct incise_error *err)
 	if (!has)
 		return 0;
 	if (*s->trigger && !use_trigger(s, s->trigger)) {
-		iio_trigger_sweep(s->trigger_folder);
+		sweep_triggers(s->trigger_folder);
 		return 0;
 	}
-	/* It takes none but its own. */
-	iio_trigger_remove(s->trigger_folder, s->trigger);
+	/* The device takes only its own trigger. */
+	remove_trigger(s->trigger_folder, s->trigger);
 	*s->trigger = '\0';
 	if (!*s->trigger_before && s->trigger_refused)
 		return incise_error_set(
@@ -273,7 +506,7 @@ static int set_trigger(struct iio_source *s, struct incise_error *err)
 	return 0;
 }
 
-/* Contexts show what there was when they were made. */
+/* Make a trigger and a new context: a context shows only what existed before it. */
 static int with_own_trigger(struct iio_source *s, const char *name,
 			    struct incise_error *err)
 {
@@ -284,7 +517,7 @@ static int with_own_trigger(struct iio_source *s, const char *name,
 	    iio_device_attr_read(s->device, "trigger/current_trigger", before,
 				 sizeof(before)) < 0)
 		return 0;
-	rc = iio_trigger_make(s->trigger_folder, s->trigger, sizeof(s->trigger));
+	rc = make_trigger(s->trigger_folder, s->trigger, sizeof(s->trigger));
 	s->trigger_refused = rc == -EACCES || rc == -EPERM;
 	if (rc)
 		return 0;
@@ -308,7 +541,7 @@ int iio_source_open(struct iio_source *s, const char *name, struct incise_error 
 		return rc;
 	trigger = *s->trigger_used ? iio_context_find_device(s->context, s->trigger_used)
 				   : NULL;
-	return iio_rate_set(s, trigger, err);
+	return set_rate(s, trigger, err);
 }
 
 void iio_source_close(struct iio_source *s)
@@ -325,5 +558,130 @@ void iio_source_close(struct iio_source *s)
 		iio_context_destroy(s->context);
 	if (s->fd >= 0)
 		close(s->fd);
-	iio_trigger_remove(s->trigger_folder, s->trigger);
+	remove_trigger(s->trigger_folder, s->trigger);
+}
+
+/* --- buffer --- */
+
+/* --- buffer --- */
+
+static int write_text(const char *folder, const char *name, const char *text)
+{
+	char path[PATH_MAX];
+	int fd, rc = 0;
+
+	snprintf(path, sizeof(path), "%s/%s", folder, name);
+	fd = open(path, O_WRONLY | O_CLOEXEC);
+	if (fd < 0)
+		return -errno;
+	if (write(fd, text, strlen(text)) < 0)
+		rc = -errno;
+	close(fd);
+	return rc;
+}
+
+static int write_number(const char *folder, const char *name, unsigned int number)
+{
+	char text[16];
+
+	snprintf(text, sizeof(text), "%u", number);
+	return write_text(folder, name, text);
+}
+
+/* Remove all channels from the scan: those left by others would move ours. */
+static void clear_scan(const char *folder)
+{
+	char path[PATH_MAX];
+	struct dirent *entry;
+	DIR *dir;
+
+	snprintf(path, sizeof(path), "%s/scan_elements", folder);
+	dir = opendir(path);
+	while (dir && (entry = readdir(dir))) {
+		size_t length = strlen(entry->d_name);
+
+		if (length > 3 && !strcmp(entry->d_name + length - 3, "_en"))
+			write_text(path, entry->d_name, "0");
+	}
+	if (dir)
+		closedir(dir);
+}
+
+/* "voltage0", or "voltage0_force" of a channel with a name. */
+static int enable(const char *folder, const struct iio_channel *channel)
+{
+	const char *name = iio_channel_get_name(channel);
+	char file[200];
+
+	snprintf(file, sizeof(file), "scan_elements/in_%.60s%s%.60s_en",
+		 iio_channel_get_id(channel), name ? "_" : "", name ? name : "");
+	return write_text(folder, file, "1");
+}
+
+static size_t round_up(size_t at, size_t size)
+{
+	return (at + size - 1) / size * size;
+}
+
+static void lay_out(struct iio_source *s)
+{
+	bool stamp_first =
+		iio_channel_get_index(s->timestamp) < iio_channel_get_index(s->voltage);
+	size_t voltage = s->format.bytes, stamp = s->timestamp_format.bytes;
+
+	s->voltage_at = stamp_first ? round_up(stamp, voltage) : 0;
+	s->timestamp_at = stamp_first ? 0 : round_up(voltage, stamp);
+	s->step = stamp_first ? s->voltage_at + voltage : s->timestamp_at + stamp;
+	s->step = round_up(s->step, voltage > stamp ? voltage : stamp);
+}
+
+int iio_source_start(struct iio_source *s, const char *folder, unsigned int block,
+		     unsigned int capacity)
+{
+	int rc;
+
+	lay_out(s);
+	clear_scan(folder);
+	rc = enable(folder, s->voltage);
+	rc = rc ? rc : enable(folder, s->timestamp);
+	rc = rc ? rc : write_number(folder, "buffer/length", capacity);
+	if (rc)
+		return rc;
+	/* A buffer without a watermark only wakes its reader more often. */
+	write_number(folder, "buffer/watermark", block);
+	snprintf(s->folder, sizeof(s->folder), "%s", folder);
+	rc = write_text(folder, "buffer/enable", "1");
+	if (rc)
+		iio_source_stop(s);
+	return rc;
+}
+
+void iio_source_stop(struct iio_source *s)
+{
+	if (!*s->folder)
+		return;
+	write_text(s->folder, "buffer/enable", "0");
+	clear_scan(s->folder);
+	s->folder[0] = '\0';
+}
+
+int iio_source_read(struct iio_source *s)
+{
+	ssize_t got = read(s->fd, s->bytes, sizeof(s->bytes) / s->step * s->step);
+
+	if (got < 0)
+		return -errno;
+	/* The kernel returns whole scans; an empty read is no answer of a device. */
+	return (size_t)got >= s->step ? (int)((size_t)got / s->step) : -EIO;
+}
+
+int32_t iio_source_code(const struct iio_source *s, int i)
+{
+	return code_of(&s->format, s->bytes + (size_t)i * s->step + s->voltage_at);
+}
+
+int64_t iio_source_timestamp(const struct iio_source *s, int i)
+{
+	return (int64_t)raw_value(&s->timestamp_format,
+				  s->bytes + (size_t)i * s->step + s->timestamp_at);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/daq/comedi_force.c on a card that a test makes: its file is a pipe, and the
- * linker hands read() of it to a function here, which has it fail as the kernel does.
+ * lib/device/daq/comedi_force.c on a card that a test simulates, whose file is a pipe: its set-up, times
+ * from the arrival of blocks, samples, and the search.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,8 +11,279 @@
 #include <math.h>
 #include <sched.h>
 #include <stdlib.h>
-#include "../../../lib/device/daq/comedi_force.h"
+#include "../../../lib/device/daq/comedi_force.c"
 #include "card.h"
+#include "found.h"
+
+/* --- card --- */
+
+static int card_setup(void **state)
+{
+	card_reset();
+	return 0;
+}
+
+static void bits(void **state)
+{
+	static const struct {
+		lsampl_t maxdata;
+		int bits;
+	} cases[] = {{1, 1},	{4095, 12}, {65535, 16},      {0xffffff, 24}, {0, 0},
+		     {4096, 0}, {4000, 0},  {0x7fffffff, 31}, {0xffffffff, 0}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
+		assert_int_equal(bits_of(cases[i].maxdata), cases[i].bits);
+}
+
+static void ranges(void **state)
+{
+	static const comedi_range all[] = {
+		{-10, 10, UNIT_volt},  {-5, 5, UNIT_volt}, {-2.5, 2.5, UNIT_volt},
+		{0, 5, UNIT_volt},     {0, 0.02, UNIT_mA}, {0, 4.095, UNIT_volt},
+		{NAN, NAN, UNIT_volt},
+	};
+	static const struct {
+		double full_scale_V;
+		int range;
+	} cases[] = {{0, 0},	{5, 3},	 {4.9, 3}, {4.096, 5}, {0.01, 5},
+		     {5.01, 1}, {10, 1}, {20, 0},  {20.1, -1}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
+		assert_int_equal(choose_range(all, 7, cases[i].full_scale_V),
+				 cases[i].range);
+	assert_int_equal(choose_range(all, 0, 0), -1);
+}
+
+static int open_card(struct card *c, const char *arguments, double rate_hz,
+		     struct incise_error *err)
+{
+	*c = (struct card){.where = "rig.conf:3: force"};
+	c->setup.rate_hz = rate_hz;
+	c->setup.full_scale_V = 5;
+	c->setup.channel = 3;
+	return card_open(c, arguments, err);
+}
+
+static void is_set_up(void **state)
+{
+	struct incise_error err = {0};
+	struct card c;
+
+	assert_int_equal(open_card(&c, "/dev/comedi0:0", 10000, &err), 0);
+	assert_int_equal(c.bits, 12);
+	/* 0 … 5 V, of which 4095 is the top */
+	assert_true(fabs(c.full_scale_V - 5.0 * 4096 / 4095) < 1e-12);
+	assert_true(c.offset_V == 0);
+	assert_true(c.period_ns == 100000);
+	assert_false(c.wide);
+	assert_int_equal(card_start(&c), 0);
+	assert_int_equal(card.chanspec, CR_PACK(3, 1, AREF_GROUND));
+	assert_int_equal(card.command.stop_src, TRIG_NONE);
+	assert_int_equal(card.command.scan_end_arg, 1);
+	card_close(&c);
+	card_close(&c);
+	assert_int_equal(card.opened, 0);
+	assert_int_equal(card.cancelled, 1);
+}
+
+/* What it takes is what is told; its buffer grows as far as it may. */
+static void the_rest_of_a_card(void **state)
+{
+	struct incise_error err = {0};
+	struct card c;
+
+	card.flags = SDF_CMD_READ | SDF_DIFF | SDF_LSAMPL;
+	card.convert_timer = true;
+	card.buffer_size = 4096;
+	card.maxdata = 0xffffff;
+	assert_int_equal(open_card(&c, "/dev/comedi0", 9983, &err), 0);
+	assert_true(c.wide);
+	assert_int_equal(c.bits, 24);
+	assert_true(c.period_ns == 100000);
+	assert_int_equal(card.buffer_size, 1 << 16);
+	assert_int_equal(CR_AREF(c.chanlist[0]), AREF_DIFF);
+	card_close(&c);
+}
+
+static void refusals(void **state)
+{
+	static const struct {
+		const char *arguments;
+		double rate_hz;
+		void *field; /* of the card, set to @value */
+		int value, code;
+		const char *says;
+	} cases[] = {
+		{"comedi0:0", 1e4, NULL, 0, EINVAL, "expected comedi:DEVICE:SUBDEVICE"},
+		{"/dev/comedi0:", 1e4, NULL, 0, EINVAL, "expected comedi:"},
+		{"/dev/comedi0:x", 1e4, NULL, 0, EINVAL, "expected comedi:"},
+		{"/dev/comedi0:-1", 1e4, NULL, 0, EINVAL, "expected comedi:"},
+		{"/dev/comedi0:4294967296", 1e4, NULL, 0, EINVAL, "expected comedi:"},
+		{"", 1e4, NULL, 0, EINVAL, "expected comedi:"},
+		{"/dev/comedi0", 1e4, &card.open_error, EACCES, EACCES, "join the group"},
+		{"/dev/comedi0", 1e4, &card.open_error, ENOENT, ENOENT,
+		 "load the driver of your card"},
+		{"/dev/comedi0:1", 1e4, NULL, 0, EOPNOTSUPP, "subdevice 1 is no analog"},
+		{"/dev/comedi0:7", 1e4, NULL, 0, EOPNOTSUPP, "subdevice 7 is no analog"},
+		{"/dev/comedi0", 1e4, &card.type, COMEDI_SUBD_AO, EOPNOTSUPP,
+		 "is no analog input"},
+		{"/dev/comedi0", 1e4, &card.flags, SDF_CMD_READ | SDF_BUSY, EBUSY,
+		 "in use by another program"},
+		{"/dev/comedi0", 1e4, &card.n_channels, 3, EINVAL,
+		 "has channels 0 to 2; correct force_setup.channel"},
+		{"/dev/comedi0", 1e4, &card.maxdata, 5000, EOPNOTSUPP,
+		 "codes up to 5000 are not"},
+		{"/dev/comedi0", 1e4, &card.n_ranges, 0, ERANGE, "(ranges in V: none)"},
+		{"/dev/comedi0", 1e4, &card.no_timer, 1, EOPNOTSUPP, "by a timer"},
+		{"/dev/comedi0", 1e4, &card.period_least_ns, 200000, EINVAL,
+		 "does not take 10000 Hz, next to it is 5000 Hz"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+		struct card c;
+
+		card_reset();
+		if (cases[i].field == &card.no_timer)
+			card.no_timer = true;
+		else if (cases[i].field)
+			*(int *)cases[i].field = cases[i].value;
+		assert_int_equal(open_card(&c, cases[i].arguments, cases[i].rate_hz,
+					   &err),
+				 -cases[i].code);
+		if (!strstr(err.text, cases[i].says) ||
+		    strncmp(err.text, "rig.conf:3: force: ", 19) != 0)
+			fail_msg("case %zu: %s", i, err.text);
+		card_close(&c);
+		assert_int_equal(card.opened, 0);
+	}
+}
+
+static void card_does_not_start(void **state)
+{
+	struct incise_error err = {0};
+	struct card c;
+
+	assert_int_equal(open_card(&c, "/dev/comedi0:0", 10000, &err), 0);
+	card.command_error = EBUSY;
+	assert_int_equal(card_start(&c), -EBUSY);
+	card_close(&c);
+}
+
+/* --- times --- */
+
+#define T 100000.0
+#define START 7000000000LL
+
+/*
+ * Blocks of @block samples over @seconds, each late by @delay_ns and up to @jitter_ns more;
+ * the card's clock is off by @ppm. The most that a stamp is off by in the last half, ns.
+ */
+static double error_of(int block, double delay_ns, double jitter_ns, double ppm, int seconds)
+{
+	struct times stamps;
+	double period = T * (1 + ppm * 1e-6), most = 0;
+	int64_t last = 0;
+	int n = 0;
+
+	srand(1);
+	times_init(&stamps, T);
+	times_start(&stamps, START);
+	while (n < seconds * 10000) {
+		double late = delay_ns + jitter_ns * rand() / RAND_MAX;
+		int64_t arrival = START + llround(period * (n + block) + late);
+
+		times_block(&stamps, arrival, (uint64_t)block, true);
+		for (int i = 0; i < block; i++) {
+			int64_t t = times_next(&stamps);
+			double off = (double)(t - START) - period * ++n;
+
+			assert_true(t > last);
+			/* half a nanosecond of rounding, up */
+			assert_true(t <= arrival + 1);
+			last = t;
+			if (n > seconds * 5000)
+				most = fmax(most, fabs(off));
+		}
+	}
+	return most;
+}
+
+static void times(void **state)
+{
+	static const struct {
+		int block;
+		double delay_ns, jitter_ns, ppm;
+		double most_ns;
+	} cases[] = {
+		/* a sound clock: exact but for rounding, however late blocks come */
+		{1, 0, 0, 0, 2},
+		{80, 0, 0, 0, 2},
+		{512, 2e6, 0, 0, 2},
+		/* the least of 125 delays of a second is within some 3 % of the jitter */
+		{80, 1e6, 4e6, 0, 300e3},
+		/* 100 ppm: 0.1 ms a second, followed with a second's delay or two */
+		{80, 0, 0, 100, 250e3},
+		{80, 1e6, 0, -100, 350e3},
+		{80, 1e6, 1e6, 200, 700e3},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		double most = error_of(cases[i].block, cases[i].delay_ns, cases[i].jitter_ns,
+				  cases[i].ppm, 60);
+
+		if (most > cases[i].most_ns)
+			fail_msg("case %zu: off by %.0f ns", i, most);
+	}
+}
+
+/* Started again: stamps go on behind those before. */
+static void again(void **state)
+{
+	struct times stamps;
+	int64_t last;
+
+	times_init(&stamps, T);
+	times_start(&stamps, START);
+	times_block(&stamps, START + 1000000, 10, true);
+	for (int i = 0; i < 10; i++)
+		last = times_next(&stamps);
+	assert_int_equal(last, START + 1000000);
+	times_start(&stamps, START + 5000000);
+	times_block(&stamps, START + 5200000, 2, true);
+	assert_int_equal(times_next(&stamps), START + 5100000);
+	/* a clock of the computer that stood still */
+	times_start(&stamps, START);
+	times_block(&stamps, START, 2, true);
+	assert_int_equal(times_next(&stamps), START + 5100001);
+	assert_int_equal(times_next(&stamps), START + 5100002);
+}
+
+/* A reader that was held for 5 s finds blocks of 4096 waiting: their stamps stay true. */
+static void held_up(void **state)
+{
+	struct times stamps;
+	int n = 0;
+
+	times_init(&stamps, T);
+	times_start(&stamps, START);
+	while (n < 200000) {
+		bool held = n >= 60000 && n < 110000;
+		int block = held ? 4096 : 80;
+		int64_t taken = START + llround(T * (n + block));
+		/* from 6 s on all comes at 11 s */
+		int64_t arrival = taken < START + 11000000000LL && n >= 60000
+					  ? START + 11000000000LL
+					  : taken;
+
+		times_block(&stamps, arrival, (uint64_t)block, block == 80);
+		for (int i = 0; i < block; i++)
+			assert_true(llabs(times_next(&stamps) - START -
+					  llround(T * ++n)) < 2);
+	}
+}
+
+/* --- comedi_force --- */
 
 static atomic_int fail; /* an errno for the next read, once; -1: the end of the command */
 
@@ -55,7 +326,7 @@ static struct incise_force *open_force(struct incise_error *err)
 		.where = "rig.conf:3: force",
 		.force = &setup};
 
-	return comedi_force_open(&request, err);
+	return incise_force_comedi.open(&request, err);
 }
 
 /* Until something comes, or the end. */
@@ -225,15 +496,110 @@ static void does_not_start(void **state)
 	assert_int_equal(card.opened, 0);
 }
 
+/* --- scan --- */
+
+static struct found found;
+
+static int scan_setup(void **state)
+{
+	card_reset();
+	found = (struct found){0};
+	return 0;
+}
+
+static int scan(const char *arguments)
+{
+	struct incise_error err = {0};
+	int rc = incise_force_comedi.scan(arguments, keep, &found, &err);
+
+	assert_int_equal(card.opened, 0);
+	/* Nothing is started by looking. */
+	assert_int_equal(atomic_load(&card.commands), 0);
+	return rc;
+}
+
+static void a_card_is_told_of(void **state)
+{
+	static const char *const properties[][2] = {
+		{"path", "/dev/null"},
+		{"board", "fake-16"},
+		{"driver", "fake"},
+		{"channels", "8"},
+		{"bits", "12"},
+		{"ranges_V", "-5 to 5, 0 to 5, -2.5 to 2.5"},
+		{"rate_most_hz", "200000"}, /* 5 us, its least */
+		{"rate_least_hz", "1"},
+		{"time_stamps", "by arrival"},
+	};
+
+	/* Its second subdevice is no analog input. */
+	assert_int_equal(scan("/dev/null:0"), 0);
+	assert_int_equal(found.n, 1);
+	assert_string_equal(found.device[0].device, "comedi:/dev/null:0");
+	assert_true(found.device[0].usable);
+	for (size_t i = 0; i < sizeof(properties) / sizeof(*properties); i++)
+		assert_string_equal(told(&found.device[0], properties[i][0]),
+				    properties[i][1]);
+}
+
+static void what_cannot_be_used_is_told_as_such(void **state)
+{
+	card.flags |= SDF_BUSY;
+	assert_int_equal(scan("/dev/null"), 0);
+	assert_non_null(strstr(found.device[0].what, ", in use"));
+	scan_setup(NULL);
+	card.no_timer = true;
+	assert_int_equal(scan("/dev/null"), 0);
+	assert_false(found.device[0].usable);
+	assert_string_equal(told(&found.device[0], "rate_most_hz"), "");
+	scan_setup(NULL);
+	card.maxdata = 4000; /* codes of no whole number of bits */
+	assert_int_equal(scan("/dev/null"), 0);
+	assert_false(found.device[0].usable);
+}
+
+static void none(void **state)
+{
+	assert_int_equal(scan("/dev/not-there:0"), 0);
+	card.open_error = EACCES;
+	assert_int_equal(scan("/dev/null"), 0);
+	card.open_error = 0;
+	card.type = COMEDI_SUBD_AO;
+	assert_int_equal(scan("/dev/null"), 0);
+	card.type = COMEDI_SUBD_AI;
+	card.flags = 0; /* one that samples when it is asked only */
+	assert_int_equal(scan("/dev/null"), 0);
+	assert_int_equal(found.n, 0);
+}
+
+static void it_ends_when_it_is_told_to(void **state)
+{
+	found.answer = -ENOMEM;
+	assert_int_equal(scan("/dev/null"), -ENOMEM);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup(bits, card_setup),
+		cmocka_unit_test_setup(ranges, card_setup),
+		cmocka_unit_test_setup(is_set_up, card_setup),
+		cmocka_unit_test_setup(the_rest_of_a_card, card_setup),
+		cmocka_unit_test_setup(refusals, card_setup),
+		cmocka_unit_test_setup(card_does_not_start, card_setup),
+		cmocka_unit_test(times),
+		cmocka_unit_test(again),
+		cmocka_unit_test(held_up),
 		cmocka_unit_test_setup_teardown(samples_come, setup, teardown),
 		cmocka_unit_test_setup_teardown(wide_samples, setup, teardown),
 		cmocka_unit_test_setup_teardown(overflow, setup, teardown),
 		cmocka_unit_test_setup_teardown(unplugged, setup, teardown),
 		cmocka_unit_test_setup_teardown(never_goes_on, setup, teardown),
 		cmocka_unit_test_setup_teardown(does_not_start, setup, teardown),
+		cmocka_unit_test_setup(a_card_is_told_of, scan_setup),
+		cmocka_unit_test_setup(what_cannot_be_used_is_told_as_such, scan_setup),
+		cmocka_unit_test_setup(none, scan_setup),
+		cmocka_unit_test_setup(it_ends_when_it_is_told_to, scan_setup),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -100,7 +100,9 @@ static ssize_t get(const struct attribute *a, char *to, size_t size)
 {
 	if (!a)
 		return -ENOENT;
-	snprintf(to, size, "%s%s", a->text, a->line ? "\n" : "");
+	*to = '\0';
+	strncat(to, a->text, size - 2);
+	strcat(to, a->line ? "\n" : "");
 	return (ssize_t)strlen(to) + 1;
 }
 

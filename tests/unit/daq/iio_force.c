@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/daq/iio_force.c where it does not open: what is said, and that nothing is left. A
- * channel that samples needs a kernel: tests/vm/guest/force_iio.c.
+ * lib/device/daq/iio_force.c on a converter that a test simulates: missing samples by their timestamps, a
+ * channel that cannot be opened, the search. A channel that samples needs a kernel:
+ * tests/vm/guest/force_iio.c.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,8 +10,142 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <dirent.h>
-#include "../../../lib/device/daq/iio_force.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../../../lib/device/daq/iio_force.c"
 #include "converter.h"
+#include "found.h"
+
+/* --- spacing --- */
+
+#define T 100000 /* ns */
+#define START 5000000000LL
+
+static struct daq_feed *feed;
+static struct spacing spacing;
+
+static int spacing_setup(void **state)
+{
+	feed = aligned_alloc(_Alignof(struct daq_feed), sizeof(*feed));
+	memset(feed, 0, sizeof(*feed));
+	feed->info.bits = 12;
+	feed->info.rate_hz = 10000;
+	spacing_init(&spacing, feed, 10000);
+	return daq_feed_init(feed);
+}
+
+static int teardown(void **state)
+{
+	daq_feed_free(feed);
+	free(feed);
+	return 0;
+}
+
+/* The code says which conversion it was. */
+static void put(int64_t n, int64_t late_ns)
+{
+	spacing_put(&spacing, START + n * T + late_ns, (int32_t)(n & 4095));
+}
+
+/* All that came have the number of their conversion. */
+static void numbers_are_right(void)
+{
+	struct incise_force_sample sample;
+
+	spacing_flush(&spacing);
+	while (daq_feed_read(&feed->force, &sample, 1) == 1)
+		assert_int_equal(sample.code, sample.seq & 4095);
+}
+
+static void gaps(void **state)
+{
+	static const int lengths[] = {1, 2, 3, 10, 1000, 19999, 1000000};
+	uint64_t lost = 0, overflows = 0;
+	struct incise_force_info info;
+	int64_t n = 0;
+
+	for (size_t i = 0; i < sizeof(lengths) / sizeof(*lengths); i++) {
+		for (int k = 0; k < 100; k++)
+			put(n++, 0);
+		n += lengths[i];
+		lost += (uint64_t)lengths[i];
+		overflows++;
+	}
+	put(n, 0);
+	put(n + 1, 0);
+	numbers_are_right();
+	daq_feed_info(&feed->force, &info);
+	assert_int_equal(daq_feed_lost(&feed->force), lost);
+	assert_int_equal(info.overflows, overflows);
+}
+
+/* Up to just below a period late: told apart from a loss by what follows. */
+static void lateness_is_no_gap(void **state)
+{
+	for (int64_t n = 0; n < 20000; n++)
+		put(n, n % 7 == 3 ? (n % 100) * T / 101 : 0);
+	numbers_are_right();
+	assert_int_equal(daq_feed_lost(&feed->force), 0);
+}
+
+/* And a loss is one, when the sample behind it is late, too. */
+static void late_behind_a_gap(void **state)
+{
+	int64_t n = 0;
+
+	for (int i = 0; i < 1000; i++) {
+		put(n++, 0);
+		put(n++, 0);
+		n += i % 5;
+		put(n++, (i % 97) * T / 100);
+	}
+	numbers_are_right();
+	assert_int_equal(daq_feed_lost(&feed->force), 2000);
+}
+
+/* An oscillator that is 1 % off: after it has been seen, long gaps are right, too. */
+static void clock_is_off(void **state)
+{
+	static const double factors[] = {0.99, 1.01};
+
+	for (size_t i = 0; i < 2; i++) {
+		int64_t n = 0;
+
+		teardown(NULL);
+		spacing_setup(NULL);
+		for (; n < 30000; n++)
+			put(n, llround((double)(n * T) * (factors[i] - 1)));
+		n += 5000;
+		for (int k = 0; k < 100; k++, n++)
+			put(n, llround((double)(n * T) * (factors[i] - 1)));
+		numbers_are_right();
+		assert_int_equal(daq_feed_lost(&feed->force), 5000);
+	}
+}
+
+/* Nothing is computed beyond what numbers hold, and no sample is left out. */
+static void nonsense(void **state)
+{
+	static const int64_t stamps[] = {0, INT64_MAX, INT64_MIN, -1, 1, INT64_MAX / 2,
+					 0, 5,	       5,	  3};
+	struct incise_force_sample sample;
+	uint64_t last = 0;
+	int n = 0, total = 0;
+
+	for (int round = 0; round < 200; round++)
+		for (size_t i = 0; i < sizeof(stamps) / sizeof(*stamps); i++, total++)
+			spacing_put(&spacing, stamps[(i * 7 + (size_t)round) % 10], 1);
+	spacing_flush(&spacing);
+	while (daq_feed_read(&feed->force, &sample, 1) == 1) {
+		assert_true(!n || sample.seq > last);
+		last = sample.seq;
+		n++;
+	}
+	assert_int_equal(n, total);
+}
+
+/* --- iio_force --- */
 
 static int setup(void **state)
 {
@@ -56,7 +191,7 @@ static void refusals(void **state)
 		int before = open_files();
 
 		setup(NULL);
-		assert_null(iio_force_open(&request, &err));
+		assert_null(incise_force_iio.open(&request, &err));
 		if (errno != cases[i].code || !strstr(err.text, cases[i].says) ||
 		    strncmp(err.text, "rig.conf:3: force: ", 19) != 0)
 			fail_msg("case %zu: %d %s", i, errno, err.text);
@@ -70,10 +205,116 @@ static void refusals(void **state)
 	}
 }
 
+/* --- scan --- */
+
+static struct found found;
+
+static int scan_setup(void **state)
+{
+	world_reset();
+	found = (struct found){0};
+	return 0;
+}
+
+static int scan(const char *arguments)
+{
+	struct incise_error err = {0};
+	int rc = incise_force_iio.scan(arguments, keep, &found, &err);
+
+	/* Whatever it found, it leaves nothing open. */
+	assert_int_equal(world.made, 0);
+	return rc;
+}
+
+static void a_converter_is_told_of(void **state)
+{
+	const struct incise_scan_device *adc = &found.device[0];
+	static const char *const properties[][2] = {
+		{"id", "null"},		 {"name", "adc"},    {"channels", "1"},
+		{"channel", "voltage0"}, {"bits", "12"},     {"range_V", "-2.5 to 2.5"},
+		{"rate_hz", "1000"},	 {"trigger", "own"}, {"time_stamps", "kernel"},
+	};
+
+	assert_int_equal(scan(""), 0);
+	/* Triggers are devices too, and none of these. */
+	assert_int_equal(found.n, 1);
+	assert_string_equal(adc->device, "iio:adc");
+	assert_true(adc->usable);
+	for (size_t i = 0; i < sizeof(properties) / sizeof(*properties); i++)
+		assert_string_equal(told(adc, properties[i][0]), properties[i][1]);
+}
+
+static void two_of_a_name_go_by_number(void **state)
+{
+	world.devices[1] = world.devices[0];
+	world.devices[1].id = "iio:device7";
+	assert_int_equal(scan(""), 0);
+	assert_int_equal(found.n, 2);
+	assert_string_equal(found.device[0].device, "iio:null");
+	assert_string_equal(found.device[1].device, "iio:iio:device7");
+}
+
+static void what_cannot_be_used_is_told_as_such(void **state)
+{
+	struct iio_device *adc = &world.devices[0];
+
+	adc->channels[1].format.bits = 32; /* of incise_force_sample.code 31 are */
+	assert_int_equal(scan(""), 0);
+	assert_false(found.device[0].usable);
+	assert_string_equal(told(&found.device[0], "range_V"), "");
+	scan_setup(NULL);
+	adc->channels[2].id = "voltage1";
+	assert_int_equal(scan(""), 0);
+	assert_false(found.device[0].usable);
+	assert_string_equal(told(&found.device[0], "channels"), "2");
+	assert_string_equal(told(&found.device[0], "time_stamps"), "none");
+	/* Without a scale it is of use, once rig.conf says what the codes stand for. */
+	scan_setup(NULL);
+	adc->channels[1].attributes[0].key = "other";
+	assert_int_equal(scan(""), 0);
+	assert_true(found.device[0].usable);
+	assert_string_equal(told(&found.device[0], "range_V"), "");
+}
+
+static void by_name_and_without_any(void **state)
+{
+	static const struct {
+		const char *arguments;
+		int n;
+	} cases[] = {{"adc", 1}, {"null", 1}, {"other", 0}, {"own", 0}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		scan_setup(NULL);
+		assert_int_equal(scan(cases[i].arguments), 0);
+		if (found.n != cases[i].n)
+			fail_msg("%s: %d", cases[i].arguments, found.n);
+	}
+	scan_setup(NULL);
+	world.error = ENOSYS; /* no IIO in this kernel */
+	assert_int_equal(scan(""), 0);
+	assert_int_equal(found.n, 0);
+	scan_setup(NULL);
+	world.devices[1] = world.devices[0];
+	found.answer = -ENOMEM;
+	assert_int_equal(scan(""), -ENOMEM);
+	assert_int_equal(found.n, 1);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(gaps, spacing_setup, teardown),
+		cmocka_unit_test_setup_teardown(lateness_is_no_gap, spacing_setup,
+						teardown),
+		cmocka_unit_test_setup_teardown(late_behind_a_gap, spacing_setup,
+						teardown),
+		cmocka_unit_test_setup_teardown(clock_is_off, spacing_setup, teardown),
+		cmocka_unit_test_setup_teardown(nonsense, spacing_setup, teardown),
 		cmocka_unit_test(refusals),
+		cmocka_unit_test_setup(a_converter_is_told_of, scan_setup),
+		cmocka_unit_test_setup(two_of_a_name_go_by_number, scan_setup),
+		cmocka_unit_test_setup(what_cannot_be_used_is_told_as_such, scan_setup),
+		cmocka_unit_test_setup(by_name_and_without_any, scan_setup),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,19 +1,337 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/daq/iio_source.c on a converter that a test makes: what is set
- * and put back, and each refusal. The linker hands open() of a device's file to here.
+ * lib/device/daq/iio_source.c on a converter that a test simulates: formats, triggers in a folder that stands
+ * for configfs, rates, set-up and its refusals, and the buffer on files that stand for a device.
  */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <errno.h>
 #include <fcntl.h>
+#include <ftw.h>
 #include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
-#include "../../../lib/device/daq/iio_source.h"
+#include "../../../lib/device/daq/iio_source.c"
 #include "converter.h"
+
+/* --- format --- */
+
+/* As the kernel writes it in scan_elements/in_voltage0_type: "le:s12/16>>4". */
+static struct iio_data_format data_of(const char *type)
+{
+	struct iio_data_format data = {.repeat = 1};
+	char endian, sign;
+
+	if (sscanf(type, "%ce:%c%u/%uX%u>>%u", &endian, &sign, &data.bits, &data.length,
+		   &data.repeat, &data.shift) != 6)
+		assert_int_equal(sscanf(type, "%ce:%c%u/%u>>%u", &endian, &sign,
+					&data.bits, &data.length, &data.shift),
+				 5);
+	data.is_be = endian == 'b';
+	data.is_signed = sign == 's' || sign == 'S';
+	return data;
+}
+
+static void codes(void **state)
+{
+	static const struct {
+		const char *type;
+		unsigned char bytes[8];
+		uint64_t raw;
+		int32_t code;
+	} cases[] = {
+		{"le:u8/8>>0", {0xa5}, 0xa5, 0xa5},
+		{"le:s8/8>>0", {0x80}, 0x80, 0},
+		{"le:s8/8>>0", {0x7f}, 0x7f, 255},
+		{"le:u12/16>>0", {0x34, 0xf2}, 0x234, 0x234},
+		{"be:u12/16>>0", {0xf2, 0x34}, 0x234, 0x234},
+		{"le:u12/16>>4", {0x4f, 0x23}, 0x234, 0x234},
+		{"be:u12/16>>4", {0x23, 0x4f}, 0x234, 0x234},
+		{"le:s12/16>>0", {0x00, 0x08}, 0x800, 0},
+		{"le:s12/16>>0", {0xff, 0x07}, 0x7ff, 4095},
+		{"le:s12/16>>0", {0xff, 0xff}, 0xfff, 2047},
+		{"be:s12/16>>4", {0x80, 0x00}, 0x800, 0},
+		{"be:s12/16>>4", {0x00, 0x0f}, 0x000, 2048},
+		{"le:S16/16>>0", {0x00, 0x80}, 0x8000, 0},
+		{"be:u16/16>>0", {0xff, 0xff}, 0xffff, 65535},
+		{"be:u24/32>>8", {0x12, 0x34, 0x56, 0xff}, 0x123456, 0x123456},
+		{"be:s24/32>>8", {0x80, 0x00, 0x01, 0xff}, 0x800001, 1},
+		{"le:s24/32>>0", {0xff, 0xff, 0x7f, 0x00}, 0x7fffff, 0xffffff},
+		{"le:u31/32>>1", {0xff, 0xff, 0xff, 0xff}, 0x7fffffff, 0x7fffffff},
+		{"le:s31/64>>33", {0, 0, 0, 0, 0, 0, 0, 0x80}, 0x40000000, 0},
+		{"le:u1/8>>7", {0x80}, 1, 1},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct iio_data_format data = data_of(cases[i].type);
+		struct iio_format format = {0};
+
+		assert_int_equal(iio_format_of(&format, &data, 31), 0);
+		assert_int_equal(raw_value(&format, cases[i].bytes), cases[i].raw);
+		assert_int_equal(code_of(&format, cases[i].bytes), cases[i].code);
+	}
+}
+
+static void stamps(void **state)
+{
+	static const unsigned char le[8] = {8, 7, 6, 5, 4, 3, 2, 1};
+	struct iio_data_format data = data_of("le:s64/64>>0");
+	struct iio_format format = {0};
+
+	assert_int_equal(iio_format_of(&format, &data, 64), 0);
+	assert_int_equal(raw_value(&format, le), 0x0102030405060708);
+	data = data_of("be:s64/64>>0");
+	assert_int_equal(iio_format_of(&format, &data, 64), 0);
+	assert_int_equal(raw_value(&format, le), 0x0807060504030201);
+}
+
+/* A signed code grows with the voltage, through all of its range. */
+static void order(void **state)
+{
+	struct iio_data_format data = data_of("be:s10/16>>3");
+	struct iio_format format = {0};
+
+	assert_int_equal(iio_format_of(&format, &data, 31), 0);
+	for (int volts = -512; volts < 512; volts++) {
+		uint16_t stored = (uint16_t)((unsigned int)(volts & 0x3ff) << 3 | 5);
+		unsigned char bytes[2] = {stored >> 8, stored & 0xff};
+
+		assert_int_equal(code_of(&format, bytes), volts + 512);
+	}
+}
+
+static void formats_refused(void **state)
+{
+	static const char *const types[] = {
+		"le:u0/16>>0",	 "le:u12/12>>0",   "le:u17/16>>0",
+		"le:u12/16>>5",	 "le:u32/32>>0",   "le:u12/24>>0",
+		"le:u12/128>>0", "le:u12/16X2>>0", "le:u12/16>>4294967295",
+	};
+
+	for (size_t i = 0; i < sizeof(types) / sizeof(*types); i++) {
+		struct iio_data_format data = data_of(types[i]);
+		struct iio_format format = {0};
+
+		assert_int_equal(iio_format_of(&format, &data, 31), -EINVAL);
+	}
+}
+
+/* --- trigger --- */
+
+static char trigger_folder[64];
+
+static int trigger_setup(void **state)
+{
+	snprintf(trigger_folder, sizeof(trigger_folder), "/tmp/incise-test-XXXXXX");
+	return mkdtemp(trigger_folder) ? 0 : -1;
+}
+
+/* Fails where anything is left. */
+static int trigger_teardown(void **state)
+{
+	return rmdir(trigger_folder);
+}
+
+static bool there(const char *name)
+{
+	char path[200];
+
+	snprintf(path, sizeof(path), "%s/%s", trigger_folder, name);
+	return !access(path, F_OK);
+}
+
+static void make(const char *name)
+{
+	char path[200];
+
+	snprintf(path, sizeof(path), "%s/%s", trigger_folder, name);
+	assert_int_equal(mkdir(path, 0755), 0);
+}
+
+static void comes_and_goes(void **state)
+{
+	char one[64], two[64], expected[64];
+
+	assert_int_equal(make_trigger(trigger_folder, one, sizeof(one)), 0);
+	assert_int_equal(make_trigger(trigger_folder, two, sizeof(two)), 0);
+	snprintf(expected, sizeof(expected), "incise-%ld-0", (long)getpid());
+	assert_string_equal(one, expected);
+	snprintf(expected, sizeof(expected), "incise-%ld-1", (long)getpid());
+	assert_string_equal(two, expected);
+	/* this program lives: its own stay */
+	sweep_triggers(trigger_folder);
+	assert_true(there(one) && there(two));
+	remove_trigger(trigger_folder, one);
+	remove_trigger(trigger_folder, two);
+	remove_trigger(trigger_folder, "");
+	assert_false(there(one) || there(two));
+}
+
+static void kernel_without(void **state)
+{
+	char name[64];
+
+	assert_int_equal(make_trigger("/nonexistent", name, sizeof(name)), -ENOENT);
+	assert_string_equal(name, "");
+	sweep_triggers("/nonexistent");
+}
+
+static void too_many(void **state)
+{
+	char names[17][64];
+	int n = 0;
+
+	while (n < 17 && !make_trigger(trigger_folder, names[n], sizeof(*names)))
+		n++;
+	assert_int_equal(n, 16);
+	while (n--)
+		remove_trigger(trigger_folder, names[n]);
+}
+
+/* Only those of the dead, and only what has the form of ours. */
+static void sweep(void **state)
+{
+	static const char *const others[] = {"timer",	   "incise-",	 "incise-1",
+					     "incise-x-0", "incise-0-0", "incise--5-0",
+					     "incise-1-0"};
+	char dead[64], more[64];
+	pid_t child = fork();
+
+	if (!child)
+		_exit(0);
+	assert_int_equal(waitpid(child, NULL, 0), child);
+	snprintf(dead, sizeof(dead), "incise-%ld-3", (long)child);
+	snprintf(more, sizeof(more), "incise-%ld-3-x", (long)child);
+	make(dead);
+	make(more);
+	for (size_t i = 0; i < sizeof(others) / sizeof(*others); i++)
+		make(others[i]);
+	sweep_triggers(trigger_folder);
+	assert_false(there(dead));
+	assert_true(there(more));
+	remove_trigger(trigger_folder, more);
+	for (size_t i = 0; i < sizeof(others) / sizeof(*others); i++) {
+		assert_true(there(others[i]));
+		remove_trigger(trigger_folder, others[i]);
+	}
+}
+
+/* --- rate --- */
+
+static struct iio_source source;
+
+static struct attribute *own(void)
+{
+	return device_attribute(&world.devices[0], "sampling_frequency");
+}
+
+static struct attribute *timer(void)
+{
+	return device_attribute(&world.devices[2], "sampling_frequency");
+}
+
+static int rate_setup(void **state)
+{
+	world_reset();
+	source = (struct iio_source){.where = "rig.conf:3: force",
+				     .device = &world.devices[0],
+				     .voltage = &world.devices[0].channels[1]};
+	return 0;
+}
+
+static int set_to(double rate_hz, const struct iio_device *trigger,
+		  struct incise_error *err)
+{
+	*err = (struct incise_error){0};
+	source.setup.rate_hz = rate_hz;
+	return set_rate(&source, trigger, err);
+}
+
+/* Whole numbers without a point: some drivers take no other. */
+static void how_it_is_written(void **state)
+{
+	static const struct {
+		double rate_hz;
+		const char *text;
+	} cases[] = {
+		{1, "1"},
+		{10000, "10000"},
+		{1234.5, "1234.500"},
+		{99999.9996, "100000"},
+		{0.001, "0.001"},
+	};
+	struct incise_error err;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		rate_setup(NULL);
+		assert_int_equal(set_to(cases[i].rate_hz, NULL, &err), 0);
+		assert_string_equal(own()->text, cases[i].text);
+	}
+}
+
+/* A trigger's before the device's, that before the channel's. */
+static void where_it_is(void **state)
+{
+	struct incise_error err;
+
+	assert_int_equal(set_to(5000, &world.devices[2], &err), 0);
+	assert_string_equal(timer()->text, "5000");
+	assert_string_equal(own()->text, "5000");
+	assert_true(source.rate_hz == 5000);
+	rate_setup(NULL);
+	/* A trigger without one: the device makes the pace. */
+	assert_int_equal(set_to(4000, &world.devices[1], &err), 0);
+	assert_string_equal(own()->text, "4000");
+	rate_setup(NULL);
+	own()->key = "other";
+	source.voltage->attributes[2] =
+		(struct attribute){.key = "sampling_frequency", .text = "1"};
+	assert_int_equal(set_to(3000, NULL, &err), 0);
+	assert_string_equal(source.voltage->attributes[2].text, "3000");
+	rate_setup(NULL);
+	own()->key = "other";
+	assert_int_equal(set_to(3000, NULL, &err), -EOPNOTSUPP);
+	assert_non_null(strstr(err.text, "name a timer in force_setup.trigger"));
+}
+
+/* Converters divide a clock: within 1 % it is the rate that was asked for. */
+static void how_far_off_it_may_be(void **state)
+{
+	static const struct {
+		const char *is;
+		bool taken;
+	} cases[] = {
+		{"10099", true}, {"9901", true}, {"10101", false},
+		{"9899", false}, {"0", false},	 {"", false},
+		{"nan", false},	 {"inf", false}, {"-10000", false},
+	};
+	struct incise_error err;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		rate_setup(NULL);
+		own()->stuck = true;
+		strcpy(own()->text, cases[i].is);
+		if (set_to(10000, NULL, &err) != (cases[i].taken ? 0 : -EINVAL))
+			fail_msg("%s: %s", cases[i].is, err.text);
+		if (!cases[i].taken)
+			assert_non_null(strstr(err.text, "set force_setup.rate_hz"));
+	}
+	/* A converter that is slower than its trigger leaves some out. */
+	rate_setup(NULL);
+	own()->stuck = true;
+	strcpy(own()->text, "9000");
+	assert_int_equal(set_to(10000, &world.devices[2], &err), -EINVAL);
+	assert_non_null(strstr(err.text, "converts at 9000 Hz, its trigger at 10000 Hz"));
+}
+
+/* --- iio_source --- */
 
 static int open_error;
 static char folder[64];
@@ -41,7 +359,7 @@ static struct iio_device *adc(void)
 	return &world.devices[0];
 }
 
-static struct iio_channel *voltage(void)
+static struct iio_channel *the_voltage(void)
 {
 	return &adc()->channels[1];
 }
@@ -191,13 +509,13 @@ static void what_the_driver_does_not_say(void **state)
 			       .trigger_folder = folder,
 			       .setup = {.rate_hz = 10000, .full_scale_V = 3.3}};
 
-	voltage()->attributes[0].key = "sampling_frequency";
+	the_voltage()->attributes[0].key = "sampling_frequency";
 	adc()->attributes[2].key = "else";
-	voltage()->format.is_signed = true;
+	the_voltage()->format.is_signed = true;
 	assert_int_equal(iio_source_open(&s, "adc", &err), 0);
 	assert_true(s.full_scale_V == 3.3);
 	assert_true(s.offset_V == -1.65);
-	assert_string_equal(voltage()->attributes[0].text, "10000");
+	assert_string_equal(the_voltage()->attributes[0].text, "10000");
 	iio_source_close(&s);
 }
 
@@ -212,9 +530,9 @@ static void channels(void **state)
 		     {"voltage10", 10, true},	     {"current1", 1, false}};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		voltage()->id = cases[i].id;
-		assert_ptr_equal(iio_source_voltage(adc(), cases[i].channel),
-				 cases[i].found ? voltage() : NULL);
+		the_voltage()->id = cases[i].id;
+		assert_ptr_equal(find_voltage(adc(), cases[i].channel),
+				 cases[i].found ? the_voltage() : NULL);
 	}
 }
 
@@ -233,17 +551,17 @@ static void broken(int what)
 		open_error = EACCES;
 		break;
 	case 4:
-		voltage()->no_scan = true;
+		the_voltage()->no_scan = true;
 		break;
 	case 5:
 		adc()->n_channels = 2;
 		break;
 	case 6:
-		voltage()->format.bits = 32;
-		voltage()->format.length = 32;
+		the_voltage()->format.bits = 32;
+		the_voltage()->format.length = 32;
 		break;
 	case 7:
-		voltage()->attributes[0].key = "else";
+		the_voltage()->attributes[0].key = "else";
 		break;
 	case 8:
 		a[0].stuck = true;
@@ -326,9 +644,189 @@ static void refusals(void **state)
 	}
 }
 
+/* --- buffer --- */
+
+static char buffer_folder[64];
+static int ends[2];
+
+static void put(const char *name, const char *text)
+{
+	char path[200];
+	FILE *f;
+
+	snprintf(path, sizeof(path), "%s/%s", buffer_folder, name);
+	f = fopen(path, "w");
+	assert_non_null(f);
+	fputs(text, f);
+	fclose(f);
+}
+
+/* Files keep what was behind a shorter write: the first character tells. */
+static char first_of(const char *name)
+{
+	char path[200];
+	FILE *f;
+	int c;
+
+	snprintf(path, sizeof(path), "%s/%s", buffer_folder, name);
+	f = fopen(path, "r");
+	assert_non_null(f);
+	c = fgetc(f);
+	fclose(f);
+	return (char)c;
+}
+
+static int buffer_setup(void **state)
+{
+	static const char *const folders[] = {"", "/scan_elements", "/buffer"};
+	static const char *const files[] = {"in_voltage0_en", "in_voltage1_grip_en",
+					    "in_timestamp_en"};
+	char path[200];
+
+	snprintf(buffer_folder, sizeof(buffer_folder), "/tmp/incise-test-XXXXXX");
+	if (!mkdtemp(buffer_folder))
+		return -1;
+	for (size_t i = 1; i < 3; i++) {
+		snprintf(path, sizeof(path), "%s%s", buffer_folder, folders[i]);
+		mkdir(path, 0755);
+	}
+	for (size_t i = 0; i < 3; i++) {
+		snprintf(path, sizeof(path), "scan_elements/%s", files[i]);
+		put(path, "1");
+	}
+	put("buffer/length", "2");
+	put("buffer/watermark", "1");
+	put("buffer/enable", "0");
+	return pipe2(ends, O_NONBLOCK);
+}
+
+static int drop(const char *path, const struct stat *status, int type, struct FTW *at)
+{
+	return remove(path);
+}
+
+static int buffer_teardown(void **state)
+{
+	close(ends[0]);
+	close(ends[1]);
+	return nftw(buffer_folder, drop, 8, FTW_DEPTH | FTW_PHYS);
+}
+
+/* A converter of which the second channel, named, is sampled: "le:s24/32>>8". */
+static struct iio_source source_of(struct iio_channel *voltage,
+				   struct iio_channel *timestamp)
+{
+	*voltage = (struct iio_channel){.id = "voltage1", .name = "grip", .index = 1};
+	*timestamp = (struct iio_channel){.id = "timestamp", .index = 2};
+	return (struct iio_source){
+		.fd = ends[0],
+		.voltage = voltage,
+		.timestamp = timestamp,
+		.format = {.bytes = 4, .bits = 24, .shift = 8, .is_signed = true},
+		.timestamp_format = {.bytes = 8, .bits = 64, .is_signed = true},
+	};
+}
+
+static void starts_and_stops(void **state)
+{
+	struct iio_channel voltage, timestamp;
+	struct iio_source source = source_of(&voltage, &timestamp);
+
+	assert_int_equal(iio_source_start(&source, buffer_folder, 50, 7000), 0);
+	assert_int_equal(first_of("scan_elements/in_voltage0_en"), '0');
+	assert_int_equal(first_of("scan_elements/in_voltage1_grip_en"), '1');
+	assert_int_equal(first_of("scan_elements/in_timestamp_en"), '1');
+	assert_int_equal(first_of("buffer/length"), '7');
+	assert_int_equal(first_of("buffer/watermark"), '5');
+	assert_int_equal(first_of("buffer/enable"), '1');
+	iio_source_stop(&source);
+	assert_int_equal(first_of("buffer/enable"), '0');
+	assert_int_equal(first_of("scan_elements/in_timestamp_en"), '0');
+	iio_source_stop(&source);
+}
+
+static void does_not_start(void **state)
+{
+	struct iio_channel voltage, timestamp;
+	struct iio_source source = source_of(&voltage, &timestamp);
+
+	voltage.name = "other";
+	assert_int_equal(iio_source_start(&source, buffer_folder, 50, 7000), -ENOENT);
+	assert_int_equal(iio_source_start(&source, "/nonexistent", 50, 7000), -ENOENT);
+	iio_source_stop(&source);
+}
+
+/* Elements stand on multiples of their size, in the order of their index. */
+static void layouts(void **state)
+{
+	static const struct {
+		unsigned int bytes;
+		long index, stamp_index;
+		size_t step, voltage_at, stamp_at;
+	} cases[] = {
+		{1, 0, 1, 16, 0, 8}, {2, 0, 1, 16, 0, 8}, {4, 3, 9, 16, 0, 8},
+		{8, 0, 1, 16, 0, 8}, {2, 1, 0, 16, 8, 0}, {8, 1, 0, 16, 8, 0},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct iio_channel voltage, timestamp;
+		struct iio_source source = source_of(&voltage, &timestamp);
+
+		source.format.bytes = cases[i].bytes;
+		voltage.index = cases[i].index;
+		timestamp.index = cases[i].stamp_index;
+		assert_int_equal(iio_source_start(&source, buffer_folder, 5, 10), 0);
+		assert_int_equal(source.step, cases[i].step);
+		assert_int_equal(source.voltage_at, cases[i].voltage_at);
+		assert_int_equal(source.timestamp_at, cases[i].stamp_at);
+		iio_source_stop(&source);
+	}
+}
+
+static void scans_are_read(void **state)
+{
+	static const struct {
+		uint32_t volts;
+		uint32_t filling;
+		int64_t t_ns;
+	} scans[] = {{0x80000012, 7, 1}, {0x000001ff, 8, -2}, {0x7fffff00, 9, INT64_MAX}};
+	static const int32_t codes[] = {0, 0x800001, 0xffffff};
+	struct iio_channel voltage, timestamp;
+	struct iio_source source = source_of(&voltage, &timestamp);
+
+	assert_int_equal(iio_source_start(&source, buffer_folder, 5, 10), 0);
+	assert_int_equal(iio_source_read(&source), -EAGAIN);
+	assert_int_equal(write(ends[1], scans, sizeof(scans)), sizeof(scans));
+	assert_int_equal(iio_source_read(&source), 3);
+	for (int i = 0; i < 3; i++) {
+		assert_int_equal(iio_source_code(&source, i), codes[i]);
+		assert_true(iio_source_timestamp(&source, i) == scans[i].t_ns);
+	}
+	/* what no device does */
+	assert_int_equal(write(ends[1], scans, 7), 7);
+	assert_int_equal(iio_source_read(&source), -EIO);
+	source.fd = -1;
+	assert_int_equal(iio_source_read(&source), -EBADF);
+	iio_source_stop(&source);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(codes),
+		cmocka_unit_test(stamps),
+		cmocka_unit_test(order),
+		cmocka_unit_test(formats_refused),
+		cmocka_unit_test_setup_teardown(comes_and_goes, trigger_setup,
+						trigger_teardown),
+		cmocka_unit_test_setup_teardown(kernel_without, trigger_setup,
+						trigger_teardown),
+		cmocka_unit_test_setup_teardown(too_many, trigger_setup,
+						trigger_teardown),
+		cmocka_unit_test_setup_teardown(sweep, trigger_setup, trigger_teardown),
+		cmocka_unit_test_setup(how_it_is_written, rate_setup),
+		cmocka_unit_test_setup(where_it_is, rate_setup),
+		cmocka_unit_test_setup(how_far_off_it_may_be, rate_setup),
 		cmocka_unit_test_setup(is_set_up, setup),
 		cmocka_unit_test_setup(named_trigger, setup),
 		cmocka_unit_test_setup(own_trigger, setup),
@@ -337,6 +835,13 @@ int main(void)
 		cmocka_unit_test_setup(what_the_driver_does_not_say, setup),
 		cmocka_unit_test_setup(channels, setup),
 		cmocka_unit_test_setup(refusals, setup),
+		cmocka_unit_test_setup_teardown(starts_and_stops, buffer_setup,
+						buffer_teardown),
+		cmocka_unit_test_setup_teardown(does_not_start, buffer_setup,
+						buffer_teardown),
+		cmocka_unit_test_setup_teardown(layouts, buffer_setup, buffer_teardown),
+		cmocka_unit_test_setup_teardown(scans_are_read, buffer_setup,
+						buffer_teardown),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

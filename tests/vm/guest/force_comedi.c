@@ -23,7 +23,7 @@
 #include <unistd.h>
 
 #include <comedilib.h>
-#include "../../../lib/device/daq/comedi_force.h"
+#include "../../../lib/device/backends.h"
 #include "../hold.h"
 #include "../tap.h"
 
@@ -51,7 +51,7 @@ static struct incise_force *open_force(const char *device, int channel, double r
 		.arguments = device, .where = "test: force", .force = &setup};
 
 	*err = (struct incise_error){0};
-	return comedi_force_open(&request, err);
+	return incise_force_comedi.open(&request, err);
 }
 
 static int take(struct incise_force *force, int n)
@@ -285,7 +285,7 @@ int main(int argc, char **argv)
 		clipping();
 		return tap_failures != 0;
 	}
-	check(!comedi_force_scan("", found, &listed, &err) && listed == 1,
+	check(!incise_force_comedi.scan("", found, &listed, &err) && listed == 1,
 	      "it is listed once");
 	two_seconds();
 	overflow_is_counted();

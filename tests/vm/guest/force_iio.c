@@ -20,8 +20,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "../../../lib/device/daq/iio_force.h"
-#include "../../../lib/device/daq/iio_trigger.h"
+#include "../../../lib/device/backends.h"
+#include "../../../lib/device/daq/iio_source.h"
 #include "../hold.h"
 #include "../simulator.h"
 #include "../tap.h"
@@ -61,7 +61,7 @@ static struct incise_force *open_force(const char *device, const char *trigger,
 
 	*err = (struct incise_error){0};
 	snprintf(setup.trigger, sizeof(setup.trigger), "%s", trigger);
-	return iio_force_open(&request, err);
+	return incise_force_iio.open(&request, err);
 }
 
 /* Until there are @n, or none has come for @patience_ms. The last answer is in @rc. */
@@ -331,7 +331,7 @@ static void own_trigger_goes(void)
 	pid_t child;
 
 	snprintf(current, sizeof(current), "%s/trigger/current_trigger", device_folder());
-	snprintf(made, sizeof(made), IIO_TRIGGER_FOLDER "/incise-%d-0", getpid());
+	snprintf(made, sizeof(made), IIO_SOURCE_TRIGGERS "/incise-%d-0", getpid());
 	force = open_force(INCISE_SIM_ADC, "", HZ, &err);
 	check(force && !access(made, F_OK), "a trigger is made %s", err.text);
 	if (force)
@@ -344,7 +344,7 @@ static void own_trigger_goes(void)
 		raise(SIGKILL);
 	}
 	waitpid(child, NULL, 0);
-	snprintf(made, sizeof(made), IIO_TRIGGER_FOLDER "/incise-%d-0", child);
+	snprintf(made, sizeof(made), IIO_SOURCE_TRIGGERS "/incise-%d-0", child);
 	check(!access(made, F_OK), "a killed program leaves its trigger");
 	force = open_force(INCISE_SIM_ADC, "", HZ, &err);
 	check(force && access(made, F_OK), "the next one removes it %s", err.text);
@@ -368,7 +368,7 @@ static void is_listed(void)
 	struct incise_error err = {0};
 	int n = 0;
 
-	check(!iio_force_scan("", found, &n, &err) && n == 1, "it is listed once");
+	check(!incise_force_iio.scan("", found, &n, &err) && n == 1, "it is listed once");
 }
 
 /* The commands of the udev rules; then access as a member of the group. */
