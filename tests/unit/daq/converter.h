@@ -98,11 +98,13 @@ static struct attribute *channel_attribute(const struct iio_channel *c, const ch
 
 static ssize_t get(const struct attribute *a, char *to, size_t size)
 {
+	size_t length;
+
 	if (!a)
 		return -ENOENT;
-	*to = '\0';
-	strncat(to, a->text, size - 2);
-	strcat(to, a->line ? "\n" : "");
+	length = strnlen(a->text, size - 2);
+	memcpy(to, a->text, length);
+	strcpy(to + length, a->line ? "\n" : "");
 	return (ssize_t)strlen(to) + 1;
 }
 
