@@ -179,7 +179,8 @@ static void card_does_not_start(void **state)
  * Blocks of @block samples over @seconds, each late by @delay_ns and up to @jitter_ns more;
  * the card's clock is off by @ppm. The most that a stamp is off by in the last half, ns.
  */
-static double error_of(int block, double delay_ns, double jitter_ns, double ppm, int seconds)
+static double error_of(int block, double delay_ns, double jitter_ns, double ppm,
+		       int seconds)
 {
 	struct times stamps;
 	double period = T * (1 + ppm * 1e-6), most = 0;
@@ -229,8 +230,8 @@ static void times(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		double most = error_of(cases[i].block, cases[i].delay_ns, cases[i].jitter_ns,
-				  cases[i].ppm, 60);
+		double most = error_of(cases[i].block, cases[i].delay_ns,
+				       cases[i].jitter_ns, cases[i].ppm, 60);
 
 		if (most > cases[i].most_ns)
 			fail_msg("case %zu: off by %.0f ns", i, most);
