@@ -3,7 +3,7 @@
  * Validating a blob in full: after this no input can make an evaluator read outside of
  * it, shift by a wrong amount or overflow. Blobs come from files and go to kernels.
  */
-#include "division.h"
+#include "integers.h"
 #include "layout.h"
 
 /* Without errno.h, which a kernel does not have in this form. */
@@ -32,11 +32,6 @@ static int within(uint64_t offset, uint64_t n, uint32_t size, uint32_t align)
 {
 	return offset >= sizeof(struct incise_fx_header) && offset % align == 0 &&
 	       offset <= size && n <= size - offset;
-}
-
-static int32_t get32(const int32_t *values, uint64_t i)
-{
-	return (int32_t)incise_fx_le32((uint32_t)values[i]);
 }
 
 /* Supports, counts, and for tables that the cells reach over the whole support. */
@@ -76,7 +71,8 @@ static int check_mfs(const struct incise_fixed *fx, int i, uint32_t offset)
 	if (!within(offset, (uint64_t)in->n_mfs * sizeof(*mf), fx->size, 4))
 		return BAD;
 	for (int k = 0; k < in->n_mfs; k++) {
-		int32_t slope = get32(&mf[k].slope, 0), shift = get32(&mf[k].shift, 0);
+		int32_t slope = incise_fx_int32(mf[k].slope);
+		int32_t shift = incise_fx_int32(mf[k].shift);
 
 		/* (x - centre)·slope: 32 + 30 bits. */
 		if (slope < 0 || slope > 1 << 30 || shift < 0 || shift > 62)
@@ -85,7 +81,7 @@ static int check_mfs(const struct incise_fixed *fx, int i, uint32_t offset)
 	return 0;
 }
 
-/* No consequent may overflow the sums of incise_fx_direct() anywhere in the support. */
+/* No consequent may overflow the direct arithmetic's sums anywhere in the support. */
 static int check_direct(const struct incise_fixed *fx)
 {
 	const int64_t *p = fx->data;
@@ -101,7 +97,7 @@ static int check_direct(const struct incise_fixed *fx)
 		uint64_t sum = 0;
 
 		for (int i = 0; i <= n; i++) {
-			uint64_t c = magnitude((int64_t)incise_fx_le64((uint64_t)p[i]));
+			uint64_t c = magnitude(incise_fx_int64(p[i]));
 			uint64_t x = INCISE_FIXED_ONE;
 
 			if (i) {
@@ -118,11 +114,10 @@ static int check_direct(const struct incise_fixed *fx)
 		}
 		/* A rule is linear: its largest output is at a corner of the support. */
 		for (int corner = 0; corner < 1 << n; corner++) {
-			int64_t y = (int64_t)incise_fx_le64((uint64_t)p[0]) *
-				    INCISE_FIXED_ONE;
+			int64_t y = incise_fx_int64(p[0]) * INCISE_FIXED_ONE;
 
 			for (int i = 0; i < n; i++)
-				y += (int64_t)incise_fx_le64((uint64_t)p[i + 1]) *
+				y += incise_fx_int64(p[i + 1]) *
 				     (corner & 1 << i ? fx->input[i].max
 						      : fx->input[i].min);
 			/* One more, for the floor of a negative number. */
@@ -143,7 +138,7 @@ static int check_weights(const struct incise_fixed *fx)
 		int64_t sum = 0;
 
 		for (int i = 0; i < a->n_mfs; i++) {
-			int32_t w = get32(a->values, row * a->n_mfs + i);
+			int32_t w = incise_fx_int32(a->values[row * a->n_mfs + i]);
 
 			if (w < 0)
 				return BAD;
@@ -176,8 +171,9 @@ static int check_fold(const struct incise_fixed *fx)
 		return BAD;
 	for (int64_t row = 0; row <= fx->input[1].cells; row++)
 		for (int i = 0; i < n; i++) {
-			uint64_t g = magnitude(get32(fold, 2 * (row * n + i)));
-			uint64_t h = magnitude(get32(fold, 2 * (row * n + i) + 1));
+			uint64_t g = magnitude(incise_fx_int32(fold[2 * (row * n + i)]));
+			uint64_t h =
+				magnitude(incise_fx_int32(fold[2 * (row * n + i) + 1]));
 
 			/* One more of h: a sum of weights over 1 is floored away from 0. */
 			if (h + 1 > FOLD_MAX ||
@@ -187,7 +183,7 @@ static int check_fold(const struct incise_fixed *fx)
 	return 0;
 }
 
-/* The sections of a blob: where they are, and what is in them. */
+/* The sections of a blob: their places and their numbers. */
 static int check_data(const struct incise_fixed *fx, const struct incise_fx_header *head)
 {
 	uint32_t data = incise_fx_le32(head->data), n = (uint32_t)fx->n_inputs;
@@ -243,7 +239,7 @@ static int check_name(const char *name, int size)
 	return 0;
 }
 
-/* What says nothing in this version must be zero, so that a later one can use it. */
+/* Bytes without a meaning in this version must be zero, so that a later one can use them. */
 static int check_unused(const struct incise_fx_header *head)
 {
 	const uint8_t *input = (const uint8_t *)&head->input[1];
@@ -283,8 +279,8 @@ int incise_fixed_open(struct incise_fixed *fx, const void *blob, uint32_t size)
 			(enum incise_fixed_arithmetic)incise_fx_le32(head->arithmetic),
 		.n_inputs = (int32_t)incise_fx_le32(head->n_inputs),
 		.n_rules = (int32_t)incise_fx_le32(head->n_rules),
-		.shift_a = (int32_t)incise_fx_le32((uint32_t)head->shift_a),
-		.shift_b = (int32_t)incise_fx_le32((uint32_t)head->shift_b),
+		.shift_a = incise_fx_int32(head->shift_a),
+		.shift_b = incise_fx_int32(head->shift_b),
 		.bound = incise_fx_le64(head->bound),
 		.name = head->name,
 		.output = head->output,
@@ -305,8 +301,8 @@ int incise_fixed_open(struct incise_fixed *fx, const void *blob, uint32_t size)
 			return BAD;
 		fx->input[i] = (struct incise_fixed_input){
 			.name = in->name,
-			.min = (int32_t)incise_fx_le32((uint32_t)in->min),
-			.max = (int32_t)incise_fx_le32((uint32_t)in->max),
+			.min = incise_fx_int32(in->min),
+			.max = incise_fx_int32(in->max),
 			.n_mfs = (int32_t)incise_fx_le32(in->n_mfs),
 			.cell_shift = (int32_t)incise_fx_le32(in->cell_shift),
 			.cells = (int32_t)incise_fx_le32(in->cells),

@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * Integer types and their limits as C names them, in a kernel too: it has the types, but
- * other names for the limits.
+ * Integer types, their limits as C names them, and divisions of 64 bits as a kernel names
+ * them: a kernel has the types, other names for the limits, and on a processor of 32 bits no
+ * other divisions.
  */
 #ifndef INCISE_FX_INTEGERS_H
 #define INCISE_FX_INTEGERS_H
 
 #ifdef __KERNEL__
 #include <linux/limits.h>
+#include <linux/math64.h>
 #include <linux/types.h>
 
 #ifndef INT32_MAX
@@ -18,6 +20,27 @@
 #endif
 #else
 #include <stdint.h>
+
+static inline uint64_t div_u64(uint64_t dividend, uint32_t divisor)
+{
+	return dividend / divisor;
+}
+
+static inline uint64_t div64_u64(uint64_t dividend, uint64_t divisor)
+{
+	return dividend / divisor;
+}
+
+static inline int64_t div64_s64(int64_t dividend, int64_t divisor)
+{
+	return dividend / divisor;
+}
+
+static inline uint64_t div_u64_rem(uint64_t dividend, uint32_t divisor, uint32_t *rest)
+{
+	*rest = (uint32_t)(dividend % divisor);
+	return dividend / divisor;
+}
 #endif
 
 #endif

@@ -88,23 +88,29 @@ static inline uint64_t incise_fx_le64(uint64_t v)
 #endif
 }
 
+/* The same for signed numbers. */
+static inline int32_t incise_fx_int32(int32_t v)
+{
+	return (int32_t)incise_fx_le32((uint32_t)v);
+}
+
+static inline int64_t incise_fx_int64(int64_t v)
+{
+	return (int64_t)incise_fx_le64((uint64_t)v);
+}
+
 /* CRC-32C (Castagnoli) of n bytes. */
 uint32_t incise_fx_crc(const uint8_t *bytes, uint32_t n);
 
-/* Evaluators; inputs are distances from the support's lower end, clamped. Q16.16. */
-int64_t incise_fx_direct(const struct incise_fixed *fx,
-			 const uint32_t *from_min) INCISE_REALTIME;
-int64_t incise_fx_table(const struct incise_fixed *fx,
-			const uint32_t *from_min) INCISE_REALTIME;
-int64_t incise_fx_force(const struct incise_fixed *fx,
-			const uint32_t *from_min) INCISE_REALTIME;
-
 /*
- * The value of a table's column within a cell: from + (to - from)·frac/2^shift, floored.
+ * The value of a table's column within a cell, from neighbours in the blob:
+ * from + (to - from)·frac/2^shift, floored.
  */
 static inline int64_t incise_fx_lerp(int32_t from, int32_t to, uint32_t frac, int shift)
 {
-	return from + ((((int64_t)to - from) * frac) >> shift);
+	int64_t low = incise_fx_int32(from);
+
+	return low + (((incise_fx_int32(to) - low) * frac) >> shift);
 }
 
 #endif

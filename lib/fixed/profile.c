@@ -16,7 +16,7 @@
  *   velocity as Q16   (400·2^32 >> 8)·10⁹ < 2^63
  *   step times        tick_ns·way < 2^21·2^41 = 2^62
  */
-#include "division.h"
+#include "integers.h"
 #include "ramp.h"
 
 /* Without errno.h, which a kernel does not have in this form. */

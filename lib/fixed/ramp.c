@@ -22,7 +22,7 @@
  * with S(v + a) = S(v - a) + 2v + a < W + 2^43; where a is beyond all velocities, S is just
  * the velocity. So the largest number here, 2·S, stays below 2^64 - 2^60. It has no sign.
  */
-#include "division.h"
+#include "integers.h"
 #include "ramp.h"
 
 /* 2·S(v); n = ⌊v/a⌋. */

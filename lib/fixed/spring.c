@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
 /*
- * A spring along a direction, in integers; see incise/fixed_spring.h. Whatever the numbers
- * are, the steps stay within 63 bits:
+ * A spring along a direction, in integers; see spring.h. Whatever the numbers are,
+ * the steps stay within 63 bits:
  *
  *   P - P0                 held to ±2^30
  *   (P - P0)·u             3 · 2^30 · 2^31 < 2^63   Q46, rounded to Q16, held to 31 bits
@@ -10,9 +10,7 @@
  *
  * Numbers are held to as much below 0 as above, so that both sides are the same.
  */
-#include <incise/fixed_spring.h>
-
-#include "integers.h"
+#include "spring.h"
 
 /* P - P0 beyond this counts as this: 16384 mm. */
 #define AWAY_MAX (1 << 30)

@@ -1,18 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * Inputs by chance, the same in a kernel and in a program: what shows that both compute the
- * same bits. Seed s, then for k = 0 … n-1 in this order:
+ * Random inputs, the same in a kernel and in a program: they show that both compute the same
+ * bits. Seed s, then for k = 0 … n-1 in this order:
  *
  *   x[0], x[1] …     of the evaluator, a quarter of the support beyond either end too
- *   spring, p        of the plane constraint: any numbers, its door says that all are safe
+ *   spring, p        of the plane constraint: any numbers: all are safe, see spring.h
  */
 #ifndef INCISE_FX_TRIAL_H
 #define INCISE_FX_TRIAL_H
 
 #include <incise/fixed.h>
-#include <incise/fixed_spring.h>
 
-#include "integers.h"
+#include "spring.h"
 
 #define INCISE_FX_TRIAL_MAX 1000000
 

@@ -155,16 +155,12 @@ static const char direct_one_text[] =
 
 /* ---- the numbers ---- */
 
-static int32_t get32(const int32_t *values, size_t i)
-{
-	return (int32_t)incise_fx_le32((uint32_t)values[i]);
-}
-
 static void put_array(FILE *out, const char *name, const int32_t *values, size_t n)
 {
 	fprintf(out, "static const int32_t %s[%zu] = {", name, n);
 	for (size_t i = 0; i < n; i++)
-		fprintf(out, "%s%" PRId32 ",", i % 8 ? " " : "\n\t", get32(values, i));
+		fprintf(out, "%s%" PRId32 ",", i % 8 ? " " : "\n\t",
+			incise_fx_int32(values[i]));
 	fputs("\n};\n\n", out);
 }
 
@@ -176,7 +172,8 @@ static void put_functions(FILE *out, const struct incise_fixed *fx, int i)
 		i);
 	for (int k = 0; k < fx->input[i].n_mfs; k++, v += 4)
 		fprintf(out, "\t{%" PRId32 ", %" PRId32 ", %" PRId32 ", %" PRId32 "},\n",
-			get32(v, 0), get32(v, 1), get32(v, 2), get32(v, 3));
+			incise_fx_int32(v[0]), incise_fx_int32(v[1]),
+			incise_fx_int32(v[2]), incise_fx_int32(v[3]));
 	fputs("};\n\n", out);
 }
 
@@ -192,8 +189,7 @@ static void put_consequents(FILE *out, const struct incise_fixed *fx)
 	for (int r = 0; r < fx->n_rules; r++) {
 		fputc('\t', out);
 		for (int k = 0; k < n; k++)
-			fprintf(out, "INT64_C(%" PRId64 "),%c",
-				(int64_t)incise_fx_le64((uint64_t)*p++),
+			fprintf(out, "INT64_C(%" PRId64 "),%c", incise_fx_int64(*p++),
 				k + 1 < n ? ' ' : '\n');
 	}
 	fputs("};\n\n", out);

@@ -1,38 +1,414 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * MATLAB's .fis file: a model is read from it section by section; see fis_reader.h.
+ * MATLAB's .fis file, read and written. Every number read is checked, and an error names
+ * file and line; numbers are written with 17 significant digits, so that the same model is
+ * read again.
+ *
+ *   [System]  Type='sugeno' NumInputs=2 NumRules=20 AndMethod='prod' …
+ *   [Input1]  Name='depth_mm' Range=[0 20] NumMFs=5 MF1='in1mf1':'gaussmf',[2.1 0]
+ *   [Output1] MF1='out1mf1':'linear',[p1 p2 p0]
+ *   [Rules]   1 1, 1 (1) : 1
  */
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/outfile.h>
 #include "../base/c_locale.h"
-#include "fis_reader.h"
+#include "model.h"
 
-static int read_file(struct incise_fis_reader *in)
+/* A consequent as the file has it; rules refer to it by number. */
+struct consequent {
+	bool seen, constant;
+	double p[INCISE_MODEL_INPUTS_MAX + 1];
+};
+
+struct reader {
+	FILE *file;
+	const char *path;
+	int line;
+	char *text; /* of the line, without white space at its ends */
+	size_t size;
+	struct incise_error *err;
+	struct incise_model *model;
+	/* What has been seen so far; bits of MFs by number. */
+	bool system, output, rules;
+	int n_rules; /* promised */
+	int n_out_mfs;
+	uint32_t inputs_seen;
+	uint32_t ranges_seen;
+	uint64_t mfs_seen[INCISE_MODEL_INPUTS_MAX];
+	struct consequent out[INCISE_MODEL_RULES_MAX];
+};
+
+/* --- lines, names and numbers --- */
+
+/* The error with the place in front; returns -code. */
+static int fail(struct reader *in, int code, const char *fmt, ...)
+{
+	char what[300];
+	va_list args;
+
+	va_start(args, fmt);
+	vsnprintf(what, sizeof(what), fmt, args);
+	va_end(args);
+	return incise_error_set(in->err, code, "%s:%d: %s", in->path, in->line, what);
+}
+
+/* Next line that says something: 1, or 0 at the end of the file. */
+static int next_line(struct reader *in)
+{
+	static const char space[] = " \t\r\n";
+	ssize_t n;
+
+	while ((n = getline(&in->text, &in->size, in->file)) >= 0) {
+		size_t skip;
+
+		in->line++;
+		if (memchr(in->text, 0, n))
+			return fail(in, EINVAL, "a NUL byte: not a .fis file");
+		while (n > 0 && strchr(space, in->text[n - 1]))
+			in->text[--n] = 0;
+		skip = strspn(in->text, space);
+		memmove(in->text, in->text + skip, n - skip + 1);
+		if (*in->text && *in->text != '%' && *in->text != '#')
+			return 1;
+	}
+	/* getline(3) fails without memory, too. */
+	if (!feof(in->file))
+		return incise_error_set(in->err, errno ? errno : EIO,
+					"%s: %s; give a .fis file", in->path,
+					strerror(errno ? errno : EIO));
+	return 0;
+}
+
+/* 'NAME' at *text, which moves behind it. */
+static int read_quoted(struct reader *in, const char **text, char *name)
+{
+	const char *end = **text == '\'' ? strchr(*text + 1, '\'') : NULL;
+
+	if (!end)
+		return fail(in, EINVAL, "expected a name in single quotes at '%.20s'",
+			    *text);
+	if (end - *text - 1 >= INCISE_MODEL_NAME_MAX)
+		return fail(in, EINVAL, "a name is longer than %d bytes",
+			    INCISE_MODEL_NAME_MAX - 1);
+	memcpy(name, *text + 1, end - *text - 1);
+	name[end - *text - 1] = 0;
+	*text = end + 1;
+	return 0;
+}
+
+/* [a b c]: just n finite numbers, then the end of the line. */
+static int read_numbers(struct reader *in, const char *text, double *values, int n)
+{
+	if (*text++ != '[')
+		return fail(in, EINVAL, "expected %d numbers in brackets", n);
+	for (int i = 0; i < n; i++) {
+		char *end;
+
+		values[i] = strtod(text, &end);
+		if (end == text)
+			return fail(
+				in, EINVAL,
+				"expected %d numbers in brackets, number %d is '%.20s'",
+				n, i + 1, text);
+		if (!isfinite(values[i]))
+			return fail(in, EINVAL, "number %d is not finite", i + 1);
+		text = end + strspn(end, " \t,;");
+	}
+	if (strcmp(text, "]"))
+		return fail(in, EINVAL, "expected ']' after %d numbers, found '%.20s'", n,
+			    text);
+	return 0;
+}
+
+/* A whole number from min to max, then the end of the line. */
+static int read_whole(struct reader *in, const char *key, const char *text, int min,
+		      int max, int *value)
+{
+	char *end;
+	long v = strtol(text, &end, 10);
+
+	if (end == text || *end || v < min || v > max)
+		return fail(in, v > max ? E2BIG : EINVAL, "%s=%.20s: expected %d to %d",
+			    key, text, min, max);
+	*value = v;
+	return 0;
+}
+
+/* --- keys of the sections --- */
+
+/* A key of [System]; those that do not change a Sugeno model's output are passed over. */
+static int system_key(struct reader *in, const char *key, const char *value)
+{
+	static const struct {
+		const char *key, *value;
+	} must[] = {
+		{"Type", "sugeno"},
+		{"DefuzzMethod", "wtaver"},
+	};
+	struct incise_model *model = in->model;
+	char word[INCISE_MODEL_NAME_MAX];
+	int n, rc;
+
+	if (!strcmp(key, "Name"))
+		return read_quoted(in, &value, model->name);
+	if (!strcmp(key, "NumInputs"))
+		return read_whole(in, key, value, 1, INCISE_MODEL_INPUTS_MAX,
+				  &model->n_inputs);
+	if (!strcmp(key, "NumOutputs"))
+		return read_whole(in, key, value, 1, 1, &n);
+	if (!strcmp(key, "NumRules"))
+		return read_whole(in, key, value, 1, INCISE_MODEL_RULES_MAX,
+				  &in->n_rules);
+	if (!strcmp(key, "AndMethod")) {
+		rc = read_quoted(in, &value, word);
+		if (!rc && strcmp(word, "prod") && strcmp(word, "min"))
+			rc = fail(in, ENOTSUP,
+				  "AndMethod='%s': only 'prod' and 'min' are supported",
+				  word);
+		model->and_method =
+			!rc && !strcmp(word, "min") ? INCISE_AND_MIN : INCISE_AND_PROD;
+		return rc;
+	}
+	for (size_t i = 0; i < sizeof(must) / sizeof(*must); i++) {
+		if (strcmp(key, must[i].key))
+			continue;
+		rc = read_quoted(in, &value, word);
+		if (!rc && strcmp(word, must[i].value))
+			rc = fail(in, ENOTSUP,
+				  "%s='%s': only '%s' is supported; convert the model to "
+				  "Sugeno with wtaver",
+				  key, word, must[i].value);
+		return rc;
+	}
+	return 0;
+}
+
+/* MFn='name':'kind',[…]: name and kind; *value moves to the bracket. */
+static int mf_head(struct reader *in, const char *key, const char **value, int n_mfs,
+		   int *number, char *name, char *kind)
+{
+	int rc;
+
+	if (!n_mfs)
+		return fail(in, EINVAL, "%.20s before NumMFs", key);
+	rc = read_whole(in, "MF", key + 2, 1, n_mfs, number);
+	if (!rc)
+		rc = read_quoted(in, value, name);
+	if (!rc && *(*value)++ != ':')
+		rc = fail(in, EINVAL, "expected ':' after the function's name");
+	if (!rc)
+		rc = read_quoted(in, value, kind);
+	if (!rc && *(*value)++ != ',')
+		rc = fail(in, EINVAL, "expected ',' after the function's kind");
+	*value += rc ? 0 : strspn(*value, " \t");
+	--*number;
+	return rc;
+}
+
+static int variable_key(struct reader *in, struct incise_variable *v, const char *key,
+			const char *value)
+{
+	double range[2];
+	int rc;
+
+	if (!strcmp(key, "Name"))
+		return read_quoted(in, &value, v->name);
+	if (strcmp(key, "Range"))
+		return 0;
+	rc = read_numbers(in, value, range, 2);
+	if (rc)
+		return rc;
+	v->min = range[0];
+	v->max = range[1];
+	if (!(v->min < v->max) || !isfinite(v->max - v->min))
+		return fail(in, EINVAL,
+			    "Range: the first number must be the smaller one");
+	return 0;
+}
+
+/* A key of an input's section, i from 0 on. */
+static int input_key(struct reader *in, int i, const char *key, const char *value)
+{
+	struct incise_model *model = in->model;
+	char name[INCISE_MODEL_NAME_MAX], kind[INCISE_MODEL_NAME_MAX];
+	struct incise_mf *mf;
+	const char *fault;
+	int k, type, rc;
+
+	if (!strcmp(key, "Range"))
+		in->ranges_seen |= 1u << i;
+	if (!strcmp(key, "NumMFs"))
+		return read_whole(in, key, value, 1, INCISE_MODEL_MFS_MAX,
+				  &model->n_mfs[i]);
+	if (strncmp(key, "MF", 2))
+		return variable_key(in, &model->input[i], key, value);
+	rc = mf_head(in, key, &value, model->n_mfs[i], &k, name, kind);
+	if (rc)
+		return rc;
+	type = incise_mf_type_find(kind);
+	if (type < 0)
+		return fail(
+			in, ENOTSUP,
+			"membership function '%s' is not supported; gaussmf, gauss2mf, "
+			"gbellmf, trimf, trapmf and sigmf are",
+			kind);
+	mf = &model->mf[i][k];
+	mf->type = type;
+	strcpy(mf->name, name);
+	rc = read_numbers(in, value, mf->p, incise_mf_n_params(type));
+	fault = rc ? NULL : incise_mf_fault(type, mf->p);
+	if (fault)
+		rc = fail(in, EINVAL, "function %s, a %s: %s", name, kind, fault);
+	in->mfs_seen[i] |= 1ull << k;
+	return rc;
+}
+
+static int output_key(struct reader *in, const char *key, const char *value)
+{
+	struct incise_model *model = in->model;
+	char name[INCISE_MODEL_NAME_MAX], kind[INCISE_MODEL_NAME_MAX];
+	double p[INCISE_MODEL_INPUTS_MAX + 1] = {0};
+	struct consequent *out;
+	int k, rc;
+
+	if (!strcmp(key, "NumMFs"))
+		return read_whole(in, key, value, 1, INCISE_MODEL_RULES_MAX,
+				  &in->n_out_mfs);
+	if (strncmp(key, "MF", 2))
+		return variable_key(in, &model->output, key, value);
+	rc = mf_head(in, key, &value, in->n_out_mfs, &k, name, kind);
+	if (rc)
+		return rc;
+	out = &in->out[k];
+	out->constant = !strcmp(kind, "constant");
+	if (!out->constant && strcmp(kind, "linear"))
+		return fail(in, ENOTSUP,
+			    "consequent '%s' is not supported; linear and constant are",
+			    kind);
+	/* The file has the constant last. */
+	rc = read_numbers(in, value, p, out->constant ? 1 : model->n_inputs + 1);
+	if (rc)
+		return rc;
+	out->seen = true;
+	out->p[0] = out->constant ? p[0] : p[model->n_inputs];
+	for (int i = 0; i < model->n_inputs; i++)
+		out->p[i + 1] = out->constant ? 0 : p[i];
+	return 0;
+}
+
+/* --- rules --- */
+
+/* What must have been said before [Rules] can be read. */
+static int check_variables(struct reader *in)
+{
+	struct incise_model *model = in->model;
+
+	if (!in->system || !model->n_inputs || !in->n_rules)
+		return fail(in, EINVAL,
+			    "[Rules] before NumInputs and NumRules in [System]");
+	for (int i = 0; i < model->n_inputs; i++) {
+		if (!(in->inputs_seen & 1u << i) || !(in->ranges_seen & 1u << i))
+			return fail(in, EINVAL, "[Rules] before [Input%d] with its Range",
+				    i + 1);
+		if (!model->n_mfs[i] || in->mfs_seen[i] != (1ull << model->n_mfs[i]) - 1)
+			return fail(in, EINVAL,
+				    "[Input%d] has not all of its NumMFs=%d functions",
+				    i + 1, model->n_mfs[i]);
+	}
+	if (!in->output)
+		return fail(in, EINVAL, "[Rules] before [Output1]");
+	return 0;
+}
+
+/* "1 2, 3 (1) : 1" */
+static int read_rule(struct reader *in)
+{
+	struct incise_model *model = in->model;
+	struct incise_rule *rule = &model->rule[model->n_rules];
+	const char *text = in->text;
+	int n_used = 0;
+	long v;
+	char *end;
+
+	if (model->n_rules == in->n_rules)
+		return fail(in, EINVAL, "more rules than NumRules=%d", in->n_rules);
+	for (int i = 0; i < model->n_inputs; i++) {
+		v = strtol(text, &end, 10);
+		if (end == text || v > model->n_mfs[i])
+			return fail(in, EINVAL,
+				    "rule %d: input %d: expected a number from 0 to %d",
+				    model->n_rules + 1, i + 1, model->n_mfs[i]);
+		if (v < 0)
+			return fail(in, ENOTSUP, "rule %d: 'not' (%ld) is not supported",
+				    model->n_rules + 1, v);
+		rule->mf[i] = v - 1;
+		n_used += v > 0;
+		text = end;
+	}
+	text += strspn(text, " \t");
+	if (*text++ != ',')
+		return fail(in, EINVAL, "rule %d: expected ',' after %d inputs",
+			    model->n_rules + 1, model->n_inputs);
+	v = strtol(text, &end, 10);
+	if (end == text || v < 1 || v > in->n_out_mfs)
+		return fail(in, EINVAL, "rule %d: expected a consequent from 1 to %d",
+			    model->n_rules + 1, in->n_out_mfs);
+	if (!in->out[v - 1].seen)
+		return fail(in, EINVAL, "rule %d: consequent MF%ld is missing",
+			    model->n_rules + 1, v);
+	memcpy(rule->p, in->out[v - 1].p, sizeof(rule->p));
+	rule->constant = in->out[v - 1].constant;
+	text = end + strspn(end, " \t");
+	if (*text++ != '(')
+		return fail(in, EINVAL, "rule %d: expected a weight in parentheses",
+			    model->n_rules + 1);
+	rule->weight = strtod(text, &end);
+	if (end == text || *end != ')' || !(rule->weight >= 0 && rule->weight <= 1))
+		return fail(in, EINVAL, "rule %d: expected a weight from 0 to 1",
+			    model->n_rules + 1);
+	text = end + 1 + strspn(end + 1, " \t");
+	if (*text++ != ':')
+		return fail(in, EINVAL, "rule %d: expected ': 1' at the end",
+			    model->n_rules + 1);
+	v = strtol(text, &end, 10);
+	if (end == text || *end || (v != 1 && v != 2))
+		return fail(in, EINVAL, "rule %d: expected ': 1' at the end",
+			    model->n_rules + 1);
+	/* Of one input, 'or' and 'and' are the same. */
+	if (v == 2 && n_used != 1)
+		return fail(in, ENOTSUP, "rule %d: 'or' (: 2) is not supported",
+			    model->n_rules + 1);
+	model->n_rules++;
+	return 0;
+}
+
+/* --- the whole file --- */
+
+static int read_file(struct reader *in)
 {
 	enum { NONE, SYSTEM, INPUT, OUTPUT, RULES } section = NONE;
 	int input = 0, rc;
 
-	while ((rc = incise_fis_next_line(in)) > 0) {
+	while ((rc = next_line(in)) > 0) {
 		char *equals, *value;
 		int end = 0;
 
 		if (*in->text == '[') {
 			/* Nothing that rules refer to may change behind them. */
 			if (section == RULES)
-				return incise_fis_fail(in, EINVAL, "%.40s after [Rules]",
-						       in->text);
+				return fail(in, EINVAL, "%.40s after [Rules]", in->text);
 			if (!strcmp(in->text, "[System]")) {
 				section = SYSTEM;
 				in->system = true;
 			} else if (sscanf(in->text, "[Input%d]%n", &input, &end) == 1 &&
 				   end) {
 				if (input < 1 || input > in->model->n_inputs)
-					return incise_fis_fail(in, EINVAL,
-							       "%.20s: NumInputs is %d",
-							       in->text,
-							       in->model->n_inputs);
+					return fail(in, EINVAL, "%.20s: NumInputs is %d",
+						    in->text, in->model->n_inputs);
 				in->inputs_seen |= 1u << --input;
 				section = INPUT;
 			} else if (!strcmp(in->text, "[Output1]")) {
@@ -41,57 +417,56 @@ static int read_file(struct incise_fis_reader *in)
 			} else if (!strcmp(in->text, "[Rules]")) {
 				section = RULES;
 				in->rules = true;
-				rc = incise_fis_check_variables(in);
+				rc = check_variables(in);
 				if (rc)
 					return rc;
 			} else {
-				return incise_fis_fail(in, ENOTSUP,
-						       "unknown section %.40s", in->text);
+				return fail(in, ENOTSUP, "unknown section %.40s",
+					    in->text);
 			}
 			continue;
 		}
 		if (section == RULES) {
-			rc = incise_fis_rule(in);
+			rc = read_rule(in);
 			if (rc)
 				return rc;
 			continue;
 		}
 		equals = strchr(in->text, '=');
 		if (!equals || section == NONE)
-			return incise_fis_fail(
+			return fail(
 				in, EINVAL,
 				"expected [System] or KEY=VALUE, found '%.40s': is this a "
 				".fis file?",
 				in->text);
 		*equals = 0;
 		value = equals + 1;
-		rc = section == SYSTEM	? incise_fis_system_key(in, in->text, value)
-		     : section == INPUT ? incise_fis_input_key(in, input, in->text, value)
-					: incise_fis_output_key(in, in->text, value);
+		rc = section == SYSTEM	? system_key(in, in->text, value)
+		     : section == INPUT ? input_key(in, input, in->text, value)
+					: output_key(in, in->text, value);
 		if (rc)
 			return rc;
 	}
 	if (rc)
 		return rc;
 	if (!in->system)
-		return incise_fis_fail(
-			in, EINVAL,
-			"the file is empty or has no [System]: is it a .fis file?");
+		return fail(in, EINVAL,
+			    "the file is empty or has no [System]: is it a .fis file?");
 	if (!in->rules || in->model->n_rules != in->n_rules)
-		return incise_fis_fail(
+		return fail(
 			in, EINVAL,
 			"the file ends after %d of %d rules: it is truncated; write it again",
 			in->model->n_rules, in->n_rules);
 	for (int r = 0; r < in->n_rules; r++)
 		if (in->model->rule[r].weight > 0)
 			return 0;
-	return incise_fis_fail(in, EINVAL, "all rules have weight 0: none ever fires");
+	return fail(in, EINVAL, "all rules have weight 0: none ever fires");
 }
 
 struct incise_model *incise_model_load(const char *path, struct incise_error *err)
 {
 	struct incise_c_locale locale;
-	struct incise_fis_reader *in = calloc(1, sizeof(*in));
+	struct reader *in = calloc(1, sizeof(*in));
 	struct incise_model *model = calloc(1, sizeof(*model));
 	int rc = -ENOMEM;
 
@@ -99,7 +474,7 @@ struct incise_model *incise_model_load(const char *path, struct incise_error *er
 		rc = incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
 		goto out;
 	}
-	*in = (struct incise_fis_reader){.path = path, .err = err, .model = model};
+	*in = (struct reader){.path = path, .err = err, .model = model};
 	model->clamp = true;
 	in->file = strcmp(path, "-") ? fopen(path, "re") : stdin;
 	if (!in->file) {
@@ -122,4 +497,87 @@ out:
 	}
 	incise_model_classify(model);
 	return model;
+}
+
+/* --- writing --- */
+
+/* A name within single quotes: what would end it early or break the line is replaced. */
+static void write_name(FILE *out, const char *key, const char *name)
+{
+	fprintf(out, "%s='", key);
+	for (; *name; name++)
+		fputc(*name == '\'' || (unsigned char)*name < ' ' ? '_' : *name, out);
+	fputc('\'', out);
+}
+
+static void write_mf(FILE *out, const struct incise_mf *mf, int number)
+{
+	char key[16];
+
+	snprintf(key, sizeof(key), "MF%d", number);
+	write_name(out, key, mf->name);
+	fprintf(out, ":'%s',[", incise_mf_type_name(mf->type));
+	for (int i = 0; i < incise_mf_n_params(mf->type); i++)
+		fprintf(out, "%s%.17g", i ? " " : "", mf->p[i]);
+	fputs("]\n", out);
+}
+
+static void write_model(const struct incise_model *model, FILE *out)
+{
+	fputs("[System]\n", out);
+	write_name(out, "Name", model->name);
+	fprintf(out,
+		"\nType='sugeno'\nVersion=2.0\nNumInputs=%d\nNumOutputs=1\nNumRules=%d\n"
+		"AndMethod='%s'\nOrMethod='probor'\nImpMethod='prod'\nAggMethod='sum'\n"
+		"DefuzzMethod='wtaver'\n",
+		model->n_inputs, model->n_rules,
+		model->and_method == INCISE_AND_MIN ? "min" : "prod");
+	for (int i = 0; i < model->n_inputs; i++) {
+		const struct incise_variable *v = &model->input[i];
+
+		fprintf(out, "\n[Input%d]\n", i + 1);
+		write_name(out, "Name", v->name);
+		fprintf(out, "\nRange=[%.17g %.17g]\nNumMFs=%d\n", v->min, v->max,
+			model->n_mfs[i]);
+		for (int k = 0; k < model->n_mfs[i]; k++)
+			write_mf(out, &model->mf[i][k], k + 1);
+	}
+	fputs("\n[Output1]\n", out);
+	write_name(out, "Name", model->output.name);
+	/* A file need not name the range of its output. */
+	if (model->output.min < model->output.max)
+		fprintf(out, "\nRange=[%.17g %.17g]", model->output.min,
+			model->output.max);
+	fprintf(out, "\nNumMFs=%d\n", model->n_rules);
+	for (int r = 0; r < model->n_rules; r++) {
+		const struct incise_rule *rule = &model->rule[r];
+
+		fprintf(out, "MF%d='out1mf%d':'%s',[", r + 1, r + 1,
+			rule->constant ? "constant" : "linear");
+		for (int i = 0; i < model->n_inputs && !rule->constant; i++)
+			fprintf(out, "%.17g ", rule->p[i + 1]);
+		fprintf(out, "%.17g]\n", rule->p[0]);
+	}
+	fputs("\n[Rules]\n", out);
+	for (int r = 0; r < model->n_rules; r++) {
+		const struct incise_rule *rule = &model->rule[r];
+
+		for (int i = 0; i < model->n_inputs; i++)
+			fprintf(out, "%s%d", i ? " " : "", rule->mf[i] + 1);
+		fprintf(out, ", %d (%.17g) : 1\n", r + 1, rule->weight);
+	}
+}
+
+int incise_model_save(const struct incise_model *model, const char *path,
+		      struct incise_error *err)
+{
+	struct incise_outfile *file = incise_outfile_open(path, err);
+	struct incise_c_locale locale;
+
+	if (!file)
+		return -errno;
+	locale = incise_c_locale_begin();
+	write_model(model, incise_outfile_stream(file));
+	incise_c_locale_end(locale);
+	return incise_outfile_commit(file, err);
 }

@@ -207,11 +207,6 @@ const char *incise_model_name(const struct incise_model *model)
 	return model->name;
 }
 
-void incise_model_set_name(struct incise_model *model, const char *name)
-{
-	snprintf(model->name, sizeof(model->name), "%s", name);
-}
-
 int incise_model_n_inputs(const struct incise_model *model)
 {
 	return model->n_inputs;

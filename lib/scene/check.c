@@ -8,7 +8,7 @@
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
-#include <incise/slope.h>
+#include "../model/slope.h"
 #include "../control/pose_loop.h"
 #include "plan.h"
 

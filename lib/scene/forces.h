@@ -10,7 +10,7 @@
 
 #include <stdbool.h>
 #include <incise/export.h>
-#include <incise/fixed_spring.h>
+#include "../fixed/spring.h"
 
 /* A plan keeps at most INCISE_PLAN_STAGES_MAX stages, forces among them. */
 #define INCISE_FORCES_MAX 7

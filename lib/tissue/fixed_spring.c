@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * Floating-point companions of lib/fixed/spring.c: take a spring from
- * double, and bound its error; see incise/fixed_spring.h.
+ * double, and bound its error; see spring.h.
  */
 #include <errno.h>
 #include <math.h>
 #include <incise/fixed.h>
-#include <incise/fixed_spring.h>
+#include "../fixed/spring.h"
 #include "../base/vector.h"
 
 /* Q16.16 ends a little above. */

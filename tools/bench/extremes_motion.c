@@ -5,7 +5,7 @@
  */
 #include <stdio.h>
 #include <stdlib.h>
-#include <incise/fixed_spring.h>
+#include "../../lib/fixed/spring.h"
 #include <incise/profile.h>
 #include "any_pose.h"
 #include "extremes.h"

@@ -29,9 +29,5 @@ struct incise_error {
 INCISE_API int incise_error_set(struct incise_error *err, int code, const char *fmt, ...)
 	INCISE_PRINTF(3, 4);
 
-/** As incise_error_set(), with a va_list. */
-INCISE_API int incise_error_vset(struct incise_error *err, int code, const char *fmt,
-				 va_list args) INCISE_PRINTF(3, 0);
-
 INCISE_END_DECLS
 #endif

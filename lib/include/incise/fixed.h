@@ -135,9 +135,6 @@ INCISE_API struct incise_fixed *incise_fixed_load(const char *path,
 INCISE_API int incise_fixed_save(const struct incise_fixed *fx, const char *path,
 				 struct incise_error *err);
 
-/** A copy with a blob of its own. @return copy; NULL with errno ENOMEM. */
-INCISE_API struct incise_fixed *incise_fixed_copy(const struct incise_fixed *fx);
-
 /**
  * Write a compiled model as a C99 file of its own for a microcontroller: constant tables
  * and `int32_t SYMBOL_eval(const int32_t *x)`, which gives what incise_fixed_eval() does,
@@ -149,7 +146,7 @@ INCISE_API struct incise_fixed *incise_fixed_copy(const struct incise_fixed *fx)
 INCISE_API int incise_fixed_write_c(const struct incise_fixed *fx, const char *path,
 				    const char *symbol, struct incise_error *err);
 
-/** Free what incise_fixed_compile(), incise_fixed_copy() or incise_fixed_load() made. */
+/** Free what incise_fixed_compile() or incise_fixed_load() made. */
 INCISE_API void incise_fixed_free(struct incise_fixed *fx);
 
 /** The certified bound of the error, output's unit. */

@@ -134,8 +134,6 @@ INCISE_API void incise_model_free(struct incise_model *model);
 
 /** Its name in the .fis file; owned by the model. */
 INCISE_API const char *incise_model_name(const struct incise_model *model);
-/** Name it; what is beyond INCISE_MODEL_NAME_MAX is cut off. */
-INCISE_API void incise_model_set_name(struct incise_model *model, const char *name);
 /** How many inputs it has, 1 … INCISE_MODEL_INPUTS_MAX. */
 INCISE_API int incise_model_n_inputs(const struct incise_model *model);
 /** How many rules it has. */

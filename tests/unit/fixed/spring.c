@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include <string.h>
-#include <incise/fixed_spring.h>
+#include "../../../lib/fixed/spring.h"
 #include "../model/paper_model.h"
 
 #define CASES 1000000

@@ -16,6 +16,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/fixed.h>
+#include "../../../lib/model/model.h"
 #include "paper_model.h"
 
 #define N 100000
@@ -53,7 +54,7 @@ static struct incise_fixed *compiled(int n_inputs, int arithmetic, double size,
 
 		incise_model_set_consequent(model, r, p);
 	}
-	incise_model_set_name(model, name);
+	snprintf(model->name, sizeof(model->name), "%s", name);
 	fx = incise_fixed_compile(model, &options, NULL);
 	assert_non_null(fx);
 	incise_model_free(model);

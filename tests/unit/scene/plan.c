@@ -11,7 +11,7 @@
 #include <errno.h>
 #include <math.h>
 #include <incise/fixed.h>
-#include <incise/fixed_spring.h>
+#include "../../../lib/fixed/spring.h"
 #include <incise/sim.h>
 #include <time.h>
 #include "fed.h"

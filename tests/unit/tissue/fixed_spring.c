@@ -13,7 +13,7 @@
 #include <math.h>
 #include <string.h>
 #include <incise/fixed.h>
-#include <incise/fixed_spring.h>
+#include "../../../lib/fixed/spring.h"
 #include "../../../lib/base/vector.h"
 #include "../model/paper_model.h"
 

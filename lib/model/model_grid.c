@@ -1,0 +1,593 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A model as a full grid of Gaussians, with certified bounds of what it can do between
+ * points; see model_grid.h.
+ *
+ * With L(i) = -(x-c(i))²/(2s(i)²) and ⟨f⟩ = Σ ā(k) f(k), the degrees of one input are
+ *
+ *   ā(i)   = 1 / Σk exp(L(k) - L(i))
+ *   ā(i)'  = ā(i) (L(i)' - ⟨L'⟩)
+ *   ā(i)'' = ā(i) ((L(i)' - ⟨L'⟩)² + L(i)'' - ⟨L''⟩ - ⟨(L' - ⟨L'⟩)²⟩)
+ *
+ * and with
+ *
+ *   T(i) = Σj b̄(j) r(i,j)    S(j) = Σi ā(i) r(i,j)    h(i) = Σj b̄(j) p(i,j,1)
+ *
+ * the model and its derivatives are
+ *
+ *   F       = Σ ā(i) T(i) = Σ b̄(j) S(j)
+ *   ∂F/∂a   = Σ ā(i)' T(i) + Σij ā(i) b̄(j) p(i,j,1)
+ *   ∂F/∂b   = Σ b̄(j)' S(j) + Σij ā(i) b̄(j) p(i,j,2)
+ *   ∂²F/∂a² = Σ ā(i)'' T(i) + 2 Σ ā(i)' h(i)
+ *   ∂²F/∂b² = Σ ā(i) T(i)''
+ *   ∂²F/∂a∂b = Σij ā(i)' b̄(j)' r(i,j) + ā(i)' b̄(j) p(i,j,2) + ā(i) b̄(j)' p(i,j,1)
+ *
+ * Degrees add up to 1, so their derivatives add up to 0: in sums with derivatives a
+ * constant is taken off T, S and h, in sums with degrees it is taken out of the sum. That
+ * keeps the enclosures tight; a plane's slopes come out exactly.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "model.h"
+#include "model_grid.h"
+
+/* --- one input --- */
+
+void incise_axis_init(struct incise_axis *axis, const struct incise_model *model,
+		      int input)
+{
+	const struct incise_variable *v = incise_model_input(model, input);
+
+	axis->n = incise_model_n_mfs(model, input);
+	/* A compiled support ends at the nearest LSB, which may lie half an LSB outside. */
+	axis->min = fmin(v->min, rint(v->min * INCISE_FIXED_ONE) / INCISE_FIXED_ONE);
+	axis->max = fmax(v->max, rint(v->max * INCISE_FIXED_ONE) / INCISE_FIXED_ONE);
+	for (int i = 0; i < axis->n; i++) {
+		axis->s[i] = incise_model_mf(model, input, i)->p[0];
+		axis->c[i] = incise_model_mf(model, input, i)->p[1];
+	}
+}
+
+void incise_axis_at(const struct incise_axis *axis, long double x, long double *a)
+{
+	long double largest = -HUGE_VALL, sum = 0;
+
+	for (int i = 0; i < axis->n; i++) {
+		long double z = (x - axis->c[i]) / axis->s[i];
+
+		a[i] = -z * z / 2;
+		largest = fmaxl(largest, a[i]);
+	}
+	for (int i = 0; i < axis->n; i++) {
+		a[i] = expl(a[i] - largest);
+		sum += a[i];
+	}
+	for (int i = 0; i < axis->n; i++)
+		a[i] /= sum;
+}
+
+/* L(k) - L(i) over [m-r, m+r] in mean-value form: its value at m, plus slope times ±r. */
+static struct interval log_ratio(const struct incise_axis *axis, int k, int i,
+				 struct interval x, const struct interval *slope)
+{
+	double m = x.lo + (x.hi - x.lo) / 2;
+	struct interval zk = iv_scale(iv_sub(iv(m), iv(axis->c[k])), 1 / axis->s[k]);
+	struct interval zi = iv_scale(iv_sub(iv(m), iv(axis->c[i])), 1 / axis->s[i]);
+	struct interval at_m = iv_scale(iv_sub(iv_square(zi), iv_square(zk)), 0.5);
+	struct interval off = iv_sub(x, iv(m));
+
+	/* 1/s is rounded: two ulp of the squares more. */
+	at_m = iv_add(at_m,
+		      iv_scale((struct interval){-1, 1}, (zi.hi * zi.hi + zi.lo * zi.lo +
+							  zk.hi * zk.hi + zk.lo * zk.lo) *
+								 0x1p-50));
+	return iv_add(at_m, iv_mul(iv_sub(slope[k], slope[i]), off));
+}
+
+void incise_axis_over(const struct incise_axis *axis, struct interval x,
+		      struct incise_axis_range *range)
+{
+	struct interval slope[INCISE_FIXED_MFS_MAX], bend[INCISE_FIXED_MFS_MAX];
+	struct interval mean = iv(0), mean_bend = iv(0), spread = iv(0);
+	const struct interval unit = {0, 1};
+	int n = axis->n;
+
+	for (int i = 0; i < n; i++) {
+		struct interval s2 = iv_square(iv(axis->s[i]));
+
+		bend[i] = iv_scale(iv_inverse(s2), -1);
+		slope[i] = iv_mul(iv_sub(x, iv(axis->c[i])), bend[i]);
+	}
+	for (int i = 0; i < n; i++) {
+		struct interval sum = iv(1);
+
+		for (int k = 0; k < n; k++)
+			if (k != i)
+				sum = iv_add(sum,
+					     iv_exp(log_ratio(axis, k, i, x, slope)));
+		range->a[i] = iv_intersect(iv_inverse(sum), unit);
+	}
+	for (int i = 0; i < n; i++) {
+		mean = iv_add(mean, iv_mul(range->a[i], slope[i]));
+		mean_bend = iv_add(mean_bend, iv_mul(range->a[i], bend[i]));
+	}
+	/* The weights add up to 1: a mean lies between the extremes. */
+	for (int i = 0, lo = 0, hi = 0; i < n; i++) {
+		lo = slope[i].lo < slope[lo].lo ? i : lo;
+		hi = slope[i].hi > slope[hi].hi ? i : hi;
+		if (i == n - 1)
+			mean = iv_intersect(mean, (struct interval){slope[lo].lo,
+								    slope[hi].hi});
+	}
+	for (int i = 0; i < n; i++)
+		spread = iv_add(spread,
+				iv_mul(range->a[i], iv_square(iv_sub(slope[i], mean))));
+	for (int i = 0; i < n; i++) {
+		struct interval off = iv_sub(slope[i], mean);
+
+		range->d1[i] = iv_mul(range->a[i], off);
+		range->d2[i] =
+			iv_mul(range->a[i],
+			       iv_sub(iv_add(iv_square(off), iv_sub(bend[i], mean_bend)),
+				      spread));
+	}
+}
+
+/* --- the grid --- */
+
+/* Largest magnitude of an input: Q16.16 in 32 bits, ranges too. */
+#define X_MAX 16383.0
+
+static int check_input(const struct incise_model *model, int i, struct incise_error *err)
+{
+	const struct incise_variable *v = incise_model_input(model, i);
+	int n = incise_model_n_mfs(model, i);
+
+	if (n > INCISE_FIXED_MFS_MAX)
+		return incise_error_set(
+			err, E2BIG,
+			"fixed point: input %s has %d membership functions, at "
+			"most %d fit; use double",
+			v->name, n, INCISE_FIXED_MFS_MAX);
+	if (fmax(fabs(v->min), fabs(v->max)) > X_MAX ||
+	    v->max - v->min < 64.0 / INCISE_FIXED_ONE)
+		return incise_error_set(
+			err, ERANGE,
+			"fixed point: input %s: its support %g to %g is beyond "
+			"±%g or narrower than 0.001; use double",
+			v->name, v->min, v->max, X_MAX);
+	for (int k = 0; k < n; k++) {
+		const struct incise_mf *mf = incise_model_mf(model, i, k);
+
+		if (mf->type != INCISE_MF_GAUSS)
+			return incise_error_set(
+				err, ENOTSUP,
+				"fixed point: input %s, function %s is a %s, only gaussmf has "
+				"a fixed form; train with --mf-type gaussmf or use double",
+				v->name, mf->name, incise_mf_type_name(mf->type));
+		if (fabs(mf->p[1]) > X_MAX)
+			return incise_error_set(
+				err, ERANGE,
+				"fixed point: input %s, function %s: its centre %g is beyond "
+				"±%g; use double",
+				v->name, mf->name, mf->p[1], X_MAX);
+		/* 2^-22 of a unit: some LSB of the input, below which there is no shape. */
+		if (mf->p[0] < 64.0 / INCISE_FIXED_ONE / INCISE_FIXED_ONE)
+			return incise_error_set(
+				err, ERANGE,
+				"fixed point: input %s, function %s: its width %g is too small "
+				"for a format; use double",
+				v->name, mf->name, mf->p[0]);
+	}
+	return 0;
+}
+
+int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
+		     struct incise_error *err)
+{
+	int n = incise_model_n_inputs(model), n_rules = incise_model_n_rules(model);
+	int n_b = incise_model_n_mfs(model, n - 1), grid_rules = 1, rc;
+
+	memset(grid, 0, sizeof(*grid));
+	if (n > INCISE_FIXED_INPUTS_MAX)
+		return incise_error_set(
+			err, E2BIG,
+			"fixed point: the model has %d inputs, at most %d fit; "
+			"use double",
+			n, INCISE_FIXED_INPUTS_MAX);
+	if (model->and_method != INCISE_AND_PROD)
+		return incise_error_set(
+			err, ENOTSUP,
+			"fixed point: the model's AndMethod is min, only prod has a "
+			"fixed form; use double");
+	for (int i = 0; i < n; i++) {
+		rc = check_input(model, i, err);
+		if (rc)
+			return rc;
+		grid_rules *= incise_model_n_mfs(model, i);
+	}
+	if (grid_rules != n_rules)
+		return incise_error_set(
+			err, ENOTSUP,
+			"fixed point: the model has %d rules, its grid has %d: "
+			"only full grids have a fixed form; use double",
+			n_rules, grid_rules);
+	grid->one = n == 1;
+	grid->a = (struct incise_axis){.n = 1, .s = {1}};
+	if (n == 2)
+		incise_axis_init(&grid->a, model, 0);
+	incise_axis_init(&grid->b, model, n - 1);
+	for (int r = 0; r < n_rules; r++) {
+		const double *p = incise_model_consequent(model, r);
+		double *to = grid->p[r / n_b][r % n_b];
+
+		if (incise_model_rule_mf(model, r, n - 1) != r % n_b ||
+		    (n == 2 && incise_model_rule_mf(model, r, 0) != r / n_b) ||
+		    model->rule[r].weight != 1)
+			return incise_error_set(
+				err, ENOTSUP,
+				"fixed point: rule %d has a weight, or is out "
+				"of the grid's order (last input fastest); use "
+				"double",
+				r + 1);
+		to[0] = p[0];
+		to[1] = n == 2 ? p[1] : 0;
+		to[2] = p[n];
+	}
+	return 0;
+}
+
+void incise_grid_size(const struct incise_grid *grid, struct incise_grid_size *size)
+{
+	const struct incise_axis *a = &grid->a, *b = &grid->b;
+
+	*size = (struct incise_grid_size){0};
+	for (int i = 0; i < a->n; i++)
+		for (int j = 0; j < b->n; j++) {
+			const double *p = grid->p[i][j];
+			double middle = p[0] + p[1] * (a->min + a->max) / 2 +
+					p[2] * (b->min + b->max) / 2;
+			double half = fabs(p[1]) * (a->max - a->min) / 2 +
+				      fabs(p[2]) * (b->max - b->min) / 2;
+			double parts = fabs(p[0]) +
+				       fabs(p[1]) * fmax(fabs(a->min), fabs(a->max)) +
+				       fabs(p[2]) * fmax(fabs(b->min), fabs(b->max));
+
+			size->rule = fmax(size->rule, fabs(middle) + half);
+			size->parts = fmax(size->parts, parts);
+			size->slope = fmax(size->slope, fabs(p[1]));
+		}
+}
+
+/* --- patches --- */
+
+void incise_block_over(struct incise_block *block, const struct incise_axis *axis,
+		       struct interval x)
+{
+	long double at[INCISE_FIXED_MFS_MAX];
+
+	block->x = x;
+	block->main = 0;
+	incise_axis_over(axis, x, &block->range);
+	incise_axis_at(axis, x.lo + (x.hi - x.lo) / 2, at);
+	for (int i = 1; i < axis->n; i++)
+		if (at[i] > at[block->main])
+			block->main = i;
+}
+
+static struct interval rule_difference(const struct incise_grid *grid, int i, int j,
+				       int k, int l, const struct incise_block *a,
+				       const struct incise_block *b)
+{
+	const double *p = grid->p[i][j], *q = grid->p[k][l];
+	struct interval d = iv_sub(iv(p[0]), iv(q[0]));
+
+	d = iv_add(d, iv_mul(iv_sub(iv(p[1]), iv(q[1])), a->x));
+	return iv_add(d, iv_mul(iv_sub(iv(p[2]), iv(q[2])), b->x));
+}
+
+/* Σij ā(i) b̄(j) p(i,j,k), about the main rule's. */
+static struct interval mean_slope(const struct incise_grid *grid,
+				  const struct incise_block *a,
+				  const struct incise_block *b, int k)
+{
+	struct interval sum = iv(grid->p[a->main][b->main][k]);
+
+	for (int i = 0; i < grid->a.n; i++)
+		for (int j = 0; j < grid->b.n; j++) {
+			struct interval off = iv_sub(iv(grid->p[i][j][k]),
+						     iv(grid->p[a->main][b->main][k]));
+
+			sum = iv_add(sum,
+				     iv_mul(iv_mul(a->range.a[i], b->range.a[j]), off));
+		}
+	return sum;
+}
+
+void incise_patch_slopes(struct incise_patch *patch, const struct incise_grid *grid,
+			 const struct incise_block *a, const struct incise_block *b)
+{
+	patch->f1 = mean_slope(grid, a, b, 1);
+	patch->f2 = mean_slope(grid, a, b, 2);
+	for (int i = 0; i < grid->a.n; i++) {
+		patch->t[i] = iv(0);
+		for (int j = 0; j < grid->b.n; j++)
+			patch->t[i] = iv_add(
+				patch->t[i],
+				iv_mul(b->range.a[j],
+				       rule_difference(grid, i, j, a->main, j, a, b)));
+		patch->f1 = iv_add(patch->f1, iv_mul(a->range.d1[i], patch->t[i]));
+	}
+	for (int j = 0; j < grid->b.n; j++) {
+		struct interval s = iv(0);
+
+		for (int i = 0; i < grid->a.n; i++)
+			s = iv_add(s,
+				   iv_mul(a->range.a[i],
+					  rule_difference(grid, i, j, i, b->main, a, b)));
+		patch->f2 = iv_add(patch->f2, iv_mul(b->range.d1[j], s));
+	}
+}
+
+/* t2 and h of function i of input a. */
+static void rule_sums(struct incise_patch *patch, const struct incise_grid *grid,
+		      const struct incise_block *a, const struct incise_block *b, int i)
+{
+	const struct incise_axis_range *rb = &b->range;
+	int m = b->main;
+
+	patch->t2[i] = patch->h[i] = iv(0);
+	for (int j = 0; j < grid->b.n; j++) {
+		const double *p = grid->p[i][j];
+		struct interval r = rule_difference(grid, i, j, i, m, a, b);
+		struct interval slope = iv_sub(iv(p[2]), iv(grid->p[i][m][2]));
+
+		patch->t2[i] = iv_add(patch->t2[i],
+				      iv_add(iv_mul(rb->d2[j], r),
+					     iv_scale(iv_mul(rb->d1[j], slope), 2)));
+		patch->h[i] = iv_add(
+			patch->h[i],
+			iv_mul(rb->a[j], iv_sub(iv(p[1]), iv(grid->p[a->main][j][1]))));
+	}
+}
+
+void incise_patch_over(struct incise_patch *patch, const struct incise_grid *grid,
+		       const struct incise_block *a, const struct incise_block *b)
+{
+	const struct incise_axis_range *ra = &a->range;
+
+	incise_patch_slopes(patch, grid, a, b);
+	patch->f11 = patch->f22 = iv(0);
+	for (int i = 0; i < grid->a.n; i++) {
+		rule_sums(patch, grid, a, b, i);
+		patch->f11 = iv_add(patch->f11,
+				    iv_add(iv_mul(ra->d2[i], patch->t[i]),
+					   iv_scale(iv_mul(ra->d1[i], patch->h[i]), 2)));
+		patch->f22 = iv_add(patch->f22, iv_mul(ra->a[i], patch->t2[i]));
+	}
+}
+
+struct interval incise_patch_mixed(const struct incise_grid *grid,
+				   const struct incise_block *a,
+				   const struct incise_block *b)
+{
+	const struct incise_axis_range *ra = &a->range, *rb = &b->range;
+	struct interval f12 = iv(0);
+
+	for (int i = 0; i < grid->a.n; i++)
+		for (int j = 0; j < grid->b.n; j++) {
+			const double *p = grid->p[i][j];
+			/* Of r, what depends on i or j alone adds up to 0 as well. */
+			struct interval r =
+				iv_sub(rule_difference(grid, i, j, i, b->main, a, b),
+				       rule_difference(grid, a->main, j, a->main, b->main,
+						       a, b));
+			struct interval by_b =
+				iv_sub(iv(p[2]), iv(grid->p[a->main][j][2]));
+			struct interval by_a =
+				iv_sub(iv(p[1]), iv(grid->p[i][b->main][1]));
+
+			f12 = iv_add(f12, iv_mul(iv_mul(ra->d1[i], rb->d1[j]), r));
+			f12 = iv_add(f12, iv_mul(iv_mul(ra->d1[i], rb->a[j]), by_b));
+			f12 = iv_add(f12, iv_mul(iv_mul(ra->a[i], rb->d1[j]), by_a));
+		}
+	return f12;
+}
+
+/* --- survey --- */
+
+/* Blocks per input: more give a tighter bound and take time, with the square. */
+#define BLOCKS 128
+
+/* Rounding an input to Q16.16. */
+#define HALF_LSB (0.5 / INCISE_FIXED_ONE)
+
+#define N INCISE_FIXED_MFS_MAX
+
+/*
+ * The largest of each, over the whole support. They are added up though they need not meet
+ * in one place: a cell of a table reaches over several blocks.
+ */
+struct incise_survey {
+	double input;	 /* rounding of the inputs */
+	double f11, f22; /* second derivatives */
+	double weights;	 /* table: times wa²/8 */
+	double slopes;	 /* the same for an output wa further on: times wa³/8 */
+	double outputs;	 /* times wb²/8 */
+	double bends,
+		worst; /* weights that are off meet outputs that are: wa²/8 · wb²/8 */
+	double direct;
+};
+
+struct blocks {
+	int n;
+	struct incise_block *block;
+};
+
+static int make_blocks(struct blocks *blocks, const struct incise_axis *axis,
+		       bool trivial)
+{
+	double from = axis->min;
+	double to = axis->max + (axis->max - axis->min) / (INCISE_SURVEY_CELLS - 2);
+
+	blocks->n = trivial ? 1 : BLOCKS;
+	blocks->block = calloc(blocks->n, sizeof(*blocks->block));
+	if (!blocks->block)
+		return -1;
+	for (int k = 0; k < blocks->n; k++) {
+		struct interval x = {from + (to - from) * k / blocks->n,
+				     from + (to - from) * (k + 1) / blocks->n};
+
+		/* Ends that round inwards would leave gaps. */
+		incise_block_over(&blocks->block[k], axis, iv_out(x.lo, x.hi));
+	}
+	return 0;
+}
+
+/* The larger; a NaN counts as endless. */
+static double larger(double largest, double e)
+{
+	if (isnan(e))
+		return INFINITY;
+	return e > largest ? e : largest;
+}
+
+/* Of the weights' table and the folded one: see lib/fixed/table.c. */
+static void table_errors(const struct incise_grid *grid, const struct incise_block *a,
+			 const struct incise_patch *patch, struct incise_survey *survey)
+{
+	struct interval of_a = iv(0), of_h = iv(0), of_b = iv(0);
+	double bends = 0;
+
+	for (int i = 0; i < grid->a.n; i++) {
+		double e = iv_mag(patch->t2[i]);
+
+		of_a = iv_add(of_a, iv_mul(a->range.d2[i], patch->t[i]));
+		of_h = iv_add(of_h, iv_mul(a->range.d2[i], patch->h[i]));
+		of_b = iv_add(of_b, iv_mul(a->range.a[i], (struct interval){0, e}));
+		bends += iv_mag(a->range.d2[i]);
+		survey->worst = larger(survey->worst, e);
+	}
+	survey->weights = larger(survey->weights, iv_mag(of_a));
+	survey->slopes = larger(survey->slopes, iv_mag(of_h));
+	survey->outputs = larger(survey->outputs, iv_mag(of_b));
+	survey->bends = larger(survey->bends, bends);
+}
+
+/*
+ * Error of degrees that lib/fixed/direct.c computes, relative to the largest being 1.
+ * z: slope to 2^-30, two roundings in Q24; q = z² floored in Q26; 2^-q to 8 LSB of Q30.
+ */
+static void degree_errors(const struct incise_axis *axis,
+			  const struct incise_block *block, double *error)
+{
+	double q_error[N], worst = 0, main;
+
+	for (int i = 0; i < axis->n; i++) {
+		double far = fmax(fabs(block->x.lo - axis->c[i]),
+				  fabs(block->x.hi - axis->c[i]));
+		double z = fmin(128, far / (axis->s[i] * sqrt(2 * M_LN2)) * (1 + 1e-12));
+		double z_error = z * 0x1p-29 + 0x1p-23;
+
+		q_error[i] = 2 * z * z_error + z_error * z_error + 0x1p-26;
+	}
+	/* The exponent that is taken off may be that of any function near the largest. */
+	for (int i = 0; i < axis->n; i++)
+		if (block->range.a[i].hi >= 0.5 * block->range.a[block->main].lo)
+			worst = fmax(worst, q_error[i]);
+	main = fmax(block->range.a[block->main].lo, 1.0 / (2 * axis->n));
+	for (int i = 0; i < axis->n; i++) {
+		double degree = fmin(1, block->range.a[i].hi / main);
+
+		error[i] = degree * 1.01 * M_LN2 * (q_error[i] + worst) + 0x1p-27;
+	}
+}
+
+static double direct_error(const struct incise_grid *grid, const struct incise_block *a,
+			   const struct incise_block *b)
+{
+	double ea[N], eb[N], sum = 0, spread = 0;
+
+	degree_errors(&grid->a, a, ea);
+	degree_errors(&grid->b, b, eb);
+	if (grid->one)
+		ea[0] = 0;
+	/* |r - F| is at most the distance between the farthest two rules here. */
+	for (int i = 0; i < grid->a.n; i++)
+		for (int j = 0; j < grid->b.n; j++) {
+			double d = iv_mag(
+				rule_difference(grid, i, j, a->main, b->main, a, b));
+
+			spread = fmax(spread,
+				      a->range.a[i].hi * b->range.a[j].hi > 1e-9 ? d : 0);
+		}
+	for (int i = 0; i < grid->a.n; i++)
+		for (int j = 0; j < grid->b.n; j++) {
+			double d = iv_mag(
+				rule_difference(grid, i, j, a->main, b->main, a, b));
+
+			sum += (ea[i] + eb[j] + 0x1p-29) * (d + spread);
+		}
+	/* The largest weight is 1 within 1e-6. */
+	return sum * 1.001;
+}
+
+struct incise_survey *incise_survey_new(const struct incise_grid *grid)
+{
+	struct incise_survey *survey = calloc(1, sizeof(*survey));
+	struct blocks ba = {0}, bb = {0};
+
+	if (!survey || make_blocks(&ba, &grid->a, grid->one) ||
+	    make_blocks(&bb, &grid->b, false)) {
+		free(survey);
+		survey = NULL;
+		goto out;
+	}
+	for (int k = 0; k < ba.n * bb.n; k++) {
+		const struct incise_block *a = &ba.block[k / bb.n],
+					  *b = &bb.block[k % bb.n];
+		struct incise_patch patch;
+
+		incise_patch_over(&patch, grid, a, b);
+		survey->input = larger(survey->input,
+				       (iv_mag(patch.f1) + iv_mag(patch.f2)) * HALF_LSB);
+		survey->f11 = larger(survey->f11, iv_mag(patch.f11));
+		survey->f22 = larger(survey->f22, iv_mag(patch.f22));
+		survey->direct = larger(survey->direct, direct_error(grid, a, b));
+		table_errors(grid, a, &patch, survey);
+	}
+out:
+	free(ba.block);
+	free(bb.block);
+	return survey;
+}
+
+void incise_survey_free(struct incise_survey *survey)
+{
+	free(survey);
+}
+
+/* Sums of a few doubles, each rounded: 1e-12 covers them. */
+#define SLACK (1 + 1e-12)
+
+double incise_survey_table(const struct incise_survey *s, double wa, double wb)
+{
+	double a2 = wa * wa / 8, b2 = wb * wb / 8;
+	double bound = s->input + (s->weights + s->slopes * wa) * a2 + s->outputs * b2 +
+		       s->bends * a2 * s->worst * b2;
+
+	return larger(0, bound * SLACK);
+}
+
+double incise_survey_force(const struct incise_survey *s, double wa, double wb)
+{
+	return larger(0,
+		      (s->input + s->f11 * wa * wa / 8 + s->f22 * wb * wb / 8) * SLACK);
+}
+
+double incise_survey_direct(const struct incise_survey *s)
+{
+	return larger(0, (s->input + s->direct) * SLACK);
+}
