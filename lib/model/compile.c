@@ -15,16 +15,31 @@
 #include "../fixed/layout.h"
 #include "model_grid.h"
 
+/* A compiled model with the bytes that it reads. */
 struct compiled {
-	struct incise_fixed fx; /* first: what users hold */
+	struct incise_fixed fx; /* first: incise_fixed_free() gets its address */
 	uint64_t blob[];	/* aligned to 8 */
 };
 
 /* A force table is the cheapest only while it stays in the cache beside all else. */
 #define FORCE_SIZE_MAX (256 << 10)
 
-struct image {
+/* The model to compile, in the forms that all arithmetics are built from. */
+struct source {
+	const struct incise_model *model;
 	const struct incise_grid *grid;
+	const struct incise_survey *survey;
+	struct incise_grid_size size;
+};
+
+/*
+ * A compiled model under construction: its header, and behind that weights, tables and
+ * functions in the order in which they were added; see lib/fixed/layout.h. The header's
+ * numbers are in the machine's own order until image_finish().
+ */
+struct image {
+	const struct source *source;
+	const struct incise_grid *grid; /* the source's */
 	struct incise_fx_header head;
 	uint8_t *data; /* behind the header */
 	size_t size;
@@ -37,8 +52,6 @@ struct cells {
 	double width; /* of a cell */
 	int n;
 };
-
-/* --- an image: the header, and behind it weights, tables and functions --- */
 
 /* Least k with 2^k > v. */
 static int bits_of(double v)
@@ -73,12 +86,15 @@ static void put_name(char *to, size_t size, const char *name)
 			*c = '_';
 }
 
-/* Empty, with what the header says of the model. */
-static void image_start(struct image *image, const struct incise_grid *grid,
-			enum incise_fixed_arithmetic arithmetic,
-			const struct incise_model *model)
+/* An image without data, its header filled in from the model. */
+static void image_start(struct image *image, const struct source *source,
+			enum incise_fixed_arithmetic arithmetic)
 {
+	const struct incise_model *model = source->model;
+	const struct incise_grid *grid = source->grid;
+
 	memset(image, 0, sizeof(*image));
+	image->source = source;
 	image->grid = grid;
 	memcpy(image->head.magic, INCISE_FX_MAGIC, sizeof(image->head.magic));
 	image->head.version = INCISE_FX_VERSION;
@@ -99,7 +115,7 @@ static void image_start(struct image *image, const struct incise_grid *grid,
 	}
 }
 
-/* Room for n bytes at the end; *offset from the blob's begin. NULL without memory. */
+/* Add n zero bytes at the end; *offset counts from the blob's start. NULL without memory. */
 static void *image_extend(struct image *image, size_t n, uint32_t *offset)
 {
 	uint8_t *data = realloc(image->data, image->size + n);
@@ -113,17 +129,19 @@ static void *image_extend(struct image *image, size_t n, uint32_t *offset)
 	return data + image->size - n;
 }
 
-/* Cells of input i: the width is the largest power of two that gives at least n cells. */
-static void set_cells(struct image *image, int i, int n)
+/* Cells of all inputs: the width is the largest power of two that gives at least n cells. */
+static void set_cells(struct image *image, int n)
 {
-	struct incise_fx_input *in = &image->head.input[i];
-	int64_t range = (int64_t)in->max - in->min;
-	int shift = 0;
+	for (int i = 0; i < n_inputs(image->grid); i++) {
+		struct incise_fx_input *in = &image->head.input[i];
+		int64_t range = (int64_t)in->max - in->min;
+		int shift = 0;
 
-	while (shift < 30 && (range >> (shift + 1)) + 1 >= n)
-		shift++;
-	in->cell_shift = shift;
-	in->cells = (uint32_t)((range >> shift) + 1);
+		while (shift < 30 && (range >> (shift + 1)) + 1 >= n)
+			shift++;
+		in->cell_shift = shift;
+		in->cells = (uint32_t)((range >> shift) + 1);
+	}
 }
 
 static struct cells cells_of(const struct image *image, int i)
@@ -149,7 +167,7 @@ static void image_cells(const struct image *image, struct cells *a, struct cells
 	*b = cells_of(image, image->grid->one ? 0 : 1);
 }
 
-/* Put header and data together, and look at the result as a stranger would. */
+/* Put header and data together, and validate the result as one from a file. */
 static struct incise_fixed *image_finish(struct image *image, struct incise_error *err)
 {
 	size_t size = sizeof(image->head) + image->size;
@@ -197,7 +215,7 @@ static struct incise_fixed *image_finish(struct image *image, struct incise_erro
 	return &owned->fx;
 }
 
-/* --- tables of what the rules depend on, for incise_fx_table() --- */
+/* --- table: what the rules depend on --- */
 
 /* Weights at each knot of input a, rounded so that they add up to just 2^30. */
 static int put_weights(struct image *image, const struct cells *cells)
@@ -233,7 +251,7 @@ static int put_fold(struct image *image, const struct cells *cells)
 	int stride = grid->one ? 1 : 2 * grid->a.n;
 	int32_t *to = image_extend(image, (size_t)(cells->n + 1) * stride * 4,
 				   &image->head.data);
-	/* The middle as lib/fixed/table.c counts it. */
+	/* The middle as the evaluator counts it. */
 	int64_t range = (int64_t)image->head.input[0].max - image->head.input[0].min;
 	long double middle =
 		(image->head.input[0].min + (range >> 1)) / (long double)INCISE_FIXED_ONE;
@@ -264,9 +282,8 @@ static int put_fold(struct image *image, const struct cells *cells)
 	return 0;
 }
 
-/* Roundings on the way through lib/fixed/table.c; see there. */
-static double table_rounding(const struct image *image,
-			     const struct incise_grid_size *size)
+/* Roundings in the evaluator; see lib/fixed/eval.c. */
+static double table_rounding(const struct image *image)
 {
 	const struct incise_grid *grid = image->grid;
 	double lsb_g = ldexp(1, -image->head.shift_a),
@@ -279,25 +296,18 @@ static double table_rounding(const struct image *image,
 	 * between knots; h: half an LSB, one for its sum's floor, times x. */
 	if (grid->one)
 		return output + 2 * lsb_g;
-	return output + 4 * lsb_g + 2 * lsb_h * reach + weights * size->rule;
+	return output + 4 * lsb_g + 2 * lsb_h * reach +
+	       weights * image->source->size.rule;
 }
 
-/*
- * Fill in an image in one arithmetic, its bound included. 0, -ERANGE (no format holds it),
- * -E2BIG (a force table larger than FORCE_SIZE_MAX), -ENOMEM; image->data is the
- * caller's to free.
- */
-static int build_table(struct image *image, const struct incise_grid *grid,
-		       const struct incise_survey *survey, int cells,
-		       const struct incise_grid_size *size,
-		       const struct incise_model *model)
+static int build_table(struct image *image, int cells)
 {
+	const struct incise_grid *grid = image->grid;
+	const struct incise_grid_size *size = &image->source->size;
 	struct cells a, b;
 	int rc = 0;
 
-	image_start(image, grid, INCISE_FIXED_TABLE, model);
-	for (int i = 0; i < n_inputs(grid); i++)
-		set_cells(image, i, cells);
+	set_cells(image, cells);
 	/* g + x·h within 2^31 with one bit to spare: knots lie beyond the support, too. */
 	image->head.shift_a = (int)fmin(28, 30 - bits_of(1.25 * size->rule));
 	image->head.shift_b = (int)fmin(45, 30 - bits_of(size->slope));
@@ -312,12 +322,13 @@ static int build_table(struct image *image, const struct incise_grid *grid,
 	if (!rc)
 		rc = put_fold(image, &b);
 	if (!rc)
-		image->bound = incise_survey_table(survey, a.width, b.width) +
-			       table_rounding(image, size);
+		image->bound =
+			incise_survey_table(image->source->survey, a.width, b.width) +
+			table_rounding(image);
 	return rc;
 }
 
-/* --- functions and consequents themselves, for incise_fx_direct() --- */
+/* --- direct: the functions and consequents themselves --- */
 
 /* Returns whether the width has a format. */
 static bool compile_mf(const struct incise_axis *axis, int i, struct incise_fx_mf *fx)
@@ -345,7 +356,7 @@ static bool compile_mf(const struct incise_axis *axis, int i, struct incise_fx_m
 
 /*
  * Distances are held at 128 widths. Between two functions that are both further away the
- * nearer one could not be told: the largest such distance is where neighbours cross, or
+ * nearer one would be unknown: the largest such distance is where neighbours cross, or
  * at the ends of the support.
  */
 static bool covered(const struct incise_axis *axis)
@@ -375,16 +386,14 @@ static bool covered(const struct incise_axis *axis)
 	return true;
 }
 
-static int build_direct(struct image *image, const struct incise_grid *grid,
-			const struct incise_survey *survey,
-			const struct incise_grid_size *size,
-			const struct incise_model *model)
+static int build_direct(struct image *image)
 {
+	const struct incise_grid *grid = image->grid;
+	const struct incise_grid_size *size = &image->source->size;
 	int n = n_inputs(grid);
 	double reach = 1;
 	int64_t *p;
 
-	image_start(image, grid, INCISE_FIXED_DIRECT, model);
 	for (int i = 0; i < n; i++) {
 		const struct incise_axis *axis = input_axis(grid, i);
 		struct incise_fx_mf *mf = image_extend(image, axis->n * sizeof(*mf),
@@ -421,27 +430,24 @@ static int build_direct(struct image *image, const struct incise_grid *grid,
 		}
 	/* A consequent's half LSB times the inputs; a rule's floor and the quotient's; half
 	 * an LSB of the output. */
-	image->bound = incise_survey_direct(survey) +
+	image->bound = incise_survey_direct(image->source->survey) +
 		       ldexp(0.5 * reach, -image->head.shift_a) +
 		       ldexp(2, -image->head.shift_b) + 0.5 / INCISE_FIXED_ONE;
 	return 0;
 }
 
-/* --- one table of the output, for incise_fx_force() --- */
+/* --- force: a table of the output --- */
 
-static int build_force(struct image *image, const struct incise_grid *grid,
-		       const struct incise_survey *survey, int cells,
-		       const struct incise_grid_size *size,
-		       const struct incise_model *model)
+static int build_force(struct image *image, int cells)
 {
+	const struct incise_grid *grid = image->grid;
 	long double at_a[INCISE_FIXED_MFS_MAX], at_b[INCISE_FIXED_MFS_MAX];
 	struct cells a, b;
 	int32_t *to;
 
-	image_start(image, grid, INCISE_FIXED_FORCE, model);
-	for (int i = 0; i < n_inputs(grid); i++)
-		set_cells(image, i, cells);
-	image->head.shift_a = (int)fmin(28, 30 - bits_of(1.25 * size->rule));
+	set_cells(image, cells);
+	image->head.shift_a =
+		(int)fmin(28, 30 - bits_of(1.25 * image->source->size.rule));
 	if (image->head.shift_a < 17)
 		return -ERANGE;
 	image_cells(image, &a, &b);
@@ -471,12 +477,12 @@ static int build_force(struct image *image, const struct incise_grid *grid,
 		}
 	}
 	/* Half an LSB in the table, two floored between knots, half one of the output. */
-	image->bound = incise_survey_force(survey, a.width, b.width) +
+	image->bound = incise_survey_force(image->source->survey, a.width, b.width) +
 		       ldexp(2.5, -image->head.shift_a) + 0.5 / INCISE_FIXED_ONE;
 	return 0;
 }
 
-/* --- the choice --- */
+/* --- the choice of arithmetic and cells --- */
 
 /* 0.1 mN: an order of magnitude below a 12-bit step of the force channel. */
 #define DEFAULT_BUDGET 1e-4
@@ -499,22 +505,25 @@ void incise_fixed_options_init(struct incise_fixed_options *options)
 		(struct incise_fixed_options){.budget = DEFAULT_BUDGET, .arithmetic = -1};
 }
 
-/* Build one candidate; 0, or -errno when it cannot be. */
-static int build(struct image *image, const struct incise_grid *grid,
-		 const struct incise_survey *survey, int arithmetic, int cells,
-		 const struct incise_grid_size *size, const struct incise_model *model)
+/*
+ * Build one candidate, its bound included. 0; -ERANGE (no format holds it), -E2BIG (a force
+ * table larger than FORCE_SIZE_MAX), -ENOMEM.
+ */
+static int build(struct image *image, const struct source *source, int arithmetic,
+		 int cells)
 {
 	int rc;
 
+	image_start(image, source, arithmetic);
 	switch (arithmetic) {
 	case INCISE_FIXED_FORCE:
-		rc = build_force(image, grid, survey, cells, size, model);
+		rc = build_force(image, cells);
 		break;
 	case INCISE_FIXED_TABLE:
-		rc = build_table(image, grid, survey, cells, size, model);
+		rc = build_table(image, cells);
 		break;
 	default:
-		rc = build_direct(image, grid, survey, size, model);
+		rc = build_direct(image);
 	}
 	if (!rc && !(ldexp(image->bound, 32) < 0x1p62))
 		rc = -ERANGE;
@@ -532,18 +541,19 @@ static int choose(struct image *best, const struct incise_grid *grid,
 {
 	static const int order[] = {INCISE_FIXED_FORCE, INCISE_FIXED_TABLE,
 				    INCISE_FIXED_DIRECT};
+	struct source source = {.model = model, .grid = grid};
 	struct incise_survey *survey;
-	struct incise_grid_size size;
 	int rc = -ERANGE;
 
-	incise_grid_size(grid, &size);
+	incise_grid_size(grid, &source.size);
 	*best = (struct image){.bound = INFINITY};
-	/* Nothing of that size has a format; what follows may count on finite numbers. */
-	if (!(size.parts < INCISE_GRID_LARGEST))
+	/* Nothing of that size has a format; the arithmetics may count on finite numbers. */
+	if (!(source.size.parts < INCISE_GRID_LARGEST))
 		return rc;
 	survey = incise_survey_new(grid);
 	if (!survey)
 		return -ENOMEM;
+	source.survey = survey;
 	for (int k = 0; k < 3; k++)
 		for (int c = 0; c < N_COUNTS; c++) {
 			struct image image;
@@ -554,13 +564,12 @@ static int choose(struct image *best, const struct incise_grid *grid,
 			    (order[k] != INCISE_FIXED_DIRECT &&
 			     cell_counts[c] < o->cells))
 				continue;
-			built = build(&image, grid, survey, order[k], cell_counts[c],
-				      &size, model);
+			built = build(&image, &source, order[k], cell_counts[c]);
 			if (built == -ENOMEM) {
 				rc = built;
 				goto out;
 			}
-			/* What went wrong last counts if all did. */
+			/* The last error counts if all failed. */
 			rc = rc && built ? built : 0;
 			if (built)
 				continue;

@@ -34,7 +34,7 @@ struct reader {
 	struct incise_model *model;
 	/* What has been seen so far; bits of MFs by number. */
 	bool system, output, rules;
-	int n_rules; /* promised */
+	int n_rules; /* by NumRules */
 	int n_out_mfs;
 	uint32_t inputs_seen;
 	uint32_t ranges_seen;
@@ -45,6 +45,7 @@ struct reader {
 /* --- lines, names and numbers --- */
 
 /* The error with the place in front; returns -code. */
+static int fail(struct reader *in, int code, const char *fmt, ...) INCISE_PRINTF(3, 4);
 static int fail(struct reader *in, int code, const char *fmt, ...)
 {
 	char what[300];
@@ -56,7 +57,7 @@ static int fail(struct reader *in, int code, const char *fmt, ...)
 	return incise_error_set(in->err, code, "%s:%d: %s", in->path, in->line, what);
 }
 
-/* Next line that says something: 1, or 0 at the end of the file. */
+/* Next line that is not empty or a comment: 1, or 0 at the end of the file. */
 static int next_line(struct reader *in)
 {
 	static const char space[] = " \t\r\n";
@@ -140,7 +141,7 @@ static int read_whole(struct reader *in, const char *key, const char *text, int 
 
 /* --- keys of the sections --- */
 
-/* A key of [System]; those that do not change a Sugeno model's output are passed over. */
+/* A key of [System]; those that do not change a Sugeno model's output are ignored. */
 static int system_key(struct reader *in, const char *key, const char *value)
 {
 	static const struct {
@@ -302,7 +303,7 @@ static int output_key(struct reader *in, const char *key, const char *value)
 
 /* --- rules --- */
 
-/* What must have been said before [Rules] can be read. */
+/* Rules refer to the variables: all of them must come before. */
 static int check_variables(struct reader *in)
 {
 	struct incise_model *model = in->model;
@@ -398,7 +399,7 @@ static int read_file(struct reader *in)
 		int end = 0;
 
 		if (*in->text == '[') {
-			/* Nothing that rules refer to may change behind them. */
+			/* Rules refer to the sections before them, which must not change any more. */
 			if (section == RULES)
 				return fail(in, EINVAL, "%.40s after [Rules]", in->text);
 			if (!strcmp(in->text, "[System]")) {
