@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * Random numbers by splitmix64: number n of a stream is a function of the stream's key and n
- * alone. So streams do not disturb each other, and the order of reading changes nothing.
+ * alone. So streams do not disturb each other, and the order of reading changes nothing. And
+ * a generator with a state, for searches that are to be repeatable.
  */
 #ifndef INCISE_BASE_RANDOM_H
 #define INCISE_BASE_RANDOM_H
@@ -56,6 +57,13 @@ static inline double incise_random_normal(uint64_t key, uint64_t n)
 	double angle = (double)(bits & 0xffffffff) * 0x1p-32;
 
 	return sqrt(-2 * log(radius)) * cos(2 * M_PI * angle);
+}
+
+/* One of 0 … n-1 from a state, by Knuth's MMIX; its high bits are the good ones. */
+static inline uint32_t incise_random_draw(uint64_t *state, uint32_t n)
+{
+	*state = *state * 6364136223846793005ULL + 1442695040888963407ULL;
+	return (uint32_t)(*state >> 33) % n;
 }
 
 #endif
