@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Lens and pose: from mm of a board to pixels and back; see board.h.
+ * Lens and pose: from mm of a board to pixels and back; see board_lens.h.
  */
 #include <math.h>
 #include <string.h>
 #include "../base/vector.h"
-#include "board.h"
+#include "board_lens.h"
 
 #define BACK_ROUNDS 50 /* it converges by a factor of 5 to 100 a round */
 
@@ -107,10 +107,4 @@ void board_meet(const union board_lens *lens, const double pose[BOARD_POSE],
 			mm[k] += back[k][i] * (far * ray[i] - t[i]);
 		}
 	}
-}
-
-void board_corner(const struct incise_board_views *views, int corner, double mm[2])
-{
-	mm[0] = corner % views->columns * views->square_mm;
-	mm[1] = corner / views->columns * views->square_mm;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Two streams on one grid of 4 ms, and their derivatives through a Gaussian; see delay.h.
+ * Two streams on one grid of 4 ms, and their derivatives through a Gaussian; see delay_grid.h.
  *
  *   quick stream   ·····|·····|·····     mean of what is within half a step
  *   slow stream      o     o     o       cubic through four neighbours
@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../base/ascending.h"
-#include "delay.h"
+#include "delay_grid.h"
 
 #define NS_PER_STEP 4000000LL
 #define TIME_MAX_NS (INT64_MAX / 4)

@@ -10,6 +10,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 #include <incise/redundancy.h>
 #include "../base/ascending.h"
 #include "robust_line.h"
@@ -23,7 +24,7 @@ struct work {
 	double *depth, *off,
 		*along; /* tracker's depth; camera - tracker; place on the way */
 	int64_t *t_ns;
-	double *room;
+	double *scratch; /* three times n */
 	bool *wild;
 	int n;
 };
@@ -33,12 +34,10 @@ void incise_redundancy_limits_init(struct incise_redundancy_limits *limits)
 	*limits = (struct incise_redundancy_limits){0.5, 0.3, 0.02};
 }
 
-static double median(const double *values, int n, double *room)
+static double median_copy(const double *values, int n, double *scratch)
 {
-	for (int i = 0; i < n; i++)
-		room[i] = values[i];
-	qsort(room, n, sizeof(*room), ascending);
-	return n % 2 ? room[n / 2] : 0.5 * (room[n / 2 - 1] + room[n / 2]);
+	memcpy(scratch, values, (size_t)n * sizeof(*values));
+	return median(scratch, n);
 }
 
 /* The longest way along the surface: the first principal axis of the places. */
@@ -96,7 +95,7 @@ static void find_places(struct work *w, const struct robust_line *line,
 {
 	double low = INFINITY, high = -INFINITY, least = INFINITY, most = -INFINITY;
 	double least_u = 0, most_u = 0;
-	double *rest = w->room + w->n, *some = rest + w->n;
+	double *rest = w->scratch + w->n, *some = rest + w->n;
 
 	for (int i = 0; i < w->n; i++) {
 		low = fmin(low, w->along[i]);
@@ -118,7 +117,7 @@ static void find_places(struct work *w, const struct robust_line *line,
 		}
 		if (m < PAIRS_MIN / QUARTERS)
 			continue;
-		value = median(some, m, w->room);
+		value = median(some, m);
 		u = mean_u(w, rest, w->wild);
 		if (isinf(u))
 			continue;
@@ -142,7 +141,7 @@ static void compare(struct work *w, const struct incise_redundancy_limits *limit
 	double mean = 0, squares = 0, distance;
 
 	r->n = w->n;
-	r->bias_mm = median(w->off, w->n, w->room);
+	r->bias_mm = median_copy(w->off, w->n, w->scratch);
 	r->depth_low_mm = INFINITY;
 	r->depth_high_mm = -INFINITY;
 	for (int i = 0; i < w->n; i++) {
@@ -163,13 +162,13 @@ static void compare(struct work *w, const struct incise_redundancy_limits *limit
 	}
 	find_places(w, &line, r);
 	/* find_places() has left what lies off the trend */
-	r->bias_u_mm = mean_u(w, w->room + w->n, NULL);
+	r->bias_u_mm = mean_u(w, w->scratch + w->n, NULL);
 	/* as if the slope were a difference of means at one sd to each side */
 	if (isfinite(r->trend))
 		r->trend_u = r->bias_u_mm / sqrt(squares / w->n);
 	for (int i = 0; i < w->n; i++)
 		w->off[i] = fabs(w->off[i] - line.zero - line.slope * w->depth[i]);
-	distance = median(w->off, w->n, w->room);
+	distance = median(w->off, w->n);
 	r->scatter_sd_mm = 1.4826 * distance;
 	r->bias_bad = fabs(r->bias_mm) > limits->bias_mm + 2 * r->bias_u_mm;
 	r->place_bad = r->place_mm > limits->place_mm + 2 * r->place_u_mm;
@@ -210,8 +209,8 @@ int incise_redundancy(const struct incise_depth_pair *pairs, int n,
 	if (w.depth && w.wild) {
 		w.off = w.depth + n;
 		w.along = w.off + n;
-		w.room = w.along + n; /* three times n */
-		w.t_ns = (int64_t *)(w.room + 3 * n);
+		w.scratch = w.along + n;
+		w.t_ns = (int64_t *)(w.scratch + 3 * n);
 		find_way(pairs, n, way);
 		for (int i = 0; i < n; i++) {
 			if (!(fabs(pairs[i].rate_mm_s) <= RATE_MM_S))

@@ -8,6 +8,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include "../base/ascending.h"
+#include "../base/random.h"
 #include "robust_line.h"
 
 /* Through every two of up to 150 points; of more points, so many lines. */
@@ -111,13 +112,9 @@ int incise_robust_line(const double *x, const double *y, int n, double sd_min,
 				try_line(x, y, n, i, j, line, &best, room);
 	else
 		for (int k = 0; k < LINES; k++) {
-			int i, j;
+			int i = (int)incise_random_draw(&choice, n);
+			int j = (int)incise_random_draw(&choice, n);
 
-			/* Knuth's MMIX; the high bits are the good ones */
-			choice = choice * 6364136223846793005u + 1442695040888963407u;
-			i = (choice >> 33) % n;
-			choice = choice * 6364136223846793005u + 1442695040888963407u;
-			j = (choice >> 33) % n;
 			try_line(x, y, n, i, j, line, &best, room);
 		}
 	free(room);

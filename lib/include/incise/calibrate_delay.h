@@ -1,19 +1,18 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Delay between two streams that have seen one motion, or one sync pulse. Part of
- * libincise-learn.
+ * Delay between two streams that have seen one motion. Part of libincise-learn.
  *
  *     depth by the tracker  ____/~~\____/~~~\____
  *     force, or depth by    ______/~~\____/~~~\__     y(t) = f(d(t + delay)), delay < 0 here:
- *     the camera                 |-|                  the motion's stamps are the earlier ones
+ *     the camera                 |-|                  the motion's timestamps are earlier
  *
  * Correlation of band-limited derivatives finds the delay roughly (as the PLUS toolkit does:
  * Lasso et al., IEEE Trans. Biomed. Eng. 61, 2014), least squares of one stream under the
- * other finds it to a fraction of a sample, and resampled blocks of the run tell how well.
+ * other finds it to a fraction of a sample, and resampled blocks of the run give its uncertainty.
  *
  * A force follows from depth by a curve that is not known, and leads it where the material is
- * viscous: a stiffness c1 and a viscosity of c2 look like a delay of c2/c1. What can be told
- * apart is fitted along: F = E(x) + v·V(x) + W(x, |v|) with x the depth of the contact, and E,
+ * viscous: a stiffness c1 and a viscosity of c2 look like a delay of c2/c1. Both are
+ * fitted as far as they can be separated: F = E(x) + v·V(x) + W(x, |v|) with x the depth of the contact, and E,
  * V, W polynomials of x that are 0 where the contact begins (Hunt and Crossley, J. Appl. Mech. 42,
  * 1975). A material that pushes back by its viscosity alone at first touch would bias this.
  */
@@ -31,7 +30,7 @@ INCISE_BEGIN_DECLS
 /** Streams that agree less are refused. */
 #define INCISE_DELAY_CORRELATION_MIN 0.8
 #define INCISE_DELAY_SECOND_MAX 0.8 /**< of a second peak, relative to the first */
-#define INCISE_DELAY_SD_MAX_MS 0.5  /**< a motion that tells it worse is refused */
+#define INCISE_DELAY_SD_MAX_MS 0.5  /**< a larger uncertainty is refused */
 
 /** One value of a stream, at the time that the stream states. */
 struct incise_delay_point {
@@ -45,9 +44,9 @@ enum incise_delay_relation {
 	INCISE_DELAY_FORCE, /**< force of something that is pressed on */
 };
 
-/** The delay between two streams, and how well they tell it. */
+/** The delay between two streams, and its uncertainty. */
 struct incise_delay_fit {
-	double delay_ms; /**< how much later the motion is stamped than the other stream */
+	double delay_ms; /**< how much later the motion's timestamps are */
 	double sd_ms;	 /**< standard uncertainty */
 	double low_ms, high_ms;	      /**< 95 % interval */
 	double drift_ms, drift_sd_ms; /**< of the delay from the beginning to the end */
@@ -55,8 +54,7 @@ struct incise_delay_fit {
 	double second;	    /**< highest other peak of correlation, relative */
 	double contact_mm;  /**< motion at which the contact begins; NAN: it always is */
 	double span_s;	    /**< that both streams cover */
-	int blocks;	    /**< of the run, or pulses */
-	int outliers;	    /**< pulses left out */
+	int blocks;	    /**< of the run */
 };
 
 /**
@@ -76,20 +74,6 @@ INCISE_API int incise_calibrate_delay(const struct incise_delay_point *motion,
 				      enum incise_delay_relation relation,
 				      double range_ms, struct incise_delay_fit *fit,
 				      struct incise_error *err);
-
-/**
- * Delay of a stream behind the edges of a sync pulse: each edge makes a step in it, up or
- * down. A stream of period P meets an edge anywhere within ±P/2, which averages out over
- * pulses that are not in step with it.
- *
- * @param edges_ns ascending, as the kernel stamped them
- * @param fit      delay_ms is how much later the stream shows a step than its edge
- * @return 0; -EINVAL, -EDOM (fewer than 10 edges with a step), -ENOMEM
- */
-INCISE_API int incise_calibrate_delay_pulse(const int64_t *edges_ns, int n_edges,
-					    const struct incise_delay_point *stream,
-					    int n, struct incise_delay_fit *fit,
-					    struct incise_error *err);
 
 INCISE_END_DECLS
 #endif

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include <string.h>
-#include "../../../lib/calib/board.h"
+#include "../../../lib/calib/board_lens.h"
 
 static const union board_lens lens = {
 	.by_name = {1000, 1010, 322, 238, -0.25, 0.1, 0.001, -0.001}};

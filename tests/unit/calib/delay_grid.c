@@ -11,7 +11,7 @@
 #include <errno.h>
 #include <math.h>
 #include <string.h>
-#include "../../../lib/calib/delay.h"
+#include "../../../lib/calib/delay_grid.h"
 
 #define SPAN_S 12
 #define SLOW (SPAN_S * 100)   /* each 10 ms: cubics */

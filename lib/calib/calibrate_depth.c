@@ -9,7 +9,83 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/calibrate_depth.h>
-#include "repeats.h"
+#include "../base/ascending.h"
+
+/* --- repeated readings --- */
+
+#define FEW 20
+#define LAGS_MAX 200 /* four seconds of pictures */
+
+/*
+ * Standard deviation of noise from n absolute residuals, which are sorted, outliers or not
+ * (at most a quarter of few). Of few it comes out larger, so that a good one is not lost for
+ * a chance: twice as large for 12.
+ */
+static double repeats_sd(double *absolute, int n)
+{
+	double sd = 1.4826 * median(absolute, n);
+
+	/* Few can lie close together by chance: what three quarters of them keep within. */
+	if (n < FEW)
+		sd = absolute[3 * n / 4] / 1.1503;
+	return sd * (1 + 12.0 / n);
+}
+
+/* Half of what Student's t needs for 95.45 %, by degrees of freedom. */
+static double widen(int dof)
+{
+	static const double t[] = {13.97, 4.53, 3.31, 2.87, 2.65, 2.52, 2.43, 2.37};
+
+	if (dof < 1)
+		return t[0] / 2;
+	if (dof <= 8)
+		return t[dof - 1] / 2;
+	return 1 + 1.26 / dof; /* within 0.005 of the table from there on */
+}
+
+/*
+ * 1 + 2 Σ ρ as long as the correlation is more than chance makes, Sokal's way to end a sum:
+ * at a lag of 5 times what it has come to.
+ */
+static double correlation_time(const double *r, int n, double power)
+{
+	double sum = 1;
+
+	for (int lag = 1; lag < n / 4 && lag < LAGS_MAX && lag <= 5 * sum; lag++) {
+		double product = 0;
+
+		for (int i = lag; i < n; i++)
+			product += r[i] * r[i - lag];
+		if (product / power < 2 / sqrt(n))
+			break;
+		sum += 2 * product / power;
+	}
+	return sum;
+}
+
+/*
+ * Standard uncertainty of the mean of n values whose residuals these are, in the order they
+ * came; @fitted numbers have been taken from them. As with Student's t, few have a wider
+ * one, so that twice it holds 95.45 %. 0 for one value: of its scatter nothing is known.
+ * *effective: how many independent ones they are worth.
+ */
+static double repeats_u(const double *residual, int n, int fitted, int *effective)
+{
+	double power = 0, times;
+	int worth = n;
+
+	for (int i = 0; i < n; i++)
+		power += residual[i] * residual[i];
+	*effective = n;
+	if (n <= fitted || !(power > 0))
+		return 0;
+	times = n >= 8 ? correlation_time(residual, n, power) : 1;
+	worth = (int)(n / times);
+	if (worth < fitted + 1)
+		worth = fitted + 1;
+	*effective = worth;
+	return sqrt(power / (n - fitted) / worth) * widen(worth - fitted);
+}
 
 /* What calibration.conf takes for depth_mm_px is wider; no camera of a cut is outside. */
 #define SCALE_MIN 1e-4
@@ -19,7 +95,7 @@
 #define POINTS_NEAR 5.0 /* robust standard deviations */
 #define PAIRS_NEAR 4.0	/* of which noise exceeds once in 16000 */
 #define FLOOR_PX 0.01	/* noise below is rounding */
-#define FEW 10		/* points, whose robust standard deviation is chance */
+#define FEW_POINTS 10	/* their robust standard deviation is chance */
 #define FEW_FLOOR_PX 0.2
 #define MEDIANS_MAX 2000 /* pairs in the repeated median; its time is their square */
 #define ROUNDS 20
@@ -73,13 +149,13 @@ static int check_scale(double mm_px, struct incise_error *err)
 		mm_px);
 }
 
-/* ---- two points --------------------------------------------------------------------- */
+/* --- two points --- */
 
 int incise_calibrate_depth_points(const struct incise_depth_points *points, bool *inlier,
 				  struct incise_depth_fit *fit, struct incise_error *err)
 {
 	const double *px = points->length_px;
-	double median, spread, mean = 0, u_mean;
+	double middle, spread, mean = 0, u_mean;
 	double *copy;
 	bool *near;
 	int n = points->n, rc, k = 0;
@@ -104,12 +180,12 @@ int incise_calibrate_depth_points(const struct incise_depth_points *points, bool
 		goto out;
 	}
 	memcpy(copy, px, n * sizeof(*copy));
-	median = repeats_median(copy, n);
+	middle = median(copy, n);
 	for (int i = 0; i < n; i++)
-		copy[i] = fabs(px[i] - median);
-	spread = fmax(repeats_sd(copy, n), n < FEW ? FEW_FLOOR_PX : FLOOR_PX);
+		copy[i] = fabs(px[i] - middle);
+	spread = fmax(repeats_sd(copy, n), n < FEW_POINTS ? FEW_FLOOR_PX : FLOOR_PX);
 	for (int i = 0; i < n; i++) {
-		near[i] = n < 5 || fabs(px[i] - median) <= POINTS_NEAR * spread;
+		near[i] = n < 5 || fabs(px[i] - middle) <= POINTS_NEAR * spread;
 		if (near[i])
 			copy[k++] = px[i];
 	}
@@ -149,7 +225,7 @@ out:
 	return rc;
 }
 
-/* ---- line --------------------------------------------------------------------------- */
+/* --- line --- */
 
 struct line {
 	double slope, middle_px,
@@ -179,17 +255,17 @@ static int start_line(const struct incise_depth_lengths *p, struct line *line)
 				slopes[k++] = (p->depth_mm[j] - p->depth_mm[i]) /
 					      (p->length_px[j] - p->length_px[i]);
 		if (k)
-			each[m++] = repeats_median(slopes, k);
+			each[m++] = median(slopes, k);
 	}
 	rc = -EDOM;
 	if (!m)
 		goto out;
-	line->slope = repeats_median(each, m);
+	line->slope = median(each, m);
 	line->middle_px = 0;
 	m = 0;
 	for (int i = 0; i < p->n; i++)
 		each[m++] = p->depth_mm[i] - line->slope * p->length_px[i];
-	line->middle_mm = repeats_median(each, m);
+	line->middle_mm = median(each, m);
 	rc = 0;
 out:
 	free(slopes);

@@ -5,8 +5,8 @@
  */
 #include <stdarg.h>
 #include <stddef.h>
-#include <setjmp.h>
 #include <stdint.h>
+#include <setjmp.h>
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
@@ -415,6 +415,18 @@ static void the_interval_holds_the_truth(void **state)
 	assert_true(worst < 0.003);
 }
 
+/* Values of the formula as published: 9.7803253359 at the equator, 9.8321849378 at the pole. */
+static void gravity_is_that_of_wgs84(void **state)
+{
+	assert_float_equal(incise_calibrate_gravity(0, 0), 9.7803253359, 1e-10);
+	assert_float_equal(incise_calibrate_gravity(90, 0), 9.8321849378, 1e-9);
+	assert_float_equal(incise_calibrate_gravity(-90, 0), 9.8321849378, 1e-9);
+	/* free air: 0.3086 mGal per metre at the ground, a little less above */
+	assert_float_equal(incise_calibrate_gravity(45, 1000) -
+				   incise_calibrate_gravity(45, 0),
+			   -3.086e-3, 2e-6);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -428,6 +440,7 @@ int main(void)
 		cmocka_unit_test(saturated_readings_are_left_out),
 		cmocka_unit_test(what_cannot_be_is_named),
 		cmocka_unit_test(the_interval_holds_the_truth),
+		cmocka_unit_test(gravity_is_that_of_wgs84),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

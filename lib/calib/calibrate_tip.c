@@ -1,0 +1,692 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Pivot calibration; see incise/calibrate_tip.h. Lengths in mm.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <lapacke.h>
+#include <incise/calibrate_tip.h>
+#include "../base/ascending.h"
+#include "../base/random.h"
+#include "../base/vector.h"
+
+/* The poses as the fit has them. */
+struct tip_poses {
+	int n;
+	double (*p)[3];	       /* mm */
+	double (*r)[9];	       /* rotation, row by row */
+	double (*residual)[3]; /* mm, of the last tip_residuals() */
+	double *square;	       /* its length squared */
+	bool *in;
+	int *list;	/* room for n indices */
+	double *sorted; /* room for n */
+};
+
+/* A solution, and what it rests upon. */
+struct tip_solution {
+	double t[3], c[3];
+	double mean_r[9];
+	double values[3], vectors[9]; /* of I - R̄ᵀR̄, ascending; vector k is column k */
+	int n;
+};
+
+/* --- least squares --- */
+
+#define EIGENVALUE_MIN 1e-9 /* noise of 0.025 degrees makes 2e-7 of none */
+
+/* to = r·v */
+static void tip_turn(double to[3], const double r[9], const double v[3])
+{
+	for (int i = 0; i < 3; i++)
+		to[i] = v3_dot(r + 3 * i, v);
+}
+
+static void turn_back(double to[3], const double r[9], const double v[3])
+{
+	for (int i = 0; i < 3; i++)
+		to[i] = r[i] * v[0] + r[3 + i] * v[1] + r[6 + i] * v[2];
+}
+
+/* Of those of the list (NULL: the first n). False where they do not fix the tip. */
+static bool tip_solve(const struct tip_poses *poses, const int *list, int n,
+		      struct tip_solution *s)
+{
+	double mean_p[3] = {0}, right[3] = {0}, step[3];
+
+	memset(s, 0, sizeof(*s));
+	s->n = n;
+	if (n < 2)
+		return false;
+	for (int i = 0; i < n; i++) {
+		int at = list ? list[i] : i;
+
+		for (int k = 0; k < 3; k++)
+			mean_p[k] += poses->p[at][k] / n;
+		for (int k = 0; k < 9; k++)
+			s->mean_r[k] += poses->r[at][k] / n;
+	}
+	for (int i = 0; i < n; i++) {
+		int at = list ? list[i] : i;
+		double d[9], dp[3], part[3];
+
+		for (int k = 0; k < 9; k++)
+			d[k] = poses->r[at][k] - s->mean_r[k];
+		v3_sub(dp, poses->p[at], mean_p);
+		turn_back(part, d, dp);
+		v3_add(right, right, -1.0 / n, part);
+		/* not I - R̄ᵀR̄, which would cancel where they turn little */
+		for (int a = 0; a < 3; a++)
+			for (int b = 0; b <= a; b++)
+				s->vectors[3 * a + b] +=
+					(d[a] * d[b] + d[3 + a] * d[3 + b] +
+					 d[6 + a] * d[6 + b]) /
+					n;
+	}
+	if (LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'V', 'L', 3, s->vectors, 3, s->values) ||
+	    !(s->values[0] > EIGENVALUE_MIN))
+		return false;
+	turn_back(step, s->vectors, right);
+	for (int k = 0; k < 3; k++)
+		step[k] /= s->values[k];
+	tip_turn(s->t, s->vectors, step);
+	tip_turn(s->c, s->mean_r, s->t);
+	v3_add(s->c, s->c, 1, mean_p);
+	return v3_finite(s->t) && v3_finite(s->c);
+}
+
+/* Of all poses under a solution. */
+static void tip_residuals(struct tip_poses *poses, const struct tip_solution *s)
+{
+	for (int i = 0; i < poses->n; i++) {
+		double *r = poses->residual[i];
+
+		tip_turn(r, poses->r[i], s->t);
+		v3_add(r, r, 1, poses->p[i]);
+		v3_sub(r, r, s->c);
+		poses->square[i] = v3_dot(r, r);
+	}
+}
+
+/* --- which poses to believe --- */
+
+#define STARTS 60
+#define FINALISTS 5
+#define START_POSES 4  /* two fix five of the six unknowns, three all: one to spare */
+#define SAMPLE_MAX 200 /* poses that the search looks at */
+#define SHARE 0.6      /* of them that are fitted */
+#define STEPS 10
+
+/*
+ * Median of the length of three normal deviates. Where noise is larger across the tool,
+ * lengths are those of two: 5 scales are then 3.8 sd, which one good pose in 1500 exceeds.
+ */
+#define MEDIAN_LENGTH 1.538
+#define FAR 5.0
+
+static double quantile(struct tip_poses *sample, int at)
+{
+	memcpy(sample->sorted, sample->square, (size_t)sample->n * sizeof(double));
+	qsort(sample->sorted, (size_t)sample->n, sizeof(double), ascending);
+	return sample->sorted[at];
+}
+
+/* Fit the nearest h, some times. The sum of their squares; HUGE_VAL: they fix nothing. */
+static double concentrate(struct tip_poses *sample, struct tip_solution *s, int h,
+			  int steps)
+{
+	double sum = 0, limit;
+
+	for (int step = 0; step < steps; step++) {
+		int n = 0;
+
+		tip_residuals(sample, s);
+		limit = quantile(sample, h - 1);
+		sum = 0;
+		for (int i = 0; i < sample->n; i++)
+			if (sample->square[i] <= limit) {
+				sample->list[n++] = i;
+				sum += sample->square[i];
+			}
+		if (!tip_solve(sample, sample->list, n, s))
+			return HUGE_VAL;
+	}
+	return sum;
+}
+
+static void search(struct tip_poses *sample, struct tip_solution *best)
+{
+	struct tip_solution finalists[FINALISTS], s;
+	double sums[FINALISTS], sum;
+	int h = (int)ceil(SHARE * sample->n);
+	uint64_t state = 1; /* the same each time: a fit is to be repeatable */
+
+	for (int i = 0; i < FINALISTS; i++)
+		sums[i] = HUGE_VAL;
+	for (int start = 0; start < STARTS; start++) {
+		int few[START_POSES], at = FINALISTS;
+
+		for (int i = 0; i < START_POSES; i++)
+			few[i] = (int)incise_random_draw(&state, (uint32_t)sample->n);
+		if (!tip_solve(sample, few, START_POSES, &s))
+			continue;
+		sum = concentrate(sample, &s, h, 2);
+		while (at > 0 && sum < sums[at - 1])
+			at--;
+		if (at == FINALISTS)
+			continue;
+		for (int i = FINALISTS - 1; i > at; i--) {
+			sums[i] = sums[i - 1];
+			finalists[i] = finalists[i - 1];
+		}
+		sums[at] = sum;
+		finalists[at] = s;
+	}
+	sum = HUGE_VAL;
+	for (int i = 0; i < FINALISTS && sums[i] < HUGE_VAL; i++) {
+		double reached = concentrate(sample, &finalists[i], h, STEPS);
+
+		if (reached < sum) {
+			sum = reached;
+			*best = finalists[i];
+		}
+	}
+}
+
+/* Those marked, as a list in ->list. How many. */
+static int tip_listed(const struct tip_poses *poses)
+{
+	int n = 0;
+
+	for (int i = 0; i < poses->n; i++)
+		if (poses->in[i])
+			poses->list[n++] = i;
+	return n;
+}
+
+/* Mark the poses that are about one pivot and solve by them. False: none fixes the tip. */
+static bool tip_robust(struct tip_poses *poses, struct tip_solution *solution)
+{
+	int m = poses->n < SAMPLE_MAX ? poses->n : SAMPLE_MAX;
+	struct tip_poses sample = *poses; /* shares the scratch of the whole */
+	double(*p)[3] = poses->p, (*r)[9] = poses->r;
+	bool whole = m == poses->n, changed = true;
+	int n;
+
+	if (!tip_solve(poses, NULL, poses->n, solution))
+		return false;
+	if (!whole) {
+		sample.p = malloc((size_t)m * sizeof(*p));
+		sample.r = malloc((size_t)m * sizeof(*r));
+	}
+	sample.n = m;
+	for (int i = 0; !whole && sample.p && sample.r && i < m; i++) {
+		int from = (int)((int64_t)i * poses->n / m);
+
+		memcpy(sample.p[i], p[from], sizeof(*p));
+		memcpy(sample.r[i], r[from], sizeof(*r));
+	}
+	if (sample.p && sample.r)
+		search(&sample, solution);
+	if (!whole) {
+		free(sample.p);
+		free(sample.r);
+	}
+	for (int step = 0; step < STEPS && changed; step++) {
+		double scale, limit;
+
+		tip_residuals(poses, solution);
+		scale = sqrt(quantile(poses, poses->n / 2)) / MEDIAN_LENGTH;
+		/* exact data have no scale; rounding has */
+		limit = FAR * scale + 1e-9;
+		changed = !step;
+		for (int i = 0; i < poses->n; i++) {
+			bool in = poses->square[i] <= limit * limit;
+
+			changed |= in != poses->in[i];
+			poses->in[i] = in;
+		}
+		n = tip_listed(poses);
+		if (!tip_solve(poses, poses->list, n, solution))
+			return false;
+	}
+	tip_residuals(poses, solution);
+	return true;
+}
+
+/* --- motion --- */
+
+#define DIRECTIONS_MAX 1500 /* compared each with each */
+
+/* Shortest tip that tells where the tool points; a shorter one is a correction. */
+#define TOOL_MIN_MM 10.0
+
+/* Largest angle between two directions that an axis of the sensor took. */
+static double swept_deg(const struct tip_poses *poses, int n, const double axis[3])
+{
+	int stride = 1 + n / DIRECTIONS_MAX, m = 0;
+	double least = 1;
+	double(*to)[3] = malloc((size_t)(n / stride + 1) * sizeof(*to));
+
+	if (!to)
+		return 0;
+	for (int i = 0; i < n; i += stride)
+		tip_turn(to[m++], poses->r[poses->list[i]], axis);
+	for (int i = 0; i < m; i++)
+		for (int j = 0; j < i; j++)
+			least = fmin(least, v3_dot(to[i], to[j]));
+	free(to);
+	return acos(fmax(-1, least)) * 180 / M_PI;
+}
+
+/* How far the n poses listed turned, and what of the tip that fixes. */
+static void tip_motion(const struct tip_poses *poses, int n, const struct tip_solution *s,
+		       struct incise_tip_fit *fit)
+{
+	double largest = sqrt(fmax(0, 1 - s->values[0])), tool[3];
+
+	for (int k = 0; k < 3; k++)
+		fit->least[k] = s->vectors[3 * k];
+	fit->least_deg = swept_deg(poses, n, fit->least);
+	fit->cone_deg = fit->least_deg;
+	if (v3_unit(tool, s->t, TOOL_MIN_MM))
+		fit->cone_deg = swept_deg(poses, n, tool);
+	/* singular values of [R -I] are √(n(1 ± s)), s those of R̄ */
+	fit->condition = sqrt((1 + largest) / fmax(s->values[0] / (1 + largest), 1e-300));
+}
+
+/* --- uncertainty --- */
+
+#define ROUNDING_MM 1e-9
+#define BLOCK_TIMES 4
+
+/* Autocorrelation time of the residuals, in poses; 1 where each stands for itself. */
+static double time_of(const struct tip_poses *poses, int n)
+{
+	double zero = 0, time = 1, noise = 3 / sqrt(3.0 * n);
+
+	for (int i = 0; i < n; i++)
+		zero += poses->square[poses->list[i]];
+	if (zero < n * ROUNDING_MM * ROUNDING_MM)
+		return 1;
+	for (int lag = 1; lag <= n / 10; lag++) {
+		double sum = 0;
+
+		for (int i = lag; i < n; i++)
+			sum += v3_dot(poses->residual[poses->list[i]],
+				      poses->residual[poses->list[i - lag]]);
+		if (sum / zero < noise)
+			break;
+		time += 2 * sum / zero;
+	}
+	return time;
+}
+
+/* Poses in a row that count as one: of noise that lasts, some times as long. */
+static int tip_block(const struct tip_poses *poses, int n)
+{
+	double time = time_of(poses, n);
+
+	return time > 1 ? (int)ceil(BLOCK_TIMES * time) : 1;
+}
+
+/*
+ * What a variance from sums over blocks is too small by: borders between blocks cut off half
+ * a time each (Flegal and Jones, Ann. Stat. 38, 2010), six unknowns are two poses' worth of
+ * equations, and few blocks have Student's tails, which k = 2 is to hold too.
+ */
+static double correction(int block, int blocks)
+{
+	double freedom = fmax(1, blocks - 2), student = 1 + 1.21 / freedom;
+	double border = block > 1 ? 1 / (1 - 0.5 / BLOCK_TIMES) : 1;
+
+	return blocks / freedom * border * student * student;
+}
+
+/*
+ * Sandwich of the fit with a pivot that moves evenly: unknowns t and the pivot's move per
+ * half of the run, w. Or without: w 0.
+ */
+struct sandwich {
+	int m; /* unknowns, 3 or 6 */
+	double left[36], middle[36], right[6];
+};
+
+static void score_rows(double rows[3][6], const struct tip_poses *poses, int at,
+		       const struct tip_solution *s, double u)
+{
+	for (int e = 0; e < 3; e++)
+		for (int k = 0; k < 3; k++) {
+			rows[e][k] = poses->r[at][3 * e + k] - s->mean_r[3 * e + k];
+			rows[e][3 + k] = e == k ? -u : 0;
+		}
+}
+
+/* x = left⁻¹ right, and its covariance into middle. False: singular. */
+static bool sandwich(struct tip_poses *poses, int n, const double *u,
+		     const struct tip_solution *s, int block, struct sandwich *w)
+{
+	int m = w->m, blocks = n / block;
+	double sum[6] = {0}, x[6];
+
+	memset(w->left, 0, sizeof(w->left));
+	memset(w->right, 0, sizeof(w->right));
+	memset(w->middle, 0, sizeof(w->middle));
+	for (int i = 0; i < n; i++) {
+		const double *r = poses->residual[poses->list[i]];
+		double rows[3][6];
+
+		score_rows(rows, poses, poses->list[i], s, u[i]);
+		for (int e = 0; e < 3; e++)
+			for (int a = 0; a < m; a++) {
+				w->right[a] -= rows[e][a] * r[e];
+				for (int b = 0; b < m; b++)
+					w->left[a * m + b] += rows[e][a] * rows[e][b];
+			}
+	}
+	if (LAPACKE_dpotrf(LAPACK_ROW_MAJOR, 'L', m, w->left, m))
+		return false;
+	memcpy(x, w->right, sizeof(x));
+	LAPACKE_dpotrs(LAPACK_ROW_MAJOR, 'L', m, 1, w->left, m, x, 1);
+	for (int i = 0; i < n; i++) {
+		double r[3], rows[3][6];
+
+		v3_copy(r, poses->residual[poses->list[i]]);
+		score_rows(rows, poses, poses->list[i], s, u[i]);
+		for (int e = 0; e < 3; e++) {
+			for (int a = 0; a < m; a++)
+				r[e] += rows[e][a] * x[a];
+			for (int a = 0; a < m; a++)
+				sum[a] += rows[e][a] * r[e];
+		}
+		/* what is left over goes with the last block */
+		if (i != n - 1 && ((i + 1) % block || (i + 1) / block == blocks))
+			continue;
+		for (int a = 0; a < m; a++)
+			for (int b = 0; b < m; b++)
+				w->middle[a * m + b] += sum[a] * sum[b];
+		memset(sum, 0, sizeof(sum));
+	}
+	/* middle = left⁻¹ middle left⁻¹, symmetric in between once it is transposed */
+	for (int side = 0; side < 2; side++) {
+		LAPACKE_dpotrs(LAPACK_ROW_MAJOR, 'L', m, m, w->left, m, w->middle, m);
+		for (int a = 0; a < m; a++)
+			for (int b = 0; b < a; b++) {
+				double keep = w->middle[a * m + b];
+
+				w->middle[a * m + b] = w->middle[b * m + a];
+				w->middle[b * m + a] = keep;
+			}
+	}
+	for (int i = 0; i < m * m; i++)
+		w->middle[i] *= correction(block, blocks);
+	memcpy(w->right, x, sizeof(x));
+	return true;
+}
+
+/*
+ * The solution's covariance, and how far the pivot moved, with its χ², by blocks of
+ * fit->block; u: times of those listed, in halves of the run, that add up to 0.
+ */
+static void tip_uncertainty(struct tip_poses *poses, int n, const double *u,
+			    const struct tip_solution *s, struct incise_tip_fit *fit,
+			    double *chi2)
+{
+	struct sandwich still = {.m = 3}, moving = {.m = 6};
+	double c[9], move[3];
+
+	if (sandwich(poses, n, u, s, fit->block, &still))
+		memcpy(fit->covariance, still.middle, sizeof(fit->covariance));
+	*chi2 = 0;
+	if (!sandwich(poses, n, u, s, fit->block, &moving))
+		return;
+	for (int a = 0; a < 3; a++)
+		for (int b = 0; b < 3; b++)
+			c[3 * a + b] = moving.middle[(3 + a) * 6 + 3 + b];
+	v3_copy(move, moving.right + 3);
+	fit->moved_mm = 2 * v3_length(move);
+	fit->moved_sd_mm = 2 * sqrt((c[0] + c[4] + c[8]) / 3);
+	if (!LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', 3, 1, c, 3, move, 1))
+		*chi2 = v3_dot(move, moving.right + 3);
+}
+
+/* --- judgement --- */
+
+#define OUTLIERS_MAX 0.3
+#define RMS_MAX_MM 1.0
+#define CHI2_MOVED 16.27 /* of three, which chance exceeds once in 1000 */
+#define MOVED_MIN_MM 0.1
+
+/* Whether those left out lie together at an end: the pivot moved there. */
+static bool outliers_at_end(const struct tip_poses *poses)
+{
+	int outliers = 0, late = 0;
+
+	for (int i = 0; i < poses->n; i++)
+		if (!poses->in[i]) {
+			outliers++;
+			late += i >= poses->n / 2;
+		}
+	return late > 0.8 * outliers || late < 0.2 * outliers;
+}
+
+/* Whether to believe it. 0; -EDOM with what to do. */
+static int tip_judge(const struct tip_poses *poses, const struct incise_tip_fit *fit,
+		     double chi2, struct incise_error *err)
+{
+	if (fit->least_deg < INCISE_TIP_LEAST_DEG)
+		return incise_error_set(
+			err, EDOM,
+			"it turned about one axis only: the direction (%.2f %.2f %.2f) "
+			"of the sensor swept %.0f degrees; turn the tool all ways",
+			fit->least[0], fit->least[1], fit->least[2], fit->least_deg);
+	if (fit->n - fit->inliers > OUTLIERS_MAX * fit->n) {
+		if (outliers_at_end(poses))
+			return incise_error_set(
+				err, EDOM,
+				"the pivot moved: %d of %d poses are about another point "
+				"than the rest; keep the tip in its dimple",
+				fit->n - fit->inliers, fit->n);
+		return incise_error_set(
+			err, EDOM,
+			"%d of %d poses are not about the pivot of the others; keep the "
+			"tip in its dimple, or are columns swapped?",
+			fit->n - fit->inliers, fit->n);
+	}
+	if (fit->rms_mm > RMS_MAX_MM)
+		return incise_error_set(
+			err, EDOM,
+			"poses miss their pivot by %.2f mm rms, more than %g mm; keep the "
+			"tip in its dimple, or are columns swapped (quaternion w first)?",
+			fit->rms_mm, RMS_MAX_MM);
+	if (fit->cone_deg < INCISE_TIP_CONE_DEG)
+		return incise_error_set(
+			err, EDOM,
+			"the tool swept a cone of %.0f degrees only; %g are needed",
+			fit->cone_deg, INCISE_TIP_CONE_DEG);
+	if (chi2 > CHI2_MOVED && fit->moved_mm > MOVED_MIN_MM)
+		return incise_error_set(
+			err, EDOM,
+			"the pivot moved by %.2f mm while it turned; keep the tip in its "
+			"dimple, and the dimple where it is",
+			fit->moved_mm);
+	if (fit->blocks < INCISE_TIP_POSES_MIN)
+		return incise_error_set(
+			err, EDOM,
+			"%d poses are worth %d independent ones, %d are needed; turn the "
+			"tool longer",
+			fit->n, fit->blocks, INCISE_TIP_POSES_MIN);
+	return 0;
+}
+
+/* --- the whole --- */
+
+/* Columns are where the axes go to. */
+static void rotation(double r[9], const double q[4])
+{
+	double length = sqrt(q[0] * q[0] + v3_dot(q + 1, q + 1)), unit[4];
+
+	for (int i = 0; i < 4; i++)
+		unit[i] = q[i] / length;
+	for (int k = 0; k < 3; k++) {
+		double axis[3] = {k == 0, k == 1, k == 2}, to[3];
+
+		v3_rotate(to, unit, axis);
+		for (int i = 0; i < 3; i++)
+			r[3 * i + k] = to[i];
+	}
+}
+
+static int take(struct tip_poses *to, const struct incise_tip_pose *from,
+		struct incise_error *err)
+{
+	for (int i = 0; i < to->n; i++) {
+		const double *q = from[i].quaternion;
+		double length = sqrt(q[0] * q[0] + v3_dot(q + 1, q + 1));
+
+		if (!v3_finite(from[i].position_mm) || !isfinite(length) ||
+		    v3_length(from[i].position_mm) > 1e6)
+			return incise_error_set(err, EINVAL,
+						"pose %d: not a number, or no place of "
+						"a tool; remove it",
+						i + 1);
+		if (fabs(length - 1) > 0.02)
+			return incise_error_set(err, EINVAL,
+						"pose %d: the quaternion's length is "
+						"%.3g, not 1; are columns swapped?",
+						i + 1, length);
+		v3_copy(to->p[i], from[i].position_mm);
+		rotation(to->r[i], q);
+	}
+	return 0;
+}
+
+static void release(struct tip_poses *poses)
+{
+	free(poses->p);
+	free(poses->r);
+	free(poses->residual);
+	free(poses->square);
+	free(poses->in);
+	free(poses->list);
+	free(poses->sorted);
+}
+
+static bool make_room(struct tip_poses *poses, int n)
+{
+	size_t size = (size_t)n;
+
+	*poses = (struct tip_poses){
+		.n = n,
+		.p = malloc(size * sizeof(*poses->p)),
+		.r = malloc(size * sizeof(*poses->r)),
+		.residual = malloc(size * sizeof(*poses->residual)),
+		.square = malloc(size * sizeof(*poses->square)),
+		.in = calloc(size, sizeof(*poses->in)),
+		.list = malloc(size * sizeof(*poses->list)),
+		.sorted = malloc(size * sizeof(*poses->sorted)),
+	};
+	return poses->p && poses->r && poses->residual && poses->square && poses->in &&
+	       poses->list && poses->sorted;
+}
+
+/* Each half's residuals under the fit of the other; blocks of 1/20 take turns. */
+static double held_out(struct tip_poses *poses, int n)
+{
+	int length = n / 20 > 0 ? n / 20 : 1, m;
+	int *half = malloc((size_t)n * sizeof(*half));
+	struct tip_solution s;
+	double sum = 0;
+
+	if (!half)
+		return NAN;
+	for (int side = 0; side < 2; side++) {
+		m = 0;
+		for (int i = 0; i < n; i++)
+			if (i / length % 2 == side)
+				half[m++] = poses->list[i];
+		if (!tip_solve(poses, half, m, &s)) {
+			sum = NAN;
+			break;
+		}
+		tip_residuals(poses, &s);
+		for (int i = 0; i < n; i++)
+			if (i / length % 2 != side)
+				sum += poses->square[poses->list[i]];
+	}
+	free(half);
+	return sqrt(sum / n);
+}
+
+static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *given,
+		     struct incise_tip_fit *fit, struct incise_error *err)
+{
+	struct tip_solution s;
+	double sum = 0, chi2, *u;
+	int n;
+
+	if (!tip_robust(poses, &s))
+		return incise_error_set(
+			err, EDOM,
+			"the tool did not turn, or about one axis only; turn it all "
+			"ways, the tip in its dimple");
+	n = fit->inliers = tip_listed(poses);
+	v3_copy(fit->tip_mm, s.t);
+	v3_copy(fit->pivot_mm, s.c);
+	for (int i = 0; i < n; i++) {
+		sum += poses->square[poses->list[i]];
+		fit->largest_mm =
+			fmax(fit->largest_mm, sqrt(poses->square[poses->list[i]]));
+	}
+	fit->rms_mm = sqrt(sum / n);
+	tip_motion(poses, n, &s, fit);
+	fit->block = tip_block(poses, n);
+	fit->blocks = n / fit->block;
+	u = malloc((size_t)n * sizeof(*u));
+	if (!u)
+		return incise_error_set(err, ENOMEM, "out of memory");
+	for (int i = 0; i < n; i++) {
+		/* apart, as their difference may not fit its type */
+		double first = (double)given[0].t_ns;
+		double span = (double)given[poses->n - 1].t_ns - first;
+
+		u[i] = span > 0
+			       ? 2 * ((double)given[poses->list[i]].t_ns - first) / span -
+					 1
+			       : 2.0 * i / n - 1;
+	}
+	sum = 0;
+	for (int i = 0; i < n; i++)
+		sum += u[i] / n;
+	for (int i = 0; i < n; i++)
+		u[i] -= sum;
+	tip_uncertainty(poses, n, u, &s, fit, &chi2);
+	free(u);
+	fit->held_out_mm = held_out(poses, n);
+	return tip_judge(poses, fit, chi2, err);
+}
+
+int incise_calibrate_tip(const struct incise_tip_pose *poses, int n, bool *inlier,
+			 struct incise_tip_fit *fit, struct incise_error *err)
+{
+	struct tip_poses own;
+	int rc;
+
+	*fit = (struct incise_tip_fit){.n = n};
+	if (inlier)
+		memset(inlier, 0, (size_t)(n > 0 ? n : 0) * sizeof(*inlier));
+	if (n < INCISE_TIP_POSES_MIN)
+		return incise_error_set(err, EDOM,
+					"%d poses are too few, %d are needed at least; "
+					"turn the tool longer",
+					n, INCISE_TIP_POSES_MIN);
+	rc = make_room(&own, n) ? take(&own, poses, err)
+				: incise_error_set(err, ENOMEM, "out of memory");
+	if (!rc)
+		rc = fit_poses(&own, poses, fit, err);
+	if (inlier && own.in)
+		memcpy(inlier, own.in, (size_t)n * sizeof(*inlier));
+	release(&own);
+	return rc;
+}
