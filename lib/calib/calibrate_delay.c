@@ -358,7 +358,8 @@ static int bootstrap(struct delay *d, const struct tangent *t,
 		struct normal sum = {.m = t->m}, without;
 
 		for (int b = 0; b < used; b++)
-			add_normal(&sum, &blocks[incise_random_draw(&state, (uint32_t)used)]);
+			add_normal(&sum,
+				   &blocks[incise_random_draw(&state, (uint32_t)used)]);
 		drifts[draw] = solve(&sum, x) ? x[t->m - 1] : 0;
 		without = (struct normal){.m = t->m - 1, .yy = sum.yy};
 		for (int i = 0; i < without.m; i++) {

@@ -80,7 +80,8 @@ static int slope_of_pairs(struct work *w, double *room)
 	int n = 0;
 
 	for (int tries = 0; tries < 4 * PAIRS && n < PAIRS; tries++) {
-		const struct stroke *s = &w->strokes[incise_random_draw(&choice, w->n_strokes)];
+		const struct stroke *s =
+			&w->strokes[incise_random_draw(&choice, w->n_strokes)];
 		int length = s->last - s->first + 1;
 		int i = s->first + (int)incise_random_draw(&choice, length);
 		int j = s->first + (int)incise_random_draw(&choice, length);
