@@ -46,8 +46,8 @@ enum incise_delay_relation {
 
 /** The delay between two streams, and its uncertainty. */
 struct incise_delay_fit {
-	double delay_ms; /**< how much later the motion's timestamps are */
-	double sd_ms;	 /**< standard uncertainty */
+	double delay_ms;	      /**< how much later the motion's timestamps are */
+	double sd_ms;		      /**< standard uncertainty */
 	double low_ms, high_ms;	      /**< 95 % interval */
 	double drift_ms, drift_sd_ms; /**< of the delay from the beginning to the end */
 	double correlation; /**< of the derivatives of the other stream and of the fit */
