@@ -25,6 +25,18 @@ struct solution {
 	int plane_at;	    /* where the plane's pose begins in it */
 };
 
+/*
+ * --- first values ---
+ *
+ * After Z. Zhang, A flexible new technique for camera calibration, IEEE PAMI 22 (2000) 1330.
+ * Columns 1 and 2 of a homography H = K [r1 r2 t] come from unit vectors at a right angle. With
+ * the principal point in the picture's middle, taken off, each view has two equations for
+ * w = 1/f²:
+ *
+ *     w (h11 h12 + h21 h22) + h31 h32 = 0
+ *     w (h11² + h21² - h12² - h22²) + h31² - h32² = 0
+ */
+
 static void corner_mm(const struct incise_board_views *views, int corner, double mm[2])
 {
 	mm[0] = corner % views->columns * views->square_mm;
@@ -158,7 +170,13 @@ static int find_start(const struct incise_board_views *views, struct solution *s
 	return 0;
 }
 
-/* --- the cutting plane --- */
+/*
+ * --- the cutting plane ---
+ *
+ * Every metric of the plane is a function of the lens and of the pose in the plane, 14 numbers;
+ * its variance is gᵀ C g with a gradient by differences of a tenth of each number's own standard
+ * deviation.
+ */
 
 #define GRID 9	       /* places in the region, both ways */
 #define AXIS_PLACES 33 /* on the axis */

@@ -105,7 +105,11 @@ static void tangent_normal(const struct tangent *t, int from, int to, int withou
 			add_row(normal, t->row + (size_t)i * t->m, t->rest[i]);
 }
 
-/* --- the delay roughly --- */
+/*
+ * --- the delay roughly ---
+ *
+ * The peak of the correlation, and where the contact begins.
+ */
 
 #define COARSE_KNOTS 5
 #define COARSE_STRIDE 2 /* rows; neighbours are alike through the filter */
@@ -313,7 +317,11 @@ static void search_contact(struct delay *d)
 		d->touches = d->contact_mm > d->low_mm;
 }
 
-/* --- uncertainty --- */
+/*
+ * --- uncertainty ---
+ *
+ * Blocks of the run are drawn again and again.
+ */
 
 #define BLOCK_S 1.0
 #define BLOCKS_MIN 7

@@ -33,7 +33,13 @@ struct work {
 	double robust_slope;
 };
 
-/* --- the line and its budget --- */
+/*
+ * --- the line and its budget ---
+ *
+ * The readings of a load share the error of the weight, which more readings do not take away:
+ * the variance of a load's mean is scatter²/n + (S u_load)², and its inverse the weight. The
+ * slope is then S = Σ c_k mean_k, and each source adds by these c_k (GUM, JCGM 100:2008, 5.1.2).
+ */
 
 static int by_force(const void *a, const void *b)
 {
@@ -267,7 +273,12 @@ static void fit_line(struct work *w, struct incise_calibrate_force *result)
 	result->used = 0; /* counted with the others, by the caller */
 }
 
-/* --- metrics of the sensor --- */
+/*
+ * --- metrics of the sensor ---
+ *
+ * Linearity, hysteresis, repeatability and zero return, in the words of ISO 376, in percent of
+ * full scale: the reading of the largest load above the zero.
+ */
 
 /* Readings of one load that one way leads to. */
 struct way {

@@ -35,7 +35,13 @@ struct work {
 	double sxx;	 /* Σ (x - its stroke's mean)² of the points used */
 };
 
-/* --- lines --- */
+/*
+ * --- lines ---
+ *
+ * Lines of one slope, one for each stroke, in spite of outliers: the median of the slopes of pairs
+ * within strokes (P. K. Sen, J. Am. Stat. Assoc. 63, 1968), then least squares of the points near
+ * it. A zero for each stroke takes up a sensor that drifts.
+ */
 
 #define PAIRS 4000
 #define ROUNDS 10
@@ -210,7 +216,12 @@ static int fit_lines(struct work *w, double skip_mm)
 	return rc;
 }
 
-/* --- refusals --- */
+/*
+ * --- refusals ---
+ *
+ * A sensor that does not move or does not follow, a reversed sign, lost steps, too small a range,
+ * too many outliers: each is refused with a line of its own.
+ */
 
 #define BLOCKS 8  /* of the range, that are looked at one by one */
 #define SLIP 0.01 /* of full scale, that strokes of one way may be apart */
@@ -347,7 +358,22 @@ static int check_lines(const struct work *w, struct incise_calibrate_stepper *re
 	return 0;
 }
 
-/* --- turns --- */
+/*
+ * --- turns ---
+ *
+ * How far the force stands still behind the turns, how far it jumps, and how the rest fades, from
+ * all turns together. s is the way since the turn, and rho how far the force is behind its
+ * branch's line, on the side that it came from:
+ *
+ *   rho   k(s - D) ____________ up to dead: the force stands still
+ *                 /:leap
+ *                / o.
+ *               /  rest `.
+ *   ----------D----dead----`.------- s
+ *
+ * Four models, the simple ones first: that turn is just the lines' distance D; a leap; a rest;
+ * both. One with more in it has to explain much more.
+ */
 
 #define LOOK 0.4 /* behind each turn, of the range */
 /* Tried first, of that; then finer about the best. */

@@ -32,7 +32,13 @@ struct tip_solution {
 	int n;
 };
 
-/* --- least squares --- */
+/*
+ * --- least squares ---
+ *
+ * With c eliminated the six unknowns are three: n(I - R̄ᵀR̄) t = -Σ (R_i - R̄)ᵀ(p_i - p̄). The
+ * eigenvalues of the matrix say how well the motion fixes each direction: one that all poses leave
+ * where it is has eigenvalue 0.
+ */
 
 #define EIGENVALUE_MIN 1e-9 /* noise of 0.025 degrees makes 2e-7 of none */
 
@@ -109,7 +115,12 @@ static void tip_residuals(struct tip_poses *poses, const struct tip_solution *s)
 	}
 }
 
-/* --- which poses to believe --- */
+/*
+ * --- inliers ---
+ *
+ * Poses that are about one pivot: least trimmed squares by concentration steps (Rousseeuw and
+ * Van Driessen, Data Min. Knowl. Discov. 12, 2006), then all that are near it.
+ */
 
 #define STARTS 60
 #define FINALISTS 5
@@ -255,7 +266,11 @@ static bool tip_robust(struct tip_poses *poses, struct tip_solution *solution)
 	return true;
 }
 
-/* --- motion --- */
+/*
+ * --- motion ---
+ *
+ * How far directions of the sensor swept.
+ */
 
 #define DIRECTIONS_MAX 1500 /* compared each with each */
 
@@ -296,7 +311,11 @@ static void tip_motion(const struct tip_poses *poses, int n, const struct tip_so
 	fit->condition = sqrt((1 + largest) / fmax(s->values[0] / (1 + largest), 1e-300));
 }
 
-/* --- uncertainty --- */
+/*
+ * --- uncertainty ---
+ *
+ * The covariance, of noise that may last from pose to pose, and whether the pivot moved.
+ */
 
 #define ROUNDING_MM 1e-9
 #define BLOCK_TIMES 4

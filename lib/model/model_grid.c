@@ -396,7 +396,12 @@ struct interval incise_patch_mixed(const struct incise_grid *grid,
 	return f12;
 }
 
-/* --- survey --- */
+/*
+ * --- survey ---
+ *
+ * Bounds by interval arithmetic over patches that cover the support. Linear interpolation over a
+ * cell of width w is off by at most w²/8 times the largest second derivative.
+ */
 
 /* Blocks per input: more give a tighter bound and take time, with the square. */
 #define BLOCKS 128

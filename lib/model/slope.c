@@ -232,7 +232,12 @@ static int enclose(const struct incise_grid *grid, struct incise_slope *slopes)
 	return 0;
 }
 
-/* --- estimates --- */
+/*
+ * --- estimates ---
+ *
+ * Points spread evenly over the box, then from the best of them uphill by steps along the inputs
+ * that grow shorter.
+ */
 
 /* A point and the slope there, negated where the lowest is sought. */
 struct place {
