@@ -12,7 +12,6 @@
 #include <incise/train.h>
 #include "cli/cli.h"
 #include "train/train_report.h"
-#include "train/train_side.h"
 #include "train/train_wish.h"
 #include "cli/file.h"
 
@@ -59,14 +58,14 @@ static void check_writable(const struct train_wish *wish, const char *path)
 
 static void judge_interval(struct train_interval *interval,
 			   const struct incise_model *model,
-			   const struct train_side *check)
+			   const struct incise_train_side *check)
 {
 	size_t inside = 0;
 
 	interval->noise = incise_uncertainty_noise(interval->uncertainty);
 	interval->coverage = NAN;
 	for (size_t i = 0; check && i < check->pairs.n; i++) {
-		const double *x = check->rows + i * (check->pairs.n_inputs + 1);
+		const double *x = check->pairs.rows + i * (check->pairs.n_inputs + 1);
 		double e = incise_model_eval(model, x, NULL) - x[check->pairs.n_inputs];
 		double sd = incise_uncertainty_sd(interval->uncertainty, model, x);
 
@@ -95,7 +94,7 @@ static void save_uncertainty(const struct train_interval *interval, const char *
 static void train(struct train_wish *wish, struct incise_model *model,
 		  struct train_result *result)
 {
-	const struct train_side *check = result->check;
+	const struct incise_train_side *check = result->check;
 	struct incise_error err = {0};
 	struct incise_outfile *file = NULL;
 	struct history history = {.epochs = wish->train.epochs};
@@ -120,7 +119,7 @@ static void train(struct train_wish *wish, struct incise_model *model,
 int main(int argc, char **argv)
 {
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
-	struct train_side fit = {0}, check = {0};
+	struct incise_train_side fit = {0}, check = {0};
 	struct train_wish wish;
 	struct train_result result = {.wish = &wish, .fit = &fit};
 	struct incise_error err = {0};
@@ -139,9 +138,16 @@ int main(int argc, char **argv)
 				   &err);
 	if (!data)
 		cli_fail_with(&err);
-	train_sides_take(&fit, &check, data, &wish);
+	if (incise_train_split(data, wish.check, wish.train.seed, &fit, &check, &err))
+		cli_fail("%s: %s", wish.data, err.text);
 	result.check = wish.check > 0 ? &check : NULL;
-	result.model = model = train_first_model(&wish, &fit);
+	wish.train.groups = fit.groups;
+	if (wish.auto_mfs)
+		wish.mfs[0] = 0;
+	result.model = model = incise_train_start(&fit.pairs, columns, wish.type,
+						  wish.mfs, &wish.train, &err);
+	if (!model)
+		cli_fail("%s: %s", wish.data, err.text);
 	if (wish.initial && incise_model_save(model, wish.initial, &err))
 		cli_fail_with(&err);
 	train(&wish, model, &result);
@@ -163,7 +169,7 @@ int main(int argc, char **argv)
 	incise_model_free(model);
 	incise_uncertainty_free(result.interval.uncertainty);
 	incise_dataset_free(data);
-	train_side_free(&fit);
-	train_side_free(&check);
+	incise_train_side_free(&fit);
+	incise_train_side_free(&check);
 	return 0;
 }

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * Random numbers by splitmix64: number n of a stream is a function of the stream's key and n
- * alone. So streams do not disturb each other, and the order of reading changes nothing. And
- * a generator with a state, for searches that are to be repeatable.
+ * alone. So streams do not disturb each other, and the order of reading changes nothing. Two
+ * generators with a state serve searches and splits that are to be repeatable.
  */
 #ifndef INCISE_BASE_RANDOM_H
 #define INCISE_BASE_RANDOM_H
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <incise/export.h>
 
@@ -64,6 +65,33 @@ static inline uint32_t incise_random_draw(uint64_t *state, uint32_t n)
 {
 	*state = *state * 6364136223846793005ULL + 1442695040888963407ULL;
 	return (uint32_t)(*state >> 33) % n;
+}
+
+/* The next 64 bits of splitmix64 with a state. */
+static inline uint64_t incise_random_next(uint64_t *state)
+{
+	return incise_random_mix(*state += 0x9e3779b97f4a7c15ULL);
+}
+
+/* The next number, uniformly distributed in -1 … 1, 1 excluded. */
+static inline double incise_random_symmetric(uint64_t *state)
+{
+	return (double)(incise_random_next(state) >> 11) * 0x1p-52 - 1;
+}
+
+/* Fill order with 0 … n-1 in random order (Fisher and Yates). */
+static inline void incise_random_shuffle(size_t *order, size_t n, uint64_t seed)
+{
+	for (size_t i = 0; i < n; i++)
+		order[i] = i;
+	for (size_t i = n; i > 1; i--) {
+		/* The modulo's bias is below n/2^64. */
+		size_t j = incise_random_next(&seed) % i;
+		size_t other = order[j];
+
+		order[j] = order[i - 1];
+		order[i - 1] = other;
+	}
 }
 
 #endif

@@ -80,7 +80,7 @@ static void choose_points(struct work *w, double skip_mm)
 }
 
 /* Slopes of pairs that are far apart, so that noise does not make them steep. */
-static int slope_of_pairs(struct work *w, double *room)
+static int slope_of_pairs(struct work *w, double *scratch)
 {
 	uint64_t choice = 1;
 	int n = 0;
@@ -96,16 +96,16 @@ static int slope_of_pairs(struct work *w, double *room)
 		if (w->states[i] == INCISE_CALIBRATE_STEPPER_USED &&
 		    w->states[j] == INCISE_CALIBRATE_STEPPER_USED &&
 		    fabs(mm) > 0.2 * w->range_mm)
-			room[n++] = (w->points[j].force_N - w->points[i].force_N) / mm;
+			scratch[n++] = (w->points[j].force_N - w->points[i].force_N) / mm;
 	}
 	if (n < 10)
 		return -EDOM;
-	w->slope = upper_median(room, n);
+	w->slope = upper_median(scratch, n);
 	return 0;
 }
 
 /* The zero of each stroke, and the spread about the lines, by medians. */
-static int medians(struct work *w, double *room)
+static int medians(struct work *w, double *scratch)
 {
 	int all = 0;
 
@@ -116,16 +116,16 @@ static int medians(struct work *w, double *room)
 		s->zero_N = 0;
 		for (int i = s->first; i <= s->last; i++)
 			if (w->states[i] == INCISE_CALIBRATE_STEPPER_USED)
-				room[n++] = off_line(w, s, i);
+				scratch[n++] = off_line(w, s, i);
 		if (n < 4)
 			return -EDOM;
-		s->zero_N = median(room, n);
+		s->zero_N = median(scratch, n);
 	}
 	for (int k = 0; k < w->n_strokes; k++)
 		for (int i = w->strokes[k].first; i <= w->strokes[k].last; i++)
 			if (w->states[i] == INCISE_CALIBRATE_STEPPER_USED)
-				room[all++] = fabs(off_line(w, &w->strokes[k], i));
-	w->sd = 1.4826 * upper_median(room, all);
+				scratch[all++] = fabs(off_line(w, &w->strokes[k], i));
+	w->sd = 1.4826 * upper_median(scratch, all);
 	return 0;
 }
 
@@ -199,16 +199,16 @@ static int least_squares(struct work *w)
  */
 static int fit_lines(struct work *w, double skip_mm)
 {
-	double *room = malloc((w->n > PAIRS ? w->n : PAIRS) * sizeof(*room));
+	double *scratch = malloc((w->n > PAIRS ? w->n : PAIRS) * sizeof(*scratch));
 	int rc;
 
-	if (!room)
+	if (!scratch)
 		return -ENOMEM;
 	choose_points(w, skip_mm);
-	rc = slope_of_pairs(w, room);
+	rc = slope_of_pairs(w, scratch);
 	if (!rc)
-		rc = medians(w, room);
-	free(room);
+		rc = medians(w, scratch);
+	free(scratch);
 	for (int round = 0; round < ROUNDS && !rc; round++) {
 		drop_far(w);
 		rc = least_squares(w);
@@ -229,21 +229,21 @@ static int fit_lines(struct work *w, double skip_mm)
 /* Noise is what three points in a row are off a line; the force has to go much further. */
 static int check_moves(const struct work *w, struct incise_error *err)
 {
-	double *room = malloc(w->n * sizeof(*room)), noise, spread;
+	double *scratch = malloc(w->n * sizeof(*scratch)), noise, spread;
 	int m = 0;
 
-	if (!room)
+	if (!scratch)
 		return incise_error_set(err, ENOMEM, "no memory for %d points", w->n);
 	for (int i = 1; i + 1 < w->n; i++)
-		room[m++] = fabs(w->points[i - 1].force_N - 2 * w->points[i].force_N +
-				 w->points[i + 1].force_N) /
-			    sqrt(6);
-	noise = fmax(1.4826 * upper_median(room, m), w->setup->resolution_N);
+		scratch[m++] = fabs(w->points[i - 1].force_N - 2 * w->points[i].force_N +
+				    w->points[i + 1].force_N) /
+			       sqrt(6);
+	noise = fmax(1.4826 * upper_median(scratch, m), w->setup->resolution_N);
 	for (int i = 0; i < w->n; i++)
-		room[i] = w->points[i].force_N;
-	qsort(room, w->n, sizeof(*room), ascending);
-	spread = room[w->n - 1 - w->n / 10] - room[w->n / 10];
-	free(room);
+		scratch[i] = w->points[i].force_N;
+	qsort(scratch, w->n, sizeof(*scratch), ascending);
+	spread = scratch[w->n - 1 - w->n / 10] - scratch[w->n / 10];
+	free(scratch);
 	if (spread > 10 * noise)
 		return 0;
 	return incise_error_set(
@@ -256,10 +256,10 @@ static int check_moves(const struct work *w, struct incise_error *err)
 /* In each quarter, the median distance from the lines in its first half and its second. */
 static int check_follows(const struct work *w, struct incise_error *err)
 {
-	double *room = malloc(w->n * sizeof(*room)), low = INFINITY, middle[BLOCKS];
+	double *scratch = malloc(w->n * sizeof(*scratch)), low = INFINITY, middle[BLOCKS];
 	bool known[BLOCKS] = {false};
 
-	if (!room)
+	if (!scratch)
 		return incise_error_set(err, ENOMEM, "no memory for %d points", w->n);
 	for (int i = 0; i < w->n; i++)
 		low = fmin(low, w->points[i].position_mm);
@@ -273,13 +273,13 @@ static int check_follows(const struct work *w, struct incise_error *err)
 
 				if (fmin(BLOCKS - 1, floor(at * BLOCKS)) == b &&
 				    w->states[i] != INCISE_CALIBRATE_STEPPER_TURN)
-					room[m++] = off_line(w, &w->strokes[k], i);
+					scratch[m++] = off_line(w, &w->strokes[k], i);
 			}
 		known[b] = m >= 4;
 		if (known[b])
-			middle[b] = upper_median(room, m);
+			middle[b] = upper_median(scratch, m);
 	}
-	free(room);
+	free(scratch);
 	for (int b = 0; b + 1 < BLOCKS; b++)
 		if (known[b] && known[b + 1] &&
 		    (middle[b + 1] - middle[b]) / (w->range_mm / BLOCKS) <

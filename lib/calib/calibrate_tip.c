@@ -20,8 +20,8 @@ struct tip_poses {
 	double (*residual)[3]; /* mm, of the last tip_residuals() */
 	double *square;	       /* its length squared */
 	bool *in;
-	int *list;	/* room for n indices */
-	double *sorted; /* room for n */
+	int *list;	/* scratch: n indices */
+	double *sorted; /* scratch: n */
 };
 
 /* A solution, and what it rests upon. */
@@ -592,7 +592,7 @@ static void release(struct tip_poses *poses)
 	free(poses->sorted);
 }
 
-static bool make_room(struct tip_poses *poses, int n)
+static bool allocate(struct tip_poses *poses, int n)
 {
 	size_t size = (size_t)n;
 
@@ -700,8 +700,8 @@ int incise_calibrate_tip(const struct incise_tip_pose *poses, int n, bool *inlie
 					"%d poses are too few, %d are needed at least; "
 					"turn the tool longer",
 					n, INCISE_TIP_POSES_MIN);
-	rc = make_room(&own, n) ? take(&own, poses, err)
-				: incise_error_set(err, ENOMEM, "out of memory");
+	rc = allocate(&own, n) ? take(&own, poses, err)
+			       : incise_error_set(err, ENOMEM, "out of memory");
 	if (!rc)
 		rc = fit_poses(&own, poses, fit, err);
 	if (inlier && own.in)

@@ -199,7 +199,7 @@ static void make_speed(struct delay_grid *grid)
 	}
 }
 
-static bool make_room(struct delay_grid *grid)
+static bool allocate(struct delay_grid *grid)
 {
 	size_t size = (size_t)grid->n * sizeof(double);
 	bool all = true;
@@ -274,7 +274,7 @@ int delay_grid_make(struct delay_grid *grid, const struct incise_delay_point *mo
 					"slow for a delay",
 					fmax(periods[0], periods[1]) * 1e-6);
 	grid->reach = (int)ceil(REACH_SIGMAS * grid->sigma);
-	if (!make_room(grid))
+	if (!allocate(grid))
 		return incise_error_set(err, ENOMEM, "out of memory");
 	for (int k = -grid->reach; k <= grid->reach; k++) {
 		double w = k / grid->sigma;

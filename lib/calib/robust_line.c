@@ -37,18 +37,18 @@ static int quantile(int n)
 	return n < 20 ? 3 * n / 4 : n / 2;
 }
 
-/* Median of |y - line|, or the quantile of few points; @room for n numbers. */
+/* Median of |y - line|, or the quantile of few points; @scratch: n numbers. */
 static double median_distance(const double *x, const double *y, int n, double slope,
-			      double zero, double *room)
+			      double zero, double *scratch)
 {
 	for (int i = 0; i < n; i++)
-		room[i] = fabs(y[i] - zero - slope * x[i]);
-	qsort(room, n, sizeof(*room), ascending);
-	return room[quantile(n)];
+		scratch[i] = fabs(y[i] - zero - slope * x[i]);
+	qsort(scratch, n, sizeof(*scratch), ascending);
+	return scratch[quantile(n)];
 }
 
 static void try_line(const double *x, const double *y, int n, int i, int j,
-		     struct robust_line *line, double *best, double *room)
+		     struct robust_line *line, double *best, double *scratch)
 {
 	double slope, zero, distance;
 
@@ -56,7 +56,7 @@ static void try_line(const double *x, const double *y, int n, int i, int j,
 		return;
 	slope = (y[j] - y[i]) / (x[j] - x[i]);
 	zero = y[i] - slope * x[i];
-	distance = median_distance(x, y, n, slope, zero, room);
+	distance = median_distance(x, y, n, slope, zero, scratch);
 	if (distance < *best) {
 		*best = distance;
 		line->slope = slope;
@@ -100,24 +100,24 @@ static bool least_squares(const double *x, const double *y, int n, const bool *o
 int incise_robust_line(const double *x, const double *y, int n, double sd_min,
 		       struct robust_line *line, bool *outlier)
 {
-	double best = INFINITY, far = FAR, *room = malloc(n * sizeof(*room));
+	double best = INFINITY, far = FAR, *scratch = malloc(n * sizeof(*scratch));
 	uint64_t choice = 1;
 
-	if (!room)
+	if (!scratch)
 		return -ENOMEM;
 	*line = (struct robust_line){0};
 	if ((int64_t)n * (n - 1) / 2 <= LINES_MAX)
 		for (int i = 0; i < n; i++)
 			for (int j = 0; j < i; j++)
-				try_line(x, y, n, i, j, line, &best, room);
+				try_line(x, y, n, i, j, line, &best, scratch);
 	else
 		for (int k = 0; k < LINES; k++) {
 			int i = (int)incise_random_draw(&choice, n);
 			int j = (int)incise_random_draw(&choice, n);
 
-			try_line(x, y, n, i, j, line, &best, room);
+			try_line(x, y, n, i, j, line, &best, scratch);
 		}
-	free(room);
+	free(scratch);
 	if (!isfinite(best))
 		return -EDOM;
 	/* Rousseeuw and Leroy 1987, chapter 5: to an sd of normal errors, for small n too. */

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <incise/train.h>
 #include "lsq.h"
-#include "shuffle.h"
+#include "../base/random.h"
 
 static const int ks[] = {1, 3, 5, 10, 20, 50};
 #define N_KS ((int)(sizeof(ks) / sizeof(*ks)))
@@ -93,7 +93,7 @@ static size_t *some_of(size_t n, size_t most, size_t *count)
 	size_t *order = malloc(n * sizeof(*order));
 
 	if (order)
-		incise_shuffle(order, n, 1);
+		incise_random_shuffle(order, n, 1);
 	*count = n < most ? n : most;
 	return order;
 }

@@ -7,6 +7,7 @@
 #ifndef INCISE_BASIS_H
 #define INCISE_BASIS_H
 
+#include <stdint.h>
 #include <incise/train.h>
 
 #define BASIS_PARAMS_MAX 3 /* of one membership function */
@@ -56,5 +57,27 @@ double incise_basis_output(const struct incise_basis *basis, const double *w,
 
 /* The consequents of a model as one vector, and back; -EDOM when one is not finite. */
 int incise_basis_set_consequents(struct incise_model *model, const double *consequents);
+
+/*
+ * How the premises may move while they learn, on inputs scaled to [0, 1]. A step is in
+ * coordinates where all premises are alike: widths and slopes by their logarithm, so that they
+ * stay positive, and centres in units of the even spacing.
+ */
+
+/* ∂p/∂step of each premise. */
+void incise_premises_scale(const struct incise_basis *basis, double *scale);
+
+/* Take a step and bring the functions back into their bounds. */
+void incise_premises_step(struct incise_basis *basis, const double *step);
+
+/*
+ * The bounds: centres in order within the range, a quarter of the even spacing apart at
+ * least; a function still 0.1 half-way to its neighbours and at the end of the range next
+ * to it; no wider than four times the even grid's; slopes of bells from 1 to 8.
+ */
+void incise_premises_project(struct incise_basis *basis);
+
+/* Another start, by seed: centres by up to 0.3 spacings, widths by up to a third. */
+void incise_premises_jitter(struct incise_basis *basis, uint64_t seed);
 
 #endif

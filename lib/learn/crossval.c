@@ -8,7 +8,7 @@
 #include <string.h>
 #include "crossval.h"
 #include "lsq.h"
-#include "shuffle.h"
+#include "../base/random.h"
 #include "varpro.h"
 
 /* Up to so many pairs the division into folds is repeated. */
@@ -87,7 +87,7 @@ int incise_folds_init(struct incise_folds *folds, const struct incise_pairs *pai
 	repeats = elements > CROSSVAL_FOLDS && pairs->n <= REPEATED_MAX ? CROSSVAL_REPEATS
 									: 1;
 	for (int repeat = 0; repeat < repeats && !rc; repeat++) {
-		incise_shuffle(place, elements, seed + repeat);
+		incise_random_shuffle(place, elements, seed + repeat);
 		for (int f = 0; f < n_folds && !rc; f++)
 			rc = fill_fold(folds, folds->n++, pairs, place, unit,
 				       n_groups >= 2, n_folds, f);

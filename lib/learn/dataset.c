@@ -10,15 +10,16 @@
 #include <string.h>
 #include <incise/dataset.h>
 #include "../base/c_locale.h"
+#include "pairs.h"
 
 #define FIELDS_MAX 256
 
 struct incise_dataset {
-	size_t rows, room;
+	size_t rows, capacity;
 	int columns;
 	double *values; /* row by row */
 	int *group;	/* per row, or NULL */
-	int n_groups, group_room;
+	int n_groups, group_capacity;
 	char **names; /* of groups */
 };
 
@@ -151,14 +152,14 @@ static int find_group(struct incise_dataset *data, const char *name)
 	for (int i = data->n_groups - 1; i >= 0; i--)
 		if (!strcmp(data->names[i], name))
 			return i;
-	if (data->n_groups == data->group_room) {
-		int room = data->group_room ? 2 * data->group_room : 64;
+	if (data->n_groups == data->group_capacity) {
+		int capacity = data->group_capacity ? 2 * data->group_capacity : 64;
 
-		names = realloc(data->names, room * sizeof(*names));
+		names = realloc(data->names, capacity * sizeof(*names));
 		if (!names)
 			return -ENOMEM;
 		data->names = names;
-		data->group_room = room;
+		data->group_capacity = capacity;
 	}
 	data->names[data->n_groups] = strdup(name);
 	return data->names[data->n_groups] ? data->n_groups++ : -ENOMEM;
@@ -166,20 +167,21 @@ static int find_group(struct incise_dataset *data, const char *name)
 
 static int grow(struct incise_dataset *data, bool groups)
 {
-	size_t room = data->room ? 2 * data->room : 1024;
-	double *values = realloc(data->values, room * data->columns * sizeof(*values));
+	size_t capacity = data->capacity ? 2 * data->capacity : 1024;
+	double *values =
+		realloc(data->values, capacity * data->columns * sizeof(*values));
 	int *group;
 
 	if (!values)
 		return -ENOMEM;
 	data->values = values;
 	if (groups) {
-		group = realloc(data->group, room * sizeof(*group));
+		group = realloc(data->group, capacity * sizeof(*group));
 		if (!group)
 			return -ENOMEM;
 		data->group = group;
 	}
-	data->room = room;
+	data->capacity = capacity;
 	return 0;
 }
 
@@ -212,7 +214,7 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 				    "column %d: the row has %d fields, the header has %d",
 				    in->n_fields < header ? in->n_fields + 1 : header + 1,
 				    in->n_fields, header);
-		if (data->rows == data->room && grow(data, group))
+		if (data->rows == data->capacity && grow(data, group))
 			return fail(in, ENOMEM, "no memory for more rows");
 		for (int i = 0; i < data->columns; i++) {
 			rc = number(in, at[i], columns[i],
@@ -291,17 +293,72 @@ const double *incise_dataset_row(const struct incise_dataset *data, size_t row)
 	return data->values + row * data->columns;
 }
 
-int incise_dataset_n_groups(const struct incise_dataset *data)
-{
-	return data->n_groups;
-}
-
 int incise_dataset_group(const struct incise_dataset *data, size_t row)
 {
 	return data->group ? data->group[row] : -1;
 }
 
-const char *incise_dataset_group_name(const struct incise_dataset *data, int group)
+/* The rows of one side of a split, or all of them where @check is NULL. */
+static int take_side(struct incise_train_side *side, const struct incise_dataset *data,
+		     const bool *check, bool want)
 {
-	return data->names[group];
+	bool *seen = calloc(data->n_groups + 1, sizeof(*seen));
+	size_t width = data->columns, taken = 0;
+	double *rows = malloc(data->rows * width * sizeof(*rows));
+
+	*side = (struct incise_train_side){.pairs = {rows, 0, data->columns - 1}};
+	if (data->group)
+		side->groups = malloc(data->rows * sizeof(*side->groups));
+	if (!seen || !rows || (data->group && !side->groups)) {
+		free(seen);
+		return -ENOMEM;
+	}
+	for (size_t i = 0; i < data->rows; i++) {
+		int group = incise_dataset_group(data, i);
+
+		if (check && check[i] != want)
+			continue;
+		memcpy(rows + taken * width, incise_dataset_row(data, i),
+		       width * sizeof(*rows));
+		if (group >= 0) {
+			side->n_groups += !seen[group];
+			seen[group] = true;
+			side->groups[taken] = group;
+		}
+		taken++;
+	}
+	free(seen);
+	side->pairs.n = taken;
+	return 0;
+}
+
+int incise_train_split(const struct incise_dataset *data, double share, uint64_t seed,
+		       struct incise_train_side *fit, struct incise_train_side *check,
+		       struct incise_error *err)
+{
+	bool *split = share != 0 ? malloc(data->rows * sizeof(*split)) : NULL;
+	int rc = share != 0 && !split ? -ENOMEM : 0;
+
+	*fit = (struct incise_train_side){0};
+	if (split) {
+		rc = incise_split(data->rows, data->group, share, seed, split, err);
+		if (rc) {
+			free(split);
+			return rc;
+		}
+		rc = take_side(check, data, split, true);
+	}
+	if (!rc)
+		rc = take_side(fit, data, split, false);
+	free(split);
+	if (rc)
+		return incise_error_set(err, -rc, "no memory for its %zu pairs",
+					data->rows);
+	return 0;
+}
+
+void incise_train_side_free(struct incise_train_side *side)
+{
+	free((void *)side->pairs.rows);
+	free(side->groups);
 }

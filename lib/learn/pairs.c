@@ -5,9 +5,91 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include <incise/train.h>
+#include "../base/random.h"
 #include "crossval.h"
 #include "pairs.h"
-#include "shuffle.h"
+
+/* --- units --- */
+
+void incise_scaling_find(struct incise_scaling *scaling,
+			 const struct incise_variable *inputs,
+			 const struct incise_pairs *pairs)
+{
+	int d = pairs->n_inputs;
+	double mean = 0, sum = 0, largest = 0;
+
+	scaling->n_inputs = d;
+	for (int i = 0; i < d; i++) {
+		scaling->offset[i] = inputs[i].min;
+		scaling->scale[i] = inputs[i].max - inputs[i].min;
+	}
+	for (size_t n = 0; n < pairs->n; n++)
+		largest = fmax(largest, fabs(pairs->rows[n * (d + 1) + d]));
+	if (!(largest > 0))
+		largest = 1;
+	/* Relative to the largest, so that squares neither vanish nor overflow. */
+	for (size_t n = 0; n < pairs->n; n++)
+		mean += pairs->rows[n * (d + 1) + d] / largest / pairs->n;
+	for (size_t n = 0; n < pairs->n; n++) {
+		double e = pairs->rows[n * (d + 1) + d] / largest - mean;
+
+		sum += e * e / pairs->n;
+	}
+	scaling->offset[d] = mean * largest;
+	/* Of a constant, rounding leaves a spread of its own: that is not a scale. */
+	scaling->scale[d] = sum > 1e-28 ? sqrt(sum) * largest : largest;
+}
+
+void incise_scaling_row(const struct incise_scaling *scaling, const double *raw,
+			double *scaled)
+{
+	for (int i = 0; i <= scaling->n_inputs; i++)
+		scaled[i] = (raw[i] - scaling->offset[i]) / scaling->scale[i];
+}
+
+void incise_scaling_premises(const struct incise_scaling *scaling,
+			     struct incise_basis *basis, bool to_raw)
+{
+	for (int i = 0; i < basis->n_inputs; i++)
+		for (int k = 0; k < basis->n_mfs[i]; k++) {
+			/* Width and centre of both kinds are lengths, a slope is not. */
+			double *width = basis->p + basis->at[i][k];
+			double *centre = basis->p + incise_basis_centre(basis, i, k);
+
+			if (to_raw) {
+				*width *= scaling->scale[i];
+				*centre =
+					scaling->offset[i] + *centre * scaling->scale[i];
+			} else {
+				*width /= scaling->scale[i];
+				*centre = (*centre - scaling->offset[i]) /
+					  scaling->scale[i];
+			}
+		}
+}
+
+int incise_scaling_consequents(const struct incise_scaling *scaling, int n_rules,
+			       double *consequents)
+{
+	int d = scaling->n_inputs;
+
+	for (int r = 0; r < n_rules; r++) {
+		double *p = consequents + r * (d + 1);
+
+		p[0] = scaling->offset[d] + p[0] * scaling->scale[d];
+		for (int i = 0; i < d; i++) {
+			p[i + 1] = p[i + 1] / scaling->scale[i] * scaling->scale[d];
+			p[0] -= p[i + 1] * scaling->offset[i];
+		}
+		for (int i = 0; i <= d; i++)
+			if (!isfinite(p[i]))
+				return -EDOM;
+	}
+	return 0;
+}
+
+/* --- checks, samples and errors --- */
 
 /* A pair for each fold; fewer say nothing. */
 #define PAIRS_MIN CROSSVAL_FOLDS
@@ -59,7 +141,7 @@ static bool *choose(size_t n, size_t most, uint64_t seed)
 	bool *chosen = calloc(n, sizeof(*chosen));
 
 	if (order && chosen) {
-		incise_shuffle(order, n, seed);
+		incise_random_shuffle(order, n, seed);
 		for (size_t i = 0; i < most; i++)
 			chosen[order[i]] = true;
 	} else {
@@ -124,4 +206,93 @@ double incise_pairs_r2(const struct incise_pairs *pairs, double rmse)
 		sum += pow(y[i * width] / largest - mean, 2) / pairs->n;
 	/* What rounding leaves of a constant is no spread. */
 	return sum > 1e-28 ? 1 - pow(rmse / largest, 2) / sum : NAN;
+}
+
+double incise_pairs_rmse(const struct incise_model *model,
+			 const struct incise_pairs *pairs)
+{
+	double w[INCISE_MODEL_RULES_MAX], sum = 0, largest = 0;
+	struct incise_basis basis;
+	/* Where strengths separate they are quicker to have. */
+	bool grid = !incise_basis_init(&basis, model);
+
+	for (size_t n = 0; n < pairs->n; n++) {
+		const double *x = pairs->rows + n * (pairs->n_inputs + 1);
+		double e = -x[pairs->n_inputs];
+
+		if (grid)
+			incise_basis_firing(&basis, x, w);
+		else
+			incise_model_firing(model, x, w);
+		for (int r = 0; r < incise_model_n_rules(model); r++) {
+			const double *p = incise_model_consequent(model, r);
+
+			e += w[r] * p[0];
+			for (int i = 0; i < pairs->n_inputs; i++)
+				e += w[r] * p[i + 1] * x[i];
+		}
+		/* Σe² as largest²·sum, which neither vanishes nor overflows. */
+		e = fabs(e);
+		if (e > largest) {
+			sum *= (largest / e) * (largest / e);
+			largest = e;
+		}
+		if (largest > 0)
+			sum += (e / largest) * (e / largest);
+	}
+	return pairs->n ? largest * sqrt(sum / pairs->n) : NAN;
+}
+
+/* --- both sides of a split --- */
+
+int incise_split(size_t n, const int *groups, double share, uint64_t seed, bool *check,
+		 struct incise_error *err)
+{
+	size_t n_units = n, taken = 0;
+	size_t *order, *count;
+
+	if (!(share > 0 && share < 1))
+		return incise_error_set(
+			err, EINVAL,
+			"the share of check data is %g: it must lie between 0 "
+			"and 1",
+			share);
+	if (groups) {
+		n_units = 0;
+		for (size_t i = 0; i < n; i++)
+			if ((size_t)groups[i] + 1 > n_units)
+				n_units = (size_t)groups[i] + 1;
+	}
+	if (n_units < 2)
+		return incise_error_set(
+			err, EINVAL,
+			"there are %zu %s: at least two are needed to keep some "
+			"back for checking",
+			n_units, groups ? "groups" : "rows");
+	order = malloc(n_units * sizeof(*order));
+	count = calloc(n_units, sizeof(*count));
+	if (!order || !count) {
+		free(order);
+		free(count);
+		return incise_error_set(err, ENOMEM, "no memory to split %zu rows", n);
+	}
+	for (size_t i = 0; i < n; i++) {
+		count[groups ? (size_t)groups[i] : i]++;
+		check[i] = false;
+	}
+	incise_random_shuffle(order, n_units, seed);
+	/* Take units until the next one would lead further away from the share. */
+	for (size_t u = 0; u + 1 < n_units; u++) {
+		double with = fabs((double)(taken + count[order[u]]) - share * n);
+
+		if (u && with >= fabs((double)taken - share * n))
+			continue;
+		taken += count[order[u]];
+		count[order[u]] = 0; /* taken */
+	}
+	for (size_t i = 0; i < n; i++)
+		check[i] = !count[groups ? (size_t)groups[i] : i];
+	free(order);
+	free(count);
+	return 0;
 }

@@ -1,13 +1,41 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Training pairs: whether they can be learnt from, a part of them in scaled units, and
- * how much of their spread a model explains.
+ * Training pairs: their checks, the units for learning, a sample of them, both sides of a split,
+ * and a model's error on them.
+ *
+ * Units for learning: inputs from 0 to 1 over the model's ranges, the output about its mean in
+ * standard deviations. So a ridge and a step mean the same for every dataset, and squares of
+ * 1e-9 N or 1e9 N neither vanish nor overflow.
  */
 #ifndef INCISE_PAIRS_H
 #define INCISE_PAIRS_H
 
+#include <incise/dataset.h>
 #include <incise/train.h>
-#include "scaling.h"
+#include "basis.h"
+
+/* Scaled = (raw - offset) / scale, per column; the output is the last. */
+struct incise_scaling {
+	int n_inputs;
+	double offset[INCISE_MODEL_INPUTS_MAX + 1];
+	double scale[INCISE_MODEL_INPUTS_MAX + 1];
+};
+
+void incise_scaling_find(struct incise_scaling *scaling,
+			 const struct incise_variable *inputs,
+			 const struct incise_pairs *pairs);
+
+/* One row, output included. */
+void incise_scaling_row(const struct incise_scaling *scaling, const double *raw,
+			double *scaled);
+
+/* Premises into scaled units, or back. */
+void incise_scaling_premises(const struct incise_scaling *scaling,
+			     struct incise_basis *basis, bool to_raw);
+
+/* Consequents into raw units; -EDOM when one overflows. */
+int incise_scaling_consequents(const struct incise_scaling *scaling, int n_rules,
+			       double *consequents);
 
 /* There are pairs and all are finite; `what` names them. 0 or -EINVAL. */
 int incise_pairs_check(const struct incise_pairs *pairs, const char *what,
@@ -36,5 +64,17 @@ void incise_sample_free(struct incise_sample *sample);
 
 /* 1 - rmse²/variance of the output; NaN where that is constant. */
 double incise_pairs_r2(const struct incise_pairs *pairs, double rmse);
+
+/* RMSE of a model; inputs are not clamped. */
+double incise_pairs_rmse(const struct incise_model *model,
+			 const struct incise_pairs *pairs);
+
+/*
+ * Choose which of n rows are kept back for checking, by whole groups (or NULL) and as near to
+ * the share as groups allow; both sides keep at least one group. The same seed gives the same
+ * split. 0, -EINVAL (share, or fewer than two groups or rows), -ENOMEM.
+ */
+int incise_split(size_t n, const int *groups, double share, uint64_t seed, bool *check,
+		 struct incise_error *err);
 
 #endif

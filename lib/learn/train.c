@@ -13,12 +13,51 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../base/ascending.h"
 #include "anfis.h"
 #include "lsq.h"
 #include "pairs.h"
-#include "posterior.h"
 #include "tune.h"
 #include "varpro.h"
+
+/* The 97.5 % quantile of Student's t, to 0.1 %. */
+static double student(int freedom)
+{
+	static const double few[] = {12.706, 4.303, 3.182, 2.776, 2.571};
+	const double z = INCISE_INTERVAL95, n = freedom;
+
+	if (freedom <= 5)
+		return few[freedom - 1];
+	/* Cornish and Fisher's expansion. */
+	return z + (pow(z, 3) + z) / (4 * n) +
+	       (5 * pow(z, 5) + 16 * pow(z, 3) + 3 * z) / (96 * n * n);
+}
+
+static int held_out_noise(const struct incise_basis *basis,
+			  const struct incise_folds *folds,
+			  const struct incise_ridge *ridge, int epochs, double *noise)
+{
+	double *error = malloc((size_t)epochs * folds->n_units * sizeof(*error));
+	double *ratios = malloc(folds->n_held * sizeof(*ratios));
+	int rc = error && ratios ? incise_crossval_search(basis, folds, ridge, epochs,
+							  error, ratios)
+				 : -ENOMEM;
+
+	if (!rc) {
+		/* The quantile that also holds the pair to come: (n+1)·0.95 from below. */
+		double rank = ceil(0.95 * (folds->n_held + 1.0));
+		size_t at = fmin(rank, folds->n_held) - 1;
+
+		qsort(ratios, folds->n_held, sizeof(*ratios), ascending);
+		*noise = ratios[at] / INCISE_INTERVAL95 * student(folds->n_units - 1) /
+			 INCISE_INTERVAL95;
+	}
+	free(error);
+	free(ratios);
+	return rc;
+}
+
+/* --- training --- */
 
 /* MATLAB's recursive least squares starts with S = 1e6 I, which is this ridge. */
 #define CLASSIC_RIDGE 1e-6
@@ -235,8 +274,7 @@ static int find_uncertainty(struct learner *l, const struct incise_tuning *tunin
 	const double *factor;
 
 	ridge.ridge = fmax(ridge.ridge, LEAST_RIDGE);
-	rc = incise_posterior_noise(&tuning->basis, &l->folds, &ridge, tuning->epochs,
-				    &noise);
+	rc = held_out_noise(&tuning->basis, &l->folds, &ridge, tuning->epochs, &noise);
 	if (rc)
 		return rc;
 	factor = incise_lsq_factor(l->lsq, &ridge, &stride);
@@ -281,11 +319,11 @@ static int learn(struct learner *l)
 	report->ridge = tuning.ridge.ridge;
 	report->crossval_rmse = tuning.rmse * l->scaling.scale[l->basis.n_inputs];
 	report->parameters = n + l->basis.n_premises;
-	report->train_rmse = incise_train_rmse(l->model, l->train);
+	report->train_rmse = incise_pairs_rmse(l->model, l->train);
 	report->train_r2 = incise_pairs_r2(l->train, report->train_rmse);
 	report->check_rmse = report->check_r2 = NAN;
 	if (l->check) {
-		report->check_rmse = incise_train_rmse(l->model, l->check);
+		report->check_rmse = incise_pairs_rmse(l->model, l->check);
 		report->check_r2 = incise_pairs_r2(l->check, report->check_rmse);
 	}
 	return l->options->uncertainty ? find_uncertainty(l, &tuning) : 0;
@@ -340,39 +378,4 @@ int incise_train(struct incise_model *model, const struct incise_pairs *train,
 	incise_sample_free(&l->tuned);
 	free(l);
 	return rc ? fail(err, rc) : 0;
-}
-
-double incise_train_rmse(const struct incise_model *model,
-			 const struct incise_pairs *pairs)
-{
-	double w[INCISE_MODEL_RULES_MAX], sum = 0, largest = 0;
-	struct incise_basis basis;
-	/* Where strengths separate they are quicker to have. */
-	bool grid = !incise_basis_init(&basis, model);
-
-	for (size_t n = 0; n < pairs->n; n++) {
-		const double *x = pairs->rows + n * (pairs->n_inputs + 1);
-		double e = -x[pairs->n_inputs];
-
-		if (grid)
-			incise_basis_firing(&basis, x, w);
-		else
-			incise_model_firing(model, x, w);
-		for (int r = 0; r < incise_model_n_rules(model); r++) {
-			const double *p = incise_model_consequent(model, r);
-
-			e += w[r] * p[0];
-			for (int i = 0; i < pairs->n_inputs; i++)
-				e += w[r] * p[i + 1] * x[i];
-		}
-		/* Σe² as largest²·sum, which neither vanishes nor overflows. */
-		e = fabs(e);
-		if (e > largest) {
-			sum *= (largest / e) * (largest / e);
-			largest = e;
-		}
-		if (largest > 0)
-			sum += (e / largest) * (e / largest);
-	}
-	return pairs->n ? largest * sqrt(sum / pairs->n) : NAN;
 }

@@ -11,7 +11,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "premises.h"
 #include "tune.h"
 
 static const double sizes[TUNE_SIZES] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1,

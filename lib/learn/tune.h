@@ -28,4 +28,13 @@ int incise_tune(const struct incise_basis *basis, const struct incise_folds *fol
 #define TUNE_RIDGES (TUNE_SIZES * TUNE_MEANS)
 void incise_tune_ridges(const struct incise_basis *basis, struct incise_ridge *ridges);
 
+/*
+ * How many membership functions each input should have, as incise_train_start() says. 0;
+ * -EINVAL, -ENODATA (too few pairs to compare anything), -EDOM, -ENOMEM.
+ */
+int incise_choose_grid(const struct incise_pairs *pairs,
+		       const struct incise_variable *inputs, enum incise_mf_type type,
+		       const struct incise_train_options *options, int *n_mfs,
+		       struct incise_error *err);
+
 #endif

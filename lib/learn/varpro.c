@@ -20,7 +20,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <lapacke.h>
-#include "premises.h"
 #include "varpro.h"
 
 /* Damping: first, by success and failure, and where a search ends. */

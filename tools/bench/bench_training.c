@@ -18,6 +18,7 @@
 #include "../cli/child.h"
 #include "../cli/cli.h"
 #include "../cli/file.h"
+#include "../../lib/learn/tune.h"
 #include "../cli/json.h"
 #include "noise.h"
 
@@ -187,7 +188,7 @@ static struct incise_model *train(const struct row *row, const struct data *data
 	options.epochs = row->epochs;
 	options.groups = data->group;
 	if (row->fit == FIT_CHOSEN &&
-	    incise_train_choose_grid(&pairs, in, INCISE_MF_GAUSS, &options, mfs, &err))
+	    incise_choose_grid(&pairs, in, INCISE_MF_GAUSS, &options, mfs, &err))
 		cli_fail_with(&err);
 	model = incise_model_new_grid(2, in, mfs, INCISE_MF_GAUSS, &out, &err);
 	if (!model || incise_train(model, &pairs, NULL, &options, NULL, &err))

@@ -106,7 +106,7 @@ void train_report_json(const struct train_result *result, json_t *warned)
 {
 	const struct train_wish *wish = result->wish;
 	const struct incise_model *model = result->model;
-	const struct train_side *fit = result->fit, *check = result->check;
+	const struct incise_train_side *fit = result->fit, *check = result->check;
 	const struct incise_train_report *report = &result->report;
 	const struct incise_baselines *baselines = &result->baselines;
 	const struct train_interval *interval = &result->interval;
@@ -170,7 +170,7 @@ void train_report_text(const struct train_result *result)
 {
 	const struct train_wish *wish = result->wish;
 	const struct incise_model *model = result->model;
-	const struct train_side *fit = result->fit, *check = result->check;
+	const struct incise_train_side *fit = result->fit, *check = result->check;
 	const struct incise_train_report *report = &result->report;
 	const struct incise_baselines *baselines = &result->baselines;
 	const struct train_interval *interval = &result->interval;

@@ -7,7 +7,7 @@
 #define INCISE_TRAIN_REPORT_H
 
 #include <jansson.h>
-#include "train_side.h"
+#include "train_wish.h"
 
 /* What the standard deviation says, and how often it is right on the pairs kept back. */
 struct train_interval {
@@ -19,7 +19,8 @@ struct train_interval {
 struct train_result {
 	const struct train_wish *wish;
 	const struct incise_model *model;
-	const struct train_side *fit, *check; /* check NULL: no pairs were kept back */
+	const struct incise_train_side *fit,
+		*check; /* check NULL: no pairs were kept back */
 	struct incise_train_report report;
 	struct incise_baselines baselines;
 	struct train_interval interval;

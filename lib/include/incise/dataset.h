@@ -43,15 +43,8 @@ INCISE_API size_t incise_dataset_rows(const struct incise_dataset *data);
 INCISE_API const double *incise_dataset_row(const struct incise_dataset *data,
 					    size_t row);
 
-/** Number of distinct groups; 0 without a group column. */
-INCISE_API int incise_dataset_n_groups(const struct incise_dataset *data);
-
-/** Group of a row, 0 … n_groups-1 in order of appearance; -1 without a group column. */
+/** Group of a row, counted from 0 in order of appearance; -1 without a group column. */
 INCISE_API int incise_dataset_group(const struct incise_dataset *data, size_t row);
-
-/** The text of a group; owned by the dataset. */
-INCISE_API const char *incise_dataset_group_name(const struct incise_dataset *data,
-						 int group);
 
 INCISE_END_DECLS
 #endif

@@ -18,6 +18,8 @@
 
 INCISE_BEGIN_DECLS
 
+struct incise_dataset;
+
 /** Rows of inputs and output, row-major, n × (n_inputs + 1); not owned. */
 struct incise_pairs {
 	const double *rows;
@@ -114,28 +116,6 @@ INCISE_API int incise_train(struct incise_model *model, const struct incise_pair
 			    const struct incise_train_options *options,
 			    struct incise_train_report *report, struct incise_error *err);
 
-/**
- * Choose how many membership functions each input should have: the fewest rules whose
- * error on held-out groups is within one standard error of the best, the standard error
- * being that of their difference, or whose squared error is within 1 % of it. Grids grow by one function at a time from one function
- * each, to 6 per input, with no more consequent parameters than half the pairs.
- *
- * @param inputs  pairs->n_inputs ranges
- * @param type    kind of all functions
- * @param options groups and seed are used
- * @param n_mfs   pairs->n_inputs results
- * @return 0; -EINVAL, -ENODATA (too few pairs to compare anything), -EDOM, -ENOMEM.
- */
-INCISE_API int incise_train_choose_grid(const struct incise_pairs *pairs,
-					const struct incise_variable *inputs,
-					enum incise_mf_type type,
-					const struct incise_train_options *options,
-					int *n_mfs, struct incise_error *err);
-
-/** RMSE of a model over pairs; inputs are not clamped. */
-INCISE_API double incise_train_rmse(const struct incise_model *model,
-				    const struct incise_pairs *pairs);
-
 /** RMSE over @on of predictors fitted on @train. */
 struct incise_baselines {
 	double mean;   /**< the mean of the training outputs */
@@ -156,20 +136,52 @@ INCISE_API int incise_baselines(const struct incise_pairs *train, const int *gro
 				struct incise_baselines *result,
 				struct incise_error *err);
 
+/** The pairs on one side of a split, to train from or to check with. */
+struct incise_train_side {
+	struct incise_pairs pairs; /**< its rows are the side's */
+	int *groups;		   /**< of each pair; NULL without groups */
+	int n_groups;		   /**< distinct */
+};
+
 /**
- * Choose which rows are kept back for checking: by whole groups where there are groups,
- * else by single rows. The share of rows is met as nearly as groups allow; both sides
- * keep at least one group.
+ * Split a dataset into pairs to train from and pairs that are kept back for checking: by
+ * whole groups where there are groups, else by single rows. The share of rows is met as
+ * nearly as groups allow; both sides keep at least one group. The last column is the output.
  *
- * @param n       rows
- * @param groups  group of each row, or NULL
- * @param share   0 < share < 1
- * @param seed    same seed, same split
- * @param check   n results
+ * @param share 0 < share < 1; 0: all pairs are to train from, and @check stays as it is
+ * @param seed  same seed, same split
+ * @param fit   to be freed with incise_train_side_free(), as @check
  * @return 0, -EINVAL (share, or fewer than two groups or rows), -ENOMEM.
  */
-INCISE_API int incise_split(size_t n, const int *groups, double share, uint64_t seed,
-			    bool *check, struct incise_error *err);
+INCISE_API int incise_train_split(const struct incise_dataset *data, double share,
+				  uint64_t seed, struct incise_train_side *fit,
+				  struct incise_train_side *check,
+				  struct incise_error *err);
+
+/** Free what the side holds; a zeroed one is accepted. */
+INCISE_API void incise_train_side_free(struct incise_train_side *side);
+
+/**
+ * The model that training starts from: an even grid over the ranges of training pairs.
+ *
+ * @n_mfs may be chosen from the pairs: the fewest rules whose error on held-out groups is
+ * within one standard error of the best, the standard error being that of their difference,
+ * or whose squared error is within 1 % of it. Grids grow by one function at a time from one
+ * function each, to 6 per input, with no more consequent parameters than half the pairs.
+ *
+ * @param names   of the inputs, then the output
+ * @param type    kind of all functions
+ * @param n_mfs   how many functions each input has; where the first is 0 they are chosen,
+ *                and left here
+ * @param options groups and seed are used where they are chosen
+ * @return model, to be freed with incise_model_free(); NULL with errno EINVAL (a constant
+ *         input, a range that no double holds), ENODATA (too few pairs to compare anything),
+ *         E2BIG, EDOM, ENOMEM.
+ */
+INCISE_API struct incise_model *incise_train_start(
+	const struct incise_pairs *pairs, const char *const *names,
+	enum incise_mf_type type, int *n_mfs, const struct incise_train_options *options,
+	struct incise_error *err);
 
 INCISE_END_DECLS
 #endif

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../../../lib/learn/anfis.h"
+#include "../../../lib/learn/pairs.h"
 #include "../model/paper_model.h"
 
 #define PAIRS 150
@@ -33,7 +34,7 @@ static void fill(void)
 static double squared_error(const struct incise_model *model,
 			    const struct incise_pairs *pairs)
 {
-	double rmse = incise_train_rmse(model, pairs);
+	double rmse = incise_pairs_rmse(model, pairs);
 
 	return rmse * rmse * pairs->n;
 }
@@ -125,7 +126,7 @@ static void test_best_epoch_is_kept(void **state)
 	assert_int_equal(epochs, 20);
 	/* So long a step does not go downhill to the end. */
 	assert_true(anfis.best_epoch < 20);
-	assert_true(fabs(incise_train_rmse(model, &pairs) - anfis.train_rmse) <
+	assert_true(fabs(incise_pairs_rmse(model, &pairs) - anfis.train_rmse) <
 		    1e-9 * anfis.train_rmse);
 	incise_model_free(model);
 }

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../../../lib/learn/crossval.h"
-#include "../../../lib/learn/shuffle.h"
+#include "../../../lib/base/random.h"
 
 #define PAIRS 240
 
@@ -24,8 +24,9 @@ static void fill(int per_group)
 	uint64_t seed = 5;
 
 	for (int i = 0; i < PAIRS; i++) {
-		rows[2 * i] = (1 + incise_random(&seed)) / 2;
-		rows[2 * i + 1] = sin(5 * rows[2 * i]) + 0.1 * incise_random(&seed);
+		rows[2 * i] = (1 + incise_random_symmetric(&seed)) / 2;
+		rows[2 * i + 1] =
+			sin(5 * rows[2 * i]) + 0.1 * incise_random_symmetric(&seed);
 		/* With gaps, as when others lie on the check side. */
 		groups[i] = 3 * (i / per_group) + 2;
 	}

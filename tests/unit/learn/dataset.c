@@ -2,6 +2,8 @@
 /*
  * Reading CSV: values, groups, and errors that name line and column.
  */
+/* before cmocka.h, which has a macro fail() */
+#include "../../../lib/learn/dataset.c"
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -41,11 +43,11 @@ static void test_values_in_the_order_asked_for(void **state)
 	assert_true(incise_dataset_row(data, 0)[0] == -2e-3);
 	assert_true(incise_dataset_row(data, 0)[1] == 1.5);
 	assert_true(incise_dataset_row(data, 2)[0] == 5);
-	assert_int_equal(incise_dataset_n_groups(data), 2);
+	assert_int_equal(data->n_groups, 2);
 	assert_int_equal(incise_dataset_group(data, 0), 0);
 	assert_int_equal(incise_dataset_group(data, 1), 1);
 	assert_int_equal(incise_dataset_group(data, 2), 0);
-	assert_string_equal(incise_dataset_group_name(data, 0), "a, \"1\"");
+	assert_string_equal(data->names[0], "a, \"1\"");
 	incise_dataset_free(data);
 }
 
@@ -53,7 +55,7 @@ static void test_without_groups(void **state)
 {
 	struct incise_dataset *data = read_text("depth_mm,force_N\n1,2\n", NULL, NULL);
 
-	assert_int_equal(incise_dataset_n_groups(data), 0);
+	assert_int_equal(data->n_groups, 0);
 	assert_int_equal(incise_dataset_group(data, 0), -1);
 	incise_dataset_free(data);
 }
@@ -69,7 +71,7 @@ static void test_many_rows(void **state)
 		used += sprintf(text + used, "c%d,%d,%d\n", i / 10, i, -i);
 	data = read_text(text, "cut", NULL);
 	assert_int_equal(incise_dataset_rows(data), 5000);
-	assert_int_equal(incise_dataset_n_groups(data), 500);
+	assert_int_equal(data->n_groups, 500);
 	for (int i = 0; i < 5000; i++) {
 		assert_true(incise_dataset_row(data, i)[0] == -i);
 		assert_true(incise_dataset_row(data, i)[1] == i);
@@ -153,6 +155,41 @@ static void test_missing_and_binary_files(void **state)
 	temp_file_free(&file);
 }
 
+/* Four cuts of three rows: both sides hold whole cuts, and the rows as they were. */
+static void test_split(void **state)
+{
+	struct incise_dataset *data = read_text(
+		"cut,depth_mm,force_N\np,1,10\np,2,20\np,3,30\nq,4,40\nq,5,50\nq,6,60\n"
+		"r,7,70\nr,8,80\nr,9,90\ns,10,100\ns,11,110\ns,12,120\n",
+		"cut", NULL);
+	struct incise_train_side fit, check = {0};
+	double sum = 0;
+
+	assert_int_equal(incise_train_split(data, 0.25, 1, &fit, &check, NULL), 0);
+	assert_int_equal(fit.pairs.n, 9);
+	assert_int_equal(fit.n_groups, 3);
+	assert_int_equal(check.pairs.n, 3);
+	assert_int_equal(check.n_groups, 1);
+	for (size_t i = 0; i < 12; i++) {
+		const struct incise_train_side *side = i < 9 ? &fit : &check;
+		const double *row = side->pairs.rows + 2 * (i < 9 ? i : i - 9);
+
+		assert_true(row[0] == 10 * row[1]);
+		assert_int_equal(side->groups[i < 9 ? i : i - 9], (int)(row[1] - 1) / 3);
+		sum += row[1];
+	}
+	assert_true(sum == 78);
+	incise_train_side_free(&fit);
+	incise_train_side_free(&check);
+	check = (struct incise_train_side){0};
+	assert_int_equal(incise_train_split(data, 0, 1, &fit, &check, NULL), 0);
+	assert_int_equal(fit.pairs.n, 12);
+	assert_null(check.pairs.rows);
+	incise_train_side_free(&fit);
+	assert_int_equal(incise_train_split(data, 1, 1, &fit, &check, NULL), -EINVAL);
+	incise_dataset_free(data);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -161,6 +198,7 @@ int main(void)
 		cmocka_unit_test(test_many_rows),
 		cmocka_unit_test(test_errors_say_where),
 		cmocka_unit_test(test_missing_and_binary_files),
+		cmocka_unit_test(test_split),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

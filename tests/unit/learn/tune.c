@@ -9,8 +9,8 @@
 #include <cmocka.h>
 #include <math.h>
 #include <string.h>
-#include "../../../lib/learn/premises.h"
-#include "../../../lib/learn/shuffle.h"
+#include "../../../lib/learn/basis.h"
+#include "../../../lib/base/random.h"
 #include "../../../lib/learn/tune.h"
 
 #define PAIRS 200
@@ -30,9 +30,10 @@ static void tune(double noise, double shift, uint64_t seed, struct incise_tuning
 	uint64_t state = 5;
 
 	for (int i = 0; i < PAIRS; i++) {
-		double x = rows[2 * i] = (1 + incise_random(&state)) / 2;
+		double x = rows[2 * i] = (1 + incise_random_symmetric(&state)) / 2;
 
-		rows[2 * i + 1] = tanh(20 * (x - shift)) + noise * incise_random(&state);
+		rows[2 * i + 1] =
+			tanh(20 * (x - shift)) + noise * incise_random_symmetric(&state);
 	}
 	assert_int_equal(incise_basis_init(&basis, model), 0);
 	incise_model_free(model);

@@ -10,8 +10,8 @@
 #include <cmocka.h>
 #include <math.h>
 #include <string.h>
-#include "../../../lib/learn/premises.h"
-#include "../../../lib/learn/shuffle.h"
+#include "../../../lib/learn/basis.h"
+#include "../../../lib/base/random.h"
 #include "../../../lib/learn/varpro.h"
 
 #define PAIRS 300
@@ -37,12 +37,12 @@ static void plant(const struct incise_basis *basis)
 	uint64_t seed = 5;
 
 	for (int k = 0; k < 27; k++)
-		consequents[k] = incise_random(&seed);
+		consequents[k] = incise_random_symmetric(&seed);
 	for (int i = 0; i < PAIRS; i++) {
 		double *x = rows + 3 * i;
 
-		x[0] = (1 + incise_random(&seed)) / 2;
-		x[1] = (1 + incise_random(&seed)) / 2;
+		x[0] = (1 + incise_random_symmetric(&seed)) / 2;
+		x[1] = (1 + incise_random_symmetric(&seed)) / 2;
 		incise_basis_firing(basis, x, w);
 		x[2] = incise_basis_output(basis, w, x, consequents, f);
 	}
@@ -125,7 +125,7 @@ static void test_converges_fast_near_the_minimum(void **state)
 	incise_premises_jitter(&planted, 21);
 	plant(&planted);
 	for (int k = 0; k < 18; k++)
-		step[k] = 0.01 * incise_random(&seed);
+		step[k] = 0.01 * incise_random_symmetric(&seed);
 	basis = planted;
 	incise_premises_step(&basis, step);
 	varpro.each = NULL;

@@ -11,7 +11,8 @@
 #include <math.h>
 #include <string.h>
 #include <incise/train.h>
-#include "../../../lib/learn/shuffle.h"
+#include "../../../lib/base/random.h"
+#include "../../../lib/learn/tune.h"
 
 static double rows[400 * 3];
 
@@ -27,13 +28,14 @@ static void choose(double bends, double noise, size_t n, int *n_mfs, int want)
 	for (size_t i = 0; i < n; i++) {
 		double *x = rows + 3 * i;
 
-		x[0] = (1 + incise_random(&seed)) / 2;
-		x[1] = (1 + incise_random(&seed)) / 2;
-		x[2] = sin(bends * M_PI * x[0]) + x[1] + noise * incise_random(&seed);
+		x[0] = (1 + incise_random_symmetric(&seed)) / 2;
+		x[1] = (1 + incise_random_symmetric(&seed)) / 2;
+		x[2] = sin(bends * M_PI * x[0]) + x[1] +
+		       noise * incise_random_symmetric(&seed);
 	}
 	incise_train_options_init(&options);
-	assert_int_equal(incise_train_choose_grid(&pairs, in, INCISE_MF_GAUSS, &options,
-						  n_mfs, &err),
+	assert_int_equal(incise_choose_grid(&pairs, in, INCISE_MF_GAUSS, &options, n_mfs,
+					    &err),
 			 want);
 	if (want)
 		assert_non_null(strstr(err.text, "pairs"));
@@ -63,11 +65,44 @@ static void test_few_pairs(void **state)
 	choose(4, 0.1, 3, n_mfs, -ENODATA);
 }
 
+/* Ranges are those of the pairs; functions are counted where no number is given. */
+static void test_start(void **state)
+{
+	static const char *const names[] = {"a", "b", "y"};
+	struct incise_pairs pairs = {rows, 400, 2};
+	struct incise_train_options options;
+	struct incise_model *model;
+	struct incise_error err = {0};
+	int n_mfs[2], chosen[2] = {0}, given[2] = {3, 2};
+
+	choose(4, 0.1, 400, n_mfs, 0);
+	incise_train_options_init(&options);
+	model = incise_train_start(&pairs, names, INCISE_MF_GAUSS, chosen, &options,
+				   &err);
+	assert_non_null(model);
+	assert_string_equal(incise_model_output(model)->name, "y");
+	assert_true(incise_model_input(model, 0)->min >= 0 &&
+		    incise_model_input(model, 0)->max <= 1);
+	for (int i = 0; i < 2; i++)
+		assert_int_equal(incise_model_n_mfs(model, i), chosen[i]);
+	assert_true(chosen[0] >= 4 && chosen[1] == 1);
+	incise_model_free(model);
+	model = incise_train_start(&pairs, names, INCISE_MF_GBELL, given, &options, &err);
+	assert_int_equal(incise_model_n_rules(model), 6);
+	incise_model_free(model);
+	rows[2] = -1.5e308;
+	rows[5] = 1.5e308;
+	assert_null(incise_train_start(&pairs, names, INCISE_MF_GAUSS, given, &options,
+				       &err));
+	assert_non_null(strstr(err.text, "column y spans"));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_as_many_as_needed),
 		cmocka_unit_test(test_few_pairs),
+		cmocka_unit_test(test_start),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * How many membership functions each input should have; see incise/train.h.
+ * The model that training starts from, and how many membership functions each of its inputs
+ * should have; see incise/train.h.
  *
  * The held-out error of an even grid at its best ridge is cheap, so a grid is judged by
  * it; the premises are searched later, for the grid chosen. All grids visited stay in the
@@ -8,6 +9,7 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "pairs.h"
@@ -192,11 +194,10 @@ static int run(struct race *race, const struct incise_pairs *pairs,
 	return rc;
 }
 
-int incise_train_choose_grid(const struct incise_pairs *pairs,
-			     const struct incise_variable *inputs,
-			     enum incise_mf_type type,
-			     const struct incise_train_options *options, int *n_mfs,
-			     struct incise_error *err)
+int incise_choose_grid(const struct incise_pairs *pairs,
+		       const struct incise_variable *inputs, enum incise_mf_type type,
+		       const struct incise_train_options *options, int *n_mfs,
+		       struct incise_error *err)
 {
 	struct race *race;
 	int rc;
@@ -232,4 +233,48 @@ int incise_train_choose_grid(const struct incise_pairs *pairs,
 				: "no grid can be fitted to these %zu pairs: they "
 				  "are too extreme",
 		pairs->n);
+}
+
+/* Range of a column over the training pairs: unseen ones shape nothing. */
+static struct incise_variable find_variable(const struct incise_pairs *pairs, int column,
+					    const char *name)
+{
+	size_t width = pairs->n_inputs + 1;
+	struct incise_variable v = {
+		.min = pairs->rows[column],
+		.max = pairs->rows[column],
+	};
+
+	snprintf(v.name, sizeof(v.name), "%s", name);
+	for (size_t i = 1; i < pairs->n; i++) {
+		v.min = fmin(v.min, pairs->rows[i * width + column]);
+		v.max = fmax(v.max, pairs->rows[i * width + column]);
+	}
+	return v;
+}
+
+struct incise_model *incise_train_start(const struct incise_pairs *pairs,
+					const char *const *names,
+					enum incise_mf_type type, int *n_mfs,
+					const struct incise_train_options *options,
+					struct incise_error *err)
+{
+	struct incise_variable in[INCISE_MODEL_INPUTS_MAX], out;
+	int n = pairs->n_inputs;
+
+	for (int i = 0; i < n; i++)
+		in[i] = find_variable(pairs, i, names[i]);
+	out = find_variable(pairs, n, names[n]);
+	if (!isfinite(out.max - out.min)) {
+		incise_error_set(
+			err, EINVAL,
+			"column %s spans %g to %g: too far for a double; scale it",
+			out.name, out.min, out.max);
+		return NULL;
+	}
+	if (!(out.min < out.max))
+		out.max = out.min + fmax(fabs(out.min), 1) * 1e-6;
+	if (!*n_mfs && incise_choose_grid(pairs, in, type, options, n_mfs, err))
+		return NULL;
+	return incise_model_new_grid(n, in, n_mfs, type, &out, err);
 }
