@@ -11,7 +11,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
-#include <incise/timeline.h>
+#include "../../lib/record/time/timeline.h"
 #include "../cli/cli.h"
 #include "drifting_stream.h"
 #include "time_methods.h"
@@ -129,7 +129,7 @@ static double squares_take(void *state, uint64_t seq, int64_t arrival_ns)
 /* ---- the library ---- */
 
 struct line {
-	struct incise_timeline *timeline;
+	struct incise_timeline timeline;
 	int n;
 	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS_MAX];
 };
@@ -138,13 +138,11 @@ static void *line_of_grain(int64_t grain_ns)
 {
 	struct line *line = room(sizeof(*line));
 
-	line->timeline = incise_timeline_new(&(struct incise_timeline_setup){
-		.rate_hz = STREAM_HZ,
-		.delay_ns = STREAM_DELAY_NS,
-		.grain_ns = grain_ns,
-	});
-	if (!line->timeline)
-		cli_fail("no memory");
+	incise_timeline_init(&line->timeline, &(struct incise_timeline_setup){
+						      .rate_hz = STREAM_HZ,
+						      .delay_ns = STREAM_DELAY_NS,
+						      .grain_ns = grain_ns,
+					      });
 	return line;
 }
 
@@ -163,7 +161,7 @@ static double line_take(void *state, uint64_t seq, int64_t arrival_ns)
 {
 	struct line *line = state;
 
-	return (double)incise_timeline_sample(line->timeline, seq, arrival_ns);
+	return (double)incise_timeline_sample(&line->timeline, seq, arrival_ns);
 }
 
 static double line_live_sd(const void *state, uint64_t seq)
@@ -172,7 +170,7 @@ static double line_live_sd(const void *state, uint64_t seq)
 	struct incise_timeline_report report;
 
 	(void)seq;
-	incise_timeline_report(line->timeline, &report);
+	incise_timeline_report(&line->timeline, &report);
 	return report.offset_sd_ns;
 }
 
@@ -180,7 +178,7 @@ static void line_finish(void *state)
 {
 	struct line *line = state;
 
-	line->n = incise_timeline_knots(line->timeline, line->knots);
+	line->n = incise_timeline_knots(&line->timeline, line->knots);
 }
 
 static double line_at(const void *state, uint64_t seq)
@@ -190,23 +188,11 @@ static double line_at(const void *state, uint64_t seq)
 	return line->n ? (double)incise_timeline_at(line->knots, line->n, seq) : NAN;
 }
 
-/* The larger one of the two knots around. */
 static double line_final_sd(const void *state, uint64_t seq)
 {
 	const struct line *line = state;
-	int k = 0;
 
-	while (k + 2 < line->n && line->knots[k + 1].seq <= seq)
-		k++;
-	return line->n ? fmax(line->knots[k].sd_ns, line->knots[k + 1].sd_ns) : NAN;
-}
-
-static void line_end(void *state)
-{
-	struct line *line = state;
-
-	incise_timeline_free(line->timeline);
-	free(line);
+	return line->n ? incise_timeline_sd(line->knots, line->n, seq) : NAN;
 }
 
 const struct time_method time_methods[TIME_METHODS] = {
@@ -216,8 +202,7 @@ const struct time_method time_methods[TIME_METHODS] = {
 	{"squares_known", squares_known_begin, squares_take, NULL, NULL, NULL, free},
 	{"squares_final", squares_known_begin, squares_take, squares_at, NULL, NULL,
 	 free},
-	{"line_live", line_begin, line_take, NULL, NULL, line_live_sd, line_end},
-	{"line_untold", untold_begin, line_take, NULL, NULL, line_live_sd, line_end},
-	{"line_final", line_begin, line_take, line_at, line_finish, line_final_sd,
-	 line_end},
+	{"line_live", line_begin, line_take, NULL, NULL, line_live_sd, free},
+	{"line_untold", untold_begin, line_take, NULL, NULL, line_live_sd, free},
+	{"line_final", line_begin, line_take, line_at, line_finish, line_final_sd, free},
 };

@@ -118,7 +118,7 @@ static bool take_knot(sqlite3_stmt *stmt, const struct incise_timeline_knot *las
 	knot->seq = seq;
 	knot->t_ns = sqlite3_column_int64(stmt, 1);
 	knot->sd_ns = sqlite3_column_double(stmt, 2);
-	knot->begins = sqlite3_column_int(stmt, 3);
+	knot->starts = sqlite3_column_int(stmt, 3);
 	return sqlite3_column_type(stmt, 0) == SQLITE_INTEGER && seq >= 0 &&
 	       sqlite3_column_type(stmt, 1) == SQLITE_INTEGER &&
 	       knot->t_ns >= -TIME_MAX && knot->t_ns <= TIME_MAX &&
@@ -172,17 +172,5 @@ int64_t incise_recording_time(const struct incise_recording_line *line, uint64_t
 
 double incise_recording_time_sd(const struct incise_recording_line *line, uint64_t seq)
 {
-	int low = 0, high = line->n - 1;
-
-	if (!line->n)
-		return NAN;
-	while (high - low > 1) {
-		int middle = low + (high - low) / 2;
-
-		if (line->knots[middle].seq <= seq)
-			low = middle;
-		else
-			high = middle;
-	}
-	return fmax(line->knots[low].sd_ns, line->knots[high].sd_ns);
+	return line->n ? incise_timeline_sd(line->knots, line->n, seq) : NAN;
 }

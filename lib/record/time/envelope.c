@@ -10,27 +10,27 @@
 
 #define SLOPE_MAX INCISE_ENVELOPE_SLOPE_MAX
 #define SLOPE_SD_FIRST 300e-6
-/* Once known, the rate of a device does not change by more while blocks are few. */
+/* Largest change of a known rate while there are few blocks. */
 #define SLOPE_SD_KNOWN 20e-6
 
-/* Blocks so many scales above the line had another latency; exp(-12) is 6e-6. */
+/* Blocks this many scales above the line had another latency; exp(-12) is 6e-6. */
 #define RAISED_SCALES 12
 #define RAISED_MIN_NS 1500e3 /* a frame of USB is not yet another latency */
 
-/* Phases on a grid closer than this do not matter; nor do more of them. */
+/* Phases on a grid that are closer, or more of them, do not matter. */
 #define GRAIN_MIN_NS 20e3
 #define PHASES_MAX 256
-/* Lowest points of a sawtooth so many are enough to draw a line through two. */
+/* Lowest points of a sawtooth that are enough for a line through two of them. */
 #define BOTTOMS 5
 
-/* Times are whole ns, and so are the slope's steps from knot to knot. */
+/* Times and the slope's steps from knot to knot are whole ns. */
 #define ROUNDING_NS 5
 
-/* Fewer tell nothing of the distribution. */
+/* Fewest blocks for a fit of the distribution. */
 #define SHAPE_BLOCKS 8
 #define SHAPE_MIN 0.7
 #define SHAPE_MAX 3.0
-/* Shape is averaged over so many lines: one set of 64 blocks gives it to ± 25 %. */
+/* Lines that the shape is averaged over: one set of 64 blocks gives it to ± 25 %. */
 #define SHAPE_FITS 256
 #define SHAPE_FITS_FIRST 32
 /* log(log(1 - 0.625) / log(1 - 0.25)): two quantiles of shape 1 */
@@ -41,12 +41,12 @@ void incise_envelope_init(struct incise_envelope *env, double period_ns, double 
 	memset(env, 0, sizeof(*env));
 	env->period_ns = period_ns;
 	env->grain_ns = grain_ns;
-	/* so that doubling ends at the full length */
+	/* Doubling ends at the full length. */
 	env->block_ns = INCISE_ENVELOPE_BLOCK_MAX_NS;
 	while (env->block_ns / 2 >= period_ns)
 		env->block_ns /= 2;
 	env->prior_slope_sd = SLOPE_SD_FIRST;
-	/* Until it is known, of shape 1, as if so many lines had told. */
+	/* Until it is known: shape 1, with the weight of a few lines. */
 	env->shape = 1;
 	env->log_ratio = LOG_ODDS;
 	env->shape_fits = SHAPE_FITS_FIRST;
@@ -59,7 +59,7 @@ double incise_envelope_at(const struct incise_envelope *env, double x_ns)
 
 double incise_envelope_bend(double span_ns)
 {
-	/* A crystal that warms up changes its rate by so much in a second. */
+	/* Change of rate of a crystal that warms up. */
 	const double per_s = 2e-7;
 
 	return per_s / 1e9 * span_ns * span_ns / 8;
@@ -101,7 +101,7 @@ static void double_blocks(struct incise_envelope *env)
 	env->block_ns *= 2;
 }
 
-/* The block that was open joins the others. */
+/* Add the open block to the others. */
 static void close_block(struct incise_envelope *env)
 {
 	struct incise_envelope_block *open = &env->open;
@@ -118,7 +118,7 @@ static void close_block(struct incise_envelope *env)
 	memmove(env->blocks, env->blocks + gone,
 		(size_t)env->count * sizeof(*env->blocks));
 	if (env->count && env->blocks[env->count - 1].number == open->number) {
-		/* doubling has put it into one that is there */
+		/* Doubling has put it into the last block. */
 		if (lower(env, open, &env->blocks[env->count - 1]))
 			env->blocks[env->count - 1] = *open;
 	} else {
@@ -126,7 +126,7 @@ static void close_block(struct incise_envelope *env)
 	}
 }
 
-/* Blocks of another latency say nothing about this line. */
+/* Choose the blocks of this line: not those of another latency. */
 static int choose(struct incise_envelope *env,
 		  const struct incise_envelope_block **chosen)
 {
@@ -146,7 +146,7 @@ static int choose(struct incise_envelope *env,
 		return n;
 	for (int i = 0; i < env->count; i++)
 		chosen[n++] = &env->blocks[i];
-	env->scale_ns = 0; /* the line begins anew */
+	env->scale_ns = 0; /* a new line starts */
 	env->restarts++;
 	return n;
 }
@@ -194,11 +194,11 @@ static void sort(double *values, int n)
 }
 
 /*
- * How far above the true line is the line expected to be? Were the n excesses exponential
- * of mean m, then by its lack of memory those that the line does not touch would be so
- * again, their sum (n - 2)·m, and the line 2·m/n too high in the middle. A Weibull excess
- * is a power of an exponential one: scale·(2/n)^(1/shape). Shape and scale come from two
- * quantiles, since a mean would be at the mercy of stalls.
+ * Estimate how far the line is above the true line. If the n excesses are exponential with mean
+ * m, then by the lack of memory those that the line does not touch are exponential too, their
+ * sum is (n - 2)·m, and the line is 2·m/n too high in the middle. A Weibull excess is a power
+ * of an exponential one: scale·(2/n)^(1/shape). Shape and scale come from two quantiles, because
+ * stalls spoil a mean.
  */
 static void measure_gap(struct incise_envelope *env, double *excess, int n,
 			double span_ns)
@@ -210,17 +210,17 @@ static void measure_gap(struct incise_envelope *env, double *excess, int n,
 	high = excess[n * 5 / 8];
 	env->gap_ns = 0;
 	if (n < SHAPE_BLOCKS) {
-		/* nothing better is known than how far they are apart */
+		/* The spread is the only known bound. */
 		env->gap_sd_ns = fmax(excess[n - 1], n < 3 ? env->block_ns : 1);
 		env->slope_sd = env->prior_slope_sd;
 		return;
 	}
-	low = fmax(low, 1); /* a clock does not tell less than 1 ns */
+	low = fmax(low, 1); /* the resolution of a clock */
 	high = fmax(high, low * 1.01);
 	for (int i = 0; i < 4; i++) {
 		double ratio = log((high + env->gap_ns) / (low + env->gap_ns));
 
-		if (i == 3) { /* the average over lines only takes the last word */
+		if (i == 3) { /* the average over lines takes only the last iteration */
 			env->shape_fits += env->shape_fits < SHAPE_FITS;
 			env->log_ratio += (ratio - env->log_ratio) / env->shape_fits;
 			ratio = env->log_ratio;
@@ -230,8 +230,8 @@ static void measure_gap(struct incise_envelope *env, double *excess, int n,
 			(high + env->gap_ns) / pow(-log(1 - 0.625), 1 / env->shape);
 		env->gap_ns = env->scale_ns * pow(2.0 / n, 1 / env->shape);
 	}
-	/* Scatter of the gap is by its shape, but the shape itself was never seen down there,
-	 * where none arrived: nearly all of the gap may be wrong. */
+	/* The shape gives the scatter of the gap, but no sample shows the shape below the
+	 * lowest arrival: nearly all of the gap may be wrong. */
 	env->gap_sd_ns = env->gap_ns * fmax(1 / env->shape, 0.8) + ROUNDING_NS;
 	env->slope_sd = env->prior_slope_sd;
 	if (span_ns > 0)
@@ -240,11 +240,11 @@ static void measure_gap(struct incise_envelope *env, double *excess, int n,
 
 /*
  * On a grid of time q periods are nearly p grains for some small q: then only q phases of
- * the grid are seen, they slide slowly, and jitter is a sawtooth as high as they are apart:
+ * the grid occur, they drift slowly, and jitter is a sawtooth of the height of their distance:
  *
- *     │  /|  /|  /      slow: one bottom or none in all blocks, and the line may be too
- *     │ / | / | /       high by as much as the sawtooth, and tilted by it
- *     │/  |/  |/        fast: bottoms enough, the line is right
+ *     │  /|  /|  /      slow: one bottom or none in all blocks; the line may be too high by
+ *     │ / | / | /       the height of the sawtooth, and tilted by it
+ *     │/  |/  |/        fast: enough bottoms, the line is right
  *     └──────────► x
  */
 static void measure_grain(struct incise_envelope *env, double span_ns)
@@ -276,7 +276,7 @@ static void draw(struct incise_envelope *env)
 		x_ns += chosen[i]->x_ns / n;
 	span_ns = chosen[n - 1]->x_ns - chosen[0]->x_ns;
 	if (hull_slope(chosen, n, x_ns, &slope)) {
-		/* A short line says less about the rate than the device's type does. */
+		/* A short line defines the rate less well than the device's type. */
 		double sd = n < SHAPE_BLOCKS || env->slope_sd <= 0 ? 1e-2 : env->slope_sd;
 		double prior = env->prior_slope_sd * env->prior_slope_sd;
 
@@ -305,7 +305,7 @@ static void draw(struct incise_envelope *env)
 	}
 }
 
-bool incise_envelope_take(struct incise_envelope *env, double x_ns, double y_ns)
+bool incise_envelope_add(struct incise_envelope *env, double x_ns, double y_ns)
 {
 	struct incise_envelope_block block = {(int64_t)(x_ns / env->block_ns), x_ns,
 					      y_ns};

@@ -30,7 +30,7 @@ static void begin(struct incise_recorder *rec, int i, const char *name,
 		with_sd.delay_sd_ns = llround(delay_sd_ms * 1e6);
 	snprintf(stream->device, sizeof(stream->device), "%s", device);
 	incise_ledger_init(&stream->ledger);
-	incise_timeline_begin(&stream->timeline, &with_sd);
+	incise_timeline_init(&stream->timeline, &with_sd);
 }
 
 void incise_recorder_begin_streams(struct incise_recorder *rec)
@@ -40,7 +40,7 @@ void incise_recorder_begin_streams(struct incise_recorder *rec)
 	begin(rec, INCISE_LEDGER_FORCE, "force", rec->force_info.name,
 	      calibration->force_delay_sd_ms,
 	      &(struct incise_timeline_setup){
-		      .stamped = true,
+		      .timestamped = true,
 		      .rate_hz = rec->force_info.rate_hz,
 		      .delay_ns = delay_ns(calibration->force_delay_ms, 0),
 	      });
@@ -60,7 +60,7 @@ void incise_recorder_begin_streams(struct incise_recorder *rec)
 		begin(rec, INCISE_LEDGER_CAMERA, "camera", rec->camera_info.name,
 		      calibration->camera_delay_sd_ms,
 		      &(struct incise_timeline_setup){
-			      .stamped = true,
+			      .timestamped = true,
 			      .rate_hz = rec->camera_info.rate_hz,
 			      .delay_ns = delay_ns(calibration->camera_delay_ms, 0),
 		      });
@@ -85,7 +85,7 @@ static void tell(const struct incise_recorder *rec, int i, struct incise_stream 
 
 	incise_timeline_report(&stream->timeline, &report);
 	*out = (struct incise_stream){
-		.stamped = stream->timeline.setup.stamped,
+		.stamped = stream->timeline.setup.timestamped,
 		.nominal_hz = stream->timeline.setup.rate_hz,
 		.delay_ms = (double)stream->timeline.setup.delay_ns * 1e-6,
 		.delay_sd_ms = stream->delay_sd_ms,
@@ -185,7 +185,7 @@ static int write_knots(struct incise_recorder *rec, int i)
 		sqlite3_bind_int64(stmt, 3, knots[k].seq);
 		sqlite3_bind_int64(stmt, 4, knots[k].t_ns);
 		sqlite3_bind_double(stmt, 5, knots[k].sd_ns);
-		sqlite3_bind_int(stmt, 6, knots[k].begins);
+		sqlite3_bind_int(stmt, 6, knots[k].starts);
 		rc = incise_recorder_run(stmt);
 	}
 	return rc;
@@ -200,7 +200,7 @@ int incise_recorder_write_streams(struct incise_recorder *rec, bool knots)
 			continue;
 		rc = write_stream(rec, i);
 		/* What is stamped carries its time itself. */
-		if (rc == SQLITE_OK && knots && !rec->streams[i].timeline.setup.stamped)
+		if (rc == SQLITE_OK && knots && !rec->streams[i].timeline.setup.timestamped)
 			rc = write_knots(rec, i);
 	}
 	return rc;

@@ -61,7 +61,7 @@ static void highest_of_all_lines(void **state)
 			double x_ns = i * PERIOD_NS;
 			double y_ns = slope * x_ns + exponential(&random, 1000);
 
-			if (!incise_envelope_take(&env, x_ns, y_ns) || ++lines % 10)
+			if (!incise_envelope_add(&env, x_ns, y_ns) || ++lines % 10)
 				continue;
 			/* nor is it when the new arrival has pulled it down since */
 			if (env.count < 32 ||
@@ -93,8 +93,8 @@ static void gap_is_known(void **state)
 
 		incise_envelope_init(&env, PERIOD_NS, 0);
 		for (int i = 0; i <= 64; i++)
-			incise_envelope_take(&env, i * (double)FIRST_BLOCK_NS,
-					     i < 64 ? exponential(&random, 6400) : 1e6);
+			incise_envelope_add(&env, i * (double)FIRST_BLOCK_NS,
+					    i < 64 ? exponential(&random, 6400) : 1e6);
 		assert_int_equal(env.count, 64);
 		before += env.y_ns / seeds;
 		error_ns = env.y_ns - env.gap_ns;
@@ -117,7 +117,7 @@ static void blocks_are_bounded(void **state)
 
 	incise_envelope_init(&env, PERIOD_NS, 0);
 	for (int i = 0; i < 100000; i++) {
-		incise_envelope_take(&env, i * PERIOD_NS, i % 10);
+		incise_envelope_add(&env, i * PERIOD_NS, i % 10);
 		assert_in_range(env.count, 0, INCISE_ENVELOPE_BLOCKS);
 		assert_true(env.block_ns <= INCISE_ENVELOPE_BLOCK_MAX_NS);
 		assert_true(!was_full || incise_envelope_full(&env));
@@ -126,8 +126,8 @@ static void blocks_are_bounded(void **state)
 	assert_true(was_full);
 	assert_true(env.blocks[0].x_ns > 100000 * PERIOD_NS - 65 * env.block_ns - 1);
 	/* a hole as long as all of it */
-	incise_envelope_take(&env, 1e6 * PERIOD_NS, 3);
-	incise_envelope_take(&env, 2e6 * PERIOD_NS, 3);
+	incise_envelope_add(&env, 1e6 * PERIOD_NS, 3);
+	incise_envelope_add(&env, 2e6 * PERIOD_NS, 3);
 	assert_int_equal(env.count, 1);
 	assert_true(isfinite(incise_envelope_at(&env, 2e6 * PERIOD_NS)));
 }
@@ -151,8 +151,8 @@ static void grid_is_doubted(void **state)
 
 		incise_envelope_init(&env, PERIOD_NS, cases[c].grain_ns);
 		for (int i = 0; i < 40000; i++)
-			incise_envelope_take(&env, i * PERIOD_NS,
-					     cases[c].slope * i * PERIOD_NS);
+			incise_envelope_add(&env, i * PERIOD_NS,
+					    cases[c].slope * i * PERIOD_NS);
 		assert_true(env.gap_sd_ns >= cases[c].least_ns);
 		assert_true(env.gap_sd_ns <= cases[c].most_ns);
 	}

@@ -17,13 +17,66 @@
 #define KNOTS (INCISE_TIMELINE_KNOTS + 3)
 #define FIRST 1000 /* streams begin with this number */
 
+/* A stream with timestamps and of unknown rate. */
+static void init_timestamped(struct incise_timeline *timeline, int64_t delay_ns)
+{
+	incise_timeline_init(timeline, &(struct incise_timeline_setup){
+					       .timestamped = true,
+					       .rate_hz = NAN,
+					       .delay_ns = delay_ns,
+				       });
+}
+
+/* One straight line through all knots after the last start. */
+struct line {
+	uint64_t seq;
+	int64_t ns;
+	double period_ns;
+	double sd_ns; /* of the line against the truth, with the bends of the knots */
+};
+
+/* False: there are too few knots. */
+static bool line_of(const struct incise_timeline *timeline, struct line *line)
+{
+	struct incise_timeline_knot all[KNOTS], *knots = all;
+	double x0 = 0, y0 = 0, xx = 0, xy = 0, sd2 = 0;
+	int n = incise_timeline_knots(timeline, all);
+
+	for (int i = 0; i < n; i++)
+		if (all[i].starts)
+			knots = &all[i];
+	n -= (int)(knots - all);
+	if (n < 2)
+		return false;
+	for (int i = 0; i < n; i++) {
+		x0 += (double)(knots[i].seq - knots->seq) / n;
+		y0 += (double)(knots[i].t_ns - knots->t_ns) / n;
+	}
+	for (int i = 0; i < n; i++) {
+		double x = (double)(knots[i].seq - knots->seq) - x0;
+
+		xx += x * x;
+		xy += x * ((double)(knots[i].t_ns - knots->t_ns) - y0);
+	}
+	*line = (struct line){knots->seq, knots->t_ns + (int64_t)(y0 - xy / xx * x0),
+			      xy / xx, 0};
+	for (int i = 0; i < n; i++) {
+		double x = (double)(knots[i].seq - knots->seq) - x0;
+		double r = (double)(knots[i].t_ns - knots->t_ns) - y0 - xy / xx * x;
+
+		sd2 += (r * r + knots[i].sd_ns * knots[i].sd_ns) / n;
+	}
+	line->sd_ns = sqrt(sd2);
+	return true;
+}
+
 static void latency_is_taken_off(void **state)
 {
 	struct incise_timeline timeline;
 
-	incise_timeline_init(&timeline, 4200000);
-	assert_int_equal(incise_timeline_acquired(&timeline, 1000000000), 995800000);
-	assert_int_equal(incise_timeline_acquired(&timeline, 1008333333), 1004133333);
+	init_timestamped(&timeline, 4200000);
+	assert_int_equal(incise_timeline_sample(&timeline, 0, 1000000000), 995800000);
+	assert_int_equal(incise_timeline_sample(&timeline, 1, 1008333333), 1004133333);
 }
 
 static void times_always_increase(void **state)
@@ -39,9 +92,10 @@ static void times_always_increase(void **state)
 	};
 	struct incise_timeline timeline;
 
-	incise_timeline_init(&timeline, 10);
+	init_timestamped(&timeline, 10);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
-		assert_int_equal(incise_timeline_acquired(&timeline, cases[i].arrival_ns),
+		assert_int_equal(incise_timeline_sample(&timeline, i,
+							cases[i].arrival_ns),
 				 cases[i].acquired_ns);
 }
 
@@ -108,7 +162,7 @@ static void run(struct stream *stream, const struct incise_timeline_setup *setup
 	int64_t before_ns = -1;
 
 	assert_true((size_t)n <= sizeof(truth_ns) / sizeof(*truth_ns));
-	incise_timeline_begin(timeline, setup);
+	incise_timeline_init(timeline, setup);
 	for (int i = 0; i < n; i++) {
 		struct incise_timeline_report report;
 		int64_t arrival_ns, t_ns;
@@ -253,7 +307,7 @@ static void stamps_are_taken(void **state)
 
 		stream.size_ns = 80e3; /* mean 20 us */
 		setup = setup_of(&stream);
-		setup.stamped = true;
+		setup.timestamped = true;
 		setup.delay_ns += seed * 10000 - 40000;
 		setup.delay_sd_ns = 50000;
 		run(&stream, &setup, &timeline, &live, &after);
@@ -304,7 +358,7 @@ static void drift_is_followed(void **state)
 	struct stream stream = stream_of(240, UNIFORM, 7);
 	struct errors live = {0}, after = {0};
 	struct incise_timeline_setup setup;
-	struct incise_timeline_line line;
+	struct line line;
 	struct incise_timeline timeline;
 
 	stream.length_s = 600;
@@ -317,7 +371,7 @@ static void drift_is_followed(void **state)
 	assert_true(coverage(&live) >= 0.95);
 	assert_true(coverage(&after) >= 0.95);
 	assert_true(timeline.knot_count > 600 / 16 - 4);
-	assert_int_equal(incise_timeline_line(&timeline, &line), 0);
+	assert_true(line_of(&timeline, &line));
 	assert_true(line.sd_ns > 300e3 && line.sd_ns < 1e6); /* and it says so */
 	assert_true(fabs(line.period_ns * 240e-9 * (1 + 1e-6 * (stream.drift_ppm + 10)) -
 			 1) < 1e-6);
@@ -333,7 +387,7 @@ static void gaps_and_stalls(void **state)
 	struct errors good = {0};
 	uint64_t slow = 0;
 
-	incise_timeline_begin(&timeline, &setup);
+	incise_timeline_init(&timeline, &setup);
 	for (int i = 0; i < 120 * 60; i++) {
 		int64_t arrival_ns;
 		double truth_ns = stream_next(&stream, &arrival_ns);
@@ -371,7 +425,7 @@ static void new_line_after_replug(void **state)
 	double shift_ns = 0;
 	int n;
 
-	incise_timeline_begin(&timeline, &setup);
+	incise_timeline_init(&timeline, &setup);
 	for (int i = 0; i < 240 * 90; i++) {
 		int64_t arrival_ns;
 
@@ -410,7 +464,7 @@ static void level_changes_for_good(void **state)
 	struct incise_timeline timeline;
 	double error_ns = 0;
 
-	incise_timeline_begin(&timeline, &setup);
+	incise_timeline_init(&timeline, &setup);
 	for (int i = 0; i < 120 * 120; i++) {
 		int64_t arrival_ns;
 		double truth_ns = stream_next(&stream, &arrival_ns), shift_ns = 0;
@@ -437,7 +491,7 @@ static void memory_is_bounded(void **state)
 	int n;
 
 	for (int often = 0; often < 2; often++) {
-		incise_timeline_begin(&timeline, &setup);
+		incise_timeline_init(&timeline, &setup);
 		for (int i = 0; i < 10 * 3600 * 4; i++) {
 			if (often && i % 37 == 0)
 				incise_timeline_replug(&timeline);
@@ -479,7 +533,7 @@ static void hostile_streams(void **state)
 
 	for (int round = 0; round < 200; round++) {
 		struct incise_timeline_setup setup = {
-			.stamped = stream_random(&random) < 0.3,
+			.timestamped = stream_random(&random) < 0.3,
 			.rate_hz = rates_hz[round % (int)rates],
 			.delay_ns =
 				ends_ns[(size_t)(stream_random(&random) * (double)ends)],
@@ -490,13 +544,13 @@ static void hostile_streams(void **state)
 		};
 		struct incise_timeline_knot knots[KNOTS];
 		struct incise_timeline_report report;
-		struct incise_timeline_line line;
+		struct line line;
 		struct incise_timeline timeline;
 		int64_t before_ns = -1, arrival_ns = 0;
 		uint64_t seq = 0;
 		int n;
 
-		incise_timeline_begin(&timeline, &setup);
+		incise_timeline_init(&timeline, &setup);
 		for (int i = 0; i < 2000; i++) {
 			double what = stream_random(&random);
 			int64_t t_ns;
@@ -530,7 +584,7 @@ static void hostile_streams(void **state)
 		for (int i = 0; i < 50 && n; i++)
 			incise_timeline_at(knots, n,
 					   (uint64_t)(stream_random(&random) * 1.8e19));
-		if (!incise_timeline_line(&timeline, &line))
+		if (line_of(&timeline, &line))
 			assert_true(isfinite(line.period_ns));
 	}
 }
@@ -541,18 +595,18 @@ static void nothing_is_made_up(void **state)
 	struct incise_timeline_setup setup = {.rate_hz = NAN};
 	struct incise_timeline_knot knots[KNOTS];
 	struct incise_timeline_report report;
-	struct incise_timeline_line line;
+	struct line line;
 	struct incise_timeline timeline;
 
 	for (int i = 0; i < 2; i++) {
-		incise_timeline_begin(&timeline, &setup);
+		incise_timeline_init(&timeline, &setup);
 		for (int round = 0; round < 2; round++) {
 			incise_timeline_report(&timeline, &report);
 			assert_true(isnan(report.rate_hz) && isnan(report.drift_ppm));
 			assert_true(isnan(report.drift_sd_ppm) &&
 				    isnan(report.jitter_ns));
 			assert_int_equal(incise_timeline_knots(&timeline, knots), 0);
-			assert_true(incise_timeline_line(&timeline, &line) < 0);
+			assert_false(line_of(&timeline, &line));
 			incise_timeline_sample(&timeline, 5, 1000000000);
 		}
 		if (isnan(setup.rate_hz))
@@ -561,21 +615,59 @@ static void nothing_is_made_up(void **state)
 	}
 }
 
-static void new_is_begin(void **state)
+/* --- times between knots ------------------------------------------------------------- */
+
+static void between_and_beyond(void **state)
 {
-	struct incise_timeline_setup setup = {.rate_hz = 120, .delay_ns = 4200000};
-	struct incise_timeline *made = incise_timeline_new(&setup), begun;
+	/*  one line: 100 ns, then 110 ns a sample     plugged in again at 300 */
+	static const struct incise_timeline_knot knots[] = {
+		{100, 10000, 1, true},	{200, 20000, 1, false},	 {210, 21100, 1, false},
+		{300, 900000, 1, true}, {400, 910000, 1, false},
+	};
+	static const struct {
+		uint64_t seq;
+		int64_t t_ns;
+	} cases[] = {
+		{100, 10000},  {150, 15000},  {200, 20000},  {205, 20550},
+		{210, 21100},  {220, 22200}, /* the old line goes on up to the new one */
+		{299, 30890},  {300, 900000}, {350, 905000}, {400, 910000},
+		{500, 920000}, {0, 0}, /* before the first */
+	};
 
-	assert_non_null(made);
-	incise_timeline_begin(&begun, &setup);
-	for (int i = 0; i < 500; i++) {
-		int64_t arrival_ns = 1000000000 + i * 8334000LL + i * 7919 % 997 * 1000;
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
+		assert_int_equal(incise_timeline_at(knots, 5, cases[i].seq),
+				 cases[i].t_ns);
+}
 
-		assert_int_equal(incise_timeline_sample(made, i, arrival_ns),
-				 incise_timeline_sample(&begun, i, arrival_ns));
-	}
-	incise_timeline_free(made);
-	incise_timeline_free(NULL);
+/* A device that is exact: its knots and its line are exact, too. */
+static void exact_device(void **state)
+{
+	struct incise_timeline_setup setup = {.rate_hz = 100, .delay_ns = 5000000};
+	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS + 3];
+	struct line line;
+	struct incise_timeline timeline;
+	int n;
+
+	incise_timeline_init(&timeline, &setup);
+	for (int i = 0; i < 20000; i++)
+		incise_timeline_sample(&timeline, 50 + (uint64_t)i,
+				       7000000000 + 10001000LL * i);
+	n = incise_timeline_knots(&timeline, knots);
+	/* its begin, one each 16 s from the middle of the blocks on, the last blocks, its end */
+	assert_in_range(n, 200 / 16, 200 / 16 + 3);
+	assert_true(knots[0].starts);
+	assert_int_equal(knots[0].seq, 50);
+	assert_int_equal(knots[n - 1].seq, 50 + 19999);
+	for (int i = 0; i < n; i++)
+		assert_in_range(
+			knots[i].t_ns -
+				(6995000000 + 10001000LL * (int64_t)(knots[i].seq - 50)) +
+				100,
+			90, 110); /* ± 10 ns of rounding */
+	assert_true(line_of(&timeline, &line));
+	assert_int_equal(line.seq, 50);
+	assert_in_range(line.ns - 6995000000 + 100, 90, 110);
+	assert_in_range((int64_t)(line.period_ns * 1000), 10000999990, 10001000010);
 }
 
 int main(void)
@@ -595,7 +687,8 @@ int main(void)
 		cmocka_unit_test(memory_is_bounded),
 		cmocka_unit_test(hostile_streams),
 		cmocka_unit_test(nothing_is_made_up),
-		cmocka_unit_test(new_is_begin),
+		cmocka_unit_test(between_and_beyond),
+		cmocka_unit_test(exact_device),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
