@@ -200,7 +200,8 @@ int incise_recorder_write_streams(struct incise_recorder *rec, bool knots)
 			continue;
 		rc = write_stream(rec, i);
 		/* What is stamped carries its time itself. */
-		if (rc == SQLITE_OK && knots && !rec->streams[i].timeline.setup.timestamped)
+		if (rc == SQLITE_OK && knots &&
+		    !rec->streams[i].timeline.setup.timestamped)
 			rc = write_knots(rec, i);
 	}
 	return rc;
