@@ -137,6 +137,6 @@ setup() {
 		nm -u --format=posix ./*.o | awk '$2 == "U" { print $1 }' | sort -u >needs
 		run comm -13 has needs
 		[ -z "$(echo "$output" | grep -v '^div[0-9]*_[us]64')" ] || complain "$output"
-		grep -q incise_fx_direct needs
+		grep -q incise_ramp_tick needs
 	done
 }
