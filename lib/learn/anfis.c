@@ -13,7 +13,6 @@
 #include <string.h>
 #include "anfis.h"
 #include "basis.h"
-#include "lsq.h"
 
 /* Firing strengths are kept from the fit to the gradient for so many numbers: 8 MB. */
 #define KEPT_MAX (1 << 20)
@@ -44,33 +43,20 @@ static const double *strengths(const struct state *s, size_t n, const double *x,
 
 static int solve(struct state *s, const struct incise_pairs *pairs, double ridge)
 {
-	double w[INCISE_MODEL_RULES_MAX];
 	struct incise_ridge plain = {ridge, 1, s->n_linear, 1};
-	int d = pairs->n_inputs;
 
-	incise_lsq_reset(s->lsq);
-	for (size_t n = 0; n < pairs->n; n++) {
-		const double *x = pairs->rows + n * (d + 1);
-		double *to = n < s->n_kept ? s->kept + n * s->basis.n_rules : w;
-
-		incise_basis_firing(&s->basis, x, to);
-		incise_basis_row(&s->basis, to, x, incise_lsq_row(s->lsq));
-		incise_lsq_add(s->lsq, x[d]);
-	}
+	incise_basis_fold(&s->basis, pairs, s->lsq, s->kept, s->n_kept);
 	return incise_lsq_solve(s->lsq, &plain, s->x);
 }
 
 static double check_rmse(const struct state *s, const struct incise_pairs *pairs)
 {
-	double w[INCISE_MODEL_RULES_MAX], f[INCISE_MODEL_RULES_MAX], sum = 0;
-	int d = pairs->n_inputs;
+	double sum = 0;
 
 	for (size_t n = 0; n < pairs->n; n++) {
-		const double *x = pairs->rows + n * (d + 1);
-		double e;
+		const double *x = pairs->rows + n * (pairs->n_inputs + 1);
+		double e = incise_basis_error(&s->basis, x, s->x);
 
-		incise_basis_firing(&s->basis, x, w);
-		e = incise_basis_output(&s->basis, w, x, s->x, f) - x[d];
 		sum += e * e;
 	}
 	return sqrt(sum / pairs->n);

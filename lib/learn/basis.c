@@ -217,6 +217,32 @@ double incise_basis_output(const struct incise_basis *basis, const double *w,
 	return y;
 }
 
+double incise_basis_error(const struct incise_basis *basis, const double *x,
+			  const double *consequents)
+{
+	double w[INCISE_MODEL_RULES_MAX], f[INCISE_MODEL_RULES_MAX];
+
+	incise_basis_firing(basis, x, w);
+	return incise_basis_output(basis, w, x, consequents, f) - x[basis->n_inputs];
+}
+
+void incise_basis_fold(const struct incise_basis *basis, const struct incise_pairs *pairs,
+		       struct incise_lsq *lsq, double *kept, size_t n_kept)
+{
+	double own[INCISE_MODEL_RULES_MAX];
+	int d = pairs->n_inputs;
+
+	incise_lsq_reset(lsq);
+	for (size_t n = 0; n < pairs->n; n++) {
+		const double *x = pairs->rows + n * (d + 1);
+		double *w = n < n_kept ? kept + n * basis->n_rules : own;
+
+		incise_basis_firing(basis, x, w);
+		incise_basis_row(basis, w, x, incise_lsq_row(lsq));
+		incise_lsq_add(lsq, x[d]);
+	}
+}
+
 int incise_basis_set_consequents(struct incise_model *model, const double *consequents)
 {
 	int n = incise_model_n_inputs(model) + 1;

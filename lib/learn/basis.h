@@ -9,6 +9,7 @@
 
 #include <stdint.h>
 #include <incise/train.h>
+#include "lsq.h"
 
 #define BASIS_PARAMS_MAX 3 /* of one membership function */
 
@@ -55,7 +56,15 @@ void incise_basis_row(const struct incise_basis *basis, const double *w, const d
 double incise_basis_output(const struct incise_basis *basis, const double *w,
 			   const double *x, const double *consequents, double *f);
 
-/* The consequents of a model as one vector, and back; -EDOM when one is not finite. */
+/* Output less the one of a pair: x is its row, inputs and output. */
+double incise_basis_error(const struct incise_basis *basis, const double *x,
+			  const double *consequents);
+
+/* Fold the rows of all pairs; strengths of the first n_kept pairs are left in kept. */
+void incise_basis_fold(const struct incise_basis *basis, const struct incise_pairs *pairs,
+		       struct incise_lsq *lsq, double *kept, size_t n_kept);
+
+/* Set all consequents of a model; -EDOM when one is not finite. */
 int incise_basis_set_consequents(struct incise_model *model, const double *consequents);
 
 /*

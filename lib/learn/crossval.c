@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "crossval.h"
-#include "lsq.h"
 #include "../base/random.h"
 #include "varpro.h"
 
@@ -113,32 +112,12 @@ static void add_errors(const struct incise_folds *folds, int f,
 		       double *error)
 {
 	const struct incise_pairs *held = &folds->held[f];
-	double w[INCISE_MODEL_RULES_MAX], out[INCISE_MODEL_RULES_MAX];
-	int d = held->n_inputs;
 
 	for (size_t i = 0; i < held->n; i++) {
-		const double *x = held->rows + i * (d + 1);
-		double e;
+		const double *x = held->rows + i * (held->n_inputs + 1);
+		double e = incise_basis_error(basis, x, consequents);
 
-		incise_basis_firing(basis, x, w);
-		e = incise_basis_output(basis, w, x, consequents, out) - x[d];
 		error[folds->unit[f][i]] += e * e;
-	}
-}
-
-static void fold_pairs(struct incise_lsq *lsq, const struct incise_basis *basis,
-		       const struct incise_pairs *pairs)
-{
-	double w[INCISE_MODEL_RULES_MAX];
-	int d = pairs->n_inputs;
-
-	incise_lsq_reset(lsq);
-	for (size_t i = 0; i < pairs->n; i++) {
-		const double *x = pairs->rows + i * (d + 1);
-
-		incise_basis_firing(basis, x, w);
-		incise_basis_row(basis, w, x, incise_lsq_row(lsq));
-		incise_lsq_add(lsq, x[d]);
 	}
 }
 
@@ -153,7 +132,7 @@ int incise_crossval_ridges(const struct incise_basis *basis,
 
 	memset(error, 0, (size_t)n * folds->n_units * sizeof(*error));
 	for (int f = 0; f < folds->n && !rc; f++) {
-		fold_pairs(lsq, basis, &folds->fit[f]);
+		incise_basis_fold(basis, &folds->fit[f], lsq, NULL, 0);
 		for (int i = 0; i < n && !rc; i++) {
 			rc = incise_lsq_solve(lsq, &ridges[i], x);
 			if (!rc)
@@ -201,7 +180,7 @@ static int find_ratios(const struct incise_folds *folds, int f,
 		       const struct incise_ridge *ridge, double *ratios)
 {
 	const struct incise_pairs *held = &folds->held[f];
-	double w[INCISE_MODEL_RULES_MAX], out[INCISE_MODEL_RULES_MAX];
+	double w[INCISE_MODEL_RULES_MAX];
 	int d = held->n_inputs, n = basis->n_rules * (d + 1), stride, rc = -ENOMEM;
 	struct incise_lsq *lsq = incise_lsq_new(n);
 	double *phi = malloc(n * sizeof(*phi));
@@ -210,17 +189,16 @@ static int find_ratios(const struct incise_folds *folds, int f,
 	if (!lsq || !phi)
 		goto out;
 	rc = -EDOM;
-	fold_pairs(lsq, basis, &folds->fit[f]);
+	incise_basis_fold(basis, &folds->fit[f], lsq, NULL, 0);
 	factor = incise_lsq_factor(lsq, ridge, &stride);
 	if (!factor)
 		goto out;
 	rc = 0;
 	for (size_t i = 0; i < held->n; i++) {
 		const double *x = held->rows + i * (d + 1);
-		double e;
+		double e = incise_basis_error(basis, x, consequents);
 
 		incise_basis_firing(basis, x, w);
-		e = incise_basis_output(basis, w, x, consequents, out) - x[d];
 		incise_basis_row(basis, w, x, phi);
 		ratios[i] =
 			fabs(e) / sqrt(1 + incise_lsq_leverage(factor, stride, n, phi));

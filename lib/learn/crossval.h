@@ -9,7 +9,6 @@
 #define INCISE_CROSSVAL_H
 
 #include "basis.h"
-#include "lsq.h"
 
 #define CROSSVAL_FOLDS 5
 #define CROSSVAL_REPEATS 4

@@ -12,33 +12,44 @@
 
 /* --- units --- */
 
+/*
+ * Variance of the output and its mean, relative to the largest output or *largest, so that
+ * squares neither vanish nor overflow. 0 for a constant, whatever rounding leaves of it.
+ */
+static double output_variance(const struct incise_pairs *pairs, double *largest,
+			      double *mean)
+{
+	const double *y = pairs->rows + pairs->n_inputs;
+	int width = pairs->n_inputs + 1;
+	double sum = 0;
+
+	for (size_t i = 0; i < pairs->n; i++)
+		*largest = fmax(*largest, fabs(y[i * width]));
+	if (!(*largest > 0))
+		*largest = 1;
+	*mean = 0;
+	for (size_t i = 0; i < pairs->n; i++)
+		*mean += y[i * width] / *largest / pairs->n;
+	for (size_t i = 0; i < pairs->n; i++)
+		sum += pow(y[i * width] / *largest - *mean, 2) / pairs->n;
+	return sum > 1e-28 ? sum : 0;
+}
+
 void incise_scaling_find(struct incise_scaling *scaling,
 			 const struct incise_variable *inputs,
 			 const struct incise_pairs *pairs)
 {
 	int d = pairs->n_inputs;
-	double mean = 0, sum = 0, largest = 0;
+	double mean, variance, largest = 0;
 
 	scaling->n_inputs = d;
 	for (int i = 0; i < d; i++) {
 		scaling->offset[i] = inputs[i].min;
 		scaling->scale[i] = inputs[i].max - inputs[i].min;
 	}
-	for (size_t n = 0; n < pairs->n; n++)
-		largest = fmax(largest, fabs(pairs->rows[n * (d + 1) + d]));
-	if (!(largest > 0))
-		largest = 1;
-	/* Relative to the largest, so that squares neither vanish nor overflow. */
-	for (size_t n = 0; n < pairs->n; n++)
-		mean += pairs->rows[n * (d + 1) + d] / largest / pairs->n;
-	for (size_t n = 0; n < pairs->n; n++) {
-		double e = pairs->rows[n * (d + 1) + d] / largest - mean;
-
-		sum += e * e / pairs->n;
-	}
+	variance = output_variance(pairs, &largest, &mean);
 	scaling->offset[d] = mean * largest;
-	/* Of a constant, rounding leaves a spread of its own: that is not a scale. */
-	scaling->scale[d] = sum > 1e-28 ? sqrt(sum) * largest : largest;
+	scaling->scale[d] = variance > 0 ? sqrt(variance) * largest : largest;
 }
 
 void incise_scaling_row(const struct incise_scaling *scaling, const double *raw,
@@ -191,21 +202,9 @@ void incise_sample_free(struct incise_sample *sample)
 
 double incise_pairs_r2(const struct incise_pairs *pairs, double rmse)
 {
-	double mean = 0, sum = 0, largest = rmse;
-	int width = pairs->n_inputs + 1;
-	const double *y = pairs->rows + pairs->n_inputs;
+	double mean, largest = rmse, variance = output_variance(pairs, &largest, &mean);
 
-	/* Relative to the largest, so that squares neither vanish nor overflow. */
-	for (size_t i = 0; i < pairs->n; i++)
-		largest = fmax(largest, fabs(y[i * width]));
-	if (!(largest > 0))
-		return NAN;
-	for (size_t i = 0; i < pairs->n; i++)
-		mean += y[i * width] / largest / pairs->n;
-	for (size_t i = 0; i < pairs->n; i++)
-		sum += pow(y[i * width] / largest - mean, 2) / pairs->n;
-	/* What rounding leaves of a constant is no spread. */
-	return sum > 1e-28 ? 1 - pow(rmse / largest, 2) / sum : NAN;
+	return variance > 0 ? 1 - pow(rmse / largest, 2) / variance : NAN;
 }
 
 double incise_pairs_rmse(const struct incise_model *model,

@@ -15,7 +15,6 @@
 #include <string.h>
 #include "../base/ascending.h"
 #include "anfis.h"
-#include "lsq.h"
 #include "pairs.h"
 #include "tune.h"
 #include "varpro.h"
@@ -155,16 +154,14 @@ static int check_trainable(const struct incise_model *model, struct incise_error
 static double rmse_of(const struct learner *l, const struct incise_basis *basis,
 		      const double *consequents, const struct incise_pairs *pairs)
 {
-	double w[INCISE_MODEL_RULES_MAX], f[INCISE_MODEL_RULES_MAX], sum = 0;
-	double x[INCISE_MODEL_INPUTS_MAX + 1];
+	double x[INCISE_MODEL_INPUTS_MAX + 1], sum = 0;
 	int d = pairs->n_inputs;
 
 	for (size_t i = 0; i < pairs->n; i++) {
 		double e;
 
 		incise_scaling_row(&l->scaling, pairs->rows + i * (d + 1), x);
-		incise_basis_firing(basis, x, w);
-		e = incise_basis_output(basis, w, x, consequents, f) - x[d];
+		e = incise_basis_error(basis, x, consequents);
 		sum += e * e;
 	}
 	return sqrt(sum / pairs->n) * l->scaling.scale[d];

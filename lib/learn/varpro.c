@@ -49,18 +49,10 @@ struct state {
 static int solve(struct state *s, const struct incise_basis *basis, double *consequents,
 		 double *error)
 {
-	int d = s->pairs->n_inputs, stride;
 	const double *factor;
+	int stride;
 
-	incise_lsq_reset(s->linear);
-	for (size_t i = 0; i < s->pairs->n; i++) {
-		const double *x = s->pairs->rows + i * (d + 1);
-		double *w = s->kept + i * basis->n_rules;
-
-		incise_basis_firing(basis, x, w);
-		incise_basis_row(basis, w, x, incise_lsq_row(s->linear));
-		incise_lsq_add(s->linear, x[d]);
-	}
+	incise_basis_fold(basis, s->pairs, s->linear, s->kept, s->pairs->n);
 	factor = incise_lsq_factor(s->linear, s->ridge, &stride);
 	if (!factor)
 		return -EDOM;

@@ -8,7 +8,6 @@
 #define INCISE_VARPRO_H
 
 #include "basis.h"
-#include "lsq.h"
 
 struct incise_varpro {
 	const struct incise_pairs *pairs;
