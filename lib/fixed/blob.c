@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
 /*
- * Validating a blob in full: after this no input can make an evaluator read outside of
+ * Validates a blob in full: after this no input can make an evaluator read outside of
  * it, shift by a wrong amount or overflow. Blobs come from files and go to kernels.
  */
 #include "integers.h"
@@ -27,7 +27,7 @@ static uint64_t magnitude(int64_t v)
 	return v < 0 ? -(uint64_t)v : (uint64_t)v;
 }
 
-/* Whether n bytes at offset lie within the blob, behind the header, aligned. */
+/* True where n bytes at offset lie within the blob, behind the header, aligned. */
 static int within(uint64_t offset, uint64_t n, uint32_t size, uint32_t align)
 {
 	return offset >= sizeof(struct incise_fx_header) && offset % align == 0 &&

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * What a motion profile is made of: positions of whole ticks within limits of velocity and
+ * The ramp of a motion profile: positions of whole ticks within limits of velocity and
  * acceleration; see ramp.c. Units are 2^-32 steps, and ticks.
  */
 #ifndef INCISE_RAMP_H
@@ -8,7 +8,7 @@
 
 #include <incise/profile.h>
 
-/* A way without an end. Spelled so that a kernel knows it too. */
+/* A way without an end. A kernel has no UINT64_MAX. */
 #define INCISE_RAMP_UNBOUNDED (~(uint64_t)0)
 
 /* Stand at a position; velocity and acceleration are set before. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What a model must beat: the mean, linear regression and k nearest neighbours; see
- * incise/train.h.
+ * The predictors that a model must beat: the mean, linear regression and k nearest
+ * neighbours; see incise/train.h.
  */
 #include <errno.h>
 #include <math.h>

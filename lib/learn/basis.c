@@ -304,7 +304,7 @@ static void order_centres(struct incise_basis *basis, int input)
 	}
 }
 
-/* How far function k has to reach: half-way to its neighbours, or to the end. */
+/* The distance that function k has to reach: half-way to its neighbours, or to the end. */
 static double reach(const struct incise_basis *basis, int input, int k)
 {
 	double c = basis->p[incise_basis_centre(basis, input, k)];
@@ -336,7 +336,7 @@ void incise_premises_project(struct incise_basis *basis)
 					pow(1 / LEAST_OVERLAP - 1, 0.5 / p[1]);
 				most = MOST_WIDTH * half;
 			}
-			/* Where a wide gap asks for more than the most, overlap wins. */
+			/* If a wide gap asks for more than the most, overlap wins. */
 			p[0] = fmax(least, fmin(most, p[0]));
 		}
 	}

@@ -2,7 +2,7 @@
 /*
  * The nonlinear half of a grid model, laid out for learning: its membership functions as
  * one vector of premises, and their normalised firing strengths, which separate over the
- * inputs. A model is 30 KB; this is what changes while it learns.
+ * inputs. A model is 30 KB; this is the part that changes.
  */
 #ifndef INCISE_BASIS_H
 #define INCISE_BASIS_H
@@ -17,7 +17,7 @@ struct incise_basis {
 	int n_inputs, n_rules, n_premises;
 	int n_mfs[INCISE_MODEL_INPUTS_MAX];
 	enum incise_mf_type type[INCISE_MODEL_INPUTS_MAX][INCISE_MODEL_MFS_MAX];
-	/* Where each function's parameters begin in p, in the order of incise_mf.p */
+	/* Index in p of each function's parameters, in the order of incise_mf.p */
 	int at[INCISE_MODEL_INPUTS_MAX][INCISE_MODEL_MFS_MAX];
 	double p[INCISE_MODEL_INPUTS_MAX * INCISE_MODEL_MFS_MAX * BASIS_PARAMS_MAX];
 };
@@ -68,7 +68,7 @@ void incise_basis_fold(const struct incise_basis *basis, const struct incise_pai
 int incise_basis_set_consequents(struct incise_model *model, const double *consequents);
 
 /*
- * How the premises may move while they learn, on inputs scaled to [0, 1]. A step is in
+ * Moves of the premises while they learn, on inputs scaled to [0, 1]. A step is in
  * coordinates where all premises are alike: widths and slopes by their logarithm, so that they
  * stay positive, and centres in units of the even spacing.
  */

@@ -42,8 +42,8 @@ int incise_crossval_ridges(const struct incise_basis *basis,
 /*
  * Held-out squared errors while premises are searched (varpro.h), by epoch:
  * error[e·n_units + unit] for epoch e+1. Where a fold's search ends early its last error
- * stands for the epochs left. With ratios, n_held of them, |error|/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each held pair
- * after the last epoch: what the error is in units of the noise.
+ * stands for the epochs left. ratios is NULL, or gets |error|/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each
+ * of the n_held pairs after the last epoch: the error in units of the noise.
  */
 int incise_crossval_search(const struct incise_basis *basis,
 			   const struct incise_folds *folds,

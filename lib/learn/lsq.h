@@ -32,15 +32,16 @@ void incise_lsq_free(struct incise_lsq *lsq);
 /* Forget all rows. */
 void incise_lsq_reset(struct incise_lsq *lsq);
 
-/* Room for the n coefficients of the next row; zero it is not. */
+/* The n coefficients of the next row, to be filled in: they are not zero. */
 double *incise_lsq_row(struct incise_lsq *lsq);
 
 /* The row filled in since then stands for row·x = target. */
 void incise_lsq_add(struct incise_lsq *lsq, double target);
 
 /*
- * The factor [R z; 0 ρ] of all rows and of a ridge (or NULL): row i of its n+1 begins at i·*stride. Only the upper triangle means something. It belongs to the
- * lsq and is good until its next use. NULL where the rows overflow.
+ * The factor [R z; 0 ρ] of all rows and of a ridge (or NULL): row i of its n+1 starts at
+ * i·*stride. Only the upper triangle has a meaning. It belongs to the lsq and is good until
+ * its next use. NULL where the rows overflow.
  */
 const double *incise_lsq_factor(struct incise_lsq *lsq, const struct incise_ridge *ridge,
 				int *stride);
@@ -52,8 +53,8 @@ int incise_lsq_solve(struct incise_lsq *lsq, const struct incise_ridge *ridge, d
 int incise_lsq_back(const double *factor, int stride, int n, int right, double *x);
 
 /*
- * |R⁻ᵀ a|² for a of n coefficients, which is spoilt: what the factor's rows leave unknown
- * of a·x.
+ * |R⁻ᵀ a|² for a of n coefficients, which is overwritten: the variance of a·x that the
+ * factor's rows leave, in units of the noise.
  */
 double incise_lsq_leverage(const double *factor, int stride, int n, double *a);
 

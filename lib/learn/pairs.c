@@ -212,7 +212,7 @@ double incise_pairs_rmse(const struct incise_model *model,
 {
 	double w[INCISE_MODEL_RULES_MAX], sum = 0, largest = 0;
 	struct incise_basis basis;
-	/* Where strengths separate they are quicker to have. */
+	/* A grid has a quicker way to them. */
 	bool grid = !incise_basis_init(&basis, model);
 
 	for (size_t n = 0; n < pairs->n; n++) {

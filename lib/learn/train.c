@@ -64,7 +64,7 @@ static int held_out_noise(const struct incise_basis *basis,
 /* Pairs that settle ridge and premises; beyond, more of them change neither. */
 #define TUNED_MAX 3000
 
-/* A rule that never fires stronger than this has learnt nothing from the data. */
+/* A rule that never fires stronger than this learns nothing from the data. */
 #define UNFIRED 0.05
 
 /* Just enough that the standard deviation is finite where the user wants no ridge. */

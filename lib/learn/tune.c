@@ -4,7 +4,7 @@
  *
  *   ridge of the first premises ─▶ search with it and its neighbours ─▶ other starts
  *
- * Of two settings the one that moves the premises less is kept unless the other's
+ * The setting that moves the premises less is kept unless the other's
  * held-out error is clearly less: held-out errors of many settings have a winner by chance.
  */
 #include <errno.h>
@@ -22,7 +22,7 @@ static const double sizes[TUNE_SIZES] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
  */
 static const double means[TUNE_MEANS] = {1, 1e-3};
 
-/* Where there is nothing to cross-validate with; good on real tissue data. */
+/* The ridge without cross-validation; good on real tissue data. */
 #define DEFAULT_RIDGE 1.0
 
 /* Epochs of a search in cross-validation, at most. */
@@ -155,7 +155,7 @@ int incise_tune(const struct incise_basis *basis, const struct incise_folds *fol
 	if (folds->n < 2)
 		return 0;
 	t.epochs = options->epochs < EPOCHS_MAX ? options->epochs : EPOCHS_MAX;
-	/* Where all cannot be afforded, other starts are the first to go. */
+	/* If all would take too long, other starts are left out first. */
 	if (epochs < (starts + 2.0) * t.epochs)
 		starts = 1;
 	if (epochs < 3.0 * t.epochs)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What the training pairs themselves can say about how to learn from them: the ridge, the
- * premises to start from, how long to search, and how many membership functions there
- * should be. All by cross-validation (crossval.h), so pairs kept back stay unseen.
+ * Settings of learning, chosen from the training pairs: the ridge, the premises to start
+ * from, the epochs of the search, and the numbers of membership functions. All by
+ * cross-validation (crossval.h), so pairs kept back stay unseen.
  */
 #ifndef INCISE_TUNE_H
 #define INCISE_TUNE_H
@@ -29,7 +29,7 @@ int incise_tune(const struct incise_basis *basis, const struct incise_folds *fol
 void incise_tune_ridges(const struct incise_basis *basis, struct incise_ridge *ridges);
 
 /*
- * How many membership functions each input should have, as incise_train_start() says. 0;
+ * Choose the number of membership functions of each input, as incise_train_start() says. 0;
  * -EINVAL, -ENODATA (too few pairs to compare anything), -EDOM, -ENOMEM.
  */
 int incise_choose_grid(const struct incise_pairs *pairs,

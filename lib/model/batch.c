@@ -2,13 +2,13 @@
 /*
  * Many evaluations of a compiled model at once, for surfaces, exports and benches: four
  * at a time where the processor has AVX2, one by one elsewhere. Results are those of
- * incise_fixed_eval() to the bit; lib/fixed is the definition, this is a copy of it in
- * vectors that a test holds against it.
+ * incise_fixed_eval() to the bit: this is a copy of lib/fixed/eval.c in vectors, and a test
+ * compares both.
  *
  * Numbers stand in the lower halves of 64-bit lanes, whose products are exact. AVX2 has
  * no arithmetic shift of 64 bits: where the result fits in 32 bits and the shift is by at
  * most 32, a logical one gives the same lower half; elsewhere shift_right() adds a bias.
- * That all fits is what incise_fixed_open() has checked.
+ * incise_fixed_open() has checked that all fits.
  */
 #include "../fixed/layout.h"
 
@@ -27,7 +27,7 @@ static void one_by_one(const struct incise_fixed *fx, const int32_t *x, int32_t 
 
 #define LANES 4
 
-/* Of four evaluations and one input: where in the table, and how far into the cell. */
+/* One input of four evaluations: the place in the table, and the way into the cell. */
 struct place {
 	__m256i cell; /* 64-bit lanes */
 	__m256i from; /* share of the knot below: 2^cell_shift - share of the one above */
@@ -113,7 +113,7 @@ AVX2_INLINE __m256i pairs(const int32_t *values, __m256i index)
 	return _mm256_i64gather_epi64((const long long *)values, index, 4);
 }
 
-/* ---- one input: both kinds of tables are the same ---- */
+/* --- one input: both kinds of tables are the same --- */
 
 AVX2 static void one_input(const struct incise_fixed *fx, const int32_t *x, int32_t *y,
 			   size_t n)
@@ -130,7 +130,7 @@ AVX2 static void one_input(const struct incise_fixed *fx, const int32_t *x, int3
 	}
 }
 
-/* ---- force table of two inputs ---- */
+/* --- force table of two inputs --- */
 
 AVX2 static void force(const struct incise_fixed *fx, const int32_t *x, int32_t *y,
 		       size_t n)
@@ -153,7 +153,7 @@ AVX2 static void force(const struct incise_fixed *fx, const int32_t *x, int32_t 
 	}
 }
 
-/* ---- tables of weights of two inputs; see lib/fixed/table.c ---- */
+/* --- tables of weights of two inputs; see lib/fixed/eval.c --- */
 
 /* Weighed sums over input a's functions, at both knots of input b. */
 struct sums {
@@ -166,7 +166,7 @@ struct rows {
 	int n;
 };
 
-/* What four vectors add up to: a lane each. */
+/* The sum of each of four vectors, in a lane each. */
 AVX2_INLINE __m256i add_up(__m256i v0, __m256i v1, __m256i v2, __m256i v3)
 {
 	__m256i v01 = _mm256_add_epi64(_mm256_unpacklo_epi64(v0, v1),
@@ -312,7 +312,7 @@ AVX2 static void table(const struct incise_fixed *fx, const int32_t *x, int32_t 
 		table_of(fx, x, y, count, n);
 }
 
-/* How many of n evaluations were done. */
+/* Returns the number of evaluations done, of n. */
 static size_t by_vectors(const struct incise_fixed *fx, const int32_t *x, int32_t *y,
 			 size_t n)
 {

@@ -2,7 +2,7 @@
 /*
  * A compiled model as a C file of its own, for a microcontroller: the blob's numbers as
  * constant tables, and the arithmetic of lib/fixed with this model's formats filled in.
- * What it computes is what incise_fixed_eval() does, to the bit; a test compiles it.
+ * Its outputs are those of incise_fixed_eval() to the bit; a test compiles it.
  */
 #include <ctype.h>
 #include <errno.h>
@@ -17,7 +17,7 @@
 
 #define SYMBOL_MAX 60
 
-/* ---- the arithmetic, as text; see lib/fixed, and keep both alike ---- */
+/* --- the arithmetic, as text; see lib/fixed/eval.c, and keep both alike --- */
 
 static const char clamp_text[] =
 	"/* Distance from the support's lower end, clamped. */\n"
@@ -153,7 +153,7 @@ static const char direct_one_text[] =
 	"\treturn rounded(sum / sum_w);\n"
 	"}\n";
 
-/* ---- the numbers ---- */
+/* --- the numbers --- */
 
 static void put_array(FILE *out, const char *name, const int32_t *values, size_t n)
 {

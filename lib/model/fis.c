@@ -32,7 +32,7 @@ struct reader {
 	size_t size;
 	struct incise_error *err;
 	struct incise_model *model;
-	/* What has been seen so far; bits of MFs by number. */
+	/* Sections and keys read so far; bits of MFs by number. */
 	bool system, output, rules;
 	int n_rules; /* by NumRules */
 	int n_out_mfs;
@@ -379,7 +379,7 @@ static int read_rule(struct reader *in)
 	if (end == text || *end || (v != 1 && v != 2))
 		return fail(in, EINVAL, "rule %d: expected ': 1' at the end",
 			    model->n_rules + 1);
-	/* Of one input, 'or' and 'and' are the same. */
+	/* 'or' and 'and' of a single input are the same. */
 	if (v == 2 && n_used != 1)
 		return fail(in, ENOTSUP, "rule %d: 'or' (: 2) is not supported",
 			    model->n_rules + 1);

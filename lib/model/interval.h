@@ -89,7 +89,7 @@ static inline struct interval iv_intersect(struct interval a, struct interval b)
 	return (struct interval){fmax(a.lo, b.lo), fmin(a.hi, b.hi)};
 }
 
-/* Largest absolute value; endless where an end is no number. */
+/* Largest absolute value; infinite where an end is no number. */
 static inline double iv_mag(struct interval a)
 {
 	if (isnan(a.lo) || isnan(a.hi))

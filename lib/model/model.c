@@ -275,7 +275,7 @@ int incise_model_set_consequent(struct incise_model *model, int rule, const doub
 		if (!isfinite(p[i]))
 			return -EINVAL;
 	memcpy(model->rule[rule].p, p, (model->n_inputs + 1) * sizeof(*p));
-	/* With a slope it would lose it in the file, were it still called constant. */
+	/* The file has no slopes of a rule that is still called constant. */
 	for (int i = 1; i <= model->n_inputs; i++)
 		model->rule[rule].constant &= p[i] == 0;
 	return 0;
@@ -309,7 +309,7 @@ static void degrees(const struct incise_model *model, int i, double x, struct de
 }
 
 /*
- * Of a grid, Σ w = Π(i) Σ(k) A(i,k): normalising each input's degrees alone normalises
+ * A grid has Σ w = Π(i) Σ(k) A(i,k): normalising each input's degrees alone normalises
  * all products of them, with an exp() per function rather than per rule.
  */
 bool incise_model_firing_grid(const struct incise_model *model, const double *x,
@@ -382,8 +382,8 @@ bool incise_model_firing_rules(const struct incise_model *model, const double *x
 		if (!model->in_all[i])
 			continue;
 		/*
-		 * What all rules have in common cancels; left in, a far input's large
-		 * number would swallow what the others say.
+		 * A number common to all rules cancels; left in, a far input's large
+		 * one would swallow the digits of the others.
 		 */
 		log += d[i].log_max;
 		gaps += d[i].gap_min;
@@ -394,7 +394,7 @@ bool incise_model_firing_rules(const struct incise_model *model, const double *x
 	}
 	for (int r = 0; r < model->n_rules; r++) {
 		w[r] = rule_log(model, &model->rule[r], d, &gap[r]);
-		/* Of weight 0, it does not even stand in. */
+		/* A rule of weight 0 does not even stand in. */
 		if (model->rule[r].weight > 0)
 			nearest = fmin(nearest, gap[r]);
 	}
@@ -461,7 +461,7 @@ double incise_model_eval(const struct incise_model *model, const double *x,
 
 		for (int i = 0; i < model->n_inputs; i++)
 			yr += p[i + 1] * in[i];
-		/* A rule that does not fire has no say, not even with an overflow. */
+		/* A rule that does not fire adds nothing, not even an overflow. */
 		if (w[r] > 0)
 			y += w[r] * yr;
 	}

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Inside of a model, for the files of this room.
+ * The inside of a model, for the files of this folder.
  */
 #ifndef INCISE_MODEL_INTERNAL_H
 #define INCISE_MODEL_INTERNAL_H
@@ -28,7 +28,7 @@ struct incise_model {
 	enum incise_and_method and_method;
 	bool clamp;
 	/*
-	 * What the rules look like, which decides how they are evaluated; see
+	 * The shape of the rules, which decides how they are evaluated; see
 	 * incise_model_classify(). Rules, weights and kinds never change afterwards.
 	 */
 	bool is_grid; /* each combination once, prod, weights 1 */
@@ -40,7 +40,7 @@ struct incise_model {
 	struct incise_rule rule[INCISE_MODEL_RULES_MAX];
 };
 
-/* What keeps parameters from making a function of this kind, for a person, or NULL. */
+/* The reason, in words, why parameters make no function of this kind, or NULL. */
 const char *incise_mf_fault(enum incise_mf_type type, const double *p);
 
 /*
@@ -52,10 +52,10 @@ double incise_mf_log(const struct incise_mf *mf, double x, double *gap) INCISE_R
 
 bool incise_mf_type_known(enum incise_mf_type type);
 
-/* The kind a .fis file's word stands for, or -1. */
+/* The kind that a .fis file names so, or -1. */
 int incise_mf_type_find(const char *word);
 
-/* Find what is kept about the rules; call it once they are all there. */
+/* Find is_grid, in_all and the logs of weights; to be called once all rules are there. */
 void incise_model_classify(struct incise_model *model);
 
 /*

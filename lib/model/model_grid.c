@@ -379,7 +379,7 @@ struct interval incise_patch_mixed(const struct incise_grid *grid,
 	for (int i = 0; i < grid->a.n; i++)
 		for (int j = 0; j < grid->b.n; j++) {
 			const double *p = grid->p[i][j];
-			/* Of r, what depends on i or j alone adds up to 0 as well. */
+			/* The parts of r that depend on i or j alone add up to 0 as well. */
 			struct interval r =
 				iv_sub(rule_difference(grid, i, j, i, b->main, a, b),
 				       rule_difference(grid, a->main, j, a->main, b->main,
@@ -451,7 +451,7 @@ static int make_blocks(struct blocks *blocks, const struct incise_axis *axis,
 	return 0;
 }
 
-/* The larger; a NaN counts as endless. */
+/* The larger; a NaN counts as infinite. */
 static double larger(double largest, double e)
 {
 	if (isnan(e))
@@ -459,7 +459,7 @@ static double larger(double largest, double e)
 	return e > largest ? e : largest;
 }
 
-/* Of the weights' table and the folded one: see lib/fixed/table.c. */
+/* Errors of the weights' table and the folded one: see lib/fixed/eval.c. */
 static void table_errors(const struct incise_grid *grid, const struct incise_block *a,
 			 const struct incise_patch *patch, struct incise_survey *survey)
 {
@@ -482,7 +482,7 @@ static void table_errors(const struct incise_grid *grid, const struct incise_blo
 }
 
 /*
- * Error of degrees that lib/fixed/direct.c computes, relative to the largest being 1.
+ * Error of the direct arithmetic's degrees, relative to the largest being 1.
  * z: slope to 2^-30, two roundings in Q24; q = z² floored in Q26; 2^-q to 8 LSB of Q30.
  */
 static void degree_errors(const struct incise_axis *axis,

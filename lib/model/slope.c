@@ -22,10 +22,10 @@
 #include "model_grid.h"
 #include "slope.h"
 
-/* Of the larger end: a stiffness that is known to 1 % is known well. */
+/* Share of the larger end: a stiffness that is known to 1 % is known well. */
 #define TOLERANCE 0.01
 
-/* Beyond this a bound says nothing, and an estimate is worth more. */
+/* A looser bound is worth less than an estimate. */
 #define LOOSEST 0.2
 
 /* Boxes per input to begin with, how often they are cut, and how many may be left. */
@@ -106,7 +106,7 @@ static void look(struct branches *b, struct box *box)
 	}
 }
 
-/* Whether a box adds no more than a tolerance to the slopes that are met. */
+/* True where a box adds no more than a tolerance to the slopes that are met. */
 static bool is_done(const struct branches *b, const struct box *box, double tolerance)
 {
 	for (int i = 0; i < 2; i++) {
@@ -193,7 +193,7 @@ static int first_boxes(const struct incise_grid *grid, struct box *box)
 	return n;
 }
 
-/* 0; -ERANGE where nothing of use can be certified and the slopes are those met; -ENOMEM. */
+/* 0; -ERANGE where nothing useful can be certified and the slopes are those met; -ENOMEM. */
 static int enclose(const struct incise_grid *grid, struct incise_slope *slopes)
 {
 	static const struct interval none = {INFINITY, -INFINITY};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * How steep a model is over its support, by each input: ∂y/∂x from the lowest to the
+ * The slopes of a model over its support by each input: ∂y/∂x from the lowest to the
  * highest. Of a cutting model the highest slope by depth is the stiffness that the hand
  * meets, N/mm, and that by velocity, N s/mm, acts as damping: a check of stability needs both
  * before a model is felt.
