@@ -113,22 +113,13 @@ static void pose_of(const double h[9], double f, double pose[BOARD_POSE])
 	double a[3] = {h[0] / f, h[3] / f, h[6]}, b[3] = {h[1] / f, h[4] / f, h[7]};
 	double t[3] = {h[2] / f, h[5] / f, h[8]}, c[3], r[9];
 	double length = sqrt(sqrt(v3_dot(a, a) * v3_dot(b, b)));
-	double along, la, lb;
 
 	for (int i = 0; i < 3; i++)
 		pose[3 + i] = t[i] / length;
-	la = sqrt(v3_dot(a, a));
-	for (int i = 0; i < 3; i++)
-		a[i] /= la;
-	along = v3_dot(a, b);
-	for (int i = 0; i < 3; i++)
-		b[i] -= along * a[i];
-	lb = sqrt(v3_dot(b, b));
-	for (int i = 0; i < 3; i++)
-		b[i] /= lb;
-	c[0] = a[1] * b[2] - a[2] * b[1];
-	c[1] = a[2] * b[0] - a[0] * b[2];
-	c[2] = a[0] * b[1] - a[1] * b[0];
+	v3_unit(a, a, 0);
+	v3_add(b, b, -v3_dot(a, b), a);
+	v3_unit(b, b, 0);
+	v3_cross(c, a, b);
 	for (int i = 0; i < 3; i++) {
 		r[3 * i] = a[i];
 		r[3 * i + 1] = b[i];
@@ -495,6 +486,12 @@ static void derive(const struct solution *s, int view, const double mm[2],
 	}
 }
 
+/* Index of a number of the lens or of a view's pose among all unknowns. */
+static int unknown(const struct board *b, int view, int i)
+{
+	return i < BOARD_LENS ? i : b->at[view] + i - BOARD_LENS;
+}
+
 /* The normal matrix, whole, and its right side. */
 static void accumulate(struct board *b, const struct solution *s)
 {
@@ -517,45 +514,54 @@ static void accumulate(struct board *b, const struct solution *s)
 			derive(s, v, mm, by);
 			for (int k = 0; k < 2; k++)
 				for (int i = 0; i < BOARD_LENS + BOARD_POSE; i++) {
-					int row = i < BOARD_LENS
-							  ? i
-							  : b->at[v] + i - BOARD_LENS;
+					int row = unknown(b, v, i);
 
 					b->right[row] +=
 						by[k][i] * (px[2 * c + k] - to[k]);
 					for (int j = 0; j < BOARD_LENS + BOARD_POSE; j++)
-						b->normal
-							[(size_t)row * n +
-							 (j < BOARD_LENS
-								  ? j
-								  : b->at[v] + j -
-									    BOARD_LENS)] +=
+						b->normal[(size_t)row * n +
+							  unknown(b, v, j)] +=
 							by[k][i] * by[k][j];
 				}
 		}
 	}
 }
 
-/* (N + damping diag N) step = right, in units in which N's diagonal is 1. */
-static int solve(const struct board *b, double damping, double *step)
+/* The unit of an unknown in which the normal matrix N has a diagonal of 1. */
+static double unit_of(const struct board *b, int i)
+{
+	return sqrt(b->normal[(size_t)i * b->n + i]);
+}
+
+/* Put N + damping diag N, in these units, into the work matrix. -EDOM where one is 0. */
+static int scale_normal(const struct board *b, double damping)
 {
 	int n = b->n;
 
 	for (int i = 0; i < n; i++) {
-		double d = sqrt(b->normal[(size_t)i * n + i]);
-
-		if (!(d > 0))
+		if (!(unit_of(b, i) > 0))
 			return -EDOM;
-		step[i] = b->right[i] / d;
 		for (int j = 0; j < n; j++)
-			b->work[(size_t)i * n + j] = b->normal[(size_t)i * n + j] / d /
-						     sqrt(b->normal[(size_t)j * n + j]);
+			b->work[(size_t)i * n + j] = b->normal[(size_t)i * n + j] /
+						     unit_of(b, i) / unit_of(b, j);
 		b->work[(size_t)i * n + i] += damping;
 	}
+	return 0;
+}
+
+/* (N + damping diag N) step = right */
+static int solve(const struct board *b, double damping, double *step)
+{
+	int n = b->n;
+
+	if (scale_normal(b, damping))
+		return -EDOM;
+	for (int i = 0; i < n; i++)
+		step[i] = b->right[i] / unit_of(b, i);
 	if (LAPACKE_dposv(LAPACK_ROW_MAJOR, 'U', n, 1, b->work, n, step, 1))
 		return -EDOM;
 	for (int i = 0; i < n; i++)
-		step[i] /= sqrt(b->normal[(size_t)i * n + i]);
+		step[i] /= unit_of(b, i);
 	return 0;
 }
 
@@ -652,12 +658,7 @@ static int covariance(struct board *b, struct solution *s, double variance,
 	int n = b->n;
 
 	accumulate(b, s);
-	for (int i = 0; i < n; i++)
-		for (int j = 0; j < n; j++)
-			b->work[(size_t)i * n + j] = b->normal[(size_t)i * n + j] /
-						     sqrt(b->normal[(size_t)i * n + i]) /
-						     sqrt(b->normal[(size_t)j * n + j]);
-	if (LAPACKE_dpotrf(LAPACK_ROW_MAJOR, 'U', n, b->work, n) ||
+	if (scale_normal(b, 0) || LAPACKE_dpotrf(LAPACK_ROW_MAJOR, 'U', n, b->work, n) ||
 	    LAPACKE_dpotri(LAPACK_ROW_MAJOR, 'U', n, b->work, n))
 		return incise_error_set(
 			err, EDOM,
@@ -669,8 +670,7 @@ static int covariance(struct board *b, struct solution *s, double variance,
 			s->covariance[(size_t)i * n + j] =
 				variance *
 				b->work[(size_t)(i < j ? i : j) * n + (i < j ? j : i)] /
-				sqrt(b->normal[(size_t)i * n + i]) /
-				sqrt(b->normal[(size_t)j * n + j]);
+				unit_of(b, i) / unit_of(b, j);
 	s->n_unknowns = n;
 	s->plane_at = b->at[b->views->plane];
 	return 0;
