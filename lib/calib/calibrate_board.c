@@ -16,13 +16,13 @@
 #include "board_lens.h"
 #include "../base/ascending.h"
 
-/* All that was fitted. */
+/* The fitted numbers. */
 struct solution {
 	union board_lens lens;
 	double pose[INCISE_BOARD_VIEWS][BOARD_POSE];
 	int n_unknowns;
-	double *covariance; /* n_unknowns squared; views that are not believed have none */
-	int plane_at;	    /* where the plane's pose begins in it */
+	double *covariance; /* n_unknowns squared; views left out have none */
+	int plane_at;	    /* index of the plane's pose in it */
 };
 
 /*
@@ -100,7 +100,7 @@ static int focal_length(double h[][9], int n, double *f)
 		}
 	}
 	/* (a w + b = 0) has its noise in a too: solved for f² it would be biased the other
-	 * way; either is near enough to begin with. */
+	 * way; either is near enough for a start. */
 	w = top / bottom;
 	if (!(w > 0) || !isfinite(w))
 		return -EDOM;
@@ -129,8 +129,8 @@ static void pose_of(const double h[9], double f, double pose[BOARD_POSE])
 }
 
 /*
- * First values: of each view a homography, of all a focal length, with the principal point
- * in the picture's middle and no distortion. 0, -EDOM.
+ * First values: a homography of each view, a focal length of all, the principal point in the
+ * picture's middle, and no distortion. 0, -EDOM.
  */
 static int find_start(const struct incise_board_views *views, struct solution *solution,
 		      struct incise_error *err)
@@ -171,7 +171,7 @@ static int find_start(const struct incise_board_views *views, struct solution *s
 
 #define GRID 9	       /* places in the region, both ways */
 #define AXIS_PLACES 33 /* on the axis */
-#define REACH_PX 8.0   /* to both sides of a place that a scale is taken over */
+#define REACH_PX 8.0   /* to both sides of a place; the length of its scale */
 
 struct state {
 	union board_lens lens;
@@ -215,8 +215,8 @@ static double cov(const struct solution *s, int i, int j)
 	return s->covariance[(size_t)a * s->n_unknowns + b];
 }
 
-/* k -1: the scale; 0, 1: the normal's x, y. */
-static double figure(const struct incise_board_views *views, const struct state *state,
+/* One metric. k -1: the scale; 0, 1: the normal's x, y. */
+static double metric(const struct incise_board_views *views, const struct state *state,
 		     int k)
 {
 	return k < 0 ? axis_scale(views, state) : normal_of(state, k);
@@ -232,9 +232,9 @@ static void gradient(const struct incise_board_views *views, const struct soluti
 		double *x = number_of(&moved, i), was = *x, up, down;
 
 		*x = was + step;
-		up = figure(views, &moved, k);
+		up = metric(views, &moved, k);
 		*x = was - step;
-		down = figure(views, &moved, k);
+		down = metric(views, &moved, k);
 		*x = was;
 		g[i] = (up - down) / (2 * step);
 	}
@@ -267,7 +267,7 @@ static void find_tilt(const struct incise_board_views *views, const struct solut
 	fit->u_tilt_deg = sqrt(fmax(0, largest)) * 180 / M_PI;
 }
 
-/* How the scale along the axis differs within the region, and one number from the truth. */
+/* The range of scales within the region, and the error of a single scale. */
 static void find_change(const struct incise_board_views *views, const struct state *state,
 			struct incise_board_fit *fit)
 {
@@ -358,7 +358,7 @@ static void find_homography(const struct state *state, double h[9])
 		h[i] /= h[8];
 }
 
-/* What the solution says of the plane: scale, tilt, residual, budget. */
+/* Scale, tilt, residual and budget of the plane. */
 static void find_scale(const struct incise_board_views *views, const struct solution *s,
 		       struct incise_board_fit *fit)
 {
@@ -417,7 +417,7 @@ void incise_board_plane(const struct incise_board_fit *fit, double x_px, double 
 #define VIEWS_MIN 3
 #define SPREAD_MIN_DEG 10.0 /* views less apart leave the focal length open */
 #define RMS_MAX_PX 1.0
-/* A view is an outlier that has so many times the median's residual, and so much. */
+/* An outlier among views has so many times the median's residual, and so many px. */
 #define VIEW_TIMES 3.0
 #define VIEW_PX 0.3
 
@@ -425,7 +425,7 @@ struct board {
 	const struct incise_board_views *views;
 	int corners, n; /* of a view; unknowns */
 	bool *believed;
-	int at[INCISE_BOARD_VIEWS];    /* where a view's pose begins in the unknowns */
+	int at[INCISE_BOARD_VIEWS];    /* index of a view's pose in the unknowns */
 	double *normal, *work, *right; /* n² and n² and n */
 };
 
@@ -610,7 +610,7 @@ static int descend(struct board *b, struct solution *s, double *step)
 	return isfinite(now) ? 0 : -EDOM;
 }
 
-/* Leaves out views that are far worse. Whether there are any. */
+/* Leave out a view that is far worse than the others; true if there is one. */
 static bool leave_out(struct board *b, const struct solution *s, double *rms)
 {
 	double sorted[INCISE_BOARD_VIEWS], middle;
@@ -623,7 +623,7 @@ static bool leave_out(struct board *b, const struct solution *s, double *rms)
 			sorted[k++] = rms[v];
 	}
 	middle = median(sorted, k);
-	/* The worst one alone: it may have spoilt others. */
+	/* Only the worst: it may have spoilt the others. */
 	for (int v = 0; v < b->views->n; v++)
 		if (b->believed[v] && rms[v] == sorted[k - 1] && rms[v] > VIEW_PX &&
 		    rms[v] > VIEW_TIMES * middle && k > VIEWS_MIN && !any) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Delay between two streams of one motion; see incise/calibrate_delay.h. Within, delays are
- * in steps of the grid.
+ * Delay between two streams of one motion; see incise/calibrate_delay.h. Delays are in
+ * steps of the grid here.
  *
  *     target(i) ≈ Σ c_k · column_k(i + delay)       columns depend on where contact begins
  */
@@ -16,7 +16,7 @@
 #include "../base/random.h"
 #include "delay_grid.h"
 
-/* A fit under way. Delays are in steps of the grid. */
+/* A fit under way. */
 struct delay {
 	struct delay_grid grid;
 	enum incise_delay_relation relation;
@@ -28,7 +28,7 @@ struct delay {
 	bool touches; /* contact begins within the motion, and is fitted along */
 };
 
-#define UNKNOWNS (DELAY_COLUMNS + 3) /* and delay, contact, drift */
+#define UNKNOWNS (DELAY_COLUMNS + 3) /* the others: delay, contact, drift */
 
 /* Normal equations of some rows; the lower triangle. */
 struct normal {
@@ -68,7 +68,7 @@ static void add_normal(struct normal *to, const struct normal *from)
 	to->yy += from->yy;
 }
 
-/* Columns are scaled alike first. */
+/* Columns are scaled alike first; one of zeros gets 0. False: singular. */
 static bool solve(const struct normal *normal, double *x)
 {
 	double a[UNKNOWNS * UNKNOWNS] = {0}, scale[UNKNOWNS];
@@ -94,7 +94,7 @@ static bool solve(const struct normal *normal, double *x)
 	return true;
 }
 
-/* Of all rows, or of those of one block; the last `without` unknowns are left out. */
+/* Normal equations of rows from … to - 1, without the last `without` unknowns. */
 static void tangent_normal(const struct tangent *t, int from, int to, int without,
 			   struct normal *normal)
 {
@@ -105,11 +105,7 @@ static void tangent_normal(const struct tangent *t, int from, int to, int withou
 			add_row(normal, t->row + (size_t)i * t->m, t->rest[i]);
 }
 
-/*
- * --- the delay roughly ---
- *
- * The peak of the correlation, and where the contact begins.
- */
+/* --- rough delay: the peak of the correlation, and the start of contact --- */
 
 #define COARSE_KNOTS 5
 #define COARSE_STRIDE 2 /* rows; neighbours are alike through the filter */
@@ -117,7 +113,7 @@ static void tangent_normal(const struct tangent *t, int from, int to, int withou
 #define CONTACTS 24
 #define NEAR_LAGS 5
 
-/* What grows with speed, whichever way, does so by then. */
+/* Speeds at which forces that grow with speed, either way, have half of their largest. */
 #define SLOW_MM_S 10.0
 #define FAST_MM_S 50.0
 
@@ -126,7 +122,7 @@ static void filter_column(struct delay_grid *grid, int k)
 	delay_grid_filter(grid, grid->scratch, grid->column[k]);
 }
 
-/* What the other stream is made of, for a contact that begins at a depth. */
+/* The columns that the other stream is fitted by, for a contact that begins at a depth. */
 static void make_columns(struct delay *d, double contact_mm)
 {
 	struct delay_grid *grid = &d->grid;
@@ -175,7 +171,7 @@ static void make_coarse_columns(struct delay *d)
 	}
 }
 
-/* Rows that can be compared at any delay within the range. */
+/* True for rows that can be compared at a delay of @shift. */
 static bool is_usable(const struct delay *d, int i, int shift)
 {
 	const struct delay_grid *grid = &d->grid;
@@ -201,7 +197,7 @@ static void coarse_normal(const struct delay *d, int shift, struct normal *norma
 	}
 }
 
-/* Correlation of the target and what the columns make of it; negative for a mirror image. */
+/* Correlation of the target and its fit by the columns; negative for a mirror image. */
 static double correlation(const struct normal *normal)
 {
 	double x[UNKNOWNS], explained = 0, slope = 0;
@@ -218,7 +214,6 @@ static double correlation(const struct normal *normal)
 	return slope < 0 ? -explained : explained;
 }
 
-/* The delay roughly, by the peak of the correlation. 0, -EDOM, -ENOMEM. */
 static int search(struct delay *d, struct incise_delay_fit *fit, struct incise_error *err)
 {
 	int lags = 2 * (d->range / COARSE_LAG) + 1, best = 0;
@@ -240,7 +235,7 @@ static int search(struct delay *d, struct incise_delay_fit *fit, struct incise_e
 	for (int l = 1; l < lags - 1; l++)
 		if (l != best && r[l] >= r[l - 1] && r[l] >= r[l + 1])
 			second = fmax(second, r[l]);
-	/* one that goes on rising at the end may be anything beyond */
+	/* one that still rises at the end may have any height beyond */
 	if (lags > 1 && best != 0 && r[0] > r[1])
 		second = fmax(second, r[0]);
 	if (lags > 1 && best != lags - 1 && r[lags - 1] > r[lags - 2])
@@ -268,7 +263,7 @@ static int search(struct delay *d, struct incise_delay_fit *fit, struct incise_e
 	return 0;
 }
 
-/* What is left unexplained with the present columns; HUGE_VAL where nothing can be said. */
+/* Share that the present columns do not explain; HUGE_VAL where they have no solution. */
 static double coarse_rest(const struct delay *d, int shift)
 {
 	struct normal normal;
@@ -284,8 +279,8 @@ static double coarse_rest(const struct delay *d, int shift)
 }
 
 /*
- * Where contact begins, of some depths, and the delay anew, as viscosity has moved the peak
- * of the correlation; the fit goes on from there.
+ * Choose the depth at which contact begins, and the delay again, as viscosity has moved the
+ * peak of the correlation; the fit starts from there.
  */
 static void search_contact(struct delay *d)
 {
@@ -317,17 +312,13 @@ static void search_contact(struct delay *d)
 		d->touches = d->contact_mm > d->low_mm;
 }
 
-/*
- * --- uncertainty ---
- *
- * Blocks of the run are drawn again and again.
- */
+/* --- uncertainty --- */
 
 #define BLOCK_S 1.0
 #define BLOCKS_MIN 7
 #define DRAWS 400
 
-/* Standard deviation of `value` n times; few blocks have Student's tails, k = 2 holds them. */
+/* Standard deviation of n values; few blocks have Student's tails, which k = 2 holds. */
 static double spread(const double *value, int n, int blocks)
 {
 	double mean = 0, sum = 0, freedom = blocks - 2;
@@ -339,7 +330,7 @@ static double spread(const double *value, int n, int blocks)
 	return sqrt(sum / (n - 1) * blocks / freedom) * (1 + 1.21 / freedom);
 }
 
-/* Draw blocks of the run again and again, and solve for each. */
+/* Draw blocks of the run with replacement, many times, and solve each time. */
 static int bootstrap(struct delay *d, const struct tangent *t,
 		     struct incise_delay_fit *fit, struct incise_error *err)
 {
@@ -388,7 +379,7 @@ static int bootstrap(struct delay *d, const struct tangent *t,
 		fit->drift_ms = solve(&sum, x) ? x[t->m - 1] * ms : NAN;
 	}
 	free(blocks);
-	/* the quantiles, as much wider as the standard deviation was made */
+	/* the quantiles are widened as the standard deviation was */
 	qsort(delays, DRAWS, sizeof(*delays), ascending);
 	plain = 0;
 	for (int i = 0; i < DRAWS; i++)
@@ -403,10 +394,10 @@ static int bootstrap(struct delay *d, const struct tangent *t,
 #define ITERATIONS 12
 #define BEYOND 2 /* steps that a fit may leave the range by */
 
-/* --- the fit --------------------------------------------------------------------------- */
+/* --- the fit --- */
 
-/* Sum of squares of the rest; the coefficients are the best for delay and contact as they
- * are. Negative: there are none. */
+/* Sum of squares of the rest, with the best coefficients for the present delay and contact;
+ * negative: there are none. */
 static double make_tangent(struct delay *d, struct tangent *t)
 {
 	struct delay_grid *grid = &d->grid;
@@ -456,7 +447,7 @@ static double make_tangent(struct delay *d, struct tangent *t)
 	return squares;
 }
 
-/* Steps of delay and contact that make it better; a step that does not is halved. */
+/* Improve delay and contact by steps; one that does not improve them is halved. */
 static bool refine(struct delay *d, struct tangent *t)
 {
 	double step[UNKNOWNS], scale = d->high_mm - d->low_mm, moved = 1;
@@ -479,7 +470,7 @@ static bool refine(struct delay *d, struct tangent *t)
 
 			d->shift += share * shift;
 			d->contact_mm += share * contact;
-			/* contact that slips out of the motion begins nowhere */
+			/* contact outside of the motion has no start */
 			if (d->touches && (d->contact_mm <= d->floor_mm ||
 					   d->contact_mm >= d->high_mm)) {
 				d->touches = false;
@@ -499,8 +490,6 @@ static bool refine(struct delay *d, struct tangent *t)
 	}
 	return squares >= 0;
 }
-
-/* --- the whole ------------------------------------------------------------------------- */
 
 static int measure_motion(struct delay *d, struct incise_error *err)
 {

@@ -2,7 +2,7 @@
 /*
  * Scale of the picture from two points and from a line; see incise/calibrate_depth.h.
  *
- *     pairs ─ start that bears outliers ─ which are near ─ least squares ─ budget
+ *     pairs ─ robust start ─ choice of the near ones ─ least squares ─ budget
  */
 #include <errno.h>
 #include <math.h>
@@ -14,24 +14,24 @@
 /* --- repeated readings --- */
 
 #define FEW 20
-#define LAGS_MAX 200 /* four seconds of pictures */
+#define LAGS_MAX 200 /* four seconds of frames */
 
 /*
  * Standard deviation of noise from n absolute residuals, which are sorted, outliers or not
- * (at most a quarter of few). Of few it comes out larger, so that a good one is not lost for
- * a chance: twice as large for 12.
+ * (at most a quarter of few). Few residuals give a larger one, so that a good reading is not
+ * lost by chance: twice as large for 12.
  */
 static double repeats_sd(double *absolute, int n)
 {
 	double sd = 1.4826 * median(absolute, n);
 
-	/* Few can lie close together by chance: what three quarters of them keep within. */
+	/* Few can lie close together by chance: the distance that holds three quarters. */
 	if (n < FEW)
 		sd = absolute[3 * n / 4] / 1.1503;
 	return sd * (1 + 12.0 / n);
 }
 
-/* Half of what Student's t needs for 95.45 %, by degrees of freedom. */
+/* Half of Student's t for 95.45 %, by degrees of freedom. */
 static double widen(int dof)
 {
 	static const double t[] = {13.97, 4.53, 3.31, 2.87, 2.65, 2.52, 2.43, 2.37};
@@ -44,8 +44,8 @@ static double widen(int dof)
 }
 
 /*
- * 1 + 2 Σ ρ as long as the correlation is more than chance makes, Sokal's way to end a sum:
- * at a lag of 5 times what it has come to.
+ * 1 + 2 Σ ρ as long as the correlation is more than chance; ended as Sokal does, at a lag of
+ * 5 times the sum so far.
  */
 static double correlation_time(const double *r, int n, double power)
 {
@@ -66,8 +66,8 @@ static double correlation_time(const double *r, int n, double power)
 /*
  * Standard uncertainty of the mean of n values whose residuals these are, in the order they
  * came; @fitted numbers have been taken from them. As with Student's t, few have a wider
- * one, so that twice it holds 95.45 %. 0 for one value: of its scatter nothing is known.
- * *effective: how many independent ones they are worth.
+ * one, so that twice it holds 95.45 %. 0 for one value, whose scatter is unknown. *effective:
+ * the number of independent values that they are worth.
  */
 static double repeats_u(const double *residual, int n, int fitted, int *effective)
 {
@@ -87,7 +87,7 @@ static double repeats_u(const double *residual, int n, int fitted, int *effectiv
 	return sqrt(power / (n - fitted) / worth) * widen(worth - fitted);
 }
 
-/* What calibration.conf takes for depth_mm_px is wider; no camera of a cut is outside. */
+/* No camera over a cut is outside; calibration.conf takes more for depth_mm_px. */
 #define SCALE_MIN 1e-4
 #define SCALE_MAX 1.0
 
@@ -238,7 +238,7 @@ static double off_line(const struct line *line, double px, double mm)
 	return mm - line->middle_mm - line->slope * (px - line->middle_px);
 }
 
-/* Repeated medians: of the slopes from each pair to all others, and of those. */
+/* Repeated medians: the median over pairs of the median slope to all others. */
 static int start_line(const struct incise_depth_lengths *p, struct line *line)
 {
 	int step = 1 + (p->n - 1) / MEDIANS_MAX, m = 0, rc = -ENOMEM;
@@ -273,7 +273,7 @@ out:
 	return rc;
 }
 
-/* Least squares of those that are near. */
+/* Least squares of the near pairs. */
 static void fit_line(const struct incise_depth_lengths *p, const bool *near,
 		     struct line *line)
 {
@@ -298,7 +298,7 @@ static void fit_line(const struct incise_depth_lengths *p, const bool *near,
 	line->slope = sxy / line->sxx;
 }
 
-/* How many are near, and whether that is another set than before. */
+/* Returns the number of near pairs; *changed: they are another set than before. */
 static int choose(const struct incise_depth_lengths *p, const struct line *line,
 		  double *residual, bool *near, bool *changed)
 {
@@ -321,7 +321,7 @@ static int choose(const struct incise_depth_lengths *p, const struct line *line,
 	return k;
 }
 
-/* What a parabola adds at the ends of the lengths; q = x² without its part along 1, x. */
+/* The bend of a parabola at the ends of the lengths; q = x² without its part along 1, x. */
 static void find_bend(const struct incise_depth_lengths *p, const bool *near,
 		      const struct line *line, struct incise_depth_fit *fit)
 {
@@ -346,7 +346,7 @@ static void find_bend(const struct incise_depth_lengths *p, const bool *near,
 			srr += r * r;
 			end = fmax(end, fabs(q));
 		}
-	/* Two depths only have no parabola. */
+	/* Only two depths have no parabola. */
 	if (!(sqq > 1e-6 * k * sx2 * sx2)) {
 		fit->bend_mm = fit->bend_sd_mm = NAN;
 		return;
@@ -396,7 +396,7 @@ static int fit_pairs(const struct incise_depth_lengths *p, bool *near, double *r
 
 	if (start_line(p, &line) == -ENOMEM)
 		return incise_error_set(err, ENOMEM, "out of memory");
-	/* Lengths all alike: the start has nothing, and the check below names it. */
+	/* Equal lengths have no start; the check below names them. */
 	fit->low_px = HUGE_VAL;
 	fit->high_px = -HUGE_VAL;
 	for (int i = 0; i < p->n; i++) {
@@ -444,8 +444,8 @@ static int fit_pairs(const struct incise_depth_lengths *p, bool *near, double *r
 	add_part(fit, "scatter about the line", 'A', u_slope, "mm/px", 1);
 	add_part(fit, "scale of the gauge", 'B', p->u_scale, "1", fit->mm_px);
 	fit->u_mm_px = budget(fit->part, fit->n_parts);
-	/* full = middle + depth there / slope; a gauge's scale falls out of it but for the
-	 * depth of the middle, where its zero is. */
+	/* full = middle + depth there / slope; a gauge's scale cancels but for the depth of
+	 * the middle, where its zero is. */
 	zero = hypot(u_middle, p->u_depth_mm) / fit->mm_px;
 	fit->u_full_px = hypot(zero, line.middle_mm / fit->mm_px / fit->mm_px * u_slope);
 	fit->covariance = -line.middle_mm / fit->mm_px / fit->mm_px * u_slope * u_slope;

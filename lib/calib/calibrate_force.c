@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Sensitivity of the force channel: what is refused, what is left out, and the order of it
- * all; see incise/calibrate_force.h. The line itself is in force_line.c, what is told of the
- * sensor in force_figures.c.
+ * Sensitivity of the force channel; see incise/calibrate_force.h. Constants of gravity are
+ * those of WGS 84, NIMA TR8350.2, tables 3.1 to 3.4.
  */
 #include <errno.h>
 #include <math.h>
@@ -12,7 +11,7 @@
 #include "chi2.h"
 #include "robust_line.h"
 
-/* Pairs of one load: weighed once, so that they share what the scale has rounded. */
+/* Pairs of one load: weighed once, so that they share the rounding of the scale. */
 struct load {
 	double F_N;
 	double mean_mV; /* of the readings used */
@@ -100,7 +99,7 @@ static double student(int freedom)
 	       (5 * pow(z, 5) + 16 * pow(z, 3) + 3 * z) / (96 * v * v);
 }
 
-/* The scatter of readings of one load, pooled; without repetition that about a line. */
+/* The scatter of readings of one load, pooled; without repetition the one about a line. */
 static void measure_scatter(const struct work *w, struct incise_calibrate_force *result)
 {
 	double squares = 0;
@@ -142,7 +141,7 @@ static void measure_scatter(const struct work *w, struct incise_calibrate_force 
 	result->scatter_sd_mV = sqrt(squares / result->freedom);
 }
 
-/* What is common to all readings of a load, mV: weight, and a code without noise. */
+/* Error common to all readings of a load, mV: its weight, and a code without noise. */
 static double common_mV(const struct work *w, const struct load *load, double slope,
 			double code_u_mV)
 {
@@ -179,7 +178,6 @@ static void add_common(const struct work *w, struct incise_calibrate_force *resu
 			 (s->weight_kg_m3 * s->weight_kg_m3));
 }
 
-/* The weighted line through the loads, and its budget. */
 static void fit_line(struct work *w, struct incise_calibrate_force *result)
 {
 	double slope = w->robust_slope, zero = 0, code_u_mV = 0, t;
@@ -193,7 +191,7 @@ static void fit_line(struct work *w, struct incise_calibrate_force *result)
 		code_u_mV = w->setup->step_mV / sqrt(12);
 	t = student(result->freedom);
 	turn = fmax(t / 2, 1);
-	/* The weights hold the slope; it is known so well that two rounds settle it. */
+	/* The weights depend on the slope, which two rounds settle. */
 	for (int round = 0; round < 3; round++) {
 		double sxy = 0;
 
@@ -256,7 +254,7 @@ static void fit_line(struct work *w, struct incise_calibrate_force *result)
 	for (int i = 0; i < result->parts; i++)
 		u2 += result->part[i].u_mV_N * result->part[i].u_mV_N;
 	result->sensitivity_u_mV_N = sqrt(u2);
-	/* Of the line alone: what turns all loads does not move the zero. */
+	/* The line alone counts: an error common to all loads does not move the zero. */
 	double line2 = scatter2 + scale2 + code2;
 
 	result->covariance = -mx * line2;
@@ -280,7 +278,7 @@ static void fit_line(struct work *w, struct incise_calibrate_force *result)
  * full scale: the reading of the largest load above the zero.
  */
 
-/* Readings of one load that one way leads to. */
+/* Readings of one load, reached one way. */
 struct way {
 	double sum, least, most;
 	int n;
@@ -296,7 +294,7 @@ static void take(struct way *way, double reading)
 	way->n++;
 }
 
-/* Both ways of a load; series of readings of the first are counted as they differ. */
+/* Readings of a load by both ways. */
 static void gather(const struct work *w, int load, struct way *up, struct way *down)
 {
 	*up = *down = (struct way){0};
@@ -313,7 +311,7 @@ static bool is_first_of_series(const struct work *w, int i)
 	return true;
 }
 
-/* Zero behind the loads of a series against that before them; NAN: not both are there. */
+/* Zero after the loads of a series less the one before; NAN: one is missing. */
 static double zero_return_mV(const struct work *w, int series)
 {
 	double before = NAN, after = NAN;
@@ -332,7 +330,7 @@ static double zero_return_mV(const struct work *w, int series)
 	return fabs(after - before);
 }
 
-/* fmax() takes the number where one of two is NaN: figures begin as not stated. */
+/* fmax() takes the number where one of two is NaN: metrics start as not stated. */
 static void measure_metrics(const struct work *w, struct incise_calibrate_force *result)
 {
 	const struct load *last = &w->loads[w->n_loads - 1];
@@ -377,9 +375,9 @@ static void measure_metrics(const struct work *w, struct incise_calibrate_force 
 #define MARGIN 0.002
 /* Readings are alike within this share of all that was read. */
 #define ALIKE 0.001
-/* Readings of one load may scatter by this share of what the largest load makes. */
+/* Readings of one load may scatter by this share of the largest load's reading. */
 #define SCATTER_MAX 0.02
-/* Outliers that are borne, as a share of the pairs. */
+/* Outliers that are tolerated, as a share of the pairs. */
 #define OUTLIERS_MAX 0.1
 
 void incise_calibrate_force_init(struct incise_calibrate_force_setup *setup)
@@ -463,7 +461,7 @@ static bool near(double ratio, double expected)
 }
 
 /*
- * What a slope that is off by a known factor is a sign of. Columns are swapped where the
+ * Name the mistake behind a slope that is off by a known factor. Columns are swapped where the
  * inverse of the slope, with loads in the unit of the column, is the nominal sensitivity.
  */
 static int check_slope(const struct work *w, double slope, struct incise_error *err)
@@ -495,7 +493,7 @@ static int check_slope(const struct work *w, double slope, struct incise_error *
 
 /*
  * The reading that all loads from one on (@top: upwards) share, though they are clearly apart;
- * NAN: none. A weight that was noted wrong makes none: others of its load read otherwise.
+ * NAN: none. A wrongly noted weight makes none: other pairs of its load read otherwise.
  */
 static double plateau(const struct work *w, bool top)
 {
@@ -524,7 +522,7 @@ static double plateau(const struct work *w, bool top)
 	return end;
 }
 
-/* Mark what is saturated; returns how many. */
+/* Mark saturated pairs; returns their number. */
 static int mark_saturated(struct work *w)
 {
 	const struct incise_calibrate_force_setup *s = w->setup;
@@ -598,7 +596,7 @@ static int mark_outliers(struct work *w, struct incise_error *err)
 				y[m] = w->y[i];
 				from[m++] = i;
 			}
-		/* What rounding by scale and converter explains is no outlier. */
+		/* A distance that rounding by scale and converter explains is no outlier. */
 		rc = incise_robust_line(x, y, m,
 					hypot(w->setup->nominal_mV_N * w->load_u_N,
 					      w->setup->step_mV / sqrt(12)),
@@ -628,7 +626,7 @@ static int mark_outliers(struct work *w, struct incise_error *err)
 	return 0;
 }
 
-/* What is wrong is named before it is left out: a slope of all that was read. */
+/* Mistakes are named before pairs are left out: by the slope of all readings. */
 static int check_whole(struct work *w, struct incise_error *err)
 {
 	bool *outlier = malloc(w->n * sizeof(*outlier));
@@ -639,7 +637,7 @@ static int check_whole(struct work *w, struct incise_error *err)
 	free(outlier);
 	if (rc == -ENOMEM)
 		return incise_error_set(err, ENOMEM, "no memory for %d pairs", w->n);
-	/* No line: the loads tell why, below. A reading that falls may be a saturated one. */
+	/* No line: check_loads() says why. A falling reading may be a saturated one. */
 	return rc || !(line.slope > 0) ? 0 : check_slope(w, line.slope, err);
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The calibration of an actuator against a force sensor; see incise/calibrate_stepper.h. Here:
- * strokes, the order of things, and what is concluded. Lines are stepper_lines.c, turns
- * stepper_turn.c, and what is refused of both stepper_check.c.
+ * The calibration of an actuator against a force sensor; see incise/calibrate_stepper.h.
  */
 #include <errno.h>
 #include <math.h>
@@ -17,7 +15,7 @@
 /* A run of points that go one way: first … last. */
 struct stroke {
 	int first, last, way; /* way: 1 up, -1 down */
-	double from_mm;	      /* where it turned round */
+	double from_mm;	      /* place of the turn before it */
 	double zero_N;	      /* its line at 0 mm */
 	double mean_mm;	      /* of the points used */
 	int used;
@@ -62,7 +60,7 @@ static double upper_median(double *values, int n)
 	return values[n / 2];
 }
 
-/* Points behind the turns and not saturated are to be used, until they prove to be far. */
+/* Use points behind the turns that are not saturated, until they prove to be far. */
 static void choose_points(struct work *w, double skip_mm)
 {
 	for (int k = 0; k < w->n_strokes; k++) {
@@ -194,7 +192,7 @@ static int least_squares(struct work *w)
 }
 
 /*
- * Lines of one slope through what lies further than @skip_mm behind each turn, without
+ * Fit lines of one slope through the points further than @skip_mm behind each turn, without
  * outliers. Returns 0, -EDOM (nothing to fit), -ENOMEM.
  */
 static int fit_lines(struct work *w, double skip_mm)
@@ -223,10 +221,10 @@ static int fit_lines(struct work *w, double skip_mm)
  * too many outliers: each is refused with a line of its own.
  */
 
-#define BLOCKS 8  /* of the range, that are looked at one by one */
+#define BLOCKS 8  /* of the range, examined one by one */
 #define SLIP 0.01 /* of full scale, that strokes of one way may be apart */
 
-/* Noise is what three points in a row are off a line; the force has to go much further. */
+/* Noise is the distance of three points in a row from a line; the force has to exceed it. */
 static int check_moves(const struct work *w, struct incise_error *err)
 {
 	double *scratch = malloc(w->n * sizeof(*scratch)), noise, spread;
@@ -323,7 +321,7 @@ static int check_slip(const struct work *w, struct incise_calibrate_stepper *res
 		from + 1, worst / w->slope, worst);
 }
 
-/* Whether the lines can be those of an actuator; counts outliers. -EDOM, -ENOMEM. */
+/* Refuse lines that are not those of an actuator; count outliers. 0, -EDOM, -ENOMEM. */
 static int check_lines(const struct work *w, struct incise_calibrate_stepper *result,
 		       struct incise_error *err)
 {
@@ -361,9 +359,9 @@ static int check_lines(const struct work *w, struct incise_calibrate_stepper *re
 /*
  * --- turns ---
  *
- * How far the force stands still behind the turns, how far it jumps, and how the rest fades, from
- * all turns together. s is the way since the turn, and rho how far the force is behind its
- * branch's line, on the side that it came from:
+ * Behind a turn the force stands still, jumps, and its rest fades; all turns together show how
+ * far. s is the way since the turn, and rho the force less its branch's line, on the side that
+ * it came from:
  *
  *   rho   k(s - D) ____________ up to dead: the force stands still
  *                 /:leap
@@ -371,7 +369,7 @@ static int check_lines(const struct work *w, struct incise_calibrate_stepper *re
  *               /  rest `.
  *   ----------D----dead----`.------- s
  *
- * Four models, the simple ones first: that turn is just the lines' distance D; a leap; a rest;
+ * Four models are tried, the simple ones first: just the lines' distance D; a leap; a rest;
  * both. One with more in it has to explain much more.
  */
 
@@ -380,8 +378,8 @@ static int check_lines(const struct work *w, struct incise_calibrate_stepper *re
 #define DEAD_GRAIN 0.025
 #define FADE_GRAIN 1.5
 #define ABOUT 1
-#define MOMENTS 2000 /* looked at */
-/* Chi² that one more thing in the model has to take away; with the search it is rarely 12. */
+#define MOMENTS 2000 /* at most */
+/* Chi² that one more part of a model has to take away; noise rarely takes 12. */
 #define WORTH 25.0
 
 struct moment {
@@ -399,14 +397,14 @@ static int by_way(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* Lines of two strokes that meet: how far apart, in mm of travel that is lost. */
+/* Distance of the lines of two strokes that meet, in mm of lost travel. */
 static double apart_mm(const struct work *w, int k)
 {
 	return w->strokes[k].way * (w->strokes[k - 1].zero_N - w->strokes[k].zero_N) /
 	       w->slope;
 }
 
-/* Points behind all turns but the first stroke's, whose turn nobody has seen. */
+/* Points behind all turns but the first stroke's, whose turn was not measured. */
 static int gather(const struct work *w, double far_mm, struct moment *moments)
 {
 	int m = 0;
@@ -426,7 +424,7 @@ static int gather(const struct work *w, double far_mm, struct moment *moments)
 		}
 	}
 	qsort(moments, m, sizeof(*moments), by_way);
-	/* So many tell as much, and the search goes over them a few thousand times. */
+	/* More would add little, and the search passes over them a few thousand times. */
 	if (m > MOMENTS) {
 		for (int i = 0; i < MOMENTS; i++)
 			moments[i] = moments[(int64_t)i * m / MOMENTS];
@@ -444,8 +442,8 @@ static double square(double off, double sd)
 }
 
 /*
- * With the force standing still up to @dead and a rest that fades on @fade (0: none). A
- * @leap is to be there or not: without one the rest is what the dead travel leaves.
+ * The model of a force that stands still up to @dead, with a rest that fades on @fade (0:
+ * none). Without a @leap the rest is what the dead travel leaves.
  */
 static struct model try_model(const struct work *w, const struct moment *moments, int m,
 			      double D, double dead, double fade, bool leap)
@@ -456,7 +454,7 @@ static struct model try_model(const struct work *w, const struct moment *moments
 	double sum_ff = 0, sum_rf = 0;
 
 	for (int i = 0; i < m && fade > 0; i++) {
-		/* Where the sensor drifts, turns lie apart. */
+		/* A sensor that drifts moves the turns apart. */
 		double behind = moments[i].s - dead - (moments[i].D - D);
 
 		if (behind > 0 && behind < fade) {
@@ -483,7 +481,7 @@ static struct model try_model(const struct work *w, const struct moment *moments
 	return model;
 }
 
-/* Of dead travels and fades about @from, so far apart, the best. */
+/* Try dead travels and fades about @from, so far apart, and keep the best. */
 static void try_about(const struct work *w, const struct moment *moments, int m, double D,
 		      bool leap, double least_mm, struct model from, double wide,
 		      struct model *best)
@@ -501,7 +499,7 @@ static void try_about(const struct work *w, const struct moment *moments, int m,
 				continue;
 			if (!from.fade_mm && j)
 				continue;
-			/* What fades within a few points is a leap; along the dead
+			/* A fade within a few points is a leap; along the dead
 			 * travel's own slope it is dead travel. */
 			if (from.fade_mm > 0 &&
 			    (fade < least_mm || fade < 2 * (D - dead)))
@@ -532,7 +530,6 @@ static struct model search(const struct work *w, const struct moment *moments, i
 	return best;
 }
 
-/* What happens behind the turns, from the lines. Returns 0, -ENOMEM. */
 static int measure_turn(const struct work *w, struct incise_calibrate_stepper *result)
 {
 	struct moment *moments = malloc(w->n * sizeof(*moments));
@@ -574,8 +571,7 @@ static int measure_turn(const struct work *w, struct incise_calibrate_stepper *r
 	if (best == &leap || best == &both)
 		result->stiction_N =
 			fmax(0, w->slope * (best->dead_mm - mean_mm) - best->rest_N);
-	/* Without a leap the rest hangs on where the force begins to change. */
-	/* One that is too small to be seen may be there still; twice: its fading is not known. */
+	/* An unseen rest may still be there; twice: its fading is unknown. */
 	unseen = try_model(w, moments, m, mean_mm, best->dead_mm, 0.05 * w->range_mm,
 			   true);
 	u_rest = best->sum > 0 ? 2 * w->sd / sqrt(best->sum)
@@ -679,7 +675,7 @@ static int find_strokes(struct work *w, struct incise_error *err)
 			err, EDOM,
 			"a range of %g mm is too small: %d steps are %g mm; give a larger one",
 			w->range_mm, LEAST_STEPS, LEAST_STEPS * w->setup->step_mm);
-	/* On its way to the first stroke, and home after the last. */
+	/* Leave out the ways to the first stroke and home after the last. */
 	while (w->n_strokes && w->strokes->last - w->strokes->first + 1 < LEAST_POINTS) {
 		w->n_strokes--;
 		for (int k = 0; k < w->n_strokes; k++)
@@ -844,7 +840,7 @@ static int fit(struct work *w, struct incise_calibrate_stepper *result,
 {
 	double skip_mm = FIRST_SKIP * w->range_mm;
 
-	/* Behind a part of each stroke that is large enough first, then behind the turns. */
+	/* First skip a large part of each stroke, then just the turns. */
 	for (int round = 0; round < 2; round++) {
 		int rc = fit_lines(w, skip_mm);
 

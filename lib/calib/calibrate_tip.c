@@ -24,7 +24,7 @@ struct tip_poses {
 	double *sorted; /* scratch: n */
 };
 
-/* A solution, and what it rests upon. */
+/* A solution, and the means that it rests upon. */
 struct tip_solution {
 	double t[3], c[3];
 	double mean_r[9];
@@ -55,7 +55,7 @@ static void turn_back(double to[3], const double r[9], const double v[3])
 		to[i] = r[i] * v[0] + r[3 + i] * v[1] + r[6 + i] * v[2];
 }
 
-/* Of those of the list (NULL: the first n). False where they do not fix the tip. */
+/* Solve for the poses of the list (NULL: the first n). False: they do not fix the tip. */
 static bool tip_solve(const struct tip_poses *poses, const int *list, int n,
 		      struct tip_solution *s)
 {
@@ -102,7 +102,7 @@ static bool tip_solve(const struct tip_poses *poses, const int *list, int n,
 	return v3_finite(s->t) && v3_finite(s->c);
 }
 
-/* Of all poses under a solution. */
+/* Residuals of all poses under a solution. */
 static void tip_residuals(struct tip_poses *poses, const struct tip_solution *s)
 {
 	for (int i = 0; i < poses->n; i++) {
@@ -125,7 +125,7 @@ static void tip_residuals(struct tip_poses *poses, const struct tip_solution *s)
 #define STARTS 60
 #define FINALISTS 5
 #define START_POSES 4  /* two fix five of the six unknowns, three all: one to spare */
-#define SAMPLE_MAX 200 /* poses that the search looks at */
+#define SAMPLE_MAX 200 /* poses of the search */
 #define SHARE 0.6      /* of them that are fitted */
 #define STEPS 10
 
@@ -143,7 +143,7 @@ static double quantile(struct tip_poses *sample, int at)
 	return sample->sorted[at];
 }
 
-/* Fit the nearest h, some times. The sum of their squares; HUGE_VAL: they fix nothing. */
+/* Fit the nearest h, some times. Returns the sum of their squares; HUGE_VAL: no solution. */
 static double concentrate(struct tip_poses *sample, struct tip_solution *s, int h,
 			  int steps)
 {
@@ -205,7 +205,7 @@ static void search(struct tip_poses *sample, struct tip_solution *best)
 	}
 }
 
-/* Those marked, as a list in ->list. How many. */
+/* List the marked poses in ->list; returns their number. */
 static int tip_listed(const struct tip_poses *poses)
 {
 	int n = 0;
@@ -266,15 +266,11 @@ static bool tip_robust(struct tip_poses *poses, struct tip_solution *solution)
 	return true;
 }
 
-/*
- * --- motion ---
- *
- * How far directions of the sensor swept.
- */
+/* --- motion: angles that directions of the sensor swept --- */
 
 #define DIRECTIONS_MAX 1500 /* compared each with each */
 
-/* Shortest tip that tells where the tool points; a shorter one is a correction. */
+/* Shortest tip that gives the direction of the tool; a shorter one is a correction. */
 #define TOOL_MIN_MM 10.0
 
 /* Largest angle between two directions that an axis of the sensor took. */
@@ -295,7 +291,7 @@ static double swept_deg(const struct tip_poses *poses, int n, const double axis[
 	return acos(fmax(-1, least)) * 180 / M_PI;
 }
 
-/* How far the n poses listed turned, and what of the tip that fixes. */
+/* Angles that the n listed poses swept, and how well they fix the tip. */
 static void tip_motion(const struct tip_poses *poses, int n, const struct tip_solution *s,
 		       struct incise_tip_fit *fit)
 {
@@ -314,7 +310,7 @@ static void tip_motion(const struct tip_poses *poses, int n, const struct tip_so
 /*
  * --- uncertainty ---
  *
- * The covariance, of noise that may last from pose to pose, and whether the pivot moved.
+ * The covariance, for noise that may last from pose to pose, and the motion of the pivot.
  */
 
 #define ROUNDING_MM 1e-9
@@ -351,7 +347,7 @@ static int tip_block(const struct tip_poses *poses, int n)
 }
 
 /*
- * What a variance from sums over blocks is too small by: borders between blocks cut off half
+ * Factor by which a variance from sums over blocks is too small: borders between blocks cut off half
  * a time each (Flegal and Jones, Ann. Stat. 38, 2010), six unknowns are two poses' worth of
  * equations, and few blocks have Student's tails, which k = 2 is to hold too.
  */
@@ -419,7 +415,7 @@ static bool sandwich(struct tip_poses *poses, int n, const double *u,
 			for (int a = 0; a < m; a++)
 				sum[a] += rows[e][a] * r[e];
 		}
-		/* what is left over goes with the last block */
+		/* the remainder belongs to the last block */
 		if (i != n - 1 && ((i + 1) % block || (i + 1) / block == blocks))
 			continue;
 		for (int a = 0; a < m; a++)
@@ -445,8 +441,8 @@ static bool sandwich(struct tip_poses *poses, int n, const double *u,
 }
 
 /*
- * The solution's covariance, and how far the pivot moved, with its χ², by blocks of
- * fit->block; u: times of those listed, in halves of the run, that add up to 0.
+ * The solution's covariance, and the way that the pivot moved, with its χ², by blocks of
+ * fit->block; u: times of the listed poses, in halves of the run, that add up to 0.
  */
 static void tip_uncertainty(struct tip_poses *poses, int n, const double *u,
 			    const struct tip_solution *s, struct incise_tip_fit *fit,
@@ -477,7 +473,7 @@ static void tip_uncertainty(struct tip_poses *poses, int n, const double *u,
 #define CHI2_MOVED 16.27 /* of three, which chance exceeds once in 1000 */
 #define MOVED_MIN_MM 0.1
 
-/* Whether those left out lie together at an end: the pivot moved there. */
+/* True if the poses left out lie together at an end: the pivot moved there. */
 static bool outliers_at_end(const struct tip_poses *poses)
 {
 	int outliers = 0, late = 0;
@@ -490,7 +486,7 @@ static bool outliers_at_end(const struct tip_poses *poses)
 	return late > 0.8 * outliers || late < 0.2 * outliers;
 }
 
-/* Whether to believe it. 0; -EDOM with what to do. */
+/* Refuse a fit that is not to be trusted. 0; -EDOM. */
 static int tip_judge(const struct tip_poses *poses, const struct incise_tip_fit *fit,
 		     double chi2, struct incise_error *err)
 {
@@ -541,7 +537,7 @@ static int tip_judge(const struct tip_poses *poses, const struct incise_tip_fit 
 
 /* --- the whole --- */
 
-/* Columns are where the axes go to. */
+/* Rotation matrix; columns are the turned axes. */
 static void rotation(double r[9], const double q[4])
 {
 	double length = sqrt(q[0] * q[0] + v3_dot(q + 1, q + 1)), unit[4];
@@ -666,7 +662,7 @@ static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *give
 	if (!u)
 		return incise_error_set(err, ENOMEM, "out of memory");
 	for (int i = 0; i < n; i++) {
-		/* apart, as their difference may not fit its type */
+		/* as doubles, for their difference may not fit its type */
 		double first = (double)given[0].t_ns;
 		double span = (double)given[poses->n - 1].t_ns - first;
 

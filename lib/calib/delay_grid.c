@@ -22,7 +22,7 @@
 #define REACH_SIGMAS 4
 #define SPEED_REACH 12 /* ±48 ms: less noise than of ±20 ms, which biased by 0.18 ms */
 
-#define GAP_PERIODS 4 /* farther apart, points have nothing to say of what is between */
+#define GAP_PERIODS 4 /* farther apart, points leave the time between them open */
 
 /* Median time between points, ns; negative where they do not ascend. */
 static double period_of(const struct incise_delay_point *points, int n)
@@ -45,8 +45,8 @@ static double period_of(const struct incise_delay_point *points, int n)
 	return steps[m / 2];
 }
 
-/* At the middle of each step, on the line through what is within it: a mean alone would be
- * off by where the points happen to lie. */
+/* Values at the middle of each step, on the line through the points within it: a mean alone
+ * would depend on where they happen to lie. */
 static void put_means(double *to, int n, int64_t start_ns,
 		      const struct incise_delay_point *points, int n_points)
 {
@@ -154,7 +154,7 @@ double delay_grid_at(const double *column, int i, double shift)
 	       (u + 1) * u * (u - 1) / 6 * p[2];
 }
 
-/* Where values are missing: rows that see them are no good, and 0 stands for them. */
+/* Missing values become 0, and rows that a filter reaches from them are not good. */
 static void mark_good(struct delay_grid *grid)
 {
 	double *streams[] = {grid->motion, grid->other};
@@ -176,7 +176,7 @@ static void mark_good(struct delay_grid *grid)
 
 /*
  * Derivative of a cubic through 2·SPEED_REACH + 1 steps about each (Savitzky and Golay, Anal.
- * Chem. 36, 1964): what it knows of slow motion is exact, so that viscosity is not mistaken.
+ * Chem. 36, 1964): it is exact for slow motion, so that viscosity is not mistaken.
  */
 static void make_speed(struct delay_grid *grid)
 {

@@ -153,7 +153,7 @@ static void compare(struct work *w, const struct incise_redundancy_limits *limit
 		squares += (w->depth[i] - mean) * (w->depth[i] - mean);
 	r->trend = r->trend_u = NAN;
 	line.zero = r->bias_mm;
-	/* A trend needs a way to go. */
+	/* A trend needs a range of depths. */
 	if (r->depth_high_mm - r->depth_low_mm > 1 &&
 	    !incise_robust_line(w->depth, w->off, w->n, 0, &line, w->wild)) {
 		r->trend = line.slope;
@@ -161,7 +161,7 @@ static void compare(struct work *w, const struct incise_redundancy_limits *limit
 		line.slope = 0;
 	}
 	find_places(w, &line, r);
-	/* find_places() has left what lies off the trend */
+	/* find_places() has left the distances from the trend there */
 	r->bias_u_mm = mean_u(w, w->scratch + w->n, NULL);
 	/* as if the slope were a difference of means at one sd to each side */
 	if (isfinite(r->trend))

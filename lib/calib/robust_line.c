@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A straight line beside outliers; see robust_line.h. Deterministic: with many points the
+ * A straight line in spite of outliers; see robust_line.h. Deterministic: with many points the
  * lines tried are a fixed choice.
  */
 #include <errno.h>
@@ -29,8 +29,8 @@ static double far_of(int freedom)
 }
 
 /*
- * Of few points, half of them always lie on some line by luck, and make the others look far:
- * there three quarters are to be near it.
+ * Half of few points always lie on some line by luck, and make the others look far: so three
+ * quarters are to be near it.
  */
 static int quantile(int n)
 {
@@ -64,7 +64,7 @@ static void try_line(const double *x, const double *y, int n, int i, int j,
 	}
 }
 
-/* Least squares of the points that are no outliers; false: they do not carry a line. */
+/* Least squares of the points that are no outliers; false: they have no line. */
 static bool least_squares(const double *x, const double *y, int n, const bool *outlier,
 			  struct robust_line *line, double *far)
 {

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A straight line y = zero + slope x that nearly half of the points (of less than 20 points:
- * a quarter) cannot bend: least median
- * of squares (P. J. Rousseeuw, J. Am. Stat. Assoc. 79, 1984), then least squares of what lies
- * near it.
+ * A straight line y = zero + slope x that nearly half of the points (a quarter of fewer than
+ * 20) cannot bend: least median of squares (P. J. Rousseeuw, J. Am. Stat. Assoc. 79, 1984),
+ * then least squares of the points near it.
  */
 #ifndef INCISE_ROBUST_LINE_H
 #define INCISE_ROBUST_LINE_H
@@ -16,8 +15,8 @@ struct robust_line {
 };
 
 /*
- * Fit. @sd_min: points are not outliers for less than four of it. @outlier: of n points, set
- * for those that are far off. Returns 0; -EDOM (all x alike), -ENOMEM.
+ * Fit. @sd_min: points within four of it are no outliers. @outlier: set for those of the n
+ * points that are far off. Returns 0; -EDOM (all x alike), -ENOMEM.
  */
 int incise_robust_line(const double *x, const double *y, int n, double sd_min,
 		       struct robust_line *line, bool *outlier);
