@@ -15,7 +15,7 @@ static inline int ascending(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* Of n ≥ 1 values, which are sorted. */
+/* The median of n ≥ 1 values, which are sorted. */
 static inline double median(double *values, int n)
 {
 	qsort(values, (size_t)n, sizeof(*values), ascending);

@@ -152,8 +152,8 @@ static void make_printable(char *text)
 }
 
 /*
- * What is wrong with a record, as words behind the name of its key; NULL: nothing. The same
- * for what a file says and for what is to be appended.
+ * The fault of a record, as words behind the name of its key; NULL: none. For records of a
+ * file and for one to be appended.
  */
 static const char *fault(const struct incise_calibration_record *record)
 {
@@ -171,7 +171,7 @@ static const char *fault(const struct incise_calibration_record *record)
 
 		if (!key)
 			return "values: key: expected a key of calibration.conf";
-		/* What failed may be far out, and is kept to be read. */
+		/* A failed calibration may be far out, and is kept to be read. */
 		if (!isfinite(value->left) ||
 		    (record->pass && !in_range(key, value->left)))
 			return "values: left: expected a number in the range of its key";
@@ -190,7 +190,7 @@ static const char *fault(const struct incise_calibration_record *record)
 	return NULL;
 }
 
-/* libconfig gives a group in a list the line before it: its first key tells better. */
+/* libconfig gives a group in a list the line before it; its first key has the right one. */
 static int entry_error(const config_setting_t *entry, const char *path, const char *what,
 		       struct incise_error *err)
 {
@@ -478,7 +478,7 @@ static const struct incise_calibration_record *origin(const struct file_content 
 	return NULL;
 }
 
-/* "# mV/N, U = 2.4 (k = 2), 2026-11-21": behind a key. Two signs: it is written anew. */
+/* "# mV/N, U = 2.4 (k = 2), 2026-11-21": behind a key. Two signs: it is rewritten. */
 static void put_origin(const struct file_content *file, const struct known_key *key,
 		       double value, FILE *out)
 {

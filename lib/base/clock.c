@@ -9,9 +9,9 @@
 #include "monotonic.h"
 
 struct incise_clock {
-	bool real, paced, begun;
-	int64_t now_ns;	  /* of one that is not real */
-	int64_t ahead_ns; /* of a paced one that has begun: CLOCK_MONOTONIC less its time */
+	bool real, paced, started;
+	int64_t now_ns; /* of one that is not real */
+	int64_t ahead_ns; /* of a paced one that has started: CLOCK_MONOTONIC less its time */
 	int64_t lag_ns;
 };
 
@@ -77,9 +77,9 @@ static int keep_pace(struct incise_clock *clock, int64_t t_ns)
 	int64_t due_ns;
 	int rc;
 
-	if (!clock->begun)
+	if (!clock->started)
 		clock->ahead_ns = incise_monotonic_ns() - clock->now_ns;
-	clock->begun = true;
+	clock->started = true;
 	due_ns = t_ns + clock->ahead_ns;
 	rc = sleep_until(due_ns);
 	if (!rc)

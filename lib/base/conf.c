@@ -34,7 +34,7 @@ static void setting_name(const config_setting_t *setting, const char *key, char 
 		snprintf(name + length, size - length, "%s%s", length ? "." : "", key);
 }
 
-/* What a person wrote, as far as one line can show it. */
+/* A setting's value as it was written, as far as one line can show it. */
 static void setting_value(const config_setting_t *setting, char *text, size_t size)
 {
 	switch (config_setting_type(setting)) {
@@ -150,7 +150,7 @@ static int unreadable(const char *path, int code, const char *why,
 				path, why);
 }
 
-/* What is in the file, to be freed. */
+/* The content of a file, to be freed. */
 static int read_all(const char *path, char **text, size_t *size, struct incise_error *err)
 {
 	FILE *file = fopen(path, "re");
@@ -188,7 +188,7 @@ int incise_conf_read(config_t *config, const char *path, struct incise_error *er
 	rc = read_all(path, &text, &size, err);
 	if (rc)
 		return rc;
-	/* Where a disk fails to read the parser would end the process; memory does not. */
+	/* The parser ends the process where a disk fails to read; memory does not fail. */
 	stream = fmemopen(text, size, "r");
 	line = stream ? include_line(stream) : 0;
 	if (line)
@@ -207,8 +207,8 @@ int incise_conf_read(config_t *config, const char *path, struct incise_error *er
 }
 
 /*
- * How many characters two keys begin with alike, when they are one quantity in two units
- * ("radius_cm" and "radius_mm"); else 0.
+ * The number of characters that two keys have in common at their start, if they are one
+ * quantity in two units ("radius_cm" and "radius_mm"); else 0.
  */
 static size_t other_unit(const char *a, const char *b)
 {

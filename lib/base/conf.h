@@ -44,7 +44,7 @@ int incise_conf_numbers(const config_setting_t *group, const char *path, const c
 int incise_conf_direction(const config_setting_t *group, const char *path,
 			  const char *key, double value[3], struct incise_error *err);
 
-/* Fail when a key that must be there is not. */
+/* Fail if a required key is missing. */
 int incise_conf_need(const config_setting_t *group, const char *path, const char *key,
 		     struct incise_error *err);
 

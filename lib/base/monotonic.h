@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The time that all stamps are of: CLOCK_MONOTONIC, in ns. Real-time safe (vDSO). What follows
- * a rig's clock, which may be simulated, asks incise_clock_now().
+ * The time of all timestamps: CLOCK_MONOTONIC, in ns. Real-time safe (vDSO). Code that
+ * follows a rig's clock, which may be simulated, calls incise_clock_now().
  */
 #ifndef INCISE_BASE_MONOTONIC_H
 #define INCISE_BASE_MONOTONIC_H

@@ -11,18 +11,18 @@
 
 int incise_ring_init(struct incise_ring *ring, size_t size, size_t count)
 {
-	uint64_t room = 1;
+	uint64_t capacity = 1;
 
 	memset(ring, 0, sizeof(*ring));
 	if (!size || !count || count > COUNT_MAX)
 		return -EINVAL;
-	while (room < count)
-		room *= 2;
-	if (size > SIZE_MAX / room)
+	while (capacity < count)
+		capacity *= 2;
+	if (size > SIZE_MAX / capacity)
 		return -ENOMEM;
 	ring->size = size;
-	ring->room = room;
-	ring->records = calloc(room, size);
+	ring->capacity = capacity;
+	ring->records = calloc(capacity, size);
 	return ring->records ? 0 : -ENOMEM;
 }
 
@@ -37,11 +37,11 @@ bool incise_ring_put(struct incise_ring *ring, const void *record)
 	uint64_t head = atomic_load_explicit(&ring->head, memory_order_relaxed);
 	uint64_t tail = atomic_load_explicit(&ring->tail, memory_order_acquire);
 
-	if (head - tail == ring->room) {
+	if (head - tail == ring->capacity) {
 		atomic_fetch_add_explicit(&ring->dropped, 1, memory_order_relaxed);
 		return false;
 	}
-	memcpy(ring->records + (head & (ring->room - 1)) * ring->size, record,
+	memcpy(ring->records + (head & (ring->capacity - 1)) * ring->size, record,
 	       ring->size);
 	atomic_store_explicit(&ring->head, head + 1, memory_order_release);
 	return true;
@@ -55,7 +55,7 @@ int incise_ring_take(struct incise_ring *ring, void *records, int n)
 
 	for (; taken < n && tail != head; taken++, tail++)
 		memcpy((unsigned char *)records + (size_t)taken * ring->size,
-		       ring->records + (tail & (ring->room - 1)) * ring->size,
+		       ring->records + (tail & (ring->capacity - 1)) * ring->size,
 		       ring->size);
 	atomic_store_explicit(&ring->tail, tail, memory_order_release);
 	return taken;

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A ring between one thread that writes records and one that reads them, so that whoever reads
- * neither waits nor makes a system call.
+ * A ring between one thread that writes records and one that reads them; neither waits nor
+ * makes a system call.
  *
  *   written: one thread        taken: another
  *        |                        |
  *        v  head                  v  tail          head - tail records wait
  *   [  ][r9][r8][r7][r6][  ][  ][  ]               full: the new one is dropped and counted
  *
- * All memory is there from the start. What is full drops what is new: only the reader may move
+ * All memory is there from the start. A full ring drops new records: only the reader may move
  * the tail.
  */
 #ifndef INCISE_BASE_RING_H
@@ -21,8 +21,8 @@
 #include <stdint.h>
 
 struct incise_ring {
-	size_t size;   /* of a record, bytes */
-	uint64_t room; /* records: a power of 2 */
+	size_t size;	   /* of a record, bytes */
+	uint64_t capacity; /* records: a power of 2 */
 	unsigned char *records;
 	/* Far apart, so that the two threads do not fight for a line of the cache. */
 	_Alignas(64) _Atomic uint64_t head;
@@ -34,13 +34,13 @@ struct incise_ring {
 int incise_ring_init(struct incise_ring *ring, size_t size, size_t count);
 void incise_ring_free(struct incise_ring *ring);
 
-/* The writer's: false, and one more dropped, when it is full. Real-time safe. */
+/* For the writer: false, and one more dropped, when it is full. Real-time safe. */
 bool incise_ring_put(struct incise_ring *ring, const void *record) INCISE_REALTIME;
 
-/* The reader's: how many of at most @n were taken, oldest first. Real-time safe. */
+/* For the reader: take at most @n, oldest first; returns their number. Real-time safe. */
 int incise_ring_take(struct incise_ring *ring, void *records, int n) INCISE_REALTIME;
 
-/* Records that found no room, so far; any thread's. */
+/* Records dropped so far; for any thread. */
 uint64_t incise_ring_dropped(const struct incise_ring *ring);
 
 #endif

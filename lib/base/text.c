@@ -14,7 +14,7 @@
 
 int text_open(struct text *text, const char *path, struct incise_error *err)
 {
-	size_t room = 1 << 16, size = 0, got;
+	size_t capacity = 1 << 16, size = 0, got;
 	struct stat st;
 	FILE *stream;
 	int rc = 0;
@@ -26,20 +26,21 @@ int text_open(struct text *text, const char *path, struct incise_error *err)
 	stream = fopen(path, "re");
 	if (!stream)
 		return incise_error_set(err, errno, "%s: %s", path, strerror(errno));
-	text->data = malloc(room + 1);
-	while (text->data && (got = fread(text->data + size, 1, room - size, stream))) {
+	text->data = malloc(capacity + 1);
+	while (text->data &&
+	       (got = fread(text->data + size, 1, capacity - size, stream))) {
 		char *more;
 
 		size += got;
-		if (size < room)
+		if (size < capacity)
 			continue;
 		if (size > TEXT_SIZE_MAX) {
 			rc = incise_error_set(err, EFBIG, "%s: larger than %zu MB", path,
 					      TEXT_SIZE_MAX >> 20);
 			break;
 		}
-		room *= 2;
-		more = realloc(text->data, room + 1);
+		capacity *= 2;
+		more = realloc(text->data, capacity + 1);
 		if (!more)
 			free(text->data);
 		text->data = more;
@@ -97,7 +98,7 @@ static bool is_digit(char c)
 	return c >= '0' && c <= '9';
 }
 
-/* What the fast way cannot round correctly. The word was found to be a number. */
+/* For numbers that the fast way cannot round correctly. */
 static bool slow_number(const char *word, size_t length, double *value)
 {
 	struct incise_c_locale locale;

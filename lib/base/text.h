@@ -31,7 +31,7 @@ size_t text_word(struct text *text, const char **word);
 /* Go to the next line; false at the end of the file. */
 bool text_next_line(struct text *text);
 
-/* The whole word is a finite decimal number: correctly rounded. */
+/* The whole word is a finite decimal number, read correctly rounded. */
 bool text_number(const char *word, size_t length, double *value);
 
 /* The word's begin is a whole number of at most ten digits; returns what follows or NULL. */

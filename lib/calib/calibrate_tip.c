@@ -347,9 +347,9 @@ static int tip_block(const struct tip_poses *poses, int n)
 }
 
 /*
- * Factor by which a variance from sums over blocks is too small: borders between blocks cut off half
- * a time each (Flegal and Jones, Ann. Stat. 38, 2010), six unknowns are two poses' worth of
- * equations, and few blocks have Student's tails, which k = 2 is to hold too.
+ * Factor by which a variance from sums over blocks is too small: borders between blocks cut
+ * off half a time each (Flegal and Jones, Ann. Stat. 38, 2010), six unknowns are two poses'
+ * worth of equations, and few blocks have Student's tails, which k = 2 is to hold too.
  */
 static double correction(int block, int blocks)
 {

@@ -38,7 +38,7 @@ struct incise_delay_point {
 	double value; /**< not finite: none, as of a force that is clipped */
 };
 
-/** How the other stream follows from the motion. */
+/** The relation of the other stream to the motion. */
 enum incise_delay_relation {
 	INCISE_DELAY_ALIKE, /**< the same depth, scaled, maybe not below some depth */
 	INCISE_DELAY_FORCE, /**< force of something that is pressed on */

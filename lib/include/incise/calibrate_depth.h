@@ -40,7 +40,7 @@ struct incise_depth_part {
 	double sensitivity; /**< change of mm_px per unit */
 };
 
-/** What came out; as far as it got, when it is refused. */
+/** The result; as far as it got, if it is refused. */
 struct incise_depth_fit {
 	double mm_px, u_mm_px;
 	double full_px, u_full_px; /**< exposed length at depth 0 */
@@ -105,7 +105,7 @@ INCISE_API int incise_calibrate_depth_line(const struct incise_depth_lengths *pa
 #define INCISE_BOARD_VIEWS 40
 #define INCISE_BOARD_CORNERS 400 /**< of one view */
 
-/** What the camera is: Brown's lens (1966) before a pinhole, by OpenCV's names. */
+/** The camera: Brown's lens (1966) before a pinhole, by OpenCV's names. */
 struct incise_board_lens {
 	/* px; pixel (0, 0) covers 0 … 1: OpenCV's cx and cy are less by a half. */
 	double fx, fy, cx, cy;
@@ -127,7 +127,7 @@ struct incise_board_views {
 	int width, height;	/**< of the picture */
 };
 
-/** What the views of a board say: lens, plane and scale. u: standard uncertainty. */
+/** The result of views of a board: lens, plane and scale. u: standard uncertainty. */
 struct incise_board_fit {
 	struct incise_board_lens lens, u_lens;
 	double mm_px, u_mm_px;	      /**< over the axis from end to end */

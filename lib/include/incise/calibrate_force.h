@@ -29,7 +29,7 @@ struct incise_calibrate_force_pair {
 	bool descending;   /**< reached by taking weight off */
 };
 
-/** What is known beside the pairs; incise_calibrate_force_init() gives the defaults. */
+/** Settings beside the pairs; incise_calibrate_force_init() gives the defaults. */
 struct incise_calibrate_force_setup {
 	double gravity_m_s2,
 		gravity_u_m_s2;	       /**< 9.80665, and 0.0173 for anywhere on Earth */
@@ -48,7 +48,7 @@ struct incise_calibrate_force_setup {
 	double tolerance;    /**< 0.05 of it */
 };
 
-/** What became of a pair. */
+/** The use of a pair. */
 enum incise_calibrate_force_state {
 	INCISE_CALIBRATE_FORCE_USED,
 	INCISE_CALIBRATE_FORCE_SATURATED,
@@ -68,7 +68,7 @@ struct incise_calibrate_force_part {
 /** Lines that a budget has at most. */
 #define INCISE_CALIBRATE_FORCE_PARTS 6
 
-/** What the pairs say: the line, what it holds for, and what makes its uncertainty. */
+/** The result: the line, its range, and the budget of its uncertainty. */
 struct incise_calibrate_force {
 	double sensitivity_mV_N, sensitivity_u_mV_N; /**< U is twice that (k = 2) */
 	double zero_mV, zero_u_mV;
@@ -76,7 +76,7 @@ struct incise_calibrate_force {
 	double residual_sd_mV; /**< of the pairs used, about the line */
 	double scatter_sd_mV;  /**< of readings of one load; what type A rests on */
 	int freedom;	       /**< its degrees of freedom */
-	/** How much further loads lie from the line than their uncertainty explains; it
+	/** Ratio of the loads' distances from the line to those that their uncertainty explains; it
 	 * widens u where it is above what chance gives in 1 of 100, else it is 1. */
 	double misfit;
 	/* In percent of full scale, which is the largest load used; NAN: not stated. */

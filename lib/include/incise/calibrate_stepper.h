@@ -33,13 +33,13 @@
 
 INCISE_BEGIN_DECLS
 
-/** Where the actuator was told to be, and what the sensor said when it had come to rest. */
+/** A commanded position, and the sensor's reading at rest there. */
 struct incise_calibrate_stepper_point {
 	double position_mm; /**< counted; -1e4 … 1e4 */
 	double force_N;	    /**< -1e4 … 1e4 */
 };
 
-/** What is known beside that; incise_calibrate_stepper_init() gives the defaults. */
+/** Settings beside the points; incise_calibrate_stepper_init() gives the defaults. */
 struct incise_calibrate_stepper_setup {
 	double step_mm;	 /**< one microstep; 0.000625 */
 	double sensor_u; /**< standard uncertainty of the sensor's sensitivity, relative;
@@ -51,7 +51,7 @@ struct incise_calibrate_stepper_setup {
 	double linearity;     /**< largest that passes, percent of full scale; 2 */
 };
 
-/** What became of a point. */
+/** The use of a point. */
 enum incise_calibrate_stepper_state {
 	INCISE_CALIBRATE_STEPPER_USED,
 	INCISE_CALIBRATE_STEPPER_TURN, /**< behind a turn: not on a branch's line yet */
@@ -71,7 +71,7 @@ struct incise_calibrate_stepper_part {
 /** Lines that a budget has. */
 #define INCISE_CALIBRATE_STEPPER_PARTS 3
 
-/** What the strokes say of the actuator. */
+/** The result. */
 struct incise_calibrate_stepper {
 	double N_step, N_step_u; /**< force per microstep; U is twice that (k = 2) */
 	double N_mm,

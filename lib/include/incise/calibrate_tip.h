@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Where the tip of the blade is in the frame of the tracker's sensor, from poses of a tool
+ * The place of the blade's tip in the frame of the tracker's sensor, from poses of a tool
  * that turns about its tip in a dimple (pivot calibration). Part of libincise-learn.
  *
  *        sensor  p_i, R_i          p_i + R_i t = c   for all poses i
@@ -9,7 +9,7 @@
  *             \ | /                Yaniv, Which pivot calibration?, SPIE 9415 (2015)
  *     ─────────`o'──────── c, the dimple
  *
- * What noise makes of it: a position noise of s mm and an orientation noise of a rad move a
+ * The effect of noise: a position noise of s mm and an orientation noise of a rad move a
  * pose's equations by s along the tool, and by hypot(s, a |t|) across it: 0.02 mm and
  * 0.025 degrees are 0.03 mm at 50 mm and 0.05 mm at 100 mm. The tip's standard uncertainty
  * across the tool is that divided by sin(cone / 4) √N, roughly: 0.1 mm (k = 2) need N = 16
@@ -37,7 +37,7 @@ struct incise_tip_pose {
 	double quaternion[4]; /**< w first; turns the sensor's frame into the tracker's */
 };
 
-/** What came out; as far as it got, when it is refused. */
+/** The result; as far as it got, if it is refused. */
 struct incise_tip_fit {
 	double tip_mm[3];     /**< t, in the sensor's frame */
 	double covariance[9]; /**< of it, mm², row by row */

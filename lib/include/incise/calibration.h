@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What turns raw readings into millimetres and newtons. `incise calibrate` measures it;
- * without a file the paper's figures are taken.
+ * Coefficients between raw readings and millimetres and newtons. `incise calibrate` measures
+ * them; without a file the paper's figures are taken.
  */
 #ifndef INCISE_CALIBRATION_H
 #define INCISE_CALIBRATION_H
@@ -47,7 +47,7 @@ INCISE_API int incise_calibration_load(const char *path,
 				       struct incise_calibration *calibration,
 				       struct incise_error *err);
 
-/** What is in force under a key of the history; NAN: not known, or there is no such key. */
+/** The value in force of a key of the history; NAN: unknown, or there is no such key. */
 INCISE_API double incise_calibration_get(const struct incise_calibration *calibration,
 					 const char *key);
 

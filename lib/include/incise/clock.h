@@ -29,7 +29,7 @@ struct incise_clock;
 INCISE_API struct incise_clock *incise_clock_new_real(void);
 
 /**
- * A clock that stands still until it is waited upon.
+ * A clock that stands still until someone waits for it.
  *
  * @param start_ns the first value of incise_clock_now(), ns
  * @return clock, to be freed with incise_clock_free(); NULL with errno ENOMEM.
@@ -52,12 +52,12 @@ INCISE_API void incise_clock_free(struct incise_clock *clock);
 /** Nanoseconds since an arbitrary start. Real-time safe (vDSO). */
 INCISE_API int64_t incise_clock_now(const struct incise_clock *clock) INCISE_REALTIME;
 
-/** Whether time passes by itself. Real-time safe. */
+/** True if time passes by itself. Real-time safe. */
 INCISE_API bool incise_clock_is_real(const struct incise_clock *clock) INCISE_REALTIME;
 
 /**
- * How far a paced clock was behind CLOCK_MONOTONIC when its last wait ended, ns; 0 for the
- * others. Real-time safe.
+ * The time by which a paced clock was behind CLOCK_MONOTONIC when its last wait ended, ns; 0
+ * for the others. Real-time safe.
  */
 INCISE_API int64_t incise_clock_lag_ns(const struct incise_clock *clock) INCISE_REALTIME;
 

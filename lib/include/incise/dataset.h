@@ -17,11 +17,11 @@ struct incise_dataset;
 
 /**
  * Read the named columns of a CSV file. Fields may be quoted; lines may end in CR LF; a
- * line that starts with '#' and an empty line are passed over.
+ * line that starts with '#' and an empty line are ignored.
  *
  * @param path    file, or "-" for standard input
  * @param columns n names; "" matches nothing
- * @param group   name of the column whose text tells which cut a row belongs to, or NULL
+ * @param group   name of the column whose text names the cut that a row belongs to, or NULL
  * @return dataset with the n columns in the order asked for, to be freed with
  *         incise_dataset_free(); NULL with errno of fopen(3), EINVAL (a field that is no
  *         finite number, a row with too few fields: line and column are named; a column
@@ -36,7 +36,7 @@ INCISE_API struct incise_dataset *incise_dataset_read(const char *path,
 /** NULL is accepted. */
 INCISE_API void incise_dataset_free(struct incise_dataset *data);
 
-/** How many rows there are. */
+/** Number of rows. */
 INCISE_API size_t incise_dataset_rows(const struct incise_dataset *data);
 
 /** Row @row: one value per column, in the order asked for; owned by the dataset. */

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * The fuzzy model in integers: what the 1 kHz loop evaluates, and what a kernel or a
- * microcontroller can. A model is compiled to a blob with a certified bound of its
+ * The fuzzy model in integers, for the 1 kHz loop, a kernel or a microcontroller. A model is compiled to a blob with a certified bound of its
  * error; the blob is the file MODEL.fx, byte for byte. Evaluation uses 64-bit integers
  * only: no float, no libc, no allocation.
  *
@@ -36,7 +35,7 @@ INCISE_BEGIN_DECLS
 
 #define INCISE_FIXED_ONE (1 << 16) /**< 1.0 as input or output */
 
-/** How a blob computes its output; see lib/fixed. */
+/** The arithmetic of a blob; see lib/fixed. */
 enum incise_fixed_arithmetic {
 	INCISE_FIXED_DIRECT, /**< exponentials by polynomial, one division */
 	INCISE_FIXED_TABLE, /**< tables of normalised weights: no exponential, no division */
@@ -95,7 +94,7 @@ INCISE_API int32_t incise_fixed_eval(const struct incise_fixed *fx,
 #ifndef __KERNEL__
 struct incise_model;
 
-/** What to compile to. */
+/** The form to compile to. */
 struct incise_fixed_options {
 	/** Largest error, output's unit: the cheapest arithmetic within it is taken; 0: none. */
 	double budget;

@@ -54,7 +54,7 @@ enum incise_mf_type {
 	INCISE_MF_SIG, /**< sigmf [a c]: 1/(1 + exp(-a(x-c))); a may be negative or 0 */
 };
 
-/** How the degrees of a rule's inputs make its firing strength. */
+/** The operation that makes a rule's firing strength of its inputs' degrees. */
 enum incise_and_method {
 	INCISE_AND_PROD, /**< their product */
 	INCISE_AND_MIN,	 /**< the least of them */
@@ -73,7 +73,7 @@ struct incise_variable {
 	double min, max; /**< support; min < max, both finite */
 };
 
-/** What an evaluation says beside its value. */
+/** Flags of an evaluation. */
 enum incise_model_flag {
 	/**
 	 * An input lay outside its range, or was NaN; or no rule fires there (all firing
@@ -134,11 +134,11 @@ INCISE_API void incise_model_free(struct incise_model *model);
 
 /** Its name in the .fis file; owned by the model. */
 INCISE_API const char *incise_model_name(const struct incise_model *model);
-/** How many inputs it has, 1 … INCISE_MODEL_INPUTS_MAX. */
+/** Number of inputs, 1 … INCISE_MODEL_INPUTS_MAX. */
 INCISE_API int incise_model_n_inputs(const struct incise_model *model);
-/** How many rules it has. */
+/** Number of rules. */
 INCISE_API int incise_model_n_rules(const struct incise_model *model);
-/** How many membership functions input @input has. */
+/** Number of membership functions of input @input. */
 INCISE_API int incise_model_n_mfs(const struct incise_model *model, int input);
 
 /** Input @input, 0 … n_inputs-1; owned by the model. */
@@ -156,12 +156,12 @@ INCISE_API const struct incise_mf *incise_model_mf(const struct incise_model *mo
  * Replace the parameters of a membership function; kind and name stay.
  *
  * @param p as many as incise_mf_n_params() says
- * @return 0, or -EINVAL when they do not make such a function; see incise_mf_type.
+ * @return 0, or -EINVAL if they do not make such a function; see incise_mf_type.
  */
 INCISE_API int incise_model_set_mf(struct incise_model *model, int input, int mf,
 				   const double p[4]);
 
-/** How the memberships of a rule are joined. */
+/** The operation that joins the degrees of a rule. */
 INCISE_API enum incise_and_method incise_model_and_method(
 	const struct incise_model *model);
 
@@ -186,15 +186,15 @@ INCISE_API int incise_model_set_consequent(struct incise_model *model, int rule,
 					   const double *p);
 
 /**
- * Whether inputs outside their range are taken as its nearest end (default on). Off, the
- * consequents extrapolate linearly.
+ * Take inputs outside their range as its nearest end (default on). Off, the consequents
+ * extrapolate linearly.
  */
 INCISE_API void incise_model_set_clamp(struct incise_model *model, bool clamp);
 
 /** Degree of membership in [0, 1]; of NaN it is 0. Real-time safe. */
 INCISE_API double incise_mf_eval(const struct incise_mf *mf, double x);
 
-/** How many of incise_mf.p a kind uses: 2 to 4. */
+/** Number of parameters in incise_mf.p that a kind uses: 2 to 4. */
 INCISE_API int incise_mf_n_params(enum incise_mf_type type);
 
 /** Name of a kind as .fis files spell it, e.g. "gaussmf". */

@@ -24,9 +24,9 @@
  * Control Engineering Practice 20, 2012; there the filter for jerk takes a/j, for motions in
  * which +a does not turn to -a at once, as it may here). It costs (N-1)/2 ticks of delay.
  *
- * What holds, whatever the targets are and whenever they come, with v, a, j, T of the limits
+ * For any targets at any time, these inequalities hold, with v, a, j, T of the limits
  * in steps and seconds, P(k) = incise_profile_slot.to of tick k and t(i) the time of the
- * i-th step in ns (ticks k·tick_ns + incise_profile_step_ns()); halt and init begin anew:
+ * i-th step in ns (ticks k·tick_ns + incise_profile_step_ns()); halt and init restart:
  *
  *   |P(k) - P(k-1)|                            ≤ v T
  *   |P(k) - 2 P(k-1) + P(k-2)|                 ≤ a T²
@@ -64,7 +64,7 @@ INCISE_BEGIN_DECLS
 #define INCISE_PROFILE_POSITION_MAX 1000000000 /**< steps, to either side */
 #define INCISE_PROFILE_AVERAGE_MAX 256	       /**< ticks */
 
-/** What a motion keeps within. */
+/** The limits of a motion. */
 struct incise_profile_limits {
 	uint32_t tick_ns;      /**< INCISE_PROFILE_TICK_MIN_NS … _MAX_NS */
 	uint32_t velocity;     /**< steps/s, 1 … INCISE_PROFILE_VELOCITY_MAX */
@@ -74,7 +74,7 @@ struct incise_profile_limits {
 	uint64_t jerk;	       /**< steps/s³; 0: not limited */
 };
 
-/** What a target is. */
+/** The kind of a target. */
 enum incise_profile_mode {
 	INCISE_PROFILE_POSITION, /**< target in steps */
 	INCISE_PROFILE_VELOCITY, /**< target in steps/s */
@@ -110,7 +110,7 @@ struct incise_profile {
 	int64_t history[INCISE_PROFILE_AVERAGE_MAX];
 };
 
-/** What happens within one tick. */
+/** The motion within one tick. */
 struct incise_profile_slot {
 	int64_t from, to; /**< position at begin and end, 2^-32 steps */
 	uint64_t first;	  /**< private: way to the first step, 2^-32 steps */
@@ -159,7 +159,8 @@ INCISE_API void incise_profile_tick(struct incise_profile *profile,
 				    struct incise_profile_slot *slot);
 
 /**
- * When a step of a slot is due: ns from the begin of its tick, 1 … tick_ns, rounded up.
+ * The time at which a step of a slot is due: ns from the start of its tick, 1 … tick_ns,
+ * rounded up.
  * Ascending with @k, and equal only where steps are less than 1 ns apart, which no limits do.
  *
  * @param k 0 … slot->n - 1; beyond: clamped; tick_ns where the slot has no steps
@@ -168,8 +169,8 @@ INCISE_API uint32_t incise_profile_step_ns(const struct incise_profile_slot *slo
 					   int32_t k);
 
 /**
- * Whether it rests, and will until there is a new target. It says so N ticks after the last
- * motion of the ramp at the earliest; incise_profile_tick() is cheap from then on.
+ * True while it rests, and will until there is a new target: N ticks after the last motion of
+ * the ramp at the earliest; incise_profile_tick() is cheap from then on.
  */
 INCISE_API bool incise_profile_resting(const struct incise_profile *profile);
 

@@ -15,7 +15,7 @@
 
 INCISE_BEGIN_DECLS
 
-/** What is borne. */
+/** Differences that are tolerated. */
 struct incise_redundancy_limits {
 	/** 0.5 mm: four pixels; 10 ms at 50 mm/s make as much. */
 	double bias_mm;

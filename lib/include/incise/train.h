@@ -34,7 +34,7 @@ struct incise_pairs {
 typedef void (*incise_train_progress)(void *user, int epoch, double train_rmse,
 				      double check_rmse);
 
-/** How to train; incise_train_options_init() fills in the defaults. */
+/** Options of training; incise_train_options_init() fills in the defaults. */
 struct incise_train_options {
 	int epochs;  /**< at most, 1 …; default 80, the paper's */
 	double step; /**< initial step of the premises, default 0.01; classic only */
@@ -61,13 +61,13 @@ struct incise_train_options {
 	/** Premises to start from: those given, and others near them; default 3. */
 	int starts;
 	/**
-	 * Where to leave the predictive standard deviation, to be freed with
+	 * Gets the predictive standard deviation, to be freed with
 	 * incise_uncertainty_free(), or NULL. On error nothing is left there.
 	 */
 	struct incise_uncertainty **uncertainty;
 };
 
-/** What training did. */
+/** Report of a training. */
 struct incise_train_report {
 	int epochs;	/**< run in the final training */
 	int best_epoch; /**< from 1: the one whose parameters were kept */

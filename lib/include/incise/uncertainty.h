@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * How far a model's prediction may be off: the standard deviation of an output that has
+ * The uncertainty of a model's prediction: the standard deviation of an output that has
  * not been seen, of Bayesian linear consequents,
  *
  *   sd(x)² = noise² (1 + |R⁻ᵀφ(x)|²)
