@@ -7,26 +7,9 @@
 #include <string.h>
 #include "../../base/vector.h"
 #include "blade.h"
-#include "force_near.h"
-#include "../schema.h"
 
 /* Below this a series is closer than 1e-10, and quicker than sines. */
 #define SMALL_ANGLE 0.1
-
-/* What the gains of the loop's filter are made for. */
-static double nominal_hz(struct incise_recording *recording)
-{
-	sqlite3_stmt *stmt = NULL;
-	double hz = NAN;
-
-	if (sqlite3_prepare_v2(recording->db,
-			       "SELECT value FROM meta WHERE key = 'tracker_hz'", -1,
-			       &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		hz = sqlite3_column_double(stmt, 0);
-	sqlite3_finalize(stmt);
-	return hz > 0 ? hz : 120;
-}
 
 static double dot4(const double a[4], const double b[4])
 {
@@ -156,13 +139,17 @@ static int more_depth(struct incise_blade *blade, struct incise_error *err)
 int incise_blade_open(struct incise_blade *blade, struct incise_recording *recording,
 		      const struct incise_calibration *given, struct incise_error *err)
 {
-	int rc;
+	double rate_hz;
+	int rc = incise_recording_number(recording, "tracker_hz", &rate_hz, err);
 
 	*blade = (struct incise_blade){0};
 	memcpy(blade->tip_mm, recording->meta.tip_mm, sizeof(blade->tip_mm));
 	for (int i = 0; i < 2; i++)
 		blade->pose[i].t_ns = blade->deep[i].t_ns = INCISE_TIME_NONE;
-	if (incise_smooth_init(&blade->smooth, nominal_hz(recording)))
+	if (rc)
+		return rc;
+	/* The gains of the loop's filter are made for the nominal rate. */
+	if (incise_smooth_init(&blade->smooth, rate_hz > 0 ? rate_hz : 120))
 		return incise_error_set(err, ENOMEM, "out of memory");
 	rc = incise_rows_open(&blade->tracker, recording, "tracker",
 			      recording->form < 2
@@ -176,7 +163,7 @@ int incise_blade_open(struct incise_blade *blade, struct incise_recording *recor
 		rc = incise_rows_open_joined(
 			&blade->depth, recording, "depth", "tracker",
 			"depth.seq, depth.t_ns, depth_mm, x_mm, y_mm, z_mm, qw, qx, qy, qz",
-			"iirrrrrrrr", recording->depth_rows, err);
+			"iirrrrrrrr", recording->meta.depth, err);
 	if (!rc && given) {
 		incise_rows_calibrate(&blade->tracker, given);
 		incise_rows_calibrate(&blade->depth, given);
@@ -249,8 +236,8 @@ int incise_blade_at(struct incise_blade *blade, int64_t t_ns, double t_sd_s,
 		rc = more_depth(blade, err);
 	if (rc < 0)
 		return rc;
-	s = incise_share(a->t_ns, b->t_ns, t_ns);
-	e = incise_share(c->t_ns, d->t_ns, t_ns);
+	s = incise_row_share(a->t_ns, b->t_ns, t_ns);
+	e = incise_row_share(c->t_ns, d->t_ns, t_ns);
 	time_s = sqrt(d->t_sd_s * d->t_sd_s + t_sd_s * t_sd_s);
 	for (int i = 0; i < 3; i++)
 		value->position_mm[i] = mix(a->position_mm[i], b->position_mm[i], s);

@@ -4,7 +4,6 @@
  */
 #include <math.h>
 #include "camera_near.h"
-#include "force_near.h"
 #include "../schema.h"
 
 int incise_camera_near_any(struct incise_recording *recording, struct incise_error *err)
@@ -102,7 +101,7 @@ int incise_camera_near_at(struct incise_camera_near *near, int64_t t_ns, double 
 		rc = more(near, err);
 	if (rc < 0)
 		return rc;
-	s = incise_share(a->t_ns, b->t_ns, t_ns);
+	s = incise_row_share(a->t_ns, b->t_ns, t_ns);
 	if (isnan(s) || isnan(a->depth_mm) || isnan(b->depth_mm))
 		return 0;
 	slope = (b->depth_mm - a->depth_mm) / ((double)(b->t_ns - a->t_ns) * 1e-9);

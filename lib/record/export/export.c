@@ -74,7 +74,7 @@ static int write_cuts(struct incise_export_pass *pass,
 			"(deepest %.2f mm); check `surface` in the rig's "
 			"configuration",
 			recordings[0]->path, n > 1 ? " and the others" : "",
-			INCISE_CUT_BEGIN_MM, pass->depth_deepest_mm);
+			INCISE_CUT_START_MM, pass->depth_deepest_mm);
 	if (!pass->report.rows)
 		return incise_error_set(
 			pass->err, ENODATA,

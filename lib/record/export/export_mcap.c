@@ -24,8 +24,7 @@
 
 struct mcap_export {
 	const struct incise_recording *recording;
-	double n_per_code, zero_N;
-	int64_t top;
+	struct incise_recording_force scale;
 	uint64_t clipped;
 	char *text; /* of a message */
 	size_t room;
@@ -47,13 +46,14 @@ static char *add_real(char *to, const char *before, double value, int decimals)
 static int force_message(struct mcap_export *export, const struct incise_rows *rows)
 {
 	int64_t code = sqlite3_column_int64(rows->stmt, 2);
-	bool clipped = code == 0 || code == export->top;
+	bool clipped = code == 0 || code == export->scale.top;
 	char *to = export->text;
 
-	if (code < 0 || code > export->top)
+	if (code < 0 || code > export->scale.top)
 		return -EINVAL;
 	export->clipped += clipped;
-	to = add_real(to, "{\"force_N\":", code * export->n_per_code - export->zero_N, 5);
+	to = add_real(to, "{\"force_N\":",
+		      code * export->scale.n_per_code - export->scale.zero_N, 5);
 	to = incise_decimal_integer(add(to, ",\"code\":"), code);
 	to = add(to, clipped ? ",\"clipped\":true}" : ",\"clipped\":false}");
 	return to - export->text;
@@ -224,17 +224,9 @@ int incise_export_mcap(struct incise_recording *recording,
 {
 	const struct incise_recording_info *meta = &recording->meta;
 	const struct incise_calibration *given = options->calibration;
-	double mV_N = given ? given->force_mV_N : meta->force_mV_N;
-	double zero_mV = given && !isnan(given->force_zero_mV) ? given->force_zero_mV
-							       : meta->zero_mV;
 	const uint64_t expected[STREAMS] = {meta->force, meta->tracker,
-					    recording->depth_rows, UINT64_MAX};
-	struct mcap_export export = {
-		.recording = recording,
-		.n_per_code = meta->full_scale_V * 1e3 / (1LL << meta->bits) / mV_N,
-		.zero_N = (zero_mV - meta->offset_V * 1e3) / mV_N,
-		.top = (1LL << meta->bits) - 1,
-	};
+					    recording->meta.depth, UINT64_MAX};
+	struct mcap_export export = {.recording = recording};
 	struct incise_c_locale locale = incise_c_locale_begin();
 	struct incise_rows rows[STREAMS] = {0};
 	struct incise_mcap *mcap = incise_mcap_new(out);
@@ -243,11 +235,9 @@ int incise_export_mcap(struct incise_recording *recording,
 
 	if (rc)
 		rc = incise_error_set(err, ENOMEM, "out of memory");
-	else if (isnan(zero_mV))
-		rc = incise_error_set(err, EINVAL,
-				      "%s: ended before the zero of the force channel "
-				      "was known (0.5 s), so no force can be told",
-				      recording->path);
+	incise_recording_force(recording, given, &export.scale);
+	if (!rc)
+		rc = incise_recording_need_zero(recording, &export.scale, err);
 	for (int i = 0; i < STREAMS && !rc; i++) {
 		rc = incise_rows_open(&rows[i], recording, streams[i].table,
 				      streams[i].columns, streams[i].types, expected[i],
@@ -262,7 +252,7 @@ int incise_export_mcap(struct incise_recording *recording,
 	if (!rc) {
 		incise_mcap_metadata(mcap, "incise", lineage);
 		n = each_row(&export, mcap, rows, options,
-			     meta->force + meta->tracker + recording->depth_rows, err);
+			     meta->force + meta->tracker + recording->meta.depth, err);
 		rc = n < 0 ? (int)n : 0;
 	}
 	if (!rc && (rc = incise_mcap_finish(mcap)))

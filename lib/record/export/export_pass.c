@@ -109,13 +109,10 @@ static int each_sample(struct incise_export_pass *pass,
 		return rc;
 	if (calibration)
 		incise_cuts_calibrate(&cuts, calibration);
-	if (isnan(cuts.zero_N)) {
+	rc = incise_recording_need_zero(recording, &cuts.scale, pass->err);
+	if (rc) {
 		incise_cuts_close(&cuts);
-		return incise_error_set(
-			pass->err, EINVAL,
-			"%s: ended before the zero of the force channel was "
-			"known (0.5 s), so no force can be told",
-			recording->path);
+		return rc;
 	}
 	pass->number = 0;
 	while ((rc = incise_cuts_next(&cuts, &sample, pass->err)) > 0) {

@@ -23,14 +23,6 @@ double incise_force_weight(double rows)
 	return sinc * (0.42 + 0.5 * cos(x) + 0.08 * cos(2 * x));
 }
 
-double incise_share(int64_t a_ns, int64_t b_ns, int64_t t_ns)
-{
-	if (a_ns == INCISE_TIME_NONE || b_ns == INCISE_TIME_NONE || t_ns < a_ns ||
-	    b_ns - a_ns > INCISE_DEPTH_GAP_NS)
-		return NAN;
-	return (double)(t_ns - a_ns) / (b_ns - a_ns);
-}
-
 /* Last time of the table, which is what a grid goes to. */
 static int find_last(struct incise_force_near *near, struct incise_error *err)
 {
@@ -58,29 +50,20 @@ int incise_force_near_open(struct incise_force_near *near,
 			   const struct incise_calibration *given,
 			   struct incise_error *err)
 {
-	const struct incise_recording_info *meta = &recording->meta;
-	double mV_N = given ? given->force_mV_N : meta->force_mV_N;
-	double zero_mV = given && !isnan(given->force_zero_mV) ? given->force_zero_mV
-							       : meta->zero_mV;
 	int rc;
 
-	*near = (struct incise_force_near){
-		.n_per_code = meta->full_scale_V * 1e3 / (1LL << meta->bits) / mV_N,
-		.zero_N = (zero_mV - meta->offset_V * 1e3) / mV_N,
-		.top = (1LL << meta->bits) - 1,
-	};
-	if (isnan(zero_mV))
-		return incise_error_set(err, EINVAL,
-					"%s: ended before the zero of the force channel "
-					"was known (0.5 s), so no force can be told",
-					recording->path);
+	*near = (struct incise_force_near){0};
+	incise_recording_force(recording, given, &near->scale);
+	rc = incise_recording_need_zero(recording, &near->scale, err);
+	if (rc)
+		return rc;
 	near->weights = malloc((STEPS + 2) * sizeof(*near->weights));
 	if (!near->weights)
 		return incise_error_set(err, ENOMEM, "out of memory");
 	for (int i = 0; i < STEPS + 2; i++)
 		near->weights[i] = incise_force_weight((double)i / CELLS);
 	rc = incise_rows_open(&near->rows, recording, "force", "seq, t_ns, code", "iii",
-			      meta->force, err);
+			      recording->meta.force, err);
 	if (!rc && given)
 		incise_rows_calibrate(&near->rows, given);
 	if (!rc)
@@ -115,7 +98,7 @@ int incise_force_near_more(struct incise_force_near *near, struct incise_error *
 		near->room = room;
 	}
 	code = sqlite3_column_int64(near->rows.stmt, 2);
-	if (code < 0 || code > near->top)
+	if (code < 0 || code > near->scale.top)
 		return incise_error_set(err, EINVAL,
 					"%s: damaged: table force, row %lld: code is "
 					"out of the converter's range",
@@ -138,7 +121,7 @@ size_t incise_force_near_forget(struct incise_force_near *near, size_t n)
 
 static bool clipped(const struct incise_force_near *near, size_t at)
 {
-	return near->samples[at].code == 0 || near->samples[at].code == near->top;
+	return near->samples[at].code == 0 || near->samples[at].code == near->scale.top;
 }
 
 /*
@@ -154,7 +137,7 @@ static double noise(const struct incise_force_near *near, size_t from, size_t to
 
 		sum += step * step;
 	}
-	return fabs(near->n_per_code) *
+	return fabs(near->scale.n_per_code) *
 	       sqrt((to > from + 1 ? sum / (to - from - 1) / 2 : 0) + 1 / 12.);
 }
 
@@ -162,7 +145,7 @@ void incise_force_near_sample(const struct incise_force_near *near, size_t at,
 			      struct incise_force_value *value)
 {
 	*value = (struct incise_force_value){
-		near->samples[at].code * near->n_per_code - near->zero_N,
+		near->samples[at].code * near->scale.n_per_code - near->scale.zero_N,
 		noise(near, at > HALF ? at - HALF : 0,
 		      at + HALF < near->n ? at + HALF + 1 : near->n),
 		clipped(near, at)};
@@ -193,7 +176,7 @@ void incise_force_near_filter(const struct incise_force_near *near, int64_t t_ns
 	if (!any)
 		return;
 	share = sqrt(squares) / fabs(sum);
-	value->force_N = code / sum * near->n_per_code - near->zero_N;
+	value->force_N = code / sum * near->scale.n_per_code - near->scale.zero_N;
 	value->u_N = noise(near, 0, near->n) * share;
 }
 
@@ -211,9 +194,10 @@ void incise_force_near_line(const struct incise_force_near *near, int64_t t_ns,
 		return;
 	a = &near->samples[i];
 	b = a + 1;
-	s = incise_share(a->t_ns, b->t_ns, t_ns);
-	value->force_N = (a->code + s * (b->code - (double)a->code)) * near->n_per_code -
-			 near->zero_N;
+	s = incise_row_share(a->t_ns, b->t_ns, t_ns);
+	value->force_N =
+		(a->code + s * (b->code - (double)a->code)) * near->scale.n_per_code -
+		near->scale.zero_N;
 	value->u_N = noise(near, 0, near->n) * sqrt((1 - s) * (1 - s) + s * s);
 	value->clipped = clipped(near, i) || clipped(near, i + 1);
 }

@@ -26,8 +26,7 @@ struct incise_force_sample_near {
 
 struct incise_force_near {
 	struct incise_rows rows;
-	double n_per_code, zero_N;
-	int32_t top;	 /* largest code */
+	struct incise_recording_force scale;
 	int64_t last_ns; /* of the recording's last sample, as far as it says */
 	struct incise_force_sample_near *samples;
 	size_t n, room;
@@ -73,8 +72,5 @@ void incise_force_near_filter(const struct incise_force_near *near, int64_t t_ns
 /* On the line between the samples before and after. */
 void incise_force_near_line(const struct incise_force_near *near, int64_t t_ns,
 			    struct incise_force_value *value);
-
-/* Share of the way from a to b; NAN where they are not around it, or too far apart. */
-double incise_share(int64_t a_ns, int64_t b_ns, int64_t t_ns);
 
 #endif

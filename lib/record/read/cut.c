@@ -11,7 +11,7 @@
 
 bool incise_cut_step(struct incise_cut *cut, double depth_mm)
 {
-	if (!cut->inside && depth_mm > INCISE_CUT_BEGIN_MM) {
+	if (!cut->inside && depth_mm > INCISE_CUT_START_MM) {
 		cut->inside = true;
 		cut->count++;
 	} else if (cut->inside && depth_mm < INCISE_CUT_END_MM) {
@@ -67,7 +67,7 @@ static int step_force(struct incise_cuts *cuts, int64_t *t_ns, int32_t *code,
 		return rc;
 	value = sqlite3_column_int64(stmt, 2);
 	if (sqlite3_column_type(stmt, 2) != SQLITE_INTEGER || value < 0 ||
-	    value > cuts->top)
+	    value > cuts->scale.top)
 		return bad_row(cuts, "force", stmt,
 			       "code is out of the converter's range", err);
 	*code = value;
@@ -85,14 +85,13 @@ static int step_depth(struct incise_cuts *cuts, struct incise_error *err)
 	int rc = step(cuts, stmt, "depth", &cuts->depth_times, &next.t_ns, err);
 
 	cuts->before = cuts->after;
-	cuts->has_before = cuts->has_after;
-	cuts->has_after = rc > 0;
-	if (rc == 0 && cuts->depth_rows != cuts->recording->depth_rows)
+	cuts->after.t_ns = INCISE_TIME_NONE;
+	if (rc == 0 && cuts->depth_rows != cuts->recording->meta.depth)
 		return incise_error_set(err, EINVAL,
 					"%s: damaged: table depth has %llu rows of %llu",
 					cuts->recording->path,
 					(unsigned long long)cuts->depth_rows,
-					(unsigned long long)cuts->recording->depth_rows);
+					(unsigned long long)cuts->recording->meta.depth);
 	if (rc <= 0)
 		return rc;
 	next.depth_mm = sqlite3_column_double(stmt, 2);
@@ -109,20 +108,10 @@ static int step_depth(struct incise_cuts *cuts, struct incise_error *err)
 	return 1;
 }
 
-static void scale(struct incise_cuts *cuts, double force_mV_N, double zero_mV)
-{
-	const struct incise_recording_info *meta = &cuts->recording->meta;
-
-	cuts->n_per_code = meta->full_scale_V * 1e3 / (1LL << meta->bits) / force_mV_N;
-	cuts->zero_N = (zero_mV - meta->offset_V * 1e3) / force_mV_N;
-}
-
 void incise_cuts_calibrate(struct incise_cuts *cuts,
 			   const struct incise_calibration *calibration)
 {
-	scale(cuts, calibration->force_mV_N,
-	      isnan(calibration->force_zero_mV) ? cuts->recording->meta.zero_mV
-						: calibration->force_zero_mV);
+	incise_recording_force(cuts->recording, calibration, &cuts->scale);
 	incise_row_times_calibrate(&cuts->force_times, calibration);
 	incise_row_times_calibrate(&cuts->depth_times, calibration);
 }
@@ -130,15 +119,15 @@ void incise_cuts_calibrate(struct incise_cuts *cuts,
 int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recording,
 		     struct incise_error *err)
 {
-	const struct incise_recording_info *meta = &recording->meta;
 	int rc;
 
 	*cuts = (struct incise_cuts){
 		.recording = recording,
-		.top = (1LL << meta->bits) - 1,
+		.before.t_ns = INCISE_TIME_NONE,
+		.after.t_ns = INCISE_TIME_NONE,
 		.depth_max_mm = -INFINITY,
 	};
-	scale(cuts, meta->force_mV_N, meta->zero_mV);
+	incise_recording_force(recording, NULL, &cuts->scale);
 	if (sqlite3_prepare_v2(recording->db,
 			       "SELECT seq, t_ns, code FROM force ORDER BY seq", -1,
 			       &cuts->force, NULL) != SQLITE_OK ||
@@ -165,16 +154,14 @@ void incise_cuts_close(struct incise_cuts *cuts)
 	cuts->force = cuts->depth = NULL;
 }
 
-/* Depth and velocity at the time of a force sample; false where no row is near. */
+/* Depth and velocity at the time of a force sample; false if no row is near. */
 static bool interpolate(const struct incise_cuts *cuts, struct incise_cut_sample *sample)
 {
 	const struct incise_cut_depth *a = &cuts->before, *b = &cuts->after;
-	double share;
+	double share = incise_row_share(a->t_ns, b->t_ns, sample->t_ns);
 
-	if (!cuts->has_before || !cuts->has_after ||
-	    b->t_ns - a->t_ns > INCISE_DEPTH_GAP_NS)
+	if (isnan(share))
 		return false;
-	share = (double)(sample->t_ns - a->t_ns) / (b->t_ns - a->t_ns);
 	sample->depth_mm = a->depth_mm + share * (b->depth_mm - a->depth_mm);
 	sample->velocity_mm_s =
 		a->velocity_mm_s + share * (b->velocity_mm_s - a->velocity_mm_s);
@@ -188,8 +175,8 @@ int incise_cuts_next(struct incise_cuts *cuts, struct incise_cut_sample *sample,
 	int rc;
 
 	while ((rc = step_force(cuts, &sample->t_ns, &code, err)) > 0) {
-		while ((cuts->has_after || !cuts->depth_rows) &&
-		       (!cuts->has_after || cuts->after.t_ns <= sample->t_ns)) {
+		while ((cuts->after.t_ns != INCISE_TIME_NONE || !cuts->depth_rows) &&
+		       cuts->after.t_ns <= sample->t_ns) {
 			rc = step_depth(cuts, err);
 			if (rc < 0)
 				return rc;
@@ -200,12 +187,12 @@ int incise_cuts_next(struct incise_cuts *cuts, struct incise_cut_sample *sample,
 		    !incise_cut_step(&cuts->cut, sample->depth_mm))
 			continue;
 		sample->cut = cuts->cut.count;
-		sample->force_N = code * cuts->n_per_code - cuts->zero_N;
-		sample->clipped = code == 0 || code == cuts->top;
+		sample->force_N = code * cuts->scale.n_per_code - cuts->scale.zero_N;
+		sample->clipped = code == 0 || code == cuts->scale.top;
 		return 1;
 	}
-	/* What stands behind the last force sample is checked too. */
-	while (!rc && cuts->has_after)
+	/* Rows behind the last force sample are checked too. */
+	while (!rc && cuts->after.t_ns != INCISE_TIME_NONE)
 		rc = step_depth(cuts, err) < 0 ? -errno : 0;
 	return rc;
 }

@@ -39,7 +39,7 @@ static double speed(const struct incise_depth *depth, int at)
 		last++;
 	if (first == last)
 		return 0;
-	/* About the record itself: the differences are small, the numbers exact. */
+	/* Relative to the record itself: small differences are exact. */
 	for (int i = first; i <= last; i++) {
 		mean_t += (window[i].t_ns - window[at].t_ns) * 1e-9 / (last - first + 1);
 		for (int k = 0; k < 3; k++)
@@ -60,9 +60,9 @@ static double speed(const struct incise_depth *depth, int at)
 	return sqrt(sum);
 }
 
-/* Depth is the record's own: a mean over the window would be off in a quick plunge by
- * more than the tracker's noise. */
-static void give_out(struct incise_depth *depth, struct incise_depth_row *row)
+/* Depth is the record's own: in a quick plunge the error of a mean over the window would
+ * exceed the tracker's noise. */
+static void fill_row(struct incise_depth *depth, struct incise_depth_row *row)
 {
 	const struct incise_depth_record *record = &depth->window[depth->done];
 
@@ -92,7 +92,7 @@ bool incise_depth_push(struct incise_depth *depth, int64_t seq, int64_t t_ns,
 	memcpy(record->position_mm, position_mm, sizeof(record->position_mm));
 	if (depth->n - depth->done <= INCISE_DEPTH_HALF)
 		return false;
-	give_out(depth, row);
+	fill_row(depth, row);
 	return true;
 }
 
@@ -100,6 +100,6 @@ bool incise_depth_flush(struct incise_depth *depth, struct incise_depth_row *row
 {
 	if (depth->done == depth->n)
 		return false;
-	give_out(depth, row);
+	fill_row(depth, row);
 	return true;
 }

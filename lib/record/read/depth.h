@@ -23,7 +23,7 @@
 #define INCISE_DEPTH_HALF 4
 #define INCISE_DEPTH_WINDOW (2 * INCISE_DEPTH_HALF + 1)
 
-/* Records further apart than this have nothing to say of each other. */
+/* Records further apart than this are not interpolated. */
 #define INCISE_DEPTH_GAP_NS 50000000LL
 
 /* One row of the table `depth`. */
@@ -41,7 +41,7 @@ struct incise_depth {
 	double point_mm[3], normal[3];
 	struct incise_depth_record window[INCISE_DEPTH_WINDOW];
 	int n;	  /* records in the window, oldest first */
-	int done; /* of them, from the oldest, that have been given out */
+	int done; /* of them, from the oldest, that have their row */
 };
 
 void incise_depth_init(struct incise_depth *depth, const double point_mm[3],
@@ -50,11 +50,11 @@ void incise_depth_init(struct incise_depth *depth, const double point_mm[3],
 /* Depth of one position, mm. */
 double incise_depth_of(const struct incise_depth *depth, const double position_mm[3]);
 
-/* Add a record; true when it completes the window of an earlier one: its row. */
+/* Add a record; true: it completes the window of an earlier one, whose row is in @row. */
 bool incise_depth_push(struct incise_depth *depth, int64_t seq, int64_t t_ns,
 		       const double position_mm[3], struct incise_depth_row *row);
 
-/* At the end: the next of the last records, their windows cut short; false: no more. */
+/* At the end: the row of the next of the last records, with a shorter window; false: none. */
 bool incise_depth_flush(struct incise_depth *depth, struct incise_depth_row *row);
 
 #endif

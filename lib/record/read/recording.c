@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Reading a recording; see incise/recording.h. Nothing in the file is trusted: it may be
- * cut short, altered or made to deceive.
+ * Reading a recording; see incise/recording.h. The file is untrusted: it may be truncated,
+ * altered or forged.
  */
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -14,102 +15,139 @@
 #include "../schema.h"
 
 #define COUNT_MAX (1LL << 53)
+/* As in calibration.conf. */
+#define TIP_MAX_MM 1e6
+/* 146 years: times and their differences stay below 2^63. */
+#define TIME_MAX (INT64_MAX / 2)
+
+/* --- values of a row ---------------------------------------------------------------- */
+
+static int damaged(struct incise_recording *rec, const char *table, const char *what,
+		   struct incise_error *err)
+{
+	return incise_error_set(err, EINVAL, "%s: damaged: table %s: %s", rec->path,
+				table, what);
+}
+
+/* A text without control characters, which a terminal would obey. */
+static bool take_text(sqlite3_stmt *stmt, int column, bool optional, char *to,
+		      size_t size)
+{
+	/* The type first: sqlite3_column_text() converts any value. */
+	int type = sqlite3_column_type(stmt, column);
+	const char *text = (const char *)sqlite3_column_text(stmt, column);
+
+	if (type == SQLITE_NULL && optional)
+		text = "";
+	else if (type != SQLITE_TEXT || !text)
+		return false;
+	snprintf(to, size, "%s", text);
+	for (char *c = to; *c; c++)
+		if ((unsigned char)*c < ' ' || *c == 0x7f)
+			*c = '?';
+	return true;
+}
+
+static bool take_count(sqlite3_stmt *stmt, int column, uint64_t *to)
+{
+	int64_t value = sqlite3_column_int64(stmt, column);
+
+	*to = value;
+	return sqlite3_column_type(stmt, column) == SQLITE_INTEGER && value >= 0 &&
+	       value <= COUNT_MAX;
+}
+
+/* A number, or NULL for an unknown one. */
+static bool take_known(sqlite3_stmt *stmt, int column, double scale, double *to)
+{
+	int type = sqlite3_column_type(stmt, column);
+
+	*to = type == SQLITE_NULL ? NAN : sqlite3_column_double(stmt, column) * scale;
+	return type == SQLITE_NULL ||
+	       ((type == SQLITE_FLOAT || type == SQLITE_INTEGER) && isfinite(*to));
+}
 
 /* --- table meta ------------------------------------------------------------------- */
 
-/*
- * Run @take on the value of a key. Returns 0, -EINVAL (absent and not @optional, or not
- * taken), -errno.
- */
-static int meta(struct incise_recording *rec, const char *key,
-		int (*take)(sqlite3_stmt *stmt, void *to), void *to, bool optional,
-		struct incise_error *err)
-{
-	sqlite3_stmt *stmt;
-	int rc;
+struct item {
+	const char *key;
+	enum { TEXT, COUNT, REAL, REAL_OR_NULL } type;
+	void *to;
+	size_t size; /* of a text */
+	bool optional;
+};
 
-	if (sqlite3_prepare_v2(rec->db, "SELECT value FROM meta WHERE key = ?", -1, &stmt,
-			       NULL) != SQLITE_OK)
-		return incise_schema_fail(rec->db, rec->path, err);
-	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
-	rc = sqlite3_step(stmt);
-	if (rc == SQLITE_ROW && !take(stmt, to))
-		rc = 0;
-	else if (rc == SQLITE_DONE && optional)
+static bool take_item(sqlite3_stmt *stmt, const struct item *item)
+{
+	switch (item->type) {
+	case TEXT:
+		return take_text(stmt, 0, false, item->to, item->size);
+	case COUNT:
+		return take_count(stmt, 0, item->to);
+	default:
+		return take_known(stmt, 0, 1, item->to) &&
+		       (sqlite3_column_type(stmt, 0) == SQLITE_FLOAT ||
+			(item->type == REAL_OR_NULL &&
+			 sqlite3_column_type(stmt, 0) == SQLITE_NULL));
+	}
+}
+
+/* Prepare and run a query for the value of a key. Returns a code of sqlite3_step(). */
+static int find_key(struct incise_recording *rec, const char *key, sqlite3_stmt **stmt)
+{
+	int rc = sqlite3_prepare_v2(rec->db, "SELECT value FROM meta WHERE key = ?", -1,
+				    stmt, NULL);
+
+	if (rc != SQLITE_OK)
+		return rc;
+	sqlite3_bind_text(*stmt, 1, key, -1, SQLITE_STATIC);
+	return sqlite3_step(*stmt);
+}
+
+static int read_item(struct incise_recording *rec, const struct item *item,
+		     struct incise_error *err)
+{
+	sqlite3_stmt *stmt = NULL;
+	int rc = find_key(rec, item->key, &stmt);
+
+	if ((rc == SQLITE_ROW && take_item(stmt, item)) ||
+	    (rc == SQLITE_DONE && item->optional))
 		rc = 0;
 	else if (rc == SQLITE_ROW || rc == SQLITE_DONE)
 		rc = incise_error_set(
 			err, EINVAL, "%s: damaged: '%s' in table meta is %s", rec->path,
-			key, rc == SQLITE_ROW ? "no value it can have" : "missing");
+			item->key, rc == SQLITE_ROW ? "no value it can have" : "missing");
 	else
 		rc = incise_schema_fail(rec->db, rec->path, err);
 	sqlite3_finalize(stmt);
 	return rc;
 }
 
-/* As calibration.conf has it. */
-#define TIP_MAX_MM 1e6
-
-struct text {
-	char *to;
-	size_t size;
-};
-
-static int take_text(sqlite3_stmt *stmt, void *to)
+int incise_recording_number(struct incise_recording *rec, const char *key, double *value,
+			    struct incise_error *err)
 {
-	struct text *text = to;
-	/* Before the text is asked for, which makes one of anything. */
-	int type = sqlite3_column_type(stmt, 0);
-	const char *value = (const char *)sqlite3_column_text(stmt, 0);
-	size_t n;
+	sqlite3_stmt *stmt = NULL;
+	int rc = find_key(rec, key, &stmt);
 
-	if (type != SQLITE_TEXT || !value)
-		return -EINVAL;
-	n = strnlen(value, text->size - 1);
-	memcpy(text->to, value, n);
-	text->to[n] = 0;
-	for (char *c = text->to; *c; c++)
-		if ((unsigned char)*c < ' ' || *c == 0x7f)
-			*c = '?';
-	return 0;
+	if (rc != SQLITE_ROW || !take_known(stmt, 0, 1, value))
+		*value = NAN;
+	rc = rc == SQLITE_ROW || rc == SQLITE_DONE
+		     ? 0
+		     : incise_schema_fail(rec->db, rec->path, err);
+	sqlite3_finalize(stmt);
+	return rc;
 }
 
-static int take_count(sqlite3_stmt *stmt, void *to)
-{
-	sqlite3_int64 value = sqlite3_column_int64(stmt, 0);
-
-	if (sqlite3_column_type(stmt, 0) != SQLITE_INTEGER || value < 0 ||
-	    value > COUNT_MAX)
-		return -EINVAL;
-	*(uint64_t *)to = value;
-	return 0;
-}
-
-static int take_real(sqlite3_stmt *stmt, void *to)
-{
-	double value = sqlite3_column_double(stmt, 0);
-
-	if (sqlite3_column_type(stmt, 0) != SQLITE_FLOAT || !isfinite(value))
-		return -EINVAL;
-	*(double *)to = value;
-	return 0;
-}
-
-/* A number, or NULL for one that is not known. */
-static int take_known(sqlite3_stmt *stmt, void *to)
-{
-	*(double *)to = NAN;
-	return sqlite3_column_type(stmt, 0) == SQLITE_NULL ? 0 : take_real(stmt, to);
-}
-
-/* Recordings from before have none: the device's own tip is the blade's. */
+/* Older recordings have none: the device's own tip is the blade's. */
 static int read_tip(struct incise_recording *rec, struct incise_error *err)
 {
 	static const char *const keys[] = {"tip_x_mm", "tip_y_mm", "tip_z_mm"};
 	int rc = 0;
 
 	for (int i = 0; i < 3 && !rc; i++) {
-		rc = meta(rec, keys[i], take_real, &rec->meta.tip_mm[i], true, err);
+		const struct item item = {keys[i], REAL, &rec->meta.tip_mm[i], 0, true};
+
+		rc = read_item(rec, &item, err);
 		if (!rc && !(fabs(rec->meta.tip_mm[i]) <= TIP_MAX_MM))
 			rc = incise_error_set(err, EINVAL,
 					      "%s: damaged: '%s' in table meta is %g, "
@@ -122,47 +160,40 @@ static int read_tip(struct incise_recording *rec, struct incise_error *err)
 static int read_meta(struct incise_recording *rec, struct incise_error *err)
 {
 	struct incise_recording_info *info = &rec->meta;
-	struct text started = {info->started, sizeof(info->started)};
-	struct text rig = {info->rig, sizeof(info->rig)};
 	uint64_t complete = 0, bits = 0;
-	const struct {
-		const char *key;
-		int (*take)(sqlite3_stmt *stmt, void *to);
-		void *to;
-	} items[] = {
-		{"complete", take_count, &complete},
-		{"started", take_text, &started},
-		{"rig", take_text, &rig},
-		{"force_bits", take_count, &bits},
-		{"force_full_scale_V", take_real, &info->full_scale_V},
-		{"force_mV_N", take_real, &info->force_mV_N},
-		{"force_zero_mV", take_known, &info->zero_mV},
-		{"depth_mm_px", take_real, &info->depth_mm_px},
-		{"surface_point_x_mm", take_real, &info->surface_point_mm[0]},
-		{"surface_point_y_mm", take_real, &info->surface_point_mm[1]},
-		{"surface_point_z_mm", take_real, &info->surface_point_mm[2]},
-		{"surface_normal_x", take_real, &info->surface_normal[0]},
-		{"surface_normal_y", take_real, &info->surface_normal[1]},
-		{"surface_normal_z", take_real, &info->surface_normal[2]},
-		{"force_rows", take_count, &info->force},
-		{"tracker_rows", take_count, &info->tracker},
-		{"depth_rows", take_count, &rec->depth_rows},
-		{"force_lost", take_count, &info->force_lost},
-		{"tracker_lost", take_count, &info->tracker_lost},
-		{"force_clipped", take_count, &info->force_clipped},
+	const struct item items[] = {
+		{"complete", COUNT, &complete, 0, false},
+		{"started", TEXT, info->started, sizeof(info->started), false},
+		{"rig", TEXT, info->rig, sizeof(info->rig), false},
+		{"force_bits", COUNT, &bits, 0, false},
+		{"force_full_scale_V", REAL, &info->full_scale_V, 0, false},
+		{"force_mV_N", REAL, &info->force_mV_N, 0, false},
+		{"force_zero_mV", REAL_OR_NULL, &info->zero_mV, 0, false},
+		{"depth_mm_px", REAL, &info->depth_mm_px, 0, false},
+		{"surface_point_x_mm", REAL, &info->surface_point_mm[0], 0, false},
+		{"surface_point_y_mm", REAL, &info->surface_point_mm[1], 0, false},
+		{"surface_point_z_mm", REAL, &info->surface_point_mm[2], 0, false},
+		{"surface_normal_x", REAL, &info->surface_normal[0], 0, false},
+		{"surface_normal_y", REAL, &info->surface_normal[1], 0, false},
+		{"surface_normal_z", REAL, &info->surface_normal[2], 0, false},
+		{"force_rows", COUNT, &info->force, 0, false},
+		{"tracker_rows", COUNT, &info->tracker, 0, false},
+		{"depth_rows", COUNT, &info->depth, 0, false},
+		{"force_lost", COUNT, &info->force_lost, 0, false},
+		{"tracker_lost", COUNT, &info->tracker_lost, 0, false},
+		{"force_clipped", COUNT, &info->force_clipped, 0, false},
+		/* Older recordings have none, and start at 0 V. */
+		{"force_offset_V", REAL, &info->offset_V, 0, true},
 	};
 	int rc = 0;
 
 	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && !rc; i++)
-		rc = meta(rec, items[i].key, items[i].take, items[i].to, false, err);
-	/* Recordings from before have none, and begin at 0 V. */
-	if (!rc)
-		rc = meta(rec, "force_offset_V", take_real, &info->offset_V, true, err);
+		rc = read_item(rec, &items[i], err);
 	if (!rc)
 		rc = read_tip(rec, err);
 	if (rc)
 		return rc;
-	/* No converter has more than 31 bits; figures of 1e±9 keep all that follows finite. */
+	/* No converter has more than 31 bits; values within 1e±9 keep all results finite. */
 	if (bits < 1 || bits > 31 ||
 	    !(info->full_scale_V > 1e-9 && info->full_scale_V < 1e9) ||
 	    !(fabs(info->offset_V) < 1e9) ||
@@ -175,14 +206,43 @@ static int read_meta(struct incise_recording *rec, struct incise_error *err)
 			rec->path, (unsigned long long)bits, info->full_scale_V,
 			info->offset_V, info->force_mV_N, info->zero_mV);
 	info->bits = bits;
-	info->depth = rec->depth_rows;
 	info->complete = complete;
 	return 0;
 }
 
+/* --- force --------------------------------------------------------------------------- */
+
+void incise_recording_force(const struct incise_recording *rec,
+			    const struct incise_calibration *given,
+			    struct incise_recording_force *force)
+{
+	const struct incise_recording_info *meta = &rec->meta;
+	double mV_N = given ? given->force_mV_N : meta->force_mV_N;
+	double zero_mV = given && !isnan(given->force_zero_mV) ? given->force_zero_mV
+							       : meta->zero_mV;
+
+	*force = (struct incise_recording_force){
+		.n_per_code = meta->full_scale_V * 1e3 / (1LL << meta->bits) / mV_N,
+		.zero_N = (zero_mV - meta->offset_V * 1e3) / mV_N,
+		.top = (1LL << meta->bits) - 1,
+	};
+}
+
+int incise_recording_need_zero(const struct incise_recording *rec,
+			       const struct incise_recording_force *force,
+			       struct incise_error *err)
+{
+	if (!isnan(force->zero_N))
+		return 0;
+	return incise_error_set(err, EINVAL,
+				"%s: ended before the zero of the force channel was "
+				"known (0.5 s), so no force can be told",
+				rec->path);
+}
+
 /* --- opening ----------------------------------------------------------------------- */
 
-/* The folder that holds the recording: path, or path.part; no trailing slashes. */
+/* The folder of the recording: path, or path.part; no trailing slashes. */
 static char *find_folder(const char *path, struct incise_error *err)
 {
 	size_t length = strlen(path);
@@ -223,7 +283,7 @@ static char *find_name(const char *folder)
 	return name;
 }
 
-/* Whether there is a log, which then has the newest pages, be the file as it may. */
+/* Whether there is a log, which then has the newest pages. */
 static bool has_log(struct incise_recording *rec)
 {
 	const char *log = sqlite3_filename_wal(sqlite3_db_filename(rec->db, "main"));
@@ -233,9 +293,9 @@ static bool has_log(struct incise_recording *rec)
 }
 
 /*
- * Whole pages: SQLite notices a missing page, but takes zeros for the missing end of the
- * last one. While the log is folded in, the end of the file may be in mid-page, as after a
- * disk that failed then.
+ * The file must have whole pages: SQLite detects a missing page, but reads zeros for the missing
+ * end of the last one. While the log is folded in, also after a disk that failed then, the file
+ * may end in mid-page.
  */
 static int check_size(struct incise_recording *rec, struct incise_error *err)
 {
@@ -259,15 +319,15 @@ static int check_size(struct incise_recording *rec, struct incise_error *err)
 	return 0;
 }
 
-/* Until SQLite has read something it does not know what state a file was left in. */
+/* SQLite detects the state of a file when it first reads from it. */
 static int read_something(sqlite3 *db)
 {
 	return sqlite3_exec(db, "SELECT 1 FROM sqlite_master", NULL, NULL, NULL);
 }
 
 /*
- * A recorder that was killed, or whose disk failed, in the moment when it gave up its log has
- * left a journal, and SQLite wants that rolled back by someone who may write.
+ * A recorder that was killed, or whose disk failed, while it removed its log has left a journal,
+ * which only a connection that may write can roll back.
  */
 static void roll_back(const char *file)
 {
@@ -289,7 +349,7 @@ static int open_read_only(const char *file, sqlite3 **db)
 				 NULL);
 
 	if (rc == SQLITE_OK) {
-		/* Nothing that stands in a file's schema is run. */
+		/* No code of the file's schema is run. */
 		sqlite3_db_config(*db, SQLITE_DBCONFIG_DEFENSIVE, 1, NULL);
 		sqlite3_db_config(*db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, NULL);
 		sqlite3_busy_timeout(*db, 1000);
@@ -334,7 +394,7 @@ static int open_database(struct incise_recording *rec, struct incise_error *err)
 	free(file);
 	if (rc)
 		return rc;
-	/* Pages are checked as they are read. */
+	/* SQLite checks pages as it reads them. */
 	if (sqlite3_exec(rec->db, "PRAGMA cell_size_check=ON; BEGIN", NULL, NULL, NULL))
 		return incise_schema_fail(rec->db, rec->path, err);
 	return 0;
@@ -381,9 +441,129 @@ void incise_recording_close(struct incise_recording *rec)
 	free(rec);
 }
 
+/* --- tables streams and knots ---------------------------------------------------------- */
+
+static bool take_stream(sqlite3_stmt *stmt, struct incise_stream *stream)
+{
+	struct incise_stream *s = stream;
+
+	s->stamped = sqlite3_column_int(stmt, 2);
+	return take_text(stmt, 0, true, s->name, sizeof(s->name)) && *s->name &&
+	       take_text(stmt, 1, true, s->device, sizeof(s->device)) &&
+	       take_known(stmt, 3, 1, &s->nominal_hz) &&
+	       take_known(stmt, 4, 1e-6, &s->delay_ms) &&
+	       take_known(stmt, 5, 1e-6, &s->delay_sd_ms) &&
+	       take_count(stmt, 6, &s->rows) && take_count(stmt, 7, &s->lost) &&
+	       take_count(stmt, 8, &s->late) && take_known(stmt, 9, 1, &s->rate_hz) &&
+	       take_known(stmt, 10, 1, &s->drift_ppm) &&
+	       take_known(stmt, 11, 1, &s->drift_sd_ppm) &&
+	       take_known(stmt, 12, 1e-6, &s->jitter_ms) &&
+	       take_known(stmt, 13, 1e-6, &s->jitter_max_ms) &&
+	       take_known(stmt, 14, 1e-6, &s->offset_ms) &&
+	       take_known(stmt, 15, 1e-6, &s->offset_sd_ms) &&
+	       take_text(stmt, 16, true, s->ended, sizeof(s->ended));
+}
+
+int incise_recording_streams(struct incise_recording *rec,
+			     struct incise_stream streams[INCISE_STREAMS_MAX],
+			     struct incise_error *err)
+{
+	sqlite3_stmt *stmt;
+	int n = 0, rc;
+
+	if (rec->form < 2)
+		return 0;
+	if (sqlite3_prepare_v2(
+		    rec->db,
+		    "SELECT name, device, stamped, nominal_hz, delay_ns, delay_sd_ns, "
+		    "rows, lost, late, rate_hz, drift_ppm, drift_sd_ppm, jitter_ns, "
+		    "jitter_max_ns, offset_ns, offset_sd_ns, ended FROM streams ORDER BY "
+		    "rowid",
+		    -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(rec->db, rec->path, err);
+	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW && n < INCISE_STREAMS_MAX)
+		if (!take_stream(stmt, &streams[n++])) {
+			n = damaged(rec, "streams", "a value is none that it can have",
+				    err);
+			sqlite3_finalize(stmt);
+			return n;
+		}
+	if (rc == SQLITE_ROW)
+		n = damaged(rec, "streams", "more rows than there are streams", err);
+	else if (rc != SQLITE_DONE)
+		n = incise_schema_fail(rec->db, rec->path, err);
+	sqlite3_finalize(stmt);
+	return n;
+}
+
+static bool take_knot(sqlite3_stmt *stmt, const struct incise_timeline_knot *last,
+		      struct incise_timeline_knot *knot)
+{
+	int64_t seq = sqlite3_column_int64(stmt, 0);
+
+	knot->seq = seq;
+	knot->t_ns = sqlite3_column_int64(stmt, 1);
+	knot->sd_ns = sqlite3_column_double(stmt, 2);
+	knot->starts = sqlite3_column_int(stmt, 3);
+	return sqlite3_column_type(stmt, 0) == SQLITE_INTEGER && seq >= 0 &&
+	       sqlite3_column_type(stmt, 1) == SQLITE_INTEGER &&
+	       knot->t_ns >= -TIME_MAX && knot->t_ns <= TIME_MAX &&
+	       sqlite3_column_type(stmt, 2) == SQLITE_FLOAT && knot->sd_ns >= 0 &&
+	       knot->sd_ns < 1e18 &&
+	       (!last || (knot->seq > last->seq && knot->t_ns > last->t_ns));
+}
+
+int incise_recording_line(struct incise_recording *rec, const char *stream,
+			  struct incise_recording_line *line, struct incise_error *err)
+{
+	sqlite3_stmt *stmt;
+	int rc;
+
+	line->n = 0;
+	if (rec->form < 2)
+		return 0;
+	if (sqlite3_prepare_v2(rec->db,
+			       "SELECT seq, t_ns, sd_ns, begins FROM knots WHERE stream "
+			       "= ? ORDER BY knot",
+			       -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(rec->db, rec->path, err);
+	sqlite3_bind_text(stmt, 1, stream, -1, SQLITE_STATIC);
+	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW) {
+		int n = line->n;
+
+		if (n == INCISE_TIMELINE_KNOTS_MAX ||
+		    !take_knot(stmt, n ? &line->knots[n - 1] : NULL, &line->knots[n])) {
+			sqlite3_finalize(stmt);
+			return damaged(rec, "knots", "a row is none that a line can have",
+				       err);
+		}
+		line->n++;
+	}
+	if (rc != SQLITE_DONE) {
+		rc = incise_schema_fail(rec->db, rec->path, err);
+		sqlite3_finalize(stmt);
+		return rc;
+	}
+	sqlite3_finalize(stmt);
+	if (line->n < 2)
+		line->n = 0;
+	return 0;
+}
+
+int64_t incise_recording_time(const struct incise_recording_line *line, uint64_t seq,
+			      int64_t t_ns)
+{
+	return line->n ? incise_timeline_at(line->knots, line->n, seq) : t_ns;
+}
+
+double incise_recording_time_sd(const struct incise_recording_line *line, uint64_t seq)
+{
+	return line->n ? incise_timeline_sd(line->knots, line->n, seq) : NAN;
+}
+
 /* --- info -------------------------------------------------------------------------- */
 
-/* Rows of the tracker are not exported, so here is where they are checked. */
+/* The rows of the tracker are checked here, because they are not exported. */
 static int check_tracker(struct incise_recording *rec, struct incise_error *err)
 {
 	sqlite3_stmt *stmt;

@@ -14,30 +14,52 @@ struct incise_recording {
 	char *path;  /* of the folder that was opened */
 	char *name;  /* "liver" of dir/liver.rec and of dir/liver.rec.part */
 	int form;    /* of its tables, see schema.h */
-	uint64_t depth_rows;
-	struct incise_recording_info meta; /* as far as the table `meta` says */
+	struct incise_recording_info meta; /* the part that is in table meta */
 };
 
-/* The line that gives a stream its times afterwards; n 0: its rows' own are the best. */
+/*
+ * A number of table meta, NAN if it is missing, NULL or no number. Returns 0, or -errno if the
+ * table cannot be read.
+ */
+int incise_recording_number(struct incise_recording *recording, const char *key,
+			    double *value, struct incise_error *err);
+
+/* The converter's codes as forces: code · n_per_code - zero_N. */
+struct incise_recording_force {
+	double n_per_code, zero_N; /* zero NAN: not known */
+	int32_t top;		   /* largest code */
+};
+
+/* By the recording's own calibration, or by @given if that is not NULL. */
+void incise_recording_force(const struct incise_recording *recording,
+			    const struct incise_calibration *given,
+			    struct incise_recording_force *force);
+
+/* Returns 0, or -EINVAL if the zero is not known. */
+int incise_recording_need_zero(const struct incise_recording *recording,
+			       const struct incise_recording_force *force,
+			       struct incise_error *err);
+
+/* The line of a stream's times; n 0: the times of the rows are the best. */
 struct incise_recording_line {
 	int n;
 	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS_MAX];
 };
 
-/* Table streams; a recording of form 1 has none. How many, -EINVAL (a row that cannot be). */
+/* Table streams; form 1 has none. Returns their number, -EINVAL (an impossible row). */
 int incise_recording_streams(struct incise_recording *recording,
 			     struct incise_stream streams[INCISE_STREAMS_MAX],
 			     struct incise_error *err);
 
-/* Table knots of one stream. 0, -EINVAL (a row that cannot be), -EIO. */
+/* Table knots of one stream. Returns 0, -EINVAL (an impossible row), -EIO. */
 int incise_recording_line(struct incise_recording *recording, const char *stream,
 			  struct incise_recording_line *line, struct incise_error *err);
 
-/* The best time of a row, ns of CLOCK_MONOTONIC: on the line, or where there is none its own. */
+/* The best time of a row, ns of CLOCK_MONOTONIC: on the line, or without a line its own. */
 int64_t incise_recording_time(const struct incise_recording_line *line, uint64_t seq,
 			      int64_t t_ns);
 
-/* Its standard uncertainty, ns; NAN where there is no line. */
+/* Its standard uncertainty, ns; NAN without a line. */
 double incise_recording_time_sd(const struct incise_recording_line *line, uint64_t seq);
 
 #endif

@@ -1,7 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The rows of one of a recording's tables, one after the other. Nothing in the file is
- * trusted: a row that cannot be, or one that is missing, ends it.
+ * The rows of one of a recording's tables, in order, and the best time of each, ns of
+ * CLOCK_MONOTONIC. The file is untrusted: an impossible or a missing row ends it with an error.
+ *
+ *     row's own t_ns │ │  │ │ │   found while recording, from the samples so far
+ *     best time      ╱ ╱  ╱ ╱ ╱   on the line through all samples, if the stream has one
+ *
+ * The best time is less the delay of another calibration, if one is given. Times increase from
+ * row to row, whatever rows and knots contain; a delay can make them negative.
  */
 #ifndef INCISE_ROWS_H
 #define INCISE_ROWS_H
@@ -9,42 +15,80 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <sqlite3.h>
+#include <incise/calibration.h>
 #include <incise/error.h>
 #include "recording.h"
-#include "row_times.h"
+
+/* --- times ------------------------------------------------------------------------- */
+
+#define INCISE_TIME_NONE INT64_MIN /* before any row */
+
+struct incise_row_times {
+	struct incise_recording_line line;
+	const char *stream;
+	bool may_repeat;	      /* equal times are allowed */
+	double delay_ns, delay_sd_ns; /* subtracted while recording; NAN: not known */
+	double offset_sd_ns;	      /* of times without a line */
+	double variance_ns2;	      /* added by another calibration */
+	int64_t shift_ns;
+	int64_t own_ns, last_ns; /* of the row before */
+};
+
+/* For a table of a recording. Returns 0 or -errno. */
+int incise_row_times_open(struct incise_row_times *times,
+			  struct incise_recording *recording, const char *table,
+			  struct incise_error *err);
+
+/* Use the delay of another calibration, if it has one for this stream. */
+void incise_row_times_calibrate(struct incise_row_times *times,
+				const struct incise_calibration *calibration);
+
+/* Time of the next row, to @best_ns; false: its own is impossible or does not increase. */
+bool incise_row_times_next(struct incise_row_times *times, int64_t seq, int64_t t_ns,
+			   int64_t *best_ns);
+
+/* Its standard uncertainty, s; 0 if it is not known. */
+double incise_row_times_sd(const struct incise_row_times *times, int64_t seq);
+
+/*
+ * Share of the way from the time of one row to that of another; NAN if a time is missing, t is
+ * before the first, or they are further apart than INCISE_DEPTH_GAP_NS.
+ */
+double incise_row_share(int64_t a_ns, int64_t b_ns, int64_t t_ns);
+
+/* --- rows -------------------------------------------------------------------------- */
 
 struct incise_rows {
 	struct incise_recording *recording;
 	const char *table, *types;
-	const char *other;  /* that is joined, or NULL */
+	const char *other;  /* joined table, or NULL */
 	sqlite3_stmt *stmt; /* at the row */
 	uint64_t n, expected;
-	int64_t t_ns; /* of the row, the best there is; column 1 is its own */
+	int64_t t_ns; /* best time of the row; column 1 is its own */
 	struct incise_row_times times;
 	bool live; /* there is a row */
 };
 
 /*
- * Open a table for columns of SQL, the second of which is t_ns, and of these types, a
- * letter each: i integer, r finite real, n the same or NULL, t text. Times increase; those
- * of events may stand still. @expected UINT64_MAX: the table's size is not known. Returns 0
- * or -errno.
+ * Open a table for columns of SQL, the second of which is t_ns, and their types, a letter
+ * each: i integer, r finite real, n the same or NULL, t text. Times increase; those of events
+ * may repeat. @expected UINT64_MAX: the table's size is not known. Returns 0 or -errno.
  */
 int incise_rows_open(struct incise_rows *rows, struct incise_recording *recording,
 		     const char *table, const char *columns, const char *types,
 		     uint64_t expected, struct incise_error *err);
 
-/* The same with the columns of another table's row of the same number, which must be there. */
+/* The same, joined with the row of the same number of another table, which must exist. */
 int incise_rows_open_joined(struct incise_rows *rows, struct incise_recording *recording,
 			    const char *table, const char *other, const char *columns,
 			    const char *types, uint64_t expected,
 			    struct incise_error *err);
 
-/* Take another calibration's delay; before the first row. */
+/* Use the delay of another calibration; before the first row. */
 void incise_rows_calibrate(struct incise_rows *rows,
 			   const struct incise_calibration *calibration);
 
-/* Go to the next row: 1, 0 at the end, -EINVAL (a row that cannot be, or missing), -EIO. */
+/* Go to the next row: 1, 0 at the end, -EINVAL (an impossible or missing row), -EIO. */
 int incise_rows_next(struct incise_rows *rows, struct incise_error *err);
 
 void incise_rows_close(struct incise_rows *rows);

@@ -57,7 +57,7 @@ static int step_force(struct incise_replay_source *source, struct incise_error *
 	if (rc <= 0)
 		return rc;
 	code = sqlite3_column_int64(s->rows.stmt, 2);
-	if (code < 0 || code > source->top)
+	if (code < 0 || code > source->scale.top)
 		return damaged(s, "code is out of the converter's range", err);
 	return 1;
 }
@@ -86,7 +86,7 @@ static int step_depth(struct incise_replay_source *source, struct incise_error *
 	int rc = step(s, err);
 
 	source->deep[0] = source->deep[1];
-	source->deep[1].t_ns = -1;
+	source->deep[1].t_ns = INCISE_TIME_NONE;
 	if (rc > 0)
 		source->deep[1] = (struct incise_cut_depth){
 			.t_ns = s->t_ns,
@@ -98,23 +98,13 @@ static int step_depth(struct incise_replay_source *source, struct incise_error *
 /* --- opening ------------------------------------------------------------------------- */
 
 /* A number of table meta within bounds. */
-static int number(const struct incise_recording *recording, const char *key, double least,
+static int number(struct incise_recording *recording, const char *key, double least,
 		  double most, double *to, struct incise_error *err)
 {
-	sqlite3_stmt *stmt;
-	bool good;
+	int rc = incise_recording_number(recording, key, to, err);
 
-	if (sqlite3_prepare_v2(recording->db, "SELECT value FROM meta WHERE key = ?", -1,
-			       &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(recording->db, recording->path, err);
-	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
-	good = sqlite3_step(stmt) == SQLITE_ROW &&
-	       (sqlite3_column_type(stmt, 0) == SQLITE_FLOAT ||
-		sqlite3_column_type(stmt, 0) == SQLITE_INTEGER);
-	*to = sqlite3_column_double(stmt, 0);
-	sqlite3_finalize(stmt);
-	if (good && *to >= least && *to <= most)
-		return 0;
+	if (rc || (*to >= least && *to <= most))
+		return rc;
 	return incise_error_set(err, EINVAL,
 				"%s: damaged: '%s' in table meta is missing, or no value "
 				"it can have",
@@ -161,7 +151,7 @@ static int open_streams(struct incise_replay_source *source, struct incise_error
 	if (!rc)
 		rc = incise_rows_open(&source->depth.rows, recording, "depth",
 				      "seq, t_ns, depth_mm, velocity_mm_s", "iirr",
-				      recording->depth_rows, err);
+				      recording->meta.depth, err);
 	return rc;
 }
 
@@ -225,19 +215,6 @@ static int find_span(struct incise_replay_source *source, struct incise_error *e
 	return 0;
 }
 
-static void take_force_scale(struct incise_replay_source *source,
-			     const struct incise_calibration *given)
-{
-	const struct incise_recording_info *meta = &source->recording->meta;
-	double mV_N = given ? given->force_mV_N : meta->force_mV_N;
-	double zero_mV = given && !isnan(given->force_zero_mV) ? given->force_zero_mV
-							       : meta->zero_mV;
-
-	source->n_per_code = meta->full_scale_V * 1e3 / (1LL << meta->bits) / mV_N;
-	source->zero_N = (zero_mV - meta->offset_V * 1e3) / mV_N;
-	source->top = (1LL << meta->bits) - 1;
-}
-
 int incise_replay_source_open(struct incise_replay_source *source,
 			      struct incise_recording *recording,
 			      enum incise_replay_at at,
@@ -249,9 +226,9 @@ int incise_replay_source_open(struct incise_replay_source *source,
 	*source = (struct incise_replay_source){
 		.recording = recording,
 		.at = at,
-		.deep = {{.t_ns = -1}, {.t_ns = -1}},
+		.deep = {{.t_ns = INCISE_TIME_NONE}, {.t_ns = INCISE_TIME_NONE}},
 	};
-	take_force_scale(source, calibration);
+	incise_recording_force(recording, calibration, &source->scale);
 	rc = take_info(source, err);
 	if (!rc)
 		rc = open_streams(source, err);
@@ -326,12 +303,13 @@ static int average(struct incise_replay_source *source, int64_t t_ns, int64_t pe
 		if (s->t_ns >= from_ns) {
 			sum += code;
 			n++;
-			measure->clipped |= code == 0 || code == source->top;
+			measure->clipped |= code == 0 || code == source->scale.top;
 		}
 		rc = step_force(source, err);
 	}
 	measure->force_N =
-		n ? (double)sum / n * source->n_per_code - source->zero_N : NAN;
+		n ? (double)sum / n * source->scale.n_per_code - source->scale.zero_N
+		  : NAN;
 	return rc < 0 ? rc : 0;
 }
 
@@ -340,18 +318,17 @@ static int find_depth(struct incise_replay_source *source, int64_t t_ns,
 		      struct incise_replay_measure *measure, struct incise_error *err)
 {
 	const struct incise_cut_depth *a = &source->deep[0], *b = &source->deep[1];
+	double share;
 	int rc = 0;
 
 	while (rc >= 0 && source->depth.live && source->depth.t_ns <= t_ns)
 		rc = step_depth(source, err);
 	if (rc < 0)
 		return rc;
-	measure->depth_mm = NAN;
-	if (a->t_ns < 0 || b->t_ns <= a->t_ns || t_ns < a->t_ns ||
-	    b->t_ns - a->t_ns > INCISE_DEPTH_GAP_NS)
+	share = incise_row_share(a->t_ns, b->t_ns, t_ns);
+	measure->depth_mm = a->depth_mm + share * (b->depth_mm - a->depth_mm);
+	if (isnan(share))
 		return 0;
-	measure->depth_mm = a->depth_mm + (double)(t_ns - a->t_ns) / (b->t_ns - a->t_ns) *
-						  (b->depth_mm - a->depth_mm);
 	if (incise_cut_step(&source->cut, measure->depth_mm))
 		measure->cut = source->cut.count;
 	return 0;

@@ -24,9 +24,8 @@ struct incise_replay_source {
 	int64_t first_ns, last_ns;	 /* of what there is to replay */
 	int64_t origin_ns;		 /* first force sample; without one first_ns */
 	struct incise_replay_stream tracker, force, depth;
-	double n_per_code, zero_N; /* zero NAN: not known */
-	int32_t top;
-	struct incise_cut_depth deep[2]; /* before and after; t_ns -1: none */
+	struct incise_recording_force scale;
+	struct incise_cut_depth deep[2]; /* before and after */
 	struct incise_cut cut;
 };
 

@@ -69,7 +69,7 @@ static void check_depth(struct incise_verification *verify)
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_COUNT);
 	uint64_t rows = ask(verify, "SELECT count(*) FROM depth", -1);
 
-	found.count = verify->recording->depth_rows;
+	found.count = verify->recording->meta.depth;
 	if (rows != found.count)
 		incise_verify_found(verify, &found, "table depth has %lld rows of %llu",
 				    (long long)rows, (unsigned long long)found.count);

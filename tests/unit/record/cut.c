@@ -97,8 +97,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(hysteresis),
-		cmocka_unit_test_setup_teardown(samples_are_interpolated, enter_folder,
-						leave_folder),
+		IN_FOLDER(samples_are_interpolated),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

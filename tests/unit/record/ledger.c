@@ -401,8 +401,7 @@ int main(void)
 		cmocka_unit_test(a_seal_is_of_these_bytes),
 		cmocka_unit_test(any_change_shows),
 		cmocka_unit_test(no_column_is_left_out),
-		cmocka_unit_test_setup_teardown(head_of_a_file, enter_folder,
-						leave_folder),
+		IN_FOLDER(head_of_a_file),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -61,6 +61,8 @@ __attribute__((unused)) static int enter_folder(void **state)
 	return 0;
 }
 
+#define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, enter_folder, leave_folder)
+
 /* And with the modules that are in O/lib/incise, beside O/tests/unit/record/. */
 __attribute__((unused)) static int enter_with_modules(void **state)
 {

@@ -196,7 +196,7 @@ static void stats_count_what_is_written(void **state)
 	assert_true(!stats.force && !stats.tracker && isnan(stats.zero_mV));
 	assert_int_equal(poll_for(rec, rig, 4000 * MS, &err), 0);
 	incise_recorder_stats(rec, &stats);
-	assert_true(stats.depth_mm > INCISE_CUT_BEGIN_MM); /* a cut is under way */
+	assert_true(stats.depth_mm > INCISE_CUT_START_MM); /* a cut is under way */
 	assert_true(stats.force_N > 0);
 	assert_int_equal(stats.force_lost + stats.tracker_lost, 0);
 	assert_int_equal(incise_recorder_close(rec, &err), 0);
@@ -802,8 +802,6 @@ static void closing_nothing(void **state)
 {
 	assert_int_equal(incise_recorder_close(NULL, NULL), 0);
 }
-
-#define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, enter_folder, leave_folder)
 
 int main(void)
 {

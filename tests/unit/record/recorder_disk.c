@@ -62,10 +62,8 @@ static void refuses_what_no_disk_holds(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(expects_what_it_takes, enter_folder,
-						leave_folder),
-		cmocka_unit_test_setup_teardown(refuses_what_no_disk_holds, enter_folder,
-						leave_folder),
+		IN_FOLDER(expects_what_it_takes),
+		IN_FOLDER(refuses_what_no_disk_holds),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

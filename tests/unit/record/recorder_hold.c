@@ -69,8 +69,7 @@ static void last_second_is_there(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(last_second_is_there, enter_folder,
-						leave_folder),
+		IN_FOLDER(last_second_is_there),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

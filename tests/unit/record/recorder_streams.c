@@ -152,10 +152,8 @@ static void table_says_what_is_known(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(times_without_stamps_are_near_the_truth,
-						enter_folder, leave_folder),
-		cmocka_unit_test_setup_teardown(table_says_what_is_known, enter_folder,
-						leave_folder),
+		IN_FOLDER(times_without_stamps_are_near_the_truth),
+		IN_FOLDER(table_says_what_is_known),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -860,27 +860,27 @@ static void recorder_and_verification_agree(void **state)
 	assert_non_null(strstr(findings.text, "table streams is altered"));
 }
 
-#define IN_FOLDER(test) \
+#define WITH_MODULES(test) \
 	cmocka_unit_test_setup_teardown(test, enter_with_modules, leave_folder)
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		IN_FOLDER(good_recording_is_complete),
-		IN_FOLDER(tampering_is_found),
-		IN_FOLDER(losses_are_no_alteration),
-		IN_FOLDER(interrupted_is_intact),
-		IN_FOLDER(closed_and_not_complete),
-		IN_FOLDER(what_cannot_be_verified),
-		IN_FOLDER(damaged_pages_are_found),
-		IN_FOLDER(truncated_file),
-		IN_FOLDER(can_be_stopped),
-		IN_FOLDER(pictures_are_held_against_their_rows),
-		IN_FOLDER(rows_of_pictures_are_in_the_ledger),
-		IN_FOLDER(damaged_file),
-		IN_FOLDER(file_is_ahead_of_an_interrupted_recording),
-		IN_FOLDER(recorder_and_verification_agree),
-		IN_FOLDER(without_the_module_it_is_said),
+		WITH_MODULES(good_recording_is_complete),
+		WITH_MODULES(tampering_is_found),
+		WITH_MODULES(losses_are_no_alteration),
+		WITH_MODULES(interrupted_is_intact),
+		WITH_MODULES(closed_and_not_complete),
+		WITH_MODULES(what_cannot_be_verified),
+		WITH_MODULES(damaged_pages_are_found),
+		WITH_MODULES(truncated_file),
+		WITH_MODULES(can_be_stopped),
+		WITH_MODULES(pictures_are_held_against_their_rows),
+		WITH_MODULES(rows_of_pictures_are_in_the_ledger),
+		WITH_MODULES(damaged_file),
+		WITH_MODULES(file_is_ahead_of_an_interrupted_recording),
+		WITH_MODULES(recorder_and_verification_agree),
+		WITH_MODULES(without_the_module_it_is_said),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/read/row_times.c: which time a row gets, and that times increase whatever
+ * Tests of lib/record/read/rows.c: which time a row gets, and that times increase whatever
  * a file says.
  */
 #include "recorded.h"
-#include "../../../lib/record/read/row_times.h"
+#include "../../../lib/record/read/rows.h"
 
 #define DB "times.rec/recording.db"
 
