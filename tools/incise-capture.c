@@ -253,7 +253,6 @@ int main(int argc, char **argv)
 	if (incise_recorder_end(run.recorder, &err))
 		give_up(&run, &err);
 	incise_recorder_stats(run.recorder, &run.result.stats);
-	run.result.n = incise_recorder_streams(run.recorder, run.result.streams);
 	if (incise_recorder_close(run.recorder, &err))
 		cli_fail_with(&err);
 	/* Whole by now, should the terminal be held. */

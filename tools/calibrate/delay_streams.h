@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <incise/calibrate_delay.h>
 #include <incise/calibration.h>
-#include <incise/stream.h>
+#include <incise/recording.h>
 
 enum { DELAY_FORCE, DELAY_TRACKER, DELAY_CAMERA, DELAY_STREAMS };
 

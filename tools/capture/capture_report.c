@@ -12,8 +12,8 @@
 void capture_report(const struct capture_result *result, bool json)
 {
 	const struct incise_recorder_stats *stats = &result->stats;
-	const struct incise_stream *streams = result->streams;
-	const int n = result->n;
+	const struct incise_stream *streams = stats->streams;
+	const int n = stats->n_streams;
 	uint64_t lost = stats->force_lost + stats->tracker_lost + stats->frames_lost;
 	const char *path = result->path;
 
@@ -72,9 +72,9 @@ _Noreturn static void fail_of_losses(const char *path,
 void capture_judge(const struct capture_result *result)
 {
 	const struct incise_recorder_stats *stats = &result->stats;
-	const struct incise_stream *streams = result->streams;
+	const struct incise_stream *streams = stats->streams;
 	const char *path = result->path;
-	const int n = result->n;
+	const int n = stats->n_streams;
 
 	if (result->early.code)
 		cli_fail_with(&result->early);

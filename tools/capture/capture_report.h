@@ -13,8 +13,6 @@ struct capture_result {
 	double seconds;		   /* recorded */
 	struct incise_error early; /* why it ended by itself; code 0: it did not */
 	struct incise_recorder_stats stats;
-	struct incise_stream streams[INCISE_STREAMS_MAX];
-	int n;
 };
 
 /* On standard output, as text or JSON. */

@@ -108,11 +108,9 @@ static void headline(const struct capture_view *view,
 void capture_view_show(struct capture_view *view, const struct incise_recorder *recorder,
 		       double seconds)
 {
-	struct incise_stream streams[INCISE_STREAMS_MAX];
 	struct incise_recorder_stats stats;
 	char top[200], lines[INCISE_STREAMS_MAX][200] = {{0}};
 	int64_t now_ns = (int64_t)stopwatch_ns();
-	int n;
 
 	if (now_ns - view->shown_ns < SHOW_NS)
 		return;
@@ -121,10 +119,10 @@ void capture_view_show(struct capture_view *view, const struct incise_recorder *
 		return;
 	incise_recorder_stats(recorder, &stats);
 	headline(view, &stats, seconds, top, sizeof(top));
-	n = incise_recorder_streams(recorder, streams);
-	for (int i = 0; i < n; i++)
-		stream_line(&streams[i], lines[i], sizeof(lines[i]));
+	for (int i = 0; i < stats.n_streams; i++)
+		stream_line(&stats.streams[i], lines[i], sizeof(lines[i]));
 	cli_progress("%s\n%s\n%s\n%s\n%s%sm, 1-9: marker   %sq: end   %s", top,
-		     stream_heading, lines[0], lines[1], lines[2], n > 2 ? "\n" : "",
-		     stats.armed ? "t: trigger   " : "", view->last);
+		     stream_heading, lines[0], lines[1], lines[2],
+		     stats.n_streams > 2 ? "\n" : "", stats.armed ? "t: trigger   " : "",
+		     view->last);
 }

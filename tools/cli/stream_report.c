@@ -88,7 +88,7 @@ json_t *stream_json(const struct incise_stream *streams, int n)
 			array,
 			json_pack("{so so sb so so so sI sI sI so so so so so so so so}",
 				  "name", json_text(s->name), "device",
-				  json_text(s->device), "stamped", s->stamped,
+				  json_text(s->device), "stamped", s->timestamped,
 				  "nominal_hz", json_number(s->nominal_hz), "delay_ms",
 				  json_number(s->delay_ms), "delay_sd_ms",
 				  json_number(s->delay_sd_ms), "rows",

@@ -7,7 +7,7 @@
 
 #include <stddef.h>
 #include <jansson.h>
-#include <incise/stream.h>
+#include <incise/recording.h>
 
 /* The heading of lines, and a line of one stream, both without a newline. */
 extern const char stream_heading[];

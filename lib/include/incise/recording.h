@@ -12,10 +12,41 @@
 #include <incise/calibration.h>
 #include <incise/error.h>
 #include <incise/export.h>
-#include <incise/stream.h>
 #include <incise/tracker.h>
 
 INCISE_BEGIN_DECLS
+
+/** Streams of a recording, at most. */
+#define INCISE_STREAMS_MAX 3
+
+/**
+ * One stream of a recording: its losses and its times. NAN: not known.
+ *
+ *     acquisition ──── delay ────► earliest ──── jitter ────► arrival   (CLOCK_MONOTONIC)
+ *                                  arrival       ≥ 0
+ *
+ * A timestamped stream has its times from the device or the kernel, and its jitter is that of
+ * the timestamps. Another one gets its times from the line of the device's own clock below all
+ * arrivals.
+ */
+struct incise_stream {
+	char name[16]; /**< force, tracker, camera */
+	char device[64];
+	bool timestamped; /**< by the kernel or the converter, at the acquisition */
+	double nominal_hz;
+	double delay_ms, delay_sd_ms; /**< of the calibration or the device */
+	uint64_t rows, lost;
+	uint64_t late;			/**< more than a period behind the line */
+	double rate_hz;			/**< measured by this computer's clock */
+	double drift_ppm, drift_sd_ppm; /**< of the device's clock; fast is positive */
+	double jitter_ms;     /**< standard deviation of arrivals or timestamps */
+	double jitter_max_ms; /**< farthest above the line */
+	double offset_ms; /**< in all: the delay, and the expected error of the line */
+	/** Standard uncertainty of times against this clock; without that of the delay if
+	 * delay_sd_ms is NAN. */
+	double offset_sd_ms;
+	char ended[200]; /**< cause of an end before the recording's; empty: none */
+};
 
 struct incise_recording;
 

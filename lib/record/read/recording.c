@@ -447,7 +447,7 @@ static bool take_stream(sqlite3_stmt *stmt, struct incise_stream *stream)
 {
 	struct incise_stream *s = stream;
 
-	s->stamped = sqlite3_column_int(stmt, 2);
+	s->timestamped = sqlite3_column_int(stmt, 2);
 	return take_text(stmt, 0, true, s->name, sizeof(s->name)) && *s->name &&
 	       take_text(stmt, 1, true, s->device, sizeof(s->device)) &&
 	       take_known(stmt, 3, 1, &s->nominal_hz) &&

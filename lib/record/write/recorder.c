@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Writing a recording; see incise/recorder.h, and recorder.h for its parts.
+ * Writing a recording; see incise/recorder.h, and recorder.h for the other files.
  *
  *     force ────►┐                         ┌─► tables, ledger ─► one transaction per 100 ms
  *     tracker ──►┼─► poll ─► times ─► rows ┤                     of the rig's clock
@@ -17,15 +17,257 @@
 #include <unistd.h>
 #include "recorder.h"
 
-#define BATCH 1024
+#define COMMIT_NS 100000000LL
+/* The knots of a line are many and change little in a second: not with each commit. */
+#define KNOTS_EVERY 10
+#define BATCH_FORCE 1024
+#define BATCH 64
+/* A disk that has not answered for this time is given up. */
+#define PATIENCE_NS (5 * INCISE_NS_PER_S)
+/* A power cut costs little more frames than rows of the database. */
+#define SYNC_NS 1000000000LL
+/* A camera without a frame for this time and number of periods is silent. */
+#define SILENT_NS (2 * INCISE_NS_PER_S)
+#define SILENT_PERIODS 10
+/* Longest time between two checks that counts as silence: the computer may have slept. */
+#define LOOK_NS 100000000LL
+
+/* --- camera -------------------------------------------------------------------------- */
+
+/* Create camera.mkv and set up vision. Returns 0 or -errno. */
+static int open_camera(struct incise_recorder *rec,
+		       const struct incise_vision_setup *vision, struct incise_error *err)
+{
+	bool real = incise_clock_is_real(incise_rig_clock(rec->rig));
+	const struct incise_frames_options options = {.sync_ns = real ? SYNC_NS : 0};
+	const struct incise_frames_shape shape = {
+		.width = rec->camera_info.width,
+		.height = rec->camera_info.height,
+		.pixels = rec->camera_info.pixels,
+		.rate_hz = rec->camera_info.rate_hz,
+	};
+	struct incise_vision_setup scaled;
+	char *file;
+
+	if (vision) {
+		scaled = *vision;
+		if (scaled.full_px > 0)
+			scaled.depth_mm_px = rec->calibration.depth_mm_px;
+		rec->camera.vision = incise_vision_new(&scaled, err);
+		if (!rec->camera.vision)
+			return -errno;
+	}
+	if (asprintf(&file, "%s/%s", rec->part, INCISE_FRAMES_FILE) < 0)
+		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+	rec->camera.writer = incise_frames_writer_new(file, &shape, &options, err);
+	free(file);
+	return rec->camera.writer ? 0 : -errno;
+}
+
+/* Frames go into the file from now on. Returns 0 or -errno. */
+static int start_camera(struct incise_recorder *rec, struct incise_error *err)
+{
+	struct incise_frame_pump_setup setup = {
+		.camera = incise_rig_camera(rec->rig),
+		.clock = incise_rig_clock(rec->rig),
+		.vision = rec->camera.vision,
+		.writer = rec->camera.writer,
+	};
+
+	if (!rec->camera.writer)
+		return 0;
+	rec->camera.writer = NULL; /* the pump closes it */
+	rec->camera.pump = incise_frame_pump_new(&setup, err);
+	return rec->camera.pump ? 0 : -errno;
+}
+
+static int put_records(struct incise_recorder *rec, struct incise_error *err)
+{
+	struct incise_frame_record records[BATCH];
+	int n = BATCH, rc = 0;
+
+	while (n == BATCH) {
+		n = incise_frame_pump_take(rec->camera.pump, records, BATCH);
+		for (int i = 0; i < n && !rc; i++)
+			rc = incise_recorder_put_frame(rec, &records[i], err);
+		if (rc)
+			return rc;
+	}
+	return 0;
+}
+
+static void count(struct incise_recorder *rec, struct incise_frame_pump_stats *stats)
+{
+	incise_frame_pump_stats(rec->camera.pump, stats);
+	rec->streams[INCISE_LEDGER_CAMERA].device_lost =
+		stats->lost + stats->dropped + stats->unwritten + stats->unrecorded;
+	rec->stats.frames_unlooked = stats->unlooked;
+}
+
+/* Check whether frames arrive. Returns 0 or a disk error. */
+static int check_silence(struct incise_recorder *rec, uint64_t read,
+			 struct incise_error *err)
+{
+	struct incise_recorder_camera *camera = &rec->camera;
+	int64_t now_ns = incise_clock_now(incise_rig_clock(rec->rig));
+	int64_t since_ns = camera->looked_ns ? now_ns - camera->looked_ns : 0;
+	double period_ns = 1e9 / rec->camera_info.rate_hz; /* infinite for rate 0 */
+	bool was = camera->silent;
+	int rc = SQLITE_OK;
+
+	camera->looked_ns = now_ns;
+	camera->silent_ns += since_ns < LOOK_NS ? since_ns : LOOK_NS;
+	if (read != camera->seen)
+		camera->silent_ns = 0;
+	camera->seen = read;
+	camera->silent = camera->silent_ns >= SILENT_NS &&
+			 ((double)camera->silent_ns >= SILENT_PERIODS * period_ns ||
+			  !(rec->camera_info.rate_hz > 0));
+	if (camera->silent && !was)
+		rc = incise_recorder_note(rec, "silent", "camera: no picture for %.1f s",
+					  (double)camera->silent_ns * 1e-9);
+	else if (was && !camera->silent)
+		rc = incise_recorder_note(rec, "silent", "camera: pictures come again");
+	return incise_recorder_check(rec, rc, err);
+}
+
+/* Write rows of frames that are in the file. Returns 0 or a disk error. */
+static int read_camera(struct incise_recorder *rec, struct incise_error *err)
+{
+	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_CAMERA];
+	struct incise_frame_pump_stats stats;
+	int rc;
+
+	if (!rec->camera.pump)
+		return 0;
+	/* On a real clock this does nothing: the pump has a thread. */
+	while (!*stream->ended && incise_frame_pump_step(rec->camera.pump) > 0)
+		;
+	rc = put_records(rec, err);
+	count(rec, &stats);
+	if (!rc && !*stream->ended && (stats.camera.code || stats.file.code))
+		rc = incise_recorder_end_stream(
+			rec, INCISE_LEDGER_CAMERA,
+			stats.camera.code ? stats.camera.text : stats.file.text, err);
+	else if (!rc && !*stream->ended)
+		rc = check_silence(rec, stats.read, err);
+	return rc;
+}
+
+/* End the file and write its last rows. Returns 0 or a disk error. */
+static int end_camera(struct incise_recorder *rec, struct incise_error *err)
+{
+	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_CAMERA];
+	struct incise_frame_pump_stats stats;
+	struct incise_error why = {0};
+	int rc = 0, stopped;
+
+	if (!rec->camera.pump) { /* never triggered: a file without frames */
+		incise_frames_writer_close(rec->camera.writer, NULL);
+		rec->camera.writer = NULL;
+		return 0;
+	}
+	stopped = incise_frame_pump_stop(rec->camera.pump, PATIENCE_NS, &why);
+	rc = put_records(rec, err);
+	count(rec, &stats);
+	/* Frames that hang on a disk that does not answer are never reported: they have no row. */
+	if (stopped == -ETIMEDOUT)
+		stream->device_lost = stats.lost + stats.read - stream->rows;
+	if (!rc && stopped && !*stream->ended)
+		rc = incise_recorder_end_stream(rec, INCISE_LEDGER_CAMERA, why.text, err);
+	if (!rc && rec->camera.silent && !*stream->ended) {
+		incise_error_set(
+			&why, ENODATA,
+			"%s: gave no picture for the last %.1f s; check its cable",
+			stream->device, (double)rec->camera.silent_ns * 1e-9);
+		rc = incise_recorder_end_stream(rec, INCISE_LEDGER_CAMERA, why.text, err);
+	}
+	return rc;
+}
+
+static void close_camera(struct incise_recorder *rec)
+{
+	incise_frame_pump_free(rec->camera.pump);
+	rec->camera.pump = NULL;
+	incise_frames_writer_close(rec->camera.writer, NULL);
+	rec->camera.writer = NULL;
+	incise_vision_free(rec->camera.vision);
+	rec->camera.vision = NULL;
+}
+
+/* --- counts and commits ------------------------------------------------------------------------- */
+
+static void fill_counts(const struct incise_recorder *rec,
+			struct incise_recorder_stats *stats)
+{
+	*stats = rec->stats;
+	stats->force = rec->streams[INCISE_LEDGER_FORCE].rows;
+	stats->tracker = rec->streams[INCISE_LEDGER_TRACKER].rows;
+	stats->frames = rec->streams[INCISE_LEDGER_CAMERA].rows;
+	stats->force_lost = incise_recorder_lost(rec, INCISE_LEDGER_FORCE);
+	stats->tracker_lost = incise_recorder_lost(rec, INCISE_LEDGER_TRACKER);
+	stats->frames_lost = incise_recorder_lost(rec, INCISE_LEDGER_CAMERA);
+	/* Closing writes the rows whose window is still open. */
+	stats->depth += rec->depth.n - rec->depth.done;
+}
+
+void incise_recorder_stats(const struct incise_recorder *rec,
+			   struct incise_recorder_stats *stats)
+{
+	fill_counts(rec, stats);
+	stats->n_streams = incise_recorder_describe_streams(rec, stats->streams);
+}
+
+/* Counts are committed with their rows: an interrupted recording has its losses. */
+static int write_counts(struct incise_recorder *rec)
+{
+	struct incise_recorder_stats stats;
+	bool camera = rec->streams[INCISE_LEDGER_CAMERA].exists;
+	int bad = SQLITE_OK;
+
+	fill_counts(rec, &stats);
+	const struct {
+		const char *key;
+		uint64_t value;
+	} counts[] = {
+		{"force_rows", stats.force},
+		{"tracker_rows", stats.tracker},
+		{"depth_rows", rec->stats.depth}, /* without the open windows */
+		{"force_lost", stats.force_lost},
+		{"tracker_lost", stats.tracker_lost},
+		{"force_clipped", stats.force_clipped},
+		{"frames_rows", stats.frames},
+		{"frames_lost", stats.frames_lost},
+		{"frames_unlooked", stats.frames_unlooked},
+	};
+
+	for (size_t i = 0; i < sizeof(counts) / sizeof(*counts) - (camera ? 0 : 3); i++)
+		bad |= incise_recorder_set_integer(rec, counts[i].key, counts[i].value);
+	return bad;
+}
+
+/* Commit the rows so far, with their counts and their ledger. Returns 0 or -errno. */
+static int commit(struct incise_recorder *rec, int64_t now_ns, bool last,
+		  struct incise_error *err)
+{
+	bool knots = last || rec->commits++ % KNOTS_EVERY == 0;
+
+	if (write_counts(rec) != SQLITE_OK ||
+	    incise_recorder_write_streams(rec, knots) != SQLITE_OK ||
+	    incise_recorder_write_ledger(rec) != SQLITE_OK ||
+	    sqlite3_exec(rec->db, "COMMIT; BEGIN", NULL, NULL, NULL) != SQLITE_OK)
+		return incise_recorder_fail(rec, err);
+	rec->commit_ns = now_ns;
+	return 0;
+}
 
 /* --- beginning ------------------------------------------------------------------- */
 
 static void recorder_free(struct incise_recorder *rec)
 {
-	incise_recorder_close_camera(rec);
+	close_camera(rec);
 	incise_recorder_close_database(rec);
-	incise_recorder_hold_free(rec);
+	incise_recorder_disarm(rec);
 	if (rec->folder >= 0)
 		close(rec->folder);
 	if (rec->parent >= 0)
@@ -46,7 +288,7 @@ static int check_rig(const char *path, struct incise_rig *rig, struct incise_err
 			"%s was opened without",
 			path, incise_rig_spec(rig));
 	incise_tracker_info(incise_rig_tracker(rig), &tracker);
-	/* Rows of two sensors in one table would be one that jumps to and fro. */
+	/* The tables have no column that separates two sensors. */
 	if (tracker.stations > 1)
 		return incise_error_set(
 			err, EOPNOTSUPP,
@@ -58,10 +300,10 @@ static int check_rig(const char *path, struct incise_rig *rig, struct incise_err
 }
 
 /*
- * Where making files took long, devices have lost some of what came meanwhile. That is of
- * before the recording, and no loss to it. The virtual rig loses when it is asked.
+ * Devices may have lost samples while the files were made. These are from before the recording
+ * and do not count. The virtual rig counts losses when it is read.
  */
-static void begin_counts(struct incise_recorder *rec)
+static void start_counts(struct incise_recorder *rec)
 {
 	struct incise_tracker *tracker = incise_rig_tracker(rec->rig);
 	struct incise_force *force = incise_rig_force(rec->rig);
@@ -74,24 +316,27 @@ static void begin_counts(struct incise_recorder *rec)
 	rec->streams[INCISE_LEDGER_TRACKER].lost_at_start = incise_tracker_lost(tracker);
 }
 
-/* Files in the folder, and all that may fail before the first sample is taken. */
-static int begin(struct incise_recorder *rec, const struct incise_recorder_setup *setup,
+/* Make the files, and do all that may fail before the first sample is read. */
+static int start(struct incise_recorder *rec, const struct incise_recorder_setup *setup,
 		 struct incise_error *err)
 {
-	int rc = incise_recorder_preflight(rec, setup->planned_s, err);
+	int rc = incise_recorder_check_space(rec, setup->planned_s, err);
 
 	if (!rc)
 		rc = incise_recorder_open_database(rec, setup->calibration_path, err);
-	if (!rc && rec->streams[INCISE_LEDGER_CAMERA].there)
-		rc = incise_recorder_open_camera(rec, setup->vision, err);
-	if (!rc && setup->armed && incise_recorder_hold(rec))
+	if (!rc)
+		rc = commit(rec, incise_clock_now(incise_rig_clock(rec->rig)), false,
+			    err);
+	if (!rc && rec->streams[INCISE_LEDGER_CAMERA].exists)
+		rc = open_camera(rec, setup->vision, err);
+	if (!rc && setup->armed && incise_recorder_arm(rec))
 		rc = incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
 	if (!rc && !setup->armed)
-		rc = incise_recorder_start_camera(rec, err);
+		rc = start_camera(rec, err);
 	if (!rc)
-		begin_counts(rec);
+		start_counts(rec);
 	if (rc) {
-		incise_recorder_close_camera(rec);
+		close_camera(rec);
 		incise_recorder_close_database(rec);
 		incise_recorder_remove_folder(rec);
 	}
@@ -117,8 +362,8 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	rec->rig = rig;
 	rec->calibration = *setup->calibration;
 	rec->cuts = setup->cuts;
-	rec->hold.force_N = setup->trigger_force_N;
-	rec->hold.button = setup->trigger_button;
+	rec->pretrigger.force_N = setup->trigger_force_N;
+	rec->pretrigger.button = setup->trigger_button;
 	rec->stats.zero_mV = rec->calibration.force_zero_mV;
 	rec->stats.camera_depth_mm = NAN;
 	rec->zero.depth_max_mm = -INFINITY;
@@ -128,18 +373,18 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 		incise_camera_info(incise_rig_camera(rig), &rec->camera_info);
 	incise_rig_surface(rig, point_mm, normal);
 	incise_depth_init(&rec->depth, point_mm, normal);
-	incise_recorder_begin_streams(rec);
-	rc = incise_recorder_take_path(rec, path, err);
+	incise_recorder_start_streams(rec);
+	rc = incise_recorder_split_path(rec, path, err);
 	if (!rc)
 		rc = incise_recorder_make_folder(rec, err);
 	if (!rc)
-		rc = begin(rec, setup, err);
+		rc = start(rec, setup, err);
 	if (rc) {
 		recorder_free(rec);
 		errno = -rc;
 		return NULL;
 	}
-	/* A power cut must not take the folder's name; where this fails, nothing is worse. */
+	/* A power cut must not lose the folder's name; a failure changes nothing. */
 	if (incise_clock_is_real(incise_rig_clock(rig)) && !fsync(rec->folder))
 		incise_recorder_sync_parent(rec);
 	return rec;
@@ -148,8 +393,8 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 /* --- samples --------------------------------------------------------------------- */
 
 /*
- * A device that fails ends its stream alone. @cause: what it tells of it, if anything.
- * Returns 0 or of the disk.
+ * A device that fails ends its stream alone. @cause is its message, or empty. Returns 0 or a
+ * disk error.
  */
 static int fail_device(struct incise_recorder *rec, int stream, const char *cause, int rc,
 		       struct incise_error *err)
@@ -163,16 +408,16 @@ static int fail_device(struct incise_recorder *rec, int stream, const char *caus
 	return incise_recorder_end_stream(rec, stream, *cause ? cause : why, err);
 }
 
-static int take_force(struct incise_recorder *rec, struct incise_error *err)
+static int read_force(struct incise_recorder *rec, struct incise_error *err)
 {
 	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_FORCE];
 	struct incise_force *force = incise_rig_force(rec->rig);
-	struct incise_force_sample samples[BATCH];
+	struct incise_force_sample samples[BATCH_FORCE];
 	char cause[200];
-	int n = BATCH, rc = 0;
+	int n = BATCH_FORCE, rc = 0;
 
-	while (n == BATCH && !*stream->ended) {
-		n = incise_force_read(force, samples, BATCH);
+	while (n == BATCH_FORCE && !*stream->ended) {
+		n = incise_force_read(force, samples, BATCH_FORCE);
 		if (n < 0) {
 			incise_force_cause(force, cause, sizeof(cause));
 			rc = fail_device(rec, INCISE_LEDGER_FORCE, cause, n, err);
@@ -186,16 +431,16 @@ static int take_force(struct incise_recorder *rec, struct incise_error *err)
 	return 0;
 }
 
-static int take_tracker(struct incise_recorder *rec, struct incise_error *err)
+static int read_tracker(struct incise_recorder *rec, struct incise_error *err)
 {
 	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_TRACKER];
 	struct incise_tracker *tracker = incise_rig_tracker(rec->rig);
-	struct incise_tracker_sample samples[BATCH / 16];
+	struct incise_tracker_sample samples[BATCH];
 	char cause[200];
-	int n = BATCH / 16, rc = 0;
+	int n = BATCH, rc = 0;
 
-	while (n == BATCH / 16 && !*stream->ended) {
-		n = incise_tracker_read(tracker, samples, BATCH / 16);
+	while (n == BATCH && !*stream->ended) {
+		n = incise_tracker_read(tracker, samples, BATCH);
 		if (n < 0) {
 			incise_tracker_cause(tracker, cause, sizeof(cause));
 			rc = fail_device(rec, INCISE_LEDGER_TRACKER, cause, n, err);
@@ -213,12 +458,12 @@ static int take_tracker(struct incise_recorder *rec, struct incise_error *err)
 static bool all_ended(const struct incise_recorder *rec)
 {
 	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++)
-		if (rec->streams[i].there && !*rec->streams[i].ended)
+		if (rec->streams[i].exists && !*rec->streams[i].ended)
 			return false;
 	return true;
 }
 
-/* 1 with *err where it is to end, though nothing is wrong with what there is. */
+/* 1 with *err if the recording must end, though it is good so far. */
 static int check_end(struct incise_recorder *rec, struct incise_error *err)
 {
 	if (all_ended(rec)) {
@@ -237,6 +482,14 @@ static int check_end(struct incise_recorder *rec, struct incise_error *err)
 	return 0;
 }
 
+/* The trigger has come. */
+static int release(struct incise_recorder *rec, struct incise_error *err)
+{
+	int rc = incise_recorder_release(rec, err);
+
+	return rc ? rc : start_camera(rec, err);
+}
+
 int incise_recorder_poll(struct incise_recorder *rec, struct incise_error *err)
 {
 	int64_t now = incise_clock_now(incise_rig_clock(rec->rig));
@@ -245,24 +498,24 @@ int incise_recorder_poll(struct incise_recorder *rec, struct incise_error *err)
 	if (rec->failed)
 		return incise_error_set(err, -rec->failed, "%s: has failed before",
 					rec->path);
-	rc = take_force(rec, err);
+	rc = read_force(rec, err);
 	if (!rc)
-		rc = take_tracker(rec, err);
+		rc = read_tracker(rec, err);
 	if (!rc)
-		rc = incise_recorder_take_camera(rec, err);
+		rc = read_camera(rec, err);
 	if (!rc && incise_recorder_zero_due(rec))
 		rc = incise_recorder_settle_zero(rec, err);
-	if (!rc && rec->stats.armed && rec->hold.triggered)
-		rc = incise_recorder_release(rec, err);
-	if (!rc && now - rec->commit_ns >= INCISE_RECORDER_COMMIT_NS)
-		rc = incise_recorder_commit(rec, now, false, err);
+	if (!rc && rec->stats.armed && rec->pretrigger.triggered)
+		rc = release(rec, err);
+	if (!rc && now - rec->commit_ns >= COMMIT_NS)
+		rc = commit(rec, now, false, err);
 	rec->failed = rc;
 	return rc ? rc : check_end(rec, err);
 }
 
 void incise_recorder_trigger(struct incise_recorder *rec)
 {
-	rec->hold.triggered = true;
+	rec->pretrigger.triggered = true;
 }
 
 int incise_recorder_mark(struct incise_recorder *rec, const char *kind, const char *text,
@@ -271,20 +524,6 @@ int incise_recorder_mark(struct incise_recorder *rec, const char *kind, const ch
 	if (!rec->failed && incise_recorder_note(rec, kind, "%s", text) != SQLITE_OK)
 		rec->failed = incise_recorder_fail(rec, err);
 	return rec->failed;
-}
-
-void incise_recorder_stats(const struct incise_recorder *rec,
-			   struct incise_recorder_stats *stats)
-{
-	*stats = rec->stats;
-	stats->force = rec->streams[INCISE_LEDGER_FORCE].rows;
-	stats->tracker = rec->streams[INCISE_LEDGER_TRACKER].rows;
-	stats->frames = rec->streams[INCISE_LEDGER_CAMERA].rows;
-	stats->force_lost = incise_recorder_lost(rec, INCISE_LEDGER_FORCE);
-	stats->tracker_lost = incise_recorder_lost(rec, INCISE_LEDGER_TRACKER);
-	stats->frames_lost = incise_recorder_lost(rec, INCISE_LEDGER_CAMERA);
-	/* Rows whose window is still open are as good as written: closing writes them. */
-	stats->depth += rec->depth.n - rec->depth.done;
 }
 
 /* --- end -------------------------------------------------------------------------- */
@@ -298,9 +537,9 @@ int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
 	if (rec->ended)
 		return 0;
 	rec->ended = true;
-	rc = incise_recorder_end_camera(rec, err);
-	/* A recording shorter than the time for the zero makes do with what it has. */
-	if (!rc && isnan(rec->stats.zero_mV) && rec->streams[INCISE_LEDGER_FORCE].begun)
+	rc = end_camera(rec, err);
+	/* A recording that is too short for the zero uses the samples that it has. */
+	if (!rc && isnan(rec->stats.zero_mV) && rec->streams[INCISE_LEDGER_FORCE].started)
 		rc = incise_recorder_settle_zero(rec, err);
 	if (!rc)
 		rc = incise_recorder_flush_depth(rec, err);
@@ -308,17 +547,17 @@ int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
 	return rc;
 }
 
-/* Write what is still held back, and that nothing is missing. */
+/* Write the last rows, the end of the ledger and the seals. */
 static int complete(struct incise_recorder *rec, struct incise_error *err)
 {
 	int rc = incise_recorder_end(rec, err);
 
-	if (!rc && (incise_recorder_ledger_close(rec) != SQLITE_OK ||
+	if (!rc && (incise_recorder_end_ledger(rec) != SQLITE_OK ||
 		    incise_recorder_note(rec, "end", "recording ended") != SQLITE_OK))
 		rc = incise_recorder_fail(rec, err);
 	if (!rc)
-		rc = incise_recorder_commit(rec, rec->commit_ns, true, err);
-	/* With it all is written that is to be sealed. */
+		rc = commit(rec, rec->commit_ns, true, err);
+	/* The seals are over all rows, those of this commit included. */
 	if (!rc && (incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK ||
 		    incise_recorder_seal(rec) != SQLITE_OK ||
 		    sqlite3_exec(rec->db, "COMMIT", NULL, NULL, NULL) != SQLITE_OK))
@@ -326,8 +565,8 @@ static int complete(struct incise_recorder *rec, struct incise_error *err)
 	if (rc)
 		return rc;
 	/*
-	 * One file that stands alone. Someone who is reading it now keeps SQLite from
-	 * folding the log in; then the log stays beside it, which is as good.
+	 * Make it a single file. If a reader keeps SQLite from folding the log in, the log stays
+	 * next to the file, which is valid too.
 	 */
 	if (sqlite3_exec(rec->db, "PRAGMA synchronous=FULL; PRAGMA journal_mode=DELETE",
 			 NULL, NULL, NULL) != SQLITE_OK &&
@@ -351,10 +590,10 @@ int incise_recorder_close(struct incise_recorder *rec, struct incise_error *err)
 			rec->worthless ? "" : rec->part);
 	else
 		rc = complete(rec, err);
-	incise_recorder_close_camera(rec);
+	close_camera(rec);
 	incise_recorder_close_database(rec);
 	if (!rc)
-		rc = incise_recorder_give_name(rec, err);
+		rc = incise_recorder_rename_folder(rec, err);
 	if (rec->worthless)
 		incise_recorder_remove_folder(rec);
 	recorder_free(rec);

@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The database of a recording that is written: opened, committed, closed; see recorder.h.
+ * The database of a recording that is written: opening and closing, statements, tables meta and
+ * events; see recorder.h.
  */
 #include <errno.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include "recorder.h"
+#include <string.h>
+#include <sys/utsname.h>
+#include <time.h>
+#include <incise/version.h>
 #include "../schema.h"
+#include "recorder.h"
 
-/* How long a reader may keep the recorder from writing. */
+#define SETTINGS_MAX 16384
+#define CALIBRATION_MAX (1 << 20) /* with the history of years */
+/* Longest wait for a reader that blocks the recorder. */
 #define BUSY_MS 1000
 
 static const char *const sql[STATEMENTS] = {
@@ -43,52 +51,194 @@ int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err)
 				rec->path, text, rec->part);
 }
 
-/* Counts go with the rows they count, so that an interrupted recording knows its losses. */
-static int write_counts(struct incise_recorder *rec)
+int incise_recorder_check(struct incise_recorder *rec, int code, struct incise_error *err)
 {
-	struct incise_recorder_stats stats;
-	bool camera = rec->streams[INCISE_LEDGER_CAMERA].there;
+	return code == SQLITE_OK ? 0 : incise_recorder_fail(rec, err);
+}
+
+/* --- rows of tables meta and events -------------------------------------------------- */
+
+int incise_recorder_run(sqlite3_stmt *stmt)
+{
+	sqlite3_step(stmt);
+	return sqlite3_reset(stmt);
+}
+
+static int set_text(struct incise_recorder *rec, const char *key, const char *value)
+{
+	sqlite3_stmt *stmt = rec->stmt[SET_META];
+
+	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
+	sqlite3_bind_text(stmt, 2, value, -1, SQLITE_TRANSIENT);
+	return incise_recorder_run(stmt);
+}
+
+int incise_recorder_set_integer(struct incise_recorder *rec, const char *key,
+				int64_t value)
+{
+	sqlite3_stmt *stmt = rec->stmt[SET_META];
+
+	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
+	sqlite3_bind_int64(stmt, 2, value);
+	return incise_recorder_run(stmt);
+}
+
+/* SQLite keeps NaN as NULL: not known. */
+int incise_recorder_set_real(struct incise_recorder *rec, const char *key, double value)
+{
+	sqlite3_stmt *stmt = rec->stmt[SET_META];
+
+	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
+	sqlite3_bind_double(stmt, 2, value);
+	return incise_recorder_run(stmt);
+}
+
+/* End a truncated text before its last, incomplete character. */
+static void end_whole(char *text, size_t size, int length)
+{
+	size_t n = size - 1;
+
+	if (length < (int)size)
+		return;
+	while (n && ((unsigned char)text[n - 1] & 0xc0) == 0x80)
+		n--;
+	if (n && (unsigned char)text[n - 1] >= 0xc0)
+		n--;
+	text[n] = 0;
+}
+
+static int note(struct incise_recorder *rec, int64_t t_ns, const char *kind,
+		const char *fmt, va_list args)
+{
+	sqlite3_stmt *stmt = rec->stmt[INSERT_EVENT];
+	char text[250];
+
+	end_whole(text, sizeof(text), vsnprintf(text, sizeof(text), fmt, args));
+	sqlite3_bind_int64(stmt, 1, t_ns);
+	sqlite3_bind_text(stmt, 2, kind, -1, SQLITE_TRANSIENT);
+	sqlite3_bind_text(stmt, 3, text, -1, SQLITE_TRANSIENT);
+	return incise_recorder_run(stmt);
+}
+
+int incise_recorder_note_at(struct incise_recorder *rec, int64_t t_ns, const char *kind,
+			    const char *fmt, ...)
+{
+	va_list args;
+	int rc;
+
+	va_start(args, fmt);
+	rc = note(rec, t_ns, kind, fmt, args);
+	va_end(args);
+	return rc;
+}
+
+int incise_recorder_note(struct incise_recorder *rec, const char *kind, const char *fmt,
+			 ...)
+{
+	va_list args;
+	int rc;
+
+	va_start(args, fmt);
+	rc = note(rec, incise_clock_now(incise_rig_clock(rec->rig)), kind, fmt, args);
+	va_end(args);
+	return rc;
+}
+
+/* --- what is known at the start ------------------------------------------------------ */
+
+/* Set a value to the text of a file, up to @max bytes; skip a file that cannot be read. */
+static int set_file(struct incise_recorder *rec, const char *key, const char *path,
+		    size_t max)
+{
+	FILE *file = fopen(path, "re");
+	char *text = file ? malloc(max + 1) : NULL;
+	int rc = SQLITE_OK;
+
+	if (text) {
+		text[fread(text, 1, max, file)] = 0;
+		rc = set_text(rec, key, text);
+	}
+	free(text);
+	if (file)
+		fclose(file);
+	return rc;
+}
+
+/* Keep the texts of rig.conf and calibration.conf. */
+static int set_settings(struct incise_recorder *rec, const char *calibration_path)
+{
+	const char *spec = incise_rig_spec(rec->rig);
 	int bad = SQLITE_OK;
 
-	incise_recorder_stats(rec, &stats);
-	const struct {
-		const char *key;
-		uint64_t value;
-	} counts[] = {
-		{"force_rows", stats.force},
-		{"tracker_rows", stats.tracker},
-		{"depth_rows", rec->stats.depth}, /* without those that are to come */
-		{"force_lost", stats.force_lost},
-		{"tracker_lost", stats.tracker_lost},
-		{"force_clipped", stats.force_clipped},
-		{"frames_rows", stats.frames},
-		{"frames_lost", stats.frames_lost},
-		{"frames_unlooked", stats.frames_unlooked},
-	};
-
-	for (size_t i = 0; i < sizeof(counts) / sizeof(*counts) - (camera ? 0 : 3); i++)
-		bad |= incise_recorder_set_integer(rec, counts[i].key, counts[i].value);
+	if (strncmp(spec, "sim:", 4))
+		bad |= set_file(rec, "rig_conf", spec, SETTINGS_MAX);
+	if (calibration_path)
+		bad |= set_file(rec, "calibration_conf", calibration_path,
+				CALIBRATION_MAX);
 	return bad;
 }
 
-/* The knots of a line are many, and move little in a second: not with each commit. */
-#define KNOTS_EVERY 10
-
-int incise_recorder_commit(struct incise_recorder *rec, int64_t now_ns, bool last,
-			   struct incise_error *err)
+static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 {
-	bool knots = last || rec->commits++ % KNOTS_EVERY == 0;
+	const char *const axes[] = {"x", "y", "z"};
+	char started[32];
+	struct utsname host;
+	struct timespec now;
+	struct tm utc;
+	int bad = 0;
 
-	if (write_counts(rec) != SQLITE_OK ||
-	    incise_recorder_write_streams(rec, knots) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	if (incise_recorder_ledger(rec) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	if (sqlite3_exec(rec->db, "COMMIT; BEGIN", NULL, NULL, NULL) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	rec->commit_ns = now_ns;
-	return 0;
+	clock_gettime(CLOCK_REALTIME, &now);
+	strftime(started, sizeof(started), "%Y-%m-%dT%H:%M:%SZ",
+		 gmtime_r(&now.tv_sec, &utc));
+	uname(&host);
+	bad |= incise_recorder_set_integer(rec, "complete", 0);
+	bad |= set_text(rec, "incise", incise_version());
+	bad |= set_text(rec, "host", host.nodename);
+	bad |= set_text(rec, "kernel", host.release);
+	bad |= set_text(rec, "started", started);
+	bad |= set_text(rec, "rig", incise_rig_spec(rec->rig));
+	bad |= set_settings(rec, calibration_path);
+	bad |= set_text(rec, "clock",
+			incise_clock_is_real(incise_rig_clock(rec->rig)) ? "real"
+									 : "simulated");
+	bad |= set_text(rec, "tracker_name", rec->tracker_info.name);
+	bad |= incise_recorder_set_real(rec, "tracker_hz", rec->tracker_info.rate_hz);
+	bad |= incise_recorder_set_integer(rec, "tracker_latency_ns",
+					   rec->tracker_info.latency_ns);
+	bad |= set_text(rec, "force_name", rec->force_info.name);
+	bad |= incise_recorder_set_real(rec, "force_hz", rec->force_info.rate_hz);
+	bad |= incise_recorder_set_integer(rec, "force_bits", rec->force_info.bits);
+	bad |= incise_recorder_set_real(rec, "force_full_scale_V",
+					rec->force_info.full_scale_V);
+	bad |= incise_recorder_set_real(rec, "force_offset_V", rec->force_info.offset_V);
+	bad |= incise_recorder_set_real(rec, "force_mV_N", rec->calibration.force_mV_N);
+	bad |= incise_recorder_set_real(rec, "force_zero_mV", rec->stats.zero_mV);
+	bad |= incise_recorder_set_real(rec, "depth_mm_px", rec->calibration.depth_mm_px);
+	if (rec->streams[INCISE_LEDGER_CAMERA].exists) {
+		bad |= set_text(rec, "camera_name", rec->camera_info.name);
+		bad |= incise_recorder_set_real(rec, "camera_hz",
+						rec->camera_info.rate_hz);
+		bad |= incise_recorder_set_integer(rec, "camera_width",
+						   rec->camera_info.width);
+		bad |= incise_recorder_set_integer(rec, "camera_height",
+						   rec->camera_info.height);
+		bad |= incise_recorder_set_integer(rec, "camera_exposure_ns",
+						   rec->camera_info.exposure_ns);
+	}
+	for (int i = 0; i < 3; i++) {
+		char key[32];
+
+		snprintf(key, sizeof(key), "tip_%s_mm", axes[i]);
+		bad |= incise_recorder_set_real(rec, key, rec->calibration.tip_mm[i]);
+		snprintf(key, sizeof(key), "surface_point_%s_mm", axes[i]);
+		bad |= incise_recorder_set_real(rec, key, rec->depth.point_mm[i]);
+		snprintf(key, sizeof(key), "surface_normal_%s", axes[i]);
+		bad |= incise_recorder_set_real(rec, key, rec->depth.normal[i]);
+	}
+	return bad | incise_recorder_note(rec, "start", "recording started");
 }
+
+/* --- opening and closing ------------------------------------------------------------- */
 
 int incise_recorder_open_database(struct incise_recorder *rec,
 				  const char *calibration_path, struct incise_error *err)
@@ -104,9 +254,8 @@ int incise_recorder_open_database(struct incise_recorder *rec,
 		SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL);
 	free(file);
 	/*
-	 * Someone may read the recording as it grows, and SQLite keeps the writer out for
-	 * a moment: until the file has its log, and when a log is folded in. What comes
-	 * meanwhile waits in the sources' rings.
+	 * A reader of the growing recording can block the writer for a moment: until the file
+	 * has its log, and while the log is folded in. Samples wait in the devices' rings.
 	 */
 	if (rc == SQLITE_OK)
 		rc = sqlite3_busy_timeout(rec->db, BUSY_MS);
@@ -124,11 +273,8 @@ int incise_recorder_open_database(struct incise_recorder *rec,
 		rc = sqlite3_prepare_v3(rec->db, sql[i], -1, SQLITE_PREPARE_PERSISTENT,
 					&rec->stmt[i], NULL);
 	if (rc == SQLITE_OK)
-		rc = incise_recorder_write_meta(rec, calibration_path);
-	if (rc != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	return incise_recorder_commit(rec, incise_clock_now(incise_rig_clock(rec->rig)),
-				      false, err);
+		rc = write_meta(rec, calibration_path);
+	return incise_recorder_check(rec, rc, err);
 }
 
 void incise_recorder_close_database(struct incise_recorder *rec)

@@ -1,22 +1,46 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The folder of a recording that is written: NAME.rec.part, locked, which becomes NAME.rec
- * when it is whole; see recorder.h.
+ * The folder of a recording that is written, NAME.rec.part, locked, which becomes NAME.rec when
+ * the recording is complete; and the free space of its disk. See recorder.h.
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
-#include "recorder.h"
 #include "../schema.h"
+#include "recorder.h"
 
-/* Split the path into its folder, kept open, and its name. */
-int incise_recorder_take_path(struct incise_recorder *rec, const char *path,
-			      struct incise_error *err)
+/* Reserved for the log that is folded in at the end, and for other writers. */
+#define RESERVED_BYTES 16e6
+/* Reserved for frames in memory, and for data that arrive before the next look. */
+#define RESERVED_S 5.0
+#define LOOK_NS 1000000000LL
+/* Files grow in steps: their rate is measured over this time at least. */
+#define RATE_NS 2000000000LL
+
+/* Bytes of a row in the file, with its part of the pages; tests/unit/record/recorder.c. */
+#define FORCE_BYTES 18.0
+#define TRACKER_BYTES 180.0 /* with its row in table depth */
+#define FRAME_BYTES 110.0
+/* Size of a frame in camera.mkv, an upper estimate. */
+#define FFV1_SHARE 0.75
+#define JPEG_BYTES_PIXEL 0.35
+
+static const char *const files[] = {INCISE_SCHEMA_DB, INCISE_SCHEMA_DB "-wal",
+				    INCISE_FRAMES_FILE, INCISE_SCHEMA_DB "-shm",
+				    INCISE_SCHEMA_DB "-journal"};
+#define FILES_GROWING 3 /* the first of them */
+
+/* --- folder -------------------------------------------------------------------------- */
+
+int incise_recorder_split_path(struct incise_recorder *rec, const char *path,
+			       struct incise_error *err)
 {
 	size_t length = strlen(path);
 	char *slash, *parent;
@@ -42,7 +66,6 @@ int incise_recorder_take_path(struct incise_recorder *rec, const char *path,
 	return rec->parent < 0 ? -errno : 0;
 }
 
-/* Make NAME.rec.part and lock it, so that nobody takes it for a leftover. */
 int incise_recorder_make_folder(struct incise_recorder *rec, struct incise_error *err)
 {
 	const char *part = rec->part + (rec->name - rec->path);
@@ -68,11 +91,11 @@ int incise_recorder_make_folder(struct incise_recorder *rec, struct incise_error
 	rec->folder = openat(rec->parent, part, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 	if (rec->folder < 0)
 		return incise_error_set(err, errno, "%s: %s", rec->part, strerror(errno));
-	flock(rec->folder, LOCK_EX | LOCK_NB); /* where the file system cannot: no lock */
+	flock(rec->folder, LOCK_EX | LOCK_NB); /* some file systems have no locks */
 	return 0;
 }
 
-/* fsync(2) the folder that holds the name; O_PATH descriptors cannot be. */
+/* A descriptor of O_PATH cannot be synced. */
 int incise_recorder_sync_parent(struct incise_recorder *rec)
 {
 	int fd = openat(rec->parent, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -80,24 +103,18 @@ int incise_recorder_sync_parent(struct incise_recorder *rec)
 
 	if (fd >= 0)
 		close(fd);
-	/* A folder that may be written but not listed, or one that cannot be synced. */
+	/* Ignore a folder that may be written but not read, or one that cannot be synced. */
 	return rc == -EACCES || rc == -EINVAL ? 0 : rc;
 }
 
-/* Remove NAME.rec.part; only files that a recorder makes. */
 void incise_recorder_remove_folder(struct incise_recorder *rec)
 {
-	static const char *const files[] = {INCISE_SCHEMA_DB, INCISE_SCHEMA_DB "-wal",
-					    INCISE_SCHEMA_DB "-shm",
-					    INCISE_SCHEMA_DB "-journal",
-					    INCISE_FRAMES_FILE};
-
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
 		unlinkat(rec->folder, files[i], 0);
 	unlinkat(rec->parent, rec->part + (rec->name - rec->path), AT_REMOVEDIR);
 }
 
-int incise_recorder_give_name(struct incise_recorder *rec, struct incise_error *err)
+int incise_recorder_rename_folder(struct incise_recorder *rec, struct incise_error *err)
 {
 	const char *part = rec->part + (rec->name - rec->path);
 	int rc = fsync(rec->folder) && errno != EINVAL ? -errno : 0;
@@ -105,7 +122,7 @@ int incise_recorder_give_name(struct incise_recorder *rec, struct incise_error *
 	if (!rc &&
 	    renameat2(rec->parent, part, rec->parent, rec->name, RENAME_NOREPLACE)) {
 		rc = -errno;
-		/* File systems without that flag; rename(2) too replaces no full folder. */
+		/* Without that flag: rename(2) does not replace a folder with files either. */
 		if (rc == -EINVAL || rc == -ENOSYS)
 			rc = renameat(rec->parent, part, rec->parent, rec->name) ? -errno
 										 : 0;
@@ -119,4 +136,102 @@ int incise_recorder_give_name(struct incise_recorder *rec, struct incise_error *
 			"name %s",
 			rec->path, strerror(-rc), rec->part);
 	return 0;
+}
+
+/*
+ * --- free space: enough at the start for the planned time, and always enough to end ----------
+ *
+ *     |◄──────────────── free ────────────────►|
+ *     |◄── may be written ──►|◄─── reserved ──►|    log of the database, frames in memory
+ */
+
+static int free_bytes(const struct incise_recorder *rec, double *bytes)
+{
+	struct statvfs disk;
+
+	if (fstatvfs(rec->folder, &disk))
+		return -errno;
+	*bytes = (double)disk.f_bavail * (double)disk.f_frsize;
+	return 0;
+}
+
+/* Bytes per second, by the nominal rates of the devices. */
+static double expected_rate(const struct incise_recorder *rec)
+{
+	const struct incise_camera_info *camera = &rec->camera_info;
+	double bytes_s = rec->force_info.rate_hz * FORCE_BYTES +
+			 rec->tracker_info.rate_hz * TRACKER_BYTES;
+	double pixels = (double)camera->width * camera->height;
+	double row = (double)incise_frames_row(camera->pixels, camera->width);
+
+	if (rec->streams[INCISE_LEDGER_CAMERA].exists)
+		bytes_s += camera->rate_hz *
+			   (FRAME_BYTES + (row > 0 ? row * camera->height * FFV1_SHARE
+						   : pixels * JPEG_BYTES_PIXEL));
+	return isfinite(bytes_s) && bytes_s > 0 ? bytes_s : 0;
+}
+
+static double reserved(double bytes_s)
+{
+	return RESERVED_BYTES + RESERVED_S * bytes_s;
+}
+
+int incise_recorder_check_space(struct incise_recorder *rec, double planned_s,
+				struct incise_error *err)
+{
+	double bytes_s = expected_rate(rec), usable;
+	int rc = free_bytes(rec, &rec->disk.free_bytes);
+
+	if (rc)
+		return incise_error_set(err, -rc, "%s: %s", rec->part, strerror(-rc));
+	usable = rec->disk.free_bytes - reserved(bytes_s);
+	rec->stats.bytes_per_s = bytes_s;
+	rec->stats.disk_s = bytes_s > 0 ? fmax(0, usable / bytes_s) : INFINITY;
+	if (usable >= planned_s * bytes_s)
+		return 0;
+	if (usable <= 0)
+		return incise_error_set(
+			err, ENOSPC,
+			"%s: the disk has %.0f MB free, and %.0f MB are kept back to end "
+			"a recording in; make room, or record to another disk",
+			rec->path, rec->disk.free_bytes / 1e6, reserved(bytes_s) / 1e6);
+	return incise_error_set(
+		err, ENOSPC,
+		"%s: %.0f s of this rig take some %.0f MB, and the disk has %.0f MB for "
+		"it: enough for %.0f s; make room, or record for a shorter time",
+		rec->path, planned_s, planned_s * bytes_s / 1e6, usable / 1e6,
+		usable / bytes_s);
+}
+
+/* Bytes of the files of this recording. */
+static double written(const struct incise_recorder *rec)
+{
+	double bytes = 0;
+	struct stat st;
+
+	for (int i = 0; i < FILES_GROWING; i++)
+		if (!fstatat(rec->folder, files[i], &st, AT_SYMLINK_NOFOLLOW))
+			bytes += (double)st.st_size;
+	return bytes;
+}
+
+bool incise_recorder_disk_full(struct incise_recorder *rec)
+{
+	struct incise_recorder_disk *disk = &rec->disk;
+	int64_t now_ns = incise_clock_now(incise_rig_clock(rec->rig));
+	double usable;
+
+	if (now_ns - disk->asked_ns < LOOK_NS || free_bytes(rec, &disk->free_bytes))
+		return false;
+	disk->asked_ns = now_ns;
+	if (!rec->stats.armed && !disk->started_ns)
+		disk->started_ns = now_ns;
+	else if (disk->started_ns && now_ns - disk->started_ns >= RATE_NS)
+		rec->stats.bytes_per_s =
+			written(rec) / ((double)(now_ns - disk->started_ns) * 1e-9);
+	usable = disk->free_bytes - reserved(rec->stats.bytes_per_s);
+	rec->stats.disk_s = rec->stats.bytes_per_s > 0
+				    ? fmax(0, usable / rec->stats.bytes_per_s)
+				    : INFINITY;
+	return usable <= 0;
 }

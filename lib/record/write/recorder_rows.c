@@ -8,35 +8,274 @@
  *       └► depth, speed ────┼─────────────────► table depth
  *     camera ───► timeline ─┴─────────────────► table frames
  *
- * Armed, rows go into the hold (recorder_hold.c) instead.
+ * Before the trigger, rows go into the pretrigger rings instead.
  */
 #include <errno.h>
+#include <fcntl.h>
 #include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
 #include "../../base/vector.h"
+#include "../frames.h"
+#include "../ledger.h"
+#include "../read/cut.h"
 #include "recorder.h"
 
+/* Time for the zero of the force channel, with the tool held free. */
+#define ZERO_NS 500000000LL
+/* The zero does not wait longer for a silent tracker. */
+#define ZERO_PATIENCE_NS (2 * ZERO_NS)
+/* The noise of the channel is some mN; a touch is tenths of N. */
+#define ZERO_SD_MAX_N 0.03
+
+/* --- streams ------------------------------------------------------------------------- */
+
+/* A sample with its time of acquisition. */
+struct force_row {
+	uint64_t seq;
+	int64_t t_ns;
+	int32_t code;
+};
+
+struct tracker_row {
+	int64_t t_ns;
+	struct incise_tracker_sample sample;
+};
+
+/* The delay of the calibration if there is one, else that of the device. */
+static int64_t delay_ns(double calibrated_ms, int64_t device_ns)
+{
+	return isnan(calibrated_ms) ? device_ns : llround(calibrated_ms * 1e6);
+}
+
+static void start_stream(struct incise_recorder *rec, int i, const char *name,
+			 const char *device, double delay_sd_ms,
+			 const struct incise_timeline_setup *setup)
+{
+	struct incise_recorder_stream *stream = &rec->streams[i];
+	struct incise_timeline_setup with_sd = *setup;
+
+	stream->name = name;
+	stream->exists = true;
+	stream->delay_sd_ms = delay_sd_ms;
+	if (!isnan(delay_sd_ms))
+		with_sd.delay_sd_ns = llround(delay_sd_ms * 1e6);
+	snprintf(stream->device, sizeof(stream->device), "%s", device);
+	incise_ledger_init(&stream->ledger);
+	incise_timeline_init(&stream->timeline, &with_sd);
+}
+
+void incise_recorder_start_streams(struct incise_recorder *rec)
+{
+	const struct incise_calibration *calibration = &rec->calibration;
+
+	start_stream(rec, INCISE_LEDGER_FORCE, "force", rec->force_info.name,
+		     calibration->force_delay_sd_ms,
+		     &(struct incise_timeline_setup){
+			     .timestamped = true,
+			     .rate_hz = rec->force_info.rate_hz,
+			     .delay_ns = delay_ns(calibration->force_delay_ms, 0),
+		     });
+	start_stream(rec, INCISE_LEDGER_TRACKER, "tracker", rec->tracker_info.name,
+		     calibration->tracker_delay_sd_ms,
+		     &(struct incise_timeline_setup){
+			     .rate_hz = rec->tracker_info.rate_hz,
+			     .delay_ns = delay_ns(calibration->tracker_delay_ms,
+						  rec->tracker_info.latency_ns),
+			     .grain_ns = rec->tracker_info.grain_ns,
+		     });
+	rec->streams[INCISE_LEDGER_FORCE].lost_at_start =
+		incise_force_lost(incise_rig_force(rec->rig));
+	rec->streams[INCISE_LEDGER_TRACKER].lost_at_start =
+		incise_tracker_lost(incise_rig_tracker(rec->rig));
+	if (incise_rig_camera(rec->rig))
+		start_stream(rec, INCISE_LEDGER_CAMERA, "camera", rec->camera_info.name,
+			     calibration->camera_delay_sd_ms,
+			     &(struct incise_timeline_setup){
+				     .timestamped = true,
+				     .rate_hz = rec->camera_info.rate_hz,
+				     .delay_ns =
+					     delay_ns(calibration->camera_delay_ms, 0),
+			     });
+}
+
+uint64_t incise_recorder_lost(const struct incise_recorder *rec, int i)
+{
+	const struct incise_recorder_stream *stream = &rec->streams[i];
+	uint64_t since = stream->gaps - stream->gaps_held;
+
+	return stream->gaps_held +
+	       (since > stream->device_lost ? since : stream->device_lost);
+}
+
+static void describe(const struct incise_recorder *rec, int i, struct incise_stream *out)
+{
+	const struct incise_recorder_stream *stream = &rec->streams[i];
+	struct incise_timeline_report report;
+
+	incise_timeline_report(&stream->timeline, &report);
+	*out = (struct incise_stream){
+		.timestamped = stream->timeline.setup.timestamped,
+		.nominal_hz = stream->timeline.setup.rate_hz,
+		.delay_ms = (double)stream->timeline.setup.delay_ns * 1e-6,
+		.delay_sd_ms = stream->delay_sd_ms,
+		.rows = stream->rows,
+		.lost = incise_recorder_lost(rec, i),
+		.late = report.late,
+		.rate_hz = report.rate_hz,
+		.drift_ppm = report.drift_ppm,
+		.drift_sd_ppm = report.drift_sd_ppm,
+		.jitter_ms = report.jitter_ns * 1e-6,
+		.jitter_max_ms = report.jitter_max_ns * 1e-6,
+		.offset_ms = report.offset_ns * 1e-6,
+		.offset_sd_ms = report.offset_sd_ns * 1e-6,
+	};
+	/* Only the delay of a timestamp is uncertain, and it is not known. */
+	if (out->timestamped && isnan(out->delay_sd_ms))
+		out->offset_sd_ms = NAN;
+	snprintf(out->name, sizeof(out->name), "%s", stream->name);
+	snprintf(out->device, sizeof(out->device), "%s", stream->device);
+	snprintf(out->ended, sizeof(out->ended), "%s", stream->ended);
+}
+
+int incise_recorder_describe_streams(const struct incise_recorder *rec,
+				     struct incise_stream streams[INCISE_STREAMS_MAX])
+{
+	int n = 0;
+
+	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++)
+		if (rec->streams[i].exists)
+			describe(rec, i, &streams[n++]);
+	return n;
+}
+
+int incise_recorder_end_stream(struct incise_recorder *rec, int i, const char *why,
+			       struct incise_error *err)
+{
+	struct incise_recorder_stream *stream = &rec->streams[i];
+
+	snprintf(stream->ended, sizeof(stream->ended), "%.199s", why);
+	return incise_recorder_check(
+		rec, incise_recorder_note(rec, "failed", "%s: %s", stream->name, why),
+		err);
+}
+
 /*
- * A sample's number, and its time. Counts those missing before it. A number that was there
- * before is a fault of the backend. Returns 0 or -EIO.
+ * --- zero of the force channel -----------------------------------------------------------
+ *
+ *     force    |◄── 0.5 s: mean ──►|
+ *     tracker      |◄── not in the tissue ──►|     comes later: up to 1 s is waited
+ */
+
+/* A difference of codes in mV. */
+static double span_mV(const struct incise_recorder *rec, double codes)
+{
+	return codes * rec->force_info.full_scale_V * 1e3 / (1LL << rec->force_info.bits);
+}
+
+static double code_mV(const struct incise_recorder *rec, double code)
+{
+	return rec->force_info.offset_V * 1e3 + span_mV(rec, code);
+}
+
+static void zero_force(struct incise_recorder *rec, int64_t t_ns, int32_t code,
+		       bool clipped)
+{
+	if (t_ns - rec->streams[INCISE_LEDGER_FORCE].first_ns >= ZERO_NS)
+		return;
+	rec->zero.n++;
+	rec->zero.sum += code;
+	rec->zero.sum2 += (int64_t)code * code;
+	rec->zero.clipped |= clipped;
+}
+
+static void zero_depth(struct incise_recorder *rec, int64_t t_ns, double depth_mm)
+{
+	if (isnan(rec->stats.zero_mV) && rec->streams[INCISE_LEDGER_FORCE].started &&
+	    t_ns - rec->streams[INCISE_LEDGER_FORCE].first_ns < ZERO_NS)
+		rec->zero.depth_max_mm = fmax(rec->zero.depth_max_mm, depth_mm);
+}
+
+int incise_recorder_settle_zero(struct incise_recorder *rec, struct incise_error *err)
+{
+	const struct incise_recorder_zero *zero = &rec->zero;
+	const char *remedy =
+		"hold the tool free for the first 0.5 s, or give force_zero_mV in "
+		"the calibration";
+	double mean = (double)zero->sum / zero->n;
+	double var = fmax(0, (double)zero->sum2 / zero->n - mean * mean);
+	double sd_mV = span_mV(rec, sqrt(var));
+	double sd_N = sd_mV / fabs(rec->calibration.force_mV_N);
+
+	rec->worthless = true;
+	if (zero->depth_max_mm > INCISE_CUT_END_MM)
+		return incise_error_set(
+			err, EBUSY,
+			"%s: the blade was %.1f mm deep while the zero of the "
+			"force channel was measured; %s",
+			rec->path, zero->depth_max_mm, remedy);
+	if (zero->clipped)
+		return incise_error_set(
+			err, EBUSY,
+			"%s: the force channel was at the end of its range while "
+			"its zero was measured; check the amplifier; %s",
+			rec->path, remedy);
+	if (sd_N > ZERO_SD_MAX_N)
+		return incise_error_set(
+			err, EBUSY,
+			"%s: the force varied by %.3f N (sd; up to %.2f is rest) "
+			"while its zero was measured; %s",
+			rec->path, sd_N, ZERO_SD_MAX_N, remedy);
+	rec->worthless = false;
+	rec->stats.zero_mV = code_mV(rec, mean);
+	if (incise_recorder_set_real(rec, "force_zero_mV", rec->stats.zero_mV) !=
+		    SQLITE_OK ||
+	    incise_recorder_set_real(rec, "force_zero_sd_mV", sd_mV) != SQLITE_OK ||
+	    incise_recorder_set_integer(rec, "force_zero_samples", zero->n) !=
+		    SQLITE_OK ||
+	    incise_recorder_note(
+		    rec, "zero", "force zero %.2f mV, sd %.2f mV over %lld samples",
+		    rec->stats.zero_mV, sd_mV, (long long)zero->n) != SQLITE_OK)
+		return incise_recorder_fail(rec, err);
+	return 0;
+}
+
+bool incise_recorder_zero_due(const struct incise_recorder *rec)
+{
+	int64_t end_ns = rec->streams[INCISE_LEDGER_FORCE].first_ns + ZERO_NS;
+
+	return isnan(rec->stats.zero_mV) && rec->streams[INCISE_LEDGER_FORCE].started &&
+	       rec->streams[INCISE_LEDGER_FORCE].timeline.last_ns >= end_ns &&
+	       (rec->zero.tracker_ns >= end_ns ||
+		rec->streams[INCISE_LEDGER_FORCE].timeline.last_ns >=
+			rec->streams[INCISE_LEDGER_FORCE].first_ns + ZERO_PATIENCE_NS);
+}
+
+/* --- rows ---------------------------------------------------------------------------- */
+
+/*
+ * Take a sample's number into its stream and find its time. A number that does not increase is a
+ * fault of the backend. Returns 0 or -EIO.
  */
 static int take_number(struct incise_recorder_stream *stream, uint64_t seq,
 		       int64_t arrival_ns, int64_t *t_ns, struct incise_error *err)
 {
-	if (seq > INT64_MAX || (stream->begun && seq < stream->next))
+	if (seq > INT64_MAX || (stream->started && seq < stream->next))
 		return incise_error_set(err, EIO,
 					"%s: sample %llu came after %llu; the driver of "
 					"this device is at fault",
 					stream->device, (unsigned long long)seq,
 					(unsigned long long)stream->next - 1);
 	*t_ns = incise_timeline_sample(&stream->timeline, seq, arrival_ns);
-	if (!stream->begun)
+	if (!stream->started)
 		stream->first_ns = *t_ns;
-	stream->begun = true;
+	stream->started = true;
 	stream->next = seq + 1;
 	return 0;
 }
 
-/* The row goes into the ledger; what is missing before it is an event. */
+/* Add a row to the ledger; samples missing before it are an event. */
 static int enter(struct incise_recorder *rec, struct incise_recorder_stream *stream,
 		 const struct incise_ledger_row *row, struct incise_error *err)
 {
@@ -49,19 +288,17 @@ static int enter(struct incise_recorder *rec, struct incise_recorder_stream *str
 	if (!missing)
 		return 0;
 	stream->gaps += missing;
-	return incise_recorder_note_at(rec, row->t_ns, "lost",
-				       "%s: %llu samples before number %llu",
-				       stream->device, (unsigned long long)missing,
-				       (unsigned long long)row->seq) == SQLITE_OK
-		       ? 0
-		       : incise_recorder_fail(rec, err);
+	return incise_recorder_check(
+		rec,
+		incise_recorder_note_at(rec, row->t_ns, "lost",
+					"%s: %llu samples before number %llu",
+					stream->device, (unsigned long long)missing,
+					(unsigned long long)row->seq),
+		err);
 }
 
-/* --- force --------------------------------------------------------------------------- */
-
-int incise_recorder_write_force(struct incise_recorder *rec,
-				const struct incise_recorder_force_row *row,
-				struct incise_error *err)
+static int write_force(struct incise_recorder *rec, const struct force_row *row,
+		       struct incise_error *err)
 {
 	sqlite3_stmt *stmt = rec->stmt[INSERT_FORCE];
 	int64_t top = (1LL << rec->force_info.bits) - 1;
@@ -76,43 +313,6 @@ int incise_recorder_write_force(struct incise_recorder *rec,
 	incise_ledger_row_force(&entry, row->seq, row->t_ns, row->code);
 	return enter(rec, &rec->streams[INCISE_LEDGER_FORCE], &entry, err);
 }
-
-int incise_recorder_put_force(struct incise_recorder *rec,
-			      const struct incise_force_sample *sample,
-			      struct incise_error *err)
-{
-	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_FORCE];
-	struct incise_recorder_force_row row = {.seq = sample->seq, .code = sample->code};
-	int64_t top = (1LL << rec->force_info.bits) - 1;
-	struct incise_error why = {0};
-	int rc = 0;
-
-	if (sample->code < 0 || sample->code > top)
-		rc = incise_error_set(&why, EIO,
-				      "%s: code %d is not within 0 to %lld; the driver "
-				      "of this device is at fault",
-				      stream->device, sample->code, (long long)top);
-	if (rc || take_number(stream, sample->seq, sample->t_ns, &row.t_ns, &why))
-		return incise_recorder_end_stream(rec, INCISE_LEDGER_FORCE, why.text,
-						  err);
-	if (rec->stats.armed)
-		incise_recorder_hold_force(rec, &row);
-	else
-		rc = incise_recorder_write_force(rec, &row, err);
-	if (!isnan(rec->stats.zero_mV)) {
-		rec->stats.force_N = (incise_recorder_code_mV(rec, sample->code) -
-				      rec->stats.zero_mV) /
-				     rec->calibration.force_mV_N;
-		rec->hold.triggered |= rec->hold.force_N > 0 &&
-				       fabs(rec->stats.force_N) >= rec->hold.force_N;
-	} else {
-		incise_recorder_zero_force(rec, row.t_ns, sample->code,
-					   sample->code == 0 || sample->code == top);
-	}
-	return rc;
-}
-
-/* --- tracker and depth --------------------------------------------------------------- */
 
 static int write_depth(struct incise_recorder *rec, const struct incise_depth_row *row,
 		       struct incise_error *err)
@@ -145,18 +345,7 @@ int incise_recorder_flush_depth(struct incise_recorder *rec, struct incise_error
 	return rc;
 }
 
-static bool finite_record(const struct incise_tracker_sample *sample)
-{
-	for (int i = 0; i < 3; i++)
-		if (!isfinite(sample->position_mm[i]))
-			return false;
-	for (int i = 0; i < 4; i++)
-		if (!isfinite(sample->quaternion[i]))
-			return false;
-	return true;
-}
-
-/* Where the tip of the blade is: rows keep what the device gave, depth is the tip's. */
+/* Position of the blade's tip. Rows have the device's own position, depth is the tip's. */
 static void tip_of(const struct incise_recorder *rec,
 		   const struct incise_tracker_sample *sample, double tip_mm[3])
 {
@@ -166,9 +355,8 @@ static void tip_of(const struct incise_recorder *rec,
 	v3_add(tip_mm, sample->position_mm, 1, arm_mm);
 }
 
-int incise_recorder_write_tracker(struct incise_recorder *rec,
-				  const struct incise_recorder_tracker_row *row,
-				  struct incise_error *err)
+static int write_tracker(struct incise_recorder *rec, const struct tracker_row *row,
+			 struct incise_error *err)
 {
 	const struct incise_tracker_sample *sample = &row->sample;
 	sqlite3_stmt *stmt = rec->stmt[INSERT_TRACKER];
@@ -192,11 +380,137 @@ int incise_recorder_write_tracker(struct incise_recorder *rec,
 		return incise_recorder_fail(rec, err);
 	incise_ledger_row_tracker(&entry, row->t_ns, sample);
 	rc = enter(rec, &rec->streams[INCISE_LEDGER_TRACKER], &entry, err);
-	/* A record that the tracker itself doubts is kept, but not believed. */
+	/* A record with an error status is kept, but gives no depth. */
 	if (!rc && sample->status == ' ' &&
 	    incise_depth_push(&rec->depth, sample->seq, row->t_ns, tip_mm, &depth))
 		rc = write_depth(rec, &depth, err);
 	return rc;
+}
+
+/*
+ * --- pretrigger --------------------------------------------------------------------------
+ *
+ *     ─────────────[── 1 s kept ──]▼ trigger
+ *                   recording ─────────────────────►
+ *
+ * The trigger is seen late, by the delay of the sample and by a poll: the second before it
+ * contains its cause.
+ */
+
+/* More than a second at any rate near the nominal one. */
+static size_t pretrigger_rows(double rate_hz)
+{
+	return rate_hz > 0 && rate_hz < 1e6 ? (size_t)ceil(rate_hz * 1.1) + 16 : 100000;
+}
+
+int incise_recorder_arm(struct incise_recorder *rec)
+{
+	int rc = incise_ring_init(&rec->pretrigger.force, sizeof(struct force_row),
+				  pretrigger_rows(rec->force_info.rate_hz));
+
+	if (!rc)
+		rc = incise_ring_init(&rec->pretrigger.tracker,
+				      sizeof(struct tracker_row),
+				      pretrigger_rows(rec->tracker_info.rate_hz));
+	rec->stats.armed = !rc;
+	return rc;
+}
+
+void incise_recorder_disarm(struct incise_recorder *rec)
+{
+	incise_ring_free(&rec->pretrigger.force);
+	incise_ring_free(&rec->pretrigger.tracker);
+}
+
+/* Add a row; the oldest is dropped when the ring is full. */
+static void keep(struct incise_ring *ring, const void *row)
+{
+	union {
+		struct force_row force;
+		struct tracker_row tracker;
+	} oldest;
+
+	while (!incise_ring_put(ring, row))
+		incise_ring_take(ring, &oldest, 1);
+}
+
+/* Both streams start at one time, whatever the capacity of the rings. */
+int incise_recorder_release(struct incise_recorder *rec, struct incise_error *err)
+{
+	int64_t now_ns = incise_clock_now(incise_rig_clock(rec->rig));
+	int64_t from_ns = now_ns - INCISE_NS_PER_S;
+	struct tracker_row tracker;
+	struct force_row force;
+	int rc = 0;
+
+	rec->stats.armed = false;
+	rec->not_finite = 0;
+	rec->streams[INCISE_LEDGER_FORCE].lost_at_start =
+		incise_force_lost(incise_rig_force(rec->rig));
+	rec->streams[INCISE_LEDGER_TRACKER].lost_at_start =
+		incise_tracker_lost(incise_rig_tracker(rec->rig));
+	if (incise_recorder_note(rec, "trigger", "triggered; it begins 1 s before") !=
+	    SQLITE_OK)
+		return incise_recorder_fail(rec, err);
+	while (!rc && incise_ring_take(&rec->pretrigger.force, &force, 1))
+		if (force.t_ns >= from_ns)
+			rc = write_force(rec, &force, err);
+	while (!rc && incise_ring_take(&rec->pretrigger.tracker, &tracker, 1))
+		if (tracker.t_ns >= from_ns)
+			rc = write_tracker(rec, &tracker, err);
+	/* The device's count starts here; samples missing in the second before were lost too. */
+	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++)
+		rec->streams[i].gaps_held = rec->streams[i].gaps;
+	incise_recorder_disarm(rec);
+	return rc;
+}
+
+/* --- samples of the devices ---------------------------------------------------------- */
+
+int incise_recorder_put_force(struct incise_recorder *rec,
+			      const struct incise_force_sample *sample,
+			      struct incise_error *err)
+{
+	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_FORCE];
+	struct force_row row = {.seq = sample->seq, .code = sample->code};
+	int64_t top = (1LL << rec->force_info.bits) - 1;
+	struct incise_error why = {0};
+	int rc = 0;
+
+	if (sample->code < 0 || sample->code > top)
+		rc = incise_error_set(&why, EIO,
+				      "%s: code %d is not within 0 to %lld; the driver "
+				      "of this device is at fault",
+				      stream->device, sample->code, (long long)top);
+	if (rc || take_number(stream, sample->seq, sample->t_ns, &row.t_ns, &why))
+		return incise_recorder_end_stream(rec, INCISE_LEDGER_FORCE, why.text,
+						  err);
+	if (rec->stats.armed)
+		keep(&rec->pretrigger.force, &row);
+	else
+		rc = write_force(rec, &row, err);
+	if (!isnan(rec->stats.zero_mV)) {
+		rec->stats.force_N = (code_mV(rec, sample->code) - rec->stats.zero_mV) /
+				     rec->calibration.force_mV_N;
+		rec->pretrigger.triggered |=
+			rec->pretrigger.force_N > 0 &&
+			fabs(rec->stats.force_N) >= rec->pretrigger.force_N;
+	} else {
+		zero_force(rec, row.t_ns, sample->code,
+			   sample->code == 0 || sample->code == top);
+	}
+	return rc;
+}
+
+static bool finite_record(const struct incise_tracker_sample *sample)
+{
+	for (int i = 0; i < 3; i++)
+		if (!isfinite(sample->position_mm[i]))
+			return false;
+	for (int i = 0; i < 4; i++)
+		if (!isfinite(sample->quaternion[i]))
+			return false;
+	return true;
 }
 
 int incise_recorder_put_tracker(struct incise_recorder *rec,
@@ -204,47 +518,46 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 				struct incise_error *err)
 {
 	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_TRACKER];
-	struct incise_recorder_tracker_row row = {.sample = *sample};
+	struct tracker_row row = {.sample = *sample};
 	struct incise_error why = {0};
 	double tip_mm[3];
 	int rc = 0;
 
-	/* A line through both would bend, and bend the times of either. */
+	/* One line through both parts would be wrong for either. */
 	if (sample->begins)
 		incise_timeline_replug(&stream->timeline);
 	if (take_number(stream, sample->seq, sample->t_ns, &row.t_ns, &why))
 		return incise_recorder_end_stream(rec, INCISE_LEDGER_TRACKER, why.text,
 						  err);
 	rec->zero.tracker_ns = row.t_ns;
-	if (!finite_record(sample)) { /* no place in the table: as good as lost */
+	if (!finite_record(sample)) { /* the table cannot hold it: it counts as lost */
 		rec->not_finite++;
-		return incise_recorder_note(rec, "lost", "%s: record %llu is not finite",
-					    stream->device,
-					    (unsigned long long)sample->seq) == SQLITE_OK
-			       ? 0
-			       : incise_recorder_fail(rec, err);
+		return incise_recorder_check(
+			rec,
+			incise_recorder_note(rec, "lost", "%s: record %llu is not finite",
+					     stream->device,
+					     (unsigned long long)sample->seq),
+			err);
 	}
 	if (sample->status == ' ') {
 		tip_of(rec, sample, tip_mm);
 		rec->stats.depth_mm = incise_depth_of(&rec->depth, tip_mm);
-		incise_recorder_zero_depth(rec, row.t_ns, rec->stats.depth_mm);
+		zero_depth(rec, row.t_ns, rec->stats.depth_mm);
 	}
 	if (sample->button != rec->stats.button) {
 		rec->stats.button = sample->button;
-		rec->hold.triggered |= rec->hold.button && sample->button;
+		rec->pretrigger.triggered |= rec->pretrigger.button && sample->button;
 		if (incise_recorder_note_at(rec, row.t_ns, "button", "%s",
 					    sample->button ? "pressed" : "released") !=
 		    SQLITE_OK)
 			return incise_recorder_fail(rec, err);
 	}
 	if (rec->stats.armed)
-		incise_recorder_hold_tracker(rec, &row);
+		keep(&rec->pretrigger.tracker, &row);
 	else
-		rc = incise_recorder_write_tracker(rec, &row, err);
+		rc = write_tracker(rec, &row, err);
 	return rc;
 }
-
-/* --- camera -------------------------------------------------------------------------- */
 
 /* SQLite keeps NaN as NULL: not known. */
 int incise_recorder_put_frame(struct incise_recorder *rec,
@@ -274,4 +587,153 @@ int incise_recorder_put_frame(struct incise_recorder *rec,
 	rec->stats.camera_depth_mm = row.depth_mm;
 	incise_ledger_row_frame(&entry, &row);
 	return enter(rec, stream, &entry, err);
+}
+
+/* --- tables streams, knots and ledger ------------------------------------------------ */
+
+static int write_stream(struct incise_recorder *rec, int i)
+{
+	const struct incise_recorder_stream *stream = &rec->streams[i];
+	sqlite3_stmt *stmt = rec->stmt[SET_STREAM];
+	struct incise_stream now;
+
+	describe(rec, i, &now);
+	sqlite3_bind_text(stmt, 1, now.name, -1, SQLITE_TRANSIENT);
+	sqlite3_bind_text(stmt, 2, now.device, -1, SQLITE_TRANSIENT);
+	sqlite3_bind_int(stmt, 3, now.timestamped);
+	sqlite3_bind_double(stmt, 4, now.nominal_hz);
+	sqlite3_bind_int64(stmt, 5, stream->timeline.setup.delay_ns);
+	if (isnan(now.delay_sd_ms))
+		sqlite3_bind_null(stmt, 6);
+	else
+		sqlite3_bind_int64(stmt, 6, stream->timeline.setup.delay_sd_ns);
+	sqlite3_bind_int64(stmt, 7, stream->timeline.setup.grain_ns);
+	sqlite3_bind_int64(stmt, 8, now.rows);
+	sqlite3_bind_int64(stmt, 9, now.lost);
+	sqlite3_bind_int64(stmt, 10, now.late);
+	sqlite3_bind_double(stmt, 11, now.rate_hz);
+	sqlite3_bind_double(stmt, 12, now.drift_ppm);
+	sqlite3_bind_double(stmt, 13, now.drift_sd_ppm);
+	sqlite3_bind_double(stmt, 14, now.jitter_ms * 1e6);
+	sqlite3_bind_double(stmt, 15, now.jitter_max_ms * 1e6);
+	sqlite3_bind_double(stmt, 16, now.offset_ms * 1e6);
+	sqlite3_bind_double(stmt, 17, now.offset_sd_ms * 1e6);
+	if (*now.ended)
+		sqlite3_bind_text(stmt, 18, now.ended, -1, SQLITE_TRANSIENT);
+	else
+		sqlite3_bind_null(stmt, 18);
+	return incise_recorder_run(stmt);
+}
+
+static int write_knots(struct incise_recorder *rec, int i)
+{
+	const struct incise_recorder_stream *stream = &rec->streams[i];
+	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS_MAX];
+	sqlite3_stmt *stmt = rec->stmt[DROP_KNOTS];
+	int n = incise_timeline_knots(&stream->timeline, knots), rc;
+
+	sqlite3_bind_text(stmt, 1, stream->name, -1, SQLITE_STATIC);
+	rc = incise_recorder_run(stmt);
+	stmt = rec->stmt[INSERT_KNOT];
+	for (int k = 0; k < n && rc == SQLITE_OK; k++) {
+		sqlite3_bind_text(stmt, 1, stream->name, -1, SQLITE_STATIC);
+		sqlite3_bind_int(stmt, 2, k);
+		sqlite3_bind_int64(stmt, 3, knots[k].seq);
+		sqlite3_bind_int64(stmt, 4, knots[k].t_ns);
+		sqlite3_bind_double(stmt, 5, knots[k].sd_ns);
+		sqlite3_bind_int(stmt, 6, knots[k].starts);
+		rc = incise_recorder_run(stmt);
+	}
+	return rc;
+}
+
+int incise_recorder_write_streams(struct incise_recorder *rec, bool knots)
+{
+	int rc = SQLITE_OK;
+
+	for (int i = 0; i < INCISE_LEDGER_STREAMS && rc == SQLITE_OK; i++) {
+		if (!rec->streams[i].exists)
+			continue;
+		rc = write_stream(rec, i);
+		/* Timestamped samples need no line. */
+		if (rc == SQLITE_OK && knots &&
+		    !rec->streams[i].timeline.setup.timestamped)
+			rc = write_knots(rec, i);
+	}
+	return rc;
+}
+
+static int put_block(struct incise_recorder *rec, const char *stream,
+		     const struct incise_ledger_block *block)
+{
+	sqlite3_stmt *stmt = rec->stmt[INSERT_LEDGER];
+	const int64_t values[] = {block->block,	   block->first_seq, block->last_seq,
+				  block->first_ns, block->last_ns,   block->count,
+				  block->lost,	   block->crc};
+
+	sqlite3_bind_text(stmt, 1, stream, -1, SQLITE_TRANSIENT);
+	for (int i = 0; i < 8; i++)
+		sqlite3_bind_int64(stmt, 2 + i, values[i]);
+	return incise_recorder_run(stmt);
+}
+
+int incise_recorder_write_ledger(struct incise_recorder *rec)
+{
+	struct incise_ledger_block block;
+	int rc = SQLITE_OK;
+
+	for (int i = 0; i < INCISE_LEDGER_STREAMS && rc == SQLITE_OK; i++)
+		if (incise_ledger_end(&rec->streams[i].ledger, &block))
+			rc = put_block(rec, rec->streams[i].name, &block);
+	return rc;
+}
+
+int incise_recorder_end_ledger(struct incise_recorder *rec)
+{
+	int rc = incise_recorder_write_ledger(rec);
+
+	for (int i = 0; i < INCISE_LEDGER_STREAMS && rc == SQLITE_OK; i++) {
+		struct incise_ledger *ledger = &rec->streams[i].ledger;
+		struct incise_ledger_block block;
+		uint64_t lost = incise_recorder_lost(rec, i);
+
+		if (!rec->streams[i].exists)
+			continue;
+		/* Losses that no gap in the numbers shows. */
+		incise_ledger_close(ledger, lost > ledger->lost ? lost - ledger->lost : 0,
+				    &block);
+		rc = put_block(rec, rec->streams[i].name, &block);
+	}
+	return rc;
+}
+
+/* Seal the head of camera.mkv, if there is one. */
+static int seal_head(struct incise_recorder *rec)
+{
+	struct incise_ledger_block block;
+	int fd = openat(rec->folder, INCISE_FRAMES_FILE, O_RDONLY | O_CLOEXEC);
+	int rc;
+
+	if (fd < 0)
+		return errno == ENOENT ? SQLITE_OK : SQLITE_IOERR;
+	rc = incise_ledger_seal_head(fd, &block);
+	close(fd);
+	return rc ? SQLITE_IOERR : put_block(rec, INCISE_LEDGER_HEAD, &block);
+}
+
+int incise_recorder_seal(struct incise_recorder *rec)
+{
+	int rc = seal_head(rec);
+
+	for (int i = 0; incise_ledger_sealed[i] && rc == SQLITE_OK; i++) {
+		struct incise_ledger_block block;
+		char stream[40];
+
+		snprintf(stream, sizeof(stream), INCISE_LEDGER_TABLE "%s",
+			 incise_ledger_sealed[i]);
+		rc = incise_ledger_seal(rec->db, incise_ledger_sealed[i], &block);
+		if (rc == SQLITE_OK)
+			rc = put_block(rec, stream, &block);
+	}
+	return rc;
 }

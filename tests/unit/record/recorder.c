@@ -542,7 +542,6 @@ static void failures_of_devices(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_rig *rig = faulty_rig();
 		struct incise_recorder *rec = start_recorder("a.rec", rig);
-		struct incise_stream streams[INCISE_STREAMS_MAX];
 		struct incise_recorder_stats stats;
 		struct incise_error err = {0};
 		char sql[300];
@@ -551,10 +550,10 @@ static void failures_of_devices(void **state)
 		force_tells = cases[i].tells;
 		if (poll_for(rec, rig, 2000 * MS, &err))
 			fail_msg("%s: %s", cases[i].what, err.text);
-		assert_int_equal(incise_recorder_streams(rec, streams), 2);
-		assert_non_null(strstr(streams[0].ended, cases[i].text));
-		assert_string_equal(streams[1].ended, "");
 		incise_recorder_stats(rec, &stats);
+		assert_int_equal(stats.n_streams, 2);
+		assert_non_null(strstr(stats.streams[0].ended, cases[i].text));
+		assert_string_equal(stats.streams[1].ended, "");
 		/* 0.8 s of force, in polls of 10 ms; 2 s of the tracker, less its latency */
 		assert_in_range(stats.force, 7900, 8101);
 		assert_in_range(stats.tracker, 238, 240);
@@ -803,6 +802,60 @@ static void closing_nothing(void **state)
 	assert_int_equal(incise_recorder_close(NULL, NULL), 0);
 }
 
+/* --- free space ---------------------------------------------------------------------- */
+
+/* Not too little, so that the disk is not full before the end; not twice too much. */
+static void expects_what_it_takes(void **state)
+{
+	static const char *const specs[] = {SIM, SIM ",force_hz=50000",
+					    SIM ",force_hz=100,tracker_hz=1000"};
+
+	for (size_t i = 0; i < sizeof(specs) / sizeof(*specs); i++) {
+		struct incise_rig *rig = open_rig(specs[i]);
+		struct incise_calibration calibration;
+		struct incise_recorder_setup setup = {.calibration = &calibration};
+		struct incise_recorder_stats stats;
+		struct incise_error err = {0};
+		struct incise_recorder *rec;
+		double expected_s;
+		struct stat st;
+
+		incise_calibration_nominal(&calibration);
+		rec = incise_recorder_new("a.rec", rig, &setup, &err);
+		if (!rec)
+			fail_msg("%s", err.text);
+		incise_recorder_stats(rec, &stats);
+		expected_s = stats.bytes_per_s;
+		assert_true(stats.disk_s > 0);
+		assert_int_equal(poll_for(rec, rig, 10000 * MS, &err), 0);
+		assert_int_equal(incise_recorder_close(rec, &err), 0);
+		assert_int_equal(stat("a.rec/recording.db", &st), 0);
+		if (st.st_size / 10.0 > expected_s || st.st_size / 10.0 < expected_s / 2)
+			fail_msg("%s: %.0f bytes/s, expected %.0f", specs[i],
+				 st.st_size / 10.0, expected_s);
+		assert_int_equal(system("rm -r a.rec"), 0);
+		incise_rig_close(rig);
+	}
+}
+
+static void refuses_what_no_disk_holds(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_calibration calibration;
+	/* 31 years of some 200 kB/s: 200 TB */
+	struct incise_recorder_setup setup = {.calibration = &calibration,
+					      .planned_s = 1e9};
+	struct incise_error err = {0};
+
+	incise_calibration_nominal(&calibration);
+	assert_null(incise_recorder_new("a.rec", rig, &setup, &err));
+	assert_int_equal(errno, ENOSPC);
+	assert_int_equal(err.code, ENOSPC);
+	assert_non_null(strstr(err.text, "record for a shorter time"));
+	assert_int_equal(access("a.rec.part", F_OK), -1);
+	incise_rig_close(rig);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -828,6 +881,8 @@ int main(void)
 		IN_FOLDER(reader_does_not_stop_the_start),
 		IN_FOLDER(reader_does_not_stop_the_end),
 		cmocka_unit_test(closing_nothing),
+		IN_FOLDER(expects_what_it_takes),
+		IN_FOLDER(refuses_what_no_disk_holds),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
