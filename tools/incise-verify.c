@@ -51,7 +51,7 @@ static json_t *as_json(const struct incise_verify_finding *finding)
 		[INCISE_VERIFY_EXTRA] = "extra",
 		[INCISE_VERIFY_COUNT] = "count",
 		[INCISE_VERIFY_INTERRUPTED] = "interrupted",
-		[INCISE_VERIFY_PICTURES] = "pictures",
+		[INCISE_VERIFY_FRAMES] = "pictures",
 		[INCISE_VERIFY_UNVERIFIED] = "unverified",
 		[INCISE_VERIFY_DAMAGED] = "damaged",
 		[INCISE_VERIFY_ENDED] = "ended",
@@ -98,17 +98,16 @@ static int progress(void *user, double share)
 /* Of the camera's file; null where the recording has none. */
 static json_t *pictures(const struct incise_verify_report *report)
 {
-	const struct incise_verify_pictures *pictures = &report->pictures;
+	const struct incise_verify_frames *frames = &report->frames;
 
 	if (!report->n_streams ||
 	    strcmp(report->streams[report->n_streams - 1].name, "camera"))
 		return json_null();
-	return json_pack("{sb sI sI sI sI sI}", "checked", pictures->checked, "present",
-			 (json_int_t)pictures->present, "missing",
-			 (json_int_t)pictures->missing, "altered",
-			 (json_int_t)pictures->altered, "extra",
-			 (json_int_t)pictures->extra, "ahead",
-			 (json_int_t)pictures->ahead);
+	return json_pack("{sb sI sI sI sI sI}", "checked", frames->checked, "present",
+			 (json_int_t)frames->present, "missing",
+			 (json_int_t)frames->missing, "altered",
+			 (json_int_t)frames->altered, "extra", (json_int_t)frames->extra,
+			 "ahead", (json_int_t)frames->ahead);
 }
 
 static void print_json(const struct incise_verify_report *report, const struct sink *sink)
@@ -150,13 +149,13 @@ static void print_table(const struct incise_verify_report *report, const char *p
 			       (unsigned long long)stream->altered);
 		printf("\n");
 	}
-	if (report->pictures.checked)
+	if (report->frames.checked)
 		printf("%-8s %llu pictures as written, %llu missing, %llu altered, %llu that "
 		       "no row has\n",
-		       "", (unsigned long long)report->pictures.present,
-		       (unsigned long long)report->pictures.missing,
-		       (unsigned long long)report->pictures.altered,
-		       (unsigned long long)report->pictures.extra);
+		       "", (unsigned long long)report->frames.present,
+		       (unsigned long long)report->frames.missing,
+		       (unsigned long long)report->frames.altered,
+		       (unsigned long long)report->frames.extra);
 	if (report->complete)
 		printf("%s: complete: all is there, as it was written\n", path);
 }

@@ -157,6 +157,36 @@ void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_
 	ledger->last_ns = row->t_ns;
 }
 
+int incise_ledger_select(sqlite3 *db, const char *stream, sqlite3_stmt **stmt)
+{
+	int rc = sqlite3_prepare_v2(
+		db,
+		"SELECT block, first_seq, last_seq, first_ns, last_ns, count, lost, crc "
+		"FROM ledger WHERE stream = ? ORDER BY block",
+		-1, stmt, NULL);
+
+	if (rc == SQLITE_OK)
+		sqlite3_bind_text(*stmt, 1, stream, -1, SQLITE_STATIC);
+	return rc;
+}
+
+bool incise_ledger_block_read(struct incise_ledger_block *block, sqlite3_stmt *stmt)
+{
+	int64_t *const to[] = {&block->block,	 &block->first_seq, &block->last_seq,
+			       &block->first_ns, &block->last_ns,   &block->count,
+			       &block->lost};
+	int64_t crc = sqlite3_column_int64(stmt, 7);
+	bool good = sqlite3_column_type(stmt, 7) == SQLITE_INTEGER && crc >= 0 &&
+		    crc <= UINT32_MAX;
+
+	for (int i = 0; i < 7; i++) {
+		good &= sqlite3_column_type(stmt, i) == SQLITE_INTEGER;
+		*to[i] = sqlite3_column_int64(stmt, i);
+	}
+	block->crc = crc;
+	return good;
+}
+
 bool incise_ledger_same(const struct incise_ledger_block *a,
 			const struct incise_ledger_block *b)
 {

@@ -92,6 +92,12 @@ bool incise_ledger_end(struct incise_ledger *ledger, struct incise_ledger_block 
 void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
 			 struct incise_ledger_block *block);
 
+/* Select the entries of a stream, in order. Returns an SQLite code. */
+int incise_ledger_select(sqlite3 *db, const char *stream, sqlite3_stmt **stmt);
+
+/* Read the entry of a row of that. False: a value is impossible in any entry. */
+bool incise_ledger_block_read(struct incise_ledger_block *block, sqlite3_stmt *stmt);
+
 bool incise_ledger_same(const struct incise_ledger_block *a,
 			const struct incise_ledger_block *b);
 

@@ -3,11 +3,16 @@
  * Proof that a recording is complete; see incise/verify.h and verify.h.
  */
 #include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
+#include "../frames.h"
 #include "../schema.h"
 #include "verify.h"
 
-/* One number by SQL; @otherwise where it is NULL or cannot be had. */
+/* One integer by SQL; @otherwise if it is NULL or cannot be read. */
 static int64_t ask(struct incise_verification *verify, const char *sql, int64_t otherwise)
 {
 	sqlite3_stmt *stmt;
@@ -21,14 +26,14 @@ static int64_t ask(struct incise_verification *verify, const char *sql, int64_t 
 	return otherwise;
 }
 
-/* --- what is not of one stream -------------------------------------------------------- */
+/* --- pages, counts and names ---------------------------------------------------------- */
 
-static int tell_of_pages(void *user)
+static int report_pages(void *user)
 {
-	return incise_verify_progress(user, -1);
+	return incise_verify_progress(user, true);
 }
 
-/* SQLite's own look at every page. Returns 0 or -ECANCELED. */
+/* SQLite's own check of every page. Returns 0 or -ECANCELED. */
 static int check_pages(struct incise_verification *verify)
 {
 	sqlite3 *db = verify->recording->db;
@@ -36,7 +41,7 @@ static int check_pages(struct incise_verification *verify)
 	int rc;
 
 	/* in steps of SQLite's machine; some ms */
-	sqlite3_progress_handler(db, 100000, tell_of_pages, verify);
+	sqlite3_progress_handler(db, 100000, report_pages, verify);
 	rc = sqlite3_prepare_v2(db, "PRAGMA integrity_check(20)", -1, &stmt, NULL);
 	while (rc == SQLITE_OK && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
 		const char *text = (const char *)sqlite3_column_text(stmt, 0);
@@ -63,7 +68,7 @@ static int check_pages(struct incise_verification *verify)
 	return rc == SQLITE_INTERRUPT ? -ECANCELED : 0;
 }
 
-/* Of an interrupted recording; a closed one has a seal of it. */
+/* Table depth of an interrupted recording; a closed one has a seal of it. */
 static void check_depth(struct incise_verification *verify)
 {
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_COUNT);
@@ -75,7 +80,7 @@ static void check_depth(struct incise_verification *verify)
 				    (long long)rows, (unsigned long long)found.count);
 }
 
-/* Streams that this version does not know would be taken for verified. */
+/* An entry with an unknown name would pass as verified. */
 #define STREAMS "'force', 'tracker', 'camera'"
 #define SEALS                                                                           \
 	"'table:depth', 'table:events', 'table:knots', 'table:meta', 'table:streams', " \
@@ -95,8 +100,8 @@ static void check_names(struct incise_verification *verify)
 			"the ledger has entries of streams that there are not");
 }
 
-/* How many samples a device that died would still have given nobody knows. */
-static void tell_of_ends(struct incise_verification *verify)
+/* The number of samples that a dead device would still have sent is not known. */
+static void report_ends(struct incise_verification *verify)
 {
 	sqlite3_stmt *stmt;
 
@@ -105,7 +110,7 @@ static void tell_of_ends(struct incise_verification *verify)
 		    "SELECT name, ended, (SELECT max(last_ns) FROM ledger WHERE "
 		    "stream = name AND count > 0) FROM streams WHERE ended IS NOT NULL",
 		    -1, &stmt, NULL) != SQLITE_OK)
-		return; /* pages and seals tell of it */
+		return; /* reported with the pages and seals */
 	while (sqlite3_step(stmt) == SQLITE_ROW) {
 		struct incise_verify_finding found =
 			incise_verify_finding(INCISE_VERIFY_ENDED);
@@ -128,7 +133,7 @@ static void tell_of_ends(struct incise_verification *verify)
 	sqlite3_finalize(stmt);
 }
 
-static void tell_of_interruption(struct incise_verification *verify)
+static void report_interruption(struct incise_verification *verify)
 {
 	struct incise_verify_finding found =
 		incise_verify_finding(INCISE_VERIFY_INTERRUPTED);
@@ -150,9 +155,112 @@ static void tell_of_interruption(struct incise_verification *verify)
 			incise_verify_s(verify, found.last_ns));
 }
 
-/* --- all of it ------------------------------------------------------------------------- */
+/* --- seals ---------------------------------------------------------------------------- */
 
-/* Whatever says so, since anything may have been removed. */
+/* Number of entries of @stream in the ledger, the first in @entry; -1: it cannot be read. */
+static int read_entry(struct incise_verification *verify, const char *stream,
+		      struct incise_ledger_block *entry)
+{
+	sqlite3_stmt *stmt = NULL;
+	int n = 0, rc;
+
+	*entry = (struct incise_ledger_block){0};
+	if (incise_ledger_select(verify->recording->db, stream, &stmt) != SQLITE_OK)
+		return -1;
+	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW && n++ == 0)
+		if (!incise_ledger_block_read(entry, stmt))
+			n = 2; /* as bad as a second one */
+	sqlite3_finalize(stmt);
+	return rc == SQLITE_ROW || rc == SQLITE_DONE ? n : -1;
+}
+
+/* @stream is the name in the ledger, @what that in the finding. */
+static void compare(struct incise_verification *verify, const char *stream,
+		    const char *what, const char *units,
+		    const struct incise_ledger_block *made)
+{
+	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_ALTERED);
+	struct incise_ledger_block entry;
+	int n = read_entry(verify, stream, &entry);
+
+	if (n < 0) {
+		incise_verify_unreadable(verify, "", "ledger");
+		return;
+	}
+	if (!n) {
+		found.kind = INCISE_VERIFY_LEDGER;
+		incise_verify_found(verify, &found, "%s has no seal in the ledger", what);
+		return;
+	}
+	found.count = entry.count;
+	if (n == 1 && incise_ledger_same(made, &entry))
+		return;
+	if (n == 1 && made->count != entry.count)
+		incise_verify_found(verify, &found, "%s has %lld %s of %lld", what,
+				    (long long)made->count, units,
+				    (long long)entry.count);
+	else
+		incise_verify_found(verify, &found,
+				    "%s is altered: its %s or its seal are not what was "
+				    "written",
+				    what, units);
+}
+
+static void check_head(struct incise_verification *verify)
+{
+	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_DAMAGED);
+	struct incise_ledger_block made, entry;
+	char *path;
+	int fd, rc;
+
+	if (asprintf(&path, "%s/" INCISE_FRAMES_FILE, verify->recording->path) < 0)
+		return;
+	fd = open(path, O_RDONLY | O_CLOEXEC);
+	free(path);
+	if (fd < 0) {
+		/* With frames, verify_camera.c reports that it is missing. */
+		if (read_entry(verify, INCISE_LEDGER_HEAD, &entry) && !verify->frames)
+			incise_verify_found(verify, &found,
+					    "camera: " INCISE_FRAMES_FILE " is missing");
+		return;
+	}
+	rc = incise_ledger_seal_head(fd, &made);
+	close(fd);
+	if (rc)
+		incise_verify_found(verify, &found,
+				    INCISE_FRAMES_FILE " cannot be read: %s",
+				    strerror(-rc));
+	else
+		compare(verify, INCISE_LEDGER_HEAD, "the head of " INCISE_FRAMES_FILE,
+			"bytes", &made);
+}
+
+/* Compare all seals of a closed recording. Returns 0 or -ECANCELED. */
+static int check_seals(struct incise_verification *verify)
+{
+	int rc = 0;
+
+	for (int i = 0; incise_ledger_sealed[i] && !rc; i++) {
+		const char *table = incise_ledger_sealed[i];
+		struct incise_ledger_block made;
+		char stream[40], what[40];
+
+		snprintf(stream, sizeof(stream), INCISE_LEDGER_TABLE "%s", table);
+		snprintf(what, sizeof(what), "table %s", table);
+		if (incise_ledger_seal(verify->recording->db, table, &made) != SQLITE_OK)
+			incise_verify_unreadable(verify, "", table);
+		else
+			compare(verify, stream, what, "rows", &made);
+		rc = incise_verify_progress(verify, false);
+	}
+	if (!rc && verify->camera)
+		check_head(verify);
+	return rc;
+}
+
+/* --- the recording ---------------------------------------------------------------------- */
+
+/* Any trace of a camera counts, because others may have been removed. */
 static bool has_camera(struct incise_verification *verify)
 {
 	return ask(
@@ -185,9 +293,8 @@ static int check_streams(struct incise_verification *verify)
 	verify->rows = meta->force + meta->tracker;
 	if (verify->camera) {
 		verify->frames = ask(verify, "SELECT count(*) FROM frames", 0);
-		verify->rows += verify->frames * INCISE_VERIFY_PICTURE_ROWS;
+		verify->rows += verify->frames * INCISE_VERIFY_FRAME_ROWS;
 	}
-
 	for (int i = 0; i < INCISE_LEDGER_STREAMS && !rc; i++) {
 		if (i == INCISE_LEDGER_CAMERA && !verify->camera)
 			continue;
@@ -230,7 +337,7 @@ int incise_verify(const char *path, const struct incise_verify_watch *watch,
 			check_depth(&verify);
 		check_names(&verify);
 		if (!report->interrupted)
-			rc = incise_verify_seals(&verify);
+			rc = check_seals(&verify);
 	}
 	if (!rc)
 		rc = check_pages(&verify);
@@ -238,8 +345,8 @@ int incise_verify(const char *path, const struct incise_verify_watch *watch,
 		rc = incise_error_set(err, ECANCELED, "%s: stopped; not verified", path);
 		goto out;
 	}
-	tell_of_ends(&verify);
-	tell_of_interruption(&verify);
+	report_ends(&verify);
+	report_interruption(&verify);
 	report->complete = !report->findings;
 	report->intact = !verify.altered;
 out:

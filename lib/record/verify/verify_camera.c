@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * camera.mkv against the rows of table frames, both in order and a picture at a time; see
+ * camera.mkv compared with the rows of table frames, both in order and frame by frame; see
  * verify.h.
  *
  *     rows      1 2 3 4 5   7 8 |
- *     pictures  1 2   4 5 6 7 8 | 9      9: only of an interrupted recording, whose file is
+ *     frames    1 2   4 5 6 7 8 | 9      9: only in an interrupted recording, whose file is
  *                  └ missing └ extra     ahead of the table
  *
- * A damaged picture may say any number, so one is known by its number and by what else is in
- * its row: the stamp in the file, or size and CRC.
+ * A damaged frame may have any number, so a frame is identified by its number and by other
+ * columns of its row: the timestamp in the file, or size and CRC.
  */
 #include <errno.h>
 #include <stdio.h>
@@ -21,9 +21,9 @@ struct row {
 	int64_t seq, t_ns, pts_ms, bytes, crc;
 };
 
-/* Pictures in a row that are wrong in the same way. */
+/* Consecutive frames that are wrong in the same way. */
 struct run {
-	enum { NONE, MISSING, ALTERED, EXTRA } what;
+	enum fault { NONE, MISSING, ALTERED, EXTRA } what;
 	const char *why; /* of ALTERED */
 	int64_t first_seq, last_seq;
 	int64_t first_ns, last_ns;
@@ -32,14 +32,14 @@ struct run {
 
 struct walk {
 	struct incise_verification *verify;
-	struct incise_verify_pictures *out;
+	struct incise_verify_frames *out;
 	sqlite3_stmt *rows, *by_seq;
 	struct row row; /* next, where has_row */
 	bool has_row;
-	int64_t last_ns; /* of the row before */
-	bool stamped;	 /* rows have the pictures' times, less the delay */
+	int64_t last_ns;  /* of the row before */
+	bool timestamped; /* rows have the frames' times, less the delay */
 	int64_t delay_ns;
-	bool ended; /* it died, maybe in mid-picture */
+	bool ended; /* it died, maybe in mid-frame */
 	struct run run;
 };
 
@@ -56,7 +56,7 @@ static struct incise_verify_finding finding(enum incise_verify_kind kind)
 static void flush_run(struct walk *walk)
 {
 	const struct run *run = &walk->run;
-	struct incise_verify_finding found = finding(INCISE_VERIFY_PICTURES);
+	struct incise_verify_finding found = finding(INCISE_VERIFY_FRAMES);
 	char where[120];
 
 	if (run->what == NONE)
@@ -91,12 +91,12 @@ static void flush_run(struct walk *walk)
 	walk->run.what = NONE;
 }
 
-static void add_to_run(struct walk *walk, int what, const char *why, int64_t seq,
+static void add_to_run(struct walk *walk, enum fault what, const char *why, int64_t seq,
 		       int64_t t_ns)
 {
 	struct run *run = &walk->run;
 
-	if (run->what != NONE && ((int)run->what != what || run->why != why))
+	if (run->what != NONE && (run->what != what || run->why != why))
 		flush_run(walk);
 	if (run->what == NONE)
 		*run = (struct run){what, why, seq, seq, t_ns, t_ns, 0};
@@ -116,7 +116,7 @@ static void read_row(sqlite3_stmt *stmt, struct row *row)
 	};
 }
 
-/* Returns 0 or -EIO, which verify_stream.c has told of. */
+/* Returns 0 or -EIO, which verify_stream.c has reported. */
 static int next_row(struct walk *walk)
 {
 	int rc = sqlite3_step(walk->rows);
@@ -135,44 +135,43 @@ static int skip_row(struct walk *walk)
 	return next_row(walk);
 }
 
-/* --- pictures --------------------------------------------------------------------- */
+/* --- frames ----------------------------------------------------------------------- */
 
-struct picture {
-	struct incise_camera_frame frame;
+struct frame {
+	struct incise_camera_frame head; /* number and time */
 	struct incise_frames_stored stored;
 	bool good; /* by the reader */
 };
 
-static bool is_like(const struct row *row, const struct picture *picture)
+static bool is_like(const struct row *row, const struct frame *frame)
 {
-	return row->pts_ms == picture->stored.pts_ms ||
-	       (row->crc == picture->stored.crc && row->bytes == picture->stored.bytes);
+	return row->pts_ms == frame->stored.pts_ms ||
+	       (row->crc == frame->stored.crc && row->bytes == frame->stored.bytes);
 }
 
-/* Whether a row further on is this picture's: those between have none. */
-static bool is_further_on(struct walk *walk, const struct picture *picture)
+/* Whether a later row is this frame's: the rows between have no frame. */
+static bool is_further_on(struct walk *walk, const struct frame *frame)
 {
 	struct row row;
 	bool is = false;
 
-	if (picture->frame.seq > INT64_MAX ||
-	    (int64_t)picture->frame.seq <= walk->row.seq)
+	if (frame->head.seq > INT64_MAX || (int64_t)frame->head.seq <= walk->row.seq)
 		return false;
-	sqlite3_bind_int64(walk->by_seq, 1, picture->frame.seq);
+	sqlite3_bind_int64(walk->by_seq, 1, frame->head.seq);
 	if (sqlite3_step(walk->by_seq) == SQLITE_ROW) {
 		read_row(walk->by_seq, &row);
-		is = is_like(&row, picture);
+		is = is_like(&row, frame);
 	}
 	sqlite3_reset(walk->by_seq);
 	return is;
 }
 
-/* A stamp that stood still was moved on by 1 ns; see timeline.h. */
+/* A repeated timestamp was increased by 1 ns; see timeline.h. */
 static bool is_time(const struct walk *walk, int64_t t_ns)
 {
 	int64_t late_ns;
 
-	if (!walk->stamped)
+	if (!walk->timestamped)
 		return true;
 	if (__builtin_sub_overflow(t_ns, walk->row.t_ns, &late_ns))
 		return false;
@@ -180,53 +179,52 @@ static bool is_time(const struct walk *walk, int64_t t_ns)
 	       (late_ns < walk->delay_ns && walk->row.t_ns == walk->last_ns + 1);
 }
 
-/* What of the picture of walk->row is not as written; NULL: all is. */
-static const char *difference(const struct walk *walk, const struct picture *picture)
+/* The part of the frame that differs from walk->row; NULL: none. */
+static const char *difference(const struct walk *walk, const struct frame *frame)
 {
 	const struct row *row = &walk->row;
 
-	if (row->bytes != picture->stored.bytes)
+	if (row->bytes != frame->stored.bytes)
 		return "its size is";
-	if (row->crc != picture->stored.crc)
+	if (row->crc != frame->stored.crc)
 		return "its bytes are";
-	if (row->seq < 0 || (uint64_t)row->seq != picture->frame.seq)
+	if (row->seq < 0 || (uint64_t)row->seq != frame->head.seq)
 		return "its number is";
-	if (row->pts_ms != picture->stored.pts_ms || !is_time(walk, picture->frame.t_ns))
+	if (row->pts_ms != frame->stored.pts_ms || !is_time(walk, frame->head.t_ns))
 		return "its time is";
-	return picture->good ? NULL : "its note or the file's head is";
+	return frame->good ? NULL : "its note or the file's head is";
 }
 
-static int take_picture(struct walk *walk, const struct picture *picture)
+/* Compare a frame with its row, after the rows without a frame. Returns 0 or -EIO. */
+static int take_frame(struct walk *walk, const struct frame *frame)
 {
-	const struct incise_camera_frame *frame = &picture->frame;
+	const struct incise_camera_frame *head = &frame->head;
 	const char *why;
 	int rc = 0;
 
-	if (walk->has_row && frame->seq != (uint64_t)walk->row.seq) {
-		if (is_further_on(walk, picture)) {
-			while (!rc && walk->has_row &&
-			       walk->row.seq < (int64_t)frame->seq)
+	if (walk->has_row && head->seq != (uint64_t)walk->row.seq) {
+		if (is_further_on(walk, frame)) {
+			while (!rc && walk->has_row && walk->row.seq < (int64_t)head->seq)
 				rc = skip_row(walk);
 			if (rc)
 				return rc;
-		} else if (!is_like(&walk->row, picture)) {
+		} else if (!is_like(&walk->row, frame)) {
 			walk->out->extra++;
-			add_to_run(walk, EXTRA, NULL, frame->seq, frame->t_ns);
+			add_to_run(walk, EXTRA, NULL, head->seq, head->t_ns);
 			return 0;
 		}
 	}
 	if (!walk->has_row) {
-		/* Pictures are in the file before their rows are in the table. */
-		if (walk->verify->report->interrupted ||
-		    (walk->ended && !picture->good)) {
+		/* Frames are in the file before their rows are in the table. */
+		if (walk->verify->report->interrupted || (walk->ended && !frame->good)) {
 			walk->out->ahead++;
 			return 0;
 		}
 		walk->out->extra++;
-		add_to_run(walk, EXTRA, NULL, frame->seq, frame->t_ns);
+		add_to_run(walk, EXTRA, NULL, head->seq, head->t_ns);
 		return 0;
 	}
-	why = difference(walk, picture);
+	why = difference(walk, frame);
 	if (why) {
 		walk->out->altered++;
 		add_to_run(walk, ALTERED, why, walk->row.seq, walk->row.t_ns);
@@ -246,21 +244,18 @@ static int walk_through(struct walk *walk, struct incise_frames_reader *reader)
 	int rc = next_row(walk), got = 1;
 
 	while (!rc) {
-		struct picture picture;
+		struct frame frame;
 
-		got = incise_frames_next(reader, &picture.frame, &picture.stored, &err);
+		got = incise_frames_next(reader, &frame.head, &frame.stored, &err);
 		if (got != 1 && got != -EBADMSG)
 			break;
-		picture.good = got == 1;
-		/* The first one shows that the file's head is right; then CRCs are enough. */
-		reader->undecoded |= picture.good;
-		rc = take_picture(walk, &picture);
-		verify->rows_done += INCISE_VERIFY_PICTURE_ROWS;
+		frame.good = got == 1;
+		/* The first frame proves the file's head; CRCs are enough for the others. */
+		reader->undecoded |= frame.good;
+		rc = take_frame(walk, &frame);
+		verify->rows_done += INCISE_VERIFY_FRAME_ROWS;
 		if (!rc)
-			rc = incise_verify_progress(
-				verify, verify->rows_done < verify->rows
-						? (double)verify->rows_done / verify->rows
-						: 1);
+			rc = incise_verify_progress(verify, false);
 	}
 	if (!rc && got < 0) {
 		struct incise_verify_finding found =
@@ -278,14 +273,14 @@ static int walk_through(struct walk *walk, struct incise_frames_reader *reader)
 	return rc;
 }
 
-/* Nothing is known of the pictures. */
-static void tell_unopened(struct incise_verification *verify, const char *path,
-			  const struct incise_error *err)
+/* Report that no frame could be verified. */
+static void report_unopened(struct incise_verification *verify, const char *path,
+			    const struct incise_error *err)
 {
-	struct incise_verify_finding found = finding(INCISE_VERIFY_PICTURES);
+	struct incise_verify_finding found = finding(INCISE_VERIFY_FRAMES);
 
 	if (access(path, F_OK) && errno == ENOENT) {
-		found.count = verify->report->pictures.missing = verify->frames;
+		found.count = verify->report->frames.missing = verify->frames;
 		incise_verify_found(verify, &found,
 				    "camera: " INCISE_FRAMES_FILE
 				    " is missing, and %llu pictures with it",
@@ -319,7 +314,7 @@ static int prepare(struct walk *walk)
 			"name = 'camera'",
 			-1, &stmt, NULL);
 	if (rc == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW) {
-		walk->stamped = sqlite3_column_int(stmt, 0);
+		walk->timestamped = sqlite3_column_int(stmt, 0);
 		walk->delay_ns = sqlite3_column_int64(stmt, 1);
 		walk->ended = sqlite3_column_int(stmt, 2);
 	}
@@ -329,7 +324,7 @@ static int prepare(struct walk *walk)
 
 int incise_verify_camera(struct incise_verification *verify)
 {
-	struct walk walk = {.verify = verify, .out = &verify->report->pictures};
+	struct walk walk = {.verify = verify, .out = &verify->report->frames};
 	struct incise_frames_reader *reader = NULL;
 	struct incise_error err = {0};
 	char *path = NULL;
@@ -339,15 +334,15 @@ int incise_verify_camera(struct incise_verification *verify)
 		path = NULL;
 		incise_error_set(&err, ENOMEM, INCISE_FRAMES_FILE ": out of memory");
 	} else if (access(path, F_OK)) {
-		/* A camera that died before its first picture has no file. */
+		/* A camera that died before its first frame has no file. */
 		if (verify->frames)
-			tell_unopened(verify, path, &err);
+			report_unopened(verify, path, &err);
 		goto out;
 	} else {
 		reader = incise_frames_reader_new(path, &err);
 	}
 	if (!reader) {
-		tell_unopened(verify, path ? path : "", &err);
+		report_unopened(verify, path ? path : "", &err);
 		goto out;
 	}
 	rc = prepare(&walk);
@@ -358,6 +353,6 @@ int incise_verify_camera(struct incise_verification *verify)
 	incise_frames_reader_close(reader);
 out:
 	free(path);
-	/* What SQLite cannot read was told when the rows were walked through. */
+	/* verify_stream.c has reported rows that SQLite cannot read. */
 	return rc == -ECANCELED ? rc : 0;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What a verification finds, and how far it is; see verify.h.
+ * Findings and progress of a verification; see verify.h.
  */
 #include <errno.h>
 #include <stdarg.h>
@@ -8,7 +8,7 @@
 #include <time.h>
 #include "verify.h"
 
-#define TELL_NS 100000000LL
+#define REPORT_NS 100000000LL
 
 double incise_verify_s(const struct incise_verification *verify, int64_t t_ns)
 {
@@ -37,7 +37,7 @@ void incise_verify_found(struct incise_verification *verify,
 	va_start(args, fmt);
 	vsnprintf(line, sizeof(line), fmt, args);
 	va_end(args);
-	/* Names and values may come from the file. */
+	/* Names and values may come from the file: no control characters. */
 	for (char *c = line; *c; c++)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '?';
@@ -62,8 +62,11 @@ void incise_verify_unreadable(struct incise_verification *verify, const char *st
 			    sqlite3_errmsg(verify->recording->db));
 }
 
-int incise_verify_progress(struct incise_verification *verify, double share)
+int incise_verify_progress(struct incise_verification *verify, bool pages)
 {
+	double share = verify->rows_done < verify->rows
+			       ? (double)verify->rows_done / verify->rows
+			       : 1;
 	struct timespec now;
 	int64_t now_ns;
 
@@ -71,8 +74,10 @@ int incise_verify_progress(struct incise_verification *verify, double share)
 		return 0;
 	clock_gettime(CLOCK_MONOTONIC, &now);
 	now_ns = now.tv_sec * 1000000000LL + now.tv_nsec;
-	if (now_ns - verify->told_ns < TELL_NS)
+	if (now_ns - verify->reported_ns < REPORT_NS)
 		return 0;
-	verify->told_ns = now_ns;
-	return verify->watch->progress(verify->watch->user, share) ? -ECANCELED : 0;
+	verify->reported_ns = now_ns;
+	return verify->watch->progress(verify->watch->user, pages ? -1 : share)
+		       ? -ECANCELED
+		       : 0;
 }

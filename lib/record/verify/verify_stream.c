@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The rows of one stream against its ledger, both in order and a row at a time; see verify.h.
+ * The rows of one stream compared with its ledger, both in order and row by row; see verify.h.
  *
  *     ledger   ├─ block 0 ─┤├─ block 1 ─┤├─ block 2 ─┤ end
  *     rows     1 2 3 4 5 6  7 8   10 11   12 …              extra
  *                              └ lost
  *
- * After a block that does not agree it is not known which is wrong, its rows or its entry,
- * so the next one may go on from either: from the CRC that was recomputed or from the one
- * that is written. That way only what is wrong is reported, and not all that follows.
+ * If a block does not agree, its rows or its entry are wrong, so the next block may continue from
+ * either the recomputed CRC or the one in the entry. That way only the wrong blocks are
+ * reported, and not all that follow.
  */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include "verify.h"
 
-#define TELL_ROWS 4096
-/* Sums of what a damaged ledger says stay in range. */
+#define REPORT_ROWS 4096
+/* Sums over a damaged ledger stay in range. */
 #define COUNT_MAX (1LL << 53)
 
 struct walk {
@@ -27,15 +27,16 @@ struct walk {
 
 	struct incise_ledger_row row; /* next, where has_row */
 	bool has_row, good_row;
-	bool known; /* last_seq and last_ns: of a row, or where the ledger begins */
+	bool known; /* last_seq and last_ns: of a row, or of the ledger's start */
 	int64_t last_seq, last_ns;
 
-	struct incise_ledger chain[2]; /* from the CRC recomputed, from the one written */
-	int chains;		       /* 1 as long as both are the same */
-	uint64_t counted;	       /* rows, by the ledger */
-	int64_t next;		       /* block */
+	struct incise_ledger
+		chain[2]; /* from the recomputed CRC, from the one in the entry */
+	int chains;	  /* 1 while both are the same */
+	uint64_t counted; /* rows, by the ledger */
+	int64_t next;	  /* block */
 	struct incise_verify_finding altered; /* blocks in a row; first_block -1: none */
-	uint64_t there;			      /* rows that they have */
+	uint64_t altered_rows;		      /* rows that they have */
 };
 
 static struct incise_verify_finding finding(const struct walk *walk,
@@ -47,7 +48,7 @@ static struct incise_verify_finding finding(const struct walk *walk,
 	return found;
 }
 
-/* Samples from @first to @last are not there; the row after them is at @after_ns, or -1. */
+/* Report missing samples from @first to @last; the row after them is at @after_ns, or -1. */
 static void lost(struct walk *walk, int64_t first, int64_t last, int64_t after_ns)
 {
 	struct incise_verify_finding found = finding(walk, INCISE_VERIFY_LOST);
@@ -90,15 +91,11 @@ static int next_row(struct walk *walk)
 		return -EIO;
 	}
 	walk->good_row = incise_ledger_row_read(&walk->row, walk->form, walk->rows);
-	if (++verify->rows_done % TELL_ROWS)
-		return 0;
-	return incise_verify_progress(verify,
-				      verify->rows_done < verify->rows
-					      ? (double)verify->rows_done / verify->rows
-					      : 1);
+	return ++verify->rows_done % REPORT_ROWS ? 0
+						 : incise_verify_progress(verify, false);
 }
 
-/* Take the row into the chains, and go on to the next. Returns as next_row(). */
+/* Add the row to the chains, and read the next. Returns as next_row(). */
 static int take_row(struct walk *walk, bool *good)
 {
 	if (walk->known && walk->row.seq > walk->last_seq + 1)
@@ -113,7 +110,7 @@ static int take_row(struct walk *walk, bool *good)
 	return next_row(walk);
 }
 
-/* Tell of blocks that do not agree, if there are any. */
+/* Report the blocks that do not agree, if there are any. */
 static void flush_altered(struct walk *walk)
 {
 	struct incise_verify_finding *found = &walk->altered;
@@ -127,11 +124,11 @@ static void flush_altered(struct walk *walk)
 	else
 		snprintf(blocks, sizeof(blocks), "blocks %lld to %lld are",
 			 (long long)found->first_block, (long long)found->last_block);
-	if (walk->there == found->count)
+	if (walk->altered_rows == found->count)
 		snprintf(what, sizeof(what), "rows or ledger are not what was written");
 	else
 		snprintf(what, sizeof(what), "%llu rows, and %llu were written",
-			 (unsigned long long)walk->there,
+			 (unsigned long long)walk->altered_rows,
 			 (unsigned long long)found->count);
 	incise_verify_found(walk->verify, found,
 			    "%s: %s altered, numbers %lld to %lld, %.4f to %.4f s: %s",
@@ -140,11 +137,11 @@ static void flush_altered(struct walk *walk)
 			    incise_verify_s(walk->verify, found->first_ns),
 			    incise_verify_s(walk->verify, found->last_ns), what);
 	*found = finding(walk, INCISE_VERIFY_ALTERED);
-	walk->there = 0;
+	walk->altered_rows = 0;
 }
 
 static void add_altered(struct walk *walk, const struct incise_ledger_block *block,
-			uint64_t there)
+			uint64_t rows)
 {
 	struct incise_verify_finding *found = &walk->altered;
 
@@ -157,25 +154,15 @@ static void add_altered(struct walk *walk, const struct incise_ledger_block *blo
 	found->last_seq = block->last_seq;
 	found->last_ns = block->last_ns;
 	found->count += block->count;
-	walk->there += there;
+	walk->altered_rows += rows;
 	walk->out->altered++;
 }
 
-/* The entry that walk->blocks is at. Returns false when it cannot be one. */
+/* Read the next entry. Returns false if it is impossible. */
 static bool read_block(struct walk *walk, struct incise_ledger_block *block)
 {
-	int64_t *const to[] = {&block->block,	 &block->first_seq, &block->last_seq,
-			       &block->first_ns, &block->last_ns,   &block->count,
-			       &block->lost};
-	int64_t crc = sqlite3_column_int64(walk->blocks, 7);
-	bool good = sqlite3_column_type(walk->blocks, 7) == SQLITE_INTEGER && crc >= 0 &&
-		    crc <= UINT32_MAX;
+	bool good = incise_ledger_block_read(block, walk->blocks);
 
-	for (int i = 0; i < 7; i++) {
-		good &= sqlite3_column_type(walk->blocks, i) == SQLITE_INTEGER;
-		*to[i] = sqlite3_column_int64(walk->blocks, i);
-	}
-	block->crc = crc;
 	if (block->count < 0 || block->count > COUNT_MAX || block->lost < 0 ||
 	    block->lost > COUNT_MAX) {
 		block->count = block->lost = 0;
@@ -189,8 +176,8 @@ static bool read_block(struct walk *walk, struct incise_ledger_block *block)
 }
 
 /*
- * Entries from walk->next to @block are not there. The rows before it are taken for one
- * block: where it was one, the chain goes on.
+ * Entries from walk->next to @block are missing. The rows before @block are treated as one block:
+ * if they were one, the chain continues.
  */
 static int skip_blocks(struct walk *walk, const struct incise_ledger_block *block)
 {
@@ -212,7 +199,7 @@ static int skip_blocks(struct walk *walk, const struct incise_ledger_block *bloc
 	}
 	if (rc == -ECANCELED)
 		return rc;
-	/* whatever the missing entries said, only what was recomputed is left */
+	/* Without the entries only the recomputed CRC is left. */
 	incise_ledger_end(&walk->chain[0], &ignored);
 	walk->chain[0].open.block = block->block;
 	walk->chains = 1;
@@ -231,7 +218,7 @@ static int skip_blocks(struct walk *walk, const struct incise_ledger_block *bloc
 	return rc;
 }
 
-/* Recompute a block of its rows. Returns as next_row(). */
+/* Recompute a block from its rows. Returns as next_row(). */
 static int take_block(struct walk *walk, const struct incise_ledger_block *block,
 		      bool good)
 {
@@ -313,7 +300,7 @@ static int step_block(struct walk *walk)
 	return -EIO;
 }
 
-/* What the recorder counted in table meta against the ledger. */
+/* Compare the recorder's counts in table meta with the ledger. */
 static void check_counts(struct walk *walk, uint64_t rows, uint64_t lost_rows)
 {
 	const struct incise_verify_stream *out = walk->out;
@@ -326,7 +313,7 @@ static void check_counts(struct walk *walk, uint64_t rows, uint64_t lost_rows)
 				    walk->form->stream, (unsigned long long)rows,
 				    (unsigned long long)walk->counted);
 	}
-	/* Before the end a device may know of losses that no gap shows yet. */
+	/* Before the end a device may count losses that no gap shows yet. */
 	if (!walk->verify->report->interrupted && lost_rows != out->lost_at_capture) {
 		found.count = lost_rows;
 		incise_verify_found(
@@ -399,15 +386,10 @@ int incise_verify_stream(struct incise_verification *verify,
 	snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY seq", form->columns,
 		 form->table);
 	if (sqlite3_prepare_v2(db, sql, -1, &walk.rows, NULL) != SQLITE_OK ||
-	    sqlite3_prepare_v2(
-		    db,
-		    "SELECT block, first_seq, last_seq, first_ns, last_ns, count, lost, crc "
-		    "FROM ledger WHERE stream = ? ORDER BY block",
-		    -1, &walk.blocks, NULL) != SQLITE_OK) {
+	    incise_ledger_select(db, form->stream, &walk.blocks) != SQLITE_OK) {
 		incise_verify_unreadable(verify, form->stream, form->table);
 		rc = -EIO;
 	}
-	sqlite3_bind_text(walk.blocks, 1, form->stream, -1, SQLITE_STATIC);
 	if (!rc)
 		rc = walk_through(&walk);
 	if (!rc)

@@ -637,8 +637,8 @@ static void pictures_are_held_against_their_rows(void **state)
 	assert_string_equal(report.streams[2].name, "camera");
 	assert_int_equal(report.streams[2].expected, PICTURES);
 	assert_int_equal(report.streams[2].present, PICTURES);
-	assert_true(report.pictures.checked);
-	assert_int_equal(report.pictures.present, PICTURES);
+	assert_true(report.frames.checked);
+	assert_int_equal(report.frames.present, PICTURES);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		write_pictures(PICTURES, &cases[i].change, NULL);
 		seal(true); /* a file's head has a random number of its own */
@@ -646,15 +646,15 @@ static void pictures_are_held_against_their_rows(void **state)
 		if (report.complete || report.intact || report.findings != 1 ||
 		    !strstr(findings.text, cases[i].text))
 			fail_msg("%zu: %d: %s", i, report.complete, findings.text);
-		assert_int_equal(findings.first.kind, INCISE_VERIFY_PICTURES);
+		assert_int_equal(findings.first.kind, INCISE_VERIFY_FRAMES);
 		assert_int_equal(findings.first.first_seq, cases[i].seq);
 		assert_int_equal(findings.first.last_seq,
 				 cases[i].last_seq ? cases[i].last_seq : cases[i].seq);
-		assert_int_equal(report.pictures.present,
+		assert_int_equal(report.frames.present,
 				 PICTURES - cases[i].missing - cases[i].altered);
-		assert_int_equal(report.pictures.missing, cases[i].missing);
-		assert_int_equal(report.pictures.altered, cases[i].altered);
-		assert_int_equal(report.pictures.extra, cases[i].extra);
+		assert_int_equal(report.frames.missing, cases[i].missing);
+		assert_int_equal(report.frames.altered, cases[i].altered);
+		assert_int_equal(report.frames.extra, cases[i].extra);
 	}
 }
 
@@ -754,10 +754,10 @@ static void damaged_file(void **state)
 		assert_int_equal(truncate(FILE_NAME, size), 0);
 		verify("a.rec", &report, &findings);
 		if (report.intact ||
-		    report.pictures.present + report.pictures.missing +
-				    report.pictures.altered !=
+		    report.frames.present + report.frames.missing +
+				    report.frames.altered !=
 			    PICTURES ||
-		    !report.pictures.missing)
+		    !report.frames.missing)
 			fail_msg("%ld bytes: %s", (long)size, findings.text);
 	}
 	assert_int_equal(system("echo nothing >" FILE_NAME), 0);
@@ -770,7 +770,7 @@ static void damaged_file(void **state)
 	assert_false(report.intact);
 	assert_non_null(
 		strstr(findings.text, "camera.mkv is missing, and 30 pictures with it"));
-	assert_int_equal(report.pictures.missing, PICTURES);
+	assert_int_equal(report.frames.missing, PICTURES);
 }
 
 /* A kill comes after a picture and before its row. */
@@ -785,15 +785,15 @@ static void file_is_ahead_of_an_interrupted_recording(void **state)
 	verify("a.rec", &report, &findings);
 	if (!report.interrupted || !report.intact || report.findings != 1)
 		fail_msg("%s", findings.text);
-	assert_int_equal(report.pictures.present, PICTURES - 4);
-	assert_int_equal(report.pictures.ahead, 4);
+	assert_int_equal(report.frames.present, PICTURES - 4);
+	assert_int_equal(report.frames.ahead, 4);
 
 	seal(true);
 	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
 	assert_non_null(strstr(findings.text,
 			       "4 in camera.mkv that no row has, numbers 31 to 34"));
-	assert_int_equal(report.pictures.extra, 4);
+	assert_int_equal(report.frames.extra, 4);
 }
 
 static void without_the_module_it_is_said(void **state)
@@ -813,7 +813,7 @@ static void without_the_module_it_is_said(void **state)
 	assert_int_equal(findings.first.kind, INCISE_VERIFY_UNVERIFIED);
 	assert_non_null(strstr(findings.text, "the pictures are not verified: "));
 	assert_non_null(strstr(findings.text, "no module frames_mkv.so"));
-	assert_false(report.pictures.checked);
+	assert_false(report.frames.checked);
 }
 
 /* What a recorder makes, with a delay that was calibrated. */
@@ -848,9 +848,9 @@ static void recorder_and_verification_agree(void **state)
 	if (!report.complete || !report.intact)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.n_streams, 3);
-	assert_true(report.pictures.checked);
-	assert_int_equal(report.pictures.present, report.streams[2].present);
-	assert_true(report.pictures.present > 10);
+	assert_true(report.frames.checked);
+	assert_int_equal(report.frames.present, report.streams[2].present);
+	assert_true(report.frames.present > 10);
 	assert_int_equal(ask(DB, "SELECT delay_ns FROM streams WHERE name = 'camera'"),
 			 2500000);
 	change(DB, "UPDATE streams SET delay_ns = 0 WHERE name = 'camera'");
