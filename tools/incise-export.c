@@ -168,7 +168,7 @@ int main(int argc, char **argv)
 			how.resample = true;
 			break;
 		case OPT_LINEAGE:
-			how.lineage = true;
+			how.provenance = true;
 			break;
 		case OPT_JSON:
 			json = true;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Reading a recording, and making a dataset of it (paper 1, §4.1). Part of
+ * Reading a recording, and exporting it as a dataset (paper 1, §4.1). Part of
  * libincise-record.
  */
 #ifndef INCISE_RECORDING_H
@@ -8,7 +8,6 @@
 
 #include <stdbool.h>
 #include <stdint.h>
-#include <stdio.h>
 #include <incise/calibration.h>
 #include <incise/error.h>
 #include <incise/export.h>
@@ -50,29 +49,28 @@ struct incise_stream {
 
 struct incise_recording;
 
-/** What a recording holds. */
+/** The contents of a recording. */
 struct incise_recording_info {
 	bool complete; /**< closed by its recorder; false: readable up to the last commit */
 	int64_t start_ns, end_ns; /**< first and last force sample, CLOCK_MONOTONIC */
 	char started[32];	  /**< wall clock at the start, ISO 8601 UTC */
-	char rig[256];		  /**< what was given as rig */
+	char rig[256];		  /**< specification of the rig */
 	uint64_t force, tracker, depth; /**< rows */
 	uint64_t force_lost, tracker_lost, force_clipped;
 	int bits;
-	double full_scale_V, offset_V; /**< 2^bits codes span that; code 0 is this */
-	double force_mV_N, zero_mV, depth_mm_px; /**< calibration it was made with */
+	double full_scale_V, offset_V; /**< range of 2^bits codes; voltage of code 0 */
+	double force_mV_N, zero_mV, depth_mm_px; /**< calibration when it was made */
 	double surface_normal[3], surface_point_mm[3];
-	double tip_mm
-		[3]; /**< calibrated; rows of poses are without it, depth is with it */
-	int cuts;    /**< stretches with the blade in the tissue */
+	double tip_mm[3]; /**< calibrated; poses are without it, depth is with it */
+	int cuts;	  /**< times with the blade in the tissue */
 	double depth_max_mm, force_max_N;
 	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< of form 2 */
 	int n_streams;
 };
 
 /**
- * Open a recording for reading. Where NAME.rec is absent but NAME.rec.part was left by a
- * crash or a full disk, that one is opened.
+ * Open a recording for reading. If NAME.rec is absent and a crash or a full disk has left
+ * NAME.rec.part, open that.
  *
  * @return recording, to be closed with incise_recording_close(); NULL with errno ENOENT,
  *         EINVAL (no recording, a damaged one, or of a newer version), EIO, ENOMEM.
@@ -82,7 +80,7 @@ INCISE_API struct incise_recording *incise_recording_open(const char *path,
 /** NULL is accepted. */
 INCISE_API void incise_recording_close(struct incise_recording *recording);
 
-/** @return 0, -EINVAL (a row that cannot be), -EIO. */
+/** @return 0, -EINVAL (an impossible row), -EIO. */
 INCISE_API int incise_recording_info(struct incise_recording *recording,
 				     struct incise_recording_info *info,
 				     struct incise_error *err);
@@ -95,12 +93,12 @@ struct incise_recording_value {
 
 /**
  * All of a stream in memory: "force", N (NAN where it is clipped; from the converter's 0 V
- * where its zero is not known); "depth", mm by the tracker; "camera", mm by vision, those
- * pictures alone in which it saw the scalpel.
+ * if its zero is not known); "depth", mm by the tracker; "camera", mm by vision, only of the
+ * frames in which it found the scalpel.
  *
  * @param values to be freed with free(3)
- * @return how many, 0 of a stream that it has not; -EINVAL (no such name, a row that cannot
- *         be), -EIO, -ENOMEM.
+ * @return how many, 0 of an absent stream; -EINVAL (no such name, an impossible row), -EIO,
+ *         -ENOMEM.
  */
 INCISE_API int incise_recording_values(struct incise_recording *recording,
 				       const char *name,
@@ -108,18 +106,18 @@ INCISE_API int incise_recording_values(struct incise_recording *recording,
 				       struct incise_error *err);
 
 /**
- * All poses of the tracker as it gave them, with their best times.
+ * All poses of the tracker as received, with their best times.
  *
  * @param poses to be freed with free(3)
- * @return how many; -EINVAL (a row that cannot be), -EIO, -ENOMEM.
+ * @return how many; -EINVAL (an impossible row), -EIO, -ENOMEM.
  */
 INCISE_API int incise_recording_poses(struct incise_recording *recording,
 				      struct incise_tracker_sample **poses,
 				      struct incise_error *err);
 
-/** Exposed length in a picture beside the tracker's depth when it was taken. */
+/** Exposed length in a frame, with the tracker's depth at its time. */
 struct incise_recording_length {
-	int64_t t_ns; /**< of the picture, CLOCK_MONOTONIC */
+	int64_t t_ns; /**< of the frame, CLOCK_MONOTONIC */
 	double length_px;
 	double quality;	 /**< as incise/vision.h */
 	double depth_mm; /**< below 0 in the air */
@@ -127,13 +125,13 @@ struct incise_recording_length {
 };
 
 /**
- * All pictures in which the scalpel was found when they were recorded, in order, with the
- * depth interpolated between the tracker's records around each; those without a record
- * within 50 ms on both sides are left out.
+ * All frames in which vision found the scalpel while recording, in order, with the depth
+ * interpolated between the tracker's records around each; without those that have no record
+ * within 50 ms on both sides.
  *
  * @param lengths to be freed with free(3); NULL for none
- * @return how many; -EINVAL (a row that cannot be; a recording of form 1 has no pictures),
- *         -EIO, -ENOMEM
+ * @return how many; -EINVAL (an impossible row; a recording of form 1 has no frames), -EIO,
+ *         -ENOMEM
  */
 INCISE_API int incise_recording_lengths(struct incise_recording *recording,
 					struct incise_recording_length **lengths,
@@ -141,8 +139,8 @@ INCISE_API int incise_recording_lengths(struct incise_recording *recording,
 
 /** How to export. */
 struct incise_export_options {
-	double rate_hz; /**< rows per second of raw export, averaged over the force samples
-			     they stand for; 0: every force sample */
+	double rate_hz; /**< rows per second of raw export, each the mean of its force
+			     samples; 0: every force sample */
 	int depth_bins; /**< 0: raw; else averaged over depth_bins × velocity_bins */
 	int velocity_bins;
 	double depth_max_mm; /**< upper end of the bins; 0: the largest in the data */
@@ -154,53 +152,47 @@ struct incise_export_options {
 			    with a rate, on a grid; see incise-export(1) */
 	/** In place of the recordings': force, the camera's depth, and the delays it has. */
 	const struct incise_calibration *calibration;
-	bool lineage; /**< CSV begins with lines "# key: value"; HDF5 and MCAP always have it */
+	bool provenance; /**< CSV starts with lines "# key: value"; HDF5 and MCAP always have
+			      it */
 
-	/** Told now and then how much is done, 0 to 1, or NULL; what is not 0 ends it. */
+	/** Called now and then with the share that is done, 0 to 1, or NULL; a value other
+	 * than 0 stops the export. */
 	int (*progress)(void *context, double share);
 	void *context;
 };
 
-/** Raw, every force sample of each cut, by what the recordings hold. */
+/** Raw: every force sample of each cut, with the recordings' own calibration. */
 INCISE_API void incise_export_options_init(struct incise_export_options *options);
 
-/** What was exported. */
+/** The result of an export. */
 struct incise_export_report {
 	uint64_t rows;
 	int cuts;
 	uint64_t
-		clipped; /**< force samples at either end of the converter, left out of averages */
+		clipped; /**< force samples at either end of the converter, not in averages */
 	double depth_max_mm, velocity_max_mm_s;
 };
 
 /**
- * Write the cuts of some recordings as CSV. Raw: cut,t_s,depth_mm,velocity_mm_s,force_N,
- * clipped. Averaged: [cut,]depth_mm,velocity_mm_s,force_N,sd_N,count,cuts. Depth and
- * velocity are interpolated at the times of the force samples.
+ * Export to a file whose name has the format: .h5 and .hdf5 are HDF5, .mcap is MCAP, any
+ * other is CSV. The file appears under its name when it is complete.
  *
- * @param recordings n of them
- * @param out        stream to write to
- * @param report     or NULL
- * @return 0; -ENODATA (no cut in any recording), -EINVAL, -EIO, -ENOSPC, -ENOMEM.
- */
-INCISE_API int incise_export_csv(struct incise_recording *const *recordings, int n,
-				 const struct incise_export_options *options, FILE *out,
-				 struct incise_export_report *report,
-				 struct incise_error *err);
-
-/**
- * Export to a file whose name says of which kind it is: .h5 and .hdf5 are HDF5, .mcap is
- * MCAP, any other is CSV. It appears under its name when it is whole.
+ * CSV has the cuts of some recordings. Raw: cut,t_s,depth_mm,velocity_mm_s,force_N,clipped.
+ * Averaged: [cut,]depth_mm,velocity_mm_s,force_N,sd_N,count,cuts. Depth and velocity are
+ * interpolated at the times of the force samples.
  *
  * HDF5 has a dataset of one dimension per column, named like it, with the attributes
  * units and description; the column cut holds numbers from 1 into the dataset cut_names.
- * The root's attributes are the lineage.
+ * The root's attributes are the provenance.
  *
  * MCAP is all of one recording for viewers, not only its cuts: /force, /tracker, /depth
  * and /events in JSON; rows of the report are messages then, and cuts 0.
  *
- * @return as incise_export_csv(); -ENOENT where the module export_hdf5.so is not there;
- *         -EINTR where progress wanted it to end; errno of incise_outfile_open().
+ * @param recordings n of them
+ * @param report     or NULL
+ * @return 0; -ENODATA (no cut in any recording), -EINVAL, -EIO, -ENOSPC, -ENOMEM; -ENOENT
+ *         without the module export_hdf5.so; -EINTR if progress stopped it; errno of
+ *         incise_outfile_open().
  */
 INCISE_API int incise_export(struct incise_recording *const *recordings, int n,
 			     const struct incise_export_options *options,

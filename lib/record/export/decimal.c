@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include "decimal.h"
 
-/* The digits of a whole number; returns behind the last. */
+/* Write the digits of an integer, with leading zeros up to @least of them. */
 static char *put_digits(char *to, uint64_t value, int least)
 {
 	char digits[24];
@@ -27,8 +27,8 @@ char *incise_decimal_integer(char *to, int64_t value)
 }
 
 /*
- * As printf("%.*f"). The product is off by half of its last digit, 2^-53 of it: below
- * 2^40 that is 1.3e-4, so only within 1e-3 of a half can the rounding be in doubt.
+ * The product has an error of half its last digit, 2^-53 of it: below 2^40 that is 1.3e-4, so
+ * the rounding is uncertain only within 1e-3 of a half.
  */
 char *incise_decimal_real(char *to, double value, int decimals)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Numbers as text, quickly: the digits are those of printf(3), which would take most of
- * the time of an export. In any locale that has a decimal point; see c_locale.h.
+ * Numbers as text, with the digits of printf(3), which would take most of the time of an
+ * export. The locale must have a decimal point; see c_locale.h.
  */
 #ifndef INCISE_DECIMAL_H
 #define INCISE_DECIMAL_H

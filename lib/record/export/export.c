@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A dataset of recordings; see incise/recording.h.
+ * Export of recordings; see incise/recording.h.
  *
  *     recordings ──► cuts ──► raw rows, or means over 1/rate            ──► table
  *                        └──► bins of depth × velocity (paper 1, §4.1)  ──► table
@@ -11,13 +11,369 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "export_mcap.h"
-#include "export_pass.h"
+#include <incise/outfile.h>
+#include "../read/cut.h"
 #include "../read/recording.h"
-#include "resample.h"
+#include "export.h"
+#include "provenance.h"
 #include "table_writer.h"
 
+#define COLUMNS(columns) ((int)(sizeof(columns) / sizeof(*(columns))))
 #define BINS_MAX 1000 /* in one direction; all of them are held in memory */
+
+/* --- a pass over the cuts ------------------------------------------------------------ */
+
+/* Force samples of one bin, or of one row of a raw export. Set to {0} before use. */
+struct bin {
+	uint64_t n;
+	double t_s, depth_mm, velocity_mm_s, force_N; /* means */
+	double m2; /* sum of squared deviations of the force */
+	int cuts;  /* that have samples here */
+	int last;  /* the cut counted last */
+	bool clipped;
+};
+
+/* A pass over the cuts of some recordings, which are streamed, into the rows of a table. */
+struct pass {
+	const struct incise_export_options *options;
+	struct incise_table *table;
+	struct incise_export_report report;
+	struct incise_error *err;
+
+	char *name;		       /* of the present recording, unique */
+	uint64_t samples, samples_all; /* of force, read and to be read */
+	int cut;		       /* the present one of all recordings, from 1 */
+	int number;		       /* of the same cut in its recording */
+	double depth_deepest_mm;       /* of any row, for the error without a cut */
+	void *state;		       /* of the visitor */
+};
+
+/* Functions for each sample and cut; each returns 0 or -errno. */
+struct visitor {
+	int (*sample)(struct pass *pass, const struct incise_cut_sample *sample,
+		      double t_s);
+	int (*end_cut)(struct pass *pass); /* or NULL */
+};
+
+/* Name of a recording, unlike any before it: a/liver.rec and b/liver.rec differ. NULL: no memory. */
+static char *unique_name(struct incise_recording *const *recordings, int at)
+{
+	const char *name = recordings[at]->name;
+	int same = 1;
+	char *text;
+
+	for (int i = 0; i < at; i++)
+		same += !strcmp(recordings[i]->name, name);
+	/* No recording's own name ends in such a suffix. */
+	if (same > 1 ? asprintf(&text, "%s~%d", name, same) < 0
+		     : asprintf(&text, "%s", name) < 0)
+		return NULL;
+	for (char *c = text; *c; c++)
+		if ((unsigned char)*c < ' ' || *c == 0x7f)
+			*c = '_';
+	return text;
+}
+
+/* Number of the present cut's name in the table, or -ENOMEM. */
+static int cut_name(struct pass *pass)
+{
+	char *text;
+	int rc;
+
+	if (asprintf(&text, "%s-%02d", pass->name, pass->number) < 0)
+		return incise_error_set(pass->err, ENOMEM, "out of memory");
+	rc = incise_table_name(pass->table, text);
+	free(text);
+	if (rc < 0)
+		return incise_error_set(pass->err, -rc, "out of memory");
+	return rc;
+}
+
+/* Welford's way: one pass, no cancellation. */
+static void bin_add(struct bin *bin, const struct incise_cut_sample *sample, double t_s,
+		    int cut)
+{
+	double share = 1.0 / ++bin->n;
+	double delta = sample->force_N - bin->force_N;
+
+	bin->t_s += share * (t_s - bin->t_s);
+	bin->depth_mm += share * (sample->depth_mm - bin->depth_mm);
+	bin->velocity_mm_s += share * (sample->velocity_mm_s - bin->velocity_mm_s);
+	bin->force_N += share * delta;
+	bin->m2 += delta * (sample->force_N - bin->force_N);
+	bin->clipped |= sample->clipped;
+	if (bin->last != cut) {
+		bin->last = cut;
+		bin->cuts++;
+	}
+}
+
+/* Extend the bins without a given end to the largest sample that is not clipped. */
+static void extend(struct pass *pass, const struct incise_cut_sample *sample)
+{
+	const struct incise_export_options *o = pass->options;
+	struct incise_export_report *report = &pass->report;
+
+	if (sample->clipped)
+		return;
+	if (!(o->depth_max_mm > 0))
+		report->depth_max_mm = fmax(report->depth_max_mm, sample->depth_mm);
+	if (!(o->velocity_max_mm_s > 0))
+		report->velocity_max_mm_s =
+			fmax(report->velocity_max_mm_s, sample->velocity_mm_s);
+}
+
+static int end_cut(struct pass *pass, const struct visitor *visitor)
+{
+	return pass->number && visitor->end_cut ? visitor->end_cut(pass) : 0;
+}
+
+/* Pass over the cuts of one recording. */
+static int each_sample(struct pass *pass, struct incise_recording *recording,
+		       const struct visitor *visitor)
+{
+	const struct incise_calibration *calibration = pass->options->calibration;
+	struct incise_cut_sample sample;
+	struct incise_cuts cuts;
+	int rc;
+
+	rc = incise_cuts_open(&cuts, recording, pass->err);
+	if (rc)
+		return rc;
+	if (calibration)
+		incise_cuts_calibrate(&cuts, calibration);
+	rc = incise_recording_need_zero(recording, &cuts.scale, pass->err);
+	if (rc) {
+		incise_cuts_close(&cuts);
+		return rc;
+	}
+	pass->number = 0;
+	while ((rc = incise_cuts_next(&cuts, &sample, pass->err)) > 0) {
+		if (sample.cut != pass->number) {
+			rc = end_cut(pass, visitor);
+			if (rc)
+				break;
+			pass->number = sample.cut;
+			pass->cut++;
+		}
+		rc = visitor->sample(pass, &sample, (sample.t_ns - cuts.first_ns) * 1e-9);
+		if (!rc && (cuts.force_rows & 0xfff) == 0)
+			rc = incise_export_progress(
+				pass->options, (double)(pass->samples + cuts.force_rows),
+				(double)pass->samples_all, pass->err);
+		if (rc)
+			break;
+	}
+	if (!rc)
+		rc = end_cut(pass, visitor);
+	pass->samples += cuts.force_rows;
+	pass->depth_deepest_mm = fmax(pass->depth_deepest_mm, cuts.depth_max_mm);
+	incise_cuts_close(&cuts);
+	return rc;
+}
+
+/* Visit every sample in a cut, in order. Returns 0 or -errno. */
+static int each_cut(struct pass *pass, struct incise_recording *const *recordings, int n,
+		    const struct visitor *visitor)
+{
+	int rc = 0;
+
+	pass->cut = 0;
+	for (int i = 0; i < n && !rc; i++) {
+		free(pass->name);
+		pass->name = unique_name(recordings, i);
+		rc = pass->name ? each_sample(pass, recordings[i], visitor)
+				: incise_error_set(pass->err, ENOMEM, "out of memory");
+	}
+	return rc;
+}
+
+/* --- force samples, or means over 1/rate --------------------------------------------- */
+
+#define CUT                                                                          \
+	{                                                                            \
+		"cut", "1", "recording and number of the cut", INCISE_COLUMN_NAME, 0 \
+	}
+
+static const struct incise_column raw_columns[] = {
+	CUT,
+	{"t_s", "s", "since the recording's first force sample", INCISE_COLUMN_REAL, 6},
+	{"depth_mm", "mm", "of the tip below the surface", INCISE_COLUMN_SINGLE, 4},
+	{"velocity_mm_s", "mm/s", "speed of the tip", INCISE_COLUMN_SINGLE, 3},
+	{"force_N", "N", "on the blade", INCISE_COLUMN_SINGLE, 5},
+	{"clipped", "1", "1: the converter was at an end", INCISE_COLUMN_FLAG, 0},
+};
+
+struct raw {
+	struct bin row;
+	int64_t slot; /* of the row, 1/rate each */
+};
+
+static int put_row(struct pass *pass)
+{
+	struct raw *raw = pass->state;
+	const struct bin *row = &raw->row;
+	int name, rc;
+
+	if (!row->n)
+		return 0;
+	name = cut_name(pass);
+	if (name < 0)
+		return name;
+	rc = incise_table_add(pass->table,
+			      (union incise_cell[]){
+				      {.integer = name},
+				      {.real = row->t_s},
+				      {.real = row->depth_mm},
+				      {.real = row->velocity_mm_s},
+				      {.real = row->force_N},
+				      {.integer = row->clipped},
+			      },
+			      pass->err);
+	pass->report.rows++;
+	raw->row = (struct bin){0};
+	return rc;
+}
+
+static int add_to_row(struct pass *pass, const struct incise_cut_sample *sample,
+		      double t_s)
+{
+	struct raw *raw = pass->state;
+	double rate = pass->options->rate_hz;
+	/* Half a ns keeps a sample on the edge in its own slot; times are whole ns. */
+	int64_t slot = rate > 0 ? (int64_t)floor((t_s + 0.5e-9) * rate) : raw->slot + 1;
+	int rc;
+
+	extend(pass, sample);
+	pass->report.clipped += sample->clipped;
+	rc = slot != raw->slot ? put_row(pass) : 0;
+
+	raw->slot = slot;
+	bin_add(&raw->row, sample, t_s, pass->cut);
+	return rc;
+}
+
+static int write_raw(struct pass *pass, struct incise_recording *const *recordings, int n)
+{
+	static const struct visitor rows = {add_to_row, put_row};
+	struct raw raw = {0};
+
+	pass->state = &raw;
+	return each_cut(pass, recordings, n, &rows);
+}
+
+/* --- means over bins of depth and velocity (paper 1, §4.1) --------------------------- */
+
+static const struct incise_column bin_columns[] = {
+	CUT,
+	{"depth_mm", "mm", "mean depth in the bin", INCISE_COLUMN_REAL, -1},
+	{"velocity_mm_s", "mm/s", "mean speed in the bin", INCISE_COLUMN_REAL, -1},
+	{"force_N", "N", "mean force in the bin", INCISE_COLUMN_REAL, -1},
+	{"sd_N", "N", "standard deviation of single samples", INCISE_COLUMN_REAL, -1},
+	{"count", "1", "samples", INCISE_COLUMN_INTEGER, 0},
+	{"cuts", "1", "different cuts that they are from", INCISE_COLUMN_INTEGER, 0},
+};
+
+/* Bin of a value; the upper end belongs to the last one. -1: above it. */
+static int bin_of(double value, double max, int bins)
+{
+	if (value > max || !(max > 0))
+		return -1;
+	return value < max ? (int)fmin(value / max * bins, bins - 1) : bins - 1;
+}
+
+static int add_to_bin(struct pass *pass, const struct incise_cut_sample *sample,
+		      double t_s)
+{
+	struct bin *bins = pass->state;
+	const struct incise_export_options *o = pass->options;
+	int i, k;
+
+	(void)t_s; /* visitors share one form */
+	if (sample->clipped) {
+		pass->report.clipped++;
+		return 0;
+	}
+	i = bin_of(sample->depth_mm, pass->report.depth_max_mm, o->depth_bins);
+	k = bin_of(sample->velocity_mm_s, pass->report.velocity_max_mm_s,
+		   o->velocity_bins);
+
+	if (i >= 0 && k >= 0)
+		bin_add(&bins[i * o->velocity_bins + k], sample, 0, pass->cut);
+	return 0;
+}
+
+/* Write the bins with enough samples, and empty all. */
+static int put_bins(struct pass *pass)
+{
+	struct bin *bins = pass->state;
+	const struct incise_export_options *o = pass->options;
+	size_t n = (size_t)o->depth_bins * o->velocity_bins;
+	uint64_t enough = o->min_count > 1 ? o->min_count : 1;
+	int rc = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		struct bin *bin = &bins[i];
+		union incise_cell cells[] = {
+			{.integer = 0},
+			{.real = bin->depth_mm},
+			{.real = bin->velocity_mm_s},
+			{.real = bin->force_N},
+			{.real = bin->n > 1 ? sqrt(bin->m2 / (bin->n - 1)) : 0.0},
+			{.integer = (int64_t)bin->n},
+			{.integer = bin->cuts},
+		};
+
+		if (bin->n >= enough && !rc) {
+			if (o->by_cut) {
+				rc = cut_name(pass);
+				cells[0].integer = rc;
+			}
+			if (rc >= 0)
+				rc = incise_table_add(pass->table, cells + !o->by_cut,
+						      pass->err);
+			pass->report.rows++;
+		}
+		*bin = (struct bin){0};
+	}
+	return rc;
+}
+
+static int find_extent(struct pass *pass, const struct incise_cut_sample *sample,
+		       double t_s)
+{
+	(void)t_s;
+	extend(pass, sample);
+	return 0;
+}
+
+static int write_bins(struct pass *pass, struct incise_recording *const *recordings,
+		      int n)
+{
+	const struct incise_export_options *o = pass->options;
+	struct visitor ends = {find_extent, NULL};
+	struct visitor rows = {add_to_bin, o->by_cut ? put_bins : NULL};
+	uint64_t all = pass->samples_all;
+	int rc = 0;
+
+	pass->state =
+		calloc((size_t)o->depth_bins * o->velocity_bins, sizeof(struct bin));
+	if (!pass->state)
+		return incise_error_set(pass->err, ENOMEM, "%d × %d bins: out of memory",
+					o->depth_bins, o->velocity_bins);
+	if (!(o->depth_max_mm > 0 && o->velocity_max_mm_s > 0)) {
+		pass->samples_all += all; /* each is read twice */
+		rc = each_cut(pass, recordings, n, &ends);
+	}
+	if (!rc)
+		rc = each_cut(pass, recordings, n, &rows);
+	if (!rc && !o->by_cut)
+		rc = put_bins(pass);
+	free(pass->state);
+	return rc;
+}
+
+/* --- exporting ----------------------------------------------------------------------- */
 
 void incise_export_options_init(struct incise_export_options *options)
 {
@@ -54,16 +410,16 @@ static int check_options(const struct incise_export_options *o, struct incise_er
 	return 0;
 }
 
-static int write_cuts(struct incise_export_pass *pass,
-		      struct incise_recording *const *recordings, int n)
+static int write_cuts(struct pass *pass, struct incise_recording *const *recordings,
+		      int n)
 {
 	const struct incise_export_options *o = pass->options;
 	int rc;
 
 	pass->report.depth_max_mm = o->depth_max_mm;
 	pass->report.velocity_max_mm_s = o->velocity_max_mm_s;
-	rc = o->depth_bins ? incise_export_bins(pass, recordings, n)
-			   : incise_export_raw(pass, recordings, n);
+	rc = o->depth_bins ? write_bins(pass, recordings, n)
+			   : write_raw(pass, recordings, n);
 	if (rc)
 		return rc;
 	pass->report.cuts = pass->cut;
@@ -85,13 +441,13 @@ static int write_cuts(struct incise_export_pass *pass,
 	return incise_table_finish(pass->table, pass->err);
 }
 
-static int write_resampled(struct incise_export_pass *pass,
-			   struct incise_recording *const *recordings, int n)
+static int write_resampled(struct pass *pass, struct incise_recording *const *recordings,
+			   int n)
 {
 	int rc = 0;
 
 	for (int i = 0; i < n && !rc; i++) {
-		char *name = incise_export_name(recordings, i);
+		char *name = unique_name(recordings, i);
 
 		rc = name ? incise_resample(recordings[i], name, pass->options,
 					    pass->table, &pass->report, pass->samples,
@@ -103,15 +459,13 @@ static int write_resampled(struct incise_export_pass *pass,
 	return rc ? rc : incise_table_finish(pass->table, pass->err);
 }
 
-/* To a file or, where that is NULL, to a stream. */
 static int export_table(struct incise_recording *const *recordings, int n,
 			const struct incise_export_options *options,
-			const struct incise_table_format *format,
-			struct incise_outfile *file, FILE *out,
-			const struct incise_lineage *lineage,
+			const struct incise_table_format *format, FILE *out,
+			const struct incise_provenance *provenance,
 			struct incise_export_report *report, struct incise_error *err)
 {
-	struct incise_export_pass pass = {
+	struct pass pass = {
 		.options = options, .err = err, .depth_deepest_mm = -INFINITY};
 	bool bins = options->depth_bins > 0, whole = !bins || options->by_cut;
 	struct incise_table table;
@@ -122,16 +476,14 @@ static int export_table(struct incise_recording *const *recordings, int n,
 	if (options->resample) {
 		rc = incise_resample_width(recordings, n, err);
 		if (rc > 0)
-			rc = incise_table_open(&table, format, file, out,
-					       incise_resample_columns, rc, lineage, err);
+			rc = incise_table_open(&table, format, out,
+					       incise_resample_columns, rc, provenance,
+					       err);
 	} else {
 		rc = incise_table_open(
-			&table, format, file, out,
-			(bins ? incise_export_bin_columns : incise_export_raw_columns) +
-				!whole,
-			(bins ? INCISE_EXPORT_BIN_COLUMNS : INCISE_EXPORT_RAW_COLUMNS) -
-				!whole,
-			lineage, err);
+			&table, format, out, (bins ? bin_columns : raw_columns) + !whole,
+			(bins ? COLUMNS(bin_columns) : COLUMNS(raw_columns)) - !whole,
+			provenance, err);
 	}
 	if (!rc) {
 		pass.table = &table;
@@ -145,27 +497,7 @@ static int export_table(struct incise_recording *const *recordings, int n,
 	return rc;
 }
 
-int incise_export_csv(struct incise_recording *const *recordings, int n,
-		      const struct incise_export_options *options, FILE *out,
-		      struct incise_export_report *report, struct incise_error *err)
-{
-	struct incise_lineage lineage = {0};
-	int rc = check_options(options, err);
-
-	if (rc)
-		return rc;
-	if (n < 1)
-		return incise_error_set(err, EINVAL, "no recording to export");
-	if (options->lineage)
-		rc = incise_lineage_of(&lineage, recordings, n, options, err);
-	if (!rc)
-		rc = export_table(recordings, n, options, &incise_table_csv, NULL, out,
-				  options->lineage ? &lineage : NULL, report, err);
-	incise_lineage_free(&lineage);
-	return rc;
-}
-
-/* The ending of a path, without regard to case. */
+/* Whether a path has an ending, in either case. */
 static bool ends_with(const char *path, const char *end)
 {
 	size_t n = strlen(path), k = strlen(end);
@@ -175,7 +507,7 @@ static bool ends_with(const char *path, const char *end)
 
 static int write_mcap(struct incise_recording *const *recordings, int n,
 		      const struct incise_export_options *options, FILE *out,
-		      const struct incise_lineage *lineage,
+		      const struct incise_provenance *provenance,
 		      struct incise_export_report *report, struct incise_error *err)
 {
 	if (n > 1 || options->rate_hz > 0 || options->depth_bins || options->resample)
@@ -183,7 +515,7 @@ static int write_mcap(struct incise_recording *const *recordings, int n,
 			err, EINVAL,
 			"MCAP takes one recording as it is: no rate, no "
 			"averages; give -o FILE.csv or FILE.h5 for these");
-	return incise_export_mcap(recordings[0], options, out, lineage, report, err);
+	return incise_export_mcap(recordings[0], options, out, provenance, report, err);
 }
 
 int incise_export(struct incise_recording *const *recordings, int n,
@@ -192,7 +524,7 @@ int incise_export(struct incise_recording *const *recordings, int n,
 {
 	bool hdf5 = ends_with(path, ".h5") || ends_with(path, ".hdf5");
 	const struct incise_table_format *format = &incise_table_csv;
-	struct incise_lineage lineage = {0};
+	struct incise_provenance provenance = {0};
 	struct incise_outfile *file;
 	int rc = check_options(options, err);
 
@@ -205,15 +537,16 @@ int incise_export(struct incise_recording *const *recordings, int n,
 	file = incise_outfile_open(path, err);
 	if (!file)
 		return -errno;
-	rc = incise_lineage_of(&lineage, recordings, n, options, err);
+	rc = incise_provenance_of(&provenance, recordings, n, options, err);
 	if (!rc && ends_with(path, ".mcap"))
 		rc = write_mcap(recordings, n, options, incise_outfile_stream(file),
-				&lineage, report, err);
+				&provenance, report, err);
 	else if (!rc)
-		rc = export_table(recordings, n, options, format, file, NULL,
-				  hdf5 || options->lineage ? &lineage : NULL, report,
-				  err);
-	incise_lineage_free(&lineage);
+		rc = export_table(recordings, n, options, format,
+				  incise_outfile_stream(file),
+				  hdf5 || options->provenance ? &provenance : NULL,
+				  report, err);
+	incise_provenance_free(&provenance);
 	if (!rc)
 		return incise_outfile_commit(file, err);
 	incise_outfile_abort(file);

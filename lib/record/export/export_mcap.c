@@ -1,36 +1,455 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A recording as messages for viewers; see export_mcap.h.
+ * A recording as messages for viewers; see export.h.
  *
  *     force ──┐
- *     tracker ├──► the earliest ──► JSON ──► mcap_writer
+ *     tracker ├──► the earliest ──► JSON ──► MCAP
  *     depth ──┤
  *     events ─┘
  */
 #include <errno.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+#include <zlib.h>
+#include <incise/version.h>
 #include "../../base/c_locale.h"
-#include "decimal.h"
-#include "export_mcap.h"
-#include "mcap_writer.h"
 #include "../read/recording.h"
 #include "../read/rows.h"
+#include "decimal.h"
+#include "export.h"
+
+/*
+ * --- MCAP, the log format of viewers such as Foxglove; https://mcap.dev/spec ----------------
+ *
+ *     magic │ Header │ Schema, Channel … Metadata │ Chunk, MessageIndex … … │ DataEnd │
+ *           │ summary: Schema, Channel …, Statistics, ChunkIndex …, MetadataIndex │
+ *           │ SummaryOffset … │ Footer │ magic
+ *
+ * Names of records and fields are those of the specification; numbers are little-endian, times
+ * in ns. Chunks are not compressed, and indexed by time. Memory is that of a chunk and of 100
+ * bytes for each one before. Failures are kept until mcap_finish().
+ */
+
+#define CHUNK_SIZE (1 << 20)
+#define STREAMS 4
+
+enum opcode {
+	HEADER = 1,
+	FOOTER,
+	SCHEMA,
+	CHANNEL,
+	MESSAGE,
+	CHUNK,
+	MESSAGE_INDEX,
+	CHUNK_INDEX,
+	STATISTICS = 0x0b,
+	METADATA,
+	METADATA_INDEX,
+	SUMMARY_OFFSET,
+	DATA_END,
+};
+
+static const unsigned char magic[8] = {0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
+
+/* A growing buffer. */
+struct bytes {
+	unsigned char *data;
+	size_t n, capacity;
+	bool failed; /* no memory */
+};
+
+struct channel {
+	const char *topic, *schema_name, *schema;
+	uint64_t messages;
+	struct bytes index; /* of the chunk: log_time, offset; 8 bytes each */
+};
+
+struct mcap {
+	FILE *out;
+	int rc;	      /* first failure */
+	uint32_t crc; /* of the present section */
+	uint64_t at;  /* bytes written */
+	struct channel channels[STREAMS];
+	int n_channels;
+	struct bytes record; /* the present one */
+	struct bytes chunk;  /* its records */
+	uint64_t first_ns, last_ns, chunk_first_ns, chunk_last_ns;
+	struct bytes chunk_indexes, metadata_index; /* whole records, for the summary */
+	uint64_t chunks, metadata;
+};
+
+static unsigned char *grow(struct bytes *bytes, size_t n)
+{
+	unsigned char *at;
+
+	if (bytes->n + n > bytes->capacity) {
+		size_t capacity = 2 * (bytes->n + n);
+		unsigned char *data = realloc(bytes->data, capacity);
+
+		if (!data) {
+			bytes->failed = true;
+			return NULL;
+		}
+		bytes->data = data;
+		bytes->capacity = capacity;
+	}
+	at = bytes->data + bytes->n;
+	bytes->n += n;
+	return at;
+}
+
+static void put(struct bytes *bytes, const void *data, size_t n)
+{
+	unsigned char *at = n ? grow(bytes, n) : NULL;
+
+	if (at)
+		memcpy(at, data, n);
+}
+
+static void put_number(struct bytes *bytes, uint64_t value, int size)
+{
+	unsigned char *at = grow(bytes, size);
+
+	for (int i = 0; at && i < size; i++)
+		at[i] = value >> (8 * i);
+}
+
+static void put_text(struct bytes *bytes, const char *text)
+{
+	put_number(bytes, strlen(text), 4);
+	put(bytes, text, strlen(text));
+}
+
+/* Fill in a length, now that its end is written. */
+static void close_length(struct bytes *bytes, size_t at, int size)
+{
+	uint64_t length = bytes->n - at - size;
+
+	for (int i = 0; !bytes->failed && i < size; i++)
+		bytes->data[at + i] = length >> (8 * i);
+}
+
+static void put_pairs(struct bytes *bytes, const struct incise_provenance *provenance)
+{
+	size_t at = bytes->n;
+
+	put_number(bytes, 0, 4);
+	for (int i = 0; i < provenance->n; i++) {
+		put_text(bytes, provenance->items[i].key);
+		put_text(bytes, provenance->items[i].value);
+	}
+	close_length(bytes, at, 4);
+}
+
+static void write_bytes(struct mcap *mcap, const void *data, size_t n)
+{
+	if (mcap->rc || !n)
+		return;
+	errno = 0;
+	if (fwrite(data, 1, n, mcap->out) != n)
+		mcap->rc = errno ? -errno : -EIO;
+	mcap->crc = (uint32_t)crc32_z(mcap->crc, data, n);
+	mcap->at += n;
+}
+
+static struct bytes *begin(struct mcap *mcap, enum opcode opcode)
+{
+	mcap->record.n = 0;
+	put_number(&mcap->record, opcode, 1);
+	put_number(&mcap->record, 0, 8);
+	return &mcap->record;
+}
+
+/* Write the record, or add it to @summary if that is not NULL. */
+static void end(struct mcap *mcap, struct bytes *summary)
+{
+	close_length(&mcap->record, 1, 8);
+	if (mcap->record.failed && !mcap->rc)
+		mcap->rc = -ENOMEM;
+	if (!summary)
+		write_bytes(mcap, mcap->record.data, mcap->record.n);
+	else
+		put(summary, mcap->record.data, mcap->record.n);
+	if (summary && summary->failed && !mcap->rc)
+		mcap->rc = -ENOMEM;
+}
+
+static void write_schema(struct mcap *mcap, int i)
+{
+	struct bytes *to = begin(mcap, SCHEMA);
+
+	put_number(to, i + 1, 2); /* 0 would be none */
+	put_text(to, mcap->channels[i].schema_name);
+	put_text(to, "jsonschema");
+	put_text(to, mcap->channels[i].schema);
+	end(mcap, NULL);
+}
+
+static void write_channel(struct mcap *mcap, int i)
+{
+	struct bytes *to = begin(mcap, CHANNEL);
+
+	put_number(to, i, 2);
+	put_number(to, i + 1, 2);
+	put_text(to, mcap->channels[i].topic);
+	put_text(to, "json");
+	put_number(to, 0, 4); /* no metadata */
+	end(mcap, NULL);
+}
+
+/* Write the chunk, and its indexes behind it. */
+static void write_chunk(struct mcap *mcap)
+{
+	uint64_t start = mcap->at, length, indexes;
+	uint64_t offsets[STREAMS];
+	struct bytes *to = begin(mcap, CHUNK);
+	size_t at;
+
+	put_number(to, mcap->chunk_first_ns, 8);
+	put_number(to, mcap->chunk_last_ns, 8);
+	put_number(to, mcap->chunk.n, 8);
+	put_number(to, (uint32_t)crc32_z(0, mcap->chunk.data, mcap->chunk.n), 4);
+	put_text(to, ""); /* not compressed */
+	put_number(to, mcap->chunk.n, 8);
+	put(to, mcap->chunk.data, mcap->chunk.n);
+	end(mcap, NULL);
+	length = mcap->at - start;
+	indexes = mcap->at;
+	for (int i = 0; i < mcap->n_channels; i++) {
+		struct bytes *index = &mcap->channels[i].index;
+
+		offsets[i] = index->n ? mcap->at : 0;
+		if (!index->n)
+			continue;
+		to = begin(mcap, MESSAGE_INDEX);
+		put_number(to, i, 2);
+		put_number(to, index->n, 4);
+		put(to, index->data, index->n);
+		end(mcap, NULL);
+		index->n = 0;
+	}
+	to = begin(mcap, CHUNK_INDEX);
+	put_number(to, mcap->chunk_first_ns, 8);
+	put_number(to, mcap->chunk_last_ns, 8);
+	put_number(to, start, 8);
+	put_number(to, length, 8);
+	at = to->n;
+	put_number(to, 0, 4);
+	for (int i = 0; i < mcap->n_channels; i++)
+		if (offsets[i]) {
+			put_number(to, i, 2);
+			put_number(to, offsets[i], 8);
+		}
+	close_length(to, at, 4);
+	put_number(to, mcap->at - indexes, 8);
+	put_text(to, "");
+	put_number(to, mcap->chunk.n, 8);
+	put_number(to, mcap->chunk.n, 8);
+	end(mcap, &mcap->chunk_indexes);
+	mcap->chunks++;
+	mcap->chunk.n = 0;
+}
+
+/* Add a message. Returns 0, or -errno of the writes so far. */
+static int mcap_message(struct mcap *mcap, int channel, uint64_t t_ns, const char *json,
+			size_t length)
+{
+	struct channel *of = &mcap->channels[channel];
+	struct bytes *to = &mcap->chunk;
+
+	put_number(&of->index, t_ns, 8);
+	put_number(&of->index, to->n, 8);
+	if (!to->n || t_ns < mcap->chunk_first_ns)
+		mcap->chunk_first_ns = t_ns;
+	if (!to->n || t_ns > mcap->chunk_last_ns)
+		mcap->chunk_last_ns = t_ns;
+	if ((!to->n && !mcap->chunks) || t_ns < mcap->first_ns)
+		mcap->first_ns = t_ns;
+	if ((!to->n && !mcap->chunks) || t_ns > mcap->last_ns)
+		mcap->last_ns = t_ns;
+	put_number(to, MESSAGE, 1);
+	put_number(to, 22 + length, 8);
+	put_number(to, channel, 2);
+	put_number(to, of->messages++, 4); /* modulo 2^32, which readers accept */
+	put_number(to, t_ns, 8);	   /* log_time */
+	put_number(to, t_ns, 8);	   /* publish_time */
+	put(to, json, length);
+	if ((to->failed || of->index.failed) && !mcap->rc)
+		mcap->rc = -ENOMEM;
+	if (to->n >= CHUNK_SIZE && !mcap->rc)
+		write_chunk(mcap);
+	return mcap->rc;
+}
+
+static void mcap_begin(struct mcap *mcap, FILE *out)
+{
+	struct bytes *to;
+
+	*mcap = (struct mcap){.out = out};
+	write_bytes(mcap, magic, sizeof(magic));
+	to = begin(mcap, HEADER);
+	put_text(to, ""); /* no profile */
+	put_text(to, "incise " INCISE_VERSION);
+	end(mcap, NULL);
+}
+
+/*
+ * Announce a topic with messages in JSON after a JSON Schema, before the first message. Texts
+ * must outlive the file.
+ */
+static void mcap_channel(struct mcap *mcap, const char *topic, const char *schema_name,
+			 const char *schema)
+{
+	int i = mcap->n_channels++;
+
+	mcap->channels[i] = (struct channel){topic, schema_name, schema, 0, {0}};
+	write_schema(mcap, i);
+	write_channel(mcap, i);
+}
+
+static void mcap_metadata(struct mcap *mcap, const char *name,
+			  const struct incise_provenance *provenance)
+{
+	uint64_t start = mcap->at;
+	struct bytes *to = begin(mcap, METADATA);
+
+	put_text(to, name);
+	put_pairs(to, provenance);
+	end(mcap, NULL);
+	to = begin(mcap, METADATA_INDEX);
+	put_number(to, start, 8);
+	put_number(to, mcap->at - start, 8);
+	put_text(to, name);
+	end(mcap, &mcap->metadata_index);
+	mcap->metadata++;
+}
+
+static void write_statistics(struct mcap *mcap)
+{
+	struct bytes *to = begin(mcap, STATISTICS);
+	uint64_t messages = 0;
+	size_t at;
+
+	for (int i = 0; i < mcap->n_channels; i++)
+		messages += mcap->channels[i].messages;
+	put_number(to, messages, 8);
+	put_number(to, mcap->n_channels, 2);
+	put_number(to, mcap->n_channels, 4);
+	put_number(to, 0, 4); /* attachments */
+	put_number(to, mcap->metadata, 4);
+	put_number(to, mcap->chunks, 4);
+	put_number(to, mcap->first_ns, 8);
+	put_number(to, mcap->last_ns, 8);
+	at = to->n;
+	put_number(to, 0, 4);
+	for (int i = 0; i < mcap->n_channels; i++) {
+		put_number(to, i, 2);
+		put_number(to, mcap->channels[i].messages, 8);
+	}
+	close_length(to, at, 4);
+	end(mcap, NULL);
+}
+
+/* Records of one kind in the summary. */
+struct group {
+	enum opcode opcode;
+	uint64_t start, length;
+};
+
+static void write_summary(struct mcap *mcap)
+{
+	struct group groups[5];
+	uint64_t start = mcap->at, offsets, before;
+	struct bytes *to;
+
+	mcap->crc = 0;
+	for (int k = 0; k < 5; k++) {
+		static const enum opcode order[] = {SCHEMA, CHANNEL, STATISTICS,
+						    CHUNK_INDEX, METADATA_INDEX};
+
+		before = mcap->at;
+		for (int i = 0; i < mcap->n_channels && k < 2; i++)
+			(k ? write_channel : write_schema)(mcap, i);
+		if (order[k] == STATISTICS)
+			write_statistics(mcap);
+		else if (order[k] == CHUNK_INDEX)
+			write_bytes(mcap, mcap->chunk_indexes.data,
+				    mcap->chunk_indexes.n);
+		else if (order[k] == METADATA_INDEX)
+			write_bytes(mcap, mcap->metadata_index.data,
+				    mcap->metadata_index.n);
+		groups[k] = (struct group){order[k], before, mcap->at - before};
+	}
+	offsets = mcap->at;
+	for (int k = 0; k < 5; k++) {
+		if (!groups[k].length)
+			continue;
+		to = begin(mcap, SUMMARY_OFFSET);
+		put_number(to, groups[k].opcode, 1);
+		put_number(to, groups[k].start, 8);
+		put_number(to, groups[k].length, 8);
+		end(mcap, NULL);
+	}
+	to = begin(mcap, FOOTER);
+	put_number(to, start, 8);
+	put_number(to, offsets, 8);
+	put_number(to, 0, 4);
+	close_length(to, 1, 8);
+	if (to->failed)
+		return;
+	/* The checksum is over the whole summary but itself. */
+	mcap->crc = (uint32_t)crc32_z(mcap->crc, to->data, to->n - 4);
+	to->n -= 4;
+	put_number(to, mcap->crc, 4);
+	write_bytes(mcap, to->data, to->n);
+}
+
+/* End the file: 0, or the negative errno of the first failure. */
+static int mcap_finish(struct mcap *mcap)
+{
+	struct bytes *to;
+	uint32_t crc;
+
+	if (mcap->chunk.n)
+		write_chunk(mcap);
+	crc = mcap->crc;
+	to = begin(mcap, DATA_END);
+	put_number(to, crc, 4);
+	end(mcap, NULL);
+	write_summary(mcap);
+	write_bytes(mcap, magic, sizeof(magic));
+	errno = 0;
+	if (!mcap->rc && fflush(mcap->out))
+		mcap->rc = errno ? -errno : -EIO;
+	return mcap->rc;
+}
+
+static void mcap_free(struct mcap *mcap)
+{
+	for (int i = 0; i < mcap->n_channels; i++)
+		free(mcap->channels[i].index.data);
+	free(mcap->record.data);
+	free(mcap->chunk.data);
+	free(mcap->chunk_indexes.data);
+	free(mcap->metadata_index.data);
+}
+
+/* --- messages ------------------------------------------------------------------------ */
 
 #define NUMBER(about) "{\"type\":\"number\",\"description\":\"" about "\"}"
 #define OBJECT(properties) "{\"type\":\"object\",\"properties\":{" properties "}}"
-#define STREAMS 4
 
 struct mcap_export {
 	const struct incise_recording *recording;
 	struct incise_recording_force scale;
 	uint64_t clipped;
 	char *text; /* of a message */
-	size_t room;
+	size_t capacity;
 };
 
-/* The message of a row, into text; its length, or -errno. */
+/* Make the message of a row in text; its length, or -errno. */
 typedef int (*message)(struct mcap_export *export, const struct incise_rows *rows);
 
 static char *add(char *to, const char *text)
@@ -59,7 +478,7 @@ static int force_message(struct mcap_export *export, const struct incise_rows *r
 	return to - export->text;
 }
 
-/* A text in JSON's quotes; what is no UTF-8 in it, SQLite has from outside: '?'. */
+/* A text in JSON's quotes; bytes that are not UTF-8 become '?'. */
 static char *add_text(char *to, const char *before, const unsigned char *text)
 {
 	to = add(to, before);
@@ -90,19 +509,19 @@ static char *add_text(char *to, const char *before, const unsigned char *text)
 	return to;
 }
 
-/* Room for a message with a text of so many bytes, each of which may be quoted. */
-static int make_room(struct mcap_export *export, size_t bytes)
+/* Make text large enough for a message with this many bytes, each of which may be quoted. */
+static int reserve(struct mcap_export *export, size_t bytes)
 {
-	size_t room = 16 * INCISE_DECIMAL_MAX + 2 * bytes;
+	size_t capacity = 16 * INCISE_DECIMAL_MAX + 2 * bytes;
 	char *text;
 
-	if (room <= export->room)
+	if (capacity <= export->capacity)
 		return 0;
-	text = realloc(export->text, room);
+	text = realloc(export->text, capacity);
 	if (!text)
 		return -ENOMEM;
 	export->text = text;
-	export->room = room;
+	export->capacity = capacity;
 	return 0;
 }
 
@@ -115,7 +534,7 @@ static int tracker_message(struct mcap_export *export, const struct incise_rows 
 					     ",\"x\":",
 					     ",\"y\":",
 					     ",\"z\":"};
-	int rc = make_room(export, sqlite3_column_bytes(rows->stmt, 9));
+	int rc = reserve(export, sqlite3_column_bytes(rows->stmt, 9));
 	char *to = export->text;
 
 	if (rc)
@@ -138,8 +557,8 @@ static int depth_message(struct mcap_export *export, const struct incise_rows *r
 
 static int event_message(struct mcap_export *export, const struct incise_rows *rows)
 {
-	int rc = make_room(export, sqlite3_column_bytes(rows->stmt, 2) +
-					   sqlite3_column_bytes(rows->stmt, 3));
+	int rc = reserve(export, sqlite3_column_bytes(rows->stmt, 2) +
+					 sqlite3_column_bytes(rows->stmt, 3));
 	char *to = export->text;
 
 	if (rc)
@@ -149,7 +568,6 @@ static int event_message(struct mcap_export *export, const struct incise_rows *r
 	return add(to, "}") - export->text;
 }
 
-/* Where each stream comes from, and what becomes of it. */
 static const struct stream {
 	const char *table, *columns, *types;
 	message message;
@@ -179,8 +597,8 @@ static int fail_write(int rc, struct incise_error *err)
 		strerror(-rc));
 }
 
-/* All rows, the earliest first. Returns how many, or -errno. */
-static int64_t each_row(struct mcap_export *export, struct incise_mcap *mcap,
+/* Write all rows, the earliest first. Returns their number, or -errno. */
+static int64_t each_row(struct mcap_export *export, struct mcap *mcap,
 			struct incise_rows rows[STREAMS],
 			const struct incise_export_options *o, uint64_t all,
 			struct incise_error *err)
@@ -204,14 +622,15 @@ static int64_t each_row(struct mcap_export *export, struct incise_mcap *mcap,
 				err, -rc, "%s: damaged: table %s, row %lld cannot be",
 				export->recording->path, streams[next].table,
 				(long long)sqlite3_column_int64(rows[next].stmt, 0));
-		rc = incise_mcap_message(mcap, next,
-					 rows[next].t_ns > 0 ? rows[next].t_ns : 0,
-					 export->text, rc);
+		rc = mcap_message(mcap, next, rows[next].t_ns > 0 ? rows[next].t_ns : 0,
+				  export->text, rc);
 		if (rc)
 			return fail_write(rc, err);
-		if ((++n & 0xffff) == 0 && o->progress &&
-		    o->progress(o->context, fmin(1, n / fmax(1, all))))
-			return incise_error_set(err, EINTR, "interrupted");
+		if ((++n & 0xffff) == 0) {
+			rc = incise_export_progress(o, (double)n, (double)all, err);
+			if (rc)
+				return rc;
+		}
 		rc = incise_rows_next(&rows[next], err);
 	}
 	return rc;
@@ -219,22 +638,23 @@ static int64_t each_row(struct mcap_export *export, struct incise_mcap *mcap,
 
 int incise_export_mcap(struct incise_recording *recording,
 		       const struct incise_export_options *options, FILE *out,
-		       const struct incise_lineage *lineage,
+		       const struct incise_provenance *provenance,
 		       struct incise_export_report *report, struct incise_error *err)
 {
 	const struct incise_recording_info *meta = &recording->meta;
 	const struct incise_calibration *given = options->calibration;
-	const uint64_t expected[STREAMS] = {meta->force, meta->tracker,
-					    recording->meta.depth, UINT64_MAX};
+	const uint64_t expected[STREAMS] = {meta->force, meta->tracker, meta->depth,
+					    UINT64_MAX};
 	struct mcap_export export = {.recording = recording};
 	struct incise_c_locale locale = incise_c_locale_begin();
 	struct incise_rows rows[STREAMS] = {0};
-	struct incise_mcap *mcap = incise_mcap_new(out);
+	struct mcap mcap;
 	int64_t n = 0;
-	int rc = mcap ? make_room(&export, 0) : -ENOMEM;
+	int rc = reserve(&export, 0);
 
 	if (rc)
 		rc = incise_error_set(err, ENOMEM, "out of memory");
+	mcap_begin(&mcap, out);
 	incise_recording_force(recording, given, &export.scale);
 	if (!rc)
 		rc = incise_recording_need_zero(recording, &export.scale, err);
@@ -244,23 +664,21 @@ int incise_export_mcap(struct incise_recording *recording,
 				      err);
 		if (!rc && given)
 			incise_rows_calibrate(&rows[i], given);
-		if (!rc &&
-		    incise_mcap_channel(mcap, streams[i].topic, streams[i].schema_name,
-					streams[i].schema) < 0)
-			rc = fail_write(incise_mcap_finish(mcap), err);
+		mcap_channel(&mcap, streams[i].topic, streams[i].schema_name,
+			     streams[i].schema);
 	}
 	if (!rc) {
-		incise_mcap_metadata(mcap, "incise", lineage);
-		n = each_row(&export, mcap, rows, options,
-			     meta->force + meta->tracker + recording->meta.depth, err);
+		mcap_metadata(&mcap, "incise", provenance);
+		n = each_row(&export, &mcap, rows, options,
+			     meta->force + meta->tracker + meta->depth, err);
 		rc = n < 0 ? (int)n : 0;
 	}
-	if (!rc && (rc = incise_mcap_finish(mcap)))
+	if (!rc && (rc = mcap_finish(&mcap)))
 		rc = fail_write(rc, err);
 	incise_c_locale_end(locale);
 	for (int i = 0; i < STREAMS; i++)
 		incise_rows_close(&rows[i]);
-	incise_mcap_free(mcap);
+	mcap_free(&mcap);
 	free(export.text);
 	if (!rc && report)
 		*report = (struct incise_export_report){.rows = n,

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A recording on one grid of time; see resample.h. Memory is that of what is near a row.
+ * A recording on one grid of time; see export.h. Memory is that of the samples near a row.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
-#include "blade.h"
-#include "camera_near.h"
-#include "force_near.h"
 #include "../read/recording.h"
-#include "resample.h"
+#include "export.h"
+#include "interpolators.h"
 
 #define SINGLE(name, unit, about, decimals)                       \
 	{                                                         \
@@ -56,13 +54,13 @@ const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
 	FLAG("low_quality", "1: below 0.5 in a picture, or not seen"),
 };
 
-/* No session takes a hundred days; a grid over forged times has no end. */
+/* A hundred days: longer than any session; a grid over forged times would not end. */
 #define SPAN_MAX_NS 1e16
 
 struct resample {
-	struct incise_force_near force;
-	struct incise_blade blade;
-	struct incise_camera_near camera;
+	struct incise_force_interpolator force;
+	struct incise_blade_pose blade;
+	struct incise_camera_interpolator camera;
 	double t_sd_s; /* of times of force */
 
 	const struct incise_export_options *options;
@@ -77,7 +75,7 @@ int incise_resample_width(struct incise_recording *const *recordings, int n,
 			  struct incise_error *err)
 {
 	for (int i = 0; i < n; i++) {
-		int any = incise_camera_near_any(recordings[i], err);
+		int any = incise_camera_interpolator_any(recordings[i], err);
 
 		if (any)
 			return any < 0 ? any
@@ -92,10 +90,7 @@ static double least(double a, double b)
 	return isnan(b) ? a : fmax(a, b);
 }
 
-/*
- * Twelve bits of an uncertainty are more than is known of it, and a file with no more of
- * them is smaller and sooner written.
- */
+/* Twelve bits of an uncertainty are enough, and make a file that is smaller and faster to write. */
 static double coarse(double u)
 {
 	union {
@@ -111,14 +106,14 @@ static double coarse(double u)
 static int put_row(struct resample *r, int64_t t_ns,
 		   const struct incise_force_value *force)
 {
-	const struct incise_export_options *o = r->options;
 	struct incise_export_report *report = r->report;
 	struct incise_camera_value camera;
-	struct incise_blade_value blade;
-	int rc = incise_blade_at(&r->blade, t_ns, r->t_sd_s, &blade, r->err);
+	struct incise_blade_pose_value blade;
+	int rc = incise_blade_pose_at(&r->blade, t_ns, r->t_sd_s, &blade, r->err);
 
 	if (!rc && r->table->n_columns > INCISE_RESAMPLE_COLUMNS)
-		rc = incise_camera_near_at(&r->camera, t_ns, r->t_sd_s, &camera, r->err);
+		rc = incise_camera_interpolator_at(&r->camera, t_ns, r->t_sd_s, &camera,
+						   r->err);
 	else
 		camera = (struct incise_camera_value){0};
 	if (rc)
@@ -156,30 +151,31 @@ static int put_row(struct resample *r, int64_t t_ns,
 				      {.integer = camera.low_quality},
 			      },
 			      r->err);
-	if (!rc && (++report->rows & 0xfff) == 0 && o->progress &&
-	    o->progress(o->context,
-			fmin(1, (r->samples + r->force.rows.n) / fmax(1, r->all))))
-		rc = incise_error_set(r->err, EINTR, "interrupted");
+	if (!rc && (++report->rows & 0xfff) == 0)
+		rc = incise_export_progress(r->options,
+					    (double)(r->samples + r->force.rows.n),
+					    (double)r->all, r->err);
 	return rc;
 }
 
-/* A row for each force sample, told with 8 to each side for the noise. */
+/* A row for each force sample, with the noise of 8 samples to each side. */
 static int on_force(struct resample *r)
 {
-	struct incise_force_near *near = &r->force;
+	struct incise_force_interpolator *force = &r->force;
 	struct incise_force_value value;
 	size_t at = 0;
 	int rc = 1, bad = 0;
 
 	for (; !bad; at++) {
-		while (rc > 0 && near->n < at + INCISE_FORCE_HALF + 1)
-			rc = incise_force_near_more(near, r->err);
-		if (rc < 0 || at >= near->n)
+		while (rc > 0 && force->n < at + INCISE_FORCE_HALF + 1)
+			rc = incise_force_interpolator_more(force, r->err);
+		if (rc < 0 || at >= force->n)
 			return rc < 0 ? rc : 0;
 		if (at > INCISE_FORCE_HALF)
-			at -= incise_force_near_forget(near, at - INCISE_FORCE_HALF);
-		incise_force_near_sample(near, at, &value);
-		bad = put_row(r, near->samples[at].t_ns, &value);
+			at -= incise_force_interpolator_forget(force,
+							       at - INCISE_FORCE_HALF);
+		incise_force_interpolator_sample(force, at, &value);
+		bad = put_row(r, force->samples[at].t_ns, &value);
 	}
 	return bad;
 }
@@ -187,10 +183,10 @@ static int on_force(struct resample *r)
 /* A row for each multiple of 1/rate from the first force sample to the last. */
 static int on_grid(struct resample *r, double force_hz)
 {
-	struct incise_force_near *near = &r->force;
+	struct incise_force_interpolator *force = &r->force;
 	double row_ns = 1e9 / r->options->rate_hz;
 	bool drops = r->options->rate_hz < force_hz;
-	/* Two samples of force to each side are enough for a line. */
+	/* A line needs two samples of force to each side. */
 	double reach_ns = INCISE_FORCE_HALF * row_ns;
 	int rc = 1, bad;
 
@@ -201,28 +197,28 @@ static int on_grid(struct resample *r, double force_hz)
 		struct incise_force_value value;
 		size_t old = 0;
 
-		if (t_ns > near->last_ns)
+		if (t_ns > force->last_ns)
 			break;
-		while (rc > 0 && near->samples[near->n - 1].t_ns < t_ns + reach_ns)
-			rc = incise_force_near_more(near, r->err);
+		while (rc > 0 && force->samples[force->n - 1].t_ns < t_ns + reach_ns)
+			rc = incise_force_interpolator_more(force, r->err);
 		if (rc < 0)
 			return rc;
-		/* The last one stays, to say how far the samples go. */
-		while (old + 1 < near->n && near->samples[old].t_ns < t_ns - reach_ns)
+		/* The last one stays: it is the end of the samples. */
+		while (old + 1 < force->n && force->samples[old].t_ns < t_ns - reach_ns)
 			old++;
-		incise_force_near_forget(near, old);
+		incise_force_interpolator_forget(force, old);
 		if (drops)
-			incise_force_near_filter(near, t_ns, row_ns, &value);
+			incise_force_interpolator_filter(force, t_ns, row_ns, &value);
 		else
-			incise_force_near_line(near, t_ns, &value);
+			incise_force_interpolator_line(force, t_ns, &value);
 		bad = put_row(r, t_ns, &value);
 		if (bad)
 			return bad;
 	}
-	/* What is behind is checked as well. */
+	/* Rows behind the grid are checked too. */
 	while (rc > 0) {
-		near->n = 0;
-		rc = incise_force_near_more(near, r->err);
+		force->n = 0;
+		rc = incise_force_interpolator_more(force, r->err);
 	}
 	return rc;
 }
@@ -247,11 +243,11 @@ int incise_resample(struct incise_recording *recording, const char *name,
 
 	if (r.name < 0)
 		return incise_error_set(err, ENOMEM, "out of memory");
-	rc = incise_force_near_open(&r.force, recording, given, err);
+	rc = incise_force_interpolator_open(&r.force, recording, given, err);
 	if (!rc)
-		rc = incise_blade_open(&r.blade, recording, given, err);
+		rc = incise_blade_pose_open(&r.blade, recording, given, err);
 	if (!rc)
-		rc = incise_camera_near_open(&r.camera, recording, given, err);
+		rc = incise_camera_interpolator_open(&r.camera, recording, given, err);
 	if (!rc && r.force.n) {
 		r.first_ns = r.force.samples[0].t_ns;
 		r.t_sd_s = incise_row_times_sd(&r.force.rows.times, 0);
@@ -271,8 +267,8 @@ int incise_resample(struct incise_recording *recording, const char *name,
 				     : on_force(&r);
 	}
 	report->cuts += r.blade.cut.count;
-	incise_force_near_close(&r.force);
-	incise_blade_close(&r.blade);
-	incise_camera_near_close(&r.camera);
+	incise_force_interpolator_close(&r.force);
+	incise_blade_pose_close(&r.blade);
+	incise_camera_interpolator_close(&r.camera);
 	return rc;
 }

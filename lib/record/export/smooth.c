@@ -8,17 +8,17 @@
 #include <string.h>
 #include "smooth.h"
 
-#define AHEAD 4	  /* records that a first slope is made of, besides its own */
-#define AROUND 16 /* records to each side that noise is told from */
+#define AHEAD 4	  /* records of a first slope, besides its own */
+#define AROUND 16 /* records to each side for the noise */
 #define FADED 1e-7
 #define LAG_MAX 4096 /* at 10 kHz, the fastest that the filter is made for, it is 2198 */
 
-/* λ of a record becomes that of the one before: Fᵀ (I - K H)ᵀ λ, less what it missed. */
-static void step_back(const struct incise_predict *p, double miss, double periods,
+/* λ of a record becomes that of the one before: Fᵀ (I - K H)ᵀ λ, less its residual. */
+static void step_back(const struct incise_predict *p, double residual, double periods,
 		      double lambda[3])
 {
 	double x = lambda[0] - p->alpha * lambda[0] - p->beta * lambda[1] -
-		   p->gamma * lambda[2] - miss;
+		   p->gamma * lambda[2] - residual;
 
 	lambda[2] += (lambda[1] + x * periods / 2) * periods;
 	lambda[1] += x * periods;
@@ -64,8 +64,8 @@ int incise_smooth_init(struct incise_smooth *smooth, double rate_hz)
 	smooth->pull[1] = (8 * a * b + g * (b - 2 * a - 4)) / (8 * (1 - a));
 	smooth->pull[2] = b * (2 * b - g) / (4 * (1 - a));
 	smooth->lag = fading(p);
-	smooth->room = 2 * smooth->lag + AHEAD + 2 * AROUND;
-	smooth->records = calloc(smooth->room, sizeof(*smooth->records));
+	smooth->capacity = 2 * smooth->lag + AHEAD + 2 * AROUND;
+	smooth->records = calloc(smooth->capacity, sizeof(*smooth->records));
 	return smooth->records ? 0 : -ENOMEM;
 }
 
@@ -86,8 +86,8 @@ static double apart(const struct incise_smooth_record *a,
 	return sqrt(sum);
 }
 
-/* Whether a record goes on from the one before: no gap, no leap. */
-static bool goes_on(const struct incise_smooth *smooth, size_t i)
+/* Whether a record continues the one before: no gap, no discontinuity. */
+static bool continues(const struct incise_smooth *smooth, size_t i)
 {
 	const struct incise_smooth_record *r = &smooth->records[i];
 
@@ -102,7 +102,7 @@ static void first_slope(const struct incise_smooth *smooth, size_t first, double
 	double t[AHEAD + 1], mean = 0, tt = 0;
 	size_t n = 1;
 
-	while (n <= AHEAD && first + n < smooth->n && goes_on(smooth, first + n))
+	while (n <= AHEAD && first + n < smooth->n && continues(smooth, first + n))
 		n++;
 	for (size_t i = 0; i < n; i++) {
 		t[i] = (r[i].t_ns - r->t_ns) * 1e-9;
@@ -119,17 +119,17 @@ static void first_slope(const struct incise_smooth *smooth, size_t first, double
 		slope[k] /= tt;
 }
 
-/* Whether the filter, brought to this record, is too far off to go on. */
+/* Whether the filter, predicted to this record, is too far off to continue. */
 static bool lost(const struct incise_predict *p, const struct incise_smooth_record *r,
 		 double dt)
 {
 	double sum = 0;
 
 	for (int i = 0; i < 3; i++) {
-		double miss =
+		double residual =
 			r->position_mm[i] - p->x[i] - (p->v[i] + p->a[i] * dt / 2) * dt;
 
-		sum += miss * miss;
+		sum += residual * residual;
 	}
 	return !(sqrt(sum) <= INCISE_PREDICT_JUMP_MM);
 }
@@ -138,28 +138,28 @@ static void step_forward(struct incise_smooth *smooth, size_t i)
 {
 	struct incise_smooth_record *r = &smooth->records[i];
 	struct incise_predict *p = &smooth->predict, next;
-	/* The filter takes no negative times; rows' are within ±2^61. */
+	/* The filter needs positive times; rows' are within ±2^61. */
 	struct incise_tracker_sample sample = {.t_ns = r->t_ns + (1LL << 62),
 					       .quaternion = {1}};
 	double dt = (sample.t_ns - p->t_ns) * 1e-9;
 
 	memcpy(sample.position_mm, r->position_mm, sizeof(sample.position_mm));
-	r->begins = !p->started || sample.t_ns - p->t_ns > p->gap_ns || lost(p, r, dt);
+	r->starts = !p->started || sample.t_ns - p->t_ns > p->gap_ns || lost(p, r, dt);
 	r->periods = dt / smooth->period_s;
-	next = r->begins ? smooth->fresh : *p;
+	next = r->starts ? smooth->fresh : *p;
 	incise_predict_add(&next, &sample);
 	r->skipped = next.t_ns != sample.t_ns;
 	if (!r->skipped)
 		*p = next;
-	if (!r->skipped && r->begins)
+	if (!r->skipped && r->starts)
 		first_slope(smooth, i, p->v);
 	for (int k = 0; k < 3; k++) {
 		r->velocity_mm_s[k] = r->skipped ? NAN : p->v[k];
-		r->miss_mm[k] = r->position_mm[k] - p->x[k];
+		r->residual_mm[k] = r->position_mm[k] - p->x[k];
 	}
 }
 
-/* How much a record is off the line between its neighbours. */
+/* The squared distance of a record from the line between its neighbours. */
 static void bend(struct incise_smooth *smooth, size_t i)
 {
 	struct incise_smooth_record *r = &smooth->records[i], *a, *b;
@@ -182,7 +182,7 @@ static void bend(struct incise_smooth *smooth, size_t i)
 			b->position_mm[k] - 2 * r->position_mm[k] + a->position_mm[k], 2);
 }
 
-static void tell_noise(struct incise_smooth *smooth, size_t i)
+static void measure_noise(struct incise_smooth *smooth, size_t i)
 {
 	struct incise_smooth_record *r = &smooth->records[i];
 	size_t from = i > AROUND ? i - AROUND : 0, n = 0;
@@ -201,7 +201,7 @@ static void tell_noise(struct incise_smooth *smooth, size_t i)
 	r->depth_noise_mm = n ? sqrt(depth / n / 6) : NAN;
 }
 
-/* Go as far as there are records, and back to those not finished yet. */
+/* Filter forward to the last record, and smooth back to the unfinished ones. */
 static void run(struct incise_smooth *smooth)
 {
 	size_t end = smooth->ended ? smooth->n : smooth->n - AHEAD;
@@ -216,7 +216,7 @@ static void run(struct incise_smooth *smooth)
 		struct incise_smooth_record *r = &smooth->records[i];
 
 		if (i < sure)
-			tell_noise(smooth, i);
+			measure_noise(smooth, i);
 		if (r->skipped)
 			continue;
 		for (int k = 0; k < 3; k++) {
@@ -227,9 +227,9 @@ static void run(struct incise_smooth *smooth)
 					(smooth->pull[0] * l[0] + smooth->pull[1] * l[1] +
 					 smooth->pull[2] * l[2]) /
 					smooth->period_s;
-			step_back(&smooth->fresh, r->miss_mm[k], r->periods, l);
+			step_back(&smooth->fresh, r->residual_mm[k], r->periods, l);
 		}
-		if (r->begins)
+		if (r->starts)
 			memset(lambda, 0, sizeof(lambda));
 	}
 	smooth->finished = sure;
@@ -238,8 +238,8 @@ static void run(struct incise_smooth *smooth)
 void incise_smooth_push(struct incise_smooth *smooth,
 			const struct incise_smooth_record *record)
 {
-	if (smooth->n == smooth->room) {
-		/* All that is finished has been taken; noise looks at some before. */
+	if (smooth->n == smooth->capacity) {
+		/* All finished records were taken; the noise uses some of them. */
 		size_t old = smooth->finished - AROUND;
 
 		smooth->n -= old;
@@ -250,7 +250,7 @@ void incise_smooth_push(struct incise_smooth *smooth,
 		smooth->taken -= old;
 	}
 	smooth->records[smooth->n++] = *record;
-	if (smooth->n == smooth->room)
+	if (smooth->n == smooth->capacity)
 		run(smooth);
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A table on its way into a file: columns with name, unit and type, rows that are handed
- * on in blocks, lineage. What kind of file it is, only the opening says. Memory is that
- * of one block; the file appears under its name when it is whole.
+ * A table on its way into a file: columns with name, unit and type, rows that are written in
+ * blocks, provenance. The format is chosen when the table is opened. Memory is that of one
+ * block.
  *
  *     rows ──► block ──► format ──► outfile ──► FILE.csv, FILE.h5
  *
@@ -16,17 +16,16 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <incise/error.h>
-#include <incise/outfile.h>
-#include "lineage.h"
+#include "provenance.h"
 
 #define INCISE_TABLE_BLOCK 16384 /* rows; of HDF5 a chunk, 128 KiB of doubles */
 
 enum incise_column_type {
 	INCISE_COLUMN_REAL,
-	INCISE_COLUMN_SINGLE, /* real, of which seven digits are kept in a binary file */
+	INCISE_COLUMN_SINGLE, /* real, with seven digits in a binary file */
 	INCISE_COLUMN_INTEGER,
 	INCISE_COLUMN_FLAG, /* integer, 0 or 1 */
-	INCISE_COLUMN_NAME, /* integer, of incise_table_name(); in one column only */
+	INCISE_COLUMN_NAME, /* integer, from incise_table_name(); in one column only */
 };
 
 struct incise_column {
@@ -42,29 +41,28 @@ union incise_cell {
 
 struct incise_table;
 
-/* How a kind of file takes a table. All but close return 0 or a negative errno. */
+/* A file format. All but close return 0 or a negative errno. */
 struct incise_table_format {
 	unsigned int abi;
 	int (*begin)(struct incise_table *table, struct incise_error *err);
-	/* The block's rows, table->filled of them. */
+	/* Write the block's rows, table->filled of them. */
 	int (*rows)(struct incise_table *table, struct incise_error *err);
 	int (*end)(struct incise_table *table, struct incise_error *err);
-	void (*close)(struct incise_table *table); /* where begin made a state */
+	void (*close)(struct incise_table *table); /* if begin made a state */
 };
 
-#define INCISE_TABLE_ABI 1 /* changes when a struct of this header does */
+#define INCISE_TABLE_ABI 2 /* changes when a struct of this header does */
 
 struct incise_table {
 	const struct incise_table_format *format;
 	const struct incise_column *columns;
 	int n_columns;
-	const struct incise_lineage *lineage; /* or NULL */
+	const struct incise_provenance *provenance; /* or NULL */
 	union incise_cell *block; /* column by column, INCISE_TABLE_BLOCK each */
 	size_t filled;		  /* rows in it */
 	uint64_t rows;		  /* in blocks before */
 	char **names;
 	int n_names;
-	struct incise_outfile *file; /* NULL: the stream is the caller's */
 	FILE *out;
 	void *state; /* of the format */
 };
@@ -75,26 +73,26 @@ extern const struct incise_table_format incise_table_csv;
 const struct incise_table_format *incise_table_hdf5(struct incise_error *err);
 
 /*
- * Open a table in a file, or on a stream where @file is NULL; it takes neither over when
- * it fails. Columns and lineage must outlive it. Returns 0 or -errno.
+ * Open a table on a stream, which the caller closes. Columns and provenance must outlive it.
+ * Returns 0 or -errno.
  */
 int incise_table_open(struct incise_table *table,
-		      const struct incise_table_format *format,
-		      struct incise_outfile *file, FILE *out,
+		      const struct incise_table_format *format, FILE *out,
 		      const struct incise_column *columns, int n_columns,
-		      const struct incise_lineage *lineage, struct incise_error *err);
+		      const struct incise_provenance *provenance,
+		      struct incise_error *err);
 
-/* Number of a name, from 1; the last one given is not entered twice. Or -ENOMEM. */
+/* Number of a name, from 1; the last name is not entered twice. Or -ENOMEM. */
 int incise_table_name(struct incise_table *table, const char *name);
 
 /* Add a row of n_columns cells. Returns 0 or -errno: ENOSPC, EIO, …. */
 int incise_table_add(struct incise_table *table, const union incise_cell *cells,
 		     struct incise_error *err);
 
-/* What is in the block goes out, and what the format ends with; then close. */
+/* Write the last block and the end of the format; then close. */
 int incise_table_finish(struct incise_table *table, struct incise_error *err);
 
-/* Free the memory; the outfile stays the caller's, to commit or to abort. */
+/* Free the memory. */
 void incise_table_close(struct incise_table *table);
 
 #endif

@@ -16,6 +16,7 @@
 #include <cmocka.h>
 #include <hdf5.h>
 #include <incise/backend.h>
+#include <incise/outfile.h>
 #include "../../../lib/record/export/table_writer.h"
 
 static const struct incise_column columns[] = {
@@ -62,7 +63,7 @@ static int64_t mix(uint64_t x)
 }
 
 /* Write n rows; the first error, or 0. */
-static int write_rows(int64_t n, const struct incise_lineage *lineage,
+static int write_rows(int64_t n, const struct incise_provenance *provenance,
 		      struct incise_error *err)
 {
 	struct incise_outfile *file = incise_outfile_open(FILE_NAME, err);
@@ -71,8 +72,8 @@ static int write_rows(int64_t n, const struct incise_lineage *lineage,
 	int rc;
 
 	assert_non_null(file);
-	rc = incise_table_open(&table, incise_backend.open(NULL, err), file, NULL,
-			       columns, 5, lineage, err);
+	rc = incise_table_open(&table, incise_backend.open(NULL, err),
+			       incise_outfile_stream(file), columns, 5, provenance, err);
 	for (int64_t i = 0; i < n && !rc; i++) {
 		int64_t mixed = mix(i);
 
@@ -133,16 +134,16 @@ static void rows_come_back(void **state)
 	/* none, one, a block, one more, and several with a rest */
 	static const int64_t sizes[] = {0, 1, INCISE_TABLE_BLOCK, INCISE_TABLE_BLOCK + 1,
 					50001};
-	struct incise_lineage lineage = {0};
+	struct incise_provenance provenance = {0};
 
-	assert_int_equal(incise_lineage_add(&lineage, "source", "liver.rec"), 0);
+	assert_int_equal(incise_provenance_add(&provenance, "source", "liver.rec"), 0);
 	for (size_t k = 0; k < sizeof(sizes) / sizeof(*sizes); k++) {
 		struct incise_error err = {0};
 		int64_t n = sizes[k];
 		double *cut, *t_s, *force, *count, *clipped;
 		hid_t file;
 
-		if (write_rows(n, &lineage, &err))
+		if (write_rows(n, &provenance, &err))
 			fail_msg("%s", err.text);
 		file = H5Fopen(FILE_NAME, H5F_ACC_RDONLY, H5P_DEFAULT);
 		assert_true(file >= 0);
@@ -168,7 +169,7 @@ static void rows_come_back(void **state)
 		free(clipped);
 		H5Fclose(file);
 	}
-	incise_lineage_free(&lineage);
+	incise_provenance_free(&provenance);
 }
 
 static void names_stand_beside_their_column(void **state)

@@ -152,6 +152,20 @@ __attribute__((unused)) static void record(const char *path, const char *spec,
 	incise_rig_close(rig);
 }
 
+/* A whole file as a text, to be freed. */
+__attribute__((unused)) static char *text_of(const char *path)
+{
+	FILE *file = fopen(path, "r");
+	size_t size = 0;
+	char *text = NULL;
+
+	assert_non_null(file);
+	if (getdelim(&text, &size, EOF, file) < 0)
+		*text = 0;
+	fclose(file);
+	return text;
+}
+
 /* Run SQL on a database, as a stranger would. */
 __attribute__((unused)) static void change(const char *file, const char *sql)
 {

@@ -4,8 +4,8 @@
  * signals that are put into a recording and known at any time.
  */
 #include "recorded.h"
-#include "../../../lib/record/export/force_near.h"
-#include "../../../lib/record/export/resample.h"
+#include "../../../lib/record/export/interpolators.h"
+#include "../../../lib/record/export/export.h"
 
 static int record_once(void **state)
 {
@@ -36,20 +36,16 @@ static char *resample(const char *path, double rate_hz,
 	struct incise_export_options how;
 	struct incise_export_report report;
 	struct incise_error err = {0};
-	char *text = NULL;
-	size_t size;
-	FILE *out = open_memstream(&text, &size);
 
 	incise_export_options_init(&how);
 	how.resample = true;
 	how.rate_hz = rate_hz;
 	how.calibration = calibration;
 	recording = incise_recording_open(path, &err);
-	if (!recording || incise_export_csv(&recording, 1, &how, out, &report, &err))
+	if (!recording || incise_export(&recording, 1, &how, "out.csv", &report, &err))
 		fail_msg("%s", err.text);
 	incise_recording_close(recording);
-	fclose(out);
-	return text;
+	return text_of("out.csv");
 }
 
 struct row {
@@ -287,21 +283,21 @@ static void damage_is_told(void **state)
 		struct incise_export_options how = {.resample = true, .rate_hz = 100};
 		struct incise_recording *recording;
 		struct incise_error err = {0};
-		FILE *out = fopen("/dev/null", "w");
 
 		assert_int_equal(system("rm -rf hurt.rec; cp -r known.rec hurt.rec"), 0);
 		change("hurt.rec/recording.db", cases[i].sql);
 		recording = incise_recording_open("hurt.rec", &err);
 		assert_non_null(recording);
-		assert_int_equal(incise_export_csv(&recording, 1, &how, out, NULL, &err),
+		assert_int_equal(incise_export(&recording, 1, &how, "/dev/null", NULL,
+					       &err),
 				 -EINVAL);
 		if (!strstr(err.text, cases[i].message))
 			fail_msg("%s: %s", cases[i].sql, err.text);
 		/* Nobody need want the message. */
-		assert_int_equal(incise_export_csv(&recording, 1, &how, out, NULL, NULL),
+		assert_int_equal(incise_export(&recording, 1, &how, "/dev/null", NULL,
+					       NULL),
 				 -EINVAL);
 		incise_recording_close(recording);
-		fclose(out);
 	}
 }
 

@@ -105,7 +105,7 @@ static struct incise_smooth_record straight(int i, void *way)
 	struct incise_smooth_record record = {.seq = i};
 
 	t += i >= 700 ? 3 * period : 0; /* the filter goes on */
-	t += i >= 1200 ? 0.04 : 0;	/* and begins anew */
+	t += i >= 1200 ? 0.04 : 0;	/* and restarts */
 	t += i >= 2000 ? 100 : 0;
 	record.t_ns = llround(t * 1e9);
 	record.position_mm[0] = 30 * t + (i >= 2600 ? 500 : 0);

@@ -28,13 +28,13 @@ static const struct incise_column columns[] = {
 static char *text;
 static size_t size;
 
-static FILE *begin(struct incise_table *table, const struct incise_lineage *lineage)
+static FILE *begin(struct incise_table *table, const struct incise_provenance *provenance)
 {
 	FILE *out = open_memstream(&text, &size);
 	struct incise_error err = {0};
 
-	assert_int_equal(incise_table_open(table, &incise_table_csv, NULL, out, columns,
-					   N_COLUMNS, lineage, &err),
+	assert_int_equal(incise_table_open(table, &incise_table_csv, out, columns,
+					   N_COLUMNS, provenance, &err),
 			 0);
 	return out;
 }
@@ -103,15 +103,16 @@ static void numbers_are_those_of_printf(void **state)
 	free(text);
 }
 
-static void names_are_quoted_and_lineage_is_comments(void **state)
+static void names_are_quoted_and_provenance_is_comments(void **state)
 {
-	struct incise_lineage lineage = {0};
+	struct incise_provenance provenance = {0};
 	struct incise_table table;
 	FILE *out;
 
-	assert_int_equal(incise_lineage_add(&lineage, "source", "a\nb%s", ".rec"), 0);
-	assert_int_equal(incise_lineage_add(&lineage, "nothing", "%s", ""), 0);
-	out = begin(&table, &lineage);
+	assert_int_equal(incise_provenance_add(&provenance, "source", "a\nb%s", ".rec"),
+			 0);
+	assert_int_equal(incise_provenance_add(&provenance, "nothing", "%s", ""), 0);
+	out = begin(&table, &provenance);
 	add(&table, "plain", 1, 0);
 	add(&table, "say \"a,b\"", 1, 0);
 	add(&table, "say \"a,b\"", 1, 0);
@@ -122,7 +123,7 @@ static void names_are_quoted_and_lineage_is_comments(void **state)
 				  "plain,1.0000,1.000000,1,0,0\n"
 				  "\"say \"\"a,b\"\"\",1.0000,1.000000,1,0,0\n"
 				  "\"say \"\"a,b\"\"\",1.0000,1.000000,1,0,0\n");
-	incise_lineage_free(&lineage);
+	incise_provenance_free(&provenance);
 	free(text);
 }
 
@@ -142,7 +143,7 @@ static void a_full_disk_is_told(void **state)
 	struct incise_table table;
 	FILE *out = fopen("/dev/full", "w");
 
-	assert_int_equal(incise_table_open(&table, &incise_table_csv, NULL, out, columns,
+	assert_int_equal(incise_table_open(&table, &incise_table_csv, out, columns,
 					   N_COLUMNS, NULL, &err),
 			 0);
 	add(&table, "a", 1, 1);
@@ -156,7 +157,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(numbers_are_those_of_printf),
-		cmocka_unit_test(names_are_quoted_and_lineage_is_comments),
+		cmocka_unit_test(names_are_quoted_and_provenance_is_comments),
 		cmocka_unit_test(nothing_is_written_before_a_row),
 		cmocka_unit_test(a_full_disk_is_told),
 	};

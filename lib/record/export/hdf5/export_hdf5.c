@@ -3,7 +3,7 @@
  * The module that writes a table as HDF5: a dataset per column, since that is what
  * h5read('pairs.h5', '/force_N') and h5py's file['force_N'][:] take as it is.
  *
- *     /            attributes: the lineage
+ *     /            attributes: the provenance
  *     /t_s         float64, attributes units, description; chunks of a block,
  *     /force_N     float32  shuffled and deflated
  *     /cut         int32, from 1, into
@@ -11,9 +11,9 @@
  *
  * It writes the outfile's own inode, through /proc: nothing shows under the final name.
  *
- * Chunks are packed here and handed to the library as they are. Its own deflate looks for
- * texts that come again, which single samples have none of; runs of one byte, of which
- * shuffled columns are full, and Huffman's code take half the time and a quarter more space.
+ * Chunks are packed here, not by the library, whose deflate searches for repeated strings, which
+ * single samples do not have. Runs of one byte, frequent in shuffled columns, and Huffman's code
+ * take half the time and a quarter more space.
  */
 #include <errno.h>
 #include <stdlib.h>
@@ -25,7 +25,7 @@
 #include <incise/backend.h>
 #include "../table_writer.h"
 
-#define LEVEL 1 /* as readers are told; it does not matter to them */
+#define LEVEL 1 /* noted in the file; readers ignore it */
 
 struct hdf5 {
 	hid_t file;
@@ -38,7 +38,7 @@ struct hdf5 {
 	bool failed; /* libhdf5 1.10 crashes in closing what it could not write */
 };
 
-/* The file is left as it is, open: it has no name, and goes with the process. */
+/* The file stays open and without a name, until the process ends. */
 static int fail(struct hdf5 *hdf5, const char *what, struct incise_error *err)
 {
 	int code = errno ? errno : EIO;
@@ -89,7 +89,7 @@ static hid_t make_column(hid_t file, const struct incise_column *column)
 	hid_t how = H5Pcreate(H5P_DATASET_CREATE);
 	hid_t set = -1;
 
-	/* Without times in it, equal data are an equal file. */
+	/* Without times, equal data give equal files. */
 	if (H5Pset_chunk(how, 1, &chunk) >= 0 && H5Pset_shuffle(how) >= 0 &&
 	    H5Pset_deflate(how, LEVEL) >= 0 && H5Pset_obj_track_times(how, 0) >= 0)
 		set = H5Dcreate2(file, column->name, stored_type(column->type), space,
@@ -130,9 +130,9 @@ static int open_file(struct incise_table *table, struct hdf5 *hdf5)
 
 	snprintf(path, sizeof(path), "/proc/self/fd/%d", fileno(table->out));
 	errno = 0;
-	/* A dataset that was left open must not keep the file open. */
+	/* An open dataset must not keep the file open. */
 	H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
-	/* The usual driver looks for what a link's text says, which here is no path. */
+	/* The default driver resolves the link to its text, which is not a path. */
 	H5Pset_fapl_stdio(access);
 	hdf5->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
 	H5Pclose(access);
@@ -159,11 +159,11 @@ static int hdf5_begin(struct incise_table *table, struct incise_error *err)
 	struct stat st;
 	int bad;
 
-	if (!table->file || fstat(fileno(table->out), &st) || !S_ISREG(st.st_mode))
+	if (fstat(fileno(table->out), &st) || !S_ISREG(st.st_mode))
 		return incise_error_set(err, ESPIPE,
 					"HDF5 cannot be written to a pipe or a device; "
 					"give -o FILE.h5");
-	H5dont_atexit(); /* nor at the program's end; all is closed that can be */
+	H5dont_atexit(); /* nothing is left to close at the program's end */
 	H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
 	hdf5 = calloc(1, sizeof(*hdf5));
 	if (!hdf5)
@@ -181,9 +181,9 @@ static int hdf5_begin(struct incise_table *table, struct incise_error *err)
 		hdf5->columns[i] = make_column(hdf5->file, &table->columns[i]);
 		bad = hdf5->columns[i] < 0;
 	}
-	for (int i = 0; table->lineage && i < table->lineage->n && !bad; i++)
-		bad = put_text(hdf5->file, table->lineage->items[i].key,
-			       table->lineage->items[i].value);
+	for (int i = 0; table->provenance && i < table->provenance->n && !bad; i++)
+		bad = put_text(hdf5->file, table->provenance->items[i].key,
+			       table->provenance->items[i].value);
 	return bad ? fail(hdf5, "the file cannot be begun", err) : 0;
 }
 
@@ -234,7 +234,7 @@ static void shuffle(const unsigned char *cells, size_t width, unsigned char *to)
 			*to++ = cells[i * width + byte];
 }
 
-/* A chunk as the filters of make_column() would leave it; a last one is filled with 0. */
+/* Write a chunk as the filters of make_column() would make it; the last one is padded with 0. */
 static int put_chunk(struct hdf5 *hdf5, hid_t set, const union incise_cell *cells,
 		     size_t n, hsize_t from, enum incise_column_type type)
 {
@@ -273,7 +273,7 @@ static int hdf5_rows(struct incise_table *table, struct incise_error *err)
 	return bad ? fail(hdf5, "rows cannot be written", err) : 0;
 }
 
-/* The texts that a column of names counts into, beside it. */
+/* Write the texts of a column of names. */
 static int put_names(struct incise_table *table, const struct incise_column *column)
 {
 	struct hdf5 *hdf5 = table->state;
@@ -342,7 +342,7 @@ static void *hdf5_open(const struct incise_backend_request *request,
 	return (void *)&format;
 }
 
-/* No device, but found as one: what opens is a format. */
+/* Found like the module of a device; open() returns a format. */
 const struct incise_backend incise_backend = {
 	.abi = INCISE_BACKEND_ABI,
 	.kind = "export",

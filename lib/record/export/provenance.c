@@ -1,25 +1,26 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Where exported data comes from; see lineage.h.
+ * The provenance of exported data; see provenance.h.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <incise/version.h>
-#include "lineage.h"
+#include "provenance.h"
 #include "../read/recording.h"
 
-int incise_lineage_add(struct incise_lineage *lineage, const char *key, const char *fmt,
-		       ...)
+int incise_provenance_add(struct incise_provenance *provenance, const char *key,
+			  const char *fmt, ...)
 {
-	struct incise_lineage_item *item = &lineage->items[lineage->n];
+	struct incise_provenance_item *item = &provenance->items[provenance->n];
 	va_list args;
 	int length;
 
-	if (lineage->n == INCISE_LINEAGE_MAX)
+	if (provenance->n == INCISE_PROVENANCE_MAX)
 		return -E2BIG;
 	va_start(args, fmt);
 	length = vasprintf(&item->value, fmt, args);
@@ -30,12 +31,12 @@ int incise_lineage_add(struct incise_lineage *lineage, const char *key, const ch
 		free(item->value);
 		return 0;
 	}
-	/* A line of its own in CSV, whatever a recording has in its name. */
+	/* A single line in CSV, whatever characters a recording's name has. */
 	for (char *c = item->value; *c; c++)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '_';
 	item->key = key;
-	lineage->n++;
+	provenance->n++;
 	return 0;
 }
 
@@ -67,7 +68,6 @@ static const char *start_of(const struct incise_recording *recording)
 	return recording->meta.started;
 }
 
-/* What is missing in it, so that who reads the table is not left in the dark. */
 static const char *state_of(const struct incise_recording *recording)
 {
 	const struct incise_recording_info *meta = &recording->meta;
@@ -83,7 +83,7 @@ static const char *rig_of(const struct incise_recording *recording)
 	return recording->meta.rig;
 }
 
-static int add_sources(struct incise_lineage *lineage,
+static int add_sources(struct incise_provenance *provenance,
 		       struct incise_recording *const *recordings, int n)
 {
 	const struct {
@@ -98,15 +98,15 @@ static int add_sources(struct incise_lineage *lineage,
 	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && !rc; i++) {
 		char *text = join(recordings, n, items[i].text);
 
-		rc = text ? incise_lineage_add(lineage, items[i].key, "%s", text)
+		rc = text ? incise_provenance_add(provenance, items[i].key, "%s", text)
 			  : -ENOMEM;
 		free(text);
 	}
 	return rc;
 }
 
-/* What turns pixels into depth, and delays that are given. */
-static int add_lengths(struct incise_lineage *lineage,
+/* Add the camera's scale, and delays of a given calibration. */
+static int add_lengths(struct incise_provenance *provenance,
 		       struct incise_recording *const *recordings, int n,
 		       const struct incise_calibration *given)
 {
@@ -124,16 +124,16 @@ static int add_lengths(struct incise_lineage *lineage,
 	for (int i = 1; i < n && !given; i++)
 		if (recordings[i]->meta.depth_mm_px != mm_px)
 			return 0;
-	rc = incise_lineage_add(lineage, "depth_mm_px", "%.9g", mm_px);
+	rc = incise_provenance_add(provenance, "depth_mm_px", "%.9g", mm_px);
 	for (size_t i = 0; i < sizeof(delays) / sizeof(*delays) && !rc; i++)
 		if (!isnan(delays[i].ms))
-			rc = incise_lineage_add(lineage, delays[i].key, "%.9g",
-						delays[i].ms);
+			rc = incise_provenance_add(provenance, delays[i].key, "%.9g",
+						   delays[i].ms);
 	return rc;
 }
 
-/* Without one that is given, each recording's own; told where it is one for all. */
-static int add_calibration(struct incise_lineage *lineage,
+/* Add the given calibration, or the recordings' own if all have the same. */
+static int add_calibration(struct incise_provenance *provenance,
 			   struct incise_recording *const *recordings, int n,
 			   const struct incise_calibration *given)
 {
@@ -145,8 +145,8 @@ static int add_calibration(struct incise_lineage *lineage,
 	if (!own)
 		zero_mV = given->force_zero_mV;
 
-	rc = incise_lineage_add(lineage, "calibration", "%s",
-				given ? "given for the export" : "of the recording");
+	rc = incise_provenance_add(provenance, "calibration", "%s",
+				   given ? "given for the export" : "of the recording");
 	for (int i = 1; i < n && own; i++) {
 		if (!given && recordings[i]->meta.force_mV_N != mV_N)
 			return rc;
@@ -154,36 +154,37 @@ static int add_calibration(struct incise_lineage *lineage,
 			zero_mV = NAN;
 	}
 	if (!rc)
-		rc = incise_lineage_add(lineage, "force_mV_N", "%.17g", mV_N);
+		rc = incise_provenance_add(provenance, "force_mV_N", "%.17g", mV_N);
 	if (!rc)
-		rc = isnan(zero_mV) ? incise_lineage_add(lineage, "force_zero_mV",
-							 "each recording's own")
-				    : incise_lineage_add(lineage, "force_zero_mV",
-							 "%.17g", zero_mV);
-	return rc ? rc : add_lengths(lineage, recordings, n, given);
+		rc = isnan(zero_mV) ? incise_provenance_add(provenance, "force_zero_mV",
+							    "each recording's own")
+				    : incise_provenance_add(provenance, "force_zero_mV",
+							    "%.17g", zero_mV);
+	return rc ? rc : add_lengths(provenance, recordings, n, given);
 }
 
-static int add_options(struct incise_lineage *lineage,
+static int add_options(struct incise_provenance *provenance,
 		       const struct incise_export_options *o)
 {
 	const char *rows = o->resample ? "resampled" : "raw";
 
 	if (o->depth_bins)
-		return incise_lineage_add(lineage, "options",
-					  "averaged in %dx%d bins, at least %d "
-					  "samples%s",
-					  o->depth_bins, o->velocity_bins, o->min_count,
-					  o->by_cut ? ", by cut" : "");
+		return incise_provenance_add(provenance, "options",
+					     "averaged in %dx%d bins, at least %d "
+					     "samples%s",
+					     o->depth_bins, o->velocity_bins,
+					     o->min_count, o->by_cut ? ", by cut" : "");
 	if (o->rate_hz > 0)
-		return incise_lineage_add(lineage, "options", "%s at %.9g Hz", rows,
-					  o->rate_hz);
-	return incise_lineage_add(lineage, "options", "%s, every force sample", rows);
+		return incise_provenance_add(provenance, "options", "%s at %.9g Hz", rows,
+					     o->rate_hz);
+	return incise_provenance_add(provenance, "options", "%s, every force sample",
+				     rows);
 }
 
-int incise_lineage_of(struct incise_lineage *lineage,
-		      struct incise_recording *const *recordings, int n,
-		      const struct incise_export_options *options,
-		      struct incise_error *err)
+int incise_provenance_of(struct incise_provenance *provenance,
+			 struct incise_recording *const *recordings, int n,
+			 const struct incise_export_options *options,
+			 struct incise_error *err)
 {
 	time_t now = time(NULL);
 	char date[32] = "";
@@ -192,21 +193,21 @@ int incise_lineage_of(struct incise_lineage *lineage,
 
 	if (gmtime_r(&now, &utc))
 		strftime(date, sizeof(date), "%Y-%m-%dT%H:%M:%SZ", &utc);
-	rc = incise_lineage_add(lineage, "incise", "%s", incise_version());
+	rc = incise_provenance_add(provenance, "incise", "%s", incise_version());
 	if (!rc)
-		rc = incise_lineage_add(lineage, "date", "%s", date);
+		rc = incise_provenance_add(provenance, "date", "%s", date);
 	if (!rc)
-		rc = add_sources(lineage, recordings, n);
+		rc = add_sources(provenance, recordings, n);
 	if (!rc)
-		rc = add_options(lineage, options);
+		rc = add_options(provenance, options);
 	if (!rc)
-		rc = add_calibration(lineage, recordings, n, options->calibration);
+		rc = add_calibration(provenance, recordings, n, options->calibration);
 	return rc ? incise_error_set(err, -rc, "lineage: %s", strerror(-rc)) : 0;
 }
 
-void incise_lineage_free(struct incise_lineage *lineage)
+void incise_provenance_free(struct incise_provenance *provenance)
 {
-	for (int i = 0; i < lineage->n; i++)
-		free(lineage->items[i].value);
-	lineage->n = 0;
+	for (int i = 0; i < provenance->n; i++)
+		free(provenance->items[i].value);
+	provenance->n = 0;
 }

@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Inside an export; for lib/record/export/ only.
+ */
+#ifndef INCISE_EXPORT_PRIVATE_H
+#define INCISE_EXPORT_PRIVATE_H
+
+#include <errno.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <incise/recording.h>
+#include "provenance.h"
+#include "table_writer.h"
+
+/* Report progress, @done of @all. 0, or -EINTR if the callback stops the export. */
+static inline int incise_export_progress(const struct incise_export_options *options,
+					 double done, double all,
+					 struct incise_error *err)
+{
+	if (options->progress &&
+	    options->progress(options->context, fmin(1, done / fmax(1, all))))
+		return incise_error_set(err, EINTR, "interrupted");
+	return 0;
+}
+
+/* --- resample.c -------------------------------------------------------------------- */
+
+/*
+ * All of a recording on one grid of time, or at the times of the force samples: force, pose of
+ * the blade, depth and speed, depth by the camera, each with its uncertainty and flags. The last
+ * columns are of the camera.
+ */
+#define INCISE_RESAMPLE_COLUMNS 21
+#define INCISE_RESAMPLE_CAMERA_COLUMNS 5
+
+extern const struct incise_column
+	incise_resample_columns[INCISE_RESAMPLE_COLUMNS + INCISE_RESAMPLE_CAMERA_COLUMNS];
+
+/* Number of columns for these recordings: 21 or 26, or -errno. */
+int incise_resample_width(struct incise_recording *const *recordings, int n,
+			  struct incise_error *err);
+
+/*
+ * Add the rows of a recording under a name. For the progress, @samples of force were read
+ * before, of @all. Returns 0 or -errno.
+ */
+int incise_resample(struct incise_recording *recording, const char *name,
+		    const struct incise_export_options *options,
+		    struct incise_table *table, struct incise_export_report *report,
+		    uint64_t samples, uint64_t all, struct incise_error *err);
+
+/* --- export_mcap.c ----------------------------------------------------------------- */
+
+/*
+ * A recording as messages for viewers: every row of force, tracker, depth and events, in order
+ * of time, log_time = t_ns (CLOCK_MONOTONIC). Rows of the report are messages. Returns 0,
+ * -EINVAL, -EIO, -ENOSPC, -ENOMEM, -EINTR.
+ */
+int incise_export_mcap(struct incise_recording *recording,
+		       const struct incise_export_options *options, FILE *out,
+		       const struct incise_provenance *provenance,
+		       struct incise_export_report *report, struct incise_error *err);
+
+#endif
