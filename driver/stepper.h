@@ -26,7 +26,7 @@
 #include <linux/spinlock.h>
 #include <linux/wait.h>
 
-#include <incise/profile.h>
+#include "../lib/fixed/profile.h"
 
 #include "stepper_page.h"
 #include "uapi/incise_stepper.h"

@@ -23,10 +23,9 @@
 #define READ_ONCE(x) __atomic_load_n(&(x), __ATOMIC_RELAXED)
 #endif
 #define smp_rmb() __atomic_thread_fence(__ATOMIC_ACQUIRE) /* loads before loads */
-#define div_u64(a, b) ((a) / (b))
 #endif
 
-#include <incise/profile.h>
+#include "../lib/fixed/profile.h"
 
 #define SLOT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(__u64))
 

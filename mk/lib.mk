@@ -54,14 +54,15 @@ has_comedilib := $(shell $(PKG_CONFIG) --exists comedilib && echo yes)
 device_modules := $(if $(shell $(PKG_CONFIG) --exists libgpiod && echo yes),stepper_gpio) \
 	$(if $(has_libmnl),stepper_can) stepper_slcan \
 	$(if $(has_libiio),force_iio) $(if $(has_comedilib),force_comedi)
+# A motor that is moved from a thread here.
+motor_core := $(addprefix $(O)/obj/lib/,fixed/profile.o fixed/ramp.o \
+	$(addprefix device/,motor.o motion.o page.o thread.o))
 pc_stepper_gpio := libgpiod
-objects_stepper_gpio := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o thread.o gpio/pulser.o \
-	gpio/stepper_gpio.o \
+objects_stepper_gpio := $(motor_core) $(addprefix $(O)/obj/lib/device/,gpio/pulser.o gpio/stepper_gpio.o \
 	$(if $(shell $(PKG_CONFIG) --atleast-version=2 libgpiod && echo yes),gpio/gpio_v2.o,gpio/gpio_v1.o))
 
 # A drive on one of two kinds of bus: each module has the files of its own transport only.
-can_core := $(addprefix $(O)/obj/lib/device/,motor.o motion.o page.o thread.o) \
-	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/*.c) \
+can_core := $(motor_core) $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/*.c) \
 		lib/device/can/bus/bus_load.c)
 can_socketcan := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/bus/socketcan*.c))
 can_slcan := $(O)/obj/lib/device/tty.o \

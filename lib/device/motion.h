@@ -15,7 +15,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
-#include <incise/profile.h>
+#include "../fixed/profile.h"
 #include "abi.h"
 
 /* After these it may not take the time to brake by its profile. */

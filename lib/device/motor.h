@@ -10,7 +10,7 @@
 #define INCISE_MOTOR_H
 
 #include <incise/backend.h>
-#include <incise/profile.h>
+#include "../fixed/profile.h"
 #include "abi.h"
 
 /* Largest velocity and acceleration in microsteps: they are 32 bits. */

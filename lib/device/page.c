@@ -6,7 +6,7 @@
 #include <errno.h>
 #include <stdbool.h>
 #include <string.h>
-#include <incise/profile.h>
+#include "../fixed/profile.h"
 #include "page.h"
 
 /* A writer is in it for some 20 ns; a reader that is so often unlucky is not unlucky. */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
 /*
- * Limits, the average and the steps of a motion profile; see incise/profile.h. The ramp that
+ * Limits, the average and the steps of a motion profile; see lib/fixed/profile.h. The ramp that
  * is averaged is in ramp.c. Lengths are 2^-32 steps. The average is exact: output·N + rest is
  * the sum of the last N positions, and moves by (newest - oldest) each tick, so nothing
  * drifts and the end is the target to the last bit.

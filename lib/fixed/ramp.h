@@ -6,7 +6,7 @@
 #ifndef INCISE_RAMP_H
 #define INCISE_RAMP_H
 
-#include <incise/profile.h>
+#include "profile.h"
 
 /* A way without an end. A kernel has no UINT64_MAX. */
 #define INCISE_RAMP_UNBOUNDED (~(uint64_t)0)

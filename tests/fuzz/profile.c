@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * The motion profile under libFuzzer: bytes become limits, then commands and ticks; every
- * tick is held against what incise/profile.h promises, and at the end so is a stop.
+ * tick is held against what lib/fixed/profile.h promises, and at the end so is a stop.
  *
  *   limits  tick 4 · velocity 4 · acceleration 4 · jerk 8 · min 4 · max 4 · begin 4 · how 1
  *   then, until the bytes end, one command: what 1 · target 8, little-endian

@@ -2,7 +2,7 @@
 /*
  * The kernel module's page of set-points under libFuzzer, and what comes of it: a config of
  * any bytes; if it is let pass, a page of any bytes, read as the module's timer does, and
- * ticks of the profile, each held against what incise/profile.h promises.
+ * ticks of the profile, each held against what lib/fixed/profile.h promises.
  *
  *   config  128 bytes, struct incise_stepper_config
  *   then, until the bytes end: how 1 · offset 1 · n 1 · n bytes, written into the slot at

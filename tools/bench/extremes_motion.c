@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include "../../lib/fixed/spring.h"
-#include <incise/profile.h>
+#include "../../lib/fixed/profile.h"
 #include "any_pose.h"
 #include "extremes.h"
 
@@ -133,7 +133,7 @@ static struct incise_profile_limits any_limits(void)
 	return l;
 }
 
-/* The promises of incise/profile.h at the ends of ticks, whatever the targets are. */
+/* The promises of lib/fixed/profile.h at the ends of ticks, whatever the targets are. */
 static void run_profile(struct extremes_row *row, const struct incise_profile_limits *l)
 {
 	struct incise_profile profile;

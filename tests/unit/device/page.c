@@ -12,7 +12,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <string.h>
-#include <incise/profile.h>
+#include "../../../lib/fixed/profile.h"
 #include "../../../lib/device/page.h"
 
 static void a_set_point_is_taken_once(void **state)

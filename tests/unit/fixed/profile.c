@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The motion profile: every promise of incise/profile.h over motions by chance (see
+ * The motion profile: every promise of lib/fixed/profile.h over motions by chance (see
  * profile_watch.h), arrival and stops against closed forms, the average against adding up.
  */
 #include <stdarg.h>

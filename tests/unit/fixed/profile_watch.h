@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Holds each tick of a motion profile against every inequality that incise/profile.h
+ * Holds each tick of a motion profile against every inequality that lib/fixed/profile.h
  * promises, in integers of 128 bits where it can. For the unit tests and the fuzzer.
  *
  * It knows limits, slots and step times only, and nothing of how they are made.
@@ -10,7 +10,7 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <incise/profile.h>
+#include "../../../lib/fixed/profile.h"
 
 #define WATCH_STEP ((int64_t)1 << 32)
 #define WATCH_BACK 32 /* steps that are remembered */

@@ -11,7 +11,7 @@
  */
 #include <errno.h>
 #include <fcntl.h>
-#include <incise/profile.h>
+#include "../../../lib/fixed/profile.h"
 #include <inttypes.h>
 #include <signal.h>
 #include <stdlib.h>

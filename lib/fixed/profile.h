@@ -46,41 +46,36 @@
 #ifndef INCISE_PROFILE_H
 #define INCISE_PROFILE_H
 
-#include <incise/export.h>
-#ifdef __KERNEL__
-#include <linux/types.h>
-#else
+#ifndef __KERNEL__
 #include <stdbool.h>
-#include <stdint.h>
 #endif
+#include "integers.h"
 
-INCISE_BEGIN_DECLS
-
-/** Shortest tick. */
+/* Shortest tick. */
 #define INCISE_PROFILE_TICK_MIN_NS 50000
-/** Longest tick. */
+/* Longest tick. */
 #define INCISE_PROFILE_TICK_MAX_NS 2000000
-#define INCISE_PROFILE_VELOCITY_MAX 200000     /**< steps/s */
-#define INCISE_PROFILE_POSITION_MAX 1000000000 /**< steps, to either side */
-#define INCISE_PROFILE_AVERAGE_MAX 256	       /**< ticks */
+#define INCISE_PROFILE_VELOCITY_MAX 200000     /* steps/s */
+#define INCISE_PROFILE_POSITION_MAX 1000000000 /* steps, to either side */
+#define INCISE_PROFILE_AVERAGE_MAX 256	       /* ticks */
 
-/** The limits of a motion. */
+/* The limits of a motion. */
 struct incise_profile_limits {
-	uint32_t tick_ns;      /**< INCISE_PROFILE_TICK_MIN_NS … _MAX_NS */
-	uint32_t velocity;     /**< steps/s, 1 … INCISE_PROFILE_VELOCITY_MAX */
-	uint32_t acceleration; /**< steps/s², 1 … */
-	int32_t position_min;  /**< steps, within ±INCISE_PROFILE_POSITION_MAX */
-	int32_t position_max;  /**< steps, from position_min on */
-	uint64_t jerk;	       /**< steps/s³; 0: not limited */
+	uint32_t tick_ns;      /* INCISE_PROFILE_TICK_MIN_NS … _MAX_NS */
+	uint32_t velocity;     /* steps/s, 1 … INCISE_PROFILE_VELOCITY_MAX */
+	uint32_t acceleration; /* steps/s², 1 … */
+	int32_t position_min;  /* steps, within ±INCISE_PROFILE_POSITION_MAX */
+	int32_t position_max;  /* steps, from position_min on */
+	uint64_t jerk;	       /* steps/s³; 0: not limited */
 };
 
-/** The kind of a target. */
+/* The kind of a target. */
 enum incise_profile_mode {
-	INCISE_PROFILE_POSITION, /**< target in steps */
-	INCISE_PROFILE_VELOCITY, /**< target in steps/s */
+	INCISE_PROFILE_POSITION, /* target in steps */
+	INCISE_PROFILE_VELOCITY, /* target in steps/s */
 };
 
-/** Private: the ramp, in units of 2^-32 steps and ticks. */
+/* Private: the ramp, in units of 2^-32 steps and ticks. */
 struct incise_ramp {
 	int64_t position, velocity;
 	int64_t target;	       /* position */
@@ -89,7 +84,7 @@ struct incise_ramp {
 	uint64_t brake;	       /* full ticks of it in velocity */
 };
 
-/**
+/*
  * A profile; the caller's memory, 2.2 kB. All fields are private. It has no pointers: a
  * copy is a profile of its own.
  */
@@ -110,28 +105,27 @@ struct incise_profile {
 	int64_t history[INCISE_PROFILE_AVERAGE_MAX];
 };
 
-/** The motion within one tick. */
+/* The motion within one tick. */
 struct incise_profile_slot {
-	int64_t from, to; /**< position at begin and end, 2^-32 steps */
-	uint64_t first;	  /**< private: way to the first step, 2^-32 steps */
+	int64_t from, to; /* position at begin and end, 2^-32 steps */
+	uint64_t first;	  /* private: way to the first step, 2^-32 steps */
 	uint32_t tick_ns;
-	int32_t n;   /**< steps, 0 … */
-	int32_t dir; /**< of all of them, and of the motion: +1, -1; 0: none */
+	int32_t n;   /* steps, 0 … */
+	int32_t dir; /* of all of them, and of the motion: +1, -1; 0: none */
 	int32_t reserved;
 };
 
-/**
+/*
  * Make a profile that rests at a position.
  *
  * @return 0; -22 (EINVAL: a limit is out of its range), -34 (ERANGE: @position is not within
  *         the limits, or jerk is so low that the average would take more than
  *         INCISE_PROFILE_AVERAGE_MAX ticks). @profile is left as it was then.
  */
-INCISE_API int incise_profile_init(struct incise_profile *profile,
-				   const struct incise_profile_limits *limits,
-				   int32_t position);
+int incise_profile_init(struct incise_profile *profile,
+			const struct incise_profile_limits *limits, int32_t position);
 
-/**
+/*
  * Set where to go, or how fast; at any time, in flight too. The next tick already goes
  * there. If a position lies nearer than the way to a stop, it brakes, stops beyond, and
  * comes back. A velocity goes on to the position limit and rests there.
@@ -140,47 +134,46 @@ INCISE_API int incise_profile_init(struct incise_profile *profile,
  * @param target any number; clamped to the limits
  * @return target in force, after clamping
  */
-INCISE_API int64_t incise_profile_target(struct incise_profile *profile,
-					 enum incise_profile_mode mode, int64_t target);
+int64_t incise_profile_target(struct incise_profile *profile,
+			      enum incise_profile_mode mode, int64_t target);
 
-/** Brake to rest at the limits, wherever that is: velocity 0. */
-INCISE_API void incise_profile_stop(struct incise_profile *profile);
+/* Brake to rest at the limits, wherever that is: velocity 0. */
+void incise_profile_stop(struct incise_profile *profile);
 
-/**
+/*
  * Rest at a position at once, against all limits, with nothing left to do: a limit switch,
  * an emergency stop, or a new name for where it stands.
  *
  * @param position steps; clamped to the limits
  */
-INCISE_API void incise_profile_halt(struct incise_profile *profile, int32_t position);
+void incise_profile_halt(struct incise_profile *profile, int32_t position);
 
-/** Go on by one tick. */
-INCISE_API void incise_profile_tick(struct incise_profile *profile,
-				    struct incise_profile_slot *slot);
+/* Go on by one tick. */
+void incise_profile_tick(struct incise_profile *profile,
+			 struct incise_profile_slot *slot);
 
-/**
+/*
  * The time at which a step of a slot is due: ns from the start of its tick, 1 … tick_ns,
  * rounded up.
  * Ascending with @k, and equal only where steps are less than 1 ns apart, which no limits do.
  *
  * @param k 0 … slot->n - 1; beyond: clamped; tick_ns where the slot has no steps
  */
-INCISE_API uint32_t incise_profile_step_ns(const struct incise_profile_slot *slot,
-					   int32_t k);
+uint32_t incise_profile_step_ns(const struct incise_profile_slot *slot, int32_t k);
 
-/**
+/*
  * True while it rests, and will until there is a new target: N ticks after the last motion of
  * the ramp at the earliest; incise_profile_tick() is cheap from then on.
  */
-INCISE_API bool incise_profile_resting(const struct incise_profile *profile);
+bool incise_profile_resting(const struct incise_profile *profile);
 
-/** The sum of all steps of the ticks so far, from the position that init or halt gave. */
-INCISE_API int32_t incise_profile_position(const struct incise_profile *profile);
+/* The sum of all steps of the ticks so far, from the position that init or halt gave. */
+int32_t incise_profile_position(const struct incise_profile *profile);
 
-/** Velocity in the last tick, 2^-16 steps/s, rounded towards 0. */
-INCISE_API int64_t incise_profile_velocity(const struct incise_profile *profile);
+/* Velocity in the last tick, 2^-16 steps/s, rounded towards 0. */
+int64_t incise_profile_velocity(const struct incise_profile *profile);
 
-/**
+/*
  * The most steps that come in the ticks after incise_profile_stop() until it rests. Where
  * it is called within a tick, the rest of that tick's steps comes on top.
  *
@@ -189,12 +182,11 @@ INCISE_API int64_t incise_profile_velocity(const struct incise_profile *profile)
  * @return steps; at most position_max - position_min; 2^64 - 1 for limits that
  *         incise_profile_init() refuses
  */
-INCISE_API uint64_t incise_profile_stopping_steps(
-	const struct incise_profile_limits *limits, uint32_t velocity);
+uint64_t incise_profile_stopping_steps(const struct incise_profile_limits *limits,
+				       uint32_t velocity);
 
-/** The same as time until the end of the last tick that moves, ns. */
-INCISE_API uint64_t incise_profile_stopping_ns(const struct incise_profile_limits *limits,
-					       uint32_t velocity);
+/* The same as time until the end of the last tick that moves, ns. */
+uint64_t incise_profile_stopping_ns(const struct incise_profile_limits *limits,
+				    uint32_t velocity);
 
-INCISE_END_DECLS
 #endif
