@@ -6,6 +6,7 @@
 #ifndef INCISE_BASE_MONOTONIC_H
 #define INCISE_BASE_MONOTONIC_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include <time.h>
 #include <incise/export.h>
@@ -25,6 +26,14 @@ static INCISE_REALTIME inline int64_t incise_monotonic_ns(void)
 
 	clock_gettime(CLOCK_MONOTONIC, &now);
 	return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
+}
+
+/* A signal may end the sleep early. */
+static inline void incise_monotonic_sleep_until(int64_t t_ns)
+{
+	struct timespec until = {t_ns / INT64_C(1000000000), t_ns % INT64_C(1000000000)};
+
+	clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
 }
 
 #ifdef INCISE_MONOTONIC_POP

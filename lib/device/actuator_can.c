@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The drive on a CAN bus, of rig.conf: the group actuator.can.
+ * The group actuator.can of rig.conf: a drive on a CAN bus.
  *
- * What limits the loop of position that csv closes here, once per cycle T:
+ * In csv the loop of position is closed here, once per cycle T, which limits its gain:
  *
- *   SYNC n      position x[n] is taken, and comes in a TPDO
+ *   SYNC n      position x[n] is sampled, and comes in a TPDO
  *   SYNC n + 1  brings the speed K (target - x[n])
  *   SYNC n + 2  the drive runs at it, until
  *   SYNC n + 3
  *
- * which is x[n+1] = x[n] + T K (target - x[n-d]) with d = 2; another cycle is left for what
+ * that is x[n+1] = x[n] + T K (target - x[n-d]) with d = 2; another cycle is left for what
  * drive and bus add. Its roots, those of z^(d+1) - z^d + T K, lie within the unit circle for
  *
  *   0 < T K < 2 sin(π / (2 (2d + 1)))
@@ -34,7 +34,7 @@ double incise_actuator_can_gain_1_s(double cycle_s)
 	return sin(M_PI / (2 * (2 * DELAY_CYCLES + 1))) / cycle_s;
 }
 
-/* A key that is a number of the struct, in another unit there. */
+/* A key for a number of the struct, with its unit there. */
 struct number {
 	const char *key;
 	double min, max, unit; /* unit: of the key in that of the field */
@@ -107,7 +107,7 @@ static int read_mode(struct incise_actuator_can *can, const config_setting_t *gr
 			    path, line_of(group, "mode"), name);
 }
 
-/* Those that serial adapters have a letter for; can0 is set to the same ones. */
+/* The rates of serial adapters, which are also usual for can0. */
 static int read_bitrate(struct incise_actuator_can *can, const config_setting_t *group,
 			const char *path, struct incise_error *err)
 {
@@ -146,7 +146,7 @@ static int read_cycle(struct incise_actuator_can *can, const config_setting_t *g
 		us - us % CYCLE_UNIT_US, us - us % CYCLE_UNIT_US + CYCLE_UNIT_US);
 }
 
-/* What a mode needs, and what fits alone but not together. */
+/* Check keys that a mode requires, and combinations. */
 static int check(const struct incise_actuator_can *can, const config_setting_t *group,
 		 const char *path, struct incise_error *err)
 {

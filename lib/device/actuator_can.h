@@ -9,14 +9,14 @@
 #include "../base/conf.h"
 
 /*
- * Read and check the group `can` within @group; without one all is as by default.
+ * Read and check the group `can` within @group; without one all values are defaults.
  * Returns 0 or -EINVAL; err names file, line, key and what to do.
  */
 int incise_actuator_can_read(struct incise_actuator_can *can, double travel_mm,
 			     const config_setting_t *group, const char *path,
 			     struct incise_error *err);
 
-/* Largest position_gain_1_s of csv that is taken at a cycle: half of what is stable. */
+/* The largest accepted position_gain_1_s of csv: half of the stable one. */
 double incise_actuator_can_gain_1_s(double cycle_s);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The lines of one GPIO chip, as levels: what stepper_gpio.c needs of libgpiod, whose two
- * versions have nothing in common. gpio_v1.c is for 1.x, gpio_v2.c for 2.x.
+ * The lines of one GPIO chip, as levels, over libgpiod: gpio_v1.c for 1.x, gpio_v2.c for 2.x,
+ * which have nothing in common.
  */
 #ifndef INCISE_GPIO_LINES_H
 #define INCISE_GPIO_LINES_H
@@ -12,11 +12,11 @@
 struct gpio_lines;
 
 /*
- * Take the lines of a chip; the first INCISE_LINES_OUT are outputs, at the level @idle says.
+ * Request the lines of a chip; the first INCISE_LINES_OUT are outputs, at the level @idle says.
  *
  * @chip: name, label or path of the chip
  * @line: offsets, -1 for none, in the order of enum incise_actuator_line
- * @idle: bit 1 << line: high
+ * @idle: bits 1 << line of outputs that start high
  * Returns NULL with errno: ENOENT (no such chip), EBUSY (a line is taken), EINVAL (no such
  * line), EACCES, ENOMEM …
  */
@@ -25,10 +25,10 @@ struct gpio_lines *gpio_lines_open(const char *chip, const int *line, unsigned i
 /* Set an output's level. Returns 0 or a negative errno. One system call. */
 int gpio_lines_write(struct gpio_lines *lines, enum incise_actuator_line line, bool high);
 
-/* Levels of the inputs, bits 1 << line, or a negative errno. One system call, or none. */
+/* Returns levels of the inputs, bits 1 << line, or a negative errno. At most one system call. */
 int gpio_lines_read(struct gpio_lines *lines);
 
-/* The lines stay at their levels, as far as the chip's driver lets them. */
+/* The lines keep their levels if the chip's driver does so. */
 void gpio_lines_close(struct gpio_lines *lines);
 
 #endif

@@ -88,7 +88,7 @@ int gpio_lines_read(struct gpio_lines *lines)
 
 void gpio_lines_close(struct gpio_lines *lines)
 {
-	/* It gives the lines back too. */
+	/* This releases the lines too. */
 	if (lines->chip)
 		gpiod_chip_close(lines->chip);
 	free(lines);

@@ -31,7 +31,7 @@ static bool is_called(struct gpiod_chip *chip, const char *name)
 	return is;
 }
 
-/* By its path, else the first chip that is called so. */
+/* Open a chip by path, else the first one of that name or label. */
 static struct gpiod_chip *find_chip(const char *name)
 {
 	struct gpiod_chip *chip = NULL;
@@ -59,7 +59,7 @@ static struct gpiod_chip *find_chip(const char *name)
 	return chip;
 }
 
-/* Settings of all lines that are wired. Returns 0, or -1 with errno. */
+/* Add the settings of all wired lines. Returns 0, or -1 with errno. */
 static int describe(struct gpio_lines *lines, const int *line, unsigned int idle,
 		    struct gpiod_line_settings *settings,
 		    struct gpiod_line_config *config)

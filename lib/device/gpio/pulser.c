@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Steps from user space; see pulser.h. All is planned from the state alone, so that it
- * may be asked at any time what is due next, and nothing is done twice.
+ * Steps from user space; see pulser.h. The plan depends on the state alone: it may be computed
+ * at any time, and nothing is done twice.
  */
 #include <errno.h>
 #include <stddef.h>
@@ -19,14 +19,14 @@ static int64_t later(int64_t a, int64_t b)
 
 static void power_off(struct incise_pulser *p, int64_t now)
 {
-	/* There is nothing left to do about a line that cannot be written. */
-	if (p->door->write(p->world, INCISE_PULSER_ENABLE, false) < 0)
+	/* No more can be done about a line that cannot be written. */
+	if (p->ops->write(p->world, INCISE_PULSER_ENABLE, false) < 0)
 		p->motion.status.faults |= INCISE_STEPPER_FAULT_LINE;
 	incise_motion_power_off(&p->motion);
 	incise_motion_publish(&p->motion, now);
 }
 
-/* No further step. Where it moved, the rotor may be anywhere near. */
+/* No further step. If it moved, the rotor may be several steps away. */
 static void halt(struct incise_pulser *p, int64_t now)
 {
 	incise_motion_halt(&p->motion, p->given < p->steps.n || !p->motion.resting);
@@ -42,18 +42,18 @@ static void fault_at(struct incise_pulser *p, uint32_t fault, int64_t now)
 
 void incise_pulser_fault(struct incise_pulser *pulser, uint32_t fault)
 {
-	int64_t now = pulser->door->now(pulser->world);
+	int64_t now = pulser->ops->now(pulser->world);
 
 	fault_at(pulser, fault, now);
 	incise_motion_publish(&pulser->motion, now);
 }
 
-/* Returns when the line has changed for sure. */
+/* Returns a time at which the line has changed for sure. */
 static int64_t write_line(struct incise_pulser *p, enum incise_pulser_output output,
 			  bool active)
 {
-	int rc = p->door->write(p->world, output, active);
-	int64_t now = p->door->now(p->world);
+	int rc = p->ops->write(p->world, output, active);
+	int64_t now = p->ops->now(p->world);
 
 	if (rc < 0)
 		fault_at(p, INCISE_STEPPER_FAULT_LINE, now);
@@ -63,16 +63,16 @@ static int64_t write_line(struct incise_pulser *p, enum incise_pulser_output out
 static void look(struct incise_pulser *p, int64_t now)
 {
 	bool moves = p->motion.powered && (p->given < p->steps.n || !p->motion.resting);
-	int inputs = p->door->inputs(p->world);
-	uint32_t came;
+	int inputs = p->ops->inputs(p->world);
+	uint32_t rising;
 
 	if (inputs < 0) {
 		fault_at(p, INCISE_STEPPER_FAULT_LINE, now);
 		return;
 	}
-	came = (uint32_t)inputs & ~p->motion.status.inputs;
+	rising = (uint32_t)inputs & ~p->motion.status.inputs;
 	p->motion.status.inputs = (uint32_t)inputs;
-	if (came & INCISE_STEPPER_LINE_HOME) {
+	if (rising & INCISE_STEPPER_LINE_HOME) {
 		p->motion.status.home_position = p->motion.status.position;
 		p->motion.status.flags |= INCISE_STEPPER_FLAG_HOME_SEEN;
 	}
@@ -80,14 +80,14 @@ static void look(struct incise_pulser *p, int64_t now)
 		fault_at(p, INCISE_STEPPER_FAULT_ESTOP, now);
 	if (inputs & INCISE_STEPPER_LINE_DRIVER)
 		fault_at(p, INCISE_STEPPER_FAULT_DRIVER, now);
-	/* Away from a limit it may go. */
+	/* Motion away from a limit is allowed. */
 	if (moves && inputs & INCISE_STEPPER_LINE_LIMIT_MIN && p->steps.dir < 0)
 		fault_at(p, INCISE_STEPPER_FAULT_LIMIT_MIN, now);
 	if (moves && inputs & INCISE_STEPPER_LINE_LIMIT_MAX && p->steps.dir > 0)
 		fault_at(p, INCISE_STEPPER_FAULT_LIMIT_MAX, now);
 }
 
-/* What is due next, and when. @want: that step by the profile. */
+/* Returns the next action and its time. @want: the time of that step in the profile. */
 static enum next plan(const struct incise_pulser *p, int64_t *due, int64_t *want)
 {
 	int64_t tick = p->base_ns + p->motion.config.tick_ns;
@@ -113,7 +113,7 @@ static enum next plan(const struct incise_pulser *p, int64_t *due, int64_t *want
 			     later(p->lead_ns + p->motion.config.hold_ns, p->trail_ns));
 		return NEXT_DIR;
 	}
-	/* What was lost is caught up a little at a time, and never beyond the limit. */
+	/* A delay is caught up a little at a time, and never beyond the limit. */
 	gap = *want - p->lead_want_ns;
 	gap = later(gap - (gap >> CATCH_UP), p->interval_ns);
 	*due = later(later(*want, p->lead_ns + gap),
@@ -136,9 +136,9 @@ static void note_late(struct incise_pulser *p, int64_t late_ns, uint32_t shortes
 
 static void lead(struct incise_pulser *p, int64_t due, int64_t want)
 {
-	int64_t now = p->door->now(p->world), lag;
+	int64_t now = p->ops->now(p->world), lag;
 
-	/* The last look at what forbids this step. */
+	/* The last check of the inputs before this step. */
 	look(p, now);
 	if (!p->motion.powered)
 		return;
@@ -204,7 +204,7 @@ static void tick(struct incise_pulser *p, int64_t now, int64_t due)
 
 int64_t incise_pulser_run(struct incise_pulser *p)
 {
-	int64_t due, want, now = p->door->now(p->world);
+	int64_t due, want, now = p->ops->now(p->world);
 	enum next next = plan(p, &due, &want);
 
 	if (due > now)
@@ -235,7 +235,7 @@ int64_t incise_pulser_run(struct incise_pulser *p)
 int incise_pulser_init(struct incise_pulser *p,
 		       const struct incise_stepper_config *config)
 {
-	int64_t now = p->door->now(p->world);
+	int64_t now = p->ops->now(p->world);
 	int rc = incise_motion_init(&p->motion, config);
 
 	if (rc)
@@ -252,7 +252,7 @@ int incise_pulser_init(struct incise_pulser *p,
 int incise_pulser_enable(struct incise_pulser *p)
 {
 	struct incise_motion *m = &p->motion;
-	int64_t now = p->door->now(p->world);
+	int64_t now = p->ops->now(p->world);
 	int rc;
 
 	look(p, now);
@@ -272,12 +272,12 @@ void incise_pulser_disable(struct incise_pulser *p)
 {
 	if (p->motion.powered)
 		incise_motion_brake(&p->motion, 0);
-	incise_motion_publish(&p->motion, p->door->now(p->world));
+	incise_motion_publish(&p->motion, p->ops->now(p->world));
 }
 
 int incise_pulser_clear(struct incise_pulser *p)
 {
-	int64_t now = p->door->now(p->world);
+	int64_t now = p->ops->now(p->world);
 	int rc;
 
 	look(p, now);
@@ -290,6 +290,6 @@ int incise_pulser_origin(struct incise_pulser *p, int32_t steps, bool homed)
 {
 	int rc = incise_motion_origin(&p->motion, steps, homed);
 
-	incise_motion_publish(&p->motion, p->door->now(p->world));
+	incise_motion_publish(&p->motion, p->ops->now(p->world));
 	return rc;
 }

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * A stepper on GPIO lines, for machines that cannot load the module: "gpio:CHIP", with the
- * lines in actuator.lines of rig.conf. A thread of its own makes the steps, real-time when
- * it may be.
+ * lines in actuator.lines of rig.conf. A thread makes the steps, real-time if permitted.
  *
  *   incise_stepper_…() ─▶ pages, mailbox ─▶ thread: pulser ─▶ libgpiod
  *
- * The thread sleeps until shortly before an edge is due, and waits for the rest of it in a
- * loop: what a sleep is late by, the loop takes up.
+ * The thread sleeps until shortly before an edge is due, and polls the clock for the rest: that
+ * absorbs late wake-ups.
  */
 #include <errno.h>
 #include <limits.h>
@@ -17,7 +16,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <time.h>
 #include <incise/clock.h>
 #include "../../base/monotonic.h"
 #include "../backends.h"
@@ -53,14 +51,7 @@ struct gpio_stepper {
 	bool runs;
 };
 
-static void sleep_until(int64_t t_ns)
-{
-	struct timespec until = {t_ns / INCISE_NS_PER_S, t_ns % INCISE_NS_PER_S};
-
-	clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
-}
-
-/* The pulser's world. */
+/* --- the pulser's clock and lines --- */
 
 static int64_t world_now(void *world)
 {
@@ -103,14 +94,13 @@ static int world_inputs(void *world)
 	struct gpio_stepper *g = world;
 	int high = gpio_lines_read(g->lines);
 
-	/* A line that is not wired is never among active_low, nor ever high. */
+	/* A line that is not wired is neither in active_low nor high. */
 	return high < 0 ? high : (int)input_bits((unsigned int)high ^ g->active_low);
 }
 
-static const struct incise_pulser_door world_door = {world_now, world_write,
-						     world_inputs};
+static const struct incise_pulser_ops world_ops = {world_now, world_write, world_inputs};
 
-/* The thread. */
+/* --- the thread --- */
 
 static int obey(struct gpio_stepper *g, int command)
 {
@@ -146,12 +136,12 @@ static void *thread_run(void *argument)
 			continue;
 		}
 		if (due - incise_monotonic_ns() > spin_ns)
-			sleep_until(due - spin_ns);
+			incise_monotonic_sleep_until(due - spin_ns);
 	}
 	return NULL;
 }
 
-/* The doors of the motor. */
+/* --- functions of the motor --- */
 
 static struct gpio_stepper *of(struct incise_motor *motor)
 {
@@ -166,7 +156,7 @@ static int ask(struct gpio_stepper *g, enum command command)
 	while (atomic_load_explicit(&g->command, memory_order_acquire) != NONE) {
 		if (incise_monotonic_ns() > end && command != END)
 			return -EIO;
-		sleep_until(incise_monotonic_ns() + 50000);
+		incise_monotonic_sleep_until(incise_monotonic_ns() + 50000);
 	}
 	return g->answer;
 }
@@ -224,7 +214,7 @@ static int ascending(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* What this machine can hold, measured on lines that move nothing. */
+/* Measure the rate that this machine can keep, without moving the motor. */
 static int self_test(struct gpio_stepper *g, uint32_t *rate_max, uint32_t *pulse_ns)
 {
 	int64_t late[SLEEPS], write[WRITES], step_ns;
@@ -232,7 +222,7 @@ static int self_test(struct gpio_stepper *g, uint32_t *rate_max, uint32_t *pulse
 	for (int i = 0; i < SLEEPS; i++) {
 		int64_t due = incise_monotonic_ns() + SLEEP_NS;
 
-		sleep_until(due);
+		incise_monotonic_sleep_until(due);
 		late[i] = incise_monotonic_ns() - due;
 	}
 	for (int i = 0; i < WRITES; i++) {
@@ -246,7 +236,7 @@ static int self_test(struct gpio_stepper *g, uint32_t *rate_max, uint32_t *pulse
 	qsort(late, SLEEPS, sizeof(*late), ascending);
 	qsort(write, WRITES, sizeof(*write), ascending);
 	g->spin_ns = late[SLEEPS - 1] < SPIN_MAX_NS ? late[SLEEPS - 1] : SPIN_MAX_NS;
-	/* A step is two edges, each with a look at the inputs; half of the time is spare. */
+	/* A step is two edges, each with a read of the inputs; half of the time is spare. */
 	step_ns = 2 * (2 * write[WRITES * 9 / 10] + late[SLEEPS * 9 / 10]);
 	*pulse_ns = (uint32_t)write[WRITES * 9 / 10];
 	*rate_max = step_ns > INCISE_NS_PER_S / RATE_MOST
@@ -270,8 +260,9 @@ static int start_thread(struct gpio_stepper *g)
 	return 0;
 }
 
-static int take_lines(struct gpio_stepper *g, const struct incise_backend_request *asked,
-		      struct incise_error *err)
+static int request_lines(struct gpio_stepper *g,
+			 const struct incise_backend_request *asked,
+			 struct incise_error *err)
 {
 	const struct incise_actuator *actuator = asked->actuator;
 	const char *todo;
@@ -327,7 +318,7 @@ static int set_up(struct gpio_stepper *g, const struct incise_backend_request *a
 {
 	struct incise_stepper_config config;
 	uint32_t rate_max, pulse_ns;
-	int rc = take_lines(g, asked, err);
+	int rc = request_lines(g, asked, err);
 
 	if (rc)
 		return rc;
@@ -341,7 +332,7 @@ static int set_up(struct gpio_stepper *g, const struct incise_backend_request *a
 		return rc;
 	g->motor.rate_max_hz = rate_max;
 	incise_motor_config(&g->motor.actuator, 0, &config);
-	/* So that no first use of a page comes in a step. It may be refused. */
+	/* No page fault in a step; mlock() may be refused. */
 	mlock(g, sizeof(*g));
 	rc = incise_pulser_init(&g->pulser, &config);
 	if (!rc)
@@ -381,7 +372,7 @@ static void *gpio_open(const struct incise_backend_request *asked,
 	snprintf(g->motor.name, sizeof(g->motor.name), "gpio chip %.24s",
 		 asked->arguments);
 	incise_motor_init(&g->motor);
-	g->pulser.door = &world_door;
+	g->pulser.ops = &world_ops;
 	g->pulser.world = g;
 	g->pulser.motion.setpoint = &g->setpoint;
 	g->pulser.motion.slot = &g->status;

@@ -103,7 +103,7 @@ static inline int machine_inputs(void *world)
 	return (int)machine_switches(world);
 }
 
-static const struct incise_pulser_door machine_door = {machine_now, machine_write,
-						       machine_inputs};
+static const struct incise_pulser_ops machine_ops = {machine_now, machine_write,
+						     machine_inputs};
 
 #endif

@@ -166,7 +166,7 @@ static void bench_start(struct bench *b, bool home, bool limits, bool invert,
 	incise_motor_config(&b->motor.actuator, 0, &b->config);
 	b->machine.config = &b->config;
 	b->pulser = (struct incise_pulser){
-		.door = &machine_door,
+		.ops = &machine_ops,
 		.world = &b->machine,
 		.motion.setpoint = &b->setpoint,
 		.motion.slot = &b->status,

@@ -46,7 +46,7 @@ static void start(struct bench *b, unsigned int flags)
 	};
 	b->machine.config = &b->config;
 	b->pulser = (struct incise_pulser){
-		.door = &machine_door,
+		.ops = &machine_ops,
 		.world = &b->machine,
 		.motion.setpoint = &b->setpoint,
 		.motion.slot = &b->status,

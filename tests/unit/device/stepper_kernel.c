@@ -93,7 +93,7 @@ static int configure(const struct incise_stepper_config *config)
 	if (config->motor != MOTOR)
 		return -EINVAL;
 	module.machine.config = &module.config;
-	module.pulser.door = &machine_door;
+	module.pulser.ops = &machine_ops;
 	module.pulser.world = &module.machine;
 	module.pulser.motion.setpoint =
 		(struct incise_stepper_setpoint *)module.setpoints + MOTOR;

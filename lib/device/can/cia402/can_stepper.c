@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <time.h>
+#include "../../../base/monotonic.h"
 #include "../../motor.h"
 #include "../../thread.h"
 #include "can_session.h"
@@ -139,19 +139,12 @@ static int64_t step(struct can_stepper *c)
 	return c->due_ns;
 }
 
-static void sleep_until(int64_t t_ns)
-{
-	struct timespec until = {t_ns / INCISE_NS_PER_S, t_ns % INCISE_NS_PER_S};
-
-	clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
-}
-
 static void *thread_run(void *argument)
 {
 	struct can_stepper *c = argument;
 
 	while (!c->ended)
-		sleep_until(step(c));
+		incise_monotonic_sleep_until(step(c));
 	return NULL;
 }
 
@@ -161,7 +154,7 @@ static void nap(struct can_stepper *c, int64_t ns)
 	int64_t end = now_of(c) + ns, due;
 
 	if (!c->sleep_until) {
-		sleep_until(end);
+		incise_monotonic_sleep_until(end);
 		return;
 	}
 	do {
