@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """
-What a test tells the drive and asks of it: a line in is a command, a line out its answer, in
+Commands of a test to the drive: a line in is a command, a line out its answer, in
 JSON. `help` lists them. The end of the input ends the drive.
 """
 

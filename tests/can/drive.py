@@ -168,7 +168,7 @@ class Drive:
 
     def boot(self):
         """From power-on, or a reset, to pre-operational."""
-        self.watch_node, self.watch_s, self.heard, self.lost = 0, 0.0, None, False
+        self.watch_node, self.watch_s, self.heartbeat_at, self.lost = 0, 0.0, None, False
         self.beat_at = None
         self.nmt = PRE_OPERATIONAL
         for pdo in self.pdos:
@@ -223,17 +223,17 @@ class Drive:
 
     def on_heartbeat(self, _, __, ___):
         self.record.heartbeats += 1
-        self.heard = self.now
+        self.heartbeat_at = self.now
         if self.lost:
             self.lost = False
             self.event("heartbeat of the master is back")
 
     def watch(self):
         """The master's heartbeat; and set-points, where 1400:5 asks for that."""
-        if self.heard is not None and not self.lost and self.watch_s:
-            if self.now - self.heard > self.watch_s:
+        if self.heartbeat_at is not None and not self.lost and self.watch_s:
+            if self.now - self.heartbeat_at > self.watch_s:
                 self.lost = True
-                self.connection_lost(0x8130, "heartbeat lost", self.heard)
+                self.connection_lost(0x8130, "heartbeat lost", self.heartbeat_at)
         for pdo in self.pdos:
             if pdo.deadline is not None and self.now > pdo.deadline:
                 pdo.deadline = None
@@ -278,7 +278,7 @@ class Drive:
         return (index, sub) in objects or (index, None) in objects
 
     def check_write(self, index, sub, value):
-        """What the standard forbids, as an abort."""
+        """Abort what the standard forbids."""
         ok = True
         if index == 0x6060:
             ok = value == 0 or 1 <= value <= 32 and self.node.value(0x6502, 0) >> value - 1 & 1
@@ -356,7 +356,7 @@ class Drive:
             self.network.unsubscribe(0x700 + self.watch_node, self.on_heartbeat)
         node, ms = value >> 16 & 0x7F, value & 0xFFFF
         self.watch_node, self.watch_s = (node, ms / 1000) if node and ms else (0, 0.0)
-        self.heard, self.lost = None, False
+        self.heartbeat_at, self.lost = None, False
         if self.watch_node:
             self.network.subscribe(0x700 + node, self.on_heartbeat)
 
@@ -456,8 +456,8 @@ class Drive:
         due = [self.now + 0.05]
         if self.beat_at is not None:
             due.append(self.beat_at)
-        if self.heard is not None and self.watch_s and not self.lost:
-            due.append(self.heard + self.watch_s + 0.0001)
+        if self.heartbeat_at is not None and self.watch_s and not self.lost:
+            due.append(self.heartbeat_at + self.watch_s + 0.0001)
         due += [pdo.deadline for pdo in self.pdos if pdo.deadline is not None]
         return max(0.0, min(due) - self.now)
 

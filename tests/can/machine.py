@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """
 The drive itself, by CiA 402 (IEC 61800-7-201): state machine, modes, limits, and a shaft
-that is where it was told to be one cycle later. Knows no bus and no clock; who calls gives
-the time that went by. Units: counts, s.
+that is at its target one cycle later. It has no bus and no clock: callers pass the elapsed
+time. Units: counts, s.
 
     shaft    where the screw stands in the machine; position = shaft - zero
     span     the limit switches, on the shaft
@@ -33,12 +33,12 @@ STEPS = {
     ("quick stop", "disable voltage"): "switch-on disabled",  # 12
 }
 
-# Where homing methods go: the negative or the positive limit switch.
+# Homing methods: towards the negative or the positive limit switch.
 HOME_DOWN, HOME_UP, HOME_HERE = (1, 17), (2, 18), (35, 37)
 
 
 def command(word):
-    """What a controlword asks for, by its bits 0 to 3; bit 7 is looked at elsewhere."""
+    """The command of a controlword, by its bits 0 to 3; bit 7 is handled elsewhere."""
     if not word & 0x02:
         return "disable voltage"
     if not word & 0x04:
@@ -78,7 +78,7 @@ class Machine:
         self.following = False
         self.limit_active = False
 
-    # What it measures.
+    # Measured values.
 
     @property
     def position(self):
@@ -127,7 +127,7 @@ class Machine:
     def acceleration_unit(self):
         return self._unit(0x60AA)
 
-    # What it is told.
+    # Commands.
 
     def _go(self, state, why):
         if state == self.state:
@@ -194,7 +194,7 @@ class Machine:
         elif option == 3:
             self.quick_stop(why)
 
-    # What it does.
+    # Motion.
 
     def _home(self, rising, word):
         if rising & 0x10:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""What the drive saw of its master: counts, times between SYNCs, steps of the set-points."""
+"""The master as seen by the drive: counts, times between SYNCs, steps of the set-points."""
 
 from array import array
 

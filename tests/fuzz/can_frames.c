@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What comes from a CAN bus, against the CANopen master and the drive behind it: nothing is
- * read out of bounds, everything ends, and in bounded time.
+ * Frames of a CAN bus for the CANopen master and the functions of a drive: nothing is read out of
+ * bounds, and everything ends in bounded time.
  *
- *   input: what is asked (1 byte), then frames:
+ *   input: the request (1 byte), then frames:
  *
  *   kind (1)   0 … 63    a good answer to the last SDO: 4 bytes, where it reads what was not
  *                        written just before
@@ -22,8 +22,8 @@
 #define OWN 0x7f
 #define START_NS 1000000000LL
 /*
- * Whatever is asked is some hundred SDOs at most, and each ends the whole with its silence:
- * but for some waits of 2 s, they are late by less than 200 ms each.
+ * Each request takes some hundred SDOs at most, and the first one without an answer ends
+ * it: apart from some waits of 2 s, each is late by less than 200 ms.
  */
 #define LIMIT_NS (60 * 1000000000LL)
 
@@ -124,7 +124,7 @@ static int bus_wait(struct can_bus *bus, int64_t until_ns)
 	return 0;
 }
 
-static void take(struct canopen *master)
+static void handle_all(struct canopen *master)
 {
 	struct can_frame frame;
 	uint32_t inputs;
@@ -142,7 +142,7 @@ static void take(struct canopen *master)
 	}
 }
 
-static void ask(struct canopen *master, uint8_t what)
+static void run(struct canopen *master, uint8_t request)
 {
 	const struct cia402_setup setup = {
 		.mode = CIA402_CSP,
@@ -165,12 +165,12 @@ static void ask(struct canopen *master, uint8_t what)
 	bool homed;
 	int rc = 0;
 
-	switch (what & 7) {
+	switch (request & 7) {
 	case 0:
-		take(master);
+		handle_all(master);
 		break;
 	case 1:
-		canopen_read(master, 0x6064, 0, what & 8 ? 2 : 4, &value);
+		canopen_read(master, 0x6064, 0, request & 8 ? 2 : 4, &value);
 		break;
 	case 2:
 		rc = canopen_read_text(master, 0x1008, 0, text, sizeof(text));
@@ -217,10 +217,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		.bus = {.ops = &ops, .name = "fuzz"}, .data = data, .size = size};
 	struct canopen master = {
 		.bus = &bus.bus, .node = NODE, .own = OWN, .heartbeat_ns = 20000000};
-	uint8_t what;
+	uint8_t request;
 
 	bus.now_ns = START_NS;
-	next(&bus, &what, 1);
-	ask(&master, what);
+	next(&bus, &request, 1);
+	run(&master, request);
 	return 0;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Bytes of a serial line under libFuzzer: whatever comes, a frame is one that the bus can
- * have, is said and read back the same, and after a CR the next line is read.
+ * Bytes of a serial line under libFuzzer: each frame is valid and survives formatting and parsing,
+ * and after a CR the next line is parsed.
  */
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/bus/bus_load.c: against frames whose bits are laid out and stuffed here, and
- * against the sums that shared facts of CAN give.
+ * lib/device/can/bus/bus_load.c against frames that are stuffed here bit by bit, and
+ * against sums made by hand.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,14 +10,14 @@
 #include <cmocka.h>
 #include "../../../lib/device/can/bus/bus_load.h"
 
-/* Longest frame that any bits make: a run of 5, then runs of 4 with each stuffed bit. */
+/* The longest frame: a run of 5 equal bits, then runs of 4 with each stuffed bit. */
 static uint32_t stuffed_by_hand(unsigned int bytes)
 {
 	unsigned int bits = 1 + 11 + 1 + 1 + 1 + 4 + 8 * bytes + 15, run = 0, sent = 0;
 	int last = -1, next = 0;
 
 	for (unsigned int i = 0; i < bits; i++) {
-		/* The worst: go on as the last bit on the wire was. */
+		/* The worst case repeats the last bit on the wire. */
 		run = next == last ? run + 1 : 1;
 		last = next;
 		sent++;
@@ -50,7 +50,7 @@ static void test_loads(void **state)
 	assert_int_equal(bus_load_of(2000000, 6, 6, 0), 285000 / 2 + 9500);
 }
 
-/* What fits: 1 kHz at 1 Mbit/s and at 500 kbit/s, not at 250. */
+/* 1 kHz fits at 1 Mbit/s and at 500 kbit/s, not at 250. */
 static void test_fits(void **state)
 {
 	uint64_t load = bus_load_of(1000000, 6, 6, 20000000);

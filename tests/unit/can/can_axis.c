@@ -52,7 +52,7 @@ static void start(struct bench *b)
 	b->axis.master = &b->led.master;
 }
 
-/* Cycles; targets come as long as @mm is not negative. */
+/* Run cycles, with set-points unless @target is negative. */
 static void cycles(struct bench *b, int n, int64_t target)
 {
 	for (int i = 0; i < n; i++) {
@@ -82,7 +82,7 @@ static void it_takes_no_target_before_it_heard_where_it_is(void **state)
 	start(&b);
 	b.led.drive.position = b.led.drive.demand = 4321;
 	power(&b);
-	/* The first targets were where it stood. */
+	/* The first targets were its own position. */
 	assert_in_range(b.led.drive.least_target, 4320, 4322);
 	assert_in_range(b.led.drive.most_target, 4320, 4322);
 	assert_int_equal(b.slot.position, 4321);
@@ -193,7 +193,7 @@ static uint64_t draw(void)
 	return random_state;
 }
 
-/* Ids of this drive with anything in them, for hours of cycles. */
+/* Random data under the ids of this drive, for hours of cycles. */
 static void whatever_comes_gives_no_power(void **state)
 {
 	static const uint32_t ids[] = {0x080,
@@ -223,7 +223,7 @@ static void whatever_comes_gives_no_power(void **state)
 		assert_int_equal(b.led.drive.enables, enables);
 		assert_false(b.axis.motion.powered);
 	}
-	/* With power, it is a fault sooner or later, and stays one. */
+	/* With power, they cause a fault sooner or later, which stays. */
 	for (int k = 0; k < 200; k++) {
 		uint64_t enables;
 

@@ -1,20 +1,19 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * A CiA 402 drive on a CAN bus, and a clock that only goes while somebody waits or the test
- * says so: the world of the CAN room in tests. It is strict: it keeps to what it was
- * configured to do by SDO, and to that alone.
+ * A simulated CiA 402 drive on a CAN bus, with a clock that advances only in waits and in
+ * drive_advance(). It is strict: it does exactly what SDOs configured.
  *
  *   tested code ──▶ drive.bus ──▶ queue, latency ──▶ SDO, NMT, PDO ──▶ state machine, motion
  *
  *	struct drive drive;
  *
  *	drive_init(&drive);
- *	cia402_configure(&master_of(&drive.bus) …);	time goes by while it waits
- *	drive_advance(&drive, 5 * DRIVE_MS);		time goes by
- *	drive.blocked = true;				something goes wrong
+ *	cia402_configure(&master_of(&drive.bus) …);	the clock advances in its waits
+ *	drive_advance(&drive, 5 * DRIVE_MS);		the clock advances
+ *	drive.blocked = true;				a fault
  *	assert_int_equal(drive.state, CIA402_FAULT);
  *
- * A struct drive is some 25 KB. What is in it is said in drive_state.h.
+ * A struct drive has some 25 KB; drive_state.h describes it.
  */
 #ifndef INCISE_TEST_CAN_DRIVE_H
 #define INCISE_TEST_CAN_DRIVE_H
@@ -22,7 +21,7 @@
 #include <errno.h>
 #include "drive_objects.h"
 
-/* Power-on, or a reboot by itself: all that was configured is lost. */
+/* Power-on, or a reboot of its own: all configuration is lost. */
 static inline void drive_reboot(struct drive *d)
 {
 	uint8_t boot = 0;
@@ -69,7 +68,7 @@ static inline void drive_nmt(struct drive *d, const struct can_frame *frame)
 	}
 }
 
-/* Put what a PDO brought into its objects. */
+/* Copy the data of a PDO to its objects. */
 static inline void drive_apply(struct drive *d, const struct drive_object *pdo,
 			       const uint8_t *data, unsigned int size)
 {
@@ -230,7 +229,7 @@ static inline void drive_tick(struct drive *d)
 	drive_event_pdo(d);
 }
 
-/* Time goes to @until; or, with @frame, only until a frame is there for the master. */
+/* Advance the clock to @until; with @frame only until a frame for the master arrives. */
 static inline void drive_run(struct drive *d, int64_t until, bool frame)
 {
 	while (d->now_ns < until) {
@@ -257,7 +256,7 @@ static inline void drive_run(struct drive *d, int64_t until, bool frame)
 	}
 }
 
-/* So much time goes by. */
+/* Advance the clock. */
 static inline void drive_advance(struct drive *d, int64_t ns)
 {
 	drive_run(d, d->now_ns + ns, false);
@@ -273,7 +272,7 @@ static inline void drive_error_frame(struct drive *d, uint32_t classes,
 	drive_say(d, &frame);
 }
 
-/* This side's controller is off the bus: what is sent fails, nothing comes. */
+/* The master's controller is off the bus: sending fails, nothing arrives. */
 static inline void drive_bus_off(struct drive *d)
 {
 	drive_error_frame(d, CAN_ERR_BUSOFF, 0);
@@ -358,7 +357,7 @@ static inline void drive_close(struct can_bus *bus)
 	((struct drive *)bus)->filters_n = 0;
 }
 
-/* As it comes out of its box, with power on its logic since a second. */
+/* The factory state, one second after power-on of the logic. */
 static inline void drive_init(struct drive *d)
 {
 	static const struct can_bus_ops ops = {drive_now,  drive_send,	 drive_receive,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402/can_scan.c: who is on a bus, found without a word written to them.
+ * lib/device/can/cia402/can_scan.c: a scan finds the nodes of a bus and writes nothing to
+ * them.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -95,7 +96,7 @@ static void what_is_no_drive_is_listed_too(void **state)
 	assert_false(list.device[0].usable);
 }
 
-/* What a node does not tell is not there, and one that fell silent is asked no more. */
+/* Missing objects are left out, and a node that stops answering gets no more requests. */
 static void what_is_not_told_is_not_made_up(void **state)
 {
 	struct incise_error err = {0};
@@ -132,7 +133,7 @@ static void nobody_and_nothing(void **state)
 	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
 			 0);
 	assert_int_equal(list.n, 0);
-	/* Nobody acknowledges. */
+	/* No node acknowledges. */
 	rig.drive.send_error = -ENOBUFS;
 	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
 			 -ENOBUFS);
@@ -141,7 +142,7 @@ static void nobody_and_nothing(void **state)
 	rig.drive.receive_error = -ENETDOWN;
 	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
 			 -ENETDOWN);
-	/* Who asked may end it. */
+	/* The callback may end the scan. */
 	can_rig_init(&rig);
 	list.end = 7;
 	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),

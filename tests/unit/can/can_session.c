@@ -16,7 +16,7 @@
 
 static struct can_rig rig;
 
-/* Whatever the drive refuses, or leaves without an answer, on its way to power. */
+/* The drive refuses or ignores the k-th request of the start, for every k. */
 static void no_step_of_the_start_hangs_or_gives_power(void **state)
 {
 	uint32_t requests;
@@ -38,7 +38,7 @@ static void no_step_of_the_start_hangs_or_gives_power(void **state)
 				rig.drive.abort_at = k;
 			begin = rig.drive.now_ns;
 			if (can_rig_open(&rig, &err)) {
-				/* One that it can do without. */
+				/* An optional object. */
 				can_rig_enable_or_fail(&rig);
 				can_rig_close(&rig);
 			} else if (!strstr(err.text, "rig.conf:3: stepper: ") || !errno) {
@@ -46,7 +46,7 @@ static void no_step_of_the_start_hangs_or_gives_power(void **state)
 			}
 			assert_false(drive_powered(&rig.drive));
 			assert_int_equal(rig.drive.enabled_unasked, 0);
-			/* An answer is waited for 0.2 s; all else goes by the cycle. */
+			/* An SDO times out after 0.2 s; other waits are shorter. */
 			if (rig.drive.now_ns - begin > 3000 * MS)
 				fail_msg("request %u took %lld ms", k,
 					 (long long)((rig.drive.now_ns - begin) / MS));
@@ -108,7 +108,7 @@ static void another_master_is_not_disturbed(void **state)
 	assert_int_equal(rig.drive.requests, 0);
 }
 
-/* Its watch is switched off by who leaves in good order, and by nobody else. */
+/* Only an orderly close switches the drive's watch off. */
 static void who_goes_leaves_it_stopped_or_watched(void **state)
 {
 	static const struct {
@@ -156,7 +156,7 @@ static void a_watcher_looks_and_writes_nothing(void **state)
 	assert_true(s.homed && fabs(s.position_mm - 3) < 1e-3);
 	assert_int_equal(incise_stepper_set(rig.stepper, 1), -EPERM);
 	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
-	/* Switches that are pressed by hand. */
+	/* Limit switches pressed by hand. */
 	rig.drive.inputs = CIA402_AT_MAX | CIA402_AT_HOME;
 	can_rig_advance(&rig, 100 * MS);
 	s = can_rig_look(&rig);

@@ -51,7 +51,7 @@ static void every_case_of_a_stepper(void **state)
 				.world = &rig,
 				.advance = can_rig_advance,
 				.input = input,
-				/* A quick stop, and the frames' way there and back. */
+				/* A quick stop, and the delay of frames both ways. */
 				.slack_s = 0.1,
 				.say = failed,
 			};
@@ -68,9 +68,8 @@ static void every_case_of_a_stepper(void **state)
 			conformance[i].run(&c);
 			assert_int_equal(rig.drive.enabled_unasked, 0);
 			/*
-			 * It goes in straight lines from target to target, and rounds their
-			 * corners by its own ramp; what that loses it makes good, within
-			 * the limit that it was told.
+			 * The drive interpolates linearly between targets and rounds
+			 * corners by its own ramp; it catches up within its limits.
 			 */
 			assert_true(rig.drive.fastest <= 1.25 * 10 * COUNTS_PER_MM + 1);
 			can_rig_close(&rig);
@@ -78,7 +77,7 @@ static void every_case_of_a_stepper(void **state)
 		}
 }
 
-/* Things that go wrong under way; each is undone before `clear`. */
+/* Faults under way; each is undone before `clear`. */
 static void emcy(struct drive *d, bool on)
 {
 	if (on)
@@ -181,7 +180,7 @@ static void each_fault_stops_the_drive_and_is_named(void **state)
 		uint64_t enables;
 
 		can_rig_init(&rig);
-		/* What is blocked is seen here before the drive itself sees it. */
+		/* This side detects a blocked drive before the drive does. */
 		if (faults[i].inject == blocked)
 			rig.drive.od[OD_FOLLOWING].size = 0;
 		can_rig_open_or_fail(&rig);
@@ -236,8 +235,8 @@ static void a_program_that_hangs_is_stopped_by_the_drive(void **state)
 	assert_int_equal(rig.drive.velocity, 0);
 	assert_false(drive_powered(&rig.drive));
 	/*
-	 * It goes on at the last target's speed for the deadman and a beat at most, then by
-	 * its ramp, which is at least as steep as ours: v²/2a = 0.1 mm.
+	 * It continues at the last speed for at most the deadman and a heartbeat, then on
+	 * its ramp, which is at least as steep as the profile's: v²/2a = 0.1 mm.
 	 */
 	most_mm = 10 * (0.1 + 0.025) + 0.1;
 	assert_true(rig.drive.position / COUNTS_PER_MM - at_mm <= most_mm);
@@ -292,7 +291,7 @@ static void no_set_point_is_lost(void **state)
 	can_rig_close(&rig);
 }
 
-/* The loops that are closed here: they come to the target, and stay within its limits. */
+/* The loops closed here reach the target within their limits. */
 static void velocities_and_torques_go_there_too(void **state)
 {
 	static const struct {
@@ -300,10 +299,12 @@ static void velocities_and_torques_go_there_too(void **state)
 		bool invert;
 		double within_mm;
 	} cases[] = {
-		/* To the count: an integrator leaves nothing. */
+		/* Exactly: an integrator leaves no error. */
 		{INCISE_ACTUATOR_CSV, false, 2e-4},
 		{INCISE_ACTUATOR_CSV, true, 2e-4},
-		/* To what a spring of stiffness_permille_mm gives for half a ‰. */
+		/*
+		 * Up to the deflection of a spring of stiffness_permille_mm at half a ‰.
+		 */
 		{INCISE_ACTUATOR_CST, false, 0.02},
 		{INCISE_ACTUATOR_CST, true, 0.02},
 	};
@@ -351,7 +352,7 @@ static double at_mm(void)
 	return rig.drive.position / COUNTS_PER_MM;
 }
 
-/* Stopped for good, for the reason that is given. */
+/* Check that it stopped permanently, for the given reason. */
 static void stopped(unsigned int fault, const char *says)
 {
 	struct incise_stepper_status s;
@@ -369,7 +370,7 @@ static void stopped(unsigned int fault, const char *says)
 	assert_int_equal(rig.drive.enabled_unasked, 0);
 }
 
-/* A loop that is closed here is not closed over silence, however long the deadman is. */
+/* A loop closed here opens without answers, however long the deadman is. */
 static void silence_of_the_drive_moves_nothing(void **state)
 {
 	for (int mode = INCISE_ACTUATOR_CSP; mode <= INCISE_ACTUATOR_CST; mode++)
@@ -378,7 +379,10 @@ static void silence_of_the_drive_moves_nothing(void **state)
 			can_rig_hold(&rig, 4, 300 * MS);
 			rig.drive.no_tpdo = true;
 			can_rig_hold(&rig, 4, 3000 * MS);
-			/* On its way it goes there at most; a torque's swing is let run out. */
+			/*
+			 * It moves at most to its target; a swing in torque mode runs
+			 * out.
+			 */
 			assert_true(at_mm() < (mode == INCISE_ACTUATOR_CST ? 5 : 4.01));
 			assert_true(at_mm() > 0);
 			rig.drive.no_tpdo = mode == INCISE_ACTUATOR_CSP;
@@ -387,7 +391,7 @@ static void silence_of_the_drive_moves_nothing(void **state)
 		}
 }
 
-/* It hears no set-points, but beats, and tells where it is. */
+/* It receives no set-points, but sends heartbeats and its position. */
 static void a_drive_that_does_not_obey_is_left_to_its_own_watch(void **state)
 {
 	for (int mode = INCISE_ACTUATOR_CSP; mode <= INCISE_ACTUATOR_CSV; mode++) {
@@ -400,9 +404,9 @@ static void a_drive_that_does_not_obey_is_left_to_its_own_watch(void **state)
 		can_rig_hold(&rig, from_mm, 1000 * MS);
 		assert_int_equal(rig.drive.velocity, 0);
 		/*
-		 * In csv it goes on at 10 mm/s until it is off by following_mm for following_ms,
-		 * has not obeyed for 20 ms, and its own watch of 100 ms and a beat is over; the
-		 * targets go on for v²/2a as well, and its ramp takes as much.
+		 * In csv it continues at 10 mm/s for following_mm and following_ms, then
+		 * 20 ms without obeying, then the 100 ms of its own watch and a
+		 * heartbeat; the targets continue for v²/2a, and its ramp takes as much.
 		 */
 		assert_true(at_mm() - from_mm <
 			    1 + 10 * (0.05 + 0.02 + 0.125) + 2 * 0.1 + 0.1);
@@ -420,7 +424,7 @@ static int no_sync(struct can_bus *bus, const struct can_frame *frame)
 	return frame->can_id == CANOPEN_SYNC ? -ENOBUFS : all_sent(bus, frame);
 }
 
-/* A queue that empties by a frame a cycle: set-points find room, SYNCs do not. */
+/* A queue that empties by a frame per cycle has room for set-points, not for SYNCs. */
 static void a_set_point_without_its_sync_is_none(void **state)
 {
 	static struct can_bus_ops ops;
@@ -436,14 +440,14 @@ static void a_set_point_without_its_sync_is_none(void **state)
 	rig.drive.bus.ops = &ops;
 	from_mm = at_mm();
 	can_rig_hold(&rig, 5, 1000 * MS);
-	/* Its own watch, and a beat that was on its way. */
+	/* Its own watch, and a heartbeat that was on its way. */
 	assert_true(at_mm() - from_mm < 10 * 0.125 + 0.3);
 	rig.drive.bus.ops = before;
 	stopped(INCISE_STEPPER_BUS, "queue is full");
 	can_rig_close(&rig);
 }
 
-/* What is to say that the e-stop was pressed does not come any more. */
+/* The PDO that would report the e-stop stops. */
 static void inputs_that_fall_silent_are_a_fault(void **state)
 {
 	start(INCISE_ACTUATOR_CSP, 0.1);
@@ -453,7 +457,7 @@ static void inputs_that_fall_silent_are_a_fault(void **state)
 	can_rig_hold(&rig, 10, 400 * MS);
 	stopped(INCISE_STEPPER_LOST, "its inputs (TPDO2) were not heard");
 	can_rig_close(&rig);
-	/* Of a drive that does not send them again by itself nothing is known of that. */
+	/* A drive without the event timer gives no such indication. */
 	can_rig_init(&rig);
 	rig.drive.od[OD_TPDO2_TIMER].size = 0;
 	assert_non_null(can_rig_open(&rig, NULL));
@@ -463,7 +467,7 @@ static void inputs_that_fall_silent_are_a_fault(void **state)
 	can_rig_close(&rig);
 }
 
-/* Somebody else gives it power while nothing is driven here. */
+/* Another program gives it power. */
 static void power_that_nobody_gave_is_a_fault(void **state)
 {
 	struct incise_error err = {0};
@@ -483,7 +487,7 @@ static void power_that_nobody_gave_is_a_fault(void **state)
 	can_rig_close(&rig);
 }
 
-/* The shortest deadman that is taken: its watch must not end while nothing moves. */
+/* The shortest accepted deadman: it must not expire at rest. */
 static void the_shortest_deadman_holds_at_rest(void **state)
 {
 	struct incise_error err = {0};
@@ -537,7 +541,10 @@ static void one_that_gives_way_gets_no_jump(void **state)
 				 way_mm[i] < 0 ? -ERANGE : 0);
 		assert_true(gives_way_mm == 0);
 		can_rig_advance(&rig, 2000 * MS);
-		/* A cycle at 10 mm/s, and rounding: no target is farther from where it is. */
+		/*
+		 * Each target is within a cycle at 10 mm/s, and rounding, of its
+		 * position.
+		 */
 		assert_true(rig.drive.fastest <= 10 * COUNTS_PER_MM + 2000);
 		assert_false(drive_powered(&rig.drive));
 		can_rig_close(&rig);
@@ -571,11 +578,11 @@ static void it_homes_by_itself(void **state)
 				 (int32_t)lround(COUNTS_PER_MM *
 						 (fmin(0, home_mm[i]) - home_mm[i] - 1)));
 		can_rig_close(&rig);
-		/* Whoever opens it next knows: the drive says so. */
+		/* The next program reads it from the drive. */
 		can_rig_open_or_fail(&rig);
 		assert_true(can_rig_look(&rig).homed);
 		can_rig_close(&rig);
-		/* A reboot takes it away. */
+		/* A reboot clears it. */
 		drive_reboot(&rig.drive);
 		can_rig_open_or_fail(&rig);
 		assert_false(can_rig_look(&rig).homed);
@@ -602,7 +609,7 @@ static void homing_can_fail_and_be_stopped(void **state)
 	rig.drive.homing_fails = false;
 	assert_int_equal(incise_stepper_clear(rig.stepper, &err), 0);
 	can_rig_enable_or_fail(&rig);
-	/* What failed before is not taken for what fails now, here or in the next program. */
+	/* An earlier failure does not count again, here or in the next program. */
 	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), 0);
 	assert_true(can_rig_look(&rig).homed);
 	rig.drive.homing_fails = true;

@@ -16,7 +16,9 @@ static struct can_rig rig;
 static struct can_bus_ops ops; /* the drive's, on the computer's clock */
 static int64_t offset_ns;
 
-/* The drive lives up to now. One at a time has the bus: that is what is tested here. */
+/*
+ * Advances the drive to the present. One thread at a time has the bus: that is the test.
+ */
 static int64_t real_now(struct can_bus *bus)
 {
 	struct drive *drive = (struct drive *)bus;
@@ -92,7 +94,7 @@ static void it_runs_and_lends_the_bus(void **state)
 	struct incise_error err = {0};
 
 	can_rig_init(&rig);
-	/* So long that no machine's stall is taken for a program's end. */
+	/* Longer than any stall of a machine. */
 	rig.actuator.deadman_s = 10;
 	if (!open_real(&err))
 		fail_msg("%s", err.text);
@@ -130,7 +132,7 @@ static void a_watcher_has_a_thread_too(void **state)
 	rig.watch = true;
 	if (!open_real(&err))
 		fail_msg("%s", err.text);
-	/* What it is now is known at once. */
+	/* The first status is valid at once. */
 	assert_int_equal(incise_stepper_status(rig.stepper, &s), 0);
 	assert_true(s.t_ns && s.state == INCISE_STEPPER_DISABLED);
 	for (int i = 0; i < 5000; i++) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402/can_units.c: rig.conf in the units of a drive, held against figures made by
- * hand.
+ * lib/device/can/cia402/can_units.c: rig.conf in the units of a drive, compared with
+ * figures made by hand.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -55,7 +55,7 @@ static void steps_are_as_fine_as_may_be(void **state)
 				 cases[i].steps_per_turn);
 		can_units_setup(&session);
 		assert_int_equal(can_units_axis(&session), 0);
-		/* A turn is a turn, however it is counted. */
+		/* A turn stays a turn in any units. */
 		assert_true(fabs(session.axis.setup.counts_per_step *
 					 cases[i].steps_per_turn -
 				 cases[i].counts_per_turn) <=
@@ -85,7 +85,7 @@ static void limits_are_the_drives_with_room(void **state)
 	assert_true(session.setup.limited);
 	assert_int_equal(session.setup.position_min, 6400 - 12800);
 	assert_int_equal(session.setup.position_max, 6400 + 21 * 12800);
-	/* Turned round, with a home below 0. */
+	/* Inverted, with a home below 0. */
 	session.actuator.invert = true;
 	session.actuator.home_mm = -2;
 	assert_int_equal(can_units_axis(&session), 0);
@@ -93,7 +93,7 @@ static void limits_are_the_drives_with_room(void **state)
 	assert_int_equal(session.setup.position_min, 6400 - 21 * 12800);
 	assert_int_equal(session.setup.position_max, 6400 + 3 * 12800);
 	assert_int_equal(session.axis.setup.config.position_min, -2 * 12800);
-	/* A jerk that would take more ticks than there is room for. */
+	/* A jerk that would take more ticks than the profile has. */
 	session.actuator.jerk_mm_s3 = 1;
 	assert_int_equal(can_units_axis(&session), -ERANGE);
 	assert_non_null(strstr(err.text, "jerk_mm_s3 = 1"));

@@ -44,7 +44,7 @@ static uint32_t handle(struct world *w, uint32_t id, uint8_t len, const char *by
 	return canopen_handle(&w->master, &frame, 42);
 }
 
-/* Which frames are whose, and what they are. */
+/* The function of each frame, and whether another master sent it. */
 static void test_functions(void **state)
 {
 	static const struct {
@@ -96,7 +96,7 @@ static void test_heartbeats(void **state)
 	handle(w, 0x700 + N, 1, "\x05");
 	assert_int_equal(w->master.state, CANOPEN_OPERATIONAL);
 	assert_int_equal(w->master.last_heartbeat_ns, 42);
-	/* Not one: too short, too long, of no state, somebody else's. */
+	/* Invalid: too short, too long, no state, another node's. */
 	handle(w, 0x700 + N, 0, "");
 	handle(w, 0x700 + N, 2, "\x7f\0");
 	handle(w, 0x700 + N, 1, "\x33");
@@ -124,7 +124,7 @@ static void test_emcy(void **state)
 	handle(w, 0x81 + N, 8, "\x10\x23\x01\0\0\0\0\0");
 	assert_int_equal(w->master.emcy.code, 0x8611);
 	assert_int_equal(w->master.emcy.count, 1);
-	/* What it was is kept when it is over. */
+	/* The error stays known after its end. */
 	handle(w, 0x80 + N, 8, "\0\0\0\0\0\0\0\0");
 	assert_int_equal(w->master.emcy.code, 0x8611);
 	assert_int_equal(w->master.emcy.count, 1);
@@ -229,7 +229,7 @@ static void test_await(void **state)
 	w->drive.receive_error = -ENETDOWN;
 	assert_int_equal(canopen_await(&w->master, operational, t + DRIVE_MS), -ENETDOWN);
 	w->drive.receive_error = 0;
-	/* A queue that is full stops heartbeats, but not the waiting. */
+	/* A full queue stops heartbeats, but not the wait. */
 	w->drive.send_error = -ENOBUFS;
 	t = w->drive.now_ns;
 	w->drive.no_heartbeat = true;
@@ -265,7 +265,7 @@ static void test_numbers(void **state)
 	assert_int_equal(canopen_write(&w->master, 0x60c2, 2, 1, 0xfffffffd), 0);
 	assert_int_equal(canopen_read(&w->master, 0x60c2, 2, 1, &value), 0);
 	assert_int_equal(value, 0xfd);
-	/* Of another size than it has. */
+	/* With another size than the object's. */
 	assert_int_equal(canopen_read(&w->master, 0x605a, 0, 4, &value), -EPROTO);
 	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 2, &value), -EPROTO);
 	assert_int_equal(canopen_write(&w->master, 0x605a, 0, 4, 1), -EREMOTEIO);
@@ -308,7 +308,7 @@ static void test_text(void **state)
 		assert_int_equal(
 			canopen_read_text(&w->master, 0x1008, 0, text, cases[i].size), 0);
 		assert_string_equal(text, cases[i].text);
-		/* And what comes next is none the worse. */
+		/* The next request works. */
 		assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), 0);
 	}
 	w->drive.name = NULL;
@@ -332,7 +332,7 @@ static void test_silence(void **state)
 	assert_int_equal(canopen_write(&w->master, 0x6060, 0, 1, 8), -ETIMEDOUT);
 	assert_int_equal(w->drive.now_ns, t + 5 * DRIVE_MS);
 
-	/* An answer that comes too late is not taken for that of the next request. */
+	/* A late answer does not count for the next request. */
 	w->drive.mute = false;
 	w->drive.answer_ns = 10 * DRIVE_MS;
 	assert_int_equal(canopen_read(&w->master, 0x1018, 2, 4, &value), -ETIMEDOUT);
@@ -368,7 +368,7 @@ static void test_bus(void **state)
 	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), -ENODEV);
 }
 
-/* Answers by script, one frame a line; the drive itself is mute. */
+/* Scripted answers, one frame a line; the drive itself is mute. */
 static void script(struct world *w, uint8_t len, const char *bytes)
 {
 	struct can_frame frame = {.can_id = CANOPEN_SDO_ANSWER + N, .len = len};
@@ -444,7 +444,7 @@ static void test_segments(void **state)
 		{{"\x41\x08\x10\x00\x09\0\0\0", "\x0eofwords", "\x1b\x31\x32xxxxx"},
 		 -EPROTO,
 		 ""},
-		/* It gives up half-way. */
+		/* It aborts half-way. */
 		{{"\x41\x08\x10\x00\x09\0\0\0", "\x00ofwords",
 		  "\x80\x08\x10\x00\x00\x00\x00\x08"},
 		 -EREMOTEIO,
@@ -464,7 +464,7 @@ static void test_segments(void **state)
 	w->master.answer_ns = 20 * DRIVE_MS;
 	for (size_t i = 0; i < COUNT(cases); i++) {
 		canopen_await(&w->master, NULL, w->drive.now_ns + 50 * DRIVE_MS);
-		/* Frames come one by one, each after what asks for it. */
+		/* Frames come one by one, each after its request. */
 		for (int j = 0; j < 3; j++) {
 			w->drive.latency_ns = (1 + 2 * j) * DRIVE_MS;
 			script(w, 8, cases[i].answers[j]);
@@ -548,7 +548,7 @@ static void test_emcys(void **state)
 				    cases[i].text);
 }
 
-/* Any code, any room: it ends and says its number. */
+/* Any code in any size: the text ends with 0 and has the code. */
 static void test_all_emcys(void **state)
 {
 	char text[100], number[12];

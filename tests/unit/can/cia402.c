@@ -40,7 +40,7 @@ static void test_states(void **state)
 {
 	for (uint32_t word = 0; word <= UINT16_MAX; word++) {
 		enum cia402_state expected = CIA402_UNKNOWN;
-		bool powered = true; /* what is not known may have power */
+		bool powered = true; /* an unknown state may have power */
 
 		for (size_t i = 0; i < COUNT(table); i++)
 			if (matches(word, table[i].bits)) {
@@ -70,7 +70,7 @@ static void test_names(void **state)
 	assert_string_equal(cia402_mode_name(INT32_MAX), "unknown");
 }
 
-/* One step at a time; out of what went wrong there is none. */
+/* One step at a time; none leads out of a fault. */
 static void test_next_controlword(void **state)
 {
 	assert_int_equal(cia402_next_controlword(CIA402_DISABLED), 0x06);
@@ -212,7 +212,7 @@ static void test_objects(void **state)
 	assert_int_equal(cia402_write_verified(&led->client, &word, (uint32_t)-1),
 			 0); /* of 16 bits */
 	assert_int_equal(o->value, 0xffff);
-	/* What is so already is not written. */
+	/* An equal value is not written. */
 	asked = led->drive.requests;
 	assert_int_equal(cia402_ensure(&led->client, &word, 0xffff), 0);
 	assert_int_equal(led->drive.requests, asked + 1);
@@ -235,7 +235,7 @@ static void test_objects(void **state)
 	has = true;
 	assert_int_equal(cia402_write_optional(&led->client, &absent, 1, &has), 0);
 	assert_false(has);
-	/* Only absence is none; any other refusal is an error. */
+	/* Any other refusal than absence is an error. */
 	led->drive.abort_index = 0x605a;
 	assert_int_equal(cia402_read_optional(&led->client, &word, &value, &has),
 			 -EOPNOTSUPP);

@@ -71,7 +71,7 @@ static void test_clear(void **state)
 	assert_int_equal(cia402_clear(&led->client), -EBUSY);
 	assert_non_null(strstr(led->err.text, "DC link over-voltage (3210h)"));
 	assert_int_equal(d->state, CIA402_FAULT);
-	/* By its EMCY, where it has no 603F. */
+	/* From its EMCY, without 603F. */
 	drive_lacks(d, 0x603f, -1);
 	led->master.emcy.code = 0x8611;
 	assert_int_equal(cia402_clear(&led->client), -EBUSY);
@@ -79,7 +79,7 @@ static void test_clear(void **state)
 	d->fault_stays = false;
 	assert_int_equal(cia402_clear(&led->client), 0);
 
-	/* One that is not in fault but has power is without it afterwards. */
+	/* Clear also removes power without a fault. */
 	d->tripped = false;
 	led_enable(led);
 	assert_int_equal(cia402_clear(&led->client), 0);
@@ -88,7 +88,7 @@ static void test_clear(void **state)
 	assert_int_equal(cia402_clear(&led->client), -ETIMEDOUT);
 }
 
-/* The k-th SDO is refused or lost: it ends in a line, and never with power. */
+/* The k-th SDO is refused or lost: it ends with a message, and never with power. */
 static void test_every_step(void **state)
 {
 	struct led *led = *state;
@@ -162,7 +162,7 @@ static void test_homes(void **state)
 	canopen_await(&led->master, NULL, d->now_ns + 750 * DRIVE_MS);
 	led_control(led, CIA402_ENABLE);
 	assert_true(d->position == 0);
-	assert_false(homed(led, -EBUSY)); /* with power it is not asked */
+	assert_false(homed(led, -EBUSY)); /* not with power */
 	assert_int_equal(d->od[OD_MODE_NOW].value, CIA402_HOMING);
 	assert_int_equal(cia402_power_off(&led->client), 0);
 	assert_true(homed(led, 0));
@@ -206,7 +206,7 @@ static void test_fails(void **state)
 	assert_int_equal(cia402_set_homing(&led->client, 128, 1, 1, 1), -EINVAL);
 	drive_lacks(d, 0x6099, 2);
 	assert_int_equal(cia402_set_homing(&led->client, 1, 1, 1, 1), -EOPNOTSUPP);
-	/* No homing mode: it says so, and goes back to its own. */
+	/* No homing mode: an error, and back to its own mode. */
 	cia402_set_mode(&led->client, CIA402_CSV);
 	drive_set(d, 0x6502, 0, 0x380);
 	assert_false(homed(led, -EOPNOTSUPP));

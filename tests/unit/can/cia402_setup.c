@@ -69,11 +69,11 @@ static void test_objects(void **state)
 	/* Start-up in a second, at 0.2 ms for each SDO: a third of it is left to slower ones. */
 	assert_true(led->drive.now_ns - t < 300 * DRIVE_MS);
 	assert_true(led->drive.requests < 250);
-	/* And once more, as after a reboot of this side. */
+	/* Again, as after a reboot of this side. */
 	assert_int_equal(led_configure(led), 0);
 }
 
-/* It is led by PDOs, and stops by itself when the heartbeats end. */
+/* PDOs drive it, and it stops by itself when the heartbeats end. */
 static void test_deadman(void **state)
 {
 	static const struct {
@@ -123,14 +123,14 @@ static void test_deadman(void **state)
 	}
 }
 
-/* What a drive may lack, and what it may not. */
+/* Optional and required objects. */
 static void test_absences(void **state)
 {
 	static const struct {
 		uint16_t index;
 		int sub;
 		int rc;
-		size_t taken; /* offset of what is not taken; 0: nothing is lost */
+		size_t taken; /* offset of the unsupported part; SIZE_MAX: none */
 	} cases[] = {
 		{0x60fd, -1, 0, offsetof(struct cia402_supported, inputs)},
 		{0x1801, -1, 0, offsetof(struct cia402_supported, inputs)},
@@ -182,7 +182,7 @@ static void test_absences(void **state)
 			continue;
 		}
 		for (size_t k = 0; k < sizeof(led->supported); k++) {
-			/* What does not come does not come in time. */
+			/* Without inputs there are no timed ones. */
 			if (k == offsetof(struct cia402_supported, inputs_timed) &&
 			    cases[i].taken == offsetof(struct cia402_supported, inputs))
 				continue;
@@ -224,7 +224,7 @@ static void test_not_kept(void **state)
 		led_init(led);
 		led->drive.od[cases[i]].deaf = true;
 		rc = led_configure(led);
-		/* A mode that does not come is waited for; a PDO that stays on refuses. */
+		/* A mode times out; a PDO that stays on refuses. */
 		assert_true(rc == -EPROTO || rc == -ETIMEDOUT || rc == -EOPNOTSUPP);
 		assert_memory_equal(led->err.text, "here: ", 6);
 		assert_false(cia402_powered(led->drive.state));
@@ -242,7 +242,7 @@ static void test_refused(void **state)
 	asked = led->drive.requests;
 	assert_int_equal(led_configure(led), -EBUSY);
 	assert_non_null(strstr(led->err.text, "operation enabled"));
-	/* And nothing was touched: it was asked once. */
+	/* Nothing was written: there was one request. */
 	assert_int_equal(led->drive.state, CIA402_ENABLED);
 	assert_int_equal(led->drive.requests, asked + 1);
 	assert_int_equal(led_value(led, 0x1016, 1), 0);
@@ -313,7 +313,7 @@ static void test_cycles(void **state)
 	}
 }
 
-/* What goes wrong at the k-th SDO, for every k: a line, or an absence that is noted. */
+/* A failure at the k-th SDO, for every k: a message, or an object noted as absent. */
 static void test_every_step(void **state)
 {
 	static const uint32_t codes[] = {0x08000000, ABORT_NO_OBJECT, ABORT_NO_SUB,
@@ -344,8 +344,10 @@ static void test_every_step(void **state)
 			assert_int_equal(led->drive.enables, 0);
 			if (!rc) {
 				went_on++;
-				/* Silence is never passed over; a refusal that is no absence
-				 * only where the object is a hint, or leaves inputs out. */
+				/*
+				 * Silence is always an error; a refusal other than
+				 * absence is not one for hints and inputs.
+				 */
 				assert_true(c < COUNT(codes));
 				if (codes[c] != ABORT_NO_OBJECT &&
 				    codes[c] != ABORT_NO_SUB)
@@ -367,12 +369,12 @@ static void test_every_step(void **state)
 				assert_int_equal(led->drive.master_abort, ABORT_TIMEOUT);
 			}
 		}
-	/* Of six passes, four and more failed at nearly every step. */
+	/* At least four of six passes failed at nearly every step. */
 	assert_true(failed > requests * 4);
 	assert_int_equal(failed + went_on, requests * (COUNT(codes) + 1));
 }
 
-/* The bus fails, at the start or at the k-th frame, for good or once. */
+/* The bus fails at the start or at the k-th frame, permanently or once. */
 static void test_bus_fails(void **state)
 {
 	static const int errors[] = {-ENETDOWN, -ENODEV, -EIO};
@@ -381,7 +383,7 @@ static void test_bus_fails(void **state)
 
 	assert_int_equal(led_configure(led), 0);
 	frames = led->drive.bus.counts.sent;
-	/* As many as it takes without a failure, but for a heartbeat more or less. */
+	/* The number of frames without a failure, up to a heartbeat. */
 	for (uint32_t k = 0; k < frames - 2; k++)
 		for (int good = 0; good < 2; good++) {
 			led_init(led);
@@ -413,7 +415,9 @@ static void test_bus_fails(void **state)
 	led_init(led);
 	led->drive.twice = true;
 	assert_int_equal(led_configure(led), 0);
-	/* A silence is named by its object, also where a refusal would be passed over. */
+	/*
+	 * The message about silence names the object, also where a refusal is tolerated.
+	 */
 	for (uint16_t index = 0x1006; index <= 0x1007; index++) {
 		char name[8];
 
@@ -429,7 +433,7 @@ static void test_bus_fails(void **state)
 	assert_non_null(strstr(led->err.text, "does not become operational"));
 }
 
-/* Of each mode its target, from what a drive was left with. */
+/* The target of each mode, after any other mode. */
 static void test_modes(void **state)
 {
 	static const struct {
@@ -443,7 +447,7 @@ static void test_modes(void **state)
 	};
 	struct led *led = *state;
 
-	/* One after the other on the same drive: all of it is on already. */
+	/* One after the other on the same drive, whose PDOs are on already. */
 	for (size_t i = 0; i < COUNT(cases); i++) {
 		led->setup.mode = cases[i].mode;
 		assert_int_equal(led_configure(led), 0);
@@ -452,7 +456,7 @@ static void test_modes(void **state)
 	}
 }
 
-/* Other ids, other bits 30, more objects than ours: what was there before goes. */
+/* Other ids, bits 30 and objects from before are replaced. */
 static void test_left_over(void **state)
 {
 	struct led *led = *state;
@@ -470,7 +474,7 @@ static void test_left_over(void **state)
 	assert_int_equal(led_value(led, 0x1a00, 0), 2);
 }
 
-/* What comes back, once it runs: TPDO1 at each SYNC, inputs at change, nothing else. */
+/* Its traffic: TPDO1 at each SYNC, inputs at change, nothing else. */
 static void test_traffic(void **state)
 {
 	struct led *led = *state;
@@ -508,7 +512,7 @@ static void test_traffic(void **state)
 	assert_int_equal(others, 0);
 }
 
-/* A drive that maps no inputs has none for us, and its TPDO2 stays off. */
+/* If a drive cannot map inputs, its TPDO2 stays off. */
 static void test_unmapped_inputs(void **state)
 {
 	struct led *led = *state;
@@ -520,7 +524,7 @@ static void test_unmapped_inputs(void **state)
 	assert_true(led->supported.position_limit);
 }
 
-/* Reasons differ; each of them is told. */
+/* The message has the abort code. */
 static void test_fixed_mapping(void **state)
 {
 	static const uint32_t codes[] = {ABORT_ACCESS, 0x08000022, ABORT_READ_ONLY};
@@ -540,7 +544,7 @@ static void test_fixed_mapping(void **state)
 	}
 }
 
-/* Limits are the drive's own too. */
+/* The drive enforces the limits by itself. */
 static void test_limits(void **state)
 {
 	struct led *led = *state;
@@ -565,7 +569,7 @@ static void test_limits(void **state)
 	assert_int_equal(led->drive.enabled_unasked, 0);
 }
 
-/* Limits of before do not stay: a machine that is not homed has no range. */
+/* Old limits do not stay: without homing there is no range. */
 static void test_unlimited(void **state)
 {
 	struct led *led = *state;
@@ -584,7 +588,7 @@ static void test_unlimited(void **state)
 	assert_int_equal(cia402_set_range(&led->client, 40, 40), -EINVAL);
 }
 
-/* What is not limited here is left to the drive. */
+/* Limits that are not set here stay the drive's. */
 static void test_left_alone(void **state)
 {
 	struct led *led = *state;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402/cia402_units.c: who a drive is, and units of drives that people have.
+ * lib/device/can/cia402/cia402_units.c: profile and units, with those of real drives.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -136,7 +136,7 @@ static void test_refused(void **state)
 		{{1, 3, NO, NO, NO, NO, NO, NO, NO}, "counts_per_turn"},
 		{{NO, NO, 0, 1, NO, NO, NO, NO, NO}, "counts_per_turn"},
 		{{NO, NO, 4000, 1, 1, 0, NO, NO, NO}, "counts_per_turn"},
-		/* More than a position has room for. */
+		/* More than a position can hold. */
 		{{NO, NO, 0xfffffffe, 1, 0xfffffffe, 1, NO, NO, NO}, "counts_per_turn"},
 		{{1000, 1, 4000, 1, 1, 1, 0x00aa0000, NO, NO}, "counts_per_turn"},
 		{{1000, 1, 4000, 1, 1, 1, 0x80410000, NO, NO}, "counts_per_turn"},
@@ -147,7 +147,7 @@ static void test_refused(void **state)
 		{{1000, 1, NO, NO, NO, NO, NO, 0x00010300, NO}, "velocity_per_turn_s"},
 		{{1000, 1, NO, NO, NO, NO, NO, 0x80b44700, NO}, "velocity_per_turn_s"},
 		{{1000, 1, NO, NO, NO, NO, NO, 0x00c00300, NO}, "velocity_per_turn_s"},
-		/* Its accelerations are rpm/s, or are they? */
+		/* The unit of accelerations could be rpm/s. */
 		{{1000, 1, NO, NO, NO, NO, NO, 0x00b44700, NO},
 		 "acceleration_per_turn_s2"},
 		{{1000, 1, NO, NO, NO, NO, NO, NO, 0x00b44700},
@@ -170,7 +170,7 @@ static void test_refused(void **state)
 	}
 }
 
-/* What rig.conf gives is not asked for. */
+/* Units from rig.conf are not read. */
 static void test_given(void **state)
 {
 	struct cia402_units units = {200, 60, 1};

@@ -56,7 +56,7 @@ static inline void drive_enter(struct drive *d, enum cia402_state state)
 		d->velocity = 0; /* a screw does not coast */
 }
 
-/* It faults, with an EMCY; power goes away at once. */
+/* Fault with an EMCY; power goes away at once. */
 static inline void drive_fault(struct drive *d, uint16_t code)
 {
 	d->faults++;
@@ -65,7 +65,7 @@ static inline void drive_fault(struct drive *d, uint16_t code)
 	drive_emcy(d, code);
 }
 
-/* What 605A says, unasked: the line is dead. */
+/* React as 605A says: the line is dead. */
 static inline void drive_quick_stop(struct drive *d, bool by_itself)
 {
 	d->tripped |= by_itself;
@@ -76,7 +76,7 @@ static inline void drive_quick_stop(struct drive *d, bool by_itself)
 		drive_enter(d, CIA402_DISABLED);
 }
 
-/* 6007: what it does when nobody leads it any more. */
+/* 6007: the reaction to a missing master. */
 static inline void drive_connection_lost(struct drive *d, uint16_t code)
 {
 	drive_emcy(d, code);

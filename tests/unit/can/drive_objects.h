@@ -27,7 +27,7 @@ static const enum drive_object_name drive_pdos[] = {
 };
 #define DRIVE_PDOS 5
 
-/* NULL: it has none, or lacks it. */
+/* NULL: the drive lacks it. */
 static inline struct drive_object *drive_object(struct drive *d, uint16_t index,
 						uint8_t sub)
 {
@@ -37,7 +37,7 @@ static inline struct drive_object *drive_object(struct drive *d, uint16_t index,
 	return NULL;
 }
 
-/* What a test has it be from power-on on. */
+/* Set the value after power-on. */
 static inline void drive_set(struct drive *d, uint16_t index, uint8_t sub, uint32_t value)
 {
 	struct drive_object *o = drive_object(d, index, sub);
@@ -45,7 +45,7 @@ static inline void drive_set(struct drive *d, uint16_t index, uint8_t sub, uint3
 	o->value = o->initial = value;
 }
 
-/* It has one that it lacks by default, of so many bytes. */
+/* Add an object that it lacks by default, of so many bytes. */
 static inline void drive_has(struct drive *d, uint16_t index, uint8_t sub, uint8_t size,
 			     uint32_t value)
 {
@@ -56,7 +56,7 @@ static inline void drive_has(struct drive *d, uint16_t index, uint8_t sub, uint8
 		}
 }
 
-/* It lacks an object; all subs of it: -1. */
+/* Remove an object; @sub -1: with all subs. */
 static inline void drive_lacks(struct drive *d, uint16_t index, int sub)
 {
 	for (int i = 0; i < OD_N; i++)
@@ -77,7 +77,7 @@ static inline bool drive_pdo_on(const struct drive_object *pdo)
 	return !(pdo[PDO_COB].value & 0x80000000);
 }
 
-/* Sub-objects of a mapping that counts so many: 0 or why not. */
+/* Check the sub-objects of a mapping: 0 or an abort code. */
 static inline uint32_t drive_mapping(struct drive *d, const struct drive_object *pdo,
 				     uint32_t n)
 {

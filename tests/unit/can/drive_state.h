@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What there is of the simulated drive (can_drive.h): its object dictionary, what a test may
- * do to it and may ask of it. Positions are counts, times ns of the simulated clock.
+ * The state of the simulated drive (can_drive.h): its object dictionary, faults that a test may
+ * inject, and results. Positions are counts, times ns of the simulated clock.
  */
 #ifndef INCISE_TEST_DRIVE_STATE_H
 #define INCISE_TEST_DRIVE_STATE_H
@@ -19,7 +19,7 @@
 #define DRIVE_NODE 0x10
 #define DRIVE_QUEUE 256
 
-/* What may be done with an object. */
+/* Access to an object. */
 enum { R_ = 1, W_ = 2, RW = 3, MAPPED = 4, OF_NODE = 8 /* its id is added */ };
 
 /* Rows of one PDO: its parameters (1400 …) and its mapping (1600 …). */
@@ -137,14 +137,14 @@ struct drive_queue {
 };
 
 struct drive {
-	struct can_bus bus; /* the way in for what is tested */
+	struct can_bus bus; /* the bus for the tested code */
 	int64_t now_ns;
 	uint8_t node;
 
-	/* What it is; drive_init gives what is usual, a test may change it. */
+	/* Properties; drive_init() sets usual ones, a test may change them. */
 	const char *name;      /* 1008; NULL: it has none */
-	int64_t latency_ns;    /* of a frame, either way */
-	int64_t look_ns;       /* what a look at the clock takes */
+	int64_t latency_ns;    /* delay of a frame, either way */
+	int64_t look_ns;       /* duration of reading the clock */
 	int64_t enable_ns;     /* from "enable" to operation enabled: a brake */
 	double velocity_scale; /* counts/s per velocity unit */
 	double acceleration_scale;
@@ -164,7 +164,7 @@ struct drive {
 	uint32_t abort_code;  /* … with this; 0: 08000000h */
 	uint16_t abort_index; /* each of this object … */
 	int abort_sub;	      /* … and sub; -1: any */
-	uint32_t drop_at;     /* the k-th SDO request is not heard */
+	uint32_t drop_at;     /* the k-th SDO request is lost */
 	bool no_heartbeat;    /* it goes on, but is silent about it */
 	bool unplugged;	      /* no frame either way; it goes on by itself */
 	bool blocked;	      /* the shaft does not turn */
@@ -179,7 +179,7 @@ struct drive {
 	int can_state;		       /* of bus->ops->state */
 	uint32_t inputs;	       /* 60FD */
 
-	/* What a test may ask. */
+	/* Results for a test. */
 	enum cia402_state state;
 	enum canopen_state nmt;
 	uint64_t syncs, rpdos; /* rpdos: set-points that were applied, at a SYNC */
@@ -187,8 +187,8 @@ struct drive {
 	uint64_t enables; /* times that it came to operation enabled */
 	uint64_t quick_stops, faults;
 	/*
-	 * Set when it faults, quick-stops by itself or boots; a test sets it back when a person
-	 * asks for motion. Coming to operation enabled meanwhile is counted.
+	 * Set when it faults, quick-stops by itself or boots; a test clears it when the
+	 * user asks for motion. Enabling meanwhile is counted.
 	 */
 	bool tripped;
 	uint64_t enabled_unasked;
@@ -243,7 +243,7 @@ static inline void drive_queue_put(struct drive_queue *q, const struct can_frame
 		q->lost++;
 		return;
 	}
-	/* One wire: none passes another. */
+	/* One wire: frames stay in order. */
 	if (q->n) {
 		int64_t last = q->frame[(q->head + q->n - 1) % DRIVE_QUEUE].at_ns;
 

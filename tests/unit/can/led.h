@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * A simulated drive and a master that leads it: where tests of the CAN room begin.
+ * A simulated drive with a CANopen master: the fixture of the CAN tests.
  */
 #ifndef INCISE_TEST_LED_H
 #define INCISE_TEST_LED_H
@@ -50,7 +50,7 @@ static inline int led_configure(struct led *led)
 	return cia402_configure(&led->client, &led->setup, &led->supported);
 }
 
-/* To what @word leads, by SDO. */
+/* Write the controlword by SDO, and wait for its effect. */
 static inline void led_control(struct led *led, uint16_t word)
 {
 	canopen_write(&led->master, 0x6040, 0, 2, word);
@@ -64,7 +64,7 @@ static inline void led_enable(struct led *led)
 	led_control(led, CIA402_ENABLE);
 }
 
-/* What an object holds, by the drive itself. */
+/* Returns the drive's value of an object. */
 static inline uint32_t led_value(struct led *led, uint16_t index, uint8_t sub)
 {
 	return drive_object(&led->drive, index, sub)->value;

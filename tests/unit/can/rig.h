@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * A stepper on a simulated drive: lib/device/can as a whole, thread and all, in a time that
- * goes only while somebody waits. For the tests of the CAN room.
+ * A stepper on a simulated drive: all of lib/device/can with its thread, on the drive's clock.
  *
  *	struct can_rig rig;
  *
  *	can_rig_init(&rig);
- *	rig.actuator.invert = true;		what rig.conf says
- *	rig.drive->blocked = true;		what the drive does
+ *	rig.actuator.invert = true;		set by rig.conf
+ *	rig.drive->blocked = true;		a fault of the drive
  *	stepper = can_rig_open(&rig, &err);
  *	can_rig_hold(&rig, 3.0, 100 * DRIVE_MS);	a target each 5 ms
  */
@@ -26,7 +25,7 @@ struct can_rig {
 	bool watch;
 };
 
-/* There is one at a time: a transport has no room for whose it is. */
+/* One at a time: a transport has no context. */
 static struct can_rig *can_rig_now;
 
 static inline int can_rig_transport(struct can_bus **bus,
@@ -97,7 +96,7 @@ static inline void can_rig_open_or_fail(struct can_rig *rig)
 		fail_msg("%s", err.text);
 }
 
-/* A person asks for it. */
+/* The user enables it. */
 static inline void can_rig_enable_or_fail(struct can_rig *rig)
 {
 	struct incise_error err = {0};
@@ -113,7 +112,7 @@ static inline void can_rig_close(struct can_rig *rig)
 	rig->stepper->ops->close(rig->stepper);
 }
 
-/* Time goes by, and the thread's work is done. */
+/* Advance the clock; the thread's work is done meanwhile. */
 static inline void can_rig_advance(void *world, int64_t ns)
 {
 	struct can_rig *rig = world;

@@ -216,7 +216,7 @@ static void the_rate_may_follow_the_tty(void **state)
 		const char *behind;
 		uint32_t bitrate;
 		int rc;
-		const char *said; /* to the adapter; or in the line */
+		const char *said; /* received by the adapter; or part of the message */
 	} cases[] = {
 		{"@500000", 0, 0, ".C.S6.O."},
 		{"@500000", 500000, 0, ".C.S6.O."},

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/bus/socketcan_netlink.c on answers that a test makes up, byte by byte, and on the
- * kernel's own of lo. A real controller is asked in tests/vm/guest/can_bus.sh.
+ * lib/device/can/bus/socketcan_netlink.c on answers composed here byte by byte, and on
+ * the kernel's answer for lo. tests/vm/guest/can_bus.sh queries a real controller.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -75,7 +75,7 @@ static void nest_end(struct datagram *d, size_t at)
 	memcpy(d->bytes + at, &size, sizeof(size));
 }
 
-/* What is told of an interface; sizes of attributes that are wrong where they are not 0. */
+/* Attributes of an interface; wrong sizes of them where not 0. */
 struct interface {
 	const char *name, *kind;
 	uint16_t type;
@@ -151,7 +151,7 @@ static void put_error(struct datagram *d, int code, uint32_t sequence, uint32_t 
 	message_end(d, at);
 }
 
-/* Of memory that ends where the datagram does, so that a read behind it is found. */
+/* Parse a copy in memory that ends with the datagram, to find reads behind it. */
 static int parse(const void *bytes, size_t n, struct can_netlink *link)
 {
 	void *copy = malloc(n ? n : 1);
@@ -186,7 +186,7 @@ static void a_controller_is_told(void **state)
 		assert_int_equal(link.bitrate, 500000);
 		assert_int_equal(link.restart_ms, 100);
 		assert_int_equal(link.state, CAN_STATE_ERROR_PASSIVE);
-		/* In whatever order it is link. */
+		/* In any order. */
 		i.data_first = true;
 	}
 }
@@ -283,7 +283,7 @@ static void what_is_cut_off_is_refused(void **state)
 		memcpy(d.bytes, &n, sizeof(n));
 		whole += parse(d.bytes, n, &link) == 1;
 	}
-	/* Whatever else it says of its length. */
+	/* Any other length in its header. */
 	for (int shift = 10; shift < 32; shift++) {
 		uint32_t length = 1u << shift;
 
@@ -407,7 +407,7 @@ ssize_t __wrap_mnl_socket_recvfrom(const struct mnl_socket *socket, void *bytes,
 
 	if (!fake.on)
 		return __real_mnl_socket_recvfrom(socket, bytes, size);
-	/* Who waits without a limit would wait for ever. */
+	/* Without a time limit this would wait for ever. */
 	assert_true(fake.limit_s > 0 && fake.limit_s <= 2);
 	fake.now_ns += S / 10;
 	if (i == fake.n) {
@@ -519,7 +519,7 @@ static void what_fails_is_said(void **state)
 	assert_int_equal(can_netlink_query("can0", &link), -ENODEV);
 }
 
-/* No answer, signals without end, or others' messages without end. */
+/* No answer, endless signals, or endless messages for others. */
 static void every_wait_has_a_limit(void **state)
 {
 	struct can_netlink link;
@@ -535,7 +535,7 @@ static void every_wait_has_a_limit(void **state)
 		assert_int_equal(can_netlink_query("can0", &link), -ETIMEDOUT);
 		assert_true(fake.now_ns <= 1000 * S + 2 * S);
 	}
-	/* But one that comes late still counts. */
+	/* A late answer still counts. */
 	fake_begin(NULL);
 	fake.errors[0] = EINTR;
 	put_error(&fake.answers[1], -ENODEV, SEQUENCE + 1, PORT);

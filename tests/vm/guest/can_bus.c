@@ -180,7 +180,7 @@ static void overflow(struct can_bus *bus, int peer)
 	for (int i = 0; i < FLOOD; i++)
 		sent += say(peer, 0x123, 8);
 	count(bus);
-	/* What was lost is told by the next frame that is not. */
+	/* The next frame reports the loss. */
 	sent += say(peer, 0x123, 8);
 	count(bus);
 	before = bus->counts.received - before;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/bus/socketcan_netlink.c on a controller of a real kernel, held against what ip says
+ * lib/device/can/bus/socketcan_netlink.c on a controller of a real kernel, compared with the output of ip
  * of it: the kernel's slcan, on a pty whose other end just reads. Prints "ok …" and
  * "not ok …".
  *
@@ -104,7 +104,7 @@ static void as_ip_has_it(const char *name)
 	      "it is found by its other name, and tells its own");
 }
 
-/* An adapter that takes what it is told; else the kernel waits for that in vain. */
+/* An adapter that reads commands; else the kernel waits for that in vain. */
 static pid_t adapter(int master)
 {
 	pid_t child = fork();
