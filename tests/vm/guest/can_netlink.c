@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/bus/socketcan_netlink.c on a controller of a real kernel, compared with the output of ip
- * of it: the kernel's slcan, on a pty whose other end just reads. Prints "ok …" and
- * "not ok …".
+ * lib/device/can/bus/socketcan_netlink.c on a controller of a real kernel, the kernel's slcan on
+ * a pty whose other end only reads, compared with the output of ip. Prints "ok …" and "not ok …".
  *
  *   can_netlink ─ pty ─ N_SLCAN ─ can0 ◀─ ip link set … type can bitrate …
  */
