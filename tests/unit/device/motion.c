@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/device/motion.c, on no lines and no bus: what it says to who owns it. What comes of
- * that on lines is in pulser.c, on a bus in tests/unit/can/axis.c.
+ * that on lines is in pulser.c, on a bus in tests/unit/can/can_axis.c.
  */
 #include <stdarg.h>
 #include <stddef.h>
