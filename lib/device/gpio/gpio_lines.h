@@ -12,7 +12,7 @@
 struct gpio_lines;
 
 /*
- * Request the lines of a chip; the first INCISE_LINES_OUT are outputs, at the level @idle says.
+ * Request the lines of a chip; the first INCISE_LINES_OUT are outputs, at the levels of @idle.
  *
  * @chip: name, label or path of the chip
  * @line: offsets, -1 for none, in the order of enum incise_actuator_line

@@ -28,7 +28,7 @@
 #define SLEEP_NS 200000
 #define SPIN_MAX_NS 200000
 #define WRITES 64
-#define RATE_MOST 20000 /* steps/s, whatever the self-test says */
+#define RATE_MOST 20000 /* steps/s, whatever the self-test finds */
 #define ANSWER_NS INCISE_NS_PER_S
 
 enum command { NONE, ENABLE, DISABLE, CLEAR, ORIGIN, HOMED, END };

@@ -46,14 +46,14 @@ struct slcan_line {
 	bool broken; /* skip to its end */
 };
 
-/* The content of a line; the kind says which field. */
+/* The content of a line; which field is valid depends on the kind. */
 struct slcan_message {
 	struct can_frame frame;
 	uint8_t flags;
 	int state;
 };
 
-/* Add a byte to a line, which starts as {0}; *message is set as the returned kind says. */
+/* Add a byte to a line, which starts as {0}; the returned kind defines *message. */
 enum slcan_kind slcan_line_receive(struct slcan_line *line, unsigned char byte,
 				   struct slcan_message *message);
 

@@ -36,7 +36,7 @@ enum can_axis_phase {
 enum can_axis_cause {
 	CAN_AXIS_NO_REASON,
 	CAN_AXIS_EMCY,	       /* a: code, b: error register */
-	CAN_AXIS_DRIVE_FAULT,  /* the statusword says fault, without an EMCY */
+	CAN_AXIS_DRIVE_FAULT,  /* by the statusword, without an EMCY */
 	CAN_AXIS_NOT_ENABLED,  /* a: enum cia402_state */
 	CAN_AXIS_NO_HEARTBEAT, /* a: ms */
 	CAN_AXIS_NO_TPDO,      /* a: ms */
