@@ -148,7 +148,7 @@ static struct gpio_stepper *of(struct incise_motor *motor)
 	return (struct gpio_stepper *)motor;
 }
 
-static int ask(struct gpio_stepper *g, enum command command)
+static int post(struct gpio_stepper *g, enum command command)
 {
 	int64_t end = incise_monotonic_ns() + ANSWER_NS;
 
@@ -164,24 +164,24 @@ static int ask(struct gpio_stepper *g, enum command command)
 static int gpio_enable(struct incise_motor *motor, struct incise_error *err)
 {
 	(void)err;
-	return ask(of(motor), ENABLE);
+	return post(of(motor), ENABLE);
 }
 
 static int gpio_disable(struct incise_motor *motor)
 {
-	return ask(of(motor), DISABLE);
+	return post(of(motor), DISABLE);
 }
 
 static int gpio_clear(struct incise_motor *motor, struct incise_error *err)
 {
 	(void)err;
-	return ask(of(motor), CLEAR);
+	return post(of(motor), CLEAR);
 }
 
 static int gpio_origin(struct incise_motor *motor, int32_t steps, bool homed)
 {
 	of(motor)->steps = steps;
-	return ask(of(motor), homed ? HOMED : ORIGIN);
+	return post(of(motor), homed ? HOMED : ORIGIN);
 }
 
 static INCISE_REALTIME int64_t gpio_now(struct incise_motor *motor)
@@ -196,7 +196,7 @@ static void gpio_close(struct incise_motor *motor)
 
 	if (g->runs) {
 		motor->stepper.ops->disable(&motor->stepper, NULL);
-		ask(g, END);
+		post(g, END);
 		pthread_join(g->thread, NULL);
 	}
 	if (g->lines) {
@@ -261,33 +261,33 @@ static int start_thread(struct gpio_stepper *g)
 }
 
 static int request_lines(struct gpio_stepper *g,
-			 const struct incise_backend_request *asked,
+			 const struct incise_backend_request *request,
 			 struct incise_error *err)
 {
-	const struct incise_actuator *actuator = asked->actuator;
+	const struct incise_actuator *actuator = request->actuator;
 	const char *todo;
 
-	if (!*asked->arguments)
+	if (!*request->arguments)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: expected gpio:CHIP, a name, label or path such "
 			"as gpio:gpiochip0; correct it",
-			asked->where);
+			request->where);
 	if (!actuator->has_lines)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: gpio needs actuator.lines; add lines = { step "
 			"= 17; dir = 27; enable = 22; }; with your lines",
-			asked->where);
-	if (asked->watch)
+			request->where);
+	if (request->watch)
 		return incise_error_set(err, EOPNOTSUPP,
 					"%s: steps over gpio are made within the program "
 					"that drives them, and cannot be watched from "
 					"another",
-					asked->where);
+					request->where);
 	/* At rest all are inactive. */
 	g->lines =
-		gpio_lines_open(asked->arguments, actuator->line, actuator->active_low);
+		gpio_lines_open(request->arguments, actuator->line, actuator->active_low);
 	if (g->lines)
 		return 0;
 	switch (errno) {
@@ -309,16 +309,16 @@ static int request_lines(struct gpio_stepper *g,
 	default:
 		todo = strerror(errno);
 	}
-	return incise_error_set(err, errno, "%s: gpio chip %.60s: %s", asked->where,
-				asked->arguments, todo);
+	return incise_error_set(err, errno, "%s: gpio chip %.60s: %s", request->where,
+				request->arguments, todo);
 }
 
-static int set_up(struct gpio_stepper *g, const struct incise_backend_request *asked,
+static int set_up(struct gpio_stepper *g, const struct incise_backend_request *request,
 		  struct incise_error *err)
 {
 	struct incise_stepper_config config;
 	uint32_t rate_max, pulse_ns;
-	int rc = request_lines(g, asked, err);
+	int rc = request_lines(g, request, err);
 
 	if (rc)
 		return rc;
@@ -326,8 +326,9 @@ static int set_up(struct gpio_stepper *g, const struct incise_backend_request *a
 	if (rc)
 		return incise_error_set(
 			err, -rc, "%s: gpio chip %.60s: its lines cannot be used: %s",
-			asked->where, asked->arguments, strerror(-rc));
-	rc = incise_motor_fit(&g->motor.actuator, asked->where, rate_max, pulse_ns, err);
+			request->where, request->arguments, strerror(-rc));
+	rc = incise_motor_fit(&g->motor.actuator, request->where, rate_max, pulse_ns,
+			      err);
 	if (rc)
 		return rc;
 	g->motor.rate_max_hz = rate_max;
@@ -342,7 +343,7 @@ static int set_up(struct gpio_stepper *g, const struct incise_backend_request *a
 		  : 0;
 }
 
-static void *gpio_open(const struct incise_backend_request *asked,
+static void *gpio_open(const struct incise_backend_request *request,
 		       struct incise_error *err)
 {
 	static const struct incise_motor_ops ops = {
@@ -357,26 +358,26 @@ static void *gpio_open(const struct incise_backend_request *asked,
 	int rc;
 
 	if (!g) {
-		incise_error_set(err, ENOMEM, "%s: %s", asked->where, strerror(ENOMEM));
+		incise_error_set(err, ENOMEM, "%s: %s", request->where, strerror(ENOMEM));
 		return NULL;
 	}
 	memset(g, 0, sizeof(*g));
 	g->motor.ops = &ops;
-	g->motor.actuator = *asked->actuator;
+	g->motor.actuator = *request->actuator;
 	g->motor.setpoint = &g->setpoint;
 	g->motor.slot = &g->status;
-	g->active_low = asked->actuator->active_low;
+	g->active_low = request->actuator->active_low;
 	for (int i = 0; i < INCISE_LINES; i++)
-		if (asked->actuator->line[i] >= 0)
+		if (request->actuator->line[i] >= 0)
 			g->motor.lines |= input_bits(1u << i);
 	snprintf(g->motor.name, sizeof(g->motor.name), "gpio chip %.24s",
-		 asked->arguments);
+		 request->arguments);
 	incise_motor_init(&g->motor);
 	g->pulser.ops = &world_ops;
 	g->pulser.world = g;
 	g->pulser.motion.setpoint = &g->setpoint;
 	g->pulser.motion.slot = &g->status;
-	rc = set_up(g, asked, err);
+	rc = set_up(g, request, err);
 	if (!rc)
 		return &g->motor.stepper;
 	gpio_close(&g->motor);

@@ -72,15 +72,15 @@ static int set_filter(struct can_session *s)
 }
 
 static int open_bus(struct can_session *s, const struct can_transport *transport,
-		    const struct incise_backend_request *asked, bool watch)
+		    const struct incise_backend_request *request, bool watch)
 {
 	struct incise_error *err = s->client.err;
-	const struct incise_actuator_can *can = &asked->actuator->can;
+	const struct incise_actuator_can *can = &request->actuator->can;
 	char device[DEVICE_MAX];
-	struct can_bus_request request = {
-		.where = asked->where, .device = device, .bitrate = can->bitrate};
+	struct can_bus_request bus = {
+		.where = request->where, .device = device, .bitrate = can->bitrate};
 	unsigned int node;
-	int rc = can_session_parse(asked->arguments, device, sizeof(device), &node);
+	int rc = can_session_parse(request->arguments, device, sizeof(device), &node);
 
 	if (rc)
 		return incise_error_set(
@@ -88,10 +88,10 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 			"%s: expected %s:DEVICE:NODE such as %s with a "
 			"node id of 1 to 127, found %s:%.60s; `incise "
 			"info %s` lists drives",
-			asked->where, transport->name,
+			request->where, transport->name,
 			strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0:0x10"
 						       : "can:can0:0x10",
-			transport->name, asked->arguments,
+			transport->name, request->arguments,
 			strcmp(transport->name, "can") ? "slcan:/dev/ttyACM0"
 						       : "can:can0");
 	if (node == (unsigned int)can->master)
@@ -99,9 +99,9 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 					"%s: node %u is also actuator.can.master, the "
 					"id of this program's heartbeat; give another "
 					"one there",
-					asked->where, node);
-	request.node = watch ? 0 : (uint8_t)node;
-	rc = transport->open(&s->bus, &request, err);
+					request->where, node);
+	bus.node = watch ? 0 : (uint8_t)node;
+	rc = transport->open(&s->bus, &bus, err);
 	if (rc)
 		return rc;
 	s->master = (struct canopen){
@@ -259,24 +259,25 @@ static int prepare(struct can_session *s)
 }
 
 int can_session_open(struct can_session *s, const struct can_transport *transport,
-		     const struct incise_backend_request *asked, struct incise_error *err)
+		     const struct incise_backend_request *request,
+		     struct incise_error *err)
 {
 	int rc;
 
-	begin(s, asked->where, err);
-	s->actuator = *asked->actuator;
+	begin(s, request->where, err);
+	s->actuator = *request->actuator;
 	rc = can_units_deadman(s);
 	if (!rc)
-		rc = open_bus(s, transport, asked, false);
+		rc = open_bus(s, transport, request, false);
 	if (rc)
 		return rc;
-	s->master.own = (uint8_t)asked->actuator->can.master;
+	s->master.own = (uint8_t)request->actuator->can.master;
 	rc = set_filter(s);
 	if (!rc)
 		rc = check_alone(s);
 	/* A drive that another master stopped answers nothing else. */
 	if (!rc && (rc = canopen_send_nmt(&s->master, CANOPEN_PREPARE)) < 0)
-		rc = incise_error_set(err, -rc, "%s: %s: cannot send: %s", asked->where,
+		rc = incise_error_set(err, -rc, "%s: %s: cannot send: %s", request->where,
 				      s->bus->name, strerror(-rc));
 	if (!rc)
 		rc = prepare(s);
@@ -297,16 +298,16 @@ int can_session_open(struct can_session *s, const struct can_transport *transpor
  * a moment, so that no other program drives it.
  */
 static int watch_homed(struct can_session *s, const struct can_transport *transport,
-		       const struct incise_backend_request *asked)
+		       const struct incise_backend_request *request)
 {
 	struct incise_error *err = s->client.err;
 	uint32_t word;
 	bool alone;
-	int rc = open_bus(s, transport, asked, false);
+	int rc = open_bus(s, transport, request, false);
 
 	if (rc)
 		return rc;
-	s->master.own = (uint8_t)asked->actuator->can.master;
+	s->master.own = (uint8_t)request->actuator->can.master;
 	rc = prepare(s);
 	/* Nor may another kind of master drive it. */
 	s->client.err = NULL;
@@ -332,19 +333,19 @@ static int find_inputs(struct can_session *s)
 }
 
 int can_session_watch(struct can_session *s, const struct can_transport *transport,
-		      const struct incise_backend_request *asked,
+		      const struct incise_backend_request *request,
 		      struct incise_error *err)
 {
 	int rc;
 
-	begin(s, asked->where, err);
-	s->actuator = *asked->actuator;
-	rc = watch_homed(s, transport, asked);
+	begin(s, request->where, err);
+	s->actuator = *request->actuator;
+	rc = watch_homed(s, transport, request);
 	if (rc && rc != -EBUSY)
 		return rc;
 	if (err)
 		*err = (struct incise_error){0};
-	rc = open_bus(s, transport, asked, true);
+	rc = open_bus(s, transport, request, true);
 	if (!rc)
 		rc = prepare(s);
 	/* No heartbeats. */

@@ -27,7 +27,7 @@
 #define POLL_NS MS
 #define IDLE_LOOK_NS (2 * MS) /* period of looking at the mailbox without power */
 #define ANSWER_NS INCISE_NS_PER_S
-#define ASK_POLL_NS 250000
+#define POST_POLL_NS 250000
 
 enum command {
 	NONE,
@@ -165,7 +165,7 @@ static void nap(struct can_stepper *c, int64_t ns)
 
 /* --- the callers' side of the mailbox --- */
 
-static int ask(struct can_stepper *c, enum command command)
+static int post(struct can_stepper *c, enum command command)
 {
 	int64_t end = now_of(c) + ANSWER_NS;
 
@@ -173,14 +173,14 @@ static int ask(struct can_stepper *c, enum command command)
 	while (atomic_load_explicit(&c->command, memory_order_acquire) != NONE) {
 		if (now_of(c) > end)
 			return -EIO;
-		nap(c, ASK_POLL_NS);
+		nap(c, POST_POLL_NS);
 	}
 	return 0;
 }
 
 static int borrow(struct can_stepper *c, struct incise_error *err)
 {
-	int rc = ask(c, LEND);
+	int rc = post(c, LEND);
 
 	return rc ? incise_error_set(err, -rc,
 				     "%s: its thread does not answer; end this program",
@@ -190,7 +190,7 @@ static int borrow(struct can_stepper *c, struct incise_error *err)
 
 static void give_back(struct can_stepper *c)
 {
-	ask(c, RETURN);
+	post(c, RETURN);
 }
 
 static int start_thread(struct can_stepper *c, bool *real_time)
@@ -230,7 +230,7 @@ static int await_result(struct can_stepper *c, int64_t most_ns, const volatile i
 			return -ETIMEDOUT;
 		if (stop && *stop && !stopped) {
 			stopped = true;
-			ask(c, DISABLE);
+			post(c, DISABLE);
 		}
 		nap(c, POLL_NS);
 	}
@@ -304,7 +304,7 @@ static int can_enable(struct incise_motor *motor, struct incise_error *err)
 
 static int can_disable(struct incise_motor *motor)
 {
-	return ask(of(motor), DISABLE);
+	return post(of(motor), DISABLE);
 }
 
 static int can_clear(struct incise_motor *motor, struct incise_error *err)
@@ -500,7 +500,7 @@ static void set_ops(struct can_stepper *c)
 }
 
 static int set_up(struct can_stepper *c, const struct can_transport *transport,
-		  const struct incise_backend_request *asked, struct incise_error *err)
+		  const struct incise_backend_request *request, struct incise_error *err)
 {
 	struct can_session *session = &c->session;
 	bool real_time;
@@ -508,15 +508,15 @@ static int set_up(struct can_stepper *c, const struct can_transport *transport,
 
 	session->axis.motion.setpoint = &c->setpoint;
 	session->axis.motion.slot = &c->status;
-	rc = asked->watch ? can_session_watch(session, transport, asked, err)
-			  : can_session_open(session, transport, asked, err);
+	rc = request->watch ? can_session_watch(session, transport, request, err)
+			    : can_session_open(session, transport, request, err);
 	if (rc)
 		return rc;
 	c->motor.actuator = session->actuator;
 	c->motor.lines = session->axis.setup.wired;
 	snprintf(c->motor.name, sizeof(c->motor.name), "%s", session->name);
 	/* The first status is valid from the start. */
-	if (asked->watch)
+	if (request->watch)
 		can_session_watch_cycle(session);
 	else
 		incise_motion_publish(&session->axis.motion, now_of(c));
@@ -532,7 +532,7 @@ static int set_up(struct can_stepper *c, const struct can_transport *transport,
 }
 
 void *can_stepper_open(const struct can_transport *transport,
-		       const struct incise_backend_request *asked,
+		       const struct incise_backend_request *request,
 		       struct incise_error *err)
 {
 	static const struct incise_motor_ops ops = {
@@ -547,18 +547,18 @@ void *can_stepper_open(const struct can_transport *transport,
 	int rc;
 
 	if (!c) {
-		incise_error_set(err, ENOMEM, "%s: %s", asked->where, strerror(ENOMEM));
+		incise_error_set(err, ENOMEM, "%s: %s", request->where, strerror(ENOMEM));
 		return NULL;
 	}
 	memset(c, 0, sizeof(*c));
 	c->sleep_until = transport->sleep_until;
 	c->motor.ops = &ops;
-	c->motor.watches = asked->watch;
+	c->motor.watches = request->watch;
 	c->motor.setpoint = &c->setpoint;
 	c->motor.slot = &c->status;
 	incise_motor_init(&c->motor);
 	set_ops(c);
-	rc = set_up(c, transport, asked, err);
+	rc = set_up(c, transport, request, err);
 	if (!rc)
 		return &c->motor.stepper;
 	can_close(&c->motor);
