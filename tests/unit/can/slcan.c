@@ -114,6 +114,22 @@ static const char *received(struct adapter *a)
 	return text;
 }
 
+/* Likewise without queries, which follow a frame after 100 ms of any machine's stall. */
+static const char *frames_received(struct adapter *a)
+{
+	static char frames[4096];
+	const char *text = received(a);
+	size_t n = 0;
+
+	for (; *text; text++)
+		if (!strncmp(text, "F.", 2))
+			text++;
+		else
+			frames[n++] = *text;
+	frames[n] = 0;
+	return frames;
+}
+
 static void send_bytes(struct adapter *a, const char *bytes, size_t n)
 {
 	assert_int_equal(__real_write(a->fd, bytes, n), n);
@@ -315,7 +331,7 @@ static void frames_go_both_ways(void **state)
 			 in;
 
 	assert_int_equal(a->bus->ops->send(a->bus, &out), 0);
-	assert_string_equal(received(a), "t21060F00FFEEDDCC.");
+	assert_string_equal(frames_received(a), "t21060F00FFEEDDCC.");
 	out.can_dlc = 9;
 	assert_int_equal(a->bus->ops->send(a->bus, &out), -EINVAL);
 	/* This side ignores C, S and O, which python-can sends. */
@@ -390,12 +406,18 @@ static void filters_are_exact(void **state)
 static void until_queried(struct adapter *a)
 {
 	const struct can_frame sync = {.can_id = 0x080};
+	int64_t query_ns;
 
 	nanosleep(&(struct timespec){.tv_nsec = 101 * MS}, NULL);
+	query_ns = a->bus->ops->now(a->bus);
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
 	assert_string_equal(received(a), "t0800.F.");
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	assert_string_equal(received(a), "t0800.");
+	/* No further query, unless the machine stalled. */
+	if (a->bus->ops->now(a->bus) - query_ns < 100 * MS)
+		assert_string_equal(received(a), "t0800.");
+	else
+		assert_string_equal(frames_received(a), "t0800.");
 }
 
 static void status_becomes_error_frames(void **state)
@@ -534,16 +556,16 @@ static void a_torn_line_is_finished_first(void **state)
 	write_interrupts = 5;
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
 	assert_int_equal(a->bus->ops->send(a->bus, &other), 0);
-	assert_string_equal(received(a), "t0800.t1230.");
+	assert_string_equal(frames_received(a), "t0800.t1230.");
 	/* Two bytes went out, and then none do: the rest is kept, ahead of later frames. */
 	write_left = 2;
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
 	assert_int_equal(a->bus->ops->send(a->bus, &other), -ENOBUFS);
 	assert_int_equal(a->bus->ops->wait(a->bus, 0), 0);
-	assert_string_equal(received(a), "t0");
+	assert_string_equal(frames_received(a), "t0");
 	write_all();
 	assert_int_equal(a->bus->ops->send(a->bus, &other), 0);
-	assert_string_equal(received(a), "800.t1230.");
+	assert_string_equal(frames_received(a), "800.t1230.");
 	assert_int_equal(a->bus->counts.full, 2);
 	assert_int_equal(a->bus->counts.sent, 4);
 }
@@ -676,7 +698,7 @@ static void the_last_frames_arrive(void **state)
 	a->bus->ops->close(a->bus);
 	a->bus = NULL;
 	do {
-		text = received(a);
+		text = frames_received(a);
 		for (const char *at = strchr(text, 't'); at; at = strchr(at + 1, 't'))
 			frames++;
 		if (strlen(text) >= 12 &&
