@@ -190,14 +190,14 @@ check-frames: $(O)/tests/frames ## CPU per picture and bytes per hour of each fo
 	$(O)/tests/frames $(O)/tests
 
 # Virtual rigs with known truth, seen through the module of vision.
-$(O)/tests/calibrate_depth: tests/bench/calibrate_depth.c libs
+$(O)/tests/calibrate_depth: tests/bench/calibrate_depth.c $(O)/lib/libincise-tests.a | libs
 	@mkdir -p $(@D)
 	$(call step,LD)
-	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
-		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise -lincise-learn -lm
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $^ \
+		$(test_libs)
 
 check-depth: $(O)/tests/calibrate_depth ## whether stated intervals of depth hold the truth on 200 virtual rigs
-	$(O)/tests/calibrate_depth
+	INCISE_MODULE_PATH=$(O)/lib/incise $(O)/tests/calibrate_depth
 
 # Time that the loop needs to publish its state.
 $(O)/tests/state_tick: tests/bench/state_tick.c $(O)/lib/libincise-tests.a

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What can be set about the virtual rig: defaults, names and ranges; see incise/sim.h.
- * The ranges keep every division, buffer and integration of the rig well defined.
+ * Configuration of the virtual rig: names, defaults and ranges; see incise/sim.h. The ranges
+ * keep every division, buffer and integration of the rig well defined.
  */
 #include <errno.h>
 #include <math.h>
@@ -33,7 +33,7 @@ struct key {
 	}
 
 static const struct key keys[] = {
-	/* What libconfig reads without a suffix; it wraps round beyond that. */
+	/* libconfig reads no larger integers without a suffix. */
 	KEY(KEY_UINT64, seed, 1, 0, 2147483647.0),
 	KEY(KEY_INT, motion, 0, 0, 3),
 	KEY(KEY_DOUBLE, cone_deg, 80, 0, 170),
@@ -63,7 +63,7 @@ static const struct key keys[] = {
 	KEY(KEY_DOUBLE, force_zero_mV, 180, -10000, 10000),
 	KEY(KEY_DOUBLE, force_noise_mV, 3, 0, 1000),
 	KEY(KEY_DOUBLE, camera_hz, 50, 1, 500),
-	/* The lower end keeps the whole scalpel in the picture; see sim_camera.c. */
+	/* The lower limit keeps the whole scalpel in the frame; see sim_camera.c. */
 	KEY(KEY_DOUBLE, camera_mm_px, 47.5 / 400, 0.118, 1),
 	KEY(KEY_DOUBLE, spring_N_mm, 2, 0.001, 1000),
 	KEY(KEY_DOUBLE, lead_mm, 2, 0.1, 100),
@@ -74,7 +74,7 @@ static const struct key keys[] = {
 	KEY(KEY_DOUBLE, handle_kg, 0.05, 0.001, 100),
 	KEY(KEY_DOUBLE, handle_friction_N, 0.01, 0, 100),
 	KEY(KEY_DOUBLE, hand_N_mm, 1, 0, 1000),
-	/* Some damping always: it takes up what the moving nut puts in. */
+	/* Some damping is needed to absorb the work of the moving nut. */
 	KEY(KEY_DOUBLE, hand_N_s_mm, 0.01, 0.0001, 10),
 	KEY(KEY_INT, bench, 0, 0, 1),
 	KEY(KEY_DOUBLE, backlash_mm, 0, 0, 10),
@@ -176,7 +176,7 @@ int incise_sim_config_set(struct incise_sim_config *config, const char *name,
 		return rc;
 	key_put(config, key, index, value);
 	if (key->length) {
-		/* Without an index, one depth is all there is. */
+		/* Without an index it becomes the only depth. */
 		if (!name[length])
 			config->n_depths = 1;
 		else if (config->n_depths <= index)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The virtual rig's world, on which its devices stand; see incise/sim.h and world.h.
+ * The world of the virtual rig, and the ring of samples of each device; see incise/sim.h and
+ * world.h.
  */
 #include <errno.h>
 #include <math.h>
@@ -50,13 +51,13 @@ int64_t incise_sim_duration(const struct incise_sim *sim)
 	return incise_surgeon_duration(&sim->surgeon);
 }
 
-void incise_sim_listen(struct incise_sim *sim, struct incise_sim_stream *stream)
+void incise_sim_add_stream(struct incise_sim *sim, struct incise_sim_stream *stream)
 {
 	stream->next = sim->streams;
 	sim->streams = stream;
 }
 
-void incise_sim_unlisten(struct incise_sim *sim, struct incise_sim_stream *stream)
+void incise_sim_remove_stream(struct incise_sim *sim, struct incise_sim_stream *stream)
 {
 	struct incise_sim_stream **at = &sim->streams;
 
@@ -70,7 +71,7 @@ uint64_t incise_sim_first(const struct incise_sim *sim, double hz)
 {
 	uint64_t n = (uint64_t)(sim->t_ns * NS * hz);
 
-	/* The estimate may be one off to either side: start below and search. */
+	/* The estimate may be off by one either way: start below and search. */
 	n -= n > 0;
 	while (incise_sim_time(n, hz) < sim->t_ns)
 		n++;
@@ -137,7 +138,7 @@ void incise_sim_truth(struct incise_sim *sim, struct incise_sim_truth *truth)
 	int64_t now;
 
 	incise_sim_advance(sim);
-	/* On a real clock some time has passed; the tick reached is what can be told. */
+	/* On a real clock time has passed since: the present tick is the latest known. */
 	now = incise_clock_now(sim->clock) - sim->start_ns;
 	if (now >= sim->t_ns + INCISE_SIM_TICK_NS)
 		now = sim->t_ns + INCISE_SIM_TICK_NS - 1;
@@ -151,4 +152,46 @@ void incise_sim_truth(struct incise_sim *sim, struct incise_sim_truth *truth)
 	};
 	memcpy(truth->position_mm, blade.position_mm, sizeof(truth->position_mm));
 	incise_surgeon_grip(&sim->surgeon, now, truth->quaternion);
+}
+
+int incise_sim_ring_init(struct incise_sim_ring *ring, size_t size, double hz,
+			 double extra_s)
+{
+	*ring = (struct incise_sim_ring){
+		.size = size,
+		.capacity = (size_t)ceil(hz * (INCISE_SIM_RING_S + extra_s)) + 1,
+	};
+	ring->records = calloc(ring->capacity, size);
+	return ring->records ? 0 : -ENOMEM;
+}
+
+void incise_sim_ring_free(struct incise_sim_ring *ring)
+{
+	free(ring->records);
+}
+
+void incise_sim_ring_push(struct incise_sim_ring *ring, const void *record)
+{
+	size_t tail;
+
+	if (ring->count == ring->capacity) {
+		incise_sim_ring_pop(ring);
+		ring->lost++;
+	}
+	tail = ring->head + ring->count++;
+	if (tail >= ring->capacity)
+		tail -= ring->capacity;
+	memcpy(ring->records + tail * ring->size, record, ring->size);
+}
+
+const void *incise_sim_ring_peek(const struct incise_sim_ring *ring)
+{
+	return ring->count ? ring->records + ring->head * ring->size : NULL;
+}
+
+void incise_sim_ring_pop(struct incise_sim_ring *ring)
+{
+	if (++ring->head == ring->capacity)
+		ring->head = 0;
+	ring->count--;
 }

@@ -3,16 +3,16 @@
  * The virtual camera: 640 × 480 RGB of a black scalpel over liver, drawn when it is read.
  * Pixel (0, 0) covers 0 … 1 in both directions, top row first.
  *
- *       +----------------------+    The camera goes along with the blade; the liver
- *       |         ##           |    passes behind. The scalpel's axis is turned 0.05 rad
- *       |         ##           |    from the vertical. Its sheath and handle are 47.5 mm
- *       |  liver  ##  47.5 mm  |    long; what is below the surface is hidden, and what
- *       |         ##  - depth  |    is seen shrinks by the depth: by 400 px at the default
- *       |        ##            |    scale, less depth / camera_mm_px. In the air all of it
- *       |......[entry].........|    is seen, and it moves up by its height.
+ *       +----------------------+    The camera moves with the blade; the liver passes
+ *       |         ##           |    behind. The scalpel's axis is turned 0.05 rad from
+ *       |         ##           |    the vertical. Its sheath and handle are 47.5 mm long;
+ *       |  liver  ##  47.5 mm  |    the part below the surface is hidden: the visible
+ *       |         ##  - depth  |    part has 400 px at the default scale, minus
+ *       |        ##            |    depth / camera_mm_px. In the air all of it is visible,
+ *       |......[entry].........|    and moves up by its height.
  *       +----------------------+
  *
- * How the hand leans is left out: the picture shows the axis as it is in the tissue.
+ * The lean of the hand is left out: the frame shows the axis as it is in the tissue.
  */
 #include <errno.h>
 #include <math.h>
@@ -32,27 +32,27 @@
 #define ROLL 0.05 /* rad */
 #define ENTRY_X (WIDTH / 2.0)
 /*
- * 5 mm and a tremor above the surface the scalpel still ends in the picture, at the
- * finest scale: 462 - (47.5 + 5.03) / 0.118 > 16.
+ * 5 mm and a tremor above the surface the scalpel still ends in the frame, at the finest
+ * scale: 462 - (47.5 + 5.03) / 0.118 > 16.
  */
 #define ENTRY_Y 462.0
 
 #define LIVER_PERIOD 1024 /* pixels, after which the texture repeats */
 #define NOISE_SIZE 65536
-#define WAIT_MOST 24 /* pictures, for a reader that is held up */
+#define WAIT_MOST 24 /* frames, for a late reader */
 
 #define NOISE_LEVELS 2.0 /* sd of the sensor's noise */
 
 /* Far enough from 0 and 255 that noise, 6.7 sd at most, cannot overflow. */
 static const double liver_rgb[3] = {118, 46, 38};
-static const double liver_spread[3] = {30, 16, 14}; /* both ways */
+static const double liver_spread[3] = {30, 16, 14}; /* ± */
 static const double scalpel_rgb[3] = {24, 24, 26};
 
 struct sim_camera {
 	struct incise_camera camera;
 	struct incise_sim *sim;
 	uint64_t key;
-	uint64_t next, first; /* next picture by the world's count; where seq 0 is */
+	uint64_t next, first; /* next frame by the world's count; that of seq 0 */
 	uint64_t lost;
 	uint8_t *rgb;	/* HEIGHT rows */
 	uint8_t *liver; /* HEIGHT rows of LIVER_PERIOD pixels */
@@ -128,7 +128,7 @@ static void draw_scalpel(uint8_t *row, int y, double low, double high, double ha
 		double dx = x + 0.5 - ENTRY_X;
 		double along = dx * up[0] + dy * up[1];
 		double across = fabs(dx * up[1] - dy * up[0]);
-		/* The share of the pixel that the scalpel covers, as if it stood level. */
+		/* Covered share of the pixel, as if the scalpel stood upright. */
 		double cover = clip01(along - low + 0.5) * clip01(high - along + 0.5) *
 			       clip01(half_px - across + 0.5);
 
@@ -169,7 +169,7 @@ static void draw(struct sim_camera *c, uint64_t n, const struct incise_blade *bl
 void incise_sim_vision_setup(const struct incise_sim_config *config,
 			     struct incise_vision_setup *setup)
 {
-	/* Between the scalpel, 26, and the darkest liver, 88, as HSV's value sees them. */
+	/* In HSV's value between the scalpel, 26, and the darkest liver, 88. */
 	*setup = (struct incise_vision_setup){
 		.hue = {0, 179},
 		.saturation = {0, 255},
@@ -206,7 +206,7 @@ static int sim_camera_read(struct incise_camera *camera,
 	n = newest - c->next < WAIT_MOST ? c->next : newest - WAIT_MOST + 1;
 	c->lost += n - c->next;
 	c->next = n + 1;
-	/* The surgeon is a function of time: the world need not stop for a picture. */
+	/* The surgeon is a function of time: the world need not stop for a frame. */
 	incise_surgeon_blade(&c->sim->surgeon, incise_sim_time(n, hz), &blade);
 	draw(c, n, &blade);
 	*frame = (struct incise_camera_frame){

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The virtual force channel: force on the blade → bridge, amplifier → 12-bit converter
- * over 5 V, in codes. On the bench the force is that of the actuator. Samples lie on the exact grid n / force_hz.
+ * The virtual force channel: force on the blade → bridge, amplifier → 12-bit converter over 5 V,
+ * in codes. On the bench the force is the actuator's. Samples lie on the exact grid n / force_hz.
  */
 #include <errno.h>
 #include <math.h>
@@ -20,7 +20,7 @@ struct sim_force {
 	struct incise_sim_ring ring;
 	struct incise_sim *sim;
 	uint64_t key;
-	uint64_t n, first; /* next sample by the world's count; where seq 0 is */
+	uint64_t n, first; /* next sample by the world's count; that of seq 0 */
 };
 
 static struct sim_force *of_force(const struct incise_force *force)
@@ -95,7 +95,7 @@ static void sim_force_close(struct incise_force *force)
 {
 	struct sim_force *f = of_force(force);
 
-	incise_sim_unlisten(f->sim, &f->stream);
+	incise_sim_remove_stream(f->sim, &f->stream);
 	incise_sim_ring_free(&f->ring);
 	free(f);
 }
@@ -124,6 +124,6 @@ struct incise_force *incise_sim_force_new(struct incise_sim *sim)
 	f->n = f->first = incise_sim_first(sim, hz);
 	f->stream.t_ns = incise_sim_time(f->n, hz);
 	f->stream.sample = sim_force_sample;
-	incise_sim_listen(sim, &f->stream);
+	incise_sim_add_stream(sim, &f->stream);
 	return &f->force;
 }

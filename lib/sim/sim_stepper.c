@@ -11,19 +11,21 @@
  *                 /            \         slopes: the largest acceleration
  *           _____/              \_____
  *
- * On the bench the handle presses a stiff sensor instead: see bench.h.
+ * On the bench the handle presses a stiff sensor instead: see world.h.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include "bench.h"
 #include "sim.h"
 #include "world.h"
 
 #define NS 1e-9
 #define TICK_S (INCISE_SIM_TICK_NS * NS)
 #define DEADMAN_NS 100000000
+
+/* The loss is complete after this way: a Jenkins element of that stiffness. */
+#define LOSS_MM 0.1
 
 struct sim_stepper {
 	struct incise_stepper stepper;
@@ -45,7 +47,7 @@ static struct sim_stepper *of_stepper(const struct incise_stepper *stepper)
 	return (struct sim_stepper *)stepper;
 }
 
-/* Where the motor holds the nut: the nearest microstep within the travel. */
+/* The motor holds the nut at the nearest microstep within the travel. */
 static double nut_held(const struct sim_stepper *s)
 {
 	long steps = lround(s->nut_mm / s->step_mm);
@@ -102,6 +104,40 @@ static void move_handle(struct sim_stepper *s, double nut_mm)
 	s->handle_mm_s = 2 * middle - s->handle_mm_s;
 }
 
+/* Follows @x with a play of @width. */
+static double play(double now, double x, double width)
+{
+	return fmax(x - width / 2, fmin(x + width / 2, now));
+}
+
+void incise_bench_follow(struct incise_bench *bench,
+			 const struct incise_sim_config *config, double nut_mm,
+			 double mm_s)
+{
+	const double friction_N = config->handle_friction_N;
+	double moved = nut_mm - bench->nut_mm, before = bench->behind_mm, spring_N, apart;
+	int way;
+
+	bench->nut_mm = nut_mm;
+	if (config->stall_mm_s > 0 && fabs(mm_s) > config->stall_mm_s)
+		bench->lost_mm += moved;
+	bench->behind_mm = play(before, nut_mm - bench->lost_mm, config->backlash_mm);
+	bench->loss_N += config->hysteresis_N / LOSS_MM * (bench->behind_mm - before);
+	bench->loss_N = fmax(-config->hysteresis_N / 2,
+			     fmin(config->hysteresis_N / 2, bench->loss_N));
+	spring_N = config->spring_N_mm * bench->behind_mm + bench->loss_N;
+
+	/* The handle transmits the force that its friction does not hold. */
+	apart = spring_N - bench->force_N;
+	way = (apart > 0) - (apart < 0);
+	if (bench->sliding && way == -bench->sliding)
+		bench->sliding = 0;
+	if (!bench->sliding && fabs(apart) > friction_N + config->stiction_N)
+		bench->sliding = way;
+	if (bench->sliding && fabs(apart) > friction_N)
+		bench->force_N = spring_N - way * friction_N;
+}
+
 static void advance(struct sim_stepper *s, int64_t now)
 {
 	while (s->t_ns + INCISE_SIM_TICK_NS <= now) {
@@ -121,7 +157,7 @@ static void advance(struct sim_stepper *s, int64_t now)
 	}
 }
 
-/* For the force channel, which asks at its own times, none of them later than ours. */
+/* For the force channel, at its own times, none later than the stepper's. */
 static INCISE_REALTIME double press_N(struct incise_stepper *stepper, int64_t t_ns)
 {
 	struct sim_stepper *s = of_stepper(stepper);
@@ -132,7 +168,7 @@ static INCISE_REALTIME double press_N(struct incise_stepper *stepper, int64_t t_
 
 static int64_t script_now(const struct sim_stepper *s)
 {
-	/* Samples from before a target must not show what it does. */
+	/* Samples from before a target must not show its effect. */
 	if (s->sim->config.bench)
 		incise_sim_advance(s->sim);
 	return incise_clock_now(s->sim->clock) - s->sim->start_ns;
@@ -146,7 +182,7 @@ static INCISE_REALTIME int sim_stepper_set(struct incise_stepper *stepper,
 	int64_t now = script_now(s);
 
 	advance(s, now);
-	/* Neither a target nor a sign of life. */
+	/* Neither a target nor a heartbeat. */
 	if (!isfinite(position_mm))
 		return -EDOM;
 	s->limit_mm_s = s->sim->config.screw_mm_s;
@@ -160,7 +196,7 @@ static INCISE_REALTIME int sim_stepper_set(struct incise_stepper *stepper,
 	return 0;
 }
 
-/* The bench alone has it: there a speed is what is asked for. */
+/* On the bench only, where users request a speed. */
 static int sim_stepper_jog(struct incise_stepper *stepper, double velocity_mm_s)
 {
 	struct sim_stepper *s = of_stepper(stepper);
@@ -193,7 +229,7 @@ static int sim_stepper_enable(struct incise_stepper *stepper, struct incise_erro
 	return sim_stepper_set(stepper, nut_held(s));
 }
 
-/* As far as it goes without power to take away: no force, and nobody to miss. */
+/* There is no power to switch off: no force, and no deadman. */
 static int sim_stepper_disable(struct incise_stepper *stepper, struct incise_error *err)
 {
 	struct sim_stepper *s = of_stepper(stepper);
@@ -216,7 +252,7 @@ static int sim_stepper_clear(struct incise_stepper *stepper, struct incise_error
 
 static enum incise_stepper_state sim_stepper_state(const struct sim_stepper *s)
 {
-	/* Within half a microstep, and no faster than what one tick takes away. */
+	/* Within half a microstep, and slow enough to stop in one tick. */
 	if (fabs(s->nut_mm - s->target_mm) < s->step_mm / 2 &&
 	    fabs(s->nut_mm_s) <= s->sim->config.screw_mm_s2 * TICK_S)
 		return INCISE_STEPPER_READY;
@@ -232,7 +268,7 @@ static INCISE_REALTIME int sim_stepper_status(struct incise_stepper *stepper,
 
 	advance(s, script_now(s));
 	nut = nut_held(s);
-	/* On the bench nobody holds it, and what it presses is for the force channel. */
+	/* On the bench no hand holds it, and only the force channel measures its force. */
 	if (s->sim->config.bench)
 		s->handle_mm = 0;
 	*status = (struct incise_stepper_status){

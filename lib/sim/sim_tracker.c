@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The virtual magnetic tracker: tip position, mm, and attitude, with noise, a clock that
- * drifts and a way to the host that takes its time.
+ * The virtual magnetic tracker: tip position, mm, and attitude, with noise, a clock that drifts
+ * and a latency to the host.
  *
  *   acquisition   |           |           |        every 1 / (hz · (1 + drift))
  *   arrival       '-latency-|~|           '-latency-|~~|   + a jitter ≥ 0
  *
- * A record carries its arrival and is there to be read from then on.
+ * A record carries the time of its arrival and is readable from then on.
  */
 #include <errno.h>
 #include <math.h>
@@ -20,7 +20,7 @@
 /* Attitude noise, rad: FASTRAK's 0.025° static accuracy (paper 1, §2). */
 #define ATTITUDE_NOISE (0.025 * M_PI / 180)
 
-#define DRAWS 8 /* random numbers kept for one record: 3 position, 3 attitude, jitter */
+#define DRAWS 8 /* random numbers per record: 3 position, 3 attitude, jitter, a spare */
 
 struct sim_tracker {
 	struct incise_tracker tracker;
@@ -29,7 +29,7 @@ struct sim_tracker {
 	struct incise_sim *sim;
 	uint64_t key;
 	double hz;	    /* true, by the host's clock */
-	uint64_t n, first;  /* next record by the world's count; where seq 0 is */
+	uint64_t n, first;  /* next record by the world's count; that of seq 0 */
 	int64_t arrival_ns; /* of the last record */
 };
 
@@ -128,7 +128,7 @@ static void sim_tracker_close(struct incise_tracker *tracker)
 {
 	struct sim_tracker *t = of_tracker(tracker);
 
-	incise_sim_unlisten(t->sim, &t->stream);
+	incise_sim_remove_stream(t->sim, &t->stream);
 	incise_sim_ring_free(&t->ring);
 	free(t);
 }
@@ -144,13 +144,13 @@ struct incise_tracker *incise_sim_tracker_new(struct incise_sim *sim)
 {
 	const struct incise_sim_config *config = &sim->config;
 	double hz = config->tracker_hz * (1 + config->tracker_drift_ppm * 1e-6);
-	/* What is on its way needs room as well; no deviate exceeds 7 sd. */
-	double way_s =
+	/* The ring also holds records that have not arrived; no deviate exceeds 7 sd. */
+	double transit_s =
 		(config->tracker_latency_ms + 7 * config->tracker_jitter_ms) * 1e-3;
 	struct sim_tracker *t = calloc(1, sizeof(*t));
 
 	if (!t || incise_sim_ring_init(&t->ring, sizeof(struct incise_tracker_sample), hz,
-				       way_s)) {
+				       transit_s)) {
 		free(t);
 		errno = ENOMEM;
 		return NULL;
@@ -163,6 +163,6 @@ struct incise_tracker *incise_sim_tracker_new(struct incise_sim *sim)
 	t->stream.t_ns = incise_sim_time(t->n, hz);
 	t->stream.sample = sim_tracker_sample;
 	t->arrival_ns = INT64_MIN;
-	incise_sim_listen(sim, &t->stream);
+	incise_sim_add_stream(sim, &t->stream);
 	return &t->tracker;
 }

@@ -8,11 +8,11 @@
  *      0     ------\--------------------------------------------/-------- surface
  *   -depth           `-.________________________~~~~~~~~~~~~~~~'
  *
- * Each nominal depth is cut all its times before the next. The blade follows a path in
- * the x-z plane, with `progress` p from 0 to 1 along it. The hand's speed along the path
- * swings about its mean, so that every depth is met at every velocity; where the path is
- * steep the blade moves the less in x, so that its speed stays what the hand's is. Tremor
- * is across the cut and along z only: along x it would hide the slow phases.
+ * Each nominal depth is cut all its times before the next. The blade follows a path in the x-z
+ * plane, with progress p from 0 to 1 along it. The hand's speed along the path swings about its
+ * mean, so that every depth occurs at every velocity; where the path is steep the blade moves
+ * less in x, so that its speed remains the hand's. Tremor is across the cut and along z only:
+ * along x it would hide the slow phases.
  */
 #include <math.h>
 #include "../base/vector.h"
@@ -31,14 +31,18 @@
 #define DRIFT_TURNS 2.6 /* per cut */
 #define ONSET_S 0.15	/* the hand's time to reach speed and to stop */
 
-/* Pressing: how far above and below the surface, how often, and how that swings. */
+/* Pressing: heights above and below the surface, rate, and swing of the rate. */
 #define PRESS_FROM_MM 3.0
 #define PRESS_TO_MM 8.0
 #define PRESS_HZ 2.0
 #define PRESS_SWING_HZ 1.1
 #define PRESS_SWING_TURNS 0.13 /* per second */
 
-/* Golden angle: phases of consecutive cuts spread evenly, however many there are. */
+/* Initial height of a held scalpel; maximum number of reads. */
+#define HAND_ABOVE_MM 30.0
+#define HAND_TRIES 100
+
+/* Golden angle: phases of any number of consecutive cuts spread evenly. */
 #define GOLDEN 2.39996322972865332
 
 static const struct {
@@ -123,7 +127,7 @@ static struct curve hand_time(const struct incise_sim_config *config, double t)
 	return (struct curve){end - left * left / (2 * onset), left / onset};
 }
 
-/* Way along the path after a span of the hand's own time. */
+/* Distance along the path after a span of the hand's own time. */
 static struct curve way(const struct incise_sim_config *config, double phase, double hand)
 {
 	double w = 2 * M_PI * SWING_HZ;
@@ -219,7 +223,7 @@ static void blade_pausing(const struct incise_surgeon *surgeon, int cut, double 
 	blade->velocity_mm_s[2] = (AIR_MM - CLEARANCE_MM) * lift.slope / pause;
 }
 
-/* The tip rests in a dimple; how the tool leans, incise_surgeon_grip() says. */
+/* The tip rests in a dimple; incise_surgeon_grip() has the lean. */
 static void blade_turning(struct incise_blade *blade)
 {
 	*blade = (struct incise_blade){.cut = -1, .position_mm = {START_MM, 0, 0}};
@@ -227,7 +231,7 @@ static void blade_turning(struct incise_blade *blade)
 
 /*
  * Pressing on the tissue: from PRESS_FROM_MM above to PRESS_TO_MM below the surface, at a
- * rate that swings between PRESS_HZ ± PRESS_SWING_HZ, so that no two strokes are alike.
+ * rate that swings within PRESS_HZ ± PRESS_SWING_HZ, so that no two strokes are alike.
  */
 static void blade_pressing(const struct incise_surgeon *surgeon, double t,
 			   struct incise_blade *blade)
@@ -242,6 +246,51 @@ static void blade_pressing(const struct incise_surgeon *surgeon, double t,
 	blade->position_mm[2] = PRESS_FROM_MM - half + half * cos(angle);
 	if (s > 0)
 		blade->velocity_mm_s[2] = -half * rate * sin(angle);
+}
+
+void incise_hand_init(struct incise_hand *hand)
+{
+	atomic_store(&hand->turn, 0);
+	for (int i = 0; i < 10; i++)
+		atomic_store(&hand->pose[0][i], i == 2 ? HAND_ABOVE_MM : i == 6);
+}
+
+void incise_hand_move(struct incise_hand *hand, const double position_mm[3],
+		      const double velocity_mm_s[3], const double quaternion[4])
+{
+	uint64_t next = atomic_load_explicit(&hand->turn, memory_order_relaxed) + 1;
+
+	/* A reader that sees any of these also sees the turn before, and tries again. */
+	atomic_thread_fence(memory_order_release);
+	for (int i = 0; i < 10; i++)
+		atomic_store_explicit(&hand->pose[next & 1][i],
+				      i < 3   ? position_mm[i]
+				      : i < 6 ? velocity_mm_s[i - 3]
+					      : quaternion[i - 6],
+				      memory_order_relaxed);
+	atomic_store_explicit(&hand->turn, next, memory_order_release);
+}
+
+void incise_hand_look(const struct incise_hand *hand, double position_mm[3],
+		      double velocity_mm_s[3], double quaternion[4])
+{
+	/* A suspended writer is at the other pose: only two moves during this make it try
+	 * again. */
+	for (int try = 0; try < HAND_TRIES; try++) {
+		uint64_t turn = atomic_load_explicit(&hand->turn, memory_order_acquire);
+
+		for (int i = 0; i < 10; i++) {
+			double value = atomic_load_explicit(&hand->pose[turn & 1][i],
+							    memory_order_relaxed);
+
+			*(i < 3	  ? &position_mm[i]
+			  : i < 6 ? &velocity_mm_s[i - 3]
+				  : &quaternion[i - 6]) = value;
+		}
+		atomic_thread_fence(memory_order_acquire);
+		if (turn == atomic_load_explicit(&hand->turn, memory_order_relaxed))
+			return;
+	}
 }
 
 static void blade_held(const struct incise_surgeon *surgeon, struct incise_blade *blade)
@@ -337,7 +386,7 @@ void incise_surgeon_grip(const struct incise_surgeon *surgeon, int64_t t_ns,
 		return;
 	}
 	if (surgeon->config->motion == INCISE_SURGEON_TURNS) {
-		/* it leans all ways in turns, and turns about itself a little */
+		/* it leans in all directions in turn, and turns a little about itself */
 		double half = surgeon->config->cone_deg * M_PI / 360;
 		double tilt = half * (0.75 + 0.25 * sin(2 * M_PI * 0.37 * t));
 

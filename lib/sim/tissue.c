@@ -2,16 +2,16 @@
 /*
  * Cutting force of the virtual liver; see tissue.h. F = mean(depth, speed) · tooth · bound.
  *
- * Tooth: the tissue stretches along the cut until it tears, over and over. Its mean over
- * the path is 1, so that the mean force stays the stated law:
+ * Tooth: the tissue stretches along the cut until it tears, repeatedly. Its mean over the path
+ * is 1, so that the mean force follows the stated law:
  *
  *   1 + a      /|    /|      /|
  *   1         / |   / |     / |        teeth of random length, mean tooth_mm
  *   1 - a    /  |  /  |    /  |
  *          --------------------------▶ path
  *
- * Bound: how the slab happens to be held. A factor for each cut, and a drift by the size
- * of `boundary` in all along the slab, from the fixed, stiff end to the free one.
+ * Bound: the slab's support. A random factor for each cut, and a total drift of `boundary` along
+ * the slab, from the fixed, stiff end to the free one.
  *
  * Withdrawal follows the same law: the edge still lies in the cut and meets its walls.
  */
@@ -41,7 +41,7 @@ void incise_tissue_init(struct incise_tissue *tissue,
 void incise_tissue_advance(struct incise_tissue *tissue, const struct incise_blade *blade,
 			   double dt_s)
 {
-	/* what is not cut has no teeth */
+	/* only cutting has teeth */
 	if (blade->depth_mm <= 0 || tissue->config->motion != INCISE_SURGEON_CUTS)
 		return;
 	tissue->path_mm += blade->speed_mm_s * dt_s;
@@ -62,7 +62,7 @@ static double bound_factor(const struct incise_tissue *tissue,
 	double size = tissue->config->boundary;
 	double deviate = incise_random_normal(tissue->boundary_key, blade->boundary);
 
-	/* 2.5 sd: one cut in 80 is cut short; with the largest size it stays positive. */
+	/* 2.5 sd clips one cut in 80; at the largest size the factor stays positive. */
 	deviate = fmax(-2.5, fmin(2.5, deviate));
 	return (1 + size * deviate) * (1 + size * (0.5 - blade->slab));
 }

@@ -17,7 +17,7 @@ struct incise_tissue {
 	uint64_t teeth;
 };
 
-/* @config stays the caller's and must outlive @tissue. */
+/* @config must outlive @tissue. */
 void incise_tissue_init(struct incise_tissue *tissue,
 			const struct incise_sim_config *config);
 

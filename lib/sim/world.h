@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The world of the virtual rig: it goes forward in ticks of 100 µs and lets the streams
- * that listen take their samples on the way.
+ * The world of the virtual rig: it advances in ticks of 100 µs, and its streams take their
+ * samples on the way.
  *
  *   tick      0        1        2        3
  *   ──────────┼────────┼────────┼────────┼──▶ script time
  *   sample    *     *     *     *              each at its own time, from the state at
  *                                              the tick before it
  *
- * All of a tick's samples exist once the world has gone past it, so what they hold
- * depends neither on when and how often a device is read nor on which are open.
+ * All samples of a tick exist once the world has passed it. So their values depend neither on
+ * the times at which devices are read nor on the set of open devices.
  */
 #ifndef INCISE_SIM_WORLD_H
 #define INCISE_SIM_WORLD_H
@@ -21,7 +21,7 @@
 #include "tissue.h"
 
 #define INCISE_SIM_TICK_NS 100000
-#define INCISE_SIM_ROOM_S 2.5 /* of every stream: an fdatasync may stall for long */
+#define INCISE_SIM_RING_S 2.5 /* of each stream: an fdatasync may stall for long */
 
 /* One device that samples the world; embedded in it. */
 struct incise_sim_stream {
@@ -41,17 +41,17 @@ struct incise_sim {
 	struct incise_tissue tissue;
 	struct incise_blade blade; /* at t_ns */
 	struct incise_sim_stream *streams;
-	double load_N; /* hung on the sensor; NAN: the blade is on it */
-	/* What presses the force sensor on the bench, at a script time; or NULL. */
+	double load_N; /* weight on the sensor; NAN: the blade is on it */
+	/* Force on the sensor on the bench, at a script time; or NULL. */
 	double (*press_N)(struct incise_stepper *stepper, int64_t t_ns) INCISE_REALTIME;
 	struct incise_stepper *stepper;
 };
 
-/* Let a stream listen from the present tick on; its t_ns must not lie before that. */
-void incise_sim_listen(struct incise_sim *sim, struct incise_sim_stream *stream);
-void incise_sim_unlisten(struct incise_sim *sim, struct incise_sim_stream *stream);
+/* Add a stream from the present tick on; its t_ns must not be earlier. */
+void incise_sim_add_stream(struct incise_sim *sim, struct incise_sim_stream *stream);
+void incise_sim_remove_stream(struct incise_sim *sim, struct incise_sim_stream *stream);
 
-/* Go forward to the clock's time. Real-time safe. */
+/* Advance to the clock's time. Real-time safe. */
 void incise_sim_advance(struct incise_sim *sim) INCISE_REALTIME;
 
 /* The blade and the force on it at a time within the present tick. */
@@ -62,15 +62,44 @@ void incise_sim_sense(const struct incise_sim *sim, int64_t t_ns,
 uint64_t incise_sim_first(const struct incise_sim *sim, double hz);
 int64_t incise_sim_time(uint64_t n, double hz) INCISE_REALTIME;
 
+/*
+ * The virtual actuator on the bench: its handle is pressed against a stiff force sensor.
+ *
+ *   nut ─▶| backlash |─/\/\ spring, loss /\/\─ handle ─▶| sensor
+ *                                              friction
+ *
+ *       force N
+ *         |          __.   after turning round the force stands still for the backlash,
+ *         |        ,'  /   and until the handle breaks away; the spring's loss has the
+ *         |      ,'  ,'    opposite sign on the way back
+ *         |    ,'  ,'
+ *         +--------------- nut mm
+ *
+ * Quasi-static: a spring without mass, friction that does not depend on time. Starts with {0}.
+ */
+struct incise_bench {
+	double nut_mm;	  /* counted, when it was last looked at */
+	double lost_mm;	  /* of the count: steps that were not made */
+	double behind_mm; /* behind the backlash */
+	double loss_N;	  /* of the spring, now */
+	double force_N;	  /* on the sensor */
+	int sliding;	  /* the handle, which way; 0: it sticks */
+};
+
+/* The nut's count is at @nut_mm now, at a speed of @mm_s. */
+void incise_bench_follow(struct incise_bench *bench,
+			 const struct incise_sim_config *config, double nut_mm,
+			 double mm_s) INCISE_REALTIME;
+
 /* Samples on their way to a reader: records of one size, first in, first out. */
 struct incise_sim_ring {
-	size_t size, room; /* bytes of a record; records */
+	size_t size, capacity; /* bytes of a record; records */
 	size_t head, count;
-	uint64_t lost; /* oldest records that gave way to new ones */
+	uint64_t lost; /* oldest records, replaced by new ones */
 	char *records;
 };
 
-/* Room for 2.5 s and @extra_s at a rate. Returns 0 or -ENOMEM. */
+/* Capacity for 2.5 s and @extra_s at a rate. Returns 0 or -ENOMEM. */
 int incise_sim_ring_init(struct incise_sim_ring *ring, size_t size, double hz,
 			 double extra_s);
 void incise_sim_ring_free(struct incise_sim_ring *ring);

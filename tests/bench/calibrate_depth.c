@@ -15,8 +15,9 @@
 #include <string.h>
 #include <incise/calibrate_depth.h>
 #include <incise/rig.h>
-#include <incise/sim.h>
 #include <incise/vision.h>
+#include "../../lib/base/random.h"
+#include "../../lib/sim/sim.h"
 
 #define RIGS 200
 #define IN_AIR 10
@@ -31,11 +32,7 @@ static uint64_t state;
 
 static double uniform(void)
 {
-	uint64_t z = state += 0x9e3779b97f4a7c15u;
-
-	z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-	z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-	return (((z ^ (z >> 31)) >> 11) + 0.5) * 0x1p-53;
+	return ((incise_random_mix(state += 0x9e3779b97f4a7c15u) >> 11) + 0.5) * 0x1p-53;
 }
 
 static double normal(void)

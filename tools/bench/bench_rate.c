@@ -20,13 +20,13 @@
 #include <string.h>
 #include <incise/backend.h>
 #include <incise/plan.h>
-#include <incise/sim.h>
 #include "bench_rate.h"
 #include "../cli/cli.h"
 #include "metrics.h"
 #include "../cli/json.h"
 #include "../cli/file.h"
 #include "../cli/tick_cost.h"
+#include "../../lib/sim/sim.h"
 
 /* Whole numbers of ns, and multiples of all rates. */
 #define POINT_HZ 64000

@@ -5,9 +5,9 @@
 #include <math.h>
 #include <string.h>
 #include <incise/clock.h>
-#include <incise/sim.h>
 #include "../cli/cli.h"
 #include "motions.h"
+#include "../../lib/sim/sim.h"
 
 /* A value and its slope. */
 struct curve {

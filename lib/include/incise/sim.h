@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The virtual rig: a slab of liver with known truth, a surgeon who cuts it, and the
- * devices that watch. For demos, tests and development. Deterministic by seed: the same
- * configuration gives the same samples, in real and in simulated time.
+ * The virtual rig: a slab of liver with known truth, a surgeon who cuts it, and the devices that
+ * measure it. For demos, tests and development. Deterministic by seed: the same configuration
+ * gives the same samples, in real and in simulated time.
  *
  * Frame: z is the outward normal of the surface, which lies at z = 0; the cut runs along
  * +x from the fixed end at x = 0 towards the free end. Depth is -z of the blade's tip.
@@ -18,22 +18,23 @@
 
 INCISE_BEGIN_DECLS
 
-/** Nominal depths that cuts take turns at, at most. */
+/** Maximum number of nominal depths. */
 #define INCISE_SIM_DEPTHS_MAX 8
 
 /**
- * Everything that can be set. The names are the keys of the `sim` group in rig.conf.
+ * The configuration. The names are the keys of the `sim` group in rig.conf.
  * incise_sim_config_init() gives the defaults named here.
  */
 struct incise_sim_config {
 	uint64_t seed; /**< 1 */
 
-	/* What the surgeon does, for as long as the cuts would take: 0 cuts; 1 turns the
-	 * tool about its tip, which rests at the start of the cuts; 2 presses on the tissue
-	 * over and over, without cutting it: then it has no teeth; 3 is where
-	 * incise_sim_hold() says. */
+	/*
+	 * The surgeon's motion, for the duration of the cuts: 0 cuts; 1 turns the tool about
+	 * its tip, which rests at the start of the cuts; 2 presses on the tissue repeatedly
+	 * without cutting it, so that it has no teeth; 3 holds the pose of incise_sim_hold().
+	 */
 	int motion;	 /**< 0 */
-	double cone_deg; /**< 80; that the tool sweeps when it is turned, 0 … 170 */
+	double cone_deg; /**< 80; opening angle of the turning tool's cone, 0 … 170 */
 
 	/* The surgeon: a list of cuts, each nominal depth repeated, then rest. */
 	int n_depths;				/**< 4 */
@@ -60,7 +61,7 @@ struct incise_sim_config {
 	double tracker_latency_ms; /**< 4.2 */
 	double tracker_jitter_ms;  /**< 0.2; sd of extra latency, never negative */
 	double tracker_drift_ppm;  /**< 50; its clock runs this much fast */
-	/** 0 0 0; of the true tip from what the tracker takes for it, in the scalpel's frame */
+	/** 0 0 0; of the true tip from the tracker's, in the scalpel's frame */
 	double tip_x_mm, tip_y_mm, tip_z_mm;
 
 	/* Force channel. */
@@ -85,42 +86,18 @@ struct incise_sim_config {
 	double hand_N_mm;	  /**< 1; stiffness of the hand's grip */
 	double hand_N_s_mm;	  /**< 0.01; damping of the hand's grip */
 
-	/* Bench: the handle presses the force sensor, and the force channel shows that. */
+	/* Bench: the handle presses the force sensor, and the force channel measures that. */
 	int bench;	     /**< 0; 1: the actuator stands on the bench */
 	double backlash_mm;  /**< 0; play in front of the spring */
-	double hysteresis_N; /**< 0; loss of the spring between the two ways */
-	double stiction_N;   /**< 0; that the handle holds more than it rubs */
+	double hysteresis_N; /**< 0; loss of the spring between the two directions */
+	double stiction_N;   /**< 0; static friction minus sliding friction */
 	double stall_mm_s;   /**< 0; a faster nut loses its steps; 0: none does */
-};
-
-/** What is true at one instant, which no device shows undisturbed. */
-struct incise_sim_truth {
-	int64_t t_ns;
-	int cut;	       /**< 0 … of the cut under way, -1 between cuts */
-	double position_mm[3]; /**< tip of the blade */
-	double quaternion[4];  /**< w first */
-	double depth_mm;       /**< ≥ 0; 0 in the air */
-	double velocity_mm_s;  /**< speed of the tip */
-	double force_N;	       /**< on the blade, saw-tooth and boundary included */
 };
 
 struct incise_sim;
 
 /** Defaults as documented above. */
 INCISE_API void incise_sim_config_init(struct incise_sim_config *config);
-
-/**
- * Make a virtual rig; time 0 of its script is the clock's time at this call.
- *
- * @return sim, to be freed with incise_sim_free() after the devices that use it; NULL
- *         with errno EINVAL (a value out of range: the message names key and range), ENOMEM.
- */
-INCISE_API struct incise_sim *incise_sim_new(const struct incise_sim_config *config,
-					     struct incise_clock *clock,
-					     struct incise_error *err);
-
-/** NULL is accepted. */
-INCISE_API void incise_sim_free(struct incise_sim *sim);
 
 /** The configuration in use; owned by @sim. */
 INCISE_API const struct incise_sim_config *incise_sim_config(
@@ -129,27 +106,24 @@ INCISE_API const struct incise_sim_config *incise_sim_config(
 /** Length of the script: all cuts with their pauses, ns. */
 INCISE_API int64_t incise_sim_duration(const struct incise_sim *sim);
 
-/** The truth at the clock's present time. */
-INCISE_API void incise_sim_truth(struct incise_sim *sim, struct incise_sim_truth *truth);
-
 /**
- * Hang a weight on the force sensor, in place of the blade, from the clock's present time on:
- * nobody else can on a virtual rig. 0 is the empty pan; NAN gives it the blade back.
+ * Hang a weight on the force sensor, in place of the blade, from the clock's present time on.
+ * 0 is the empty pan; NAN restores the blade.
  */
 INCISE_API void incise_sim_load(struct incise_sim *sim, double load_N);
 
 /**
- * Hold the scalpel there from now on, with motion 3: what moves it is a mouse, or a script.
- * From one thread, beside the one that reads the devices; real-time safe.
+ * Hold the scalpel at a pose from now on, with motion 3: a mouse or a script moves it. From one
+ * thread, next to the one that reads the devices; real-time safe.
  *
- * @param position_mm   of the tip; @param velocity_mm_s how it moves
+ * @param position_mm   of the tip; @param velocity_mm_s of the tip
  * @param quaternion    unit, w first
  * @return 0, -EINVAL (another motion, or not finite, or more than 1e6 mm)
  */
 INCISE_API int incise_sim_hold(struct incise_sim *sim, const double position_mm[3],
 			       const double velocity_mm_s[3], const double quaternion[4]);
 
-/** Force without saw-tooth and boundary effect: what a model can at best learn. */
+/** Force without saw-tooth and boundary effect: the best that a model can learn. */
 INCISE_API double incise_sim_mean_force(const struct incise_sim_config *config,
 					double depth_mm, double velocity_mm_s);
 

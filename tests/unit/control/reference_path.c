@@ -30,11 +30,11 @@
 #include <math.h>
 #include <incise/clock.h>
 #include <incise/rig.h>
-#include <incise/sim.h>
 #include <incise/tracker.h>
 #include "../../../lib/base/vector.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/control/predict.h"
+#include "../../../lib/sim/sim.h"
 
 #define REFERENCE_LATENCY_NS 4200000
 #define REFERENCE_NOISE_MM 0.02

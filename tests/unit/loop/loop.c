@@ -233,38 +233,38 @@ static void test_real_clock(void **state)
 	felt_end(&f);
 }
 
-struct told {
+struct listener {
 	int64_t begin_ns, stall_ns;
 	int ticks, end_at, end_by;
 };
 
 static int tell(void *context, const struct incise_tick *tick)
 {
-	struct told *told = context;
+	struct listener *listener = context;
 
-	assert_int_equal(tick->t_ns, told->begin_ns + ++told->ticks * 1000000LL);
-	if (told->ticks == 3 && told->stall_ns)
-		clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){0, told->stall_ns},
-				NULL);
-	return told->ticks == told->end_at ? told->end_by : 0;
+	assert_int_equal(tick->t_ns, listener->begin_ns + ++listener->ticks * 1000000LL);
+	if (listener->ticks == 3 && listener->stall_ns)
+		clock_nanosleep(CLOCK_MONOTONIC, 0,
+				&(struct timespec){0, listener->stall_ns}, NULL);
+	return listener->ticks == listener->end_at ? listener->end_by : 0;
 }
 
-static void test_who_is_told_of_ticks_ends_the_loop(void **state)
+static void test_callback_ends_the_loop(void **state)
 {
-	struct told told = {.end_at = 17, .end_by = -ENOSPC};
+	struct listener listener = {.end_at = 17, .end_by = -ENOSPC};
 	struct incise_loop_options options = {.rate_hz = 1000,
 					      .duration_ns = INCISE_NS_PER_S,
 					      .ticked = tell,
-					      .context = &told};
+					      .context = &listener};
 	struct incise_error err = {0};
 	struct felt f;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	told.begin_ns = incise_clock_now(incise_rig_clock(f.rig));
+	listener.begin_ns = incise_clock_now(incise_rig_clock(f.rig));
 	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
 					 &stats, &err),
 			 -ENOSPC);
-	assert_int_equal(told.ticks, 17);
+	assert_int_equal(listener.ticks, 17);
 	assert_int_equal(stats.ticks, 17);
 	/* no device is blamed */
 	assert_int_equal(err.code, 0);
@@ -274,17 +274,17 @@ static void test_who_is_told_of_ticks_ends_the_loop(void **state)
 /* On a paced clock a stall of many periods costs no tick, and each has its own time. */
 static void test_paced_clock(void **state)
 {
-	struct told told = {.begin_ns = 777, .stall_ns = 12000000};
+	struct listener listener = {.begin_ns = 777, .stall_ns = 12000000};
 	struct incise_loop_options options = {.rate_hz = 1000,
 					      .duration_ns = 40000000,
 					      .ticked = tell,
-					      .context = &told};
+					      .context = &listener};
 	struct incise_clock *clock = incise_clock_new_paced(777);
 	struct felt f;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
 	assert_int_equal(incise_loop_run(f.plan, clock, &options, &stats, NULL), 0);
-	assert_int_equal(told.ticks, 40);
+	assert_int_equal(listener.ticks, 40);
 	assert_int_equal(stats.ticks, 40);
 	assert_int_equal(stats.skipped, 0);
 	/* The tick after the stall was due 1 ms after the third. */
@@ -557,7 +557,7 @@ int main(void)
 		cmocka_unit_test(test_device_failure_ends_the_loop),
 		cmocka_unit_test(test_refused_options),
 		cmocka_unit_test(test_real_clock),
-		cmocka_unit_test(test_who_is_told_of_ticks_ends_the_loop),
+		cmocka_unit_test(test_callback_ends_the_loop),
 		cmocka_unit_test(test_paced_clock),
 		cmocka_unit_test(test_quantile),
 		cmocka_unit_test(test_stop_fades),

@@ -97,7 +97,7 @@ static void test_ring_that_went_round(void **state)
 struct busy {
 	struct made made;
 	atomic_bool stop;
-	int64_t told;
+	int64_t written;
 };
 
 /* Like a loop: some ticks, then a pause in which a reader succeeds. */
@@ -106,10 +106,10 @@ static void *tell(void *arg)
 	struct busy *busy = arg;
 
 	while (!atomic_load(&busy->stop)) {
-		int64_t more = 1 + busy->told % 50;
+		int64_t more = 1 + busy->written % 50;
 
-		made_ticks(busy->made.writer, busy->told, busy->told + more);
-		busy->told += more;
+		made_ticks(busy->made.writer, busy->written, busy->written + more);
+		busy->written += more;
 		for (int i = 0; i < 4; i++)
 			sched_yield();
 	}
@@ -172,7 +172,7 @@ static void test_beside_a_writer(void **state)
 	atomic_store(&busy.stop, true);
 	pthread_join(thread, NULL);
 	assert_int_equal(incise_state_read(reader, &now), 0);
-	assert_int_equal(now.ticks, busy.told);
+	assert_int_equal(now.ticks, busy.written);
 	whole();
 	incise_state_close(reader);
 	made_free(&busy.made);
@@ -305,7 +305,7 @@ static void test_places_astray(void **state)
 			reader = incise_state_open(made.path, NULL);
 			if (!reader)
 				continue;
-			/* Wrong numbers may be read, but within the file. */
+			/* Wrong numbers may be read, but only within the file. */
 			opened++;
 			incise_state_read(reader, &now);
 			incise_state_ticks(reader, &cursor, ticks, 100, NULL);

@@ -12,9 +12,9 @@
 #include <math.h>
 #include <incise/fixed.h>
 #include "../../../lib/fixed/spring.h"
-#include <incise/sim.h>
 #include <time.h>
 #include "fed.h"
+#include "../../../lib/sim/sim.h"
 
 #define LIMITED (INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED)
 #define BOTH (INCISE_RIG_TRACKER | INCISE_RIG_STEPPER)

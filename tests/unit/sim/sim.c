@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/sim/sim.c: one world, whoever looks at it, however often and by which clock.
+ * lib/sim/sim.c: one world, independent of readers, their rate and their clock; its rings.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -16,7 +16,7 @@
 #define START_NS INCISE_NS_PER_S
 #define MAX 120000
 
-/* All that a run of some seconds gave. */
+/* All samples of a run of some seconds. */
 struct log {
 	struct incise_force_sample force[MAX];
 	struct incise_tracker_sample tracker[MAX];
@@ -26,7 +26,7 @@ struct log {
 
 static struct log first, second;
 
-/* A way to read: which devices are open, how long between reads, how many at a time. */
+/* A pattern of reading: open devices, time between reads, samples per read. */
 struct manner {
 	bool force, tracker, camera;
 	int64_t step_ns[3]; /* in turn */
@@ -92,7 +92,7 @@ static void run(uint64_t seed, double seconds, const struct manner *manner,
 	incise_clock_free(clock);
 }
 
-/* Field by field: what lies between the fields is no part of a sample. */
+/* Field by field: padding is not compared. */
 static bool force_equal(const struct log *a, const struct log *b, int n)
 {
 	for (int i = 0; i < n; i++)
@@ -158,7 +158,7 @@ static void what_is_not_taken_is_lost_and_counted(void **state)
 		true, true, false, {10000000000, 10000000000, 10000000000}, MAX};
 
 	run(1, 10, &late, &first);
-	/* The newest 2.5 s or a little more are there, and end where the run does. */
+	/* The newest 2.5 s or a little more remain, up to the end of the run. */
 	assert_true(first.n_force >= 25000 && first.n_force < 25010);
 	assert_int_equal(first.force[first.n_force - 1].seq, 99999);
 	assert_true(first.n_tracker >= 300 && first.n_tracker < 310);
@@ -316,6 +316,40 @@ static void bad_configuration_is_refused(void **state)
 	incise_clock_free(clock);
 }
 
+static void ring_keeps_order_and_counts_losses(void **state)
+{
+	struct incise_sim_ring ring;
+	int next = 0, expected = 0, taken = 0;
+
+	assert_int_equal(incise_sim_ring_init(&ring, sizeof(int), 4, 0.25), 0);
+	/* 4 Hz for 2.5 s and 0.25 s more. */
+	assert_true(ring.capacity >= 11);
+	assert_null(incise_sim_ring_peek(&ring));
+	/* Several rounds of more pushes than pops, then the rest. */
+	for (int round = 0; round < 10; round++) {
+		for (int i = 0; i < 7; i++, next++)
+			incise_sim_ring_push(&ring, &next);
+		for (int i = 0; i < 5; i++) {
+			int value = *(const int *)incise_sim_ring_peek(&ring);
+
+			/* Gaps only forward, and each one counted. */
+			assert_true(value >= expected);
+			expected = value + 1;
+			taken++;
+			incise_sim_ring_pop(&ring);
+		}
+	}
+	while (incise_sim_ring_peek(&ring)) {
+		expected = *(const int *)incise_sim_ring_peek(&ring) + 1;
+		taken++;
+		incise_sim_ring_pop(&ring);
+	}
+	assert_int_equal(expected, next); /* the newest is never dropped */
+	assert_true(ring.lost > 0);
+	assert_int_equal(taken + ring.lost, next);
+	incise_sim_ring_free(&ring);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -327,6 +361,7 @@ int main(void)
 		cmocka_unit_test(truth_is_the_law_without_disturbance),
 		cmocka_unit_test(tooth_goes_on_between_ticks),
 		cmocka_unit_test(bad_configuration_is_refused),
+		cmocka_unit_test(ring_keeps_order_and_counts_losses),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/sim/sim_camera.c: the scalpel in the picture is as long as the truth says, measured
- * here from pixels alone; pictures keep their times and count their losses.
+ * lib/sim/sim_camera.c: the scalpel in the frame has its true length, measured
+ * from pixels alone; frames keep their times and count their losses.
  */
 #include <stdarg.h>
 #include <stddef.h>

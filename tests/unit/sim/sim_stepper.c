@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/sim/sim_stepper.c: limits kept, faults told, and a handle that moves as the
- * equation of motion says, however stiff.
+ * lib/sim/sim_stepper.c: limits, faults, and a handle that obeys the equation of motion at any
+ * stiffness; on the bench backlash, loss, friction and lost steps, and the force channel.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,6 +12,7 @@
 #include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/sim/sim.h"
+#include "../../../lib/sim/world.h"
 
 #define START_NS INCISE_NS_PER_S
 #define TICK_NS 100000
@@ -50,7 +51,7 @@ static struct incise_stepper_status rig_after(struct rig *rig, int64_t ns)
 	return status;
 }
 
-/* Hold a target for some time, renewed before the deadman misses it. */
+/* Hold a target for some time, renewed before the deadman acts. */
 static struct incise_stepper_status rig_hold(struct rig *rig, double mm, double seconds)
 {
 	for (int i = 0; i < seconds * 20; i++) {
@@ -148,7 +149,7 @@ static void target_is_reached_in_the_time_of_a_trapezoid(void **state)
 	rig_free(&rig);
 }
 
-static void faults_are_told(void **state)
+static void faults_are_reported(void **state)
 {
 	struct incise_sim_config config;
 	struct incise_stepper_status s;
@@ -166,7 +167,7 @@ static void faults_are_told(void **state)
 	assert_true(s.position_mm == 0);
 	s = rig_hold(&rig, 1, 1);
 	assert_int_equal(s.faults, 0);
-	/* No number is no target, and no sign of life either. */
+	/* A NaN is neither a target nor a heartbeat. */
 	assert_int_equal(incise_stepper_set(rig.stepper, 1), 0);
 	rig_after(&rig, 60000000);
 	assert_int_equal(incise_stepper_set(rig.stepper, NAN), -EDOM);
@@ -327,7 +328,7 @@ static void asking_changes_nothing(void **state)
 	assert_int_equal(end[0].t_ns, end[1].t_ns);
 }
 
-static void it_is_always_powered_and_says_how_it_moves(void **state)
+static void it_is_always_powered_and_reports_its_motion(void **state)
 {
 	struct incise_sim_config config;
 	struct incise_stepper_status s;
@@ -355,7 +356,7 @@ static void it_is_always_powered_and_says_how_it_moves(void **state)
 	assert_int_equal(s.state, INCISE_STEPPER_READY);
 	assert_int_equal(incise_stepper_clear(rig.stepper, NULL), 0);
 	assert_int_equal(rig_after(&rig, 0).faults, 0);
-	/* Disabled, it goes to no force, and misses nobody. */
+	/* Disabled, it moves to zero force, without a deadman. */
 	rig_hold(&rig, 5, 1);
 	assert_int_equal(incise_stepper_disable(rig.stepper, NULL), 0);
 	s = rig_after(&rig, INCISE_NS_PER_S);
@@ -382,19 +383,152 @@ static void info_is_the_configuration(void **state)
 	rig_free(&rig);
 }
 
+/* Move in microsteps; returns the force. */
+static double go(struct incise_bench *bench, const struct incise_sim_config *config,
+		 double to_mm, double mm_s)
+{
+	double from = bench->nut_mm;
+	int n = 1 + (int)ceil(fabs(to_mm - from) / 0.0005);
+
+	for (int i = 1; i <= n; i++)
+		incise_bench_follow(bench, config, from + (to_mm - from) * i / n, mm_s);
+	return bench->force_N;
+}
+
+/* Rounding only. */
+static bool same(double a, double b)
+{
+	return fabs(a - b) < 1e-9;
+}
+
+static void bench_agrees_with_hand_calculation(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_bench b = {0};
+
+	incise_sim_config_init(&config);
+	config.handle_friction_N = 0;
+	assert_true(same(go(&b, &config, 1, 0), 2) && same(go(&b, &config, 0.5, 0), 1));
+
+	config.backlash_mm = 0.1;
+	b = (struct incise_bench){0};
+	assert_true(same(go(&b, &config, 1, 0), 1.9));
+	assert_true(same(go(&b, &config, 0.9, 0), 1.9));
+	assert_true(same(go(&b, &config, 0.5, 0), 1.1));
+
+	config.backlash_mm = 0;
+	config.hysteresis_N = 0.1;
+	b = (struct incise_bench){0};
+	assert_true(same(go(&b, &config, 1, 0), 2.05));
+	assert_true(same(go(&b, &config, 0.5, 0), 0.95));
+
+	/* Friction of 0.02 N, and 0.05 N more at rest. */
+	config.hysteresis_N = 0;
+	config.handle_friction_N = 0.02;
+	config.stiction_N = 0.05;
+	b = (struct incise_bench){0};
+	assert_true(same(go(&b, &config, 1, 0), 1.98));
+	assert_true(same(go(&b, &config, 0.956, 0), 1.98)); /* less than 0.09 N */
+	assert_true(same(go(&b, &config, 0.954, 0), 1.928));
+	assert_true(same(go(&b, &config, 0.5, 0), 1.02));
+
+	/* Lost steps stay lost. */
+	config.handle_friction_N = config.stiction_N = 0;
+	config.stall_mm_s = 10;
+	b = (struct incise_bench){0};
+	assert_true(same(go(&b, &config, 0.5, 10), 1));
+	assert_true(same(go(&b, &config, 0.6, 10.1), 1));
+	assert_true(same(go(&b, &config, 1, 5), 1.8));
+}
+
+/* The mean force of the channel's last samples, by its true sensitivity. */
+static double channel_N(struct incise_force *force,
+			const struct incise_sim_config *config)
+{
+	struct incise_force_sample s[64];
+	double sum = 0;
+	int n, all = 0;
+
+	while ((n = force->ops->read(force, s, 64)) > 0)
+		for (int i = 0; i < n; i++, all++)
+			sum += s[i].code;
+	return (sum / all * 5000 / 4096 - config->force_zero_mV) / config->force_mV_N;
+}
+
+static void force_channel_shows_the_bench(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_simulated(0);
+	struct incise_stepper *stepper;
+	struct incise_sim_config config;
+	struct incise_force *force;
+	struct incise_sim *sim;
+
+	incise_sim_config_init(&config);
+	config.bench = 1;
+	config.handle_friction_N = 0;
+	config.backlash_mm = 0.1;
+	sim = incise_sim_new(&config, clock, NULL);
+	force = incise_sim_force_new(sim);
+	stepper = incise_sim_stepper_new(sim);
+	for (int i = 1; i < 20; i++) {
+		assert_int_equal(stepper->ops->set(stepper, 1), 0);
+		incise_clock_wait_until(clock, i * 20000000);
+	}
+	channel_N(force, &config);
+	stepper->ops->set(stepper, 1);
+	incise_clock_wait_until(clock, 430000000);
+	/* 500 samples of 3 mV and a code of 1.2 mV: 0.11 mN; five of them. */
+	assert_true(fabs(channel_N(force, &config) - 1.9) < 6e-4);
+	/* At a speed, which it keeps. */
+	assert_int_equal(stepper->ops->jog(stepper, 2), 0);
+	incise_clock_wait_until(clock, 500000000);
+	channel_N(force, &config);
+	stepper->ops->jog(stepper, 0);
+	incise_clock_wait_until(clock, 550000000);
+	channel_N(force, &config);
+	incise_clock_wait_until(clock, 600000000);
+	/* 2 mm/s for 70 ms, and 0.7 µm to stop; a step is 0.6 µm. */
+	assert_true(fabs(channel_N(force, &config) - 1.9 - 0.28) < 4e-3);
+	stepper->ops->close(stepper);
+	incise_clock_wait_until(clock, 700000000);
+	channel_N(force, &config);
+	force->ops->close(force);
+	incise_sim_free(sim);
+	incise_clock_free(clock);
+}
+
+static void jog_is_for_the_bench_only(void **state)
+{
+	struct incise_clock *clock = incise_clock_new_simulated(0);
+	struct incise_stepper *stepper;
+	struct incise_sim_config config;
+	struct incise_sim *sim;
+
+	incise_sim_config_init(&config);
+	sim = incise_sim_new(&config, clock, NULL);
+	stepper = incise_sim_stepper_new(sim);
+	assert_int_equal(stepper->ops->jog(stepper, 1), -EOPNOTSUPP);
+	stepper->ops->close(stepper);
+	incise_sim_free(sim);
+	incise_clock_free(clock);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(spring_law_at_rest),
 		cmocka_unit_test(limits_are_never_exceeded),
 		cmocka_unit_test(target_is_reached_in_the_time_of_a_trapezoid),
-		cmocka_unit_test(faults_are_told),
+		cmocka_unit_test(faults_are_reported),
 		cmocka_unit_test(handle_moves_as_the_equation_says),
 		cmocka_unit_test(friction_holds),
 		cmocka_unit_test(bounded_however_stiff),
 		cmocka_unit_test(asking_changes_nothing),
-		cmocka_unit_test(it_is_always_powered_and_says_how_it_moves),
+		cmocka_unit_test(it_is_always_powered_and_reports_its_motion),
 		cmocka_unit_test(info_is_the_configuration),
+		cmocka_unit_test(bench_agrees_with_hand_calculation),
+		cmocka_unit_test(force_channel_shows_the_bench),
+		cmocka_unit_test(jog_is_for_the_bench_only),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

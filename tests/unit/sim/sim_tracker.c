@@ -184,7 +184,7 @@ static void info_is_nominal(void **state)
 	incise_sim_config_init(&config);
 	rig = rig_new(&config);
 	incise_tracker_info(rig.tracker, &info);
-	assert_true(info.rate_hz == 120); /* drift is for the reader to find out */
+	assert_true(info.rate_hz == 120); /* the drift is not reported */
 	assert_int_equal(info.latency_ns, 4200000);
 	assert_string_equal(info.name, "virtual tracker");
 	rig_free(&rig);

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/sim/surgeon.c: smooth motion, the protocol kept, every depth met at every speed.
+ * lib/sim/surgeon.c: smooth motion, the protocol, every depth at every speed; a pose that a program
+ * holds reaches the tracker whole, and bad ones are refused.
  */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <errno.h>
 #include <math.h>
+#include <pthread.h>
+#include <incise/rig.h>
+#include "../../../lib/sim/sim.h"
 #include "../../../lib/sim/surgeon.h"
 
 #define TREMOR_MM 0.035 /* a little over the amplitude in y and z */
@@ -23,8 +28,8 @@ static void velocity_is_the_derivative(void **state)
 	/*
 	 * Central difference over ±50 µs: its error is h²/6·jerk ≈ 4e-10·jerk, and at
 	 * joints of the path, where acceleration jumps, h/4·jump: at most 600 mm/s² in a
-	 * pause, 2·25·2π·1.6·0.9 in a cut and 5.5·(4π)² where pressing begins, so 0.02 mm/s is ample and far below any
-	 * wrong term.
+	 * pause, 2·25·2π·1.6·0.9 in a cut and 5.5·(4π)² where pressing begins. So 0.02 mm/s is
+	 * ample, and far below any wrong term.
 	 */
 	for (int64_t t = 50000; t < incise_surgeon_duration(&surgeon); t += 1234567) {
 		struct incise_blade before, at, after;
@@ -134,7 +139,7 @@ static void grip_is_a_rotation(void **state)
 	}
 }
 
-/* The tip rests while the tool sweeps the cone that was asked for, and no more. */
+/* The tip rests while the tool sweeps the configured cone, and no more. */
 static void a_turn_is_about_the_tip(void **state)
 {
 	struct incise_sim_config config;
@@ -189,6 +194,86 @@ static void pressing_goes_into_the_tissue_and_out(void **state)
 	assert_in_range(strokes, 15, 25); /* about twice a second */
 }
 
+static void a_held_pose_reaches_the_tracker(void **state)
+{
+	struct incise_rig *rig = incise_rig_open(
+		"sim:mouse,clock=simulated,tracker_noise_mm=0", INCISE_RIG_TRACKER, NULL);
+	const double at[] = {10, -3, -2}, still[3] = {0}, turned[] = {0.6, 0, 0.8, 0};
+	struct incise_tracker_sample samples[64];
+	struct incise_sim_truth truth;
+	int n;
+
+	assert_non_null(rig);
+	assert_int_equal(incise_sim_hold(incise_rig_sim(rig), at, still, turned), 0);
+	incise_clock_wait_until(incise_rig_clock(rig),
+				incise_clock_now(incise_rig_clock(rig)) + 200000000);
+	n = incise_tracker_read(incise_rig_tracker(rig), samples, 64);
+	assert_in_range(n, 20, 25); /* 120 Hz, 0.2 s */
+	for (int i = 0; i < 3; i++)
+		assert_true(fabs(samples[n - 1].position_mm[i] - at[i]) < 1e-9);
+	/* Attitude has noise of 0.025 degrees, 0.4 mrad. */
+	for (int i = 0; i < 4; i++)
+		assert_true(fabs(samples[n - 1].quaternion[i] - turned[i]) < 4e-3);
+	incise_sim_truth(incise_rig_sim(rig), &truth);
+	assert_true(truth.depth_mm == 2 && truth.cut == -1);
+	incise_rig_close(rig);
+}
+
+static void bad_poses_are_refused(void **state)
+{
+	struct incise_rig *rig =
+		incise_rig_open("sim:clock=simulated", INCISE_RIG_TRACKER, NULL);
+	const double zero[3] = {0}, whole[] = {1, 0, 0, 0}, half[] = {0.5, 0, 0, 0};
+	const double bad[] = {0, NAN, 0}, far[] = {0, 0, 1e7};
+
+	/* Only motion 3 can be held. */
+	assert_int_equal(incise_sim_hold(incise_rig_sim(rig), zero, zero, whole),
+			 -EINVAL);
+	incise_rig_close(rig);
+	rig = incise_rig_open("sim:mouse,clock=simulated", INCISE_RIG_TRACKER, NULL);
+	assert_int_equal(incise_sim_hold(incise_rig_sim(rig), bad, zero, whole), -EINVAL);
+	assert_int_equal(incise_sim_hold(incise_rig_sim(rig), zero, bad, whole), -EINVAL);
+	assert_int_equal(incise_sim_hold(incise_rig_sim(rig), far, zero, whole), -EINVAL);
+	assert_int_equal(incise_sim_hold(incise_rig_sim(rig), zero, zero, half), -EINVAL);
+	assert_int_equal(incise_sim_hold(incise_rig_sim(rig), zero, zero, whole), 0);
+	incise_rig_close(rig);
+}
+
+static void *move_hand(void *argument)
+{
+	struct incise_hand *hand = argument;
+
+	for (int i = 1; i <= 200000; i++) {
+		const double p[] = {i, i, i}, v[] = {i, i, i}, q[] = {i, i, i, i};
+
+		incise_hand_move(hand, p, v, q);
+	}
+	return NULL;
+}
+
+/* No pose is a mix of two, whatever the interleaving. */
+static void held_poses_are_whole(void **state)
+{
+	struct incise_hand hand;
+	pthread_t thread;
+	double p[3], v[3], q[4], last = 0;
+	long mixed = 0, looks = 0;
+
+	incise_hand_init(&hand);
+	incise_hand_move(&hand, (const double[3]){0}, (const double[3]){0},
+			 (const double[4]){0});
+	assert_int_equal(pthread_create(&thread, NULL, move_hand, &hand), 0);
+	while (p[0] = 0, incise_hand_look(&hand, p, v, q), p[0] < 200000) {
+		looks++;
+		mixed += p[2] != p[0] || v[1] != p[0] || q[3] != p[0];
+		assert_true(p[0] >= last);
+		last = p[0];
+	}
+	pthread_join(thread, NULL);
+	assert_int_equal(mixed, 0);
+	assert_true(looks > 0);
+}
+
 int main(void)
 {
 	static int cuts = INCISE_SURGEON_CUTS, turns = INCISE_SURGEON_TURNS,
@@ -202,6 +287,9 @@ int main(void)
 		cmocka_unit_test(protocol_is_kept),
 		cmocka_unit_test(every_depth_at_every_speed),
 		cmocka_unit_test(grip_is_a_rotation),
+		cmocka_unit_test(a_held_pose_reaches_the_tracker),
+		cmocka_unit_test(bad_poses_are_refused),
+		cmocka_unit_test(held_poses_are_whole),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
