@@ -109,7 +109,7 @@ $(objects_vision_opencv): pc_cflags = $(opencv_cflags)
 # Detection of a board; it needs more of OpenCV, which a measurement of depth need not map.
 device_modules += $(if $(has_board),board_opencv)
 pc_board_opencv :=
-objects_board_opencv := $(addprefix $(O)/obj/lib/,vision/picture.o vision/jpeg.o \
+objects_board_opencv := $(addprefix $(O)/obj/lib/,vision/image.o vision/jpeg.o \
 	vision/board/board_opencv.o)
 libs_board_opencv := -lopencv_calib3d $(libs_vision_opencv)
 $(O)/obj/lib/vision/board/board_opencv.o: pc_cflags = $(opencv_cflags)

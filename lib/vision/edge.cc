@@ -1,42 +1,199 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Where an end of the handle is; see edge.h. Pixels are taken where they are, none is
- * interpolated:
+ * An end of the handle to a few hundredths of a pixel. Pixels are used at their own places,
+ * without interpolation:
  *
- *   value    ·····──────   beyond      1. strips along the axis say where, and how slanted
+ *   value    ·····──────   beyond      1. strips along the axis give place and slant
  *          /                           2. medians over the width, a curve fitted to them
- *   ──────/                handle      3. pixels that are off that curve are thrown out
- *         u                            4. means of the others, the curve once more
+ *   ──────/                handle      3. pixels far from that curve are discarded
+ *         u                            4. means of the others, the curve fitted again
  *
  * The curve is a step, blurred by a Gaussian and by the pixel's own width, from a level to
- * one that may wander farther out. It is at half of its height at u whatever the blur.
- * Of colours the sum that differs most between handle and beyond is taken: for liver mostly
- * red. tests/unit/vision/edge.c holds it against the bound of what is possible.
+ * one that may wander farther out. It is at half of its height at u whatever the blur. Of colours,
+ * the sum that differs most between handle and background is used: for liver mostly red.
+ * tests/unit/vision/edge.c compares its error with the theoretical bound.
  */
 #include <algorithm>
 #include <cmath>
-#include "edge.h"
-#include "step.h"
+#include "handle.h"
 
 namespace vision
 {
 
-enum { STRIPS = 16, FEWEST_STRIPS = 6, REFINEMENTS = 3, BINS = 96, FEWEST = 60 };
+/*
+ * The curve that is fitted to an end: a step along the axis, blurred, from the handle's level to
+ * that beyond. Pixels and levels.
+ *
+ *                    ____      RISE …: a random walk, where the tissue has a texture
+ *               ____/          BEYOND, one level up to here: what rises nearer is the edge
+ *             /
+ *   _________/ PLACE           INSIDE; BLUR: sd of a Gaussian, beside the pixel's width
+ */
+enum { PLACE, BLUR, INSIDE, BEYOND, RISE, RISES = 5, UNKNOWNS = RISE + RISES };
 
-static constexpr double reach_px = 14;	/* beyond which nothing is looked at, at least */
-static constexpr double widest_px = 48; /* beyond which nothing is, at most */
-static constexpr double clear_px = 8; /* from the end: one colour or the other, mostly */
-static constexpr double window_px = 12; /* of the curve, to both sides */
-/* What a fit may leave, over the step; where it leaves more, how far out it then looks. */
+typedef cv::Vec<double, UNKNOWNS> unknowns;
+typedef cv::Matx<double, UNKNOWNS, UNKNOWNS> equations;
+
+/* Place of the step, sd of the blur, level of the handle, level beyond at the edge, and the
+ * increase of that farther out, per rise_px each. */
+struct curve {
+	unknowns p;
+	double level; /* from here on the level beyond may rise */
+};
+
+/* A mean of pixels. */
+struct bin {
+	double x, y, weight;
+};
+
+enum {
+	STRIPS = 16,
+	FEWEST_STRIPS = 6,
+	REFINEMENTS = 3,
+	BINS = 96,
+	FEWEST = 60,
+	PASSES = 15
+};
+
+static constexpr double level_px = 2, rise_px = 2;
+static constexpr double rise_sd = 1; /* levels, of a step */
+
+static constexpr double reach_px = 14;	/* of the search, at least */
+static constexpr double widest_px = 48; /* of the search, at most */
+static constexpr double clear_px = 8;	/* from the end on: mostly one colour */
+static constexpr double window_px = 12; /* of the curve, to each side */
+/* Largest misfit; beyond it, the fit is repeated with this smaller reach. */
 static constexpr double most_misfit = 0.04;
 static constexpr double near_px = 1.5, near_blurs = 2;
-static constexpr double across =
-	0.8; /* of the width is looked at: the sides are blurred */
+static constexpr double across = 0.8;	 /* share of the width: the sides are blurred */
 static constexpr double steepest = 1.5;	 /* slant of the edge */
-static constexpr double most_more = 0.1; /* slant that the strips may have missed */
+static constexpr double most_more = 0.1; /* correction of the slant */
 static constexpr double least_step = 8;	 /* levels */
 static constexpr double keep_sd = 3.5;
-static constexpr double floor_share[2] = {0.04, 0.02}; /* of the step, is no outlier */
+static constexpr double floor_share[2] = {0.04, 0.02}; /* of the step: no outlier below */
+
+static double normal(double x)
+{
+	return std::exp(-0.5 * x * x) * 0.3989422804014327;
+}
+
+static double cumulated(double x)
+{
+	return 0.5 * std::erfc(-x * 0.7071067811865475);
+}
+
+/* The curve at @x; its derivatives in @d, unless that is NULL. */
+static double curve_at(const curve &c, double x, unknowns *d)
+{
+	double s = c.p[BLUR], a = (x + 0.5 - c.p[PLACE]) / s,
+	       b = (x - 0.5 - c.p[PLACE]) / s;
+	double ca = b >= 5, cb = ca, na = 0, nb = 0;
+
+	/* Most pixels are far from the edge. */
+	if (a > -5 && b < 5) {
+		ca = cumulated(a);
+		cb = cumulated(b);
+		na = normal(a);
+		nb = normal(b);
+	}
+	double part = s * (a * ca + na - b * cb - nb); /* of the step, in 0 … 1 */
+	double far = (x - c.level) / rise_px, beyond = c.p[BEYOND];
+
+	for (int k = 0; k < RISES; k++)
+		beyond += c.p[RISE + k] * std::min(std::max(far - k, 0.0), 1.0);
+	double step = beyond - c.p[INSIDE];
+
+	if (d) {
+		*d = unknowns();
+		(*d)[PLACE] = -step * (ca - cb);
+		(*d)[BLUR] = step * (na - nb);
+		(*d)[INSIDE] = 1 - part;
+		(*d)[BEYOND] = part;
+		for (int k = 0; k < RISES; k++)
+			(*d)[RISE + k] = part * std::min(std::max(far - k, 0.0), 1.0);
+	}
+	return c.p[INSIDE] + step * part;
+}
+
+/* The level beyond begins to wander here, past the blur. */
+static double level_from(const curve &c)
+{
+	return c.p[PLACE] + std::max(level_px, 1.25 * c.p[BLUR]);
+}
+
+/*
+ * Least squares from @c, which is nearly right: Levenberg-Marquardt. @noise: of a pixel.
+ * @variance: of PLACE, over that of a mean of weight 1.
+ */
+static bool fit_curve(const bin *bins, int n, double noise, curve &c, double *variance)
+{
+	double damping = 1e-3, best = HUGE_VAL,
+	       flat = noise * noise / (rise_sd * rise_sd);
+	unknowns start = c.p, gradient;
+	equations normal_matrix;
+	curve trial = c;
+
+	for (int pass = 0; pass < PASSES; pass++) {
+		equations m = equations::zeros();
+		unknowns g;
+		double sum = 0;
+
+		for (int i = 0; i < n; i++) {
+			unknowns d;
+			double r = bins[i].y - curve_at(trial, bins[i].x, &d);
+
+			sum += bins[i].weight * r * r;
+			for (int k = 0; k < UNKNOWNS; k++) {
+				double w = bins[i].weight * d[k];
+
+				g[k] += w * r;
+				for (int l = 0; l <= k; l++)
+					m(k, l) += w * d[l];
+			}
+		}
+		for (int k = RISE; k < UNKNOWNS; k++) {
+			m(k, k) += flat;
+			g[k] -= flat * trial.p[k];
+			sum += flat * trial.p[k] * trial.p[k];
+		}
+		for (int k = 0; k < UNKNOWNS; k++)
+			for (int l = 0; l < k; l++)
+				m(l, k) = m(k, l);
+		if (!std::isfinite(sum))
+			return false;
+		if (sum <= best) {
+			/* a hundredth of the sd, for a hundred bins */
+			bool settled = best - sum <= 1e-6 * sum;
+
+			best = sum;
+			c = trial;
+			normal_matrix = m;
+			gradient = g;
+			damping *= 0.2;
+			if (settled)
+				break;
+		} else {
+			damping *= 8;
+		}
+		/* From the best so far; after a bad step by its old equations. */
+		equations damped = normal_matrix;
+		for (int k = 0; k < UNKNOWNS; k++)
+			damped(k, k) += damping * normal_matrix(k, k) + 1e-9;
+		bool ok;
+		unknowns by = damped.inv(cv::DECOMP_CHOLESKY, &ok) * gradient;
+		if (!ok)
+			return false;
+		trial.p = c.p + by;
+		trial.p[BLUR] = std::min(std::max(trial.p[BLUR], 0.05), 8.0);
+		trial.p[PLACE] = std::min(std::max(trial.p[PLACE], start[PLACE] - 8),
+					  start[PLACE] + 8);
+	}
+	bool ok;
+	for (int k = 0; k < UNKNOWNS; k++)
+		normal_matrix(k, k) += 1e-9;
+	*variance = normal_matrix.inv(cv::DECOMP_CHOLESKY, &ok)(PLACE, PLACE);
+	return ok && std::fabs(c.p[PLACE] - start[PLACE]) < 7.9;
+}
 
 /* The curve over the window, for many pixels: between 16 values per pixel by a line. */
 struct drawn {
@@ -47,7 +204,7 @@ struct drawn {
 	drawn(const curve &c, double place) : from(place - window_px)
 	{
 		for (int i = 0; i < VALUES; i++)
-			value[i] = (float)at(c, from + (double)i / FINE, nullptr);
+			value[i] = (float)curve_at(c, from + (double)i / FINE, nullptr);
 	}
 
 	/* @u: within the window */
@@ -77,11 +234,11 @@ static int middle_of(const int *count, int n)
 	return value;
 }
 
-/* The pixels around the end; a colour becomes one number, which rises outwards. */
-static bool gather(edge_search &s, const picture &picture, const cv::Point2d &end,
+/* The pixels around the end; a colour becomes one number that rises outwards. */
+static bool gather(edge_search &s, const image &image, const cv::Point2d &end,
 		   const cv::Point2d &out, double reach, double half)
 {
-	int channels = picture.channels();
+	int channels = image.channels();
 	double wide = std::fabs(out.x) * reach + std::fabs(out.y) * half;
 	double high = std::fabs(out.y) * reach + std::fabs(out.x) * half;
 	cv::Rect box(
@@ -91,7 +248,7 @@ static bool gather(edge_search &s, const picture &picture, const cv::Point2d &en
 	double weight[3] = {1, 0, 0}, norm = 0;
 	int n[2] = {};
 
-	box &= picture.area;
+	box &= image.area;
 	s.samples.clear();
 	for (int pass = 0; pass < 2; pass++) {
 		for (int y = box.y; y < box.y + box.height; y++)
@@ -105,7 +262,7 @@ static bool gather(edge_search &s, const picture &picture, const cv::Point2d &en
 					continue;
 				if (!pass && std::fabs(u) < clear_px)
 					continue;
-				picture.pixel(x, y, value);
+				image.pixel(x, y, value);
 				if (!pass) {
 					n[u > 0]++;
 					for (int k = 0; k < channels; k++)
@@ -134,9 +291,9 @@ static bool gather(edge_search &s, const picture &picture, const cv::Point2d &en
 }
 
 /*
- * Where a strip's profile, one value per pixel, is best parted in two: as few as can be are
- * above half of the height before and below it behind, so that neither reflections on the
- * handle nor crumbs beyond it are taken for its end. Then the area around that place.
+ * The best split of a strip's profile, one value per pixel: as few values as possible are on the
+ * wrong side of half of the height, so that neither reflections on the handle nor crumbs beyond
+ * it pass for its end. The area around the split then gives the place.
  */
 static bool cross(const double *profile, int n, double *place)
 {
@@ -159,7 +316,7 @@ static bool cross(const double *profile, int n, double *place)
 	}
 	if (split < NEAR || split + NEAR > n)
 		return false;
-	/* Levels from close by: what is beyond has a texture. */
+	/* Levels from close by: the background has a texture. */
 	inner.assign(profile + split - NEAR, profile + split - 2);
 	outer.assign(profile + split + 2, profile + split + NEAR);
 	low = median(inner);
@@ -181,8 +338,8 @@ static int strip_of(const sample &p, double half)
 }
 
 /*
- * A line u = place + slope v through the strips' places, that outliers do not move. Strips
- * that are off it, by a reflection over the edge, lose their pixels; @share of them is left.
+ * A robust line u = place + slope v through the strips' places. Strips far from it, by a
+ * reflection over the edge, lose their pixels; @share of the strips is left.
  */
 static bool find_line(edge_search &s, double reach, double half, double *place,
 		      double *slope, double *share)
@@ -201,7 +358,7 @@ static bool find_line(edge_search &s, double reach, double half, double *place,
 		if (i < 0 || i >= bins)
 			continue;
 		sum[strip][i] += p.value;
-		/* Upright, all pixels of a row are at one place within their bin. */
+		/* If upright, all pixels of a row are at one place within their bin. */
 		phase[strip] += p.u + bins / 2 - i - 0.5;
 		total[strip]++;
 		count[strip][i]++;
@@ -210,7 +367,7 @@ static bool find_line(edge_search &s, double reach, double half, double *place,
 		double profile[2 * (int)widest_px];
 		int from = 0, to = bins;
 
-		/* The picture may end within the reach. */
+		/* The image may end within the reach. */
 		while (from < bins && !count[k][from])
 			from++;
 		while (to > from && !count[k][to - 1])
@@ -226,7 +383,7 @@ static bool find_line(edge_search &s, double reach, double half, double *place,
 	}
 	if (found < FEWEST_STRIPS)
 		return false;
-	/* Each two of them propose a line, all vote. */
+	/* Each pair proposes a line, all vote. */
 	const double limit = 1.2;
 	double most = 0;
 	*slope = *place = 0;
@@ -242,7 +399,7 @@ static bool find_line(edge_search &s, double reach, double half, double *place,
 
 				votes += std::max(0.0, 1 - r * r);
 			}
-			/* The mask's end is good to some pixels. */
+			/* The mask's end is accurate to some pixels. */
 			votes -= 0.1 * std::fabs(b);
 			if (votes > most) {
 				most = votes;
@@ -257,7 +414,7 @@ static bool find_line(edge_search &s, double reach, double half, double *place,
 			good[which[k]] = true;
 			left++;
 		}
-	/* The slant once more, by least squares: it must not smear the edge. */
+	/* Refine the slant by least squares, so that it does not smear the edge. */
 	double mu = 0, mv = 0, vv = 0, uv = 0;
 	for (int k = 0; k < found; k++)
 		if (good[which[k]]) {
@@ -344,8 +501,8 @@ static int by_means(edge_search &s, double place, double end, double limit, bin 
 }
 
 /*
- * The slant once more, now from all pixels that are near the curve: by least squares of
- * what it leaves, with the place. A reflection over a corner had a part in the line.
+ * Refine the slant from all pixels near the curve, by least squares of its residuals, together
+ * with the place. The line may have been affected by a reflection over a corner.
  */
 static void straighten(edge_search &s, const drawn &line, double limit)
 {
@@ -366,15 +523,15 @@ static void straighten(edge_search &s, const drawn &line, double limit)
 	}
 	double by = dd * vv - dv * dv;
 	double more = by > 1e-6 * dd * vv ? (dd * rv - dv * rd) / by : 0;
-	/* u + more v is where the curve has it */
+	/* The curve has the pixel at u + more v. */
 	more = std::min(std::max(more, -most_more), most_more);
 	for (sample &p : s.samples)
 		p.u += (float)(more * p.v);
 }
 
 /*
- * From a curve that is nearly right: throw out what is off it, fit means, and once more.
- * What is beyond counts as far as @blurs blurs and @more pixels.
+ * From a curve that is nearly right: discard pixels far from it, fit means, and repeat. The
+ * background counts as far as @blurs blurs and @more pixels.
  */
 static bool refine(edge_search &s, double place, double more, double blurs, curve c,
 		   edge &found)
@@ -396,7 +553,7 @@ static bool refine(edge_search &s, double place, double more, double blurs, curv
 		end = c.p[PLACE] + more + blurs * c.p[BLUR];
 		n = by_means(s, place, end, limit, bins, &found.kept);
 		c.level = level_from(c);
-		if (n < 8 || !fit(bins, n, noise, c, &variance))
+		if (n < 8 || !fit_curve(bins, n, noise, c, &variance))
 			return false;
 		if (pass + 1 < REFINEMENTS)
 			straighten(s, drawn(c, place), limit);
@@ -416,10 +573,10 @@ static bool refine(edge_search &s, double place, double more, double blurs, curv
 	found.u = c.p[PLACE];
 	found.step = c.p[BEYOND] - c.p[INSIDE];
 	found.noise = std::sqrt(square / std::max<size_t>(used, 6));
-	/* What is not noise, as texture, or a curve of another form, does not average out. */
+	/* Texture, or a curve of another form, does not average out as noise does. */
 	double excess = 0, near = 0, weight = 0, white = 0;
 	for (int i = 0; i < n; i++) {
-		double r = bins[i].y - at(c, bins[i].x, nullptr);
+		double r = bins[i].y - curve_at(c, bins[i].x, nullptr);
 
 		excess += bins[i].weight * r * r;
 		if (std::fabs(bins[i].x - c.p[PLACE]) > clear_px)
@@ -435,7 +592,7 @@ static bool refine(edge_search &s, double place, double more, double blurs, curv
 	return found.step >= least_step && std::isfinite(found.sd);
 }
 
-const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d &end,
+const char *edge_find(edge_search &s, const image &image, const cv::Point2d &end,
 		      const cv::Point2d &out, double half_px, edge &found)
 {
 	static const char *const no_step = "the handle's end does not stand out";
@@ -446,12 +603,12 @@ const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d 
 	curve c;
 	int n;
 
-	if (!gather(s, picture, end, out, reach, half))
+	if (!gather(s, image, end, out, reach, half))
 		return "the handle reaches the picture's border";
 	if (!find_line(s, reach, half, &place, &slope, &share))
 		return no_step;
 
-	/* From here on u is along the axis at its middle, whatever the slant. */
+	/* From here on u is corrected for the slant. */
 	size_t left = 0;
 	int n_inside = 0, n_beyond = 0;
 	for (sample p : s.samples) {
@@ -473,12 +630,12 @@ const char *edge_find(edge_search &s, const picture &picture, const cv::Point2d 
 	c.p[INSIDE] = bins[0].y;
 	c.p[BEYOND] = bins[n - 1].y;
 	c.level = level_from(c);
-	if (!fit(bins, n, 4, c, &variance))
+	if (!fit_curve(bins, n, 4, c, &variance))
 		return no_step;
 	if (!refine(s, place, window_px, 0, c, found))
 		return no_step;
 	if (found.misfit > most_misfit) {
-		/* Other things beyond, as a bright rim: look less far. */
+		/* Something else beyond, such as a bright rim: use a smaller reach. */
 		edge near;
 
 		if (refine(s, place, near_px, near_blurs, c, near) &&

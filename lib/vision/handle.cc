@@ -1,29 +1,117 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The handle in a picture; see handle.h. Pixels within the thresholds are cleaned of specks
- * and joined; of what hangs together the largest with the form of a handle is taken:
+ * The handle in an image; see handle.h. Pixels within the thresholds are cleaned of specks and
+ * joined; the largest region with the form of a handle is taken:
  *
- *      x            the first and last pixel of each row give two sides, each a line
- *      ·┌──┐·       x = a + b y fitted so that rows which are off, by a reflection or
- *      ·│  │·       a shadow, weigh little; rows that meet an end of a tilted handle
- *      ·└──┘·       are left out
+ *      x            the first and last pixel of each row give two sides, each fitted with a
+ *      ·┌──┐·       line x = a + b y; rows far from it, by a reflection or a shadow, weigh
+ *      ·│  │·       little; rows that cross an end of a tilted handle are left out
+ *      ·└──┘·
  *
- * Of high pictures every second row will do: ends and sides are refined from all pixels.
+ * Tall images need every second row only: ends and sides are refined from all pixels.
  */
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 #include "handle.h"
 
 namespace vision
 {
 
+/*
+ * Regions: each run begins a region of its own, and those that touch a run of the row above are
+ * joined with it.
+ *
+ *      row above   ·███····██·      two runs touch when neither ends before the
+ *      row         ··██████···      other begins
+ */
+static int root_of(std::vector<int> &parent, int i)
+{
+	while (parent[i] != i) {
+		parent[i] = parent[parent[i]];
+		i = parent[i];
+	}
+	return i;
+}
+
+static void read_runs(const cv::Mat &mask, int y, std::vector<run> &runs)
+{
+	const uint8_t *row = mask.ptr(y);
+	int x = 0;
+
+	while (x < mask.cols) {
+		uint64_t eight;
+
+		/* most pixels are not the handle */
+		if (x + 8 <= mask.cols) {
+			memcpy(&eight, row + x, sizeof(eight));
+			if (!eight) {
+				x += 8;
+				continue;
+			}
+		}
+		if (!row[x]) {
+			x++;
+			continue;
+		}
+		const void *end = memchr(row + x, 0, mask.cols - x);
+		int to = end ? (int)((const uint8_t *)end - row) : mask.cols;
+
+		runs.push_back({y, x, to, (int)runs.size()});
+		x = to;
+	}
+}
+
+void pieces::find(const cv::Mat &mask)
+{
+	size_t above = 0, row = 0;
+
+	runs.clear();
+	list.clear();
+	parent.clear();
+	for (int y = 0; y < mask.rows; y++) {
+		size_t a = above;
+
+		row = runs.size();
+		read_runs(mask, y, runs);
+		for (size_t i = row; i < runs.size(); i++) {
+			parent.push_back((int)i);
+			while (a < row && runs[a].to < runs[i].from)
+				a++;
+			for (size_t b = a; b < row && runs[b].from <= runs[i].to; b++) {
+				int one = root_of(parent, (int)b);
+				int other = root_of(parent, (int)i);
+
+				/* the root is a piece's first run */
+				parent[std::max(one, other)] = std::min(one, other);
+			}
+		}
+		above = row;
+	}
+	for (size_t i = 0; i < runs.size(); i++) {
+		run &r = runs[i];
+		cv::Rect box(r.from, r.y, r.to - r.from, 1);
+		int root = root_of(parent, (int)i);
+
+		if (root == (int)i) {
+			r.piece = (int)list.size();
+			list.push_back({box, box.width});
+			continue;
+		}
+		r.piece = runs[root].piece;
+		piece &p = list[r.piece];
+		p.box |= box;
+		p.area += box.width;
+	}
+}
+
 enum {
-	HIGH = 400,	 /* rows: from here on every second one is looked at */
-	CANDIDATES = 8,	 /* largest pieces that are looked at */
-	FEWEST = 12,	 /* rows that a side is fitted to */
+	HIGH = 400,	 /* rows: taller images are searched every second row */
+	CANDIDATES = 8,	 /* number of largest pieces that are judged */
+	FEWEST = 12,	 /* rows for the fit of a side */
 	BORDER = 6,	 /* pixels of background that an end needs */
-	LEAST_PIECE = 6, /* rows of what goes on with the handle behind a gap */
+	LEAST_PIECE = 6, /* rows of a piece that continues the handle behind a gap */
 };
 
 static constexpr double longest_ratio = 1.5; /* length over width at least */
@@ -31,7 +119,7 @@ static constexpr double least_fill = 0.6;    /* of the rectangle between the sid
 static constexpr double most_tilt = 1.75;    /* tan 60° and a little */
 static constexpr double most_rms_px = 3;
 static constexpr double seam_levels =
-	8; /* more than light and noise do to what is black */
+	8; /* beyond the effect of light and noise on black */
 
 /* 255 where a pixel has the handle's colour. */
 static void find_colour(handle_search &s, const struct incise_vision_setup &setup)
@@ -105,7 +193,7 @@ static bool fit_line(handle_search &s, const std::vector<double> &x, double y0, 
 			square += s.weight[i] * r * r;
 		}
 		line.rms = std::sqrt(square / w);
-		/* From wide to narrow: a bad start must not throw out what is good. */
+		/* From wide to narrow: a bad start must not discard good rows. */
 		scale = std::max(1.5, pass < 2 ? 4 * line.rms : 3 * line.rms);
 		for (size_t i = 0; i < n; i++) {
 			double r = (x[i] - line.a - line.b * s.y[i]) / scale;
@@ -118,7 +206,7 @@ static bool fit_line(handle_search &s, const std::vector<double> &x, double y0, 
 	return true;
 }
 
-/* First and last pixel of each row of a piece, in pixels of the picture. */
+/* First and last pixel of each row of a piece, in pixels of the image. */
 static void read_sides(handle_search &s, int piece, const cv::Rect &box, int step)
 {
 	int last = -1;
@@ -145,7 +233,7 @@ static bool fit_sides(handle_search &s, double y0, double y1, line *side)
 	       fit_line(s, s.side[1], y0, y1, side[1]);
 }
 
-/* NULL when it is one; else why not. */
+/* NULL for a handle; else the reason why it is none. */
 static const char *judge(handle_search &s, double area, handle &h)
 {
 	double y0, y1, slope, width, corner, length;
@@ -166,7 +254,7 @@ static const char *judge(handle_search &s, double area, handle &h)
 		width = (side[1].a - side[0].a +
 			 (side[1].b - side[0].b) * (y0 + y1) / 2) *
 			h.axis.y;
-		/* Rows that an end crosses, if it is square to the axis or level. */
+		/* Leave out rows that cross an end, square to the axis or level. */
 		corner = std::min(width * std::fabs(h.axis.x) + 4, (y1 - y0) / 3);
 		if (!fit_sides(s, y0 + corner, y1 - corner, side))
 			return "what has the handle's colour has no straight sides";
@@ -178,7 +266,7 @@ static const char *judge(handle_search &s, double area, handle &h)
 	if (h.rms_px > most_rms_px)
 		return "what has the handle's colour has no straight sides";
 
-	/* Where the axis enters the piece and leaves it. */
+	/* The axis enters and leaves the piece there. */
 	double a = (side[0].a + side[1].a) / 2, b = (side[0].b + side[1].b) / 2;
 	size_t first = s.y.size(), last = 0;
 
@@ -214,8 +302,8 @@ static bool at_border(const handle &h, const cv::Rect &within)
 }
 
 /*
- * Whether a piece other than @own goes on with the handle, as wide as it is: a reflection
- * all across it, or a tape, has cut it, or this is its mirror image in the tissue.
+ * Whether a piece other than @own continues the handle at its width: a reflection all across it,
+ * or a tape, has cut it, or this is its mirror image in the tissue.
  */
 static bool is_cut(handle_search &s, int own, const handle &h, const cv::Rect &box,
 		   int step)
@@ -278,8 +366,8 @@ static void read_colour(handle_search &s, const handle &h, const cv::Rect &box, 
 }
 
 /*
- * Whether the handle is best told apart in two parts of a colour each, from one row to the
- * next. A shadow on the tissue, or blood, may have the handle's colour and go on with it.
+ * Whether the handle's colour has a step from one row to the next. A shadow on the tissue, or
+ * blood, may have the handle's colour and continue it.
  */
 static bool has_seam(handle_search &s, const handle &h, const cv::Rect &box, int step)
 {
@@ -307,24 +395,23 @@ static bool has_seam(handle_search &s, const handle &h, const cv::Rect &box, int
 	if (!split)
 		return false;
 	cv::Vec2d all = mean(split, n) - mean(0, split);
-	/* Light that fades has no step. */
+	/* Fading light has no step. */
 	cv::Vec2d here = mean(std::min(split + 1, n - 2), std::min(split + NEAR, n)) -
 			 mean(std::max(split - NEAR, 0), std::max(split - 1, 2));
 	double size = cv::norm(all);
 	return size > seam_levels && here.dot(all) > 0.7 * size * size;
 }
 
-bool handle_find(handle_search &s, picture &picture,
-		 const struct incise_vision_setup &setup, const cv::Rect &box,
-		 handle &found, const char **why)
+bool handle_find(handle_search &s, image &image, const struct incise_vision_setup &setup,
+		 const cv::Rect &box, handle &found, const char **why)
 {
-	int step = picture.size.height >= HIGH ? 2 : 1;
+	int step = image.size.height >= HIGH ? 2 : 1;
 	int smallest = 16 * FEWEST / step;
 	double most = 0;
 	int own = -1;
 
 	*why = "nothing has the handle's colour";
-	picture.hsv(box, step, s.hsv);
+	image.hsv(box, step, s.hsv);
 	find_colour(s, setup);
 	/* Close first: reflections on the handle are more than specks. */
 	cv::morphologyEx(s.mask, s.cleaned, cv::MORPH_CLOSE,
@@ -353,7 +440,7 @@ bool handle_find(handle_search &s, picture &picture,
 		if (!fault && (at_border(h, box) || piece.x == 0 || piece.y == 0 ||
 			       piece.x + piece.width == s.mask.cols ||
 			       piece.y + piece.height == s.mask.rows))
-			/* cut off, a side would be taken for the border's */
+			/* if cut off, the border would pass for a side */
 			fault = "the handle reaches the picture's border";
 		if (!fault && area > most) {
 			most = area;

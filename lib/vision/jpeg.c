@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Part of a JPEG picture as RGB, by libjpeg-turbo. Not by OpenCV's imgcodecs: that guesses
- * the format of what the camera sent, brings GDAL and some 40 more libraries into the
- * process, and cannot leave out what is beside the region of interest.
+ * Part of a JPEG frame as RGB, by libjpeg-turbo. Not by OpenCV's imgcodecs: that guesses the
+ * format, brings GDAL and some 40 more libraries into the process, and cannot skip pixels outside
+ * the region of interest.
  *
- * A file of its own in C: libjpeg's errors leave by longjmp(), past no destructor.
+ * In C, because libjpeg's errors leave by longjmp(), which must not skip destructors.
  */
 #include <errno.h>
 #include <setjmp.h>
 #include <stdio.h>
 #include <jpeglib.h>
 #include <jerror.h>
-#include "jpeg.h"
+#include "vision_opencv.h"
 
 struct reader {
 	struct jpeg_decompress_struct jpeg;
@@ -26,7 +26,7 @@ static void leave(j_common_ptr jpeg)
 	longjmp(reader->out, 1);
 }
 
-/* Data that end early or are damaged are a mere warning to libjpeg, which goes on in grey. */
+/* For libjpeg, truncated or damaged data are only a warning, and it fills in grey. */
 static void judge(j_common_ptr jpeg, int level)
 {
 	if (level >= 0)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The module of vision on OpenCV. All it does is behind vision_opencv.h.
+ * The entry of the vision module on OpenCV.
  */
 #include "vision_opencv.h"
 

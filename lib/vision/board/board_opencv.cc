@@ -11,7 +11,7 @@
 #include <opencv2/imgproc.hpp>
 #include <incise/backend.h>
 #include <incise/board.h>
-#include "../picture.h"
+#include "../image.h"
 
 namespace
 {
@@ -19,9 +19,9 @@ namespace
 constexpr double most_stray = 1; /* px */
 
 /*
- * What was found is 0.2 px off; where the edges of a corner cross is known to 0.04 px. No
- * other corner may be within reach. One that strays is looked for closer by, and stays as it
- * was found in the end.
+ * Found corners are accurate to 0.2 px, the crossing of their edges to 0.04 px. No other corner
+ * may be within reach. A corner that strays is searched with a smaller reach, and in the end
+ * stays as it was found.
  */
 void refine(const cv::Mat &grey, int columns, std::vector<cv::Point2f> &corners)
 {
@@ -52,8 +52,8 @@ void refine(const cv::Mat &grey, int columns, std::vector<cv::Point2f> &corners)
 int find(const struct incise_camera_frame &frame, int columns, int rows, double *corners,
 	 struct incise_error *err)
 {
-	vision::picture picture;
-	int ret = picture.take(frame);
+	vision::image image;
+	int ret = image.take(frame);
 
 	if (ret)
 		return incise_error_set(err, -ret,
@@ -62,25 +62,25 @@ int find(const struct incise_camera_frame &frame, int columns, int rows, double 
 		return incise_error_set(err, EINVAL,
 					"board: %d x %d inner corners: give 3 to 100",
 					columns, rows);
-	ret = picture.bring(cv::Rect(cv::Point(), picture.size));
+	ret = image.bring(cv::Rect(cv::Point(), image.size));
 	if (ret)
 		return incise_error_set(err, -ret,
 					"board: the picture cannot be decoded");
 
-	cv::Mat grey(picture.size, CV_8U);
+	cv::Mat grey(image.size, CV_8U);
 	std::vector<cv::Point2f> found;
 
 	for (int y = 0; y < grey.rows; y++)
 		for (int x = 0; x < grey.cols; x++) {
 			float v[3];
 
-			picture.pixel(x, y, v);
-			if (picture.channels() == 3)
+			image.pixel(x, y, v);
+			if (image.channels() == 3)
 				v[0] = 0.299f * v[0] + 0.587f * v[1] + 0.114f * v[2];
 			grey.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(v[0]);
 		}
-	/* The more it is asked to do the more it finds, and the less it is right: with
-	 * the light evened, one corner of 4500 was 8 px off and the rest 0.3 px. */
+	/* More effort finds more boards, less accurately: with normalized light, one corner of
+	 * 4500 was 8 px off and the rest 0.3 px. */
 	const cv::Size size(columns, rows);
 	if (!cv::findChessboardCornersSB(grey, size, found, 0) &&
 	    !cv::findChessboardCornersSB(grey, size, found, cv::CALIB_CB_EXHAUSTIVE) &&
@@ -120,7 +120,7 @@ void opencv_close(struct incise_board *)
 {
 }
 
-/* There is nothing to keep from one picture to the next. */
+/* Images have no state in common. */
 void *opencv_open(const struct incise_backend_request *, struct incise_error *)
 {
 	static const struct incise_board_ops ops = {opencv_find, opencv_close};

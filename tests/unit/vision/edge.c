@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/vision/edge.cc: how far from what can be reached at all the sub-pixel edge is, by
+ * lib/vision/edge.cc: the error of the sub-pixel edge compared with the theoretical bound of
  * Cramer and Rao's bound. An end of the handle is a row of means, each over w pixels,
  *
  *   y_i = inside + (beyond - inside) F((x_i - place) / s) + noise / sqrt(w) + texture
  *
  * with F the cumulated Gaussian. With J the derivatives of all y by the unknowns and C the
  * covariance of noise and texture, no unbiased estimate has a variance of the place below
- * that of (J' C^-1 J)^-1, and of the length, which has two ends, below twice that. Were all
+ * that of (J' C^-1 J)^-1, and of the length, which has two ends, below twice that. If all
  * but the place known, and no texture, that is
  *
  *   sd = noise / step · sqrt(2 · 2 s sqrt(pi) / w)
@@ -67,7 +67,7 @@ static void forward(const double *l, int n, double *b)
 	}
 }
 
-/* Of two values @apart on the axis, of means over the width: waves of 12, 24, 48, 96 px. */
+/* Covariance of means over the width, @apart on the axis: waves of 12, 24, 48, 96 px. */
 static double texture_covariance(const struct step *s, double width, double apart)
 {
 	double sum = 0;
@@ -134,7 +134,7 @@ static double all_known_px(const struct step *s)
 	return s->noise / s->height * sqrt(2 * 2 * sd * sqrt(M_PI) / (SHARE * WIDTH_PX));
 }
 
-/* What tools/bench/scalpel_picture.c draws, of liver and black, as edge.cc sees it. */
+/* An end in a picture of tools/bench/scalpel_picture.c, liver and black. */
 static struct step step_of(const struct scalpel_picture *p)
 {
 	static const double liver[3] = {118, 46, 38}, black[3] = {24, 24, 26};
@@ -163,7 +163,7 @@ static struct step step_of(const struct scalpel_picture *p)
 	return s;
 }
 
-/* Alone against the formula: nearly so where next to nothing is unknown. */
+/* Compared with the formula, which nearly holds if almost everything is known. */
 static void the_bound_is_that_of_the_formula(void **state)
 {
 	struct step s = {.height = 97.3, .noise = 8, .blur_px = 1};
@@ -232,12 +232,12 @@ static void the_edge_is_as_good_as_can_be(void **state)
 			p.pixels, p.noise, p.blur_px, p.texture, sqrt(square), bound,
 			all_known_px(&step));
 		pooled += square / (bound * bound) / n_cases;
-		/* 1.3: what the rms of 40 may be by chance, at 99 % */
+		/* 1.3: limit of chance for the rms of 40, at 99 % */
 		assert_true(sqrt(square) < 1.25 * 1.3 * bound);
 	}
 	pooled = sqrt(pooled);
 	print_message("all: %.2f times the bound\n", pooled);
-	/* 1.1: what the rms of 240 may be by chance; far below the bound it would be wrong */
+	/* 1.1: limit of chance for the rms of 240; far below the bound it would be wrong */
 	assert_true(pooled < 1.15 * 1.1 && pooled > 1 / 1.15);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/vision/jpeg.c, picture.cc: pictures as JPEG, whole, cut off at any byte, damaged.
+ * lib/vision/jpeg.c, image.cc: JPEG frames, whole, truncated at any byte, damaged.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -113,7 +113,7 @@ static void what_ends_early_is_refused(void **state)
 
 	for (size_t size = 0; size < whole.size; size += 1 + size / 20) {
 		struct incise_vision *vision = incise_vision_new(&black, NULL);
-		/* a copy, so that a read behind its end is seen */
+		/* a copy, so that a read behind its end is detected */
 		uint8_t *copy = malloc(size + 1);
 		struct incise_camera_frame frame = whole;
 
@@ -181,7 +181,7 @@ static void other_sizes_and_progressive_ones_are_refused(void **state)
 	incise_vision_free(vision);
 }
 
-/* Cameras leave out the tables that everyone knows. */
+/* Cameras leave out the standard tables. */
 static void huffman_tables_may_be_missing(void **state)
 {
 	struct incise_vision *vision = incise_vision_new(&black, NULL);

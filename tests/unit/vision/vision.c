@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/vision/vision.cc, handle.cc, edge.cc: the exposed length against pictures whose truth
- * is known, which are drawn apart from the library (tools/bench/scalpel_picture.c), and against
- * the virtual camera's. Figures are printed, so that a log has what was reached.
+ * lib/vision/vision.cc, handle.cc, edge.cc: the exposed length compared with the truth of pictures
+ * that are drawn outside the library (tools/bench/scalpel_picture.c), and of
+ * the virtual camera. Results are printed for the log. Learnt thresholds find the handle.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -71,10 +71,10 @@ static struct incise_vision_result measured(const struct scalpel_picture *p)
 
 struct condition {
 	const char *name;
-	struct scalpel_picture with; /* what differs from small() */
+	struct scalpel_picture with; /* differences from small() */
 	double most_deg;	     /* of tilt, both ways; 0: 20, -1: none */
-	double sd_px;		     /* what is allowed; 0: the 0.05 px of issue 7 */
-	int refused; /* pictures at most in which it says that it cannot tell */
+	double sd_px;		     /* limit; 0: the 0.05 px of issue 7 */
+	int refused;		     /* largest number of pictures without a result */
 };
 
 /*
@@ -172,7 +172,7 @@ static void length_is_that_of_the_picture(void **state)
 			square += error * error;
 			said += r.sd_px * r.sd_px;
 			quality = fmin(quality, r.quality);
-			/* The axis is good to a fraction of a pixel over its length. */
+			/* The axis is accurate to a fraction of a pixel over its length. */
 			assert_true(fabs(r.axis[0] + sin(p.angle_deg * M_PI / 180)) <
 				    0.005);
 			assert_true(fabs(r.edge_px[0] - p.x) < 1);
@@ -189,7 +189,7 @@ static void length_is_that_of_the_picture(void **state)
 			"quality %.2f at least\n",
 			c->name, n, FRAMES, sum, square, said, worst, quality);
 		assert_true(fabs(sum) <= 0.1);
-		/* 1.45: what the sd of 16 may be by chance, at 99 % */
+		/* 1.45: limit of chance for the sd of 16, at 99 % */
 		assert_true(square <= 1.45 * (c->sd_px > 0 ? c->sd_px : 0.05));
 	}
 }
@@ -281,16 +281,16 @@ static void paint(struct incise_camera_frame *frame, int x, int y, int width, in
 }
 
 /*
- * What makes the length wrong by tens of pixels must not pass for a good one. The handle is
+ * A length that is wrong by tens of pixels must not have a good quality. The handle is
  * upright, 67 pixels wide, from row 100 to row 400.
  */
 static void what_only_looks_like_the_handle_costs_quality(void **state)
 {
 	static const struct {
 		const char *name;
-		int y, height, half; /* of what is painted */
+		int y, height, half; /* of the painted box */
 		uint8_t rgb[3];
-		double most;	 /* quality; 1: it is not to suffer */
+		double most;	 /* quality; 1: unaffected */
 		const char *why; /* not found */
 	} cases[] = {
 		{"reflection across", 200, 12, 40, {230, 230, 230}, 0, "cut in two"},
@@ -320,7 +320,7 @@ static void what_only_looks_like_the_handle_costs_quality(void **state)
 		assert_int_equal(scalpel_picture_draw(&p, &frame), 0);
 		paint(&frame, 320 - cases[k].half, cases[k].y, 2 * cases[k].half,
 		      cases[k].height, cases[k].rgb);
-		/* The second time in the region of interest, where there is one. */
+		/* The second search is in the region of interest, if there is one. */
 		for (int i = 0; i < 2; i++) {
 			assert_int_equal(incise_vision_measure(vision, &frame, &r), 0);
 			print_message("%s: %s, %.1f px off, quality %.2f\n",
@@ -342,7 +342,7 @@ static void what_only_looks_like_the_handle_costs_quality(void **state)
 	}
 }
 
-/* Wherever it jumps to, the region of interest is not what decides. */
+/* The region of interest does not affect the result, wherever the handle jumps. */
 static void the_region_follows(void **state)
 {
 	struct incise_vision *vision = vision_of(&black);
@@ -515,6 +515,127 @@ static void any_region_will_do(void **state)
 	}
 }
 
+static struct incise_camera_frame drawn_frame(enum incise_pixels pixels, double noise,
+					      double *length)
+{
+	struct incise_camera_frame frame;
+	struct scalpel_picture p;
+
+	scalpel_picture_init(&p);
+	p.pixels = pixels;
+	p.noise = noise;
+	p.blur_px = 1;
+	*length = p.length_px;
+	assert_int_equal(scalpel_picture_draw(&p, &frame), 0);
+	return frame;
+}
+
+/* On the handle, which is 67 wide at 320, 80 to 440. */
+static const struct incise_vision_box box = {301, 201, 35, 91}, click = {320, 250, 1, 1};
+
+static void learnt_thresholds_find_the_handle(void **state)
+{
+	static const enum incise_pixels formats[] = {
+		INCISE_PIXELS_RGB, INCISE_PIXELS_GREY, INCISE_PIXELS_YUYV};
+
+	for (int k = 0; k < 12; k++) {
+		struct incise_vision_setup setup = {.full_px = 7, .depth_mm_px = 3};
+		double length;
+		struct incise_camera_frame frame =
+			drawn_frame(formats[k % 3], k < 6 ? 2 : 4, &length);
+		struct incise_vision_result r;
+		struct incise_vision *vision;
+
+		assert_int_equal(incise_vision_learn(&frame, k % 2 ? &box : &click,
+						     &setup, NULL),
+				 0);
+		/* black: the value alone; noise is 2.1 sd at its 2 %, 24 of RGB 41 in Y */
+		assert_int_equal(setup.hue[0], 0);
+		assert_int_equal(setup.hue[1], 179);
+		assert_int_equal(setup.value[0], 0);
+		assert_true(setup.value[1] > 30 && setup.value[1] < 80);
+		assert_true(setup.full_px == 7 && setup.depth_mm_px == 3);
+		vision = incise_vision_new(&setup, NULL);
+		assert_non_null(vision);
+		assert_int_equal(incise_vision_measure(vision, &frame, &r), 0);
+		assert_true(r.found);
+		assert_true(fabs(r.length_px - length) < 0.3);
+		incise_vision_free(vision);
+		free((void *)frame.data);
+	}
+}
+
+/* Of one colour, and noise of one level. */
+static struct incise_camera_frame plain_frame(uint8_t *data, int red, int green, int blue)
+{
+	for (int i = 0; i < 64 * 64; i++) {
+		data[3 * i] = (uint8_t)(red + i % 2);
+		data[3 * i + 1] = (uint8_t)(green + i / 2 % 2);
+		data[3 * i + 2] = (uint8_t)(blue + i / 4 % 2);
+	}
+	return (struct incise_camera_frame){.width = 64,
+					    .height = 64,
+					    .stride = 192,
+					    .data = data,
+					    .size = 64 * 64 * 3};
+}
+
+static void colours_have_a_hue(void **state)
+{
+	static uint8_t data[64 * 64 * 3];
+	static const struct incise_vision_box all = {0, 0, 64, 64};
+	struct incise_camera_frame frame = plain_frame(data, 20, 200, 20); /* green: 60 */
+	struct incise_vision_setup setup = {0};
+
+	assert_int_equal(incise_vision_learn(&frame, &all, &setup, NULL), 0);
+	assert_true(setup.hue[0] >= 50 && setup.hue[0] <= 56);
+	assert_true(setup.hue[1] >= 64 && setup.hue[1] <= 70);
+	assert_true(setup.saturation[0] > 60);
+	/* red is at both ends of the scale */
+	frame = plain_frame(data, 200, 20, 20);
+	assert_int_equal(incise_vision_learn(&frame, &all, &setup, NULL), 0);
+	assert_true(setup.hue[0] > 165 && setup.hue[1] < 15);
+	/* grey: no hue */
+	frame = plain_frame(data, 150, 150, 150);
+	assert_int_equal(incise_vision_learn(&frame, &all, &setup, NULL), 0);
+	assert_true(setup.hue[0] == 0 && setup.hue[1] == 179);
+	assert_true(setup.saturation[1] < 40 && setup.value[0] > 60);
+}
+
+static void two_colours_are_refused(void **state)
+{
+	static const struct incise_vision_box across = {260, 200, 60, 60};
+	struct incise_vision_setup setup = {.value = {1, 2}}, before = setup;
+	struct incise_error err = {0};
+	double length;
+	struct incise_camera_frame frame = drawn_frame(INCISE_PIXELS_RGB, 2, &length);
+
+	assert_int_equal(incise_vision_learn(&frame, &across, &setup, &err), -ERANGE);
+	assert_int_equal(err.code, ERANGE);
+	assert_non_null(strstr(err.text, "not one colour"));
+	assert_memory_equal(&setup, &before, sizeof(setup));
+	free((void *)frame.data);
+}
+
+static void a_box_elsewhere_is_refused(void **state)
+{
+	static const struct incise_vision_box bad[] = {
+		{-1, 0, 5, 5},	{0, 0, 0, 5},	      {636, 0, 5, 5},
+		{0, 476, 5, 5}, {INT32_MAX, 0, 5, 5}, {5, 5, INT32_MAX, 5},
+		{0, -5, 5, 5},
+	};
+	struct incise_vision_setup setup = {0};
+	double length;
+	struct incise_camera_frame frame = drawn_frame(INCISE_PIXELS_RGB, 2, &length);
+
+	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++)
+		assert_int_equal(incise_vision_learn(&frame, &bad[i], &setup, NULL),
+				 -EINVAL);
+	frame.stride = 5;
+	assert_int_equal(incise_vision_learn(&frame, &box, &setup, NULL), -EINVAL);
+	free((void *)frame.data);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -528,6 +649,10 @@ int main(void)
 		cmocka_unit_test(sizes_that_do_not_fit_are_refused),
 		cmocka_unit_test(a_setup_out_of_range_is_refused),
 		cmocka_unit_test(any_region_will_do),
+		cmocka_unit_test(learnt_thresholds_find_the_handle),
+		cmocka_unit_test(colours_have_a_hue),
+		cmocka_unit_test(two_colours_are_refused),
+		cmocka_unit_test(a_box_elsewhere_is_refused),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Frames: sizes checked, JPEG decoded; see picture.h.
+ * Frames with checked sizes and decoded JPEG; see image.h.
  */
 #include <cerrno>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
-#include "jpeg.h"
-#include "picture.h"
+#include "image.h"
+#include "vision_opencv.h"
 
 namespace vision
 {
@@ -28,11 +28,11 @@ static size_t row_bytes(const struct incise_camera_frame &frame)
 	}
 }
 
-int picture::take(const struct incise_camera_frame &f)
+int image::take(const struct incise_camera_frame &f)
 {
 	int format;
 
-	/* It comes from C, where an enum may be any number: not to be loaded as one. */
+	/* From C, an enum may have any value, which C++ must not load as an enum. */
 	memcpy(&format, &f.pixels, sizeof(format));
 	if (format < INCISE_PIXELS_RGB || format > INCISE_PIXELS_MJPEG)
 		return -EINVAL;
@@ -59,7 +59,7 @@ int picture::take(const struct incise_camera_frame &f)
 	return 0;
 }
 
-int picture::bring(const cv::Rect &wanted)
+int image::bring(const cv::Rect &wanted)
 {
 	if ((wanted & area) == wanted)
 		return 0;
@@ -78,13 +78,13 @@ int picture::bring(const cv::Rect &wanted)
 	return 0;
 }
 
-void picture::hsv(const cv::Rect &box, int step, cv::Mat &out)
+void image::hsv(const cv::Rect &box, int step, cv::Mat &out)
 {
 	int rows = (box.height + step - 1) / step;
 	int bytes = pixels == INCISE_PIXELS_RGB	   ? 3
 		    : pixels == INCISE_PIXELS_YUYV ? 2
 						   : 1;
-	/* OpenCV's views are not const; nothing writes to this one */
+	/* OpenCV has no const views; nothing writes to this one. */
 	uint8_t *from = const_cast<uint8_t *>(data) + stride * (box.y - area.y) +
 			(size_t)(box.x - left) * bytes;
 	cv::Mat view(rows, box.width, CV_8UC(bytes), from, stride * step);
@@ -102,7 +102,7 @@ void picture::hsv(const cv::Rect &box, int step, cv::Mat &out)
 	}
 }
 
-void picture::pixel(int x, int y, float *value) const
+void image::pixel(int x, int y, float *value) const
 {
 	const uint8_t *row = data + stride * (y - area.y);
 	size_t column = x - left;

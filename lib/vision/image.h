@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A frame of a camera as the rest of this room sees it: sizes checked, JPEG decoded as far
- * as asked for. Pixels are not copied otherwise.
+ * The image in a camera's frame: checked sizes, JPEG decoded in the part that is needed. Other
+ * pixels are not copied.
  */
-#ifndef INCISE_PICTURE_H
-#define INCISE_PICTURE_H
+#ifndef INCISE_IMAGE_H
+#define INCISE_IMAGE_H
 
 #include <vector>
 #include <opencv2/core.hpp>
@@ -13,16 +13,16 @@
 namespace vision
 {
 
-struct picture {
+struct image {
 	cv::Size size;
-	cv::Rect area;		   /* of it is here */
+	cv::Rect area;		   /* the available part */
 	enum incise_pixels pixels; /* RGB, GREY or YUYV */
-	bool smeared; /* colour has less than full resolution: edges are seen in luma only */
+	bool smeared; /* colour has less than full resolution: use luma for edges */
 
-	/* 0 or a negative errno; @frame stays in use. Nothing is in area yet. */
+	/* 0 or a negative errno; @frame stays in use. The area is empty at first. */
 	int take(const struct incise_camera_frame &frame);
 
-	/* Have at least @wanted, which is within the picture, in area. */
+	/* Make at least @wanted, a part of the image, available in area. */
 	int bring(const cv::Rect &wanted);
 
 	/* Every @step-th row of @box, which is within area: hue, saturation and value in 3
