@@ -1,18 +1,466 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Blood from fresh cuts; see blood.h.
+ * Blood from fresh cuts: its drops, its sources and its colour; see blood.h.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 #include "../base/random.h"
 #include "blood.h"
-#include "blood_drop.h"
 #include "blood_film.h"
-#include "blood_paint.h"
-#include "grain.h"
+#include "noise.h"
 
 #define STEP_S 0.01
+
+#define DROPS_MAX 128
+/* No drop grows beyond that by being fed or by merging, µl. */
+#define DROP_MOST_UL 60.0
+
+struct drop {
+	int64_t units; /* 0: there is no drop */
+	double px[2];
+	double heading[2];	     /* unit, along and across downhill */
+	double speed_mm_s;	     /* 0: pinned */
+	struct ground_metric metric; /* of where it is */
+	double age_s;
+	double way_mm; /* since it left some film */
+	int source;    /* that it hangs at and is fed by, or -1 */
+
+	/*
+	 * As it is drawn: the same, until it is seen to be another. Lengths of its shape
+	 * are in radii of a round one: before, behind, to the sides of its axis.
+	 */
+	double drawn_px[2], drawn_mm, axis_px[2], before, behind, beside;
+};
+
+struct drops {
+	struct film *film;
+	uint32_t key;	  /* of what looks random */
+	double viscosity; /* mN s/mm² */
+	struct drop drop[DROPS_MAX];
+};
+
+/* mN, mm, s: weight of a µl; surface tension of blood; its capillary length. */
+#define WEIGHT 0.0104
+#define TENSION 0.055
+#define CAPILLARY_MM 2.3
+/* V / r³ of a cap of 50°. */
+#define CAP 0.786
+/* Difference of the cosines of the advancing and the receding angle, on dry skin. */
+#define HYSTERESIS 0.05
+/* Part of it that is left on wet skin, and while a drop moves. */
+#define WET 0.7
+#define MOVING 0.75
+/* C of the drag: some 6 ln(r / slip length) / angle, both sides of the wedge. */
+#define DRAG 110.0
+#define SPEED_MAX_MM_S 150.0
+#define SPEED_LEAST_MM_S 0.3
+/* Time in which a drop takes up its speed, and turns. */
+#define RELAX_S 0.08
+/* Blood in a drop is as thick again at this age. */
+#define CLOT_S 25.0
+/* The film behind, mm; it is narrower than the drop. */
+#define FILM_LEAST_MM 0.06
+#define FILM_MOST_MM 0.22
+#define FILM_WIDTH 0.8
+/* A spot of it for each such part of its radius. */
+#define FILM_EACH 0.3
+/* In a slow film blood is more viscous than in the drop: it thins by shear. */
+#define FILM_THICKER 1.7
+/* Skin is rough over this length; by so much (tangent) it turns a drop at most. */
+#define ROUGH_MM 2.6
+#define ROUGH 0.55
+#define TURN_MOST 0.9
+/* Wetter skin beside the way draws it over: tangent. */
+#define DRAWN 0.5
+#define WET_MM 0.004
+/* Overlapping by so much of their radii drops flow together, by this part in a step. */
+#define TOUCH 0.72
+#define FLOW 0.12
+/* Pinned for so long a drop sinks in, by this part in a step; what is less is film. */
+#define PINNED_S 4.0
+#define SINK 0.006
+#define LEAST_UNITS (int64_t)(0.03 / BLOOD_UNIT_UL)
+/* How a drop looks is seen to in each so many steps, not in all drops at once. */
+#define SHOWN_EACH 3
+
+/* One that hangs lies along its cut; in radii of a round one. */
+#define DROP_HANGS_ALONG 1.7
+#define DROP_HANGS_ACROSS 0.7
+
+/* Where a drop is drawn. */
+struct drop_box {
+	struct ground_metric metric;
+	double axis[2];		      /* unit, in the metric's frame */
+	int left, top, right, bottom; /* texels that it can cover, the last ones too */
+};
+
+/* A change that is seen, in mm. */
+#define SEEN_MM 0.04
+#define SEEN 0.03
+/* 1 / sqrt(1 - FILM_ROUGH), rounded up. */
+#define ROUGHEST 1.2
+/* The part by which a shape changes when it is shown. */
+#define TURNS_INTO 0.22
+
+static double drop_radius_mm(int64_t units)
+{
+	return cbrt((double)units * (BLOOD_UNIT_UL / CAP));
+}
+
+static bool drop_box(const struct film *film, const struct drop *drop,
+		     struct drop_box *box)
+{
+	struct ground_metric *m = &box->metric;
+	double u, v, length, along, beside, half_u, half_v, half_x;
+
+	if (!(drop->drawn_mm > 0) || !ground_metric(film->map, drop->drawn_px, m))
+		return false;
+	u = m->a * drop->axis_px[0] + m->b * drop->axis_px[1];
+	v = m->c * drop->axis_px[1];
+	length = sqrt(u * u + v * v);
+	box->axis[0] = length > 0 ? u / length : 0;
+	box->axis[1] = length > 0 ? v / length : 1;
+	/* Of the ellipse that holds both halves, at its roughest. */
+	along = drop->drawn_mm * fmax(drop->before, drop->behind) * ROUGHEST;
+	beside = drop->drawn_mm * drop->beside * ROUGHEST;
+	half_u = hypot(along * box->axis[0], beside * box->axis[1]);
+	half_v = hypot(along * box->axis[1], beside * box->axis[0]);
+	half_x = (half_u + half_v * fabs(m->b) / m->c) / m->a;
+	box->left = (int)floor(drop->drawn_px[0] - half_x);
+	box->right = (int)floor(drop->drawn_px[0] + half_x);
+	box->top = (int)floor(drop->drawn_px[1] - half_v / m->c);
+	box->bottom = (int)floor(drop->drawn_px[1] + half_v / m->c);
+	return true;
+}
+
+static void drops_mark(struct drops *drops, const struct drop *drop)
+{
+	struct drop_box box;
+
+	if (drop_box(drops->film, drop, &box))
+		film_mark(drops->film, box.left, box.top, box.right, box.bottom);
+}
+
+static bool nearer(double *value, double to)
+{
+	if (fabs(*value - to) < SEEN)
+		return false;
+	*value += (to - *value) * TURNS_INTO;
+	return true;
+}
+
+/*
+ * What is drawn follows when it would be seen; always by the drops' own steps. A drop that
+ * hangs lies along its cut; one that runs has a round head and is drawn out behind.
+ */
+static void drops_show(struct drops *drops, struct drop *drop,
+		       const struct ground *ground)
+{
+	double radius = drop_radius_mm(drop->units);
+	double moved = ground_length_mm(&ground->metric, drop->px[0] - drop->drawn_px[0],
+					drop->px[1] - drop->drawn_px[1]);
+	double fast = fmin(drop->speed_mm_s / 15, 1);
+	struct drop is = *drop;
+	bool other;
+
+	if (drop->source < 0) {
+		other = nearer(&is.before, 0.8);
+		other = nearer(&is.behind, 0.9 + 1.6 * fast) || other;
+		other = nearer(&is.beside, 0.9 - 0.25 * fast) || other;
+		for (int i = 0; i < 2 && drop->speed_mm_s > 0; i++)
+			is.axis_px[i] = drop->heading[0] * ground->down_px[i] +
+					drop->heading[1] * ground->across_px[i];
+	} else {
+		other = false;
+	}
+	if (!other && fabs(radius - drop->drawn_mm) < SEEN_MM && moved < SEEN_MM)
+		return;
+	drops_mark(drops, drop);
+	*drop = is;
+	drop->drawn_mm = radius;
+	drop->drawn_px[0] = drop->px[0];
+	drop->drawn_px[1] = drop->px[1];
+	drops_mark(drops, drop);
+}
+
+static void drop_turn_round(struct drop *drop, const struct ground *ground)
+{
+	const struct ground_metric *m = &ground->metric;
+	double u = m->a * drop->axis_px[0] + m->b * drop->axis_px[1];
+	double v = m->c * drop->axis_px[1], length = sqrt(u * u + v * v);
+	double a = m->a * ground->down_px[0] + m->b * ground->down_px[1];
+	double b = m->c * ground->down_px[1], along, across;
+
+	if (!(length > 0))
+		return;
+	along = fabs(u * a + v * b) / length;
+	across = sqrt(fmax(1 - along * along, 0));
+	drop->before = drop->behind =
+		along * DROP_HANGS_ALONG + across * DROP_HANGS_ACROSS;
+	drop->beside = along * DROP_HANGS_ACROSS + across * DROP_HANGS_ALONG;
+	drop->axis_px[0] = ground->down_px[0];
+	drop->axis_px[1] = ground->down_px[1];
+}
+
+static void drops_init(struct drops *drops, struct film *film,
+		       const struct incise_scene_picture *picture, uint32_t key)
+{
+	*drops = (struct drops){.film = film, .key = key};
+	drops->viscosity = picture->viscosity_mPa_s * 1e-6;
+}
+
+static int drops_new(struct drops *drops, const double px[2], const double along_px[2],
+		     int source, int64_t units)
+{
+	struct ground ground;
+
+	if (!ground_at(drops->film->map, drops->film->gravity, px, &ground))
+		return -1;
+	for (int i = 0; i < DROPS_MAX; i++) {
+		struct drop *drop = &drops->drop[i];
+
+		if (drop->units)
+			continue;
+		*drop = (struct drop){
+			.units = units,
+			.px = {px[0], px[1]},
+			.heading = {1, 0},
+			.source = source,
+			.metric = ground.metric,
+			.axis_px = {along_px[0], along_px[1]},
+			.before = DROP_HANGS_ALONG,
+			.behind = DROP_HANGS_ALONG,
+			.beside = DROP_HANGS_ACROSS,
+		};
+		return i;
+	}
+	return -1;
+}
+
+static void vanish(struct drops *drops, struct drop *drop)
+{
+	drops_mark(drops, drop);
+	drop->units = 0;
+	drop->drawn_mm = 0;
+}
+
+/* How wet it is at a place ahead, in mm along and across downhill; 0 … 1. */
+static double wet_at(struct drops *drops, const struct drop *drop,
+		     const struct ground *ground, double along, double across)
+{
+	double x =
+		drop->px[0] + along * ground->down_px[0] + across * ground->across_px[0];
+	double y =
+		drop->px[1] + along * ground->down_px[1] + across * ground->across_px[1];
+
+	return fmin(film_thickness_mm(drops->film, x, y) / WET_MM, 1);
+}
+
+/* Downhill, off to a side by the skin's roughness and by what is wet already. */
+static void steer(struct drops *drops, struct drop *drop, const struct ground *ground,
+		  double radius)
+{
+	double mm_x = drop->px[0] * ground->metric.a,
+	       mm_y = drop->px[1] * ground->metric.c;
+	double rough = noise_smooth(drops->key, (float)(mm_x / ROUGH_MM),
+				    (float)(mm_y / ROUGH_MM)) +
+		       0.5 * noise_smooth(drops->key + 1, (float)(mm_x / ROUGH_MM * 2.7),
+					  (float)(mm_y / ROUGH_MM * 2.7));
+	double right = wet_at(drops, drop, ground, 1.1 * radius, 1.2 * radius);
+	double left = wet_at(drops, drop, ground, 1.1 * radius, -1.2 * radius);
+	double turn = ROUGH * rough + DRAWN * (right - left);
+	double length;
+
+	turn = fmin(fmax(turn, -TURN_MOST), TURN_MOST);
+	drop->heading[1] += (turn - drop->heading[1]) * (STEP_S / RELAX_S);
+	drop->heading[0] = 1;
+	length = sqrt(1 + drop->heading[1] * drop->heading[1]);
+	drop->heading[0] /= length;
+	drop->heading[1] /= length;
+}
+
+/* The steepest that the drop's foot feels: where it hangs over, on what curves down. */
+static double slope_of(struct drops *drops, const struct drop *drop,
+		       const struct ground *ground, double radius)
+{
+	double px[2] = {drop->px[0] + radius * ground->down_px[0],
+			drop->px[1] + radius * ground->down_px[1]};
+	struct ground front;
+
+	if (!ground_at(drops->film->map, drops->film->gravity, px, &front))
+		return ground->slope;
+	return fmax(ground->slope, front.slope);
+}
+
+static void accelerate(struct drops *drops, struct drop *drop,
+		       const struct ground *ground, double radius)
+{
+	double ahead = wet_at(drops, drop, ground, 1.15 * radius, 0);
+	double volume = (double)drop->units * BLOOD_UNIT_UL;
+	double held = TENSION * HYSTERESIS * 2 * radius * (1 - (1 - WET) * ahead);
+	double clot = 1 + drop->age_s * drop->age_s / (CLOT_S * CLOT_S);
+	double drives, to;
+
+	if (drop->speed_mm_s > 0)
+		held *= MOVING;
+	/* Clotting blood holds on: its edge more than its inside. */
+	drives = WEIGHT * volume * slope_of(drops, drop, ground, radius) - held * clot;
+	to = fmax(drives, 0) / (DRAG * drops->viscosity * clot * 2 * radius);
+	to = fmin(to, SPEED_MAX_MM_S);
+	drop->speed_mm_s += (to - drop->speed_mm_s) * (STEP_S / RELAX_S);
+	if (drop->speed_mm_s < SPEED_LEAST_MM_S)
+		drop->speed_mm_s = to > SPEED_LEAST_MM_S ? SPEED_LEAST_MM_S : 0;
+}
+
+/*
+ * What a drop leaves on its way, or takes up from what is thicker: a spot for each part of
+ * the spot's radius, so that a slow drop costs no more than its way.
+ */
+static void leave_film(struct drops *drops, struct drop *drop, double radius)
+{
+	double capillary = drops->viscosity * drop->speed_mm_s / TENSION;
+	double thick = 0.94 * CAPILLARY_MM * cbrt(capillary * capillary);
+	double width = FILM_WIDTH * radius, share;
+
+	if (drop->way_mm < FILM_EACH * width)
+		return;
+	share = 1 - exp(-drop->way_mm / (0.4 * width));
+	drop->way_mm = 0;
+	thick = fmin(fmax(FILM_THICKER * thick, FILM_LEAST_MM), FILM_MOST_MM);
+	drop->units -=
+		film_level(drops->film, drop->px, width, thick, share, drop->units);
+}
+
+static void run(struct drops *drops, struct drop *drop, const struct ground *ground,
+		double radius)
+{
+	double way = drop->speed_mm_s * STEP_S;
+
+	drop->way_mm += way;
+	leave_film(drops, drop, radius);
+	for (int i = 0; i < 2; i++)
+		drop->px[i] += way * (drop->heading[0] * ground->down_px[i] +
+				      drop->heading[1] * ground->across_px[i]);
+	if (drop->source >= 0)
+		drop_turn_round(drop, ground);
+	drop->source = -1;
+}
+
+/* Into the film below. */
+static void sink(struct drops *drops, struct drop *drop, double radius, int64_t units)
+{
+	film_add(drops->film, drop->px, radius, units);
+	drop->units -= units;
+}
+
+static void step_drop(struct drops *drops, struct drop *drop)
+{
+	struct ground ground;
+	double radius = drop_radius_mm(drop->units);
+
+	if (!ground_at(drops->film->map, drops->film->gravity, drop->px, &ground)) {
+		drops->film->off_units += drop->units;
+		vanish(drops, drop);
+		return;
+	}
+	drop->metric = ground.metric;
+	if (drop->source < 0)
+		drop->age_s += STEP_S;
+	accelerate(drops, drop, &ground, radius);
+	if (drop->speed_mm_s > 0) {
+		steer(drops, drop, &ground, radius);
+		run(drops, drop, &ground, radius);
+	} else if (drop->source < 0 && drop->age_s > PINNED_S) {
+		sink(drops, drop, radius, (int64_t)((double)drop->units * SINK));
+	}
+	if (drop->source < 0 && drop->units < LEAST_UNITS)
+		sink(drops, drop, radius, drop->units);
+	if (drop->units &&
+	    (drops->film->step + (uint64_t)(drop - drops->drop)) % SHOWN_EACH)
+		return;
+	if (drop->units)
+		drops_show(drops, drop, &ground);
+	else
+		vanish(drops, drop);
+}
+
+/* The smaller of two that touch flows into the larger. */
+static void merge(struct drops *drops, struct drop *a, struct drop *b)
+{
+	struct drop *to = a->units >= b->units ? a : b, *from = to == a ? b : a;
+	int64_t units = (int64_t)((double)from->units * FLOW) + 1;
+	double part;
+
+	if (from->units < LEAST_UNITS || units > from->units)
+		units = from->units;
+	if ((double)(to->units + units) * BLOOD_UNIT_UL > DROP_MOST_UL)
+		return;
+	/* The mixture is as old as its parts. */
+	part = (double)units / (double)(units + to->units);
+	to->age_s += (from->age_s - to->age_s) * part;
+	to->units += units;
+	from->units -= units;
+	if (!from->units)
+		vanish(drops, from);
+}
+
+/* Drops whose edges touch, by where they were at the beginning. */
+static void merge_all(struct drops *drops)
+{
+	struct drop *live[DROPS_MAX];
+	double radius[DROPS_MAX];
+	int n = 0;
+
+	for (int i = 0; i < DROPS_MAX; i++) {
+		struct drop *drop = &drops->drop[i];
+
+		if (!drop->units)
+			continue;
+		radius[n] = drop_radius_mm(drop->units);
+		live[n++] = drop;
+	}
+	for (int i = 0; i < n; i++)
+		for (int j = i + 1; j < n; j++) {
+			struct drop *a = live[i], *b = live[j];
+
+			if (a->units && b->units &&
+			    ground_length_mm(&a->metric, b->px[0] - a->px[0],
+					     b->px[1] - a->px[1]) <
+				    TOUCH * (radius[i] + radius[j]))
+				merge(drops, a, b);
+		}
+}
+
+static void drops_step(struct drops *drops)
+{
+	for (int i = 0; i < DROPS_MAX; i++)
+		if (drops->drop[i].units)
+			step_drop(drops, &drops->drop[i]);
+	merge_all(drops);
+}
+
+static int64_t drops_units(const struct drops *drops)
+{
+	int64_t units = 0;
+
+	for (int i = 0; i < DROPS_MAX; i++)
+		units += drops->drop[i].units;
+	return units;
+}
+
+static int drops_count(const struct drops *drops)
+{
+	int n = 0;
+
+	for (int i = 0; i < DROPS_MAX; i++)
+		n += drops->drop[i].units > 0;
+	return n;
+}
+
+/* --- Sources --- */
+
 /* A source stands for so much of a cut, mm: a random length between these. */
 #define SPAN_LEAST_MM 2.5
 #define SPAN_MOST_MM 8.0
@@ -55,13 +503,13 @@ static double draw(struct blood *blood)
 	return incise_random_uniform(blood->key, blood->drawn++);
 }
 
-struct blood *blood_new(const struct incise_chart *chart,
+struct blood *blood_new(const struct uv_map *map,
 			const struct incise_scene_picture *picture,
 			struct incise_error *err)
 {
 	struct blood *blood = calloc(1, sizeof(*blood));
 
-	if (!blood || !film_init(&blood->film, chart, picture)) {
+	if (!blood || !film_init(&blood->film, map, picture)) {
 		blood_free(blood);
 		incise_error_set(err, ENOMEM, "view: no memory for blood");
 		return NULL;
@@ -141,7 +589,7 @@ void blood_reopen(struct blood *blood, const double px[2], double depth_mm)
 	double in = fmin(depth_mm / REOPENS_DEPTH_MM, 1);
 	struct ground_metric metric;
 
-	if (!(in > 0) || !ground_metric(blood->film.chart, px, &metric))
+	if (!(in > 0) || !ground_metric(blood->film.map, px, &metric))
 		return;
 	for (int i = 0; i < blood->n; i++) {
 		struct source *source = &blood->source[i];
@@ -175,7 +623,7 @@ static void hang(struct blood *blood, struct source *source, struct drop *drop)
 	struct ground ground;
 
 	if (!(lower > 0) ||
-	    !ground_at(blood->film.chart, blood->film.gravity, drop->px, &ground))
+	    !ground_at(blood->film.map, blood->film.gravity, drop->px, &ground))
 		return;
 	source->drop_mm = radius;
 	for (int i = 0; i < 2; i++)
@@ -244,11 +692,6 @@ void blood_step(struct blood *blood)
 	film_step(&blood->film);
 }
 
-void blood_paint(struct blood *blood, struct incise_canvas *canvas, int layer)
-{
-	blood_paint_layer(&blood->film, &blood->drops, canvas, layer);
-}
-
 void blood_volumes(const struct blood *blood, struct blood_volumes *volumes)
 {
 	*volumes = (struct blood_volumes){
@@ -276,4 +719,174 @@ bool blood_drop(const struct blood *blood, int index, double px[2], double *ul)
 size_t blood_memory(const struct blood *blood)
 {
 	return sizeof(*blood) + film_memory(&blood->film);
+}
+
+/* At this thickness, mm, a film hides two thirds of what is below. */
+#define HIDES_MM 0.013f
+/* From a thin film's colour half of the way to a thick one's. */
+#define DARK_MM 0.16f
+/* Thinner than this there is none to be seen, mm. */
+#define NOTHING_MM 0.0004f
+
+/* A drop, prepared; from … to is what it covers, texels. */
+struct shape {
+	struct ground_metric metric;
+	float x, y, axis[2];	      /* axis: unit, mm, the way it runs */
+	float before, behind, beside; /* 1/mm */
+	float high_mm, grain;
+	int from_px[2], to_px[2];
+};
+
+struct wet_texel {
+	float thick, light; /* mm; of a highlight, 0 … 1 */
+};
+
+static bool shape_of(const struct film *film, const struct drop *drop,
+		     struct shape *shape)
+{
+	struct drop_box box;
+
+	if (!drop->units || !drop_box(film, drop, &box))
+		return false;
+	shape->metric = box.metric;
+	shape->axis[0] = (float)box.axis[0];
+	shape->axis[1] = (float)box.axis[1];
+	shape->x = (float)drop->drawn_px[0];
+	shape->y = (float)drop->drawn_px[1];
+	shape->before = (float)(1 / (drop->drawn_mm * drop->before));
+	shape->behind = (float)(1 / (drop->drawn_mm * drop->behind));
+	shape->beside = (float)(1 / (drop->drawn_mm * drop->beside));
+	/* Such that its volume is the drop's: the mean of (1 - r²)^1.5 over a disc is 0.4. */
+	shape->high_mm = (float)(0.625 * drop->drawn_mm * 2 /
+				 (drop->beside * (drop->before + drop->behind)));
+	shape->grain = box.metric.a / FILM_ROUGH_MM;
+	shape->from_px[0] = box.left;
+	shape->from_px[1] = box.top;
+	shape->to_px[0] = box.right + 1;
+	shape->to_px[1] = box.bottom + 1;
+	return true;
+}
+
+static void add_texel(struct wet_texel *to, int x, int y, const struct shape *shape)
+{
+	float dx = (float)x + 0.5f - shape->x, dy = (float)y + 0.5f - shape->y;
+	float u = shape->metric.a * dx + shape->metric.b * dy, v = shape->metric.c * dy;
+	float along = u * shape->axis[0] + v * shape->axis[1];
+	float across = (v * shape->axis[0] - u * shape->axis[1]) * shape->beside;
+	float r2, cap, lit;
+
+	along *= along > 0 ? shape->before : shape->behind;
+	r2 = along * along + across * across;
+	if (r2 >= 1.6f)
+		return;
+	r2 *= 1 + FILM_ROUGH * noise_smooth(FILM_ROUGH_KEY, (float)x * shape->grain,
+					    (float)y * shape->grain);
+	if (r2 >= 1)
+		return;
+	cap = 1 - r2;
+	to->thick += shape->high_mm * cap * sqrtf(cap);
+	/* A window that shines on it, off the middle. */
+	u = u * shape->beside + 0.3f;
+	v = v * shape->beside + 0.34f;
+	lit = 1 - (u * u + v * v) * 16;
+	if (lit > to->light)
+		to->light = lit;
+}
+
+static void add_shape(struct wet_texel *tile, int x0, int y0, const struct shape *shape)
+{
+	int left = shape->from_px[0] > x0 ? shape->from_px[0] : x0;
+	int right =
+		shape->to_px[0] < x0 + CANVAS_TILE ? shape->to_px[0] : x0 + CANVAS_TILE;
+	int top = shape->from_px[1] > y0 ? shape->from_px[1] : y0;
+	int bottom =
+		shape->to_px[1] < y0 + CANVAS_TILE ? shape->to_px[1] : y0 + CANVAS_TILE;
+
+	for (int y = top; y < bottom; y++)
+		for (int x = left; x < right; x++)
+			add_texel(&tile[(y - y0) * CANVAS_TILE + x - x0], x, y, shape);
+}
+
+static float mix(float a, float b, float t)
+{
+	return a + (b - a) * t;
+}
+
+static void colour(const struct wet_texel *texel, float dry, uint8_t rgba[4])
+{
+	float thick = texel->thick;
+	float alpha = 1 - expf(-thick / HIDES_MM);
+	float dark = thick / (thick + DARK_MM);
+	float light = texel->light > 0 ? texel->light * texel->light * 0.14f *
+						 fminf(thick / 0.3f, 1)
+				       : 0;
+	float rgb[3] = {
+		mix(0.56f, 0.36f, dark),
+		mix(0.025f, 0.01f, dark),
+		mix(0.03f, 0.012f, dark),
+	};
+	const float brown[3] = {0.27f, 0.055f, 0.035f};
+
+	alpha = fminf(alpha, 0.985f);
+	for (int i = 0; i < 3; i++) {
+		rgb[i] = mix(rgb[i], brown[i], dry * 0.75f);
+		rgb[i] = mix(rgb[i], 1, light);
+		rgba[i] = (uint8_t)(rgb[i] * alpha * 255 + 0.5f);
+	}
+	rgba[3] = (uint8_t)(alpha * 255 + 0.5f);
+}
+
+/* Whether a texel of it is another one now. */
+static bool paint_tile(struct film *film, const struct shape *shapes, int n, int number,
+		       uint8_t *rgba)
+{
+	int x0 = number % film->tiles * CANVAS_TILE,
+	    y0 = number / film->tiles * CANVAS_TILE;
+	const struct film_tile *tile = film_tile(film, x0, y0);
+	size_t first = (size_t)number * FILM_TEXELS;
+	struct wet_texel texels[FILM_TEXELS];
+	bool changed = false;
+	float unit = (float)(BLOOD_UNIT_UL / tile->area_mm2);
+
+	for (int i = 0; i < FILM_TEXELS; i++)
+		texels[i] = (struct wet_texel){(float)film->volume[first + i] * unit, 0};
+	for (int i = 0; i < n; i++)
+		add_shape(texels, x0, y0, &shapes[i]);
+	for (int i = 0; i < FILM_TEXELS; i++) {
+		uint8_t *to = rgba + ((size_t)(y0 + i / CANVAS_TILE) * film->size + x0 +
+				      i % CANVAS_TILE) *
+					     4;
+		uint8_t is[4] = {0};
+
+		if (texels[i].thick > NOTHING_MM)
+			colour(&texels[i], film->dry[first + i] * (1.0f / FILM_DRY), is);
+		changed |= memcmp(to, is, sizeof(is)) != 0;
+		memcpy(to, is, sizeof(is));
+	}
+	return changed;
+}
+
+void blood_paint(struct blood *blood, struct incise_canvas *canvas, int layer)
+{
+	struct film *film = &blood->film;
+	uint8_t *rgba = incise_canvas_layer(canvas, layer);
+	struct shape shapes[DROPS_MAX];
+	int n = 0;
+
+	if (!film->n_dirty || !rgba)
+		return;
+	for (int i = 0; i < DROPS_MAX; i++)
+		n += shape_of(film, &blood->drops.drop[i], &shapes[n]);
+	for (int i = 0; film->n_dirty; i++) {
+		if (!film->dirty[i])
+			continue;
+		film->dirty[i] = 0;
+		film->n_dirty--;
+		/* A film drains and dries by less than a step of colour, mostly. */
+		if (paint_tile(film, shapes, n, i, rgba))
+			incise_canvas_dirty(canvas, (struct incise_rect){
+							    i % film->tiles * CANVAS_TILE,
+							    i / film->tiles * CANVAS_TILE,
+							    CANVAS_TILE, CANVAS_TILE});
+	}
 }

@@ -20,7 +20,7 @@
 #include <incise/error.h>
 #include <incise/scene.h>
 #include "canvas.h"
-#include "chart.h"
+#include "uv_map.h"
 #include "wound.h"
 
 #define BLOOD_CLOT_S 18.0
@@ -28,7 +28,7 @@
 
 struct blood;
 
-struct blood *blood_new(const struct incise_chart *chart,
+struct blood *blood_new(const struct uv_map *map,
 			const struct incise_scene_picture *picture,
 			struct incise_error *err);
 

@@ -20,7 +20,7 @@
 #include <stdint.h>
 #include <incise/scene.h>
 #include "canvas.h"
-#include "chart.h"
+#include "uv_map.h"
 #include "ground.h"
 
 #define BLOOD_UNIT_UL 1e-7
@@ -39,7 +39,7 @@
 
 /* What a tile's middle says of its texels. */
 struct film_tile {
-	bool known, there; /* the chart was asked; there is a surface */
+	bool known, there; /* the map was asked; there is a surface */
 	bool awake;	   /* something flows or dries */
 	uint8_t period;	   /* rounds between two visits: fewer where less flows */
 	uint32_t last;	   /* round of the last one */
@@ -48,7 +48,7 @@ struct film_tile {
 };
 
 struct film {
-	const struct incise_chart *chart;
+	const struct uv_map *map;
 	double gravity[3];
 	double drain; /* rho g / (3 mu), 1/(mm s) */
 	int size, tiles;
@@ -63,7 +63,7 @@ struct film {
 	int64_t units, off_units; /* all that is here; all that ran off the texture */
 };
 
-bool film_init(struct film *film, const struct incise_chart *chart,
+bool film_init(struct film *film, const struct uv_map *map,
 	       const struct incise_scene_picture *picture);
 void film_free(struct film *film);
 size_t film_memory(const struct film *film);
@@ -87,28 +87,6 @@ void film_add(struct film *film, const double px[2], double radius_mm, int64_t u
 
 /* 10 ms: some of the tiles drain and dry. */
 void film_step(struct film *film);
-
-/* For what drains. */
-static inline bool film_inside(const struct film *film, int x, int y)
-{
-	return x >= 0 && y >= 0 && x < film->size && y < film->size;
-}
-
-/* Of a texel of the texture. */
-static inline size_t film_index(const struct film *film, int x, int y)
-{
-	return ((size_t)(y / CANVAS_TILE) * film->tiles + x / CANVAS_TILE) * FILM_TEXELS +
-	       y % CANVAS_TILE * CANVAS_TILE + x % CANVAS_TILE;
-}
-
-/* Fresh blood on old wets it again. */
-void film_put(struct film *film, size_t at, uint32_t units);
-
-/* Which round of visits it is. */
-uint32_t film_round(const struct film *film);
-
-/* Something changed at a texel: its tile is to be painted and visited. */
-struct film_tile *film_wake(struct film *film, int x, int y);
 
 /* Texels are to be painted; the last ones too. */
 void film_mark(struct film *film, int left, int top, int right, int bottom);

@@ -1,17 +1,514 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A picture by OpenGL; see draw.h.
+ * Drawing by OpenGL; see draw.h: triangles, the framebuffer, the textures, the scene.
  */
 #include <dlfcn.h>
 #include <epoxy/gl.h>
 #include <errno.h>
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "../base/vector.h"
-#include "draw_parts.h"
+#include "draw.h"
+#include "instrument_shape.h"
 #include "shaders.h"
+#include "view_camera.h"
+
+/*
+ * Triangles in the graphics' memory, for the shaders: attribute 0 is the place in mm, 1 the
+ * normal, 2 the tangent or the colour, 3 the texel.
+ */
+struct solid {
+	unsigned array, vertices, indices; /* OpenGL's names */
+	int n_indices;
+};
+
+static void attribute(int index, int n, size_t stride, size_t offset)
+{
+	glEnableVertexAttribArray(index);
+	glVertexAttribPointer(index, n, GL_FLOAT, GL_FALSE, (int)stride,
+			      (const void *)(uintptr_t)offset);
+}
+
+static void fill_buffers(struct solid *solid, const void *vertices, size_t bytes,
+			 const uint32_t *indices, int n_indices)
+{
+	glGenVertexArrays(1, &solid->array);
+	glGenBuffers(1, &solid->vertices);
+	glGenBuffers(1, &solid->indices);
+	glBindVertexArray(solid->array);
+	glBindBuffer(GL_ARRAY_BUFFER, solid->vertices);
+	glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)bytes, vertices, GL_STATIC_DRAW);
+	glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, solid->indices);
+	glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)n_indices * 4, indices,
+		     GL_STATIC_DRAW);
+	solid->n_indices = n_indices;
+}
+
+static void solid_draw(const struct solid *solid)
+{
+	glBindVertexArray(solid->array);
+	glDrawElements(GL_TRIANGLES, solid->n_indices, GL_UNSIGNED_INT, NULL);
+}
+
+static void solid_free(struct solid *solid)
+{
+	glDeleteVertexArrays(1, &solid->array);
+	glDeleteBuffers(1, &solid->vertices);
+	glDeleteBuffers(1, &solid->indices);
+}
+
+static void solid_surface(struct solid *solid, const struct uv_map *map,
+			  double middle_mm[3], double *reach_mm)
+{
+	const size_t stride = sizeof(struct uv_map_vertex);
+	double low[3] = {INFINITY, INFINITY, INFINITY};
+	double high[3] = {-INFINITY, -INFINITY, -INFINITY}, across[3];
+
+	fill_buffers(solid, map->vertices, map->n_vertices * stride, map->indices,
+		     map->n_indices);
+	attribute(0, 3, stride, offsetof(struct uv_map_vertex, position_mm));
+	attribute(1, 3, stride, offsetof(struct uv_map_vertex, normal));
+	attribute(2, 4, stride, offsetof(struct uv_map_vertex, tangent));
+	attribute(3, 2, stride, offsetof(struct uv_map_vertex, px));
+	for (int i = 0; i < map->n_vertices; i++)
+		for (int k = 0; k < 3; k++) {
+			low[k] = fmin(low[k], map->vertices[i].position_mm[k]);
+			high[k] = fmax(high[k], map->vertices[i].position_mm[k]);
+		}
+	for (int k = 0; k < 3 && map->n_vertices > 0; k++)
+		middle_mm[k] = 0.5 * (low[k] + high[k]);
+	v3_sub(across, high, low);
+	*reach_mm = map->n_vertices > 0 ? 0.5 * v3_length(across) : 1;
+}
+
+static void solid_instrument(struct solid *solid, const struct instrument_mesh *mesh)
+{
+	const size_t stride = sizeof(struct instrument_vertex);
+
+	fill_buffers(solid, mesh->vertices, mesh->n_vertices * stride, mesh->indices,
+		     mesh->n_indices);
+	attribute(0, 3, stride, offsetof(struct instrument_vertex, position_mm));
+	attribute(1, 3, stride, offsetof(struct instrument_vertex, normal));
+	attribute(2, 4, stride, offsetof(struct instrument_vertex, rgb));
+}
+
+/*
+ * The target: a framebuffer object with several samples per pixel and depth, and the one of single
+ * pixels to which it is resolved.
+ */
+struct target {
+	int width, height;
+	int samples;	 /* 1: drawn on single pixels straight away */
+	unsigned drawn;	 /* framebuffer to draw the scene on */
+	unsigned single; /* framebuffer of single pixels; the same with one sample */
+	unsigned colour, depth, pixels; /* their renderbuffers */
+};
+
+static void target_free(struct target *target)
+{
+	if (target->single != target->drawn)
+		glDeleteFramebuffers(1, &target->single);
+	glDeleteFramebuffers(1, &target->drawn);
+	glDeleteRenderbuffers(1, &target->colour);
+	glDeleteRenderbuffers(1, &target->depth);
+	glDeleteRenderbuffers(1, &target->pixels);
+	target->drawn = target->single = 0;
+	target->colour = target->depth = target->pixels = 0;
+}
+
+static unsigned make_renderbuffer(const struct target *target, int samples, GLenum format)
+{
+	unsigned name;
+
+	glGenRenderbuffers(1, &name);
+	glBindRenderbuffer(GL_RENDERBUFFER, name);
+	glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples > 1 ? samples : 0,
+					 format, target->width, target->height);
+	return name;
+}
+
+static unsigned make_framebuffer(unsigned colour, unsigned depth)
+{
+	unsigned name;
+
+	glGenFramebuffers(1, &name);
+	glBindFramebuffer(GL_FRAMEBUFFER, name);
+	glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER,
+				  colour);
+	if (depth)
+		glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT,
+					  GL_RENDERBUFFER, depth);
+	return name;
+}
+
+static int complete(struct target *target)
+{
+	int good;
+
+	target->colour = make_renderbuffer(target, target->samples, GL_RGBA8);
+	target->depth = make_renderbuffer(target, target->samples, GL_DEPTH_COMPONENT24);
+	target->drawn = make_framebuffer(target->colour, target->depth);
+	good = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+	target->single = target->drawn;
+	if (target->samples > 1) {
+		target->pixels = make_renderbuffer(target, 1, GL_RGBA8);
+		target->single = make_framebuffer(target->pixels, 0);
+		good &= glCheckFramebufferStatus(GL_FRAMEBUFFER) ==
+			GL_FRAMEBUFFER_COMPLETE;
+	}
+	return good && glGetError() == GL_NO_ERROR;
+}
+
+static int target_size(struct target *target, int width, int height,
+		       struct incise_error *err)
+{
+	int side_max = 0, samples_max = 1, samples = target->samples;
+
+	if (target->drawn && target->width == width && target->height == height)
+		return 0;
+	glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &side_max);
+	glGetIntegerv(GL_MAX_SAMPLES, &samples_max);
+	if (width < 1 || height < 1 || width > side_max || height > side_max)
+		return incise_error_set(err, EINVAL,
+					"picture: %d × %d pixels; expected 1 to %d each",
+					width, height, side_max);
+	target_free(target);
+	target->width = width;
+	target->height = height;
+	target->samples = samples < samples_max ? samples : samples_max;
+	while (!complete(target)) {
+		samples = target->samples / 2;
+		target_free(target);
+		if (samples < 1) {
+			target->width = target->height = 0;
+			return incise_error_set(
+				err, ENOTSUP,
+				"picture: no framebuffer of %d × %d pixels: "
+				"a smaller picture may do",
+				width, height);
+		}
+		target->samples = samples;
+	}
+	return 0;
+}
+
+static void target_resolve(const struct target *target)
+{
+	if (target->samples > 1) {
+		glBindFramebuffer(GL_READ_FRAMEBUFFER, target->drawn);
+		glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target->single);
+		glBlitFramebuffer(0, 0, target->width, target->height, 0, 0,
+				  target->width, target->height, GL_COLOR_BUFFER_BIT,
+				  GL_NEAREST);
+	}
+	glBindFramebuffer(GL_FRAMEBUFFER, target->single);
+}
+
+/*
+ * Textures: the surface's, which is sent by rectangles, and images over the frame. Their levels
+ * are made here or by the canvas, never by glGenerateMipmap(), which does the whole texture.
+ *
+ * The surface has a single texture, since each lookup costs a CPU renderer a quarter of its frame:
+ * red, green and blue are the canvas's; alpha is the skin's slope towards the lamp, 128 + 127 times
+ * the slope along @way, as lamp and surface stand still. It comes from the skin's normals, and for
+ * wet blood from the border of its film:
+ *
+ *          wet            next, some texels along the way to the lamp
+ *     ▁▁▁▂▅▇▇▇▇▇▇▅▂▁▁▁    slope = a share of (wet - next)
+ *        ▲       ▲
+ *     leans     leans
+ *     away      to the lamp
+ */
+struct texture_setup {
+	const struct incise_canvas *canvas; /* all of it is sent */
+	const uint8_t *normal_rgb;	    /* size²; or NULL: a smooth skin */
+	double way[2]; /* unit: to the lamp, in texels right and down */
+	bool fine;     /* what costs more on a CPU than it shows */
+};
+
+#define LEVELS_MAX 15	/* a canvas has at most 16384 texels a side */
+#define FILM_TEXELS 2.5 /* over which a film ends, at level 0 */
+#define FILM_SLOPE 0.6
+
+struct texture {
+	unsigned name;
+	int size, levels;
+	int reach[LEVELS_MAX][2];   /* to the texel whose wetness is compared */
+	uint8_t *slope[LEVELS_MAX]; /* of the skin */
+	uint8_t *band;		    /* what is sent: rows of one rectangle */
+	size_t band_bytes;
+};
+
+static void texture_free(struct texture *texture)
+{
+	if (!texture)
+		return;
+	if (texture->name)
+		glDeleteTextures(1, &texture->name);
+	for (int level = 0; level < texture->levels; level++)
+		free(texture->slope[level]);
+	free(texture->band);
+	free(texture);
+}
+
+static bool too_large(int size, struct incise_error *err)
+{
+	int most = 0;
+
+	glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+	if (size <= most)
+		return false;
+	incise_error_set(err, ENOTSUP,
+			 "picture: a texture of %d texels; the graphics have at most %d: "
+			 "make picture.texture_px of the scene smaller",
+			 size, most);
+	return true;
+}
+
+static unsigned begin_texture(int levels, bool fine)
+{
+	unsigned name;
+
+	glGenTextures(1, &name);
+	glBindTexture(GL_TEXTURE_2D, name);
+	glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, levels - 1);
+	glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+	glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+	glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+	glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER,
+			fine ? GL_LINEAR_MIPMAP_LINEAR : GL_LINEAR_MIPMAP_NEAREST);
+	if (fine && epoxy_has_gl_extension("GL_EXT_texture_filter_anisotropic")) {
+		float most = 1;
+
+		glGetFloatv(GL_MAX_TEXTURE_MAX_ANISOTROPY_EXT, &most);
+		glTexParameterf(GL_TEXTURE_2D, GL_TEXTURE_MAX_ANISOTROPY_EXT,
+				most < 8 ? most : 8);
+	}
+	return name;
+}
+
+static void slopes(uint8_t *to, const uint8_t *normal_rgb, size_t n, const double way[2])
+{
+	/* In 1/128 of the way. */
+	int x = (int)lround(way[0] * 128), y = (int)lround(way[1] * 128);
+
+	for (size_t i = 0; i < n; i++) {
+		int lean = 0;
+
+		if (normal_rgb)
+			lean = ((normal_rgb[3 * i] - 128) * x +
+				(normal_rgb[3 * i + 1] - 128) * y) /
+			       128;
+		to[i] = (uint8_t)(lean < -127 ? 1 : lean > 127 ? 255 : 128 + lean);
+	}
+}
+
+/* The mean of 2 × 2: from afar a rough skin is smooth. */
+static void halve(uint8_t *to, const uint8_t *from, int side)
+{
+	for (int y = 0; y < side; y++)
+		for (int x = 0; x < side; x++) {
+			const uint8_t *at = from + (size_t)4 * y * side + 2 * x;
+
+			to[(size_t)y * side + x] =
+				(uint8_t)((at[0] + at[1] + at[2 * side] +
+					   at[2 * side + 1] + 2) /
+					  4);
+		}
+}
+
+static bool make_slopes(struct texture *texture, const struct texture_setup *setup)
+{
+	for (int level = 0; level < texture->levels; level++) {
+		int side = texture->size >> level;
+		double texels = fmax(FILM_TEXELS / (1 << level), 1);
+
+		texture->slope[level] = malloc((size_t)side * side);
+		if (!texture->slope[level])
+			return false;
+		if (level)
+			halve(texture->slope[level], texture->slope[level - 1], side);
+		else
+			slopes(texture->slope[0], setup->normal_rgb, (size_t)side * side,
+			       setup->way);
+		for (int k = 0; k < 2; k++)
+			texture->reach[level][k] = (int)lround(setup->way[k] * texels);
+	}
+	return true;
+}
+
+/*
+ * How wet a texel is, 0 … 255, by its colour: fresh blood has green below a third of red,
+ * skin, liver and what has dried have more. The shader has the same rule.
+ */
+static int wetness(const uint8_t *rgba)
+{
+	int wet = 3 * rgba[0] - 7 * rgba[1];
+
+	return wet < 0 ? 0 : wet > 255 ? 255 : wet;
+}
+
+static int clamp_index(int x, int side)
+{
+	return x < 0 ? 0 : x >= side ? side - 1 : x;
+}
+
+static uint8_t lean(int slope, int wet, int next)
+{
+	int skin = (slope - 128) * (282 - wet) / 282;
+	int film = (int)(FILM_SLOPE * 128) * (wet - next) / 256;
+
+	return (uint8_t)(clamp_index(skin + film + 127, 255) + 1);
+}
+
+/* One rectangle, within its level: colours and slopes. */
+static void fill_band(const struct texture *texture, const uint8_t *pixels, int stride,
+		      int level, const struct incise_rect *r)
+{
+	int side = texture->size >> level;
+	const int *reach = texture->reach[level];
+	uint8_t *to = texture->band;
+
+	for (int y = r->y; y < r->y + r->h; y++) {
+		const uint8_t *row = pixels + (size_t)y * stride;
+		const uint8_t *next =
+			pixels + (size_t)clamp_index(y + reach[1], side) * stride;
+		const uint8_t *slope = texture->slope[level] + (size_t)y * side;
+
+		for (int x = r->x; x < r->x + r->w; x++, to += 4) {
+			const uint8_t *at = row + 4 * x;
+
+			to[0] = at[0];
+			to[1] = at[1];
+			to[2] = at[2];
+			to[3] = lean(slope[x], wetness(at),
+				     wetness(next + 4 * clamp_index(x + reach[0], side)));
+		}
+	}
+}
+
+/* Rows at a time, so that a whole level needs little memory. */
+static void send_rect(const struct texture *texture, const struct incise_canvas *canvas,
+		      int level, struct incise_rect rect)
+{
+	int stride, bottom = rect.y + rect.h;
+	const uint8_t *pixels = incise_canvas_pixels(canvas, level, &stride);
+	int rows = (int)(texture->band_bytes / 4 / (size_t)rect.w);
+
+	for (; rect.y < bottom; rect.y += rect.h) {
+		rect.h = bottom - rect.y < rows ? bottom - rect.y : rows;
+		fill_band(texture, pixels, stride, level, &rect);
+		glTexSubImage2D(GL_TEXTURE_2D, level, rect.x, rect.y, rect.w, rect.h,
+				GL_RGBA, GL_UNSIGNED_BYTE, texture->band);
+	}
+}
+
+static struct texture *texture_new(const struct texture_setup *setup,
+				   struct incise_error *err)
+{
+	struct texture *texture;
+	int size = incise_canvas_size(setup->canvas);
+
+	if (too_large(size, err))
+		return NULL;
+	texture = calloc(1, sizeof(*texture));
+	if (!texture)
+		goto out_memory;
+	texture->size = size;
+	texture->levels = incise_canvas_levels(setup->canvas);
+	/* 64 rows of the largest level. */
+	texture->band_bytes = (size_t)size * 4 * 64;
+	texture->band = malloc(texture->band_bytes);
+	if (!texture->band || !make_slopes(texture, setup))
+		goto out_memory;
+	texture->name = begin_texture(texture->levels, setup->fine);
+	for (int level = 0; level < texture->levels; level++) {
+		int side = size >> level;
+
+		glTexImage2D(GL_TEXTURE_2D, level, GL_RGBA8, side, side, 0, GL_RGBA,
+			     GL_UNSIGNED_BYTE, NULL);
+		send_rect(texture, setup->canvas, level,
+			  (struct incise_rect){0, 0, side, side});
+	}
+	return texture;
+
+out_memory:
+	texture_free(texture);
+	incise_error_set(err, ENOMEM, "picture: no memory for a texture of %d texels",
+			 size);
+	return NULL;
+}
+
+static void texture_upload(struct texture *texture, const struct incise_canvas *canvas,
+			   const struct incise_upload *uploads, int n)
+{
+	glBindTexture(GL_TEXTURE_2D, texture->name);
+	for (int i = 0; i < n; i++) {
+		const struct incise_rect *r = &uploads[i].rect;
+		int level = uploads[i].level, side, left, top, right, bottom;
+		const int *reach;
+
+		if (level < 0 || level >= texture->levels)
+			continue;
+		side = texture->size >> level;
+		if (r->x < 0 || r->y < 0 || r->w < 1 || r->h < 1 || r->w > side - r->x ||
+		    r->h > side - r->y)
+			continue;
+		/* Those whose slope is a matter of the wetness in there. */
+		reach = texture->reach[level];
+		left = clamp_index(r->x - (reach[0] > 0 ? reach[0] : 0), side);
+		right = clamp_index(r->x + r->w - 1 - (reach[0] < 0 ? reach[0] : 0),
+				    side);
+		top = clamp_index(r->y - (reach[1] > 0 ? reach[1] : 0), side);
+		bottom = clamp_index(r->y + r->h - 1 - (reach[1] < 0 ? reach[1] : 0),
+				     side);
+		send_rect(texture, canvas, level,
+			  (struct incise_rect){left, top, right - left + 1,
+					       bottom - top + 1});
+	}
+}
+
+static unsigned texture_image(unsigned image, const uint8_t *bgra, int w, int h)
+{
+	if (!image) {
+		image = begin_texture(1, false);
+		glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+		glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+	}
+	glBindTexture(GL_TEXTURE_2D, image);
+	glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, w, h, 0, GL_BGRA,
+		     GL_UNSIGNED_INT_8_8_8_8_REV, bgra);
+	return image;
+}
+
+/* --- The scene --- */
+
+#define DRAW_SLOTS 4
+
+/* Towards the lamp: from the left and high, so that shadows and shine are seen from in front. */
+static const double draw_key_way[3] = {-0.62, 0.12, 0.78};
+
+struct incise_draw {
+	struct solid surface, scalpel, tube;
+	unsigned skin, metal, ground, image; /* programs */
+	struct texture *texture;
+	double way[2]; /* to the lamp, in texels */
+	struct {
+		unsigned texture;
+		uint64_t version;
+		int w, h;
+	} slot[DRAW_SLOTS];
+	unsigned nothing; /* array without attributes */
+	struct target target;
+	struct incise_scene_scalpel tool;
+	enum incise_skin look;
+	double middle_mm[3], reach_mm; /* a ball round the surface */
+	char renderer[128];
+	bool drawn;
+};
 
 static int failed(struct incise_error *err)
 {
@@ -30,18 +527,18 @@ static int failed(struct incise_error *err)
 
 static int put_instruments(struct incise_draw *draw, struct incise_error *err)
 {
-	struct incise_instrument_mesh mesh;
-	int rc = incise_instrument_scalpel(draw->tool.handle_mm, &mesh);
+	struct instrument_mesh mesh;
+	int rc = instrument_scalpel(draw->tool.handle_mm, &mesh);
 
 	if (!rc) {
-		incise_solid_instrument(&draw->scalpel, &mesh);
-		incise_instrument_free(&mesh);
-		rc = incise_instrument_tube(&mesh);
+		solid_instrument(&draw->scalpel, &mesh);
+		instrument_free(&mesh);
+		rc = instrument_tube(&mesh);
 	}
 	if (rc)
 		return incise_error_set(err, -rc, "picture: no memory");
-	incise_solid_instrument(&draw->tube, &mesh);
-	incise_instrument_free(&mesh);
+	solid_instrument(&draw->tube, &mesh);
+	instrument_free(&mesh);
 	return 0;
 }
 
@@ -83,12 +580,12 @@ static bool has_library(struct incise_error *err)
 }
 
 /* The lamp as seen from the middle of the texture; its height does not matter here. */
-static void find_way(struct incise_draw *draw, const struct incise_chart *chart)
+static void find_way(struct incise_draw *draw, const struct uv_map *map)
 {
-	double middle[2] = {chart->size / 2.0, chart->size / 2.0};
+	double middle[2] = {map->size / 2.0, map->size / 2.0};
 	double right[3], down[3], length;
 
-	incise_chart_metric(chart, middle, right, down);
+	uv_map_metric(map, middle, right, down);
 	draw->way[0] = v3_unit(right, right, 0) ? v3_dot(right, draw_key_way) : -1;
 	draw->way[1] = v3_unit(down, down, 0) ? v3_dot(down, draw_key_way) : 0;
 	length = hypot(draw->way[0], draw->way[1]);
@@ -99,7 +596,7 @@ static void find_way(struct incise_draw *draw, const struct incise_chart *chart)
 struct incise_draw *incise_draw_new(const struct incise_draw_setup *setup,
 				    struct incise_error *err)
 {
-	struct incise_texture_setup texture = {setup->canvas, setup->normal_rgb, {0}, 0};
+	struct texture_setup texture = {setup->canvas, setup->normal_rgb, {0}, 0};
 	struct incise_draw *draw;
 	bool fine;
 
@@ -126,15 +623,14 @@ struct incise_draw *incise_draw_new(const struct incise_draw_setup *setup,
 	glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
 	glPixelStorei(GL_PACK_ALIGNMENT, 1);
 	glGenVertexArrays(1, &draw->nothing);
-	incise_solid_surface(&draw->surface, setup->chart, draw->middle_mm,
-			     &draw->reach_mm);
+	solid_surface(&draw->surface, setup->map, draw->middle_mm, &draw->reach_mm);
 	if (put_instruments(draw, err) || put_programs(draw, err))
 		goto out_free;
-	find_way(draw, setup->chart);
+	find_way(draw, setup->map);
 	texture.way[0] = draw->way[0];
 	texture.way[1] = draw->way[1];
 	texture.fine = fine;
-	draw->texture = incise_texture_new(&texture, err);
+	draw->texture = texture_new(&texture, err);
 	if (!draw->texture || failed(err))
 		goto out_free;
 	return draw;
@@ -149,18 +645,18 @@ void incise_draw_free(struct incise_draw *draw)
 	if (!draw)
 		return;
 	if (draw->nothing) {
-		incise_solid_free(&draw->surface);
-		incise_solid_free(&draw->scalpel);
-		incise_solid_free(&draw->tube);
+		solid_free(&draw->surface);
+		solid_free(&draw->scalpel);
+		solid_free(&draw->tube);
 		glDeleteVertexArrays(1, &draw->nothing);
 		glDeleteProgram(draw->skin);
 		glDeleteProgram(draw->metal);
 		glDeleteProgram(draw->ground);
 		glDeleteProgram(draw->image);
-		incise_texture_free(draw->texture);
+		texture_free(draw->texture);
 		for (int i = 0; i < DRAW_SLOTS; i++)
 			glDeleteTextures(1, &draw->slot[i].texture);
-		incise_target_free(&draw->target);
+		target_free(&draw->target);
 	}
 	free(draw);
 }
@@ -169,7 +665,101 @@ void incise_draw_upload(struct incise_draw *draw, const struct incise_canvas *ca
 			const struct incise_upload *uploads, int n)
 {
 	if (n > 0)
-		incise_texture_upload(draw->texture, canvas, uploads, n);
+		texture_upload(draw->texture, canvas, uploads, n);
+}
+
+static void set_vector(unsigned program, const char *name, const double v[3])
+{
+	glUniform3f(glGetUniformLocation(program, name), (float)v[0], (float)v[1],
+		    (float)v[2]);
+}
+
+static void set_scene(unsigned program, const struct view_projection *projection)
+{
+	static const double sky[3] = {0, 0, 1};
+	double key[3];
+
+	v3_unit(key, draw_key_way, 0);
+	glUseProgram(program);
+	glUniformMatrix4fv(glGetUniformLocation(program, "clip"), 1, GL_FALSE,
+			   projection->clip);
+	set_vector(program, "eye", projection->position_mm);
+	set_vector(program, "key", key);
+	set_vector(program, "sky", sky);
+}
+
+/* Lines with a thickness that stand for the instrument where it throws a shadow. */
+static void set_casters(const struct incise_draw *draw,
+			const struct instrument_place *place)
+{
+	double h = draw->tool.handle_mm;
+	/* Along x and z, and radius: blade, handle; a straight tube, its bend. */
+	const double scalpel[][3] = {
+		{0, 0, 0.3}, {0.2, fmin(28, h / 4), 2.2}, {0, h, 3.2}};
+	static const double tube[][3] = {
+		{0, 0, 4}, {0, 27, 4}, {-18, 66, 4}, {-32, 77, 6}};
+	const double(*line)[3] = place && place->tube ? tube : scalpel;
+	int n = !place ? 0 : place->tube ? 3 : 2;
+	float from[SHADERS_CASTERS][4], to[SHADERS_CASTERS][4];
+
+	glUniform1i(glGetUniformLocation(draw->skin, "casters"), n);
+	for (int i = 0; i < n; i++)
+		for (int k = 0; k < 4; k++) {
+			const double *a = line[i], *b = line[i + 1];
+
+			from[i][k] = (float)(k == 3 ? a[2]
+						    : place->origin_mm[k] +
+							      a[0] * place->x[k] +
+							      a[1] * place->z[k]);
+			to[i][k] = (float)(k == 3 ? b[2]
+						  : place->origin_mm[k] +
+							    b[0] * place->x[k] +
+							    b[1] * place->z[k]);
+		}
+	if (n) {
+		glUniform4fv(glGetUniformLocation(draw->skin, "from"), n, from[0]);
+		glUniform4fv(glGetUniformLocation(draw->skin, "to"), n, to[0]);
+	}
+}
+
+static void draw_surface(struct incise_draw *draw,
+			 const struct view_projection *projection,
+			 const struct instrument_place *place)
+{
+	set_scene(draw->skin, projection);
+	set_casters(draw, place);
+	glUniform1f(glGetUniformLocation(draw->skin, "texel"),
+		    1.0f / (float)draw->texture->size);
+	/* Of the texture's side; where there is none it ends beyond it. */
+	glUniform1f(glGetUniformLocation(draw->skin, "cloth"),
+		    draw->look == INCISE_SKIN_NECK ? 0.055f : -1.0f);
+	glUniform1f(glGetUniformLocation(draw->skin, "moist"),
+		    draw->look == INCISE_SKIN_LIVER ? 0.6f : 0.0f);
+	glUniform2f(glGetUniformLocation(draw->skin, "way"), (float)draw->way[0],
+		    (float)draw->way[1]);
+	glUniform1i(glGetUniformLocation(draw->skin, "base"), 0);
+	glActiveTexture(GL_TEXTURE0);
+	glBindTexture(GL_TEXTURE_2D, draw->texture->name);
+	solid_draw(&draw->surface);
+}
+
+static void draw_instrument(struct incise_draw *draw,
+			    const struct view_projection *projection,
+			    const struct instrument_place *place)
+{
+	float matrix[16] = {0};
+
+	for (int k = 0; k < 3; k++) {
+		matrix[k] = (float)place->x[k];
+		matrix[4 + k] = (float)place->y[k];
+		matrix[8 + k] = (float)place->z[k];
+		matrix[12 + k] = (float)place->origin_mm[k];
+	}
+	matrix[15] = 1;
+	set_scene(draw->metal, projection);
+	glUniformMatrix4fv(glGetUniformLocation(draw->metal, "place"), 1, GL_FALSE,
+			   matrix);
+	solid_draw(place->tube ? &draw->tube : &draw->scalpel);
 }
 
 int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera *camera,
@@ -177,21 +767,21 @@ int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera 
 		      struct incise_error *err)
 {
 	struct incise_view_camera held = *camera;
-	struct incise_eye eye;
-	struct incise_instrument_place place;
+	struct view_projection projection;
+	struct instrument_place place;
 	double off[3];
-	bool placed = pose && incise_instrument_place(&draw->tool, pose, &place);
+	bool placed = pose && instrument_place(&draw->tool, pose, &place);
 	int rc;
 
-	if (!incise_eye_hold(&held))
+	if (!view_camera_limit(&held))
 		return incise_error_set(err, EINVAL, "picture: the camera is nowhere");
-	rc = incise_target_size(&draw->target, width, height, err);
+	rc = target_size(&draw->target, width, height, err);
 	if (rc)
 		return rc;
 	v3_sub(off, draw->middle_mm, held.target_mm);
-	incise_eye_look(&held, width, height,
-			v3_length(off) + draw->reach_mm + draw->tool.handle_mm + 100,
-			&eye);
+	view_camera_project(&held, width, height,
+			    v3_length(off) + draw->reach_mm + draw->tool.handle_mm + 100,
+			    &projection);
 
 	glBindFramebuffer(GL_FRAMEBUFFER, draw->target.drawn);
 	glViewport(0, 0, width, height);
@@ -202,13 +792,13 @@ int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera 
 	glDepthMask(GL_TRUE);
 	glClear(GL_DEPTH_BUFFER_BIT);
 	if (placed)
-		incise_draw_instrument(draw, &eye, &place);
-	incise_draw_surface(draw, &eye, placed ? &place : NULL);
+		draw_instrument(draw, &projection, &place);
+	draw_surface(draw, &projection, placed ? &place : NULL);
 	/* Last, where nothing else is. */
 	glUseProgram(draw->ground);
 	glBindVertexArray(draw->nothing);
 	glDrawArrays(GL_TRIANGLES, 0, 3);
-	incise_target_resolve(&draw->target);
+	target_resolve(&draw->target);
 	draw->drawn = true;
 	return failed(err);
 }
@@ -224,7 +814,7 @@ int incise_draw_overlay(struct incise_draw *draw, int slot, const uint8_t *bgra,
 	if (!draw->slot[slot].texture || draw->slot[slot].version != version ||
 	    draw->slot[slot].w != w || draw->slot[slot].h != h) {
 		draw->slot[slot].texture =
-			incise_texture_image(draw->slot[slot].texture, bgra, w, h);
+			texture_image(draw->slot[slot].texture, bgra, w, h);
 		draw->slot[slot].version = version;
 		draw->slot[slot].w = w;
 		draw->slot[slot].h = h;
@@ -269,7 +859,7 @@ int incise_draw_read(struct incise_draw *draw, uint8_t *rgb, int width, int heig
 
 void incise_draw_show(struct incise_draw *draw)
 {
-	const struct incise_target *target = &draw->target;
+	const struct target *target = &draw->target;
 
 	if (!draw->drawn)
 		return;

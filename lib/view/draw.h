@@ -17,14 +17,14 @@
 #include <incise/plan.h>
 #include <incise/view.h>
 #include "canvas.h"
-#include "chart.h"
+#include "uv_map.h"
 
 struct incise_draw;
 
 struct incise_draw_setup {
-	const struct incise_chart *chart;   /* read while it is made only */
+	const struct uv_map *map;	    /* read while it is made only */
 	const struct incise_canvas *canvas; /* as well; all levels are uploaded */
-	const uint8_t *normal_rgb;	    /* size² of the chart; or NULL: smooth */
+	const uint8_t *normal_rgb;	    /* size² of the map; or NULL: smooth */
 	enum incise_skin look; /* liver is moist all over; round a neck lies a cloth */
 	struct incise_scene_scalpel scalpel;
 	int samples; /* 0: what is cheap here; 1: none; 4 */

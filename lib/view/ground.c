@@ -6,7 +6,7 @@
 #include "../base/vector.h"
 #include "ground.h"
 
-/* A texel is longer than this and shorter than that, mm; else the chart makes no sense. */
+/* A texel is longer than this and shorter than that, mm; else the map makes no sense. */
 #define TEXEL_MIN_MM 1e-4
 #define TEXEL_MAX_MM 100.0
 /* The relief is smooth over so many texels. */
@@ -29,39 +29,38 @@ static bool metric_of(const double right[3], const double down[3],
 	return true;
 }
 
-bool ground_metric(const struct incise_chart *chart, const double px[2],
+bool ground_metric(const struct uv_map *map, const double px[2],
 		   struct ground_metric *metric)
 {
 	double right[3], down[3], point[3], normal[3];
 
-	if (!incise_chart_point(chart, px, point, normal))
+	if (!uv_map_point(map, px, point, normal))
 		return false;
-	incise_chart_metric(chart, px, right, down);
+	uv_map_metric(map, px, right, down);
 	return metric_of(right, down, metric);
 }
 
 /* How the relief rises over a texel to the right, or down. */
-static double rise_mm(const struct incise_chart *chart, const double px[2], int axis)
+static double rise_mm(const struct uv_map *map, const double px[2], int axis)
 {
 	double before[2] = {px[0], px[1]}, after[2] = {px[0], px[1]};
 
 	before[axis] = fmax(px[axis] - RELIEF_PX, 0);
-	after[axis] = fmin(px[axis] + RELIEF_PX, chart->size);
-	return (incise_chart_relief_mm(chart, after) -
-		incise_chart_relief_mm(chart, before)) /
+	after[axis] = fmin(px[axis] + RELIEF_PX, map->size);
+	return (uv_map_relief_mm(map, after) - uv_map_relief_mm(map, before)) /
 	       (after[axis] - before[axis]);
 }
 
-bool ground_at(const struct incise_chart *chart, const double gravity[3],
-	       const double px[2], struct ground *ground)
+bool ground_at(const struct uv_map *map, const double gravity[3], const double px[2],
+	       struct ground *ground)
 {
 	double right[3], down[3], point[3], normal[3], g[2], e, f, h, det, x, y, length;
 
-	if (!incise_chart_point(chart, px, point, normal))
+	if (!uv_map_point(map, px, point, normal))
 		return false;
-	incise_chart_metric(chart, px, right, down);
-	v3_add(right, right, rise_mm(chart, px, 0), normal);
-	v3_add(down, down, rise_mm(chart, px, 1), normal);
+	uv_map_metric(map, px, right, down);
+	v3_add(right, right, rise_mm(map, px, 0), normal);
+	v3_add(down, down, rise_mm(map, px, 1), normal);
 	if (!metric_of(right, down, &ground->metric))
 		return false;
 	ground->area_mm2 = (double)ground->metric.a * ground->metric.c;

@@ -11,7 +11,7 @@
 #define INCISE_VIEW_GROUND_H
 
 #include <stdbool.h>
-#include "chart.h"
+#include "uv_map.h"
 
 struct ground_metric {
 	float a, b, c; /* mm per texel; a, c > 0 */
@@ -25,11 +25,11 @@ struct ground {
 	double across_px[2]; /* the same to the right of it, along the level */
 };
 
-/* false: there is no surface there, or the chart is degenerate; nothing is written. */
-bool ground_metric(const struct incise_chart *chart, const double px[2],
+/* false: there is no surface there, or the map is degenerate; nothing is written. */
+bool ground_metric(const struct uv_map *map, const double px[2],
 		   struct ground_metric *metric);
-bool ground_at(const struct incise_chart *chart, const double gravity[3],
-	       const double px[2], struct ground *ground);
+bool ground_at(const struct uv_map *map, const double gravity[3], const double px[2],
+	       struct ground *ground);
 
 /* Length of a step, mm. */
 double ground_length_mm(const struct ground_metric *metric, double dx, double dy);

@@ -1,17 +1,19 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Smooth noise over a texture, made row by row.
- *
- * Random numbers stand on a lattice and cubic B-splines run between: a row of the lattice
- * is blended first, so that a texel costs four products whatever the cell's size. Mean 0,
- * standard deviation about 1, within ±4. The same seed gives the same bits on one type of
- * machine.
+ * Random patterns over a texture: noise and cells, row by row, and noise at single places. All are
+ * functions of seed and place: the same seed gives the same bits on one type of machine.
  */
-#ifndef INCISE_NOISE_H
-#define INCISE_NOISE_H
+#ifndef INCISE_VIEW_NOISE_H
+#define INCISE_VIEW_NOISE_H
 
+#include <math.h>
 #include <stdint.h>
 
+/*
+ * Smooth noise: random numbers on a lattice, cubic B-splines between them. A row of the lattice is
+ * blended first, so that a texel costs four products whatever the cell's size. Mean 0, standard
+ * deviation about 1, within ±4.
+ */
 struct noise;
 
 /*
@@ -26,5 +28,52 @@ void noise_row(struct noise *noise, int y, float gain, float *row);
 
 /* A number from 0 to 1, less than 1, for a place of a lattice. */
 float noise_at(uint64_t seed, int x, int y);
+
+/*
+ * Cells as of a tissue (Worley 1996): scattered points, and for each texel the distances to the two
+ * nearest.
+ */
+struct cells;
+
+/* @cell_x, @cell_y in texels, on average; less than 2: there are none. NULL: no memory. */
+struct cells *cells_new(uint64_t seed, int size, double cell_x, double cell_y);
+void cells_free(struct cells *cells);
+
+/* How clearly they are seen: 0 where there are none, 1 from 4 texels on. */
+float cells_fade(const struct cells *cells);
+
+/*
+ * Of a row of texels, each moved by (warp_x, warp_y) cells, ±2 at most: the distance to
+ * the nearest point and how much farther the next is, in cells; about 0.4 and 0.3 on
+ * average. Where there are no cells just this.
+ */
+void cells_row(const struct cells *cells, int y, const float *warp_x, const float *warp_y,
+	       float *nearest, float *farther);
+
+/* -1 … 1 at a point of a grid; cheap, for pixels. */
+static inline float noise_grid(uint32_t key, int x, int y)
+{
+	uint32_t h = key ^ ((uint32_t)x * 0x8da6b343u) ^ ((uint32_t)y * 0xd8163841u);
+
+	h = (h ^ (h >> 15)) * 0x2c1b3c6du;
+	h = (h ^ (h >> 12)) * 0x297a2d39u;
+	h ^= h >> 15;
+	return (float)(h >> 8) * (2.0f / 16777216.0f) - 1.0f;
+}
+
+/* -1 … 1, smooth between the points of a grid; x and y within ±1e9. */
+static inline float noise_smooth(uint32_t key, float x, float y)
+{
+	float fx = floorf(x), fy = floorf(y);
+	int ix = (int)fx, iy = (int)fy;
+	float u = x - fx, v = y - fy;
+	float a, b;
+
+	u = u * u * (3 - 2 * u);
+	v = v * v * (3 - 2 * v);
+	a = noise_grid(key, ix, iy) * (1 - u) + noise_grid(key, ix + 1, iy) * u;
+	b = noise_grid(key, ix, iy + 1) * (1 - u) + noise_grid(key, ix + 1, iy + 1) * u;
+	return a * (1 - v) + b * v;
+}
 
 #endif

@@ -10,7 +10,308 @@
 #include <stdlib.h>
 #include <string.h>
 #include "overlay.h"
-#include "overlay_paint.h"
+
+#define OVERLAY_COLUMNS 250	   /* of a graph: 10 s */
+#define OVERLAY_COLUMN_NS 40000000 /* that one of them stands for */
+#define OVERLAY_LINES_MAX 24
+#define OVERLAY_PANEL_WIDTH 316
+#define OVERLAY_PANEL_HEIGHT 244
+#define OVERLAY_KEYS_WIDTH 380
+
+struct overlay_column {
+	int64_t at; /* which column of all time */
+	bool any;
+	float low, high;
+};
+
+struct overlay_graph {
+	int64_t last; /* column; INT64_MIN: none yet */
+	struct overlay_column column[OVERLAY_COLUMNS];
+};
+
+struct overlay_words {
+	const struct incise_tick *tick;		 /* or NULL */
+	const struct incise_view_status *status; /* or NULL */
+	const struct overlay_graph *force, *depth;
+};
+
+#define GRAPH_LEFT 44
+#define GRAPH_HEIGHT 62
+#define LINE 18
+
+/* --- Painting --- */
+
+static cairo_surface_t *overlay_surface(int width, int height)
+{
+	cairo_surface_t *surface =
+		cairo_image_surface_create(CAIRO_FORMAT_ARGB32, width, height);
+
+	if (cairo_surface_status(surface) == CAIRO_STATUS_SUCCESS)
+		return surface;
+	cairo_surface_destroy(surface);
+	return NULL;
+}
+
+static cairo_t *begin(cairo_surface_t *surface)
+{
+	cairo_t *cr = cairo_create(surface);
+	double w = cairo_image_surface_get_width(surface);
+	double h = cairo_image_surface_get_height(surface), r = 9;
+
+	cairo_set_operator(cr, CAIRO_OPERATOR_CLEAR);
+	cairo_paint(cr);
+	cairo_set_operator(cr, CAIRO_OPERATOR_OVER);
+	cairo_arc(cr, r, r, r, M_PI, 1.5 * M_PI);
+	cairo_arc(cr, w - r, r, r, 1.5 * M_PI, 2 * M_PI);
+	cairo_arc(cr, w - r, h - r, r, 0, 0.5 * M_PI);
+	cairo_arc(cr, r, h - r, r, 0.5 * M_PI, M_PI);
+	cairo_close_path(cr);
+	cairo_set_source_rgba(cr, 0.04, 0.06, 0.08, 0.72);
+	cairo_fill(cr);
+	cairo_select_font_face(cr, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
+			       CAIRO_FONT_WEIGHT_NORMAL);
+	return cr;
+}
+
+static void grey(cairo_t *cr, double light)
+{
+	cairo_set_source_rgba(cr, light, light, light, 1);
+}
+
+/* @align: 0 begins at x, 1 ends there. */
+static void text(cairo_t *cr, double x, double y, double size, double align,
+		 const char *words)
+{
+	cairo_text_extents_t extents;
+
+	cairo_set_font_size(cr, size);
+	cairo_text_extents(cr, words, &extents);
+	cairo_move_to(cr, floor(x - align * extents.x_advance), y);
+	cairo_show_text(cr, words);
+}
+
+/* The least of 1, 2, 5, 10 … times @unit that holds all of a graph. */
+static double range_of(const struct overlay_graph *graph, double unit)
+{
+	double most = 0, range = unit;
+
+	for (int i = 0; i < OVERLAY_COLUMNS; i++)
+		if (graph->column[i].any &&
+		    graph->last - graph->column[i].at < OVERLAY_COLUMNS)
+			most = fmax(most, graph->column[i].high);
+	for (int i = 0; range < most && i < 30; i++)
+		range *= i % 3 == 1 ? 2.5 : 2;
+	return range;
+}
+
+static void curve(cairo_t *cr, const struct overlay_graph *graph, double top,
+		  double range)
+{
+	double bottom = top + GRAPH_HEIGHT;
+	bool on = false;
+
+	for (int i = 0; i < OVERLAY_COLUMNS && graph->last != INT64_MIN; i++) {
+		int64_t at = graph->last - (OVERLAY_COLUMNS - 1) + i;
+		const struct overlay_column *column =
+			&graph->column[((at % OVERLAY_COLUMNS) + OVERLAY_COLUMNS) %
+				       OVERLAY_COLUMNS];
+		double x = GRAPH_LEFT + i + 0.5;
+
+		if (!column->any || column->at != at) {
+			on = false;
+			continue;
+		}
+		if (on)
+			cairo_line_to(cr, x, bottom - column->low / range * GRAPH_HEIGHT);
+		else
+			cairo_move_to(cr, x,
+				      bottom - column->low / range * GRAPH_HEIGHT + 0.5);
+		cairo_line_to(cr, x, bottom - column->high / range * GRAPH_HEIGHT);
+		on = true;
+	}
+	cairo_set_line_width(cr, 1.4);
+	cairo_set_line_join(cr, CAIRO_LINE_JOIN_ROUND);
+	cairo_stroke(cr);
+}
+
+static void graph(cairo_t *cr, const struct overlay_graph *graph, double top,
+		  const char *name, const char *unit, double least, const double rgb[3])
+{
+	double range = range_of(graph, least);
+	char words[64];
+
+	grey(cr, 0.32);
+	cairo_set_line_width(cr, 1);
+	for (int i = 0; i <= 2; i++) {
+		double y = floor(top + GRAPH_HEIGHT * (1 - 0.5 * i)) + 0.5;
+
+		cairo_move_to(cr, GRAPH_LEFT, y);
+		cairo_line_to(cr, GRAPH_LEFT + OVERLAY_COLUMNS, y);
+	}
+	/* Every two seconds. */
+	for (int i = 0; i <= OVERLAY_COLUMNS; i += 50) {
+		cairo_move_to(cr, GRAPH_LEFT + i + 0.5, top + GRAPH_HEIGHT);
+		cairo_line_to(cr, GRAPH_LEFT + i + 0.5, top + GRAPH_HEIGHT + 3);
+	}
+	cairo_stroke(cr);
+	grey(cr, 0.72);
+	for (int i = 0; i <= 2; i++) {
+		snprintf(words, sizeof(words), "%g", 0.5 * i * range);
+		text(cr, GRAPH_LEFT - 5, top + GRAPH_HEIGHT * (1 - 0.5 * i) + 4, 10, 1,
+		     words);
+	}
+	cairo_save(cr);
+	cairo_rectangle(cr, GRAPH_LEFT, top - 1, OVERLAY_COLUMNS, GRAPH_HEIGHT + 2);
+	cairo_clip(cr);
+	cairo_set_source_rgba(cr, rgb[0], rgb[1], rgb[2], 1);
+	curve(cr, graph, top, range);
+	cairo_restore(cr);
+	cairo_set_source_rgba(cr, rgb[0], rgb[1], rgb[2], 1);
+	snprintf(words, sizeof(words), "%s  %s", name, unit);
+	text(cr, GRAPH_LEFT + 4, top + 11, 11, 0, words);
+}
+
+static const char *phase_of(const struct incise_tick *tick)
+{
+	switch (tick->phase) {
+	case INCISE_PHASE_FREE:
+		return "free";
+	case INCISE_PHASE_CUTTING:
+		return "cutting";
+	case INCISE_PHASE_INSERTION:
+		return "insertion";
+	}
+	return "?";
+}
+
+static const char *tool_of(const struct incise_tick *tick)
+{
+	switch (tick->tool) {
+	case INCISE_TOOL_AUTO:
+	case INCISE_TOOL_BLADE:
+		return "blade";
+	case INCISE_TOOL_HANDLE:
+		return "handle";
+	case INCISE_TOOL_TUBE:
+		return "tube";
+	}
+	return "?";
+}
+
+/* What of a tick somebody has to know. */
+static const char *warning_of(const struct incise_tick *tick)
+{
+	if (tick->flags & INCISE_TICK_FAULT)
+		return "FAULT";
+	if (tick->flags & INCISE_TICK_STALE)
+		return "no pose";
+	if (tick->flags & INCISE_TICK_CLAMPED)
+		return "force held";
+	return "";
+}
+
+static void say_tick(cairo_t *cr, double y, const struct incise_tick *tick)
+{
+	char words[160], size[2][32] = {"–", "–"};
+	double force = sqrt(tick->command_N[0] * tick->command_N[0] +
+			    tick->command_N[1] * tick->command_N[1] +
+			    tick->command_N[2] * tick->command_N[2]);
+
+	if (isfinite(force))
+		snprintf(size[0], sizeof(size[0]), "%.2f", force);
+	if (isfinite(tick->depth_mm))
+		snprintf(size[1], sizeof(size[1]), "%.1f",
+			 tick->depth_mm < 0 ? 0 : tick->depth_mm);
+	grey(cr, 0.95);
+	snprintf(words, sizeof(words), "%s · %s", phase_of(tick), tool_of(tick));
+	text(cr, 14, y, 12.5, 0, words);
+	snprintf(words, sizeof(words), "%s N   %s mm", size[0], size[1]);
+	text(cr, OVERLAY_PANEL_WIDTH - 20, y, 12.5, 1, words);
+	cairo_set_source_rgba(cr, 1, 0.55, 0.35, 1);
+	text(cr, OVERLAY_PANEL_WIDTH / 2 - 4, y, 12.5, 0.4, warning_of(tick));
+}
+
+static void micros(char *words, size_t size, double us)
+{
+	if (!isfinite(us))
+		snprintf(words, size, "–");
+	else if (us < 9999)
+		snprintf(words, size, "%.0f µs", us);
+	else
+		snprintf(words, size, "%.0f ms", us / 1000);
+}
+
+static void say_status(cairo_t *cr, double y, const struct incise_view_status *status)
+{
+	char words[160], median[32], most[32];
+
+	grey(cr, 0.8);
+	snprintf(words, sizeof(words), "%.40s", status->state ? status->state : "");
+	text(cr, 14, y, 12, 0, words);
+	if (isfinite(status->rate_hz)) {
+		snprintf(words, sizeof(words), "%.0f Hz", status->rate_hz);
+		text(cr, OVERLAY_PANEL_WIDTH - 20, y, 12, 1, words);
+	}
+	micros(median, sizeof(median), status->lateness_median_us);
+	micros(most, sizeof(most), status->lateness_999_us);
+	snprintf(words, sizeof(words), "late %s   99.9 %% %s", median, most);
+	text(cr, 14, y + LINE, 12, 0, words);
+	if (status->lost) {
+		cairo_set_source_rgba(cr, 1, 0.55, 0.35, 1);
+		snprintf(words, sizeof(words), "%llu lost",
+			 (unsigned long long)status->lost);
+		text(cr, OVERLAY_PANEL_WIDTH - 20, y + LINE, 12, 1, words);
+	}
+}
+
+static void overlay_paint_panel(cairo_surface_t *surface,
+				const struct overlay_words *words)
+{
+	static const double force[3] = {1.0, 0.80, 0.38}, depth[3] = {0.45, 0.80, 1.0};
+	cairo_t *cr = begin(surface);
+	double y = 14;
+
+	graph(cr, words->force, y, "force", "N", 0.5, force);
+	y += GRAPH_HEIGHT + 14;
+	graph(cr, words->depth, y, "depth", "mm", 1, depth);
+	y += GRAPH_HEIGHT + 15;
+	grey(cr, 0.72);
+	text(cr, GRAPH_LEFT, y, 10, 0, "-10 s");
+	text(cr, GRAPH_LEFT + OVERLAY_COLUMNS, y, 10, 1, "now");
+	y += LINE + 4;
+	if (words->tick)
+		say_tick(cr, y, words->tick);
+	y += LINE + 2;
+	if (words->status)
+		say_status(cr, y, words->status);
+	cairo_destroy(cr);
+}
+
+static int overlay_keys_height(int lines)
+{
+	return 26 + LINE * lines;
+}
+
+static void overlay_paint_keys(cairo_surface_t *surface, const char *const *lines, int n)
+{
+	cairo_t *cr = begin(surface);
+
+	for (int i = 0; i < n; i++) {
+		const char *tab = strchr(lines[i], '\t');
+		double y = 26 + LINE * i;
+		char key[64];
+
+		snprintf(key, sizeof(key), "%.*s",
+			 tab ? (int)(tab - lines[i]) : (int)strlen(lines[i]), lines[i]);
+		cairo_set_source_rgba(cr, 1.0, 0.80, 0.38, 1);
+		text(cr, 16, y, 12, 0, key);
+		grey(cr, 0.92);
+		text(cr, 140, y, 12, 0, tab ? tab + 1 : "");
+	}
+	cairo_destroy(cr);
+}
+
+/* --- The overlay --- */
 
 #define REDRAW_NS 66666667 /* 15 times in a second */
 

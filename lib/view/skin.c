@@ -125,8 +125,8 @@ static double texel_mm(double mm)
 	return fmin(fmax(mm, 1e-4), 1e3);
 }
 
-int incise_skin_paint(const struct incise_chart *chart, enum incise_skin skin,
-		      uint64_t seed, uint8_t *rgba, uint8_t *normal_rgb)
+int incise_skin_paint(const struct uv_map *map, enum incise_skin skin, uint64_t seed,
+		      uint8_t *rgba, uint8_t *normal_rgb)
 {
 	const struct skin_look *look = skin == INCISE_SKIN_NECK	   ? &skin_neck
 				       : skin == INCISE_SKIN_LIVER ? &skin_liver
@@ -134,14 +134,14 @@ int incise_skin_paint(const struct incise_chart *chart, enum incise_skin skin,
 	/* Seeds that are neighbours share nothing. */
 	struct skin_work work = {
 		.seed = seed * UINT64_C(0x9e3779b97f4a7c15),
-		.size = chart->size,
-		.x_mm = texel_mm(chart->wide_mm / chart->size),
-		.y_mm = texel_mm(chart->high_mm / chart->size),
+		.size = map->size,
+		.x_mm = texel_mm(map->wide_mm / map->size),
+		.y_mm = texel_mm(map->high_mm / map->size),
 	};
 	int rc;
 
 	if (!look) {
-		paint_plain(chart->size, rgba, normal_rgb);
+		paint_plain(map->size, rgba, normal_rgb);
 		return 0;
 	}
 	rc = work_init(&work, look);

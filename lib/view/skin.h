@@ -6,11 +6,11 @@
 #define INCISE_SKIN_H
 
 #include <incise/scene.h>
-#include "chart.h"
+#include "uv_map.h"
 
 /*
- * Paint a texture of chart->size² texels, rows from the top. Sizes (pores, lobules) are
- * in mm by the chart's metric; what is finer than two texels fades away.
+ * Paint a texture of map->size² texels, rows from the top. Sizes (pores, lobules) are
+ * in mm by the map's metric; what is finer than two texels fades away.
  *
  * @rgba        sRGB of 8 bits, opaque
  * @normal_rgb  unit normal (128 + 127 n): red along the vertex's tangent (+px[0]), green
@@ -18,7 +18,7 @@
  *
  * The same seed gives the same bytes on one type of machine. Returns 0 or -ENOMEM.
  */
-int incise_skin_paint(const struct incise_chart *chart, enum incise_skin skin,
-		      uint64_t seed, uint8_t *rgba, uint8_t *normal_rgb);
+int incise_skin_paint(const struct uv_map *map, enum incise_skin skin, uint64_t seed,
+		      uint8_t *rgba, uint8_t *normal_rgb);
 
 #endif

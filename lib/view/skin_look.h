@@ -6,7 +6,6 @@
 #ifndef INCISE_SKIN_LOOK_H
 #define INCISE_SKIN_LOOK_H
 
-#include "cells.h"
 #include "noise.h"
 
 #define SKIN_NOISES_MAX 32

@@ -2,8 +2,8 @@
 /*
  * The picture of a scene, put together; see incise/view.h.
  *
- *     chart ─┬─▶ skin ─▶ canvas ─▶ draw ─▶ window, pixels
- *            └─▶ effects ──▲         ▲
+ *     map ─┬─▶ skin ─▶ canvas ─▶ draw ─▶ window, pixels
+ *            └─▶ injury ──▲         ▲
  *     ticks ──────╯  ╰──────────▶ overlay
  */
 #include <errno.h>
@@ -13,8 +13,15 @@
 #include <time.h>
 #include <incise/view.h>
 #include "../base/vector.h"
-#include "eye.h"
-#include "view_parts.h"
+#include "canvas.h"
+#include "draw.h"
+#include "egl.h"
+#include "injury.h"
+#include "overlay.h"
+#include "skin.h"
+#include "uv_map.h"
+#include "view_camera.h"
+#include "window.h"
 
 #define FAR_MM 1e6 /* what is beyond is no place of a tool */
 #define MARGIN_PX 14
@@ -22,12 +29,130 @@
 
 enum { SLOT_PANEL, SLOT_KEYS };
 
+#define VIEW_UPLOADS 256 /* that are sent at once */
+
+struct incise_view {
+	const struct incise_surface *surface;
+	struct incise_scene_picture picture;
+	struct incise_scene_scalpel scalpel;
+	struct incise_egl *egl; /* one of these */
+	struct incise_window *window;
+	uint8_t *base; /* the canvas's, of size² texels */
+	struct uv_map *map;
+	struct incise_canvas *canvas;
+	struct incise_injury *injury;
+	struct incise_draw *draw;
+	struct incise_overlay *overlay;
+	struct view_orbit orbit;
+	struct incise_tick tick; /* the last one that has a place */
+	bool ticked, drawn, panel, keys;
+	int width, height; /* of frames */
+	uint64_t uploads, uploaded_texels, ticks, frames;
+	double ticks_s, texture_s, draw_s;
+};
+
 static double seconds(void)
 {
 	struct timespec now;
 
 	clock_gettime(CLOCK_MONOTONIC, &now);
 	return (double)now.tv_sec + now.tv_nsec * 1e-9;
+}
+
+static int make_context(struct incise_view *view, const struct incise_view_setup *setup,
+			struct incise_error *err)
+{
+	if (setup->window)
+		view->window =
+			incise_window_new(setup->title, setup->width, setup->height, err);
+	else
+		view->egl = incise_egl_new(err);
+	return view->window || view->egl ? 0 : -errno;
+}
+
+/* What is painted before anything is drawn. @normals: to be freed by the caller. */
+static int make_texture(struct incise_view *view, uint8_t **normals,
+			struct incise_error *err)
+{
+	size_t texels;
+	int rc;
+
+	view->map = uv_map_new(view->surface, &view->picture, err);
+	if (!view->map)
+		return -errno;
+	texels = (size_t)view->map->size * view->map->size;
+	view->base = malloc(texels * 4);
+	*normals = malloc(texels * 3);
+	if (!view->base || !*normals)
+		return incise_error_set(err, ENOMEM,
+					"picture: no memory for %d² texels: make "
+					"picture.texture_px of the scene smaller",
+					view->map->size);
+	rc = incise_skin_paint(view->map, view->picture.skin,
+			       (uint64_t)view->picture.seed, view->base, *normals);
+	if (rc)
+		return incise_error_set(err, -rc, "picture: no memory for the skin");
+	view->canvas = incise_canvas_new(view->map->size, view->base, err);
+	if (!view->canvas)
+		return -errno;
+	view->injury = incise_injury_new(&view->picture, view->map, view->canvas, err);
+	return view->injury ? 0 : -errno;
+}
+
+static int make_draw(struct incise_view *view, const uint8_t *normals, int samples,
+		     struct incise_error *err)
+{
+	struct incise_upload uploads[VIEW_UPLOADS];
+	struct incise_draw_setup setup = {
+		.map = view->map,
+		.canvas = view->canvas,
+		.normal_rgb = view->picture.skin == INCISE_SKIN_PLAIN ? NULL : normals,
+		.look = view->picture.skin,
+		.scalpel = view->scalpel,
+		.samples = samples,
+	};
+
+	/* All of it is sent at first, so what is dirty need not be. */
+	while (incise_canvas_compose(view->canvas, uploads, VIEW_UPLOADS) > 0)
+		;
+	view->draw = incise_draw_new(&setup, err);
+	return view->draw ? 0 : -errno;
+}
+
+static void look_home(struct incise_view *view, const struct incise_plan *plan)
+{
+	struct incise_touch top;
+	double middle[2] = {view->map->size / 2.0, view->map->size / 2.0};
+	double right[3], down[3], target[3], centre[3], reach;
+
+	incise_plan_top(plan, &top);
+	uv_map_metric(view->map, middle, right, down);
+	incise_draw_bounds(view->draw, centre, &reach);
+	/* Between what is cut and the middle of all that is seen. */
+	for (int i = 0; i < 3; i++)
+		target[i] = 0.75 * top.point_mm[i] + 0.25 * centre[i];
+	view_orbit_home(&view->orbit, target, right, reach);
+}
+
+/* Parts that were made stay when it fails: incise_view_free(). */
+static int make_parts(struct incise_view *view, const struct incise_plan *plan,
+		      const struct incise_view_setup *setup, struct incise_error *err)
+{
+	uint8_t *normals = NULL;
+	int rc = make_context(view, setup, err);
+
+	if (!rc)
+		rc = make_texture(view, &normals, err);
+	if (!rc)
+		rc = make_draw(view, normals, setup->samples, err);
+	free(normals);
+	if (rc)
+		return rc;
+	view->overlay = incise_overlay_new(err);
+	if (!view->overlay || incise_view_keys(view, NULL, 0))
+		return -ENOMEM;
+	look_home(view, plan);
+	return 0;
 }
 
 struct incise_view *incise_view_new(const struct incise_scene *scene,
@@ -56,7 +181,7 @@ struct incise_view *incise_view_new(const struct incise_scene *scene,
 	view->width = setup->width;
 	view->height = setup->height;
 	view->panel = true;
-	rc = incise_view_make(view, plan, setup, err);
+	rc = make_parts(view, plan, setup, err);
 	if (rc) {
 		incise_view_free(view);
 		errno = -rc;
@@ -78,9 +203,9 @@ void incise_view_free(struct incise_view *view)
 	if (view->draw && !current(view, NULL))
 		incise_draw_free(view->draw);
 	incise_overlay_free(view->overlay);
-	incise_effects_free(view->effects);
+	incise_injury_free(view->injury);
 	incise_canvas_free(view->canvas);
-	incise_chart_free(view->chart);
+	uv_map_free(view->map);
 	free(view->base);
 	incise_window_free(view->window);
 	incise_egl_free(view->egl);
@@ -103,7 +228,7 @@ void incise_view_ticks(struct incise_view *view, const struct incise_tick *ticks
 		if (!near(tick->position_mm) || !near(tick->tool_mm) ||
 		    !near(tick->proxy_mm) || !near(tick->normal))
 			continue;
-		incise_effects_tick(view->effects, tick);
+		incise_injury_tick(view->injury, tick);
 		view->tick = *tick;
 		view->ticked = true;
 	}
@@ -125,9 +250,8 @@ static double relief_at(const struct incise_view *view, const double point_mm[3]
 		return 0;
 	incise_surface_nearest(view->surface, point_mm, &touch);
 	v3_copy(normal, touch.normal);
-	return incise_chart_px(view->chart, touch.point_mm, px)
-		       ? incise_chart_relief_mm(view->chart, px)
-		       : 0;
+	return uv_map_px(view->map, touch.point_mm, px) ? uv_map_relief_mm(view->map, px)
+							: 0;
 }
 
 static void lift(const struct incise_view *view, struct incise_tick *tick)
@@ -144,7 +268,7 @@ static void send(struct incise_view *view)
 	struct incise_upload uploads[VIEW_UPLOADS];
 	int n;
 
-	incise_effects_paint(view->effects);
+	incise_injury_paint(view->injury);
 	while ((n = incise_canvas_compose(view->canvas, uploads, VIEW_UPLOADS)) > 0) {
 		incise_draw_upload(view->draw, view->canvas, uploads, n);
 		view->uploads += (uint64_t)n;
@@ -262,7 +386,7 @@ void incise_view_set_camera(struct incise_view *view,
 {
 	struct incise_view_camera held = *camera;
 
-	if (incise_eye_hold(&held))
+	if (view_camera_limit(&held))
 		view->orbit.camera = held;
 }
 
@@ -270,15 +394,16 @@ void incise_view_ray(const struct incise_view *view, double x_px, double y_px,
 		     struct incise_view_ray *ray)
 {
 	struct incise_touch touch;
-	struct incise_eye eye;
+	struct view_projection projection;
 	double up_mm = 0, up[3] = {0};
 
 	memset(ray, 0, sizeof(*ray));
 	if (!isfinite(x_px) || !isfinite(y_px))
 		return;
-	incise_eye_look(&view->orbit.camera, view->width, view->height, 1, &eye);
-	v3_copy(ray->from_mm, eye.eye_mm);
-	incise_eye_way(&eye, view->width, view->height, x_px, y_px, ray->way);
+	view_camera_project(&view->orbit.camera, view->width, view->height, 1,
+			    &projection);
+	v3_copy(ray->from_mm, projection.position_mm);
+	view_camera_ray(&projection, view->width, view->height, x_px, y_px, ray->way);
 	/*
 	 * What is seen there stands above what is felt by a relief that is known where the
 	 * ray meets it only: so some rounds, each with the last one's.
@@ -306,7 +431,7 @@ int incise_view_event(struct incise_view *view, struct incise_view_event *event)
 	if (event->type == INCISE_VIEW_MOTION || event->type == INCISE_VIEW_BUTTON ||
 	    event->type == INCISE_VIEW_WHEEL)
 		incise_view_ray(view, event->x_px, event->y_px, &event->ray);
-	event->used = incise_orbit_event(&view->orbit, event, view->height);
+	event->used = view_orbit_event(&view->orbit, event, view->height);
 	if (event->type == INCISE_VIEW_KEY && event->pressed && !event->repeat) {
 		bool help = event->key == INCISE_VIEW_F1 || event->key == 'h';
 
@@ -319,17 +444,17 @@ int incise_view_event(struct incise_view *view, struct incise_view_event *event)
 
 void incise_view_report(const struct incise_view *view, struct incise_view_report *report)
 {
-	struct incise_effects_report effects;
+	struct incise_injury_report injury;
 
-	incise_effects_report(view->effects, &effects);
+	incise_injury_report(view->injury, &injury);
 	*report = (struct incise_view_report){
-		.cut_mm = effects.cut_mm,
-		.stamps = effects.stamps,
-		.blood_ul_emitted = effects.blood_ul_emitted,
-		.blood_ul_drops = effects.blood_ul_drops,
-		.blood_ul_trails = effects.blood_ul_trails,
-		.blood_ul_off = effects.blood_ul_off,
-		.drops = effects.drops,
+		.cut_mm = injury.cut_mm,
+		.stamps = injury.stamps,
+		.blood_ul_emitted = injury.blood_ul_emitted,
+		.blood_ul_drops = injury.blood_ul_drops,
+		.blood_ul_trails = injury.blood_ul_trails,
+		.blood_ul_off = injury.blood_ul_off,
+		.drops = injury.drops,
 		.uploads = view->uploads,
 		.uploaded_texels = view->uploaded_texels,
 		.ticks = view->ticks,
@@ -337,8 +462,8 @@ void incise_view_report(const struct incise_view *view, struct incise_view_repor
 		.ticks_s = view->ticks_s,
 		.texture_s = view->texture_s,
 		.draw_s = view->draw_s,
-		.triangles = view->chart->n_indices / 3,
-		.texture_px = view->chart->size,
+		.triangles = view->map->n_indices / 3,
+		.texture_px = view->map->size,
 		.renderer = incise_draw_renderer(view->draw),
 		.samples = incise_draw_samples(view->draw),
 	};

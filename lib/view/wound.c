@@ -1,13 +1,352 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The wound in the texture; see wound.h.
+ * The wound in the texture: its fields, the line of its points, its lips and its colour; see
+ * wound.h.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "../base/vector.h"
-#include "wound_line.h"
+#include "noise.h"
+#include "wound.h"
+
+/* --- The fields, and a stretch of the line that raises them --- */
+
+#define FIELD_TEXELS (CANVAS_TILE * CANVAS_TILE)
+/* How far outside of the lips their distance is kept, mm. */
+#define FIELD_INSIDE_MIN_MM -1.0f
+#define FIELD_STEPS_MM 4096.0f /* to a mm */
+#define FIELD_BIAS_MM 8.0f
+
+/* All 0: there is no wound. */
+struct field_texel {
+	uint16_t
+		inside; /* (mm inside of the lips + FIELD_BIAS_MM) FIELD_STEPS_MM; 0: far */
+	uint16_t depth; /* mm FIELD_STEPS_MM */
+	uint16_t halo;	/* 0 … 65535 */
+};
+
+/* An end of a stretch, as it is to be drawn. */
+struct field_end {
+	float px[2], half_mm, depth_mm;
+};
+
+/* A stretch, prepared; from_px … to_px is what it can touch, texels. */
+struct field_stretch {
+	struct ground_metric metric;
+	float x, y;		     /* one end, texels */
+	float along[2], inverse_mm2; /* to the other, mm; 1 / length², or 0 */
+	float half_mm, half_more_mm; /* there, and by how much more at the other */
+	float depth_mm, depth_more_mm;
+	float reach_mm;
+	int from_px[2], to_px[2]; /* to_px is outside */
+};
+
+#define FIELD_INSIDE_MAX_MM 7.9f
+#define FIELD_DEPTH_MAX_MM 15.9f
+
+static float field_inside_mm(const struct field_texel *texel)
+{
+	return (float)texel->inside * (1 / FIELD_STEPS_MM) - FIELD_BIAS_MM;
+}
+
+/* The reddened skin beside a cut: mm, more beside a deep one. */
+static float halo_mm(float depth_mm)
+{
+	return fminf(0.7f + 0.35f * depth_mm, 2.5f);
+}
+
+/* Texels that a span of mm around some can touch, cut to the texture. */
+static bool span(float low, float high, float reach, int size, int *from, int *to)
+{
+	low = fmaxf(floorf(low - reach) - 1, 0);
+	high = fminf(ceilf(high + reach) + 1, (float)size);
+	if (!(low < high))
+		return false;
+	*from = (int)low;
+	*to = (int)high;
+	return true;
+}
+
+static bool field_prepare(struct field_stretch *s, const struct field_end *a,
+			  const struct field_end *b, const struct ground_metric *m,
+			  int size)
+{
+	float dx = b->px[0] - a->px[0], dy = b->px[1] - a->px[1], length2;
+	float half = fmaxf(a->half_mm, b->half_mm);
+
+	*s = (struct field_stretch){.metric = *m, .x = a->px[0], .y = a->px[1]};
+	s->along[0] = m->a * dx + m->b * dy;
+	s->along[1] = m->c * dy;
+	length2 = s->along[0] * s->along[0] + s->along[1] * s->along[1];
+	s->inverse_mm2 = length2 > 1e-12f ? 1 / length2 : 0;
+	s->half_mm = a->half_mm;
+	s->half_more_mm = b->half_mm - a->half_mm;
+	s->depth_mm = a->depth_mm;
+	s->depth_more_mm = b->depth_mm - a->depth_mm;
+	s->reach_mm = half + fmaxf(halo_mm(fmaxf(a->depth_mm, b->depth_mm)),
+				   -FIELD_INSIDE_MIN_MM);
+	return span(fminf(a->px[0], b->px[0]), fmaxf(a->px[0], b->px[0]),
+		    s->reach_mm * (1 + fabsf(m->b) / m->c) / m->a, size, &s->from_px[0],
+		    &s->to_px[0]) &&
+	       span(fminf(a->px[1], b->px[1]), fmaxf(a->px[1], b->px[1]),
+		    s->reach_mm / m->c, size, &s->from_px[1], &s->to_px[1]);
+}
+
+static void raise_to(uint16_t *field, float value)
+{
+	uint16_t v = (uint16_t)(value + 0.5f);
+
+	if (v > *field)
+		*field = v;
+}
+
+static void raise_texel(struct field_texel *texel, const struct field_stretch *s, float u,
+			float v)
+{
+	float t = (u * s->along[0] + v * s->along[1]) * s->inverse_mm2;
+	float half, depth, inside, out, off2;
+
+	t = fminf(fmaxf(t, 0), 1);
+	u -= t * s->along[0];
+	v -= t * s->along[1];
+	off2 = u * u + v * v;
+	if (off2 >= s->reach_mm * s->reach_mm)
+		return;
+	half = s->half_mm + t * s->half_more_mm;
+	depth = s->depth_mm + t * s->depth_more_mm;
+	inside = half - sqrtf(off2);
+	if (inside > FIELD_INSIDE_MIN_MM)
+		raise_to(&texel->inside,
+			 (fminf(inside, FIELD_INSIDE_MAX_MM) + FIELD_BIAS_MM) *
+				 FIELD_STEPS_MM);
+	if (inside > 0) {
+		float off = 1 - inside / half; /* 0 in the middle, 1 at the lips */
+
+		raise_to(&texel->depth, fminf(depth, FIELD_DEPTH_MAX_MM) *
+						(1 - off * off) * FIELD_STEPS_MM);
+	}
+	out = 1 + fminf(inside, 0) / halo_mm(depth);
+	if (out > 0)
+		raise_to(&texel->halo, out * out * fminf(depth / 1.5f, 1) * 65535);
+}
+
+static void field_raise(struct field_texel *tile, int x, int y,
+			const struct field_stretch *s)
+{
+	int left = s->from_px[0] > x ? s->from_px[0] : x;
+	int right = s->to_px[0] < x + CANVAS_TILE ? s->to_px[0] : x + CANVAS_TILE;
+	int top = s->from_px[1] > y ? s->from_px[1] : y;
+	int bottom = s->to_px[1] < y + CANVAS_TILE ? s->to_px[1] : y + CANVAS_TILE;
+
+	for (int j = top; j < bottom; j++) {
+		struct field_texel *row = tile + (j - y) * CANVAS_TILE;
+		float dy = (float)j + 0.5f - s->y;
+
+		for (int i = left; i < right; i++) {
+			float dx = (float)i + 0.5f - s->x;
+
+			raise_texel(&row[i - x], s, s->metric.a * dx + s->metric.b * dy,
+				    s->metric.c * dy);
+		}
+	}
+}
+
+/* A colour of some strength over premultiplied ones. */
+static void over(float to[4], float r, float g, float b, float alpha)
+{
+	const float colour[4] = {r, g, b, 1};
+
+	for (int i = 0; i < 4; i++)
+		to[i] = to[i] * (1 - alpha) + colour[i] * alpha;
+}
+
+static float smooth(float from, float to, float x)
+{
+	x = fminf(fmaxf((x - from) / (to - from), 0), 1);
+	return x * x * (3 - 2 * x);
+}
+
+static float mix(float a, float b, float t)
+{
+	return a + (b - a) * t;
+}
+
+static void colour_texel(const struct field_texel *texel, float x_mm, float y_mm,
+			 float texel_mm, uint8_t rgba[4])
+{
+	float grain = noise_smooth(7, x_mm * 2.2f, y_mm * 2.2f);
+	float fine = noise_smooth(8, x_mm * 6.0f, y_mm * 6.0f);
+	float inside = field_inside_mm(texel) + 0.045f * grain + 0.02f * fine;
+	float halo = (float)texel->halo * (1 / 65535.0f);
+	float depth = (float)texel->depth * (1 / FIELD_STEPS_MM);
+	float soft = fmaxf(0.06f, texel_mm), colour[4] = {0}, lip, core, deep, wet;
+
+	over(colour, 0.68f, 0.15f, 0.12f, halo * (0.48f + 0.10f * grain));
+	/* The rim of the skin stands up a little and is pale. */
+	lip = 1 - fabsf(inside + 0.17f) / 0.2f;
+	if (lip > 0)
+		over(colour, 0.93f, 0.66f, 0.58f, 0.6f * lip * halo);
+	core = smooth(-soft, soft, inside);
+	if (core > 0) {
+		deep = powf(fminf(depth / 4.5f, 1), 0.6f);
+		wet = 1 + 0.16f * fine * (1 - 0.6f * deep);
+		over(colour, mix(0.70f, 0.19f, deep) * wet,
+		     mix(0.20f, 0.012f, deep) * wet, mix(0.15f, 0.02f, deep) * wet,
+		     core * 0.97f);
+	}
+	/* Rounded together, so that no colour is above its alpha. */
+	rgba[3] = (uint8_t)(fminf(colour[3], 1) * 255 + 0.5f);
+	for (int i = 0; i < 3; i++)
+		rgba[i] = (uint8_t)(fminf(colour[i], colour[3]) * 255 + 0.5f);
+}
+
+static void field_colour(const struct field_texel *tile, int x, int y, float texel_mm,
+			 uint8_t *rgba, int stride)
+{
+	for (int j = 0; j < CANVAS_TILE; j++) {
+		uint8_t *to = rgba + (size_t)j * stride;
+
+		for (int i = 0; i < CANVAS_TILE; i++, to += 4, tile++)
+			if (tile->inside || tile->halo)
+				colour_texel(tile, (float)(x + i) * texel_mm,
+					     (float)(y + j) * texel_mm, texel_mm, to);
+			else
+				to[0] = to[1] = to[2] = to[3] = 0;
+	}
+}
+
+/* --- The line of its points --- */
+
+/* A cut runs out into a point over this length at either end. */
+#define LINE_TAPER_MM 1.6f
+
+struct wound {
+	const struct uv_map *map;
+	int size, tiles; /* texels, tiles along a side */
+	float texel_mm;
+	struct field_texel *field; /* tile after tile */
+	uint8_t *dirty;		   /* tiles² */
+	int n_dirty;
+
+	/* Points have numbers; those from @first to before @end are there. */
+	uint64_t first, end;
+	uint64_t settled; /* those before are settled */
+	struct wound_point *points;
+
+	bool cutting; /* and @tip is the blade, joined to the last point */
+	struct wound_point tip;
+	double tip_mm[3]; /* on the surface */
+	int64_t tip_ns;
+
+	bool inserted, moving; /* lips are not at rest */
+	double tool_px[2], tool_half_mm, tool_depth_mm;
+
+	double cut_mm;
+	uint64_t stamps;
+	struct field_stretch *over; /* room to paint: WOUND_POINTS and the blade's */
+};
+
+/* As thin it is at its very end. */
+#define TAPER_LEAST 0.12f
+
+static struct wound_point *line_point(const struct wound *wound, uint64_t number)
+{
+	return &wound->points[number % WOUND_POINTS];
+}
+
+/* 0 … 1 over the end of a cut. */
+static float taper(float from_end_mm)
+{
+	return fminf(fmaxf(from_end_mm / LINE_TAPER_MM, TAPER_LEAST), 1);
+}
+
+/* How a point is to be drawn when the cut ends at this arc. */
+static struct field_end line_end(const struct wound_point *p, float end_mm)
+{
+	float thin = p->settled ? 1 : taper(fminf(p->arc_mm, end_mm - p->arc_mm));
+
+	return (struct field_end){
+		.px = {p->px[0], p->px[1]},
+		.half_mm = p->half_mm * thin + fmaxf(p->open_mm, p->wider_mm),
+		.depth_mm = p->depth_mm * sqrtf(thin),
+	};
+}
+
+static void line_mark(struct wound *wound, const struct field_stretch *s)
+{
+	int right = (s->to_px[0] - 1) / CANVAS_TILE,
+	    bottom = (s->to_px[1] - 1) / CANVAS_TILE;
+
+	for (int y = s->from_px[1] / CANVAS_TILE; y <= bottom; y++)
+		for (int x = s->from_px[0] / CANVAS_TILE; x <= right; x++) {
+			uint8_t *dirty = &wound->dirty[y * wound->tiles + x];
+
+			wound->n_dirty += !*dirty;
+			*dirty = 1;
+		}
+}
+
+static void line_raise(struct wound *wound, const struct field_stretch *s)
+{
+	int right = (s->to_px[0] - 1) / CANVAS_TILE,
+	    bottom = (s->to_px[1] - 1) / CANVAS_TILE;
+
+	for (int y = s->from_px[1] / CANVAS_TILE; y <= bottom; y++)
+		for (int x = s->from_px[0] / CANVAS_TILE; x <= right; x++)
+			field_raise(wound->field +
+					    ((size_t)y * wound->tiles + x) * FIELD_TEXELS,
+				    x * CANVAS_TILE, y * CANVAS_TILE, s);
+}
+
+/* The stretch that ends at a point, drawn so. */
+static bool line_stretch(const struct wound *wound, const struct wound_point *before,
+			 const struct wound_point *p, float end_mm,
+			 struct field_stretch *stretch)
+{
+	struct field_end b = line_end(p, end_mm), a = b;
+
+	if (p->joined && before)
+		a = line_end(before, end_mm);
+	return field_prepare(stretch, &a, &b, &p->metric, wound->size);
+}
+
+static const struct wound_point *line_before(const struct wound *wound, uint64_t number)
+{
+	return number > wound->first ? line_point(wound, number - 1) : NULL;
+}
+
+/* Points are final up to where the blade cannot thin them any more. */
+static void line_settle(struct wound *wound, float end_mm, float until_mm)
+{
+	while (wound->settled < wound->end) {
+		uint64_t number = wound->settled;
+		struct wound_point *p = line_point(wound, number);
+		struct field_stretch stretch;
+		struct field_end final;
+
+		if (p->arc_mm > until_mm)
+			break;
+		final = line_end(p, end_mm);
+		p->half_mm = final.half_mm - fmaxf(p->open_mm, p->wider_mm);
+		p->depth_mm = final.depth_mm;
+		p->settled = true;
+		wound->settled++;
+		if (line_stretch(wound, line_before(wound, number), p, end_mm,
+				 &stretch)) {
+			line_raise(wound, &stretch);
+			line_mark(wound, &stretch);
+		}
+	}
+}
+
+static bool line_open(const struct wound_point *p)
+{
+	return p->open_mm > p->wider_mm;
+}
+
+/* --- Cutting --- */
 
 /* Less deep the blade touches the skin but does not cut it. */
 #define CUTS_FROM_MM 0.05
@@ -26,22 +365,22 @@
 #define HANDLE_HALF_MM 1.5
 #define TUBE_HALF_MM 2.0
 
-struct wound *wound_new(const struct incise_chart *chart, struct incise_error *err)
+struct wound *wound_new(const struct uv_map *map, struct incise_error *err)
 {
-	double middle[2] = {chart->size * 0.5, chart->size * 0.5};
+	double middle[2] = {map->size * 0.5, map->size * 0.5};
 	struct wound *wound = calloc(1, sizeof(*wound));
 	struct ground_metric metric;
 
 	if (!wound)
 		goto no_memory;
-	wound->chart = chart;
-	wound->size = chart->size;
-	wound->tiles = chart->size / CANVAS_TILE;
+	wound->map = map;
+	wound->size = map->size;
+	wound->tiles = map->size / CANVAS_TILE;
 	wound->texel_mm = 0.1f;
-	if (ground_metric(chart, middle, &metric))
+	if (ground_metric(map, middle, &metric))
 		wound->texel_mm = sqrtf(metric.a * metric.c);
 	/* From calloc: pages that nobody writes are not there. */
-	wound->field = calloc((size_t)chart->size * chart->size, sizeof(*wound->field));
+	wound->field = calloc((size_t)map->size * map->size, sizeof(*wound->field));
 	wound->dirty = calloc((size_t)wound->tiles * wound->tiles, 1);
 	wound->points = calloc(WOUND_POINTS, sizeof(*wound->points));
 	wound->over = calloc(WOUND_POINTS + 1, sizeof(*wound->over));
@@ -271,8 +610,8 @@ static bool read_blade(const struct wound *wound, const struct incise_tick *tick
 {
 	if (!(tick->depth_mm >= CUTS_FROM_MM) || !isfinite(tick->depth_mm) ||
 	    !v3_finite(tick->proxy_mm) ||
-	    !incise_chart_px(wound->chart, tick->proxy_mm, blade->px) ||
-	    !ground_metric(wound->chart, blade->px, &blade->metric))
+	    !uv_map_px(wound->map, tick->proxy_mm, blade->px) ||
+	    !ground_metric(wound->map, blade->px, &blade->metric))
 		return false;
 	v3_copy(blade->point_mm, tick->proxy_mm);
 	blade->depth_mm = fmin(tick->depth_mm, DEPTH_MAX_MM);
@@ -283,7 +622,7 @@ static bool read_blade(const struct wound *wound, const struct incise_tick *tick
 static void insert(struct wound *wound, const struct incise_tick *tick)
 {
 	wound->inserted = v3_finite(tick->proxy_mm) && isfinite(tick->depth_mm) &&
-			  incise_chart_px(wound->chart, tick->proxy_mm, wound->tool_px);
+			  uv_map_px(wound->map, tick->proxy_mm, wound->tool_px);
 	wound->tool_half_mm =
 		tick->tool == INCISE_TOOL_TUBE ? TUBE_HALF_MM : HANDLE_HALF_MM;
 	wound->tool_depth_mm = fmin(fmax(tick->depth_mm, 0), DEPTH_MAX_MM);
@@ -303,6 +642,187 @@ bool wound_tick(struct wound *wound, const struct incise_tick *tick,
 	    tick->tool == INCISE_TOOL_BLADE && read_blade(wound, tick, &blade))
 		return cut(wound, &blade, stroke);
 	return lift(wound, stroke);
+}
+
+/* --- Lips: they open around an instrument, and close --- */
+
+/* In so deep, it opens the cut by all of its width. */
+#define INSERTED_MM 1.5
+/* How far along the cut it opens it, in halves of the tool; the lips are that stiff. */
+#define SHOULDER_HALVES 4.5
+/* They stay wider by this part of how far they were opened. */
+#define WIDER 0.12f
+/* Parts of the way that they go in a step: 60 ms to open; to close, the last 2 % at 1 s. */
+#define OPENING 0.15f
+#define CLOSING 0.036f
+#define AT_REST_MM 0.004f
+
+/* Half of the width that the tool asks of a point, this far from it and from the ends. */
+static float asked_mm(const struct wound *wound, const struct wound_point *p,
+		      float end_mm)
+{
+	double off, ends, in;
+
+	if (!wound->inserted)
+		return 0;
+	off = ground_length_mm(&p->metric, p->px[0] - wound->tool_px[0],
+			       p->px[1] - wound->tool_px[1]) /
+	      (wound->tool_half_mm * SHOULDER_HALVES);
+	if (!(off < 1))
+		return 0;
+	/* The corners of a slit stay where they are. */
+	ends = fmin(fmax(fmin(p->arc_mm, end_mm - p->arc_mm) / (2 * LINE_TAPER_MM), 0),
+		    1);
+	in = fmin(wound->tool_depth_mm / INSERTED_MM, 1);
+	off = 1 - off * off;
+	return (float)(wound->tool_half_mm * in * off * off * ends);
+}
+
+/* The stretches on both sides of a point. */
+static void stretches_at(struct wound *wound, uint64_t number, bool at_rest)
+{
+	for (uint64_t i = number; i <= number + 1 && i < wound->settled; i++) {
+		struct field_stretch stretch;
+
+		if (i > number && !line_point(wound, i)->joined)
+			break;
+		if (!line_stretch(wound, line_before(wound, i), line_point(wound, i), 0,
+				  &stretch))
+			continue;
+		if (at_rest)
+			line_raise(wound, &stretch);
+		line_mark(wound, &stretch);
+	}
+}
+
+static void step_point(struct wound *wound, uint64_t number, float end_mm)
+{
+	struct wound_point *p = line_point(wound, number);
+	float to = fmaxf(asked_mm(wound, p, end_mm) - p->half_mm, 0), was = p->open_mm;
+	bool was_open = line_open(p);
+
+	if (to == was)
+		return;
+	if (was_open)
+		stretches_at(wound, number, false);
+	p->open_mm += (to - was) * (to > was ? OPENING : CLOSING);
+	if (fabsf(to - p->open_mm) < AT_REST_MM)
+		p->open_mm = to;
+	p->wider_mm = fmaxf(p->wider_mm, WIDER * p->open_mm);
+	if (was_open || line_open(p))
+		stretches_at(wound, number, !line_open(p));
+}
+
+void wound_step(struct wound *wound)
+{
+	float end_mm = 0;
+
+	if (!wound->inserted && !wound->moving)
+		return;
+	wound->moving = false;
+	for (uint64_t i = wound->settled; i-- > wound->first;) {
+		const struct wound_point *p = line_point(wound, i);
+
+		if (i + 1 == wound->settled || !line_point(wound, i + 1)->joined)
+			end_mm = p->arc_mm;
+		step_point(wound, i, end_mm);
+		wound->moving = wound->moving || p->open_mm > 0;
+	}
+}
+
+/* --- The layer --- */
+
+/* So many stretches at most are drawn as one, with no turn above this tangent. */
+#define TOGETHER 3
+#define STRAIGHT 0.1f
+
+/* A tile with what is not in the fields laid over it. */
+static void paint_tile(struct wound *wound, const struct field_stretch *over, int n,
+		       int tile, uint8_t *rgba)
+{
+	int x = tile % wound->tiles * CANVAS_TILE, y = tile / wound->tiles * CANVAS_TILE;
+	struct field_texel texels[FIELD_TEXELS];
+
+	memcpy(texels, wound->field + (size_t)tile * FIELD_TEXELS, sizeof(texels));
+	for (int i = 0; i < n; i++)
+		field_raise(texels, x, y, &over[i]);
+	field_colour(texels, x, y, wound->texel_mm,
+		     rgba + ((size_t)y * wound->size + x) * 4, wound->size * 4);
+}
+
+/* Whether the line goes on at a point as it came. */
+static bool straight(const struct wound *wound, uint64_t number)
+{
+	const float *a = line_point(wound, number - 1)->px;
+	const float *b = line_point(wound, number)->px;
+	const float *c = line_point(wound, number + 1)->px;
+	float x = b[0] - a[0], y = b[1] - a[1], u = c[0] - b[0], v = c[1] - b[1];
+	float along = x * u + y * v, across = x * v - y * u;
+
+	return along > 0 && fabsf(across) < STRAIGHT * along;
+}
+
+/*
+ * The last of some stretches that can be drawn as one: where lips are open they are wide,
+ * and each would be drawn over much of the one before.
+ */
+static uint64_t together(const struct wound *wound, uint64_t from)
+{
+	uint64_t to = from;
+
+	if (from == wound->first)
+		return to;
+	while (to + 1 < wound->settled && to - from + 1 < TOGETHER &&
+	       line_point(wound, to + 1)->joined && line_open(line_point(wound, to)) &&
+	       line_open(line_point(wound, to + 1)) && straight(wound, to))
+		to++;
+	return to;
+}
+
+/* Stretches that move, and those behind the blade. */
+static int laid_over(const struct wound *wound, struct field_stretch *over)
+{
+	int n = 0;
+
+	for (uint64_t i = wound->moving ? wound->first : wound->settled; i < wound->end;
+	     i++) {
+		const struct wound_point *p = line_point(wound, i);
+		const struct wound_point *last = line_before(wound, i);
+
+		if (i < wound->settled) {
+			if (!line_open(p) && !(p->joined && last && line_open(last)))
+				continue;
+			if (p->joined)
+				i = together(wound, i);
+			p = line_point(wound, i);
+		}
+		n += line_stretch(wound, last, p, wound->tip.arc_mm, &over[n]);
+	}
+	if (wound->cutting)
+		n += line_stretch(wound, line_before(wound, wound->end), &wound->tip,
+				  wound->tip.arc_mm, &over[n]);
+	return n;
+}
+
+void wound_paint(struct wound *wound, struct incise_canvas *canvas, int layer)
+{
+	uint8_t *rgba = incise_canvas_layer(canvas, layer);
+	int n;
+
+	if (!wound->n_dirty || !rgba)
+		return;
+	n = laid_over(wound, wound->over);
+	for (int tile = 0; wound->n_dirty; tile++) {
+		if (!wound->dirty[tile])
+			continue;
+		wound->dirty[tile] = 0;
+		wound->n_dirty--;
+		paint_tile(wound, wound->over, n, tile, rgba);
+		incise_canvas_dirty(
+			canvas, (struct incise_rect){tile % wound->tiles * CANVAS_TILE,
+						     tile / wound->tiles * CANVAS_TILE,
+						     CANVAS_TILE, CANVAS_TILE});
+	}
 }
 
 bool wound_inserted(const struct wound *wound, double px[2], double *depth_mm)

@@ -37,7 +37,7 @@
 #include <incise/error.h>
 #include <incise/plan.h>
 #include "canvas.h"
-#include "chart.h"
+#include "uv_map.h"
 #include "ground.h"
 
 #define WOUND_POINTS 4096
@@ -66,7 +66,7 @@ struct wound_stroke {
 
 struct wound;
 
-struct wound *wound_new(const struct incise_chart *chart, struct incise_error *err);
+struct wound *wound_new(const struct uv_map *map, struct incise_error *err);
 
 /* Returns whether a stretch of line was added, and which. */
 bool wound_tick(struct wound *wound, const struct incise_tick *tick,

@@ -21,7 +21,7 @@
 static void stroke(struct blood *blood, const struct field *field, double x0, double y0,
 		   double x1, double y1, double depth_mm)
 {
-	double half = field->chart->size / 2.0, length = hypot(x1 - x0, y1 - y0);
+	double half = field->map->size / 2.0, length = hypot(x1 - x0, y1 - y0);
 	int n = (int)(length / 0.25) + 1;
 
 	for (int i = 0; i < n; i++) {
@@ -61,7 +61,7 @@ static void test_balance(void **state)
 		struct field field;
 
 		field_new(&field, COARSE, tilts[k]);
-		blood = blood_new(field.chart, &field.picture, NULL);
+		blood = blood_new(field.map, &field.picture, NULL);
 		assert_non_null(blood);
 		for (int i = 0; i < 12000; i++) {
 			if (i % 3000 == 0)
@@ -94,7 +94,7 @@ static void test_emits_what_it_should(void **state)
 	double all;
 
 	field_new(&field, COARSE, 0);
-	blood = blood_new(field.chart, &field.picture, NULL);
+	blood = blood_new(field.map, &field.picture, NULL);
 	stroke(blood, &field, -10, 0, 10, 0, 2);
 	for (int i = 0; i < 100; i++)
 		blood_step(blood);
@@ -115,11 +115,11 @@ static void test_emits_what_it_should(void **state)
 /* What is seen of a place: how high it stands against gravity, mm. */
 static double height_mm(const struct field *field, const double px[2])
 {
-	double point[3], normal[3], relief = incise_chart_relief_mm(field->chart, px);
+	double point[3], normal[3], relief = uv_map_relief_mm(field->map, px);
 	double high = 0;
 
 	/* It has just run off the texture. */
-	if (!incise_chart_point(field->chart, px, point, normal))
+	if (!uv_map_point(field->map, px, point, normal))
 		return -INFINITY;
 	for (int i = 0; i < 3; i++)
 		high -= (point[i] + relief * normal[i]) * field->picture.gravity[i];
@@ -145,9 +145,9 @@ static void test_downhill(void **state)
 				incise_surface_new_capsule((double[]){-60, 0, -55},
 							   (double[]){160, 0, -55}, 55,
 							   NULL);
-			field.chart = incise_chart_new(field.surface, &picture, NULL);
+			field.map = uv_map_new(field.surface, &picture, NULL);
 		}
-		blood = blood_new(field.chart, &picture, NULL);
+		blood = blood_new(field.map, &picture, NULL);
 		stroke(blood, &field, -20, 12, 20, 14, 4);
 		for (int i = 0; i < 1200; i++) {
 			blood_step(blood);
@@ -188,7 +188,7 @@ static void test_level_stays(void **state)
 	double px[2], ul;
 
 	field_new(&field, SIDE, 0);
-	blood = blood_new(field.chart, &field.picture, NULL);
+	blood = blood_new(field.map, &field.picture, NULL);
 	stroke(blood, &field, -5, 0, 5, 0, 3);
 	for (int i = 0; i < 2000; i++)
 		blood_step(blood);
@@ -214,7 +214,7 @@ static void test_pinned_below_a_volume(void **state)
 
 		field_new(&field, SIDE, k ? 80 : 15);
 		field.picture.blood_ul_s_mm2 = 0.3;
-		blood = blood_new(field.chart, &field.picture, NULL);
+		blood = blood_new(field.map, &field.picture, NULL);
 		stroke(blood, &field, 0, -30, 0.3, -30, 2);
 		for (int i = 0; i < 6000 && !(let_go_ul[k] > 0); i++) {
 			if (i % 500 == 0)
@@ -257,7 +257,7 @@ static void painted_new(struct painted *p, const struct field *field, int seed)
 	p->base = calloc(SIDE * SIDE, 4);
 	p->canvas = incise_canvas_new(SIDE, p->base, NULL);
 	assert_int_equal(incise_canvas_add_layer(p->canvas), 0);
-	p->blood = blood_new(field->chart, &picture, NULL);
+	p->blood = blood_new(field->map, &picture, NULL);
 	assert_non_null(p->blood);
 }
 
@@ -346,7 +346,7 @@ static void test_much(void **state)
 		field_new(&field, COARSE, -1);
 		field.picture.blood_ul_s_mm2 = 100;
 		field.picture.viscosity_mPa_s = viscosities[k];
-		blood = blood_new(field.chart, &field.picture, NULL);
+		blood = blood_new(field.map, &field.picture, NULL);
 		memory = blood_memory(blood);
 		srand(3);
 		for (int i = 0; i < 60; i++) {

@@ -15,8 +15,8 @@
 #include "../../../lib/surface/surface.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/draw.h"
-#include "../../../lib/view/eye.h"
-#include "../../../lib/view/instrument.h"
+#include "../../../lib/view/view_camera.h"
+#include "../../../lib/view/instrument_shape.h"
 #include "look.h"
 
 #define W 320
@@ -25,7 +25,7 @@
 
 static struct incise_egl *egl;
 static struct incise_surface *surface;
-static struct incise_chart *chart;
+static struct uv_map *map;
 static uint8_t base[SIZE * SIZE * 4], normals[SIZE * SIZE * 3];
 static uint8_t one[W * H * 3], two[W * H * 3];
 
@@ -58,16 +58,16 @@ static int setup(void **state)
 		.texture_px = SIZE, .skin = INCISE_SKIN_NECK, .gravity = {0, 0, -1}};
 
 	surface = incise_surface_new_capsule(a, b, 55, NULL);
-	chart = surface ? incise_chart_new(surface, &picture, NULL) : NULL;
+	map = surface ? uv_map_new(surface, &picture, NULL) : NULL;
 	paint_skin();
 	egl = look_context();
-	return chart ? 0 : -1;
+	return map ? 0 : -1;
 }
 
 static int teardown(void **state)
 {
 	incise_egl_free(egl);
-	incise_chart_free(chart);
+	uv_map_free(map);
 	incise_surface_free(surface);
 	return 0;
 }
@@ -102,7 +102,7 @@ static struct incise_canvas *canvas_new(void)
 
 static struct incise_draw *draw_new(const struct incise_canvas *canvas, int samples)
 {
-	struct incise_draw_setup s = {.chart = chart,
+	struct incise_draw_setup s = {.map = map,
 				      .canvas = canvas,
 				      .normal_rgb = normals,
 				      .look = INCISE_SKIN_NECK,
@@ -235,11 +235,11 @@ static void test_instrument_is_where_its_pose_says(void **state)
 {
 	static const struct incise_scene_scalpel scalpel = {{0, 0, 1}, {0, 1, 0}, 120};
 	struct incise_tick tick = held(INCISE_TOOL_BLADE);
-	struct incise_instrument_place place;
-	struct incise_instrument_mesh mesh;
+	struct instrument_place place;
+	struct instrument_mesh mesh;
 	struct incise_canvas *canvas;
 	struct incise_draw *draw;
-	struct incise_eye eye;
+	struct view_projection projection;
 	double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
 	int shaded = 0;
 
@@ -249,19 +249,19 @@ static void test_instrument_is_where_its_pose_says(void **state)
 	draw = draw_new(canvas, 1);
 	frame(draw, &aside, NULL, one);
 	frame(draw, &aside, &tick, two);
-	assert_true(incise_instrument_place(&scalpel, &tick, &place));
-	incise_eye_look(&aside, W, H, 100, &eye);
+	assert_true(instrument_place(&scalpel, &tick, &place));
+	view_camera_project(&aside, W, H, 100, &projection);
 	/* Along its middle it covers what was there; the last part is out of the picture. */
 	for (double mm = 5; mm < 85; mm += 2) {
 		double p[3], px[2];
 
 		v3_add(p, place.origin_mm, mm, place.z);
-		assert_true(incise_eye_px(&eye, W, H, p, px));
+		assert_true(view_camera_px(&projection, W, H, p, px));
 		if (px[0] >= 0 && px[0] < W && px[1] >= 0 && px[1] < H)
 			assert_true(differs((int)px[0], (int)px[1]));
 	}
 	/* Around it there is its shadow, which makes nothing lighter. */
-	assert_int_equal(incise_instrument_scalpel(120, &mesh), 0);
+	assert_int_equal(instrument_scalpel(120, &mesh), 0);
 	for (int i = 0; i < mesh.n_vertices; i++) {
 		double p[3], px[2];
 
@@ -269,7 +269,7 @@ static void test_instrument_is_where_its_pose_says(void **state)
 		v3_add(p, p, mesh.vertices[i].position_mm[0], place.x);
 		v3_add(p, p, mesh.vertices[i].position_mm[1], place.y);
 		v3_add(p, p, mesh.vertices[i].position_mm[2], place.z);
-		assert_true(incise_eye_px(&eye, W, H, p, px));
+		assert_true(view_camera_px(&projection, W, H, p, px));
 		for (int k = 0; k < 2; k++) {
 			low[k] = fmin(low[k], px[k]);
 			high[k] = fmax(high[k], px[k]);
@@ -285,7 +285,7 @@ static void test_instrument_is_where_its_pose_says(void **state)
 			assert_true(darker(x, y) >= -3);
 		}
 	assert_true(shaded > 20);
-	incise_instrument_free(&mesh);
+	instrument_free(&mesh);
 	incise_draw_free(draw);
 	incise_canvas_free(canvas);
 }
@@ -297,7 +297,7 @@ static void test_dirty_rectangle(void **state)
 	struct incise_upload uploads[CANVAS_UPLOADS_MIN];
 	struct incise_canvas *canvas;
 	struct incise_draw *draw, *anew;
-	struct incise_eye eye;
+	struct view_projection projection;
 	double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
 	int changed = 0, n;
 	uint8_t *layer;
@@ -317,14 +317,14 @@ static void test_dirty_rectangle(void **state)
 	frame(draw, &aside, NULL, two);
 
 	/* Where it is in the picture, with the texels that filters mix in. */
-	incise_eye_look(&aside, W, H, 100, &eye);
+	view_camera_project(&aside, W, H, 100, &projection);
 	for (int i = 0; i < 4; i++) {
 		double px[2] = {rect.x + (i & 1 ? rect.w + 6 : -6),
 				rect.y + (i & 2 ? rect.h + 6 : -6)};
 		double p[3], normal[3], at[2];
 
-		assert_true(incise_chart_point(chart, px, p, normal));
-		assert_true(incise_eye_px(&eye, W, H, p, at));
+		assert_true(uv_map_point(map, px, p, normal));
+		assert_true(view_camera_px(&projection, W, H, p, at));
 		for (int k = 0; k < 2; k++) {
 			low[k] = fmin(low[k], at[k]);
 			high[k] = fmax(high[k], at[k]);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Ground for tests of wound, blood and effects: a plane, level or tilted, or the neck, with
- * its chart; and ticks of a blade, handle or tube on it.
+ * Ground for tests of wound, blood and injury: a plane, level or tilted, or the neck, with
+ * its map; and ticks of a blade, handle or tube on it.
  */
 #ifndef TESTS_VIEW_GROUND_H
 #define TESTS_VIEW_GROUND_H
@@ -9,11 +9,11 @@
 #include <math.h>
 #include <string.h>
 #include "../../../lib/surface/surface.h"
-#include "../../../lib/view/effects.h"
+#include "../../../lib/view/injury.h"
 
 struct field {
 	struct incise_surface *surface;
-	struct incise_chart *chart;
+	struct uv_map *map;
 	struct incise_scene_picture picture;
 	double mm; /* per texel, in the middle */
 };
@@ -37,15 +37,15 @@ static inline void field_new(struct field *field, int size, double tilt_deg)
 	field->surface = tilt_deg < 0 ? incise_surface_new_capsule(a, b, 55, NULL)
 				      : incise_surface_new_plane(point, normal, NULL);
 	assert_non_null(field->surface);
-	field->chart = incise_chart_new(field->surface, &field->picture, NULL);
-	assert_non_null(field->chart);
-	incise_chart_metric(field->chart, middle, right, down);
+	field->map = uv_map_new(field->surface, &field->picture, NULL);
+	assert_non_null(field->map);
+	uv_map_metric(field->map, middle, right, down);
 	field->mm = sqrt(right[0] * right[0] + right[1] * right[1] + right[2] * right[2]);
 }
 
 static inline void field_free(struct field *field)
 {
-	incise_chart_free(field->chart);
+	uv_map_free(field->map);
 	incise_surface_free(field->surface);
 }
 
@@ -64,14 +64,14 @@ static inline struct incise_tick tick_at(const struct field *field, double t_s,
 					 double down_mm, double depth_mm)
 {
 	struct incise_tick tick = tick_free(t_s);
-	double half = field->chart->size / 2.0;
+	double half = field->map->size / 2.0;
 	double px[2] = {half + right_mm / field->mm, half + down_mm / field->mm};
 
 	tick.tool = tool;
 	tick.phase =
 		tool == INCISE_TOOL_BLADE ? INCISE_PHASE_CUTTING : INCISE_PHASE_INSERTION;
 	tick.flags = INCISE_TICK_CONTACT;
-	assert_true(incise_chart_point(field->chart, px, tick.proxy_mm, tick.normal));
+	assert_true(uv_map_point(field->map, px, tick.proxy_mm, tick.normal));
 	tick.depth_mm = depth_mm;
 	for (int i = 0; i < 3; i++)
 		tick.tool_mm[i] = tick.position_mm[i] =

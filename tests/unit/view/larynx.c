@@ -9,7 +9,7 @@
 #include <cmocka.h>
 #include "../../../lib/base/vector.h"
 #include "../../../lib/surface/surface.h"
-#include "../../../lib/view/chart.h"
+#include "../../../lib/view/uv_map.h"
 #include "../../../lib/view/larynx.h"
 
 #define SIZE 512
@@ -48,7 +48,7 @@ static void test_smooth(void **state)
 			double dy = larynx_height_mm(x, y + h) - here;
 			double bend = larynx_height_mm(x - h, y) - here + dx;
 
-			assert_true(here >= 0 && here <= CHART_RELIEF_MAX_MM);
+			assert_true(here >= 0 && here <= UV_MAP_RELIEF_MAX_MM);
 			/* 45°, and radii of curvature of 1 mm and more */
 			assert_true(fabs(dx) < h && fabs(dy) < h);
 			assert_true(fabs(bend) < h * h);
@@ -57,34 +57,34 @@ static void test_smooth(void **state)
 	assert_true(larynx_height_mm(0, INFINITY) == 0);
 }
 
-static struct incise_chart *neck(struct incise_surface **surface, bool larynx)
+static struct uv_map *neck(struct incise_surface **surface, bool larynx)
 {
 	const struct incise_scene_picture picture = {.texture_px = SIZE,
 						     .larynx = larynx};
-	struct incise_chart *chart;
+	struct uv_map *map;
 
 	*surface = incise_surface_new_capsule((const double[3]){-60, 0, -55},
 					      (const double[3]){160, 0, -55}, 55, NULL);
-	chart = incise_chart_new(*surface, &picture, NULL);
-	assert_non_null(chart);
-	return chart;
+	map = uv_map_new(*surface, &picture, NULL);
+	assert_non_null(map);
+	return map;
 }
 
 /* Above what is felt stands what is drawn, and it is lit as it stands. */
 static void test_drawn(void **state)
 {
 	struct incise_surface *surface;
-	struct incise_chart *chart = neck(&surface, true);
+	struct uv_map *map = neck(&surface, true);
 	double highest = 0;
 
-	for (int i = 0; i < chart->n_vertices; i++) {
-		const struct incise_chart_vertex *v = chart->vertices + i;
+	for (int i = 0; i < map->n_vertices; i++) {
+		const struct uv_map_vertex *v = map->vertices + i;
 		const double at[3] = {v->position_mm[0], v->position_mm[1],
 				      v->position_mm[2]};
 		const double px[2] = {v->px[0], v->px[1]};
-		double height = incise_chart_relief_mm(chart, px);
-		double x = (px[0] / SIZE - 0.5) * chart->wide_mm;
-		double y = (px[1] / SIZE - 0.5) * chart->high_mm;
+		double height = uv_map_relief_mm(map, px);
+		double x = (px[0] / SIZE - 0.5) * map->wide_mm;
+		double y = (px[1] / SIZE - 0.5) * map->high_mm;
 		double flat[3], normal[3], right[3], down[3], slope[2], out[3];
 		struct incise_touch touch;
 
@@ -96,8 +96,8 @@ static void test_drawn(void **state)
 		 * By the slopes of the relief on the cylinder; what is drawn has facets of
 		 * 1.6 mm, that at a radius of curvature of 5 mm are off by tan 4°.
 		 */
-		assert_true(incise_chart_point(chart, px, flat, normal));
-		incise_chart_metric(chart, px, right, down);
+		assert_true(uv_map_point(map, px, flat, normal));
+		uv_map_metric(map, px, right, down);
 		v3_unit(right, right, 0);
 		v3_unit(down, down, 0);
 		slope[0] =
@@ -114,7 +114,7 @@ static void test_drawn(void **state)
 			    cos(4 * M_PI / 180));
 	}
 	assert_true(highest > 4);
-	incise_chart_free(chart);
+	uv_map_free(map);
 	incise_surface_free(surface);
 }
 
@@ -122,24 +122,24 @@ static void test_drawn(void **state)
 static void test_none(void **state)
 {
 	struct incise_surface *surface;
-	struct incise_chart *chart = neck(&surface, false);
+	struct uv_map *map = neck(&surface, false);
 	const struct incise_scene_picture picture = {.texture_px = SIZE, .larynx = true};
 	double most = 0;
 
 	for (int i = 0; i < SIZE * SIZE; i += 7)
-		most = fmax(most, incise_chart_relief_mm(
-					  chart, (const double[2]){i % SIZE, i / SIZE}));
+		most = fmax(most,
+			    uv_map_relief_mm(map, (const double[2]){i % SIZE, i / SIZE}));
 	assert_true(most == 0);
-	incise_chart_free(chart);
+	uv_map_free(map);
 	incise_surface_free(surface);
 	surface = incise_surface_new_sphere((const double[3]){0}, 20, NULL);
-	chart = incise_chart_new(surface, &picture, NULL);
-	assert_non_null(chart);
+	map = uv_map_new(surface, &picture, NULL);
+	assert_non_null(map);
 	for (int i = 0; i < SIZE * SIZE; i += 7)
-		most = fmax(most, incise_chart_relief_mm(
-					  chart, (const double[2]){i % SIZE, i / SIZE}));
+		most = fmax(most,
+			    uv_map_relief_mm(map, (const double[2]){i % SIZE, i / SIZE}));
 	assert_true(most == 0);
-	incise_chart_free(chart);
+	uv_map_free(map);
 	incise_surface_free(surface);
 }
 

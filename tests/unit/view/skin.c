@@ -21,15 +21,15 @@ struct picture {
 };
 
 /* A texture whose texels are those of the middle of one of 2048² on a neck. */
-static struct incise_chart chart_of(double texel_mm)
+static struct uv_map map_of(double texel_mm)
 {
-	return (struct incise_chart){
+	return (struct uv_map){
 		.size = SIZE, .wide_mm = SIZE * texel_mm, .high_mm = SIZE * texel_mm};
 }
 
 static struct picture *paint(enum incise_skin skin, double texel_mm, uint64_t seed)
 {
-	struct incise_chart chart = chart_of(texel_mm);
+	struct uv_map map = map_of(texel_mm);
 	struct picture *picture = malloc(sizeof(*picture));
 
 	if (!picture)
@@ -37,7 +37,7 @@ static struct picture *paint(enum incise_skin skin, double texel_mm, uint64_t se
 	/* Nothing of what was there before stays. */
 	memset(picture, 0x5a, sizeof(*picture));
 	assert_int_equal(
-		incise_skin_paint(&chart, skin, seed, picture->rgba, picture->normal), 0);
+		incise_skin_paint(&map, skin, seed, picture->rgba, picture->normal), 0);
 	return picture;
 }
 
@@ -256,12 +256,12 @@ static void test_any_scale(void **state)
 
 	for (size_t k = 0; k < sizeof(scales) / sizeof(*scales); k++)
 		for (int skin = INCISE_SKIN_NECK; skin <= INCISE_SKIN_LIVER; skin++) {
-			const struct incise_chart chart = {.size = 64,
-							   .wide_mm = 64 * scales[k],
-							   .high_mm = 64 * scales[k]};
+			const struct uv_map map = {.size = 64,
+						   .wide_mm = 64 * scales[k],
+						   .high_mm = 64 * scales[k]};
 			uint8_t rgba[4 * 64 * 64], normal[3 * 64 * 64];
 
-			assert_int_equal(incise_skin_paint(&chart, (enum incise_skin)skin,
+			assert_int_equal(incise_skin_paint(&map, (enum incise_skin)skin,
 							   UINT64_MAX, rgba, normal),
 					 0);
 			for (size_t i = 0; i < 64 * 64; i++)

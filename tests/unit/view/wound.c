@@ -67,7 +67,7 @@ static void test_no_gap(void **state)
 
 	field_new(&field, SIDE, 0);
 	for (size_t c = 0; c < sizeof(cases) / sizeof(*cases); c++) {
-		struct wound *wound = wound_new(field.chart, NULL);
+		struct wound *wound = wound_new(field.map, NULL);
 		double rate = cases[c].rate_hz, off = 0, x, y;
 		int n = (int)(cases[c].s * rate);
 		double sum;
@@ -112,8 +112,8 @@ static void test_union(void **state)
 	struct wound *wound, *both;
 
 	field_new(&field, SIDE, 0);
-	wound = wound_new(field.chart, NULL);
-	both = wound_new(field.chart, NULL);
+	wound = wound_new(field.map, NULL);
+	both = wound_new(field.map, NULL);
 	cut(wound, &field, 1, 1000, 4);
 	cut(both, &field, 1, 1000, 4);
 	cut(both, &field, 1, 1000, 1);
@@ -138,7 +138,7 @@ static void painted_new(struct painted *p, const struct field *field)
 	p->canvas = incise_canvas_new(SIDE, p->base, NULL);
 	assert_non_null(p->canvas);
 	assert_int_equal(incise_canvas_add_layer(p->canvas), 0);
-	p->wound = wound_new(field->chart, NULL);
+	p->wound = wound_new(field->map, NULL);
 	assert_non_null(p->wound);
 }
 
@@ -276,7 +276,7 @@ static void test_endless(void **state)
 	size_t memory;
 
 	field_new(&field, SIDE, 0);
-	wound = wound_new(field.chart, NULL);
+	wound = wound_new(field.map, NULL);
 	memory = wound_memory(wound);
 	cut(wound, &field, 1, 1000, 3);
 	for (int i = 0; i < 3 * WOUND_POINTS; i++) {
@@ -306,7 +306,7 @@ static void test_no_cut(void **state)
 	struct wound *wound;
 
 	field_new(&field, SIDE, 0);
-	wound = wound_new(field.chart, NULL);
+	wound = wound_new(field.map, NULL);
 	for (int k = 0; k < 15; k++)
 		for (int i = 0; i < 4; i++) {
 			struct incise_tick tick = tick_at(
@@ -376,7 +376,7 @@ static void test_leaps(void **state)
 
 	field_new(&field, SIDE, 0);
 	for (int i = 0; i < 5; i++) {
-		struct wound *wound = wound_new(field.chart, NULL);
+		struct wound *wound = wound_new(field.map, NULL);
 		struct incise_tick tick =
 			tick_at(&field, 1, INCISE_TOOL_BLADE, -20, 0, 3);
 		struct wound_stroke stroke;

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <errno.h>
 #include "../../../lib/base/vector.h"
-#include "../../../lib/view/chart.h"
+#include "../../../lib/view/uv_map.h"
 #include "../surface/solid.h"
 
 #define SIZE 512
@@ -99,14 +99,14 @@ static struct incise_surface *make(int kind)
 	}
 }
 
-static struct incise_chart *chart_of(const struct incise_surface *surface, bool larynx)
+static struct uv_map *map_of(const struct incise_surface *surface, bool larynx)
 {
 	const struct incise_scene_picture picture = {.texture_px = SIZE,
 						     .larynx = larynx};
-	struct incise_chart *chart = incise_chart_new(surface, &picture, NULL);
+	struct uv_map *map = uv_map_new(surface, &picture, NULL);
 
-	assert_non_null(chart);
-	return chart;
+	assert_non_null(map);
+	return map;
 }
 
 /* From 0 to 1 (MMIX's generator, Knuth). */
@@ -122,8 +122,7 @@ static double extent(const double p[3])
 	return fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2])));
 }
 
-static void there_and_back(const struct incise_surface *surface,
-			   const struct incise_chart *chart)
+static void there_and_back(const struct incise_surface *surface, const struct uv_map *map)
 {
 	uint64_t state = 1;
 	int found = 0;
@@ -134,19 +133,19 @@ static void there_and_back(const struct incise_surface *surface,
 
 		px[0] = SIZE * random_next(&state);
 		px[1] = SIZE * random_next(&state);
-		if (!incise_chart_point(chart, px, point, normal))
+		if (!uv_map_point(map, px, point, normal))
 			continue;
 		found++;
 		assert_true(fabs(v3_length(normal) - 1) < 1e-12);
 		incise_surface_nearest(surface, point, &touch);
 		/* A line of sight is 1e5 long: roundings of that. */
 		assert_true(fabs(touch.depth_mm) <= 1e-9 + 1e-14 * extent(point));
-		assert_true(incise_chart_px(chart, point, back));
+		assert_true(uv_map_px(map, point, back));
 		/* Closed forms; of an atlas coordinates are floats, 1e-7 of 512. */
 		assert_true(fabs(back[0] - px[0]) < 1e-3);
 		assert_true(fabs(back[1] - px[1]) < 1e-3);
 		/* Neither along the other, and in the surface, which turns little there. */
-		incise_chart_metric(chart, px, right, down);
+		uv_map_metric(map, px, right, down);
 		assert_true(v3_length(right) > 0 && v3_length(down) > 0);
 		assert_true(fabs(v3_dot(right, normal)) < 1e-6 * v3_length(right));
 		assert_true(fabs(v3_dot(down, normal)) < 1e-6 * v3_length(down));
@@ -156,7 +155,7 @@ static void there_and_back(const struct incise_surface *surface,
 }
 
 /* Held against how far points are that are half a texel to each side. */
-static void metric(const struct incise_chart *chart)
+static void metric(const struct uv_map *map)
 {
 	const double step = 0.01;
 	uint64_t state = 2;
@@ -166,14 +165,14 @@ static void metric(const struct incise_chart *chart)
 
 		px[0] = 1 + (SIZE - 2) * random_next(&state);
 		px[1] = 1 + (SIZE - 2) * random_next(&state);
-		incise_chart_metric(chart, px, m[0], m[1]);
+		uv_map_metric(map, px, m[0], m[1]);
 		for (int k = 0; k < 2; k++) {
 			double before[2] = {px[0], px[1]}, after[2] = {px[0], px[1]};
 
 			before[k] -= step;
 			after[k] += step;
-			if (!incise_chart_point(chart, before, a, na) ||
-			    !incise_chart_point(chart, after, b, nb))
+			if (!uv_map_point(map, before, a, na) ||
+			    !uv_map_point(map, after, b, nb))
 				continue;
 			/* An edge of a mesh lies between. */
 			if (v3_dot(na, nb) < 1 - 1e-6)
@@ -188,18 +187,18 @@ static void metric(const struct incise_chart *chart)
 	}
 }
 
-static void drawn(const struct incise_chart *chart)
+static void drawn(const struct uv_map *map)
 {
-	int n = chart->n_vertices;
+	int n = map->n_vertices;
 
-	assert_true(chart->n_indices % 3 == 0 && chart->n_indices > 0);
-	for (int i = 0; i < chart->n_indices; i += 3) {
-		const struct incise_chart_vertex *v[3];
+	assert_true(map->n_indices % 3 == 0 && map->n_indices > 0);
+	for (int i = 0; i < map->n_indices; i += 3) {
+		const struct uv_map_vertex *v[3];
 		double e[2][3], out[3], area;
 
 		for (int k = 0; k < 3; k++) {
-			assert_true(chart->indices[i + k] < (uint32_t)n);
-			v[k] = chart->vertices + chart->indices[i + k];
+			assert_true(map->indices[i + k] < (uint32_t)n);
+			v[k] = map->vertices + map->indices[i + k];
 		}
 		for (int k = 0; k < 3; k++) {
 			e[0][k] = (double)v[1]->position_mm[k] - v[0]->position_mm[k];
@@ -215,7 +214,7 @@ static void drawn(const struct incise_chart *chart)
 				    0);
 	}
 	for (int i = 0; i < n; i++) {
-		const struct incise_chart_vertex *v = chart->vertices + i;
+		const struct uv_map_vertex *v = map->vertices + i;
 		double nn = 0, tt = 0, nt = 0;
 
 		for (int k = 0; k < 3; k++) {
@@ -235,21 +234,21 @@ static void drawn(const struct incise_chart *chart)
 }
 
 /* Where a vertex is drawn is where its texel's point is, raised by the relief. */
-static void drawn_in_place(const struct incise_chart *chart)
+static void drawn_in_place(const struct uv_map *map)
 {
-	for (int i = 0; i < chart->n_vertices; i++) {
-		const struct incise_chart_vertex *v = chart->vertices + i;
+	for (int i = 0; i < map->n_vertices; i++) {
+		const struct uv_map_vertex *v = map->vertices + i;
 		const double px[2] = {v->px[0], v->px[1]};
 		double point[3], normal[3], right[3], down[3], bitangent[3];
 
-		if (!incise_chart_point(chart, px, point, normal))
+		if (!uv_map_point(map, px, point, normal))
 			continue; /* rounded to a float over the border of a mesh */
-		v3_add(point, point, incise_chart_relief_mm(chart, px), normal);
+		v3_add(point, point, uv_map_relief_mm(map, px), normal);
 		for (int k = 0; k < 3; k++)
 			/* Rounding to floats: of the place, and of the texel it is at. */
 			assert_true(fabs(point[k] - v->position_mm[k]) <=
 				    1e-4 + 1e-7 * extent(point));
-		incise_chart_metric(chart, px, right, down);
+		uv_map_metric(map, px, right, down);
 		v3_cross(bitangent,
 			 (const double[3]){v->normal[0], v->normal[1], v->normal[2]},
 			 (const double[3]){v->tangent[0], v->tangent[1], v->tangent[2]});
@@ -265,18 +264,18 @@ static void test_all_kinds(void **state)
 	struct incise_surface *surface;
 
 	for (int kind = 0; (surface = make(kind)); kind++) {
-		struct incise_chart *chart = chart_of(surface, kind % 2);
+		struct uv_map *map = map_of(surface, kind % 2);
 
-		there_and_back(surface, chart);
-		metric(chart);
-		drawn(chart);
-		drawn_in_place(chart);
+		there_and_back(surface, map);
+		metric(map);
+		drawn(map);
+		drawn_in_place(map);
 		if (!incise_surface_triangles(surface))
-			assert_int_equal(chart->n_indices, 3 * 20000);
-		incise_chart_free(chart);
+			assert_int_equal(map->n_indices, 3 * 20000);
+		uv_map_free(map);
 		incise_surface_free(surface);
 	}
-	incise_chart_free(NULL);
+	uv_map_free(NULL);
 }
 
 /* The top is in the middle, right is +x and the picture is not mirrored. */
@@ -286,19 +285,19 @@ static void test_lies_as_it_should(void **state)
 
 	for (size_t k = 0; k < sizeof(kinds) / sizeof(*kinds); k++) {
 		struct incise_surface *surface = make(kinds[k]);
-		struct incise_chart *chart = chart_of(surface, false);
+		struct uv_map *map = map_of(surface, false);
 		const double middle[2] = {SIZE / 2.0, SIZE / 2.0};
 		double point[3], normal[3], right[3], down[3], out[3];
 		struct incise_touch top;
 
 		incise_surface_top(surface, &top);
-		assert_true(incise_chart_point(chart, middle, point, normal));
+		assert_true(uv_map_point(map, middle, point, normal));
 		v3_sub(out, point, top.point_mm);
 		assert_true(v3_length(out) < 1e-9);
-		incise_chart_metric(chart, middle, right, down);
+		uv_map_metric(map, middle, right, down);
 		assert_true(right[0] > 0.99 * v3_length(right));
 		assert_true(-down[1] > 0.99 * v3_length(down));
-		incise_chart_free(chart);
+		uv_map_free(map);
 		incise_surface_free(surface);
 	}
 }
@@ -307,18 +306,18 @@ static void test_lies_as_it_should(void **state)
 static void test_neck_is_not_stretched(void **state)
 {
 	struct incise_surface *surface = make(6);
-	struct incise_chart *chart = chart_of(surface, true);
+	struct uv_map *map = map_of(surface, true);
 
 	for (int i = 0; i <= 16; i++) {
 		const double px[2] = {SIZE * i / 16.0, SIZE * (16 - i) / 16.0};
 		double right[3], down[3], ratio;
 
-		incise_chart_metric(chart, px, right, down);
+		uv_map_metric(map, px, right, down);
 		ratio = v3_length(right) / v3_length(down);
 		assert_true(ratio > 1 / 1.05 && ratio < 1.05);
 		assert_true(fabs(v3_length(right) * SIZE - 160) < 1e-9);
 	}
-	incise_chart_free(chart);
+	uv_map_free(map);
 	incise_surface_free(surface);
 }
 
@@ -326,28 +325,28 @@ static void test_neck_is_not_stretched(void **state)
 static void test_fits_a_mesh(void **state)
 {
 	struct incise_surface *surface = hill(0);
-	struct incise_chart *chart = chart_of(surface, false);
+	struct uv_map *map = map_of(surface, false);
 	struct incise_touch top;
 	int found = 0;
 	double px[2];
 
 	/* 80 × 70 mm of 80 × 80. */
-	assert_true(fabs(chart->wide_mm - 80) < 1e-9 && chart->high_mm == chart->wide_mm);
+	assert_true(fabs(map->wide_mm - 80) < 1e-9 && map->high_mm == map->wide_mm);
 	incise_surface_top(surface, &top);
-	assert_true(incise_chart_px(chart, top.point_mm, px));
+	assert_true(uv_map_px(map, top.point_mm, px));
 	for (int k = 0; k < 2; k++)
-		assert_true(fabs((px[k] / SIZE - 0.5) * 80 - chart->top_mm[k]) < 1e-9);
+		assert_true(fabs((px[k] / SIZE - 0.5) * 80 - map->top_mm[k]) < 1e-9);
 	for (int i = 0; i < SIZE * SIZE; i += 16) {
 		double point[3], normal[3];
 
 		px[0] = i % SIZE + 0.5;
 		px[1] = i / SIZE + 0.5;
-		found += incise_chart_point(chart, px, point, normal);
+		found += uv_map_point(map, px, point, normal);
 	}
 	assert_true(fabs(found * 16.0 / (SIZE * SIZE) - 70 / 80.0) < 0.005);
 	/* So are triangles, but for those cut at the border. */
-	assert_true(chart->n_indices / 3 >= 17500 && chart->n_indices / 3 < 18200);
-	incise_chart_free(chart);
+	assert_true(map->n_indices / 3 >= 17500 && map->n_indices / 3 < 18200);
+	uv_map_free(map);
 	incise_surface_free(surface);
 }
 
@@ -365,25 +364,25 @@ static void test_outside(void **state)
 	struct incise_surface *surface;
 
 	for (int kind = 0; (surface = make(kind)); kind++) {
-		struct incise_chart *chart = chart_of(surface, true);
+		struct uv_map *map = map_of(surface, true);
 		double px[2] = {7, 7}, point[3] = {7}, normal[3], right[3], down[3];
 
 		for (size_t k = 0; k < sizeof(nowhere) / sizeof(*nowhere); k++) {
 			/* Of a mesh with coordinates the nearest is on it all the same. */
-			bool there = incise_chart_px(chart, nowhere[k], px);
+			bool there = uv_map_px(map, nowhere[k], px);
 
 			assert_false(there && (k < 6 || kind < 5));
 			assert_true(px[0] >= 0 && px[0] <= SIZE);
 		}
 		for (size_t k = 0; k < sizeof(off) / sizeof(*off); k++) {
-			assert_false(incise_chart_point(chart, off[k], point, normal));
+			assert_false(uv_map_point(map, off[k], point, normal));
 			assert_true(point[0] == 7);
-			assert_true(incise_chart_relief_mm(chart, off[k]) == 0);
-			incise_chart_metric(chart, off[k], right, down);
+			assert_true(uv_map_relief_mm(map, off[k]) == 0);
+			uv_map_metric(map, off[k], right, down);
 			assert_true(v3_finite(right) && v3_finite(down));
 			assert_true(v3_length(right) > 0 && v3_length(down) > 0);
 		}
-		incise_chart_free(chart);
+		uv_map_free(map);
 		incise_surface_free(surface);
 	}
 }
@@ -392,13 +391,13 @@ static void test_outside(void **state)
 static void test_underside(void **state)
 {
 	struct incise_surface *surface = make(3);
-	struct incise_chart *chart = chart_of(surface, false);
+	struct uv_map *map = map_of(surface, false);
 	double px[2];
 
-	assert_true(incise_chart_px(chart, (const double[3]){5, 6, 87}, px));
-	assert_true(incise_chart_px(chart, (const double[3]){5, 6, 86}, px));
-	assert_false(incise_chart_px(chart, (const double[3]){5, 6, -73}, px));
-	incise_chart_free(chart);
+	assert_true(uv_map_px(map, (const double[3]){5, 6, 87}, px));
+	assert_true(uv_map_px(map, (const double[3]){5, 6, 86}, px));
+	assert_false(uv_map_px(map, (const double[3]){5, 6, -73}, px));
+	uv_map_free(map);
 	incise_surface_free(surface);
 }
 
@@ -411,7 +410,7 @@ static void test_refused(void **state)
 		const struct incise_scene_picture picture = {.texture_px = sizes[k]};
 		struct incise_error err = {0};
 
-		assert_null(incise_chart_new(surface, &picture, &err));
+		assert_null(uv_map_new(surface, &picture, &err));
 		assert_int_equal(errno, EINVAL);
 		assert_non_null(strstr(err.text, "expected"));
 	}
@@ -426,15 +425,15 @@ static void test_useless_coordinates(void **state)
 	for (size_t k = 0; k < sizeof(values) / sizeof(*values); k++) {
 		struct incise_surface *surface = hill(1);
 		struct mesh *mesh = surface->mesh;
-		struct incise_chart *chart;
+		struct uv_map *map;
 
 		for (uint32_t t = 0; t < mesh->n_triangles; t++)
 			for (int i = 0; i < 3; i++)
 				mesh->uv[t][i][0] = mesh->uv[t][i][1] = values[k];
-		chart = chart_of(surface, false);
-		assert_int_equal(chart->kind, CHART_FROM_ABOVE);
-		there_and_back(surface, chart);
-		incise_chart_free(chart);
+		map = map_of(surface, false);
+		assert_int_equal(map->kind, UV_MAP_FROM_ABOVE);
+		there_and_back(surface, map);
+		uv_map_free(map);
 		incise_surface_free(surface);
 	}
 }
@@ -446,15 +445,15 @@ static void test_crowded_coordinates(void **state)
 	struct incise_surface *surface = hill(1);
 	struct mesh *mesh = surface->mesh;
 	double point[3], normal[3];
-	struct incise_chart *chart;
+	struct uv_map *map;
 
 	for (uint32_t t = 0; t < mesh->n_triangles; t++)
 		memcpy(mesh->uv[t], corner, sizeof(corner));
-	chart = chart_of(surface, false);
-	assert_int_equal(chart->kind, CHART_ATLAS);
-	assert_true(incise_chart_point(chart, (const double[2]){9, 9}, point, normal));
+	map = map_of(surface, false);
+	assert_int_equal(map->kind, UV_MAP_ATLAS);
+	assert_true(uv_map_point(map, (const double[2]){9, 9}, point, normal));
 	assert_true(v3_finite(point));
-	incise_chart_free(chart);
+	uv_map_free(map);
 	incise_surface_free(surface);
 }
 
@@ -463,7 +462,7 @@ static void test_seam(void **state)
 {
 	struct incise_surface *surface = hill(1);
 	struct mesh *mesh = surface->mesh;
-	struct incise_chart *whole = chart_of(surface, false), *parted;
+	struct uv_map *whole = map_of(surface, false), *parted;
 
 	assert_int_equal(whole->n_vertices, (HILL + 1) * (HILL + 1));
 	assert_int_equal(whole->n_indices, 6 * HILL * HILL);
@@ -476,11 +475,11 @@ static void test_seam(void **state)
 		for (int k = 0; k < 3 && middle > 0; k++)
 			mesh->uv[t][k][0] += 0.05F;
 	}
-	parted = chart_of(surface, false);
+	parted = map_of(surface, false);
 	assert_int_equal(parted->n_vertices, whole->n_vertices + HILL + 1);
 	assert_int_equal(parted->n_indices, whole->n_indices);
-	incise_chart_free(parted);
-	incise_chart_free(whole);
+	uv_map_free(parted);
+	uv_map_free(whole);
 	incise_surface_free(surface);
 }
 

@@ -9,32 +9,32 @@
  *        │ ▌╲ edge of the blade to +x                │┃┃
  *        ○───▶ x, tip at 0                           ○───▶ x, end at 0
  */
-#ifndef INCISE_VIEW_INSTRUMENT_H
-#define INCISE_VIEW_INSTRUMENT_H
+#ifndef INCISE_VIEW_INSTRUMENT_SHAPE_H
+#define INCISE_VIEW_INSTRUMENT_SHAPE_H
 
 #include <stdbool.h>
 #include <stdint.h>
 #include <incise/plan.h>
 
-struct incise_instrument_vertex {
+struct instrument_vertex {
 	float position_mm[3], normal[3];
 	float rgb[3]; /* sRGB 0 … 1 */
 	float metal;  /* 0 plastic … 1 steel */
 };
 
-struct incise_instrument_mesh {
+struct instrument_mesh {
 	int n_vertices, n_indices;
-	struct incise_instrument_vertex *vertices;
+	struct instrument_vertex *vertices;
 	uint32_t *indices; /* triangles, counter-clockwise from outside */
 };
 
 /* Of a few hundred triangles. 0, -ENOMEM. To be freed; the mesh is empty then. */
-int incise_instrument_scalpel(double handle_mm, struct incise_instrument_mesh *mesh);
-int incise_instrument_tube(struct incise_instrument_mesh *mesh);
-void incise_instrument_free(struct incise_instrument_mesh *mesh);
+int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh);
+int instrument_tube(struct instrument_mesh *mesh);
+void instrument_free(struct instrument_mesh *mesh);
 
 /* Where an instrument stands: columns x, y, z, origin of its frame. */
-struct incise_instrument_place {
+struct instrument_place {
 	double x[3], y[3], z[3], origin_mm[3];
 	bool tube; /* else the scalpel */
 };
@@ -43,8 +43,7 @@ struct incise_instrument_place {
  * From a tick: the scalpel's tip and attitude are the pose's; the tube's end is the tool's
  * place. False when it is nowhere: no attitude yet, or numbers that make no place.
  */
-bool incise_instrument_place(const struct incise_scene_scalpel *scalpel,
-			     const struct incise_tick *tick,
-			     struct incise_instrument_place *place);
+bool instrument_place(const struct incise_scene_scalpel *scalpel,
+		      const struct incise_tick *tick, struct instrument_place *place);
 
 #endif

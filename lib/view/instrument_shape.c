@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Meshes of scalpel and tube; see instrument.h. Each is a skin around rings:
+ * Meshes of scalpel and tube; see instrument_shape.h. Each is a skin around rings:
  *
  *      ring 3  ○───○───○      a ring: a point, two directions across, a half width for
  *      ring 2  ○───○───○      each side, how square it is, how far it tapers to an edge
@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../base/vector.h"
-#include "instrument.h"
+#include "instrument_shape.h"
 
 #define AROUND 16
 #define RINGS_MAX 32
@@ -79,10 +79,10 @@ static void corner_normal(double (*points)[AROUND][3], int rings, int r, int i,
 		to[k] = (float)unit[k];
 }
 
-static void put(struct incise_instrument_mesh *mesh, const struct ring *ring,
-		const double p[3], const float normal[3])
+static void put(struct instrument_mesh *mesh, const struct ring *ring, const double p[3],
+		const float normal[3])
 {
-	struct incise_instrument_vertex *v = &mesh->vertices[mesh->n_vertices++];
+	struct instrument_vertex *v = &mesh->vertices[mesh->n_vertices++];
 
 	for (int k = 0; k < 3; k++) {
 		v->position_mm[k] = (float)p[k];
@@ -101,7 +101,7 @@ static void put(struct incise_instrument_mesh *mesh, const struct ring *ring,
 	v->metal = ring->metal;
 }
 
-static int skin(const struct ring *ring, int rings, struct incise_instrument_mesh *mesh)
+static int skin(const struct ring *ring, int rings, struct instrument_mesh *mesh)
 {
 	static const int order[6] = {0, 1, 2, 0, 2, 3};
 	double points[RINGS_MAX][AROUND][3];
@@ -111,7 +111,7 @@ static int skin(const struct ring *ring, int rings, struct incise_instrument_mes
 	mesh->vertices = calloc(faces * 4, sizeof(*mesh->vertices));
 	mesh->indices = calloc(faces * 6, sizeof(*mesh->indices));
 	if (!mesh->vertices || !mesh->indices) {
-		incise_instrument_free(mesh);
+		instrument_free(mesh);
 		return -ENOMEM;
 	}
 	for (int r = 0; r < rings; r++)
@@ -145,7 +145,7 @@ static void paint(struct ring *ring, const float rgb[3], float metal)
 	ring->metal = metal;
 }
 
-int incise_instrument_scalpel(double handle_mm, struct incise_instrument_mesh *mesh)
+int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh)
 {
 	/*
 	 * A blade with a belly in a handle, mm of one that is 120 mm long: height, left
@@ -183,7 +183,7 @@ int incise_instrument_scalpel(double handle_mm, struct incise_instrument_mesh *m
 	return skin(ring, RINGS, mesh);
 }
 
-int incise_instrument_tube(struct incise_instrument_mesh *mesh)
+int instrument_tube(struct instrument_mesh *mesh)
 {
 	enum { STRAIGHT = 4, CURVED = 10, TOP = 5, INNER = 2 };
 	enum { RINGS = INNER + STRAIGHT + CURVED + TOP };
@@ -228,16 +228,15 @@ int incise_instrument_tube(struct incise_instrument_mesh *mesh)
 	return skin(ring, RINGS, mesh);
 }
 
-void incise_instrument_free(struct incise_instrument_mesh *mesh)
+void instrument_free(struct instrument_mesh *mesh)
 {
 	free(mesh->vertices);
 	free(mesh->indices);
 	memset(mesh, 0, sizeof(*mesh));
 }
 
-bool incise_instrument_place(const struct incise_scene_scalpel *scalpel,
-			     const struct incise_tick *tick,
-			     struct incise_instrument_place *place)
+bool instrument_place(const struct incise_scene_scalpel *scalpel,
+		      const struct incise_tick *tick, struct instrument_place *place)
 {
 	const double *origin;
 	double q[4], axis[3], side[3], z[3], x[3], size = 0;

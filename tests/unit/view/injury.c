@@ -17,7 +17,7 @@
 
 struct scene {
 	struct incise_canvas *canvas;
-	struct incise_effects *effects;
+	struct incise_injury *injury;
 	uint8_t *base;
 };
 
@@ -27,13 +27,13 @@ static void scene_new(struct scene *s, const struct field *field)
 	memset(s->base, 200, TEXELS);
 	s->canvas = incise_canvas_new(SIDE, s->base, NULL);
 	assert_non_null(s->canvas);
-	s->effects = incise_effects_new(&field->picture, field->chart, s->canvas, NULL);
-	assert_non_null(s->effects);
+	s->injury = incise_injury_new(&field->picture, field->map, s->canvas, NULL);
+	assert_non_null(s->injury);
 }
 
 static void scene_free(struct scene *s)
 {
-	incise_effects_free(s->effects);
+	incise_injury_free(s->injury);
 	incise_canvas_free(s->canvas);
 	free(s->base);
 }
@@ -42,7 +42,7 @@ static void paint(struct scene *s)
 {
 	struct incise_upload uploads[64];
 
-	incise_effects_paint(s->effects);
+	incise_injury_paint(s->injury);
 	while (incise_canvas_compose(s->canvas, uploads, 64) > 0)
 		;
 }
@@ -61,14 +61,14 @@ static struct incise_tick procedure(const struct field *field, int i, double rat
 
 static void assert_same(const struct scene *a, const struct scene *b)
 {
-	struct incise_effects_report ra, rb;
+	struct incise_injury_report ra, rb;
 
 	for (int level = 0; level < incise_canvas_levels(a->canvas); level++)
 		assert_memory_equal(incise_canvas_pixels(a->canvas, level, NULL),
 				    incise_canvas_pixels(b->canvas, level, NULL),
 				    (size_t)(SIDE >> level) * (SIDE >> level) * 4);
-	incise_effects_report(a->effects, &ra);
-	incise_effects_report(b->effects, &rb);
+	incise_injury_report(a->injury, &ra);
+	incise_injury_report(b->injury, &rb);
 	assert_memory_equal(&ra, &rb, sizeof(ra));
 }
 
@@ -85,7 +85,7 @@ static void test_frames_do_not_matter(void **state)
 		for (int i = 0; i < 3000; i++) {
 			struct incise_tick tick = procedure(&field, i, 1000);
 
-			incise_effects_tick(s[k].effects, &tick);
+			incise_injury_tick(s[k].injury, &tick);
 			if (every[k] ? i % every[k] == 0 : rand() % 40 == 0)
 				paint(&s[k]);
 		}
@@ -111,7 +111,7 @@ static void test_ticks_twice(void **state)
 			struct incise_tick tick = procedure(&field, i, 500);
 
 			for (int n = 0; n <= k; n++)
-				incise_effects_tick(s[k].effects, &tick);
+				incise_injury_tick(s[k].injury, &tick);
 		}
 		paint(&s[k]);
 	}
@@ -130,16 +130,16 @@ static void test_rates(void **state)
 
 	field_new(&field, SIDE, 40);
 	for (int k = 0; k < 4; k++) {
-		struct incise_effects_report report;
+		struct incise_injury_report report;
 		struct scene s;
 
 		scene_new(&s, &field);
 		for (int i = 0; i < 3 * rates[k]; i++) {
 			struct incise_tick tick = procedure(&field, i, rates[k]);
 
-			incise_effects_tick(s.effects, &tick);
+			incise_injury_tick(s.injury, &tick);
 		}
-		incise_effects_report(s.effects, &report);
+		incise_injury_report(s.injury, &report);
 		ul[k] = report.blood_ul_emitted;
 		/* 30 mm and 3 mm to the side; the last tick in it is a period before 1 s. */
 		assert_true(fabs(report.cut_mm - 30.15 * (1 - 1 / rates[k])) < 0.01);
@@ -166,7 +166,7 @@ static void test_only_what_is_asked_for(void **state)
 
 	field_new(&field, SIDE, 40);
 	for (int k = 0; k < 4; k++) {
-		struct incise_effects_report report;
+		struct incise_injury_report report;
 		struct scene s;
 
 		field.picture.wound = cases[k].wound;
@@ -175,13 +175,13 @@ static void test_only_what_is_asked_for(void **state)
 		for (int i = 0; i < 1500; i++) {
 			struct incise_tick tick = procedure(&field, i, 1000);
 
-			incise_effects_tick(s.effects, &tick);
+			incise_injury_tick(s.injury, &tick);
 		}
 		paint(&s);
-		incise_effects_report(s.effects, &report);
+		incise_injury_report(s.injury, &report);
 		assert_true((report.cut_mm > 0) == cases[k].wound);
 		assert_true((report.blood_ul_emitted > 0) == (cases[k].layers == 2));
-		memory[k] = incise_effects_memory(s.effects);
+		memory[k] = incise_injury_memory(s.injury);
 		for (int layer = 0; layer < CANVAS_LAYERS_MAX; layer++)
 			assert_true(!incise_canvas_layer(s.canvas, layer) ==
 				    (layer >= cases[k].layers));
@@ -214,19 +214,19 @@ static void test_gaps(void **state)
 
 	field_new(&field, SIDE, 40);
 	for (int k = 0; k < 5; k++) {
-		struct incise_effects_report before, after, later;
+		struct incise_injury_report before, after, later;
 		struct incise_tick tick = {0};
 		struct scene s;
 
 		scene_new(&s, &field);
 		for (int i = 0; i <= 2000; i++) {
 			tick = procedure(&field, i, 1000);
-			incise_effects_tick(s.effects, &tick);
+			incise_injury_tick(s.injury, &tick);
 		}
-		incise_effects_report(s.effects, &before);
+		incise_injury_report(s.injury, &before);
 		tick.t_ns += cases[k].gap_ns;
-		incise_effects_tick(s.effects, &tick);
-		incise_effects_report(s.effects, &after);
+		incise_injury_tick(s.injury, &tick);
+		incise_injury_report(s.injury, &after);
 		if (after.steps_lost != cases[k].lost)
 			print_error("%d: %llu\n", k,
 				    (unsigned long long)after.steps_lost);
@@ -236,8 +236,8 @@ static void test_gaps(void **state)
 		/* And time goes on from there. */
 		if (cases[k].gap_ns < INT64_MAX / 2)
 			tick.t_ns += 200000000;
-		incise_effects_tick(s.effects, &tick);
-		incise_effects_report(s.effects, &later);
+		incise_injury_tick(s.injury, &tick);
+		incise_injury_report(s.injury, &later);
 		if (cases[k].gap_ns < INT64_MAX / 2)
 			assert_true(later.blood_ul_emitted > after.blood_ul_emitted);
 		scene_free(&s);
@@ -262,7 +262,7 @@ static void test_hostile(void **state)
 	static const double tilts[] = {40, -1};
 
 	for (int k = 0; k < 2; k++) {
-		struct incise_effects_report report;
+		struct incise_injury_report report;
 		struct incise_tick tick = {0};
 		struct field field;
 		struct scene s;
@@ -304,11 +304,11 @@ static void test_hostile(void **state)
 								       : INT64_MAX;
 				}
 			}
-			incise_effects_tick(s.effects, &tick);
+			incise_injury_tick(s.injury, &tick);
 			if (i % 50 == 0)
 				paint(&s);
 		}
-		incise_effects_report(s.effects, &report);
+		incise_injury_report(s.injury, &report);
 		assert_true(isfinite(report.cut_mm) && report.cut_mm >= 0);
 		assert_true(fabs(report.blood_ul_emitted - report.blood_ul_drops -
 				 report.blood_ul_trails - report.blood_ul_off) <=
@@ -334,10 +334,10 @@ static void test_refused(void **state)
 
 	field_new(&field, SIDE, 0);
 	canvas = incise_canvas_new(32, base, NULL);
-	assert_null(incise_effects_new(&field.picture, field.chart, canvas, &err));
+	assert_null(incise_injury_new(&field.picture, field.map, canvas, &err));
 	assert_int_equal(err.code, EINVAL);
 	incise_canvas_free(canvas);
-	incise_effects_free(NULL);
+	incise_injury_free(NULL);
 	field_free(&field);
 }
 

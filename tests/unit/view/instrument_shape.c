@@ -10,11 +10,11 @@
 #include <math.h>
 #include <string.h>
 #include "../../../lib/base/vector.h"
-#include "../../../lib/view/instrument.h"
+#include "../../../lib/view/instrument_shape.h"
 
 static const struct incise_scene_scalpel scalpel = {{0, 0, 1}, {0, 1, 0}, 120};
 
-static double signed_volume(const struct incise_instrument_mesh *mesh)
+static double signed_volume(const struct instrument_mesh *mesh)
 {
 	double volume = 0;
 
@@ -31,8 +31,7 @@ static double signed_volume(const struct incise_instrument_mesh *mesh)
 	return volume;
 }
 
-static void check(const struct incise_instrument_mesh *mesh, double low[3],
-		  double high[3])
+static void check(const struct instrument_mesh *mesh, double low[3], double high[3])
 {
 	assert_in_range(mesh->n_indices / 3, 100, 999);
 	assert_int_equal(mesh->n_indices % 3, 0);
@@ -41,7 +40,7 @@ static void check(const struct incise_instrument_mesh *mesh, double low[3],
 		high[k] = -INFINITY;
 	}
 	for (int i = 0; i < mesh->n_vertices; i++) {
-		const struct incise_instrument_vertex *v = &mesh->vertices[i];
+		const struct instrument_vertex *v = &mesh->vertices[i];
 		double n = 0;
 
 		for (int k = 0; k < 3; k++) {
@@ -61,13 +60,13 @@ static void check(const struct incise_instrument_mesh *mesh, double low[3],
 static void test_scalpel(void **state)
 {
 	static const double lengths[] = {1, 40, 120, 1000};
-	struct incise_instrument_mesh mesh;
+	struct instrument_mesh mesh;
 	double low[3], high[3];
 
 	for (int i = 0; i < 4; i++) {
 		double h = lengths[i];
 
-		assert_int_equal(incise_instrument_scalpel(h, &mesh), 0);
+		assert_int_equal(instrument_scalpel(h, &mesh), 0);
 		check(&mesh, low, high);
 		/* From the tip to the handle's end; floats. */
 		assert_true(fabs(low[2]) < 1e-5 && fabs(high[2] - h) < 1e-3);
@@ -78,26 +77,26 @@ static void test_scalpel(void **state)
 		if (h == 120)
 			assert_true(signed_volume(&mesh) > 1500 &&
 				    signed_volume(&mesh) < 4500);
-		incise_instrument_free(&mesh);
+		instrument_free(&mesh);
 		assert_null(mesh.vertices);
 	}
 }
 
 static void test_tube(void **state)
 {
-	struct incise_instrument_mesh mesh;
+	struct instrument_mesh mesh;
 	double low[3], high[3];
 
-	assert_int_equal(incise_instrument_tube(&mesh), 0);
+	assert_int_equal(instrument_tube(&mesh), 0);
 	check(&mesh, low, high);
 	assert_true(fabs(low[2]) < 1e-5);
 	/* 8 mm thick at its end, 15 mm at the top, and bent to -x. */
 	assert_true(fabs(high[1] - 7.5) < 1e-3 && fabs(low[1] + 7.5) < 1e-3);
 	assert_true(high[0] < 8 && low[0] < -25);
-	incise_instrument_free(&mesh);
+	instrument_free(&mesh);
 }
 
-static void expect(const struct incise_instrument_place *place, const double x[3],
+static void expect(const struct instrument_place *place, const double x[3],
 		   const double z[3])
 {
 	double y[3];
@@ -113,23 +112,23 @@ static void expect(const struct incise_instrument_place *place, const double x[3
 
 static void test_place(void **state)
 {
-	struct incise_instrument_place place;
+	struct instrument_place place;
 	struct incise_tick tick = {.position_mm = {1, 2, 3},
 				   .tool_mm = {4, 5, 6},
 				   .quaternion = {1, 0, 0, 0},
 				   .tool = INCISE_TOOL_BLADE};
 
-	assert_true(incise_instrument_place(&scalpel, &tick, &place));
+	assert_true(instrument_place(&scalpel, &tick, &place));
 	expect(&place, (double[]){1, 0, 0}, (double[]){0, 0, 1});
 	assert_true(!place.tube && place.origin_mm[0] == 1);
 	/* A quarter round x: what was up is -y. A handle is the scalpel's, at its tip. */
 	tick.quaternion[0] = tick.quaternion[1] = M_SQRT1_2;
 	tick.tool = INCISE_TOOL_HANDLE;
-	assert_true(incise_instrument_place(&scalpel, &tick, &place));
+	assert_true(instrument_place(&scalpel, &tick, &place));
 	expect(&place, (double[]){1, 0, 0}, (double[]){0, -1, 0});
 	assert_true(!place.tube && place.origin_mm[2] == 3);
 	tick.tool = INCISE_TOOL_TUBE;
-	assert_true(incise_instrument_place(&scalpel, &tick, &place));
+	assert_true(instrument_place(&scalpel, &tick, &place));
 	assert_true(place.tube && place.origin_mm[0] == 4);
 }
 
@@ -138,23 +137,23 @@ static void test_nowhere(void **state)
 	static const struct incise_scene_scalpel odd = {{0, 0, 1}, {0, 0, 1}, 120};
 	const struct incise_tick good = {.quaternion = {1, 0, 0, 0},
 					 .tool = INCISE_TOOL_BLADE};
-	struct incise_instrument_place place;
+	struct instrument_place place;
 	struct incise_tick tick = good;
 
 	/* Side along the axis: some frame, a right one. */
-	assert_true(incise_instrument_place(&odd, &tick, &place));
+	assert_true(instrument_place(&odd, &tick, &place));
 	assert_true(fabs(v3_length(place.x) - 1) < 1e-12);
 	assert_true(fabs(v3_dot(place.x, place.z)) < 1e-12);
 
 	tick.quaternion[0] = 0;
-	assert_false(incise_instrument_place(&scalpel, &tick, &place));
+	assert_false(instrument_place(&scalpel, &tick, &place));
 	tick.quaternion[2] = NAN;
-	assert_false(incise_instrument_place(&scalpel, &tick, &place));
+	assert_false(instrument_place(&scalpel, &tick, &place));
 	tick = good;
 	tick.position_mm[1] = INFINITY;
-	assert_false(incise_instrument_place(&scalpel, &tick, &place));
+	assert_false(instrument_place(&scalpel, &tick, &place));
 	tick.position_mm[1] = 1e7;
-	assert_false(incise_instrument_place(&scalpel, &tick, &place));
+	assert_false(instrument_place(&scalpel, &tick, &place));
 }
 
 int main(void)

@@ -15,41 +15,41 @@
  * Ticks are not trusted: what is not finite, too far or too fast for a hand is no cut. One
  * thread at a time.
  */
-#ifndef INCISE_VIEW_EFFECTS_H
-#define INCISE_VIEW_EFFECTS_H
+#ifndef INCISE_VIEW_INJURY_H
+#define INCISE_VIEW_INJURY_H
 
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/plan.h>
 #include <incise/scene.h>
 #include "canvas.h"
-#include "chart.h"
+#include "uv_map.h"
 
-#define EFFECTS_STEP_NS 10000000 /* 10 ms */
+#define INJURY_STEP_NS 10000000 /* 10 ms */
 /*
  * After a gap in the ticks at most so many steps are made up; what is longer is passed over,
  * as if lips and blood had stood still in it.
  */
-#define EFFECTS_STEPS_MAX 100
+#define INJURY_STEPS_MAX 100
 
-struct incise_effects;
+struct incise_injury;
 
 /*
- * chart and canvas must live longer, and be of one size; layers are added to the canvas.
+ * map and canvas must live longer, and be of one size; layers are added to the canvas.
  * Returns NULL with errno EINVAL, ENOMEM, ENOSPC.
  */
-struct incise_effects *incise_effects_new(const struct incise_scene_picture *picture,
-					  const struct incise_chart *chart,
-					  struct incise_canvas *canvas,
-					  struct incise_error *err);
+struct incise_injury *incise_injury_new(const struct incise_scene_picture *picture,
+					const struct uv_map *map,
+					struct incise_canvas *canvas,
+					struct incise_error *err);
 
 /* Each tick, in order. */
-void incise_effects_tick(struct incise_effects *effects, const struct incise_tick *tick);
+void incise_injury_tick(struct incise_injury *injury, const struct incise_tick *tick);
 
 /* Bring the canvas's layers up to date; before incise_canvas_compose(). */
-void incise_effects_paint(struct incise_effects *effects);
+void incise_injury_paint(struct incise_injury *injury);
 
-struct incise_effects_report {
+struct incise_injury_report {
 	double cut_mm;	 /* length of all strokes of the blade, on the surface */
 	uint64_t stamps; /* stretches of them that were drawn */
 	/* µl: emitted = drops + trails + off. */
@@ -60,12 +60,12 @@ struct incise_effects_report {
 	int drops;
 	uint64_t steps_lost; /* of 10 ms, in gaps that were too long */
 };
-void incise_effects_report(const struct incise_effects *effects,
-			   struct incise_effects_report *report);
+void incise_injury_report(const struct incise_injury *injury,
+			  struct incise_injury_report *report);
 
 /* Bytes that were asked for, without layers and canvas. */
-size_t incise_effects_memory(const struct incise_effects *effects);
+size_t incise_injury_memory(const struct incise_injury *injury);
 
-void incise_effects_free(struct incise_effects *effects);
+void incise_injury_free(struct incise_injury *injury);
 
 #endif

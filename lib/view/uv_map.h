@@ -16,11 +16,11 @@
  *   mesh with texture coordinates   its own triangles; u = px[0] / size, v = 1 - px[1] / size
  *   all others, and a capsule that stands   seen straight from above the top, at most
  *              120 × 120 mm
- * Lengths in mm, in the tracker's frame; texels as doubles. A chart does not change once
+ * Lengths in mm, in the tracker's frame; texels as doubles. A map does not change once
  * made and may be read by several threads. It keeps the surface, which has to live longer.
  */
-#ifndef INCISE_CHART_H
-#define INCISE_CHART_H
+#ifndef INCISE_VIEW_UV_MAP_H
+#define INCISE_VIEW_UV_MAP_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -28,9 +28,9 @@
 #include <incise/surface.h>
 
 /* What stands above what is felt is no higher than this. */
-#define CHART_RELIEF_MAX_MM 5.0
+#define UV_MAP_RELIEF_MAX_MM 5.0
 
-struct incise_chart_vertex {
+struct uv_map_vertex {
 	float position_mm[3]; /* as drawn, with the relief */
 	float normal[3];      /* unit, of what is drawn */
 	float tangent[4]; /* unit, towards +px[0]; [3] (normal × tangent) is +px[1] */
@@ -38,17 +38,17 @@ struct incise_chart_vertex {
 };
 
 /* Triangles of a mesh in texture space, to find the one that a texel is in. */
-struct chart_atlas;
+struct uv_atlas;
 
-struct incise_chart {
+struct uv_map {
 	int size; /* of the texture, texels */
 	int n_vertices, n_indices;
-	struct incise_chart_vertex *vertices;
+	struct uv_map_vertex *vertices;
 	uint32_t *indices; /* triangles, counter-clockwise seen from outside */
 
-	/* The rest is the chart's own. */
+	/* The rest is the map's own. */
 	const struct incise_surface *surface;
-	enum { CHART_FROM_ABOVE, CHART_UNROLLED, CHART_ATLAS } kind;
+	enum { UV_MAP_FROM_ABOVE, UV_MAP_UNROLLED, UV_MAP_ATLAS } kind;
 	bool larynx;
 	double wide_mm, high_mm; /* of the whole texture */
 	double top_mm[2];	 /* the surface's top, from the texture's middle */
@@ -56,42 +56,57 @@ struct incise_chart {
 	double origin[3], right[3], down[3], up[3];
 	double above_mm, below_mm; /* the surface lies between, from the origin */
 	double radius_mm, axis_mm, middle_mm; /* unrolled; the texture's middle along */
-	struct chart_atlas *atlas;
+	struct uv_atlas *atlas;
 };
 
 /*
  * About 20 000 triangles; of a mesh with texture coordinates its own. NULL with errno:
  * ENOMEM, EINVAL (texture_px is no power of 2 from 16 to 16384).
  */
-struct incise_chart *incise_chart_new(const struct incise_surface *surface,
-				      const struct incise_scene_picture *picture,
-				      struct incise_error *err);
-void incise_chart_free(struct incise_chart *chart);
+struct uv_map *uv_map_new(const struct incise_surface *surface,
+			  const struct incise_scene_picture *picture,
+			  struct incise_error *err);
+void uv_map_free(struct uv_map *map);
 
 /* Of a point on the surface, or near it; false: outside of the texture, or not finite. */
-bool incise_chart_px(const struct incise_chart *chart, const double point_mm[3],
-		     double px[2]);
+bool uv_map_px(const struct uv_map *map, const double point_mm[3], double px[2]);
 
 /*
  * The point of the surface, as it is felt, and its outward unit normal; false: there is no
  * surface at that place of the texture, and nothing is written.
  */
-bool incise_chart_point(const struct incise_chart *chart, const double px[2],
-			double point_mm[3], double normal[3]);
+bool uv_map_point(const struct uv_map *map, const double px[2], double point_mm[3],
+		  double normal[3]);
 
 /*
  * By how much the surface's point moves when px does by one texel. Where there is no
  * surface: of the nearest texel of the texture's border, or as on flat ground.
  */
-void incise_chart_metric(const struct incise_chart *chart, const double px[2],
-			 double right_mm[3], double down_mm[3]);
+void uv_map_metric(const struct uv_map *map, const double px[2], double right_mm[3],
+		   double down_mm[3]);
 
 /*
  * By how much what is seen stands above what is felt, along the normal: 0 to
- * CHART_RELIEF_MAX_MM, 0 without a larynx. The head is towards -px[0], the membrane that a
+ * UV_MAP_RELIEF_MAX_MM, 0 without a larynx. The head is towards -px[0], the membrane that a
  * cricothyroidotomy cuts on the surface's top. A mesh with texture coordinates is drawn as
  * it is.
  */
-double incise_chart_relief_mm(const struct incise_chart *chart, const double px[2]);
+double uv_map_relief_mm(const struct uv_map *map, const double px[2]);
+
+/*
+ * For uv_map.c only, an atlas: a mesh's own texture coordinates (uv_map_atlas.c). 0 or -ENOMEM;
+ * the kind becomes an atlas only if some texel is on the mesh. The others return false, and write
+ * nothing, where no triangle is.
+ */
+int uv_atlas_init(struct uv_map *map);
+void uv_atlas_free(struct uv_atlas *atlas);
+bool uv_atlas_px(const struct uv_map *map, const double point_mm[3], double px[2]);
+bool uv_atlas_point(const struct uv_map *map, const double px[2], double point_mm[3],
+		    double normal[3]);
+bool uv_atlas_metric(const struct uv_map *map, const double px[2], double right_mm[3],
+		     double down_mm[3]);
+
+/* Its triangles. 0 or -ENOMEM. */
+int uv_atlas_mesh(struct uv_map *map);
 
 #endif

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * What ticks do to the texture; see effects.h.
+ */
+#include <errno.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include "blood.h"
+#include "blood_film.h"
+#include "injury.h"
+#include "wound.h"
+
+struct incise_injury {
+	struct incise_canvas *canvas;
+	struct wound *wound; /* or NULL */
+	struct blood *blood; /* or NULL */
+	int wound_layer, blood_layer;
+	bool began;
+	int64_t step_ns; /* time of the last step */
+	uint64_t steps_lost;
+};
+
+static int add_layer(struct incise_injury *injury, int *layer, struct incise_error *err)
+{
+	*layer = incise_canvas_add_layer(injury->canvas);
+	if (*layer >= 0)
+		return 0;
+	return incise_error_set(err, -*layer, "view: no layer for wound or blood");
+}
+
+/* What the scene asks for. */
+static int add(struct incise_injury *injury, const struct incise_scene_picture *picture,
+	       const struct uv_map *map, struct incise_error *err)
+{
+	int rc;
+
+	if (!picture->wound)
+		return 0;
+	injury->wound = wound_new(map, err);
+	if (!injury->wound)
+		return -ENOMEM;
+	rc = add_layer(injury, &injury->wound_layer, err);
+	if (rc || !picture->bleeding)
+		return rc;
+	injury->blood = blood_new(map, picture, err);
+	if (!injury->blood)
+		return -ENOMEM;
+	return add_layer(injury, &injury->blood_layer, err);
+}
+
+struct incise_injury *incise_injury_new(const struct incise_scene_picture *picture,
+					const struct uv_map *map,
+					struct incise_canvas *canvas,
+					struct incise_error *err)
+{
+	struct incise_injury *injury;
+
+	if (map->size != incise_canvas_size(canvas)) {
+		incise_error_set(err, EINVAL,
+				 "view: a chart of %d texels on a canvas of %d",
+				 map->size, incise_canvas_size(canvas));
+		return NULL;
+	}
+	injury = calloc(1, sizeof(*injury));
+	if (!injury) {
+		incise_error_set(err, ENOMEM, "view: no memory");
+		return NULL;
+	}
+	injury->canvas = canvas;
+	if (add(injury, picture, map, err)) {
+		incise_injury_free(injury);
+		return NULL;
+	}
+	return injury;
+}
+
+void incise_injury_free(struct incise_injury *injury)
+{
+	if (!injury)
+		return;
+	wound_free(injury->wound);
+	blood_free(injury->blood);
+	free(injury);
+}
+
+static void step(struct incise_injury *injury)
+{
+	double px[2], depth_mm;
+
+	wound_step(injury->wound);
+	if (!injury->blood)
+		return;
+	if (wound_inserted(injury->wound, px, &depth_mm))
+		blood_reopen(injury->blood, px, depth_mm);
+	blood_step(injury->blood);
+}
+
+/* Steps up to a tick's time, with what was there before it. */
+static void step_until(struct incise_injury *injury, int64_t t_ns)
+{
+	uint64_t steps, done;
+
+	/* Of a clock that was set back, or of a new run: time goes on from there. */
+	if (!injury->began || t_ns < injury->step_ns) {
+		if (!injury->began ||
+		    (uint64_t)injury->step_ns - (uint64_t)t_ns > INJURY_STEP_NS)
+			injury->step_ns = t_ns;
+		injury->began = true;
+		return;
+	}
+	steps = ((uint64_t)t_ns - (uint64_t)injury->step_ns) / INJURY_STEP_NS;
+	/* Not beyond t_ns, so no overflow. */
+	injury->step_ns = (int64_t)((uint64_t)injury->step_ns + steps * INJURY_STEP_NS);
+	done = steps < INJURY_STEPS_MAX ? steps : INJURY_STEPS_MAX;
+	injury->steps_lost += steps - done;
+	for (uint64_t i = 0; i < done; i++)
+		step(injury);
+}
+
+void incise_injury_tick(struct incise_injury *injury, const struct incise_tick *tick)
+{
+	struct wound_stroke stroke;
+
+	if (!injury->wound)
+		return;
+	step_until(injury, tick->t_ns);
+	if (wound_tick(injury->wound, tick, &stroke) && injury->blood)
+		blood_stroke(injury->blood, &stroke);
+}
+
+void incise_injury_paint(struct incise_injury *injury)
+{
+	if (injury->wound)
+		wound_paint(injury->wound, injury->canvas, injury->wound_layer);
+	if (injury->blood)
+		blood_paint(injury->blood, injury->canvas, injury->blood_layer);
+}
+
+void incise_injury_report(const struct incise_injury *injury,
+			  struct incise_injury_report *report)
+{
+	struct blood_volumes volumes;
+
+	*report = (struct incise_injury_report){.steps_lost = injury->steps_lost};
+	if (!injury->wound)
+		return;
+	report->cut_mm = wound_cut_mm(injury->wound);
+	report->stamps = wound_stamps(injury->wound);
+	if (!injury->blood)
+		return;
+	blood_volumes(injury->blood, &volumes);
+	report->blood_ul_emitted = (double)volumes.emitted * BLOOD_UNIT_UL;
+	report->blood_ul_drops = (double)volumes.drops * BLOOD_UNIT_UL;
+	report->blood_ul_trails = (double)volumes.films * BLOOD_UNIT_UL;
+	report->blood_ul_off = (double)volumes.off * BLOOD_UNIT_UL;
+	report->drops = volumes.n_drops;
+}
+
+size_t incise_injury_memory(const struct incise_injury *injury)
+{
+	return sizeof(*injury) + (injury->wound ? wound_memory(injury->wound) : 0) +
+	       (injury->blood ? blood_memory(injury->blood) : 0);
+}
