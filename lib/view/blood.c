@@ -140,7 +140,8 @@ static void drops_mark(struct drops *drops, const struct drop *drop)
 	struct drop_box box;
 
 	if (drop_box(drops->film, drop, &box))
-		film_mark(drops->film, box.left, box.top, box.right, box.bottom);
+		canvas_tiles_mark_texels(&drops->film->tiles, box.left, box.top,
+					 box.right, box.bottom);
 }
 
 static bool nearer(double *value, double to)
@@ -840,8 +841,8 @@ static void colour(const struct wet_texel *texel, float dry, uint8_t rgba[4])
 static bool paint_tile(struct film *film, const struct shape *shapes, int n, int number,
 		       uint8_t *rgba)
 {
-	int x0 = number % film->tiles * CANVAS_TILE,
-	    y0 = number / film->tiles * CANVAS_TILE;
+	int x0 = number % film->tiles.side * CANVAS_TILE,
+	    y0 = number / film->tiles.side * CANVAS_TILE;
 	const struct film_tile *tile = film_tile(film, x0, y0);
 	size_t first = (size_t)number * FILM_TEXELS;
 	struct wet_texel texels[FILM_TEXELS];
@@ -873,20 +874,12 @@ void blood_paint(struct blood *blood, struct incise_canvas *canvas, int layer)
 	struct shape shapes[DROPS_MAX];
 	int n = 0;
 
-	if (!film->n_dirty || !rgba)
+	if (!film->tiles.n_dirty || !rgba)
 		return;
 	for (int i = 0; i < DROPS_MAX; i++)
 		n += shape_of(film, &blood->drops.drop[i], &shapes[n]);
-	for (int i = 0; film->n_dirty; i++) {
-		if (!film->dirty[i])
-			continue;
-		film->dirty[i] = 0;
-		film->n_dirty--;
-		/* A film drains and dries by less than a step of colour, mostly. */
+	for (int i = 0; (i = canvas_tiles_next(&film->tiles, i)) >= 0;)
+		/* Drying and draining mostly change a colour by less than a step. */
 		if (paint_tile(film, shapes, n, i, rgba))
-			incise_canvas_dirty(canvas, (struct incise_rect){
-							    i % film->tiles * CANVAS_TILE,
-							    i / film->tiles * CANVAS_TILE,
-							    CANVAS_TILE, CANVAS_TILE});
-	}
+			incise_canvas_dirty(canvas, canvas_tile_rect(&film->tiles, i));
 }

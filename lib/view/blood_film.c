@@ -22,7 +22,8 @@ static bool film_inside(const struct film *film, int x, int y)
 /* The place of a texel, tile after tile. */
 static size_t film_index(const struct film *film, int x, int y)
 {
-	return ((size_t)(y / CANVAS_TILE) * film->tiles + x / CANVAS_TILE) * FILM_TEXELS +
+	return ((size_t)(y / CANVAS_TILE) * film->tiles.side + x / CANVAS_TILE) *
+		       FILM_TEXELS +
 	       y % CANVAS_TILE * CANVAS_TILE + x % CANVAS_TILE;
 }
 
@@ -30,11 +31,9 @@ bool film_init(struct film *film, const struct uv_map *map,
 	       const struct incise_scene_picture *picture)
 {
 	size_t texels = (size_t)map->size * map->size;
-	size_t tiles;
+	size_t tiles = texels / FILM_TEXELS;
 
 	*film = (struct film){.map = map, .size = map->size};
-	film->tiles = map->size / CANVAS_TILE;
-	tiles = (size_t)film->tiles * film->tiles;
 	for (int i = 0; i < 3; i++)
 		film->gravity[i] = picture->gravity[i];
 	/* mPa s are 1e-6 kg/(mm s). */
@@ -43,9 +42,9 @@ bool film_init(struct film *film, const struct uv_map *map,
 	film->volume = calloc(texels, sizeof(*film->volume));
 	film->dry = calloc(texels, sizeof(*film->dry));
 	film->tile = calloc(tiles, sizeof(*film->tile));
-	film->dirty = calloc(tiles, 1);
 	film->height = malloc(FILM_SPOT_PX * FILM_SPOT_PX * sizeof(*film->height));
-	return film->height && film->volume && film->dry && film->tile && film->dirty;
+	return film->height && film->volume && film->dry && film->tile &&
+	       canvas_tiles_init(&film->tiles, film->size);
 }
 
 void film_free(struct film *film)
@@ -53,7 +52,7 @@ void film_free(struct film *film)
 	free(film->volume);
 	free(film->dry);
 	free(film->tile);
-	free(film->dirty);
+	free(film->tiles.dirty);
 	free(film->height);
 }
 
@@ -68,8 +67,8 @@ size_t film_memory(const struct film *film)
 
 static void learn_tile(struct film *film, struct film_tile *tile, int number)
 {
-	double px[2] = {(number % film->tiles + 0.5) * CANVAS_TILE,
-			(number / film->tiles + 0.5) * CANVAS_TILE};
+	double px[2] = {(number % film->tiles.side + 0.5) * CANVAS_TILE,
+			(number / film->tiles.side + 0.5) * CANVAS_TILE};
 	struct ground ground;
 	double length;
 
@@ -89,7 +88,7 @@ static void learn_tile(struct film *film, struct film_tile *tile, int number)
 
 const struct film_tile *film_tile(struct film *film, int x, int y)
 {
-	int number = y / CANVAS_TILE * film->tiles + x / CANVAS_TILE;
+	int number = y / CANVAS_TILE * film->tiles.side + x / CANVAS_TILE;
 	struct film_tile *tile = &film->tile[number];
 
 	if (!tile->known)
@@ -114,7 +113,7 @@ static uint32_t film_round(const struct film *film)
 /* Something changed at a texel: its tile is to be painted and visited. */
 static struct film_tile *film_wake(struct film *film, int x, int y)
 {
-	int number = y / CANVAS_TILE * film->tiles + x / CANVAS_TILE;
+	int number = y / CANVAS_TILE * film->tiles.side + x / CANVAS_TILE;
 	struct film_tile *tile = &film->tile[number];
 
 	if (!tile->awake) {
@@ -122,24 +121,8 @@ static struct film_tile *film_wake(struct film *film, int x, int y)
 		tile->period = 1;
 		tile->last = film_round(film);
 	}
-	film->n_dirty += !film->dirty[number];
-	film->dirty[number] = 1;
+	canvas_tiles_mark(&film->tiles, number);
 	return tile;
-}
-
-void film_mark(struct film *film, int left, int top, int right, int bottom)
-{
-	left = (left < 0 ? 0 : left) / CANVAS_TILE;
-	top = (top < 0 ? 0 : top) / CANVAS_TILE;
-	right = (right >= film->size ? film->size - 1 : right) / CANVAS_TILE;
-	bottom = (bottom >= film->size ? film->size - 1 : bottom) / CANVAS_TILE;
-	for (int y = top; y <= bottom; y++)
-		for (int x = left; x <= right; x++) {
-			uint8_t *dirty = &film->dirty[y * film->tiles + x];
-
-			film->n_dirty += !*dirty;
-			*dirty = 1;
-		}
 }
 
 /* Fresh blood on old wets it again. */
@@ -403,7 +386,7 @@ static void fall_at(struct film *film, int column, int row, float *x, float *y)
 		int c = column - 1 + i % 2, r = row - 1 + i / 2;
 		const struct film_tile *tile;
 
-		if (c < 0 || r < 0 || c >= film->tiles || r >= film->tiles)
+		if (c < 0 || r < 0 || c >= film->tiles.side || r >= film->tiles.side)
 			continue;
 		tile = film_tile(film, c * CANVAS_TILE, r * CANVAS_TILE);
 		*x += tile->down_px[0] * tile->slope;
@@ -417,8 +400,9 @@ static void fall_at(struct film *film, int column, int row, float *x, float *y)
 static void fall_of(struct film *film, int number, struct fall *fall)
 {
 	for (int i = 0; i < 4; i++)
-		fall_at(film, number % film->tiles + i % 2, number / film->tiles + i / 2,
-			&fall->x[i / 2][i % 2], &fall->y[i / 2][i % 2]);
+		fall_at(film, number % film->tiles.side + i % 2,
+			number / film->tiles.side + i / 2, &fall->x[i / 2][i % 2],
+			&fall->y[i / 2][i % 2]);
 }
 
 static float between(const float corner[2][2], float u, float v)
@@ -493,8 +477,8 @@ static bool dry_texel(struct film *film, const struct film_tile *tile, size_t at
 /* Downhill texels first, so that what flows is not carried through a whole tile at once. */
 static void visit_tile(struct film *film, int number, uint32_t round)
 {
-	int x0 = number % film->tiles * CANVAS_TILE,
-	    y0 = number / film->tiles * CANVAS_TILE;
+	int x0 = number % film->tiles.side * CANVAS_TILE,
+	    y0 = number / film->tiles.side * CANVAS_TILE;
 	struct film_tile *own = &film->tile[number];
 	const struct film_tile *tile = film_tile(film, x0, y0);
 	bool left = tile->down_px[0] < 0, up = tile->down_px[1] < 0, drying = false;
@@ -537,12 +521,13 @@ static bool due(const struct film *film, int number, uint32_t round, int turn)
 	if (!tile->awake || since < tile->period)
 		return false;
 	return since > tile->period ||
-	       (number + number / film->tiles * 2) % FILM_ROUND_STEPS == turn;
+	       (number + number / film->tiles.side * 2) % FILM_ROUND_STEPS == turn;
 }
 
 void film_step(struct film *film)
 {
-	int n = film->tiles * film->tiles, turn = (int)(film->step % FILM_ROUND_STEPS);
+	int n = film->tiles.side * film->tiles.side,
+	    turn = (int)(film->step % FILM_ROUND_STEPS);
 	int at = film->next, visits = 0;
 	uint32_t round = film_round(film);
 

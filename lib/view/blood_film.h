@@ -51,12 +51,11 @@ struct film {
 	const struct uv_map *map;
 	double gravity[3];
 	double drain; /* rho g / (3 mu), 1/(mm s) */
-	int size, tiles;
+	int size;
 	uint32_t *volume; /* units, tile after tile */
 	uint8_t *dry;	  /* 0 … FILM_DRY, the same */
 	struct film_tile *tile;
-	uint8_t *dirty; /* tiles², to be painted */
-	int n_dirty;
+	struct canvas_tiles tiles; /* to be painted */
 	uint64_t step;
 	int next;		  /* tile to begin with */
 	float *height;		  /* of a spot: room for FILM_SPOT_PX² */
@@ -87,8 +86,5 @@ void film_add(struct film *film, const double px[2], double radius_mm, int64_t u
 
 /* 10 ms: some of the tiles drain and dry. */
 void film_step(struct film *film);
-
-/* Texels are to be painted; the last ones too. */
-void film_mark(struct film *film, int left, int top, int right, int bottom);
 
 #endif

@@ -17,16 +17,47 @@
 #define SUM_STEPS (1 << 14)
 
 struct incise_canvas {
-	int size, levels, tiles; /* tiles along a side */
+	int size, levels;
 	const uint8_t *base;
 	int n_layers;
 	uint8_t *layer[CANVAS_LAYERS_MAX];
 	uint8_t *level[LEVELS_MAX];
-	uint8_t *dirty; /* tiles² */
-	int n_dirty;
+	struct canvas_tiles tiles;
 	uint16_t linear[256];	 /* of an sRGB value, 65535 is white */
 	uint8_t srgb[SUM_STEPS]; /* of the sum of four of them >> SUM_SHIFT */
 };
+
+bool canvas_tiles_init(struct canvas_tiles *tiles, int size)
+{
+	*tiles = (struct canvas_tiles){.side = size / CANVAS_TILE};
+	tiles->dirty = calloc((size_t)tiles->side * tiles->side, 1);
+	return tiles->dirty;
+}
+
+void canvas_tiles_mark_texels(struct canvas_tiles *tiles, int left, int top, int right,
+			      int bottom)
+{
+	int last = tiles->side * CANVAS_TILE - 1;
+
+	left = (left < 0 ? 0 : left) / CANVAS_TILE;
+	top = (top < 0 ? 0 : top) / CANVAS_TILE;
+	right = right < 0 ? -1 : (right > last ? last : right) / CANVAS_TILE;
+	bottom = bottom < 0 ? -1 : (bottom > last ? last : bottom) / CANVAS_TILE;
+	for (int y = top; y <= bottom; y++)
+		for (int x = left; x <= right; x++)
+			canvas_tiles_mark(tiles, y * tiles->side + x);
+}
+
+int canvas_tiles_next(struct canvas_tiles *tiles, int number)
+{
+	if (!tiles->n_dirty)
+		return -1;
+	while (!tiles->dirty[number])
+		number++;
+	tiles->dirty[number] = 0;
+	tiles->n_dirty--;
+	return number;
+}
 
 static void make_tables(struct incise_canvas *canvas)
 {
@@ -48,7 +79,7 @@ struct incise_canvas *incise_canvas_new(int size, const uint8_t *base_rgba,
 					struct incise_error *err)
 {
 	struct incise_canvas *canvas;
-	bool there = true;
+	bool there;
 
 	if (size < CANVAS_TILE || size > 16384 || (size & (size - 1)) || !base_rgba) {
 		incise_error_set(err, EINVAL,
@@ -62,19 +93,17 @@ struct incise_canvas *incise_canvas_new(int size, const uint8_t *base_rgba,
 		goto no_memory;
 	canvas->size = size;
 	canvas->base = base_rgba;
-	canvas->tiles = size / CANVAS_TILE;
-	canvas->dirty = malloc((size_t)canvas->tiles * canvas->tiles);
+	there = canvas_tiles_init(&canvas->tiles, size);
 	for (int side = size; side; side >>= 1) {
 		uint8_t *level = malloc((size_t)side * side * 4);
 
 		canvas->level[canvas->levels++] = level;
 		there = there && level;
 	}
-	if (!canvas->dirty || !there)
+	if (!there)
 		goto no_memory;
 	make_tables(canvas);
-	canvas->n_dirty = canvas->tiles * canvas->tiles;
-	memset(canvas->dirty, 1, canvas->n_dirty);
+	canvas_tiles_mark_texels(&canvas->tiles, 0, 0, size - 1, size - 1);
 	return canvas;
 
 no_memory:
@@ -91,7 +120,7 @@ void incise_canvas_free(struct incise_canvas *canvas)
 		free(canvas->layer[i]);
 	for (int i = 0; i < canvas->levels; i++)
 		free(canvas->level[i]);
-	free(canvas->dirty);
+	free(canvas->tiles.dirty);
 	free(canvas);
 }
 
@@ -114,32 +143,17 @@ uint8_t *incise_canvas_layer(struct incise_canvas *canvas, int layer)
 	return layer >= 0 && layer < canvas->n_layers ? canvas->layer[layer] : NULL;
 }
 
-/* The tiles that a stretch touches: false when none. */
-static bool tiles_of(int from, int length, int size, int *first, int *last)
-{
-	int64_t end = (int64_t)from + length;
-
-	if (length <= 0 || end <= 0 || from >= size)
-		return false;
-	*first = (from < 0 ? 0 : from) / CANVAS_TILE;
-	*last = (int)((end > size ? size : end) - 1) / CANVAS_TILE;
-	return true;
-}
-
 void incise_canvas_dirty(struct incise_canvas *canvas, struct incise_rect rect)
 {
-	int left, right, top, bottom;
+	int64_t right = (int64_t)rect.x + rect.w - 1;
+	int64_t bottom = (int64_t)rect.y + rect.h - 1;
 
-	if (!tiles_of(rect.x, rect.w, canvas->size, &left, &right) ||
-	    !tiles_of(rect.y, rect.h, canvas->size, &top, &bottom))
-		return;
-	for (int y = top; y <= bottom; y++)
-		for (int x = left; x <= right; x++) {
-			uint8_t *dirty = &canvas->dirty[y * canvas->tiles + x];
-
-			canvas->n_dirty += !*dirty;
-			*dirty = 1;
-		}
+	/* Sums of int do not overflow int64_t, and are clipped to the canvas. */
+	if (rect.w > 0 && rect.h > 0)
+		canvas_tiles_mark_texels(
+			&canvas->tiles, rect.x, rect.y,
+			(int)(right < canvas->size ? right : canvas->size),
+			(int)(bottom < canvas->size ? bottom : canvas->size));
 }
 
 /* round(a b / 255), exact for 8-bit values. */
@@ -237,13 +251,13 @@ static void enclose(struct incise_rect *all, const struct incise_rect *rect)
 /* Whether every tile of a stretch of a row of tiles is dirty; they are clean then. */
 static bool take_row(struct incise_canvas *canvas, int x, int y, int w)
 {
-	uint8_t *row = canvas->dirty + (size_t)y * canvas->tiles + x;
+	uint8_t *row = canvas->tiles.dirty + (size_t)y * canvas->tiles.side + x;
 
 	for (int i = 0; i < w; i++)
 		if (!row[i])
 			return false;
 	memset(row, 0, w);
-	canvas->n_dirty -= w;
+	canvas->tiles.n_dirty -= w;
 	return true;
 }
 
@@ -253,13 +267,13 @@ static bool take_row(struct incise_canvas *canvas, int x, int y, int w)
  */
 static struct incise_rect take_rect(struct incise_canvas *canvas, int x, int y)
 {
-	const uint8_t *row = canvas->dirty + (size_t)y * canvas->tiles;
+	const uint8_t *row = canvas->tiles.dirty + (size_t)y * canvas->tiles.side;
 	int w = 1, h = 1;
 
-	while (x + w < canvas->tiles && row[x + w])
+	while (x + w < canvas->tiles.side && row[x + w])
 		w++;
 	take_row(canvas, x, y, w);
-	while (y + h < canvas->tiles && take_row(canvas, x, y + h, w))
+	while (y + h < canvas->tiles.side && take_row(canvas, x, y + h, w))
 		h++;
 	return (struct incise_rect){x * CANVAS_TILE, y * CANVAS_TILE, w * CANVAS_TILE,
 				    h * CANVAS_TILE};
@@ -290,12 +304,13 @@ int incise_canvas_compose(struct incise_canvas *canvas, struct incise_upload *up
 	if (n < CANVAS_UPLOADS_MIN)
 		return -EINVAL;
 	n -= LEVELS_MAX - LEVEL_SMALL; /* kept for the small levels */
-	for (; canvas->n_dirty && done + LEVEL_SMALL <= n; at++) {
+	for (; canvas->tiles.n_dirty && done + LEVEL_SMALL <= n; at++) {
 		struct incise_rect rect;
 
-		if (!canvas->dirty[at])
+		if (!canvas->tiles.dirty[at])
 			continue;
-		rect = take_rect(canvas, at % canvas->tiles, at / canvas->tiles);
+		rect = take_rect(canvas, at % canvas->tiles.side,
+				 at / canvas->tiles.side);
 		enclose(&all, &rect);
 		done += do_rect(canvas, rect, uploads + done);
 	}

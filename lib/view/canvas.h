@@ -16,6 +16,7 @@
 #ifndef INCISE_VIEW_CANVAS_H
 #define INCISE_VIEW_CANVAS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
@@ -27,6 +28,36 @@
 struct incise_rect {
 	int x, y, w, h;
 };
+
+/* Which tiles of a square texture are to be painted. */
+struct canvas_tiles {
+	int side, n_dirty; /* tiles */
+	uint8_t *dirty;	   /* side², row by row */
+};
+
+/* All clean. size: texels. Returns whether there was memory; tiles->dirty is to be freed. */
+bool canvas_tiles_init(struct canvas_tiles *tiles, int size);
+
+static inline void canvas_tiles_mark(struct canvas_tiles *tiles, int number)
+{
+	tiles->n_dirty += !tiles->dirty[number];
+	tiles->dirty[number] = 1;
+}
+
+/* Mark the tiles from one texel to another, inclusive; places outside are clipped. */
+void canvas_tiles_mark_texels(struct canvas_tiles *tiles, int left, int top, int right,
+			      int bottom);
+
+/* The next dirty tile from @number on, marked clean; -1: there is none. */
+int canvas_tiles_next(struct canvas_tiles *tiles, int number);
+
+static inline struct incise_rect canvas_tile_rect(const struct canvas_tiles *tiles,
+						  int number)
+{
+	return (struct incise_rect){number % tiles->side * CANVAS_TILE,
+				    number / tiles->side * CANVAS_TILE, CANVAS_TILE,
+				    CANVAS_TILE};
+}
 
 /* A rectangle of a level that has changed; in texels of that level. */
 struct incise_upload {

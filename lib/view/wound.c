@@ -224,11 +224,10 @@ static void field_colour(const struct field_texel *tile, int x, int y, float tex
 
 struct wound {
 	const struct uv_map *map;
-	int size, tiles; /* texels, tiles along a side */
+	int size; /* texels */
 	float texel_mm;
 	struct field_texel *field; /* tile after tile */
-	uint8_t *dirty;		   /* tiles² */
-	int n_dirty;
+	struct canvas_tiles tiles; /* to be painted */
 
 	/* Points have numbers; those from @first to before @end are there. */
 	uint64_t first, end;
@@ -274,18 +273,11 @@ static struct field_end line_end(const struct wound_point *p, float end_mm)
 	};
 }
 
+/* The stretch is to be painted. */
 static void line_mark(struct wound *wound, const struct field_stretch *s)
 {
-	int right = (s->to_px[0] - 1) / CANVAS_TILE,
-	    bottom = (s->to_px[1] - 1) / CANVAS_TILE;
-
-	for (int y = s->from_px[1] / CANVAS_TILE; y <= bottom; y++)
-		for (int x = s->from_px[0] / CANVAS_TILE; x <= right; x++) {
-			uint8_t *dirty = &wound->dirty[y * wound->tiles + x];
-
-			wound->n_dirty += !*dirty;
-			*dirty = 1;
-		}
+	canvas_tiles_mark_texels(&wound->tiles, s->from_px[0], s->from_px[1],
+				 s->to_px[0] - 1, s->to_px[1] - 1);
 }
 
 static void line_raise(struct wound *wound, const struct field_stretch *s)
@@ -295,8 +287,8 @@ static void line_raise(struct wound *wound, const struct field_stretch *s)
 
 	for (int y = s->from_px[1] / CANVAS_TILE; y <= bottom; y++)
 		for (int x = s->from_px[0] / CANVAS_TILE; x <= right; x++)
-			field_raise(wound->field +
-					    ((size_t)y * wound->tiles + x) * FIELD_TEXELS,
+			field_raise(wound->field + ((size_t)y * wound->tiles.side + x) *
+							   FIELD_TEXELS,
 				    x * CANVAS_TILE, y * CANVAS_TILE, s);
 }
 
@@ -375,16 +367,15 @@ struct wound *wound_new(const struct uv_map *map, struct incise_error *err)
 		goto no_memory;
 	wound->map = map;
 	wound->size = map->size;
-	wound->tiles = map->size / CANVAS_TILE;
 	wound->texel_mm = 0.1f;
 	if (ground_metric(map, middle, &metric))
 		wound->texel_mm = sqrtf(metric.a * metric.c);
 	/* From calloc: pages that nobody writes are not there. */
 	wound->field = calloc((size_t)map->size * map->size, sizeof(*wound->field));
-	wound->dirty = calloc((size_t)wound->tiles * wound->tiles, 1);
 	wound->points = calloc(WOUND_POINTS, sizeof(*wound->points));
 	wound->over = calloc(WOUND_POINTS + 1, sizeof(*wound->over));
-	if (wound->field && wound->dirty && wound->points && wound->over)
+	if (wound->field && wound->points && wound->over &&
+	    canvas_tiles_init(&wound->tiles, wound->size))
 		return wound;
 no_memory:
 	wound_free(wound);
@@ -397,7 +388,7 @@ void wound_free(struct wound *wound)
 	if (!wound)
 		return;
 	free(wound->field);
-	free(wound->dirty);
+	free(wound->tiles.dirty);
 	free(wound->points);
 	free(wound->over);
 	free(wound);
@@ -413,7 +404,7 @@ static double cut_before_mm(const struct wound *wound, const struct wound_point 
 	if (x < 0 || y < 0 || x >= wound->size || y >= wound->size)
 		return 0;
 	tile = wound->field +
-	       ((size_t)(y / CANVAS_TILE) * wound->tiles + x / CANVAS_TILE) *
+	       ((size_t)(y / CANVAS_TILE) * wound->tiles.side + x / CANVAS_TILE) *
 		       FIELD_TEXELS;
 	return tile[y % CANVAS_TILE * CANVAS_TILE + x % CANVAS_TILE].depth /
 	       (double)FIELD_STEPS_MM;
@@ -740,7 +731,8 @@ void wound_step(struct wound *wound)
 static void paint_tile(struct wound *wound, const struct field_stretch *over, int n,
 		       int tile, uint8_t *rgba)
 {
-	int x = tile % wound->tiles * CANVAS_TILE, y = tile / wound->tiles * CANVAS_TILE;
+	int x = tile % wound->tiles.side * CANVAS_TILE,
+	    y = tile / wound->tiles.side * CANVAS_TILE;
 	struct field_texel texels[FIELD_TEXELS];
 
 	memcpy(texels, wound->field + (size_t)tile * FIELD_TEXELS, sizeof(texels));
@@ -809,19 +801,12 @@ void wound_paint(struct wound *wound, struct incise_canvas *canvas, int layer)
 	uint8_t *rgba = incise_canvas_layer(canvas, layer);
 	int n;
 
-	if (!wound->n_dirty || !rgba)
+	if (!wound->tiles.n_dirty || !rgba)
 		return;
 	n = laid_over(wound, wound->over);
-	for (int tile = 0; wound->n_dirty; tile++) {
-		if (!wound->dirty[tile])
-			continue;
-		wound->dirty[tile] = 0;
-		wound->n_dirty--;
+	for (int tile = 0; (tile = canvas_tiles_next(&wound->tiles, tile)) >= 0;) {
 		paint_tile(wound, wound->over, n, tile, rgba);
-		incise_canvas_dirty(
-			canvas, (struct incise_rect){tile % wound->tiles * CANVAS_TILE,
-						     tile / wound->tiles * CANVAS_TILE,
-						     CANVAS_TILE, CANVAS_TILE});
+		incise_canvas_dirty(canvas, canvas_tile_rect(&wound->tiles, tile));
 	}
 }
 
@@ -842,7 +827,7 @@ double wound_inside_mm(const struct wound *wound, int x, int y)
 	if (x < 0 || y < 0 || x >= wound->size || y >= wound->size)
 		return -FIELD_BIAS_MM;
 	tile = wound->field +
-	       ((size_t)(y / CANVAS_TILE) * wound->tiles + x / CANVAS_TILE) *
+	       ((size_t)(y / CANVAS_TILE) * wound->tiles.side + x / CANVAS_TILE) *
 		       FIELD_TEXELS;
 	return field_inside_mm(&tile[y % CANVAS_TILE * CANVAS_TILE + x % CANVAS_TILE]);
 }
@@ -866,6 +851,6 @@ size_t wound_memory(const struct wound *wound)
 {
 	return sizeof(*wound) +
 	       (size_t)wound->size * wound->size * sizeof(*wound->field) +
-	       (size_t)wound->tiles * wound->tiles +
+	       (size_t)wound->tiles.side * wound->tiles.side +
 	       WOUND_POINTS * (sizeof(*wound->points) + sizeof(*wound->over));
 }
