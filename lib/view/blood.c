@@ -13,8 +13,24 @@
 
 #define STEP_S 0.01
 
+/*
+ * Drops hang at the wound and grow, run when their weight overcomes the hold of their edge, leave a
+ * film behind, and merge.
+ *
+ *      ╷╷╷  film, Landau and Levich: h = 0.94 lc (mu v / gamma)^(2/3)
+ *      ╷╷╷
+ *     ╭───╮   weight along the surface   rho g V s         s: sine of the slope
+ *     │   │   held at the edge           gamma dcos 2 r    Furmidge; less on wet skin
+ *     ╰───╯   viscous drag               C mu v 2 r        Kim, Lee and Kang 2002
+ *       ▼
+ *
+ * A drop of volume V is a cap with a contact angle of 50°: V = 0.79 r³. Its weight grows with r³,
+ * its hold with r: so each slope has a volume below which drops are pinned, some µl. Above it, the
+ * speed is the remaining weight over the drag. Blood stiffens as it clots. A drop that stays pinned
+ * sinks into the film below it.
+ */
 #define DROPS_MAX 128
-/* No drop grows beyond that by being fed or by merging, µl. */
+/* No drop grows beyond that, µl. */
 #define DROP_MOST_UL 60.0
 
 struct drop {
@@ -22,21 +38,21 @@ struct drop {
 	double px[2];
 	double heading[2];	     /* unit, along and across downhill */
 	double speed_mm_s;	     /* 0: pinned */
-	struct ground_metric metric; /* of where it is */
+	struct ground_metric metric; /* at its place */
 	double age_s;
-	double way_mm; /* since it left some film */
-	int source;    /* that it hangs at and is fed by, or -1 */
+	double way_mm; /* since it last left film */
+	int source;    /* that feeds it, or -1 */
 
 	/*
-	 * As it is drawn: the same, until it is seen to be another. Lengths of its shape
-	 * are in radii of a round one: before, behind, to the sides of its axis.
+	 * As drawn, which follows only visible changes. Lengths of its shape are in radii of
+	 * a round one: before, behind, to the sides of its axis.
 	 */
 	double drawn_px[2], drawn_mm, axis_px[2], before, behind, beside;
 };
 
 struct drops {
 	struct film *film;
-	uint32_t key;	  /* of what looks random */
+	uint32_t key;	  /* of the skin's roughness */
 	double viscosity; /* mN s/mm² */
 	struct drop drop[DROPS_MAX];
 };
@@ -49,16 +65,16 @@ struct drops {
 #define CAP 0.786
 /* Difference of the cosines of the advancing and the receding angle, on dry skin. */
 #define HYSTERESIS 0.05
-/* Part of it that is left on wet skin, and while a drop moves. */
+/* Remaining part of it on wet skin, and while a drop moves. */
 #define WET 0.7
 #define MOVING 0.75
 /* C of the drag: some 6 ln(r / slip length) / angle, both sides of the wedge. */
 #define DRAG 110.0
 #define SPEED_MAX_MM_S 150.0
 #define SPEED_LEAST_MM_S 0.3
-/* Time in which a drop takes up its speed, and turns. */
+/* Time constant of speed and heading. */
 #define RELAX_S 0.08
-/* Blood in a drop is as thick again at this age. */
+/* The viscosity of a drop doubles at this age. */
 #define CLOT_S 25.0
 /* The film behind, mm; it is narrower than the drop. */
 #define FILM_LEAST_MM 0.06
@@ -66,42 +82,42 @@ struct drops {
 #define FILM_WIDTH 0.8
 /* A spot of it for each such part of its radius. */
 #define FILM_EACH 0.3
-/* In a slow film blood is more viscous than in the drop: it thins by shear. */
+/* Blood thins by shear: in a slow film it is more viscous than in the drop. */
 #define FILM_THICKER 1.7
-/* Skin is rough over this length; by so much (tangent) it turns a drop at most. */
+/* Length of the skin's roughness; effect on the heading, and its maximum (tangent). */
 #define ROUGH_MM 2.6
 #define ROUGH 0.55
 #define TURN_MOST 0.9
-/* Wetter skin beside the way draws it over: tangent. */
+/* Wetter skin to one side attracts it: tangent. */
 #define DRAWN 0.5
 #define WET_MM 0.004
-/* Overlapping by so much of their radii drops flow together, by this part in a step. */
+/* Drops closer than this part of their radii merge, by this part in a step. */
 #define TOUCH 0.72
 #define FLOW 0.12
-/* Pinned for so long a drop sinks in, by this part in a step; what is less is film. */
+/* A pinned drop sinks in after this time, by this part in a step, or all at once. */
 #define PINNED_S 4.0
 #define SINK 0.006
 #define LEAST_UNITS (int64_t)(0.03 / BLOOD_UNIT_UL)
-/* How a drop looks is seen to in each so many steps, not in all drops at once. */
+/* The shape of each drop is updated every so many steps, in turns. */
 #define SHOWN_EACH 3
 
-/* One that hangs lies along its cut; in radii of a round one. */
+/* A hanging drop lies along its cut; in radii of a round one. */
 #define DROP_HANGS_ALONG 1.7
 #define DROP_HANGS_ACROSS 0.7
 
-/* Where a drop is drawn. */
+/* The texels of a drop as drawn. */
 struct drop_box {
 	struct ground_metric metric;
 	double axis[2];		      /* unit, in the metric's frame */
-	int left, top, right, bottom; /* texels that it can cover, the last ones too */
+	int left, top, right, bottom; /* inclusive */
 };
 
-/* A change that is seen, in mm. */
+/* Visible changes: mm, and radii. */
 #define SEEN_MM 0.04
 #define SEEN 0.03
 /* 1 / sqrt(1 - FILM_ROUGH), rounded up. */
 #define ROUGHEST 1.2
-/* The part by which a shape changes when it is shown. */
+/* Part of the way that a shape changes per update. */
 #define TURNS_INTO 0.22
 
 static double drop_radius_mm(int64_t units)
@@ -122,7 +138,7 @@ static bool drop_box(const struct film *film, const struct drop *drop,
 	length = sqrt(u * u + v * v);
 	box->axis[0] = length > 0 ? u / length : 0;
 	box->axis[1] = length > 0 ? v / length : 1;
-	/* Of the ellipse that holds both halves, at its roughest. */
+	/* The ellipse around both halves, at its roughest. */
 	along = drop->drawn_mm * fmax(drop->before, drop->behind) * ROUGHEST;
 	beside = drop->drawn_mm * drop->beside * ROUGHEST;
 	half_u = hypot(along * box->axis[0], beside * box->axis[1]);
@@ -135,6 +151,7 @@ static bool drop_box(const struct film *film, const struct drop *drop,
 	return true;
 }
 
+/* The drop's texels are to be painted. */
 static void drops_mark(struct drops *drops, const struct drop *drop)
 {
 	struct drop_box box;
@@ -153,8 +170,8 @@ static bool nearer(double *value, double to)
 }
 
 /*
- * What is drawn follows when it would be seen; always by the drops' own steps. A drop that
- * hangs lies along its cut; one that runs has a round head and is drawn out behind.
+ * Update the shape as drawn, if the change is visible. A hanging drop lies along its cut; a running
+ * one has a round head and a tail.
  */
 static void drops_show(struct drops *drops, struct drop *drop,
 		       const struct ground *ground)
@@ -164,7 +181,7 @@ static void drops_show(struct drops *drops, struct drop *drop,
 					drop->px[1] - drop->drawn_px[1]);
 	double fast = fmin(drop->speed_mm_s / 15, 1);
 	struct drop is = *drop;
-	bool other;
+	bool other = false;
 
 	if (drop->source < 0) {
 		other = nearer(&is.before, 0.8);
@@ -173,8 +190,6 @@ static void drops_show(struct drops *drops, struct drop *drop,
 		for (int i = 0; i < 2 && drop->speed_mm_s > 0; i++)
 			is.axis_px[i] = drop->heading[0] * ground->down_px[i] +
 					drop->heading[1] * ground->across_px[i];
-	} else {
-		other = false;
 	}
 	if (!other && fabs(radius - drop->drawn_mm) < SEEN_MM && moved < SEEN_MM)
 		return;
@@ -186,6 +201,7 @@ static void drops_show(struct drops *drops, struct drop *drop,
 	drops_mark(drops, drop);
 }
 
+/* The drop leaves its cut: the same shape along another axis. */
 static void drop_turn_round(struct drop *drop, const struct ground *ground)
 {
 	const struct ground_metric *m = &ground->metric;
@@ -212,6 +228,10 @@ static void drops_init(struct drops *drops, struct film *film,
 	drops->viscosity = picture->viscosity_mPa_s * 1e-6;
 }
 
+/*
+ * A new drop that hangs at a source; its index, or -1 when there are DROPS_MAX or there is no
+ * surface. along_px: of the cut, of any length. units > 0.
+ */
 static int drops_new(struct drops *drops, const double px[2], const double along_px[2],
 		     int source, int64_t units)
 {
@@ -247,7 +267,7 @@ static void vanish(struct drops *drops, struct drop *drop)
 	drop->drawn_mm = 0;
 }
 
-/* How wet it is at a place ahead, in mm along and across downhill; 0 … 1. */
+/* Wetness at a place ahead, in mm along and across downhill; 0 … 1. */
 static double wet_at(struct drops *drops, const struct drop *drop,
 		     const struct ground *ground, double along, double across)
 {
@@ -259,7 +279,7 @@ static double wet_at(struct drops *drops, const struct drop *drop,
 	return fmin(film_thickness_mm(drops->film, x, y) / WET_MM, 1);
 }
 
-/* Downhill, off to a side by the skin's roughness and by what is wet already. */
+/* Steer downhill, deflected by the skin's roughness and by wet skin. */
 static void steer(struct drops *drops, struct drop *drop, const struct ground *ground,
 		  double radius)
 {
@@ -282,7 +302,7 @@ static void steer(struct drops *drops, struct drop *drop, const struct ground *g
 	drop->heading[1] /= length;
 }
 
-/* The steepest that the drop's foot feels: where it hangs over, on what curves down. */
+/* The steepest slope under the drop, which hangs over on a surface that curves down. */
 static double slope_of(struct drops *drops, const struct drop *drop,
 		       const struct ground *ground, double radius)
 {
@@ -306,7 +326,7 @@ static void accelerate(struct drops *drops, struct drop *drop,
 
 	if (drop->speed_mm_s > 0)
 		held *= MOVING;
-	/* Clotting blood holds on: its edge more than its inside. */
+	/* Clotting increases the hold of the edge more than the drag. */
 	drives = WEIGHT * volume * slope_of(drops, drop, ground, radius) - held * clot;
 	to = fmax(drives, 0) / (DRAG * drops->viscosity * clot * 2 * radius);
 	to = fmin(to, SPEED_MAX_MM_S);
@@ -316,8 +336,8 @@ static void accelerate(struct drops *drops, struct drop *drop,
 }
 
 /*
- * What a drop leaves on its way, or takes up from what is thicker: a spot for each part of
- * the spot's radius, so that a slow drop costs no more than its way.
+ * Leave film on the way, or take up thicker film: one spot per part of its radius, so that the cost
+ * depends on the distance, not on the time.
  */
 static void leave_film(struct drops *drops, struct drop *drop, double radius)
 {
@@ -349,7 +369,7 @@ static void run(struct drops *drops, struct drop *drop, const struct ground *gro
 	drop->source = -1;
 }
 
-/* Into the film below. */
+/* Move part of a drop into the film below. */
 static void sink(struct drops *drops, struct drop *drop, double radius, int64_t units)
 {
 	film_add(drops->film, drop->px, radius, units);
@@ -398,7 +418,7 @@ static void merge(struct drops *drops, struct drop *a, struct drop *b)
 		units = from->units;
 	if ((double)(to->units + units) * BLOOD_UNIT_UL > DROP_MOST_UL)
 		return;
-	/* The mixture is as old as its parts. */
+	/* The mixture's age is the mean of its parts'. */
 	part = (double)units / (double)(units + to->units);
 	to->age_s += (from->age_s - to->age_s) * part;
 	to->units += units;
@@ -407,7 +427,7 @@ static void merge(struct drops *drops, struct drop *a, struct drop *b)
 		vanish(drops, from);
 }
 
-/* Drops whose edges touch, by where they were at the beginning. */
+/* Merge drops that touch, by their radii at the start of the step. */
 static void merge_all(struct drops *drops)
 {
 	struct drop *live[DROPS_MAX];
@@ -442,60 +462,42 @@ static void drops_step(struct drops *drops)
 	merge_all(drops);
 }
 
-static int64_t drops_units(const struct drops *drops)
-{
-	int64_t units = 0;
-
-	for (int i = 0; i < DROPS_MAX; i++)
-		units += drops->drop[i].units;
-	return units;
-}
-
-static int drops_count(const struct drops *drops)
-{
-	int n = 0;
-
-	for (int i = 0; i < DROPS_MAX; i++)
-		n += drops->drop[i].units > 0;
-	return n;
-}
-
 /* --- Sources --- */
 
-/* A source stands for so much of a cut, mm: a random length between these. */
+/* A source represents a stretch of a cut of random length between these, mm. */
 #define SPAN_LEAST_MM 2.5
 #define SPAN_MOST_MM 8.0
-/* The wound is wet first, to this thickness, by spots of that radius. */
+/* The wound is wetted first, to this thickness, by spots of this radius. */
 #define WETS_MM 0.16
 #define SPOT_MM 0.55
 #define WETS_SHARE 0.5
-/* A source gives every so many steps, each at its own time. */
+/* A source emits every so many steps, each at its own time. */
 #define EMIT_STEPS 8
-/* What an instrument that goes in opens again, of all that bled at first; within this, mm. */
+/* An inserted instrument restores this part of the first flow, within this distance, mm. */
 #define REOPENS 0.5
 #define REOPENS_MM 9.0
 #define REOPENS_DEPTH_MM 2.0
-/* Below this, µl/s, it has stopped. */
+/* Below this, µl/s, a source has stopped. */
 #define STOPPED_UL_S 1e-3
 
 struct source {
-	double from_px[2], to_px[2]; /* of what it stands for */
-	double at_px[2];	     /* where its drop hangs */
+	double from_px[2], to_px[2]; /* of its stretch */
+	double at_px[2];	     /* of its drop */
 	double length_mm, span_mm, at_mm;
-	double first_ul_s; /* all that it bled when fresh */
+	double first_ul_s; /* flow when fresh */
 	double ul_s;	   /* now */
 	double carry;	   /* of a unit */
 	int drop;	   /* or -1 */
-	double drop_mm;	   /* its radius when it was last moved */
+	double drop_mm;	   /* the drop's radius when it was last moved */
 };
 
 struct blood {
 	struct film film;
 	struct drops drops;
 	double ul_s_mm2;
-	uint64_t key, drawn; /* of random numbers, and how many there were */
+	uint64_t key, drawn; /* of random numbers, and their count */
 	int64_t emitted;
-	int n, last; /* sources; the one that grows, or -1 */
+	int n, last; /* sources; the growing one, or -1 */
 	struct source source[BLOOD_SOURCES_MAX];
 };
 
@@ -530,8 +532,8 @@ void blood_free(struct blood *blood)
 	free(blood);
 }
 
-/* Room for a source: a free one, or that which bleeds least. */
-static int room(const struct blood *blood)
+/* The place of a new source: a free one, or the one with the least flow. */
+static int place_of_source(const struct blood *blood)
 {
 	int least = 0;
 
@@ -543,17 +545,25 @@ static int room(const struct blood *blood)
 	return least;
 }
 
-static struct source *begin(struct blood *blood, const struct wound_stroke *stroke)
+/* The drop that hangs at a source, or NULL. */
+static struct drop *hanging(struct blood *blood, int number)
 {
-	int number = room(blood);
+	int drop = blood->source[number].drop;
+
+	return drop >= 0 && blood->drops.drop[drop].source == number
+		       ? &blood->drops.drop[drop]
+		       : NULL;
+}
+
+static struct source *start_source(struct blood *blood, const struct wound_stroke *stroke)
+{
+	int number = place_of_source(blood);
 	struct source *source = &blood->source[number];
 
-	/* Its drop, if it had one, goes its own way. */
-	if (number < blood->n && source->drop >= 0 &&
-	    blood->drops.drop[source->drop].source == number)
-		blood->drops.drop[source->drop].source = -1;
 	if (number == blood->n)
 		blood->n++;
+	else if (hanging(blood, number))
+		hanging(blood, number)->source = -1;
 	*source = (struct source){
 		.from_px = {stroke->from_px[0], stroke->from_px[1]},
 		.at_px = {stroke->to_px[0], stroke->to_px[1]},
@@ -573,7 +583,7 @@ void blood_stroke(struct blood *blood, const struct wound_stroke *stroke)
 	if (!(ul_s > 0))
 		return;
 	if (!source || stroke->begins || source->length_mm >= source->span_mm)
-		source = begin(blood, stroke);
+		source = start_source(blood, stroke);
 	source->length_mm += stroke->length_mm;
 	source->to_px[0] = stroke->to_px[0];
 	source->to_px[1] = stroke->to_px[1];
@@ -604,7 +614,7 @@ void blood_reopen(struct blood *blood, const double px[2], double depth_mm)
 	}
 }
 
-/* Some of it wets the cut; returns how much. */
+/* Some blood wets the cut; returns its amount. */
 static int64_t wet(struct blood *blood, int number, int64_t units)
 {
 	const struct source *source = &blood->source[number];
@@ -616,7 +626,7 @@ static int64_t wet(struct blood *blood, int number, int64_t units)
 			  0.3, (int64_t)((double)units * WETS_SHARE));
 }
 
-/* A drop hangs below the place it comes from, lower the larger it is. */
+/* A drop hangs below its source, lower the larger it is. */
 static void hang(struct blood *blood, struct source *source, struct drop *drop)
 {
 	double radius = drop_radius_mm(drop->units),
@@ -634,14 +644,12 @@ static void hang(struct blood *blood, struct source *source, struct drop *drop)
 static void feed(struct blood *blood, int number, int64_t units)
 {
 	struct source *source = &blood->source[number];
-	struct drop *drop = source->drop >= 0 ? &blood->drops.drop[source->drop] : NULL;
+	struct drop *drop = hanging(blood, number);
 	double along[2];
 
-	if (drop && drop->units && drop->source == number) {
-		if ((double)drop->units * BLOOD_UNIT_UL > DROP_MOST_UL)
-			drop->source = -1;
-	}
-	if (drop && drop->units && drop->source == number) {
+	if (drop && (double)drop->units * BLOOD_UNIT_UL > DROP_MOST_UL)
+		drop->source = -1;
+	else if (drop && drop->units) {
 		drop->units += units;
 		hang(blood, source, drop);
 		return;
@@ -668,7 +676,7 @@ static void emit(struct blood *blood, int number)
 		return;
 	blood->emitted += whole;
 	left = whole - wet(blood, number, whole);
-	/* More when a spot that was too thick was spread. */
+	/* It is more when the spot was too thick and got thinner. */
 	if (left > 0)
 		feed(blood, number, left);
 }
@@ -683,9 +691,9 @@ void blood_step(struct blood *blood)
 		if (source->ul_s > STOPPED_UL_S) {
 			emit(blood, i);
 		} else if (source->drop >= 0) {
-			/* It hangs no longer at what does not bleed. */
-			if (blood->drops.drop[source->drop].source == i)
-				blood->drops.drop[source->drop].source = -1;
+			/* A stopped source releases its drop. */
+			if (hanging(blood, i))
+				hanging(blood, i)->source = -1;
 			source->drop = -1;
 		}
 	}
@@ -697,11 +705,13 @@ void blood_volumes(const struct blood *blood, struct blood_volumes *volumes)
 {
 	*volumes = (struct blood_volumes){
 		.emitted = blood->emitted,
-		.drops = drops_units(&blood->drops),
 		.films = blood->film.units,
 		.off = blood->film.off_units,
-		.n_drops = drops_count(&blood->drops),
 	};
+	for (int i = 0; i < DROPS_MAX; i++) {
+		volumes->drops += blood->drops.drop[i].units;
+		volumes->n_drops += blood->drops.drop[i].units > 0;
+	}
 }
 
 bool blood_drop(const struct blood *blood, int index, double px[2], double *ul)
@@ -717,22 +727,26 @@ bool blood_drop(const struct blood *blood, int index, double px[2], double *ul)
 	return true;
 }
 
-size_t blood_memory(const struct blood *blood)
-{
-	return sizeof(*blood) + film_memory(&blood->film);
-}
+/*
+ * Colour, by thickness and dryness. Light that passes through blood and back is absorbed by Beer
+ * and Lambert: a film is translucent, a drop opaque. Alpha is 1 - exp(-h / h0), the colour goes
+ * from light to dark red, and with drying to brown, first at thin edges.
+ *
+ * The height of a drop is added to that of the film below it, and goes smoothly to zero: there is
+ * no seam between a drop and its trail.
+ */
 
-/* At this thickness, mm, a film hides two thirds of what is below. */
+/* At this thickness, mm, a film hides two thirds of the skin. */
 #define HIDES_MM 0.013f
-/* From a thin film's colour half of the way to a thick one's. */
+/* Thickness of half of the change from a thin film's colour to a thick one's. */
 #define DARK_MM 0.16f
-/* Thinner than this there is none to be seen, mm. */
+/* Thinner blood is invisible, mm. */
 #define NOTHING_MM 0.0004f
 
-/* A drop, prepared; from … to is what it covers, texels. */
+/* A drop, prepared for painting; from … to: its texels. */
 struct shape {
 	struct ground_metric metric;
-	float x, y, axis[2];	      /* axis: unit, mm, the way it runs */
+	float x, y, axis[2];	      /* axis: unit, mm, along its way */
 	float before, behind, beside; /* 1/mm */
 	float high_mm, grain;
 	int from_px[2], to_px[2];
@@ -757,7 +771,7 @@ static bool shape_of(const struct film *film, const struct drop *drop,
 	shape->before = (float)(1 / (drop->drawn_mm * drop->before));
 	shape->behind = (float)(1 / (drop->drawn_mm * drop->behind));
 	shape->beside = (float)(1 / (drop->drawn_mm * drop->beside));
-	/* Such that its volume is the drop's: the mean of (1 - r²)^1.5 over a disc is 0.4. */
+	/* The volume is the drop's: the mean of (1 - r²)^1.5 over a disc is 0.4. */
 	shape->high_mm = (float)(0.625 * drop->drawn_mm * 2 /
 				 (drop->beside * (drop->before + drop->behind)));
 	shape->grain = box.metric.a / FILM_ROUGH_MM;
@@ -786,7 +800,7 @@ static void add_texel(struct wet_texel *to, int x, int y, const struct shape *sh
 		return;
 	cap = 1 - r2;
 	to->thick += shape->high_mm * cap * sqrtf(cap);
-	/* A window that shines on it, off the middle. */
+	/* Highlight of a window, off the middle. */
 	u = u * shape->beside + 0.3f;
 	v = v * shape->beside + 0.34f;
 	lit = 1 - (u * u + v * v) * 16;
@@ -837,7 +851,7 @@ static void colour(const struct wet_texel *texel, float dry, uint8_t rgba[4])
 	rgba[3] = (uint8_t)(alpha * 255 + 0.5f);
 }
 
-/* Whether a texel of it is another one now. */
+/* Returns whether a texel changed. */
 static bool paint_tile(struct film *film, const struct shape *shapes, int n, int number,
 		       uint8_t *rgba)
 {

@@ -5,12 +5,12 @@
  *     strokes of the blade ─▶ sources ─▶ wet the cut, then drops ─▶ films ─▶ dry
  *                                        run downhill, merge
  *
- * A stretch of a cut that is L long and D deep in what was whole bleeds k L D µl/s; that falls
- * to a third in BLOOD_CLOT_S as it clots. Where an instrument is put in, it opens again. Each
- * source stands for some mm of a cut, and its drop hangs at a random place of them.
+ * A fresh stretch of a cut, L long and D deep, bleeds k L D µl/s, which falls to a third in
+ * BLOOD_CLOT_S as it clots; an inserted instrument reopens it. Each source represents some mm of a
+ * cut, and its drop hangs at a random place of them.
  *
- * All of it moves in steps of 10 ms, by the steps alone. Volumes are whole units
- * (blood_film.h): what was emitted is in drops, in films or off the texture, exactly.
+ * Blood moves in steps of 10 ms only. Volumes are whole units (blood_film.h): all emitted blood is
+ * in drops, in films or off the texture, exactly.
  */
 #ifndef INCISE_VIEW_BLOOD_H
 #define INCISE_VIEW_BLOOD_H
@@ -32,10 +32,10 @@ struct blood *blood_new(const struct uv_map *map,
 			const struct incise_scene_picture *picture,
 			struct incise_error *err);
 
-/* A cut got longer. */
+/* A cut became longer. */
 void blood_stroke(struct blood *blood, const struct wound_stroke *stroke);
 
-/* An instrument is in the tissue: for each step in which it is. */
+/* For each step in which an instrument is in the tissue. */
 void blood_reopen(struct blood *blood, const double px[2], double depth_mm);
 
 void blood_step(struct blood *blood);
@@ -47,10 +47,9 @@ struct blood_volumes {
 };
 void blood_volumes(const struct blood *blood, struct blood_volumes *volumes);
 
-/* Where drop @index is, texels, and its volume, µl; false: there is none. For tests. */
+/* Place of drop @index, texels, and its volume, µl; false: there is none. For tests. */
 bool blood_drop(const struct blood *blood, int index, double px[2], double *ul);
 
-size_t blood_memory(const struct blood *blood);
 void blood_free(struct blood *blood);
 
 #endif

@@ -11,7 +11,9 @@
 /* Of blood: kg/mm³, and mm/s². */
 #define RHO 1.06e-6
 #define GRAVITY_MM_S2 9810.0
-/* A spot leaves alone what lacks no more than that part of its height. */
+/* No spot is wider, texels. */
+#define FILM_SPOT_PX 320
+/* A spot ignores differences below this part of its height. */
 #define UNSEEN 0.03
 
 static bool film_inside(const struct film *film, int x, int y)
@@ -38,7 +40,7 @@ bool film_init(struct film *film, const struct uv_map *map,
 		film->gravity[i] = picture->gravity[i];
 	/* mPa s are 1e-6 kg/(mm s). */
 	film->drain = RHO * GRAVITY_MM_S2 / (3 * picture->viscosity_mPa_s * 1e-6);
-	/* From calloc: pages that nobody writes are not there. */
+	/* From calloc: unwritten pages take no memory. */
 	film->volume = calloc(texels, sizeof(*film->volume));
 	film->dry = calloc(texels, sizeof(*film->dry));
 	film->tile = calloc(tiles, sizeof(*film->tile));
@@ -54,15 +56,6 @@ void film_free(struct film *film)
 	free(film->tile);
 	free(film->tiles.dirty);
 	free(film->height);
-}
-
-size_t film_memory(const struct film *film)
-{
-	size_t texels = (size_t)film->size * film->size;
-
-	return texels * (sizeof(*film->volume) + sizeof(*film->dry)) +
-	       texels / FILM_TEXELS * (sizeof(*film->tile) + 1) +
-	       FILM_SPOT_PX * FILM_SPOT_PX * sizeof(*film->height);
 }
 
 static void learn_tile(struct film *film, struct film_tile *tile, int number)
@@ -98,12 +91,15 @@ const struct film_tile *film_tile(struct film *film, int x, int y)
 
 double film_thickness_mm(struct film *film, double x, double y)
 {
-	/* Also what is not a number is outside. */
+	/* NaN is outside, too. */
 	if (!(x >= 0 && y >= 0 && x < film->size && y < film->size))
 		return 0;
 	return film->volume[film_index(film, (int)x, (int)y)] * BLOOD_UNIT_UL /
 	       film_tile(film, (int)x, (int)y)->area_mm2;
 }
+
+/* Steps in which each busy tile is visited once. */
+#define FILM_ROUND_STEPS 8
 
 static uint32_t film_round(const struct film *film)
 {
@@ -135,7 +131,7 @@ static void film_put(struct film *film, size_t at, uint32_t units)
 	film->volume[at] = was + units;
 }
 
-/* A round spot on the surface, as rows of texels with their heights in film->height. */
+/* A round spot on the surface, as rows of texels; their heights are in film->height. */
 struct spot {
 	struct ground_metric metric;
 	double area_mm2; /* of a texel */
@@ -145,7 +141,7 @@ struct spot {
 };
 
 /*
- * 1 in the middle, 0 at the edge and outside. The edge follows the roughness of the skin.
+ * 1 in the middle, 0 at the edge and outside. The edge follows the skin's roughness.
  */
 static float spot_height(const struct spot *spot, float grain, int x, int y)
 {
@@ -191,7 +187,7 @@ static bool spot_at(struct film *film, const double px[2], double radius_mm,
 	return spot->sum > 0;
 }
 
-/* By how much a texel is to change that should be so thick in the spot's middle. */
+/* The change of a texel, for @units in the spot's middle. */
 static double lacks(const struct film *film, size_t at, float high, double units,
 		    double share)
 {
@@ -268,7 +264,7 @@ void film_add(struct film *film, const double px[2], double radius_mm, int64_t u
 		int64_t part;
 		size_t at;
 
-		/* What has been given so far, rounded: no unit is lost. */
+		/* The rounded sum so far: no unit is lost. */
 		sum += film->height[i];
 		part = (int64_t)((double)units * fmin(sum / spot.sum, 1)) - given;
 		if (part <= 0)
@@ -290,33 +286,33 @@ void film_add(struct film *film, const double px[2], double radius_mm, int64_t u
 /* --- Draining and drying --- */
 
 /*
- * A round is so many steps; in each step some of the tiles are due. A tile in which much
- * flows is visited in each round, others in each fourth or tenth, for as much longer.
+ * A round is so many steps; in each step some of the tiles are due. A tile with much flow is
+ * visited in each round, others every fourth or tenth, for a longer time.
  */
 #define ROUND_S (FILM_ROUND_STEPS * 0.01)
 #define ROUNDS_MOST 10
-/* In a step, so that there is an end to its time however much blood there is. */
+/* Per step, which bounds its time for any amount of blood. */
 #define VISITS_MOST 24
-/* No texel gives more than that part of itself in a visit: the scheme is explicit. */
+/* A texel gives at most this part of itself per visit: the scheme is explicit. */
 #define FLOW_MOST 0.4
-/* With less in a round it is not visited in each, or each fourth. */
+/* Flow per round for visits in each round, and in every fourth. */
 #define FLOW_MUCH 0.05
 #define FLOW_SOME 0.012
-/* Slower than that it is not seen. */
+/* Slower flow is invisible. */
 #define FLOW_LEAST 0.0002
-/* Where it flows to it may become so many times thicker than where it comes from. */
+/* The target may become this many times thicker than the source. */
 #define PILES_UP 1.06
 #define EDGE_MM 0.012
-/* Less than that part of a texel does not move: it would not be seen. */
+/* Less than this part of a texel does not move: it would be invisible. */
 #define FLOW_UNSEEN 0.01
-/* Sideways it levels by this part of the difference, where it is thicker than that. */
+/* Sideways levelling, by this part of the difference, of films thicker than this. */
 #define LEVELS 0.12
 #define LEVELS_MM 0.02
-/* Thinner than this, mm, it dries three times as fast; than that, twice. */
+/* Films thinner than these, mm, dry three times and twice as fast. */
 #define THIN_MM 0.02
 #define MEDIUM_MM 0.06
 
-/* Beside dry skin: there a film is thin, as its angle to the skin is no right one. */
+/* Next to dry skin a film is thin, as it meets the skin at a small angle. */
 static bool at_edge(const struct film *film, int x, int y)
 {
 	return (x > 0 && !film->volume[film_index(film, x - 1, y)]) ||
@@ -325,7 +321,7 @@ static bool at_edge(const struct film *film, int x, int y)
 	       (y + 1 < film->size && !film->volume[film_index(film, x, y + 1)]);
 }
 
-/* Give some of a texel to the one beside it, if that is wet: else its edge is pinned. */
+/* Move some of a texel to its neighbour if that is wet; else the edge is pinned. */
 static bool flow(struct film *film, size_t from, int x, int y, double units)
 {
 	double most;
@@ -349,7 +345,7 @@ static bool flow(struct film *film, size_t from, int x, int y, double units)
 	if (!film->volume[to] || !(units >= 1 + FLOW_UNSEEN * film->volume[from]))
 		return false;
 	film->volume[from] -= (uint32_t)units;
-	/* Where the film runs it is as dry as the wetter of the two. */
+	/* A running film is as dry as the wetter of the two. */
 	if (film->dry[from] < film->dry[to])
 		film_put(film, to, (uint32_t)units);
 	else
@@ -358,7 +354,7 @@ static bool flow(struct film *film, size_t from, int x, int y, double units)
 	return true;
 }
 
-/* Surface tension levels what has run together: to a neighbour that is thinner. */
+/* Surface tension levels a film towards a thinner neighbour. */
 static bool level(struct film *film, size_t from, int x, int y)
 {
 	size_t to;
@@ -371,12 +367,12 @@ static bool level(struct film *film, size_t from, int x, int y)
 	return flow(film, from, x, y, LEVELS * (film->volume[from] - film->volume[to]));
 }
 
-/* Which way is down over a tile: in its corners, and so between them. */
+/* Downhill direction in the corners of a tile, interpolated between them. */
 struct fall {
 	float x[2][2], y[2][2]; /* texels, sine of the slope long; [down][right] */
 };
 
-/* A corner of tiles falls as the mean of those around it: what is beside it sees the same. */
+/* The mean of the tiles around a corner, so that neighbours agree. */
 static void fall_at(struct film *film, int column, int row, float *x, float *y)
 {
 	int n = 0;
@@ -459,7 +455,7 @@ static void drain_texel(struct visit *visit, int x, int y, size_t at)
 	}
 }
 
-/* Returns whether a texel is still on its way to being dry. times: 0.8 s each. */
+/* Returns whether a texel is still drying. times: 0.8 s each. */
 static bool dry_texel(struct film *film, const struct film_tile *tile, size_t at,
 		      unsigned int times)
 {
@@ -474,7 +470,7 @@ static bool dry_texel(struct film *film, const struct film_tile *tile, size_t at
 	return true;
 }
 
-/* Downhill texels first, so that what flows is not carried through a whole tile at once. */
+/* Downhill texels first, so that blood does not cross a whole tile at once. */
 static void visit_tile(struct film *film, int number, uint32_t round)
 {
 	int x0 = number % film->tiles.side * CANVAS_TILE,
@@ -512,7 +508,7 @@ static void visit_tile(struct film *film, int number, uint32_t round)
 		own->awake = false;
 }
 
-/* Its turn has come, or has passed. */
+/* Its turn has come or has passed. */
 static bool due(const struct film *film, int number, uint32_t round, int turn)
 {
 	const struct film_tile *tile = &film->tile[number];
@@ -531,7 +527,7 @@ void film_step(struct film *film)
 	int at = film->next, visits = 0;
 	uint32_t round = film_round(film);
 
-	/* Those for which there is no time wait, and are visited for as much longer. */
+	/* Skipped tiles wait, and then drain for a longer time. */
 	for (int i = 0; i < n && visits < VISITS_MOST; i++, at++) {
 		at = at < n ? at : 0;
 		if (!due(film, at, round, turn))

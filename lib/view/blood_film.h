@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The film of blood on the surface: what drops leave, and what wets the wound. Each texel
- * has a volume and says how dry it is.
+ * The film of blood on the surface: trails of drops, and the wet wound. Each texel has a volume
+ * and a dryness.
  *
- * Volumes are whole units of BLOOD_UNIT_UL, so that none is lost or made by rounding:
- * whatever is taken from one place is put to another.
+ * Volumes are whole units of BLOOD_UNIT_UL, so that rounding neither loses nor creates any: an
+ * amount that is taken from one place is added to another.
  *
  * A film thins as it drains (Nusselt: on a slope of sine s a film of thickness h moves at
- * rho g h² s / (3 mu) on average), into what is wet already: its edge on dry skin is pinned.
- * As it dries and clots mu grows, until it stands.
+ * rho g h² s / (3 mu) on average) into wet texels: its edge on dry skin is pinned. As it dries and
+ * clots mu grows, until it stands.
  *
- * Tiles without blood cost nothing; tiles in which nothing moves or dries any more sleep.
+ * Tiles without blood cost nothing; tiles without flow or drying sleep.
  */
 #ifndef INCISE_VIEW_BLOOD_FILM_H
 #define INCISE_VIEW_BLOOD_FILM_H
@@ -20,28 +20,24 @@
 #include <stdint.h>
 #include <incise/scene.h>
 #include "canvas.h"
-#include "uv_map.h"
 #include "ground.h"
+#include "uv_map.h"
 
 #define BLOOD_UNIT_UL 1e-7
 #define FILM_TEXELS (CANVAS_TILE * CANVAS_TILE)
 #define FILM_DRY 255
-#define FILM_CLOT 110	   /* so dry, it stands */
-#define FILM_ROUND_STEPS 8 /* see blood_drain.c */
+#define FILM_CLOT 110 /* from this dryness on it stands */
 
-/* Edges of drops and films follow the skin's roughness: over this length, by that part. */
+/* Edges of drops and films follow the skin's roughness: its length, and the effect. */
 #define FILM_ROUGH_KEY 0x736b696e
 #define FILM_ROUGH_MM 0.8f
 #define FILM_ROUGH 0.28f
 
-/* No spot is wider, texels. */
-#define FILM_SPOT_PX 320
-
-/* What a tile's middle says of its texels. */
+/* Values of a tile's middle, for all of its texels. */
 struct film_tile {
-	bool known, there; /* the map was asked; there is a surface */
+	bool known, there; /* the rest is set; there is a surface */
 	bool awake;	   /* something flows or dries */
-	uint8_t period;	   /* rounds between two visits: fewer where less flows */
+	uint8_t period;	   /* rounds between two visits: more where less flows */
 	uint32_t last;	   /* round of the last one */
 	float area_mm2, texel_mm, slope;
 	float down_px[2]; /* unit, texels; 0 where level */
@@ -58,25 +54,23 @@ struct film {
 	struct canvas_tiles tiles; /* to be painted */
 	uint64_t step;
 	int next;		  /* tile to begin with */
-	float *height;		  /* of a spot: room for FILM_SPOT_PX² */
-	int64_t units, off_units; /* all that is here; all that ran off the texture */
+	float *height;		  /* of a spot */
+	int64_t units, off_units; /* in the film; ran off the texture */
 };
 
 bool film_init(struct film *film, const struct uv_map *map,
 	       const struct incise_scene_picture *picture);
 void film_free(struct film *film);
-size_t film_memory(const struct film *film);
 
-/* What the tile at a texel says; never NULL for one of the texture. */
+/* The tile of a texel; never NULL within the texture. */
 const struct film_tile *film_tile(struct film *film, int x, int y);
 
 /* Thickness, mm; 0 outside of the texture. */
 double film_thickness_mm(struct film *film, double x, double y);
 
 /*
- * Bring a round spot nearer to a thickness, highest in its middle: by the part @share of what
- * is missing, or of what is too much and still wet. Returns by how many units it is more
- * than before (less: below 0); it gets no more than @most.
+ * Bring a round spot closer to a thickness, highest in its middle: by the part @share of the lack,
+ * or of the excess that is still wet. Returns the change in units, at most @most.
  */
 int64_t film_level(struct film *film, const double px[2], double radius_mm,
 		   double thickness_mm, double share, int64_t most);

@@ -222,13 +222,6 @@ static void target_resolve(const struct target *target)
  *     leans     leans
  *     away      to the lamp
  */
-struct texture_setup {
-	const struct incise_canvas *canvas; /* all of it is sent */
-	const uint8_t *normal_rgb;	    /* size²; or NULL: a smooth skin */
-	double way[2]; /* unit: to the lamp, in texels right and down */
-	bool fine;     /* what costs more on a CPU than it shows */
-};
-
 #define LEVELS_MAX 15	/* a canvas has at most 16384 texels a side */
 #define FILM_TEXELS 2.5 /* over which a film ends, at level 0 */
 #define FILM_SLOPE 0.6
@@ -320,7 +313,8 @@ static void halve(uint8_t *to, const uint8_t *from, int side)
 		}
 }
 
-static bool make_slopes(struct texture *texture, const struct texture_setup *setup)
+static bool make_slopes(struct texture *texture, const uint8_t *normal_rgb,
+			const double way[2])
 {
 	for (int level = 0; level < texture->levels; level++) {
 		int side = texture->size >> level;
@@ -332,10 +326,9 @@ static bool make_slopes(struct texture *texture, const struct texture_setup *set
 		if (level)
 			halve(texture->slope[level], texture->slope[level - 1], side);
 		else
-			slopes(texture->slope[0], setup->normal_rgb, (size_t)side * side,
-			       setup->way);
+			slopes(texture->slope[0], normal_rgb, (size_t)side * side, way);
 		for (int k = 0; k < 2; k++)
-			texture->reach[level][k] = (int)lround(setup->way[k] * texels);
+			texture->reach[level][k] = (int)lround(way[k] * texels);
 	}
 	return true;
 }
@@ -406,7 +399,9 @@ static void send_rect(const struct texture *texture, const struct incise_canvas 
 	}
 }
 
-static struct texture *texture_new(const struct texture_setup *setup,
+/* @way: unit, to the lamp, in texels right and down. @fine: with expensive filters. */
+static struct texture *texture_new(const struct incise_draw_setup *setup,
+				   const double way[2], bool fine,
 				   struct incise_error *err)
 {
 	struct texture *texture;
@@ -422,9 +417,9 @@ static struct texture *texture_new(const struct texture_setup *setup,
 	/* 64 rows of the largest level. */
 	texture->band_bytes = (size_t)size * 4 * 64;
 	texture->band = malloc(texture->band_bytes);
-	if (!texture->band || !make_slopes(texture, setup))
+	if (!texture->band || !make_slopes(texture, setup->normal_rgb, way))
 		goto out_memory;
-	texture->name = begin_texture(texture->levels, setup->fine);
+	texture->name = begin_texture(texture->levels, fine);
 	for (int level = 0; level < texture->levels; level++) {
 		int side = size >> level;
 
@@ -493,7 +488,7 @@ static const double draw_key_way[3] = {-0.62, 0.12, 0.78};
 
 struct incise_draw {
 	struct solid surface, scalpel, tube;
-	unsigned skin, metal, ground, image; /* programs */
+	unsigned program[SHADERS];
 	struct texture *texture;
 	double way[2]; /* to the lamp, in texels */
 	struct {
@@ -505,8 +500,7 @@ struct incise_draw {
 	struct target target;
 	struct incise_scene_scalpel tool;
 	enum incise_skin look;
-	double middle_mm[3], reach_mm; /* a ball round the surface */
-	char renderer[128];
+	struct incise_draw_info info;
 	bool drawn;
 };
 
@@ -544,19 +538,12 @@ static int put_instruments(struct incise_draw *draw, struct incise_error *err)
 
 static int put_programs(struct incise_draw *draw, struct incise_error *err)
 {
-	draw->skin = incise_shader_program("skin", incise_shader_surface_vs,
-					   incise_shader_surface_fs, err);
-	if (draw->skin)
-		draw->metal =
-			incise_shader_program("instrument", incise_shader_instrument_vs,
-					      incise_shader_instrument_fs, err);
-	if (draw->metal)
-		draw->ground = incise_shader_program("ground", incise_shader_ground_vs,
-						     incise_shader_ground_fs, err);
-	if (draw->ground)
-		draw->image = incise_shader_program("image", incise_shader_image_vs,
-						    incise_shader_image_fs, err);
-	return draw->image ? 0 : -EIO;
+	for (int i = 0; i < SHADERS; i++) {
+		draw->program[i] = shader_program((enum shader)i, err);
+		if (!draw->program[i])
+			return -EIO;
+	}
+	return 0;
 }
 
 /* Where a CPU draws, some things cost more than they show. */
@@ -596,7 +583,6 @@ static void find_way(struct incise_draw *draw, const struct uv_map *map)
 struct incise_draw *incise_draw_new(const struct incise_draw_setup *setup,
 				    struct incise_error *err)
 {
-	struct texture_setup texture = {setup->canvas, setup->normal_rgb, {0}, 0};
 	struct incise_draw *draw;
 	bool fine;
 
@@ -614,23 +600,21 @@ struct incise_draw *incise_draw_new(const struct incise_draw_setup *setup,
 				 epoxy_gl_version() / 10, epoxy_gl_version() % 10);
 		goto out_free;
 	}
-	snprintf(draw->renderer, sizeof(draw->renderer), "%s",
+	snprintf(draw->info.renderer, sizeof(draw->info.renderer), "%s",
 		 (const char *)glGetString(GL_RENDERER));
-	fine = !by_cpu(draw->renderer);
+	fine = !by_cpu(draw->info.renderer);
 	draw->tool = setup->scalpel;
 	draw->look = setup->look;
 	draw->target.samples = setup->samples > 0 ? setup->samples : fine ? 4 : 1;
 	glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
 	glPixelStorei(GL_PACK_ALIGNMENT, 1);
 	glGenVertexArrays(1, &draw->nothing);
-	solid_surface(&draw->surface, setup->map, draw->middle_mm, &draw->reach_mm);
+	solid_surface(&draw->surface, setup->map, draw->info.middle_mm,
+		      &draw->info.reach_mm);
 	if (put_instruments(draw, err) || put_programs(draw, err))
 		goto out_free;
 	find_way(draw, setup->map);
-	texture.way[0] = draw->way[0];
-	texture.way[1] = draw->way[1];
-	texture.fine = fine;
-	draw->texture = texture_new(&texture, err);
+	draw->texture = texture_new(setup, draw->way, fine, err);
 	if (!draw->texture || failed(err))
 		goto out_free;
 	return draw;
@@ -649,10 +633,8 @@ void incise_draw_free(struct incise_draw *draw)
 		solid_free(&draw->scalpel);
 		solid_free(&draw->tube);
 		glDeleteVertexArrays(1, &draw->nothing);
-		glDeleteProgram(draw->skin);
-		glDeleteProgram(draw->metal);
-		glDeleteProgram(draw->ground);
-		glDeleteProgram(draw->image);
+		for (int i = 0; i < SHADERS; i++)
+			glDeleteProgram(draw->program[i]);
 		texture_free(draw->texture);
 		for (int i = 0; i < DRAW_SLOTS; i++)
 			glDeleteTextures(1, &draw->slot[i].texture);
@@ -688,7 +670,16 @@ static void set_scene(unsigned program, const struct view_projection *projection
 	set_vector(program, "sky", sky);
 }
 
-/* Lines with a thickness that stand for the instrument where it throws a shadow. */
+static void caster_end(float to[4], const struct instrument_place *place,
+		       const double at[3])
+{
+	for (int k = 0; k < 3; k++)
+		to[k] = (float)(place->origin_mm[k] + at[0] * place->x[k] +
+				at[1] * place->z[k]);
+	to[3] = (float)at[2];
+}
+
+/* Lines with a thickness that represent the instrument where it casts a shadow. */
 static void set_casters(const struct incise_draw *draw,
 			const struct instrument_place *place)
 {
@@ -702,23 +693,16 @@ static void set_casters(const struct incise_draw *draw,
 	int n = !place ? 0 : place->tube ? 3 : 2;
 	float from[SHADERS_CASTERS][4], to[SHADERS_CASTERS][4];
 
-	glUniform1i(glGetUniformLocation(draw->skin, "casters"), n);
-	for (int i = 0; i < n; i++)
-		for (int k = 0; k < 4; k++) {
-			const double *a = line[i], *b = line[i + 1];
-
-			from[i][k] = (float)(k == 3 ? a[2]
-						    : place->origin_mm[k] +
-							      a[0] * place->x[k] +
-							      a[1] * place->z[k]);
-			to[i][k] = (float)(k == 3 ? b[2]
-						  : place->origin_mm[k] +
-							    b[0] * place->x[k] +
-							    b[1] * place->z[k]);
-		}
+	glUniform1i(glGetUniformLocation(draw->program[SHADER_SURFACE], "casters"), n);
+	for (int i = 0; i < n; i++) {
+		caster_end(from[i], place, line[i]);
+		caster_end(to[i], place, line[i + 1]);
+	}
 	if (n) {
-		glUniform4fv(glGetUniformLocation(draw->skin, "from"), n, from[0]);
-		glUniform4fv(glGetUniformLocation(draw->skin, "to"), n, to[0]);
+		glUniform4fv(glGetUniformLocation(draw->program[SHADER_SURFACE], "from"),
+			     n, from[0]);
+		glUniform4fv(glGetUniformLocation(draw->program[SHADER_SURFACE], "to"), n,
+			     to[0]);
 	}
 }
 
@@ -726,18 +710,18 @@ static void draw_surface(struct incise_draw *draw,
 			 const struct view_projection *projection,
 			 const struct instrument_place *place)
 {
-	set_scene(draw->skin, projection);
+	set_scene(draw->program[SHADER_SURFACE], projection);
 	set_casters(draw, place);
-	glUniform1f(glGetUniformLocation(draw->skin, "texel"),
+	glUniform1f(glGetUniformLocation(draw->program[SHADER_SURFACE], "texel"),
 		    1.0f / (float)draw->texture->size);
 	/* Of the texture's side; where there is none it ends beyond it. */
-	glUniform1f(glGetUniformLocation(draw->skin, "cloth"),
+	glUniform1f(glGetUniformLocation(draw->program[SHADER_SURFACE], "cloth"),
 		    draw->look == INCISE_SKIN_NECK ? 0.055f : -1.0f);
-	glUniform1f(glGetUniformLocation(draw->skin, "moist"),
+	glUniform1f(glGetUniformLocation(draw->program[SHADER_SURFACE], "moist"),
 		    draw->look == INCISE_SKIN_LIVER ? 0.6f : 0.0f);
-	glUniform2f(glGetUniformLocation(draw->skin, "way"), (float)draw->way[0],
-		    (float)draw->way[1]);
-	glUniform1i(glGetUniformLocation(draw->skin, "base"), 0);
+	glUniform2f(glGetUniformLocation(draw->program[SHADER_SURFACE], "way"),
+		    (float)draw->way[0], (float)draw->way[1]);
+	glUniform1i(glGetUniformLocation(draw->program[SHADER_SURFACE], "base"), 0);
 	glActiveTexture(GL_TEXTURE0);
 	glBindTexture(GL_TEXTURE_2D, draw->texture->name);
 	solid_draw(&draw->surface);
@@ -756,9 +740,10 @@ static void draw_instrument(struct incise_draw *draw,
 		matrix[12 + k] = (float)place->origin_mm[k];
 	}
 	matrix[15] = 1;
-	set_scene(draw->metal, projection);
-	glUniformMatrix4fv(glGetUniformLocation(draw->metal, "place"), 1, GL_FALSE,
-			   matrix);
+	set_scene(draw->program[SHADER_INSTRUMENT], projection);
+	glUniformMatrix4fv(glGetUniformLocation(draw->program[SHADER_INSTRUMENT],
+						"place"),
+			   1, GL_FALSE, matrix);
 	solid_draw(place->tube ? &draw->tube : &draw->scalpel);
 }
 
@@ -778,9 +763,10 @@ int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera 
 	rc = target_size(&draw->target, width, height, err);
 	if (rc)
 		return rc;
-	v3_sub(off, draw->middle_mm, held.target_mm);
+	v3_sub(off, draw->info.middle_mm, held.target_mm);
 	view_camera_project(&held, width, height,
-			    v3_length(off) + draw->reach_mm + draw->tool.handle_mm + 100,
+			    v3_length(off) + draw->info.reach_mm + draw->tool.handle_mm +
+				    100,
 			    &projection);
 
 	glBindFramebuffer(GL_FRAMEBUFFER, draw->target.drawn);
@@ -795,7 +781,7 @@ int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera 
 		draw_instrument(draw, &projection, &place);
 	draw_surface(draw, &projection, placed ? &place : NULL);
 	/* Last, where nothing else is. */
-	glUseProgram(draw->ground);
+	glUseProgram(draw->program[SHADER_GROUND]);
 	glBindVertexArray(draw->nothing);
 	glDrawArrays(GL_TRIANGLES, 0, 3);
 	target_resolve(&draw->target);
@@ -824,9 +810,9 @@ int incise_draw_overlay(struct incise_draw *draw, int slot, const uint8_t *bgra,
 	glDisable(GL_CULL_FACE);
 	glEnable(GL_BLEND);
 	glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-	glUseProgram(draw->image);
-	glUniform1i(glGetUniformLocation(draw->image, "image"), 0);
-	glUniform4f(glGetUniformLocation(draw->image, "box"),
+	glUseProgram(draw->program[SHADER_IMAGE]);
+	glUniform1i(glGetUniformLocation(draw->program[SHADER_IMAGE], "image"), 0);
+	glUniform4f(glGetUniformLocation(draw->program[SHADER_IMAGE], "box"),
 		    (float)(2.0 * x / width - 1), (float)(1 - 2.0 * y / height),
 		    (float)(2.0 * (x + w) / width - 1),
 		    (float)(1 - 2.0 * (y + h) / height));
@@ -875,19 +861,8 @@ void incise_draw_finish(struct incise_draw *draw)
 		glFinish();
 }
 
-void incise_draw_bounds(const struct incise_draw *draw, double middle_mm[3],
-			double *reach_mm)
+const struct incise_draw_info *incise_draw_info(struct incise_draw *draw)
 {
-	v3_copy(middle_mm, draw->middle_mm);
-	*reach_mm = draw->reach_mm;
-}
-
-int incise_draw_samples(const struct incise_draw *draw)
-{
-	return draw->target.samples;
-}
-
-const char *incise_draw_renderer(const struct incise_draw *draw)
-{
-	return draw->renderer;
+	draw->info.samples = draw->target.samples;
+	return &draw->info;
 }

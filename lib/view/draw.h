@@ -65,12 +65,11 @@ void incise_draw_show(struct incise_draw *draw);
 /* Wait until the last frame is drawn. */
 void incise_draw_finish(struct incise_draw *draw);
 
-/* A ball round the surface. */
-void incise_draw_bounds(const struct incise_draw *draw, double middle_mm[3],
-			double *reach_mm);
-
-/* Chosen samples per pixel; OpenGL's name of the renderer. */
-int incise_draw_samples(const struct incise_draw *draw);
-const char *incise_draw_renderer(const struct incise_draw *draw);
+struct incise_draw_info {
+	double middle_mm[3], reach_mm; /* a ball round the surface */
+	int samples;		       /* per pixel */
+	char renderer[128];	       /* OpenGL's name */
+};
+const struct incise_draw_info *incise_draw_info(struct incise_draw *draw);
 
 #endif

@@ -155,9 +155,3 @@ void incise_injury_report(const struct incise_injury *injury,
 	report->blood_ul_off = (double)volumes.off * BLOOD_UNIT_UL;
 	report->drops = volumes.n_drops;
 }
-
-size_t incise_injury_memory(const struct incise_injury *injury)
-{
-	return sizeof(*injury) + (injury->wound ? wound_memory(injury->wound) : 0) +
-	       (injury->blood ? blood_memory(injury->blood) : 0);
-}

@@ -63,9 +63,6 @@ struct incise_injury_report {
 void incise_injury_report(const struct incise_injury *injury,
 			  struct incise_injury_report *report);
 
-/* Bytes that were asked for, without layers and canvas. */
-size_t incise_injury_memory(const struct incise_injury *injury);
-
 void incise_injury_free(struct incise_injury *injury);
 
 #endif

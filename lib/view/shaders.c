@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The shaders; see shaders.h. Those of the surface do as much as they can at the vertices,
- * a millimetre or two apart: light, half way to the eye and up are turned into the frame
- * of the texture there, and the shadow of the instrument is found there.
+ * The shaders; see shaders.h. Those of the surface work as far as possible at the vertices, a
+ * millimetre or two apart: light, half-way vector and up are rotated into the texture's frame
+ * there, and the instrument's shadow is computed there.
  */
 #include <epoxy/gl.h>
 #include <errno.h>
@@ -12,10 +12,10 @@
 #define HEAD "#version 330 core\n"
 
 /*
- * Shadow: how near the way from a place to the light passes by a piece of the instrument,
- * a line with a thickness; farther off it is softer.
+ * Shadow: distance between the way from a place to the light and a piece of the instrument, a line
+ * with a thickness; the farther away, the softer.
  */
-const char *const incise_shader_surface_vs = HEAD
+static const char surface_vs[] = HEAD
 	"layout(location = 0) in vec3 in_0;\n" /* place, mm */
 	"layout(location = 1) in vec3 in_1;\n" /* normal */
 	"layout(location = 2) in vec4 in_2;\n" /* tangent */
@@ -26,7 +26,7 @@ const char *const incise_shader_surface_vs = HEAD
 	"uniform int casters;\n"
 	"uniform vec4 from[4], to[4];\n" /* mm; w: radius */
 	"out vec2 uv;\n"
-	"out vec4 light;\n" /* w: what is not in the shadow */
+	"out vec4 light;\n" /* w: not in the shadow */
 	"out vec3 half_way, up;\n"
 	"float shade(vec3 p, vec4 a, vec4 b)\n"
 	"{\n"
@@ -54,15 +54,14 @@ const char *const incise_shader_surface_vs = HEAD
 	"}\n";
 
 /*
- * Light goes some way below skin, red the farthest: it wraps round into the shade. The
- * shine is that of GGX with Fresnel's term held: skin is rough, what is wet is smooth.
+ * Light penetrates the skin, red the farthest: it wraps round into the shade. The highlight is GGX
+ * with a constant Fresnel term: skin is rough, wet surfaces are smooth.
  *
- * What is wet shows by its colour, which is deep red and nothing else is. The texture's
- * alpha is the slope towards the lamp: see texture.h.
+ * Only wet surfaces are deep red. The texture's alpha is the slope towards the lamp, see draw.c.
  *
- * A cloth of the operating theatre lies round a neck and hides where its texture ends.
+ * A surgical drape lies round a neck and hides the border of its texture.
  */
-const char *const incise_shader_surface_fs = HEAD
+static const char surface_fs[] = HEAD
 	"in vec2 uv;\n"
 	"in vec4 light;\n"
 	"in vec3 half_way, up;\n"
@@ -98,7 +97,7 @@ const char *const incise_shader_surface_fs = HEAD
 	"	colour = vec4(sqrt(lit), 1.0);\n"
 	"}\n";
 
-const char *const incise_shader_instrument_vs =
+static const char instrument_vs[] =
 	HEAD "layout(location = 0) in vec3 in_0;\n" /* place, mm */
 	     "layout(location = 1) in vec3 in_1;\n" /* normal */
 	     "layout(location = 2) in vec4 in_2;\n" /* sRGB, metal */
@@ -116,10 +115,9 @@ const char *const incise_shader_instrument_vs =
 	     "}\n";
 
 /*
- * Metal shows a room: a bright ceiling with a lamp, a window in front, skin
- * below.
+ * Metal reflects a room: a bright ceiling with a lamp, a window in front, skin below.
  */
-const char *const incise_shader_instrument_fs = HEAD
+static const char instrument_fs[] = HEAD
 	"in vec3 normal, to_eye;\n"
 	"in vec4 stuff;\n"
 	"uniform vec3 key, sky;\n"
@@ -140,8 +138,8 @@ const char *const incise_shader_instrument_fs = HEAD
 	"	colour = vec4(sqrt(mix(plastic, metal, stuff.a)), 1.0);\n"
 	"}\n";
 
-/* One triangle over all; a soft light in the middle of a dark room. */
-const char *const incise_shader_ground_vs =
+/* One triangle over everything; a soft light in the middle of a dark room. */
+static const char ground_vs[] =
 	HEAD "out vec2 at;\n"
 	     "void main()\n"
 	     "{\n"
@@ -149,7 +147,7 @@ const char *const incise_shader_ground_vs =
 	     "	gl_Position = vec4(at, 1.0, 1.0);\n"
 	     "}\n";
 
-const char *const incise_shader_ground_fs = HEAD
+static const char ground_fs[] = HEAD
 	"in vec2 at;\n"
 	"out vec4 colour;\n"
 	"void main()\n"
@@ -158,7 +156,7 @@ const char *const incise_shader_ground_fs = HEAD
 	"	colour = vec4(c * (1.0 - 0.22 * dot(at, at)), 1.0);\n"
 	"}\n";
 
-const char *const incise_shader_image_vs =
+static const char image_vs[] =
 	HEAD "uniform vec4 box;\n" /* left, top, right, bottom in clip space */
 	     "out vec2 uv;\n"
 	     "void main()\n"
@@ -167,13 +165,13 @@ const char *const incise_shader_image_vs =
 	     "	gl_Position = vec4(mix(box.xy, box.zw, uv), 0.0, 1.0);\n"
 	     "}\n";
 
-const char *const incise_shader_image_fs = HEAD "in vec2 uv;\n"
-						"uniform sampler2D image;\n"
-						"out vec4 colour;\n"
-						"void main()\n"
-						"{\n"
-						"	colour = texture(image, uv);\n"
-						"}\n";
+static const char image_fs[] = HEAD "in vec2 uv;\n"
+				    "uniform sampler2D image;\n"
+				    "out vec4 colour;\n"
+				    "void main()\n"
+				    "{\n"
+				    "	colour = texture(image, uv);\n"
+				    "}\n";
 
 static unsigned compile(const char *what, GLenum kind, const char *text,
 			struct incise_error *err)
@@ -215,14 +213,22 @@ static unsigned link(const char *what, unsigned vs, unsigned fs, struct incise_e
 	return 0;
 }
 
-unsigned incise_shader_program(const char *what, const char *vs, const char *fs,
-			       struct incise_error *err)
+unsigned shader_program(enum shader shader, struct incise_error *err)
 {
-	unsigned v = compile(what, GL_VERTEX_SHADER, vs, err);
-	unsigned f = v ? compile(what, GL_FRAGMENT_SHADER, fs, err) : 0;
+	static const struct {
+		const char *what, *vs, *fs;
+	} texts[SHADERS] = {
+		[SHADER_SURFACE] = {"skin", surface_vs, surface_fs},
+		[SHADER_INSTRUMENT] = {"instrument", instrument_vs, instrument_fs},
+		[SHADER_GROUND] = {"ground", ground_vs, ground_fs},
+		[SHADER_IMAGE] = {"image", image_vs, image_fs},
+	};
+	const char *what = texts[shader].what;
+	unsigned v = compile(what, GL_VERTEX_SHADER, texts[shader].vs, err);
+	unsigned f = v ? compile(what, GL_FRAGMENT_SHADER, texts[shader].fs, err) : 0;
 	unsigned program = f ? link(what, v, f, err) : 0;
 
-	/* They live on in the program. */
+	/* The program keeps them alive. */
 	if (v)
 		glDeleteShader(v);
 	if (f)

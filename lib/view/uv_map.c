@@ -618,3 +618,41 @@ double uv_map_relief_mm(const struct uv_map *map, const double px[2])
 				(px[1] / map->size - 0.5) * map->high_mm -
 					map->top_mm[1]);
 }
+
+double uv_map_relief_at_mm(const struct uv_map *map, const double point_mm[3],
+			   double normal[3])
+{
+	struct incise_touch touch;
+	double px[2];
+
+	if (!map->larynx)
+		return 0;
+	incise_surface_nearest(map->surface, point_mm, &touch);
+	v3_copy(normal, touch.normal);
+	return uv_map_px(map, touch.point_mm, px) ? uv_map_relief_mm(map, px) : 0;
+}
+
+bool uv_map_meet(const struct uv_map *map, const double from_mm[3], const double way[3],
+		 double far_mm, double point_mm[3], double normal[3])
+{
+	struct incise_touch touch;
+	double up_mm = 0, up[3] = {0};
+
+	if (!v3_finite(way))
+		return false;
+	/* The relief is only known where the ray meets it: iterate, each time with the last. */
+	for (int i = 0; i < 4; i++) {
+		double from[3], to[3];
+
+		v3_add(from, from_mm, -up_mm, up);
+		v3_add(to, from, far_mm, way);
+		if (!incise_surface_enters(map->surface, from, to, &touch))
+			return false;
+		v3_copy(point_mm, touch.point_mm);
+		v3_copy(normal, touch.normal);
+		up_mm = uv_map_relief_at_mm(map, point_mm, up);
+		if (up_mm == 0)
+			break;
+	}
+	return true;
+}

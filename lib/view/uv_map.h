@@ -93,6 +93,17 @@ void uv_map_metric(const struct uv_map *map, const double px[2], double right_mm
  */
 double uv_map_relief_mm(const struct uv_map *map, const double px[2]);
 
+/* The same above the nearest point of the surface; its normal where there is a larynx. */
+double uv_map_relief_at_mm(const struct uv_map *map, const double point_mm[3],
+			   double normal[3]);
+
+/*
+ * The point of the surface, as it is felt, and its normal, where a ray of length far_mm along a
+ * unit vector first meets the surface as it is drawn. False: nowhere, or the way is not finite.
+ */
+bool uv_map_meet(const struct uv_map *map, const double from_mm[3], const double way[3],
+		 double far_mm, double point_mm[3], double normal[3]);
+
 /*
  * For uv_map.c only, an atlas: a mesh's own texture coordinates (uv_map_atlas.c). 0 or -ENOMEM;
  * the kind becomes an atlas only if some texel is on the mesh. The others return false, and write

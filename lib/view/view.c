@@ -123,15 +123,15 @@ static void look_home(struct incise_view *view, const struct incise_plan *plan)
 {
 	struct incise_touch top;
 	double middle[2] = {view->map->size / 2.0, view->map->size / 2.0};
-	double right[3], down[3], target[3], centre[3], reach;
+	double right[3], down[3], target[3];
+	const struct incise_draw_info *info = incise_draw_info(view->draw);
 
 	incise_plan_top(plan, &top);
 	uv_map_metric(view->map, middle, right, down);
-	incise_draw_bounds(view->draw, centre, &reach);
 	/* Between what is cut and the middle of all that is seen. */
 	for (int i = 0; i < 3; i++)
-		target[i] = 0.75 * top.point_mm[i] + 0.25 * centre[i];
-	view_orbit_home(&view->orbit, target, right, reach);
+		target[i] = 0.75 * top.point_mm[i] + 0.25 * info->middle_mm[i];
+	view_orbit_home(&view->orbit, target, right, info->reach_mm);
 }
 
 /* Parts that were made stay when it fails: incise_view_free(). */
@@ -236,28 +236,11 @@ void incise_view_ticks(struct incise_view *view, const struct incise_tick *ticks
 	view->ticks_s += seconds() - begin;
 }
 
-/*
- * What is seen may stand above what is felt, as a larynx does: the instrument goes up by as
- * much, or it would be in the skin before it touches it.
- */
-static double relief_at(const struct incise_view *view, const double point_mm[3],
-			double normal[3])
-{
-	struct incise_touch touch;
-	double px[2];
-
-	if (!view->picture.larynx)
-		return 0;
-	incise_surface_nearest(view->surface, point_mm, &touch);
-	v3_copy(normal, touch.normal);
-	return uv_map_px(view->map, touch.point_mm, px) ? uv_map_relief_mm(view->map, px)
-							: 0;
-}
-
+/* The instrument rises with the relief, or it would be in the skin before it touches it. */
 static void lift(const struct incise_view *view, struct incise_tick *tick)
 {
 	double normal[3] = {0};
-	double mm = relief_at(view, tick->tool_mm, normal);
+	double mm = uv_map_relief_at_mm(view->map, tick->tool_mm, normal);
 
 	v3_add(tick->position_mm, tick->position_mm, mm, normal);
 	v3_add(tick->tool_mm, tick->tool_mm, mm, normal);
@@ -390,38 +373,17 @@ void incise_view_set_camera(struct incise_view *view,
 		view->orbit.camera = held;
 }
 
-void incise_view_ray(const struct incise_view *view, double x_px, double y_px,
+static void read_ray(const struct incise_view *view, double x_px, double y_px,
 		     struct incise_view_ray *ray)
 {
-	struct incise_touch touch;
+	const struct incise_view_camera *camera = &view->orbit.camera;
 	struct view_projection projection;
-	double up_mm = 0, up[3] = {0};
 
-	memset(ray, 0, sizeof(*ray));
-	if (!isfinite(x_px) || !isfinite(y_px))
-		return;
-	view_camera_project(&view->orbit.camera, view->width, view->height, 1,
-			    &projection);
+	view_camera_project(camera, view->width, view->height, 1, &projection);
 	v3_copy(ray->from_mm, projection.position_mm);
 	view_camera_ray(&projection, view->width, view->height, x_px, y_px, ray->way);
-	/*
-	 * What is seen there stands above what is felt by a relief that is known where the
-	 * ray meets it only: so some rounds, each with the last one's.
-	 */
-	for (int i = 0; i < 4; i++) {
-		double from[3], to[3];
-
-		v3_add(from, ray->from_mm, -up_mm, up);
-		v3_add(to, from, 2 * view->orbit.camera.distance_mm + 1e4, ray->way);
-		ray->met = incise_surface_enters(view->surface, from, to, &touch);
-		if (!ray->met)
-			return;
-		v3_copy(ray->point_mm, touch.point_mm);
-		v3_copy(ray->normal, touch.normal);
-		up_mm = relief_at(view, ray->point_mm, up);
-		if (up_mm == 0)
-			return;
-	}
+	ray->met = uv_map_meet(view->map, ray->from_mm, ray->way,
+			       2 * camera->distance_mm + 1e4, ray->point_mm, ray->normal);
 }
 
 int incise_view_event(struct incise_view *view, struct incise_view_event *event)
@@ -430,7 +392,7 @@ int incise_view_event(struct incise_view *view, struct incise_view_event *event)
 		return 0;
 	if (event->type == INCISE_VIEW_MOTION || event->type == INCISE_VIEW_BUTTON ||
 	    event->type == INCISE_VIEW_WHEEL)
-		incise_view_ray(view, event->x_px, event->y_px, &event->ray);
+		read_ray(view, event->x_px, event->y_px, &event->ray);
 	event->used = view_orbit_event(&view->orbit, event, view->height);
 	if (event->type == INCISE_VIEW_KEY && event->pressed && !event->repeat) {
 		bool help = event->key == INCISE_VIEW_F1 || event->key == 'h';
@@ -464,7 +426,7 @@ void incise_view_report(const struct incise_view *view, struct incise_view_repor
 		.draw_s = view->draw_s,
 		.triangles = view->map->n_indices / 3,
 		.texture_px = view->map->size,
-		.renderer = incise_draw_renderer(view->draw),
-		.samples = incise_draw_samples(view->draw),
+		.renderer = incise_draw_info(view->draw)->renderer,
+		.samples = incise_draw_info(view->draw)->samples,
 	};
 }

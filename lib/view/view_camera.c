@@ -90,20 +90,6 @@ void view_camera_ray(const struct view_projection *projection, int width, int he
 		v3_copy(way, v);
 }
 
-bool view_camera_px(const struct view_projection *projection, int width, int height,
-		    const double point_mm[3], double px[2])
-{
-	double from[3], ahead;
-
-	v3_sub(from, point_mm, projection->position_mm);
-	ahead = -v3_dot(from, projection->back) * projection->half_height;
-	if (!(ahead > 0))
-		return false;
-	px[0] = 0.5 * (width + v3_dot(from, projection->right) / ahead * height);
-	px[1] = 0.5 * height * (1 - v3_dot(from, projection->up) / ahead);
-	return true;
-}
-
 /* --- Orbit: mouse and keys move the camera --- */
 
 #define DEG_PER_PX 0.35

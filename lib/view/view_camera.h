@@ -33,10 +33,6 @@ void view_camera_project(const struct incise_view_camera *camera, int width, int
 void view_camera_ray(const struct view_projection *projection, int width, int height,
 		     double x_px, double y_px, double way[3]);
 
-/* Where a place is in the picture; false: behind the eye. */
-bool view_camera_px(const struct view_projection *projection, int width, int height,
-		    const double point_mm[3], double px[2]);
-
 /*
  * The camera under control of mouse and keys: right button and arrows turn it round its target, the
  * middle button moves the target, the wheel changes the distance.

@@ -8,39 +8,39 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../base/vector.h"
+#include "ground.h"
 #include "noise.h"
 #include "wound.h"
 
-/* --- The fields, and a stretch of the line that raises them --- */
+/* --- The fields, and the stretches of the line that raise them --- */
 
 #define FIELD_TEXELS (CANVAS_TILE * CANVAS_TILE)
-/* How far outside of the lips their distance is kept, mm. */
+/* Distances to the lips are kept up to this far outside, mm. */
 #define FIELD_INSIDE_MIN_MM -1.0f
-#define FIELD_STEPS_MM 4096.0f /* to a mm */
+#define FIELD_STEPS_MM 4096.0f /* per mm */
 #define FIELD_BIAS_MM 8.0f
 
 /* All 0: there is no wound. */
 struct field_texel {
-	uint16_t
-		inside; /* (mm inside of the lips + FIELD_BIAS_MM) FIELD_STEPS_MM; 0: far */
-	uint16_t depth; /* mm FIELD_STEPS_MM */
-	uint16_t halo;	/* 0 … 65535 */
+	uint16_t inside; /* (mm inside of the lips + BIAS) · STEPS; 0: far */
+	uint16_t depth;	 /* mm · STEPS */
+	uint16_t halo;	 /* 0 … 65535 */
 };
 
-/* An end of a stretch, as it is to be drawn. */
+/* An end of a stretch, as drawn. */
 struct field_end {
 	float px[2], half_mm, depth_mm;
 };
 
-/* A stretch, prepared; from_px … to_px is what it can touch, texels. */
+/* A stretch, prepared; from_px … to_px: the texels that it can touch. */
 struct field_stretch {
 	struct ground_metric metric;
 	float x, y;		     /* one end, texels */
 	float along[2], inverse_mm2; /* to the other, mm; 1 / length², or 0 */
-	float half_mm, half_more_mm; /* there, and by how much more at the other */
+	float half_mm, half_more_mm; /* at this end; increase to the other */
 	float depth_mm, depth_more_mm;
 	float reach_mm;
-	int from_px[2], to_px[2]; /* to_px is outside */
+	int from_px[2], to_px[2]; /* to_px is exclusive */
 };
 
 #define FIELD_INSIDE_MAX_MM 7.9f
@@ -51,13 +51,13 @@ static float field_inside_mm(const struct field_texel *texel)
 	return (float)texel->inside * (1 / FIELD_STEPS_MM) - FIELD_BIAS_MM;
 }
 
-/* The reddened skin beside a cut: mm, more beside a deep one. */
+/* Width of the reddened skin along a cut: mm, more along a deep one. */
 static float halo_mm(float depth_mm)
 {
 	return fminf(0.7f + 0.35f * depth_mm, 2.5f);
 }
 
-/* Texels that a span of mm around some can touch, cut to the texture. */
+/* The texels within a reach of others, clipped to the texture. */
 static bool span(float low, float high, float reach, int size, int *from, int *to)
 {
 	low = fmaxf(floorf(low - reach) - 1, 0);
@@ -69,6 +69,7 @@ static bool span(float low, float high, float reach, int size, int *from, int *t
 	return true;
 }
 
+/* Returns false when it touches none of size × size texels. */
 static bool field_prepare(struct field_stretch *s, const struct field_end *a,
 			  const struct field_end *b, const struct ground_metric *m,
 			  int size)
@@ -132,6 +133,7 @@ static void raise_texel(struct field_texel *texel, const struct field_stretch *s
 		raise_to(&texel->halo, out * out * fminf(depth / 1.5f, 1) * 65535);
 }
 
+/* Raise the fields of the tile that begins at this texel, where the stretch is. */
 static void field_raise(struct field_texel *tile, int x, int y,
 			const struct field_stretch *s)
 {
@@ -153,7 +155,7 @@ static void field_raise(struct field_texel *tile, int x, int y,
 	}
 }
 
-/* A colour of some strength over premultiplied ones. */
+/* A colour with alpha over premultiplied ones. */
 static void over(float to[4], float r, float g, float b, float alpha)
 {
 	const float colour[4] = {r, g, b, 1};
@@ -184,7 +186,7 @@ static void colour_texel(const struct field_texel *texel, float x_mm, float y_mm
 	float soft = fmaxf(0.06f, texel_mm), colour[4] = {0}, lip, core, deep, wet;
 
 	over(colour, 0.68f, 0.15f, 0.12f, halo * (0.48f + 0.10f * grain));
-	/* The rim of the skin stands up a little and is pale. */
+	/* The rim of the skin rises a little and is pale. */
 	lip = 1 - fabsf(inside + 0.17f) / 0.2f;
 	if (lip > 0)
 		over(colour, 0.93f, 0.66f, 0.58f, 0.6f * lip * halo);
@@ -196,12 +198,13 @@ static void colour_texel(const struct field_texel *texel, float x_mm, float y_mm
 		     mix(0.20f, 0.012f, deep) * wet, mix(0.15f, 0.02f, deep) * wet,
 		     core * 0.97f);
 	}
-	/* Rounded together, so that no colour is above its alpha. */
+	/* No colour may exceed its alpha, rounding included. */
 	rgba[3] = (uint8_t)(fminf(colour[3], 1) * 255 + 0.5f);
 	for (int i = 0; i < 3; i++)
 		rgba[i] = (uint8_t)(fminf(colour[i], colour[3]) * 255 + 0.5f);
 }
 
+/* Colours of a tile; texel_mm: size of a texel, for the grain of the flesh. */
 static void field_colour(const struct field_texel *tile, int x, int y, float texel_mm,
 			 uint8_t *rgba, int stride)
 {
@@ -219,8 +222,22 @@ static void field_colour(const struct field_texel *tile, int x, int y, float tex
 
 /* --- The line of its points --- */
 
-/* A cut runs out into a point over this length at either end. */
+/* A cut tapers over this length at both ends, down to this part of its width. */
 #define LINE_TAPER_MM 1.6f
+#define TAPER_LEAST 0.12f
+
+/* A point of the line. */
+struct wound_point {
+	float px[2];
+	float depth_mm;
+	float half_mm;	/* half-width at rest, if never opened */
+	float open_mm;	/* present opening */
+	float wider_mm; /* lasting widening */
+	float arc_mm;	/* from the cut's start */
+	bool joined;	/* to the point before it */
+	bool settled;	/* its width and depth are final, and in the fields */
+	struct ground_metric metric;
+};
 
 struct wound {
 	const struct uv_map *map;
@@ -229,26 +246,24 @@ struct wound {
 	struct field_texel *field; /* tile after tile */
 	struct canvas_tiles tiles; /* to be painted */
 
-	/* Points have numbers; those from @first to before @end are there. */
+	/* Points have numbers, from @first to before @end. */
 	uint64_t first, end;
-	uint64_t settled; /* those before are settled */
+	uint64_t settled; /* all before are settled */
 	struct wound_point *points;
 
-	bool cutting; /* and @tip is the blade, joined to the last point */
+	bool cutting; /* @tip is the blade, joined to the last point */
 	struct wound_point tip;
 	double tip_mm[3]; /* on the surface */
 	int64_t tip_ns;
 
-	bool inserted, moving; /* lips are not at rest */
+	bool inserted, moving; /* moving: lips are not at rest */
 	double tool_px[2], tool_half_mm, tool_depth_mm;
 
 	double cut_mm;
 	uint64_t stamps;
-	struct field_stretch *over; /* room to paint: WOUND_POINTS and the blade's */
+	struct field_stretch
+		*over; /* buffer for painting: WOUND_POINTS and the blade's */
 };
-
-/* As thin it is at its very end. */
-#define TAPER_LEAST 0.12f
 
 static struct wound_point *line_point(const struct wound *wound, uint64_t number)
 {
@@ -261,7 +276,7 @@ static float taper(float from_end_mm)
 	return fminf(fmaxf(from_end_mm / LINE_TAPER_MM, TAPER_LEAST), 1);
 }
 
-/* How a point is to be drawn when the cut ends at this arc. */
+/* A point as drawn when the cut ends at this arc. */
 static struct field_end line_end(const struct wound_point *p, float end_mm)
 {
 	float thin = p->settled ? 1 : taper(fminf(p->arc_mm, end_mm - p->arc_mm));
@@ -292,7 +307,7 @@ static void line_raise(struct wound *wound, const struct field_stretch *s)
 				    x * CANVAS_TILE, y * CANVAS_TILE, s);
 }
 
-/* The stretch that ends at a point, drawn so. */
+/* The stretch that ends at a point, likewise; false when it touches no texel. */
 static bool line_stretch(const struct wound *wound, const struct wound_point *before,
 			 const struct wound_point *p, float end_mm,
 			 struct field_stretch *stretch)
@@ -304,12 +319,13 @@ static bool line_stretch(const struct wound *wound, const struct wound_point *be
 	return field_prepare(stretch, &a, &b, &p->metric, wound->size);
 }
 
+/* The point before, or NULL. */
 static const struct wound_point *line_before(const struct wound *wound, uint64_t number)
 {
 	return number > wound->first ? line_point(wound, number - 1) : NULL;
 }
 
-/* Points are final up to where the blade cannot thin them any more. */
+/* Points up to an arc are final, as the blade's taper no longer reaches them. */
 static void line_settle(struct wound *wound, float end_mm, float until_mm)
 {
 	while (wound->settled < wound->end) {
@@ -333,6 +349,7 @@ static void line_settle(struct wound *wound, float end_mm, float until_mm)
 	}
 }
 
+/* The lips are farther apart than they will stay. */
 static bool line_open(const struct wound_point *p)
 {
 	return p->open_mm > p->wider_mm;
@@ -340,20 +357,20 @@ static bool line_open(const struct wound_point *p)
 
 /* --- Cutting --- */
 
-/* Less deep the blade touches the skin but does not cut it. */
+/* At a smaller depth the blade touches the skin without cutting it. */
 #define CUTS_FROM_MM 0.05
 #define DEPTH_MAX_MM 15.0
-/* A hand is not faster; what is, or was not seen for so long, is no way but a leap. */
+/* Faster motion, or a longer gap, is a discontinuity. */
 #define SPEED_MAX_MM_S 5000.0
 #define GAP_MAX_NS 500000000
-#define LEAP_MIN_MM 1.0
-/* A way between two ticks is cut into pieces no longer than this, mm, if not too many. */
+#define JUMP_MIN_MM 1.0
+/* Ways between ticks are divided into pieces of at most this length, mm. */
 #define WAY_MM 0.6
 #define WAYS_MAX 500
 /* A prick without length bleeds like this much of a cut. */
 #define PRICK_MM 0.3
 
-/* Half of what is put in: a scalpel's handle, a tube. */
+/* Half-widths of a scalpel's handle and a tube. */
 #define HANDLE_HALF_MM 1.5
 #define TUBE_HALF_MM 2.0
 
@@ -370,7 +387,7 @@ struct wound *wound_new(const struct uv_map *map, struct incise_error *err)
 	wound->texel_mm = 0.1f;
 	if (ground_metric(map, middle, &metric))
 		wound->texel_mm = sqrtf(metric.a * metric.c);
-	/* From calloc: pages that nobody writes are not there. */
+	/* From calloc: unwritten pages take no memory. */
 	wound->field = calloc((size_t)map->size * map->size, sizeof(*wound->field));
 	wound->points = calloc(WOUND_POINTS, sizeof(*wound->points));
 	wound->over = calloc(WOUND_POINTS + 1, sizeof(*wound->over));
@@ -394,19 +411,24 @@ void wound_free(struct wound *wound)
 	free(wound);
 }
 
-/* What was there before of the depth, halfway along a stretch. */
+/* The fields at a texel; none outside of the texture. */
+static struct field_texel field_at(const struct wound *wound, int x, int y)
+{
+	size_t tile = (size_t)(y / CANVAS_TILE) * wound->tiles.side + x / CANVAS_TILE;
+
+	if (x < 0 || y < 0 || x >= wound->size || y >= wound->size)
+		return (struct field_texel){0};
+	return wound->field[tile * FIELD_TEXELS + y % CANVAS_TILE * CANVAS_TILE +
+			    x % CANVAS_TILE];
+}
+
+/* The previous depth, halfway along a stretch. */
 static double cut_before_mm(const struct wound *wound, const struct wound_point *a,
 			    const struct wound_point *b)
 {
-	int x = (int)((a->px[0] + b->px[0]) / 2), y = (int)((a->px[1] + b->px[1]) / 2);
-	const struct field_texel *tile;
-
-	if (x < 0 || y < 0 || x >= wound->size || y >= wound->size)
-		return 0;
-	tile = wound->field +
-	       ((size_t)(y / CANVAS_TILE) * wound->tiles.side + x / CANVAS_TILE) *
-		       FIELD_TEXELS;
-	return tile[y % CANVAS_TILE * CANVAS_TILE + x % CANVAS_TILE].depth /
+	return field_at(wound, (int)((a->px[0] + b->px[0]) / 2),
+			(int)((a->px[1] + b->px[1]) / 2))
+		       .depth /
 	       (double)FIELD_STEPS_MM;
 }
 
@@ -443,7 +465,7 @@ static void push(struct wound *wound, struct wound_stroke *stroke)
 	line_settle(wound, INFINITY, wound->tip.arc_mm - LINE_TAPER_MM);
 }
 
-/* The stretches that are not in the fields yet have changed. */
+/* The stretches that are not yet in the fields have changed. */
 static void mark_tail(struct wound *wound)
 {
 	struct field_stretch stretch;
@@ -464,7 +486,7 @@ static bool lift(struct wound *wound, struct wound_stroke *stroke)
 	if (!wound->cutting)
 		return false;
 	mark_tail(wound);
-	/* What is left of the way since the last point, or a prick. */
+	/* The rest of the way since the last point, or a prick. */
 	if (wound->tip.depth_mm > 0) {
 		bool prick = wound->tip.arc_mm < PRICK_MM;
 
@@ -490,8 +512,9 @@ struct blade {
 	struct ground_metric metric;
 };
 
-/* Whether the blade cannot have gone there through the tissue. */
-static bool leaps(const struct wound *wound, const struct blade *blade, double *way_mm)
+/* Whether the blade cannot have moved there through the tissue. */
+static bool is_discontinuity(const struct wound *wound, const struct blade *blade,
+			     double *way_mm)
 {
 	double off[3], dt_s, along_mm;
 	int64_t dt_ns;
@@ -502,12 +525,12 @@ static bool leaps(const struct wound *wound, const struct blade *blade, double *
 	dt_s = (double)dt_ns * 1e-9;
 	v3_sub(off, blade->point_mm, wound->tip_mm);
 	*way_mm = v3_length(off);
-	if (!(*way_mm <= LEAP_MIN_MM + SPEED_MAX_MM_S * dt_s))
+	if (!(*way_mm <= JUMP_MIN_MM + SPEED_MAX_MM_S * dt_s))
 		return true;
-	/* Over a seam of the texture a short way is a long one in texels. */
+	/* Across a seam of the texture a short way is a long one in texels. */
 	along_mm = ground_length_mm(&blade->metric, blade->px[0] - wound->tip.px[0],
 				    blade->px[1] - wound->tip.px[1]);
-	return along_mm > LEAP_MIN_MM + 3 * *way_mm;
+	return along_mm > JUMP_MIN_MM + 3 * *way_mm;
 }
 
 static void place(struct wound *wound, const struct blade *blade)
@@ -533,7 +556,7 @@ static void begin(struct wound *wound, const struct blade *blade)
 	push(wound, &none);
 }
 
-/* The tip as a point of the line; or several when it is far, as the taper needs them. */
+/* Add the tip to the line, with points between if it is far, as the taper needs them. */
 static void push_way(struct wound *wound, double since_mm, struct wound_stroke *stroke)
 {
 	const struct wound_point from = *line_point(wound, wound->end - 1),
@@ -551,7 +574,7 @@ static void push_way(struct wound *wound, double since_mm, struct wound_stroke *
 		wound->tip.depth_mm = from.depth_mm + t * (to.depth_mm - from.depth_mm);
 		wound->tip.half_mm = half_mm(wound->tip.depth_mm);
 		wound->tip.arc_mm = from.arc_mm + t * (to.arc_mm - from.arc_mm);
-		/* Of a point that is thinned already the depth is less than it was. */
+		/* The depth of a tapered point is no longer its own. */
 		if (i == n || from.settled) {
 			wound->tip.depth_mm = to.depth_mm;
 			wound->tip.half_mm = to.half_mm;
@@ -575,7 +598,7 @@ static bool cut(struct wound *wound, const struct blade *blade,
 	double way_mm = 0, since_mm;
 	bool added = false;
 
-	if (!wound->cutting || leaps(wound, blade, &way_mm)) {
+	if (!wound->cutting || is_discontinuity(wound, blade, &way_mm)) {
 		added = lift(wound, stroke);
 		begin(wound, blade);
 		mark_tail(wound);
@@ -637,20 +660,20 @@ bool wound_tick(struct wound *wound, const struct incise_tick *tick,
 
 /* --- Lips: they open around an instrument, and close --- */
 
-/* In so deep, it opens the cut by all of its width. */
+/* At this depth an instrument opens the cut by its full width. */
 #define INSERTED_MM 1.5
-/* How far along the cut it opens it, in halves of the tool; the lips are that stiff. */
+/* Reach of the opening along the cut, in half-widths: stiffness of the lips. */
 #define SHOULDER_HALVES 4.5
-/* They stay wider by this part of how far they were opened. */
+/* Lips stay wider by this part of their largest opening. */
 #define WIDER 0.12f
-/* Parts of the way that they go in a step: 60 ms to open; to close, the last 2 % at 1 s. */
+/* Part of the way per step: opened in 60 ms, closed to 2 % in 1 s. */
 #define OPENING 0.15f
 #define CLOSING 0.036f
 #define AT_REST_MM 0.004f
 
-/* Half of the width that the tool asks of a point, this far from it and from the ends. */
-static float asked_mm(const struct wound *wound, const struct wound_point *p,
-		      float end_mm)
+/* The half-width that the tool requires at a point. */
+static float required_mm(const struct wound *wound, const struct wound_point *p,
+			 float end_mm)
 {
 	double off, ends, in;
 
@@ -661,7 +684,7 @@ static float asked_mm(const struct wound *wound, const struct wound_point *p,
 	      (wound->tool_half_mm * SHOULDER_HALVES);
 	if (!(off < 1))
 		return 0;
-	/* The corners of a slit stay where they are. */
+	/* The corners of a slit stay closed. */
 	ends = fmin(fmax(fmin(p->arc_mm, end_mm - p->arc_mm) / (2 * LINE_TAPER_MM), 0),
 		    1);
 	in = fmin(wound->tool_depth_mm / INSERTED_MM, 1);
@@ -689,7 +712,7 @@ static void stretches_at(struct wound *wound, uint64_t number, bool at_rest)
 static void step_point(struct wound *wound, uint64_t number, float end_mm)
 {
 	struct wound_point *p = line_point(wound, number);
-	float to = fmaxf(asked_mm(wound, p, end_mm) - p->half_mm, 0), was = p->open_mm;
+	float to = fmaxf(required_mm(wound, p, end_mm) - p->half_mm, 0), was = p->open_mm;
 	bool was_open = line_open(p);
 
 	if (to == was)
@@ -723,11 +746,11 @@ void wound_step(struct wound *wound)
 
 /* --- The layer --- */
 
-/* So many stretches at most are drawn as one, with no turn above this tangent. */
+/* Maximum number of stretches that are drawn as one; maximum turn, tangent. */
 #define TOGETHER 3
 #define STRAIGHT 0.1f
 
-/* A tile with what is not in the fields laid over it. */
+/* Paint a tile: its fields, and the stretches over them. */
 static void paint_tile(struct wound *wound, const struct field_stretch *over, int n,
 		       int tile, uint8_t *rgba)
 {
@@ -742,7 +765,7 @@ static void paint_tile(struct wound *wound, const struct field_stretch *over, in
 		     rgba + ((size_t)y * wound->size + x) * 4, wound->size * 4);
 }
 
-/* Whether the line goes on at a point as it came. */
+/* Whether the line is straight at a point. */
 static bool straight(const struct wound *wound, uint64_t number)
 {
 	const float *a = line_point(wound, number - 1)->px;
@@ -755,8 +778,8 @@ static bool straight(const struct wound *wound, uint64_t number)
 }
 
 /*
- * The last of some stretches that can be drawn as one: where lips are open they are wide,
- * and each would be drawn over much of the one before.
+ * The last of the stretches that can be drawn as one: open lips are wide, and single stretches
+ * would overlap.
  */
 static uint64_t together(const struct wound *wound, uint64_t from)
 {
@@ -771,7 +794,7 @@ static uint64_t together(const struct wound *wound, uint64_t from)
 	return to;
 }
 
-/* Stretches that move, and those behind the blade. */
+/* Stretches that move, and those behind the blade. Returns their number. */
 static int laid_over(const struct wound *wound, struct field_stretch *over)
 {
 	int n = 0;
@@ -822,14 +845,9 @@ bool wound_inserted(const struct wound *wound, double px[2], double *depth_mm)
 
 double wound_inside_mm(const struct wound *wound, int x, int y)
 {
-	const struct field_texel *tile;
+	struct field_texel texel = field_at(wound, x, y);
 
-	if (x < 0 || y < 0 || x >= wound->size || y >= wound->size)
-		return -FIELD_BIAS_MM;
-	tile = wound->field +
-	       ((size_t)(y / CANVAS_TILE) * wound->tiles.side + x / CANVAS_TILE) *
-		       FIELD_TEXELS;
-	return field_inside_mm(&tile[y % CANVAS_TILE * CANVAS_TILE + x % CANVAS_TILE]);
+	return field_inside_mm(&texel);
 }
 
 double wound_cut_mm(const struct wound *wound)
@@ -845,12 +863,4 @@ uint64_t wound_stamps(const struct wound *wound)
 int wound_points(const struct wound *wound)
 {
 	return (int)(wound->end - wound->first);
-}
-
-size_t wound_memory(const struct wound *wound)
-{
-	return sizeof(*wound) +
-	       (size_t)wound->size * wound->size * sizeof(*wound->field) +
-	       (size_t)wound->tiles.side * wound->tiles.side +
-	       WOUND_POINTS * (sizeof(*wound->points) + sizeof(*wound->over));
 }

@@ -147,10 +147,6 @@ struct incise_view_ray {
 	double normal[3]; /**< outward, unit */
 };
 
-/** The ray of a pixel, x from the left and y from the top; its middle is at .5. */
-INCISE_API void incise_view_ray(const struct incise_view *view, double x_px, double y_px,
-				struct incise_view_ray *ray);
-
 /** What happened at the window. */
 enum incise_view_event_type {
 	INCISE_VIEW_KEY,

@@ -15,9 +15,9 @@
 #include "../../../lib/surface/surface.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/draw.h"
-#include "../../../lib/view/view_camera.h"
 #include "../../../lib/view/instrument_shape.h"
 #include "look.h"
+#include "project.h"
 
 #define W 320
 #define H 180
@@ -256,7 +256,7 @@ static void test_instrument_is_where_its_pose_says(void **state)
 		double p[3], px[2];
 
 		v3_add(p, place.origin_mm, mm, place.z);
-		assert_true(view_camera_px(&projection, W, H, p, px));
+		assert_true(project(&projection, W, H, p, px));
 		if (px[0] >= 0 && px[0] < W && px[1] >= 0 && px[1] < H)
 			assert_true(differs((int)px[0], (int)px[1]));
 	}
@@ -269,7 +269,7 @@ static void test_instrument_is_where_its_pose_says(void **state)
 		v3_add(p, p, mesh.vertices[i].position_mm[0], place.x);
 		v3_add(p, p, mesh.vertices[i].position_mm[1], place.y);
 		v3_add(p, p, mesh.vertices[i].position_mm[2], place.z);
-		assert_true(view_camera_px(&projection, W, H, p, px));
+		assert_true(project(&projection, W, H, p, px));
 		for (int k = 0; k < 2; k++) {
 			low[k] = fmin(low[k], px[k]);
 			high[k] = fmax(high[k], px[k]);
@@ -324,7 +324,7 @@ static void test_dirty_rectangle(void **state)
 		double p[3], normal[3], at[2];
 
 		assert_true(uv_map_point(map, px, p, normal));
-		assert_true(view_camera_px(&projection, W, H, p, at));
+		assert_true(project(&projection, W, H, p, at));
 		for (int k = 0; k < 2; k++) {
 			low[k] = fmin(low[k], at[k]);
 			high[k] = fmax(high[k], at[k]);

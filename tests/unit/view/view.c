@@ -13,6 +13,8 @@
 #include <unistd.h>
 #include <incise/view.h>
 #include "../../../lib/base/vector.h"
+#include "../../../lib/view/uv_map.h"
+#include "../../../lib/view/view_camera.h"
 #include "look.h"
 
 #define W 320
@@ -171,22 +173,42 @@ static void test_ticks_that_are_no_numbers(void **state)
 	incise_view_free(view);
 }
 
-/* The ray of a pixel meets the surface where that place is drawn, larynx and all. */
-static void test_rays(void **state)
+/* As the view reads the ray of an event. */
+static struct incise_view_ray ray_of(const struct incise_view *view,
+				     const struct uv_map *map, double x, double y)
 {
 	struct incise_view_camera camera;
+	struct incise_view_ray ray = {.met = false};
+	struct view_projection projection;
+
+	incise_view_camera(view, &camera);
+	view_camera_project(&camera, W, H, 1, &projection);
+	view_camera_ray(&projection, W, H, x, y, ray.way);
+	ray.met = uv_map_meet(map, projection.position_mm, ray.way,
+			      2 * camera.distance_mm + 1e4, ray.point_mm, ray.normal);
+	return ray;
+}
+
+/* The ray of a pixel meets the surface as drawn there, including the larynx. */
+static void test_rays(void **state)
+{
 	struct incise_view_ray ray;
+	struct incise_scene_picture picture;
 	struct incise_view *view;
+	struct uv_map *map;
 	int met = 0;
 
 	if (!possible)
 		skip();
 	view = view_new();
+	incise_scene_picture(scene, &picture);
+	map = uv_map_new(incise_plan_surface(plan), &picture, NULL);
+	assert_non_null(map);
 	for (double y = 5.5; y < H; y += 17)
 		for (double x = 5.5; x < W; x += 17) {
 			struct incise_touch touch;
 
-			incise_view_ray(view, x, y, &ray);
+			ray = ray_of(view, map, x, y);
 			assert_true(fabs(v3_length(ray.way) - 1) < 1e-12);
 			if (!ray.met)
 				continue;
@@ -197,15 +219,15 @@ static void test_rays(void **state)
 			assert_true(v3_dot(ray.normal, ray.way) < 0);
 		}
 	assert_true(met > 50);
-	/* In the middle is the target, or what is before it. */
-	incise_view_camera(view, &camera);
-	incise_view_ray(view, W / 2.0, H / 2.0, &ray);
+	/* In the middle is the target, or something in front of it. */
+	ray = ray_of(view, map, W / 2.0, H / 2.0);
 	assert_true(ray.met);
 	/* The upper corners look past the neck. */
-	incise_view_ray(view, W - 1, 1, &ray);
+	ray = ray_of(view, map, W - 1, 1);
 	assert_false(ray.met);
-	incise_view_ray(view, NAN, 1, &ray);
+	ray = ray_of(view, map, NAN, 1);
 	assert_false(ray.met);
+	uv_map_free(map);
 	incise_view_free(view);
 }
 

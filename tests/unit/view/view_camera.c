@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../../../lib/base/vector.h"
-#include "../../../lib/view/view_camera.h"
+#include "project.h"
 
 static const struct incise_view_camera cameras[] = {
 	{{0, 0, 0}, 0, 0, 100, 40},
@@ -31,16 +31,16 @@ static void test_directions(void **state)
 	/* At azimuth 0 one looks along +y. */
 	assert_true(fabs(projection.position_mm[1] + 100) < 1e-12 &&
 		    fabs(projection.position_mm[0]) < 1e-12);
-	assert_true(view_camera_px(&projection, 200, 100, cameras[0].target_mm, px));
+	assert_true(project(&projection, 200, 100, cameras[0].target_mm, px));
 	assert_true(fabs(px[0] - 100) < 1e-9 && fabs(px[1] - 50) < 1e-9);
-	assert_true(view_camera_px(&projection, 200, 100, to_right, px) && px[0] > 100);
-	assert_true(view_camera_px(&projection, 200, 100, over, px) && px[1] < 50);
+	assert_true(project(&projection, 200, 100, to_right, px) && px[0] > 100);
+	assert_true(project(&projection, 200, 100, over, px) && px[1] < 50);
 	/* At 90 along -x. */
 	view_camera_project(&(struct incise_view_camera){{0, 0, 0}, 90, 0, 100, 40}, 200,
 			    100, 50, &projection);
 	assert_true(fabs(projection.position_mm[0] - 100) < 1e-12);
 	/* What is behind is nowhere. */
-	assert_false(view_camera_px(&projection, 200, 100, (double[]){101, 0, 0}, px));
+	assert_false(project(&projection, 200, 100, (double[]){101, 0, 0}, px));
 }
 
 static void test_pixel_and_back(void **state)
@@ -57,7 +57,7 @@ static void test_pixel_and_back(void **state)
 			view_camera_ray(&projection, 320, 180, x, y, way);
 			assert_true(fabs(v3_length(way) - 1) < 1e-12);
 			v3_add(p, projection.position_mm, 3 + k, way);
-			assert_true(view_camera_px(&projection, 320, 180, p, px));
+			assert_true(project(&projection, 320, 180, p, px));
 			/* 1e5 mm from the target a double leaves 1e-11 mm, a pixel is 0.1. */
 			assert_true(fabs(px[0] - x) < 1e-6 && fabs(px[1] - y) < 1e-6);
 		}
@@ -83,7 +83,7 @@ static void test_matrix_says_the_same(void **state)
 					  projection.clip[12 + row];
 			w = at[3];
 			assert_true(w > 0);
-			assert_true(view_camera_px(&projection, 320, 180, p, px));
+			assert_true(project(&projection, 320, 180, p, px));
 			/* Single precision of the matrix, over a picture of 320 pixels. */
 			assert_true(fabs((at[0] / w + 1) * 160 - px[0]) < 0.01);
 			assert_true(fabs((1 - at[1] / w) * 90 - px[1]) < 0.01);
@@ -153,7 +153,7 @@ static void test_moves_with_the_mouse(void **state)
 	event = motion(700, 300, 2);
 	assert_true(view_orbit_event(&orbit, &event, 720));
 	view_camera_project(&orbit.camera, 1280, 720, 100, &projection);
-	assert_true(view_camera_px(&projection, 1280, 720, old, px));
+	assert_true(project(&projection, 1280, 720, old, px));
 	assert_true(fabs(px[0] - 700) < 1e-6 && fabs(px[1] - 300) < 1e-6);
 }
 
