@@ -9,10 +9,10 @@
  */
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
+#include <epoxy/common.h>
 #include <errno.h>
 #include <stdbool.h>
 #include <stdlib.h>
-#include <string.h>
 #include "egl.h"
 
 #define HINT "install libegl1 and libgl1-mesa-dri, which draw without a screen"
@@ -23,23 +23,13 @@ struct incise_egl {
 	EGLContext context;
 };
 
-static bool has(const char *extensions, const char *name)
-{
-	size_t n = strlen(name);
-
-	for (const char *at = extensions; at && (at = strstr(at, name)); at += n)
-		if ((at == extensions || at[-1] == ' ') && (!at[n] || at[n] == ' '))
-			return true;
-	return false;
-}
-
 static EGLDisplay surfaceless(void)
 {
 	const char *extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
 	PFNEGLGETPLATFORMDISPLAYEXTPROC get;
 
-	if (!has(extensions, "EGL_MESA_platform_surfaceless") ||
-	    !has(extensions, "EGL_EXT_platform_base"))
+	if (!epoxy_extension_in_string(extensions, "EGL_MESA_platform_surfaceless") ||
+	    !epoxy_extension_in_string(extensions, "EGL_EXT_platform_base"))
 		return EGL_NO_DISPLAY;
 	get = (PFNEGLGETPLATFORMDISPLAYEXTPROC)eglGetProcAddress(
 		"eglGetPlatformDisplayEXT");
@@ -78,7 +68,7 @@ static bool open_context(struct incise_egl *egl)
 	egl->context = eglCreateContext(egl->display, config, EGL_NO_CONTEXT, core);
 	if (egl->context == EGL_NO_CONTEXT)
 		return false;
-	if (!has(extensions, "EGL_KHR_surfaceless_context")) {
+	if (!epoxy_extension_in_string(extensions, "EGL_KHR_surfaceless_context")) {
 		egl->surface = eglCreatePbufferSurface(egl->display, config, small);
 		if (egl->surface == EGL_NO_SURFACE)
 			return false;

@@ -171,34 +171,19 @@ static void graph(cairo_t *cr, const struct overlay_graph *graph, double top,
 	text(cr, GRAPH_LEFT + 4, top + 11, 11, 0, words);
 }
 
-static const char *phase_of(const struct incise_tick *tick)
-{
-	switch (tick->phase) {
-	case INCISE_PHASE_FREE:
-		return "free";
-	case INCISE_PHASE_CUTTING:
-		return "cutting";
-	case INCISE_PHASE_INSERTION:
-		return "insertion";
-	}
-	return "?";
-}
+static const char *const phases[] = {
+	[INCISE_PHASE_FREE] = "free",
+	[INCISE_PHASE_CUTTING] = "cutting",
+	[INCISE_PHASE_INSERTION] = "insertion",
+};
+static const char *const tools[] = {
+	[INCISE_TOOL_AUTO] = "blade",
+	[INCISE_TOOL_BLADE] = "blade",
+	[INCISE_TOOL_HANDLE] = "handle",
+	[INCISE_TOOL_TUBE] = "tube",
+};
 
-static const char *tool_of(const struct incise_tick *tick)
-{
-	switch (tick->tool) {
-	case INCISE_TOOL_AUTO:
-	case INCISE_TOOL_BLADE:
-		return "blade";
-	case INCISE_TOOL_HANDLE:
-		return "handle";
-	case INCISE_TOOL_TUBE:
-		return "tube";
-	}
-	return "?";
-}
-
-/* What of a tick somebody has to know. */
+/* The most important flag. */
 static const char *warning_of(const struct incise_tick *tick)
 {
 	if (tick->flags & INCISE_TICK_FAULT)
@@ -223,7 +208,9 @@ static void say_tick(cairo_t *cr, double y, const struct incise_tick *tick)
 		snprintf(size[1], sizeof(size[1]), "%.1f",
 			 tick->depth_mm < 0 ? 0 : tick->depth_mm);
 	grey(cr, 0.95);
-	snprintf(words, sizeof(words), "%s · %s", phase_of(tick), tool_of(tick));
+	snprintf(words, sizeof(words), "%s · %s",
+		 tick->phase <= INCISE_PHASE_INSERTION ? phases[tick->phase] : "?",
+		 tick->tool <= INCISE_TOOL_TUBE ? tools[tick->tool] : "?");
 	text(cr, 14, y, 12.5, 0, words);
 	snprintf(words, sizeof(words), "%s N   %s mm", size[0], size[1]);
 	text(cr, OVERLAY_PANEL_WIDTH - 20, y, 12.5, 1, words);

@@ -312,33 +312,48 @@ static void unrolled_metric(const struct uv_map *map, const double px[2],
 /* Halvings of a cell on the way to the border: less than a thousandth of a texel. */
 #define HALVINGS 24
 
-struct grid {
-	const struct uv_map *map;
-	bool *there;
-	double (*px)[2], (*drawn)[3], (*normal)[3];
-	uint32_t *number; /* of the vertex */
+struct node {
+	bool there;
+	double px[2], drawn[3], normal[3];
+	uint32_t number; /* of the vertex, or NO_VERTEX */
 };
 
-static bool place(struct grid *grid, int i, const double px[2])
+#define NO_VERTEX UINT32_MAX
+
+struct grid {
+	const struct uv_map *map;
+	struct node *node; /* SIDE² */
+};
+
+static bool place(struct grid *grid, struct node *node, const double px[2])
 {
 	double point[3];
 
-	if (!uv_map_point(grid->map, px, point, grid->normal[i]))
+	if (!uv_map_point(grid->map, px, point, node->normal))
 		return false;
-	v3_add(grid->drawn[i], point, uv_map_relief_mm(grid->map, px), grid->normal[i]);
-	grid->px[i][0] = px[0];
-	grid->px[i][1] = px[1];
+	v3_add(node->drawn, point, uv_map_relief_mm(grid->map, px), node->normal);
+	node->px[0] = px[0];
+	node->px[1] = px[1];
 	return true;
 }
 
-static void corner_px(const struct grid *grid, int x, int y, double px[2])
+static void node_px(const struct grid *grid, int i, double px[2])
 {
-	px[0] = (double)grid->map->size * x / CELLS;
-	px[1] = (double)grid->map->size * y / CELLS;
+	px[0] = (double)grid->map->size * (i % SIDE) / CELLS;
+	px[1] = (double)grid->map->size * (i / SIDE) / CELLS;
 }
 
-/* On the way from a place of the surface to one beside it, the last one on it. */
-static void to_border(struct grid *grid, int i, const double on[2], const double off[2])
+/* The number of a neighbour, or -1. */
+static int neighbour(int i, int dx, int dy)
+{
+	int x = i % SIDE + dx, y = i / SIDE + dy;
+
+	return x < 0 || x >= SIDE || y < 0 || y >= SIDE ? -1 : y * SIDE + x;
+}
+
+/* The last place on the surface between one on it and one outside. */
+static void to_border(struct grid *grid, struct node *node, const double on[2],
+		      const double off[2])
 {
 	double in = 0, out = 1, px[2];
 
@@ -347,13 +362,13 @@ static void to_border(struct grid *grid, int i, const double on[2], const double
 
 		px[0] = on[0] + mid * (off[0] - on[0]);
 		px[1] = on[1] + mid * (off[1] - on[1]);
-		if (place(grid, i, px))
+		if (place(grid, node, px))
 			in = mid;
 		else
 			out = mid;
 	}
 	if (in == 0)
-		place(grid, i, on);
+		place(grid, node, on);
 }
 
 static void place_all(struct grid *grid)
@@ -363,38 +378,37 @@ static void place_all(struct grid *grid)
 	double px[2], on[2];
 
 	for (int i = 0; i < SIDE * SIDE; i++) {
-		corner_px(grid, i % SIDE, i / SIDE, px);
-		grid->there[i] = place(grid, i, px);
+		node_px(grid, i, px);
+		grid->node[i].there = place(grid, &grid->node[i], px);
 	}
-	/* `there` is not changed here: only true neighbours are drawn to. */
+	/* `there` does not change here: vertices move towards true neighbours only. */
 	for (int i = 0; i < SIDE * SIDE; i++) {
-		grid->number[i] = grid->there[i] ? 0 : UINT32_MAX;
-		for (int k = 0; k < 8 && grid->number[i]; k++) {
-			int x = i % SIDE + around[k][0], y = i / SIDE + around[k][1];
+		struct node *node = &grid->node[i];
 
-			if (x < 0 || x >= SIDE || y < 0 || y >= SIDE ||
-			    !grid->there[y * SIDE + x])
+		node->number = node->there ? 0 : NO_VERTEX;
+		for (int k = 0; k < 8 && node->number; k++) {
+			int other = neighbour(i, around[k][0], around[k][1]);
+
+			if (other < 0 || !grid->node[other].there)
 				continue;
-			corner_px(grid, i % SIDE, i / SIDE, px);
-			corner_px(grid, x, y, on);
-			to_border(grid, i, on, px);
-			grid->number[i] = 0;
+			node_px(grid, i, px);
+			node_px(grid, other, on);
+			to_border(grid, node, on, px);
+			node->number = 0;
 		}
 	}
 }
 
-/* A neighbour, or the vertex itself where there is none. */
+/* The place of a neighbour, or of the vertex itself where there is none. */
 static const double *beside(const struct grid *grid, int i, int dx, int dy)
 {
-	int x = i % SIDE + dx, y = i / SIDE + dy;
+	int other = neighbour(i, dx, dy);
 
-	if (x < 0 || x >= SIDE || y < 0 || y >= SIDE ||
-	    grid->number[y * SIDE + x] == UINT32_MAX)
-		return grid->drawn[i];
-	return grid->drawn[y * SIDE + x];
+	return grid->node[other < 0 || grid->node[other].number == NO_VERTEX ? i : other]
+		.drawn;
 }
 
-/* Of what is drawn: facets of a mesh smoothed, relief followed. */
+/* The normal as drawn: facets of a mesh smoothed, with the relief. */
 static void drawn_normal(const struct grid *grid, int i, double normal[3])
 {
 	double right[3], down[3], out[3];
@@ -403,20 +417,17 @@ static void drawn_normal(const struct grid *grid, int i, double normal[3])
 	v3_sub(down, beside(grid, i, 0, 1), beside(grid, i, 0, -1));
 	v3_cross(out, down, right);
 	if (!v3_unit(normal, out, 0))
-		v3_copy(normal, grid->normal[i]);
+		v3_copy(normal, grid->node[i].normal);
 }
 
-static bool raised(const struct grid *grid, int i)
+/* Whether there is relief as far as its neighbours. */
+static bool raised(const struct uv_map *map, const double px[2])
 {
-	const double *px = grid->px[i];
-	double cell = (double)grid->map->size / CELLS;
+	double cell = (double)map->size / CELLS;
 
-	/* Its neighbours lie at most so far. */
 	for (int k = -1; k <= 1; k++)
-		if (uv_map_relief_mm(grid->map, (double[2]){px[0] + k * cell, px[1]}) >
-			    1e-6 ||
-		    uv_map_relief_mm(grid->map, (double[2]){px[0], px[1] + k * cell}) >
-			    1e-6)
+		if (uv_map_relief_mm(map, (double[2]){px[0] + k * cell, px[1]}) > 1e-6 ||
+		    uv_map_relief_mm(map, (double[2]){px[0], px[1] + k * cell}) > 1e-6)
 			return true;
 	return false;
 }
@@ -424,83 +435,72 @@ static bool raised(const struct grid *grid, int i)
 static void write_vertex(const struct grid *grid, int i, struct uv_map_vertex *to)
 {
 	bool faceted = incise_surface_triangles(grid->map->surface) > 0;
+	const struct node *node = &grid->node[i];
 	double normal[3], right[3], down[3], side[3], tangent[3];
 
-	if (faceted || raised(grid, i))
+	if (faceted || raised(grid->map, node->px))
 		drawn_normal(grid, i, normal);
 	else
-		v3_copy(normal, grid->normal[i]);
-	uv_map_metric(grid->map, grid->px[i], right, down);
+		v3_copy(normal, node->normal);
+	uv_map_metric(grid->map, node->px, right, down);
 	v3_add(side, right, -v3_dot(right, normal), normal);
 	if (!v3_unit(tangent, side, 0))
 		v3_copy(tangent, grid->map->right);
 	for (int k = 0; k < 3; k++) {
-		to->position_mm[k] = (float)grid->drawn[i][k];
+		to->position_mm[k] = (float)node->drawn[k];
 		to->normal[k] = (float)normal[k];
 		to->tangent[k] = (float)tangent[k];
 	}
 	/* normal × right points up. */
 	to->tangent[3] = -1;
-	to->px[0] = (float)grid->px[i][0];
-	to->px[1] = (float)grid->px[i][1];
+	to->px[0] = (float)node->px[0];
+	to->px[1] = (float)node->px[1];
 }
 
-static void write_triangle(const struct grid *grid, struct uv_map *map, int a, int b,
-			   int c)
+static void write_triangle(const struct grid *grid, struct uv_map *map,
+			   const int corner[3])
 {
-	/* One corner at least is where it should be, or the triangle is a sliver. */
-	if (!grid->there[a] && !grid->there[b] && !grid->there[c])
-		return;
-	if (grid->number[a] == UINT32_MAX || grid->number[b] == UINT32_MAX ||
-	    grid->number[c] == UINT32_MAX)
-		return;
-	map->indices[map->n_indices++] = grid->number[a];
-	map->indices[map->n_indices++] = grid->number[b];
-	map->indices[map->n_indices++] = grid->number[c];
-}
+	bool there = false;
 
-static void write_all(struct grid *grid, struct uv_map *map)
-{
-	for (int i = 0; i < SIDE * SIDE; i++)
-		if (grid->number[i] != UINT32_MAX) {
-			write_vertex(grid, i, map->vertices + map->n_vertices);
-			grid->number[i] = (uint32_t)map->n_vertices++;
-		}
-	for (int i = 0; i < SIDE * (SIDE - 1); i++)
-		if (i % SIDE < CELLS) {
-			write_triangle(grid, map, i, i + SIDE, i + 1);
-			write_triangle(grid, map, i + 1, i + SIDE, i + SIDE + 1);
-		}
+	for (int k = 0; k < 3; k++) {
+		if (grid->node[corner[k]].number == NO_VERTEX)
+			return;
+		there = there || grid->node[corner[k]].there;
+	}
+	/* With no corner at its own place, the triangle is a sliver. */
+	for (int k = 0; k < 3 && there; k++)
+		map->indices[map->n_indices++] = grid->node[corner[k]].number;
 }
 
 static int make_grid(struct uv_map *map)
 {
 	const size_t n = SIDE * SIDE;
-	struct grid grid = {.map = map};
-	int rc = -ENOMEM;
+	struct grid grid = {map, calloc(n, sizeof(*grid.node))};
 
-	grid.there = calloc(n, sizeof(*grid.there));
-	grid.px = calloc(n, sizeof(*grid.px));
-	grid.drawn = calloc(n, sizeof(*grid.drawn));
-	grid.normal = calloc(n, sizeof(*grid.normal));
-	grid.number = calloc(n, sizeof(*grid.number));
 	map->vertices = calloc(n, sizeof(*map->vertices));
 	map->indices = calloc(6 * CELLS * CELLS, sizeof(*map->indices));
-	if (grid.there && grid.px && grid.drawn && grid.normal && grid.number &&
-	    map->vertices && map->indices) {
-		place_all(&grid);
-		write_all(&grid, map);
-		rc = 0;
+	if (!grid.node || !map->vertices || !map->indices) {
+		free(grid.node);
+		return -ENOMEM;
 	}
-	free(grid.there);
-	free(grid.px);
-	free(grid.drawn);
-	free(grid.normal);
-	free(grid.number);
-	return rc;
+	place_all(&grid);
+	for (int i = 0; i < SIDE * SIDE; i++)
+		if (grid.node[i].number != NO_VERTEX)
+			write_vertex(&grid, i, map->vertices + map->n_vertices++);
+	for (int i = 0, number = 0; i < SIDE * SIDE; i++)
+		if (grid.node[i].number != NO_VERTEX)
+			grid.node[i].number = (uint32_t)number++;
+	for (int i = 0; i < SIDE * (SIDE - 1); i++)
+		if (i % SIDE < CELLS) {
+			write_triangle(&grid, map, (int[]){i, i + SIDE, i + 1});
+			write_triangle(&grid, map,
+				       (int[]){i + 1, i + SIDE, i + SIDE + 1});
+		}
+	free(grid.node);
+	return 0;
 }
 
-/* Which kind suits the surface; its numbers and its triangles. */
+/* Choose the kind for the surface; set its values and its triangles. */
 static int init(struct uv_map *map)
 {
 	const struct incise_surface *surface = map->surface;

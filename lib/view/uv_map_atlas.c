@@ -11,6 +11,7 @@
  */
 #include <errno.h>
 #include <stdlib.h>
+#include <string.h>
 #include "../base/vector.h"
 #include "../surface/surface.h"
 #include "uv_map.h"
@@ -137,15 +138,16 @@ static uint32_t measure(struct uv_map *map)
 	return n;
 }
 
-/* Counts into first[cell + 1]; whether they are few enough. */
-static bool count(const struct uv_map *map, struct uv_atlas *atlas, int cells)
+/*
+ * Enter each triangle into the lists of its cells; without lists yet, count them in first[cell + 1].
+ * False: they are too many.
+ */
+static bool enter_all(const struct uv_map *map, struct uv_atlas *atlas)
 {
 	size_t most = (size_t)ENTRIES_PER_TRIANGLE * map->surface->mesh->n_triangles;
+	int cells = atlas->cells;
 	size_t n = 0;
 
-	atlas->cells = cells;
-	for (int i = 0; i <= cells * cells; i++)
-		atlas->first[i] = 0;
 	for (uint32_t t = 0; t < map->surface->mesh->n_triangles; t++) {
 		struct patch patch;
 		int box[4];
@@ -158,50 +160,41 @@ static bool count(const struct uv_map *map, struct uv_atlas *atlas, int cells)
 			return false;
 		for (int y = box[2]; y <= box[3]; y++)
 			for (int x = box[0]; x <= box[1]; x++)
-				atlas->first[y * cells + x + 1]++;
+				if (atlas->triangle)
+					atlas->triangle[atlas->first[y * cells + x]++] =
+						t;
+				else
+					atlas->first[y * cells + x + 1]++;
 	}
 	return true;
-}
-
-/* Into the lists; then first[cell] is the end of a cell's own, and is put back. */
-static void fill(const struct uv_map *map, struct uv_atlas *atlas)
-{
-	int cells = atlas->cells;
-
-	for (uint32_t t = 0; t < map->surface->mesh->n_triangles; t++) {
-		struct patch patch;
-		int box[4];
-
-		if (!patch_read(map, t, &patch))
-			continue;
-		reach(map, cells, &patch, box);
-		for (int y = box[2]; y <= box[3]; y++)
-			for (int x = box[0]; x <= box[1]; x++)
-				atlas->triangle[atlas->first[y * cells + x]++] = t;
-	}
-	for (int i = cells * cells; i > 0; i--)
-		atlas->first[i] = atlas->first[i - 1];
-	atlas->first[0] = 0;
 }
 
 static int make_lists(struct uv_map *map, uint32_t n)
 {
 	struct uv_atlas *atlas = map->atlas;
-	int cells = (int)fmin(fmax(sqrt(n), 1), CELLS_MAX);
+	size_t *first;
 
-	atlas->first = calloc((size_t)cells * (size_t)cells + 1, sizeof(*atlas->first));
-	if (!atlas->first)
+	atlas->cells = (int)fmin(fmax(sqrt(n), 1), CELLS_MAX);
+	first = calloc((size_t)atlas->cells * (size_t)atlas->cells + 1, sizeof(*first));
+	atlas->first = first;
+	if (!first)
 		return -ENOMEM;
-	/* One cell has each triangle once: that is few enough. */
-	while (!count(map, atlas, cells))
-		cells = (cells + 1) / 2;
-	for (int i = 0; i < cells * cells; i++)
-		atlas->first[i + 1] += atlas->first[i];
-	atlas->triangle =
-		calloc(atlas->first[cells * cells] + 1, sizeof(*atlas->triangle));
+	/* A single cell has each triangle once: that is few enough. */
+	while (!enter_all(map, atlas)) {
+		memset(first, 0,
+		       ((size_t)atlas->cells * atlas->cells + 1) * sizeof(*first));
+		atlas->cells = (atlas->cells + 1) / 2;
+	}
+	n = (uint32_t)(atlas->cells * atlas->cells);
+	for (uint32_t i = 0; i < n; i++)
+		first[i + 1] += first[i];
+	atlas->triangle = calloc(first[n] + 1, sizeof(*atlas->triangle));
 	if (!atlas->triangle)
 		return -ENOMEM;
-	fill(map, atlas);
+	/* Then first[cell] is the end of the cell's list: shift it back. */
+	enter_all(map, atlas);
+	memmove(first + 1, first, n * sizeof(*first));
+	first[0] = 0;
 	return 0;
 }
 
