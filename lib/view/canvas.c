@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The texture that is drawn; see canvas.h.
+ * The texture as drawn: its layers blended, its levels, and its dirty tiles; see canvas.h.
  */
 #include <errno.h>
 #include <math.h>
@@ -10,7 +10,7 @@
 #include "canvas.h"
 
 #define LEVELS_MAX 15
-/* From this level on a tile is one texel or less: they are done once for all rectangles. */
+/* From this level on a tile is at most one texel: these levels are updated once per call. */
 #define LEVEL_SMALL 5
 /* The sum of four 16-bit linear values, to 14 bits: finer than a step of 8-bit sRGB. */
 #define SUM_SHIFT 4
@@ -130,7 +130,7 @@ int incise_canvas_add_layer(struct incise_canvas *canvas)
 
 	if (canvas->n_layers == CANVAS_LAYERS_MAX)
 		return -ENOSPC;
-	/* From calloc, pages that nobody writes are not there. */
+	/* From calloc: unwritten pages take no memory. */
 	layer = calloc((size_t)canvas->size * canvas->size, 4);
 	if (!layer)
 		return -ENOMEM;
@@ -148,7 +148,6 @@ void incise_canvas_dirty(struct incise_canvas *canvas, struct incise_rect rect)
 	int64_t right = (int64_t)rect.x + rect.w - 1;
 	int64_t bottom = (int64_t)rect.y + rect.h - 1;
 
-	/* Sums of int do not overflow int64_t, and are clipped to the canvas. */
 	if (rect.w > 0 && rect.h > 0)
 		canvas_tiles_mark_texels(
 			&canvas->tiles, rect.x, rect.y,
@@ -217,7 +216,7 @@ static void shrink_rect(struct incise_canvas *canvas, int level,
 	}
 }
 
-/* The texels of the next level that a rectangle of one is part of. */
+/* The rectangle of the next level that covers a rectangle of this one. */
 static void halve(struct incise_rect *rect)
 {
 	int right = (rect->x + rect->w + 1) / 2, bottom = (rect->y + rect->h + 1) / 2;
@@ -248,7 +247,7 @@ static void enclose(struct incise_rect *all, const struct incise_rect *rect)
 	all->h = bottom - all->y;
 }
 
-/* Whether every tile of a stretch of a row of tiles is dirty; they are clean then. */
+/* Clean part of a row of tiles if all of it is dirty. Returns whether. */
 static bool take_row(struct incise_canvas *canvas, int x, int y, int w)
 {
 	uint8_t *row = canvas->tiles.dirty + (size_t)y * canvas->tiles.side + x;
@@ -262,8 +261,8 @@ static bool take_row(struct incise_canvas *canvas, int x, int y, int w)
 }
 
 /*
- * Take a rectangle of dirty tiles that begins at one: as far to the right as they go, and
- * as far down as the whole width does.
+ * Take a rectangle of dirty tiles that starts at one: as far to the right as they reach, and as far
+ * down as the whole width does.
  */
 static struct incise_rect take_rect(struct incise_canvas *canvas, int x, int y)
 {
@@ -279,7 +278,7 @@ static struct incise_rect take_rect(struct incise_canvas *canvas, int x, int y)
 				    h * CANVAS_TILE};
 }
 
-/* A rectangle at all levels on which it is more than a texel or so. Returns how many. */
+/* Update a rectangle at all levels below LEVEL_SMALL. Returns the number of uploads. */
 static int do_rect(struct incise_canvas *canvas, struct incise_rect rect,
 		   struct incise_upload *uploads)
 {

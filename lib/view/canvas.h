@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The texture that is drawn: skin below, layers of wound and blood over it, and the same
- * at half the size, a quarter … for who looks from afar. Only what is dirty is done anew.
+ * The texture as drawn: skin below, layers of wound and blood over it, and the same at half the
+ * size, a quarter … for distant views. Only dirty tiles are updated.
  *
  *     base (opaque) ◀─ layer 0 ◀─ layer 1    premultiplied RGBA, "over", sRGB values
  *            └────────────┴───────┴──▶ level 0 ─▶ level 1 ─▶ … ─▶ 1 × 1
  *                                      tiles of 32 × 32 texels
  *
- * Layers are blended in sRGB values, as painters and browsers do. A level is the mean of
- * 2 × 2 texels of the one before in linear light, as a texture of format sRGB is filtered
- * by the card: else fine dark lines, a cut, would be too dark from afar.
+ * Layers are blended in sRGB values, as browsers do. A level is the mean of 2 × 2 texels of the one
+ * before in linear light, as graphics cards filter sRGB textures: otherwise fine dark lines such as
+ * cuts would be too dark from a distance.
  *
- * What comes out is the same to the bit as composing everything anew. One thread at a time.
+ * The result is identical to composing everything again. One thread at a time.
  */
 #ifndef INCISE_VIEW_CANVAS_H
 #define INCISE_VIEW_CANVAS_H
@@ -29,13 +29,13 @@ struct incise_rect {
 	int x, y, w, h;
 };
 
-/* Which tiles of a square texture are to be painted. */
+/* The tiles of a square texture that are to be painted. */
 struct canvas_tiles {
 	int side, n_dirty; /* tiles */
 	uint8_t *dirty;	   /* side², row by row */
 };
 
-/* All clean. size: texels. Returns whether there was memory; tiles->dirty is to be freed. */
+/* All clean. size: texels. False: no memory. tiles->dirty is to be freed. */
 bool canvas_tiles_init(struct canvas_tiles *tiles, int size);
 
 static inline void canvas_tiles_mark(struct canvas_tiles *tiles, int number)
@@ -78,26 +78,26 @@ struct incise_canvas *incise_canvas_new(int size, const uint8_t *base_rgba,
 					struct incise_error *err);
 
 /*
- * Put a clear layer over those that are there. Returns its index, or -ENOSPC, -ENOMEM. Its
- * memory is taken from the system where it is written only.
+ * Put a clear layer on top. Returns its index, or -ENOSPC, -ENOMEM. Only written parts of it take
+ * memory.
  */
 int incise_canvas_add_layer(struct incise_canvas *canvas);
 
 /*
- * size² texels, premultiplied: no colour is above its alpha. To be written by whoever then
- * says incise_canvas_dirty().
+ * size² texels, premultiplied: no colour is above its alpha. Call incise_canvas_dirty() after
+ * writing.
  */
 uint8_t *incise_canvas_layer(struct incise_canvas *canvas, int layer);
 
-/* A rectangle is to be done anew, in whole tiles; what is outside of the canvas is cut off. */
+/* A rectangle changed; it is extended to whole tiles and clipped to the canvas. */
 void incise_canvas_dirty(struct incise_canvas *canvas, struct incise_rect rect);
 
 /*
- * Compose what is dirty, at all levels, and say what has changed.
+ * Compose the dirty tiles at all levels, and return the rectangles that changed.
  *
- * uploads, n   room for at least CANVAS_UPLOADS_MIN. When there is more to be said the rest
- *              stays dirty: call again until it returns 0
- * Returns how many; -EINVAL.
+ * uploads, n   capacity, at least CANVAS_UPLOADS_MIN; if that is too small the rest stays dirty:
+ *              call again until it returns 0
+ * Returns their number; -EINVAL.
  */
 #define CANVAS_UPLOADS_MIN 32
 int incise_canvas_compose(struct incise_canvas *canvas, struct incise_upload *uploads,

@@ -101,10 +101,10 @@ static void solid_instrument(struct solid *solid, const struct instrument_mesh *
  */
 struct target {
 	int width, height;
-	int samples;	 /* 1: drawn on single pixels straight away */
-	unsigned drawn;	 /* framebuffer to draw the scene on */
+	int samples;	 /* 1: drawn on single pixels at once */
+	unsigned drawn;	 /* framebuffer of the scene */
 	unsigned single; /* framebuffer of single pixels; the same with one sample */
-	unsigned colour, depth, pixels; /* their renderbuffers */
+	unsigned colour, depth, pixels; /* renderbuffers */
 };
 
 static void target_free(struct target *target)
@@ -223,15 +223,15 @@ static void target_resolve(const struct target *target)
  *     away      to the lamp
  */
 #define LEVELS_MAX 15	/* a canvas has at most 16384 texels a side */
-#define FILM_TEXELS 2.5 /* over which a film ends, at level 0 */
+#define FILM_TEXELS 2.5 /* width of a film's border, at level 0 */
 #define FILM_SLOPE 0.6
 
 struct texture {
 	unsigned name;
 	int size, levels;
-	int reach[LEVELS_MAX][2];   /* to the texel whose wetness is compared */
+	int reach[LEVELS_MAX][2];   /* to the texel for the comparison of wetness */
 	uint8_t *slope[LEVELS_MAX]; /* of the skin */
-	uint8_t *band;		    /* what is sent: rows of one rectangle */
+	uint8_t *band;		    /* rows of one rectangle, to be sent */
 	size_t band_bytes;
 };
 
@@ -285,7 +285,7 @@ static unsigned begin_texture(int levels, bool fine)
 
 static void slopes(uint8_t *to, const uint8_t *normal_rgb, size_t n, const double way[2])
 {
-	/* In 1/128 of the way. */
+	/* In 1/128. */
 	int x = (int)lround(way[0] * 128), y = (int)lround(way[1] * 128);
 
 	for (size_t i = 0; i < n; i++) {
@@ -299,7 +299,7 @@ static void slopes(uint8_t *to, const uint8_t *normal_rgb, size_t n, const doubl
 	}
 }
 
-/* The mean of 2 × 2: from afar a rough skin is smooth. */
+/* The mean of 2 × 2: from a distance rough skin is smooth. */
 static void halve(uint8_t *to, const uint8_t *from, int side)
 {
 	for (int y = 0; y < side; y++)
@@ -334,8 +334,8 @@ static bool make_slopes(struct texture *texture, const uint8_t *normal_rgb,
 }
 
 /*
- * How wet a texel is, 0 … 255, by its colour: fresh blood has green below a third of red,
- * skin, liver and what has dried have more. The shader has the same rule.
+ * The wetness of a texel, 0 … 255, by its colour: fresh blood has green below a third of red; skin,
+ * liver and dried blood have more. The shader has the same rule.
  */
 static int wetness(const uint8_t *rgba)
 {
@@ -383,7 +383,7 @@ static void fill_band(const struct texture *texture, const uint8_t *pixels, int 
 	}
 }
 
-/* Rows at a time, so that a whole level needs little memory. */
+/* Send some rows at a time, so that a whole level needs little memory. */
 static void send_rect(const struct texture *texture, const struct incise_canvas *canvas,
 		      int level, struct incise_rect rect)
 {
@@ -452,7 +452,7 @@ static void texture_upload(struct texture *texture, const struct incise_canvas *
 		if (r->x < 0 || r->y < 0 || r->w < 1 || r->h < 1 || r->w > side - r->x ||
 		    r->h > side - r->y)
 			continue;
-		/* Those whose slope is a matter of the wetness in there. */
+		/* Include texels whose slope depends on the wetness in the rectangle. */
 		reach = texture->reach[level];
 		left = clamp_index(r->x - (reach[0] > 0 ? reach[0] : 0), side);
 		right = clamp_index(r->x + r->w - 1 - (reach[0] < 0 ? reach[0] : 0),
@@ -483,7 +483,7 @@ static unsigned texture_image(unsigned image, const uint8_t *bgra, int w, int h)
 
 #define DRAW_SLOTS 4
 
-/* Towards the lamp: from the left and high, so that shadows and shine are seen from in front. */
+/* Towards the lamp: high on the left, so that shadow and shine are visible from the front. */
 static const double draw_key_way[3] = {-0.62, 0.12, 0.78};
 
 struct incise_draw {
@@ -508,7 +508,7 @@ static int failed(struct incise_error *err)
 {
 	GLenum why = glGetError();
 
-	/* Those that came before this call count as well; a lost context may repeat its. */
+	/* Clear all errors; a lost context may repeat its own. */
 	for (int i = 0; i < 16 && glGetError() != GL_NO_ERROR; i++)
 		;
 	if (why == GL_NO_ERROR)
@@ -546,13 +546,13 @@ static int put_programs(struct incise_draw *draw, struct incise_error *err)
 	return 0;
 }
 
-/* Where a CPU draws, some things cost more than they show. */
+/* A CPU renderer does without expensive effects. */
 static bool by_cpu(const char *name)
 {
 	return strstr(name, "llvmpipe") || strstr(name, "softpipe");
 }
 
-/* libepoxy ends the process when it finds none of them. */
+/* libepoxy ends the process when it finds neither. */
 static bool has_library(struct incise_error *err)
 {
 	static const char *const names[] = {"libOpenGL.so.0", "libGL.so.1"};
@@ -566,7 +566,7 @@ static bool has_library(struct incise_error *err)
 	return false;
 }
 
-/* The lamp as seen from the middle of the texture; its height does not matter here. */
+/* The direction of the lamp from the middle of the texture, without its height. */
 static void find_way(struct incise_draw *draw, const struct uv_map *map)
 {
 	double middle[2] = {map->size / 2.0, map->size / 2.0};
@@ -714,7 +714,7 @@ static void draw_surface(struct incise_draw *draw,
 	set_casters(draw, place);
 	glUniform1f(glGetUniformLocation(draw->program[SHADER_SURFACE], "texel"),
 		    1.0f / (float)draw->texture->size);
-	/* Of the texture's side; where there is none it ends beyond it. */
+	/* In parts of the texture's side; -1: no drape. */
 	glUniform1f(glGetUniformLocation(draw->program[SHADER_SURFACE], "cloth"),
 		    draw->look == INCISE_SKIN_NECK ? 0.055f : -1.0f);
 	glUniform1f(glGetUniformLocation(draw->program[SHADER_SURFACE], "moist"),
@@ -780,7 +780,7 @@ int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera 
 	if (placed)
 		draw_instrument(draw, &projection, &place);
 	draw_surface(draw, &projection, placed ? &place : NULL);
-	/* Last, where nothing else is. */
+	/* The background last, where nothing else is. */
 	glUseProgram(draw->program[SHADER_GROUND]);
 	glBindVertexArray(draw->nothing);
 	glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -829,7 +829,7 @@ int incise_draw_read(struct incise_draw *draw, uint8_t *rgb, int width, int heig
 		return -EINVAL;
 	glBindFramebuffer(GL_FRAMEBUFFER, draw->target.single);
 	glReadPixels(0, 0, width, height, GL_RGB, GL_UNSIGNED_BYTE, rgb);
-	/* OpenGL's rows begin at the bottom. */
+	/* OpenGL's rows start at the bottom. */
 	for (int y = 0; y < height / 2; y++) {
 		uint8_t *a = rgb + y * row, *b = rgb + (height - 1 - y) * row;
 

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A picture by OpenGL 3.3 core, in the context that is current: the surface with its
- * texture, the instrument, images over it. Lengths in mm in the tracker's frame; pixels
- * with x from the left and y from the top.
+ * Drawing by OpenGL 3.3 core, in the current context: the surface with its texture, the instrument,
+ * images over it. Lengths in mm in the tracker's frame; pixels with x from the left, y from the top.
  *
  *     surface ─▶ instrument ─▶ target (samples) ─▶ resolved ─▶ images over it ─▶ read, show
  *
- * What is wet shines; the shader tells it by the colour of fresh blood.
+ * Wet surfaces shine; the shader recognizes them by the colour of fresh blood.
  */
 #ifndef INCISE_VIEW_DRAW_H
 #define INCISE_VIEW_DRAW_H
@@ -23,11 +22,11 @@ struct incise_draw;
 
 struct incise_draw_setup {
 	const struct uv_map *map;	    /* read while it is made only */
-	const struct incise_canvas *canvas; /* as well; all levels are uploaded */
+	const struct incise_canvas *canvas; /* likewise; all levels are uploaded */
 	const uint8_t *normal_rgb;	    /* size² of the map; or NULL: smooth */
-	enum incise_skin look; /* liver is moist all over; round a neck lies a cloth */
+	enum incise_skin look; /* a liver is moist, a neck has a drape round it */
 	struct incise_scene_scalpel scalpel;
-	int samples; /* 0: what is cheap here; 1: none; 4 */
+	int samples; /* 1, 4; 0: 4 by a card, 1 by a CPU */
 };
 
 /* NULL with errno ENOTSUP (texture too large, no framebuffer), EIO (shader), ENOMEM. */
@@ -35,12 +34,12 @@ struct incise_draw *incise_draw_new(const struct incise_draw_setup *setup,
 				    struct incise_error *err);
 void incise_draw_free(struct incise_draw *draw);
 
-/* Send what changed. Rectangles that are not within their level are left out. */
+/* Send changes. Rectangles outside of their level are ignored. */
 void incise_draw_upload(struct incise_draw *draw, const struct incise_canvas *canvas,
 			const struct incise_upload *uploads, int n);
 
 /*
- * Draw the surface, and the instrument where a tick says (NULL: none).
+ * Draw the surface, and the instrument at a tick's pose (NULL: none).
  *
  * Returns 0, -EINVAL (size), -EIO (the graphics failed, or lost their context), -ENOMEM.
  */
@@ -49,9 +48,8 @@ int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera 
 		      struct incise_error *err);
 
 /*
- * Lay an image over the frame, premultiplied bgra as cairo's ARGB32 is, its top left at
- * x, y. @slot: 0 … 3, one for each image; it is sent when @version is another than the
- * slot's last.
+ * Draw an image over the frame, premultiplied bgra as cairo's ARGB32, its top left at x, y. @slot:
+ * 0 … 3, one per image; it is sent when @version differs from the slot's last.
  */
 int incise_draw_overlay(struct incise_draw *draw, int slot, const uint8_t *bgra, int w,
 			int h, uint64_t version, int x, int y);

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A context without a screen; see egl.h. First Mesa's platform without surfaces, which
- * asks for no display server; then whatever display EGL finds by itself, with a small
- * surface in memory that nothing is drawn on.
+ * A context without a screen; see egl.h. It tries Mesa's platform without surfaces, which needs no
+ * display server; then EGL's default display, with a small unused surface in memory.
  *
- * Displays are EGL's own, one of a kind in a process: they are not terminated here, for
- * that would take the contexts of others with it.
+ * A process shares its displays: terminating one here would destroy other contexts.
  */
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
@@ -117,7 +115,7 @@ struct incise_egl *incise_egl_new(struct incise_error *err)
 
 int incise_egl_current(struct incise_egl *egl, struct incise_error *err)
 {
-	/* What eglMakeCurrent() uses is a thread's: another may have left OpenGL ES there. */
+	/* The API is per thread: another library may have bound OpenGL ES. */
 	if (eglBindAPI(EGL_OPENGL_API) &&
 	    eglMakeCurrent(egl->display, egl->surface, egl->surface, egl->context))
 		return 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A film: the module that codes it, and its file's name; see incise/film.h.
+ * A film: its module, and the name of its file; see incise/film.h.
  */
 #include <errno.h>
 #include <stdio.h>
@@ -20,7 +20,7 @@ struct incise_film {
 	int failed;
 };
 
-/* It stays, as the one in lib/record/frames.c does. */
+/* The module stays loaded. */
 static const struct incise_film_module *load(struct incise_error *err)
 {
 	const struct incise_film_module *film;

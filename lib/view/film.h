@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What a module for films exports, as the symbol `incise_film_module`.
+ * The interface of a module for films, exported as the symbol `incise_film_module`.
  */
 #ifndef INCISE_VIEW_FILM_H
 #define INCISE_VIEW_FILM_H
@@ -14,7 +14,7 @@ struct incise_film_coder;
 
 struct incise_film_module {
 	int abi;
-	/* As in incise/film.h, of the file at that very path. */
+	/* As in incise/film.h, but writes to the path itself. */
 	struct incise_film_coder *(*open)(const char *path, int width, int height,
 					  int rate_hz, struct incise_error *err);
 	int (*add)(struct incise_film_coder *coder, const uint8_t *rgb,

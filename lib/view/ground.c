@@ -6,10 +6,10 @@
 #include "../base/vector.h"
 #include "ground.h"
 
-/* A texel is longer than this and shorter than that, mm; else the map makes no sense. */
+/* Limits of a texel's length, mm; beyond them the map is degenerate. */
 #define TEXEL_MIN_MM 1e-4
 #define TEXEL_MAX_MM 100.0
-/* The relief is smooth over so many texels. */
+/* Step for the slope of the relief, texels. */
 #define RELIEF_PX 2.0
 /* Below this sine it is level: no direction is down. */
 #define LEVEL 1e-6
@@ -40,7 +40,7 @@ bool ground_metric(const struct uv_map *map, const double px[2],
 	return metric_of(right, down, metric);
 }
 
-/* How the relief rises over a texel to the right, or down. */
+/* The rise of the relief over a texel to the right, or down. */
 static double rise_mm(const struct uv_map *map, const double px[2], int axis)
 {
 	double before[2] = {px[0], px[1]}, after[2] = {px[0], px[1]};
@@ -64,7 +64,7 @@ bool ground_at(const struct uv_map *map, const double gravity[3], const double p
 	if (!metric_of(right, down, &ground->metric))
 		return false;
 	ground->area_mm2 = (double)ground->metric.a * ground->metric.c;
-	/* Gravity's part in the surface, x right + y down, is the least squares of it. */
+	/* Gravity's component in the surface, x right + y down, by least squares. */
 	g[0] = v3_dot(gravity, right);
 	g[1] = v3_dot(gravity, down);
 	e = v3_dot(right, right);

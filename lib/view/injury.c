@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What ticks do to the texture; see effects.h.
+ * The wound and the blood that follow from ticks; see injury.h.
  */
 #include <errno.h>
 #include <stdbool.h>
@@ -28,7 +28,7 @@ static int add_layer(struct incise_injury *injury, int *layer, struct incise_err
 	return incise_error_set(err, -*layer, "view: no layer for wound or blood");
 }
 
-/* What the scene asks for. */
+/* Add the parts that the scene requests. */
 static int add(struct incise_injury *injury, const struct incise_scene_picture *picture,
 	       const struct uv_map *map, struct incise_error *err)
 {
@@ -95,12 +95,12 @@ static void step(struct incise_injury *injury)
 	blood_step(injury->blood);
 }
 
-/* Steps up to a tick's time, with what was there before it. */
+/* Steps up to a tick's time, with the state before it. */
 static void step_until(struct incise_injury *injury, int64_t t_ns)
 {
 	uint64_t steps, done;
 
-	/* Of a clock that was set back, or of a new run: time goes on from there. */
+	/* At a clock that was set back, or a new run, time restarts there. */
 	if (!injury->began || t_ns < injury->step_ns) {
 		if (!injury->began ||
 		    (uint64_t)injury->step_ns - (uint64_t)t_ns > INJURY_STEP_NS)
@@ -109,7 +109,7 @@ static void step_until(struct incise_injury *injury, int64_t t_ns)
 		return;
 	}
 	steps = ((uint64_t)t_ns - (uint64_t)injury->step_ns) / INJURY_STEP_NS;
-	/* Not beyond t_ns, so no overflow. */
+	/* At most t_ns: no overflow. */
 	injury->step_ns = (int64_t)((uint64_t)injury->step_ns + steps * INJURY_STEP_NS);
 	done = steps < INJURY_STEPS_MAX ? steps : INJURY_STEPS_MAX;
 	injury->steps_lost += steps - done;

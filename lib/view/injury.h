@@ -1,19 +1,18 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What ticks do to the texture: a wound where the blade went, and blood that runs from it.
+ * The injury in the texture: a wound along the blade's way, and blood that runs from it.
  *
  *     ticks ─▶ [wound] ─ fresh cuts ─▶ [blood]      state: a function of the ticks alone
  *                 │                       │
  *              paint                    paint       pixels: a function of the state alone
  *                 └─▶ layers of a canvas ◀┘
  *
- * Time is the ticks'. Lips and blood move in steps of 10 ms of it, however many ticks there
- * are. So the same ticks give the same texture to the bit, however often it is painted.
- * Nothing is there that the scene does not ask for: without `wound` no wound layer (and no
- * blood), without `bleeding` no blood.
+ * Time is the ticks'. Lips and blood move in steps of 10 ms of it, at any tick rate. So the same
+ * ticks give the same texture to the bit, however often it is painted. A scene without `wound` has
+ * no layer (and no blood), one without `bleeding` no blood.
  *
- * Ticks are not trusted: what is not finite, too far or too fast for a hand is no cut. One
- * thread at a time.
+ * Ticks are not trusted: values that are not finite, or too far or fast for a hand, cut nothing.
+ * One thread at a time.
  */
 #ifndef INCISE_VIEW_INJURY_H
 #define INCISE_VIEW_INJURY_H
@@ -26,16 +25,13 @@
 #include "uv_map.h"
 
 #define INJURY_STEP_NS 10000000 /* 10 ms */
-/*
- * After a gap in the ticks at most so many steps are made up; what is longer is passed over,
- * as if lips and blood had stood still in it.
- */
+/* After a gap in the ticks at most so many steps follow at once; the rest is skipped. */
 #define INJURY_STEPS_MAX 100
 
 struct incise_injury;
 
 /*
- * map and canvas must live longer, and be of one size; layers are added to the canvas.
+ * map and canvas must live longer, and have the same size; layers are added to the canvas.
  * Returns NULL with errno EINVAL, ENOMEM, ENOSPC.
  */
 struct incise_injury *incise_injury_new(const struct incise_scene_picture *picture,
@@ -46,19 +42,19 @@ struct incise_injury *incise_injury_new(const struct incise_scene_picture *pictu
 /* Each tick, in order. */
 void incise_injury_tick(struct incise_injury *injury, const struct incise_tick *tick);
 
-/* Bring the canvas's layers up to date; before incise_canvas_compose(). */
+/* Update the canvas's layers; before incise_canvas_compose(). */
 void incise_injury_paint(struct incise_injury *injury);
 
 struct incise_injury_report {
 	double cut_mm;	 /* length of all strokes of the blade, on the surface */
-	uint64_t stamps; /* stretches of them that were drawn */
+	uint64_t stamps; /* stretches that were drawn */
 	/* µl: emitted = drops + trails + off. */
 	double blood_ul_emitted;
-	double blood_ul_drops;	/* that can run, or hang at the wound */
+	double blood_ul_drops;	/* running, or hanging at the wound */
 	double blood_ul_trails; /* films, wet or dried */
 	double blood_ul_off;	/* ran off the texture */
 	int drops;
-	uint64_t steps_lost; /* of 10 ms, in gaps that were too long */
+	uint64_t steps_lost; /* of 10 ms, in long gaps */
 };
 void incise_injury_report(const struct incise_injury *injury,
 			  struct incise_injury_report *report);

@@ -2,11 +2,11 @@
 /*
  * Meshes of scalpel and tube; see instrument_shape.h. Each is a skin around rings:
  *
- *      ring 3  ○───○───○      a ring: a point, two directions across, a half width for
- *      ring 2  ○───○───○      each side, how square it is, how far it tapers to an edge
+ *      ring 3  ○───○───○      a ring: a point, two directions across, a half-width for each
+ *      ring 2  ○───○───○      side, its squareness, its taper to an edge
  *      ring 1  ○───○───○
  *
- * Where faces meet at less than 40° they are smooth, else they have an edge between them.
+ * Faces that meet at less than 40° are smooth, others have an edge between them.
  */
 #include <errno.h>
 #include <stdlib.h>
@@ -53,7 +53,7 @@ static void face_normal(double (*points)[AROUND][3], int r, int i, double normal
 	v3_cross(normal, one, two);
 }
 
-/* Of one corner of a face: those of the faces around it that are not far from its own. */
+/* The normal at a corner of a face: the sum of those around it that are close to its own. */
 static void corner_normal(double (*points)[AROUND][3], int rings, int r, int i,
 			  int corner, float to[3])
 {
@@ -89,8 +89,7 @@ static void put(struct instrument_mesh *mesh, const struct ring *ring, const dou
 		v->rgb[k] = ring->rgb[k];
 	}
 	/*
-	 * Polished steel is never flat: it is ground hollow, and shows a band of the room
-	 * and not one spot of it.
+	 * Polished steel is never flat: it is ground hollow, and reflects a band of the room.
 	 */
 	for (int k = 0; k < 3; k++) {
 		double lean = 0.09 * (p[0] + 0.3) * ring->across[k];
@@ -149,7 +148,7 @@ int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh)
 {
 	/*
 	 * A blade with a belly in a handle, mm of one that is 120 mm long: height, left
-	 * (back), right (edge), half its thickness, roundness, edge, of steel.
+	 * (back), right (edge), half of the thickness, roundness, edge, steel.
 	 */
 	static const double shape[][7] = {
 		{0, 0.02, 0.02, 0.02, 0.5, 1, 1},   {0.7, 0.6, 0.9, 0.12, 0.5, 1, 1},
@@ -165,7 +164,7 @@ int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh)
 	};
 	enum { RINGS = sizeof(shape) / sizeof(shape[0]) };
 	struct ring ring[RINGS] = {0};
-	/* A longer one has a longer handle; a shorter one is smaller all over. */
+	/* A longer scalpel has a longer handle; a shorter one is scaled down. */
 	double small = fmin(handle_mm / 120, 1), longer = fmax(handle_mm - 120, 0);
 
 	for (int i = 0; i < RINGS; i++) {
@@ -255,7 +254,7 @@ bool instrument_place(const struct incise_scene_scalpel *scalpel,
 		return false;
 	v3_cross(x, side, z);
 	if (!v3_unit(place->x, x, 1e-6)) {
-		/* The side is along the axis: any direction across will do. */
+		/* The side is along the axis: use any direction across. */
 		const double any[3] = {fabs(z[0]) < 0.7, fabs(z[0]) >= 0.7, 0};
 
 		v3_cross(x, any, z);

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Meshes of what the hand holds: scalpel, which is its handle too, and tube. In mm, in a
- * frame of their own:
+ * Meshes of the instruments: scalpel, with its handle, and tube. In mm, in a frame of their own:
  *
  *      z ▲ ▓ end of the handle, z = handle_mm      z ▲ ╱╱ tube, open, curved in the
  *        │ ▓                                         │┃┃  plane of x and z above
- *        │ ▓ flat side to ±y                         │┃┃  what goes in
+ *        │ ▓ flat side to ±y                         │┃┃  inserted part
  *        │ ▌╲ edge of the blade to +x                │┃┃
  *        ○───▶ x, tip at 0                           ○───▶ x, end at 0
  */
@@ -28,20 +27,20 @@ struct instrument_mesh {
 	uint32_t *indices; /* triangles, counter-clockwise from outside */
 };
 
-/* Of a few hundred triangles. 0, -ENOMEM. To be freed; the mesh is empty then. */
+/* A few hundred triangles; to be freed. 0, -ENOMEM with an empty mesh. */
 int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh);
 int instrument_tube(struct instrument_mesh *mesh);
 void instrument_free(struct instrument_mesh *mesh);
 
-/* Where an instrument stands: columns x, y, z, origin of its frame. */
+/* The frame of an instrument: columns x, y, z, origin. */
 struct instrument_place {
 	double x[3], y[3], z[3], origin_mm[3];
 	bool tube; /* else the scalpel */
 };
 
 /*
- * From a tick: the scalpel's tip and attitude are the pose's; the tube's end is the tool's
- * place. False when it is nowhere: no attitude yet, or numbers that make no place.
+ * From a tick: the scalpel's tip and attitude are the pose's; the tube's end is the tool's place.
+ * False: no attitude yet, or values that are not finite or too large.
  */
 bool instrument_place(const struct incise_scene_scalpel *scalpel,
 		      const struct incise_tick *tick, struct instrument_place *place);

@@ -17,7 +17,7 @@ struct noise {
 	double cell_y;
 	float *lattice; /* rows × columns */
 	float *blend;	/* of four rows of the lattice */
-	int *column;	/* of each texel's column: the first of its four */
+	int *column;	/* first of the four columns of each texel */
 	float (*weight)[4];
 };
 
@@ -47,7 +47,7 @@ struct noise *noise_new(uint64_t seed, int size, double cell_x, double cell_y)
 
 	if (!noise)
 		return NULL;
-	/* A cell that is not a number has no noise either. */
+	/* A NaN cell has no noise. */
 	noise->fade = (float)fmin(fmax((cell - 1.5) / 1.5, 0), 1);
 	if (noise->fade <= 0)
 		return noise;
@@ -123,10 +123,10 @@ void noise_row(struct noise *noise, int y, float gain, float *restrict row)
  *      │·  │ · │·  │
  *      └───┴───┴───┘
  */
-/* Squares around the texture, for warps and for neighbours. */
+/* Squares around the texture, for warps and neighbours. */
 #define MARGIN 3
 
-/* Of a square that its point may lie in: cells of a tissue are of about the same size. */
+/* Part of a square for its point: cells of a tissue have similar sizes. */
 #define SCATTER 0.85F
 
 struct cells {

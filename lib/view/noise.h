@@ -17,13 +17,13 @@
 struct noise;
 
 /*
- * @size of the texture; cells in texels. Cells of less than 3 texels fade, those of less
- * than 1.5 are none, which costs nothing. NULL: no memory.
+ * @size of the texture; cells in texels. Cells below 3 texels fade, down to none at 1.5, which
+ * costs nothing. NULL: no memory.
  */
 struct noise *noise_new(uint64_t seed, int size, double cell_x, double cell_y);
 void noise_free(struct noise *noise);
 
-/* Add gain × noise to a row; y from 0 to size - 1. The noise keeps a blended row: one user. */
+/* Add gain × noise to a row; y from 0 to size - 1. For one thread: it buffers a row. */
 void noise_row(struct noise *noise, int y, float gain, float *row);
 
 /* A number from 0 to 1, less than 1, for a place of a lattice. */
@@ -35,17 +35,17 @@ float noise_at(uint64_t seed, int x, int y);
  */
 struct cells;
 
-/* @cell_x, @cell_y in texels, on average; less than 2: there are none. NULL: no memory. */
+/* @cell_x, @cell_y: mean size in texels; below 2 there are none. NULL: no memory. */
 struct cells *cells_new(uint64_t seed, int size, double cell_x, double cell_y);
 void cells_free(struct cells *cells);
 
-/* How clearly they are seen: 0 where there are none, 1 from 4 texels on. */
+/* Contrast: 0 without cells, 1 from 4 texels on. */
 float cells_fade(const struct cells *cells);
 
 /*
- * Of a row of texels, each moved by (warp_x, warp_y) cells, ±2 at most: the distance to
- * the nearest point and how much farther the next is, in cells; about 0.4 and 0.3 on
- * average. Where there are no cells just this.
+ * For each texel of a row, moved by (warp_x, warp_y) cells, ±2 at most: the distance to the nearest
+ * point, and the additional distance to the next, in cells; on average, and without cells, about
+ * 0.4 and 0.3.
  */
 void cells_row(const struct cells *cells, int y, const float *warp_x, const float *warp_y,
 	       float *nearest, float *farther);

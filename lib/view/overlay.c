@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What is written over the picture; see overlay.h. History is kept as columns of a graph,
- * each with the least and the largest value of its 40 ms: what lasted one tick is seen.
+ * Panels over the picture, by cairo; see overlay.h. Graphs consist of columns, each with the least
+ * and the largest value of its 40 ms, so that single ticks are visible. Without DejaVu Sans cairo
+ * uses another font, and without any font there are still graphs.
  */
 #include <cairo.h>
 #include <errno.h>
@@ -12,14 +13,14 @@
 #include "overlay.h"
 
 #define OVERLAY_COLUMNS 250	   /* of a graph: 10 s */
-#define OVERLAY_COLUMN_NS 40000000 /* that one of them stands for */
+#define OVERLAY_COLUMN_NS 40000000 /* per column */
 #define OVERLAY_LINES_MAX 24
 #define OVERLAY_PANEL_WIDTH 316
 #define OVERLAY_PANEL_HEIGHT 244
 #define OVERLAY_KEYS_WIDTH 380
 
 struct overlay_column {
-	int64_t at; /* which column of all time */
+	int64_t at; /* number of the column since time 0 */
 	bool any;
 	float low, high;
 };
@@ -78,7 +79,7 @@ static void grey(cairo_t *cr, double light)
 	cairo_set_source_rgba(cr, light, light, light, 1);
 }
 
-/* @align: 0 begins at x, 1 ends there. */
+/* @align: 0 starts at x, 1 ends there. */
 static void text(cairo_t *cr, double x, double y, double size, double align,
 		 const char *words)
 {
@@ -90,7 +91,7 @@ static void text(cairo_t *cr, double x, double y, double size, double align,
 	cairo_show_text(cr, words);
 }
 
-/* The least of 1, 2, 5, 10 … times @unit that holds all of a graph. */
+/* The least of 1, 2, 5, 10 … times @unit that covers a graph. */
 static double range_of(const struct overlay_graph *graph, double unit)
 {
 	double most = 0, range = unit;
@@ -148,7 +149,7 @@ static void graph(cairo_t *cr, const struct overlay_graph *graph, double top,
 		cairo_move_to(cr, GRAPH_LEFT, y);
 		cairo_line_to(cr, GRAPH_LEFT + OVERLAY_COLUMNS, y);
 	}
-	/* Every two seconds. */
+	/* A line every two seconds. */
 	for (int i = 0; i <= OVERLAY_COLUMNS; i += 50) {
 		cairo_move_to(cr, GRAPH_LEFT + i + 0.5, top + GRAPH_HEIGHT);
 		cairo_line_to(cr, GRAPH_LEFT + i + 0.5, top + GRAPH_HEIGHT + 3);
@@ -300,7 +301,7 @@ static void overlay_paint_keys(cairo_surface_t *surface, const char *const *line
 
 /* --- The overlay --- */
 
-#define REDRAW_NS 66666667 /* 15 times in a second */
+#define REDRAW_NS 66666667 /* 15 times per second */
 
 struct incise_overlay {
 	struct overlay_graph force, depth;
@@ -354,13 +355,13 @@ static void graph_add(struct overlay_graph *graph, int64_t t_ns, double value)
 		&graph->column[((at % OVERLAY_COLUMNS) + OVERLAY_COLUMNS) %
 			       OVERLAY_COLUMNS];
 
-	/* Another recording begins. */
+	/* Time went back: another recording. */
 	if (graph->last != INT64_MIN && at < graph->last)
 		memset(graph->column, 0, sizeof(graph->column));
 	graph->last = at;
 	if (!isfinite(value))
 		return;
-	/* Beyond it there is nothing to be read from a graph. */
+	/* Larger values are not readable from a graph. */
 	value = fmin(value, 1e6);
 	if (!column->any || column->at != at)
 		*column = (struct overlay_column){at, true, (float)value, (float)value};
@@ -375,7 +376,7 @@ void incise_overlay_tick(struct incise_overlay *overlay, const struct incise_tic
 	for (int i = 0; i < 3; i++)
 		force += tick->command_N[i] * tick->command_N[i];
 	graph_add(&overlay->force, tick->t_ns, sqrt(force));
-	/* Outside of the tissue there is none. */
+	/* Outside of the tissue the depth is 0. */
 	graph_add(&overlay->depth, tick->t_ns, tick->depth_mm < 0 ? 0 : tick->depth_mm);
 	overlay->tick = *tick;
 	overlay->ticked = true;

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What is written over the picture, by cairo: force and depth over the last 10 s, phase,
- * tool, state, lateness; and a panel of keys. Small images of their own, redrawn at most
- * 15 times in a second of the ticks' time.
+ * Panels over the picture: force and depth over the last 10 s, phase, tool, state, lateness; and
+ * the keys. They are images of their own, redrawn at most 15 times per second of the ticks' time.
  *
  *      ┌ force N ───────────┐
  *      │      ╱╲__          │     graphs run with the ticks' time: the last is at the right
@@ -27,19 +26,19 @@ struct incise_overlay;
 struct incise_overlay_image {
 	const uint8_t *pixels; /* rows of width × 4 bytes */
 	int width, height;
-	uint64_t version; /* another one when it was redrawn */
+	uint64_t version; /* changes when it is redrawn */
 };
 
 /* NULL with errno ENOMEM. */
 struct incise_overlay *incise_overlay_new(struct incise_error *err);
 void incise_overlay_free(struct incise_overlay *overlay);
 
-/* Finite or not: what is no number leaves a gap. */
+/* Values that are not finite leave a gap. */
 void incise_overlay_tick(struct incise_overlay *overlay, const struct incise_tick *tick);
 
 /*
- * The panel as of the last tick and that status (or NULL); redrawn when it is due, or when
- * the words of the status changed.
+ * The panel after the last tick, with a status (or NULL); redrawn when it is due, or when the
+ * status has another state.
  */
 const struct incise_overlay_image *incise_overlay_panel(
 	struct incise_overlay *overlay, const struct incise_view_status *status);

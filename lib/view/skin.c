@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * What intact tissue looks like: rows of colour and height are mixed by the kind's look
- * (skin_neck.c, skin_liver.c), and heights become normals.
+ * The texture of intact tissue: the kind's look (skin_neck.c, skin_liver.c) mixes rows of colour and
+ * height, and heights become normals.
  */
 #include <errno.h>
 #include <math.h>
@@ -38,7 +38,7 @@ static void write_colour(int size, float *const colour[3], uint8_t *rgba)
 	}
 }
 
-/* Of the middle one of three rows of heights; at the border the slope is one-sided. */
+/* For the middle one of three rows of heights; at the border the slope is one-sided. */
 static void write_normals(const struct skin_work *work, int y, float *const height[3],
 			  uint8_t *rgb)
 {
@@ -51,7 +51,7 @@ static void write_normals(const struct skin_work *work, int y, float *const heig
 		float dy = (height[0][x] - height[2][x]) * down;
 		float scale = 127 / sqrtf(dx * dx + dy * dy + 1);
 
-		/* Rounded at random, or a wet surface shows steps of half a degree. */
+		/* Random rounding: otherwise a wet surface shows steps of half a degree. */
 		rgb[3 * x] = (uint8_t)(128 + noise_at(0, 2 * x, y) + scale * dx);
 		rgb[3 * x + 1] = (uint8_t)(128 + noise_at(0, 2 * x + 1, y) + scale * dy);
 		rgb[3 * x + 2] = (uint8_t)(128.5F + scale);
@@ -103,7 +103,7 @@ static void paint(const struct skin_work *work, const struct skin_look *look,
 	float *const ring[3] = {rows + 3 * size, rows + 4 * size, rows + 5 * size};
 	const int last = work->size - 1;
 
-	/* A row's normals come a row later: they need the heights on both sides. */
+	/* A row's normals follow a row later: they need the heights on both sides. */
 	for (int y = 0; y <= last + 1; y++) {
 		int above = y > 1 ? y - 2 : 0, below = y <= last ? y : last;
 		float *const height[3] = {ring[above % 3], ring[(y + 2) % 3],
@@ -119,7 +119,7 @@ static void paint(const struct skin_work *work, const struct skin_look *look,
 	}
 }
 
-/* On what is smaller heights would drown in the rounding of floats. */
+/* With smaller texels, heights would be lost in the rounding of floats. */
 static double texel_mm(double mm)
 {
 	return fmin(fmax(mm, 1e-4), 1e3);
@@ -131,7 +131,7 @@ int incise_skin_paint(const struct uv_map *map, enum incise_skin skin, uint64_t 
 	const struct skin_look *look = skin == INCISE_SKIN_NECK	   ? &skin_neck
 				       : skin == INCISE_SKIN_LIVER ? &skin_liver
 								   : NULL;
-	/* Seeds that are neighbours share nothing. */
+	/* Neighbouring seeds must not share streams. */
 	struct skin_work work = {
 		.seed = seed * UINT64_C(0x9e3779b97f4a7c15),
 		.size = map->size,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What intact tissue looks like: its colour and the fine shape of its surface.
+ * The look of intact tissue: its colour and the fine shape of its surface.
  */
 #ifndef INCISE_SKIN_H
 #define INCISE_SKIN_H
@@ -9,8 +9,8 @@
 #include "uv_map.h"
 
 /*
- * Paint a texture of map->size² texels, rows from the top. Sizes (pores, lobules) are
- * in mm by the map's metric; what is finer than two texels fades away.
+ * Paint a texture of map->size² texels, rows from the top. Sizes (pores, lobules) are in mm by the
+ * map's metric; patterns finer than two texels fade away.
  *
  * @rgba        sRGB of 8 bits, opaque
  * @normal_rgb  unit normal (128 + 127 n): red along the vertex's tangent (+px[0]), green

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The surface of a liver: dark reddish brown, in lobules of 1 to 2 mm whose borders are
- * paler, under a smooth wet capsule.
+ * The surface of a liver: dark reddish brown, in lobules of 1 to 2 mm with paler borders, under a
+ * smooth wet capsule.
  */
 #include "skin_look.h"
 

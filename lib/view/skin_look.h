@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * How one kind of tissue looks: the noises and cells that it is made of, and how a row of
- * texels is mixed of them.
+ * The look of one kind of tissue: its noises and cells, and the function that mixes a row of texels.
  */
 #ifndef INCISE_SKIN_LOOK_H
 #define INCISE_SKIN_LOOK_H
@@ -16,14 +15,14 @@ struct skin_scale {
 	double x_mm, y_mm; /* of a cell */
 };
 
-/* A texture at work. */
+/* A texture while it is painted. */
 struct skin_work {
 	uint64_t seed;
 	int size;
 	double x_mm, y_mm; /* of a texel */
 	struct noise *noise[SKIN_NOISES_MAX];
 	struct cells *cells[SKIN_CELLS_MAX];
-	float *row[SKIN_ROWS]; /* for the mixer, as it likes */
+	float *row[SKIN_ROWS]; /* buffers of the mixer */
 };
 
 struct skin_look {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The skin of a neck. Colour is that of the tissue, taken off by what is in it: melanin
- * above, blood below, each with blotches of its own, and two veins that shine through.
- * Its surface is the net of fine furrows of human skin, about 1 mm wide and drawn out
- * around the neck, with pores in it, wrinkles and a few creases around the neck.
+ * The skin of a neck. Its colour is bare tissue minus the absorption of melanin and blood, each with
+ * its own blotches, and of two veins below. Its surface is the net of fine furrows of human skin,
+ * about 1 mm wide and elongated around the neck, with pores, wrinkles and a few creases.
  *
  *   x along the neck ──►     creases and wrinkles run in y, veins in x
  */
@@ -60,16 +59,16 @@ enum {
 	TEMP
 };
 
-/* Bare tissue; how much each channel loses to melanin and to blood. */
+/* Bare tissue; absorption of melanin, of blood and of veins per channel. */
 static const float base[3] = {221, 178, 154};
 static const float of_melanin[3] = {11, 14, 15}, of_blood[3] = {3, 13, 11};
 static const float of_vein[3] = {11, 4, -1};
 
-/* Creases stand so far apart, and are so wide to each side. */
+/* Distance of creases, and half-width. */
 #define CREASE_APART_MM 37.0F
 #define CREASE_WIDE_MM 1.3F
 
-/* The anterior jugular veins: from the midline, and half as wide as they seem. */
+/* The anterior jugular veins: distance from the midline, and half-width. */
 #define VEIN_ASIDE_MM 17.0F
 #define VEIN_WIDE_MM 2.6F
 
@@ -101,7 +100,7 @@ static void moles(const struct skin_work *work, int y)
 	}
 }
 
-/* The net of furrows: 0 in them, 1 on the fields between. */
+/* The net of furrows: 0 in them, 1 between. */
 static void furrows(const struct skin_work *work, int y)
 {
 	const float fade = cells_fade(work->cells[FURROW]);
@@ -132,7 +131,7 @@ static void pores(const struct skin_work *work, int y)
 		hole[x] = fade * skin_bump(hole[x] / 0.13F);
 }
 
-/* Lines that texels are too coarse for fade, or they would be dotted. */
+/* Lines thinner than texels fade, or they would be dotted. */
 static float line_fade(float wide_mm, double texel_mm)
 {
 	return skin_clamp(wide_mm / (float)texel_mm - 0.5F, 0, 1);
@@ -201,7 +200,7 @@ static void mix(const struct skin_work *work, int y, float *const colour[3],
 	pores(work, y);
 	folds(work, y, height_mm);
 	veins(work, y);
-	/* How coarse the skin is differs from place to place. */
+	/* Coarseness varies from place to place. */
 	share = SKIN_SUM(work, y, TEMP, RELIEF_SHARE, 0.22F);
 	for (int x = 0; x < work->size; x++) {
 		float coarse = skin_clamp(0.8F + share[x], 0.3F, 1.3F);

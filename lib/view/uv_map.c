@@ -29,13 +29,13 @@ static bool on_texture(const struct uv_map *map, const double px[2])
 /* Of a ball's radius: at the corners of the texture its slope is then 58°. */
 #define BALL_SHARE 0.6
 
-/* A slope steeper than this (87°) is measured as this. */
+/* Slopes steeper than 87° count as 87°. */
 #define FACING_MIN 0.05
 
-/* A point this share of the side above or below the surface still belongs to it. */
+/* Points belong to the surface up to this distance, in parts of the side. */
 #define NEAR_SHARE (1 / 12.0)
 
-/* From the least to the most of a mesh along one way, mm from the origin. */
+/* The extent of a mesh along one direction, mm from the origin. */
 static void mesh_reach(const struct uv_map *map, const double way[3], double reach[2])
 {
 	const struct mesh *mesh = map->surface->mesh;
@@ -52,8 +52,8 @@ static void mesh_reach(const struct uv_map *map, const double way[3], double rea
 }
 
 /*
- * A texture as large as the mesh, or as is allowed; then it is moved so that it lies on
- * the mesh as far as it can, with the top on it. Returns half its side.
+ * A texture as large as the mesh, up to the limit, moved onto the mesh as far as possible with the
+ * top on it. Returns half of its side.
  */
 static double fit_mesh(struct uv_map *map)
 {
@@ -89,7 +89,7 @@ static void above_init(struct uv_map *map)
 	map->kind = UV_MAP_FROM_ABOVE;
 	incise_surface_top(surface, &top);
 	v3_copy(map->origin, top.point_mm);
-	/* The highest place is seen from above, whatever way its own triangle faces. */
+	/* The top is seen from above, whatever direction its triangle faces. */
 	if (surface->kind == INCISE_SURFACE_PLANE ||
 	    (surface->mesh && top.normal[2] < 0.3))
 		v3_copy(map->up, top.normal);
@@ -107,14 +107,14 @@ static void above_init(struct uv_map *map)
 		half = fmin(half, BALL_SHARE * surface->capsule.radius);
 		map->below_mm = surface->capsule.radius;
 	}
-	/* A mesh that stands on edge has no extent; what is seen of it does not matter. */
+	/* A mesh on its edge has no extent. */
 	half = fmax(half, 1e-9);
 	map->above_mm += half;
 	map->below_mm += half;
 	map->wide_mm = map->high_mm = 2 * half;
 }
 
-/* A place over the plane, mm from its middle. */
+/* A place above the plane. */
 static void over(const struct uv_map *map, const double px[2], double height_mm,
 		 double to[3])
 {
@@ -149,7 +149,7 @@ static bool above_px(const struct uv_map *map, const double point_mm[3], double 
 	at[1] = map->size * (0.5 + v3_dot(out, map->down) / map->high_mm);
 	if (!on_texture(map, at))
 		return false;
-	/* At the border of a mesh the ray may just miss it: then the point is believed. */
+	/* At the border of a mesh the ray may just miss it: then the point counts. */
 	if (above_point(map, at, there, normal)) {
 		v3_sub(out, point_mm, there);
 		if (!(fabs(v3_dot(out, map->up)) <= NEAR_SHARE * map->wide_mm))
@@ -168,7 +168,7 @@ static bool above_metric(const struct uv_map *map, const double px[2], double ri
 	if (!above_point(map, px, point, normal))
 		return false;
 	facing = fmax(v3_dot(normal, map->up), FACING_MIN);
-	/* A step to the side stays on the surface: it goes down as the surface does. */
+	/* A step to the side stays on the surface, and descends with it. */
 	for (int i = 0; i < 3; i++) {
 		right_mm[i] = mm * (map->right[i] -
 				    v3_dot(map->right, normal) / facing * map->up[i]);
@@ -193,13 +193,13 @@ static bool above_metric(const struct uv_map *map, const double px[2], double ri
 #define WIDE_MAX_MM 160.0
 #define TURN_MAX (80 * M_PI / 180)
 
-/* Longer than wide by this at most: a finger is not stretched to a neck. */
+/* Maximum ratio of length to width: a finger is not stretched to a neck. */
 #define STRETCH_MAX 1.5
 
-/* So far over the round ends, in radius: 69°, where texels are 0.36 as high. */
+/* Reach onto the round ends, in radii: 69°, where texels have 0.36 of their height. */
 #define END_MAX 1.2
 
-/* A capsule that rises more steeply than this sine is seen from above. */
+/* A capsule steeper than this sine is seen from above. */
 #define STANDS 0.7
 
 static bool unrolled_init(struct uv_map *map)
@@ -256,7 +256,7 @@ static bool unrolled_px(const struct uv_map *map, const double point_mm[3], doub
 	return true;
 }
 
-/* Of a texel: the place on the axis and the angles towards its end and around it. */
+/* A texel's place on the axis, and its angles towards the end and around the axis. */
 static double turns(const struct uv_map *map, const double px[2], double *end,
 		    double *turn)
 {
@@ -508,7 +508,7 @@ static int init(struct uv_map *map)
 	if (surface->kind == INCISE_SURFACE_MESH && surface->mesh->uv) {
 		int rc = uv_atlas_init(map);
 
-		/* Texture coordinates that cover nothing are none. */
+		/* Texture coordinates without area do not count. */
 		if (rc)
 			return rc;
 		if (map->kind == UV_MAP_ATLAS)
@@ -558,7 +558,7 @@ void uv_map_free(struct uv_map *map)
 
 bool uv_map_px(const struct uv_map *map, const double point_mm[3], double px[2])
 {
-	/* Farther away no surface lies, and squares would overflow. */
+	/* No surface is farther away, and squares would overflow. */
 	for (int i = 0; i < 3; i++)
 		if (!(fabs(point_mm[i]) <= 1e9))
 			return false;
@@ -593,7 +593,7 @@ void uv_map_metric(const struct uv_map *map, const double px[2], double right_mm
 {
 	double at[2];
 
-	/* fmax() takes what is not a number for 0. */
+	/* fmax() turns NaN into 0. */
 	for (int i = 0; i < 2; i++)
 		at[i] = fmin(fmax(px[i], 0), map->size);
 	if (map->kind == UV_MAP_UNROLLED) {

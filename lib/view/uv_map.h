@@ -9,7 +9,7 @@
  *   ▼   │ centre at .5 │
  *       └──────────────┘  seen from outside the picture is not mirrored
  *
- * The middle of the texture is the surface's top, but where the surface ends sooner than the
+ * The middle of the texture is the surface's top, unless the surface ends sooner than the
  * texture would. By the kind of surface:
  *   capsule    its wall unrolled: x along the axis (from a to b), y around it, at most
  *              160 mm along and ±80° around; on the round ends arcs go on as meridians
@@ -27,7 +27,7 @@
 #include <incise/scene.h>
 #include <incise/surface.h>
 
-/* What stands above what is felt is no higher than this. */
+/* Maximum height of the relief above the surface as it is felt. */
 #define UV_MAP_RELIEF_MAX_MM 5.0
 
 struct uv_map_vertex {
@@ -37,7 +37,7 @@ struct uv_map_vertex {
 	float px[2];	  /* texels */
 };
 
-/* Triangles of a mesh in texture space, to find the one that a texel is in. */
+/* Triangles of a mesh in texture space, to find the one of a texel. */
 struct uv_atlas;
 
 struct uv_map {
@@ -46,7 +46,7 @@ struct uv_map {
 	struct uv_map_vertex *vertices;
 	uint32_t *indices; /* triangles, counter-clockwise seen from outside */
 
-	/* The rest is the map's own. */
+	/* The rest is private. */
 	const struct incise_surface *surface;
 	enum { UV_MAP_FROM_ABOVE, UV_MAP_UNROLLED, UV_MAP_ATLAS } kind;
 	bool larynx;
@@ -68,28 +68,27 @@ struct uv_map *uv_map_new(const struct incise_surface *surface,
 			  struct incise_error *err);
 void uv_map_free(struct uv_map *map);
 
-/* Of a point on the surface, or near it; false: outside of the texture, or not finite. */
+/* The texel of a point on or near the surface; false: outside of the texture, or not finite. */
 bool uv_map_px(const struct uv_map *map, const double point_mm[3], double px[2]);
 
 /*
- * The point of the surface, as it is felt, and its outward unit normal; false: there is no
- * surface at that place of the texture, and nothing is written.
+ * The point of the surface, as it is felt, and its outward unit normal; false, without a result:
+ * there is no surface at that place of the texture.
  */
 bool uv_map_point(const struct uv_map *map, const double px[2], double point_mm[3],
 		  double normal[3]);
 
 /*
- * By how much the surface's point moves when px does by one texel. Where there is no
- * surface: of the nearest texel of the texture's border, or as on flat ground.
+ * The change of the surface's point per texel. Where there is no surface: that of the nearest texel
+ * at the texture's border, or of flat ground.
  */
 void uv_map_metric(const struct uv_map *map, const double px[2], double right_mm[3],
 		   double down_mm[3]);
 
 /*
- * By how much what is seen stands above what is felt, along the normal: 0 to
+ * The height of the surface as drawn above that as felt, along the normal: 0 to
  * UV_MAP_RELIEF_MAX_MM, 0 without a larynx. The head is towards -px[0], the membrane that a
- * cricothyroidotomy cuts on the surface's top. A mesh with texture coordinates is drawn as
- * it is.
+ * cricothyroidotomy cuts at the surface's top. A mesh with texture coordinates has no relief.
  */
 double uv_map_relief_mm(const struct uv_map *map, const double px[2]);
 

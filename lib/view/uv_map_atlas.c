@@ -18,22 +18,22 @@
 
 #define CELLS_MAX 256
 
-/* Triangles that lie in many cells each: then cells are made larger. */
+/* If triangles are in more cells than this on average, cells become larger. */
 #define ENTRIES_PER_TRIANGLE 8
 
-/* Less than this is no area, texels². */
+/* Smaller triangles have no area, texels². */
 #define AREA_MIN 1e-9
 
-/* Rounding puts a place on an edge between two triangles beside both. */
+/* Rounding may put a place on an edge outside of both triangles. */
 #define BESIDE 1e-6
 
 struct uv_atlas {
-	int cells;	    /* a side */
-	size_t *first;	    /* of each cell, in `triangle`; one more at the end */
+	int cells;	    /* per side */
+	size_t *first;	    /* of each cell, in `triangle`; and an end */
 	uint32_t *triangle; /* of the mesh, by cell */
 };
 
-/* A triangle in texels, and how its points and texels belong together. */
+/* A triangle in texels, with its corners and the derivatives of its points. */
 struct patch {
 	double px[3][2], area2;
 	double corner[3][3], right[3], down[3]; /* mm; mm per texel */
@@ -48,7 +48,7 @@ static void corner_px(const struct uv_map *map, uint32_t triangle, int corner,
 	px[1] = (1 - (double)uv[1]) * map->size;
 }
 
-/* False: no texel is in it. */
+/* False: it contains no texel. */
 static bool patch_read(const struct uv_map *map, uint32_t triangle, struct patch *patch)
 {
 	const struct mesh *mesh = map->surface->mesh;
@@ -78,7 +78,7 @@ static bool patch_read(const struct uv_map *map, uint32_t triangle, struct patch
 	return true;
 }
 
-/* How far a texel is inside: the least of its three weights; < 0 outside. */
+/* The least of the three weights of a texel; < 0 outside. */
 static double inside(const struct patch *patch, const double px[2])
 {
 	double least = 1;
@@ -114,7 +114,7 @@ static void reach(const struct uv_map *map, int cells, const struct patch *patch
 	}
 }
 
-/* How large the texture is on the surface, as a square, for what is as on flat ground. */
+/* The mean size of the texture on the surface, as a square. Returns the number of triangles. */
 static uint32_t measure(struct uv_map *map)
 {
 	double mm2 = 0, px2 = 0;
@@ -238,7 +238,7 @@ bool uv_atlas_px(const struct uv_map *map, const double point_mm[3], double px[2
 	return true;
 }
 
-/* The triangle that a texel is in; of several the one that it is most inside of. */
+/* The triangle of a texel; of several the one with the largest inside(). */
 static bool find(const struct uv_map *map, const double px[2], struct patch *found,
 		 uint32_t *triangle)
 {
@@ -304,9 +304,9 @@ bool uv_atlas_metric(const struct uv_map *map, const double px[2], double right_
 #define COMPARED_MAX 16
 
 struct weld {
-	uint32_t *last;	  /* vertex made of a mesh's, or MESH_NONE */
-	uint32_t *before; /* vertex made of the same one before, or MESH_NONE */
-	uint32_t *corner; /* 3 triangle + corner that a vertex was made of first */
+	uint32_t *last;	  /* newest vertex for each of the mesh's, or MESH_NONE */
+	uint32_t *before; /* the previous vertex for the same one, or MESH_NONE */
+	uint32_t *corner; /* 3 · triangle + corner, the first of each vertex */
 };
 
 static const float *uv_of(const struct mesh *mesh, uint32_t corner)
@@ -335,7 +335,7 @@ static uint32_t weld_corner(struct weld *weld, const struct mesh *mesh, uint32_t
 	return vertex;
 }
 
-/* The way of +px[0] and +px[1] over each triangle, summed up at its corners. */
+/* The directions of +px[0] and +px[1] over each triangle, summed at its corners. */
 static void add_directions(struct uv_map *map, double (*right)[3], double (*down)[3])
 {
 	for (int i = 0; i < map->n_indices; i += 3) {
@@ -377,7 +377,7 @@ static void set_tangent(struct uv_map_vertex *vertex, const double right[3],
 		tangent[1] = 1;
 	}
 	v3_add(side, right, -v3_dot(right, normal), normal);
-	/* Without texture coordinates any tangent will do. */
+	/* Without texture coordinates, use any tangent. */
 	if (!v3_unit(tangent, side, 0)) {
 		v3_add(side, tangent, -v3_dot(tangent, normal), normal);
 		v3_unit(tangent, side, 0);

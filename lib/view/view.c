@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The picture of a scene, put together; see incise/view.h.
+ * The picture of a scene; see incise/view.h.
  *
- *     map ─┬─▶ skin ─▶ canvas ─▶ draw ─▶ window, pixels
- *            └─▶ injury ──▲         ▲
- *     ticks ──────╯  ╰──────────▶ overlay
+ *     uv map ─┬─▶ skin ─▶ canvas ─▶ draw ─▶ window, pixels
+ *             └─▶ injury ──▲         ▲
+ *     ticks ───────╯  ╰──────────▶ overlay
  */
 #include <errno.h>
 #include <math.h>
@@ -23,13 +23,13 @@
 #include "view_camera.h"
 #include "window.h"
 
-#define FAR_MM 1e6 /* what is beyond is no place of a tool */
+#define FAR_MM 1e6 /* no tool is farther away */
 #define MARGIN_PX 14
-#define ROOM_PX (800 * 450) /* with less there is no panel */
+#define PANEL_LEAST_PX (800 * 450) /* smaller pictures have no panel */
 
 enum { SLOT_PANEL, SLOT_KEYS };
 
-#define VIEW_UPLOADS 256 /* that are sent at once */
+#define VIEW_UPLOADS 256 /* per call */
 
 struct incise_view {
 	const struct incise_surface *surface;
@@ -37,14 +37,14 @@ struct incise_view {
 	struct incise_scene_scalpel scalpel;
 	struct incise_egl *egl; /* one of these */
 	struct incise_window *window;
-	uint8_t *base; /* the canvas's, of size² texels */
+	uint8_t *base; /* the canvas's, size² texels */
 	struct uv_map *map;
 	struct incise_canvas *canvas;
 	struct incise_injury *injury;
 	struct incise_draw *draw;
 	struct incise_overlay *overlay;
 	struct view_orbit orbit;
-	struct incise_tick tick; /* the last one that has a place */
+	struct incise_tick tick; /* the last one with a valid place */
 	bool ticked, drawn, panel, keys;
 	int width, height; /* of frames */
 	uint64_t uploads, uploaded_texels, ticks, frames;
@@ -70,7 +70,7 @@ static int make_context(struct incise_view *view, const struct incise_view_setup
 	return view->window || view->egl ? 0 : -errno;
 }
 
-/* What is painted before anything is drawn. @normals: to be freed by the caller. */
+/* The painting before the first frame. @normals: to be freed by the caller. */
 static int make_texture(struct incise_view *view, uint8_t **normals,
 			struct incise_error *err)
 {
@@ -112,7 +112,7 @@ static int make_draw(struct incise_view *view, const uint8_t *normals, int sampl
 		.samples = samples,
 	};
 
-	/* All of it is sent at first, so what is dirty need not be. */
+	/* incise_draw_new() sends all of it, so no tile need be dirty. */
 	while (incise_canvas_compose(view->canvas, uploads, VIEW_UPLOADS) > 0)
 		;
 	view->draw = incise_draw_new(&setup, err);
@@ -128,7 +128,7 @@ static void look_home(struct incise_view *view, const struct incise_plan *plan)
 
 	incise_plan_top(plan, &top);
 	uv_map_metric(view->map, middle, right, down);
-	/* Between what is cut and the middle of all that is seen. */
+	/* Between the surface's top and the middle of the drawn surface. */
 	for (int i = 0; i < 3; i++)
 		target[i] = 0.75 * top.point_mm[i] + 0.25 * info->middle_mm[i];
 	view_orbit_home(&view->orbit, target, right, info->reach_mm);
@@ -265,8 +265,8 @@ static void lay_over(struct incise_view *view, const struct incise_view_status *
 {
 	const struct incise_overlay_image *image;
 
-	/* In a small picture it would hide what it is about. */
-	if (view->panel && view->width * view->height >= ROOM_PX &&
+	/* In a small picture the panel would hide too much. */
+	if (view->panel && view->width * view->height >= PANEL_LEAST_PX &&
 	    (image = incise_overlay_panel(view->overlay, status)))
 		incise_draw_overlay(view->draw, SLOT_PANEL, image->pixels, image->width,
 				    image->height, image->version, MARGIN_PX,

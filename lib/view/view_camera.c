@@ -20,7 +20,7 @@ bool view_camera_limit(struct incise_view_camera *camera)
 	for (int i = 0; i < 3; i++)
 		camera->target_mm[i] = between(-1e6, camera->target_mm[i], 1e6);
 	camera->azimuth_deg = remainder(camera->azimuth_deg, 360);
-	/* At ±90 there would be no way up. */
+	/* At ±90 there is no unique upward direction. */
 	camera->elevation_deg = between(-89, camera->elevation_deg, 89);
 	camera->distance_mm = between(1, camera->distance_mm, 1e5);
 	camera->fov_deg = between(5, camera->fov_deg, 120);
@@ -94,7 +94,7 @@ void view_camera_ray(const struct view_projection *projection, int width, int he
 
 #define DEG_PER_PX 0.35
 #define DEG_PER_KEY 5.0
-#define NEARER 0.9 /* for each notch of the wheel */
+#define NEARER 0.9 /* per notch of the wheel */
 
 enum { MIDDLE = 2, RIGHT = 4 };
 
@@ -104,7 +104,7 @@ void view_orbit_home(struct view_orbit *orbit, const double target_mm[3],
 	struct incise_view_camera *home = &orbit->home;
 
 	v3_copy(home->target_mm, target_mm);
-	/* From the side and above, a little from the end that is to the right. */
+	/* From the side and above, slightly from the right end. */
 	home->azimuth_deg = 24;
 	if (hypot(along[0], along[1]) > 1e-9)
 		home->azimuth_deg += atan2(along[1], along[0]) * 180 / M_PI;

@@ -17,19 +17,19 @@ struct view_projection {
 	double position_mm[3];
 	double right[3], up[3], back[3]; /* unit, at right angles */
 	float clip[16];			 /* of a place in mm */
-	double half_height;		 /* of the picture at distance 1 */
+	double half_height;		 /* of the frame at distance 1 */
 };
 
-/* Hold all within its range; false, and nothing changed, when a number is not finite. */
+/* Limit all values to their ranges; false, without changes, if one is not finite. */
 bool view_camera_limit(struct incise_view_camera *camera);
 
 /*
- * @param reach_mm nothing that is drawn is farther from the target
+ * @reach_mm: everything that is drawn is closer to the target
  */
 void view_camera_project(const struct incise_view_camera *camera, int width, int height,
 			 double reach_mm, struct view_projection *projection);
 
-/* Where a pixel looks to: a unit vector. */
+/* The unit vector of a pixel's ray. */
 void view_camera_ray(const struct view_projection *projection, int width, int height,
 		     double x_px, double y_px, double way[3]);
 
@@ -42,11 +42,11 @@ struct view_orbit {
 	double x_px, y_px; /* of the last motion */
 };
 
-/* @along: a way in the picture that shall run to the right, as a neck's axis. */
+/* @along: a direction that shall run to the right, such as a neck's axis. */
 void view_orbit_home(struct view_orbit *orbit, const double target_mm[3],
 		     const double along[3], double reach_mm);
 
-/* @height of the frame, pixels. Whether the camera took the event. */
+/* @height of the frame, pixels. Returns whether the event was used. */
 bool view_orbit_event(struct view_orbit *orbit, const struct incise_view_event *event,
 		      int height);
 

@@ -19,7 +19,7 @@ struct incise_window {
 	SDL_Joystick *stick[STICKS_MAX];
 };
 
-/* The library's caller keeps its signals; fingers and pens come as what they are. */
+/* The caller keeps its signals; fingers and pens do not become mice. */
 static void set_hints(void)
 {
 	SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
@@ -44,7 +44,7 @@ static int open_window(struct incise_window *window, const char *title, int widt
 	SDL_GL_SetAttribute(SDL_GL_CONTEXT_MINOR_VERSION, 3);
 	SDL_GL_SetAttribute(SDL_GL_CONTEXT_PROFILE_MASK, SDL_GL_CONTEXT_PROFILE_CORE);
 	SDL_GL_SetAttribute(SDL_GL_DOUBLEBUFFER, 1);
-	/* What is drawn comes from a framebuffer of its own, which has a depth. */
+	/* Drawing happens in another framebuffer, which has a depth. */
 	SDL_GL_SetAttribute(SDL_GL_DEPTH_SIZE, 0);
 	window->window =
 		SDL_CreateWindow(title ? title : "incise", SDL_WINDOWPOS_CENTERED,
@@ -58,7 +58,7 @@ static int open_window(struct incise_window *window, const char *title, int widt
 			"libgl1 and libgl1-mesa-dri, or run with "
 			"LIBGL_ALWAYS_SOFTWARE=1",
 			SDL_GetError());
-	/* With the screen; late frames at once, where that can be. */
+	/* In step with the screen; late frames at once, if supported. */
 	if (SDL_GL_SetSwapInterval(-1))
 		SDL_GL_SetSwapInterval(1);
 	return 0;
@@ -81,7 +81,7 @@ struct incise_window *incise_window_new(const char *title, int width, int height
 		errno = -rc;
 		return NULL;
 	}
-	/* A picture goes without. */
+	/* Joysticks are optional. */
 	window->sticks = !SDL_InitSubSystem(SDL_INIT_JOYSTICK);
 	return window;
 }
@@ -126,7 +126,7 @@ void incise_window_show(struct incise_window *window)
 	SDL_GL_SwapWindow(window->window);
 }
 
-/* SDL's places are the desktop's; a pixel of the frame may be smaller. */
+/* SDL uses desktop coordinates; a pixel of the frame may be smaller. */
 static void place(const struct incise_window *window, double x, double y,
 		  struct incise_view_event *event)
 {
@@ -279,7 +279,7 @@ static bool take_window(const struct incise_window *window, const SDL_WindowEven
 	return true;
 }
 
-/* Whether it is one that is told. */
+/* Returns whether the event is reported. */
 static bool take(struct incise_window *window, const SDL_Event *from,
 		 struct incise_view_event *to)
 {

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A window with an OpenGL 3.3 core context, by SDL 2, and what is done at it. Its events
- * have places in pixels of the frame; rays are the view's. See incise/view.h.
+ * A window with an OpenGL 3.3 core context, by SDL 2, and its events. Their places are in pixels of
+ * the frame; the view adds rays. See incise/view.h.
  *
- * SDL 2 tells the pressure of fingers and of pens that are touch devices; a pen that is a
- * mouse has none.
+ * SDL 2 reports the pressure of fingers and of pens that are touch devices, not of pens that are
+ * mice.
  */
 #ifndef INCISE_VIEW_WINDOW_H
 #define INCISE_VIEW_WINDOW_H
@@ -21,10 +21,10 @@ struct incise_window *incise_window_new(const char *title, int width, int height
 /* Make its context current. 0, -EIO. */
 int incise_window_current(struct incise_window *window, struct incise_error *err);
 
-/* Of what can be drawn on, pixels; 0 × 0 while it is closed up. */
+/* Size of the drawable, pixels; 0 × 0 while it is minimized. */
 void incise_window_size(const struct incise_window *window, int *width, int *height);
 
-/* Show what was drawn; waits for the screen where that can be waited for. */
+/* Show the frame; waits for the screen if supported. */
 void incise_window_show(struct incise_window *window);
 
 /* The next event, its ray empty. 1; 0: none. */

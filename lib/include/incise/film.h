@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A film of pictures, for people: Matroska with H.264 where libavcodec has an encoder for it
- * (libx264), else MJPEG. It looks the same but is not, to the bit: measurements belong into
- * recordings. Part of libincise-view; the first call loads a module on libavformat,
- * incise/film_mkv.so.
+ * A film for viewing: Matroska with H.264 if libavcodec has an encoder for it (libx264), else
+ * MJPEG. Compression is lossy: measurements belong into recordings. Part of libincise-view; the
+ * first call loads a module on libavformat, incise/film_mkv.so.
  */
 #ifndef INCISE_FILM_H
 #define INCISE_FILM_H
@@ -20,7 +19,7 @@ struct incise_film;
 #define INCISE_FILM_SIDE_MAX 8192
 
 /**
- * Begin a film at PATH.part; PATH is left alone until incise_film_close().
+ * Start a film at PATH.part; PATH stays as it is until incise_film_close().
  *
  * @param width, height even, 16 … INCISE_FILM_SIDE_MAX
  * @param rate_hz       pictures per second, 1 … 1000; whole
@@ -31,7 +30,7 @@ INCISE_API struct incise_film *incise_film_new(const char *path, int width, int 
 					       int rate_hz, struct incise_error *err);
 
 /**
- * The next picture.
+ * Add a picture.
  * @param rgb rows from the top, 3 bytes a pixel, without padding
  * @return 0; -EIO, -ENOSPC: no more can be added
  */
@@ -39,15 +38,15 @@ INCISE_API int incise_film_add(struct incise_film *film, const uint8_t *rgb,
 			       struct incise_error *err);
 
 /**
- * End it and put it in its place, over what is there; without a picture, or after an error,
- * nothing is left. Frees it.
+ * End the film and rename it to PATH, replacing a file there. Without a picture, or after an error,
+ * no file is left. Frees it.
  *
  * @param film NULL is allowed
  * @return 0; the error that ended it, or of writing the rest
  */
 INCISE_API int incise_film_close(struct incise_film *film, struct incise_error *err);
 
-/** Give it up: nothing is left. Frees it. */
+/** Discard it: no file is left. Frees it. */
 INCISE_API void incise_film_drop(struct incise_film *film);
 
 INCISE_END_DECLS

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A film in Matroska by libavformat: H.264 by libx264, else MJPEG; see ../view/film.h.
+ * A film in Matroska by libavformat: H.264 by libx264, else MJPEG; see ../film.h.
  *
  *     RGB ─► Y'CbCr 4:2:0 (BT.709 for H.264, BT.601 full range for MJPEG) ─► coder ─► .mkv
  */
@@ -13,7 +13,7 @@
 #include <libavutil/opt.h>
 #include "../film.h"
 
-/* Quality: of H.264 by its scale of 0 … 51, of MJPEG by 2 … 31; both look as the input does. */
+/* Quality: H.264 on a scale of 0 … 51, MJPEG of 2 … 31; visually lossless. */
 #define H264_CRF "20"
 #define MJPEG_SCALE 3
 
@@ -27,7 +27,7 @@ struct incise_film_coder {
 	char path[4096];
 };
 
-/* What a standard says of red, green and blue in 16 bits after the point. */
+/* Weights of red, green and blue by a standard, in 2^-16. */
 struct weights {
 	int y[3], cb[3], cr[3], offset;
 };
@@ -50,7 +50,7 @@ static int av_fail(struct incise_film_coder *coder, int rc, const char *what,
 {
 	int code = AVUNERROR(rc);
 
-	/* Codes of libav's own are no errno. */
+	/* libav has codes that are no errno. */
 	if (code <= 0 || code > 4095)
 		code = EIO;
 	return incise_error_set(err, code, "%.300s: %s: %s", coder->path, what,
@@ -67,7 +67,7 @@ static uint8_t weigh(const int w[3], const int rgb[3], int shift, int offset)
 	return (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
 }
 
-/* 2 × 2 pixels share their colour: that of their mean. */
+/* 2 × 2 pixels share the colour of their mean. */
 static void convert(AVFrame *frame, const uint8_t *rgb, const struct weights *weights)
 {
 	int width = frame->width, height = frame->height;
@@ -181,7 +181,7 @@ static struct incise_film_coder *film_open(const char *path, int width, int heig
 		errno = ENOMEM;
 		return NULL;
 	}
-	/* What it thinks of its input is for who makes the pictures. */
+	/* Warnings about the input are not for users. */
 	av_log_set_level(AV_LOG_ERROR);
 	if (strlen(path) < sizeof(coder->path)) {
 		strcpy(coder->path, path);
@@ -202,7 +202,7 @@ static struct incise_film_coder *film_open(const char *path, int width, int heig
 	return NULL;
 }
 
-/* What the coder has ready, into the file. */
+/* Write the packets that are ready. */
 static int drain(struct incise_film_coder *coder)
 {
 	AVStream *stream = coder->format->streams[0];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Films, read back by libavformat and libavcodec themselves: as many pictures as were put, at
- * their times, with their colours but for what coding costs; and files that cannot be.
+ * Films, read back by libavformat and libavcodec: the number of pictures, their times, and their
+ * colours up to coding losses; and files that cannot be written.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -28,7 +28,7 @@ extern const struct incise_film_module incise_film_module;
 
 static char path[] = "/tmp/incise-film-XXXXXX";
 
-/* A red square that wanders over a grey that brightens to the right. */
+/* A red square that moves over a grey that brightens to the right. */
 static void picture(int n, uint8_t *rgb)
 {
 	for (int y = 0; y < H; y++)
@@ -42,7 +42,7 @@ static void picture(int n, uint8_t *rgb)
 		}
 }
 
-/* What a film of these is to show: brightness, by the standard's weights. */
+/* Expected brightness of a film of these, by the standard's weights. */
 static double brightness(const uint8_t *rgb, bool limited)
 {
 	double y = limited ? 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
@@ -66,9 +66,9 @@ static void check_picture(const AVFrame *frame, int n)
 
 			off2 += off * off;
 		}
-	/* 32 dB: of 255 a rms of 6.4; what both coders do at their quality is below 4. */
+	/* 32 dB: a rms of 6.4 of 255; both coders stay below 4 at their quality. */
 	assert_true(sqrt(off2 / (W * H)) < 6.4);
-	/* In the square it is red, else grey: of what is left of colour at half the size. */
+	/* The square is red, the rest grey, at half of the colour resolution. */
 	assert_true(frame->data[2][12 * frame->linesize[2] + n / 2 + 4] > 165);
 	assert_in_range(frame->data[2][4 * frame->linesize[2] + 4], 120, 136);
 }
@@ -138,7 +138,7 @@ static void test_files_that_cannot_be(void **state)
 	assert_null(incise_film_module.open("/tmp/no/such/x.mkv", W, H, FPS, &err));
 	assert_int_equal(errno, ENOENT);
 	assert_non_null(strstr(err.text, "/tmp/no/such/x.mkv"));
-	/* A disk that is full, at the latest when it is ended. */
+	/* A full disk is reported when the film ends, at the latest. */
 	coder = incise_film_module.open("/dev/full", 1024, 1024, FPS, &err);
 	if (coder) {
 		srand(1);

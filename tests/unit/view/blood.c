@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Blood: no unit of volume is made or lost, drops go downhill only, all of it is bounded, and
- * the same seed gives the same.
+ * Blood: its volume balances in whole units, drops run downhill only, memory is bounded, and a seed
+ * determines the result.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -46,7 +46,7 @@ static void assert_balance(const struct blood *blood)
 	struct blood_volumes v;
 
 	blood_volumes(blood, &v);
-	/* Whole units: not to rounding, but the same. */
+	/* Whole units are equal exactly. */
 	assert_true(v.emitted == v.drops + v.films + v.off);
 	assert_true(v.drops >= 0 && v.films >= 0 && v.off >= 0);
 }
@@ -83,9 +83,8 @@ static void test_balance(void **state)
 }
 
 /*
- * All that a fresh cut gives is k L D tau: in five tau all but 1 % of it. Level ground: a
- * source gives what it has each 80 ms, at the rate at their beginning, so half of
- * 80 ms / 18 s too much.
+ * A fresh cut emits k L D tau in total, 99 % of it in five tau. On level ground: a source emits
+ * every 80 ms at the rate of their start, so half of 80 ms / 18 s too much.
  */
 static void test_emits_what_it_should(void **state)
 {
@@ -113,7 +112,7 @@ static void test_emits_what_it_should(void **state)
 	field_free(&field);
 }
 
-/* What is seen of a place: how high it stands against gravity, mm. */
+/* Height of a place as drawn, against gravity, mm. */
 static double height_mm(const struct field *field, const double px[2])
 {
 	double point[3], normal[3], relief = uv_map_relief_mm(field->map, px);
@@ -127,7 +126,7 @@ static double height_mm(const struct field *field, const double px[2])
 	return high;
 }
 
-/* No drop rises, from step to step; and some go far. With and without a larynx. */
+/* No drop rises in any step, and some run far. With and without a larynx. */
 static void test_downhill(void **state)
 {
 	for (int k = 0; k < 3; k++) {
@@ -181,7 +180,7 @@ static void test_downhill(void **state)
 	}
 }
 
-/* On a level nothing runs away. */
+/* On level ground nothing runs. */
 static void test_level_stays(void **state)
 {
 	struct blood *blood;
@@ -202,7 +201,7 @@ static void test_level_stays(void **state)
 	field_free(&field);
 }
 
-/* A drop below the critical volume hangs; a steeper slope lets go of smaller ones. */
+/* A drop below the critical volume hangs; a steeper slope releases smaller ones. */
 static void test_pinned_below_a_volume(void **state)
 {
 	double let_go_ul[2] = {0};
@@ -262,7 +261,7 @@ static void painted_new(struct painted *p, const struct field *field, int seed)
 	assert_non_null(p->blood);
 }
 
-/* The same seed: the same to the bit, painted often or once. Another seed: another picture. */
+/* The same seed gives identical textures, painted often or once; another seed another one. */
 static void test_repeats(void **state)
 {
 	static const int seeds[] = {1, 1, 2};
@@ -284,7 +283,7 @@ static void test_repeats(void **state)
 	}
 	assert_memory_equal(layer[0], layer[1], SIDE * SIDE * 4);
 	assert_true(memcmp(layer[0], layer[2], SIDE * SIDE * 4) != 0);
-	/* Premultiplied; and there is thick blood, thin blood and none. */
+	/* Premultiplied; with thick blood, thin blood and none. */
 	for (int i = 0; i < SIDE * SIDE; i++)
 		for (int c = 0; c < 3; c++)
 			assert_true(layer[0][4 * i + c] <= layer[0][4 * i + 3]);
@@ -308,7 +307,7 @@ static void test_repeats(void **state)
 	field_free(&field);
 }
 
-/* Long after it all stands still, and nothing is painted any more. */
+/* After a long time nothing moves and nothing is painted. */
 static void test_dries(void **state)
 {
 	struct incise_upload uploads[256];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The canvas: what is composed where it is dirty is the same, to the bit, as all of it anew;
- * its levels are means in linear light.
+ * The canvas: composing dirty tiles gives the same bits as composing everything; its levels are
+ * means in linear light.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -48,7 +48,7 @@ static void compose_all(struct incise_canvas *canvas, int room)
 	assert_int_equal(n, 0);
 }
 
-/* Premultiplied texels that mean nothing. */
+/* Arbitrary premultiplied texels. */
 static void scribble(struct incise_canvas *canvas, int layer, struct incise_rect rect)
 {
 	uint8_t *rgba = incise_canvas_layer(canvas, layer);
@@ -79,7 +79,7 @@ static void assert_same(const struct incise_canvas *a, const struct incise_canva
 	}
 }
 
-/* A canvas that composed as it went against one that sees the end only. */
+/* A canvas that composes after each change, compared with one that composes at the end. */
 static void test_as_anew(void **state)
 {
 	const int rooms[] = {CANVAS_UPLOADS_MIN, UPLOADS};
@@ -109,7 +109,7 @@ static void test_as_anew(void **state)
 	}
 }
 
-/* A copy kept by uploads alone, as a card keeps one, is the canvas. */
+/* A copy that follows the uploads, as in a graphics card, equals the canvas. */
 static void test_uploads_tell_all(void **state)
 {
 	uint8_t *base = any_base(SIDE), *copy[9];
@@ -151,7 +151,7 @@ static void test_uploads_tell_all(void **state)
 	free(base);
 }
 
-/* A small change is told by small rectangles: a tile, and what of it is seen from afar. */
+/* A small change gives small rectangles: a tile, and its parts of the other levels. */
 static void test_small_stays_small(void **state)
 {
 	uint8_t *base = any_base(SIDE);
@@ -172,7 +172,7 @@ static void test_small_stays_small(void **state)
 	free(base);
 }
 
-/* Against the formula of "over" in doubles. */
+/* Compared with the formula of "over" in doubles. */
 static void test_over(void **state)
 {
 	uint8_t *base = any_base(32);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Pictures by OpenGL: against kept ones, and by what must hold of any. The surface is a
- * neck without a larynx, painted here, so that only drawing can change them.
+ * Pictures by OpenGL, compared with stored ones and with properties of any picture. The surface is a
+ * neck without a larynx, painted here, so that only drawing affects them.
  *
- *     INCISE_GOLDEN=write build/tests/unit/view/draw    keeps new ones: look at them
+ *     INCISE_GOLDEN=write build/tests/unit/view/draw    stores new ones: look at them
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -117,7 +117,7 @@ static struct incise_draw *draw_new(const struct incise_canvas *canvas, int samp
 	return draw;
 }
 
-/* Held as a pen is, with its tip 2 mm below the skin. */
+/* Held like a pen, with its tip 2 mm below the skin. */
 static struct incise_tick held(enum incise_tool tool)
 {
 	double back = -35 * M_PI / 360, aslant = 20 * M_PI / 360;
@@ -141,10 +141,10 @@ static void frame(struct incise_draw *draw, const struct incise_view_camera *cam
 }
 
 /*
- * Other versions of Mesa and LLVM round and filter a little otherwise, and may put an edge
- * on the next pixel. Measured here: with one sample per pixel, so that every edge is
- * another, 0.995; with a card's filters, three-linear and anisotropic, 0.985; without the
- * instrument, or with one too many, 0.964 and less.
+ * Other versions of Mesa and LLVM round and filter slightly differently, and may move an edge by a
+ * pixel. Measured: with one sample per pixel, which changes every edge, 0.995; with a card's
+ * filters, trilinear and anisotropic, 0.985; without the instrument, or with one too many, at most
+ * 0.964.
  */
 #define ALIKE 0.975
 
@@ -186,7 +186,7 @@ static void test_golden(void **state)
 			look_write("/tmp/incise-draw-failed.png", one, W, H);
 		print_message("%s: %.4f\n", cases[i].name, alike);
 		assert_true(alike >= ALIKE);
-		/* It can fail: the same without the instrument, or with one, is told apart. */
+		/* The measure distinguishes pictures with and without the instrument. */
 		frame(draw, cases[i].camera, pose ? NULL : &tick, one);
 		alike = look_alike(one, golden, W, H);
 		print_message("%s, otherwise: %.4f\n", cases[i].name, alike);
@@ -208,7 +208,7 @@ static void test_same_input_same_picture(void **state)
 	for (int i = 0; i < 2; i++) {
 		struct incise_draw *draw = draw_new(canvas, 1);
 
-		/* What was drawn before does not matter. */
+		/* Previous frames have no effect. */
 		if (i)
 			frame(draw, &above, NULL, two);
 		frame(draw, &aside, &tick, i ? two : one);
@@ -251,7 +251,7 @@ static void test_instrument_is_where_its_pose_says(void **state)
 	frame(draw, &aside, &tick, two);
 	assert_true(instrument_place(&scalpel, &tick, &place));
 	view_camera_project(&aside, W, H, 100, &projection);
-	/* Along its middle it covers what was there; the last part is out of the picture. */
+	/* Along its middle it covers the background; its end is outside of the picture. */
 	for (double mm = 5; mm < 85; mm += 2) {
 		double p[3], px[2];
 
@@ -260,7 +260,7 @@ static void test_instrument_is_where_its_pose_says(void **state)
 		if (px[0] >= 0 && px[0] < W && px[1] >= 0 && px[1] < H)
 			assert_true(differs((int)px[0], (int)px[1]));
 	}
-	/* Around it there is its shadow, which makes nothing lighter. */
+	/* Its shadow around it makes nothing lighter. */
 	assert_int_equal(instrument_scalpel(120, &mesh), 0);
 	for (int i = 0; i < mesh.n_vertices; i++) {
 		double p[3], px[2];
@@ -290,7 +290,7 @@ static void test_instrument_is_where_its_pose_says(void **state)
 	incise_canvas_free(canvas);
 }
 
-/* What is uploaded by rectangles is the same as all of it anew, and no more than that. */
+/* Uploads by rectangles give the same texture as a complete one, and no more changes. */
 static void test_dirty_rectangle(void **state)
 {
 	static const struct incise_rect rect = {300, 220, 17, 9};

@@ -26,7 +26,7 @@ static void test_two_do_not_meddle(void **state)
 	assert_false(glIsTexture(texture));
 	assert_int_equal(incise_egl_current(a, NULL), 0);
 	assert_true(glIsTexture(texture));
-	/* One that is not current goes without harm for the one that is. */
+	/* Freeing a context that is not current does not affect the current one. */
 	incise_egl_free(b);
 	assert_true(glIsTexture(texture));
 	assert_int_equal(glGetError(), GL_NO_ERROR);

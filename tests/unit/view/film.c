@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * A film's file: what is no film is refused, a module that is not there is named, and nothing
- * half is left. What is in it is in tests/unit/film.
+ * A film's file: invalid options and a missing module are reported, and no partial file is left.
+ * tests/unit/film tests its contents.
  */
 #include <stdarg.h>
 #include <stddef.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Effects: a function of the ticks alone, whenever it is painted; only what the scene asks
- * for; and ticks that make no sense do no harm.
+ * The injury: a function of the ticks alone, whenever it is painted; only the parts that the scene
+ * requests; and invalid ticks do no harm.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -102,7 +102,7 @@ static void test_frames_do_not_matter(void **state)
 	field_free(&field);
 }
 
-/* Repeated ticks of one time, as a reader that looks twice might give them, change nothing. */
+/* Repeated ticks of one time, as from a reader that reads twice, change nothing. */
 static void test_ticks_twice(void **state)
 {
 	struct scene s[2];
@@ -125,7 +125,7 @@ static void test_ticks_twice(void **state)
 	field_free(&field);
 }
 
-/* The blood of a cut is that of its length and depth, at any rate of ticks. */
+/* The blood of a cut depends on its length and depth, not on the tick rate. */
 static void test_rates(void **state)
 {
 	static const double rates[] = {1000, 5000, 100, 20};
@@ -157,7 +157,7 @@ static void test_rates(void **state)
 	field_free(&field);
 }
 
-/* Nothing is there that the scene does not ask for. */
+/* There are only the parts that the scene requests. */
 static void test_only_what_is_asked_for(void **state)
 {
 	static const struct {
@@ -203,7 +203,7 @@ static void test_only_what_is_asked_for(void **state)
 	field_free(&field);
 }
 
-/* A gap in the ticks is made up, up to a second of it; more is passed over. */
+/* Up to a second of a gap in the ticks is caught up, the rest skipped. */
 static void test_gaps(void **state)
 {
 	static const struct {
@@ -237,7 +237,7 @@ static void test_gaps(void **state)
 		assert_true(after.steps_lost == cases[k].lost);
 		assert_true((after.blood_ul_emitted > before.blood_ul_emitted) ==
 			    (cases[k].gap_ns > 0));
-		/* And time goes on from there. */
+		/* Time continues from there. */
 		if (cases[k].gap_ns < INT64_MAX / 2)
 			tick.t_ns += 200000000;
 		incise_injury_tick(s.injury, &tick);
@@ -260,7 +260,7 @@ static double any_double(void)
 	return odd[(size_t)rand() % (sizeof(odd) / sizeof(*odd))];
 }
 
-/* Any ticks: what comes out is premultiplied colour, bounded time, and volumes that balance. */
+/* Any ticks give premultiplied colours and volumes that balance, in bounded time. */
 static void test_hostile(void **state)
 {
 	static const double tilts[] = {40, -1};

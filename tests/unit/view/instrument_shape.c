@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Instruments' meshes, and where a tick puts them.
+ * Meshes of instruments, and their frames from ticks.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -50,7 +50,7 @@ static void check(const struct instrument_mesh *mesh, double low[3], double high
 			n += v->normal[k] * v->normal[k];
 			assert_true(v->rgb[k] >= 0 && v->rgb[k] <= 1);
 		}
-		/* The shader makes it unit; steel's leans on purpose. */
+		/* The shader normalizes it; steel's normals lean on purpose. */
 		assert_true(n > 0.2 && n < 4);
 	}
 	for (int i = 0; i < mesh->n_indices; i++)

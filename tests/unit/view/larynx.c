@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The larynx that shows through: its shape, and that what is drawn follows it.
+ * The larynx: its shape, and the surface as drawn with it.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -26,7 +26,7 @@ static void test_landmarks(void **state)
 	assert_true(membrane < 0.3 && membrane < 0.2 * cricoid);
 	assert_true(cricoid > 1.5 && cricoid < prominence);
 	assert_true(below < 0.6 * cricoid);
-	/* Both sides are alike. */
+	/* Both sides are equal. */
 	assert_true(larynx_height_mm(-20, 6) == larynx_height_mm(-20, -6));
 	/* Nothing at the texture's borders, or there would be an edge. */
 	for (int i = -80; i <= 80; i++) {
@@ -70,7 +70,7 @@ static struct uv_map *neck(struct incise_surface **surface, bool larynx)
 	return map;
 }
 
-/* Above what is felt stands what is drawn, and it is lit as it stands. */
+/* The surface is drawn with the relief, and normals follow it. */
 static void test_drawn(void **state)
 {
 	struct incise_surface *surface;
@@ -118,7 +118,7 @@ static void test_drawn(void **state)
 	incise_surface_free(surface);
 }
 
-/* Not asked for, or on what is too small for it, there is none. */
+/* There is none unless requested, and none on a texture that is too small. */
 static void test_none(void **state)
 {
 	struct incise_surface *surface;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Pictures of tests: a context or a skip, PNG files by cairo, and how alike two are.
+ * Pictures of tests: a context or a skip, PNG files by cairo, and similarity of two.
  */
 #ifndef INCISE_TEST_LOOK_H
 #define INCISE_TEST_LOOK_H
@@ -12,7 +12,7 @@
 #include <incise/error.h>
 #include "../../../lib/view/egl.h"
 
-/* Or NULL, which is said: the test is to be skipped. */
+/* NULL, with a message: skip the test. */
 static inline struct incise_egl *look_context(void)
 {
 	struct incise_error err = {0};
@@ -45,7 +45,7 @@ static inline bool look_write(const char *path, const uint8_t *rgb, int w, int h
 	return good;
 }
 
-/* NULL: no such file, or of another size. */
+/* NULL: no such file, or another size. */
 static inline uint8_t *look_read(const char *path, int w, int h)
 {
 	cairo_surface_t *s = cairo_image_surface_create_from_png(path);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Noise, held against the sum over its lattice by the closed form of the B-spline.
+ * Noise compared with the sum over its lattice by the closed form of the B-spline; cells.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -76,7 +76,7 @@ static void test_mean_and_deviation(void **state)
 	noise_free(noise);
 }
 
-/* What is finer than texels fades, and what is no size is nothing. */
+/* Noise finer than texels fades, and an invalid size gives none. */
 static void test_fades(void **state)
 {
 	static const struct {
@@ -105,7 +105,7 @@ static void test_fades(void **state)
 	}
 }
 
-/* Numbers of places that are neighbours, or of seeds, have nothing in common. */
+/* Numbers of neighbouring places, or of seeds, are independent. */
 static void test_places(void **state)
 {
 	double sum = 0, product[3] = {0};
@@ -183,7 +183,7 @@ static void test_warp(void **state)
 	for (int y = 0; y < SIZE - 16; y++)
 		for (int x = 0; x < SIZE - 16; x++)
 			assert_true(fabsf(moved[y][x] - near[y + 16][x + 16]) < 1e-5F);
-	/* Beyond what is promised there is some distance, and nothing else is read. */
+	/* Beyond the documented range there is some distance, without a wrong access. */
 	rows(cells, 1e6F, moved, far);
 	rows(cells, -1e6F, moved, far);
 	assert_true(isfinite(moved[0][0]) && isfinite(far[0][0]));

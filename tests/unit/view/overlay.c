@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The panels: what is drawn when, and that nothing that a tick holds does them harm.
+ * The panels: contents and times of redrawing; any tick is harmless.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -75,7 +75,7 @@ static void test_redrawn_15_times_a_second(void **state)
 			first = last;
 	}
 	assert_in_range(last - first, 28, 30);
-	/* Time stands still: the state is told at once, what else there is not. */
+	/* Without a new tick, a new state is drawn at once, other changes are not. */
 	assert_int_equal(incise_overlay_panel(overlay, &status)->version, last);
 	assert_int_equal(incise_overlay_panel(
 				 overlay, &(struct incise_view_status){.state = "fault"})
@@ -122,7 +122,7 @@ static void test_keys(void **state)
 	image = incise_overlay_keys(overlay);
 	for (int i = 0; i < image->width * image->height; i++)
 		lit += image->pixels[4 * i + 1] > 150;
-	/* Where there is a font; without one there is the panel still. */
+	/* With a font; without one there is still a panel. */
 	print_message("%d pixels of text\n", lit);
 	assert_int_equal(image->pixels[4 * (40 * image->width + 2) + 3], 184);
 	assert_int_equal(incise_overlay_keys(overlay)->version, 1);

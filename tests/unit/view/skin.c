@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Painted tissue: that its colours are those of tissue, that no seam shows, and that a
- * seed is one picture. Whether it looks like skin is for eyes.
+ * Painted tissue: plausible colours, no seams, and one texture per seed. Its beauty is not tested.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -34,7 +33,7 @@ static struct picture *paint(enum incise_skin skin, double texel_mm, uint64_t se
 
 	if (!picture)
 		abort();
-	/* Nothing of what was there before stays. */
+	/* Every byte is overwritten. */
 	memset(picture, 0x5a, sizeof(*picture));
 	assert_int_equal(
 		incise_skin_paint(&map, skin, seed, picture->rgba, picture->normal), 0);
@@ -51,7 +50,7 @@ static void mean(const struct picture *picture, double rgb[3])
 	}
 }
 
-/* Opaque, and normals of length 1 as far as 8 bits go, that look outwards. */
+/* Opaque, and outward normals of length 1 to 8 bits. */
 static void well_formed(const struct picture *picture)
 {
 	double slope[2] = {0};
@@ -68,7 +67,7 @@ static void well_formed(const struct picture *picture)
 		slope[0] += x;
 		slope[1] += y;
 	}
-	/* On the whole it is flat: pores and furrows have two sides. */
+	/* The mean is flat: pores and furrows have two sides. */
 	assert_true(fabs(slope[0] / TEXELS) < 0.01 && fabs(slope[1] / TEXELS) < 0.01);
 }
 
@@ -87,8 +86,8 @@ static void test_plain(void **state)
 }
 
 /*
- * The rule by which Kovač, Peer and Solina (EUROCON 2003) tell skin in daylight from all
- * else, and the range of means of light to tanned skin.
+ * The rule of Kovač, Peer and Solina (EUROCON 2003) that distinguishes skin in daylight, and the
+ * range of means of light to tanned skin.
  */
 static void test_neck_is_skin(void **state)
 {
@@ -103,7 +102,7 @@ static void test_neck_is_skin(void **state)
 			skin += p[0] > 95 && p[1] > 40 && p[2] > 20 && p[0] - p[2] > 15 &&
 				p[0] - p[1] > 15 && p[0] > p[1] && p[1] >= p[2];
 		}
-		/* Moles, and what lies over a vein, may be anything. */
+		/* Moles and skin over veins may violate it. */
 		assert_true((double)skin > 0.99 * TEXELS);
 		mean(picture, rgb);
 		assert_true(rgb[0] > 180 && rgb[0] < 230);
@@ -129,7 +128,7 @@ static void test_liver_is_dark(void **state)
 	}
 }
 
-/* Not one colour, and not a storm: how much texels differ, of 255. */
+/* Neither one colour nor pure noise: differences of texels, of 255. */
 static void test_has_texture(void **state)
 {
 	for (int skin = INCISE_SKIN_NECK; skin <= INCISE_SKIN_LIVER; skin++) {
@@ -151,7 +150,7 @@ static void test_has_texture(void **state)
 	}
 }
 
-/* How much a column differs from the next, or a row, on average. */
+/* Mean difference between neighbouring columns, or rows. */
 static double step(const struct picture *picture, size_t at, bool across)
 {
 	double sum = 0;
@@ -173,7 +172,7 @@ static int by_value(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* No line between two columns or two rows stands out, wherever a tile might end. */
+/* No line between two columns or rows stands out, at any possible tile border. */
 static void test_no_seam(void **state)
 {
 	for (int skin = INCISE_SKIN_NECK; skin <= INCISE_SKIN_LIVER; skin++) {
@@ -185,7 +184,7 @@ static void test_no_seam(void **state)
 			for (size_t i = 0; i < SIZE - 1; i++)
 				steps[i] = step(picture, i, across);
 			qsort(steps, SIZE - 1, sizeof(*steps), by_value);
-			/* A crease that lies straight along a column is the most. */
+			/* The largest is a crease along a column. */
 			assert_true(steps[SIZE - 2] < 1.6 * steps[SIZE / 2]);
 			/* Nor is one smeared. */
 			assert_true(steps[0] > 0.5 * steps[SIZE / 2]);
@@ -194,7 +193,7 @@ static void test_no_seam(void **state)
 	}
 }
 
-/* How a texel differs from the next one: what is fine, without what is wide. */
+/* Difference between neighbouring texels: fine patterns, without wide ones. */
 static double fine(const struct picture *picture, size_t x, size_t y)
 {
 	const uint8_t *here = picture->rgba + 4 * (y * SIZE + x);
@@ -202,7 +201,7 @@ static double fine(const struct picture *picture, size_t x, size_t y)
 	return (double)here[1] - here[5];
 }
 
-/* Nothing comes again after an eighth, a quarter or a half of the side, as tiles would. */
+/* Nothing repeats after an eighth, a quarter or a half of the side, as tiles would. */
 static void test_no_tile(void **state)
 {
 	for (int skin = INCISE_SKIN_NECK; skin <= INCISE_SKIN_LIVER; skin++) {
@@ -248,7 +247,7 @@ static void test_seed(void **state)
 	}
 }
 
-/* Textures of a body, of a cell, and of nonsense. */
+/* Textures of the size of a body, of a cell, and of invalid sizes. */
 static void test_any_scale(void **state)
 {
 	static const double scales[] = {0,   1e-300, 1e-9,  1e-3,     1,  3,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Charts of all kinds of surface: there and back, held against finite differences and
- * against the surface itself; and what is drawn.
+ * Maps of all kinds of surface: there and back, compared with finite differences and with the
+ * surface itself; and their triangles.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -144,17 +144,17 @@ static void there_and_back(const struct incise_surface *surface, const struct uv
 		/* Closed forms; of an atlas coordinates are floats, 1e-7 of 512. */
 		assert_true(fabs(back[0] - px[0]) < 1e-3);
 		assert_true(fabs(back[1] - px[1]) < 1e-3);
-		/* Neither along the other, and in the surface, which turns little there. */
+		/* Not parallel, and in the surface, which curves little there. */
 		uv_map_metric(map, px, right, down);
 		assert_true(v3_length(right) > 0 && v3_length(down) > 0);
 		assert_true(fabs(v3_dot(right, normal)) < 1e-6 * v3_length(right));
 		assert_true(fabs(v3_dot(down, normal)) < 1e-6 * v3_length(down));
 	}
-	/* Some of the texture of a mesh lies beside it. */
+	/* Part of a mesh's texture is outside of it. */
 	assert_true(found > (incise_surface_triangles(surface) ? 500 : 999));
 }
 
-/* Held against how far points are that are half a texel to each side. */
+/* Compared with the distance of points half a texel to each side. */
 static void metric(const struct uv_map *map)
 {
 	const double step = 0.01;
@@ -179,7 +179,7 @@ static void metric(const struct uv_map *map)
 				continue;
 			v3_sub(difference, b, a);
 			v3_add(difference, difference, -2 * step, m[k]);
-			/* Curvature goes in by its square; coordinates' rounding as it is. */
+			/* Quadratic in curvature, linear in rounding of coordinates. */
 			assert_true(v3_length(difference) <=
 				    1e-4 * step * v3_length(m[k]) +
 					    1e-13 * fmax(extent(a), 1e-3));
@@ -206,7 +206,7 @@ static void drawn(const struct uv_map *map)
 		}
 		v3_cross(out, e[0], e[1]);
 		area = v3_length(out);
-		/* Counter-clockwise from outside; but for slivers, which floats turn. */
+		/* Counter-clockwise from outside, except for slivers, which floats may turn. */
 		if (area > 1e-2 * v3_length(e[0]) * v3_length(e[1]) &&
 		    v3_length(e[0]) > 1e-2)
 			assert_true(out[0] * v[0]->normal[0] + out[1] * v[0]->normal[1] +
@@ -233,7 +233,7 @@ static void drawn(const struct uv_map *map)
 	}
 }
 
-/* Where a vertex is drawn is where its texel's point is, raised by the relief. */
+/* A vertex is at its texel's point, raised by the relief. */
 static void drawn_in_place(const struct uv_map *map)
 {
 	for (int i = 0; i < map->n_vertices; i++) {
@@ -302,7 +302,7 @@ static void test_lies_as_it_should(void **state)
 	}
 }
 
-/* A neck's texels are squares, but for a twentieth, everywhere. */
+/* A neck's texels are squares to within a twentieth. */
 static void test_neck_is_not_stretched(void **state)
 {
 	struct incise_surface *surface = make(6);
@@ -321,7 +321,7 @@ static void test_neck_is_not_stretched(void **state)
 	incise_surface_free(surface);
 }
 
-/* The texture lies on a mesh as far as it can, and the top is on it. */
+/* The texture is on a mesh as far as possible, with the top on it. */
 static void test_fits_a_mesh(void **state)
 {
 	struct incise_surface *surface = hill(0);
@@ -344,13 +344,13 @@ static void test_fits_a_mesh(void **state)
 		found += uv_map_point(map, px, point, normal);
 	}
 	assert_true(fabs(found * 16.0 / (SIZE * SIZE) - 70 / 80.0) < 0.005);
-	/* So are triangles, but for those cut at the border. */
+	/* So are triangles, except those cut at the border. */
 	assert_true(map->n_indices / 3 >= 17500 && map->n_indices / 3 < 18200);
 	uv_map_free(map);
 	incise_surface_free(surface);
 }
 
-/* What is not on the texture, or nowhere, has no texel and no point. */
+/* Places outside of the texture, or not finite, have no texel and no point. */
 static void test_outside(void **state)
 {
 	static const double nowhere[][3] = {
@@ -368,7 +368,7 @@ static void test_outside(void **state)
 		double px[2] = {7, 7}, point[3] = {7}, normal[3], right[3], down[3];
 
 		for (size_t k = 0; k < sizeof(nowhere) / sizeof(*nowhere); k++) {
-			/* Of a mesh with coordinates the nearest is on it all the same. */
+			/* On a mesh with coordinates, the nearest point still has a texel. */
 			bool there = uv_map_px(map, nowhere[k], px);
 
 			assert_false(there && (k < 6 || kind < 5));
@@ -417,7 +417,7 @@ static void test_refused(void **state)
 	incise_surface_free(surface);
 }
 
-/* Coordinates that cover nothing are none: then a mesh is seen from above. */
+/* A mesh whose coordinates have no area is seen from above. */
 static void test_useless_coordinates(void **state)
 {
 	static const float values[] = {0, 0.5F, 1e6F};
@@ -466,7 +466,7 @@ static void test_seam(void **state)
 
 	assert_int_equal(whole->n_vertices, (HILL + 1) * (HILL + 1));
 	assert_int_equal(whole->n_indices, 6 * HILL * HILL);
-	/* Its right half goes to a place of its own. */
+	/* Its right half gets a place of its own. */
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
 		double middle = 0;
 

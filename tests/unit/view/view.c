@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The whole picture: the same ticks give the same one however many frames were drawn, and
- * nothing that comes from outside breaks it. Neck with a small texture.
+ * The view: the same ticks give the same picture for any number of frames, and no input breaks it.
+ * Neck with a small texture.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -103,7 +103,7 @@ static void film(int every, uint8_t *rgb)
 	assert_int_equal(incise_view_frame(view, NULL, NULL), 0);
 	assert_int_equal(incise_view_pixels(view, rgb), 0);
 	incise_view_report(view, &report);
-	/* As long as the blade went, to the texels of the ends. */
+	/* As long as the blade's way, to the texels of the ends. */
 	assert_true(fabs(report.cut_mm - 30) < 1);
 	assert_true(report.blood_ul_emitted > 0 && report.uploads > 0);
 	incise_view_free(view);
@@ -119,7 +119,7 @@ static void test_frames_do_not_matter(void **state)
 	film(1500, one);
 	film(40, two);
 	assert_memory_equal(one, two, sizeof(one));
-	/* There is something to be seen. */
+	/* The frame is not empty. */
 	view = view_new();
 	assert_int_equal(incise_view_pixels(view, bare), -ENODATA);
 	assert_int_equal(incise_view_frame(view, NULL, NULL), 0);
@@ -153,7 +153,7 @@ static void test_ticks_that_are_no_numbers(void **state)
 	assert_int_equal(incise_view_frame(view, NULL, NULL), 0);
 	assert_int_equal(incise_view_pixels(view, two), 0);
 	assert_memory_equal(one, two, sizeof(one));
-	/* What of a tick is no place may be odd, and time may go backwards. */
+	/* Other values of a tick may be invalid, and time may go backwards. */
 	for (int i = 0; i < 200; i++) {
 		struct incise_tick tick = cut(i * 7919 % 1500);
 
@@ -262,14 +262,14 @@ static void test_camera_and_sizes(void **state)
 	assert_true(camera.elevation_deg == 89);
 	incise_view_size(view, &w, &h);
 	assert_true(w == W && h == H);
-	/* Without a window nobody does anything at it. */
+	/* Without a window there are no events. */
 	assert_int_equal(incise_view_event(view, &event), 0);
 	assert_int_equal(incise_view_keys(view, (const char *const[]){"q\tquit"}, 1), 0);
 	incise_view_free(view);
 	incise_view_free(NULL);
 }
 
-/* Two views in a thread draw each its own. */
+/* Two views in a thread are independent. */
 static void test_two_views(void **state)
 {
 	struct incise_tick tick = cut(3);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The geometry of looking: pixels to ways and back, and OpenGL's matrix beside both.
+ * The camera: rays of pixels and back, compared with OpenGL's matrix; control by mouse and keys.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -21,14 +21,14 @@ static const struct incise_view_camera cameras[] = {
 };
 #define CAMERAS (sizeof(cameras) / sizeof(cameras[0]))
 
-/* The middle of the picture is the target, whose right and above are where the header says. */
+/* The middle of the frame is the target; directions are as documented. */
 static void test_directions(void **state)
 {
 	struct view_projection projection;
 	double px[2], to_right[3] = {1, 0, 0}, over[3] = {0, 0, 1};
 
 	view_camera_project(&cameras[0], 200, 100, 50, &projection);
-	/* At azimuth 0 one looks along +y. */
+	/* At azimuth 0 it looks along +y. */
 	assert_true(fabs(projection.position_mm[1] + 100) < 1e-12 &&
 		    fabs(projection.position_mm[0]) < 1e-12);
 	assert_true(project(&projection, 200, 100, cameras[0].target_mm, px));
@@ -39,7 +39,7 @@ static void test_directions(void **state)
 	view_camera_project(&(struct incise_view_camera){{0, 0, 0}, 90, 0, 100, 40}, 200,
 			    100, 50, &projection);
 	assert_true(fabs(projection.position_mm[0] - 100) < 1e-12);
-	/* What is behind is nowhere. */
+	/* Places behind the camera have no pixel. */
 	assert_false(project(&projection, 200, 100, (double[]){101, 0, 0}, px));
 }
 
@@ -132,15 +132,15 @@ static void test_home_sees_all(void **state)
 	assert_true(c->elevation_deg > 20 && c->elevation_deg < 70);
 	/* A ball of 100 mm is wider than the picture is high, not wider than 16 : 9. */
 	assert_true(tan(c->fov_deg * M_PI / 360) * c->distance_mm > 100 * 9 / 16.0);
-	/* What lies along y is seen as what lies along x. */
+	/* A direction along y looks the same as one along x. */
 	view_orbit_home(&turned, c->target_mm, (double[]){0, 2, 0}, 100);
 	assert_true(fabs(turned.camera.azimuth_deg - c->azimuth_deg - 90) < 1e-9);
-	/* A way straight up is none. */
+	/* A vertical direction has no effect. */
 	view_orbit_home(&turned, c->target_mm, (double[]){0, 0, 1}, 100);
 	assert_true(turned.camera.azimuth_deg == c->azimuth_deg);
 }
 
-/* The place under the mouse comes with it when the middle button is held. */
+/* With the middle button, the place under the mouse follows it. */
 static void test_moves_with_the_mouse(void **state)
 {
 	struct view_orbit orbit = start();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * A window of SDL's driver `offscreen`, which has a context and no screen; events are put
- * into SDL's own queue. A real window is met by tests/cli under Xvfb.
+ * A window of SDL's driver `offscreen`, with a context and no screen; events are pushed into SDL's
+ * queue. tests/cli has a real window under Xvfb.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -51,7 +51,7 @@ static struct incise_view_event sent(SDL_Event from)
 	struct incise_view_event event;
 
 	assert_int_equal(SDL_PushEvent(&from), 1);
-	/* SDL says "none" once between what came before it was last asked and after that. */
+	/* SDL reports "none" once between events of before and after the last poll. */
 	if (!incise_window_event(window, &event))
 		assert_int_equal(incise_window_event(window, &event), 1);
 	assert_true(event.t_ns > 0);
@@ -153,7 +153,7 @@ static void test_others(void **state)
 {
 	struct incise_view_event event;
 	SDL_Event unknown = {.type = SDL_USEREVENT};
-	/* Of joysticks that are not there. */
+	/* Events of missing joysticks. */
 	SDL_Event axis = {.jaxis = {.type = SDL_JOYAXISMOTION, .which = 77}};
 	SDL_Event gone = {.jdevice = {.type = SDL_JOYDEVICEREMOVED, .which = 77}};
 	SDL_Event added = {.jdevice = {.type = SDL_JOYDEVICEADDED, .which = 77}};

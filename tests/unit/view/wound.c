@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The wound: without a gap at any speed and tick rate, opened by what is put in, closed
- * after it, the same however often it is painted, and nothing of ticks that make no sense.
+ * The wound: without gaps at any speed and tick rate, opened by an instrument, closed after it,
+ * independent of the times of painting; invalid ticks cut nothing.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -80,7 +80,7 @@ static void test_no_gap(void **state)
 		 * a curve's 1e-4 of it. */
 		assert_true(fabs(sum - wound_cut_mm(wound)) < 0.01);
 		for (int i = 1; i < 2000; i++) {
-			/* On the chords between ticks: what the blade swept. */
+			/* On the chords between ticks, which the blade swept. */
 			double u = i / 2000.0 * n, x1, y1;
 
 			way(floor(u) / n, &x, &y);
@@ -98,7 +98,7 @@ static void test_no_gap(void **state)
 			else
 				assert_true(off > 0.07 - 0.71 * field.mm - 0.02);
 		}
-		/* And there is nothing where the blade was not. */
+		/* There is no wound elsewhere. */
 		assert_true(inside(wound, &field, -24, 0) < 0);
 		assert_true(inside(wound, &field, 0, -9) < 0);
 		wound_free(wound);
@@ -150,7 +150,7 @@ static void painted_free(struct painted *p)
 	free(p->base);
 }
 
-/* Width of what is not skin across the cut at right_mm, mm: alpha of flesh, not of halo. */
+/* Width of the flesh across the cut at right_mm, mm: by alpha, without the halo. */
 static double open_mm(const struct painted *p, const struct field *field, double right_mm)
 {
 	const uint8_t *layer = incise_canvas_layer(p->canvas, 0);
@@ -161,7 +161,7 @@ static double open_mm(const struct painted *p, const struct field *field, double
 	return n * field->mm;
 }
 
-/* 10 ms of time with something at a place, or nothing; painted now and then, or not. */
+/* Some time with an instrument at a place, or none; painted sometimes, or not. */
 static void hold(struct painted *p, const struct field *field, double *t_s, double s,
 		 enum incise_tool tool, bool in, bool paint)
 {
@@ -191,7 +191,7 @@ static void straight(struct painted *p, const struct field *field, double *t_s)
 	wound_paint(p->wound, p->canvas, 0);
 }
 
-/* The cut opens to the tool's width where that is, less beside it; and closes in a second. */
+/* The cut opens to the tool's width at its place, less next to it; it closes in a second. */
 static void test_opens_and_closes(void **state)
 {
 	static const struct {
@@ -221,7 +221,7 @@ static void test_opens_and_closes(void **state)
 		assert_true(open_mm(&p, &field, 0) > rest + 2 * field.mm);
 		hold(&p, &field, &t, 1.0, cases[c].tool, false, false);
 		shut = open_mm(&p, &field, 0);
-		/* Wider by an eighth of what it was opened by, on each side. */
+		/* Wider by an eighth of the opening, on each side. */
 		assert_true(shut >= rest &&
 			    shut < rest + 0.3 * (cases[c].wide_mm - rest) + field.mm);
 		hold(&p, &field, &t, 1.0, cases[c].tool, false, false);
@@ -252,7 +252,7 @@ static void test_painting_changes_nothing(void **state)
 			if (i && k % 3 == 0)
 				wound_paint(p[i].wound, p[i].canvas, 0);
 		}
-		/* While the blade is in the tissue too. */
+		/* Also while the blade is in the tissue. */
 		wound_paint(p[i].wound, p[i].canvas, 0);
 	}
 	for (int stage = 0; stage < 3; stage++) {
@@ -300,7 +300,7 @@ static void test_endless(void **state)
 	field_free(&field);
 }
 
-/* What is no cut: flags, phases, tools, leaps, gaps, and what is no number. */
+/* No cut: by flags, phases, tools, discontinuities, gaps, and values that are not finite. */
 static void test_no_cut(void **state)
 {
 	struct field field;
@@ -368,7 +368,7 @@ static void test_no_cut(void **state)
 	field_free(&field);
 }
 
-/* Pricks where a hand cannot have gone from one to the next are not joined. */
+/* Pricks too far apart for a hand are not joined. */
 static void test_leaps(void **state)
 {
 	static const int64_t after_ns[] = {1000000, -1000000, 600000000, INT64_MAX / 2,
