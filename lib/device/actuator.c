@@ -14,10 +14,10 @@
 #define MS 1000000.0 /* ns */
 #define SECOND_NS 1e9
 
-/* A key that is a number of the struct, in another unit there. */
+/* A key for a number of the struct, which may have another unit. */
 struct number {
 	const char *key;
-	double min, max, unit; /* unit: of the key in that of the field */
+	double min, max, unit; /* unit: field = unit · key */
 	size_t offset;
 	enum { DOUBLE, U32, U64 } type;
 };
@@ -149,7 +149,7 @@ static int line_of(const config_setting_t *group, const char *key)
 	return config_setting_source_line(setting ? setting : group);
 }
 
-/* What fits alone need not fit together. */
+/* Check values against each other. */
 static int check(const struct incise_actuator *actuator, const config_setting_t *group,
 		 const char *path, struct incise_error *err)
 {
@@ -192,7 +192,9 @@ static int check(const struct incise_actuator *actuator, const config_setting_t 
 			INCISE_MOTOR_STEPS_MAX, step_mm, step_mm * INCISE_MOTOR_STEPS_MAX,
 			actuator->acceleration_mm_s2);
 	incise_actuator_limits(actuator, &limits);
-	/* So that its average, 2a/(jT), has no more ticks than there is room for. */
+	/*
+	 * The average over 2a/(jT) ticks has at most INCISE_PROFILE_AVERAGE_MAX of them.
+	 */
 	jerk = 2 * actuator->acceleration_mm_s2 /
 	       (INCISE_PROFILE_AVERAGE_MAX * (actuator->tick_ns / SECOND_NS));
 	if (actuator->jerk_mm_s3 &&

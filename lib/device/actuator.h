@@ -8,10 +8,7 @@
 #include <incise/backend.h>
 #include "../base/conf.h"
 
-/*
- * Read and check the group. Returns 0 or -EINVAL; err names file, line, key and what to
- * do.
- */
+/* Read and check the group. 0 or -EINVAL; @err names file, line and key. */
 int incise_actuator_read(struct incise_actuator *actuator, const config_setting_t *group,
 			 const char *path, struct incise_error *err);
 

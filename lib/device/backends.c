@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Finding a backend by its name, built in or in a module; see backends.h. Nothing is
- * loaded that is not named: a module brings its libraries into the process.
+ * Backends by their names, built in or in modules; see backends.h. Only a module that is
+ * named is loaded, as it brings its libraries into the process.
  */
 #include <dirent.h>
 #include <dlfcn.h>
@@ -19,7 +19,7 @@
 
 static const struct incise_backend *const built_in[] = {&incise_stepper_kernel};
 
-/* Names go into paths: letters, digits and the underscore, no more. */
+/* Names become parts of paths. */
 static bool plain(const char *name)
 {
 	size_t length = strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_");

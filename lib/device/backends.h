@@ -17,7 +17,9 @@ extern const struct incise_backend incise_camera_v4l2, incise_force_comedi,
 	incise_force_iio, incise_stepper_gpio, incise_stepper_kernel, incise_tracker_tty,
 	incise_tracker_usb;
 
-/* Export a backend from its module as `incise_backend`; weak, as tests may link several. */
+/*
+ * Export a backend from its module as `incise_backend`; weak, as tests may link several.
+ */
 #define INCISE_MODULE(backend)                                       \
 	INCISE_API extern const struct incise_backend incise_backend \
 		__attribute__((weak, alias(#backend)))
@@ -29,9 +31,9 @@ struct incise_loaded {
 };
 
 /*
- * Find a backend, and load its module if it is in one. @where begins the message.
- * Returns 0; -ENODEV (there is none: the message lists those there are), -ENOEXEC (its
- * module is broken, or made for another version).
+ * Find a backend and load its module, if it is in one. @where begins the message. 0;
+ * -ENODEV (the message lists the known ones); -ENOEXEC (its module is broken, or of
+ * another version).
  */
 int incise_backend_find(struct incise_loaded *loaded, const char *kind, const char *name,
 			const char *where, struct incise_error *err);

@@ -2,11 +2,11 @@
 /*
  * Modules: shared objects that bring a library into the process, loaded at first use.
  *
- *     INCISE_MODULE_PATH, or the folder incise/ beside the library that asks
+ *     INCISE_MODULE_PATH, or the folder incise/ next to the library that loads it
  *       ├── stepper_gpio.so, vision_opencv.so, export_hdf5.so …   `incise_backend`
  *       └── frames_mkv.so                                         `incise_frames`
  *
- * libincise and libincise-record each hold this themselves.
+ * libincise, libincise-record and libincise-view each contain this.
  */
 #ifndef INCISE_MODULE_H
 #define INCISE_MODULE_H
@@ -17,28 +17,28 @@
 
 struct incise_module {
 	void *handle;	    /* of dlopen() */
-	const void *symbol; /* what it exports */
+	const void *symbol; /* exported by it */
 };
 
-/* The folder that modules are looked for in. False where its name does not fit. */
+/* The folder of the modules. False where its name does not fit. */
 bool incise_module_folder(char *path, size_t size);
 
 /*
- * Load a file and find its symbol. @where begins the message. Returns 0 or -ENOEXEC (it is
+ * Load a file and find its symbol. @where begins the message. 0 or -ENOEXEC (it is
  * broken, or no module).
  */
 int incise_module_open(struct incise_module *module, const char *path, const char *symbol,
 		       const char *where, struct incise_error *err);
 
-/* The same for a file of the folder; -ENOENT: it is not there, see below. */
+/* The same for a file of the folder; -ENOENT: see below. */
 int incise_module_find(struct incise_module *module, const char *file, const char *symbol,
 		       const char *where, const char *packages, struct incise_error *err);
 
-/* -ENOENT: say that there is no such module, and which packages are to be there: "libx-dev is". */
+/* -ENOENT, with the packages that its build needs: "libx-dev is". */
 int incise_module_absent(const char *file, const char *where, const char *packages,
 			 struct incise_error *err);
 
-/* -ENOEXEC: unload one that is made for another version, and say so. */
+/* -ENOEXEC: unload a module that was made for another version. */
 int incise_module_refuse(struct incise_module *module, const char *file,
 			 const char *where, struct incise_error *err);
 

@@ -95,19 +95,19 @@ bool incise_motion_fault(struct incise_motion *m, uint32_t fault)
 	return false;
 }
 
-/* What it is told to do from now on. */
+/* Follow the latest set-point. */
 static void obey(struct incise_motion *m)
 {
-	enum incise_profile_mode mode = m->wish.mode == INCISE_STEPPER_MODE_VELOCITY
+	enum incise_profile_mode mode = m->latest.mode == INCISE_STEPPER_MODE_VELOCITY
 						? INCISE_PROFILE_VELOCITY
 						: INCISE_PROFILE_POSITION;
 
-	m->status.target = incise_profile_target(&m->profile, mode, m->wish.target);
+	m->status.target = incise_profile_target(&m->profile, mode, m->latest.target);
 	m->resting = false;
 	m->status.flags &= ~INCISE_STEPPER_FLAG_HELD;
-	if (m->status.target != m->wish.target)
+	if (m->status.target != m->latest.target)
 		m->status.flags |= INCISE_STEPPER_FLAG_HELD;
-	m->status.setpoint_t_ns = m->wish.t_ns;
+	m->status.setpoint_t_ns = m->latest.t_ns;
 	m->status.setpoint_seq = m->seq;
 }
 
@@ -117,7 +117,7 @@ uint32_t incise_motion_listen(struct incise_motion *m, int64_t now_ns)
 
 	if (m->ending)
 		return 0;
-	taken = incise_page_get_setpoint(m->setpoint, &m->seq, &m->wish);
+	taken = incise_page_get_setpoint(m->setpoint, &m->seq, &m->latest);
 	if (taken < 0)
 		return INCISE_STEPPER_FAULT_SETPOINT;
 	if (taken > 0) {

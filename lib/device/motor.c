@@ -11,8 +11,8 @@
 #include "motor.h"
 #include "page.h"
 
-#define LEAST_PULSE_NS 5000 /* where nothing is said: what most power stages take */
-#define UNREAD_MAX 100	    /* looks in vain until it is said */
+#define LEAST_PULSE_NS 5000 /* default: enough for most power stages */
+#define UNREAD_MAX 100	    /* failed reads until -EIO */
 #define POLL_NS INCISE_NS_PER_S / 1000
 #define LATE_MAX 20 /* edges in a row */
 
@@ -64,7 +64,7 @@ double incise_actuator_step_mm(const struct incise_actuator *actuator)
 	       ((double)actuator->steps_per_turn * actuator->microsteps);
 }
 
-/* Whole microsteps in the travel; the rounding of the division must not lose one. */
+/* Whole microsteps in the travel; rounding must not lose one. */
 static double travel_steps(const struct incise_actuator *actuator)
 {
 	return floor(actuator->travel_mm / incise_actuator_step_mm(actuator) *
@@ -120,8 +120,8 @@ static double to_mm(const struct incise_motor *motor, int64_t steps)
 }
 
 /*
- * The latest status that could be read. A writer that is cut off in the midst of it leaves
- * the one before for a while; whoever drives a real machine must hear of more.
+ * Read the status. While a writer is interrupted the last one stays valid, but not for
+ * more than UNREAD_MAX reads.
  */
 static int look(struct incise_motor *motor)
 {
@@ -137,7 +137,7 @@ static int look(struct incise_motor *motor)
 	return 0;
 }
 
-/* Whether a target would move it. */
+/* 0 if a target would move it. */
 static int drivable(struct incise_motor *motor)
 {
 	int rc = motor->watches ? -EPERM : look(motor);
@@ -228,7 +228,7 @@ static INCISE_REALTIME int motor_status(struct incise_stepper *stepper,
 	return rc;
 }
 
-/* The first of the faults that are latched, in words. */
+/* The first latched fault in words. */
 static const char *fault_text(const struct incise_motor *motor)
 {
 	unsigned int faults = own_bits(fault_bits, motor->last.faults);
@@ -236,7 +236,7 @@ static const char *fault_text(const struct incise_motor *motor)
 	return incise_stepper_fault_text((enum incise_stepper_fault)(faults & -faults));
 }
 
-/* What the door said, in its own words, or in ours with what is known of the cause. */
+/* Report @rc with the message of the ops, or with the cause that the status shows. */
 static int told(struct incise_motor *motor, int rc, const char *what,
 		const struct incise_error *said, struct incise_error *err)
 {
@@ -290,7 +290,7 @@ static int motor_wait(struct incise_stepper *stepper, int64_t ns)
 
 	if (motor->ops->wait)
 		return motor->ops->wait(motor, ns);
-	/* Cut short by a signal: who waits looks again. */
+	/* Interrupted by a signal: the caller polls again. */
 	clock_nanosleep(CLOCK_MONOTONIC, 0, &wait, NULL);
 	return 0;
 }
@@ -305,7 +305,7 @@ static int motor_disable(struct incise_stepper *stepper, struct incise_error *er
 	incise_actuator_limits(&motor->actuator, &limits);
 	left_ns = INCISE_NS_PER_S +
 		  (int64_t)incise_profile_stopping_ns(&limits, UINT32_MAX);
-	/* A retract that is under way may take the travel. */
+	/* A retract may take the whole travel. */
 	if (motor->actuator.retract)
 		left_ns += (int64_t)(motor->actuator.travel_mm /
 				     motor->actuator.velocity_mm_s * INCISE_NS_PER_S);
@@ -371,7 +371,7 @@ static int motor_homing(struct incise_stepper *stepper,
 	return 0;
 }
 
-/* Only the home input's edges are kept; a limit's is where it halts. */
+/* Only edges of the home input are stored; the edge of a limit is where it halts. */
 static int motor_edge(struct incise_stepper *stepper, struct incise_stepper_edge *edge)
 {
 	struct incise_motor *motor = of(stepper);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A motor behind pages of set-points and status, in mm: what the kernel module and the
- * thread over GPIO have in common. What differs stands behind a door.
+ * A stepper in mm in front of pages of set-points and status, shared by the kernel
+ * module, the thread over GPIO and drives on CAN; they differ in their ops.
  *
  *   incise_stepper_…()  ─▶ motor ─┬─▶ pages ◀─▶ timer of the kernel, or thread
- *        mm                       ╰─▶ door        steps
+ *        mm                       ╰─▶ ops         steps
  */
 #ifndef INCISE_MOTOR_H
 #define INCISE_MOTOR_H
@@ -39,12 +39,12 @@ void incise_actuator_limits(const struct incise_actuator *actuator,
 struct incise_motor;
 
 /*
- * Each returns 0 or a negative errno as the ioctl of the same name does. Who knows more of
- * the cause says so in @err, which is always there.
+ * Each returns 0 or a negative errno as the ioctl of that name; @err, never NULL, may say
+ * more.
  */
 struct incise_motor_ops {
 	int (*enable)(struct incise_motor *motor, struct incise_error *err);
-	int (*disable)(struct incise_motor *motor); /* begins it */
+	int (*disable)(struct incise_motor *motor); /* only starts it */
 	int (*clear)(struct incise_motor *motor, struct incise_error *err);
 	int (*origin)(struct incise_motor *motor, int32_t steps, bool homed);
 	void (*close)(struct incise_motor *motor);
@@ -59,27 +59,27 @@ struct incise_motor {
 	char name[64];
 	double rate_max_hz;
 	unsigned int lines; /* INCISE_STEPPER_LINE_… bits it has */
-	bool watches;	    /* it may not be driven from here */
+	bool watches;	    /* opened to watch, not to drive */
 	struct incise_stepper_setpoint *setpoint; /* NULL where it watches */
 	const struct incise_abi_status *slot;
 
 	/* private */
-	struct incise_abi_status last; /* status that could be read */
-	unsigned int unread;	       /* looks since then */
+	struct incise_abi_status last; /* last status that could be read */
+	unsigned int unread;	       /* failed reads since then */
 	bool beyond;		       /* the last target was clamped */
 };
 
-/* Fill in the functions; the fields above "private" are the backend's to set. */
+/* Set stepper.ops; the backend sets the other fields above "private". */
 void incise_motor_init(struct incise_motor *motor);
 
-/* Its configuration for the module, or a thread that does the same. */
+/* The configuration for the kernel module, or for a thread that does the same. */
 void incise_motor_config(const struct incise_actuator *actuator, unsigned int index,
 			 struct incise_stepper_config *config);
 
 /*
- * With what a machine can hold, give pulses that rig.conf leaves open their shortest times.
- * @where begins the message; @pulse_ns: what an edge and its lateness take. Returns 0; -ERANGE: err says which rate was
- * asked for, and which is the largest.
+ * Set pulse times that rig.conf leaves open to the shortest that the machine holds, and
+ * check the rate. @where begins the message; @pulse_ns: for an edge and its lateness. 0
+ * or -ERANGE.
  */
 int incise_motor_fit(struct incise_actuator *actuator, const char *where,
 		     uint32_t rate_max, uint32_t pulse_ns, struct incise_error *err);

@@ -9,7 +9,7 @@
 #include "../fixed/profile.h"
 #include "page.h"
 
-/* A writer is in it for some 20 ns; a reader that is so often unlucky is not unlucky. */
+/* A write takes some 20 ns: after so many tries the writer was interrupted. */
 #define TRIES 100
 
 #define SETPOINT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(uint32_t))

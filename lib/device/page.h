@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The slots of set-points and status in memory that two share without a lock; both sides
- * of it. All are real-time safe.
+ * Slots of set-points and status in memory shared without a lock. Real-time safe.
  *
  *   writer   seq odd ── fields ── seq even          one at a time per slot
  *   reader   seq even ── copy ── the same seq       else once more
  *
- * Every word is read and written as an atomic, so that a race is a torn copy that seq
- * gives away, and never undefined.
+ * Every word is read and written as an atomic, so that a race gives a torn copy, which
+ * seq shows, and no undefined behaviour.
  */
 #ifndef INCISE_PAGE_H
 #define INCISE_PAGE_H
@@ -16,13 +15,15 @@
 #include <stdint.h>
 #include "abi.h"
 
-/* Write a set-point; mode is INCISE_STEPPER_MODE_…. Heals a seq that a dead owner left. */
+/*
+ * Write a set-point; mode is INCISE_STEPPER_MODE_…. Repairs the odd seq of a dead owner.
+ */
 void incise_page_put_setpoint(struct incise_stepper_setpoint *slot, unsigned int mode,
 			      int64_t target, int64_t t_ns) INCISE_REALTIME;
 
 /*
- * Take a set-point that is newer than @seq. Returns 1 (taken: @copy; @seq is its), 0
- * (there is none), -EINVAL (one that nobody should write; @seq is its).
+ * Read a set-point newer than @seq. 1: @copy and @seq are set; 0: none; -EINVAL: an
+ * invalid one.
  */
 int incise_page_get_setpoint(const struct incise_stepper_setpoint *slot, uint32_t *seq,
 			     struct incise_stepper_setpoint *copy);
@@ -32,8 +33,8 @@ void incise_page_put_status(struct incise_abi_status *slot,
 			    const struct incise_abi_status *status);
 
 /*
- * Read a status. Returns 0; -EAGAIN (it was being written each time one looked; @copy is as
- * it was), -EIO (what stands there makes no sense).
+ * 0; -EAGAIN: it was being written at each try, @copy is unchanged; -EIO: impossible
+ * values.
  */
 int incise_page_get_status(const struct incise_abi_status *slot,
 			   struct incise_abi_status *copy) INCISE_REALTIME;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A rig: reads rig.conf or the shorthand, then opens what was asked for on one clock; see
- * incise/rig.h. The two steps are apart, so that a fault in the file opens nothing.
+ * A rig: opens the devices of a plan on one clock; see incise/rig.h. The plan is read
+ * first, so that an error in the file opens nothing.
  */
 #include <errno.h>
 #include <stdio.h>
@@ -28,7 +28,6 @@ struct incise_rig {
 	bool has_vision;
 };
 
-/* Where a device of a kind is kept. Each kind's struct is what its backend opens. */
 static void *rig_open_sim(struct incise_rig *rig, int kind)
 {
 	switch (kind) {
@@ -144,7 +143,7 @@ struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
 	}
 	incise_rig_plan_free(&plan);
 	if (rc) {
-		/* A value out of range is the file's fault like any other. */
+		/* err->code is the errno of this function. */
 		errno = -rc;
 		if (err)
 			err->code = errno;

@@ -9,12 +9,12 @@
 #include <incise/scan.h>
 #include "backends.h"
 
-/* What a backend finds, with its kind. */
+/* Adds the kind to what a backend finds. */
 struct kind_found {
 	const char *kind;
 	incise_scan_found *found;
 	void *context;
-	int rc; /* of found */
+	int rc; /* last return of found */
 };
 
 static int pass_on(void *context, const struct incise_scan_device *device)
@@ -35,7 +35,7 @@ static int scan_backend(struct kind_found *of, const char *name)
 
 	snprintf(spec, sizeof(spec), "%.31s:", name);
 	rc = incise_scan(of->kind, spec, of->found, of->context, &err);
-	/* It cannot look, or needs to be told where. */
+	/* It cannot search, or not without arguments. */
 	if (!err.code || rc == -EOPNOTSUPP || rc == -EINVAL)
 		return err.code ? 0 : rc;
 	snprintf(failed.kind, sizeof(failed.kind), "%s", of->kind);
@@ -48,7 +48,7 @@ static const char *const kinds[] = {"tracker", "force", "camera", "stepper"};
 #define KINDS (sizeof(kinds) / sizeof(*kinds))
 #define NAMES 16
 
-/* The backend of that name, of whatever kind. */
+/* The backend of that name, of any kind. */
 static int find_any(struct incise_loaded *loaded, struct kind_found *of, const char *name,
 		    const char *where, struct incise_error *err)
 {
@@ -104,7 +104,7 @@ int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 					spec);
 	snprintf(name, sizeof(name), "%.*s", (int)length, spec);
 	snprintf(where, sizeof(where), "%.70s", spec);
-	/* The virtual rig is whatever one asks for. */
+	/* The virtual rig is there for every kind. */
 	if (strcmp(name, "sim"))
 		rc = kind ? incise_backend_find(&loaded, kind, name, where, err)
 			  : find_any(&loaded, &of, name, where, err);

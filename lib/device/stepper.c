@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * An actuator in front of its backend, and the homing of those whose drive does not home by
- * itself; mm of the nut. See incise/stepper.h.
+ * An actuator in front of its backend, and the homing of those whose drive does not home
+ * by itself; mm of the nut. See incise/stepper.h.
  */
 #include <errno.h>
 #include <math.h>
@@ -101,7 +101,9 @@ static int fault_error(const struct home *h)
 	return incise_error_set(h->err, EIO, "homing %s: %s", h->info.name, cause);
 }
 
-/* Wait for one poll, then read the status. The limit that homing looks for is no fault. */
+/*
+ * Wait for one poll, then read the status. The limit that homing looks for is no fault.
+ */
 static int look(struct home *h)
 {
 	int rc;

@@ -2,7 +2,7 @@
 /*
  * A stepper on the kernel module incise_stepper: "kernel:/dev/incise-stepper0", or
  * "kernel:/dev/incise-stepper0:2" for its third motor. Targets and status go through two
- * mapped pages, without a system call; what is set up while it stands goes by ioctl. See
+ * mapped pages, without a system call; settings at rest by ioctl. See
  * driver/uapi/incise_stepper.h.
  */
 #include <errno.h>
@@ -32,7 +32,7 @@ struct kernel_stepper {
 	unsigned int index; /* of the motor */
 	int fd;
 	size_t page;
-	void *setpoints, *status; /* pages; NULL or MAP_FAILED where there is none */
+	void *setpoints, *status; /* pages; NULL or MAP_FAILED: none */
 };
 
 static struct kernel_stepper *of(struct incise_motor *motor)
@@ -90,10 +90,7 @@ static void unmap(const struct kernel_stepper *k, void *page)
 		munmap(page, k->page);
 }
 
-/*
- * The module brings to rest what is powered by itself, as it does when a program dies; but
- * that is a fault, and to close is none.
- */
+/* Disable first: the module would stop the motor by itself, but with a fault latched. */
 static void kernel_close(struct incise_motor *motor)
 {
 	struct kernel_stepper *k = of(motor);
@@ -141,7 +138,7 @@ static int open_device(struct kernel_stepper *k,
 
 	struct stat status;
 
-	/* Without waiting: a pipe would, for a writer. */
+	/* O_NONBLOCK: to open a pipe would wait for a writer. */
 	k->fd = open(k->path,
 		     (asked->watch ? O_RDONLY : O_RDWR) | O_CLOEXEC | O_NONBLOCK);
 	if (k->fd >= 0 && !fstat(k->fd, &status) && !S_ISCHR(status.st_mode)) {
@@ -177,7 +174,7 @@ static int open_device(struct kernel_stepper *k,
 				todo);
 }
 
-/* What the module says of itself is not believed blindly: sizes lead to memory. */
+/* Check the answer of the module, as its sizes lead to memory. */
 static int check_info(const struct kernel_stepper *k, struct incise_abi_info *info,
 		      const struct incise_backend_request *asked,
 		      struct incise_error *err)
@@ -219,7 +216,7 @@ static int configure(struct kernel_stepper *k, const struct incise_abi_info *inf
 		return rc;
 	incise_motor_config(&k->motor.actuator, k->index, &config);
 	rc = request(k, INCISE_STEPPER_SET_CONFIG, &config);
-	/* What the last owner left in motion is still coming to rest. */
+	/* A motor that the last owner left in motion is still coming to rest. */
 	for (int i = 0; rc == -EBUSY && i < REST_POLLS; i++) {
 		nanosleep(&(struct timespec){.tv_nsec = REST_POLL_NS}, NULL);
 		rc = request(k, INCISE_STEPPER_SET_CONFIG, &config);
@@ -243,7 +240,7 @@ static int configure(struct kernel_stepper *k, const struct incise_abi_info *inf
 		asked->where, k->path, strerror(-rc));
 }
 
-/* A watcher has nobody's limits but the owner's. */
+/* A watcher shows the limits of the owner. */
 static int adopt(struct kernel_stepper *k)
 {
 	struct incise_stepper_config config = {.motor = k->index};
@@ -254,7 +251,7 @@ static int adopt(struct kernel_stepper *k)
 	return rc;
 }
 
-/* All of it now: a page that is first touched in the loop would be a late tick. */
+/* Populate now: a page first touched in the loop would make a tick late. */
 static int map_pages(struct kernel_stepper *k, bool watch)
 {
 	off_t page = (off_t)k->page;
@@ -276,8 +273,8 @@ static int map_pages(struct kernel_stepper *k, bool watch)
 }
 
 /*
- * The module's count goes on from one owner to the next. One that lies outside of this
- * travel cannot be gone on from, so it begins anew, and its 0 is not known.
+ * The module's count goes on from one owner to the next. One outside of this travel is
+ * restarted at 0, and is not homed.
  */
 static int take_count(struct kernel_stepper *k)
 {

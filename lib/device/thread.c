@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A thread of a device that is to be on time; see thread.h.
+ * A real-time thread of a device; see thread.h.
  */
 #include <sched.h>
 #include <signal.h>
@@ -29,7 +29,7 @@ void incise_thread_hurry(bool hurry)
 	struct sched_param priority = {.sched_priority =
 					       hurry ? INCISE_THREAD_PRIORITY : 0};
 
-	/* Denied it was at the start as well. */
+	/* An error at the start as well: without real time there is none to restore. */
 	pthread_setschedparam(pthread_self(), hurry ? SCHED_FIFO : SCHED_OTHER,
 			      &priority);
 }

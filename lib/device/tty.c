@@ -30,10 +30,10 @@ static int set_raw(int fd, speed_t speed)
 		cfsetspeed(&t, B115200);
 	if (tcsetattr(fd, TCSANOW, &t) < 0)
 		return -errno;
-	/* It also succeeds when only a part of it was done. */
+	/* tcsetattr() also succeeds when only some settings were made. */
 	if (tcgetattr(fd, &is) < 0 || (speed != B0 && cfgetospeed(&is) != speed))
 		return -EINVAL;
-	/* Else an FTDI adapter holds bytes back for 16 ms. Not every line knows of it. */
+	/* Else an FTDI adapter holds bytes back for 16 ms. Not every line supports it. */
 	if (!ioctl(fd, TIOCGSERIAL, &serial)) {
 		serial.flags |= ASYNC_LOW_LATENCY;
 		ioctl(fd, TIOCSSERIAL, &serial);
@@ -46,7 +46,7 @@ int incise_tty_open(const char *path, speed_t speed)
 	struct stat is;
 	int fd, rc;
 
-	/* To open what is no line may wait, or do what nobody asked for. */
+	/* Opening another file may block, or have side effects. */
 	if (stat(path, &is) < 0)
 		return -errno;
 	if (!S_ISCHR(is.st_mode))
@@ -54,7 +54,7 @@ int incise_tty_open(const char *path, speed_t speed)
 	fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
 	if (fd < 0)
 		return -errno;
-	/* TIOCEXCL does not keep root out; the lock does, of those that ask for it. */
+	/* TIOCEXCL does not exclude root; the lock does, for programs that use it. */
 	if (!isatty(fd))
 		rc = -ENOTTY;
 	else if (flock(fd, LOCK_EX | LOCK_NB) < 0 || ioctl(fd, TIOCEXCL) < 0)

@@ -8,13 +8,12 @@
 #include <termios.h>
 
 /*
- * @speed  B115200 …; B0 leaves what stty set: over USB it mostly means nothing, and where it
- *         does only the user knows. But 9600, which a port has when nobody set it, becomes
- *         115200
+ * @speed  B115200 …; B0 keeps the speed set by stty, as over USB it mostly has no meaning; but
+ *         9600, the default of a port, becomes 115200
  *
- * A descriptor that does not block and has no bytes of another time, to be closed after
- * TIOCNXCL; or -ENOENT, -EACCES, -EBUSY or -EWOULDBLOCK (another program has it), -ENOTTY,
- * -EINVAL (not at that speed).
+ * A non-blocking descriptor without old bytes, to be closed after TIOCNXCL; or -ENOENT,
+ * -EACCES, -EBUSY or -EWOULDBLOCK (another program has it), -ENOTTY, -EINVAL (not at that
+ * speed).
  */
 int incise_tty_open(const char *path, speed_t speed);
 

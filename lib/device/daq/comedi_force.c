@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A force channel on a DAQ card under comedi, "comedi:/dev/comedi0:0": a command streams into
- * the kernel's buffer until that overflows, and is then restarted.
+ * A force channel on a DAQ card under comedi, "comedi:/dev/comedi0:0": a command streams
+ * into the kernel's buffer until that overflows, and is then restarted.
  *
  *   card ─▶ its FIFO ─▶ kernel's buffer (up to 2 s) ─▶ thread, by blocks ─▶ feed
  *
- * There are no timestamps: t_ns is computed from the arrival of blocks. How many samples an
- * overflow lost is known by that time only, to a few samples; that it happened is certain.
+ * There are no timestamps: t_ns is computed from the arrival of blocks. How many samples
+ * an overflow lost is known by that time only, to a few samples; that it happened is
+ * certain.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -314,16 +315,17 @@ static void card_close(struct card *card)
 /*
  * --- times ---
  *
- * The time of each sample of a card without timestamps, from the arrival of blocks and the
- * number of samples in them.
+ * The time of each sample of a card without timestamps, from the arrival of blocks and
+ * the number of samples in them.
  *
  *   start T  2T  3T  4T  5T               sample n is taken at start + (n + 1) T
  *     |---|---|---|---|---|···            blocks arrive late by their time in the card:
  *                   ▲         ▲           the least delay within a second is taken for
  *                block 1   block 2        constant, and its drift moves start
  *
- * A reader that was delayed finds many blocks waiting, which is no drift: only blocks that
- * empty the kernel's buffer count, at least eight of them; and no clock is off by 1000 ppm.
+ * A reader that was delayed finds many blocks waiting, which is no drift: only blocks
+ * that empty the kernel's buffer count, at least eight of them; and no clock is off by
+ * 1000 ppm.
  *
  * The error is the card's least delay, which is unknown here: milliseconds with a card
  * that transfers its FIFO when it is half full. No time is later than the arrival, and

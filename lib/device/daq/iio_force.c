@@ -20,7 +20,7 @@
  * buffer is full.
  *
  *   timestamps   |    |    |                   |    |       gap of 4 T: 3 lost
- *   timestamps   |    |    |        | |    |    |    |      one interrupt late by 0.9 T: none
+ *   timestamps   |    |    |        | |    |    |    |      late by 0.9 T: none
  *
  * A timestamp later than 1.5 T is held until the next one has come: a sample is not later
  * than its successor less T. The period T is the nominal one until the timestamps have
@@ -85,7 +85,9 @@ static void spacing_flush(struct spacing *s)
 	s->holds = false;
 }
 
-/* Pass a sample to the feed, with the number missing ahead of it; @t_ns may be anything. */
+/*
+ * Pass a sample to the feed, with the number missing ahead of it; @t_ns may be anything.
+ */
 static void spacing_put(struct spacing *s, int64_t t_ns, int32_t code)
 {
 	int64_t T;

@@ -348,8 +348,8 @@ static int refused(const struct iio_source *s, int rc, const char *what,
 
 /*
  * The file of a device opens only once at a time, which shows whether another program
- * samples. A buffer left running by a killed program is stopped, as it would block settings.
- * The file stays open for reading samples.
+ * samples. A buffer left running by a killed program is stopped, as it would block
+ * settings. The file stays open for reading samples.
  */
 static int check_alone(struct iio_source *s, struct incise_error *err)
 {
@@ -407,7 +407,10 @@ static int set_clock(struct iio_source *s, struct incise_error *err)
 	if (rc < 0)
 		return refused(s, (int)rc, "set the clock of time stamps", err);
 	rc = iio_device_attr_read(s->device, key, is, sizeof(is));
-	/* Linux 6.1 adds a NUL behind the end of the line; libiio removes only one of the two. */
+	/*
+	 * Linux 6.1 adds a NUL behind the end of the line; libiio removes only one of the
+	 * two.
+	 */
 	is[strcspn(is, "\n")] = '\0';
 	if (rc < 0 || strcmp(is, "monotonic") != 0)
 		return incise_error_set(

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * An A/D converter of Linux IIO with its buffer: device and channel, trigger, rate, clock of
- * its timestamps, the meaning of its codes. The buffer is read from the kernel itself:
- * libiio's own buffers return whole blocks only, lose samples ahead of an error, and print
- * to stderr.
+ * An A/D converter of Linux IIO with its buffer: device and channel, trigger, rate, clock
+ * of its timestamps, the meaning of its codes. The buffer is read from the kernel itself:
+ * libiio's own buffers return whole blocks only, lose samples ahead of an error, and
+ * print to stderr.
  *
  *   a scan:  [ u12 in 16 ][ filling ][ s64 timestamp ]    each element on a multiple of its
  *            0            2          8                16  size, in the order of their index
@@ -52,8 +52,8 @@ struct iio_source {
 };
 
 /*
- * Set up all but the buffer. 0 or -errno with the message in @err; iio_source_close() is due in
- * either case. @name: of the device, its label, or iio:deviceN.
+ * Set up all but the buffer. 0 or -errno with the message in @err; iio_source_close() is
+ * due in either case. @name: of the device, its label, or iio:deviceN.
  */
 int iio_source_open(struct iio_source *source, const char *name,
 		    struct incise_error *err);
@@ -62,7 +62,8 @@ int iio_source_open(struct iio_source *source, const char *name,
 void iio_source_close(struct iio_source *source);
 
 /*
- * Start the buffer: the kernel wakes readers of @source->fd every @block scans, and buffers
+ * Start the buffer: the kernel wakes readers of @source->fd every @block scans, and
+ * buffers
  * @capacity. @folder: "/sys/bus/iio/devices/iio:device0". 0 or -errno.
  */
 int iio_source_start(struct iio_source *source, const char *folder, unsigned int block,

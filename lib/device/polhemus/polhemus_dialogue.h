@@ -39,8 +39,8 @@ bool polhemus_status_read(const unsigned char *bytes, size_t n,
 			  struct polhemus_status *status);
 
 /*
- * The numbers in @text, separated by blanks or by their signs; how many, at most @most. -1:
- * there is something else.
+ * The numbers in @text, separated by blanks or by their signs; how many, at most @most.
+ * -1: there is something else.
  */
 int polhemus_reply_numbers(const char *text, double *values, int most);
 
@@ -80,15 +80,17 @@ struct polhemus_dialogue {
 /* 0, -ENODEV, -EIO. */
 int polhemus_say(struct polhemus_dialogue *d, const char *command);
 
-/* Drop bytes until none comes. -EBUSY, without a message: they come for more than 0.5 s. */
+/*
+ * Drop bytes until none comes. -EBUSY, without a message: they come for more than 0.5 s.
+ */
 int polhemus_drain(struct polhemus_dialogue *d);
 
 /* Receive until no byte comes, for 0.5 s, or until d->bytes is full; how many bytes. */
 int polhemus_collect(struct polhemus_dialogue *d);
 
 /*
- * Send a command that a FASTRAK answers with "2sX…"; @reply, of POLHEMUS_REPLY_MAX, gets the
- * text behind X. -ETIMEDOUT, without a message; -EINVAL: it answered *ERROR*.
+ * Send a command that a FASTRAK answers with "2sX…"; @reply, of POLHEMUS_REPLY_MAX, gets
+ * the text behind X. -ETIMEDOUT, without a message; -EINVAL: it answered *ERROR*.
  */
 int polhemus_ask(struct polhemus_dialogue *d, const char *command, char type,
 		 char *reply);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The trackers of Polhemus that are known: how they show on USB and how fast they are.
+ * The known trackers of Polhemus: their ids on USB, rates and latencies.
  *
- * A tracker comes out of its box without firmware; a loader gives it that each time it is
- * plugged in, and it then appears once more, as another product. (From the maker's user
- * manuals and Linux tools; see the facts in the manual page of rig.conf.)
+ * A tracker starts without firmware; a loader sends it each time it is plugged in, and it
+ * then appears again as another product. (From the maker's user manuals and Linux tools;
+ * see rig.conf(5).)
  */
 #ifndef INCISE_POLHEMUS_MODEL_H
 #define INCISE_POLHEMUS_MODEL_H
@@ -23,7 +23,7 @@ enum polhemus_family {
 
 struct polhemus_model {
 	uint16_t product;
-	bool ready; /* false: it waits for its firmware */
+	bool ready; /* false: waits for its firmware */
 	enum polhemus_family family;
 	const char *name;
 };

@@ -92,7 +92,9 @@ static int fastrak_identify(struct polhemus_dialogue *d,
 	return 0;
 }
 
-/* Send a command, then a question whose answer must be @values; @width of a field, or 0. */
+/*
+ * Send a command, then a question whose answer must be @values; @width of a field, or 0.
+ */
 static int fastrak_put(struct polhemus_dialogue *d, const char *command,
 		       const char *question, int width, const double *values, int n,
 		       const char *what)
@@ -399,9 +401,9 @@ static int no_answer(struct polhemus_dialogue *d)
 }
 
 /*
- * Stop any stream. CR ends an incomplete command, c the stream of a FASTRAK, P that of the
- * others. For those, c and CR start a stream; a FASTRAK answers P with records. All answers are
- * dropped.
+ * Stop any stream. CR ends an incomplete command, c the stream of a FASTRAK, P that of
+ * the others. For those, c and CR start a stream; a FASTRAK answers P with records. All
+ * answers are dropped.
  */
 static int quiet(struct polhemus_dialogue *d)
 {

@@ -2,11 +2,11 @@
 /*
  * Sets a tracker up, reads every setting back, and starts and stops its records.
  *
- * Set are binary output, centimetres, items, stations, hemisphere, no filters, no increment
- * (it would hold records back), a stylus button that is only reported (else it stops the stream)
- * and the sync mode. Not changed are alignment, boresight, mounting frame and tip offset of a
- * stylus, which a user may have set on purpose. Nothing is written to the EEPROM: power off and
- * on restores the old settings.
+ * Set are binary output, centimetres, items, stations, hemisphere, no filters, no
+ * increment (it would hold records back), a stylus button that is only reported (else it
+ * stops the stream) and the sync mode. Not changed are alignment, boresight, mounting
+ * frame and tip offset of a stylus, which a user may have set on purpose. Nothing is
+ * written to the EEPROM: power off and on restores the old settings.
  */
 #ifndef INCISE_POLHEMUS_SETUP_H
 #define INCISE_POLHEMUS_SETUP_H
@@ -27,14 +27,16 @@ struct polhemus_identity {
 /*
  * Set up and start records. Blocks for a second or two.
  *
- * 0; -ENODEV (gone), -EIO (not taken; no tracker), -EINVAL (a command refused; a setup that
- * the family does not have), -ETIMEDOUT (no answer), -EBUSY; message in @err.
+ * 0; -ENODEV (gone), -EIO (not taken; no tracker), -EINVAL (a command refused; a setup
+ * that the family does not have), -ETIMEDOUT (no answer), -EBUSY; message in @err.
  */
 int polhemus_setup(struct polhemus_line *line, const struct incise_tracker_setup *setup,
 		   struct polhemus_identity *identity, const char *where,
 		   struct incise_error *err);
 
-/* Only identify the tracker; no setting is changed, but a stream ends. Errors as above. */
+/*
+ * Only identify the tracker; no setting is changed, but a stream ends. Errors as above.
+ */
 int polhemus_identify(struct polhemus_line *line, struct polhemus_identity *identity,
 		      const char *where, struct incise_error *err);
 

@@ -94,8 +94,8 @@ static uint64_t rounds(const struct polhemus_gaps *gaps, int64_t ns)
 }
 
 /*
- * After a pause only time and order are known; time from the earliest possible arrival, as
- * the last record before the pause may have been late.
+ * After a pause only time and order are known; time from the earliest possible arrival,
+ * as the last record before the pause may have been late.
  */
 static void step_over(struct polhemus_gaps *gaps, int64_t t_ns, int where)
 {

@@ -17,9 +17,10 @@
 /*
  * Gaps: how many records were lost before this one.
  *
- * LIBERTY and PATRIOT count their frames. A FASTRAK does not: only the order of its stations
- * and the time are known. Record k is measured at k periods and arrives some time later,
- * never earlier; its lateness is counted from the earliest arrival of the others:
+ * LIBERTY and PATRIOT count their frames. A FASTRAK does not: only the order of its
+ * stations and the time are known. Record k is measured at k periods and arrives some
+ * time later, never earlier; its lateness is counted from the earliest arrival of the
+ * others:
  *
  *   lateness |        one record held up        one record lost
  *            |                                       o--o--o--o--
@@ -28,11 +29,11 @@
  *          0 |--o--o--o-----o--o--o--          --o--o
  *            '---------------------------------------------------> records
  *
- * A loss is reported at once where stations are out of order, or half a record or more was
- * damaged; where only time shows it, after the lateness has stayed for POLHEMUS_GAPS_WINDOW
- * records (0.5 s): then the number is right, but its place in seq is that much late. A drift between the
- * two clocks is followed. With sync from outside there is no period; only order and damage
- * show a loss.
+ * A loss is reported at once where stations are out of order, or half a record or more
+ * was damaged; where only time shows it, after the lateness has stayed for
+ * POLHEMUS_GAPS_WINDOW records (0.5 s): then the number is right, but its place in seq is
+ * that much late. A drift between the two clocks is followed. With sync from outside
+ * there is no period; only order and damage show a loss.
  */
 #define POLHEMUS_GAPS_WINDOW 60
 
@@ -73,8 +74,8 @@ void polhemus_gaps_start(struct polhemus_gaps *gaps, int64_t t_ns);
 void polhemus_gaps_broken(struct polhemus_gaps *gaps);
 
 /*
- * How many records are certainly missing when none came since the last; never more than count
- * as lost when one comes after polhemus_gaps_broken().
+ * How many records are certainly missing when none came since the last; never more than
+ * count as lost when one comes after polhemus_gaps_broken().
  */
 uint64_t polhemus_gaps_silent(const struct polhemus_gaps *gaps, int64_t t_ns);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A tracker of Polhemus behind struct incise_tracker; see polhemus_tracker.h.
+ * A tracker of Polhemus as struct incise_tracker; see polhemus_tracker.h.
  */
 #include <errno.h>
 #include <math.h>
@@ -13,10 +13,9 @@
 #include "polhemus_stream.h"
 #include "polhemus_tracker.h"
 
-/* How long close() waits for the thread, about. */
-#define POLL_MS 50
-#define LOST_MS 500 /* of silence: what is missing counts, as of what only time tells */
-#define NOISE_MAX (2 * POLHEMUS_RECORD_MAX) /* bytes: so many have a record in them */
+#define POLL_MS 50  /* about how long close() waits for the thread */
+#define LOST_MS 500 /* of silence, after which missing records count as lost */
+#define NOISE_MAX (2 * POLHEMUS_RECORD_MAX) /* bytes that would contain a record */
 
 struct polhemus_tracker {
 	struct incise_tracker tracker;
@@ -26,7 +25,7 @@ struct polhemus_tracker {
 	struct polhemus_stream stream;
 	pthread_t thread;
 	_Atomic bool stop;
-	_Atomic int gone; /* negative errno: for good; then cause is there */
+	_Atomic int gone; /* negative errno, for good: then cause is set */
 	struct incise_error cause;
 };
 
@@ -40,7 +39,7 @@ static int64_t now_ms(void)
 	return incise_monotonic_ns() / 1000000;
 }
 
-/* Wait for it to come back. false: it did not, or close() does not want to wait. */
+/* Try to open it again. False: it did not come back, or is being closed. */
 static bool recover(struct polhemus_tracker *t)
 {
 	int64_t began_ms = now_ms();
@@ -55,7 +54,6 @@ static bool recover(struct polhemus_tracker *t)
 			polhemus_stream_broken(&t->stream, &identity.layout);
 			return true;
 		}
-		/* It may never come back, or not before it is closed. */
 		polhemus_stream_silent(&t->stream, incise_monotonic_ns());
 		if (now_ms() - began_ms >= t->times.gone_ms)
 			return false;
@@ -65,10 +63,11 @@ static bool recover(struct polhemus_tracker *t)
 }
 
 /*
- * Nothing was understood for too long. Pulses from outside may pause as long as they like; but
- * one that was switched off and on sends nothing, or what it sends out of its box.
+ * No valid record for too long. With sync from outside, pauses are normal; but a tracker
+ * that was switched off and on sends nothing, or records in its default format.
  */
-static bool is_dumb(const struct polhemus_tracker *t, int64_t silent_ms, size_t noise)
+static bool is_unresponsive(const struct polhemus_tracker *t, int64_t silent_ms,
+			    size_t noise)
 {
 	return silent_ms >= t->times.silent_ms &&
 	       (t->stream.setup.sync == INCISE_TRACKER_INTERNAL || noise > NOISE_MAX);
@@ -98,14 +97,14 @@ static void *run(void *argument)
 				noise = 0;
 			}
 		}
-		/* A computer that stood still did not listen. */
+		/* While the computer stood still, the line was not read. */
 		now = now_ms();
 		silent_ms += least(now - before_ms, 2 * POLL_MS);
 		before_ms = now;
-		/* Less may be a host that is busy; pulses from outside may pause. */
+		/* A shorter silence may be due to a busy host. */
 		if (n < 0 || silent_ms >= LOST_MS)
 			polhemus_stream_silent(&t->stream, incise_monotonic_ns());
-		if (n >= 0 && !is_dumb(t, silent_ms, noise))
+		if (n >= 0 && !is_unresponsive(t, silent_ms, noise))
 			continue;
 		incise_thread_hurry(false);
 		if (!recover(t))
@@ -128,7 +127,7 @@ static INCISE_REALTIME int tracker_read(struct incise_tracker *tracker,
 					struct incise_tracker_sample *samples, int n)
 {
 	struct polhemus_tracker *t = of_tracker(tracker);
-	/* Before the ring is looked into: what came before the end is still in it. */
+	/* Read ahead of the ring, which has the samples from before the end. */
 	int gone = atomic_load(&t->gone);
 	int taken = polhemus_stream_take(&t->stream, samples, n);
 
@@ -218,7 +217,7 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 		rc = polhemus_setup(t->line, setup, &t->identity, where, err);
 	if (rc)
 		return rc;
-	/* So that it need not be asked again when it comes back. */
+	/* It need not be asked again when it comes back. */
 	t->line->family = (int)t->identity.layout.family;
 	if (polhemus_stream_init(&t->stream, setup, &t->identity.layout))
 		rc = incise_error_set(err, ENOMEM,
@@ -245,7 +244,7 @@ struct incise_tracker *polhemus_tracker_open(struct polhemus_line *line,
 					     const struct polhemus_times *times,
 					     const char *where, struct incise_error *err)
 {
-	/* The ring's indices lie on lines of the cache of their own. */
+	/* The indices of the ring have their own cache lines. */
 	struct polhemus_tracker *t = aligned_alloc(_Alignof(struct polhemus_tracker),
 						   sizeof(struct polhemus_tracker));
 	int rc;

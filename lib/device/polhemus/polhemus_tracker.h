@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A tracker of Polhemus behind struct incise_tracker, whatever line leads to it.
+ * A tracker of Polhemus as struct incise_tracker, on any line.
  *
- * A thread of its own reads the line and puts samples into a ring; incise_tracker_read()
- * takes them out of it: real-time safe. A sample's stamp is when the packet with its last
- * byte had come, as the kernel stamps neither USB packets nor serial bytes; rate_hz is of all
- * stations together.
+ * A thread reads the line and puts samples into a ring; incise_tracker_read() takes them
+ * from there, which is real-time safe. A sample's timestamp is the arrival of the packet
+ * with its last byte, as the kernel stamps neither USB packets nor serial bytes; rate_hz
+ * is of all stations together.
  *
- * Pulled out, or silent for silent_ms, or sending what is no record for as long, the tracker is looked for every retry_ms, set up again
- * and goes on; until then read() returns 0, and what the time in between would have brought
- * counts as lost, whether it comes back or not, from the start on. After gone_ms read()
- * returns -ENODEV, for good.
+ * When the tracker is unplugged, silent for silent_ms, or sends no valid record for as
+ * long, the thread tries every retry_ms to open it and to set it up again. Until then
+ * read() returns 0, and the missing samples count as lost. After gone_ms read() returns
+ * -ENODEV for good.
  */
 #ifndef INCISE_POLHEMUS_TRACKER_H
 #define INCISE_POLHEMUS_TRACKER_H
@@ -22,12 +22,12 @@ struct polhemus_times {
 	int silent_ms, retry_ms, gone_ms;
 };
 
-/* What a rig gets; tests are less patient. */
+/* Of a rig; tests use shorter ones. */
 #define POLHEMUS_TIMES ((struct polhemus_times){1000, 250, 10000})
 
 /*
- * Set it up and begin. The line is the tracker's from here on, also when this fails. NULL
- * with errno as of polhemus_setup(), or ENOMEM, EINVAL (@setup).
+ * Set it up and start. The tracker owns the line, also when this fails. NULL with errno
+ * as of polhemus_setup(), or ENOMEM, EINVAL (@setup).
  */
 struct incise_tracker *polhemus_tracker_open(struct polhemus_line *line,
 					     const struct incise_tracker_setup *setup,

@@ -8,9 +8,9 @@
  *   interrupt IN       records of a stream (FASTRAK; the others send all on bulk IN)
  *
  * The descriptors say which endpoints these are. Each IN endpoint always has several
- * transfers of one packet in flight, so that none is missed while another is read; a packet
- * is stamped when its transfer completes. When unread packets fill the queue, no transfer is
- * submitted: the device waits, and no packet is dropped.
+ * transfers of one packet in flight, so that none is missed while another is read; a
+ * packet is stamped when its transfer completes. When unread packets fill the queue, no
+ * transfer is submitted: the device waits, and no packet is dropped.
  */
 #include <errno.h>
 #include <stdbool.h>
@@ -306,8 +306,8 @@ static int choose(libusb_device **list, const struct usb_name *wanted, const cha
 }
 
 /*
- * The device named @wanted, which the caller unrefs; messages call it @name. Of several it is the
- * one at @was, unless that is "". -ENODEV, -EINVAL (several), -EACCES, -ENOMEM.
+ * The device named @wanted, which the caller unrefs; messages call it @name. Of several
+ * it is the one at @was, unless that is "". -ENODEV, -EINVAL (several), -EACCES, -ENOMEM.
  */
 static int find_device(libusb_context *context, const struct usb_name *wanted,
 		       const char *was, const char *name, libusb_device **device,
@@ -677,7 +677,10 @@ static int usb_write(struct polhemus_line *line, const void *bytes, size_t n)
 	return 0;
 }
 
-/* Wait until a packet is there, the device is gone or the time is over; other events return early. */
+/*
+ * Wait until a packet is there, the device is gone or the time is over; other events
+ * return early.
+ */
 static void await_packet(struct polhemus_usb *usb, int timeout_ms)
 {
 	int64_t end_ns = incise_monotonic_ns() + timeout_ms * INT64_C(1000000), left_ns;

@@ -6,7 +6,8 @@
  *                                              │ waiting
  *   incise_camera_read() ◀─────────────────────┘
  *
- * When the stream ends, the thread keeps the reason; read() reports it after the last frame.
+ * When the stream ends, the thread keeps the reason; read() reports it after the last
+ * frame.
  */
 #include <errno.h>
 #include <glob.h>
@@ -241,8 +242,8 @@ static void *camera_open(const struct incise_backend_request *asked,
 }
 
 /*
- * Search. A camera is named by a path that stays when it is plugged in elsewhere (by-id), or
- * by that of its socket (by-path); /dev/video0 depends on the order of plugging.
+ * Search. A camera is named by a path that stays when it is plugged in elsewhere (by-id),
+ * or by that of its socket (by-path); /dev/video0 depends on the order of plugging.
  */
 struct search {
 	incise_scan_found *found;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A camera's controls, held where they are: what a camera adjusts by itself moves edges and
- * colours from picture to picture, and the time of a picture with the exposure.
+ * A camera's controls, held where they are: what a camera adjusts by itself moves edges
+ * and colours from picture to picture, and the time of a picture with the exposure.
  *
  *   exposure, dynamic frame rate, white balance, gain, focus:
  *   automatic off ─▶ set ─▶ read back ─▶ read again while it runs
@@ -30,7 +30,8 @@ struct v4l2_controls {
 
 /*
  * Lock all that the camera has, at what @setup says, or at what they are. @rate_hz of the
- * pictures, 0: not known. 0; -EINVAL, -ERANGE (@setup), -EOPNOTSUPP (the camera has not what
+ * pictures, 0: not known. 0; -EINVAL, -ERANGE (@setup), -EOPNOTSUPP (the camera has not
+ * what
  * @setup sets), -EIO (it does not hold), -EBUSY, -ENODEV. @where begins the message.
  */
 int v4l2_controls_lock(struct v4l2_controls *controls, int fd,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The file of a V4L2 device, /dev/video0: opened so that nothing on it waits, asked so that
- * a signal does not matter. Shared by who captures and who looks what is attached.
+ * The file of a V4L2 device, /dev/video0: opened so that nothing on it waits, asked so
+ * that a signal does not matter. Shared by who captures and who looks what is attached.
  */
 #ifndef INCISE_V4L2_FILE_H
 #define INCISE_V4L2_FILE_H

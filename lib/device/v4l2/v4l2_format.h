@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What a camera's pictures are: pixels, size, rows, rate. Chosen among those that the driver
- * offers, the nearest to what rig.conf asks for, and then as the driver says that it is.
+ * What a camera's pictures are: pixels, size, rows, rate. Chosen among those that the
+ * driver offers, the nearest to what rig.conf asks for, and then as the driver says that
+ * it is.
  */
 #ifndef INCISE_V4L2_FORMAT_H
 #define INCISE_V4L2_FORMAT_H
@@ -23,8 +24,8 @@ struct v4l2_shape {
 
 /*
  * Set the camera. 0; -EINVAL (@setup), -EOPNOTSUPP (it has no such pixels; the line names
- * those it has), -EBUSY (another program has it), -EPROTO (what the driver says cannot be),
- * -ENODEV, -EIO. @where begins the message.
+ * those it has), -EBUSY (another program has it), -EPROTO (what the driver says cannot
+ * be), -ENODEV, -EIO. @where begins the message.
  */
 int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char *where,
 		    struct v4l2_shape *shape, struct incise_error *err);

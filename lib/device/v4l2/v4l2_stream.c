@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A camera's pictures; see v4l2_stream.h. What the driver says of one is believed only as far
- * as it can be: an index of a buffer that it has, a size within it, a stamp that rises and is
- * near now, a count that rises.
+ * A camera's pictures; see v4l2_stream.h. What the driver says of one is believed only as
+ * far as it can be: an index of a buffer that it has, a size within it, a stamp that
+ * rises and is near now, a count that rises.
  */
 #include <errno.h>
 #include <poll.h>
@@ -25,8 +25,8 @@
 #define SILENT_PERIODS 20
 #define STALE_NS 10000000000LL /* age of a picture that is not believed */
 /*
- * A driver may reckon a stamp: from the camera's own clock (UVC), or for the end of a picture
- * that it hands out before (vivid). Another clock is off by more.
+ * A driver may reckon a stamp: from the camera's own clock (UVC), or for the end of a
+ * picture that it hands out before (vivid). Another clock is off by more.
  */
 #define FUTURE_NS 300000000
 #define JUMP_MOST 1000 /* step of the count that a damaged picture may make */
@@ -283,9 +283,9 @@ static int drop_damaged(struct v4l2_stream *s, int i, struct incise_error *err)
 }
 
 /*
- * The queue of those that wait: the thread alone moves the head, and whoever takes the oldest
- * moves the tail over it. A number is thus taken once, and its place, of as many as there are
- * buffers at most, is written again only when it was.
+ * The queue of those that wait: the thread alone moves the head, and whoever takes the
+ * oldest moves the tail over it. A number is thus taken once, and its place, of as many
+ * as there are buffers at most, is written again only when it was.
  */
 static int waiting_at(const struct v4l2_stream *s, unsigned long long n)
 {
@@ -300,7 +300,10 @@ static bool take_tail(struct v4l2_stream *s, unsigned long long tail)
 		&s->tail, &tail, tail + 1, memory_order_acq_rel, memory_order_relaxed);
 }
 
-/* How many may wait. Some drivers keep a few to fill: a quarter is for those, and the reader. */
+/*
+ * How many may wait. Some drivers keep a few to fill: a quarter is for those, and the
+ * reader.
+ */
 static unsigned int room(const struct v4l2_stream *s)
 {
 	int others = s->n / 4;
@@ -386,7 +389,9 @@ static int no_picture(struct v4l2_stream *s, int rc, short events,
 	if (rc == -ENODEV)
 		return gone(s, err);
 	if (rc == -EAGAIN && !(events & (POLLERR | POLLHUP | POLLNVAL))) {
-		/* Ready, and then not: a driver that goes on so must not take all time. */
+		/*
+		 * Ready, and then not: a driver that goes on so must not take all time.
+		 */
 		poll(NULL, 0, 1);
 		return check_silence(s, err);
 	}
@@ -421,8 +426,8 @@ int v4l2_stream_step(struct v4l2_stream *s, int timeout_ms, struct incise_error 
 	if (rc < 0)
 		return no_picture(s, -errno, ready.revents, err);
 	/*
-	 * What came back meanwhile, too: v4l2loopback, where its feeder is faster than this
-	 * thread, goes on with a buffer that was not yet queued.
+	 * What came back meanwhile, too: v4l2loopback, where its feeder is faster than
+	 * this thread, goes on with a buffer that was not yet queued.
 	 */
 	rc = take_back(s, err);
 	if (rc)

@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A camera's pictures, in memory that the driver fills and that is mapped here: nothing is
- * copied. A buffer is in one of five places:
+ * A camera's pictures, in memory that the driver fills and that is mapped here: nothing
+ * is copied. A buffer is in one of five places:
  *
  *      driver ──dequeued──▶ thread ──whole──▶ waiting ──read──▶ held by the caller
  *        ▲                    │                  │                    │
  *        └──────queued────────┴── damaged,       │ no room: oldest    │ the next read
  *                                 late ◀─────────┘         returned ◀─┘
  *
- * One thread steps; another one reads, without a lock or a system call: it takes the oldest
- * that waits, and leaves the one it held before in a set that the thread queues again. Three
- * quarters of the buffers may wait (24 of 32), and all but 3 at most: one is held, one
- * returned, one the driver's. So what a caller holds is never written to, and four buffers
- * suffice that none is waited for.
+ * One thread steps; another one reads, without a lock or a system call: it takes the
+ * oldest that waits, and leaves the one it held before in a set that the thread queues
+ * again. Three quarters of the buffers may wait (24 of 32), and all but 3 at most: one is
+ * held, one returned, one the driver's. So what a caller holds is never written to, and
+ * four buffers suffice that none is waited for.
  */
 #ifndef INCISE_V4L2_STREAM_H
 #define INCISE_V4L2_STREAM_H
@@ -61,16 +61,17 @@ struct v4l2_stream {
 };
 
 /*
- * Map buffers and let the driver begin. 0; -EPROTO: it stamps pictures with another clock than
- * CLOCK_MONOTONIC, or has no buffers that can be; -EBUSY, -ENODEV, -EIO, -ENOMEM. Whatever it
- * returns, v4l2_stream_stop() is to be called. @where begins messages, and must live as long.
+ * Map buffers and let the driver begin. 0; -EPROTO: it stamps pictures with another clock
+ * than CLOCK_MONOTONIC, or has no buffers that can be; -EBUSY, -ENODEV, -EIO, -ENOMEM.
+ * Whatever it returns, v4l2_stream_stop() is to be called. @where begins messages, and
+ * must live as long.
  */
 int v4l2_stream_start(struct v4l2_stream *stream, int fd, const struct v4l2_shape *shape,
 		      int64_t exposure_ns, const char *where, struct incise_error *err);
 
 /*
- * Wait for a picture for at most @timeout_ms, and take it from the driver. 1: one came, whole
- * or damaged; 0: none; -ENODEV, -EIO: the stream is at its end, @err says why.
+ * Wait for a picture for at most @timeout_ms, and take it from the driver. 1: one came,
+ * whole or damaged; 0: none; -ENODEV, -EIO: the stream is at its end, @err says why.
  */
 int v4l2_stream_step(struct v4l2_stream *stream, int timeout_ms,
 		     struct incise_error *err);
