@@ -11,17 +11,17 @@
 #include "v4l2_controls.h"
 #include "v4l2_file.h"
 
-#define NS_PER_UNIT 100000	       /* of V4L2_CID_EXPOSURE_ABSOLUTE: 100 µs */
-#define EXPOSURE_MOST_NS 10000000000LL /* beyond, it is not believed */
-#define UNREAD_MOST 3
+#define NS_PER_UNIT 100000	      /* of V4L2_CID_EXPOSURE_ABSOLUTE: 100 µs */
+#define EXPOSURE_MAX_NS 10000000000LL /* longer ones are ignored */
+#define UNREAD_MAX 3
 
-/* What is locked together: what adjusts by itself, and what it adjusts. */
+/* An automatic control and the value that it adjusts, locked together. */
 static const struct pair {
-	const char *key; /* of camera_setup; NULL: kept as it is */
+	const char *key; /* of camera_setup; NULL: the value is kept */
 	size_t asked;	 /* a double in struct incise_camera_setup */
-	double scale;	 /* from there to the driver's units */
+	double scale;	 /* to the units of the driver */
 	uint32_t automatic, value;
-	int32_t off[2]; /* of automatic, the first that the camera takes */
+	int32_t off[2]; /* of automatic: the first that the camera accepts */
 	const char *automatic_name, *name;
 } pairs[] = {
 	{"exposure_ms",
@@ -69,8 +69,7 @@ static const struct pair {
 	 "focus"},
 };
 
-/* Each may bring two. */
-_Static_assert(2 * sizeof(pairs) / sizeof(*pairs) <= V4L2_LOCKS_MOST, "locks fit");
+_Static_assert(2 * sizeof(pairs) / sizeof(*pairs) <= V4L2_LOCKS_MAX, "locks fit");
 
 struct locking {
 	struct v4l2_controls *controls;
@@ -95,11 +94,11 @@ static int set(int fd, uint32_t id, int32_t value)
 }
 
 /* Whether the camera has a control that can be read. */
-static bool has(int fd, uint32_t id, struct v4l2_queryctrl *told)
+static bool has(int fd, uint32_t id, struct v4l2_queryctrl *range)
 {
-	*told = (struct v4l2_queryctrl){.id = id};
-	return id && !v4l2_ask(fd, VIDIOC_QUERYCTRL, told) &&
-	       !(told->flags & (V4L2_CTRL_FLAG_DISABLED | V4L2_CTRL_FLAG_WRITE_ONLY));
+	*range = (struct v4l2_queryctrl){.id = id};
+	return id && !v4l2_ask(fd, VIDIOC_QUERYCTRL, range) &&
+	       !(range->flags & (V4L2_CTRL_FLAG_DISABLED | V4L2_CTRL_FLAG_WRITE_ONLY));
 }
 
 static int refuse(struct locking *l, int rc, const char *name)
@@ -116,7 +115,7 @@ static int refuse(struct locking *l, int rc, const char *name)
 				l->where, name, strerror(-rc));
 }
 
-/* Bring a control to a value, and note it. It is read back when all are set. */
+/* Set a control; it is read back after all are set. */
 static int hold(struct locking *l, uint32_t id, const char *name, int32_t value)
 {
 	struct v4l2_controls *c = l->controls;
@@ -134,11 +133,11 @@ static int hold(struct locking *l, uint32_t id, const char *name, int32_t value)
 static int lock_automatic(struct locking *l, const struct pair *pair)
 {
 	struct v4l2_controls *c = l->controls;
-	struct v4l2_queryctrl told;
+	struct v4l2_queryctrl range;
 	int32_t is;
 	int rc;
 
-	if (!has(c->fd, pair->automatic, &told))
+	if (!has(c->fd, pair->automatic, &range))
 		return 0;
 	rc = get(c->fd, pair->automatic, &is);
 	if (rc)
@@ -154,24 +153,24 @@ static int lock_automatic(struct locking *l, const struct pair *pair)
 	return refuse(l, rc, pair->automatic_name);
 }
 
-/* What is asked for, in the driver's units and steps. */
+/* A value in the units and steps of the driver. */
 static int value_of(struct locking *l, const struct pair *pair, double asked,
-		    const struct v4l2_queryctrl *told, int32_t *value)
+		    const struct v4l2_queryctrl *range, int32_t *value)
 {
-	double units = asked * pair->scale, step = told->step > 0 ? told->step : 1;
-	double nearest = told->minimum + round((units - told->minimum) / step) * step;
+	double units = asked * pair->scale, step = range->step > 0 ? range->step : 1;
+	double nearest = range->minimum + round((units - range->minimum) / step) * step;
 
-	/* Half a step is what rounding takes. */
-	if (units < told->minimum - step / 2 || units > told->maximum + step / 2)
+	/* Rounding allows half a step. */
+	if (units < range->minimum - step / 2 || units > range->maximum + step / 2)
 		return incise_error_set(l->err, ERANGE,
 					"%s: camera_setup.%s is %g; the camera takes %g "
 					"to %g; correct it",
 					l->where, pair->key, asked,
-					told->minimum / pair->scale,
-					told->maximum / pair->scale);
-	if (nearest > told->maximum)
+					range->minimum / pair->scale,
+					range->maximum / pair->scale);
+	if (nearest > range->maximum)
 		nearest -= step;
-	*value = (int32_t)fmax(nearest, told->minimum);
+	*value = (int32_t)fmax(nearest, range->minimum);
 	return 0;
 }
 
@@ -179,8 +178,8 @@ static int lock_pair(struct locking *l, const struct pair *pair,
 		     const struct incise_camera_setup *setup)
 {
 	struct v4l2_controls *c = l->controls;
-	struct v4l2_queryctrl told;
-	bool there = has(c->fd, pair->value, &told);
+	struct v4l2_queryctrl range;
+	bool there = has(c->fd, pair->value, &range);
 	double asked = 0;
 	int32_t value = 0;
 	int rc = 0;
@@ -191,21 +190,21 @@ static int lock_pair(struct locking *l, const struct pair *pair,
 		return incise_error_set(l->err, EINVAL,
 					"%s: camera_setup.%s is %g; correct it", l->where,
 					pair->key, asked);
-	if (asked > 0 && (!there || told.flags & V4L2_CTRL_FLAG_READ_ONLY))
+	if (asked > 0 && (!there || range.flags & V4L2_CTRL_FLAG_READ_ONLY))
 		return incise_error_set(l->err, EOPNOTSUPP,
 					"%s: the camera has no %s that can be set; take "
 					"camera_setup.%s away",
 					l->where, pair->name, pair->key);
-	/* What it is now is what the camera has chosen, so read it first. */
+	/* Read the value chosen by the camera before automatic goes off. */
 	if (there && !(asked > 0))
 		rc = get(c->fd, pair->value, &value);
 	if (rc)
 		return refuse(l, rc, pair->name);
 	if (asked > 0)
-		rc = value_of(l, pair, asked, &told, &value);
+		rc = value_of(l, pair, asked, &range, &value);
 	if (!rc)
 		rc = lock_automatic(l, pair);
-	if (rc || !there || told.flags & V4L2_CTRL_FLAG_READ_ONLY)
+	if (rc || !there || range.flags & V4L2_CTRL_FLAG_READ_ONLY)
 		return rc;
 	return hold(l, pair->value, pair->name, value);
 }
@@ -221,7 +220,7 @@ static int check_exposure(const struct incise_camera_setup *setup, double rate_h
 				where, setup->exposure_ms, 1000 / rate_hz, rate_hz);
 }
 
-/* Those that are not what they were set to, in one line. */
+/* Check that each control has the value that was set. */
 static int read_back(struct locking *l)
 {
 	struct v4l2_controls *c = l->controls;
@@ -247,7 +246,7 @@ static void note_exposure(struct v4l2_controls *c)
 {
 	for (int i = 0; i < c->n; i++)
 		if (c->lock[i].id == V4L2_CID_EXPOSURE_ABSOLUTE && c->lock[i].value > 0 &&
-		    c->lock[i].value <= EXPOSURE_MOST_NS / NS_PER_UNIT)
+		    c->lock[i].value <= EXPOSURE_MAX_NS / NS_PER_UNIT)
 			c->exposure_ns = (int64_t)c->lock[i].value * NS_PER_UNIT;
 }
 
@@ -297,7 +296,7 @@ int v4l2_controls_check(struct v4l2_controls *c, const char *where,
 	}
 	/* A transfer on a bus may fail once. */
 	c->unread = rc ? c->unread + 1 : 0;
-	if (c->unread < UNREAD_MOST)
+	if (c->unread < UNREAD_MAX)
 		return 0;
 	return incise_error_set(err, EIO,
 				"%s: the camera's controls cannot be read any more: %s; "

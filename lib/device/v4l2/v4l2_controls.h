@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A camera's controls, held where they are: what a camera adjusts by itself moves edges
- * and colours from picture to picture, and the time of a picture with the exposure.
+ * A camera's controls, locked: automatic adjustment would move edges and colours from frame to
+ * frame, and with the exposure the time of a frame.
  *
  *   exposure, dynamic frame rate, white balance, gain, focus:
  *   automatic off ─▶ set ─▶ read back ─▶ read again while it runs
@@ -12,7 +12,7 @@
 #include <stdint.h>
 #include <incise/camera.h>
 
-#define V4L2_LOCKS_MOST 16
+#define V4L2_LOCKS_MAX 16
 
 struct v4l2_lock {
 	uint32_t id;
@@ -23,8 +23,8 @@ struct v4l2_lock {
 struct v4l2_controls {
 	int fd;
 	int n;
-	int unread; /* checks in a row that a control could not be read at */
-	struct v4l2_lock lock[V4L2_LOCKS_MOST];
+	int unread; /* failed checks in a row */
+	struct v4l2_lock lock[V4L2_LOCKS_MAX];
 	int64_t exposure_ns; /* 0: not known */
 };
 

@@ -9,7 +9,7 @@
 #include <linux/videodev2.h>
 #include "v4l2_file.h"
 
-#define TRIES 1000 /* against a signal that never ends */
+#define TRIES 1000 /* so that endless signals do not block it */
 
 int v4l2_open(const char *path)
 {
@@ -34,7 +34,7 @@ int v4l2_ask(int fd, unsigned long request, void *argument)
 	return -EINTR;
 }
 
-/* What a driver names need not end, nor be printable. */
+/* Text of a driver may be unterminated or unprintable. */
 static void text_of(char *text, size_t size, const unsigned char *from, size_t length)
 {
 	size_t i;
@@ -57,7 +57,7 @@ int v4l2_identify(int fd, struct v4l2_identity *identity)
 	text_of(identity->bus, sizeof(identity->bus), told.bus_info,
 		sizeof(told.bus_info));
 	identity->version = told.version;
-	/* A device may have several files, each for something else. */
+	/* A device may have several files with different capabilities. */
 	identity->capabilities = told.capabilities & V4L2_CAP_DEVICE_CAPS
 					 ? told.device_caps
 					 : told.capabilities;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The file of a V4L2 device, /dev/video0: opened so that nothing on it waits, asked so
- * that a signal does not matter. Shared by who captures and who looks what is attached.
+ * The file of a V4L2 device, /dev/video0: non-blocking, with requests that signals do not
+ * interrupt.
  */
 #ifndef INCISE_V4L2_FILE_H
 #define INCISE_V4L2_FILE_H
@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What a device says that it is: text that is safe to print. */
+/* How a device identifies itself; the text is printable. */
 struct v4l2_identity {
 	char card[40], driver[24], bus[40];
 	uint32_t capabilities; /* of this very file */

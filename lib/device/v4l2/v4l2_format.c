@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Choice of a camera's format, size and rate; see v4l2_format.h. A driver may enumerate
- * what it likes: lists are followed for a bounded length, and numbers are used only when
- * they can be.
+ * Choice of a camera's format, size and rate; see v4l2_format.h. Lists of a driver are
+ * read up to a limit, and its numbers are checked before use.
  */
 #include <errno.h>
 #include <math.h>
@@ -14,9 +13,9 @@
 #include "v4l2_file.h"
 #include "v4l2_format.h"
 
-#define FORMATS_MOST 64
-#define CHOICES_MOST 256	       /* sizes, or rates */
-#define PICTURE_MOST ((size_t)1 << 28) /* bytes */
+#define FORMATS_MAX 64
+#define CHOICES_MAX 256		    /* sizes, or rates */
+#define FRAME_MAX ((size_t)1 << 28) /* bytes */
 
 static const struct {
 	enum incise_pixels pixels;
@@ -32,14 +31,13 @@ static const struct {
 
 #define KNOWN (sizeof(known) / sizeof(*known))
 
-/* The @i-th format on offer; 0: there is none. */
+/* Format number @i of the driver; 0: none. */
 static uint32_t offered(int fd, uint32_t i)
 {
 	struct v4l2_fmtdesc told = {.index = i, .type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
 
-	return i < FORMATS_MOST && !v4l2_ask(fd, VIDIOC_ENUM_FMT, &told)
-		       ? told.pixelformat
-		       : 0;
+	return i < FORMATS_MAX && !v4l2_ask(fd, VIDIOC_ENUM_FMT, &told) ? told.pixelformat
+									: 0;
 }
 
 static bool is_known(uint32_t fourcc)
@@ -58,7 +56,7 @@ void v4l2_format_list(int fd, char *text, size_t size)
 	uint32_t fourcc;
 
 	*text = '\0';
-	/* Those that can be taken come first. */
+	/* Usable ones first. */
 	for (int other = 0; other < 2; other++)
 		for (uint32_t i = 0; (fourcc = offered(fd, i)) && length + 6 < size; i++)
 			if (is_known(fourcc) != other)
@@ -67,7 +65,7 @@ void v4l2_format_list(int fd, char *text, size_t size)
 							   v4l2_letters(fourcc, letters));
 }
 
-/* Index into known; KNOWN: it has none of that kind. */
+/* Index into known; KNOWN: the camera has no such pixels. */
 static size_t find(int fd, enum incise_pixels pixels)
 {
 	size_t best = KNOWN;
@@ -86,10 +84,10 @@ static long away(uint32_t a, int b)
 	return labs((long)a - b);
 }
 
-/* The nearest that steps from @least to @most give. */
+/* The nearest step between @least and @most. */
 static int step_to(int asked, uint32_t least, uint32_t most, uint32_t step)
 {
-	if (most < least || most > V4L2_SIDE_MOST)
+	if (most < least || most > V4L2_SIDE_MAX)
 		return asked;
 	if (!step)
 		step = 1;
@@ -100,13 +98,13 @@ static int step_to(int asked, uint32_t least, uint32_t most, uint32_t step)
 	return (int)(least + ((uint32_t)asked - least + step / 2) / step * step);
 }
 
-/* Make a size asked for the nearest on offer; as it is where none is enumerated. */
+/* Change a size to the nearest one of the driver, if it enumerates any. */
 static void nearest_size(int fd, uint32_t fourcc, int *width, int *height)
 {
 	int w = *width, h = *height;
 	long best = -1;
 
-	for (uint32_t i = 0; i < CHOICES_MOST; i++) {
+	for (uint32_t i = 0; i < CHOICES_MAX; i++) {
 		struct v4l2_frmsizeenum told = {.index = i, .pixel_format = fourcc};
 		long off;
 
@@ -122,8 +120,8 @@ static void nearest_size(int fd, uint32_t fourcc, int *width, int *height)
 			return;
 		}
 		off = away(told.discrete.width, w) + away(told.discrete.height, h);
-		if (told.discrete.width - 1 < V4L2_SIDE_MOST &&
-		    told.discrete.height - 1 < V4L2_SIDE_MOST &&
+		if (told.discrete.width - 1 < V4L2_SIDE_MAX &&
+		    told.discrete.height - 1 < V4L2_SIDE_MAX &&
 		    (best < 0 || off < best)) {
 			best = off;
 			*width = (int)told.discrete.width;
@@ -132,7 +130,7 @@ static void nearest_size(int fd, uint32_t fourcc, int *width, int *height)
 	}
 }
 
-/* Pictures per second; 0: not a rate. */
+/* Frames per second; 0: not a rate. */
 static double rate_of(const struct v4l2_fract *interval)
 {
 	double hz = interval->numerator
@@ -148,7 +146,7 @@ static struct v4l2_fract nearest_interval(int fd, const struct v4l2_shape *shape
 	struct v4l2_fract best = {1000, (uint32_t)lround(hz * 1000)};
 	double off = -1;
 
-	for (uint32_t i = 0; i < CHOICES_MOST; i++) {
+	for (uint32_t i = 0; i < CHOICES_MAX; i++) {
 		struct v4l2_frmivalenum told = {.index = i,
 						.pixel_format = shape->fourcc,
 						.width = (uint32_t)shape->width,
@@ -176,7 +174,7 @@ static struct v4l2_fract nearest_interval(int fd, const struct v4l2_shape *shape
 	return best;
 }
 
-/* Not every driver has a rate; then it is not known. */
+/* The rate stays 0 where the driver has none. */
 static void set_rate(int fd, struct v4l2_shape *shape, double hz)
 {
 	struct v4l2_streamparm told = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
@@ -194,7 +192,7 @@ static void set_rate(int fd, struct v4l2_shape *shape, double hz)
 	shape->rate_hz = rate_of(&told.parm.capture.timeperframe);
 }
 
-/* Whether what a driver says of its pictures can be; else why not. */
+/* Check the answer of the driver; NULL, or the reason why it is impossible. */
 static const char *wrong(const struct v4l2_pix_format *told, size_t kind,
 			 struct v4l2_shape *shape)
 {
@@ -205,9 +203,9 @@ static const char *wrong(const struct v4l2_pix_format *told, size_t kind,
 	if (told->field != V4L2_FIELD_NONE)
 		return "interlaced pictures, whose halves are of two times; set a "
 		       "progressive mode";
-	if (told->width - 1 >= V4L2_SIDE_MOST || told->height - 1 >= V4L2_SIDE_MOST)
+	if (told->width - 1 >= V4L2_SIDE_MAX || told->height - 1 >= V4L2_SIDE_MAX)
 		return "a size that cannot be";
-	if (!told->sizeimage || told->sizeimage > PICTURE_MOST)
+	if (!told->sizeimage || told->sizeimage > FRAME_MAX)
 		return "a number of bytes that cannot be";
 	*shape = (struct v4l2_shape){
 		.pixels = known[kind].pixels,
@@ -218,9 +216,9 @@ static const char *wrong(const struct v4l2_pix_format *told, size_t kind,
 	if (!known[kind].bytes)
 		return NULL;
 	row = (size_t)told->width * (size_t)known[kind].bytes;
-	/* Drivers of the old days leave it at 0 where rows have no padding. */
+	/* Old drivers leave it at 0 where rows have no padding. */
 	shape->stride = (int)(told->bytesperline ? told->bytesperline : row);
-	if (told->bytesperline > PICTURE_MOST || (size_t)shape->stride < row)
+	if (told->bytesperline > FRAME_MAX || (size_t)shape->stride < row)
 		return "rows that are too short";
 	if (shape->pixels == INCISE_PIXELS_YUYV && told->width % 2)
 		return "an odd number of pixels in a row of YUYV";
@@ -232,8 +230,8 @@ static const char *wrong(const struct v4l2_pix_format *told, size_t kind,
 static int check_setup(const struct incise_camera_setup *setup, const char *where,
 		       struct incise_error *err)
 {
-	if (setup->width < 0 || setup->width > V4L2_SIDE_MOST || setup->height < 0 ||
-	    setup->height > V4L2_SIDE_MOST)
+	if (setup->width < 0 || setup->width > V4L2_SIDE_MAX || setup->height < 0 ||
+	    setup->height > V4L2_SIDE_MAX)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: camera_setup: a picture of %d x %d pixels cannot be; "
@@ -274,9 +272,9 @@ int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char 
 			where, *list ? list : "none");
 	}
 	width = setup->width ? setup->width
-			     : step_to(V4L2_SIDE_MOST, 1, set.fmt.pix.width, 1);
+			     : step_to(V4L2_SIDE_MAX, 1, set.fmt.pix.width, 1);
 	height = setup->height ? setup->height
-			       : step_to(V4L2_SIDE_MOST, 1, set.fmt.pix.height, 1);
+			       : step_to(V4L2_SIDE_MAX, 1, set.fmt.pix.height, 1);
 	nearest_size(fd, known[kind].fourcc, &width, &height);
 	set.fmt.pix.width = (uint32_t)width;
 	set.fmt.pix.height = (uint32_t)height;

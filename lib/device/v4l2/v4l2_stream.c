@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A camera's pictures; see v4l2_stream.h. What the driver says of one is believed only as
- * far as it can be: an index of a buffer that it has, a size within it, a stamp that
- * rises and is near now, a count that rises.
+ * A camera's frames; see v4l2_stream.h. Answers of the driver are checked: index of a
+ * buffer, size within it, a rising timestamp near now, a rising count.
  */
 #include <errno.h>
 #include <poll.h>
@@ -16,20 +15,20 @@
 #include "v4l2_stream.h"
 
 #define NONE (-1)
-#define ASKED 32       /* buffers: 24 wait: 0.4 s at 60 Hz for a reader that is held up */
+#define ASKED 32       /* buffers; 24 of them may wait, for 0.4 s at 60 Hz */
 #define FEWEST 4       /* one waits, one is held, one returned, one the driver's */
-#define ERRORS_MOST 10 /* in a row, that taking a picture may fail */
+#define ERRORS_MAX 10  /* of dequeueing, in a row */
 #define ERROR_MS 10    /* of rest after each */
-#define DAMAGED_ROW 30 /* damaged pictures in a row: it is of no use */
-#define SILENT_NS 5000000000LL /* without any picture; or so many periods: */
+#define DAMAGED_ROW 30 /* damaged frames in a row end the stream */
+#define SILENT_NS 5000000000LL /* without a frame; or so many periods: */
 #define SILENT_PERIODS 20
-#define STALE_NS 10000000000LL /* age of a picture that is not believed */
+#define STALE_NS 10000000000LL /* largest valid age of a frame */
 /*
- * A driver may reckon a stamp: from the camera's own clock (UVC), or for the end of a
- * picture that it hands out before (vivid). Another clock is off by more.
+ * A driver may compute a timestamp: from the camera's own clock (UVC), or for the end of
+ * a frame that it returns before that (vivid). Other clocks are off by more.
  */
 #define FUTURE_NS 300000000
-#define JUMP_MOST 1000 /* step of the count that a damaged picture may make */
+#define JUMP_MAX 1000 /* valid step of the count of a damaged frame */
 
 static struct v4l2_buffer buffer_at(uint32_t index)
 {
@@ -124,7 +123,7 @@ static int take_buffers(struct v4l2_stream *s, struct incise_error *err)
 					"%s: the camera's driver has %u buffers, and "
 					"fewer than %d lose pictures; give it more",
 					s->where, asked.count, FEWEST);
-	n = asked.count < V4L2_BUFFERS_MOST ? asked.count : V4L2_BUFFERS_MOST;
+	n = asked.count < V4L2_BUFFERS_MAX ? asked.count : V4L2_BUFFERS_MAX;
 	for (s->n = 0; s->n < (int)n; s->n++) {
 		rc = map(s, s->n, err);
 		if (rc)
@@ -169,7 +168,6 @@ void v4l2_stream_stop(struct v4l2_stream *s)
 					   .memory = V4L2_MEMORY_MMAP};
 	int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
 
-	/* Nothing can be done about a device that does not stop. */
 	if (s->runs)
 		v4l2_ask(s->fd, VIDIOC_STREAMOFF, &type);
 	for (int i = 0; i < s->n; i++)
@@ -180,7 +178,7 @@ void v4l2_stream_stop(struct v4l2_stream *s)
 	s->runs = false;
 }
 
-/* Buffers that the reader is done with go back to the driver. */
+/* Queue buffers that the reader has returned. */
 static int take_back(struct v4l2_stream *s, struct incise_error *err)
 {
 	unsigned int set =
@@ -193,7 +191,7 @@ static int take_back(struct v4l2_stream *s, struct incise_error *err)
 	return rc;
 }
 
-/* A JPEG from its first marker to its last, which may have padding behind it. */
+/* A JPEG from its first marker to its last, which padding may follow. */
 static bool is_jpeg(const uint8_t *data, size_t size)
 {
 	if (size < 4 || data[0] != 0xff || data[1] != 0xd8)
@@ -204,9 +202,9 @@ static bool is_jpeg(const uint8_t *data, size_t size)
 	return false;
 }
 
-/* The stamp, ns; -1: it is none that can be. */
-static int64_t stamp_of(const struct v4l2_stream *s, const struct v4l2_buffer *buffer,
-			int64_t now)
+/* The timestamp, ns; -1: an impossible one. */
+static int64_t timestamp_of(const struct v4l2_stream *s, const struct v4l2_buffer *buffer,
+			    int64_t now)
 {
 	int64_t t;
 
@@ -214,11 +212,12 @@ static int64_t stamp_of(const struct v4l2_stream *s, const struct v4l2_buffer *b
 	    buffer->timestamp.tv_usec < 0 || buffer->timestamp.tv_usec > 999999)
 		return -1;
 	t = buffer->timestamp.tv_sec * INCISE_NS_PER_S + buffer->timestamp.tv_usec * 1000;
-	return t > s->stamp_ns && t <= now + FUTURE_NS && t >= now - STALE_NS ? t : -1;
+	return t > s->timestamp_ns && t <= now + FUTURE_NS && t >= now - STALE_NS ? t
+										  : -1;
 }
 
 /*
- * A picture is stamped when its exposure begins, or when its last pixel is there:
+ * Drivers stamp a frame at the start of its exposure, or when its last pixel has arrived:
  *
  *     SOE                        EOF
  *      ├─ exposure ─┼─ readout ───┤      The readout is not known here: what it makes the
@@ -242,14 +241,14 @@ static bool is_whole(const struct v4l2_stream *s, const struct v4l2_buffer *buff
 	       is_jpeg(slot->data, buffer->bytesused);
 }
 
-/* Go on with the driver's count, and with ours; a gap is lost. */
+/* Advance the counts; frames in a gap are lost. */
 static int count(struct v4l2_stream *s, uint32_t sequence, bool whole,
 		 struct incise_error *err)
 {
 	uint32_t step = s->any ? sequence - s->sequence : 1;
 
-	/* Some drivers do not count what is damaged, or leave anything there. */
-	if (!whole && (!s->any || !step || step > JUMP_MOST)) {
+	/* Some drivers do not count damaged frames, or give them any number. */
+	if (!whole && (!s->any || !step || step > JUMP_MAX)) {
 		s->seq++;
 		return 0;
 	}
@@ -260,7 +259,7 @@ static int count(struct v4l2_stream *s, uint32_t sequence, bool whole,
 			"%u, so that losses cannot be told; use another "
 			"camera or driver",
 			s->where, sequence, s->sequence);
-	/* The first picture is number 0. */
+	/* The first frame is number 0. */
 	if (s->any)
 		s->seq += step;
 	s->any = true;
@@ -283,49 +282,46 @@ static int drop_damaged(struct v4l2_stream *s, int i, struct incise_error *err)
 }
 
 /*
- * The queue of those that wait: the thread alone moves the head, and whoever takes the
- * oldest moves the tail over it. A number is thus taken once, and its place, of as many
- * as there are buffers at most, is written again only when it was.
+ * The queue of waiting buffers: only the thread moves the head; whoever takes the oldest
+ * moves the tail over it. So a number is taken once, and its place is written again only
+ * after that.
  */
 static int waiting_at(const struct v4l2_stream *s, unsigned long long n)
 {
-	return atomic_load_explicit(&s->waiting[n % V4L2_BUFFERS_MOST],
+	return atomic_load_explicit(&s->waiting[n % V4L2_BUFFERS_MAX],
 				    memory_order_relaxed);
 }
 
-/* Whether number @tail was there, and not yet taken by the other thread. */
+/* False: the other thread took number @tail. */
 static bool take_tail(struct v4l2_stream *s, unsigned long long tail)
 {
 	return atomic_compare_exchange_strong_explicit(
 		&s->tail, &tail, tail + 1, memory_order_acq_rel, memory_order_relaxed);
 }
 
-/*
- * How many may wait. Some drivers keep a few to fill: a quarter is for those, and the
- * reader.
- */
-static unsigned int room(const struct v4l2_stream *s)
+/* How many may wait; the rest is for the reader, and for drivers that keep a few. */
+static unsigned int capacity(const struct v4l2_stream *s)
 {
 	int others = s->n / 4;
 
 	return (unsigned int)(s->n - (others < FEWEST - 1 ? FEWEST - 1 : others));
 }
 
-/* Hand it over; where there is no room the oldest, which nobody has taken, was lost. */
+/* Add it to the waiting ones; if they are full, the oldest is lost. */
 static int publish(struct v4l2_stream *s, int i, struct incise_error *err)
 {
 	unsigned long long head = atomic_load_explicit(&s->head, memory_order_relaxed);
 	unsigned long long tail = atomic_load_explicit(&s->tail, memory_order_acquire);
 	int old = NONE;
 
-	if (head - tail >= room(s)) {
+	if (head - tail >= capacity(s)) {
 		old = waiting_at(s, tail);
-		/* Else it was read just now, and there is room. */
+		/* Else it was read just now, and they are not full. */
 		if (!take_tail(s, tail))
 			old = NONE;
 	}
 	s->damaged_row = 0;
-	atomic_store_explicit(&s->waiting[head % V4L2_BUFFERS_MOST], (signed char)i,
+	atomic_store_explicit(&s->waiting[head % V4L2_BUFFERS_MAX], (signed char)i,
 			      memory_order_relaxed);
 	atomic_store_explicit(&s->head, head + 1, memory_order_release);
 	if (old == NONE)
@@ -338,7 +334,7 @@ static int take(struct v4l2_stream *s, const struct v4l2_buffer *buffer, int64_t
 		struct incise_error *err)
 {
 	struct v4l2_slot *slot;
-	int64_t stamp;
+	int64_t timestamp;
 	bool whole;
 	int rc;
 
@@ -351,15 +347,15 @@ static int take(struct v4l2_stream *s, const struct v4l2_buffer *buffer, int64_t
 	slot->queued = false;
 	if (!is_monotonic(buffer))
 		return other_clock(s, EIO, err);
-	stamp = stamp_of(s, buffer, now);
-	whole = stamp >= 0 && is_whole(s, buffer, slot);
+	timestamp = timestamp_of(s, buffer, now);
+	whole = timestamp >= 0 && is_whole(s, buffer, slot);
 	rc = count(s, buffer->sequence, whole, err);
 	if (rc)
 		return rc;
 	if (!whole)
 		return drop_damaged(s, (int)buffer->index, err);
-	s->stamp_ns = stamp;
-	slot->t_ns = stamp + to_middle(s, buffer);
+	s->timestamp_ns = timestamp;
+	slot->t_ns = timestamp + to_middle(s, buffer);
 	slot->seq = s->seq;
 	slot->size = buffer->bytesused;
 	return publish(s, (int)buffer->index, err);
@@ -380,25 +376,22 @@ static int check_silence(const struct v4l2_stream *s, struct incise_error *err)
 				s->where, (double)most / 1e9);
 }
 
-/* What the driver answered other than a picture. */
-static int no_picture(struct v4l2_stream *s, int rc, short events,
-		      struct incise_error *err)
+/* Handle an answer of the driver without a frame. */
+static int no_frame(struct v4l2_stream *s, int rc, short events, struct incise_error *err)
 {
 	struct v4l2_capability told;
 
 	if (rc == -ENODEV)
 		return gone(s, err);
 	if (rc == -EAGAIN && !(events & (POLLERR | POLLHUP | POLLNVAL))) {
-		/*
-		 * Ready, and then not: a driver that goes on so must not take all time.
-		 */
+		/* A driver that is ready without a frame must not cause a busy loop. */
 		poll(NULL, 0, 1);
 		return check_silence(s, err);
 	}
 	if (rc != -EAGAIN && rc != -EIO)
-		s->errors = ERRORS_MOST;
-	/* It says so at once as long as it lasts. */
-	if (++s->errors < ERRORS_MOST) {
+		s->errors = ERRORS_MAX;
+	/* The error may be permanent, and returned at once. */
+	if (++s->errors < ERRORS_MAX) {
 		poll(NULL, 0, ERROR_MS);
 		return 0;
 	}
@@ -424,17 +417,17 @@ int v4l2_stream_step(struct v4l2_stream *s, int timeout_ms, struct incise_error 
 	if (!rc)
 		return check_silence(s, err);
 	if (rc < 0)
-		return no_picture(s, -errno, ready.revents, err);
+		return no_frame(s, -errno, ready.revents, err);
 	/*
-	 * What came back meanwhile, too: v4l2loopback, where its feeder is faster than
-	 * this thread, goes on with a buffer that was not yet queued.
+	 * Again: v4l2loopback, when its feeder is faster than this thread, continues with
+	 * a buffer that was not yet queued.
 	 */
 	rc = take_back(s, err);
 	if (rc)
 		return rc;
 	rc = v4l2_ask(s->fd, VIDIOC_DQBUF, &buffer);
 	if (rc)
-		return no_picture(s, rc, ready.revents, err);
+		return no_frame(s, rc, ready.revents, err);
 	s->errors = 0;
 	s->seen_ns = incise_monotonic_ns();
 	rc = take(s, &buffer, s->seen_ns, err);
@@ -447,7 +440,7 @@ int v4l2_stream_read(struct v4l2_stream *s, struct incise_camera_frame *frame)
 	const struct v4l2_slot *slot;
 	int i;
 
-	/* Again only where the thread, which has no room, was there first. */
+	/* Again only if the thread dropped the oldest meanwhile. */
 	do {
 		tail = atomic_load_explicit(&s->tail, memory_order_relaxed);
 		if (tail == atomic_load_explicit(&s->head, memory_order_acquire))

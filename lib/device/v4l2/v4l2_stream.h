@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A camera's pictures, in memory that the driver fills and that is mapped here: nothing
- * is copied. A buffer is in one of five places:
+ * A camera's frames, in memory that the driver fills and that is mapped here, without a
+ * copy. A buffer is in one of five places:
  *
  *      driver ──dequeued──▶ thread ──whole──▶ waiting ──read──▶ held by the caller
  *        ▲                    │                  │                    │
- *        └──────queued────────┴── damaged,       │ no room: oldest    │ the next read
+ *        └──────queued────────┴── damaged,       │ full: oldest       │ the next read
  *                                 late ◀─────────┘         returned ◀─┘
  *
  * One thread steps; another one reads, without a lock or a system call: it takes the
- * oldest that waits, and leaves the one it held before in a set that the thread queues
- * again. Three quarters of the buffers may wait (24 of 32), and all but 3 at most: one is
- * held, one returned, one the driver's. So what a caller holds is never written to, and
- * four buffers suffice that none is waited for.
+ * oldest waiting buffer, and returns the one it held before in a set that the thread
+ * queues again. Three quarters of the buffers may wait (24 of 32), and all but 3 at most:
+ * one is held, one returned, one the driver's. So a held buffer is never written to, and
+ * with four buffers neither side waits.
  */
 #ifndef INCISE_V4L2_STREAM_H
 #define INCISE_V4L2_STREAM_H
@@ -24,13 +24,13 @@
 #include <incise/camera.h>
 #include "v4l2_format.h"
 
-#define V4L2_BUFFERS_MOST 32 /* bits of a set */
+#define V4L2_BUFFERS_MAX 32 /* bits of a set */
 
-/* A mapped buffer, and the picture in it. */
+/* A mapped buffer, and the frame in it. */
 struct v4l2_slot {
 	void *data;
 	size_t length;
-	bool queued; /* the driver's */
+	bool queued; /* owned by the driver */
 	size_t size;
 	int64_t t_ns;
 	uint64_t seq;
@@ -42,44 +42,44 @@ struct v4l2_stream {
 	struct v4l2_shape shape;
 	int64_t exposure_ns;
 	bool runs;
-	struct v4l2_slot slot[V4L2_BUFFERS_MOST];
-	/* Between the two threads. */
-	_Alignas(64) atomic_ullong tail; /* first that waits; both threads move it */
-	atomic_ullong head;		 /* behind the last; the thread's */
-	_Atomic signed char waiting[V4L2_BUFFERS_MOST];
+	struct v4l2_slot slot[V4L2_BUFFERS_MAX];
+	/* Shared by the two threads. */
+	_Alignas(64) atomic_ullong tail; /* first waiting; moved by both threads */
+	atomic_ullong head;		 /* behind the last; moved by the thread */
+	_Atomic signed char waiting[V4L2_BUFFERS_MAX];
 	atomic_uint returned; /* a bit per slot */
 	atomic_ullong lost, damaged;
 	/* The reader's. */
 	_Alignas(64) int held;
 	/* The thread's. */
 	_Alignas(64) bool any;
-	uint32_t sequence; /* the driver's, of the last picture */
-	uint64_t seq;	   /* ours */
-	int64_t stamp_ns;  /* of the last whole one */
-	int64_t seen_ns;   /* when the last one came */
+	uint32_t sequence;    /* of the driver, of the last frame */
+	uint64_t seq;	      /* ours */
+	int64_t timestamp_ns; /* of the last whole one */
+	int64_t seen_ns;      /* when the last one came */
 	int errors, damaged_row;
 };
 
 /*
- * Map buffers and let the driver begin. 0; -EPROTO: it stamps pictures with another clock
- * than CLOCK_MONOTONIC, or has no buffers that can be; -EBUSY, -ENODEV, -EIO, -ENOMEM.
- * Whatever it returns, v4l2_stream_stop() is to be called. @where begins messages, and
- * must live as long.
+ * Map buffers and start the driver. 0; -EPROTO: its timestamps are not of
+ * CLOCK_MONOTONIC, or its buffers are impossible; -EBUSY, -ENODEV, -EIO, -ENOMEM.
+ * v4l2_stream_stop() is due in any case. @where begins messages, and must live as long as
+ * the stream.
  */
 int v4l2_stream_start(struct v4l2_stream *stream, int fd, const struct v4l2_shape *shape,
 		      int64_t exposure_ns, const char *where, struct incise_error *err);
 
 /*
- * Wait for a picture for at most @timeout_ms, and take it from the driver. 1: one came,
- * whole or damaged; 0: none; -ENODEV, -EIO: the stream is at its end, @err says why.
+ * Wait for a frame for at most @timeout_ms and dequeue it. 1: one came, whole or damaged;
+ * 0: none; -ENODEV, -EIO: the stream has ended, with the cause in @err.
  */
 int v4l2_stream_step(struct v4l2_stream *stream, int timeout_ms,
 		     struct incise_error *err);
 
-/* The oldest picture that waits; 1 or 0. Real-time safe. */
+/* The oldest waiting frame; 1 or 0. Real-time safe. */
 int v4l2_stream_read(struct v4l2_stream *stream, struct incise_camera_frame *frame);
 
-/* No thread may step or read any more. */
+/* No thread may step or read after it. */
 void v4l2_stream_stop(struct v4l2_stream *stream);
 
 #endif
