@@ -334,7 +334,7 @@ static void put_sample(struct polhemus_stream *stream,
 		.status = record->status,
 		.station = record->station,
 		.button = record->button,
-		.begins = stream->restarted,
+		.restarted = stream->restarted,
 	};
 	double tip[3];
 

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What stands behind a device: a table of functions per backend and kind. A backend
- * embeds the kind's struct as its first member. For those who write one (doc/device-backend.md
- * goes through a whole one); who only uses devices needs the header of their kind.
+ * Backends of devices: a table of functions per backend and kind. A backend embeds the
+ * struct of its kind as its first member. Only for writing a backend
+ * (doc/device-backend.md has a whole one); to use devices, the header of their kind is
+ * enough.
  *
- * What holds for every table:
+ * Rules for every table:
  *
- *  - read() takes what has arrived and never waits: 0 is "nothing yet", an errno "it is over".
- *    Who has to wait for a device does so in a thread of his own.
- *  - All of them are called by one thread at a time, between open and close.
- *  - close() frees what open() made, the struct itself too. It is called once.
+ *  - read() takes samples that have arrived and never waits: 0 is "nothing yet", an errno the
+ *    end. A backend that has to wait for its device does so in its own thread.
+ *  - All functions are called by one thread at a time, between open and close.
+ *  - close() frees all that open() made, also the struct. It is called once.
  */
 #ifndef INCISE_BACKEND_H
 #define INCISE_BACKEND_H
@@ -27,25 +28,25 @@
 
 INCISE_BEGIN_DECLS
 
-/** What a tracker answers with; see incise/tracker.h. */
+/** Functions of a tracker; see incise/tracker.h. */
 struct incise_tracker_ops {
-	/** As incise_tracker_read(); INCISE_REALTIME, where a haptic loop is to read it. */
+	/** As incise_tracker_read(); INCISE_REALTIME if a haptic loop may read it. */
 	int (*read)(struct incise_tracker *tracker, struct incise_tracker_sample *samples,
 		    int n) INCISE_REALTIME;
 	void (*info)(const struct incise_tracker *tracker,
 		     struct incise_tracker_info *info);
 	uint64_t (*lost)(const struct incise_tracker *tracker);
 	void (*close)(struct incise_tracker *tracker);
-	/** Why read() fails; NULL: it cannot tell. */
+	/** Cause of an error of read(); may be NULL. */
 	int (*cause)(struct incise_tracker *tracker, char *text, size_t size);
 };
 
-/** A tracker: the first member of what its backend opens. */
+/** A tracker: the first member of its backend's struct. */
 struct incise_tracker {
 	const struct incise_tracker_ops *ops;
 };
 
-/** What a force channel answers with; see incise/force.h. */
+/** Functions of a force channel; see incise/force.h. */
 struct incise_force_ops {
 	/** As incise_force_read(). */
 	int (*read)(struct incise_force *force, struct incise_force_sample *samples,
@@ -53,32 +54,32 @@ struct incise_force_ops {
 	void (*info)(const struct incise_force *force, struct incise_force_info *info);
 	uint64_t (*lost)(const struct incise_force *force);
 	void (*close)(struct incise_force *force);
-	/** Why read() fails; NULL: it cannot tell. */
+	/** Cause of an error of read(); may be NULL. */
 	int (*cause)(struct incise_force *force, char *text, size_t size);
 };
 
-/** A force channel: the first member of what its backend opens. */
+/** A force channel: the first member of its backend's struct. */
 struct incise_force {
 	const struct incise_force_ops *ops;
 };
 
-/** What a camera answers with; see incise/camera.h. */
+/** Functions of a camera; see incise/camera.h. */
 struct incise_camera_ops {
 	/** As incise_camera_read(). */
 	int (*read)(struct incise_camera *camera, struct incise_camera_frame *frame);
 	void (*info)(const struct incise_camera *camera, struct incise_camera_info *info);
 	uint64_t (*lost)(const struct incise_camera *camera);
 	void (*close)(struct incise_camera *camera);
-	/** Why read() fails; NULL: it cannot tell. */
+	/** Cause of an error of read(); may be NULL. */
 	int (*cause)(struct incise_camera *camera, char *text, size_t size);
 };
 
-/** A camera: the first member of what its backend opens. */
+/** A camera: the first member of its backend's struct. */
 struct incise_camera {
 	const struct incise_camera_ops *ops;
 };
 
-/** Where the home input, or the limit at 0, was met, in the count of position_mm. */
+/** Edge of the home input, or of the limit at 0, in the count of position_mm. */
 struct incise_stepper_edge {
 	bool seen;	    /**< since it was enabled */
 	double position_mm; /**< at the last one */
@@ -86,13 +87,13 @@ struct incise_stepper_edge {
 
 /** How to find the machine's 0. */
 struct incise_stepper_homing {
-	double speed_mm_s;    /**< of the way there; a tenth of it for the edge itself */
+	double speed_mm_s;    /**< of the approach; a tenth of it for the edge */
 	double home_mm;	      /**< position of the edge in the machine */
 	unsigned int home_at; /**< INCISE_STEPPER_AT_HOME, or _AT_MIN without one */
 };
 
 /**
- * A stepper. What a backend has not (NULL) answers -EOPNOTSUPP. All but set, jog and
+ * Functions of a stepper. A function that is NULL gives -EOPNOTSUPP. All but set, jog and
  * status may block.
  */
 struct incise_stepper_ops {
@@ -108,7 +109,7 @@ struct incise_stepper_ops {
 		     struct incise_stepper_info *info);
 	void (*close)(struct incise_stepper *stepper);
 
-	/** What the device tells of its fault; 0: nothing, and @text is as it was. */
+	/** The device's own description of its fault; 0: none, and @text is unchanged. */
 	int (*cause)(struct incise_stepper *stepper, char *text, size_t size);
 	int (*counter)(struct incise_stepper *stepper, int i,
 		       struct incise_stepper_counter *counter);
@@ -123,13 +124,13 @@ struct incise_stepper_ops {
 	int (*homing)(struct incise_stepper *stepper,
 		      struct incise_stepper_homing *homing);
 	int (*edge)(struct incise_stepper *stepper, struct incise_stepper_edge *edge);
-	/** Name the position where it stands at rest. 0, -EBUSY (it moves), -EIO. */
+	/** Define its position at rest. 0, -EBUSY (it moves), -EIO. */
 	int (*origin)(struct incise_stepper *stepper, double position_mm, bool homed);
-	/** Let time pass; 0, or -EINTR. NULL: the computer's clock. */
+	/** Wait; 0, or -EINTR. NULL: by the clock of the computer. */
 	int (*wait)(struct incise_stepper *stepper, int64_t ns);
 };
 
-/** A stepper: the first member of what its backend opens. */
+/** A stepper: the first member of its backend's struct. */
 struct incise_stepper {
 	const struct incise_stepper_ops *ops;
 };
@@ -139,7 +140,7 @@ struct incise_vision_ops {
 	int (*measure)(struct incise_vision *vision,
 		       const struct incise_camera_frame *frame,
 		       struct incise_vision_result *result);
-	/** Asked of an object whose own setup says nothing. */
+	/** Of an object with an empty setup. */
 	int (*learn)(struct incise_vision *vision,
 		     const struct incise_camera_frame *frame,
 		     const struct incise_vision_box *box,
@@ -147,21 +148,21 @@ struct incise_vision_ops {
 	void (*close)(struct incise_vision *vision);
 };
 
-/** The first member of what the module of vision opens. */
+/** Vision: the first member of its module's struct. */
 struct incise_vision {
 	const struct incise_vision_ops *ops;
 };
 
 struct incise_board;
 
-/** Nor is what finds a board, see incise/board.h; it needs nothing of the request. */
+/** Detection of boards, see incise/board.h, likewise; it needs nothing of the request. */
 struct incise_board_ops {
 	int (*find)(struct incise_board *board, const struct incise_camera_frame *frame,
 		    int columns, int rows, double *corners, struct incise_error *err);
 	void (*close)(struct incise_board *board);
 };
 
-/** The first member of what the module of boards opens. */
+/** Detection of boards: the first member of its module's struct. */
 struct incise_board {
 	const struct incise_board_ops *ops;
 };
@@ -180,14 +181,14 @@ enum incise_actuator_line {
 #define INCISE_LINES 8	   /**< how many there are */
 #define INCISE_LINES_OUT 3 /**< how many of them are outputs */
 
-/** How a drive on a bus is told where to go; CiA 402's cyclic modes. */
+/** Cyclic modes of CiA 402. */
 enum incise_actuator_mode {
 	INCISE_ACTUATOR_CSP, /**< positions; the drive closes all loops */
-	INCISE_ACTUATOR_CSV, /**< velocities; the loop of position is closed here */
-	INCISE_ACTUATOR_CST, /**< torques; those of position and velocity are closed here */
+	INCISE_ACTUATOR_CSV, /**< velocities; the position loop is closed here */
+	INCISE_ACTUATOR_CST, /**< torques; position and velocity loops are closed here */
 };
 
-/** A drive on a CAN bus: the group `can`. 0 in a unit: as the drive itself says. */
+/** A drive on a CAN bus: the group `can`. A unit of 0: as the drive reports it. */
 struct incise_actuator_can {
 	enum incise_actuator_mode mode;
 	uint32_t bitrate;		  /**< 0: that of the interface */
@@ -205,7 +206,7 @@ struct incise_actuator_can {
 	int master; /**< node id of this program's heartbeat, 1 … 127 */
 };
 
-/** What rig.conf says of an actuator. Lengths in mm, times as their names say. */
+/** The group `actuator` of rig.conf. */
 struct incise_actuator {
 	double spring_N_mm, travel_mm;
 	double lead_mm;	    /**< per turn */
@@ -217,7 +218,7 @@ struct incise_actuator {
 	double deadman_s;
 	bool retract; /**< on a deadman, go to 0 before power goes away */
 	uint32_t tick_ns;
-	uint32_t high_ns, low_ns; /**< 0: not given, as short as the machine can */
+	uint32_t high_ns, low_ns; /**< 0: not given, the shortest of the machine */
 	uint32_t setup_ns, hold_ns;
 	uint64_t enable_ns;
 	double home_mm_s, home_mm;
@@ -231,13 +232,13 @@ struct incise_actuator {
 /** Changes when any struct of this header does. */
 #define INCISE_BACKEND_ABI 4
 
-/** What rig.conf asks a backend for. */
+/** Settings of rig.conf for a backend. */
 struct incise_backend_request {
-	const char *arguments;	    /**< what follows "NAME:" */
+	const char *arguments;	    /**< behind "NAME:" */
 	const char *where;	    /**< "FILE:LINE: stepper"; messages begin with it */
 	struct incise_clock *clock; /**< real; lives as long as the device */
-	bool watch; /**< only look: the device must not be moved, nor its owner be hurt */
-	/* What rig.conf has for its kind, or defaults; to be copied. */
+	bool watch; /**< only watch: do not move the device, nor disturb its owner */
+	/* Settings for its kind, or defaults; to be copied. */
 	const struct incise_actuator *actuator; /**< of a stepper */
 	const struct incise_tracker_setup *tracker;
 	const struct incise_force_setup *force;
@@ -259,22 +260,23 @@ struct incise_backend {
 	const char *kind; /**< "tracker", "force", "camera", "stepper", … */
 	const char *name; /**< letters a to z, digits, underscores; below 32 */
 	/**
-	 * Open a device. Whatever was powered when it is closed must be brought to rest.
+	 * Open a device. Its close() must bring a powered device to rest.
 	 *
-	 * @return the struct of the kind, such as struct incise_stepper; NULL with errno,
-	 *         and the line in @err.
+	 * @return the struct of the kind, for example struct incise_stepper; NULL with
+	 * errno
+	 *         and a message in @err.
 	 */
 	void *(*open)(const struct incise_backend_request *request,
 		      struct incise_error *err);
 	/**
-	 * Look for devices, as incise_scan() says. NULL: it cannot look.
-	 * @arguments of the device's string, as far as it goes: "can0"
+	 * Search for devices as incise_scan(). NULL: it cannot search.
+	 * @arguments of the device's string, possibly incomplete: "can0"
 	 */
 	int (*scan)(const char *arguments, incise_scan_found *found, void *context,
 		    struct incise_error *err);
 };
 
-/** What a module exports, and nothing else of its own. */
+/** The only symbol that a module exports. */
 INCISE_API extern const struct incise_backend incise_backend;
 
 INCISE_END_DECLS

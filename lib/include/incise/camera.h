@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Pictures of the scalpel over the tissue.
+ * Frames of the scalpel over the tissue.
  */
 #ifndef INCISE_CAMERA_H
 #define INCISE_CAMERA_H
@@ -12,18 +12,18 @@
 
 INCISE_BEGIN_DECLS
 
-/** How a picture's bytes are pixels. */
+/** Pixel formats. */
 enum incise_pixels {
 	INCISE_PIXELS_RGB,  /**< 3 bytes a pixel, red first */
 	INCISE_PIXELS_GREY, /**< 1 byte a pixel */
 	INCISE_PIXELS_YUYV, /**< 4 bytes for two pixels: Y0 U Y1 V, full resolution in Y */
-	INCISE_PIXELS_MJPEG, /**< a JPEG picture; stride is 0 */
+	INCISE_PIXELS_MJPEG, /**< a JPEG; stride is 0 */
 };
 
-/** One picture; its pixels belong to the camera until the next read that gives one. */
+/** One frame; its pixels are valid until the next read that returns one. */
 struct incise_camera_frame {
 	int64_t t_ns; /**< middle of the exposure */
-	uint64_t seq; /**< counts from 0; a gap is a lost picture */
+	uint64_t seq; /**< counts from 0; a gap is a lost frame */
 	int width, height;
 	int stride; /**< bytes from row to row, top row first */
 	enum incise_pixels pixels;
@@ -31,63 +31,63 @@ struct incise_camera_frame {
 	size_t size; /**< bytes of data */
 };
 
-/** What a camera says of itself. */
+/** Properties of a camera. */
 struct incise_camera_info {
 	char name[64];
 	double rate_hz;
 	int width, height;
 	enum incise_pixels pixels;
-	int64_t exposure_ns; /**< 0: not known; then t_ns is what the device stamped */
-	uint64_t damaged; /**< pictures that came with an error or too short; lost too */
+	int64_t exposure_ns; /**< 0: not known; then t_ns is the timestamp of the device */
+	uint64_t
+		damaged; /**< frames with an error, or too short; they count as lost too */
 };
 
-/** What a real camera is set to; the group `camera_setup` of rig.conf. 0: as it is. */
+/** Settings of a real camera; the group `camera_setup` of rig.conf. 0: not changed. */
 struct incise_camera_setup {
 	int width, height;
 	double rate_hz;
 	enum incise_pixels
-		pixels; /**< YUYV has no smear of colour at an edge; the default */
+		pixels; /**< default YUYV, which does not smear colour at an edge */
 	double exposure_ms;
-	double gain; /**< the driver's units */
+	double gain; /**< units of the driver */
 	double white_balance_K;
-	double focus; /**< the driver's units */
+	double focus; /**< units of the driver */
 };
 
 struct incise_camera;
 
 /**
- * Take the oldest picture that waits, without waiting for one. Up to 24 wait for a reader that
- * is held up; fewer where the driver of a camera has fewer than 32 buffers: three quarters of
- * them, and all but 3 at most. Where there is no more room the oldest is lost, and counted.
+ * Take the oldest frame, without waiting. Up to 24 are queued for a slow reader; fewer
+ * where the driver of a camera has fewer than 32 buffers: three quarters of them, and all
+ * but 3 at most. When the queue is full, the oldest frame is lost, and counted.
  *
- * @return 1 with a picture, 0 with none; -EIO, -ENODEV (unplugged): then
- *         incise_camera_cause() says why, and no picture will come any more.
+ * @return 1 with a frame, 0 without; -EIO, -ENODEV (unplugged): no frame will come any more,
+ *         and incise_camera_cause() gives the cause.
  */
 INCISE_API int incise_camera_read(struct incise_camera *camera,
 				  struct incise_camera_frame *frame);
 
-/** What it says of itself. */
+/** Properties of the camera. */
 INCISE_API void incise_camera_info(const struct incise_camera *camera,
 				   struct incise_camera_info *info);
 
 /**
- * Take all that wait, and keep the newest: for who looks, and does not record. Those before
- * it do not count as lost.
+ * Take all queued frames and return the newest, to show and not to record. The others do
+ * not count as lost.
  *
- * @return as incise_camera_read(); -EIO, -ENODEV only where no picture waited
+ * @return as incise_camera_read(); -EIO, -ENODEV only where no frame was queued
  */
 INCISE_API int incise_camera_newest(struct incise_camera *camera,
 				    struct incise_camera_frame *frame);
 
-/** Pictures lost so far. */
+/** Frames lost so far. */
 INCISE_API uint64_t incise_camera_lost(const struct incise_camera *camera);
 
 /**
- * Why read() gives an error, in one line that says what to do: what was unplugged, which
- * control has changed from what it was locked at.
+ * The cause of an error of read(), in one line with what to do.
  *
- * @param text always a string; empty as long as there is no error, or nothing is known
- * @return length of the line, as snprintf(3). For people: not real-time safe.
+ * @param text empty without an error, or without a known cause
+ * @return length of the line, as snprintf(3). Not real-time safe.
  */
 INCISE_API int incise_camera_cause(struct incise_camera *camera, char *text, size_t size);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * The force channel: raw codes of an A/D converter behind the bridge amplifier.
- * Conversion to newtons is the calibration's, see incise/calibration.h.
+ * incise/calibration.h converts them to newtons.
  */
 #ifndef INCISE_FORCE_H
 #define INCISE_FORCE_H
@@ -20,18 +20,18 @@ struct incise_force_sample {
 	int32_t code; /**< raw; 0 … 2^bits - 1 */
 };
 
-/** What a force channel says of itself. */
+/** Properties of a force channel. */
 struct incise_force_info {
 	char name[64];
 	double rate_hz;	     /**< nominal */
 	int bits;	     /**< resolution */
 	double full_scale_V; /**< 2^bits codes span this voltage */
-	double offset_V;     /**< code 0 stands for this voltage; 0 of a unipolar range */
+	double offset_V;     /**< voltage of code 0; 0 of a unipolar range */
 	uint64_t clipped;    /**< samples at either end of the range so far */
-	uint64_t overflows;  /**< times that the device or the kernel had no room */
+	uint64_t overflows;  /**< overflows of the device or the kernel so far */
 };
 
-/** What a real force channel is set to; the group `force_setup` of rig.conf. */
+/** Settings of a real force channel; the group `force_setup` of rig.conf. */
 struct incise_force_setup {
 	double rate_hz; /**< 1 … 100000; default 10000 */
 	int channel;	/**< 0 …; default 0 */
@@ -46,24 +46,24 @@ struct incise_force;
 /**
  * Take samples that have arrived, without waiting.
  *
- * @param samples room for @n samples, oldest first
+ * @param samples array of @n samples, oldest first
  * @return how many were taken, 0 … n; -EIO, -ENODEV (unplugged).
  */
 INCISE_API int incise_force_read(struct incise_force *force,
 				 struct incise_force_sample *samples, int n);
 
-/** What it says of itself, with the counts of now. */
+/** Properties and current counts of the channel. */
 INCISE_API void incise_force_info(const struct incise_force *force,
 				  struct incise_force_info *info);
 
-/** Samples lost so far, in the device or for want of room. */
+/** Samples lost so far, in the device or in full buffers. */
 INCISE_API uint64_t incise_force_lost(const struct incise_force *force);
 
 /**
- * Why read() gives an error, in one line that says what to do.
+ * The cause of an error of read(), in one line with what to do.
  *
- * @param text always a string; empty as long as there is no error, or nothing is known
- * @return length of the line, as snprintf(3). For people: not real-time safe.
+ * @param text empty without an error, or without a known cause
+ * @return length of the line, as snprintf(3). Not real-time safe.
  */
 INCISE_API int incise_force_cause(struct incise_force *force, char *text, size_t size);
 

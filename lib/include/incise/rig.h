@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A rig: the devices that stand on one table, with their common clock, as rig.conf names
- * them. Each device is a string, `BACKEND:ARGUMENTS`; `sim:` is the virtual rig. A backend
- * that is not built in is a module, loaded when it is named (incise/backend.h).
+ * A rig: the devices of rig.conf with their common clock. Each device is a string,
+ * `BACKEND:ARGUMENTS`; `sim:` is the virtual rig. A backend that is not built in is a
+ * module, loaded when it is named (incise/backend.h).
  *
  *     clock   = "real";          # or "simulated"
  *     tracker = "sim:";
@@ -35,9 +35,9 @@ enum incise_rig_device {
 	INCISE_RIG_FORCE = 2,
 	INCISE_RIG_CAMERA = 4,
 	INCISE_RIG_STEPPER = 8,
-	/** With STEPPER: only look at it, beside the program that drives it. */
+	/** With STEPPER: only watch it, while another program drives it. */
 	INCISE_RIG_WATCH = 16,
-	/** With CAMERA: only where a rig.conf names one; a "sim:KEY=VALUE,…" names none. */
+	/** With CAMERA: only if a rig.conf names one; a "sim:KEY=VALUE,…" names none. */
 	INCISE_RIG_IF_NAMED = 32,
 };
 
@@ -46,16 +46,15 @@ enum incise_rig_device {
  *
  * @param spec    path of a rig.conf, or "sim:KEY=VALUE,…" for a virtual rig with the
  *                scalar keys of the `sim` group and `clock`; "sim:" for its defaults
- * @param devices incise_rig_device bits: the only ones that are opened
+ * @param devices incise_rig_device bits to open
  * @return rig, to be closed with incise_rig_close(); NULL with errno of fopen(3), EINVAL
- *         (syntax, unknown key, value out of range: file and line are named), ENODEV (a
- *         device that the file does not name, or a backend that does not exist), ENOEXEC
- *         (a module that is broken), ENOMEM; of a real device also ENOENT, EACCES, EBUSY
- *         (another program drives it), ERANGE (this machine cannot make its steps so
- *         fast; it has no such range or value), EOPNOTSUPP (it cannot be watched, or has
- *         not what is set of it), ETIMEDOUT (nobody answers), EPROTO (its driver says what
- *         cannot be), EIO (it does not take, or keep, a setting), ENOSPC (no room on its
- *         bus).
+ *         (syntax, unknown key, value out of range; the message has file and line), ENODEV
+ *         (a device that the file does not name, or an unknown backend), ENOEXEC (a broken
+ *         module), ENOMEM; of a real device also ENOENT, EACCES, EBUSY (another program
+ *         drives it), ERANGE (this machine is too slow for its steps; no such range or
+ *         value), EOPNOTSUPP (it cannot be watched, or lacks a setting), ETIMEDOUT (no
+ *         answer), EPROTO (impossible answers of its driver), EIO (it does not accept or
+ *         keep a setting), ENOSPC (its bus has no bandwidth left).
  */
 INCISE_API struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
 					      struct incise_error *err);
@@ -63,13 +62,13 @@ INCISE_API struct incise_rig *incise_rig_open(const char *spec, unsigned int dev
 /** Close its devices, the modules behind them and its clock. NULL is accepted. */
 INCISE_API void incise_rig_close(struct incise_rig *rig);
 
-/** What was given as @spec. */
+/** The @spec it was opened with. */
 INCISE_API const char *incise_rig_spec(const struct incise_rig *rig);
 
 /** The rig's clock; owned by it. */
 INCISE_API struct incise_clock *incise_rig_clock(struct incise_rig *rig);
 
-/** A device that was opened, else NULL; owned by the rig. */
+/** The device if it was opened, else NULL; owned by the rig. */
 INCISE_API struct incise_tracker *incise_rig_tracker(struct incise_rig *rig);
 /** @see incise_rig_tracker() */
 INCISE_API struct incise_force *incise_rig_force(struct incise_rig *rig);
@@ -78,7 +77,7 @@ INCISE_API struct incise_camera *incise_rig_camera(struct incise_rig *rig);
 /** @see incise_rig_tracker() */
 INCISE_API struct incise_stepper *incise_rig_stepper(struct incise_rig *rig);
 
-/** The virtual rig behind the `sim:` devices, or NULL when there is none. */
+/** The virtual rig behind the `sim:` devices, or NULL. */
 INCISE_API struct incise_sim *incise_rig_sim(struct incise_rig *rig);
 
 /** The tissue's surface: a point on it and the outward unit normal. */
@@ -86,12 +85,12 @@ INCISE_API void incise_rig_surface(const struct incise_rig *rig, double point_mm
 				   double normal[3]);
 
 /**
- * What finds the scalpel in the camera's pictures, for incise_vision_new(): rig.conf's group
- * `vision`, whose depth_mm_px is 0, as calibration.conf has that: fill it in where full_px is
- * not 0. Without the group, of a virtual camera what fits its pictures, with their scale.
- * Whether the camera was opened does not matter, and nothing of vision is loaded.
+ * Settings for incise_vision_new(): the group `vision` of rig.conf, with depth_mm_px 0,
+ * to be filled in from calibration.conf where full_px is not 0; without the group, and
+ * for a virtual camera, settings for its frames, with their scale. The camera need not be
+ * open, and no module is loaded.
  *
- * @return 0; -ENOENT (no such group, and no virtual camera): *setup is as it was
+ * @return 0; -ENOENT (no such group, and no virtual camera): *setup is unchanged
  */
 INCISE_API int incise_rig_vision(const struct incise_rig *rig,
 				 struct incise_vision_setup *setup);

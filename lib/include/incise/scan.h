@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Which devices there are behind a backend, for who writes a rig.conf: "can:can0" lists the
- * drives on that bus. Nothing that is found is changed, moved or set up.
+ * Search for devices behind a backend, to write a rig.conf: "can:can0" lists the drives
+ * on that bus. Nothing is changed, moved or set up.
  */
 #ifndef INCISE_SCAN_H
 #define INCISE_SCAN_H
@@ -12,10 +12,10 @@
 
 INCISE_BEGIN_DECLS
 
-/** Properties that a device has at most. */
+/** Most properties of a device. */
 #define INCISE_SCAN_PROPERTIES 24
 
-/** Something known of a device. */
+/** A property of a device. */
 struct incise_scan_property {
 	const char *key; /**< "vendor_id": for JSON, lower snake case, unit as suffix */
 	char text[100];	 /**< for people, and for JSON a string */
@@ -23,16 +23,16 @@ struct incise_scan_property {
 
 /** A device. */
 struct incise_scan_device {
-	char device[320]; /**< what rig.conf names it by, such as "can:can0:0x10" */
-	char what[240];	  /**< a line: what it is, and how it is */
-	bool usable; /**< rig.conf may name it; false: it is there, but of no use here */
+	char device[320]; /**< its name in rig.conf, for example "can:can0:0x10" */
+	char what[240];	  /**< a line: kind of device and its state */
+	bool usable;	  /**< rig.conf may name it */
 	int n;
 	struct incise_scan_property property[INCISE_SCAN_PROPERTIES];
-	char kind[16]; /**< "stepper" …; the library's to fill in */
+	char kind[16]; /**< "stepper" …; set by the library */
 };
 
 /**
- * Called for each device that is found. @device lives until it returns.
+ * Called for each device that is found. @device is valid until it returns.
  * @return 0; another value ends the scan, which returns it
  */
 typedef int incise_scan_found(void *context, const struct incise_scan_device *device);
@@ -40,27 +40,27 @@ typedef int incise_scan_found(void *context, const struct incise_scan_device *de
 /**
  * Look for devices. Blocks, for some seconds at most.
  *
- * @param kind "stepper", "tracker", "force" or "camera"; NULL: whichever has that backend
+ * @param kind "stepper", "tracker", "force" or "camera"; NULL: any that has that backend
  * @param spec "BACKEND:ARGUMENTS", such as "can:can0"
  * @return 0, also where none was found; what @found returned; -EINVAL (@spec),
- *         -ENODEV (no such backend, or bus), -EOPNOTSUPP (the backend cannot look),
+ *         -ENODEV (no such backend, or bus), -EOPNOTSUPP (the backend cannot search),
  *         -EACCES, -EBUSY, -ENETDOWN, -EIO.
  */
 INCISE_API int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 			   void *context, struct incise_error *err);
 
 /**
- * Look for all that is attached: each backend of each kind that can look without being told
- * where. One that fails is told as a device that is not usable, whose line says why.
+ * Search all backends that need no arguments for it. One that fails is reported as a
+ * device that is not usable, with the reason in its line.
  *
  * @return 0; what @found returned; -ENOMEM
  */
 INCISE_API int incise_scan_all(incise_scan_found *found, void *context);
 
 /**
- * For backends: add a property to @device, its text as printf(3). One too many is left out.
+ * For backends: add a property to @device, its text as printf(3), if there is space.
  *
- * @param key is kept as it is
+ * @param key must live as long as @device
  */
 INCISE_API void incise_scan_tell(struct incise_scan_device *device, const char *key,
 				 const char *format, ...)

@@ -19,35 +19,35 @@ struct incise_tracker_sample {
 	uint64_t seq; /**< counts from 0; a gap is a lost record */
 	double position_mm[3]; /**< tip of the blade, in the tracker's frame */
 	double quaternion[4];  /**< unit, w first; rotates the scalpel's frame into it */
-	char status;	       /**< the device's error character, ' ' when all is well */
-	uint8_t station;       /**< 1 …: which sensor; the virtual rig's is 1 */
-	bool button;	       /**< the stylus's is pressed; false where there is none */
-	bool begins; /**< it was away before this record: periods have a new phase from here */
+	char status;	       /**< the device's error character; ' ': none */
+	uint8_t station; /**< number of the sensor, from 1; the virtual rig's is 1 */
+	bool button;	 /**< of the stylus, pressed; false where there is none */
+	bool restarted; /**< first record after an interruption: periods have a new phase */
 };
 
 /** When a tracker measures. */
 enum incise_tracker_sync {
 	INCISE_TRACKER_INTERNAL, /**< by its own clock */
 	INCISE_TRACKER_EXTERNAL, /**< by pulses at its sync input */
-	INCISE_TRACKER_VIDEO,	 /**< by the video sync that it hears */
+	INCISE_TRACKER_VIDEO,	 /**< by the video sync that it receives */
 };
 
-/** What a real tracker is set to; the group `tracker_setup` of rig.conf. */
+/** Settings of a real tracker; the group `tracker_setup` of rig.conf. */
 struct incise_tracker_setup {
 	int n_stations;
 	uint8_t stations[4];  /**< 1 … 4, ascending; default {1} */
-	double hemisphere[3]; /**< unit vector to where the sensor is; default +x */
+	double hemisphere[3]; /**< unit vector towards the sensor; default +x */
 	enum incise_tracker_sync sync;
 	double tip_mm[3]; /**< of the blade, in the sensor's frame; default 0 */
 };
 
-/** What a tracker says of itself. */
+/** Properties of a tracker. */
 struct incise_tracker_info {
 	char name[64];
 	double rate_hz;	    /**< nominal */
 	int64_t latency_ns; /**< nominal, acquisition to arrival */
 	int stations;	    /**< sensors that send records; seq counts all of them */
-	int64_t grain_ns;   /**< arrivals come on such a grid: 1000000 for USB; 0: none */
+	int64_t grain_ns;   /**< grid of arrival times: 1000000 for USB; 0: none */
 };
 
 struct incise_tracker;
@@ -55,27 +55,27 @@ struct incise_tracker;
 /**
  * Take records that have arrived, without waiting.
  *
- * @param samples room for @n records, oldest first
- * @return how many were taken, 0 … n; -EIO, -ENODEV (unplugged; of a tracker that is waited
- *         for, see rig.conf(5), only once it is given up: until then 0). Real-time safe for
- *         the virtual rig and for trackers of Polhemus; another backend says so itself.
+ * @param samples array of @n records, oldest first
+ * @return how many were taken, 0 … n; -EIO, -ENODEV (unplugged; a tracker that may
+ *         reconnect, see rig.conf(5), returns 0 until it is given up). Real-time safe for the
+ *         virtual rig and for trackers of Polhemus; other backends document it.
  */
 INCISE_API int incise_tracker_read(struct incise_tracker *tracker,
 				   struct incise_tracker_sample *samples,
 				   int n) INCISE_REALTIME;
 
-/** What it says of itself. */
+/** Properties of the tracker. */
 INCISE_API void incise_tracker_info(const struct incise_tracker *tracker,
 				    struct incise_tracker_info *info);
 
-/** Records lost so far, in the device or for want of room. */
+/** Records lost so far, in the device or in full buffers. */
 INCISE_API uint64_t incise_tracker_lost(const struct incise_tracker *tracker);
 
 /**
- * Why read() gives an error, in one line that says what to do.
+ * The cause of an error of read(), in one line with what to do.
  *
- * @param text always a string; empty as long as there is no error, or nothing is known
- * @return length of the line, as snprintf(3). For people: not real-time safe.
+ * @param text empty without an error, or without a known cause
+ * @return length of the line, as snprintf(3). Not real-time safe.
  */
 INCISE_API int incise_tracker_cause(struct incise_tracker *tracker, char *text,
 				    size_t size);

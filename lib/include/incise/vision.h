@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Depth of the blade from a picture. It is done by a module on OpenCV, vision_opencv.so
- * (incise/backend.h), which the first call of incise_vision_new() or incise_vision_learn()
- * maps into the process, to stay there; who calls neither never maps it. The black scalpel
- * is found, its axis fitted, and along the axis its upper end and the place where the tissue
- * begins. As in paper 1, handle and
- * sheath are black all the way into the tissue, and both ends of what is seen of them are
- * in the picture: 47.5 mm over 400 pixels there.
+ * Depth of the blade in a frame, by a module on OpenCV, vision_opencv.so
+ * (incise/backend.h), which the first call of incise_vision_new() or
+ * incise_vision_learn() maps into the process and which stays there. It finds the black
+ * scalpel, fits its axis, and finds along the axis its upper end and the edge of the
+ * tissue. As in paper 1, handle and sheath are black down to the tissue, and both ends of
+ * the visible part are in the frame: 47.5 mm over 400 pixels.
  *
- *         ┌──┐  ┐            length_px: from the upper end of what is black to the edge
- *         │██│  │            of the tissue, along the axis, both at half of the step in
+ *         ┌──┐  ┐            length_px: from the upper end of the black part to the edge of
+ *         │██│  │            the tissue, along the axis, both at half of the step in
  *         │██│  │ length_px  brightness
  *         │██│  │
  *   ──────┤██├──┘──── tissue depth_mm = (full_px - length_px) · depth_mm_px
@@ -17,18 +16,16 @@
  * A blade of bright steel below the black is not part of length_px: paint it.
  * Pixel (0, 0) covers 0 … 1 in both directions, top row first.
  *
- * What no picture tells: a hand or glove over the upper end is taken for that end; tissue,
- * blood or a shadow of the very colour of the handle, in grey of its very brightness, that
- * goes on with it is taken for more of it; so are less than about 10 pixels of any colour
- * that is within the thresholds, next to the tissue. A depth that leaps from picture to
- * picture is worth no trust whatever its quality. Light that leaves the tissue within the
- * handle's thresholds, a dark glove at the handle, and anything that cuts the handle in two
- * give "not found".
+ * Errors that a frame does not show: a hand or glove over the upper end is taken for that
+ * end; adjacent tissue, blood or shadow of the colour of the handle (in a grey frame, of
+ * its brightness) is taken for a part of it, and so are up to about 10 pixels within the
+ * thresholds next to the tissue. Do not trust a depth that jumps from frame to frame,
+ * whatever its quality. Light in which the tissue is within the thresholds, a dark glove
+ * at the handle, and anything that cuts the handle in two give "not found".
  *
- * Not real-time safe. One thread at a time per object. No exception of C++ comes out.
- * OpenCV is told to use no threads of its own, in the whole process.
- * Loading the module, with some 25 libraries, takes milliseconds: who must not wait makes
- * the object before.
+ * Not real-time safe. One thread at a time per object. No C++ exception leaves it. OpenCV
+ * uses no threads of its own, in the whole process. Loading the module, with some 25
+ * libraries, takes milliseconds: create the object before the real-time part.
  */
 #ifndef INCISE_VISION_H
 #define INCISE_VISION_H
@@ -47,9 +44,9 @@ struct incise_vision_box {
 };
 
 /**
- * What the handle looks like, and where to look; the group `vision` of rig.conf. A pixel
- * belongs to it when hue, saturation and value all are within; of a grey picture only the
- * value counts.
+ * Colour of the handle, and where to search; the group `vision` of rig.conf. A pixel
+ * belongs to it when hue, saturation and value are within the limits; in a grey frame
+ * only the value counts.
  */
 struct incise_vision_setup {
 	/* OpenCV's scale: hue 0 … 179 (low > high wraps around red), saturation and
@@ -57,38 +54,38 @@ struct incise_vision_setup {
 	int hue[2], saturation[2], value[2];
 	double full_px;	    /**< exposed length at depth 0; 0: depth stays NaN */
 	double depth_mm_px; /**< calibration.conf; above 0 where full_px is */
-	struct incise_vision_box roi; /**< where it is looked for first; width 0: all */
+	struct incise_vision_box roi; /**< searched first; width 0: all */
 };
 
-/** What was seen in a picture. */
+/** Measurement of one frame. */
 struct incise_vision_result {
-	int64_t t_ns;	  /**< of the picture */
+	int64_t t_ns;	  /**< of the frame */
 	bool found;	  /**< else the numbers are NaN, the quality 0 */
 	double length_px; /**< exposed, sub-pixel */
-	/** standard deviation of length_px, from what the fits leave; 0.6 to 2 times that of
-	 * many pictures, by the tissue's texture */
+	/** standard deviation of length_px, from the residuals of the fits; 0.6 to 2 times that
+	 * over many frames, depending on the texture of the tissue */
 	double sd_px;
 	double depth_mm;   /**< a little below 0 is noise; NaN without full_px */
 	double edge_px[2]; /**< where the axis meets the tissue: x, y */
 	double axis[2];	   /**< unit, down the handle */
 	/**
-	 * 0 … 1, the least of: step at the tissue over 10 sd of what is left of the fit
-	 * there; 1 - rms of the handle's sides from straight lines / 3 px; share of the
-	 * pixels at both ends that the fits kept, from 1/2 (0) to 1 (1); 1 - what the fits
-	 * leave beside noise / 10 % of the step, as a shelf of blood does; 1/4 where the
-	 * colour of what is taken for the handle changes at once: shadow, blood or a mirror
-	 * image may go on with it. Below 0.2 nothing is found.
+	 * 0 … 1, the least of: step at the tissue over 10 sd of the residuals there; 1 -
+	 * rms of the handle's sides from straight lines / 3 px; share of the pixels at
+	 * both ends that the fits kept, from 1/2 (0) to 1 (1); 1 - residuals in excess of
+	 * noise / 10 % of the step, for example of a shelf of blood; 1/4 where the colour
+	 * of the handle changes at once, for example by a shadow, blood or a mirror
+	 * image. Below 0.2 found is false.
 	 */
 	double quality;
-	const char *why; /**< not found: why, in words; static */
+	const char *why; /**< reason for not found, in words; static */
 };
 
 struct incise_vision;
 
 /**
  * @return to be freed; NULL with errno EINVAL (a value out of range), ENOMEM; ENOENT (the
- *         module is not installed: the message says where it was looked for), ENOEXEC (it
- *         is broken, or lacks a library)
+ *         module is not installed; the message names the folder), ENOEXEC (it is broken, or
+ *         lacks a library)
  */
 INCISE_API struct incise_vision *incise_vision_new(
 	const struct incise_vision_setup *setup, struct incise_error *err);
@@ -97,28 +94,28 @@ INCISE_API struct incise_vision *incise_vision_new(
 INCISE_API void incise_vision_free(struct incise_vision *vision);
 
 /**
- * Look at a picture. The region of interest follows what was found; where nothing is found
- * in it the whole picture is searched. The handle must be within 60° of upright, longer
- * than 1.5 times its width, and off the picture's border.
+ * Measure a frame. The region of interest follows the handle; where it is not found
+ * there, the whole frame is searched. The handle must be within 60° of upright, longer
+ * than 1.5 times its width, and off the border.
  *
- * @return 0, also where no handle is to be seen; -EINVAL (sizes that do not fit: below 16
+ * @return 0, also without a handle; -EINVAL (invalid sizes: below 16
  *         or above 8192 pixels, a stride or size too small, YUYV of an odd width, a JPEG of
  *         other sizes than the frame says), -EBADMSG (a JPEG that cannot be decoded, as far
- *         down as the region goes), -ENOMEM, -EIO (OpenCV failed). *result says found =
- *         false then.
+ *         down as the region goes), -ENOMEM, -EIO (OpenCV failed); on errors
+ *         result->found is false.
  */
 INCISE_API int incise_vision_measure(struct incise_vision *vision,
 				     const struct incise_camera_frame *frame,
 				     struct incise_vision_result *result);
 
 /**
- * Learn the handle's thresholds from a box of pixels on it, or from a click, which is a box
- * of 1 × 1 and stands for 7 × 7 around it. Of what is black the value alone counts. Only
- * the thresholds of *setup are written.
+ * Learn the handle's thresholds from a box of pixels on it, or from a click, a box of 1 ×
+ * 1, which stands for 7 × 7 around it. For black, only the value is learnt. Only the
+ * thresholds of *setup are written.
  *
- * @return 0; -EINVAL (the box is not within the picture), -ERANGE (what is in the box is not
- *         of one colour: the message says what it spans); as incise_vision_measure(), and
- *         -ENOENT, -ENOEXEC as incise_vision_new()
+ * @return 0; -EINVAL (the box is not within the frame), -ERANGE (the box has several colours;
+ *         the message gives their range); as incise_vision_measure(), and -ENOENT, -ENOEXEC
+ *         as incise_vision_new()
  */
 INCISE_API int incise_vision_learn(const struct incise_camera_frame *frame,
 				   const struct incise_vision_box *box,

@@ -524,7 +524,7 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 	int rc = 0;
 
 	/* One line through both parts would be wrong for either. */
-	if (sample->begins)
+	if (sample->restarted)
 		incise_timeline_replug(&stream->timeline);
 	if (take_number(stream, sample->seq, sample->t_ns, &row.t_ns, &why))
 		return incise_recorder_end_stream(rec, INCISE_LEDGER_TRACKER, why.text,
