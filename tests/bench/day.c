@@ -245,7 +245,7 @@ static void report(uint64_t due, const struct memory *late)
 	       text);
 }
 
-/* What others read of the loop meanwhile. */
+/* Read the state of the loop, as other programs do. */
 static void report_page(const char *path, uint64_t due)
 {
 	static struct incise_tick ticks[INCISE_STATE_TICKS];

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What it costs to write pictures: CPU of all threads per picture, the longest put(), bytes per
- * hour at 60 Hz. The pictures are the virtual camera's, in each format; MJPEG is 42 kB of
- * noise, which is what a VGA camera sends, and goes through as it is.
+ * Cost of writing frames: CPU of all threads per frame, the longest put(), bytes per hour at
+ * 60 Hz. The frames are those of the virtual camera, in each format; MJPEG is 42 kB of noise,
+ * the size that a VGA camera sends, and is written unchanged.
  *
  *     frames FOLDER [PICTURES [THREADS [SYNC_MS]]]
  */

@@ -26,7 +26,7 @@
 
 enum emulator_kind { EMULATOR_FASTRAK, EMULATOR_LIBERTY, EMULATOR_PATRIOT };
 
-/* What happens to records on their way. In parts of a million; of slots from … to. */
+/* Damage to records on their way, in parts of a million, in slots from … to. */
 struct emulator_damage {
 	uint64_t from, to;
 	unsigned int flip;   /* of bytes that become another one */
@@ -90,7 +90,7 @@ void emulator_advance(struct emulator *e, int64_t now_ns);
 /* When it will next send; INT64_MAX: never. */
 int64_t emulator_next_ns(const struct emulator *e);
 
-/* What waits, replies first. The two apart: records only, replies only. */
+/* Take bytes that wait, replies first; or only records, or only replies. */
 size_t emulator_take(struct emulator *e, void *bytes, size_t size);
 size_t emulator_take_replies(struct emulator *e, void *bytes, size_t size);
 size_t emulator_take_records(struct emulator *e, void *bytes, size_t size);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What the library gives held against what the emulator sent.
+ * Comparison of samples of the library with records that the emulator sent.
  */
 #ifndef INCISE_TEST_POLHEMUS_SENT_H
 #define INCISE_TEST_POLHEMUS_SENT_H

@@ -105,7 +105,7 @@ static int describe_all(int ep0)
 		       : -1;
 }
 
-/* What fails is an unplugged host: it is tried again. */
+/* A failure is an unplugged host: try again. */
 static void rest(void)
 {
 	nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);

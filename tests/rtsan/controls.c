@@ -16,7 +16,7 @@
 
 #define SINNED_AT 100 /* tick */
 
-/* What the sanitizer ends a program with. */
+/* Exit code of a program that the sanitizer ends. */
 #define CAUGHT 43
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;

@@ -33,7 +33,7 @@ struct daq_feed {
 	int stop; /* eventfd; readable: the thread is to end */
 };
 
-/* What rig.conf asks for, or what is usual. 0 or -EINVAL. */
+/* Settings of rig.conf, or defaults. 0 or -EINVAL. */
 int daq_feed_setup(const struct incise_backend_request *request,
 		   struct incise_force_setup *setup, struct incise_error *err);
 

@@ -273,7 +273,7 @@ static void *force_open(const struct incise_backend_request *request,
 
 #define KEY "sampling_frequency"
 
-/* How many channels can be sampled; the first one in @first. */
+/* Count the channels that can be sampled; *first is the first one. */
 static int voltages(const struct iio_device *device, struct iio_channel **first)
 {
 	unsigned int n = iio_device_get_channels_count(device);

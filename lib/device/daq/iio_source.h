@@ -71,7 +71,7 @@ int iio_source_start(struct iio_source *source, const char *folder, unsigned int
 /* The device may be gone. */
 void iio_source_stop(struct iio_source *source);
 
-/* How many scans were read, or -errno: -EAGAIN (none), -ENODEV. */
+/* Number of scans read, or -errno: -EAGAIN (none), -ENODEV. */
 int iio_source_read(struct iio_source *source);
 /* Of scan @i of those. */
 int32_t iio_source_code(const struct iio_source *source, int i);

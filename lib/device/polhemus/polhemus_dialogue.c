@@ -173,7 +173,7 @@ int polhemus_say(struct polhemus_dialogue *d, const char *command)
 	return rc ? gone(d, rc) : 0;
 }
 
-/* How many bytes were received, the last at *t_ns. */
+/* Number of bytes received, the last at *t_ns. */
 static ssize_t receive_at(struct polhemus_dialogue *d, int timeout_ms, int64_t *t_ns)
 {
 	ssize_t n;

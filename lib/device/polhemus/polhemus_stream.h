@@ -74,7 +74,7 @@ void polhemus_gaps_start(struct polhemus_gaps *gaps, int64_t t_ns);
 void polhemus_gaps_broken(struct polhemus_gaps *gaps);
 
 /*
- * How many records are certainly missing when none came since the last; never more than
+ * Records that are certainly missing when none came since the last; never more than
  * count as lost when one comes after polhemus_gaps_broken().
  */
 uint64_t polhemus_gaps_silent(const struct polhemus_gaps *gaps, int64_t t_ns);

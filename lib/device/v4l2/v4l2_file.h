@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* How a device identifies itself; the text is printable. */
+/* Identity of a device; the text is printable. */
 struct v4l2_identity {
 	char card[40], driver[24], bus[40];
 	uint32_t capabilities; /* of this very file */

@@ -299,7 +299,7 @@ static bool take_tail(struct v4l2_stream *s, unsigned long long tail)
 		&s->tail, &tail, tail + 1, memory_order_acq_rel, memory_order_relaxed);
 }
 
-/* How many may wait; the rest is for the reader, and for drivers that keep a few. */
+/* Buffers that may wait; the others are for the reader, and for drivers that keep a few. */
 static unsigned int capacity(const struct v4l2_stream *s)
 {
 	int others = s->n / 4;

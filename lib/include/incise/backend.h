@@ -85,7 +85,7 @@ struct incise_stepper_edge {
 	double position_mm; /**< at the last one */
 };
 
-/** How to find the machine's 0. */
+/** Parameters of homing. */
 struct incise_stepper_homing {
 	double speed_mm_s;    /**< of the approach; a tenth of it for the edge */
 	double home_mm;	      /**< position of the edge in the machine */

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What the compiler must refuse, else it proves nothing of the library: a function that is
- * said to be real-time safe, and takes memory two calls further, on a way that is never
- * gone.
+ * Code that the compiler must refuse, to show that its check works: a function declared
+ * real-time safe that allocates memory two calls further, on a path that is never taken.
  */
 #include <stdlib.h>
 #include <incise/clock.h>

@@ -86,7 +86,7 @@ static void is_set_up(void **state)
 	assert_int_equal(card.cancelled, 1);
 }
 
-/* What it takes is what is told; its buffer grows as far as it may. */
+/* The accepted rate is reported; the buffer grows up to its limit. */
 static void the_rest_of_a_card(void **state)
 {
 	struct incise_error err = {0};

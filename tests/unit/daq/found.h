@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What a scan finds, kept for a test to look at.
+ * Devices found by a scan, kept for a test.
  */
 #ifndef INCISE_TEST_DAQ_FOUND_H
 #define INCISE_TEST_DAQ_FOUND_H

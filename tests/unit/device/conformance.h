@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What every stepper must do, whatever stands behind it: a table of cases, each against
- * one that was just opened. Who runs them says how time goes on and how inputs are raised.
+ * Requirements of every stepper, with any backend: a table of cases, each for one that
+ * was just opened. The test that runs them advances time and raises inputs.
  *
  *   for (i = 0; conformance[i].name; i++) { open; conformance[i].run(&c); close; }
  */
@@ -19,7 +19,9 @@ struct conformance {
 	struct incise_stepper *stepper;
 	void *world;
 	void (*advance)(void *world, int64_t ns);
-	/* Make INCISE_STEPPER_ESTOP_ACTIVE, or _AT_MAX, active or not; NULL: it has none. */
+	/*
+	 * Make INCISE_STEPPER_ESTOP_ACTIVE, or _AT_MAX, active or not; NULL: it has none.
+	 */
 	void (*input)(void *world, unsigned int input, bool active);
 	bool always_powered; /* the virtual rig: no power, and faults end by themselves */
 	double slack_s;	     /* what this machine may be late by */
@@ -141,8 +143,9 @@ static inline void conform_keeps_its_limits(struct conformance *c)
 		s = conform_look(c);
 		dt = (double)(s.t_ns - last.t_ns) * 1e-9;
 		/*
-		 * A step is there or not, at both ends; what was late may be made good 1/7
-		 * faster; the status may be a tick, 2 ms at most, older than its position.
+		 * A step is there or not, at both ends; what was late may be made good
+		 * 1/7 faster; the status may be a tick, 2 ms at most, older than its
+		 * position.
 		 */
 		most = c->info.velocity_mm_s * 8 / 7 * (dt + 0.002);
 		CONFORM(c, fabs(s.position_mm - last.position_mm) <=

@@ -53,7 +53,7 @@ static void devices_share_one_world(void **state)
 	incise_rig_close(rig);
 }
 
-/* What a rig says of vision; -1 in value[1] where it says nothing. */
+/* The settings of vision of a rig; -1 in value[1] where it has none. */
 static struct incise_vision_setup vision_of(const char *spec)
 {
 	struct incise_vision_setup setup = {.value = {-1, -1}};

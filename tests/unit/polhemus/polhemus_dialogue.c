@@ -328,7 +328,7 @@ static void frames(void **state)
 	assert_int_equal(polhemus_ask_frame(&dialogue, "H\r", 'H', &frame), -ETIMEDOUT);
 }
 
-/* Who closes a tracker does not wait until it has answered all, or not. */
+/* close() does not wait for a dialogue to end. */
 static void given_up(void **state)
 {
 	static const _Atomic bool stop = true;

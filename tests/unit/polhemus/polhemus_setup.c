@@ -125,7 +125,7 @@ static void sync_from_outside(void **state)
 	}
 }
 
-/* What it forgets, one command each, is found and named. */
+/* A setting that the tracker ignores is detected and named, for each command. */
 static void what_is_not_taken(void **state)
 {
 	static const struct {

@@ -161,7 +161,7 @@ static void without_a_period(void **state)
 	assert_int_equal(gaps.lost, 5);
 }
 
-/* What was told to send, and did not, or not so that it was understood. */
+/* A tracker that was started sends nothing, or no valid record. */
 static void before_the_first(void **state)
 {
 	static const struct {
@@ -224,7 +224,7 @@ static void broken(void **state)
 	assert_int_equal(gaps.lost, 900 + 198);
 }
 
-/* What never comes again is missing as well: never more of it than counts if it does. */
+/* Records missing at the end count as well, never more than if the tracker returned. */
 static void silent(void **state)
 {
 	for (int n = 1; n <= 4; n++)

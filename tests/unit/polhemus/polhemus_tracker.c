@@ -96,7 +96,7 @@ static void through_the_door(void **state)
 	assert_int_equal(pty.emulator.eeprom_writes, 0);
 }
 
-/* What waits is taken, up to now. */
+/* Read all samples up to now. */
 static void read_all(struct incise_tracker *tracker, uint64_t *next)
 {
 	struct incise_tracker_sample sample;

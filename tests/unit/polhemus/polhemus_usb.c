@@ -334,7 +334,7 @@ enum { OUT = 0x02, IN = 0x82, INTERRUPT = 0x84 };
 static struct libusb_endpoint_descriptor endpoints[3];
 static struct libusb_interface_descriptor interfaces[1];
 static struct libusb_interface interface;
-/* What the device has to send, and what came. */
+/* Packets that the device has to send, and those sent. */
 static unsigned int to_send, sent;
 static struct polhemus_line *line;
 

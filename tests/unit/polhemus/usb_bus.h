@@ -131,7 +131,7 @@ int libusb_get_string_descriptor_ascii(libusb_device_handle *handle, uint8_t ind
 	return index == 3 ? n : LIBUSB_ERROR_PIPE;
 }
 
-/* What only an open device needs. */
+/* Functions for an open device. */
 
 int libusb_set_auto_detach_kernel_driver(libusb_device_handle *handle, int enable)
 {
