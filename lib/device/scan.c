@@ -73,7 +73,8 @@ static int find_any(struct incise_loaded *loaded, struct kind_found *of, const c
 			     : rc;
 }
 
-int incise_scan_all(incise_scan_found *found, void *context)
+/* Each backend of each kind that needs no arguments. */
+static int scan_all(incise_scan_found *found, void *context)
 {
 	char names[NAMES][32];
 	int rc = 0;
@@ -92,11 +93,14 @@ int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 		void *context, struct incise_error *err)
 {
 	struct incise_loaded loaded = {0};
-	size_t length = strcspn(spec, ":");
 	struct kind_found of = {kind, found, context, 0};
 	char name[32], where[80];
+	size_t length;
 	int rc = 0;
 
+	if (!spec)
+		return scan_all(found, context);
+	length = strcspn(spec, ":");
 	if (!spec[length] || length >= sizeof(name))
 		return incise_error_set(err, EINVAL,
 					"%.60s: expected BACKEND:ARGUMENTS such as "

@@ -394,14 +394,7 @@ int incise_stepper_clear(struct incise_stepper *stepper, struct incise_error *er
 }
 
 int incise_stepper_home(struct incise_stepper *stepper, const volatile int *stop,
-			struct incise_error *err)
-{
-	return incise_stepper_home_edge(stepper, stop, NULL, err);
-}
-
-int incise_stepper_home_edge(struct incise_stepper *stepper, const volatile int *stop,
-			     struct incise_stepper_edge_found *edge,
-			     struct incise_error *err)
+			struct incise_stepper_edge_found *edge, struct incise_error *err)
 {
 	const struct incise_stepper_ops *ops = stepper->ops;
 

@@ -238,7 +238,7 @@ void stepper_live_start(struct stepper_live *live)
 	stepper_drive_power(drive);
 	if (drive->info.can_home) {
 		cli_progress("home: Ctrl-C stops");
-		if (incise_stepper_home(drive->stepper, &cli_stop, &err))
+		if (incise_stepper_home(drive->stepper, &cli_stop, NULL, &err))
 			stepper_drive_fail(drive, "%s", err.text);
 		stepper_drive_look(drive);
 	}

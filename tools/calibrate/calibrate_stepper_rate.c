@@ -78,7 +78,7 @@ static void put_right(struct stepper_live *live, double lost_mm)
 	live->off_mm += lost_mm;
 	if (!drive->info.can_home)
 		return;
-	if (incise_stepper_home(drive->stepper, &cli_stop, &err))
+	if (incise_stepper_home(drive->stepper, &cli_stop, NULL, &err))
 		stepper_drive_fail(drive, "%s", err.text);
 	stepper_drive_look(drive);
 	live->off_mm = 0;

@@ -16,7 +16,7 @@ static int home_it(struct incise_stepper *stepper, struct incise_error *err)
 	int rc = incise_stepper_enable(stepper, err);
 
 	if (!rc)
-		rc = incise_stepper_home(stepper, &cli_stop, err);
+		rc = incise_stepper_home(stepper, &cli_stop, NULL, err);
 	return rc ? rc : incise_stepper_disable(stepper, err);
 }
 

@@ -152,7 +152,7 @@ void bus_report_show_attached(bool json)
 	int rc;
 
 	cli_progress("looking for devices");
-	rc = incise_scan_all(keep, &found);
+	rc = incise_scan(NULL, NULL, keep, &found, NULL);
 	cli_progress_end();
 	if (rc)
 		cli_fail("devices: %s", strerror(-rc));

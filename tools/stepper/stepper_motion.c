@@ -206,7 +206,7 @@ static void find_edge(struct edges *edges, const struct stepper_job *job,
 	struct incise_error err = {0};
 	long long before;
 
-	if (incise_stepper_home_edge(drive->stepper, &cli_stop, &edge, &err))
+	if (incise_stepper_home(drive->stepper, &cli_stop, &edge, &err))
 		stepper_drive_fail(drive, "%s", err.text);
 	stepper_drive_look(drive);
 	edges->after_mm = edge.after_mm;

@@ -41,21 +41,15 @@ typedef int incise_scan_found(void *context, const struct incise_scan_device *de
  * Look for devices. Blocks, for some seconds at most.
  *
  * @param kind "stepper", "tracker", "force" or "camera"; NULL: any that has that backend
- * @param spec "BACKEND:ARGUMENTS", such as "can:can0"
+ * @param spec "BACKEND:ARGUMENTS", for example "can:can0"; NULL: search all backends that need
+ *        no arguments; one that fails is reported as a device that is not usable, with the
+ *        reason in its line
  * @return 0, also where none was found; what @found returned; -EINVAL (@spec),
  *         -ENODEV (no such backend, or bus), -EOPNOTSUPP (the backend cannot search),
  *         -EACCES, -EBUSY, -ENETDOWN, -EIO.
  */
 INCISE_API int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 			   void *context, struct incise_error *err);
-
-/**
- * Search all backends that need no arguments for it. One that fails is reported as a
- * device that is not usable, with the reason in its line.
- *
- * @return 0; what @found returned; -ENOMEM
- */
-INCISE_API int incise_scan_all(incise_scan_found *found, void *context);
 
 /**
  * For backends: add a property to @device, its text as printf(3), if there is space.

@@ -153,37 +153,32 @@ INCISE_API int incise_stepper_clear(struct incise_stepper *stepper,
 				    struct incise_error *err);
 
 /**
- * Find the machine's 0: towards the home input (or the limit at 0 where there is no home),
- * back off, again slowly, then to `home_mm` of rig.conf. Must be powered. A drive that
- * homes by itself does it in its own way. Blocks, at most 60 s and a way through the travel
- * at `home_mm_s`; SIGINT stops it through @stop.
- *
- * @param stop looked at between polls; non-zero ends with -EINTR and the nut at rest. Or
- *             NULL.
- * @return 0, homed; -EOPNOTSUPP (neither input is wired), -EIO (a fault came up: the
- *         message names it), -ETIMEDOUT, -EINTR, -ENODEV.
- */
-INCISE_API int incise_stepper_home(struct incise_stepper *stepper,
-				   const volatile int *stop, struct incise_error *err);
-
-/**
- * Where homing found the edge of the input. Of a nut that was homed before, the difference
- * is what the count had lost since, or how well the edge repeats.
+ * Edge of the input found by homing. Of a nut that was homed before, the difference is
+ * the error of the count since then, or the repeatability of the edge.
  */
 struct incise_stepper_edge_found {
-	/** In the count that held before; NaN: a drive homed by itself and does not tell. */
+	/** In the count before homing; NaN: a drive homed by itself and does not report it. */
 	double before_mm;
-	double after_mm; /**< in that of the machine: `home_mm` of rig.conf */
+	double after_mm; /**< in the count of the machine: `home_mm` of rig.conf */
 };
 
 /**
- * The same, and tell where the edge was.
- * @param edge untouched on an error; may be NULL
+ * Find the machine's 0: move towards the home input (or the limit at 0 where there is
+ * none), back off, approach again slowly, then move to `home_mm` of rig.conf. Must be
+ * powered. A drive that homes by itself does so in its own way. Blocks, at most 60 s and
+ * the time for the travel at `home_mm_s`; SIGINT stops it through @stop.
+ *
+ * @param stop checked between polls; non-zero ends with -EINTR and the nut at rest. May
+ * be
+ *             NULL.
+ * @param edge unchanged on an error; may be NULL
+ * @return 0, homed; -EOPNOTSUPP (neither input is wired), -EIO (a fault, named in the
+ *         message), -ETIMEDOUT, -EINTR, -ENODEV.
  */
-INCISE_API int incise_stepper_home_edge(struct incise_stepper *stepper,
-					const volatile int *stop,
-					struct incise_stepper_edge_found *edge,
-					struct incise_error *err);
+INCISE_API int incise_stepper_home(struct incise_stepper *stepper,
+				   const volatile int *stop,
+				   struct incise_stepper_edge_found *edge,
+				   struct incise_error *err);
 
 /** What is fixed about it. */
 INCISE_API void incise_stepper_info(const struct incise_stepper *stepper,

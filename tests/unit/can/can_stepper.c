@@ -565,7 +565,7 @@ static void it_homes_by_itself(void **state)
 		can_rig_open_or_fail(&rig);
 		assert_false(can_rig_look(&rig).homed);
 		can_rig_enable_or_fail(&rig);
-		if (incise_stepper_home_edge(rig.stepper, NULL, &edge, &err))
+		if (incise_stepper_home(rig.stepper, NULL, &edge, &err))
 			fail_msg("%s", err.text);
 		s = can_rig_look(&rig);
 		assert_true(s.homed && s.state == INCISE_STEPPER_READY && !s.faults);
@@ -597,11 +597,11 @@ static void homing_can_fail_and_be_stopped(void **state)
 
 	can_rig_init(&rig);
 	can_rig_open_or_fail(&rig);
-	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), -EIO);
+	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, &err), -EIO);
 	assert_non_null(strstr(err.text, "not powered"));
 	can_rig_enable_or_fail(&rig);
 	rig.drive.homing_fails = true;
-	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), -EIO);
+	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, &err), -EIO);
 	assert_non_null(strstr(err.text, "its homing failed"));
 	assert_false(drive_powered(&rig.drive));
 	assert_false(can_rig_look(&rig).homed);
@@ -610,19 +610,19 @@ static void homing_can_fail_and_be_stopped(void **state)
 	assert_int_equal(incise_stepper_clear(rig.stepper, &err), 0);
 	can_rig_enable_or_fail(&rig);
 	/* An earlier failure does not count again, here or in the next program. */
-	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), 0);
+	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, &err), 0);
 	assert_true(can_rig_look(&rig).homed);
 	rig.drive.homing_fails = true;
-	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), -EIO);
+	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, &err), -EIO);
 	assert_false(can_rig_look(&rig).homed);
 	can_rig_close(&rig);
 	rig.drive.homing_fails = false;
 	can_rig_open_or_fail(&rig);
 	assert_false(can_rig_look(&rig).homed);
 	can_rig_enable_or_fail(&rig);
-	assert_int_equal(incise_stepper_home(rig.stepper, NULL, &err), 0);
+	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, &err), 0);
 	stop = 1;
-	assert_int_equal(incise_stepper_home(rig.stepper, &stop, &err), -EINTR);
+	assert_int_equal(incise_stepper_home(rig.stepper, &stop, NULL, &err), -EINTR);
 	assert_false(drive_powered(&rig.drive));
 	assert_int_equal(can_rig_look(&rig).faults, 0);
 	can_rig_enable_or_fail(&rig);

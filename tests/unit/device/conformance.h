@@ -315,7 +315,7 @@ static inline void conform_home(struct conformance *c)
 	int rc;
 
 	conform_enable(c);
-	rc = incise_stepper_home(c->stepper, NULL, &err);
+	rc = incise_stepper_home(c->stepper, NULL, NULL, &err);
 	if (!c->info.can_home) {
 		CONFORM(c, rc == -EOPNOTSUPP && err.text[0]);
 		return;

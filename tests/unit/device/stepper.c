@@ -116,7 +116,8 @@ static void what_a_backend_has_not_is_said(void **state)
 		assert_int_equal(i == 0	  ? incise_stepper_enable(&stepper, &err)
 				 : i == 1 ? incise_stepper_disable(&stepper, &err)
 				 : i == 2 ? incise_stepper_clear(&stepper, &err)
-					  : incise_stepper_home(&stepper, NULL, &err),
+					  : incise_stepper_home(&stepper, NULL, NULL,
+								&err),
 				 -EOPNOTSUPP);
 		assert_int_equal(err.code, EOPNOTSUPP);
 		assert_int_equal(strncmp(err.text, "a simple one cannot be ", 23), 0);
@@ -492,7 +493,7 @@ static void the_count_becomes_the_position(void **state)
 			if (m.end_mm > starts_mm[k])
 				continue;
 			powered_at(&m, starts_mm[k]);
-			rc = incise_stepper_home(&m.stepper, &m.stop, &err);
+			rc = incise_stepper_home(&m.stepper, &m.stop, NULL, &err);
 			if (rc)
 				fail_msg("case %zu from %g mm: %s", i, starts_mm[k],
 					 err.text);
@@ -527,9 +528,8 @@ static void the_edge_is_told_in_the_old_count(void **state)
 
 			m.count_mm += lost_mm[k];
 			was_mm = m.edge_mm + m.count_mm;
-			assert_int_equal(incise_stepper_home_edge(&m.stepper, &m.stop,
-								  &edge, NULL),
-					 0);
+			assert_int_equal(
+				incise_stepper_home(&m.stepper, &m.stop, &edge, NULL), 0);
 			assert_true(edge.after_mm == 2);
 			if (!(fabs(edge.before_mm - was_mm) < 0.0005 + 0.00005 + STEP_MM))
 				fail_msg("input %u, %g mm lost: %g, was %g", inputs[i],
@@ -576,7 +576,7 @@ static void what_is_wrong_is_said(void **state)
 		int rc;
 
 		powered_at(&m, 10);
-		rc = incise_stepper_home_edge(&m.stepper, &m.stop, &edge, &err);
+		rc = incise_stepper_home(&m.stepper, &m.stop, &edge, &err);
 		assert_true(edge.before_mm == 77 && edge.after_mm == 78);
 		if (rc != cases[i].rc || !strstr(err.text, cases[i].says))
 			fail_msg("case %zu: %d, \"%s\"", i, rc, err.text);
@@ -592,7 +592,7 @@ static void it_must_be_powered(void **state)
 
 	powered_at(&m, 3);
 	m.state = INCISE_STEPPER_DISABLED;
-	assert_int_equal(incise_stepper_home(&m.stepper, NULL, &err), -EIO);
+	assert_int_equal(incise_stepper_home(&m.stepper, NULL, NULL, &err), -EIO);
 	assert_non_null(strstr(err.text, "enable it first"));
 	assert_true(m.at_mm == 3);
 }

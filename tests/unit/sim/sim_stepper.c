@@ -362,7 +362,7 @@ static void it_is_always_powered_and_reports_its_motion(void **state)
 	s = rig_after(&rig, INCISE_NS_PER_S);
 	assert_true(s.position_mm == 0 && !s.faults);
 	assert_int_equal(incise_stepper_jog(rig.stepper, 1), -EOPNOTSUPP);
-	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL), -EOPNOTSUPP);
+	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, NULL), -EOPNOTSUPP);
 	rig_free(&rig);
 }
 
