@@ -166,9 +166,9 @@ struct stepper {
 	bool closing; /* reboot: no power any more */
 	bool gone;
 
-	struct incise_stepper_info info;
-	struct incise_stepper_setpoint *setpoints; /* page 0: untrusted */
-	struct incise_stepper_status *status;	   /* page 1 */
+	struct incise_stepper_controller info;
+	struct incise_stepper_setpoint *setpoints;  /* page 0: untrusted */
+	struct incise_stepper_motor_status *status; /* page 1 */
 	struct gpio_desc *estop;
 	struct stepper_irq estop_irq;
 	struct stepper_sync_line sync;

@@ -105,7 +105,7 @@ static void stepper_ability_round(struct stepper_trial *trial)
 /* Fill in what the self-test says in info. Sleeps. */
 int stepper_ability_measure(struct stepper *stepper)
 {
-	struct incise_stepper_info *info = &stepper->info;
+	struct incise_stepper_controller *info = &stepper->info;
 	u64 pulse = U32_MAX, late = U32_MAX, period;
 	struct stepper_trial *trial;
 	int round;

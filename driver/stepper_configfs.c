@@ -445,7 +445,7 @@ static struct config_group *stepper_folder_make(struct config_group *group,
 	struct stepper_folder *folder;
 
 	/* info.name is to hold it. */
-	if (strlen(name) >= sizeof(((struct incise_stepper_info *)0)->name))
+	if (strlen(name) >= sizeof(((struct incise_stepper_controller *)0)->name))
 		return ERR_PTR(-ENAMETOOLONG);
 	folder = kzalloc(sizeof(*folder), GFP_KERNEL);
 	if (!folder)

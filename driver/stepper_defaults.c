@@ -67,7 +67,7 @@ static void stepper_defaults_read(struct incise_stepper_config *c,
 static void stepper_defaults_fit(struct stepper_motor *motor,
 				 struct incise_stepper_config *c, struct device *dev)
 {
-	const struct incise_stepper_info *info = &motor->stepper->info;
+	const struct incise_stepper_controller *info = &motor->stepper->info;
 	u32 velocity;
 
 	c->high_ns = max(c->high_ns, info->pulse_ns);

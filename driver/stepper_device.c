@@ -73,9 +73,9 @@ struct stepper *stepper_device_new(struct device *parent, unsigned int n_motors)
 	int id, ret;
 
 	BUILD_BUG_ON(sizeof(struct incise_stepper_setpoint) != 64);
-	BUILD_BUG_ON(sizeof(struct incise_stepper_status) != 128);
+	BUILD_BUG_ON(sizeof(struct incise_stepper_motor_status) != 128);
 	BUILD_BUG_ON(sizeof(struct incise_stepper_event) != 32);
-	BUILD_BUG_ON(sizeof(struct incise_stepper_info) != 256);
+	BUILD_BUG_ON(sizeof(struct incise_stepper_controller) != 256);
 	BUILD_BUG_ON(sizeof(struct incise_stepper_config) != 128);
 	BUILD_BUG_ON(sizeof(struct incise_stepper_origin) != 16);
 	BUILD_BUG_ON(sizeof(struct incise_stepper_sync) != 64);

@@ -146,7 +146,7 @@ static int stepper_file_mask(struct stepper *stepper, unsigned int command, u32 
 /* The arguments of the ioctls, one at a time. */
 union stepper_argument {
 	u32 mask;
-	struct incise_stepper_info info;
+	struct incise_stepper_controller info;
 	struct incise_stepper_config config;
 	struct incise_stepper_origin origin;
 	struct incise_stepper_sync sync;

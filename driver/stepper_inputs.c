@@ -40,7 +40,7 @@ static void stepper_inputs_act(struct stepper_motor *motor, enum stepper_input i
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_ESTOP, now);
 		break;
 	case STEPPER_DRIVER:
-		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_DRIVER, now);
+		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_ALARM, now);
 		break;
 	case STEPPER_HOME:
 	case STEPPER_INPUTS:

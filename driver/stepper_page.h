@@ -35,6 +35,6 @@ enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint 
 __s64 stepper_page_clamp(const struct stepper_wish *wish,
 			 const struct incise_stepper_config *config);
 int stepper_page_config(const struct incise_stepper_config *config,
-			const struct incise_stepper_info *info);
+			const struct incise_stepper_controller *info);
 
 #endif

@@ -40,7 +40,7 @@ static void stepper_setup_look(struct stepper_motor *motor)
 /* motor->lock held. */
 static int stepper_setup_allowed(const struct stepper_motor *motor)
 {
-	const u32 forbid = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_DRIVER;
+	const u32 forbid = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_ALARM;
 
 	if (motor->faults)
 		return -EPERM;
@@ -135,7 +135,7 @@ void stepper_setup_disable(struct stepper_motor *motor)
 /* 0; -EBUSY: it has power, or what caused the fault is still there. */
 int stepper_setup_clearable(struct stepper_motor *motor)
 {
-	const u32 causes = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_DRIVER;
+	const u32 causes = INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_ALARM;
 	unsigned long flags;
 	int ret = 0;
 

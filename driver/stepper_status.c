@@ -29,7 +29,8 @@ void stepper_status_state(struct stepper_motor *motor, u32 state, s64 now)
 
 void stepper_status_publish(struct stepper_motor *motor, s64 now)
 {
-	struct incise_stepper_status *status = &motor->stepper->status[motor->index];
+	struct incise_stepper_motor_status *status =
+		&motor->stepper->status[motor->index];
 	u32 seq = status->seq;
 
 	WRITE_ONCE(status->seq, seq + 1);

@@ -49,7 +49,7 @@ dkms_dir = $(srcdir)/incise-$(version)
 dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe) \
 	$(filter-out %.mod.c,$(wildcard $(addprefix driver/,*.[ch] uapi/*.h compat/*.c))) \
 	$(wildcard lib/fixed/*.[ch]) $(shell grep -l __KERNEL__ lib/include/incise/*.h) \
-	lib/include/incise/export.h
+	$(addprefix lib/include/incise/,export.h stepper_state.h)
 
 dkms_install: ## install the module's sources for dkms in $(DESTDIR)$(srcdir)
 	$(INSTALL) -d $(addprefix $(DESTDIR)$(dkms_dir)/,$(sort $(dir $(dkms_sources))))

@@ -138,7 +138,7 @@ static void run_disable(const struct stepper_job *job, struct stepper_drive *dri
 		printf("%s: %s at %.4f mm%s\n", drive->info.name,
 		       incise_stepper_state_name(drive->status.state),
 		       drive->status.position_mm,
-		       drive->status.state == INCISE_STEPPER_READY
+		       drive->status.state == INCISE_STEPPER_STATE_READY
 			       ? ", as it is always powered"
 			       : "");
 }

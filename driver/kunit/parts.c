@@ -34,7 +34,7 @@ static void parts_page(struct kunit *test)
 
 static void parts_config(struct kunit *test)
 {
-	struct incise_stepper_info info = {
+	struct incise_stepper_controller info = {
 		.n_motors = 1, .rate_max = 20000, .pulse_ns = 3000};
 	struct incise_stepper_config config = {
 		.tick_ns = 250000,

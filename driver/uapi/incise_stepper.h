@@ -27,6 +27,7 @@
 
 #include <linux/ioctl.h>
 #include <linux/types.h>
+#include <incise/stepper_state.h>
 
 #define INCISE_STEPPER_MOTORS_MAX 8
 
@@ -60,44 +61,14 @@ struct incise_stepper_setpoint {
 	__u64 reserved[5];
 };
 
-/* incise_stepper_status.state */
-#define INCISE_STEPPER_STATE_DISABLED 0 /* not powered, no fault latched */
-#define INCISE_STEPPER_STATE_READY 1	/* powered, at rest */
-#define INCISE_STEPPER_STATE_MOVING 2
-#define INCISE_STEPPER_STATE_STOPPING 3 /* coming to rest, by a fault or DISABLE */
-#define INCISE_STEPPER_STATE_FAULT 4	/* not powered, a fault latched */
-
-/* incise_stepper_status.faults, latched; value of an INCISE_STEPPER_EVENT_FAULT */
-#define INCISE_STEPPER_FAULT_DEADMAN (1U << 0)	 /* no new set-point for deadman_ns */
-#define INCISE_STEPPER_FAULT_LIMIT_MIN (1U << 1) /* a step towards an active limit */
-#define INCISE_STEPPER_FAULT_LIMIT_MAX (1U << 2)
-#define INCISE_STEPPER_FAULT_ESTOP (1U << 3)	/* its input is or was active */
-#define INCISE_STEPPER_FAULT_DRIVER (1U << 4)	/* the power stage's fault output */
-#define INCISE_STEPPER_FAULT_LATE (1U << 5)	/* the timer was late too often */
-#define INCISE_STEPPER_FAULT_SETPOINT (1U << 6) /* a slot with unknown contents */
-#define INCISE_STEPPER_FAULT_OWNER (1U << 7)   /* closed while enabled, without DISABLE */
-#define INCISE_STEPPER_FAULT_SUSPEND (1U << 8) /* the machine went to sleep */
-#define INCISE_STEPPER_FAULT_GONE (1U << 9)    /* the device was unbound */
-#define INCISE_STEPPER_FAULT_LINE \
-	(1U << 10) /* a GPIO line could not be written or read */
-
-/* Lines: incise_stepper_status.inputs and incise_stepper_info.lines */
-#define INCISE_STEPPER_LINE_LIMIT_MIN (1U << 0)
-#define INCISE_STEPPER_LINE_LIMIT_MAX (1U << 1)
-#define INCISE_STEPPER_LINE_HOME (1U << 2)
-#define INCISE_STEPPER_LINE_ESTOP (1U << 3)
-#define INCISE_STEPPER_LINE_DRIVER (1U << 4)
-#define INCISE_STEPPER_LINE_ENABLE (1U << 5) /* an output; in info only */
-#define INCISE_STEPPER_LINE_DIR (1U << 6)    /* an output; in info only */
-
-/* incise_stepper_status.flags */
+/* incise_stepper_motor_status.flags */
 /* Position is that of the machine; a stop at once while moving takes it away. */
 #define INCISE_STEPPER_FLAG_HOMED (1U << 0)
 #define INCISE_STEPPER_FLAG_HELD (1U << 1)	/* the last set-point was clamped */
 #define INCISE_STEPPER_FLAG_HOME_SEEN (1U << 2) /* home_position is of this enable */
 
 /**
- * struct incise_stepper_status - where a motor stands; one slot, 128 bytes
+ * struct incise_stepper_motor_status - where a motor stands; one slot, 128 bytes
  * @seq: odd while the kernel writes; a reader tries again when it changed meanwhile
  * @state: INCISE_STEPPER_STATE_…
  * @faults: INCISE_STEPPER_FAULT_… bits, latched
@@ -117,7 +88,7 @@ struct incise_stepper_setpoint {
  * @shifted_ns: by how much the time line of the motion was put off by late edges, since bind
  * @reserved: zero
  */
-struct incise_stepper_status {
+struct incise_stepper_motor_status {
 	__u32 seq;
 	__u32 state;
 	__u32 faults;
@@ -161,12 +132,12 @@ struct incise_stepper_event {
 	__u32 value;
 };
 
-/* incise_stepper_info.capabilities */
+/* incise_stepper_controller.capabilities */
 #define INCISE_STEPPER_CAP_SYNC (1ULL << 0)  /* has a SYNC line */
 #define INCISE_STEPPER_CAP_FIXED (1ULL << 1) /* the integer force model is built in */
 
 /**
- * struct incise_stepper_info - what the controller is, 256 bytes
+ * struct incise_stepper_controller - what the controller is, 256 bytes
  * @name: of the controller, zero-padded
  * @capabilities: INCISE_STEPPER_CAP_… bits
  * @n_motors: 1 … INCISE_STEPPER_MOTORS_MAX
@@ -182,7 +153,7 @@ struct incise_stepper_event {
  * @reserved0: zero
  * @reserved: zero
  */
-struct incise_stepper_info {
+struct incise_stepper_controller {
 	char name[32];
 	__u64 capabilities;
 	__u32 n_motors;
@@ -288,7 +259,8 @@ struct incise_stepper_sync {
 
 /* Watchers may call the ones that only read; the others need the owner (EPERM). */
 #define INCISE_STEPPER_IOC 0xB6
-#define INCISE_STEPPER_GET_INFO _IOR(INCISE_STEPPER_IOC, 0, struct incise_stepper_info)
+#define INCISE_STEPPER_GET_INFO \
+	_IOR(INCISE_STEPPER_IOC, 0, struct incise_stepper_controller)
 #define INCISE_STEPPER_GET_CONFIG \
 	_IOWR(INCISE_STEPPER_IOC, 1, struct incise_stepper_config)
 #define INCISE_STEPPER_SET_CONFIG \

@@ -7,7 +7,7 @@
 #include "page.h"
 
 #define RETRACTS (INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER)
-#define FORBIDS (INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_DRIVER)
+#define FORBIDS (INCISE_STEPPER_LINE_ESTOP | INCISE_STEPPER_LINE_ALARM)
 
 int incise_motion_init(struct incise_motion *m,
 		       const struct incise_stepper_config *config)

@@ -14,23 +14,24 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include "../../driver/uapi/incise_stepper.h"
 #include "../fixed/profile.h"
-#include "abi.h"
 
 /* Faults after which it may not brake by its profile, but stops at once. */
-#define INCISE_MOTION_AT_ONCE                                                           \
-	(INCISE_STEPPER_FAULT_LIMIT_MIN | INCISE_STEPPER_FAULT_LIMIT_MAX |              \
-	 INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_DRIVER |                     \
-	 INCISE_STEPPER_FAULT_LATE | INCISE_STEPPER_FAULT_LINE | INCISE_ABI_FAULT_BUS | \
-	 INCISE_ABI_FAULT_LOST | INCISE_ABI_FAULT_FOLLOWING)
+#define INCISE_MOTION_AT_ONCE                                              \
+	(INCISE_STEPPER_FAULT_LIMIT_MIN | INCISE_STEPPER_FAULT_LIMIT_MAX | \
+	 INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM |         \
+	 INCISE_STEPPER_FAULT_LATE | INCISE_STEPPER_FAULT_LINE |           \
+	 INCISE_STEPPER_FAULT_BUS | INCISE_STEPPER_FAULT_LOST |            \
+	 INCISE_STEPPER_FAULT_FOLLOWING)
 
 struct incise_motion {
 	const struct incise_stepper_setpoint *setpoint; /* written by another thread */
-	struct incise_abi_status *slot;			/* read by another thread */
+	struct incise_stepper_motor_status *slot;	/* read by another thread */
 
 	/* Read by the owner, who writes status.position and .inputs. */
 	struct incise_stepper_config config;
-	struct incise_abi_status status; /* copied into the slot */
+	struct incise_stepper_motor_status status; /* copied into the slot */
 	struct incise_profile profile;
 	bool powered, resting, ending;
 

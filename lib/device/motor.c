@@ -16,48 +16,6 @@
 #define POLL_NS INCISE_NS_PER_S / 1000
 #define LATE_MAX 20 /* edges in a row */
 
-/* Bits of the ABI, and what the library calls them. */
-struct bit {
-	unsigned int abi, own;
-};
-
-static const struct bit fault_bits[] = {
-	{INCISE_STEPPER_FAULT_DEADMAN, INCISE_STEPPER_DEADMAN},
-	{INCISE_STEPPER_FAULT_LIMIT_MIN, INCISE_STEPPER_LIMIT_MIN},
-	{INCISE_STEPPER_FAULT_LIMIT_MAX, INCISE_STEPPER_LIMIT_MAX},
-	{INCISE_STEPPER_FAULT_ESTOP, INCISE_STEPPER_ESTOP},
-	{INCISE_STEPPER_FAULT_DRIVER, INCISE_STEPPER_ALARM},
-	{INCISE_STEPPER_FAULT_LATE, INCISE_STEPPER_LATE},
-	{INCISE_STEPPER_FAULT_SETPOINT, INCISE_STEPPER_SETPOINT},
-	{INCISE_STEPPER_FAULT_OWNER, INCISE_STEPPER_OWNER},
-	{INCISE_STEPPER_FAULT_SUSPEND, INCISE_STEPPER_SUSPEND},
-	{INCISE_STEPPER_FAULT_GONE, INCISE_STEPPER_GONE},
-	{INCISE_STEPPER_FAULT_LINE, INCISE_STEPPER_LINE},
-	{INCISE_ABI_FAULT_BUS, INCISE_STEPPER_BUS},
-	{INCISE_ABI_FAULT_LOST, INCISE_STEPPER_LOST},
-	{INCISE_ABI_FAULT_FOLLOWING, INCISE_STEPPER_FOLLOWING},
-	{0, 0},
-};
-
-static const struct bit input_bits[] = {
-	{INCISE_STEPPER_LINE_LIMIT_MIN, INCISE_STEPPER_AT_MIN},
-	{INCISE_STEPPER_LINE_LIMIT_MAX, INCISE_STEPPER_AT_MAX},
-	{INCISE_STEPPER_LINE_HOME, INCISE_STEPPER_AT_HOME},
-	{INCISE_STEPPER_LINE_ESTOP, INCISE_STEPPER_ESTOP_ACTIVE},
-	{INCISE_STEPPER_LINE_DRIVER, INCISE_STEPPER_ALARM_ACTIVE},
-	{0, 0},
-};
-
-static unsigned int own_bits(const struct bit *bit, unsigned int abi)
-{
-	unsigned int own = 0;
-
-	for (; bit->abi; bit++)
-		if (abi & bit->abi)
-			own |= bit->own;
-	return own;
-}
-
 double incise_actuator_step_mm(const struct incise_actuator *actuator)
 {
 	return actuator->lead_mm /
@@ -186,27 +144,11 @@ static int motor_jog(struct incise_stepper *stepper, double velocity_mm_s)
 	return 0;
 }
 
-static enum incise_stepper_state state_of(unsigned int abi)
-{
-	switch (abi) {
-	case INCISE_STEPPER_STATE_READY:
-		return INCISE_STEPPER_READY;
-	case INCISE_STEPPER_STATE_MOVING:
-		return INCISE_STEPPER_MOVING;
-	case INCISE_STEPPER_STATE_STOPPING:
-		return INCISE_STEPPER_STOPPING;
-	case INCISE_STEPPER_STATE_FAULT:
-		return INCISE_STEPPER_FAULT;
-	default:
-		return INCISE_STEPPER_DISABLED;
-	}
-}
-
 static INCISE_REALTIME int motor_status(struct incise_stepper *stepper,
 					struct incise_stepper_status *status)
 {
 	struct incise_motor *motor = of(stepper);
-	const struct incise_abi_status *last = &motor->last;
+	const struct incise_stepper_motor_status *last = &motor->last;
 	int rc = look(motor);
 
 	*status = (struct incise_stepper_status){
@@ -216,10 +158,10 @@ static INCISE_REALTIME int motor_status(struct incise_stepper *stepper,
 				 incise_actuator_step_mm(&motor->actuator),
 		.handle_mm = NAN,
 		.force_N = NAN,
-		.faults = own_bits(fault_bits, last->faults) |
-			  (motor->beyond ? INCISE_STEPPER_TRAVEL : 0),
-		.state = state_of(last->state),
-		.inputs = own_bits(input_bits, last->inputs),
+		.faults =
+			last->faults | (motor->beyond ? INCISE_STEPPER_FAULT_TRAVEL : 0),
+		.state = (enum incise_stepper_state)last->state,
+		.inputs = last->inputs,
 		.homed = last->flags & INCISE_STEPPER_FLAG_HOMED,
 		.late = last->late,
 	};
@@ -231,7 +173,7 @@ static INCISE_REALTIME int motor_status(struct incise_stepper *stepper,
 /* The first latched fault in words. */
 static const char *fault_text(const struct incise_motor *motor)
 {
-	unsigned int faults = own_bits(fault_bits, motor->last.faults);
+	unsigned int faults = motor->last.faults;
 
 	return incise_stepper_fault_text((enum incise_stepper_fault)(faults & -faults));
 }
@@ -250,10 +192,10 @@ static int told(struct incise_motor *motor, int rc, const char *what,
 	if (motor->watches)
 		why = "it was opened to watch; the program that drives it can";
 	else if (motor->last.faults & INCISE_STEPPER_FAULT_GONE || rc == -ENODEV)
-		why = incise_stepper_fault_text(INCISE_STEPPER_GONE);
+		why = incise_stepper_fault_text(INCISE_STEPPER_FAULT_GONE);
 	else if (rc == -EBUSY && motor->last.inputs & INCISE_STEPPER_LINE_ESTOP)
 		why = "the e-stop is active; release it";
-	else if (rc == -EBUSY && motor->last.inputs & INCISE_STEPPER_LINE_DRIVER)
+	else if (rc == -EBUSY && motor->last.inputs & INCISE_STEPPER_LINE_ALARM)
 		why = "the power stage reports a fault; see what it says, switch it off "
 		      "and on";
 	else if (rc == -EBUSY)
@@ -345,7 +287,7 @@ static void motor_info(const struct incise_stepper *stepper,
 		.can_home = motor->lines &
 			    (INCISE_STEPPER_LINE_HOME | INCISE_STEPPER_LINE_LIMIT_MIN),
 		.origin_mm = actuator->origin_mm,
-		.inputs = own_bits(input_bits, motor->lines),
+		.inputs = motor->lines & ((1U << INCISE_STEPPER_INPUTS) - 1),
 	};
 	snprintf(info->name, sizeof(info->name), "%s", motor->name);
 }
@@ -363,9 +305,9 @@ static int motor_homing(struct incise_stepper *stepper,
 	homing->speed_mm_s = motor->actuator.home_mm_s;
 	homing->home_mm = motor->actuator.home_mm;
 	if (motor->lines & INCISE_STEPPER_LINE_HOME)
-		homing->home_at = INCISE_STEPPER_AT_HOME;
+		homing->home_at = INCISE_STEPPER_LINE_HOME;
 	else if (motor->lines & INCISE_STEPPER_LINE_LIMIT_MIN)
-		homing->home_at = INCISE_STEPPER_AT_MIN;
+		homing->home_at = INCISE_STEPPER_LINE_LIMIT_MIN;
 	else
 		return -EOPNOTSUPP;
 	return 0;

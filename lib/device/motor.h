@@ -10,8 +10,8 @@
 #define INCISE_MOTOR_H
 
 #include <incise/backend.h>
+#include "../../driver/uapi/incise_stepper.h"
 #include "../fixed/profile.h"
-#include "abi.h"
 
 /* Largest velocity and acceleration in microsteps: they are 32 bits. */
 #define INCISE_MOTOR_STEPS_MAX 2e9
@@ -61,12 +61,12 @@ struct incise_motor {
 	unsigned int lines; /* INCISE_STEPPER_LINE_… bits it has */
 	bool watches;	    /* opened to watch, not to drive */
 	struct incise_stepper_setpoint *setpoint; /* NULL where it watches */
-	const struct incise_abi_status *slot;
+	const struct incise_stepper_motor_status *slot;
 
 	/* private */
-	struct incise_abi_status last; /* last status that could be read */
-	unsigned int unread;	       /* failed reads since then */
-	bool beyond;		       /* the last target was clamped */
+	struct incise_stepper_motor_status last; /* last status that could be read */
+	unsigned int unread;			 /* failed reads since then */
+	bool beyond;				 /* the last target was clamped */
 };
 
 /* Set stepper.ops; the backend sets the other fields above "private". */

@@ -13,11 +13,9 @@
 #define TRIES 100
 
 #define SETPOINT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(uint32_t))
-#define STATUS_WORDS (sizeof(struct incise_abi_status) / sizeof(uint32_t))
-#define KNOWN_FAULTS                                                  \
-	((2 * INCISE_STEPPER_FAULT_LINE - 1) | INCISE_ABI_FAULT_BUS | \
-	 INCISE_ABI_FAULT_LOST | INCISE_ABI_FAULT_FOLLOWING)
-#define KNOWN_INPUTS (2 * INCISE_STEPPER_LINE_DRIVER - 1)
+#define STATUS_WORDS (sizeof(struct incise_stepper_motor_status) / sizeof(uint32_t))
+#define KNOWN_FAULTS ((1U << INCISE_STEPPER_FAULTS) - 1 - INCISE_STEPPER_FAULT_TRAVEL)
+#define KNOWN_INPUTS ((1U << INCISE_STEPPER_INPUTS) - 1)
 
 static void begin(uint32_t *words, uint32_t seq)
 {
@@ -87,8 +85,8 @@ int incise_page_get_setpoint(const struct incise_stepper_setpoint *slot, uint32_
 	return 1;
 }
 
-void incise_page_put_status(struct incise_abi_status *slot,
-			    const struct incise_abi_status *status)
+void incise_page_put_status(struct incise_stepper_motor_status *slot,
+			    const struct incise_stepper_motor_status *status)
 {
 	uint32_t *words = (uint32_t *)slot;
 	uint32_t seq = __atomic_load_n(words, __ATOMIC_RELAXED) & ~1u;
@@ -98,7 +96,7 @@ void incise_page_put_status(struct incise_abi_status *slot,
 	end(words, seq + 2);
 }
 
-static bool sensible(const struct incise_abi_status *status)
+static bool sensible(const struct incise_stepper_motor_status *status)
 {
 	const int64_t most = 2LL * INCISE_PROFILE_POSITION_MAX;
 	const int64_t fastest = (INCISE_PROFILE_VELOCITY_MAX + 1LL) << 16;
@@ -110,10 +108,10 @@ static bool sensible(const struct incise_abi_status *status)
 	       status->velocity >= -fastest && status->velocity <= fastest;
 }
 
-int incise_page_get_status(const struct incise_abi_status *slot,
-			   struct incise_abi_status *copy)
+int incise_page_get_status(const struct incise_stepper_motor_status *slot,
+			   struct incise_stepper_motor_status *copy)
 {
-	struct incise_abi_status status;
+	struct incise_stepper_motor_status status;
 
 	for (int i = 0; i < TRIES; i++) {
 		if (!get((const uint32_t *)slot, &status, STATUS_WORDS))

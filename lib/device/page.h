@@ -13,7 +13,7 @@
 
 #include <incise/export.h>
 #include <stdint.h>
-#include "abi.h"
+#include "../../driver/uapi/incise_stepper.h"
 
 /*
  * Write a set-point; mode is INCISE_STEPPER_MODE_…. Repairs the odd seq of a dead owner.
@@ -29,14 +29,14 @@ int incise_page_get_setpoint(const struct incise_stepper_setpoint *slot, uint32_
 			     struct incise_stepper_setpoint *copy);
 
 /* Write a status; its seq is the slot's own. */
-void incise_page_put_status(struct incise_abi_status *slot,
-			    const struct incise_abi_status *status);
+void incise_page_put_status(struct incise_stepper_motor_status *slot,
+			    const struct incise_stepper_motor_status *status);
 
 /*
  * 0; -EAGAIN: it was being written at each try, @copy is unchanged; -EIO: impossible
  * values.
  */
-int incise_page_get_status(const struct incise_abi_status *slot,
-			   struct incise_abi_status *copy) INCISE_REALTIME;
+int incise_page_get_status(const struct incise_stepper_motor_status *slot,
+			   struct incise_stepper_motor_status *copy) INCISE_REALTIME;
 
 #endif

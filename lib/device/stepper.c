@@ -44,8 +44,8 @@ struct home {
 
 static const char *input_name(const struct home *h)
 {
-	return h->homing.home_at == INCISE_STEPPER_AT_HOME ? "home input"
-							   : "limit switch at 0";
+	return h->homing.home_at == INCISE_STEPPER_LINE_HOME ? "home input"
+							     : "limit switch at 0";
 }
 
 static bool at_home(const struct home *h)
@@ -56,8 +56,8 @@ static bool at_home(const struct home *h)
 /* Without a home input, the limit switch at 0 is what homing looks for. */
 static bool hit_limit(const struct home *h)
 {
-	return h->homing.home_at == INCISE_STEPPER_AT_MIN &&
-	       h->status.faults & INCISE_STEPPER_LIMIT_MIN;
+	return h->homing.home_at == INCISE_STEPPER_LINE_LIMIT_MIN &&
+	       h->status.faults & INCISE_STEPPER_FAULT_LIMIT_MIN;
 }
 
 static int sleep_ns(struct incise_stepper *stepper, int64_t ns)
@@ -83,12 +83,13 @@ static int refused(const struct home *h, int rc)
 
 static int fault_error(const struct home *h)
 {
-	unsigned int faults = h->status.faults & ~INCISE_STEPPER_TRAVEL;
+	unsigned int faults = h->status.faults & ~INCISE_STEPPER_FAULT_TRAVEL;
 	char cause[300];
 
-	if (faults & INCISE_STEPPER_GONE)
-		return incise_error_set(h->err, ENODEV, "homing %s: %s", h->info.name,
-					incise_stepper_fault_text(INCISE_STEPPER_GONE));
+	if (faults & INCISE_STEPPER_FAULT_GONE)
+		return incise_error_set(
+			h->err, ENODEV, "homing %s: %s", h->info.name,
+			incise_stepper_fault_text(INCISE_STEPPER_FAULT_GONE));
 	if (!faults)
 		return incise_error_set(h->err, EIO,
 					"homing %s: it is not powered; enable it first",
@@ -126,16 +127,16 @@ static int look(struct home *h)
 		return refused(h, rc);
 	if (hit_limit(h))
 		return 0;
-	if (h->status.faults & ~INCISE_STEPPER_TRAVEL ||
-	    (h->status.state != INCISE_STEPPER_READY &&
-	     h->status.state != INCISE_STEPPER_MOVING))
+	if (h->status.faults & ~INCISE_STEPPER_FAULT_TRAVEL ||
+	    (h->status.state != INCISE_STEPPER_STATE_READY &&
+	     h->status.state != INCISE_STEPPER_STATE_MOVING))
 		return fault_error(h);
 	return 0;
 }
 
 static bool at_rest(const struct home *h)
 {
-	return h->status.state == INCISE_STEPPER_READY && !h->status.velocity_mm_s;
+	return h->status.state == INCISE_STEPPER_STATE_READY && !h->status.velocity_mm_s;
 }
 
 /* Power it again after the limit switch switched it off. */
@@ -143,9 +144,9 @@ static int recover(struct home *h)
 {
 	int rc = 0;
 
-	while (!rc && h->status.state == INCISE_STEPPER_STOPPING)
+	while (!rc && h->status.state == INCISE_STEPPER_STATE_STOPPING)
 		rc = look(h);
-	if (!rc && h->status.state == INCISE_STEPPER_FAULT)
+	if (!rc && h->status.state == INCISE_STEPPER_STATE_FAULT)
 		rc = incise_stepper_clear(h->stepper, h->err);
 	if (!rc)
 		rc = incise_stepper_enable(h->stepper, h->err);
@@ -423,8 +424,8 @@ int incise_stepper_cause(struct incise_stepper *stepper, char *text, size_t size
 		return length;
 	stepper->ops->status(stepper, &status);
 	/* A target that was held stops nothing. */
-	faults = status.faults & ~INCISE_STEPPER_TRAVEL
-			 ? status.faults & ~INCISE_STEPPER_TRAVEL
+	faults = status.faults & ~INCISE_STEPPER_FAULT_TRAVEL
+			 ? status.faults & ~INCISE_STEPPER_FAULT_TRAVEL
 			 : status.faults;
 	return snprintf(text, size, "%s",
 			faults ? incise_stepper_fault_text(
@@ -443,15 +444,15 @@ int incise_stepper_counter(struct incise_stepper *stepper, int i,
 const char *incise_stepper_state_name(enum incise_stepper_state state)
 {
 	switch (state) {
-	case INCISE_STEPPER_DISABLED:
+	case INCISE_STEPPER_STATE_DISABLED:
 		return "disabled";
-	case INCISE_STEPPER_READY:
+	case INCISE_STEPPER_STATE_READY:
 		return "ready";
-	case INCISE_STEPPER_MOVING:
+	case INCISE_STEPPER_STATE_MOVING:
 		return "moving";
-	case INCISE_STEPPER_STOPPING:
+	case INCISE_STEPPER_STATE_STOPPING:
 		return "stopping";
-	case INCISE_STEPPER_FAULT:
+	case INCISE_STEPPER_STATE_FAULT:
 		return "fault";
 	}
 	return "unknown";
@@ -460,42 +461,42 @@ const char *incise_stepper_state_name(enum incise_stepper_state state)
 const char *incise_stepper_fault_text(enum incise_stepper_fault fault)
 {
 	switch (fault) {
-	case INCISE_STEPPER_DEADMAN:
+	case INCISE_STEPPER_FAULT_DEADMAN:
 		return "deadman: targets stopped coming; clear, and look at what drives "
 		       "it";
-	case INCISE_STEPPER_TRAVEL:
+	case INCISE_STEPPER_FAULT_TRAVEL:
 		return "travel: a target lay outside and was held";
-	case INCISE_STEPPER_LIMIT_MIN:
+	case INCISE_STEPPER_FAULT_LIMIT_MIN:
 		return "limit switch at 0: clear, enable and home";
-	case INCISE_STEPPER_LIMIT_MAX:
+	case INCISE_STEPPER_FAULT_LIMIT_MAX:
 		return "limit switch at the end of the travel: clear, enable and home";
-	case INCISE_STEPPER_ESTOP:
+	case INCISE_STEPPER_FAULT_ESTOP:
 		return "e-stop: release it, then clear";
-	case INCISE_STEPPER_ALARM:
+	case INCISE_STEPPER_FAULT_ALARM:
 		return "alarm of the power stage: see what it says, switch it off and "
 		       "on, then clear";
-	case INCISE_STEPPER_LATE:
+	case INCISE_STEPPER_FAULT_LATE:
 		return "late: this machine could not hold the step times; give a "
 		       "smaller velocity_mm_s or a real-time kernel, then clear";
-	case INCISE_STEPPER_SETPOINT:
+	case INCISE_STEPPER_FAULT_SETPOINT:
 		return "set-point that cannot be read: two programs drive it, or one "
 		       "is broken; end it, then clear";
-	case INCISE_STEPPER_OWNER:
+	case INCISE_STEPPER_FAULT_OWNER:
 		return "the program that drove it ended while it was powered: clear";
-	case INCISE_STEPPER_SUSPEND:
+	case INCISE_STEPPER_FAULT_SUSPEND:
 		return "the machine went to sleep: clear, enable and home";
-	case INCISE_STEPPER_GONE:
+	case INCISE_STEPPER_FAULT_GONE:
 		return "the device went away: plug it in, or load its module again";
-	case INCISE_STEPPER_LINE:
+	case INCISE_STEPPER_FAULT_LINE:
 		return "a GPIO line cannot be written or read: see its wiring and the "
 		       "kernel's log, then clear";
-	case INCISE_STEPPER_BUS:
+	case INCISE_STEPPER_FAULT_BUS:
 		return "the bus to the drive fails: see its cable, its ends and "
 		       "`ip -details link show`, then clear";
-	case INCISE_STEPPER_LOST:
+	case INCISE_STEPPER_FAULT_LOST:
 		return "the drive is not heard any more, or began anew: see its power and "
 		       "cable, then clear, enable and home";
-	case INCISE_STEPPER_FOLLOWING:
+	case INCISE_STEPPER_FAULT_FOLLOWING:
 		return "it does not follow its targets: see what blocks it, or give a "
 		       "smaller acceleration_mm_s2, then clear";
 	}

@@ -175,11 +175,12 @@ static int open_device(struct kernel_stepper *k,
 }
 
 /* Check the answer of the module, as its sizes lead to memory. */
-static int check_info(const struct kernel_stepper *k, struct incise_abi_info *info,
+static int check_info(const struct kernel_stepper *k,
+		      struct incise_stepper_controller *info,
 		      const struct incise_backend_request *asked,
 		      struct incise_error *err)
 {
-	int rc = request(k, INCISE_ABI_GET_INFO, info);
+	int rc = request(k, INCISE_STEPPER_GET_INFO, info);
 
 	if (rc == -ENOTTY)
 		return incise_error_set(
@@ -204,7 +205,8 @@ static int check_info(const struct kernel_stepper *k, struct incise_abi_info *in
 	return 0;
 }
 
-static int configure(struct kernel_stepper *k, const struct incise_abi_info *info,
+static int configure(struct kernel_stepper *k,
+		     const struct incise_stepper_controller *info,
 		     const struct incise_backend_request *asked, struct incise_error *err)
 {
 	struct incise_stepper_config config;
@@ -260,7 +262,7 @@ static int map_pages(struct kernel_stepper *k, bool watch)
 			 INCISE_STEPPER_PAGE_STATUS * page);
 	if (k->status == MAP_FAILED)
 		return -errno;
-	k->motor.slot = (const struct incise_abi_status *)k->status + k->index;
+	k->motor.slot = (const struct incise_stepper_motor_status *)k->status + k->index;
 	if (watch)
 		return 0;
 	k->setpoints =
@@ -279,7 +281,7 @@ static int map_pages(struct kernel_stepper *k, bool watch)
 static int take_count(struct kernel_stepper *k)
 {
 	double most = incise_actuator_steps(&k->motor.actuator, HUGE_VAL);
-	struct incise_abi_status status;
+	struct incise_stepper_motor_status status;
 	int rc = incise_page_get_status(k->motor.slot, &status);
 
 	if (rc || (status.position >= 0 && (double)status.position <= most))
@@ -290,7 +292,7 @@ static int take_count(struct kernel_stepper *k)
 static int set_up(struct kernel_stepper *k, const struct incise_backend_request *asked,
 		  struct incise_error *err)
 {
-	struct incise_abi_info info = {0};
+	struct incise_stepper_controller info = {0};
 	int rc = parse(k, asked, err);
 
 	if (!rc)

@@ -220,8 +220,9 @@ int incise_stage_limit(struct incise_plan *plan, struct incise_tick *tick)
 static int refused(struct incise_plan *plan, const struct incise_stepper_status *status,
 		   int rc)
 {
-	plan->actuator_faults = status->faults & ~(unsigned int)INCISE_STEPPER_TRAVEL;
-	plan->actuator_off = rc == -EIO && status->state == INCISE_STEPPER_DISABLED;
+	plan->actuator_faults =
+		status->faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL;
+	plan->actuator_off = rc == -EIO && status->state == INCISE_STEPPER_STATE_DISABLED;
 	return rc;
 }
 

@@ -145,7 +145,7 @@ static void advance(struct sim_stepper *s, int64_t now)
 
 		if (s->watched && s->t_ns - s->set_ns >= DEADMAN_NS) {
 			s->target_mm = 0;
-			s->faults |= INCISE_STEPPER_DEADMAN;
+			s->faults |= INCISE_STEPPER_FAULT_DEADMAN;
 		}
 		move_nut(s);
 		if (s->sim->config.bench)
@@ -187,7 +187,7 @@ static INCISE_REALTIME int sim_stepper_set(struct incise_stepper *stepper,
 		return -EDOM;
 	s->limit_mm_s = s->sim->config.screw_mm_s;
 	s->faults = position_mm < 0 || position_mm > s->sim->config.travel_mm
-			    ? INCISE_STEPPER_TRAVEL
+			    ? INCISE_STEPPER_FAULT_TRAVEL
 			    : 0;
 	position_mm = fmax(0, fmin(most, position_mm));
 	s->target_mm = round(position_mm / s->step_mm) * s->step_mm;
@@ -255,9 +255,9 @@ static enum incise_stepper_state sim_stepper_state(const struct sim_stepper *s)
 	/* Within half a microstep, and slow enough to stop in one tick. */
 	if (fabs(s->nut_mm - s->target_mm) < s->step_mm / 2 &&
 	    fabs(s->nut_mm_s) <= s->sim->config.screw_mm_s2 * TICK_S)
-		return INCISE_STEPPER_READY;
-	return s->faults & INCISE_STEPPER_DEADMAN ? INCISE_STEPPER_STOPPING
-						  : INCISE_STEPPER_MOVING;
+		return INCISE_STEPPER_STATE_READY;
+	return s->faults & INCISE_STEPPER_FAULT_DEADMAN ? INCISE_STEPPER_STATE_STOPPING
+							: INCISE_STEPPER_STATE_MOVING;
 }
 
 static INCISE_REALTIME int sim_stepper_status(struct incise_stepper *stepper,

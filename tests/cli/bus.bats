@@ -26,7 +26,7 @@ setup_file() {
 			(void)s;
 			mm = to_mm;
 			if (fails() && ++sets > 20)
-				faults = INCISE_STEPPER_ALARM | INCISE_STEPPER_LOST;
+				faults = INCISE_STEPPER_FAULT_ALARM | INCISE_STEPPER_FAULT_LOST;
 			return faults ? -EIO : 0;
 		}
 		static int status(struct incise_stepper *s, struct incise_stepper_status *status)
@@ -34,8 +34,8 @@ setup_file() {
 			(void)s;
 			*status = (struct incise_stepper_status){.position_mm = mm, .handle_mm = NAN,
 				.force_N = NAN, .homed = true, .faults = faults,
-				.state = faults ? INCISE_STEPPER_FAULT :
-					powered ? INCISE_STEPPER_READY : INCISE_STEPPER_DISABLED};
+				.state = faults ? INCISE_STEPPER_STATE_FAULT :
+					powered ? INCISE_STEPPER_STATE_READY : INCISE_STEPPER_STATE_DISABLED};
 			return 0;
 		}
 		static int enable(struct incise_stepper *s, struct incise_error *err)
@@ -103,7 +103,7 @@ setup_file() {
 			stepper.ops = &ops;
 			snprintf(name, sizeof(name), "drive %s", asked->arguments);
 			if (strstr(name, "faulty"))
-				faults = INCISE_STEPPER_ALARM | INCISE_STEPPER_LOST;
+				faults = INCISE_STEPPER_FAULT_ALARM | INCISE_STEPPER_FAULT_LOST;
 			return &stepper;
 		}
 		static int scan(const char *arguments, incise_scan_found *found, void *context,

@@ -31,7 +31,7 @@ make_module() { # FILE NAME ABI
 			((struct mine *)s)->mm = mm;
 			sets++;
 			if (has("pressed") && sets > 20)
-				faults = INCISE_STEPPER_ESTOP;
+				faults = INCISE_STEPPER_FAULT_ESTOP;
 			if (has("hangs") && sets == 500)
 				sleep(3);
 			if (has("slow") && sets > 20)
@@ -41,7 +41,7 @@ make_module() { # FILE NAME ABI
 		static int status(struct incise_stepper *s, struct incise_stepper_status *status)
 		{
 			*status = (struct incise_stepper_status){.position_mm = ((struct mine *)s)->mm,
-				.handle_mm = NAN, .force_N = NAN, .state = INCISE_STEPPER_READY,
+				.handle_mm = NAN, .force_N = NAN, .state = INCISE_STEPPER_STATE_READY,
 				.homed = !strstr(((struct mine *)s)->name, "lost"), .faults = faults};
 			return 0;
 		}
@@ -49,7 +49,7 @@ make_module() { # FILE NAME ABI
 		static int clear(struct incise_stepper *s, struct incise_error *err)
 		{
 			(void)s; (void)err;
-			if (faults == INCISE_STEPPER_OWNER)
+			if (faults == INCISE_STEPPER_FAULT_OWNER)
 				faults = 0;
 			fputs("cleared\n", stderr);
 			return 0;
@@ -70,7 +70,7 @@ make_module() { # FILE NAME ABI
 			(void)err;
 			mine.stepper.ops = &ops;
 			snprintf(mine.name, sizeof(mine.name), "mine at %s", asked->arguments);
-			faults = has("left") ? INCISE_STEPPER_OWNER : has("latched") ? INCISE_STEPPER_ESTOP : 0;
+			faults = has("left") ? INCISE_STEPPER_FAULT_OWNER : has("latched") ? INCISE_STEPPER_FAULT_ESTOP : 0;
 			fprintf(stderr, "opened %s, lead %g\n", mine.name, asked->actuator->lead_mm);
 			return &mine;
 		}

@@ -22,7 +22,7 @@ static void wrong(const char *what)
 }
 
 /* A machine that holds every config that any machine does. */
-static const struct incise_stepper_info machine = {
+static const struct incise_stepper_controller machine = {
 	.n_motors = INCISE_STEPPER_MOTORS_MAX,
 	.rate_max = INCISE_PROFILE_VELOCITY_MAX,
 };

@@ -49,8 +49,8 @@ static int stopped(struct incise_stepper_status *status, int rc)
 {
 	if (hands.reads < BEGIN)
 		return rc;
-	status->state = INCISE_STEPPER_FAULT;
-	status->faults = INCISE_STEPPER_ESTOP;
+	status->state = INCISE_STEPPER_STATE_FAULT;
+	status->faults = INCISE_STEPPER_FAULT_ESTOP;
 	return -EIO;
 }
 

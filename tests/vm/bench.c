@@ -286,10 +286,11 @@ void bench_want(struct bench *bench, unsigned int motor, unsigned int mode,
 	slot->seq = seq + 2;
 }
 
-struct incise_stepper_status bench_look(const struct bench *bench, unsigned int motor)
+struct incise_stepper_motor_status bench_look(const struct bench *bench,
+					      unsigned int motor)
 {
-	const volatile struct incise_stepper_status *slot = &bench->status[motor];
-	struct incise_stepper_status copy;
+	const volatile struct incise_stepper_motor_status *slot = &bench->status[motor];
+	struct incise_stepper_motor_status copy;
 	uint32_t seq;
 
 	do {

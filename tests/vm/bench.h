@@ -43,8 +43,8 @@ struct bench {
 	char dev_name[64]; /* on the platform bus */
 	int fd;		   /* < 0: not open */
 	volatile struct incise_stepper_setpoint *setpoint;
-	const volatile struct incise_stepper_status *status;
-	struct incise_stepper_info info;
+	const volatile struct incise_stepper_motor_status *status;
+	struct incise_stepper_controller info;
 	struct incise_stepper_config config[INCISE_STEPPER_MOTORS_MAX];
 	struct edge_log log[INCISE_STEPPER_MOTORS_MAX];
 	uint64_t edges; /* judged so far, of all lines */
@@ -76,7 +76,8 @@ int bench_carriage(const struct incise_stepper_config *config, int64_t position,
 
 void bench_want(struct bench *bench, unsigned int motor, unsigned int mode,
 		int64_t target);
-struct incise_stepper_status bench_look(const struct bench *bench, unsigned int motor);
+struct incise_stepper_motor_status bench_look(const struct bench *bench,
+					      unsigned int motor);
 
 /* Hands all edges of the ring to the judges. */
 void bench_judge(struct bench *bench);

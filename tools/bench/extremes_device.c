@@ -79,7 +79,7 @@ static int hostile_status(struct incise_stepper *stepper,
 		return hostile.rc;
 	if (fails(FAILS_FAULT)) {
 		status->faults |= hostile.faults;
-		status->state = INCISE_STEPPER_FAULT;
+		status->state = INCISE_STEPPER_STATE_FAULT;
 	}
 	if (hostile.nonsense && !below(4)) {
 		status->position_mm = special();
@@ -122,8 +122,8 @@ static void prepare(bool nonsense)
 	hostile.rc = -codes[below(6)];
 	hostile.faults = 1U << below(INCISE_STEPPER_FAULTS);
 	/* Held within the travel is none. */
-	if (hostile.faults == INCISE_STEPPER_TRAVEL)
-		hostile.faults = INCISE_STEPPER_ESTOP;
+	if (hostile.faults == INCISE_STEPPER_FAULT_TRAVEL)
+		hostile.faults = INCISE_STEPPER_FAULT_ESTOP;
 	hostile.beyond = false;
 }
 

@@ -8,8 +8,9 @@
 #include "haptic_actuator.h"
 
 /* What says nothing of the machine, only of the program before. */
-#define LEFT_BEHIND \
-	(INCISE_STEPPER_DEADMAN | INCISE_STEPPER_OWNER | INCISE_STEPPER_SUSPEND)
+#define LEFT_BEHIND                                                  \
+	(INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER | \
+	 INCISE_STEPPER_FAULT_SUSPEND)
 
 static int home_it(struct incise_stepper *stepper, struct incise_error *err)
 {
@@ -35,7 +36,8 @@ static void drop_poses(struct incise_tracker *tracker)
 static int recover_it(struct incise_stepper *stepper, const char *name,
 		      struct incise_stepper_status *status, struct incise_error *err)
 {
-	unsigned int latched = status->faults & ~(unsigned int)INCISE_STEPPER_TRAVEL;
+	unsigned int latched =
+		status->faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL;
 	char cause[300];
 	int rc;
 
@@ -69,7 +71,7 @@ int haptic_take_hold(struct incise_rig *rig, bool home, bool recover,
 		return rc;
 	if (!status.homed && !home) {
 		/* Homing, too, is refused before that is cleared. */
-		if (status.faults & ~(unsigned int)INCISE_STEPPER_TRAVEL) {
+		if (status.faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL) {
 			incise_stepper_cause(stepper, cause, sizeof(cause));
 			return incise_error_set(err, EPERM, "%s: %s", info.name, cause);
 		}
@@ -106,7 +108,7 @@ void haptic_let_go(struct incise_rig *rig)
 	while (now < end && !incise_stepper_set(stepper, 0) &&
 	       !incise_stepper_status(stepper, &status) &&
 	       (status.position_mm > info.step_mm / 2 ||
-		status.state == INCISE_STEPPER_MOVING)) {
+		status.state == INCISE_STEPPER_STATE_MOVING)) {
 		incise_clock_wait_until(clock, now + 2000000);
 		now = incise_clock_now(clock);
 	}

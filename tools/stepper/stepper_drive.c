@@ -65,7 +65,7 @@ void stepper_drive_look(struct stepper_drive *drive)
 
 	if (rc == -ENODEV)
 		stepper_drive_fail(drive, "%s: %s", drive->info.name,
-				   incise_stepper_fault_text(INCISE_STEPPER_GONE));
+				   incise_stepper_fault_text(INCISE_STEPPER_FAULT_GONE));
 	if (rc)
 		stepper_drive_fail(drive, "%s: reading its status: %s", drive->info.name,
 				   strerror(-rc));
@@ -95,7 +95,7 @@ void stepper_drive_power(struct stepper_drive *drive)
 
 bool stepper_drive_rests(const struct stepper_drive *drive)
 {
-	return drive->status.state == INCISE_STEPPER_READY &&
+	return drive->status.state == INCISE_STEPPER_STATE_READY &&
 	       drive->status.velocity_mm_s == 0;
 }
 
@@ -116,7 +116,7 @@ void stepper_drive_rest(struct stepper_drive *drive)
 		stepper_drive_fail(drive, "%s", err.text);
 	stepper_drive_look(drive);
 	/* The virtual one goes back to 0. */
-	while (drive->status.state == INCISE_STEPPER_MOVING)
+	while (drive->status.state == INCISE_STEPPER_STATE_MOVING)
 		pass(drive, drive->period_ns);
 }
 
@@ -135,11 +135,11 @@ static _Noreturn void fail_with_fault(struct stepper_drive *drive)
 	unsigned int faults;
 	char text[400];
 
-	for (int64_t ns = 0; drive->status.state == INCISE_STEPPER_STOPPING &&
+	for (int64_t ns = 0; drive->status.state == INCISE_STEPPER_STATE_STOPPING &&
 			     ns < STOPPING_NS && incise_clock_is_real(drive->clock);
 	     ns += drive->period_ns)
 		pass(drive, drive->period_ns);
-	faults = drive->status.faults & ~INCISE_STEPPER_TRAVEL;
+	faults = drive->status.faults & ~INCISE_STEPPER_FAULT_TRAVEL;
 	stepper_drive_fail(drive, "%s stopped at %.4f mm: %s", drive->info.name,
 			   drive->status.position_mm,
 			   faults ? stepper_why(drive->stepper, faults, text,
@@ -162,9 +162,9 @@ static void follow(struct stepper_drive *drive, int rc)
 		stepper_drive_look(drive);
 	else
 		pass(drive, drive->period_ns);
-	if (rc || drive->status.faults & ~INCISE_STEPPER_TRAVEL ||
-	    (drive->status.state != INCISE_STEPPER_READY &&
-	     drive->status.state != INCISE_STEPPER_MOVING))
+	if (rc || drive->status.faults & ~INCISE_STEPPER_FAULT_TRAVEL ||
+	    (drive->status.state != INCISE_STEPPER_STATE_READY &&
+	     drive->status.state != INCISE_STEPPER_STATE_MOVING))
 		fail_with_fault(drive);
 	if (incise_clock_is_real(drive->clock) && now - drive->shown_ns >= SHOW_NS) {
 		cli_progress("%s: %9.4f mm %8.3f mm/s, Ctrl-C stops", drive->doing,

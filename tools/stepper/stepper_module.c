@@ -20,8 +20,8 @@
 #define TRIES 1000
 
 /* A slot that the kernel may be writing, whole. */
-static int read_slot(const volatile struct incise_stepper_status *slot,
-		     struct incise_stepper_status *status)
+static int read_slot(const volatile struct incise_stepper_motor_status *slot,
+		     struct incise_stepper_motor_status *status)
 {
 	for (int i = 0; i < TRIES; i++) {
 		uint32_t before = __atomic_load_n(&slot->seq, __ATOMIC_ACQUIRE);
@@ -39,7 +39,7 @@ static void read_status(struct stepper_module *module, int fd)
 	size_t size = (size_t)sysconf(_SC_PAGESIZE);
 	void *page = mmap(NULL, size, PROT_READ, MAP_SHARED, fd,
 			  (off_t)(INCISE_STEPPER_PAGE_STATUS * size));
-	struct incise_stepper_status *slots = page;
+	struct incise_stepper_motor_status *slots = page;
 
 	if (page == MAP_FAILED)
 		cli_fail("%s: mapping its status: %s", module->path, strerror(errno));

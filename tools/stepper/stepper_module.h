@@ -22,14 +22,14 @@ struct stepper_histogram {
 
 struct stepper_motor {
 	struct incise_stepper_config config;
-	struct incise_stepper_status status;
+	struct incise_stepper_motor_status status;
 	struct stepper_histogram lateness, cost; /* of the hard timer */
 	uint64_t edges;
 };
 
 struct stepper_module {
 	const char *path;
-	struct incise_stepper_info info;
+	struct incise_stepper_controller info;
 	struct incise_stepper_sync sync;
 	bool has_sync;
 	bool has_evidence;    /* debugfs could be read: histograms and edges are there */

@@ -6,6 +6,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+#include <incise/stepper.h>
 #include "../cli/cli.h"
 #include "../cli/json.h"
 #include "stepper_module.h"
@@ -24,14 +25,6 @@ static const char *const faults[] = {"deadman", "limit_min", "limit_max", "estop
 				     "alarm",	"late",	     "setpoint",  "owner",
 				     "suspend", "gone",	     "line"};
 #define FAULTS (sizeof(faults) / sizeof(*faults))
-
-static const char *state_name(uint32_t state)
-{
-	static const char *const names[] = {"disabled", "ready", "moving", "stopping",
-					    "fault"};
-
-	return state < sizeof(names) / sizeof(*names) ? names[state] : "unknown";
-}
 
 bool stepper_module_is(const char *what)
 {
@@ -98,11 +91,11 @@ static void put_histograms(const struct stepper_module *module,
 static void put_motor(const struct stepper_module *module, uint32_t i)
 {
 	const struct stepper_motor *motor = &module->motor[i];
-	const struct incise_stepper_status *s = &motor->status;
+	const struct incise_stepper_motor_status *s = &motor->status;
 
 	printf("motor %u: %s at step %" PRId64 ", target %" PRId64 ", %.0f steps/s, %s\n",
-	       i, state_name(s->state), (int64_t)s->position, (int64_t)s->target,
-	       velocity_steps_s(motor),
+	       i, incise_stepper_state_name((enum incise_stepper_state)s->state),
+	       (int64_t)s->position, (int64_t)s->target, velocity_steps_s(motor),
 	       s->flags & INCISE_STEPPER_FLAG_HOMED ? "homed" : "not homed");
 	put_bits("lines", module->info.lines[i], lines, LINES);
 	put_bits("active", s->inputs, lines, LINES);
@@ -133,7 +126,7 @@ static void put_sync(const struct stepper_module *module)
 
 static void put_text(const struct stepper_module *module)
 {
-	const struct incise_stepper_info *info = &module->info;
+	const struct incise_stepper_controller *info = &module->info;
 
 	printf("%s: %.*s, %u motor%s\n", module->path, (int)sizeof(info->name),
 	       info->name, info->n_motors, info->n_motors == 1 ? "" : "s");
@@ -201,11 +194,12 @@ static json_t *histogram_json(const struct stepper_module *module,
 static json_t *motor_json(const struct stepper_module *module, uint32_t i)
 {
 	const struct stepper_motor *motor = &module->motor[i];
-	const struct incise_stepper_status *s = &motor->status;
+	const struct incise_stepper_motor_status *s = &motor->status;
 
 	return json_pack("{ss sI sI sf sb so so so so sI sI sI sI so so so}", "state",
-			 state_name(s->state), "position_steps", (json_int_t)s->position,
-			 "target_steps", (json_int_t)s->target, "velocity_steps_s",
+			 incise_stepper_state_name((enum incise_stepper_state)s->state),
+			 "position_steps", (json_int_t)s->position, "target_steps",
+			 (json_int_t)s->target, "velocity_steps_s",
 			 velocity_steps_s(motor), "homed",
 			 (int)!!(s->flags & INCISE_STEPPER_FLAG_HOMED), "lines",
 			 bits_json(module->info.lines[i], lines, LINES), "inputs",
@@ -236,7 +230,7 @@ static json_t *sync_json(const struct stepper_module *module)
 
 static json_t *module_json(const struct stepper_module *module)
 {
-	const struct incise_stepper_info *info = &module->info;
+	const struct incise_stepper_controller *info = &module->info;
 	json_t *motors = json_array();
 	char name[sizeof(info->name) + 1] = {0};
 

@@ -22,13 +22,29 @@ static const struct {
 };
 #define INPUTS (sizeof(inputs) / sizeof(*inputs))
 
-static const char *const fault_keys[] = {
-	"deadman", "travel", "limit_min", "limit_max", "estop",
-	"alarm",   "late",   "setpoint",  "owner",     "suspend",
-	"gone",	   "line",   "bus",	  "lost",      "following",
+/* In the order of their report. */
+static const struct {
+	enum incise_stepper_fault fault;
+	const char *key;
+} fault_keys[] = {
+	{INCISE_STEPPER_FAULT_DEADMAN, "deadman"},
+	{INCISE_STEPPER_FAULT_TRAVEL, "travel"},
+	{INCISE_STEPPER_FAULT_LIMIT_MIN, "limit_min"},
+	{INCISE_STEPPER_FAULT_LIMIT_MAX, "limit_max"},
+	{INCISE_STEPPER_FAULT_ESTOP, "estop"},
+	{INCISE_STEPPER_FAULT_ALARM, "alarm"},
+	{INCISE_STEPPER_FAULT_LATE, "late"},
+	{INCISE_STEPPER_FAULT_SETPOINT, "setpoint"},
+	{INCISE_STEPPER_FAULT_OWNER, "owner"},
+	{INCISE_STEPPER_FAULT_SUSPEND, "suspend"},
+	{INCISE_STEPPER_FAULT_GONE, "gone"},
+	{INCISE_STEPPER_FAULT_LINE, "line"},
+	{INCISE_STEPPER_FAULT_BUS, "bus"},
+	{INCISE_STEPPER_FAULT_LOST, "lost"},
+	{INCISE_STEPPER_FAULT_FOLLOWING, "following"},
 };
-_Static_assert(sizeof(fault_keys) / sizeof(*fault_keys) == INCISE_STEPPER_FAULTS,
-	       "a key for each fault");
+#define FAULTS (sizeof(fault_keys) / sizeof(*fault_keys))
+_Static_assert(FAULTS == INCISE_STEPPER_FAULTS, "a key for each fault");
 
 long long stepper_steps(const struct incise_stepper_info *info, double mm)
 {
@@ -40,11 +56,11 @@ static const char *faults_text(unsigned int faults, char *text, size_t size)
 	size_t used = 0;
 
 	text[0] = 0;
-	for (unsigned int bit = 0; bit < INCISE_STEPPER_FAULTS && used < size; bit++)
-		if (faults & 1u << bit)
+	for (size_t i = 0; i < FAULTS && used < size; i++)
+		if (faults & fault_keys[i].fault)
 			used += snprintf(text + used, size - used, "%s%s",
 					 used ? "; " : "",
-					 incise_stepper_fault_text(1u << bit));
+					 incise_stepper_fault_text(fault_keys[i].fault));
 	return text;
 }
 
@@ -66,8 +82,8 @@ static bool own_cause(struct incise_stepper *stepper, unsigned int faults, char 
 {
 	if (!faults || incise_stepper_cause(stepper, text, size) <= 0)
 		return false;
-	for (unsigned int bit = 0; bit < INCISE_STEPPER_FAULTS; bit++)
-		if (!strcmp(text, incise_stepper_fault_text(1u << bit)))
+	for (size_t i = 0; i < FAULTS; i++)
+		if (!strcmp(text, incise_stepper_fault_text(fault_keys[i].fault)))
 			return false;
 	drop_name(stepper, text);
 	return true;
@@ -130,9 +146,10 @@ void stepper_status_text(struct incise_stepper *stepper,
 		putchar(')');
 	}
 	putchar('\n');
-	for (unsigned int bit = 0; bit < INCISE_STEPPER_FAULTS; bit++)
-		if (status->faults & 1u << bit)
-			printf("fault      %s\n", incise_stepper_fault_text(1u << bit));
+	for (size_t i = 0; i < FAULTS; i++)
+		if (status->faults & fault_keys[i].fault)
+			printf("fault      %s\n",
+			       incise_stepper_fault_text(fault_keys[i].fault));
 	if (!status->faults)
 		puts("faults     none");
 	if (own_cause(stepper, status->faults, cause, sizeof(cause)))
@@ -171,12 +188,13 @@ static json_t *faults_json(unsigned int faults)
 {
 	json_t *list = json_array();
 
-	for (unsigned int bit = 0; bit < INCISE_STEPPER_FAULTS; bit++)
-		if (faults & 1u << bit)
-			json_array_append_new(
-				list,
-				json_pack("{ss ss}", "fault", fault_keys[bit], "text",
-					  incise_stepper_fault_text(1u << bit)));
+	for (size_t i = 0; i < FAULTS; i++)
+		if (faults & fault_keys[i].fault)
+			json_array_append_new(list,
+					      json_pack("{ss ss}", "fault",
+							fault_keys[i].key, "text",
+							incise_stepper_fault_text(
+								fault_keys[i].fault)));
 	return list;
 }
 

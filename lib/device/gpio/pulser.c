@@ -78,8 +78,8 @@ static void look(struct incise_pulser *p, int64_t now)
 	}
 	if (inputs & INCISE_STEPPER_LINE_ESTOP)
 		fault_at(p, INCISE_STEPPER_FAULT_ESTOP, now);
-	if (inputs & INCISE_STEPPER_LINE_DRIVER)
-		fault_at(p, INCISE_STEPPER_FAULT_DRIVER, now);
+	if (inputs & INCISE_STEPPER_LINE_ALARM)
+		fault_at(p, INCISE_STEPPER_FAULT_ALARM, now);
 	/* Motion away from a limit is allowed. */
 	if (moves && inputs & INCISE_STEPPER_LINE_LIMIT_MIN && p->steps.dir < 0)
 		fault_at(p, INCISE_STEPPER_FAULT_LIMIT_MIN, now);

@@ -37,7 +37,7 @@ struct gpio_stepper {
 	struct incise_motor motor;
 	/* The two pages. */
 	_Alignas(64) struct incise_stepper_setpoint setpoint;
-	_Alignas(64) struct incise_abi_status status;
+	_Alignas(64) struct incise_stepper_motor_status status;
 	/* Mailbox: written by the caller while it is NONE, else by the thread. */
 	_Alignas(64) atomic_int command;
 	int32_t steps;
@@ -79,7 +79,7 @@ static unsigned int input_bits(unsigned int lines)
 		[INCISE_LINE_LIMIT_MAX] = INCISE_STEPPER_LINE_LIMIT_MAX,
 		[INCISE_LINE_HOME] = INCISE_STEPPER_LINE_HOME,
 		[INCISE_LINE_ESTOP] = INCISE_STEPPER_LINE_ESTOP,
-		[INCISE_LINE_ALARM] = INCISE_STEPPER_LINE_DRIVER,
+		[INCISE_LINE_ALARM] = INCISE_STEPPER_LINE_ALARM,
 	};
 	unsigned int bits = 0;
 

@@ -89,7 +89,7 @@ struct incise_stepper_edge {
 struct incise_stepper_homing {
 	double speed_mm_s;    /**< of the approach; a tenth of it for the edge */
 	double home_mm;	      /**< position of the edge in the machine */
-	unsigned int home_at; /**< INCISE_STEPPER_AT_HOME, or _AT_MIN without one */
+	unsigned int home_at; /**< INCISE_STEPPER_LINE_HOME, or _AT_MIN without one */
 };
 
 /**
@@ -229,8 +229,8 @@ struct incise_actuator {
 	struct incise_actuator_can can;
 };
 
-/** Changes when any struct of this header does. */
-#define INCISE_BACKEND_ABI 4
+/** Changes when a struct or value that backends use does. */
+#define INCISE_BACKEND_ABI 5
 
 /** Settings of rig.conf for a backend. */
 struct incise_backend_request {

@@ -23,6 +23,7 @@
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
+#include <incise/stepper_state.h>
 
 INCISE_BEGIN_DECLS
 
@@ -43,49 +44,7 @@ struct incise_stepper_info {
 	bool can_home;	      /**< incise_stepper_home() can find its 0 */
 	double origin_mm;     /**< without measures_handle: where handle_mm is 0, along
 					the actuator's axis in the tracker's frame */
-	unsigned int inputs;  /**< incise_stepper_input bits that are wired */
-};
-
-/** What it does. */
-enum incise_stepper_state {
-	INCISE_STEPPER_DISABLED, /**< not powered, no fault */
-	INCISE_STEPPER_READY,	 /**< powered, at rest */
-	INCISE_STEPPER_MOVING,
-	INCISE_STEPPER_STOPPING, /**< coming to rest because of a fault */
-	INCISE_STEPPER_FAULT,	 /**< not powered; clear, then enable */
-};
-
-/**
- * Why an actuator does not move, or not as asked; bits. All are latched but TRAVEL, and
- * the virtual rig's DEADMAN, which ends with the next target.
- */
-enum incise_stepper_fault {
-	INCISE_STEPPER_DEADMAN = 1, /**< set-points stopped coming */
-	INCISE_STEPPER_TRAVEL = 2, /**< a set-point lay outside the travel and was held */
-	INCISE_STEPPER_LIMIT_MIN = 4,  /**< ran into the limit switch at 0 */
-	INCISE_STEPPER_LIMIT_MAX = 8,  /**< at the end of the travel */
-	INCISE_STEPPER_ESTOP = 16,     /**< emergency stop */
-	INCISE_STEPPER_ALARM = 32,     /**< the power stage reports a fault */
-	INCISE_STEPPER_LATE = 64,      /**< this machine could not hold the step times */
-	INCISE_STEPPER_SETPOINT = 128, /**< a set-point that cannot be read */
-	INCISE_STEPPER_OWNER = 256,    /**< the program that drove it ended */
-	INCISE_STEPPER_SUSPEND = 512,  /**< the machine went to sleep */
-	INCISE_STEPPER_GONE = 1024,    /**< the device went away */
-	INCISE_STEPPER_LINE = 2048,    /**< a GPIO line cannot be written or read */
-	INCISE_STEPPER_BUS = 4096,     /**< the bus to the drive fails */
-	INCISE_STEPPER_LOST = 8192, /**< the drive is not heard any more, or rebooted */
-	INCISE_STEPPER_FOLLOWING = 16384, /**< it does not follow its targets */
-};
-
-#define INCISE_STEPPER_FAULTS 15 /**< bits of incise_stepper_fault */
-
-/** Inputs that are active; bits. */
-enum incise_stepper_input {
-	INCISE_STEPPER_AT_MIN = 1,
-	INCISE_STEPPER_AT_MAX = 2,
-	INCISE_STEPPER_AT_HOME = 4,
-	INCISE_STEPPER_ESTOP_ACTIVE = 8,
-	INCISE_STEPPER_ALARM_ACTIVE = 16,
+	unsigned int inputs;  /**< incise_stepper_line bits that are wired */
 };
 
 /** Where it stands. */
@@ -97,7 +56,7 @@ struct incise_stepper_status {
 	double force_N;	      /**< on the hand; NaN where it is not measured */
 	unsigned int faults;  /**< incise_stepper_fault bits */
 	enum incise_stepper_state state;
-	unsigned int inputs; /**< incise_stepper_input bits that are active */
+	unsigned int inputs; /**< incise_stepper_line bits that are active */
 	bool homed;	     /**< position_mm is that of the machine, not just a count */
 	uint64_t late;	     /**< steps that came too late since it was opened */
 };

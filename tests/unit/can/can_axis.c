@@ -20,7 +20,7 @@ struct bench {
 	struct led led;
 	struct can_axis axis;
 	struct incise_stepper_setpoint setpoint;
-	struct incise_abi_status slot;
+	struct incise_stepper_motor_status slot;
 };
 
 static void start(struct bench *b)
@@ -158,7 +158,7 @@ static void a_few_set_points_may_wait_for_the_queue(void **state)
 	b.led.drive.send_error = -ENOBUFS;
 	b.led.drive.send_errors = 0;
 	cycles(&b, 50, 20000);
-	assert_int_equal(b.slot.faults, INCISE_ABI_FAULT_BUS);
+	assert_int_equal(b.slot.faults, INCISE_STEPPER_FAULT_BUS);
 	assert_int_equal(b.axis.cause, CAN_AXIS_QUEUE_FULL);
 }
 

@@ -152,7 +152,7 @@ static void a_watcher_looks_and_writes_nothing(void **state)
 	enables = rig.drive.enables;
 	can_rig_advance(&rig, 100 * MS);
 	s = can_rig_look(&rig);
-	assert_int_equal(s.state, INCISE_STEPPER_DISABLED);
+	assert_int_equal(s.state, INCISE_STEPPER_STATE_DISABLED);
 	assert_true(s.homed && fabs(s.position_mm - 3) < 1e-3);
 	assert_int_equal(incise_stepper_set(rig.stepper, 1), -EPERM);
 	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
@@ -160,15 +160,16 @@ static void a_watcher_looks_and_writes_nothing(void **state)
 	rig.drive.inputs = CIA402_AT_MAX | CIA402_AT_HOME;
 	can_rig_advance(&rig, 100 * MS);
 	s = can_rig_look(&rig);
-	assert_int_equal(s.inputs, INCISE_STEPPER_AT_MAX | INCISE_STEPPER_AT_HOME);
+	assert_int_equal(s.inputs,
+			 INCISE_STEPPER_LINE_LIMIT_MAX | INCISE_STEPPER_LINE_HOME);
 	drive_fault(&rig.drive, 0x4310);
 	can_rig_advance(&rig, 100 * MS);
 	s = can_rig_look(&rig);
-	assert_int_equal(s.state, INCISE_STEPPER_FAULT);
-	assert_int_equal(s.faults, INCISE_STEPPER_ALARM);
+	assert_int_equal(s.state, INCISE_STEPPER_STATE_FAULT);
+	assert_int_equal(s.faults, INCISE_STEPPER_FAULT_ALARM);
 	rig.drive.mute = true;
 	can_rig_advance(&rig, 1000 * MS);
-	assert_int_equal(can_rig_look(&rig).faults, INCISE_STEPPER_LOST);
+	assert_int_equal(can_rig_look(&rig).faults, INCISE_STEPPER_FAULT_LOST);
 	assert_int_equal(rig.drive.enables, enables);
 	assert_int_equal(rig.drive.master_beats, 0);
 	can_rig_close(&rig);

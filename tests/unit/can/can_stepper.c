@@ -26,9 +26,9 @@ static void failed(const char *text)
 static void input(void *world, unsigned int input, bool active)
 {
 	struct can_rig *r = world;
-	uint32_t bit = input == INCISE_STEPPER_ESTOP_ACTIVE ? CIA402_INTERLOCK
-		       : r->actuator.invert		    ? CIA402_AT_MIN
-							    : CIA402_AT_MAX;
+	uint32_t bit = input == INCISE_STEPPER_LINE_ESTOP ? CIA402_INTERLOCK
+		       : r->actuator.invert		  ? CIA402_AT_MIN
+							  : CIA402_AT_MAX;
 
 	r->drive.inputs = active ? r->drive.inputs | bit : r->drive.inputs & ~bit;
 }
@@ -157,18 +157,19 @@ static const struct {
 	unsigned int fault;
 	const char *says;
 } faults[] = {
-	{"EMCY", emcy, INCISE_STEPPER_ALARM, "(3210h)"},
-	{"no heartbeat", heartbeat, INCISE_STEPPER_LOST, "no heartbeat of it"},
-	{"no TPDO", tpdo, INCISE_STEPPER_LOST, "no status (TPDO1)"},
-	{"unplugged", unplugged, INCISE_STEPPER_LOST, "see its power and cable"},
-	{"reboot", reboot, INCISE_STEPPER_LOST, "began anew"},
-	{"blocked", blocked, INCISE_STEPPER_FOLLOWING, "off its target by"},
-	{"bus-off", bus_off, INCISE_STEPPER_BUS, "the bus is off"},
-	{"queue full", queue_full, INCISE_STEPPER_BUS, "queue is full"},
-	{"adapter gone", adapter_gone, INCISE_STEPPER_BUS, "No such device"},
-	{"other master", other_master, INCISE_STEPPER_SETPOINT, "another program"},
-	{"power taken", powered_off, INCISE_STEPPER_ALARM, "left operation enabled"},
-	{"NMT", pre_operational, INCISE_STEPPER_LOST, "pre-operational"},
+	{"EMCY", emcy, INCISE_STEPPER_FAULT_ALARM, "(3210h)"},
+	{"no heartbeat", heartbeat, INCISE_STEPPER_FAULT_LOST, "no heartbeat of it"},
+	{"no TPDO", tpdo, INCISE_STEPPER_FAULT_LOST, "no status (TPDO1)"},
+	{"unplugged", unplugged, INCISE_STEPPER_FAULT_LOST, "see its power and cable"},
+	{"reboot", reboot, INCISE_STEPPER_FAULT_LOST, "began anew"},
+	{"blocked", blocked, INCISE_STEPPER_FAULT_FOLLOWING, "off its target by"},
+	{"bus-off", bus_off, INCISE_STEPPER_FAULT_BUS, "the bus is off"},
+	{"queue full", queue_full, INCISE_STEPPER_FAULT_BUS, "queue is full"},
+	{"adapter gone", adapter_gone, INCISE_STEPPER_FAULT_BUS, "No such device"},
+	{"other master", other_master, INCISE_STEPPER_FAULT_SETPOINT, "another program"},
+	{"power taken", powered_off, INCISE_STEPPER_FAULT_ALARM,
+	 "left operation enabled"},
+	{"NMT", pre_operational, INCISE_STEPPER_FAULT_LOST, "pre-operational"},
 };
 
 static void each_fault_stops_the_drive_and_is_named(void **state)
@@ -191,8 +192,8 @@ static void each_fault_stops_the_drive_and_is_named(void **state)
 		can_rig_hold(&rig, 15, 2000 * MS);
 		s = can_rig_look(&rig);
 		incise_stepper_cause(rig.stepper, cause, sizeof(cause));
-		if (s.state != INCISE_STEPPER_FAULT || !(s.faults & faults[i].fault) ||
-		    !strstr(cause, faults[i].says) ||
+		if (s.state != INCISE_STEPPER_STATE_FAULT ||
+		    !(s.faults & faults[i].fault) || !strstr(cause, faults[i].says) ||
 		    !strstr(cause, "drive 0x10 at can-test: "))
 			fail_msg("%s: %s, faults %#x, \"%s\"", faults[i].name,
 				 incise_stepper_state_name(s.state), s.faults, cause);
@@ -242,7 +243,7 @@ static void a_program_that_hangs_is_stopped_by_the_drive(void **state)
 	assert_true(rig.drive.position / COUNTS_PER_MM - at_mm <= most_mm);
 	/* The program wakes up: nothing moves by itself. */
 	can_rig_hold(&rig, 15, 2000 * MS);
-	assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_FAULT);
+	assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_STATE_FAULT);
 	assert_int_equal(rig.drive.velocity, 0);
 	assert_int_equal(rig.drive.enabled_unasked, 0);
 	can_rig_close(&rig);
@@ -361,7 +362,7 @@ static void stopped(unsigned int fault, const char *says)
 	can_rig_hold(&rig, 10, 3000 * MS);
 	s = can_rig_look(&rig);
 	incise_stepper_cause(rig.stepper, cause, sizeof(cause));
-	if (s.state != INCISE_STEPPER_FAULT || !(s.faults & fault) ||
+	if (s.state != INCISE_STEPPER_STATE_FAULT || !(s.faults & fault) ||
 	    !strstr(cause, says))
 		fail_msg("%s, faults %#x, \"%s\"", incise_stepper_state_name(s.state),
 			 s.faults, cause);
@@ -386,7 +387,7 @@ static void silence_of_the_drive_moves_nothing(void **state)
 			assert_true(at_mm() < (mode == INCISE_ACTUATOR_CST ? 5 : 4.01));
 			assert_true(at_mm() > 0);
 			rig.drive.no_tpdo = mode == INCISE_ACTUATOR_CSP;
-			stopped(INCISE_STEPPER_LOST, "no status (TPDO1)");
+			stopped(INCISE_STEPPER_FAULT_LOST, "no status (TPDO1)");
 			can_rig_close(&rig);
 		}
 }
@@ -410,8 +411,8 @@ static void a_drive_that_does_not_obey_is_left_to_its_own_watch(void **state)
 		 */
 		assert_true(at_mm() - from_mm <
 			    1 + 10 * (0.05 + 0.02 + 0.125) + 2 * 0.1 + 0.1);
-		stopped(INCISE_STEPPER_FOLLOWING | INCISE_STEPPER_LOST |
-				INCISE_STEPPER_ALARM,
+		stopped(INCISE_STEPPER_FAULT_FOLLOWING | INCISE_STEPPER_FAULT_LOST |
+				INCISE_STEPPER_FAULT_ALARM,
 			"drive 0x10 at can-test: ");
 		can_rig_close(&rig);
 	}
@@ -443,7 +444,7 @@ static void a_set_point_without_its_sync_is_none(void **state)
 	/* Its own watch, and a heartbeat that was on its way. */
 	assert_true(at_mm() - from_mm < 10 * 0.125 + 0.3);
 	rig.drive.bus.ops = before;
-	stopped(INCISE_STEPPER_BUS, "queue is full");
+	stopped(INCISE_STEPPER_FAULT_BUS, "queue is full");
 	can_rig_close(&rig);
 }
 
@@ -455,7 +456,7 @@ static void inputs_that_fall_silent_are_a_fault(void **state)
 	assert_int_equal(can_rig_look(&rig).faults, 0);
 	rig.drive.od[OD_TPDO2_COB].value |= 0x80000000u;
 	can_rig_hold(&rig, 10, 400 * MS);
-	stopped(INCISE_STEPPER_LOST, "its inputs (TPDO2) were not heard");
+	stopped(INCISE_STEPPER_FAULT_LOST, "its inputs (TPDO2) were not heard");
 	can_rig_close(&rig);
 	/* A drive without the event timer gives no such indication. */
 	can_rig_init(&rig);
@@ -476,7 +477,7 @@ static void power_that_nobody_gave_is_a_fault(void **state)
 	assert_int_equal(incise_stepper_disable(rig.stepper, NULL), 0);
 	drive_enter(&rig.drive, CIA402_ENABLED);
 	can_rig_advance(&rig, 1000 * MS);
-	assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_FAULT);
+	assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_STATE_FAULT);
 	/* And its watch ends that. */
 	assert_false(drive_powered(&rig.drive));
 	if (incise_stepper_clear(rig.stepper, &err))
@@ -568,7 +569,8 @@ static void it_homes_by_itself(void **state)
 		if (incise_stepper_home(rig.stepper, NULL, &edge, &err))
 			fail_msg("%s", err.text);
 		s = can_rig_look(&rig);
-		assert_true(s.homed && s.state == INCISE_STEPPER_READY && !s.faults);
+		assert_true(s.homed && s.state == INCISE_STEPPER_STATE_READY &&
+			    !s.faults);
 		assert_true(isnan(edge.before_mm) && edge.after_mm == home_mm[i]);
 		assert_true(fabs(s.position_mm - fmax(0, home_mm[i])) < 1e-3);
 		/* The drive's own 0 is at its switch, that is at home_mm. */

@@ -134,7 +134,7 @@ static void a_watcher_has_a_thread_too(void **state)
 		fail_msg("%s", err.text);
 	/* The first status is valid at once. */
 	assert_int_equal(incise_stepper_status(rig.stepper, &s), 0);
-	assert_true(s.t_ns && s.state == INCISE_STEPPER_DISABLED);
+	assert_true(s.t_ns && s.state == INCISE_STEPPER_STATE_DISABLED);
 	for (int i = 0; i < 5000; i++) {
 		int64_t t_ns = s.t_ns;
 

@@ -20,7 +20,7 @@ struct conformance {
 	void *world;
 	void (*advance)(void *world, int64_t ns);
 	/*
-	 * Make INCISE_STEPPER_ESTOP_ACTIVE, or _AT_MAX, active or not; NULL: it has none.
+	 * Make INCISE_STEPPER_LINE_ESTOP, or _AT_MAX, active or not; NULL: it has none.
 	 */
 	void (*input)(void *world, unsigned int input, bool active);
 	bool always_powered; /* the virtual rig: no power, and faults end by themselves */
@@ -87,8 +87,8 @@ static inline void conform_rests_when_opened(struct conformance *c)
 	struct incise_stepper_status s = conform_look(c), later;
 
 	CONFORM(c, s.faults == 0 && s.velocity_mm_s == 0);
-	CONFORM(c, s.state == (c->always_powered ? INCISE_STEPPER_READY
-						 : INCISE_STEPPER_DISABLED));
+	CONFORM(c, s.state == (c->always_powered ? INCISE_STEPPER_STATE_READY
+						 : INCISE_STEPPER_STATE_DISABLED));
 	CONFORM(c, c->info.travel_mm > 0 && c->info.step_mm > 0 && c->info.name[0]);
 	CONFORM(c, c->info.spring_N_mm > 0 && c->info.deadman_s > 0);
 	if (!c->always_powered)
@@ -114,7 +114,7 @@ static inline void conform_goes_where_it_is_sent(struct conformance *c)
 		s = conform_look(c);
 		/* The nearest microstep. */
 		CONFORM(c, fabs(s.position_mm - mm) <= 0.501 * c->info.step_mm);
-		CONFORM(c, s.state == INCISE_STEPPER_READY && s.velocity_mm_s == 0);
+		CONFORM(c, s.state == INCISE_STEPPER_STATE_READY && s.velocity_mm_s == 0);
 		CONFORM(c, s.faults == 0);
 		before = mm;
 	}
@@ -163,11 +163,11 @@ static inline void conform_holds_targets_within_the_travel(struct conformance *c
 	conform_enable(c);
 	conform_hold(c, -1e30, 0.1);
 	s = conform_look(c);
-	CONFORM(c, s.position_mm == 0 && s.faults == INCISE_STEPPER_TRAVEL);
+	CONFORM(c, s.position_mm == 0 && s.faults == INCISE_STEPPER_FAULT_TRAVEL);
 	conform_hold(c, 1e30, conform_time(c, c->info.travel_mm) + c->slack_s);
 	s = conform_look(c);
 	CONFORM(c, fabs(s.position_mm - c->info.travel_mm) < c->info.step_mm);
-	CONFORM(c, s.faults == INCISE_STEPPER_TRAVEL);
+	CONFORM(c, s.faults == INCISE_STEPPER_FAULT_TRAVEL);
 	/* No number is no target. */
 	CONFORM(c, incise_stepper_set(c->stepper, NAN) == -EDOM);
 	CONFORM(c, incise_stepper_set(c->stepper, INFINITY) == -EDOM);
@@ -186,23 +186,23 @@ static inline void conform_deadman(struct conformance *c)
 	CONFORM(c, conform_look(c).faults == 0);
 	c->advance(c->world, (int64_t)((c->info.deadman_s + stop_s + c->slack_s) * 1e9));
 	if (c->always_powered) {
-		CONFORM(c, conform_look(c).faults == INCISE_STEPPER_DEADMAN);
+		CONFORM(c, conform_look(c).faults == INCISE_STEPPER_FAULT_DEADMAN);
 		return;
 	}
 	s = conform_look(c);
-	CONFORM(c, s.faults == INCISE_STEPPER_DEADMAN);
-	CONFORM(c, s.state == INCISE_STEPPER_FAULT && s.velocity_mm_s == 0);
+	CONFORM(c, s.faults == INCISE_STEPPER_FAULT_DEADMAN);
+	CONFORM(c, s.state == INCISE_STEPPER_STATE_FAULT && s.velocity_mm_s == 0);
 	/* Latched: no target, and no power, before it is cleared. */
 	CONFORM(c, incise_stepper_set(c->stepper, 1) == -EIO);
 	CONFORM(c, incise_stepper_enable(c->stepper, NULL) == -EPERM);
 	CONFORM(c, !incise_stepper_clear(c->stepper, NULL));
-	CONFORM(c, conform_look(c).state == INCISE_STEPPER_DISABLED);
+	CONFORM(c, conform_look(c).state == INCISE_STEPPER_STATE_DISABLED);
 	conform_enable(c);
 	c->advance(c->world, (int64_t)(c->info.deadman_s / 2 * 1e9));
 	/* And nothing moves by itself. */
 	later = conform_look(c);
 	CONFORM(c, later.position_mm == s.position_mm);
-	CONFORM(c, later.state == INCISE_STEPPER_READY && later.faults == 0);
+	CONFORM(c, later.state == INCISE_STEPPER_STATE_READY && later.faults == 0);
 }
 
 static inline void conform_disable(struct conformance *c)
@@ -218,7 +218,7 @@ static inline void conform_disable(struct conformance *c)
 	s = conform_look(c);
 	if (c->always_powered)
 		return;
-	CONFORM(c, s.state == INCISE_STEPPER_DISABLED && s.faults == 0);
+	CONFORM(c, s.state == INCISE_STEPPER_STATE_DISABLED && s.faults == 0);
 	CONFORM(c, s.velocity_mm_s == 0 && s.position_mm > 0);
 	c->advance(c->world, 300 * CONFORM_MS);
 	later = conform_look(c);
@@ -241,7 +241,7 @@ static inline void conform_jog(struct conformance *c)
 	CONFORM(c, incise_stepper_jog(c->stepper, NAN) == -EDOM);
 	c->advance(c->world, (int64_t)(fmin(0.05, c->info.deadman_s / 2) * 1e9));
 	s = conform_look(c);
-	CONFORM(c, s.state == INCISE_STEPPER_MOVING && s.position_mm > 0);
+	CONFORM(c, s.state == INCISE_STEPPER_STATE_MOVING && s.position_mm > 0);
 	/* To a step/s, what a target is rounded to. */
 	CONFORM(c, fabs(s.velocity_mm_s - speed) <= 1.01 * c->info.step_mm);
 	/* Down again, to the end of the travel and no farther. */
@@ -261,16 +261,16 @@ static inline void conform_estop(struct conformance *c)
 		return;
 	conform_enable(c);
 	conform_hold(c, c->info.travel_mm, 0.1);
-	CONFORM(c, conform_look(c).state == INCISE_STEPPER_MOVING);
-	c->input(c->world, INCISE_STEPPER_ESTOP_ACTIVE, true);
+	CONFORM(c, conform_look(c).state == INCISE_STEPPER_STATE_MOVING);
+	c->input(c->world, INCISE_STEPPER_LINE_ESTOP, true);
 	c->advance(c->world, 5 * CONFORM_MS + (int64_t)(c->slack_s * 1e9));
 	s = conform_look(c);
-	CONFORM(c, s.state == INCISE_STEPPER_FAULT);
-	CONFORM(c, s.faults == INCISE_STEPPER_ESTOP && !s.homed);
-	CONFORM(c, s.inputs & INCISE_STEPPER_ESTOP_ACTIVE);
+	CONFORM(c, s.state == INCISE_STEPPER_STATE_FAULT);
+	CONFORM(c, s.faults == INCISE_STEPPER_FAULT_ESTOP && !s.homed);
+	CONFORM(c, s.inputs & INCISE_STEPPER_LINE_ESTOP);
 	CONFORM(c, incise_stepper_set(c->stepper, 0) == -EIO);
 	CONFORM(c, incise_stepper_clear(c->stepper, NULL) == -EBUSY);
-	c->input(c->world, INCISE_STEPPER_ESTOP_ACTIVE, false);
+	c->input(c->world, INCISE_STEPPER_LINE_ESTOP, false);
 	c->advance(c->world, 10 * CONFORM_MS);
 	/* Released, it is still latched. */
 	CONFORM(c, incise_stepper_enable(c->stepper, NULL) == -EPERM);
@@ -280,32 +280,32 @@ static inline void conform_estop(struct conformance *c)
 	CONFORM(c, later.position_mm == s.position_mm && later.faults == 0);
 	/* Pressed before, it forbids power. */
 	CONFORM(c, !incise_stepper_disable(c->stepper, NULL));
-	c->input(c->world, INCISE_STEPPER_ESTOP_ACTIVE, true);
+	c->input(c->world, INCISE_STEPPER_LINE_ESTOP, true);
 	c->advance(c->world, 10 * CONFORM_MS);
 	CONFORM(c, incise_stepper_enable(c->stepper, NULL) == -EBUSY);
-	c->input(c->world, INCISE_STEPPER_ESTOP_ACTIVE, false);
+	c->input(c->world, INCISE_STEPPER_LINE_ESTOP, false);
 }
 
 static inline void conform_limit(struct conformance *c)
 {
 	struct incise_stepper_status s;
 
-	if (!c->input || !(c->info.inputs & INCISE_STEPPER_AT_MAX))
+	if (!c->input || !(c->info.inputs & INCISE_STEPPER_LINE_LIMIT_MAX))
 		return;
 	conform_enable(c);
 	conform_hold(c, c->info.travel_mm, 0.1);
-	c->input(c->world, INCISE_STEPPER_AT_MAX, true);
+	c->input(c->world, INCISE_STEPPER_LINE_LIMIT_MAX, true);
 	c->advance(c->world, 5 * CONFORM_MS + (int64_t)(c->slack_s * 1e9));
 	s = conform_look(c);
-	CONFORM(c,
-		s.state == INCISE_STEPPER_FAULT && s.faults == INCISE_STEPPER_LIMIT_MAX);
+	CONFORM(c, s.state == INCISE_STEPPER_STATE_FAULT &&
+			   s.faults == INCISE_STEPPER_FAULT_LIMIT_MAX);
 	/* Away from it, it may go while it is active. */
 	CONFORM(c, !incise_stepper_clear(c->stepper, NULL));
 	conform_enable(c);
 	conform_hold(c, 0, conform_time(c, s.position_mm) + c->slack_s);
 	s = conform_look(c);
 	CONFORM(c, s.position_mm == 0 && s.faults == 0);
-	c->input(c->world, INCISE_STEPPER_AT_MAX, false);
+	c->input(c->world, INCISE_STEPPER_LINE_LIMIT_MAX, false);
 }
 
 static inline void conform_home(struct conformance *c)
@@ -323,7 +323,7 @@ static inline void conform_home(struct conformance *c)
 	if (rc)
 		c->say(err.text);
 	s = conform_look(c);
-	CONFORM(c, s.homed && s.state == INCISE_STEPPER_READY && s.faults == 0);
+	CONFORM(c, s.homed && s.state == INCISE_STEPPER_STATE_READY && s.faults == 0);
 }
 
 static const struct {

@@ -17,7 +17,7 @@
 
 struct bench {
 	struct incise_stepper_setpoint setpoint;
-	struct incise_abi_status slot;
+	struct incise_stepper_motor_status slot;
 	struct incise_motion motion;
 	int64_t now_ns;
 };

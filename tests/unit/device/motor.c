@@ -18,7 +18,7 @@
 struct bench {
 	struct incise_motor motor;
 	struct incise_stepper_setpoint setpoint;
-	struct incise_abi_status status;
+	struct incise_stepper_motor_status status;
 	struct incise_stepper_config config;
 	struct incise_pulser pulser;
 	struct machine machine;
@@ -57,7 +57,7 @@ static void bench_advance(void *world, int64_t ns)
 static void bench_input(void *world, unsigned int input, bool active)
 {
 	struct bench *b = world;
-	unsigned int line = input == INCISE_STEPPER_ESTOP_ACTIVE
+	unsigned int line = input == INCISE_STEPPER_LINE_ESTOP
 				    ? INCISE_STEPPER_LINE_ESTOP
 				    : INCISE_STEPPER_LINE_LIMIT_MAX;
 
@@ -200,7 +200,8 @@ static void every_case_on_a_made_clock(void **state)
 				.slack_s = 0.1,
 				.say = failed,
 			};
-			const struct incise_abi_status *told = &b.pulser.motion.status;
+			const struct incise_stepper_motor_status *told =
+				&b.pulser.motion.status;
 			int64_t start;
 
 			bench_start(&b, row[k].home, row[k].limits, row[k].invert,

@@ -62,15 +62,15 @@ static void garbage_in_a_set_point_is_told_once(void **state)
 
 static void a_status_must_make_sense(void **state)
 {
-	const struct incise_abi_status good = {
+	const struct incise_stepper_motor_status good = {
 		.seq = 8,
 		.state = INCISE_STEPPER_STATE_FAULT,
 		.faults = INCISE_STEPPER_FAULT_LINE | INCISE_STEPPER_FAULT_DEADMAN,
-		.inputs = INCISE_STEPPER_LINE_DRIVER,
+		.inputs = INCISE_STEPPER_LINE_ALARM,
 		.position = -2LL * INCISE_PROFILE_POSITION_MAX,
 		.velocity = (int64_t)INCISE_PROFILE_VELOCITY_MAX << 16,
 	};
-	struct incise_abi_status slot = good, copy;
+	struct incise_stepper_motor_status slot = good, copy;
 
 	assert_int_equal(incise_page_get_status(&slot, &copy), 0);
 	assert_memory_equal(&copy, &good, sizeof(copy));
@@ -79,7 +79,7 @@ static void a_status_must_make_sense(void **state)
 		if (i == 0)
 			slot.state = INCISE_STEPPER_STATE_FAULT + 1;
 		else if (i == 1)
-			slot.faults = INCISE_STEPPER_FAULT_LINE << 1;
+			slot.faults = INCISE_STEPPER_FAULT_TRAVEL; /* never in a page */
 		else if (i == 2)
 			slot.inputs = INCISE_STEPPER_LINE_ENABLE;
 		else if (i == 3)
@@ -88,7 +88,7 @@ static void a_status_must_make_sense(void **state)
 			slot.velocity = INT64_MAX;
 		else
 			slot.home_position = INT64_MAX;
-		copy = (struct incise_abi_status){.t_ns = 42};
+		copy = (struct incise_stepper_motor_status){.t_ns = 42};
 		assert_int_equal(incise_page_get_status(&slot, &copy), -EIO);
 		assert_int_equal(copy.t_ns, 42);
 	}
@@ -105,7 +105,7 @@ static void a_status_must_make_sense(void **state)
 #define WRITES 200000
 
 struct shared {
-	struct incise_abi_status slot;
+	struct incise_stepper_motor_status slot;
 	atomic_bool done;
 };
 
@@ -115,14 +115,14 @@ static void *write_many(void *argument)
 	struct shared *s = argument;
 
 	for (int i = 1; i <= WRITES; i++) {
-		struct incise_abi_status status = {.t_ns = i,
-						   .position = i,
-						   .velocity = i,
-						   .target = i,
-						   .home_position = i,
-						   .steps_up = i,
-						   .late = i,
-						   .shifted_ns = i};
+		struct incise_stepper_motor_status status = {.t_ns = i,
+							     .position = i,
+							     .velocity = i,
+							     .target = i,
+							     .home_position = i,
+							     .steps_up = i,
+							     .late = i,
+							     .shifted_ns = i};
 
 		incise_page_put_status(&s->slot, &status);
 	}
@@ -133,7 +133,7 @@ static void *write_many(void *argument)
 static void a_copy_is_never_torn(void **state)
 {
 	static struct shared s;
-	struct incise_abi_status copy = {0};
+	struct incise_stepper_motor_status copy = {0};
 	uint64_t copies = 0;
 	int64_t last = 0;
 	pthread_t thread;

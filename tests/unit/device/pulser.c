@@ -17,7 +17,7 @@
 
 struct bench {
 	struct incise_stepper_setpoint setpoint;
-	struct incise_abi_status status;
+	struct incise_stepper_motor_status status;
 	struct incise_stepper_config config;
 	struct incise_pulser pulser;
 	struct machine machine;
@@ -150,7 +150,7 @@ static void some_faults_halt_at_once(void **state)
 		unsigned int fault;
 	} cases[] = {
 		{INCISE_STEPPER_LINE_ESTOP, 0, INCISE_STEPPER_FAULT_ESTOP},
-		{INCISE_STEPPER_LINE_DRIVER, 0, INCISE_STEPPER_FAULT_DRIVER},
+		{INCISE_STEPPER_LINE_ALARM, 0, INCISE_STEPPER_FAULT_ALARM},
 		{INCISE_STEPPER_LINE_LIMIT_MAX, 0, INCISE_STEPPER_FAULT_LIMIT_MAX},
 		{0, -EIO, INCISE_STEPPER_FAULT_LINE},
 	};

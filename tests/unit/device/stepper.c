@@ -187,11 +187,13 @@ static void the_cause_is_the_device_s_own_or_the_first_fault(void **state)
 		const char *cause, *says; /* says: the beginning, without a cause */
 	} cases[] = {
 		{0, NULL, ""},
-		{INCISE_STEPPER_BUS | INCISE_STEPPER_LOST, NULL, "the bus to the drive"},
+		{INCISE_STEPPER_FAULT_BUS | INCISE_STEPPER_FAULT_LOST, NULL,
+		 "the bus to the drive"},
 		/* What stopped nothing is said only where there is nothing else. */
-		{INCISE_STEPPER_TRAVEL, NULL, "travel: "},
-		{INCISE_STEPPER_TRAVEL | INCISE_STEPPER_ALARM, NULL, "alarm of"},
-		{INCISE_STEPPER_ALARM, "short circuit (2320h)", "alarm of"},
+		{INCISE_STEPPER_FAULT_TRAVEL, NULL, "travel: "},
+		{INCISE_STEPPER_FAULT_TRAVEL | INCISE_STEPPER_FAULT_ALARM, NULL,
+		 "alarm of"},
+		{INCISE_STEPPER_FAULT_ALARM, "short circuit (2320h)", "alarm of"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
@@ -275,7 +277,8 @@ static bool touches(const struct machine *m)
 
 static bool powered(const struct machine *m)
 {
-	return m->state == INCISE_STEPPER_READY || m->state == INCISE_STEPPER_MOVING;
+	return m->state == INCISE_STEPPER_STATE_READY ||
+	       m->state == INCISE_STEPPER_STATE_MOVING;
 }
 
 static void halt(struct machine *m, unsigned int fault)
@@ -283,7 +286,7 @@ static void halt(struct machine *m, unsigned int fault)
 	m->faults |= fault;
 	m->v_mm_s = 0;
 	m->homed = false;
-	m->state = INCISE_STEPPER_FAULT;
+	m->state = INCISE_STEPPER_STATE_FAULT;
 }
 
 static void move(struct machine *m, double dt)
@@ -303,12 +306,12 @@ static void move(struct machine *m, double dt)
 	m->v_mm_s = fmax(m->v_mm_s - most, fmin(m->v_mm_s + most, wanted));
 	if (fabs(m->v_mm_s) < STEP_MM && fabs(wanted) < STEP_MM)
 		m->v_mm_s = 0;
-	if (m->home_at == INCISE_STEPPER_AT_MIN && touches(m) && m->v_mm_s < 0) {
-		halt(m, INCISE_STEPPER_LIMIT_MIN);
+	if (m->home_at == INCISE_STEPPER_LINE_LIMIT_MIN && touches(m) && m->v_mm_s < 0) {
+		halt(m, INCISE_STEPPER_FAULT_LIMIT_MIN);
 		return;
 	}
 	m->at_mm += m->v_mm_s * dt;
-	m->state = m->v_mm_s ? INCISE_STEPPER_MOVING : INCISE_STEPPER_READY;
+	m->state = m->v_mm_s ? INCISE_STEPPER_STATE_MOVING : INCISE_STEPPER_STATE_READY;
 }
 
 static int machine_wait(struct incise_stepper *stepper, int64_t ns)
@@ -319,9 +322,9 @@ static int machine_wait(struct incise_stepper *stepper, int64_t ns)
 		bool before = m->touched;
 
 		if (powered(m) && m->t_ns - m->set_ns > 50000000)
-			halt(m, INCISE_STEPPER_DEADMAN);
+			halt(m, INCISE_STEPPER_FAULT_DEADMAN);
 		if (powered(m) && m->estop && m->polls > 100)
-			halt(m, INCISE_STEPPER_ESTOP);
+			halt(m, INCISE_STEPPER_FAULT_ESTOP);
 		if (powered(m))
 			move(m, 1e-4);
 		m->touched = touches(m);
@@ -377,14 +380,14 @@ static int machine_enable(struct incise_stepper *stepper, struct incise_error *e
 
 	if (m->faults)
 		return incise_error_set(err, EPERM, "clear it");
-	m->state = INCISE_STEPPER_READY;
+	m->state = INCISE_STEPPER_STATE_READY;
 	return machine_take(m, position(m), false);
 }
 
 static int machine_clear(struct incise_stepper *stepper, struct incise_error *err)
 {
 	of(stepper)->faults = 0;
-	of(stepper)->state = INCISE_STEPPER_DISABLED;
+	of(stepper)->state = INCISE_STEPPER_STATE_DISABLED;
 	return 0;
 }
 
@@ -420,7 +423,7 @@ static int machine_edge(struct incise_stepper *stepper, struct incise_stepper_ed
 	struct machine *m = of(stepper);
 
 	*edge = (struct incise_stepper_edge){0};
-	if (m->home_at == INCISE_STEPPER_AT_HOME)
+	if (m->home_at == INCISE_STEPPER_LINE_HOME)
 		*edge = (struct incise_stepper_edge){m->touched, m->edge_count_mm};
 	return 0;
 }
@@ -467,14 +470,14 @@ static void the_count_becomes_the_position(void **state)
 		unsigned int home_at;
 		double edge_mm, end_mm, home_mm;
 	} cases[] = {
-		{INCISE_STEPPER_AT_HOME, 0, -9, 0},
-		{INCISE_STEPPER_AT_HOME, 0, -9, 1.5},
-		{INCISE_STEPPER_AT_HOME, 0, -9, -0.25},
+		{INCISE_STEPPER_LINE_HOME, 0, -9, 0},
+		{INCISE_STEPPER_LINE_HOME, 0, -9, 1.5},
+		{INCISE_STEPPER_LINE_HOME, 0, -9, -0.25},
 		/* A mark that is gone between two polls at full speed. */
-		{INCISE_STEPPER_AT_HOME, 0, -0.003, 0},
-		{INCISE_STEPPER_AT_MIN, 0, -9, 0},
-		{INCISE_STEPPER_AT_MIN, 0, -9, -0.5},
-		{INCISE_STEPPER_AT_MIN, 0, -9, 0.75},
+		{INCISE_STEPPER_LINE_HOME, 0, -0.003, 0},
+		{INCISE_STEPPER_LINE_LIMIT_MIN, 0, -9, 0},
+		{INCISE_STEPPER_LINE_LIMIT_MIN, 0, -9, -0.5},
+		{INCISE_STEPPER_LINE_LIMIT_MIN, 0, -9, 0.75},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
@@ -497,7 +500,7 @@ static void the_count_becomes_the_position(void **state)
 			if (rc)
 				fail_msg("case %zu from %g mm: %s", i, starts_mm[k],
 					 err.text);
-			assert_true(m.homed && m.state == INCISE_STEPPER_READY);
+			assert_true(m.homed && m.state == INCISE_STEPPER_STATE_READY);
 			assert_true(fabs(position(&m) - rest_mm) < STEP_MM / 2);
 			/*
 			 * The edge is read to what a tenth of the speed goes in one poll
@@ -513,8 +516,8 @@ static void the_count_becomes_the_position(void **state)
 /* The count at the edge, read before homing names places anew; as well as homing reads. */
 static void the_edge_is_told_in_the_old_count(void **state)
 {
-	static const unsigned int inputs[] = {INCISE_STEPPER_AT_HOME,
-					      INCISE_STEPPER_AT_MIN};
+	static const unsigned int inputs[] = {INCISE_STEPPER_LINE_HOME,
+					      INCISE_STEPPER_LINE_LIMIT_MIN};
 	static const double lost_mm[] = {0, 0.25, -0.125, 3};
 
 	for (size_t i = 0; i < 2; i++) {
@@ -546,25 +549,25 @@ static void what_is_wrong_is_said(void **state)
 		const char *says;
 	} cases[] = {
 		{{.home_at = 0}, -EOPNOTSUPP, "neither a home input nor"},
-		{{.home_at = INCISE_STEPPER_AT_HOME, .stuck_off = true},
+		{{.home_at = INCISE_STEPPER_LINE_HOME, .stuck_off = true},
 		 -EIO,
 		 "did not come within the travel"},
-		{{.home_at = INCISE_STEPPER_AT_HOME, .stuck_on = true},
+		{{.home_at = INCISE_STEPPER_LINE_HOME, .stuck_on = true},
 		 -EIO,
 		 "stays active"},
-		{{.home_at = INCISE_STEPPER_AT_HOME, .end_mm = -9, .estop = true},
+		{{.home_at = INCISE_STEPPER_LINE_HOME, .end_mm = -9, .estop = true},
 		 -EIO,
 		 "e-stop: release it"},
-		{{.home_at = INCISE_STEPPER_AT_HOME,
+		{{.home_at = INCISE_STEPPER_LINE_HOME,
 		  .end_mm = -9,
 		  .estop = true,
 		  .cause = "safe torque off (5441h)"},
 		 -EIO,
 		 "homing machine: safe torque off (5441h)"},
-		{{.home_at = INCISE_STEPPER_AT_HOME, .end_mm = -9, .deaf = true},
+		{{.home_at = INCISE_STEPPER_LINE_HOME, .end_mm = -9, .deaf = true},
 		 -ETIMEDOUT,
 		 "not done in time"},
-		{{.home_at = INCISE_STEPPER_AT_HOME, .end_mm = -9, .stop_at = 50},
+		{{.home_at = INCISE_STEPPER_LINE_HOME, .end_mm = -9, .stop_at = 50},
 		 -EINTR,
 		 "stopped"},
 	};
@@ -587,11 +590,11 @@ static void what_is_wrong_is_said(void **state)
 
 static void it_must_be_powered(void **state)
 {
-	struct machine m = {.home_at = INCISE_STEPPER_AT_HOME};
+	struct machine m = {.home_at = INCISE_STEPPER_LINE_HOME};
 	struct incise_error err = {0};
 
 	powered_at(&m, 3);
-	m.state = INCISE_STEPPER_DISABLED;
+	m.state = INCISE_STEPPER_STATE_DISABLED;
 	assert_int_equal(incise_stepper_home(&m.stepper, NULL, NULL, &err), -EIO);
 	assert_non_null(strstr(err.text, "enable it first"));
 	assert_true(m.at_mm == 3);

@@ -156,21 +156,21 @@ static void it_steps_and_lets_go(void **state)
 	assert_int_equal(chip.idle, actuator.active_low);
 	incise_stepper_info(stepper, &info);
 	assert_int_equal(strncmp(info.name, "gpio chip pinctrl", 17), 0);
-	assert_int_equal(info.inputs, INCISE_STEPPER_ESTOP_ACTIVE);
+	assert_int_equal(info.inputs, INCISE_STEPPER_LINE_ESTOP);
 	assert_true(info.rate_max_hz > 0 && info.step_mm == 0.01);
 	assert_true(atomic_load(&chip.level) >> INCISE_LINE_ENABLE & 1);
 	assert_int_equal(incise_stepper_enable(stepper, &err), 0);
 	assert_false(atomic_load(&chip.level) >> INCISE_LINE_ENABLE & 1);
 	assert_int_equal(incise_stepper_set(stepper, 0.1), 0);
-	await(stepper, INCISE_STEPPER_MOVING);
-	status = await(stepper, INCISE_STEPPER_READY);
+	await(stepper, INCISE_STEPPER_STATE_MOVING);
+	status = await(stepper, INCISE_STEPPER_STATE_READY);
 	assert_true(status.position_mm > 0.0999 && status.position_mm < 0.1001);
 	assert_int_equal(atomic_load(&chip.steps), 10);
 	assert_true(atomic_load(&chip.level) >> INCISE_LINE_DIR & 1);
 	/* Pressed: low. */
 	atomic_fetch_and(&chip.level, ~(1u << INCISE_LINE_ESTOP));
-	status = await(stepper, INCISE_STEPPER_FAULT);
-	assert_int_equal(status.faults, INCISE_STEPPER_ESTOP);
+	status = await(stepper, INCISE_STEPPER_STATE_FAULT);
+	assert_int_equal(status.faults, INCISE_STEPPER_FAULT_ESTOP);
 	assert_true(atomic_load(&chip.level) >> INCISE_LINE_ENABLE & 1);
 	assert_int_equal(incise_stepper_clear(stepper, &err), -EBUSY);
 	assert_non_null(strstr(err.text, "e-stop is active; release it"));
@@ -181,7 +181,7 @@ static void it_steps_and_lets_go(void **state)
 	assert_int_equal(incise_stepper_enable(stepper, &err), 0);
 	/* Closed under way. */
 	assert_int_equal(incise_stepper_set(stepper, 5), 0);
-	await(stepper, INCISE_STEPPER_MOVING);
+	await(stepper, INCISE_STEPPER_STATE_MOVING);
 	stepper->ops->close(stepper);
 	assert_int_equal(chip.open, 0);
 	assert_true(atomic_load(&chip.level) >> INCISE_LINE_ENABLE & 1);

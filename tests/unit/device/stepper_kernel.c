@@ -27,7 +27,7 @@
 /* The module, and how it shall misbehave. */
 static struct {
 	_Alignas(4096) char setpoints[4096], status[4096];
-	struct incise_abi_info info;
+	struct incise_stepper_controller info;
 	struct incise_pulser pulser;
 	struct incise_stepper_config config;
 	struct machine machine;
@@ -97,7 +97,8 @@ static int configure(const struct incise_stepper_config *config)
 	module.pulser.world = &module.machine;
 	module.pulser.motion.setpoint =
 		(struct incise_stepper_setpoint *)module.setpoints + MOTOR;
-	module.pulser.motion.slot = (struct incise_abi_status *)module.status + MOTOR;
+	module.pulser.motion.slot =
+		(struct incise_stepper_motor_status *)module.status + MOTOR;
 	module.configured = true;
 	return incise_pulser_init(&module.pulser, &module.config);
 }
@@ -108,7 +109,7 @@ int __wrap_ioctl(int fd, unsigned long request, void *argument)
 
 	if (fd != FD)
 		return __real_ioctl(fd, request, argument);
-	if (request == INCISE_ABI_GET_INFO) {
+	if (request == INCISE_STEPPER_GET_INFO) {
 		memcpy(argument, &module.info, sizeof(module.info));
 		return answer(module.info_error);
 	}
@@ -233,7 +234,7 @@ static void sleep_for(void *world, int64_t ns)
 
 static void raise(void *world, unsigned int input, bool active)
 {
-	unsigned int line = input == INCISE_STEPPER_ESTOP_ACTIVE
+	unsigned int line = input == INCISE_STEPPER_LINE_ESTOP
 				    ? INCISE_STEPPER_LINE_ESTOP
 				    : INCISE_STEPPER_LINE_LIMIT_MAX;
 
@@ -292,7 +293,8 @@ static void a_watcher_only_looks(void **state)
 	assert_int_equal(incise_stepper_set(owner, 4), 0);
 	run_for(90000000);
 	assert_int_equal(incise_stepper_status(watcher, &status), 0);
-	assert_true(status.position_mm > 0.1 && status.state == INCISE_STEPPER_MOVING);
+	assert_true(status.position_mm > 0.1 &&
+		    status.state == INCISE_STEPPER_STATE_MOVING);
 	assert_int_equal(incise_stepper_set(watcher, 1), -EPERM);
 	assert_int_equal(incise_stepper_jog(watcher, 1), -EPERM);
 	assert_int_equal(incise_stepper_enable(watcher, &err), -EPERM);
@@ -411,7 +413,7 @@ static void a_device_that_goes_away(void **state)
 	incise_pulser_fault(&module.pulser, INCISE_STEPPER_FAULT_GONE);
 	assert_int_equal(incise_stepper_set(stepper, 1), -ENODEV);
 	assert_int_equal(incise_stepper_status(stepper, &status), -ENODEV);
-	assert_int_equal(status.faults, INCISE_STEPPER_GONE);
+	assert_int_equal(status.faults, INCISE_STEPPER_FAULT_GONE);
 	run_for(100000000);
 	assert_int_equal(incise_stepper_enable(stepper, &err), -EPERM);
 	assert_non_null(strstr(err.text, "went away"));
@@ -421,8 +423,8 @@ static void a_device_that_goes_away(void **state)
 /* A status that is never finished is not waited for, and is told after a while. */
 static void a_page_that_makes_no_sense(void **state)
 {
-	struct incise_abi_status *slot =
-		(struct incise_abi_status *)module.status + MOTOR;
+	struct incise_stepper_motor_status *slot =
+		(struct incise_stepper_motor_status *)module.status + MOTOR;
 	struct incise_stepper_status status;
 	struct incise_stepper *stepper;
 	int rc = 0, looks = 0;

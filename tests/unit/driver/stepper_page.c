@@ -186,7 +186,7 @@ static void test_clamp(void **state)
 	}
 }
 
-static const struct incise_stepper_info machine = {
+static const struct incise_stepper_controller machine = {
 	.n_motors = 2,
 	.rate_max = 100000,
 	.pulse_ns = 600,
@@ -285,7 +285,8 @@ static void test_config(void **state)
 /* The profile's own limit holds where a machine could do more. */
 static void test_fast_machine(void **state)
 {
-	const struct incise_stepper_info fast = {.n_motors = 2, .rate_max = UINT32_MAX};
+	const struct incise_stepper_controller fast = {.n_motors = 2,
+						       .rate_max = UINT32_MAX};
 	struct incise_stepper_config config = good;
 
 	config.high_ns = config.low_ns = 500;

@@ -325,16 +325,17 @@ static void test_a_fault_of_the_actuator_is_named(void **state)
 		enum incise_stepper_state state;
 		const char *says, *own; /* own: what the device tells of its fault */
 	} cases[] = {
-		{0, -EIO, INCISE_STEPPER_ESTOP | INCISE_STEPPER_TRAVEL,
-		 INCISE_STEPPER_FAULT, "e-stop: release it", NULL},
-		{0, -EIO, INCISE_STEPPER_ALARM, INCISE_STEPPER_FAULT, "alarm of",
-		 "over-voltage (3210h)"},
-		{0, -EIO, 0, INCISE_STEPPER_DISABLED, "no power: enable it", NULL},
-		{-ENODEV, 0, INCISE_STEPPER_GONE, INCISE_STEPPER_FAULT,
+		{0, -EIO, INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_TRAVEL,
+		 INCISE_STEPPER_STATE_FAULT, "e-stop: release it", NULL},
+		{0, -EIO, INCISE_STEPPER_FAULT_ALARM, INCISE_STEPPER_STATE_FAULT,
+		 "alarm of", "over-voltage (3210h)"},
+		{0, -EIO, 0, INCISE_STEPPER_STATE_DISABLED, "no power: enable it", NULL},
+		{-ENODEV, 0, INCISE_STEPPER_FAULT_GONE, INCISE_STEPPER_STATE_FAULT,
 		 "the device went away", NULL},
-		{-EIO, 0, 0, INCISE_STEPPER_READY, "Input/output error", NULL},
+		{-EIO, 0, 0, INCISE_STEPPER_STATE_READY, "Input/output error", NULL},
 		/* Another device failed: what the actuator may have is not why. */
-		{-EIO, 0, 0, INCISE_STEPPER_READY, "Input/output error", "of last week"},
+		{-EIO, 0, 0, INCISE_STEPPER_STATE_READY, "Input/output error",
+		 "of last week"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

@@ -160,10 +160,10 @@ static void faults_are_reported(void **state)
 	/* Not yet in use. */
 	assert_int_equal(rig_after(&rig, INCISE_NS_PER_S).faults, 0);
 	s = rig_hold(&rig, 25, 1);
-	assert_int_equal(s.faults, INCISE_STEPPER_TRAVEL);
+	assert_int_equal(s.faults, INCISE_STEPPER_FAULT_TRAVEL);
 	assert_true(s.position_mm == 20);
 	s = rig_hold(&rig, -1, 1);
-	assert_int_equal(s.faults, INCISE_STEPPER_TRAVEL);
+	assert_int_equal(s.faults, INCISE_STEPPER_FAULT_TRAVEL);
 	assert_true(s.position_mm == 0);
 	s = rig_hold(&rig, 1, 1);
 	assert_int_equal(s.faults, 0);
@@ -178,9 +178,9 @@ static void faults_are_reported(void **state)
 	assert_true(s.position_mm == 1);
 	/* The tick that begins 100 ms after the target is the first to act. */
 	assert_int_equal(rig_after(&rig, 100000).faults, 0);
-	assert_int_equal(rig_after(&rig, 100000).faults, INCISE_STEPPER_DEADMAN);
+	assert_int_equal(rig_after(&rig, 100000).faults, INCISE_STEPPER_FAULT_DEADMAN);
 	s = rig_after(&rig, INCISE_NS_PER_S);
-	assert_int_equal(s.faults, INCISE_STEPPER_DEADMAN);
+	assert_int_equal(s.faults, INCISE_STEPPER_FAULT_DEADMAN);
 	assert_true(s.position_mm == 0);
 	/* What friction of 0.01 N holds against both springs. */
 	assert_true(fabs(s.handle_mm) <= 0.01 / 3 + 1e-9);
@@ -337,23 +337,23 @@ static void it_is_always_powered_and_reports_its_motion(void **state)
 	incise_sim_config_init(&config);
 	rig = rig_new(&config);
 	s = rig_after(&rig, 0);
-	assert_int_equal(s.state, INCISE_STEPPER_READY);
+	assert_int_equal(s.state, INCISE_STEPPER_STATE_READY);
 	assert_true(s.homed && !s.inputs && !s.late && s.velocity_mm_s == 0);
 	assert_int_equal(incise_stepper_set(rig.stepper, 10), 0);
 	/* 30 mm/s are reached after 10 ms. */
 	s = rig_after(&rig, 20000000);
-	assert_int_equal(s.state, INCISE_STEPPER_MOVING);
+	assert_int_equal(s.state, INCISE_STEPPER_STATE_MOVING);
 	assert_true(s.velocity_mm_s == 30);
 	/* Enabled, it stays where it is, and the deadman runs from there on. */
 	assert_int_equal(incise_stepper_enable(rig.stepper, NULL), 0);
 	s = rig_after(&rig, 90000000);
-	assert_int_equal(s.state, INCISE_STEPPER_READY);
+	assert_int_equal(s.state, INCISE_STEPPER_STATE_READY);
 	assert_true(s.position_mm > 0.3 && s.position_mm < 1 && !s.faults);
 	s = rig_after(&rig, 10200000);
-	assert_int_equal(s.faults, INCISE_STEPPER_DEADMAN);
-	assert_int_equal(s.state, INCISE_STEPPER_STOPPING);
+	assert_int_equal(s.faults, INCISE_STEPPER_FAULT_DEADMAN);
+	assert_int_equal(s.state, INCISE_STEPPER_STATE_STOPPING);
 	s = rig_after(&rig, INCISE_NS_PER_S);
-	assert_int_equal(s.state, INCISE_STEPPER_READY);
+	assert_int_equal(s.state, INCISE_STEPPER_STATE_READY);
 	assert_int_equal(incise_stepper_clear(rig.stepper, NULL), 0);
 	assert_int_equal(rig_after(&rig, 0).faults, 0);
 	/* Disabled, it moves to zero force, without a deadman. */

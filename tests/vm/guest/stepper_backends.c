@@ -60,8 +60,8 @@ static void input(void *world, unsigned int which, bool active)
 	char text[16];
 
 	(void)world;
-	snprintf(text, sizeof(text), "%d %d",
-		 which == INCISE_STEPPER_ESTOP_ACTIVE ? 7 : 4, active);
+	snprintf(text, sizeof(text), "%d %d", which == INCISE_STEPPER_LINE_ESTOP ? 7 : 4,
+		 active);
 	tell_sim("inputs", text);
 }
 

@@ -215,7 +215,7 @@ static void visitor(uint64_t seed)
 static void odd_ioctls(int rounds)
 {
 	unsigned int taken = 0, unknown = 0, refused = 0;
-	struct incise_stepper_info before, after;
+	struct incise_stepper_controller before, after;
 	uint64_t steps[2] = {0};
 	bool strange = false;
 	pid_t child;

@@ -143,7 +143,7 @@ static bool session(struct bench *bench, uint32_t *retargets, int64_t *longest)
 				     target[i], AFTER);
 	bench_judge(bench);
 	for (unsigned int i = 0; i < MOTORS; i++) {
-		struct incise_stepper_status status = bench_look(bench, i);
+		struct incise_stepper_motor_status status = bench_look(bench, i);
 
 		if (right && status.position == target[i] &&
 		    carriage_of(i) == target[i] && bench->log[i].position == target[i] &&

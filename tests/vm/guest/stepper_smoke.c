@@ -31,7 +31,7 @@
 struct bench {
 	int fd;
 	struct incise_stepper_setpoint *slot;
-	const struct incise_stepper_status *status;
+	const struct incise_stepper_motor_status *status;
 };
 
 static void tell(bool good, const char *what)
@@ -84,14 +84,15 @@ static void bench_close(struct bench *bench)
 	close(bench->fd);
 }
 
-static struct incise_stepper_status look(const struct bench *bench)
+static struct incise_stepper_motor_status look(const struct bench *bench)
 {
-	struct incise_stepper_status copy;
+	struct incise_stepper_motor_status copy;
 	uint32_t seq;
 
 	do {
 		seq = __atomic_load_n(&bench->status->seq, __ATOMIC_ACQUIRE);
-		copy = *(const volatile struct incise_stepper_status *)bench->status;
+		copy = *(const volatile struct incise_stepper_motor_status *)
+				bench->status;
 		__atomic_thread_fence(__ATOMIC_ACQUIRE);
 	} while (seq & 1 ||
 		 seq != __atomic_load_n(&bench->status->seq, __ATOMIC_RELAXED));
@@ -137,7 +138,7 @@ static bool until(struct bench *bench, uint32_t state, unsigned int mode, int64_
 static bool go(struct bench *bench, int64_t target)
 {
 	int64_t end = now_ns() + INT64_C(60000000000);
-	struct incise_stepper_status status;
+	struct incise_stepper_motor_status status;
 
 	do {
 		want(bench, INCISE_STEPPER_MODE_POSITION, target);
@@ -158,7 +159,7 @@ static bool fresh(struct bench *bench)
 /* Move away at 2000 steps/s and see it moving. */
 static bool run(struct bench *bench, int64_t velocity)
 {
-	struct incise_stepper_status status = {0};
+	struct incise_stepper_motor_status status = {0};
 
 	for (int i = 0; i < 100; i++) {
 		want(bench, INCISE_STEPPER_MODE_VELOCITY, velocity);
@@ -279,7 +280,7 @@ static void try_deadman(struct bench *bench)
 
 static void try_limit(struct bench *bench)
 {
-	struct incise_stepper_status status;
+	struct incise_stepper_motor_status status;
 	int64_t stop;
 
 	tell(fresh(bench) && run(bench, 2000), "it runs up");
@@ -321,7 +322,7 @@ static void try_estop(struct bench *bench)
 
 static void try_home(struct bench *bench)
 {
-	struct incise_stepper_status status;
+	struct incise_stepper_motor_status status;
 	struct incise_stepper_origin origin = {.homed = 1, .position = 100};
 
 	tell(fresh(bench) && run(bench, 1000), "it runs");
@@ -423,7 +424,7 @@ static void try_retract(struct bench *bench)
 {
 	struct incise_stepper_config config = {0};
 	struct incise_stepper_origin origin = {.homed = 1, .position = 0};
-	struct incise_stepper_status status;
+	struct incise_stepper_motor_status status;
 
 	command(bench, INCISE_STEPPER_CLEAR, 1);
 	ioctl(bench->fd, INCISE_STEPPER_GET_CONFIG, &config);
@@ -467,7 +468,7 @@ static void try_kill(struct bench *bench, const char *path)
 static void try_unbind(struct bench *bench, const char *driver, const char *device)
 {
 	struct pollfd hung = {.fd = bench->fd, .events = POLLIN};
-	struct incise_stepper_info info;
+	struct incise_stepper_controller info;
 	char path[256];
 
 	tell(fresh(bench) && run(bench, 2000), "it runs");
@@ -487,7 +488,7 @@ static void try_unbind(struct bench *bench, const char *driver, const char *devi
 int main(int argc, char **argv)
 {
 	struct incise_stepper_config config = {0};
-	struct incise_stepper_info info;
+	struct incise_stepper_controller info;
 	struct bench bench;
 
 	if (argc != 4)

@@ -35,7 +35,7 @@ static int64_t reach; /* steps that do not take long */
 static const uint32_t at_rest =
 	1U << INCISE_STEPPER_STATE_FAULT | 1U << INCISE_STEPPER_STATE_DISABLED;
 
-static struct incise_stepper_status status(void)
+static struct incise_stepper_motor_status status(void)
 {
 	return bench_look(&bench, 0);
 }
@@ -89,7 +89,7 @@ static int64_t any_velocity(const struct incise_stepper_config *config)
 /* All three say the same, and the fault is the one that was made. */
 static bool agrees(uint32_t fault)
 {
-	struct incise_stepper_status is = status();
+	struct incise_stepper_motor_status is = status();
 	int64_t carriage = simulator_number_of("carriage", "0", "position");
 	bool right;
 
@@ -393,7 +393,7 @@ static void is_unbound(int rounds)
 
 	for (int i = 0; i < rounds && right; i++) {
 		struct incise_stepper_config config;
-		struct incise_stepper_info info;
+		struct incise_stepper_controller info;
 		int64_t silent_ns, position;
 
 		right = fresh("", &config) &&
@@ -438,7 +438,7 @@ int main(int argc, char **argv)
 	limits_stop(rounds);
 	inputs_stop("e-stop", BENCH_ESTOP, true, INCISE_STEPPER_FAULT_ESTOP, rounds);
 	inputs_stop("the power stage's fault", bench_line(0, BENCH_FAULT), false,
-		    INCISE_STEPPER_FAULT_DRIVER, rounds);
+		    INCISE_STEPPER_FAULT_ALARM, rounds);
 	deadman_stops(rounds);
 	owners(rounds / 10 + 1);
 	check(!bench_faulty(&bench), "not one of %" PRIu64 " edges breaks a promise",

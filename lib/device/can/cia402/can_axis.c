@@ -172,7 +172,7 @@ static unsigned int line_bits(const struct can_axis *axis, uint32_t inputs)
 
 void can_axis_inputs(struct can_axis *axis, uint32_t inputs)
 {
-	struct incise_abi_status *status = &axis->motion.status;
+	struct incise_stepper_motor_status *status = &axis->motion.status;
 	unsigned int bits = line_bits(axis, inputs), rising = bits & ~status->inputs;
 
 	status->inputs = bits;
@@ -221,7 +221,7 @@ static void receive(struct can_axis *axis)
 		}
 	}
 	if (rc < 0)
-		set_fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_BUS_FAILED, -rc, 0);
+		set_fault(axis, INCISE_STEPPER_FAULT_BUS, CAN_AXIS_BUS_FAILED, -rc, 0);
 }
 
 /* axis->setpoint_sent: whether it went out. */
@@ -240,10 +240,10 @@ static void send_setpoint(struct can_axis *axis, uint16_t controlword, int32_t t
 		axis->counts.setpoints++;
 	} else if (rc == -ENOBUFS) {
 		if (++axis->full > FULL_MOST)
-			set_fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_QUEUE_FULL,
+			set_fault(axis, INCISE_STEPPER_FAULT_BUS, CAN_AXIS_QUEUE_FULL,
 				  axis->full, 0);
 	} else {
-		set_fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_BUS_FAILED, -rc, 0);
+		set_fault(axis, INCISE_STEPPER_FAULT_BUS, CAN_AXIS_BUS_FAILED, -rc, 0);
 	}
 }
 
@@ -257,8 +257,8 @@ static void send_sync(struct can_axis *axis)
 	axis->setpoint_sent = axis->setpoint_sent && !axis->answered;
 	axis->unsynced = axis->answered ? axis->unsynced + 1 : 0;
 	if (axis->unsynced > FULL_MOST)
-		set_fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_QUEUE_FULL, axis->unsynced,
-			  0);
+		set_fault(axis, INCISE_STEPPER_FAULT_BUS, CAN_AXIS_QUEUE_FULL,
+			  axis->unsynced, 0);
 }
 
 /* --- checks --- */
@@ -281,35 +281,37 @@ static void check_drive(struct can_axis *axis)
 	enum cia402_state state = cia402_state(axis->statusword);
 
 	if (master->bus_offs != axis->bus_offs)
-		set_fault(axis, INCISE_ABI_FAULT_BUS, CAN_AXIS_BUS_OFF, 0, 0);
+		set_fault(axis, INCISE_STEPPER_FAULT_BUS, CAN_AXIS_BUS_OFF, 0, 0);
 	if (master->boots != axis->boots)
-		set_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_REBOOTED, 0, 0);
+		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_REBOOTED, 0, 0);
 	if (master->emcy.count != axis->emcys)
-		set_fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_EMCY,
+		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_EMCY,
 			  master->emcy.code, master->emcy.error_register);
 	/* Its EMCY may be a frame behind: wait for the next cycle. */
 	else if (is_fault(state)) {
 		if (axis->failed)
-			set_fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_DRIVE_FAULT,
+			set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_DRIVE_FAULT,
 				  0, 0);
 		axis->failed = true;
 	}
 	if (master->foreign != axis->foreign)
 		set_fault(axis, INCISE_STEPPER_FAULT_SETPOINT, CAN_AXIS_FOREIGN, 0, 0);
 	if (axis->now_ns - master->last_heartbeat_ns > axis->setup.silence_ns)
-		set_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_HEARTBEAT,
+		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_HEARTBEAT,
 			  axis->setup.silence_ns / MS, 0);
 	else if (master->state != CANOPEN_OPERATIONAL)
-		set_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NMT, master->state, 0);
-	if (axis->setup.inputs_timed && axis->inputs_ns > INPUTS_NS)
-		set_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_INPUTS, INPUTS_NS / MS,
+		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NMT, master->state,
 			  0);
+	if (axis->setup.inputs_timed && axis->inputs_ns > INPUTS_NS)
+		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_INPUTS,
+			  INPUTS_NS / MS, 0);
 	/* A loop that is closed here must not stay open for long. */
 	if (axis->setup.mode != CIA402_CSP && axis->missed >= OPEN_CYCLES &&
 	    axis->now_ns - axis->tpdo_ns > OPEN_NS)
-		set_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_TPDO, OPEN_NS / MS, 0);
+		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_TPDO, OPEN_NS / MS,
+			  0);
 	if (axis->now_ns - axis->tpdo_ns > axis->setup.silence_ns)
-		set_fault(axis, INCISE_ABI_FAULT_LOST, CAN_AXIS_NO_TPDO,
+		set_fault(axis, INCISE_STEPPER_FAULT_LOST, CAN_AXIS_NO_TPDO,
 			  axis->setup.silence_ns / MS, 0);
 }
 
@@ -347,7 +349,8 @@ static void check_following(struct can_axis *axis)
 	if (!axis->off_ns)
 		axis->off_ns = axis->now_ns;
 	if (axis->now_ns - axis->off_ns >= axis->setup.following_ns)
-		set_fault(axis, INCISE_ABI_FAULT_FOLLOWING, CAN_AXIS_OFF_TARGET, off, 0);
+		set_fault(axis, INCISE_STEPPER_FAULT_FOLLOWING, CAN_AXIS_OFF_TARGET, off,
+			  0);
 }
 
 /* The drive keeps its power, and follows its targets. */
@@ -358,7 +361,7 @@ static void check_running(struct can_axis *axis)
 	if (is_fault(state))
 		return;
 	if (state != CIA402_ENABLED)
-		set_fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_NOT_ENABLED, state,
+		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_NOT_ENABLED, state,
 			  0);
 	/* Only with a current position. */
 	else if (axis->phase == CAN_AXIS_RUNNING && is_fresh(axis))
@@ -379,7 +382,7 @@ static void power_off(struct can_axis *axis)
 {
 	struct incise_motion *m = &axis->motion;
 
-	incise_motion_halt(m, m->status.faults & INCISE_ABI_FAULT_LOST);
+	incise_motion_halt(m, m->status.faults & INCISE_STEPPER_FAULT_LOST);
 	incise_motion_power_off(m);
 	if (axis->result > 0)
 		axis->result = axis->outcome;
@@ -398,14 +401,14 @@ static bool has_answered(const struct can_axis *axis)
 /* The drive must not have power. */
 static void run_idle(struct can_axis *axis)
 {
-	struct incise_abi_status *status = &axis->motion.status;
+	struct incise_stepper_motor_status *status = &axis->motion.status;
 
 	if (!axis->status_received || axis->answers < 2 ||
 	    cia402_state(axis->statusword) != CIA402_ENABLED)
 		return;
 	if (!status->faults)
 		set_cause(axis, CAN_AXIS_NO_STOP, CIA402_ENABLED, 0);
-	status->faults |= INCISE_STEPPER_FAULT_DRIVER;
+	status->faults |= INCISE_STEPPER_FAULT_ALARM;
 	status->state = INCISE_STEPPER_STATE_FAULT;
 	axis->heartbeat_off = true;
 }
@@ -476,10 +479,10 @@ static void run_homing(struct can_axis *axis)
 		axis->motion.status.state = INCISE_STEPPER_STATE_STOPPING;
 		abandon(axis, -EINTR);
 	} else if (started && word & CIA402_FOLLOWING_ERROR) {
-		set_fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_NO_HOME, 0, 0);
+		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_NO_HOME, 0, 0);
 	} else if (axis->now_ns > axis->limit_ns) {
 		axis->outcome = -ETIMEDOUT;
-		set_fault(axis, INCISE_STEPPER_FAULT_DRIVER, CAN_AXIS_HOME_TIME, 0, 0);
+		set_fault(axis, INCISE_STEPPER_FAULT_ALARM, CAN_AXIS_HOME_TIME, 0, 0);
 	} else if (started && word & CIA402_HOMED && word & CIA402_TARGET_REACHED) {
 		axis->outcome = 0;
 		axis->motion.ending = true;
@@ -529,7 +532,7 @@ static void run_quick_stop(struct can_axis *axis)
 	if (axis->now_ns - axis->since_ns > most) {
 		send_setpoint(axis, CIA402_DISABLE_VOLTAGE, hold_target(axis));
 		if (!axis->motion.status.faults && axis->outcome != -ETIMEDOUT)
-			axis->motion.status.faults |= INCISE_ABI_FAULT_LOST;
+			axis->motion.status.faults |= INCISE_STEPPER_FAULT_LOST;
 		set_cause(axis, CAN_AXIS_NO_STOP, state, 0);
 		axis->heartbeat_off = true;
 		power_off(axis);

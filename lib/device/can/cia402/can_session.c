@@ -137,7 +137,7 @@ static int read_position(struct can_session *s, bool keep)
 {
 	const struct incise_actuator *a = &s->actuator;
 	double per_mm = s->axis.setup.counts_per_step / incise_actuator_step_mm(a);
-	struct incise_abi_status *status = &s->axis.motion.status;
+	struct incise_stepper_motor_status *status = &s->axis.motion.status;
 	const struct cia402_object position = {0x6064, 0, 4, "position"};
 	uint32_t counts;
 	int rc = cia402_read(&s->client, &position, &counts);
@@ -231,7 +231,7 @@ static void adopt_fault(struct can_session *s)
 	axis->statusword = (uint16_t)word;
 	if (cia402_state(axis->statusword) != CIA402_FAULT)
 		return;
-	axis->motion.status.faults |= INCISE_STEPPER_FAULT_DRIVER;
+	axis->motion.status.faults |= INCISE_STEPPER_FAULT_ALARM;
 	axis->motion.status.state = INCISE_STEPPER_STATE_FAULT;
 	find_cause(s);
 }
@@ -530,9 +530,9 @@ static void publish(struct can_session *s, int rc, int64_t now)
 	m->status.state = state_of(state, moves);
 	m->status.faults = 0;
 	if (rc)
-		m->status.faults = INCISE_ABI_FAULT_LOST;
+		m->status.faults = INCISE_STEPPER_FAULT_LOST;
 	else if (state == CIA402_FAULT)
-		m->status.faults = INCISE_STEPPER_FAULT_DRIVER;
+		m->status.faults = INCISE_STEPPER_FAULT_ALARM;
 	if (m->status.faults)
 		m->status.state = INCISE_STEPPER_STATE_FAULT;
 	incise_motion_publish(m, now);

@@ -50,7 +50,7 @@ struct can_stepper {
 	const struct incise_stepper_ops *motor_ops;
 	/* The two pages. */
 	_Alignas(64) struct incise_stepper_setpoint setpoint;
-	_Alignas(64) struct incise_abi_status status;
+	_Alignas(64) struct incise_stepper_motor_status status;
 	/* Mailbox: written by the caller while it is NONE, else by the thread. */
 	_Alignas(64) atomic_int command;
 	/* Of a simulated clock; NULL: there is a thread. See can_bus.h. */
@@ -289,12 +289,12 @@ static int can_enable(struct incise_motor *motor, struct incise_error *err)
 	struct can_stepper *c = of(motor);
 
 	switch (state_of(c)) {
-	case INCISE_STEPPER_READY:
-	case INCISE_STEPPER_MOVING:
+	case INCISE_STEPPER_STATE_READY:
+	case INCISE_STEPPER_STATE_MOVING:
 		return 0;
-	case INCISE_STEPPER_STOPPING:
+	case INCISE_STEPPER_STATE_STOPPING:
 		return -EBUSY;
-	case INCISE_STEPPER_FAULT:
+	case INCISE_STEPPER_STATE_FAULT:
 		refuse_by_cause(c, -EPERM, "cannot be enabled", err);
 		return -EPERM;
 	default:
@@ -312,8 +312,8 @@ static int can_clear(struct incise_motor *motor, struct incise_error *err)
 	struct can_stepper *c = of(motor);
 	int rc;
 
-	if (state_of(c) != INCISE_STEPPER_FAULT)
-		return state_of(c) == INCISE_STEPPER_STOPPING ? -EBUSY : 0;
+	if (state_of(c) != INCISE_STEPPER_STATE_FAULT)
+		return state_of(c) == INCISE_STEPPER_STATE_STOPPING ? -EBUSY : 0;
 	rc = borrow(c, err);
 	if (rc)
 		return rc;
@@ -350,7 +350,7 @@ static int stepper_cause(struct incise_stepper *stepper, char *text, size_t size
 	char why[300];
 
 	stepper->ops->status(stepper, &status);
-	if (!(status.faults & ~INCISE_STEPPER_TRAVEL) ||
+	if (!(status.faults & ~INCISE_STEPPER_FAULT_TRAVEL) ||
 	    !can_axis_cause_text(&c->session.axis, why, sizeof(why)))
 		return 0;
 	return snprintf(text, size, "%s: %s", c->motor.name, why);
@@ -423,7 +423,7 @@ static int go_to_start(struct can_stepper *c, double home_mm, const volatile int
 						"see that it moves",
 						c->motor.name, to_mm);
 		if (rested == INT64_MAX && c->motor.last.setpoint_t_ns >= begin &&
-		    status.state == INCISE_STEPPER_READY)
+		    status.state == INCISE_STEPPER_STATE_READY)
 			rested = now;
 	}
 	return 0;
@@ -446,7 +446,8 @@ static int stepper_home(struct incise_stepper *stepper, const volatile int *stop
 	if (c->motor.watches)
 		return incise_error_set(err, EPERM, "homing %s: it was opened to watch",
 					c->motor.name);
-	if (state_of(c) != INCISE_STEPPER_READY && state_of(c) != INCISE_STEPPER_MOVING)
+	if (state_of(c) != INCISE_STEPPER_STATE_READY &&
+	    state_of(c) != INCISE_STEPPER_STATE_MOVING)
 		return refuse_by_cause(
 			c,
 			incise_error_set(err, EIO,

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: (GPL-2.0-only WITH Linux-syscall-note) OR LGPL-2.1-or-later */
+/*
+ * States, faults and lines of a stepper: one set of names and values for the library, its
+ * backends and the kernel module. The values are ABI of /dev/incise-stepperN; see
+ * driver/uapi/incise_stepper.h.
+ */
+#ifndef INCISE_STEPPER_STATE_H
+#define INCISE_STEPPER_STATE_H
+
+enum incise_stepper_state {
+	INCISE_STEPPER_STATE_DISABLED = 0, /**< not powered, no fault latched */
+	INCISE_STEPPER_STATE_READY = 1,	   /**< powered, at rest */
+	INCISE_STEPPER_STATE_MOVING = 2,
+	INCISE_STEPPER_STATE_STOPPING =
+		3, /**< coming to rest, by a fault or by disable */
+	INCISE_STEPPER_STATE_FAULT =
+		4, /**< not powered, a fault latched: clear, then enable */
+};
+
+/**
+ * Faults; bits. All are latched but TRAVEL, and the virtual rig's DEADMAN, which ends with
+ * the next target. The kernel module has those up to LINE.
+ */
+enum incise_stepper_fault {
+	INCISE_STEPPER_FAULT_DEADMAN = 1 << 0, /**< no new target for the deadman time */
+	INCISE_STEPPER_FAULT_LIMIT_MIN =
+		1 << 1, /**< a step towards the active limit at 0 */
+	INCISE_STEPPER_FAULT_LIMIT_MAX = 1 << 2, /**< or at the end of the travel */
+	INCISE_STEPPER_FAULT_ESTOP = 1 << 3,	 /**< its input is or was active */
+	INCISE_STEPPER_FAULT_ALARM = 1 << 4,	 /**< fault output of the power stage */
+	INCISE_STEPPER_FAULT_LATE = 1 << 5,	/**< timer late too often for the steps */
+	INCISE_STEPPER_FAULT_SETPOINT = 1 << 6, /**< an invalid set-point */
+	INCISE_STEPPER_FAULT_OWNER = 1
+				     << 7, /**< its program ended while it was enabled */
+	INCISE_STEPPER_FAULT_SUSPEND = 1 << 8, /**< the machine went to sleep */
+	INCISE_STEPPER_FAULT_GONE = 1 << 9,    /**< the device was unbound or unplugged */
+	INCISE_STEPPER_FAULT_LINE =
+		1 << 10, /**< a GPIO line could not be read or written */
+	INCISE_STEPPER_FAULT_BUS = 1 << 11,  /**< the bus to the drive fails */
+	INCISE_STEPPER_FAULT_LOST = 1 << 12, /**< the drive is silent, or has restarted */
+	INCISE_STEPPER_FAULT_FOLLOWING = 1 << 13, /**< it does not follow its targets */
+	INCISE_STEPPER_FAULT_TRAVEL =
+		1 << 14, /**< a target outside of the travel was held */
+};
+#define INCISE_STEPPER_FAULTS 15 /**< bits of incise_stepper_fault */
+
+/** Lines; bits. The inputs come first. */
+enum incise_stepper_line {
+	INCISE_STEPPER_LINE_LIMIT_MIN = 1 << 0,
+	INCISE_STEPPER_LINE_LIMIT_MAX = 1 << 1,
+	INCISE_STEPPER_LINE_HOME = 1 << 2,
+	INCISE_STEPPER_LINE_ESTOP = 1 << 3,
+	INCISE_STEPPER_LINE_ALARM = 1 << 4,
+	INCISE_STEPPER_LINE_ENABLE = 1 << 5, /**< an output; only in info of the module */
+	INCISE_STEPPER_LINE_DIR = 1 << 6,    /**< an output; only in info of the module */
+};
+#define INCISE_STEPPER_INPUTS 5 /**< bits of incise_stepper_line that are inputs */
+
+#endif
