@@ -8,9 +8,8 @@
 #include "schema.h"
 
 /*
- * The text that SQLite keeps of each table is compared when a recording is opened, so a
- * view, a virtual table or a generated column cannot pass for one of ours. Anything
- * added beside these tables is left alone.
+ * The texts that SQLite keeps of the tables are compared when a recording is opened, so a view,
+ * a virtual table or a generated column cannot replace one. Additional tables are ignored.
  */
 static const struct {
 	const char *name;
@@ -99,8 +98,8 @@ int incise_schema_errno(sqlite3 *db)
 	case SQLITE_NOMEM:
 		return ENOMEM;
 	case SQLITE_IOERR:
-		/* SQLite takes only ENOSPC for a full disk; a quota and a limit on the
-		 * size of files are no different to who has to make room. */
+		/* SQLite knows only ENOSPC; a quota and a limit on the size of files are
+		 * full disks for the user too. */
 		return cause == EDQUOT || cause == EFBIG || cause == ENOSPC ? ENOSPC
 									    : EIO;
 	case SQLITE_CANTOPEN:
@@ -146,7 +145,7 @@ int incise_schema_fail(sqlite3 *db, const char *path, struct incise_error *err)
 				db ? sqlite3_errmsg(db) : strerror(ENOMEM));
 }
 
-/* The one number that this answers. */
+/* The number that a statement returns. */
 static int pragma(sqlite3 *db, const char *sql, sqlite3_int64 *value)
 {
 	sqlite3_stmt *stmt;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The form of recording.db: its tables, how it is known to be one, and what SQLite's
- * errors mean to a person. Described for users in incise-recording(5).
+ * The form of recording.db: its tables, its identification, and messages for SQLite's errors.
+ * Described for users in incise-recording(5).
  */
 #ifndef INCISE_SCHEMA_H
 #define INCISE_SCHEMA_H
@@ -17,14 +17,14 @@
 int incise_schema_create(sqlite3 *db);
 
 /*
- * Whether an opened database is a recording of this or an older version, with just the
- * tables this library makes; which form it has. Form 1 has no ledger, streams and frames,
- * and no station and button of the tracker. Returns 0, -EINVAL, or as incise_schema_fail().
+ * Check that an opened database is a recording of this or an older version with the tables of
+ * this library, and find its form. Form 1 has no ledger, streams and frames, and no station and
+ * button of the tracker. Returns 0, -EINVAL, or as incise_schema_fail().
  */
 int incise_schema_check(sqlite3 *db, const char *path, int *form,
 			struct incise_error *err);
 
-/* The errno that the last SQLite error amounts to: EINVAL for a damaged file. */
+/* The errno of the last SQLite error: EINVAL for a damaged file. */
 int incise_schema_errno(sqlite3 *db);
 
 /* Report a failed read of a recording; @path names it. Returns -errno. */

@@ -18,7 +18,7 @@
 
 INCISE_BEGIN_DECLS
 
-/** How to record. */
+/** Options of a recording. */
 struct incise_recorder_setup {
 	const struct incise_calibration *calibration;
 	/** Its file, whose text the recording keeps; NULL: none. */

@@ -137,7 +137,7 @@ INCISE_API int incise_recording_lengths(struct incise_recording *recording,
 					struct incise_recording_length **lengths,
 					struct incise_error *err);
 
-/** How to export. */
+/** Options of an export. */
 struct incise_export_options {
 	double rate_hz; /**< rows per second of raw export, each the mean of its force
 			     samples; 0: every force sample */
@@ -164,7 +164,7 @@ struct incise_export_options {
 /** Raw: every force sample of each cut, with the recordings' own calibration. */
 INCISE_API void incise_export_options_init(struct incise_export_options *options);
 
-/** The result of an export. */
+/** Result of an export. */
 struct incise_export_report {
 	uint64_t rows;
 	int cuts;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * The loop, run on a recording; see incise/replay.h. It is incise_loop_run() on a clock that
- * goes on by steps, waited for or not. Rows are read between ticks, so that a tick does
- * what it does live.
+ * advances in steps, in real time or not. Rows are read between ticks, so a tick does the same
+ * work as live.
  */
 #include <errno.h>
 #include <limits.h>
@@ -13,10 +13,10 @@
 #include "../../base/crc32c.h"
 #include "replay_source.h"
 
-/* What a plan takes before a tick. */
+/* Poses that a plan accepts before a tick. */
 #define POSES 32
 
-/* What nobody else who is told of ticks answers. */
+/* The return value of a stopped replay; no callback returns it. */
 #define STOPPED INT_MIN
 
 struct replay {
@@ -32,7 +32,7 @@ struct replay {
 	double squares_N2, least_N, most_N;
 };
 
-/* Have the plan get what has come by the next tick. */
+/* Feed the plan the poses up to the next tick. */
 static int feed(struct replay *replay, int64_t t_ns)
 {
 	struct incise_tracker_sample poses[POSES];
@@ -61,19 +61,19 @@ static uint32_t add_force(uint32_t crc, const double force_N[3])
 	return incise_crc32c(crc, bytes, sizeof(bytes));
 }
 
-static void compare(struct replay *replay, const struct incise_replay_tick *told)
+static void compare(struct replay *replay, const struct incise_replay_tick *at)
 {
 	struct incise_replay_report *report = replay->report;
-	double error_N = told->predicted_N - told->measured_N;
+	double error_N = at->predicted_N - at->measured_N;
 
-	if (!told->cut || told->clipped || isnan(told->measured_N))
+	if (!at->cut || at->clipped || isnan(at->measured_N))
 		return;
 	replay->squares_N2 += error_N * error_N;
-	replay->least_N = fmin(replay->least_N, told->measured_N);
-	replay->most_N = fmax(replay->most_N, told->measured_N);
+	replay->least_N = fmin(replay->least_N, at->measured_N);
+	replay->most_N = fmax(replay->most_N, at->measured_N);
 	if (!report->compared++ || fabs(error_N) > report->max_N) {
 		report->max_N = fabs(error_N);
-		report->max_t_s = told->t_s;
+		report->max_t_s = at->t_s;
 	}
 }
 
@@ -83,7 +83,7 @@ static int ticked(void *context, const struct incise_tick *tick)
 	struct incise_replay_source *source = &replay->source;
 	struct incise_replay_report *report = replay->report;
 	struct incise_replay_measure measure;
-	struct incise_replay_tick told;
+	struct incise_replay_tick at;
 	int rc = incise_replay_source_measure(source, tick->t_ns, replay->period_ns,
 					      &measure, replay->err);
 
@@ -95,7 +95,7 @@ static int ticked(void *context, const struct incise_tick *tick)
 		report->spells[i] += (tick->flags & ~replay->flags) >> i & 1;
 	replay->flags = tick->flags;
 	report->seconds = (tick->t_ns - replay->first_ns) * 1e-9;
-	told = (struct incise_replay_tick){
+	at = (struct incise_replay_tick){
 		.tick = tick,
 		.t_s = (tick->t_ns - source->origin_ns) * 1e-9,
 		.done = (double)(tick->t_ns - source->first_ns) /
@@ -108,14 +108,13 @@ static int ticked(void *context, const struct incise_tick *tick)
 		.measured_N = measure.force_N,
 		.clipped = measure.clipped,
 	};
-	compare(replay, &told);
+	compare(replay, &at);
 	if (replay->options->ticked) {
-		rc = replay->options->ticked(replay->options->context, &told,
-					     replay->err);
+		rc = replay->options->ticked(replay->options->context, &at, replay->err);
 		if (rc)
 			return rc;
 	}
-	/* At once: nobody holds what a loop would let go of first. */
+	/* At once: there is no force to release first. */
 	if (replay->options->stop && *replay->options->stop)
 		return STOPPED;
 	return feed(replay, tick->t_ns + replay->period_ns);
@@ -156,7 +155,7 @@ static int begin(struct replay *replay, const struct incise_scene *scene)
 	const struct incise_replay_source *source = &replay->source;
 	const struct incise_recording_info *meta = &source->recording->meta;
 
-	/* Multiples of the period, so that ticks do not depend on when a stream began. */
+	/* Multiples of the period: ticks do not depend on the start of a stream. */
 	replay->period_ns = llrint(INCISE_NS_PER_S / incise_scene_rate_hz(scene));
 	replay->first_ns = (source->first_ns / replay->period_ns + 1) * replay->period_ns;
 	if (replay->first_ns > source->last_ns)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A recording as the loop meets it; see replay_source.h.
+ * A recording as input of the loop; see replay_source.h.
  */
 #include <errno.h>
 #include <math.h>
@@ -10,7 +10,7 @@
 #include "replay_source.h"
 #include "../schema.h"
 
-/* Capture takes no longer ones; a row that says otherwise would be waited for. */
+/* Longer than any recording; a replay in real time would wait for a forged time. */
 #define SPAN_MAX_NS 1000000000000000LL
 #define COUNT_MAX (1LL << 53)
 
@@ -39,7 +39,6 @@ static int step(struct incise_replay_stream *s, struct incise_error *err)
 	int rc = incise_rows_next(&s->rows, err);
 	int64_t seq;
 
-	s->live = rc > 0;
 	if (rc <= 0)
 		return rc;
 	seq = sqlite3_column_int64(s->rows.stmt, 0);
@@ -63,11 +62,11 @@ static int step_force(struct incise_replay_source *source, struct incise_error *
 	return 1;
 }
 
-/* A pose's time is that at which the loop gets it. */
+/* A pose's time is that at which the loop receives it. */
 static int step_pose(struct incise_replay_source *source, struct incise_error *err)
 {
 	struct incise_replay_stream *s = &source->tracker;
-	int64_t before_ns = s->live ? s->t_ns : 0;
+	int64_t before_ns = s->rows.live ? s->t_ns : 0;
 	int rc = step(s, err);
 
 	if (rc <= 0)
@@ -75,7 +74,7 @@ static int step_pose(struct incise_replay_source *source, struct incise_error *e
 	if (source->at == INCISE_REPLAY_ACQUISITION)
 		return 1;
 	s->t_ns = sqlite3_column_int64(s->rows.stmt, ARRIVAL);
-	/* The clock does not go back; one from far ahead would hold up all behind it. */
+	/* The clock does not run back; a pose from far ahead would delay all behind it. */
 	if (s->t_ns < before_ns)
 		return damaged(s, "arrival_ns goes back", err);
 	return 1;
@@ -112,8 +111,8 @@ static int number(struct incise_recording *recording, const char *key, double le
 				recording->path, key);
 }
 
-/* As the predictor takes rates and latencies; lib/tissue/predict.h. */
-static int take_info(struct incise_replay_source *source, struct incise_error *err)
+/* The predictor's limits of rate and latency; lib/control/predict.h. */
+static int read_info(struct incise_replay_source *source, struct incise_error *err)
 {
 	double rate_hz, latency_ns;
 	int rc = number(source->recording, "tracker_hz", 1, 1e4, &rate_hz, err);
@@ -136,7 +135,7 @@ static int take_info(struct incise_replay_source *source, struct incise_error *e
 static int open_streams(struct incise_replay_source *source, struct incise_error *err)
 {
 	struct incise_recording *recording = source->recording;
-	/* Form 1 knows of no stations. */
+	/* Form 1 has no stations. */
 	const char *poses = recording->form > 1
 				    ? "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, "
 				      "qy, qz, status, station, button"
@@ -156,7 +155,7 @@ static int open_streams(struct incise_replay_source *source, struct incise_error
 	return rc;
 }
 
-/* Time of the last row, if there is one; it is checked when its turn has come. */
+/* Time of the last row, if there is one; the row is checked when it is read. */
 static int find_last(struct incise_replay_source *source, const char *table,
 		     const struct incise_replay_stream *s, const char *column,
 		     struct incise_error *err)
@@ -189,13 +188,13 @@ static int find_span(struct incise_replay_source *source, struct incise_error *e
 	const char *path = source->recording->path;
 	int rc;
 
-	if (!source->tracker.live)
+	if (!source->tracker.rows.live)
 		return incise_error_set(err, ENODATA,
 					"%s: there is no pose to replay: its tracker "
 					"gave none",
 					path);
 	source->origin_ns =
-		source->force.live ? source->force.t_ns : source->tracker.t_ns;
+		source->force.rows.live ? source->force.t_ns : source->tracker.t_ns;
 	source->first_ns = source->tracker.t_ns < source->origin_ns ? source->tracker.t_ns
 								    : source->origin_ns;
 	source->last_ns = source->first_ns;
@@ -230,7 +229,7 @@ int incise_replay_source_open(struct incise_replay_source *source,
 		.deep = {{.t_ns = INCISE_TIME_NONE}, {.t_ns = INCISE_TIME_NONE}},
 	};
 	incise_recording_force(recording, calibration, &source->scale);
-	rc = take_info(source, err);
+	rc = read_info(source, err);
 	if (!rc)
 		rc = open_streams(source, err);
 	if (!rc)
@@ -253,7 +252,7 @@ void incise_replay_source_close(struct incise_replay_source *source)
 	incise_rows_close(&source->depth.rows);
 }
 
-/* --- going on ------------------------------------------------------------------------ */
+/* --- reading ------------------------------------------------------------------------- */
 
 static void take_pose(const struct incise_replay_stream *s,
 		      struct incise_tracker_sample *pose)
@@ -279,7 +278,7 @@ int incise_replay_source_poses(struct incise_replay_source *source, int64_t t_ns
 {
 	int taken = 0;
 
-	while (taken < n && source->tracker.live && source->tracker.t_ns <= t_ns) {
+	while (taken < n && source->tracker.rows.live && source->tracker.t_ns <= t_ns) {
 		int rc;
 
 		take_pose(&source->tracker, &poses[taken++]);
@@ -298,7 +297,7 @@ static int average(struct incise_replay_source *source, int64_t t_ns, int64_t pe
 	int64_t from_ns = t_ns - period_ns / 2, end_ns = from_ns + period_ns, sum = 0;
 	int n = 0, rc = 0;
 
-	while (rc >= 0 && s->live && s->t_ns < end_ns) {
+	while (rc >= 0 && s->rows.live && s->t_ns < end_ns) {
 		int32_t code = sqlite3_column_int(s->rows.stmt, 2);
 
 		if (s->t_ns >= from_ns) {
@@ -314,7 +313,7 @@ static int average(struct incise_replay_source *source, int64_t t_ns, int64_t pe
 	return rc < 0 ? rc : 0;
 }
 
-/* On the line between the rows before and after, if they are near each other. */
+/* On the line between the rows before and after, if they are near. */
 static int find_depth(struct incise_replay_source *source, int64_t t_ns,
 		      struct incise_replay_measure *measure, struct incise_error *err)
 {
@@ -322,7 +321,7 @@ static int find_depth(struct incise_replay_source *source, int64_t t_ns,
 	double share;
 	int rc = 0;
 
-	while (rc >= 0 && source->depth.live && source->depth.t_ns <= t_ns)
+	while (rc >= 0 && source->depth.rows.live && source->depth.t_ns <= t_ns)
 		rc = step_depth(source, err);
 	if (rc < 0)
 		return rc;
@@ -351,11 +350,11 @@ int incise_replay_source_finish(struct incise_replay_source *source,
 {
 	int rc = 0;
 
-	while (rc >= 0 && source->tracker.live)
+	while (rc >= 0 && source->tracker.rows.live)
 		rc = step_pose(source, err);
-	while (rc >= 0 && source->force.live)
+	while (rc >= 0 && source->force.rows.live)
 		rc = step_force(source, err);
-	while (rc >= 0 && source->depth.live)
+	while (rc >= 0 && source->depth.rows.live)
 		rc = step_depth(source, err);
 	return rc < 0 ? rc : 0;
 }

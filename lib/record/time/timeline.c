@@ -18,7 +18,7 @@
 #define KNOTS_SPARE 4
 
 /*
- * --- knots of the line, for those who read the recording afterwards ----------------------
+ * --- knots of the line, for readers of the recording --------------------------------------
  *
  *     start        middle of       middle of           middle of    last
  *     of line      64 blocks       64 blocks           the last 64  sample

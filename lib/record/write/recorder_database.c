@@ -180,6 +180,9 @@ static int set_settings(struct incise_recorder *rec, const char *calibration_pat
 
 static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 {
+	const struct incise_tracker_info *tracker = &rec->tracker_info;
+	const struct incise_force_info *force = &rec->force_info;
+	const struct incise_camera_info *camera = &rec->camera_info;
 	const char *const axes[] = {"x", "y", "z"};
 	char started[32];
 	struct utsname host;
@@ -201,29 +204,25 @@ static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 	bad |= set_text(rec, "clock",
 			incise_clock_is_real(incise_rig_clock(rec->rig)) ? "real"
 									 : "simulated");
-	bad |= set_text(rec, "tracker_name", rec->tracker_info.name);
-	bad |= incise_recorder_set_real(rec, "tracker_hz", rec->tracker_info.rate_hz);
+	bad |= set_text(rec, "tracker_name", tracker->name);
+	bad |= incise_recorder_set_real(rec, "tracker_hz", tracker->rate_hz);
 	bad |= incise_recorder_set_integer(rec, "tracker_latency_ns",
-					   rec->tracker_info.latency_ns);
-	bad |= set_text(rec, "force_name", rec->force_info.name);
-	bad |= incise_recorder_set_real(rec, "force_hz", rec->force_info.rate_hz);
-	bad |= incise_recorder_set_integer(rec, "force_bits", rec->force_info.bits);
-	bad |= incise_recorder_set_real(rec, "force_full_scale_V",
-					rec->force_info.full_scale_V);
-	bad |= incise_recorder_set_real(rec, "force_offset_V", rec->force_info.offset_V);
+					   tracker->latency_ns);
+	bad |= set_text(rec, "force_name", force->name);
+	bad |= incise_recorder_set_real(rec, "force_hz", force->rate_hz);
+	bad |= incise_recorder_set_integer(rec, "force_bits", force->bits);
+	bad |= incise_recorder_set_real(rec, "force_full_scale_V", force->full_scale_V);
+	bad |= incise_recorder_set_real(rec, "force_offset_V", force->offset_V);
 	bad |= incise_recorder_set_real(rec, "force_mV_N", rec->calibration.force_mV_N);
 	bad |= incise_recorder_set_real(rec, "force_zero_mV", rec->stats.zero_mV);
 	bad |= incise_recorder_set_real(rec, "depth_mm_px", rec->calibration.depth_mm_px);
 	if (rec->streams[INCISE_LEDGER_CAMERA].exists) {
-		bad |= set_text(rec, "camera_name", rec->camera_info.name);
-		bad |= incise_recorder_set_real(rec, "camera_hz",
-						rec->camera_info.rate_hz);
-		bad |= incise_recorder_set_integer(rec, "camera_width",
-						   rec->camera_info.width);
-		bad |= incise_recorder_set_integer(rec, "camera_height",
-						   rec->camera_info.height);
+		bad |= set_text(rec, "camera_name", camera->name);
+		bad |= incise_recorder_set_real(rec, "camera_hz", camera->rate_hz);
+		bad |= incise_recorder_set_integer(rec, "camera_width", camera->width);
+		bad |= incise_recorder_set_integer(rec, "camera_height", camera->height);
 		bad |= incise_recorder_set_integer(rec, "camera_exposure_ns",
-						   rec->camera_info.exposure_ns);
+						   camera->exposure_ns);
 	}
 	for (int i = 0; i < 3; i++) {
 		char key[32];
