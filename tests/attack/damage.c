@@ -6,7 +6,7 @@
  *     damage NAME.rec FILE COUNT SEED        FILE: recording.db or camera.mkv
  *
  * Verification must find it, unless the byte is in nothing that is read: then all rows and
- * pictures are as before. In one process, so that a bad access under a sanitizer ends it.
+ * frames are as before. In one process, so that a bad access under a sanitizer ends it.
  * Works in the current folder; prints a line at the end.
  */
 #include <errno.h>
@@ -82,7 +82,7 @@ static bool read_rows(const char *folder, uint32_t *crc)
 	return good;
 }
 
-static bool read_pictures(const char *folder, uint32_t *crc)
+static bool read_frames(const char *folder, uint32_t *crc)
 {
 	struct incise_frames_stored stored;
 	struct incise_frames_reader *reader;
@@ -129,7 +129,7 @@ static off_t choose_in_database(off_t size)
 }
 
 /*
- * Somewhere: anywhere, in the file's head, or where one picture ends with its note and the
+ * Somewhere: anywhere, in the file's head, or where one frame ends with its note and the
  * next begins with its number and time.
  */
 static off_t choose_in_film(const uint8_t *bytes, off_t size)
@@ -193,7 +193,7 @@ static void run(const char *fmt, const char *name)
 
 int main(int argc, char **argv)
 {
-	uint32_t rows, pictures;
+	uint32_t rows, frames;
 	int count, found = 0, unopened = 0, unused = 0;
 	char path[200];
 	uint8_t *good, *bytes;
@@ -207,7 +207,7 @@ int main(int argc, char **argv)
 	count = atoi(argv[3]);
 	random_state = strtoull(argv[4], NULL, 10) * 0x9e3779b97f4a7c15 | 1;
 	fprintf(stderr, "damage %s %s %d, seed %s\n", argv[1], argv[2], count, argv[4]);
-	if (!read_rows(argv[1], &rows) || !read_pictures(argv[1], &pictures)) {
+	if (!read_rows(argv[1], &rows) || !read_frames(argv[1], &frames)) {
 		fprintf(stderr, "%s cannot be read\n", argv[1]);
 		return 1;
 	}
@@ -224,7 +224,7 @@ int main(int argc, char **argv)
 		struct incise_error err = {0};
 		struct incise_recording_info info;
 		struct incise_recording *recording;
-		uint32_t new_rows = 0, new_pictures = 0;
+		uint32_t new_rows = 0, new_frames = 0;
 
 		memcpy(bytes, good, size);
 		for (int j = 0; j < n && at + j < size; j++)
@@ -235,20 +235,20 @@ int main(int argc, char **argv)
 		found += !rc && !report.complete;
 		if (!rc && report.complete) {
 			if (!read_rows("damaged.rec", &new_rows) ||
-			    !read_pictures("damaged.rec", &new_pictures) ||
-			    new_rows != rows || new_pictures != pictures) {
+			    !read_frames("damaged.rec", &new_frames) ||
+			    new_rows != rows || new_frames != frames) {
 				fprintf(stderr,
 					"place %d: %d bytes of %s at %lld are changed, and "
 					"verify finds all complete: rows %08" PRIx32
 					" %08" PRIx32 ", pictures %08" PRIx32
 					" %08" PRIx32 "\n",
 					i, n, argv[2], (long long)at, rows, new_rows,
-					pictures, new_pictures);
+					frames, new_frames);
 				return 1;
 			}
 			unused++;
 		}
-		/* Who reads it without verifying must not fall over it either. */
+		/* Reading it without verification must not crash either. */
 		recording = incise_recording_open("damaged.rec", &err);
 		if (recording)
 			incise_recording_info(recording, &info, &err);

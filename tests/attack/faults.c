@@ -112,7 +112,7 @@ static void attack(struct round *round, const char *kind, int count)
 			fail(round, "nothing failed, and yet: %s", text_of("err"));
 		check_message(round);
 		failed++;
-		/* What has not begun is cleared away. */
+		/* A recording that did not start leaves nothing. */
 		if (has_no_sample(round->page) && access("a.rec.part", F_OK) &&
 		    access("a.rec", F_OK)) {
 			unbegun++;

@@ -23,7 +23,7 @@ static struct {
 	_Atomic bool stop;
 } canary;
 
-/* How long a program that wants to run every 5 ms has to wait. */
+/* Longest wait of a program that wants to run every 5 ms. */
 static void *watch_machine(void *unused)
 {
 	int64_t next = now_ns();

@@ -36,13 +36,13 @@ static int64_t number(const char *name)
 
 static void answer(void)
 {
-	static _Atomic int64_t begun_ms;
+	static _Atomic int64_t started_ms;
 	int64_t none = 0, first_ms = number("STALL_FIRST_MS");
 	int64_t every_ms = number("STALL_EVERY_MS"), stall_ms = number("STALL_MS"), at_ms;
 	struct timespec rest;
 
-	atomic_compare_exchange_strong(&begun_ms, &none, now_ms());
-	at_ms = now_ms() - begun_ms - first_ms;
+	atomic_compare_exchange_strong(&started_ms, &none, now_ms());
+	at_ms = now_ms() - started_ms - first_ms;
 	if (every_ms > 0 && at_ms > 0)
 		at_ms %= every_ms;
 	if (at_ms < 0 || at_ms >= stall_ms)

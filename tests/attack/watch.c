@@ -144,7 +144,7 @@ static bool is_of_recording(int fd)
 }
 
 /*
- * What becomes of a write of *size bytes, or of a sync, where size is NULL: 0, or an error;
+ * The result of a write of *size bytes, or of a sync if size is NULL: 0, or an error;
  * fewer bytes are written when *size is less.
  */
 static int fate(int fd, size_t *size)

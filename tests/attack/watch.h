@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What the library that is loaded into a recording program (watch.c) tells the attacker: a
- * page that both map, so that it outlives a kill -9.
+ * Shared by the library loaded into a recording program (watch.c) and the attacker: a
+ * page that both map, which outlives a kill -9.
  */
 #ifndef TEST_ATTACK_WATCH_H
 #define TEST_ATTACK_WATCH_H

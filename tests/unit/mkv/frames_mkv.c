@@ -27,7 +27,7 @@
 
 #define ROOM (1 << 20)
 #define MS 1000000LL
-#define PICTURES 20
+#define FRAMES 20
 
 /* --- made-up frames ------------------------------------------------------------------ */
 
@@ -45,7 +45,7 @@ static uint8_t film_byte(uint64_t n, size_t i)
 }
 
 /*
- * Picture @n. Rows are @pad bytes longer than their pixels. An "MJPEG" one is of any length
+ * Frame @n. Rows are @pad bytes longer than their pixels. An "MJPEG" one is of any length
  * and of bytes that no decoder would take: they must come back all the same.
  */
 static struct incise_camera_frame film_frame(const struct incise_frames_shape *s,
@@ -100,14 +100,14 @@ static const struct incise_frames_shape shapes[] = {
 /* A disk that writes at most so much at once, or fails. 0: as it is. */
 static struct {
 	size_t most;
-	int64_t room; /* bytes until it fails with EIO; below 0: for ever */
+	int64_t capacity; /* bytes until it fails with EIO; below 0: for ever */
 } disk = {0, -1};
 
 ssize_t __real_write(int fd, const void *bytes, size_t n);
 ssize_t __wrap_write(int fd, const void *bytes, size_t n)
 {
-	if (disk.room >= 0 && (int64_t)n > disk.room) {
-		n = (size_t)disk.room;
+	if (disk.capacity >= 0 && (int64_t)n > disk.capacity) {
+		n = (size_t)disk.capacity;
 		if (!n) {
 			errno = EIO;
 			return -1;
@@ -115,8 +115,8 @@ ssize_t __wrap_write(int fd, const void *bytes, size_t n)
 	}
 	if (disk.most && n > disk.most)
 		n = disk.most;
-	if (disk.room >= 0)
-		disk.room -= (int64_t)n;
+	if (disk.capacity >= 0)
+		disk.capacity -= (int64_t)n;
 	return __real_write(fd, bytes, n);
 }
 
@@ -142,9 +142,9 @@ static void put(struct incise_frames_writer *writer,
 		fail_msg("%s", err.text);
 }
 
-/* That @frame is picture @n of the film, row by row. */
-static void is_picture(const struct incise_camera_frame *frame,
-		       const struct incise_frames_shape *shape, uint64_t n, int pad)
+/* That @frame is frame @n of the film, row by row. */
+static void is_frame(const struct incise_camera_frame *frame,
+		     const struct incise_frames_shape *shape, uint64_t n, int pad)
 {
 	static uint8_t bytes[ROOM];
 	struct incise_camera_frame want = film_frame(shape, n, pad, bytes);
@@ -167,7 +167,7 @@ static void is_picture(const struct incise_camera_frame *frame,
 				    want.data + want.stride * (size_t)y, row);
 }
 
-/* How many pictures a file has; all but the last are those of the film. */
+/* Number of frames of a file; all but the last are those of the film. */
 static uint64_t count(const char *path, const struct incise_frames_shape *shape)
 {
 	struct incise_error err = {0};
@@ -183,7 +183,7 @@ static uint64_t count(const char *path, const struct incise_frames_shape *shape)
 	if (!reader)
 		fail_msg("%s", err.text);
 	while ((rc = reader->ops->next(reader, &frame, &stored, &err)) == 1)
-		is_picture(&frame, shape, n++, 0);
+		is_frame(&frame, shape, n++, 0);
 	/* The last may be torn, and then says so. */
 	assert_true(rc == 0 || rc == -EBADMSG);
 	if (rc == -EBADMSG)
@@ -198,7 +198,7 @@ static void comes_back_to_the_byte(void **state)
 
 	for (size_t i = 0; i < sizeof(shapes) / sizeof(*shapes); i++) {
 		const struct incise_frames_shape *shape = &shapes[i];
-		int pad = i % 2 ? 0 : 13, pictures = shape->height > 1000 ? 2 : 12;
+		int pad = i % 2 ? 0 : 13, frames = shape->height > 1000 ? 2 : 12;
 		struct incise_frames_stored put_as[12], stored;
 		struct incise_frames_writer *writer;
 		struct incise_frames_reader *reader;
@@ -209,10 +209,10 @@ static void comes_back_to_the_byte(void **state)
 
 		film_path(path, sizeof(path));
 		writer = begin(path, shape);
-		for (int n = 0; n < pictures; n++) {
+		for (int n = 0; n < frames; n++) {
 			frame = film_frame(shape, (uint64_t)n, pad, bytes);
 			put(writer, &frame, &put_as[n]);
-			/* 16.666667 ms a picture, to the nearest. */
+			/* 16.666667 ms a frame, to the nearest. */
 			assert_int_equal(put_as[n].pts_ms,
 					 (n * FILM_STEP_NS + 500000) / 1000000);
 		}
@@ -224,10 +224,10 @@ static void comes_back_to_the_byte(void **state)
 		reader = incise_frames.open(path, &err);
 		if (!reader)
 			fail_msg("%s", err.text);
-		for (int n = 0; n < pictures; n++) {
+		for (int n = 0; n < frames; n++) {
 			assert_int_equal(reader->ops->next(reader, &frame, &stored, &err),
 					 1);
-			is_picture(&frame, shape, (uint64_t)n, pad);
+			is_frame(&frame, shape, (uint64_t)n, pad);
 			assert_int_equal(stored.pts_ms, put_as[n].pts_ms);
 			assert_int_equal(stored.bytes, put_as[n].bytes);
 			assert_int_equal(stored.crc, put_as[n].crc);
@@ -335,7 +335,7 @@ static void refuses(void **state)
 	film_remove(path);
 }
 
-/* Where each picture ends in the file. */
+/* Where each frame ends in the file. */
 static void write_film(const char *path, const struct incise_frames_shape *shape, int n,
 		       off_t *ends)
 {
@@ -371,7 +371,7 @@ static void cut_off_anywhere(void **state)
 			while (whole < 6 && ends[whole] <= size)
 				whole++;
 			found = count(path, &shapes[i]);
-			/* What is behind the picture's bytes need not be there. */
+			/* Bytes behind the frame's need not exist. */
 			assert_in_range(found, whole, whole + 1);
 		}
 		film_remove(path);
@@ -395,7 +395,7 @@ static void altered_bytes_are_found(void **state)
 		write_film(path, shape, 6, ends);
 		file = fopen(path, "r+");
 		assert_non_null(file);
-		/* In the middle of picture 3's bytes. */
+		/* In the middle of frame 3's bytes. */
 		assert_int_equal(fseek(file, (ends[2] + ends[3]) / 2, SEEK_SET), 0);
 		int c = fgetc(file);
 		assert_int_equal(fseek(file, -1, SEEK_CUR), 0);
@@ -511,7 +511,7 @@ static void a_disk_that_fails(void **state)
 {
 	static uint8_t bytes[ROOM];
 
-	for (int64_t room = 0; room < 20000; room += 777) {
+	for (int64_t capacity = 0; capacity < 20000; capacity += 777) {
 		struct incise_frames_writer *writer;
 		struct incise_frames_stored stored;
 		struct incise_error err = {0};
@@ -520,7 +520,7 @@ static void a_disk_that_fails(void **state)
 		int rc = 0;
 
 		film_path(path, sizeof(path));
-		disk.room = room;
+		disk.capacity = capacity;
 		writer = incise_frames.create(path, &shapes[3], NULL, &err);
 		while (writer && !rc && n < 100) {
 			struct incise_camera_frame frame =
@@ -528,10 +528,10 @@ static void a_disk_that_fails(void **state)
 
 			rc = writer->ops->put(writer, &frame, &stored, &err);
 		}
-		disk.room = -1;
+		disk.capacity = -1;
 		assert_int_equal(err.code, EIO);
 		if (!writer) {
-			/* Nothing is left of what could not be begun. */
+			/* Nothing is left of a file that could not be started. */
 			assert_int_equal(access(path, F_OK), -1);
 			film_remove(path);
 			continue;
@@ -543,7 +543,7 @@ static void a_disk_that_fails(void **state)
 	}
 }
 
-/* 20 writers are killed at 20 moments: every picture that was put is there. */
+/* 20 writers are killed at 20 moments: every frame that was put is there. */
 static void killed(void **state)
 {
 	volatile uint64_t *done = mmap(NULL, 4096, PROT_READ | PROT_WRITE,
@@ -600,7 +600,7 @@ static void virtual_camera_comes_back(void **state)
 {
 	struct incise_rig *rig =
 		incise_rig_open("sim:clock=simulated", INCISE_RIG_CAMERA, NULL);
-	struct incise_frame_record record[PICTURES];
+	struct incise_frame_record record[FRAMES];
 	struct incise_frame_pump_setup setup = {0};
 	struct incise_frames_stored stored;
 	struct incise_frames_shape shape;
@@ -625,12 +625,12 @@ static void virtual_camera_comes_back(void **state)
 	pump = incise_frame_pump_new(&setup, NULL);
 	assert_non_null(pump);
 	from_ns = incise_clock_now(setup.clock);
-	for (int ms = 0; read < PICTURES; ms++) {
+	for (int ms = 0; read < FRAMES; ms++) {
 		incise_clock_wait_until(setup.clock, from_ns + ms * MS);
 		read += incise_frame_pump_step(pump);
 	}
 	assert_int_equal(incise_frame_pump_stop(pump, 60000 * MS, NULL), 0);
-	assert_int_equal(incise_frame_pump_take(pump, record, PICTURES), PICTURES);
+	assert_int_equal(incise_frame_pump_take(pump, record, FRAMES), FRAMES);
 	incise_frame_pump_free(pump);
 	incise_rig_close(rig);
 
@@ -638,7 +638,7 @@ static void virtual_camera_comes_back(void **state)
 	rig = incise_rig_open("sim:clock=simulated", INCISE_RIG_CAMERA, NULL);
 	reader = incise_frames.open(path, &err);
 	assert_true(rig && reader);
-	for (int i = 0; i < PICTURES; i++) {
+	for (int i = 0; i < FRAMES; i++) {
 		struct incise_camera_frame truth;
 
 		incise_clock_wait_until(incise_rig_clock(rig), record[i].arrival_ns);
@@ -666,7 +666,7 @@ static const struct incise_frames_shape live_shapes[] = {
 	{64, 48, INCISE_PIXELS_MJPEG, 200},
 };
 
-/* 200 pictures of the film a second, each at its time. */
+/* 200 frames of the film a second, each at its time. */
 struct film_camera {
 	struct incise_camera camera;
 	const struct incise_frames_shape *shape;
@@ -722,15 +722,15 @@ static const struct incise_camera_ops camera_ops = {
 	.lost = camera_lost,
 };
 
-/* What the child tells: since when it takes pictures, and of how many it has rows. */
-struct told {
+/* Reported by the child: the time of its first frame, and its number of rows. */
+struct reported {
 	_Atomic int64_t from_ns;
 	_Atomic uint64_t rows;
 	_Atomic bool stood_still; /* the computer did, so that times say nothing */
 };
 
 static void record(const char *path, const struct incise_frames_shape *shape,
-		   struct told *told)
+		   struct reported *reported)
 {
 	static struct film_camera camera = {.camera = {&camera_ops}};
 	struct incise_clock *clock = incise_clock_new_real();
@@ -747,24 +747,24 @@ static void record(const char *path, const struct incise_frames_shape *shape,
 		NULL);
 	while (!camera.from_ns)
 		usleep(100);
-	told->from_ns = camera.from_ns;
+	reported->from_ns = camera.from_ns;
 	for (int64_t before_ns = camera.from_ns;;) {
 		int64_t now_ns = clock_ns();
 
 		if (now_ns - before_ns > 50 * MS)
-			told->stood_still = true;
+			reported->stood_still = true;
 		before_ns = now_ns;
-		told->rows += (uint64_t)incise_frame_pump_take(pump, records, 16);
+		reported->rows += (uint64_t)incise_frame_pump_take(pump, records, 16);
 		usleep(1000);
 	}
 }
 
 static void a_kill_costs_200_ms_at_most(void **state)
 {
-	struct told *told = mmap(NULL, sizeof(*told), PROT_READ | PROT_WRITE,
-				 MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	struct reported *reported = mmap(NULL, sizeof(*reported), PROT_READ | PROT_WRITE,
+					 MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 
-	assert_true(told != MAP_FAILED);
+	assert_true(reported != MAP_FAILED);
 	srandom((unsigned int)time(NULL));
 	for (int round = 0; round < 20; round++) {
 		const struct incise_frames_shape *shape = &live_shapes[round % 2];
@@ -779,14 +779,14 @@ static void a_kill_costs_200_ms_at_most(void **state)
 		pid_t child;
 
 		film_path(path, sizeof(path));
-		told->from_ns = 0;
-		told->rows = 0;
-		told->stood_still = false;
+		reported->from_ns = 0;
+		reported->rows = 0;
+		reported->stood_still = false;
 		child = fork();
 		assert_true(child >= 0);
 		if (!child)
-			record(path, shape, told);
-		while (!told->from_ns)
+			record(path, shape, reported);
+		while (!reported->from_ns)
 			usleep(1000);
 		usleep((useconds_t)random() % 250000);
 		killed_ns = clock_ns();
@@ -805,13 +805,13 @@ static void a_kill_costs_200_ms_at_most(void **state)
 		}
 		reader->ops->close(reader);
 		/* Rows are never ahead of the file. */
-		assert_true(n >= told->rows);
+		assert_true(n >= reported->rows);
 		/* The bound of issue 8. */
-		if (killed_ns - told->from_ns > 200 * MS && !told->stood_still)
+		if (killed_ns - reported->from_ns > 200 * MS && !reported->stood_still)
 			assert_true(last_ns > killed_ns - 200 * MS);
 		film_remove(path);
 	}
-	munmap(told, sizeof(*told));
+	munmap(reported, sizeof(*reported));
 }
 
 int main(void)

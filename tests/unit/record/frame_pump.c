@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/record/write/frame_pump.c, with a camera, a file and a vision that do as they are told:
- * every picture is in the file or in a count, whoever is slow, ends or hangs.
+ * lib/record/write/frame_pump.c, with a simulated camera, file and vision: every frame is in
+ * the file or in a count, whichever of them is slow, ends or hangs.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -21,7 +21,7 @@
 #define SIDE 16
 #define MS 1000000LL
 
-/* A picture every 1/hz s of the clock; all wait until they are read. */
+/* A frame every 1/hz s of the clock; all wait until they are read. */
 struct fake_camera {
 	struct incise_camera camera;
 	struct incise_clock *clock;
@@ -29,7 +29,7 @@ struct fake_camera {
 	int64_t ahead_ns; /* they come so long before their time */
 	double hz;
 	uint64_t next, last; /* ends at */
-	int end;	     /* negative errno of the end; 0: no more pictures */
+	int end;	     /* negative errno of the end; 0: no more frames */
 	uint64_t lost;
 	uint8_t bytes[SIDE * SIDE];
 };
@@ -99,14 +99,14 @@ static struct fake_camera camera_of(struct incise_clock *clock, double hz, uint6
 	};
 }
 
-/* A file that stalls, fails or hangs at one picture. */
+/* A file that stalls, fails or hangs at one frame. */
 struct fake_file {
 	struct incise_frames_writer writer;
 	uint64_t puts, at;
 	useconds_t stall;
 	int fail;
 	sem_t *hang;
-	bool wrong; /* a picture that is not whole, or out of order */
+	bool wrong; /* a frame that is not whole, or out of order */
 	_Atomic int closed;
 };
 
@@ -138,7 +138,7 @@ static int file_close(struct incise_frames_writer *writer, struct incise_error *
 
 static const struct incise_frames_writer_ops file_ops = {file_put, file_close};
 
-/* A vision that is slow, and finds no handle in every third picture. */
+/* A vision that is slow, and finds no handle in every third frame. */
 struct fake_vision {
 	struct incise_vision vision;
 	useconds_t takes;
@@ -186,14 +186,14 @@ static struct incise_frame_pump *begin(struct fake_camera *camera, struct fake_f
 
 /* Until the camera has given its last and all of it went through. */
 static struct incise_frame_pump_stats wait_for(struct incise_frame_pump *pump,
-					       uint64_t pictures)
+					       uint64_t frames)
 {
 	struct incise_frame_pump_stats s;
 
 	do {
 		usleep(1000);
 		incise_frame_pump_stats(pump, &s);
-	} while (s.written + s.dropped + s.unwritten < pictures);
+	} while (s.written + s.dropped + s.unwritten < frames);
 	return s;
 }
 
@@ -255,7 +255,7 @@ static void nothing_is_lost_where_time_waits(void **state)
 	incise_clock_free(clock);
 }
 
-/* What waited in the camera before the pump began is no part of the recording, nor lost. */
+/* Frames that waited in the camera before the pump started are not recorded, and not lost. */
 static void what_was_shot_before_is_passed_over(void **state)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(1000 * MS);
@@ -265,7 +265,7 @@ static void what_was_shot_before_is_passed_over(void **state)
 	struct incise_frame_record record[30];
 	struct incise_frame_pump *pump;
 
-	/* Pictures 0 … 20 are before. */
+	/* Frames 0 … 20 are before. */
 	camera.from_ns = 1000 * MS;
 	incise_clock_wait_until(clock, 1205 * MS);
 	pump = begin(&camera, &file, NULL);
@@ -291,7 +291,7 @@ static void what_was_shot_before_is_passed_over(void **state)
 	incise_clock_free(clock);
 }
 
-/* A disk that does not answer for 1.5 s, of the 2.5 s that there is room for. */
+/* A disk that does not answer for 1.5 s, of the 2.5 s that the slots bridge. */
 static void a_stall_is_bridged(void **state)
 {
 	struct incise_clock *clock = incise_clock_new_real();
@@ -303,7 +303,7 @@ static void a_stall_is_bridged(void **state)
 
 	assert_int_equal(stats.written, 120);
 	assert_int_equal(stats.capacity, 150);
-	/* It did stall: of 90 pictures most have waited. */
+	/* It did stall: of 90 frames most have waited. */
 	assert_true(stats.waiting_most > 45);
 	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
 	for (uint64_t seq = 0; seq < 120; seq++) {
@@ -318,10 +318,10 @@ static void a_stall_is_bridged(void **state)
 	incise_clock_free(clock);
 }
 
-/* One that hangs: what finds no room is counted, and the end does not wait for it. */
+/* A disk that hangs: frames without a slot are counted, and the end does not wait for it. */
 static void a_disk_that_hangs_holds_nobody(void **state)
 {
-	/* What the thread that hangs may touch is never freed. */
+	/* Memory that the hanging thread may use is never freed. */
 	static struct incise_frame_pump *left;
 	static struct fake_file file = {.writer = {&file_ops}, .at = 5};
 	static sem_t hang;
@@ -344,7 +344,7 @@ static void a_disk_that_hangs_holds_nobody(void **state)
 	incise_frame_pump_stats(left, &stats);
 	/* 5 are in the file, one is in the hand of who hangs and in its slot still. */
 	assert_int_equal(stats.written, 5);
-	/* All are somewhere. Who hangs may have begun before or after the slots were full. */
+	/* Each is counted once. The hang may start before or after the slots are full. */
 	assert_in_range(stats.waiting, 2495, 2500);
 	assert_int_equal(stats.written + stats.waiting + stats.dropped, 3000);
 	assert_int_equal(incise_frame_pump_take(left, record, 10), 5);
@@ -379,8 +379,8 @@ static void a_full_disk_ends_the_file_alone(void **state)
 	incise_clock_free(clock);
 }
 
-/* What is not of the shape costs itself alone. */
-static void a_wrong_picture_is_passed_over(void **state)
+/* A frame of a wrong shape does not affect the others. */
+static void a_wrong_frame_is_passed_over(void **state)
 {
 	struct incise_clock *clock = incise_clock_new_real();
 	struct fake_camera camera = camera_of(clock, 1000, 50);
@@ -395,7 +395,7 @@ static void a_wrong_picture_is_passed_over(void **state)
 	assert_int_equal(stats.file.code, 0);
 	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
 	assert_int_equal(incise_frame_pump_take(pump, record, 50), 49);
-	/* What vision saw stays with its picture behind the gap. */
+	/* Vision's results stay with their frames behind the gap. */
 	for (int i = 0; i < 49; i++) {
 		uint64_t seq = (uint64_t)i + (i >= 20);
 
@@ -428,7 +428,7 @@ static void a_camera_that_ends_says_why(void **state)
 	incise_clock_free(clock);
 }
 
-/* Vision that is slower than the camera: pictures without a depth, but all of them. */
+/* Vision that is slower than the camera: frames without a depth, but all of them. */
 static void slow_vision_holds_nobody(void **state)
 {
 	struct incise_clock *clock = incise_clock_new_real();
@@ -467,7 +467,7 @@ int main(void)
 		cmocka_unit_test(a_stall_is_bridged),
 		cmocka_unit_test(a_disk_that_hangs_holds_nobody),
 		cmocka_unit_test(a_full_disk_ends_the_file_alone),
-		cmocka_unit_test(a_wrong_picture_is_passed_over),
+		cmocka_unit_test(a_wrong_frame_is_passed_over),
 		cmocka_unit_test(a_camera_that_ends_says_why),
 		cmocka_unit_test(slow_vision_holds_nobody),
 	};

@@ -41,7 +41,7 @@ static const uint8_t tracker_bytes[] = {
 	0, 0, 0, 0,    0,    0,	   0, 0, 0,   0,   0,	0,   'j', 3,	0,    0,   0,
 	0, 0, 0, 0,    1,    0,	   0, 0, 0,   0,   0,	0};
 
-static const struct incise_frame_record picture = {
+static const struct incise_frame_record frame = {
 	.seq = 1,
 	.t_ns = 2,
 	.arrival_ns = 3,
@@ -77,13 +77,13 @@ static void rows_are_these_bytes(void **state)
 	assert_memory_equal(row.bytes, tracker_bytes, sizeof(tracker_bytes));
 	assert_true(row.seq == 7 && row.t_ns == -2);
 
-	incise_ledger_row_frame(&row, &picture);
+	incise_ledger_row_frame(&row, &frame);
 	assert_int_equal(row.n, sizeof(frame_bytes));
 	assert_memory_equal(row.bytes, frame_bytes, sizeof(frame_bytes));
 	assert_true(row.seq == 1 && row.t_ns == 2);
 }
 
-/* What a SELECT of this gives is such bytes, or no row. */
+/* A SELECT of these values gives such bytes, or no row. */
 static void read_from_SQLite(void **state)
 {
 	static const struct {

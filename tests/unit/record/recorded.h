@@ -77,7 +77,7 @@ __attribute__((unused)) static int enter_with_modules(void **state)
 	return enter_folder(state);
 }
 
-/* Whether the module that writes and reads pictures was built. */
+/* Whether the module that writes and reads frames was built. */
 __attribute__((unused)) static bool has_frames(void)
 {
 	char path[PATH_MAX];

@@ -268,7 +268,7 @@ static void name_taken_meanwhile_is_kept(void **state)
 
 /* --- kills -------------------------------------------------------------------------- */
 
-/* Record in another process; it tells the start of each poll and never closes. */
+/* Record in another process, which reports the start of each poll and never closes. */
 static pid_t record_forever(const char *spec, int64_t duration_ns, int *polls)
 {
 	int pipes[2];
@@ -383,7 +383,7 @@ static void interrupted_recording_knows_its_losses(void **state)
 
 /* --- faults of devices --------------------------------------------------------------- */
 
-/* What a fault does to the samples of one read; returns how many, or -errno. */
+/* The effect of a fault on the samples of one read; returns their number, or -errno. */
 static int (*force_fault)(struct incise_force_sample *samples, int n);
 static int (*tracker_fault)(struct incise_tracker_sample *samples, int n);
 static struct incise_force_ops force_ops;
@@ -405,7 +405,7 @@ static int faulty_tracker(struct incise_tracker *tracker,
 	return n > 0 && tracker_fault ? tracker_fault(samples, n) : n;
 }
 
-/* What the device tells of its end; empty: nothing. */
+/* The device's message about its end; empty: none. */
 static const char *force_tells;
 
 static int force_cause(struct incise_force *force, char *text, size_t size)

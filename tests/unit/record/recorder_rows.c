@@ -94,7 +94,7 @@ static void measure(double hz, double drift_ppm, double jitter_ms, double latenc
 	out->covered = (double)covered / rows;
 }
 
-/* Asked: 0.5 ms rms without stamps, and the uncertainty stated covers the error in 95 %. */
+/* Required: 0.5 ms rms without timestamps, and 95 % of errors within the stated uncertainty. */
 static void times_without_stamps_are_near_the_truth(void **state)
 {
 	static const struct {
@@ -128,7 +128,7 @@ static void times_without_stamps_are_near_the_truth(void **state)
 	}
 }
 
-/* What is stamped is taken at its word: exact on the virtual rig. */
+/* Timestamps are used as they are: exact on the virtual rig. */
 static void table_says_what_is_known(void **state)
 {
 	struct errors errors;
@@ -309,7 +309,7 @@ static void verified(bool complete)
 	assert_true(report.intact);
 }
 
-static void pictures_are_rows(void **state)
+static void frames_are_rows(void **state)
 {
 	struct incise_rig *rig = open_camera();
 	struct incise_recorder *recorder = start(rig, false);
@@ -317,7 +317,7 @@ static void pictures_are_rows(void **state)
 
 	assert_int_equal(poll_for(recorder, rig, 1000 * MS, NULL), 0);
 	end(recorder, rig, streams);
-	/* 50 Hz for a second, from its first picture at 0 */
+	/* 50 Hz for a second, from its first frame at 0 */
 	assert_in_range(streams[2].rows, 50, 51);
 	assert_int_equal(streams[2].lost, 0);
 	assert_int_equal(ask(DB, "SELECT count(*) FROM frames"), streams[2].rows);
@@ -328,7 +328,7 @@ static void pictures_are_rows(void **state)
 	verified(true);
 }
 
-/* The others go on; all pictures from before are there. */
+/* The other streams continue; all earlier frames are there. */
 static void camera_that_dies(void **state)
 {
 	struct incise_rig *rig = open_camera();
@@ -350,7 +350,7 @@ static void camera_that_dies(void **state)
 	verified(false);
 }
 
-/* Its numbers tell nothing of it: it shot nothing. 50 Hz, and silence is 2 s of it. */
+/* A silent camera shoots nothing, so its numbers have no gap. 50 Hz; silence is 2 s. */
 static void silent_camera(void **state)
 {
 	static const struct {
@@ -381,7 +381,7 @@ static void silent_camera(void **state)
 	}
 }
 
-static void lost_picture_is_counted(void **state)
+static void lost_frame_is_counted(void **state)
 {
 	struct incise_rig *rig = open_camera();
 	struct incise_recorder *recorder = start(rig, false);
@@ -430,10 +430,10 @@ int main(void)
 		IN_FOLDER(times_without_stamps_are_near_the_truth),
 		IN_FOLDER(table_says_what_is_known),
 		IN_FOLDER(last_second_is_there),
-		TEST(pictures_are_rows),
+		TEST(frames_are_rows),
 		TEST(camera_that_dies),
 		TEST(silent_camera),
-		TEST(lost_picture_is_counted),
+		TEST(lost_frame_is_counted),
 		TEST(armed_camera_begins_with_the_trigger),
 		TEST(never_triggered_is_empty_and_whole),
 	};

@@ -242,7 +242,7 @@ static void depths_are_interpolated(void **state)
 	free(rows);
 }
 
-/* Nothing is told across a gap in the tracker's records. */
+/* No length has a depth across a gap in the tracker's records. */
 static void gaps_are_left_out(void **state)
 {
 	struct incise_recording_length *rows;
@@ -278,7 +278,7 @@ static void impossible_lengths_are_refused(void **state)
 	}
 }
 
-static void old_recordings_have_no_pictures(void **state)
+static void old_recordings_have_no_frames(void **state)
 {
 	struct incise_recording_length *rows;
 	struct incise_error err = {0};
@@ -293,8 +293,8 @@ static void old_recordings_have_no_pictures(void **state)
 
 #define CUTS "sim:clock=simulated,cut_s=2,pause_s=0.5,depth_mm=8"
 
-/* A picture between each two records, 0.25 mm deeper than the middle of both. */
-#define PICTURES                                                                          \
+/* A frame between each two records, 0.25 mm deeper than the middle of both. */
+#define FRAMES                                                                            \
 	"DELETE FROM knots; DELETE FROM frames; "                                         \
 	"INSERT INTO frames SELECT a.seq, (a.t_ns + b.t_ns) / 2, b.t_ns, a.seq, 1, 0, "   \
 	"100.0, 0.1, 0.25 - (a.z_mm + b.z_mm) / 2, 0.9 FROM tracker a JOIN tracker b ON " \
@@ -311,7 +311,7 @@ static int pairs_of(struct incise_depth_pair **pairs, struct incise_error *err)
 	return n;
 }
 
-static void pictures_meet_the_tracker(void **state)
+static void frames_meet_the_tracker(void **state)
 {
 	struct incise_depth_pair *pairs;
 	struct incise_error err = {0};
@@ -321,7 +321,7 @@ static void pictures_meet_the_tracker(void **state)
 	record("a.rec", CUTS, 0);
 	assert_int_equal(pairs_of(&pairs, &err), 0); /* no camera */
 	free(pairs);
-	change("a.rec/recording.db", PICTURES);
+	change("a.rec/recording.db", FRAMES);
 	n = pairs_of(&pairs, &err);
 	assert_int_equal(n, ask("a.rec/recording.db",
 				"SELECT count(*) FROM frames WHERE depth_mm >= 1.25"));
@@ -369,7 +369,7 @@ static void what_is_no_depth_is_left_out(void **state)
 
 		if (!i) {
 			record("b.rec", CUTS, 0);
-			change("b.rec/recording.db", PICTURES);
+			change("b.rec/recording.db", FRAMES);
 		}
 		snprintf(copy, sizeof(copy), "rm -rf a.rec && cp -r b.rec a.rec");
 		assert_int_equal(system(copy), 0);
@@ -395,8 +395,8 @@ int main(void)
 		IN_FOLDER(depths_are_interpolated),
 		IN_FOLDER(gaps_are_left_out),
 		IN_FOLDER(impossible_lengths_are_refused),
-		IN_FOLDER(old_recordings_have_no_pictures),
-		IN_FOLDER(pictures_meet_the_tracker),
+		IN_FOLDER(old_recordings_have_no_frames),
+		IN_FOLDER(frames_meet_the_tracker),
 		IN_FOLDER(what_is_no_depth_is_left_out),
 	};
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Tests of lib/record/replay/replay.c: the forces are those that the live loop had on the same
- * poses, to the bit; what is told of them is the same as by plain sums.
+ * poses, to the bit; the report is the same as by plain sums.
  */
 #include "recorded.h"
 #include <incise/replay.h>
@@ -48,10 +48,10 @@ static uint32_t slow_crc(uint32_t crc, const void *bytes, size_t n)
 	return ~crc;
 }
 
-static int see(void *context, const struct incise_replay_tick *told,
+static int see(void *context, const struct incise_replay_tick *at,
 	       struct incise_error *err)
 {
-	const struct incise_tick *tick = told->tick;
+	const struct incise_tick *tick = at->tick;
 	struct seen *seen = context;
 
 	if (seen->as_live) {
@@ -64,26 +64,26 @@ static int see(void *context, const struct incise_replay_tick *told,
 		assert_int_equal(tick->flags, live[seen->n].flags);
 	}
 	/* a plane with the normal z */
-	assert_true(told->predicted_N == tick->command_N[2]);
-	assert_true(told->done >= seen->last_done && told->done <= 1);
-	assert_true(told->t_s > seen->last_t_s);
-	seen->last_done = told->done;
-	seen->last_t_s = told->t_s;
-	seen->in_cut |= told->cut > 0;
+	assert_true(at->predicted_N == tick->command_N[2]);
+	assert_true(at->done >= seen->last_done && at->done <= 1);
+	assert_true(at->t_s > seen->last_t_s);
+	seen->last_done = at->done;
+	seen->last_t_s = at->t_s;
+	seen->in_cut |= at->cut > 0;
 	seen->crc = slow_crc(seen->crc, tick->command_N, sizeof(tick->command_N));
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
 		if (tick->flags & 1u << i && !(seen->flags & 1u << i))
 			seen->spells[i]++;
 	seen->flags = tick->flags;
-	if (told->cut && !told->clipped && isfinite(told->measured_N)) {
-		double error = told->predicted_N - told->measured_N;
+	if (at->cut && !at->clipped && isfinite(at->measured_N)) {
+		double error = at->predicted_N - at->measured_N;
 
 		seen->squares_N2 += error * error;
 		seen->max_N = fmax(seen->max_N, fabs(error));
 		if (!seen->compared++)
-			seen->least_N = seen->most_N = told->measured_N;
-		seen->least_N = fmin(seen->least_N, told->measured_N);
-		seen->most_N = fmax(seen->most_N, told->measured_N);
+			seen->least_N = seen->most_N = at->measured_N;
+		seen->least_N = fmin(seen->least_N, at->measured_N);
+		seen->most_N = fmax(seen->most_N, at->measured_N);
 	}
 	seen->n++;
 	if (seen->stop && seen->n == seen->end_at)
@@ -262,7 +262,7 @@ static void who_is_told_ends_it(void **state)
 static void what_cannot_be_replayed(void **state)
 {
 	static const struct {
-		const char *sql, *told;
+		const char *sql, *message;
 		int code;
 	} cases[] = {
 		{"DELETE FROM tracker; UPDATE meta SET value = 0 WHERE key = "
@@ -294,7 +294,7 @@ static void what_cannot_be_replayed(void **state)
 		change("b.rec/recording.db", cases[k].sql);
 		rc = replay("b.rec", &f, (struct incise_replay_options){0}, &seen,
 			    &report, &err);
-		if (rc != -cases[k].code || !strstr(err.text, cases[k].told))
+		if (rc != -cases[k].code || !strstr(err.text, cases[k].message))
 			fail_msg("%s: %d, %s", cases[k].sql, rc, err.text);
 	}
 	felt_end(&f);

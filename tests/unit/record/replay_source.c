@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Tests of lib/record/replay/replay_source.c: what a recording of hand-written rows says at each
- * tick, against the same told by plain sums over the rows.
+ * tick, compared with plain sums over the rows.
  */
 #include "recorded.h"
 #include "../../../lib/record/replay/replay_source.h"
@@ -13,7 +13,7 @@
 #define RECORDS 120 /* records of the tracker: 0.96 s */
 #define SAMPLES 9500
 
-/* Rows that anyone can tell: force by its number, a blade that goes down evenly. */
+/* Rows with known values: force by its number, a blade that goes down evenly. */
 #define ROWS                                                                                \
 	"DELETE FROM knots; DELETE FROM force WHERE seq >= 9500;"                           \
 	"DELETE FROM tracker WHERE seq >= 120; DELETE FROM depth WHERE seq >= 120;"         \
@@ -51,7 +51,7 @@ static int64_t arrival(int seq)
 	return START_NS + 4 * MS + seq * TRACKER_NS + seq * 7919 % 3000 * 1000;
 }
 
-/* Each pose is told at the first tick that is not before it, and never again. */
+/* Each pose is returned at the first tick that is not before it, and never again. */
 static void poses_are_told_when_they_had_come(void **state)
 {
 	static const enum incise_replay_at ats[] = {INCISE_REPLAY_ARRIVAL,
@@ -260,11 +260,11 @@ static void gaps_clips_and_lines(void **state)
 	       "'depth_rows');");
 }
 
-/* What is wrong, and that it is told: on opening, or on the way. */
+/* Damage and its message: on opening, or while reading. */
 static void no_damaged_row_is_believed(void **state)
 {
 	static const struct {
-		const char *sql, *told;
+		const char *sql, *message;
 		int code;
 	} cases[] = {
 		{"SELECT 1", NULL, 0},
@@ -324,7 +324,7 @@ static void no_damaged_row_is_believed(void **state)
 		}
 		if (rc != -cases[k].code)
 			fail_msg("%s: %d, %s", cases[k].sql, rc, err.text);
-		if (rc && !strstr(err.text, cases[k].told))
+		if (rc && !strstr(err.text, cases[k].message))
 			fail_msg("%s: %s", cases[k].sql, err.text);
 		incise_recording_close(recording);
 	}

@@ -154,7 +154,7 @@ static double at(const char *sql)
 }
 
 /*
- * Noise on the records, pictures on a saw, times that are uncertain by 1 ms of the tracker's
+ * Noise on the records, frames on a saw, times that are uncertain by 1 ms of the tracker's
  * and 2 ms of the camera's: what is said of each is what was put in.
  */
 static void uncertainties_are_what_was_put_in(void **state)
@@ -187,16 +187,16 @@ static void uncertainties_are_what_was_put_in(void **state)
 			       "tracker_error,camera_depth_mm,camera_depth_sd_mm,"
 			       "camera_depth_u_mm,quality,low_quality"));
 	for (int i = 0; next_row(&rest, &r); i++) {
-		int picture = i / 10;
+		int frame = i / 10;
 		double share = i % 10 / 10.0, line = hypot(share, 1 - share);
-		bool low = picture % 50 == 7 || picture % 50 == 6;
+		bool low = frame % 50 == 7 || frame % 50 == 6;
 
 		if (i < 200 || i >= 2500)
 			continue;
-		if (picture >= 19 && picture <= 21) {
+		if (frame >= 19 && frame <= 21) {
 			assert_true(isnan(r.camera[0]) && isnan(r.camera[3]));
 			assert_true(r.camera[4] == 1);
-		} else if (picture >= 99 && picture < 106) {
+		} else if (frame >= 99 && frame < 106) {
 			assert_true(isnan(r.camera[0]) && r.camera[4] == 1);
 		} else {
 			double sd = 0.5 * first * line;

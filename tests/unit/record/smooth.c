@@ -14,7 +14,7 @@
 
 #define RECORDS 4000
 
-/* What comes out for records whose position is that of a function of their number. */
+/* The result for records whose position is a function of their number. */
 static struct incise_smooth_record out[RECORDS];
 
 static int run(double rate_hz, int n,
@@ -98,7 +98,7 @@ static void a_sine_comes_out_as_theory_says(void **state)
 	assert_true(fabs(gain(240, 18.5) / (2 * M_PI * 18.5) - 0.5) < 0.005);
 }
 
-/* 30 mm/s, with records missing, gaps, leaps and places where no hand can be. */
+/* 30 mm/s, with missing records, gaps, discontinuities and impossible positions. */
 static struct incise_smooth_record straight(int i, void *way)
 {
 	double period = 1 / 240., t = i * period;

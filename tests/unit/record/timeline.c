@@ -127,7 +127,7 @@ static double coverage(const struct errors *errors)
 	return errors->covered / errors->asked;
 }
 
-/* What is said of the knots on both sides of a number; the worse holds between them. */
+/* The deviation between two knots is the larger one of both. */
 static double sd_at(const struct incise_timeline_knot *knots, int n, uint64_t seq)
 {
 	int i = 0;
@@ -295,8 +295,8 @@ static void queues_are_seen(void **state)
 	assert_true(coverage(&after) >= 0.95);
 }
 
-/* Kernel stamps with the jitter of an interrupt: 0.1 ms, of which most is the delay's. */
-static void stamps_are_taken(void **state)
+/* Kernel timestamps with the jitter of an interrupt: 0.1 ms, most of it the delay's. */
+static void timestamps_are_used(void **state)
 {
 	for (int seed = 0; seed < 8; seed++) {
 		struct stream stream = stream_of(1000, EXPONENTIAL, (uint64_t)seed);
@@ -432,7 +432,7 @@ static void new_line_after_replug(void **state)
 		truth_ns[i] = stream_next(&stream, &arrival_ns);
 		if (i && i % (240 * 30) == 0) {
 			incise_timeline_replug(&timeline);
-			/* a fast device has short periods; 30 s told within 5 ppm */
+			/* a fast device has short periods; 30 s are measured within 5 ppm */
 			assert_true(fabs(timeline.envelope.prior_slope * 1e6 +
 					 stream.drift_ppm) < 5);
 			assert_true(timeline.envelope.prior_slope_sd <= 20e-6);
@@ -589,7 +589,7 @@ static void hostile_streams(void **state)
 	}
 }
 
-/* What cannot be known is NaN, and no line is made of nothing. */
+/* Unknown values are NaN, and there is no line without samples. */
 static void nothing_is_made_up(void **state)
 {
 	struct incise_timeline_setup setup = {.rate_hz = NAN};
@@ -678,7 +678,7 @@ int main(void)
 		cmocka_unit_test(arrivals_are_enough),
 		cmocka_unit_test(grids_are_admitted),
 		cmocka_unit_test(queues_are_seen),
-		cmocka_unit_test(stamps_are_taken),
+		cmocka_unit_test(timestamps_are_used),
 		cmocka_unit_test(delay_is_uncertain),
 		cmocka_unit_test(drift_is_followed),
 		cmocka_unit_test(gaps_and_stalls),

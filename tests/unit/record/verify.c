@@ -210,7 +210,7 @@ static void tampering_is_found(void **state)
 	}
 }
 
-/* What was lost before it was written is said, but is no alteration. */
+/* Samples lost before they were written are reported, but are no alteration. */
 static void losses_are_no_alteration(void **state)
 {
 	struct incise_rig *rig = open_rig(SIM);
@@ -280,7 +280,7 @@ static void interrupted_is_intact(void **state)
 	assert_int_equal(report.streams[0].lost, 1);
 }
 
-/* Who says that it was interrupted does not get rid of the seals. */
+/* Marking a recording as interrupted does not avoid its seals. */
 static void closed_and_not_complete(void **state)
 {
 	struct incise_verify_report report;
@@ -374,23 +374,23 @@ static void can_be_stopped(void **state)
 /* --- camera -------------------------------------------------------------------------- */
 
 #define FILE_NAME "a.rec/" INCISE_FRAMES_FILE
-#define PICTURES 30
-#define FIRST 5 /* number of the first picture */
+#define FRAMES 30
+#define FIRST 5 /* number of the first frame */
 #define BLOCK 10
 #define PERIOD_NS 16666667LL
 #define DELAY_NS 3000000LL
 #define SIZE(i) (200 + 7 * (size_t)(i))
 
-/* How one picture of the file is not as its row says. */
+/* A difference between one frame of the file and its row. */
 struct change {
-	int at;		/* picture, from 0; -1: none is */
+	int at;		/* frame, from 0; -1: none is */
 	bool left_out;	/* not in the file */
 	bool twice;	/* once more behind it, with the number 1000 */
 	int byte;	/* of its data, changed; 0: none */
 	int shorter;	/* bytes */
 	int64_t t_ns;	/* later */
 	uint64_t seq;	/* higher */
-	int left_out_n; /* pictures, where it is left out; 0: 1 */
+	int left_out_n; /* frames, where it is left out; 0: 1 */
 };
 
 static int64_t stamp(int i)
@@ -398,9 +398,9 @@ static int64_t stamp(int i)
 	return 1000000000 + i * PERIOD_NS;
 }
 
-/* camera.mkv of @n pictures; @rows may be NULL. */
-static void write_pictures(int n, const struct change *change,
-			   struct incise_frame_record *rows)
+/* camera.mkv of @n frames; @rows may be NULL. */
+static void write_frames(int n, const struct change *change,
+			 struct incise_frame_record *rows)
 {
 	static const struct incise_frames_shape shape = {32, 16, INCISE_PIXELS_MJPEG, 60};
 	struct incise_frames_stored stored;
@@ -413,7 +413,7 @@ static void write_pictures(int n, const struct change *change,
 		fail_msg("%s", err.text);
 	for (int i = 0; i < n; i++) {
 		bool here = i == change->at;
-		uint8_t bytes[SIZE(PICTURES)];
+		uint8_t bytes[SIZE(FRAMES)];
 		struct incise_camera_frame frame = {
 			.t_ns = stamp(i) + (here ? change->t_ns : 0),
 			.seq = FIRST + i + (here ? change->seq : 0),
@@ -547,23 +547,23 @@ static void seal(bool whole)
 
 static const struct change none = {.at = -1};
 
-/* A recording with all pictures, and rows of the first @n; @closed, or cut off. */
-static void record_pictures(int n, bool closed)
+/* A recording with all frames, and rows of the first @n; @closed, or cut off. */
+static void record_frames(int n, bool closed)
 {
-	struct incise_frame_record rows[PICTURES];
+	struct incise_frame_record rows[FRAMES];
 
 	record("a.rec", "sim:clock=simulated", 600 * MS);
-	write_pictures(PICTURES, &none, rows);
+	write_frames(FRAMES, &none, rows);
 	add_camera(rows, n, closed);
 	seal(closed);
 }
 
-static void pictures_are_held_against_their_rows(void **state)
+static void frames_are_held_against_their_rows(void **state)
 {
 	static const struct {
 		struct change change;
 		const char *text;
-		int64_t seq, last_seq; /* 0: of one picture */
+		int64_t seq, last_seq; /* 0: of one frame */
 		uint64_t missing, altered, extra;
 	} cases[] = {
 		{.change = {.at = 7, .left_out = true},
@@ -575,7 +575,7 @@ static void pictures_are_held_against_their_rows(void **state)
 		 .seq = 12,
 		 .last_seq = 15,
 		 .missing = 4},
-		/* pts are of the first picture in the file: all that follow seem moved */
+		/* pts are of the first frame in the file: all that follow seem moved */
 		{.change = {.at = 28, .left_out = true, .left_out_n = 2},
 		 .text = "camera: 2 missing in camera.mkv, numbers 33 to 34, ",
 		 .seq = 33,
@@ -629,18 +629,18 @@ static void pictures_are_held_against_their_rows(void **state)
 
 	if (!has_frames())
 		skip();
-	record_pictures(PICTURES, true);
+	record_frames(FRAMES, true);
 	verify("a.rec", &report, &findings);
 	if (!report.complete || !report.intact)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.n_streams, 3);
 	assert_string_equal(report.streams[2].name, "camera");
-	assert_int_equal(report.streams[2].expected, PICTURES);
-	assert_int_equal(report.streams[2].present, PICTURES);
+	assert_int_equal(report.streams[2].expected, FRAMES);
+	assert_int_equal(report.streams[2].present, FRAMES);
 	assert_true(report.frames.checked);
-	assert_int_equal(report.frames.present, PICTURES);
+	assert_int_equal(report.frames.present, FRAMES);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		write_pictures(PICTURES, &cases[i].change, NULL);
+		write_frames(FRAMES, &cases[i].change, NULL);
 		seal(true); /* a file's head has a random number of its own */
 		verify("a.rec", &report, &findings);
 		if (report.complete || report.intact || report.findings != 1 ||
@@ -651,14 +651,14 @@ static void pictures_are_held_against_their_rows(void **state)
 		assert_int_equal(findings.first.last_seq,
 				 cases[i].last_seq ? cases[i].last_seq : cases[i].seq);
 		assert_int_equal(report.frames.present,
-				 PICTURES - cases[i].missing - cases[i].altered);
+				 FRAMES - cases[i].missing - cases[i].altered);
 		assert_int_equal(report.frames.missing, cases[i].missing);
 		assert_int_equal(report.frames.altered, cases[i].altered);
 		assert_int_equal(report.frames.extra, cases[i].extra);
 	}
 }
 
-static void rows_of_pictures_are_in_the_ledger(void **state)
+static void rows_of_frames_are_in_the_ledger(void **state)
 {
 	static const struct {
 		const char *sql, *text;
@@ -687,7 +687,7 @@ static void rows_of_pictures_are_in_the_ledger(void **state)
 
 	if (!has_frames())
 		skip();
-	record_pictures(PICTURES, true);
+	record_frames(FRAMES, true);
 	assert_int_equal(system("cp -r a.rec good.rec"), 0);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
@@ -699,7 +699,7 @@ static void rows_of_pictures_are_in_the_ledger(void **state)
 	}
 }
 
-/* Any byte of the pictures is some picture's, or of the form of the file. */
+/* Any byte of the frames is some frame's, or of the form of the file. */
 static void damaged_file(void **state)
 {
 	struct incise_verify_report report;
@@ -710,11 +710,11 @@ static void damaged_file(void **state)
 
 	if (!has_frames())
 		skip();
-	record_pictures(PICTURES, true);
+	record_frames(FRAMES, true);
 	assert_int_equal(stat(FILE_NAME, &st), 0);
 	assert_int_equal(system("cp " FILE_NAME " good.mkv"), 0);
 
-	/* data of picture 7 */
+	/* data of frame 7 */
 	for (size_t i = 0; i < sizeof(first); i++)
 		first[i] = (uint8_t)(7 * 131 + i * i);
 	file = fopen(FILE_NAME, "r+");
@@ -736,7 +736,7 @@ static void damaged_file(void **state)
 	    !strstr(findings.text, "1 altered in camera.mkv, number 12, "))
 		fail_msg("%s", findings.text);
 
-	/* its head is no picture's */
+	/* its head is no frame's */
 	for (long at = 8; at < 250; at += 8) {
 		assert_int_equal(system("cp good.mkv " FILE_NAME), 0);
 		file = fopen(FILE_NAME, "r+");
@@ -748,7 +748,7 @@ static void damaged_file(void **state)
 			fail_msg("byte %ld", at);
 	}
 
-	/* cut short, in a picture and between two; and with nothing but its head */
+	/* cut short, in a frame and between two; and with nothing but its head */
 	for (off_t size = st.st_size - 1; size > 0; size -= 397) {
 		assert_int_equal(system("cp good.mkv " FILE_NAME), 0);
 		assert_int_equal(truncate(FILE_NAME, size), 0);
@@ -756,7 +756,7 @@ static void damaged_file(void **state)
 		if (report.intact ||
 		    report.frames.present + report.frames.missing +
 				    report.frames.altered !=
-			    PICTURES ||
+			    FRAMES ||
 		    !report.frames.missing)
 			fail_msg("%ld bytes: %s", (long)size, findings.text);
 	}
@@ -770,10 +770,10 @@ static void damaged_file(void **state)
 	assert_false(report.intact);
 	assert_non_null(
 		strstr(findings.text, "camera.mkv is missing, and 30 pictures with it"));
-	assert_int_equal(report.frames.missing, PICTURES);
+	assert_int_equal(report.frames.missing, FRAMES);
 }
 
-/* A kill comes after a picture and before its row. */
+/* A kill comes after a frame and before its row. */
 static void file_is_ahead_of_an_interrupted_recording(void **state)
 {
 	struct incise_verify_report report;
@@ -781,11 +781,11 @@ static void file_is_ahead_of_an_interrupted_recording(void **state)
 
 	if (!has_frames())
 		skip();
-	record_pictures(PICTURES - 4, false);
+	record_frames(FRAMES - 4, false);
 	verify("a.rec", &report, &findings);
 	if (!report.interrupted || !report.intact || report.findings != 1)
 		fail_msg("%s", findings.text);
-	assert_int_equal(report.frames.present, PICTURES - 4);
+	assert_int_equal(report.frames.present, FRAMES - 4);
 	assert_int_equal(report.frames.ahead, 4);
 
 	seal(true);
@@ -803,7 +803,7 @@ static void without_the_module_it_is_said(void **state)
 
 	if (!has_frames())
 		skip();
-	record_pictures(PICTURES, true);
+	record_frames(FRAMES, true);
 	setenv("INCISE_MODULE_PATH", "/nonexistent", 1);
 	verify("a.rec", &report, &findings);
 	assert_false(report.complete);
@@ -816,7 +816,7 @@ static void without_the_module_it_is_said(void **state)
 	assert_false(report.frames.checked);
 }
 
-/* What a recorder makes, with a delay that was calibrated. */
+/* A recording of the recorder, with a calibrated delay. */
 static void recorder_and_verification_agree(void **state)
 {
 	struct incise_error err = {0};
@@ -875,8 +875,8 @@ int main(void)
 		WITH_MODULES(damaged_pages_are_found),
 		WITH_MODULES(truncated_file),
 		WITH_MODULES(can_be_stopped),
-		WITH_MODULES(pictures_are_held_against_their_rows),
-		WITH_MODULES(rows_of_pictures_are_in_the_ledger),
+		WITH_MODULES(frames_are_held_against_their_rows),
+		WITH_MODULES(rows_of_frames_are_in_the_ledger),
 		WITH_MODULES(damaged_file),
 		WITH_MODULES(file_is_ahead_of_an_interrupted_recording),
 		WITH_MODULES(recorder_and_verification_agree),
