@@ -437,35 +437,6 @@ out_memory:
 	return NULL;
 }
 
-static void texture_upload(struct texture *texture, const struct incise_canvas *canvas,
-			   const struct incise_upload *uploads, int n)
-{
-	glBindTexture(GL_TEXTURE_2D, texture->name);
-	for (int i = 0; i < n; i++) {
-		const struct incise_rect *r = &uploads[i].rect;
-		int level = uploads[i].level, side, left, top, right, bottom;
-		const int *reach;
-
-		if (level < 0 || level >= texture->levels)
-			continue;
-		side = texture->size >> level;
-		if (r->x < 0 || r->y < 0 || r->w < 1 || r->h < 1 || r->w > side - r->x ||
-		    r->h > side - r->y)
-			continue;
-		/* Include texels whose slope depends on the wetness in the rectangle. */
-		reach = texture->reach[level];
-		left = clamp_index(r->x - (reach[0] > 0 ? reach[0] : 0), side);
-		right = clamp_index(r->x + r->w - 1 - (reach[0] < 0 ? reach[0] : 0),
-				    side);
-		top = clamp_index(r->y - (reach[1] > 0 ? reach[1] : 0), side);
-		bottom = clamp_index(r->y + r->h - 1 - (reach[1] < 0 ? reach[1] : 0),
-				     side);
-		send_rect(texture, canvas, level,
-			  (struct incise_rect){left, top, right - left + 1,
-					       bottom - top + 1});
-	}
-}
-
 static unsigned texture_image(unsigned image, const uint8_t *bgra, int w, int h)
 {
 	if (!image) {
@@ -646,8 +617,32 @@ void incise_draw_free(struct incise_draw *draw)
 void incise_draw_upload(struct incise_draw *draw, const struct incise_canvas *canvas,
 			const struct incise_upload *uploads, int n)
 {
-	if (n > 0)
-		texture_upload(draw->texture, canvas, uploads, n);
+	const struct texture *texture = draw->texture;
+
+	glBindTexture(GL_TEXTURE_2D, texture->name);
+	for (int i = 0; i < n; i++) {
+		const struct incise_rect *r = &uploads[i].rect;
+		int level = uploads[i].level, side, left, top, right, bottom;
+		const int *reach;
+
+		if (level < 0 || level >= texture->levels)
+			continue;
+		side = texture->size >> level;
+		if (r->x < 0 || r->y < 0 || r->w < 1 || r->h < 1 || r->w > side - r->x ||
+		    r->h > side - r->y)
+			continue;
+		/* Include texels whose slope depends on the wetness in the rectangle. */
+		reach = texture->reach[level];
+		left = clamp_index(r->x - (reach[0] > 0 ? reach[0] : 0), side);
+		right = clamp_index(r->x + r->w - 1 - (reach[0] < 0 ? reach[0] : 0),
+				    side);
+		top = clamp_index(r->y - (reach[1] > 0 ? reach[1] : 0), side);
+		bottom = clamp_index(r->y + r->h - 1 - (reach[1] < 0 ? reach[1] : 0),
+				     side);
+		send_rect(texture, canvas, level,
+			  (struct incise_rect){left, top, right - left + 1,
+					       bottom - top + 1});
+	}
 }
 
 static void set_vector(unsigned program, const char *name, const double v[3])

@@ -137,11 +137,10 @@ void incise_injury_paint(struct incise_injury *injury)
 }
 
 void incise_injury_report(const struct incise_injury *injury,
-			  struct incise_injury_report *report)
+			  struct incise_view_report *report)
 {
 	struct blood_volumes volumes;
 
-	*report = (struct incise_injury_report){.steps_lost = injury->steps_lost};
 	if (!injury->wound)
 		return;
 	report->cut_mm = wound_cut_mm(injury->wound);
@@ -154,4 +153,9 @@ void incise_injury_report(const struct incise_injury *injury,
 	report->blood_ul_trails = (double)volumes.films * BLOOD_UNIT_UL;
 	report->blood_ul_off = (double)volumes.off * BLOOD_UNIT_UL;
 	report->drops = volumes.n_drops;
+}
+
+uint64_t incise_injury_steps_lost(const struct incise_injury *injury)
+{
+	return injury->steps_lost;
 }

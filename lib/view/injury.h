@@ -21,6 +21,7 @@
 #include <incise/error.h>
 #include <incise/plan.h>
 #include <incise/scene.h>
+#include <incise/view.h>
 #include "canvas.h"
 #include "uv_map.h"
 
@@ -45,19 +46,12 @@ void incise_injury_tick(struct incise_injury *injury, const struct incise_tick *
 /* Update the canvas's layers; before incise_canvas_compose(). */
 void incise_injury_paint(struct incise_injury *injury);
 
-struct incise_injury_report {
-	double cut_mm;	 /* length of all strokes of the blade, on the surface */
-	uint64_t stamps; /* stretches that were drawn */
-	/* µl: emitted = drops + trails + off. */
-	double blood_ul_emitted;
-	double blood_ul_drops;	/* running, or hanging at the wound */
-	double blood_ul_trails; /* films, wet or dried */
-	double blood_ul_off;	/* ran off the texture */
-	int drops;
-	uint64_t steps_lost; /* of 10 ms, in long gaps */
-};
+/* Set the fields of wound and blood, and leave the others. */
 void incise_injury_report(const struct incise_injury *injury,
-			  struct incise_injury_report *report);
+			  struct incise_view_report *report);
+
+/* Steps of 10 ms that were skipped in long gaps. */
+uint64_t incise_injury_steps_lost(const struct incise_injury *injury);
 
 void incise_injury_free(struct incise_injury *injury);
 

@@ -30,15 +30,30 @@ struct overlay_graph {
 	struct overlay_column column[OVERLAY_COLUMNS];
 };
 
-struct overlay_words {
-	const struct incise_tick *tick;		 /* or NULL */
-	const struct incise_view_status *status; /* or NULL */
-	const struct overlay_graph *force, *depth;
-};
-
 #define GRAPH_LEFT 44
 #define GRAPH_HEIGHT 62
 #define LINE 18
+
+#define REDRAW_NS 66666667 /* 15 times per second */
+
+struct incise_overlay {
+	struct overlay_graph force, depth;
+	struct incise_tick tick; /* the last one */
+	bool ticked;
+	int64_t drawn_at; /* in redraws' periods */
+	char state[32];	  /* as drawn */
+	cairo_surface_t *panel, *keys;
+	struct incise_overlay_image panel_image, keys_image;
+	int n_lines;
+	char *line[OVERLAY_LINES_MAX];
+};
+
+static struct overlay_column *column_at(const struct overlay_graph *graph, int64_t at)
+{
+	int number = (int)((at % OVERLAY_COLUMNS + OVERLAY_COLUMNS) % OVERLAY_COLUMNS);
+
+	return (struct overlay_column *)&graph->column[number];
+}
 
 /* --- Painting --- */
 
@@ -113,9 +128,7 @@ static void curve(cairo_t *cr, const struct overlay_graph *graph, double top,
 
 	for (int i = 0; i < OVERLAY_COLUMNS && graph->last != INT64_MIN; i++) {
 		int64_t at = graph->last - (OVERLAY_COLUMNS - 1) + i;
-		const struct overlay_column *column =
-			&graph->column[((at % OVERLAY_COLUMNS) + OVERLAY_COLUMNS) %
-				       OVERLAY_COLUMNS];
+		const struct overlay_column *column = column_at(graph, at);
 		double x = GRAPH_LEFT + i + 0.5;
 
 		if (!column->any || column->at != at) {
@@ -252,45 +265,40 @@ static void say_status(cairo_t *cr, double y, const struct incise_view_status *s
 	}
 }
 
-static void overlay_paint_panel(cairo_surface_t *surface,
-				const struct overlay_words *words)
+static void paint_panel(const struct incise_overlay *overlay,
+			const struct incise_view_status *status)
 {
 	static const double force[3] = {1.0, 0.80, 0.38}, depth[3] = {0.45, 0.80, 1.0};
-	cairo_t *cr = begin(surface);
+	cairo_t *cr = begin(overlay->panel);
 	double y = 14;
 
-	graph(cr, words->force, y, "force", "N", 0.5, force);
+	graph(cr, &overlay->force, y, "force", "N", 0.5, force);
 	y += GRAPH_HEIGHT + 14;
-	graph(cr, words->depth, y, "depth", "mm", 1, depth);
+	graph(cr, &overlay->depth, y, "depth", "mm", 1, depth);
 	y += GRAPH_HEIGHT + 15;
 	grey(cr, 0.72);
 	text(cr, GRAPH_LEFT, y, 10, 0, "-10 s");
 	text(cr, GRAPH_LEFT + OVERLAY_COLUMNS, y, 10, 1, "now");
 	y += LINE + 4;
-	if (words->tick)
-		say_tick(cr, y, words->tick);
+	if (overlay->ticked)
+		say_tick(cr, y, &overlay->tick);
 	y += LINE + 2;
-	if (words->status)
-		say_status(cr, y, words->status);
+	if (status)
+		say_status(cr, y, status);
 	cairo_destroy(cr);
 }
 
-static int overlay_keys_height(int lines)
+static void paint_keys(const struct incise_overlay *overlay)
 {
-	return 26 + LINE * lines;
-}
+	cairo_t *cr = begin(overlay->keys);
 
-static void overlay_paint_keys(cairo_surface_t *surface, const char *const *lines, int n)
-{
-	cairo_t *cr = begin(surface);
-
-	for (int i = 0; i < n; i++) {
-		const char *tab = strchr(lines[i], '\t');
+	for (int i = 0; i < overlay->n_lines; i++) {
+		const char *line = overlay->line[i], *tab = strchr(line, '\t');
 		double y = 26 + LINE * i;
 		char key[64];
 
 		snprintf(key, sizeof(key), "%.*s",
-			 tab ? (int)(tab - lines[i]) : (int)strlen(lines[i]), lines[i]);
+			 tab ? (int)(tab - line) : (int)strlen(line), line);
 		cairo_set_source_rgba(cr, 1.0, 0.80, 0.38, 1);
 		text(cr, 16, y, 12, 0, key);
 		grey(cr, 0.92);
@@ -300,20 +308,6 @@ static void overlay_paint_keys(cairo_surface_t *surface, const char *const *line
 }
 
 /* --- The overlay --- */
-
-#define REDRAW_NS 66666667 /* 15 times per second */
-
-struct incise_overlay {
-	struct overlay_graph force, depth;
-	struct incise_tick tick; /* the last one */
-	bool ticked;
-	int64_t drawn_at; /* in redraws' periods */
-	char state[32];	  /* as drawn */
-	cairo_surface_t *panel, *keys;
-	struct incise_overlay_image panel_image, keys_image;
-	int n_lines;
-	char *line[OVERLAY_LINES_MAX];
-};
 
 struct incise_overlay *incise_overlay_new(struct incise_error *err)
 {
@@ -351,9 +345,7 @@ static int64_t floor_of(int64_t t, int64_t period)
 static void graph_add(struct overlay_graph *graph, int64_t t_ns, double value)
 {
 	int64_t at = floor_of(t_ns, OVERLAY_COLUMN_NS);
-	struct overlay_column *column =
-		&graph->column[((at % OVERLAY_COLUMNS) + OVERLAY_COLUMNS) %
-			       OVERLAY_COLUMNS];
+	struct overlay_column *column = column_at(graph, at);
 
 	/* Time went back: another recording. */
 	if (graph->last != INT64_MIN && at < graph->last)
@@ -400,10 +392,6 @@ static void finish(cairo_surface_t *surface, struct incise_overlay_image *image)
 const struct incise_overlay_image *incise_overlay_panel(
 	struct incise_overlay *overlay, const struct incise_view_status *status)
 {
-	struct overlay_words words = {.tick = overlay->ticked ? &overlay->tick : NULL,
-				      .status = status,
-				      .force = &overlay->force,
-				      .depth = &overlay->depth};
 	char state[sizeof(overlay->state)];
 
 	snprintf(state, sizeof(state), "%s",
@@ -415,7 +403,7 @@ const struct incise_overlay_image *incise_overlay_panel(
 			overlay_surface(OVERLAY_PANEL_WIDTH, OVERLAY_PANEL_HEIGHT);
 	if (!overlay->panel)
 		return NULL;
-	overlay_paint_panel(overlay->panel, &words);
+	paint_panel(overlay, status);
 	finish(overlay->panel, &overlay->panel_image);
 	overlay->drawn_at = floor_of(overlay->tick.t_ns, REDRAW_NS);
 	snprintf(overlay->state, sizeof(overlay->state), "%s", state);
@@ -441,12 +429,10 @@ const struct incise_overlay_image *incise_overlay_keys(struct incise_overlay *ov
 {
 	if (overlay->keys)
 		return &overlay->keys_image;
-	overlay->keys = overlay_surface(OVERLAY_KEYS_WIDTH,
-					overlay_keys_height(overlay->n_lines));
+	overlay->keys = overlay_surface(OVERLAY_KEYS_WIDTH, 26 + LINE * overlay->n_lines);
 	if (!overlay->keys)
 		return NULL;
-	overlay_paint_keys(overlay->keys, (const char *const *)overlay->line,
-			   overlay->n_lines);
+	paint_keys(overlay);
 	finish(overlay->keys, &overlay->keys_image);
 	return &overlay->keys_image;
 }

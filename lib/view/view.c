@@ -10,8 +10,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <incise/view.h>
+#include "../base/monotonic.h"
 #include "../base/vector.h"
 #include "canvas.h"
 #include "draw.h"
@@ -46,17 +46,13 @@ struct incise_view {
 	struct view_orbit orbit;
 	struct incise_tick tick; /* the last one with a valid place */
 	bool ticked, drawn, panel, keys;
-	int width, height; /* of frames */
-	uint64_t uploads, uploaded_texels, ticks, frames;
-	double ticks_s, texture_s, draw_s;
+	int width, height;		  /* of frames */
+	struct incise_view_report report; /* counts and times */
 };
 
 static double seconds(void)
 {
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (double)now.tv_sec + now.tv_nsec * 1e-9;
+	return (double)incise_monotonic_ns() * 1e-9;
 }
 
 static int make_context(struct incise_view *view, const struct incise_view_setup *setup,
@@ -232,8 +228,8 @@ void incise_view_ticks(struct incise_view *view, const struct incise_tick *ticks
 		view->tick = *tick;
 		view->ticked = true;
 	}
-	view->ticks += n > 0 ? (uint64_t)n : 0;
-	view->ticks_s += seconds() - begin;
+	view->report.ticks += n > 0 ? (uint64_t)n : 0;
+	view->report.ticks_s += seconds() - begin;
 }
 
 /* The instrument rises with the relief, or it would be in the skin before it touches it. */
@@ -254,9 +250,9 @@ static void send(struct incise_view *view)
 	incise_injury_paint(view->injury);
 	while ((n = incise_canvas_compose(view->canvas, uploads, VIEW_UPLOADS)) > 0) {
 		incise_draw_upload(view->draw, view->canvas, uploads, n);
-		view->uploads += (uint64_t)n;
+		view->report.uploads += (uint64_t)n;
 		for (int i = 0; i < n; i++)
-			view->uploaded_texels +=
+			view->report.uploaded_texels +=
 				(uint64_t)uploads[i].rect.w * (uint64_t)uploads[i].rect.h;
 	}
 }
@@ -310,9 +306,9 @@ int incise_view_frame(struct incise_view *view, const struct incise_view_status 
 	} else {
 		incise_draw_finish(view->draw);
 	}
-	view->texture_s += sent - begin;
-	view->draw_s += seconds() - sent;
-	view->frames++;
+	view->report.texture_s += sent - begin;
+	view->report.draw_s += seconds() - sent;
+	view->report.frames++;
 	return 0;
 }
 
@@ -406,27 +402,10 @@ int incise_view_event(struct incise_view *view, struct incise_view_event *event)
 
 void incise_view_report(const struct incise_view *view, struct incise_view_report *report)
 {
-	struct incise_injury_report injury;
-
-	incise_injury_report(view->injury, &injury);
-	*report = (struct incise_view_report){
-		.cut_mm = injury.cut_mm,
-		.stamps = injury.stamps,
-		.blood_ul_emitted = injury.blood_ul_emitted,
-		.blood_ul_drops = injury.blood_ul_drops,
-		.blood_ul_trails = injury.blood_ul_trails,
-		.blood_ul_off = injury.blood_ul_off,
-		.drops = injury.drops,
-		.uploads = view->uploads,
-		.uploaded_texels = view->uploaded_texels,
-		.ticks = view->ticks,
-		.frames = view->frames,
-		.ticks_s = view->ticks_s,
-		.texture_s = view->texture_s,
-		.draw_s = view->draw_s,
-		.triangles = view->map->n_indices / 3,
-		.texture_px = view->map->size,
-		.renderer = incise_draw_info(view->draw)->renderer,
-		.samples = incise_draw_info(view->draw)->samples,
-	};
+	*report = view->report;
+	incise_injury_report(view->injury, report);
+	report->triangles = view->map->n_indices / 3;
+	report->texture_px = view->map->size;
+	report->renderer = incise_draw_info(view->draw)->renderer;
+	report->samples = incise_draw_info(view->draw)->samples;
 }

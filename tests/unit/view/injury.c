@@ -65,7 +65,7 @@ static struct incise_tick procedure(const struct field *field, int i, double rat
 
 static void assert_same(const struct scene *a, const struct scene *b)
 {
-	struct incise_injury_report ra, rb;
+	struct incise_view_report ra = {0}, rb = {0};
 
 	for (int level = 0; level < incise_canvas_levels(a->canvas); level++)
 		assert_memory_equal(incise_canvas_pixels(a->canvas, level, NULL),
@@ -134,7 +134,7 @@ static void test_rates(void **state)
 
 	field_new(&field, SIDE, 40);
 	for (int k = 0; k < 4; k++) {
-		struct incise_injury_report report;
+		struct incise_view_report report = {0};
 		struct scene s;
 
 		scene_new(&s, &field);
@@ -170,7 +170,7 @@ static void test_only_what_is_asked_for(void **state)
 
 	field_new(&field, SIDE, 40);
 	for (int k = 0; k < 4; k++) {
-		struct incise_injury_report report;
+		struct incise_view_report report = {0};
 		struct scene s;
 
 		field.picture.wound = cases[k].wound;
@@ -218,7 +218,7 @@ static void test_gaps(void **state)
 
 	field_new(&field, SIDE, 40);
 	for (int k = 0; k < 5; k++) {
-		struct incise_injury_report before, after, later;
+		struct incise_view_report before = {0}, after = {0}, later = {0};
 		struct incise_tick tick = {0};
 		struct scene s;
 
@@ -231,10 +231,11 @@ static void test_gaps(void **state)
 		tick.t_ns += cases[k].gap_ns;
 		incise_injury_tick(s.injury, &tick);
 		incise_injury_report(s.injury, &after);
-		if (after.steps_lost != cases[k].lost)
-			print_error("%d: %llu\n", k,
-				    (unsigned long long)after.steps_lost);
-		assert_true(after.steps_lost == cases[k].lost);
+		if (incise_injury_steps_lost(s.injury) != cases[k].lost)
+			print_error(
+				"%d: %llu\n", k,
+				(unsigned long long)incise_injury_steps_lost(s.injury));
+		assert_true(incise_injury_steps_lost(s.injury) == cases[k].lost);
 		assert_true((after.blood_ul_emitted > before.blood_ul_emitted) ==
 			    (cases[k].gap_ns > 0));
 		/* Time continues from there. */
@@ -266,7 +267,7 @@ static void test_hostile(void **state)
 	static const double tilts[] = {40, -1};
 
 	for (int k = 0; k < 2; k++) {
-		struct incise_injury_report report;
+		struct incise_view_report report = {0};
 		struct incise_tick tick = {0};
 		struct field field;
 		struct scene s;
