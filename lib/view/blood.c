@@ -105,11 +105,13 @@ struct drops {
 #define DROP_HANGS_ALONG 1.7
 #define DROP_HANGS_ACROSS 0.7
 
-/* The texels of a drop as drawn. */
-struct drop_box {
+/* A drop as drawn; from … to: its texels. */
+struct shape {
 	struct ground_metric metric;
-	double axis[2];		      /* unit, in the metric's frame */
-	int left, top, right, bottom; /* inclusive */
+	float x, y, axis[2];	      /* axis: unit, mm, along its way */
+	float before, behind, beside; /* 1/mm */
+	float high_mm, grain;
+	int from_px[2], to_px[2]; /* to_px is exclusive */
 };
 
 /* Visible changes: mm, and radii. */
@@ -125,40 +127,52 @@ static double drop_radius_mm(int64_t units)
 	return cbrt((double)units * (BLOOD_UNIT_UL / CAP));
 }
 
-static bool drop_box(const struct film *film, const struct drop *drop,
-		     struct drop_box *box)
+static bool drop_shape(const struct film *film, const struct drop *drop,
+		       struct shape *shape)
 {
-	struct ground_metric *m = &box->metric;
-	double u, v, length, along, beside, half_u, half_v, half_x;
+	struct ground_metric *m = &shape->metric;
+	double u, v, length, axis[2], along, beside, half_u, half_v, half[2];
 
 	if (!(drop->drawn_mm > 0) || !ground_metric(film->map, drop->drawn_px, m))
 		return false;
 	u = m->a * drop->axis_px[0] + m->b * drop->axis_px[1];
 	v = m->c * drop->axis_px[1];
 	length = sqrt(u * u + v * v);
-	box->axis[0] = length > 0 ? u / length : 0;
-	box->axis[1] = length > 0 ? v / length : 1;
+	axis[0] = length > 0 ? u / length : 0;
+	axis[1] = length > 0 ? v / length : 1;
 	/* The ellipse around both halves, at its roughest. */
 	along = drop->drawn_mm * fmax(drop->before, drop->behind) * ROUGHEST;
 	beside = drop->drawn_mm * drop->beside * ROUGHEST;
-	half_u = hypot(along * box->axis[0], beside * box->axis[1]);
-	half_v = hypot(along * box->axis[1], beside * box->axis[0]);
-	half_x = (half_u + half_v * fabs(m->b) / m->c) / m->a;
-	box->left = (int)floor(drop->drawn_px[0] - half_x);
-	box->right = (int)floor(drop->drawn_px[0] + half_x);
-	box->top = (int)floor(drop->drawn_px[1] - half_v / m->c);
-	box->bottom = (int)floor(drop->drawn_px[1] + half_v / m->c);
+	half_u = hypot(along * axis[0], beside * axis[1]);
+	half_v = hypot(along * axis[1], beside * axis[0]);
+	half[0] = (half_u + half_v * fabs(m->b) / m->c) / m->a;
+	half[1] = half_v / m->c;
+	for (int i = 0; i < 2; i++) {
+		shape->axis[i] = (float)axis[i];
+		shape->from_px[i] = (int)floor(drop->drawn_px[i] - half[i]);
+		shape->to_px[i] = (int)floor(drop->drawn_px[i] + half[i]) + 1;
+	}
+	shape->x = (float)drop->drawn_px[0];
+	shape->y = (float)drop->drawn_px[1];
+	shape->before = (float)(1 / (drop->drawn_mm * drop->before));
+	shape->behind = (float)(1 / (drop->drawn_mm * drop->behind));
+	shape->beside = (float)(1 / (drop->drawn_mm * drop->beside));
+	/* The volume is the drop's: the mean of (1 - r²)^1.5 over a disc is 0.4. */
+	shape->high_mm = (float)(0.625 * drop->drawn_mm * 2 /
+				 (drop->beside * (drop->before + drop->behind)));
+	shape->grain = m->a / FILM_ROUGH_MM;
 	return true;
 }
 
 /* The drop's texels are to be painted. */
 static void drops_mark(struct drops *drops, const struct drop *drop)
 {
-	struct drop_box box;
+	struct shape shape;
 
-	if (drop_box(drops->film, drop, &box))
-		canvas_tiles_mark_texels(&drops->film->tiles, box.left, box.top,
-					 box.right, box.bottom);
+	if (drop_shape(drops->film, drop, &shape))
+		canvas_tiles_mark_texels(&drops->film->tiles, shape.from_px[0],
+					 shape.from_px[1], shape.to_px[0] - 1,
+					 shape.to_px[1] - 1);
 }
 
 static bool nearer(double *value, double to)
@@ -743,44 +757,9 @@ bool blood_drop(const struct blood *blood, int index, double px[2], double *ul)
 /* Thinner blood is invisible, mm. */
 #define NOTHING_MM 0.0004f
 
-/* A drop, prepared for painting; from … to: its texels. */
-struct shape {
-	struct ground_metric metric;
-	float x, y, axis[2];	      /* axis: unit, mm, along its way */
-	float before, behind, beside; /* 1/mm */
-	float high_mm, grain;
-	int from_px[2], to_px[2];
-};
-
 struct wet_texel {
 	float thick, light; /* mm; of a highlight, 0 … 1 */
 };
-
-static bool shape_of(const struct film *film, const struct drop *drop,
-		     struct shape *shape)
-{
-	struct drop_box box;
-
-	if (!drop->units || !drop_box(film, drop, &box))
-		return false;
-	shape->metric = box.metric;
-	shape->axis[0] = (float)box.axis[0];
-	shape->axis[1] = (float)box.axis[1];
-	shape->x = (float)drop->drawn_px[0];
-	shape->y = (float)drop->drawn_px[1];
-	shape->before = (float)(1 / (drop->drawn_mm * drop->before));
-	shape->behind = (float)(1 / (drop->drawn_mm * drop->behind));
-	shape->beside = (float)(1 / (drop->drawn_mm * drop->beside));
-	/* The volume is the drop's: the mean of (1 - r²)^1.5 over a disc is 0.4. */
-	shape->high_mm = (float)(0.625 * drop->drawn_mm * 2 /
-				 (drop->beside * (drop->before + drop->behind)));
-	shape->grain = box.metric.a / FILM_ROUGH_MM;
-	shape->from_px[0] = box.left;
-	shape->from_px[1] = box.top;
-	shape->to_px[0] = box.right + 1;
-	shape->to_px[1] = box.bottom + 1;
-	return true;
-}
 
 static void add_texel(struct wet_texel *to, int x, int y, const struct shape *shape)
 {
@@ -891,7 +870,8 @@ void blood_paint(struct blood *blood, struct incise_canvas *canvas, int layer)
 	if (!film->tiles.n_dirty || !rgba)
 		return;
 	for (int i = 0; i < DROPS_MAX; i++)
-		n += shape_of(film, &blood->drops.drop[i], &shapes[n]);
+		n += blood->drops.drop[i].units &&
+		     drop_shape(film, &blood->drops.drop[i], &shapes[n]);
 	for (int i = 0; (i = canvas_tiles_next(&film->tiles, i)) >= 0;)
 		/* Drying and draining mostly change a colour by less than a step. */
 		if (paint_tile(film, shapes, n, i, rgba))

@@ -36,8 +36,11 @@ static const struct incise_film_module *load(struct incise_error *err)
 	return NULL;
 }
 
+/* Keeps errno. */
 static void forget(struct incise_film *film)
 {
+	if (!film)
+		return;
 	free(film->path);
 	free(film->part);
 	free(film);
@@ -56,31 +59,26 @@ struct incise_film *incise_film_new(const char *path, int width, int height, int
 			"%.300s: a film of %d x %d at %d Hz: expected even sides "
 			"from 16 to %d and 1 to 1000 Hz",
 			path, width, height, rate_hz, INCISE_FILM_SIDE_MAX);
-		errno = EINVAL;
 		return NULL;
 	}
 	film = calloc(1, sizeof(*film));
-	if (film)
-		film->path = strdup(path);
-	if (!film || !film->path || asprintf(&film->part, "%s.part", path) < 0) {
-		if (film)
-			film->part = NULL;
-		incise_error_set(err, ENOMEM, "no memory for a film");
-		errno = ENOMEM;
-		goto fail;
+	if (!film)
+		goto no_memory;
+	film->path = strdup(path);
+	if (!film->path || asprintf(&film->part, "%s.part", path) < 0) {
+		film->part = NULL;
+		goto no_memory;
 	}
 	film->module = load(err);
 	if (film->module)
 		film->coder = film->module->open(film->part, width, height, rate_hz, err);
 	if (film->coder)
 		return film;
-fail:
-	if (film) {
-		int code = errno;
-
-		forget(film);
-		errno = code;
-	}
+	forget(film);
+	return NULL;
+no_memory:
+	forget(film);
+	incise_error_set(err, ENOMEM, "no memory for a film");
 	return NULL;
 }
 

@@ -178,7 +178,6 @@ static struct incise_film_coder *film_open(const char *path, int width, int heig
 
 	if (!coder) {
 		incise_error_set(err, ENOMEM, "no memory for a film");
-		errno = ENOMEM;
 		return NULL;
 	}
 	/* Warnings about the input are not for users. */
