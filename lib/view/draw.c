@@ -645,24 +645,28 @@ void incise_draw_upload(struct incise_draw *draw, const struct incise_canvas *ca
 	}
 }
 
-static void set_vector(unsigned program, const char *name, const double v[3])
+static int uniform(const struct incise_draw *draw, enum shader shader, const char *name)
 {
-	glUniform3f(glGetUniformLocation(program, name), (float)v[0], (float)v[1],
-		    (float)v[2]);
+	return glGetUniformLocation(draw->program[shader], name);
 }
 
-static void set_scene(unsigned program, const struct view_projection *projection)
+static void set_vector(int to, const double v[3])
+{
+	glUniform3f(to, (float)v[0], (float)v[1], (float)v[2]);
+}
+
+static void use_program(const struct incise_draw *draw, enum shader shader,
+			const struct view_projection *projection)
 {
 	static const double sky[3] = {0, 0, 1};
 	double key[3];
 
 	v3_unit(key, draw_key_way, 0);
-	glUseProgram(program);
-	glUniformMatrix4fv(glGetUniformLocation(program, "clip"), 1, GL_FALSE,
-			   projection->clip);
-	set_vector(program, "eye", projection->position_mm);
-	set_vector(program, "key", key);
-	set_vector(program, "sky", sky);
+	glUseProgram(draw->program[shader]);
+	glUniformMatrix4fv(uniform(draw, shader, "clip"), 1, GL_FALSE, projection->clip);
+	set_vector(uniform(draw, shader, "eye"), projection->position_mm);
+	set_vector(uniform(draw, shader, "key"), key);
+	set_vector(uniform(draw, shader, "sky"), sky);
 }
 
 static void caster_end(float to[4], const struct instrument_place *place,
@@ -688,16 +692,14 @@ static void set_casters(const struct incise_draw *draw,
 	int n = !place ? 0 : place->tube ? 3 : 2;
 	float from[SHADERS_CASTERS][4], to[SHADERS_CASTERS][4];
 
-	glUniform1i(glGetUniformLocation(draw->program[SHADER_SURFACE], "casters"), n);
+	glUniform1i(uniform(draw, SHADER_SURFACE, "casters"), n);
 	for (int i = 0; i < n; i++) {
 		caster_end(from[i], place, line[i]);
 		caster_end(to[i], place, line[i + 1]);
 	}
 	if (n) {
-		glUniform4fv(glGetUniformLocation(draw->program[SHADER_SURFACE], "from"),
-			     n, from[0]);
-		glUniform4fv(glGetUniformLocation(draw->program[SHADER_SURFACE], "to"), n,
-			     to[0]);
+		glUniform4fv(uniform(draw, SHADER_SURFACE, "from"), n, from[0]);
+		glUniform4fv(uniform(draw, SHADER_SURFACE, "to"), n, to[0]);
 	}
 }
 
@@ -705,18 +707,18 @@ static void draw_surface(struct incise_draw *draw,
 			 const struct view_projection *projection,
 			 const struct instrument_place *place)
 {
-	set_scene(draw->program[SHADER_SURFACE], projection);
+	use_program(draw, SHADER_SURFACE, projection);
 	set_casters(draw, place);
-	glUniform1f(glGetUniformLocation(draw->program[SHADER_SURFACE], "texel"),
+	glUniform1f(uniform(draw, SHADER_SURFACE, "texel"),
 		    1.0f / (float)draw->texture->size);
 	/* In parts of the texture's side; -1: no drape. */
-	glUniform1f(glGetUniformLocation(draw->program[SHADER_SURFACE], "cloth"),
+	glUniform1f(uniform(draw, SHADER_SURFACE, "cloth"),
 		    draw->look == INCISE_SKIN_NECK ? 0.055f : -1.0f);
-	glUniform1f(glGetUniformLocation(draw->program[SHADER_SURFACE], "moist"),
+	glUniform1f(uniform(draw, SHADER_SURFACE, "moist"),
 		    draw->look == INCISE_SKIN_LIVER ? 0.6f : 0.0f);
-	glUniform2f(glGetUniformLocation(draw->program[SHADER_SURFACE], "way"),
-		    (float)draw->way[0], (float)draw->way[1]);
-	glUniform1i(glGetUniformLocation(draw->program[SHADER_SURFACE], "base"), 0);
+	glUniform2f(uniform(draw, SHADER_SURFACE, "way"), (float)draw->way[0],
+		    (float)draw->way[1]);
+	glUniform1i(uniform(draw, SHADER_SURFACE, "base"), 0);
 	glActiveTexture(GL_TEXTURE0);
 	glBindTexture(GL_TEXTURE_2D, draw->texture->name);
 	solid_draw(&draw->surface);
@@ -735,7 +737,7 @@ static void draw_instrument(struct incise_draw *draw,
 		matrix[12 + k] = (float)place->origin_mm[k];
 	}
 	matrix[15] = 1;
-	set_scene(draw->program[SHADER_INSTRUMENT], projection);
+	use_program(draw, SHADER_INSTRUMENT, projection);
 	glUniformMatrix4fv(glGetUniformLocation(draw->program[SHADER_INSTRUMENT],
 						"place"),
 			   1, GL_FALSE, matrix);
@@ -806,10 +808,9 @@ int incise_draw_overlay(struct incise_draw *draw, int slot, const uint8_t *bgra,
 	glEnable(GL_BLEND);
 	glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
 	glUseProgram(draw->program[SHADER_IMAGE]);
-	glUniform1i(glGetUniformLocation(draw->program[SHADER_IMAGE], "image"), 0);
-	glUniform4f(glGetUniformLocation(draw->program[SHADER_IMAGE], "box"),
-		    (float)(2.0 * x / width - 1), (float)(1 - 2.0 * y / height),
-		    (float)(2.0 * (x + w) / width - 1),
+	glUniform1i(uniform(draw, SHADER_IMAGE, "image"), 0);
+	glUniform4f(uniform(draw, SHADER_IMAGE, "box"), (float)(2.0 * x / width - 1),
+		    (float)(1 - 2.0 * y / height), (float)(2.0 * (x + w) / width - 1),
 		    (float)(1 - 2.0 * (y + h) / height));
 	glBindVertexArray(draw->nothing);
 	glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);

@@ -70,12 +70,6 @@ struct handle_search {
 bool handle_find(handle_search &s, image &image, const struct incise_vision_setup &setup,
 		 const cv::Rect &box, handle &found, const char **why);
 
-/* Whether the thresholds allow any hue. */
-inline bool all_hues(const struct incise_vision_setup &setup)
-{
-	return setup.hue[0] == 0 && setup.hue[1] == 179;
-}
-
 /* A pixel near an end: its place along the axis and across it, and its brightness. */
 struct sample {
 	float u, v, value;
