@@ -120,13 +120,14 @@ static void model_json(const struct incise_model *model, const struct incise_fix
 
 		for (int i = 0; i < incise_model_n_inputs(model); i++)
 			json_array_append_new(
-				mfs, json_integer(incise_model_rule_mf(model, r, i) + 1));
+				mfs,
+				json_integer(incise_model_rule(model, r)->mf[i] + 1));
 		for (int i = 0; i <= incise_model_n_inputs(model); i++)
 			json_array_append_new(
-				p, json_real(incise_model_consequent(model, r)[i]));
+				p, json_real(incise_model_rule(model, r)->p[i]));
 		json_array_append_new(
 			rules, json_pack("{so so sf}", "mfs", mfs, "consequent", p,
-					 "weight", incise_model_rule_weight(model, r)));
+					 "weight", incise_model_rule(model, r)->weight));
 	}
 	report = json_pack("{ss so so s{so sf sf} ss so}", "kind", "model", "name",
 			   json_text(incise_model_name(model)), "inputs", inputs,
@@ -160,16 +161,16 @@ static void model_text(const struct incise_model *model, const struct incise_fix
 	printf("rules by %s (functions: constant, then a coefficient per input)\n",
 	       and_method(model));
 	for (int r = 0; r < incise_model_n_rules(model); r++) {
-		const double *p = incise_model_consequent(model, r);
+		const double *p = incise_model_rule(model, r)->p;
 
 		printf(" ");
 		for (int i = 0; i < n; i++)
-			printf(" %2d", incise_model_rule_mf(model, r, i) + 1);
+			printf(" %2d", incise_model_rule(model, r)->mf[i] + 1);
 		printf(":");
 		for (int i = 0; i <= n; i++)
 			printf(" %12.6g", p[i]);
-		if (incise_model_rule_weight(model, r) != 1)
-			printf("  weight %.6g", incise_model_rule_weight(model, r));
+		if (incise_model_rule(model, r)->weight != 1)
+			printf("  weight %.6g", incise_model_rule(model, r)->weight);
 		putchar('\n');
 	}
 	/* A refusal says itself what it is about. */

@@ -34,7 +34,7 @@ static bool is_grid(const struct incise_basis *basis, const struct incise_model 
 		return false;
 	for (int r = 0; r < n; r++)
 		for (int i = basis->n_inputs - 1, rest = r; i >= 0; i--) {
-			if (incise_model_rule_mf(model, r, i) != rest % basis->n_mfs[i])
+			if (incise_model_rule(model, r)->mf[i] != rest % basis->n_mfs[i])
 				return false;
 			rest /= basis->n_mfs[i];
 		}
@@ -45,7 +45,7 @@ static bool is_grid(const struct incise_basis *basis, const struct incise_model 
 	for (int r = 0; r < n; r++) {
 		for (int i = 0; i < basis->n_inputs; i++)
 			x[i] = basis->p[incise_basis_centre(
-				basis, i, incise_model_rule_mf(model, r, i))];
+				basis, i, incise_model_rule(model, r)->mf[i])];
 		incise_basis_firing(basis, x, a);
 		incise_model_firing(model, x, b);
 		for (int k = 0; k < n; k++)

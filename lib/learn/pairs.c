@@ -224,7 +224,7 @@ double incise_pairs_rmse(const struct incise_model *model,
 		else
 			incise_model_firing(model, x, w);
 		for (int r = 0; r < incise_model_n_rules(model); r++) {
-			const double *p = incise_model_consequent(model, r);
+			const double *p = incise_model_rule(model, r)->p;
 
 			e += w[r] * p[0];
 			for (int i = 0; i < pairs->n_inputs; i++)

@@ -362,7 +362,7 @@ static int read_rule(struct reader *in)
 		return fail(in, EINVAL, "rule %d: consequent MF%ld is missing",
 			    model->n_rules + 1, v);
 	memcpy(rule->p, in->out[v - 1].p, sizeof(rule->p));
-	rule->constant = in->out[v - 1].constant;
+	model->constant[model->n_rules] = in->out[v - 1].constant;
 	text = end + strspn(end, " \t");
 	if (*text++ != '(')
 		return fail(in, EINVAL, "rule %d: expected a weight in parentheses",
@@ -554,8 +554,8 @@ static void write_model(const struct incise_model *model, FILE *out)
 		const struct incise_rule *rule = &model->rule[r];
 
 		fprintf(out, "MF%d='out1mf%d':'%s',[", r + 1, r + 1,
-			rule->constant ? "constant" : "linear");
-		for (int i = 0; i < model->n_inputs && !rule->constant; i++)
+			model->constant[r] ? "constant" : "linear");
+		for (int i = 0; i < model->n_inputs && !model->constant[r]; i++)
 			fprintf(out, "%.17g ", rule->p[i + 1]);
 		fprintf(out, "%.17g]\n", rule->p[0]);
 	}

@@ -175,7 +175,7 @@ void incise_model_classify(struct incise_model *model)
 {
 	model->is_grid = is_grid(model);
 	for (int r = 0; r < model->n_rules; r++)
-		model->rule[r].log_weight = log(model->rule[r].weight);
+		model->log_weight[r] = log(model->rule[r].weight);
 	for (int i = 0; i < model->n_inputs; i++) {
 		model->in_all[i] = model->and_method == INCISE_AND_PROD;
 		for (int r = 0; r < model->n_rules; r++)
@@ -254,19 +254,9 @@ enum incise_and_method incise_model_and_method(const struct incise_model *model)
 	return model->and_method;
 }
 
-int incise_model_rule_mf(const struct incise_model *model, int rule, int input)
+const struct incise_rule *incise_model_rule(const struct incise_model *model, int rule)
 {
-	return model->rule[rule].mf[input];
-}
-
-double incise_model_rule_weight(const struct incise_model *model, int rule)
-{
-	return model->rule[rule].weight;
-}
-
-const double *incise_model_consequent(const struct incise_model *model, int rule)
-{
-	return model->rule[rule].p;
+	return &model->rule[rule];
 }
 
 int incise_model_set_consequent(struct incise_model *model, int rule, const double *p)
@@ -277,7 +267,7 @@ int incise_model_set_consequent(struct incise_model *model, int rule, const doub
 	memcpy(model->rule[rule].p, p, (model->n_inputs + 1) * sizeof(*p));
 	/* The file has no slopes of a rule that is still called constant. */
 	for (int i = 1; i <= model->n_inputs; i++)
-		model->rule[rule].constant &= p[i] == 0;
+		model->constant[rule] &= p[i] == 0;
 	return 0;
 }
 
@@ -347,15 +337,15 @@ bool incise_model_firing_grid(const struct incise_model *model, const double *x,
 	return gap == 0 && log >= MODEL_LOG_FIRES;
 }
 
-/* A rule's log strength and gap, by its AND method and weight. */
-static double rule_log(const struct incise_model *model, const struct incise_rule *rule,
-		       const struct degrees *d, double *gap)
+/* Log strength and gap of rule r, by the AND method and its weight. */
+static double rule_log(const struct incise_model *model, int r, const struct degrees *d,
+		       double *gap)
 {
 	double sum = 0;
 
 	*gap = 0;
 	for (int i = 0; i < model->n_inputs; i++) {
-		int k = rule->mf[i];
+		int k = model->rule[r].mf[i];
 
 		if (k < 0)
 			continue;
@@ -367,7 +357,7 @@ static double rule_log(const struct incise_model *model, const struct incise_rul
 			*gap += d[i].gap[k];
 		}
 	}
-	return sum + rule->log_weight;
+	return sum + model->log_weight[r];
 }
 
 bool incise_model_firing_rules(const struct incise_model *model, const double *x,
@@ -393,7 +383,7 @@ bool incise_model_firing_rules(const struct incise_model *model, const double *x
 		}
 	}
 	for (int r = 0; r < model->n_rules; r++) {
-		w[r] = rule_log(model, &model->rule[r], d, &gap[r]);
+		w[r] = rule_log(model, r, d, &gap[r]);
 		/* A rule of weight 0 does not even stand in. */
 		if (model->rule[r].weight > 0)
 			nearest = fmin(nearest, gap[r]);

@@ -14,14 +14,6 @@
 /* exp() of less than this is 0: a rule whose strength has this log does not fire. */
 #define MODEL_LOG_FIRES (-745.0)
 
-struct incise_rule {
-	int8_t mf[INCISE_MODEL_INPUTS_MAX];    /* -1: this input does not matter */
-	bool constant;			       /* zero order, as the file had it */
-	double weight;			       /* 0 … 1; not 0 in all rules */
-	double log_weight;		       /* by incise_model_classify() */
-	double p[INCISE_MODEL_INPUTS_MAX + 1]; /* the constant first */
-};
-
 struct incise_model {
 	char name[INCISE_MODEL_NAME_MAX];
 	int n_inputs, n_rules;
@@ -38,6 +30,8 @@ struct incise_model {
 	int n_mfs[INCISE_MODEL_INPUTS_MAX];
 	struct incise_mf mf[INCISE_MODEL_INPUTS_MAX][INCISE_MODEL_MFS_MAX];
 	struct incise_rule rule[INCISE_MODEL_RULES_MAX];
+	double log_weight[INCISE_MODEL_RULES_MAX]; /* by incise_model_classify() */
+	bool constant[INCISE_MODEL_RULES_MAX];	   /* zero order, as the file had it */
 };
 
 /* The reason, in words, why parameters make no function of this kind, or NULL. */

@@ -220,11 +220,11 @@ int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
 		incise_axis_init(&grid->a, model, 0);
 	incise_axis_init(&grid->b, model, n - 1);
 	for (int r = 0; r < n_rules; r++) {
-		const double *p = incise_model_consequent(model, r);
+		const double *p = incise_model_rule(model, r)->p;
 		double *to = grid->p[r / n_b][r % n_b];
 
-		if (incise_model_rule_mf(model, r, n - 1) != r % n_b ||
-		    (n == 2 && incise_model_rule_mf(model, r, 0) != r / n_b) ||
+		if (incise_model_rule(model, r)->mf[n - 1] != r % n_b ||
+		    (n == 2 && incise_model_rule(model, r)->mf[0] != r / n_b) ||
 		    model->rule[r].weight != 1)
 			return incise_error_set(
 				err, ENOTSUP,

@@ -65,9 +65,9 @@ static uint64_t checksum(const struct incise_model *model)
 	for (int r = 0; r < n_rules; r++) {
 		sum(&hash, model->rule[r].weight);
 		for (int i = 0; i < d; i++)
-			sum(&hash, incise_model_rule_mf(model, r, i));
+			sum(&hash, incise_model_rule(model, r)->mf[i]);
 		for (int i = 0; i <= d; i++)
-			sum(&hash, incise_model_consequent(model, r)[i]);
+			sum(&hash, incise_model_rule(model, r)->p[i]);
 	}
 	return hash;
 }

@@ -81,7 +81,7 @@ static void *run(void *user)
 		for (int i = 0; i < a->n; i++)
 			for (int j = 0; j < b->n; j++) {
 				const double *p =
-					incise_model_consequent(job->model, i * b->n + j);
+					incise_model_rule(job->model, i * b->n + j)->p;
 
 				c[j] += a->degree[k][i] * (p[0] + p[1] * a->x[k]);
 				d[j] += a->degree[k][i] * p[2];

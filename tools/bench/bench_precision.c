@@ -95,8 +95,8 @@ static struct plain *plain_new(const struct incise_model *model)
 	}
 	for (int r = 0; r < m->n_rules; r++) {
 		for (int i = 0; i < m->n_inputs; i++)
-			m->mf[r][i] = incise_model_rule_mf(model, r, i);
-		memcpy(m->p[r], incise_model_consequent(model, r),
+			m->mf[r][i] = incise_model_rule(model, r)->mf[i];
+		memcpy(m->p[r], incise_model_rule(model, r)->p,
 		       (m->n_inputs + 1) * sizeof(double));
 	}
 	return m;

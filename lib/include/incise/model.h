@@ -20,6 +20,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
@@ -71,6 +72,13 @@ struct incise_mf {
 struct incise_variable {
 	char name[INCISE_MODEL_NAME_MAX];
 	double min, max; /**< support; min < max, both finite */
+};
+
+/** One rule; its output is p[0] + p[1] x1 + … */
+struct incise_rule {
+	int8_t mf[INCISE_MODEL_INPUTS_MAX]; /**< function of each input; -1: none */
+	double weight; /**< 0 … 1; one of weight 0 never fires, and at least one is not */
+	double p[INCISE_MODEL_INPUTS_MAX + 1];
 };
 
 /** Flags of an evaluation. */
@@ -165,16 +173,9 @@ INCISE_API int incise_model_set_mf(struct incise_model *model, int input, int mf
 INCISE_API enum incise_and_method incise_model_and_method(
 	const struct incise_model *model);
 
-/** The membership function of @input that rule @rule uses, or -1 for none. */
-INCISE_API int incise_model_rule_mf(const struct incise_model *model, int rule,
-				    int input);
-
-/** Weight of rule @rule, 0 … 1; one of weight 0 never fires. At least one is not 0. */
-INCISE_API double incise_model_rule_weight(const struct incise_model *model, int rule);
-
-/** Consequent of rule @rule: n_inputs+1 coefficients, the constant first. */
-INCISE_API const double *incise_model_consequent(const struct incise_model *model,
-						 int rule);
+/** Rule @rule, 0 … n_rules-1; owned by the model. */
+INCISE_API const struct incise_rule *incise_model_rule(const struct incise_model *model,
+						       int rule);
 
 /**
  * Replace a consequent.

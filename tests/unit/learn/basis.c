@@ -64,7 +64,7 @@ static void test_output_is_the_model_s(void **state)
 
 	assert_int_equal(incise_basis_init(&basis, model), 0);
 	for (int r = 0; r < 20; r++)
-		memcpy(consequents + 3 * r, incise_model_consequent(model, r),
+		memcpy(consequents + 3 * r, incise_model_rule(model, r)->p,
 		       3 * sizeof(double));
 	for (int i = 0; i < 100; i++) {
 		double x[] = {10 + 10 * paper_random(&seed),

@@ -538,7 +538,7 @@ static void test_kinds_that_cannot_be_trained(void **state)
 					 -ENOTSUP);
 			assert_non_null(strstr(err.text, cases[i].word));
 			assert_non_null(strstr(err.text, "in1mf1"));
-			assert_true(incise_model_consequent(model, 0)[0] == 0);
+			assert_true(incise_model_rule(model, 0)->p[0] == 0);
 			incise_model_free(model);
 		}
 }
@@ -576,7 +576,7 @@ static void check_finite(const struct incise_model *model, bool ordered)
 {
 	for (int r = 0; r < incise_model_n_rules(model); r++)
 		for (int i = 0; i <= incise_model_n_inputs(model); i++)
-			assert_true(isfinite(incise_model_consequent(model, r)[i]));
+			assert_true(isfinite(incise_model_rule(model, r)->p[i]));
 	for (int i = 0; i < incise_model_n_inputs(model); i++)
 		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
 			const double *p = incise_model_mf(model, i, k)->p;

@@ -194,9 +194,9 @@ static inline void any_model(struct incise_model *model, uint64_t *seed, int n_i
 		rule->weight = r == 0 || weighs > 1 ? 1
 			       : weighs		    ? (1 + paper_random(seed)) / 2
 						    : 0;
-		rule->constant = !any_below(seed, 4);
+		model->constant[r] = !any_below(seed, 4);
 		for (int i = 0; i <= n_inputs; i++)
-			rule->p[i] = i && rule->constant ? 0 : paper_random(seed);
+			rule->p[i] = i && model->constant[r] ? 0 : paper_random(seed);
 	}
 	incise_model_classify(model);
 }

@@ -75,8 +75,8 @@ static void assert_same(const struct incise_model *a, const struct incise_model 
 		}
 	}
 	for (int r = 0; r < incise_model_n_rules(a); r++)
-		assert_memory_equal(incise_model_consequent(a, r),
-				    incise_model_consequent(b, r), 3 * sizeof(double));
+		assert_memory_equal(incise_model_rule(a, r)->p,
+				    incise_model_rule(b, r)->p, 3 * sizeof(double));
 }
 
 /* 17 digits carry every bit of a double. */
@@ -122,7 +122,7 @@ static void assert_same_inside(const struct incise_model *a, const struct incise
 		const struct incise_rule *f = &a->rule[r], *g = &b->rule[r];
 
 		assert_memory_equal(f->mf, g->mf, a->n_inputs);
-		assert_int_equal(f->constant, g->constant);
+		assert_int_equal(a->constant[r], b->constant[r]);
 		assert_memory_equal(&f->weight, &g->weight, sizeof(f->weight));
 		assert_memory_equal(f->p, g->p, (a->n_inputs + 1) * sizeof(*f->p));
 	}
@@ -159,14 +159,14 @@ static void test_constants_become_linear(void **state)
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1), *back;
 
 	for (int r = 0; r < 20; r++)
-		model->rule[r].constant = true;
+		model->constant[r] = true;
 	for (int r = 0; r < 20; r++)
 		incise_model_set_consequent(model, r, (double[]){1, 0, r == 4 ? 2 : 0});
 	assert_int_equal(incise_model_save(model, path, NULL), 0);
 	back = incise_model_load(path, NULL);
 	for (int r = 0; r < 20; r++) {
-		assert_int_equal(back->rule[r].constant, r != 4);
-		assert_true(incise_model_consequent(back, r)[2] == (r == 4 ? 2 : 0));
+		assert_int_equal(back->constant[r], r != 4);
+		assert_true(incise_model_rule(back, r)->p[2] == (r == 4 ? 2 : 0));
 	}
 	incise_model_free(model);
 	incise_model_free(back);
@@ -258,9 +258,9 @@ static void test_every_kind(void **state)
 	assert_non_null(model);
 	assert_true(fabs(incise_model_eval(model, x, NULL) - want) < 1e-14);
 	assert_int_equal(incise_model_and_method(model), INCISE_AND_MIN);
-	assert_true(incise_model_rule_weight(model, 1) == 0.25);
-	assert_true(incise_model_rule_weight(model, 2) == 0);
-	assert_int_equal(incise_model_rule_mf(model, 3, 1), -1);
+	assert_true(incise_model_rule(model, 1)->weight == 0.25);
+	assert_true(incise_model_rule(model, 2)->weight == 0);
+	assert_int_equal(incise_model_rule(model, 3)->mf[1], -1);
 	incise_model_free(model);
 }
 

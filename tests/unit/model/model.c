@@ -22,12 +22,12 @@ static long double plain(const struct incise_model *model, const double *x)
 	long double sum = 0, weights = 0;
 
 	for (int r = 0; r < incise_model_n_rules(model); r++) {
-		const double *p = incise_model_consequent(model, r);
+		const double *p = incise_model_rule(model, r)->p;
 		long double w = 1, y = p[0];
 
 		for (int i = 0; i < incise_model_n_inputs(model); i++) {
 			const struct incise_mf *mf = incise_model_mf(
-				model, i, incise_model_rule_mf(model, r, i));
+				model, i, incise_model_rule(model, r)->mf[i]);
 
 			if (mf->type == INCISE_MF_GAUSS)
 				w *= expl(-powl(x[i] - mf->p[1], 2) /
@@ -248,7 +248,7 @@ static void test_nearest_rule_takes_over(void **state)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 	const double far[] = {1000, 5000};
-	const double *p = incise_model_consequent(model, 19);
+	const double *p = incise_model_rule(model, 19)->p;
 	unsigned int flags;
 
 	assert_true(isnan((double)plain(model, far)) ||
@@ -423,8 +423,8 @@ static void test_min_and_weights_by_hand(void **state)
 	assert_true(fabs(w[0] - 0.4) < 1e-15 && fabs(w[1] - 0.2) < 1e-15);
 	assert_true(fabs(w[2] - 0.4) < 1e-15 && w[3] == 0);
 	assert_int_equal(incise_model_and_method(model), INCISE_AND_MIN);
-	assert_true(incise_model_rule_weight(model, 1) == 0.5);
-	assert_true(incise_model_rule_weight(model, 3) == 0);
+	assert_true(incise_model_rule(model, 1)->weight == 0.5);
+	assert_true(incise_model_rule(model, 3)->weight == 0);
 	/* As prod: 0.5 e^-1/50, 0.15, 0.5 */
 	model->and_method = INCISE_AND_PROD;
 	incise_model_classify(model);
@@ -550,9 +550,9 @@ static void test_grid_shape(void **state)
 
 	assert_int_equal(incise_model_n_rules(model), 20);
 	/* MATLAB's order: the last input's functions follow each other fastest. */
-	assert_int_equal(incise_model_rule_mf(model, 1, 0), 0);
-	assert_int_equal(incise_model_rule_mf(model, 1, 1), 1);
-	assert_int_equal(incise_model_rule_mf(model, 19, 0), 4);
+	assert_int_equal(incise_model_rule(model, 1)->mf[0], 0);
+	assert_int_equal(incise_model_rule(model, 1)->mf[1], 1);
+	assert_int_equal(incise_model_rule(model, 19)->mf[0], 4);
 	incise_model_free(model);
 	/* Neighbours cross at 0.5, and each is 1 at its centre. */
 	for (int type = 0; type < INCISE_MF_SIG; type++) {
@@ -640,8 +640,8 @@ static void test_setters_refuse_what_is_no_number(void **state)
 			 -EINVAL);
 	assert_memory_equal(incise_model_mf(model, 0, 0)->p,
 			    incise_model_mf(copy, 0, 0)->p, 16);
-	assert_memory_equal(incise_model_consequent(model, 0),
-			    incise_model_consequent(copy, 0), 24);
+	assert_memory_equal(incise_model_rule(model, 0)->p, incise_model_rule(copy, 0)->p,
+			    24);
 	incise_model_free(model);
 	incise_model_free(copy);
 }

@@ -155,7 +155,7 @@ static void test_stale(void **state)
 
 	assert_int_equal(incise_uncertainty_save(u, path, NULL), 0);
 	incise_uncertainty_free(u);
-	memcpy(p, incise_model_consequent(model, 19), sizeof(p));
+	memcpy(p, incise_model_rule(model, 19)->p, sizeof(p));
 	p[2] = nextafter(p[2], 10);
 	incise_model_set_consequent(model, 19, p);
 	assert_null(incise_uncertainty_load(path, model, &err));

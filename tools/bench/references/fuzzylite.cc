@@ -60,7 +60,7 @@ void add_rules(engine &e, const incise_model *model)
 	block->setImplication(new fl::AlgebraicProduct);
 	block->setActivation(new fl::General);
 	for (int r = 0; r < incise_model_n_rules(model); r++) {
-		const double *p = incise_model_consequent(model, r);
+		const double *p = incise_model_rule(model, r)->p;
 		/* The constant comes last. */
 		std::vector<fl::scalar> coefficients(p + 1, p + n + 1);
 		std::string text = "if ";
@@ -69,7 +69,7 @@ void add_rules(engine &e, const incise_model *model)
 		e.output->addTerm(new fl::Linear(name("rule", r), coefficients, &e.engine));
 		for (int i = 0; i < n; i++)
 			text += (i ? " and " : "") + name("x", i) + " is " +
-				name("mf", i, incise_model_rule_mf(model, r, i));
+				name("mf", i, incise_model_rule(model, r)->mf[i]);
 		text += " then y is " + name("rule", r);
 		block->addRule(fl::Rule::parse(text, &e.engine));
 	}
