@@ -236,7 +236,6 @@ static void compare(const char *path, struct comparison *c)
 	struct incise_error err = {0};
 	struct incise_recording *recording = incise_recording_open(path, &err);
 	struct incise_redundancy *r = &c->redundancy;
-	struct incise_redundancy_limits limits;
 	struct incise_depth_pair *pairs;
 	int n;
 
@@ -245,8 +244,7 @@ static void compare(const char *path, struct comparison *c)
 	n = incise_depth_pairs(recording, &pairs, &err);
 	if (n < 0)
 		cli_fail_with(&err);
-	incise_redundancy_limits_init(&limits);
-	if (incise_redundancy(pairs, n, &limits, r, &err))
+	if (incise_redundancy(pairs, n, r, &err))
 		cli_fail("%s: %s", path, err.text);
 	free(pairs);
 	incise_recording_close(recording);
@@ -256,19 +254,19 @@ static void compare(const char *path, struct comparison *c)
 			c->verdict, sizeof(c->verdict),
 			"metal nearby? camera and tracker differ by %.2f mm between places; "
 			"more than %g mm: move steel away from tracker and scalpel",
-			r->place_mm, limits.place_mm);
+			r->place_mm, INCISE_REDUNDANCY_PLACE_MM);
 	else if (r->trend_bad)
 		snprintf(
 			c->verdict, sizeof(c->verdict),
 			"wrong scale? they differ by %.1f %% of the depth; more than %g %%: "
 			"calibrate depth",
-			100 * r->trend, 100 * limits.trend);
+			100 * r->trend, 100 * INCISE_REDUNDANCY_TREND);
 	else if (r->bias_bad)
 		snprintf(
 			c->verdict, sizeof(c->verdict),
 			"shifted camera? they differ by %+.2f mm everywhere; more than %g "
 			"mm: calibrate depth and tip, or look at the surface in rig.conf",
-			r->bias_mm, limits.bias_mm);
+			r->bias_mm, INCISE_REDUNDANCY_BIAS_MM);
 	else
 		snprintf(c->verdict, sizeof(c->verdict), "camera and tracker agree");
 }

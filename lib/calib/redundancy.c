@@ -29,11 +29,6 @@ struct work {
 	int n;
 };
 
-void incise_redundancy_limits_init(struct incise_redundancy_limits *limits)
-{
-	*limits = (struct incise_redundancy_limits){0.5, 0.3, 0.02};
-}
-
 static double median_copy(const double *values, int n, double *scratch)
 {
 	memcpy(scratch, values, (size_t)n * sizeof(*values));
@@ -134,8 +129,7 @@ static void find_places(struct work *w, const struct robust_line *line,
 	r->place_u_mm = hypot(least_u, most_u);
 }
 
-static void compare(struct work *w, const struct incise_redundancy_limits *limits,
-		    struct incise_redundancy *r)
+static void compare(struct work *w, struct incise_redundancy *r)
 {
 	struct robust_line line = {0};
 	double mean = 0, squares = 0, distance;
@@ -170,9 +164,9 @@ static void compare(struct work *w, const struct incise_redundancy_limits *limit
 		w->off[i] = fabs(w->off[i] - line.zero - line.slope * w->depth[i]);
 	distance = median(w->off, w->n);
 	r->scatter_sd_mm = 1.4826 * distance;
-	r->bias_bad = fabs(r->bias_mm) > limits->bias_mm + 2 * r->bias_u_mm;
-	r->place_bad = r->place_mm > limits->place_mm + 2 * r->place_u_mm;
-	r->trend_bad = fabs(r->trend) > limits->trend + 2 * r->trend_u;
+	r->bias_bad = fabs(r->bias_mm) > INCISE_REDUNDANCY_BIAS_MM + 2 * r->bias_u_mm;
+	r->place_bad = r->place_mm > INCISE_REDUNDANCY_PLACE_MM + 2 * r->place_u_mm;
+	r->trend_bad = fabs(r->trend) > INCISE_REDUNDANCY_TREND + 2 * r->trend_u;
 }
 
 /* Seconds that hold a pair. */
@@ -187,7 +181,6 @@ static int seconds_of(const struct work *w)
 }
 
 int incise_redundancy(const struct incise_depth_pair *pairs, int n,
-		      const struct incise_redundancy_limits *limits,
 		      struct incise_redundancy *result, struct incise_error *err)
 {
 	struct work w = {0};
@@ -223,7 +216,7 @@ int incise_redundancy(const struct incise_depth_pair *pairs, int n,
 		}
 		seconds = seconds_of(&w);
 		if (w.n >= PAIRS_MIN && seconds >= SECONDS_MIN)
-			compare(&w, limits, result);
+			compare(&w, result);
 		else
 			rc = incise_error_set(
 				err, ENODATA,

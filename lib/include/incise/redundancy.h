@@ -15,15 +15,12 @@
 
 INCISE_BEGIN_DECLS
 
-/** Differences that are tolerated. */
-struct incise_redundancy_limits {
-	/** 0.5 mm: four pixels; 10 ms at 50 mm/s make as much. */
-	double bias_mm;
-	/** 0.3 mm between places: 15 sd of a tracker's noise; steel makes millimetres. */
-	double place_mm;
-	/** 0.02: 0.4 mm at 20 mm of depth. */
-	double trend;
-};
+/** Largest bias: four pixels; 10 ms at 50 mm/s make as much. */
+#define INCISE_REDUNDANCY_BIAS_MM 0.5
+/** Largest difference between places: 15 sd of a tracker's noise; steel makes millimetres. */
+#define INCISE_REDUNDANCY_PLACE_MM 0.3
+/** Largest trend: 0.4 mm at 20 mm of depth. */
+#define INCISE_REDUNDANCY_TREND 0.02
 
 /** Camera against tracker. */
 struct incise_redundancy {
@@ -37,9 +34,6 @@ struct incise_redundancy {
 	bool bias_bad, place_bad, trend_bad; /**< above the limit by twice its u */
 };
 
-/** Defaults as documented above. */
-INCISE_API void incise_redundancy_limits_init(struct incise_redundancy_limits *limits);
-
 /**
  * Compare. Pairs while the depth changes by more than 20 mm/s are left out, and the
  * uncertainties are those of means over a second, as neighbours err alike. A pure function.
@@ -47,7 +41,6 @@ INCISE_API void incise_redundancy_limits_init(struct incise_redundancy_limits *l
  * @return 0; -ENODATA (fewer than 30 pairs, or 4 seconds of them), -EINVAL, -ENOMEM
  */
 INCISE_API int incise_redundancy(const struct incise_depth_pair *pairs, int n,
-				 const struct incise_redundancy_limits *limits,
 				 struct incise_redundancy *result,
 				 struct incise_error *err);
 

@@ -48,16 +48,13 @@ static void make(struct incise_depth_pair *pairs, int how, uint64_t seed)
 static void what_differs_is_named(void **state)
 {
 	static struct incise_depth_pair pairs[PAIRS];
-	struct incise_redundancy_limits limits;
 
-	incise_redundancy_limits_init(&limits);
 	for (int how = 0; how < CASES; how++)
 		for (int seed = 1; seed <= 5; seed++) {
 			struct incise_redundancy r;
 
 			make(pairs, how, seed);
-			assert_int_equal(
-				incise_redundancy(pairs, PAIRS, &limits, &r, NULL), 0);
+			assert_int_equal(incise_redundancy(pairs, PAIRS, &r, NULL), 0);
 			assert_int_equal(r.n, 195 * 5);
 			assert_int_equal(r.place_bad, how == BENT);
 			assert_int_equal(r.trend_bad, how == SCALED);
@@ -80,38 +77,34 @@ static void what_differs_is_named(void **state)
 static void too_little_is_refused(void **state)
 {
 	static struct incise_depth_pair pairs[PAIRS];
-	struct incise_redundancy_limits limits;
 	struct incise_redundancy r;
 	struct incise_error err = {0};
 
-	incise_redundancy_limits_init(&limits);
 	make(pairs, PLAIN, 1);
-	assert_int_equal(incise_redundancy(pairs, 34, &limits, &r, &err), -ENODATA);
+	assert_int_equal(incise_redundancy(pairs, 34, &r, &err), -ENODATA);
 	assert_non_null(strstr(err.text, "29 pictures within 1 seconds"));
-	assert_int_equal(incise_redundancy(pairs, 150, &limits, &r, &err), -ENODATA);
-	assert_int_equal(incise_redundancy(NULL, 0, &limits, &r, &err), -ENODATA);
+	assert_int_equal(incise_redundancy(pairs, 150, &r, &err), -ENODATA);
+	assert_int_equal(incise_redundancy(NULL, 0, &r, &err), -ENODATA);
 	pairs[10].camera_mm = NAN;
-	assert_int_equal(incise_redundancy(pairs, PAIRS, &limits, &r, &err), -EINVAL);
+	assert_int_equal(incise_redundancy(pairs, PAIRS, &r, &err), -EINVAL);
 	make(pairs, PLAIN, 1);
 	pairs[10].t_ns = 0;
-	assert_int_equal(incise_redundancy(pairs, PAIRS, &limits, &r, &err), -EINVAL);
+	assert_int_equal(incise_redundancy(pairs, PAIRS, &r, &err), -EINVAL);
 }
 
 /* One place and one depth: nothing is said of trend, and no place differs. */
 static void no_travel_is_no_fault(void **state)
 {
 	static struct incise_depth_pair pairs[PAIRS];
-	struct incise_redundancy_limits limits;
 	struct incise_redundancy r;
 
-	incise_redundancy_limits_init(&limits);
 	make(pairs, PLAIN, 1);
 	for (int i = 0; i < PAIRS; i++) {
 		pairs[i].place_mm[0] = pairs[i].place_mm[1] = 1;
 		pairs[i].camera_mm += 10 - pairs[i].tracker_mm;
 		pairs[i].tracker_mm = 10;
 	}
-	assert_int_equal(incise_redundancy(pairs, PAIRS, &limits, &r, NULL), 0);
+	assert_int_equal(incise_redundancy(pairs, PAIRS, &r, NULL), 0);
 	assert_true(isnan(r.trend) && !r.trend_bad && !r.place_bad && !r.bias_bad);
 	assert_true(r.place_mm == 0 && r.travel_mm == 0);
 }
