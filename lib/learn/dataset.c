@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/dataset.h>
-#include "../base/c_locale.h"
+#include "../base/lines.h"
 #include "pairs.h"
 
 #define FIELDS_MAX 256
@@ -24,27 +24,10 @@ struct incise_dataset {
 };
 
 struct reader {
-	FILE *file;
-	const char *path;
-	int line;
-	char *text;
-	size_t size;
-	char *field[FIELDS_MAX]; /* into text */
+	struct incise_lines lines;
+	char *field[FIELDS_MAX]; /* into the line */
 	int n_fields;
-	struct incise_error *err;
 };
-
-static int fail(struct reader *in, int code, const char *fmt, ...) INCISE_PRINTF(3, 4);
-static int fail(struct reader *in, int code, const char *fmt, ...)
-{
-	char what[400];
-	va_list args;
-
-	va_start(args, fmt);
-	vsnprintf(what, sizeof(what), fmt, args);
-	va_end(args);
-	return incise_error_set(in->err, code, "%s:%d: %s", in->path, in->line, what);
-}
 
 /* The end of the field at *c; a quoted one ("" stands for ") is unquoted in place. */
 static int field_end(struct reader *in, char **c)
@@ -61,55 +44,52 @@ static int field_end(struct reader *in, char **c)
 		*to++ = *from++;
 	}
 	if (*from != '"')
-		return fail(in, EINVAL, "field %d: a quote is not closed",
-			    in->n_fields + 1);
+		return incise_lines_error(&in->lines, EINVAL,
+					  "field %d: a quote is not closed",
+					  in->n_fields + 1);
 	*to = 0;
 	*c = from + 1;
 	if (**c && **c != ',')
-		return fail(in, EINVAL, "field %d: text after the closing quote",
-			    in->n_fields + 1);
+		return incise_lines_error(&in->lines, EINVAL,
+					  "field %d: text after the closing quote",
+					  in->n_fields + 1);
 	return 0;
+}
+
+/* Split a row into its fields. */
+static int split_row(struct reader *in, char *c)
+{
+	for (in->n_fields = 0;; c++) {
+		int rc;
+
+		if (in->n_fields == FIELDS_MAX)
+			return incise_lines_error(&in->lines, E2BIG,
+						  "more than %d columns", FIELDS_MAX);
+		in->field[in->n_fields] = c;
+		rc = field_end(in, &c);
+		if (rc)
+			return rc;
+		in->n_fields++;
+		if (!*c)
+			return 1;
+		*c = 0;
+	}
 }
 
 /* Next row that is not empty or a comment: 1, or 0 at the end. */
 static int next_row(struct reader *in)
 {
-	ssize_t n;
+	int rc;
 
-	while ((n = getline(&in->text, &in->size, in->file)) >= 0) {
-		char *c = in->text;
+	while ((rc = incise_lines_next(&in->lines, "\r\n")) > 0) {
+		char *c = in->lines.text;
 
-		in->line++;
-		if (memchr(in->text, 0, n))
-			return fail(in, EINVAL, "a NUL byte: not a CSV file");
-		if (in->line == 1 && !strncmp(c, "\xef\xbb\xbf", 3))
+		if (in->lines.line == 1 && !strncmp(c, "\xef\xbb\xbf", 3))
 			c += 3;
-		while (n > 0 && (in->text[n - 1] == '\n' || in->text[n - 1] == '\r'))
-			in->text[--n] = 0;
-		if (!*c || *c == '#')
-			continue;
-		for (in->n_fields = 0;; c++) {
-			int rc;
-
-			if (in->n_fields == FIELDS_MAX)
-				return fail(in, E2BIG, "more than %d columns",
-					    FIELDS_MAX);
-			in->field[in->n_fields] = c;
-			rc = field_end(in, &c);
-			if (rc)
-				return rc;
-			in->n_fields++;
-			if (!*c)
-				return 1;
-			*c = 0;
-		}
+		if (*c && *c != '#')
+			return split_row(in, c);
 	}
-	/* getline(3) fails without memory, too. */
-	if (!feof(in->file))
-		return incise_error_set(in->err, errno ? errno : EIO,
-					"%s: %s; give a CSV file with a header row",
-					in->path, strerror(errno ? errno : EIO));
-	return 0;
+	return rc;
 }
 
 static int find_column(struct reader *in, const char *name)
@@ -123,8 +103,9 @@ static int find_column(struct reader *in, const char *name)
 	for (int i = 0; i < in->n_fields && used < sizeof(list); i++)
 		used += snprintf(list + used, sizeof(list) - used, "%s%s", i ? ", " : "",
 				 in->field[i]);
-	return fail(in, EINVAL, "there is no column '%s'; the columns are: %s", name,
-		    list);
+	return incise_lines_error(&in->lines, EINVAL,
+				  "there is no column '%s'; the columns are: %s", name,
+				  list);
 }
 
 static int number(struct reader *in, int field, const char *column, double *value)
@@ -134,11 +115,12 @@ static int number(struct reader *in, int field, const char *column, double *valu
 
 	*value = strtod(text, &end);
 	if (end == text || end[strspn(end, " \t")])
-		return fail(in, EINVAL, "column %d (%s): '%.40s' is not a number",
-			    field + 1, column, text);
+		return incise_lines_error(&in->lines, EINVAL,
+					  "column %d (%s): '%.40s' is not a number",
+					  field + 1, column, text);
 	if (!isfinite(*value))
-		return fail(
-			in, EINVAL,
+		return incise_lines_error(
+			&in->lines, EINVAL,
 			"column %d (%s): %.40s is not finite; remove the row or mend it",
 			field + 1, column, text);
 	return 0;
@@ -194,9 +176,9 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 	if (rc < 0)
 		return rc;
 	if (!rc)
-		return fail(in, ENODATA,
-			    "the file is empty: expected a header row with "
-			    "column names");
+		return incise_lines_error(&in->lines, ENODATA,
+					  "the file is empty: expected a header row with "
+					  "column names");
 	for (int i = 0; i < data->columns; i++) {
 		at[i] = find_column(in, columns[i]);
 		if (at[i] < 0)
@@ -210,12 +192,14 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 	rc = in->n_fields;
 	for (int header = rc; (rc = next_row(in)) > 0; data->rows++) {
 		if (in->n_fields != header)
-			return fail(in, EINVAL,
-				    "column %d: the row has %d fields, the header has %d",
-				    in->n_fields < header ? in->n_fields + 1 : header + 1,
-				    in->n_fields, header);
+			return incise_lines_error(
+				&in->lines, EINVAL,
+				"column %d: the row has %d fields, the header has %d",
+				in->n_fields < header ? in->n_fields + 1 : header + 1,
+				in->n_fields, header);
 		if (data->rows == data->capacity && grow(data, group))
-			return fail(in, ENOMEM, "no memory for more rows");
+			return incise_lines_error(&in->lines, ENOMEM,
+						  "no memory for more rows");
 		for (int i = 0; i < data->columns; i++) {
 			rc = number(in, at[i], columns[i],
 				    &data->values[data->rows * data->columns + i]);
@@ -226,11 +210,13 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 			continue;
 		rc = find_group(data, in->field[group_at]);
 		if (rc < 0)
-			return fail(in, ENOMEM, "no memory for more groups");
+			return incise_lines_error(&in->lines, ENOMEM,
+						  "no memory for more groups");
 		data->group[data->rows] = rc;
 	}
 	if (!rc && !data->rows)
-		rc = fail(in, ENODATA, "there are no rows below the header");
+		rc = incise_lines_error(&in->lines, ENODATA,
+					"there are no rows below the header");
 	return rc;
 }
 
@@ -239,8 +225,7 @@ struct incise_dataset *incise_dataset_read(const char *path, const char *const *
 					   struct incise_error *err)
 {
 	struct incise_dataset *data = calloc(1, sizeof(*data));
-	struct reader in = {.path = path, .err = err};
-	struct incise_c_locale locale;
+	struct reader in;
 	int rc;
 
 	if (!data || n < 1 || n > FIELDS_MAX) {
@@ -250,19 +235,12 @@ struct incise_dataset *incise_dataset_read(const char *path, const char *const *
 		return NULL;
 	}
 	data->columns = n;
-	in.file = strcmp(path, "-") ? fopen(path, "re") : stdin;
-	if (!in.file) {
-		incise_error_set(err, errno, "%s: %s; give a CSV file with a header row",
-				 path, strerror(errno));
-		free(data);
-		return NULL;
+	rc = incise_lines_open(&in.lines, path, "a CSV file",
+			       "give a CSV file with a header row", err);
+	if (!rc) {
+		rc = read_rows(&in, columns, group, data);
+		incise_lines_close(&in.lines);
 	}
-	locale = incise_c_locale_begin();
-	rc = read_rows(&in, columns, group, data);
-	incise_c_locale_end(locale);
-	if (in.file != stdin)
-		fclose(in.file);
-	free(in.text);
 	if (rc < 0) {
 		incise_dataset_free(data);
 		errno = -rc;

@@ -16,6 +16,7 @@
 #include <string.h>
 #include <incise/outfile.h>
 #include "../base/c_locale.h"
+#include "../base/lines.h"
 #include "model.h"
 
 /* A consequent as the file has it; rules refer to it by number. */
@@ -25,12 +26,8 @@ struct consequent {
 };
 
 struct reader {
-	FILE *file;
-	const char *path;
-	int line;
+	struct incise_lines lines;
 	char *text; /* of the line, without white space at its ends */
-	size_t size;
-	struct incise_error *err;
 	struct incise_model *model;
 	/* Sections and keys read so far; bits of MFs by number. */
 	bool system, output, rules;
@@ -44,44 +41,19 @@ struct reader {
 
 /* --- lines, names and numbers --- */
 
-/* The error with the place in front; returns -code. */
-static int fail(struct reader *in, int code, const char *fmt, ...) INCISE_PRINTF(3, 4);
-static int fail(struct reader *in, int code, const char *fmt, ...)
-{
-	char what[300];
-	va_list args;
-
-	va_start(args, fmt);
-	vsnprintf(what, sizeof(what), fmt, args);
-	va_end(args);
-	return incise_error_set(in->err, code, "%s:%d: %s", in->path, in->line, what);
-}
+#define fail(in, ...) incise_lines_error(&(in)->lines, __VA_ARGS__)
 
 /* Next line that is not empty or a comment: 1, or 0 at the end of the file. */
 static int next_line(struct reader *in)
 {
-	static const char space[] = " \t\r\n";
-	ssize_t n;
+	int rc;
 
-	while ((n = getline(&in->text, &in->size, in->file)) >= 0) {
-		size_t skip;
-
-		in->line++;
-		if (memchr(in->text, 0, n))
-			return fail(in, EINVAL, "a NUL byte: not a .fis file");
-		while (n > 0 && strchr(space, in->text[n - 1]))
-			in->text[--n] = 0;
-		skip = strspn(in->text, space);
-		memmove(in->text, in->text + skip, n - skip + 1);
+	while ((rc = incise_lines_next(&in->lines, " \t\r\n")) > 0) {
+		in->text = in->lines.text + strspn(in->lines.text, " \t\r\n");
 		if (*in->text && *in->text != '%' && *in->text != '#')
-			return 1;
+			break;
 	}
-	/* getline(3) fails without memory, too. */
-	if (!feof(in->file))
-		return incise_error_set(in->err, errno ? errno : EIO,
-					"%s: %s; give a .fis file", in->path,
-					strerror(errno ? errno : EIO));
-	return 0;
+	return rc;
 }
 
 /* 'NAME' at *text, which moves behind it. */
@@ -466,29 +438,21 @@ static int read_file(struct reader *in)
 
 struct incise_model *incise_model_load(const char *path, struct incise_error *err)
 {
-	struct incise_c_locale locale;
 	struct reader *in = calloc(1, sizeof(*in));
 	struct incise_model *model = calloc(1, sizeof(*model));
-	int rc = -ENOMEM;
+	int rc;
 
 	if (!in || !model) {
 		rc = incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
 		goto out;
 	}
-	*in = (struct reader){.path = path, .err = err, .model = model};
+	in->model = model;
 	model->clamp = true;
-	in->file = strcmp(path, "-") ? fopen(path, "re") : stdin;
-	if (!in->file) {
-		rc = incise_error_set(err, errno, "%s: %s; give a .fis file", path,
-				      strerror(errno));
+	rc = incise_lines_open(&in->lines, path, "a .fis file", "give a .fis file", err);
+	if (rc)
 		goto out;
-	}
-	locale = incise_c_locale_begin();
 	rc = read_file(in);
-	incise_c_locale_end(locale);
-	if (in->file != stdin)
-		fclose(in->file);
-	free(in->text);
+	incise_lines_close(&in->lines);
 out:
 	free(in);
 	if (rc) {

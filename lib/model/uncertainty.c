@@ -13,6 +13,7 @@
 #include <incise/outfile.h>
 #include <incise/uncertainty.h>
 #include "../base/c_locale.h"
+#include "../base/lines.h"
 #include "model.h"
 
 #define VERSION 1
@@ -179,49 +180,21 @@ double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 	return isfinite(sum) ? sum : DBL_MAX;
 }
 
-struct reader {
-	FILE *file;
-	const char *path;
-	int line;
-	char *text;
-	size_t size;
-	struct incise_error *err;
-};
-
-static int fail(struct reader *in, int code, const char *fmt, ...) INCISE_PRINTF(3, 4);
-static int fail(struct reader *in, int code, const char *fmt, ...)
-{
-	char what[400];
-	va_list args;
-
-	va_start(args, fmt);
-	vsnprintf(what, sizeof(what), fmt, args);
-	va_end(args);
-	return incise_error_set(in->err, code, "%s:%d: %s", in->path, in->line, what);
-}
+#define fail incise_lines_error
 
 /* Next line that is not empty or a comment: 1, or 0 at the end. */
-static int next_line(struct reader *in)
+static int next_line(struct incise_lines *in)
 {
-	ssize_t n;
+	int rc;
 
-	while ((n = getline(&in->text, &in->size, in->file)) >= 0) {
-		in->line++;
-		if (memchr(in->text, 0, n))
-			return fail(in, EINVAL, "a NUL byte: not a .sd file");
-		while (n > 0 && strchr("\r\n \t", in->text[n - 1]))
-			in->text[--n] = 0;
-		if (*in->text && *in->text != '#')
-			return 1;
-	}
-	if (ferror(in->file))
-		return incise_error_set(in->err, errno ? errno : EIO, "%s: %s", in->path,
-					strerror(errno ? errno : EIO));
-	return 0;
+	do
+		rc = incise_lines_next(in, " \t\r\n");
+	while (rc > 0 && (!*in->text || *in->text == '#'));
+	return rc;
 }
 
 /* The line "KEY VALUE": its value, or NULL. */
-static char *value_of(struct reader *in, const char *key)
+static char *value_of(struct incise_lines *in, const char *key)
 {
 	size_t length = strlen(key);
 	int rc = next_line(in);
@@ -236,7 +209,7 @@ static char *value_of(struct reader *in, const char *key)
 	return in->text + length + 1;
 }
 
-static int integer_of(struct reader *in, const char *key, long *value)
+static int integer_of(struct incise_lines *in, const char *key, long *value)
 {
 	char *text = value_of(in, key), *end;
 
@@ -250,7 +223,7 @@ static int integer_of(struct reader *in, const char *key, long *value)
 }
 
 /* A finite number at *at, behind one space for all but the first. */
-static int number(struct reader *in, char **at, double *value)
+static int number(struct incise_lines *in, char **at, double *value)
 {
 	char *end;
 
@@ -263,7 +236,7 @@ static int number(struct reader *in, char **at, double *value)
 	return 0;
 }
 
-static int read_row(struct reader *in, double *to, int n, int row)
+static int read_row(struct incise_lines *in, double *to, int n, int row)
 {
 	int rc = next_line(in);
 	char *at = in->text;
@@ -289,7 +262,7 @@ static int read_row(struct reader *in, double *to, int n, int row)
 	return 0;
 }
 
-static int read_file(struct reader *in, struct incise_uncertainty *u)
+static int read_file(struct incise_lines *in, struct incise_uncertainty *u)
 {
 	double *to = u->factor;
 	char *text, *end;
@@ -342,27 +315,19 @@ struct incise_uncertainty *incise_uncertainty_load(const char *path,
 						   struct incise_error *err)
 {
 	struct incise_uncertainty *u = make(model);
-	struct reader in = {.path = path, .err = err};
-	struct incise_c_locale locale;
+	struct incise_lines in;
 	int rc;
 
 	if (!u) {
 		incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
 		return NULL;
 	}
-	in.file = strcmp(path, "-") ? fopen(path, "re") : stdin;
-	if (!in.file) {
-		rc = incise_error_set(err, errno,
-				      "%s: %s; it lies beside a model that 'incise "
-				      "train' wrote",
-				      path, strerror(errno));
-	} else {
-		locale = incise_c_locale_begin();
+	rc = incise_lines_open(&in, path, "a .sd file",
+			       "it lies beside a model that 'incise train' wrote", err);
+	if (!rc) {
+		in.hint = NULL;
 		rc = read_file(&in, u);
-		incise_c_locale_end(locale);
-		if (in.file != stdin)
-			fclose(in.file);
-		free(in.text);
+		incise_lines_close(&in);
 	}
 	if (rc) {
 		incise_uncertainty_free(u);

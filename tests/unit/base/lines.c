@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * lib/base/lines.h: lines without their ends, a NUL byte, errors of file and line.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include "../../../lib/base/lines.h"
+#include "temp_file.h"
+
+static void test_lines(void **state)
+{
+	struct temp_file file = temp_file_new("l.txt", " one \r\n\ntwo");
+	struct incise_lines in;
+
+	assert_int_equal(incise_lines_open(&in, file.path, "a text", NULL, NULL), 0);
+	assert_int_equal(incise_lines_next(&in, " \r\n"), 1);
+	assert_string_equal(in.text, " one");
+	assert_int_equal(incise_lines_next(&in, "\n"), 1);
+	assert_string_equal(in.text, "");
+	assert_int_equal(incise_lines_next(&in, "\n"), 1);
+	assert_string_equal(in.text, "two");
+	assert_int_equal(in.line, 3);
+	assert_int_equal(incise_lines_next(&in, "\n"), 0);
+	incise_lines_close(&in);
+	temp_file_free(&file);
+}
+
+static void test_errors(void **state)
+{
+	struct temp_file file = temp_file_new("l.txt", "one\n");
+	struct incise_error err = {0};
+	struct incise_lines in;
+	FILE *out = fopen(file.path, "w");
+
+	assert_int_equal(fwrite("a\nb\0c\n", 1, 6, out), 6);
+	fclose(out);
+	assert_int_equal(incise_lines_open(&in, file.path, "a text", NULL, &err), 0);
+	assert_int_equal(incise_lines_next(&in, "\n"), 1);
+	assert_int_equal(incise_lines_next(&in, "\n"), -EINVAL);
+	assert_non_null(strstr(err.text, "l.txt:2: a NUL byte: not a text"));
+	incise_lines_close(&in);
+	/* a folder opens, and fails to be read */
+	assert_int_equal(incise_lines_open(&in, file.dir, "a text", "give one", &err), 0);
+	assert_int_equal(incise_lines_next(&in, "\n"), -EISDIR);
+	assert_non_null(strstr(err.text, ": Is a directory; give one"));
+	incise_lines_close(&in);
+	temp_file_free(&file);
+	assert_int_equal(incise_lines_open(&in, file.path, "a text", NULL, &err),
+			 -ENOENT);
+	assert_non_null(strstr(err.text, "l.txt: No such file or directory"));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_lines),
+		cmocka_unit_test(test_errors),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
