@@ -235,12 +235,12 @@ static void open_model(struct evaluator *e, const char *path, const char *arith,
 	if (!e->model)
 		cli_fail_with(&err);
 	incise_model_set_clamp(e->model, clamp);
-	e->n_inputs = incise_model_n_inputs(e->model);
-	e->output = incise_model_output(e->model)->name;
+	e->n_inputs = incise_model_info(e->model)->n_inputs;
+	e->output = incise_model_info(e->model)->output.name;
 	for (int i = 0; i < e->n_inputs; i++) {
-		e->input[i] = incise_model_input(e->model, i)->name;
-		e->min[i] = incise_model_input(e->model, i)->min;
-		e->max[i] = incise_model_input(e->model, i)->max;
+		e->input[i] = incise_model_info(e->model)->input[i].name;
+		e->min[i] = incise_model_info(e->model)->input[i].min;
+		e->max[i] = incise_model_info(e->model)->input[i].max;
 	}
 	if (!arith || strcmp(arith, "fixed"))
 		return;

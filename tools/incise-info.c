@@ -45,10 +45,11 @@ static const struct cli_command command = {
 
 static json_t *input_json(const struct incise_model *model, int i)
 {
-	const struct incise_variable *v = incise_model_input(model, i);
+	const struct incise_model_info *info = incise_model_info(model);
+	const struct incise_variable *v = &info->input[i];
 	json_t *mfs = json_array();
 
-	for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+	for (int k = 0; k < info->n_mfs[i]; k++) {
 		const struct incise_mf *mf = incise_model_mf(model, i, k);
 		json_t *params = json_array();
 
@@ -65,7 +66,7 @@ static json_t *input_json(const struct incise_model *model, int i)
 /* As .fis files spell it. */
 static const char *and_method(const struct incise_model *model)
 {
-	return incise_model_and_method(model) == INCISE_AND_MIN ? "min" : "prod";
+	return incise_model_info(model)->and_method == INCISE_AND_MIN ? "min" : "prod";
 }
 
 /* Cells per input, empty where the arithmetic has none. */
@@ -110,19 +111,20 @@ static void add_fixed_json(json_t *report, const struct incise_fixed *fx,
 static void model_json(const struct incise_model *model, const struct incise_fixed *fx,
 		       const char *refused)
 {
-	const struct incise_variable *out = incise_model_output(model);
+	const struct incise_model_info *info = incise_model_info(model);
+	const struct incise_variable *out = &info->output;
 	json_t *inputs = json_array(), *rules = json_array(), *report;
 
-	for (int i = 0; i < incise_model_n_inputs(model); i++)
+	for (int i = 0; i < info->n_inputs; i++)
 		json_array_append_new(inputs, input_json(model, i));
-	for (int r = 0; r < incise_model_n_rules(model); r++) {
+	for (int r = 0; r < info->n_rules; r++) {
 		json_t *mfs = json_array(), *p = json_array();
 
-		for (int i = 0; i < incise_model_n_inputs(model); i++)
+		for (int i = 0; i < info->n_inputs; i++)
 			json_array_append_new(
 				mfs,
 				json_integer(incise_model_rule(model, r)->mf[i] + 1));
-		for (int i = 0; i <= incise_model_n_inputs(model); i++)
+		for (int i = 0; i <= info->n_inputs; i++)
 			json_array_append_new(
 				p, json_real(incise_model_rule(model, r)->p[i]));
 		json_array_append_new(
@@ -130,9 +132,9 @@ static void model_json(const struct incise_model *model, const struct incise_fix
 					 "weight", incise_model_rule(model, r)->weight));
 	}
 	report = json_pack("{ss so so s{so sf sf} ss so}", "kind", "model", "name",
-			   json_text(incise_model_name(model)), "inputs", inputs,
-			   "output", "name", json_text(out->name), "min", out->min, "max",
-			   out->max, "and_method", and_method(model), "rules", rules);
+			   json_text(info->name), "inputs", inputs, "output", "name",
+			   json_text(out->name), "min", out->min, "max", out->max,
+			   "and_method", and_method(model), "rules", rules);
 	add_fixed_json(report, fx, refused);
 	json_print(report);
 }
@@ -140,16 +142,16 @@ static void model_json(const struct incise_model *model, const struct incise_fix
 static void model_text(const struct incise_model *model, const struct incise_fixed *fx,
 		       const char *refused)
 {
-	const struct incise_variable *v = incise_model_output(model);
-	int n = incise_model_n_inputs(model);
+	const struct incise_model_info *info = incise_model_info(model);
+	const struct incise_variable *v = &info->output;
+	int n = info->n_inputs;
 
 	printf("model %s: %d rules, %d inputs, output %s (%g to %g in the data)\n",
-	       incise_model_name(model), incise_model_n_rules(model), n, v->name, v->min,
-	       v->max);
+	       info->name, info->n_rules, n, v->name, v->min, v->max);
 	for (int i = 0; i < n; i++) {
-		v = incise_model_input(model, i);
+		v = &info->input[i];
 		printf("input %s, support %g to %g\n", v->name, v->min, v->max);
-		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+		for (int k = 0; k < info->n_mfs[i]; k++) {
 			const struct incise_mf *mf = incise_model_mf(model, i, k);
 
 			printf("  %-10s %s", mf->name, incise_mf_type_name(mf->type));
@@ -160,7 +162,7 @@ static void model_text(const struct incise_model *model, const struct incise_fix
 	}
 	printf("rules by %s (functions: constant, then a coefficient per input)\n",
 	       and_method(model));
-	for (int r = 0; r < incise_model_n_rules(model); r++) {
+	for (int r = 0; r < info->n_rules; r++) {
 		const double *p = incise_model_rule(model, r)->p;
 
 		printf(" ");

@@ -57,11 +57,13 @@ static bool is_grid(const struct incise_basis *basis, const struct incise_model 
 
 int incise_basis_init(struct incise_basis *basis, const struct incise_model *model)
 {
+	const struct incise_model_info *info = incise_model_info(model);
+
 	memset(basis, 0, sizeof(*basis));
-	basis->n_inputs = incise_model_n_inputs(model);
-	basis->n_rules = incise_model_n_rules(model);
+	basis->n_inputs = info->n_inputs;
+	basis->n_rules = info->n_rules;
 	for (int i = 0; i < basis->n_inputs; i++) {
-		basis->n_mfs[i] = incise_model_n_mfs(model, i);
+		basis->n_mfs[i] = info->n_mfs[i];
 		for (int k = 0; k < basis->n_mfs[i]; k++) {
 			const struct incise_mf *mf = incise_model_mf(model, i, k);
 			int n = incise_mf_n_params(mf->type);
@@ -74,7 +76,7 @@ int incise_basis_init(struct incise_basis *basis, const struct incise_model *mod
 			basis->n_premises += n;
 		}
 	}
-	if (incise_model_and_method(model) != INCISE_AND_PROD)
+	if (info->and_method != INCISE_AND_PROD)
 		return -ENOTSUP;
 	return is_grid(basis, model) ? 0 : -ENOTSUP;
 }
@@ -245,9 +247,10 @@ void incise_basis_fold(const struct incise_basis *basis, const struct incise_pai
 
 int incise_basis_set_consequents(struct incise_model *model, const double *consequents)
 {
-	int n = incise_model_n_inputs(model) + 1;
+	const struct incise_model_info *info = incise_model_info(model);
+	int n = info->n_inputs + 1;
 
-	for (int r = 0; r < incise_model_n_rules(model); r++)
+	for (int r = 0; r < info->n_rules; r++)
 		if (incise_model_set_consequent(model, r, consequents + r * n))
 			return -EDOM;
 	return 0;

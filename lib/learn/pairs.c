@@ -223,7 +223,7 @@ double incise_pairs_rmse(const struct incise_model *model,
 			incise_basis_firing(&basis, x, w);
 		else
 			incise_model_firing(model, x, w);
-		for (int r = 0; r < incise_model_n_rules(model); r++) {
+		for (int r = 0; r < incise_model_info(model)->n_rules; r++) {
 			const double *p = incise_model_rule(model, r)->p;
 
 			e += w[r] * p[0];

@@ -92,10 +92,12 @@ void incise_train_options_init(struct incise_train_options *options)
 static int check_pairs(const struct incise_model *model, const struct incise_pairs *pairs,
 		       const char *what, struct incise_error *err)
 {
-	if (pairs->n_inputs != incise_model_n_inputs(model))
+	const struct incise_model_info *info = incise_model_info(model);
+
+	if (pairs->n_inputs != info->n_inputs)
 		return incise_error_set(err, EINVAL,
 					"%s pairs have %d inputs, the model has %d", what,
-					pairs->n_inputs, incise_model_n_inputs(model));
+					pairs->n_inputs, info->n_inputs);
 	return incise_pairs_check(pairs, what, err);
 }
 
@@ -104,8 +106,8 @@ static int check_all(const struct incise_model *model,
 		     const struct incise_pairs *train, const struct incise_pairs *check,
 		     const struct incise_train_options *options, struct incise_error *err)
 {
-	size_t n_linear =
-		(size_t)incise_model_n_rules(model) * (incise_model_n_inputs(model) + 1);
+	const struct incise_model_info *info = incise_model_info(model);
+	size_t n_linear = (size_t)info->n_rules * (info->n_inputs + 1);
 	int rc = check_pairs(model, train, "training", err);
 
 	if (!rc && check)
@@ -123,20 +125,22 @@ static int check_all(const struct incise_model *model,
 			err, ENODATA,
 			"%zu training pairs cannot settle the %zu consequent parameters of "
 			"%d rules; ask for fewer membership functions or record more",
-			train->n, n_linear, incise_model_n_rules(model));
+			train->n, n_linear, info->n_rules);
 	return incise_pairs_check_inputs(train, inputs, err);
 }
 
 /* The gradients and scalings here are those of two kinds, and of a product of degrees. */
 static int check_trainable(const struct incise_model *model, struct incise_error *err)
 {
-	if (incise_model_and_method(model) != INCISE_AND_PROD)
+	const struct incise_model_info *info = incise_model_info(model);
+
+	if (info->and_method != INCISE_AND_PROD)
 		return incise_error_set(
 			err, ENOTSUP,
 			"the model joins degrees by min: only models with the AND "
 			"method prod can be trained");
-	for (int i = 0; i < incise_model_n_inputs(model); i++)
-		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+	for (int i = 0; i < info->n_inputs; i++)
+		for (int k = 0; k < info->n_mfs[i]; k++) {
 			const struct incise_mf *mf = incise_model_mf(model, i, k);
 
 			if (mf->type != INCISE_MF_GAUSS && mf->type != INCISE_MF_GBELL)
@@ -144,7 +148,7 @@ static int check_trainable(const struct incise_model *model, struct incise_error
 					err, ENOTSUP,
 					"input %s, function %s is a %s: only gaussmf and "
 					"gbellmf can be trained",
-					incise_model_input(model, i)->name, mf->name,
+					info->input[i].name, mf->name,
 					incise_mf_type_name(mf->type));
 		}
 	return 0;
@@ -343,13 +347,14 @@ int incise_train(struct incise_model *model, const struct incise_pairs *train,
 		 const struct incise_train_options *options,
 		 struct incise_train_report *report, struct incise_error *err)
 {
+	const struct incise_model_info *info = incise_model_info(model);
 	struct incise_variable inputs[INCISE_MODEL_INPUTS_MAX];
 	struct incise_train_report own;
 	struct learner *l;
 	int rc;
 
-	for (int i = 0; i < incise_model_n_inputs(model); i++)
-		inputs[i] = *incise_model_input(model, i);
+	for (int i = 0; i < info->n_inputs; i++)
+		inputs[i] = info->input[i];
 	rc = check_trainable(model, err);
 	if (!rc)
 		rc = check_all(model, inputs, train, check, options, err);

@@ -101,9 +101,10 @@ static void image_start(struct image *image, const struct source *source,
 	image->head.arithmetic = arithmetic;
 	image->head.n_inputs = n_inputs(grid);
 	image->head.n_rules = grid->a.n * grid->b.n;
-	put_name(image->head.name, sizeof(image->head.name), incise_model_name(model));
+	put_name(image->head.name, sizeof(image->head.name),
+		 incise_model_info(model)->name);
 	put_name(image->head.output, sizeof(image->head.output),
-		 incise_model_output(model)->name);
+		 incise_model_info(model)->output.name);
 	for (int i = 0; i < n_inputs(grid); i++) {
 		const struct incise_axis *axis = input_axis(grid, i);
 
@@ -111,7 +112,7 @@ static void image_start(struct image *image, const struct source *source,
 		image->head.input[i].max = q16(axis->max);
 		image->head.input[i].n_mfs = axis->n;
 		put_name(image->head.input[i].name, sizeof(image->head.input[i].name),
-			 incise_model_input(model, i)->name);
+			 incise_model_info(model)->input[i].name);
 	}
 }
 

@@ -127,10 +127,10 @@ static int system_key(struct reader *in, const char *key, const char *value)
 	int n, rc;
 
 	if (!strcmp(key, "Name"))
-		return read_quoted(in, &value, model->name);
+		return read_quoted(in, &value, model->info.name);
 	if (!strcmp(key, "NumInputs"))
 		return read_whole(in, key, value, 1, INCISE_MODEL_INPUTS_MAX,
-				  &model->n_inputs);
+				  &model->info.n_inputs);
 	if (!strcmp(key, "NumOutputs"))
 		return read_whole(in, key, value, 1, 1, &n);
 	if (!strcmp(key, "NumRules"))
@@ -142,7 +142,7 @@ static int system_key(struct reader *in, const char *key, const char *value)
 			rc = fail(in, ENOTSUP,
 				  "AndMethod='%s': only 'prod' and 'min' are supported",
 				  word);
-		model->and_method =
+		model->info.and_method =
 			!rc && !strcmp(word, "min") ? INCISE_AND_MIN : INCISE_AND_PROD;
 		return rc;
 	}
@@ -216,10 +216,10 @@ static int input_key(struct reader *in, int i, const char *key, const char *valu
 		in->ranges_seen |= 1u << i;
 	if (!strcmp(key, "NumMFs"))
 		return read_whole(in, key, value, 1, INCISE_MODEL_MFS_MAX,
-				  &model->n_mfs[i]);
+				  &model->info.n_mfs[i]);
 	if (strncmp(key, "MF", 2))
-		return variable_key(in, &model->input[i], key, value);
-	rc = mf_head(in, key, &value, model->n_mfs[i], &k, name, kind);
+		return variable_key(in, &model->info.input[i], key, value);
+	rc = mf_head(in, key, &value, model->info.n_mfs[i], &k, name, kind);
 	if (rc)
 		return rc;
 	type = incise_mf_type_find(kind);
@@ -252,7 +252,7 @@ static int output_key(struct reader *in, const char *key, const char *value)
 		return read_whole(in, key, value, 1, INCISE_MODEL_RULES_MAX,
 				  &in->n_out_mfs);
 	if (strncmp(key, "MF", 2))
-		return variable_key(in, &model->output, key, value);
+		return variable_key(in, &model->info.output, key, value);
 	rc = mf_head(in, key, &value, in->n_out_mfs, &k, name, kind);
 	if (rc)
 		return rc;
@@ -263,12 +263,12 @@ static int output_key(struct reader *in, const char *key, const char *value)
 			    "consequent '%s' is not supported; linear and constant are",
 			    kind);
 	/* The file has the constant last. */
-	rc = read_numbers(in, value, p, out->constant ? 1 : model->n_inputs + 1);
+	rc = read_numbers(in, value, p, out->constant ? 1 : model->info.n_inputs + 1);
 	if (rc)
 		return rc;
 	out->seen = true;
-	out->p[0] = out->constant ? p[0] : p[model->n_inputs];
-	for (int i = 0; i < model->n_inputs; i++)
+	out->p[0] = out->constant ? p[0] : p[model->info.n_inputs];
+	for (int i = 0; i < model->info.n_inputs; i++)
 		out->p[i + 1] = out->constant ? 0 : p[i];
 	return 0;
 }
@@ -280,17 +280,18 @@ static int check_variables(struct reader *in)
 {
 	struct incise_model *model = in->model;
 
-	if (!in->system || !model->n_inputs || !in->n_rules)
+	if (!in->system || !model->info.n_inputs || !in->n_rules)
 		return fail(in, EINVAL,
 			    "[Rules] before NumInputs and NumRules in [System]");
-	for (int i = 0; i < model->n_inputs; i++) {
+	for (int i = 0; i < model->info.n_inputs; i++) {
 		if (!(in->inputs_seen & 1u << i) || !(in->ranges_seen & 1u << i))
 			return fail(in, EINVAL, "[Rules] before [Input%d] with its Range",
 				    i + 1);
-		if (!model->n_mfs[i] || in->mfs_seen[i] != (1ull << model->n_mfs[i]) - 1)
+		if (!model->info.n_mfs[i] ||
+		    in->mfs_seen[i] != (1ull << model->info.n_mfs[i]) - 1)
 			return fail(in, EINVAL,
 				    "[Input%d] has not all of its NumMFs=%d functions",
-				    i + 1, model->n_mfs[i]);
+				    i + 1, model->info.n_mfs[i]);
 	}
 	if (!in->output)
 		return fail(in, EINVAL, "[Rules] before [Output1]");
@@ -301,23 +302,23 @@ static int check_variables(struct reader *in)
 static int read_rule(struct reader *in)
 {
 	struct incise_model *model = in->model;
-	struct incise_rule *rule = &model->rule[model->n_rules];
+	struct incise_rule *rule = &model->rule[model->info.n_rules];
 	const char *text = in->text;
 	int n_used = 0;
 	long v;
 	char *end;
 
-	if (model->n_rules == in->n_rules)
+	if (model->info.n_rules == in->n_rules)
 		return fail(in, EINVAL, "more rules than NumRules=%d", in->n_rules);
-	for (int i = 0; i < model->n_inputs; i++) {
+	for (int i = 0; i < model->info.n_inputs; i++) {
 		v = strtol(text, &end, 10);
-		if (end == text || v > model->n_mfs[i])
+		if (end == text || v > model->info.n_mfs[i])
 			return fail(in, EINVAL,
 				    "rule %d: input %d: expected a number from 0 to %d",
-				    model->n_rules + 1, i + 1, model->n_mfs[i]);
+				    model->info.n_rules + 1, i + 1, model->info.n_mfs[i]);
 		if (v < 0)
 			return fail(in, ENOTSUP, "rule %d: 'not' (%ld) is not supported",
-				    model->n_rules + 1, v);
+				    model->info.n_rules + 1, v);
 		rule->mf[i] = v - 1;
 		n_used += v > 0;
 		text = end;
@@ -325,37 +326,37 @@ static int read_rule(struct reader *in)
 	text += strspn(text, " \t");
 	if (*text++ != ',')
 		return fail(in, EINVAL, "rule %d: expected ',' after %d inputs",
-			    model->n_rules + 1, model->n_inputs);
+			    model->info.n_rules + 1, model->info.n_inputs);
 	v = strtol(text, &end, 10);
 	if (end == text || v < 1 || v > in->n_out_mfs)
 		return fail(in, EINVAL, "rule %d: expected a consequent from 1 to %d",
-			    model->n_rules + 1, in->n_out_mfs);
+			    model->info.n_rules + 1, in->n_out_mfs);
 	if (!in->out[v - 1].seen)
 		return fail(in, EINVAL, "rule %d: consequent MF%ld is missing",
-			    model->n_rules + 1, v);
+			    model->info.n_rules + 1, v);
 	memcpy(rule->p, in->out[v - 1].p, sizeof(rule->p));
-	model->constant[model->n_rules] = in->out[v - 1].constant;
+	model->constant[model->info.n_rules] = in->out[v - 1].constant;
 	text = end + strspn(end, " \t");
 	if (*text++ != '(')
 		return fail(in, EINVAL, "rule %d: expected a weight in parentheses",
-			    model->n_rules + 1);
+			    model->info.n_rules + 1);
 	rule->weight = strtod(text, &end);
 	if (end == text || *end != ')' || !(rule->weight >= 0 && rule->weight <= 1))
 		return fail(in, EINVAL, "rule %d: expected a weight from 0 to 1",
-			    model->n_rules + 1);
+			    model->info.n_rules + 1);
 	text = end + 1 + strspn(end + 1, " \t");
 	if (*text++ != ':')
 		return fail(in, EINVAL, "rule %d: expected ': 1' at the end",
-			    model->n_rules + 1);
+			    model->info.n_rules + 1);
 	v = strtol(text, &end, 10);
 	if (end == text || *end || (v != 1 && v != 2))
 		return fail(in, EINVAL, "rule %d: expected ': 1' at the end",
-			    model->n_rules + 1);
+			    model->info.n_rules + 1);
 	/* 'or' and 'and' of a single input are the same. */
 	if (v == 2 && n_used != 1)
 		return fail(in, ENOTSUP, "rule %d: 'or' (: 2) is not supported",
-			    model->n_rules + 1);
-	model->n_rules++;
+			    model->info.n_rules + 1);
+	model->info.n_rules++;
 	return 0;
 }
 
@@ -379,9 +380,9 @@ static int read_file(struct reader *in)
 				in->system = true;
 			} else if (sscanf(in->text, "[Input%d]%n", &input, &end) == 1 &&
 				   end) {
-				if (input < 1 || input > in->model->n_inputs)
+				if (input < 1 || input > in->model->info.n_inputs)
 					return fail(in, EINVAL, "%.20s: NumInputs is %d",
-						    in->text, in->model->n_inputs);
+						    in->text, in->model->info.n_inputs);
 				in->inputs_seen |= 1u << --input;
 				section = INPUT;
 			} else if (!strcmp(in->text, "[Output1]")) {
@@ -425,11 +426,11 @@ static int read_file(struct reader *in)
 	if (!in->system)
 		return fail(in, EINVAL,
 			    "the file is empty or has no [System]: is it a .fis file?");
-	if (!in->rules || in->model->n_rules != in->n_rules)
+	if (!in->rules || in->model->info.n_rules != in->n_rules)
 		return fail(
 			in, EINVAL,
 			"the file ends after %d of %d rules: it is truncated; write it again",
-			in->model->n_rules, in->n_rules);
+			in->model->info.n_rules, in->n_rules);
 	for (int r = 0; r < in->n_rules; r++)
 		if (in->model->rule[r].weight > 0)
 			return 0;
@@ -490,44 +491,44 @@ static void write_mf(FILE *out, const struct incise_mf *mf, int number)
 static void write_model(const struct incise_model *model, FILE *out)
 {
 	fputs("[System]\n", out);
-	write_name(out, "Name", model->name);
+	write_name(out, "Name", model->info.name);
 	fprintf(out,
 		"\nType='sugeno'\nVersion=2.0\nNumInputs=%d\nNumOutputs=1\nNumRules=%d\n"
 		"AndMethod='%s'\nOrMethod='probor'\nImpMethod='prod'\nAggMethod='sum'\n"
 		"DefuzzMethod='wtaver'\n",
-		model->n_inputs, model->n_rules,
-		model->and_method == INCISE_AND_MIN ? "min" : "prod");
-	for (int i = 0; i < model->n_inputs; i++) {
-		const struct incise_variable *v = &model->input[i];
+		model->info.n_inputs, model->info.n_rules,
+		model->info.and_method == INCISE_AND_MIN ? "min" : "prod");
+	for (int i = 0; i < model->info.n_inputs; i++) {
+		const struct incise_variable *v = &model->info.input[i];
 
 		fprintf(out, "\n[Input%d]\n", i + 1);
 		write_name(out, "Name", v->name);
 		fprintf(out, "\nRange=[%.17g %.17g]\nNumMFs=%d\n", v->min, v->max,
-			model->n_mfs[i]);
-		for (int k = 0; k < model->n_mfs[i]; k++)
+			model->info.n_mfs[i]);
+		for (int k = 0; k < model->info.n_mfs[i]; k++)
 			write_mf(out, &model->mf[i][k], k + 1);
 	}
 	fputs("\n[Output1]\n", out);
-	write_name(out, "Name", model->output.name);
+	write_name(out, "Name", model->info.output.name);
 	/* A file need not name the range of its output. */
-	if (model->output.min < model->output.max)
-		fprintf(out, "\nRange=[%.17g %.17g]", model->output.min,
-			model->output.max);
-	fprintf(out, "\nNumMFs=%d\n", model->n_rules);
-	for (int r = 0; r < model->n_rules; r++) {
+	if (model->info.output.min < model->info.output.max)
+		fprintf(out, "\nRange=[%.17g %.17g]", model->info.output.min,
+			model->info.output.max);
+	fprintf(out, "\nNumMFs=%d\n", model->info.n_rules);
+	for (int r = 0; r < model->info.n_rules; r++) {
 		const struct incise_rule *rule = &model->rule[r];
 
 		fprintf(out, "MF%d='out1mf%d':'%s',[", r + 1, r + 1,
 			model->constant[r] ? "constant" : "linear");
-		for (int i = 0; i < model->n_inputs && !model->constant[r]; i++)
+		for (int i = 0; i < model->info.n_inputs && !model->constant[r]; i++)
 			fprintf(out, "%.17g ", rule->p[i + 1]);
 		fprintf(out, "%.17g]\n", rule->p[0]);
 	}
 	fputs("\n[Rules]\n", out);
-	for (int r = 0; r < model->n_rules; r++) {
+	for (int r = 0; r < model->info.n_rules; r++) {
 		const struct incise_rule *rule = &model->rule[r];
 
-		for (int i = 0; i < model->n_inputs; i++)
+		for (int i = 0; i < model->info.n_inputs; i++)
 			fprintf(out, "%s%d", i ? " " : "", rule->mf[i] + 1);
 		fprintf(out, ", %d (%.17g) : 1\n", r + 1, rule->weight);
 	}

@@ -58,13 +58,13 @@ static void grid_mf(struct incise_mf *mf, enum incise_mf_type type,
 
 static void grid_rules(struct incise_model *model)
 {
-	for (int r = 0; r < model->n_rules; r++) {
+	for (int r = 0; r < model->info.n_rules; r++) {
 		int rest = r;
 
 		model->rule[r].weight = 1;
-		for (int i = model->n_inputs - 1; i >= 0; i--) {
-			model->rule[r].mf[i] = rest % model->n_mfs[i];
-			rest /= model->n_mfs[i];
+		for (int i = model->info.n_inputs - 1; i >= 0; i--) {
+			model->rule[r].mf[i] = rest % model->info.n_mfs[i];
+			rest /= model->info.n_mfs[i];
 		}
 	}
 }
@@ -121,14 +121,14 @@ struct incise_model *incise_model_new_grid(int n_inputs,
 		incise_error_set(err, ENOMEM, "no memory for a model");
 		return NULL;
 	}
-	snprintf(model->name, sizeof(model->name), "incise");
-	model->n_inputs = n_inputs;
-	model->n_rules = n_rules;
+	snprintf(model->info.name, sizeof(model->info.name), "incise");
+	model->info.n_inputs = n_inputs;
+	model->info.n_rules = n_rules;
 	model->clamp = true;
-	model->output = *output;
+	model->info.output = *output;
 	for (int i = 0; i < n_inputs; i++) {
-		model->input[i] = inputs[i];
-		model->n_mfs[i] = n_mfs[i];
+		model->info.input[i] = inputs[i];
+		model->info.n_mfs[i] = n_mfs[i];
 		for (int k = 0; k < n_mfs[i]; k++) {
 			grid_mf(&model->mf[i][k], type, &inputs[i], i, k, n_mfs[i]);
 			if (!incise_mf_fault(type, model->mf[i][k].p))
@@ -151,18 +151,18 @@ static bool is_grid(const struct incise_model *model)
 	bool seen[INCISE_MODEL_RULES_MAX] = {0};
 	int n_rules = 1;
 
-	for (int i = 0; i < model->n_inputs && n_rules <= model->n_rules; i++)
-		n_rules *= model->n_mfs[i];
-	if (model->n_rules != n_rules || model->and_method != INCISE_AND_PROD)
+	for (int i = 0; i < model->info.n_inputs && n_rules <= model->info.n_rules; i++)
+		n_rules *= model->info.n_mfs[i];
+	if (model->info.n_rules != n_rules || model->info.and_method != INCISE_AND_PROD)
 		return false;
 	for (int r = 0; r < n_rules; r++) {
 		const struct incise_rule *rule = &model->rule[r];
 		int place = 0;
 
-		for (int i = 0; i < model->n_inputs; i++) {
+		for (int i = 0; i < model->info.n_inputs; i++) {
 			if (rule->mf[i] < 0)
 				return false;
-			place = place * model->n_mfs[i] + rule->mf[i];
+			place = place * model->info.n_mfs[i] + rule->mf[i];
 		}
 		if (seen[place] || rule->weight != 1)
 			return false;
@@ -174,11 +174,11 @@ static bool is_grid(const struct incise_model *model)
 void incise_model_classify(struct incise_model *model)
 {
 	model->is_grid = is_grid(model);
-	for (int r = 0; r < model->n_rules; r++)
+	for (int r = 0; r < model->info.n_rules; r++)
 		model->log_weight[r] = log(model->rule[r].weight);
-	for (int i = 0; i < model->n_inputs; i++) {
-		model->in_all[i] = model->and_method == INCISE_AND_PROD;
-		for (int r = 0; r < model->n_rules; r++)
+	for (int i = 0; i < model->info.n_inputs; i++) {
+		model->in_all[i] = model->info.and_method == INCISE_AND_PROD;
+		for (int r = 0; r < model->info.n_rules; r++)
 			model->in_all[i] &= model->rule[r].mf[i] >= 0;
 	}
 }
@@ -202,35 +202,9 @@ void incise_model_free(struct incise_model *model)
 	free(model);
 }
 
-const char *incise_model_name(const struct incise_model *model)
+const struct incise_model_info *incise_model_info(const struct incise_model *model)
 {
-	return model->name;
-}
-
-int incise_model_n_inputs(const struct incise_model *model)
-{
-	return model->n_inputs;
-}
-
-int incise_model_n_rules(const struct incise_model *model)
-{
-	return model->n_rules;
-}
-
-int incise_model_n_mfs(const struct incise_model *model, int input)
-{
-	return model->n_mfs[input];
-}
-
-const struct incise_variable *incise_model_input(const struct incise_model *model,
-						 int input)
-{
-	return &model->input[input];
-}
-
-const struct incise_variable *incise_model_output(const struct incise_model *model)
-{
-	return &model->output;
+	return &model->info;
 }
 
 const struct incise_mf *incise_model_mf(const struct incise_model *model, int input,
@@ -249,11 +223,6 @@ int incise_model_set_mf(struct incise_model *model, int input, int mf, const dou
 	return 0;
 }
 
-enum incise_and_method incise_model_and_method(const struct incise_model *model)
-{
-	return model->and_method;
-}
-
 const struct incise_rule *incise_model_rule(const struct incise_model *model, int rule)
 {
 	return &model->rule[rule];
@@ -261,12 +230,12 @@ const struct incise_rule *incise_model_rule(const struct incise_model *model, in
 
 int incise_model_set_consequent(struct incise_model *model, int rule, const double *p)
 {
-	for (int i = 0; i <= model->n_inputs; i++)
+	for (int i = 0; i <= model->info.n_inputs; i++)
 		if (!isfinite(p[i]))
 			return -EINVAL;
-	memcpy(model->rule[rule].p, p, (model->n_inputs + 1) * sizeof(*p));
+	memcpy(model->rule[rule].p, p, (model->info.n_inputs + 1) * sizeof(*p));
 	/* The file has no slopes of a rule that is still called constant. */
-	for (int i = 1; i <= model->n_inputs; i++)
+	for (int i = 1; i <= model->info.n_inputs; i++)
 		model->constant[rule] &= p[i] == 0;
 	return 0;
 }
@@ -284,7 +253,7 @@ struct degrees {
 
 static void degrees(const struct incise_model *model, int i, double x, struct degrees *d)
 {
-	int n = model->n_mfs[i];
+	int n = model->info.n_mfs[i];
 
 	/* Comparisons, not fmax(): without NaN they agree, and they need no call. */
 	d->gap_min = INFINITY;
@@ -307,7 +276,7 @@ bool incise_model_firing_grid(const struct incise_model *model, const double *x,
 {
 	double share[INCISE_MODEL_INPUTS_MAX][INCISE_MODEL_MFS_MAX];
 	double log = 0, gap = 0;
-	int n_inputs = model->n_inputs;
+	int n_inputs = model->info.n_inputs;
 
 	for (int i = 0; i < n_inputs; i++) {
 		struct degrees d;
@@ -316,17 +285,17 @@ bool incise_model_firing_grid(const struct incise_model *model, const double *x,
 		degrees(model, i, x[i], &d);
 		log += d.log_max;
 		gap += d.gap_min;
-		for (int k = 0; k < model->n_mfs[i]; k++) {
+		for (int k = 0; k < model->info.n_mfs[i]; k++) {
 			share[i][k] =
 				d.gap[k] > d.gap_min ? 0 : exp(d.log[k] - d.log_max);
 			sum += share[i][k];
 		}
 		/* The largest is exp(0): sum ≥ 1. One division, for it takes as long as exp(). */
 		sum = 1 / sum;
-		for (int k = 0; k < model->n_mfs[i]; k++)
+		for (int k = 0; k < model->info.n_mfs[i]; k++)
 			share[i][k] *= sum;
 	}
-	for (int r = 0; r < model->n_rules; r++) {
+	for (int r = 0; r < model->info.n_rules; r++) {
 		const int8_t *mf = model->rule[r].mf;
 		double product = share[0][mf[0]];
 
@@ -344,12 +313,12 @@ static double rule_log(const struct incise_model *model, int r, const struct deg
 	double sum = 0;
 
 	*gap = 0;
-	for (int i = 0; i < model->n_inputs; i++) {
+	for (int i = 0; i < model->info.n_inputs; i++) {
 		int k = model->rule[r].mf[i];
 
 		if (k < 0)
 			continue;
-		if (model->and_method == INCISE_AND_MIN) {
+		if (model->info.and_method == INCISE_AND_MIN) {
 			sum = fmin(sum, d[i].log[k]);
 			*gap = fmax(*gap, d[i].gap[k]);
 		} else {
@@ -367,7 +336,7 @@ bool incise_model_firing_rules(const struct incise_model *model, const double *x
 	double gap[INCISE_MODEL_RULES_MAX];
 	double largest = -INFINITY, nearest = INFINITY, log = 0, gaps = 0, sum = 0;
 
-	for (int i = 0; i < model->n_inputs; i++) {
+	for (int i = 0; i < model->info.n_inputs; i++) {
 		degrees(model, i, x[i], &d[i]);
 		if (!model->in_all[i])
 			continue;
@@ -377,26 +346,26 @@ bool incise_model_firing_rules(const struct incise_model *model, const double *x
 		 */
 		log += d[i].log_max;
 		gaps += d[i].gap_min;
-		for (int k = 0; k < model->n_mfs[i]; k++) {
+		for (int k = 0; k < model->info.n_mfs[i]; k++) {
 			d[i].log[k] -= d[i].log_max;
 			d[i].gap[k] -= d[i].gap_min;
 		}
 	}
-	for (int r = 0; r < model->n_rules; r++) {
+	for (int r = 0; r < model->info.n_rules; r++) {
 		w[r] = rule_log(model, r, d, &gap[r]);
 		/* A rule of weight 0 does not even stand in. */
 		if (model->rule[r].weight > 0)
 			nearest = fmin(nearest, gap[r]);
 	}
-	for (int r = 0; r < model->n_rules; r++)
+	for (int r = 0; r < model->info.n_rules; r++)
 		if (gap[r] == nearest)
 			largest = fmax(largest, w[r]);
-	for (int r = 0; r < model->n_rules; r++) {
+	for (int r = 0; r < model->info.n_rules; r++) {
 		w[r] = gap[r] > nearest ? 0 : exp(w[r] - largest);
 		sum += w[r];
 	}
 	/* The largest is exp(0): sum ≥ 1. */
-	for (int r = 0; r < model->n_rules; r++)
+	for (int r = 0; r < model->info.n_rules; r++)
 		w[r] /= sum;
 	return gaps + nearest == 0 && log + largest >= MODEL_LOG_FIRES;
 }
@@ -416,8 +385,8 @@ void incise_model_firing(const struct incise_model *model, const double *x, doub
 {
 	double in[INCISE_MODEL_INPUTS_MAX];
 
-	for (int i = 0; i < model->n_inputs; i++)
-		in[i] = isnan(x[i]) ? middle(&model->input[i]) : x[i];
+	for (int i = 0; i < model->info.n_inputs; i++)
+		in[i] = isnan(x[i]) ? middle(&model->info.input[i]) : x[i];
 	firing(model, in, w);
 }
 
@@ -429,8 +398,8 @@ double incise_model_eval(const struct incise_model *model, const double *x,
 	unsigned int seen = 0;
 	double y = 0;
 
-	for (int i = 0; i < model->n_inputs; i++) {
-		const struct incise_variable *v = &model->input[i];
+	for (int i = 0; i < model->info.n_inputs; i++) {
+		const struct incise_variable *v = &model->info.input[i];
 
 		in[i] = x[i];
 		if (x[i] >= v->min && x[i] <= v->max)
@@ -445,11 +414,11 @@ double incise_model_eval(const struct incise_model *model, const double *x,
 	}
 	if (!firing(model, in, w))
 		seen |= INCISE_MODEL_EXTRAPOLATED;
-	for (int r = 0; r < model->n_rules; r++) {
+	for (int r = 0; r < model->info.n_rules; r++) {
 		const double *p = model->rule[r].p;
 		double yr = p[0];
 
-		for (int i = 0; i < model->n_inputs; i++)
+		for (int i = 0; i < model->info.n_inputs; i++)
 			yr += p[i + 1] * in[i];
 		/* A rule that does not fire adds nothing, not even an overflow. */
 		if (w[r] > 0)

@@ -15,9 +15,7 @@
 #define MODEL_LOG_FIRES (-745.0)
 
 struct incise_model {
-	char name[INCISE_MODEL_NAME_MAX];
-	int n_inputs, n_rules;
-	enum incise_and_method and_method;
+	struct incise_model_info info;
 	bool clamp;
 	/*
 	 * The shape of the rules, which decides how they are evaluated; see
@@ -26,8 +24,6 @@ struct incise_model {
 	bool is_grid; /* each combination once, prod, weights 1 */
 	bool in_all
 		[INCISE_MODEL_INPUTS_MAX]; /* prod, and no rule leaves this input out */
-	struct incise_variable input[INCISE_MODEL_INPUTS_MAX], output;
-	int n_mfs[INCISE_MODEL_INPUTS_MAX];
 	struct incise_mf mf[INCISE_MODEL_INPUTS_MAX][INCISE_MODEL_MFS_MAX];
 	struct incise_rule rule[INCISE_MODEL_RULES_MAX];
 	double log_weight[INCISE_MODEL_RULES_MAX]; /* by incise_model_classify() */

@@ -38,9 +38,9 @@
 void incise_axis_init(struct incise_axis *axis, const struct incise_model *model,
 		      int input)
 {
-	const struct incise_variable *v = incise_model_input(model, input);
+	const struct incise_variable *v = &model->info.input[input];
 
-	axis->n = incise_model_n_mfs(model, input);
+	axis->n = model->info.n_mfs[input];
 	/* A compiled support ends at the nearest LSB, which may lie half an LSB outside. */
 	axis->min = fmin(v->min, rint(v->min * INCISE_FIXED_ONE) / INCISE_FIXED_ONE);
 	axis->max = fmax(v->max, rint(v->max * INCISE_FIXED_ONE) / INCISE_FIXED_ONE);
@@ -142,8 +142,8 @@ void incise_axis_over(const struct incise_axis *axis, struct interval x,
 
 static int check_input(const struct incise_model *model, int i, struct incise_error *err)
 {
-	const struct incise_variable *v = incise_model_input(model, i);
-	int n = incise_model_n_mfs(model, i);
+	const struct incise_variable *v = &model->info.input[i];
+	int n = model->info.n_mfs[i];
 
 	if (n > INCISE_FIXED_MFS_MAX)
 		return incise_error_set(
@@ -187,8 +187,8 @@ static int check_input(const struct incise_model *model, int i, struct incise_er
 int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
 		     struct incise_error *err)
 {
-	int n = incise_model_n_inputs(model), n_rules = incise_model_n_rules(model);
-	int n_b = incise_model_n_mfs(model, n - 1), grid_rules = 1, rc;
+	int n = model->info.n_inputs, n_rules = model->info.n_rules;
+	int n_b = model->info.n_mfs[n - 1], grid_rules = 1, rc;
 
 	memset(grid, 0, sizeof(*grid));
 	if (n > INCISE_FIXED_INPUTS_MAX)
@@ -197,7 +197,7 @@ int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
 			"fixed point: the model has %d inputs, at most %d fit; "
 			"use double",
 			n, INCISE_FIXED_INPUTS_MAX);
-	if (model->and_method != INCISE_AND_PROD)
+	if (model->info.and_method != INCISE_AND_PROD)
 		return incise_error_set(
 			err, ENOTSUP,
 			"fixed point: the model's AndMethod is min, only prod has a "
@@ -206,7 +206,7 @@ int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
 		rc = check_input(model, i, err);
 		if (rc)
 			return rc;
-		grid_rules *= incise_model_n_mfs(model, i);
+		grid_rules *= model->info.n_mfs[i];
 	}
 	if (grid_rules != n_rules)
 		return incise_error_set(

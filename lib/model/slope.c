@@ -347,11 +347,11 @@ void incise_secant_search(const struct incise_secant *secant, struct incise_slop
 static double model_slope(const void *of, const double *x, int i)
 {
 	const struct incise_model *model = of;
-	const struct incise_variable *in = incise_model_input(model, i);
+	const struct incise_variable *in = &model->info.input[i];
 	double width = (in->max - in->min) * MODEL_SECANT;
 	double at[INCISE_MODEL_INPUTS_MAX], lo, hi, from;
 
-	for (int k = 0; k < model->n_inputs; k++)
+	for (int k = 0; k < model->info.n_inputs; k++)
 		at[k] = x[k];
 	lo = fmax(in->min, fmin(x[i] - width / 2, in->max - width));
 	hi = fmin(in->max, lo + width);
@@ -366,16 +366,16 @@ static double model_slope(const void *of, const double *x, int i)
 static void search_model(const struct incise_model *model, struct incise_slope *slopes)
 {
 	struct incise_slope found[INCISE_MODEL_INPUTS_MAX];
-	int n = model->n_inputs;
+	int n = model->info.n_inputs;
 	struct incise_secant secant = {.of = model, .n_inputs = n, .slope = model_slope};
-	int points = POINTS_WORK / (n * (model->n_rules + 12 * n));
+	int points = POINTS_WORK / (n * (model->info.n_rules + 12 * n));
 
 	secant.n_points = points > POINTS_MAX	? POINTS_MAX
 			  : points < POINTS_MIN ? POINTS_MIN
 						: points;
 	for (int i = 0; i < n; i++) {
-		secant.min[i] = incise_model_input(model, i)->min;
-		secant.max[i] = incise_model_input(model, i)->max;
+		secant.min[i] = model->info.input[i].min;
+		secant.max[i] = model->info.input[i].max;
 	}
 	incise_secant_search(&secant, found);
 	for (int i = 0; i < n; i++) {
@@ -391,7 +391,7 @@ int incise_model_slopes(const struct incise_model *model, struct incise_slope *s
 
 	if (!grid)
 		return -ENOMEM;
-	for (int i = 0; i < model->n_inputs; i++)
+	for (int i = 0; i < model->info.n_inputs; i++)
 		slopes[i] = (struct incise_slope){INFINITY, -INFINITY, false};
 	rc = incise_grid_init(grid, model, NULL);
 	if (!rc)

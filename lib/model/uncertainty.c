@@ -45,16 +45,16 @@ static void sum(uint64_t *hash, double value)
 
 static uint64_t checksum(const struct incise_model *model)
 {
-	int d = incise_model_n_inputs(model), n_rules = incise_model_n_rules(model);
+	int d = model->info.n_inputs, n_rules = model->info.n_rules;
 	uint64_t hash = 0xcbf29ce484222325;
 
 	sum(&hash, d);
 	for (int i = 0; i < d; i++) {
-		const struct incise_variable *v = incise_model_input(model, i);
+		const struct incise_variable *v = &model->info.input[i];
 
 		sum(&hash, v->min);
 		sum(&hash, v->max);
-		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+		for (int k = 0; k < model->info.n_mfs[i]; k++) {
 			const struct incise_mf *mf = incise_model_mf(model, i, k);
 
 			for (const char *c = incise_mf_type_name(mf->type); *c; c++)
@@ -75,7 +75,7 @@ static uint64_t checksum(const struct incise_model *model)
 
 static int unknowns(const struct incise_model *model)
 {
-	return incise_model_n_rules(model) * (incise_model_n_inputs(model) + 1);
+	return model->info.n_rules * (model->info.n_inputs + 1);
 }
 
 static struct incise_uncertainty *make(const struct incise_model *model)
@@ -146,8 +146,8 @@ double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 	double w[INCISE_MODEL_RULES_MAX], sum = 0, *at = phi;
 	const double *row = uncertainty->factor;
 
-	for (int i = 0; i < model->n_inputs; i++) {
-		const struct incise_variable *v = &model->input[i];
+	for (int i = 0; i < model->info.n_inputs; i++) {
+		const struct incise_variable *v = &model->info.input[i];
 
 		in[i] = x[i];
 		if (isnan(x[i]))
@@ -158,10 +158,10 @@ double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 			in[i] = fmax(-DBL_MAX, fmin(DBL_MAX, x[i]));
 	}
 	incise_model_firing(model, in, w);
-	for (int r = 0; r < model->n_rules; r++) {
+	for (int r = 0; r < model->info.n_rules; r++) {
 		*at++ = w[r];
-		for (int i = 0; i < model->n_inputs; i++) {
-			const struct incise_variable *v = &model->input[i];
+		for (int i = 0; i < model->info.n_inputs; i++) {
+			const struct incise_variable *v = &model->info.input[i];
 
 			*at++ = w[r] > 0 ? w[r] * ((in[i] - v->min) / (v->max - v->min))
 					 : 0;

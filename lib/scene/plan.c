@@ -112,7 +112,7 @@ static double reserve(const struct incise_plan *plan)
 	if (plan->fixed)
 		most = fmax(most, force_N * plan->fixed->input[0].max / INCISE_FIXED_ONE);
 	else if (plan->model)
-		most = fmax(most, force_N * incise_model_input(plan->model, 0)->max);
+		most = fmax(most, force_N * incise_model_info(plan->model)->input[0].max);
 	return fmax(most, 0);
 }
 

@@ -365,7 +365,7 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	if (!scene->model && !scene->compiled)
 		return incise_error_set(err, why.code, "%s: its model %s", scene->path,
 					why.text);
-	n_inputs = scene->model ? incise_model_n_inputs(scene->model)
+	n_inputs = scene->model ? incise_model_info(scene->model)->n_inputs
 				: scene->compiled->n_inputs;
 	if (n_inputs != 2)
 		return incise_error_set(

@@ -41,7 +41,7 @@ static void fill(struct input *in, const struct incise_model *model,
 {
 	int64_t range = (int64_t)fx->input[i].max - fx->input[i].min;
 
-	in->n = incise_model_n_mfs(model, i);
+	in->n = incise_model_info(model)->n_mfs[i];
 	for (int k = 0; k < VALUES; k++) {
 		double sum = 0, logs[MFS], largest = -INFINITY;
 

@@ -80,12 +80,13 @@ struct plain {
 /* The model has a fixed-point form: a grid of Gaussians, last input fastest. */
 static struct plain *plain_new(const struct incise_model *model)
 {
+	const struct incise_model_info *info = incise_model_info(model);
 	struct plain *m = bench_alloc(1, sizeof(*m));
 
-	m->n_inputs = incise_model_n_inputs(model);
-	m->n_rules = incise_model_n_rules(model);
+	m->n_inputs = info->n_inputs;
+	m->n_rules = info->n_rules;
 	for (int i = 0; i < m->n_inputs; i++) {
-		m->n_mfs[i] = incise_model_n_mfs(model, i);
+		m->n_mfs[i] = info->n_mfs[i];
 		for (int k = 0; k < m->n_mfs[i]; k++) {
 			const struct incise_mf *mf = incise_model_mf(model, i, k);
 
@@ -162,7 +163,7 @@ static void points_init(struct points *p, const struct incise_model *model, size
 	};
 	for (size_t k = 0; k < values; k++) {
 		const struct incise_variable *v =
-			incise_model_input(model, (int)(k % m->n_inputs));
+			&incise_model_info(model)->input[(int)(k % m->n_inputs)];
 
 		p->x[k] = v->min + (v->max - v->min) * lcg_uniform(&seed);
 		p->x_float[k] = (float)p->x[k];
@@ -464,7 +465,7 @@ static struct incise_model *own_model(struct incise_error *err)
 	struct incise_model *model =
 		incise_model_new_grid(2, in, mfs, INCISE_MF_GAUSS, &out, err);
 
-	for (int r = 0; model && r < incise_model_n_rules(model); r++) {
+	for (int r = 0; model && r < incise_model_info(model)->n_rules; r++) {
 		double d = r / 4 * 5.0, v = r % 4 * 50.0 / 3;
 		double p[] = {0.05 * d + 0.01 * v - 0.3, 0.05 + 0.002 * d,
 			      0.01 - 0.0001 * v};
@@ -525,17 +526,18 @@ static void run(struct bench_run *run)
 		measure_error(&all->row[i], &points);
 	measure_times(all, &points, repeats);
 
-	bench_value(run, "model", json_text(incise_model_name(model)));
-	bench_value(run, "rules", json_integer(incise_model_n_rules(model)));
+	bench_value(run, "model", json_text(incise_model_info(model)->name));
+	bench_value(run, "rules", json_integer(incise_model_info(model)->n_rules));
 	bench_value(run, "points", json_integer((json_int_t)points.n));
 	bench_value(run, "repeats", json_integer(repeats));
 	bench_value(run, "fuzzylite_version", json_pack("s?", all->reference_version));
 	bench_text(run,
 		   "model %s, %d rules; errors at %zu points, times of %d runs in turn\n"
 		   "%s; %s; vectors: %s; %s%s%s\n\n",
-		   incise_model_name(model), incise_model_n_rules(model), points.n,
-		   repeats, bench_machine(run, "cpu"), bench_machine(run, "kernel"),
-		   bench_machine(run, "vectors"), bench_machine(run, "compiler"),
+		   incise_model_info(model)->name, incise_model_info(model)->n_rules,
+		   points.n, repeats, bench_machine(run, "cpu"),
+		   bench_machine(run, "kernel"), bench_machine(run, "vectors"),
+		   bench_machine(run, "compiler"),
 		   all->reference_version ? "; fuzzylite " : "",
 		   all->reference_version ? all->reference_version : "");
 	bench_table(run, &rows_table, all->row, all->n);

@@ -62,7 +62,7 @@ static struct incise_model *any_model(void)
 			p[0] *= below(2) ? 1 : width;
 			incise_model_set_mf(model, i, k, p);
 		}
-	for (int r = 0; r < incise_model_n_rules(model); r++) {
+	for (int r = 0; r < incise_model_info(model)->n_rules; r++) {
 		double p[3] = {wild * between(-2, 2), wild * between(-0.1, 0.1),
 			       wild * between(-0.1, 0.1)};
 

@@ -46,12 +46,13 @@ static void make(struct incise_model **model, struct incise_error *err)
 /* Parameters that cannot be must be said to be so. */
 static void shake(struct extremes_row *row, struct incise_model *model)
 {
-	int n = incise_model_n_inputs(model);
+	const struct incise_model_info *info = incise_model_info(model);
+	int n = info->n_inputs;
 	double p[INPUTS_MAX + 1];
 
 	for (int k = 0; k < 6; k++) {
 		int input = (int)below((uint32_t)n), rc;
-		int mf = (int)below((uint32_t)incise_model_n_mfs(model, input));
+		int mf = (int)below((uint32_t)info->n_mfs[input]);
 		double q[4] = {any_number(), any_number(), any_number(), any_number()};
 
 		rc = incise_model_set_mf(model, input, mf, q);
@@ -61,7 +62,7 @@ static void shake(struct extremes_row *row, struct incise_model *model)
 			extremes_tell(row, "set_mf(%a, %a, %a, %a): %d", q[0], q[1], q[2],
 				      q[3], rc);
 	}
-	for (int r = 0; r < incise_model_n_rules(model); r++) {
+	for (int r = 0; r < info->n_rules; r++) {
 		for (int i = 0; i <= n; i++)
 			p[i] = below(2) ? any_number() : between(-1, 1);
 		incise_model_set_consequent(model, r, p); /* refused where not finite */
@@ -72,24 +73,26 @@ static void shake(struct extremes_row *row, struct incise_model *model)
 static void tell(struct extremes_row *row, const struct incise_model *model,
 		 const double *x, double y, const char *what)
 {
+	const struct incise_model_info *info = incise_model_info(model);
 	const struct incise_mf *mf = incise_model_mf(model, 0, 0);
 
 	extremes_tell(row, "%s: y = %a at (", what, y);
-	for (int i = 0; i < incise_model_n_inputs(model); i++)
+	for (int i = 0; i < info->n_inputs; i++)
 		extremes_tell(row, "%s%a", i ? ", " : "", x[i]);
 	extremes_tell(row, "), case %ld, of %d rules, %s(%a, %a, %a, %a)", row->tried,
-		      incise_model_n_rules(model), incise_mf_type_name(mf->type),
-		      mf->p[0], mf->p[1], mf->p[2], mf->p[3]);
+		      info->n_rules, incise_mf_type_name(mf->type), mf->p[0], mf->p[1],
+		      mf->p[2], mf->p[3]);
 }
 
 static void ask(struct extremes_row *row, const struct incise_model *model)
 {
-	int n = incise_model_n_inputs(model);
+	const struct incise_model_info *info = incise_model_info(model);
+	int n = info->n_inputs;
 	double x[INPUTS_MAX], y, middle[INPUTS_MAX];
 	bool missing = false;
 
 	for (int i = 0; i < n; i++) {
-		const struct incise_variable *in = incise_model_input(model, i);
+		const struct incise_variable *in = &info->input[i];
 
 		x[i] = below(2) ? any_number() : between(in->min, in->max);
 		middle[i] = isnan(x[i]) ? in->min + (in->max - in->min) / 2 : x[i];

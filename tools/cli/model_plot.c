@@ -50,12 +50,13 @@ static void put_axis(FILE *script, const char *axis, const struct incise_variabl
 void model_plot_write_functions(const struct incise_model *model, const char *folder,
 				const char *data)
 {
+	const struct incise_model_info *info = incise_model_info(model);
 	FILE *out = plot_data(folder, data);
 
-	for (int i = 0; i < incise_model_n_inputs(model); i++) {
-		const struct incise_variable *v = incise_model_input(model, i);
+	for (int i = 0; i < info->n_inputs; i++) {
+		const struct incise_variable *v = &info->input[i];
 
-		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+		for (int k = 0; k < info->n_mfs[i]; k++) {
 			for (int s = 0; s <= SAMPLES; s++) {
 				double x = between(v, s, SAMPLES);
 
@@ -71,13 +72,14 @@ void model_plot_write_functions(const struct incise_model *model, const char *fo
 void model_plot_functions(FILE *script, const struct incise_model *model, int input,
 			  const char *data, const char *title, const char *names)
 {
-	int first = 0, n = incise_model_n_mfs(model, input);
+	const struct incise_model_info *info = incise_model_info(model);
+	int first = 0, n = info->n_mfs[input];
 
 	for (int i = 0; i < input; i++)
-		first += incise_model_n_mfs(model, i);
+		first += info->n_mfs[i];
 	fprintf(script, "set title '%s'\nset yrange [0:1.1]\nset ylabel 'degree'\n",
 		title);
-	put_axis(script, "x", incise_model_input(model, input));
+	put_axis(script, "x", &info->input[input]);
 	fputs("names = \"", script);
 	if (names)
 		fputs(names, script);
@@ -96,15 +98,16 @@ void model_plot_functions(FILE *script, const struct incise_model *model, int in
 void model_plot_write_surface(const struct incise_model *model, const char *folder,
 			      const char *data)
 {
-	const struct incise_variable *a = incise_model_input(model, 0), *b = a;
+	const struct incise_model_info *info = incise_model_info(model);
+	const struct incise_variable *a = &info->input[0], *b = a;
 	FILE *out = plot_data(folder, data);
 	double x[INCISE_MODEL_INPUTS_MAX];
-	int n = incise_model_n_inputs(model);
+	int n = info->n_inputs;
 
 	for (int i = 2; i < n; i++)
-		x[i] = between(incise_model_input(model, i), 1, 2);
+		x[i] = between(&info->input[i], 1, 2);
 	if (n > 1)
-		b = incise_model_input(model, 1);
+		b = &info->input[1];
 	for (int i = 0; n > 1 && i <= MESH; i++, fputc('\n', out))
 		for (int j = 0; j <= MESH; j++) {
 			x[0] = between(a, i, MESH);
@@ -122,17 +125,19 @@ void model_plot_write_surface(const struct incise_model *model, const char *fold
 void model_plot_surface(FILE *script, const struct incise_model *model, const char *data,
 			const char *title, const char *more)
 {
+	const struct incise_model_info *info = incise_model_info(model);
+
 	fprintf(script, "set title '%s'\n", title);
-	put_axis(script, "x", incise_model_input(model, 0));
-	if (incise_model_n_inputs(model) == 1) {
-		put_axis(script, "y", incise_model_output(model));
+	put_axis(script, "x", &info->input[0]);
+	if (info->n_inputs == 1) {
+		put_axis(script, "y", &info->output);
 		fprintf(script, "set yrange [*:*]\nplot '%s' with lines ls 1 lw 2%s\n",
 			data, more);
 		return;
 	}
-	put_axis(script, "y", incise_model_input(model, 1));
-	put_axis(script, "z", incise_model_output(model));
-	put_axis(script, "cb", incise_model_output(model));
+	put_axis(script, "y", &info->input[1]);
+	put_axis(script, "z", &info->output);
+	put_axis(script, "cb", &info->output);
 	fprintf(script,
 		"set zlabel rotate parallel\nset yrange [*:*]\nset ticslevel 0\n"
 		"set view 55,320\nset palette rgbformulae 33,13,10\n"
@@ -148,7 +153,7 @@ void model_plot_surface(FILE *script, const struct incise_model *model, const ch
 void model_plot_draw(const struct incise_model *model, const char *folder,
 		     const char *name)
 {
-	int n = incise_model_n_inputs(model), columns = n > 1 ? 2 : 1;
+	int n = incise_model_info(model)->n_inputs, columns = n > 1 ? 2 : 1;
 	int rows = (n + columns - 1) / columns;
 	int width = 2 * PANEL_WIDTH, height = rows * PANEL_HEIGHT + SURFACE_HEIGHT;
 	double panel = (double)PANEL_HEIGHT / height;

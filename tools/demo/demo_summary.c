@@ -32,6 +32,7 @@ json_t *demo_summary_begin(long seed)
 /* Largest difference of the two arithmetics on a grid over the support, N. */
 static double fixed_difference(const struct incise_model *model, double *bound)
 {
+	const struct incise_model_info *info = incise_model_info(model);
 	struct incise_error err = {0};
 	struct incise_fixed *fixed = incise_fixed_compile(model, NULL, &err);
 	double largest = 0;
@@ -40,8 +41,8 @@ static double fixed_difference(const struct incise_model *model, double *bound)
 		cli_fail_with(&err);
 	for (int i = 0; i <= GRID; i++)
 		for (int j = 0; j <= GRID; j++) {
-			const struct incise_variable *d = incise_model_input(model, 0);
-			const struct incise_variable *v = incise_model_input(model, 1);
+			const struct incise_variable *d = &info->input[0];
+			const struct incise_variable *v = &info->input[1];
 			double x[] = {d->min + (d->max - d->min) * i / GRID,
 				      v->min + (v->max - v->min) * j / GRID};
 

@@ -77,7 +77,7 @@ json_t *train_warnings(const struct train_result *result)
 	const char *data = !wish->check		 ? "its own"
 			   : wish->train.classic ? "the check"
 						 : "unseen";
-	const struct incise_variable *out = incise_model_output(model);
+	const struct incise_variable *out = &incise_model_info(model)->output;
 	/* Rounding of a double, some hundred times over, is no error worth a word. */
 	double rounding = 1e-13 * fmax(fabs(out->min), fabs(out->max));
 	json_t *list = json_array();
@@ -92,13 +92,13 @@ json_t *train_warnings(const struct train_result *result)
 		warn(list,
 		     "%d of %d rules never fire in the data: the model is a guess there; "
 		     "ask for fewer membership functions or record more",
-		     report->rules_unfired, incise_model_n_rules(model));
+		     report->rules_unfired, incise_model_info(model)->n_rules);
 	if (pairs < (size_t)PAIRS_PER_PARAMETER * report->parameters)
 		warn(list,
 		     "%zu training pairs for %d parameters: the model can follow noise; at "
 		     "least %d pairs support %d rules",
 		     pairs, report->parameters, PAIRS_PER_PARAMETER * report->parameters,
-		     incise_model_n_rules(model));
+		     incise_model_info(model)->n_rules);
 	return list;
 }
 
@@ -132,14 +132,15 @@ void train_report_json(const struct train_result *result, json_t *warned)
 	json_object_set_new(object, "train_groups", json_integer(fit->n_groups));
 	json_object_set_new(object, "check_groups",
 			    json_integer(check ? check->n_groups : 0));
-	json_object_set_new(object, "rules", json_integer(incise_model_n_rules(model)));
+	json_object_set_new(object, "rules",
+			    json_integer(incise_model_info(model)->n_rules));
 	json_object_set_new(object, "parameters", json_integer(report->parameters));
 	json_object_set_new(object, "epochs", json_integer(report->epochs));
 	json_object_set_new(object, "best_epoch", json_integer(report->best_epoch));
 	json_object_set_new(object, "ridge", json_number(report->ridge));
 	json_object_set_new(object, "condition", json_number(report->condition));
 	json_object_set_new(object, "rules_unfired", json_integer(report->rules_unfired));
-	for (int r = 0; r < incise_model_n_rules(model); r++)
+	for (int r = 0; r < incise_model_info(model)->n_rules; r++)
 		if (report->unfired[r])
 			json_array_append_new(unfired, json_integer(r + 1));
 	json_object_set_new(object, "unfired_rules", unfired);
@@ -187,7 +188,7 @@ void train_report_text(const struct train_result *result)
 	if (check && wish->group)
 		printf(" (%d cuts)", check->n_groups);
 	printf("\n%d rules, %d parameters, %d epochs (kept %d), ridge %g, condition %.2g\n",
-	       incise_model_n_rules(model), report->parameters, report->epochs,
+	       incise_model_info(model)->n_rules, report->parameters, report->epochs,
 	       report->best_epoch, report->ridge, report->condition);
 	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);

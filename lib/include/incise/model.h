@@ -74,6 +74,16 @@ struct incise_variable {
 	double min, max; /**< support; min < max, both finite */
 };
 
+/** A model but for its membership functions and rules. */
+struct incise_model_info {
+	char name[INCISE_MODEL_NAME_MAX]; /**< in the .fis file */
+	int n_inputs;			  /**< 1 … INCISE_MODEL_INPUTS_MAX */
+	int n_rules;
+	enum incise_and_method and_method; /**< joins the degrees of a rule */
+	struct incise_variable input[INCISE_MODEL_INPUTS_MAX], output;
+	int n_mfs[INCISE_MODEL_INPUTS_MAX]; /**< membership functions of each input */
+};
+
 /** One rule; its output is p[0] + p[1] x1 + … */
 struct incise_rule {
 	int8_t mf[INCISE_MODEL_INPUTS_MAX]; /**< function of each input; -1: none */
@@ -140,20 +150,8 @@ INCISE_API void incise_model_assign(struct incise_model *to,
 /** NULL is accepted. */
 INCISE_API void incise_model_free(struct incise_model *model);
 
-/** Its name in the .fis file; owned by the model. */
-INCISE_API const char *incise_model_name(const struct incise_model *model);
-/** Number of inputs, 1 … INCISE_MODEL_INPUTS_MAX. */
-INCISE_API int incise_model_n_inputs(const struct incise_model *model);
-/** Number of rules. */
-INCISE_API int incise_model_n_rules(const struct incise_model *model);
-/** Number of membership functions of input @input. */
-INCISE_API int incise_model_n_mfs(const struct incise_model *model, int input);
-
-/** Input @input, 0 … n_inputs-1; owned by the model. */
-INCISE_API const struct incise_variable *incise_model_input(
-	const struct incise_model *model, int input);
-/** Name and range of the output; owned by the model. */
-INCISE_API const struct incise_variable *incise_model_output(
+/** Name, inputs and output; owned by the model. */
+INCISE_API const struct incise_model_info *incise_model_info(
 	const struct incise_model *model);
 
 /** Membership function @mf of input @input; owned by the model. */
@@ -168,10 +166,6 @@ INCISE_API const struct incise_mf *incise_model_mf(const struct incise_model *mo
  */
 INCISE_API int incise_model_set_mf(struct incise_model *model, int input, int mf,
 				   const double p[4]);
-
-/** The operation that joins the degrees of a rule. */
-INCISE_API enum incise_and_method incise_model_and_method(
-	const struct incise_model *model);
 
 /** Rule @rule, 0 … n_rules-1; owned by the model. */
 INCISE_API const struct incise_rule *incise_model_rule(const struct incise_model *model,

@@ -68,7 +68,7 @@ static void test_gradient(void **state)
 		assert_int_equal(incise_anfis_run(after, &anfis), 0);
 		assert_int_equal(anfis.best_epoch, 2);
 		for (int i = 0; i < 2; i++)
-			for (int k = 0; k < incise_model_n_mfs(model, i); k++)
+			for (int k = 0; k < incise_model_info(model)->n_mfs[i]; k++)
 				for (int j = 0; j < n_params; j++, n++) {
 					double p[4], h, up, down;
 

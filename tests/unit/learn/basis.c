@@ -135,7 +135,7 @@ static void test_store(void **state)
 		assert_int_equal(incise_basis_init(&basis, a), 0);
 		incise_basis_store(&basis, b);
 		for (int i = 0; i < 2; i++)
-			for (int k = 0; k < incise_model_n_mfs(a, i); k++)
+			for (int k = 0; k < incise_model_info(a)->n_mfs[i]; k++)
 				assert_memory_equal(incise_model_mf(a, i, k)->p,
 						    incise_model_mf(b, i, k)->p,
 						    (type ? 3 : 2) * sizeof(double));

@@ -80,15 +80,15 @@ static void test_start(void **state)
 	model = incise_train_start(&pairs, names, INCISE_MF_GAUSS, chosen, &options,
 				   &err);
 	assert_non_null(model);
-	assert_string_equal(incise_model_output(model)->name, "y");
-	assert_true(incise_model_input(model, 0)->min >= 0 &&
-		    incise_model_input(model, 0)->max <= 1);
+	assert_string_equal(incise_model_info(model)->output.name, "y");
+	assert_true(incise_model_info(model)->input[0].min >= 0 &&
+		    incise_model_info(model)->input[0].max <= 1);
 	for (int i = 0; i < 2; i++)
-		assert_int_equal(incise_model_n_mfs(model, i), chosen[i]);
+		assert_int_equal(incise_model_info(model)->n_mfs[i], chosen[i]);
 	assert_true(chosen[0] >= 4 && chosen[1] == 1);
 	incise_model_free(model);
 	model = incise_train_start(&pairs, names, INCISE_MF_GBELL, given, &options, &err);
-	assert_int_equal(incise_model_n_rules(model), 6);
+	assert_int_equal(incise_model_info(model)->n_rules, 6);
 	incise_model_free(model);
 	rows[2] = -1.5e308;
 	rows[5] = 1.5e308;

@@ -574,11 +574,13 @@ static void test_min_cannot_be_trained(void **state)
 /* Wherever parameters end, they are numbers, and functions of the default in order. */
 static void check_finite(const struct incise_model *model, bool ordered)
 {
-	for (int r = 0; r < incise_model_n_rules(model); r++)
-		for (int i = 0; i <= incise_model_n_inputs(model); i++)
+	const struct incise_model_info *info = incise_model_info(model);
+
+	for (int r = 0; r < info->n_rules; r++)
+		for (int i = 0; i <= info->n_inputs; i++)
 			assert_true(isfinite(incise_model_rule(model, r)->p[i]));
-	for (int i = 0; i < incise_model_n_inputs(model); i++)
-		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+	for (int i = 0; i < info->n_inputs; i++)
+		for (int k = 0; k < info->n_mfs[i]; k++) {
 			const double *p = incise_model_mf(model, i, k)->p;
 
 			assert_true(isfinite(p[0]) && p[0] > 0 && isfinite(p[1]));

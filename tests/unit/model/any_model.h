@@ -65,17 +65,17 @@ static inline long double any_strengths(const struct incise_model *model, const 
 {
 	long double largest = 0;
 
-	for (int r = 0; r < model->n_rules; r++) {
+	for (int r = 0; r < model->info.n_rules; r++) {
 		const struct incise_rule *rule = &model->rule[r];
 
 		w[r] = 1;
-		for (int i = 0; i < model->n_inputs; i++) {
+		for (int i = 0; i < model->info.n_inputs; i++) {
 			long double degree;
 
 			if (rule->mf[i] < 0)
 				continue;
 			degree = any_degree(&model->mf[i][rule->mf[i]], x[i]);
-			if (model->and_method == INCISE_AND_PROD)
+			if (model->info.and_method == INCISE_AND_PROD)
 				w[r] *= degree;
 			else if (degree < w[r])
 				w[r] = degree;
@@ -93,10 +93,10 @@ static inline long double any_output(const struct incise_model *model, const dou
 	long double w[INCISE_MODEL_RULES_MAX], sum = 0, weights = 0;
 
 	any_strengths(model, x, w);
-	for (int r = 0; r < model->n_rules; r++) {
+	for (int r = 0; r < model->info.n_rules; r++) {
 		long double y = model->rule[r].p[0];
 
-		for (int i = 0; i < model->n_inputs; i++)
+		for (int i = 0; i < model->info.n_inputs; i++)
 			y += (long double)model->rule[r].p[i + 1] * x[i];
 		sum += w[r] * y;
 		weights += w[r];
@@ -171,16 +171,16 @@ static inline void any_mf(struct incise_mf *mf, uint64_t *seed, double decades)
 static inline void any_model(struct incise_model *model, uint64_t *seed, int n_inputs,
 			     int n_rules, double decades)
 {
-	snprintf(model->name, sizeof(model->name), "any");
-	model->n_inputs = n_inputs;
-	model->n_rules = n_rules;
+	snprintf(model->info.name, sizeof(model->info.name), "any");
+	model->info.n_inputs = n_inputs;
+	model->info.n_rules = n_rules;
 	model->clamp = any_below(seed, 2);
-	model->and_method = any_below(seed, 2) ? INCISE_AND_MIN : INCISE_AND_PROD;
-	model->output = (struct incise_variable){"y", -1, 1};
+	model->info.and_method = any_below(seed, 2) ? INCISE_AND_MIN : INCISE_AND_PROD;
+	model->info.output = (struct incise_variable){"y", -1, 1};
 	for (int i = 0; i < n_inputs; i++) {
-		model->input[i] = (struct incise_variable){"x", -10, 10};
-		model->n_mfs[i] = 1 + any_below(seed, 5);
-		for (int k = 0; k < model->n_mfs[i]; k++)
+		model->info.input[i] = (struct incise_variable){"x", -10, 10};
+		model->info.n_mfs[i] = 1 + any_below(seed, 5);
+		for (int k = 0; k < model->info.n_mfs[i]; k++)
 			any_mf(&model->mf[i][k], seed, decades);
 	}
 	for (int r = 0; r < n_rules; r++) {
@@ -189,7 +189,7 @@ static inline void any_model(struct incise_model *model, uint64_t *seed, int n_i
 
 		for (int i = 0; i < n_inputs; i++)
 			rule->mf[i] = any_below(seed, 8)
-					      ? any_below(seed, model->n_mfs[i])
+					      ? any_below(seed, model->info.n_mfs[i])
 					      : -1;
 		rule->weight = r == 0 || weighs > 1 ? 1
 			       : weighs		    ? (1 + paper_random(seed)) / 2

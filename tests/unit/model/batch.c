@@ -30,7 +30,7 @@ static struct incise_fixed *compiled(int n_inputs, int n_a, int n_b, int arithme
 		incise_model_new_grid(n_inputs, in, mfs, INCISE_MF_GAUSS, &out, NULL);
 	struct incise_fixed *fx;
 
-	for (int r = 0; r < incise_model_n_rules(model); r++) {
+	for (int r = 0; r < incise_model_info(model)->n_rules; r++) {
 		double p[] = {5 * paper_random(&seed), paper_random(&seed),
 			      paper_random(&seed)};
 

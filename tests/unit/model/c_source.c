@@ -48,13 +48,13 @@ static struct incise_fixed *compiled(int n_inputs, int arithmetic, double size,
 	uint64_t seed = 11;
 	struct incise_fixed *fx;
 
-	for (int r = 0; r < incise_model_n_rules(model); r++) {
+	for (int r = 0; r < incise_model_info(model)->n_rules; r++) {
 		double p[] = {size * paper_random(&seed), size * paper_random(&seed) / 9,
 			      size * paper_random(&seed) / 9};
 
 		incise_model_set_consequent(model, r, p);
 	}
-	snprintf(model->name, sizeof(model->name), "%s", name);
+	snprintf(model->info.name, sizeof(model->info.name), "%s", name);
 	fx = incise_fixed_compile(model, &options, NULL);
 	assert_non_null(fx);
 	incise_model_free(model);

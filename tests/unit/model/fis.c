@@ -54,16 +54,16 @@ static char *get(size_t *n)
 
 static void assert_same(const struct incise_model *a, const struct incise_model *b)
 {
-	assert_int_equal(incise_model_n_rules(a), incise_model_n_rules(b));
-	assert_string_equal(incise_model_name(a), incise_model_name(b));
+	const struct incise_model_info *info = incise_model_info(a);
+
+	assert_int_equal(info->n_rules, incise_model_info(b)->n_rules);
+	assert_string_equal(info->name, incise_model_info(b)->name);
 	for (int i = 0; i < 2; i++) {
-		assert_string_equal(incise_model_input(a, i)->name,
-				    incise_model_input(b, i)->name);
-		assert_true(incise_model_input(a, i)->min ==
-			    incise_model_input(b, i)->min);
-		assert_true(incise_model_input(a, i)->max ==
-			    incise_model_input(b, i)->max);
-		for (int k = 0; k < incise_model_n_mfs(a, i); k++) {
+		assert_string_equal(info->input[i].name,
+				    incise_model_info(b)->input[i].name);
+		assert_true(info->input[i].min == incise_model_info(b)->input[i].min);
+		assert_true(info->input[i].max == incise_model_info(b)->input[i].max);
+		for (int k = 0; k < info->n_mfs[i]; k++) {
 			const struct incise_mf *f = incise_model_mf(a, i, k);
 			const struct incise_mf *g = incise_model_mf(b, i, k);
 
@@ -74,7 +74,7 @@ static void assert_same(const struct incise_model *a, const struct incise_model 
 						    sizeof(double));
 		}
 	}
-	for (int r = 0; r < incise_model_n_rules(a); r++)
+	for (int r = 0; r < info->n_rules; r++)
 		assert_memory_equal(incise_model_rule(a, r)->p,
 				    incise_model_rule(b, r)->p, 3 * sizeof(double));
 }
@@ -89,12 +89,12 @@ static void test_round_trip_is_exact(void **state)
 			struct incise_model *back;
 
 			paper_disturb(model, seed, 0.4);
-			strcpy(model->name, "pig's liver");
+			strcpy(model->info.name, "pig's liver");
 			assert_int_equal(incise_model_save(model, path, NULL), 0);
 			back = incise_model_load(path, NULL);
 			assert_non_null(back);
 			/* A quote would end the name early: it is replaced. */
-			strcpy(model->name, "pig_s liver");
+			strcpy(model->info.name, "pig_s liver");
 			assert_same(model, back);
 			incise_model_free(model);
 			incise_model_free(back);
@@ -104,27 +104,28 @@ static void test_round_trip_is_exact(void **state)
 /* All that a model holds but its clamp, which is not the file's. */
 static void assert_same_inside(const struct incise_model *a, const struct incise_model *b)
 {
-	assert_int_equal(a->n_inputs, b->n_inputs);
-	assert_int_equal(a->n_rules, b->n_rules);
-	assert_int_equal(a->and_method, b->and_method);
+	assert_int_equal(a->info.n_inputs, b->info.n_inputs);
+	assert_int_equal(a->info.n_rules, b->info.n_rules);
+	assert_int_equal(a->info.and_method, b->info.and_method);
 	assert_int_equal(a->is_grid, b->is_grid);
-	assert_memory_equal(a->n_mfs, b->n_mfs, a->n_inputs * sizeof(*a->n_mfs));
-	assert_memory_equal(a->in_all, b->in_all, a->n_inputs * sizeof(*a->in_all));
-	for (int i = 0; i < a->n_inputs; i++)
-		for (int k = 0; k < a->n_mfs[i]; k++) {
+	assert_memory_equal(a->info.n_mfs, b->info.n_mfs,
+			    a->info.n_inputs * sizeof(*a->info.n_mfs));
+	assert_memory_equal(a->in_all, b->in_all, a->info.n_inputs * sizeof(*a->in_all));
+	for (int i = 0; i < a->info.n_inputs; i++)
+		for (int k = 0; k < a->info.n_mfs[i]; k++) {
 			const struct incise_mf *f = &a->mf[i][k], *g = &b->mf[i][k];
 
 			assert_int_equal(f->type, g->type);
 			assert_memory_equal(f->p, g->p,
 					    incise_mf_n_params(f->type) * sizeof(*f->p));
 		}
-	for (int r = 0; r < a->n_rules; r++) {
+	for (int r = 0; r < a->info.n_rules; r++) {
 		const struct incise_rule *f = &a->rule[r], *g = &b->rule[r];
 
-		assert_memory_equal(f->mf, g->mf, a->n_inputs);
+		assert_memory_equal(f->mf, g->mf, a->info.n_inputs);
 		assert_int_equal(a->constant[r], b->constant[r]);
 		assert_memory_equal(&f->weight, &g->weight, sizeof(f->weight));
-		assert_memory_equal(f->p, g->p, (a->n_inputs + 1) * sizeof(*f->p));
+		assert_memory_equal(f->p, g->p, (a->info.n_inputs + 1) * sizeof(*f->p));
 	}
 }
 
@@ -222,7 +223,7 @@ static void test_matlab_file(void **state)
 	put(matlab, strlen(matlab));
 	model = incise_model_load(path, NULL);
 	assert_non_null(model);
-	assert_string_equal(incise_model_name(model), "tipper");
+	assert_string_equal(incise_model_info(model)->name, "tipper");
 	assert_true(fabs(incise_model_eval(model, x, NULL) - want) < 1e-14);
 	/* A second generation says the same. */
 	assert_int_equal(incise_model_save(model, path, NULL), 0);
@@ -257,7 +258,7 @@ static void test_every_kind(void **state)
 	model = incise_model_load(path, NULL);
 	assert_non_null(model);
 	assert_true(fabs(incise_model_eval(model, x, NULL) - want) < 1e-14);
-	assert_int_equal(incise_model_and_method(model), INCISE_AND_MIN);
+	assert_int_equal(incise_model_info(model)->and_method, INCISE_AND_MIN);
 	assert_true(incise_model_rule(model, 1)->weight == 0.25);
 	assert_true(incise_model_rule(model, 2)->weight == 0);
 	assert_int_equal(incise_model_rule(model, 3)->mf[1], -1);

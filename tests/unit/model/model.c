@@ -19,13 +19,14 @@
 /* Eq. (1)–(3) as printed, with σ = √2 s. */
 static long double plain(const struct incise_model *model, const double *x)
 {
+	const struct incise_model_info *info = incise_model_info(model);
 	long double sum = 0, weights = 0;
 
-	for (int r = 0; r < incise_model_n_rules(model); r++) {
+	for (int r = 0; r < info->n_rules; r++) {
 		const double *p = incise_model_rule(model, r)->p;
 		long double w = 1, y = p[0];
 
-		for (int i = 0; i < incise_model_n_inputs(model); i++) {
+		for (int i = 0; i < info->n_inputs; i++) {
 			const struct incise_mf *mf = incise_model_mf(
 				model, i, incise_model_rule(model, r)->mf[i]);
 
@@ -81,13 +82,13 @@ static void test_against_formulas(void **state)
 	for (size_t c = 0; c < sizeof(cases) / sizeof(*cases); c++)
 		for (int n = 0; n < cases[c].rounds; n++) {
 			any_model(model, &seed, cases[c].n_inputs, cases[c].n_rules, 1);
-			min += model->and_method == INCISE_AND_MIN;
+			min += model->info.and_method == INCISE_AND_MIN;
 			for (int k = 0; k < 20; k++) {
 				long double w[INCISE_MODEL_RULES_MAX], largest;
 				double x[INCISE_MODEL_INPUTS_MAX], y;
 				unsigned int flags;
 
-				for (int i = 0; i < model->n_inputs; i++)
+				for (int i = 0; i < model->info.n_inputs; i++)
 					x[i] = 10 * paper_random(&seed);
 				y = incise_model_eval(model, x, &flags);
 				largest = any_strengths(model, x, w);
@@ -120,19 +121,19 @@ static void any_grid(struct incise_model *model, uint64_t *seed)
 
 	do {
 		any_model(model, seed, 1 + any_below(seed, 4), 1, 1);
-		model->n_rules = 1;
-		for (int i = 0; i < model->n_inputs; i++)
-			model->n_rules *= model->n_mfs[i];
-	} while (model->n_rules > INCISE_MODEL_RULES_MAX);
-	model->and_method = INCISE_AND_PROD;
-	for (int r = 0; r < model->n_rules; r++) {
+		model->info.n_rules = 1;
+		for (int i = 0; i < model->info.n_inputs; i++)
+			model->info.n_rules *= model->info.n_mfs[i];
+	} while (model->info.n_rules > INCISE_MODEL_RULES_MAX);
+	model->info.and_method = INCISE_AND_PROD;
+	for (int r = 0; r < model->info.n_rules; r++) {
 		rest = r;
 		model->rule[r].weight = 1;
-		for (int i = 0; i < model->n_inputs; i++) {
-			model->rule[r].mf[i] = rest % model->n_mfs[i];
-			rest /= model->n_mfs[i];
+		for (int i = 0; i < model->info.n_inputs; i++) {
+			model->rule[r].mf[i] = rest % model->info.n_mfs[i];
+			rest /= model->info.n_mfs[i];
 		}
-		for (int i = 0; i <= model->n_inputs; i++)
+		for (int i = 0; i <= model->info.n_inputs; i++)
 			model->rule[r].p[i] = paper_random(seed);
 	}
 	incise_model_classify(model);
@@ -156,25 +157,26 @@ static void test_grids_go_a_way_of_their_own(void **state)
 			double x[INCISE_MODEL_INPUTS_MAX], sum = 0, y = 0, size = 0;
 			bool fires;
 
-			for (int i = 0; i < model->n_inputs; i++)
+			for (int i = 0; i < model->info.n_inputs; i++)
 				x[i] = paper_random(&seed) *
 				       (k < 15 ? 10 : any_width(&seed, 300));
 			fires = incise_model_firing_grid(model, x, w[0]);
 			assert_int_equal(incise_model_firing_rules(model, x, w[1]),
 					 fires);
 			fired += fires;
-			for (int r = 0; r < model->n_rules; r++)
+			for (int r = 0; r < model->info.n_rules; r++)
 				sum += fabs(w[0][r] - w[1][r]);
 			apart = fmax(apart, sum);
 			/* The public ones take the first of them. */
 			incise_model_firing(model, x, w[1]);
-			assert_memory_equal(w[0], w[1], model->n_rules * sizeof(**w));
+			assert_memory_equal(w[0], w[1],
+					    model->info.n_rules * sizeof(**w));
 			if (k >= 15)
 				continue;
-			for (int r = 0; r < model->n_rules; r++) {
+			for (int r = 0; r < model->info.n_rules; r++) {
 				double yr = model->rule[r].p[0];
 
-				for (int i = 0; i < model->n_inputs; i++)
+				for (int i = 0; i < model->info.n_inputs; i++)
 					yr += model->rule[r].p[i + 1] * x[i];
 				y += w[0][r] * yr;
 				size = fmax(size, fabs(yr));
@@ -213,10 +215,10 @@ static void test_grids_are_told_from_lists(void **state)
 			model->rule[19].weight = 0.5;
 			break;
 		case MIN:
-			model->and_method = INCISE_AND_MIN;
+			model->info.and_method = INCISE_AND_MIN;
 			break;
 		case FEWER:
-			model->n_rules--;
+			model->info.n_rules--;
 			break;
 		}
 		incise_model_classify(model);
@@ -320,7 +322,7 @@ static void test_nearest_rule_of_triangles(void **state)
 		if (way) {
 			model->rule[4] = model->rule[0];
 			model->rule[4].weight = 0;
-			model->n_rules = 5;
+			model->info.n_rules = 5;
 			incise_model_classify(model);
 		}
 		assert_int_equal(model->is_grid, !way);
@@ -380,10 +382,10 @@ static void test_nearest_rule_by_min(void **state)
 	incise_model_classify(model);
 	incise_model_firing(model, (double[]){4, 3}, w);
 	assert_true(w[3] == 1);
-	model->n_rules = 3;
+	model->info.n_rules = 3;
 	/* Without far narrow: by sums 2.5, 1.5, 2.2, by the largest 1.5, 1, 1.5. */
 	for (int min = 0; min < 2; min++) {
-		model->and_method = min ? INCISE_AND_MIN : INCISE_AND_PROD;
+		model->info.and_method = min ? INCISE_AND_MIN : INCISE_AND_PROD;
 		incise_model_classify(model);
 		incise_model_firing(model, (double[]){4, 3}, w);
 		assert_true(w[1] == 1);
@@ -398,7 +400,7 @@ static void test_nearest_rule_by_min(void **state)
 	model->mf[1][0] = (struct incise_mf){INCISE_MF_TRI, "c", {-2, -1, 0}};
 	model->mf[1][1] = (struct incise_mf){INCISE_MF_TRI, "d", {5, 6, 7}};
 	for (int min = 0; min < 2; min++) {
-		model->and_method = min ? INCISE_AND_MIN : INCISE_AND_PROD;
+		model->info.and_method = min ? INCISE_AND_MIN : INCISE_AND_PROD;
 		incise_model_classify(model);
 		incise_model_firing(model, (double[]){3, 2}, w);
 		assert_true(w[min ? 2 : 1] == 1);
@@ -416,23 +418,23 @@ static void test_min_and_weights_by_hand(void **state)
 	model->rule[2] = model->rule[0];
 	model->rule[2].mf[1] = -1; /* near alone */
 	model->rule[3].weight = 0;
-	model->and_method = INCISE_AND_MIN;
+	model->info.and_method = INCISE_AND_MIN;
 	incise_model_classify(model);
 	/* near 0.5, wide exp(-1/50) = 0.98, narrow 0.6 */
 	incise_model_firing(model, (double[]){0.5, 4.6}, w);
 	assert_true(fabs(w[0] - 0.4) < 1e-15 && fabs(w[1] - 0.2) < 1e-15);
 	assert_true(fabs(w[2] - 0.4) < 1e-15 && w[3] == 0);
-	assert_int_equal(incise_model_and_method(model), INCISE_AND_MIN);
+	assert_int_equal(incise_model_info(model)->and_method, INCISE_AND_MIN);
 	assert_true(incise_model_rule(model, 1)->weight == 0.5);
 	assert_true(incise_model_rule(model, 3)->weight == 0);
 	/* As prod: 0.5 e^-1/50, 0.15, 0.5 */
-	model->and_method = INCISE_AND_PROD;
+	model->info.and_method = INCISE_AND_PROD;
 	incise_model_classify(model);
 	incise_model_firing(model, (double[]){0.5, 4.6}, w);
 	assert_true(fabs(w[0] - 0.5 * exp(-0.02) / (0.65 + 0.5 * exp(-0.02))) < 1e-15);
 	assert_true(fabs(w[1] - 0.15 / (0.65 + 0.5 * exp(-0.02))) < 1e-15);
 	/* A rule of weight 0 does not even stand in where it is the only one to fire. */
-	model->n_rules = 4;
+	model->info.n_rules = 4;
 	incise_model_firing(model, (double[]){11, 5}, w);
 	assert_true(w[3] == 0 && fabs(w[0] + w[1] + w[2] - 1) < 1e-15);
 	incise_model_free(model);
@@ -469,17 +471,17 @@ static void test_nothing_yields_nan(void **state)
 
 		any_model(model, &seed, 1 + any_below(&seed, 8), 1 + any_below(&seed, 12),
 			  12);
-		for (int i = 0; i < model->n_inputs; i++) {
+		for (int i = 0; i < model->info.n_inputs; i++) {
 			x[i] = any_input(&seed);
 			if (!(fabs(x[i]) <= 10))
 				outside = INCISE_MODEL_EXTRAPOLATED;
-			for (int k = 0; k < model->n_mfs[i]; k++)
+			for (int k = 0; k < model->info.n_mfs[i]; k++)
 				steep |= model->mf[i][k].type == INCISE_MF_GBELL &&
 					 model->mf[i][k].p[1] > 100;
 		}
 		assert_true(isfinite(incise_model_eval(model, x, &flags)));
 		incise_model_firing(model, x, w);
-		for (int r = 0; r < model->n_rules; r++) {
+		for (int r = 0; r < model->info.n_rules; r++) {
 			assert_true(w[r] >= 0 && w[r] <= 1);
 			sum += w[r];
 		}
@@ -489,7 +491,7 @@ static void test_nothing_yields_nan(void **state)
 		/* Such bells make anything of the rounding of (x-c)/a. */
 		if (steep)
 			continue;
-		for (int i = 0; i < model->n_inputs; i++)
+		for (int i = 0; i < model->info.n_inputs; i++)
 			x[i] = isnan(x[i]) ? 0 : fmax(-DBL_MAX, fmin(DBL_MAX, x[i]));
 		largest = any_strengths(model, x, want);
 		nowhere += largest == 0;
@@ -501,9 +503,9 @@ static void test_nothing_yields_nan(void **state)
 			continue;
 		compared++;
 		compared_far += largest < 1e-330L;
-		for (int r = 0; r < model->n_rules; r++)
+		for (int r = 0; r < model->info.n_rules; r++)
 			total += want[r];
-		for (int r = 0; r < model->n_rules; r++)
+		for (int r = 0; r < model->info.n_rules; r++)
 			/*
 			 * Strengths are logs down to -11000, off by some ulp (bells: by
 			 * their slope), and so are weights: 11000 · 100 · 2e-16.
@@ -548,7 +550,7 @@ static void test_grid_shape(void **state)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 
-	assert_int_equal(incise_model_n_rules(model), 20);
+	assert_int_equal(incise_model_info(model)->n_rules, 20);
 	/* MATLAB's order: the last input's functions follow each other fastest. */
 	assert_int_equal(incise_model_rule(model, 1)->mf[0], 0);
 	assert_int_equal(incise_model_rule(model, 1)->mf[1], 1);

@@ -140,7 +140,7 @@ static void test_refusals(void **state)
 	refused(square(2, 2, 1e-4), ERANGE, "0.001");
 	refused(paper_model(INCISE_MF_GBELL, 1, 1), ENOTSUP, "in1mf1 is a gbellmf");
 	model = square(2, 2, 1);
-	model->and_method = INCISE_AND_MIN;
+	model->info.and_method = INCISE_AND_MIN;
 	refused(model, ENOTSUP, "AndMethod is min");
 	model = square(1, 2, 1);
 	incise_model_set_mf(model, 0, 1, (double[4]){1e-12, 0.5});

@@ -37,7 +37,7 @@ static inline struct incise_model *paper_model(enum incise_mf_type type, uint64_
 static inline void paper_disturb(struct incise_model *model, uint64_t seed, double share)
 {
 	for (int i = 0; i < 2; i++)
-		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+		for (int k = 0; k < incise_model_info(model)->n_mfs[i]; k++) {
 			const struct incise_mf *mf = incise_model_mf(model, i, k);
 			int c = mf->type == INCISE_MF_GBELL ? 2 : 1;
 			double p[4] = {mf->p[0], mf->p[1], mf->p[2], mf->p[3]};

@@ -21,10 +21,11 @@
 /* Central differences of 1e-5 of the range: off by some 1e-9 of the slope. */
 static double difference(const struct incise_model *model, const double *x, int i)
 {
-	const struct incise_variable *v = incise_model_input(model, i);
+	const struct incise_model_info *info = incise_model_info(model);
+	const struct incise_variable *v = &info->input[i];
 	double h = (v->max - v->min) * 1e-5, lo[2], hi[2];
 
-	for (int k = 0; k < incise_model_n_inputs(model); k++)
+	for (int k = 0; k < info->n_inputs; k++)
 		lo[k] = hi[k] = x[k];
 	lo[i] = fmax(v->min, x[i] - h);
 	hi[i] = fmin(v->max, x[i] + h);
@@ -34,7 +35,8 @@ static double difference(const struct incise_model *model, const double *x, int 
 
 static void look(const struct incise_model *model, struct incise_slope *found)
 {
-	int n = incise_model_n_inputs(model);
+	const struct incise_model_info *info = incise_model_info(model);
+	int n = info->n_inputs;
 
 	for (int i = 0; i < n; i++)
 		found[i] = (struct incise_slope){INFINITY, -INFINITY, false};
@@ -43,7 +45,7 @@ static void look(const struct incise_model *model, struct incise_slope *found)
 		double x[2];
 
 		for (int i = 0; i < n; i++) {
-			const struct incise_variable *v = incise_model_input(model, i);
+			const struct incise_variable *v = &info->input[i];
 
 			x[i] = v->min + (v->max - v->min) * at[i] / (DENSE - 1);
 		}
@@ -90,7 +92,7 @@ static void test_certified(void **state)
 			paper_disturb(model, seed, 0.6);
 		assert_int_equal(incise_model_slopes(model, slopes), 0);
 		look(model, found);
-		for (int i = 0; i < incise_model_n_inputs(model); i++) {
+		for (int i = 0; i < incise_model_info(model)->n_inputs; i++) {
 			assert_true(slopes[i].certified);
 			assert_encloses(&slopes[i], &found[i], TIGHT);
 		}

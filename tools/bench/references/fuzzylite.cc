@@ -27,13 +27,13 @@ std::string name(const char *kind, int i, int k = 0)
 
 void add_inputs(engine &e, const incise_model *model)
 {
-	for (int i = 0; i < incise_model_n_inputs(model); i++) {
-		const incise_variable *v = incise_model_input(model, i);
+	for (int i = 0; i < incise_model_info(model)->n_inputs; i++) {
+		const incise_variable *v = &incise_model_info(model)->input[i];
 		auto input = new fl::InputVariable(name("x", i), v->min, v->max);
 
 		e.engine.addInputVariable(input);
 		e.inputs.push_back(input);
-		for (int k = 0; k < incise_model_n_mfs(model, i); k++) {
+		for (int k = 0; k < incise_model_info(model)->n_mfs[i]; k++) {
 			const incise_mf *mf = incise_model_mf(model, i, k);
 
 			if (mf->type != INCISE_MF_GAUSS)
@@ -47,8 +47,8 @@ void add_inputs(engine &e, const incise_model *model)
 
 void add_rules(engine &e, const incise_model *model)
 {
-	const incise_variable *v = incise_model_output(model);
-	int n = incise_model_n_inputs(model);
+	const incise_variable *v = &incise_model_info(model)->output;
+	int n = incise_model_info(model)->n_inputs;
 	auto block = new fl::RuleBlock("rules");
 
 	e.output = new fl::OutputVariable("y", v->min, v->max);
@@ -59,7 +59,7 @@ void add_rules(engine &e, const incise_model *model)
 	block->setConjunction(new fl::AlgebraicProduct);
 	block->setImplication(new fl::AlgebraicProduct);
 	block->setActivation(new fl::General);
-	for (int r = 0; r < incise_model_n_rules(model); r++) {
+	for (int r = 0; r < incise_model_info(model)->n_rules; r++) {
 		const double *p = incise_model_rule(model, r)->p;
 		/* The constant comes last. */
 		std::vector<fl::scalar> coefficients(p + 1, p + n + 1);
