@@ -12,7 +12,6 @@
 #include "bench/bench_loop.h"
 #include "bench/bench_pose.h"
 #include "bench/bench_scenes.h"
-#include "bench/bench_stability.h"
 #include "bench/bench_timeline.h"
 #include "bench/bench_vision.h"
 #include "bench/compare.h"
@@ -51,11 +50,6 @@ static const struct cli_option options[] = {
 };
 
 /* --- not declared yet --- */
-
-static void stability(struct bench_run *run)
-{
-	bench_stability(run->json, run->quick, run->plot);
-}
 
 static void loop(struct bench_run *run)
 {
@@ -111,12 +105,6 @@ static void extremes(struct bench_run *run)
 static const struct bench_plot some_plot[] = {{0}};
 
 static const struct bench
-	old_stability =
-		{.name = "stability",
-		 .summary = "how stiff a virtual wall may be, simulated and computed;\n"
-			    "the guard of passivity; integrators of a stiff spring",
-		 .plots = some_plot,
-		 .all = stability},
 	old_loop = {.name = "loop",
 		    .operands = "[SCENE]",
 		    .summary =
@@ -164,8 +152,8 @@ static const struct bench
 		.all = extremes};
 
 static const struct bench *const benches[] = {
-	&bench_precision, &bench_training, &old_stability, &old_loop,	&old_pose,
-	&old_timeline,	  &old_vision,	   &old_capture,   &old_scenes, &old_extremes,
+	&bench_precision, &bench_training, &bench_stability, &old_loop,	  &old_pose,
+	&old_timeline,	  &old_vision,	   &old_capture,     &old_scenes, &old_extremes,
 };
 #define BENCHES (int)(sizeof(benches) / sizeof(*benches))
 

@@ -82,6 +82,8 @@ static json_t *json_of(const struct bench_column *c, const void *row)
 	case BENCH_BOOL:
 		return json_boolean(number_of(c, row) != 0);
 	case BENCH_NUMBER:
+		if (c->whole && number_of(c, row) == round(number_of(c, row)))
+			return json_integer((json_int_t)number_of(c, row));
 		return json_number(number_of(c, row));
 	default:
 		if (c->scale != 0 || isnan(number_of(c, row)))
@@ -160,12 +162,21 @@ static void print_cell(const struct bench_column *c, const void *row)
 		printf(c->format, value);
 }
 
+/* Nothing ends a line behind the last heading that is not empty. */
 static void print_headings(const struct bench_column *columns)
 {
-	for (const struct bench_column *c = columns; c->key || c->heading; c++)
-		if (c->heading)
-			printf("%s%*s", c == columns ? "" : " ", width_of(c->format),
-			       c->heading);
+	int blank = 0;
+
+	for (const struct bench_column *c = columns; c->key || c->heading; c++) {
+		if (!c->heading)
+			continue;
+		if (c != columns && !*c->heading) {
+			blank += 1 + abs(width_of(c->format));
+			continue;
+		}
+		printf("%*s%*s", blank, "", width_of(c->format), c->heading);
+		blank = 1;
+	}
 	putchar('\n');
 }
 
@@ -209,7 +220,7 @@ void bench_lines(const struct bench_run *run, const struct bench_table *table,
 void bench_block(const struct bench_run *run, const struct bench_block *block,
 		 size_t row_bytes, const void *rows, int n, int n_across, int usual)
 {
-	const char *row = rows;
+	const char *row = rows, *between = block->between ? block->between : "";
 
 	if (run->json)
 		return;
@@ -218,7 +229,7 @@ void bench_block(const struct bench_run *run, const struct bench_block *block,
 		putchar(' ');
 		print_cell(&block->across, row + (size_t)k * n * row_bytes);
 	}
-	printf("%s", block->between);
+	fputs(between, stdout);
 	for (const struct bench_column *c = block->columns; c->heading; c++)
 		printf(" %*s", width_of(c->format), c->heading);
 	putchar('\n');
@@ -226,7 +237,7 @@ void bench_block(const struct bench_run *run, const struct bench_block *block,
 		print_cell(&block->line, row);
 		for (int k = 0; k < n_across; k++) {
 			const char *cell = row + (size_t)k * n * row_bytes;
-			const char *failed = cell + block->failed;
+			const char *failed = block->failed ? cell + block->failed : "";
 
 			putchar(' ');
 			if (*failed && !block->mark)
@@ -237,7 +248,7 @@ void bench_block(const struct bench_run *run, const struct bench_block *block,
 				putchar(*failed ? '*' : ' ');
 		}
 		if (block->columns->heading)
-			printf("%*s", (int)strlen(block->between), "");
+			printf("%*s", (int)strlen(between), "");
 		for (const struct bench_column *c = block->columns; c->heading; c++) {
 			putchar(' ');
 			print_cell(c, row + (size_t)usual * n * row_bytes);
@@ -271,6 +282,11 @@ static void set(json_t *object, const char *path, json_t *value)
 void bench_value(struct bench_run *run, const char *key, json_t *value)
 {
 	set(run->report, key, value);
+}
+
+void bench_scalar(struct bench_run *run, const char *key, json_t *value)
+{
+	json_object_set_new(run->scalars, key, value);
 }
 
 static json_t *row_json(const struct bench_table *table, const void *row)
@@ -545,6 +561,7 @@ static void draw(const struct bench_run *run, const struct bench_plot *plot)
 	fputs("set datafile columnheaders separator tab\n", script);
 	write_scalars(script, run->machine);
 	write_scalars(script, run->report);
+	write_scalars(script, run->scalars);
 	write_variables(script, "data", file[0], &plot->data, rows);
 	if (more)
 		write_variables(script, "more", file[1], &plot->more, more);
@@ -581,6 +598,7 @@ void bench_measure(struct bench_run *run)
 	machine_init(&machine);
 	run->machine = machine_json(&machine);
 	run->metrics = json_array();
+	run->scalars = json_object();
 	run->report = json_pack("{sO sb}", "machine", run->machine, "quick", run->quick);
 	run->bench->run(run);
 	cli_progress_end();

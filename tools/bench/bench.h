@@ -40,6 +40,7 @@ struct bench_column {
 	double scale;	     /* of the number; 0: 1 */
 	double text_scale;   /* in the text on top of that; 0: 1 */
 	bool optional;	     /* 0 is none */
+	bool whole;	     /* in the JSON a whole number is an integer */
 	bool data; /* neither in the text nor in the JSON: for plots and metrics */
 };
 
@@ -107,7 +108,7 @@ struct bench_data {
  *                      keys for "using"
  *   data_blocks        names of all blocks, as a list of words; more_blocks
  *   data_KEY           values of each key of the blocks, as a list of words; more_KEY
- *   NAME               each scalar of bench_value(); cpu and kernel
+ *   NAME               each scalar of bench_value() and bench_scalar(); cpu and kernel
  */
 struct bench_plot {
 	const char *suffix; /* the plot is NAME-suffix; NULL: NAME */
@@ -118,7 +119,8 @@ struct bench_plot {
 	struct bench_data data, more;
 };
 
-extern const char text_precision_gp[], text_training_gp[];
+extern const char text_precision_gp[], text_stability_guard_gp[],
+	text_stability_integrators_gp[], text_stability_map_gp[], text_training_gp[];
 
 struct bench_run;
 
@@ -132,7 +134,7 @@ struct bench {
 	void (*all)(struct bench_run *run); /* of a benchmark that is not declared yet */
 };
 
-extern const struct bench bench_precision, bench_training;
+extern const struct bench bench_precision, bench_stability, bench_training;
 
 /* --- a run --- */
 
@@ -147,7 +149,7 @@ struct bench_run {
 	char **operands;
 	int n_operands;
 
-	json_t *machine, *report, *metrics;
+	json_t *machine, *report, *metrics, *scalars;
 	char failed[600];
 	const char *folder, *name; /* of plots */
 	struct bench_rows {
@@ -170,6 +172,9 @@ const char *bench_machine(const struct bench_run *run, const char *key);
 
 /* A member of the JSON; takes the value. */
 void bench_value(struct bench_run *run, const char *key, json_t *value);
+
+/* A scalar for the plots alone. */
+void bench_scalar(struct bench_run *run, const char *key, json_t *value);
 
 /* printf() of the text; nothing with --json. */
 void bench_text(const struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3);

@@ -1,210 +1,728 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * How stiff a virtual wall may be; see bench_stability.h.
+ * incise bench stability: how stiff a virtual wall may be, simulated in time next to what
+ * theory says; the guard of passivity; integrators of a stiff spring. The device is light, in
+ * a loop of 1 kHz.
  */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include "bench_energy.h"
-#include "bench_guard.h"
-#include "bench_integrators.h"
-#include "bench_limits.h"
-#include "bench_stability.h"
+#include <string.h>
+#include "../../lib/control/plant.h"
+#include "../../lib/control/stability.h"
 #include "../cli/cli.h"
-#include "metrics.h"
-#include "../cli/json.h"
-#include "machine.h"
-#include "../cli/plot.h"
-#include "stability_picture.h"
+#include "stability.h"
 
-/* Simulation beside theory: what is measured, how near it shall come, and why not nearer. */
-static const struct {
-	void (*measure)(struct ratios *ratios, bool quick);
-	struct ratios empty;
-} experiments[] = {
-	{bench_exact_limit,
-	 {.key = "exact_limit",
-	  .title =
-		  "largest stable stiffness of a wall alone on the device, K T^2/m: simulated in "
-		  "time against the eigenvalues",
-	  .params = {"bT_m", "BT_m", "delay"},
-	  .simulated = "sim_KT2_m",
-	  .theory = "theory_KT2_m",
-	  .tolerance = 0.01}},
-	{bench_colgate,
-	 {.key = "colgate",
-	  .title =
-		  "in the worst of passive hands, a mass and a spring that swing at some angle "
-		  "per tick: against Colgate and Schenkel",
-	  .params = {"bT_m", "BT_m", "delay", "angle"},
-	  .simulated = "sim_KT2_m",
-	  .theory = "theory_KT2_m",
-	  .tolerance = 0.01,
-	  .note = "at least: a damper in the wall needs a hand with many modes to reach the "
-		  "bound, one does not"}},
-	{bench_gil,
-	 {.key = "gil",
-	  .title = "little damping: against the linear law of Gil and Hulin",
-	  .params = {"bT_m", "BT_m", "delay"},
-	  .simulated = "sim_KT2_m",
-	  .theory = "theory_KT2_m",
-	  .tolerance = 0.02,
-	  .note = "the law is the limit for b T/m to 0: it leaves out the next term"}},
-	{bench_amplitude,
-	 {.key = "amplitude",
-	  .title =
-		  "amplitude from which on Coulomb friction does not end an oscillation, mm: "
-		  "against the describing function",
-	  .params = {"omega_T", "viscous_part"},
-	  .simulated = "sim_mm",
-	  .theory = "theory_mm",
-	  .tolerance = 0.03}},
-	{bench_quantisation,
-	 {.key = "quantisation",
-	  .title =
-		  "stiffness from which on a hand that shakes across an encoder's steps gets "
-		  "energy, N/mm: against Abbott and Okamura",
-	  .params = {"b_N_s_mm", "coulomb_N", "encoder_mm", "worst_way_mm"},
-	  .simulated = "sim_N_mm",
-	  .theory = "theory_N_mm",
-	  .tolerance = 0.01}},
-	{bench_leak,
-	 {.key = "leak",
-	  .title = "energy of a press to a depth and back, N mm: against K T u X",
-	  .params = {"K_N_mm", "speed_mm_s", "depth_mm"},
-	  .simulated = "sim_N_mm",
-	  .theory = "theory_N_mm",
-	  .tolerance = 0.03}},
-	{bench_break_even,
-	 {.key = "break_even",
-	  .title = "damping that takes what a bounce makes, N s/mm: against K T/2",
-	  .params = {"omega_T", "K_N_mm"},
-	  .simulated = "sim_N_s_mm",
-	  .theory = "theory_N_s_mm",
-	  .tolerance = 0.03,
-	  .note = "less by a third of omega T: the first part of a period in the wall has no "
-		  "force yet"}},
-};
-#define EXPERIMENTS (sizeof(experiments) / sizeof(*experiments))
+/* --- a row of a simulation next to theory --- */
 
-struct stability {
-	struct ratios ratios[EXPERIMENTS];
-	struct guard_bench guard;
-	struct integrator_bench integrators;
-	struct machine machine;
+#define PARAMS 4
+#define RATIOS_MAX 160
+
+struct ratio {
+	double param[PARAMS];
+	double simulated, theory; /* theory: the expected value, or the least allowed */
+	bool at_least;
+
+	double ratio; /* 1 where both find that there is none */
+	bool ok;
+	const char *verdict;
 };
 
-static void measure(struct stability *s, bool quick)
+struct ratios {
+	const struct experiment *experiment;
+	struct ratio row[RATIOS_MAX];
+	int n;
+	struct bench_table table;
+};
+
+static void add(struct ratios *ratios, struct ratio row);
+
+/* Whether a motion grows at a stiffness or amplitude. */
+typedef bool (*grows_fn)(const void *context, double value);
+
+/* The value from which on it grows, found by climbing from a small one and then halving the
+ * interval; 0 where that one already grows. */
+static double threshold(grows_fn grows, const void *context, double low, double most,
+			double precision)
 {
-	machine_init(&s->machine);
-	for (size_t i = 0; i < EXPERIMENTS; i++) {
-		s->ratios[i] = experiments[i].empty;
-		cli_progress("%s", s->ratios[i].key);
-		experiments[i].measure(&s->ratios[i], quick);
+	double high = 2 * low;
+
+	if (grows(context, low))
+		return 0;
+	for (; !grows(context, high); high *= 2) {
+		if (high > most)
+			return INFINITY;
+		low = high;
 	}
-	bench_guard(&s->guard, quick);
-	bench_integrators(&s->integrators, quick);
-	cli_progress_end();
+	while (high > low * (1 + precision)) {
+		double middle = sqrt(low * high);
+
+		if (grows(context, middle))
+			high = middle;
+		else
+			low = middle;
+	}
+	return sqrt(low * high);
 }
 
-static void print_text(const struct stability *s, bool quick)
+/* --- a sampled wall in time, in which no eigenvalue is computed ---
+ *
+ *   x_k ──▶ -K x_k - B (x_k - x_{k-1})/T ──▶ delay ticks ──▶ held for T ──▶ plant
+ */
+
+#define UNIT_N_s_mm (DEVICE / PERIOD_S)	   /* m/T */
+#define UNIT_N_mm (UNIT_N_s_mm / PERIOD_S) /* m/T² */
+#define WALL_DELAY_MAX 64
+
+struct sampled_wall {
+	struct incise_plant
+		plant;	       /* device and what it is tied to; no Coulomb friction */
+	double damping_N_s_mm; /* of the wall, B */
+	int delay;
+};
+
+/* A run: some time for what fades at once, then two windows apart.
+ *
+ *   0      skip       window              gap              window
+ *   ├────────────┼──╱‾‾‾‾‾‾‾╲──┼──────────────────────┼──╱‾‾‾‾‾‾‾╲──┤
+ */
+struct run {
+	int skip, window, gap;
+	double omega; /* angular frequency that the wall gives: x² + (v/ω)² is amplitude² */
+};
+
+static struct run plan(const struct sampled_wall *wall, double K_N_mm)
 {
-	printf("%s; %s; %s%s\n\n", s->machine.cpu, s->machine.kernel, s->machine.compiler,
-	       quick ? "\nquick: a part of the grids" : "");
-	for (size_t i = 0; i < EXPERIMENTS; i++)
-		ratios_print(&s->ratios[i]);
-	guard_bench_print(&s->guard);
-	integrator_bench_print(&s->integrators);
+	double m = wall->plant.mass_kg * N_S2_PER_MM_KG, T = PERIOD_S;
+	double delta = wall->plant.damping_N_s_mm * T / m;
+	struct run run = {.omega = sqrt((K_N_mm + wall->plant.wall_N_mm) / m)};
+
+	/* Some twelve swings, so that it does not matter where one begins. */
+	run.window = fmax(400, fmin(10000, 12 * 2 * M_PI / (run.omega * T)));
+	run.skip = run.window + 20 * wall->delay;
+	/* A stiffness that is off by 1e-3 changes the growth by δ/2 × 1e-3 per tick. */
+	run.gap = fmax(3000, fmin(20000, 20 / delta));
+	return run;
 }
 
-/* How far the worst ratio of each experiment is off, and how many were tried. */
-static json_t *figures_of(const struct stability *s)
+static bool wall_grows(const void *context, double K_N_mm)
 {
-	json_t *figures = json_array();
+	const struct sampled_wall *wall = context;
+	struct run run = plan(wall, K_N_mm);
+	struct incise_plant plant = wall->plant;
+	double past[WALL_DELAY_MAX + 2], sum[2] = {0}, T = PERIOD_S;
+	int size = wall->delay + 2, late = run.skip + run.window + run.gap;
 
-	for (size_t i = 0; i < EXPERIMENTS; i++) {
-		const struct ratios *r = &s->ratios[i];
-		double worst = 0;
+	/* Both a displacement and a push, so that no mode is left out. */
+	plant.position_mm = 1;
+	plant.velocity_mm_s = 0.3 * run.omega;
+	for (int i = 0; i < size; i++)
+		past[i] = plant.position_mm;
+	for (int k = 0; k < late + run.window; k++) {
+		double x = plant.position_mm, v = plant.velocity_mm_s / run.omega;
+		double norm = x * x + v * v, seen, before;
+		int since = k < late ? k - run.skip : k - late;
 
-		for (int k = 0; k < r->n; k++) {
-			double off = ratios_value(&r->row[k]) - 1;
+		if (norm > 1e24)
+			return true;
+		if (norm < 1e-24)
+			return false;
+		if (since >= 0 && since < run.window) {
+			double weight = sin(M_PI * since / run.window);
 
-			/* Where theory is a lower bound more is not wrong. */
-			worst = fmax(worst, r->row[k].at_least ? -off : fabs(off));
+			sum[k >= late] += weight * weight * norm;
 		}
-		metrics_exact(figures, worst, "1", "%s worst ratio off", r->key);
-		metrics_more_is_better(
-			metrics_exact(figures, r->n, "1", "%s tried", r->key));
+		past[k % size] = x;
+		seen = past[(k + size - wall->delay) % size];
+		before = past[(k + size - wall->delay - 1) % size];
+		incise_plant_step(
+			&plant,
+			-K_N_mm * seen - wall->damping_N_s_mm * (seen - before) / T, T);
 	}
-	guard_bench_figures(&s->guard, figures);
-	integrator_bench_figures(&s->integrators, figures);
-	return figures;
+	return sum[1] > sum[0];
 }
 
-static void print_json(const struct stability *s, bool quick)
+static double wall_limit(const struct sampled_wall *wall)
 {
-	json_t *all = json_object();
+	double unit = wall->plant.mass_kg * N_S2_PER_MM_KG / (PERIOD_S * PERIOD_S);
 
-	for (size_t i = 0; i < EXPERIMENTS; i++)
-		json_object_set_new(all, s->ratios[i].key, ratios_json(&s->ratios[i]));
-	json_object_set_new(all, "guard", guard_bench_json(&s->guard));
-	json_object_set_new(all, "integrators", integrator_bench_json(&s->integrators));
-	json_object_set_new(all, "quick", json_boolean(quick));
-	json_object_set_new(all, "machine", machine_json(&s->machine));
-	json_object_set_new(all, "figures", figures_of(s));
-	json_print(all);
+	return threshold(wall_grows, wall, 2e-5 * unit, 1e6 * unit, 1e-4);
+}
+
+static struct incise_haptic_device device(double bT_m, int delay)
+{
+	return (struct incise_haptic_device){.mass_kg = DEVICE_KG,
+					     .damping_N_s_mm = bT_m * UNIT_N_s_mm,
+					     .period_s = PERIOD_S,
+					     .delay_ticks = delay};
+}
+
+static struct sampled_wall wall(double bT_m, double BT_m, int delay)
+{
+	return (struct sampled_wall){.plant = {.mass_kg = DEVICE_KG,
+					       .damping_N_s_mm = bT_m * UNIT_N_s_mm},
+				     .damping_N_s_mm = BT_m * UNIT_N_s_mm,
+				     .delay = delay};
+}
+
+struct grid {
+	double damping[8], wall[4];
+	int delay[4];
+	int n_dampings, n_walls, n_delays;
+};
+
+/* A wall alone on the device, over damping and delay. */
+static void sweep(struct ratios *ratios, const struct grid *grid,
+		  double (*theory)(const struct incise_haptic_device *, double))
+{
+	for (int d = 0; d < grid->n_delays; d++)
+		for (int w = 0; w < grid->n_walls; w++)
+			for (int b = 0; b < grid->n_dampings; b++) {
+				double bT_m = grid->damping[b], BT_m = grid->wall[w];
+				int delay = grid->delay[d];
+				struct incise_haptic_device dev = device(bT_m, delay);
+				struct sampled_wall sim = wall(bT_m, BT_m, delay);
+
+				add(ratios,
+				    (struct ratio){
+					    .param = {bT_m, BT_m, delay},
+					    .simulated = wall_limit(&sim) / UNIT_N_mm,
+					    .theory = theory(&dev, BT_m * UNIT_N_s_mm) /
+						      UNIT_N_mm});
+			}
+}
+
+static void exact_limit(struct ratios *ratios, bool quick)
+{
+	static const struct grid full = {{0.001, 0.01, 0.1, 1, 3, 10},
+					 {0, 0.1, 0.3},
+					 {0, 1, 2, 5},
+					 6,
+					 3,
+					 4},
+				 few = {{0.01, 1, 10}, {0, 0.1}, {0, 2}, 3, 2, 2};
+
+	sweep(ratios, quick ? &few : &full, incise_stability_limit);
+}
+
+static void gil(struct ratios *ratios, bool quick)
+{
+	static const struct grid full = {{0.002, 0.01},
+					 {0, 0.005, -0.001},
+					 {0, 1, 5},
+					 2,
+					 3,
+					 3},
+				 few = {{0.01}, {0, 0.005}, {0, 1}, 1, 2, 2};
+
+	sweep(ratios, quick ? &few : &full, incise_stability_gil);
+}
+
+/* The hand adds mass, so that little damping is left per mass, and a spring, so that the
+ * whole swings at an angle per tick: a passive hand, and the worst of its kind. */
+static double limit_in_hand(struct sampled_wall sim, double angle)
+{
+	double m;
+
+	sim.plant.mass_kg = sim.plant.damping_N_s_mm * PERIOD_S / 0.01 / N_S2_PER_MM_KG;
+	m = sim.plant.mass_kg * N_S2_PER_MM_KG;
+	sim.plant.tied = true;
+	sim.plant.wall_N_mm = m * (angle / PERIOD_S) * (angle / PERIOD_S);
+	return wall_limit(&sim);
+}
+
+static void colgate(struct ratios *ratios, bool quick)
+{
+	static const struct {
+		double BT_m;
+		int delay;
+		bool at_least; /* one mode of the hand does not reach the bound */
+	} cases[] = {{0, 0, false}, {0, 2, false}, {-0.05, 0, false}, {0.05, 0, true},
+		     {0, 1, false}, {0, 5, false}, {0.05, 2, true}};
+	static const double angles[] = {0,   1, 3.141, 0.1, 0.3, 0.6,
+					1.5, 2, 2.5,   2.8, 3,	 3.1};
+	const double bT_m = 0.1;
+
+	for (int i = 0; i < (quick ? 4 : N(cases)); i++) {
+		double BT_m = cases[i].BT_m, lowest = INFINITY, at = 0;
+		struct incise_haptic_device dev = device(bT_m, cases[i].delay);
+		struct sampled_wall sim = wall(bT_m, BT_m, cases[i].delay);
+
+		for (int k = 0; k < (quick ? 3 : N(angles)); k++) {
+			double K = limit_in_hand(sim, angles[k]) / UNIT_N_mm;
+
+			cli_progress("in a hand: %d, angle %g", i + 1, angles[k]);
+			if (K < lowest) {
+				lowest = K;
+				at = angles[k];
+			}
+		}
+		add(ratios, (struct ratio){.param = {bT_m, BT_m, cases[i].delay, at},
+					   .simulated = lowest,
+					   .theory = incise_stability_colgate(
+							     &dev, BT_m * UNIT_N_s_mm) /
+						     UNIT_N_mm,
+					   .at_least = cases[i].at_least});
+	}
+}
+
+/* --- energy that a sampled wall makes, and friction that takes it --- */
+
+/* An oscillation at a sampled spring. It begins at rest, some part of a period before the
+ * next sample. */
+struct swing {
+	struct incise_haptic_device device;
+	double K, phase;
+};
+
+static bool swing_grows(const void *context, double start)
+{
+	const struct swing *s = context;
+	struct incise_plant plant = {.mass_kg = s->device.mass_kg,
+				     .damping_N_s_mm = s->device.damping_N_s_mm,
+				     .coulomb_N = s->device.coulomb_N,
+				     .position_mm = start};
+	double omega = sqrt(s->K / DEVICE);
+
+	incise_plant_step(&plant, -s->K * start, s->phase * PERIOD_S);
+	/* By then the slowest case below has grown or died e^20 times. */
+	for (int k = 0; k < 2000000; k++) {
+		double x = plant.position_mm, v = plant.velocity_mm_s / omega;
+		double norm = x * x + v * v;
+
+		if (norm > 4 * start * start)
+			return true;
+		if (norm < start * start / 4)
+			return false;
+		incise_plant_step(&plant, -s->K * x, PERIOD_S);
+	}
+	return false;
+}
+
+static void amplitude(struct ratios *ratios, bool quick)
+{
+	static const double angles[] = {0.1, 0.2, 0.32, 0.02, 0.05, 0.14, 0.26};
+	static const double parts[] = {0, 0.5}; /* of K T/2 that viscous friction takes */
+	const int phases = quick ? 2 : 4;
+
+	for (int b = 0; b < (quick ? 1 : N(parts)); b++)
+		for (int i = 0; i < (quick ? 3 : N(angles)); i++) {
+			double omega = angles[i] / PERIOD_S, K = omega * omega * DEVICE;
+			struct swing swing = {
+				.device = {.mass_kg = DEVICE_KG,
+					   .damping_N_s_mm = parts[b] * K * PERIOD_S / 2,
+					   .coulomb_N = 0.05,
+					   .period_s = PERIOD_S},
+				.K = K};
+			double sum = 0;
+
+			for (int p = 0; p < phases; p++) {
+				cli_progress("amplitude: wT %g", angles[i]);
+				swing.phase = (double)p / phases;
+				sum += threshold(swing_grows, &swing, 1e-3, 1e9, 1e-3);
+			}
+			add(ratios, (struct ratio){.param = {angles[i], parts[b]},
+						   .simulated = sum / phases,
+						   .theory = incise_stability_amplitude(
+							   &swing.device, K)});
+		}
+}
+
+/* The stiffness at which a hand that goes to and fro by @way in each tick, about @centre,
+ * gets as much energy as friction takes. */
+static double shaken(const struct incise_haptic_device *d, double way, double centre)
+{
+	const int ticks = 1000;
+	double made = 0, taken = 0;
+
+	for (int k = 0; k < ticks; k++) {
+		double side = k % 2 ? 0.5 : -0.5, x = centre + side * way;
+		double next = centre - side * way;
+		/* For a stiffness of 1: all is proportional to it. */
+		double force = -floor(x / d->encoder_mm) * d->encoder_mm;
+
+		made += force * (next - x);
+		taken += d->coulomb_N * fabs(next - x) +
+			 d->damping_N_s_mm * (next - x) * (next - x) / d->period_s;
+	}
+	return made > 0 ? taken / made : INFINITY;
+}
+
+static void quantisation(struct ratios *ratios, bool quick)
+{
+	/* Coulomb friction decides, then viscous friction, then both alike. */
+	static const struct {
+		double b_N_s_mm, c_N, encoder_mm;
+	} cases[] = {{0.05, 0.05, 0.01},
+		     {0.005, 0.2, 0.01},
+		     {0.01, 0.1, 0.01},
+		     {0.05, 0.01, 0.03},
+		     {0.001, 0.1, 0.001}};
+	const int centres = quick ? 9 : 33;
+
+	for (int i = 0; i < N(cases); i++) {
+		struct incise_haptic_device d = {.mass_kg = DEVICE_KG,
+						 .damping_N_s_mm = cases[i].b_N_s_mm,
+						 .coulomb_N = cases[i].c_N,
+						 .encoder_mm = cases[i].encoder_mm,
+						 .period_s = PERIOD_S};
+		double lowest = INFINITY, at = 0;
+
+		cli_progress("quantisation: %d", i + 1);
+		for (double steps = 1e-6; steps < 1e5; steps *= 1.2)
+			for (int c = 0; c < centres; c++) {
+				double way = steps * d.encoder_mm;
+				double K =
+					shaken(&d, way, c * d.encoder_mm / (centres - 1));
+
+				if (K < lowest) {
+					lowest = K;
+					at = way;
+				}
+			}
+		add(ratios, (struct ratio){.param = {cases[i].b_N_s_mm, cases[i].c_N,
+						     cases[i].encoder_mm, at},
+					   .simulated = lowest,
+					   .theory = incise_stability_quantisation(&d)});
+	}
+}
+
+/* Energy given to a hand that goes in to @depth at one speed and out again; contact comes
+ * @phase of a period before a sample. */
+static double pressed(double K, double speed, double depth, double phase)
+{
+	double turn = depth / speed, made = 0, force = 0, was = 0, t = phase * PERIOD_S;
+
+	/* Until the last held force was taken back outside. */
+	for (bool out = false; !out; t += PERIOD_S) {
+		double x = t < turn ? -speed * t : -2 * depth + speed * t;
+
+		made += force * (x - was);
+		out = x >= 0 && t > turn;
+		force = x < 0 ? -K * x : 0;
+		was = x;
+	}
+	return made;
+}
+
+static void leak(struct ratios *ratios, bool quick)
+{
+	static const struct {
+		double K_N_mm, u_mm_s, X_mm;
+	} cases[] = {{1, 20, 2}, {10, 50, 3}, {5, 200, 10}, {50, 10, 1}};
+	const int phases = quick ? 32 : 256;
+
+	for (int i = 0; i < N(cases); i++) {
+		double K = cases[i].K_N_mm, u = cases[i].u_mm_s, X = cases[i].X_mm,
+		       sum = 0;
+		struct incise_haptic_device d = {.mass_kg = DEVICE_KG,
+						 .period_s = PERIOD_S};
+
+		for (int p = 0; p < phases; p++)
+			sum += pressed(K, u, X, (p + 0.5) / phases);
+		add(ratios, (struct ratio){.param = {K, u, X},
+					   .simulated = sum / phases,
+					   .theory = incise_stability_leak(&d, K, u, X)});
+	}
+}
+
+/* Speed after a bounce, squared, as part of that before; mean over where between two
+ * samples the contact begins. */
+static double bounced(double K, double damping, int phases)
+{
+	double sum = 0;
+
+	for (int p = 0; p < phases; p++) {
+		struct incise_plant plant = {.mass_kg = DEVICE_KG,
+					     .damping_N_s_mm = damping,
+					     .velocity_mm_s = -100};
+
+		/* Damping acts within the contact: before it there is none, and the last
+		 * step outside is a part of what sampling does. */
+		incise_plant_step(&plant, 0, (p + 0.5) / phases * PERIOD_S);
+		for (int k = 0; k < 1000000 && plant.position_mm < 0; k++)
+			incise_plant_step(&plant, -K * plant.position_mm, PERIOD_S);
+		sum += plant.velocity_mm_s * plant.velocity_mm_s / 1e4;
+	}
+	return sum / phases;
+}
+
+static void break_even(struct ratios *ratios, bool quick)
+{
+	static const double angles[] = {0.05, 0.02, 0.01};
+	const int phases = quick ? 16 : 64;
+
+	for (int i = 0; i < N(angles); i++) {
+		double omega = angles[i] / PERIOD_S, K = omega * omega * DEVICE;
+		double low = 0, high = 10 * K * PERIOD_S;
+
+		cli_progress("break-even: wT %g", angles[i]);
+		while (high - low > 1e-4 * high) {
+			double middle = (low + high) / 2;
+
+			if (bounced(K, middle, phases) > 1)
+				low = middle;
+			else
+				high = middle;
+		}
+		add(ratios, (struct ratio){.param = {angles[i], K},
+					   .simulated = (low + high) / 2,
+					   .theory = K * PERIOD_S / 2});
+	}
+}
+
+/* --- experiments --- */
+
+/* A simulation next to theory: how near they shall come, and why not nearer. */
+static const struct experiment {
+	void (*measure)(struct ratios *ratios, bool quick);
+	const char *key, *title;
+	const char *params[PARAMS], *simulated, *theory; /* keys */
+	double tolerance;				 /* of the ratio, about 1 */
+	const char *note;				 /* below the table, or NULL */
+} experiments[] = {
+	{exact_limit,
+	 "exact_limit",
+	 "largest stable stiffness of a wall alone on the device, K T^2/m: simulated in "
+	 "time against the eigenvalues",
+	 {"bT_m", "BT_m", "delay"},
+	 "sim_KT2_m",
+	 "theory_KT2_m",
+	 0.01,
+	 NULL},
+	{colgate,
+	 "colgate",
+	 "in the worst of passive hands, a mass and a spring that swing at some angle "
+	 "per tick: against Colgate and Schenkel",
+	 {"bT_m", "BT_m", "delay", "angle"},
+	 "sim_KT2_m",
+	 "theory_KT2_m",
+	 0.01,
+	 "at least: a damper in the wall needs a hand with many modes to reach the "
+	 "bound, one does not"},
+	{gil,
+	 "gil",
+	 "little damping: against the linear law of Gil and Hulin",
+	 {"bT_m", "BT_m", "delay"},
+	 "sim_KT2_m",
+	 "theory_KT2_m",
+	 0.02,
+	 "the law is the limit for b T/m to 0: it leaves out the next term"},
+	{amplitude,
+	 "amplitude",
+	 "amplitude from which on Coulomb friction does not end an oscillation, mm: "
+	 "against the describing function",
+	 {"omega_T", "viscous_part"},
+	 "sim_mm",
+	 "theory_mm",
+	 0.03,
+	 NULL},
+	{quantisation,
+	 "quantisation",
+	 "stiffness from which on a hand that shakes across an encoder's steps gets "
+	 "energy, N/mm: against Abbott and Okamura",
+	 {"b_N_s_mm", "coulomb_N", "encoder_mm", "worst_way_mm"},
+	 "sim_N_mm",
+	 "theory_N_mm",
+	 0.01,
+	 NULL},
+	{leak,
+	 "leak",
+	 "energy of a press to a depth and back, N mm: against K T u X",
+	 {"K_N_mm", "speed_mm_s", "depth_mm"},
+	 "sim_N_mm",
+	 "theory_N_mm",
+	 0.03,
+	 NULL},
+	{break_even,
+	 "break_even",
+	 "damping that takes what a bounce makes, N s/mm: against K T/2",
+	 {"omega_T", "K_N_mm"},
+	 "sim_N_s_mm",
+	 "theory_N_s_mm",
+	 0.03,
+	 "less by a third of omega T: the first part of a period in the wall has no "
+	 "force yet"},
+};
+
+static struct ratios results[N(experiments)];
+
+static void add(struct ratios *ratios, struct ratio row)
+{
+	double tolerance = ratios->experiment->tolerance;
+
+	if (ratios->n == RATIOS_MAX)
+		cli_fail("%s: more than %d rows", ratios->experiment->key, RATIOS_MAX);
+	row.ratio = row.simulated == row.theory ? 1 : row.simulated / row.theory;
+	row.ok = row.ratio >= 1 - tolerance &&
+		 (row.at_least || row.ratio <= 1 + tolerance);
+	row.verdict = row.at_least ? (row.ok ? "at least ok" : "at least MISSED")
+				   : (row.ok ? "ok" : "MISSED");
+	ratios->row[ratios->n++] = row;
+	cli_progress("%s: %d", ratios->experiment->key, ratios->n);
+}
+
+static void make_table(struct ratios *ratios)
+{
+	const struct experiment *e = ratios->experiment;
+	const struct bench_column rest[] = {
+		COLUMN(ratio, e->simulated, simulated, "%15.6g", e->simulated),
+		COLUMN(ratio, e->theory, theory, "%15.6g", e->theory),
+		COLUMN(ratio, "ratio", ratio, "%8.4f", "ratio"),
+		COLUMN(ratio, "at_least", at_least),
+		COLUMN(ratio, "ok", ok),
+		COLUMN(ratio, NULL, verdict, " %s", ""),
+	};
+	struct bench_column *c = ratios->table.columns;
+
+	ratios->table.key = e->key;
+	ratios->table.row_bytes = sizeof(struct ratio);
+	for (int p = 0; p < PARAMS && e->params[p]; p++) {
+		*c = (struct bench_column)COLUMN(ratio, e->params[p], param[0],
+						 p ? "%13g" : "%14g", e->params[p],
+						 .whole = true);
+		c++->offset += (size_t)p * sizeof(double);
+	}
+	memcpy(c, rest, sizeof(rest));
 }
 
 /* A bench that finds theory and simulation apart has found a fault in one of them. */
-static void judge(const struct stability *s)
+static void judge_ratios(struct bench_run *run, const struct ratios *ratios)
 {
-	int missed;
+	const struct experiment *e = ratios->experiment;
+	char params[200] = "";
+	int missed = 0, n = 0;
 
-	for (size_t i = 0; i < EXPERIMENTS; i++) {
-		const struct ratios *r = &s->ratios[i];
-		const struct ratio *first = ratios_first_missed(r, &missed);
-		char text[200];
+	for (int i = 0; i < ratios->n; i++) {
+		const struct ratio *row = &ratios->row[i];
 
-		if (!first)
+		if (row->ok || missed++)
 			continue;
-		ratios_describe(r, first, text, sizeof(text));
-		cli_fail(
-			"%s: %d of %d differ from theory by more than %g %%, first %s: please "
-			"report it",
-			r->key, missed, r->n, 100 * r->tolerance, text);
+		for (int p = 0; p < PARAMS && e->params[p]; p++)
+			n += snprintf(params + n, sizeof(params) - (size_t)n, "%s%s %g",
+				      p ? ", " : "", e->params[p], row->param[p]);
+		snprintf(params + n, sizeof(params) - (size_t)n, ": %.3f of theory",
+			 row->ratio);
 	}
-	missed = guard_bench_missed(&s->guard);
 	if (missed)
-		cli_fail("guard: %d walls were not bounded with it: please report it",
-			 missed);
-	missed = integrator_bench_missed(&s->integrators);
-	if (missed)
-		cli_fail(
-			"integrators: %d runs of the exact ones were not: please report it",
-			missed);
+		bench_fail(run,
+			   "%s: %d of %d differ from theory by more than %g %%, first "
+			   "%s: please report it",
+			   e->key, missed, ratios->n, 100 * e->tolerance, params);
 }
 
-void bench_stability(bool json, bool quick, const char *plot)
+/* How far the worst ratio is off, and how many were tried. */
+struct summary {
+	const char *key;
+	double worst, n;
+};
+
+static const struct bench_table summary_table = {
+	.row_bytes = sizeof(struct summary),
+	.columns = {COLUMN(summary, "key", key)},
+	.metrics = {METRIC(EXACT, summary, worst, "1", "{key} worst ratio off"),
+		    METRIC(EXACT, summary, n, "1", "{key} tried",
+			   .more_is_better = true)},
+};
+
+static void report_ratios(struct bench_run *run)
 {
-	struct stability *s = calloc(1, sizeof(*s));
-	const char *folder, *name;
+	static struct summary summary[N(experiments)];
 
-	if (!s)
-		cli_fail("no memory");
-	/* A name that cannot be is said before the work, not after. */
-	if (plot)
-		plot_place("plot", plot, &folder, &name);
-	measure(s, quick);
-	if (json)
-		print_json(s, quick);
-	else
-		print_text(s, quick);
-	cli_finish();
-	if (plot) {
-		stability_picture_map(&s->ratios[0], folder, name);
-		stability_picture_guard(&s->guard, folder, name);
-		stability_picture_integrators(&s->integrators, folder, name);
+	for (int i = 0; i < N(experiments); i++) {
+		struct ratios *r = &results[i];
+		const char *note = experiments[i].note;
+
+		make_table(r);
+		bench_text(run, "%s\n", experiments[i].title);
+		bench_table(run, &r->table, r->row, r->n);
+		bench_text(run, "%s%s\n", note ? note : "", note ? "\n" : "");
+		summary[i] = (struct summary){.key = r->table.key, .n = r->n};
+		for (int k = 0; k < r->n; k++) {
+			double off = r->row[k].ratio - 1;
+
+			/* Where theory is a lower bound more is not wrong. */
+			summary[i].worst = fmax(summary[i].worst,
+						r->row[k].at_least ? -off : fabs(off));
+		}
+		judge_ratios(run, r);
 	}
-	judge(s);
-	free(s);
+	bench_rows(run, &summary_table, summary, N(experiments));
 }
+
+/* Curves of theory for the map, for unit mass and period. */
+static void add_curves(struct bench_run *run)
+{
+	static struct bench_point points[6000];
+	const struct ratios *exact = &results[0];
+	int n = 0;
+
+	for (const struct ratio *r = exact->row; r < exact->row + exact->n; r++) {
+		struct incise_haptic_device device = {
+			.mass_kg = 1000, .period_s = 1, .delay_ticks = (int)r->param[2]};
+
+		/* Rows of a wall and a delay stand together. */
+		if (r > exact->row && r->param[1] == r[-1].param[1] &&
+		    r->param[2] == r[-1].param[2])
+			continue;
+		for (double b = 5e-4; b < 20 && n < N(points); b *= 1.03) {
+			double K;
+
+			device.damping_N_s_mm = b;
+			K = incise_stability_limit(&device, r->param[1]);
+			points[n] = (struct bench_point){.x = b, .y = K > 0 ? K : NAN};
+			snprintf(points[n].block, sizeof(points[n].block), "%g %g",
+				 r->param[1], r->param[2]);
+			n++;
+		}
+	}
+	bench_rows(run, &bench_points, points, n);
+}
+
+/* --- the bench --- */
+
+static void run(struct bench_run *run)
+{
+	bench_text(run, "%s; %s; %s%s\n\n", bench_machine(run, "cpu"),
+		   bench_machine(run, "kernel"), bench_machine(run, "compiler"),
+		   run->quick ? "\nquick: a part of the grids" : "");
+	for (int i = 0; i < N(experiments); i++) {
+		results[i].experiment = &experiments[i];
+		experiments[i].measure(&results[i], run->quick);
+	}
+	cli_progress_end();
+	report_ratios(run);
+	add_curves(run);
+	stability_guard(run);
+	stability_integrators(run);
+}
+
+static const struct bench_plot plots[] = {
+	{.suffix = "map",
+	 .script = text_stability_map_gp,
+	 .width = 440,
+	 .height = 520,
+	 .across = "BT_m",
+	 .data = {&results[0].table, "BT_m,delay"},
+	 .more = {&bench_points, "block"}},
+	{.suffix = "guard",
+	 .script = text_stability_guard_gp,
+	 .width = 1320,
+	 .height = 540,
+	 .data = {&stability_guard_table, "delay", stability_is_guarded},
+	 .more = {&stability_cap_table, "verdict"}},
+	{.suffix = "integrators",
+	 .script = text_stability_integrators_gp,
+	 .width = 1500,
+	 .height = 560,
+	 .data = {&stability_integrator_table, "integrator,K_N_m"},
+	 .more = {&stability_integrator_table, "integrator", stability_is_whole}},
+	{0},
+};
+
+const struct bench bench_stability = {
+	.name = "stability",
+	.summary = "how stiff a virtual wall may be, simulated and computed;\n"
+		   "the guard of passivity; integrators of a stiff spring",
+	.run = run,
+	.plots = plots,
+};
