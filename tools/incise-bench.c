@@ -10,10 +10,7 @@
 #include "bench/bench_capture.h"
 #include "bench/bench_extremes.h"
 #include "bench/bench_loop.h"
-#include "bench/bench_pose.h"
 #include "bench/bench_scenes.h"
-#include "bench/bench_timeline.h"
-#include "bench/bench_vision.h"
 #include "bench/compare.h"
 #include "cli/cli.h"
 #include "cli/json.h"
@@ -65,24 +62,9 @@ static void loop(struct bench_run *run)
 	bench_loop(&bench);
 }
 
-static void vision(struct bench_run *run)
-{
-	bench_vision(run->json, run->quick, run->plot);
-}
-
 static void capture(struct bench_run *run)
 {
 	bench_capture(run->operands[0], run->seconds, run->json, run->quick);
-}
-
-static void pose(struct bench_run *run)
-{
-	bench_pose(run->json, run->quick, run->plot);
-}
-
-static void timeline(struct bench_run *run)
-{
-	bench_timeline(run->json, run->quick, run->plot);
 }
 
 static void scenes(struct bench_run *run)
@@ -115,21 +97,6 @@ static const struct bench
 		    .takes_load = true,
 		    .plots = some_plot,
 		    .all = loop},
-	old_pose = {.name = "pose",
-		    .summary =
-			    "error of the pose over the tracker's rate, delay and cost",
-		    .plots = some_plot,
-		    .all = pose},
-	old_timeline =
-		{.name = "timeline",
-		 .summary = "error of times of samples that come late, by a clock that\n"
-			    "drifts, over how much was seen and the cost",
-		 .plots = some_plot,
-		 .all = timeline},
-	old_vision = {.name = "vision",
-		      .summary = "error of the exposed length over the time per picture",
-		      .plots = some_plot,
-		      .all = vision},
 	old_capture = {.name = "capture",
 		       .operands = "[RUN]",
 		       .summary = "how much of a core it takes to record all streams",
@@ -152,8 +119,8 @@ static const struct bench
 		.all = extremes};
 
 static const struct bench *const benches[] = {
-	&bench_precision, &bench_training, &bench_stability, &old_loop,	  &old_pose,
-	&old_timeline,	  &old_vision,	   &old_capture,     &old_scenes, &old_extremes,
+	&bench_precision, &bench_training, &bench_stability, &old_loop,	  &bench_pose,
+	&bench_timeline,  &bench_vision,   &old_capture,     &old_scenes, &old_extremes,
 };
 #define BENCHES (int)(sizeof(benches) / sizeof(*benches))
 

@@ -199,21 +199,49 @@ static void print_line(const struct bench_table *table, const void *row)
 void bench_lines(const struct bench_run *run, const struct bench_table *table,
 		 const void *rows, int n)
 {
-	bool any = false;
-
 	if (run->json)
 		return;
 	print_headings(table->columns);
 	for (int i = 0; i < n; i++)
 		print_line(table, row_at(table, rows, i));
-	for (int i = 0; i < n && !table->failed_after; i++) {
+}
+
+/* "{name}, {rate_hz:%g} Hz" of a row's columns. */
+static void expand(const struct bench_table *table, const void *row, const char *template,
+		   char *text, size_t size)
+{
+	size_t n = 0;
+
+	while (*template && n + 1 < size) {
+		size_t length = strcspn(template + 1, ":}");
+		char format[16] = "%g";
+
+		if (*template != '{') {
+			text[n++] = *template ++;
+			continue;
+		}
+		if (template[1 + length] == ':')
+			sscanf(template + 2 + length, "%15[^}]", format);
+		word_of(column_of(table, template + 1, length), row, format, text + n,
+			size - n);
+		n += strlen(text + n);
+		template += strcspn(template, "}") + 1;
+	}
+	text[n] = 0;
+}
+
+void bench_failures(const struct bench_run *run, const struct bench_table *table,
+		    const void *rows, int n, const char *template)
+{
+	char text[TEXT_BYTES];
+
+	for (int i = 0; i < n && !run->json; i++) {
 		const void *row = row_at(table, rows, i);
 
 		if (!failed_of(table, row))
 			continue;
-		printf("%s%s: %s\n", any ? "" : "\n", text_of(table->columns, row),
-		       failed_of(table, row));
-		any = true;
+		expand(table, row, template, text, sizeof(text));
+		printf("%s: %s\n", text, failed_of(table, row));
 	}
 }
 
@@ -231,7 +259,8 @@ void bench_block(const struct bench_run *run, const struct bench_block *block,
 	}
 	fputs(between, stdout);
 	for (const struct bench_column *c = block->columns; c->heading; c++)
-		printf(" %*s", width_of(c->format), c->heading);
+		if (*c->heading)
+			printf(" %*s", width_of(c->format), c->heading);
 	putchar('\n');
 	for (int i = 0; i < n; i++, row += row_bytes) {
 		print_cell(&block->line, row);
@@ -297,30 +326,6 @@ static json_t *row_json(const struct bench_table *table, const void *row)
 		if (c->key && !c->data)
 			set(object, c->key, json_of(c, row));
 	return object;
-}
-
-/* "{name}, {rate_hz:%g} Hz" of a row's columns. */
-static void expand(const struct bench_table *table, const void *row, const char *template,
-		   char *text, size_t size)
-{
-	size_t n = 0;
-
-	while (*template && n + 1 < size) {
-		size_t length = strcspn(template + 1, ":}");
-		char format[16] = "%g";
-
-		if (*template != '{') {
-			text[n++] = *template ++;
-			continue;
-		}
-		if (template[1 + length] == ':')
-			sscanf(template + 2 + length, "%15[^}]", format);
-		word_of(column_of(table, template + 1, length), row, format, text + n,
-			size - n);
-		n += strlen(text + n);
-		template += strcspn(template, "}") + 1;
-	}
-	text[n] = 0;
 }
 
 static void add_metric(json_t *metrics, const struct bench_table *table,
@@ -558,7 +563,8 @@ static void draw(const struct bench_run *run, const struct bench_plot *plot)
 	script = plot_begin(run->folder, name,
 			    plot->width * values_of(plot, plot->across, rows),
 			    plot->height * values_of(plot, plot->down, rows));
-	fputs("set datafile columnheaders separator tab\n", script);
+	fprintf(script, "set datafile columnheaders separator tab\nsuffix = '%s'\n",
+		plot->suffix ? plot->suffix : "");
 	write_scalars(script, run->machine);
 	write_scalars(script, run->report);
 	write_scalars(script, run->scalars);

@@ -81,8 +81,8 @@ struct bench_metric {
 #define BENCH_METRICS 8
 
 /*
- * A column "failed" has the reason why a row failed. In the text such a row ends with it
- * behind so many columns; with 0 the reasons stand below the table.
+ * A column "failed" has the reason why a row failed; with @failed_after a line of the text
+ * ends with it behind so many columns.
  */
 struct bench_table {
 	const char *
@@ -108,6 +108,7 @@ struct bench_data {
  *                      keys for "using"
  *   data_blocks        names of all blocks, as a list of words; more_blocks
  *   data_KEY           values of each key of the blocks, as a list of words; more_KEY
+ *   suffix             the plot's
  *   NAME               each scalar of bench_value() and bench_scalar(); cpu and kernel
  */
 struct bench_plot {
@@ -119,8 +120,9 @@ struct bench_plot {
 	struct bench_data data, more;
 };
 
-extern const char text_precision_gp[], text_stability_guard_gp[],
-	text_stability_integrators_gp[], text_stability_map_gp[], text_training_gp[];
+extern const char text_pose_gp[], text_precision_gp[], text_stability_guard_gp[],
+	text_stability_integrators_gp[], text_stability_map_gp[], text_timeline_gp[],
+	text_training_gp[], text_vision_gp[];
 
 struct bench_run;
 
@@ -134,7 +136,8 @@ struct bench {
 	void (*all)(struct bench_run *run); /* of a benchmark that is not declared yet */
 };
 
-extern const struct bench bench_precision, bench_stability, bench_training;
+extern const struct bench bench_pose, bench_precision, bench_stability, bench_timeline,
+	bench_training, bench_vision;
 
 /* --- a run --- */
 
@@ -191,6 +194,10 @@ void bench_rows(struct bench_run *run, const struct bench_table *table, const vo
 		int n);
 void bench_lines(const struct bench_run *run, const struct bench_table *table,
 		 const void *rows, int n);
+
+/* A line of text for each row that failed: a template as of a metric's name, and the reason. */
+void bench_failures(const struct bench_run *run, const struct bench_table *table,
+		    const void *rows, int n, const char *template);
 
 /*
  * A block of text with a line for each of n rows, and the same rows under n_across

@@ -541,6 +541,8 @@ static void run(struct bench_run *run)
 		   all->reference_version ? "; fuzzylite " : "",
 		   all->reference_version ? all->reference_version : "");
 	bench_table(run, &rows_table, all->row, all->n);
+	bench_text(run, "\n");
+	bench_failures(run, &rows_table, all->row, all->n, "{name}");
 }
 
 static const struct bench_plot plots[] = {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Error of times over window and cost; see bench_timeline.h.
+ * incise bench timeline: error of the times that late samples are given, over how much of the
+ * stream was seen and over the cost.
  *
  *   window    ├───────────────────────────────────┤ 1 … 120 s, from the first sample on
  *   live                               ├──────────┤ times given at arrival: the last quarter
@@ -9,20 +10,17 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include "bench_timeline.h"
+#include "../../lib/record/time/timeline.h"
+#include "bench.h"
 #include "../cli/cli.h"
-#include "metrics.h"
 #include "../cli/json.h"
-#include "machine.h"
-#include "../cli/plot.h"
 #include "../cli/stopwatch.h"
-#include "timeline_picture.h"
+#include "noise.h"
+
+#define N(array) (int)(sizeof(array) / sizeof(*(array)))
 
 static const double windows_s[] = {1, 2, 5, 10, 30, 60, 120};
-#define WINDOWS (int)(sizeof(windows_s) / sizeof(*windows_s))
-
 static const double drifts_ppm[] = {-200, 0, 200};
-#define DRIFTS (int)(sizeof(drifts_ppm) / sizeof(*drifts_ppm))
 
 /* Streams of each window: so many at least, and so many seconds together. */
 #define STREAMS 20
@@ -30,29 +28,327 @@ static const double drifts_ppm[] = {-200, 0, 200};
 #define QUICK_STREAMS 4
 #define QUICK_STREAMS_S 24
 
-/* Of all samples one in so many is asked how sure it is. */
+/* One in so many samples is asked for its uncertainty. */
 #define ASK_EVERY 16
 
-/* Of the truth that shall be within twice the stated uncertainty, were it normal. */
+/* Share of the truth within twice the stated uncertainty, were it normal. */
 #define WITHIN 0.9545
 
 #define REPEATS 51
 #define QUICK_REPEATS 5
 
-struct bench {
-	struct timeline_table table;
-	struct harness_time times[WINDOWS][TIME_METHODS];
-	struct machine machine;
-	int repeats;
-	bool quick;
+/* --- streams of known times: a device with a clock of its own, whose samples come late by
+ * chance, and some not at all ---
+ *
+ *   taken     |    |    |    |    |    |    |     a period of the device's clock
+ *   arrives    \delay, and up to 20 ms more
+ *             ····|·|·······|·|||·······|··
+ */
+
+#define RATE_HZ 240
+#define PERIOD_NS (1e9 / RATE_HZ)
+#define DELAY_NS 4200000
+#define LATE_MS 20
+#define LATE_NS (LATE_MS * 1e6)
+#define LOST 0.01
+#define FIRST 1000
+#define INTERRUPT_NS 20e3 /* mean lateness of a burst */
+
+enum lateness {
+	UNIFORM,     /* by anything up to 20 ms */
+	EXPONENTIAL, /* by 5 ms in the mean, and no more than 20 ms */
+	BURSTS,	     /* all that has come goes on together, each 20 ms */
+};
+static const char *const lateness_names[] = {"uniform", "exponential", "bursts"};
+
+struct stream {
+	uint64_t *seq;
+	int64_t *arrival_ns;
+	double *taken_ns; /* the truth */
+	int n;
+	double mean_late_ns; /* of arrivals later than the delay */
+	int64_t grain_ns;    /* arrivals come on a grid; 0: on none */
 };
 
-static int streams_of(const struct bench *b, double window_s)
+/* Arrival of a sample that could come at @quickest_ns; @phase_ns: of the bursts. */
+static double arrival_ns(enum lateness lateness, double quickest_ns, double phase_ns,
+			 struct noise *noise)
 {
-	int least = b->quick ? QUICK_STREAMS : STREAMS;
-	double seconds = b->quick ? QUICK_STREAMS_S : STREAMS_S;
+	if (lateness == UNIFORM)
+		return quickest_ns + LATE_NS * noise_uniform(noise);
+	if (lateness == EXPONENTIAL)
+		return quickest_ns +
+		       fmin(LATE_NS / 4 * noise_exponential(noise), LATE_NS);
+	return ceil((quickest_ns - phase_ns) / LATE_NS) * LATE_NS + phase_ns +
+	       INTERRUPT_NS * noise_exponential(noise);
+}
 
-	return (int)fmax(least, seconds / window_s);
+static struct stream stream_begin(enum lateness lateness, double drift_ppm,
+				  double seconds, uint64_t seed)
+{
+	struct noise noise = {seed};
+	double period_ns = PERIOD_NS / (1 + drift_ppm * 1e-6);
+	double begin_ns = 5e9 + 1e9 * noise_uniform(&noise);
+	double phase_ns = LATE_NS * noise_uniform(&noise), before_ns = 0;
+	int all = (int)(seconds * RATE_HZ);
+	struct stream s = {
+		.seq = bench_alloc(all, sizeof(*s.seq)),
+		.arrival_ns = bench_alloc(all, sizeof(*s.arrival_ns)),
+		.taken_ns = bench_alloc(all, sizeof(*s.taken_ns)),
+		.grain_ns = lateness == BURSTS ? (int64_t)LATE_NS : 0,
+	};
+
+	for (int k = 0; k < all; k++) {
+		double taken_ns = begin_ns + k * period_ns;
+		double quickest_ns = taken_ns + DELAY_NS;
+
+		/* One wire: none overtakes another. */
+		before_ns = fmax(arrival_ns(lateness, quickest_ns, phase_ns, &noise),
+				 before_ns);
+		if (noise_uniform(&noise) < LOST && k)
+			continue;
+		s.seq[s.n] = FIRST + (uint64_t)k;
+		s.taken_ns[s.n] = taken_ns;
+		s.arrival_ns[s.n++] = llround(before_ns);
+		s.mean_late_ns += before_ns - quickest_ns;
+	}
+	s.mean_late_ns /= s.n;
+	return s;
+}
+
+static void stream_end(struct stream *stream)
+{
+	free(stream->seq);
+	free(stream->arrival_ns);
+	free(stream->taken_ns);
+}
+
+/* --- methods: the time of acquisition from arrivals ---
+ *
+ *     y │  ·    ·      ·  ·         y: arrival less number · nominal period
+ *       │----·-------·---·----      least squares: through the middle of the arrivals
+ *       │ ·    ·  ·  ·              lowest: level, below all
+ *       │__·____·___________·_      the library's: sloping, below all
+ *       └──────────────────► number
+ */
+
+struct method {
+	const char *name;
+	/* Has the stream's grain and, as no real program, its mean lateness. To be ended. */
+	void *(*begin)(const struct stream *stream);
+	/* The time of a sample when it arrives, ns. */
+	double (*take)(void *state, uint64_t seq, int64_t arrival_ns);
+	/* The best time of one of them afterwards; NULL: that of take() is final. */
+	double (*afterwards)(const void *state, uint64_t seq);
+	/* To be called once between them, or NULL. */
+	void (*finish)(void *state);
+	/* Stated uncertainty of the last one taken, or afterwards of one; NULL: none is. */
+	double (*sd_ns)(const void *state, uint64_t seq);
+	void (*end)(void *state);
+};
+
+static void *nothing_begin(const struct stream *stream)
+{
+	(void)stream;
+	return NULL;
+}
+
+static double arrival_take(void *state, uint64_t seq, int64_t arrival_ns)
+{
+	(void)state;
+	(void)seq;
+	return (double)(arrival_ns - DELAY_NS);
+}
+
+struct lowest {
+	bool begun;
+	uint64_t seq;
+	int64_t arrival_ns; /* of the lowest */
+};
+
+static void *lowest_begin(const struct stream *stream)
+{
+	(void)stream;
+	return bench_alloc(1, sizeof(struct lowest));
+}
+
+static double lowest_take(void *state, uint64_t seq, int64_t arrival_ns)
+{
+	struct lowest *lowest = state;
+	double x_ns = (double)(seq - lowest->seq) * PERIOD_NS;
+
+	if (!lowest->begun || (double)(arrival_ns - lowest->arrival_ns) < x_ns) {
+		*lowest = (struct lowest){true, seq, arrival_ns};
+		x_ns = 0;
+	}
+	return (double)(lowest->arrival_ns - DELAY_NS) + x_ns;
+}
+
+/* Means and sums about them, which grow without losing digits: Welford's. */
+struct squares {
+	uint64_t first;
+	int64_t first_ns;
+	double n, x, y, xx, xy; /* y: ns later than by the nominal period */
+	double late_ns;
+};
+
+static void *squares_begin(const struct stream *stream)
+{
+	(void)stream;
+	return bench_alloc(1, sizeof(struct squares));
+}
+
+static void *squares_known_begin(const struct stream *stream)
+{
+	struct squares *s = squares_begin(stream);
+
+	s->late_ns = stream->mean_late_ns;
+	return s;
+}
+
+static double squares_at(const void *state, uint64_t seq)
+{
+	const struct squares *s = state;
+	double x_ns = (double)(seq - s->first) * PERIOD_NS;
+	double slope = s->xx > 0 ? s->xy / s->xx : 0;
+
+	return (double)(s->first_ns - DELAY_NS) + x_ns + s->y + slope * (x_ns - s->x) -
+	       s->late_ns;
+}
+
+static double squares_take(void *state, uint64_t seq, int64_t arrival_ns)
+{
+	struct squares *s = state;
+	double x_ns, y_ns, dx, dy;
+
+	if (!s->n) {
+		s->first = seq;
+		s->first_ns = arrival_ns;
+	}
+	x_ns = (double)(seq - s->first) * PERIOD_NS;
+	y_ns = (double)(arrival_ns - s->first_ns) - x_ns;
+	s->n++;
+	dx = x_ns - s->x;
+	dy = y_ns - s->y;
+	s->x += dx / s->n;
+	s->y += dy / s->n;
+	s->xx += dx * (x_ns - s->x);
+	s->xy += dx * (y_ns - s->y);
+	return squares_at(s, seq);
+}
+
+struct line {
+	struct incise_timeline *timeline;
+	int n;
+	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS_MAX];
+};
+
+static void *line_of_grain(int64_t grain_ns)
+{
+	struct line *line = bench_alloc(1, sizeof(*line));
+
+	line->timeline = incise_timeline_new(&(struct incise_timeline_setup){
+		.rate_hz = RATE_HZ, .delay_ns = DELAY_NS, .grain_ns = grain_ns});
+	if (!line->timeline)
+		cli_fail("no memory");
+	return line;
+}
+
+static void *line_begin(const struct stream *stream)
+{
+	return line_of_grain(stream->grain_ns);
+}
+
+static void *untold_begin(const struct stream *stream)
+{
+	(void)stream;
+	return line_of_grain(0);
+}
+
+static double line_take(void *state, uint64_t seq, int64_t arrival_ns)
+{
+	struct line *line = state;
+
+	return (double)incise_timeline_sample(line->timeline, seq, arrival_ns);
+}
+
+static double line_live_sd(const void *state, uint64_t seq)
+{
+	const struct line *line = state;
+	struct incise_timeline_report report;
+
+	(void)seq;
+	incise_timeline_report(line->timeline, &report);
+	return report.offset_sd_ns;
+}
+
+static void line_finish(void *state)
+{
+	struct line *line = state;
+
+	line->n = incise_timeline_knots(line->timeline, line->knots);
+}
+
+static double line_at(const void *state, uint64_t seq)
+{
+	const struct line *line = state;
+
+	return line->n ? (double)incise_timeline_at(line->knots, line->n, seq) : NAN;
+}
+
+/* The larger one of the two knots around. */
+static double line_final_sd(const void *state, uint64_t seq)
+{
+	const struct line *line = state;
+	int k = 0;
+
+	while (k + 2 < line->n && line->knots[k + 1].seq <= seq)
+		k++;
+	return line->n ? fmax(line->knots[k].sd_ns, line->knots[k + 1].sd_ns) : NAN;
+}
+
+static void line_end(void *state)
+{
+	struct line *line = state;
+
+	incise_timeline_free(line->timeline);
+	free(line);
+}
+
+#define METHODS 8
+static const struct method methods[METHODS] = {
+	{"arrival", nothing_begin, arrival_take, NULL, NULL, NULL, free},
+	{"lowest", lowest_begin, lowest_take, NULL, NULL, NULL, free},
+	{"squares", squares_begin, squares_take, NULL, NULL, NULL, free},
+	{"squares_known", squares_known_begin, squares_take, NULL, NULL, NULL, free},
+	{"squares_final", squares_known_begin, squares_take, squares_at, NULL, NULL,
+	 free},
+	{"line_live", line_begin, line_take, NULL, NULL, line_live_sd, line_end},
+	{"line_untold", untold_begin, line_take, NULL, NULL, line_live_sd, line_end},
+	{"line_final", line_begin, line_take, line_at, line_finish, line_final_sd,
+	 line_end},
+};
+
+/* --- measurement --- */
+
+/* Rows of a window stand together, a row per method. */
+struct row {
+	const char *name, *late;
+	double drift_ppm, window_s;
+	double rms_us, p99_us, max_us, mean_us;
+	double stated_us,
+		within; /* uncertainty, and the share of truth within twice it */
+	struct harness_time time; /* of a sample */
+	char failed[160];
+};
+
+static struct row rows[N(lateness_names) * N(drifts_ppm) * N(windows_s) * METHODS];
+static struct harness_time times[N(windows_s)][METHODS];
+
+static int streams_of(bool quick, double window_s)
+{
+	return quick ? (int)fmax(QUICK_STREAMS, QUICK_STREAMS_S / window_s)
+		     : (int)fmax(STREAMS, STREAMS_S / window_s);
 }
 
 /* Errors of a method over some streams, ns. */
@@ -63,21 +359,24 @@ struct errors {
 	double asked, within, stated2;
 };
 
-static void add_error(struct errors *e, double error)
+/* The error of a sample's time; one in some with its stated uncertainty. */
+static void add_error(struct errors *e, const struct method *method, const void *state,
+		      const struct stream *stream, int k, double t_ns)
 {
+	double error = t_ns - stream->taken_ns[k], sd;
+
 	e->error[e->n++] = fabs(error);
 	e->sum += error;
 	e->sum2 += error * error;
-}
-
-static void ask(struct errors *e, double error, double sd)
-{
+	if (!method->sd_ns || k % ASK_EVERY)
+		return;
+	sd = method->sd_ns(state, stream->seq[k]);
 	e->asked++;
 	e->within += fabs(error) <= 2 * sd;
 	e->stated2 += sd * sd;
 }
 
-static void follow(const struct time_method *method, const struct drifting_stream *stream,
+static void follow(const struct method *method, const struct stream *stream,
 		   struct errors *e)
 {
 	void *state = method->begin(stream);
@@ -85,45 +384,34 @@ static void follow(const struct time_method *method, const struct drifting_strea
 	for (int k = 0; k < stream->n; k++) {
 		double t_ns = method->take(state, stream->seq[k], stream->arrival_ns[k]);
 
-		if (method->afterwards || k < stream->n - stream->n / 4)
-			continue;
-		add_error(e, t_ns - stream->taken_ns[k]);
-		if (method->sd_ns && k % ASK_EVERY == 0)
-			ask(e, t_ns - stream->taken_ns[k],
-			    method->sd_ns(state, stream->seq[k]));
+		if (!method->afterwards && k >= stream->n - stream->n / 4)
+			add_error(e, method, state, stream, k, t_ns);
 	}
 	if (method->finish)
 		method->finish(state);
-	for (int k = 0; method->afterwards && k < stream->n; k++) {
-		double error =
-			method->afterwards(state, stream->seq[k]) - stream->taken_ns[k];
-
-		add_error(e, error);
-		if (method->sd_ns && k % ASK_EVERY == 0)
-			ask(e, error, method->sd_ns(state, stream->seq[k]));
-	}
+	for (int k = 0; method->afterwards && k < stream->n; k++)
+		add_error(e, method, state, stream, k,
+			  method->afterwards(state, stream->seq[k]));
 	method->end(state);
 }
 
-static void finish(struct errors *e, struct timeline_row *row)
+static void set_errors(struct row *row, struct errors *e)
 {
 	stopwatch_sort(e->error, e->n);
 	row->rms_us = sqrt(e->sum2 / e->n) * 1e-3;
 	row->mean_us = e->sum / e->n * 1e-3;
 	row->p99_us = stopwatch_quantile(e->error, e->n, 0.99) * 1e-3;
 	row->max_us = e->error[e->n - 1] * 1e-3;
-	row->within = row->stated_us = NAN;
-	if (e->asked > 0) {
-		row->within = e->within / e->asked;
-		row->stated_us = sqrt(e->stated2 / e->asked) * 1e-3;
-	}
+	row->within = e->asked > 0 ? e->within / e->asked : NAN;
+	row->stated_us = e->asked > 0 ? sqrt(e->stated2 / e->asked) * 1e-3 : NAN;
+	free(e->error);
 }
 
 /*
  * Samples of a stream are off together: chance is that of so many streams, and three of its
  * deviations are allowed.
  */
-static void judge(struct timeline_row *row, double arrival_us, int streams)
+static void judge(struct row *row, double arrival_us, int streams)
 {
 	double least = WITHIN - 3 * sqrt(WITHIN * (1 - WITHIN) / streams);
 
@@ -142,222 +430,190 @@ static void judge(struct timeline_row *row, double arrival_us, int streams)
 			 row->within * 100);
 }
 
-/* Append a row per method. */
-static void measure(struct bench *b, enum lateness_kind late, double drift_ppm,
-		    int window)
+/* A row per method; of the seeds of each window none is that of another. */
+static void measure(bool quick, enum lateness lateness, double drift_ppm, int window,
+		    struct row *row)
 {
-	struct timeline_row *rows = &b->table.row[b->table.n];
-	int streams = streams_of(b, windows_s[window]);
-	int most = (int)(streams * windows_s[window] * STREAM_HZ);
-	struct errors errors[TIME_METHODS] = {{0}};
+	double window_s = windows_s[window];
+	int streams = streams_of(quick, window_s);
+	int most = (int)(streams * window_s * RATE_HZ);
+	uint64_t seed = 1 + 1000 * (uint64_t)((row - rows) / METHODS);
+	struct errors errors[METHODS] = {{0}};
 
-	for (int i = 0; i < TIME_METHODS; i++) {
-		errors[i].error = calloc(most + 1, sizeof(*errors[i].error));
-		if (!errors[i].error)
-			cli_fail("no memory");
-	}
+	for (int i = 0; i < METHODS; i++)
+		errors[i].error = bench_alloc(most, sizeof(*errors[i].error));
 	for (int k = 0; k < streams; k++) {
-		struct drifting_stream stream;
+		struct stream stream =
+			stream_begin(lateness, drift_ppm, window_s, seed + (uint64_t)k);
 
-		drifting_stream_begin(
-			&stream, late, drift_ppm, windows_s[window],
-			(uint64_t)(1 + k + 1000 * (b->table.n / TIME_METHODS)));
-		for (int i = 0; i < TIME_METHODS; i++)
-			follow(&time_methods[i], &stream, &errors[i]);
-		drifting_stream_end(&stream);
+		for (int i = 0; i < METHODS; i++)
+			follow(&methods[i], &stream, &errors[i]);
+		stream_end(&stream);
 	}
-	for (int i = 0; i < TIME_METHODS; i++) {
-		rows[i] = (struct timeline_row){
-			.name = time_methods[i].name,
-			.late = late,
-			.drift_ppm = drift_ppm,
-			.window_s = windows_s[window],
-			.time = b->times[window][i],
-		};
-		finish(&errors[i], &rows[i]);
-		judge(&rows[i], rows[TIME_METHOD_ARRIVAL].rms_us, streams);
-		free(errors[i].error);
+	for (int i = 0; i < METHODS; i++) {
+		row[i] = (struct row){.name = methods[i].name,
+				      .late = lateness_names[lateness],
+				      .drift_ppm = drift_ppm,
+				      .window_s = window_s,
+				      .time = times[window][i]};
+		set_errors(&row[i], &errors[i]);
+		judge(&row[i], row->rms_us, streams);
 	}
-	b->table.n += TIME_METHODS;
 }
-
-static void measure_rows(struct bench *b)
-{
-	b->table = (struct timeline_table){
-		.row = calloc((size_t)LATE_KINDS * DRIFTS * WINDOWS * TIME_METHODS,
-			      sizeof(*b->table.row)),
-		.windows = WINDOWS,
-		.drifts = DRIFTS,
-	};
-	if (!b->table.row)
-		cli_fail("no memory");
-	for (int i = 0; i < LATE_KINDS * DRIFTS * WINDOWS && !cli_stop; i++) {
-		enum lateness_kind late = i / WINDOWS / DRIFTS;
-		double drift_ppm = drifts_ppm[i / WINDOWS % DRIFTS];
-
-		cli_progress("%s, %g ppm, %g s", lateness_kinds[late], drift_ppm,
-			     windows_s[i % WINDOWS]);
-		measure(b, late, drift_ppm, i % WINDOWS);
-	}
-	cli_progress_end();
-}
-
-/* ---- cost ---- */
 
 struct timed {
-	const struct time_method *method;
-	const struct drifting_stream *stream;
+	const struct method *method;
+	const struct stream *stream;
 	double sum;
 };
 
 static void run_timed(void *context)
 {
 	struct timed *timed = context;
-	const struct drifting_stream *stream = timed->stream;
-	void *state = timed->method->begin(stream);
+	const struct stream *stream = timed->stream;
+	const struct method *method = timed->method;
+	void *state = method->begin(stream);
 
 	for (int k = 0; k < stream->n; k++)
-		timed->sum +=
-			timed->method->take(state, stream->seq[k], stream->arrival_ns[k]);
-	if (timed->method->finish)
-		timed->method->finish(state);
-	for (int k = 0; timed->method->afterwards && k < stream->n; k++)
-		timed->sum += timed->method->afterwards(state, stream->seq[k]);
-	timed->method->end(state);
+		timed->sum += method->take(state, stream->seq[k], stream->arrival_ns[k]);
+	if (method->finish)
+		method->finish(state);
+	for (int k = 0; method->afterwards && k < stream->n; k++)
+		timed->sum += method->afterwards(state, stream->seq[k]);
+	method->end(state);
 }
 
-static void measure_times(struct bench *b)
+static void measure_times(int repeats)
 {
-	struct harness_variant ways[WINDOWS * TIME_METHODS];
-	struct timed timed[WINDOWS * TIME_METHODS];
-	struct drifting_stream streams[WINDOWS];
+	struct harness_variant variants[N(windows_s) * METHODS];
+	struct timed timed[N(variants)];
+	struct stream streams[N(windows_s)];
 
-	for (int w = 0; w < WINDOWS; w++)
-		drifting_stream_begin(&streams[w], LATE_UNIFORM, 200, windows_s[w], 1);
-	for (int i = 0; i < WINDOWS * TIME_METHODS; i++) {
-		const struct drifting_stream *stream = &streams[i / TIME_METHODS];
+	for (int w = 0; w < N(windows_s); w++)
+		streams[w] = stream_begin(UNIFORM, 200, windows_s[w], 1);
+	for (int i = 0; i < N(variants); i++) {
+		const struct stream *stream = &streams[i / METHODS];
 
-		timed[i] = (struct timed){&time_methods[i % TIME_METHODS], stream, 0};
-		ways[i] = (struct harness_variant){
+		timed[i] = (struct timed){&methods[i % METHODS], stream, 0};
+		variants[i] = (struct harness_variant){
 			.run = run_timed, .context = &timed[i], .units = stream->n};
 	}
-	harness_times(ways, WINDOWS * TIME_METHODS, b->repeats, b->times[0]);
-	for (int w = 0; w < WINDOWS; w++)
-		drifting_stream_end(&streams[w]);
+	harness_times(variants, N(variants), repeats, times[0]);
+	for (int w = 0; w < N(windows_s); w++)
+		stream_end(&streams[w]);
 }
 
-/* ---- report ---- */
+/* --- report --- */
 
-/* A lateness and a drift: a line per method, columns per window. */
-static void print_block(const struct timeline_row *block)
+static bool is_compared(const void *data)
 {
-	const struct timeline_row *last = &block[(WINDOWS - 1) * TIME_METHODS];
+	const struct row *row = data;
 
-	printf("\n%s lateness, %+g ppm\n%-16s", lateness_kinds[block->late],
-	       block->drift_ppm, "rms / us after");
-	for (int w = 0; w < WINDOWS; w++)
-		printf(" %7g s ", windows_s[w]);
-	printf(" at the last: 99 %%  largest   stated  within 2 %8s\n", "ns");
-	for (int i = 0; i < TIME_METHODS; i++) {
-		printf("%-16s", block[i].name);
-		for (int w = 0; w < WINDOWS; w++)
-			printf(" %8.1f%c", block[w * TIME_METHODS + i].rms_us,
-			       *block[w * TIME_METHODS + i].failed ? '*' : ' ');
-		printf("        %9.1f %8.1f ", last[i].p99_us, last[i].max_us);
-		if (isnan(last[i].within))
-			printf("%8s %9s", "-", "-");
-		else
-			printf("%8.1f %7.1f %%", last[i].stated_us, last[i].within * 100);
-		printf(" %8.1f\n", last[i].time.ns.median);
+	return row->window_s == 1 || row->window_s == 30;
+}
+
+/* Times are the same for each lateness and drift. */
+static bool is_timed(const void *row)
+{
+	return (const struct row *)row < &rows[N(windows_s) * METHODS];
+}
+
+static const struct bench_table rows_table = {
+	.key = "rows",
+	.row_bytes = sizeof(struct row),
+	.columns = {COLUMN(row, "name", name), COLUMN(row, "late", late),
+		    COLUMN(row, "window_s", window_s),
+		    COLUMN(row, "drift_ppm", drift_ppm), COLUMN(row, "rms_us", rms_us),
+		    COLUMN(row, "p99_us", p99_us), COLUMN(row, "max_us", max_us),
+		    COLUMN(row, "mean_us", mean_us), COLUMN(row, "stated_us", stated_us),
+		    COLUMN(row, "within_2sd", within),
+		    COLUMN(row, "ns_per_sample", time.ns.median),
+		    COLUMN(row, "ns_p5", time.ns.p5), COLUMN(row, "ns_p95", time.ns.p95),
+		    COLUMN(row, "failed", failed)},
+	.metrics = {METRIC(EXACT, row, rms_us, "us",
+			   "{name}, {late}, {drift_ppm:%+g} ppm, {window_s} s, rms",
+			   is_compared),
+		    METRIC(TIME, row, time, "ns", "{name}, {window_s} s", is_timed)},
+};
+
+/* A lateness and a drift. */
+static const struct bench_block block = {
+	.corner = "rms / us after",
+	.line = COLUMN(row, NULL, name, "%-16s"),
+	.across = COLUMN(row, NULL, window_s, "%7g s"),
+	.cell = COLUMN(row, NULL, rms_us, "%8.1f"),
+	.failed = offsetof(struct row, failed),
+	.mark = true,
+	.between = " at the last:",
+	.columns = {COLUMN(row, NULL, p99_us, "%8.1f", "99 %"),
+		    COLUMN(row, NULL, max_us, "%8.1f", "largest"),
+		    COLUMN(row, NULL, stated_us, "%8.1f", "stated"),
+		    COLUMN(row, NULL, within, "%7.1f %%", "within 2", 100),
+		    COLUMN(row, NULL, time.ns.median, "%8.1f", "ns")},
+};
+
+static void run(struct bench_run *run)
+{
+	const int per_block = N(windows_s) * METHODS;
+	int repeats = run->quick ? QUICK_REPEATS : REPEATS, i = 0;
+
+	measure_times(repeats);
+	for (int late = 0; late < N(lateness_names); late++)
+		for (int d = 0; d < N(drifts_ppm); d++)
+			for (int w = 0; w < N(windows_s); w++, i += METHODS) {
+				cli_progress("%s, %g ppm, %g s", lateness_names[late],
+					     drifts_ppm[d], windows_s[w]);
+				measure(run->quick, (enum lateness)late, drifts_ppm[d], w,
+					&rows[i]);
+			}
+	cli_progress_end();
+	bench_value(run, "rate_hz", json_integer(RATE_HZ));
+	bench_value(run, "lost", json_real(LOST));
+	bench_value(run, "streams", json_integer(streams_of(run->quick, 120)));
+	bench_value(run, "repeats", json_integer(repeats));
+	bench_scalar(run, "drift_ppm", json_real(drifts_ppm[N(drifts_ppm) - 1]));
+	bench_scalar(run, "late_ms", json_integer(LATE_MS));
+	bench_text(
+		run,
+		"%d Hz, up to %d ms late, %g %% lost; %d streams or more of each; times of %d "
+		"runs in turn\n%s; %s; %s\n",
+		RATE_HZ, LATE_MS, LOST * 100, streams_of(run->quick, 120), repeats,
+		bench_machine(run, "cpu"), bench_machine(run, "kernel"),
+		bench_machine(run, "compiler"));
+	for (const struct row *r = rows; r < rows + N(rows); r += per_block) {
+		bench_text(run, "\n%s lateness, %+g ppm\n", r->late, r->drift_ppm);
+		bench_block(run, &block, sizeof(*rows), r, METHODS, N(windows_s),
+			    N(windows_s) - 1);
 	}
+	bench_text(run, "\n");
+	bench_rows(run, &rows_table, rows, N(rows));
+	bench_failures(run, &rows_table, rows, N(rows),
+		       "* {name}, {late}, {drift_ppm:%+g} ppm, {window_s} s");
 }
 
-static void print_report(const struct bench *b)
+/* Of the drifts the last one. */
+static bool is_drawn(const void *row)
 {
-	const struct machine *m = &b->machine;
-	int block = WINDOWS * TIME_METHODS;
-
-	printf("%d Hz, up to %d ms late, %g %% lost; %d streams or more of each; times of %d "
-	       "runs in turn\n%s; %s; %s\n",
-	       STREAM_HZ, STREAM_LATE_MS, STREAM_LOST * 100, streams_of(b, 120),
-	       b->repeats, m->cpu, m->kernel, m->compiler);
-	for (int i = 0; i + block <= b->table.n; i += block)
-		print_block(&b->table.row[i]);
-	putchar('\n');
-	for (int i = 0; i < b->table.n; i++) {
-		const struct timeline_row *row = &b->table.row[i];
-
-		if (*row->failed)
-			printf("* %s, %s, %+g ppm, %g s: %s\n", row->name,
-			       lateness_kinds[row->late], row->drift_ppm, row->window_s,
-			       row->failed);
-	}
+	return ((const struct row *)row)->drift_ppm == drifts_ppm[N(drifts_ppm) - 1];
 }
 
-static json_t *row_json(const struct timeline_row *row)
-{
-	return json_pack("{ss ss so so so so so so so so so so so so}", "name", row->name,
-			 "late", lateness_kinds[row->late], "window_s",
-			 json_number(row->window_s), "drift_ppm",
-			 json_number(row->drift_ppm), "rms_us", json_number(row->rms_us),
-			 "p99_us", json_number(row->p99_us), "max_us",
-			 json_number(row->max_us), "mean_us", json_number(row->mean_us),
-			 "stated_us", json_number(row->stated_us), "within_2sd",
-			 json_number(row->within), "ns_per_sample",
-			 json_number(row->time.ns.median), "ns_p5",
-			 json_number(row->time.ns.p5), "ns_p95",
-			 json_number(row->time.ns.p95), "failed",
-			 *row->failed ? json_text(row->failed) : json_null());
-}
+static const struct bench_plot plots[] = {
+	{.script = text_timeline_gp,
+	 .width = 1320,
+	 .height = 620,
+	 .data = {&rows_table, "late,name", is_drawn}},
+	{.suffix = "windows",
+	 .script = text_timeline_gp,
+	 .width = 1320,
+	 .height = 620,
+	 .data = {&rows_table, "late,name", is_drawn}},
+	{0},
+};
 
-static void print_json(const struct bench *b)
-{
-	json_t *rows = json_array(), *figures = json_array();
-
-	for (int i = 0; i < b->table.n; i++) {
-		const struct timeline_row *row = &b->table.row[i];
-
-		json_array_append_new(rows, row_json(row));
-		if (row->window_s == 1 || row->window_s == 30)
-			metrics_exact(figures, row->rms_us, "us",
-				      "%s, %s, %+g ppm, %g s, rms", row->name,
-				      lateness_kinds[row->late], row->drift_ppm,
-				      row->window_s);
-	}
-	for (int w = 0; w < WINDOWS; w++)
-		for (int i = 0; i < TIME_METHODS; i++)
-			metrics_time(figures, &b->times[w][i], "ns", "%s, %g s",
-				     time_methods[i].name, windows_s[w]);
-	json_print(json_pack("{so sb si sf si si so so}", "machine",
-			     machine_json(&b->machine), "quick", b->quick, "rate_hz",
-			     STREAM_HZ, "lost", STREAM_LOST, "streams",
-			     streams_of(b, 120), "repeats", b->repeats, "rows", rows,
-			     "figures", figures));
-}
-
-void bench_timeline(bool json, bool quick, const char *plot)
-{
-	struct bench *b = calloc(1, sizeof(*b));
-	const char *folder, *name;
-
-	if (!b)
-		cli_fail("no memory");
-	if (plot)
-		plot_place("plot", plot, &folder, &name);
-	b->quick = quick;
-	b->repeats = quick ? QUICK_REPEATS : REPEATS;
-	machine_init(&b->machine);
-	measure_times(b);
-	measure_rows(b);
-	if (json)
-		print_json(b);
-	else
-		print_report(b);
-	cli_finish();
-	if (plot) {
-		timeline_picture_cost(&b->table, folder, name);
-		timeline_picture_windows(&b->table, folder, name);
-	}
-	free(b->table.row);
-	free(b);
-}
+const struct bench bench_timeline = {
+	.name = "timeline",
+	.summary = "error of times of samples that come late, by a clock that\n"
+		   "drifts, over how much was seen and the cost",
+	.run = run,
+	.plots = plots,
+};

@@ -12,14 +12,20 @@ struct noise {
 	uint64_t state; /* set it to a seed */
 };
 
-/* 0 … 1, without 1. splitmix64: Steele, Lea and Flood, OOPSLA 2014. */
-static inline double noise_uniform(struct noise *noise)
+/* splitmix64: Steele, Lea and Flood, OOPSLA 2014. */
+static inline uint64_t splitmix64(uint64_t *state)
 {
-	uint64_t z = noise->state += 0x9e3779b97f4a7c15;
+	uint64_t z = *state += 0x9e3779b97f4a7c15;
 
 	z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
 	z = (z ^ z >> 27) * 0x94d049bb133111eb;
-	return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
+	return z ^ z >> 31;
+}
+
+/* 0 … 1, without 1. */
+static inline double noise_uniform(struct noise *noise)
+{
+	return (double)(splitmix64(&noise->state) >> 11) * 0x1p-53;
 }
 
 /* Of mean 0 and sd 1; of Box and Muller's two one. */

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "noise.h"
 #include "scalpel_picture.h"
 
 #define SAMPLES 256
@@ -21,24 +22,15 @@ struct canvas {
 	float *rgb, *row; /* three values per pixel */
 };
 
-static uint64_t bits(uint64_t *state)
-{
-	uint64_t z = *state += 0x9e3779b97f4a7c15u;
-
-	z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-	z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-	return z ^ (z >> 31);
-}
-
 double scalpel_picture_random(uint64_t *state)
 {
-	return (bits(state) >> 11) * 0x1p-53;
+	return (splitmix64(state) >> 11) * 0x1p-53;
 }
 
 /* Four uniform ones: near enough to a Gaussian, of sd 1. */
 static double noise(uint64_t *state)
 {
-	uint64_t b = bits(state);
+	uint64_t b = splitmix64(state);
 	double sum = (b & 0xffff) + (b >> 16 & 0xffff) + (b >> 32 & 0xffff) + (b >> 48);
 
 	return (sum / 65536 - 2) * 1.7320508;
