@@ -9,7 +9,6 @@
 #include "bench/bench.h"
 #include "bench/bench_capture.h"
 #include "bench/bench_extremes.h"
-#include "bench/bench_loop.h"
 #include "bench/bench_scenes.h"
 #include "bench/compare.h"
 #include "cli/cli.h"
@@ -48,20 +47,6 @@ static const struct cli_option options[] = {
 
 /* --- not declared yet --- */
 
-static void loop(struct bench_run *run)
-{
-	const struct bench_loop bench = {
-		.scene = run->operands[0],
-		.load = run->load,
-		.seconds = run->seconds,
-		.json = run->json,
-		.quick = run->quick,
-		.plot = run->plot,
-	};
-
-	bench_loop(&bench);
-}
-
 static void capture(struct bench_run *run)
 {
 	bench_capture(run->operands[0], run->seconds, run->json, run->quick);
@@ -87,16 +72,6 @@ static void extremes(struct bench_run *run)
 static const struct bench_plot some_plot[] = {{0}};
 
 static const struct bench
-	old_loop = {.name = "loop",
-		    .operands = "[SCENE]",
-		    .summary =
-			    "cost of a tick; how late the machine wakes the loop, idle\n"
-			    "and under loads, beside cyclictest; error over its rate",
-		    .n_operands = 1,
-		    .takes_duration = true,
-		    .takes_load = true,
-		    .plots = some_plot,
-		    .all = loop},
 	old_capture = {.name = "capture",
 		       .operands = "[RUN]",
 		       .summary = "how much of a core it takes to record all streams",
@@ -119,7 +94,7 @@ static const struct bench
 		.all = extremes};
 
 static const struct bench *const benches[] = {
-	&bench_precision, &bench_training, &bench_stability, &old_loop,	  &bench_pose,
+	&bench_precision, &bench_training, &bench_stability, &bench_loop, &bench_pose,
 	&bench_timeline,  &bench_vision,   &old_capture,     &old_scenes, &old_extremes,
 };
 #define BENCHES (int)(sizeof(benches) / sizeof(*benches))

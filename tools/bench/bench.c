@@ -378,6 +378,8 @@ void bench_table(struct bench_run *run, const struct bench_table *table, const v
 
 /* --- plots --- */
 
+#define WIDTH_LEAST 640 /* of a title */
+
 const struct bench_table bench_points = {
 	.row_bytes = sizeof(struct bench_point),
 	.columns = {COLUMN(bench_point, "block", block), COLUMN(bench_point, "x", x),
@@ -550,6 +552,7 @@ static void draw(const struct bench_run *run, const struct bench_plot *plot)
 				*more = rows_of(run, plot->more.table);
 	char name[TEXT_BYTES], file[2][TEXT_BYTES + 16];
 	FILE *script;
+	int width;
 
 	if (!rows)
 		return;
@@ -560,8 +563,8 @@ static void draw(const struct bench_run *run, const struct bench_plot *plot)
 	write_data(run, file[0], &plot->data, rows);
 	if (more)
 		write_data(run, file[1], &plot->more, more);
-	script = plot_begin(run->folder, name,
-			    plot->width * values_of(plot, plot->across, rows),
+	width = plot->width * values_of(plot, plot->across, rows);
+	script = plot_begin(run->folder, name, width > WIDTH_LEAST ? width : WIDTH_LEAST,
 			    plot->height * values_of(plot, plot->down, rows));
 	fprintf(script, "set datafile columnheaders separator tab\nsuffix = '%s'\n",
 		plot->suffix ? plot->suffix : "");

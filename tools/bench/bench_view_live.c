@@ -211,11 +211,10 @@ static double pooled(const struct beside *beside, bool view, bool cyclictest)
 	if (!bins)
 		cli_fail("no memory");
 	for (int i = 0; i < beside->n; i++) {
-		const struct wakeup_row *run = &beside->run[i];
-		const struct lateness *l =
-			cyclictest ? &run->got.cyclictest : &run->got.loop;
+		const struct wakeup *run = &beside->run[i];
+		const struct lateness *l = cyclictest ? &run->cyclictest : &run->loop;
 
-		if ((run->load == LOAD_VIEW) == view && l->bins)
+		if ((run->load == load_names[LOAD_VIEW]) == view && l->bins)
 			for (int k = 0; k < INCISE_LOOP_BINS; k++)
 				bins[k] += l->bins[k];
 	}
@@ -232,14 +231,13 @@ void bench_view_beside(const char *scene, double seconds, bool quick,
 
 	*beside = (struct beside){.n = quick ? 2 : BESIDE_RUNS, .seconds = seconds};
 	for (int i = 0; i < beside->n; i++) {
-		struct wakeups wakeups;
+		static struct wakeups wakeups;
 
-		bench_wakeup(scene, order[i], false, seconds, &wakeups);
+		wakeups_measure(scene, NULL, order[i], false, seconds, &wakeups);
 		beside->run[i] = wakeups.row[0];
 		beside->realtime = wakeups.realtime;
 		if (wakeups.row[0].no_load)
 			cli_fail("the picture beside a loop: %s", wakeups.row[0].no_load);
-		free(wakeups.row);
 	}
 	for (int view = 0; view < 2; view++) {
 		beside->p999_us[view] = pooled(beside, view, false);
@@ -247,20 +245,24 @@ void bench_view_beside(const char *scene, double seconds, bool quick,
 	}
 }
 
+static json_t *json_of(const struct lateness *l)
+{
+	return l->json ? json_incref(l->json) : json_null();
+}
+
 json_t *beside_json(const struct beside *beside)
 {
 	json_t *list = json_array();
 
 	for (int i = 0; i < beside->n; i++) {
-		const struct wakeup_row *run = &beside->run[i];
+		const struct wakeup *run = &beside->run[i];
 
 		json_array_append_new(
-			list,
-			json_pack("{ss so so so sI}", "load", load_name(run->load),
-				  "lateness_us", lateness_json(&run->got.loop),
-				  "cyclictest_us", lateness_json(&run->got.cyclictest),
-				  "frames_hz", json_number(run->frames_hz), "skipped",
-				  (json_int_t)run->got.skipped));
+			list, json_pack("{ss so so so sI}", "load", run->load,
+					"lateness_us", json_of(&run->loop),
+					"cyclictest_us", json_of(&run->cyclictest),
+					"frames_hz", json_number(run->frames_hz),
+					"skipped", (json_int_t)run->skipped));
 	}
 	return json_pack("{sf ss so so so so so so so}", "seconds", beside->seconds,
 			 "policy", beside->realtime ? "fifo" : "other", "p999_us",
@@ -283,17 +285,17 @@ void beside_print(const struct beside *beside)
 				: "SCHED_OTHER, as real time is not granted",
 	       "load", "median", "99 %", "99.9 %", "99.99 %", "max", "fps", "cyclictest");
 	for (int i = 0; i < beside->n; i++) {
-		const struct wakeup_row *run = &beside->run[i];
-		const struct lateness *l = &run->got.loop;
+		const struct wakeup *run = &beside->run[i];
+		const struct lateness *l = &run->loop;
 
-		printf("%-6s %7.0f %7.0f %7.0f %7.0f %8.0f", load_name(run->load),
-		       l->median, l->p99, l->p999, l->p9999, l->max);
+		printf("%-6s %7.0f %7.0f %7.0f %7.0f %8.0f", run->load, l->median, l->p99,
+		       l->p999, l->p9999, l->max);
 		if (run->frames_hz > 0)
 			printf(" %8.1f", run->frames_hz);
 		else
 			printf(" %8s", "");
-		if (run->got.cyclictest.bins)
-			printf(" %12.0f", run->got.cyclictest.p999);
+		if (run->cyclictest.bins)
+			printf(" %12.0f", run->cyclictest.p999);
 		printf("\n");
 	}
 	printf("99.9 %% of all: %.0f without, %.0f with: %.2f times", beside->p999_us[0],
@@ -319,8 +321,8 @@ void beside_figures(const struct beside *beside, json_t *figures)
 		int n = 0;
 
 		for (int i = 0; i < beside->n; i++)
-			if ((beside->run[i].load == LOAD_VIEW) == view)
-				median[n++] = beside->run[i].got.loop.median;
+			if ((beside->run[i].load == load_names[LOAD_VIEW]) == view)
+				median[n++] = beside->run[i].loop.median;
 		harness_spread(median, n, &spread);
 		metrics_measured(figures, &spread, "us",
 				 "loop late %s the picture, median",

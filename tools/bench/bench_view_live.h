@@ -8,7 +8,7 @@
 
 #include <jansson.h>
 #include <stdbool.h>
-#include "bench_wakeup.h"
+#include "wakeup.h"
 #include "metrics.h"
 
 /* Cuts at 5 kHz. */
@@ -27,7 +27,7 @@ void absorbed_print(const struct absorbed *absorbed);
 #define BESIDE_RUNS 4
 
 struct beside {
-	struct wakeup_row run[BESIDE_RUNS];
+	struct wakeup run[BESIDE_RUNS];
 	int n;
 	double seconds; /* of each */
 	bool realtime;

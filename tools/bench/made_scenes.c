@@ -2,8 +2,8 @@
 /*
  * Scenes for incise bench scenes; see made_scenes.h.
  */
-#include "bench_tick.h"
 #include "made_scenes.h"
+#include "sheet.h"
 
 #define ALL                                                    \
 	"tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; " \
@@ -44,7 +44,7 @@ void made_scene_begin(struct made_scene *made, int number)
 		.scene = memory_file_begin(scenes[number].name),
 	};
 	if (scenes[number].mesh) {
-		made->sheet = bench_tick_sheet(CELLS);
+		made->sheet = sheet_of_waves(CELLS);
 		fprintf(made->scene.file, scenes[number].text, made->sheet.path);
 	} else {
 		fputs(scenes[number].text, made->scene.file);

@@ -7,19 +7,16 @@
 
 #include <math.h>
 #include <stdint.h>
+#include "../../lib/base/random.h"
 
 struct noise {
 	uint64_t state; /* set it to a seed */
 };
 
-/* splitmix64: Steele, Lea and Flood, OOPSLA 2014. */
+/* 64 random bits. */
 static inline uint64_t splitmix64(uint64_t *state)
 {
-	uint64_t z = *state += 0x9e3779b97f4a7c15;
-
-	z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
-	z = (z ^ z >> 27) * 0x94d049bb133111eb;
-	return z ^ z >> 31;
+	return incise_random_mix(*state += 0x9e3779b97f4a7c15);
 }
 
 /* 0 … 1, without 1. */

@@ -1,0 +1,638 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * How late the loop wakes; see wakeup.h.
+ *
+ * The loop runs a scene on the virtual rig in a thread of its own, and cyclictest runs next to
+ * it, on the same processor, with the same policy and interval, half a period apart:
+ *
+ *   cyclictest      |               |               |
+ *   loop                    |█              |█              |█
+ *   of a second |               |               |               |
+ *               0  T/4     3T/4
+ *
+ * So both meet the same host, interrupts and load, in the same minute; neither is ever ready
+ * while the other has work to do, as long as a tick costs less than T/2. One after the other
+ * they would meet different minutes, which on a shared machine differ by more than the
+ * programs do. That each finds the processor a little less deeply asleep than alone is the
+ * same for both. Neither wakes at full milliseconds, where the kernel has its own tick to do.
+ *
+ * The cause of an overrun: cyclictest's priority is one above the loop's, so that no tick,
+ * however long, holds it up. Where cyclictest was waiting in vain for half of the time that
+ * the loop was late, or longer, the machine stood still: the host of a virtual one, mostly.
+ * Every other overrun counts as the program's.
+ *
+ *   loop        |█      |█      :       :       :    |█     left out: 3
+ *   cyclictest      |       |........................|      late: the machine's
+ */
+#include <errno.h>
+#include <limits.h>
+#include <math.h>
+#include <pthread.h>
+#include <sched.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+#include <incise/loop.h>
+#include <incise/scene.h>
+#include "bench.h"
+#include "../cli/child.h"
+#include "../cli/cli.h"
+#include "../cli/folder.h"
+#include "../cli/json.h"
+#include "wakeup.h"
+
+/* --- loads --- */
+
+#define UNDER_WAY_US 500000
+#define BLEEDING_S 4
+#define LONGER_S 30 /* than it is needed: the end of one whose bench was killed */
+
+const char *const load_names[LOADS] = {"idle", "cpu", "memory", "disk", "view"};
+
+/* Arguments of stress-ng: one worker per processor, and one at the disk. */
+static const char *const stress[LOADS][4] = {
+	[LOAD_CPU] = {"--cpu", "0"},
+	[LOAD_MEMORY] = {"--vm", "0", "--vm-bytes", "128m"},
+	[LOAD_DISK] = {"--hdd", "1", "--hdd-bytes", "64m"},
+};
+
+struct load_run {
+	pid_t pid;	       /* 0: none runs */
+	char folder[PATH_MAX]; /* where a disk is kept busy, or empty */
+	struct memory_file said;
+};
+
+static const char *begin_stress(enum load load, double seconds, struct load_run *run)
+{
+	const char *argv[16] = {"stress-ng", "--quiet", "--timeout"};
+	char time[24];
+	int n = 3;
+
+	if (!child_possible("stress-ng"))
+		return "stress-ng is not installed: apt-get install stress-ng";
+	snprintf(time, sizeof(time), "%.0f", seconds + LONGER_S);
+	argv[n++] = time;
+	for (int i = 0; i < 4 && stress[load][i]; i++)
+		argv[n++] = stress[load][i];
+	/* It makes a folder there for any of its workers. */
+	folder_make(run->folder, sizeof(run->folder), "to keep the disk busy in");
+	argv[n++] = "--temp-path";
+	argv[n++] = run->folder;
+	run->pid = child_start((char *const *)argv, -1, -1);
+	return NULL;
+}
+
+static const char *begin_view(const char *scene, double seconds, struct load_run *run)
+{
+	char path[PATH_MAX + 20], time[24];
+	const char *argv[] = {path,	    scene, "--procedure", "--no-output",
+			      "--duration", time,  NULL};
+
+	snprintf(path, sizeof(path), "%s/incise-view", cli_folder());
+	if (access(path, X_OK))
+		return "incise-view is not there";
+	snprintf(time, sizeof(time), "%.0f", seconds + LONGER_S);
+	run->said = memory_file_begin("view");
+	run->pid = child_start((char *const *)argv, fileno(run->said.file), -1);
+	/* Until the skin is painted and the cut bleeds. */
+	sleep(BLEEDING_S);
+	return NULL;
+}
+
+/* Returns the frame rate of a view, else NaN. */
+static double load_end(struct load_run *run)
+{
+	double frames_hz = NAN;
+
+	if (run->pid)
+		child_end(run->pid, 0);
+	if (run->said.file) {
+		rewind(run->said.file);
+		if (fscanf(run->said.file, "%lf", &frames_hz) != 1)
+			frames_hz = NAN;
+		fclose(run->said.file);
+	}
+	if (*run->folder)
+		folder_remove(run->folder);
+	return frames_hz;
+}
+
+/* Begin, for @seconds at most, and wait until it is under way. Returns NULL, or why there is
+ * no such load here. */
+static const char *load_begin(enum load load, const char *scene, double seconds,
+			      struct load_run *run)
+{
+	const char *why;
+	int status;
+
+	if (load == LOAD_IDLE)
+		return NULL;
+	why = load == LOAD_VIEW ? begin_view(scene, seconds, run)
+				: begin_stress(load, seconds, run);
+	if (why)
+		return why;
+	usleep(UNDER_WAY_US);
+	if (child_ended(run->pid, &status)) {
+		run->pid = 0;
+		load_end(run);
+		return "it ended at once; run it by hand to see why";
+	}
+	return NULL;
+}
+
+/* --- cyclictest; its figures are JSON, its late wake-ups lines of output, times in µs ---
+ *
+ *     T: 0 Spike:    1301: TS:  68161260801
+ */
+
+#define SPIKES_MAX 200000
+#define SPIKES_TEXT "200000"
+#define END_S 5 /* after the time that it should take, which has passed */
+
+/* Its histogram, and ours, whose last bin is all above. */
+#define TRACKED_US "20000"
+_Static_assert(INCISE_LOOP_BINS == 20001, "bins of both");
+
+/* A wake-up that was late by more than a quarter of a period. */
+struct spike {
+	int64_t from_ns, to_ns; /* when it was due, when it came; CLOCK_MONOTONIC */
+};
+
+struct cyclictest {
+	pid_t pid;
+	struct memory_file report, out;
+	uint64_t late_us[INCISE_LOOP_BINS];
+	double max_us;
+	struct spike spike[SPIKES_MAX]; /* in order of time */
+	int spikes;
+};
+
+static const char *cyclictest_possible(bool realtime)
+{
+	if (!child_possible("cyclictest"))
+		return "cyclictest is not installed: apt-get install rt-tests";
+	if (!realtime)
+		return "cyclictest runs only where real-time policies are granted";
+	return NULL;
+}
+
+/*
+ * With one thread of SCHED_FIFO, for so many wake-ups, each a quarter of a period after where
+ * one would be that counts from a full second of CLOCK_MONOTONIC. It begins with the next
+ * second, when that is not to come within half a second.
+ */
+static void cyclictest_begin(struct cyclictest *c, double rate_hz, int cpu,
+			     uint64_t cycles)
+{
+	char text[7][48];
+	/* The buffer for spikes is allocated only behind the option that asks for them. */
+	const char *argv[] = {"cyclictest",
+			      "--quiet",
+			      "--mlockall",
+			      "--policy=fifo",
+			      "--threads=1",
+			      text[0],
+			      text[1],
+			      text[2],
+			      text[3],
+			      text[4],
+			      text[5],
+			      text[6],
+			      "--spike-nodes=" SPIKES_TEXT,
+			      "--histogram=" TRACKED_US,
+			      NULL};
+
+	c->report = memory_file_begin("cyclictest");
+	c->out = memory_file_begin("cyclictest's lines");
+	snprintf(text[0], sizeof(*text), "--priority=%d", INCISE_REALTIME_PRIORITY + 1);
+	snprintf(text[1], sizeof(*text), "--affinity=%d", cpu);
+	snprintf(text[2], sizeof(*text), "--interval=%.0f", 1e6 / rate_hz);
+	snprintf(text[3], sizeof(*text), "--loops=%llu", (unsigned long long)cycles);
+	snprintf(text[4], sizeof(*text), "--spike=%.0f", 0.25e6 / rate_hz);
+	snprintf(text[5], sizeof(*text), "--json=%s", c->report.path);
+	snprintf(text[6], sizeof(*text), "--secaligned=%.0f", 0.25e6 / rate_hz);
+	c->pid = child_start((char *const *)argv, fileno(c->out.file), -1);
+}
+
+static void read_spikes(struct cyclictest *c)
+{
+	char line[200];
+
+	rewind(c->out.file);
+	while (fgets(line, sizeof(line), c->out.file) && c->spikes < SPIKES_MAX) {
+		long long late_us, at_us;
+		int thread;
+
+		if (sscanf(line, "T:%d Spike:%lld: TS:%lld", &thread, &late_us, &at_us) ==
+		    3)
+			c->spike[c->spikes++] =
+				(struct spike){(at_us - late_us) * 1000, at_us * 1000};
+	}
+}
+
+/* "histogram": {"14": 96, …}; a wake-up above all bins is in none of them. */
+static const char *read_histogram(struct cyclictest *c, json_t *thread)
+{
+	json_t *histogram = json_object_get(thread, "histogram"), *count;
+	json_int_t cycles = json_integer_value(json_object_get(thread, "cycles"));
+	const char *us;
+
+	if (!json_is_object(histogram) || cycles <= 0)
+		return "cyclictest's report has no histogram";
+	json_object_foreach(histogram, us, count)
+	{
+		long bin = strtol(us, NULL, 10);
+
+		if (bin < 0 || bin >= INCISE_LOOP_BINS - 1 ||
+		    json_integer_value(count) < 0)
+			return "cyclictest's histogram makes no sense";
+		c->late_us[bin] = (uint64_t)json_integer_value(count);
+		cycles -= json_integer_value(count);
+	}
+	if (cycles > 0)
+		c->late_us[INCISE_LOOP_BINS - 1] = (uint64_t)cycles;
+	c->max_us = json_number_value(json_object_get(thread, "max"));
+	return NULL;
+}
+
+/* Wait for its end and read its report. Returns NULL or why there is none. */
+static const char *cyclictest_end(struct cyclictest *c)
+{
+	int status = child_end(c->pid, END_S);
+	const char *why = NULL;
+	json_t *report;
+
+	rewind(c->report.file);
+	report = json_loadf(c->report.file, 0, NULL);
+	if (status || !report)
+		why = "cyclictest failed; run it by hand to see why";
+	else
+		why = read_histogram(c, json_object_get(json_object_get(report, "thread"),
+							"0"));
+	if (!why)
+		read_spikes(c);
+	json_decref(report);
+	fclose(c->report.file);
+	fclose(c->out.file);
+	return why;
+}
+
+/* --- the loop --- */
+
+#define STALLS_MAX 65536
+
+/* A gap between two ticks in which others were left out. */
+struct stall {
+	int64_t from_ns, to_ns;
+	uint64_t skipped;
+};
+
+struct run {
+	const struct wakeups *wakeups;
+	const struct incise_realtime *realtime; /* NULL: the shell's policy */
+	double rate_hz;
+	bool with_cyclictest;
+	struct incise_scene *scene;
+	struct incise_rig *rig;
+	struct incise_plan *plan;
+	int64_t period_ns, due_ns; /* of the first tick */
+	struct incise_loop_stats stats;
+	struct incise_error err;
+	int rc;
+	/* of the tick before */
+	int64_t index, t_ns;
+	struct stall stall[STALLS_MAX];
+	int stalls;
+	uint64_t found; /* ticks skipped in all of these */
+	struct cyclictest cyclictest;
+};
+
+static int64_t now_ns(void)
+{
+	struct timespec t;
+
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return t.tv_sec * INCISE_NS_PER_S + t.tv_nsec;
+}
+
+static void sleep_until(int64_t t_ns)
+{
+	struct timespec t = {t_ns / INCISE_NS_PER_S, t_ns % INCISE_NS_PER_S};
+
+	while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR)
+		;
+}
+
+static void add_stall(struct run *run, int64_t to_ns, uint64_t skipped)
+{
+	if (!skipped || run->stalls == STALLS_MAX)
+		return;
+	run->stall[run->stalls++] = (struct stall){run->t_ns, to_ns, skipped};
+	run->found += skipped;
+}
+
+static int ticked(void *context, const struct incise_tick *tick)
+{
+	struct run *run = context;
+	int64_t index = (tick->t_ns - run->due_ns) / run->period_ns;
+
+	if (index > run->index + 1)
+		add_stall(run, tick->t_ns, (uint64_t)(index - run->index - 1));
+	run->index = index;
+	run->t_ns = tick->t_ns;
+	return 0;
+}
+
+/*
+ * Three quarters of a period after a full second, half a period after cyclictest. Not much
+ * later, or the two would be ready together.
+ */
+static void wait_for_phase(const struct run *run)
+{
+	int64_t begin = (now_ns() / INCISE_NS_PER_S + 1) * INCISE_NS_PER_S +
+			run->period_ns / 4 * 3;
+
+	for (int i = 0; i < 1000; i++, begin += run->period_ns) {
+		sleep_until(begin);
+		if (now_ns() - begin < run->period_ns / 8)
+			return;
+	}
+}
+
+static void run_loop(struct run *run)
+{
+	struct incise_clock *clock = incise_rig_clock(run->rig);
+	struct incise_loop_options options = {
+		.rate_hz = run->rate_hz,
+		.duration_ns = (int64_t)(run->wakeups->seconds * 1e9),
+		.stop = &cli_stop,
+		.ticked = ticked,
+		.context = run,
+	};
+
+	if (run->with_cyclictest)
+		wait_for_phase(run);
+	run->due_ns = incise_clock_now(clock) + run->period_ns;
+	run->t_ns = run->due_ns - run->period_ns;
+	run->index = -1;
+	run->rc = incise_loop_run(run->plan, clock, &options, &run->stats, &run->err);
+	/* No tick comes after a gap over the end. */
+	if (run->stats.skipped > run->found)
+		add_stall(run, incise_clock_now(clock), run->stats.skipped - run->found);
+}
+
+static void *loop_thread(void *context)
+{
+	struct run *run = context;
+	cpu_set_t cpus;
+
+	if (run->realtime) {
+		run->rc = incise_realtime_enter(run->realtime, &run->err);
+	} else {
+		CPU_ZERO(&cpus);
+		CPU_SET(run->wakeups->cpu, &cpus);
+		pthread_setaffinity_np(pthread_self(), sizeof(cpus), &cpus);
+	}
+	if (!run->rc)
+		run_loop(run);
+	return NULL;
+}
+
+static void run_thread(struct run *run)
+{
+	pthread_t thread;
+	int rc = pthread_create(&thread, NULL, loop_thread, run);
+
+	if (rc)
+		cli_fail("no thread for the loop: %s", strerror(rc));
+	pthread_join(thread, NULL);
+}
+
+static void open_run(struct run *run, const char *scene)
+{
+	run->period_ns = llrint(INCISE_NS_PER_S / run->rate_hz);
+	run->scene = incise_scene_load(scene, NULL, &run->err);
+	if (run->scene)
+		run->rig = incise_rig_open(
+			"sim:", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, &run->err);
+	if (run->rig)
+		run->plan = incise_plan_new(run->scene, run->rig, &run->err);
+	if (!run->plan)
+		cli_fail_with(&run->err);
+}
+
+static void close_run(struct run *run)
+{
+	incise_plan_free(run->plan);
+	incise_rig_close(run->rig);
+	incise_scene_free(run->scene);
+	free(run);
+}
+
+/* --- both together --- */
+
+static struct lateness lateness_of(const uint64_t *bins, double max_us)
+{
+	struct lateness l = {
+		.median = incise_loop_quantile(bins, 0.5),
+		.p99 = incise_loop_quantile(bins, 0.99),
+		.p999 = incise_loop_quantile(bins, 0.999),
+		.p9999 = incise_loop_quantile(bins, 0.9999),
+		.max = max_us,
+		.bins = bench_alloc(INCISE_LOOP_BINS, sizeof(*bins)),
+	};
+
+	memcpy(l.bins, bins, INCISE_LOOP_BINS * sizeof(*bins));
+	while (l.min < INCISE_LOOP_BINS - 1 && !bins[(int)l.min])
+		l.min++;
+	for (int i = 0; i < INCISE_LOOP_BINS; i++)
+		l.ticks += bins[i];
+	l.json = json_pack("{sf sf sf sf sf sf sI}", "min", l.min, "median", l.median,
+			   "p99", l.p99, "p999", l.p999, "p9999", l.p9999, "max", l.max,
+			   "ticks", (json_int_t)l.ticks);
+	return l;
+}
+
+/* By ranks, as if wake-ups were independent of each other: those of one run alone. */
+static struct harness_spread quantile_of(const struct lateness *l, double q)
+{
+	double off = 1.96 * sqrt(q * (1 - q) / fmax((double)l->ticks, 1));
+
+	return (struct harness_spread){
+		.median = incise_loop_quantile(l->bins, q),
+		.low = incise_loop_quantile(l->bins, fmax(q - off, 0)),
+		.high = incise_loop_quantile(l->bins, fmin(q + off, 1)),
+	};
+}
+
+static bool held_up(const struct cyclictest *c, const struct stall *stall,
+		    int64_t period_ns)
+{
+	int64_t gap_ns = stall->to_ns - stall->from_ns, both_ns = 0;
+
+	for (int i = 0; i < c->spikes; i++) {
+		int64_t from = c->spike[i].from_ns, to = c->spike[i].to_ns;
+
+		from = from > stall->from_ns ? from : stall->from_ns;
+		to = to < stall->to_ns ? to : stall->to_ns;
+		if (to > from)
+			both_ns += to - from;
+	}
+	return both_ns >= (gap_ns - period_ns) / 2;
+}
+
+/* How many of the skipped ticks were the machine's. */
+static double blame(const struct run *run)
+{
+	uint64_t machine = 0;
+
+	for (int i = 0; i < run->stalls; i++)
+		if (held_up(&run->cyclictest, &run->stall[i], run->period_ns))
+			machine += run->stall[i].skipped;
+	return (double)(machine < run->stats.skipped ? machine : run->stats.skipped);
+}
+
+/* A loop that fails fails the program. */
+static void run_both(struct run *run, const char *scene, struct wakeup *row)
+{
+	struct cyclictest *c = &run->cyclictest;
+	double cycles = run->wakeups->seconds * run->rate_hz;
+
+	open_run(run, scene);
+	if (run->with_cyclictest) {
+		/* Early in a second: both begin with the next one. */
+		if (now_ns() % INCISE_NS_PER_S > INCISE_NS_PER_S / 4)
+			sleep_until((now_ns() / INCISE_NS_PER_S + 1) * INCISE_NS_PER_S);
+		cyclictest_begin(c, run->rate_hz, run->wakeups->cpu,
+				 (uint64_t)llrint(cycles));
+	}
+	run_thread(run);
+	if (run->with_cyclictest)
+		row->no_cyclictest = cyclictest_end(c);
+	if (run->rc && !cli_stop)
+		cli_fail_with(&run->err);
+	row->loop =
+		lateness_of(run->stats.lateness_us, run->stats.lateness_max_ns * 1e-3);
+	row->median = quantile_of(&row->loop, 0.5);
+	row->p999 = quantile_of(&row->loop, 0.999);
+	row->tick_max_us = run->stats.tick_max_ns * 1e-3;
+	row->skipped = run->stats.skipped;
+	snprintf(row->title, sizeof(row->title), "99.9 %%: %.0f us", row->loop.p999);
+	if (!row->no_cyclictest) {
+		row->cyclictest = lateness_of(c->late_us, c->max_us);
+		row->ratio = row->loop.p999 / row->cyclictest.p999;
+		row->machine = blame(run);
+		snprintf(row->title, sizeof(row->title),
+			 "99.9 %%: %.0f us, cyclictest %.0f us", row->loop.p999,
+			 row->cyclictest.p999);
+	}
+}
+
+static void measure(const char *scene, enum load load, const struct wakeups *wakeups,
+		    const struct incise_realtime *realtime, struct wakeup *row)
+{
+	struct run *run = bench_alloc(1, sizeof(*run));
+	struct load_run beside = {0};
+
+	row->no_cyclictest = cyclictest_possible(realtime);
+	run->wakeups = wakeups;
+	run->realtime = realtime;
+	run->rate_hz = row->rate_hz;
+	run->with_cyclictest = !row->no_cyclictest;
+	row->no_load = load_begin(load, scene, wakeups->seconds, &beside);
+	if (!row->no_load) {
+		cli_progress("wake-ups at %g Hz, %s, %.3g s", row->rate_hz, row->load,
+			     wakeups->seconds);
+		run_both(run, scene, row);
+		row->frames_hz = load_end(&beside);
+	}
+	close_run(run);
+}
+
+static double scene_rate(const char *path)
+{
+	struct incise_error err = {0};
+	struct incise_scene *scene = incise_scene_load(path, NULL, &err);
+	double rate_hz;
+
+	if (!scene)
+		cli_fail_with(&err);
+	rate_hz = incise_scene_rate_hz(scene);
+	incise_scene_free(scene);
+	return rate_hz;
+}
+
+struct incise_realtime *wakeup_realtime(int cpu)
+{
+	const struct incise_realtime_setup setup = {
+		.policy = INCISE_REALTIME_FIFO,
+		.priority = INCISE_REALTIME_PRIORITY,
+		.cpu = cpu,
+		.period_ns = 1000000, /* of no account for this policy */
+	};
+	struct incise_error ignored = {0};
+
+	return incise_realtime_new(&setup, &ignored);
+}
+
+const char *wakeups_policy(bool realtime)
+{
+	return realtime ? "fifo" : "other";
+}
+
+/* A load takes seconds to begin and to end. */
+static bool wanted(enum load load, enum load only, bool quick, int rate)
+{
+	if (only != LOADS)
+		return load == only;
+	return !quick || (load <= LOAD_CPU && !rate);
+}
+
+void wakeups_measure(const char *scene, struct memory_file (*own)(double rate_hz),
+		     enum load only, bool quick, double seconds, struct wakeups *wakeups)
+{
+	static const struct lateness none = {NAN, NAN, NAN, NAN, NAN, NAN, 0, NULL, NULL};
+	const double rates_hz[] = {scene ? scene_rate(scene) : 1000, 4000};
+	struct incise_realtime *realtime;
+
+	*wakeups = (struct wakeups){.seconds = seconds, .cpu = harness_cpu()};
+	incise_realtime_prepare();
+	realtime = wakeup_realtime(wakeups->cpu);
+	wakeups->realtime = realtime;
+	cli_catch_signals();
+	for (int i = 0; i < (scene ? 1 : 2); i++) {
+		struct memory_file file = {0};
+
+		if (!scene)
+			file = own(rates_hz[i]);
+		for (int load = 0; load < LOADS && !cli_stop; load++) {
+			struct wakeup *row = &wakeups->row[wakeups->n];
+
+			if (!wanted((enum load)load, only, quick, i))
+				continue;
+			*row = (struct wakeup){
+				.load = load_names[load],
+				.rate_hz = rates_hz[i],
+				.loop = none,
+				.cyclictest = none,
+				.median = {.median = NAN},
+				.p999 = {.median = NAN},
+				.ratio = NAN,
+				.machine = NAN,
+				.tick_max_us = NAN,
+				.frames_hz = NAN,
+			};
+			measure(scene ? scene : file.path, (enum load)load, wakeups,
+				realtime, row);
+			wakeups->n++;
+		}
+		if (file.file)
+			fclose(file.file);
+	}
+	cli_progress_end();
+	incise_realtime_free(realtime);
+	if (cli_stop)
+		cli_fail("interrupted");
+}
