@@ -13,9 +13,9 @@ $(O)/obj/tools/stepper/%.o: cppflags += -Idriver
 $(O)/obj/tools/bench/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \
 	-ffile-prefix-map=% -fdebug-prefix-map=% -fmacro-prefix-map=%,$(CFLAGS))))"'
 
-# Pictures that incise bench has coded before it measures.
+# Frames that incise bench capture codes before it measures.
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
-$(O)/obj/tools/bench/jpeg_camera.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
+$(O)/obj/tools/bench/bench_capture.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 
 # Picture files: those that depth is calibrated from, and frames of a view.
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)

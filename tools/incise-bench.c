@@ -7,7 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "bench/bench.h"
-#include "bench/bench_capture.h"
 #include "bench/bench_extremes.h"
 #include "bench/bench_scenes.h"
 #include "bench/compare.h"
@@ -47,11 +46,6 @@ static const struct cli_option options[] = {
 
 /* --- not declared yet --- */
 
-static void capture(struct bench_run *run)
-{
-	bench_capture(run->operands[0], run->seconds, run->json, run->quick);
-}
-
 static void scenes(struct bench_run *run)
 {
 	if (run->profile && run->n_operands != 1)
@@ -72,12 +66,6 @@ static void extremes(struct bench_run *run)
 static const struct bench_plot some_plot[] = {{0}};
 
 static const struct bench
-	old_capture = {.name = "capture",
-		       .operands = "[RUN]",
-		       .summary = "how much of a core it takes to record all streams",
-		       .n_operands = 1,
-		       .takes_duration = true,
-		       .all = capture},
 	old_scenes = {.name = "scenes",
 		      .operands = "[SCENE...]",
 		      .summary = "what each scene leaves out, and what that saves",
@@ -95,7 +83,7 @@ static const struct bench
 
 static const struct bench *const benches[] = {
 	&bench_precision, &bench_training, &bench_stability, &bench_loop, &bench_pose,
-	&bench_timeline,  &bench_vision,   &old_capture,     &old_scenes, &old_extremes,
+	&bench_timeline,  &bench_vision,   &bench_capture,   &old_scenes, &old_extremes,
 };
 #define BENCHES (int)(sizeof(benches) / sizeof(*benches))
 

@@ -136,8 +136,8 @@ struct bench {
 	void (*all)(struct bench_run *run); /* of a benchmark that is not declared yet */
 };
 
-extern const struct bench bench_loop, bench_pose, bench_precision, bench_stability,
-	bench_timeline, bench_training, bench_vision;
+extern const struct bench bench_capture, bench_loop, bench_pose, bench_precision,
+	bench_stability, bench_timeline, bench_training, bench_vision;
 
 /* --- a run --- */
 

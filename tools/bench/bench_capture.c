@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * A capture of all streams in real time, and the same with parts left out; what a part takes
- * is the difference. Force and tracker are simulated by the process that is measured, which
- * is no part of a real capture: a run that reads all and keeps nothing tells what it takes.
+ * incise bench capture: how much of a core a capture of all streams takes in real time, and the
+ * same with parts left out; the cost of a part is the difference. Force and tracker are
+ * simulated by the process that is measured, which is no part of a real capture: a run that
+ * reads all and keeps nothing has that cost alone.
  *
  *   every 10 ms:  force, tracker ─ recorder ─ folder
- *   by the pump:  JPEG pictures, made before ─ camera.mkv, vision
+ *   by the pump:  JPEG frames, coded before ─ camera.mkv, vision
  */
 #include <errno.h>
 #include <limits.h>
@@ -15,21 +16,22 @@
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
+#include <incise/backend.h>
 #include <incise/calibration.h>
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/vision.h>
-#include "bench_capture.h"
+#include "bench.h"
 #include "../cli/cli.h"
-#include "metrics.h"
 #include "../cli/folder.h"
-#include "jpeg_camera.h"
 #include "../cli/json.h"
-#include "machine.h"
+#ifdef HAVE_JPEG
+#include <jpeglib.h>
+#endif
 
 #define SECONDS 7
 #define QUICK_SECONDS 0.8
-#define PARTS 12 /* of a run, for how sure its processor time is */
+#define PARTS 12 /* of a run, for the interval of its processor time */
 #define CAMERA_HZ 60
 #define POLL_NS 10000000LL /* as incise capture */
 #define BATCH 256
@@ -37,10 +39,165 @@
 
 #define RIG "sim:tracker_hz=240"
 
+/* --- a camera that gives JPEG frames, as USB cameras do: those of a virtual camera, coded
+ * before and given over and over, so that drawing and coding them is not measured --- */
+
+#define FRAMES 64 /* 1.3 s: in the air and in the tissue */
+#define QUALITY 85
+#define WAIT_MOST 24	     /* frames, for a reader that is held up */
+#define FIRST_NS 800000000LL /* the plunge of the first cut begins at 1 s */
+
+/* The one of this program: ops have no context. */
+static struct {
+	struct incise_camera_ops ops;
+	const struct incise_camera_ops *before;
+	struct incise_clock *clock;
+	int width, height;
+	struct {
+		unsigned char *bytes;
+		unsigned long size;
+	} frame[FRAMES];
+	int64_t start_ns;
+	uint64_t next, lost;
+} camera;
+
+#ifdef HAVE_JPEG
+static int code(const struct incise_camera_frame *frame, int k)
+{
+	struct jpeg_compress_struct jpeg;
+	struct jpeg_error_mgr error;
+
+	jpeg.err = jpeg_std_error(&error);
+	jpeg_create_compress(&jpeg);
+	jpeg_mem_dest(&jpeg, &camera.frame[k].bytes, &camera.frame[k].size);
+	jpeg.image_width = (JDIMENSION)frame->width;
+	jpeg.image_height = (JDIMENSION)frame->height;
+	jpeg.input_components = 3;
+	jpeg.in_color_space = JCS_RGB;
+	jpeg_set_defaults(&jpeg);
+	jpeg_set_quality(&jpeg, QUALITY, TRUE);
+	jpeg_start_compress(&jpeg, TRUE);
+	while (jpeg.next_scanline < jpeg.image_height) {
+		JSAMPROW row = (JSAMPROW)(frame->data +
+					  (size_t)jpeg.next_scanline * frame->stride);
+
+		jpeg_write_scanlines(&jpeg, &row, 1);
+	}
+	jpeg_finish_compress(&jpeg);
+	jpeg_destroy_compress(&jpeg);
+	return 0;
+}
+#else
+static int code(const struct incise_camera_frame *frame, int k)
+{
+	(void)frame;
+	(void)k;
+	return -EOPNOTSUPP;
+}
+#endif
+
+/* Frames of the virtual rig's script. */
+static void code_all(void)
+{
+	struct incise_error err = {0};
+	struct incise_rig *rig =
+		incise_rig_open("sim:clock=simulated", INCISE_RIG_CAMERA, &err);
+	struct incise_clock *clock;
+	struct incise_camera_frame frame;
+
+	if (!rig)
+		cli_fail_with(&err);
+	clock = incise_rig_clock(rig);
+	incise_clock_wait_until(clock, incise_clock_now(clock) + FIRST_NS);
+	incise_camera_newest(incise_rig_camera(rig), &frame);
+	for (int n = 0; n < FRAMES;) {
+		incise_clock_wait_until(clock, incise_clock_now(clock) + 10000000);
+		if (incise_camera_read(incise_rig_camera(rig), &frame) != 1)
+			continue;
+		camera.width = frame.width;
+		camera.height = frame.height;
+		if (code(&frame, n++))
+			cli_fail("this incise was built without libjpeg, which makes "
+				 "the pictures; build it where libjpeg-dev is");
+	}
+	incise_rig_close(rig);
+}
+
+static int64_t due_ns(uint64_t n)
+{
+	return camera.start_ns + (int64_t)((double)n * 1e9 / CAMERA_HZ);
+}
+
+static int camera_read(struct incise_camera *of_rig, struct incise_camera_frame *frame)
+{
+	int64_t now_ns = incise_clock_now(camera.clock);
+
+	(void)of_rig;
+	if (now_ns < due_ns(camera.next))
+		return 0;
+	/* As of a driver with so many buffers: a frame without one is lost. */
+	for (; now_ns >= due_ns(camera.next + WAIT_MOST); camera.next++)
+		camera.lost++;
+	*frame = (struct incise_camera_frame){
+		.t_ns = due_ns(camera.next),
+		.seq = camera.next,
+		.width = camera.width,
+		.height = camera.height,
+		.pixels = INCISE_PIXELS_MJPEG,
+		.data = camera.frame[camera.next % FRAMES].bytes,
+		.size = camera.frame[camera.next % FRAMES].size,
+	};
+	camera.next++;
+	return 1;
+}
+
+static void camera_info(const struct incise_camera *of_rig,
+			struct incise_camera_info *info)
+{
+	(void)of_rig;
+	*info = (struct incise_camera_info){
+		.rate_hz = CAMERA_HZ,
+		.width = camera.width,
+		.height = camera.height,
+		.pixels = INCISE_PIXELS_MJPEG,
+	};
+	snprintf(info->name, sizeof(info->name), "JPEG pictures made before");
+}
+
+static uint64_t camera_lost(const struct incise_camera *of_rig)
+{
+	(void)of_rig;
+	return camera.lost;
+}
+
+static void camera_close(struct incise_camera *of_rig)
+{
+	of_rig->ops = camera.before;
+	of_rig->ops->close(of_rig);
+}
+
+/* Have a rig's camera give the coded frames from now on, until it is closed. */
+static void camera_take_over(struct incise_camera *of_rig, struct incise_clock *clock)
+{
+	camera.ops = (struct incise_camera_ops){
+		.read = camera_read,
+		.info = camera_info,
+		.lost = camera_lost,
+		.close = camera_close,
+	};
+	camera.before = of_rig->ops;
+	camera.clock = clock;
+	camera.start_ns = incise_clock_now(clock);
+	camera.next = camera.lost = 0;
+	of_rig->ops = &camera.ops;
+}
+
+/* --- runs --- */
+
 static const struct part {
 	const char *name, *rig;
 	bool camera, recorder, vision;
-	int base; /* the run that tells what the rig itself takes */
+	int base; /* the run with the cost of the rig itself */
 } parts[] = {
 	{"full", RIG, true, true, true, 4},
 	{"without_vision", RIG, true, true, false, 4},
@@ -51,14 +208,15 @@ static const struct part {
 };
 #define RUNS (int)(sizeof(parts) / sizeof(*parts))
 
-/* What a run is made of, and what it counts. */
-struct run {
+struct row {
+	const char *name, *failed;
 	struct incise_rig *rig;
-	struct incise_recorder *recorder; /* NULL: what is read is dropped */
-	double cpu_percent;
+	struct incise_recorder *recorder; /* NULL: samples are read and dropped */
+	double cpu_percent, net_percent;
 	double part_percent[PARTS];
 	int parts;
-	double late_ms; /* the latest wake */
+	struct harness_spread cpu, memory; /* with their intervals */
+	double late_ms;			   /* the latest wake */
 	double held_up; /* share of the time that wakes were late, by a period or more */
 	double rss_MB[2]; /* memory at a quarter of the time, and at its end */
 	bool done;
@@ -68,20 +226,19 @@ struct run {
 	struct incise_camera_info camera_info;
 };
 
-/* CPU time, ns: CLOCK_PROCESS_CPUTIME_ID or CLOCK_THREAD_CPUTIME_ID. */
-static double cpu_ns(clockid_t clock)
+static double cpu_ns(void)
 {
 	struct timespec t;
 
-	clock_gettime(clock, &t);
+	clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
 	return t.tv_sec * 1e9 + t.tv_nsec;
 }
 
-/* Read what there is and keep nothing. */
-static int drop_samples(struct run *run)
+/* Read all samples and keep none. */
+static int drop_samples(struct row *row)
 {
-	struct incise_force *force = incise_rig_force(run->rig);
-	struct incise_tracker *tracker = incise_rig_tracker(run->rig);
+	struct incise_force *force = incise_rig_force(row->rig);
+	struct incise_tracker *tracker = incise_rig_tracker(row->rig);
 	struct incise_force_sample samples[BATCH];
 	struct incise_tracker_sample records[BATCH];
 	int n;
@@ -90,30 +247,44 @@ static int drop_samples(struct run *run)
 		n = incise_force_read(force, samples, BATCH);
 		if (n < 0)
 			return n;
-		run->force += n;
+		row->force += n;
 	} while (n == BATCH);
 	do {
 		n = incise_tracker_read(tracker, records, BATCH);
 		if (n < 0)
 			return n;
-		run->tracker += n;
+		row->tracker += n;
 	} while (n == BATCH);
-	run->force_lost = incise_force_lost(force);
-	run->tracker_lost = incise_tracker_lost(tracker);
+	row->force_lost = incise_force_lost(force);
+	row->tracker_lost = incise_tracker_lost(tracker);
 	return 0;
 }
 
-static int take_frame(struct run *run)
+static int drop_frame(struct row *row)
 {
-	struct incise_camera *camera = incise_rig_camera(run->rig);
+	struct incise_camera *of_rig = incise_rig_camera(row->rig);
 	struct incise_camera_frame frame;
-	int rc = camera && !run->recorder ? incise_camera_read(camera, &frame) : 0;
+	int rc = of_rig ? incise_camera_read(of_rig, &frame) : 0;
 
 	if (rc <= 0)
 		return rc;
-	run->frames++;
-	run->frames_lost = incise_camera_lost(camera);
+	row->frames++;
+	row->frames_lost = incise_camera_lost(of_rig);
 	return 0;
+}
+
+/* Read what there is, by the recorder or in its place. */
+static int poll_streams(struct row *row, struct incise_error *err)
+{
+	int rc;
+
+	if (row->recorder)
+		return incise_recorder_poll(row->recorder, err);
+	rc = drop_samples(row);
+	if (rc)
+		return incise_error_set(err, -rc, "the virtual rig: %s", strerror(-rc));
+	rc = drop_frame(row);
+	return rc ? incise_error_set(err, -rc, "a picture: %s", strerror(-rc)) : 0;
 }
 
 /* Memory of this process that is in use, MB. */
@@ -131,122 +302,116 @@ static double memory_MB(void)
 }
 
 /* Processor time of each part of the run. */
-static void end_part(struct run *run, int64_t now, int64_t *part_begin, double *part_cpu)
+static void end_part(struct row *row, int64_t now, int64_t *part_begin, double *part_cpu)
 {
-	double cpu = cpu_ns(CLOCK_PROCESS_CPUTIME_ID);
+	double cpu = cpu_ns();
 
-	if (run->parts < PARTS && now > *part_begin)
-		run->part_percent[run->parts++] =
+	if (row->parts < PARTS && now > *part_begin)
+		row->part_percent[row->parts++] =
 			100 * (cpu - *part_cpu) / (double)(now - *part_begin);
 	*part_begin = now;
 	*part_cpu = cpu;
 }
 
 /* Opening and closing are not measured: they happen once. */
-static int capture(struct run *run, double seconds, struct incise_error *err)
+static int capture(struct row *row, double seconds, struct incise_error *err)
 {
-	struct incise_clock *clock = incise_rig_clock(run->rig);
+	struct incise_clock *clock = incise_rig_clock(row->rig);
 	int64_t length_ns = (int64_t)(seconds * INCISE_NS_PER_S), start, now, next, part;
 	double cpu, part_cpu, held_up_ns = 0;
 	int rc = 0;
 
 	start = now = next = part = incise_clock_now(clock);
-	cpu = part_cpu = cpu_ns(CLOCK_PROCESS_CPUTIME_ID);
+	cpu = part_cpu = cpu_ns();
 	while (!rc && !cli_stop && now - start < length_ns) {
 		next = now > next + POLL_NS ? now : next + POLL_NS;
 		incise_clock_wait_until(clock, next);
 		now = incise_clock_now(clock);
-		run->late_ms = fmax(run->late_ms, (now - next) * 1e-6);
+		row->late_ms = fmax(row->late_ms, (now - next) * 1e-6);
 		if (now - next >= POLL_NS)
 			held_up_ns += now - next;
-		if (run->recorder)
-			rc = incise_recorder_poll(run->recorder, err);
-		else if ((rc = drop_samples(run)))
-			incise_error_set(err, -rc, "the virtual rig: %s", strerror(-rc));
-		if (!rc && (rc = take_frame(run)))
-			incise_error_set(err, -rc, "a picture: %s", strerror(-rc));
+		rc = poll_streams(row, err);
 		if (now - part >= length_ns / PARTS)
-			end_part(run, now, &part, &part_cpu);
-		if (!run->rss_MB[0] && now - start >= length_ns / 4)
-			run->rss_MB[0] = memory_MB();
+			end_part(row, now, &part, &part_cpu);
+		if (!row->rss_MB[0] && now - start >= length_ns / 4)
+			row->rss_MB[0] = memory_MB();
 	}
-	run->rss_MB[1] = memory_MB();
-	run->cpu_percent =
-		100 * (cpu_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu) / (double)(now - start);
-	run->held_up = held_up_ns / (double)(now - start);
+	row->rss_MB[1] = memory_MB();
+	row->cpu_percent = 100 * (cpu_ns() - cpu) / (double)(now - start);
+	row->held_up = held_up_ns / (double)(now - start);
 	return rc;
 }
 
-/* Make what this run is of. Returns 0 or a negative errno. */
-static int open_run(struct run *run, const struct part *part, struct jpeg_camera *camera,
-		    const char *folder, struct incise_error *err)
+/* Returns 0 or a negative errno. */
+static int open_run(struct row *row, const struct part *part, const char *folder,
+		    struct incise_error *err)
 {
 	struct incise_calibration calibration;
 	struct incise_recorder_setup setup = {.calibration = &calibration};
 	struct incise_vision_setup vision;
 	char path[PATH_MAX];
 
-	run->rig = incise_rig_open(part->rig,
+	row->rig = incise_rig_open(part->rig,
 				   INCISE_RIG_TRACKER | INCISE_RIG_FORCE |
 					   (part->camera ? INCISE_RIG_CAMERA : 0),
 				   err);
-	if (!run->rig)
+	if (!row->rig)
 		return -errno;
-	incise_force_info(incise_rig_force(run->rig), &run->force_info);
-	incise_tracker_info(incise_rig_tracker(run->rig), &run->tracker_info);
+	incise_force_info(incise_rig_force(row->rig), &row->force_info);
+	incise_tracker_info(incise_rig_tracker(row->rig), &row->tracker_info);
 	incise_calibration_nominal(&calibration);
-	if (part->vision && !incise_rig_vision(run->rig, &vision))
+	if (part->vision && !incise_rig_vision(row->rig, &vision))
 		setup.vision = &vision;
 	if (part->camera) {
-		jpeg_camera_take_over(camera, incise_rig_camera(run->rig),
-				      incise_rig_clock(run->rig));
-		incise_camera_info(incise_rig_camera(run->rig), &run->camera_info);
+		camera_take_over(incise_rig_camera(row->rig), incise_rig_clock(row->rig));
+		incise_camera_info(incise_rig_camera(row->rig), &row->camera_info);
 	}
 	if (part->recorder) {
 		snprintf(path, sizeof(path), "%s/%s.rec", folder, part->name);
-		run->recorder = incise_recorder_new(path, run->rig, &setup, err);
-		if (!run->recorder)
+		row->recorder = incise_recorder_new(path, row->rig, &setup, err);
+		if (!row->recorder)
 			return -errno;
 	}
 	return 0;
 }
 
-static int end_recorder(struct run *run, struct incise_error *err)
+static int end_recorder(struct row *row, struct incise_error *err)
 {
 	struct incise_recorder_stats stats;
 	struct incise_error ignored = {0};
-	int rc = incise_recorder_end(run->recorder, err), closed;
+	int rc = incise_recorder_end(row->recorder, err), closed;
 
-	incise_recorder_stats(run->recorder, &stats);
-	run->force = stats.force;
-	run->tracker = stats.tracker;
-	run->frames = stats.frames;
-	run->force_lost = stats.force_lost;
-	run->tracker_lost = stats.tracker_lost;
-	run->frames_lost = stats.frames_lost;
-	run->unlooked = stats.frames_unlooked;
-	closed = incise_recorder_close(run->recorder, rc ? &ignored : err);
+	incise_recorder_stats(row->recorder, &stats);
+	row->force = stats.force;
+	row->tracker = stats.tracker;
+	row->frames = stats.frames;
+	row->force_lost = stats.force_lost;
+	row->tracker_lost = stats.tracker_lost;
+	row->frames_lost = stats.frames_lost;
+	row->unlooked = stats.frames_unlooked;
+	closed = incise_recorder_close(row->recorder, rc ? &ignored : err);
 	return rc ? rc : closed;
 }
 
-static int do_run(struct run *run, const struct part *part, struct jpeg_camera *camera,
-		  const char *folder, double seconds, struct incise_error *err)
+static int run_part(struct row *row, const struct part *part, const char *folder,
+		    double seconds, struct incise_error *err)
 {
 	struct incise_error ignored = {0};
-	int rc = open_run(run, part, camera, folder, err), ended;
+	int rc = open_run(row, part, folder, err), ended;
 
 	if (!rc)
-		rc = capture(run, seconds, err);
+		rc = capture(row, seconds, err);
 	if (rc > 0) /* the disk is nearly full */
 		rc = -err->code;
-	ended = run->recorder ? end_recorder(run, rc ? &ignored : err) : 0;
-	incise_rig_close(run->rig);
+	ended = row->recorder ? end_recorder(row, rc ? &ignored : err) : 0;
+	incise_rig_close(row->rig);
+	row->name = part->name;
+	row->done = true;
 	return rc ? rc : ended;
 }
 
 /* All runs; the recordings go into a folder that is gone afterwards, come what may. */
-static void run_all(struct run *runs, struct jpeg_camera *camera, const char *only,
-		    double seconds)
+static void run_all(struct row *rows, const char *only, double seconds)
 {
 	struct incise_error err = {0};
 	char folder[PATH_MAX - 80];
@@ -257,8 +422,7 @@ static void run_all(struct run *runs, struct jpeg_camera *camera, const char *on
 		if (only && strcmp(only, parts[i].name))
 			continue;
 		cli_progress("%s, %.2g s", parts[i].name, seconds);
-		rc = do_run(&runs[i], &parts[i], camera, folder, seconds, &err);
-		runs[i].done = true;
+		rc = run_part(&rows[i], &parts[i], folder, seconds, &err);
 	}
 	cli_progress_end();
 	folder_remove(folder);
@@ -268,134 +432,117 @@ static void run_all(struct run *runs, struct jpeg_camera *camera, const char *on
 		cli_fail_with(&err);
 }
 
-/* Of the capture alone: without what the virtual rig takes in the same run's time. */
-static double net(const struct run *runs, int i)
+/* --- report --- */
+
+static const struct bench_table rows_table = {
+	.key = "rows",
+	.row_bytes = sizeof(struct row),
+	.columns = {COLUMN(row, "name", name, "%-15s", "run"),
+		    COLUMN(row, "cpu_percent", cpu_percent, "%6.2f", "CPU %"),
+		    COLUMN(row, "net_percent", net_percent, "%6.2f", "net %"),
+		    COLUMN(row, "force", force, "%9.0f", "force"),
+		    COLUMN(row, "force_lost", force_lost, "%5.0f", "lost"),
+		    COLUMN(row, "tracker", tracker, "%8.0f", "tracker"),
+		    COLUMN(row, "tracker_lost", tracker_lost, "%5.0f", "lost"),
+		    COLUMN(row, "frames", frames, "%7.0f", "frames"),
+		    COLUMN(row, "frames_lost", frames_lost, "%5.0f", "lost"),
+		    COLUMN(row, "late_ms", late_ms, "%8.1f", "late ms"),
+		    COLUMN(row, "quarter_MB", rss_MB[0], "%7.1f", "MB 1/4"),
+		    COLUMN(row, "end_MB", rss_MB[1], "%7.1f", "MB end"),
+		    COLUMN(row, "failed", failed)},
+	.metrics = {METRIC(MEASURED, row, cpu, "%", "{name} processor"),
+		    METRIC(MEASURED, row, memory, "MB", "{name} memory")},
+};
+
+/* Rows of runs that were done, one after the other. Returns how many. */
+static int set_rows(struct row *rows, struct row *done)
 {
-	const struct run *base = &runs[parts[i].base];
-
-	return base->done ? runs[i].cpu_percent - base->cpu_percent : NAN;
-}
-
-static const struct run *first(const struct run *runs)
-{
-	while (!runs->done)
-		runs++;
-	return runs;
-}
-
-static void print_text(const struct run *runs, const struct machine *machine,
-		       double seconds, const struct jpeg_camera *camera)
-{
-	const struct run *full = first(runs);
-	int n;
-	size_t bytes = jpeg_camera_bytes(camera, &n);
-
-	printf("%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz, JPEG of %.0f "
-	       "kB; %.2g s each, in real time\n%-15s %6s %6s %9s %5s %8s %5s %7s %5s %8s %7s "
-	       "%7s\n",
-	       machine->cpu, full->force_info.rate_hz, full->tracker_info.rate_hz,
-	       full->camera_info.width, full->camera_info.height,
-	       full->camera_info.rate_hz, (double)bytes / n / 1e3, seconds, "run",
-	       "CPU %", "net %", "force", "lost", "tracker", "lost", "frames", "lost",
-	       "late ms", "MB 1/4", "MB end");
-	for (int i = 0; i < RUNS; i++)
-		if (runs[i].done)
-			printf("%-15s %6.2f %6.2f %9llu %5llu %8llu %5llu %7llu %5llu %8.1f %7.1f "
-			       "%7.1f\n",
-			       parts[i].name, runs[i].cpu_percent, net(runs, i),
-			       (unsigned long long)runs[i].force,
-			       (unsigned long long)runs[i].force_lost,
-			       (unsigned long long)runs[i].tracker,
-			       (unsigned long long)runs[i].tracker_lost,
-			       (unsigned long long)runs[i].frames,
-			       (unsigned long long)runs[i].frames_lost, runs[i].late_ms,
-			       runs[i].rss_MB[0], runs[i].rss_MB[1]);
-	printf("net: without what the virtual rig itself takes in the runs virtual_*\n"
-	       "pictures that vision had no time for: %llu\n",
-	       (unsigned long long)full->unlooked);
-}
-
-static json_t *figures_of(const struct run *runs)
-{
-	json_t *figures = json_array();
-	struct harness_spread cpu, memory;
+	int n = 0;
 
 	for (int i = 0; i < RUNS; i++) {
-		const double *rss = runs[i].rss_MB;
+		const struct row *base = &rows[parts[i].base];
+		struct row *row = &done[n];
 
-		if (!runs[i].done)
+		if (!rows[i].done)
 			continue;
-		harness_spread(runs[i].part_percent, runs[i].parts, &cpu);
-		metrics_measured(figures, &cpu, "%", "%s processor", parts[i].name);
-		memory = (struct harness_spread){.median = rss[1],
-						 .low = fmin(rss[0], rss[1]),
-						 .high = fmax(rss[0], rss[1])};
-		metrics_measured(figures, &memory, "MB", "%s memory", parts[i].name);
+		*row = rows[i];
+		/* Of the capture alone: without the cost of the virtual rig. */
+		row->net_percent =
+			base->done ? row->cpu_percent - base->cpu_percent : NAN;
+		harness_spread(row->part_percent, row->parts, &row->cpu);
+		row->memory = (struct harness_spread){
+			.median = row->rss_MB[1],
+			.low = fmin(row->rss_MB[0], row->rss_MB[1]),
+			.high = fmax(row->rss_MB[0], row->rss_MB[1]),
+		};
+		n++;
 	}
-	return figures;
+	return n;
 }
 
-static void print_json(const struct run *runs, const struct machine *machine,
-		       double seconds, bool quick)
+static void report(struct bench_run *run, const struct row *rows, int n, double seconds)
 {
-	const struct run *full = first(runs);
-	json_t *list = json_array();
+	const struct incise_camera_info *info = &rows->camera_info;
+	double bytes = 0;
 
-	for (int i = 0; i < RUNS; i++)
-		if (runs[i].done)
-			json_array_append_new(
-				list,
-				json_pack("{ss so so sI sI sI sI sI sI so so so sn}",
-					  "name", parts[i].name, "cpu_percent",
-					  json_number(runs[i].cpu_percent), "net_percent",
-					  json_number(net(runs, i)), "force",
-					  (json_int_t)runs[i].force, "force_lost",
-					  (json_int_t)runs[i].force_lost, "tracker",
-					  (json_int_t)runs[i].tracker, "tracker_lost",
-					  (json_int_t)runs[i].tracker_lost, "frames",
-					  (json_int_t)runs[i].frames, "frames_lost",
-					  (json_int_t)runs[i].frames_lost, "late_ms",
-					  json_number(runs[i].late_ms), "quarter_MB",
-					  json_number(runs[i].rss_MB[0]), "end_MB",
-					  json_number(runs[i].rss_MB[1]), "failed"));
-	json_print(json_pack(
-		"{so sb so so so so si si sI so so}", "machine", machine_json(machine),
-		"quick", quick, "seconds", json_number(seconds), "force_hz",
-		json_number(full->force_info.rate_hz), "tracker_hz",
-		json_number(full->tracker_info.rate_hz), "camera_hz",
-		json_number(full->camera_info.rate_hz), "width", full->camera_info.width,
-		"height", full->camera_info.height, "unlooked",
-		(json_int_t)full->unlooked, "rows", list, "figures", figures_of(runs)));
+	for (int i = 0; i < FRAMES; i++)
+		bytes += (double)camera.frame[i].size;
+	bench_value(run, "seconds", json_real(seconds));
+	bench_value(run, "force_hz", json_number(rows->force_info.rate_hz));
+	bench_value(run, "tracker_hz", json_number(rows->tracker_info.rate_hz));
+	bench_value(run, "camera_hz", json_number(info->rate_hz));
+	bench_value(run, "width", json_integer(info->width));
+	bench_value(run, "height", json_integer(info->height));
+	bench_value(run, "unlooked", json_integer((json_int_t)rows->unlooked));
+	bench_text(
+		run,
+		"%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz, JPEG of %.0f "
+		"kB; %.2g s each, in real time\n",
+		bench_machine(run, "cpu"), rows->force_info.rate_hz,
+		rows->tracker_info.rate_hz, info->width, info->height, info->rate_hz,
+		bytes / FRAMES / 1e3, seconds);
+	bench_table(run, &rows_table, rows, n);
+	bench_text(
+		run,
+		"net: without what the virtual rig itself takes in the runs virtual_*\n"
+		"pictures that vision had no time for: %llu\n",
+		(unsigned long long)rows->unlooked);
 }
 
-void bench_capture(const char *only, double seconds, bool json, bool quick)
+static void run(struct bench_run *run)
 {
-	static struct run runs[RUNS]; /* large */
-	struct incise_error err = {0};
-	struct jpeg_camera *camera;
-	struct machine machine;
+	static struct row rows[RUNS], done[RUNS]; /* large */
+	const char *only = run->n_operands ? run->operands[0] : NULL;
+	double seconds = run->quick ? QUICK_SECONDS : SECONDS;
+	int n = 0;
 
-	for (int i = 0; only && strcmp(only, parts[i].name);)
-		if (++i == RUNS)
-			cli_usage("'%s' is no run of capture; see incise-bench(1)", only);
-	if (!(seconds > 0))
-		seconds = quick ? QUICK_SECONDS : SECONDS;
-	machine_init(&machine);
-	/* Coding pictures takes a second where others are busy. */
+	while (only && n < RUNS && strcmp(only, parts[n].name))
+		n++;
+	if (n == RUNS)
+		cli_usage("'%s' is no run of capture; see incise-bench(1)", only);
+	if (run->seconds > 0)
+		seconds = run->seconds;
+	/* Coding frames takes a second where others are busy. */
 	cli_catch_signals();
-	camera = jpeg_camera_new(CAMERA_HZ, &err);
-	if (!camera)
-		cli_fail_with(&err);
-	run_all(runs, camera, only, seconds);
-	if (json)
-		print_json(runs, &machine, seconds, quick);
-	else
-		print_text(runs, &machine, seconds, camera);
-	jpeg_camera_free(camera);
-	for (int i = 0; i < RUNS; i++)
-		if (runs[i].held_up > HELD_UP)
+	code_all();
+	run_all(rows, only, seconds);
+	n = set_rows(rows, done);
+	report(run, done, n, seconds);
+	for (int i = 0; i < FRAMES; i++)
+		free(camera.frame[i].bytes);
+	for (int i = 0; i < n; i++)
+		if (done[i].held_up > HELD_UP)
 			cli_warn(
 				"%s: the machine held it up for %.0f %% of the time; close other "
 				"programs and measure again",
-				parts[i].name, 100 * runs[i].held_up);
+				done[i].name, 100 * done[i].held_up);
 }
+
+const struct bench bench_capture = {
+	.name = "capture",
+	.operands = "[RUN]",
+	.summary = "how much of a core it takes to record all streams",
+	.n_operands = 1,
+	.takes_duration = true,
+	.run = run,
+};
