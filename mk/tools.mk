@@ -17,6 +17,10 @@ $(O)/obj/tools/bench/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst "
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/bench/bench_capture.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 
+# The report of incise bench all as HTML.
+has_cmark := $(shell $(PKG_CONFIG) --exists libcmark-gfm && echo yes)
+$(O)/obj/tools/bench/report_html.o: cppflags += $(if $(has_cmark),-DHAVE_CMARK)
+
 # Picture files: those that depth is calibrated from, and frames of a view.
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/calibrate/depth_picture.o $(O)/obj/tools/cli/png_file.o: cppflags += $(if $(has_png),-DHAVE_PNG)
@@ -66,6 +70,7 @@ $(filter $(O)/bin/incise-bench%,$(programs)): tool_inside = $(O)/lib/libincise-t
 $(filter $(O)/bin/incise-bench%,$(programs)): $(O)/lib/libincise-tests.a
 tool_libs := $(patsubst %,-l%,$(libraries))
 tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
+$(O)/bin/incise-bench-all: tool_more_libs += $(if $(has_cmark),$(shell $(PKG_CONFIG) --libs libcmark-gfm))
 
 $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(libraries),$(O)/lib/lib$(lib).so)
 	@mkdir -p $(@D)

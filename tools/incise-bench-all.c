@@ -1,26 +1,38 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench all --report DIR: every word of incise bench, one after the other, as one
- * report that anyone can repeat. Each word is a program of its own, so that none meets what
- * another has left in memory.
+ * incise bench all --report DIR: every benchmark of incise bench, one after the other, as one
+ * report that anyone can repeat. Each is a program of its own, so that none meets what another
+ * has left in memory. A new report is made within the folder, hidden, and takes the old one's
+ * place when it is whole.
  *
- *   incise-bench WORD --json ─▶ DIR/data/WORD.json ─┐
- *                     --plot ─▶ DIR/pictures/       ├─▶ DIR/report.{json,html,md}
+ *   incise-bench WORD --json ─▶ data/WORD.json ─┐
+ *                     --plot ─▶ pictures/       ├─▶ report.{json,html,md}
+ *
+ *   DIR/.unfinished/{data,pictures,report.*}  ─▶  DIR/{data,pictures,report.*}
  */
+#include <dirent.h>
 #include <errno.h>
 #include <getopt.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
 #include <time.h>
+#include <unistd.h>
+#include <incise/outfile.h>
 #include <incise/version.h>
-#include "cli/cli.h"
 #include "bench/compare.h"
-#include "cli/json.h"
 #include "bench/machine.h"
-#include "bench/report_folder.h"
-#include "bench/report_measure.h"
-#include "bench/report_sections.h"
+#include "bench/report.h"
+#include "cli/child.h"
+#include "cli/cli.h"
+#include "cli/file.h"
+#include "cli/folder.h"
+#include "cli/json.h"
+#include "cli/plot.h"
+#include "cli/stopwatch.h"
 
 enum { OPT_REPORT = CLI_LONG, OPT_FROM, OPT_AGAINST, OPT_ONLY, OPT_QUICK, OPT_JSON };
 
@@ -58,6 +70,465 @@ struct job {
 	bool quick, json;
 };
 
+/* "FOLDER/PARTNAMESUFFIX" */
+static char *path_of(const char *folder, const char *part, const char *name,
+		     const char *suffix)
+{
+	char *path;
+
+	if (asprintf(&path, "%s/%s%s%s", folder, part, name, suffix) < 0)
+		cli_fail("no memory");
+	return path;
+}
+
+/* --- the folder --- */
+
+static const char *const parts[] = {"data", "pictures", "report.json", "report.html",
+				    "report.md"};
+#define PARTS (int)(sizeof(parts) / sizeof(*parts))
+
+struct folder {
+	const char *path;
+	char *unfinished;
+	bool made; /* by us */
+};
+
+static void remove_all(const char *path)
+{
+	int rc = folder_remove(path);
+
+	if (rc && rc != -ENOENT)
+		cli_fail("%s: cannot be removed: %s", path, strerror(-rc));
+}
+
+/* Returns whether it was not there. */
+static bool make(const char *path)
+{
+	if (!mkdir(path, 0777))
+		return true;
+	if (errno != EEXIST)
+		cli_fail("%s: %s", path, strerror(errno));
+	return false;
+}
+
+/* A report, or one that was never finished; or nothing at all. */
+static bool may_be_replaced(const char *path)
+{
+	DIR *folder = opendir(path);
+	struct dirent *entry;
+	bool empty = true;
+	char *file = path_of(path, "", "report.json", "");
+	json_t *report = json_read(file, NULL);
+	bool is_report = json_is_object(json_object_get(report, "words"));
+
+	free(file);
+	json_decref(report);
+	if (!folder)
+		cli_fail("%s: %s", path, strerror(errno));
+	while ((entry = readdir(folder)))
+		empty &= !strcmp(entry->d_name, ".") || !strcmp(entry->d_name, "..") ||
+			 !strcmp(entry->d_name, ".unfinished");
+	closedir(folder);
+	return empty || is_report;
+}
+
+/* Prepare a new report; fails the program when there is something else at that path. */
+static struct folder folder_begin(const char *path)
+{
+	struct folder folder = {path, path_of(path, "", ".unfinished", ""), false};
+	char *above = strdup(path);
+
+	if (!above)
+		cli_fail("no memory");
+	for (char *slash = strchr(above + 1, '/'); slash;
+	     slash = strchr(slash + 1, '/')) {
+		*slash = 0;
+		make(above);
+		*slash = '/';
+	}
+	free(above);
+	folder.made = make(path);
+	if (!folder.made && !may_be_replaced(path))
+		cli_fail("%s: is there, and is no report; give another --report DIR",
+			 path);
+	remove_all(folder.unfinished);
+	make(folder.unfinished);
+	for (int i = 0; i < 2; i++) {
+		char *part = path_of(folder.unfinished, "", parts[i], "");
+
+		make(part);
+		free(part);
+	}
+	return folder;
+}
+
+/* Put the new report in the old one's place. */
+static void folder_finish(const struct folder *folder)
+{
+	for (int i = 0; i < PARTS; i++) {
+		char *from = path_of(folder->unfinished, "", parts[i], ""),
+		     *to = path_of(folder->path, "", parts[i], "");
+
+		remove_all(to);
+		if (rename(from, to) && errno != ENOENT)
+			cli_fail("%s: %s", to, strerror(errno));
+		free(from);
+		free(to);
+	}
+	remove_all(folder->unfinished);
+}
+
+static void folder_abandon(const struct folder *folder)
+{
+	remove_all(folder->unfinished);
+	if (folder->made)
+		rmdir(folder->path);
+}
+
+/* report.json; fails the program where there is none. */
+static json_t *load(const char *path)
+{
+	char *file = path_of(path, "", "report.json", "");
+	struct incise_error err = {0};
+	json_t *report = json_read(file, &err);
+
+	if (!report)
+		cli_fail_with(&err);
+	if (!json_is_object(json_object_get(report, "words")))
+		cli_fail("%s: is no report of 'incise bench all'", file);
+	free(file);
+	return report;
+}
+
+static struct incise_outfile *open_part(const char *path, const char *name,
+					struct incise_error *err)
+{
+	char *file = path_of(path, "", name, "");
+	struct incise_outfile *part = incise_outfile_open(file, err);
+
+	free(file);
+	return part;
+}
+
+/* --- the text of the report --- */
+
+#define FAILED_MAX 40 /* rows of a benchmark in the text; the JSON has all */
+
+/* The keys that tell a row from its neighbours: its texts, and its settings. */
+static void failed_name(const json_t *row, char *name, size_t size)
+{
+	static const char settings[] = " rate_hz tracker_hz delay_ms gap_ms window_s "
+				       "drift_ppm K_N_m K_N_mm stiffness_N_mm ";
+	const json_t *value;
+	const char *key;
+	size_t n = 0;
+
+	*name = 0;
+	json_object_foreach((json_t *)row, key, value)
+	{
+		const char *text = json_string_value(value);
+		char word[80], number[64];
+
+		snprintf(word, sizeof(word), " %s ", key);
+		if (n >= size || !strcmp(key, "failed") ||
+		    (!text && !(json_is_number(value) && strstr(settings, word))))
+			continue;
+		report_number(json_number_value(value), 4, number, sizeof(number));
+		n += (size_t)snprintf(name + n, size - n, "%s%s%s%s", n ? ", " : "",
+				      text ? "" : key, text ? "" : " ",
+				      text ? text : number);
+	}
+}
+
+/* Rows with a reason why they failed, wherever they are, as {"word", "row", "why"}. */
+static void find_failed(const char *word, const json_t *value, json_t *rows)
+{
+	const char *why = json_string_value(json_object_get(value, "failed")), *key;
+	const json_t *member;
+	char name[200];
+	size_t i;
+
+	if (why && *why) {
+		failed_name(value, name, sizeof(name));
+		json_array_append_new(rows, json_pack("{ss so ss}", "word", word, "row",
+						      json_text(name), "why", why));
+	}
+	json_array_foreach((json_t *)value, i, member) find_failed(word, member, rows);
+	json_object_foreach((json_t *)value, key, member)
+	{
+		if (strcmp(key, "integrators"))
+			find_failed(word, member, rows);
+	}
+}
+
+static const char *text_at(const json_t *object, const char *key)
+{
+	const char *text = json_string_value(json_object_get(object, key));
+
+	return text ? text : "";
+}
+
+/* {"lines", "rows"}: benchmarks that failed and warnings; rows. */
+static json_t *failures(const json_t *report)
+{
+	json_t *lines = json_array(), *all = json_array();
+	const json_t *run, *json, *line;
+	const char *word;
+	size_t i;
+
+	json_object_foreach(json_object_get(report, "runs"), word, run)
+	{
+		if (strcmp(text_at(run, "state"), "measured"))
+			json_array_append_new(lines, json_sprintf("%s: %s: %s", word,
+								  text_at(run, "state"),
+								  text_at(run, "why")));
+		json_array_foreach(json_object_get(run, "warnings"), i, line)
+			json_array_append_new(lines,
+					      json_sprintf("%s: %s", word,
+							   json_string_value(line)));
+	}
+	json_object_foreach(json_object_get(report, "words"), word, json)
+	{
+		json_t *rows = json_array();
+		int more;
+
+		find_failed(word, json, rows);
+		more = (int)json_array_size(rows) - FAILED_MAX;
+		while (json_array_size(rows) > FAILED_MAX)
+			json_array_remove(rows, FAILED_MAX);
+		if (more > 0)
+			json_array_append_new(rows,
+					      json_pack("{ss so ss}", "word", word, "row",
+							json_sprintf("%d more", more),
+							"why", "as in its JSON"));
+		json_array_extend(all, rows);
+		json_decref(rows);
+	}
+	return json_pack("{so so}", "lines", lines, "rows", all);
+}
+
+/* One that cannot be made stays away, and the line says why. */
+static int write_html(const char *path, const char *markdown, struct incise_error *err)
+{
+	struct incise_outfile *file = open_part(path, "report.html", err);
+	int rc;
+
+	if (!file)
+		return -errno;
+	rc = report_html(markdown, path, incise_outfile_stream(file), err);
+	if (!rc)
+		return incise_outfile_commit(file, err);
+	incise_outfile_abort(file);
+	if (rc != -EOPNOTSUPP)
+		return rc;
+	cli_warn("%s/report.html is left out: %s", path, err->text);
+	return 0;
+}
+
+/* report.json, and report.md and report.html of it, each of them whole or not at all. They are
+ * of what a reader of report.json gets, rounded as it is. */
+static int write_report(const char *path, const json_t *report, struct incise_error *err)
+{
+	struct incise_outfile *file = open_part(path, "report.json", err);
+	char *markdown = NULL;
+	size_t size;
+	json_t *read;
+	FILE *out;
+	int rc;
+
+	if (!file)
+		return -errno;
+	json_dumpf(report, incise_outfile_stream(file),
+		   JSON_INDENT(1) | JSON_REAL_PRECISION(12));
+	fputc('\n', incise_outfile_stream(file));
+	rc = incise_outfile_commit(file, err);
+	if (rc)
+		return rc;
+	read = load(path);
+	out = open_memstream(&markdown, &size);
+	if (!out)
+		cli_fail("no memory");
+	json_object_set_new(read, "failures", failures(read));
+	report_markdown(read, path, out);
+	fclose(out);
+	json_decref(read);
+	rc = write_html(path, markdown, err);
+	file = rc ? NULL : open_part(path, "report.md", err);
+	if (file) {
+		fputs(markdown, incise_outfile_stream(file));
+		rc = incise_outfile_commit(file, err);
+	} else if (!rc) {
+		rc = -errno;
+	}
+	free(markdown);
+	return rc;
+}
+
+/* --- measurement --- */
+
+#define POLL_US 50000
+#define ASKED_S 20 /* to end what it has started, and itself */
+#define LINES 20   /* of warnings that are kept */
+
+/* Wait for its end, or for ours. */
+static int wait_for(pid_t pid, const char *word, int number, int of)
+{
+	double begin_ns = stopwatch_ns();
+	int status = 0;
+
+	while (!child_ended(pid, &status)) {
+		if (cli_stop) {
+			kill(-pid, SIGTERM);
+			for (double s = 0; s < ASKED_S; s += POLL_US * 1e-6) {
+				if (child_ended(pid, &status))
+					return status;
+				usleep(POLL_US);
+			}
+			return child_end(pid, 0);
+		}
+		cli_progress("%s (%d of %d): %.0f s", word, number, of,
+			     (stopwatch_ns() - begin_ns) * 1e-9);
+		usleep(POLL_US);
+	}
+	cli_progress_end();
+	return status;
+}
+
+/*
+ * Lines of its standard error: warnings, but for the last line of one that failed, which goes to
+ * @why. "incise bench: " is clear from where a line stands.
+ */
+static json_t *read_warnings(FILE *said, bool failed, char *why, size_t size)
+{
+	json_t *lines = json_array();
+	char line[600];
+
+	rewind(said);
+	while (fgets(line, sizeof(line), said)) {
+		char *text = line, *colon;
+
+		line[strcspn(line, "\n")] = 0;
+		colon = strncmp(line, "incise ", 7) ? NULL : strstr(line, ": ");
+		text = colon ? colon + 2 : line;
+		if (!strncmp(text, "warning: ", 9))
+			text += 9;
+		/* A hint to --help is for a person at a shell. */
+		if (!*text || !strncmp(text, "Try 'incise ", 12))
+			continue;
+		snprintf(why, size, "%s", text);
+		if (json_array_size(lines) < LINES)
+			json_array_append_new(lines, json_text(text));
+	}
+	if (failed && json_array_size(lines))
+		json_array_remove(lines, json_array_size(lines) - 1);
+	return lines;
+}
+
+static void note(json_t *report, const char *word, const char *state, double seconds,
+		 const char *why, json_t *warnings)
+{
+	if (!strcmp(state, "failed"))
+		json_array_append_new(json_object_get(report, "failed"),
+				      json_string(word));
+	json_object_set_new(json_object_get(report, "runs"), word,
+			    json_pack("{ss sf so so}", "state", state, "seconds", seconds,
+				      "why", *why ? json_text(why) : json_null(),
+				      "warnings", warnings));
+}
+
+/* Its report, and its metrics once more among those of all, named with the word. */
+static void add_report(json_t *report, const char *word, json_t *json)
+{
+	const json_t *metric;
+	size_t i;
+
+	json_object_set(json_object_get(report, "words"), word, json);
+	json_array_foreach(json_object_get(json, "figures"), i, metric)
+	{
+		const char *name = json_string_value(json_object_get(metric, "name"));
+		json_t *copy;
+
+		if (!json_is_object(metric))
+			continue;
+		copy = json_copy((json_t *)metric);
+		json_object_set_new(copy, "name",
+				    json_sprintf("%s: %s", word, name ? name : ""));
+		json_array_append_new(json_object_get(report, "figures"), copy);
+	}
+}
+
+/* Start it, and wait; its JSON into a file. */
+static int run(const struct report_section *s, const char *program, const char *folder,
+	       const char *data, bool quick, FILE *said, int number, int of)
+{
+	char *plot = path_of(folder, "pictures/", s->word, "");
+	const char *argv[8] = {program};
+	int n = 1, status;
+	FILE *out = fopen(data, "we");
+
+	if (!out)
+		cli_fail("%s: %s", data, strerror(errno));
+	/* A benchmark with a program of its own is not named once more. */
+	if (!strcmp(s->program, "incise-bench"))
+		argv[n++] = s->word;
+	argv[n++] = "--json";
+	if (quick)
+		argv[n++] = "--quick";
+	if (s->plots && plot_possible()) {
+		argv[n++] = "--plot";
+		argv[n++] = plot;
+	}
+	status = wait_for(child_start((char *const *)argv, fileno(out), fileno(said)),
+			  s->word, number, of);
+	fclose(out);
+	free(plot);
+	return status;
+}
+
+/* A benchmark that fails is in the report with its last line, and the others go on. */
+static void measure_word(const struct report_section *s, const char *folder, bool quick,
+			 json_t *report, int number, int of)
+{
+	char *program = path_of(cli_folder(), "", s->program, ""),
+	     *data = path_of(folder, "data/", s->word, ".json");
+	struct memory_file said = memory_file_begin("said");
+	double begin_ns = stopwatch_ns();
+	struct incise_error err = {0};
+	json_t *json, *warnings;
+	char why[600] = "";
+	int status;
+
+	if (access(program, X_OK)) {
+		snprintf(why, sizeof(why),
+			 "%s is not there: it is built where its libraries are",
+			 s->program);
+		note(report, s->word, "left out", 0, why, json_array());
+		goto out_free;
+	}
+	status = run(s, program, folder, data, quick, said.file, number, of);
+	json = json_read(data, &err);
+	warnings = read_warnings(said.file, status != 0, why, sizeof(why));
+	if (WIFSIGNALED(status))
+		snprintf(why, sizeof(why), "ended by a signal: %s",
+			 strsignal(WTERMSIG(status)));
+	else if (!json_is_object(json) && !status)
+		snprintf(why, sizeof(why), "what it reported is no JSON: %s",
+			 *err.text ? err.text : "no object");
+	else if (!status)
+		*why = 0;
+	note(report, s->word, *why ? "failed" : "measured",
+	     (stopwatch_ns() - begin_ns) * 1e-9, why, warnings);
+	if (json_is_object(json))
+		add_report(report, s->word, json);
+	else
+		unlink(data);
+	json_decref(json);
+out_free:
+	fclose(said.file);
+	free(program);
+	free(data);
+}
+
 static bool wanted(const struct job *job, const char *word)
 {
 	for (int i = 0; i < job->n_only; i++)
@@ -66,20 +537,7 @@ static bool wanted(const struct job *job, const char *word)
 	return !job->n_only;
 }
 
-static void check_words(const struct job *job)
-{
-	for (int i = 0; i < job->n_only; i++) {
-		const struct report_section *s = report_sections;
-
-		while (s->word && strcmp(s->word, job->only[i]))
-			s++;
-		if (!s->word)
-			cli_usage("--only: '%s' is no word of incise bench",
-				  job->only[i]);
-	}
-}
-
-/* What is typed to get the same; the folder is another on another machine. */
+/* The command that gives the same; the folder is another on another machine. */
 static json_t *command(const struct job *job)
 {
 	char line[600];
@@ -109,7 +567,7 @@ static json_t *begin_report(const struct job *job)
 			 json_array());
 }
 
-/* Of a report of all words; of one word it is that. */
+/* Of a report of all benchmarks; that of one is itself. */
 static const json_t *words_of(const json_t *report)
 {
 	const json_t *words = json_object_get(report, "words");
@@ -117,7 +575,7 @@ static const json_t *words_of(const json_t *report)
 	return words ? words : report;
 }
 
-/* What changed goes into the report; that it cannot be told does, too. */
+/* The comparison goes into the report, or the reason why there is none. */
 static void compare(const char *path, const json_t *old, json_t *report)
 {
 	struct incise_error err = {0};
@@ -132,33 +590,47 @@ static void compare(const char *path, const json_t *old, json_t *report)
 
 static json_t *measure(const struct job *job)
 {
-	struct report_folder folder;
-	struct report_measure m = {.quick = job->quick};
+	json_t *old = job->against ? compare_load(job->against) : NULL, *report;
+	struct folder folder = folder_begin(job->folder);
 	struct incise_error err = {0};
-	json_t *old = job->against ? compare_load(job->against) : NULL;
 	int n = 0, of = 0;
 
-	report_folder_begin(&folder, job->folder);
-	m.folder = folder.unfinished;
-	m.report = begin_report(job);
-	for (const struct report_section *s = report_sections; s->word; s++)
+	report = begin_report(job);
+	for (const struct report_section *s = report_sections(); *s->word; s++)
 		of += wanted(job, s->word);
-	for (const struct report_section *s = report_sections; s->word && !cli_stop; s++)
+	for (const struct report_section *s = report_sections(); *s->word && !cli_stop;
+	     s++)
 		if (wanted(job, s->word))
-			report_measure(&m, s, ++n, of);
+			measure_word(s, folder.unfinished, job->quick, report, ++n, of);
 	if (cli_stop) {
-		report_folder_abandon(&folder);
+		folder_abandon(&folder);
 		cli_fail("%s: %s is as it was", strsignal(cli_stop), job->folder);
 	}
 	if (old)
-		compare(job->against, old, m.report);
+		compare(job->against, old, report);
 	json_decref(old);
-	if (report_folder_write(folder.unfinished, m.report, &err)) {
-		report_folder_abandon(&folder);
+	if (write_report(folder.unfinished, report, &err)) {
+		folder_abandon(&folder);
 		cli_fail_with(&err);
 	}
-	report_folder_finish(&folder);
-	return m.report;
+	folder_finish(&folder);
+	free(folder.unfinished);
+	return report;
+}
+
+/* --- the command line --- */
+
+static void check_words(const struct job *job)
+{
+	for (int i = 0; i < job->n_only; i++) {
+		const struct report_section *s = report_sections();
+
+		while (*s->word && strcmp(s->word, job->only[i]))
+			s++;
+		if (!*s->word)
+			cli_usage("--only: '%s' is no word of incise bench",
+				  job->only[i]);
+	}
 }
 
 static void parse(struct job *job, int argc, char **argv)
@@ -200,7 +672,7 @@ static void parse(struct job *job, int argc, char **argv)
 	check_words(job);
 }
 
-/* The one line of what is not as it should be, and what of it is first. */
+/* One line for the worst that is not as it should be. */
 static void judge(const struct job *job, const json_t *report)
 {
 	const json_t *against = json_object_get(report, "against");
@@ -229,8 +701,8 @@ int main(int argc, char **argv)
 	parse(&job, argc, argv);
 	cli_catch_signals();
 	if (job.from) {
-		report = report_folder_load(job.from);
-		if (report_folder_write(job.from, report, &err))
+		report = load(job.from);
+		if (write_report(job.from, report, &err))
 			cli_fail_with(&err);
 	} else {
 		report = measure(&job);

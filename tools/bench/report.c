@@ -1,0 +1,923 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Figures in the places of report.md. A template is made of blocks with empty lines between:
+ *
+ *   {section PATH by PROGRAM}  the blocks from here on are of this object of report.json, and are
+ *                              left out where it is none; a benchmark's is words.NAME, and
+ *                              measured by a program, or incise-bench
+ *   {if KEY} {if !KEY}         first line of a block that is left out unless the object has it
+ *   {each LIST where K=V,…}    first line of a block for each row of a list of the object, or of
+ *                              lists "a,b"; a list item is repeated, and so is the last line of
+ *                              a table. Rows of an object are its members.
+ *   {contents}                 a block of its own
+ *   {to NAME}                  a link to a benchmark's section
+ *   {VALUE}                    of the object or row; {: VALUE} with the text in front, if any
+ *
+ * VALUE is KEY*FACTOR PART:DIGITS of WORD.LIST where K=V,…, all but KEY at will. A KEY leads
+ * inwards, "a.b", or is a ratio, "a/b"; "@" is the row's name, or that of its list, "." the row
+ * itself, "count" how many rows there are. Without digits it is a text, or yes and no. A PART is
+ * of several rows: least, largest (of magnitude), range, median, sum, holding (how many are true,
+ * or a text: "3 of 12"). In a table with parts rows are one whose other columns are equal. A
+ * column without a value is left out, as is a row of a table without {each}.
+ */
+#include <ctype.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "../../lib/base/ascending.h"
+#include "bench.h"
+#include "../cli/cli.h"
+#include "report.h"
+
+/* Longer tables are for programs: the JSON has them. */
+#define ROWS_MAX 500
+#define COLUMNS_MAX 16
+#define TEXT 400
+
+enum part {
+	PART_VALUE,
+	PART_LEAST,
+	PART_LARGEST,
+	PART_RANGE,
+	PART_MEDIAN,
+	PART_SUM,
+	PART_HOLDING,
+	PART_COUNT
+};
+static const char *const parts[] = {"",	      "least", "largest", "range",
+				    "median", "sum",   "holding", "count"};
+
+struct value {
+	char key[80], by[80], lists[200], where[120];
+	enum part part;
+	double factor;
+	int digits; /* significant ones; 0: text */
+};
+
+struct row {
+	const char *name;
+	const json_t *object;
+};
+
+struct rows {
+	struct row *row;
+	int n;
+	char names[200]; /* of the lists */
+};
+
+struct report {
+	const json_t *report, *object; /* of the section */
+	const char *folder;
+	FILE *out;
+	bool item; /* the last block was a list item */
+};
+
+/* --- Markdown --- */
+
+/* Bytes of UTF-8 of a control character of ASCII or Latin-1; 0: none is. */
+static int control(const char *text)
+{
+	const unsigned char *c = (const unsigned char *)text;
+
+	if (*c == 0xc2 && c[1] >= 0x80 && c[1] < 0xa0)
+		return 2;
+	return (*c && *c < ' ') || *c == 0x7f;
+}
+
+/* An underscore in a word is none to Markdown, and names are full of them. */
+static bool in_word(const char *text, const char *at)
+{
+	return at > text && isalnum((unsigned char)at[-1]) &&
+	       isalnum((unsigned char)at[1]);
+}
+
+/* Text that is shown as it is, even at the start of a line. */
+static void put_text(FILE *out, const char *text)
+{
+	size_t digits = strspn(text, "0123456789");
+
+	if (*text && strchr("#+-=~", *text))
+		fputc('\\', out);
+	for (const char *c = text; *c; c++) {
+		if (control(c)) {
+			fputc(' ', out);
+			c += control(c) - 1;
+			continue;
+		}
+		if ((*c == '_' && !in_word(text, c)) || strchr("\\`*[]<>|&", *c) ||
+		    (digits && c == text + digits && strchr(".)", *c) &&
+		     strchr(" ", c[1])))
+			fputc('\\', out);
+		fputc(*c, out);
+	}
+}
+
+/* One line, which cannot end the fence that it stands in. */
+static void put_command(FILE *out, const char *text)
+{
+	for (; *text; text++)
+		fputc(*text == '`' ? '\'' : control(text) ? ' ' : *text, out);
+}
+
+void report_anchor(const char *title, char *anchor, size_t size)
+{
+	size_t n = 0;
+
+	for (const char *c = title; *c && n + 1 < size; c++)
+		if (isalnum((unsigned char)*c) || *c == '-' || *c == '_')
+			anchor[n++] = (char)tolower((unsigned char)*c);
+		else if (*c == ' ')
+			anchor[n++] = '-';
+	anchor[n] = 0;
+}
+
+/* An empty line in front of a block, but not between list items. */
+static void begin_block(struct report *r, bool item)
+{
+	if (!item || !r->item)
+		fputc('\n', r->out);
+	r->item = item;
+}
+
+/* --- values --- */
+
+void report_number(double value, int digits, char *text, size_t size)
+{
+	static const char *const raised[] = {"⁰", "¹", "²", "³", "⁴",
+					     "⁵", "⁶", "⁷", "⁸", "⁹"};
+	char plain[64], power[64] = "", *e;
+
+	if (!isfinite(value)) {
+		snprintf(text, size, "–");
+		return;
+	}
+	snprintf(plain, sizeof(plain), "%.*e", digits - 1, value);
+	e = strchr(plain, 'e');
+	if (value == 0 || (atoi(e + 1) >= -4 && atoi(e + 1) < 7)) {
+		/* As it is, but for digits that it lacks. */
+		int after = digits - 1 - atoi(e + 1);
+
+		snprintf(text, size, "%.*f", value == 0 || after < 0 ? 0 : after, value);
+		if (strchr(text, '.')) {
+			size_t n = strlen(text);
+
+			while (text[n - 1] == '0')
+				text[--n] = 0;
+			if (text[n - 1] == '.')
+				text[n - 1] = 0;
+		}
+		return;
+	}
+	for (const char *c = e + (e[1] == '-' ? 2 : 1); *c; c++)
+		if (*c >= '0' && *c <= '9' && (*c != '0' || *power))
+			strcat(power, raised[*c - '0']);
+	snprintf(text, size, "%.*s×10%s%s", (int)(e - plain), plain,
+		 e[1] == '-' ? "⁻" : "", power);
+}
+
+/* "a.b" of an object; "." and "" are itself. */
+static const json_t *at_path(const json_t *object, const char *path)
+{
+	char key[100];
+
+	while (object && *path && *path != '.') {
+		size_t n = strcspn(path, ".");
+
+		snprintf(key, sizeof(key), "%.*s", (int)n, path);
+		object = json_object_get(object, key);
+		path += n + (path[n] == '.');
+	}
+	return object;
+}
+
+static double number_at(const json_t *object, const char *path)
+{
+	const json_t *value = at_path(object, path);
+
+	return json_is_number(value) ? json_number_value(value) : NAN;
+}
+
+/* "a/b" is a ratio; b may be a number itself. */
+static double number(const struct row *row, const struct value *v)
+{
+	double value = number_at(row->object, v->key);
+
+	if (isdigit((unsigned char)*v->by))
+		value /= atof(v->by);
+	else if (*v->by)
+		value /= number_at(row->object, v->by);
+	return value * v->factor;
+}
+
+/* Whether there is something to show. */
+static bool has(const struct row *row, const struct value *v)
+{
+	const json_t *value;
+
+	if (v->part == PART_COUNT || *v->key == '@')
+		return true;
+	if (v->digits)
+		return isfinite(number(row, v));
+	value = at_path(row->object, v->key);
+	return value && !json_is_null(value) &&
+	       !(json_is_string(value) && !json_string_length(value));
+}
+
+/* A text, yes or no; a number that stands among texts. */
+static void row_text(const struct row *row, const struct value *v, char *text,
+		     size_t size)
+{
+	const json_t *value = at_path(row->object, v->key);
+
+	if (*v->key == '@')
+		snprintf(text, size, "%s", row->name);
+	else if (v->digits)
+		report_number(number(row, v), v->digits, text, size);
+	else if (json_is_string(value))
+		snprintf(text, size, "%s", json_string_value(value));
+	else if (json_is_boolean(value))
+		snprintf(text, size, "%s", json_is_true(value) ? "yes" : "no");
+	else if (json_is_number(value))
+		report_number(json_number_value(value), 6, text, size);
+	else
+		*text = 0;
+}
+
+/* Cut @text at @mark; returns the text behind, or "". */
+static char *cut(char *text, const char *mark)
+{
+	char *at = strstr(text, mark);
+
+	if (!at)
+		return "";
+	*at = 0;
+	return at + strlen(mark);
+}
+
+/* "KEY*FACTOR PART:DIGITS of LISTS where CONDITION" */
+static struct value value_of(const char *text)
+{
+	struct value v = {.factor = 1};
+	char line[TEXT];
+	const char *part, *factor;
+
+	snprintf(line, sizeof(line), "%s", text);
+	snprintf(v.where, sizeof(v.where), "%s", cut(line, " where "));
+	snprintf(v.lists, sizeof(v.lists), "%s", cut(line, " of "));
+	v.digits = atoi(cut(line, ":"));
+	part = cut(line, " ");
+	while (v.part < PART_COUNT && strcmp(part, parts[v.part]))
+		v.part++;
+	factor = cut(line, "*");
+	if (*factor)
+		v.factor = atof(factor);
+	snprintf(v.by, sizeof(v.by), "%s", cut(line, "/"));
+	snprintf(v.key, sizeof(v.key), "%.79s", line);
+	if (!strcmp(v.key, "count"))
+		v.part = PART_COUNT;
+	else if (v.part == PART_COUNT)
+		v.part = PART_VALUE; /* of a link: "to NAME" */
+	return v;
+}
+
+/* --- rows --- */
+
+/* "KEY=TEXT,KEY=TEXT" */
+static bool matches(const struct row *row, const char *where)
+{
+	char copy[120], is[TEXT], *save = NULL;
+
+	snprintf(copy, sizeof(copy), "%s", where);
+	for (char *one = strtok_r(copy, ",", &save); one;
+	     one = strtok_r(NULL, ",", &save)) {
+		const char *wanted = cut(one, "=");
+		struct value v = value_of(one);
+
+		row_text(row, &v, is, sizeof(is));
+		if (strcmp(is, wanted))
+			return false;
+	}
+	return true;
+}
+
+static void add_row(struct rows *rows, const char *name, const json_t *object,
+		    const char *where)
+{
+	struct row row = {name, object};
+
+	if (!matches(&row, where))
+		return;
+	rows->row = realloc(rows->row, (size_t)(rows->n + 1) * sizeof(*rows->row));
+	if (!rows->row)
+		cli_fail("no memory");
+	rows->row[rows->n++] = row;
+}
+
+/* Objects of lists, or texts; of an object all members that can be shown. */
+static void find_rows(const json_t *object, const char *lists, const char *where,
+		      struct rows *rows)
+{
+	char *save = NULL;
+
+	rows->row = NULL;
+	rows->n = 0;
+	snprintf(rows->names, sizeof(rows->names), "%s", lists);
+	for (char *path = strtok_r(rows->names, ",", &save); path;
+	     path = strtok_r(NULL, ",", &save)) {
+		const json_t *list = at_path(object, path), *member;
+		const char *key;
+		size_t i;
+
+		json_array_foreach((json_t *)list, i, member)
+		{
+			if (json_is_object(member) || json_is_string(member))
+				add_row(rows, path, member, where);
+		}
+		json_object_foreach((json_t *)list, key, member)
+		{
+			if (!json_is_array(member) && !json_is_null(member))
+				add_row(rows, key, member, where);
+		}
+	}
+}
+
+/* --- cells --- */
+
+/* One number of those in the rows of a group; NaN of none. */
+static double summed_up(const struct rows *rows, const int *group, int which,
+			const struct value *v, enum part part)
+{
+	double *values = bench_alloc((size_t)rows->n, sizeof(*values)), value = 0;
+	int n = 0;
+
+	for (int i = 0; i < rows->n; i++) {
+		double one = group[i] == which ? number(&rows->row[i], v) : NAN;
+
+		if (isfinite(one))
+			values[n++] = one;
+	}
+	qsort(values, (size_t)n, sizeof(*values), ascending);
+	if (!n)
+		value = NAN;
+	else if (part == PART_LEAST)
+		value = values[0];
+	else if (part == PART_LARGEST)
+		value = fabs(values[0]) > values[n - 1] ? -values[0] : values[n - 1];
+	else if (part == PART_RANGE)
+		value = values[n - 1];
+	else if (part == PART_MEDIAN)
+		value = (values[n / 2] + values[(n - 1) / 2]) / 2;
+	else
+		for (int i = 0; i < n; i++)
+			value += values[i];
+	free(values);
+	return value;
+}
+
+static void range_text(const struct rows *rows, const int *group, int which,
+		       const struct value *v, char *text, size_t size)
+{
+	char least[64], largest[64];
+
+	report_number(summed_up(rows, group, which, v, PART_LEAST), v->digits, least,
+		      sizeof(least));
+	report_number(summed_up(rows, group, which, v, PART_RANGE), v->digits, largest,
+		      sizeof(largest));
+	if (strcmp(least, largest))
+		snprintf(text, size, "%s to %s", least, largest);
+	else
+		snprintf(text, size, "%s", least);
+}
+
+/* Where the answer is yes or no, of those that were asked. */
+static void cell_text(const struct rows *rows, const int *group, int which,
+		      const struct value *v, char *text, size_t size)
+{
+	int n = 0, asked = 0, holding = 0, first = -1;
+
+	for (int i = 0; i < rows->n; i++) {
+		const json_t *value = at_path(rows->row[i].object, v->key);
+
+		if (group[i] != which)
+			continue;
+		n++;
+		first = first < 0 ? i : first;
+		holding += json_is_true(value) || json_is_string(value);
+		asked += json_is_boolean(value);
+	}
+	if (v->part == PART_VALUE)
+		row_text(&rows->row[first], v, text, size);
+	else if (v->part == PART_COUNT)
+		snprintf(text, size, "%d", n);
+	else if (v->part == PART_HOLDING)
+		snprintf(text, size, "%d of %d", holding, asked ? asked : n);
+	else if (v->part == PART_RANGE)
+		range_text(rows, group, which, v, text, size);
+	else
+		report_number(summed_up(rows, group, which, v, v->part), v->digits, text,
+			      size);
+}
+
+static bool same(const struct row *a, const struct row *b, const struct value *columns,
+		 int n)
+{
+	char left[TEXT], right[TEXT];
+
+	for (const struct value *v = columns; v < columns + n; v++) {
+		if (v->part != PART_VALUE)
+			continue;
+		row_text(a, v, left, sizeof(left));
+		row_text(b, v, right, sizeof(right));
+		if (strcmp(left, right))
+			return false;
+	}
+	return true;
+}
+
+/* Numbers of groups by their rows; returns how many. */
+static int make_groups(const struct rows *rows, const struct value *columns, int n,
+		       int *group)
+{
+	bool grouped = false;
+	int groups = 0;
+
+	for (int k = 0; k < n; k++)
+		grouped |= columns[k].part != PART_VALUE;
+	for (int i = 0; i < rows->n; i++) {
+		int like = 0;
+
+		while (grouped && like < i &&
+		       !same(&rows->row[i], &rows->row[like], columns, n))
+			like++;
+		group[i] = grouped && like < i ? group[like] : groups++;
+	}
+	return groups;
+}
+
+/* --- text with places --- */
+
+static const struct report_section *section_of(const char *word)
+{
+	const struct report_section *s = report_sections();
+
+	while (*s->word && strcmp(s->word, word))
+		s++;
+	return s;
+}
+
+/* A link, where the report has the section. */
+static void put_link(struct report *r, const char *word)
+{
+	const struct report_section *s = section_of(word);
+	char anchor[100];
+
+	if (!*s->word || !json_object_get(json_object_get(r->report, "words"), word)) {
+		put_text(r->out, word);
+		return;
+	}
+	report_anchor(s->title, anchor, sizeof(anchor));
+	fprintf(r->out, "[%s](#%s)", word, anchor);
+}
+
+/* Of lists of the report: "WORD.LIST,LIST". False where there is none. */
+static bool listed_text(struct report *r, const struct value *v, char *text, size_t size)
+{
+	size_t word = strcspn(v->lists, ".");
+	bool there = false;
+	struct rows rows;
+	char path[64];
+	int *group;
+
+	snprintf(path, sizeof(path), "words.%.*s", (int)word, v->lists);
+	find_rows(at_path(r->report, path), v->lists + word + 1, v->where, &rows);
+	group = bench_alloc((size_t)rows.n, sizeof(*group));
+	for (int i = 0; i < rows.n; i++)
+		there |= has(&rows.row[i], v) || v->part == PART_HOLDING;
+	if (there)
+		cell_text(&rows, group, 0, v, text, size);
+	free(group);
+	free(rows.row);
+	return there;
+}
+
+/* A place's text without its braces; returns whether it has a value. */
+static bool put_place(struct report *r, const struct row *row, const char *place,
+		      void (*put)(FILE *, const char *))
+{
+	size_t front = *place == ':' ? 2 : 0;
+	struct value v = value_of(place + front);
+	char text[TEXT];
+	bool there;
+
+	if (!strcmp(v.key, "to")) {
+		put_link(r, place + 3);
+		return true;
+	}
+	if (*v.lists) {
+		there = listed_text(r, &v, text, sizeof(text));
+	} else {
+		there = has(row, &v);
+		row_text(row, &v, text, sizeof(text));
+	}
+	fprintf(r->out, "%.*s", there ? (int)front : 0, place);
+	if (there)
+		put(r->out, text);
+	return there;
+}
+
+/* Returns whether its first place has a value. */
+static bool put_line(struct report *r, const struct row *row, const char *line,
+		     void (*put)(FILE *, const char *))
+{
+	const struct row whole = {"", r->object};
+	bool first = true, there = true;
+	char place[TEXT];
+
+	while (*line) {
+		size_t n = strcspn(line, "{");
+
+		fwrite(line, 1, n, r->out);
+		line += n;
+		if (!*line)
+			break;
+		n = strcspn(line, "}");
+		snprintf(place, sizeof(place), "%.*s", (int)n - 1, line + 1);
+		if (!put_place(r, row ? row : &whole, place, put) && first)
+			there = false;
+		first = false;
+		line += n + 1;
+	}
+	return there;
+}
+
+/* --- blocks --- */
+
+/* Lines of the template, or some of them. */
+struct block {
+	char **line;
+	int n;
+};
+
+/* The template in lines, cut once. */
+static struct block template_lines(void)
+{
+	static struct block all;
+	char *text = all.n ? NULL : strdup(text_report_md), *save = NULL;
+
+	if (all.n)
+		return all;
+	all.line = bench_alloc(strlen(text_report_md), sizeof(*all.line));
+	/* strtok() would leave out empty ones. */
+	for (char *line = text; line && *line; line = save) {
+		save = line + strcspn(line, "\n");
+		if (*save)
+			*save++ = 0;
+		all.line[all.n++] = line;
+	}
+	return all;
+}
+
+/* Take the next block off the lines, without its empty lines. */
+static struct block next_block(struct block *lines)
+{
+	struct block block;
+
+	for (; lines->n && !**lines->line; lines->n--)
+		lines->line++;
+	block = (struct block){lines->line, 0};
+	for (; lines->n && **lines->line; lines->n--, lines->line++)
+		block.n++;
+	return block;
+}
+
+/* The argument of a first line "{NAME ARGUMENT}", in @argument, or NULL. */
+static char *directive(const struct block *block, const char *name, char argument[TEXT])
+{
+	size_t length = strlen(name);
+	const char *line = block->n ? *block->line : "";
+
+	if (*line != '{' || strncmp(line + 1, name, length) ||
+	    !strchr(" }", line[1 + length]))
+		return NULL;
+	snprintf(argument, TEXT, "%s",
+		 line + 1 + length + strspn(line + 1 + length, " "));
+	argument[strcspn(argument, "}")] = 0;
+	return argument;
+}
+
+/* Lines of a paragraph or of list items as one each. */
+static void put_paragraph(struct report *r, struct block block, const struct row *row)
+{
+	for (int i = 0; i < block.n; i++) {
+		const char *line = block.line[i] + strspn(block.line[i], " ");
+		bool item = !strncmp(line, "- ", 2);
+
+		if (i && !item)
+			fputc(' ', r->out);
+		else
+			begin_block(r, item);
+		put_line(r, row, line, put_text);
+		if (i + 1 == block.n || !strncmp(block.line[i + 1], "- ", 2))
+			fputc('\n', r->out);
+	}
+}
+
+static void put_fence(struct report *r, struct block block)
+{
+	begin_block(r, false);
+	for (int i = 0; i < block.n; i++) {
+		put_line(r, NULL, block.line[i], put_command);
+		fputc('\n', r->out);
+	}
+}
+
+/* "![alt](FILE)" and its caption, where the folder has the file. */
+static void put_plot(struct report *r, struct block block)
+{
+	const char *file = strstr(*block.line, "](") + 2;
+	char *path;
+
+	if (asprintf(&path, "%s/%.*s", r->folder, (int)strcspn(file, ")"), file) < 0)
+		cli_fail("no memory");
+	if (!access(path, R_OK)) {
+		put_paragraph(r, (struct block){block.line, 1}, NULL);
+		put_paragraph(r, (struct block){block.line + 1, block.n - 1}, NULL);
+	}
+	free(path);
+}
+
+/* How many lines of a block are the caption of a table. */
+static int caption_of(struct block block)
+{
+	int n = 0;
+
+	while (n < block.n && *block.line[n] != '|')
+		n++;
+	return n;
+}
+
+static void put_caption(struct report *r, struct block block)
+{
+	put_paragraph(r, (struct block){block.line, caption_of(block)}, NULL);
+	begin_block(r, false);
+}
+
+/* A table whose rows stand in the template; without any of them a line that says so. */
+static void put_facts(struct report *r, struct block block)
+{
+	struct report inner = *r;
+	int heading = caption_of(block);
+	char *row, *rows = bench_alloc(1, 1);
+	size_t size;
+
+	for (int i = heading + 2; i < block.n; i++) {
+		inner.out = open_memstream(&row, &size);
+		if (inner.out && put_line(&inner, NULL, block.line[i], put_text)) {
+			fclose(inner.out);
+			rows = realloc(rows, strlen(rows) + size + 2);
+			strcat(strcat(rows, row), "\n");
+		} else {
+			fclose(inner.out);
+		}
+		free(row);
+	}
+	if (*rows) {
+		put_caption(r, block);
+		fprintf(r->out, "%s\n%s\n%s", block.line[heading],
+			block.line[heading + 1], rows);
+	} else {
+		fputs("\nNothing of this was measured.\n", r->out);
+	}
+	free(rows);
+}
+
+/* --- tables with a line for each row --- */
+
+struct table {
+	char *heading[COLUMNS_MAX], *align[COLUMNS_MAX], *place[COLUMNS_MAX];
+	struct value column[COLUMNS_MAX];
+	bool shown[COLUMNS_MAX];
+	int n;
+};
+
+/* Cells of "| a | b |" in a copy of it, which is the caller's; returns how many. */
+static int split(char *copy, char *cell[COLUMNS_MAX])
+{
+	int n = 0;
+
+	for (char *c = copy, *bar; n < COLUMNS_MAX && (bar = strstr(c, " |"));
+	     c = bar + 1) {
+		*bar = 0;
+		cell[n++] = c + 2; /* behind "| " */
+	}
+	return n;
+}
+
+/* In a cell a reason would make a table wide, in which nearly all others are empty. */
+static void put_reason(struct report *r, const struct table *t, const struct row *row)
+{
+	const char *why = json_string_value(json_object_get(row->object, "failed"));
+	char line[4 * TEXT] = "", text[TEXT];
+
+	if (!why)
+		return;
+	for (int k = 0; k < t->n && k < 3; k++) {
+		const struct value *v = &t->column[k];
+
+		if (!has(row, v))
+			continue;
+		row_text(row, v, text, sizeof(text));
+		snprintf(line + strlen(line), sizeof(line) - strlen(line), "%s%s%s%s",
+			 *line ? "; " : "Failed: ", v->digits ? t->heading[k] : "",
+			 v->digits ? ": " : "", text);
+	}
+	snprintf(line + strlen(line), sizeof(line) - strlen(line), ". Why: %s", why);
+	begin_block(r, false);
+	put_text(r->out, line);
+	fputc('\n', r->out);
+}
+
+static void put_heads(struct report *r, const struct table *t, char *const *cell)
+{
+	for (int k = 0; k < t->n; k++)
+		if (t->shown[k])
+			fprintf(r->out, "| %s ", cell[k]);
+	fputs("|\n", r->out);
+}
+
+static void put_group(struct report *r, const struct table *t, const struct rows *rows,
+		      const int *group, int which)
+{
+	char text[TEXT];
+
+	for (int k = 0; k < t->n; k++) {
+		if (!t->shown[k])
+			continue;
+		fputs("| ", r->out);
+		if (!strcmp(t->column[k].key, "to")) {
+			put_link(r, rows->row[which].name);
+		} else {
+			cell_text(rows, group, which, &t->column[k], text, sizeof(text));
+			put_text(r->out, text);
+		}
+		fputc(' ', r->out);
+	}
+	fputs("|\n", r->out);
+}
+
+/* Rows that are equal in all that is not summed up are one. */
+static void put_table(struct report *r, struct block block, const struct rows *rows)
+{
+	int heading = caption_of(block), groups,
+	    *group = bench_alloc((size_t)rows->n, sizeof(*group));
+	char *copy[3] = {strdup(block.line[heading]), strdup(block.line[heading + 1]),
+			 strdup(block.line[heading + 2])};
+	struct table t = {.n = split(copy[0], t.heading)};
+
+	split(copy[1], t.align);
+	split(copy[2], t.place);
+	for (int k = 0; k < t.n; k++) {
+		struct value *v = &t.column[k];
+
+		t.place[k][strlen(t.place[k]) - 1] = 0;
+		*v = value_of(t.place[k] + 1);
+		t.shown[k] = v->part == PART_HOLDING || !strcmp(v->key, "to");
+		for (int i = 0; i < rows->n && !t.shown[k]; i++)
+			t.shown[k] = has(&rows->row[i], v);
+	}
+	groups = make_groups(rows, t.column, t.n, group);
+	put_caption(r, block);
+	put_heads(r, &t, t.heading);
+	put_heads(r, &t, t.align);
+	for (int i = 0; i < groups && i < ROWS_MAX; i++)
+		put_group(r, &t, rows, group, i);
+	/* Those of groups are counted in them. */
+	for (int i = 0; i < rows->n && groups == rows->n; i++)
+		put_reason(r, &t, &rows->row[i]);
+	if (groups > ROWS_MAX)
+		fprintf(r->out, "\nThe first %d of %d rows.\n", ROWS_MAX, groups);
+	for (int i = 0; i < 3; i++)
+		free(copy[i]);
+	free(group);
+}
+
+static void put_each(struct report *r, struct block block, char *lists)
+{
+	char *where = strstr(lists, " where ");
+	struct rows rows;
+
+	if (where)
+		*where = 0;
+	find_rows(r->object, lists, where ? where + 7 : "", &rows);
+	if (rows.n && caption_of(block) < block.n)
+		put_table(r, block, &rows);
+	else
+		for (int i = 0; i < rows.n; i++)
+			put_paragraph(r, block, &rows.row[i]);
+	free(rows.row);
+}
+
+/* --- the template --- */
+
+const struct report_section *report_sections(void)
+{
+	static struct report_section sections[32];
+	struct block lines = template_lines();
+	struct report_section *s = NULL;
+	char path[TEXT];
+	int n = 0;
+
+	if (*sections->word)
+		return sections;
+	while (lines.n) {
+		struct block block = next_block(&lines);
+
+		if (directive(&block, "section", path)) {
+			s = strncmp(path, "words.", 6) ? NULL : &sections[n++];
+			if (s &&
+			    sscanf(path, "words.%31s by %31s", s->word, s->program) < 2)
+				strcpy(s->program, "incise-bench");
+		} else if (s && block.n && !strncmp(*block.line, "## ", 3)) {
+			snprintf(s->title, sizeof(s->title), "%s", *block.line + 3);
+		} else if (s && block.n && !strncmp(*block.line, "![", 2)) {
+			s->plots = true;
+		}
+	}
+	return sections;
+}
+
+/* "KEY", or "!KEY": whether there is none. */
+static bool holds(const json_t *object, const char *key)
+{
+	bool negated = *key == '!';
+	const json_t *value = at_path(object, key + negated);
+
+	return (json_is_true(value) || json_string_length(value) ||
+		json_array_size(value)) != negated;
+}
+
+static void put_block(struct report *r, struct block block)
+{
+	char argument[TEXT];
+
+	if (directive(&block, "if", argument)) {
+		if (!holds(r->object, argument))
+			return;
+		block = (struct block){block.line + 1, block.n - 1};
+	}
+	if (directive(&block, "each", argument))
+		put_each(r, (struct block){block.line + 1, block.n - 1}, argument);
+	else if (!strncmp(*block.line, "```", 3))
+		put_fence(r, block);
+	else if (!strncmp(*block.line, "![", 2))
+		put_plot(r, block);
+	else if (caption_of(block) < block.n)
+		put_facts(r, block);
+	else
+		put_paragraph(r, block, NULL);
+}
+
+static void put_contents(FILE *out, const char *body)
+{
+	for (const char *line = body; line; line = strchr(line, '\n')) {
+		char title[200], anchor[200];
+
+		line += *line == '\n';
+		if (strncmp(line, "## ", 3))
+			continue;
+		snprintf(title, sizeof(title), "%.*s", (int)strcspn(line + 3, "\n"),
+			 line + 3);
+		report_anchor(title, anchor, sizeof(anchor));
+		fprintf(out, "- [%s](#%s)\n", title, anchor);
+	}
+}
+
+void report_markdown(const json_t *report, const char *folder, FILE *out)
+{
+	struct report r = {.report = report, .object = report, .folder = folder};
+	struct block lines = template_lines(), block;
+	char *body = NULL, path[TEXT];
+	size_t size;
+
+	/* Its first block is about the template, but for the title, its last line. */
+	block = next_block(&lines);
+	fprintf(out, "%s\n\n", block.line[block.n - 1]);
+	next_block(&lines); /* {contents} */
+	r.out = open_memstream(&body, &size);
+	if (!r.out)
+		cli_fail("no memory");
+	while (lines.n) {
+		block = next_block(&lines);
+		if (directive(&block, "section", path)) {
+			path[strcspn(path, " ")] = 0;
+			r.object = at_path(report, path);
+		} else if (block.n && json_is_object(r.object)) {
+			put_block(&r, block);
+		}
+	}
+	fclose(r.out);
+	put_contents(out, body);
+	fwrite(body, 1, size, out);
+	free(body);
+}

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The report's Markdown as one file of HTML, rendered by libcmark-gfm. This file adds the
+ * outline: sections that links lead to, a box that scrolls around each table and plot, and the
+ * plots themselves.
+ */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include "report.h"
+
+#ifdef HAVE_CMARK
+#include <cmark-gfm.h>
+#include <cmark-gfm-core-extensions.h>
+#include <cmark-gfm-extension_api.h>
+
+/* Text of so many bytes takes several lines of its column. */
+#define LONG 30
+
+struct page {
+	cmark_parser *parser;
+	const char *folder;
+	FILE *out;
+	struct incise_error *err;
+};
+
+static char *html_of(const struct page *page, cmark_node *node)
+{
+	return cmark_render_html(
+		node, CMARK_OPT_DEFAULT | CMARK_OPT_TABLE_PREFER_STYLE_ATTRIBUTES,
+		cmark_parser_get_syntax_extensions(page->parser));
+}
+
+static void put_node(const struct page *page, cmark_node *node)
+{
+	char *html = html_of(page, node);
+
+	fputs(html, page->out);
+	free(html);
+}
+
+/* The text of a node in one line. */
+static char *text_of(cmark_node *node)
+{
+	cmark_iter *iter = cmark_iter_new(node);
+	char *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
+
+	while (out && cmark_iter_next(iter) != CMARK_EVENT_DONE) {
+		const char *literal = cmark_node_get_literal(cmark_iter_get_node(iter));
+
+		if (literal)
+			fputs(literal, out);
+	}
+	cmark_iter_free(iter);
+	if (out)
+		fclose(out);
+	return text;
+}
+
+/* In an element or an attribute. */
+static void put_text(FILE *out, const char *text)
+{
+	for (; *text; text++)
+		if (*text == '&')
+			fputs("&amp;", out);
+		else if (*text == '<')
+			fputs("&lt;", out);
+		else if (*text == '>')
+			fputs("&gt;", out);
+		else if (*text == '"')
+			fputs("&quot;", out);
+		else
+			fputc(*text, out);
+}
+
+static void put_box(FILE *out, const char *class, const char *label)
+{
+	fprintf(out, "<div%s role=\"region\" tabindex=\"0\" aria-label=\"", class);
+	put_text(out, label);
+	fputs("\">", out);
+}
+
+/* Cells with much text get a width of their own. */
+static void mark_long_cells(cmark_node *table)
+{
+	for (cmark_node *row = cmark_node_first_child(table); row;
+	     row = cmark_node_next(row))
+		for (cmark_node *cell = cmark_node_first_child(row); cell;
+		     cell = cmark_node_next(cell)) {
+			cmark_node *begin = cmark_node_new(CMARK_NODE_CUSTOM_INLINE),
+				   *end = cmark_node_new(CMARK_NODE_CUSTOM_INLINE);
+			char *text = text_of(cell);
+
+			cmark_node_set_on_enter(begin, "<span class=\"long\">");
+			cmark_node_set_on_enter(end, "</span>");
+			if (strlen(text) <= LONG ||
+			    !cmark_node_prepend_child(cell, begin) ||
+			    !cmark_node_append_child(cell, end)) {
+				cmark_node_free(begin);
+				cmark_node_free(end);
+			}
+			free(text);
+		}
+}
+
+static void put_table(const struct page *page, cmark_node *table, const char *caption)
+{
+	char *html;
+
+	mark_long_cells(table);
+	html = html_of(page, table);
+	put_box(page->out, " class=\"scroll\"", caption);
+	fputs("\n<table>\n<caption><span>", page->out);
+	put_text(page->out, caption);
+	fprintf(page->out, "</span></caption>\n%s</div>\n", strchr(html, '\n') + 1);
+	free(html);
+}
+
+static void put_base64(FILE *out, const unsigned char *bytes, size_t n)
+{
+	static const char digits[] =
+		"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+	for (size_t i = 0; i < n; i += 3) {
+		unsigned v = bytes[i] << 16 | (i + 1 < n ? bytes[i + 1] : 0) << 8 |
+			     (i + 2 < n ? bytes[i + 2] : 0);
+
+		fputc(digits[v >> 18], out);
+		fputc(digits[v >> 12 & 63], out);
+		fputc(i + 1 < n ? digits[v >> 6 & 63] : '=', out);
+		fputc(i + 2 < n ? digits[v & 63] : '=', out);
+	}
+}
+
+/* No folder, and no device that never ends. */
+static FILE *fopen_regular(const char *path)
+{
+	struct stat status;
+
+	if (stat(path, &status))
+		return NULL;
+	if (!S_ISREG(status.st_mode)) {
+		errno = EINVAL;
+		return NULL;
+	}
+	return fopen(path, "re");
+}
+
+/* As data of an <img>: in the page itself the names within one would meet those of others. */
+static int put_data(const struct page *page, const char *name)
+{
+	unsigned char bytes[3 * 4096];
+	char *path;
+	FILE *file;
+	size_t n;
+	int rc = 0;
+
+	if (asprintf(&path, "%s/%s", page->folder, name) < 0)
+		return incise_error_set(page->err, ENOMEM, "no memory");
+	file = fopen_regular(path);
+	if (!file) {
+		rc = incise_error_set(page->err, errno, "%s: %s", path, strerror(errno));
+		free(path);
+		return rc;
+	}
+	fputs("data:image/svg+xml;base64,", page->out);
+	while ((n = fread(bytes, 1, sizeof(bytes), file)))
+		put_base64(page->out, bytes, n);
+	if (ferror(file))
+		rc = incise_error_set(page->err, EIO, "%s: cannot be read", path);
+	fclose(file);
+	free(path);
+	return rc;
+}
+
+static int put_plot(const struct page *page, cmark_node *image, const char *caption)
+{
+	char *instead = text_of(image);
+	int rc;
+
+	fputs("<figure>\n", page->out);
+	put_box(page->out, "", caption);
+	fputs("<img alt=\"", page->out);
+	put_text(page->out, instead);
+	fputs("\" src=\"", page->out);
+	rc = put_data(page, cmark_node_get_url(image));
+	fputs("\"></div>\n<figcaption>", page->out);
+	put_text(page->out, caption);
+	fputs("</figcaption>\n</figure>\n", page->out);
+	free(instead);
+	return rc;
+}
+
+static void begin_section(const struct page *page, cmark_node *heading, bool first)
+{
+	char *title = text_of(heading), anchor[200];
+
+	report_anchor(title, anchor, sizeof(anchor));
+	fprintf(page->out, "%s<section id=\"%s\">\n", first ? "</nav>\n" : "</section>\n",
+		anchor);
+	put_node(page, heading);
+	free(title);
+}
+
+/* A node of the document, and with a plot or a table the paragraph that is its caption; returns
+ * the next one, or NULL with *rc. */
+static cmark_node *put_block(const struct page *page, cmark_node *node, bool *section,
+			     int *rc)
+{
+	cmark_node *next = cmark_node_next(node), *inner = cmark_node_first_child(node);
+	char *caption;
+
+	if (cmark_node_get_heading_level(node) == 2) {
+		begin_section(page, node, !*section);
+		*section = true;
+		return next;
+	}
+	if (inner && next && cmark_node_get_type(inner) == CMARK_NODE_IMAGE) {
+		caption = text_of(next);
+		*rc = put_plot(page, inner, caption);
+		free(caption);
+		return *rc ? NULL : cmark_node_next(next);
+	}
+	if (next && !strcmp(cmark_node_get_type_string(next), "table")) {
+		caption = text_of(node);
+		put_table(page, next, caption);
+		free(caption);
+		return cmark_node_next(next);
+	}
+	put_node(page, node);
+	if (cmark_node_get_heading_level(node) == 1)
+		fputs("<nav aria-label=\"Contents\">\n", page->out);
+	return next;
+}
+
+int report_html(const char *markdown, const char *folder, FILE *out,
+		struct incise_error *err)
+{
+	cmark_parser *parser = cmark_parser_new(CMARK_OPT_DEFAULT);
+	struct page page = {parser, folder, out, err};
+	cmark_node *document, *node;
+	bool section = false;
+	char *title;
+	int rc = 0;
+
+	cmark_gfm_core_extensions_ensure_registered();
+	cmark_parser_attach_syntax_extension(parser,
+					     cmark_find_syntax_extension("table"));
+	cmark_parser_feed(parser, markdown, strlen(markdown));
+	document = cmark_parser_finish(parser);
+	node = cmark_node_first_child(document);
+	title = text_of(node);
+	fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+	      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+	      "<title>",
+	      out);
+	put_text(out, title);
+	fprintf(out,
+		"</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n%s</style>\n"
+		"</head>\n<body>\n<main>\n",
+		text_report_css);
+	while (node)
+		node = put_block(&page, node, &section, &rc);
+	fputs("</section>\n</main>\n</body>\n</html>\n", out);
+	free(title);
+	cmark_node_free(document);
+	cmark_parser_free(parser);
+	return rc;
+}
+
+#else
+
+int report_html(const char *markdown, const char *folder, FILE *out,
+		struct incise_error *err)
+{
+	(void)markdown;
+	(void)folder;
+	(void)out;
+	return incise_error_set(err, EOPNOTSUPP, "built without libcmark-gfm");
+}
+#endif
