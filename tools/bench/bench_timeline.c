@@ -134,7 +134,7 @@ static void stream_end(struct stream *stream)
 
 struct method {
 	const char *name;
-	/* Has the stream's grain and, as no real program, its mean lateness. To be ended. */
+	/* Has the stream's grain and, as no real program, its mean lateness. To be freed. */
 	void *(*begin)(const struct stream *stream);
 	/* The time of a sample when it arrives, ns. */
 	double (*take)(void *state, uint64_t seq, int64_t arrival_ns);
@@ -144,7 +144,6 @@ struct method {
 	void (*finish)(void *state);
 	/* Stated uncertainty of the last one taken, or afterwards of one; NULL: none is. */
 	double (*sd_ns)(const void *state, uint64_t seq);
-	void (*end)(void *state);
 };
 
 static void *nothing_begin(const struct stream *stream)
@@ -238,7 +237,7 @@ static double squares_take(void *state, uint64_t seq, int64_t arrival_ns)
 }
 
 struct line {
-	struct incise_timeline *timeline;
+	struct incise_timeline timeline;
 	int n;
 	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS_MAX];
 };
@@ -247,10 +246,10 @@ static void *line_of_grain(int64_t grain_ns)
 {
 	struct line *line = bench_alloc(1, sizeof(*line));
 
-	line->timeline = incise_timeline_new(&(struct incise_timeline_setup){
-		.rate_hz = RATE_HZ, .delay_ns = DELAY_NS, .grain_ns = grain_ns});
-	if (!line->timeline)
-		cli_fail("no memory");
+	incise_timeline_init(&line->timeline,
+			     &(struct incise_timeline_setup){.rate_hz = RATE_HZ,
+							     .delay_ns = DELAY_NS,
+							     .grain_ns = grain_ns});
 	return line;
 }
 
@@ -269,7 +268,7 @@ static double line_take(void *state, uint64_t seq, int64_t arrival_ns)
 {
 	struct line *line = state;
 
-	return (double)incise_timeline_sample(line->timeline, seq, arrival_ns);
+	return (double)incise_timeline_sample(&line->timeline, seq, arrival_ns);
 }
 
 static double line_live_sd(const void *state, uint64_t seq)
@@ -278,7 +277,7 @@ static double line_live_sd(const void *state, uint64_t seq)
 	struct incise_timeline_report report;
 
 	(void)seq;
-	incise_timeline_report(line->timeline, &report);
+	incise_timeline_report(&line->timeline, &report);
 	return report.offset_sd_ns;
 }
 
@@ -286,7 +285,7 @@ static void line_finish(void *state)
 {
 	struct line *line = state;
 
-	line->n = incise_timeline_knots(line->timeline, line->knots);
+	line->n = incise_timeline_knots(&line->timeline, line->knots);
 }
 
 static double line_at(const void *state, uint64_t seq)
@@ -296,37 +295,23 @@ static double line_at(const void *state, uint64_t seq)
 	return line->n ? (double)incise_timeline_at(line->knots, line->n, seq) : NAN;
 }
 
-/* The larger one of the two knots around. */
 static double line_final_sd(const void *state, uint64_t seq)
 {
 	const struct line *line = state;
-	int k = 0;
 
-	while (k + 2 < line->n && line->knots[k + 1].seq <= seq)
-		k++;
-	return line->n ? fmax(line->knots[k].sd_ns, line->knots[k + 1].sd_ns) : NAN;
-}
-
-static void line_end(void *state)
-{
-	struct line *line = state;
-
-	incise_timeline_free(line->timeline);
-	free(line);
+	return line->n ? incise_timeline_sd(line->knots, line->n, seq) : NAN;
 }
 
 #define METHODS 8
 static const struct method methods[METHODS] = {
-	{"arrival", nothing_begin, arrival_take, NULL, NULL, NULL, free},
-	{"lowest", lowest_begin, lowest_take, NULL, NULL, NULL, free},
-	{"squares", squares_begin, squares_take, NULL, NULL, NULL, free},
-	{"squares_known", squares_known_begin, squares_take, NULL, NULL, NULL, free},
-	{"squares_final", squares_known_begin, squares_take, squares_at, NULL, NULL,
-	 free},
-	{"line_live", line_begin, line_take, NULL, NULL, line_live_sd, line_end},
-	{"line_untold", untold_begin, line_take, NULL, NULL, line_live_sd, line_end},
-	{"line_final", line_begin, line_take, line_at, line_finish, line_final_sd,
-	 line_end},
+	{"arrival", nothing_begin, arrival_take, NULL, NULL, NULL},
+	{"lowest", lowest_begin, lowest_take, NULL, NULL, NULL},
+	{"squares", squares_begin, squares_take, NULL, NULL, NULL},
+	{"squares_known", squares_known_begin, squares_take, NULL, NULL, NULL},
+	{"squares_final", squares_known_begin, squares_take, squares_at, NULL, NULL},
+	{"line_live", line_begin, line_take, NULL, NULL, line_live_sd},
+	{"line_untold", untold_begin, line_take, NULL, NULL, line_live_sd},
+	{"line_final", line_begin, line_take, line_at, line_finish, line_final_sd},
 };
 
 /* --- measurement --- */
@@ -392,7 +377,7 @@ static void follow(const struct method *method, const struct stream *stream,
 	for (int k = 0; method->afterwards && k < stream->n; k++)
 		add_error(e, method, state, stream, k,
 			  method->afterwards(state, stream->seq[k]));
-	method->end(state);
+	free(state);
 }
 
 static void set_errors(struct row *row, struct errors *e)
@@ -480,7 +465,7 @@ static void run_timed(void *context)
 		method->finish(state);
 	for (int k = 0; method->afterwards && k < stream->n; k++)
 		timed->sum += method->afterwards(state, stream->seq[k]);
-	method->end(state);
+	free(state);
 }
 
 static void measure_times(int repeats)
