@@ -155,7 +155,7 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c)) \
 	$(filter $(O)/obj/lib/device/polhemus/%,$(objects_tracker_tty)) \
 	$(if $(has_vision),$(filter-out %/vision_opencv.o,$(objects_vision_opencv))) \
 	$(if $(has_frames),$(objects_frames_mkv) $(objects_film_mkv)) \
-	$(O)/obj/tools/bench/scalpel_picture.o
+	$(O)/obj/tests/vision/scalpel_picture.o
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@

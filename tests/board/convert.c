@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <jpeglib.h>
 #include <png.h>
-#include "../../tools/bench/scalpel_picture.h"
+#include "../vision/scalpel_picture.h"
 
 static int scalpel(double length_px, const char *path)
 {

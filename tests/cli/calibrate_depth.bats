@@ -10,7 +10,7 @@ setup_file() {
 	mkdir board
 	./draw 1 board >truth.json
 	! has_vision || ${CC:-cc} -O2 -I"$root/lib/include" "$root/tests/board/convert.c" \
-		"$root/tools/bench/scalpel_picture.c" -o convert -ljpeg -lpng -lm
+		"$root/tests/vision/scalpel_picture.c" -o convert -ljpeg -lpng -lm
 	rig 0.13 >rig.conf
 	! has_vision || incise capture -o cut.rec -r rig.conf >/dev/null
 }

@@ -13,7 +13,7 @@
 #include "../cli/cli.h"
 #include "../cli/json.h"
 #include "../cli/stopwatch.h"
-#include "scalpel_picture.h"
+#include "../../tests/vision/scalpel_picture.h"
 
 #define FRAMES 40
 #define ROUNDS 10

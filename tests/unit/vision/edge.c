@@ -28,7 +28,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <incise/vision.h>
-#include "../../../tools/bench/scalpel_picture.h"
+#include "../../vision/scalpel_picture.h"
 
 #define FRAMES 40
 #define ROWS 25	       /* 12 to each side, as edge.cc looks at */
@@ -134,7 +134,7 @@ static double all_known_px(const struct step *s)
 	return s->noise / s->height * sqrt(2 * 2 * sd * sqrt(M_PI) / (SHARE * WIDTH_PX));
 }
 
-/* An end in a picture of tools/bench/scalpel_picture.c, liver and black. */
+/* An end in a picture of tests/vision/scalpel_picture.c, liver and black. */
 static struct step step_of(const struct scalpel_picture *p)
 {
 	static const double liver[3] = {118, 46, 38}, black[3] = {24, 24, 26};

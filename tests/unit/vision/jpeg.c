@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/vision.h>
-#include "../../../tools/bench/scalpel_picture.h"
+#include "../../vision/scalpel_picture.h"
 
 static const struct incise_vision_setup black = {
 	.hue = {0, 179}, .saturation = {0, 255}, .value = {0, 60}};

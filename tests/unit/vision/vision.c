@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/vision/vision.cc, handle.cc, edge.cc: the exposed length compared with the truth of pictures
- * that are drawn outside the library (tools/bench/scalpel_picture.c), and of
+ * that are drawn outside the library (tests/vision/scalpel_picture.c), and of
  * the virtual camera. Results are printed for the log. Learnt thresholds find the handle.
  */
 #include <stdarg.h>
@@ -15,7 +15,7 @@
 #include <string.h>
 #include <incise/vision.h>
 #include "../../../lib/sim/sim.h"
-#include "../../../tools/bench/scalpel_picture.h"
+#include "../../vision/scalpel_picture.h"
 
 #define FRAMES 16
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Pictures of a scalpel over liver; see scalpel_picture.h. In float until all is drawn:
- * liver, scalpel, reflections, blur, light, noise, bytes.
+ * Frames of a scalpel over liver; see scalpel_picture.h. In float until all is drawn: liver,
+ * scalpel, reflections, blur, light, noise, bytes.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "noise.h"
+#include "../../lib/base/random.h"
 #include "scalpel_picture.h"
 
 #define SAMPLES 256
@@ -22,15 +22,20 @@ struct canvas {
 	float *rgb, *row; /* three values per pixel */
 };
 
+static uint64_t bits(uint64_t *state)
+{
+	return incise_random_mix(*state += 0x9e3779b97f4a7c15u);
+}
+
 double scalpel_picture_random(uint64_t *state)
 {
-	return (splitmix64(state) >> 11) * 0x1p-53;
+	return (bits(state) >> 11) * 0x1p-53;
 }
 
 /* Four uniform ones: near enough to a Gaussian, of sd 1. */
 static double noise(uint64_t *state)
 {
-	uint64_t b = splitmix64(state);
+	uint64_t b = bits(state);
 	double sum = (b & 0xffff) + (b >> 16 & 0xffff) + (b >> 32 & 0xffff) + (b >> 48);
 
 	return (sum / 65536 - 2) * 1.7320508;
