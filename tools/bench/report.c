@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Figures in the places of report.md. A template is made of blocks with empty lines between:
+ * Figures in the places of report.md, a template that is made of blocks with empty lines between:
  *
- *   {section PATH by PROGRAM}  the blocks from here on are of this object of report.json, and are
- *                              left out where it is none; a benchmark's is words.NAME, and
- *                              measured by a program, or incise-bench
- *   {if KEY} {if !KEY}         first line of a block that is left out unless the object has it
- *   {each LIST where K=V,…}    first line of a block for each row of a list of the object, or of
- *                              lists "a,b"; a list item is repeated, and so is the last line of
- *                              a table. Rows of an object are its members.
- *   {contents}                 a block of its own
- *   {to NAME}                  a link to a benchmark's section
- *   {VALUE}                    of the object or row; {: VALUE} with the text in front, if any
+ *   ## TITLE {section PATH by PROGRAM}  the blocks from here on are of this object of report.json,
+ *                      and are left out where it is none; a benchmark's is words.NAME, and
+ *                      measured by a program, or incise-bench
+ *   {if KEY} {if !KEY} first line of a block that is left out unless the object has it
+ *   {each LIST where K=V,…} CAPTION  first line of a block for each row of a list of the object,
+ *                      or of lists "a,b"; a list item is repeated, and so is the last line of a
+ *                      table. Rows of an object are its members.
+ *   {to NAME}          a link to a benchmark's section
+ *   {VALUE}            of the object or row; {: VALUE} with the text in front, if any
  *
  * VALUE is KEY*FACTOR PART:DIGITS of WORD.LIST where K=V,…, all but KEY at will. A KEY leads
  * inwards, "a.b", or is a ratio, "a/b"; "@" is the row's name, or that of its list, "." the row
@@ -62,6 +61,7 @@ struct row {
 
 struct rows {
 	struct row *row;
+	int *group; /* of each row: its number */
 	int n;
 	char names[200]; /* of the lists */
 };
@@ -70,7 +70,8 @@ struct report {
 	const json_t *report, *object; /* of the section */
 	const char *folder;
 	FILE *out;
-	bool item; /* the last block was a list item */
+	bool item;  /* the last block was a list item */
+	char *word; /* of the section; "": none */
 };
 
 /* --- Markdown --- */
@@ -305,12 +306,15 @@ static void add_row(struct rows *rows, const char *name, const json_t *object,
 		    const char *where)
 {
 	struct row row = {name, object};
+	size_t n = (size_t)rows->n + 1;
 
 	if (!matches(&row, where))
 		return;
-	rows->row = realloc(rows->row, (size_t)(rows->n + 1) * sizeof(*rows->row));
-	if (!rows->row)
+	rows->row = realloc(rows->row, n * sizeof(*rows->row));
+	rows->group = realloc(rows->group, n * sizeof(*rows->group));
+	if (!rows->row || !rows->group)
 		cli_fail("no memory");
+	rows->group[rows->n] = 0;
 	rows->row[rows->n++] = row;
 }
 
@@ -320,8 +324,7 @@ static void find_rows(const json_t *object, const char *lists, const char *where
 {
 	char *save = NULL;
 
-	rows->row = NULL;
-	rows->n = 0;
+	*rows = (struct rows){0};
 	snprintf(rows->names, sizeof(rows->names), "%s", lists);
 	for (char *path = strtok_r(rows->names, ",", &save); path;
 	     path = strtok_r(NULL, ",", &save)) {
@@ -342,19 +345,66 @@ static void find_rows(const json_t *object, const char *lists, const char *where
 	}
 }
 
-/* --- cells --- */
+static void free_rows(struct rows *rows)
+{
+	free(rows->row);
+	free(rows->group);
+}
+
+static bool any_has(const struct rows *rows, const struct value *v)
+{
+	bool any = false;
+
+	for (int i = 0; i < rows->n; i++)
+		any |= v->part == PART_HOLDING || has(&rows->row[i], v);
+	return any;
+}
+
+static bool same(const struct row *a, const struct row *b, const struct value *columns,
+		 int n)
+{
+	char left[TEXT], right[TEXT];
+
+	for (const struct value *v = columns; v < columns + n; v++) {
+		if (v->part != PART_VALUE)
+			continue;
+		row_text(a, v, left, sizeof(left));
+		row_text(b, v, right, sizeof(right));
+		if (strcmp(left, right))
+			return false;
+	}
+	return true;
+}
+
+/* Number the groups; returns how many. */
+static int make_groups(struct rows *rows, const struct value *columns, int n)
+{
+	bool grouped = false;
+	int groups = 0;
+
+	for (int k = 0; k < n; k++)
+		grouped |= columns[k].part != PART_VALUE;
+	for (int i = 0; i < rows->n; i++) {
+		int like = grouped ? 0 : i;
+
+		while (like < i && !same(&rows->row[i], &rows->row[like], columns, n))
+			like++;
+		rows->group[i] = like < i ? rows->group[like] : groups++;
+	}
+	return groups;
+}
 
 /* One number of those in the rows of a group; NaN of none. */
-static double summed_up(const struct rows *rows, const int *group, int which,
-			const struct value *v, enum part part)
+static double summed_up(const struct rows *rows, int group, const struct value *v,
+			enum part part)
 {
 	double *values = bench_alloc((size_t)rows->n, sizeof(*values)), value = 0;
 	int n = 0;
 
 	for (int i = 0; i < rows->n; i++) {
-		double one = group[i] == which ? number(&rows->row[i], v) : NAN;
+		double one = number(&rows->row[i], v);
 
-		if (isfinite(one))
+		if (rows->group[i] == group && isfinite(one))
 			values[n++] = one;
 	}
 	qsort(values, (size_t)n, sizeof(*values), ascending);
@@ -375,31 +425,17 @@ static double summed_up(const struct rows *rows, const int *group, int which,
 	return value;
 }
 
-static void range_text(const struct rows *rows, const int *group, int which,
-		       const struct value *v, char *text, size_t size)
-{
-	char least[64], largest[64];
-
-	report_number(summed_up(rows, group, which, v, PART_LEAST), v->digits, least,
-		      sizeof(least));
-	report_number(summed_up(rows, group, which, v, PART_RANGE), v->digits, largest,
-		      sizeof(largest));
-	if (strcmp(least, largest))
-		snprintf(text, size, "%s to %s", least, largest);
-	else
-		snprintf(text, size, "%s", least);
-}
-
-/* Where the answer is yes or no, of those that were asked. */
-static void cell_text(const struct rows *rows, const int *group, int which,
-		      const struct value *v, char *text, size_t size)
+/* A value of a group, in TEXT bytes. */
+static void cell_text(const struct rows *rows, int group, const struct value *v,
+		      char *text)
 {
 	int n = 0, asked = 0, holding = 0, first = -1;
+	char least[64];
 
 	for (int i = 0; i < rows->n; i++) {
 		const json_t *value = at_path(rows->row[i].object, v->key);
 
-		if (group[i] != which)
+		if (rows->group[i] != group)
 			continue;
 		n++;
 		first = first < 0 ? i : first;
@@ -407,71 +443,35 @@ static void cell_text(const struct rows *rows, const int *group, int which,
 		asked += json_is_boolean(value);
 	}
 	if (v->part == PART_VALUE)
-		row_text(&rows->row[first], v, text, size);
+		row_text(&rows->row[first], v, text, TEXT);
 	else if (v->part == PART_COUNT)
-		snprintf(text, size, "%d", n);
+		snprintf(text, TEXT, "%d", n);
 	else if (v->part == PART_HOLDING)
-		snprintf(text, size, "%d of %d", holding, asked ? asked : n);
-	else if (v->part == PART_RANGE)
-		range_text(rows, group, which, v, text, size);
+		/* Where the answer is yes or no, of those that were asked. */
+		snprintf(text, TEXT, "%d of %d", holding, asked ? asked : n);
 	else
-		report_number(summed_up(rows, group, which, v, v->part), v->digits, text,
-			      size);
-}
-
-static bool same(const struct row *a, const struct row *b, const struct value *columns,
-		 int n)
-{
-	char left[TEXT], right[TEXT];
-
-	for (const struct value *v = columns; v < columns + n; v++) {
-		if (v->part != PART_VALUE)
-			continue;
-		row_text(a, v, left, sizeof(left));
-		row_text(b, v, right, sizeof(right));
-		if (strcmp(left, right))
-			return false;
+		report_number(summed_up(rows, group, v, v->part), v->digits, text, TEXT);
+	if (v->part != PART_RANGE)
+		return;
+	report_number(summed_up(rows, group, v, PART_LEAST), v->digits, least,
+		      sizeof(least));
+	if (strcmp(least, text)) {
+		memmove(text + strlen(least) + 4, text, strlen(text) + 1);
+		memcpy(text, least, strlen(least));
+		memcpy(text + strlen(least), " to ", 4);
 	}
-	return true;
-}
-
-/* Numbers of groups by their rows; returns how many. */
-static int make_groups(const struct rows *rows, const struct value *columns, int n,
-		       int *group)
-{
-	bool grouped = false;
-	int groups = 0;
-
-	for (int k = 0; k < n; k++)
-		grouped |= columns[k].part != PART_VALUE;
-	for (int i = 0; i < rows->n; i++) {
-		int like = 0;
-
-		while (grouped && like < i &&
-		       !same(&rows->row[i], &rows->row[like], columns, n))
-			like++;
-		group[i] = grouped && like < i ? group[like] : groups++;
-	}
-	return groups;
 }
 
 /* --- text with places --- */
 
-static const struct report_section *section_of(const char *word)
-{
-	const struct report_section *s = report_sections();
-
-	while (*s->word && strcmp(s->word, word))
-		s++;
-	return s;
-}
-
 /* A link, where the report has the section. */
 static void put_link(struct report *r, const char *word)
 {
-	const struct report_section *s = section_of(word);
+	const struct report_section *s = report_sections();
 	char anchor[100];
 
+	while (*s->word && strcmp(s->word, word))
+		s++;
 	if (!*s->word || !json_object_get(json_object_get(r->report, "words"), word)) {
 		put_text(r->out, word);
 		return;
@@ -480,34 +480,14 @@ static void put_link(struct report *r, const char *word)
 	fprintf(r->out, "[%s](#%s)", word, anchor);
 }
 
-/* Of lists of the report: "WORD.LIST,LIST". False where there is none. */
-static bool listed_text(struct report *r, const struct value *v, char *text, size_t size)
-{
-	size_t word = strcspn(v->lists, ".");
-	bool there = false;
-	struct rows rows;
-	char path[64];
-	int *group;
-
-	snprintf(path, sizeof(path), "words.%.*s", (int)word, v->lists);
-	find_rows(at_path(r->report, path), v->lists + word + 1, v->where, &rows);
-	group = bench_alloc((size_t)rows.n, sizeof(*group));
-	for (int i = 0; i < rows.n; i++)
-		there |= has(&rows.row[i], v) || v->part == PART_HOLDING;
-	if (there)
-		cell_text(&rows, group, 0, v, text, size);
-	free(group);
-	free(rows.row);
-	return there;
-}
-
 /* A place's text without its braces; returns whether it has a value. */
 static bool put_place(struct report *r, const struct row *row, const char *place,
 		      void (*put)(FILE *, const char *))
 {
 	size_t front = *place == ':' ? 2 : 0;
 	struct value v = value_of(place + front);
-	char text[TEXT];
+	struct rows rows = {.row = (struct row *)row, .group = (int[]){0}, .n = 1};
+	char text[TEXT], path[64] = "words.";
 	bool there;
 
 	if (!strcmp(v.key, "to")) {
@@ -515,14 +495,19 @@ static bool put_place(struct report *r, const struct row *row, const char *place
 		return true;
 	}
 	if (*v.lists) {
-		there = listed_text(r, &v, text, sizeof(text));
-	} else {
-		there = has(row, &v);
-		row_text(row, &v, text, sizeof(text));
+		size_t word = strcspn(v.lists, ".");
+
+		strncat(path, v.lists, word);
+		find_rows(at_path(r->report, path), v.lists + word + 1, v.where, &rows);
 	}
-	fprintf(r->out, "%.*s", there ? (int)front : 0, place);
-	if (there)
+	there = any_has(&rows, &v);
+	if (there) {
+		cell_text(&rows, 0, &v, text);
+		fprintf(r->out, "%.*s", (int)front, place);
 		put(r->out, text);
+	}
+	if (*v.lists)
+		free_rows(&rows);
 	return there;
 }
 
@@ -563,17 +548,14 @@ struct block {
 static struct block template_lines(void)
 {
 	static struct block all;
-	char *text = all.n ? NULL : strdup(text_report_md), *save = NULL;
+	char *text = all.n ? "" : strdup(text_report_md);
 
-	if (all.n)
-		return all;
-	all.line = bench_alloc(strlen(text_report_md), sizeof(*all.line));
-	/* strtok() would leave out empty ones. */
-	for (char *line = text; line && *line; line = save) {
-		save = line + strcspn(line, "\n");
-		if (*save)
-			*save++ = 0;
-		all.line[all.n++] = line;
+	if (!all.n)
+		all.line = bench_alloc(strlen(text_report_md), sizeof(*all.line));
+	while (*text) {
+		all.line[all.n++] = text;
+		text += strcspn(text, "\n");
+		*text++ = 0;
 	}
 	return all;
 }
@@ -591,19 +573,23 @@ static struct block next_block(struct block *lines)
 	return block;
 }
 
-/* The argument of a first line "{NAME ARGUMENT}", in @argument, or NULL. */
-static char *directive(const struct block *block, const char *name, char argument[TEXT])
+/* Text behind "{NAME " up to "}" in a block's first line, in @argument, or NULL. */
+static char *directive(struct block block, const char *name, char argument[TEXT])
 {
-	size_t length = strlen(name);
-	const char *line = block->n ? *block->line : "";
+	char opening[20], *at;
 
-	if (*line != '{' || strncmp(line + 1, name, length) ||
-	    !strchr(" }", line[1 + length]))
+	snprintf(opening, sizeof(opening), "{%s ", name);
+	at = block.n ? strstr(*block.line, opening) : NULL;
+	if (!at)
 		return NULL;
-	snprintf(argument, TEXT, "%s",
-		 line + 1 + length + strspn(line + 1 + length, " "));
-	argument[strcspn(argument, "}")] = 0;
+	snprintf(argument, TEXT, "%.*s", (int)strcspn(at, "}") - (int)strlen(opening),
+		 at + strlen(opening));
 	return argument;
+}
+
+static struct block rest(struct block block)
+{
+	return (struct block){block.line + 1, block.n - 1};
 }
 
 /* Lines of a paragraph or of list items as one each. */
@@ -642,76 +628,91 @@ static void put_plot(struct report *r, struct block block)
 		cli_fail("no memory");
 	if (!access(path, R_OK)) {
 		put_paragraph(r, (struct block){block.line, 1}, NULL);
-		put_paragraph(r, (struct block){block.line + 1, block.n - 1}, NULL);
+		put_paragraph(r, rest(block), NULL);
 	}
 	free(path);
 }
 
-/* How many lines of a block are the caption of a table. */
-static int caption_of(struct block block)
-{
-	int n = 0;
-
-	while (n < block.n && *block.line[n] != '|')
-		n++;
-	return n;
-}
-
-static void put_caption(struct report *r, struct block block)
-{
-	put_paragraph(r, (struct block){block.line, caption_of(block)}, NULL);
-	begin_block(r, false);
-}
-
-/* A table whose rows stand in the template; without any of them a line that says so. */
-static void put_facts(struct report *r, struct block block)
-{
-	struct report inner = *r;
-	int heading = caption_of(block);
-	char *row, *rows = bench_alloc(1, 1);
-	size_t size;
-
-	for (int i = heading + 2; i < block.n; i++) {
-		inner.out = open_memstream(&row, &size);
-		if (inner.out && put_line(&inner, NULL, block.line[i], put_text)) {
-			fclose(inner.out);
-			rows = realloc(rows, strlen(rows) + size + 2);
-			strcat(strcat(rows, row), "\n");
-		} else {
-			fclose(inner.out);
-		}
-		free(row);
-	}
-	if (*rows) {
-		put_caption(r, block);
-		fprintf(r->out, "%s\n%s\n%s", block.line[heading],
-			block.line[heading + 1], rows);
-	} else {
-		fputs("\nNothing of this was measured.\n", r->out);
-	}
-	free(rows);
-}
-
-/* --- tables with a line for each row --- */
+/* --- tables --- */
 
 struct table {
-	char *heading[COLUMNS_MAX], *align[COLUMNS_MAX], *place[COLUMNS_MAX];
+	char *heading[COLUMNS_MAX];
 	struct value column[COLUMNS_MAX];
 	bool shown[COLUMNS_MAX];
 	int n;
 };
 
-/* Cells of "| a | b |" in a copy of it, which is the caller's; returns how many. */
-static int split(char *copy, char *cell[COLUMNS_MAX])
+/* Cells of "| a | b |", which is cut in place; returns how many. */
+static int split(char *line, char *cell[COLUMNS_MAX])
 {
 	int n = 0;
 
-	for (char *c = copy, *bar; n < COLUMNS_MAX && (bar = strstr(c, " |"));
+	for (char *c = line, *bar; n < COLUMNS_MAX && (bar = strstr(c, " |"));
 	     c = bar + 1) {
 		*bar = 0;
 		cell[n++] = c + 2; /* behind "| " */
 	}
 	return n;
+}
+
+/* Of a line of headings and one of places, copies of which live as long as the program. */
+static struct table table_of(const char *headings, const char *places)
+{
+	struct table t = {.n = split(strdup(headings), t.heading)};
+	char *place[COLUMNS_MAX];
+
+	split(strdup(places), place);
+	for (int k = 0; k < t.n; k++) {
+		char *value = cut(place[k], "{");
+
+		cut(value, "}");
+		t.column[k] = value_of(value);
+	}
+	return t;
+}
+
+/* Caption, headings and alignment. */
+static void put_head(struct report *r, const struct table *t, const char *caption)
+{
+	fprintf(r->out, "\n%s\n\n", caption);
+	for (int k = 0; k < t->n; k++)
+		if (t->shown[k])
+			fprintf(r->out, "| %s ", t->heading[k]);
+	fputs("|\n", r->out);
+	for (int k = 0; k < t->n; k++)
+		if (t->shown[k])
+			fputs(t->column[k].digits || t->column[k].part ? "| ---: "
+								       : "| --- ",
+			      r->out);
+	fputs("|\n", r->out);
+	r->item = false;
+}
+
+/* A table whose rows stand in the template; without any of them a line that says so. */
+static void put_facts(struct report *r, struct block block)
+{
+	struct table t = table_of(block.line[1], block.line[2]);
+	bool any = false;
+
+	memset(t.shown, true, sizeof(t.shown));
+	for (int i = 2; i < block.n; i++) {
+		struct report inner = *r;
+		char *row;
+		size_t size;
+
+		inner.out = open_memstream(&row, &size);
+		if (put_line(&inner, NULL, block.line[i], put_text)) {
+			if (!any)
+				put_head(r, &t, *block.line);
+			any = true;
+			fflush(inner.out);
+			fprintf(r->out, "%s\n", row);
+		}
+		fclose(inner.out);
+		free(row);
+	}
+	if (!any)
+		fputs("\nNothing of this was measured.\n", r->out);
 }
 
 /* In a cell a reason would make a table wide, in which nearly all others are empty. */
@@ -720,9 +721,7 @@ static void put_reason(struct report *r, const struct table *t, const struct row
 	const char *why = json_string_value(json_object_get(row->object, "failed"));
 	char line[4 * TEXT] = "", text[TEXT];
 
-	if (!why)
-		return;
-	for (int k = 0; k < t->n && k < 3; k++) {
+	for (int k = 0; why && k < t->n && k < 3; k++) {
 		const struct value *v = &t->column[k];
 
 		if (!has(row, v))
@@ -732,90 +731,60 @@ static void put_reason(struct report *r, const struct table *t, const struct row
 			 *line ? "; " : "Failed: ", v->digits ? t->heading[k] : "",
 			 v->digits ? ": " : "", text);
 	}
+	if (!why)
+		return;
 	snprintf(line + strlen(line), sizeof(line) - strlen(line), ". Why: %s", why);
 	begin_block(r, false);
 	put_text(r->out, line);
 	fputc('\n', r->out);
 }
 
-static void put_heads(struct report *r, const struct table *t, char *const *cell)
+/* Rows that are equal in all that is not summed up are one. */
+static void put_table(struct report *r, struct block block, const char *caption,
+		      struct rows *rows)
 {
-	for (int k = 0; k < t->n; k++)
-		if (t->shown[k])
-			fprintf(r->out, "| %s ", cell[k]);
-	fputs("|\n", r->out);
-}
-
-static void put_group(struct report *r, const struct table *t, const struct rows *rows,
-		      const int *group, int which)
-{
+	struct table t = table_of(block.line[0], block.line[1]);
+	int groups = make_groups(rows, t.column, t.n);
 	char text[TEXT];
 
-	for (int k = 0; k < t->n; k++) {
-		if (!t->shown[k])
-			continue;
-		fputs("| ", r->out);
-		if (!strcmp(t->column[k].key, "to")) {
-			put_link(r, rows->row[which].name);
-		} else {
-			cell_text(rows, group, which, &t->column[k], text, sizeof(text));
-			put_text(r->out, text);
+	for (int k = 0; k < t.n; k++)
+		t.shown[k] =
+			!strcmp(t.column[k].key, "to") || any_has(rows, &t.column[k]);
+	put_head(r, &t, caption);
+	for (int i = 0; i < groups && i < ROWS_MAX; i++) {
+		for (int k = 0; k < t.n; k++) {
+			if (!t.shown[k])
+				continue;
+			fputs("| ", r->out);
+			cell_text(rows, i, &t.column[k], text);
+			if (!strcmp(t.column[k].key, "to"))
+				put_link(r, rows->row[i].name);
+			else
+				put_text(r->out, text);
+			fputc(' ', r->out);
 		}
-		fputc(' ', r->out);
+		fputs("|\n", r->out);
 	}
-	fputs("|\n", r->out);
-}
-
-/* Rows that are equal in all that is not summed up are one. */
-static void put_table(struct report *r, struct block block, const struct rows *rows)
-{
-	int heading = caption_of(block), groups,
-	    *group = bench_alloc((size_t)rows->n, sizeof(*group));
-	char *copy[3] = {strdup(block.line[heading]), strdup(block.line[heading + 1]),
-			 strdup(block.line[heading + 2])};
-	struct table t = {.n = split(copy[0], t.heading)};
-
-	split(copy[1], t.align);
-	split(copy[2], t.place);
-	for (int k = 0; k < t.n; k++) {
-		struct value *v = &t.column[k];
-
-		t.place[k][strlen(t.place[k]) - 1] = 0;
-		*v = value_of(t.place[k] + 1);
-		t.shown[k] = v->part == PART_HOLDING || !strcmp(v->key, "to");
-		for (int i = 0; i < rows->n && !t.shown[k]; i++)
-			t.shown[k] = has(&rows->row[i], v);
-	}
-	groups = make_groups(rows, t.column, t.n, group);
-	put_caption(r, block);
-	put_heads(r, &t, t.heading);
-	put_heads(r, &t, t.align);
-	for (int i = 0; i < groups && i < ROWS_MAX; i++)
-		put_group(r, &t, rows, group, i);
 	/* Those of groups are counted in them. */
 	for (int i = 0; i < rows->n && groups == rows->n; i++)
 		put_reason(r, &t, &rows->row[i]);
 	if (groups > ROWS_MAX)
 		fprintf(r->out, "\nThe first %d of %d rows.\n", ROWS_MAX, groups);
-	for (int i = 0; i < 3; i++)
-		free(copy[i]);
-	free(group);
 }
 
 static void put_each(struct report *r, struct block block, char *lists)
 {
-	char *where = strstr(lists, " where ");
+	const char *where = cut(lists, " where "),
+		   *caption = strchr(*block.line, '}') + 1;
 	struct rows rows;
 
-	if (where)
-		*where = 0;
-	find_rows(r->object, lists, where ? where + 7 : "", &rows);
-	if (rows.n && caption_of(block) < block.n)
-		put_table(r, block, &rows);
+	find_rows(r->object, lists, where, &rows);
+	if (rows.n && *caption)
+		put_table(r, rest(block), caption + 1, &rows);
 	else
 		for (int i = 0; i < rows.n; i++)
-			put_paragraph(r, block, &rows.row[i]);
-	free(rows.row);
+			put_paragraph(r, rest(block), &rows.row[i]);
+	free_rows(&rows);
 }
 
 /* --- the template --- */
@@ -824,24 +793,22 @@ const struct report_section *report_sections(void)
 {
 	static struct report_section sections[32];
 	struct block lines = template_lines();
-	struct report_section *s = NULL;
+	struct report_section *s = sections;
 	char path[TEXT];
-	int n = 0;
 
-	if (*sections->word)
-		return sections;
-	while (lines.n) {
+	while (lines.n && (s > sections || !*s->word)) {
 		struct block block = next_block(&lines);
 
-		if (directive(&block, "section", path)) {
-			s = strncmp(path, "words.", 6) ? NULL : &sections[n++];
-			if (s &&
-			    sscanf(path, "words.%31s by %31s", s->word, s->program) < 2)
+		if (directive(block, "section", path) &&
+		    sscanf(path, "words.%31s by %31s", s->word, s->program) > 0) {
+			if (!*s->program)
 				strcpy(s->program, "incise-bench");
-		} else if (s && block.n && !strncmp(*block.line, "## ", 3)) {
-			snprintf(s->title, sizeof(s->title), "%s", *block.line + 3);
-		} else if (s && block.n && !strncmp(*block.line, "![", 2)) {
-			s->plots = true;
+			snprintf(s->title, sizeof(s->title), "%.*s",
+				 (int)(strstr(*block.line, " {") - *block.line) - 3,
+				 *block.line + 3);
+			s++;
+		} else if (s > sections && block.n && !strncmp(*block.line, "![", 2)) {
+			s[-1].plots = true;
 		}
 	}
 	return sections;
@@ -861,21 +828,40 @@ static void put_block(struct report *r, struct block block)
 {
 	char argument[TEXT];
 
-	if (directive(&block, "if", argument)) {
+	if (directive(block, "if", argument)) {
 		if (!holds(r->object, argument))
 			return;
-		block = (struct block){block.line + 1, block.n - 1};
+		block = rest(block);
 	}
-	if (directive(&block, "each", argument))
-		put_each(r, (struct block){block.line + 1, block.n - 1}, argument);
+	if (directive(block, "each", argument))
+		put_each(r, block, argument);
 	else if (!strncmp(*block.line, "```", 3))
 		put_fence(r, block);
 	else if (!strncmp(*block.line, "![", 2))
 		put_plot(r, block);
-	else if (caption_of(block) < block.n)
+	else if (block.n > 1 && *block.line[1] == '|')
 		put_facts(r, block);
 	else
 		put_paragraph(r, block, NULL);
+}
+
+/* A benchmark's section ends with its data. */
+static void end_section(struct report *r)
+{
+	if (*r->word && json_is_object(r->object))
+		fprintf(r->out, "\nAll figures, as JSON: [data/%s.json](data/%s.json)\n",
+			r->word, r->word);
+}
+
+static void begin_section(struct report *r, const char *title, char *path)
+{
+	end_section(r);
+	cut(path, " by ");
+	r->object = at_path(r->report, path);
+	r->word = strncmp(path, "words.", 6) ? "" : path + 6;
+	if (json_is_object(r->object))
+		fprintf(r->out, "\n%.*s\n", (int)(strstr(title, " {") - title), title);
+	r->item = false;
 }
 
 static void put_contents(FILE *out, const char *body)
@@ -895,27 +881,28 @@ static void put_contents(FILE *out, const char *body)
 
 void report_markdown(const json_t *report, const char *folder, FILE *out)
 {
-	struct report r = {.report = report, .object = report, .folder = folder};
-	struct block lines = template_lines(), block;
-	char *body = NULL, path[TEXT];
+	struct report r = {
+		.report = report, .object = report, .folder = folder, .word = ""};
+	struct block lines = template_lines(), block = next_block(&lines);
+	char *body = NULL, path[TEXT], section[TEXT];
 	size_t size;
 
 	/* Its first block is about the template, but for the title, its last line. */
-	block = next_block(&lines);
 	fprintf(out, "%s\n\n", block.line[block.n - 1]);
-	next_block(&lines); /* {contents} */
 	r.out = open_memstream(&body, &size);
 	if (!r.out)
 		cli_fail("no memory");
 	while (lines.n) {
 		block = next_block(&lines);
-		if (directive(&block, "section", path)) {
-			path[strcspn(path, " ")] = 0;
-			r.object = at_path(report, path);
+		if (directive(block, "section", path)) {
+			begin_section(&r, *block.line, path);
+			memcpy(section, path, sizeof(section));
+			r.word = *r.word ? section + 6 : "";
 		} else if (block.n && json_is_object(r.object)) {
 			put_block(&r, block);
 		}
 	}
+	end_section(&r);
 	fclose(r.out);
 	put_contents(out, body);
 	fwrite(body, 1, size, out);
