@@ -96,8 +96,8 @@ static json_t *json_of(const struct bench_column *c, const void *row)
 static void word_of(const struct bench_column *c, const void *row, const char *format,
 		    char *word, size_t size)
 {
-	if (text_of(c, row))
-		snprintf(word, size, "%s", text_of(c, row));
+	if (c->type == BENCH_TEXT || c->type == BENCH_CHARS)
+		snprintf(word, size, "%s", text_of(c, row) ? text_of(c, row) : "");
 	else
 		snprintf(word, size, format, number_of(c, row));
 }
@@ -113,10 +113,28 @@ static const struct bench_column *column_of(const struct bench_table *table,
 
 static const char *failed_of(const struct bench_table *table, const void *row)
 {
-	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
-		if (c->key && !strcmp(c->key, "failed"))
-			return text_of(c, row);
-	return NULL;
+	return text_of(column_of(table, "failed", strlen("failed")), row);
+}
+
+/* "KEY=TEXT,KEY=TEXT|TEXT" */
+static bool matches(const struct bench_table *table, const char *where, const void *row)
+{
+	for (const char *c = where; c && *c; c += *c == ',') {
+		size_t key = strcspn(c, "=");
+		char word[TEXT_BYTES] = "";
+		bool any = false;
+
+		word_of(column_of(table, c, key), row, "%g", word, sizeof(word));
+		for (c += key; *c && *c != ',';) {
+			size_t n = strcspn(++c, "|,");
+
+			any |= strlen(word) == n && !strncmp(word, c, n);
+			c += n;
+		}
+		if (!any)
+			return false;
+	}
+	return true;
 }
 
 static const void *row_at(const struct bench_table *table, const void *rows, int i)
@@ -313,9 +331,33 @@ void bench_value(struct bench_run *run, const char *key, json_t *value)
 	set(run->report, key, value);
 }
 
-void bench_scalar(struct bench_run *run, const char *key, json_t *value)
+static void update(json_t *object, const char *fmt, va_list args)
 {
-	json_object_set_new(run->scalars, key, value);
+	json_error_t err;
+	json_t *members = json_vpack_ex(&err, 0, fmt, args);
+
+	if (!members)
+		cli_fail("%s: %s", fmt, err.text);
+	json_object_update(object, members);
+	json_decref(members);
+}
+
+void bench_values(struct bench_run *run, const char *fmt, ...)
+{
+	va_list args;
+
+	va_start(args, fmt);
+	update(run->report, fmt, args);
+	va_end(args);
+}
+
+void bench_scalars(struct bench_run *run, const char *fmt, ...)
+{
+	va_list args;
+
+	va_start(args, fmt);
+	update(run->scalars, fmt, args);
+	va_end(args);
 }
 
 static json_t *row_json(const struct bench_table *table, const void *row)
@@ -360,7 +402,7 @@ void bench_rows(struct bench_run *run, const struct bench_table *table, const vo
 
 		json_array_append_new(list, row_json(table, row));
 		for (const struct bench_metric *m = table->metrics; m->name; m++)
-			if (!m->when || m->when(row))
+			if (matches(table, m->where, row))
 				add_metric(run->metrics, table, m, row);
 	}
 	if (table->key)
@@ -403,11 +445,6 @@ static void add_word(struct words *words, const char *word)
 	snprintf(words->word[words->n++], TEXT_BYTES, "%s", word);
 }
 
-static bool drawn(const struct bench_data *data, const void *row)
-{
-	return !data->when || data->when(row);
-}
-
 /* The value of each key of "motion,name", with spaces between them; of @only that alone. */
 static void block_of(const struct bench_data *data, const char *only, const void *row,
 		     char block[TEXT_BYTES])
@@ -447,7 +484,7 @@ static struct words words_of(const struct bench_data *data, const char *key,
 	for (int i = 0; i < rows->n; i++) {
 		const void *row = row_at(data->table, rows->rows, i);
 
-		if (!drawn(data, row))
+		if (!matches(data->table, data->where, row))
 			continue;
 		block_of(data, key, row, word);
 		add_word(&words, word);
@@ -482,7 +519,7 @@ static void write_data(const struct bench_run *run, const char *file,
 		for (int i = 0; i < rows->n; i++) {
 			const void *row = row_at(data->table, rows->rows, i);
 
-			if (!drawn(data, row))
+			if (!matches(data->table, data->where, row))
 				continue;
 			block_of(data, NULL, row, block);
 			if (!strcmp(block, blocks.word[k]))
@@ -583,7 +620,13 @@ static void draw(const struct bench_run *run, const struct bench_plot *plot)
 
 const char *bench_machine(const struct bench_run *run, const char *key)
 {
-	return json_string_value(json_object_get(run->machine, key));
+	static char all[600];
+
+	if (key)
+		return json_string_value(json_object_get(run->machine, key));
+	snprintf(all, sizeof(all), "%s; %s; %s", bench_machine(run, "cpu"),
+		 bench_machine(run, "kernel"), bench_machine(run, "compiler"));
+	return all;
 }
 
 void bench_fail(struct bench_run *run, const char *fmt, ...)

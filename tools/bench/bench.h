@@ -67,7 +67,7 @@ struct bench_metric {
 	enum metric_kind kind;
 	size_t offset; /* struct harness_time, struct harness_spread or double */
 	const char *unit, *name;
-	bool (*when)(const void *row); /* NULL: of all rows */
+	const char *where; /* rows with "KEY=TEXT,KEY=TEXT|TEXT"; NULL: all */
 	bool more_is_better;
 };
 
@@ -97,7 +97,7 @@ struct bench_table {
 struct bench_data {
 	const struct bench_table *table;
 	const char *blocks;
-	bool (*when)(const void *row); /* NULL: all rows */
+	const char *where; /* as of a metric */
 };
 
 /*
@@ -109,7 +109,7 @@ struct bench_data {
  *   data_blocks        names of all blocks, as a list of words; more_blocks
  *   data_KEY           values of each key of the blocks, as a list of words; more_KEY
  *   suffix             the plot's
- *   NAME               each scalar of bench_value() and bench_scalar(); cpu and kernel
+ *   NAME               each scalar of bench_values() and bench_scalars(); cpu and kernel
  */
 struct bench_plot {
 	const char *suffix; /* the plot is NAME-suffix; NULL: NAME */
@@ -170,14 +170,17 @@ void *bench_alloc(size_t n, size_t size);
  * report, and fail the program with what bench_fail() was told. */
 void bench_measure(struct bench_run *run);
 
-/* Of machine and build: "cpu", "kernel", "compiler", "vectors". */
+/* Of machine and build: "cpu", "kernel", "compiler", "vectors"; "cpu; kernel; compiler" for NULL. */
 const char *bench_machine(const struct bench_run *run, const char *key);
+
+/* Members of the JSON, an object of json_pack(). */
+void bench_values(struct bench_run *run, const char *fmt, ...);
+
+/* Scalars for the plots alone, the same. */
+void bench_scalars(struct bench_run *run, const char *fmt, ...);
 
 /* A member of the JSON; takes the value. */
 void bench_value(struct bench_run *run, const char *key, json_t *value);
-
-/* A scalar for the plots alone. */
-void bench_scalar(struct bench_run *run, const char *key, json_t *value);
 
 /* printf() of the text; nothing with --json. */
 void bench_text(const struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3);

@@ -14,7 +14,6 @@
 #include "../../lib/sim/sim.h"
 #include "../cli/cli.h"
 #include "../cli/file.h"
-#include "../cli/json.h"
 #include "../cli/stopwatch.h"
 #include "../cli/tick_cost.h"
 #include "sheet.h"
@@ -423,16 +422,6 @@ static void measure_rates(bool quick)
 	cli_progress_end();
 }
 
-static bool is_1_kHz(const void *row)
-{
-	return ((const struct rate_row *)row)->rate_hz == 1000;
-}
-
-static bool is_rendered(const void *row)
-{
-	return !*((const struct rate_row *)row)->failed;
-}
-
 static const struct bench_table rates_table = {
 	.key = "rates",
 	.row_bytes = sizeof(struct rate_row),
@@ -465,11 +454,11 @@ static const struct bench_table rates_table = {
 		    COLUMN(rate_row, "rendered_max_N", rendered.max_N),
 		    COLUMN(rate_row, "failed", failed)},
 	.metrics = {METRIC(EXACT, rate_row, command.rms_N, "N",
-			   "{wall} {poses} command rms at 1 kHz", is_1_kHz),
+			   "{wall} {poses} command rms at 1 kHz", "rate_hz=1000"),
 		    METRIC(EXACT, rate_row, rendered.rms_N, "N",
-			   "{wall} {poses} rendered rms at 1 kHz", is_1_kHz),
+			   "{wall} {poses} rendered rms at 1 kHz", "rate_hz=1000"),
 		    METRIC(EXACT, rate_row, rendered.max_N, "N",
-			   "{wall} {poses} rendered largest at 1 kHz", is_1_kHz)},
+			   "{wall} {poses} rendered largest at 1 kHz", "rate_hz=1000")},
 };
 
 /* --- wake-ups --- */
@@ -609,13 +598,11 @@ static void report_wakeups(struct bench_run *run, const struct wakeups *wakeups)
 	double most = 1;
 	int n = 0;
 
-	bench_value(run, "wakeups.seconds", json_real(wakeups->seconds));
-	bench_value(run, "wakeups.policy",
-		    json_string(wakeups_policy(wakeups->realtime)));
-	bench_value(run, "wakeups.priority",
-		    wakeups->realtime ? json_integer(INCISE_REALTIME_PRIORITY)
-				      : json_null());
-	bench_value(run, "wakeups.cpu", json_integer(wakeups->cpu));
+	bench_values(run, "{s{sf ss so si}}", "wakeups", "seconds", wakeups->seconds,
+		     "policy", wakeups_policy(wakeups->realtime), "priority",
+		     wakeups->realtime ? json_integer(INCISE_REALTIME_PRIORITY)
+				       : json_null(),
+		     "cpu", wakeups->cpu);
 	print_wakeups(run, wakeups);
 	bench_rows(run, &wakeup_table, wakeups->row, wakeups->n);
 	for (int i = 0; i < wakeups->n; i++) {
@@ -630,15 +617,8 @@ static void report_wakeups(struct bench_run *run, const struct wakeups *wakeups)
 					   &row->cyclictest);
 	}
 	bench_rows(run, &bench_points, points, n);
-	bench_scalar(run, "least", json_real(0.5 / most));
-	bench_scalar(run, "seconds", json_real(wakeups->seconds));
-	bench_scalar(run, "policy",
-		     json_string(wakeups->realtime ? "SCHED_FIFO" : "SCHED_OTHER"));
-}
-
-static bool is_measured(const void *row)
-{
-	return ((const struct wakeup *)row)->loop.bins;
+	bench_scalars(run, "{sf sf ss}", "least", 0.5 / most, "seconds", wakeups->seconds,
+		      "policy", wakeups->realtime ? "SCHED_FIFO" : "SCHED_OTHER");
 }
 
 /* --- the bench --- */
@@ -661,16 +641,12 @@ static void report_first(struct bench_run *run, const struct tick_row *tick,
 {
 	json_t *late = row->loop.json ? json_copy(row->loop.json) : json_null();
 
-	bench_value(run, "tick_ns",
-		    json_pack("{sf sf sf}", "median", tick->cost.median, "p99",
-			      tick->cost.p99, "p999", tick->cost.p999));
 	if (row->loop.json)
 		json_object_set_new(late, "skipped",
 				    json_integer((json_int_t)row->skipped));
-	bench_value(run, "lateness_us", late);
-	bench_value(run, "cyclictest_us",
-		    row->cyclictest.json ? json_incref(row->cyclictest.json)
-					 : json_null());
+	bench_values(run, "{s{sf sf sf} so sO?}", "tick_ns", "median", tick->cost.median,
+		     "p99", tick->cost.p99, "p999", tick->cost.p999, "lateness_us", late,
+		     "cyclictest_us", row->cyclictest.json);
 }
 
 static void run(struct bench_run *run)
@@ -711,13 +687,13 @@ static const struct bench_plot plots[] = {
 	 .height = 360,
 	 .across = "load",
 	 .down = "rate_hz",
-	 .data = {&wakeup_table, "rate_hz,load,title", is_measured},
+	 .data = {&wakeup_table, "rate_hz,load,title", "failed="},
 	 .more = {&bench_points, "block"}},
 	{.suffix = "rates",
 	 .script = text_loop_rates_gp,
 	 .width = 1320,
 	 .height = 620,
-	 .data = {&rates_table, "stiffness_N_mm,poses", is_rendered}},
+	 .data = {&rates_table, "stiffness_N_mm,poses", "failed="}},
 	{0},
 };
 

@@ -682,8 +682,7 @@ static void add_curves(struct bench_run *run)
 
 static void run(struct bench_run *run)
 {
-	bench_text(run, "%s; %s; %s%s\n\n", bench_machine(run, "cpu"),
-		   bench_machine(run, "kernel"), bench_machine(run, "compiler"),
+	bench_text(run, "%s%s\n\n", bench_machine(run, NULL),
 		   run->quick ? "\nquick: a part of the grids" : "");
 	for (int i = 0; i < N(experiments); i++) {
 		results[i].experiment = &experiments[i];
@@ -708,14 +707,15 @@ static const struct bench_plot plots[] = {
 	 .script = text_stability_guard_gp,
 	 .width = 1320,
 	 .height = 540,
-	 .data = {&stability_guard_table, "delay", stability_is_guarded},
+	 .data = {&stability_guard_table, "delay",
+		  "guard=on,late=wall,clamp_N=nan,swept=1"},
 	 .more = {&stability_cap_table, "verdict"}},
 	{.suffix = "integrators",
 	 .script = text_stability_integrators_gp,
 	 .width = 1500,
 	 .height = 560,
 	 .data = {&stability_integrator_table, "integrator,K_N_m"},
-	 .more = {&stability_integrator_table, "integrator", stability_is_whole}},
+	 .more = {&stability_integrator_table, "integrator", "step_s=0.001"}},
 	{0},
 };
 

@@ -16,8 +16,4 @@ void stability_integrators(struct bench_run *run);
 extern const struct bench_table stability_guard_table, stability_cap_table,
 	stability_integrator_table;
 
-/* Rows to draw: with the guard on and without a clamp; with steps of a whole tick. */
-bool stability_is_guarded(const void *row);
-bool stability_is_whole(const void *row);
-
 #endif

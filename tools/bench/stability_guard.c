@@ -13,7 +13,6 @@
 #include "../../lib/control/guard.h"
 #include "../../lib/control/plant.h"
 #include "../cli/cli.h"
-#include "../cli/json.h"
 #include "stability.h"
 
 #define GUARD_ROWS_MAX 768
@@ -46,6 +45,7 @@ struct guard_row {
 	bool bounded;
 	double largest_mm, largest_N; /* over the whole run */
 	double late_mm;		      /* over its last quarter */
+	bool swept; /* at every stiffness, delay and setting; else of other caps */
 	char text[40];
 };
 
@@ -139,7 +139,8 @@ const struct bench_table stability_guard_table = {
 		    COLUMN(guard_row, "bounded", bounded),
 		    COLUMN(guard_row, "largest_mm", largest_mm),
 		    COLUMN(guard_row, "late_mm", late_mm),
-		    COLUMN(guard_row, "largest_N", largest_N)},
+		    COLUMN(guard_row, "largest_N", largest_N),
+		    COLUMN(guard_row, "swept", swept, .data = true)},
 };
 
 static const struct bench_table held_table = {
@@ -231,6 +232,8 @@ static void measure_late_walls(bool quick, struct held *held)
 				}
 	}
 	n_late_walls = n_guard_rows;
+	for (int i = 0; i < n_guard_rows; i++)
+		guard_rows[i].swept = true;
 }
 
 #define CAPS_MAX 64
@@ -297,9 +300,7 @@ void stability_guard(struct bench_run *run)
 		 "%g of %g in contact only",
 		 held[0].grow, held[0].n, held[1].grow, held[1].n, held[2].grow,
 		 held[2].n, held[3].grow, held[3].n);
-	bench_scalar(run, "unbounded", json_string(title));
-	bench_scalar(run, "share", json_real(INCISE_GUARD_SHARE));
-
+	bench_scalars(run, "{ss sf}", "unbounded", title, "share", INCISE_GUARD_SHARE);
 	for (int i = 0; i < n_guard_rows; i++) {
 		const struct guard_row *r = &guard_rows[i];
 
@@ -310,13 +311,4 @@ void stability_guard(struct bench_run *run)
 		bench_fail(run,
 			   "guard: %d walls were not bounded with it: please report it",
 			   missed);
-}
-
-/* With the guard on, without a clamp. */
-bool stability_is_guarded(const void *data)
-{
-	const struct guard_row *row = data;
-
-	return row < &guard_rows[n_late_walls] && row->setting == GUARD_ON &&
-	       isnan(row->clamp_N);
 }
