@@ -24,7 +24,6 @@
 #include "bench.h"
 #include "../cli/cli.h"
 #include "../cli/folder.h"
-#include "../cli/json.h"
 #ifdef HAVE_JPEG
 #include <jpeglib.h>
 #endif
@@ -487,13 +486,10 @@ static void report(struct bench_run *run, const struct row *rows, int n, double 
 
 	for (int i = 0; i < FRAMES; i++)
 		bytes += (double)camera.frame[i].size;
-	bench_value(run, "seconds", json_real(seconds));
-	bench_value(run, "force_hz", json_number(rows->force_info.rate_hz));
-	bench_value(run, "tracker_hz", json_number(rows->tracker_info.rate_hz));
-	bench_value(run, "camera_hz", json_number(info->rate_hz));
-	bench_value(run, "width", json_integer(info->width));
-	bench_value(run, "height", json_integer(info->height));
-	bench_value(run, "unlooked", json_integer((json_int_t)rows->unlooked));
+	bench_values(run, "{sf sf sf sf si si sI}", "seconds", seconds, "force_hz",
+		     rows->force_info.rate_hz, "tracker_hz", rows->tracker_info.rate_hz,
+		     "camera_hz", info->rate_hz, "width", info->width, "height",
+		     info->height, "unlooked", (json_int_t)rows->unlooked);
 	bench_text(
 		run,
 		"%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz, JPEG of %.0f "

@@ -20,7 +20,6 @@
 #include "../../lib/control/predict.h"
 #include "bench.h"
 #include "../cli/cli.h"
-#include "../cli/json.h"
 #include "../cli/stopwatch.h"
 #include "noise.h"
 
@@ -742,20 +741,6 @@ static void measure_times(int repeats)
 		track_end(&tracks[r]);
 }
 
-static bool is_of_first_motion(const void *data)
-{
-	const struct row *row = data;
-
-	return row->motion == motions[0].name && row->delay_ms == delays_ms[0];
-}
-
-static bool is_usual(const void *data)
-{
-	const struct row *row = data;
-
-	return row->delay_ms == USUAL_MS && row->tracker_hz == USUAL_HZ;
-}
-
 static const struct bench_table rows_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
@@ -782,9 +767,9 @@ static const struct bench_table rows_table = {
 		    COLUMN(row, "failed", failed),
 		    COLUMN(row, "panel", panel, .data = true)},
 	.metrics = {METRIC(TIME, row, time, "ns", "{name}, {tracker_hz} Hz",
-			   is_of_first_motion),
+			   "motion=line,delay_ms=4"),
 		    METRIC(EXACT, row, place_mm.rms, "mm", "{name}, {motion}, rms",
-			   is_usual)},
+			   "tracker_hz=120,delay_ms=4")},
 };
 
 static const struct bench_block rows_block = {
@@ -823,10 +808,9 @@ static void report(struct bench_run *run, int repeats, int ticks)
 	bench_text(
 		run,
 		"poses with %g mm of noise, %g ms of jitter, %g %% lost; %g s at 1000 ticks a "
-		"second; times of %d runs in turn\n%s; %s; %s\n",
+		"second; times of %d runs in turn\n%s\n",
 		NOISE_MM, JITTER_MS, LOST * 100, ticks * 1e-3, repeats,
-		bench_machine(run, "cpu"), bench_machine(run, "kernel"),
-		bench_machine(run, "compiler"));
+		bench_machine(run, NULL));
 	for (const struct row *block = rows; block < rows + N(rows); block += per_block) {
 		bench_text(run, "\n%s; %g ms late\n", block->panel, block->delay_ms);
 		bench_block(run, &rows_block, sizeof(*rows), block, ROWS, N(rates_hz),
@@ -873,31 +857,23 @@ static void run(struct bench_run *run)
 		measure(&c, USUAL_RATE, &losses[g * ROWS]);
 	}
 	cli_progress_end();
-	bench_value(run, "noise_mm", json_real(NOISE_MM));
-	bench_value(run, "jitter_ms", json_real(JITTER_MS));
-	bench_value(run, "lost", json_real(LOST));
-	bench_value(run, "seconds", json_real(c.ticks * 1e-3));
-	bench_value(run, "repeats", json_integer(repeats));
-	bench_scalar(run, "delay_ms", json_real(delays_ms[0]));
+	bench_values(run, "{sf sf sf sf si}", "noise_mm", NOISE_MM, "jitter_ms",
+		     JITTER_MS, "lost", LOST, "seconds", c.ticks * 1e-3, "repeats",
+		     repeats);
+	bench_scalars(run, "{sf}", "delay_ms", delays_ms[0]);
 	report(run, repeats, c.ticks);
-}
-
-/* Of the two delays the shorter one. */
-static bool is_drawn(const void *row)
-{
-	return ((const struct row *)row)->delay_ms == delays_ms[0];
 }
 
 static const struct bench_plot plots[] = {
 	{.script = text_pose_gp,
 	 .width = 1320,
 	 .height = 860,
-	 .data = {&rows_table, "panel,name", is_drawn}},
+	 .data = {&rows_table, "panel,name", "delay_ms=4"}},
 	{.suffix = "rates",
 	 .script = text_pose_gp,
 	 .width = 1320,
 	 .height = 860,
-	 .data = {&rows_table, "panel,name", is_drawn}},
+	 .data = {&rows_table, "panel,name", "delay_ms=4"}},
 	{0},
 };
 

@@ -13,7 +13,6 @@
 #include "../../lib/record/time/timeline.h"
 #include "bench.h"
 #include "../cli/cli.h"
-#include "../cli/json.h"
 #include "../cli/stopwatch.h"
 #include "noise.h"
 
@@ -490,19 +489,6 @@ static void measure_times(int repeats)
 
 /* --- report --- */
 
-static bool is_compared(const void *data)
-{
-	const struct row *row = data;
-
-	return row->window_s == 1 || row->window_s == 30;
-}
-
-/* Times are the same for each lateness and drift. */
-static bool is_timed(const void *row)
-{
-	return (const struct row *)row < &rows[N(windows_s) * METHODS];
-}
-
 static const struct bench_table rows_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
@@ -517,8 +503,9 @@ static const struct bench_table rows_table = {
 		    COLUMN(row, "failed", failed)},
 	.metrics = {METRIC(EXACT, row, rms_us, "us",
 			   "{name}, {late}, {drift_ppm:%+g} ppm, {window_s} s, rms",
-			   is_compared),
-		    METRIC(TIME, row, time, "ns", "{name}, {window_s} s", is_timed)},
+			   "window_s=1|30"),
+		    METRIC(TIME, row, time, "ns", "{name}, {window_s} s",
+			   "late=uniform,drift_ppm=-200")},
 };
 
 /* A lateness and a drift. */
@@ -552,19 +539,16 @@ static void run(struct bench_run *run)
 					&rows[i]);
 			}
 	cli_progress_end();
-	bench_value(run, "rate_hz", json_integer(RATE_HZ));
-	bench_value(run, "lost", json_real(LOST));
-	bench_value(run, "streams", json_integer(streams_of(run->quick, 120)));
-	bench_value(run, "repeats", json_integer(repeats));
-	bench_scalar(run, "drift_ppm", json_real(drifts_ppm[N(drifts_ppm) - 1]));
-	bench_scalar(run, "late_ms", json_integer(LATE_MS));
+	bench_values(run, "{si sf si si}", "rate_hz", RATE_HZ, "lost", LOST, "streams",
+		     streams_of(run->quick, 120), "repeats", repeats);
+	bench_scalars(run, "{sf si}", "drift_ppm", drifts_ppm[N(drifts_ppm) - 1],
+		      "late_ms", LATE_MS);
 	bench_text(
 		run,
 		"%d Hz, up to %d ms late, %g %% lost; %d streams or more of each; times of %d "
-		"runs in turn\n%s; %s; %s\n",
+		"runs in turn\n%s\n",
 		RATE_HZ, LATE_MS, LOST * 100, streams_of(run->quick, 120), repeats,
-		bench_machine(run, "cpu"), bench_machine(run, "kernel"),
-		bench_machine(run, "compiler"));
+		bench_machine(run, NULL));
 	for (const struct row *r = rows; r < rows + N(rows); r += per_block) {
 		bench_text(run, "\n%s lateness, %+g ppm\n", r->late, r->drift_ppm);
 		bench_block(run, &block, sizeof(*rows), r, METHODS, N(windows_s),
@@ -576,22 +560,16 @@ static void run(struct bench_run *run)
 		       "* {name}, {late}, {drift_ppm:%+g} ppm, {window_s} s");
 }
 
-/* Of the drifts the last one. */
-static bool is_drawn(const void *row)
-{
-	return ((const struct row *)row)->drift_ppm == drifts_ppm[N(drifts_ppm) - 1];
-}
-
 static const struct bench_plot plots[] = {
 	{.script = text_timeline_gp,
 	 .width = 1320,
 	 .height = 620,
-	 .data = {&rows_table, "late,name", is_drawn}},
+	 .data = {&rows_table, "late,name", "drift_ppm=200"}},
 	{.suffix = "windows",
 	 .script = text_timeline_gp,
 	 .width = 1320,
 	 .height = 620,
-	 .data = {&rows_table, "late,name", is_drawn}},
+	 .data = {&rows_table, "late,name", "drift_ppm=200"}},
 	{0},
 };
 

@@ -11,7 +11,6 @@
 #include <incise/vision.h>
 #include "bench.h"
 #include "../cli/cli.h"
-#include "../cli/json.h"
 #include "../cli/stopwatch.h"
 #include "../../tests/vision/scalpel_picture.h"
 
@@ -213,11 +212,6 @@ static void measure(const struct kind *kind, const struct frames *f, int rounds,
 	}
 }
 
-static bool is_found(const void *row)
-{
-	return !*((const struct row *)row)->failed;
-}
-
 static const struct bench_table rows_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
@@ -259,9 +253,7 @@ static void run(struct bench_run *run)
 		free_all(&frames);
 	}
 	cli_progress_end();
-	bench_value(run, "width", json_integer(640));
-	bench_value(run, "height", json_integer(480));
-	bench_value(run, "rounds", json_integer(rounds));
+	bench_values(run, "{si si si}", "width", 640, "height", 480, "rounds", rounds);
 	bench_text(run, "%s\none thread; %d rounds\n", bench_machine(run, "cpu"), rounds);
 	bench_table(run, &rows_table, rows, KINDS * REGIONS);
 }
@@ -270,7 +262,7 @@ static const struct bench_plot plots[] = {
 	{.script = text_vision_gp,
 	 .width = 1100,
 	 .height = 800,
-	 .data = {&rows_table, "region", is_found}},
+	 .data = {&rows_table, "region", "failed="}},
 	{0},
 };
 
