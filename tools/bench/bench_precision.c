@@ -518,8 +518,8 @@ static void run(struct bench_run *run)
 
 	bench_values(run, "{so si si si ss?}", "model",
 		     json_text(incise_model_info(model)->name), "rules",
-		     incise_model_info(model)->n_rules, "points", (int)points.n, "repeats",
-		     repeats, "fuzzylite_version", all->reference_version);
+		     incise_model_info(model)->n_rules, "points", (int)points.n,
+		     "repeats", repeats, "fuzzylite_version", all->reference_version);
 	bench_text(run,
 		   "model %s, %d rules; errors at %zu points, times of %d runs in turn\n"
 		   "%s; %s; vectors: %s; %s%s%s\n\n",
