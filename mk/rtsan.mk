@@ -51,10 +51,12 @@ $(O)/obj/again/%.o: tests/unit/%.c
 	$(call step,CC)
 	$(Q)$(rtsan_cc) -c $(test_cflags) -o $@ $<
 
+$(O)/again/tests/unit/scene/extreme: $(patsubst %,$(O)/obj/tests/extremes/%.o,\
+	extremes fed_run ground numbers plan) $(O)/obj/tools/cli/cli.o $(O)/obj/tools/cli/file.o
 $(O)/again/tests/unit/%: $(O)/obj/again/%.o $(O)/lib/libincise-rtsan.a
 	@mkdir -p $(@D)
 	$(call step,LD)
-	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) $(wraps) -o $@ $< $(O)/lib/libincise-rtsan.a \
+	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) $(wraps) -o $@ $(filter %.o,$^) $(O)/lib/libincise-rtsan.a \
 		$(rtsan_libs) $(shell $(PKG_CONFIG) --libs cmocka)
 
 $(O)/tests/rtsan/%: tests/rtsan/%.c $(O)/lib/libincise-rtsan.a $(emulator)

@@ -31,6 +31,7 @@ $(O)/obj/tests/%.o: tests/%.c
 # A test that defines __wrap_NAME plays NAME for all that it is linked to.
 wraps = $$(nm $(filter %/$*.o,$^) | sed -n 's/.* T __wrap_\(.*\)/-Wl,--wrap=\1/p')
 $(filter $(O)/tests/unit/tools/%,$(unit_programs)): $(tool_parts)
+$(filter $(O)/tests/unit/scene/% $(O)/tests/unit/tools/%,$(unit_programs)): $(extremes)
 $(filter $(O)/tests/unit/polhemus/%,$(unit_programs)): $(emulator)
 # Modules that only their own tests link, ahead of the archive: that of HDF5, and vision's,
 # which is then found without being loaded.
@@ -39,7 +40,7 @@ $(filter $(O)/tests/unit/vision/%,$(unit_programs)): $(O)/obj/tests/vision/linke
 $(O)/tests/unit/%: $(O)/obj/tests/unit/%.o $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(call step,LD)
-	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) $(wraps) -o $@ $(filter %.o,$^) $(filter %/parts.a,$^) \
+	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) $(wraps) -o $@ $(filter %.o,$^) $(filter %/extremes.a %/parts.a,$^) \
 		$(O)/lib/libincise-tests.a $(test_libs)
 .SECONDARY: $(unit_programs:$(O)/tests/%=$(O)/obj/tests/%.o)
 

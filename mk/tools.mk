@@ -63,11 +63,20 @@ $(O)/lib/incise/peer_%.py: tools/bench/references/%.py
 	@mkdir -p $(@D)
 	cp $< $@
 
+# Properties of the library under extreme inputs: incise bench extremes tries all cases, unit tests
+# some. They build without what only tests need.
+extremes := $(O)/obj/tests/extremes.a
+$(O)/obj/tests/extremes/%.o: test_cflags =
+$(extremes): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tests/extremes/*.c tools/cli/cli.c tools/cli/f*.c))
+	@rm -f $@
+	$(call step,AR)
+	$(Q)$(AR) rcs $@ $^
+
 # Benchmarks also measure parts that the shared objects do not export; the linker takes those
 # from the archive.
-$(filter $(O)/bin/incise-bench%,$(programs)): tool_inside = $(O)/lib/libincise-tests.a $(shell $(PKG_CONFIG) \
+$(filter $(O)/bin/incise-bench%,$(programs)): tool_inside = $(extremes) $(O)/lib/libincise-tests.a $(shell $(PKG_CONFIG) \
 	--libs $(foreach lib,$(libraries),$(pc_$(lib)))) -ldl -pthread
-$(filter $(O)/bin/incise-bench%,$(programs)): $(O)/lib/libincise-tests.a
+$(filter $(O)/bin/incise-bench%,$(programs)): $(extremes) $(O)/lib/libincise-tests.a
 tool_libs := $(patsubst %,-l%,$(libraries))
 tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
 $(O)/bin/incise-bench-all: tool_more_libs += $(if $(has_cmark),$(shell $(PKG_CONFIG) --libs libcmark-gfm))

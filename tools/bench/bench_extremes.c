@@ -7,13 +7,23 @@
 #include <stdlib.h>
 #include <string.h>
 #include "bench_extremes.h"
+#include "../../tests/extremes/extremes.h"
 #include "../cli/cli.h"
-#include "extremes.h"
 #include "metrics.h"
 #include "../cli/json.h"
 #include "machine.h"
 #include "../cli/plot.h"
+#include "../cli/scene_argument.h"
 #include "stiff_sweep.h"
+
+#define ROWS_MAX 64
+#define QUICK_PART 20 /* a look tries one of so many cases */
+
+struct extremes {
+	struct extremes_setup setup;
+	struct extremes_row row[ROWS_MAX];
+	int n;
+};
 
 /* What was tried, within a column, broken between words. */
 static void print_what(const char *what)
@@ -35,8 +45,9 @@ static void print_what(const char *what)
 
 static void print_table(const struct extremes *all, const struct stiff_sweep *stiff)
 {
-	printf("seed %llu\n%-20s %10s %10s %10s %8s\n", (unsigned long long)all->seed,
-	       "cases", "tried", "held", "refused", "wrong");
+	printf("seed %llu\n%-20s %10s %10s %10s %8s\n",
+	       (unsigned long long)all->setup.seed, "cases", "tried", "held", "refused",
+	       "wrong");
 	for (int i = 0; i < all->n; i++) {
 		const struct extremes_row *r = &all->row[i];
 
@@ -70,8 +81,27 @@ static void print_json(const struct extremes *all, const struct stiff_sweep *sti
 	}
 	stiff_sweep_figures(stiff, figures);
 	json_print(json_pack("{so sI sb so so so}", "machine", machine_json(&machine),
-			     "seed", (json_int_t)all->seed, "quick", all->quick, "rows",
-			     rows, "stiff", stiff_sweep_json(stiff), "figures", figures));
+			     "seed", (json_int_t)all->setup.seed, "quick",
+			     all->setup.part > 1, "rows", rows, "stiff",
+			     stiff_sweep_json(stiff), "figures", figures));
+}
+
+static void try_all(struct extremes *all)
+{
+	static const struct property *const tables[] = {
+		model_properties,   fixed_properties,  surface_properties,
+		control_properties, motion_properties, plan_properties,
+		wall_properties,    device_properties, file_properties};
+
+	for (size_t i = 0; i < sizeof(tables) / sizeof(*tables); i++)
+		for (const struct property *p = tables[i]; p->name; p++) {
+			if (p->for_tests_only)
+				continue;
+			if (all->n == ROWS_MAX)
+				cli_fail("extremes: more than %d rows", ROWS_MAX);
+			cli_progress("extremes: %s", p->name);
+			extremes_try(p, &all->setup, &all->row[all->n++]);
+		}
 }
 
 void bench_extremes(uint64_t seed, bool json, bool quick, const char *plot)
@@ -85,17 +115,9 @@ void bench_extremes(uint64_t seed, bool json, bool quick, const char *plot)
 		cli_fail("no memory");
 	if (plot)
 		plot_place("plot", plot, &folder, &name);
-	all->seed = seed;
-	all->quick = quick;
-	extremes_model(all);
-	extremes_fixed(all);
-	extremes_surface(all);
-	extremes_guard(all);
-	extremes_motion(all);
-	extremes_plan(all);
-	extremes_wall(all);
-	extremes_device(all);
-	extremes_files(all);
+	all->setup = (struct extremes_setup){seed, quick ? QUICK_PART : 1,
+					     scene_argument_shipped()};
+	try_all(all);
 	stiff_sweep(stiff, quick);
 	cli_progress_end();
 	if (cli_stop)

@@ -221,39 +221,6 @@ static void test_off_leaves_every_bit(void **state)
 	}
 }
 
-static void test_whatever_comes(void **state)
-{
-	static const double hostile[] = {0,	   -0.0,      1,       NAN,
-					 INFINITY, -INFINITY, DBL_MAX, -DBL_MAX,
-					 5e-324,   -1e-3,     1e154,   3};
-	struct incise_guard guard = made(2);
-	unsigned seed = 1;
-
-	for (int i = 0; i < 100000; i++) {
-		double in[9], f[3];
-		bool damped;
-
-		for (int k = 0; k < 9; k++) {
-			seed = seed * 1664525u + 1013904223u;
-			in[k] = hostile[(seed >> 16) % 12];
-		}
-		memcpy(f, in + 6, sizeof(f));
-		damped = incise_guard_apply(&guard, in, in + 3, f);
-		assert_true(guard.energy_N_mm <= 2 && guard.energy_N_mm >= -1e30);
-		for (int k = 0; k < 3; k++)
-			/* Damping never points along the velocity, and is none or finite. */
-			if (damped)
-				assert_true(isfinite(f[k]) &&
-					    (f[k] - in[6 + k]) * in[3 + k] <= 0);
-			else
-				assert_memory_equal(f + k, in + 6 + k, sizeof(double));
-		if (i % 3)
-			incise_guard_sent(&guard, f);
-		if (i % 1000 == 999)
-			incise_guard_reset(&guard);
-	}
-}
-
 /* Where the watched point was put elsewhere there was no way, and so no work. */
 static void test_a_leap_is_no_way(void **state)
 {
@@ -283,7 +250,6 @@ int main(void)
 		cmocka_unit_test(test_a_sampled_wall_stays_bounded),
 		cmocka_unit_test(test_a_bounce),
 		cmocka_unit_test(test_off_leaves_every_bit),
-		cmocka_unit_test(test_whatever_comes),
 		cmocka_unit_test(test_a_leap_is_no_way),
 	};
 

@@ -16,6 +16,7 @@
 #include <unistd.h>
 #include <float.h>
 #include "any_model.h"
+#include "every_kind.h"
 
 static char path[] = "/tmp/incise-fis-XXXXXX";
 
@@ -39,17 +40,6 @@ static void put(const char *text, size_t n)
 
 	assert_int_equal(fwrite(text, 1, n, file), n);
 	assert_int_equal(fclose(file), 0);
-}
-
-static char *get(size_t *n)
-{
-	FILE *file = fopen(path, "r");
-	/* 8 inputs and 256 rules of 17 digits each are 60 kB. */
-	char *text = calloc(1, 1 << 18);
-
-	*n = fread(text, 1, (1 << 18) - 1, file);
-	fclose(file);
-	return text;
 }
 
 static void assert_same(const struct incise_model *a, const struct incise_model *b)
@@ -234,18 +224,6 @@ static void test_matlab_file(void **state)
 }
 
 /* Every kind of function, min, a weight of 0, and an 'or' of one input. */
-static const char every[] =
-	"[System]\nName='every kind'\nType='sugeno'\nNumInputs=2\nNumOutputs=1\n"
-	"NumRules=4\nAndMethod='min'\nDefuzzMethod='wtaver'\n"
-	"[Input1]\nName='a'\nRange=[0 10]\nNumMFs=4\nMF1='low':'trimf',[0 0 4]\n"
-	"MF2='mid':'trapmf',[2 4 6 8]\nMF3='up':'sigmf',[2 7]\n"
-	"MF4='two':'gauss2mf',[1 4 2 5]\n"
-	"[Input2]\nName='b'\nRange=[0 1]\nNumMFs=2\nMF1='g':'gaussmf',[0.5 0]\n"
-	"MF2='e':'gbellmf',[0.5 2 1]\n"
-	"[Output1]\nName='y'\nRange=[0 1]\nNumMFs=2\nMF1='c':'constant',[1]\n"
-	"MF2='l':'linear',[1 2 3]\n"
-	"[Rules]\n1 1, 1 (1) : 1\n2 2, 2 (0.25) : 1\n3 0, 1 (0) : 1\n4 0, 2 (1) : 2\n";
-
 static void test_every_kind(void **state)
 {
 	struct incise_model *model;
@@ -254,7 +232,7 @@ static void test_every_kind(void **state)
 	double two = exp(-0.5);
 	double want = (0.25 * 1 + 0.25 * 0.5 * 7 + two * 7) / (0.25 + 0.125 + two);
 
-	put(every, strlen(every));
+	put(every_kind, strlen(every_kind));
 	model = incise_model_load(path, NULL);
 	assert_non_null(model);
 	assert_true(fabs(incise_model_eval(model, x, NULL) - want) < 1e-14);
@@ -349,7 +327,7 @@ static void test_refusals_name_line_and_word(void **state)
 		struct incise_error err;
 		char where[40];
 
-		load_changed(i < n ? matlab : every, c->from, c->to, &err);
+		load_changed(i < n ? matlab : every_kind, c->from, c->to, &err);
 		snprintf(where, sizeof(where), ":%d: ", c->line);
 		if (err.code != c->code || !strstr(err.text, where) ||
 		    !strstr(err.text, c->word))
@@ -370,57 +348,13 @@ static void test_missing_file(void **state)
 /* Cut anywhere but before the last line's end, a file is refused. */
 static void test_truncation(void **state)
 {
-	const char *const texts[] = {matlab, every};
+	const char *const texts[] = {matlab, every_kind};
 
 	for (int t = 0; t < 2; t++)
 		for (size_t k = 0; k + 1 < strlen(texts[t]); k++) {
 			put(texts[t], k);
 			assert_null(incise_model_load(path, NULL));
 		}
-}
-
-/* Random damage is refused or gives a model that evaluates to a number; never worse. */
-static void damage(const char *text, size_t n, uint64_t seed)
-{
-	struct incise_model *model;
-	char *copy = malloc(n);
-	int loaded = 0;
-
-	for (int round = 0; round < 3000; round++) {
-		memcpy(copy, text, n);
-		for (int hit = 0; hit < 1 + round % 4; hit++) {
-			size_t at = (size_t)((paper_random(&seed) + 1) / 2 * (n - 1));
-
-			copy[at] = round % 2 ? (char)(paper_random(&seed) * 128)
-					     : text[(at * 7) % n];
-		}
-		put(copy, n);
-		model = incise_model_load(path, NULL);
-		if (!model)
-			continue;
-		loaded++;
-		for (int k = 0; k < 3; k++)
-			assert_true(isfinite(incise_model_eval(
-				model, (double[8]){k * 5, k * 1e300}, NULL)));
-		incise_model_free(model);
-	}
-	/* Many hits land in digits and leave a model: both ways out were taken. */
-	assert_true(loaded > 100 && loaded < 2900);
-	free(copy);
-}
-
-static void test_random_damage(void **state)
-{
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 5, 3);
-	char *text;
-	size_t n;
-
-	assert_int_equal(incise_model_save(model, path, NULL), 0);
-	incise_model_free(model);
-	text = get(&n);
-	damage(text, n, 42);
-	free(text);
-	damage(every, strlen(every), 43);
 }
 
 int main(void)
@@ -435,7 +369,6 @@ int main(void)
 		cmocka_unit_test(test_refusals_name_line_and_word),
 		cmocka_unit_test(test_missing_file),
 		cmocka_unit_test(test_truncation),
-		cmocka_unit_test(test_random_damage),
 	};
 
 	return cmocka_run_group_tests(tests, set_up, tear_down);

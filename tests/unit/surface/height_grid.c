@@ -127,47 +127,11 @@ static void test_bad_files(void **state)
 	}
 }
 
-static void test_damaged_files(void **state)
-{
-	static const char whole[] = CENTERS "NODATA_value -9999\n" ROWS;
-	static const char odd[] = "0123456789+-.eE \n\r\tnx\x80\xff";
-	uint64_t random = 88172645463325252u;
-	int taken = 0, refused = 0;
-
-	for (int k = 0; k < 3000; k++) {
-		struct incise_error err = {0};
-		struct incise_surface *surface;
-		char text[sizeof(whole)];
-
-		memcpy(text, whole, sizeof(whole));
-		for (int i = 0; i < 1 + k % 3; i++)
-			text[(size_t)(solid_random(&random) * (sizeof(whole) - 1))] =
-				odd[(size_t)(solid_random(&random) * (sizeof(odd) - 1))];
-		if (k % 11 == 0)
-			text[(size_t)(solid_random(&random) * sizeof(whole))] = '\0';
-		surface = load(text, here, &err);
-		if (surface) {
-			struct incise_touch touch;
-
-			taken++;
-			incise_surface_top(surface, &touch);
-			assert_true(v3_finite(touch.point_mm) && v3_finite(touch.normal));
-			incise_surface_free(surface);
-		} else {
-			refused++;
-			assert_true(err.code == EINVAL || err.code == E2BIG);
-			assert_non_null(strstr(err.text, "a.asc:"));
-		}
-	}
-	assert_true(taken > 100 && refused > 100);
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_heights_lie_where_they_belong),
 		cmocka_unit_test(test_bad_files),
-		cmocka_unit_test(test_damaged_files),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

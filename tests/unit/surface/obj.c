@@ -170,59 +170,6 @@ static void test_placed_and_numbered(void **state)
 	incise_surface_free(surface);
 }
 
-/* Bytes changed, cut off, doubled: each file is read or refused, and what is read works. */
-static void test_damaged_files(void **state)
-{
-	static const char whole[] =
-		"# a roof\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nv -1 0.5 -2e-1\n"
-		"vt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\n"
-		"f 1/1/1 2/2/1 4/3/1 3/1/1\nf -5/1 -3/2 -1/3\n";
-	static const char odd[] = "0123456789+-./eE# \n\r\tvftn\\\x80\xff";
-	uint64_t random = 88172645463325252u;
-	int taken = 0, refused = 0;
-
-	for (int k = 0; k < 3000; k++) {
-		struct incise_error err = {0};
-		struct incise_surface *surface;
-		char text[2 * sizeof(whole)];
-		size_t n = sizeof(whole) - 1;
-
-		memcpy(text, whole, sizeof(whole));
-		for (int i = 0; i < 1 + k % 3; i++) {
-			size_t at = (size_t)(solid_random(&random) * (double)n);
-
-			if (k % 7 == 0 && n > 20) {
-				memmove(text + at, text + at + 1, n - at);
-				n--;
-			} else {
-				text[at] = odd[(size_t)(solid_random(&random) *
-							(sizeof(odd) - 1))];
-			}
-		}
-		if (k % 11 == 0)
-			text[(size_t)(solid_random(&random) * (double)n)] = '\0';
-		surface = load(text, here, &err);
-		if (surface) {
-			struct incise_touch touch;
-
-			taken++;
-			incise_surface_nearest(surface, (double[3]){0.3, 0.4, 0.5},
-					       &touch);
-			assert_true(v3_finite(touch.point_mm) && v3_finite(touch.normal));
-			assert_true(isfinite(touch.depth_mm) && isfinite(touch.uv[0]));
-			incise_surface_top(surface, &touch);
-			assert_true(v3_finite(touch.point_mm));
-			incise_surface_free(surface);
-		} else {
-			refused++;
-			assert_int_equal(err.code, EINVAL);
-			assert_non_null(strstr(err.text, "a.obj:"));
-			assert_null(strchr(err.text, '\n'));
-		}
-	}
-	assert_true(taken > 200 && refused > 200);
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -230,7 +177,6 @@ int main(void)
 		cmocka_unit_test(test_bad_files),
 		cmocka_unit_test(test_files_that_are_none),
 		cmocka_unit_test(test_placed_and_numbered),
-		cmocka_unit_test(test_damaged_files),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

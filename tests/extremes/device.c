@@ -1,30 +1,30 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Devices that fail or tell nonsense below a plan on the virtual rig: a fault is latched
- * with its reason, and no force is asked for after it.
+ * Devices that fail or report nonsense below a plan on the virtual rig: the plan latches the
+ * fault with its reason, and asks for no force after it.
  *
  *   tracker ─▶ ?! ─▶ plan ─▶ targets ─▶ ?! ─▶ actuator
  */
 #include <errno.h>
 #include <stdio.h>
-#include <string.h>
 #include <incise/backend.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
+#include "../../lib/base/vector.h"
 #include "../../lib/scene/plan.h"
-#include "any_pose.h"
-#include "../cli/cli.h"
+#include "../../tools/cli/cli.h"
+#include "../../tools/cli/file.h"
 #include "extremes.h"
-#include "../cli/file.h"
+#include "numbers.h"
 
-#define RUNS 2400
+#define RUNS 1200
 #define TICKS 250
 #define MS INT64_C(1000000)
 #define TRAVEL_mm 20
 
 enum failure { FAILS_READ, FAILS_SET, FAILS_STATUS, FAILS_FAULT, FAILS_NEVER };
 
-/* What a run's devices do; ops have no context. */
+/* The devices of the run; ops have no context. */
 static struct hostile {
 	const struct incise_tracker_ops *tracker;
 	const struct incise_stepper_ops *stepper;
@@ -129,23 +129,16 @@ static void prepare(bool nonsense)
 
 static bool finite_tick(const struct incise_tick *t, double limit_N)
 {
-	double force2 = 0;
-
-	for (int i = 0; i < 3; i++) {
-		force2 += t->command_N[i] * t->command_N[i];
-		if (!isfinite(t->position_mm[i]) || !isfinite(t->tool_mm[i]))
-			return false;
-	}
-	return sqrt(force2) <= limit_N && isfinite(t->rendered_N) &&
+	return v3_finite(t->position_mm) && v3_finite(t->tool_mm) &&
+	       v3_length(t->command_N) <= limit_N && isfinite(t->rendered_N) &&
 	       isfinite(t->actuated_N) && isfinite(t->depth_mm);
 }
 
-/* One tick's case; @failed: of a tick before. */
-static bool judge(struct incise_plan *plan, int rc, int failed,
-		  const struct incise_tick *t)
+/* @failed: what a tick before returned. */
+static bool is_right(struct incise_plan *plan, int rc, int failed,
+		     const struct incise_tick *t)
 {
 	const char *why = incise_plan_fault(plan);
-	bool zero = t->command_N[0] == 0 && t->command_N[1] == 0 && t->command_N[2] == 0;
 	bool must = hostile.fails_at <= 0 && hostile.what != FAILS_NEVER;
 	char cause[200];
 
@@ -153,7 +146,7 @@ static bool judge(struct incise_plan *plan, int rc, int failed,
 		return false;
 	if (!must)
 		return !rc && !failed && !why;
-	return rc < 0 && (!failed || rc == failed) && zero &&
+	return rc < 0 && (!failed || rc == failed) && v3_length(t->command_N) == 0 &&
 	       (t->flags & INCISE_TICK_FAULT) && why && *why &&
 	       incise_plan_cause(plan, cause, sizeof(cause)) > 0;
 }
@@ -184,16 +177,13 @@ static void run(struct extremes_row *row, const struct incise_scene *scene, bool
 
 		incise_clock_wait_until(clock, incise_clock_now(clock) + MS);
 		rc = incise_plan_tick(plan, incise_clock_now(clock), &tick);
-		if (extremes_first_wrong(row, judge(plan, rc, failed, &tick)))
-			extremes_tell(
-				row,
-				"tick %d: %d after %d, force (%a, %a, %a), rendered %a, target "
-				"%a, flags %#x, fault '%s'; failure %d with %d and faults %#x, "
-				"case %ld of %s",
-				k, rc, failed, tick.command_N[0], tick.command_N[1],
-				tick.command_N[2], tick.rendered_N, hostile.target_mm,
-				tick.flags, incise_plan_fault(plan) ?: "", hostile.what,
-				hostile.rc, hostile.faults, row->tried, spec);
+		extremes_check(
+			row, is_right(plan, rc, failed, &tick),
+			"tick %d: %d after %d, force " V3 ", rendered %a, target %a, "
+			"flags %#x, fault '%s'; failure %d with %d and faults %#x, of %s",
+			k, rc, failed, V3_OF(tick.command_N), tick.rendered_N,
+			hostile.target_mm, tick.flags, incise_plan_fault(plan) ?: "",
+			hostile.what, hostile.rc, hostile.faults, spec);
 		failed = rc;
 	}
 	give_back_devices(rig);
@@ -201,38 +191,35 @@ static void run(struct extremes_row *row, const struct incise_scene *scene, bool
 	incise_rig_close(rig);
 }
 
-void extremes_device(struct extremes *all)
+static void try_devices(struct extremes_row *row, const struct property *property)
 {
-	static const struct {
-		const char *name, *what;
-	} rows[] = {
-		{"device_fault",
-		 "a tracker or an actuator of the virtual rig fails, or latches a fault, at any "
-		 "tick of a cut: that tick and all after it tell it with its reason, and ask for "
-		 "no force"},
-		{"device_nonsense",
-		 "both tell numbers that cannot be: forces within the limit, and targets within "
-		 "the travel"},
-	};
 	struct memory_file file = memory_file_begin("scene");
 	struct incise_error err = {0};
 	struct incise_scene *scene;
 
 	fputs("tissue = { reaction_N_mm = 0.3; plane_N_mm = 0.05; };\n"
-	      "effects = { guard = true; };\ndevice = { delay_ticks = 12; };\nlimits = { ramp_ms = 10.0; };\n",
+	      "effects = { guard = true; };\ndevice = { delay_ticks = 12; };\n"
+	      "limits = { ramp_ms = 10.0; };\n",
 	      file.file);
 	memory_file_written(&file);
 	scene = incise_scene_load(file.path, NULL, &err);
 	if (!scene)
 		cli_fail_with(&err);
-	for (int nonsense = 0; nonsense < 2; nonsense++) {
-		struct extremes_row *row =
-			extremes_begin(all, rows[nonsense].name, rows[nonsense].what);
-
-		rng = extremes_seed(all, row);
-		for (long k = extremes_cases(all, RUNS / 2); k; k--)
-			run(row, scene, nonsense);
-	}
+	for (long k = extremes_cases(row, property->cases); k; k--)
+		run(row, scene, property->kind);
 	incise_scene_free(scene);
 	fclose(file.file);
 }
+
+const struct property device_properties[] = {
+	{"device_fault",
+	 "a tracker or an actuator of the virtual rig fails, or latches a fault, at any "
+	 "tick of a cut: that tick and all after it tell it with its reason, and ask for "
+	 "no force",
+	 RUNS, .all = try_devices, .kind = false},
+	{"device_nonsense",
+	 "both tell numbers that cannot be: forces within the limit, and targets within "
+	 "the travel",
+	 RUNS, .all = try_devices, .kind = true},
+	{0},
+};

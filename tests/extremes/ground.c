@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Scenes on each kind of ground; see extremes_ground.h.
+ * Scenes on each kind of ground; see ground.h.
  */
 #include <math.h>
-#include <stdbool.h>
-#include "../cli/cli.h"
-#include "extremes_ground.h"
-#include "../cli/file.h"
+#include <string.h>
+#include "../../tools/cli/cli.h"
+#include "../../tools/cli/file.h"
+#include "ground.h"
 
 void ground_write_model(FILE *out)
 {
@@ -26,9 +26,9 @@ void ground_write_model(FILE *out)
 }
 
 /* Slices from pole to pole; turned inside out with a radius below 0. */
-static void write_ball(FILE *out, double radius_mm)
+static void write_ball(FILE *out, double radius_mm, int slices, int stacks)
 {
-	const int slices = 16, stacks = 9, last = 2 + slices * (stacks - 1);
+	const int last = 2 + slices * (stacks - 1);
 
 	fprintf(out, "v 0 0 %.17g\n", radius_mm);
 	for (int i = 1; i < stacks; i++)
@@ -55,12 +55,18 @@ static void write_ball(FILE *out, double radius_mm)
 
 static void write_solid(FILE *out)
 {
-	write_ball(out, 40);
+	write_ball(out, 40, 16, 9);
 }
 
 static void write_cavity(FILE *out)
 {
-	write_ball(out, -60);
+	write_ball(out, -60, 16, 9);
+}
+
+/* Of 5000 triangles. */
+static void write_large(FILE *out)
+{
+	write_ball(out, 40, 50, 51);
 }
 
 static void write_waves(FILE *out)
@@ -73,79 +79,77 @@ static void write_waves(FILE *out)
 				i < 24 ? ' ' : '\n');
 }
 
-#define KINDS 6
-static const struct {
-	const char *name, *surface; /* %s: its file */
-	void (*write)(FILE *out);
-	double away_mm;
-} kinds[KINDS] = {
-	{"plane", "kind = \"plane\";", NULL, 80},
+const struct ground grounds[GROUNDS] = {
+	{"plane", "kind = \"plane\";", 80, NULL},
+	{"turned plane", "kind = \"plane\"; normal = [0.0, 0.0, -1.0];", 80, NULL},
 	{"sphere", "kind = \"sphere\"; centre_mm = [0.0, 0.0, -40.0]; radius_mm = 40.0;",
-	 NULL, 80},
+	 80, NULL},
 	{"capsule",
-	 "kind = \"capsule\"; from_mm = [-60.0, 0.0, -55.0]; to_mm = [160.0, 0.0, -55.0]; "
-	 "radius_mm = 55.0;",
-	 NULL, 80},
-	{"heights", "kind = \"heights\"; file = \"%s\";", write_waves, 80},
-	{"mesh", "kind = \"mesh\"; file = \"%s\"; at_mm = [0.0, 0.0, -40.0];",
-	 write_solid, 80},
-	/* Tissue around a hole. */
-	{"cavity", "kind = \"mesh\"; file = \"%s\";", write_cavity, 50},
+	 "kind = \"capsule\"; from_mm = [-60.0, 0.0, -55.0]; to_mm = [160.0, 0.0, "
+	 "-55.0]; radius_mm = 55.0;",
+	 80, NULL},
+	{"heights", "kind = \"heights\"; file = \"%s\";", 80, write_waves},
+	{"mesh", "kind = \"mesh\"; file = \"%s\"; at_mm = [0.0, 0.0, -40.0];", 80,
+	 write_solid},
+	/* A mesh with all its normals reversed: tissue around a cavity. */
+	{"cavity", "kind = \"mesh\"; file = \"%s\";", 50, write_cavity},
+	{"large mesh", "kind = \"mesh\"; file = \"%s\";", 80, write_large},
 };
 
-static struct incise_scene *make(int kind, bool fixed, bool model)
+const struct ground *ground_of(const char *name)
+{
+	for (int i = 0; i < GROUNDS; i++)
+		if (!strcmp(grounds[i].name, name))
+			return &grounds[i];
+	cli_fail("there is no ground '%s'", name);
+}
+
+struct incise_scene *ground_scene(const struct ground *ground, bool fixed, bool model)
 {
 	struct memory_file scene = memory_file_begin("scene"),
-			   ground = memory_file_begin("ground"),
+			   surface = memory_file_begin("ground"),
 			   force = memory_file_begin("model");
 	struct incise_error err = {0};
 	struct incise_scene *made;
 
-	if (kinds[kind].write)
-		kinds[kind].write(ground.file);
+	if (ground->write)
+		ground->write(surface.file);
 	ground_write_model(force.file);
 	fprintf(scene.file, "arithmetic = \"%s\";\nsurface = { ",
 		fixed ? "fixed" : "double");
-	fprintf(scene.file, kinds[kind].surface, ground.path);
-	fputs(" };\n", scene.file);
+	fprintf(scene.file, ground->surface, surface.path);
 	if (model)
-		fprintf(scene.file, "model = \"%s\";\n", force.path);
+		fprintf(scene.file, " };\nmodel = \"%s\";\n", force.path);
+	else
+		fputs(" };\n", scene.file);
 	fprintf(scene.file,
 		"tissue = { %s plane_N_mm = 0.3; damping_N_s_mm = 0.001;\n"
-		"  insertion_N_mm = 0.5; spread_N_mm = 0.4; leave_mm = 0.25; };\n"
+		"  insertion_N_mm = 0.5; spread_N_mm = 0.4; leave_mm = %.17g; };\n"
 		"effects = { average_ticks = 8; guard = true; };\n"
-		"tool = { handle_mm = 30.0; };\n"
+		"tool = { handle_mm = %.1f; };\n"
 		"device = { damping_N_s_mm = 0.03; delay_ticks = 12; };\n"
-		"limits = { force_N = 2.0; slew_N_s = 400.0; pose_age_ms = 50.0;\n"
+		"limits = { force_N = %.1f; slew_N_s = %.1f; pose_age_ms = 50.0;\n"
 		"  ramp_ms = 50.0; fade_ms = 20.0; };\n",
-		model ? "" : "reaction_N_mm = 0.25;");
-	memory_file_written(&ground);
+		model ? "" : "reaction_N_mm = 0.25;", GROUND_LEAVE_MM, GROUND_HANDLE_MM,
+		GROUND_FORCE_N, GROUND_SLEW_N * 1000);
+	memory_file_written(&surface);
 	memory_file_written(&force);
 	memory_file_written(&scene);
 	made = incise_scene_load(scene.path, model ? force.path : NULL, &err);
 	if (!made)
 		cli_fail_with(&err);
 	fclose(scene.file);
-	fclose(ground.file);
+	fclose(surface.file);
 	fclose(force.file);
 	return made;
 }
 
-void grounds_make(struct grounds *grounds)
+struct incise_plan *ground_plan(const struct incise_scene *scene)
 {
-	*grounds = (struct grounds){0};
-	for (int kind = 0; kind < KINDS; kind++)
-		for (int fixed = 0; fixed < 2; fixed++) {
-			int n = grounds->n++;
+	struct incise_error err = {0};
+	struct incise_plan *plan = incise_plan_new(scene, NULL, &err);
 
-			grounds->ground[n] =
-				(struct ground){kinds[kind].name, kinds[kind].away_mm};
-			grounds->scene[n] = make(kind, fixed, (kind + fixed) % 2);
-		}
-}
-
-void grounds_free(struct grounds *grounds)
-{
-	for (int i = 0; i < grounds->n; i++)
-		incise_scene_free(grounds->scene[i]);
+	if (!plan)
+		cli_fail_with(&err);
+	return plan;
 }

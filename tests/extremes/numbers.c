@@ -1,46 +1,13 @@
-/* SPDX-License-Identifier: GPL-2.0-or-later */
+// SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Numbers and turns that no tracker should send, the same in every run: for incise bench
- * extremes and the unit tests. Each source that includes it has a generator of its own.
+ * Numbers and attitudes that no device should send; see numbers.h.
  */
-#ifndef INCISE_ANY_POSE_H
-#define INCISE_ANY_POSE_H
+#include <stddef.h>
+#include "numbers.h"
 
-#include <float.h>
-#include <math.h>
-#include <stdint.h>
+uint64_t any_state = 1;
 
-static uint64_t rng = 1; /* not 0 */
-
-static inline uint64_t any(void)
-{
-	rng ^= rng << 13;
-	rng ^= rng >> 7;
-	rng ^= rng << 17;
-	return rng * 0x2545f4914f6cdd1d;
-}
-
-static inline uint32_t below(uint32_t n)
-{
-	return (uint32_t)((any() >> 32) * n >> 32);
-}
-
-static inline double between(double low, double high)
-{
-	return low + (high - low) * ((double)(any() >> 11) * 0x1p-53);
-}
-
-static inline double any_bits(void)
-{
-	union {
-		uint64_t bits;
-		double value;
-	} u = {.bits = any()};
-
-	return u.value;
-}
-
-static inline double special(void)
+double special(void)
 {
 	static const double values[] = {
 		0,	 -0.0,		NAN,	     -NAN,	   INFINITY, -INFINITY,
@@ -54,8 +21,26 @@ static inline double special(void)
 	return below(8) ? values[below((uint32_t)n)] : nextafter(1e4, below(2) ? 0 : 2e4);
 }
 
-/* A turn of the scalpel; sometimes just where blade and handle part, or none at all. */
-static inline void any_attitude(double q[4])
+double any_number(uint32_t odds, double low, double high)
+{
+	switch (below(odds)) {
+	case 0:
+		return special();
+	case 1:
+		return any_bits();
+	default:
+		return between(low, high);
+	}
+}
+
+int32_t any_integer(void)
+{
+	static const int32_t ends[] = {INT32_MIN, INT32_MAX, 0, 1, -1, INT32_MIN + 1};
+
+	return below(2) ? ends[below(6)] : (int32_t)any() >> below(31);
+}
+
+void any_attitude(double q[4])
 {
 	static const double lengths[] = {0, DBL_TRUE_MIN, 0.9, 1.1, 1, 2};
 	double length = 1;
@@ -92,5 +77,3 @@ static inline void any_attitude(double q[4])
 	for (int i = 0; i < 4; i++)
 		q[i] *= length;
 }
-
-#endif
