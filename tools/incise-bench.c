@@ -7,7 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "bench/bench.h"
-#include "bench/bench_extremes.h"
 #include "bench/bench_scenes.h"
 #include "bench/compare.h"
 #include "cli/cli.h"
@@ -57,12 +56,6 @@ static void scenes(struct bench_run *run)
 			     run->plot);
 }
 
-static void extremes(struct bench_run *run)
-{
-	bench_extremes(run->seed ? (uint64_t)run->seed : 1, run->json, run->quick,
-		       run->plot);
-}
-
 static const struct bench_plot some_plot[] = {{0}};
 
 static const struct bench
@@ -72,18 +65,11 @@ static const struct bench
 		      .n_operands = BENCH_SCENES_MOST,
 		      .takes_profile = true,
 		      .plots = some_plot,
-		      .all = scenes},
-	old_extremes = {
-		.name = "extremes",
-		.summary = "numbers and bytes that nobody should send, at each door of\n"
-			   "the library; walls of 10 N/m to 1 GN/m",
-		.takes_seed = true,
-		.plots = some_plot,
-		.all = extremes};
+		      .all = scenes};
 
 static const struct bench *const benches[] = {
 	&bench_precision, &bench_training, &bench_stability, &bench_loop, &bench_pose,
-	&bench_timeline,  &bench_vision,   &bench_capture,   &old_scenes, &old_extremes,
+	&bench_timeline,  &bench_vision,   &bench_capture,   &old_scenes, &bench_extremes,
 };
 #define BENCHES (int)(sizeof(benches) / sizeof(*benches))
 

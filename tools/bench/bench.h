@@ -120,9 +120,10 @@ struct bench_plot {
 	struct bench_data data, more;
 };
 
-extern const char text_loop_rates_gp[], text_loop_wakeups_gp[], text_pose_gp[],
-	text_precision_gp[], text_stability_guard_gp[], text_stability_integrators_gp[],
-	text_stability_map_gp[], text_timeline_gp[], text_training_gp[], text_vision_gp[];
+extern const char text_extremes_gp[], text_loop_rates_gp[], text_loop_wakeups_gp[],
+	text_pose_gp[], text_precision_gp[], text_stability_guard_gp[],
+	text_stability_integrators_gp[], text_stability_map_gp[], text_timeline_gp[],
+	text_training_gp[], text_vision_gp[];
 
 struct bench_run;
 
@@ -136,8 +137,8 @@ struct bench {
 	void (*all)(struct bench_run *run); /* of a benchmark that is not declared yet */
 };
 
-extern const struct bench bench_capture, bench_loop, bench_pose, bench_precision,
-	bench_stability, bench_timeline, bench_training, bench_vision;
+extern const struct bench bench_capture, bench_extremes, bench_loop, bench_pose,
+	bench_precision, bench_stability, bench_timeline, bench_training, bench_vision;
 
 /* --- a run --- */
 

@@ -1,32 +1,70 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Extreme cases, and a sweep of stiff walls; see bench_extremes.h.
+ * incise bench extremes: properties of the library under any input (tests/extremes), and walls of
+ * 10 N/m to 1 GN/m: whether a scene with one is accepted, and what a device makes of it all the
+ * same, with the guard of passivity off and on, behind the limit of force.
+ *
+ *   pressed by a weight ──▶ ○ device ──▶ │ wall ──▶ [guard] ──▶ limit ──▶ device
+ *
+ * A wall is tried in two ways: by a whole plan, fed by a tracker of 120 Hz that is 4.2 ms late;
+ * and alone, with the position of the tick, as by an encoder.
  */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include "bench_extremes.h"
+#include <incise/plan.h>
+#include "../../lib/control/guard.h"
+#include "../../lib/control/plant.h"
+#include "../../lib/control/stability.h"
 #include "../../tests/extremes/extremes.h"
 #include "../cli/cli.h"
-#include "metrics.h"
-#include "../cli/json.h"
-#include "machine.h"
-#include "../cli/plot.h"
+#include "../cli/file.h"
 #include "../cli/scene_argument.h"
-#include "stiff_sweep.h"
+#include "bench.h"
+#include "bench_device.h"
+
+/* --- properties --- */
 
 #define ROWS_MAX 64
 #define QUICK_PART 20 /* a look tries one of so many cases */
 
-struct extremes {
-	struct extremes_setup setup;
-	struct extremes_row row[ROWS_MAX];
-	int n;
+static const struct bench_table properties = {
+	.key = "rows",
+	.row_bytes = sizeof(struct extremes_row),
+	.columns =
+		{
+			COLUMN(extremes_row, "name", name),
+			COLUMN(extremes_row, "what", what),
+			COLUMN(extremes_row, "tried", tried),
+			COLUMN(extremes_row, "held", held),
+			COLUMN(extremes_row, "refused", refused),
+			COLUMN(extremes_row, "wrong", wrong),
+			COLUMN(extremes_row, "failed", failed),
+		},
 };
 
-/* What was tried, within a column, broken between words. */
-static void print_what(const char *what)
+static int try_all(const struct extremes_setup *setup, struct extremes_row *rows)
+{
+	static const struct property *const tables[] = {
+		model_properties,   fixed_properties,  surface_properties,
+		control_properties, motion_properties, plan_properties,
+		wall_properties,    device_properties, file_properties};
+	int n = 0;
+
+	for (size_t i = 0; i < sizeof(tables) / sizeof(*tables); i++)
+		for (const struct property *p = tables[i]; p->name; p++) {
+			if (p->for_tests_only)
+				continue;
+			if (n == ROWS_MAX)
+				cli_fail("extremes: more than %d rows", ROWS_MAX);
+			cli_progress("extremes: %s", p->name);
+			extremes_try(p, setup, &rows[n++]);
+		}
+	return n;
+}
+
+/* Text within a column, broken between words. */
+static void print_what(const struct bench_run *run, const char *what)
 {
 	const int width = 96;
 
@@ -36,111 +74,418 @@ static void print_what(const char *what)
 		if (n > width)
 			for (n = width; n > 1 && what[n] != ' ';)
 				n--;
-		printf("    %.*s\n", n, what);
+		bench_text(run, "    %.*s\n", n, what);
 		what += n;
 		while (*what == ' ')
 			what++;
 	}
 }
 
-static void print_table(const struct extremes *all, const struct stiff_sweep *stiff)
+static void report_properties(struct bench_run *run, const struct extremes_row *rows,
+			      int n)
 {
-	printf("seed %llu\n%-20s %10s %10s %10s %8s\n",
-	       (unsigned long long)all->setup.seed, "cases", "tried", "held", "refused",
-	       "wrong");
-	for (int i = 0; i < all->n; i++) {
-		const struct extremes_row *r = &all->row[i];
+	bench_rows(run, &properties, rows, n);
+	bench_text(run, "%-20s %10s %10s %10s %8s\n", "cases", "tried", "held", "refused",
+		   "wrong");
+	for (int i = 0; i < n; i++) {
+		const struct extremes_row *r = &rows[i];
 
-		printf("%-20s %10ld %10ld %10ld %8ld\n", r->name, r->tried, r->held,
-		       r->refused, r->wrong);
-		print_what(r->what);
+		metrics_exact(run->metrics, (double)r->wrong, "cases", "%s wrong",
+			      r->name);
+		bench_text(run, "%-20s %10ld %10ld %10ld %8ld\n", r->name, r->tried,
+			   r->held, r->refused, r->wrong);
+		print_what(run, r->what);
 		if (*r->failed)
-			printf("    WRONG: %s\n", r->failed);
+			bench_text(run, "    WRONG: %s\n", r->failed);
 	}
-	putchar('\n');
-	stiff_sweep_print(stiff);
+	bench_text(run, "\n");
 }
 
-static void print_json(const struct extremes *all, const struct stiff_sweep *stiff)
+static void judge_properties(struct bench_run *run, const struct extremes_row *rows,
+			     int n)
 {
-	json_t *rows = json_array(), *figures = json_array();
-	struct machine machine;
-
-	machine_init(&machine);
-	for (int i = 0; i < all->n; i++) {
-		const struct extremes_row *r = &all->row[i];
-		json_t *failed = *r->failed ? json_string(r->failed) : json_null();
-
-		json_array_append_new(
-			rows,
-			json_pack("{ss ss sI sI sI sI so}", "name", r->name, "what",
-				  r->what, "tried", (json_int_t)r->tried, "held",
-				  (json_int_t)r->held, "refused", (json_int_t)r->refused,
-				  "wrong", (json_int_t)r->wrong, "failed", failed));
-		metrics_exact(figures, (double)r->wrong, "cases", "%s wrong", r->name);
-	}
-	stiff_sweep_figures(stiff, figures);
-	json_print(json_pack("{so sI sb so so so}", "machine", machine_json(&machine),
-			     "seed", (json_int_t)all->setup.seed, "quick",
-			     all->setup.part > 1, "rows", rows, "stiff",
-			     stiff_sweep_json(stiff), "figures", figures));
-}
-
-static void try_all(struct extremes *all)
-{
-	static const struct property *const tables[] = {
-		model_properties,   fixed_properties,  surface_properties,
-		control_properties, motion_properties, plan_properties,
-		wall_properties,    device_properties, file_properties};
-
-	for (size_t i = 0; i < sizeof(tables) / sizeof(*tables); i++)
-		for (const struct property *p = tables[i]; p->name; p++) {
-			if (p->for_tests_only)
-				continue;
-			if (all->n == ROWS_MAX)
-				cli_fail("extremes: more than %d rows", ROWS_MAX);
-			cli_progress("extremes: %s", p->name);
-			extremes_try(p, &all->setup, &all->row[all->n++]);
-		}
-}
-
-void bench_extremes(uint64_t seed, bool json, bool quick, const char *plot)
-{
-	struct extremes *all = calloc(1, sizeof(*all));
-	struct stiff_sweep *stiff = calloc(1, sizeof(*stiff));
-	const char *folder, *name, *first = NULL;
+	const char *first = NULL;
 	long wrong = 0;
 
-	if (!all || !stiff)
-		cli_fail("no memory");
-	if (plot)
-		plot_place("plot", plot, &folder, &name);
-	all->setup = (struct extremes_setup){seed, quick ? QUICK_PART : 1,
-					     scene_argument_shipped()};
-	try_all(all);
-	stiff_sweep(stiff, quick);
-	cli_progress_end();
-	if (cli_stop)
-		cli_fail("interrupted");
-	if (json)
-		print_json(all, stiff);
-	else
-		print_table(all, stiff);
-	cli_finish();
-	if (plot)
-		stiff_sweep_draw(stiff, folder, name);
-	for (int i = 0; i < all->n; i++) {
-		wrong += all->row[i].wrong;
-		if (all->row[i].wrong && !first)
-			first = all->row[i].name;
+	for (int i = 0; i < n; i++) {
+		wrong += rows[i].wrong;
+		if (rows[i].wrong && !first)
+			first = rows[i].name;
 	}
 	if (wrong)
-		cli_fail("%ld cases came out wrong, the first in %s: a fault of incise, "
-			 "please report it with the line above",
-			 wrong, first);
-	if (stiff_sweep_missed(stiff))
-		cli_fail("%d walls are not as theory says: see 'failed'",
-			 stiff_sweep_missed(stiff));
-	free(all);
-	free(stiff);
+		bench_fail(run,
+			   "%ld cases came out wrong, the first in %s: a fault of "
+			   "incise, please report it with the line above",
+			   wrong, first);
 }
+
+/* --- stiff walls --- */
+
+#define WALLS_MAX 100 /* by path, guard and stiffness */
+
+enum path { PATH_PLAN, PATH_WALL, PATHS };
+
+struct wall {
+	const char *path, *guard; /* "on" or "off" */
+	bool guarded;
+	double K_N_mm;
+	double limit_N_mm;	      /* by theory */
+	bool accepted;		      /* as it is; else it was forced */
+	double largest_N, largest_mm; /* NaN: it was not run */
+	double late_mm;		      /* from one end to the other, in the last quarter */
+	long not_finite;
+	bool bounded;
+	json_t *bounded_json;
+	char failed[160]; /* why it was not run, or what is not as it must be */
+	bool missed;	  /* the latter */
+};
+
+/* The device of a scene that describes none. */
+#define DAMPING_N_s_mm 0.01
+#define LIMIT_N 4.0
+#define SLEW_N_s 100000.0 /* the most there is: less would itself be a lag */
+#define PRESS_N 1.0
+#define BEGIN_mm 1.0
+#define TICKS 12000
+#define TRACKER_HZ 120
+#define LATENCY_S 4.2e-3
+/* A scene is forced by a description under which walls up to beyond 1e6 N/m are stable: the
+ * device is not like that. */
+#define FORCED_DEVICE "damping_N_s_mm = 1.0; delay_ticks = 0;"
+#define STILL 1e-3 /* of the millimetre that it fell and the way that it sinks in */
+#define GONE_mm 1e4
+
+/* One run of the device; the force is held from tick to tick. */
+struct run {
+	struct wall *wall;
+	struct incise_plant plant;
+	double low[4], high[4]; /* of each quarter */
+	int k;
+};
+
+static void begin(struct run *run, struct wall *wall)
+{
+	*run = (struct run){.wall = wall,
+			    .plant = {.mass_kg = DEVICE_KG,
+				      .damping_N_s_mm = DAMPING_N_s_mm,
+				      .position_mm = BEGIN_mm}};
+	for (int q = 0; q < 4; q++) {
+		run->low[q] = INFINITY;
+		run->high[q] = -INFINITY;
+	}
+}
+
+static void note(struct run *run, double force_N)
+{
+	double x = run->plant.position_mm;
+	int q = 4 * run->k / TICKS;
+
+	if (!isfinite(x) || !isfinite(force_N))
+		run->wall->not_finite++;
+	run->low[q] = fmin(run->low[q], x);
+	run->high[q] = fmax(run->high[q], x);
+	run->wall->largest_N = fmax(run->wall->largest_N, fabs(force_N));
+	run->wall->largest_mm = fmax(run->wall->largest_mm, fabs(x));
+}
+
+/* It may bounce for ever, but not higher and higher. */
+static void judge(struct run *run)
+{
+	struct wall *wall = run->wall;
+	double second = run->high[1] - run->low[1];
+
+	wall->late_mm = run->high[3] - run->low[3];
+	wall->bounded = run->k == TICKS && !wall->not_finite &&
+			wall->largest_N <= LIMIT_N &&
+			(wall->late_mm < 1.25 * second || wall->late_mm < BEGIN_mm);
+	if (!wall->bounded)
+		snprintf(wall->failed, sizeof(wall->failed), "not bounded");
+	else if (wall->accepted &&
+		 !(wall->late_mm < STILL * (BEGIN_mm + PRESS_N / wall->K_N_mm)))
+		snprintf(wall->failed, sizeof(wall->failed),
+			 "accepted, and not still: it moves by %.3g mm", wall->late_mm);
+	wall->missed = *wall->failed;
+}
+
+/* The wall alone. */
+static void press_wall(struct wall *wall)
+{
+	const struct incise_haptic_device device = {.mass_kg = DEVICE_KG,
+						    .damping_N_s_mm = DAMPING_N_s_mm,
+						    .period_s = PERIOD_S};
+	struct incise_guard guard;
+	double was = BEGIN_mm;
+	struct run run;
+
+	wall->limit_N_mm = incise_stability_limit(&device, 0);
+	wall->accepted = wall->K_N_mm <= wall->limit_N_mm;
+	/* As plans do: the credit is what the tissue can have stored. */
+	incise_guard_init(&guard, DEVICE_KG, PERIOD_S,
+			  wall->guarded ? LIMIT_N * LIMIT_N / wall->K_N_mm / 2 : 0);
+	begin(&run, wall);
+	for (; run.k < TICKS && fabs(run.plant.position_mm) < GONE_mm; run.k++) {
+		double x = run.plant.position_mm, at[3] = {x},
+		       v[3] = {(x - was) / PERIOD_S};
+		double force[3] = {x < 0 ? -wall->K_N_mm * x : 0};
+
+		incise_guard_apply(&guard, at, v, force);
+		force[0] = fmax(-LIMIT_N, fmin(LIMIT_N, force[0]));
+		incise_guard_sent(&guard, force);
+		was = x;
+		note(&run, force[0]);
+		incise_plant_step(&run.plant, force[0] - PRESS_N, PERIOD_S);
+	}
+	judge(&run);
+}
+
+static struct incise_plan *make_plan(const struct wall *wall, const char *device,
+				     struct incise_scene **scene,
+				     struct incise_error *err)
+{
+	struct memory_file file = memory_file_begin("scene");
+	double gain = wall->K_N_mm > 1000 ? 10 : 1;
+	struct incise_plan *plan = NULL;
+
+	fprintf(file.file,
+		"arithmetic = \"double\";\ntissue = { gain = %.1f; reaction_N_mm = %.17e; "
+		"leave_mm = 0.0; };\neffects = { guard = %s; };\ndevice = { %s };\n"
+		"limits = { force_N = %.17e; slew_N_s = %.17e; start_N = 100.0; "
+		"ramp_ms = 1.0; };\n",
+		gain, wall->K_N_mm / gain, wall->guarded ? "true" : "false", device,
+		LIMIT_N, SLEW_N_s);
+	memory_file_written(&file);
+	*scene = incise_scene_load(file.path, NULL, err);
+	if (*scene)
+		plan = incise_plan_new(*scene, NULL, err);
+	fclose(file.file);
+	return plan;
+}
+
+/* The limit is that of the device, whatever the wall is. */
+static double plan_limit(void)
+{
+	const struct wall soft = {.K_N_mm = 0.01};
+	struct incise_plan_stability stability;
+	struct incise_error err = {0};
+	struct incise_scene *scene;
+	struct incise_plan *plan = make_plan(&soft, "", &scene, &err);
+
+	if (!plan)
+		cli_fail_with(&err);
+	incise_plan_stability(plan, &stability);
+	incise_plan_free(plan);
+	incise_scene_free(scene);
+	return stability.limit_N_mm;
+}
+
+/* From one tick to the next, with the poses that are taken in between. */
+static void advance(struct run *run, struct incise_plan *plan, int *poses, int *fed,
+		    double taken[2], double force_N)
+{
+	double from = run->k * PERIOD_S, to = from + PERIOD_S, pose;
+
+	while ((pose = (double)*poses / TRACKER_HZ) < to) {
+		incise_plant_step(&run->plant, force_N, fmax(0, pose - from));
+		from = fmax(from, pose);
+		taken[(*poses)++ % 2] = run->plant.position_mm;
+	}
+	incise_plant_step(&run->plant, force_N, to - from);
+	/* Feed those that have arrived by the next tick. */
+	while (*fed < *poses && (double)*fed / TRACKER_HZ + LATENCY_S <= to) {
+		struct incise_tracker_sample s = {
+			.t_ns = llrint(((double)*fed / TRACKER_HZ + LATENCY_S) * 1e9),
+			.position_mm = {0, 0, taken[*fed % 2]},
+			.quaternion = {1},
+			.status = ' '};
+
+		incise_plan_feed(plan, &s, 1);
+		++*fed;
+	}
+}
+
+/* A whole plan. */
+static void press_plan(struct wall *wall)
+{
+	struct incise_error err = {0}, forced = {0};
+	struct incise_scene *scene;
+	struct incise_plan *plan = make_plan(wall, "", &scene, &err);
+	double taken[2] = {0}, force_N = 0;
+	int poses = 0, fed = 0;
+	struct run run;
+
+	wall->limit_N_mm = plan_limit();
+	wall->accepted = plan;
+	if (!plan) {
+		incise_scene_free(scene);
+		plan = make_plan(wall, FORCED_DEVICE, &scene, &forced);
+	}
+	if (!plan) {
+		const char *text = strchr(forced.text, ' ');
+
+		snprintf(wall->failed, sizeof(wall->failed), "%.*s",
+			 (int)strcspn(text ? text + 1 : forced.text, ";"),
+			 text ? text + 1 : forced.text);
+		incise_scene_free(scene);
+		return;
+	}
+	begin(&run, wall);
+	for (; run.k < TICKS && fabs(run.plant.position_mm) < GONE_mm; run.k++) {
+		struct incise_tick tick;
+
+		advance(&run, plan, &poses, &fed, taken, force_N - PRESS_N);
+		if (incise_plan_tick(plan, llrint((run.k + 1) * PERIOD_S * 1e9), &tick))
+			wall->not_finite++;
+		force_N = tick.command_N[2];
+		note(&run, force_N);
+	}
+	judge(&run);
+	if (wall->accepted != (wall->K_N_mm <= wall->limit_N_mm)) {
+		snprintf(wall->failed, sizeof(wall->failed),
+			 "%s, and theory says otherwise",
+			 wall->accepted ? "accepted" : "refused");
+		wall->missed = true;
+	}
+	incise_plan_free(plan);
+	incise_scene_free(scene);
+}
+
+/* From 10 N/m to 1e9, and so in N/mm. @return their number of each path and guard */
+static int press_all(struct wall *walls, bool quick)
+{
+	static const char *const paths[PATHS] = {"plan", "wall"};
+	int n = 0;
+
+	for (int path = 0; path < PATHS; path++)
+		for (int guard = 0; guard < 2; guard++)
+			for (int k = 0; k <= 24 && !cli_stop; k += quick ? 6 : 1) {
+				struct wall *wall = &walls[n++];
+
+				*wall = (struct wall){.path = paths[path],
+						      .guard = guard ? "on" : "off",
+						      .guarded = guard,
+						      .K_N_mm = pow(10, -2 + k / 3.0),
+						      .largest_N = NAN,
+						      .largest_mm = NAN,
+						      .late_mm = NAN};
+				cli_progress("stiff: %g N/m", wall->K_N_mm * 1e3);
+				(path == PATH_PLAN ? press_plan : press_wall)(wall);
+			}
+	return n / PATHS / 2;
+}
+
+static bool was_pressed(const void *wall)
+{
+	return !isnan(((const struct wall *)wall)->largest_mm);
+}
+
+static const struct bench_table stiff = {
+	.key = "stiff",
+	.row_bytes = sizeof(struct wall),
+	.columns =
+		{
+			COLUMN(wall, "path", path),
+			COLUMN(wall, "K_N_m", K_N_mm, .scale = 1e3),
+			COLUMN(wall, "theory_limit_N_m", limit_N_mm, .scale = 1e3),
+			COLUMN(wall, "accepted", accepted),
+			COLUMN(wall, "guard", guard),
+			COLUMN(wall, "largest_N", largest_N),
+			COLUMN(wall, "largest_mm", largest_mm),
+			COLUMN(wall, "late_mm", late_mm),
+			COLUMN(wall, "not_finite", not_finite),
+			COLUMN(wall, "bounded", bounded_json),
+			COLUMN(wall, "failed", failed),
+		},
+	.metrics = {METRIC(EXACT, wall, largest_mm, "mm",
+			   "{path}, {K_N_m:%.4g} N/m, guard {guard}, largest",
+			   was_pressed)},
+};
+
+/* Each stiffness is a line, without and with the guard. */
+static void print_path(const struct bench_run *run, const char *title,
+		       const struct wall *walls, int n)
+{
+	bench_text(run, "%s\n%10s %-9s", title, "K_N_m", "");
+	for (int guard = 0; guard < 2; guard++)
+		bench_text(run, " %-9s %8s %9s %9s", guard ? "guard on" : "guard off",
+			   "largest", "largest", "at last");
+	bench_text(run, "\n%10s %-9s", "", "");
+	for (int guard = 0; guard < 2; guard++)
+		bench_text(run, " %-9s %8s %9s %9s", "", "N", "mm", "mm");
+	for (int k = 0; k < n; k++) {
+		bench_text(run, "\n%10.4g %-9s", walls[k].K_N_mm * 1e3,
+			   walls[k].accepted ? "accepted" : "refused");
+		for (const struct wall *w = &walls[k]; w < walls + 2 * n; w += n)
+			if (was_pressed(w))
+				bench_text(run, " %-9s %8.3g %9.3g %9.2g",
+					   w->bounded ? "bounded" : "GROWS", w->largest_N,
+					   w->largest_mm, w->late_mm);
+			else
+				bench_text(run, " %-9s %8s %9s %9s", "not run", "-", "-",
+					   "-");
+	}
+	bench_text(run, "\n");
+	for (int k = 0; k < n; k++)
+		if (*walls[k].failed)
+			bench_text(run, "%.4g N/m: %s\n", walls[k].K_N_mm * 1e3,
+				   walls[k].failed);
+}
+
+static void report_walls(struct bench_run *run, struct wall *walls, int each)
+{
+	static const char *const titles[PATHS] = {
+		"a plan, poses of a tracker of 120 Hz, 4.2 ms late",
+		"the wall alone, its position that of the tick"};
+	int missed = 0;
+
+	for (int i = 0; i < 4 * each; i++) {
+		missed += walls[i].missed;
+		if (was_pressed(&walls[i]))
+			walls[i].bounded_json = json_boolean(walls[i].bounded);
+	}
+	bench_rows(run, &stiff, walls, 4 * each);
+	bench_text(run,
+		   "stiff walls: 50 g and 0.01 N s/mm, pressed by 1 N, fall 1 mm onto a "
+		   "wall at 1 kHz; force limited to 4 N; 12 s\n");
+	for (int path = 0; path < PATHS; path++)
+		print_path(run, titles[path], walls + 2 * path * each, each);
+	for (int i = 0; i < 4 * each; i += 2 * each)
+		bench_text(run, "limit by theory, %s: %.4g N/m\n", walls[i].path,
+			   walls[i].limit_N_mm * 1e3);
+	if (missed)
+		bench_fail(run, "%d walls are not as theory says: see 'failed'", missed);
+}
+
+static void run_extremes(struct bench_run *run)
+{
+	struct extremes_row *rows = bench_alloc(ROWS_MAX, sizeof(*rows));
+	struct wall *walls = bench_alloc(WALLS_MAX, sizeof(*walls));
+	const struct extremes_setup setup = {.seed = run->seed ? (uint64_t)run->seed : 1,
+					     .part = run->quick ? QUICK_PART : 1,
+					     .scenes = scene_argument_shipped()};
+	int n = try_all(&setup, rows), each = press_all(walls, run->quick);
+
+	if (cli_stop)
+		cli_fail("interrupted");
+	bench_value(run, "seed", json_integer((json_int_t)setup.seed));
+	bench_text(run, "seed %llu\n", (unsigned long long)setup.seed);
+	report_properties(run, rows, n);
+	judge_properties(run, rows, n);
+	report_walls(run, walls, each);
+}
+
+static const struct bench_plot plots[] = {
+	{.script = text_extremes_gp,
+	 .width = 1100,
+	 .height = 1300,
+	 .data = {&stiff, "path,guard"}},
+	{0},
+};
+
+const struct bench bench_extremes = {
+	.name = "extremes",
+	.summary = "numbers and bytes that nobody should send, at each door of\n"
+		   "the library; walls of 10 N/m to 1 GN/m",
+	.takes_seed = true,
+	.run = run_extremes,
+	.plots = plots,
+};
