@@ -7,7 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "bench/bench.h"
-#include "bench/bench_scenes.h"
 #include "bench/compare.h"
 #include "cli/cli.h"
 #include "cli/json.h"
@@ -43,33 +42,10 @@ static const struct cli_option options[] = {
 	{0},
 };
 
-/* --- not declared yet --- */
-
-static void scenes(struct bench_run *run)
-{
-	if (run->profile && run->n_operands != 1)
-		cli_usage("--profile is of one scene, got %d", run->n_operands);
-	if (run->profile)
-		bench_scenes_profile(run->operands[0], !strcmp(run->profile, "full"));
-	else
-		bench_scenes(run->operands, run->n_operands, run->json, run->quick,
-			     run->plot);
-}
-
-static const struct bench_plot some_plot[] = {{0}};
-
-static const struct bench
-	old_scenes = {.name = "scenes",
-		      .operands = "[SCENE...]",
-		      .summary = "what each scene leaves out, and what that saves",
-		      .n_operands = BENCH_SCENES_MOST,
-		      .takes_profile = true,
-		      .plots = some_plot,
-		      .all = scenes};
-
 static const struct bench *const benches[] = {
-	&bench_precision, &bench_training, &bench_stability, &bench_loop, &bench_pose,
-	&bench_timeline,  &bench_vision,   &bench_capture,   &old_scenes, &bench_extremes,
+	&bench_precision, &bench_training, &bench_stability, &bench_loop,
+	&bench_pose,	  &bench_timeline, &bench_vision,    &bench_capture,
+	&bench_scenes,	  &bench_extremes,
 };
 #define BENCHES (int)(sizeof(benches) / sizeof(*benches))
 

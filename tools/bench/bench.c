@@ -451,6 +451,7 @@ static void block_of(const struct bench_data *data, const char *only, const void
 {
 	int n = 0;
 
+	*block = 0;
 	for (const char *key = only ? only : data->blocks; *key;) {
 		size_t length = strcspn(key, ",");
 
@@ -602,7 +603,8 @@ static void draw(const struct bench_run *run, const struct bench_plot *plot)
 		write_data(run, file[1], &plot->more, more);
 	width = plot->width * values_of(plot, plot->across, rows);
 	script = plot_begin(run->folder, name, width > WIDTH_LEAST ? width : WIDTH_LEAST,
-			    plot->height * values_of(plot, plot->down, rows));
+			    plot->height * values_of(plot, plot->down, rows) +
+				    plot->margin);
 	fprintf(script, "set datafile columnheaders separator tab\nsuffix = '%s'\n",
 		plot->suffix ? plot->suffix : "");
 	write_scalars(script, run->machine);

@@ -93,7 +93,7 @@ struct bench_table {
 	struct bench_metric metrics[BENCH_METRICS];
 };
 
-/* Rows that a plot draws, in blocks by the values of keys: "motion,name". */
+/* Rows that a plot draws, in blocks by the values of keys: "motion,name"; "": in one block. */
 struct bench_data {
 	const struct bench_table *table;
 	const char *blocks;
@@ -116,12 +116,13 @@ struct bench_plot {
 	const char *script;
 	int width,
 		height; /* pixels; with across and down of a panel of a value of that key */
+	int margin;	/* added to the height */
 	const char *across, *down;
 	struct bench_data data, more;
 };
 
 extern const char text_extremes_gp[], text_loop_rates_gp[], text_loop_wakeups_gp[],
-	text_pose_gp[], text_precision_gp[], text_stability_guard_gp[],
+	text_pose_gp[], text_precision_gp[], text_scenes_gp[], text_stability_guard_gp[],
 	text_stability_integrators_gp[], text_stability_map_gp[], text_timeline_gp[],
 	text_training_gp[], text_vision_gp[];
 
@@ -138,7 +139,8 @@ struct bench {
 };
 
 extern const struct bench bench_capture, bench_extremes, bench_loop, bench_pose,
-	bench_precision, bench_stability, bench_timeline, bench_training, bench_vision;
+	bench_scenes, bench_precision, bench_stability, bench_timeline, bench_training,
+	bench_vision;
 
 /* --- a run --- */
 

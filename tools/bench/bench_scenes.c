@@ -1,56 +1,255 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What scenes leave out; see bench_scenes.h.
+ * incise bench scenes: a scene's plan, with the stages that it needs only, compared with the full
+ * pipeline, which is the same scene with every stage kept and those neutral that it does not need
+ * (incise_scene_set_full()): time, instructions and memory of both, and whether their forces are
+ * the same to the bit.
  */
 #include <glob.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "bench_scenes.h"
+#include <incise/plan.h>
+#include "../../lib/base/vector.h"
+#include "../cli/child.h"
 #include "../cli/cli.h"
-#include "metrics.h"
 #include "../cli/json.h"
-#include "machine.h"
 #include "../cli/mapped_libraries.h"
-#include "../cli/plot.h"
 #include "../cli/scene_argument.h"
-#include "scene_row.h"
-#include "scenes_picture.h"
+#include "../cli/stopwatch.h"
+#include "../cli/stroke.h"
+#include "all_forces.h"
+#include "bench.h"
+#include "process_cost.h"
+#include "sheet.h"
 
-struct bench {
-	struct scene_row row[BENCH_SCENES_MOST];
+#define SCENES_MAX 64
+
+/*
+ * --- trajectory: the same work for several plans of a scene ---
+ *
+ * Strokes over its surface (stroke.h), one after the other, with blade, handle and tube in turn,
+ * and the poses of them all made before.
+ *
+ *     \                  \                  \
+ *   ───\──────────────────\──────────────────\────────────── surface
+ *       ╰◀── blade ──▶     ╰◀── handle ──▶    ╰◀── tube ──▶
+ */
+
+#define NS 1e-9
+#define STROKE_S 1.0
+#define DEEPER_MM 3.0  /* each stroke than the one before … */
+#define DEPTHS 11      /* … up to 30 mm, and then from 0 again */
+#define TURN_RAD 0.7   /* each stroke from the one before */
+#define GAP_EVERY 5    /* strokes */
+#define GAP_FROM_S 0.5 /* of the stroke: without poses for longer than any limit */
+#define GAP_TO_S 0.7
+
+struct trajectory {
+	struct incise_tracker_info tracker;
+	struct incise_tracker_sample *poses; /* times from 0 on */
+	int n_poses, strokes, ticks;
+	int64_t period_ns, stroke_ns;
+};
+
+static const enum incise_tool tools[] = {INCISE_TOOL_BLADE, INCISE_TOOL_HANDLE,
+					 INCISE_TOOL_TUBE};
+
+/* Whether a pose of a stroke does not come. */
+static bool lost(int stroke, double t_s)
+{
+	return stroke % GAP_EVERY == GAP_EVERY - 1 && t_s >= GAP_FROM_S && t_s < GAP_TO_S;
+}
+
+/* The scalpel is turned round, with its handle's end where the tip was. */
+static void turn_round(struct incise_tracker_sample *sample,
+		       const struct incise_scene_scalpel *scalpel)
+{
+	const double *side = scalpel->side,
+		     q[4] = {sample->quaternion[0], sample->quaternion[1],
+			     sample->quaternion[2], sample->quaternion[3]};
+	double along[3];
+
+	/* The product of q and a half turn about the side. */
+	v3_cross(sample->quaternion + 1, q + 1, side);
+	v3_add(sample->quaternion + 1, sample->quaternion + 1, q[0], side);
+	sample->quaternion[0] = -v3_dot(q + 1, side);
+	v3_rotate(along, sample->quaternion, scalpel->axis);
+	v3_add(sample->position_mm, sample->position_mm, -scalpel->handle_mm, along);
+}
+
+static void vary(struct incise_tracker_sample *sample, const struct stroke *stroke,
+		 int number, double t_s)
+{
+	double deeper =
+		DEEPER_MM * (number % DEPTHS) * pow(sin(M_PI * t_s / STROKE_S), 2);
+	double half = TURN_RAD * number / 2;
+
+	v3_add(sample->position_mm, sample->position_mm, -deeper, stroke->top.normal);
+	sample->quaternion[0] = cos(half);
+	sample->quaternion[1 + number / 3 % 3] = sin(half);
+}
+
+/*
+ * Plain strokes are 1 mm deep; varied ones are up to 30 mm deeper, the scalpel turns about, and at
+ * times no poses come. With @inserts the plan has handle and tube; else it is always the blade.
+ */
+static void make_trajectory(struct trajectory *trajectory,
+			    const struct incise_scene *scene,
+			    const struct incise_plan *plan, int strokes, bool inserts,
+			    bool varied)
+{
+	struct incise_scene_scalpel scalpel;
+	struct stroke stroke;
+	int each;
+
+	*trajectory = (struct trajectory){
+		.tracker = {.name = "usual", .rate_hz = 120, .latency_ns = 4200000},
+		.strokes = strokes,
+		.period_ns = llrint(1e9 / incise_scene_rate_hz(scene)),
+	};
+	trajectory->stroke_ns = llrint(STROKE_S / NS / (double)trajectory->period_ns) *
+				trajectory->period_ns;
+	trajectory->ticks =
+		(int)(trajectory->stroke_ns / trajectory->period_ns) * strokes;
+	each = (int)(STROKE_S * trajectory->tracker.rate_hz);
+	trajectory->poses =
+		bench_alloc((size_t)each * strokes, sizeof(*trajectory->poses));
+	incise_scene_scalpel(scene, &scalpel);
+	stroke_begin(&stroke, plan, &trajectory->tracker);
+	for (int i = 0; i < each * strokes; i++) {
+		struct incise_tracker_sample *sample =
+			&trajectory->poses[trajectory->n_poses];
+		double t_s = i % each / trajectory->tracker.rate_hz;
+
+		stroke_pose(&stroke, i % each, sample);
+		sample->t_ns += i / each * trajectory->stroke_ns;
+		sample->seq = i;
+		if (varied)
+			vary(sample, &stroke, i / each, t_s);
+		if (inserts && tools[i / each % 3] == INCISE_TOOL_HANDLE)
+			turn_round(sample, &scalpel);
+		if (!varied || !lost(i / each, t_s))
+			trajectory->n_poses++;
+	}
+}
+
+/* A plan on its way along it. */
+struct walk {
+	const struct trajectory *trajectory;
+	struct incise_plan *plan;
+	int64_t begin_ns; /* when this time along it began */
+	int tick, pose;	  /* the next ones */
+};
+
+/* Feed the poses of up to the next tick. @return when that is. At its end the trajectory starts
+ * again. */
+static int64_t feed(struct walk *walk)
+{
+	const struct trajectory *trajectory = walk->trajectory;
+	int64_t t_ns;
+
+	if (walk->tick == trajectory->ticks) {
+		walk->begin_ns += trajectory->strokes * trajectory->stroke_ns;
+		walk->tick = walk->pose = 0;
+	}
+	t_ns = walk->tick * trajectory->period_ns;
+	if (!(t_ns % trajectory->stroke_ns))
+		incise_plan_set_tool(walk->plan, tools[t_ns / trajectory->stroke_ns % 3]);
+	while (walk->pose < trajectory->n_poses &&
+	       trajectory->poses[walk->pose].t_ns <= t_ns) {
+		struct incise_tracker_sample sample = trajectory->poses[walk->pose++];
+
+		sample.t_ns += walk->begin_ns;
+		incise_plan_feed(walk->plan, &sample, 1);
+	}
+	walk->tick++;
+	return walk->begin_ns + t_ns;
+}
+
+/* Go on along another trajectory, at a later time. */
+static void change(struct walk *walk, const struct trajectory *trajectory)
+{
+	walk->begin_ns += walk->tick * walk->trajectory->period_ns;
+	walk->trajectory = trajectory;
+	walk->tick = walk->pose = 0;
+}
+
+static void run_trajectory(void *context)
+{
+	struct walk *walk = context;
+	struct incise_tick tick;
+
+	for (int i = 0; i < walk->trajectory->ticks; i++)
+		incise_plan_tick(walk->plan, feed(walk), &tick);
+}
+
+/* --- scenes: those that are given, or those that ship and some that are made here --- */
+
+/* A scene's own plan, or its full pipeline. */
+struct variant {
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+	struct walk walk;
+	struct harness_time time; /* of a tick, ns */
+	double instructions;	  /* of a tick; NaN: not counted */
+	double rounded;		  /* the same */
+	double p99_ns;		  /* of single ticks */
+	double memory_KiB;
+	double stage_ns[INCISE_PLAN_STAGES_MAX]; /* means of the middle half */
+};
+
+struct scene {
+	const char *name;
+	const char *path; /* NULL: there is none of that name */
+	bool kept;	  /* the full pipeline is its own */
+	bool measured;	  /* its plans can be */
+	struct variant few, full;
+	struct trajectory trajectory; /* that is timed and counted */
+	long ticks_compared, ticks_in_contact;
+	long first_difference; /* number of the tick; -1: none */
+	double times_cheaper;
+	struct loop_process process;
+	int libraries_mapped; /* 0: not seen */
+	/* Of the report; texts with ", " between names, or NULL. */
+	json_t *stages, *left_out, *libraries, *not_mapped, *devices, *files;
+	json_t *difference, *identical, *failure;
+	const char *forces; /* "same" */
+	char failed[520];   /* or "" */
+};
+
+struct scenes {
+	struct scene scene[SCENES_MAX];
 	int n;
-	struct machine machine;
 	const char *counted_by, *not_counted; /* instructions; the other is NULL */
 };
 
-/* ---- which ---- */
-
-static char *copy(const char *text, size_t length)
+static struct scene *add(struct scenes *s, const char *name, size_t length,
+			 const char *path)
 {
-	char *made = strndup(text, length);
+	struct scene *scene = &s->scene[s->n++];
+	char *copy = strndup(name, length);
 
-	if (!made)
+	if (!copy)
 		cli_fail("no memory");
-	return made;
-}
-
-static void add_given(struct bench *b, const char *operand)
-{
-	struct scene_row *row = &b->row[b->n++];
-	struct scene_argument argument = {0};
-
-	row->name = copy(operand, strlen(operand));
-	/* It may be the name of a file, that another gave: no line is broken by it. */
-	for (char *c = row->name; *c; c++)
+	/* A file's name may be anyone's: it breaks no line. */
+	for (char *c = copy; *c; c++)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '?';
-	if (scene_argument_find(&argument, operand))
-		row->path = argument.path;
+	*scene = (struct scene){.name = copy, .path = path, .first_difference = -1};
+	return scene;
 }
 
-static void add_shipped(struct bench *b)
+static void add_given(struct scenes *s, const char *operand)
+{
+	struct scene_argument argument = {0};
+	bool found = scene_argument_find(&argument, operand);
+
+	add(s, operand, strlen(operand), found ? argument.path : NULL);
+}
+
+static void add_shipped(struct scenes *s)
 {
 	char pattern[4200];
 	glob_t found;
@@ -59,146 +258,428 @@ static void add_shipped(struct bench *b)
 	if (glob(pattern, 0, NULL, &found))
 		cli_fail("%s: no scenes are there, though they come with the program",
 			 scene_argument_shipped());
-	for (size_t i = 0; i < found.gl_pathc && b->n < BENCH_SCENES_MOST - MADE_SCENES;
-	     i++) {
+	for (size_t i = 0; i < found.gl_pathc && s->n < SCENES_MAX / 2; i++) {
 		const char *name = strrchr(found.gl_pathv[i], '/') + 1;
-		struct scene_row *row = &b->row[b->n++];
 
-		row->name = copy(name, strlen(name) - strlen(".scene"));
-		row->path = copy(found.gl_pathv[i], strlen(found.gl_pathv[i]));
-	}
-	globfree(&found);
-}
-
-static void add_made(struct bench *b)
-{
-	for (int i = 0; i < MADE_SCENES; i++) {
-		struct scene_row *row = &b->row[b->n++];
-
-		made_scene_begin(&row->made, i);
-		row->name = copy(row->made.name, strlen(row->made.name));
-		row->path = row->made.scene.path;
+		add(s, name, strlen(name) - strlen(".scene"), found.gl_pathv[i]);
 	}
 }
 
-/* ---- measuring ---- */
+#define SPHERE                                                           \
+	"surface = { kind = \"sphere\"; centre_mm = [0.0, 0.0, -50.0]; " \
+	"radius_mm = 50.0; };\n"
+#define DOUBLE "arithmetic = \"double\";\n"
+#define REACTION "tissue = { reaction_N_mm = 0.14; };\n"
+#define MESH "surface = { kind = \"mesh\"; file = \"%s\"; };\n"
 
-static void open_row(struct scene_row *row)
+/* From the plainest to one with all that there is. */
+static const struct {
+	const char *name, *text; /* %s: a sheet of 20 000 triangles */
+	bool all, kept;		 /* every force */
+} made[] = {
+	{"plane_reaction", DOUBLE REACTION, false, false},
+	{"plane_kept", DOUBLE REACTION, false, true},
+	{"plane_constraint",
+	 DOUBLE "tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; };\n", false, false},
+	{"sphere_all", DOUBLE SPHERE, true, false},
+	{"sphere_all_fixed", "arithmetic = \"fixed\";\n" SPHERE, true, false},
+	{"mesh_reaction", DOUBLE MESH REACTION, false, false},
+	{"mesh_all", DOUBLE MESH, true, false},
+};
+
+/* As files in memory, which stay. */
+static void add_made(struct scenes *s)
 {
-	struct scene_saving *saving = &row->saving;
+	for (size_t i = 0; i < sizeof(made) / sizeof(*made); i++) {
+		struct memory_file *file = bench_alloc(2, sizeof(*file));
+		char tissue[1000] = "";
 
-	if (row->path)
-		scene_saving_begin(saving, row->path, row->made.kept);
-	else
-		snprintf(saving->failed, sizeof(saving->failed),
-			 "there is no file %s, and no scene of that name", row->name);
-	if (*saving->failed) {
-		snprintf(row->failed, sizeof(row->failed), "%s", saving->failed);
+		file[0] = memory_file_begin(made[i].name);
+		if (made[i].all)
+			all_forces(tissue, sizeof(tissue), 1, NULL, "");
+		if (strchr(made[i].text, '%'))
+			file[1] = sheet_of_waves(100);
+		fprintf(file[0].file, made[i].text, file[1].path);
+		fputs(tissue, file[0].file);
+		if (made[i].all)
+			fputs("effects = { average_ticks = 8; guard = true; };\n",
+			      file[0].file);
+		memory_file_written(&file[0]);
+		add(s, made[i].name, strlen(made[i].name), file[0].path)->kept =
+			made[i].kept;
+	}
+}
+
+/* --- plans and forces --- */
+
+/* Blade, handle and tube once each: what is timed and counted. */
+#define TIMED_STROKES 3
+#define COMPARED_TICKS 120000
+#define COMPARED_STROKES_MAX 1000 /* of a scene with few ticks a second */
+
+static bool has_stage(const struct incise_plan *plan, const char *stage)
+{
+	const char *name;
+
+	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
+		if (!strcmp(name, stage))
+			return true;
+	return false;
+}
+
+static bool open_variant(struct variant *v, const char *path, bool full,
+			 struct incise_error *err)
+{
+	v->scene = incise_scene_load(path, NULL, err);
+	if (!v->scene)
+		return false;
+	incise_scene_set_full(v->scene, full);
+	v->plan = incise_plan_new(v->scene, NULL, err);
+	if (v->plan)
+		v->memory_KiB = (double)incise_plan_memory(v->plan) / 1024;
+	return v->plan;
+}
+
+/* Kept, the stage of the tool changes nothing: there is only the blade. */
+static bool inserts(const struct scene *s)
+{
+	return !s->kept && has_stage(s->few.plan, "tool");
+}
+
+/* Make both plans, at the start of the trajectory that is timed and counted. */
+static void open_scene(struct scene *s)
+{
+	struct variant *variants[] = {&s->few, &s->full};
+	struct incise_error err = {0};
+
+	for (int i = 0; i < 2; i++)
+		variants[i]->memory_KiB = variants[i]->p99_ns =
+			variants[i]->instructions = NAN;
+	if (!s->path) {
+		snprintf(s->failed, sizeof(s->failed),
+			 "there is no file %s, and no scene of that name", s->name);
 		return;
 	}
-	/* The loop has no way to keep what its scene does not need. */
-	row->own_process = !row->made.kept;
+	if (!open_variant(&s->few, s->path, s->kept, &err) ||
+	    !open_variant(&s->full, s->path, true, &err)) {
+		snprintf(s->failed, sizeof(s->failed), "%s", err.text);
+		return;
+	}
+	s->measured = true;
+	make_trajectory(&s->trajectory, s->few.scene, s->few.plan, TIMED_STROKES,
+			inserts(s), false);
+	for (int i = 0; i < 2; i++)
+		variants[i]->walk = (struct walk){.trajectory = &s->trajectory,
+						  .plan = variants[i]->plan};
 }
 
-static void look_at_processes(struct bench *b)
+/* Run both over a long and varied trajectory, and compare the forces of each tick. */
+static void compare(struct scene *s)
 {
-	struct loop_process *started[BENCH_SCENES_MOST];
+	struct walk *few = &s->few.walk, *full = &s->full.walk;
+	int strokes = COMPARED_TICKS / (s->trajectory.ticks / s->trajectory.strokes) + 1;
+	struct trajectory trajectory;
+
+	if (strokes > COMPARED_STROKES_MAX)
+		strokes = COMPARED_STROKES_MAX;
+	make_trajectory(&trajectory, s->few.scene, few->plan, strokes, inserts(s), true);
+	change(few, &trajectory);
+	change(full, &trajectory);
+	for (long i = 0; i < trajectory.ticks; i++) {
+		struct incise_tick of_few, of_full;
+
+		incise_plan_tick(few->plan, feed(few), &of_few);
+		incise_plan_tick(full->plan, feed(full), &of_full);
+		s->ticks_compared++;
+		s->ticks_in_contact += !!(of_few.flags & INCISE_TICK_CONTACT);
+		if (memcmp(of_few.command_N, of_full.command_N,
+			   sizeof(of_few.command_N)) &&
+		    s->first_difference < 0)
+			s->first_difference = i;
+	}
+	change(few, &s->trajectory);
+	change(full, &s->trajectory);
+	free(trajectory.poses);
+}
+
+/* The loop has no way to keep stages that its scene does not need. */
+static void watch_processes(struct scenes *s)
+{
+	struct loop_process *started[SCENES_MAX];
 	int n = 0;
 
-	for (int i = 0; i < b->n; i++)
-		if (b->row[i].own_process) {
-			loop_process_begin(&b->row[i].process, b->row[i].path);
-			started[n++] = &b->row[i].process;
+	for (int i = 0; i < s->n; i++)
+		if (s->scene[i].measured && !s->scene[i].kept) {
+			started[n] = &s->scene[i].process;
+			loop_process_start(started[n++], s->scene[i].path);
 		}
-	loop_process_watch(started, n);
-	for (int i = 0; i < b->n; i++)
-		if (*b->row[i].process.failed)
-			snprintf(b->row[i].failed, sizeof(b->row[i].failed), "%s",
-				 b->row[i].process.failed);
+	loop_processes_watch(started, n);
+	for (int i = 0; i < s->n; i++)
+		if (*s->scene[i].process.failed)
+			snprintf(s->scene[i].failed, sizeof(s->scene[i].failed), "%s",
+				 s->scene[i].process.failed);
 }
 
-static void measure(struct bench *b, bool quick)
-{
-	struct scene_saving *savings[BENCH_SCENES_MOST];
+/* --- times --- */
 
-	for (int i = 0; i < b->n; i++) {
-		open_row(&b->row[i]);
-		savings[i] = &b->row[i].saving;
+#define TURNS 101
+#define QUICK_TURNS 9
+#define RUNS 10 /* of which single ticks and their stages are timed */
+
+/* Time ticks and then stages one by one; the time of reading the clock is subtracted. */
+static void time_single(struct variant *v, int runs)
+{
+	const size_t n = (size_t)runs * v->walk.trajectory->ticks;
+	double *times = bench_alloc(n * (INCISE_PLAN_STAGES_MAX + 1), sizeof(*times));
+	double own = stopwatch_own_ns();
+	struct incise_tick tick;
+
+	for (size_t i = 0; i < n; i++) {
+		int64_t t_ns = feed(&v->walk);
+		double begin = stopwatch_ns();
+
+		incise_plan_tick(v->plan, t_ns, &tick);
+		times[i] = stopwatch_ns() - begin;
 	}
-	look_at_processes(b);
-	for (int i = 0; i < b->n && !cli_stop; i++) {
-		cli_progress("%s: forces", b->row[i].name);
-		scene_saving_compare(savings[i]);
+	for (size_t i = 0; i < n; i++) {
+		int64_t stage_ns[INCISE_PLAN_STAGES_MAX];
+
+		incise_plan_tick_timed(v->plan, feed(&v->walk), &tick, stage_ns);
+		for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)
+			times[(k + 1) * n + i] = (double)stage_ns[k];
 	}
-	b->counted_by = scene_savings_count(savings, b->n, quick, &b->not_counted);
-	scene_savings_time(savings, b->n, quick);
+	stopwatch_sort(times, (int)n);
+	v->p99_ns = fmax(stopwatch_quantile(times, (int)n, 0.99) - own, 0);
+	for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++) {
+		stopwatch_sort(times + (k + 1) * n, (int)n);
+		v->stage_ns[k] =
+			fmax(stopwatch_middle(times + (k + 1) * n, (int)n) - own, 0);
+	}
+	free(times);
 }
 
-/* ---- report ---- */
-
-static bool measured(const struct scene_row *row)
+/* All of them in turns. */
+static void time_all(struct scenes *s, bool quick)
 {
-	return !*row->saving.failed;
+	struct harness_variant variants[2 * SCENES_MAX];
+	struct harness_time times[2 * SCENES_MAX];
+
+	for (int i = 0; i < s->n; i++) {
+		struct scene *scene = &s->scene[i];
+
+		variants[2 * i] = variants[2 * i + 1] = (struct harness_variant){
+			.run = run_trajectory,
+			.context = &scene->few.walk,
+			.units = scene->measured ? scene->trajectory.ticks : 0};
+		variants[2 * i + 1].context = &scene->full.walk;
+	}
+	harness_times(variants, 2 * s->n, quick ? QUICK_TURNS : TURNS, times);
+	for (int i = 0; i < s->n; i++) {
+		struct scene *scene = &s->scene[i];
+
+		scene->few.time = times[2 * i];
+		scene->full.time = times[2 * i + 1];
+		scene->times_cheaper =
+			scene->full.time.ns.median / scene->few.time.ns.median;
+		if (!scene->measured)
+			continue;
+		cli_progress("single ticks of scene %d of %d", i + 1, s->n);
+		time_single(&scene->few, quick ? 1 : RUNS);
+		time_single(&scene->full, quick ? 1 : RUNS);
+	}
+	cli_progress_end();
 }
 
-static double times_cheaper(const struct scene_row *row)
+/* --- instructions --- */
+
+static bool count(struct variant *v)
 {
-	return row->saving.full.time.ns.median / row->saving.few.time.ns.median;
+	const struct trajectory *trajectory = v->walk.trajectory;
+	struct instruction_counter counter;
+	struct incise_tick tick;
+
+	if (!instructions_open(&counter))
+		return false;
+	for (int i = 0; i < trajectory->ticks; i++) {
+		int64_t t_ns = feed(&v->walk);
+
+		instructions_begin(&counter);
+		incise_plan_tick(v->plan, t_ns, &tick);
+		instructions_end(&counter);
+	}
+	v->instructions = instructions_close(&counter) / trajectory->ticks;
+	return true;
 }
 
-/* Texts with ", " between them, to be freed; NULL of no list. */
-static char *joined(const json_t *list)
+/* Both at the same time. */
+static void count_by_callgrind(struct scene *s)
 {
-	size_t size = 1;
-	char *text;
+	struct variant *variants[] = {&s->few, &s->full};
+	struct callgrind callgrind[2];
+
+	for (int i = 0; i < 2; i++) {
+		char program[4096];
+		char *argv[] = {program,
+				"scenes",
+				(char *)s->path,
+				"--profile",
+				i || s->kept ? "full" : "needed",
+				NULL};
+
+		snprintf(program, sizeof(program), "%s/incise-bench", cli_folder());
+		callgrind_start(&callgrind[i], "incise_plan_tick", argv);
+	}
+	for (int i = 0; i < 2; i++)
+		variants[i]->instructions =
+			callgrind_end(&callgrind[i]) / s->trajectory.ticks;
+}
+
+/* @return "counter" or "callgrind", or NULL with the reason @why there are none */
+static const char *count_all(struct scenes *s, bool quick, const char **why)
+{
+	bool by_counter = false;
+
+	for (int i = 0; i < s->n && !cli_stop; i++) {
+		struct scene *scene = &s->scene[i];
+
+		if (!scene->measured)
+			continue;
+		cli_progress("instructions of scene %d of %d", i + 1, s->n);
+		by_counter = count(&scene->few) && count(&scene->full);
+		if (by_counter)
+			continue;
+		if (quick || !child_possible("valgrind")) {
+			*why = quick ? "the kernel gives no counter of them "
+				       "(perf_event_open(2)), and callgrind takes too long "
+				       "for --quick"
+				     : "the kernel gives no counter of them "
+				       "(perf_event_open(2)), and valgrind is not installed";
+			return NULL;
+		}
+		count_by_callgrind(scene);
+		if (isnan(scene->few.instructions))
+			*why = "callgrind does not run this program";
+	}
+	return by_counter ? "counter" : "callgrind";
+}
+
+/* Run the ticks that are counted, and nothing else, for another program that counts. */
+static void profile(const char *name, bool full)
+{
+	struct scene_argument argument = {0};
+	struct scene scene = {.name = name};
+
+	if (!scene_argument_find(&argument, name))
+		cli_fail("there is no file %s, and no scene of that name", name);
+	/* Both plans are made, as the trajectory of the one depends on the other's needs. */
+	scene.path = argument.path;
+	open_scene(&scene);
+	if (!scene.measured)
+		cli_fail("%s", scene.failed);
+	callgrind_here();
+	run_trajectory(full ? &scene.full.walk : &scene.few.walk);
+}
+
+/* --- report --- */
+
+static bool is_measured(const void *scene)
+{
+	return ((const struct scene *)scene)->measured;
+}
+
+static bool is_drawn(const void *scene)
+{
+	const struct scene *s = scene;
+
+	return isfinite(s->few.time.ns.median) && isfinite(s->full.time.ns.median);
+}
+
+static const struct bench_table table = {
+	.key = "rows",
+	.row_bytes = sizeof(struct scene),
+	.columns =
+		{
+			COLUMN(scene, "name", name, "%-18s", "scene"),
+			COLUMN(scene, "stages", stages),
+			COLUMN(scene, "left_out", left_out),
+			COLUMN(scene, "libraries", libraries),
+			COLUMN(scene, "tick_ns", few.time.ns.median, "%7.1f", "ns"),
+			COLUMN(scene, "tick_ns_p99", few.p99_ns, "%7.0f", "99 %"),
+			COLUMN(scene, "full_ns", full.time.ns.median, "%7.1f", "full ns"),
+			COLUMN(scene, "times_cheaper", times_cheaper, "%7.2f", "times"),
+			COLUMN(scene, "instructions", few.instructions, "%7.0f",
+			       "instr."),
+			COLUMN(scene, "full_instructions", full.instructions, "%7.0f",
+			       "full"),
+			COLUMN(scene, "plan_memory_KiB", few.memory_KiB, "%9.1f",
+			       "plan KiB"),
+			COLUMN(scene, "process_memory_KiB", process.peak_KiB, "%9.0f",
+			       "proc. KiB", .optional = true),
+			COLUMN(scene, "libraries_mapped", libraries_mapped, "%6.0f",
+			       "libs", .optional = true),
+			COLUMN(scene, NULL, forces, " %s", " forces"),
+			COLUMN(scene, "libraries_not_mapped", not_mapped),
+			COLUMN(scene, "devices", devices),
+			COLUMN(scene, "files_open", files),
+			COLUMN(scene, "full_memory_KiB", full.memory_KiB),
+			COLUMN(scene, "process_own_KiB", process.own_KiB,
+			       .optional = true),
+			COLUMN(scene, "ticks_compared", ticks_compared),
+			COLUMN(scene, "ticks_in_contact", ticks_in_contact),
+			COLUMN(scene, "first_difference", difference),
+			COLUMN(scene, "identical", identical),
+			COLUMN(scene, "failed", failure),
+		},
+	.metrics =
+		{
+			METRIC(TIME, scene, few.time, "ns", "{name} tick", is_measured),
+			METRIC(TIME, scene, full.time, "ns", "{name} full tick",
+			       is_measured),
+			METRIC(EXACT, scene, few.rounded, "instructions",
+			       "{name} instructions", is_measured),
+			METRIC(EXACT, scene, full.rounded, "instructions",
+			       "{name} full instructions", is_measured),
+		},
+};
+
+struct left_out {
+	const char *scene, *stage, *why;
+	double ns; /* of the stage that does nothing, in the full pipeline; NaN: not there */
+};
+
+static const struct bench_table left_table = {
+	.key = "left_out",
+	.row_bytes = sizeof(struct left_out),
+	.columns =
+		{
+			COLUMN(left_out, "scene", scene),
+			COLUMN(left_out, "stage", stage),
+			COLUMN(left_out, "why", why),
+			COLUMN(left_out, "ns", ns),
+		},
+};
+
+static void append(char *text, size_t size, const char *name)
+{
+	size_t n = strlen(text);
+
+	snprintf(text + n, size - n, "%s%s", n ? ", " : "", name);
+}
+
+/* Names with ", " between them; NULL of no list. Takes the list. */
+static json_t *joined(json_t *list)
+{
+	char text[8000] = "";
 
 	if (!list)
 		return NULL;
 	for (size_t i = 0; i < json_array_size(list); i++)
-		size += strlen(json_string_value(json_array_get(list, i))) + 2;
-	text = calloc(size, 1);
-	if (!text)
-		cli_fail("no memory");
-	for (size_t i = 0; i < json_array_size(list); i++) {
-		strcat(text, i ? ", " : "");
-		strcat(text, json_string_value(json_array_get(list, i)));
-	}
-	return text;
-}
-
-/* The same as JSON; takes the list. */
-static json_t *joined_json(json_t *list)
-{
-	char *text = joined(list);
-	json_t *value = text ? json_string(text) : json_null();
-
-	free(text);
+		append(text, sizeof(text), json_string_value(json_array_get(list, i)));
 	json_decref(list);
-	return value;
+	return json_string(text);
 }
 
-static json_t *stages_of(const struct incise_plan *plan)
-{
-	json_t *list = plan ? json_array() : NULL;
-	const char *name;
-
-	for (int i = 0; plan && (name = incise_plan_stage(plan, i)); i++)
-		json_array_append_new(list, json_string(name));
-	return list;
-}
-
-static json_t *left_out_of(const struct incise_plan *plan)
-{
-	json_t *list = plan ? json_array() : NULL;
-	const char *name;
-
-	for (int i = 0; plan && (name = incise_plan_left_out(plan, i, NULL)); i++)
-		json_array_append_new(list, json_string(name));
-	return list;
-}
-
-/* What a stage takes that does nothing, in the full pipeline; NaN where it is not there. */
-static double neutral_ns(const struct scene_way *full, const char *stage)
+static double neutral_ns(const struct variant *full, const char *stage)
 {
 	const char *name;
 
@@ -208,261 +689,205 @@ static double neutral_ns(const struct scene_way *full, const char *stage)
 	return NAN;
 }
 
-static json_t *kib(const struct scene_way *way)
+/* Name the stages, and add to those that are left out. */
+static int name_stages(struct scene *s, struct left_out *left)
 {
-	return way->plan ? json_real((double)incise_plan_memory(way->plan) / 1024)
-			 : json_null();
-}
+	json_t *stages = json_array(), *left_out = json_array();
+	const struct incise_plan *plan = s->few.plan;
+	const char *name;
+	int n = 0;
 
-static json_t *row_json(const struct scene_row *row)
-{
-	const struct scene_way *few = &row->saving.few, *full = &row->saving.full;
-	const struct loop_process *process = &row->process;
-	bool seen = process->libraries;
-	json_t *object = json_object();
-
-	json_object_set_new(object, "name", json_text(row->name));
-	json_object_set_new(object, "stages", joined_json(stages_of(few->plan)));
-	json_object_set_new(object, "left_out", joined_json(left_out_of(few->plan)));
-	json_object_set_new(object, "libraries",
-			    joined_json(json_incref(process->libraries)));
-	json_object_set_new(
-		object, "libraries_mapped",
-		seen ? json_integer((json_int_t)json_array_size(process->libraries))
-		     : json_null());
-	json_object_set_new(object, "libraries_not_mapped",
-			    joined_json(seen ? unmapped_libraries(process->libraries)
-					     : NULL));
-	json_object_set_new(object, "devices",
-			    joined_json(json_incref(process->devices)));
-	json_object_set_new(object, "files_open",
-			    joined_json(json_incref(process->files)));
-	json_object_set_new(object, "plan_memory_KiB", kib(few));
-	json_object_set_new(object, "full_memory_KiB", kib(full));
-	json_object_set_new(object, "process_memory_KiB",
-			    seen ? json_integer(process->peak_KiB) : json_null());
-	json_object_set_new(object, "process_own_KiB",
-			    seen ? json_integer(process->own_KiB) : json_null());
-	json_object_set_new(object, "tick_ns", json_number(few->time.ns.median));
-	json_object_set_new(object, "tick_ns_p99",
-			    json_number(measured(row) ? few->p99_ns : NAN));
-	json_object_set_new(object, "instructions", json_number(few->instructions));
-	json_object_set_new(object, "full_ns", json_number(full->time.ns.median));
-	json_object_set_new(object, "full_instructions", json_number(full->instructions));
-	json_object_set_new(object, "times_cheaper", json_number(times_cheaper(row)));
-	json_object_set_new(object, "ticks_compared",
-			    json_integer(row->saving.ticks_compared));
-	json_object_set_new(object, "ticks_in_contact",
-			    json_integer(row->saving.ticks_in_contact));
-	json_object_set_new(object, "first_difference",
-			    row->saving.first_difference < 0
-				    ? json_null()
-				    : json_integer(row->saving.first_difference));
-	json_object_set_new(object, "identical",
-			    measured(row) ? json_boolean(row->saving.first_difference < 0)
-					  : json_null());
-	json_object_set_new(object, "failed",
-			    *row->failed ? json_text(row->failed) : json_null());
-	return object;
-}
-
-static void add_left_out(json_t *list, const struct scene_row *row)
-{
-	const struct incise_plan *plan = row->saving.few.plan;
-	const char *name, *why;
-
-	for (int i = 0; (name = incise_plan_left_out(plan, i, &why)); i++)
-		json_array_append_new(
-			list,
-			json_pack("{so ss ss so}", "scene", json_text(row->name), "stage",
-				  name, "why", why, "ns",
-				  json_number(neutral_ns(&row->saving.full, name))));
-}
-
-static void add_figures(json_t *figures, const struct scene_row *row)
-{
-	const struct scene_way *few = &row->saving.few, *full = &row->saving.full;
-
-	metrics_time(figures, &few->time, "ns", "%s tick", row->name);
-	metrics_time(figures, &full->time, "ns", "%s full tick", row->name);
-	metrics_exact(figures, round(few->instructions), "instructions",
-		      "%s instructions", row->name);
-	metrics_exact(figures, round(full->instructions), "instructions",
-		      "%s full instructions", row->name);
-}
-
-static void print_json(const struct bench *b, bool quick)
-{
-	json_t *rows = json_array(), *left = json_array(), *figures = json_array();
-
-	for (int i = 0; i < b->n; i++) {
-		json_array_append_new(rows, row_json(&b->row[i]));
-		if (!measured(&b->row[i]))
-			continue;
-		add_left_out(left, &b->row[i]);
-		add_figures(figures, &b->row[i]);
+	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
+		json_array_append_new(stages, json_string(name));
+	for (; (name = incise_plan_left_out(plan, n, &left[n].why)); n++) {
+		json_array_append_new(left_out, json_string(name));
+		left[n].scene = s->name;
+		left[n].stage = name;
+		left[n].ns = neutral_ns(&s->full, name);
 	}
-	json_print(json_pack("{so sb ss? ss? so so so}", "machine",
-			     machine_json(&b->machine), "quick", quick, "instructions_by",
-			     b->counted_by, "instructions_failed", b->not_counted, "rows",
-			     rows, "left_out", left, "figures", figures));
+	s->stages = joined(stages);
+	s->left_out = joined(left_out);
+	return n;
 }
 
-static void print_number(int width, int digits, double value)
+static int complete(struct scene *s, struct left_out *left)
 {
-	if (isfinite(value))
-		printf(" %*.*f", width, digits, value);
-	else
-		printf(" %*s", width, "-");
-}
+	struct loop_process *process = &s->process;
+	bool same = s->first_difference < 0;
 
-static void print_row(const struct scene_row *row)
-{
-	const struct scene_way *few = &row->saving.few, *full = &row->saving.full;
-	bool seen = row->process.libraries;
-
-	printf("%-18s", row->name);
-	print_number(7, 1, few->time.ns.median);
-	print_number(7, 0, measured(row) ? few->p99_ns : NAN);
-	print_number(7, 1, full->time.ns.median);
-	print_number(7, 2, times_cheaper(row));
-	print_number(7, 0, few->instructions);
-	print_number(7, 0, full->instructions);
-	print_number(9, 1,
-		     few->plan ? (double)incise_plan_memory(few->plan) / 1024 : NAN);
-	print_number(9, 0, seen ? (double)row->process.peak_KiB : NAN);
-	print_number(6, 0, seen ? (double)json_array_size(row->process.libraries) : NAN);
-	printf("  %s\n", !measured(row)			    ? "-"
-			 : row->saving.first_difference < 0 ? "same"
-							    : "DIFFER");
-}
-
-static void print_list(const char *title, json_t *list)
-{
-	char *text = joined(list);
-
-	printf("  %-9s %s\n", title, text && *text ? text : "none");
-	free(text);
-	json_decref(list);
-}
-
-/* What it has, what it leaves out, and what that costs a plan that keeps it. */
-static void print_details(const struct scene_row *row)
-{
-	const struct incise_plan *plan = row->saving.few.plan;
-	const char *name, *why;
-
-	printf("\n%s\n", row->name);
-	print_list("stages", stages_of(plan));
-	for (int i = 0; (name = incise_plan_left_out(plan, i, &why)); i++) {
-		double ns = neutral_ns(&row->saving.full, name);
-
-		printf("  %-9s %-10s", i ? "" : "left out", name);
-		print_number(4, 0, ns);
-		printf("%s  %s\n", isfinite(ns) ? " ns" : "   ", why);
+	s->few.rounded = round(s->few.instructions);
+	s->full.rounded = round(s->full.instructions);
+	if (process->libraries) {
+		s->libraries_mapped = (int)json_array_size(process->libraries);
+		s->not_mapped = joined(unmapped_libraries(process->libraries));
+	} else {
+		process->peak_KiB = process->own_KiB = 0;
 	}
-	if (!row->process.libraries)
+	s->libraries = joined(process->libraries);
+	s->devices = joined(process->devices);
+	s->files = joined(process->files);
+	s->failure = *s->failed ? json_text(s->failed) : NULL;
+	s->forces = "-";
+	if (!s->measured)
+		return 0;
+	s->forces = same ? "same" : "DIFFER";
+	s->identical = json_boolean(same);
+	if (!same)
+		s->difference = json_integer(s->first_difference);
+	return name_stages(s, left);
+}
+
+static void print_list(const struct bench_run *run, const char *title, json_t *text)
+{
+	const char *names = json_string_value(text);
+
+	bench_text(run, "  %-9s %s\n", title, names && *names ? names : "none");
+}
+
+/* Its stages, those that it leaves out, and what these cost a plan that keeps them. */
+static void print_details(const struct bench_run *run, const struct scene *s,
+			  const struct left_out *left, int n)
+{
+	bench_text(run, "\n%s\n", s->name);
+	print_list(run, "stages", s->stages);
+	for (int i = 0; i < n; i++) {
+		bench_text(run, "  %-9s %-10s", i ? "" : "left out", left[i].stage);
+		if (isfinite(left[i].ns))
+			bench_text(run, " %4.0f ns  %s\n", left[i].ns, left[i].why);
+		else
+			bench_text(run, " %4s     %s\n", "-", left[i].why);
+	}
+	if (!s->libraries)
 		return;
-	print_list("devices", json_incref(row->process.devices));
-	print_list("opened", json_incref(row->process.files));
-	print_list("libraries", json_incref(row->process.libraries));
-	print_list("not these", unmapped_libraries(row->process.libraries));
+	print_list(run, "devices", s->devices);
+	print_list(run, "opened", s->files);
+	print_list(run, "libraries", s->libraries);
+	print_list(run, "not these", s->not_mapped);
 }
 
-/* The 95 % intervals of the medians meet. */
-static bool saves_nothing(const struct scene_row *row)
-{
-	return measured(row) &&
-	       row->saving.full.time.ns.low <= row->saving.few.time.ns.high;
-}
-
-static void print_text(const struct bench *b)
+static void print_notes(const struct bench_run *run, const struct scenes *all)
 {
 	long compared = 0;
 
-	printf("a tick of each scene, and of the full pipeline: the same with every stage "
-	       "kept\n%s; %s; %s\n\n"
-	       "%-18s %7s %7s %7s %7s %7s %7s %9s %9s %6s  %s\n",
-	       b->machine.cpu, b->machine.kernel, b->machine.compiler, "scene", "ns",
-	       "99 %", "full ns", "times", "instr.", "full", "plan KiB", "proc. KiB",
-	       "libs", "forces");
-	for (int i = 0; i < b->n; i++) {
-		print_row(&b->row[i]);
-		compared += b->row[i].saving.ticks_compared;
+	for (int i = 0; i < all->n; i++)
+		compared += all->scene[i].ticks_compared;
+	bench_text(run, "\nforces of %ld ticks compared bit by bit; instructions %s%s\n",
+		   compared, all->counted_by ? "by " : "not counted: ",
+		   all->counted_by ? all->counted_by : all->not_counted);
+	for (int i = 0; i < all->n; i++) {
+		const struct scene *s = &all->scene[i];
+
+		if (*s->failed)
+			bench_text(run, "%s: %s\n", s->name, s->failed);
+		else if (s->measured && s->full.time.ns.low <= s->few.time.ns.high)
+			/* The 95 % intervals of the medians meet. */
+			bench_text(
+				run,
+				"%s: the full pipeline costs no more that could be told\n",
+				s->name);
 	}
-	printf("\nforces of %ld ticks compared bit by bit; instructions %s%s\n", compared,
-	       b->counted_by ? "by " : "not counted: ",
-	       b->counted_by ? b->counted_by : b->not_counted);
-	for (int i = 0; i < b->n; i++)
-		if (*b->row[i].failed)
-			printf("%s: %s\n", b->row[i].name, b->row[i].failed);
-		else if (saves_nothing(&b->row[i]))
-			printf("%s: the full pipeline costs no more that could be told\n",
-			       b->row[i].name);
-	for (int i = 0; i < b->n; i++)
-		if (measured(&b->row[i]))
-			print_details(&b->row[i]);
 }
 
-/* After the report: what of it is a fault. */
-static void judge(const struct bench *b, bool given)
+static json_t *text_json(const char *text)
 {
-	for (int i = 0; i < b->n; i++)
-		if (measured(&b->row[i]) && b->row[i].saving.first_difference >= 0)
-			cli_fail(
-				"%s: leaving out changes the force, first in tick %ld: a "
-				"fault of incise, please report it with the scene",
-				b->row[i].name, b->row[i].saving.first_difference);
-	for (int i = 0; i < b->n && given; i++)
-		if (*b->row[i].failed)
-			cli_fail("%s: not measured: %s", b->row[i].name,
-				 b->row[i].failed);
+	return text ? json_string(text) : json_null();
 }
 
-static void end_row(struct scene_row *row)
+static void report(struct bench_run *run, struct scenes *all)
 {
-	scene_saving_end(&row->saving);
-	loop_process_free(&row->process);
-	if (row->made.name)
-		made_scene_end(&row->made);
-	free(row->name);
-}
+	struct left_out *left =
+		bench_alloc((size_t)all->n * INCISE_PLAN_STAGES_MAX + 1, sizeof(*left));
+	int n = 0, of[SCENES_MAX];
 
-void bench_scenes_profile(const char *scene, bool full)
-{
-	struct scene_argument argument = {0};
-
-	if (!scene_argument_find(&argument, scene))
-		cli_fail("there is no file %s, and no scene of that name", scene);
-	scene_profile(argument.path, full);
-}
-
-void bench_scenes(char *const *scenes, int n, bool json, bool quick, const char *plot)
-{
-	struct bench *b = calloc(1, sizeof(*b));
-	const char *folder, *name;
-
-	if (!b)
-		cli_fail("no memory");
-	if (plot)
-		plot_place("plot", plot, &folder, &name);
-	machine_init(&b->machine);
-	for (int i = 0; i < n; i++)
-		add_given(b, scenes[i]);
-	if (!n) {
-		add_shipped(b);
-		add_made(b);
+	for (int i = 0; i < all->n; i++) {
+		of[i] = complete(&all->scene[i], left + n);
+		n += of[i];
 	}
-	measure(b, quick);
-	if (json)
-		print_json(b, quick);
-	else
-		print_text(b);
-	cli_finish();
-	if (plot)
-		scenes_picture(b->row, b->n, &b->machine, folder, name);
-	judge(b, n > 0);
-	for (int i = 0; i < b->n; i++)
-		end_row(&b->row[i]);
-	free(b);
+	bench_text(run,
+		   "a tick of each scene, and of the full pipeline: the same with every "
+		   "stage kept\n%s; %s; %s\n\n",
+		   bench_machine(run, "cpu"), bench_machine(run, "kernel"),
+		   bench_machine(run, "compiler"));
+	bench_value(run, "instructions_by", text_json(all->counted_by));
+	bench_value(run, "instructions_failed", text_json(all->not_counted));
+	bench_rows(run, &table, all->scene, all->n);
+	bench_lines(run, &table, all->scene, all->n);
+	bench_rows(run, &left_table, left, n);
+	print_notes(run, all);
+	for (int i = 0; i < all->n; left += of[i++])
+		if (all->scene[i].measured)
+			print_details(run, &all->scene[i], left, of[i]);
 }
+
+static void judge(struct bench_run *run, const struct scenes *all)
+{
+	for (int i = 0; i < all->n; i++)
+		if (all->scene[i].first_difference >= 0)
+			bench_fail(
+				run,
+				"%s: leaving out changes the force, first in tick %ld: "
+				"a fault of incise, please report it with the scene",
+				all->scene[i].name, all->scene[i].first_difference);
+	for (int i = 0; i < all->n && run->n_operands; i++)
+		if (*all->scene[i].failed)
+			bench_fail(run, "%s: not measured: %s", all->scene[i].name,
+				   all->scene[i].failed);
+}
+
+static void run_scenes(struct bench_run *run)
+{
+	struct scenes *all = bench_alloc(1, sizeof(*all));
+
+	for (int i = 0; i < run->n_operands; i++)
+		add_given(all, run->operands[i]);
+	if (!run->n_operands) {
+		add_shipped(all);
+		add_made(all);
+	}
+	for (int i = 0; i < all->n; i++)
+		open_scene(&all->scene[i]);
+	watch_processes(all);
+	for (int i = 0; i < all->n && !cli_stop; i++) {
+		cli_progress("%s: forces", all->scene[i].name);
+		if (all->scene[i].measured)
+			compare(&all->scene[i]);
+	}
+	all->counted_by = count_all(all, run->quick, &all->not_counted);
+	if (all->not_counted)
+		all->counted_by = NULL;
+	time_all(all, run->quick);
+	report(run, all);
+	judge(run, all);
+}
+
+static void run_or_profile(struct bench_run *run)
+{
+	if (!run->profile) {
+		run_scenes(run);
+		return;
+	}
+	if (run->n_operands != 1)
+		cli_usage("--profile is of one scene, got %d", run->n_operands);
+	profile(run->operands[0], !strcmp(run->profile, "full"));
+	exit(0);
+}
+
+static const struct bench_plot plots[] = {
+	{.script = text_scenes_gp,
+	 .width = 1150,
+	 .height = 46,
+	 .down = "name",
+	 .margin = 160,
+	 .data = {&table, "", is_drawn}},
+	{0},
+};
+
+const struct bench bench_scenes = {
+	.name = "scenes",
+	.operands = "[SCENE...]",
+	.summary = "what each scene leaves out, and what that saves",
+	.n_operands = SCENES_MAX,
+	.takes_profile = true,
+	.run = run_or_profile,
+	.plots = plots,
+};
