@@ -4,6 +4,7 @@
  */
 #include <math.h>
 #include <string.h>
+#include "../../tools/bench/all_forces.h"
 #include "../../tools/cli/cli.h"
 #include "../../tools/cli/file.h"
 #include "ground.h"
@@ -110,8 +111,10 @@ struct incise_scene *ground_scene(const struct ground *ground, bool fixed, bool 
 			   surface = memory_file_begin("ground"),
 			   force = memory_file_begin("model");
 	struct incise_error err = {0};
+	char tissue[1000], more[60];
 	struct incise_scene *made;
 
+	snprintf(more, sizeof(more), "leave_mm = %.17g;", GROUND_LEAVE_MM);
 	if (ground->write)
 		ground->write(surface.file);
 	ground_write_model(force.file);
@@ -122,16 +125,15 @@ struct incise_scene *ground_scene(const struct ground *ground, bool fixed, bool 
 		fprintf(scene.file, " };\nmodel = \"%s\";\n", force.path);
 	else
 		fputs(" };\n", scene.file);
+	all_forces(tissue, sizeof(tissue), 2, model ? "reaction" : NULL, more);
+	fputs(tissue, scene.file);
 	fprintf(scene.file,
-		"tissue = { %s plane_N_mm = 0.3; damping_N_s_mm = 0.001;\n"
-		"  insertion_N_mm = 0.5; spread_N_mm = 0.4; leave_mm = %.17g; };\n"
 		"effects = { average_ticks = 8; guard = true; };\n"
 		"tool = { handle_mm = %.1f; };\n"
 		"device = { damping_N_s_mm = 0.03; delay_ticks = 12; };\n"
 		"limits = { force_N = %.1f; slew_N_s = %.1f; pose_age_ms = 50.0;\n"
 		"  ramp_ms = 50.0; fade_ms = 20.0; };\n",
-		model ? "" : "reaction_N_mm = 0.25;", GROUND_LEAVE_MM, GROUND_HANDLE_MM,
-		GROUND_FORCE_N, GROUND_SLEW_N * 1000);
+		GROUND_HANDLE_MM, GROUND_FORCE_N, GROUND_SLEW_N * 1000);
 	memory_file_written(&surface);
 	memory_file_written(&force);
 	memory_file_written(&scene);
