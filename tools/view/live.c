@@ -27,6 +27,7 @@ struct view_live {
 	pthread_t thread;
 	struct incise_plan *plan;
 	struct incise_clock *clock;
+	struct incise_realtime *realtime; /* or NULL */
 	struct incise_loop_options options;
 	struct incise_loop_stats stats;
 	struct incise_error err;
@@ -67,9 +68,12 @@ static int take_tool(void *context, const struct incise_tick *tick)
 static void *run(void *argument)
 {
 	struct view_live *live = argument;
+	int rc = live->realtime ? incise_realtime_enter(live->realtime, &live->err) : 0;
 
-	atomic_store(&live->rc, incise_loop_run(live->plan, live->clock, &live->options,
-						&live->stats, &live->err));
+	if (!rc)
+		rc = incise_loop_run(live->plan, live->clock, &live->options,
+				     &live->stats, &live->err);
+	atomic_store(&live->rc, rc);
 	atomic_store(&live->ended, true);
 	return NULL;
 }
@@ -88,7 +92,8 @@ static int start(struct view_live *live, struct incise_error *err)
 }
 
 struct view_live *view_live_begin(struct incise_plan *plan, struct incise_rig *rig,
-				  double rate_hz, struct incise_error *err)
+				  double rate_hz, struct incise_realtime *realtime,
+				  struct incise_error *err)
 {
 	struct incise_state_setup setup = {.rate_hz = rate_hz,
 					   .rig = incise_rig_spec(rig)};
@@ -100,6 +105,7 @@ struct view_live *view_live_begin(struct incise_plan *plan, struct incise_rig *r
 	live->own = true;
 	live->plan = plan;
 	live->clock = incise_rig_clock(rig);
+	live->realtime = realtime;
 	live->options = (struct incise_loop_options){.rate_hz = rate_hz,
 						     .stop = &live->stop,
 						     .ticked = take_tool,

@@ -8,6 +8,7 @@
 #define INCISE_VIEW_LIVE_H
 
 #include <incise/loop.h>
+#include <incise/realtime.h>
 #include <incise/rig.h>
 #include <incise/state.h>
 #include <incise/view.h>
@@ -18,11 +19,12 @@ struct view_live;
 struct view_live *view_live_open(const char *page, struct incise_error *err);
 
 /*
- * Begin a loop in a thread of this program. All lives until view_live_close(), which ends it.
- * NULL with errno.
+ * Start a loop in a thread of this program, in real time where @realtime is not NULL. All lives
+ * until view_live_close(), which ends it. NULL with errno.
  */
 struct view_live *view_live_begin(struct incise_plan *plan, struct incise_rig *rig,
-				  double rate_hz, struct incise_error *err);
+				  double rate_hz, struct incise_realtime *realtime,
+				  struct incise_error *err);
 
 /* What the hand holds from now on; of a loop of this program. */
 void view_live_tool(struct view_live *live, enum incise_tool tool);

@@ -81,7 +81,7 @@ void view_rig(struct view_job *job)
 				incise_scene_handle_mm(job->scene), &top);
 		view_hand_move(&hand, 0.001);
 	}
-	live = view_live_begin(job->plan, job->own_rig, job->rate_hz, &err);
+	live = view_live_begin(job->plan, job->own_rig, job->rate_hz, NULL, &err);
 	if (!live)
 		cli_fail_with(&err);
 	run_live(job, live, held ? &hand : NULL);
