@@ -213,11 +213,6 @@ int main(int argc, char **argv)
 		compare_against(run.against, run.json);
 		run.json = true;
 	}
-	if (!bench->all) {
-		bench_measure(&run);
-		return 0;
-	}
-	bench->all(&run);
-	cli_finish();
+	bench_measure(&run);
 	return 0;
 }

@@ -124,7 +124,7 @@ struct bench_plot {
 extern const char text_extremes_gp[], text_loop_rates_gp[], text_loop_wakeups_gp[],
 	text_pose_gp[], text_precision_gp[], text_scenes_gp[], text_stability_guard_gp[],
 	text_stability_integrators_gp[], text_stability_map_gp[], text_timeline_gp[],
-	text_training_gp[], text_vision_gp[];
+	text_training_gp[], text_view_gp[], text_vision_gp[];
 
 struct bench_run;
 
@@ -134,13 +134,12 @@ struct bench {
 	int n_operands;		     /* at most */
 	bool takes_duration, takes_load, takes_profile, takes_seed;
 	void (*run)(struct bench_run *run);
-	const struct bench_plot *plots;	    /* ends with {0}; NULL: --plot is bad usage */
-	void (*all)(struct bench_run *run); /* of a benchmark that is not declared yet */
+	const struct bench_plot *plots; /* ends with {0}; NULL: --plot is bad usage */
 };
 
 extern const struct bench bench_capture, bench_extremes, bench_loop, bench_pose,
-	bench_scenes, bench_precision, bench_stability, bench_timeline, bench_training,
-	bench_vision;
+	bench_precision, bench_scenes, bench_stability, bench_timeline, bench_training,
+	bench_view, bench_vision;
 
 /* --- a run --- */
 
