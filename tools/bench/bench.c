@@ -116,22 +116,22 @@ static const char *failed_of(const struct bench_table *table, const void *row)
 	return text_of(column_of(table, "failed", strlen("failed")), row);
 }
 
-/* "KEY=TEXT,KEY=TEXT|TEXT" */
+/* "KEY=TEXT,KEY!=TEXT|TEXT" */
 static bool matches(const struct bench_table *table, const char *where, const void *row)
 {
 	for (const char *c = where; c && *c; c += *c == ',') {
-		size_t key = strcspn(c, "=");
+		size_t key = strcspn(c, "!=");
+		bool wanted = c[key] == '=', any = false;
 		char word[TEXT_BYTES] = "";
-		bool any = false;
 
 		word_of(column_of(table, c, key), row, "%g", word, sizeof(word));
-		for (c += key; *c && *c != ',';) {
+		for (c += key + !wanted; *c && *c != ',';) {
 			size_t n = strcspn(++c, "|,");
 
 			any |= strlen(word) == n && !strncmp(word, c, n);
 			c += n;
 		}
-		if (!any)
+		if (any != wanted)
 			return false;
 	}
 	return true;

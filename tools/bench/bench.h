@@ -67,7 +67,7 @@ struct bench_metric {
 	enum metric_kind kind;
 	size_t offset; /* struct harness_time, struct harness_spread or double */
 	const char *unit, *name;
-	const char *where; /* rows with "KEY=TEXT,KEY=TEXT|TEXT"; NULL: all */
+	const char *where; /* rows with "KEY=TEXT,KEY!=TEXT|TEXT"; NULL: all */
 	bool more_is_better;
 };
 

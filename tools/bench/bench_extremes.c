@@ -373,11 +373,6 @@ static int press_all(struct wall *walls, bool quick)
 	return n / PATHS / 2;
 }
 
-static bool was_pressed(const void *wall)
-{
-	return !isnan(((const struct wall *)wall)->largest_mm);
-}
-
 static const struct bench_table stiff = {
 	.key = "stiff",
 	.row_bytes = sizeof(struct wall),
@@ -397,7 +392,7 @@ static const struct bench_table stiff = {
 		},
 	.metrics = {METRIC(EXACT, wall, largest_mm, "mm",
 			   "{path}, {K_N_m:%.4g} N/m, guard {guard}, largest",
-			   was_pressed)},
+			   "largest_mm!=nan")},
 };
 
 /* Each stiffness is a line, without and with the guard. */
@@ -415,7 +410,7 @@ static void print_path(const struct bench_run *run, const char *title,
 		bench_text(run, "\n%10.4g %-9s", walls[k].K_N_mm * 1e3,
 			   walls[k].accepted ? "accepted" : "refused");
 		for (const struct wall *w = &walls[k]; w < walls + 2 * n; w += n)
-			if (was_pressed(w))
+			if (!isnan(w->largest_mm))
 				bench_text(run, " %-9s %8.3g %9.3g %9.2g",
 					   w->bounded ? "bounded" : "GROWS", w->largest_N,
 					   w->largest_mm, w->late_mm);
@@ -439,7 +434,7 @@ static void report_walls(struct bench_run *run, struct wall *walls, int each)
 
 	for (int i = 0; i < 4 * each; i++) {
 		missed += walls[i].missed;
-		if (was_pressed(&walls[i]))
+		if (!isnan(walls[i].largest_mm))
 			walls[i].bounded_json = json_boolean(walls[i].bounded);
 	}
 	bench_rows(run, &stiff, walls, 4 * each);
