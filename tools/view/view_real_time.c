@@ -5,7 +5,7 @@
  */
 #include <incise/sim.h>
 #include "../cli/cli.h"
-#include "../status/state_pages.h"
+#include "../status/pages.h"
 #include "view_job.h"
 
 static void run_live(struct view_job *job, struct view_live *live, struct view_hand *hand)

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Which loops have told their state here: pages /run/incise/NAME.state and
+ * The state pages of this machine's loops: /run/incise/NAME.state and
  * $XDG_RUNTIME_DIR/incise/NAME.state.
  */
-#ifndef INCISE_STATE_PAGES_H
-#define INCISE_STATE_PAGES_H
+#ifndef INCISE_STATUS_PAGES_H
+#define INCISE_STATUS_PAGES_H
 
 #include <incise/state.h>
 
@@ -20,16 +20,16 @@ struct state_pages {
 };
 
 /*
- * The one asked for, a name, a scene or a page, or where it is NULL all; fails where there is none.
- * Of two of a name, the one whose loop lives. Pages that cannot be read are warned of.
+ * Open the page of a name, a scene or a file, or with NULL all; fails if there is none. Of
+ * two pages of one name it takes that of the live loop. Warns of unreadable pages.
  */
 void state_pages_open(struct state_pages *pages, const char *asked);
 
-/* A look. Returns 0, or -errno where the page makes no sense. Waits some ms at most. */
+/* Read the page. 0 or -errno for a damaged page. Waits up to 50 ms for the writer. */
 int state_pages_try(const struct state_page_file *page, struct incise_state_now *now,
 		    struct incise_error *err);
 
-/* The same, or fails. */
+/* The same; failure ends the program. */
 void state_pages_look(const struct state_page_file *page, struct incise_state_now *now);
 
 void state_pages_close(struct state_pages *pages);

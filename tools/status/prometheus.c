@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The state of loops for Prometheus; see state_prometheus.h. The format:
+ * The state of loops for Prometheus; see report.h. The format:
  * prometheus.io/docs/instrumenting/exposition_formats, text-based, version 0.0.4.
  */
 #include <inttypes.h>
@@ -8,14 +8,13 @@
 #include <stddef.h>
 #include <string.h>
 #include "../cli/loop_report.h"
-#include "state_prometheus.h"
-#include "state_report.h"
+#include "report.h"
 
 /* Bounds of histograms: 2^FIRST_BIT - 1 ns, 1 us, and on by doubling to 17 s. */
 #define FIRST_BIT 10
 #define LAST_BIT 34
 
-typedef const struct state_metrics loop;
+typedef const struct state_look loop;
 
 /* The value of a label: \, " and the end of a line are escaped. */
 static void put_label(FILE *out, const char *label, const char *value)
@@ -52,7 +51,7 @@ static void put_count(FILE *out, loop *l, const char *metric, const char *label,
 static void put_number(FILE *out, loop *l, const char *metric, double number)
 {
 	begin(out, l, metric, NULL, NULL);
-	/* As the format spells what is no number. */
+	/* The spelling of the format. */
 	if (isnan(number))
 		fputs("NaN\n", out);
 	else if (isinf(number))
@@ -94,7 +93,7 @@ static void put_info(FILE *out, loop *l, const char *metric)
 static void put_start(FILE *out, loop *l, const char *metric)
 {
 	begin(out, l, metric, NULL, NULL);
-	/* To the ms: a double has no more digits of it than that to spare. */
+	/* To the ms, the resolution of a double here. */
 	fprintf(out, "%.3f\n", state_unix_s(l->now, l->now->start_ns));
 }
 
@@ -232,7 +231,7 @@ static void put_metric(FILE *out, loop *l, size_t i)
 	}
 }
 
-void state_prometheus(FILE *out, const struct state_metrics *loops, int n)
+void state_prometheus(FILE *out, const struct state_look *loops, int n)
 {
 	for (size_t i = 0; i < sizeof(metrics) / sizeof(*metrics); i++) {
 		fprintf(out, "# HELP %s %s\n", metrics[i].name, metrics[i].help);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Finding the state of loops; see state_pages.h.
+ * The state pages of loops; see pages.h.
  */
 #include <dirent.h>
 #include <errno.h>
@@ -9,37 +9,23 @@
 #include <string.h>
 #include <time.h>
 #include "../cli/cli.h"
-#include "state_pages.h"
+#include "../cli/scene_argument.h"
+#include "pages.h"
 
 #define SUFFIX ".state"
 #define FOLDERS 2
-#define LOOKS \
-	50 /* a millisecond between them: a normal thread was put off in its writing */
+#define LOOKS 50 /* 1 ms apart: the writer may be preempted */
 
-static char *text(const char *fmt, ...) INCISE_PRINTF(1, 2);
-
-static char *text(const char *fmt, ...)
-{
-	char *made;
-	va_list args;
-
-	va_start(args, fmt);
-	if (vasprintf(&made, fmt, args) < 0)
-		cli_fail("no memory");
-	va_end(args);
-	return made;
-}
-
-/* Those that the loop puts pages in; NULL where there is no such one. */
+/* The folders of pages; NULL: not set. */
 static void folders(char *list[FOLDERS])
 {
 	const char *own = getenv("XDG_RUNTIME_DIR");
 
-	list[0] = text("/run/incise");
-	list[1] = own && *own ? text("%s/incise", own) : NULL;
+	list[0] = cli_text("/run/incise");
+	list[1] = own && *own ? cli_text("%s/incise", own) : NULL;
 }
 
-/* The length of a page's name in that of its file; 0: it is none. */
+/* Length of NAME in "NAME.state"; 0: another file. */
 static size_t name_length(const char *file)
 {
 	size_t n = strlen(file), end = strlen(SUFFIX);
@@ -51,20 +37,17 @@ static void add(struct state_pages *pages, const char *path, struct incise_state
 {
 	const char *slash = strrchr(path, '/'), *file = slash ? slash + 1 : path;
 	size_t n = name_length(file);
-	struct state_page_file *more;
+	struct state_page_file *page;
 
-	more = realloc(pages->page, (size_t)(pages->n + 1) * sizeof(*more));
-	if (!more)
-		cli_fail("no memory");
-	pages->page = more;
-	more += pages->n++;
-	*more = (struct state_page_file){
-		.name = text("%.*s", n ? (int)n : (int)strlen(file), file),
-		.path = text("%s", path),
+	pages->page = cli_resize(pages->page, (size_t)pages->n + 1, sizeof(*page));
+	page = &pages->page[pages->n++];
+	*page = (struct state_page_file){
+		.name = cli_text("%.*s", n ? (int)n : (int)strlen(file), file),
+		.path = cli_text("%s", path),
 		.state = state,
 	};
-	/* Others may name files there: a terminal is not to obey them. */
-	for (char *c = more->name; *c; c++)
+	/* Others may name files there: no control characters. */
+	for (char *c = page->name; *c; c++)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '?';
 }
@@ -76,7 +59,7 @@ static int by_name(const void *a, const void *b)
 	return strcmp(x->name, y->name);
 }
 
-/* All of a folder; how many could not be read. */
+/* Add all pages of a folder. Returns how many are unreadable. */
 static int add_folder(struct state_pages *pages, const char *folder)
 {
 	DIR *dir = opendir(folder);
@@ -90,7 +73,7 @@ static int add_folder(struct state_pages *pages, const char *folder)
 
 		if (!name_length(entry->d_name))
 			continue;
-		path = text("%s/%s", folder, entry->d_name);
+		path = cli_text("%s/%s", folder, entry->d_name);
 		state = incise_state_open(path, &err);
 		if (state)
 			add(pages, path, state);
@@ -125,7 +108,7 @@ static void open_name(struct state_pages *pages, const char *name, char *list[FO
 	bool found = false;
 
 	for (int i = 0; i < FOLDERS; i++) {
-		char *path = list[i] ? text("%s/%s" SUFFIX, list[i], name) : NULL;
+		char *path = list[i] ? cli_text("%s/%s" SUFFIX, list[i], name) : NULL;
 		struct incise_state *state = path ? incise_state_open(path, &err) : NULL;
 
 		if (state && pages->n && incise_state_alive(state) != 1) {
@@ -148,26 +131,15 @@ static void open_name(struct state_pages *pages, const char *name, char *list[FO
 			name, name);
 }
 
-/* "scenes/neck.scene" is the loop neck; NULL: it is no scene. */
-static char *name_of_scene(const char *asked)
-{
-	const char *slash = strrchr(asked, '/'), *file = slash ? slash + 1 : asked;
-	size_t n = strlen(file), end = strlen(".scene");
-
-	return n > end && !strcmp(file + n - end, ".scene")
-		       ? text("%.*s", (int)(n - end), file)
-		       : NULL;
-}
-
 void state_pages_open(struct state_pages *pages, const char *asked)
 {
 	struct incise_error err = {0};
 	struct incise_state *state;
 	char *list[FOLDERS];
-	char *name = asked ? name_of_scene(asked) : NULL;
+	bool scene = asked && cli_ends_with(asked, ".scene");
 
 	*pages = (struct state_pages){0};
-	if (asked && !name && (strchr(asked, '/') || name_length(asked))) {
+	if (asked && !scene && (strchr(asked, '/') || name_length(asked))) {
 		state = incise_state_open(asked, &err);
 		if (!state)
 			cli_fail_with(&err);
@@ -175,13 +147,16 @@ void state_pages_open(struct state_pages *pages, const char *asked)
 		return;
 	}
 	folders(list);
-	if (asked)
-		open_name(pages, name ? name : asked, list);
-	else
+	if (asked) {
+		char *name = scene_argument_name(asked);
+
+		open_name(pages, name, list);
+		free(name);
+	} else {
 		open_all(pages, list);
+	}
 	for (int i = 0; i < FOLDERS; i++)
 		free(list[i]);
-	free(name);
 }
 
 int state_pages_try(const struct state_page_file *page, struct incise_state_now *now,

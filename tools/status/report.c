@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The state of a loop, for people and as JSON; see state_report.h.
+ * The state of a loop as text and JSON; see report.h.
  */
 #include <inttypes.h>
 #include <math.h>
@@ -9,7 +9,7 @@
 #include <incise/clock.h>
 #include "../cli/json.h"
 #include "../cli/loop_report.h"
-#include "state_report.h"
+#include "report.h"
 
 static const double shares[] = {0.5, 0.99, 0.999, 0.9999};
 
@@ -63,7 +63,7 @@ static const char *put_time(char *text, size_t size, double unix_s)
 	struct tm tm;
 	time_t t;
 
-	/* Of a damaged page there is no such year. */
+	/* A damaged page may have any value. */
 	t = (time_t)fmax(0, fmin(unix_s, 1e11));
 	if (!localtime_r(&t, &tm) || !strftime(text, size, "%Y-%m-%d %H:%M:%S", &tm))
 		snprintf(text, size, "-");
@@ -98,7 +98,7 @@ static double mean_hz(const struct incise_state_now *now)
 	return now->ticks > 1 && gone_s > 0 ? (double)(now->ticks - 1) / gone_s : NAN;
 }
 
-/* The longest was measured itself, and no share of all can be above it. */
+/* The maximum is exact, and limits a quantile of buckets. */
 static double quantile_us(const struct incise_state_histogram *histogram, double share,
 			  int64_t max_ns)
 {
@@ -132,7 +132,7 @@ static void headline(FILE *out, const struct state_look *look)
 		      out);
 }
 
-static void felt(FILE *out, const struct incise_state_now *now)
+static void setup(FILE *out, const struct incise_state_now *now)
 {
 	if (*now->scene)
 		fprintf(out, "scene      %s\n", now->scene);
@@ -208,7 +208,7 @@ void state_report_text(FILE *out, const struct state_look *look)
 	const struct incise_state_now *now = look->now;
 
 	headline(out, look);
-	felt(out, now);
+	setup(out, now);
 	ticks(out, look);
 	fprintf(out,
 		"thread     %" PRIu64 " minor and %" PRIu64 " major page faults, %" PRIu64
@@ -239,10 +239,10 @@ void state_report_line(FILE *out, const struct state_look *look)
 	fprintf(out, "%s%s\n", *now->reason ? ": " : "", now->reason);
 }
 
-static json_t *count_json(uint64_t count)
+static void set_count(json_t *object, const char *key, uint64_t count)
 {
-	/* JSON's integers end there; so long no loop runs. */
-	return json_integer(count < INT64_MAX ? (json_int_t)count : INT64_MAX);
+	/* The end of jansson's integers. */
+	json_set_integer(object, key, count < INT64_MAX ? (json_int_t)count : INT64_MAX);
 }
 
 static json_t *times_json(const struct incise_state_histogram *histogram, uint64_t sum_ns,
@@ -265,43 +265,40 @@ static void add_run_json(json_t *report, const struct incise_state_now *now)
 
 	for (int i = 0; i < now->n_stages; i++)
 		json_array_append_new(stages, json_text(now->stage[i]));
-	json_object_set_new(report, "pid", json_integer(now->pid));
-	json_object_set_new(report, "start_unix_s",
-			    json_number(state_unix_s(now, now->start_ns)));
-	json_object_set_new(report, "since_unix_s",
-			    json_number(state_unix_s(now, now->since_ns)));
+	json_set_integer(report, "pid", now->pid);
+	json_set_number(report, "start_unix_s", state_unix_s(now, now->start_ns));
+	json_set_number(report, "since_unix_s", state_unix_s(now, now->since_ns));
 	json_object_set_new(report, "scene", json_text(now->scene));
 	json_object_set_new(report, "stages", stages);
-	json_object_set_new(report, "left_out", json_integer(now->left_out));
-	json_object_set_new(report, "reloads", count_json(now->reloads));
-	json_object_set_new(report, "reloads_refused", count_json(now->refused));
+	json_set_integer(report, "left_out", now->left_out);
+	set_count(report, "reloads", now->reloads);
+	set_count(report, "reloads_refused", now->refused);
 	json_object_set_new(report, "rig", json_text(now->rig));
 	json_object_set_new(report, "policy", json_text(now->policy));
-	json_object_set_new(report, "minor_faults", count_json(now->minor_faults));
-	json_object_set_new(report, "major_faults", count_json(now->major_faults));
-	json_object_set_new(report, "voluntary_switches", count_json(now->voluntary));
-	json_object_set_new(report, "involuntary_switches", count_json(now->involuntary));
+	set_count(report, "minor_faults", now->minor_faults);
+	set_count(report, "major_faults", now->major_faults);
+	set_count(report, "voluntary_switches", now->voluntary);
+	set_count(report, "involuntary_switches", now->involuntary);
 }
 
 static void add_tick_json(json_t *report, const struct incise_state_now *now)
 {
-	json_object_set_new(report, "ticks", count_json(now->ticks));
-	json_object_set_new(report, "skipped", count_json(now->skipped));
-	json_object_set_new(report, "overruns", count_json(now->overruns));
-	json_object_set_new(report, "limited", count_json(now->limited));
+	set_count(report, "ticks", now->ticks);
+	set_count(report, "skipped", now->skipped);
+	set_count(report, "overruns", now->overruns);
+	set_count(report, "limited", now->limited);
 	json_object_set_new(report, "flags", loop_flags_json(now->flagged));
 	json_object_set_new(report, "lateness_us",
 			    times_json(&now->lateness, now->lateness_sum_ns,
 				       now->lateness_max_ns));
 	json_object_set_new(report, "tick_us",
 			    times_json(&now->cost, now->cost_sum_ns, now->cost_max_ns));
-	json_object_set_new(report, "force_N", json_number(now->force_N));
-	json_object_set_new(report, "force_max_N", json_number(now->force_max_N));
-	json_object_set_new(report, "depth_mm", json_number(now->tick.depth_mm));
-	json_object_set_new(report, "velocity_mm_s",
-			    json_number(now->tick.velocity_mm_s));
-	json_object_set_new(report, "absorbed_mJ", json_number(now->absorbed_mJ));
-	json_object_set_new(report, "returned_mJ", json_number(now->returned_mJ));
+	json_set_number(report, "force_N", now->force_N);
+	json_set_number(report, "force_max_N", now->force_max_N);
+	json_set_number(report, "depth_mm", now->tick.depth_mm);
+	json_set_number(report, "velocity_mm_s", now->tick.velocity_mm_s);
+	json_set_number(report, "absorbed_mJ", now->absorbed_mJ);
+	json_set_number(report, "returned_mJ", now->returned_mJ);
 }
 
 json_t *state_report_json(const struct state_look *look)
@@ -316,9 +313,9 @@ json_t *state_report_json(const struct state_look *look)
 	json_object_set_new(report, "alive", json_boolean(now->alive));
 	json_object_set_new(report, "torn", json_boolean(now->torn));
 	json_object_set_new(report, "stalled", json_boolean(look->stalled));
-	json_object_set_new(report, "rate_hz", json_number(now->rate_hz));
-	json_object_set_new(report, "measured_hz", json_number(look->measured_hz));
-	json_object_set_new(report, "mean_hz", json_number(mean_hz(now)));
+	json_set_number(report, "rate_hz", now->rate_hz);
+	json_set_number(report, "measured_hz", look->measured_hz);
+	json_set_number(report, "mean_hz", mean_hz(now));
 	add_run_json(report, now);
 	add_tick_json(report, now);
 	return report;
