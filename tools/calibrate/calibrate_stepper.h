@@ -12,7 +12,7 @@
 #include <jansson.h>
 #include <incise/calibrate_stepper.h>
 #include <incise/calibration.h>
-#include "../stepper/stepper_drive.h"
+#include "../stepper/drive.h"
 
 struct stepper_series {
 	struct incise_calibrate_stepper_point *points;

@@ -11,7 +11,7 @@
 #include "haptic_report.h"
 #include "../cli/json.h"
 #include "../cli/loop_report.h"
-#include "../cli/stepper_counters.h"
+#include "../stepper/status.h"
 
 static const char *const phases[] = {"free", "cutting", "insertion"};
 

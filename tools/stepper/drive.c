@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * An actuator driven by hand; see stepper_drive.h.
+ * An actuator driven by hand; see drive.h.
  */
 #include <errno.h>
 #include <math.h>
@@ -10,31 +10,21 @@
 #include <stdio.h>
 #include <string.h>
 #include "../cli/cli.h"
-#include "stepper_drive.h"
-#include "stepper_status.h"
+#include "drive.h"
+#include "status.h"
 
-/* A target each; an ordinary process may be late by more than one of them. */
+/* An ordinary process may be late by more than one period. */
 #define PERIODS_PER_DEADMAN 10
 #define PERIOD_NS 5000000      /* at most */
 #define LEAST_PERIOD_NS 100000 /* at least */
 #define SHOW_NS 100000000      /* between progress */
 #define STOPPING_NS 2000000000 /* for it to come to rest by a fault */
 
-void stepper_drive_open(struct stepper_drive *drive, const char *rig, bool watch,
-			const char *doing)
+void stepper_drive_open(struct stepper_drive *drive, const char *rig,
+			unsigned int devices, const char *doing)
 {
-	stepper_drive_open_with(drive, rig, watch ? INCISE_RIG_WATCH : 0, doing);
-}
-
-void stepper_drive_open_with(struct stepper_drive *drive, const char *rig,
-			     unsigned int devices, const char *doing)
-{
-	struct incise_error err = {0};
-
 	*drive = (struct stepper_drive){.doing = doing};
-	drive->rig = incise_rig_open(cli_rig(rig), INCISE_RIG_STEPPER | devices, &err);
-	if (!drive->rig)
-		cli_fail_with(&err);
+	drive->rig = cli_open_rig(rig, INCISE_RIG_STEPPER | devices);
 	drive->clock = incise_rig_clock(drive->rig);
 	drive->stepper = incise_rig_stepper(drive->rig);
 	incise_stepper_info(drive->stepper, &drive->info);
@@ -52,7 +42,7 @@ void stepper_drive_fail(struct stepper_drive *drive, const char *fmt, ...)
 	va_start(args, fmt);
 	vsnprintf(text, sizeof(text), fmt, args);
 	va_end(args);
-	/* Disabling tells no more than the fault does. */
+	/* An error of disabling adds nothing to this failure. */
 	if (drive->powered)
 		incise_stepper_disable(drive->stepper, NULL);
 	incise_rig_close(drive->rig);
@@ -81,12 +71,12 @@ void stepper_drive_power(struct stepper_drive *drive)
 	struct incise_error err = {0};
 
 	cli_catch_signals();
-	/* When nobody reads what is printed any more, that ends it as Ctrl-C does. */
+	/* A closed pipe ends the motion as Ctrl-C does. */
 	sigaction(SIGPIPE, &(struct sigaction){.sa_handler = on_pipe}, NULL);
-	/* Without the right to, it goes on as it is, and a busy machine may be too late. */
+	/* Optional: on a busy machine an ordinary process may be too late. */
 	if (incise_clock_is_real(drive->clock))
 		sched_setscheduler(0, SCHED_FIFO, &(struct sched_param){1});
-	/* Before it is: a signal's way out has to take power away as well. */
+	/* Set before it is powered, so that every way out powers it off. */
 	drive->powered = drive->drove = true;
 	if (incise_stepper_enable(drive->stepper, &err))
 		stepper_drive_fail(drive, "%s", err.text);
@@ -101,7 +91,7 @@ bool stepper_drive_rests(const struct stepper_drive *drive)
 
 static void pass(struct stepper_drive *drive, int64_t ns)
 {
-	/* A signal cuts it short; who drives looks at cli_stop. */
+	/* A signal ends the wait; callers check cli_stop. */
 	incise_clock_wait_until(drive->clock, incise_clock_now(drive->clock) + ns);
 	stepper_drive_look(drive);
 }
@@ -129,7 +119,7 @@ void stepper_drive_end(struct stepper_drive *drive)
 	drive->rig = NULL;
 }
 
-/* It has stopped, or does so, by itself: say where, why and what to do. */
+/* It stopped, or is stopping, by itself: print where, why and what to do. */
 static _Noreturn void fail_with_fault(struct stepper_drive *drive)
 {
 	unsigned int faults;

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * An actuator driven by hand: targets are given again and again, which is the sign of life
- * that its deadman waits for, and whatever ends the program brings it to rest first.
+ * An actuator driven by hand: targets are repeated, as its deadman requires, and whatever
+ * ends the program brings it to rest first.
  *
  *   open ─▶ power ─▶ ⟲ target, pass ─▶ end
  *             ╰────────────┴─▶ fault, Ctrl-C: to rest, power off, one line
  *
  * Times are those of the rig's clock, simulated or real.
  */
-#ifndef INCISE_STEPPER_DRIVE_H
-#define INCISE_STEPPER_DRIVE_H
+#ifndef INCISE_STEPPER_DRIVE_TOOL_H
+#define INCISE_STEPPER_DRIVE_TOOL_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -23,44 +23,40 @@ struct stepper_drive {
 	struct incise_stepper_info info;
 	struct incise_stepper_status status; /* the last one */
 	const char *doing;		     /* "move" */
-	bool powered;			     /* by us */
-	bool drove;			     /* it was */
+	bool powered;			     /* by this program */
+	bool drove;			     /* it was powered */
 	int64_t period_ns;		     /* of targets */
 	int64_t shown_ns;		     /* when progress was shown */
 };
 
 /* All of these end the program with 1 and one line when they fail. */
 
-/* Open the rig's stepper: to be its owner, or just to watch. */
-void stepper_drive_open(struct stepper_drive *drive, const char *rig, bool watch,
-			const char *doing);
-
-/* The same as its owner, with other devices of the rig: INCISE_RIG_FORCE. */
-void stepper_drive_open_with(struct stepper_drive *drive, const char *rig,
-			     unsigned int devices, const char *doing);
+/* Open the rig's stepper; @devices: others of the rig, or INCISE_RIG_WATCH. */
+void stepper_drive_open(struct stepper_drive *drive, const char *rig,
+			unsigned int devices, const char *doing);
 
 /* Power it; from here on signals set cli_stop. */
 void stepper_drive_power(struct stepper_drive *drive);
 
-/* Read where it stands. */
+/* Read its status. */
 void stepper_drive_look(struct stepper_drive *drive);
 
-/* Give a target, or a speed; let a period pass; look. A fault ends the program. */
+/* Set a target or a speed, wait a period, read the status. A fault ends the program. */
 void stepper_drive_to(struct stepper_drive *drive, double position_mm);
 void stepper_drive_at(struct stepper_drive *drive, double velocity_mm_s);
 
-/* Hold it where it stands until Ctrl-C, or for a time; 0: for ever. */
+/* Hold its position until Ctrl-C, or for a time; 0: no limit. */
 void stepper_drive_hold(struct stepper_drive *drive, double seconds);
 
 bool stepper_drive_rests(const struct stepper_drive *drive);
 
-/* To rest, power off; look where that is. */
+/* Bring it to rest without power, and read the status. */
 void stepper_drive_rest(struct stepper_drive *drive);
 
-/* The same as far as it is powered, and close the rig. */
+/* The same if it is powered, and close the rig. */
 void stepper_drive_end(struct stepper_drive *drive);
 
-/* stepper_drive_end(), then the line. */
+/* Power off, close the rig, then fail the program. */
 _Noreturn void stepper_drive_fail(struct stepper_drive *drive, const char *fmt, ...)
 	INCISE_PRINTF(2, 3);
 

@@ -1,25 +1,19 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Where an actuator stands, in words and as JSON; see stepper_status.h.
+ * State of an actuator as text and JSON; see status.h.
  */
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 #include "../cli/json.h"
-#include "../cli/stepper_counters.h"
-#include "stepper_status.h"
+#include "status.h"
 
-/* From the lowest bit on; a person's word, and the key of JSON. */
-static const struct {
-	const char *word, *key;
-} inputs[] = {
-	{"limit at 0", "limit_min"},
-	{"limit at the end", "limit_max"},
-	{"home", "home"},
-	{"e-stop", "estop"},
-	{"alarm", "alarm"},
-};
+/* From the lowest bit on: in text, and in JSON. */
+static const char *const inputs[] = {"limit at 0", "limit at the end", "home", "e-stop",
+				     "alarm"};
+static const char *const input_keys[] = {"limit_min", "limit_max", "home", "estop",
+					 "alarm"};
 #define INPUTS (sizeof(inputs) / sizeof(*inputs))
 
 static const char *const fault_keys[] = {
@@ -29,6 +23,41 @@ static const char *const fault_keys[] = {
 };
 _Static_assert(sizeof(fault_keys) / sizeof(*fault_keys) == INCISE_STEPPER_FAULTS,
 	       "a key for each fault");
+
+json_t *stepper_counters_json(struct incise_stepper *stepper)
+{
+	struct incise_stepper_counter counter;
+	json_t *object = json_object();
+
+	for (int i = 0; !incise_stepper_counter(stepper, i, &counter); i++)
+		json_object_set_new(object, counter.key,
+				    json_integer((json_int_t)counter.value));
+	return object;
+}
+
+void stepper_counters_text(struct incise_stepper *stepper)
+{
+	struct incise_stepper_counter counter;
+
+	for (int i = 0; !incise_stepper_counter(stepper, i, &counter); i++)
+		printf("%-10s %s: %llu\n", i ? "" : "counted", counter.text,
+		       (unsigned long long)counter.value);
+}
+
+void stepper_counters_line(struct incise_stepper *stepper)
+{
+	struct incise_stepper_counter counter;
+	const char *before = "actuator   ";
+
+	for (int i = 0; !incise_stepper_counter(stepper, i, &counter); i++)
+		if (counter.trouble && counter.value) {
+			printf("%s%s: %llu", before, counter.text,
+			       (unsigned long long)counter.value);
+			before = ", ";
+		}
+	if (*before == ',')
+		putchar('\n');
+}
 
 long long stepper_steps(const struct incise_stepper_info *info, double mm)
 {
@@ -48,19 +77,19 @@ static const char *faults_text(unsigned int faults, char *text, size_t size)
 	return text;
 }
 
-/* What begins with the device's name is printed where that was said. */
+/* Remove the device's name from the beginning: it is printed before. */
 static void drop_name(struct incise_stepper *stepper, char *text)
 {
 	const char *rest = strstr(text, ": ");
 	struct incise_stepper_info info = {0};
 
 	incise_stepper_info(stepper, &info);
-	/* The name may say more than the line does, such as "not real-time". */
+	/* The name may be longer than in the text: "… (not real-time)". */
 	if (rest && !strncmp(text, info.name, (size_t)(rest - text)))
 		memmove(text, rest + 2, strlen(rest + 2) + 1);
 }
 
-/* The device's own words for its fault; false where it has none beyond those of the bit. */
+/* The device's own text for its fault; false if it only has that of the bit. */
 static bool own_cause(struct incise_stepper *stepper, unsigned int faults, char *text,
 		      size_t size)
 {
@@ -80,14 +109,14 @@ const char *stepper_why(struct incise_stepper *stepper, unsigned int faults, cha
 						      : faults_text(faults, text, size);
 }
 
-/* "home, e-stop", or what to say when there is none. */
+/* "home, e-stop", or @none. */
 static void put_inputs(unsigned int bits, const char *none)
 {
 	const char *comma = "";
 
 	for (unsigned int i = 0; i < INPUTS; i++)
 		if (bits & 1u << i) {
-			printf("%s%s", comma, inputs[i].word);
+			printf("%s%s", comma, inputs[i]);
 			comma = ", ";
 		}
 	if (!bits)
@@ -157,16 +186,6 @@ void stepper_status_line(struct incise_stepper *stepper,
 	putchar('\n');
 }
 
-static json_t *inputs_json(unsigned int bits)
-{
-	json_t *list = json_array();
-
-	for (unsigned int i = 0; i < INPUTS; i++)
-		if (bits & 1u << i)
-			json_array_append_new(list, json_string(inputs[i].key));
-	return list;
-}
-
 static json_t *faults_json(unsigned int faults)
 {
 	json_t *list = json_array();
@@ -180,13 +199,13 @@ static json_t *faults_json(unsigned int faults)
 	return list;
 }
 
-/* Without measures_handle there is nothing to believe in these two. */
+/* Null unless the device measures its handle. */
 static json_t *measured(const struct incise_stepper_info *info, double value)
 {
 	return info->measures_handle ? json_number(value) : json_null();
 }
 
-/* In the device's own words, else those of its first fault; null without one. */
+/* The device's own text, else that of its first fault; null without a fault. */
 static json_t *cause_json(struct incise_stepper *stepper, unsigned int faults)
 {
 	char text[300];
@@ -208,8 +227,9 @@ json_t *stepper_status_json(struct incise_stepper *stepper,
 		(json_int_t)stepper_steps(info, status->position_mm), "velocity_mm_s",
 		json_number(status->velocity_mm_s), "homed", status->homed, "handle_mm",
 		measured(info, status->handle_mm), "force_N",
-		measured(info, status->force_N), "inputs", inputs_json(status->inputs),
-		"inputs_wired", inputs_json(info->inputs), "faults",
+		measured(info, status->force_N), "inputs",
+		json_bits(status->inputs, input_keys, INPUTS), "inputs_wired",
+		json_bits(info->inputs, input_keys, INPUTS), "faults",
 		faults_json(status->faults), "cause", cause_json(stepper, status->faults),
 		"late_steps", (json_int_t)status->late, "travel_mm",
 		json_number(info->travel_mm), "step_mm", json_number(info->step_mm),
