@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The thread of the loop, and the one that looks after it; see haptic_supervisor.h.
+ * The loop's thread, and the supervisor of a normal priority: log, state page, service manager,
+ * watchdog, another scene at SIGHUP.
  *
  *   loop      tick tick tick tick …          (real time; no lock, no file, no log)
  *               │ control: events, ticks, plans        │ state page
@@ -11,47 +12,126 @@
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <time.h>
 #include <unistd.h>
+#include <incise/export.h>
 #include "../cli/cli.h"
-#include "haptic_self_test.h"
-#include "haptic_supervisor.h"
-#include "notify.h"
+#include "haptic.h"
+
+/*
+ * --- the service manager ---------------------------------------------------------------
+ *
+ * The protocol of sd_notify(3): a datagram of lines VARIABLE=VALUE to the socket in
+ * $NOTIFY_SOCKET. libsystemd would bring a megabyte of libraries into a process that is locked
+ * in memory.
+ */
+
+/* The socket's address; 0: none, or an invalid one. */
+static socklen_t address(struct sockaddr_un *to)
+{
+	const char *path = getenv("NOTIFY_SOCKET");
+	size_t length = path ? strlen(path) : 0;
+
+	if (!length || length >= sizeof(to->sun_path) || (*path != '/' && *path != '@'))
+		return 0;
+	*to = (struct sockaddr_un){.sun_family = AF_UNIX};
+	memcpy(to->sun_path, path, length);
+	/* An abstract socket: its name begins with a 0. */
+	if (*path == '@')
+		to->sun_path[0] = 0;
+	return (socklen_t)(offsetof(struct sockaddr_un, sun_path) + length);
+}
+
+/* Send lines, for example "READY=1\nSTATUS=runs". Never waits; a failed send is lost. */
+static void notify_send(const char *fmt, ...) INCISE_PRINTF(1, 2);
+static void notify_send(const char *fmt, ...)
+{
+	struct sockaddr_un to;
+	socklen_t size = address(&to);
+	char text[1024];
+	va_list args;
+	int length, fd;
+
+	if (!size)
+		return;
+	va_start(args, fmt);
+	length = vsnprintf(text, sizeof(text), fmt, args);
+	va_end(args);
+	fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+	if (fd < 0)
+		return;
+	if (length >= (int)sizeof(text))
+		length = sizeof(text) - 1;
+	if (length > 0)
+		sendto(fd, text, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT,
+		       (struct sockaddr *)&to, size);
+	close(fd);
+}
+
+/* "RELOADING=1", with the time that the protocol requires. */
+static void notify_reloading(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	notify_send("RELOADING=1\nMONOTONIC_USEC=%lld",
+		    now.tv_sec * 1000000LL + now.tv_nsec / 1000);
+}
+
+/* Longest time between WATCHDOG=1 of this process; 0: no watchdog. */
+static int64_t notify_watchdog_ns(void)
+{
+	const char *us = getenv("WATCHDOG_USEC"), *pid = getenv("WATCHDOG_PID");
+	long long value = us ? strtoll(us, NULL, 10) : 0;
+
+	/* Inherited from a parent. */
+	if (pid && strtoll(pid, NULL, 10) != getpid())
+		return 0;
+	return value > 0 && value < INT64_MAX / 1000 ? value * 1000 : 0;
+}
+
+/* --- the supervisor -------------------------------------------------------------------- */
 
 #define LOOK_MS 100
-#define SAY_NS INCISE_NS_PER_S
+#define REPORT_NS INCISE_NS_PER_S
 
 static volatile sig_atomic_t reload_asked;
 
-/* What the loop's thread and its supervisor share until it is joined. */
+/* Shared by the loop's thread and its supervisor until the thread is joined. */
 struct supervisor {
 	struct haptic *haptic;
-	struct incise_clock *time; /* of the log; the rig's may be a simulated one */
+	struct incise_clock *time; /* of the log; the rig's may be simulated */
 	pthread_t thread;
 	int ended_fd; /* readable when the loop has ended */
 	_Atomic int tid;
 	int rc;
 	struct incise_error err;
 
-	/* A scene that is to take the place of the one in force. */
+	/* A scene that the loop has not yet taken. */
 	struct incise_scene *next_scene;
 	struct incise_plan *next_plan;
 
 	bool ready, stopping;
 	uint64_t fed_ticks; /* when the watchdog was last fed */
-	uint64_t said_ticks;
+	uint64_t reported_ticks;
 	uint64_t overruns, skipped; /* since the last line of the log */
 	uint64_t overruns_all, skipped_all;
 	bool stale;
-	char refused[530]; /* why the last scene was, until another is taken */
-	int64_t say_ns, feed_ns, watchdog_ns;
+	char refused[530]; /* reason of the last refused reload, or "" */
+	int64_t report_ns, feed_ns, watchdog_ns;
 };
 
-/* ---- the loop's thread ---- */
+/* --- the loop's thread ------------------------------------------------------------------ */
 
 static void take_counts(struct incise_realtime_counts *counts, int sign)
 {
@@ -89,7 +169,7 @@ static int start_thread(struct supervisor *s, struct incise_error *err)
 	sigset_t all, before;
 	int rc;
 
-	/* Signals are the supervisor's: in the loop they would be late ticks. */
+	/* The supervisor handles signals: in the loop they would make ticks late. */
 	sigfillset(&all);
 	pthread_sigmask(SIG_SETMASK, &all, &before);
 	rc = pthread_create(&s->thread, NULL, run_loop, s);
@@ -97,7 +177,7 @@ static int start_thread(struct supervisor *s, struct incise_error *err)
 	return rc ? incise_error_set(err, rc, "the loop's thread: %s", strerror(rc)) : 0;
 }
 
-/* ---- another scene ---- */
+/* --- another scene ---------------------------------------------------------------------- */
 
 static void on_reload(int number)
 {
@@ -129,7 +209,7 @@ struct incise_plan *haptic_plan(const struct haptic *haptic,
 	return plan;
 }
 
-static void forget_next(struct supervisor *s)
+static void free_next(struct supervisor *s)
 {
 	incise_plan_free(s->next_plan);
 	incise_scene_free(s->next_scene);
@@ -161,13 +241,13 @@ static int prepare_next(struct supervisor *s, struct incise_error *err)
 	return s->next_plan ? 0 : -errno;
 }
 
-static void begin_reload(struct supervisor *s)
+static void start_reload(struct supervisor *s)
 {
 	struct incise_error err = {0};
 	int rc = 0;
 
 	reload_asked = 0;
-	/* One at a time; the last one asked for counts. */
+	/* One at a time; a later request is kept. */
 	if (s->next_plan || s->stopping) {
 		reload_asked = !s->stopping;
 		return;
@@ -179,7 +259,7 @@ static void begin_reload(struct supervisor *s)
 		rc = incise_loop_control_offer(s->haptic->loop.control, s->next_plan);
 	if (!rc)
 		return;
-	forget_next(s);
+	free_next(s);
 	incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
 	incise_state_refused(s->haptic->state, err.text);
 	cli_warn("not reloaded, the scene before goes on: %s", err.text);
@@ -207,9 +287,9 @@ static void end_reload(struct supervisor *s)
 	notify_send("READY=1");
 }
 
-/* ---- what is told ---- */
+/* --- log and status --------------------------------------------------------------------- */
 
-static void take_events(struct supervisor *s)
+static void handle_events(struct supervisor *s)
 {
 	struct incise_loop_event events[32];
 	int n;
@@ -223,7 +303,7 @@ static void take_events(struct supervisor *s)
 				break;
 			case INCISE_LOOP_STALE:
 				s->stale = true;
-				/* The first pose is on its way. */
+				/* At the start the first pose is still to come. */
 				if (events[i].tick)
 					cli_note("no fresh pose: the force fades");
 				break;
@@ -241,13 +321,13 @@ static void take_events(struct supervisor *s)
 			}
 }
 
-/* Once a second: what piled up, and how it goes. */
-static void say(struct supervisor *s, uint64_t ticks, int64_t now_ns)
+/* Once a second: overruns since the last line, and the rate. */
+static void report(struct supervisor *s, uint64_t ticks, int64_t now_ns)
 {
 	struct haptic *haptic = s->haptic;
 	struct incise_realtime_counts counts;
-	double seconds = (double)(now_ns - s->say_ns + SAY_NS) / INCISE_NS_PER_S;
-	double rate_hz = (double)(ticks - s->said_ticks) / seconds;
+	double seconds = (double)(now_ns - s->report_ns + REPORT_NS) / INCISE_NS_PER_S;
+	double rate_hz = (double)(ticks - s->reported_ticks) / seconds;
 	char text[200];
 
 	s->overruns_all += s->overruns;
@@ -263,7 +343,7 @@ static void say(struct supervisor *s, uint64_t ticks, int64_t now_ns)
 		 (unsigned long long)s->skipped_all, s->stale ? ", no fresh pose" : "");
 	notify_send("STATUS=%s%s", text, s->refused);
 	cli_progress("%s: %s; Ctrl-C ends", haptic->argument.path, text);
-	s->said_ticks = ticks;
+	s->reported_ticks = ticks;
 }
 
 static void look(struct supervisor *s)
@@ -272,7 +352,7 @@ static void look(struct supervisor *s)
 	uint64_t ticks = incise_loop_control_ticks(haptic->loop.control);
 	int64_t now_ns = incise_clock_now(s->time);
 
-	take_events(s);
+	handle_events(s);
 	if (!s->ready && ticks) {
 		s->ready = true;
 		incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
@@ -280,7 +360,7 @@ static void look(struct supervisor *s)
 		cli_note("%s: runs at %g Hz, %s", haptic->argument.path,
 			 haptic->loop.rate_hz, haptic->scheduling);
 	}
-	/* Only while ticks come: else the manager is to end what hangs. */
+	/* Only while ticks come: the manager ends a loop that hangs. */
 	if (s->watchdog_ns && now_ns >= s->feed_ns && ticks != s->fed_ticks) {
 		notify_send("WATCHDOG=1");
 		s->fed_ticks = ticks;
@@ -295,21 +375,21 @@ static void look(struct supervisor *s)
 	}
 	end_reload(s);
 	if (reload_asked && s->ready)
-		begin_reload(s);
-	if (now_ns >= s->say_ns) {
-		say(s, ticks, now_ns);
-		s->say_ns = now_ns + SAY_NS;
+		start_reload(s);
+	if (now_ns >= s->report_ns) {
+		report(s, ticks, now_ns);
+		s->report_ns = now_ns + REPORT_NS;
 	}
 }
 
-/* What was prepared and came to nothing, as the loop has ended. */
+/* The loop has ended: drop a plan that it did not take. */
 static void settle(struct supervisor *s)
 {
-	take_events(s);
+	handle_events(s);
 	end_reload(s);
 	if (s->next_plan)
 		incise_loop_control_withdraw(s->haptic->loop.control);
-	forget_next(s);
+	free_next(s);
 }
 
 static int supervise(struct supervisor *s, struct incise_error *err)
@@ -341,7 +421,7 @@ int haptic_supervise(struct haptic *haptic, struct incise_error *err)
 		rc = incise_error_set(err, errno, "the loop cannot be looked after: %s",
 				      strerror(errno));
 	} else {
-		s.say_ns = incise_clock_now(s.time) + SAY_NS;
+		s.report_ns = incise_clock_now(s.time) + REPORT_NS;
 		rc = supervise(&s, err);
 	}
 	if (s.ended_fd >= 0)
