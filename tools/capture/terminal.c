@@ -1,31 +1,37 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The view of a running capture; see capture_view.h.
+ * The terminal of a running capture; see terminal.h.
  *
  *     12.3 of 60.0 s   force   0.532 N [####......]   depth   4.21 mm   disk 5.2 h
  *     stream      rate/s       rows   lost   late  jitter ms  drift ppm       offset ms
  *     force     10000.00     123456      0      0 …
  *     m: marker   q: end
  */
+#include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <poll.h>
+#include <signal.h>
+#include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <termios.h>
 #include <unistd.h>
 #include <incise/clock.h>
-#include "capture_view.h"
 #include "../cli/cli.h"
 #include "../cli/stopwatch.h"
 #include "../cli/stream_report.h"
+#include "terminal.h"
+
+/* --- the view ------------------------------------------------------------------------ */
 
 #define SHOW_NS 200000000LL
 #define BAR 10
 
 /*
- * A terminal that is held (Ctrl-S), or at the other end of a line that hangs, must not hold up
- * who records: nothing waits for it. It is opened anew, as flags of the one that was inherited
- * are the shell's too.
+ * A terminal that is stopped (Ctrl-S) or unreachable must not hold up the recording, so writes
+ * do not block. It is opened again, as the shell shares the flags of the inherited one.
  */
 void capture_view_begin(void)
 {
@@ -48,7 +54,7 @@ void capture_view_end(void)
 	cli_progress_end();
 }
 
-static bool terminal_takes(void)
+static bool terminal_ready(void)
 {
 	struct pollfd terminal = {.fd = STDERR_FILENO, .events = POLLOUT};
 
@@ -117,7 +123,7 @@ void capture_view_show(struct capture_view *view, const struct incise_recorder *
 	if (now_ns - view->shown_ns < SHOW_NS)
 		return;
 	view->shown_ns = now_ns;
-	if (!terminal_takes())
+	if (!terminal_ready())
 		return;
 	incise_recorder_stats(recorder, &stats);
 	headline(view, &stats, seconds, top, sizeof(top));
@@ -127,4 +133,97 @@ void capture_view_show(struct capture_view *view, const struct incise_recorder *
 	cli_progress("%s\n%s\n%s\n%s\n%s%sm, 1-9: marker   %sq: end   %s", top,
 		     stream_heading, lines[0], lines[1], lines[2], n > 2 ? "\n" : "",
 		     stats.armed ? "t: trigger   " : "", view->last);
+}
+
+/*
+ * --- keys ------------------------------------------------------------------------------
+ *
+ *     begin ─► keys ── Ctrl-Z ─► as before, stopped ── fg ─► keys ─► end: as before
+ *                                                   └─ bg ─► as the shell has it
+ */
+
+static volatile sig_atomic_t started, resumed;
+static struct termios before, keys;
+
+/* A background process that reads or sets the terminal would be stopped. */
+static bool in_front(void)
+{
+	return tcgetpgrp(STDIN_FILENO) == getpgrp();
+}
+
+void keyboard_end(void)
+{
+	if (started && in_front())
+		tcsetattr(STDIN_FILENO, TCSANOW, &before);
+	started = false;
+}
+
+static void on_continue(int number)
+{
+	int error = errno;
+
+	(void)number;
+	resumed = true;
+	if (started && in_front())
+		tcsetattr(STDIN_FILENO, TCSANOW, &keys);
+	errno = error;
+}
+
+/* Ctrl-Z and Ctrl-\: restore the terminal, then do their default. */
+static void on_stop(int number)
+{
+	struct sigaction action = {.sa_handler = SIG_DFL}, ours;
+	int error = errno;
+
+	if (started && in_front())
+		tcsetattr(STDIN_FILENO, TCSANOW, &before);
+	sigaction(number, &action, &ours);
+	raise(number);
+	sigaction(number, &ours, NULL);
+	/* An orphaned process group is not stopped. */
+	on_continue(number);
+	errno = error;
+}
+
+static void watch(int number, void (*handler)(int))
+{
+	/* SA_NODEFER, as the handler raises the signal. */
+	struct sigaction action = {.sa_handler = handler,
+				   .sa_flags = SA_RESTART | SA_NODEFER},
+			 had;
+
+	if (!sigaction(number, NULL, &had) && had.sa_handler != SIG_IGN)
+		sigaction(number, &action, NULL);
+}
+
+void keyboard_begin(void)
+{
+	if (started || !isatty(STDIN_FILENO) || !in_front() ||
+	    tcgetattr(STDIN_FILENO, &before))
+		return;
+	keys = before;
+	keys.c_lflag &= ~(tcflag_t)(ICANON | ECHO); /* Ctrl-C goes on to be a signal */
+	keys.c_cc[VMIN] = 0;
+	keys.c_cc[VTIME] = 0;
+	watch(SIGTSTP, on_stop);
+	watch(SIGQUIT, on_stop);
+	watch(SIGCONT, on_continue);
+	started = true;
+	atexit(keyboard_end);
+	tcsetattr(STDIN_FILENO, TCSANOW, &keys);
+}
+
+bool keyboard_resumed(void)
+{
+	bool was = resumed;
+
+	resumed = false;
+	return was;
+}
+
+int keyboard_next(void)
+{
+	unsigned char key;
+
+	return started && in_front() && read(STDIN_FILENO, &key, 1) == 1 ? key : 0;
 }
