@@ -122,8 +122,7 @@ static void draw_plot(struct plot *plot)
 		"  '' using 1:5 with lines ls 1 title 'in the loop'\n"
 		"unset multiplot\n",
 		plot->file, plot->file);
-	if (!plot_draw(script, plot->folder, plot->name))
-		cli_fail("gnuplot could not draw %s/%s", plot->folder, plot->name);
+	plot_draw_or_fail(script, plot->folder, plot->name);
 }
 
 /* The ticks' way out, and the progress. */
