@@ -1,15 +1,167 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Weights on the force channel; see calibrate_weights.h.
+ * Pairs of loads and readings; see force.h.
  */
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include <incise/sim.h>
-#include "calibrate_weights.h"
 #include "../cli/cli.h"
+#include "../cli/file.h"
+#include "calibrate.h"
+#include "force.h"
+
+/* --- CSV ----------------------------------------------------------------------------- */
+
+#define PAIRS_MAX 10000
+#define COLUMNS_MAX 32
+
+enum { MASS, FORCE, READING, SERIES, DIRECTION, COLUMNS };
+static const char *const names[COLUMNS] = {"mass_g", "force_N", "reading_mV", "series",
+					   "direction"};
+
+struct table {
+	const char *path;
+	FILE *in;
+	int line;
+	int column[COLUMNS]; /* index of each; -1: none */
+};
+
+static void add_pair(struct pairs *pairs, const struct incise_calibrate_force_pair *pair)
+{
+	if (pairs->n == PAIRS_MAX)
+		cli_fail("more than %d pairs: average what is read under one load",
+			 PAIRS_MAX);
+	/* grown in steps: 64, 128, … */
+	if (!(pairs->n & (pairs->n - 1)) && (pairs->n >= 64 || !pairs->n))
+		pairs->pair = cli_resize(pairs->pair, pairs->n ? 2 * pairs->n : 64,
+					 sizeof(*pairs->pair));
+	pairs->pair[pairs->n++] = *pair;
+}
+
+static void read_header(struct table *table, char **fields, int n)
+{
+	for (int c = 0; c < COLUMNS; c++) {
+		table->column[c] = -1;
+		for (int i = 0; i < n; i++)
+			if (!strcmp(fields[i], names[c]))
+				table->column[c] = i;
+	}
+	if (table->column[READING] < 0 ||
+	    (table->column[MASS] < 0) == (table->column[FORCE] < 0))
+		cli_fail(
+			"%s:%d: expected a line that names the columns, with reading_mV and "
+			"either mass_g or force_N (and series, direction: up or down)",
+			table->path, table->line);
+}
+
+static double number_of(const struct table *table, int column, char **fields, int n)
+{
+	const int i = table->column[column];
+	const char *text = i < n ? fields[i] : "";
+	char *end;
+	double value = strtod(text, &end);
+
+	if (end == text || *end || !isfinite(value))
+		cli_fail("%s:%d: %s: expected a number, found '%s'; correct it",
+			 table->path, table->line, names[column], text);
+	return value;
+}
+
+static bool descends(const struct table *table, char **fields, int n)
+{
+	const int i = table->column[DIRECTION];
+	const char *text = i < n ? fields[i] : "";
+
+	if (!strcmp(text, "down") || !strcmp(text, "descending"))
+		return true;
+	if (!strcmp(text, "up") || !strcmp(text, "ascending"))
+		return false;
+	cli_fail("%s:%d: direction: expected up or down, found '%s'; correct it",
+		 table->path, table->line, text);
+}
+
+static struct incise_calibrate_force_pair read_pair(const struct table *table,
+						    char **fields, int n)
+{
+	struct incise_calibrate_force_pair pair = {.mass_g = NAN};
+	double series;
+
+	if (table->column[MASS] >= 0)
+		pair.mass_g = number_of(table, MASS, fields, n);
+	else
+		pair.force_N = number_of(table, FORCE, fields, n);
+	pair.reading_mV = number_of(table, READING, fields, n);
+	if (table->column[SERIES] >= 0) {
+		series = number_of(table, SERIES, fields, n);
+		if (series != floor(series) || fabs(series) > 1e6)
+			cli_fail("%s:%d: series: expected a whole number; correct it",
+				 table->path, table->line);
+		pair.series = (int)series;
+	}
+	if (table->column[DIRECTION] >= 0)
+		pair.descending = descends(table, fields, n);
+	return pair;
+}
+
+void pairs_read(struct pairs *pairs, const char *path)
+{
+	struct table table = {.path = path, .in = fopen(path, "re")};
+	char *line = NULL, *fields[COLUMNS_MAX];
+	bool header = false;
+	size_t size = 0;
+
+	*pairs = (struct pairs){0};
+	if (!table.in)
+		cli_fail("%s: cannot be read: %s", path, strerror(errno));
+	while (getline(&line, &size, table.in) >= 0) {
+		struct incise_calibrate_force_pair pair;
+		int n;
+
+		table.line++;
+		n = calibrate_cut(line, fields, COLUMNS_MAX, " \t\"", " \t\"");
+		if (fields[0][0] == '#' || (n == 1 && !*fields[0]))
+			continue;
+		if (!header) {
+			read_header(&table, fields, n);
+			header = true;
+			continue;
+		}
+		pair = read_pair(&table, fields, n);
+		add_pair(pairs, &pair);
+	}
+	if (ferror(table.in))
+		cli_fail("%s: cannot be read: %s", path, strerror(errno));
+	if (!pairs->n)
+		cli_fail(
+			"%s: no pairs in it: expected a line of names and lines of numbers",
+			path);
+	free(line);
+	fclose(table.in);
+}
+
+void pairs_write(const struct pairs *pairs, const char *path)
+{
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(path, &file);
+	bool masses = false;
+
+	for (int i = 0; i < pairs->n; i++)
+		masses |= !isnan(pairs->pair[i].mass_g);
+	fprintf(out, "%s,reading_mV,series,direction\n", names[masses ? MASS : FORCE]);
+	for (int i = 0; i < pairs->n; i++) {
+		const struct incise_calibrate_force_pair *pair = &pairs->pair[i];
+
+		fprintf(out, "%.10g,%.6f,%d,%s\n", masses ? pair->mass_g : pair->force_N,
+			pair->reading_mV, pair->series, pair->descending ? "down" : "up");
+	}
+	whole_file_end(file);
+}
+
+/* --- weights -------------------------------------------------------------------------- */
 
 /* A reading is steady when it has neither moved nor swung for so long. */
 #define STEADY_S 2
@@ -20,7 +172,7 @@
 
 static const struct cli_unit masses[] = {{"g", 1}, {"kg", 1e3}, {"mg", 1e-3}, {0}};
 
-/* Mean and scatter of what came while something was awaited. */
+/* Mean and scatter of samples. */
 struct mean {
 	double mV, squares;
 	long n, clipped;
@@ -33,17 +185,17 @@ static int by_mass(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-void calibrate_weights_list(struct calibrate_weights *weights, char *list)
+void weights_parse(struct weights *weights, char *list)
 {
-	char *items[CALIBRATE_WEIGHTS_MAX];
-	int n = cli_list("weights", list, items, CALIBRATE_WEIGHTS_MAX - 1);
+	char *items[WEIGHTS_MAX];
+	int n = cli_list("weights", list, items, WEIGHTS_MAX - 1);
 
 	weights->n = 0;
 	for (int i = 0; i < n; i++)
 		weights->mass_g[weights->n++] =
 			cli_quantity("--weights", items[i], masses, 0, 1e6);
 	qsort(weights->mass_g, n, sizeof(*weights->mass_g), by_mass);
-	/* The empty pan is a load that costs nothing and has no error. */
+	/* The empty pan is a load without error. */
 	if (weights->mass_g[0] > 0) {
 		memmove(weights->mass_g + 1, weights->mass_g,
 			n * sizeof(*weights->mass_g));
@@ -60,7 +212,7 @@ void calibrate_weights_list(struct calibrate_weights *weights, char *list)
 			"are good");
 }
 
-void calibrate_weights_ask(struct calibrate_weights *weights)
+void weights_ask(struct weights *weights)
 {
 	char *line = NULL;
 	size_t size = 0;
@@ -70,7 +222,7 @@ void calibrate_weights_ask(struct calibrate_weights *weights)
 	if (getline(&line, &size, stdin) < 0)
 		cli_fail("stopped before a weight was named; nothing has changed");
 	line[strcspn(line, "\n")] = 0;
-	calibrate_weights_list(weights, line);
+	weights_parse(weights, line);
 	free(line);
 }
 
@@ -88,7 +240,7 @@ static double sd_of(const struct mean *mean)
 	return mean->n > 1 ? sqrt(mean->squares / (mean->n - 1)) : 0;
 }
 
-/* What the channel reads within the next @s seconds. */
+/* The samples of the next @s seconds. */
 static struct mean read_for(struct incise_rig *rig, double s)
 {
 	struct incise_force *force = incise_rig_force(rig);
@@ -101,7 +253,7 @@ static struct mean read_for(struct incise_rig *rig, double s)
 	int n;
 
 	incise_force_info(force, &info);
-	/* what has waited is of before */
+	/* drop the samples before */
 	while (incise_force_read(force, samples, BLOCK) == BLOCK)
 		;
 	end_ns = incise_clock_now(clock) + (int64_t)(s * INCISE_NS_PER_S);
@@ -146,11 +298,11 @@ static bool is_terminal(void)
 }
 
 /*
- * Wait until a load is there and still. @before_mV: what was read before it, NAN for
- * nothing; without a person who says so, the reading has to be half of @change_mV off.
+ * Wait until a load is there and steady. @before_mV: the reading before it, or NAN; without a
+ * terminal the load is there once the reading differs by half of @change_mV.
  */
-static void wait_steady(const struct calibrate_weights *weights, double mass_g,
-			double before_mV, double change_mV)
+static void wait_steady(const struct weights *weights, double mass_g, double before_mV,
+			double change_mV)
 {
 	const double step_mV = weights->setup->step_mV;
 	double waited_s = 0;
@@ -178,8 +330,8 @@ static void wait_steady(const struct calibrate_weights *weights, double mass_g,
 	}
 }
 
-/* On the virtual rig, the one who hangs weights is this program. */
-static void bring(const struct calibrate_weights *weights, double mass_g)
+/* Ask for a load; on the virtual rig apply it. */
+static void request_load(const struct weights *weights, double mass_g)
 {
 	struct incise_sim *sim = incise_rig_sim(weights->rig);
 	struct incise_calibrate_force_pair load = {.mass_g = mass_g};
@@ -204,16 +356,16 @@ static void bring(const struct calibrate_weights *weights, double mass_g)
 		cli_fail("stopped; the calibration stays as it was");
 }
 
-/* A reading at the converter's end does not say how far it is to the next. */
-static bool within(const struct calibrate_weights *weights,
+/* Whether the reading is within the converter's range. */
+static bool within(const struct weights *weights,
 		   const struct incise_calibrate_force_pair *pair)
 {
 	return pair && pair->reading_mV > weights->setup->low_mV &&
 	       pair->reading_mV < weights->setup->high_mV;
 }
 
-static void read_load(const struct calibrate_weights *weights,
-		      struct calibrate_pairs *pairs, int series, bool descending, int k)
+static void read_load(const struct weights *weights, struct pairs *pairs, int series,
+		      bool descending, int k)
 {
 	const double mass_g = weights->mass_g[k];
 	const struct incise_calibrate_force_pair *last =
@@ -224,7 +376,7 @@ static void read_load(const struct calibrate_weights *weights,
 	struct mean mean;
 
 	if (!last || last->mass_g != mass_g)
-		bring(weights, mass_g);
+		request_load(weights, mass_g);
 	if (last)
 		change_N = incise_calibrate_force_of(&pair, weights->setup) -
 			   incise_calibrate_force_of(last, weights->setup);
@@ -234,24 +386,23 @@ static void read_load(const struct calibrate_weights *weights,
 	mean = read_for(weights->rig, weights->mean_s);
 	pair.reading_mV = mean.mV;
 	weights->setup->dithered &= sd_of(&mean) >= weights->setup->step_mV / 2;
-	/* Cut-off noise bends a mean: it counts as at the end, where it is left out. */
+	/* Clipped noise shifts the mean: the reading counts as saturated, and is left out. */
 	if (mean.clipped > mean.n / 1000)
 		pair.reading_mV =
 			mean.mV < (weights->setup->low_mV + weights->setup->high_mV) / 2
 				? weights->setup->low_mV
 				: weights->setup->high_mV;
-	calibrate_pairs_add(pairs, &pair);
+	add_pair(pairs, &pair);
 	cli_progress_end();
 	fprintf(stderr, "%d%s %8g g %10.2f mV  sd %.2f mV\n", series,
 		descending ? " down" : "   up", mass_g, mean.mV, sd_of(&mean));
 }
 
-void calibrate_weights_read(const struct calibrate_weights *weights,
-			    struct calibrate_pairs *pairs)
+void weights_measure(const struct weights *weights, struct pairs *pairs)
 {
 	const int top = weights->n - 1;
 
-	*pairs = (struct calibrate_pairs){0};
+	*pairs = (struct pairs){0};
 	weights->setup->dithered = true;
 	for (int series = 1; series <= weights->series; series++) {
 		for (int k = 0; k <= top; k++)
