@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include <incise/clock.h>
 #include "../cli/cli.h"
-#include "../cli/png_file.h"
+#include "../cli/image.h"
 #include "view_job.h"
 
 int64_t view_wall(void)
@@ -51,7 +51,7 @@ static void keep_picture(struct view_job *job)
 		if (access(path, F_OK))
 			break;
 	}
-	if (png_file_write(path, rgb, width, height, &err))
+	if (image_write_png(path, rgb, width, height, &err))
 		cli_warn("%s", err.text);
 	free(rgb);
 }

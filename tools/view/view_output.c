@@ -8,7 +8,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include "../cli/cli.h"
-#include "../cli/png_file.h"
+#include "../cli/image.h"
 #include "view_output.h"
 
 bool view_output_wanted(const struct view_output *output)
@@ -64,8 +64,8 @@ void view_output_frame(struct view_output *output, struct incise_view *view, dou
 	if (output->folder) {
 		snprintf(path, sizeof(path), "%s/frame-%06llu.png", output->folder,
 			 (unsigned long long)output->frames);
-		if (png_file_write(path, output->rgb, output->width, output->height,
-				   &err))
+		if (image_write_png(path, output->rgb, output->width, output->height,
+				    &err))
 			cli_fail_with(&err);
 	}
 	if (output->film && incise_film_add(output->film, output->rgb, &err)) {
@@ -88,8 +88,8 @@ void view_output_end(struct view_output *output)
 		cli_warn("%s: ends before its picture %d, at %g s", output->strip_path,
 			 output->stripped + 1, output->strip_s[output->stripped]);
 	if (output->strip_path && output->stripped &&
-	    png_file_write(output->strip_path, output->strip,
-			   output->width * output->n_strip, output->height, &err))
+	    image_write_png(output->strip_path, output->strip,
+			    output->width * output->n_strip, output->height, &err))
 		cli_fail_with(&err);
 	free(output->rgb);
 	free(output->strip);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Picture files; see depth_picture.h. A JPEG goes on as it is: vision decodes it.
+ * Image files; see image.h.
  */
 #include <errno.h>
 #include <stdbool.h>
@@ -10,8 +10,9 @@
 #ifdef HAVE_PNG
 #include <png.h>
 #endif
-#include "../cli/cli.h"
-#include "depth_picture.h"
+#include <incise/outfile.h>
+#include "cli.h"
+#include "image.h"
 
 #define FILE_MAX (64 << 20)
 #define SIDE_MAX 8192 /* incise/vision.h */
@@ -41,8 +42,8 @@ static void check_sides(const char *path, unsigned long width, unsigned long hei
 			 SIDE_MAX);
 }
 
-/* The sizes are in the start-of-frame marker; what is before it has a length. */
-static void take_jpeg(const char *path, struct incise_camera_frame *frame)
+/* The size is in the start-of-frame marker; markers before it have a length. */
+static void read_jpeg(const char *path, struct incise_camera_frame *frame)
 {
 	const uint8_t *d = frame->data;
 	size_t at = 2;
@@ -63,7 +64,7 @@ static void take_jpeg(const char *path, struct incise_camera_frame *frame)
 	cli_fail("%s: a JPEG without sizes; is it whole?", path);
 }
 
-/* The next number of a header, comments passed over; the place behind it. */
+/* Parse the next number of a header after blanks and comments; returns its end. */
 static size_t number(const uint8_t *d, size_t size, size_t at, unsigned long *value)
 {
 	bool any = false;
@@ -82,7 +83,7 @@ static size_t number(const uint8_t *d, size_t size, size_t at, unsigned long *va
 	return any ? at : size;
 }
 
-static void take_pnm(const char *path, struct incise_camera_frame *frame, uint8_t *data)
+static void read_pnm(const char *path, struct incise_camera_frame *frame, uint8_t *data)
 {
 	unsigned long width, height, top;
 	size_t at = number(data, frame->size, 2, &width);
@@ -104,9 +105,9 @@ static void take_pnm(const char *path, struct incise_camera_frame *frame, uint8_
 	memmove(data, data + at, frame->size);
 }
 
-static void take_png(const char *path, struct incise_camera_frame *frame)
-{
 #ifdef HAVE_PNG
+static void read_png(const char *path, struct incise_camera_frame *frame)
+{
 	png_image image = {.version = PNG_IMAGE_VERSION};
 	uint8_t *pixels;
 
@@ -115,9 +116,7 @@ static void take_png(const char *path, struct incise_camera_frame *frame)
 	check_sides(path, image.width, image.height);
 	image.format =
 		image.format & PNG_FORMAT_FLAG_COLOR ? PNG_FORMAT_RGB : PNG_FORMAT_GRAY;
-	pixels = malloc(PNG_IMAGE_SIZE(image));
-	if (!pixels)
-		cli_fail("no memory");
+	pixels = cli_alloc(PNG_IMAGE_SIZE(image), 1);
 	if (!png_image_finish_read(&image, NULL, pixels, 0, NULL))
 		cli_fail("%s: %s", path, image.message);
 	frame->width = (int)image.width;
@@ -128,15 +127,46 @@ static void take_png(const char *path, struct incise_camera_frame *frame)
 	frame->size = PNG_IMAGE_SIZE(image);
 	free((uint8_t *)frame->data);
 	frame->data = pixels;
+}
+
+int image_write_png(const char *path, const uint8_t *rgb, int width, int height,
+		    struct incise_error *err)
+{
+	png_image image = {.version = PNG_IMAGE_VERSION,
+			   .width = (png_uint_32)width,
+			   .height = (png_uint_32)height,
+			   .format = PNG_FORMAT_RGB};
+	struct incise_outfile *file = incise_outfile_open(path, err);
+
+	if (!file)
+		return -errno;
+	if (!png_image_write_to_stdio(&image, incise_outfile_stream(file), 0, rgb, 0,
+				      NULL)) {
+		incise_outfile_abort(file);
+		return incise_error_set(err, EIO, "%s: %s", path, image.message);
+	}
+	return incise_outfile_commit(file, err);
+}
 #else
+static void read_png(const char *path, struct incise_camera_frame *frame)
+{
 	(void)frame;
 	cli_fail(
 		"%s: this build reads no PNG (libpng-dev was not there); convert it to PGM",
 		path);
-#endif
 }
 
-void depth_picture_read(const char *path, struct incise_camera_frame *frame)
+int image_write_png(const char *path, const uint8_t *rgb, int width, int height,
+		    struct incise_error *err)
+{
+	(void)rgb, (void)width, (void)height;
+	return incise_error_set(err, ENOTSUP,
+				"%s: built without PNG: install libpng-dev, build again",
+				path);
+}
+#endif
+
+void image_read(const char *path, struct incise_camera_frame *frame)
 {
 	static const uint8_t png[4] = {0x89, 'P', 'N', 'G'};
 	uint8_t *data;
@@ -145,11 +175,11 @@ void depth_picture_read(const char *path, struct incise_camera_frame *frame)
 	data = read_all(path, &frame->size);
 	frame->data = data;
 	if (frame->size > 10 && !memcmp(data, png, sizeof(png)))
-		take_png(path, frame);
+		read_png(path, frame);
 	else if (frame->size > 10 && data[0] == 0xff && data[1] == 0xd8)
-		take_jpeg(path, frame);
+		read_jpeg(path, frame);
 	else if (frame->size > 10 && data[0] == 'P' && (data[1] == '5' || data[1] == '6'))
-		take_pnm(path, frame, data);
+		read_pnm(path, frame, data);
 	else
 		cli_fail("%s: is no PNG, JPEG, PGM or PPM picture", path);
 }
