@@ -237,18 +237,18 @@ static void by_lengths(struct options *options, struct depth_result *result,
 		}
 		l->vision_px = U_CLICKS_PX;
 		snprintf(options->source.device, sizeof(options->source.device), "given");
-	} else if (one_of(wish, depth_is_csv)) {
+	} else if (one_of(options, depth_is_csv)) {
 		depth_lengths_read(l, options->source.path[0], line);
 		l->vision_px = U_CLICKS_PX;
 		snprintf(options->source.device, sizeof(options->source.device), "CSV");
-	} else if (one_of(wish, depth_is_recording)) {
+	} else if (one_of(options, depth_is_recording)) {
 		depth_lengths_recording(l, options->source.path[0], line);
 		snprintf(options->source.device, sizeof(options->source.device),
 			 "recording");
 	} else if (line) {
 		cli_usage("line: give --from pairs.csv or --from NAME.rec");
 	} else {
-		need_schedule(wish);
+		need_schedule(options);
 		depth_lengths_measure(l, &options->source);
 	}
 	inlier = cli_alloc(l->n, sizeof(*inlier));
@@ -300,13 +300,13 @@ static void by_board(struct options *options, struct depth_result *result,
 
 	c->columns = options->columns;
 	c->rows = options->rows;
-	if (one_of(wish, depth_is_csv)) {
+	if (one_of(options, depth_is_csv)) {
 		depth_corners_read(c, options->source.path[0]);
 		snprintf(options->source.device, sizeof(options->source.device), "CSV");
-	} else if (one_of(wish, depth_is_recording)) {
+	} else if (one_of(options, depth_is_recording)) {
 		cli_usage("board: give pictures or a CSV of corners, not a recording");
 	} else {
-		need_schedule(wish);
+		need_schedule(options);
 		depth_corners_find(c, &options->source);
 	}
 	views = (struct incise_board_views){

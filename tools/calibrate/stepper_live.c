@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Strokes of an actuator against the force sensor; see calibrate_stepper.h. The way of driving
- * is that of incise stepper: targets given again and again, and whatever ends it brings the
- * motor to rest.
+ * Strokes of an actuator against the force sensor; see stepper.h. It is driven as by incise
+ * stepper: targets are repeated, and whatever ends it brings the motor to rest.
  *
  *   position   /|\        each stroke: to a point, settle, read; points are four times as
  *             / | \       dense in its first quarter, where the turn shows
  *            /  |  \
  */
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
-#include "calibrate_stepper.h"
 #include "../cli/cli.h"
+#include "stepper.h"
 
 #define POINTS 70     /* of a stroke */
 #define SETTLE_S 0.05 /* until the force is that of the position */
@@ -53,7 +53,7 @@ static double newtons(const struct stepper_live *live, double code)
 	return (code_mV(live, code) - live->zero_mV) / live->calibration.force_mV_N;
 }
 
-/* All samples there are; more force than may be ends it. */
+/* Read all samples; more than max_N ends the program. */
 static void read_force(struct stepper_live *live)
 {
 	struct incise_force_sample samples[256];
@@ -75,7 +75,7 @@ static void read_force(struct stepper_live *live)
 	live->samples += all;
 	if (!all || live->retreating || !(fabs(sum / all) > live->max_N))
 		return;
-	/* Before power goes, which a spring would not wait for. */
+	/* While it has power: without it the spring would push it back. */
 	live->retreating = true;
 	cli_progress_end();
 	cli_warn("%.2f N is more than %.2f N: going back", sum / all, live->max_N);
@@ -87,7 +87,7 @@ static void read_force(struct stepper_live *live)
 			   live->max_N);
 }
 
-void stepper_live_watch(struct stepper_live *live)
+static void watch(struct stepper_live *live)
 {
 	if (cli_stop) {
 		stepper_drive_rest(&live->drive);
@@ -107,7 +107,7 @@ void stepper_live_creep(struct stepper_live *live, double to_mm)
 	const double end_mm =
 		floor(drive->info.travel_mm / step_mm * (1 + 1e-12)) * step_mm;
 	double at_mm = drive->status.position_mm, waited_s = 0;
-	/* From target to target it goes as fast as it can: at the most creep_mm_s as well. */
+	/* Between two targets it accelerates: keep that below creep_mm_s, too. */
 	const double each_mm =
 		fmax(step_mm, fmin(live->creep_mm_s * pass_s,
 				   live->creep_mm_s * live->creep_mm_s /
@@ -119,7 +119,7 @@ void stepper_live_creep(struct stepper_live *live, double to_mm)
 
 		at_mm += copysign(fmin(fabs(left), each_mm), left);
 		stepper_drive_to(drive, at_mm);
-		stepper_live_watch(live);
+		watch(live);
 		if (at_mm != to_mm)
 			continue;
 		if (stepper_drive_rests(drive) &&
@@ -135,7 +135,7 @@ void stepper_live_creep(struct stepper_live *live, double to_mm)
 		drive->info.name, drive->status.position_mm, to_mm);
 }
 
-double stepper_live_force(struct stepper_live *live, double seconds)
+static double mean_force(struct stepper_live *live, double seconds)
 {
 	struct stepper_drive *drive = &live->drive;
 	const double here_mm = drive->status.position_mm;
@@ -147,7 +147,7 @@ double stepper_live_force(struct stepper_live *live, double seconds)
 			   INCISE_NS_PER_S;
 
 		if (!settled && s >= SETTLE_S + drive->info.settle_s) {
-			stepper_live_watch(live);
+			watch(live);
 			live->sum_N = live->samples = 0;
 			begin = incise_clock_now(drive->clock);
 			settled = true;
@@ -157,7 +157,7 @@ double stepper_live_force(struct stepper_live *live, double seconds)
 			stepper_drive_fail(drive, "%s gives no samples; see its cable",
 					   live->channel.name);
 		stepper_drive_to(drive, here_mm);
-		stepper_live_watch(live);
+		watch(live);
 	}
 }
 
@@ -167,10 +167,10 @@ void stepper_live_plan(struct stepper_live *live)
 	const double top = (1 << live->channel.bits) - 1;
 
 	live->zero_mV = live->calibration.force_zero_mV;
-	/* Without a zero that of this moment has to do: only differences are looked at. */
+	/* Without a zero use the present reading: only differences count. */
 	if (isnan(live->zero_mV)) {
 		live->zero_mV = 0;
-		live->retreating = true; /* nothing moves, and nothing is judged */
+		live->retreating = true; /* nothing moves: no limit */
 		for (int i = 0; i < 40; i++) {
 			incise_clock_wait_until(live->drive.clock,
 						incise_clock_now(live->drive.clock) +
@@ -209,7 +209,7 @@ void stepper_live_plan(struct stepper_live *live)
 			live->high_mm - live->low_mm);
 }
 
-/* On a terminal, somebody has to say that nothing is in the way. */
+/* On a terminal a person must confirm that nothing is in the way. */
 static void confirm(struct stepper_live *live)
 {
 	int c;
@@ -246,6 +246,24 @@ void stepper_live_start(struct stepper_live *live)
 	stepper_live_creep(live, live->low_mm);
 }
 
+void stepper_series_add(struct stepper_series *series, double t_s, double position_mm,
+			double force_N)
+{
+	if (series->n == series->capacity) {
+		series->capacity = series->capacity ? 2 * series->capacity : 512;
+		series->points = cli_resize(series->points, series->capacity,
+					    sizeof(*series->points));
+		series->t_s =
+			cli_resize(series->t_s, series->capacity, sizeof(*series->t_s));
+		series->states = cli_resize(series->states, series->capacity,
+					    sizeof(*series->states));
+	}
+	series->t_s[series->n] = t_s;
+	series->states[series->n] = INCISE_CALIBRATE_STEPPER_USED;
+	series->points[series->n++] =
+		(struct incise_calibrate_stepper_point){position_mm, force_N};
+}
+
 void stepper_live_strokes(struct stepper_live *live, struct stepper_series *series)
 {
 	const double step_mm = live->drive.info.step_mm;
@@ -260,7 +278,7 @@ void stepper_live_strokes(struct stepper_live *live, struct stepper_series *seri
 			mm = k % 2 ? live->high_mm - share * range_mm
 				   : live->low_mm + share * range_mm;
 			stepper_live_creep(live, round(mm / step_mm) * step_mm);
-			N = stepper_live_force(live, READ_S);
+			N = mean_force(live, READ_S);
 			stepper_series_add(series,
 					   (double)(incise_clock_now(live->drive.clock) -
 						    live->begin_ns) /
@@ -274,4 +292,185 @@ void stepper_live_strokes(struct stepper_live *live, struct stepper_series *seri
 					     live->drive.status.position_mm, N);
 		}
 	cli_progress_end();
+}
+
+#define LOOK_S 0.1
+/*
+ * --- the largest step rate -------------------------------------------------------------
+ *
+ * Strokes at rising speed, each way by itself. If the force at a stroke's end is far from the
+ * line of its branch, the nut is far from its count, and the count is corrected first. Then
+ * the force at one and the same position, approached slowly from below, shows single steps.
+ *
+ *   position  fast ╱─look slow  ╱─ look     fast ╲       ╱─ look
+ *                 ╱      ╲_____╱                  ╲look─╱
+ */
+
+#define TWICE 2	   /* strokes at a rate that loses none */
+#define RISE 1.4   /* from one to the next, until one loses steps */
+#define CLOSE 0.03 /* between the last that kept and the first that lost */
+#define STROKES_MAX 80
+#define RUN 0.6 /* of a stroke for speeding up and slowing down */
+
+/* The force at the middle, approached from below. */
+static double look(struct stepper_live *live)
+{
+	stepper_live_creep(live, live->low_mm);
+	stepper_live_creep(live, (live->low_mm + live->high_mm) / 2);
+	return mean_force(live, LOOK_S);
+}
+
+/* One way at a speed; returns the largest speed. */
+static double stroke(struct stepper_live *live, int way, double mm_s)
+{
+	struct stepper_drive *drive = &live->drive;
+	const double a = drive->info.acceleration_mm_s2;
+	const double pass_s = (double)drive->period_ns / INCISE_NS_PER_S;
+	const double to_mm = (way > 0 ? live->high_mm : live->low_mm) + live->off_mm;
+	/* A timeout, for a drive that stands still without a fault. */
+	const double most_s =
+		5 * (live->high_mm - live->low_mm) / mm_s + 2 * mm_s / a + 5;
+	double fastest = 0, left_mm;
+	int64_t begin;
+
+	stepper_live_creep(live, way > 0 ? live->low_mm : live->high_mm);
+	begin = incise_clock_now(drive->clock);
+	for (;;) {
+		left_mm = way * (to_mm - drive->status.position_mm);
+		/* It must slow down two periods from here. */
+		if (left_mm <= mm_s * mm_s / (2 * a) + 2 * mm_s * pass_s)
+			break;
+		stepper_drive_at(drive, way * mm_s);
+		fastest = fmax(fastest, fabs(drive->status.velocity_mm_s));
+		watch(live);
+		if ((double)(incise_clock_now(drive->clock) - begin) >
+		    most_s * INCISE_NS_PER_S)
+			stepper_drive_fail(
+				drive,
+				"%s is told to go at %g mm/s and stays at %.4f mm; "
+				"see incise stepper status",
+				drive->info.name, way * mm_s, drive->status.position_mm);
+	}
+	do {
+		stepper_drive_at(drive, 0);
+		fastest = fmax(fastest, fabs(drive->status.velocity_mm_s));
+		watch(live);
+	} while (!stepper_drive_rests(drive) &&
+		 (double)(incise_clock_now(drive->clock) - begin) <
+			 most_s * INCISE_NS_PER_S);
+	return fastest;
+}
+
+/* Correct the count by a loss. */
+static void correct_count(struct stepper_live *live, double lost_mm)
+{
+	struct stepper_drive *drive = &live->drive;
+	struct incise_error err = {0};
+
+	live->off_mm += lost_mm;
+	if (!drive->info.can_home)
+		return;
+	if (incise_stepper_home(drive->stepper, &cli_stop, &err))
+		stepper_drive_fail(drive, "%s", err.text);
+	stepper_drive_look(drive);
+	live->off_mm = 0;
+}
+
+/* Loss since the last time, after a stroke this way, mm. */
+static double lost(struct stepper_live *live, int way, double was_N,
+		   const struct incise_calibrate_stepper *fit, double seen_mm)
+{
+	double at_mm = live->drive.status.position_mm - live->off_mm;
+	double line_N = (way > 0 ? fit->up_N : fit->down_N) + fit->N_mm * at_mm;
+	double far_mm = (line_N - mean_force(live, LOOK_S)) / fit->N_mm, near_mm;
+	bool far = fabs(far_mm) >
+		   fit->dead_mm + fit->rest_mm + seen_mm + 2 * fit->drift_N / fit->N_mm;
+
+	if (far)
+		correct_count(live, far_mm);
+	near_mm = (was_N - look(live)) / fit->N_mm;
+	if (fabs(near_mm) > seen_mm) {
+		correct_count(live, near_mm);
+		/* The correction may have been smaller than the dead travel. */
+		near_mm += (was_N - look(live)) / fit->N_mm;
+	}
+	if (far)
+		return far_mm;
+	return fabs(near_mm) > seen_mm ? near_mm : 0;
+}
+
+/* Whether a speed loses steps; sets *mm_s to the speed reached. */
+static bool loses(struct stepper_live *live, double *mm_s, double was_N,
+		  const struct incise_calibrate_stepper *fit, struct stepper_rate *rate,
+		  double *lost_mm)
+{
+	double fastest = 0;
+
+	for (int i = 0; i < TWICE; i++)
+		for (int way = 1; way >= -1; way -= 2) {
+			double off;
+
+			fastest = fmax(fastest, stroke(live, way, *mm_s));
+			rate->strokes++;
+			off = lost(live, way, was_N, fit, rate->seen_mm);
+			if (incise_clock_is_real(live->drive.clock))
+				cli_progress("%.0f steps/s: %s, Ctrl-C stops",
+					     fastest / live->drive.info.step_mm,
+					     off != 0 ? "lost steps" : "lost none");
+			if (off != 0) {
+				*lost_mm = fabs(off);
+				*mm_s = fastest;
+				return true;
+			}
+		}
+	*mm_s = fastest;
+	return false;
+}
+
+void stepper_live_rate(struct stepper_live *live,
+		       const struct incise_calibrate_stepper *fit,
+		       struct stepper_rate *rate)
+{
+	const struct incise_stepper_info *info = &live->drive.info;
+	const double range_mm = live->high_mm - live->low_mm;
+	/* Not slower than it creeps, as then the creeping loses steps as well. */
+	double most, at, kept = live->creep_mm_s, loss = NAN, was_N, lost_mm;
+
+	*rate = (struct stepper_rate){.lost_1_s = NAN};
+	if (incise_stepper_jog(live->drive.stepper, 0) == -EOPNOTSUPP) {
+		rate->why = "it cannot be driven at a speed";
+		return;
+	}
+	rate->tried = true;
+	rate->seen_mm =
+		fmax(4 * info->step_mm, 5 * M_SQRT2 * fit->residual_sd_N / fit->N_mm);
+	most = fmin(info->velocity_mm_s, sqrt(RUN * range_mm * info->acceleration_mm_s2));
+	rate->limit_1_s = most / info->step_mm;
+	was_N = look(live);
+	at = fmin(most, 2 * live->creep_mm_s);
+	while (rate->strokes < STROKES_MAX) {
+		double mm_s = at;
+		bool loses_steps = loses(live, &mm_s, was_N, fit, rate, &lost_mm);
+
+		if (loses_steps) {
+			loss = at;
+			rate->lost_1_s = mm_s / info->step_mm;
+			rate->lost_mm = lost_mm;
+		} else {
+			kept = at;
+			rate->kept_1_s = mm_s / info->step_mm;
+		}
+		if (isnan(loss) && kept >= most)
+			break;
+		/* Without a home the count may drift out of the travel. */
+		if (live->high_mm + live->off_mm > info->travel_mm ||
+		    live->low_mm + live->off_mm < -0.05 * range_mm)
+			break;
+		if (!isnan(loss) && loss - kept < CLOSE * loss)
+			break;
+		at = isnan(loss) ? fmin(most, at * RISE) : (kept + loss) / 2;
+	}
+	cli_progress_end();
+	rate->off_mm = live->off_mm;
+	stepper_live_creep(live, live->low_mm);
 }
