@@ -2,7 +2,6 @@
 /*
  * incise calibrate: lists its subcommands; each is a program, incise-calibrate-SUBCOMMAND.
  */
-#include <getopt.h>
 #include "cli/cli.h"
 
 static const struct cli_option options[] = {{0}};

@@ -3,7 +3,6 @@
  * incise eval MODEL.fis: reads lines of inputs (depth velocity), prints the force.
  */
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
