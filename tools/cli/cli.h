@@ -9,6 +9,7 @@
 #ifndef INCISE_CLI_H
 #define INCISE_CLI_H
 
+#include <getopt.h> /* optind */
 #include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
