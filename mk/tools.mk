@@ -21,9 +21,9 @@ $(O)/obj/tools/bench/bench_capture.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 has_cmark := $(shell $(PKG_CONFIG) --exists libcmark-gfm && echo yes)
 $(O)/obj/tools/bench/report_html.o: cppflags += $(if $(has_cmark),-DHAVE_CMARK)
 
-# Picture files: those that depth is calibrated from, and frames of a view.
+# Image files: those that depth is calibrated from, and frames of a view.
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
-$(O)/obj/tools/calibrate/depth_picture.o $(O)/obj/tools/cli/png_file.o: cppflags += $(if $(has_png),-DHAVE_PNG)
+$(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise calibrate check: what is calibrated, how old it is, and what is due; and whether
- * tracker and camera of a recording agree about the depth.
+ * incise calibrate check: the state and age of each calibration, and whether tracker and camera
+ * of a recording agree about the depth.
  */
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,32 +12,9 @@
 #include <incise/redundancy.h>
 #include "cli/cli.h"
 #include "cli/json.h"
+#include "cli/recording.h"
 
-enum { OPT_DUE = CLI_LONG, OPT_ONLY, OPT_RECORDING, OPT_JSON };
-
-static const struct cli_option options[] = {
-	{'c', "calibration", "FILE", "to look at (default: calibration.conf)"},
-	{OPT_DUE, "due", "AGE", "a calibration older than this is due (default: 365d)"},
-	{OPT_ONLY, "only", "LIST",
-	 "what this rig needs, of force,depth,tip,delay,stepper (default: all)"},
-	{OPT_RECORDING, "recording", "NAME.rec",
-	 "see whether its tracker and camera agree about the depth"},
-	{OPT_JSON, "json", NULL, "report as JSON"},
-	{0}};
-
-static const struct cli_command command = {
-	.name = "calibrate check",
-	.synopsis = "[-c FILE] [--due AGE] [--recording NAME.rec]",
-	.summary =
-		"Say what is calibrated, how old it is and what is due; and whether the "
-		"tracker and\nthe camera of a recording agree.",
-	.options = options,
-	.notes =
-		"Exit codes: 0 all is well, 1 something is due, failed or disagrees, 2 bad "
-		"usage.",
-};
-
-/* Kinds of calibration, and the keys that tell whether the last one is in force. */
+/* Kinds of calibration, and the nominal values. */
 static const struct {
 	const char *name, *nominal;
 } kinds[] = {
@@ -49,13 +25,62 @@ static const struct {
 
 enum { KINDS = sizeof(kinds) / sizeof(*kinds) };
 
-struct wish {
+struct options {
 	const char *calibration, *recording;
 	double due_s;
 	bool json, only[KINDS];
 };
 
-/* What is known of one kind. */
+static void parse_only(void *whole, char *list)
+{
+	struct options *options = whole;
+	char *items[KINDS];
+	int n = cli_list("only", list, items, KINDS);
+
+	memset(options->only, 0, sizeof(options->only));
+	for (int i = 0; i < n; i++) {
+		int k = 0;
+
+		while (k < KINDS && strcmp(kinds[k].name, items[i]))
+			k++;
+		if (k == KINDS)
+			cli_usage("--only: there is no '%s': force, depth, tip, delay or "
+				  "stepper",
+				  items[i]);
+		options->only[k] = true;
+	}
+}
+
+static const struct cli_unit ages[] = {
+	{"d", 86400}, {"h", 3600}, {"w", 7 * 86400}, {"y", 365.25 * 86400}, {0}};
+
+static const struct cli_option option_table[] = {
+	{'c', "calibration", "FILE", "to look at (default: calibration.conf)",
+	 CLI_TEXT(struct options, calibration)},
+	{0, "due", "AGE", "a calibration older than this is due (default: 365d)",
+	 CLI_QUANTITY(struct options, due_s, ages, 0, 1e10)},
+	{0, "only", "LIST",
+	 "what this rig needs, of force,depth,tip,delay,stepper (default: all)",
+	 CLI_PARSED_BY(parse_only)},
+	{0, "recording", "NAME.rec",
+	 "see whether its tracker and camera agree about the depth",
+	 CLI_TEXT(struct options, recording)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, json)},
+	{0}};
+
+static const struct cli_command command = {
+	.name = "calibrate check",
+	.synopsis = "[-c FILE] [--due AGE] [--recording NAME.rec]",
+	.summary =
+		"Say what is calibrated, how old it is and what is due; and whether the "
+		"tracker and\nthe camera of a recording agree.",
+	.options = option_table,
+	.notes =
+		"Exit codes: 0 all is well, 1 something is due, failed or disagrees, 2 bad "
+		"usage.",
+};
+
+/* The state of one kind. */
 struct status {
 	const struct incise_calibration_record *last, *passed;
 	double age_s;	  /* of the one that passed; NAN: none */
@@ -69,55 +94,7 @@ struct comparison {
 	char verdict[240];
 };
 
-static void take_only(struct wish *wish, char *list)
-{
-	char *items[KINDS];
-	int n = cli_list("only", list, items, KINDS);
-
-	memset(wish->only, 0, sizeof(wish->only));
-	for (int i = 0; i < n; i++) {
-		int k = 0;
-
-		while (k < KINDS && strcmp(kinds[k].name, items[i]))
-			k++;
-		if (k == KINDS)
-			cli_usage("--only: there is no '%s': force, depth, tip, delay or "
-				  "stepper",
-				  items[i]);
-		wish->only[k] = true;
-	}
-}
-
-static void take_options(struct wish *wish, int argc, char **argv)
-{
-	static const struct cli_unit ages[] = {
-		{"d", 86400}, {"h", 3600}, {"w", 7 * 86400}, {"y", 365.25 * 86400}, {0}};
-	int id;
-
-	while ((id = cli_next(&command, argc, argv)) != CLI_END)
-		switch (id) {
-		case 'c':
-			wish->calibration = optarg;
-			break;
-		case OPT_DUE:
-			wish->due_s = cli_quantity("--due", optarg, ages, 0, 1e10);
-			break;
-		case OPT_ONLY:
-			take_only(wish, optarg);
-			break;
-		case OPT_RECORDING:
-			wish->recording = optarg;
-			break;
-		case OPT_JSON:
-			wish->json = true;
-			break;
-		}
-	if (optind < argc)
-		cli_usage("'%s' is too much: a recording goes with --recording",
-			  argv[optind]);
-}
-
-/* Seconds since a date of the history, which is well formed; below 0: in the future. */
+/* Seconds since a date of the history; negative: in the future. */
 static double age_of(const char *date)
 {
 	struct tm utc = {0};
@@ -126,7 +103,7 @@ static double age_of(const char *date)
 	return difftime(time(NULL), timegm(&utc));
 }
 
-/* The first key whose value is not what the calibration left; NULL: all are. */
+/* The first key whose value was changed after the calibration, or NULL. */
 static const char *altered(const struct incise_calibration *c,
 			   const struct incise_calibration_record *record)
 {
@@ -137,7 +114,7 @@ static const char *altered(const struct incise_calibration *c,
 	return NULL;
 }
 
-static void judge(const struct wish *wish, int kind,
+static void judge(const struct options *options, int kind,
 		  const struct incise_calibration *calibration,
 		  const struct incise_calibration_record *records, int n,
 		  struct status *s)
@@ -169,9 +146,9 @@ static void judge(const struct wish *wish, int kind,
 	else if (s->age_s < -60)
 		snprintf(s->why, sizeof(s->why),
 			 "its date is in the future: look at the clock");
-	else if (s->age_s > wish->due_s)
+	else if (s->age_s > options->due_s)
 		snprintf(s->why, sizeof(s->why), "older than %.4g days",
-			 wish->due_s / 86400);
+			 options->due_s / 86400);
 	else
 		s->due = false;
 }
@@ -234,13 +211,11 @@ static json_t *json_status(const struct incise_calibration *calibration, int kin
 static void compare(const char *path, struct comparison *c)
 {
 	struct incise_error err = {0};
-	struct incise_recording *recording = incise_recording_open(path, &err);
+	struct incise_recording *recording = recording_open(path);
 	struct incise_redundancy *r = &c->redundancy;
 	struct incise_depth_pair *pairs;
 	int n;
 
-	if (!recording)
-		cli_fail_with(&err);
 	n = incise_depth_pairs(recording, &pairs, &err);
 	if (n < 0)
 		cli_fail_with(&err);
@@ -305,7 +280,8 @@ static json_t *json_comparison(const struct comparison *c)
 
 int main(int argc, char **argv)
 {
-	struct wish wish = {.calibration = "calibration.conf", .due_s = 365 * 86400.0};
+	struct options options = {.calibration = "calibration.conf",
+				  .due_s = 365 * 86400.0};
 	struct incise_calibration_record *records;
 	struct incise_calibration calibration;
 	struct comparison comparison = {0};
@@ -313,41 +289,43 @@ int main(int argc, char **argv)
 	struct incise_error err = {0};
 	int n, rc, bad = 0;
 
-	memset(wish.only, 1, sizeof(wish.only));
-	take_options(&wish, argc, argv);
-	n = incise_calibration_history(wish.calibration, &records, &err);
-	rc = n < 0 ? n : incise_calibration_load(wish.calibration, &calibration, &err);
+	memset(options.only, 1, sizeof(options.only));
+	cli_parse(&command, argc, argv, &options);
+	cli_no_operands(argc, argv, "a recording goes with --recording");
+	n = incise_calibration_history(options.calibration, &records, &err);
+	rc = n < 0 ? n : incise_calibration_load(options.calibration, &calibration, &err);
 	if (rc == -ENOENT) { /* nothing was ever calibrated here */
 		n = 0;
 		incise_calibration_nominal(&calibration);
 	} else if (rc) {
 		cli_fail_with(&err);
 	}
-	if (wish.recording)
-		compare(wish.recording, &comparison);
+	if (options.recording)
+		compare(options.recording, &comparison);
 	for (int k = 0; k < KINDS; k++) {
-		judge(&wish, k, &calibration, records, n, &status[k]);
-		bad += wish.only[k] && status[k].due;
+		judge(&options, k, &calibration, records, n, &status[k]);
+		bad += options.only[k] && status[k].due;
 	}
-	if (wish.json) {
+	if (options.json) {
 		json_t *list = json_array(), *root;
 
 		for (int k = 0; k < KINDS; k++)
-			if (wish.only[k])
+			if (options.only[k])
 				json_array_append_new(list, json_status(&calibration, k,
 									&status[k]));
-		root = json_pack(
-			"{s:o, s:i, s:i, s:o, s:o}", "path", json_text(wish.calibration),
-			"calibrations", n, "due", bad, "kinds", list, "recording",
-			wish.recording ? json_comparison(&comparison) : json_null());
+		root = json_pack("{s:o, s:i, s:i, s:o, s:o}", "path",
+				 json_text(options.calibration), "calibrations", n, "due",
+				 bad, "kinds", list, "recording",
+				 options.recording ? json_comparison(&comparison)
+						   : json_null());
 		json_print(root);
 	} else {
-		printf("%s: %d calibrations in its history\n", wish.calibration, n);
+		printf("%s: %d calibrations in its history\n", options.calibration, n);
 		for (int k = 0; k < KINDS; k++)
-			if (wish.only[k])
+			if (options.only[k])
 				print_status(&calibration, k, &status[k]);
-		if (wish.recording)
-			print_comparison(wish.recording, &comparison);
+		if (options.recording)
+			print_comparison(options.recording, &comparison);
 	}
 	cli_finish();
 	free(records);

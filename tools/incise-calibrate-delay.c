@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise calibrate delay: how late tracker, force channel and camera are against each other,
- * from a motion that all of them see.
+ * incise calibrate delay: the delays between tracker, force channel and camera, from a motion
+ * that all of them measure.
  *
  *     force   F = f(depth(t + a))    a: the tracker is later than the force
  *     camera  depth(t + b)           b: the tracker is later than the camera
  */
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include <incise/calibrate_delay.h>
-#include "calibrate/calibrate_report.h"
-#include "calibrate/calibrate_result.h"
-#include "calibrate/delay_streams.h"
+#include <incise/recorder.h>
+#include <incise/rig.h>
+#include "calibrate/calibrate.h"
+#include "cli/folder.h"
 #include "cli/json.h"
 #include "cli/plot.h"
 #include "cli/recording.h"
@@ -24,24 +24,43 @@
 #define DRIFT_SIGMAS 4
 #define DRIFT_MAX_MS 0.3
 
-enum { OPT_TIME = CALIBRATE_OWN, OPT_REFERENCE, OPT_RANGE, OPT_CAMERA };
+#define POLL_NS 10000000LL
 
-static const struct cli_option options[] = {
-	{'r', "rig", "RIG",
-	 "file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n"
-	 "(default: ./rig.conf, else /etc/incise/rig.conf)"},
+enum { FORCE, TRACKER, CAMERA, STREAMS };
+static const char *const stream_names[] = {"force", "tracker", "camera", NULL};
+
+struct options {
+	struct calibrate_options common;
+	double time_s, range_ms; /* time_s 0: not given */
+	int reference;
+	bool camera;
+};
+
+static const struct cli_option option_table[] = {
+	{CLI_RIG_OPTION(struct options, common.rig)},
 	{'c', "calibration", "FILE",
-	 "read as found, and written (default: calibration.conf)"},
-	{OPT_TIME, "time", "TIME", "record so long (default: 15s)"},
-	{OPT_REFERENCE, "reference", "STREAM",
-	 "whose delay is right: force (default), tracker, camera"},
-	{OPT_RANGE, "range", "MS", "look for a delay up to so many ms (default: 150)"},
-	{OPT_CAMERA, "camera", NULL, "of the virtual rig, record its camera too"},
-	{CALIBRATE_FROM, "from", "NAME.rec", "take a recording that is there, not a rig"},
-	{CALIBRATE_KEEP, "keep", "NAME.rec", "keep the recording, for --from"},
-	{CALIBRATE_REPORT, "report", "DIR", "report.txt, report.json and pictures"},
-	{CALIBRATE_DRY_RUN, "dry-run", NULL, "do all but write calibration.conf"},
-	{CALIBRATE_JSON, "json", NULL, "tell the result as one JSON object"},
+	 "read as found, and written (default: calibration.conf)",
+	 CLI_TEXT(struct options, common.calibration)},
+	{0, "time", "TIME", "record so long (default: 15s)",
+	 CLI_DURATION(struct options, time_s, 8, 600)},
+	{0, "reference", "STREAM",
+	 "whose delay is right: force (default), tracker, camera",
+	 CLI_CHOICE(struct options, reference, stream_names,
+		    "force, tracker and camera")},
+	{0, "range", "MS", "look for a delay up to so many ms (default: 150)",
+	 CLI_NUMBER(struct options, range_ms, 10, 1000)},
+	{0, "camera", NULL, "of the virtual rig, record its camera too",
+	 CLI_FLAG(struct options, camera)},
+	{0, "from", "NAME.rec", "take a recording that is there, not a rig",
+	 CLI_TEXT(struct options, common.from)},
+	{0, "keep", "NAME.rec", "keep the recording, for --from",
+	 CLI_TEXT(struct options, common.keep)},
+	{0, "report", "DIR", "report.txt, report.json and pictures",
+	 CLI_TEXT(struct options, common.report)},
+	{0, "dry-run", NULL, "do all but write calibration.conf",
+	 CLI_FLAG(struct options, common.dry_run)},
+	{0, "json", NULL, "tell the result as one JSON object",
+	 CLI_FLAG(struct options, common.json)},
 	{0},
 };
 
@@ -52,81 +71,144 @@ static const struct cli_command command = {
 		"Measure how late tracker, force channel and camera are against each other. "
 		"Press\nthe blade's tip on something springy that it does not cut, foam or "
 		"rubber, and\nlift it off again, two or three times a second, unevenly.",
-	.options = options,
+	.options = option_table,
 	.notes =
 		"Example: incise calibrate delay --rig rig.conf --time 15s --report delay\n"
 		"Exit codes: 0 done and in force, 1 failed or refused, 2 bad usage.",
 };
 
-struct wish {
-	struct calibrate_wish common;
-	double time_s, range_ms;
-	int reference;
-	bool camera;
+struct stream {
+	struct incise_delay_point *points; /* force N, others depth mm */
+	int n;				   /* 0: there is none */
+	struct incise_stream about;
 };
 
 /* One stream against the tracker's depth. */
 struct pair {
-	bool there;
+	bool known;
 	struct incise_delay_fit fit;
 };
 
-static int reference_of(const char *text)
+static void parse(struct options *options, int argc, char **argv)
 {
-	for (int i = 0; i < DELAY_STREAMS; i++)
-		if (!strcmp(text, delay_stream_names[i]))
-			return i;
-	cli_usage("--reference: '%s' is none of force, tracker and camera", text);
-}
+	struct calibrate_options *common = &options->common;
 
-static void take_options(struct wish *wish, int argc, char **argv)
-{
-	struct calibrate_wish *common = &wish->common;
-	size_t length;
-	int id;
-
-	while ((id = cli_next(&command, argc, argv)) != CLI_END) {
-		if (calibrate_option(common, id))
-			continue;
-		if (id == OPT_TIME)
-			wish->time_s = cli_duration("time", optarg, 8, 600);
-		else if (id == OPT_REFERENCE)
-			wish->reference = reference_of(optarg);
-		else if (id == OPT_RANGE)
-			wish->range_ms = cli_number("range", optarg, 10, 1000);
-		else
-			wish->camera = true;
-	}
-	if (optind < argc)
-		cli_usage("'%s' is too much: a recording goes with --from", argv[optind]);
-	if (common->from && wish->time_s > 0)
+	cli_parse(&command, argc, argv, options);
+	cli_no_operands(argc, argv, "a recording goes with --from");
+	if (common->from && options->time_s > 0)
 		cli_usage("--time: a recording has its own");
-	if (!common->from && !(wish->time_s > 0) && !isatty(STDIN_FILENO))
+	if (!common->from && !(options->time_s > 0) && !isatty(STDIN_FILENO))
 		cli_usage("without a terminal, --time or --from is needed");
-	length = common->keep ? strlen(common->keep) : 0;
-	if (common->keep && (length < 5 || strcmp(common->keep + length - 4, ".rec")))
+	if (common->keep &&
+	    (strlen(common->keep) < 5 || !cli_ends_with(common->keep, ".rec")))
 		cli_usage("--keep: '%s' is not a name that ends in .rec", common->keep);
+	calibrate_begin(common);
 }
 
-/* --- recording now --------------------------------------------------------------------- */
+/* --- streams ------------------------------------------------------------------------- */
 
-/* What is there of a recording, whole or interrupted. */
-static void remove_recording(const char *path)
+static void read_stream(struct stream *stream, struct incise_recording *recording,
+			const char *values_of)
 {
-	char *part;
+	struct incise_recording_value *values;
+	struct incise_error err = {0};
+	int n = incise_recording_values(recording, values_of, &values, &err);
 
-	if (asprintf(&part, "%s.part", path) < 0)
-		cli_fail("no memory");
-	recording_remove(path);
-	recording_remove(part);
-	free(part);
+	if (n < 0)
+		cli_fail_with(&err);
+	stream->points = cli_alloc((size_t)n + 1, sizeof(*stream->points));
+	for (int i = 0; i < n; i++)
+		stream->points[i] = (struct incise_delay_point){.t_ns = values[i].t_ns,
+								.value = values[i].value};
+	stream->n = n;
+	free(values);
 }
 
-static void record_now(const struct wish *wish, struct delay_stream *streams)
+static void read_streams(struct stream streams[STREAMS], const char *path)
 {
-	const char *base = getenv("TMPDIR");
-	char *folder = NULL, *path = NULL;
-	double time_s = wish->time_s > 0 ? wish->time_s : 15;
+	static const char *const values[] = {"force", "depth", "camera"};
+	struct incise_recording_info info;
+	struct incise_error err = {0};
+	struct incise_recording *recording = recording_open(path);
+
+	if (incise_recording_info(recording, &info, &err))
+		cli_fail_with(&err);
+	if (!info.n_streams)
+		cli_fail("%s: is of an older incise, and does not say which delays its "
+			 "times have; record anew",
+			 path);
+	for (int i = 0; i < STREAMS; i++) {
+		streams[i] = (struct stream){0};
+		for (int k = 0; k < info.n_streams; k++)
+			if (!strcmp(info.streams[k].name, stream_names[i]))
+				streams[i].about = info.streams[k];
+		read_stream(&streams[i], recording, values[i]);
+	}
+	incise_recording_close(recording);
+}
+
+/* Poll until the time is over, a signal comes or it fails: 0 or not. */
+static int poll_for(struct incise_recorder *recorder, struct incise_clock *clock,
+		    double time_s, struct incise_error *err)
+{
+	int64_t start = incise_clock_now(clock), now = start;
+	struct incise_recorder_stats stats;
+	int rc = 0;
+
+	while (!rc && !cli_stop && (now - start) * 1e-9 < time_s) {
+		incise_clock_wait_until(clock, now + POLL_NS);
+		now = incise_clock_now(clock);
+		rc = incise_recorder_poll(recorder, err);
+		incise_recorder_stats(recorder, &stats);
+		cli_progress("%s  %.0f s left, depth %.1f mm, force %.2f N",
+			     (now - start) * 1e-9 < 1 ? "hold the tool free  "
+						      : "tap or press, unevenly",
+			     time_s - (now - start) * 1e-9, stats.depth_mm,
+			     stats.force_N);
+	}
+	cli_progress_end();
+	return rc;
+}
+
+/*
+ * Record the rig for @time_s into @path, which ends in .rec, with its camera if rig.conf names
+ * one or --camera is given. 0, or -1 with *err: then a part of it may be left there.
+ */
+static int record(const struct options *options, double time_s, const char *path,
+		  struct incise_error *err)
+{
+	unsigned int devices = INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_CAMERA |
+			       (options->camera ? 0 : INCISE_RIG_IF_NAMED);
+	struct incise_recorder_setup setup = {.calibration = &options->common.found,
+					      .planned_s = time_s};
+	struct incise_rig *rig =
+		incise_rig_open(cli_rig(options->common.rig), devices, err);
+	struct incise_error second = {0};
+	struct incise_recorder *recorder;
+	struct incise_vision_setup vision;
+	int rc;
+
+	if (!rig)
+		return -1;
+	if (incise_rig_camera(rig) && !incise_rig_vision(rig, &vision))
+		setup.vision = &vision;
+	recorder = incise_recorder_new(path, rig, &setup, err);
+	rc = recorder ? poll_for(recorder, incise_rig_clock(rig), time_s, err) : -1;
+	if (recorder && incise_recorder_close(recorder, rc ? &second : err))
+		rc = -1;
+	incise_rig_close(rig);
+	if (!rc && cli_stop) {
+		incise_error_set(err, EINTR, "stopped; the old calibration stays");
+		rc = -1;
+	}
+	return rc ? -1 : 0;
+}
+
+static void record_now(const struct options *options, struct stream *streams)
+{
+	const char *keep = options->common.keep, *base = getenv("TMPDIR");
+	char *folder, *path;
+	double time_s = options->time_s > 0 ? options->time_s : 15;
 	struct incise_error err = {0};
 	int rc;
 
@@ -138,37 +220,32 @@ static void record_now(const struct wish *wish, struct delay_stream *streams)
 		while (getchar() != '\n' && !feof(stdin) && !cli_stop)
 			;
 	}
-	if (wish->common.keep) {
-		if (delay_streams_record(wish->common.rig, &wish->common.found, time_s,
-					 wish->camera, wish->common.keep, &err))
+	if (keep) {
+		if (record(options, time_s, keep, &err))
 			cli_fail_with(&err);
-		delay_streams_read(streams, wish->common.keep);
+		read_streams(streams, keep);
 		return;
 	}
-	if (asprintf(&folder, "%s/incise-XXXXXX", base && *base ? base : "/tmp") < 0)
-		cli_fail("no memory");
+	folder = cli_text("%s/incise-XXXXXX", base && *base ? base : "/tmp");
 	if (!mkdtemp(folder))
 		cli_fail("%s: %s", folder, strerror(errno));
-	if (asprintf(&path, "%s/delay.rec", folder) < 0)
-		cli_fail("no memory");
-	rc = delay_streams_record(wish->common.rig, &wish->common.found, time_s,
-				  wish->camera, path, &err);
+	path = cli_text("%s/delay.rec", folder);
+	rc = record(options, time_s, path, &err);
 	if (!rc)
-		delay_streams_read(streams, path);
-	remove_recording(path);
-	rmdir(folder);
+		read_streams(streams, path);
+	folder_remove(folder);
 	free(path);
 	free(folder);
 	if (rc)
 		cli_fail_with(&err);
 }
 
-/* --- fits ------------------------------------------------------------------------------ */
+/* --- fits ---------------------------------------------------------------------------- */
 
-static void fit_pair(const struct wish *wish, const struct delay_stream *streams,
+static void fit_pair(const struct options *options, const struct stream *streams,
 		     int other, struct pair *pair)
 {
-	const struct delay_stream *depth = &streams[DELAY_TRACKER];
+	const struct stream *depth = &streams[TRACKER];
 	const struct incise_delay_fit *fit = &pair->fit;
 	struct incise_error err = {0};
 
@@ -176,21 +253,21 @@ static void fit_pair(const struct wish *wish, const struct delay_stream *streams
 		return;
 	if (incise_calibrate_delay(
 		    depth->points, depth->n, streams[other].points, streams[other].n,
-		    other == DELAY_FORCE ? INCISE_DELAY_FORCE : INCISE_DELAY_ALIKE,
-		    wish->range_ms, &pair->fit, &err))
-		cli_fail("tracker and %s: %s", delay_stream_names[other], err.text);
-	pair->there = true;
+		    other == FORCE ? INCISE_DELAY_FORCE : INCISE_DELAY_ALIKE,
+		    options->range_ms, &pair->fit, &err))
+		cli_fail("tracker and %s: %s", stream_names[other], err.text);
+	pair->known = true;
 	if (fabs(fit->drift_ms) > DRIFT_MAX_MS &&
 	    fabs(fit->drift_ms) > DRIFT_SIGMAS * fit->drift_sd_ms)
 		cli_fail("tracker and %s: the delay drifts by %.2f ms in %.0f s (u %.2f "
 			 "ms): the time of one of them is wrong; see incise info on the "
 			 "recording",
-			 delay_stream_names[other], fit->drift_ms, fit->span_s,
+			 stream_names[other], fit->drift_ms, fit->span_s,
 			 fit->drift_sd_ms);
 }
 
-/* What the line through arrivals leaves unknown of a stream's times, ms. */
-static double line_u(const struct delay_stream *stream)
+/* Uncertainty of a stream's times by the line through its arrivals, ms. */
+static double line_u(const struct stream *stream)
 {
 	double all = stream->about.offset_sd_ms, delay = stream->about.delay_sd_ms;
 
@@ -204,8 +281,8 @@ struct lateness {
 	double ms, fits_u, lines_u;
 };
 
-static struct lateness lateness_of(const struct delay_stream *streams,
-				   const struct pair *pairs, int stream, int reference)
+static struct lateness lateness_of(const struct stream *streams, const struct pair *pairs,
+				   int stream, int reference)
 {
 	struct lateness late = {0};
 	int ends[] = {stream, reference};
@@ -214,8 +291,8 @@ static struct lateness lateness_of(const struct delay_stream *streams,
 		double u = line_u(&streams[ends[e]]);
 
 		late.lines_u = hypot(late.lines_u, u);
-		/* of the tracker itself there is no pair: it is what all are held to */
-		if (ends[e] == DELAY_TRACKER)
+		/* the tracker is the other side of each pair */
+		if (ends[e] == TRACKER)
 			continue;
 		late.ms += (e ? 1 : -1) * pairs[ends[e]].fit.delay_ms;
 		late.fits_u = hypot(late.fits_u, pairs[ends[e]].fit.sd_ms);
@@ -223,13 +300,13 @@ static struct lateness lateness_of(const struct delay_stream *streams,
 	return late;
 }
 
-/* --- the report ------------------------------------------------------------------------ */
+/* --- the report ---------------------------------------------------------------------- */
 
 static json_t *pair_json(const struct pair *pair)
 {
 	const struct incise_delay_fit *fit = &pair->fit;
 
-	if (!pair->there)
+	if (!pair->known)
 		return json_null();
 	return json_pack("{so so so so so so so so so so si}", "tracker_later_ms",
 			 json_number(fit->delay_ms), "u_ms", json_number(fit->sd_ms),
@@ -247,7 +324,7 @@ static void report_pair(FILE *out, const char *name, const struct pair *pair)
 {
 	const struct incise_delay_fit *fit = &pair->fit;
 
-	if (!pair->there)
+	if (!pair->known)
 		return;
 	fprintf(out,
 		"tracker later than %s by %.3f ms, u = %.3f ms, 95 %% interval %.3f to "
@@ -261,33 +338,25 @@ static void report_pair(FILE *out, const char *name, const struct pair *pair)
 		fprintf(out, "  contact begins at a depth of %.2f mm\n", fit->contact_mm);
 }
 
-/* Both streams, the tracker's depth where it was when the other saw it. */
-static void draw(const struct calibrate_wish *wish, const struct delay_stream *streams,
+/* All streams, the tracker's depth shifted by its delay. */
+static void draw(const char *folder, const struct stream *streams,
 		 const struct pair *pairs)
 {
-	const char *folder, *name;
-	char *path;
 	FILE *script;
 
-	if (!plot_possible()) {
-		cli_warn("no pictures: gnuplot is not installed, apt-get install "
-			 "gnuplot-nox");
+	if (!calibrate_can_plot(folder))
 		return;
-	}
-	if (asprintf(&path, "%s/fit", wish->report) < 0)
-		cli_fail("no memory");
-	plot_place("report", path, &folder, &name);
-	for (int i = 0; i < DELAY_STREAMS; i++) {
+	for (int i = 0; i < STREAMS; i++) {
 		int stride = 1 + streams[i].n / 4000;
 		FILE *data;
 		char file[40];
 
-		snprintf(file, sizeof(file), "%s.dat", delay_stream_names[i]);
+		snprintf(file, sizeof(file), "%s.dat", stream_names[i]);
 		data = plot_data(folder, file);
 		for (int k = 0; k < streams[i].n; k += stride)
 			fprintf(data, "%.5f %.5f\n",
 				(streams[i].points[k].t_ns -
-				 streams[DELAY_TRACKER].points[0].t_ns) *
+				 streams[TRACKER].points[0].t_ns) *
 					1e-9,
 				streams[i].points[k].value);
 		plot_data_end(data, folder);
@@ -298,48 +367,46 @@ static void draw(const struct calibrate_wish *wish, const struct delay_stream *s
 		"set y2tics\nset key top right\n"
 		"plot 'tracker.dat' using ($1-%g):2 with lines ls 1 title 'tracker, "
 		"moved', 'force.dat' using 1:2 axes x1y2 with lines ls 2 title 'force'",
-		pairs[DELAY_FORCE].there ? pairs[DELAY_FORCE].fit.delay_ms * 1e-3 : 0);
-	if (pairs[DELAY_CAMERA].there)
+		pairs[FORCE].known ? pairs[FORCE].fit.delay_ms * 1e-3 : 0);
+	if (pairs[CAMERA].known)
 		fprintf(script,
 			", 'camera.dat' using ($1+%g):2 with points pt 7 ps 0.4 lc 3 "
 			"title 'camera, moved'",
-			(pairs[DELAY_CAMERA].fit.delay_ms -
-			 pairs[DELAY_FORCE].fit.delay_ms) *
-				1e-3);
+			(pairs[CAMERA].fit.delay_ms - pairs[FORCE].fit.delay_ms) * 1e-3);
 	putc('\n', script);
 	if (!plot_draw(script, folder, "fit"))
 		cli_warn("fit.png could not be drawn");
-	free(path);
 }
 
-static void state(const struct wish *wish, const struct delay_stream *streams,
-		  const struct pair *pairs, struct incise_calibration_record *record)
+static void fill_record(const struct options *options, const struct stream *streams,
+			const struct pair *pairs,
+			struct incise_calibration_record *record)
 {
-	const struct incise_calibration *c = &wish->common.found;
+	const struct incise_calibration *c = &options->common.found;
 	const double found[][2] = {{c->force_delay_ms, c->force_delay_sd_ms},
 				   {c->tracker_delay_ms, c->tracker_delay_sd_ms},
 				   {c->camera_delay_ms, c->camera_delay_sd_ms}};
 	struct incise_outfile *file;
-	FILE *out = calibrate_report_text(wish->common.report, &file);
+	FILE *out = calibrate_report_text(options->common.report, &file);
 
 	if (out) {
 		fprintf(out, "Delays against the %s\n\n",
-			delay_stream_names[wish->reference]);
-		report_pair(out, "force", &pairs[DELAY_FORCE]);
-		report_pair(out, "camera", &pairs[DELAY_CAMERA]);
+			stream_names[options->reference]);
+		report_pair(out, "force", &pairs[FORCE]);
+		report_pair(out, "camera", &pairs[CAMERA]);
 	}
-	for (int i = 0; i < DELAY_STREAMS; i++) {
+	for (int i = 0; i < STREAMS; i++) {
 		struct lateness late;
 		double u, delay = streams[i].about.delay_ms;
 		char key[32];
 
-		if (i == wish->reference || (i != DELAY_TRACKER && !pairs[i].there))
+		if (i == options->reference || (i != TRACKER && !pairs[i].known))
 			continue;
-		late = lateness_of(streams, pairs, i, wish->reference);
+		late = lateness_of(streams, pairs, i, options->reference);
 		u = hypot(late.fits_u, late.lines_u);
-		snprintf(key, sizeof(key), "%s_delay_ms", delay_stream_names[i]);
+		snprintf(key, sizeof(key), "%s_delay_ms", stream_names[i]);
 		calibrate_value(record, key, "ms", found[i][0], delay + late.ms, u);
-		snprintf(key, sizeof(key), "%s_delay_sd_ms", delay_stream_names[i]);
+		snprintf(key, sizeof(key), "%s_delay_sd_ms", stream_names[i]);
 		calibrate_value(record, key, "ms", found[i][1], u, 0);
 		if (out)
 			fprintf(out,
@@ -348,58 +415,56 @@ static void state(const struct wish *wish, const struct delay_stream *streams,
 				"  budget            type  u, ms   sensitivity\n"
 				"  fit of the motion A     %.4f  1\n"
 				"  lines of arrivals B     %.4f  1\n",
-				delay_stream_names[i], delay + late.ms, delay, late.ms, u,
+				stream_names[i], delay + late.ms, delay, late.ms, u,
 				2 * u, late.fits_u, late.lines_u);
 	}
 	if (out)
 		fprintf(out, "\npass\n");
 	whole_file_end(file);
 	if (out)
-		draw(&wish->common, streams, pairs);
+		draw(options->common.report, streams, pairs);
 }
 
 int main(int argc, char **argv)
 {
 	struct incise_calibration_record record = {
 		.kind = "delay", .low = NAN, .high = NAN, .pass = true};
-	struct delay_stream streams[DELAY_STREAMS];
-	struct pair pairs[DELAY_STREAMS] = {0};
-	struct wish wish = {.range_ms = 150, .reference = DELAY_FORCE};
+	struct stream streams[STREAMS];
+	struct pair pairs[STREAMS] = {0};
+	struct options options = {.range_ms = 150, .reference = FORCE};
 	const char *raw;
 
-	take_options(&wish, argc, argv);
-	calibrate_begin(&wish.common);
+	parse(&options, argc, argv);
 	cli_catch_signals();
-	if (wish.common.from)
-		delay_streams_read(streams, wish.common.from);
+	if (options.common.from)
+		read_streams(streams, options.common.from);
 	else
-		record_now(&wish, streams);
-	if (wish.reference == DELAY_CAMERA && !streams[DELAY_CAMERA].n)
+		record_now(&options, streams);
+	if (options.reference == CAMERA && !streams[CAMERA].n)
 		cli_fail("--reference camera: the recording has no depth by a camera");
-	fit_pair(&wish, streams, DELAY_FORCE, &pairs[DELAY_FORCE]);
-	fit_pair(&wish, streams, DELAY_CAMERA, &pairs[DELAY_CAMERA]);
-	if (!pairs[DELAY_FORCE].there && !pairs[DELAY_CAMERA].there)
+	fit_pair(&options, streams, FORCE, &pairs[FORCE]);
+	fit_pair(&options, streams, CAMERA, &pairs[CAMERA]);
+	if (!pairs[FORCE].known && !pairs[CAMERA].known)
 		cli_fail("there is nothing beside the tracker to compare with");
-	raw = wish.common.keep ? wish.common.keep : wish.common.from;
+	raw = options.common.keep ? options.common.keep : options.common.from;
 	if (raw)
 		snprintf(record.raw, sizeof(record.raw), "%s", raw);
 	snprintf(record.device, sizeof(record.device), "%s",
-		 streams[DELAY_TRACKER].about.device);
+		 streams[TRACKER].about.device);
 	snprintf(record.method, sizeof(record.method),
 		 "least squares of one motion of %.0f s, against the %s",
-		 pairs[DELAY_FORCE].there ? pairs[DELAY_FORCE].fit.span_s
-					  : pairs[DELAY_CAMERA].fit.span_s,
-		 delay_stream_names[wish.reference]);
-	state(&wish, streams, pairs, &record);
+		 pairs[FORCE].known ? pairs[FORCE].fit.span_s : pairs[CAMERA].fit.span_s,
+		 stream_names[options.reference]);
+	fill_record(&options, streams, pairs, &record);
 	snprintf(record.verdict, sizeof(record.verdict),
 		 "correlation %.3f with the force, %.3f with the camera",
-		 pairs[DELAY_FORCE].fit.correlation, pairs[DELAY_CAMERA].fit.correlation);
-	calibrate_end(&wish.common, &record,
+		 pairs[FORCE].fit.correlation, pairs[CAMERA].fit.correlation);
+	calibrate_end(&options.common, &record,
 		      json_pack("{ss so so}", "reference",
-				delay_stream_names[wish.reference], "force",
-				pair_json(&pairs[DELAY_FORCE]), "camera",
-				pair_json(&pairs[DELAY_CAMERA])));
-	for (int i = 0; i < DELAY_STREAMS; i++)
+				stream_names[options.reference], "force",
+				pair_json(&pairs[FORCE]), "camera",
+				pair_json(&pairs[CAMERA])));
+	for (int i = 0; i < STREAMS; i++)
 		free(streams[i].points);
 	return 0;
 }

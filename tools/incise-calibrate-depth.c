@@ -1,52 +1,208 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise calibrate depth: scale of the camera's picture in the plane of the scalpel, from
+ * incise calibrate depth: the scale of the camera's picture in the plane of the scalpel, from
  * two points, a line of pairs, or a board.
  */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <incise/calibrate_depth.h>
-#include <incise/calibration.h>
-#include "calibrate/calibrate_result.h"
-#include "calibrate/depth_report.h"
-#include "calibrate/depth_wish.h"
+#include <unistd.h>
+#include "calibrate/calibrate.h"
+#include "calibrate/depth.h"
 #include "cli/json.h"
 
-#define U_CLICKS_PX 0.7 /* two ends, half a pixel each */
-#define U_WORST 0.005	/* 2 u of more than that, relative, is no calibration */
-#define BEND_MM 0.2	/* that one number is off, within a handle's length */
-#define BEND_SD 4.0
-/* --- the three ways ------------------------------------------------------------------ */
+#define LENGTH_MM 47.5	  /* paper 1, §2 */
+#define U_LENGTH_MM 0.012 /* a caliper that is right to 0.02 mm: that over √3 */
+#define U_GAUGE 0.05	  /* % */
+#define U_ZERO_MM 0.02
+#define U_SQUARE 0.02 /* % */
+#define U_PLANE_MM 0.1
 
-static void corner_pair(const char *option, char *text, double to[2][2], double most)
+#define U_CLICKS_PX 0.7 /* two ends, half a pixel each */
+#define U_WORST 0.005	/* a larger 2 u, relative, is no calibration */
+#define BEND_MM 0.2	/* largest error of one number within a handle's length */
+#define BEND_SD 4.0
+#define FILES_MAX 1000
+
+struct options {
+	struct calibrate_options common;
+	const char *way; /* two-point, line, board */
+	double length_mm, u_length_mm, u_px, u_gauge, u_zero_mm;
+	const char *pixels, *axis, *region;
+	int columns, rows;
+	double square_mm, u_square, u_plane_mm;
+	struct depth_source source;
+};
+
+static const struct cli_unit lengths[] = {
+	{"mm", 1}, {"um", 1e-3}, {"cm", 10}, {"m", 1e3}, {0}};
+
+static void parse_board(void *whole, char *text)
+{
+	struct options *options = whole;
+	char rest;
+
+	if (sscanf(text, "%dx%d%c", &options->columns, &options->rows, &rest) != 2 ||
+	    options->columns < 3 || options->rows < 3 || options->columns > 100 ||
+	    options->rows > 100 ||
+	    options->columns * options->rows > INCISE_BOARD_CORNERS)
+		cli_usage("--board: '%s': inner corners as 9x6, 3 or more, at most %d",
+			  text, INCISE_BOARD_CORNERS);
+}
+
+static const struct cli_option option_table[] = {
+	{'r', "rig", "RIG", "rig.conf, or sim:KEY=VALUE,… (default: ./rig.conf)",
+	 CLI_TEXT(struct options, common.rig)},
+	{'c', "calibration", "FILE",
+	 "read as found, and written (default: calibration.conf)",
+	 CLI_TEXT(struct options, common.calibration)},
+	{0, "from", "FILE",
+	 "pictures (more may follow), FILE.csv or NAME.rec instead of the\nrig's camera",
+	 CLI_TEXT(struct options, common.from)},
+	{0, "keep", "FILE", "write the raw data there, as --from reads them",
+	 CLI_TEXT(struct options, common.keep)},
+	{0, "report", "DIR", "report.txt, report.json, fit.png and residuals.png there",
+	 CLI_TEXT(struct options, common.report)},
+	{0, "dry-run", NULL, "change no calibration.conf",
+	 CLI_FLAG(struct options, common.dry_run)},
+	{0, "json", NULL, "report as one JSON object",
+	 CLI_FLAG(struct options, common.json)},
+	{0, "length", "LENGTH", "two-point: known length (default: 47.5mm)",
+	 CLI_QUANTITY(struct options, length_mm, lengths, 0.1, 1000)},
+	{0, "length-u", "LENGTH",
+	 "two-point: its standard uncertainty (default: 0.012mm)",
+	 CLI_QUANTITY(struct options, u_length_mm, lengths, 0, 100)},
+	{0, "pixels", "PX,...", "two-point: the length in pixels, once or more",
+	 CLI_TEXT(struct options, pixels)},
+	{0, "pixels-u", "PX",
+	 "two-point: standard uncertainty that all have alike\n(default: 0.7 of --pixels, 0.03 by vision)",
+	 CLI_NUMBER(struct options, u_px, 0, 1000)},
+	{0, "pictures", "N",
+	 "take so many of the camera (default: on a terminal 50, of a\nboard 8)",
+	 CLI_INTEGER(struct options, source.pictures, 1, FILES_MAX)},
+	{0, "every", "TIME", "board: time between two pictures, without a terminal",
+	 CLI_DURATION(struct options, source.every_s, 0.01, 3600)},
+	{0, "pick", "X,Y", "learn the handle's colour from this pixel",
+	 CLI_TEXT(struct options, source.pick)},
+	{0, "gauge-u", "PERCENT",
+	 "line: standard uncertainty of the gauge's scale (default: 0.05)",
+	 CLI_NUMBER(struct options, u_gauge, 0, 100)},
+	{0, "zero-u", "LENGTH",
+	 "line: standard uncertainty of its zero (default: 0.02mm)",
+	 CLI_QUANTITY(struct options, u_zero_mm, lengths, 0, 100)},
+	{0, "board", "COLSxROWS", "board: inner corners (default: 9x6)",
+	 CLI_PARSED_BY(parse_board)},
+	{0, "square", "LENGTH", "board: side of a square (default: 5mm)",
+	 CLI_QUANTITY(struct options, square_mm, lengths, 0.01, 1000)},
+	{0, "square-u", "PERCENT",
+	 "board: standard uncertainty of the squares (default: 0.02)",
+	 CLI_NUMBER(struct options, u_square, 0, 100)},
+	{0, "plane-u", "LENGTH", "board: how well it lies in the plane (default: 0.1mm)",
+	 CLI_QUANTITY(struct options, u_plane_mm, lengths, 0, 100)},
+	{0, "axis", "X,Y,X,Y",
+	 "board: ends of the handle in the picture (default: upright in\nits middle)",
+	 CLI_TEXT(struct options, axis)},
+	{0, "region", "X,Y,X,Y",
+	 "board: corners of the region of interest (default: 100 px\naround the axis)",
+	 CLI_TEXT(struct options, region)},
+	{0},
+};
+
+static const struct cli_command command = {
+	.name = "calibrate depth",
+	.synopsis = "two-point | line | board [OPTIONS]",
+	.summary =
+		"Measure the scale of the camera's picture in the plane of the scalpel, and write\n"
+		"it to calibration.conf.\n"
+		"two-point: a known length, seen as so many pixels.\n"
+		"line: many pairs of a depth, by a gauge or the tracker, and an exposed length.\n"
+		"board: a chessboard in the cutting plane, and tilted.",
+	.options = option_table,
+	.notes =
+		"Example: incise calibrate depth two-point --length 47.5mm --pixels 400\n"
+		"         incise calibrate depth board --from plane.png tilt*.png --square 5mm\n"
+		"Exit codes: 0 done and in force, 1 failed or refused, 2 bad usage.",
+};
+
+static void parse_files(struct options *options, int argc, char **argv)
+{
+	struct depth_source *source = &options->source;
+
+	if (!options->common.from && optind < argc)
+		cli_usage("'%s': pictures follow --from", argv[optind]);
+	if (!options->common.from)
+		return;
+	source->path = cli_alloc(argc - optind + 1, sizeof(*source->path));
+	source->path[source->n_paths++] = (char *)options->common.from;
+	while (optind < argc)
+		source->path[source->n_paths++] = argv[optind++];
+	if (source->n_paths > 1)
+		for (int i = 0; i < source->n_paths; i++)
+			if (depth_is_csv(source->path[i]) ||
+			    depth_is_recording(source->path[i]))
+				cli_usage("'%s': one CSV or recording at a time",
+					  source->path[i]);
+}
+
+static void parse(struct options *options, int argc, char **argv)
+{
+	*options = (struct options){
+		.length_mm = LENGTH_MM,
+		.u_length_mm = U_LENGTH_MM,
+		.u_px = -1,
+		.u_gauge = U_GAUGE,
+		.u_zero_mm = U_ZERO_MM,
+		.columns = 9,
+		.rows = 6,
+		.square_mm = 5,
+		.u_square = U_SQUARE,
+		.u_plane_mm = U_PLANE_MM,
+	};
+	cli_parse(&command, argc, argv, options);
+	if (optind == argc)
+		cli_usage("how? two-point, line or board");
+	options->way = argv[optind++];
+	if (strcmp(options->way, "two-point") && strcmp(options->way, "line") &&
+	    strcmp(options->way, "board"))
+		cli_usage("'%s': two-point, line or board", options->way);
+	parse_files(options, argc, argv);
+	options->source.rig = options->common.rig;
+	options->source.guided = !options->source.n_paths && isatty(STDIN_FILENO);
+	if (options->pixels &&
+	    (options->common.from || strcmp(options->way, "two-point")))
+		cli_usage("--pixels is of two-point, and without --from");
+}
+
+/* --- lengths and board --------------------------------------------------------------- */
+
+static void corner_pair(const char *option, const char *text, double to[2][2],
+			double most)
 {
 	char *items[5];
 
-	if (cli_list(option, text, items, 5) != 4)
+	if (cli_list(option, (char *)text, items, 5) != 4)
 		cli_usage("--%s: four numbers: X,Y,X,Y", option);
 	for (int i = 0; i < 4; i++)
 		to[i / 2][i % 2] = cli_number(option, items[i], 0, most);
 }
 
-static void need_schedule(const struct depth_wish *wish)
+static void need_schedule(const struct options *options)
 {
-	const struct depth_source *source = &wish->source;
+	const struct depth_source *source = &options->source;
 
 	if (!source->n_paths && !source->guided &&
 	    (!source->pictures ||
-	     (!strcmp(wish->way, "board") && !(source->every_s > 0))))
+	     (!strcmp(options->way, "board") && !(source->every_s > 0))))
 		cli_usage("without a terminal give --from, or --pictures%s of the camera",
-			  strcmp(wish->way, "board") ? "" : " and --every");
+			  strcmp(options->way, "board") ? "" : " and --every");
 }
 
-static bool one_of(const struct depth_wish *wish, bool (*is)(const char *))
+static bool one_of(const struct options *options, bool (*is)(const char *))
 {
-	return wish->source.n_paths == 1 && is(wish->source.path[0]);
+	return options->source.n_paths == 1 && is(options->source.path[0]);
 }
 
-/* What was refused is told with the first outliers, and nothing is changed. */
+/* Print the reason and the first outliers. Nothing is changed. */
 _Noreturn static void refuse(const struct incise_error *err,
 			     const struct depth_lengths *l, const bool *inlier,
 			     int inliers)
@@ -61,17 +217,17 @@ _Noreturn static void refuse(const struct incise_error *err,
 	cli_fail("%s%s%s", err->text, names, length ? ", …)" : "");
 }
 
-static void by_lengths(struct depth_wish *wish, struct depth_result *result,
+static void by_lengths(struct options *options, struct depth_result *result,
 		       struct depth_lengths *l, struct incise_calibration_record *record)
 {
 	static struct incise_depth_fit fit;
-	bool line = !strcmp(wish->way, "line"), *inlier;
+	bool line = !strcmp(options->way, "line"), *inlier;
 	struct incise_error err = {0};
 	int rc;
 
-	if (wish->pixels) {
-		char *items[DEPTH_FILES_MAX], name[30];
-		int n = cli_list("pixels", wish->pixels, items, DEPTH_FILES_MAX);
+	if (options->pixels) {
+		char *items[FILES_MAX], name[30];
+		int n = cli_list("pixels", (char *)options->pixels, items, FILES_MAX);
 
 		for (int i = 0; i < n; i++) {
 			snprintf(name, sizeof(name), "--pixels %d", i + 1);
@@ -79,35 +235,34 @@ static void by_lengths(struct depth_wish *wish, struct depth_result *result,
 					  NAN, name);
 		}
 		l->vision_px = U_CLICKS_PX;
-		snprintf(wish->source.device, sizeof(wish->source.device), "given");
-	} else if (one_of(wish, depth_is_csv)) {
-		depth_lengths_read(l, wish->source.path[0], line);
+		snprintf(options->source.device, sizeof(options->source.device), "given");
+	} else if (one_of(options, depth_is_csv)) {
+		depth_lengths_read(l, options->source.path[0], line);
 		l->vision_px = U_CLICKS_PX;
-		snprintf(wish->source.device, sizeof(wish->source.device), "CSV");
-	} else if (one_of(wish, depth_is_recording)) {
-		depth_lengths_recording(l, wish->source.path[0], line);
-		snprintf(wish->source.device, sizeof(wish->source.device), "recording");
+		snprintf(options->source.device, sizeof(options->source.device), "CSV");
+	} else if (one_of(options, depth_is_recording)) {
+		depth_lengths_recording(l, options->source.path[0], line);
+		snprintf(options->source.device, sizeof(options->source.device),
+			 "recording");
 	} else if (line) {
 		cli_usage("line: give --from pairs.csv or --from NAME.rec");
 	} else {
-		need_schedule(wish);
-		depth_lengths_measure(l, &wish->source);
+		need_schedule(options);
+		depth_lengths_measure(l, &options->source);
 	}
-	inlier = calloc(l->n, sizeof(*inlier));
-	if (!inlier)
-		cli_fail("no memory");
+	inlier = cli_alloc(l->n, sizeof(*inlier));
 	if (line) {
 		struct incise_depth_lengths pairs = {
-			l->mm, l->px, l->n, wish->u_gauge / 100, wish->u_zero_mm};
+			l->mm, l->px, l->n, options->u_gauge / 100, options->u_zero_mm};
 
 		rc = incise_calibrate_depth_line(&pairs, inlier, &fit, &err);
 	} else {
 		struct incise_depth_points points = {
-			.length_mm = wish->length_mm,
-			.u_length_mm = wish->u_length_mm,
+			.length_mm = options->length_mm,
+			.u_length_mm = options->u_length_mm,
 			.length_px = l->px,
 			.n = l->n,
-			.u_px = wish->u_px >= 0 ? wish->u_px : l->vision_px,
+			.u_px = options->u_px >= 0 ? options->u_px : l->vision_px,
 		};
 
 		rc = incise_calibrate_depth_points(&points, inlier, &fit, &err);
@@ -117,7 +272,7 @@ static void by_lengths(struct depth_wish *wish, struct depth_result *result,
 	result->fit = &fit;
 	result->inlier = inlier;
 	result->lengths = l;
-	calibrate_value(record, "depth_mm_px", "mm/px", wish->common.found.depth_mm_px,
+	calibrate_value(record, "depth_mm_px", "mm/px", options->common.found.depth_mm_px,
 			fit.mm_px, fit.u_mm_px);
 	record->low = line ? (fit.full_px - fit.high_px) * fit.mm_px : NAN;
 	record->high = line ? (fit.full_px - fit.low_px) * fit.mm_px : NAN;
@@ -135,39 +290,39 @@ static void by_lengths(struct depth_wish *wish, struct depth_result *result,
 	}
 }
 
-static void by_board(struct depth_wish *wish, struct depth_result *result,
+static void by_board(struct options *options, struct depth_result *result,
 		     struct depth_corners *c, struct incise_calibration_record *record)
 {
 	static struct incise_board_fit fit;
 	static struct incise_board_views views;
 	struct incise_error err = {0};
 
-	c->columns = wish->columns;
-	c->rows = wish->rows;
-	if (one_of(wish, depth_is_csv)) {
-		depth_corners_read(c, wish->source.path[0]);
-		snprintf(wish->source.device, sizeof(wish->source.device), "CSV");
-	} else if (one_of(wish, depth_is_recording)) {
+	c->columns = options->columns;
+	c->rows = options->rows;
+	if (one_of(options, depth_is_csv)) {
+		depth_corners_read(c, options->source.path[0]);
+		snprintf(options->source.device, sizeof(options->source.device), "CSV");
+	} else if (one_of(options, depth_is_recording)) {
 		cli_usage("board: give pictures or a CSV of corners, not a recording");
 	} else {
-		need_schedule(wish);
-		depth_corners_find(c, &wish->source);
+		need_schedule(options);
+		depth_corners_find(c, &options->source);
 	}
 	views = (struct incise_board_views){
 		.columns = c->columns,
 		.rows = c->rows,
-		.square_mm = wish->square_mm,
-		.u_square_mm = wish->u_square / 100 * wish->square_mm,
+		.square_mm = options->square_mm,
+		.u_square_mm = options->u_square / 100 * options->square_mm,
 		.corners = c->px,
 		.n = c->n,
-		.u_plane_mm = wish->u_plane_mm,
+		.u_plane_mm = options->u_plane_mm,
 		.axis_px = {{c->width / 2.0, c->height * 0.1},
 			    {c->width / 2.0, c->height * 0.9}},
 		.width = c->width,
 		.height = c->height,
 	};
-	if (wish->axis)
-		corner_pair("axis", wish->axis, views.axis_px, 8192);
+	if (options->axis)
+		corner_pair("axis", options->axis, views.axis_px, 8192);
 	for (int k = 0; k < 2; k++) {
 		double low = fmin(views.axis_px[0][k], views.axis_px[1][k]);
 		double high = fmax(views.axis_px[0][k], views.axis_px[1][k]);
@@ -175,14 +330,14 @@ static void by_board(struct depth_wish *wish, struct depth_result *result,
 		views.region_px[0][k] = k ? low : low - 100;
 		views.region_px[1][k] = k ? high : high + 100;
 	}
-	if (wish->region)
-		corner_pair("region", wish->region, views.region_px, 8192);
+	if (options->region)
+		corner_pair("region", options->region, views.region_px, 8192);
 	if (incise_calibrate_depth_board(&views, &fit, &err))
 		cli_fail_with(&err);
 	result->board = &fit;
 	result->views = &views;
 	result->corners = c;
-	calibrate_value(record, "depth_mm_px", "mm/px", wish->common.found.depth_mm_px,
+	calibrate_value(record, "depth_mm_px", "mm/px", options->common.found.depth_mm_px,
 			fit.mm_px, fit.u_mm_px);
 	snprintf(
 		record->method, sizeof(record->method),
@@ -200,12 +355,12 @@ static void by_board(struct depth_wish *wish, struct depth_result *result,
 
 /* --- record -------------------------------------------------------------------------- */
 
-static void end_record(const struct depth_wish *wish, struct depth_result *result,
+static void end_record(const struct options *options, struct depth_result *result,
 		       struct incise_calibration_record *record)
 {
 	struct incise_error err = {0};
 	double u = record->values[0].u / record->values[0].left;
-	const char *raw = wish->common.keep;
+	const char *raw = options->common.keep;
 
 	if (record->pass && 2 * u > U_WORST) {
 		record->pass = false;
@@ -218,26 +373,26 @@ static void end_record(const struct depth_wish *wish, struct depth_result *resul
 	if (record->pass)
 		snprintf(record->verdict, sizeof(record->verdict),
 			 "U is %.3f %% of the scale", 200 * u);
-	snprintf(record->device, sizeof(record->device), "%s", wish->source.device);
-	if (!raw && wish->source.n_paths == 1 && depth_is_csv(wish->common.from) &&
-	    strcmp(wish->common.from, "-"))
-		raw = wish->common.from;
+	snprintf(record->device, sizeof(record->device), "%s", options->source.device);
+	if (!raw && options->source.n_paths == 1 && depth_is_csv(options->common.from) &&
+	    strcmp(options->common.from, "-"))
+		raw = options->common.from;
 	if (raw && incise_calibration_raw(record, raw, &err))
 		cli_fail_with(&err);
-	result->in_force = record->pass && !wish->common.dry_run;
-	/* Whatever can fail comes before what changes the calibration. */
-	if (wish->common.report)
-		depth_report_folder(result, wish->common.report);
+	result->in_force = record->pass && !options->common.dry_run;
+	/* Everything that can fail comes before the calibration changes. */
+	if (options->common.report)
+		depth_report_folder(result, options->common.report);
 	if (cli_stop)
 		cli_fail("stopped; the old calibration stays");
-	if (!wish->common.dry_run &&
-	    incise_calibration_append(wish->common.calibration, record, &err))
+	if (!options->common.dry_run &&
+	    incise_calibration_append(options->common.calibration, record, &err))
 		cli_fail_with(&err);
 }
 
 int main(int argc, char **argv)
 {
-	struct depth_wish wish;
+	struct options options;
 	struct incise_calibration_record record = {.kind = "depth",
 						   .low = NAN,
 						   .high = NAN,
@@ -245,22 +400,23 @@ int main(int argc, char **argv)
 						   .pass = true};
 	struct depth_lengths l = {0};
 	struct depth_corners corners = {0};
-	struct depth_result result = {.record = &record, .source = &wish.source};
+	struct depth_result result = {.record = &record, .source = &options.source};
 
-	depth_wish_take(&wish, argc, argv);
-	result.way = wish.way;
+	parse(&options, argc, argv);
+	result.way = options.way;
 	cli_catch_signals();
-	calibrate_find(&wish.common);
-	if (strcmp(wish.way, "board"))
-		by_lengths(&wish, &result, &l, &record);
+	calibrate_find(&options.common);
+	if (strcmp(options.way, "board"))
+		by_lengths(&options, &result, &l, &record);
 	else
-		by_board(&wish, &result, &corners, &record);
-	if (wish.common.keep && result.board)
-		depth_corners_write(&corners, wish.common.keep);
-	else if (wish.common.keep)
-		depth_lengths_write(&l, wish.common.keep, !strcmp(wish.way, "line"));
-	end_record(&wish, &result, &record);
-	if (wish.common.json)
+		by_board(&options, &result, &corners, &record);
+	if (options.common.keep && result.board)
+		depth_corners_write(&corners, options.common.keep);
+	else if (options.common.keep)
+		depth_lengths_write(&l, options.common.keep,
+				    !strcmp(options.way, "line"));
+	end_record(&options, &result, &record);
+	if (options.common.json)
 		json_print(depth_report_json(&result));
 	else
 		depth_report_text(&result, stdout);

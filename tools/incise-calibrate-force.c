@@ -2,70 +2,123 @@
 /*
  * incise calibrate force: sensitivity of the force channel, from weights.
  */
-#include <getopt.h>
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
-#include <incise/calibration.h>
-#include "calibrate/calibrate_force_report.h"
-#include "calibrate/calibrate_result.h"
-#include "calibrate/calibrate_weights.h"
-#include "cli/cli.h"
+#include "calibrate/calibrate.h"
+#include "calibrate/force.h"
 #include "cli/json.h"
+#include "cli/plot.h"
 
-enum {
-	OPT_WEIGHTS = CALIBRATE_OWN,
-	OPT_SERIES,
-	OPT_TIME,
-	OPT_TIMEOUT,
-	OPT_GRAVITY,
-	OPT_LATITUDE,
-	OPT_ALTITUDE,
-	OPT_SCALE,
-	OPT_DENSITY,
-	OPT_RANGE,
-	OPT_NOMINAL,
-	OPT_TOLERANCE,
-	OPT_ZERO,
+struct options {
+	struct calibrate_options common;
+	bool zero, ranged;
+	double latitude_deg, altitude_m; /* latitude_deg NAN: not given */
+	const char *gravity;		 /* its source, for the report */
+	struct weights weights;
+	struct incise_calibrate_force_setup setup;
 };
 
-static const struct cli_option options[] = {
+static void parse_gravity(void *options, char *text)
+{
+	struct incise_calibrate_force_setup *setup = &((struct options *)options)->setup;
+
+	setup->gravity_m_s2 = cli_number("gravity", text, 9.7, 9.9);
+	setup->gravity_u_m_s2 = 1e-4; /* 10 mGal */
+	((struct options *)options)->gravity = "given, to 10 mGal";
+}
+
+static void parse_density(void *options, char *text)
+{
+	struct incise_calibrate_force_setup *setup = &((struct options *)options)->setup;
+
+	setup->weight_kg_m3 = cli_number("density", text, 100, 25000);
+	setup->weight_u_kg_m3 = 0.05 * setup->weight_kg_m3;
+}
+
+static void parse_tolerance(void *tolerance, char *text)
+{
+	*(double *)tolerance = cli_number("tolerance", text, 0.001, 100) / 100;
+}
+
+static void parse_range(void *whole, char *text)
+{
+	struct options *options = whole;
+	char *item[2];
+
+	if (cli_list("range", text, item, 2) != 2)
+		cli_usage("--range: expected two voltages in mV such as 0,5000");
+	options->setup.low_mV = cli_number("range", item[0], -1e6, 1e6);
+	options->setup.high_mV = cli_number("range", item[1], -1e6, 1e6);
+	if (!(options->setup.low_mV < options->setup.high_mV))
+		cli_usage("--range: the first is to be the lower one");
+	options->ranged = true;
+}
+
+static void parse_weights(void *weights, char *text)
+{
+	weights_parse(weights, text);
+}
+
+static const struct cli_unit grams[] = {{"g", 1}, {"mg", 1e-3}, {"kg", 1e3}, {0}};
+
+static const struct cli_option option_table[] = {
 	{'r', "rig", "RIG",
-	 "rig.conf, or sim:KEY=VALUE,... (default: ./rig.conf, then /etc/incise)"},
+	 "rig.conf, or sim:KEY=VALUE,... (default: ./rig.conf, then /etc/incise)",
+	 CLI_TEXT(struct options, common.rig)},
 	{'c', "calibration", "FILE",
-	 "read as found, and written (default: calibration.conf)"},
-	{CALIBRATE_FROM, "from", "FILE",
+	 "read as found, and written (default: calibration.conf)",
+	 CLI_TEXT(struct options, common.calibration)},
+	{0, "from", "FILE",
 	 "pairs instead of a rig: CSV with mass_g or force_N, reading_mV,\n"
-	 "and perhaps series and direction (up, down)"},
-	{CALIBRATE_KEEP, "keep", "FILE", "write the pairs there, as --from reads them"},
-	{CALIBRATE_REPORT, "report", "DIR", "report.txt, report.json and pictures"},
-	{CALIBRATE_DRY_RUN, "dry-run", NULL, "leave the calibration as it is"},
-	{CALIBRATE_JSON, "json", NULL, "report as JSON"},
-	{OPT_WEIGHTS, "weights", "LIST",
-	 "loads such as 0,50g,100g,0.2kg; without it they are asked for"},
-	{OPT_SERIES, "series", "N",
-	 "times up by all loads, the last one down as well (default: 3)"},
-	{OPT_TIME, "time", "TIME", "mean of each reading (default: 2s)"},
-	{OPT_TIMEOUT, "timeout", "TIME",
-	 "for a load to come and be steady (default: 1min)"},
-	{OPT_GRAVITY, "gravity", "M_S2",
+	 "and perhaps series and direction (up, down)",
+	 CLI_TEXT(struct options, common.from)},
+	{0, "keep", "FILE", "write the pairs there, as --from reads them",
+	 CLI_TEXT(struct options, common.keep)},
+	{0, "report", "DIR", "report.txt, report.json and pictures",
+	 CLI_TEXT(struct options, common.report)},
+	{0, "dry-run", NULL, "leave the calibration as it is",
+	 CLI_FLAG(struct options, common.dry_run)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, common.json)},
+	{0, "weights", "LIST",
+	 "loads such as 0,50g,100g,0.2kg; without it they are asked for",
+	 CLI_PARSED(struct options, weights, parse_weights)},
+	{0, "series", "N",
+	 "times up by all loads, the last one down as well (default: 3)",
+	 CLI_INTEGER(struct options, weights.series, 1, 100)},
+	{0, "time", "TIME", "mean of each reading (default: 2s)",
+	 CLI_DURATION(struct options, weights.mean_s, 0.1, 600)},
+	{0, "timeout", "TIME", "for a load to come and be steady (default: 1min)",
+	 CLI_DURATION(struct options, weights.timeout_s, 2, 3600)},
+	{0, "gravity", "M_S2",
 	 "local gravity (default: 9.80665, with the uncertainty of not\n"
-	 "knowing where)"},
-	{OPT_LATITUDE, "latitude", "DEG", "compute gravity for this place"},
-	{OPT_ALTITUDE, "altitude", "M", "above the sea (default: 0)"},
-	{OPT_SCALE, "scale", "MASS",
-	 "resolution of the scale that weighed the loads (default: 0.5g)"},
-	{OPT_DENSITY, "density", "KG_M3", "of the weights (default: 7950)"},
-	{OPT_RANGE, "range", "LOW,HIGH",
+	 "knowing where)",
+	 CLI_PARSED_BY(parse_gravity)},
+	{0, "latitude", "DEG", "compute gravity for this place",
+	 CLI_NUMBER(struct options, latitude_deg, -90, 90)},
+	{0, "altitude", "M", "above the sea (default: 0)",
+	 CLI_NUMBER(struct options, altitude_m, -1000, 10000)},
+	{0, "scale", "MASS",
+	 "resolution of the scale that weighed the loads (default: 0.5g)",
+	 CLI_QUANTITY(struct options, setup.scale_g, grams, 0, 1e4)},
+	{0, "density", "KG_M3", "of the weights (default: 7950)",
+	 CLI_PARSED_BY(parse_density)},
+	{0, "range", "LOW,HIGH",
 	 "ends of the converter in mV (default: those of the rig,\n"
-	 "or not known, with --from)"},
-	{OPT_NOMINAL, "nominal", "MV_N", "to compare with (default: 1240)"},
-	{OPT_TOLERANCE, "tolerance", "PERCENT", "of it, to pass (default: 5)"},
-	{OPT_ZERO, "zero", NULL,
+	 "or not known, with --from)",
+	 CLI_PARSED_BY(parse_range)},
+	{0, "nominal", "MV_N", "to compare with (default: 1240)",
+	 CLI_NUMBER(struct options, setup.nominal_mV_N, 1, 1e5)},
+	{0, "tolerance", "PERCENT", "of it, to pass (default: 5)",
+	 CLI_PARSED(struct options, setup.tolerance, parse_tolerance)},
+	{0, "zero", NULL,
 	 "put the zero in force as well; else it is measured at each\n"
-	 "recording's start"},
+	 "recording's start",
+	 CLI_FLAG(struct options, zero)},
 	{0}};
 
 static const struct cli_command command = {
@@ -74,166 +127,88 @@ static const struct cli_command command = {
 	.summary =
 		"Measure the sensitivity of the force channel with weights (procedure after "
 		"ISO 376)\nand put it in force in calibration.conf.",
-	.options = options,
+	.options = option_table,
 	.notes =
 		"Exit codes: 0 in force (or would be, --dry-run), 1 failed or refused, 2 bad "
 		"usage.",
 };
 
-struct wish {
-	struct calibrate_wish common;
-	bool zero, ranged;
-	double latitude_deg, altitude_m;
-	const char *gravity; /* where it comes from */
-	struct calibrate_weights weights;
-	struct incise_calibrate_force_setup setup;
-};
-
-static void take_range(struct wish *wish, char *text)
+static void parse(struct options *options, int argc, char **argv)
 {
-	char *item[2];
-
-	if (cli_list("range", text, item, 2) != 2)
-		cli_usage("--range: expected two voltages in mV such as 0,5000");
-	wish->setup.low_mV = cli_number("range", item[0], -1e6, 1e6);
-	wish->setup.high_mV = cli_number("range", item[1], -1e6, 1e6);
-	if (!(wish->setup.low_mV < wish->setup.high_mV))
-		cli_usage("--range: the first is to be the lower one");
-	wish->ranged = true;
-}
-
-static void take_options(struct wish *wish, int argc, char **argv)
-{
-	static const struct cli_unit grams[] = {{"g", 1}, {"mg", 1e-3}, {"kg", 1e3}, {0}};
-	struct incise_calibrate_force_setup *setup = &wish->setup;
-	int id;
+	const struct calibrate_options *common = &options->common;
 
 	cli_negative_numbers(argc, argv);
-	while ((id = cli_next(&command, argc, argv)) != CLI_END)
-		switch (id) {
-		case OPT_WEIGHTS:
-			calibrate_weights_list(&wish->weights, optarg);
-			break;
-		case OPT_SERIES:
-			wish->weights.series = (int)cli_integer("series", optarg, 1, 100);
-			break;
-		case OPT_TIME:
-			wish->weights.mean_s = cli_duration("time", optarg, 0.1, 600);
-			break;
-		case OPT_TIMEOUT:
-			wish->weights.timeout_s =
-				cli_duration("timeout", optarg, 2, 3600);
-			break;
-		case OPT_GRAVITY:
-			setup->gravity_m_s2 = cli_number("gravity", optarg, 9.7, 9.9);
-			/* who knows it knows it to 10 mGal */
-			setup->gravity_u_m_s2 = 1e-4;
-			wish->gravity = "given, to 10 mGal";
-			break;
-		case OPT_LATITUDE:
-			wish->latitude_deg = cli_number("latitude", optarg, -90, 90);
-			break;
-		case OPT_ALTITUDE:
-			wish->altitude_m = cli_number("altitude", optarg, -1000, 10000);
-			break;
-		case OPT_SCALE:
-			setup->scale_g = cli_quantity("--scale", optarg, grams, 0, 1e4);
-			break;
-		case OPT_DENSITY:
-			setup->weight_kg_m3 = cli_number("density", optarg, 100, 25000);
-			setup->weight_u_kg_m3 = 0.05 * setup->weight_kg_m3;
-			break;
-		case OPT_RANGE:
-			take_range(wish, optarg);
-			break;
-		case OPT_NOMINAL:
-			setup->nominal_mV_N = cli_number("nominal", optarg, 1, 1e5);
-			break;
-		case OPT_TOLERANCE:
-			setup->tolerance =
-				cli_number("tolerance", optarg, 0.001, 100) / 100;
-			break;
-		case OPT_ZERO:
-			wish->zero = true;
-			break;
-		default:
-			calibrate_option(&wish->common, id);
-		}
-	if (optind < argc)
-		cli_usage("'%s' is too much: pairs are given with --from", argv[optind]);
-	if (wish->common.from &&
-	    (wish->common.rig || wish->weights.n || wish->common.keep))
+	cli_parse(&command, argc, argv, options);
+	cli_no_operands(argc, argv, "pairs are given with --from");
+	if (common->from && (common->rig || options->weights.n || common->keep))
 		cli_usage("--from takes the place of a rig: leave --rig, --weights and "
 			  "--keep out");
-	if (!isnan(wish->latitude_deg) && wish->gravity)
+	if (!isnan(options->latitude_deg) && options->gravity)
 		cli_usage("--gravity or --latitude: one of them");
 }
 
-/* Gravity of a place, and words for where it comes from. */
-static void take_gravity(struct wish *wish)
+/* Gravity of the place, and its source for the report. */
+static void find_gravity(struct options *options)
 {
 	static char words[80];
 
-	if (!isnan(wish->latitude_deg)) {
-		wish->setup.gravity_m_s2 =
-			incise_calibrate_gravity(wish->latitude_deg, wish->altitude_m);
-		wish->setup.gravity_u_m_s2 = 5e-4;
+	if (!isnan(options->latitude_deg)) {
+		options->setup.gravity_m_s2 = incise_calibrate_gravity(
+			options->latitude_deg, options->altitude_m);
+		options->setup.gravity_u_m_s2 = 5e-4;
 		snprintf(words, sizeof(words), "WGS 84 at %g degrees, %g m",
-			 wish->latitude_deg, wish->altitude_m);
-		wish->gravity = words;
-	} else if (!wish->gravity) {
-		wish->gravity = "for anywhere on Earth (--latitude says where)";
+			 options->latitude_deg, options->altitude_m);
+		options->gravity = words;
+	} else if (!options->gravity) {
+		options->gravity = "for anywhere on Earth (--latitude says where)";
 	}
 }
 
-static void read_rig(struct wish *wish, struct calibrate_pairs *pairs, char *device,
+static void read_rig(struct options *options, struct pairs *pairs, char *device,
 		     size_t size)
 {
-	struct incise_error err = {0};
+	const char *spec = cli_rig(options->common.rig);
 	struct incise_force_info info;
-	const char *spec = cli_rig(wish->common.rig);
 
-	if (!wish->weights.n) {
+	if (!options->weights.n) {
 		if (!isatty(STDIN_FILENO))
 			cli_usage("no terminal to ask for weights: give --weights or "
 				  "--from");
-		calibrate_weights_ask(&wish->weights);
+		weights_ask(&options->weights);
 	}
-	wish->weights.rig = incise_rig_open(spec, INCISE_RIG_FORCE, &err);
-	if (!wish->weights.rig)
-		cli_fail_with(&err);
-	incise_force_info(incise_rig_force(wish->weights.rig), &info);
-	if (!wish->ranged) {
-		wish->setup.low_mV = 1e3 * info.offset_V;
-		wish->setup.high_mV = 1e3 * (info.offset_V + info.full_scale_V);
+	options->weights.rig = cli_open_rig(spec, INCISE_RIG_FORCE);
+	incise_force_info(incise_rig_force(options->weights.rig), &info);
+	if (!options->ranged) {
+		options->setup.low_mV = 1e3 * info.offset_V;
+		options->setup.high_mV = 1e3 * (info.offset_V + info.full_scale_V);
 	}
-	wish->setup.step_mV = 1e3 * info.full_scale_V / (double)(1LL << info.bits);
-	wish->weights.setup = &wish->setup;
+	options->setup.step_mV = 1e3 * info.full_scale_V / (double)(1LL << info.bits);
+	options->weights.setup = &options->setup;
 	snprintf(device, size, "%s", info.name);
-	calibrate_weights_read(&wish->weights, pairs);
-	incise_rig_close(wish->weights.rig);
-	if (wish->common.keep)
-		calibrate_pairs_write(pairs, wish->common.keep);
+	weights_measure(&options->weights, pairs);
+	incise_rig_close(options->weights.rig);
+	if (options->common.keep)
+		pairs_write(pairs, options->common.keep);
 }
 
-static void fill_record(const struct wish *wish,
+static void fill_record(const struct options *options,
 			const struct incise_calibrate_force *result,
 			struct incise_calibration_record *record)
 {
-	const struct incise_calibration *found = &wish->common.found;
+	const struct incise_calibration *found = &options->common.found;
 	const double S = result->sensitivity_mV_N;
-	const double off = 100 * (S / wish->setup.nominal_mV_N - 1);
+	const double off = 100 * (S / options->setup.nominal_mV_N - 1);
 
 	snprintf(record->kind, sizeof(record->kind), "force");
 	calibrate_value(record, "force_mV_N", "mV/N", found->force_mV_N, S,
 			result->sensitivity_u_mV_N);
-	if (wish->zero)
+	if (options->zero)
 		calibrate_value(record, "force_zero_mV", "mV", found->force_zero_mV,
 				result->zero_mV, result->zero_u_mV);
 	record->covariance[0] = pow(result->sensitivity_u_mV_N, 2);
 	record->covariance[1] = result->covariance;
 	record->covariance[2] = pow(result->zero_u_mV, 2);
-	record->n_covariance = wish->zero ? 3 : 1;
+	record->n_covariance = options->zero ? 3 : 1;
 	record->low = result->low_N;
 	record->high = result->high_N;
 	snprintf(record->range_unit, sizeof(record->range_unit), "N");
@@ -241,15 +216,16 @@ static void fill_record(const struct wish *wish,
 	snprintf(record->verdict, sizeof(record->verdict),
 		 "%+.2f %% from the nominal %g mV/N, %s %g %%; U = %.2f mV/N (k = 2); "
 		 "linearity %.2g %%",
-		 off, wish->setup.nominal_mV_N, result->pass ? "within" : "more than",
-		 100 * wish->setup.tolerance, 2 * result->sensitivity_u_mV_N,
+		 off, options->setup.nominal_mV_N, result->pass ? "within" : "more than",
+		 100 * options->setup.tolerance, 2 * result->sensitivity_u_mV_N,
 		 result->linearity);
 }
 
-static void begin_record(const struct wish *wish, const char *device,
+static void begin_record(const struct options *options, const char *device,
 			 struct incise_calibration_record *record)
 {
-	const char *raw = wish->common.from ? wish->common.from : wish->common.keep;
+	const char *raw =
+		options->common.from ? options->common.from : options->common.keep;
 	const time_t now = time(NULL);
 	struct incise_error err = {0};
 	struct tm utc;
@@ -266,58 +242,316 @@ static void begin_record(const struct wish *wish, const char *device,
 		cli_fail_with(&err);
 }
 
+/* --- the report ------------------------------------------------------------------------ */
+
+struct report {
+	const struct pairs *pairs;
+	const struct incise_calibrate_force_setup *setup;
+	const struct incise_calibrate_force *result;
+	const enum incise_calibrate_force_state *states;
+	const struct incise_calibration_record *record;
+	const char *refused; /* why there is no result; NULL: there is one */
+	double found_mV_N;   /* in force before */
+	const char *gravity; /* its source */
+};
+
+static const char *const states[] = {
+	[INCISE_CALIBRATE_FORCE_USED] = "used",
+	[INCISE_CALIBRATE_FORCE_SATURATED] = "saturated",
+	[INCISE_CALIBRATE_FORCE_OUTLIER] = "outlier",
+};
+
+static void print_metric(FILE *out, const char *name, double value, const char *unit)
+{
+	if (isnan(value))
+		fprintf(out, "%-15s not stated\n", name);
+	else
+		fprintf(out, "%-15s %.3g %s\n", name, value, unit);
+}
+
+static void print_metrics(const struct report *report, FILE *out)
+{
+	const struct incise_calibrate_force *r = report->result;
+
+	fprintf(out, "%-15s %.2f mV/N, U = %.2f mV/N (k = 2), %.3f %%\n", "sensitivity",
+		r->sensitivity_mV_N, 2 * r->sensitivity_u_mV_N,
+		200 * r->sensitivity_u_mV_N / r->sensitivity_mV_N);
+	fprintf(out, "%-15s %.2f mV/N as found, %+.3f %%\n", "", report->found_mV_N,
+		100 * (r->sensitivity_mV_N / report->found_mV_N - 1));
+	fprintf(out, "%-15s %.2f mV, U = %.2f mV (k = 2)\n", "zero", r->zero_mV,
+		2 * r->zero_u_mV);
+	fprintf(out, "%-15s %.3g mV, scatter of one load %.3g mV\n", "residual sd",
+		r->residual_sd_mV, r->scatter_sd_mV);
+	print_metric(out, "linearity", r->linearity,
+		     "% of full scale, best straight line");
+	print_metric(out, "hysteresis", r->hysteresis, "% of full scale");
+	print_metric(out, "repeatability", r->repeatability, "% of full scale");
+	print_metric(out, "zero return", r->zero_return, "% of full scale");
+	print_metric(out, "resolution", 1e3 * r->resolution_N, "mN");
+	fprintf(out, "%-15s %.3g N to %.4g N", "range", r->low_N, r->high_N);
+	if (isnan(r->clips_N))
+		fprintf(out, "\n");
+	else
+		fprintf(out, "; the converter ends at %.4g N\n", r->clips_N);
+	fprintf(out,
+		"%-15s %d of %d used, %d loads, %d series; %d saturated, %d outliers\n",
+		"pairs", r->used, r->pairs, r->loads, r->series, r->saturated,
+		r->outliers);
+	if (r->misfit > 1)
+		fprintf(out,
+			"%-15s loads lie %.1f times as far from a line as their uncertainty "
+			"explains: U is widened by it\n",
+			"misfit", r->misfit);
+}
+
+static void print_budget(const struct report *report, FILE *out)
+{
+	const struct incise_calibrate_force *r = report->result;
+	const struct incise_calibrate_force_setup *s = report->setup;
+
+	fprintf(out,
+		"\nBudget of the sensitivity's standard uncertainty\n\n"
+		"%-28s %-4s %-18s %-20s %s\n",
+		"source", "type", "u", "sensitivity", "u, mV/N");
+	for (int i = 0; i < r->parts; i++) {
+		const struct incise_calibrate_force_part *part = &r->part[i];
+		char u[24], c[32];
+
+		snprintf(u, sizeof(u), "%.3g %s", part->u, part->unit);
+		snprintf(c, sizeof(c), "%.3g mV/N per %s", part->sensitivity, part->unit);
+		fprintf(out, "%-28s %-4c %-18s %-20s %.4f\n", part->source, part->type, u,
+			c, part->u_mV_N);
+	}
+	fprintf(out, "%-28s %-4s %-18s %-20s %.4f\n\n", "all, in squares", "", "", "",
+		r->sensitivity_u_mV_N);
+	fprintf(out,
+		"Type A rests on %d degrees of freedom, and is widened so that k = 2 is 95 %%.\n"
+		"Gravity %.5f m/s2, u = %.2g, %s. Air %.3g kg/m3, weights %.5g kg/m3.\n"
+		"The scale resolves %.3g g: rectangular, one error for each load weighed.\n",
+		r->freedom, s->gravity_m_s2, s->gravity_u_m_s2, report->gravity,
+		s->air_kg_m3, s->weight_kg_m3, s->scale_g);
+}
+
+/* All pairs, or those that were left out. */
+static void print_pairs(const struct report *report, bool all, FILE *out)
+{
+	const struct incise_calibrate_force *r = report->result;
+
+	for (int i = 0; i < report->pairs->n; i++) {
+		const struct incise_calibrate_force_pair *p = &report->pairs->pair[i];
+		double F_N = incise_calibrate_force_of(p, report->setup);
+
+		if (!all && report->states[i] == INCISE_CALIBRATE_FORCE_USED)
+			continue;
+		fprintf(out, "pair %-4d %10.5f N %10.2f mV  series %d %-4s  %s", i + 1,
+			F_N, p->reading_mV, p->series, p->descending ? "down" : "up",
+			states[report->states[i]]);
+		if (!report->refused)
+			fprintf(out, ", %+.2f mV off",
+				p->reading_mV - r->zero_mV - r->sensitivity_mV_N * F_N);
+		fputc('\n', out);
+	}
+}
+
+/* As text: with budget and pairs if @all. */
+static void print_report(const struct report *report, bool all, FILE *out)
+{
+	if (all)
+		fprintf(out, "Calibration of a force channel, %s\n%s\n%s\n\n",
+			report->record->date, report->record->device,
+			report->record->method);
+	if (report->refused)
+		fprintf(out, "refused: %s\n", report->refused);
+	else
+		print_metrics(report, out);
+	if (all && !report->refused)
+		print_budget(report, out);
+	if (all)
+		fputc('\n', out);
+	print_pairs(report, all, out);
+	if (!report->refused)
+		fprintf(out, "%s: %s\n", report->record->pass ? "pass" : "fail",
+			report->record->verdict);
+}
+
+static json_t *json_budget(const struct incise_calibrate_force *r)
+{
+	json_t *list = json_array();
+
+	for (int i = 0; i < r->parts; i++) {
+		const struct incise_calibrate_force_part *part = &r->part[i];
+		const char type[2] = {part->type};
+
+		json_array_append_new(
+			list, json_pack("{s:o, s:s, s:o, s:s, s:o, s:o}", "source",
+					json_text(part->source), "type", type, "u",
+					json_number(part->u), "unit", part->unit,
+					"sensitivity", json_number(part->sensitivity),
+					"u_mV_N", json_number(part->u_mV_N)));
+	}
+	return list;
+}
+
+static json_t *report_json(const struct report *report)
+{
+	const struct incise_calibrate_force *r = report->result;
+	json_t *pairs = json_array(), *root;
+
+	for (int i = 0; i < report->pairs->n; i++) {
+		const struct incise_calibrate_force_pair *p = &report->pairs->pair[i];
+
+		json_array_append_new(
+			pairs, json_pack("{s:o, s:o, s:i, s:b, s:s}", "force_N",
+					 json_number(incise_calibrate_force_of(
+						 p, report->setup)),
+					 "reading_mV", json_number(p->reading_mV),
+					 "series", p->series, "descending", p->descending,
+					 "state", states[report->states[i]]));
+	}
+	root = json_pack("{s:s, s:o, s:o, s:o, s:o}", "kind", "force", "date",
+			 json_text(report->record->date), "device",
+			 json_text(report->record->device), "method",
+			 json_text(report->record->method), "pairs", pairs);
+	if (report->refused) {
+		json_object_set_new(root, "refused", json_text(report->refused));
+		json_object_set_new(root, "pass", json_false());
+		return root;
+	}
+	json_object_update_new(
+		root,
+		json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}",
+			  "found_mV_N", json_number(report->found_mV_N),
+			  "sensitivity_mV_N", json_number(r->sensitivity_mV_N),
+			  "sensitivity_u_mV_N", json_number(r->sensitivity_u_mV_N),
+			  "sensitivity_U_mV_N", json_number(2 * r->sensitivity_u_mV_N),
+			  "zero_mV", json_number(r->zero_mV), "zero_u_mV",
+			  json_number(r->zero_u_mV), "residual_sd_mV",
+			  json_number(r->residual_sd_mV), "scatter_sd_mV",
+			  json_number(r->scatter_sd_mV), "misfit", json_number(r->misfit),
+			  "budget", json_budget(r)));
+	json_object_update_new(
+		root, json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}",
+				"linearity_percent", json_number(r->linearity),
+				"hysteresis_percent", json_number(r->hysteresis),
+				"repeatability_percent", json_number(r->repeatability),
+				"zero_return_percent", json_number(r->zero_return),
+				"resolution_N", json_number(r->resolution_N), "low_N",
+				json_number(r->low_N), "high_N", json_number(r->high_N),
+				"clips_N", json_number(r->clips_N)));
+	json_object_update_new(
+		root, json_pack("{s:i, s:i, s:i, s:i, s:i, s:b, s:o}", "used", r->used,
+				"saturated", r->saturated, "outliers", r->outliers,
+				"loads", r->loads, "series", r->series, "pass", r->pass,
+				"verdict", json_text(report->record->verdict)));
+	return root;
+}
+
+/* Both plots use one file: force, reading, residual, and whether it was used. */
+static void draw(const struct report *report, const char *folder)
+{
+	const struct incise_calibrate_force *r = report->result;
+	FILE *data = plot_data(folder, "pairs.dat"), *script;
+
+	for (int i = 0; i < report->pairs->n; i++) {
+		const struct incise_calibrate_force_pair *p = &report->pairs->pair[i];
+		double F_N = incise_calibrate_force_of(p, report->setup);
+
+		fprintf(data, "%.6f %.4f %.4f %d\n", F_N, p->reading_mV,
+			p->reading_mV - r->zero_mV - r->sensitivity_mV_N * F_N,
+			report->states[i] ? 2
+			: p->descending	  ? 1
+					  : 0);
+	}
+	plot_data_end(data, folder);
+	script = plot_begin(folder, "fit", 1000, 700);
+	fprintf(script,
+		"set xlabel 'force / N'\nset ylabel 'reading / mV'\nset key top left\n"
+		"plot %.10g + %.10g * x with lines ls 1 title '%.2f mV/N', \\\n"
+		"  'pairs.dat' using ($4 == 0 ? $1 : 1/0):2 with points pt 9 title 'up', \\\n"
+		"  '' using ($4 == 1 ? $1 : 1/0):2 with points pt 11 title 'down', \\\n"
+		"  '' using ($4 == 2 ? $1 : 1/0):2 with points pt 2 title 'left out'\n",
+		r->zero_mV, r->sensitivity_mV_N, r->sensitivity_mV_N);
+	plot_draw_or_fail(script, folder, "fit");
+	script = plot_begin(folder, "residuals", 1000, 700);
+	fprintf(script,
+		"set xlabel 'force / N'\nset ylabel 'reading - line / mV'\nset key top left\n"
+		"plot 0 with lines ls 1 notitle, \\\n"
+		"  'pairs.dat' using ($4 == 0 ? $1 : 1/0):3 with points pt 9 title 'up', \\\n"
+		"  '' using ($4 == 1 ? $1 : 1/0):3 with points pt 11 title 'down'\n");
+	plot_draw_or_fail(script, folder, "residuals");
+}
+
+/* DIR/report.txt, report.json, fit.png and residuals.png. */
+static void write_report(const struct report *report, const char *folder)
+{
+	struct incise_outfile *file;
+	FILE *out;
+
+	if (plot_possible()) {
+		plot_folder(folder);
+		if (!report->refused)
+			draw(report, folder);
+	} else {
+		cli_warn("gnuplot is not installed: the report has no pictures");
+		if (mkdir(folder, 0777) && errno != EEXIST)
+			cli_fail("%s: %s", folder, strerror(errno));
+	}
+	out = calibrate_report_text(folder, &file);
+	print_report(report, true, out);
+	whole_file_end(file);
+	calibrate_report_json(folder, report_json(report));
+}
+
 int main(int argc, char **argv)
 {
-	struct wish wish = {.latitude_deg = NAN,
-			    .weights = {.series = 3, .mean_s = 2, .timeout_s = 60}};
+	struct options options = {.latitude_deg = NAN,
+				  .weights = {.series = 3, .mean_s = 2, .timeout_s = 60}};
 	struct incise_calibration_record record;
-	struct calibrate_pairs pairs = {0};
+	struct pairs pairs = {0};
 	enum incise_calibrate_force_state *states;
 	struct incise_calibrate_force result;
-	struct calibrate_force_report report;
+	struct report report;
 	struct incise_error err = {0};
 	char device[64] = "";
 	int rc;
 
-	incise_calibrate_force_init(&wish.setup);
-	take_options(&wish, argc, argv);
-	take_gravity(&wish);
+	incise_calibrate_force_init(&options.setup);
+	parse(&options, argc, argv);
+	find_gravity(&options);
 	cli_catch_signals();
-	calibrate_find(&wish.common);
-	if (wish.common.from)
-		calibrate_pairs_read(&pairs, wish.common.from);
+	calibrate_find(&options.common);
+	if (options.common.from)
+		pairs_read(&pairs, options.common.from);
 	else
-		read_rig(&wish, &pairs, device, sizeof(device));
-	begin_record(&wish, device, &record);
-	states = calloc(pairs.n, sizeof(*states));
-	if (!states)
-		cli_fail("no memory");
-	rc = incise_calibrate_force(pairs.pair, pairs.n, &wish.setup, &result, states,
+		read_rig(&options, &pairs, device, sizeof(device));
+	begin_record(&options, device, &record);
+	states = cli_alloc(pairs.n, sizeof(*states));
+	rc = incise_calibrate_force(pairs.pair, pairs.n, &options.setup, &result, states,
 				    &err);
-	report = (struct calibrate_force_report){&pairs,
-						 &wish.setup,
-						 &result,
-						 states,
-						 &record,
-						 rc ? err.text : NULL,
-						 wish.common.found.force_mV_N,
-						 wish.gravity};
+	report = (struct report){&pairs,
+				 &options.setup,
+				 &result,
+				 states,
+				 &record,
+				 rc ? err.text : NULL,
+				 options.common.found.force_mV_N,
+				 options.gravity};
 	if (!rc)
-		fill_record(&wish, &result, &record);
-	if (wish.common.report)
-		calibrate_force_write(&report, wish.common.report);
-	if (wish.common.json)
-		json_print(calibrate_force_json(&report));
+		fill_record(&options, &result, &record);
+	if (options.common.report)
+		write_report(&report, options.common.report);
+	if (options.common.json)
+		json_print(report_json(&report));
 	else if (!rc)
-		calibrate_force_print(&report, false, stdout);
+		print_report(&report, false, stdout);
 	cli_finish();
 	if (rc)
 		cli_fail("refused: %s; %s stays as it was", err.text,
-			 wish.common.calibration);
+			 options.common.calibration);
 	if (cli_stop)
-		cli_fail("stopped; %s stays as it was", wish.common.calibration);
-	if (!wish.common.dry_run &&
-	    incise_calibration_append(wish.common.calibration, &record, &err))
+		cli_fail("stopped; %s stays as it was", options.common.calibration);
+	if (!options.common.dry_run &&
+	    incise_calibration_append(options.common.calibration, &record, &err))
 		cli_fail_with(&err);
 	if (!record.pass)
 		cli_fail("not in force: %s", record.verdict);

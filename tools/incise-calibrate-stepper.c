@@ -3,39 +3,71 @@
  * incise calibrate stepper: force per microstep of the actuator, its backlash, hysteresis and
  * stiction, and the largest step rate that loses no step.
  */
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "calibrate/calibrate_result.h"
-#include "calibrate/calibrate_stepper.h"
-#include "cli/cli.h"
+#include "calibrate/calibrate.h"
+#include "calibrate/stepper.h"
 #include "cli/json.h"
+#include "cli/plot.h"
 
-enum { OPT_RANGE = CALIBRATE_OWN, OPT_STROKES, OPT_MAX_FORCE, OPT_NO_RATE, OPT_STEP_MM };
+struct options {
+	struct calibrate_options common;
+	bool no_rate;
+	double low_mm, high_mm, max_N, step_mm; /* NAN: not given */
+	int strokes;				/* 0: not given */
+};
 
-static const struct cli_option options[] = {
-	{'r', "rig", "RIG",
-	 "file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n"
-	 "(default: ./rig.conf, else /etc/incise/rig.conf)"},
+static const struct cli_unit lengths[] = {{"mm", 1}, {"um", 1e-3}, {0}};
+static const struct cli_unit forces[] = {{"N", 1}, {"mN", 1e-3}, {0}};
+
+static void parse_range(void *whole, char *text)
+{
+	struct options *options = whole;
+	char *dots = strstr(text, "..");
+
+	if (!dots)
+		cli_usage("--range: expected two places such as 0mm..1.5mm, got '%.40s'",
+			  text);
+	*dots = 0;
+	options->low_mm = cli_quantity("--range", text, lengths, 0, 1000);
+	options->high_mm = cli_quantity("--range", dots + 2, lengths, 0, 1000);
+	if (!(options->high_mm > options->low_mm))
+		cli_usage("--range: it ends at %g mm, where it begins or before",
+			  options->high_mm);
+}
+
+static const struct cli_option option_table[] = {
+	{CLI_RIG_OPTION(struct options, common.rig)},
 	{'c', "calibration", "FILE",
-	 "read as found, and written (default: calibration.conf)"},
-	{CALIBRATE_FROM, "from", "FILE",
-	 "CSV with position_mm or steps, and force_N, instead of devices"},
-	{CALIBRATE_KEEP, "keep", "FILE", "write the points there as CSV"},
-	{CALIBRATE_REPORT, "report", "DIR",
-	 "pictures of fit and residuals, report.txt and report.json"},
-	{CALIBRATE_DRY_RUN, "dry-run", NULL, "leave the calibration as it is"},
-	{CALIBRATE_JSON, "json", NULL, "report as JSON"},
-	{OPT_RANGE, "range", "MM..MM",
+	 "read as found, and written (default: calibration.conf)",
+	 CLI_TEXT(struct options, common.calibration)},
+	{0, "from", "FILE",
+	 "CSV with position_mm or steps, and force_N, instead of devices",
+	 CLI_TEXT(struct options, common.from)},
+	{0, "keep", "FILE", "write the points there as CSV",
+	 CLI_TEXT(struct options, common.keep)},
+	{0, "report", "DIR", "pictures of fit and residuals, report.txt and report.json",
+	 CLI_TEXT(struct options, common.report)},
+	{0, "dry-run", NULL, "leave the calibration as it is",
+	 CLI_FLAG(struct options, common.dry_run)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, common.json)},
+	{0, "range", "MM..MM",
 	 "of the strokes, e.g. 0mm..1.5mm (default: from 0 to 70 % of what\n"
-	 "the force channel reads)"},
-	{OPT_STROKES, "strokes", "N", "up and down, 2 to 100 (default: 3)"},
-	{OPT_MAX_FORCE, "max-force", "N",
+	 "the force channel reads)",
+	 CLI_PARSED_BY(parse_range)},
+	{0, "strokes", "N", "up and down, 2 to 100 (default: 3)",
+	 CLI_INTEGER(struct options, strokes, 2, 100)},
+	{0, "max-force", "N",
 	 "stop and go back beyond this (default: 80 % of what the channel\n"
-	 "reads)"},
-	{OPT_NO_RATE, "no-rate", NULL, "do not search the largest step rate"},
-	{OPT_STEP_MM, "step-mm", "MM", "with --from: way of a microstep"},
+	 "reads)",
+	 CLI_QUANTITY(struct options, max_N, forces, 0.001, 10000)},
+	{0, "no-rate", NULL, "do not search the largest step rate",
+	 CLI_FLAG(struct options, no_rate)},
+	{0, "step-mm", "MM", "with --from: way of a microstep",
+	 CLI_NUMBER(struct options, step_mm, 1e-7, 100)},
 	{0},
 };
 
@@ -48,93 +80,420 @@ static const struct cli_command command = {
 		"no step. The handle is to press the sensor, and nobody is to hold it. Ctrl-C\n"
 		"ends with the motor at rest and without power. Not a safety device: keep a hand\n"
 		"on the emergency stop.",
-	.options = options,
+	.options = option_table,
 	.notes =
 		"Example:\n  incise calibrate stepper --range 0mm..1.5mm --report bench\n\n"
 		"Exit: 0 done and in force, 1 failed, refused or stopped, 2 bad usage.\n"
 		"See incise-calibrate-stepper(1).",
 };
 
-struct job {
-	struct calibrate_wish wish;
-	bool no_rate;
-	double low_mm, high_mm, max_N, step_mm;
-	int strokes;
-	bool has_strokes;
-};
-
-static const struct cli_unit lengths[] = {{"mm", 1}, {"um", 1e-3}, {0}};
-
-static void parse_range(struct job *job, char *text)
+static void parse(struct options *options, int argc, char **argv)
 {
-	char *dots = strstr(text, "..");
+	const struct calibrate_options *common = &options->common;
 
-	if (!dots)
-		cli_usage("--range: expected two places such as 0mm..1.5mm, got '%.40s'",
-			  text);
-	*dots = 0;
-	job->low_mm = cli_quantity("--range", text, lengths, 0, 1000);
-	job->high_mm = cli_quantity("--range", dots + 2, lengths, 0, 1000);
-	if (!(job->high_mm > job->low_mm))
-		cli_usage("--range: it ends at %g mm, where it begins or before",
-			  job->high_mm);
-}
-
-static void check_options(const struct job *job)
-{
-	if (!isnan(job->step_mm) && !job->wish.from)
+	*options = (struct options){
+		.low_mm = NAN, .high_mm = NAN, .max_N = NAN, .step_mm = NAN};
+	cli_parse(&command, argc, argv, options);
+	if (optind < argc)
+		cli_usage("there is nothing to do with '%s'", argv[optind]);
+	if (!isnan(options->step_mm) && !common->from)
 		cli_usage(
 			"--step-mm is for --from: a rig says itself how far a step goes");
-	if (job->wish.from && (job->wish.rig || job->wish.keep || !isnan(job->low_mm) ||
-			       !isnan(job->max_N) || job->has_strokes || job->no_rate))
+	if (common->from &&
+	    (common->rig || common->keep || !isnan(options->low_mm) ||
+	     !isnan(options->max_N) || options->strokes || options->no_rate))
 		cli_usage(
 			"--from drives nothing: it does not go with --rig, --keep, --range, "
 			"--strokes, --max-force or --no-rate");
+	if (!options->strokes)
+		options->strokes = 3;
 }
 
-static void parse(struct job *job, int argc, char **argv)
+/*
+ * --- points as CSV: --keep writes, --from reads ----------------------------------------
+ *
+ *     t_s,steps,position_mm,force_N
+ */
+
+#define COLUMNS 32
+#define POINTS_MAX 1000000
+
+static void free_series(struct stepper_series *series)
 {
-	static const struct cli_unit forces[] = {{"N", 1}, {"mN", 1e-3}, {0}};
-	int opt;
-
-	*job = (struct job){.low_mm = NAN,
-			    .high_mm = NAN,
-			    .max_N = NAN,
-			    .step_mm = NAN,
-			    .strokes = 3};
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		switch (opt) {
-		case OPT_RANGE:
-			parse_range(job, optarg);
-			break;
-		case OPT_STROKES:
-			job->strokes = (int)cli_integer("strokes", optarg, 2, 100);
-			job->has_strokes = true;
-			break;
-		case OPT_MAX_FORCE:
-			job->max_N =
-				cli_quantity("--max-force", optarg, forces, 0.001, 10000);
-			break;
-		case OPT_NO_RATE:
-			job->no_rate = true;
-			break;
-		case OPT_STEP_MM:
-			job->step_mm = cli_number("step-mm", optarg, 1e-7, 100);
-			break;
-		default:
-			calibrate_option(&job->wish, opt);
-		}
-	if (optind < argc)
-		cli_usage("there is nothing to do with '%s'", argv[optind]);
-	check_options(job);
+	free(series->points);
+	free(series->t_s);
+	free(series->states);
+	*series = (struct stepper_series){0};
 }
 
-/* How sure the force channel's sensitivity is, where the history says it. */
-static void find_sensor_u(const struct calibrate_wish *wish, double *sensor_u)
+struct reader {
+	const char *path;
+	FILE *in;
+	int line, columns, position, steps, force, time; /* -1: no such column */
+	double mm, counted; /* largest travel in both columns */
+	double first_mm, first_steps;
+};
+
+static void read_header(struct reader *r, char **columns)
+{
+	r->position = r->steps = r->force = r->time = -1;
+	for (int i = 0; i < r->columns; i++) {
+		int *at = !strcmp(columns[i], "position_mm") ? &r->position
+			  : !strcmp(columns[i], "steps")     ? &r->steps
+			  : !strcmp(columns[i], "force_N")   ? &r->force
+			  : !strcmp(columns[i], "t_s")	     ? &r->time
+							     : NULL;
+
+		if (at && *at >= 0)
+			cli_fail("%s:%d: two columns are called %s; name each once",
+				 r->path, r->line, columns[i]);
+		if (at)
+			*at = i;
+	}
+	if (r->force < 0 || (r->position < 0 && r->steps < 0))
+		cli_fail(
+			"%s:%d: expected a line of names with force_N, and position_mm or "
+			"steps",
+			r->path, r->line);
+}
+
+static double number(const struct reader *r, char **columns, int i, const char *name)
+{
+	char *end;
+	double value;
+
+	if (i < 0)
+		return NAN;
+	value = strtod(columns[i], &end);
+	if (!*columns[i] || *end || !isfinite(value))
+		cli_fail("%s:%d: %s is '%.20s' and not a number", r->path, r->line, name,
+			 columns[i]);
+	return value;
+}
+
+static void read_point(struct reader *r, char **columns, struct stepper_series *series)
+{
+	double mm = number(r, columns, r->position, "position_mm");
+	double steps = number(r, columns, r->steps, "steps");
+
+	if (!series->n) {
+		r->first_mm = mm;
+		r->first_steps = steps;
+	}
+	if (fabs(steps - r->first_steps) > r->counted) {
+		r->counted = fabs(steps - r->first_steps);
+		r->mm = fabs(mm - r->first_mm);
+	}
+	if (fabs(steps - round(steps)) > 1e-3)
+		cli_fail("%s:%d: steps is %.6g and no whole number; are columns swapped?",
+			 r->path, r->line, steps);
+	/* From the second position on the ratio of both columns is fixed. */
+	if (r->counted > 0 && r->mm > 0 && r->position >= 0 &&
+	    fabs(fabs(mm - r->first_mm) -
+		 fabs(steps - r->first_steps) * r->mm / r->counted) >
+		    1.5 * r->mm / r->counted + 0.01 * r->mm)
+		cli_fail(
+			"%s:%d: position_mm and steps do not go together; are columns swapped?",
+			r->path, r->line);
+	if (series->n == POINTS_MAX)
+		cli_fail("%s:%d: more than %d points; take every tenth", r->path, r->line,
+			 POINTS_MAX);
+	/* Steps are exact; a position in mm has been rounded. */
+	stepper_series_add(series, number(r, columns, r->time, "t_s"),
+			   r->steps >= 0 ? steps : mm,
+			   number(r, columns, r->force, "force_N"));
+}
+
+static void read_series(struct stepper_series *series, const char *path, double step_mm)
+{
+	struct reader r = {.path = path, .in = fopen(path, "re")};
+	char *line = NULL, *columns[COLUMNS];
+	bool header = true;
+	size_t size = 0;
+
+	*series = (struct stepper_series){0};
+	if (!r.in)
+		cli_fail("%s: %s", path, strerror(errno));
+	while (getline(&line, &size, r.in) >= 0) {
+		int n;
+
+		r.line++;
+		if (line[strspn(line, " \t\r\n")] == 0 || *line == '#')
+			continue;
+		n = calibrate_cut(line, columns, COLUMNS, " \t", " \t");
+		if (header) {
+			r.columns = n;
+			read_header(&r, columns);
+			header = false;
+			continue;
+		}
+		if (n != r.columns)
+			cli_fail("%s:%d: %d columns where the first line names %d", path,
+				 r.line, n, r.columns);
+		read_point(&r, columns, series);
+	}
+	if (ferror(r.in))
+		cli_fail("%s: %s", path, strerror(errno));
+	fclose(r.in);
+	free(line);
+	if (!series->n)
+		cli_fail("%s: no points in it", path);
+	if (r.counted > 0 && r.position >= 0)
+		series->step_mm = r.mm / r.counted;
+	else
+		series->step_mm = step_mm;
+	if (!isnan(step_mm))
+		series->step_mm = step_mm;
+	if (!(series->step_mm > 0))
+		cli_fail(
+			"%s: how far a step goes is not in it; give --step-mm, or both columns, "
+			"steps and position_mm",
+			path);
+	for (int i = 0; i < series->n && r.steps >= 0; i++)
+		series->points[i].position_mm *= series->step_mm;
+}
+
+static void write_series(const struct stepper_series *series, const char *path)
+{
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(path, &file);
+
+	fprintf(out, "t_s,steps,position_mm,force_N\n");
+	for (int i = 0; i < series->n; i++)
+		fprintf(out, "%.4f,%lld,%.9g,%.6f\n", series->t_s[i],
+			llround(series->points[i].position_mm / series->step_mm),
+			series->points[i].position_mm, series->points[i].force_N);
+	whole_file_end(file);
+}
+
+/* --- the report ---------------------------------------------------------------------- */
+
+struct report {
+	const struct stepper_series *series;
+	const struct incise_calibrate_stepper *fit;
+	const struct incise_calibrate_stepper_setup *setup;
+	const struct stepper_rate *rate;
+	const struct incise_calibration_record *record;
+	const char *source; /* device, or file */
+};
+
+#define LISTED 20 /* outliers, at most */
+
+static const char *const states[] = {"used", "turn", "saturated", "outlier"};
+
+static void put_budget(const struct incise_calibrate_stepper *fit, FILE *out)
+{
+	fprintf(out,
+		"\nUncertainty of N per microstep (k = 1)\n"
+		"  %-28s %-4s %-12s %s\n",
+		"source", "type", "u", "adds, N/step");
+	for (int i = 0; i < fit->parts; i++) {
+		const struct incise_calibrate_stepper_part *part = &fit->part[i];
+
+		fprintf(out, "  %-28s %-4c %-9.3g %-2s %.3g\n", part->source, part->type,
+			part->u, part->unit, part->u_N_step);
+	}
+	fprintf(out, "  %-28s %-17s %.3g   U = %.3g (k = 2), %.2f %%\n", "all", "",
+		fit->N_step_u, 2 * fit->N_step_u, 200 * fit->N_step_u / fit->N_step);
+}
+
+static void put_rate(const struct stepper_rate *rate, FILE *out)
+{
+	if (rate->why)
+		fprintf(out, "largest step rate  not measured: %s\n", rate->why);
+	if (!rate->tried)
+		return;
+	if (!(rate->kept_1_s > 0))
+		fprintf(out,
+			"largest step rate  none found: even %.0f /s lost %.4f mm, and the strokes "
+			"above were not much slower; see what blocks it\n",
+			rate->lost_1_s, rate->lost_mm);
+	else if (isnan(rate->lost_1_s))
+		fprintf(out,
+			"largest step rate  %.0f /s lost no step, which is as fast as this range "
+			"and rig.conf let it go\n",
+			rate->kept_1_s);
+	else
+		fprintf(out,
+			"largest step rate  %.0f /s lost no step; %.0f /s lost %.4f mm; with a "
+			"margin of 30 %%: %.0f /s\n",
+			rate->kept_1_s, rate->lost_1_s, rate->lost_mm,
+			0.7 * rate->kept_1_s);
+	fprintf(out, "  %d strokes; a loss of %.4f mm would have been seen\n",
+		rate->strokes, rate->seen_mm);
+	if (rate->off_mm != 0)
+		fprintf(out, "  the count is off by %.4f mm now: home it\n",
+			rate->off_mm);
+}
+
+static void report_text(const struct report *report, FILE *out)
+{
+	const struct incise_calibrate_stepper *fit = report->fit;
+	const struct stepper_series *series = report->series;
+	int listed = 0;
+
+	fprintf(out,
+		"%s: %d strokes, %.4g to %.4g mm, %.3f to %.3f N\n\n"
+		"force per microstep %.6g N, U = %.2g N (k = 2)\n"
+		"  per mm           %.5g N/mm, U = %.2g; a step is %.6g mm\n"
+		"backlash           %.4f mm, U = %.4f; with friction at the sensor, which looks "
+		"the same\n"
+		"hysteresis         %.4f N, U = %.4f; %s\n"
+		"stiction           %.4f N, U = %.4f; the force stands still for %.4f mm, %.0f "
+		"steps\n",
+		report->source, fit->strokes, fit->low_mm, fit->high_mm, fit->low_N,
+		fit->high_N, fit->N_step, 2 * fit->N_step_u, fit->N_mm, 2 * fit->N_mm_u,
+		report->setup->step_mm, fit->backlash_mm, 2 * fit->backlash_u_mm,
+		fit->hysteresis_N, 2 * fit->hysteresis_u_N,
+		fit->rest_N == 0  ? "none to be seen"
+		: fit->rest_N > 0 ? "a loss, between the ways"
+				  : "force comes late after turning round",
+		fit->stiction_N, 2 * fit->stiction_u_N, fit->dead_mm,
+		fit->dead_mm / report->setup->step_mm);
+	put_rate(report->rate, out);
+	fprintf(out,
+		"linearity          %.2f %% of full scale; points lie %.2g N off their lines; "
+		"strokes %.2g N apart\n",
+		fit->linearity, fit->residual_sd_N, fit->drift_N);
+	put_budget(fit, out);
+	fprintf(out,
+		"\n%d points: %d used, %d saturated, %d outliers, the rest behind turns\n",
+		fit->points, fit->used, fit->saturated, fit->outliers);
+	for (int i = 0; i < series->n && listed < LISTED; i++)
+		if (series->states[i] >= INCISE_CALIBRATE_STEPPER_SATURATED) {
+			fprintf(out, "  point %d: %.4f mm, %.4f N: %s\n", i + 1,
+				series->points[i].position_mm, series->points[i].force_N,
+				states[series->states[i]]);
+			listed++;
+		}
+	fprintf(out, "%s: %s\n", fit->pass ? "pass" : "fail", report->record->verdict);
+}
+
+static json_t *budget_json(const struct incise_calibrate_stepper *fit)
+{
+	json_t *list = json_array();
+
+	for (int i = 0; i < fit->parts; i++) {
+		const struct incise_calibrate_stepper_part *part = &fit->part[i];
+
+		json_array_append_new(list,
+				      json_pack("{ss ss# so ss so}", "source",
+						part->source, "type", &part->type, 1, "u",
+						json_number(part->u), "unit", part->unit,
+						"u_N_step", json_number(part->u_N_step)));
+	}
+	return list;
+}
+
+static json_t *rate_json(const struct stepper_rate *rate)
+{
+	if (!rate->tried)
+		return json_null();
+	return json_pack("{so so so so so si so}", "kept_1_s",
+			 json_number(rate->kept_1_s), "lost_1_s",
+			 json_number(rate->lost_1_s), "lost_mm",
+			 json_number(rate->lost_mm), "limit_1_s",
+			 json_number(rate->limit_1_s), "seen_mm",
+			 json_number(rate->seen_mm), "strokes", rate->strokes, "off_mm",
+			 json_number(rate->off_mm));
+}
+
+static json_t *report_json(const struct report *report)
+{
+	const struct incise_calibrate_stepper *fit = report->fit;
+	const struct {
+		const char *key;
+		double value;
+	} numbers[] = {
+		{"N_step", fit->N_step},
+		{"N_step_u", fit->N_step_u},
+		{"N_mm", fit->N_mm},
+		{"N_mm_u", fit->N_mm_u},
+		{"step_mm", report->setup->step_mm},
+		{"backlash_mm", fit->backlash_mm},
+		{"backlash_u_mm", fit->backlash_u_mm},
+		{"hysteresis_N", fit->hysteresis_N},
+		{"hysteresis_u_N", fit->hysteresis_u_N},
+		{"stiction_N", fit->stiction_N},
+		{"stiction_u_N", fit->stiction_u_N},
+		{"dead_mm", fit->dead_mm},
+		{"rest_N", fit->rest_N},
+		{"rest_mm", fit->rest_mm},
+		{"branches_mm", fit->branches_mm},
+		{"linearity_percent", fit->linearity},
+		{"low_mm", fit->low_mm},
+		{"high_mm", fit->high_mm},
+		{"low_N", fit->low_N},
+		{"high_N", fit->high_N},
+		{"residual_sd_N", fit->residual_sd_N},
+		{"misfit", fit->misfit},
+		{"drift_N", fit->drift_N},
+	};
+	json_t *object =
+		json_pack("{so sb so si si si si si}", "source",
+			  json_text(report->source), "pass", fit->pass, "verdict",
+			  json_text(report->record->verdict), "points", fit->points,
+			  "used", fit->used, "saturated", fit->saturated, "outliers",
+			  fit->outliers, "strokes", fit->strokes);
+
+	for (size_t i = 0; i < sizeof(numbers) / sizeof(*numbers); i++)
+		json_set_number(object, numbers[i].key, numbers[i].value);
+	json_object_set_new(object, "budget", budget_json(fit));
+	json_object_set_new(object, "rate", rate_json(report->rate));
+	return object;
+}
+
+/* FOLDER/fit.png, residuals.png, report.txt, report.json. */
+static void write_report(const struct report *report, const char *folder)
+{
+	const struct incise_calibrate_stepper *fit = report->fit;
+	const struct stepper_series *series = report->series;
+	struct incise_outfile *file;
+	double before = NAN;
+	FILE *data, *script;
+	int up = 1;
+
+	plot_folder(folder);
+	data = plot_data(folder, "points.dat");
+	for (int i = 0; i < series->n; i++) {
+		const struct incise_calibrate_stepper_point *p = &series->points[i];
+		double line;
+
+		if (p->position_mm != before && !isnan(before))
+			up = p->position_mm > before;
+		before = p->position_mm;
+		line = (up ? fit->up_N : fit->down_N) + fit->N_mm * p->position_mm;
+		fprintf(data, "%.6f %.6f %.6f %d %d\n", p->position_mm, p->force_N,
+			p->force_N - line, up, (int)series->states[i]);
+	}
+	plot_data_end(data, folder);
+	script = plot_begin(folder, "fit", 1000, 700);
+	fprintf(script,
+		"set xlabel 'position / mm'\nset ylabel 'force / N'\nset key top left\n"
+		"plot 'points.dat' using 1:($4==1?$2:1/0) with points pt 8 title 'up', \\\n"
+		"  '' using 1:($4==0?$2:1/0) with points pt 10 title 'down', \\\n"
+		"  %.9g+%.9g*x title 'line up', %.9g+%.9g*x title 'line down'\n",
+		fit->up_N, fit->N_mm, fit->down_N, fit->N_mm);
+	plot_draw_or_fail(script, folder, "fit");
+	script = plot_begin(folder, "residuals", 1000, 700);
+	fprintf(script, "set xlabel 'position / mm'\nset ylabel 'off the line / N'\n"
+			"plot 'points.dat' using 1:($5==0?$3:1/0) title 'used', \\\n"
+			"  '' using 1:($5==1?$3:1/0) title 'behind turns', \\\n"
+			"  '' using 1:($5>1?$3:1/0) pt 7 title 'left out'\n");
+	plot_draw_or_fail(script, folder, "residuals");
+	report_text(report, calibrate_report_text(folder, &file));
+	whole_file_end(file);
+	calibrate_report_json(folder, report_json(report));
+}
+
+/* --- the calibration ------------------------------------------------------------------- */
+
+/* Relative uncertainty of the force channel's sensitivity, from the history. */
+static void find_sensor_u(const struct calibrate_options *options, double *sensor_u)
 {
 	struct incise_calibration_record *records = NULL;
 	struct incise_error err = {0};
-	int n = incise_calibration_history(wish->calibration, &records, &err);
+	int n = incise_calibration_history(options->calibration, &records, &err);
 	bool known = false;
 
 	for (int i = 0; i < n; i++)
@@ -142,7 +501,7 @@ static void find_sensor_u(const struct calibrate_wish *wish, double *sensor_u)
 			const struct incise_calibration_value *v = &records[i].values[j];
 
 			if (strcmp(v->key, "force_mV_N") ||
-			    v->left != wish->found.force_mV_N)
+			    v->left != options->found.force_mV_N)
 				continue;
 			*sensor_u = fmin(0.9, v->u / fabs(v->left));
 			known = true;
@@ -152,7 +511,7 @@ static void find_sensor_u(const struct calibrate_wish *wish, double *sensor_u)
 		cli_warn(
 			"how sure force_mV_N is does not stand in %s: taken is 5 %%; run "
 			"incise calibrate force",
-			wish->calibration);
+			options->calibration);
 }
 
 static void fill_record(struct incise_calibration_record *record,
@@ -174,7 +533,7 @@ static void fill_record(struct incise_calibration_record *record,
 			fit->hysteresis_N, fit->hysteresis_u_N);
 	calibrate_value(record, "stepper_stiction_N", "N", found->stepper_stiction_N,
 			fit->stiction_N, fit->stiction_u_N);
-	/* Between what kept and what lost, anywhere. */
+	/* Uniform between the rate that lost none and the one that did. */
 	if (rate->tried && rate->kept_1_s > 0)
 		calibrate_value(record, "stepper_steps_s", "1/s", found->stepper_steps_s,
 				rate->kept_1_s,
@@ -199,7 +558,7 @@ static void fill_record(struct incise_calibration_record *record,
 			 isnan(setup->spring_N_mm) ? "" : ", and as stiff as the spring");
 }
 
-/* Refused: the line says why. What is still powered comes to rest first. */
+/* Fail with the reason; a powered motor comes to rest first. */
 static _Noreturn void refuse(struct stepper_live *live, const struct incise_error *err)
 {
 	if (!live)
@@ -219,27 +578,27 @@ int main(int argc, char **argv)
 	struct stepper_series series = {.step_mm = NAN};
 	struct stepper_live live;
 	struct incise_error err = {0};
-	struct stepper_report report = {.series = &series,
-					.fit = &fit,
-					.setup = &setup,
-					.rate = &rate,
-					.record = &record};
-	struct job job;
+	struct report report = {.series = &series,
+				.fit = &fit,
+				.setup = &setup,
+				.rate = &rate,
+				.record = &record};
+	struct options options;
 
-	parse(&job, argc, argv);
+	parse(&options, argc, argv);
 	incise_calibrate_stepper_init(&setup);
-	calibrate_find(&job.wish);
-	find_sensor_u(&job.wish, &setup.sensor_u);
-	if (job.wish.from) {
-		stepper_series_read(&series, job.wish.from, job.step_mm);
-		report.source = job.wish.from;
+	calibrate_find(&options.common);
+	find_sensor_u(&options.common, &setup.sensor_u);
+	if (options.common.from) {
+		read_series(&series, options.common.from, options.step_mm);
+		report.source = options.common.from;
 	} else {
-		live = (struct stepper_live){.calibration = job.wish.found,
-					     .low_mm = job.low_mm,
-					     .high_mm = job.high_mm,
-					     .max_N = job.max_N,
-					     .strokes = job.strokes};
-		stepper_live_open(&live, job.wish.rig);
+		live = (struct stepper_live){.calibration = options.common.found,
+					     .low_mm = options.low_mm,
+					     .high_mm = options.high_mm,
+					     .max_N = options.max_N,
+					     .strokes = options.strokes};
+		stepper_live_open(&live, options.common.rig);
 		stepper_live_plan(&live);
 		report.source = live.drive.info.name;
 		setup.spring_N_mm = live.drive.info.spring_N_mm;
@@ -249,41 +608,43 @@ int main(int argc, char **argv)
 			 live.drive.info.name);
 		stepper_live_start(&live);
 		stepper_live_strokes(&live, &series);
-		if (job.wish.keep)
-			stepper_series_write(&series, job.wish.keep);
+		if (options.common.keep)
+			write_series(&series, options.common.keep);
 	}
 	setup.step_mm = series.step_mm;
 	if (incise_calibrate_stepper(series.points, series.n, &setup, &fit, series.states,
 				     &err))
-		refuse(job.wish.from ? NULL : &live, &err);
-	if (!job.wish.from) {
-		if (!job.no_rate)
+		refuse(options.common.from ? NULL : &live, &err);
+	if (!options.common.from) {
+		if (!options.no_rate)
 			stepper_live_rate(&live, &fit, &rate);
 		else
 			rate.why = "not asked for";
 		stepper_drive_end(&live.drive);
 	} else
 		rate.why = "a file does not drive";
-	fill_record(&record, &fit, &setup, &rate, &job.wish.found);
-	if ((job.wish.from || job.wish.keep) &&
-	    incise_calibration_raw(&record, job.wish.from ? job.wish.from : job.wish.keep,
+	fill_record(&record, &fit, &setup, &rate, &options.common.found);
+	if ((options.common.from || options.common.keep) &&
+	    incise_calibration_raw(&record,
+				   options.common.from ? options.common.from
+						       : options.common.keep,
 				   &err))
 		cli_fail_with(&err);
-	if (job.wish.report)
-		stepper_report_folder(&report, job.wish.report);
-	/* Only now: whatever failed before has changed nothing. */
+	if (options.common.report)
+		write_report(&report, options.common.report);
+	/* Everything that can fail comes before the calibration changes. */
 	if (cli_stop)
 		cli_fail("%s: nothing has changed", strsignal(cli_stop));
-	if (!job.wish.dry_run &&
-	    incise_calibration_append(job.wish.calibration, &record, &err))
+	if (!options.common.dry_run &&
+	    incise_calibration_append(options.common.calibration, &record, &err))
 		cli_fail_with(&err);
-	if (job.wish.json)
-		json_print(stepper_report_json(&report));
+	if (options.common.json)
+		json_print(report_json(&report));
 	else {
-		stepper_report_text(&report, stdout);
+		report_text(&report, stdout);
 		cli_finish();
 	}
-	stepper_series_free(&series);
+	free_series(&series);
 	if (!fit.pass)
 		cli_fail("not in force: %s", record.verdict);
 	return 0;

@@ -3,48 +3,54 @@
  * incise calibrate tip: where the tip of the blade is in the tracker's sensor, from turning
  * the tool about its tip in a dimple.
  */
-#include <getopt.h>
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <incise/calibrate_tip.h>
 #include <incise/rig.h>
-#include "calibrate/calibrate_report.h"
-#include "calibrate/calibrate_result.h"
+#include "calibrate/calibrate.h"
 #include "cli/json.h"
 #include "cli/plot.h"
-#include "calibrate/tip_poses.h"
+#include "cli/recording.h"
 
 #define POLL_NS 10000000LL
-#define LOOK_NS 1000000000LL
+#define CHECK_NS 1000000000LL
 #define READ 64
 
-/* Enough, while it is turned: more would not make it better than the tracker is. */
+/* More would not improve it beyond the tracker's error. */
 #define ENOUGH_U_MM 0.02
 #define ENOUGH_CONE_DEG 70.0
 #define ENOUGH_BLOCKS 300
 
 #define OUTLIERS_LISTED 20
 
-enum { OPT_TIME = CALIBRATE_OWN };
+struct options {
+	struct calibrate_options common;
+	double time_s; /* 0: not given */
+};
 
-static const struct cli_option options[] = {
-	{'r', "rig", "RIG",
-	 "file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n"
-	 "(default: ./rig.conf, else /etc/incise/rig.conf)"},
+static const struct cli_option option_table[] = {
+	{CLI_RIG_OPTION(struct options, common.rig)},
 	{'c', "calibration", "FILE",
-	 "read as found, and written (default: calibration.conf)"},
-	{OPT_TIME, "time", "TIME",
+	 "read as found, and written (default: calibration.conf)",
+	 CLI_TEXT(struct options, common.calibration)},
+	{0, "time", "TIME",
 	 "turn it for so long at most (default: 20s); it ends earlier\n"
-	 "when the tip is known well enough"},
-	{CALIBRATE_FROM, "from", "FILE",
-	 "take poses from a CSV file or a recording, not from a rig"},
-	{CALIBRATE_KEEP, "keep", "FILE", "write the poses there, as CSV for --from"},
-	{CALIBRATE_REPORT, "report", "DIR",
-	 "report.txt, report.json and pictures of the residuals"},
-	{CALIBRATE_DRY_RUN, "dry-run", NULL, "do all but write calibration.conf"},
-	{CALIBRATE_JSON, "json", NULL, "tell the result as one JSON object"},
+	 "when the tip is known well enough",
+	 CLI_DURATION(struct options, time_s, 1, 600)},
+	{0, "from", "FILE", "take poses from a CSV file or a recording, not from a rig",
+	 CLI_TEXT(struct options, common.from)},
+	{0, "keep", "FILE", "write the poses there, as CSV for --from",
+	 CLI_TEXT(struct options, common.keep)},
+	{0, "report", "DIR", "report.txt, report.json and pictures of the residuals",
+	 CLI_TEXT(struct options, common.report)},
+	{0, "dry-run", NULL, "do all but write calibration.conf",
+	 CLI_FLAG(struct options, common.dry_run)},
+	{0, "json", NULL, "tell the result as one JSON object",
+	 CLI_FLAG(struct options, common.json)},
 	{0},
 };
 
@@ -55,10 +61,166 @@ static const struct cli_command command = {
 		"Find where the tip of the blade is in the frame of the tracker's sensor. "
 		"Put\nthe tip into a dimple that stays where it is, and turn the tool all "
 		"ways about\nit, by 60 degrees at least from one side to the other.",
-	.options = options,
+	.options = option_table,
 	.notes = "Example: incise calibrate tip --rig rig.conf --time 20s --report tip\n"
 		 "Exit codes: 0 done and in force, 1 failed or refused, 2 bad usage.",
 };
+
+/* --- poses -------------------------------------------------------------------------- */
+
+#define COLUMNS 8
+#define CSV_MAX 32 /* columns that a file may have */
+#define POSES_MAX 1000000
+
+struct list {
+	struct incise_tip_pose *poses;
+	int n, capacity;
+	int doubtful; /* left out: the tracker marked them */
+};
+
+static const char *const names[COLUMNS] = {"t_s", "x_mm", "y_mm", "z_mm",
+					   "qw",  "qx",	  "qy",	  "qz"};
+
+static struct incise_tip_pose *next_pose(struct list *list)
+{
+	if (list->n == list->capacity) {
+		list->capacity = list->capacity ? 2 * list->capacity : 4096;
+		if (list->capacity > 2 * POSES_MAX)
+			cli_fail("too many poses; a minute of them will do");
+		list->poses = cli_resize(list->poses, (size_t)list->capacity,
+					 sizeof(*list->poses));
+	}
+	return &list->poses[list->n++];
+}
+
+static void add_pose(struct list *list, const struct incise_tracker_sample *sample)
+{
+	struct incise_tip_pose *pose;
+
+	if (sample->status != ' ') {
+		list->doubtful++;
+		return;
+	}
+	pose = next_pose(list);
+	pose->t_ns = sample->t_ns;
+	memcpy(pose->position_mm, sample->position_mm, sizeof(pose->position_mm));
+	memcpy(pose->quaternion, sample->quaternion, sizeof(pose->quaternion));
+}
+
+static void read_recording(struct list *list, const char *path)
+{
+	struct incise_error err = {0};
+	struct incise_recording *recording = recording_open(path);
+	struct incise_tracker_sample *samples;
+	int n;
+
+	n = incise_recording_poses(recording, &samples, &err);
+	if (n < 0)
+		cli_fail_with(&err);
+	for (int i = 0; i < n; i++)
+		add_pose(list, &samples[i]);
+	free(samples);
+	incise_recording_close(recording);
+}
+
+static void find_columns(const char *path, char **fields, int n, int at[COLUMNS])
+{
+	for (int c = 0; c < COLUMNS; c++) {
+		at[c] = -1;
+		for (int i = 0; i < n; i++)
+			if (!strcmp(fields[i], names[c]))
+				at[c] = i;
+		if (at[c] < 0 && c)
+			cli_fail(
+				"%s: line 1 has no column '%s'; it is to name t_s, x_mm, "
+				"y_mm, z_mm, qw, qx, qy, qz",
+				path, names[c]);
+	}
+}
+
+static void read_csv(struct list *list, const char *path)
+{
+	FILE *file = fopen(path, "re");
+	char *line = NULL, *fields[CSV_MAX];
+	int at[COLUMNS], number = 0;
+	bool header = false;
+	size_t size = 0;
+
+	if (!file)
+		cli_fail("%s: %s", path, strerror(errno));
+	while (getline(&line, &size, file) >= 0) {
+		int n;
+
+		number++;
+		if (*line == '#' || !line[strspn(line, " \t\r\n")])
+			continue;
+		n = calibrate_cut(line, fields, CSV_MAX, " \t", "");
+		if (!header) {
+			find_columns(path, fields, n, at);
+			header = true;
+			continue;
+		}
+		double values[COLUMNS] = {list->n};
+
+		for (int c = 0; c < COLUMNS; c++) {
+			char *end;
+
+			if (at[c] < 0)
+				continue;
+			if (at[c] >= n)
+				cli_fail("%s: line %d: '%s' is missing", path, number,
+					 names[c]);
+			values[c] = strtod(fields[at[c]], &end);
+			if (end == fields[at[c]] || end[strspn(end, " \t")] ||
+			    !isfinite(values[c]) || (!c && fabs(values[c]) > 1e9))
+				cli_fail("%s: line %d: %s: '%s' is no number", path,
+					 number, names[c], fields[at[c]]);
+		}
+		struct incise_tip_pose *pose = next_pose(list);
+
+		pose->t_ns = llround(values[0] * 1e9);
+		memcpy(pose->position_mm, values + 1, sizeof(pose->position_mm));
+		memcpy(pose->quaternion, values + 4, sizeof(pose->quaternion));
+	}
+	if (ferror(file))
+		cli_fail("%s: %s", path, strerror(errno));
+	free(line);
+	fclose(file);
+}
+
+static void read_poses(struct list *list, const char *path)
+{
+	struct stat st;
+
+	if (stat(path, &st) && errno != ENOENT)
+		cli_fail("%s: %s", path, strerror(errno));
+	/* or a recording of which only NAME.rec.part exists */
+	if (S_ISDIR(st.st_mode) || cli_ends_with(path, ".rec"))
+		read_recording(list, path);
+	else
+		read_csv(list, path);
+}
+
+static void write_poses(const struct list *list, const char *path)
+{
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(path, &file);
+
+	fprintf(out, "t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n");
+	for (int i = 0; i < list->n; i++) {
+		const struct incise_tip_pose *pose = &list->poses[i];
+
+		fprintf(out, "%.9f", (pose->t_ns - list->poses[0].t_ns) * 1e-9);
+		for (int k = 0; k < 3; k++)
+			fprintf(out, ",%.17g", pose->position_mm[k]);
+		for (int k = 0; k < 4; k++)
+			fprintf(out, ",%.17g", pose->quaternion[k]);
+		putc('\n', out);
+	}
+	whole_file_end(file);
+}
+
+/* --- live ---------------------------------------------------------------------------- */
 
 static double largest_u(const struct incise_tip_fit *fit)
 {
@@ -66,8 +228,8 @@ static double largest_u(const struct incise_tip_fit *fit)
 		fmax(fit->covariance[0], fmax(fit->covariance[4], fit->covariance[8])));
 }
 
-/* Say how far it is; whether that is enough. */
-static bool look(const struct tip_list *list)
+/* Print the progress. Returns whether the tip is known well enough. */
+static bool check_progress(const struct list *list)
 {
 	struct incise_tip_fit fit;
 	struct incise_error err = {0};
@@ -80,21 +242,18 @@ static bool look(const struct tip_list *list)
 	       2 * largest_u(&fit) < ENOUGH_U_MM;
 }
 
-static void take_live(const struct calibrate_wish *wish, double time_s,
-		      struct tip_list *list, char device[64])
+static void record_poses(const struct options *options, struct list *list,
+			 char device[64])
 {
 	struct incise_tracker_info info;
-	struct incise_error err = {0};
-	struct incise_rig *rig =
-		incise_rig_open(cli_rig(wish->rig), INCISE_RIG_TRACKER, &err);
+	struct incise_rig *rig = cli_open_rig(options->common.rig, INCISE_RIG_TRACKER);
+	double time_s = options->time_s > 0 ? options->time_s : 20;
 	struct incise_tracker_sample samples[READ];
 	struct incise_clock *clock;
-	int64_t now, end, next_look;
+	int64_t now, end, next_check;
 	bool enough = false;
 	int station = 0;
 
-	if (!rig)
-		cli_fail_with(&err);
 	if (isatty(STDIN_FILENO)) {
 		fprintf(stderr,
 			"Put the tip into its dimple. Enter begins; then turn the "
@@ -107,8 +266,8 @@ static void take_live(const struct calibrate_wish *wish, double time_s,
 	clock = incise_rig_clock(rig);
 	now = incise_clock_now(clock);
 	end = now + llround(time_s * INCISE_NS_PER_S);
-	next_look = now + LOOK_NS;
-	/* what came before Enter is of no use */
+	next_check = now + CHECK_NS;
+	/* drop the poses before Enter */
 	while (incise_tracker_read(incise_rig_tracker(rig), samples, READ) == READ)
 		;
 	while (now < end && !enough && !cli_stop) {
@@ -126,11 +285,11 @@ static void take_live(const struct calibrate_wish *wish, double time_s,
 		for (int i = 0; i < n; i++) {
 			station = station ? station : samples[i].station;
 			if (samples[i].station == station)
-				tip_list_add(list, &samples[i]);
+				add_pose(list, &samples[i]);
 		}
-		if (now >= next_look) {
-			enough = look(list);
-			next_look += LOOK_NS;
+		if (now >= next_check) {
+			enough = check_progress(list);
+			next_check += CHECK_NS;
 		}
 	}
 	cli_progress_end();
@@ -139,7 +298,7 @@ static void take_live(const struct calibrate_wish *wish, double time_s,
 		cli_fail("stopped; the old calibration stays");
 }
 
-/* --- the report ------------------------------------------------------------------------ */
+/* --- the report ---------------------------------------------------------------------- */
 
 static void residual(const struct incise_tip_fit *fit, const struct incise_tip_pose *pose,
 		     double r[3])
@@ -162,22 +321,14 @@ static void residual(const struct incise_tip_fit *fit, const struct incise_tip_p
 	}
 }
 
-static void draw(const struct calibrate_wish *wish, const struct tip_list *list,
-		 const bool *inlier, const struct incise_tip_fit *fit)
+static void draw(const char *folder, const struct list *list, const bool *inlier,
+		 const struct incise_tip_fit *fit)
 {
-	static const char *const pictures[] = {"residuals", "fit"};
-	const char *folder, *name;
-	char *path;
+	static const char *const plots[] = {"residuals", "fit"};
 	FILE *data, *script;
 
-	if (!plot_possible()) {
-		cli_warn("no pictures: gnuplot is not installed, apt-get install "
-			 "gnuplot-nox");
+	if (!calibrate_can_plot(folder))
 		return;
-	}
-	if (asprintf(&path, "%s/residuals", wish->report) < 0)
-		cli_fail("no memory");
-	plot_place("report", path, &folder, &name);
 	data = plot_data(folder, "poses.dat");
 	for (int i = 0; i < list->n; i++) {
 		double r[3];
@@ -190,7 +341,7 @@ static void draw(const struct calibrate_wish *wish, const struct tip_list *list,
 	}
 	plot_data_end(data, folder);
 	for (int i = 0; i < 2; i++) {
-		script = plot_begin(folder, pictures[i], 900, 500);
+		script = plot_begin(folder, plots[i], 900, 500);
 		if (!i)
 			fprintf(script,
 				"set xlabel 'time, s'\nset ylabel 'residual, mm'\n"
@@ -205,18 +356,17 @@ static void draw(const struct calibrate_wish *wish, const struct tip_list *list,
 				"plot 'poses.dat' using 6:(int($5) ? $7 : NaN) with points pt "
 				"7 ps 0.3 lc 1 title 'believed', '' using 6:(int($5) ? NaN : "
 				"$7) with points pt 2 ps 1 lc 2 title 'left out'\n");
-		if (!plot_draw(script, folder, pictures[i]))
-			cli_warn("%s.png could not be drawn", pictures[i]);
+		if (!plot_draw(script, folder, plots[i]))
+			cli_warn("%s.png could not be drawn", plots[i]);
 	}
-	free(path);
 }
 
-static void write_report(const struct calibrate_wish *wish, const struct tip_list *list,
-			 const bool *inlier, const struct incise_tip_fit *fit)
+static void write_report(const char *folder, const struct list *list, const bool *inlier,
+			 const struct incise_tip_fit *fit)
 {
 	static const char axes[] = "xyz";
 	struct incise_outfile *file;
-	FILE *out = calibrate_report_text(wish->report, &file);
+	FILE *out = calibrate_report_text(folder, &file);
 	int listed = 0;
 
 	if (!out)
@@ -254,16 +404,14 @@ static void write_report(const struct calibrate_wish *wish, const struct tip_lis
 		fprintf(out, " and %d more", listed - OUTLIERS_LISTED);
 	fprintf(out, "\npass\n");
 	whole_file_end(file);
-	draw(wish, list, inlier, fit);
+	draw(folder, list, inlier, fit);
 }
 
-static json_t *details(const struct tip_list *list, const bool *inlier,
+static json_t *details(const struct list *list, const bool *inlier,
 		       const struct incise_tip_fit *fit)
 {
-	json_t *outliers = json_array(), *covariance = json_array();
+	json_t *outliers = json_array();
 
-	for (int i = 0; i < 9; i++)
-		json_array_append_new(covariance, json_number(fit->covariance[i]));
 	for (int i = 0; i < list->n; i++)
 		if (!inlier[i])
 			json_array_append_new(outliers, json_integer(i + 1));
@@ -275,17 +423,18 @@ static json_t *details(const struct tip_list *list, const bool *inlier,
 		"least_deg", json_number(fit->least_deg), "condition",
 		json_number(fit->condition), "moved_mm", json_number(fit->moved_mm),
 		"moved_sd_mm", json_number(fit->moved_sd_mm), "covariance_mm2",
-		covariance, "outliers", outliers);
+		json_numbers(fit->covariance, 9), "outliers", outliers);
 }
 
-static void state(const struct calibrate_wish *wish, const struct incise_tip_fit *fit,
-		  struct incise_calibration_record *record)
+static void fill_record(const struct incise_calibration *found,
+			const struct incise_tip_fit *fit,
+			struct incise_calibration_record *record)
 {
 	static const char *const keys[] = {"tip_x_mm", "tip_y_mm", "tip_z_mm"};
 
 	for (int i = 0; i < 3; i++)
-		calibrate_value(record, keys[i], "mm", wish->found.tip_mm[i],
-				fit->tip_mm[i], sqrt(fit->covariance[4 * i]));
+		calibrate_value(record, keys[i], "mm", found->tip_mm[i], fit->tip_mm[i],
+				sqrt(fit->covariance[4 * i]));
 	for (int i = 0; i < 3; i++)
 		for (int j = 0; j <= i; j++)
 			record->covariance[record->n_covariance++] =
@@ -298,51 +447,53 @@ static void state(const struct calibrate_wish *wish, const struct incise_tip_fit
 		 fit->held_out_mm);
 }
 
+static void parse(struct options *options, int argc, char **argv)
+{
+	bool timed;
+
+	cli_parse(&command, argc, argv, options);
+	timed = options->time_s > 0;
+	cli_no_operands(argc, argv, "a file goes with --from");
+	if (options->common.from && timed)
+		cli_usage("--time: a file has its own");
+	if (!options->common.from && !timed && !isatty(STDIN_FILENO))
+		cli_usage("without a terminal, --time or --from is needed");
+	calibrate_begin(&options->common);
+}
+
 int main(int argc, char **argv)
 {
 	struct incise_calibration_record record = {
 		.kind = "tip", .low = NAN, .high = NAN, .pass = true};
-	struct calibrate_wish wish = {0};
+	struct options options = {0};
+	struct calibrate_options *common = &options.common;
 	struct incise_tip_fit fit;
 	struct incise_error err = {0};
-	struct tip_list list = {0};
-	double time_s = 0;
+	struct list list = {0};
+	const char *raw;
 	bool *inlier;
-	int id;
 
-	while ((id = cli_next(&command, argc, argv)) != CLI_END)
-		if (!calibrate_option(&wish, id))
-			time_s = cli_duration("time", optarg, 1, 600);
-	if (optind < argc)
-		cli_usage("'%s' is too much: a file goes with --from", argv[optind]);
-	if (wish.from && time_s > 0)
-		cli_usage("--time: a file has its own");
-	if (!wish.from && !(time_s > 0) && !isatty(STDIN_FILENO))
-		cli_usage("without a terminal, --time or --from is needed");
-	calibrate_begin(&wish);
+	parse(&options, argc, argv);
+	raw = common->keep ? common->keep : common->from;
 	cli_catch_signals();
-	if (wish.from)
-		tip_list_read(&list, wish.from);
+	if (common->from)
+		read_poses(&list, common->from);
 	else
-		take_live(&wish, time_s > 0 ? time_s : 20, &list, record.device);
-	if (wish.keep)
-		tip_list_write(&list, wish.keep);
-	inlier = calloc((size_t)list.n + 1, sizeof(*inlier));
-	if (!inlier)
-		cli_fail("no memory");
+		record_poses(&options, &list, record.device);
+	if (common->keep)
+		write_poses(&list, common->keep);
+	inlier = cli_alloc((size_t)list.n, sizeof(*inlier));
 	if (incise_calibrate_tip(list.poses, list.n, inlier, &fit, &err))
 		cli_fail_with(&err);
 	if (list.doubtful)
 		cli_warn("%d records that the tracker itself doubts were left out",
 			 list.doubtful);
-	state(&wish, &fit, &record);
-	/* a recording is a folder, and has a ledger of its own */
-	if ((wish.keep || wish.from) &&
-	    incise_calibration_raw(&record, wish.keep ? wish.keep : wish.from, &err))
-		snprintf(record.raw, sizeof(record.raw), "%s",
-			 wish.keep ? wish.keep : wish.from);
-	write_report(&wish, &list, inlier, &fit);
-	calibrate_end(&wish, &record, details(&list, inlier, &fit));
+	fill_record(&common->found, &fit, &record);
+	/* a recording is a folder, and has its own checksums */
+	if (raw && incise_calibration_raw(&record, raw, &err))
+		snprintf(record.raw, sizeof(record.raw), "%s", raw);
+	write_report(common->report, &list, inlier, &fit);
+	calibrate_end(common, &record, details(&list, inlier, &fit));
 	free(list.poses);
 	free(inlier);
 	return 0;

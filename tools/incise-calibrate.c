@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise calibrate: says what can be calibrated; each is a program of its own,
- * incise-calibrate-WORD.
+ * incise calibrate: lists its subcommands; each is a program, incise-calibrate-SUBCOMMAND.
  */
-#include <getopt.h>
 #include "cli/cli.h"
 
 static const struct cli_option options[] = {{0}};
@@ -26,8 +24,7 @@ static const struct cli_command command = {
 
 int main(int argc, char **argv)
 {
-	while (cli_next(&command, argc, argv) != CLI_END)
-		;
+	cli_parse(&command, argc, argv, NULL);
 	if (optind < argc)
 		cli_usage("there is nothing called '%s' to calibrate", argv[optind]);
 	cli_usage("what? force, depth, tip, delay, stepper or check");

@@ -3,23 +3,120 @@
  * incise capture: records the streams of a rig in sync: tracker, force, camera.
  */
 #include <limits.h>
+#include <math.h>
 #include <signal.h>
 #include <stdio.h>
+#include <string.h>
 #include <incise/calibration.h>
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
-#include "capture/capture_report.h"
-#include "capture/capture_view.h"
-#include "capture/capture_wish.h"
+#include "capture/terminal.h"
 #include "cli/cli.h"
-#include "capture/keyboard.h"
+#include "cli/json.h"
 #include "cli/recording.h"
+#include "cli/stream_report.h"
 
 #define POLL_NS 10000000LL
 
+enum camera { CAMERA_AUTO, CAMERA_OFF, CAMERA_PICTURES, CAMERA_DEPTH };
+
+struct options {
+	const char *rig, *calibration, *output;
+	enum camera camera;
+	double trigger_force_N;
+	bool trigger_button;
+	double duration_s; /* 0: not given */
+	bool cuts, force, json;
+};
+
+static const char *const cameras[] = {"auto", "off", "pictures", "depth", NULL};
+
+static void parse_trigger(void *whole, char *text)
+{
+	static const struct cli_unit units[] = {{"N", 1}, {"mN", 1e-3}, {0}};
+	struct options *options = whole;
+
+	options->trigger_button = !strcmp(text, "button");
+	options->trigger_force_N =
+		options->trigger_button
+			? 0
+			: cli_quantity("--trigger", text, units, 1e-3, 1e4);
+}
+
+static const struct cli_option option_table[] = {
+	{'o', "output", "NAME.rec", "folder to record into; it must not exist",
+	 CLI_TEXT(struct options, output)},
+	{CLI_RIG_OPTION(struct options, rig)},
+	{'c', "calibration", "FILE",
+	 "calibration.conf (default: the figures of the paper)",
+	 CLI_TEXT(struct options, calibration)},
+	{0, "duration", "TIME",
+	 "end after 10s, 500ms, 2min, 1h (default: at Ctrl-C;\n"
+	 "on the virtual rig at the end of its cuts)",
+	 CLI_DURATION(struct options, duration_s, 0.01, 1e6)},
+	{0, "camera", "WHAT",
+	 "off; pictures: record them; depth: and find the scalpel in\n"
+	 "them; auto: what rig.conf has (default; a rig of sim:… has\n"
+	 "no camera then)",
+	 CLI_CHOICE(struct options, camera, cameras, "auto, off, pictures and depth")},
+	{0, "trigger", "WHAT",
+	 "wait for the stylus's button, or for a force such as 0.2N;\n"
+	 "the second before is recorded too",
+	 CLI_PARSED_BY(parse_trigger)},
+	{0, "cuts", NULL, "mark beginning and end of each cut in the table events",
+	 CLI_FLAG(struct options, cuts)},
+	{0, "force", NULL,
+	 "replace NAME.rec once the new one is complete; drop what\n"
+	 "an interrupted recording left as NAME.rec.part",
+	 CLI_FLAG(struct options, force)},
+	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct options, json)},
+	{0},
+};
+
+static const struct cli_command command = {
+	.name = "capture",
+	.synopsis = "-o NAME.rec [--rig RIG] [OPTIONS]",
+	.summary =
+		"Record tracker, force channel and camera of a rig in sync. Hold the tool free\n"
+		"for the first half second: the zero of the force is measured then. On a\n"
+		"terminal the keys m and 1 to 9 set markers, t triggers, q ends.",
+	.options = option_table,
+	.notes =
+		"Example: incise capture -o liver.rec --rig sim:clock=simulated\n"
+		"Exit codes: 0 recorded without loss; 1 failed, samples lost, a device died or\n"
+		"the disk was nearly full; 2 bad usage.",
+};
+
+static void parse(struct options *options, int argc, char **argv)
+{
+	char *output;
+	size_t length;
+
+	cli_parse(&command, argc, argv, options);
+	cli_no_operands(argc, argv, "the recording's name goes with -o");
+	if (!options->output)
+		cli_usage("where to? give -o NAME.rec");
+	output = cli_text("%s", options->output);
+	for (length = strlen(output); length > 1 && output[length - 1] == '/'; length--)
+		output[length - 1] = 0;
+	if (length < 5 || !cli_ends_with(output, ".rec") || output[length - 5] == '/')
+		cli_usage("-o: '%s' is not a name that ends in .rec", output);
+	if (length > PATH_MAX - 16)
+		cli_usage("-o: the path is too long");
+	options->output = output;
+}
+
+/* --- recording ----------------------------------------------------------------------- */
+
+struct result {
+	double seconds;		   /* recorded */
+	struct incise_error early; /* why it ended by itself; code 0: it did not */
+	struct incise_recorder_stats stats;
+};
+
 struct run {
-	const struct capture_wish *wish;
+	const struct options *options;
 	struct incise_rig *rig;
 	struct incise_recorder *recorder;
 	struct capture_view view;
@@ -27,10 +124,10 @@ struct run {
 	int64_t held_ns;	  /* recorded before the trigger */
 	bool armed;
 	int markers;
-	struct capture_result result;
+	struct result result;
 };
 
-/* What was committed stays. */
+/* Fail; what was committed stays. */
 _Noreturn static void give_up(struct run *run, const struct incise_error *why)
 {
 	struct incise_error second = {0};
@@ -50,7 +147,7 @@ static void mark(struct run *run, const char *text)
 	run->view.shown_ns = 0;
 }
 
-static void take_keys(struct run *run)
+static void handle_keys(struct run *run)
 {
 	char text[40];
 	int key;
@@ -70,11 +167,11 @@ static void take_keys(struct run *run)
 	}
 }
 
-/* The recording begins, maybe at its trigger; its end is known from then on. */
-static void begin(struct run *run, int64_t now_ns)
+/* The recording starts, maybe at its trigger; this sets its end. */
+static void start(struct run *run, int64_t now_ns)
 {
 	struct incise_sim *sim = incise_rig_sim(run->rig);
-	double duration_s = run->wish->duration_s;
+	double duration_s = run->options->duration_s;
 
 	run->armed = false;
 	run->start_ns = now_ns;
@@ -82,7 +179,7 @@ static void begin(struct run *run, int64_t now_ns)
 		run->end_ns = now_ns + (int64_t)(duration_s * INCISE_NS_PER_S);
 	else if (!sim)
 		run->end_ns = INT64_MAX;
-	else if (!run->end_ns) /* a trigger does not begin the virtual cuts anew */
+	else if (!run->end_ns) /* a trigger does not restart the virtual cuts */
 		run->end_ns = now_ns + incise_sim_duration(sim);
 	if (run->end_ns < INT64_MAX)
 		run->view.planned_s = (run->end_ns - now_ns) / (double)INCISE_NS_PER_S;
@@ -97,9 +194,9 @@ static void record(struct run *run)
 	int64_t now = incise_clock_now(clock), next = now, armed_ns = now;
 	int rc = 0;
 
-	begin(run, now);
-	if (run->wish->trigger_button || run->wish->trigger_force_N > 0) {
-		/* A virtual surgeon who has put the scalpel down triggers nothing. */
+	start(run, now);
+	if (run->options->trigger_button || run->options->trigger_force_N > 0) {
+		/* After its cuts the virtual rig triggers nothing. */
 		run->armed = true;
 		run->end_ns =
 			incise_rig_sim(run->rig)
@@ -119,13 +216,13 @@ static void record(struct run *run)
 		if (run->armed) {
 			incise_recorder_stats(run->recorder, &stats);
 			if (!stats.armed) {
-				begin(run, now);
+				start(run, now);
 				run->held_ns = now - armed_ns < INCISE_NS_PER_S
 						       ? now - armed_ns
 						       : INCISE_NS_PER_S;
 			}
 		}
-		take_keys(run);
+		handle_keys(run);
 		if (keyboard_resumed())
 			cli_progress_forget();
 		capture_view_show(&run->view, run->recorder,
@@ -139,75 +236,156 @@ static void record(struct run *run)
 }
 
 /*
- * What was never triggered leaves nothing behind; and with --force, what has not a sample does
- * not replace a recording that may have some.
+ * Remove a recording that was never triggered; and with --force one without a sample, so that
+ * it does not replace a recording with samples.
  */
 static void keep_old(const struct run *run, const char *new)
 {
 	const struct incise_recorder_stats *stats = &run->result.stats;
 
 	if (stats->force || stats->tracker || stats->frames ||
-	    (!stats->armed && !run->wish->force))
+	    (!stats->armed && !run->options->force))
 		return;
 	recording_remove(new);
 	if (run->result.early.code)
 		cli_fail_with(&run->result.early);
-	cli_fail("%s: %s; nothing was recorded%s", run->wish->output,
+	cli_fail("%s: %s; nothing was recorded%s", run->options->output,
 		 stats->armed ? "was never triggered" : "no device gave a sample",
-		 run->wish->force ? ", and nothing is replaced" : "");
+		 run->options->force ? ", and nothing is replaced" : "");
 }
 
-static struct incise_rig *open_rig(const struct capture_wish *wish)
+static struct incise_rig *open_rig(const struct options *options)
 {
 	static const unsigned int camera[] = {
 		[CAMERA_AUTO] = INCISE_RIG_CAMERA | INCISE_RIG_IF_NAMED,
 		[CAMERA_PICTURES] = INCISE_RIG_CAMERA,
 		[CAMERA_DEPTH] = INCISE_RIG_CAMERA,
 	};
-	struct incise_error err = {0};
-	struct incise_rig *rig = incise_rig_open(
-		cli_rig(wish->rig),
-		INCISE_RIG_TRACKER | INCISE_RIG_FORCE | camera[wish->camera], &err);
 
-	if (!rig)
-		cli_fail_with(&err);
-	return rig;
+	return cli_open_rig(options->rig, INCISE_RIG_TRACKER | INCISE_RIG_FORCE |
+						  camera[options->camera]);
 }
 
-/* Whether pictures are looked at. */
-static bool take_vision(const struct capture_wish *wish, struct incise_rig *rig,
-			struct incise_vision_setup *vision)
+/* Whether the depth is measured in pictures. */
+static bool use_vision(const struct options *options, struct incise_rig *rig,
+		       struct incise_vision_setup *vision)
 {
 	bool has = incise_rig_camera(rig) && !incise_rig_vision(rig, vision);
 
-	if (wish->camera == CAMERA_DEPTH && !has)
+	if (options->camera == CAMERA_DEPTH && !has)
 		cli_fail(
 			"%s: --camera depth needs its group `vision`, which says what the "
 			"handle looks like; see rig.conf(5)",
 			incise_rig_spec(rig));
-	return has && wish->camera != CAMERA_PICTURES;
+	return has && options->camera != CAMERA_PICTURES;
 }
 
-/* With --force the new one grows beside the old one. */
-static void clear(const struct capture_wish *wish, const char *target)
+/* With --force the new recording is written next to the old one. */
+static void clear(const struct options *options, const char *target)
 {
 	char part[PATH_MAX + 8];
 
-	recording_check(wish->output);
-	snprintf(part, sizeof(part), "%s.part", wish->output);
+	recording_check(options->output);
+	snprintf(part, sizeof(part), "%s.part", options->output);
 	recording_remove(part);
 	snprintf(part, sizeof(part), "%s.part", target);
 	recording_remove(part);
 	recording_remove(target);
 }
 
-static double planned_s(const struct capture_wish *wish, struct incise_rig *rig)
+static double planned_s(const struct options *options, struct incise_rig *rig)
 {
 	struct incise_sim *sim = incise_rig_sim(rig);
 
-	if (wish->duration_s > 0 || !sim)
-		return wish->duration_s;
+	if (options->duration_s > 0 || !sim)
+		return options->duration_s;
 	return incise_sim_duration(sim) / (double)INCISE_NS_PER_S;
+}
+
+/* --- report ---------------------------------------------------------------------------- */
+
+static void report(const struct options *options, const struct result *result)
+{
+	const struct incise_recorder_stats *stats = &result->stats;
+	const struct incise_stream *streams = stats->streams;
+	const int n = stats->n_streams;
+	uint64_t lost = stats->force_lost + stats->tracker_lost + stats->frames_lost;
+	const char *path = options->output;
+
+	if (options->json) {
+		json_print(json_pack(
+			"{so so sI sI sI sI sI sI sI sI sI so so}", "path",
+			json_text(path), "seconds", json_number(result->seconds), "force",
+			(json_int_t)stats->force, "tracker", (json_int_t)stats->tracker,
+			"depth", (json_int_t)stats->depth, "frames",
+			(json_int_t)stats->frames, "lost", (json_int_t)lost, "force_lost",
+			(json_int_t)stats->force_lost, "tracker_lost",
+			(json_int_t)stats->tracker_lost, "frames_lost",
+			(json_int_t)stats->frames_lost, "clipped",
+			(json_int_t)stats->force_clipped, "zero_mV",
+			json_number(stats->zero_mV), "streams", stream_json(streams, n)));
+		return;
+	}
+	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker records, ",
+	       path, result->seconds, (unsigned long long)stats->force,
+	       (unsigned long long)stats->force_clipped,
+	       (unsigned long long)stats->tracker);
+	if (n > 2)
+		printf("%llu pictures, ", (unsigned long long)stats->frames);
+	printf("%llu lost", (unsigned long long)lost);
+	/* A short recording has no zero before it is closed. */
+	if (!isnan(stats->zero_mV))
+		printf(", zero %.1f mV", stats->zero_mV);
+	putchar('\n');
+	stream_table(streams, n);
+	cli_finish();
+}
+
+_Noreturn static void fail_of_losses(const char *path,
+				     const struct incise_recorder_stats *stats)
+{
+	const struct {
+		uint64_t n;
+		const char *what;
+	} lost[] = {
+		{stats->force_lost, "force samples"},
+		{stats->tracker_lost, "tracker records"},
+		{stats->frames_lost, "pictures"},
+	};
+	char text[200] = "";
+	size_t at = 0;
+
+	for (int i = 0; i < 3; i++)
+		if (lost[i].n)
+			at += (size_t)snprintf(text + at, sizeof(text) - at, "%s%llu %s",
+					       at ? ", " : "",
+					       (unsigned long long)lost[i].n,
+					       lost[i].what);
+	cli_fail("%s: %s were lost; the table events says when", path, text);
+}
+
+/* A recording that is not complete is a failure. */
+static void judge(const char *path, const struct result *result)
+{
+	const struct incise_recorder_stats *stats = &result->stats;
+	const struct incise_stream *streams = stats->streams;
+	const int n = stats->n_streams;
+
+	if (result->early.code)
+		cli_fail_with(&result->early);
+	for (int i = 0; i < n; i++)
+		if (*streams[i].ended)
+			cli_fail("%s: the %s ended before the recording did: %s", path,
+				 streams[i].name, streams[i].ended);
+	if (!stats->force || !stats->tracker)
+		cli_fail("%s: the %s gave nothing in %.1f s; check its cable and power",
+			 path, stats->force ? "tracker" : "force channel",
+			 result->seconds);
+	if (stats->force_lost || stats->tracker_lost || stats->frames_lost)
+		fail_of_losses(path, stats);
+	if (n > 2 && !stats->frames)
+		cli_fail("%s: the camera gave nothing in %.1f s; check its cable", path,
+			 result->seconds);
 }
 
 int main(int argc, char **argv)
@@ -217,35 +395,34 @@ int main(int argc, char **argv)
 	struct incise_vision_setup vision;
 	struct incise_force_info force;
 	struct incise_error err = {0};
-	struct capture_wish wish = {0};
-	struct run run = {.wish = &wish};
+	struct options options = {0};
+	struct run run = {.options = &options};
 	char target[PATH_MAX];
 
-	capture_wish_take(&wish, argc, argv);
-	run.result.path = wish.output;
+	parse(&options, argc, argv);
 	incise_calibration_nominal(&calibration);
-	if (wish.calibration &&
-	    incise_calibration_load(wish.calibration, &calibration, &err))
+	if (options.calibration &&
+	    incise_calibration_load(options.calibration, &calibration, &err))
 		cli_fail_with(&err);
-	setup.calibration_path = wish.calibration;
-	run.rig = open_rig(&wish);
-	setup.planned_s = planned_s(&wish, run.rig);
-	setup.vision = take_vision(&wish, run.rig, &vision) ? &vision : NULL;
-	setup.cuts = wish.cuts;
-	setup.trigger_force_N = wish.trigger_force_N;
-	setup.trigger_button = wish.trigger_button;
-	setup.armed = wish.trigger_button || wish.trigger_force_N > 0;
+	setup.calibration_path = options.calibration;
+	run.rig = open_rig(&options);
+	setup.planned_s = planned_s(&options, run.rig);
+	setup.vision = use_vision(&options, run.rig, &vision) ? &vision : NULL;
+	setup.cuts = options.cuts;
+	setup.trigger_force_N = options.trigger_force_N;
+	setup.trigger_button = options.trigger_button;
+	setup.armed = options.trigger_button || options.trigger_force_N > 0;
 	incise_force_info(incise_rig_force(run.rig), &force);
 	run.view.full_scale_N = force.full_scale_V * 1e3 / calibration.force_mV_N;
 	run.view.depth = setup.vision;
 
-	snprintf(target, sizeof(target), "%s%s", wish.output, wish.force ? ".new" : "");
-	if (wish.force)
-		clear(&wish, target);
+	snprintf(target, sizeof(target), "%s%s", options.output,
+		 options.force ? ".new" : "");
+	if (options.force)
+		clear(&options, target);
 	cli_catch_signals();
-	run.recorder = incise_recorder_new(target, run.rig, &setup, &err);
-	if (!run.recorder)
-		cli_fail_with(&err);
+	run.recorder =
+		cli_require(incise_recorder_new(target, run.rig, &setup, &err), &err);
 	keyboard_begin();
 	capture_view_begin();
 	record(&run);
@@ -255,13 +432,13 @@ int main(int argc, char **argv)
 	incise_recorder_stats(run.recorder, &run.result.stats);
 	if (incise_recorder_close(run.recorder, &err))
 		cli_fail_with(&err);
-	/* Whole by now, should the terminal be held. */
+	/* The recording is closed: now the terminal may block. */
 	capture_view_end();
 	incise_rig_close(run.rig);
 	keep_old(&run, target);
-	if (wish.force)
-		recording_replace(target, wish.output);
-	capture_report(&run.result, wish.json);
-	capture_judge(&run.result);
+	if (options.force)
+		recording_replace(target, options.output);
+	report(&options, &run.result);
+	judge(options.output, &run.result);
 	return 0;
 }

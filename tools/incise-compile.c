@@ -4,7 +4,6 @@
  * its error.
  */
 #include <ctype.h>
-#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,37 +12,13 @@
 #include "cli/cli.h"
 #include "cli/json.h"
 
-enum { OPT_BUDGET = CLI_LONG, OPT_ARITH, OPT_CELLS, OPT_C_SOURCE, OPT_JSON };
-
-static const struct cli_option options[] = {
-	{'o', "output", "FILE",
-	 "write the compiled model there (.fx); '-' is standard output"},
-	{OPT_BUDGET, "budget", "ERROR",
-	 "largest error that may be certified, e.g. 0.1mN, 50uN or\n"
-	 "1e-4 in the output's unit (default: 0.1mN)"},
-	{OPT_ARITH, "arith", "KIND",
-	 "direct, table or force (default: the cheapest within the\n"
-	 "budget)"},
-	{OPT_CELLS, "cells", "N", "at least N cells per input of tables, up to 4096"},
-	{OPT_C_SOURCE, "c-source", "FILE.c",
-	 "write it as C for a microcontroller, too; FILE_eval() is the\n"
-	 "function"},
-	{OPT_JSON, "json", NULL, "report as JSON"},
-	{0},
+struct job {
+	const char *output, *c_source;
+	bool json;
+	struct incise_fixed_options options;
 };
 
-static const struct cli_command command = {
-	.name = "compile",
-	.synopsis = "MODEL.fis -o MODEL.fx [OPTIONS]",
-	.summary =
-		"Compile a model to integers, for the haptic loop and for kernels. The largest\n"
-		"error over the whole support is certified by interval arithmetic.",
-	.options = options,
-	.notes = "Example:\n  incise compile liver.fis --budget 0.1mN -o liver.fx\n\n"
-		 "Exit: 0 compiled, 1 failed, 2 bad usage. See incise-compile(1).",
-};
-
-static double parse_budget(const char *text)
+static void parse_budget(void *budget, char *text)
 {
 	static const struct {
 		const char *unit;
@@ -58,27 +33,28 @@ static double parse_budget(const char *text)
 		value *= units[i].scale;
 		if (!(value >= 1e-9 && value <= 1e9))
 			cli_usage("--budget: %s is not within 1e-9 to 1e9", text);
-		return value;
+		*(double *)budget = value;
+		return;
 	}
 	cli_usage("--budget: '%s' is not an error such as 0.1mN, 50uN or 1e-4", text);
 }
 
-static int parse_arithmetic(const char *text)
+static void parse_arithmetic(void *arithmetic, char *text)
 {
 	for (int a = INCISE_FIXED_DIRECT; a <= INCISE_FIXED_FORCE; a++)
-		if (!strcmp(text, incise_fixed_arithmetic_name(a)))
-			return a;
+		if (!strcmp(text, incise_fixed_arithmetic_name(a))) {
+			*(int *)arithmetic = a;
+			return;
+		}
 	cli_usage("--arith: '%s' is none of direct, table and force", text);
 }
 
-/* "out/pig liver.c" makes pig_liver: a C name of the file's own. */
+/* "out/pig liver.c" makes pig_liver, a C name of the file's own: free(3). */
 static char *symbol_of(const char *path)
 {
 	const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
-	char *symbol = strndup(name, strcspn(name, "."));
+	char *symbol = cli_text("%.*s", (int)strcspn(name, "."), name);
 
-	if (!symbol)
-		cli_fail("no memory");
 	for (char *c = symbol; *c; c++)
 		if (!isalnum((unsigned char)*c) || (unsigned char)*c >= 0x80)
 			*c = '_';
@@ -87,6 +63,45 @@ static char *symbol_of(const char *path)
 			  path);
 	return symbol;
 }
+
+static void parse_c_source(void *c_source, char *path)
+{
+	free(symbol_of(path));
+	*(const char **)c_source = path;
+}
+
+static const struct cli_option options[] = {
+	{'o', "output", "FILE",
+	 "write the compiled model there (.fx); '-' is standard output",
+	 CLI_TEXT(struct job, output)},
+	{0, "budget", "ERROR",
+	 "largest error that may be certified, e.g. 0.1mN, 50uN or\n"
+	 "1e-4 in the output's unit (default: 0.1mN)",
+	 CLI_PARSED(struct job, options.budget, parse_budget)},
+	{0, "arith", "KIND",
+	 "direct, table or force (default: the cheapest within the\n"
+	 "budget)",
+	 CLI_PARSED(struct job, options.arithmetic, parse_arithmetic)},
+	{0, "cells", "N", "at least N cells per input of tables, up to 4096",
+	 CLI_INTEGER(struct job, options.cells, 1, 4096)},
+	{0, "c-source", "FILE.c",
+	 "write it as C for a microcontroller, too; FILE_eval() is the\n"
+	 "function",
+	 CLI_PARSED(struct job, c_source, parse_c_source)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	{0},
+};
+
+static const struct cli_command command = {
+	.name = "compile",
+	.synopsis = "MODEL.fis -o MODEL.fx [OPTIONS]",
+	.summary =
+		"Compile a model to integers, for the haptic loop and for kernels. The largest\n"
+		"error over the whole support is certified by interval arithmetic.",
+	.options = options,
+	.notes = "Example:\n  incise compile liver.fis --budget 0.1mN -o liver.fx\n\n"
+		 "Exit: 0 compiled, 1 failed, 2 bad usage. See incise-compile(1).",
+};
 
 static void write_c(const struct incise_fixed *fx, const char *path)
 {
@@ -126,54 +141,28 @@ static void report(const struct incise_fixed *fx, const char *model, const char 
 
 int main(int argc, char **argv)
 {
-	struct incise_fixed_options o;
+	struct job job = {0};
 	struct incise_error err = {0};
 	struct incise_fixed *fx;
 	struct incise_model *model;
-	const char *output = NULL, *c_source = NULL;
-	bool json = false;
-	int opt;
+	const char *path;
 
-	incise_fixed_options_init(&o);
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		switch (opt) {
-		case 'o':
-			output = optarg;
-			break;
-		case OPT_BUDGET:
-			o.budget = parse_budget(optarg);
-			break;
-		case OPT_ARITH:
-			o.arithmetic = parse_arithmetic(optarg);
-			break;
-		case OPT_CELLS:
-			o.cells = cli_integer("cells", optarg, 1, 4096);
-			break;
-		case OPT_C_SOURCE:
-			c_source = optarg;
-			free(symbol_of(c_source));
-			break;
-		case OPT_JSON:
-			json = true;
-			break;
-		}
-	if (optind + 1 != argc)
-		cli_usage("expected one model, got %d", argc - optind);
-	if (!output || !*output)
+	incise_fixed_options_init(&job.options);
+	cli_parse(&command, argc, argv, &job);
+	path = cli_operand(argc, argv, "model");
+	if (!job.output || !*job.output)
 		cli_usage("where should the compiled model go? Give -o MODEL.fx");
-	if (json && !strcmp(output, "-"))
+	if (job.json && !strcmp(job.output, "-"))
 		cli_usage("--json and -o - would both write to standard output");
-	model = incise_model_load(argv[optind], &err);
-	if (!model)
-		cli_fail_with(&err);
-	fx = incise_fixed_compile(model, &o, &err);
+	model = cli_require(incise_model_load(path, &err), &err);
+	fx = incise_fixed_compile(model, &job.options, &err);
 	if (!fx)
-		cli_fail("%s: %s", argv[optind], err.text);
-	if (incise_fixed_save(fx, output, &err))
+		cli_fail("%s: %s", path, err.text);
+	if (incise_fixed_save(fx, job.output, &err))
 		cli_fail_with(&err);
-	if (c_source)
-		write_c(fx, c_source);
-	report(fx, argv[optind], output, json);
+	if (job.c_source)
+		write_c(fx, job.c_source);
+	report(fx, path, job.output, job.json);
 	cli_finish();
 	incise_fixed_free(fx);
 	incise_model_free(model);

@@ -1,32 +1,59 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise demo: walks paper 1 on the virtual rig with the same commands a person would
- * type, and leaves a folder with the data, the model, pictures like the paper's and a
- * summary.
+ * incise demo: runs the commands of paper 1 on the virtual rig as a person would type them,
+ * and leaves a folder with the data, the model, plots like the paper's and a summary.
  *
  *   capture ─▶ export ─▶ train ─▶ haptic     each printed as "$ incise …"
- *                 └────────┴────────┴───────┴──▶ pictures, summary
+ *                 └────────┴────────┴───────┴──▶ plots, summary
  */
-#include <getopt.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <spawn.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
 #include <time.h>
+#include <unistd.h>
 #include "cli/cli.h"
-#include "demo/demo.h"
-#include "demo/demo_scene.h"
 #include "cli/json.h"
 #include "cli/plot.h"
+#include "cli/scene_argument.h"
+#include "demo/demo.h"
 
-enum { OPT_SEED = CLI_LONG, OPT_LOOP, OPT_SCENE, OPT_FORCE, OPT_JSON };
+/* Seeds end below those of a rig by as much as another liver's is more. */
+#define OTHER_LIVER 1000
+#define SEED_MAX (INT32_MAX - OTHER_LIVER)
 
-static const struct cli_option options[] = {
-	{'o', "output", "DIR", "folder to leave everything in (default: demo.out)"},
-	{OPT_SEED, "seed", "N", "of the virtual rig (default: 1)"},
-	{OPT_LOOP, "loop", "TIME", "length of the haptic loop (default: 10s)"},
-	{OPT_SCENE, "scene", "SCENE",
-	 "paper 2 instead: a film and a strip of a procedure on this scene, as neck"},
-	{OPT_FORCE, "force", NULL, "write into a folder that exists"},
-	{OPT_JSON, "json", NULL, "print the summary as JSON, and nothing else"},
+struct options {
+	struct demo demo;
+	const char *loop_time, *scene;
+	bool force;
+};
+
+/* Checked here, and handed on to incise haptic as it is. */
+static void parse_loop(void *loop_time, char *text)
+{
+	cli_duration("loop", text, 0.2, 3600);
+	*(const char **)loop_time = text;
+}
+
+static const struct cli_option option_table[] = {
+	{'o', "output", "DIR", "folder to leave everything in (default: demo.out)",
+	 CLI_TEXT(struct options, demo.folder)},
+	{0, "seed", "N", "of the virtual rig (default: 1)",
+	 CLI_INTEGER(struct options, demo.seed, 0, SEED_MAX)},
+	{0, "loop", "TIME", "length of the haptic loop (default: 10s)",
+	 CLI_PARSED(struct options, loop_time, parse_loop)},
+	{0, "scene", "SCENE",
+	 "paper 2 instead: a film and a strip of a procedure on this scene, as neck",
+	 CLI_TEXT(struct options, scene)},
+	{0, "force", NULL, "write into a folder that exists",
+	 CLI_FLAG(struct options, force)},
+	{0, "json", NULL, "print the summary as JSON, and nothing else",
+	 CLI_FLAG(struct options, demo.quiet)},
 	{0},
 };
 
@@ -36,49 +63,248 @@ static const struct cli_command command = {
 	.summary =
 		"Walk paper 1 on the virtual rig: cut, record, export, train, compile to fixed\n"
 		"point, run the haptic loop; leave data, model, pictures and summary in a folder.",
-	.options = options,
+	.options = option_table,
 	.notes = "Exit: 0 done, 1 failed, 2 bad usage. See incise-demo(1).",
 };
 
+/* Make a folder, which may exist if @may_exist. */
+static void make_folder(const char *folder, bool may_exist)
+{
+	if (mkdir(folder, 0777) && (errno != EEXIST || !may_exist))
+		cli_fail("%s: %s%s", folder, strerror(errno),
+			 errno == EEXIST ? "; give another -o DIR, or --force" : "");
+}
+
+static void print_step(const struct demo *demo, const char *what)
+{
+	static int number;
+
+	if (!demo->quiet)
+		printf("\n[%d] %s\n", ++number, what);
+}
+
+/* --- commands ------------------------------------------------------------------------ */
+
+static void print_command(char *const *argv)
+{
+	fputs("$ incise", stdout);
+	for (char *const *arg = argv; *arg; arg++)
+		printf(" %s", *arg);
+	putchar('\n');
+}
+
+/* @out: descriptor of its output, or -1 for ours. */
+static pid_t start(char *const *argv, int out)
+{
+	posix_spawn_file_actions_t files;
+	char *program = cli_text("%s/incise-%s", cli_folder(), argv[0]);
+	pid_t pid;
+	int rc;
+
+	if (posix_spawn_file_actions_init(&files))
+		cli_fail("no memory");
+	if (out >= 0)
+		posix_spawn_file_actions_adddup2(&files, out, STDOUT_FILENO);
+	fflush(stdout);
+	rc = posix_spawn(&pid, program, &files, NULL, argv, environ);
+	if (rc)
+		cli_fail("%s: %s", program, strerror(rc));
+	posix_spawn_file_actions_destroy(&files);
+	free(program);
+	return pid;
+}
+
+static int wait_for(pid_t pid, char *const *argv, struct incise_error *err)
+{
+	int status;
+
+	while (waitpid(pid, &status, 0) < 0 && errno == EINTR)
+		;
+	if (!status)
+		return 0;
+	return incise_error_set(err, ECANCELED, "'incise %s' failed, see the line above",
+				argv[0]);
+}
+
+/* Run a command to its end, and read the JSON that it prints; NULL with the error. */
+static json_t *read_report(char *const *argv, struct incise_error *err)
+{
+	json_error_t why = {.text = "no memory"};
+	json_t *report;
+	int pipe_fd[2];
+	pid_t pid;
+	FILE *in;
+
+	if (pipe2(pipe_fd, O_CLOEXEC))
+		cli_fail("pipe: %s", strerror(errno));
+	pid = start(argv, pipe_fd[1]);
+	close(pipe_fd[1]);
+	in = fdopen(pipe_fd[0], "r");
+	report = in ? json_loadf(in, 0, &why) : NULL;
+	if (in)
+		fclose(in);
+	if (wait_for(pid, argv, err)) {
+		json_decref(report);
+		return NULL;
+	}
+	if (!report)
+		incise_error_set(err, EINVAL, "'incise %s' printed no report: %s",
+				 argv[0], why.text);
+	return report;
+}
+
+/* --- paper 1 ------------------------------------------------------------------------- */
+
+/* The bins that make the paper's 120 pairs. */
+#define BINS "12x10"
+
+static json_t *run_command(const struct demo *demo, char *const *argv)
+{
+	struct incise_error err = {0};
+	json_t *report;
+
+	if (!demo->quiet)
+		print_command(argv);
+	report = read_report(argv, &err);
+	if (!report)
+		cli_fail("%s; the folder %s holds what was done until then", err.text,
+			 demo->folder);
+	return report;
+}
+
+#define RUN(demo, ...) run_command(demo, (char *const[]){__VA_ARGS__, NULL})
+
+static void write_scene(const struct demo *demo)
+{
+	char *path = demo_path(demo, "liver.scene");
+	FILE *out = fopen(path, "we");
+
+	if (!out)
+		cli_fail("%s: %s", path, strerror(errno));
+	fputs("# Written by incise demo; see incise-scene(5).\n"
+	      "rate_hz = 1000.0;\nmodel = \"liver.fis\";\narithmetic = \"fixed\";\n"
+	      "limits = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };\n",
+	      out);
+	if (fclose(out))
+		cli_fail("%s: %s", path, strerror(errno));
+	free(path);
+}
+
+/* Run the commands of paper 1; their reports go into the summary. */
+static void walk(struct demo *demo, const char *loop_time)
+{
+	char *rec = demo_path(demo, "liver.rec"),
+	     *new_rec = demo_path(demo, "new-cut.rec");
+	char *raw = demo_path(demo, "raw.csv"), *pairs = demo_path(demo, "pairs.csv");
+	char *by_cut = demo_path(demo, "pairs-by-cut.csv"),
+	     *new_csv = demo_path(demo, "new-cut.csv");
+	char *paper = demo_path(demo, "paper.fis"), *model = demo_path(demo, "liver.fis");
+	char *initial = demo_path(demo, "liver-initial.fis"),
+	     *scene = demo_path(demo, "liver.scene");
+	char *history = demo_path(demo, "paper-epochs.csv"),
+	     *log = demo_path(demo, "haptic.csv");
+	char *sim = cli_text("sim:seed=%ld,clock=simulated", demo->seed);
+	char *seed_text = cli_text("%ld", demo->seed);
+	/* Another liver: the boundary effect of its cut is not that of any cut above. */
+	char *new_sim = cli_text("sim:seed=%ld,clock=simulated,depth_mm=5,times=1",
+				 demo->seed + OTHER_LIVER);
+	char *live = cli_text("sim:seed=%ld,clock=real,depth_mm=5,times=1",
+			      demo->seed + OTHER_LIVER);
+	char *duration = cli_text("%s", loop_time);
+
+	print_step(demo,
+		   "Cut the virtual liver: 3, 4, 4 and 3 times at 5, 10, 15 and 20 mm");
+	json_object_set_new(demo->summary, "capture",
+			    RUN(demo, "capture", "-o", rec, "--rig", sim, "--force",
+				"--json"));
+	print_step(demo,
+		   "Make datasets of the recording: raw, averaged, averaged cut by cut");
+	json_object_set_new(demo->summary, "export_raw",
+			    RUN(demo, "export", rec, "-o", raw, "--rate", "1000",
+				"--json"));
+	json_object_set_new(demo->summary, "export_averaged",
+			    RUN(demo, "export", rec, "-o", pairs, "--average", BINS,
+				"--json"));
+	json_object_set_new(demo->summary, "export_by_cut",
+			    RUN(demo, "export", rec, "-o", by_cut, "--average", BINS,
+				"--by-cut", "--json"));
+	print_step(demo, "Train on random halves as the paper does, then by unseen cuts");
+	json_object_set_new(demo->summary, "train_random_halves",
+			    RUN(demo, "train", pairs, "-o", paper, "--classic", "--check",
+				"0.5", "--seed", seed_text, "--history", history,
+				"--json"));
+	json_object_set_new(demo->summary, "train_unseen_cuts",
+			    RUN(demo, "train", by_cut, "-o", model, "--group", "cut",
+				"--check", "0.3", "--seed", seed_text, "--initial",
+				initial, "--json"));
+	print_step(demo, "Cut another liver once, 5 mm deep, to compare with");
+	json_object_set_new(demo->summary, "capture_new_cut",
+			    RUN(demo, "capture", "-o", new_rec, "--rig", new_sim,
+				"--force", "--json"));
+	json_object_set_new(demo->summary, "export_new_cut",
+			    RUN(demo, "export", new_rec, "-o", new_csv, "--rate", "1000",
+				"--json"));
+	print_step(demo, "Run the haptic loop in real time, in fixed point");
+	write_scene(demo);
+	json_object_set_new(demo->summary, "haptic",
+			    RUN(demo, "haptic", scene, "--rig", live, "--no-rt",
+				"--duration", duration, "--log", log, "--json"));
+	free(rec), free(new_rec), free(raw), free(pairs), free(by_cut), free(new_csv);
+	free(paper), free(model), free(initial), free(scene), free(history), free(log);
+	free(sim), free(seed_text), free(new_sim), free(live), free(duration);
+}
+
+/* --- paper 2 ------------------------------------------------------------------------- */
+
+/* In the script of `incise view --procedure`: cut, bleeding, enlarging, tube. */
+#define MOMENTS "2.4s,8.5s,12.2s,20s"
+/* Near the cut, from the side and above. */
+#define NEAR "18,40,150"
+
+static void run_view(char *const *argv)
+{
+	struct incise_error err = {0};
+
+	print_command(argv);
+	if (wait_for(start(argv, -1), argv, &err))
+		cli_fail_with(&err);
+}
+
+/* Leave NAME.mkv and NAME.png in the folder, by incise view. */
+static void film_scene(const char *scene, const char *folder, bool force)
+{
+	char *name = scene_argument_name(scene);
+	char *film = cli_text("%s/%s.mkv", folder, name);
+	char *strip = cli_text("%s/%s.png", folder, name);
+
+	make_folder(folder, force);
+	run_view((char *const[]){"view", (char *)scene, "--procedure", "--video", film,
+				 "--fps", "30", NULL});
+	run_view((char *const[]){"view", (char *)scene, "--procedure", "--strip", strip,
+				 "--at", MOMENTS, "--size", "640x480", "--no-panel",
+				 "--camera", NEAR, "--fps", "10", NULL});
+	printf("\n%s\n%s\n", film, strip);
+	cli_finish();
+	free(name), free(film), free(strip);
+}
+
 int main(int argc, char **argv)
 {
-	struct demo demo = {.folder = "demo.out", .seed = 1};
-	const char *loop_time = "10s", *scene = NULL;
+	struct options options = {.demo = {.folder = "demo.out", .seed = 1},
+				  .loop_time = "10s"};
+	struct demo *demo = &options.demo;
 	struct incise_model *model;
 	char *plot;
 	struct timespec begin, end;
-	bool force = false;
 	double seconds;
-	int opt;
 
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		switch (opt) {
-		case 'o':
-			demo.folder = optarg;
-			break;
-		case OPT_SEED:
-			demo.seed = cli_integer("seed", optarg, 0, DEMO_SEED_MAX);
-			break;
-		case OPT_LOOP:
-			cli_duration("loop", optarg, 0.2, 3600);
-			loop_time = optarg;
-			break;
-		case OPT_SCENE:
-			scene = optarg;
-			break;
-		case OPT_FORCE:
-			force = true;
-			break;
-		case OPT_JSON:
-			demo.quiet = true;
-			break;
-		}
+	cli_parse(&command, argc, argv, &options);
 	if (optind != argc)
 		cli_usage("'%s': demo takes options only", argv[optind]);
-	if (scene && demo.quiet)
+	if (options.scene && demo->quiet)
 		cli_usage("--scene makes pictures, and has nothing to say as JSON");
-	if (scene) {
-		demo_scene(scene, demo.folder, force);
+	if (options.scene) {
+		film_scene(options.scene, demo->folder, options.force);
 		return 0;
 	}
 	if (!plot_possible())
@@ -86,33 +312,33 @@ int main(int argc, char **argv)
 			"gnuplot is not installed, it draws the pictures: apt-get install "
 			"gnuplot-nox, or run 'make demo'");
 	clock_gettime(CLOCK_MONOTONIC, &begin);
-	demo_make_folder(demo.folder, force);
-	plot = demo_path(&demo, "plot");
-	demo_make_folder(plot, true);
+	make_folder(demo->folder, options.force);
+	plot = demo_path(demo, "plot");
+	make_folder(plot, true);
 	free(plot);
-	demo.pictures = json_array();
-	demo.summary = demo_summary_begin(demo.seed);
-	demo_walk(&demo, loop_time);
-	model = demo_model(&demo, "liver.fis");
-	demo_step(&demo, "Compare, and draw the pictures");
-	demo_worth(&demo, model);
-	demo_figures(&demo, model);
-	json_object_set_new(demo.summary, "pictures", demo.pictures);
+	demo->pictures = json_array();
+	demo->summary = demo_summary_begin(demo->seed);
+	walk(demo, options.loop_time);
+	model = demo_model(demo, "liver.fis");
+	print_step(demo, "Compare, and draw the pictures");
+	demo_worth(demo, model);
+	demo_figures(demo, model);
+	json_object_set_new(demo->summary, "pictures", demo->pictures);
 	clock_gettime(CLOCK_MONOTONIC, &end);
 	seconds = end.tv_sec - begin.tv_sec + (end.tv_nsec - begin.tv_nsec) * 1e-9;
-	json_object_set_new(demo.summary, "seconds", json_number(seconds));
-	demo_summary_save(&demo, seconds);
-	if (demo.quiet) {
-		json_print(json_incref(demo.summary));
+	json_set_number(demo->summary, "seconds", seconds);
+	demo_summary_save(demo, seconds);
+	if (demo->quiet) {
+		json_print(json_incref(demo->summary));
 	} else {
 		putchar('\n');
-		demo_summary_print(&demo, stdout, seconds);
+		demo_summary_print(demo, stdout, seconds);
 		printf("left in            %s: summary.json, pictures (*.png, *.svg), data, "
 		       "models\n",
-		       demo.folder);
+		       demo->folder);
 	}
 	cli_finish();
 	incise_model_free(model);
-	json_decref(demo.summary);
+	json_decref(demo->summary);
 	return 0;
 }

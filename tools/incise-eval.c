@@ -3,7 +3,6 @@
  * incise eval MODEL.fis: reads lines of inputs (depth velocity), prints the force.
  */
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,19 +12,28 @@
 #include <incise/uncertainty.h>
 #include "cli/cli.h"
 #include "cli/json.h"
+#include "cli/scene_argument.h"
 
-enum { OPT_ARITH = CLI_LONG, OPT_NO_CLAMP, OPT_GRID, OPT_SD, OPT_JSON };
+struct job {
+	const char *arith, *grid;
+	bool no_clamp, sd, json;
+};
 
 static const struct cli_option options[] = {
-	{OPT_ARITH, "arith", "KIND", "double (default) or fixed; a .fx is fixed already"},
-	{OPT_NO_CLAMP, "no-clamp", NULL, "extrapolate outside the support (double only)"},
-	{OPT_GRID, "grid", "NxM",
+	{0, "arith", "KIND", "double (default) or fixed; a .fx is fixed already",
+	 CLI_PARSED(struct job, arith, scene_argument_arith)},
+	{0, "no-clamp", NULL, "extrapolate outside the support (double only)",
+	 CLI_FLAG(struct job, no_clamp)},
+	{0, "grid", "NxM",
 	 "evaluate on a grid over the support instead of reading;\n"
-	 "prints inputs and output, an empty line after each row"},
-	{OPT_SD, "sd", NULL,
+	 "prints inputs and output, an empty line after each row",
+	 CLI_TEXT(struct job, grid)},
+	{0, "sd", NULL,
 	 "print the standard deviation of an unseen value behind\n"
-	 "the force; from MODEL.fis.sd, which train writes"},
-	{OPT_JSON, "json", NULL, "report as JSON: a row per evaluation"},
+	 "the force; from MODEL.fis.sd, which train writes",
+	 CLI_FLAG(struct job, sd)},
+	{0, "json", NULL, "report as JSON: a row per evaluation",
+	 CLI_FLAG(struct job, json)},
 	{0},
 };
 
@@ -44,7 +52,7 @@ static const struct cli_command command = {
 struct evaluator {
 	struct incise_model *model; /* NULL: only the compiled form is there */
 	struct incise_fixed *fixed; /* NULL: double */
-	struct incise_uncertainty *uncertainty; /* NULL: not asked for */
+	struct incise_uncertainty *uncertainty; /* NULL: none */
 	int n_inputs;
 	const char *input[INCISE_MODEL_INPUTS_MAX], *output;
 	double min[INCISE_MODEL_INPUTS_MAX], max[INCISE_MODEL_INPUTS_MAX];
@@ -161,11 +169,8 @@ static void load_uncertainty(struct evaluator *e, const char *model)
 		cli_fail(
 			"--sd needs a model in a file: its standard deviation lies beside "
 			"it");
-	if (asprintf(&path, "%s.sd", model) < 0)
-		cli_fail("%s: no memory for its standard deviation", model);
-	e->uncertainty = incise_uncertainty_load(path, e->model, &err);
-	if (!e->uncertainty)
-		cli_fail_with(&err);
+	path = cli_text("%s.sd", model);
+	e->uncertainty = cli_require(incise_uncertainty_load(path, e->model, &err), &err);
 	free(path);
 }
 
@@ -193,21 +198,11 @@ static void eval_grid(struct evaluator *e, const char *size)
 	}
 }
 
-static bool ends_with(const char *text, const char *end)
-{
-	size_t n = strlen(text), m = strlen(end);
-
-	return n >= m && !strcmp(text + n - m, end);
-}
-
-/* A compiled model has its fixed form only. */
 static void open_compiled(struct evaluator *e, const char *path)
 {
 	struct incise_error err = {0};
 
-	e->fixed = incise_fixed_load(path, &err);
-	if (!e->fixed)
-		cli_fail_with(&err);
+	e->fixed = cli_require(incise_fixed_load(path, &err), &err);
 	e->n_inputs = e->fixed->n_inputs;
 	e->output = e->fixed->output;
 	for (int i = 0; i < e->n_inputs; i++) {
@@ -222,7 +217,7 @@ static void open_model(struct evaluator *e, const char *path, const char *arith,
 {
 	struct incise_error err = {0};
 
-	if (ends_with(path, ".fx")) {
+	if (cli_ends_with(path, ".fx")) {
 		if (arith && !strcmp(arith, "double"))
 			cli_usage("--arith double: %s is compiled to fixed point", path);
 		if (!clamp)
@@ -231,9 +226,7 @@ static void open_model(struct evaluator *e, const char *path, const char *arith,
 		open_compiled(e, path);
 		return;
 	}
-	e->model = incise_model_load(path, &err);
-	if (!e->model)
-		cli_fail_with(&err);
+	e->model = cli_require(incise_model_load(path, &err), &err);
 	incise_model_set_clamp(e->model, clamp);
 	e->n_inputs = incise_model_info(e->model)->n_inputs;
 	e->output = incise_model_info(e->model)->output.name;
@@ -249,64 +242,52 @@ static void open_model(struct evaluator *e, const char *path, const char *arith,
 		cli_fail("%s: %s", path, err.text);
 }
 
-int main(int argc, char **argv)
+static void eval_file(struct evaluator *e, const char *path)
 {
-	const char *arith = NULL, *grid = NULL, *path = "-";
-	struct evaluator e = {0};
-	bool clamp = true, sd = false;
-	FILE *in;
-	int opt;
+	bool named = strcmp(path, "-");
+	FILE *in = named ? fopen(path, "re") : stdin;
 
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		switch (opt) {
-		case OPT_ARITH:
-			arith = optarg;
-			if (strcmp(arith, "double") && strcmp(arith, "fixed"))
-				cli_usage("--arith: '%s' is neither double nor fixed",
-					  arith);
-			break;
-		case OPT_NO_CLAMP:
-			clamp = false;
-			break;
-		case OPT_GRID:
-			grid = optarg;
-			break;
-		case OPT_SD:
-			sd = true;
-			break;
-		case OPT_JSON:
-			e.rows = json_array();
-			break;
-		}
+	if (!in)
+		cli_fail("%s: %s; give a file of lines 'depth velocity'", path,
+			 strerror(errno));
+	eval_stream(e, in, named ? path : "standard input");
+	if (named)
+		fclose(in);
+}
+
+static void parse(struct job *job, int argc, char **argv)
+{
+	cli_parse(&command, argc, argv, job);
 	if (optind >= argc || argc - optind > 2)
 		cli_usage("expected a model and at most one file of inputs");
-	if (!clamp && arith && !strcmp(arith, "fixed"))
+	if (job->no_clamp && job->arith && !strcmp(job->arith, "fixed"))
 		cli_usage(
 			"--no-clamp needs --arith double: fixed point ends at the support");
-	if (grid && argc - optind == 2)
+	if (job->grid && argc - optind == 2)
 		cli_usage("--grid evaluates its own points: it takes no file of inputs");
-	if (argc - optind == 2)
-		path = argv[optind + 1];
-	open_model(&e, argv[optind], arith, clamp);
-	if (sd)
+}
+
+int main(int argc, char **argv)
+{
+	struct evaluator e = {0};
+	struct job job = {0};
+
+	parse(&job, argc, argv);
+	open_model(&e, argv[optind], job.arith, !job.no_clamp);
+	e.rows = job.json ? json_array() : NULL;
+	if (job.sd)
 		load_uncertainty(&e, argv[optind]);
-	if (grid) {
-		eval_grid(&e, grid);
-	} else {
-		in = strcmp(path, "-") ? fopen(path, "re") : stdin;
-		if (!in)
-			cli_fail("%s: %s; give a file of lines 'depth velocity'", path,
-				 strerror(errno));
-		eval_stream(&e, in, strcmp(path, "-") ? path : "standard input");
-		if (in != stdin)
-			fclose(in);
-	}
+	if (job.grid)
+		eval_grid(&e, job.grid);
+	else
+		eval_file(&e, argc - optind == 2 ? argv[optind + 1] : "-");
 	if (e.rows)
 		json_print(json_pack("{so}", "rows", e.rows));
 	cli_finish();
 	if (e.outside)
 		cli_warn("%lu inputs lay outside the model's support and were %s",
-			 e.outside, clamp ? "taken as its nearest end" : "extrapolated");
+			 e.outside,
+			 job.no_clamp ? "extrapolated" : "taken as its nearest end");
 	if (e.unfired)
 		cli_warn(
 			"%lu inputs lay where no rule of the model fires; the nearest rule "

@@ -4,7 +4,6 @@
  * end, or for months as a service.
  */
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,58 +11,62 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include <incise/calibration.h>
+#include <incise/outfile.h>
 #include "cli/cli.h"
-#include "haptic/haptic_actuator.h"
-#include "haptic/haptic_report.h"
-#include "haptic/haptic_self_test.h"
-#include "haptic/haptic_supervisor.h"
+#include "cli/json.h"
+#include "cli/loop_report.h"
+#include "haptic/haptic.h"
+#include "stepper/status.h"
 
-enum {
-	OPT_MODEL = CLI_LONG,
-	OPT_ARITH,
-	OPT_TOOL,
-	OPT_DURATION,
-	OPT_HOME,
-	OPT_RECOVER,
-	OPT_POLICY,
-	OPT_PRIORITY,
-	OPT_CPU,
-	OPT_NO_RT,
-	OPT_OVERRUNS,
-	OPT_STATE,
-	OPT_LOG,
-	OPT_JSON
+struct job {
+	struct haptic haptic;
+	struct incise_realtime_setup realtime;
+	const char *rig, *log, *calibration, *state;
+	double duration;
+	bool json, home, recover, no_rt, verbose;
 };
 
+static const char *const tools[] = {"auto", "blade", "handle", "tube", NULL};
+static const char *const policies[] = {"fifo", "deadline", NULL};
+
 static const struct cli_option options[] = {
-	{'r', "rig", "RIG",
-	 "file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n"
-	 "(default: ./rig.conf, else /etc/incise/rig.conf)"},
+	{CLI_RIG_OPTION(struct job, rig)},
 	{'c', "calibration", "FILE",
 	 "calibration.conf, for where the tip is (default: where the\n"
-	 "tracker takes it to be)"},
-	{OPT_MODEL, "model", "FILE", "use this model instead of the scene's"},
-	{OPT_ARITH, "arith", "KIND", "fixed or double, instead of the scene's"},
-	{OPT_TOOL, "tool", "KIND",
+	 "tracker takes it to be)",
+	 CLI_TEXT(struct job, calibration)},
+	SCENE_ARGUMENT_OPTIONS(struct job, haptic.argument),
+	{0, "tool", "KIND",
 	 "what the hand holds: auto (blade or handle, by the scalpel's turn), blade,\n"
-	 "handle or tube (default: auto)"},
-	{OPT_DURATION, "duration", "TIME",
-	 "stop after this time, e.g. 10s (default: at SIGINT)"},
-	{OPT_HOME, "home", NULL, "find the actuator's 0 first, unless it is known"},
-	{OPT_RECOVER, "recover", NULL,
-	 "clear first what a program that died left latched in the actuator"},
-	{OPT_POLICY, "policy", "POLICY", "fifo or deadline (default: fifo)"},
-	{OPT_PRIORITY, "priority", "N", "of fifo, 1 to 84 (default: 80)"},
-	{OPT_CPU, "cpu", "N", "run the loop's thread on this CPU alone (default: any)"},
-	{OPT_NO_RT, "no-rt", NULL, "run without real time: ticks may be late"},
-	{OPT_OVERRUNS, "overruns", "N",
-	 "end after this many overruns in a row; 0: never (default: 100)"},
-	{OPT_STATE, "state", "FILE",
+	 "handle or tube (default: auto)",
+	 CLI_CHOICE(struct job, haptic.tool, tools, "auto, blade, handle, tube")},
+	{0, "duration", "TIME", "stop after this time, e.g. 10s (default: at SIGINT)",
+	 CLI_DURATION(struct job, duration, 0.01, 86400)},
+	{0, "home", NULL, "find the actuator's 0 first, unless it is known",
+	 CLI_FLAG(struct job, home)},
+	{0, "recover", NULL,
+	 "clear first what a program that died left latched in the actuator",
+	 CLI_FLAG(struct job, recover)},
+	{0, "policy", "POLICY", "fifo or deadline (default: fifo)",
+	 CLI_CHOICE(struct job, realtime.policy, policies, "fifo, deadline")},
+	{0, "priority", "N", "of fifo, 1 to 84 (default: 80)",
+	 CLI_INTEGER(struct job, realtime.priority, 1, INCISE_REALTIME_PRIORITY_MAX)},
+	{0, "cpu", "N", "run the loop's thread on this CPU alone (default: any)",
+	 CLI_INTEGER(struct job, realtime.cpu, 0, 1023)},
+	{0, "no-rt", NULL, "run without real time: ticks may be late",
+	 CLI_FLAG(struct job, no_rt)},
+	{0, "overruns", "N",
+	 "end after this many overruns in a row; 0: never (default: 100)",
+	 CLI_INTEGER(struct job, haptic.loop.overruns_most, 0, 1000000)},
+	{0, "state", "FILE",
 	 "page that others read, none for no page (default: NAME.state of the\n"
-	 "scene's name, in /run/incise or $XDG_RUNTIME_DIR/incise)"},
-	{OPT_LOG, "log", "FILE", "write every tick as CSV at the end; needs --duration"},
-	{OPT_JSON, "json", NULL, "report as JSON"},
-	{'v', "verbose", NULL, "say on stderr what happens meanwhile"},
+	 "scene's name, in /run/incise or $XDG_RUNTIME_DIR/incise)",
+	 CLI_TEXT(struct job, state)},
+	{0, "log", "FILE", "write every tick as CSV at the end; needs --duration",
+	 CLI_TEXT(struct job, log)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	{'v', "verbose", NULL, "say on stderr what happens meanwhile",
+	 CLI_FLAG(struct job, verbose)},
 	{0},
 };
 
@@ -81,107 +84,14 @@ static const struct cli_command command = {
 		"Exit: 0 ended as asked, 1 failed, 2 bad usage. See incise-haptic(1).",
 };
 
-struct job {
-	struct haptic haptic;
-	struct incise_realtime_setup realtime;
-	const char *rig, *log, *calibration, *state;
-	double duration;
-	bool json, home, recover, no_rt;
-};
-
-static int one_of(const char *option, const char *text, const char *const *names, int n,
-		  const char *list)
-{
-	for (int i = 0; i < n; i++)
-		if (!strcmp(text, names[i]))
-			return i;
-	cli_usage("--%s: '%s' is none of %s", option, text, list);
-}
-
-static enum incise_tool tool_named(const char *name)
-{
-	static const char *const names[] = {"auto", "blade", "handle", "tube"};
-
-	return (enum incise_tool)one_of("tool", name, names, 4,
-					"auto, blade, handle, tube");
-}
-
-static enum incise_realtime_policy policy_named(const char *name)
-{
-	static const char *const names[] = {"fifo", "deadline"};
-
-	return (enum incise_realtime_policy)one_of("policy", name, names, 2,
-						   "fifo, deadline");
-}
-
-static void take_option(struct job *job, int opt)
-{
-	switch (opt) {
-	case 'r':
-		job->rig = optarg;
-		break;
-	case 'c':
-		job->calibration = optarg;
-		break;
-	case OPT_MODEL:
-		job->haptic.argument.model = optarg;
-		break;
-	case OPT_ARITH:
-		scene_argument_arith(&job->haptic.argument, optarg);
-		break;
-	case OPT_TOOL:
-		job->haptic.tool = tool_named(optarg);
-		break;
-	case OPT_DURATION:
-		job->duration = cli_duration("duration", optarg, 0.01, 86400);
-		break;
-	case OPT_HOME:
-		job->home = true;
-		break;
-	case OPT_RECOVER:
-		job->recover = true;
-		break;
-	case OPT_POLICY:
-		job->realtime.policy = policy_named(optarg);
-		break;
-	case OPT_PRIORITY:
-		job->realtime.priority = (int)cli_integer("priority", optarg, 1,
-							  INCISE_REALTIME_PRIORITY_MAX);
-		break;
-	case OPT_CPU:
-		job->realtime.cpu = (int)cli_integer("cpu", optarg, 0, 1023);
-		break;
-	case OPT_NO_RT:
-		job->no_rt = true;
-		break;
-	case OPT_OVERRUNS:
-		job->haptic.loop.overruns_most =
-			(unsigned int)cli_integer("overruns", optarg, 0, 1000000);
-		break;
-	case OPT_STATE:
-		job->state = optarg;
-		break;
-	case OPT_LOG:
-		job->log = optarg;
-		break;
-	case OPT_JSON:
-		job->json = true;
-		break;
-	case 'v':
-		cli_be_verbose();
-		break;
-	}
-}
-
 static void parse(struct job *job, int argc, char **argv)
 {
-	int opt;
-
 	job->realtime = (struct incise_realtime_setup){
 		.priority = INCISE_REALTIME_PRIORITY, .cpu = INCISE_REALTIME_ANY_CPU};
 	job->haptic.loop.overruns_most = 100;
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		take_option(job, opt);
+	cli_parse(&command, argc, argv, job);
+	if (job->verbose)
+		cli_be_verbose();
 	scene_argument_operand(&job->haptic.argument, argc, argv, optind);
 	if (job->log && !job->duration)
 		cli_usage("--log keeps all ticks in memory: it needs --duration");
@@ -189,7 +99,7 @@ static void parse(struct job *job, int argc, char **argv)
 		cli_usage("--json and --log - would both write to standard output");
 }
 
-/* Whoever looks at the page later is to find why it failed. */
+/* Leave the reason in the state page, too. */
 static _Noreturn void fail(struct job *job, const struct incise_error *err)
 {
 	incise_state_run(job->haptic.state, INCISE_RUN_FAULT, err->text);
@@ -197,7 +107,7 @@ static _Noreturn void fail(struct job *job, const struct incise_error *err)
 	cli_fail_with(err);
 }
 
-/* ---- the page ---- */
+/* --- the state page -------------------------------------------------------------------- */
 
 static bool is_folder(const char *path)
 {
@@ -206,24 +116,24 @@ static bool is_folder(const char *path)
 	return !stat(path, &status) && S_ISDIR(status.st_mode) && !access(path, W_OK);
 }
 
-/* Where the page is by default; false: nowhere. */
-static bool state_path(const char *scene, char *path, size_t size)
+/* Default path of the page: free(3); NULL: there is no folder for it. */
+static char *state_path(const char *scene)
 {
-	const char *own = getenv("XDG_RUNTIME_DIR"), *slash = strrchr(scene, '/');
-	char folder[3000] = "/run/incise", name[256];
+	const char *own = getenv("XDG_RUNTIME_DIR");
+	char folder[3000] = "/run/incise", *name, *path;
 
-	snprintf(name, sizeof(name), "%s", slash ? slash + 1 : scene);
-	if (strlen(name) > 6 && !strcmp(name + strlen(name) - 6, ".scene"))
-		name[strlen(name) - 6] = 0;
 	if (!is_folder(folder)) {
 		if (!own || *own != '/')
-			return false;
+			return NULL;
 		snprintf(folder, sizeof(folder), "%s/incise", own);
 		mkdir(folder, 0700);
 		if (!is_folder(folder))
-			return false;
+			return NULL;
 	}
-	return snprintf(path, size, "%s/%s.state", folder, name) < (int)size;
+	name = scene_argument_name(scene);
+	path = cli_text("%s/%s.state", folder, name);
+	free(name);
+	return path;
 }
 
 static void open_state(struct job *job, bool real)
@@ -235,14 +145,15 @@ static void open_state(struct job *job, bool real)
 		.policy = haptic->scheduling,
 	};
 	struct incise_error err = {0};
-	char path[4096];
+	char *path = NULL;
 
 	if (job->state && !strcmp(job->state, "none"))
 		return;
 	if (job->state)
-		snprintf(path, sizeof(path), "%s", job->state);
-	/* In simulated time there is nothing to look at. */
-	else if (!real || !state_path(haptic->argument.path, path, sizeof(path)))
+		path = cli_text("%s", job->state);
+	else if (real) /* simulated time is over before anyone looks */
+		path = state_path(haptic->argument.path);
+	if (!path)
 		return;
 	haptic->state = incise_state_new(path, &setup, &err);
 	if (!haptic->state)
@@ -253,10 +164,11 @@ static void open_state(struct job *job, bool real)
 			"%s is on a disk, which may hold up the loop: /run or /dev/shm are "
 			"better places",
 			path);
+	free(path);
 	incise_state_scene(haptic->state, haptic->argument.path, haptic->plan);
 }
 
-/* ---- start ---- */
+/* --- start ----------------------------------------------------------------------------- */
 
 static void enter_real_time(struct job *job)
 {
@@ -304,21 +216,18 @@ static void take_calibration(struct job *job)
 	memcpy(job->haptic.tip_mm, calibration.tip_mm, sizeof(calibration.tip_mm));
 }
 
-/* Before any device is opened: what is refused then has not moved anything. */
+/* Checked before a device is opened: a refusal must not have moved anything. */
 static bool has_real_clock(const char *spec)
 {
-	struct incise_error err = {0};
-	struct incise_rig *rig = incise_rig_open(spec, 0, &err);
+	struct incise_rig *rig = cli_open_rig(spec, 0);
 	bool real;
 
-	if (!rig)
-		cli_fail_with(&err);
 	real = incise_clock_is_real(incise_rig_clock(rig));
 	incise_rig_close(rig);
 	return real;
 }
 
-/* All but power: scene, real time, devices, plan, self-test. */
+/* Everything but power: scene, real time, devices, plan, self-test. */
 static void set_up(struct job *job)
 {
 	struct haptic *haptic = &job->haptic;
@@ -335,15 +244,10 @@ static void set_up(struct job *job)
 	real = has_real_clock(spec);
 	if (real)
 		enter_real_time(job);
-	haptic->rig =
-		incise_rig_open(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, &err);
-	if (!haptic->rig)
-		cli_fail_with(&err);
+	haptic->rig = cli_open_rig(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER);
 	if (haptic_self_test(haptic->scene, incise_rig_tracker(haptic->rig), &test, &err))
 		cli_fail("%s: %s", haptic->argument.path, err.text);
-	haptic->plan = haptic_plan(haptic, haptic->scene, &err);
-	if (!haptic->plan)
-		cli_fail_with(&err);
+	haptic->plan = cli_require(haptic_plan(haptic, haptic->scene, &err), &err);
 	open_state(job, real);
 	if (haptic->realtime)
 		advise(&job->realtime);
@@ -364,6 +268,291 @@ static void finish(struct job *job)
 	free(haptic->loop.log);
 }
 
+/* --- the actuator ---------------------------------------------------------------------- */
+
+/* Faults of the program before, not of the machine. */
+#define LEFT_BEHIND                                                  \
+	(INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER | \
+	 INCISE_STEPPER_FAULT_SUSPEND)
+
+static int home_it(struct incise_stepper *stepper, struct incise_error *err)
+{
+	int rc = incise_stepper_enable(stepper, err);
+
+	if (!rc)
+		rc = incise_stepper_home(stepper, &cli_stop, NULL, err);
+	return rc ? rc : incise_stepper_disable(stepper, err);
+}
+
+/*
+ * Drop the poses that arrived meanwhile: to feed them in the first tick could take longer than
+ * the actuator's deadman waits.
+ */
+static void drop_poses(struct incise_tracker *tracker)
+{
+	struct incise_tracker_sample samples[64];
+
+	while (incise_tracker_read(tracker, samples, 64) == 64)
+		continue;
+}
+
+static int recover_it(struct incise_stepper *stepper, const char *name,
+		      struct incise_stepper_status *status, struct incise_error *err)
+{
+	unsigned int latched =
+		status->faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL;
+	char cause[300];
+	int rc;
+
+	if (!latched || (latched & ~(unsigned int)LEFT_BEHIND))
+		return 0;
+	incise_stepper_cause(stepper, cause, sizeof(cause));
+	rc = incise_stepper_clear(stepper, err);
+	if (rc)
+		return rc;
+	cli_note("%s: cleared what was left behind (%s)", name, cause);
+	rc = incise_stepper_status(stepper, status);
+	/* Where clearing is enough, what is latched is no error. */
+	return rc == -EIO ? 0 : rc;
+}
+
+/*
+ * Power the actuator. A target needs its 0: that of a real machine must be found, if it has a
+ * switch for that. The first tick must follow within the deadman's time.
+ *
+ * @home    find the 0, unless it is known
+ * @recover clear first only what a program that died or a machine that slept left latched: a
+ *          fault with its cause in the machine waits for a person
+ *
+ * Returns 0 or a negative errno.
+ */
+static int take_hold(struct incise_rig *rig, bool home, bool recover,
+		     struct incise_error *err)
+{
+	struct incise_stepper *stepper = incise_rig_stepper(rig);
+	struct incise_stepper_status status;
+	struct incise_stepper_info info;
+	char cause[300];
+	int rc = incise_stepper_status(stepper, &status);
+
+	incise_stepper_info(stepper, &info);
+	if (rc)
+		return incise_error_set(err, -rc, "%s: %s", info.name, strerror(-rc));
+	if (recover)
+		rc = recover_it(stepper, info.name, &status, err);
+	if (rc)
+		return rc;
+	if (!status.homed && !home) {
+		/* Until it is cleared, homing is refused as well. */
+		if (status.faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL) {
+			incise_stepper_cause(stepper, cause, sizeof(cause));
+			return incise_error_set(err, EPERM, "%s: %s", info.name, cause);
+		}
+		if (info.can_home)
+			return incise_error_set(
+				err, EPERM,
+				"%s is not homed; run `incise stepper home --rig %s`, or "
+				"give --home",
+				info.name, incise_rig_spec(rig));
+		cli_warn("%s cannot be homed: its 0 is where it stands", info.name);
+	}
+	if (!status.homed && home)
+		rc = home_it(stepper, err);
+	if (!rc)
+		drop_poses(incise_rig_tracker(rig));
+	return rc ? rc : incise_stepper_enable(stepper, err);
+}
+
+/* Move to where there is no force, then power off. Failures are warnings. */
+static void let_go(struct incise_rig *rig)
+{
+	struct incise_stepper *stepper = incise_rig_stepper(rig);
+	struct incise_clock *clock = incise_rig_clock(rig);
+	struct incise_stepper_status status;
+	struct incise_stepper_info info;
+	struct incise_error err = {0};
+	int64_t now = incise_clock_now(clock), end;
+
+	incise_stepper_info(stepper, &info);
+	/* The virtual one goes there by itself. */
+	end = info.measures_handle
+		      ? now
+		      : now + (int64_t)((1 + info.travel_mm / info.velocity_mm_s) *
+					INCISE_NS_PER_S);
+	while (now < end && !incise_stepper_set(stepper, 0) &&
+	       !incise_stepper_status(stepper, &status) &&
+	       (status.position_mm > info.step_mm / 2 ||
+		status.state == INCISE_STEPPER_STATE_MOVING)) {
+		incise_clock_wait_until(clock, now + 2000000);
+		now = incise_clock_now(clock);
+	}
+	if (incise_stepper_disable(stepper, &err))
+		cli_warn("%s", err.text);
+}
+
+/* --- log and report -------------------------------------------------------------------- */
+
+static const char *const phases[] = {"free", "cutting", "insertion"};
+
+/* Write them as CSV, under the file's final name. */
+static void write_log(struct incise_outfile *file, const struct incise_tick *ticks,
+		      size_t n)
+{
+	struct incise_error err = {0};
+	char flags[INCISE_TICK_FLAGS + 1];
+	FILE *out;
+
+	out = incise_outfile_stream(file);
+	fputs("t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags,phase,"
+	      "command_x_N,command_y_N,command_z_N\n",
+	      out);
+	for (size_t i = 0; i < n; i++) {
+		const struct incise_tick *t = &ticks[i];
+
+		fprintf(out,
+			"%.6f,%.4f,%.4f,%.4f,%.4f,%.3f,%.5f,%.5f,%s,%s,%.5f,%.5f,%.5f\n",
+			(t->t_ns - ticks[0].t_ns) * 1e-9, t->position_mm[0],
+			t->position_mm[1], t->position_mm[2], t->depth_mm,
+			t->velocity_mm_s,
+			sqrt(t->command_N[0] * t->command_N[0] +
+			     t->command_N[1] * t->command_N[1] +
+			     t->command_N[2] * t->command_N[2]),
+			t->rendered_N, loop_flags_text(t->flags, flags), phases[t->phase],
+			t->command_N[0], t->command_N[1], t->command_N[2]);
+	}
+	if (incise_outfile_commit(file, &err))
+		cli_fail_with(&err);
+}
+
+/* Memory for all ticks of a run; at most half of the machine's. */
+static void make_log(double duration_s, struct incise_loop_options *loop)
+{
+	double most = 0.5 * (double)sysconf(_SC_PHYS_PAGES) *
+		      (double)sysconf(_SC_PAGESIZE) / sizeof(*loop->log);
+	double ticks = ceil(duration_s * loop->rate_hz) + 1;
+
+	if (ticks <= most)
+		loop->log = calloc((size_t)ticks, sizeof(*loop->log));
+	if (!loop->log)
+		cli_fail("--log: no memory for %.0f ticks; a --duration of up to %.0f s "
+			 "fits in half of it",
+			 ticks, floor(most / loop->rate_hz));
+	loop->log_size = (size_t)ticks;
+	/* Touch the pages now: a page fault in the loop is a late tick. */
+	memset(loop->log, 0xff, loop->log_size * sizeof(*loop->log));
+}
+
+/* The actuator's force against the command of the tick before, rms. */
+static double render_error(const struct haptic *haptic)
+{
+	const struct incise_loop_stats *stats = haptic->stats;
+
+	return incise_rig_stepper(haptic->rig) && stats->ticks > 1
+		       ? sqrt(stats->rendered_off2 / (stats->ticks - 1))
+		       : NAN;
+}
+
+static bool is_real(const struct haptic *haptic)
+{
+	return incise_clock_is_real(incise_rig_clock(haptic->rig));
+}
+
+static json_t *cost_json(const struct incise_loop_stats *s)
+{
+	return json_pack("{so so so}", "median",
+			 json_number(loop_quantile(s->tick_100ns, 0.5, 100)), "p999",
+			 json_number(loop_quantile(s->tick_100ns, 0.999, 100)), "max",
+			 json_number(s->tick_max_ns));
+}
+
+static uint64_t ticks_with(const struct incise_loop_stats *s, enum incise_tick_flag flag)
+{
+	return s->flagged[__builtin_ctz(flag)];
+}
+
+static json_t *counts_json(const struct incise_realtime_counts *counts)
+{
+	return json_pack("{sI sI sI sI}", "minor_faults",
+			 (json_int_t)counts->minor_faults, "major_faults",
+			 (json_int_t)counts->major_faults, "voluntary_switches",
+			 (json_int_t)counts->voluntary, "involuntary_switches",
+			 (json_int_t)counts->involuntary);
+}
+
+static void report_json(const struct haptic *haptic)
+{
+	struct incise_stepper *stepper = incise_rig_stepper(haptic->rig);
+	const struct incise_loop_stats *s = haptic->stats;
+	bool real = is_real(haptic);
+	json_t *stages = json_array();
+
+	for (int i = 0; incise_plan_stage(haptic->plan, i); i++)
+		json_array_append_new(stages,
+				      json_string(incise_plan_stage(haptic->plan, i)));
+	json_print(json_pack(
+		"{sI sI sI sf so so sI sI sI sI so sf so so ss so so so}", "ticks",
+		(json_int_t)s->ticks, "skipped", (json_int_t)s->skipped, "overruns",
+		(json_int_t)s->overruns, "rate_hz", haptic->loop.rate_hz, "lateness_us",
+		real ? loop_lateness_json(s) : json_null(), "tick_ns",
+		real ? cost_json(s) : json_null(), "contact",
+		(json_int_t)ticks_with(s, INCISE_TICK_CONTACT), "extrapolated",
+		(json_int_t)ticks_with(s, INCISE_TICK_EXTRAPOLATED), "stale",
+		(json_int_t)ticks_with(s, INCISE_TICK_STALE), "limited",
+		(json_int_t)s->limited, "flags", loop_flags_json(s->flagged),
+		"force_max_N", s->force_max_N, "rendered_rms_error_N",
+		json_number(render_error(haptic)), "actuator",
+		stepper ? stepper_counters_json(stepper) : json_null(), "scheduling",
+		haptic->scheduling, "thread", counts_json(&haptic->counts), "stages",
+		stages, "stopped_by",
+		cli_stop ? json_string(strsignal(cli_stop)) : json_null()));
+}
+
+static void report_text(const struct haptic *haptic)
+{
+	struct incise_stepper *stepper = incise_rig_stepper(haptic->rig);
+	const struct incise_loop_stats *s = haptic->stats;
+	double rms_N = render_error(haptic);
+	char a[32], b[32];
+
+	printf("%llu ticks at %g Hz, %llu skipped in %llu overruns (%s)\nstages    ",
+	       (unsigned long long)s->ticks, haptic->loop.rate_hz,
+	       (unsigned long long)s->skipped, (unsigned long long)s->overruns,
+	       haptic->scheduling);
+	for (int i = 0; incise_plan_stage(haptic->plan, i); i++)
+		printf(" %s", incise_plan_stage(haptic->plan, i));
+	putchar('\n');
+	/* In simulated time a tick takes no time and is never late. */
+	if (is_real(haptic)) {
+		loop_lateness_line(s);
+		printf("tick       median %s, 99.9 %% %s, max %.1f us\n",
+		       loop_below(a, sizeof(a), loop_quantile(s->tick_100ns, 0.5, 0.1)),
+		       loop_below(b, sizeof(b), loop_quantile(s->tick_100ns, 0.999, 0.1)),
+		       s->tick_max_ns * 1e-3);
+		printf("thread     %llu page faults, %llu times another had its CPU\n",
+		       (unsigned long long)(haptic->counts.minor_faults +
+					    haptic->counts.major_faults),
+		       (unsigned long long)haptic->counts.involuntary);
+	}
+	printf("force      largest %.3f N", s->force_max_N);
+	if (!isnan(rms_N))
+		printf(", actuator off by %.4f N rms", rms_N);
+	printf("\nticks      %llu in contact, %llu outside the model's support, %llu without a "
+	       "fresh pose, %llu limited\n",
+	       (unsigned long long)ticks_with(s, INCISE_TICK_CONTACT),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_EXTRAPOLATED),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_STALE),
+	       (unsigned long long)s->limited);
+	printf("held       %llu at the largest force, %llu at the largest slew, %llu at the end "
+	       "of the travel, %llu by the guard, %llu starting or fading\n",
+	       (unsigned long long)ticks_with(s, INCISE_TICK_CLAMPED),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_GUARDED),
+	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
+	if (stepper)
+		stepper_counters_line(stepper);
+}
+
 int main(int argc, char **argv)
 {
 	static struct incise_loop_stats stats;
@@ -381,16 +570,16 @@ int main(int argc, char **argv)
 	haptic->loop.stop = &cli_stop;
 	set_up(&job);
 	if (job.log) {
-		/* A path that cannot be is said before the run, not after. */
+		/* A wrong path fails before the run, not after it. */
 		file = incise_outfile_open(job.log, &err);
 		if (!file)
 			fail(&job, &err);
-		haptic_make_log(job.duration, &haptic->loop);
+		make_log(job.duration, &haptic->loop);
 	}
 	cli_catch_signals();
 	haptic_catch_reload();
-	if (haptic_take_hold(haptic->rig, job.home, job.recover, &err)) {
-		/* Steps that are made in this program do not lose their power with it. */
+	if (take_hold(haptic->rig, job.home, job.recover, &err)) {
+		/* Closed, as a motor that this process steps keeps its power without it. */
 		incise_rig_close(haptic->rig);
 		fail(&job, &err);
 	}
@@ -398,18 +587,18 @@ int main(int argc, char **argv)
 		     haptic->loop.rate_hz);
 	rc = haptic_supervise(haptic, &err);
 	cli_progress_end();
-	haptic_let_go(haptic->rig);
+	let_go(haptic->rig);
 	incise_state_run(haptic->state, rc ? INCISE_RUN_FAULT : INCISE_RUN_STOPPED,
 			 rc	    ? err.text
 			 : cli_stop ? strsignal(cli_stop)
 				    : "");
 	incise_state_free(haptic->state);
 	if (job.log)
-		haptic_write_log(file, haptic->loop.log, stats.logged);
+		write_log(file, haptic->loop.log, stats.logged);
 	if (job.json)
-		haptic_report_json(haptic);
+		report_json(haptic);
 	else if (!job.log || strcmp(job.log, "-"))
-		haptic_report_text(haptic);
+		report_text(haptic);
 	cli_finish();
 	finish(&job);
 	if (rc)

@@ -1,32 +1,38 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise info FILE: what a model, a compiled model or a recording holds, what a controller
- * of the stepper module is and does, and which drives are on a bus.
+ * incise info FILE: describes a model, a compiled model, a recording or a controller of the
+ * stepper module, or lists the drives on a bus.
  */
+#include <ctype.h>
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/recording.h>
-#include "stepper/bus_report.h"
+#include <incise/scan.h>
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/stream_report.h"
 #include "cli/model_plot.h"
 #include "cli/plot.h"
-#include "stepper/stepper_module_report.h"
+#include "cli/recording.h"
+#include "stepper/module.h"
 
-enum { OPT_JSON = CLI_LONG, OPT_PLOT };
+struct job {
+	bool json;
+	const char *plot;
+};
 
 static const struct cli_option options[] = {
-	{OPT_JSON, "json", NULL, "report as JSON"},
-	{OPT_PLOT, "plot", "NAME",
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	{0, "plot", "NAME",
 	 "of a .fis: draw the membership functions and the force\n"
-	 "surface as NAME.png and NAME.svg"},
+	 "surface as NAME.png and NAME.svg",
+	 CLI_TEXT(struct job, plot)},
 	{0},
 };
 
@@ -43,6 +49,8 @@ static const struct cli_command command = {
 		"Example:\n  incise info can:can0\n\nExit: 0 shown, 1 failed, 2 bad usage. See incise-info(1).",
 };
 
+/* --- models -------------------------------------------------------------------------- */
+
 static json_t *input_json(const struct incise_model *model, int i)
 {
 	const struct incise_model_info *info = incise_model_info(model);
@@ -51,13 +59,12 @@ static json_t *input_json(const struct incise_model *model, int i)
 
 	for (int k = 0; k < info->n_mfs[i]; k++) {
 		const struct incise_mf *mf = incise_model_mf(model, i, k);
-		json_t *params = json_array();
 
-		for (int j = 0; j < incise_mf_n_params(mf->type); j++)
-			json_array_append_new(params, json_real(mf->p[j]));
 		json_array_append_new(
-			mfs, json_pack("{so ss so}", "name", json_text(mf->name), "type",
-				       incise_mf_type_name(mf->type), "params", params));
+			mfs,
+			json_pack("{so ss so}", "name", json_text(mf->name), "type",
+				  incise_mf_type_name(mf->type), "params",
+				  json_numbers(mf->p, incise_mf_n_params(mf->type))));
 	}
 	return json_pack("{so sf sf so}", "name", json_text(v->name), "min", v->min,
 			 "max", v->max, "mfs", mfs);
@@ -69,7 +76,7 @@ static const char *and_method(const struct incise_model *model)
 	return incise_model_info(model)->and_method == INCISE_AND_MIN ? "min" : "prod";
 }
 
-/* Cells per input, empty where the arithmetic has none. */
+/* Cells per input; empty if the arithmetic has none. */
 static json_t *cells_json(const struct incise_fixed *fx)
 {
 	json_t *cells = json_array();
@@ -90,7 +97,7 @@ static void put_fixed(const struct incise_fixed *fx)
 	       incise_fixed_bound(fx) * 1e3);
 }
 
-/* What the default budget makes of a model; keys are null where it is refused. */
+/* The model at the default budget; keys are null if that is refused. */
 static void add_fixed_json(json_t *report, const struct incise_fixed *fx,
 			   const char *refused)
 {
@@ -118,18 +125,15 @@ static void model_json(const struct incise_model *model, const struct incise_fix
 	for (int i = 0; i < info->n_inputs; i++)
 		json_array_append_new(inputs, input_json(model, i));
 	for (int r = 0; r < info->n_rules; r++) {
-		json_t *mfs = json_array(), *p = json_array();
+		const struct incise_rule *rule = incise_model_rule(model, r);
+		json_t *mfs = json_array();
 
 		for (int i = 0; i < info->n_inputs; i++)
-			json_array_append_new(
-				mfs,
-				json_integer(incise_model_rule(model, r)->mf[i] + 1));
-		for (int i = 0; i <= info->n_inputs; i++)
-			json_array_append_new(
-				p, json_real(incise_model_rule(model, r)->p[i]));
-		json_array_append_new(
-			rules, json_pack("{so so sf}", "mfs", mfs, "consequent", p,
-					 "weight", incise_model_rule(model, r)->weight));
+			json_array_append_new(mfs, json_integer(rule->mf[i] + 1));
+		json_array_append_new(rules,
+				      json_pack("{so so sf}", "mfs", mfs, "consequent",
+						json_numbers(rule->p, info->n_inputs + 1),
+						"weight", rule->weight));
 	}
 	report = json_pack("{ss so so s{so sf sf} ss so}", "kind", "model", "name",
 			   json_text(info->name), "inputs", inputs, "output", "name",
@@ -175,7 +179,6 @@ static void model_text(const struct incise_model *model, const struct incise_fix
 			printf("  weight %.6g", incise_model_rule(model, r)->weight);
 		putchar('\n');
 	}
-	/* A refusal says itself what it is about. */
 	if (!fx) {
 		puts(refused);
 		return;
@@ -193,9 +196,7 @@ static void show_model(const char *path, bool json, const char *plot)
 
 	if (plot)
 		plot_place("plot", plot, &folder, &name);
-	model = incise_model_load(path, &err);
-	if (!model)
-		cli_fail_with(&err);
+	model = cli_require(incise_model_load(path, &err), &err);
 	fixed = incise_fixed_compile(model, NULL, &refused);
 	if (json)
 		model_json(model, fixed, refused.text);
@@ -271,16 +272,16 @@ static void compiled_text(const struct incise_fixed *fx)
 static void show_compiled(const char *path, bool json)
 {
 	struct incise_error err = {0};
-	struct incise_fixed *fx = incise_fixed_load(path, &err);
+	struct incise_fixed *fx = cli_require(incise_fixed_load(path, &err), &err);
 
-	if (!fx)
-		cli_fail_with(&err);
 	if (json)
 		compiled_json(fx);
 	else
 		compiled_text(fx);
 	incise_fixed_free(fx);
 }
+
+/* --- recordings ---------------------------------------------------------------------- */
 
 static void recording_json(const struct incise_recording_info *info)
 {
@@ -327,9 +328,9 @@ static void show_recording(const char *path, bool json)
 {
 	struct incise_recording_info info;
 	struct incise_error err = {0};
-	struct incise_recording *recording = incise_recording_open(path, &err);
+	struct incise_recording *recording = recording_open(path);
 
-	if (!recording || incise_recording_info(recording, &info, &err))
+	if (incise_recording_info(recording, &info, &err))
 		cli_fail_with(&err);
 	if (json)
 		recording_json(&info);
@@ -338,7 +339,189 @@ static void show_recording(const char *path, bool json)
 	incise_recording_close(recording);
 }
 
-/* A recording is a folder, or would be one: NAME.rec whose .part is all there is. */
+/* --- devices on a bus ---------------------------------------------------------------- */
+
+/* A device, copied: the backend's module is unloaded when the scan ends. */
+struct answer {
+	char kind[16], device[320], what[240];
+	bool usable;
+	int n;
+	struct {
+		char key[40], text[100];
+	} property[INCISE_SCAN_PROPERTIES];
+};
+
+/* In the order in which they answered. */
+struct found {
+	struct answer *answer;
+	int n;
+};
+
+/*
+ * "BACKEND:…", for example can:can0. A model or a recording may have a colon in its name, and
+ * is recognized by its suffix.
+ */
+static bool is_bus(const char *what)
+{
+	static const char *const files[] = {".fis", ".fx", ".rec", ".rec/"};
+	size_t n = strspn(what, "abcdefghijklmnopqrstuvwxyz0123456789_");
+
+	if (!n || what[n] != ':')
+		return false;
+	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
+		if (cli_ends_with(what, files[i]))
+			return false;
+	return true;
+}
+
+static int keep(void *context, const struct incise_scan_device *device)
+{
+	struct found *found = context;
+	struct answer *one;
+
+	found->answer = cli_resize(found->answer, (size_t)found->n + 1, sizeof(*one));
+	one = &found->answer[found->n++];
+	*one = (struct answer){0};
+	snprintf(one->kind, sizeof(one->kind), "%s", device->kind);
+	snprintf(one->device, sizeof(one->device), "%s", device->device);
+	snprintf(one->what, sizeof(one->what), "%s", device->what);
+	one->usable = device->usable;
+	for (; one->n < device->n && one->n < INCISE_SCAN_PROPERTIES; one->n++) {
+		const struct incise_scan_property *from = &device->property[one->n];
+
+		snprintf(one->property[one->n].key, sizeof(one->property->key), "%s",
+			 from->key);
+		snprintf(one->property[one->n].text, sizeof(one->property->text), "%s",
+			 from->text);
+	}
+	return 0;
+}
+
+/* A drive reports its own name, which must not reach the terminal as commands. */
+static void put_plain(const char *text)
+{
+	for (; *text; text++)
+		putchar(iscntrl((unsigned char)*text) ? '?' : *text);
+}
+
+static void put_device(const struct answer *device)
+{
+	int width = (int)strlen(device->kind);
+
+	for (int i = 0; i < device->n; i++)
+		if ((int)strlen(device->property[i].key) > width)
+			width = (int)strlen(device->property[i].key);
+	putchar('\n');
+	put_plain(device->what);
+	putchar('\n');
+	if (device->usable) {
+		printf("  %-*s = \"", width, device->kind);
+		put_plain(device->device);
+		fputs("\";\n", stdout);
+	}
+	for (int i = 0; i < device->n; i++) {
+		printf("  %-*s   ", width, device->property[i].key);
+		put_plain(device->property[i].text);
+		putchar('\n');
+	}
+}
+
+static json_t *device_json(const struct answer *device)
+{
+	json_t *object = json_pack("{ss so so sb}", "kind", device->kind, "device",
+				   json_text(device->device), "what",
+				   json_text(device->what), "usable", device->usable);
+
+	for (int i = 0; i < device->n; i++)
+		json_object_set_new(object, device->property[i].key,
+				    json_text(device->property[i].text));
+	return object;
+}
+
+static void devices_json(const char *kind, const char *bus, const struct found *found)
+{
+	json_t *report = json_pack("{ss}", "kind", kind), *devices = json_array();
+
+	for (int i = 0; i < found->n; i++)
+		json_array_append_new(devices, device_json(&found->answer[i]));
+	if (bus)
+		json_object_set_new(report, "bus", json_text(bus));
+	json_object_set_new(report, "devices", devices);
+	json_print(report);
+}
+
+static void devices_text(const char *what, const struct found *found)
+{
+	printf("%s: %d device%s\n", what, found->n, found->n == 1 ? "" : "s");
+	for (int i = 0; i < found->n; i++)
+		put_device(&found->answer[i]);
+}
+
+/* Print backends that could not scan as warnings, and remove them from the devices. */
+static void warn_of_failed(struct found *found)
+{
+	int n = 0;
+
+	for (int i = 0; i < found->n; i++) {
+		const struct answer *one = &found->answer[i];
+		size_t length = strlen(one->device);
+
+		if (one->usable || one->n || !length || one->device[length - 1] != ':')
+			found->answer[n++] = *one;
+		else
+			cli_warn("%s", one->what);
+	}
+	found->n = n;
+}
+
+static void show_attached(bool json)
+{
+	struct found found = {0};
+	int rc;
+
+	cli_progress("looking for devices");
+	rc = incise_scan(NULL, NULL, keep, &found, NULL);
+	cli_progress_end();
+	if (rc)
+		cli_fail("devices: %s", strerror(-rc));
+	warn_of_failed(&found);
+	if (json)
+		devices_json("devices", NULL, &found);
+	else if (found.n)
+		devices_text("attached", &found);
+	else
+		puts("no tracker, force channel, camera or stepper is attached; drives on a "
+		     "CAN bus are listed by `incise info can:can0`");
+	free(found.answer);
+}
+
+static void show_bus(const char *what, bool json)
+{
+	struct incise_error err = {0};
+	struct found found = {0};
+	int rc;
+
+	cli_progress("looking on %s", what);
+	rc = incise_scan(NULL, what, keep, &found, &err);
+	cli_progress_end();
+	if (rc)
+		cli_fail_with(&err);
+	/* A failure, as a file that is missing. */
+	if (!found.n)
+		cli_fail(
+			"%s: nobody answers; see that it has power and its cable is in; on a "
+			"bus its node id, bit rate and the two ends of 120 ohm",
+			what);
+	if (json)
+		devices_json("bus", what, &found);
+	else
+		devices_text(what, &found);
+	free(found.answer);
+}
+
+/* --- what the operand is ------------------------------------------------------------- */
+
+/* A folder, or NAME.rec of which only NAME.rec.part exists. */
 static bool is_recording(const char *path)
 {
 	size_t n = strlen(path);
@@ -361,48 +544,32 @@ static void check_exists(const char *path)
 			 path, strerror(errno));
 }
 
-static bool is_compiled(const char *path)
-{
-	size_t n = strlen(path);
-
-	return n > 3 && !strcmp(path + n - 3, ".fx");
-}
-
 int main(int argc, char **argv)
 {
-	const char *path, *plot = NULL;
-	bool json = false;
-	int opt;
+	struct job job = {0};
+	bool compiled;
+	char *path;
 
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		switch (opt) {
-		case OPT_JSON:
-			json = true;
-			break;
-		case OPT_PLOT:
-			plot = optarg;
-			break;
-		}
-	if (optind + 1 != argc)
-		cli_usage("expected one file, got %d", argc - optind);
-	path = argv[optind];
-	if (plot && (is_recording(path) || is_compiled(path) || stepper_module_is(path) ||
-		     bus_report_is(path)))
+	cli_parse(&command, argc, argv, &job);
+	path = cli_operand(argc, argv, "file");
+	compiled = cli_ends_with(path, ".fx");
+	if (job.plot &&
+	    (is_recording(path) || compiled || stepper_module_is(path) || is_bus(path)))
 		cli_usage("--plot draws a model, MODEL.fis");
 	if (stepper_module_is(path)) {
-		stepper_module_show(path, json);
+		stepper_module_show(path, job.json);
 	} else if (!strcmp(path, "devices")) {
-		bus_report_show_attached(json);
-	} else if (bus_report_is(path)) {
-		bus_report_show(path, json);
+		show_attached(job.json);
+	} else if (is_bus(path)) {
+		show_bus(path, job.json);
 	} else if (is_recording(path)) {
-		show_recording(path, json);
+		show_recording(path, job.json);
 	} else {
 		check_exists(path);
-		if (is_compiled(path))
-			show_compiled(path, json);
+		if (compiled)
+			show_compiled(path, job.json);
 		else
-			show_model(path, json, plot);
+			show_model(path, job.json, job.plot);
 	}
 	cli_finish();
 	return 0;

@@ -4,10 +4,8 @@
  * how far it is from instability.
  */
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <incise/plan.h>
 #include "cli/cli.h"
@@ -16,17 +14,27 @@
 #include "cli/scene_argument.h"
 #include "cli/tick_cost.h"
 
-enum { OPT_MODEL = CLI_LONG, OPT_ARITH, OPT_FULL, OPT_JSON };
+/* Seconds of the stroke in which ticks are timed. */
+#define MEASURED_S 20
+
+/* Depth for which the fixed-point error is stated: paper 1's deepest cut. */
+#define REACH_MM 20
+
+struct job {
+	struct scene_argument scene;
+	const char *rig;
+	bool full, json;
+};
 
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
 	 "file rig.conf, or sim:KEY=VALUE,…: its stepper and its tracker's delay count\n"
-	 "(default: no rig; a tracker of 120 Hz, 4.2 ms late)"},
-	{OPT_MODEL, "model", "FILE", "use this model instead of the scene's"},
-	{OPT_ARITH, "arith", "KIND", "fixed or double, instead of the scene's"},
-	{OPT_FULL, "full", NULL,
-	 "keep every stage, needed or not: what leaving out saves"},
-	{OPT_JSON, "json", NULL, "report as JSON"},
+	 "(default: no rig; a tracker of 120 Hz, 4.2 ms late)",
+	 CLI_TEXT(struct job, rig)},
+	SCENE_ARGUMENT_OPTIONS(struct job, scene),
+	{0, "full", NULL, "keep every stage, needed or not: what leaving out saves",
+	 CLI_FLAG(struct job, full)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
 };
 
@@ -42,57 +50,19 @@ static const struct cli_command command = {
 		"Exit: 0 shown, 1 failed or not stable, 2 bad usage. See incise-plan(1).",
 };
 
-/* Seconds of the stroke that ticks are timed in. */
-#define MEASURED_S 20
-
-/* Depth that the fixed-point error is stated for: paper 1's deepest cut. */
-#define REACH_MM 20
-
-struct job {
-	struct scene_argument scene;
-	const char *rig;
-	bool full, json;
-};
-
-static void parse(struct job *job, int argc, char **argv)
-{
-	int opt;
-
-	*job = (struct job){0};
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		switch (opt) {
-		case 'r':
-			job->rig = optarg;
-			break;
-		case OPT_MODEL:
-			job->scene.model = optarg;
-			break;
-		case OPT_ARITH:
-			scene_argument_arith(&job->scene, optarg);
-			break;
-		case OPT_FULL:
-			job->full = true;
-			break;
-		case OPT_JSON:
-			job->json = true;
-			break;
-		}
-	scene_argument_operand(&job->scene, argc, argv, optind);
-}
-
 static double margin(const struct incise_plan_stability *s)
 {
 	return s->stiffness_N_mm > 0 ? s->limit_N_mm / s->stiffness_N_mm : INFINITY;
 }
 
-/* Laws of a wall that answers so late; none is known for poses that are extrapolated. */
+/* Passivity limit of a wall with this delay; none is known for extrapolated poses. */
 static double passive_N_mm(const struct incise_plan_stability *s)
 {
 	return s->own_delay ? incise_stability_colgate(&s->device, s->damping_N_s_mm)
 			    : NAN;
 }
 
-/* For a wall without delay. */
+/* Limit by the encoder, of a wall without delay. */
 static double encoder_N_mm(const struct incise_plan_stability *s)
 {
 	return s->own_delay && !s->device.delay_ticks && s->device.encoder_mm > 0
@@ -128,7 +98,7 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++) {
 		json_array_append_new(kept, json_string(name));
-		/* The plan that was timed has no rig. */
+		/* The timed plan has no rig. */
 		json_array_append_new(stages,
 				      json_pack("{ss so}", "stage", name, "ns",
 						strcmp(name, "actuate")
@@ -237,7 +207,7 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 	print_stability(plan);
 }
 
-/* A plan is made beside a loop that runs, where the actuator can be watched. */
+/* Only watch the actuator if it can be watched: a loop may run on it. */
 static struct incise_rig *open_rig(const char *spec, struct incise_error *err)
 {
 	const unsigned int devices = INCISE_RIG_TRACKER | INCISE_RIG_STEPPER;
@@ -256,21 +226,17 @@ int main(int argc, char **argv)
 	struct incise_scene *scene;
 	struct incise_plan *plan;
 	struct tick_cost cost;
-	struct job job;
+	struct job job = {0};
 
-	parse(&job, argc, argv);
+	cli_parse(&command, argc, argv, &job);
+	scene_argument_operand(&job.scene, argc, argv, optind);
 	scene = scene_argument_load(&job.scene);
 	incise_scene_set_full(scene, job.full);
 	if (job.rig) {
-		rig = open_rig(job.rig, &err);
-		if (!rig)
-			cli_fail_with(&err);
-	}
-	if (rig)
+		rig = cli_require(open_rig(job.rig, &err), &err);
 		incise_tracker_info(incise_rig_tracker(rig), &tracker);
-	plan = incise_plan_new(scene, rig, &err);
-	if (!plan)
-		cli_fail_with(&err);
+	}
+	plan = cli_require(incise_plan_new(scene, rig, &err), &err);
 	cli_progress("%s: timing %d s of ticks", job.scene.path, MEASURED_S);
 	tick_cost(scene, rig ? &tracker : NULL, MEASURED_S, &cost);
 	cli_progress_end();

@@ -11,38 +11,44 @@
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/loop_report.h"
-#include "cli/replay_picture.h"
+#include "cli/plot.h"
+#include "cli/recording.h"
 #include "cli/scene_argument.h"
 #include "cli/file.h"
 
-enum {
-	OPT_CSV = CLI_LONG,
-	OPT_PLOT,
-	OPT_AT,
-	OPT_REAL_TIME,
-	OPT_MODEL,
-	OPT_ARITH,
-	OPT_TOOL,
-	OPT_JSON
+#define PLOT_POINTS 20000 /* so that the plot of an hour is drawn as fast as any */
+
+struct job {
+	const char *recording, *csv, *plot, *calibration;
+	struct scene_argument scene;
+	struct incise_replay_options how;
+	bool json;
 };
 
+static const char *const times[] = {"arrival", "acquisition", NULL};
+static const char *const tools[] = {"auto", "blade", "handle", "tube", NULL};
+
 static const struct cli_option options[] = {
-	{OPT_CSV, "csv", "FILE",
-	 "write every tick, predicted beside measured force; - is standard\noutput"},
-	{OPT_PLOT, "plot", "NAME",
-	 "draw predicted beside measured force as NAME.png and NAME.svg"},
-	{OPT_REAL_TIME, "real-time", NULL,
-	 "wait for each tick (default: as fast as it goes)"},
-	{OPT_AT, "at", "WHEN",
+	{0, "csv", "FILE",
+	 "write every tick, predicted beside measured force; - is standard\noutput",
+	 CLI_TEXT(struct job, csv)},
+	{0, "plot", "NAME",
+	 "draw predicted beside measured force as NAME.png and NAME.svg",
+	 CLI_TEXT(struct job, plot)},
+	{0, "real-time", NULL, "wait for each tick (default: as fast as it goes)",
+	 CLI_FLAG(struct job, how.real_time)},
+	{0, "at", "WHEN",
 	 "give poses to the loop at their arrival, as live, or at their\n"
-	 "acquisition (default: arrival)"},
+	 "acquisition (default: arrival)",
+	 CLI_CHOICE(struct job, how.at, times, NULL)},
 	{'c', "calibration", "FILE.conf",
-	 "take this calibration of force, not that of the recording"},
-	{OPT_MODEL, "model", "FILE", "use this model instead of the scene's"},
-	{OPT_ARITH, "arith", "KIND", "fixed or double, instead of the scene's"},
-	{OPT_TOOL, "tool", "KIND",
-	 "what the hand held: auto, blade, handle or tube (default: auto)"},
-	{OPT_JSON, "json", NULL, "report as JSON"},
+	 "take this calibration of force, not that of the recording",
+	 CLI_TEXT(struct job, calibration)},
+	SCENE_ARGUMENT_OPTIONS(struct job, scene),
+	{0, "tool", "KIND",
+	 "what the hand held: auto, blade, handle or tube (default: auto)",
+	 CLI_CHOICE(struct job, how.tool, tools, NULL)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
 };
 
@@ -57,59 +63,10 @@ static const struct cli_command command = {
 		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
 };
 
-struct job {
-	const char *recording, *csv, *plot, *calibration;
-	struct scene_argument scene;
-	struct incise_replay_options how;
-	bool json;
-};
-
-/* The number of a word, for options whose words are few. */
-static int word(const char *option, const char *text, const char *const *words)
-{
-	for (int i = 0; words[i]; i++)
-		if (!strcmp(text, words[i]))
-			return i;
-	cli_usage("--%s: '%s' is none that it can be; see --help", option, text);
-}
-
 static void parse(struct job *job, int argc, char **argv)
 {
-	static const char *const whens[] = {"arrival", "acquisition", NULL};
-	static const char *const tools[] = {"auto", "blade", "handle", "tube", NULL};
-	int opt;
-
 	*job = (struct job){.how.stop = &cli_stop};
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		switch (opt) {
-		case OPT_CSV:
-			job->csv = optarg;
-			break;
-		case OPT_PLOT:
-			job->plot = optarg;
-			break;
-		case OPT_REAL_TIME:
-			job->how.real_time = true;
-			break;
-		case OPT_AT:
-			job->how.at = (enum incise_replay_at)word("at", optarg, whens);
-			break;
-		case 'c':
-			job->calibration = optarg;
-			break;
-		case OPT_MODEL:
-			job->scene.model = optarg;
-			break;
-		case OPT_ARITH:
-			scene_argument_arith(&job->scene, optarg);
-			break;
-		case OPT_TOOL:
-			job->how.tool = (enum incise_tool)word("tool", optarg, tools);
-			break;
-		case OPT_JSON:
-			job->json = true;
-			break;
-		}
+	cli_parse(&command, argc, argv, job);
 	if (argc - optind != 2)
 		cli_usage("expected a recording and a scene, got %d names",
 			  argc - optind);
@@ -119,52 +76,89 @@ static void parse(struct job *job, int argc, char **argv)
 		cli_usage("--json and --csv - would both write to standard output");
 }
 
-/* Where ticks go to, and how far it is. */
-struct table {
-	FILE *out; /* or NULL */
-	bool bar;  /* one would run through rows on the same terminal */
-	int percent;
-	const char *name;
-	struct replay_picture *picture; /* or NULL */
+/* Measured beside predicted force, and depth, over time. */
+struct plot {
+	const char *folder, *name;
+	char file[80]; /* of the data */
+	FILE *data;    /* NULL: nothing is drawn */
+	int drawn;     /* of PLOT_POINTS, the last; -1: none */
 };
 
-static void show_progress(struct table *table, double done)
+static void begin_plot(struct plot *plot, const char *path)
 {
-	static const char full[] = "##############################";
-	int percent = (int)(100 * done), n = (int)(done * (sizeof(full) - 1));
-
-	if (!table->bar || percent == table->percent)
-		return;
-	table->percent = percent;
-	cli_progress("%s [%-*.*s] %d %%", table->name, (int)sizeof(full) - 1, n, full,
-		     percent);
+	plot->drawn = -1;
+	plot_place("plot", path, &plot->folder, &plot->name);
+	if (snprintf(plot->file, sizeof(plot->file), "%s.dat", plot->name) >=
+	    (int)sizeof(plot->file))
+		cli_usage("--plot: '%s' is too long a name", plot->name);
+	plot->data = plot_data(plot->folder, plot->file);
 }
 
-static int put_tick(void *context, const struct incise_replay_tick *told,
+static void add_to_plot(struct plot *plot, const struct incise_replay_tick *tick)
+{
+	int point = (int)(tick->done * PLOT_POINTS);
+
+	if (point == plot->drawn)
+		return;
+	plot->drawn = point;
+	/* gnuplot leaves out what is nan */
+	fprintf(plot->data, "%.4f %.5f %.5f %.4f %.4f\n", tick->t_s, tick->measured_N,
+		tick->predicted_N, tick->depth_mm, tick->tick->depth_mm);
+}
+
+static void draw_plot(struct plot *plot)
+{
+	FILE *script;
+
+	plot_data_end(plot->data, plot->folder);
+	script = plot_begin(plot->folder, plot->name, 1200, 800);
+	fprintf(script,
+		"set multiplot layout 2,1\n"
+		"set xlabel 'time / s'\nset key top right\nset ylabel 'force / N'\n"
+		"plot '%s' using 1:2 with lines lc rgb '#999999' title 'measured', \\\n"
+		"  '' using 1:3 with lines ls 2 title 'predicted'\n"
+		"set ylabel 'depth / mm'\nset yrange [0:*]\n"
+		"plot '%s' using 1:4 with lines lc rgb '#999999' title 'recorded', \\\n"
+		"  '' using 1:5 with lines ls 1 title 'in the loop'\n"
+		"unset multiplot\n",
+		plot->file, plot->file);
+	plot_draw_or_fail(script, plot->folder, plot->name);
+}
+
+/* The ticks' way out, and the progress. */
+struct sink {
+	FILE *out; /* or NULL */
+	bool bar;  /* false: it would run through rows on the same terminal */
+	int percent;
+	const char *name;
+	struct plot plot;
+};
+
+static int put_tick(void *context, const struct incise_replay_tick *tick,
 		    struct incise_error *err)
 {
 	char flags[INCISE_TICK_FLAGS + 1];
-	struct table *table = context;
+	struct sink *sink = context;
 
-	show_progress(table, told->done);
-	if (table->picture)
-		replay_picture_add(table->picture, told);
-	if (!table->out)
+	if (sink->bar)
+		cli_progress_bar(sink->name, tick->done, &sink->percent);
+	if (sink->plot.data)
+		add_to_plot(&sink->plot, tick);
+	if (!sink->out)
 		return 0;
-	fprintf(table->out, "%.6f,%d,%.4f,%.3f,%.6f,", told->t_s, told->cut,
-		told->tick->depth_mm, told->tick->velocity_mm_s, told->predicted_N);
-	/* Not printf's word: a NaN's sign says nothing. */
-	if (isnan(told->measured_N))
-		fputs("nan", table->out);
+	fprintf(sink->out, "%.6f,%d,%.4f,%.3f,%.6f,", tick->t_s, tick->cut,
+		tick->tick->depth_mm, tick->tick->velocity_mm_s, tick->predicted_N);
+	/* printf would print a sign of NaN. */
+	if (isnan(tick->measured_N))
+		fputs("nan", sink->out);
 	else
-		fprintf(table->out, "%.6f", told->measured_N);
-	fprintf(table->out, ",%d,%s\n", told->clipped,
-		loop_flags_text(told->tick->flags, flags));
-	/* A full disk is no reason to go on for an hour. */
-	return ferror(table->out)
-		       ? incise_error_set(err, EIO, "%s: cannot be written: %s",
-					  table->name, strerror(errno))
-		       : 0;
+		fprintf(sink->out, "%.6f", tick->measured_N);
+	fprintf(sink->out, ",%d,%s\n", tick->clipped,
+		loop_flags_text(tick->tick->flags, flags));
+	/* On a full disk it ends at once, not after an hour. */
+	return ferror(sink->out) ? incise_error_set(err, EIO, "%s: cannot be written: %s",
+						    sink->name, strerror(errno))
+				 : 0;
 }
 
 static double relative(const struct incise_replay_report *report)
@@ -195,7 +189,7 @@ static void report_json(const struct job *job, double rate_hz,
 		job->how.real_time ? json_integer((json_int_t)r->late) : json_null()));
 }
 
-/* Why there was less force than the tissue's, or none, as far as it was met. */
+/* Print the reasons why there was less force than the tissue's. */
 static void held_line(const struct incise_loop_stats *stats,
 		      const struct incise_replay_report *report)
 {
@@ -266,8 +260,7 @@ int main(int argc, char **argv)
 	struct incise_outfile *file = NULL;
 	struct incise_error err = {0};
 	struct incise_scene *scene;
-	struct table table = {.percent = -1};
-	struct replay_picture picture;
+	struct sink sink = {.percent = -1};
 	struct job job;
 	double rate_hz;
 	int rc;
@@ -280,24 +273,20 @@ int main(int argc, char **argv)
 		job.how.calibration = &calibration;
 	scene = scene_argument_load(&job.scene);
 	rate_hz = incise_scene_rate_hz(scene);
-	recording = incise_recording_open(job.recording, &err);
-	if (!recording)
-		cli_fail_with(&err);
-	table.name = job.recording;
-	table.bar = !job.csv || strcmp(job.csv, "-");
+	recording = recording_open(job.recording);
+	sink.name = job.recording;
+	sink.bar = !job.csv || strcmp(job.csv, "-");
 	if (job.csv) {
-		table.name = job.csv;
-		table.out = whole_file_begin(job.csv, &file);
+		sink.name = job.csv;
+		sink.out = whole_file_begin(job.csv, &file);
 		fputs("t_s,cut,depth_mm,velocity_mm_s,predicted_N,measured_N,clipped,"
 		      "flags\n",
-		      table.out);
+		      sink.out);
 	}
-	if (job.plot) {
-		replay_picture_begin(&picture, job.plot);
-		table.picture = &picture;
-	}
+	if (job.plot)
+		begin_plot(&sink.plot, job.plot);
 	job.how.ticked = put_tick;
-	job.how.context = &table;
+	job.how.context = &sink;
 	cli_catch_signals();
 	rc = incise_replay(recording, scene, &job.how, &stats, &report, &err);
 	cli_progress_end();
@@ -311,10 +300,10 @@ int main(int argc, char **argv)
 		cli_fail("%s: interrupted %.1f s after its beginning%s", job.recording,
 			 report.seconds, job.csv ? "; nothing was written" : "");
 	if (job.plot)
-		replay_picture_draw(&picture);
+		draw_plot(&sink.plot);
 	if (job.json)
 		report_json(&job, rate_hz, &stats, &report);
-	else if (table.bar)
+	else if (sink.bar)
 		report_text(&job, rate_hz, &stats, &report);
 	cli_finish();
 	incise_recording_close(recording);

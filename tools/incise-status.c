@@ -1,26 +1,33 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise status: what the loops on this machine do, or did last.
+ * incise status: the state of the loops on this machine, once or live.
  */
-#include <getopt.h>
 #include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
 #include <time.h>
+#include <unistd.h>
 #include "cli/cli.h"
 #include "cli/json.h"
-#include "status/state_follow.h"
-#include "status/state_pages.h"
-#include "status/state_prometheus.h"
-#include "status/state_report.h"
+#include "status/pages.h"
+#include "status/report.h"
 
-enum { OPT_JSON = CLI_LONG, OPT_PROMETHEUS };
+struct job {
+	bool follow, json, prometheus;
+};
 
 static const struct cli_option options[] = {
 	{'f', "follow", NULL,
 	 "go on: a live view on a terminal, a line a second in a pipe;\n"
-	 "ends with the loop, or at SIGINT"},
-	{OPT_JSON, "json", NULL, "report as one JSON object; with --follow one a second"},
-	{OPT_PROMETHEUS, "prometheus", NULL, "report in Prometheus' text format"},
+	 "ends with the loop, or at SIGINT",
+	 CLI_FLAG(struct job, follow)},
+	{0, "json", NULL, "report as one JSON object; with --follow one a second",
+	 CLI_FLAG(struct job, json)},
+	{0, "prometheus", NULL, "report in Prometheus' text format",
+	 CLI_FLAG(struct job, prometheus)},
 	{0},
 };
 
@@ -38,36 +45,132 @@ static const struct cli_command command = {
 		"2 bad usage. See incise-status(1).",
 };
 
-struct job {
-	const char *asked;
-	bool follow, json, prometheus;
-};
+/* --- live ---------------------------------------------------------------------------- */
 
-static void parse(struct job *job, int argc, char **argv)
+#define VIEW_NS 200000000LL
+#define LINE_NS 1000000000LL
+
+/* Bytes of a line that fill at most so many columns; UTF-8. */
+static size_t width_of(const char *line, size_t n, int columns)
 {
-	int opt;
+	size_t i;
 
-	*job = (struct job){0};
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		switch (opt) {
-		case 'f':
-			job->follow = true;
+	for (i = 0; i < n; i++)
+		if (((unsigned char)line[i] & 0xc0) != 0x80 && !columns--)
 			break;
-		case OPT_JSON:
-			job->json = true;
-			break;
-		case OPT_PROMETHEUS:
-			job->prometheus = true;
-			break;
-		}
-	if (argc - optind > 1)
-		cli_usage("'%s': one name or file at most", argv[optind + 1]);
-	job->asked = argv[optind];
-	if (job->prometheus && (job->json || job->follow))
-		cli_usage("--prometheus stands alone: who collects asks again");
+	return i;
 }
 
-/* Long enough for each to tick, if it does. Returns how long, s. */
+/* Draw over the view before, cut to the size of the terminal. */
+static void draw(const char *text)
+{
+	struct winsize size = {.ws_row = 24, .ws_col = 80};
+
+	ioctl(STDOUT_FILENO, TIOCGWINSZ, &size);
+	fputs("\033[H", stdout);
+	for (int row = 1; *text && row < size.ws_row; row++) {
+		size_t n = strcspn(text, "\n");
+
+		printf("%.*s\033[K\n", (int)width_of(text, n, size.ws_col), text);
+		text += n + (text[n] == '\n');
+	}
+	fputs("\033[J", stdout);
+}
+
+static void draw_look(const struct state_look *look)
+{
+	char *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
+
+	if (!out)
+		cli_fail("no memory");
+	state_report_text(out, look);
+	fputs("Ctrl-C ends this view\n", out);
+	fclose(out);
+	draw(text);
+	free(text);
+}
+
+static void show(const struct state_look *look, bool view, bool json)
+{
+	if (json) {
+		json_t *report = state_report_json(look);
+
+		json_dumpf(report, stdout, JSON_COMPACT);
+		putchar('\n');
+		json_decref(report);
+	} else if (view) {
+		draw_look(look);
+	} else {
+		state_report_line(stdout, look);
+	}
+	/* A pipe gets it at once, and a closed one ends the program. */
+	if (fflush(stdout))
+		cli_finish();
+}
+
+/* Wait in parts, so that a signal is noticed within 50 ms. */
+static void wait_ns(int64_t ns)
+{
+	const struct timespec part = {.tv_nsec = 50000000};
+
+	for (; ns > 0 && !cli_stop; ns -= part.tv_nsec)
+		nanosleep(&part, NULL);
+}
+
+/* Switch to an own screen, or back to the one before. */
+static void screen(bool own)
+{
+	fputs(own ? "\033[?1049h\033[?25l" : "\033[?1049l\033[?25h", stdout);
+}
+
+/*
+ * On a terminal a view, drawn 5 times a second; else a line a second, or an object with
+ * @json. Ends at cli_stop or with the loop. Returns whether all is well then.
+ */
+static bool state_follow(const struct state_page_file *page, bool json)
+{
+	static struct incise_state_now looks[2];
+	struct state_look look = {.name = page->name, .path = page->path};
+	bool view = !json && isatty(STDOUT_FILENO);
+	struct incise_error err = {0};
+	int i = 0;
+
+	cli_catch_signals();
+	state_pages_look(page, &looks[0]);
+	if (view && looks[0].alive)
+		screen(true);
+	while (looks[i].alive && !cli_stop) {
+		wait_ns(view ? VIEW_NS : LINE_NS);
+		if (cli_stop)
+			break;
+		i = !i;
+		if (state_pages_try(page, &looks[i], &err))
+			break;
+		look.now = &looks[i];
+		state_look_since(&look, &looks[!i],
+				 view ? VIEW_NS * 1e-9 : LINE_NS * 1e-9);
+		show(&look, view, json);
+	}
+	if (view && look.now)
+		screen(false);
+	if (err.code)
+		cli_fail_with(&err);
+	/* A loop that had ended before is shown once; a view shows its last state. */
+	if (view || !look.now) {
+		look.now = &looks[i];
+		if (view)
+			state_report_text(stdout, &look);
+		else
+			show(&look, false, json);
+	}
+	return state_is_well(&look);
+}
+
+/* --- once ---------------------------------------------------------------------------- */
+
+/* Wait long enough for each running loop to tick. Returns how long, s. */
 static double pause_between(const struct incise_state_now *looks, int n)
 {
 	double s = 0;
@@ -84,14 +187,12 @@ static double pause_between(const struct incise_state_now *looks, int n)
 
 static bool show_all(const struct state_pages *pages, bool json)
 {
-	struct incise_state_now *before = calloc((size_t)pages->n, sizeof(*before));
-	struct incise_state_now *now = calloc((size_t)pages->n, sizeof(*now));
+	struct incise_state_now *before = cli_alloc((size_t)pages->n, sizeof(*before));
+	struct incise_state_now *now = cli_alloc((size_t)pages->n, sizeof(*now));
 	json_t *list = json_array();
 	bool well = true;
 	double gap_s;
 
-	if (!before || !now)
-		cli_fail("no memory");
 	for (int i = 0; i < pages->n; i++)
 		state_pages_look(&pages->page[i], &before[i]);
 	gap_s = pause_between(before, pages->n);
@@ -120,18 +221,15 @@ static bool show_all(const struct state_pages *pages, bool json)
 
 static bool show_metrics(const struct state_pages *pages)
 {
-	struct incise_state_now *now = calloc((size_t)pages->n, sizeof(*now));
-	struct state_metrics *loops = calloc((size_t)pages->n, sizeof(*loops));
+	struct incise_state_now *now = cli_alloc((size_t)pages->n, sizeof(*now));
+	struct state_look *loops = cli_alloc((size_t)pages->n, sizeof(*loops));
 	bool well = true;
 
-	if (!now || !loops)
-		cli_fail("no memory");
 	for (int i = 0; i < pages->n; i++) {
-		struct state_look look = {.now = &now[i]};
-
 		state_pages_look(&pages->page[i], &now[i]);
-		loops[i] = (struct state_metrics){pages->page[i].name, &now[i]};
-		well &= state_is_well(&look);
+		loops[i] =
+			(struct state_look){.name = pages->page[i].name, .now = &now[i]};
+		well &= state_is_well(&loops[i]);
 	}
 	state_prometheus(stdout, loops, pages->n);
 	free(loops);
@@ -139,7 +237,7 @@ static bool show_metrics(const struct state_pages *pages)
 	return well;
 }
 
-/* Of several the one that runs. */
+/* The only page, or that of the only loop that runs. */
 static const struct state_page_file *followed(const struct state_pages *pages)
 {
 	const struct state_page_file *one = NULL;
@@ -162,11 +260,15 @@ static const struct state_page_file *followed(const struct state_pages *pages)
 int main(int argc, char **argv)
 {
 	struct state_pages pages;
-	struct job job;
+	struct job job = {0};
 	bool well;
 
-	parse(&job, argc, argv);
-	state_pages_open(&pages, job.asked);
+	cli_parse(&command, argc, argv, &job);
+	if (argc - optind > 1)
+		cli_usage("'%s': one name or file at most", argv[optind + 1]);
+	if (job.prometheus && (job.json || job.follow))
+		cli_usage("--prometheus stands alone: who collects asks again");
+	state_pages_open(&pages, argv[optind]);
 	if (job.follow)
 		well = state_follow(followed(&pages), job.json);
 	else if (job.prometheus)

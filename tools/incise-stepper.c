@@ -1,34 +1,55 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise stepper COMMAND: look at the actuator of a rig, and move it by hand. For bring-up:
+ * incise stepper SUBCOMMAND: look at the actuator of a rig, and move it by hand. For bring-up:
  * wiring, directions, switches, limits.
  */
-#include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include "cli/cli.h"
-#include "stepper/stepper_command.h"
-#include "cli/stepper_counters.h"
-#include "stepper/stepper_status.h"
+#include "cli/json.h"
+#include "stepper/drive.h"
+#include "stepper/status.h"
 
-enum { OPT_BY = CLI_LONG, OPT_UNHOMED, OPT_HOLD, OPT_FOR, OPT_REPEAT, OPT_JSON };
+#define MM_MAX 1e6	   /* beyond any rig's limits */
+#define FOLLOW_NS 20000000 /* between readings */
+#define MOTION_S 2	   /* added to twice the time that the limits allow a motion */
+
+struct job {
+	const struct subcommand *subcommand;
+	const char *rig;
+	double amount; /* the operand: mm or mm/s */
+	bool follow, by, unhomed, hold, json;
+	double seconds; /* 0: until Ctrl-C */
+	int repeat;	/* 0: not given */
+};
+
+struct subcommand {
+	const char *name;
+	const char *operand;	      /* its name, or NULL */
+	const struct cli_unit *units; /* of it */
+	/* On an open drive; failure ends the program. */
+	void (*run)(const struct job *job, struct stepper_drive *drive);
+	bool watch;	   /* does not become the owner */
+	const char *takes; /* letters of options, see check_options() */
+};
 
 static const struct cli_option options[] = {
-	{'r', "rig", "RIG",
-	 "file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n"
-	 "(default: ./rig.conf, else /etc/incise/rig.conf)"},
-	{'f', "follow", NULL, "status: a line at each change, until Ctrl-C"},
-	{OPT_BY, "by", NULL, "move: by MM from where it stands, not to MM"},
-	{OPT_UNHOMED, "unhomed", NULL,
-	 "move: to MM of a count that is not the machine's"},
-	{OPT_HOLD, "hold", NULL, "move, home: stay powered afterwards, until Ctrl-C"},
-	{OPT_FOR, "for", "TIME",
-	 "status --follow, enable, jog, --hold: end after this time, e.g. 2s"},
-	{OPT_REPEAT, "repeat", "N", "home: N times, and say how well it repeats"},
-	{OPT_JSON, "json", NULL, "report as JSON"},
+	{CLI_RIG_OPTION(struct job, rig)},
+	{'f', "follow", NULL, "status: a line at each change, until Ctrl-C",
+	 CLI_FLAG(struct job, follow)},
+	{0, "by", NULL, "move: by MM from where it stands, not to MM",
+	 CLI_FLAG(struct job, by)},
+	{0, "unhomed", NULL, "move: to MM of a count that is not the machine's",
+	 CLI_FLAG(struct job, unhomed)},
+	{0, "hold", NULL, "move, home: stay powered afterwards, until Ctrl-C",
+	 CLI_FLAG(struct job, hold)},
+	{0, "for", "TIME",
+	 "status --follow, enable, jog, --hold: end after this time, e.g. 2s",
+	 CLI_DURATION(struct job, seconds, 0.001, 86400)},
+	{0, "repeat", "N", "home: N times, and say how well it repeats",
+	 CLI_INTEGER(struct job, repeat, 1, 1000)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
 };
 
@@ -53,20 +74,19 @@ static const struct cli_command command = {
 		 "usage.\nSee incise-stepper(1).",
 };
 
-/* Largest that anyone can mean; the rig's own limits are narrower. */
-#define MM_MAX 1e6
-#define FOLLOW_NS 20000000 /* between looks */
+/* --- status, disable, clear ------------------------------------------------------------ */
 
-json_t *stepper_report(const struct stepper_job *job, const struct stepper_drive *drive)
+static json_t *report(const struct job *job, const struct stepper_drive *drive)
 {
-	json_t *object = json_pack("{ss}", "command", job->command->name);
+	json_t *object = json_pack("{ss}", "command", job->subcommand->name);
 
 	json_object_update_new(object, stepper_status_json(drive->stepper, &drive->info,
 							   &drive->status));
 	return object;
 }
 
-void stepper_put(json_t *object, size_t form)
+/* Print it at once and release it. Never ends the program: the motor may have power. */
+static void put_json(json_t *object, size_t form)
 {
 	json_dumpf(object, stdout, form | JSON_REAL_PRECISION(12));
 	putchar('\n');
@@ -74,20 +94,20 @@ void stepper_put(json_t *object, size_t form)
 	json_decref(object);
 }
 
-static void put_line(const struct stepper_job *job, const struct stepper_drive *drive,
+static void put_line(const struct job *job, const struct stepper_drive *drive,
 		     int64_t begin_ns)
 {
 	double t_s = (double)(drive->status.t_ns - begin_ns) / INCISE_NS_PER_S;
 
 	if (job->json) {
-		stepper_put(stepper_report(job, drive), JSON_COMPACT);
+		put_json(report(job, drive), JSON_COMPACT);
 		return;
 	}
 	stepper_status_line(drive->stepper, &drive->status, t_s);
 	fflush(stdout);
 }
 
-/* Its time and what follows from it change always. */
+/* Time and velocity are not compared: they change always. */
 static bool changed(const struct incise_stepper_status *a,
 		    const struct incise_stepper_status *b)
 {
@@ -96,7 +116,7 @@ static bool changed(const struct incise_stepper_status *a,
 	       a->late != b->late;
 }
 
-static void follow(const struct stepper_job *job, struct stepper_drive *drive)
+static void follow(const struct job *job, struct stepper_drive *drive)
 {
 	int64_t begin = incise_clock_now(drive->clock), now = begin;
 	struct incise_stepper_status shown;
@@ -117,23 +137,23 @@ static void follow(const struct stepper_job *job, struct stepper_drive *drive)
 	}
 }
 
-static void run_status(const struct stepper_job *job, struct stepper_drive *drive)
+static void run_status(const struct job *job, struct stepper_drive *drive)
 {
 	if (job->follow)
 		follow(job, drive);
 	else if (job->json)
-		stepper_put(stepper_report(job, drive), JSON_INDENT(2));
+		put_json(report(job, drive), JSON_INDENT(2));
 	else
 		stepper_status_text(drive->stepper, &drive->info, &drive->status);
 }
 
-static void run_disable(const struct stepper_job *job, struct stepper_drive *drive)
+static void run_disable(const struct job *job, struct stepper_drive *drive)
 {
-	/* As if it was us who powered it. */
+	/* As if this program had powered it. */
 	drive->powered = true;
 	stepper_drive_rest(drive);
 	if (job->json)
-		stepper_put(stepper_report(job, drive), JSON_INDENT(2));
+		put_json(report(job, drive), JSON_INDENT(2));
 	else
 		printf("%s: %s at %.4f mm%s\n", drive->info.name,
 		       incise_stepper_state_name(drive->status.state),
@@ -143,7 +163,7 @@ static void run_disable(const struct stepper_job *job, struct stepper_drive *dri
 			       : "");
 }
 
-static void run_clear(const struct stepper_job *job, struct stepper_drive *drive)
+static void run_clear(const struct job *job, struct stepper_drive *drive)
 {
 	struct incise_error err = {0};
 	unsigned int before = drive->status.faults;
@@ -154,9 +174,9 @@ static void run_clear(const struct stepper_job *job, struct stepper_drive *drive
 		stepper_drive_fail(drive, "%s", err.text);
 	stepper_drive_look(drive);
 	if (job->json)
-		stepper_put(stepper_report(job, drive), JSON_INDENT(2));
+		put_json(report(job, drive), JSON_INDENT(2));
 	else if (before) {
-		/* What to do about it has been done. */
+		/* This is done now. */
 		if (strstr(text, ", then clear"))
 			*strstr(text, ", then clear") = 0;
 		printf("%s: cleared; it was %s\n", drive->info.name, text);
@@ -164,22 +184,293 @@ static void run_clear(const struct stepper_job *job, struct stepper_drive *drive
 		printf("%s: there was no fault\n", drive->info.name);
 }
 
+/* --- enable, move, jog, home ----------------------------------------------------------- */
+
+static void run_enable(const struct job *job, struct stepper_drive *drive)
+{
+	stepper_drive_power(drive);
+	if (!job->json) {
+		printf("powered, held at %.4f mm; Ctrl-C disables it, and so does the end of "
+		       "this program within %g ms\n",
+		       drive->status.position_mm, drive->info.deadman_s * 1e3);
+		fflush(stdout);
+	}
+	stepper_drive_hold(drive, job->seconds);
+	if (job->json)
+		put_json(report(job, drive), JSON_INDENT(2));
+}
+
+/* Print the result of a motion. */
+static void put_moved(const struct job *job, const struct stepper_drive *drive,
+		      double from_mm, double seconds)
+{
+	const struct incise_stepper_status *s = &drive->status;
+	json_t *object;
+
+	cli_progress_end();
+	if (job->json) {
+		object = report(job, drive);
+		json_object_set_new(object, "from_mm", json_number(from_mm));
+		json_object_set_new(object, "seconds", json_number(seconds));
+		put_json(object, JSON_INDENT(2));
+		return;
+	}
+	printf("moved %.4f mm in %.3f s, now at %.4f mm (step %lld)%s\n",
+	       s->position_mm - from_mm, seconds, s->position_mm,
+	       stepper_steps(&drive->info, s->position_mm),
+	       s->homed ? "" : ", not homed");
+	fflush(stdout);
+}
+
+static void maybe_hold(const struct job *job, struct stepper_drive *drive)
+{
+	if (job->hold)
+		stepper_drive_hold(drive, job->seconds);
+}
+
+/* The target within the travel; outside of it fails. */
+static double destination(const struct job *job, struct stepper_drive *drive)
+{
+	double mm = job->amount, from_mm = drive->status.position_mm;
+	/* A travel need not be of whole steps. */
+	double slack_mm = 0.5 * drive->info.step_mm;
+
+	if (job->by)
+		mm += from_mm;
+	else if (!drive->status.homed && !job->unhomed)
+		stepper_drive_fail(
+			drive,
+			"%s is not homed, so %g mm is no place of it: run `incise stepper "
+			"home`, or move --by, or with --unhomed",
+			drive->info.name, mm);
+	if (mm < -slack_mm || mm > drive->info.travel_mm + slack_mm)
+		stepper_drive_fail(
+			drive,
+			"from %g mm to %g mm: that lies outside the travel of %s, "
+			"0 to %g mm%s",
+			from_mm, mm, drive->info.name, drive->info.travel_mm,
+			drive->status.homed ? ""
+					    : "; its count is not the machine's: run "
+					      "`incise stepper home`");
+	return fmax(0, fmin(drive->info.travel_mm, mm));
+}
+
+/* Whether it rests at the target, or at the nearest microstep. */
+static bool arrived(const struct stepper_drive *drive, double to_mm)
+{
+	return stepper_drive_rests(drive) &&
+	       fabs(drive->status.position_mm - to_mm) <=
+		       fmax(0.6 * drive->info.step_mm, drive->info.within_mm);
+}
+
+/* Longest time of a motion from rest to rest within the limits. */
+static double motion_s(const struct incise_stepper_info *info, double mm)
+{
+	double s = fabs(mm) / info->velocity_mm_s +
+		   2 * info->velocity_mm_s / info->acceleration_mm_s2;
+
+	if (info->jerk_mm_s3 > 0)
+		s += 2 * info->acceleration_mm_s2 / info->jerk_mm_s3;
+	return 2 * s + MOTION_S;
+}
+
+static _Noreturn void fail_stopped(struct stepper_drive *drive)
+{
+	stepper_drive_rest(drive);
+	stepper_drive_fail(drive, "%s: at rest at %.4f mm, without power",
+			   strsignal(cli_stop), drive->status.position_mm);
+}
+
+static void run_move(const struct job *job, struct stepper_drive *drive)
+{
+	double to_mm = destination(job, drive), from_mm = drive->status.position_mm;
+	double within_s = motion_s(&drive->info, to_mm - from_mm), seconds;
+	double step_mm = drive->info.step_mm, arrived_s = INFINITY;
+	int64_t begin;
+
+	/* The last whole step of the travel. */
+	to_mm = fmin(to_mm,
+		     floor(drive->info.travel_mm / step_mm * (1 + 1e-12)) * step_mm);
+	stepper_drive_power(drive);
+	begin = incise_clock_now(drive->clock);
+	do {
+		stepper_drive_to(drive, to_mm);
+		seconds = (double)(incise_clock_now(drive->clock) - begin) /
+			  INCISE_NS_PER_S;
+		arrived_s = arrived(drive, to_mm) ? fmin(arrived_s, seconds) : INFINITY;
+		/* A drive that follows its targets needs time to settle. */
+	} while (!cli_stop && seconds < within_s &&
+		 !(seconds >= arrived_s + drive->info.settle_s));
+	if (!arrived(drive, to_mm) && cli_stop)
+		fail_stopped(drive);
+	if (!arrived(drive, to_mm))
+		stepper_drive_fail(
+			drive,
+			"%s is at %.4f mm after %.1f s and did not come to rest at "
+			"%.4f mm; see incise stepper status",
+			drive->info.name, drive->status.position_mm, seconds, to_mm);
+	put_moved(job, drive, from_mm, seconds);
+	maybe_hold(job, drive);
+}
+
+static void run_jog(const struct job *job, struct stepper_drive *drive)
+{
+	double mm_s = job->amount, end_mm = mm_s > 0 ? drive->info.travel_mm : 0;
+	double from_mm = drive->status.position_mm, seconds;
+	int64_t begin;
+	bool ended;
+
+	if (fabs(mm_s) > drive->info.velocity_mm_s)
+		stepper_drive_fail(drive, "%g mm/s is faster than the %g mm/s of %s",
+				   mm_s, drive->info.velocity_mm_s, drive->info.name);
+	stepper_drive_power(drive);
+	begin = incise_clock_now(drive->clock);
+	do {
+		stepper_drive_at(drive, mm_s);
+		seconds = (double)(incise_clock_now(drive->clock) - begin) /
+			  INCISE_NS_PER_S;
+		ended = stepper_drive_rests(drive) &&
+			fabs(drive->status.position_mm - end_mm) < drive->info.step_mm;
+	} while (!cli_stop && !ended && (!job->seconds || seconds < job->seconds));
+	stepper_drive_rest(drive);
+	put_moved(job, drive, from_mm, seconds);
+	if (ended && !job->json)
+		printf("that is the end of the travel, 0 to %g mm%s\n",
+		       drive->info.travel_mm,
+		       drive->status.homed ? ""
+					   : " of a count that is not the machine's");
+}
+
+/* Home edges as found; offsets in steps of the count after the first homing. */
+struct edges {
+	json_t *before_mm, *before_steps; /* each in the count before its homing */
+	double after_mm;
+	long long off, lowest, highest;
+	int n;	      /* known edges */
+	bool unknown; /* the drive homed by itself and does not report its edge */
+};
+
+/* A drive that homed by itself: only its 0 is known. */
+static void put_unknown_edge(struct edges *edges, const struct job *job,
+			     const struct stepper_drive *drive)
+{
+	bool first = !edges->unknown;
+
+	edges->unknown = true;
+	json_array_append_new(edges->before_mm, json_null());
+	json_array_append_new(edges->before_steps, json_null());
+	if (job->json)
+		return;
+	cli_progress_end();
+	if (first)
+		printf("%s homes by itself and does not tell where the edge was in the count "
+		       "before%s\n",
+		       drive->info.name,
+		       job->repeat > 1 ? ": how well it repeats is not known" : "");
+	fflush(stdout);
+}
+
+static void find_edge(struct edges *edges, const struct job *job,
+		      struct stepper_drive *drive)
+{
+	const struct incise_stepper_info *info = &drive->info;
+	struct incise_stepper_edge_found edge;
+	struct incise_error err = {0};
+	long long before;
+
+	if (incise_stepper_home(drive->stepper, &cli_stop, &edge, &err))
+		stepper_drive_fail(drive, "%s", err.text);
+	stepper_drive_look(drive);
+	edges->after_mm = edge.after_mm;
+	if (isnan(edge.before_mm)) {
+		put_unknown_edge(edges, job, drive);
+		return;
+	}
+	before = stepper_steps(info, edge.before_mm);
+	/* Each homing renumbers the count by the offset that it found. */
+	if (edges->n++)
+		edges->off += before - stepper_steps(info, edge.after_mm);
+	if (edges->off < edges->lowest)
+		edges->lowest = edges->off;
+	if (edges->off > edges->highest)
+		edges->highest = edges->off;
+	json_array_append_new(edges->before_mm,
+			      json_number((double)before * info->step_mm));
+	json_array_append_new(edges->before_steps, json_integer(before));
+	if (job->json)
+		return;
+	cli_progress_end();
+	printf("home edge at step %lld, %.4f mm, of the count before; now at %.4f mm\n",
+	       before, (double)before * info->step_mm, edge.after_mm);
+	fflush(stdout);
+}
+
+static json_t *home_json(const struct job *job, const struct stepper_drive *drive,
+			 const struct edges *edges)
+{
+	long long spread = edges->highest - edges->lowest;
+	bool known = edges->n > 1 && !edges->unknown;
+	double spread_mm = known ? (double)spread * drive->info.step_mm : NAN;
+	json_t *object = report(job, drive);
+
+	json_object_set_new(object, "edges_before_mm", edges->before_mm);
+	json_object_set_new(object, "edges_before_steps", edges->before_steps);
+	json_object_set_new(object, "edge_mm", json_number(edges->after_mm));
+	json_object_set_new(object, "spread_mm", json_number(spread_mm));
+	json_object_set_new(object, "spread_steps",
+			    known ? json_integer(spread) : json_null());
+	return object;
+}
+
+static void put_home(const struct edges *edges, const struct stepper_drive *drive)
+{
+	long long spread = edges->highest - edges->lowest;
+
+	if (edges->n > 1 && !edges->unknown)
+		printf("%d times within %lld steps, %.4f mm\n", edges->n, spread,
+		       (double)spread * drive->info.step_mm);
+	printf("homed, at %.4f mm\n", drive->status.position_mm);
+	fflush(stdout);
+	json_decref(edges->before_mm);
+	json_decref(edges->before_steps);
+}
+
+static void run_home(const struct job *job, struct stepper_drive *drive)
+{
+	struct edges edges = {.before_mm = json_array(), .before_steps = json_array()};
+	int times = job->repeat ? job->repeat : 1;
+
+	stepper_drive_power(drive);
+	for (int i = 0; i < times; i++) {
+		cli_progress("home: %d of %d, Ctrl-C stops", i + 1, times);
+		find_edge(&edges, job, drive);
+	}
+	cli_progress_end();
+	if (job->json)
+		put_json(home_json(job, drive, &edges), JSON_INDENT(2));
+	else
+		put_home(&edges, drive);
+	maybe_hold(job, drive);
+}
+
+/* --- subcommands ----------------------------------------------------------------------- */
+
 static const struct cli_unit lengths[] = {{"mm", 1}, {"um", 1e-3}, {0}};
 static const struct cli_unit speeds[] = {{"mm/s", 1}, {"um/s", 1e-3}, {0}};
 
-static const struct stepper_command commands[] = {
+static const struct subcommand subcommands[] = {
 	{"status", NULL, NULL, run_status, true, "ft"},
-	{"enable", NULL, NULL, stepper_enable, false, "t"},
+	{"enable", NULL, NULL, run_enable, false, "t"},
 	{"disable", NULL, NULL, run_disable, false, ""},
-	{"move", "MM", lengths, stepper_move, false, "buht"},
-	{"jog", "MM_S", speeds, stepper_jog, false, "t"},
-	{"home", NULL, NULL, stepper_home, false, "htn"},
+	{"move", "MM", lengths, run_move, false, "buht"},
+	{"jog", "MM_S", speeds, run_jog, false, "t"},
+	{"home", NULL, NULL, run_home, false, "htn"},
 	{"clear", NULL, NULL, run_clear, false, ""},
 };
-#define COMMANDS (sizeof(commands) / sizeof(*commands))
+#define SUBCOMMANDS (sizeof(subcommands) / sizeof(*subcommands))
 
-/* An option that another command takes would do nothing here: that is a mistake. */
-static void check_options(const struct stepper_job *job)
+/* An option that only other subcommands take is bad usage. */
+static void check_options(const struct job *job)
 {
 	const struct {
 		bool given;
@@ -192,86 +483,61 @@ static void check_options(const struct stepper_job *job)
 	};
 
 	for (size_t i = 0; i < sizeof(given) / sizeof(*given); i++)
-		if (given[i].given && !strchr(job->command->takes, given[i].letter))
-			cli_usage("%s does not take --%s", job->command->name,
+		if (given[i].given && !strchr(job->subcommand->takes, given[i].letter))
+			cli_usage("%s does not take --%s", job->subcommand->name,
 				  given[i].name);
 	if (job->by && job->unhomed)
 		cli_usage("--by needs no --unhomed: it goes from where it stands");
-	if (job->seconds && strchr(job->command->takes, 'h') && !job->hold)
+	if (job->seconds && strchr(job->subcommand->takes, 'h') && !job->hold)
 		cli_usage("--for is how long to hold it: add --hold");
-	if (job->seconds && job->command->run == run_status && !job->follow)
+	if (job->seconds && job->subcommand->run == run_status && !job->follow)
 		cli_usage("--for is how long to follow it: add --follow");
 }
 
-static const struct stepper_command *command_named(const char *name)
+static const struct subcommand *subcommand_named(const char *name)
 {
-	for (size_t i = 0; i < COMMANDS; i++)
-		if (!strcmp(name, commands[i].name))
-			return &commands[i];
+	for (size_t i = 0; i < SUBCOMMANDS; i++)
+		if (!strcmp(name, subcommands[i].name))
+			return &subcommands[i];
 	cli_usage(
 		"there is no command '%.40s': status, enable, disable, move, jog, home or "
 		"clear",
 		name);
 }
 
-static void parse(struct stepper_job *job, int argc, char **argv)
+static void parse(struct job *job, int argc, char **argv)
 {
-	int opt, operands;
+	const struct subcommand *sub;
+	int operands;
 
-	*job = (struct stepper_job){0};
 	cli_negative_numbers(argc, argv);
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		switch (opt) {
-		case 'r':
-			job->rig = optarg;
-			break;
-		case 'f':
-			job->follow = true;
-			break;
-		case OPT_BY:
-			job->by = true;
-			break;
-		case OPT_UNHOMED:
-			job->unhomed = true;
-			break;
-		case OPT_HOLD:
-			job->hold = true;
-			break;
-		case OPT_FOR:
-			job->seconds = cli_duration("for", optarg, 0.001, 86400);
-			break;
-		case OPT_REPEAT:
-			job->repeat = (int)cli_integer("repeat", optarg, 1, 1000);
-			break;
-		case OPT_JSON:
-			job->json = true;
-			break;
-		}
+	cli_parse(&command, argc, argv, job);
 	operands = argc - optind;
 	if (!operands)
 		cli_usage("which command: status, enable, disable, move, jog, home or "
 			  "clear?");
-	job->command = command_named(argv[optind]);
-	if (job->command->operand && operands != 2)
-		cli_usage("%s needs one %s, got %d", job->command->name,
-			  job->command->operand, operands - 1);
-	if (!job->command->operand && operands != 1)
-		cli_usage("%s takes no '%s'", job->command->name, argv[optind + 1]);
-	if (job->command->operand)
-		job->amount = cli_quantity(job->command->operand, argv[optind + 1],
-					   job->command->units, -MM_MAX, MM_MAX);
+	sub = job->subcommand = subcommand_named(argv[optind]);
+	if (sub->operand && operands != 2)
+		cli_usage("%s needs one %s, got %d", sub->name, sub->operand,
+			  operands - 1);
+	if (!sub->operand && operands != 1)
+		cli_usage("%s takes no '%s'", sub->name, argv[optind + 1]);
+	if (sub->operand)
+		job->amount = cli_quantity(sub->operand, argv[optind + 1], sub->units,
+					   -MM_MAX, MM_MAX);
 	check_options(job);
 }
 
 int main(int argc, char **argv)
 {
 	struct stepper_drive drive;
-	struct stepper_job job;
+	struct job job = {0};
 
 	parse(&job, argc, argv);
-	stepper_drive_open(&drive, job.rig, job.command->watch, job.command->name);
-	job.command->run(&job, &drive);
-	/* Status shows all of them; what moved it shows what was amiss on the way. */
+	stepper_drive_open(&drive, job.rig, job.subcommand->watch ? INCISE_RIG_WATCH : 0,
+			   job.subcommand->name);
+	job.subcommand->run(&job, &drive);
+	/* Status prints all counters; a motion only those of trouble on the way. */
 	if (!job.json && drive.drove)
 		stepper_counters_line(drive.stepper);
 	stepper_drive_end(&drive);

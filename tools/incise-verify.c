@@ -8,13 +8,14 @@
 #include "cli/cli.h"
 #include "cli/json.h"
 
-/* More in one JSON object is of no use to anyone. */
-#define FINDINGS_MAX 1000
+#define FINDINGS_MAX 1000 /* in the JSON object */
 
-enum { OPT_JSON = CLI_LONG };
+struct job {
+	bool json;
+};
 
 static const struct cli_option options[] = {
-	{OPT_JSON, "json", NULL, "report as one JSON object"},
+	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
 	{0},
 };
 
@@ -30,7 +31,7 @@ static const struct cli_command command = {
 		"Exit codes: 0 all is there, 1 anything is missing or altered, 2 bad usage.",
 };
 
-/* Where findings go: lines, or a list. */
+/* Findings are printed as lines, or kept in a list. */
 struct sink {
 	json_t *list; /* NULL: lines */
 	const char *path;
@@ -167,24 +168,22 @@ int main(int argc, char **argv)
 	struct sink sink = {0};
 	struct incise_verify_watch watch = {found, progress, &sink};
 	unsigned long long lost = 0;
-	bool json = false;
-	int id;
+	struct job job = {0};
 
-	while ((id = cli_next(&command, argc, argv)) != CLI_END)
-		json |= id == OPT_JSON;
+	cli_parse(&command, argc, argv, &job);
 	if (optind == argc)
 		cli_usage("which recording?");
 	if (optind + 1 < argc)
 		cli_usage("'%s': one recording at a time", argv[optind + 1]);
 	sink.path = argv[optind];
-	sink.list = json ? json_array() : NULL;
+	sink.list = job.json ? json_array() : NULL;
 	cli_catch_signals();
 	if (incise_verify(sink.path, &watch, &report, &err))
 		cli_fail_with(&err);
 	cli_progress_end();
 	for (int i = 0; i < report.n_streams; i++)
 		lost += report.streams[i].lost;
-	if (json)
+	if (job.json)
 		print_json(&report, &sink);
 	else
 		print_table(&report, sink.path);

@@ -1,60 +1,92 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise view SCENE: the picture of a scene, in a window or to files.
+ * incise view SCENE: a scene in a window or in files.
  *
  *     a loop that runs (its page) ──────╮
- *     a loop here: --rig (mouse …) ─────┤ ticks ──▶ picture ──▶ window
+ *     a loop here: --rig (mouse …) ─────┤ ticks ──▶ frames ──▶ window
  *     --procedure, in simulated time ───┤                ╰────▶ PNG files, film, strip
  *     --from NAME.rec ──────────────────╯
  */
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <incise/clock.h>
 #include "cli/cli.h"
 #include "cli/json.h"
-#include "view/view_job.h"
+#include "view/view.h"
 
-enum {
-	OPT_FROM = CLI_LONG,
-	OPT_PROCEDURE,
-	OPT_FRAMES,
-	OPT_VIDEO,
-	OPT_STRIP,
-	OPT_NO_OUTPUT,
-	OPT_AT,
-	OPT_SIZE,
-	OPT_FPS,
-	OPT_DURATION,
-	OPT_CAMERA,
-	OPT_NO_PANEL,
-	OPT_MODEL,
-	OPT_ARITH,
-	OPT_JSON
-};
+static void parse_size(void *whole, char *text)
+{
+	struct view_job *job = whole;
+	int used = 0;
+
+	if (sscanf(text, "%dx%d%n", &job->output.width, &job->output.height, &used) !=
+		    2 ||
+	    text[used] || job->output.width < 16 || job->output.height < 16 ||
+	    job->output.width > INCISE_VIEW_SIDE_MAX ||
+	    job->output.height > INCISE_VIEW_SIDE_MAX)
+		cli_usage(
+			"--size: '%s' is not a size such as 1280x720, sides from 16 to %d",
+			text, INCISE_VIEW_SIDE_MAX);
+}
+
+static void parse_camera(void *whole, char *text)
+{
+	struct view_job *job = whole;
+	char *items[3];
+
+	if (cli_list("camera", text, items, 3) != 3)
+		cli_usage(
+			"--camera: expected azimuth, elevation and distance, as 20,35,220");
+	job->camera[0] = cli_number("camera", items[0], -360, 360);
+	job->camera[1] = cli_number("camera", items[1], -89, 89);
+	job->camera[2] = cli_number("camera", items[2], 1, 1e5);
+	job->has_camera = true;
+}
+
+static void parse_times(void *whole, char *text)
+{
+	struct view_job *job = whole;
+	char *items[VIEW_STRIP_MAX];
+
+	job->output.n_strip = cli_list("at", text, items, VIEW_STRIP_MAX);
+	for (int i = 0; i < job->output.n_strip; i++) {
+		job->output.strip_s[i] = cli_duration("at", items[i], 0, 86400);
+		if (i && !(job->output.strip_s[i] > job->output.strip_s[i - 1]))
+			cli_usage("--at: times go up");
+	}
+}
 
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
-	 "run a loop here on this rig's tracker; sim:mouse is moved by the mouse"},
-	{OPT_FROM, "from", "NAME.rec", "show the loop on this recording"},
-	{OPT_PROCEDURE, "procedure", NULL,
-	 "show a scripted procedure: cut, bleeding, enlarging, tube"},
-	{OPT_FRAMES, "frames", "DIR",
-	 "no window: a PNG file for each frame into this folder"},
-	{OPT_VIDEO, "video", "FILE.mkv", "no window: a film"},
-	{OPT_STRIP, "strip", "FILE.png", "no window: a few frames side by side"},
-	{OPT_NO_OUTPUT, "no-output", NULL,
-	 "no window and no files: draw in real time, say how often"},
-	{OPT_AT, "at", "TIMES", "of the strip, e.g. 2s,6s,12s,20s"},
-	{OPT_SIZE, "size", "WxH", "pixels (default: 1280x720)"},
-	{OPT_FPS, "fps", "N", "frames per second of files, 1 to 240 (default: 60)"},
-	{OPT_DURATION, "duration", "TIME", "end after this time"},
-	{OPT_CAMERA, "camera", "A,E,D",
-	 "azimuth and elevation in degrees, distance in mm"},
-	{OPT_NO_PANEL, "no-panel", NULL, "the tissue alone, without graphs"},
-	{OPT_MODEL, "model", "FILE", "use this model instead of the scene's"},
-	{OPT_ARITH, "arith", "KIND", "fixed or double, instead of the scene's"},
-	{OPT_JSON, "json", NULL, "report what was drawn, as JSON, at the end"},
+	 "run a loop here on this rig's tracker; sim:mouse is moved by the mouse",
+	 CLI_TEXT(struct view_job, rig)},
+	{0, "from", "NAME.rec", "show the loop on this recording",
+	 CLI_TEXT(struct view_job, from)},
+	{0, "procedure", NULL,
+	 "show a scripted procedure: cut, bleeding, enlarging, tube",
+	 CLI_FLAG(struct view_job, procedure)},
+	{0, "frames", "DIR", "no window: a PNG file for each frame into this folder",
+	 CLI_TEXT(struct view_job, output.folder)},
+	{0, "video", "FILE.mkv", "no window: a film",
+	 CLI_TEXT(struct view_job, output.film_path)},
+	{0, "strip", "FILE.png", "no window: a few frames side by side",
+	 CLI_TEXT(struct view_job, output.strip_path)},
+	{0, "no-output", NULL, "no window and no files: draw in real time, say how often",
+	 CLI_FLAG(struct view_job, no_output)},
+	{0, "at", "TIMES", "of the strip, e.g. 2s,6s,12s,20s",
+	 CLI_PARSED_BY(parse_times)},
+	{0, "size", "WxH", "pixels (default: 1280x720)", CLI_PARSED_BY(parse_size)},
+	{0, "fps", "N", "frames per second of files, 1 to 240 (default: 60)",
+	 CLI_INTEGER(struct view_job, output.fps, 1, 240)},
+	{0, "duration", "TIME", "end after this time",
+	 CLI_DURATION(struct view_job, duration_s, 0.01, 86400)},
+	{0, "camera", "A,E,D", "azimuth and elevation in degrees, distance in mm",
+	 CLI_PARSED_BY(parse_camera)},
+	{0, "no-panel", NULL, "the tissue alone, without graphs",
+	 CLI_FLAG(struct view_job, no_panel)},
+	SCENE_ARGUMENT_OPTIONS(struct view_job, argument),
+	{0, "json", NULL, "report what was drawn, as JSON, at the end",
+	 CLI_FLAG(struct view_job, json)},
 	{0},
 };
 
@@ -76,106 +108,10 @@ static const struct cli_command command = {
 		"Exit: 0 done, 1 failed, 2 bad usage. See incise-view(1).",
 };
 
-static void take_size(struct view_job *job, const char *text)
-{
-	int used = 0;
-
-	if (sscanf(text, "%dx%d%n", &job->output.width, &job->output.height, &used) !=
-		    2 ||
-	    text[used] || job->output.width < 16 || job->output.height < 16 ||
-	    job->output.width > INCISE_VIEW_SIDE_MAX ||
-	    job->output.height > INCISE_VIEW_SIDE_MAX)
-		cli_usage(
-			"--size: '%s' is not a size such as 1280x720, sides from 16 to %d",
-			text, INCISE_VIEW_SIDE_MAX);
-}
-
-static void take_camera(struct view_job *job, char *text)
-{
-	char *items[3];
-
-	if (cli_list("camera", text, items, 3) != 3)
-		cli_usage(
-			"--camera: expected azimuth, elevation and distance, as 20,35,220");
-	job->camera[0] = cli_number("camera", items[0], -360, 360);
-	job->camera[1] = cli_number("camera", items[1], -89, 89);
-	job->camera[2] = cli_number("camera", items[2], 1, 1e5);
-	job->has_camera = true;
-}
-
-static void take_times(struct view_job *job, char *text)
-{
-	char *items[VIEW_STRIP_MAX];
-
-	job->output.n_strip = cli_list("at", text, items, VIEW_STRIP_MAX);
-	for (int i = 0; i < job->output.n_strip; i++) {
-		job->output.strip_s[i] = cli_duration("at", items[i], 0, 86400);
-		if (i && !(job->output.strip_s[i] > job->output.strip_s[i - 1]))
-			cli_usage("--at: times go up");
-	}
-}
-
-static void take_option(struct view_job *job, int opt)
-{
-	switch (opt) {
-	case 'r':
-		job->rig = optarg;
-		break;
-	case OPT_FROM:
-		job->from = optarg;
-		break;
-	case OPT_PROCEDURE:
-		job->procedure = true;
-		break;
-	case OPT_FRAMES:
-		job->output.folder = optarg;
-		break;
-	case OPT_VIDEO:
-		job->output.film_path = optarg;
-		break;
-	case OPT_STRIP:
-		job->output.strip_path = optarg;
-		break;
-	case OPT_NO_OUTPUT:
-		job->no_output = true;
-		break;
-	case OPT_AT:
-		take_times(job, optarg);
-		break;
-	case OPT_SIZE:
-		take_size(job, optarg);
-		break;
-	case OPT_FPS:
-		job->output.fps = (int)cli_integer("fps", optarg, 1, 240);
-		break;
-	case OPT_DURATION:
-		job->duration_s = cli_duration("duration", optarg, 0.01, 86400);
-		break;
-	case OPT_CAMERA:
-		take_camera(job, optarg);
-		break;
-	case OPT_NO_PANEL:
-		job->no_panel = true;
-		break;
-	case OPT_MODEL:
-		job->argument.model = optarg;
-		break;
-	case OPT_ARITH:
-		scene_argument_arith(&job->argument, optarg);
-		break;
-	case OPT_JSON:
-		job->json = true;
-		break;
-	}
-}
-
 static void parse(struct view_job *job, int argc, char **argv)
 {
-	int opt;
-
 	*job = (struct view_job){.output = {.width = 1280, .height = 720, .fps = 60}};
-	while ((opt = cli_next(&command, argc, argv)) != CLI_END)
-		take_option(job, opt);
+	cli_parse(&command, argc, argv, job);
 	scene_argument_operand(&job->argument, argc, argv, optind);
 	if (!!job->rig + !!job->from + job->procedure > 1)
 		cli_usage(
@@ -211,7 +147,7 @@ static void report(const struct view_job *job)
 		did.renderer ? did.renderer : ""));
 }
 
-static void say_rate(const struct view_job *job)
+static void print_rate(const struct view_job *job)
 {
 	double s = (double)(view_wall() - job->made_ns) / INCISE_NS_PER_S;
 	struct incise_view_report report;
@@ -244,7 +180,7 @@ int main(int argc, char **argv)
 	if (job.json)
 		report(&job);
 	else if (job.no_output)
-		say_rate(&job);
+		print_rate(&job);
 	incise_view_free(job.view);
 	incise_plan_free(job.plan);
 	incise_rig_close(job.own_rig);

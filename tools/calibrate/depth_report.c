@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Reports of a calibration of depth; see depth_report.h.
+ * The report of a calibration of depth; see depth.h.
  */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
-#include "calibrate_report.h"
+#include "calibrate.h"
 #include "../cli/cli.h"
-#include "depth_report.h"
+#include "depth.h"
 #include "../cli/json.h"
 #include "../cli/plot.h"
 
@@ -148,25 +147,20 @@ void depth_report_text(const struct depth_result *r, FILE *out)
 
 /* --- JSON ---------------------------------------------------------------------------- */
 
-static void set(json_t *object, const char *key, double value)
-{
-	json_object_set_new(object, key, json_number(value));
-}
-
 static void lengths_json(const struct depth_result *r, json_t *object)
 {
 	const struct incise_depth_fit *fit = r->fit;
 	json_t *outliers = json_array();
 
-	set(object, "full_px", fit->full_px);
-	set(object, "full_u_px", fit->u_full_px);
-	json_object_set_new(object, "readings", json_integer(fit->n));
-	json_object_set_new(object, "inliers", json_integer(fit->inliers));
-	json_object_set_new(object, "effective", json_integer(fit->effective));
-	set(object, "residual_sd_mm", fit->sd_mm);
-	set(object, "residual_max_mm", fit->largest_mm);
-	set(object, "bend_mm", fit->bend_mm);
-	set(object, "bend_u_mm", fit->bend_sd_mm);
+	json_set_number(object, "full_px", fit->full_px);
+	json_set_number(object, "full_u_px", fit->u_full_px);
+	json_set_integer(object, "readings", fit->n);
+	json_set_integer(object, "inliers", fit->inliers);
+	json_set_integer(object, "effective", fit->effective);
+	json_set_number(object, "residual_sd_mm", fit->sd_mm);
+	json_set_number(object, "residual_max_mm", fit->largest_mm);
+	json_set_number(object, "bend_mm", fit->bend_mm);
+	json_set_number(object, "bend_u_mm", fit->bend_sd_mm);
 	for (int i = 0; i < fit->n; i++)
 		if (!r->inlier[i])
 			json_array_append_new(outliers, json_text(r->lengths->name[i]));
@@ -189,26 +183,24 @@ static void board_json(const struct depth_result *r, json_t *object)
 	const struct incise_board_fit *b = r->board;
 	const double lens[] = {b->lens.fx, b->lens.fy, b->lens.cx, b->lens.cy,
 			       b->lens.k1, b->lens.k2, b->lens.p1, b->lens.p2};
-	json_t *values = json_object(), *h = json_array(), *outliers = json_array();
+	json_t *values = json_object(), *outliers = json_array();
 
 	for (int i = 0; i < 8; i++)
-		set(values, names[i], lens[i]);
+		json_set_number(values, names[i], lens[i]);
 	json_object_set_new(object, "lens", values);
-	for (int i = 0; i < 9; i++)
-		json_array_append_new(h, json_number(b->homography[i]));
-	json_object_set_new(object, "homography", h);
-	json_object_set_new(object, "views", json_integer(b->n));
-	json_object_set_new(object, "inliers", json_integer(b->views));
-	set(object, "rms_px", b->rms_px);
-	set(object, "plane_rms_mm", b->plane_rms_mm);
-	set(object, "plane_max_mm", b->plane_largest_mm);
-	set(object, "tilt_deg", b->tilt_deg);
-	set(object, "tilt_bound_deg", b->tilt_deg + 2 * b->u_tilt_deg);
-	set(object, "distance_mm", b->distance_mm);
-	set(object, "spread_deg", b->spread_deg);
-	set(object, "low_mm_px", b->low_mm_px);
-	set(object, "high_mm_px", b->high_mm_px);
-	set(object, "bend_mm", b->bend_mm);
+	json_object_set_new(object, "homography", json_numbers(b->homography, 9));
+	json_set_integer(object, "views", b->n);
+	json_set_integer(object, "inliers", b->views);
+	json_set_number(object, "rms_px", b->rms_px);
+	json_set_number(object, "plane_rms_mm", b->plane_rms_mm);
+	json_set_number(object, "plane_max_mm", b->plane_largest_mm);
+	json_set_number(object, "tilt_deg", b->tilt_deg);
+	json_set_number(object, "tilt_bound_deg", b->tilt_deg + 2 * b->u_tilt_deg);
+	json_set_number(object, "distance_mm", b->distance_mm);
+	json_set_number(object, "spread_deg", b->spread_deg);
+	json_set_number(object, "low_mm_px", b->low_mm_px);
+	json_set_number(object, "high_mm_px", b->high_mm_px);
+	json_set_number(object, "bend_mm", b->bend_mm);
 	for (int v = 0; v < b->n; v++)
 		if (!b->believed[v])
 			json_array_append_new(outliers, json_text(r->corners->name[v]));
@@ -226,10 +218,10 @@ json_t *depth_report_json(const struct depth_result *r)
 	json_object_set_new(object, "pass", json_boolean(r->record->pass));
 	json_object_set_new(object, "in_force", json_boolean(r->in_force));
 	json_object_set_new(object, "verdict", json_text(r->record->verdict));
-	set(object, "depth_mm_px", value->left);
-	set(object, "u_mm_px", value->u);
-	set(object, "U_mm_px", 2 * value->u);
-	set(object, "found_mm_px", value->found);
+	json_set_number(object, "depth_mm_px", value->left);
+	json_set_number(object, "u_mm_px", value->u);
+	json_set_number(object, "U_mm_px", 2 * value->u);
+	json_set_number(object, "found_mm_px", value->found);
 	for (int i = 0; i < n; i++) {
 		char kind[2] = {part[i].type, 0};
 
@@ -262,7 +254,7 @@ static void board_data(const struct depth_result *r, FILE *data)
 	int corners = v->columns * v->rows;
 	double sx = 0, sy = 0, at[2], c = 0, s = 0, angle, mean[2] = {0};
 
-	/* The board's own frame: corners on the plane are turned and moved onto it. */
+	/* The rotation and translation of the board's own frame onto the plane. */
 	for (int i = 0; i < corners; i++) {
 		const double *px = v->corners + 2 * ((size_t)corners * v->plane + i);
 
@@ -329,8 +321,7 @@ static void draw(const struct depth_result *r, const char *folder)
 			"set xlabel 'x / px'\nset ylabel 'y / px'\nset yrange [*:*] reverse\n"
 			"set size ratio -1\n"
 			"plot 'depth.dat' using 1:2 pt 1 lc rgb '#1b6ca8'\n");
-	if (!plot_draw(script, folder, "fit"))
-		cli_fail("gnuplot could not draw %s/fit", folder);
+	plot_draw_or_fail(script, folder, "fit");
 	script = plot_begin(folder, "residuals", 900, 600);
 	if (r->fit)
 		fprintf(script,
@@ -345,26 +336,16 @@ static void draw(const struct depth_result *r, const char *folder)
 			"set size ratio -1\n"
 			"plot 'depth.dat' using 3:4:($5 * 100):($6 * 100) with vectors lc rgb "
 			"'#1b6ca8'\n");
-	if (!plot_draw(script, folder, "residuals"))
-		cli_fail("gnuplot could not draw %s/residuals", folder);
+	plot_draw_or_fail(script, folder, "residuals");
 }
 
-void depth_report_folder(const struct depth_result *r, const char *dir)
+void depth_report_folder(const struct depth_result *r, const char *folder)
 {
 	struct incise_outfile *file;
-	const char *folder, *name;
-	json_t *object = depth_report_json(r);
-	char *path;
-	FILE *out;
 
-	if (asprintf(&path, "%s/fit", dir) < 0)
-		cli_fail("no memory");
-	plot_place("report", path, &folder, &name);
-	out = calibrate_report_text(folder, &file);
-	depth_report_text(r, out);
+	plot_folder(folder);
+	depth_report_text(r, calibrate_report_text(folder, &file));
 	whole_file_end(file);
-	calibrate_report_json(folder, object);
-	json_decref(object);
+	calibrate_report_json(folder, depth_report_json(r));
 	draw(r, folder);
-	free(path);
 }

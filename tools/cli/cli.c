@@ -16,6 +16,7 @@
 #include <sys/stat.h>
 #include <syslog.h>
 #include <unistd.h>
+#include <incise/rig.h>
 #include <incise/version.h>
 #include "cli.h"
 
@@ -32,14 +33,13 @@ static void print_help(const struct cli_command *command)
 	printf("Usage: incise %s %s\n\n%s\n\nOptions:\n", command->name,
 	       command->synopsis, command->summary);
 	for (const struct cli_option *opt = command->options; opt->name; opt++) {
-		char left[64];
+		bool letter = opt->id && opt->id < CLI_LONG;
 		const char *help = opt->help;
+		char left[64];
 
-		snprintf(left, sizeof(left), "  %c%c%s--%s%s%s",
-			 opt->id < CLI_LONG ? '-' : ' ',
-			 opt->id < CLI_LONG ? opt->id : ' ',
-			 opt->id < CLI_LONG ? ", " : "  ", opt->name, opt->arg ? " " : "",
-			 opt->arg ? opt->arg : "");
+		snprintf(left, sizeof(left), "  %c%c%s--%s%s%s", letter ? '-' : ' ',
+			 letter ? opt->id : ' ', letter ? ", " : "  ", opt->name,
+			 opt->arg ? " " : "", opt->arg ? opt->arg : "");
 		printf("%-30s", left);
 		if (strlen(left) >= 30)
 			printf("\n%-30s", "");
@@ -68,25 +68,30 @@ static void fill_streams(void)
 		close(fd);
 }
 
-int cli_next(const struct cli_command *command, int argc, char **argv)
+/* The next option, with its argument in optarg; NULL: none is left. */
+static const struct cli_option *next(const struct cli_command *command, int argc,
+				     char **argv)
 {
 	struct option longs[OPTIONS_MAX + 3] = {0};
 	char shorts[3 * OPTIONS_MAX + 8] = ":hV";
 	char *s = shorts + strlen(shorts);
+	const struct cli_option *options = command->options;
 	int n = 0;
 	int id;
 
 	if (!current)
 		fill_streams();
 	current = command;
-	for (const struct cli_option *opt = command->options; opt->name; opt++) {
+	for (const struct cli_option *opt = options; opt->name; opt++) {
 		if (n == OPTIONS_MAX)
 			abort();
-		longs[n++] = (struct option){opt->name,
-					     opt->arg ? required_argument : no_argument,
-					     NULL, opt->id};
-		if (opt->id < CLI_LONG) {
-			*s++ = opt->id;
+		/* Each has a number of its own, or getopt would complete "--m" to any. */
+		longs[n] = (struct option){opt->name,
+					   opt->arg ? required_argument : no_argument,
+					   NULL, CLI_LONG + n};
+		n++;
+		if (opt->id && opt->id < CLI_LONG) {
+			*s++ = (char)opt->id;
 			if (opt->arg)
 				*s++ = ':';
 		}
@@ -96,6 +101,8 @@ int cli_next(const struct cli_command *command, int argc, char **argv)
 	opterr = 0;
 	id = getopt_long(argc, argv, shorts, longs, NULL);
 	switch (id) {
+	case CLI_END:
+		return NULL;
 	case 'h':
 		print_help(command);
 		cli_finish();
@@ -113,7 +120,85 @@ int cli_next(const struct cli_command *command, int argc, char **argv)
 			"option %s is not known, or was given an argument it does not take",
 			argv[optind - 1]);
 	}
-	return id;
+	if (id >= CLI_LONG)
+		return &options[id - CLI_LONG];
+	while (options->id != id)
+		options++;
+	return options;
+}
+
+int cli_next(const struct cli_command *command, int argc, char **argv)
+{
+	const struct cli_option *opt = next(command, argc, argv);
+
+	return opt ? opt->id : CLI_END;
+}
+
+static void store_integer(const struct cli_option *opt, void *member)
+{
+	long value = cli_integer(opt->name, optarg, (long)opt->min, (long)opt->max);
+
+	if (opt->size == sizeof(int))
+		*(int *)member = (int)value;
+	else
+		*(long *)member = value;
+}
+
+static void store(const struct cli_option *opt, void *member)
+{
+	char what[64];
+
+	switch (opt->kind) {
+	case CLI_KIND_NONE:
+		break;
+	case CLI_KIND_FLAG:
+		*(bool *)member = true;
+		break;
+	case CLI_KIND_TEXT:
+		*(const char **)member = optarg;
+		break;
+	case CLI_KIND_INTEGER:
+		store_integer(opt, member);
+		break;
+	case CLI_KIND_NUMBER:
+		*(double *)member = cli_number(opt->name, optarg, opt->min, opt->max);
+		break;
+	case CLI_KIND_DURATION:
+		*(double *)member = cli_duration(opt->name, optarg, opt->min, opt->max);
+		break;
+	case CLI_KIND_QUANTITY:
+		snprintf(what, sizeof(what), "--%s", opt->name);
+		*(double *)member =
+			cli_quantity(what, optarg, opt->units, opt->min, opt->max);
+		break;
+	case CLI_KIND_CHOICE:
+		*(int *)member = cli_choice(opt->name, optarg, opt->names, opt->list);
+		break;
+	case CLI_KIND_PARSED:
+		opt->parse(member, optarg);
+		break;
+	}
+}
+
+void cli_parse(const struct cli_command *command, int argc, char **argv, void *options)
+{
+	const struct cli_option *opt;
+
+	while ((opt = next(command, argc, argv)))
+		store(opt, (char *)options + opt->offset);
+}
+
+char *cli_operand(int argc, char **argv, const char *what)
+{
+	if (optind + 1 != argc)
+		cli_usage("expected one %s, got %d", what, argc - optind);
+	return argv[optind];
+}
+
+void cli_no_operands(int argc, char **argv, const char *hint)
+{
+	if (optind < argc)
+		cli_usage("'%s' is too much: %s", argv[optind], hint);
 }
 
 /* Whether stderr is the journal, by the service manager's variable. */
@@ -159,6 +244,13 @@ void cli_fail(const char *fmt, ...)
 void cli_fail_with(const struct incise_error *err)
 {
 	cli_fail("%s", err->text);
+}
+
+void *cli_require(void *result, const struct incise_error *err)
+{
+	if (!result)
+		cli_fail_with(err);
+	return result;
 }
 
 void cli_usage(const char *fmt, ...)
@@ -272,15 +364,23 @@ void cli_negative_numbers(int argc, char **argv)
 {
 	for (int i = 1; i < argc && strcmp(argv[i], "--"); i++) {
 		const char *arg = argv[i];
-		char *spaced;
 
 		if (arg[0] != '-' || !(arg[1] == '.' || (arg[1] >= '0' && arg[1] <= '9')))
 			continue;
 		/* getopt takes it for an operand, and strtod skips the space. */
-		if (asprintf(&spaced, " %s", arg) < 0)
-			abort();
-		argv[i] = spaced;
+		argv[i] = cli_text(" %s", arg);
 	}
+}
+
+int cli_choice(const char *option, const char *text, const char *const *names,
+	       const char *list)
+{
+	for (int i = 0; names[i]; i++)
+		if (!strcmp(text, names[i]))
+			return i;
+	if (!list)
+		cli_usage("--%s: '%s' is none that it can be; see --help", option, text);
+	cli_usage("--%s: '%s' is none of %s", option, text, list);
 }
 
 int cli_list(const char *option, char *text, char **items, int max)
@@ -312,6 +412,13 @@ const char *cli_rig(const char *given)
 		"--rig FILE, or try the virtual one: --rig sim:");
 }
 
+struct incise_rig *cli_open_rig(const char *given, unsigned int devices)
+{
+	struct incise_error err = {0};
+
+	return cli_require(incise_rig_open(cli_rig(given), devices, &err), &err);
+}
+
 const char *cli_folder(void)
 {
 	static char path[PATH_MAX];
@@ -319,6 +426,42 @@ const char *cli_folder(void)
 
 	path[n > 0 ? n : 0] = 0;
 	return dirname(path);
+}
+
+void *cli_alloc(size_t n, size_t size)
+{
+	void *memory = calloc(n ? n : 1, size);
+
+	if (!memory)
+		cli_fail("no memory");
+	return memory;
+}
+
+void *cli_resize(void *memory, size_t n, size_t size)
+{
+	memory = reallocarray(memory, n, size);
+	if (!memory)
+		cli_fail("no memory");
+	return memory;
+}
+
+char *cli_text(const char *fmt, ...)
+{
+	va_list args;
+	char *text;
+
+	va_start(args, fmt);
+	if (vasprintf(&text, fmt, args) < 0)
+		cli_fail("no memory");
+	va_end(args);
+	return text;
+}
+
+bool cli_ends_with(const char *text, const char *end)
+{
+	size_t n = strlen(text), m = strlen(end);
+
+	return n >= m && !strcmp(text + n - m, end);
 }
 
 /* Another program has the terminal, and may have written to it. */
@@ -371,6 +514,17 @@ void cli_progress(const char *fmt, ...)
 	}
 	fflush(stderr);
 	status_line = true;
+}
+
+void cli_progress_bar(const char *name, double share, int *percent)
+{
+	static const char full[] = "##############################";
+	int now = (int)(100 * share), n = (int)(share * (sizeof(full) - 1));
+
+	if (now == *percent)
+		return;
+	*percent = now;
+	cli_progress("%s [%-*.*s] %d %%", name, (int)sizeof(full) - 1, n, full, now);
 }
 
 void cli_progress_end(void)

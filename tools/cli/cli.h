@@ -9,21 +9,93 @@
 #ifndef INCISE_CLI_H
 #define INCISE_CLI_H
 
+#include <getopt.h> /* optind */
 #include <signal.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
+/* How cli_parse() stores the argument of an option; see the macros below. */
+enum cli_kind {
+	CLI_KIND_NONE,
+	CLI_KIND_FLAG,
+	CLI_KIND_TEXT,
+	CLI_KIND_INTEGER,
+	CLI_KIND_NUMBER,
+	CLI_KIND_DURATION,
+	CLI_KIND_QUANTITY,
+	CLI_KIND_CHOICE,
+	CLI_KIND_PARSED,
+};
+
+/* Rows for cli_next() end with the help. */
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+
 /* An option; a table of them ends with {0}. */
 struct cli_option {
-	int id;		  /* its letter, or a number from CLI_LONG on */
+	int id;		  /* its letter, 0, or for cli_next() a number from CLI_LONG on */
 	const char *name; /* long name */
 	const char *arg;  /* name of its argument, or NULL */
 	const char *help; /* one line; may hold newlines */
+
+	/* For cli_parse(), by one of the macros below. */
+	enum cli_kind kind;
+	size_t offset, size; /* of the member in the command's struct */
+	double min, max;
+	const struct cli_unit *units;
+	const char *const *names;
+	const char *list;
+	void (*parse)(void *member, char *text);
 };
+
+/* The compiler warns when the member has another type. */
+#define CLI_MEMBER(type, member, of)                                                    \
+	.offset = offsetof(type, member) + 0 * sizeof(&((type *)0)->member == (of *)0), \
+	.size = sizeof(((type *)0)->member)
+
+/* bool: becomes true. */
+#define CLI_FLAG(type, member) .kind = CLI_KIND_FLAG, CLI_MEMBER(type, member, bool)
+
+/* const char *: the argument. */
+#define CLI_TEXT(type, member) \
+	.kind = CLI_KIND_TEXT, CLI_MEMBER(type, member, const char *)
+
+/* Any integer type of 4 or 8 bytes, as of cli_integer(). */
+#define CLI_INTEGER(type, member, low, high)                                    \
+	.kind = CLI_KIND_INTEGER, CLI_MEMBER(type, member, void), .min = (low), \
+	.max = (high)
+
+/* double, as of cli_number(), cli_duration() and cli_quantity(). */
+#define CLI_NUMBER(type, member, low, high)                                      \
+	.kind = CLI_KIND_NUMBER, CLI_MEMBER(type, member, double), .min = (low), \
+	.max = (high)
+#define CLI_DURATION(type, member, low, high)                                      \
+	.kind = CLI_KIND_DURATION, CLI_MEMBER(type, member, double), .min = (low), \
+	.max = (high)
+#define CLI_QUANTITY(type, member, of, low, high)                                   \
+	.kind = CLI_KIND_QUANTITY, CLI_MEMBER(type, member, double), .units = (of), \
+	.min = (low), .max = (high)
+
+/* An enum, as of cli_choice(). */
+#define CLI_CHOICE(type, member, of, text)                                      \
+	.kind = CLI_KIND_CHOICE, CLI_MEMBER(type, member, void), .names = (of), \
+	.list = (text)
+
+/* A function parses it into the member, or into the command's whole struct. */
+#define CLI_PARSED(type, member, function) \
+	.kind = CLI_KIND_PARSED, CLI_MEMBER(type, member, void), .parse = (function)
+#define CLI_PARSED_BY(function) .kind = CLI_KIND_PARSED, .parse = (function)
 
 #define CLI_LONG 256 /* first id of options without a letter */
 #define CLI_END (-1)
+
+/* The row of the rig to use, without its braces. */
+#define CLI_RIG_OPTION(type, member)                                        \
+	'r', "rig", "RIG",                                                  \
+		"file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n" \
+		"(default: ./rig.conf, else /etc/incise/rig.conf)",         \
+		CLI_TEXT(type, member)
 
 struct cli_command {
 	const char *name;     /* "train" */
@@ -34,16 +106,28 @@ struct cli_command {
 };
 
 /*
- * Next option's id, or CLI_END with optind at the first operand. Handles --help and
- * --version itself; a wrong option ends the program with 2.
+ * Store all options in the command's struct *options, and leave optind at the first operand.
+ * Handles --help and --version; a wrong option ends the program with 2.
  */
+void cli_parse(const struct cli_command *command, int argc, char **argv, void *options);
+
+/* The same by hand: the next option's id, with its argument in optarg, or CLI_END. */
 int cli_next(const struct cli_command *command, int argc, char **argv);
+
+/* The only operand; another number of them is bad usage: "expected one WHAT, got N". */
+char *cli_operand(int argc, char **argv, const char *what);
+
+/* An operand is bad usage: "'OPERAND' is too much: HINT". */
+void cli_no_operands(int argc, char **argv, const char *hint);
 
 /* Fail with one line "incise COMMAND: …": exit 1. */
 _Noreturn void cli_fail(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
 /* Fail with the text of an error: exit 1. */
 _Noreturn void cli_fail_with(const struct incise_error *err);
+
+/* Returns @result; NULL: fails with the text of the error. */
+void *cli_require(void *result, const struct incise_error *err);
 
 /* Bad usage: one line and a hint to --help; exit 2. */
 _Noreturn void cli_usage(const char *fmt, ...) INCISE_PRINTF(1, 2);
@@ -76,17 +160,34 @@ double cli_quantity(const char *what, const char *text, const struct cli_unit *u
 /* Read "-5" as a number, not as options: for commands whose operands are numbers. */
 void cli_negative_numbers(int argc, char **argv);
 
+/* Index of @text in @names, which end with NULL; @list: all names, for the message, or NULL. */
+int cli_choice(const char *option, const char *text, const char *const *names,
+	       const char *list);
+
 /* "a,b,c" to at most max strings; the text is cut in place. Returns how many. */
 int cli_list(const char *option, char *text, char **items, int max);
 
 /* The rig to use: @given, else ./rig.conf, else /etc/incise/rig.conf, else fail. */
 const char *cli_rig(const char *given);
 
+/* Open that rig with some devices (INCISE_RIG_TRACKER, …), or fail. */
+struct incise_rig *cli_open_rig(const char *given, unsigned int devices);
+
 /* The folder of this program, and of the other commands; lives as long as the program. */
 const char *cli_folder(void);
 
+/* Memory that is zeroed, memory that grows, formatted text: free(3), or fail the program. */
+void *cli_alloc(size_t n, size_t size);
+void *cli_resize(void *memory, size_t n, size_t size);
+char *cli_text(const char *fmt, ...) INCISE_PRINTF(1, 2);
+
+bool cli_ends_with(const char *text, const char *end);
+
 /* Replace the status lines on stderr; does nothing if that is not a terminal. */
 void cli_progress(const char *fmt, ...) INCISE_PRINTF(1, 2);
+
+/* A bar of it, redrawn only when *percent changes; begins with -1. */
+void cli_progress_bar(const char *name, double share, int *percent);
 
 /* Remove them. */
 void cli_progress_end(void);

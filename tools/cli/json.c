@@ -17,6 +17,35 @@ json_t *json_number(double value)
 	return isfinite(value) ? json_real(value) : json_null();
 }
 
+json_t *json_numbers(const double *values, int n)
+{
+	json_t *list = json_array();
+
+	for (int i = 0; i < n; i++)
+		json_array_append_new(list, json_number(values[i]));
+	return list;
+}
+
+json_t *json_bits(unsigned int bits, const char *const *names, size_t n)
+{
+	json_t *list = json_array();
+
+	for (size_t i = 0; i < n; i++)
+		if (bits & 1u << i)
+			json_array_append_new(list, json_string(names[i]));
+	return list;
+}
+
+void json_set_number(json_t *object, const char *key, double value)
+{
+	json_object_set_new(object, key, json_number(value));
+}
+
+void json_set_integer(json_t *object, const char *key, json_int_t value)
+{
+	json_object_set_new(object, key, json_integer(value));
+}
+
 json_t *json_text(const char *text)
 {
 	json_t *string = json_string(text);
@@ -35,7 +64,7 @@ json_t *json_text(const char *text)
 
 void json_print(json_t *object)
 {
-	/* A part that could not be made makes the whole NULL. */
+	/* It is NULL if any part of it could not be made. */
 	if (!object)
 		cli_fail(
 			"the report cannot be written as JSON: no memory, or a name that is "

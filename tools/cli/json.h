@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Reports as JSON: what --json prints, and what is read of that again. Numbers that are not
- * finite become null.
+ * Reports as JSON: printed for --json, and read back. Numbers that are not finite become
+ * null.
  */
 #ifndef INCISE_JSON_H
 #define INCISE_JSON_H
@@ -10,19 +10,27 @@
 #include <stdio.h>
 #include <incise/error.h>
 
-/* A real number, or null when it is not finite. */
+/* A real number, or null if it is not finite; and an array of them. */
 json_t *json_number(double value);
+json_t *json_numbers(const double *values, int n);
 
 /* Text that may hold any bytes: those that are not UTF-8 become '?'. */
 json_t *json_text(const char *text);
 
+/* An array of the names of the bits that are set, from the lowest on. */
+json_t *json_bits(unsigned int bits, const char *const *names, size_t n);
+
+/* Set a key of an object to a number, by json_number(), or to an integer. */
+void json_set_number(json_t *object, const char *key, double value);
+void json_set_integer(json_t *object, const char *key, json_int_t value);
+
 /* Print one object to standard output and release it. */
 void json_print(json_t *object);
 
-/* A report of a file, which may hold anything; NULL and the reason. */
+/* Read a report from a file, which may hold anything; NULL and the reason. */
 json_t *json_read(const char *path, struct incise_error *err);
 
-/* The same of what is open, and called so. */
+/* The same from an open file; @name: for messages. */
 json_t *json_read_from(FILE *file, const char *name, struct incise_error *err);
 
 #endif

@@ -9,7 +9,7 @@
 #include "json.h"
 #include "mapped_libraries.h"
 
-/* What a process without need of it should not have mapped. */
+/* Libraries that only a process that needs them should map. */
 static const struct {
 	const char *part, *name;
 } heavy[] = {
@@ -48,7 +48,7 @@ json_t *mapped_libraries(pid_t pid)
 		char *name = strrchr(line, '/');
 		char code = 0;
 
-		/* Those with code: the loader maps a list of all names for a moment. */
+		/* Only those with code: the loader maps its cache of all names. */
 		if (sscanf(line, "%*s %*c%*c%c", &code) != 1 || code != 'x' || !name ||
 		    !strstr(name, ".so"))
 			continue;

@@ -160,9 +160,8 @@ void model_plot_draw(const struct incise_model *model, const char *folder,
 	char *functions, *surface;
 	FILE *script;
 
-	if (asprintf(&functions, "%s-functions.dat", name) < 0 ||
-	    asprintf(&surface, "%s-surface.dat", name) < 0)
-		cli_fail("no memory");
+	functions = cli_text("%s-functions.dat", name);
+	surface = cli_text("%s-surface.dat", name);
 	model_plot_write_functions(model, folder, functions);
 	model_plot_write_surface(model, folder, surface);
 	script = plot_begin(folder, name, width, height);

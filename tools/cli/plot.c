@@ -14,11 +14,7 @@
 
 static char *plot_path(const char *folder, const char *name, const char *suffix)
 {
-	char *path;
-
-	if (asprintf(&path, "%s/plot/%s%s", folder, name, suffix) < 0)
-		cli_fail("no memory");
-	return path;
+	return cli_text("%s/plot/%s%s", folder, name, suffix);
 }
 
 static void make_folders(char *path)
@@ -39,7 +35,6 @@ void plot_place(const char *option, const char *path, const char **folder,
 {
 	const char *slash = strrchr(path, '/'), *last = slash ? slash + 1 : path;
 	size_t n = strlen(last);
-	char *plot;
 
 	if (n > 4 && (!strcmp(last + n - 4, ".png") || !strcmp(last + n - 4, ".svg")))
 		n -= 4;
@@ -49,13 +44,19 @@ void plot_place(const char *option, const char *path, const char **folder,
 		cli_usage("--%s: '%s' is no name for a picture: letters, digits, '.', "
 			  "'_' and '-', and not '.' or '-' first",
 			  option, last);
+	*name = cli_text("%.*s", (int)n, last);
+	*folder = slash ? cli_text("%.*s", (int)(slash > path ? slash - path : 1), path)
+			: ".";
+	plot_folder(*folder);
+}
+
+void plot_folder(const char *folder)
+{
+	char *plot = cli_text("%s/plot", folder);
+
 	if (!plot_possible())
 		cli_fail("gnuplot is not installed, it draws the pictures: apt-get "
 			 "install gnuplot-nox");
-	*name = strndup(last, n);
-	*folder = slash ? strndup(path, slash > path ? (size_t)(slash - path) : 1) : ".";
-	if (!*name || !*folder || asprintf(&plot, "%s/plot", *folder) < 0)
-		cli_fail("no memory");
 	make_folders(plot);
 	free(plot);
 }
@@ -117,11 +118,9 @@ static bool draw(const char *folder, const char *name, const char *ext)
 
 	/* In the environment the folder's name may hold any character. */
 	setenv("INCISE_PICTURE_FOLDER", folder, 1);
-	if (asprintf(
-		    &command,
-		    "cd \"$INCISE_PICTURE_FOLDER/plot\" && gnuplot -e \"ext='%s'\" %s.gp",
-		    ext, name) < 0)
-		cli_fail("no memory");
+	command = cli_text(
+		"cd \"$INCISE_PICTURE_FOLDER/plot\" && gnuplot -e \"ext='%s'\" %s.gp",
+		ext, name);
 	status = system(command);
 	free(command);
 	return status == 0;
@@ -135,14 +134,17 @@ bool plot_draw(FILE *script, const char *folder, const char *name)
 	return draw(folder, name, "png") && draw(folder, name, "svg");
 }
 
+void plot_draw_or_fail(FILE *script, const char *folder, const char *name)
+{
+	if (!plot_draw(script, folder, name))
+		cli_fail("gnuplot could not draw %s/%s", folder, name);
+}
+
 struct plot_part plot_part(const char *folder, const char *name, const char *part)
 {
-	struct plot_part p = {.folder = folder};
-
-	if (asprintf(&p.name, "%s-%s", name, part) < 0 ||
-	    asprintf(&p.data, "%s.dat", p.name) < 0)
-		cli_fail("no memory");
-	return p;
+	return (struct plot_part){.folder = folder,
+				  .name = cli_text("%s-%s", name, part),
+				  .data = cli_text("%s-%s.dat", name, part)};
 }
 
 void plot_part_draw(FILE *script, struct plot_part *part)

@@ -19,6 +19,9 @@
 void plot_place(const char *option, const char *path, const char **folder,
 		const char **name);
 
+/* Make FOLDER/plot and missing folders; fails the program without gnuplot. */
+void plot_folder(const char *folder);
+
 /* Whether gnuplot is installed. */
 bool plot_possible(void);
 
@@ -33,6 +36,9 @@ FILE *plot_begin(const char *folder, const char *name, int width, int height);
 
 /* Close the script and draw. Returns whether both files were made. */
 bool plot_draw(FILE *script, const char *folder, const char *name);
+
+/* The same; fails the program if they were not. */
+void plot_draw_or_fail(FILE *script, const char *folder, const char *name);
 
 /* One of several plots of a name: "NAME-part", and "NAME-part.dat" for its data. */
 struct plot_part {

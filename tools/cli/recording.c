@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The folder of a recording; see recording.h.
+ * A recording that exists already; see recording.h.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -12,6 +12,13 @@
 #include <unistd.h>
 #include "cli.h"
 #include "recording.h"
+
+struct incise_recording *recording_open(const char *path)
+{
+	struct incise_error err = {0};
+
+	return cli_require(incise_recording_open(path, &err), &err);
+}
 
 void recording_remove(const char *path)
 {

@@ -1,9 +1,15 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The folder of a recording that exists already. Every failure ends the program.
+ * A recording that exists already: to read, to remove, to replace. Every failure ends the
+ * program.
  */
 #ifndef INCISE_TOOLS_RECORDING_H
 #define INCISE_TOOLS_RECORDING_H
+
+#include <incise/recording.h>
+
+/* Open one. */
+struct incise_recording *recording_open(const char *path);
 
 /* Remove a recording; a folder with anything else in it stays. */
 void recording_remove(const char *path);

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The scene that a verb is given; see scene_argument.h.
+ * The scene that a command is given; see scene_argument.h.
  */
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
-#include "cli.h"
 #include "scene_argument.h"
 
-void scene_argument_arith(struct scene_argument *argument, const char *text)
+void scene_argument_arith(void *arith, char *text)
 {
 	if (strcmp(text, "double") && strcmp(text, "fixed"))
 		cli_usage("--arith: '%s' is neither double nor fixed", text);
-	argument->arith = text;
+	*(const char **)arith = text;
 }
 
 #define OF_MACHINE "/etc/incise/scenes"
@@ -42,12 +41,20 @@ bool scene_argument_find(struct scene_argument *argument, const char *operand)
 		    access(path, F_OK))
 			continue;
 		/* Lives as long as the program. */
-		argument->path = strdup(!i ? path + 2 : path);
-		if (!argument->path)
-			cli_fail("no memory");
+		argument->path = cli_text("%s", !i ? path + 2 : path);
 		return true;
 	}
 	return false;
+}
+
+char *scene_argument_name(const char *path)
+{
+	const char *slash = strrchr(path, '/'), *file = slash ? slash + 1 : path;
+	size_t n = strlen(file), end = strlen(".scene");
+
+	return cli_text("%.*s",
+			(int)(n > end && cli_ends_with(file, ".scene") ? n - end : n),
+			file);
 }
 
 void scene_argument_operand(struct scene_argument *argument, int argc, char **argv,
@@ -79,9 +86,6 @@ struct incise_scene *scene_argument_read(const struct scene_argument *argument,
 struct incise_scene *scene_argument_load(const struct scene_argument *argument)
 {
 	struct incise_error err = {0};
-	struct incise_scene *scene = scene_argument_read(argument, &err);
 
-	if (!scene)
-		cli_fail_with(&err);
-	return scene;
+	return cli_require(scene_argument_read(argument, &err), &err);
 }

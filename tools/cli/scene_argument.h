@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The scene that a verb is given, with the options that change it.
+ * The scene that a command is given, with the options that change it.
  */
 #ifndef INCISE_SCENE_ARGUMENT_H
 #define INCISE_SCENE_ARGUMENT_H
 
 #include <stdbool.h>
 #include <incise/scene.h>
+#include "cli.h"
 
 struct scene_argument {
 	const char *path;
@@ -14,27 +15,40 @@ struct scene_argument {
 	const char *arith; /* --arith, or NULL */
 };
 
-/* Take --arith; what is none is bad usage. */
-void scene_argument_arith(struct scene_argument *argument, const char *text);
+/* Rows of the table of options for --model and --arith, without the outer braces. */
+#define SCENE_ARGUMENT_OPTIONS(type, member)                                   \
+	{0, "model", "FILE", "use this model instead of the scene's",          \
+	 CLI_TEXT(type, member.model)},                                        \
+	{                                                                      \
+		0, "arith", "KIND", "fixed or double, instead of the scene's", \
+			CLI_PARSED(type, member.arith, scene_argument_arith)   \
+	}
+
+/* Parse --arith into a const char *; anything but double and fixed is bad usage. */
+void scene_argument_arith(void *arith, char *text);
 
 /*
- * Take the one operand; another number of them is bad usage. A name such as "liver", which is
- * no file, is ./liver.scene, else that of /etc/incise/scenes, else that which is installed.
+ * Take the only operand from @first on; another number of them is bad usage. A name without
+ * a file, for example "liver", is ./liver.scene, else that in /etc/incise/scenes, else the
+ * installed one.
  */
 void scene_argument_operand(struct scene_argument *argument, int argc, char **argv,
 			    int first);
 
-/* The same of one of several operands. @return false: there is none of that name. */
+/* The same for one of several operands. Returns false if there is no scene of that name. */
 bool scene_argument_find(struct scene_argument *argument, const char *operand);
 
-/* The folder of the scenes that came with the program; lives as long as it. */
+/* "neck" of "scenes/neck.scene": free(3). */
+char *scene_argument_name(const char *path);
+
+/* The folder of the installed scenes; lives as long as the program. */
 const char *scene_argument_shipped(void);
 
-/* Read it; NULL with errno and @err when that fails. To be freed. */
+/* Read it; NULL with errno and @err on failure. incise_scene_free(). */
 struct incise_scene *scene_argument_read(const struct scene_argument *argument,
 					 struct incise_error *err);
 
-/* Read it, or fail the program. To be freed. */
+/* Read it, or fail the program. incise_scene_free(). */
 struct incise_scene *scene_argument_load(const struct scene_argument *argument);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * A haptic loop that runs, and all that belongs to it; shared by the files of `incise haptic`.
+ * A running haptic loop, and the parts of incise haptic that share it.
  */
 #ifndef INCISE_HAPTIC_H
 #define INCISE_HAPTIC_H
@@ -17,20 +17,45 @@ struct haptic {
 	double tip_mm[3];
 
 	struct incise_rig *rig;
-	struct incise_scene *scene; /* in force, with its plan */
+	struct incise_scene *scene; /* that of the plan */
 	struct incise_plan *plan;
 	struct incise_loop_options loop;
 	struct incise_loop_stats *stats;
 	struct incise_realtime *realtime;  /* or NULL */
 	const char *scheduling;		   /* "SCHED_FIFO 80" */
 	struct incise_state_writer *state; /* or NULL */
-	/* Of the loop's thread from the first tick on. */
-	struct incise_realtime_counts counts;
+	struct incise_realtime_counts
+		counts; /* of the loop's thread, from the first tick */
 };
 
-/* A plan of a scene as this loop runs it; NULL, with @err, when it cannot. */
+/* A plan of a scene as this loop runs it; NULL with @err. */
 struct incise_plan *haptic_plan(const struct haptic *haptic,
 				const struct incise_scene *scene,
 				struct incise_error *err);
+
+struct self_test {
+	double force_max_N;   /* largest */
+	double silent_ms;     /* from the last pose to no force */
+	double silent_max_ms; /* largest by the scene's limits */
+	unsigned int contact; /* ticks in the tissue */
+};
+
+/*
+ * A stroke into the scene's tissue without devices, before anything moves: it must push, stay
+ * within the scene's limits, and fade when poses end. @tracker: the rig's.
+ * Returns 0, -EPROTO with the reason in @err, or as incise_plan_new_fed().
+ */
+int haptic_self_test(const struct incise_scene *scene, struct incise_tracker *tracker,
+		     struct self_test *test, struct incise_error *err);
+
+/* From here on SIGHUP reads the scene again, if this process has no terminal that closes. */
+void haptic_catch_reload(void);
+
+/*
+ * Run the loop in a thread of its own until it ends. The actuator must be powered. A reload
+ * replaces scene and plan.
+ * Returns as incise_loop_run(), or a negative errno if the loop could not start.
+ */
+int haptic_supervise(struct haptic *haptic, struct incise_error *err);
 
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Ticks of a loop that runs; see view_live.h.
+ * Ticks of a running loop; see live.h.
  */
 #include <errno.h>
 #include <math.h>
@@ -50,8 +50,6 @@ struct view_live *view_live_open(const char *page, struct incise_error *err)
 		free(live);
 		return NULL;
 	}
-	/* What was cut before one looks is cut. */
-	live->cursor = 0;
 	return live;
 }
 
@@ -117,7 +115,7 @@ struct view_live *view_live_begin(struct incise_plan *plan, struct incise_rig *r
 		incise_state_run(live->options.state, INCISE_RUN_RUNNING, "");
 		live->state = incise_state_open(live->page, err);
 		rc = live->state ? start(live, err) : -errno;
-		/* Nobody else is to find it. */
+		/* Not for other programs. */
 		unlink(live->page);
 	} else {
 		rc = -errno;
@@ -134,7 +132,7 @@ void view_live_tool(struct view_live *live, enum incise_tool tool)
 	atomic_store_explicit(&live->tool, (int)tool, memory_order_relaxed);
 }
 
-static void tell(const struct view_live *live, struct incise_view_status *status)
+static void set_status(const struct view_live *live, struct incise_view_status *status)
 {
 	const struct incise_state_now *now = &live->now;
 
@@ -168,7 +166,7 @@ int view_live_take(struct view_live *live, struct incise_view *view,
 						strerror(-n));
 		incise_view_ticks(view, live->ticks, n);
 	}
-	tell(live, status);
+	set_status(live, status);
 	if (live->own && atomic_load(&live->ended)) {
 		rc = atomic_load(&live->rc);
 		if (rc)

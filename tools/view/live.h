@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Ticks of a loop that runs: another program's, found by its state page, or one in a thread of
- * this program, which tells its state by a page like any other. The loop is never held up by
- * who looks at it.
+ * Ticks of a running loop: another program's, read from its state page, or one in a thread of
+ * this program, which has a state page, too. A reader never delays the loop.
  */
 #ifndef INCISE_VIEW_LIVE_H
 #define INCISE_VIEW_LIVE_H
@@ -15,23 +14,23 @@
 
 struct view_live;
 
-/* Look at the page of another program's loop; NULL with errno. */
+/* Open the page of another program's loop; NULL with errno. */
 struct view_live *view_live_open(const char *page, struct incise_error *err);
 
 /*
- * Start a loop in a thread of this program, in real time where @realtime is not NULL. All lives
- * until view_live_close(), which ends it. NULL with errno.
+ * Start a loop in a thread of this program, in real time if @realtime is not NULL. Its arguments
+ * must live until view_live_close(), which ends it. NULL with errno.
  */
 struct view_live *view_live_begin(struct incise_plan *plan, struct incise_rig *rig,
 				  double rate_hz, struct incise_realtime *realtime,
 				  struct incise_error *err);
 
-/* What the hand holds from now on; of a loop of this program. */
+/* Set the tool; of a loop of this program. */
 void view_live_tool(struct view_live *live, enum incise_tool tool);
 
 /*
- * Hand the ticks since the last time to the view, and tell how the loop is. 0; 1 when it has
- * ended; a negative errno with its reason.
+ * Feed the ticks since the last time to the view, and set the loop's status. 0; 1 when it has
+ * ended; a negative errno with @err.
  */
 int view_live_take(struct view_live *live, struct incise_view *view,
 		   struct incise_view_status *status, struct incise_error *err);

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The common part of all incise calibrate commands; see calibrate.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include "../cli/json.h"
+#include "../cli/plot.h"
+#include "calibrate.h"
+
+void calibrate_find(struct calibrate_options *options)
+{
+	struct incise_error err = {0};
+	int rc;
+
+	if (!options->calibration)
+		options->calibration = "calibration.conf";
+	rc = incise_calibration_load(options->calibration, &options->found, &err);
+	if (rc == -ENOENT)
+		incise_calibration_nominal(&options->found);
+	else if (rc)
+		cli_fail_with(&err);
+}
+
+void calibrate_begin(struct calibrate_options *options)
+{
+	if (options->from && options->rig)
+		cli_usage("--from and --rig: one source at a time");
+	if (options->from && options->keep)
+		cli_usage("--keep: what comes --from a file is kept there already");
+	calibrate_find(options);
+	if (options->report && mkdir(options->report, 0777) && errno != EEXIST)
+		cli_fail("%s: %s", options->report, strerror(errno));
+}
+
+void calibrate_value(struct incise_calibration_record *record, const char *key,
+		     const char *unit, double found, double left, double u)
+{
+	struct incise_calibration_value *value = &record->values[record->n++];
+
+	*value = (struct incise_calibration_value){.found = found, .left = left, .u = u};
+	snprintf(value->key, sizeof(value->key), "%s", key);
+	snprintf(value->unit, sizeof(value->unit), "%s", unit);
+}
+
+static FILE *begin_file(const char *folder, const char *name,
+			struct incise_outfile **file)
+{
+	char *path = cli_text("%s/%s", folder, name);
+	FILE *out = whole_file_begin(path, file);
+
+	free(path);
+	return out;
+}
+
+FILE *calibrate_report_text(const char *folder, struct incise_outfile **file)
+{
+	*file = NULL;
+	return folder ? begin_file(folder, "report.txt", file) : NULL;
+}
+
+void calibrate_report_json(const char *folder, json_t *object)
+{
+	struct incise_outfile *file;
+	FILE *out = begin_file(folder, "report.json", &file);
+
+	if (!object || json_dumpf(object, out, JSON_INDENT(2) | JSON_REAL_PRECISION(12)))
+		cli_fail("%s/report.json: no memory", folder);
+	fputc('\n', out);
+	whole_file_end(file);
+	json_decref(object);
+}
+
+bool calibrate_can_plot(const char *folder)
+{
+	if (plot_possible()) {
+		plot_folder(folder);
+		return true;
+	}
+	cli_warn("no pictures: gnuplot is not installed, apt-get install gnuplot-nox");
+	return false;
+}
+
+static json_t *values_json(const struct incise_calibration_record *record)
+{
+	json_t *list = json_array();
+
+	for (int i = 0; i < record->n; i++) {
+		const struct incise_calibration_value *value = &record->values[i];
+
+		json_array_append_new(list, json_pack("{ss ss so so so so}", "key",
+						      value->key, "unit", value->unit,
+						      "found", json_number(value->found),
+						      "left", json_number(value->left),
+						      "u", json_number(value->u), "U",
+						      json_number(2 * value->u)));
+	}
+	return list;
+}
+
+static void print_values(const struct incise_calibration_record *record)
+{
+	for (int i = 0; i < record->n; i++) {
+		const struct incise_calibration_value *value = &record->values[i];
+
+		printf("%-20s %.4f %s, U = %.4f (k = 2)", value->key, value->left,
+		       value->unit, 2 * value->u);
+		if (!isnan(value->found))
+			printf(", was %.4f", value->found);
+		putchar('\n');
+	}
+}
+
+void calibrate_end(const struct calibrate_options *options,
+		   const struct incise_calibration_record *record, json_t *details)
+{
+	struct incise_error err = {0};
+	json_t *all = json_pack("{ss ss sb sb so so}", "kind", record->kind, "method",
+				record->method, "pass", record->pass, "written",
+				!options->dry_run, "values", values_json(record),
+				"details", details);
+
+	/* The report first: a calibration in force must have one. */
+	if (options->report)
+		calibrate_report_json(options->report, json_incref(all));
+	if (!options->dry_run &&
+	    incise_calibration_append(options->calibration, record, &err))
+		cli_fail_with(&err);
+	if (options->json) {
+		json_print(all);
+		return;
+	}
+	print_values(record);
+	printf("%s: %s\n", options->calibration,
+	       options->dry_run ? "not written, as it is a dry run" : "in force");
+	json_decref(all);
+	cli_finish();
+}
+
+int calibrate_cut(char *line, char **fields, int max, const char *before,
+		  const char *after)
+{
+	int n = 0;
+
+	line[strcspn(line, "\r\n")] = 0;
+	for (char *field; n < max && (field = strsep(&line, ","));) {
+		char *end;
+
+		field += strspn(field, before);
+		for (end = field + strlen(field); end > field && strchr(after, end[-1]);)
+			*--end = 0;
+		fields[n++] = field;
+	}
+	return n;
+}

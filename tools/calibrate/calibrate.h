@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * The common part of all incise calibrate commands: options, the calibration before, the
+ * files of --report DIR, and the end with a result. Every failure ends the program.
+ */
+#ifndef INCISE_CALIBRATE_H
+#define INCISE_CALIBRATE_H
+
+#include <stdbool.h>
+#include <stdio.h>
+#include <jansson.h>
+#include <incise/calibration.h>
+#include "../cli/cli.h"
+#include "../cli/file.h"
+
+/* -r, -c, --from, --keep, --report, --dry-run and --json of a command. */
+struct calibrate_options {
+	const char *rig, *calibration, *from, *keep, *report;
+	bool dry_run, json;
+	struct incise_calibration found; /* in force before */
+};
+
+/* Read the calibration in force; a missing file is the nominal one. */
+void calibrate_find(struct calibrate_options *options);
+
+/* Reject options that exclude each other, read the calibration, make the report's folder. */
+void calibrate_begin(struct calibrate_options *options);
+
+/* Add a coefficient to the record. */
+void calibrate_value(struct incise_calibration_record *record, const char *key,
+		     const char *unit, double found, double left, double u);
+
+/* DIR/report.txt, for whole_file_end(); both NULL without a DIR. Each file appears whole. */
+FILE *calibrate_report_text(const char *folder, struct incise_outfile **file);
+
+/* DIR/report.json; releases @object. */
+void calibrate_report_json(const char *folder, json_t *object);
+
+/* Make DIR/plot; false with a warning: gnuplot is not installed. */
+bool calibrate_can_plot(const char *folder);
+
+/*
+ * End with a result: append it unless it is a dry run, write report.json, and print it as
+ * text or JSON, with @details in the JSON.
+ */
+void calibrate_end(const struct calibrate_options *options,
+		   const struct incise_calibration_record *record, json_t *details);
+
+/*
+ * Cut a line of CSV at its commas, in place, and strip the characters of @before and @after
+ * around each field. Returns the number of fields; further ones than @max are ignored.
+ */
+int calibrate_cut(char *line, char **fields, int max, const char *before,
+		  const char *after);
+
+#endif

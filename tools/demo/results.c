@@ -1,0 +1,501 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The results of incise demo; see demo.h: the errors of the model, paper 1's figures 2, 3 and 5
+ * with the virtual liver's data, the lateness of ticks, the camera's picture, and the summary
+ * next to the paper's results.
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/dataset.h>
+#include <incise/fixed.h>
+#include <incise/rig.h>
+#include <incise/sim.h>
+#include <incise/version.h>
+#include "../cli/cli.h"
+#include "../cli/file.h"
+#include "../cli/json.h"
+#include "../cli/model_plot.h"
+#include "../cli/plot.h"
+#include "demo.h"
+
+char *demo_path(const struct demo *demo, const char *name)
+{
+	return cli_text("%s/%s", demo->folder, name);
+}
+
+static struct incise_dataset *read_dataset(const struct demo *demo, const char *name,
+					   const char *const *columns, int n,
+					   const char *group)
+{
+	struct incise_error err = {0};
+	char *path = demo_path(demo, name);
+	struct incise_dataset *data =
+		cli_require(incise_dataset_read(path, columns, n, group, &err), &err);
+
+	free(path);
+	return data;
+}
+
+struct incise_model *demo_model(const struct demo *demo, const char *name)
+{
+	struct incise_error err = {0};
+	char *path = demo_path(demo, name);
+	struct incise_model *model = cli_require(incise_model_load(path, &err), &err);
+
+	free(path);
+	return model;
+}
+
+/* A number of a report, in the object @a of it if there is a @b. */
+static double number_of(const json_t *report, const char *a, const char *b)
+{
+	const json_t *value = json_object_get(report, a);
+
+	return json_number_value(b ? json_object_get(value, b) : value);
+}
+
+/* A quantile of the loop's report in us: free(3); null there: beyond the histogram. */
+static char *quantile_us(const json_t *haptic, const char *what, const char *name,
+			 double unit)
+{
+	const json_t *value = json_object_get(json_object_get(haptic, what), name);
+
+	return json_is_number(value)
+		       ? cli_text("< %g us", json_number_value(value) * unit)
+		       : cli_text("beyond the histogram");
+}
+
+/* --- errors of the model -------------------------------------------------------------- */
+
+#define GRID 400
+
+/* Largest difference of the two arithmetics on a grid over the support, N. */
+static double fixed_difference(const struct incise_model *model, double *bound)
+{
+	struct incise_error err = {0};
+	struct incise_fixed *fixed =
+		cli_require(incise_fixed_compile(model, NULL, &err), &err);
+	double largest = 0;
+
+	for (int i = 0; i <= GRID; i++)
+		for (int j = 0; j <= GRID; j++) {
+			const struct incise_variable *d =
+				&incise_model_info(model)->input[0];
+			const struct incise_variable *v =
+				&incise_model_info(model)->input[1];
+			double x[] = {d->min + (d->max - d->min) * i / GRID,
+				      v->min + (v->max - v->min) * j / GRID};
+
+			largest = fmax(largest, fabs(incise_model_eval(model, x, NULL) -
+						     incise_fixed_eval_double(fixed, x)));
+		}
+	*bound = incise_fixed_bound(fixed);
+	incise_fixed_free(fixed);
+	return largest;
+}
+
+/* RMSE of the model against the virtual tissue's mean force, at the averaged pairs. */
+static double truth_error(const struct demo *demo, const struct incise_model *model)
+{
+	static const char *const columns[] = {"depth_mm", "velocity_mm_s", "force_N"};
+	struct incise_dataset *pairs = read_dataset(demo, "pairs.csv", columns, 3, NULL);
+	size_t n = incise_dataset_rows(pairs);
+	struct incise_sim_config config;
+	double sum = 0;
+
+	incise_sim_config_init(&config);
+	for (size_t i = 0; i < n; i++) {
+		const double *row = incise_dataset_row(pairs, i);
+		double e = incise_model_eval(model, row, NULL) -
+			   incise_sim_mean_force(&config, row[0], row[1]);
+
+		sum += e * e / n;
+	}
+	incise_dataset_free(pairs);
+	return sqrt(sum);
+}
+
+void demo_worth(struct demo *demo, const struct incise_model *model)
+{
+	double bound, difference = fixed_difference(model, &bound);
+
+	json_object_set_new(demo->summary, "fixed_point",
+			    json_pack("{sf sf si}", "max_difference_N", difference,
+				      "bound_N", bound, "points",
+				      (GRID + 1) * (GRID + 1)));
+	json_set_number(demo->summary, "truth_rmse_N", truth_error(demo, model));
+}
+
+/* --- plots --------------------------------------------------------------------------- */
+
+static void draw(const struct demo *demo, FILE *script, const char *name)
+{
+	if (!plot_draw(script, demo->folder, name))
+		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", demo->folder, name);
+	json_array_append_new(demo->pictures, json_string(name));
+}
+
+/* ---- Figure 2: force against time, raw and averaged ---- */
+
+/* Depths of the cuts. */
+#define N_NOMINAL 4
+static const double nominal_mm[N_NOMINAL] = {5, 10, 15, 20};
+
+#define SLOT_S 0.05
+#define SLOTS 400
+
+static const char *const raw_columns[] = {"t_s", "depth_mm", "velocity_mm_s", "force_N"};
+
+/* Index of the nominal depth nearest to a cut's deepest point. */
+static int nearest_nominal(double depth_mm)
+{
+	int best = 0;
+
+	for (int i = 1; i < N_NOMINAL; i++)
+		if (fabs(depth_mm - nominal_mm[i]) < fabs(depth_mm - nominal_mm[best]))
+			best = i;
+	return best;
+}
+
+static void figure_force(const struct demo *demo)
+{
+	struct incise_dataset *raw = read_dataset(demo, "raw.csv", raw_columns, 4, "cut");
+	static double sum[N_NOMINAL][SLOTS];
+	static int count[N_NOMINAL][SLOTS];
+	size_t rows = incise_dataset_rows(raw), first = 0;
+	FILE *data = plot_data(demo->folder, "force-raw.dat");
+	FILE *script;
+
+	/* A block per cut, its nominal depth as the last column. */
+	for (size_t i = 0; i < rows; i++) {
+		double deepest = 0, start = incise_dataset_row(raw, first)[0];
+		int nominal;
+
+		if (i + 1 < rows &&
+		    incise_dataset_group(raw, i + 1) == incise_dataset_group(raw, first))
+			continue;
+		for (size_t k = first; k <= i; k++)
+			deepest = fmax(deepest, incise_dataset_row(raw, k)[1]);
+		nominal = nearest_nominal(deepest);
+		for (size_t k = first; k <= i; k++) {
+			const double *row = incise_dataset_row(raw, k);
+			int slot = (int)((row[0] - start) / SLOT_S);
+
+			fprintf(data, "%.4f %.4f %g\n", row[0], row[3],
+				nominal_mm[nominal]);
+			if (slot < 0 || slot >= SLOTS)
+				continue;
+			sum[nominal][slot] += row[3];
+			count[nominal][slot]++;
+		}
+		fputs("\n\n", data);
+		first = i + 1;
+	}
+	plot_data_end(data, demo->folder);
+	data = plot_data(demo->folder, "force-averaged.dat");
+	for (int d = 0; d < N_NOMINAL; d++) {
+		for (int s = 0; s < SLOTS; s++)
+			if (count[d][s])
+				fprintf(data, "%.4f %.5f\n", (s + 0.5) * SLOT_S,
+					sum[d][s] / count[d][s]);
+		fputs("\n\n", data);
+	}
+	plot_data_end(data, demo->folder);
+	script = plot_begin(demo->folder, "fig2-force", 1200, 800);
+	fputs("set multiplot layout 2,1 title 'Cutting force, virtual liver (as paper 1, fig. 2)'\n"
+	      "set xlabel 'time in the recording / s'\nset ylabel 'force / N'\n"
+	      "set title '(a) raw: cuts at 5, 10, 15 and 20 mm'\n"
+	      "set key top left Left reverse samplen 2\n"
+	      "plot 'force-raw.dat' using 1:($3==5?$2:NaN) with lines ls 1 title '5 mm', \\\n"
+	      "  '' using 1:($3==10?$2:NaN) with lines ls 2 title '10 mm', \\\n"
+	      "  '' using 1:($3==15?$2:NaN) with lines ls 3 title '15 mm', \\\n"
+	      "  '' using 1:($3==20?$2:NaN) with lines ls 4 title '20 mm'\n"
+	      "set xlabel 'time in the cut / s'\n"
+	      "set title '(b) averaged over the cuts of each depth'\n"
+	      "plot for [i=0:3] 'force-averaged.dat' index i using 1:2 with lines ls (i+1) lw 2 \\\n"
+	      "  title sprintf('%d mm', 5*(i+1))\n"
+	      "unset multiplot\n",
+	      script);
+	draw(demo, script, "fig2-force");
+	incise_dataset_free(raw);
+}
+
+/* ---- Figure 3: membership functions and the force surface ---- */
+
+static void figure_membership(const struct demo *demo, const struct incise_model *model)
+{
+	static const char *const names[] = {"NB NS Z PS PB", "NB NS PS PB"};
+	struct incise_model *before = demo_model(demo, "liver-initial.fis");
+	FILE *script;
+
+	model_plot_write_functions(before, demo->folder, "membership-before.dat");
+	model_plot_write_functions(model, demo->folder, "membership-after.dat");
+	script = plot_begin(demo->folder, "fig3a-membership", 1200, 700);
+	fputs("set multiplot layout 2,2 title 'Membership functions before and after training "
+	      "(as paper 1, fig. 3a)'\nset key outside right center\n",
+	      script);
+	for (int i = 0; i < 2; i++)
+		model_plot_functions(script, before, i, "membership-before.dat",
+				     "before training", names[i]);
+	for (int i = 0; i < 2; i++)
+		model_plot_functions(script, model, i, "membership-after.dat",
+				     "after training", names[i]);
+	fputs("unset multiplot\n", script);
+	draw(demo, script, "fig3a-membership");
+	incise_model_free(before);
+}
+
+static void figure_surface(const struct demo *demo, const struct incise_model *model)
+{
+	FILE *script;
+
+	model_plot_write_surface(model, demo->folder, "surface.dat");
+	script = plot_begin(demo->folder, "fig3b-surface", 1000, 800);
+	model_plot_surface(
+		script, model, "surface.dat",
+		"Force of the trained model (as paper 1, fig. 3b); dots: the averaged pairs",
+		", \\\n  'pairs.dat' with points pt 7 ps 0.6 lc rgb 'black'");
+	draw(demo, script, "fig3b-surface");
+}
+
+static void write_pairs(const struct demo *demo)
+{
+	static const char *const columns[] = {"depth_mm", "velocity_mm_s", "force_N"};
+	struct incise_dataset *pairs = read_dataset(demo, "pairs.csv", columns, 3, NULL);
+	FILE *data = plot_data(demo->folder, "pairs.dat");
+
+	for (size_t i = 0; i < incise_dataset_rows(pairs); i++) {
+		const double *row = incise_dataset_row(pairs, i);
+
+		fprintf(data, "%g %g %g\n", row[0], row[1], row[2]);
+	}
+	plot_data_end(data, demo->folder);
+	incise_dataset_free(pairs);
+}
+
+/* ---- Figure 5: predicted, rendered and measured force of a cut never seen ---- */
+
+/* RMSE of the model over a cut that no training saw. */
+static double figure_prediction(const struct demo *demo, const struct incise_model *model)
+{
+	static const char *const ticks[] = {"t_s", "depth_mm", "command_N", "rendered_N"};
+	struct incise_dataset *cut =
+		read_dataset(demo, "new-cut.csv", raw_columns, 4, "cut");
+	struct incise_dataset *log = read_dataset(demo, "haptic.csv", ticks, 4, NULL);
+	size_t n = incise_dataset_rows(cut);
+	FILE *data = plot_data(demo->folder, "prediction.dat");
+	double sum = 0, contact = -1;
+	FILE *script;
+
+	for (size_t i = 0; i < n; i++) {
+		const double *row = incise_dataset_row(cut, i);
+		double x[] = {row[1], row[2]}, y = incise_model_eval(model, x, NULL);
+
+		sum += (y - row[3]) * (y - row[3]) / n;
+		fprintf(data, "%.4f %.5f %.5f\n", row[0] - incise_dataset_row(cut, 0)[0],
+			row[3], y);
+	}
+	plot_data_end(data, demo->folder);
+	/* Both begin where the blade meets the tissue. */
+	data = plot_data(demo->folder, "rendered.dat");
+	for (size_t i = 0; i < incise_dataset_rows(log); i++) {
+		const double *row = incise_dataset_row(log, i);
+
+		/* The same threshold as a cut's begin in an export. */
+		if (contact < 0 && row[1] > 0.3)
+			contact = row[0];
+		if (contact >= 0)
+			fprintf(data, "%.4f %.5f %.5f\n", row[0] - contact, row[2],
+				row[3]);
+	}
+	if (contact < 0)
+		fputs("0 0 0\n", data);
+	plot_data_end(data, demo->folder);
+	script = plot_begin(demo->folder, "fig5-prediction", 1200, 800);
+	fputs("set multiplot layout 2,1 title 'A new cut at 5 mm (as paper 1, fig. 5)'\n"
+	      "set xlabel 'time in the cut / s'\nset ylabel 'force / N'\nset key top right\n"
+	      "set xrange [0:*]\nset yrange [0:*]\n"
+	      "set title '(a) predicted by the model, and measured'\n"
+	      "plot 'prediction.dat' using 1:2 with lines lc rgb '#999999' title 'measured', \\\n"
+	      "  '' using 1:3 with lines ls 2 lw 2 title 'predicted'\n"
+	      "set title '(b) rendered by the haptic loop, and recorded'\n"
+	      "plot 'prediction.dat' using 1:2 with lines lc rgb '#999999' title 'recorded', \\\n"
+	      "  'rendered.dat' using 1:3 with lines ls 3 lw 2.5 title 'on the hand', \\\n"
+	      "  '' using 1:2 with lines lc rgb 'black' dt 2 title 'commanded'\n"
+	      "unset multiplot\n",
+	      script);
+	draw(demo, script, "fig5-prediction");
+	incise_dataset_free(cut);
+	incise_dataset_free(log);
+	return sqrt(sum);
+}
+
+static void figure_lateness(const struct demo *demo, const json_t *haptic)
+{
+	const json_t *lateness = json_object_get(haptic, "lateness_us");
+	const json_t *histogram = json_object_get(lateness, "histogram");
+	char *median = quantile_us(haptic, "lateness_us", "median", 1);
+	char *p999 = quantile_us(haptic, "lateness_us", "p999", 1);
+	FILE *data = plot_data(demo->folder, "lateness.dat");
+	size_t i;
+	json_t *bin;
+	FILE *script;
+
+	json_array_foreach(histogram, i, bin)
+		fprintf(data, "%g %g\n", json_number_value(json_array_get(bin, 0)) + 0.5,
+			json_number_value(json_array_get(bin, 1)));
+	plot_data_end(data, demo->folder);
+	script = plot_begin(demo->folder, "tick-lateness", 1000, 500);
+	fprintf(script,
+		"set title 'Lateness of %g ticks at 1 kHz (this machine, %s): median %s, "
+		"99.9 %% %s, largest %.0f us'\n"
+		"set xlabel 'lateness / us (the last bin holds all above 20 ms)'\n"
+		"set ylabel 'ticks'\nset logscale xy\nset xrange [0.4:25000]\n"
+		"set yrange [0.7:*]\nset style fill solid 0.6\n"
+		"plot 'lateness.dat' using 1:2 with impulses ls 1 lw 2\n",
+		number_of(haptic, "ticks", NULL),
+		json_string_value(json_object_get(haptic, "scheduling")), median, p999,
+		number_of(lateness, "max", NULL));
+	free(median), free(p999);
+	draw(demo, script, "tick-lateness");
+}
+
+/* ---- The camera's picture ---- */
+
+static void figure_camera(const struct demo *demo)
+{
+	struct incise_camera_frame frame;
+	struct incise_rig *rig;
+	char *spec =
+		cli_text("sim:seed=%ld,clock=simulated,depth_mm=10,times=1", demo->seed);
+	FILE *data, *script;
+
+	rig = cli_open_rig(spec, INCISE_RIG_CAMERA);
+	/* Well into the first cut. */
+	incise_clock_wait_until(incise_rig_clock(rig),
+				incise_clock_now(incise_rig_clock(rig)) +
+					6 * INCISE_NS_PER_S);
+	if (incise_camera_newest(incise_rig_camera(rig), &frame) != 1)
+		cli_fail("the virtual camera gave no picture");
+	data = plot_data(demo->folder, "camera.rgb");
+	for (int y = 0; y < frame.height; y++)
+		fwrite(frame.data + (size_t)y * frame.stride, 3, frame.width, data);
+	plot_data_end(data, demo->folder);
+	script =
+		plot_begin(demo->folder, "camera", frame.width + 160, frame.height + 120);
+	fprintf(script,
+		"set title 'Virtual camera: %g mm/px, scalpel 10 mm deep'\nset size ratio -1\n"
+		"unset grid\nset xrange [0:%d]\nset yrange [%d:0]\nset xlabel 'px'\n"
+		"set ylabel 'px'\nplot 'camera.rgb' binary array=(%d,%d) format='%%uchar' "
+		"with rgbimage\n",
+		incise_sim_config(incise_rig_sim(rig))->camera_mm_px, frame.width,
+		frame.height, frame.width, frame.height);
+	draw(demo, script, "camera");
+	incise_rig_close(rig);
+	free(spec);
+}
+
+void demo_figures(struct demo *demo, const struct incise_model *model)
+{
+	double new_cut;
+
+	write_pairs(demo);
+	figure_force(demo);
+	figure_membership(demo, model);
+	figure_surface(demo, model);
+	new_cut = figure_prediction(demo, model);
+	figure_lateness(demo, json_object_get(demo->summary, "haptic"));
+	figure_camera(demo);
+	json_set_number(demo->summary, "new_cut_rmse_N", new_cut);
+}
+
+/* --- the summary ---------------------------------------------------------------------- */
+
+/* The paper after 80 epochs, §4.3. Its data are not published. */
+#define PAPER_MSE_TRAIN 0.036
+#define PAPER_MSE_CHECK 0.0804
+
+json_t *demo_summary_begin(long seed)
+{
+	return json_pack("{ss sI ss s{sf sf}}", "version", incise_version(), "seed",
+			 (json_int_t)seed, "note",
+			 "virtual liver: the paper's data are not published", "paper",
+			 "mse_train", PAPER_MSE_TRAIN, "mse_check", PAPER_MSE_CHECK);
+}
+
+void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
+{
+	const json_t *capture = json_object_get(demo->summary, "capture");
+	const json_t *halves = json_object_get(demo->summary, "train_random_halves");
+	const json_t *unseen = json_object_get(demo->summary, "train_unseen_cuts");
+	const json_t *lines = json_object_get(unseen, "baselines");
+	const json_t *haptic = json_object_get(demo->summary, "haptic");
+	char *late50 = quantile_us(haptic, "lateness_us", "median", 1);
+	char *late999 = quantile_us(haptic, "lateness_us", "p999", 1);
+	char *tick50 = quantile_us(haptic, "tick_ns", "median", 1e-3);
+	char *tick999 = quantile_us(haptic, "tick_ns", "p999", 1e-3);
+
+	fprintf(out,
+		"incise demo, version %s, virtual rig with seed %ld\n\n"
+		"recording          %.1f s, %.0f force samples, %.0f lost, %.0f clipped\n"
+		"pairs              %.0f, averaged over depth and velocity as in paper 1, "
+		"section 4.1\n\n"
+		"Random halves, as the paper does it (classic ANFIS, 20 rules, 80 epochs). Its data "
+		"are\nnot published and ours are of a virtual liver: the figures compare in kind, "
+		"not in value.\n"
+		"                         training      check\n"
+		"  MSE here / N^2     %12.5f %10.5f\n"
+		"  MSE in the paper   %12.5f %10.5f   (its unit is not stated)\n\n"
+		"By unseen cuts, ridge and epochs by cross-validation, RMSE / N:\n"
+		"  this model         %12.4f %10.4f\n"
+		"  mean                            %10.4f\n"
+		"  linear regression               %10.4f\n"
+		"  nearest neighbours              %10.4f\n\n"
+		"model against the tissue's true mean force   %.4f N rms at the pairs\n"
+		"model against a new cut at 5 mm              %.4f N rms\n"
+		"fixed point against double                   %.4f mN largest of %d points, "
+		"certified to %.4f mN\n\n"
+		"haptic loop        %.0f ticks at %g Hz, %.0f skipped (%s)\n"
+		"  lateness         median %s, 99.9 %% %s, largest %.0f us\n"
+		"  tick             median %s, 99.9 %% %s\n"
+		"  force            largest %.3f N, actuator off by %.4f N rms\n\n"
+		"took               %.0f s\n",
+		incise_version(), demo->seed, number_of(capture, "seconds", NULL),
+		number_of(capture, "force", NULL),
+		number_of(capture, "force_lost", NULL) +
+			number_of(capture, "tracker_lost", NULL),
+		number_of(capture, "force_clipped", NULL),
+		number_of(halves, "pairs", NULL), number_of(halves, "train", "mse_N2"),
+		number_of(halves, "check", "mse_N2"), PAPER_MSE_TRAIN, PAPER_MSE_CHECK,
+		number_of(unseen, "train", "rmse_N"),
+		number_of(unseen, "check", "rmse_N"), number_of(lines, "mean", "rmse_N"),
+		number_of(lines, "linear", "rmse_N"), number_of(lines, "knn", "rmse_N"),
+		number_of(demo->summary, "truth_rmse_N", NULL),
+		number_of(demo->summary, "new_cut_rmse_N", NULL),
+		number_of(demo->summary, "fixed_point", "max_difference_N") * 1e3,
+		(GRID + 1) * (GRID + 1),
+		number_of(demo->summary, "fixed_point", "bound_N") * 1e3,
+		number_of(haptic, "ticks", NULL), number_of(haptic, "rate_hz", NULL),
+		number_of(haptic, "skipped", NULL),
+		json_string_value(json_object_get(haptic, "scheduling")), late50, late999,
+		number_of(haptic, "lateness_us", "max"), tick50, tick999,
+		number_of(haptic, "force_max_N", NULL),
+		number_of(haptic, "rendered_rms_error_N", NULL), seconds);
+	free(late50), free(late999), free(tick50), free(tick999);
+}
+
+void demo_summary_save(const struct demo *demo, double seconds)
+{
+	char *json = demo_path(demo, "summary.json");
+	char *txt = demo_path(demo, "summary.txt");
+	struct incise_outfile *file;
+
+	json_dumpf(demo->summary, whole_file_begin(json, &file),
+		   JSON_INDENT(2) | JSON_REAL_PRECISION(12));
+	whole_file_end(file);
+	demo_summary_print(demo, whole_file_begin(txt, &file), seconds);
+	whole_file_end(file);
+	free(json);
+	free(txt);
+}

@@ -1,0 +1,433 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The loop's thread, and the supervisor of a normal priority: log, state page, service manager,
+ * watchdog, another scene at SIGHUP.
+ *
+ *   loop      tick tick tick tick …          (real time; no lock, no file, no log)
+ *               │ control: events, ticks, plans        │ state page
+ *   supervisor  └─▶ log, sd_notify, watchdog, reload   └─▶ incise status, incise view …
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+#include <incise/export.h>
+#include "../cli/cli.h"
+#include "haptic.h"
+
+/*
+ * --- the service manager ---------------------------------------------------------------
+ *
+ * The protocol of sd_notify(3): a datagram of lines VARIABLE=VALUE to the socket in
+ * $NOTIFY_SOCKET. libsystemd would bring a megabyte of libraries into a process that is locked
+ * in memory.
+ */
+
+/* The socket's address; 0: none, or an invalid one. */
+static socklen_t address(struct sockaddr_un *to)
+{
+	const char *path = getenv("NOTIFY_SOCKET");
+	size_t length = path ? strlen(path) : 0;
+
+	if (!length || length >= sizeof(to->sun_path) || (*path != '/' && *path != '@'))
+		return 0;
+	*to = (struct sockaddr_un){.sun_family = AF_UNIX};
+	memcpy(to->sun_path, path, length);
+	/* An abstract socket: its name begins with a 0. */
+	if (*path == '@')
+		to->sun_path[0] = 0;
+	return (socklen_t)(offsetof(struct sockaddr_un, sun_path) + length);
+}
+
+/* Send lines, for example "READY=1\nSTATUS=runs". Never waits; a failed send is lost. */
+static void notify_send(const char *fmt, ...) INCISE_PRINTF(1, 2);
+static void notify_send(const char *fmt, ...)
+{
+	struct sockaddr_un to;
+	socklen_t size = address(&to);
+	char text[1024];
+	va_list args;
+	int length, fd;
+
+	if (!size)
+		return;
+	va_start(args, fmt);
+	length = vsnprintf(text, sizeof(text), fmt, args);
+	va_end(args);
+	fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+	if (fd < 0)
+		return;
+	if (length >= (int)sizeof(text))
+		length = sizeof(text) - 1;
+	if (length > 0)
+		sendto(fd, text, (size_t)length, MSG_NOSIGNAL | MSG_DONTWAIT,
+		       (struct sockaddr *)&to, size);
+	close(fd);
+}
+
+/* "RELOADING=1", with the time that the protocol requires. */
+static void notify_reloading(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	notify_send("RELOADING=1\nMONOTONIC_USEC=%lld",
+		    now.tv_sec * 1000000LL + now.tv_nsec / 1000);
+}
+
+/* Longest time between WATCHDOG=1 of this process; 0: no watchdog. */
+static int64_t notify_watchdog_ns(void)
+{
+	const char *us = getenv("WATCHDOG_USEC"), *pid = getenv("WATCHDOG_PID");
+	long long value = us ? strtoll(us, NULL, 10) : 0;
+
+	/* Inherited from a parent. */
+	if (pid && strtoll(pid, NULL, 10) != getpid())
+		return 0;
+	return value > 0 && value < INT64_MAX / 1000 ? value * 1000 : 0;
+}
+
+/* --- the supervisor -------------------------------------------------------------------- */
+
+#define LOOK_MS 100
+#define REPORT_NS INCISE_NS_PER_S
+
+static volatile sig_atomic_t reload_asked;
+
+/* Shared by the loop's thread and its supervisor until the thread is joined. */
+struct supervisor {
+	struct haptic *haptic;
+	struct incise_clock *time; /* of the log; the rig's may be simulated */
+	pthread_t thread;
+	int ended_fd; /* readable when the loop has ended */
+	_Atomic int tid;
+	int rc;
+	struct incise_error err;
+
+	/* A scene that the loop has not yet taken. */
+	struct incise_scene *next_scene;
+	struct incise_plan *next_plan;
+
+	bool ready, stopping;
+	uint64_t fed_ticks; /* when the watchdog was last fed */
+	uint64_t reported_ticks;
+	uint64_t overruns, skipped; /* since the last line of the log */
+	uint64_t overruns_all, skipped_all;
+	bool stale;
+	char refused[530]; /* reason of the last refused reload, or "" */
+	int64_t report_ns, feed_ns, watchdog_ns;
+};
+
+/* --- the loop's thread ------------------------------------------------------------------ */
+
+static void take_counts(struct incise_realtime_counts *counts, int sign)
+{
+	struct rusage usage;
+
+	getrusage(RUSAGE_THREAD, &usage);
+	counts->minor_faults += (uint64_t)(sign * usage.ru_minflt);
+	counts->major_faults += (uint64_t)(sign * usage.ru_majflt);
+	counts->voluntary += (uint64_t)(sign * usage.ru_nvcsw);
+	counts->involuntary += (uint64_t)(sign * usage.ru_nivcsw);
+}
+
+static void *run_loop(void *argument)
+{
+	struct supervisor *s = argument;
+	struct haptic *haptic = s->haptic;
+	uint64_t one = 1;
+
+	s->tid = gettid();
+	if (haptic->realtime)
+		s->rc = incise_realtime_enter(haptic->realtime, &s->err);
+	if (!s->rc) {
+		take_counts(&haptic->counts, -1);
+		s->rc = incise_loop_run(haptic->plan, incise_rig_clock(haptic->rig),
+					&haptic->loop, haptic->stats, &s->err);
+		take_counts(&haptic->counts, 1);
+	}
+	if (write(s->ended_fd, &one, sizeof(one)) < 0)
+		abort();
+	return NULL;
+}
+
+static int start_thread(struct supervisor *s, struct incise_error *err)
+{
+	sigset_t all, before;
+	int rc;
+
+	/* The supervisor handles signals: in the loop they would make ticks late. */
+	sigfillset(&all);
+	pthread_sigmask(SIG_SETMASK, &all, &before);
+	rc = pthread_create(&s->thread, NULL, run_loop, s);
+	pthread_sigmask(SIG_SETMASK, &before, NULL);
+	return rc ? incise_error_set(err, rc, "the loop's thread: %s", strerror(rc)) : 0;
+}
+
+/* --- another scene ---------------------------------------------------------------------- */
+
+static void on_reload(int number)
+{
+	(void)number;
+	reload_asked = 1;
+}
+
+void haptic_catch_reload(void)
+{
+	struct sigaction action = {.sa_handler = on_reload};
+	int terminal = open("/dev/tty", O_RDONLY | O_CLOEXEC | O_NOCTTY);
+
+	if (terminal >= 0)
+		close(terminal);
+	else
+		sigaction(SIGHUP, &action, NULL);
+}
+
+struct incise_plan *haptic_plan(const struct haptic *haptic,
+				const struct incise_scene *scene,
+				struct incise_error *err)
+{
+	struct incise_plan *plan = incise_plan_new(scene, haptic->rig, err);
+
+	if (plan) {
+		incise_plan_set_tool(plan, haptic->tool);
+		incise_plan_set_tip(plan, haptic->tip_mm);
+	}
+	return plan;
+}
+
+static void free_next(struct supervisor *s)
+{
+	incise_plan_free(s->next_plan);
+	incise_scene_free(s->next_scene);
+	s->next_plan = NULL;
+	s->next_scene = NULL;
+}
+
+static int prepare_next(struct supervisor *s, struct incise_error *err)
+{
+	struct haptic *haptic = s->haptic;
+	struct self_test test;
+	double rate_hz;
+	int rc;
+
+	s->next_scene = scene_argument_read(&haptic->argument, err);
+	if (!s->next_scene)
+		return -errno;
+	rate_hz = incise_scene_rate_hz(s->next_scene);
+	if (rate_hz != haptic->loop.rate_hz)
+		return incise_error_set(err, EINVAL,
+					"%s: rate_hz is %g, and the loop runs at %g: "
+					"restart it",
+					haptic->argument.path, rate_hz,
+					haptic->loop.rate_hz);
+	rc = haptic_self_test(s->next_scene, incise_rig_tracker(haptic->rig), &test, err);
+	if (rc)
+		return rc;
+	s->next_plan = haptic_plan(haptic, s->next_scene, err);
+	return s->next_plan ? 0 : -errno;
+}
+
+static void start_reload(struct supervisor *s)
+{
+	struct incise_error err = {0};
+	int rc = 0;
+
+	reload_asked = 0;
+	/* One at a time; a later request is kept. */
+	if (s->next_plan || s->stopping) {
+		reload_asked = !s->stopping;
+		return;
+	}
+	notify_reloading();
+	incise_state_run(s->haptic->state, INCISE_RUN_RELOADING, "");
+	rc = prepare_next(s, &err);
+	if (!rc)
+		rc = incise_loop_control_offer(s->haptic->loop.control, s->next_plan);
+	if (!rc)
+		return;
+	free_next(s);
+	incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
+	incise_state_refused(s->haptic->state, err.text);
+	cli_warn("not reloaded, the scene before goes on: %s", err.text);
+	snprintf(s->refused, sizeof(s->refused), "; not reloaded: %s", err.text);
+	notify_send("READY=1");
+}
+
+static void end_reload(struct supervisor *s)
+{
+	struct haptic *haptic = s->haptic;
+	struct incise_plan *old = incise_loop_control_retired(haptic->loop.control);
+
+	if (!old)
+		return;
+	incise_plan_free(old);
+	incise_scene_free(haptic->scene);
+	haptic->plan = s->next_plan;
+	haptic->scene = s->next_scene;
+	s->next_plan = NULL;
+	s->next_scene = NULL;
+	incise_state_scene(haptic->state, haptic->argument.path, haptic->plan);
+	incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
+	s->refused[0] = 0;
+	cli_note("%s: read again and in force", haptic->argument.path);
+	notify_send("READY=1");
+}
+
+/* --- log and status --------------------------------------------------------------------- */
+
+static void handle_events(struct supervisor *s)
+{
+	struct incise_loop_event events[32];
+	int n;
+
+	while ((n = incise_loop_control_events(s->haptic->loop.control, events, 32)) > 0)
+		for (int i = 0; i < n; i++)
+			switch (events[i].kind) {
+			case INCISE_LOOP_OVERRUN:
+				s->overruns++;
+				s->skipped += (uint64_t)events[i].value;
+				break;
+			case INCISE_LOOP_STALE:
+				s->stale = true;
+				/* At the start the first pose is still to come. */
+				if (events[i].tick)
+					cli_note("no fresh pose: the force fades");
+				break;
+			case INCISE_LOOP_FRESH:
+				s->stale = false;
+				if (events[i].value > 100)
+					cli_note("poses again, after %.0f ms",
+						 events[i].value);
+				break;
+			case INCISE_LOOP_NOT_FINITE:
+				cli_warn("the force was no number: none was asked for");
+				break;
+			case INCISE_LOOP_PLAN:
+				break;
+			}
+}
+
+/* Once a second: overruns since the last line, and the rate. */
+static void report(struct supervisor *s, uint64_t ticks, int64_t now_ns)
+{
+	struct haptic *haptic = s->haptic;
+	struct incise_realtime_counts counts;
+	double seconds = (double)(now_ns - s->report_ns + REPORT_NS) / INCISE_NS_PER_S;
+	double rate_hz = (double)(ticks - s->reported_ticks) / seconds;
+	char text[200];
+
+	s->overruns_all += s->overruns;
+	s->skipped_all += s->skipped;
+	if (s->overruns)
+		cli_note("%llu overruns, %llu ticks skipped",
+			 (unsigned long long)s->overruns, (unsigned long long)s->skipped);
+	s->overruns = s->skipped = 0;
+	if (s->tid && !incise_realtime_count(s->tid, &counts))
+		incise_state_counts(haptic->state, &counts);
+	snprintf(text, sizeof(text), "%.0f of %g Hz, %llu overruns, %llu ticks skipped%s",
+		 rate_hz, haptic->loop.rate_hz, (unsigned long long)s->overruns_all,
+		 (unsigned long long)s->skipped_all, s->stale ? ", no fresh pose" : "");
+	notify_send("STATUS=%s%s", text, s->refused);
+	cli_progress("%s: %s; Ctrl-C ends", haptic->argument.path, text);
+	s->reported_ticks = ticks;
+}
+
+static void look(struct supervisor *s)
+{
+	struct haptic *haptic = s->haptic;
+	uint64_t ticks = incise_loop_control_ticks(haptic->loop.control);
+	int64_t now_ns = incise_clock_now(s->time);
+
+	handle_events(s);
+	if (!s->ready && ticks) {
+		s->ready = true;
+		incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
+		notify_send("READY=1\nSTATUS=runs at %g Hz", haptic->loop.rate_hz);
+		cli_note("%s: runs at %g Hz, %s", haptic->argument.path,
+			 haptic->loop.rate_hz, haptic->scheduling);
+	}
+	/* Only while ticks come: the manager ends a loop that hangs. */
+	if (s->watchdog_ns && now_ns >= s->feed_ns && ticks != s->fed_ticks) {
+		notify_send("WATCHDOG=1");
+		s->fed_ticks = ticks;
+		s->feed_ns = now_ns + s->watchdog_ns / 4;
+	}
+	if (cli_stop && !s->stopping) {
+		s->stopping = true;
+		incise_state_run(s->haptic->state, INCISE_RUN_STOPPING,
+				 strsignal(cli_stop));
+		notify_send("STOPPING=1\nSTATUS=the force fades");
+		cli_note("%s: the force fades", strsignal(cli_stop));
+	}
+	end_reload(s);
+	if (reload_asked && s->ready)
+		start_reload(s);
+	if (now_ns >= s->report_ns) {
+		report(s, ticks, now_ns);
+		s->report_ns = now_ns + REPORT_NS;
+	}
+}
+
+/* The loop has ended: drop a plan that it did not take. */
+static void settle(struct supervisor *s)
+{
+	handle_events(s);
+	end_reload(s);
+	if (s->next_plan)
+		incise_loop_control_withdraw(s->haptic->loop.control);
+	free_next(s);
+}
+
+static int supervise(struct supervisor *s, struct incise_error *err)
+{
+	struct pollfd ended = {.fd = s->ended_fd, .events = POLLIN};
+	int rc = start_thread(s, err);
+
+	if (rc)
+		return rc;
+	while (poll(&ended, 1, LOOK_MS) <= 0)
+		look(s);
+	pthread_join(s->thread, NULL);
+	settle(s);
+	if (s->rc)
+		*err = s->err;
+	return s->rc;
+}
+
+int haptic_supervise(struct haptic *haptic, struct incise_error *err)
+{
+	struct supervisor s = {.haptic = haptic,
+			       .ended_fd = eventfd(0, EFD_CLOEXEC),
+			       .time = incise_clock_new_real(),
+			       .watchdog_ns = notify_watchdog_ns()};
+	int rc;
+
+	haptic->loop.control = incise_loop_control_new();
+	if (!haptic->loop.control || !s.time || s.ended_fd < 0) {
+		rc = incise_error_set(err, errno, "the loop cannot be looked after: %s",
+				      strerror(errno));
+	} else {
+		s.report_ns = incise_clock_now(s.time) + REPORT_NS;
+		rc = supervise(&s, err);
+	}
+	if (s.ended_fd >= 0)
+		close(s.ended_fd);
+	incise_clock_free(s.time);
+	incise_loop_control_free(haptic->loop.control);
+	haptic->loop.control = NULL;
+	return rc;
+}

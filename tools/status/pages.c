@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The state pages of loops; see pages.h.
+ */
+#include <dirent.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include "../cli/cli.h"
+#include "../cli/scene_argument.h"
+#include "pages.h"
+
+#define SUFFIX ".state"
+#define FOLDERS 2
+#define LOOKS 50 /* 1 ms apart: the writer may be preempted */
+
+/* The folders of pages; NULL: not set. */
+static void folders(char *list[FOLDERS])
+{
+	const char *own = getenv("XDG_RUNTIME_DIR");
+
+	list[0] = cli_text("/run/incise");
+	list[1] = own && *own ? cli_text("%s/incise", own) : NULL;
+}
+
+/* Length of NAME in "NAME.state"; 0: another file. */
+static size_t name_length(const char *file)
+{
+	size_t n = strlen(file), end = strlen(SUFFIX);
+
+	return n > end && *file != '.' && !strcmp(file + n - end, SUFFIX) ? n - end : 0;
+}
+
+static void add(struct state_pages *pages, const char *path, struct incise_state *state)
+{
+	const char *slash = strrchr(path, '/'), *file = slash ? slash + 1 : path;
+	size_t n = name_length(file);
+	struct state_page_file *page;
+
+	pages->page = cli_resize(pages->page, (size_t)pages->n + 1, sizeof(*page));
+	page = &pages->page[pages->n++];
+	*page = (struct state_page_file){
+		.name = cli_text("%.*s", n ? (int)n : (int)strlen(file), file),
+		.path = cli_text("%s", path),
+		.state = state,
+	};
+	/* Others may name files there: no control characters. */
+	for (char *c = page->name; *c; c++)
+		if ((unsigned char)*c < ' ' || *c == 0x7f)
+			*c = '?';
+}
+
+static int by_name(const void *a, const void *b)
+{
+	const struct state_page_file *x = a, *y = b;
+
+	return strcmp(x->name, y->name);
+}
+
+/* Add all pages of a folder. Returns how many are unreadable. */
+static int add_folder(struct state_pages *pages, const char *folder)
+{
+	DIR *dir = opendir(folder);
+	const struct dirent *entry;
+	int bad = 0;
+
+	while (dir && (entry = readdir(dir))) {
+		struct incise_error err = {0};
+		struct incise_state *state;
+		char *path;
+
+		if (!name_length(entry->d_name))
+			continue;
+		path = cli_text("%s/%s", folder, entry->d_name);
+		state = incise_state_open(path, &err);
+		if (state)
+			add(pages, path, state);
+		else
+			cli_warn("%s", err.text);
+		bad += !state;
+		free(path);
+	}
+	if (dir)
+		closedir(dir);
+	return bad;
+}
+
+static void open_all(struct state_pages *pages, char *list[FOLDERS])
+{
+	int bad = 0;
+
+	for (int i = 0; i < FOLDERS; i++)
+		if (list[i])
+			bad += add_folder(pages, list[i]);
+	if (!pages->n && bad)
+		cli_fail("no state of a loop can be read here");
+	if (!pages->n)
+		cli_fail("no loop has run here: 'incise haptic SCENE' starts one, or the "
+			 "service 'systemctl start incise-haptic@NAME'");
+	qsort(pages->page, (size_t)pages->n, sizeof(*pages->page), by_name);
+}
+
+static void open_name(struct state_pages *pages, const char *name, char *list[FOLDERS])
+{
+	struct incise_error err = {0};
+	bool found = false;
+
+	for (int i = 0; i < FOLDERS; i++) {
+		char *path = list[i] ? cli_text("%s/%s" SUFFIX, list[i], name) : NULL;
+		struct incise_state *state = path ? incise_state_open(path, &err) : NULL;
+
+		if (state && pages->n && incise_state_alive(state) != 1) {
+			incise_state_close(state);
+		} else if (state) {
+			state_pages_close(pages);
+			add(pages, path, state);
+		}
+		found |= path && (state || err.code != ENOENT);
+		free(path);
+		if (pages->n && incise_state_alive(pages->page[0].state) == 1)
+			break;
+	}
+	if (!pages->n && found)
+		cli_fail_with(&err);
+	if (!pages->n)
+		cli_fail(
+			"%s: no loop of that name has run here: 'incise haptic %s' starts "
+			"one; 'incise status' shows all",
+			name, name);
+}
+
+void state_pages_open(struct state_pages *pages, const char *asked)
+{
+	struct incise_error err = {0};
+	struct incise_state *state;
+	char *list[FOLDERS];
+	bool scene = asked && cli_ends_with(asked, ".scene");
+
+	*pages = (struct state_pages){0};
+	if (asked && !scene && (strchr(asked, '/') || name_length(asked))) {
+		state = incise_state_open(asked, &err);
+		if (!state)
+			cli_fail_with(&err);
+		add(pages, asked, state);
+		return;
+	}
+	folders(list);
+	if (asked) {
+		char *name = scene_argument_name(asked);
+
+		open_name(pages, name, list);
+		free(name);
+	} else {
+		open_all(pages, list);
+	}
+	for (int i = 0; i < FOLDERS; i++)
+		free(list[i]);
+}
+
+int state_pages_try(const struct state_page_file *page, struct incise_state_now *now,
+		    struct incise_error *err)
+{
+	const struct timespec pause = {.tv_nsec = 1000000};
+	int rc = -EAGAIN;
+
+	for (int i = 0; i < LOOKS && rc == -EAGAIN; i++) {
+		if (i)
+			nanosleep(&pause, NULL);
+		rc = incise_state_read(page->state, now);
+	}
+	if (rc == -EAGAIN)
+		return incise_error_set(
+			err, EAGAIN,
+			"%s: its loop stands still in the middle of telling its state",
+			page->path);
+	if (rc)
+		return incise_error_set(
+			err, EIO, "%s: is damaged, or was cut off: start the loop again",
+			page->path);
+	return 0;
+}
+
+void state_pages_look(const struct state_page_file *page, struct incise_state_now *now)
+{
+	struct incise_error err = {0};
+
+	if (state_pages_try(page, now, &err))
+		cli_fail_with(&err);
+}
+
+void state_pages_close(struct state_pages *pages)
+{
+	for (int i = 0; i < pages->n; i++) {
+		incise_state_close(pages->page[i].state);
+		free(pages->page[i].name);
+		free(pages->page[i].path);
+	}
+	free(pages->page);
+	*pages = (struct state_pages){0};
+}

@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Frames of incise view, in a window with its events or into files; see view.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+#include <incise/clock.h>
+#include "../cli/cli.h"
+#include "../cli/image.h"
+#include "view.h"
+
+/* --- files ---------------------------------------------------------------------------- */
+
+bool view_output_wanted(const struct view_output *output)
+{
+	return output->folder || output->film_path || output->strip_path;
+}
+
+void view_output_begin(struct view_output *output)
+{
+	size_t size = (size_t)output->width * output->height * 3;
+	struct incise_error err = {0};
+
+	if (!view_output_wanted(output))
+		return;
+	output->rgb = cli_alloc(1, size);
+	if (output->strip_path)
+		output->strip = cli_alloc(output->n_strip, size);
+	if (output->folder && mkdir(output->folder, 0777) && errno != EEXIST)
+		cli_fail("%s: %s", output->folder, strerror(errno));
+	if (output->film_path)
+		output->film =
+			cli_require(incise_film_new(output->film_path, output->width,
+						    output->height, output->fps, &err),
+				    &err);
+}
+
+/* Put the frame to the right of those before. */
+static void add_to_strip(struct view_output *output)
+{
+	size_t row = (size_t)output->width * 3;
+
+	for (int y = 0; y < output->height; y++)
+		memcpy(output->strip +
+			       (y * (size_t)output->n_strip + output->stripped) * row,
+		       output->rgb + y * row, row);
+	output->stripped++;
+}
+
+static void write_frame(struct view_output *output, struct incise_view *view, double t_s)
+{
+	struct incise_error err = {0};
+	char path[4200];
+	int rc;
+
+	if (!view_output_wanted(output))
+		return;
+	rc = incise_view_pixels(view, output->rgb);
+	if (rc)
+		cli_fail("the picture cannot be read: %s", strerror(-rc));
+	if (output->folder) {
+		snprintf(path, sizeof(path), "%s/frame-%06llu.png", output->folder,
+			 (unsigned long long)output->frames);
+		if (image_write_png(path, output->rgb, output->width, output->height,
+				    &err))
+			cli_fail_with(&err);
+	}
+	if (output->film && incise_film_add(output->film, output->rgb, &err)) {
+		incise_film_drop(output->film);
+		cli_fail_with(&err);
+	}
+	if (output->strip_path && output->stripped < output->n_strip &&
+	    t_s >= output->strip_s[output->stripped])
+		add_to_strip(output);
+	output->frames++;
+}
+
+void view_output_end(struct view_output *output)
+{
+	struct incise_error err = {0};
+
+	if (incise_film_close(output->film, &err))
+		cli_fail_with(&err);
+	if (output->strip_path && output->stripped < output->n_strip)
+		cli_warn("%s: ends before its picture %d, at %g s", output->strip_path,
+			 output->stripped + 1, output->strip_s[output->stripped]);
+	if (output->strip_path && output->stripped &&
+	    image_write_png(output->strip_path, output->strip,
+			    output->width * output->n_strip, output->height, &err))
+		cli_fail_with(&err);
+	free(output->rgb);
+	free(output->strip);
+}
+
+/* --- the hand ------------------------------------------------------------------------- */
+
+#define ABOVE_MM 6.0	 /* over the tissue, when it is not pressed */
+#define SINK_MM_S 40.0	 /* how fast it goes in and out: a hand's */
+#define FOLLOW_S 0.03	 /* behind the pointer */
+#define TURN_S 0.4	 /* to turn the scalpel round */
+#define STICK_MM_S 40.0	 /* a joystick at its end */
+#define DEPTH_MOST_MM 15 /* that is asked for */
+
+void view_hand_begin(struct view_hand *hand, struct incise_sim *sim, double handle_mm,
+		     const struct incise_touch *top)
+{
+	*hand = (struct view_hand){.sim = sim,
+				   .handle_mm = handle_mm,
+				   .depth_mm = 3,
+				   .tool = INCISE_TOOL_BLADE,
+				   .height_mm = 25};
+	memcpy(hand->point_mm, top->point_mm, sizeof(hand->point_mm));
+	memcpy(hand->normal, top->normal, sizeof(hand->normal));
+	memcpy(hand->at_mm, top->point_mm, sizeof(hand->at_mm));
+}
+
+static bool key(struct view_hand *hand, int key)
+{
+	switch (key) {
+	case 'b':
+		hand->tool = INCISE_TOOL_BLADE;
+		return true;
+	case 'n':
+		hand->tool = INCISE_TOOL_HANDLE;
+		return true;
+	case 't':
+		hand->tool = INCISE_TOOL_TUBE;
+		return true;
+	case '+':
+	case '=':
+		hand->depth_mm = fmin(hand->depth_mm + 0.5, DEPTH_MOST_MM);
+		return true;
+	case '-':
+		hand->depth_mm = fmax(hand->depth_mm - 0.5, 0.5);
+		return true;
+	}
+	return false;
+}
+
+/* Returns whether the event was for the hand. */
+static bool hand_event(struct view_hand *hand, const struct incise_view_event *event)
+{
+	bool points = event->type == INCISE_VIEW_MOTION ||
+		      (event->type == INCISE_VIEW_BUTTON && event->button == 1);
+
+	if (event->used)
+		return false;
+	if (event->type == INCISE_VIEW_KEY)
+		return event->pressed && key(hand, event->key);
+	if (event->type == INCISE_VIEW_AXIS && event->axis >= 0 && event->axis < 2) {
+		hand->stick[event->axis] = fabs(event->value) > 0.1 ? event->value : 0;
+		return true;
+	}
+	if (event->type == INCISE_VIEW_STICK_BUTTON && event->button == 0) {
+		hand->press = event->pressed;
+		return true;
+	}
+	if (!points)
+		return false;
+	hand->press = event->buttons & 1 ? event->pressure : 0;
+	if (event->ray.met) {
+		memcpy(hand->point_mm, event->ray.point_mm, sizeof(hand->point_mm));
+		memcpy(hand->normal, event->ray.normal, sizeof(hand->normal));
+	}
+	return true;
+}
+
+/* A rotation that takes z to the normal, then the scalpel turned round its own x. */
+static void attitude(const double n[3], double round, double q[4])
+{
+	double c = sqrt(fmax(0, (1 + n[2]) / 2)), a = round * M_PI / 2;
+	double p[4] = {1, 0, 0, 0};
+
+	if (c > 1e-6) {
+		p[0] = c;
+		p[1] = -n[1] / (2 * c);
+		p[2] = n[0] / (2 * c);
+	}
+	q[0] = p[0] * cos(a) - p[1] * sin(a);
+	q[1] = p[0] * sin(a) + p[1] * cos(a);
+	q[2] = p[2] * cos(a) + p[3] * sin(a);
+	q[3] = p[3] * cos(a) - p[2] * sin(a);
+}
+
+void view_hand_move(struct view_hand *hand, double dt_s)
+{
+	double wanted_mm = hand->press > 0 ? -hand->press * hand->depth_mm : ABOVE_MM;
+	bool turned = hand->tool == INCISE_TOOL_HANDLE;
+	double share = 1 - exp(-fmax(dt_s, 0) / FOLLOW_S), most = SINK_MM_S * dt_s;
+	double velocity[3], tip[3], q[4], axis[3], before[3];
+
+	if (!(dt_s > 0))
+		return;
+	/* The scalpel is turned over only well above the tissue. */
+	if (hand->round != turned) {
+		wanted_mm = 3 * ABOVE_MM;
+		if (hand->height_mm > 2 * ABOVE_MM)
+			hand->round += fmax(-dt_s / TURN_S,
+					    fmin(dt_s / TURN_S, turned - hand->round));
+	}
+	memcpy(before, hand->at_mm, sizeof(before));
+	hand->height_mm += fmax(-most, fmin(most, wanted_mm - hand->height_mm));
+	hand->point_mm[0] += hand->stick[0] * STICK_MM_S * dt_s;
+	hand->point_mm[1] -= hand->stick[1] * STICK_MM_S * dt_s;
+	attitude(hand->normal, hand->round, q);
+	axis[0] = 2 * (q[1] * q[3] + q[0] * q[2]);
+	axis[1] = 2 * (q[2] * q[3] - q[0] * q[1]);
+	axis[2] = 1 - 2 * (q[1] * q[1] + q[2] * q[2]);
+	for (int i = 0; i < 3; i++) {
+		double to = hand->point_mm[i] + hand->height_mm * hand->normal[i];
+
+		hand->at_mm[i] += share * (to - hand->at_mm[i]);
+		velocity[i] = (hand->at_mm[i] - before[i]) / dt_s;
+		tip[i] = hand->at_mm[i] - hand->round * hand->handle_mm * axis[i];
+	}
+	incise_sim_hold(hand->sim, tip, velocity, q);
+}
+
+/* --- frames and events ---------------------------------------------------------------- */
+
+int64_t view_wall(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
+}
+
+void view_pause_until(int64_t t_ns)
+{
+	struct timespec at = {t_ns / INCISE_NS_PER_S, t_ns % INCISE_NS_PER_S};
+
+	clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, NULL);
+}
+
+/* Write the frame to the first of NAME-1.png, NAME-2.png … that does not exist. */
+static void keep_frame(struct view_job *job)
+{
+	const char *slash = strrchr(job->argument.path, '/');
+	const char *name = slash ? slash + 1 : job->argument.path;
+	int length = (int)strcspn(name, "."), width, height;
+	struct incise_error err = {0};
+	char path[300];
+	uint8_t *rgb;
+
+	job->keep = false;
+	incise_view_size(job->view, &width, &height);
+	rgb = malloc((size_t)width * height * 3);
+	if (!rgb || incise_view_pixels(job->view, rgb)) {
+		cli_warn("the picture cannot be read");
+		free(rgb);
+		return;
+	}
+	for (int i = 1; i < 10000; i++) {
+		snprintf(path, sizeof(path), "%.*s-%d.png", length < 200 ? length : 200,
+			 name, i);
+		if (access(path, F_OK))
+			break;
+	}
+	if (image_write_png(path, rgb, width, height, &err))
+		cli_warn("%s", err.text);
+	free(rgb);
+}
+
+void view_job_draw(struct view_job *job, const struct incise_view_status *status,
+		   double t_s)
+{
+	struct incise_error err = {0};
+
+	if (!job->frames++)
+		job->begin_ns = view_wall();
+	if (incise_view_frame(job->view, status, &err))
+		cli_fail_with(&err);
+	job->end_ns = view_wall();
+	if (job->keep)
+		keep_frame(job);
+	write_frame(&job->output, job->view, t_s);
+}
+
+bool view_job_events(struct view_job *job, struct view_hand *hand, struct view_live *live)
+{
+	struct incise_view_event event;
+
+	while (incise_view_event(job->view, &event)) {
+		if (event.type == INCISE_VIEW_QUIT ||
+		    (event.type == INCISE_VIEW_KEY && event.pressed && event.key == 'q'))
+			return false;
+		if (event.type == INCISE_VIEW_KEY && event.pressed && event.key == 's')
+			job->keep = true;
+		if (hand && hand_event(hand, &event))
+			view_live_tool(live, hand->tool == INCISE_TOOL_TUBE
+						     ? INCISE_TOOL_TUBE
+						     : INCISE_TOOL_AUTO);
+	}
+	return !cli_stop;
+}
+
+static const char *const keys[] = {
+	"left button\tpress the tool in",
+	"b  n  t\tblade, handle, tube",
+	"+  -\thow deep it is pressed",
+	"right button\tturn the camera",
+	"wheel\tnear, far",
+	"Home\tcamera as it was",
+	"g\tgraphs",
+	"s\tkeep the picture",
+	"h  F1\tthis",
+	"q\tend",
+};
+
+void view_job_view(struct view_job *job)
+{
+	bool window = !job->no_output && !view_output_wanted(&job->output);
+	struct incise_view_setup setup = {.width = job->output.width,
+					  .height = job->output.height,
+					  .window = window,
+					  .title = job->argument.path};
+	struct incise_view_camera camera;
+	struct incise_error err = {0};
+
+	job->view = incise_view_new(job->scene, job->plan, &setup, &err);
+	if (!job->view)
+		cli_fail("%s%s", err.text,
+			 window ? "; without a screen give --frames, --video or --strip"
+				: "");
+	incise_view_panel(job->view, !job->no_panel, false);
+	incise_view_keys(job->view, keys, sizeof(keys) / sizeof(*keys));
+	job->made_ns = view_wall();
+	if (!job->has_camera)
+		return;
+	incise_view_camera(job->view, &camera);
+	camera.azimuth_deg = job->camera[0];
+	camera.elevation_deg = job->camera[1];
+	camera.distance_mm = job->camera[2];
+	incise_view_set_camera(job->view, &camera);
+}
