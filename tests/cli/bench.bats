@@ -379,20 +379,7 @@ in_order() {
 	[ "$(key r.json wakeups.rows[0].load)" = disk ]
 	[ -z "$(key r.json wakeups.rows[0].no_load)" ]
 	in_order wakeups.rows[0].lateness_us
-	TMPDIR=$PWD/t incise bench loop --quick --load disk --duration 1min \
-		"$root/scenes/wall.scene" >out 2>err 3>&- &
-	pid=$!
-	# The load has files once it is there.
-	for ((i = 0; i < 600; i++)); do
-		[ -z "$(ls -A t)" ] || break
-		sleep 0.1
-	done
-	kill -INT $pid
-	code=0
-	wait $pid || code=$?
-	[ "$code" = 1 ]
-	grep -q "^incise bench: interrupted" err
-	[ -z "$(ls -A t)" ]
+	bench_interrupted loop --quick --load disk --duration 1min "$root/scenes/wall.scene"
 }
 
 # One value of a row of `rates`: rate wall exact 1000 hold_N.
@@ -622,9 +609,7 @@ needs_pictures() {
 @test "bench capture that is interrupted, or has no room, leaves nothing behind" {
 	needs_pictures
 	mkdir t
-	TMPDIR=$PWD/t run --separate-stderr timeout --preserve-status -s INT 1 incise bench capture
-	failed_with interrupted
-	[ -z "$(ls -A t)" ]
+	bench_interrupted capture
 	TMPDIR=$PWD/none run --separate-stderr incise bench capture --quick
 	failed_with "$PWD/none/" TMPDIR
 	run --separate-stderr incise bench capture more

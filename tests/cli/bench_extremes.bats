@@ -82,19 +82,7 @@ setup() {
 # bats test_tags=slow
 @test "bench extremes that is interrupted, or has no room, leaves nothing behind" {
 	mkdir t
-	TMPDIR=$PWD/t incise bench extremes --quick >out 2>err &
-	pid=$!
-	for ((i = 0; i < 3000; i++)); do
-		[ -z "$(ls t)" ] || break
-		sleep 0.02
-	done
-	[ -n "$(ls t)" ]
-	kill -INT $pid
-	status=0
-	wait $pid || status=$?
-	[ "$status" -eq 1 ]
-	grep -q "^incise bench: interrupted" err
-	[ -z "$(ls t)" ]
+	bench_interrupted extremes --quick
 	TMPDIR=$PWD/none run --separate-stderr incise bench extremes --quick
 	failed_with none "set TMPDIR"
 }

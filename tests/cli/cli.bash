@@ -39,6 +39,24 @@ complain() {
 	return 1
 }
 
+# Run a bench with $TMPDIR in t, send SIGINT as soon as it has files there. It says that it was
+# interrupted, as its last line, and leaves no file.
+bench_interrupted() {
+	local i pid status=0
+	TMPDIR=$PWD/t incise bench "$@" >out 2>err 3>&- &
+	pid=$!
+	for ((i = 0; i < 3000; i++)); do
+		[ -z "$(ls -A t)" ] || break
+		sleep 0.02
+	done
+	[ -n "$(ls -A t)" ] || complain "no file within 60 s: $(cat err)" || return
+	kill -INT $pid
+	wait $pid || status=$?
+	[ "$status" -eq 1 ] || complain "exit $status: $(cat err)" || return
+	grep -q "^incise bench: interrupted" err || complain "$(cat err)" || return
+	[ -z "$(ls -A t)" ] || complain "left: $(ls -A t)"
+}
+
 # The last run (with --separate-stderr) failed with 1 and one line that holds these texts.
 failed_with() {
 	[ "$status" -eq 1 ] || complain "exit $status: $stderr" || return
