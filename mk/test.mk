@@ -50,14 +50,34 @@ $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
 		$(filter %.c,$^) -lm -pthread
 
-check: ## install what is missing, build, and run all tests
-	@mk/deps build check demo
-	@mk/deps vm || echo "going on without what the test bed needs"
-	@mk/deps module || echo "going on without what checking the module needs"
-	@mk/deps rtsan || echo "going on without RealtimeSanitizer"
-	@mk/deps deb debian || echo "going on without what building packages needs"
-	+@$(MAKE) --no-print-directory check-style check-layers cli-needs
-	+@$(MAKE) --no-print-directory cli_filter="--filter-tags '!slow'" cli-tests check-unit-once check-fuzz check-rtsan check-module check-deb check-vm
+# What `check` is made of: each part is a target, timed. Those of the first line build what the
+# others use; of the others two run side by side with -j2.
+times := $(O)/times
+check-parts:
+	+@$(MAKE) --no-print-directory $(addprefix timed-,check-style check-layers cli-needs)
+	+@$(MAKE) --no-print-directory $(addprefix timed-,$(parts) cli-tests check-fuzz check-rtsan \
+		check-deb check-module check-vm)
+timed-%:
+	+@tests/timed $(times) $* $(MAKE) --no-print-directory $*
+
+check_deps = mk/deps build check demo; \
+	mk/deps vm || echo "going on without what the test bed needs"; \
+	mk/deps module || echo "going on without what checking the module needs"; \
+	mk/deps rtsan || echo "going on without RealtimeSanitizer"; \
+	mk/deps deb debian || echo "going on without what building packages needs"
+in_parts = +@set -e; $(check_deps); mkdir -p $(O); rm -f $(times); status=0; \
+	tests/timed $(times) whole $(MAKE) --no-print-directory check-parts $1 || status=$$?; \
+	tests/timed $(times); exit $$status
+
+check: ## install what is missing, build, and test
+	@echo "left out, and run by make check-all: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests" \
+		"of benches, most unit tests again without sanitizers, most cases of the slowest with them," \
+		"ThreadSanitizer, full attacks on recordings, the second kernel's boot"
+	$(call in_parts,parts=check-unit-once cli_filter="--filter-tags '!slow'" \
+		vm_boots="main:deterministic main:service main:smp")
+
+check-all: ## the same with all tests in all builds, on all kernels: an hour
+	$(call in_parts,parts="check-sanitize check-unit check-tsan" ATTACK=full)
 
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8
@@ -115,7 +135,7 @@ check-cli: cli-needs ## command-line tests of the real programs
 
 # Without building first; `check` starts with these.
 cli-tests:
-	@$(if $(cli_filter),echo "left out: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests of benches; make check-cli runs them; bench_all.bats runs each word once")
+	@$(if $(cli_filter),echo "left out: slow tests of benches; make check-cli runs them; bench_all.bats runs each word once")
 	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure $(cli_filter) tests/cli tests/attack
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
@@ -164,7 +184,7 @@ doc: ## reference of the public headers in build/doc/html; fails where a comment
 
 check-doc: doc
 
-.PHONY: doc check-doc check check-style check-layers check-unit check-unit-once check-cli cli-needs cli-tests check-attack check-sanitize check-tsan can-drive mcap-reader
+.PHONY: doc check-doc check check-all check-parts check-style check-layers check-unit check-unit-once check-cli cli-needs cli-tests check-attack check-sanitize check-tsan can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
