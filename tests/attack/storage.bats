@@ -6,8 +6,8 @@
 
 load ../cli/cli
 
-# What is killed before it got to its first commit, on a host that does other things, has shown
-# nothing.
+# On a busy host a capture may be killed before its first commit; such a run shows nothing and
+# may be repeated.
 BATS_TEST_RETRIES=2
 
 setup() {

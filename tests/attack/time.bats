@@ -7,8 +7,8 @@
 load ../cli/cli
 load ../cli/fastrak
 
-# What is lost by a host that stood still meanwhile is not what is tested: such a test may
-# be done again, twice.
+# A host that itself stood still meanwhile loses samples, which is not tested here: a test may
+# be repeated twice.
 BATS_TEST_RETRIES=2
 
 setup() {
@@ -70,7 +70,7 @@ stalled_capture() {
 	echo "$output" >report.json
 }
 
-# What capture said was lost is what verify finds missing, and what the tables hold.
+# Capture's report, verify and the tables of the recording agree on the samples lost.
 agreed() {
 	local code=0 stream
 	incise verify --json a.rec >verify.json || code=$?

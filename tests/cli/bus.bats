@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# What the tools show of a drive on a bus: who is there, the drive's own cause of a fault,
-# what is counted, homing by the drive. The backend is this test's own, and so is what it
-# tells; the real ones are in can.bats.
+# The tools on a drive on a bus: the devices found, the drive's own cause of a fault,
+# its counters, homing by the drive. The backend and its answers are this test's own; can.bats
+# tests the real ones.
 
 load cli
 

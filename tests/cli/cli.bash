@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# What the command-line tests share: `load cli`. Variables: root, the source tree.
+# Shared part of the command-line tests: `load cli`. Variables: root, the source tree.
 # shellcheck shell=bash
 
 bats_require_minimum_version 1.5.0

@@ -23,7 +23,7 @@ setup() {
 	grep -q 'class="fragment".*motor' "$html/stepper_8h.html"
 }
 
-# What mk/doc reads, with a header of our own.
+# A tree with the files that mk/doc reads, and a header of our own.
 tree_with() { # HEADER-TEXT
 	mkdir -p lib/include/incise doc mk
 	cp "$root/lib/include/incise/export.h" lib/include/incise/

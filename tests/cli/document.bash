@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# What a document says to write and to run: `load document`. A block is marked by a comment in
-# the line before its fence, <!-- file: NAME --> or <!-- WORD -->.
+# Files and commands that a document asks its reader to write and to run: `load document`. A
+# comment in the line before a block's fence marks it, <!-- file: NAME --> or <!-- WORD -->.
 # shellcheck shell=bash
 
 # The block that is to be a file.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# What is asked of a bench's report: `load report`, behind `load cli`.
+# Queries of a bench's report: `load report`, behind `load cli`.
 # shellcheck shell=bash
 
 # A value of the row with a name: row r.json fixed_table bound_N.

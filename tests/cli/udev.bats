@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# Who may open the device nodes of steppers and sources: the rules and the group that make install brings.
+# Access to the device nodes of steppers and sources: the rules and the group that make install brings.
 
 load cli
 

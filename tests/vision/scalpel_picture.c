@@ -83,7 +83,7 @@ static void paint_liver(struct canvas *c, const struct scalpel_picture *p,
 		}
 }
 
-/* How far inside the black (1) or the blade (2) a point is: below 0 outside. */
+/* Distance of a point inside the black or, with blade, inside the blade: below 0 outside. */
 static double inside(const struct scalpel_picture *p, double x, double y, double up_x,
 		     double up_y, bool blade)
 {

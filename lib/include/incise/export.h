@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * What every public header needs: C++ linkage, visibility, printf checking.
+ * Macros that every public header uses: C++ linkage, visibility, printf checking.
  *
  * Conventions of the whole library, not repeated at each function:
  *

@@ -27,7 +27,7 @@
 
 INCISE_BEGIN_DECLS
 
-/** What is fixed about the actuator. */
+/** Constant properties of the actuator. */
 struct incise_stepper_info {
 	char name[64];
 	double spring_N_mm;	   /**< series spring */
@@ -139,7 +139,7 @@ INCISE_API int incise_stepper_home(struct incise_stepper *stepper,
 				   struct incise_stepper_edge_found *edge,
 				   struct incise_error *err);
 
-/** What is fixed about it. */
+/** Returns the constant properties of the actuator. */
 INCISE_API void incise_stepper_info(const struct incise_stepper *stepper,
 				    struct incise_stepper_info *info);
 
@@ -162,7 +162,7 @@ struct incise_stepper_counter {
 };
 
 /**
- * What else than status.late it counts.
+ * Returns the actuator's counter i; status.late is not among them.
  * @param i 0 …
  * @return 0; -ENOENT (there are no more). The strings live as long as the device.
  */

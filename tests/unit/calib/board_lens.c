@@ -71,7 +71,7 @@ static void test_back(void **state)
 	}
 }
 
-/* What is projected from a tilted board is met there. */
+/* board_meet() returns the point of a tilted board that board_project() projected. */
 static void test_meet(void **state)
 {
 	static const double pose[BOARD_POSE] = {0.4, -0.3, 0.8, -20, 5, 130};

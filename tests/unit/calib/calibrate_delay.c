@@ -60,7 +60,7 @@ static double depth_at(const struct hand *h, double t, double *v)
 
 static const struct hand usual = {2, 1.1, 5.5, 2.5, 0.7};
 
-/* What is between motion and the other stream. */
+/* The relation between motion and the other stream. */
 struct link {
 	double delay_ms, drift_ms; /* of the motion's stamps */
 	double contact_mm;

@@ -40,7 +40,7 @@ static const struct truth usual = {
 	.points = 70,
 };
 
-/* How far the force is behind the branch's line, a way s behind the turn. */
+/* Difference between the branch's line and the force, at a distance s behind the turn. */
 static double behind_N(const struct truth *t, double s)
 {
 	double dead = t->backlash_mm + t->leap_N / t->N_mm;

@@ -55,7 +55,7 @@ static void about(double q[4], double x, double y, double z)
 	q[3] = z * scale;
 }
 
-/* How the tool is turned, and what is wrong with it. */
+/* The tool's rotation and its faults. */
 struct motion {
 	double tip[3], pivot[3];
 	double cone_deg, roll_deg;

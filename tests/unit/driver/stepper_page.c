@@ -34,7 +34,7 @@ static struct {
 	int read, stored;
 } owner;
 
-/* What belongs to a seq: every field tells of a mixture. */
+/* The setpoint of a seq: a mixture of two shows in every field. */
 static void fill(struct incise_stepper_setpoint *slot, __u32 seq)
 {
 	slot->mode = seq / 2 % 2;

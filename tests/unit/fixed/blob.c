@@ -120,7 +120,7 @@ static void same_in_batches(const struct incise_fixed *fx, uint64_t *seed)
 		assert_int_equal(y[n], incise_fixed_eval(fx, x + n * fx->n_inputs));
 }
 
-/* What layout.h calls zero, a bound that there always is, names that end. */
+/* Unused fields that must be zero, a bound that every input has, and names that must be valid. */
 static void test_unused_fields(void **state)
 {
 	static const struct {

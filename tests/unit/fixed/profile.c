@@ -347,7 +347,7 @@ static void test_stops_as_stated(void **state)
 	assert_true(met > 1000);
 }
 
-/* What is stated is not more than a stop from full speed takes: to the tick, and a step. */
+/* The stated stopping time is a stop's from full speed to the tick, the stated way to one step. */
 static void test_stops_no_earlier(void **state)
 {
 	static const struct incise_profile_limits rows[] = {

@@ -698,7 +698,7 @@ static void test_extreme_data(void **state)
 		}
 }
 
-/* What leaves nothing to learn is refused in one line that names it. */
+/* Pairs that leave nothing to learn are refused in one line that names the cause. */
 static void test_too_little_data(void **state)
 {
 	double rows[60 * 3];

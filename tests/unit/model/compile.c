@@ -50,7 +50,7 @@ static void test_budget_chooses(void **state)
 	incise_model_free(model);
 }
 
-/* What the default budget promises: 0.1 mN is certified for models of the paper's size over 0–20 mm × 0–50 mm/s. */
+/* The default budget certifies 0.1 mN for models of the paper's size over 0–20 mm × 0–50 mm/s. */
 static void test_default_budget_holds(void **state)
 {
 	for (uint64_t seed = 1; seed <= 10; seed++) {

@@ -190,7 +190,7 @@ static void test_grids_go_a_way_of_their_own(void **state)
 	free(model);
 }
 
-/* What is a grid, in whatever order, and what is one no more. */
+/* Rules in any order are a grid; a list with a rule missing, repeated or altered is none. */
 static void test_grids_are_told_from_lists(void **state)
 {
 	enum { NONE, SWAP, TWICE, LEAVE_OUT, WEIGHT, MIN, FEWER };

@@ -34,7 +34,7 @@ static double normal(uint64_t *state)
 	return sqrt(-2 * log(uniform(state))) * cos(angle);
 }
 
-/* What slows each kind of work down. */
+/* Factors that slow each kind of work down. */
 struct made {
 	double slower, chain, wide, memory;
 };
@@ -85,7 +85,7 @@ static int count(const json_t *comparison, const char *key)
 	return json_is_array(is) ? (int)json_array_size(is) : (int)json_integer_value(is);
 }
 
-/* How many metrics of so many pairs get worse, and better. */
+/* Counts the metrics that get worse and better over PAIRS pairs of reports. */
 static void tally(const struct made *was, const struct made *is, int *worse, int *better)
 {
 	uint64_t random = 1;
