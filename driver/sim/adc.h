@@ -88,7 +88,6 @@ struct sim_adc {
 /* adc.c */
 int sim_adc_add(struct sim_adc *adc, struct device *parent);
 void sim_adc_remove(struct sim_adc *adc);
-int sim_adc_set_frequency(struct sim_adc *adc, int hertz);
 
 /* converter.c */
 u16 sim_adc_convert(struct sim_adc *adc);
@@ -98,9 +97,5 @@ void sim_adc_start(struct sim_adc *adc);
 void sim_adc_files(struct sim_adc *adc, struct dentry *parent);
 int sim_adc_init(struct sim_adc *adc);
 void sim_adc_free(struct sim_adc *adc);
-
-/* trigger.c */
-int sim_trigger_add(struct sim_adc *adc, struct device *parent);
-void sim_trigger_remove(struct sim_adc *adc);
 
 #endif

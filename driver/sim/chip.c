@@ -1,63 +1,26 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * The lines: what gpiolib calls, and the file "inputs" by which a test drives
- * them. A line has two levels, the one that the chip puts out and the one that
- * the world outside drives; its direction says which one counts:
+ * The lines as gpiolib sees them. A line has two levels, the one that the chip
+ * puts out and the one that the world outside drives; its direction selects
+ * which one counts:
  *
  *	set() --------> out ----\  output
  *	                         >---------> level
  *	inputs, --> driven -----/  input
  *	carriage, script
  */
-#include <linux/fs.h>
 #include <linux/module.h>
-#include <linux/seq_file.h>
-#include <linux/slab.h>
 
 #include "../compat.h"
 #include "sim.h"
 
-bool sim_level_locked(const struct sim *sim, unsigned int line)
-{
-	return test_bit(line, sim->output) ? test_bit(line, sim->out)
-					   : test_bit(line, sim->driven);
-}
-
-/* The level has changed: tell everyone, in the order of cause and effect. */
+/* The level of an output has changed: pass it on in the order of cause and effect. */
 static void sim_changed_locked(struct sim *sim, unsigned int line, bool value,
 			       unsigned int flags)
 {
-	bool output = test_bit(line, sim->output);
-
-	sim_edges_put_locked(sim, line, value,
-			     flags | (output ? 0 : INCISE_SIM_EDGE_INPUT));
-	if (output)
-		sim_carriage_step_locked(sim, line, value);
-	else
-		sim_interrupt_edge_locked(sim, line, value);
+	sim_edges_put_locked(sim, line, value, flags);
+	sim_carriage_step_locked(sim, line, value);
 	sim_script_count_locked(sim, line, value);
-}
-
-/**
- * sim_drive_locked() - the world outside drives a line
- * @sim:	the chip, locked
- * @line:	the line; if it is an output, the level is kept for later
- * @value:	its level
- */
-void sim_drive_locked(struct sim *sim, unsigned int line, bool value)
-{
-	if (test_bit(line, sim->driven) == value)
-		return;
-	__assign_bit(line, sim->driven, value);
-	if (!test_bit(line, sim->output))
-		sim_changed_locked(sim, line, value, 0);
-}
-
-/* To be called before the lock is released after any change. */
-void sim_settle_locked(struct sim *sim)
-{
-	if (sim->fired)
-		sim_script_fire_locked(sim);
 }
 
 static void sim_put_out_locked(struct sim *sim, unsigned int line, bool value)
@@ -165,82 +128,4 @@ void sim_chip_remove(struct sim *sim)
 {
 	gpiochip_remove(&sim->chip);
 	irq_work_sync(&sim->work);
-}
-
-static int sim_inputs_show(struct seq_file *seq, void *unused)
-{
-	struct sim *sim = seq->private;
-	unsigned int line;
-
-	for (line = 0; line < sim->lines; line++)
-		seq_printf(seq, "%u %s %d\n", line,
-			   test_bit(line, sim->output) ? "out" : "in",
-			   sim_level_locked(sim, line));
-	return 0;
-}
-
-static int sim_inputs_open(struct inode *inode, struct file *file)
-{
-	return single_open(file, sim_inputs_show, inode->i_private);
-}
-
-/* All pairs are understood before the first one is applied. */
-static int sim_inputs_parse(const struct sim *sim, char *text, unsigned long *mask,
-			    unsigned long *bits)
-{
-	char *word;
-
-	while ((word = sim_text_word(&text))) {
-		char *level = sim_text_word(&text);
-		bool value;
-		int line;
-
-		if (!level || sim_text_line(sim, word, &line) ||
-		    sim_text_bool(level, &value) || test_bit(line, mask))
-			return -EINVAL;
-		__set_bit(line, mask);
-		__assign_bit(line, bits, value);
-	}
-	return bitmap_empty(mask, INCISE_SIM_LINES_MAX) ? -EINVAL : 0;
-}
-
-static ssize_t sim_inputs_write(struct file *file, const char __user *from, size_t size,
-				loff_t *unused)
-{
-	struct sim *sim = ((struct seq_file *)file->private_data)->private;
-	DECLARE_BITMAP(mask, INCISE_SIM_LINES_MAX) = {};
-	DECLARE_BITMAP(bits, INCISE_SIM_LINES_MAX) = {};
-	unsigned long flags;
-	unsigned int line;
-	char *text;
-	int ret;
-
-	text = sim_text_read(from, size);
-	if (IS_ERR(text))
-		return PTR_ERR(text);
-	ret = sim_inputs_parse(sim, text, mask, bits);
-	kfree(text);
-	if (ret)
-		return ret;
-
-	raw_spin_lock_irqsave(&sim->lock, flags);
-	for_each_set_bit(line, mask, sim->lines)
-		sim_drive_locked(sim, line, test_bit(line, bits));
-	sim_settle_locked(sim);
-	raw_spin_unlock_irqrestore(&sim->lock, flags);
-	return size;
-}
-
-static const struct file_operations sim_inputs_fops = {
-	.owner = THIS_MODULE,
-	.open = sim_inputs_open,
-	.read = seq_read,
-	.write = sim_inputs_write,
-	.llseek = seq_lseek,
-	.release = single_release,
-};
-
-void sim_chip_files(struct sim *sim)
-{
-	debugfs_create_file("inputs", 0600, sim->dir, sim, &sim_inputs_fops);
 }

@@ -40,10 +40,9 @@ static int sim_probe(struct platform_device *device)
 	}
 	platform_set_drvdata(device, sim);
 	sim->dir = debugfs_create_dir("incise_sim", NULL);
-	sim_chip_files(sim);
 	sim_edges_files(sim);
 	sim_carriage_files(sim);
-	sim_script_files(sim);
+	sim_inputs_files(sim);
 	sim_adc_files(&sim_adc_instance, sim->dir);
 	return 0;
 }

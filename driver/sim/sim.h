@@ -164,10 +164,6 @@ struct sim {
 /* chip.c */
 int sim_chip_add(struct sim *sim, struct device *parent);
 void sim_chip_remove(struct sim *sim);
-bool sim_level_locked(const struct sim *sim, unsigned int line);
-void sim_drive_locked(struct sim *sim, unsigned int line, bool value);
-void sim_settle_locked(struct sim *sim);
-void sim_chip_files(struct sim *sim);
 
 /* interrupt.c */
 void sim_interrupt_init(struct sim *sim);
@@ -184,10 +180,12 @@ void sim_edges_files(struct sim *sim);
 void sim_carriage_step_locked(struct sim *sim, unsigned int line, bool value);
 void sim_carriage_files(struct sim *sim);
 
-/* script.c */
+/* inputs.c */
+bool sim_level_locked(const struct sim *sim, unsigned int line);
 void sim_script_count_locked(struct sim *sim, unsigned int line, bool value);
-void sim_script_fire_locked(struct sim *sim);
-void sim_script_files(struct sim *sim);
+void sim_drive_locked(struct sim *sim, unsigned int line, bool value);
+void sim_settle_locked(struct sim *sim);
+void sim_inputs_files(struct sim *sim);
 
 /* text.c: what people write into debugfs */
 char *sim_text_read(const char __user *from, size_t size);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * Scripts: "after K edges of line L drive input M to V", so that an e-stop or
- * a fault comes at an exact moment of a motion. See incise_sim.h for the words
- * of the file "scripts".
+ * Inputs: the world outside drives them through the file "inputs", by a
+ * carriage, or by a script "after K edges of line L drive input M to V", so
+ * that an e-stop or a fault comes at an exact moment of a motion. See
+ * incise_sim.h for the words of the file "scripts".
  */
 #include <linux/bitops.h>
 #include <linux/fs.h>
@@ -14,6 +15,12 @@
 #include "sim.h"
 
 static_assert(INCISE_SIM_SCRIPTS <= 64); /* one bit each in scripts_of, fired */
+
+bool sim_level_locked(const struct sim *sim, unsigned int line)
+{
+	return test_bit(line, sim->output) ? test_bit(line, sim->out)
+					   : test_bit(line, sim->driven);
+}
 
 /* An edge of a line: one less to wait for. */
 void sim_script_count_locked(struct sim *sim, unsigned int line, bool value)
@@ -32,8 +39,29 @@ void sim_script_count_locked(struct sim *sim, unsigned int line, bool value)
 	}
 }
 
-/* A script may drive a line that fires the next one. Each fires once: it ends. */
-void sim_script_fire_locked(struct sim *sim)
+/**
+ * sim_drive_locked() - the world outside drives a line
+ * @sim:	the chip, locked
+ * @line:	the line; if it is an output, the level is kept for later
+ * @value:	its level
+ */
+void sim_drive_locked(struct sim *sim, unsigned int line, bool value)
+{
+	if (test_bit(line, sim->driven) == value)
+		return;
+	__assign_bit(line, sim->driven, value);
+	if (test_bit(line, sim->output))
+		return;
+	sim_edges_put_locked(sim, line, value, INCISE_SIM_EDGE_INPUT);
+	sim_interrupt_edge_locked(sim, line, value);
+	sim_script_count_locked(sim, line, value);
+}
+
+/*
+ * To be called before the lock is released after any change. A script may drive
+ * a line that fires the next one. Each fires once: it ends.
+ */
+void sim_settle_locked(struct sim *sim)
 {
 	while (sim->fired) {
 		unsigned int i = __ffs64(sim->fired);
@@ -182,10 +210,84 @@ static const struct file_operations sim_script_fops = {
 	.release = single_release,
 };
 
-void sim_script_files(struct sim *sim)
+static int sim_inputs_show(struct seq_file *seq, void *unused)
+{
+	struct sim *sim = seq->private;
+	unsigned int line;
+
+	for (line = 0; line < sim->lines; line++)
+		seq_printf(seq, "%u %s %d\n", line,
+			   test_bit(line, sim->output) ? "out" : "in",
+			   sim_level_locked(sim, line));
+	return 0;
+}
+
+static int sim_inputs_open(struct inode *inode, struct file *file)
+{
+	return single_open(file, sim_inputs_show, inode->i_private);
+}
+
+/* All pairs are understood before the first one is applied. */
+static int sim_inputs_parse(const struct sim *sim, char *text, unsigned long *mask,
+			    unsigned long *bits)
+{
+	char *word;
+
+	while ((word = sim_text_word(&text))) {
+		char *level = sim_text_word(&text);
+		bool value;
+		int line;
+
+		if (!level || sim_text_line(sim, word, &line) ||
+		    sim_text_bool(level, &value) || test_bit(line, mask))
+			return -EINVAL;
+		__set_bit(line, mask);
+		__assign_bit(line, bits, value);
+	}
+	return bitmap_empty(mask, INCISE_SIM_LINES_MAX) ? -EINVAL : 0;
+}
+
+static ssize_t sim_inputs_write(struct file *file, const char __user *from, size_t size,
+				loff_t *unused)
+{
+	struct sim *sim = ((struct seq_file *)file->private_data)->private;
+	DECLARE_BITMAP(mask, INCISE_SIM_LINES_MAX) = {};
+	DECLARE_BITMAP(bits, INCISE_SIM_LINES_MAX) = {};
+	unsigned long flags;
+	unsigned int line;
+	char *text;
+	int ret;
+
+	text = sim_text_read(from, size);
+	if (IS_ERR(text))
+		return PTR_ERR(text);
+	ret = sim_inputs_parse(sim, text, mask, bits);
+	kfree(text);
+	if (ret)
+		return ret;
+
+	raw_spin_lock_irqsave(&sim->lock, flags);
+	for_each_set_bit(line, mask, sim->lines)
+		sim_drive_locked(sim, line, test_bit(line, bits));
+	sim_settle_locked(sim);
+	raw_spin_unlock_irqrestore(&sim->lock, flags);
+	return size;
+}
+
+static const struct file_operations sim_inputs_fops = {
+	.owner = THIS_MODULE,
+	.open = sim_inputs_open,
+	.read = seq_read,
+	.write = sim_inputs_write,
+	.llseek = seq_lseek,
+	.release = single_release,
+};
+
+void sim_inputs_files(struct sim *sim)
 {
 	memset(sim->script, 0, sizeof(sim->script));
 	memset(sim->scripts_of, 0, sizeof(sim->scripts_of));
 	sim->fired = 0;
+	debugfs_create_file("inputs", 0600, sim->dir, sim, &sim_inputs_fops);
 	debugfs_create_file("scripts", 0600, sim->dir, sim, &sim_script_fops);
 }
