@@ -59,7 +59,7 @@ AVX2_INLINE __m256i high_halves(__m256i v)
 }
 
 /* Inputs in the lower halves, as distances from the support's lower end, clamped. */
-AVX2_INLINE __m256i from_min(const struct incise_fixed_input *in, __m256i x)
+AVX2_INLINE __m256i distance_from_min(const struct incise_fixed_input *in, __m256i x)
 {
 	const __m256i min = _mm256_set1_epi32(in->min), max = _mm256_set1_epi32(in->max);
 
@@ -68,14 +68,14 @@ AVX2_INLINE __m256i from_min(const struct incise_fixed_input *in, __m256i x)
 	return _mm256_and_si256(x, _mm256_set1_epi64x(UINT32_MAX));
 }
 
-AVX2_INLINE struct place locate(const struct incise_fixed_input *in, __m256i from_min)
+AVX2_INLINE struct place locate(const struct incise_fixed_input *in, __m256i distance)
 {
 	const __m256i width = _mm256_set1_epi64x((int64_t)1 << in->cell_shift);
 	const __m256i mask = _mm256_sub_epi64(width, _mm256_set1_epi64x(1));
 	struct place p;
 
-	p.cell = _mm256_srl_epi64(from_min, _mm_cvtsi32_si128(in->cell_shift));
-	p.to = _mm256_and_si256(from_min, mask);
+	p.cell = _mm256_srl_epi64(distance, _mm_cvtsi32_si128(in->cell_shift));
+	p.to = _mm256_and_si256(distance, mask);
 	p.from = _mm256_sub_epi64(width, p.to);
 	return p;
 }
@@ -123,7 +123,7 @@ AVX2 static void one_input(const struct incise_fixed *fx, const int32_t *x, int3
 	for (size_t k = 0; k < n; k += LANES) {
 		__m256i at =
 			_mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i *)(x + k)));
-		struct place p = locate(in, from_min(in, at));
+		struct place p = locate(in, distance_from_min(in, at));
 		__m256i v = pairs(fx->data, p.cell);
 
 		store_low(y + k, round_output(fx, v, high_halves(v), &p, in->cell_shift));
@@ -140,8 +140,8 @@ AVX2 static void force(const struct incise_fixed *fx, const int32_t *x, int32_t 
 
 	for (size_t k = 0; k < n; k += LANES) {
 		__m256i at = _mm256_loadu_si256((const __m256i *)(x + 2 * k));
-		struct place pa = locate(a, from_min(a, at));
-		struct place pb = locate(b, from_min(b, high_halves(at)));
+		struct place pa = locate(a, distance_from_min(a, at));
+		struct place pb = locate(b, distance_from_min(b, high_halves(at)));
 		__m256i index =
 			_mm256_add_epi64(_mm256_mul_epu32(pa.cell, width), pb.cell);
 		__m256i low = pairs(fx->data, index);
@@ -179,7 +179,7 @@ AVX2_INLINE __m256i add_up(__m256i v0, __m256i v1, __m256i v2, __m256i v3)
 }
 
 /* w in the lower halves; outputs g in the lower halves, h in the upper. */
-AVX2_INLINE void weigh(struct sums *s, __m256i w, __m256i fold, __m256i fold_to)
+AVX2_INLINE void add_weighted(struct sums *s, __m256i w, __m256i fold, __m256i fold_to)
 {
 	s->g[0] = _mm256_add_epi64(s->g[0], _mm256_mul_epi32(w, fold));
 	s->g[1] = _mm256_add_epi64(s->g[1], _mm256_mul_epi32(w, fold_to));
@@ -196,8 +196,9 @@ AVX2_INLINE void weigh_four(struct sums *s, const struct rows *r, int i,
 	__m256i w_to =
 		_mm256_cvtepu32_epi64(_mm_loadu_si128((const __m128i *)(weight + r->n)));
 
-	weigh(s, lerp(w, w_to, p, shift), _mm256_loadu_si256((const __m256i *)fold),
-	      _mm256_loadu_si256((const __m256i *)(fold + 2 * r->n)));
+	add_weighted(s, lerp(w, w_to, p, shift),
+		     _mm256_loadu_si256((const __m256i *)fold),
+		     _mm256_loadu_si256((const __m256i *)(fold + 2 * r->n)));
 }
 
 /* The same for the last one to three: nothing beyond the rows is read, and a weight of 0
@@ -213,9 +214,9 @@ AVX2_INLINE void weigh_rest(struct sums *s, const struct rows *r, int i,
 	__m256i w = _mm256_cvtepu32_epi64(_mm_maskload_epi32(weight, mask_w));
 	__m256i w_to = _mm256_cvtepu32_epi64(_mm_maskload_epi32(weight + r->n, mask_w));
 
-	weigh(s, lerp(w, w_to, p, shift),
-	      _mm256_maskload_epi64((const long long *)fold, mask),
-	      _mm256_maskload_epi64((const long long *)(fold + 2 * r->n), mask));
+	add_weighted(s, lerp(w, w_to, p, shift),
+		     _mm256_maskload_epi64((const long long *)fold, mask),
+		     _mm256_maskload_epi64((const long long *)(fold + 2 * r->n), mask));
 }
 
 /* Four evaluations in a lane each, function i: a vector with one function of a single
@@ -231,8 +232,8 @@ AVX2_INLINE void weigh_across(struct sums *s, const struct rows *r, int i,
 	__m256i w_to =
 		_mm256_cvtepu32_epi64(_mm256_i64gather_epi32(weight + r->n, row_a, 4));
 
-	weigh(s, lerp(w, w_to, pa, shift), pairs(fold, row_b),
-	      pairs(fold + 2 * r->n, row_b));
+	add_weighted(s, lerp(w, w_to, pa, shift), pairs(fold, row_b),
+		     pairs(fold + 2 * r->n, row_b));
 }
 
 /* Four evaluations' sums, a lane each. n is a constant where it matters for speed. */
@@ -282,9 +283,9 @@ AVX2_INLINE void table_of(const struct incise_fixed *fx, const int32_t *x, int32
 
 	for (size_t k = 0; k < count; k += LANES) {
 		__m256i at = _mm256_loadu_si256((const __m256i *)(x + 2 * k));
-		__m256i from_a = from_min(a, at), centred, v[2];
+		__m256i from_a = distance_from_min(a, at), centred, v[2];
 		struct place pa = locate(a, from_a);
-		struct place pb = locate(b, from_min(b, high_halves(at)));
+		struct place pb = locate(b, distance_from_min(b, high_halves(at)));
 		struct sums s = table_sums(fx, &pa, &pb, n);
 
 		centred = _mm256_sub_epi64(from_a, middle);

@@ -10,20 +10,6 @@
 #include <string.h>
 #include "mesh.h"
 
-void mesh_free(struct mesh *mesh)
-{
-	if (!mesh)
-		return;
-	free(mesh->vertex);
-	free(mesh->normal);
-	free(mesh->corner);
-	free(mesh->neighbour);
-	free(mesh->number);
-	free(mesh->uv);
-	bvh_free(&mesh->bvh);
-	free(mesh);
-}
-
 size_t mesh_memory(const struct mesh *mesh)
 {
 	size_t triangle = sizeof(*mesh->corner) + sizeof(*mesh->neighbour) +

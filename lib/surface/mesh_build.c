@@ -307,6 +307,20 @@ static int number_vertices(struct mesh_builder *b)
 	return 0;
 }
 
+void mesh_free(struct mesh *mesh)
+{
+	if (!mesh)
+		return;
+	free(mesh->vertex);
+	free(mesh->normal);
+	free(mesh->corner);
+	free(mesh->neighbour);
+	free(mesh->number);
+	free(mesh->uv);
+	bvh_free(&mesh->bvh);
+	free(mesh);
+}
+
 struct mesh *mesh_new(const struct mesh_draft *draft, struct incise_error *err)
 {
 	struct mesh_builder b = {.draft = draft, .err = err};
@@ -485,19 +499,19 @@ int bvh_build(struct bvh *bvh, const float (*box)[2][3], uint32_t n, uint32_t *o
 {
 	struct builder b = {.box = box, .bvh = bvh, .random = 1};
 	/* A leaf has two triangles or more, but for a single one. */
-	size_t room = (size_t)n / 2 + 1;
+	size_t capacity = (size_t)n / 2 + 1;
 	float all[2][3];
 	uint32_t root;
 
 	bvh->n_nodes = 0;
-	bvh->node = aligned_alloc(sizeof(*bvh->node), room * sizeof(*bvh->node));
+	bvh->node = aligned_alloc(sizeof(*bvh->node), capacity * sizeof(*bvh->node));
 	b.item = malloc(n * sizeof(*b.item));
 	if (!bvh->node || !b.item) {
 		free(b.item);
 		bvh_free(bvh);
 		return -ENOMEM;
 	}
-	memset(bvh->node, 0, room * sizeof(*bvh->node));
+	memset(bvh->node, 0, capacity * sizeof(*bvh->node));
 	for (uint32_t k = 0; k < n; k++) {
 		for (int i = 0; i < 3; i++)
 			b.item[k].middle[i] = box[k][0][i] / 2 + box[k][1][i] / 2;

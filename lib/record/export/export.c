@@ -14,7 +14,7 @@
 #include <incise/outfile.h>
 #include "../read/cut.h"
 #include "../read/recording.h"
-#include "export.h"
+#include "writers.h"
 #include "provenance.h"
 #include "table_writer.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A recording as messages for viewers; see export.h.
+ * A recording as messages for viewers; see writers.h.
  *
  *     force ──┐
  *     tracker ├──► the earliest ──► JSON ──► MCAP
@@ -18,7 +18,7 @@
 #include "../read/recording.h"
 #include "../read/rows.h"
 #include "decimal.h"
-#include "export.h"
+#include "writers.h"
 
 /*
  * --- MCAP, the log format of viewers such as Foxglove; https://mcap.dev/spec ----------------

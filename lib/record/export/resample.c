@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * A recording on one grid of time; see export.h. Memory is that of the samples near a row.
+ * A recording on one grid of time; see writers.h. Memory is that of the samples near a row.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include "../read/recording.h"
-#include "export.h"
+#include "writers.h"
 #include "interpolators.h"
 
 #define SINGLE(name, unit, about, decimals)                       \

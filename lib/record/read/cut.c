@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The cuts of a recording; see cut.h.
+ * The cuts of a recording, see cut.h, and its info, which needs them.
  */
 #include <errno.h>
 #include <math.h>
@@ -194,5 +194,85 @@ int incise_cuts_next(struct incise_cuts *cuts, struct incise_cut_sample *sample,
 	/* Rows behind the last force sample are checked too. */
 	while (!rc && cuts->after.t_ns != INCISE_TIME_NONE)
 		rc = step_depth(cuts, err) < 0 ? -errno : 0;
+	return rc;
+}
+
+/* --- info -------------------------------------------------------------------------- */
+
+/* The rows of the tracker are checked here, because they are not exported. */
+static int check_tracker(struct incise_recording *rec, struct incise_error *err)
+{
+	sqlite3_stmt *stmt;
+	uint64_t rows = 0;
+	int64_t last_ns = -1;
+	int rc;
+
+	if (sqlite3_prepare_v2(
+		    rec->db,
+		    "SELECT seq, t_ns, arrival_ns, status, x_mm, y_mm, z_mm, qw, qx, "
+		    "qy, qz FROM tracker ORDER BY seq",
+		    -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(rec->db, rec->path, err);
+	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW) {
+		bool good = sqlite3_column_type(stmt, 1) == SQLITE_INTEGER &&
+			    sqlite3_column_int64(stmt, 1) > last_ns &&
+			    sqlite3_column_type(stmt, 2) == SQLITE_INTEGER &&
+			    sqlite3_column_type(stmt, 3) == SQLITE_TEXT;
+
+		for (int i = 4; i < 11; i++)
+			good = good && sqlite3_column_type(stmt, i) == SQLITE_FLOAT &&
+			       isfinite(sqlite3_column_double(stmt, i));
+		if (!good) {
+			rc = incise_error_set(
+				err, EINVAL,
+				"%s: damaged: table tracker, row %lld cannot be",
+				rec->path, (long long)sqlite3_column_int64(stmt, 0));
+			goto out;
+		}
+		last_ns = sqlite3_column_int64(stmt, 1);
+		rows++;
+	}
+	if (rc != SQLITE_DONE)
+		rc = incise_schema_fail(rec->db, rec->path, err);
+	else if (rows != rec->meta.tracker)
+		rc = incise_error_set(err, EINVAL,
+				      "%s: damaged: table tracker has %llu rows of %llu",
+				      rec->path, (unsigned long long)rows,
+				      (unsigned long long)rec->meta.tracker);
+	else
+		rc = 0;
+out:
+	sqlite3_finalize(stmt);
+	return rc;
+}
+
+int incise_recording_info(struct incise_recording *rec,
+			  struct incise_recording_info *info, struct incise_error *err)
+{
+	struct incise_cut_sample sample;
+	struct incise_cuts cuts;
+	int rc = check_tracker(rec, err);
+
+	*info = rec->meta;
+	if (rc)
+		return rc;
+	rc = incise_recording_streams(rec, info->streams, err);
+	if (rc < 0)
+		return rc;
+	info->n_streams = rc;
+	rc = incise_cuts_open(&cuts, rec, err);
+	if (rc)
+		return rc;
+	info->depth_max_mm = 0;
+	info->force_max_N = 0;
+	while ((rc = incise_cuts_next(&cuts, &sample, err)) > 0) {
+		info->depth_max_mm = fmax(info->depth_max_mm, sample.depth_mm);
+		info->force_max_N =
+			fmax(info->force_max_N, sample.force_N); /* NaN: no zero */
+	}
+	info->cuts = cuts.cut.count;
+	info->start_ns = cuts.first_ns;
+	info->end_ns = cuts.last_ns;
+	incise_cuts_close(&cuts);
 	return rc;
 }

@@ -5,7 +5,7 @@
  */
 #include "recorded.h"
 #include "../../../lib/record/export/interpolators.h"
-#include "../../../lib/record/export/export.h"
+#include "../../../lib/record/export/writers.h"
 
 static int record_once(void **state)
 {
