@@ -54,15 +54,15 @@ has_vision := $(if $(shell $(CXX) -E -x c++ $(opencv_cflags) -include opencv2/im
 has_board := $(if $(has_vision),$(if $(shell $(CXX) -E -x c++ $(opencv_cflags) \
 	-include opencv2/calib3d.hpp /dev/null >/dev/null 2>&1 && echo yes),yes))
 
-# One shared object per group of rooms; a process maps only the ones it uses.
-# Pictures of a scene need a screen's libraries; without them that library and its verb are not
-# built.
+# One shared object per group of layers; a process maps only the ones it uses.
+# The image of a scene needs the libraries of a screen; without them that library and its
+# command are not built.
 has_view := $(shell $(PKG_CONFIG) --exists sdl2 epoxy cairo egl && echo yes)
 libraries := incise incise-learn incise-record $(if $(has_view),incise-view)
-rooms_incise := base fixed model surface tissue control sim device scene loop
-rooms_incise-learn := learn calib
-rooms_incise-record := $(addprefix record,/ /time /write /read /verify /export /replay)
-rooms_incise-view := view
+layers_incise := base fixed model surface tissue control sim device scene loop
+layers_incise-learn := learn calib
+layers_incise-record := $(addprefix record,/ /time /write /read /verify /export /replay)
+layers_incise-view := view
 pc_incise := libconfig
 pc_incise-learn := lapacke lapack blas
 pc_incise-record := sqlite3 zlib
@@ -84,8 +84,8 @@ needs_incise-learn := incise
 needs_incise-record := incise
 needs_incise-view := incise
 
-# One program per verb.
-verbs := $(filter-out $(if $(has_view),,view bench-view),$(patsubst tools/incise-%.c,%,\
+# One program per command.
+commands := $(filter-out $(if $(has_view),,view bench-view),$(patsubst tools/incise-%.c,%,\
 	$(wildcard tools/incise-*.c)))
 
 # A short line for each step of the build; V=1 shows the whole commands.

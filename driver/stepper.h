@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-only */
 /*
- * incise_stepper.ko inside: the structs that its files share. The door for
+ * incise_stepper.ko inside: the structs that its files share. The interface for
  * programs is uapi/incise_stepper.h.
  *
  *   page ──▶ motor ──▶ profile ──▶ edges ──▶ lines      a hard timer per motor
@@ -111,10 +111,10 @@ struct stepper_motor {
 	u64 steps_up, steps_down, late, shifted_ns;
 
 	/* Set-point */
-	struct stepper_wish wish; /* in force; seq is what was seen */
-	s64 target;		  /* clamped */
-	bool asked;		  /* the profile does not know target yet */
-	s64 seen_ns;		  /* the last sign of life */
+	struct stepper_setpoint setpoint; /* in force; seq is what was seen */
+	s64 target;			  /* clamped */
+	bool asked;			  /* the profile does not know target yet */
+	s64 seen_ns;			  /* the last sign of life */
 
 	/* Motion */
 	struct incise_profile profile;

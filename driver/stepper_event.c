@@ -58,7 +58,7 @@ u64 stepper_event_last(struct stepper *stepper)
  * @stepper:	the controller
  * @after:	seq of the last one taken; moved on
  * @to:		where
- * @n:		room, few: interrupts are off meanwhile
+ * @n:		capacity, small: interrupts are off meanwhile
  *
  * Return: how many.
  */

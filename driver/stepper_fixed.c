@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * The integer force model inside the kernel: the door to a force loop here. So far it
+ * The integer force model inside the kernel: the interface for a force loop here. So far it
  * shows that the kernel computes the same bits as a program, in debugfs:
  *
  *   incise_stepper/fixed/

@@ -156,12 +156,12 @@ static void stepper_motor_listen(struct stepper_motor *motor, s64 now)
 
 	if (motor->disabling)
 		return;
-	switch (stepper_page_take(&stepper->setpoints[motor->index], &motor->wish)) {
+	switch (stepper_page_take(&stepper->setpoints[motor->index], &motor->setpoint)) {
 	case STEPPER_PAGE_TAKEN:
 		motor->seen_ns = now;
-		motor->target = stepper_page_clamp(&motor->wish, &motor->config);
+		motor->target = stepper_page_clamp(&motor->setpoint, &motor->config);
 		motor->flags &= ~INCISE_STEPPER_FLAG_HELD;
-		if (motor->target != motor->wish.target)
+		if (motor->target != motor->setpoint.target)
 			motor->flags |= INCISE_STEPPER_FLAG_HELD;
 		motor->asked = true;
 		break;
@@ -182,7 +182,7 @@ static void stepper_motor_aim(struct stepper_motor *motor, s64 now)
 
 	if (!motor->asked || motor->disabling || now < motor->powered_ns)
 		return;
-	if (motor->wish.mode == INCISE_STEPPER_MODE_VELOCITY)
+	if (motor->setpoint.mode == INCISE_STEPPER_MODE_VELOCITY)
 		mode = INCISE_PROFILE_VELOCITY;
 	incise_profile_target(&motor->profile, mode, motor->target);
 	motor->asked = false;

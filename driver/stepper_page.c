@@ -38,20 +38,20 @@ union slot_copy {
 /**
  * stepper_page_take() - look for a new set-point
  * @slot:	in the page, aligned to 8 bytes
- * @wish:	the last one taken; @wish->seq says what is not new
+ * @setpoint:	the last one taken; @setpoint->seq says what is not new
  *
  * A slot whose seq is odd for ever gives nothing for ever, and the deadman acts.
  * Garbage is told once per seq.
  */
 enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint *slot,
-					   struct stepper_wish *wish)
+					   struct stepper_setpoint *setpoint)
 {
 	const union slot_copy *from = (const union slot_copy *)slot;
 	union slot_copy copy;
 	__u32 seq = READ_ONCE(slot->seq);
 	unsigned int i;
 
-	if (seq & 1 || seq == wish->seq)
+	if (seq & 1 || seq == setpoint->seq)
 		return STEPPER_PAGE_NOTHING;
 	smp_rmb(); /* with the owner's barrier between the fields and seq+2 */
 	for (i = 0; i < SLOT_WORDS; i++)
@@ -60,35 +60,35 @@ enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint 
 	if (READ_ONCE(slot->seq) != seq)
 		return STEPPER_PAGE_NOTHING;
 
-	wish->seq = seq;
+	setpoint->seq = seq;
 	if (copy.setpoint.mode > INCISE_STEPPER_MODE_VELOCITY || copy.setpoint.reserved0)
 		return STEPPER_PAGE_GARBAGE;
 	for (i = 0; i < ARRAY_SIZE(copy.setpoint.reserved); i++)
 		if (copy.setpoint.reserved[i])
 			return STEPPER_PAGE_GARBAGE;
-	wish->mode = copy.setpoint.mode;
-	wish->target = copy.setpoint.target;
-	wish->t_ns = copy.setpoint.t_ns;
+	setpoint->mode = copy.setpoint.mode;
+	setpoint->target = copy.setpoint.target;
+	setpoint->t_ns = copy.setpoint.t_ns;
 	return STEPPER_PAGE_TAKEN;
 }
 
 /**
  * stepper_page_clamp() - the target within a motor's limits
- * @wish:	what was asked for
+ * @setpoint:	what was asked for
  * @config:	a config that stepper_page_config() let pass
  */
-__s64 stepper_page_clamp(const struct stepper_wish *wish,
+__s64 stepper_page_clamp(const struct stepper_setpoint *setpoint,
 			 const struct incise_stepper_config *config)
 {
 	__s64 min = config->position_min, max = config->position_max;
 
-	if (wish->mode == INCISE_STEPPER_MODE_VELOCITY) {
+	if (setpoint->mode == INCISE_STEPPER_MODE_VELOCITY) {
 		max = config->velocity;
 		min = -max;
 	}
-	if (wish->target < min)
+	if (setpoint->target < min)
 		return min;
-	return wish->target > max ? max : wish->target;
+	return setpoint->target > max ? max : setpoint->target;
 }
 
 static bool stepper_page_within(__u64 value, __u64 min, __u64 max)

@@ -17,7 +17,7 @@
 #include "uapi/incise_stepper.h"
 
 /* A set-point that was looked at: one copy, which nobody can change any more. */
-struct stepper_wish {
+struct stepper_setpoint {
 	__u32 seq;
 	__u16 mode;
 	__s64 target; /* not clamped */
@@ -26,13 +26,13 @@ struct stepper_wish {
 
 enum stepper_page_answer {
 	STEPPER_PAGE_NOTHING, /* nothing new, or the owner is writing just now */
-	STEPPER_PAGE_TAKEN,   /* wish is new */
-	STEPPER_PAGE_GARBAGE, /* wish->seq is new, the rest is as it was */
+	STEPPER_PAGE_TAKEN,   /* setpoint is new */
+	STEPPER_PAGE_GARBAGE, /* setpoint->seq is new, the rest is as it was */
 };
 
 enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint *slot,
-					   struct stepper_wish *wish);
-__s64 stepper_page_clamp(const struct stepper_wish *wish,
+					   struct stepper_setpoint *setpoint);
+__s64 stepper_page_clamp(const struct stepper_setpoint *setpoint,
 			 const struct incise_stepper_config *config);
 int stepper_page_config(const struct incise_stepper_config *config,
 			const struct incise_stepper_controller *info);

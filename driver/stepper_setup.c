@@ -109,7 +109,7 @@ int stepper_setup_enable(struct stepper_motor *motor)
 	motor->target = motor->position;
 	motor->asked = false;
 	/* What the page says now was said to somebody else. */
-	motor->wish = (struct stepper_wish){
+	motor->setpoint = (struct stepper_setpoint){
 		.seq = READ_ONCE(motor->stepper->setpoints[motor->index].seq),
 	};
 	motor->seen_ns = now;
@@ -229,7 +229,7 @@ int stepper_setup_position(struct stepper_motor *motor,
 		motor->position = origin->position;
 		motor->target = origin->position;
 		motor->asked = false;
-		motor->wish.mode = INCISE_STEPPER_MODE_POSITION;
+		motor->setpoint.mode = INCISE_STEPPER_MODE_POSITION;
 		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
 		if (origin->homed)
 			motor->flags |= INCISE_STEPPER_FLAG_HOMED;

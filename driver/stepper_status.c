@@ -42,8 +42,8 @@ void stepper_status_publish(struct stepper_motor *motor, s64 now)
 	WRITE_ONCE(status->position, motor->position);
 	WRITE_ONCE(status->velocity, incise_profile_velocity(&motor->profile));
 	WRITE_ONCE(status->target, motor->target);
-	WRITE_ONCE(status->setpoint_t_ns, motor->wish.t_ns);
-	WRITE_ONCE(status->setpoint_seq, motor->wish.seq);
+	WRITE_ONCE(status->setpoint_t_ns, motor->setpoint.t_ns);
+	WRITE_ONCE(status->setpoint_seq, motor->setpoint.seq);
 	WRITE_ONCE(status->flags, motor->flags);
 	WRITE_ONCE(status->home_position, motor->home_position);
 	WRITE_ONCE(status->steps_up, motor->steps_up);

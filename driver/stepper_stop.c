@@ -62,7 +62,7 @@ static void stepper_stop_gently(struct stepper_motor *motor, u32 fault, s64 now)
 	motor->disabling = true;
 	if (retract) {
 		motor->target = motor->config.safe_position;
-		motor->wish.mode = INCISE_STEPPER_MODE_POSITION;
+		motor->setpoint.mode = INCISE_STEPPER_MODE_POSITION;
 		incise_profile_target(&motor->profile, INCISE_PROFILE_POSITION,
 				      motor->target);
 	} else {

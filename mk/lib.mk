@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # The shared objects.
 
-sources = $(sort $(foreach room,$(rooms_$1),$(wildcard lib/$(room)/*.c lib/$(room)/*.cc)))
-# also_LIB: what a library holds itself of a room of another, which does not export it.
+sources = $(sort $(foreach layer,$(layers_$1),$(wildcard lib/$(layer)/*.c lib/$(layer)/*.cc)))
+# also_LIB: objects of another library that does not export them; this one has its own copy.
 objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))) $(also_$1))
 
 $(O)/obj/%.o: %.c
@@ -159,7 +159,7 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c)) \
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
-	# q, not r: two rooms may have a file of the same name
+	# q, not r: device/vision.c and vision/vision.cc are both vision.o
 	$(call step,AR)
 	$(Q)$(AR) qcs $@ $^
 

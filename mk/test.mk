@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# Tests. tests/unit/ROOM/NAME.c tests lib/ROOM/NAME.c, tests/unit/driver what of driver/ builds
-# without a kernel, tests/unit/tools what of tools/ others rest on; tests/cli runs the real programs.
+# Tests. tests/unit/NAME/*.c test a layer or a module of lib/, the parts of driver/ that build without a
+# kernel, and shared parts of tools/; tests/cli runs the real programs.
 
 unit_sources := $(filter-out $(if $(has_libmnl),,tests/unit/can/socketcan%) \
 	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \

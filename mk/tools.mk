@@ -2,7 +2,7 @@
 # The programs. They use public headers only, and find their libraries beside them, in
 # the build tree as after installation.
 
-programs := $(O)/bin/incise $(addprefix $(O)/bin/incise-,$(verbs))
+programs := $(O)/bin/incise $(addprefix $(O)/bin/incise-,$(commands))
 
 $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 

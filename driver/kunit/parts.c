@@ -15,21 +15,21 @@ static void parts_page(struct kunit *test)
 {
 	struct incise_stepper_setpoint *slot =
 		kunit_kzalloc(test, sizeof(*slot), GFP_KERNEL);
-	struct stepper_wish wish = {};
+	struct stepper_setpoint setpoint = {};
 
 	KUNIT_ASSERT_NOT_ERR_OR_NULL(test, slot);
-	KUNIT_EXPECT_EQ(test, stepper_page_take(slot, &wish), STEPPER_PAGE_NOTHING);
+	KUNIT_EXPECT_EQ(test, stepper_page_take(slot, &setpoint), STEPPER_PAGE_NOTHING);
 	slot->seq = 2;
 	slot->target = -5;
-	KUNIT_EXPECT_EQ(test, stepper_page_take(slot, &wish), STEPPER_PAGE_TAKEN);
-	KUNIT_EXPECT_EQ(test, wish.target, -5LL);
-	KUNIT_EXPECT_EQ(test, stepper_page_take(slot, &wish), STEPPER_PAGE_NOTHING);
+	KUNIT_EXPECT_EQ(test, stepper_page_take(slot, &setpoint), STEPPER_PAGE_TAKEN);
+	KUNIT_EXPECT_EQ(test, setpoint.target, -5LL);
+	KUNIT_EXPECT_EQ(test, stepper_page_take(slot, &setpoint), STEPPER_PAGE_NOTHING);
 	slot->seq = 3;
-	KUNIT_EXPECT_EQ(test, stepper_page_take(slot, &wish), STEPPER_PAGE_NOTHING);
+	KUNIT_EXPECT_EQ(test, stepper_page_take(slot, &setpoint), STEPPER_PAGE_NOTHING);
 	slot->seq = 4;
 	slot->reserved[4] = 1;
-	KUNIT_EXPECT_EQ(test, stepper_page_take(slot, &wish), STEPPER_PAGE_GARBAGE);
-	KUNIT_EXPECT_EQ(test, wish.target, -5LL);
+	KUNIT_EXPECT_EQ(test, stepper_page_take(slot, &setpoint), STEPPER_PAGE_GARBAGE);
+	KUNIT_EXPECT_EQ(test, setpoint.target, -5LL);
 }
 
 static void parts_config(struct kunit *test)

@@ -123,7 +123,7 @@ static ssize_t sim_waveform_write(struct file *file, const char __user *from, si
 {
 	struct sim_adc *adc = file->private_data;
 	struct sim_waveform *waveform = &adc->waveform;
-	u32 count, room, tail, i;
+	u32 count, capacity, tail, i;
 	ssize_t ret;
 	u16 *sample;
 
@@ -143,8 +143,8 @@ static ssize_t sim_waveform_write(struct file *file, const char __user *from, si
 		goto out_free;
 	/* acquire: the converter has read what is overwritten here */
 	tail = smp_load_acquire(&waveform->tail);
-	room = INCISE_SIM_ADC_WAVEFORM - (waveform->head - tail);
-	count = min(count, room);
+	capacity = INCISE_SIM_ADC_WAVEFORM - (waveform->head - tail);
+	count = min(count, capacity);
 	for (i = 0; i < count; i++)
 		*sim_waveform_at(waveform, waveform->head + i) = sample[i];
 	/* release: samples are there before the converter sees them */

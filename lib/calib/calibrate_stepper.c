@@ -364,12 +364,12 @@ static int check_lines(const struct work *w, struct incise_calibrate_stepper *re
  * it came from:
  *
  *   rho   k(s - D) ____________ up to dead: the force stands still
- *                 /:leap
+ *                 /:stiction
  *                / o.
  *               /  rest `.
  *   ----------D----dead----`.------- s
  *
- * Four models are tried, the simple ones first: just the lines' distance D; a leap; a rest;
+ * Four models are tried, the simple ones first: just the lines' distance D; a stiction; a rest;
  * both. One with more in it has to explain much more.
  */
 
@@ -443,10 +443,10 @@ static double square(double off, double sd)
 
 /*
  * The model of a force that stands still up to @dead, with a rest that fades on @fade (0:
- * none). Without a @leap the rest is what the dead travel leaves.
+ * none). Without a @stiction the rest is what the dead travel leaves.
  */
 static struct model try_model(const struct work *w, const struct moment *moments, int m,
-			      double D, double dead, double fade, bool leap)
+			      double D, double dead, double fade, bool stiction)
 {
 	struct model model = {.dead_mm = dead, .fade_mm = fade};
 	const double most_N = w->slope * (dead - D);
@@ -465,7 +465,7 @@ static struct model try_model(const struct work *w, const struct moment *moments
 		}
 	}
 	model.sum = sum_ff;
-	if (fade > 0 && leap)
+	if (fade > 0 && stiction)
 		model.rest_N = sum_ff > 0 ? fmin(sum_rf / sum_ff, most_N) : 0;
 	else if (fade > 0)
 		model.rest_N = most_N;
@@ -483,7 +483,7 @@ static struct model try_model(const struct work *w, const struct moment *moments
 
 /* Try dead travels and fades about @from, so far apart, and keep the best. */
 static void try_about(const struct work *w, const struct moment *moments, int m, double D,
-		      bool leap, double least_mm, struct model from, double wide,
+		      bool stiction, double least_mm, struct model from, double wide,
 		      struct model *best)
 {
 	const double far_mm = LOOK * w->range_mm;
@@ -495,23 +495,23 @@ static void try_about(const struct work *w, const struct moment *moments, int m,
 			struct model model;
 
 			if (dead < 0 || dead + fade > far_mm ||
-			    (leap && dead < D && !fade))
+			    (stiction && dead < D && !fade))
 				continue;
 			if (!from.fade_mm && j)
 				continue;
-			/* A fade within a few points is a leap; along the dead
+			/* A fade within a few points is a stiction; along the dead
 			 * travel's own slope it is dead travel. */
 			if (from.fade_mm > 0 &&
 			    (fade < least_mm || fade < 2 * (D - dead)))
 				continue;
-			model = try_model(w, moments, m, D, dead, fade, leap);
+			model = try_model(w, moments, m, D, dead, fade, stiction);
 			if (model.chi2 < best->chi2)
 				*best = model;
 		}
 }
 
 static struct model search(const struct work *w, const struct moment *moments, int m,
-			   double D, double least_mm, bool leap, bool rest)
+			   double D, double least_mm, bool stiction, bool rest)
 {
 	const double far_mm = LOOK * w->range_mm;
 	struct model best = {.chi2 = INFINITY};
@@ -521,12 +521,12 @@ static struct model search(const struct work *w, const struct moment *moments, i
 			struct model at = {.dead_mm = dead * far_mm,
 					   .fade_mm = rest ? fade * far_mm : 0};
 
-			try_about(w, moments, m, D, leap, least_mm, at, 0, &best);
+			try_about(w, moments, m, D, stiction, least_mm, at, 0, &best);
 			if (!rest)
 				break;
 		}
 	for (double wide = 0.5; wide > 0.02 && best.chi2 < INFINITY; wide *= 0.5)
-		try_about(w, moments, m, D, leap, least_mm, best, wide, &best);
+		try_about(w, moments, m, D, stiction, least_mm, best, wide, &best);
 	return best;
 }
 
@@ -535,7 +535,7 @@ static int measure_turn(const struct work *w, struct incise_calibrate_stepper *r
 	struct moment *moments = malloc(w->n * sizeof(*moments));
 	double D[2] = {0, 0}, mean_mm, spacing, u_D2 = 0, u_rest, worth;
 	int turns[2] = {0, 0}, m;
-	struct model plain, leap, rest, both, unseen, *best = &plain;
+	struct model plain, stiction, rest, both, unseen, *best = &plain;
 
 	if (!moments)
 		return -ENOMEM;
@@ -552,13 +552,13 @@ static int measure_turn(const struct work *w, struct incise_calibrate_stepper *r
 	m = gather(w, LOOK * w->range_mm, moments);
 	spacing = m > 1 ? (moments[m - 1].s - moments[0].s) * (w->n_strokes - 1) / m : 0;
 	plain = try_model(w, moments, m, mean_mm, fmax(mean_mm, 0), 0, true);
-	leap = search(w, moments, m, mean_mm, 0, true, false);
+	stiction = search(w, moments, m, mean_mm, 0, true, false);
 	rest = search(w, moments, m, mean_mm, 4 * spacing, false, true);
 	both = search(w, moments, m, mean_mm, 4 * spacing, true, true);
 	/* means of readings are no better than their last digit */
 	worth = WORTH * (w->sd * w->sd + pow(w->setup->resolution_N, 2) / 12);
-	if (leap.chi2 < best->chi2 - worth)
-		best = &leap;
+	if (stiction.chi2 < best->chi2 - worth)
+		best = &stiction;
 	if (rest.chi2 < (best == &plain ? plain.chi2 - worth : best->chi2 - worth / 2))
 		best = &rest;
 	if (both.chi2 < best->chi2 - worth)
@@ -568,7 +568,7 @@ static int measure_turn(const struct work *w, struct incise_calibrate_stepper *r
 	result->rest_N = best->rest_N;
 	result->rest_mm = best->fade_mm;
 	result->stiction_N = 0;
-	if (best == &leap || best == &both)
+	if (best == &stiction || best == &both)
 		result->stiction_N =
 			fmax(0, w->slope * (best->dead_mm - mean_mm) - best->rest_N);
 	/* An unseen rest may still be there; twice: its fading is unknown. */

@@ -31,7 +31,7 @@ void incise_guard_reset(struct incise_guard *guard)
 	guard->placed = guard->watching = false;
 }
 
-void incise_guard_leap(struct incise_guard *guard)
+void incise_guard_discontinuity(struct incise_guard *guard)
 {
 	guard->placed = false;
 }

@@ -72,10 +72,10 @@ void incise_guard_reset(struct incise_guard *guard) INCISE_REALTIME;
 
 /*
  * The point that is watched is elsewhere now, and did not go there: another end of the
- * instrument, or a tracker's leap. Up to the next apply() no energy is counted; debt and
- * credit stay.
+ * instrument, or a discontinuity of the tracker's. Up to the next apply() no energy is
+ * counted; debt and credit stay.
  */
-void incise_guard_leap(struct incise_guard *guard) INCISE_REALTIME;
+void incise_guard_discontinuity(struct incise_guard *guard) INCISE_REALTIME;
 
 /*
  * Once per tick, out of contact too: observe the force that was held since the last call,

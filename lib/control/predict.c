@@ -200,7 +200,7 @@ void incise_predict_add(struct incise_predict *p,
 			p->v[i] = p->a[i] = 0;
 		v3_sub(step, shown, p->x);
 		blend = p->started && v3_length(step) <= INCISE_PREDICT_JUMP_MM;
-		p->leaps += p->started && !blend;
+		p->discontinuities += p->started && !blend;
 	}
 	p->started = true;
 	p->t_ns = t_ns;

@@ -39,8 +39,8 @@ struct incise_predict {
 	int64_t latency_ns;
 	int64_t gap_ns; /* after a longer gap the filter starts anew */
 	bool started;
-	/* How often a pose was taken where no hand can have got to since the last. */
-	unsigned int leaps;
+	/* Number of poses that no hand can have reached since the last one. */
+	unsigned int discontinuities;
 	int64_t t_ns; /* of acquisition of the last pose */
 	double x[3];  /* mm, at t_ns */
 	double v[3];  /* mm/s */

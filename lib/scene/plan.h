@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Inside of a plan, for the files of this room: its stages and what they share.
+ * Inside of a plan, for lib/scene: its stages, and the state that they share.
  */
 #ifndef INCISE_PLAN_INTERNAL_H
 #define INCISE_PLAN_INTERNAL_H
@@ -56,7 +56,7 @@ struct incise_plan {
 	struct incise_tracker_sample *fed; /* INCISE_PLAN_POSES, then */
 	int n_fed;
 	struct incise_predict predict;
-	unsigned int leaps; /* of what is held, that the guard knows of */
+	unsigned int discontinuities; /* of the predictor, as the guard last saw them */
 	int64_t pose_age_ns;
 	double velocity_mm_s[3]; /* of what is held: of the tip, or the handle's end */
 	double attitude[4];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Inside of a scene, for the files of this room. Names and units are those of the file.
+ * Inside of a scene, for lib/scene. Names and units are those of the file.
  */
 #ifndef INCISE_SCENE_INTERNAL_H
 #define INCISE_SCENE_INTERNAL_H

@@ -85,7 +85,7 @@ int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
 	if (other) {
 		incise_proxy_init(&plan->proxy, plan->surface, plan->proxy.leave_mm);
 		if (plan->guard)
-			incise_guard_leap(plan->guard);
+			incise_guard_discontinuity(plan->guard);
 	}
 	tick->tool = plan->instrument.held;
 	if (plan->instrument.held == INCISE_TOOL_HANDLE)
@@ -172,9 +172,9 @@ int incise_stage_guard(struct incise_plan *plan, struct incise_tick *tick)
 						    : &plan->predict;
 
 	/* A force did no work on a way that nobody went. */
-	if (plan->leaps != held->leaps)
-		incise_guard_leap(plan->guard);
-	plan->leaps = held->leaps;
+	if (plan->discontinuities != held->discontinuities)
+		incise_guard_discontinuity(plan->guard);
+	plan->discontinuities = held->discontinuities;
 	if (incise_guard_apply(plan->guard, tick->tool_mm, plan->velocity_mm_s,
 			       plan->force_N))
 		tick->flags |= INCISE_TICK_GUARDED;

@@ -25,7 +25,8 @@ struct obj {
 	struct text text;
 	struct incise_error *err;
 	const double *at_mm;
-	size_t n_vt, n_vn, room_v, room_vt, room_corner, room_index, room_line;
+	size_t n_vt, n_vn, capacity_v, capacity_vt, capacity_corner, capacity_index,
+		capacity_line;
 	float (*vt)[2];
 	uint32_t (*index)[3]; /* of vt, per triangle */
 	bool textured;
@@ -33,15 +34,15 @@ struct obj {
 };
 
 /* Room for one more of @each bytes. */
-static int grow(struct obj *obj, void *array, size_t n, size_t *room, size_t each)
+static int grow(struct obj *obj, void *array, size_t n, size_t *capacity, size_t each)
 {
 	void **old = array;
 	void *more;
 
-	if (n < *room)
+	if (n < *capacity)
 		return 0;
-	*room = *room ? 2 * *room : 1024;
-	more = realloc(*old, *room * each);
+	*capacity = *capacity ? 2 * *capacity : 1024;
+	more = realloc(*old, *capacity * each);
 	if (!more)
 		return incise_error_set(obj->err, ENOMEM, "%s: no memory to read it",
 					obj->text.path);
@@ -85,7 +86,7 @@ static int read_point(struct obj *obj)
 	if (!rc && draft->n_points == POINTS_MAX)
 		rc = too_many(obj, "points", POINTS_MAX);
 	if (!rc)
-		rc = grow(obj, &draft->point, draft->n_points, &obj->room_v,
+		rc = grow(obj, &draft->point, draft->n_points, &obj->capacity_v,
 			  sizeof(*draft->point));
 	if (rc)
 		return rc;
@@ -112,7 +113,7 @@ static int read_uv(struct obj *obj)
 	if (!rc && obj->n_vt == POINTS_MAX)
 		rc = too_many(obj, "texture coordinates", POINTS_MAX);
 	if (!rc)
-		rc = grow(obj, &obj->vt, obj->n_vt, &obj->room_vt, sizeof(*obj->vt));
+		rc = grow(obj, &obj->vt, obj->n_vt, &obj->capacity_vt, sizeof(*obj->vt));
 	if (rc)
 		return rc;
 	for (int i = 0; i < 2; i++) {
@@ -179,12 +180,13 @@ static int add_triangle(struct obj *obj, const struct index corner[3])
 	if (n == INCISE_SURFACE_TRIANGLES_MAX)
 		rc = too_many(obj, "triangles", n);
 	if (!rc)
-		rc = grow(obj, &draft->corner, n, &obj->room_corner,
+		rc = grow(obj, &draft->corner, n, &obj->capacity_corner,
 			  sizeof(*draft->corner));
 	if (!rc)
-		rc = grow(obj, &obj->index, n, &obj->room_index, sizeof(*obj->index));
+		rc = grow(obj, &obj->index, n, &obj->capacity_index, sizeof(*obj->index));
 	if (!rc)
-		rc = grow(obj, &draft->line, n, &obj->room_line, sizeof(*draft->line));
+		rc = grow(obj, &draft->line, n, &obj->capacity_line,
+			  sizeof(*draft->line));
 	if (rc)
 		return rc;
 	for (int i = 0; i < 3; i++) {

@@ -246,10 +246,10 @@ bool plane_enters(const struct plane *plane, const double from[3], const double 
 	return true;
 }
 
-/* A unit vector across the axis, towards @wish where that is possible. */
-static void across(const double axis[3], const double wish[3], double normal[3])
+/* A unit vector across the axis, towards @preferred where that is possible. */
+static void across(const double axis[3], const double preferred[3], double normal[3])
 {
-	const double *const tries[] = {wish, (const double[3]){0, 0, 1},
+	const double *const tries[] = {preferred, (const double[3]){0, 0, 1},
 				       (const double[3]){1, 0, 0}};
 	double side[3];
 

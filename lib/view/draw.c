@@ -664,7 +664,7 @@ static void use_program(const struct incise_draw *draw, enum shader shader,
 	v3_unit(key, draw_key_way, 0);
 	glUseProgram(draw->program[shader]);
 	glUniformMatrix4fv(uniform(draw, shader, "clip"), 1, GL_FALSE, projection->clip);
-	set_vector(uniform(draw, shader, "eye"), projection->position_mm);
+	set_vector(uniform(draw, shader, "camera"), projection->position_mm);
 	set_vector(uniform(draw, shader, "key"), key);
 	set_vector(uniform(draw, shader, "sky"), sky);
 }

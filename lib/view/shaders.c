@@ -21,7 +21,7 @@ static const char surface_vs[] = HEAD
 	"layout(location = 2) in vec4 in_2;\n" /* tangent */
 	"layout(location = 3) in vec2 in_3;\n" /* texels */
 	"uniform mat4 clip;\n"
-	"uniform vec3 eye, key, sky;\n"
+	"uniform vec3 camera, key, sky;\n"
 	"uniform float texel;\n"
 	"uniform int casters;\n"
 	"uniform vec4 from[4], to[4];\n" /* mm; w: radius */
@@ -42,7 +42,7 @@ static const char surface_vs[] = HEAD
 	"void main()\n"
 	"{\n"
 	"	vec3 n = in_1, t = in_2.xyz, b = in_2.w * cross(n, t);\n"
-	"	vec3 h = normalize(normalize(eye - in_0) + key);\n"
+	"	vec3 h = normalize(normalize(camera - in_0) + key);\n"
 	"	float dark = 0.0;\n"
 	"	for (int i = 0; i < casters; i++)\n"
 	"		dark = max(dark, shade(in_0, from[i], to[i]));\n"
@@ -102,14 +102,14 @@ static const char instrument_vs[] =
 	     "layout(location = 1) in vec3 in_1;\n" /* normal */
 	     "layout(location = 2) in vec4 in_2;\n" /* sRGB, metal */
 	     "uniform mat4 clip, place;\n"
-	     "uniform vec3 eye;\n"
-	     "out vec3 normal, to_eye;\n"
+	     "uniform vec3 camera;\n"
+	     "out vec3 normal, to_camera;\n"
 	     "out vec4 stuff;\n"
 	     "void main()\n"
 	     "{\n"
 	     "	vec4 p = place * vec4(in_0, 1);\n"
 	     "	normal = mat3(place) * in_1;\n"
-	     "	to_eye = eye - p.xyz;\n"
+	     "	to_camera = camera - p.xyz;\n"
 	     "	stuff = vec4(in_2.rgb * in_2.rgb, in_2.a);\n"
 	     "	gl_Position = clip * p;\n"
 	     "}\n";
@@ -118,13 +118,13 @@ static const char instrument_vs[] =
  * Metal reflects a room: a bright ceiling with a lamp, a window in front, skin below.
  */
 static const char instrument_fs[] = HEAD
-	"in vec3 normal, to_eye;\n"
+	"in vec3 normal, to_camera;\n"
 	"in vec4 stuff;\n"
 	"uniform vec3 key, sky;\n"
 	"out vec4 colour;\n"
 	"void main()\n"
 	"{\n"
-	"	vec3 n = normalize(normal), v = normalize(to_eye);\n"
+	"	vec3 n = normalize(normal), v = normalize(to_camera);\n"
 	"	float nl = max(dot(n, key), 0.0), nu = 0.5 + 0.5 * dot(n, sky);\n"
 	"	vec3 r = reflect(-v, n);\n"
 	"	float ru = dot(r, sky), rk = max(dot(r, key), 0.0);\n"

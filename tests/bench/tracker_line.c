@@ -34,7 +34,7 @@ struct line {
 	struct pty pty;
 	struct incise_tracker *tracker;
 	struct incise_tracker_sample *samples;
-	size_t n, room;
+	size_t n, capacity;
 	uint64_t lost;
 };
 
@@ -52,8 +52,8 @@ static int begin(struct line *l, int seconds)
 	struct incise_error err = {0};
 	struct polhemus_line *tty;
 
-	l->room = (size_t)(seconds + 10) * HZ;
-	l->samples = calloc(l->room, sizeof(*l->samples));
+	l->capacity = (size_t)(seconds + 10) * HZ;
+	l->samples = calloc(l->capacity, sizeof(*l->samples));
 	if (!l->samples || pty_begin(&l->pty, EMULATOR_FASTRAK)) {
 		perror("tracker_line");
 		return -1;
@@ -72,7 +72,7 @@ static int begin(struct line *l, int seconds)
 
 static int take(struct line *l)
 {
-	size_t left = l->room - l->n;
+	size_t left = l->capacity - l->n;
 	int n = incise_tracker_read(l->tracker, l->samples + l->n,
 				    left < 1000 ? (int)left : 1000);
 

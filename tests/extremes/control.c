@@ -62,7 +62,7 @@ static void try_guard(struct extremes_row *row, const struct property *property)
 		if (!below(20))
 			incise_guard_reset(&guard);
 		if (!below(20))
-			incise_guard_leap(&guard);
+			incise_guard_discontinuity(&guard);
 		guard_call(row, &guard, odds, x, v);
 	}
 }

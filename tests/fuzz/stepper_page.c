@@ -30,18 +30,18 @@ static const struct incise_stepper_controller machine = {
 struct run {
 	struct incise_stepper_config config;
 	struct incise_stepper_setpoint page;
-	struct stepper_wish wish;
+	struct stepper_setpoint setpoint;
 	struct incise_profile profile;
 	struct incise_profile_slot slot;
 	struct watch watch;
 	int64_t steps;
 };
 
-static void check_answer(const struct run *run, const struct stepper_wish *before,
+static void check_answer(const struct run *run, const struct stepper_setpoint *before,
 			 enum stepper_page_answer answer)
 {
 	const struct incise_stepper_setpoint *page = &run->page;
-	const struct stepper_wish *wish = &run->wish;
+	const struct stepper_setpoint *setpoint = &run->setpoint;
 	bool is_new = !(page->seq & 1) && page->seq != before->seq;
 	bool garbage = page->mode > INCISE_STEPPER_MODE_VELOCITY || page->reserved0;
 
@@ -51,26 +51,27 @@ static void check_answer(const struct run *run, const struct stepper_wish *befor
 		       : garbage ? STEPPER_PAGE_GARBAGE
 				 : STEPPER_PAGE_TAKEN))
 		wrong("not the right answer");
-	if (wish->seq != (is_new ? page->seq : before->seq))
+	if (setpoint->seq != (is_new ? page->seq : before->seq))
 		wrong("not the right seq");
 	if (answer == STEPPER_PAGE_TAKEN)
-		before = &(struct stepper_wish){0, page->mode, page->target, page->t_ns};
-	if (wish->mode != before->mode || wish->target != before->target ||
-	    wish->t_ns != before->t_ns)
-		wrong("not the right wish");
+		before = &(struct stepper_setpoint){0, page->mode, page->target,
+						    page->t_ns};
+	if (setpoint->mode != before->mode || setpoint->target != before->target ||
+	    setpoint->t_ns != before->t_ns)
+		wrong("not the right setpoint");
 }
 
 static void tick(struct run *run)
 {
-	struct stepper_wish before = run->wish;
-	enum stepper_page_answer answer = stepper_page_take(&run->page, &run->wish);
+	struct stepper_setpoint before = run->setpoint;
+	enum stepper_page_answer answer = stepper_page_take(&run->page, &run->setpoint);
 	const char *what;
 
 	check_answer(run, &before, answer);
 	if (answer == STEPPER_PAGE_TAKEN) {
-		int64_t target = stepper_page_clamp(&run->wish, &run->config);
+		int64_t target = stepper_page_clamp(&run->setpoint, &run->config);
 		enum incise_profile_mode mode =
-			run->wish.mode == INCISE_STEPPER_MODE_VELOCITY
+			run->setpoint.mode == INCISE_STEPPER_MODE_VELOCITY
 				? INCISE_PROFILE_VELOCITY
 				: INCISE_PROFILE_POSITION;
 

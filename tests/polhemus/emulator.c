@@ -251,9 +251,9 @@ static void send_record(struct emulator *e, uint64_t slot, int station)
 		}
 		put_byte(e, byte);
 	}
-	if (e->n_sent == e->room_sent) {
-		e->room_sent = e->room_sent ? 2 * e->room_sent : 1024;
-		e->sent = realloc(e->sent, e->room_sent * sizeof(*e->sent));
+	if (e->n_sent == e->capacity_sent) {
+		e->capacity_sent = e->capacity_sent ? 2 * e->capacity_sent : 1024;
+		e->sent = realloc(e->sent, e->capacity_sent * sizeof(*e->sent));
 		if (!e->sent)
 			abort();
 	}

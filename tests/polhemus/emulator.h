@@ -78,7 +78,7 @@ struct emulator {
 	unsigned char replies[EMULATOR_ROOM], records[EMULATOR_ROOM];
 	size_t n_replies, n_records;
 	struct emulator_sent *sent;
-	size_t n_sent, room_sent;
+	size_t n_sent, capacity_sent;
 };
 
 void emulator_init(struct emulator *e, enum emulator_kind kind, int64_t now_ns);

@@ -161,10 +161,10 @@ static void lay_spots(struct canvas *c, const struct scalpel_picture *p, uint64_
 
 /* One line of @n pixels that are @stride floats apart. */
 static void blur_line(float *line, int n, size_t stride, const float *weight, int reach,
-		      float *room)
+		      float *copy)
 {
 	for (int i = 0; i < n; i++)
-		memcpy(room + 3 * i, line + stride * i, 3 * sizeof(float));
+		memcpy(copy + 3 * i, line + stride * i, 3 * sizeof(float));
 	for (int i = 0; i < n; i++) {
 		float sum[3] = {0};
 
@@ -172,7 +172,7 @@ static void blur_line(float *line, int n, size_t stride, const float *weight, in
 			int at = i + j < 0 ? 0 : i + j >= n ? n - 1 : i + j;
 
 			for (int k = 0; k < 3; k++)
-				sum[k] += weight[abs(j)] * room[3 * at + k];
+				sum[k] += weight[abs(j)] * copy[3 * at + k];
 		}
 		memcpy(line + stride * i, sum, sizeof(sum));
 	}

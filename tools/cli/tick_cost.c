@@ -53,7 +53,7 @@ void tick_stroke_free(struct tick_stroke *timed)
 }
 
 /*
- * Go on with the stroke. With @stage_ns, room for @ticks times of each stage, it is the
+ * Go on with the stroke. With @stage_ns, an array of @ticks times for each stage, it is the
  * stages that are timed, else the ticks. Returns how many ticks were in contact.
  */
 static int go_on(struct tick_stroke *c, int ticks, double *tick_ns, double *stage_ns)
@@ -89,14 +89,14 @@ static int go_on(struct tick_stroke *c, int ticks, double *tick_ns, double *stag
 	return n;
 }
 
-double tick_stroke_ns(struct tick_stroke *timed, int ticks, double *room)
+double tick_stroke_ns(struct tick_stroke *timed, int ticks, double *ns)
 {
-	int n = go_on(timed, ticks, room, NULL);
+	int n = go_on(timed, ticks, ns, NULL);
 
 	if (!n)
 		return NAN;
-	stopwatch_sort(room, n);
-	return fmax(stopwatch_middle(room, n) - timed->clock_ns, 0);
+	stopwatch_sort(ns, n);
+	return fmax(stopwatch_middle(ns, n) - timed->clock_ns, 0);
 }
 
 static bool has_insertion(const struct incise_plan *plan)

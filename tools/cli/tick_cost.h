@@ -35,8 +35,8 @@ struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 				    const struct incise_tracker_info *tracker,
 				    enum incise_tool tool);
 
-/* Mean of the middle half of so many ticks more, ns, with @room for them; NaN without contact. */
-double tick_stroke_ns(struct tick_stroke *timed, int ticks, double *room);
+/* Mean of the middle half of so many ticks more, ns, times in @ns, an array of @ticks; NaN without contact. */
+double tick_stroke_ns(struct tick_stroke *timed, int ticks, double *ns);
 void tick_stroke_free(struct tick_stroke *timed);
 
 #endif

@@ -37,14 +37,14 @@ int daq_feed_setup(const struct incise_backend_request *request,
 
 int daq_feed_init(struct daq_feed *feed)
 {
-	double room = feed->info.rate_hz * DAQ_FEED_ROOM_S;
+	double capacity = feed->info.rate_hz * DAQ_FEED_CAPACITY_S;
 
 	feed->stop = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
 	if (feed->stop < 0)
 		return -errno;
-	/* A slow card needs room for a reader's pause, too. */
+	/* A slow card needs capacity for a reader's pause, too. */
 	return incise_ring_init(&feed->ring, sizeof(struct incise_force_sample),
-				room > 1024 ? (size_t)room : 1024);
+				capacity > 1024 ? (size_t)capacity : 1024);
 }
 
 void daq_feed_free(struct daq_feed *feed)

@@ -15,8 +15,8 @@
 #include <incise/backend.h>
 #include "../../base/ring.h"
 
-/* For how long of nobody reading there is room, s. */
-#define DAQ_FEED_ROOM_S 4
+/* Capacity of the ring: the longest pause of a reader without loss, s. */
+#define DAQ_FEED_CAPACITY_S 4
 
 struct daq_feed {
 	struct incise_force force;     /* first: what the caller holds */
@@ -27,7 +27,7 @@ struct daq_feed {
 	struct incise_error cause;
 	/* The thread's. */
 	uint64_t seq; /* of the next sample */
-	bool full;    /* the last sample found no room */
+	bool full;    /* the last sample did not fit */
 	pthread_t thread;
 	bool runs, real_time;
 	int stop; /* eventfd; readable: the thread is to end */

@@ -170,10 +170,10 @@ void polhemus_records_init(struct polhemus_records *records,
 size_t polhemus_records_put(struct polhemus_records *records, const unsigned char *bytes,
 			    size_t n, int64_t t_ns)
 {
-	size_t room = sizeof(records->bytes) - records->n;
+	size_t capacity = sizeof(records->bytes) - records->n;
 
-	if (n > room)
-		n = room;
+	if (n > capacity)
+		n = capacity;
 	memcpy(records->bytes + records->n, bytes, n);
 	for (size_t i = 0; i < n; i++)
 		records->t_ns[records->n + i] = t_ns;

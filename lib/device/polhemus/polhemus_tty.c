@@ -56,14 +56,14 @@ static int tty_write(struct polhemus_line *line, const void *bytes, size_t n)
 	const char *at = bytes;
 
 	while (n) {
-		struct pollfd room = {.fd = tty->fd, .events = POLLOUT};
+		struct pollfd writable = {.fd = tty->fd, .events = POLLOUT};
 		ssize_t m = tty->fd < 0 ? (errno = ENODEV, -1) : write(tty->fd, at, n);
 
 		if (m >= 0) {
 			at += m;
 			n -= (size_t)m;
 		} else if (errno == EAGAIN) {
-			if (poll(&room, 1, WRITE_MS) <= 0)
+			if (poll(&writable, 1, WRITE_MS) <= 0)
 				return -EIO;
 		} else if (errno != EINTR) {
 			return failed(errno);

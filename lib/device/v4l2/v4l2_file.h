@@ -25,7 +25,7 @@ int v4l2_ask(int fd, unsigned long request, void *argument);
 /* 0; -ENOTTY: not a V4L2 device; -ENODEV. */
 int v4l2_identify(int fd, struct v4l2_identity *identity);
 
-/* The four letters of a pixel format; @text has room for 5. Returns @text. */
+/* The four letters of a pixel format; @text has 5 bytes. Returns @text. */
 char *v4l2_letters(uint32_t fourcc, char *text);
 
 #endif

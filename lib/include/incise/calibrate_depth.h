@@ -68,7 +68,7 @@ struct incise_depth_points {
  * Two points. Lengths further than 5 robust standard deviations from their median are left
  * out, from 5 on; of fewer than 10 only what is more than a pixel off.
  *
- * @param inlier room for n, or NULL: which were believed
+ * @param inlier array of n, or NULL: true for those that were used
  * @return 0; -EINVAL (a number that is not finite or not positive: it is named), -EDOM
  *         (refused: none given, more than 30 % outliers, a scale that no camera has), -ENOMEM
  */
@@ -91,7 +91,7 @@ struct incise_depth_lengths {
  * deviations, more of few, are left out, and least squares fitted to the rest. Noise of the length, some
  * hundredths of a pixel over a hundred, does not bend the slope.
  *
- * @param inlier room for n, or NULL: which were believed
+ * @param inlier array of n, or NULL: true for those that were used
  * @return as incise_calibrate_depth_points(); -EDOM too for columns that are swapped, a
  *         length that grows with the depth, one depth only, too few pairs
  */

@@ -8,7 +8,7 @@
  *     |         up  /,              . . . . . . o turning point
  *     |           /,'               :  dead   / |
  *     |         /,'                 o--------´  |
- *     |       /,'                   |  leap     |  the up branch's line
+ *     |       /,'                   |  stiction |  the up branch's line
  *     |     /,'  down               o           |
  *     |   /,'                      / rest       |
  *     +------------- position mm  /  the down branch's line
@@ -18,7 +18,7 @@
  *
  *     branches_mm = backlash_mm - rest_N/N_mm,      dead_mm = backlash_mm + stiction_N/N_mm
  *
- * Backlash: travel at which the force stands still, whatever the spring is. Stiction: the leap
+ * Backlash: travel at which the force stands still, whatever the spring is. Stiction: the jump
  * at its end. What is left between the curve and its branch's line then, and fades on the way,
  * is no lost travel but force: hysteresis_N, the loss of spring and sensor. Friction between
  * spring and sensor that is the same at rest and in motion looks like a backlash of
@@ -78,7 +78,7 @@ struct incise_calibrate_stepper {
 		N_mm_u; /**< the same per mm; without the error of the screw's lead */
 	double backlash_mm, backlash_u_mm;
 	double hysteresis_N, hysteresis_u_N;
-	double stiction_N, stiction_u_N; /**< the leap where it breaks away */
+	double stiction_N, stiction_u_N; /**< the jump of force where it breaks away */
 	double dead_mm;	    /**< travel from turning round to where the force changes */
 	double rest_N;	    /**< hysteresis with its sign: > 0 is loss, < 0 is give */
 	double rest_mm;	    /**< travel on which that fades */

@@ -63,7 +63,7 @@ struct incise_tip_fit {
  * the tool, and for a stream whose noise is correlated in time.
  *
  * @param poses  n of them
- * @param inlier room for n, or NULL: which were believed
+ * @param inlier array of n, or NULL: true for those that were used
  * @param fit    filled in as far as it got in any case
  * @return 0; -EINVAL (a number that is not finite, a quaternion that is none: the pose is
  *         named), -EDOM (refused: too few poses, turning about one axis only, a cone below

@@ -217,7 +217,7 @@ INCISE_API int incise_plan_tick(struct incise_plan *plan, int64_t t_ns,
 /**
  * The same, with how long each stage took, by CLOCK_MONOTONIC and with its cost.
  *
- * @param stage_ns room for INCISE_PLAN_STAGES_MAX; 0 for what did not run
+ * @param stage_ns array of INCISE_PLAN_STAGES_MAX; 0 for what did not run
  */
 INCISE_API int incise_plan_tick_timed(struct incise_plan *plan, int64_t t_ns,
 				      struct incise_tick *tick,

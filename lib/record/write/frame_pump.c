@@ -145,7 +145,7 @@ static uint64_t slots_waiting(const struct slots *slots)
 	return atomic_load_explicit(&slots->head, memory_order_acquire) - tail;
 }
 
-static bool slots_have_room(const struct slots *slots)
+static bool slots_available(const struct slots *slots)
 {
 	return slots_waiting(slots) < slots->count;
 }
@@ -157,7 +157,7 @@ static bool slots_put(struct slots *slots, const struct slot *slot)
 	struct slot *to = &slots->slots[head % slots->count];
 	uint8_t *bytes = slots->bytes + head % slots->count * slots->size;
 
-	if (!slots_have_room(slots) || slot->frame.size > slots->size)
+	if (!slots_available(slots) || slot->frame.size > slots->size)
 		return false;
 	*to = *slot;
 	memcpy(bytes, slot->frame.data, slot->frame.size);
@@ -206,15 +206,15 @@ static void hand_on(struct incise_frame_pump *p, const struct incise_camera_fram
 	};
 	uint64_t waiting;
 
-	while (wait && !slots_have_room(&p->slots) && !is_set(&p->file_failed))
+	while (wait && !slots_available(&p->slots) && !is_set(&p->file_failed))
 		nap(NAP_MIN_NS);
-	while (wait && p->vision_runs && !slots_have_room(&p->vision_slots))
+	while (wait && p->vision_runs && !slots_available(&p->vision_slots))
 		nap(NAP_MIN_NS);
 	if (is_set(&p->file_failed)) {
 		count(&p->unwritten);
 		return;
 	}
-	if (!slots_have_room(&p->slots) || frame->size > p->slots.size) {
+	if (!slots_available(&p->slots) || frame->size > p->slots.size) {
 		count(&p->dropped);
 		return;
 	}

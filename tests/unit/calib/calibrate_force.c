@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/calib/force.c: figures of made data with known truth; what is wrong is named; the stated
+ * lib/calib/calibrate_force.c: figures of made data with known truth; what is wrong is named; the stated
  * interval holds the truth as often as it says.
  */
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/calib/stepper*.c: actuators of known truth, and what must be refused. The actuator here
+ * lib/calib/calibrate_stepper.c: actuators of known truth, and what must be refused. The actuator here
  * is not the virtual rig's: its turns are written down in closed form, from the way since the
  * turn.
  */
@@ -21,7 +21,7 @@
 #define POINTS_MAX 2000
 
 struct truth {
-	double N_mm, backlash_mm, loss_N, leap_N, noise_N, zero_N;
+	double N_mm, backlash_mm, loss_N, stiction_N, noise_N, zero_N;
 	double gain; /* the sensor's: 1 is what it is calibrated for */
 	double bend; /* of the spring, relative at the end of the range */
 	double range_mm;
@@ -43,7 +43,7 @@ static const struct truth usual = {
 /* Difference between the branch's line and the force, at a distance s behind the turn. */
 static double behind_N(const struct truth *t, double s)
 {
-	double dead = t->backlash_mm + t->leap_N / t->N_mm;
+	double dead = t->backlash_mm + t->stiction_N / t->N_mm;
 	/* between the lines: what is lost, less what the loss brings back */
 	double D = t->backlash_mm - t->loss_N / t->N_mm;
 
@@ -93,7 +93,7 @@ static int run(const struct truth *t, struct incise_calibrate_stepper *result,
 
 static void finds_what_is_there(void **state)
 {
-	/* backlash mm, loss N, leap N */
+	/* backlash mm, loss N, stiction N */
 	static const double row[][3] = {
 		{0.05, 0, 0},	 {0, 0, 0},	    {0.05, 0.06, 0},
 		{0.05, 0, 0.06}, {0, 0.06, 0},	    {0.15, 0, 0},
@@ -107,7 +107,7 @@ static void finds_what_is_there(void **state)
 
 		t.backlash_mm = row[i][0];
 		t.loss_N = row[i][1];
-		t.leap_N = row[i][2];
+		t.stiction_N = row[i][2];
 		if (run(&t, &r, &err))
 			fail_msg("row %zu: %s", i, err.text);
 		/* Noise of 0.2 mN over 400 points and 1.5 mm: 2e-5 N/mm; five of them. */
@@ -116,8 +116,8 @@ static void finds_what_is_there(void **state)
 		/* Points behind a turn are 5.3 µm apart, which is 11 mN. */
 		assert_true(fabs(r.backlash_mm - t.backlash_mm) < 0.006);
 		assert_true(fabs(r.hysteresis_N - t.loss_N) < 0.012);
-		assert_true(fabs(r.stiction_N - t.leap_N) < 0.012);
-		if (!t.loss_N && !t.leap_N)
+		assert_true(fabs(r.stiction_N - t.stiction_N) < 0.012);
+		if (!t.loss_N && !t.stiction_N)
 			assert_true(fabs(r.backlash_mm - t.backlash_mm) < 5e-4);
 	}
 }
@@ -147,7 +147,7 @@ static void intervals_hold_the_truth(void **state)
 		t.range_mm = 3 / t.N_mm;
 		t.backlash_mm = uniform(key, 1, 0, 0.08) * t.range_mm;
 		t.loss_N = seed % 3 == 1 ? uniform(key, 2, 0, 0.1) : 0;
-		t.leap_N = seed % 3 == 2 ? uniform(key, 3, 0, 0.1) : 0;
+		t.stiction_N = seed % 3 == 2 ? uniform(key, 3, 0, 0.1) : 0;
 		/* small to as much as the sensor's own: which part leads must not matter */
 		t.noise_N = pow(10, uniform(key, 4, -4, -1.8));
 		t.strokes = 2 + seed % 4;

@@ -182,7 +182,7 @@ static inline void drive_latch(struct drive *d)
 	d->last_rpdo_ns = d->now_ns;
 	if (d->state != CIA402_ENABLED)
 		return;
-	if (d->targets && d->targets_n < d->targets_room)
+	if (d->targets && d->targets_n < d->targets_capacity)
 		d->targets[d->targets_n] = target;
 	if (!d->targets_n || target < d->least_target)
 		d->least_target = target;

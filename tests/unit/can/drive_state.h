@@ -197,8 +197,8 @@ struct drive {
 	int32_t least_target,
 		most_target; /* of set-points that were applied while enabled */
 	int32_t *targets;    /* a test's own room for set-points … */
-	size_t targets_room, targets_n; /* … and how many there were */
-	uint32_t master_abort;		/* code of the last SDO abort by the master */
+	size_t targets_capacity, targets_n; /* … and how many there were */
+	uint32_t master_abort;		    /* code of the last SDO abort by the master */
 	uint16_t aborted; /* index of the last object whose SDO was aborted */
 	uint64_t master_beats, refused; /* refused: SDO aborts by it */
 	int64_t last_rpdo_ns, last_sync_ns;

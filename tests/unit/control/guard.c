@@ -222,20 +222,20 @@ static void test_off_leaves_every_bit(void **state)
 }
 
 /* Where the watched point was put elsewhere there was no way, and so no work. */
-static void test_a_leap_is_no_way(void **state)
+static void test_a_discontinuity_is_no_way(void **state)
 {
 	struct incise_guard guard = made(10);
 
 	tick(&guard, 5, 0, -2);
 	tick(&guard, 6, 0, -2);
 	assert_true(fabs(guard.energy_N_mm - 2) < ROUNDING);
-	incise_guard_leap(&guard);
+	incise_guard_discontinuity(&guard);
 	tick(&guard, -1000, 0, -2);
 	assert_true(fabs(guard.energy_N_mm - 2) < ROUNDING);
-	/* From there on it counts again, and a debt stays over a leap as well. */
+	/* From there on it counts again, and a debt stays over a discontinuity as well. */
 	tick(&guard, -1002, 0, -2);
 	assert_true(fabs(guard.energy_N_mm + 2) < ROUNDING);
-	incise_guard_leap(&guard);
+	incise_guard_discontinuity(&guard);
 	tick(&guard, 70, 0, -2);
 	assert_true(fabs(guard.energy_N_mm + 2) < ROUNDING);
 }
@@ -250,7 +250,7 @@ int main(void)
 		cmocka_unit_test(test_a_sampled_wall_stays_bounded),
 		cmocka_unit_test(test_a_bounce),
 		cmocka_unit_test(test_off_leaves_every_bit),
-		cmocka_unit_test(test_a_leap_is_no_way),
+		cmocka_unit_test(test_a_discontinuity_is_no_way),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -148,7 +148,7 @@ static void test_whatever_is_asked(void **state)
 	for (int run = 0; run < 100; run++) {
 		struct incise_limit limit = {.force_N = 0.3 + 0.0777 * run,
 					     .slew_N = 0.01 + 0.0123 * run};
-		double wish[3];
+		double wanted[3];
 
 		for (int i = 0; i < 5000; i++) {
 			double force[3], asked[3], last[3], change[3];
@@ -156,8 +156,8 @@ static void test_whatever_is_asked(void **state)
 
 			/* Asked for long enough to get there, now and then. */
 			for (int c = 0; c < 3 && i % 32 == 0; c++)
-				wish[c] = any(&seed);
-			v3_copy(force, wish);
+				wanted[c] = any(&seed);
+			v3_copy(force, wanted);
 			v3_copy(asked, force);
 			v3_copy(last, limit.last_N);
 			event = incise_limit_apply(&limit, force);

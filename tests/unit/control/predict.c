@@ -339,8 +339,8 @@ static void test_gap_starts_anew(void **state)
 			assert_true(v3_length(p.v) == 0 && v3_length(p.a) == 0);
 		else
 			assert_true(v3_length(p.v) > 0);
-		/* What is not blended is a leap; the first pose of all is none. */
-		assert_int_equal(p.leaps, !cases[i].blend);
+		/* A change that is not blended is a discontinuity; the first pose of all is none. */
+		assert_int_equal(p.discontinuities, !cases[i].blend);
 		pose = pose_at(&p, then + LATENCY_NS);
 		if (cases[i].blend)
 			assert_true(fabs(pose.x[1] - shown) < 1e-12);

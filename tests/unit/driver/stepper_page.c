@@ -77,7 +77,7 @@ static void owner_acts(void)
 /* One schedule. Returns whether a set-point was taken while the owner wrote. */
 static bool merged(void)
 {
-	struct stepper_wish wish = {.seq = 4};
+	struct stepper_setpoint setpoint = {.seq = 4};
 	struct incise_stepper_setpoint right = {0};
 	enum stepper_page_answer answer;
 	bool taken;
@@ -86,22 +86,22 @@ static bool merged(void)
 	owner.page.seq = 4;
 	fill(&owner.page, 4);
 	owner.read = owner.stored = 0;
-	answer = stepper_page_take(&owner.page, &wish);
+	answer = stepper_page_take(&owner.page, &setpoint);
 	assert_int_not_equal(answer, STEPPER_PAGE_GARBAGE);
 	taken = answer == STEPPER_PAGE_TAKEN;
 	if (taken) {
 		/* All of one set-point, and not of one that is being written. */
-		assert_true(wish.seq == 6 || wish.seq == 8);
-		fill(&right, wish.seq);
-		assert_int_equal(wish.mode, right.mode);
-		assert_int_equal(wish.target, right.target);
-		assert_int_equal(wish.t_ns, right.t_ns);
+		assert_true(setpoint.seq == 6 || setpoint.seq == 8);
+		fill(&right, setpoint.seq);
+		assert_int_equal(setpoint.mode, right.mode);
+		assert_int_equal(setpoint.target, right.target);
+		assert_int_equal(setpoint.t_ns, right.t_ns);
 	}
 	/* Once more, when the owner is done: the last is never lost. */
 	owner.read = READS;
-	stepper_page_take(&owner.page, &wish);
-	assert_int_equal(wish.seq, 8);
-	assert_int_equal(wish.target, 8000);
+	stepper_page_take(&owner.page, &setpoint);
+	assert_int_equal(setpoint.seq, 8);
+	assert_int_equal(setpoint.target, 8000);
 	return taken;
 }
 
@@ -146,20 +146,21 @@ static void test_answers(void **state)
 
 	owner.stored = STORES; /* it writes no more */
 	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++) {
-		struct stepper_wish wish = {4, 1, 123, 456};
+		struct stepper_setpoint setpoint = {4, 1, 123, 456};
 
-		assert_int_equal(stepper_page_take(&rows[i].slot, &wish), rows[i].answer);
+		assert_int_equal(stepper_page_take(&rows[i].slot, &setpoint),
+				 rows[i].answer);
 		if (rows[i].answer == STEPPER_PAGE_TAKEN) {
-			assert_int_equal(wish.mode, rows[i].slot.mode);
-			assert_int_equal(wish.target, rows[i].slot.target);
-			assert_int_equal(wish.t_ns, rows[i].slot.t_ns);
+			assert_int_equal(setpoint.mode, rows[i].slot.mode);
+			assert_int_equal(setpoint.target, rows[i].slot.target);
+			assert_int_equal(setpoint.t_ns, rows[i].slot.t_ns);
 		} else {
-			assert_int_equal(wish.mode, 1);
-			assert_int_equal(wish.target, 123);
-			assert_int_equal(wish.t_ns, 456);
+			assert_int_equal(setpoint.mode, 1);
+			assert_int_equal(setpoint.target, 123);
+			assert_int_equal(setpoint.t_ns, 456);
 		}
 		/* The same once more is nothing: garbage is told once. */
-		assert_int_equal(stepper_page_take(&rows[i].slot, &wish),
+		assert_int_equal(stepper_page_take(&rows[i].slot, &setpoint),
 				 STEPPER_PAGE_NOTHING);
 	}
 }
@@ -179,10 +180,10 @@ static void test_clamp(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++) {
-		struct stepper_wish wish = {.mode = rows[i].mode,
-					    .target = rows[i].target};
+		struct stepper_setpoint setpoint = {.mode = rows[i].mode,
+						    .target = rows[i].target};
 
-		assert_int_equal(stepper_page_clamp(&wish, &config), rows[i].right);
+		assert_int_equal(stepper_page_clamp(&setpoint, &config), rows[i].right);
 	}
 }
 

@@ -194,23 +194,23 @@ static void names_stand_beside_their_column(void **state)
 /* No more than so many bytes of a file, as on a full disk. */
 static void no_room_leaves_nothing(void **state)
 {
-	static const rlim_t rooms[] = {100, 5000, 300000};
+	static const rlim_t sizes[] = {100, 5000, 300000};
 	struct rlimit before, limit;
 
 	signal(SIGXFSZ, SIG_IGN);
 	getrlimit(RLIMIT_FSIZE, &before);
 	unlink(FILE_NAME);
-	for (size_t i = 0; i < sizeof(rooms) / sizeof(*rooms); i++) {
+	for (size_t i = 0; i < sizeof(sizes) / sizeof(*sizes); i++) {
 		struct incise_error err = {0};
 		int rc;
 
 		limit = before;
-		limit.rlim_cur = rooms[i];
+		limit.rlim_cur = sizes[i];
 		setrlimit(RLIMIT_FSIZE, &limit);
 		rc = write_rows(50001, NULL, &err);
 		setrlimit(RLIMIT_FSIZE, &before);
 		if (rc != -EFBIG)
-			fail_msg("%ld: %d", (long)rooms[i], rc);
+			fail_msg("%ld: %d", (long)sizes[i], rc);
 		assert_int_equal(err.code, EFBIG);
 		assert_int_equal(access(FILE_NAME, F_OK), -1);
 	}

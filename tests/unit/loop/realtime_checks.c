@@ -275,7 +275,7 @@ static void test_table(void **state)
 }
 
 /* Required checks come first; a smaller array is allowed. */
-static void test_order_and_room(void **state)
+static void test_order_and_capacity(void **state)
 {
 	static const char *const order[] = {"scheduling", "memory",	"cpu",
 					    "kernel",	  "throttling", "governor",
@@ -285,16 +285,17 @@ static void test_order_and_room(void **state)
 	const struct realtime_answers answers = {0};
 	struct incise_realtime_check checks[INCISE_REALTIME_CHECKS];
 
-	for (int room = 0; room <= INCISE_REALTIME_CHECKS; room++) {
+	for (int capacity = 0; capacity <= INCISE_REALTIME_CHECKS; capacity++) {
 		memset(checks, 0x55, sizeof(checks));
-		assert_int_equal(
-			realtime_judge(&setup, &answers, "/nowhere", checks, room), 9);
-		for (int i = 0; i < room; i++) {
+		assert_int_equal(realtime_judge(&setup, &answers, "/nowhere", checks,
+						capacity),
+				 9);
+		for (int i = 0; i < capacity; i++) {
 			assert_string_equal(checks[i].name, order[i]);
 			assert_int_equal(checks[i].needed, i < 3);
 		}
-		if (room < INCISE_REALTIME_CHECKS)
-			assert_int_equal(((char *)&checks[room])[0], 0x55);
+		if (capacity < INCISE_REALTIME_CHECKS)
+			assert_int_equal(((char *)&checks[capacity])[0], 0x55);
 	}
 }
 
@@ -436,7 +437,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_table),
-		cmocka_unit_test(test_order_and_room),
+		cmocka_unit_test(test_order_and_capacity),
 		cmocka_unit_test(test_denied),
 		cmocka_unit_test(test_garbage),
 	};

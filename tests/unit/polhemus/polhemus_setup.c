@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/polhemus/polhemus_setup.c, polhemus_fastrak.c, polhemus_liberty.c and
- * polhemus_dialogue.c against the emulator: what it is set to, and how it is told when it is not.
+ * lib/device/polhemus/polhemus_setup.c and polhemus_dialogue.c with the emulator: the settings
+ * that it gets, and the message for each that it does not take.
  */
 #include <stdarg.h>
 #include <stddef.h>

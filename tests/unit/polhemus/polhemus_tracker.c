@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/polhemus/polhemus_tracker.c through its door, with the emulator behind a pseudo
+ * lib/device/polhemus/polhemus_tracker.c through its interface, with the emulator behind a pseudo
  * terminal. Nothing is held to the clock: a host that is busy makes it wait longer.
  */
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/depth.c.
+ * Tests of lib/record/read/depth.c.
  */
 #include <stdarg.h>
 #include <stddef.h>

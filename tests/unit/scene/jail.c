@@ -80,7 +80,7 @@ static void run(struct incise_plan *plan, const struct incise_touch *top,
 		for (int k = 0; k < 3; k++)
 			s.position_mm[k] = top->point_mm[k] + height_mm * top->normal[k];
 		s.position_mm[0] += 5 * sin(i * 0.007);
-		/* One that leaps now and then. */
+		/* A pose that jumps now and then. */
 		if (i % 100 == 7)
 			s.position_mm[1] += 1000;
 		if (i % 8 == 7 && i % 1000 < 900)

@@ -352,7 +352,7 @@ static void test_feed(void **state)
 	/* The first of them were 1 mm apart: the last taken is the 32nd. */
 	assert_true(t.position_mm[0] > 25 && t.position_mm[0] < 60);
 	assert_true(fabs(t.position_mm[1] - 2) < 1e-9);
-	/* Taken once, and there is room again. */
+	/* Taken once, and there is capacity again. */
 	assert_int_equal(incise_plan_feed(fed.plan, poses, 40), 32);
 	fed_end(&fed);
 

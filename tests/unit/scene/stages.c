@@ -437,14 +437,14 @@ static void test_without_poses_the_last_force_fades(void **state)
 	assert_true(last == 0);
 }
 
-static void test_a_leap_is_no_work(void **state)
+static void test_a_discontinuity_is_no_work(void **state)
 {
-	for (int leaps = 0; leaps < 2; leaps++) {
+	for (int discontinuities = 0; discontinuities < 2; discontinuities++) {
 		struct incise_guard guard;
 		struct incise_plan plan = {
 			.guard = &guard,
 			.instrument = {.held = INCISE_TOOL_BLADE},
-			.predict = {.leaps = leaps},
+			.predict = {.discontinuities = discontinuities},
 		};
 		const double force_N[3] = {0, 0, 1};
 		struct incise_tick tick = {0};
@@ -457,7 +457,7 @@ static void test_a_leap_is_no_work(void **state)
 		tick.tool_mm[2] = 5;
 		assert_int_equal(incise_stage_guard(&plan, &tick), 0);
 		/* 1 N along 5 mm came out, unless nobody went that way. */
-		assert_true(guard.energy_N_mm == (leaps ? 0 : -5));
+		assert_true(guard.energy_N_mm == (discontinuities ? 0 : -5));
 	}
 }
 
@@ -475,7 +475,7 @@ int main(void)
 		cmocka_unit_test(test_an_actuator_that_lies_or_fails),
 		cmocka_unit_test(test_each_limit_is_an_event_of_its_own),
 		cmocka_unit_test(test_without_poses_the_last_force_fades),
-		cmocka_unit_test(test_a_leap_is_no_work),
+		cmocka_unit_test(test_a_discontinuity_is_no_work),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -33,7 +33,7 @@ static void end(struct fed_run *run)
 		fail_msg("%s", run->row->failed);
 }
 
-/* Go there in one leap, which no filter changes. */
+/* Go there in one jump, which no filter changes. */
 static bool touches_at(struct fed_run *run, double z)
 {
 	for (int i = 0; i < 8; i++)
@@ -81,7 +81,7 @@ static void test_threshold_of_age(void **state)
 	}
 }
 
-/* From blade to handle, and by a tracker's leap, the end of the tool goes no way. */
+/* From blade to handle, and by a jump of the tracker's, the end of the tool goes no way. */
 static void test_no_debt_without_a_way(void **state)
 {
 	struct fed_run run;

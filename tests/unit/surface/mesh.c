@@ -569,7 +569,7 @@ static void test_waves_at_five_resolutions(void **state)
 	}
 }
 
-/* However the tool leaps, the proxy stays in reach; a tool at rest leaves it at rest. */
+/* However the tool jumps, the proxy stays in reach; a tool at rest leaves it at rest. */
 static void test_never_farther_than_the_reach(void **state)
 {
 	uint64_t random = 88172645463325252u;

@@ -239,7 +239,7 @@ static void test_crease(void **state)
 	drag(&proxy, 0, 0.71, -3.2, 50);
 	assert_at(&proxy, 0, 0.71, -1.7320508075688772);
 	assert_true(fabs(proxy.touch.normal[0]) < 1e-15);
-	/* in one leap from the left wall through the air: the right wall has it then */
+	/* in one jump from the left wall through the air: the right wall has it then */
 	incise_proxy_init(&proxy, surface, 0.02);
 	move(&proxy, -0.9, 0, -0.3);
 	assert_true(proxy.touching);
@@ -487,7 +487,7 @@ static void test_inside_is_in_contact(void **state)
 	free(s);
 }
 
-/* Any pose whatever, leaps of metres and the ends of double: all results are numbers. */
+/* Any pose whatever, jumps of metres and the ends of double: all results are numbers. */
 static void test_any_pose(void **state)
 {
 	static const double odd[] = {0,	   -0.0,    1e-300,   5e-324,	1e300, -1e300,

@@ -38,13 +38,13 @@ static struct incise_canvas *canvas_of(int side, const uint8_t *base, int layers
 	return canvas;
 }
 
-static void compose_all(struct incise_canvas *canvas, int room)
+static void compose_all(struct incise_canvas *canvas, int capacity)
 {
 	struct incise_upload uploads[UPLOADS];
 	int n, calls = 0;
 
-	while ((n = incise_canvas_compose(canvas, uploads, room)) > 0)
-		assert_true(n <= room && ++calls < 10000);
+	while ((n = incise_canvas_compose(canvas, uploads, capacity)) > 0)
+		assert_true(n <= capacity && ++calls < 10000);
 	assert_int_equal(n, 0);
 }
 
@@ -82,7 +82,7 @@ static void assert_same(const struct incise_canvas *a, const struct incise_canva
 /* A canvas that composes after each change, compared with one that composes at the end. */
 static void test_as_anew(void **state)
 {
-	const int rooms[] = {CANVAS_UPLOADS_MIN, UPLOADS};
+	const int capacities[] = {CANVAS_UPLOADS_MIN, UPLOADS};
 
 	for (int k = 0; k < 2; k++) {
 		uint8_t *base = any_base(SIDE);
@@ -94,9 +94,9 @@ static void test_as_anew(void **state)
 
 			scribble(went, rand() % 2, rect);
 			if (rand() % 2)
-				compose_all(went, rooms[k]);
+				compose_all(went, capacities[k]);
 		}
-		compose_all(went, rooms[k]);
+		compose_all(went, capacities[k]);
 		anew = canvas_of(SIDE, base, 2);
 		for (int i = 0; i < 2; i++)
 			memcpy(incise_canvas_layer(anew, i), incise_canvas_layer(went, i),

@@ -369,7 +369,7 @@ static void test_no_cut(void **state)
 }
 
 /* Pricks too far apart for a hand are not joined. */
-static void test_leaps(void **state)
+static void test_jumps(void **state)
 {
 	static const int64_t after_ns[] = {1000000, -1000000, 600000000, INT64_MAX / 2,
 					   INT64_MIN};
@@ -404,7 +404,7 @@ int main(void)
 		cmocka_unit_test(test_painting_changes_nothing),
 		cmocka_unit_test(test_endless),
 		cmocka_unit_test(test_no_cut),
-		cmocka_unit_test(test_leaps),
+		cmocka_unit_test(test_jumps),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

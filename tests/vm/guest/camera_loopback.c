@@ -261,20 +261,20 @@ static void virtual_rig(void)
 			   .size = 640 * 480 * 3};
 	struct incise_clock *clock = incise_clock_new_simulated(0);
 	struct incise_camera_frame shot, frame = {0};
-	struct incise_camera *eye, *camera = NULL;
+	struct incise_camera *source, *camera = NULL;
 	struct incise_sim_config config;
 	struct incise_sim *sim;
 	int exact = 0;
 
 	incise_sim_config_init(&config);
 	sim = incise_sim_new(&config, clock, NULL);
-	eye = incise_sim_camera_new(sim);
+	source = incise_sim_camera_new(sim);
 	if (check(feeder_open(&f), "the feeder begins in RGB"))
 		camera = open_camera(INCISE_PIXELS_RGB);
 	/* Two seconds, in which the first cut begins; 100 pictures. */
 	for (int64_t t = 0; camera && t < 2000; t += 20) {
 		incise_clock_wait_until(clock, t * 1000000);
-		if (incise_camera_read(eye, &shot) != 1 ||
+		if (incise_camera_read(source, &shot) != 1 ||
 		    !feeder_shoot(&f, shot.data, 0) ||
 		    await(camera, &frame, shot.seq) != 1)
 			break;
@@ -286,7 +286,7 @@ static void virtual_rig(void)
 	if (camera)
 		camera->ops->close(camera);
 	feeder_close(&f);
-	eye->ops->close(eye);
+	source->ops->close(source);
 	incise_sim_free(sim);
 	incise_clock_free(clock);
 }

@@ -33,7 +33,7 @@ static int64_t carriage_of(unsigned int motor)
 	return simulator_number_of("carriage", name, "position");
 }
 
-static void random_wish(struct bench *bench, unsigned int motor)
+static void random_setpoint(struct bench *bench, unsigned int motor)
 {
 	const struct incise_stepper_config *config = &bench->config[motor];
 	int64_t way = config->position_max - config->position_min;
@@ -117,13 +117,13 @@ static bool session(struct bench *bench, uint32_t *retargets, int64_t *longest)
 		return false;
 	}
 	for (int i = 0; i < RETARGETS; i++) {
-		random_wish(bench, draw_between(0, MOTORS - 1));
+		random_setpoint(bench, draw_between(0, MOTORS - 1));
 		++*retargets;
 		bench_nap(draw_scattered(20000, 50000000));
 		if (i % 8 == 3)
 			*longest = later(*longest, wait_of(bench, i / 8 % MOTORS));
 		for (unsigned int m = 0; m < MOTORS && i % 8 == 7; m++)
-			random_wish(bench, m);
+			random_setpoint(bench, m);
 	}
 	bench_judge(bench);
 	for (unsigned int i = 0; i < MOTORS; i++) {
