@@ -263,8 +263,7 @@ struct incise_backend {
 	 * Open a device. Its close() must bring a powered device to rest.
 	 *
 	 * @return the struct of the kind, for example struct incise_stepper; NULL with
-	 * errno
-	 *         and a message in @err.
+	 *         errno and a message in @err.
 	 */
 	void *(*open)(const struct incise_backend_request *request,
 		      struct incise_error *err);

@@ -127,9 +127,8 @@ struct incise_stepper_edge_found {
  * powered. A drive that homes by itself does so in its own way. Blocks, at most 60 s and
  * the time for the travel at `home_mm_s`; SIGINT stops it through @stop.
  *
- * @param stop checked between polls; non-zero ends with -EINTR and the nut at rest. May
- * be
- *             NULL.
+ * @param stop checked between polls; non-zero ends with -EINTR and the nut at rest.
+ *             May be NULL.
  * @param edge unchanged on an error; may be NULL
  * @return 0, homed; -EOPNOTSUPP (neither input is wired), -EIO (a fault, named in the
  *         message), -ETIMEDOUT, -EINTR, -ENODEV.
