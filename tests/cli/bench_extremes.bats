@@ -8,7 +8,7 @@ setup() {
 	work_folder
 }
 
-@test "bench extremes: nothing is wrong, each door is tried, and it leaves nothing behind" {
+@test "bench extremes: nothing is wrong, each interface is tried, and it leaves nothing behind" {
 	mkdir t
 	TMPDIR=$PWD/t incise bench extremes --quick --json >r.json
 	[ -z "$(ls -A t)" ]
