@@ -7,6 +7,7 @@
 #ifndef INCISE_STEPPER_STATE_H
 #define INCISE_STEPPER_STATE_H
 
+/** States of a stepper. */
 enum incise_stepper_state {
 	INCISE_STEPPER_STATE_DISABLED = 0, /**< not powered, no fault latched */
 	INCISE_STEPPER_STATE_READY = 1,	   /**< powered, at rest */
