@@ -64,11 +64,25 @@ write_rig() {
 	END
 }
 
-# In the background until the drive has power; its number is $pid.
+# In the background until the drive has power; its number is $pid. A machine that does not run
+# the drive for as long as an answer may take is no fault of either: it is tried again.
 begin() {
-	incise "$@" >out 2>err 3>&- 7>&- &
-	pid=$!
-	drive_until "operation enabled" || complain "$(cat out err)"
+	local try i
+	for try in 1 2 3; do
+		incise "$@" >out 2>err 3>&- 7>&- &
+		pid=$!
+		for ((i = 0; i < 500; i++)); do
+			drive_is "operation enabled" >/dev/null && return
+			kill -0 "$pid" 2>/dev/null || break
+			sleep 0.02
+		done
+		kill -9 "$pid" 2>/dev/null || :
+		wait "$pid" || :
+		pid=
+		grep -q "nobody answers at node" err || break
+		echo "# the drive was too late, try $try: $(cat err)"
+	done
+	complain "the drive was not enabled: $(cat out err)"
 }
 
 # ended TEXT…: what was begun ends within 10 s with 1 and one line that holds these; the drive
