@@ -62,8 +62,7 @@ objects_stepper_gpio := $(motor_core) $(addprefix $(O)/obj/lib/device/,gpio/puls
 	$(if $(shell $(PKG_CONFIG) --atleast-version=2 libgpiod && echo yes),gpio/gpio_v2.o,gpio/gpio_v1.o))
 
 # A drive on one of two kinds of bus: each module has the files of its own transport only.
-can_core := $(motor_core) $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/*.c) \
-		lib/device/can/bus/bus_load.c)
+can_core := $(motor_core) $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/*.c))
 can_socketcan := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/bus/socketcan*.c))
 can_slcan := $(O)/obj/lib/device/tty.o \
 	$(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/can/bus/slcan*.c))

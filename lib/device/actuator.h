@@ -12,4 +12,15 @@
 int incise_actuator_read(struct incise_actuator *actuator, const config_setting_t *group,
 			 const char *path, struct incise_error *err);
 
+/*
+ * Read and check the group `can` within @group; without one all values are defaults.
+ * Returns 0 or -EINVAL; err names file, line, key and what to do.
+ */
+int incise_actuator_can_read(struct incise_actuator_can *can, double travel_mm,
+			     const config_setting_t *group, const char *path,
+			     struct incise_error *err);
+
+/* The largest accepted position_gain_1_s of csv: half of the stable one. */
+double incise_actuator_can_gain_1_s(double cycle_s);
+
 #endif

@@ -104,6 +104,12 @@ bool uv_map_meet(const struct uv_map *map, const double from_mm[3], const double
 		 double far_mm, double point_mm[3], double normal[3]);
 
 /*
+ * The larynx's height above the skin around it, 0 to 5 mm, smooth. @caudal_mm from the
+ * cricothyroid membrane towards the chest, @side_mm from the midline.
+ */
+double larynx_height_mm(double caudal_mm, double side_mm);
+
+/*
  * For uv_map.c only, an atlas: a mesh's own texture coordinates (uv_map_atlas.c). 0 or -ENOMEM;
  * the kind becomes an atlas only if some texel is on the mesh. The others return false, and write
  * nothing, where no triangle is.

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/bus/bus_load.c against frames that are stuffed here bit by bit, and
- * against sums made by hand.
+ * lib/device/can/cia402/can_units.c: the load of the bus, against frames that are stuffed here
+ * bit by bit, and against sums made by hand.
  */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include "../../../lib/device/can/bus/bus_load.h"
+#include "../../../lib/device/can/cia402/can_units.h"
 
 /* The longest frame: a run of 5 equal bits, then runs of 4 with each stuffed bit. */
 static uint32_t stuffed_by_hand(unsigned int bytes)

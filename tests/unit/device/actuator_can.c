@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/actuator_can.c: each key in its unit and up to its ends, each refusal with its
+ * The group actuator.can, lib/device/actuator.c: each key in its unit and up to its ends, each refusal with its
  * line, and that the gain that csv may have is half of what a loop with that delay holds.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "../../../lib/device/actuator_can.h"
+#include "../../../lib/device/actuator.h"
 #include "actuator_text.h"
 
 static void defaults_are_those_of_the_manual(void **state)

@@ -10,7 +10,6 @@
 #include "../../../lib/base/vector.h"
 #include "../../../lib/surface/surface.h"
 #include "../../../lib/view/uv_map.h"
-#include "../../../lib/view/larynx.h"
 
 #define SIZE 512
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * From rig.conf in mm to the units of a drive and of its axis, with a check that the bus can
- * carry the traffic. Nothing here uses the bus.
+ * carry the traffic, with as many stuff bits as its frames can have. Nothing here uses the bus.
  */
 #ifndef INCISE_CAN_UNITS_H
 #define INCISE_CAN_UNITS_H
@@ -28,5 +28,22 @@ int can_units_deadman(const struct can_session *session);
 
 /* Returns a speed or acceleration in the drive's units: whole, at least 1, rounded up. */
 uint32_t can_units_whole(double value);
+
+/*
+ * Returns the bits of a frame with an 11-bit id and @bytes bytes, with the gap to the next
+ * frame: 55 … 135. More than 8 bytes count as 8.
+ */
+uint32_t bus_load_bits(unsigned int bytes);
+
+/*
+ * Returns the cyclic traffic, bit/s: SYNC, RPDO and TPDO per cycle, both heartbeats each
+ * @heartbeat_ns (0: none), inputs at their highest rate. UINT32_MAX: more than that, or a cycle
+ * of 0.
+ */
+uint32_t bus_load_of(uint32_t cycle_ns, unsigned int rpdo_bytes, unsigned int tpdo_bytes,
+		     int64_t heartbeat_ns);
+
+/* The largest load, %: the rest is for SDOs, EMCYs and repeated frames. */
+#define BUS_LOAD_MOST 80
 
 #endif

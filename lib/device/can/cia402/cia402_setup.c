@@ -52,7 +52,7 @@ static const struct cia402_object modes = {0x6502, 0, 4, "supported drive modes"
 #define NO_RTR 0x40000000u /* the drive's own bit, which stays */
 #define AT_SYNC 1
 #define AT_CHANGE 255
-#define INHIBIT 100 /* 10 ms; a first change is sent at once; bus_load.c relies on it */
+#define INHIBIT 100 /* 10 ms; a first change is sent at once; can_units.c relies on it */
 
 #define MAP_CONTROLWORD 0x60400010
 #define MAP_STATUSWORD 0x60410010
