@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Cutting force of the virtual liver; see tissue.h. F = mean(depth, speed) · tooth · bound.
+ * Cutting force of the virtual liver; see world.h. F = mean(depth, speed) · tooth · bound.
  *
  * Tooth: the tissue stretches along the cut until it tears, repeatedly. Its mean over the path
  * is 1, so that the mean force follows the stated law:
@@ -17,7 +17,7 @@
  */
 #include <math.h>
 #include "../base/random.h"
-#include "tissue.h"
+#include "world.h"
 
 static void next_tooth(struct incise_tissue *tissue)
 {

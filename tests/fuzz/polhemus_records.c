@@ -24,7 +24,7 @@ static void check_samples(struct polhemus_stream *stream)
 {
 	struct incise_tracker_sample s;
 
-	while (polhemus_stream_take(stream, &s, 1) == 1) {
+	while (incise_ring_take(&stream->ring, &s, 1) == 1) {
 		const double *q = s.quaternion;
 		double norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
 

@@ -299,11 +299,6 @@ int polhemus_stream_init(struct polhemus_stream *stream,
 				CAPACITY);
 }
 
-void polhemus_stream_start(struct polhemus_stream *stream, int64_t t_ns)
-{
-	polhemus_gaps_start(&stream->gaps, t_ns);
-}
-
 void polhemus_stream_free(struct polhemus_stream *stream)
 {
 	incise_ring_free(&stream->ring);
@@ -370,12 +365,6 @@ int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *byt
 	atomic_store_explicit(&stream->lost, stream->gaps.lost + stream->overflowed,
 			      memory_order_relaxed);
 	return found;
-}
-
-int polhemus_stream_take(struct polhemus_stream *stream,
-			 struct incise_tracker_sample *samples, int n)
-{
-	return incise_ring_take(&stream->ring, samples, n);
 }
 
 uint64_t polhemus_stream_lost(const struct polhemus_stream *stream)

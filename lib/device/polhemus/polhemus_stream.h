@@ -99,8 +99,6 @@ struct polhemus_stream {
 int polhemus_stream_init(struct polhemus_stream *stream,
 			 const struct incise_tracker_setup *setup,
 			 const struct polhemus_layout *layout);
-/* The device started at @t_ns: from then on missing records are lost. */
-void polhemus_stream_start(struct polhemus_stream *stream, int64_t t_ns);
 void polhemus_stream_free(struct polhemus_stream *stream);
 
 /* The link was gone, and the device was set up again, with records of @layout. */
@@ -114,9 +112,7 @@ void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns);
 int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *bytes,
 			size_t n, int64_t t_ns);
 
-/* By one other thread; real-time safe. */
-int polhemus_stream_take(struct polhemus_stream *stream,
-			 struct incise_tracker_sample *samples, int n) INCISE_REALTIME;
+/* Any thread; real-time safe, as is taking samples from the ring by one other thread. */
 uint64_t polhemus_stream_lost(const struct polhemus_stream *stream);
 
 #endif

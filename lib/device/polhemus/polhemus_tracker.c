@@ -129,7 +129,7 @@ static INCISE_REALTIME int tracker_read(struct incise_tracker *tracker,
 	struct polhemus_tracker *t = of_tracker(tracker);
 	/* Read ahead of the ring, which has the samples from before the end. */
 	int gone = atomic_load(&t->gone);
-	int taken = polhemus_stream_take(&t->stream, samples, n);
+	int taken = incise_ring_take(&t->stream.ring, samples, n);
 
 	return taken || n <= 0 ? taken : gone;
 }
@@ -223,7 +223,7 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 		rc = incise_error_set(err, ENOMEM,
 				      "%s: out of memory: end other programs", where);
 	if (!rc) {
-		polhemus_stream_start(&t->stream, incise_monotonic_ns());
+		polhemus_gaps_start(&t->stream.gaps, incise_monotonic_ns());
 		t->line->stop = &t->stop;
 		rc = incise_thread_start(&t->thread, run, t, &real_time);
 		if (!rc)

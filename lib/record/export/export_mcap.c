@@ -663,7 +663,7 @@ int incise_export_mcap(struct incise_recording *recording,
 				      streams[i].columns, streams[i].types, expected[i],
 				      err);
 		if (!rc && given)
-			incise_rows_calibrate(&rows[i], given);
+			incise_row_times_calibrate(&rows[i].times, given);
 		mcap_channel(&mcap, streams[i].topic, streams[i].schema_name,
 			     streams[i].schema);
 	}

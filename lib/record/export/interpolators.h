@@ -17,9 +17,46 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include "../../control/predict.h"
 #include "../read/cut.h"
 #include "../read/rows.h"
-#include "smooth.h"
+
+/* --- velocity of the tip ------------------------------------------------------------- */
+
+struct incise_smooth_record {
+	int64_t seq, t_ns;
+	double position_mm[3], depth_mm, t_sd_s; /* given */
+	double velocity_mm_s[3];		 /* NAN: of an invalid position */
+	double noise_mm, depth_noise_mm; /* standard deviations of one; NAN: not known */
+	/* forward */
+	double residual_mm[3], periods; /* since the record before */
+	bool starts, skipped, even;
+	double bend2_mm2, depth_bend2_mm2; /* second differences, squared */
+};
+
+struct incise_smooth {
+	struct incise_predict fresh, predict;
+	double period_s, pull[3]; /* of λ on velocity, for a noise of 1 */
+	size_t lag, capacity;
+	struct incise_smooth_record *records;
+	size_t n, forward, finished,
+		taken; /* records added, filtered, smoothed, returned */
+	bool ended;
+};
+
+/* For records at this rate. Returns 0 or -ENOMEM. */
+int incise_smooth_init(struct incise_smooth *smooth, double rate_hz);
+void incise_smooth_free(struct incise_smooth *smooth);
+
+/* Add a record, later than the one before; then take the finished ones. */
+void incise_smooth_push(struct incise_smooth *smooth,
+			const struct incise_smooth_record *record);
+
+/* No more records follow. */
+void incise_smooth_end(struct incise_smooth *smooth);
+
+/* The next finished record, valid until the next push; NULL: none now. */
+const struct incise_smooth_record *incise_smooth_take(struct incise_smooth *smooth);
 
 /* --- force --------------------------------------------------------------------------- */
 

@@ -164,12 +164,6 @@ int incise_rows_open(struct incise_rows *rows, struct incise_recording *recordin
 				       expected, err);
 }
 
-void incise_rows_calibrate(struct incise_rows *rows,
-			   const struct incise_calibration *calibration)
-{
-	incise_row_times_calibrate(&rows->times, calibration);
-}
-
 static bool fits(sqlite3_stmt *stmt, int column, char type)
 {
 	int found = sqlite3_column_type(stmt, column);

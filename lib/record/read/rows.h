@@ -39,7 +39,7 @@ int incise_row_times_open(struct incise_row_times *times,
 			  struct incise_recording *recording, const char *table,
 			  struct incise_error *err);
 
-/* Use the delay of another calibration, if it has one for this stream. */
+/* Use the delay of another calibration, if it has one for this stream; before the first row. */
 void incise_row_times_calibrate(struct incise_row_times *times,
 				const struct incise_calibration *calibration);
 
@@ -83,10 +83,6 @@ int incise_rows_open_joined(struct incise_rows *rows, struct incise_recording *r
 			    const char *table, const char *other, const char *columns,
 			    const char *types, uint64_t expected,
 			    struct incise_error *err);
-
-/* Use the delay of another calibration; before the first row. */
-void incise_rows_calibrate(struct incise_rows *rows,
-			   const struct incise_calibration *calibration);
 
 /* Go to the next row: 1, 0 at the end, -EINVAL (an impossible or missing row), -EIO. */
 int incise_rows_next(struct incise_rows *rows, struct incise_error *err);

@@ -6,7 +6,7 @@
  *                                  arrival       ≥ 0
  *
  * With timestamps of the kernel: the timestamp less the delay. Without: the line of the
- * device's own clock below all arrivals (envelope.h), less the expected error of the line, less
+ * device's own clock below all arrivals (the envelope), less the expected error of the line, less
  * the delay. The delay is that of the quickest samples; it comes from calibration, with its
  * standard deviation. `incise bench timeline` measures the error.
  *
@@ -18,7 +18,66 @@
 
 #include <stdbool.h>
 #include <stdint.h>
-#include "envelope.h"
+
+/* --- the line below all arrivals ----------------------------------------------------- */
+
+#define INCISE_ENVELOPE_BLOCKS 64
+#define INCISE_ENVELOPE_BLOCK_MAX_NS 500000000LL
+/*
+ * Largest deviation from the nominal period. Crystals are within 100 ppm; RC oscillators of
+ * cheap devices are not.
+ */
+#define INCISE_ENVELOPE_SLOPE_MAX 2e-3
+
+struct incise_envelope_block {
+	int64_t number; /* x / block_ns */
+	double x_ns, y_ns;
+};
+
+struct incise_envelope {
+	struct incise_envelope_block blocks[INCISE_ENVELOPE_BLOCKS];
+	int count;
+	struct incise_envelope_block open; /* not yet in blocks */
+	bool has_open;
+	double block_ns, period_ns, grain_ns;
+
+	/* The line: y = y_ns + slope · (x - x_ns), in the middle of the blocks. */
+	bool has_line;
+	double x_ns, y_ns, slope;
+	/* The true line is expected to be lower by the gap. */
+	double gap_ns, gap_sd_ns, slope_sd;
+	/* The slope expected while there are few blocks. */
+	double prior_slope, prior_slope_sd;
+	/* The excess of the blocks' lowest is Weibull: shape and scale near its lower end. */
+	double log_ratio, shape, scale_ns; /* scale 0: not known */
+	int shape_fits;
+	/* New lines, because all blocks were far above the old one. */
+	int restarts;
+};
+
+/*
+ * period_ns is positive and finite. Arrivals that come on a grid of grain_ns (frames of USB)
+ * have a jitter that hardly changes when the grid and the period fit; 0: there is no grid.
+ */
+void incise_envelope_init(struct incise_envelope *env, double period_ns, double grain_ns);
+
+/*
+ * Add an arrival; x_ns grows from call to call, from 0 or more, and both are below 1e16 in
+ * size. Returns true when the line was drawn again.
+ */
+bool incise_envelope_add(struct incise_envelope *env, double x_ns, double y_ns);
+
+/* The line's height at x, without the gap. */
+double incise_envelope_at(const struct incise_envelope *env, double x_ns);
+
+/* Standard deviation of line less gap at x. */
+double incise_envelope_sd(const struct incise_envelope *env, double x_ns);
+
+/* Largest distance of a straight line from a clock whose rate changes. */
+double incise_envelope_bend(double span_ns);
+
+/* All blocks have full length: the line in the middle gets no better. */
+bool incise_envelope_full(const struct incise_envelope *env);
 
 /* A stream before its first sample. */
 struct incise_timeline_setup {

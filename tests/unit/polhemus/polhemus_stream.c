@@ -298,7 +298,7 @@ static void bench_take(struct bench *b)
 {
 	int n;
 
-	while ((n = polhemus_stream_take(&b->stream, b->samples + b->n, 100)) > 0)
+	while ((n = incise_ring_take(&b->stream.ring, b->samples + b->n, 100)) > 0)
 		b->n += (size_t)n;
 }
 

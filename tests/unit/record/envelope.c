@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/time/envelope.c against a search through all lines, and against theory.
+ * Tests of lib/record/time/timeline.c: the envelope against a search through all lines, and against theory.
  */
 #include <float.h>
 #include <math.h>
@@ -10,7 +10,7 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include "../../../lib/record/time/envelope.h"
+#include "../../../lib/record/time/timeline.h"
 #include "stream.h"
 
 #define PERIOD_NS 1e6

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/export/smooth.c: velocity against what theory says of it, for sines, straight
+ * Tests of lib/record/export/interpolators.c: the smoother: velocity against what theory says of it, for sines, straight
  * ways, gaps and noise.
  */
 #include <stdarg.h>
@@ -10,7 +10,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include <stdlib.h>
-#include "../../../lib/record/export/smooth.h"
+#include "../../../lib/record/export/interpolators.h"
 
 #define RECORDS 4000
 

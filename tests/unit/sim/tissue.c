@@ -8,7 +8,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <math.h>
-#include "../../../lib/sim/tissue.h"
+#include "../../../lib/sim/world.h"
 
 static const struct incise_blade air = {.cut = 0, .speed_mm_s = 25, .slab = 0.5};
 
