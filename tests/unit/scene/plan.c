@@ -475,7 +475,8 @@ static void test_getters(void **state)
 	struct fed exact = fed_start("scenes/neck.scene", false);
 	struct incise_plan_stability s;
 	struct incise_touch top;
-	const char *why = "none";
+	const char *name, *why = "none";
+	bool actuate = false;
 	double bound_N;
 	struct felt f;
 
@@ -501,7 +502,9 @@ static void test_getters(void **state)
 
 	assert_null(incise_plan_left_out(fixed.plan, 99, &why));
 	assert_string_equal(why, "none");
-	assert_string_equal(incise_plan_left_out(fixed.plan, 0, NULL), "actuate");
+	for (int i = 0; !actuate && (name = incise_plan_left_out(fixed.plan, i, NULL)); i++)
+		actuate = !strcmp(name, "actuate");
+	assert_true(actuate);
 
 	/* Its own size at the least, and the model's and the tables' on top. */
 	assert_true(incise_plan_memory(exact.plan) > 1000);
