@@ -5,7 +5,7 @@
  *   lateness   text: how late firings were, µs in bins that double
  *   cost       text: how long they took; ns only, no counter of instructions
  *   counters   text: "name=number" per motor
- *   reset      write anything: lateness and cost begin anew
+ *   reset      write anything: lateness and cost restart
  */
 #include <linux/debugfs.h>
 #include <linux/math64.h>

@@ -42,7 +42,7 @@ static int blob_open(struct inode *inode, struct file *file)
 {
 	struct stepper_fixed *fixed = &stepper_fixed;
 
-	/* Each opening begins a new one. */
+	/* Each opening starts a new one. */
 	mutex_lock(&fixed->mutex);
 	fixed->size = 0;
 	mutex_unlock(&fixed->mutex);

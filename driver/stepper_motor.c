@@ -2,7 +2,7 @@
 /*
  * The hard timer of a motor: ticks, and the edges between them. It fires in hard
  * interrupt on PREEMPT_RT too. One thing per firing, the one that is due first;
- * the timer is set anew for the next.
+ * the timer is set again for the next.
  *
  *          tick k                          tick k+1
  *   timer ──╫──────┬────┬─────┬─────┬────────╫──

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * The SYNC line: pulses at a fixed period for a camera's trigger, a tracker's external
- * sync or a lamp. Each is stamped and counted, and is an event: the hardware way to one
+ * sync or a lamp. Each is timestamped and counted, and is an event: the hardware way to one
  * time line.
  *
  *          first_ns        + period        + 2 period

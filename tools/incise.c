@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise VERB …: runs incise-VERB, the one beside this program first, then the one on
- * PATH, so that anyone can add a verb. Where there is a program incise-VERB-WORD beside this
- * one, incise VERB WORD … runs that.
+ * incise COMMAND …: runs incise-COMMAND, the one next to this program first, then the one on
+ * PATH, so that anyone can add a command. Where there is a program
+ * incise-COMMAND-SUBCOMMAND next to this one, incise COMMAND SUBCOMMAND … runs that.
  */
 #include <dirent.h>
 #include <errno.h>
@@ -15,11 +15,11 @@
 #include <incise/version.h>
 #include "cli/cli.h"
 
-#define WORD "abcdefghijklmnopqrstuvwxyz"
+#define LETTERS "abcdefghijklmnopqrstuvwxyz"
 
 static const struct {
 	const char *name, *does;
-} verbs[] = {
+} commands[] = {
 	{"calibrate", "measure what turns readings into mm, N and s"},
 	{"capture", "record the streams of a rig in sync"},
 	{"verify", "prove that a recording is complete"},
@@ -43,8 +43,8 @@ static void help(void)
 	printf("Usage: incise VERB [ARGUMENTS]\n\n"
 	       "A toolkit for haptic cutting: record, model and render how tissue resists a "
 	       "scalpel.\n\nVerbs:\n");
-	for (size_t i = 0; i < sizeof(verbs) / sizeof(*verbs); i++)
-		printf("  %-10s %s\n", verbs[i].name, verbs[i].does);
+	for (size_t i = 0; i < sizeof(commands) / sizeof(*commands); i++)
+		printf("  %-10s %s\n", commands[i].name, commands[i].does);
 	printf("\n'incise VERB --help' lists a verb's options, 'incise help VERB' opens its "
 	       "manual.\n'incise demo' is a good start.\n");
 }
@@ -68,29 +68,30 @@ static bool on_path(const char *name)
 	return found;
 }
 
-static bool known(const char *verb)
+static bool known(const char *command)
 {
-	for (size_t i = 0; i < sizeof(verbs) / sizeof(*verbs); i++)
-		if (!strcmp(verb, verbs[i].name))
+	for (size_t i = 0; i < sizeof(commands) / sizeof(*commands); i++)
+		if (!strcmp(command, commands[i].name))
 			return true;
 	return false;
 }
 
 /* The manual page, from the source tree when this runs in a build tree. */
-static int manual(const char *verb, const char *word)
+static int manual(const char *command, const char *subcommand)
 {
 	char folder[PATH_MAX];
 	char *name, *page;
 
 	snprintf(folder, sizeof(folder), "%s", cli_folder());
-	if (verb && !known(verb)) {
+	if (command && !known(command)) {
 		fprintf(stderr,
 			"incise: there is no verb '%.64s'; 'incise --help' lists them\n",
-			verb);
+			command);
 		return 2;
 	}
-	if (asprintf(&name, "incise%s%s%s%.64s", verb ? "-" : "", verb ? verb : "",
-		     word ? "-" : "", word ? word : "") < 0 ||
+	if (asprintf(&name, "incise%s%s%s%.64s", command ? "-" : "",
+		     command ? command : "", subcommand ? "-" : "",
+		     subcommand ? subcommand : "") < 0 ||
 	    asprintf(&page, "%s/../../man/%s.1", folder, name) < 0)
 		return 1;
 	if (!access(page, R_OK))
@@ -98,7 +99,7 @@ static int manual(const char *verb, const char *word)
 	else
 		execlp("man", "man", name, (char *)NULL);
 	fprintf(stderr, "incise: man: %s; try 'incise %s --help'\n", strerror(errno),
-		verb ? verb : "");
+		command ? command : "");
 	return 1;
 }
 
@@ -112,49 +113,50 @@ static int finish(void)
 
 int main(int argc, char **argv)
 {
-	const char *verb = argv[1];
+	const char *command = argv[1];
 	char folder[PATH_MAX], program[PATH_MAX + 80];
 
 	if (argc < 2) {
 		fprintf(stderr, "incise: which verb? 'incise --help' lists them\n");
 		return 2;
 	}
-	if (!strcmp(verb, "-h") || !strcmp(verb, "--help")) {
+	if (!strcmp(command, "-h") || !strcmp(command, "--help")) {
 		help();
 		return finish();
 	}
-	if (!strcmp(verb, "-V") || !strcmp(verb, "--version")) {
+	if (!strcmp(command, "-V") || !strcmp(command, "--version")) {
 		printf("incise %s\n", incise_version());
 		return finish();
 	}
-	if (!strcmp(verb, "help")) {
+	if (!strcmp(command, "help")) {
 		if (argc > 2)
 			return manual(argv[2], argv[3]);
 		help();
 		return finish();
 	}
-	if (strchr(verb, '/') || *verb == '-' || strlen(verb) > 64) {
+	if (strchr(command, '/') || *command == '-' || strlen(command) > 64) {
 		fprintf(stderr,
-			"incise: '%.64s' is no verb; 'incise --help' lists them\n", verb);
+			"incise: '%.64s' is no verb; 'incise --help' lists them\n",
+			command);
 		return 2;
 	}
 	snprintf(folder, sizeof(folder), "%s", cli_folder());
-	if (argc > 2 && argv[2][strspn(argv[2], WORD)] == 0 && *argv[2]) {
-		snprintf(program, sizeof(program), "%s/incise-%s-%.64s", folder, verb,
+	if (argc > 2 && argv[2][strspn(argv[2], LETTERS)] == 0 && *argv[2]) {
+		snprintf(program, sizeof(program), "%s/incise-%s-%.64s", folder, command,
 			 argv[2]);
 		if (!access(program, X_OK))
 			execv(program, argv + 2);
 	}
-	snprintf(program, sizeof(program), "%s/incise-%s", folder, verb);
+	snprintf(program, sizeof(program), "%s/incise-%s", folder, command);
 	execv(program, argv + 1);
-	snprintf(program, sizeof(program), "incise-%s", verb);
+	snprintf(program, sizeof(program), "incise-%s", command);
 	if (errno == ENOENT)
 		execvp(program, argv + 1);
 	/* A folder on PATH that may not be searched makes execvp say EACCES as well. */
 	if (errno == ENOENT || (errno == EACCES && !on_path(program))) {
 		fprintf(stderr,
 			"incise: there is no verb '%s'; 'incise --help' lists them\n",
-			verb);
+			command);
 		return 2;
 	}
 	fprintf(stderr, "incise: %s: %s\n", program, strerror(errno));

@@ -68,7 +68,7 @@ u16 sim_adc_convert(struct sim_adc *adc)
 	return value;
 }
 
-/* One conversion, stamped, for the thread. From hard interrupts. */
+/* One conversion, timestamped, for the thread. From hard interrupts. */
 void sim_adc_convert_to_fifo(struct sim_adc *adc)
 {
 	s64 now_ns = iio_get_time_ns(adc->iio);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * The ring of stamped edges and the files "edges" and "status". One writer
+ * The ring of timestamped edges and the files "edges" and "status". One writer
  * (whoever holds the simulator's lock) and one reader (the mutex): they meet
  * in head and tail only, so that a reader never delays set().
  *

@@ -4,7 +4,7 @@
  * edges, carriages and scripts. All of it changes under one raw spinlock, so
  * that a limit input is true in the same instant as the step that reached it.
  *
- *	set() -> level -> ring                     (stamped)
+ *	set() -> level -> ring                     (timestamped)
  *	               -> carriage -> inputs \
  *	               -> script   -> inputs -> ring, interrupt (irq_work)
  *

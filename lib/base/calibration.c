@@ -49,7 +49,7 @@ static const struct known_key known_keys[] = {
 	TIP("x", 0),
 	TIP("y", 1),
 	TIP("z", 2),
-	/* a camera may stamp the end of an exposure: later than its middle, or not */
+	/* a camera may timestamp the end of an exposure: later than its middle, or not */
 	NUMBER(force_delay_ms, "ms", -1000, 1000),
 	NUMBER(force_delay_sd_ms, "ms", 0, 1000),
 	NUMBER(tracker_delay_ms, "ms", -1000, 1000),

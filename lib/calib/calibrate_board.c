@@ -30,7 +30,7 @@ struct solution {
  *
  * After Z. Zhang, A flexible new technique for camera calibration, IEEE PAMI 22 (2000) 1330.
  * Columns 1 and 2 of a homography H = K [r1 r2 t] come from unit vectors at a right angle. With
- * the principal point in the picture's middle, taken off, each view has two equations for
+ * the principal point in the frame's middle, taken off, each view has two equations for
  * w = 1/f²:
  *
  *     w (h11 h12 + h21 h22) + h31 h32 = 0
@@ -130,7 +130,7 @@ static void pose_of(const double h[9], double f, double pose[BOARD_POSE])
 
 /*
  * First values: a homography of each view, a focal length of all, the principal point in the
- * picture's middle, and no distortion. 0, -EDOM.
+ * frame's middle, and no distortion. 0, -EDOM.
  */
 static int find_start(const struct incise_board_views *views, struct solution *solution,
 		      struct incise_error *err)

@@ -3,7 +3,7 @@
  * Delay between two streams of one motion; see incise/calibrate_delay.h. Delays are in
  * steps of the grid here.
  *
- *     target(i) ≈ Σ c_k · column_k(i + delay)       columns depend on where contact begins
+ *     target(i) ≈ Σ c_k · column_k(i + delay)       columns depend on where contact starts
  */
 #include <errno.h>
 #include <math.h>
@@ -25,7 +25,7 @@ struct delay {
 	int range;		/* steps */
 	/* The fit: */
 	double shift, contact_mm, c[DELAY_COLUMNS];
-	bool touches; /* contact begins within the motion, and is fitted along */
+	bool touches; /* contact starts within the motion, and is fitted along */
 };
 
 #define UNKNOWNS (DELAY_COLUMNS + 3) /* the others: delay, contact, drift */
@@ -122,7 +122,7 @@ static void filter_column(struct delay_grid *grid, int k)
 	delay_grid_filter(grid, grid->scratch, grid->column[k]);
 }
 
-/* The columns that the other stream is fitted by, for a contact that begins at a depth. */
+/* The columns that the other stream is fitted by, for a contact that starts at a depth. */
 static void make_columns(struct delay *d, double contact_mm)
 {
 	struct delay_grid *grid = &d->grid;
@@ -279,7 +279,7 @@ static double coarse_rest(const struct delay *d, int shift)
 }
 
 /*
- * Choose the depth at which contact begins, and the delay again, as viscosity has moved the
+ * Choose the depth at which contact starts, and the delay again, as viscosity has moved the
  * peak of the correlation; the fit starts from there.
  */
 static void search_contact(struct delay *d)

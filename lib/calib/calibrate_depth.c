@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Scale of the picture from two points and from a line; see incise/calibrate_depth.h.
+ * Scale of the frame from two points and from a line; see incise/calibrate_depth.h.
  *
  *     pairs ─ robust start ─ choice of the near ones ─ least squares ─ budget
  */

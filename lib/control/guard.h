@@ -67,7 +67,7 @@ struct incise_guard {
 void incise_guard_init(struct incise_guard *guard, double mass_kg, double period_s,
 		       double reserve_N_mm);
 
-/* A contact begins: no energy went in or out yet, no force is held. */
+/* A contact starts: no energy went in or out yet, no force is held. */
 void incise_guard_reset(struct incise_guard *guard) INCISE_REALTIME;
 
 /*

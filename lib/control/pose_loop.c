@@ -41,7 +41,7 @@ struct loop {
 	struct incise_predict predict;
 	double tick_s, pose_s, latency_s;
 	int ticks, poses; /* in a period */
-	int waiting;	  /* poses on their way when a period begins */
+	int waiting;	  /* poses on their way when a period starts */
 	int states;
 	double K, B;
 };
@@ -104,7 +104,7 @@ static void set_force(const struct loop *loop, struct run *run)
 		run->force_N[i] = -loop->K * x[i] - loop->B * v[i];
 }
 
-/* Round a period: the last poses are taken in before the tick that begins the next one. */
+/* Round a period: the last poses are taken in before the tick that starts the next one. */
 static void run_period(const struct loop *loop, struct run *run)
 {
 	double lead_s = LEAD * loop->tick_s;

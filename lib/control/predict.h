@@ -12,7 +12,7 @@
  *   time         |    |
  *             arrival  + period
  *
- * The blend begins when a pose arrives at the host (sample->t_ns), not when it is taken
+ * The blend starts when a pose arrives at the host (sample->t_ns), not when it is taken
  * in. So it does not matter how many poses are taken in at one tick. A pose must be taken
  * in before the first tick after its arrival is asked for; when it is late by d, what is
  * shown steps by d / period of the difference.
@@ -37,7 +37,7 @@ struct incise_predict {
 	double alpha, beta, gamma; /* of a miss: to x, v · period, a · period² */
 	double period_s;
 	int64_t latency_ns;
-	int64_t gap_ns; /* after a longer gap the filter starts anew */
+	int64_t gap_ns; /* after a longer gap the filter restarts */
 	bool started;
 	/* Number of poses that no hand can have reached since the last one. */
 	unsigned int discontinuities;

@@ -34,7 +34,7 @@ double incise_stability_amplitude(const struct incise_haptic_device *device,
 /*
  * Energy that a spring gives to the hand beyond what was pressed into it, on the way to a
  * depth and back at one speed: E = K (T + 2 t_d) u X, on average over where between two
- * samples the contact begins. The device's damping takes 2 b u X.
+ * samples the contact starts. The device's damping takes 2 b u X.
  *
  * @param stiffness_N_mm ≥ 0
  * @param speed_mm_s     ≥ 0

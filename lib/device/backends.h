@@ -31,7 +31,7 @@ struct incise_loaded {
 };
 
 /*
- * Find a backend and load its module, if it is in one. @where begins the message. 0;
+ * Find a backend and load its module, if it is in one. @where starts the message. 0;
  * -ENODEV (the message lists the known ones); -ENOEXEC (its module is broken, or of
  * another version).
  */

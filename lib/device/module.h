@@ -24,7 +24,7 @@ struct incise_module {
 bool incise_module_folder(char *path, size_t size);
 
 /*
- * Load a file and find its symbol. @where begins the message. 0 or -ENOEXEC (it is
+ * Load a file and find its symbol. @where starts the message. 0 or -ENOEXEC (it is
  * broken, or no module).
  */
 int incise_module_open(struct incise_module *module, const char *path, const char *symbol,

@@ -78,7 +78,7 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
 
 /*
  * Set pulse times that rig.conf leaves open to the shortest that the machine holds, and
- * check the rate. @where begins the message; @pulse_ns: for an edge and its lateness. 0
+ * check the rate. @where starts the message; @pulse_ns: for an edge and its lateness. 0
  * or -ERANGE.
  */
 int incise_motor_fit(struct incise_actuator *actuator, const char *where,

@@ -455,7 +455,7 @@ static int plan_sim(struct incise_rig_plan *plan, const config_setting_t *root,
 	return 0;
 }
 
-/* @where, the file and line or the shorthand, begins the message. */
+/* @where, the file and line or the shorthand, starts the message. */
 static int plan_clock(struct incise_rig_plan *plan, const char *where, const char *text,
 		      struct incise_error *err)
 {

@@ -295,7 +295,7 @@ static int find(struct home *h)
 					"it is firm",
 					h->info.name, input_name(h));
 	h->edge_mm = edge_mm - h->renamed_mm;
-	/* To the edge, or from it to where the travel begins. */
+	/* To the edge, or from it to where the travel starts. */
 	if (!rc)
 		rc = go_to(h, edge_mm + rest_mm - h->homing.home_mm);
 	if (!rc)

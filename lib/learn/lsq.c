@@ -226,7 +226,7 @@ static double length(double alpha, const double *v, int rows)
 }
 
 /*
- * Fold rows of a into the triangle r; a is left zero. Of a staircase, row i begins in
+ * Fold rows of a into the triangle r; a is left zero. Of a staircase, row i starts in
  * column i: what lies below is not touched.
  */
 static void fold(double *r, double *a, double *v, int n, int stride, int rows,

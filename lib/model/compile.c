@@ -24,7 +24,7 @@ struct compiled {
 /* A force table is the cheapest only while it stays in the cache beside all else. */
 #define FORCE_SIZE_MAX (256 << 10)
 
-/* The model to compile, in the forms that all arithmetics are built from. */
+/* The model to compile, in the forms that all evaluators are built from. */
 struct source {
 	const struct incise_model *model;
 	const struct incise_grid *grid;
@@ -548,7 +548,7 @@ static int choose(struct image *best, const struct incise_grid *grid,
 
 	incise_grid_size(grid, &source.size);
 	*best = (struct image){.bound = INFINITY};
-	/* Nothing of that size has a format; the arithmetics may count on finite numbers. */
+	/* Nothing of that size has a format; the evaluators may count on finite numbers. */
 	if (!(source.size.parts < INCISE_GRID_LARGEST))
 		return rc;
 	survey = incise_survey_new(grid);

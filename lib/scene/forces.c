@@ -17,7 +17,7 @@
  *   the depth below the surface.
  * - Fd prints +Kd v. It is to damp, so it opposes v.
  * - Fxz prints a product of three distances along (Q0-P0), which is always zero when the
- *   contact begins on the surface. Its sentence asks for a force proportional to the
+ *   contact starts on the surface. Its sentence asks for a force proportional to the
  *   distance of the instrument from where its contact began: that is what stands here.
  */
 #include <math.h>

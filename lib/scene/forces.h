@@ -38,7 +38,7 @@ struct incise_force_number {
 /* State of a force from tick to tick, in one plan. Zeroed with the plan. */
 union incise_force_state {
 	struct incise_fixed_spring
-		spring;	  /* plane in fixed point, set when contact begins */
+		spring;	  /* plane in fixed point, set when contact starts */
 	bool in_incision; /* insertion: the instrument went in where the blade had cut */
 };
 

@@ -34,7 +34,7 @@ static void take(struct incise_plan *plan, struct incise_tracker_sample *samples
 	double arm_mm[3];
 
 	for (int i = 0; i < n; i++) {
-		/* A stamp from the future would keep all later poses out. */
+		/* A timestamp from the future would keep all later poses out. */
 		if (samples[i].t_ns > now_ns)
 			samples[i].t_ns = now_ns;
 		v3_rotate(arm_mm, samples[i].quaternion, plan->tip_mm);

@@ -22,7 +22,7 @@ struct incise_average {
 /* @n 1 … 64; what is outside is taken as the nearest inside. */
 void incise_average_init(struct incise_average *a, int n);
 
-/* Forget all: when a contact begins. */
+/* Forget all: when a contact starts. */
 void incise_average_reset(struct incise_average *a) INCISE_REALTIME;
 
 /*

@@ -519,7 +519,7 @@ int bvh_build(struct bvh *bvh, const float (*box)[2][3], uint32_t n, uint32_t *o
 	}
 	root = build(&b, 0, n, all);
 	if (root & BVH_LEAF) {
-		/* A query begins with a node: one with this leaf and an empty one. */
+		/* A query starts with a node: one with this leaf and an empty one. */
 		struct bvh_node *node = bvh->node;
 
 		bvh->n_nodes = 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The proxy of a tool: when a contact begins, how it goes on, when it ends.
+ * The proxy of a tool: when a contact starts, how it goes on, when it ends.
  *
  *                  the way enters, or the first place lies inside
  *            ┌──────────────────────────────────────────────────────▶┐
@@ -25,13 +25,13 @@
 
 /*
  * A tool this near is on the mesh, on whichever side rounding shows it; a contact ends
- * farther outside than that. A way that ends or begins on the surface then cannot slip
+ * farther outside than that. A way that ends or starts on the surface then cannot slip
  * through between two ticks.
  */
 #define ON_MM 1e-9
 #define OFF_MM (2 * ON_MM)
 
-/* Contact ends on one part of a mesh and begins on another at most so often in one tick. */
+/* Contact ends on one part of a mesh and starts on another at most so often in one tick. */
 #define PARTS_MAX 4
 
 static const double up[3] = {0, 0, 1};
@@ -84,7 +84,7 @@ static void move_on_shape(struct incise_proxy *proxy, const double tool[3])
 
 static struct mesh_spot spot_of(const struct incise_proxy *proxy)
 {
-	/* Where it is on its face does not matter: gliding begins with the face. */
+	/* Where it is on its face does not matter: gliding starts with the face. */
 	struct mesh_spot spot = {.face = proxy->at_face, .part = TRIANGLE_FACE};
 
 	v3_copy(spot.point, proxy->touch.point_mm);
@@ -111,7 +111,7 @@ static void end(struct incise_proxy *proxy)
  * A proxy that is still on its way has the tool in front of its face: because the tool
  * has gone out, or because there is a dent between the two. Where the straight way to the
  * tool enters it is a dent, the tool is inside, and the proxy goes on gliding. A way that
- * begins on the edge of the dent may enter right there, and rounding then hides it: when
+ * starts on the edge of the dent may enter right there, and rounding then hides it: when
  * none is found, what is nearest to the tool tells.
  */
 static bool is_dent(const struct incise_proxy *proxy, const struct mesh_spot *spot,
@@ -130,7 +130,7 @@ static bool is_dent(const struct incise_proxy *proxy, const struct mesh_spot *sp
 
 /*
  * Glide at most @reach towards the tool, and end the contact when it has left; where its
- * way from there enters another part of the mesh, the contact begins anew on that one.
+ * way from there enters another part of the mesh, the contact restarts on that one.
  */
 static void follow(struct incise_proxy *proxy, const double tool[3], double reach)
 {
@@ -160,7 +160,7 @@ static void follow(struct incise_proxy *proxy, const double tool[3], double reac
 		if (!(proxy->touch.depth_mm < -leave) &&
 		    !mesh_beyond_border(mesh, &spot, tool))
 			return;
-		/* At the nearest place around, it is rounding that enters where it begins. */
+		/* At the nearest place around, it is rounding that enters where it starts. */
 		if (!mesh_enters(mesh, spot.point, tool, ON_MM, &entry)) {
 			end(proxy);
 			return;

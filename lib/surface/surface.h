@@ -147,7 +147,7 @@ struct incise_proxy {
 };
 
 /*
- * @param leave_mm ≥ 0; hysteresis: a contact begins at the surface and ends this far
+ * @param leave_mm ≥ 0; hysteresis: a contact starts at the surface and ends this far
  *                 outside of it
  */
 void incise_proxy_init(struct incise_proxy *proxy, const struct incise_surface *surface,
@@ -156,10 +156,10 @@ void incise_proxy_init(struct incise_proxy *proxy, const struct incise_surface *
 /*
  * Follow the tool to a new place.
  *
- * A contact begins where the way from the last place enters the tissue, or at the nearest
+ * A contact starts where the way from the last place enters the tissue, or at the nearest
  * point when the first place of all lies inside. It ends leave_mm outside, and where the
  * proxy comes to the border of an open mesh with the tool beyond it. Where the way from a
- * proxy that lets go enters another part of the mesh, a contact begins there in the same
+ * proxy that lets go enters another part of the mesh, a contact starts there in the same
  * move: `began` is set again and `first` is new.
  *
  * On a mesh the proxy goes at most twice as far as the tool went, in a straight line from

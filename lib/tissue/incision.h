@@ -22,7 +22,7 @@ struct incise_incision {
 	double from_mm, to_mm;
 };
 
-/* A cut begins and takes the place of the one before. side and normal are unit. */
+/* A cut starts and takes the place of the one before. side and normal are unit. */
 void incise_incision_begin(struct incise_incision *incision, const double at_mm[3],
 			   const double normal[3], const double side[3]) INCISE_REALTIME;
 

@@ -16,7 +16,7 @@ struct incise_film {
 	const struct incise_film_module *module;
 	struct incise_film_coder *coder;
 	char *path, *part;
-	uint64_t pictures;
+	uint64_t frames;
 	int failed;
 };
 
@@ -90,7 +90,7 @@ int incise_film_add(struct incise_film *film, const uint8_t *rgb,
 					"%s: the film has ended with an error",
 					film->path);
 	film->failed = film->module->add(film->coder, rgb, err);
-	film->pictures += !film->failed;
+	film->frames += !film->failed;
 	return film->failed;
 }
 
@@ -104,9 +104,9 @@ int incise_film_close(struct incise_film *film, struct incise_error *err)
 	if (!rc && film->failed)
 		rc = incise_error_set(err, -film->failed,
 				      "%s: the film has ended with an error", film->path);
-	if (!rc && film->pictures && rename(film->part, film->path))
+	if (!rc && film->frames && rename(film->part, film->path))
 		rc = incise_error_set(err, errno, "%s: %s", film->path, strerror(errno));
-	if (rc || !film->pictures)
+	if (rc || !film->frames)
 		unlink(film->part);
 	forget(film);
 	return rc;

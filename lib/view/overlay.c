@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Panels over the picture, by cairo; see overlay.h. Graphs consist of columns, each with the least
+ * Panels over the image, by cairo; see overlay.h. Graphs consist of columns, each with the least
  * and the largest value of its 40 ms, so that single ticks are visible. Without DejaVu Sans cairo
  * uses another font, and without any font there are still graphs.
  */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Panels over the picture: force and depth over the last 10 s, phase, tool, state, lateness; and
+ * Panels over the image: force and depth over the last 10 s, phase, tool, state, lateness; and
  * the keys. They are images of their own, redrawn at most 15 times per second of the ticks' time.
  *
  *      ┌ force N ───────────┐

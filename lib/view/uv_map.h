@@ -7,7 +7,7 @@
  * px[1] │ texel (0, 0) │             ▲ normal, towards who looks
  *   │   │ has its      │          down = right × normal
  *   ▼   │ centre at .5 │
- *       └──────────────┘  seen from outside the picture is not mirrored
+ *       └──────────────┘  seen from outside the image is not mirrored
  *
  * The middle of the texture is the surface's top, unless the surface ends sooner than the
  * texture would. By the kind of surface:
@@ -52,7 +52,7 @@ struct uv_map {
 	bool larynx;
 	double wide_mm, high_mm; /* of the whole texture */
 	double top_mm[2];	 /* the surface's top, from the texture's middle */
-	/* From above: the texture's middle; unrolled: where the axis begins; the frame. */
+	/* From above: the texture's middle; unrolled: where the axis starts; the frame. */
 	double origin[3], right[3], down[3], up[3];
 	double above_mm, below_mm; /* the surface lies between, from the origin */
 	double radius_mm, axis_mm, middle_mm; /* unrolled; the texture's middle along */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The picture of a scene; see incise/view.h.
+ * The image of a scene; see incise/view.h.
  *
  *     uv map ─┬─▶ skin ─▶ canvas ─▶ draw ─▶ window, pixels
  *             └─▶ injury ──▲         ▲
@@ -25,7 +25,7 @@
 
 #define FAR_MM 1e6 /* no tool is farther away */
 #define MARGIN_PX 14
-#define PANEL_LEAST_PX (800 * 450) /* smaller pictures have no panel */
+#define PANEL_LEAST_PX (800 * 450) /* smaller images have no panel */
 
 enum { SLOT_PANEL, SLOT_KEYS };
 
@@ -261,7 +261,7 @@ static void lay_over(struct incise_view *view, const struct incise_view_status *
 {
 	const struct incise_overlay_image *image;
 
-	/* In a small picture the panel would hide too much. */
+	/* In a small image the panel would hide too much. */
 	if (view->panel && view->width * view->height >= PANEL_LEAST_PX &&
 	    (image = incise_overlay_panel(view->overlay, status)))
 		incise_draw_overlay(view->draw, SLOT_PANEL, image->pixels, image->width,

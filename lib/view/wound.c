@@ -133,7 +133,7 @@ static void raise_texel(struct field_texel *texel, const struct field_stretch *s
 		raise_to(&texel->halo, out * out * fminf(depth / 1.5f, 1) * 65535);
 }
 
-/* Raise the fields of the tile that begins at this texel, where the stretch is. */
+/* Raise the fields of the tile that starts at this texel, where the stretch is. */
 static void field_raise(struct field_texel *tile, int x, int y,
 			const struct field_stretch *s)
 {

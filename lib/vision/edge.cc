@@ -115,7 +115,7 @@ static double curve_at(const curve &c, double x, unknowns *d)
 	return c.p[INSIDE] + step * part;
 }
 
-/* The level beyond begins to wander here, past the blur. */
+/* The level beyond starts to wander here, past the blur. */
 static double level_from(const curve &c)
 {
 	return c.p[PLACE] + std::max(level_px, 1.25 * c.p[BLUR]);

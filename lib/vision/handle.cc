@@ -20,11 +20,11 @@ namespace vision
 {
 
 /*
- * Regions: each run begins a region of its own, and those that touch a run of the row above are
+ * Regions: each run starts a region of its own, and those that touch a run of the row above are
  * joined with it.
  *
  *      row above   ·███····██·      two runs touch when neither ends before the
- *      row         ··██████···      other begins
+ *      row         ··██████···      other starts
  */
 static int root_of(std::vector<int> &parent, int i)
 {

@@ -130,7 +130,7 @@ static off_t choose_in_database(off_t size)
 
 /*
  * Somewhere: anywhere, in the file's head, or where one frame ends with its note and the
- * next begins with its number and time.
+ * next starts with its number and time.
  */
 static off_t choose_in_film(const uint8_t *bytes, off_t size)
 {

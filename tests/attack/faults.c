@@ -21,7 +21,7 @@ static void set(const char *name, long long value)
 	setenv(name, text, 1);
 }
 
-/* A message of one line that names the verb. */
+/* A message of one line that names the command. */
 static void check_message(const struct round *round)
 {
 	char *text = text_of("err"), *end = strchr(text, '\n');

@@ -6,7 +6,7 @@
  *   day SCENE [HOURS [START_NS]]
  *
  * The virtual surgeon presses on the tissue; how fast swings, with 13 swings and 200 strokes
- * in 100 s. After that all begins anew, and so does the tracker without noise, 12000 poses
+ * in 100 s. After that all restarts, and so does the tracker without noise, 12000 poses
  * on. So each round of 100 s must give what the second one gave: the first has the ramp of
  * the start in it. The clock starts at START_NS, 1 s without: a power of two that a counter
  * may wrap at, or that a double is too short for, comes to lie in the run.

@@ -551,7 +551,7 @@ static void recover_from_all(struct chaos *run)
 static void try_chaos(struct extremes_row *row, const struct incise_scene *scene,
 		      const struct ground *ground, int number, long poses, long met[METS])
 {
-	/* Where time begins; a plan's last_ns of 0 has a meaning of its own. */
+	/* Where time starts; a plan's last_ns of 0 has a meaning of its own. */
 	static const int64_t starts[] = {
 		0, 1000000000, 1, INT64_MIN, -1, -MS, MS, INT64_MAX - 3 * MS * EPISODE};
 	struct chaos run = {.met = met,

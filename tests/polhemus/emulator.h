@@ -50,7 +50,7 @@ struct emulator_pose {
 
 struct emulator {
 	enum emulator_kind kind;
-	/* May be changed before it begins. */
+	/* May be changed before it starts. */
 	bool present[EMULATOR_STATIONS]; /* a sensor is plugged in */
 	int switch_bytes;
 	double hz; /* of its cycle */

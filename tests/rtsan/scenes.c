@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Every shipped scene in both arithmetics through a cut and what can go wrong in it, in the
+ * Every shipped scene in both evaluators through a cut and what can go wrong in it, in the
  * loop with its page of state and its control, under RealtimeSanitizer: it ends this program
  * at the first thing that no tick may do. What the ticks came to is counted, to show that
  * they went where they should.
@@ -159,7 +159,7 @@ static void run(const char *scene, const char *arithmetic, bool full,
 
 int main(void)
 {
-	static const char *const arithmetics[] = {"fixed", "double"};
+	static const char *const evaluators[] = {"fixed", "double"};
 	char page[] = "/tmp/incise-rtsan-XXXXXX";
 	glob_t scenes;
 	int fd = mkstemp(page);
@@ -172,7 +172,7 @@ int main(void)
 	for (size_t s = 0; s < scenes.gl_pathc; s++)
 		for (int a = 0; a < 4; a++)
 			for (size_t w = 0; w < sizeof(ways) / sizeof(*ways); w++)
-				run(scenes.gl_pathv[s], arithmetics[a % 2], a > 1,
+				run(scenes.gl_pathv[s], evaluators[a % 2], a > 1,
 				    &ways[w], page);
 	unlink(page);
 	if (!seen.insertions)

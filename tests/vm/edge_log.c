@@ -299,7 +299,7 @@ static void edge_log_enable(struct edge_log *log, bool on)
 {
 	if (on) {
 		log->powered_ns = log->t_ns;
-		/* Begins anew, from rest where the steps have come to. */
+		/* Begins again, from rest where the steps have come to. */
 		log->steps = 0;
 		edge_log_remember(log);
 	} else if (!edge_log_halted(log)) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Judges the edges of one motor as the simulated chip has stamped them. Nothing of the
+ * Judges the edges of one motor as the simulated chip has timestamped them. Nothing of the
  * module is believed: steps, direction and times are those on the lines.
  *
  *              set_up >=      high >=  low >=          hold >=   set_up >=
@@ -8,7 +8,7 @@
  *   step  ________________/~~~~~~~\_______/~~~~~~~\__________________/~~~~~~~\__
  *                         |<----- 1/v at least --->|
  *
- * A stamp is taken within the write, and the module counts from after a write to before the
+ * A timestamp is taken within the write, and the module counts from after a write to before the
  * next: so high, low, set-up, hold and the interval at full speed hold to the nanosecond,
  * however late an edge is.
  *
@@ -98,7 +98,7 @@ struct edge_log {
 
 /*
  * Begins with a motor at rest, without power, at @position. @levels are those of the lines
- * step, dir, enable when the log begins, bits 0 to 2.
+ * step, dir, enable when the log starts, bits 0 to 2.
  */
 void edge_log_init(struct edge_log *log, const struct edge_log_motor *motor,
 		   int64_t position, unsigned int levels);

@@ -25,7 +25,7 @@ int simulator_write_bytes(const char *file, const void *bytes, size_t size);
 /* The number after "name=" in a file; INT64_MIN where there is none. */
 int64_t simulator_number(const char *file, const char *name);
 
-/* The same on the line of a file that begins with "number=NUMBER". */
+/* The same on the line of a file that starts with "number=NUMBER". */
 int64_t simulator_number_of(const char *file, const char *number, const char *name);
 
 /* Drains up to @max edges; returns how many there were. */

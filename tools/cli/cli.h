@@ -186,7 +186,7 @@ bool cli_ends_with(const char *text, const char *end);
 /* Replace the status lines on stderr; does nothing if that is not a terminal. */
 void cli_progress(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
-/* A bar of it, redrawn only when *percent changes; begins with -1. */
+/* A bar of it, redrawn only when *percent changes; starts with -1. */
 void cli_progress_bar(const char *name, double share, int *percent);
 
 /* Remove them. */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What verbs that run the loop say of it; see loop_report.h.
+ * Reports of the commands that run the loop; see loop_report.h.
  */
 #include <math.h>
 #include <stdio.h>

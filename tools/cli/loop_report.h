@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What verbs that run the loop say of it: the flags of ticks, and how late ticks were.
+ * Reports of the commands that run the loop: the flags of ticks, and how late ticks were.
  */
 #ifndef INCISE_LOOP_REPORT_H
 #define INCISE_LOOP_REPORT_H

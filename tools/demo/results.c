@@ -70,7 +70,7 @@ static char *quantile_us(const json_t *haptic, const char *what, const char *nam
 
 #define GRID 400
 
-/* Largest difference of the two arithmetics on a grid over the support, N. */
+/* Largest difference of the two evaluators on a grid over the support, N. */
 static double fixed_difference(const struct incise_model *model, double *bound)
 {
 	struct incise_error err = {0};

@@ -46,7 +46,7 @@ static socklen_t address(struct sockaddr_un *to)
 		return 0;
 	*to = (struct sockaddr_un){.sun_family = AF_UNIX};
 	memcpy(to->sun_path, path, length);
-	/* An abstract socket: its name begins with a 0. */
+	/* An abstract socket: its name starts with a 0. */
 	if (*path == '@')
 		to->sun_path[0] = 0;
 	return (socklen_t)(offsetof(struct sockaddr_un, sun_path) + length);

@@ -33,7 +33,7 @@
 #define TESTS 5 /* each corrects one stage of the command */
 
 struct card {
-	const char *where; /* begins each message; only during the set-up */
+	const char *where; /* starts each message; only during the set-up */
 	struct incise_force_setup setup;
 	char path[80];
 	comedi_t *device;

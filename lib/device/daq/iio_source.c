@@ -628,14 +628,14 @@ static size_t round_up(size_t at, size_t size)
 
 static void lay_out(struct iio_source *s)
 {
-	bool stamp_first =
+	bool timestamp_first =
 		iio_channel_get_index(s->timestamp) < iio_channel_get_index(s->voltage);
-	size_t voltage = s->format.bytes, stamp = s->timestamp_format.bytes;
+	size_t voltage = s->format.bytes, timestamp = s->timestamp_format.bytes;
 
-	s->voltage_at = stamp_first ? round_up(stamp, voltage) : 0;
-	s->timestamp_at = stamp_first ? 0 : round_up(voltage, stamp);
-	s->step = stamp_first ? s->voltage_at + voltage : s->timestamp_at + stamp;
-	s->step = round_up(s->step, voltage > stamp ? voltage : stamp);
+	s->voltage_at = timestamp_first ? round_up(timestamp, voltage) : 0;
+	s->timestamp_at = timestamp_first ? 0 : round_up(voltage, timestamp);
+	s->step = timestamp_first ? s->voltage_at + voltage : s->timestamp_at + timestamp;
+	s->step = round_up(s->step, voltage > timestamp ? voltage : timestamp);
 }
 
 int iio_source_start(struct iio_source *s, const char *folder, unsigned int block,

@@ -31,7 +31,7 @@ struct iio_format {
 
 struct iio_source {
 	int fd;		   /* of the device's file; -1 before */
-	const char *where; /* begins each message; only during the set-up */
+	const char *where; /* starts each message; only during the set-up */
 	struct incise_force_setup setup;
 	struct iio_context *context;
 	struct iio_device *device;

@@ -14,7 +14,7 @@
  *   'L' 'Y' (or 'P' 'A') station command error reserved u16 length of what follows
  *   x y z q0 q1 q2 q3 float32, count of frames u32, switch i32
  *
- * No record of a FASTRAK has a checksum, a stamp or a counter, and every byte of a header is
+ * No record of a FASTRAK has a checksum, a timestamp or a counter, and every byte of a header is
  * legal inside a float. So a record is believed when all of it holds: the header, the
  * sentinel at its distance, a quaternion of length 1, a position in the room, a switch that
  * is a switch. Where it does not, the search goes on one byte further: damage costs the

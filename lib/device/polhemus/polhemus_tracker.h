@@ -4,7 +4,7 @@
  *
  * A thread reads the line and puts samples into a ring; incise_tracker_read() takes them
  * from there, which is real-time safe. A sample's timestamp is the arrival of the packet
- * with its last byte, as the kernel stamps neither USB packets nor serial bytes; rate_hz
+ * with its last byte, as the kernel timestamps neither USB packets nor serial bytes; rate_hz
  * is of all stations together.
  *
  * When the tracker is unplugged, silent for silent_ms, or sends no valid record for as

@@ -9,7 +9,7 @@
  *
  * The descriptors say which endpoints these are. Each IN endpoint always has several
  * transfers of one packet in flight, so that none is missed while another is read; a
- * packet is stamped when its transfer completes. When unread packets fill the queue, no
+ * packet is timestamped when its transfer completes. When unread packets fill the queue, no
  * transfer is submitted: the device waits, and no packet is dropped.
  */
 #include <errno.h>

@@ -30,9 +30,9 @@ struct v4l2_controls {
 
 /*
  * Lock all that the camera has, at what @setup says, or at what they are. @rate_hz of the
- * pictures, 0: not known. 0; -EINVAL, -ERANGE (@setup), -EOPNOTSUPP (the camera has not
+ * frames, 0: not known. 0; -EINVAL, -ERANGE (@setup), -EOPNOTSUPP (the camera has not
  * what
- * @setup sets), -EIO (it does not hold), -EBUSY, -ENODEV. @where begins the message.
+ * @setup sets), -EIO (it does not hold), -EBUSY, -ENODEV. @where starts the message.
  */
 int v4l2_controls_lock(struct v4l2_controls *controls, int fd,
 		       const struct incise_camera_setup *setup, double rate_hz,

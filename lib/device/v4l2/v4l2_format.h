@@ -24,7 +24,7 @@ struct v4l2_shape {
 /*
  * Set the camera. 0; -EINVAL (@setup), -EOPNOTSUPP (it has no such pixels; the message
  * names those it has), -EBUSY, -EPROTO (impossible answers of the driver), -ENODEV, -EIO.
- * @where begins the message.
+ * @where starts the message.
  */
 int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char *where,
 		    struct v4l2_shape *shape, struct incise_error *err);

@@ -217,7 +217,7 @@ static int64_t timestamp_of(const struct v4l2_stream *s, const struct v4l2_buffe
 }
 
 /*
- * Drivers stamp a frame at the start of its exposure, or when its last pixel has arrived:
+ * Drivers timestamp a frame at the start of its exposure, or when its last pixel has arrived:
  *
  *     SOE                        EOF
  *      ├─ exposure ─┼─ readout ───┤      The readout is not known here: what it makes the

@@ -63,7 +63,7 @@ struct v4l2_stream {
 /*
  * Map buffers and start the driver. 0; -EPROTO: its timestamps are not of
  * CLOCK_MONOTONIC, or its buffers are impossible; -EBUSY, -ENODEV, -EIO, -ENOMEM.
- * v4l2_stream_stop() is due in any case. @where begins messages, and must live as long as
+ * v4l2_stream_stop() is due in any case. @where starts messages, and must live as long as
  * the stream.
  */
 int v4l2_stream_start(struct v4l2_stream *stream, int fd, const struct v4l2_shape *shape,

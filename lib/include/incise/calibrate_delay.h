@@ -13,7 +13,7 @@
  * A force follows from depth by a curve that is not known, and leads it where the material is
  * viscous: a stiffness c1 and a viscosity of c2 look like a delay of c2/c1. Both are
  * fitted as far as they can be separated: F = E(x) + v·V(x) + W(x, |v|) with x the depth of the contact, and E,
- * V, W polynomials of x that are 0 where the contact begins (Hunt and Crossley, J. Appl. Mech. 42,
+ * V, W polynomials of x that are 0 where the contact starts (Hunt and Crossley, J. Appl. Mech. 42,
  * 1975). A material that pushes back by its viscosity alone at first touch would bias this.
  */
 #ifndef INCISE_CALIBRATE_DELAY_H
@@ -52,7 +52,7 @@ struct incise_delay_fit {
 	double drift_ms, drift_sd_ms; /**< of the delay from the beginning to the end */
 	double correlation; /**< of the derivatives of the other stream and of the fit */
 	double second;	    /**< highest other peak of correlation, relative */
-	double contact_mm;  /**< motion at which the contact begins; NAN: it always is */
+	double contact_mm;  /**< motion at which the contact starts; NAN: it always is */
 	double span_s;	    /**< that both streams cover */
 	int blocks;	    /**< of the run */
 };

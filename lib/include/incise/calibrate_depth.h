@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Scale of the camera's picture in the plane of the scalpel, mm per pixel: from two points
+ * Scale of the camera's frame in the plane of the scalpel, mm per pixel: from two points
  * of known distance, from pairs of depth and exposed length, or from a board. Part of
  * libincise-learn. No device and no file here: arrays in, numbers out.
  *
  *     ┌──┐  ┐           two points   mm_px = length_mm / full_px
  *     │██│  │ full_px   line         depth_mm = mm_px · (full_px - length_px)
  *     │██│  │ at        board        a plane in space, seen through a lens: mm of the plane
- *     │██│  │ depth 0                per pixel of the raw picture along the handle
+ *     │██│  │ depth 0                per pixel of the raw frame along the handle
  *   ──┴██┴──┘──
  *
  * One number holds in one plane only: what is nearer by 1 % of the distance is larger by
@@ -101,7 +101,7 @@ INCISE_API int incise_calibrate_depth_line(const struct incise_depth_lengths *pa
 
 /* ---- board -------------------------------------------------------------------------- */
 
-/** Pictures of a board that are taken at most. */
+/** Frames of a board that are taken at most. */
 #define INCISE_BOARD_VIEWS 40
 #define INCISE_BOARD_CORNERS 400 /**< of one view */
 
@@ -124,7 +124,7 @@ struct incise_board_views {
 	double u_plane_mm;    /**< how well it lies there, along the line of sight */
 	double axis_px[2][2]; /**< ends of the handle: x, y of the upper, of the lower */
 	double region_px[2][2]; /**< of interest: x, y of two corners */
-	int width, height;	/**< of the picture */
+	int width, height;	/**< of the frame */
 };
 
 /** The result of views of a board: lens, plane and scale. u: standard uncertainty. */
@@ -136,7 +136,7 @@ struct incise_board_fit {
 	double rms_px;	/**< of all views that were believed */
 	double plane_rms_mm, plane_largest_mm; /**< corners of the view in the plane */
 	double tilt_deg,
-		u_tilt_deg; /**< of the plane against the picture's; bound: + 2 u */
+		u_tilt_deg; /**< of the plane against the frame's; bound: + 2 u */
 	double distance_mm; /**< from the lens to the middle of the axis */
 	double spread_deg;  /**< largest angle between two views */
 	/** From undistorted pixels, x, y, 1 by the lens, to mm of the plane; row by row. */
@@ -162,7 +162,7 @@ INCISE_API int incise_calibrate_depth_board(const struct incise_board_views *vie
 					    struct incise_board_fit *fit,
 					    struct incise_error *err);
 
-/** mm on the plane, x and y, of a point of the raw picture. */
+/** mm on the plane, x and y, of a point of the raw frame. */
 INCISE_API void incise_board_plane(const struct incise_board_fit *fit, double x_px,
 				   double y_px, double mm[2]);
 

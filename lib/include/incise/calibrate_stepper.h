@@ -102,7 +102,7 @@ INCISE_API void incise_calibrate_stepper_init(
 	struct incise_calibrate_stepper_setup *setup);
 
 /**
- * Fit. A stroke is a run of positions that go one way; it begins anew where they turn round.
+ * Fit. A stroke is a run of positions that go one way; it restarts where they turn round.
  * Outliers are found from a slope by the median of pairs (Theil 1950, Sen 1968); the lines are
  * least squares of the rest, weighed alike.
  *

@@ -18,7 +18,7 @@ struct incise_calibration {
 	double force_mV_N; /**< sensitivity; nominal 1240 (paper 1, §2) */
 	double force_zero_mV; /**< reading without load; NAN: measured at each recording's start */
 	double depth_mm_px; /**< nominal 47.5/400 = 0.11875; the paper prints 0.118 */
-	/* From acquisition to the quickest arrival, or to the stamp where there is one, and
+	/* From acquisition to the quickest arrival, or to the timestamp where there is one, and
 	 * its standard deviation; NAN: what the device says of itself, sd not known. */
 	double force_delay_ms, force_delay_sd_ms;
 	double tracker_delay_ms, tracker_delay_sd_ms;
@@ -29,7 +29,7 @@ struct incise_calibration {
 	double stepper_N_step;	     /**< force per microstep, with its sign */
 	double stepper_backlash_mm;  /**< travel lost where it turns round */
 	double stepper_hysteresis_N; /**< between the two ways, at one position */
-	double stepper_stiction_N;   /**< force at which it begins to move */
+	double stepper_stiction_N;   /**< force at which it starts to move */
 	double stepper_steps_s;	     /**< the largest rate that loses no step */
 };
 

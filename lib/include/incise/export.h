@@ -23,7 +23,7 @@
 #define INCISE_BEGIN_DECLS extern "C" {
 #define INCISE_END_DECLS }
 #else
-#define INCISE_BEGIN_DECLS /**< C linkage begins, where this is C++ */
+#define INCISE_BEGIN_DECLS /**< C linkage starts, where this is C++ */
 #define INCISE_END_DECLS   /**< and ends */
 #endif
 

@@ -22,7 +22,7 @@ struct incise_film;
  * Start a film at PATH.part; PATH stays as it is until incise_film_close().
  *
  * @param width, height even, 16 … INCISE_FILM_SIDE_MAX
- * @param rate_hz       pictures per second, 1 … 1000; whole
+ * @param rate_hz       frames per second, 1 … 1000; whole
  * @return film; NULL with errno EINVAL, ENOENT, ENOEXEC (the module), ENOTSUP (no encoder),
  *         ENOMEM, errno of open(2)
  */
@@ -30,7 +30,7 @@ INCISE_API struct incise_film *incise_film_new(const char *path, int width, int 
 					       int rate_hz, struct incise_error *err);
 
 /**
- * Add a picture.
+ * Add a frame.
  * @param rgb rows from the top, 3 bytes a pixel, without padding
  * @return 0; -EIO, -ENOSPC: no more can be added
  */
@@ -38,7 +38,7 @@ INCISE_API int incise_film_add(struct incise_film *film, const uint8_t *rgb,
 			       struct incise_error *err);
 
 /**
- * End the film and rename it to PATH, replacing a file there. Without a picture, or after an error,
+ * End the film and rename it to PATH, replacing a file there. Without a frame, or after an error,
  * no file is left. Frees it.
  *
  * @param film NULL is allowed

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The same depth by two ways: from the tracker and from the camera's pictures. Where they
+ * The same depth by two ways: from the tracker and from the camera's frames. Where they
  * disagree, one of them is wrong: steel near the tracker bends its field, by another amount at
  * each place; a camera that was moved is off by the same amount everywhere; a wrong mm per
  * pixel by an amount that grows with the depth. Part of libincise-learn.

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The picture of a scene: its surface with skin, wound and blood, the instrument, and a panel about
+ * The image of a scene: its surface with skin, wound and blood, the instrument, and a panel about
  * the loop. Part of libincise-view.
  *
  *     ticks ──▶ wound, blood ──▶ texture ──▶ frame ──▶ window
  *                                              ╰─────▶ pixels
  *
- * Pictures depend on the ticks and the camera only, not on the times of frames: ticks change the
+ * Images depend on the ticks and the camera only, not on the times of frames: ticks change the
  * texture, and a frame shows the state after the last of them.
  *
  * A view and its functions belong to the thread that made it, whose OpenGL context it uses. None of
@@ -26,7 +26,7 @@ INCISE_BEGIN_DECLS
 
 struct incise_view;
 
-#define INCISE_VIEW_SIDE_MAX 8192 /**< of a picture, pixels */
+#define INCISE_VIEW_SIDE_MAX 8192 /**< of an image, pixels */
 
 /** Options of a view. */
 struct incise_view_setup {
@@ -93,7 +93,7 @@ INCISE_API void incise_view_size(const struct incise_view *view, int *width, int
 INCISE_API int incise_view_pixels(struct incise_view *view, uint8_t *rgb);
 
 /**
- * Show panel and keys over the picture or not; at first the panel only. Pictures below 360 000
+ * Show panel and keys over the image or not; at first the panel only. Images below 360 000
  * pixels have no panel.
  */
 INCISE_API void incise_view_panel(struct incise_view *view, bool panel, bool keys);
@@ -134,7 +134,7 @@ INCISE_API void incise_view_camera(const struct incise_view *view,
 INCISE_API void incise_view_set_camera(struct incise_view *view,
 				       const struct incise_view_camera *camera);
 
-/** A ray into the picture, and its point on the tissue. */
+/** A ray into the image, and its point on the tissue. */
 struct incise_view_ray {
 	double from_mm[3]; /**< the camera */
 	double way[3];	   /**< unit */

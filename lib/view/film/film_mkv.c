@@ -22,7 +22,7 @@ struct incise_film_coder {
 	AVCodecContext *codec;
 	AVFrame *frame;
 	AVPacket *packet;
-	int64_t pictures;
+	int64_t frames;
 	bool begun; /* the header is written */
 	char path[4096];
 };
@@ -226,7 +226,7 @@ static int film_add(struct incise_film_coder *coder, const uint8_t *rgb,
 
 	if (rc >= 0) {
 		convert(coder->frame, rgb, h264 ? &bt709 : &bt601_full);
-		coder->frame->pts = coder->pictures++;
+		coder->frame->pts = coder->frames++;
 		rc = avcodec_send_frame(coder->codec, coder->frame);
 	}
 	if (rc >= 0)

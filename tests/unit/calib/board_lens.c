@@ -54,7 +54,7 @@ static void test_rotation(void **state)
 	assert_true(fabs(r[0]) < 1e-12 && fabs(r[3] - 1) < 1e-12);
 }
 
-/* Each pixel of a picture, through the lens and back. */
+/* Each pixel of a frame, through the lens and back. */
 static void test_back(void **state)
 {
 	static const double straight[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};

@@ -128,7 +128,7 @@ static void make_rig(struct rig *rig, double noise_px, double u_square)
 		.pitch = SQUARE + u_square * normal(),
 	};
 	for (int v = 0; v < VIEWS; v++) {
-		/* the first lies nearly as the picture does, the others lean all ways */
+		/* the first lies nearly as the frame does, the others lean all ways */
 		double lean = v ? 0.35 + 0.35 * uniform() : 0.04 * uniform();
 		double way = v ? 2 * M_PI * (v + 0.3 * uniform()) / (VIEWS - 1)
 			       : 2 * M_PI * uniform();

@@ -62,7 +62,7 @@ static const struct hand usual = {2, 1.1, 5.5, 2.5, 0.7};
 
 /* The relation between motion and the other stream. */
 struct link {
-	double delay_ms, drift_ms; /* of the motion's stamps */
+	double delay_ms, drift_ms; /* of the motion's timestamps */
 	double contact_mm;
 	double stiff[2]; /* N/mm, N/mm² */
 	double viscous;	 /* of the stiffness, s/mm: the force leads */

@@ -158,7 +158,7 @@ static inline void drive_sync(struct drive *d)
 }
 
 /* A frame reached it. */
-static inline void drive_hear(struct drive *d, const struct can_frame *frame)
+static inline void drive_process(struct drive *d, const struct can_frame *frame)
 {
 	uint32_t consumer = d->od[OD_CONSUMER].value, id = frame->can_id;
 
@@ -235,7 +235,7 @@ static inline void drive_run(struct drive *d, int64_t until, bool frame)
 	while (d->now_ns < until) {
 		const struct drive_queue *in = &d->to_drive, *out = &d->to_master;
 		int64_t next = d->tick_ns < until ? d->tick_ns : until;
-		struct can_frame heard;
+		struct can_frame received;
 
 		if (frame && out->n) {
 			if (out->frame[out->head].at_ns <= d->now_ns)
@@ -247,8 +247,8 @@ static inline void drive_run(struct drive *d, int64_t until, bool frame)
 			next = in->frame[in->head].at_ns;
 		if (next > d->now_ns)
 			d->now_ns = next;
-		while (drive_queue_take(&d->to_drive, d->now_ns, &heard, NULL))
-			drive_hear(d, &heard);
+		while (drive_queue_take(&d->to_drive, d->now_ns, &received, NULL))
+			drive_process(d, &received);
 		if (d->now_ns >= d->tick_ns) {
 			d->tick_ns += DRIVE_TICK_NS;
 			drive_tick(d);

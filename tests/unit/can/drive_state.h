@@ -173,7 +173,7 @@ struct drive {
 	bool no_tpdo;	      /* TPDO1 is not sent */
 	bool twice;	      /* each frame of it comes twice */
 	int send_error;	      /* of bus->ops->send, such as -ENOBUFS … */
-	uint32_t send_first;  /* so many frames are sent well before it begins */
+	uint32_t send_first;  /* so many frames are sent well before it starts */
 	uint32_t send_errors; /* … for so many frames; 0: until it is taken back */
 	int receive_error, wait_error; /* of the bus */
 	int can_state;		       /* of bus->ops->state */
@@ -268,12 +268,12 @@ static inline bool drive_queue_take(struct drive_queue *q, int64_t now_ns,
 /* Any frame, to the master: foreign, truncated, an error frame … */
 static inline void drive_say(struct drive *d, const struct can_frame *frame)
 {
-	bool heard = !d->filters_n || (frame->can_id & CAN_ERR_FLAG);
+	bool received = !d->filters_n || (frame->can_id & CAN_ERR_FLAG);
 
 	for (int i = 0; i < d->filters_n; i++)
-		heard |= (frame->can_id & d->filters[i].can_mask) ==
-			 (d->filters[i].can_id & d->filters[i].can_mask);
-	if (!heard)
+		received |= (frame->can_id & d->filters[i].can_mask) ==
+			    (d->filters[i].can_id & d->filters[i].can_mask);
+	if (!received)
 		return;
 	drive_queue_put(&d->to_master, frame, d->now_ns + d->latency_ns);
 	if (d->twice)

@@ -177,26 +177,26 @@ static void card_does_not_start(void **state)
 
 /*
  * Blocks of @block samples over @seconds, each late by @delay_ns and up to @jitter_ns more;
- * the card's clock is off by @ppm. The most that a stamp is off by in the last half, ns.
+ * the card's clock is off by @ppm. The most that a timestamp is off by in the last half, ns.
  */
 static double error_of(int block, double delay_ns, double jitter_ns, double ppm,
 		       int seconds)
 {
-	struct times stamps;
+	struct times timestamps;
 	double period = T * (1 + ppm * 1e-6), most = 0;
 	int64_t last = 0;
 	int n = 0;
 
 	srand(1);
-	times_init(&stamps, T);
-	times_start(&stamps, START);
+	times_init(&timestamps, T);
+	times_start(&timestamps, START);
 	while (n < seconds * 10000) {
 		double late = delay_ns + jitter_ns * rand() / RAND_MAX;
 		int64_t arrival = START + llround(period * (n + block) + late);
 
-		times_block(&stamps, arrival, (uint64_t)block, true);
+		times_block(&timestamps, arrival, (uint64_t)block, true);
 		for (int i = 0; i < block; i++) {
-			int64_t t = times_next(&stamps);
+			int64_t t = times_next(&timestamps);
 			double off = (double)(t - START) - period * ++n;
 
 			assert_true(t > last);
@@ -238,36 +238,36 @@ static void times(void **state)
 	}
 }
 
-/* Started again: stamps go on behind those before. */
+/* Started again: timestamps go on behind those before. */
 static void again(void **state)
 {
-	struct times stamps;
+	struct times timestamps;
 	int64_t last;
 
-	times_init(&stamps, T);
-	times_start(&stamps, START);
-	times_block(&stamps, START + 1000000, 10, true);
+	times_init(&timestamps, T);
+	times_start(&timestamps, START);
+	times_block(&timestamps, START + 1000000, 10, true);
 	for (int i = 0; i < 10; i++)
-		last = times_next(&stamps);
+		last = times_next(&timestamps);
 	assert_int_equal(last, START + 1000000);
-	times_start(&stamps, START + 5000000);
-	times_block(&stamps, START + 5200000, 2, true);
-	assert_int_equal(times_next(&stamps), START + 5100000);
+	times_start(&timestamps, START + 5000000);
+	times_block(&timestamps, START + 5200000, 2, true);
+	assert_int_equal(times_next(&timestamps), START + 5100000);
 	/* a clock of the computer that stood still */
-	times_start(&stamps, START);
-	times_block(&stamps, START, 2, true);
-	assert_int_equal(times_next(&stamps), START + 5100001);
-	assert_int_equal(times_next(&stamps), START + 5100002);
+	times_start(&timestamps, START);
+	times_block(&timestamps, START, 2, true);
+	assert_int_equal(times_next(&timestamps), START + 5100001);
+	assert_int_equal(times_next(&timestamps), START + 5100002);
 }
 
-/* A reader that was held for 5 s finds blocks of 4096 waiting: their stamps stay true. */
+/* A reader that was held for 5 s finds blocks of 4096 waiting: their timestamps stay true. */
 static void held_up(void **state)
 {
-	struct times stamps;
+	struct times timestamps;
 	int n = 0;
 
-	times_init(&stamps, T);
-	times_start(&stamps, START);
+	times_init(&timestamps, T);
+	times_start(&timestamps, START);
 	while (n < 200000) {
 		bool held = n >= 60000 && n < 110000;
 		int block = held ? 4096 : 80;
@@ -277,9 +277,9 @@ static void held_up(void **state)
 					  ? START + 11000000000LL
 					  : taken;
 
-		times_block(&stamps, arrival, (uint64_t)block, block == 80);
+		times_block(&timestamps, arrival, (uint64_t)block, block == 80);
 		for (int i = 0; i < block; i++)
-			assert_true(llabs(times_next(&stamps) - START -
+			assert_true(llabs(times_next(&timestamps) - START -
 					  llround(T * ++n)) < 2);
 	}
 }

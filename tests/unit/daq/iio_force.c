@@ -127,15 +127,17 @@ static void clock_is_off(void **state)
 /* Nothing is computed beyond what numbers hold, and no sample is left out. */
 static void nonsense(void **state)
 {
-	static const int64_t stamps[] = {0, INT64_MAX, INT64_MIN, -1, 1, INT64_MAX / 2,
-					 0, 5,	       5,	  3};
+	static const int64_t timestamps[] = {
+		0, INT64_MAX, INT64_MIN, -1, 1, INT64_MAX / 2, 0, 5, 5, 3};
 	struct incise_force_sample sample;
 	uint64_t last = 0;
 	int n = 0, total = 0;
 
 	for (int round = 0; round < 200; round++)
-		for (size_t i = 0; i < sizeof(stamps) / sizeof(*stamps); i++, total++)
-			spacing_put(&spacing, stamps[(i * 7 + (size_t)round) % 10], 1);
+		for (size_t i = 0; i < sizeof(timestamps) / sizeof(*timestamps);
+		     i++, total++)
+			spacing_put(&spacing, timestamps[(i * 7 + (size_t)round) % 10],
+				    1);
 	spacing_flush(&spacing);
 	while (daq_feed_read(&feed->force, &sample, 1) == 1) {
 		assert_true(!n || sample.seq > last);

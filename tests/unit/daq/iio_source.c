@@ -79,7 +79,7 @@ static void codes(void **state)
 	}
 }
 
-static void stamps(void **state)
+static void timestamps(void **state)
 {
 	static const unsigned char le[8] = {8, 7, 6, 5, 4, 3, 2, 1};
 	struct iio_data_format data = data_of("le:s64/64>>0");
@@ -814,7 +814,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(codes),
-		cmocka_unit_test(stamps),
+		cmocka_unit_test(timestamps),
 		cmocka_unit_test(order),
 		cmocka_unit_test(formats_refused),
 		cmocka_unit_test_setup_teardown(comes_and_goes, trigger_setup,

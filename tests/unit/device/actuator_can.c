@@ -252,7 +252,7 @@ static void half_of_the_gain_that_is_stable_is_taken(void **state)
 	static const double cycles_s[] = {0.0005, 0.001, 0.002};
 	double low = 0, high = 2;
 
-	/* Where a deviation begins to grow, found by trying. */
+	/* Where a deviation starts to grow, found by trying. */
 	while (high - low > 1e-6) {
 		double k = (low + high) / 2;
 

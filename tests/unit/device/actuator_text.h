@@ -15,7 +15,7 @@
 
 #define NEEDED "spring_N_mm = 2.0; travel_mm = 20.0; lead_mm = 2.0; "
 
-/* @inside begins in line 2, behind what is @needed. */
+/* @inside starts in line 2, behind what is @needed. */
 static int actuator_read(struct incise_actuator *actuator, const char *needed,
 			 const char *inside, struct incise_error *err)
 {

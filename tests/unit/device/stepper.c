@@ -513,7 +513,7 @@ static void the_count_becomes_the_position(void **state)
 		}
 }
 
-/* The count at the edge, read before homing names places anew; as well as homing reads. */
+/* The count at the edge, read before homing names places again; as well as homing reads. */
 static void the_edge_is_told_in_the_old_count(void **state)
 {
 	static const unsigned int inputs[] = {INCISE_STEPPER_LINE_HOME,

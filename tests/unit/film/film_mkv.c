@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Films, read back by libavformat and libavcodec: the number of pictures, their times, and their
+ * Films, read back by libavformat and libavcodec: the number of frames, their times, and their
  * colours up to coding losses; and files that cannot be written.
  */
 #include <stdarg.h>

@@ -16,7 +16,7 @@
 
 typedef __int128 wide;
 
-/* Where a stop ends that begins with a tick at v, by doing it. */
+/* Where a stop ends that starts with a tick at v, by doing it. */
 static int stop_of(int p, int v, int a)
 {
 	for (;;) {

@@ -165,7 +165,7 @@ static inline void any_mf(struct incise_mf *mf, uint64_t *seed, double decades)
 }
 
 /*
- * Make @model anew: n_inputs with ranges ±10, n_rules rules of which a part leave inputs
+ * Make @model again: n_inputs with ranges ±10, n_rules rules of which a part leave inputs
  * out, carry weights, or weigh nothing; widths over 10^±decades.
  */
 static inline void any_model(struct incise_model *model, uint64_t *seed, int n_inputs,

@@ -621,7 +621,7 @@ static void pulled_out(void **state)
 		polhemus_stream_broken(&b.stream, &b.identity.layout);
 		bench_run(&b, 1);
 		assert_true(b.n > was + 100);
-		/* By slot, as the order of stations begins anew: a round at most. */
+		/* By slot, as the order of stations restarts: a round at most. */
 		assert_in_range(polhemus_stream_lost(&b.stream) + b.n,
 				b.e.slot - b.e.sent[0].slot - (uint64_t)stations - 1,
 				b.e.slot - b.e.sent[0].slot + (uint64_t)stations + 1);

@@ -160,8 +160,8 @@ static void switched_off_and_on(void **state)
 	assert_true(incise_tracker_lost(tracker) >= before + 28);
 	/* It streams in ASCII, as its EEPROM may have it. */
 	before = incise_tracker_lost(tracker);
-	atomic_store(&pty.heard, "F");
-	while (atomic_load(&pty.heard))
+	atomic_store(&pty.injected, "F");
+	while (atomic_load(&pty.injected))
 		usleep(1000);
 	usleep(50000);
 	read_all(tracker, &next);
@@ -197,7 +197,7 @@ static int counted_reopen(struct polhemus_line *line)
 	return tty_ops->reopen(line);
 }
 
-/* A computer that slept for a while finds its tracker as it was: it does not set it up anew. */
+/* A computer that slept for a while finds its tracker as it was: it does not set it up again. */
 static void stood_still(void **state)
 {
 	const struct polhemus_times times = {250, 20, 20000};

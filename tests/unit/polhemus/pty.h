@@ -24,8 +24,8 @@ struct pty {
 	pthread_t thread;
 	_Atomic bool stop;
 	_Atomic uint64_t slots;
-	_Atomic bool deaf;	   /* sends nothing either */
-	const char *_Atomic heard; /* what it is told behind the host's back; once */
+	_Atomic bool deaf;	      /* sends nothing either */
+	const char *_Atomic injected; /* bytes that reach it without the host; once */
 };
 
 static int64_t pty_now_ns(void)
@@ -42,7 +42,7 @@ static void *pty_run(void *argument)
 
 	while (!atomic_load(&p->stop)) {
 		struct pollfd waits = {.fd = p->master, .events = POLLIN};
-		const char *heard;
+		const char *injected;
 		char bytes[1024];
 		ssize_t n;
 		size_t m;
@@ -50,9 +50,9 @@ static void *pty_run(void *argument)
 		poll(&waits, 1, 1);
 		n = waits.revents & POLLIN ? read(p->master, bytes, sizeof(bytes)) : 0;
 		emulator_advance(&p->emulator, pty_now_ns());
-		heard = atomic_exchange(&p->heard, NULL);
-		if (heard)
-			emulator_write(&p->emulator, heard, strlen(heard));
+		injected = atomic_exchange(&p->injected, NULL);
+		if (injected)
+			emulator_write(&p->emulator, injected, strlen(injected));
 		if (n > 0 && !atomic_load(&p->deaf))
 			emulator_write(&p->emulator, bytes, (size_t)n);
 		while ((m = emulator_take(&p->emulator, bytes, sizeof(bytes))) > 0)

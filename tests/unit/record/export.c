@@ -59,7 +59,7 @@ static struct truth brute_force(const char *file)
 		table(file, "SELECT t_ns, code, 0 FROM force ORDER BY t_ns", &n_force);
 	struct row *depth = table(
 		file,
-		/* on the tracker's line, which here begins but once */
+		/* on the tracker's line, which here starts but once */
 		"SELECT (SELECT a.t_ns + CAST((depth.seq - a.seq) * ((b.t_ns - "
 		"a.t_ns) * 1.0 / (b.seq - a.seq)) AS INTEGER) FROM knots a, knots b "
 		"WHERE a.stream = 'tracker' AND b.stream = 'tracker' AND b.knot = "

@@ -95,7 +95,7 @@ static void measure(double hz, double drift_ppm, double jitter_ms, double latenc
 }
 
 /* Required: 0.5 ms rms without timestamps, and 95 % of errors within the stated uncertainty. */
-static void times_without_stamps_are_near_the_truth(void **state)
+static void times_without_timestamps_are_near_the_truth(void **state)
 {
 	static const struct {
 		double hz, drift_ppm, jitter_ms, latency_ms;
@@ -427,7 +427,7 @@ static void never_triggered_is_empty_and_whole(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		IN_FOLDER(times_without_stamps_are_near_the_truth),
+		IN_FOLDER(times_without_timestamps_are_near_the_truth),
 		IN_FOLDER(table_says_what_is_known),
 		IN_FOLDER(last_second_is_there),
 		TEST(frames_are_rows),

@@ -112,7 +112,7 @@ static int replay(const char *path, const struct felt *f,
 
 static void forces_are_those_of_the_live_loop(void **state)
 {
-	static const char *const arithmetics[] = {"fixed", "double"};
+	static const char *const evaluators[] = {"fixed", "double"};
 
 	for (int k = 0; k < 2; k++) {
 		struct incise_loop_options loop = {.rate_hz = 1000,
@@ -124,7 +124,7 @@ static void forces_are_those_of_the_live_loop(void **state)
 		struct incise_error err = {0};
 		struct felt f;
 
-		felt_start(&f, arithmetics[k], INCISE_RIG_TRACKER);
+		felt_start(&f, evaluators[k], INCISE_RIG_TRACKER);
 		assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &loop,
 						 &stats, &err),
 				 0);

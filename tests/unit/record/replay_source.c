@@ -177,7 +177,7 @@ static void depth_and_cuts_are_those_of_the_table(void **state)
 			continue;
 		}
 		assert_true(fabs(m.depth_mm - depth) < 1e-9);
-		/* begins above 0.3 mm; the tick on it may fall to either side */
+		/* starts above 0.3 mm; the tick on it may fall to either side */
 		if (fabs(depth - 0.3) > 1e-6)
 			assert_int_equal(m.cut, depth > 0.3);
 	}

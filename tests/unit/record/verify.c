@@ -393,7 +393,7 @@ struct change {
 	int left_out_n; /* frames, where it is left out; 0: 1 */
 };
 
-static int64_t stamp(int i)
+static int64_t timestamp(int i)
 {
 	return 1000000000 + i * PERIOD_NS;
 }
@@ -415,7 +415,7 @@ static void write_frames(int n, const struct change *change,
 		bool here = i == change->at;
 		uint8_t bytes[SIZE(FRAMES)];
 		struct incise_camera_frame frame = {
-			.t_ns = stamp(i) + (here ? change->t_ns : 0),
+			.t_ns = timestamp(i) + (here ? change->t_ns : 0),
 			.seq = FIRST + i + (here ? change->seq : 0),
 			.width = 32,
 			.height = 16,

@@ -19,7 +19,7 @@
 
 static struct fed_folder folder;
 
-static const char *const arithmetics[] = {"fixed", "double"};
+static const char *const evaluators[] = {"fixed", "double"};
 
 static const struct surface {
 	const char *name, *text;
@@ -324,20 +324,20 @@ static void test_lean_is_full_to_the_bit(const struct surface *surface,
 
 static void test_plane(void **state)
 {
-	test_lean_is_full_to_the_bit(&surfaces[0], arithmetics[0]);
-	test_lean_is_full_to_the_bit(&surfaces[0], arithmetics[1]);
+	test_lean_is_full_to_the_bit(&surfaces[0], evaluators[0]);
+	test_lean_is_full_to_the_bit(&surfaces[0], evaluators[1]);
 }
 
 static void test_capsule(void **state)
 {
-	test_lean_is_full_to_the_bit(&surfaces[1], arithmetics[0]);
-	test_lean_is_full_to_the_bit(&surfaces[1], arithmetics[1]);
+	test_lean_is_full_to_the_bit(&surfaces[1], evaluators[0]);
+	test_lean_is_full_to_the_bit(&surfaces[1], evaluators[1]);
 }
 
 static void test_mesh(void **state)
 {
-	test_lean_is_full_to_the_bit(&surfaces[2], arithmetics[0]);
-	test_lean_is_full_to_the_bit(&surfaces[2], arithmetics[1]);
+	test_lean_is_full_to_the_bit(&surfaces[2], evaluators[0]);
+	test_lean_is_full_to_the_bit(&surfaces[2], evaluators[1]);
 }
 
 /* A scene that lacks nothing keeps all, but for what no loop runs and what no rig has. */
@@ -393,7 +393,7 @@ static void one_effect(const char *stage, const char *const text[3], int way)
 		snprintf(all_of_it, sizeof(all_of_it),
 			 "arithmetic = \"%s\"; surface = %s;\n%s\n"
 			 "device = { delay_ticks = 0; };\n",
-			 arithmetics[way & 1], surfaces[1 + way / 2].text, text[k]);
+			 evaluators[way & 1], surfaces[1 + way / 2].text, text[k]);
 		scene[k] = fed_scene(&folder, all_of_it, NULL);
 		assert_non_null(scene[k]);
 		plan[k] = plan_of(scene[k]);

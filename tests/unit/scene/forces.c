@@ -563,7 +563,7 @@ static void test_fixed_is_within_its_bound(void **state)
 		assert_true(v3_length(off) <= bound_N + 1e-13);
 		apart += v3_length(off) > 0;
 	}
-	/* They are two arithmetics, not one. */
+	/* They are two evaluators, not one. */
 	assert_true(apart > 90000);
 }
 

@@ -84,10 +84,10 @@ static void test_a_refused_model_names_its_scene(void **state)
 	felt_end(&f);
 }
 
-/* One whole cut of the virtual surgeon, in both arithmetics. */
+/* One whole cut of the virtual surgeon, in both evaluators. */
 static void test_against_truth(void **state)
 {
-	static const char *const arithmetics[] = {"double", "fixed"};
+	static const char *const evaluators[] = {"double", "fixed"};
 
 	for (int a = 0; a < 2; a++) {
 		struct incise_model *model;
@@ -95,7 +95,7 @@ static void test_against_truth(void **state)
 		int contacts = 0, limited = 0;
 		struct felt f;
 
-		felt_start(&f, arithmetics[a], BOTH);
+		felt_start(&f, evaluators[a], BOTH);
 		model = incise_model_load(f.model_path, NULL);
 		for (int i = 0; i < 9500; i++) {
 			struct incise_sim_truth truth;
@@ -121,7 +121,7 @@ static void test_against_truth(void **state)
 			x[0] = t.depth_mm;
 			x[1] = t.velocity_mm_s;
 			want = incise_model_eval(model, x, NULL);
-			/* 50 µN between the arithmetics; a jump at contact meets the slew. */
+			/* 50 µN between the evaluators; a jump at contact meets the slew. */
 			if (!(t.flags & LIMITED))
 				assert_true(fabs(t.command_N[2] - want) < 50e-6);
 		}
@@ -167,7 +167,7 @@ static int lying_tracker(struct incise_tracker *tracker,
 
 static void test_any_pose_gives_a_force_within_limits(void **state)
 {
-	static const char *const arithmetics[] = {"double", "fixed"};
+	static const char *const evaluators[] = {"double", "fixed"};
 
 	for (int a = 0; a < 2; a++) {
 		struct incise_tracker_ops ops;
@@ -175,7 +175,7 @@ static void test_any_pose_gives_a_force_within_limits(void **state)
 		int contacts = 0;
 		struct felt f;
 
-		felt_start(&f, arithmetics[a], BOTH);
+		felt_start(&f, evaluators[a], BOTH);
 		ops = *f.tracker_ops;
 		ops.read = lying_tracker;
 		incise_rig_tracker(f.rig)->ops = &ops;
@@ -502,7 +502,8 @@ static void test_getters(void **state)
 
 	assert_null(incise_plan_left_out(fixed.plan, 99, &why));
 	assert_string_equal(why, "none");
-	for (int i = 0; !actuate && (name = incise_plan_left_out(fixed.plan, i, NULL)); i++)
+	for (int i = 0; !actuate && (name = incise_plan_left_out(fixed.plan, i, NULL));
+	     i++)
 		actuate = !strcmp(name, "actuate");
 	assert_true(actuate);
 
@@ -589,7 +590,7 @@ static void test_fed_plane(void **state)
 	pose.position_mm[0] += 5;
 	for (int k = 1; k <= 400; k++) {
 		pose.t_ns = k * 1000000LL;
-		/* from above, so that the force begins small */
+		/* from above, so that the force starts small */
 		pose.position_mm[2] += k == 1 ? 4 : k <= 201 ? -0.02 : 0;
 		assert_int_equal(incise_plan_feed(plan, &pose, 1), 1);
 		assert_int_equal(incise_plan_tick(plan, pose.t_ns, &tick), 0);

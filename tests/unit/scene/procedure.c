@@ -492,7 +492,7 @@ static void test_damping_on_the_way(void **state)
 	}
 }
 
-/* A contact ends leave_mm = 0.2 mm above the skin, and begins at it. */
+/* A contact ends leave_mm = 0.2 mm above the skin, and starts at it. */
 static void test_hysteresis(void **state)
 {
 	struct theatre th;
@@ -567,7 +567,7 @@ static int count_contacts(double z, const char *leave)
 		begins += i > 1000 && !was && tick.phase != INCISE_PHASE_FREE;
 		was = tick.phase != INCISE_PHASE_FREE;
 	}
-	/* None that begins is one that lasts, or one that never was. */
+	/* None that starts is one that lasts, or one that never was. */
 	if (!*leave)
 		assert_int_equal(was, z < 0.1);
 	incise_plan_free(plan);

@@ -121,7 +121,7 @@ static void test_a_cut_from_its_begin_to_its_end(void **state)
 
 		plan.force_N[0] = 5;
 		assert_int_equal(incise_stage_contact(&plan, &tick), 0);
-		/* Each tick's force begins with none. */
+		/* Each tick's force starts with none. */
 		assert_true(v3_length(plan.force_N) == 0);
 		assert_int_equal(tick.phase == INCISE_PHASE_CUTTING, way[i].contact);
 		assert_int_equal(!!(tick.flags & INCISE_TICK_CONTACT), way[i].contact);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Thresholds to the ulp and to the ns: where a contact begins and ends, and when a pose is too
+ * Thresholds to the ulp and to the ns: where a contact starts and ends, and when a pose is too
  * old; and jumps, which are no way.
  */
 #include <stdarg.h>
@@ -50,7 +50,7 @@ static void test_thresholds_of_contact(void **state)
 	struct fed_run run;
 
 	begin(&run);
-	/* A contact begins on the surface, and not the least above it. */
+	/* A contact starts on the surface, and not the least above it. */
 	assert_false(touches_at(&run, 50));
 	assert_false(touches_at(&run, DBL_TRUE_MIN));
 	assert_false(touches_at(&run, 50));

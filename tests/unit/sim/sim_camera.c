@@ -46,7 +46,7 @@ static void rig_free(struct rig *rig)
 static double red(const struct incise_camera_frame *frame, int x, int y)
 {
 	if (x < 0 || y < 0 || x >= frame->width || y >= frame->height)
-		return 118; /* as liver: the edge of the picture is no edge of the scalpel */
+		return 118; /* as liver: the edge of the frame is no edge of the scalpel */
 	return frame->data[y * frame->stride + 3 * x];
 }
 
@@ -212,7 +212,7 @@ static void setup_for_vision_is_of_the_scalpel(void **state)
 
 static void pictures_wait_and_are_lost(void **state)
 {
-	/* ms, whether there is a picture, its number, losses so far */
+	/* ms, whether there is a frame, its number, losses so far */
 	static const int row[][4] = {
 		{0, 1, 0, 0},
 		{0, 0, 0, 0},

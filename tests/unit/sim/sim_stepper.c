@@ -176,7 +176,7 @@ static void faults_are_reported(void **state)
 	s = rig_after(&rig, 39900000);
 	assert_int_equal(s.faults, 0);
 	assert_true(s.position_mm == 1);
-	/* The tick that begins 100 ms after the target is the first to act. */
+	/* The tick that starts 100 ms after the target is the first to act. */
 	assert_int_equal(rig_after(&rig, 100000).faults, 0);
 	assert_int_equal(rig_after(&rig, 100000).faults, INCISE_STEPPER_FAULT_DEADMAN);
 	s = rig_after(&rig, INCISE_NS_PER_S);

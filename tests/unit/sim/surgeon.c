@@ -28,7 +28,7 @@ static void velocity_is_the_derivative(void **state)
 	/*
 	 * Central difference over ±50 µs: its error is h²/6·jerk ≈ 4e-10·jerk, and at
 	 * joints of the path, where acceleration jumps, h/4·jump: at most 600 mm/s² in a
-	 * pause, 2·25·2π·1.6·0.9 in a cut and 5.5·(4π)² where pressing begins. So 0.02 mm/s is
+	 * pause, 2·25·2π·1.6·0.9 in a cut and 5.5·(4π)² where pressing starts. So 0.02 mm/s is
 	 * ample, and far below any wrong term.
 	 */
 	for (int64_t t = 50000; t < incise_surgeon_duration(&surgeon); t += 1234567) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The averaged normal: against the sum made anew each tick, opposed normals, nonsense.
+ * The averaged normal: against the sum made again each tick, opposed normals, nonsense.
  */
 #include <stdarg.h>
 #include <stddef.h>

@@ -205,7 +205,7 @@ static void test_cube(void **state)
 
 /*
  * A groove of 60°, 2 mm wide. From the left wall's tissue through the air to the right
- * wall's: each contact begins on its own wall.
+ * wall's: each contact starts on its own wall.
  *
  *    ────╲    ╱────
  *         ╲  ╱
@@ -318,7 +318,7 @@ static void test_thin_wedge(void **state)
 	free(s);
 }
 
-/* A sheet that ends: over its border contact ends, below it none begins from the side. */
+/* A sheet that ends: over its border contact ends, below it none starts from the side. */
 static void test_open_border(void **state)
 {
 	static const double flat[][2] = {{2, 0}, {0, 0}, {-2, 0}};

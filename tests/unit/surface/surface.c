@@ -260,7 +260,7 @@ static void test_capsule_enters(void **state)
 	assert_true(found > 200);
 }
 
-/* A way that ends or begins on the surface itself: it begins the contact just once. */
+/* A way that ends or starts on the surface itself: it starts the contact just once. */
 static void test_ways_from_and_to_the_surface(void **state)
 {
 	const struct capsule ball = {{0, 0, 0}, {0, 0, 0}, 3};

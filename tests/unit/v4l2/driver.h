@@ -2,7 +2,7 @@
 /*
  * A camera's driver that a test makes, by the kernel's documents of V4L2: the linker hands
  * open, ioctl, mmap, poll and the clock to functions here. It has formats, sizes, controls
- * and buffers, and may be told to lie. Pictures come when a test shoots them, on a clock
+ * and buffers, and may be told to lie. Frames come when a test shoots them, on a clock
  * that goes when somebody polls. The real drivers are asked in tests/vm.
  */
 #ifndef INCISE_TEST_DRIVER_H
@@ -26,8 +26,8 @@
 #define DRIVER_CONTROLS 16
 #define DRIVER_NONE UINT32_MAX
 
-/* A picture as the driver hands it out. */
-struct driver_picture {
+/* A frame as the driver hands it out. */
+struct driver_frame {
 	uint32_t index; /* DRIVER_NONE: a buffer that is queued */
 	uint32_t sequence, flags, bytesused;
 	int64_t t_ns;
@@ -62,12 +62,12 @@ static struct driver {
 	uint32_t count, length, buffer_flags;
 	uint8_t *memory;
 	bool queued[DRIVER_BUFFERS];
-	struct driver_picture shot[64];
+	struct driver_frame shot[64];
 	int shots, taken;
 	short events; /* of poll(), beside POLLIN */
 	int opened, mapped, streams;
 	int64_t now_ns;
-	bool stands;		 /* the clock, unless pictures are shot */
+	bool stands;		 /* the clock, unless frames are shot */
 	uint32_t given;		 /* buffers asked for */
 	void (*meanwhile)(void); /* what another thread does in poll(), once */
 } driver;
@@ -129,17 +129,16 @@ static inline struct driver_control *driver_add(uint32_t id, int32_t min, int32_
 }
 
 /*
- * A picture that comes next; one period later than the one before. What it returns may be
- * altered where no thread takes pictures.
+ * A frame that comes next; one period later than the one before. What it returns may be
+ * altered where no thread takes frames.
  */
-static inline struct driver_picture *driver_shoot_flagged(uint32_t sequence,
-							  uint32_t flags)
+static inline struct driver_frame *driver_shoot_flagged(uint32_t sequence, uint32_t flags)
 {
-	struct driver_picture *shot;
+	struct driver_frame *shot;
 
 	pthread_mutex_lock(&driver.lock);
 	shot = &driver.shot[driver.shots % 64];
-	*shot = (struct driver_picture){
+	*shot = (struct driver_frame){
 		.index = DRIVER_NONE,
 		.sequence = sequence,
 		.flags = driver.buffer_flags | flags,
@@ -152,7 +151,7 @@ static inline struct driver_picture *driver_shoot_flagged(uint32_t sequence,
 	return shot;
 }
 
-static inline struct driver_picture *driver_shoot(uint32_t sequence)
+static inline struct driver_frame *driver_shoot(uint32_t sequence)
 {
 	return driver_shoot_flagged(sequence, 0);
 }
@@ -294,7 +293,7 @@ static inline int driver_buffer(struct v4l2_buffer *buffer)
 
 static inline int driver_dequeue(struct v4l2_buffer *buffer)
 {
-	const struct driver_picture *shot = &driver.shot[driver.taken % 64];
+	const struct driver_frame *shot = &driver.shot[driver.taken % 64];
 	uint32_t i = 0;
 
 	if (driver.dqbuf_error)
@@ -316,7 +315,7 @@ static inline int driver_dequeue(struct v4l2_buffer *buffer)
 	buffer->bytesused = shot->bytesused;
 	buffer->timestamp.tv_sec = shot->t_ns / 1000000000;
 	buffer->timestamp.tv_usec = shot->t_ns % 1000000000 / 1000;
-	/* The picture's number, so that a test sees which one it holds. */
+	/* The frame's number, so that a test sees which one it holds. */
 	if (shot->index == DRIVER_NONE && driver.is.pixelformat != V4L2_PIX_FMT_MJPEG)
 		memset(driver.memory + (size_t)i * DRIVER_BYTES, (int)shot->sequence,
 		       DRIVER_BYTES);
@@ -458,7 +457,7 @@ int __wrap_poll(struct pollfd *fds, nfds_t n, int timeout)
 	if (!ready && !driver.stands)
 		driver.now_ns += timeout * 1000000LL;
 	pthread_mutex_unlock(&driver.lock);
-	/* A thread that waits for a picture lets the test run. */
+	/* A thread that waits for a frame lets the test run. */
 	if (!ready && n)
 		__real_poll(NULL, 0, 1);
 	return ready;

@@ -59,7 +59,7 @@ static void close_camera(struct incise_camera *camera)
 	assert_int_equal(driver.mapped, 0);
 }
 
-static void pictures_come_through_the_door(void **state)
+static void frames_come_through_the_interface(void **state)
 {
 	static const struct incise_camera_setup setup = {.width = 32,
 							 .height = 24,
@@ -130,7 +130,7 @@ static void controls_that_drift_end_it(void **state)
 	char text[200];
 	int rc = 0;
 
-	/* Found by time where pictures are few, by their number where there are many. */
+	/* Found by time where frames are few, by their number where there are many. */
 	for (int many = 0; many < 2; many++) {
 		reset();
 		driver_add(V4L2_CID_GAIN, 0, 100, 50);
@@ -360,7 +360,7 @@ static void who_may_not_look_is_told(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(pictures_come_through_the_door),
+		cmocka_unit_test(frames_come_through_the_interface),
 		cmocka_unit_test(an_unplugged_camera_says_so),
 		cmocka_unit_test(controls_that_drift_end_it),
 		cmocka_unit_test(why_it_cannot_be_opened_is_said),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/v4l2/v4l2_stream.c on a driver that the test plays: every picture that was
+ * lib/device/v4l2/v4l2_stream.c on a driver that the test plays: every frame that was
  * lost or damaged is counted, what a caller holds is left alone, and what a driver says
  * wrongly is refused.
  */
@@ -76,7 +76,7 @@ static void losses(uint64_t lost, uint64_t damaged)
 	assert_true(atomic_load(&stream.damaged) == damaged);
 }
 
-static void pictures_come_in_order_with_their_stamps(void **state)
+static void frames_come_in_order_with_their_timestamps(void **state)
 {
 	struct incise_camera_frame frame;
 
@@ -109,7 +109,7 @@ static void what_is_held_is_not_written_to(void **state)
 	driver_shoot(7);
 	assert_int_equal(step(), 1);
 	assert_int_equal(v4l2_stream_read(&stream, &held), 1);
-	/* More pictures than there are buffers: what has no room is passed over. */
+	/* More frames than there are buffers: what has no room is passed over. */
 	for (uint32_t i = 1; i <= 50; i++) {
 		driver_shoot(7 + i);
 		assert_int_equal(step(), 1);
@@ -180,7 +180,7 @@ static void four_buffers_suffice(void **state)
 
 static void as_many_wait_as_there_is_room(void **state)
 {
-	/* Of so many buffers so many pictures: all but a quarter, and but 3 at most. */
+	/* Of so many buffers so many frames: all but a quarter, and but 3 at most. */
 	static const struct {
 		uint32_t buffers, waiting;
 	} cases[] = {{4, 1}, {5, 2}, {8, 5}, {12, 9}, {13, 10}, {16, 12}, {32, 24}};
@@ -239,7 +239,7 @@ static void *read_all(void *argument)
 
 static void two_threads_take_each_once(void **state)
 {
-	/* Of few buffers they meet at the same picture more often. */
+	/* Of few buffers they meet at the same frame more often. */
 	static const uint32_t buffers[] = {4, 32};
 
 	for (int k = 0; k < 2; k++) {
@@ -322,7 +322,7 @@ static void stamps_that_cannot_be_are_damage(void **state)
 	struct incise_camera_frame frame;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct driver_picture *shot;
+		struct driver_frame *shot;
 		int64_t last;
 
 		begin();
@@ -355,7 +355,7 @@ static void the_middle_of_the_exposure_is_told(void **state)
 	struct incise_camera_frame frame;
 
 	for (size_t i = 0; i < 2; i++) {
-		struct driver_picture *shot;
+		struct driver_frame *shot;
 
 		driver_reset();
 		assert_int_equal(start(INCISE_PIXELS_YUYV, 8000000), 0);
@@ -408,7 +408,7 @@ static void lie_index(void)
 
 static void lie_not_queued(void)
 {
-	/* the first picture's, which nobody took yet */
+	/* the first frame's, which nobody took yet */
 	driver_shoot(1)->index = 0;
 }
 
@@ -603,7 +603,7 @@ static uint32_t draw(uint32_t below)
 static void a_driver_that_lies_at_random_does_no_harm(void **state)
 {
 	struct incise_camera_frame frame;
-	unsigned int pictures = 0, ends = 0;
+	unsigned int frames = 0, ends = 0;
 
 	for (int run = 0; run < 300; run++) {
 		enum incise_pixels pixels =
@@ -615,7 +615,7 @@ static void a_driver_that_lies_at_random_does_no_harm(void **state)
 		driver_reset();
 		assert_int_equal(start(pixels, draw(20000000)), 0);
 		for (int i = 0; i < 100 && rc >= 0; i++) {
-			struct driver_picture *shot =
+			struct driver_frame *shot =
 				driver_shoot(sequence += 1 + !draw(9));
 
 			if (!draw(10))
@@ -646,12 +646,12 @@ static void a_driver_that_lies_at_random_does_no_harm(void **state)
 				    frame.size >= stream.shape.least &&
 				    frame.size <= DRIVER_BYTES);
 		}
-		pictures += (unsigned int)taken;
+		frames += (unsigned int)taken;
 		ends += rc < 0;
 		end();
 	}
 	/* Both happen, or nothing was tried: at these odds most runs are not ended. */
-	assert_in_range(pictures, 5000, 30000);
+	assert_in_range(frames, 5000, 30000);
 	assert_in_range(ends, 30, 270);
 }
 
@@ -667,7 +667,7 @@ static void more_buffers_than_asked_for_are_not_overrun(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(pictures_come_in_order_with_their_stamps),
+		cmocka_unit_test(frames_come_in_order_with_their_timestamps),
 		cmocka_unit_test(what_is_held_is_not_written_to),
 		cmocka_unit_test(what_comes_back_while_it_waits_is_the_drivers),
 		cmocka_unit_test(four_buffers_suffice),

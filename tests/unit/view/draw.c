@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Pictures by OpenGL, compared with stored ones and with properties of any picture. The surface is a
+ * Images by OpenGL, compared with stored ones and with properties of any picture. The surface is a
  * neck without a larynx, painted here, so that only drawing affects them.
  *
  *     INCISE_GOLDEN=write build/tests/unit/view/draw    stores new ones: look at them
@@ -186,7 +186,7 @@ static void test_golden(void **state)
 			look_write("/tmp/incise-draw-failed.png", one, W, H);
 		print_message("%s: %.4f\n", cases[i].name, alike);
 		assert_true(alike >= ALIKE);
-		/* The measure distinguishes pictures with and without the instrument. */
+		/* The measure distinguishes images with and without the instrument. */
 		frame(draw, cases[i].camera, pose ? NULL : &tick, one);
 		alike = look_alike(one, golden, W, H);
 		print_message("%s, otherwise: %.4f\n", cases[i].name, alike);
@@ -316,7 +316,7 @@ static void test_dirty_rectangle(void **state)
 		incise_draw_upload(draw, canvas, uploads, n);
 	frame(draw, &aside, NULL, two);
 
-	/* Where it is in the picture, with the texels that filters mix in. */
+	/* Where it is in the image, with the texels that filters mix in. */
 	view_camera_project(&aside, W, H, 100, &projection);
 	for (int i = 0; i < 4; i++) {
 		double px[2] = {rect.x + (i & 1 ? rect.w + 6 : -6),

@@ -278,7 +278,7 @@ static void test_all_kinds(void **state)
 	uv_map_free(NULL);
 }
 
-/* The top is in the middle, right is +x and the picture is not mirrored. */
+/* The top is in the middle, right is +x and the image is not mirrored. */
 static void test_lies_as_it_should(void **state)
 {
 	static const int kinds[] = {0, 3, 6};

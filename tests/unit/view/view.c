@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The view: the same ticks give the same picture for any number of frames, and no input breaks it.
+ * The view: the same ticks give the same image for any number of frames, and no input breaks it.
  * Neck with a small texture.
  */
 #include <stdarg.h>

@@ -84,7 +84,7 @@ static void test_matrix_says_the_same(void **state)
 			w = at[3];
 			assert_true(w > 0);
 			assert_true(project(&projection, 320, 180, p, px));
-			/* Single precision of the matrix, over a picture of 320 pixels. */
+			/* Single precision of the matrix, over an image of 320 pixels. */
 			assert_true(fabs((at[0] / w + 1) * 160 - px[0]) < 0.01);
 			assert_true(fabs((1 - at[1] / w) * 90 - px[1]) < 0.01);
 			/* Within near and far. */
@@ -130,7 +130,7 @@ static void test_home_sees_all(void **state)
 	assert_true(c->target_mm[0] == 50 && c->target_mm[2] == -6);
 	/* From the side and above. */
 	assert_true(c->elevation_deg > 20 && c->elevation_deg < 70);
-	/* A ball of 100 mm is wider than the picture is high, not wider than 16 : 9. */
+	/* A ball of 100 mm is wider than the image is high, not wider than 16 : 9. */
 	assert_true(tan(c->fov_deg * M_PI / 360) * c->distance_mm > 100 * 9 / 16.0);
 	/* A direction along y looks the same as one along x. */
 	view_orbit_home(&turned, c->target_mm, (double[]){0, 2, 0}, 100);

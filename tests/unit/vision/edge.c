@@ -16,8 +16,8 @@
  * blur and levels unknown 0.050 px; with liver that has a texture of 12 levels 0.082 px.
  * In YUYV at 8 levels (step 36) it is 0.081 px at best, 0.098 with texture. So the 0.05 px
  * of issue 7 cannot be had in these two. The part without texture is strict. Texture is
- * taken as Gaussian here and is four waves in the pictures: an estimate may be a little
- * better than that bound, and is (of 300 pictures 0.071 px for 0.082; grey at 4 levels
+ * taken as Gaussian here and is four waves in the frames: an estimate may be a little
+ * better than that bound, and is (of 300 frames 0.071 px for 0.082; grey at 4 levels
  * 0.048 for 0.051).
  */
 #include <stdarg.h>
@@ -134,7 +134,7 @@ static double all_known_px(const struct step *s)
 	return s->noise / s->height * sqrt(2 * 2 * sd * sqrt(M_PI) / (SHARE * WIDTH_PX));
 }
 
-/* An end in a picture of tests/vision/scalpel_picture.c, liver and black. */
+/* An end in a frame of tests/vision/scalpel_picture.c, liver and black. */
 static struct step step_of(const struct scalpel_picture *p)
 {
 	static const double liver[3] = {118, 46, 38}, black[3] = {24, 24, 26};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/vision/vision.cc, handle.cc, edge.cc: the exposed length compared with the truth of pictures
+ * lib/vision/vision.cc, handle.cc, edge.cc: the exposed length compared with the truth of frames
  * that are drawn outside the library (tests/vision/scalpel_picture.c), and of
  * the virtual camera. Results are printed for the log. Learnt thresholds find the handle.
  */
@@ -74,7 +74,7 @@ struct condition {
 	struct scalpel_picture with; /* differences from small() */
 	double most_deg;	     /* of tilt, both ways; 0: 20, -1: none */
 	double sd_px;		     /* limit; 0: the 0.05 px of issue 7 */
-	int refused;		     /* largest number of pictures without a result */
+	int refused;		     /* largest number of frames without a result */
 };
 
 /*
@@ -260,7 +260,7 @@ static void of_several_dark_things_the_handle_is_taken(void **state)
 	blacken(&frame, 20, 100, 200, 180); /* larger, not long */
 	blacken(&frame, 500, 200, 40, 200); /* a handle's form, smaller */
 	blacken(&frame, 0, 440, 200, 40);   /* flat, at the border */
-	blacken(&frame, 580, 0, 60, 480);   /* through all of the picture */
+	blacken(&frame, 580, 0, 60, 480);   /* through all of the frame */
 	for (int i = 0; i < 3; i++) {
 		assert_int_equal(incise_vision_measure(vision, &frame, &r), 0);
 		assert_true(r.found);
@@ -377,7 +377,7 @@ static void the_region_follows(void **state)
 	incise_vision_free(vision);
 }
 
-/* The virtual rig: over a cut, every 10th picture. */
+/* The virtual rig: over a cut, every 10th frame. */
 static void the_virtual_cameras_truth(void **state)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(INCISE_NS_PER_S);

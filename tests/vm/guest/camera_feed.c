@@ -4,7 +4,7 @@
  *
  *   camera_feed /dev/video8 RATE
  *
- * grey pictures of 320 x 240 pixels, YUYV, of which each is a level lighter than the one
+ * grey frames of 320 x 240 pixels, YUYV, of which each is a level lighter than the one
  * before. Stopped and continued it goes on from then, as a camera does whose cable is loose.
  */
 #include <fcntl.h>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/device/v4l2 held against what was really shot: this program feeds v4l2loopback and
- * takes the pictures back through the camera. Prints "ok …" and "not ok …".
+ * takes the frames back through the camera. Prints "ok …" and "not ok …".
  *
- *   feed ─▶ /dev/video8 ─▶ v4l2_camera ─▶ the same bytes, stamp and number
+ *   feed ─▶ /dev/video8 ─▶ v4l2_camera ─▶ the same bytes, timestamp and number
  *
- * v4l2loopback writes to a buffer whether somebody holds it or not, so at most seven pictures
+ * v4l2loopback writes to a buffer whether somebody holds it or not, so at most seven frames
  * are shot between two that are read.
  */
 #include <errno.h>
@@ -36,8 +36,8 @@ struct feeder {
 	size_t size;
 	uint8_t *buffer[BUFFERS];
 	size_t length;
-	int n;	      /* pictures shot */
-	int64_t t_ns; /* stamp of the last one */
+	int n;	      /* frames shot */
+	int64_t t_ns; /* timestamp of the last one */
 };
 
 static int64_t now_ns(void)
@@ -48,7 +48,7 @@ static int64_t now_ns(void)
 	return now.tv_sec * 1000000000LL + now.tv_nsec;
 }
 
-/* Every byte of every picture is another one. */
+/* Every byte of every frame is another one. */
 static uint8_t pixel(int picture, size_t at)
 {
 	uint32_t mixed = (uint32_t)picture * 2654435761u + (uint32_t)at * 40503u;
@@ -89,7 +89,7 @@ static bool feeder_open(struct feeder *f)
 	return !ioctl(f->fd, VIDIOC_STREAMON, &type);
 }
 
-/* @picture: NULL: one of pixel(). @stamp_ns: 0: the kernel's. */
+/* @frame: NULL: one of pixel(). @stamp_ns: 0: the kernel's. */
 static bool feeder_shoot(struct feeder *f, const uint8_t *picture, int64_t stamp_ns)
 {
 	struct v4l2_buffer buffer = {.index = (uint32_t)(f->n % BUFFERS),
@@ -135,7 +135,7 @@ static struct incise_camera *open_camera(enum incise_pixels pixels)
 	return camera;
 }
 
-/* Read until picture @seq is there. */
+/* Read until frame @seq is there. */
 static int await(struct incise_camera *camera, struct incise_camera_frame *frame,
 		 uint64_t seq)
 {
@@ -165,18 +165,18 @@ static bool same(const struct incise_camera_frame *frame, int picture)
 static void a_hundred(struct feeder *f, struct incise_camera *camera)
 {
 	struct incise_camera_frame frame = {0};
-	int bytes = 0, stamps = 0, numbers = 0;
+	int bytes = 0, timestamps = 0, numbers = 0;
 
 	for (int i = 0; i < 100; i++) {
 		if (!feeder_shoot(f, NULL, 0) || await(camera, &frame, (uint64_t)i) != 1)
 			break;
 		bytes += same(&frame, i);
-		stamps += frame.t_ns == f->t_ns;
+		timestamps += frame.t_ns == f->t_ns;
 		numbers += frame.seq == (uint64_t)i;
 	}
 	check(numbers == 100, "%d of 100 pictures, in order", numbers);
 	check(bytes == 100, "%d of 100 are the same byte by byte", bytes);
-	check(stamps == 100, "%d of 100 have the stamp of the shot", stamps);
+	check(timestamps == 100, "%d of 100 have the stamp of the shot", timestamps);
 	check(incise_camera_lost(camera) == 0, "none is lost");
 }
 
@@ -197,7 +197,7 @@ static int take_all(struct incise_camera *camera, int first, int last)
 	return -1;
 }
 
-/* Pictures that nobody reads wait, as long as there is room. */
+/* Frames that nobody reads wait, as long as there is room. */
 static void not_read(struct feeder *f, struct incise_camera *camera)
 {
 	uint64_t before = incise_camera_lost(camera);
@@ -271,7 +271,7 @@ static void virtual_rig(void)
 	source = incise_sim_camera_new(sim);
 	if (check(feeder_open(&f), "the feeder begins in RGB"))
 		camera = open_camera(INCISE_PIXELS_RGB);
-	/* Two seconds, in which the first cut begins; 100 pictures. */
+	/* Two seconds, in which the first cut starts; 100 frames. */
 	for (int64_t t = 0; camera && t < 2000; t += 20) {
 		incise_clock_wait_until(clock, t * 1000000);
 		if (incise_camera_read(source, &shot) != 1 ||
@@ -320,7 +320,7 @@ int main(int argc, char **argv)
 		camera->ops->close(camera);
 	}
 	feeder_close(&f);
-	/* On a device that has had no picture yet. */
+	/* On a device that has had no frame yet. */
 	path = argv[2];
 	virtual_rig();
 	return tap_failures ? 1 : 0;

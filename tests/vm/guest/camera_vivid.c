@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/v4l2 on a driver of a real kernel: vivid, a webcam that draws its pictures, and
- * can be told to damage them, to lose them, to stamp and count them wrongly and to fail. Its
- * stamps are those of jiffies. Prints "ok …" and "not ok …".
+ * lib/device/v4l2 on a driver of a real kernel: vivid, a webcam that draws its frames, and
+ * can be told to damage them, to lose them, to timestamp and count them wrongly and to fail. Its
+ * timestamps are those of jiffies. Prints "ok …" and "not ok …".
  *
  *   camera_vivid /dev/video0
  */
@@ -111,7 +111,7 @@ static int set_named(int fd, const char *name, int value)
 	return -ENOENT;
 }
 
-/* Take pictures; 0, or what is wrong with them. */
+/* Take frames; 0, or what is wrong with them. */
 static const char *take(struct incise_camera *camera, int n, double period_ns,
 			uint64_t *taken, uint64_t *last_seq)
 {
@@ -125,7 +125,7 @@ static const char *take(struct incise_camera *camera, int n, double period_ns,
 
 		if (rc != 1)
 			return rc ? "an error" : "no picture";
-		/* vivid stamps the end of a picture, which it hands out before. */
+		/* vivid timestamps the end of a frame, which it hands out before. */
 		if ((double)frame.t_ns > (double)now_ns() + period_ns ||
 		    frame.t_ns <= last_ns)
 			return "a stamp of the future, or of the past";
@@ -300,7 +300,7 @@ static void wraps(void)
 	uint64_t taken = 0, seq = 0;
 	const char *wrong = "not open";
 
-	/* It begins 128 before the count runs over. */
+	/* It starts 128 before the count runs over. */
 	if (!set_named(other, "Wrap Sequence Number", 1)) {
 		camera = open_camera(&setup);
 		if (camera) {

@@ -147,7 +147,7 @@ static void errors(struct can_bus *bus, int peer)
 	bus->ops->filter(bus, NULL, 0);
 }
 
-static void stamps(struct can_bus *bus, int peer)
+static void timestamps(struct can_bus *bus, int peer)
 {
 	struct can_frame frame;
 	int64_t before, after, last = 0, t_ns = 0;
@@ -157,12 +157,12 @@ static void stamps(struct can_bus *bus, int peer)
 		before = bus->ops->now(bus);
 		good &= say(peer, 0x123, 8);
 		after = bus->ops->now(bus);
-		/* It lies there for a while: its stamp is that of when it came. */
+		/* It lies there for a while: its timestamp is that of when it came. */
 		bus->ops->wait(bus, after + MS);
 		usleep(1000);
 		good &= next(bus, &frame, &t_ns) == 1;
 		/* Both clocks are read one after the other: as far apart as an interrupt
-		 * between takes, some 7 µs here; a frame that is stamped when it is read is
+		 * between takes, some 7 µs here; a frame that is timestamped when it is read is
 		 * a millisecond late. */
 		good &= t_ns >= last && t_ns <= bus->ops->now(bus);
 		good &= (t_ns >= before - 20000 && t_ns <= after + MS / 2) ||
@@ -312,7 +312,7 @@ int main(int argc, char **argv)
 	      "a frame that is sent arrives at others, and not at home");
 	filters(bus, peer);
 	errors(bus, peer);
-	stamps(bus, peer);
+	timestamps(bus, peer);
 	overflow(bus, peer);
 	bus->ops->close(bus);
 	owners();

@@ -29,7 +29,7 @@ static int64_t now_ns(void)
 	return now.tv_sec * 1000000000LL + now.tv_nsec;
 }
 
-/* Every edge that was made is there once, in order, stamped by this clock. */
+/* Every edge that was made is there once, in order, timestamped by this clock. */
 static void edges_are_whole(void)
 {
 	const unsigned int lines[] = {step, dir};

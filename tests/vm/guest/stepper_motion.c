@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Random motions of random motors: limits, times and polarity are drawn anew for every
+ * Random motions of random motors: limits, times and polarity are drawn again for every
  * session, targets and velocities come at any time, many of them in flight and beyond the
  * limits. Every edge is judged; at the end of each session the motor, the module, the
  * simulated carriage and the judge must agree where it stands.

@@ -366,7 +366,7 @@ static void owner_is_killed(int rounds)
 		if (!right)
 			note("round %d: state %u, faults %#x", i, status().state,
 			     status().faults);
-		/* The child's judge is gone: this one begins anew. */
+		/* The child's judge is gone: this one restarts. */
 		simulator_write("edges", "reset");
 		bench.log[0].begun = false;
 	}

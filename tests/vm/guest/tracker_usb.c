@@ -119,7 +119,7 @@ static int watch(const char *device, double seconds, const char *away, const cha
 	}
 	incise_tracker_info(tracker, &info);
 	printf("ok it opens: %s, %.0f Hz\n", info.name, info.rate_hz);
-	/* While its thread begins some wait, and come all at once. */
+	/* While its thread starts some wait, and come all at once. */
 	rc = take_for(tracker, &s, 0.3);
 	s = (struct seen){0};
 	before_lost = incise_tracker_lost(tracker);

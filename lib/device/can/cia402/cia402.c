@@ -191,7 +191,7 @@ int cia402_error(const struct cia402_client *client, int code, const char *forma
 }
 
 int cia402_fail(const struct cia402_client *client, const struct cia402_object *object,
-		const char *verb, int rc)
+		const char *action, int rc)
 {
 	char what[80], why[100];
 
@@ -202,28 +202,29 @@ int cia402_fail(const struct cia402_client *client, const struct cia402_object *
 		return cia402_error(client, EOPNOTSUPP,
 				    "the drive refuses to let %s be %s: %s; see its "
 				    "manual whether it can do this, and its firmware",
-				    what, verb,
+				    what, action,
 				    canopen_abort_text(client->master->abort, why,
 						       sizeof(why)));
 	case -ETIMEDOUT:
 		return cia402_error(client, ETIMEDOUT,
 				    "no answer when %s was to be %s; see the drive's "
 				    "power, its wiring, node id and bit rate",
-				    what, verb);
+				    what, action);
 	case -EPROTO:
 		return cia402_error(client, EPROTO,
 				    "the answer makes no sense when %s was to be %s; "
 				    "see that no other node has this id and that it is "
 				    "a CiA 402 drive",
-				    what, verb);
+				    what, action);
 	case -EINTR:
 		return cia402_error(client, EINTR, "stopped when %s was to be %s", what,
-				    verb);
+				    action);
 	default:
 		return cia402_error(client, -rc,
 				    "the bus %s failed when %s was to be %s: %s; see "
 				    "`ip -details link`, cables and termination",
-				    client->master->bus->name, what, verb, strerror(-rc));
+				    client->master->bus->name, what, action,
+				    strerror(-rc));
 	}
 }
 

@@ -120,13 +120,13 @@ int cia402_write_optional(const struct cia402_client *client,
 int cia402_ensure(const struct cia402_client *client, const struct cia402_object *object,
 		  uint32_t value);
 
-/* Make a message that begins with client->where. Returns -code. */
+/* Make a message that starts with client->where. Returns -code. */
 int cia402_error(const struct cia402_client *client, int code, const char *format, ...)
 	__attribute__((format(printf, 3, 4)));
 
 /* Make the message for @rc of canopen_read() or canopen_write(). Returns the error. */
 int cia402_fail(const struct cia402_client *client, const struct cia402_object *object,
-		const char *verb, int rc);
+		const char *action, int rc);
 
 /* Read the statusword's state. */
 int cia402_read_state(const struct cia402_client *client, enum cia402_state *state);
