@@ -82,7 +82,7 @@ static void stepper_defaults_fit(struct stepper_motor *motor,
 	}
 }
 
-/* Configs of all motors; errors are told. */
+/* Configs of all motors; errors are reported. */
 int stepper_defaults(struct stepper *stepper, struct device *dev)
 {
 	unsigned int i;

@@ -2,7 +2,7 @@
 /*
  * The file operations of /dev/incise-stepperN; see uapi/incise_stepper.h. Whoever
  * opens it for writing is the owner, others watch. After unbind every call gives ENODEV
- * and poll tells HUP; pages that are mapped stay memory.
+ * and poll shows HUP; pages that are mapped stay memory.
  *
  * A user's memory is never touched under stepper.mutex: a page fault there could wait
  * for a mapping that waits for the mutex.
@@ -229,7 +229,7 @@ static long stepper_file_ioctl(struct file *file, unsigned int command, unsigned
 
 	if (!stepper_file_known(command))
 		return -ENOTTY;
-	/* A watcher is told so before its arguments are judged. */
+	/* A watcher gets that error before its arguments are checked. */
 	if (!opened->owner && !stepper_file_watchers(command))
 		return -EPERM;
 	memset(&arg, 0, sizeof(arg));

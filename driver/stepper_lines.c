@@ -32,7 +32,7 @@ static bool stepper_lines_found_by(const struct fwnode_handle *node)
 #endif
 }
 
-/* A line, NULL where it is optional and there is none, or an error that was told. */
+/* A line, NULL where it is optional and there is none, or an error that was reported. */
 static struct gpio_desc *stepper_lines_one(struct device *dev, struct fwnode_handle *node,
 					   int motor, const char *name,
 					   enum gpiod_flags flags, bool needed)

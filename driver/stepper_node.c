@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * The firmware nodes of motors: children of the controller's node, told apart by reg.
+ * The firmware nodes of motors: children of the controller's node, distinguished by reg.
  *
  *   controller ─┬─ motor@0 { reg = <0>; }
  *               └─ motor@1 { reg = <1>; }
@@ -43,7 +43,7 @@ int stepper_node_count(struct device *dev)
 		seen |= BIT(reg);
 		n++;
 	}
-	/* Without nodes, as with a bare lookup table, the number must be told. */
+	/* Without nodes, as with a bare lookup table, the number must be given. */
 	if (!n && !device_property_read_u32(dev, "incise,motors", &n) && n >= 1 &&
 	    n <= INCISE_STEPPER_MOTORS_MAX)
 		return n;

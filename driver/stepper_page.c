@@ -41,7 +41,7 @@ union slot_copy {
  * @setpoint:	the last one taken; @setpoint->seq says what is not new
  *
  * A slot whose seq is odd for ever gives nothing for ever, and the deadman acts.
- * Garbage is told once per seq.
+ * Garbage is reported once per seq.
  */
 enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint *slot,
 					   struct stepper_setpoint *setpoint)

@@ -6,7 +6,7 @@
  *   mmap    page 0: set-points, written by the owner; page 1: status, read-only. A slot
  *           per motor in each. In the loop nothing else is needed: no system call.
  *   ioctl   what is set up while the motors stand.
- *   read    events, whole structs; poll tells when there is one. Each open file has a
+ *   read    events, whole structs; poll shows when there is one. Each open file has a
  *           place of its own in the ring of events; a gap in seq shows what it missed.
  *
  * Lengths are microsteps ("steps"), times are nanoseconds of CLOCK_MONOTONIC. Reserved

@@ -433,7 +433,7 @@ int incise_calibration_history(const char *path,
 
 /* --- writing --- */
 
-/* The shortest number that reads back the same; libconfig tells floats by their point. */
+/* The shortest number that reads back the same; libconfig recognizes floats by their point. */
 static void put_number(double value, FILE *out)
 {
 	char text[40];

@@ -24,7 +24,7 @@
  * stable below 2 sin(π/(4d+2)) m/T only: 1 for a tick, 0.28 for 5, 0.10 for 15. Lower the
  * cap to half of that for an actuator or a velocity that lags.
  *
- * It is no limit of force: whoever renders has one behind it, and tells by sent().
+ * It is no limit of force: the renderer has one behind it, and reports the force by sent().
  * All functions are real-time safe. An object belongs to one thread.
  */
 #ifndef INCISE_GUARD_H

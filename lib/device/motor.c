@@ -179,8 +179,8 @@ static const char *fault_text(const struct incise_motor *motor)
 }
 
 /* Report @rc with the message of the ops, or with the cause that the status shows. */
-static int told(struct incise_motor *motor, int rc, const char *what,
-		const struct incise_error *said, struct incise_error *err)
+static int reported(struct incise_motor *motor, int rc, const char *what,
+		    const struct incise_error *said, struct incise_error *err)
 {
 	const char *why = NULL;
 
@@ -213,7 +213,7 @@ static int motor_enable(struct incise_stepper *stepper, struct incise_error *err
 	int rc = motor->watches ? -EPERM : motor->ops->enable(motor, &why);
 
 	motor->beyond = false;
-	return told(motor, rc, "cannot be enabled", &why, err);
+	return reported(motor, rc, "cannot be enabled", &why, err);
 }
 
 static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
@@ -222,7 +222,7 @@ static int motor_clear(struct incise_stepper *stepper, struct incise_error *err)
 	struct incise_error why = {0};
 	int rc = motor->watches ? -EPERM : motor->ops->clear(motor, &why);
 
-	return told(motor, rc, "cannot be cleared", &why, err);
+	return reported(motor, rc, "cannot be cleared", &why, err);
 }
 
 static int motor_wait(struct incise_stepper *stepper, int64_t ns)
@@ -264,7 +264,7 @@ static int motor_disable(struct incise_stepper *stepper, struct incise_error *er
 						"switch its power off",
 						motor->name);
 	}
-	return told(motor, rc, "cannot be disabled", &(struct incise_error){0}, err);
+	return reported(motor, rc, "cannot be disabled", &(struct incise_error){0}, err);
 }
 
 static void motor_info(const struct incise_stepper *stepper,

@@ -14,7 +14,7 @@ static const int ks[] = {1, 3, 5, 10, 20, 50};
 #define N_KS ((int)(sizeof(ks) / sizeof(*ks)))
 #define K_MAX 50
 
-/* Queries by which k is chosen: enough to tell ks apart, few enough to be quick. */
+/* Queries by which k is chosen: enough to distinguish ks, few enough to be quick. */
 #define CHOOSERS 2000
 
 /* Neighbours are looked for among so many pairs, for so many queries, at most: by chance

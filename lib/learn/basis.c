@@ -15,7 +15,7 @@
 #include "../base/random.h"
 #include "basis.h"
 
-/* As lib/model has them: distances beyond are not told apart, sums stay finite. */
+/* As lib/model has them: distances beyond are not distinguished, sums stay finite. */
 #define Z_MAX 1e150
 #define LOG_MIN (-1e300)
 

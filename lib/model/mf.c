@@ -9,7 +9,7 @@
  *            ____           log degree  finite
  *           /    \          gap         0
  *   _______/      \_______
- *      gap a      d gap     log degree  taken as 0: only the gap tells rules apart
+ *      gap a      d gap     log degree  taken as 0: only the gap distinguishes rules
  */
 #include <float.h>
 #include <math.h>

@@ -3,7 +3,7 @@
  * Places on a mesh: normal, texture coordinates, border; searches; gliding.
  *
  * The normal on an edge is the middle of its faces', and at a corner that of the faces
- * around it weighted by their angles: with it the sign of (p - nearest) · normal tells
+ * around it weighted by their angles: with it the sign of (p - nearest) · normal shows
  * inside from outside exactly (Bærentzen & Aanæs 2005), which a face's does not.
  */
 #include <stdlib.h>

@@ -112,7 +112,7 @@ static void end(struct incise_proxy *proxy)
  * has gone out, or because there is a dent between the two. Where the straight way to the
  * tool enters it is a dent, the tool is inside, and the proxy goes on gliding. A way that
  * starts on the edge of the dent may enter right there, and rounding then hides it: when
- * none is found, what is nearest to the tool tells.
+ * none is found, the nearest one to the tool decides.
  */
 static bool is_dent(const struct incise_proxy *proxy, const struct mesh_spot *spot,
 		    const double tool[3])

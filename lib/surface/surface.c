@@ -275,7 +275,7 @@ void capsule_nearest(const struct capsule *capsule, const double p[3],
 	v3_sub(out, p, on);
 	distance = v3_length(out);
 	touch->depth_mm = capsule->radius - distance;
-	/* Nearer to the axis than a double can tell there is no direction. */
+	/* Nearer to the axis than a double resolves there is no direction. */
 	if (!v3_unit(touch->normal, out, 1e-12 * capsule->radius)) {
 		double unit[3] = {0}, ahead;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Time that the loop needs to publish its state: one tick after the other, and at 1 kHz, when its
- * memory is no longer in the cache. ns; times at 1 kHz are with the clock's own, which is told.
+ * memory is no longer in the cache. ns; times at 1 kHz are with the clock's own, which is reported.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,7 +27,7 @@ static int by_size(const void *a, const void *b)
 	return (*x > *y) - (*x < *y);
 }
 
-static void tell(struct incise_state_writer *writer, int64_t n)
+static void publish(struct incise_state_writer *writer, int64_t n)
 {
 	struct incise_tick tick = {
 		.t_ns = n * 1000000,
@@ -45,7 +45,7 @@ static void close_together(struct incise_state_writer *writer)
 	int64_t begin = now_ns();
 
 	for (int64_t n = 0; n < CLOSE; n++)
-		tell(writer, n);
+		publish(writer, n);
 	printf("one after the other: %.1f\n", (double)(now_ns() - begin) / CLOSE);
 }
 
@@ -63,7 +63,7 @@ static void paced(struct incise_state_writer *writer)
 		clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL);
 		a = now_ns();
 		b = now_ns();
-		tell(writer, n);
+		publish(writer, n);
 		cost[n] = now_ns() - b;
 		clock[n] = b - a;
 	}

@@ -6,7 +6,7 @@
  *   tracker_line [SECONDS]
  *
  * Several lines run at once: one is clean, one has 1 % of its bytes changed, on one bytes
- * come and go as well, on one whole records vanish, which only time tells. Each sample
+ * come and go as well, on one whole records vanish, which only time shows. Each sample
  * is held against the emulator's own list of what it sent. What is reported:
  *
  *   sent = came + lost          came = whole + unseen
@@ -23,7 +23,7 @@
 
 #define HZ 120
 #define BEFORE 5 /* s without harm, while it is set up and after */
-#define AFTER 5	 /* s: what only time tells it tells half a second later */
+#define AFTER 5	 /* s: losses that only time shows are reported half a second later */
 
 static const struct incise_tracker_setup setup = {
 	.n_stations = 1, .stations = {1}, .hemisphere = {1, 0, 0}};

@@ -284,7 +284,7 @@ static void cycle(struct emulator *e)
 {
 	bool button = emulator_pose(e->slot, 1).button && e->on[0];
 
-	/* Unless it is told to be a mouse's, the button ends and starts a stream. */
+	/* Unless it is set to be a mouse's, the button ends and starts a stream. */
 	if (!e->continuous)
 		e->paused = false;
 	else if (button && !e->pressed && !e->mouse)

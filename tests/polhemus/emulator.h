@@ -9,7 +9,7 @@
  *                            replies                 records --> damage
  *                               '---- emulator_take() ----'
  *
- * It moves in a way that emulator_pose() tells, and keeps a list of all records that it
+ * It moves in a way that emulator_pose() shows, and keeps a list of all records that it
  * should have sent, and of what became of them.
  */
 #ifndef INCISE_TEST_POLHEMUS_EMULATOR_H

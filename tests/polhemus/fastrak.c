@@ -158,7 +158,7 @@ int main(int argc, char **argv)
 	}
 	if (argc % 2 == 0)
 		return usage();
-	/* poll() knows nothing of lines that stdio has read ahead. */
+	/* poll() does not report lines that stdio has read ahead. */
 	setvbuf(stdin, NULL, _IONBF, 0);
 	emulator_init(&e, kind, now_ns());
 	e.damage = damage;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Plays a loop that tells its state, for tests of who reads it:
+ * Plays a loop that publishes its state, for tests of who reads it:
  *
  *   loop FILE done     1000 ticks of known numbers, at once; stopped as asked
  *   loop FILE run      1 kHz until SIGTERM; then stopped

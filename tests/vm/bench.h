@@ -82,7 +82,7 @@ struct incise_stepper_motor_status bench_look(const struct bench *bench,
 /* Hands all edges of the ring to the judges. */
 void bench_judge(struct bench *bench);
 
-/* Sum of faults that the judges have found; tells the first of each motor. */
+/* Sum of faults that the judges have found; prints the first of each motor. */
 uint64_t bench_faulty(const struct bench *bench);
 
 /* Signs of life until a motor is in one of the states (bits); false after @ns. */

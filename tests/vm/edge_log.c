@@ -130,7 +130,7 @@ static int64_t edge_log_back(const struct edge_log *log, uint64_t steps)
 
 /*
  * Between two steps the motor is within a step of where it was. Of a pause as much is looked
- * at as tells most: all of it, a half, a quarter ... down to a step at full speed.
+ * at as reveals most: all of it, a half, a quarter ... down to a step at full speed.
  */
 static void edge_log_still(struct edge_log *log, struct range moving, double g,
 			   double pause, double way_from, double way_to, const char *what,

@@ -83,7 +83,7 @@ enum daq_wait daq_feed_wait(struct daq_feed *feed, int fd, int ms)
 
 	if (n > 0 && on[0].revents)
 		return DAQ_STOP;
-	/* An error of @fd is ready too: reading tells which. */
+	/* An error of @fd is ready too: reading shows which. */
 	return n > 0 ? DAQ_READY : DAQ_QUIET;
 }
 

@@ -56,7 +56,7 @@ void daq_feed_put(struct daq_feed *feed, int64_t t_ns, int32_t code);
 /* @n samples are missing before the next; counted as one overflow. 0: none. */
 void daq_feed_lose(struct daq_feed *feed, uint64_t n);
 /*
- * The last word: 0 (it was to stop), -ENODEV, or -EIO because of @what; readers are told once
+ * The last word: 0 (it was to stop), -ENODEV, or -EIO because of @what; reported to readers once
  * they have read all.
  */
 void daq_feed_end(struct daq_feed *feed, int error, const char *what);

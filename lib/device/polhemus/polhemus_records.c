@@ -31,7 +31,7 @@ static bool is_printable(unsigned char c)
 	return c >= ' ' && c <= '~';
 }
 
-/* Whether a record may begin here, as far as its first @n bytes tell. */
+/* Whether a record may begin here, as far as its first @n bytes show. */
 static bool begins(const struct polhemus_layout *layout, const unsigned char *b, size_t n)
 {
 	if (layout->family == POLHEMUS_FASTRAK)

@@ -169,7 +169,7 @@ static bool is_kind(libusb_device *device, const struct usb_name *wanted,
 	       d->idVendor == wanted->vendor && d->idProduct == wanted->product;
 }
 
-/* *denied is set where only a serial number that may not be read could tell. */
+/* *denied is set where only a serial number that may not be read could decide. */
 static bool fits(libusb_device *device, const struct usb_name *wanted, bool *denied)
 {
 	char path[USB_PATH_MAX], serial[USB_SERIAL_MAX];

@@ -46,21 +46,22 @@ static void text_of(char *text, size_t size, const unsigned char *from, size_t l
 
 int v4l2_identify(int fd, struct v4l2_identity *identity)
 {
-	struct v4l2_capability told = {0};
-	int rc = v4l2_ask(fd, VIDIOC_QUERYCAP, &told);
+	struct v4l2_capability reported = {0};
+	int rc = v4l2_ask(fd, VIDIOC_QUERYCAP, &reported);
 
 	if (rc)
 		return rc == -EINVAL ? -ENOTTY : rc;
-	text_of(identity->card, sizeof(identity->card), told.card, sizeof(told.card));
-	text_of(identity->driver, sizeof(identity->driver), told.driver,
-		sizeof(told.driver));
-	text_of(identity->bus, sizeof(identity->bus), told.bus_info,
-		sizeof(told.bus_info));
-	identity->version = told.version;
+	text_of(identity->card, sizeof(identity->card), reported.card,
+		sizeof(reported.card));
+	text_of(identity->driver, sizeof(identity->driver), reported.driver,
+		sizeof(reported.driver));
+	text_of(identity->bus, sizeof(identity->bus), reported.bus_info,
+		sizeof(reported.bus_info));
+	identity->version = reported.version;
 	/* A device may have several files with different capabilities. */
-	identity->capabilities = told.capabilities & V4L2_CAP_DEVICE_CAPS
-					 ? told.device_caps
-					 : told.capabilities;
+	identity->capabilities = reported.capabilities & V4L2_CAP_DEVICE_CAPS
+					 ? reported.device_caps
+					 : reported.capabilities;
 	return 0;
 }
 

@@ -34,10 +34,11 @@ static const struct {
 /* Format number @i of the driver; 0: none. */
 static uint32_t offered(int fd, uint32_t i)
 {
-	struct v4l2_fmtdesc told = {.index = i, .type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+	struct v4l2_fmtdesc reported = {.index = i, .type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
 
-	return i < FORMATS_MAX && !v4l2_ask(fd, VIDIOC_ENUM_FMT, &told) ? told.pixelformat
-									: 0;
+	return i < FORMATS_MAX && !v4l2_ask(fd, VIDIOC_ENUM_FMT, &reported)
+		       ? reported.pixelformat
+		       : 0;
 }
 
 static bool is_known(uint32_t fourcc)
@@ -105,27 +106,28 @@ static void nearest_size(int fd, uint32_t fourcc, int *width, int *height)
 	long best = -1;
 
 	for (uint32_t i = 0; i < CHOICES_MAX; i++) {
-		struct v4l2_frmsizeenum told = {.index = i, .pixel_format = fourcc};
+		struct v4l2_frmsizeenum reported = {.index = i, .pixel_format = fourcc};
 		long off;
 
-		if (v4l2_ask(fd, VIDIOC_ENUM_FRAMESIZES, &told))
+		if (v4l2_ask(fd, VIDIOC_ENUM_FRAMESIZES, &reported))
 			return;
-		if (told.type != V4L2_FRMSIZE_TYPE_DISCRETE) {
-			*width = step_to(w, told.stepwise.min_width,
-					 told.stepwise.max_width,
-					 told.stepwise.step_width);
-			*height = step_to(h, told.stepwise.min_height,
-					  told.stepwise.max_height,
-					  told.stepwise.step_height);
+		if (reported.type != V4L2_FRMSIZE_TYPE_DISCRETE) {
+			*width = step_to(w, reported.stepwise.min_width,
+					 reported.stepwise.max_width,
+					 reported.stepwise.step_width);
+			*height = step_to(h, reported.stepwise.min_height,
+					  reported.stepwise.max_height,
+					  reported.stepwise.step_height);
 			return;
 		}
-		off = away(told.discrete.width, w) + away(told.discrete.height, h);
-		if (told.discrete.width - 1 < V4L2_SIDE_MAX &&
-		    told.discrete.height - 1 < V4L2_SIDE_MAX &&
+		off = away(reported.discrete.width, w) +
+		      away(reported.discrete.height, h);
+		if (reported.discrete.width - 1 < V4L2_SIDE_MAX &&
+		    reported.discrete.height - 1 < V4L2_SIDE_MAX &&
 		    (best < 0 || off < best)) {
 			best = off;
-			*width = (int)told.discrete.width;
-			*height = (int)told.discrete.height;
+			*width = (int)reported.discrete.width;
+			*height = (int)reported.discrete.height;
 		}
 	}
 }
@@ -147,28 +149,28 @@ static struct v4l2_fract nearest_interval(int fd, const struct v4l2_shape *shape
 	double off = -1;
 
 	for (uint32_t i = 0; i < CHOICES_MAX; i++) {
-		struct v4l2_frmivalenum told = {.index = i,
-						.pixel_format = shape->fourcc,
-						.width = (uint32_t)shape->width,
-						.height = (uint32_t)shape->height};
+		struct v4l2_frmivalenum reported = {.index = i,
+						    .pixel_format = shape->fourcc,
+						    .width = (uint32_t)shape->width,
+						    .height = (uint32_t)shape->height};
 		double is;
 
-		if (v4l2_ask(fd, VIDIOC_ENUM_FRAMEINTERVALS, &told))
+		if (v4l2_ask(fd, VIDIOC_ENUM_FRAMEINTERVALS, &reported))
 			break;
-		if (told.type != V4L2_FRMIVAL_TYPE_DISCRETE) {
+		if (reported.type != V4L2_FRMIVAL_TYPE_DISCRETE) {
 			/* The shortest interval is the highest rate. */
-			if (rate_of(&told.stepwise.min) > 0 &&
-			    hz > rate_of(&told.stepwise.min))
-				return told.stepwise.min;
-			if (rate_of(&told.stepwise.max) > 0 &&
-			    hz < rate_of(&told.stepwise.max))
-				return told.stepwise.max;
+			if (rate_of(&reported.stepwise.min) > 0 &&
+			    hz > rate_of(&reported.stepwise.min))
+				return reported.stepwise.min;
+			if (rate_of(&reported.stepwise.max) > 0 &&
+			    hz < rate_of(&reported.stepwise.max))
+				return reported.stepwise.max;
 			break;
 		}
-		is = rate_of(&told.discrete);
+		is = rate_of(&reported.discrete);
 		if (is > 0 && (off < 0 || fabs(is - hz) < off)) {
 			off = fabs(is - hz);
-			best = told.discrete;
+			best = reported.discrete;
 		}
 	}
 	return best;
@@ -177,54 +179,55 @@ static struct v4l2_fract nearest_interval(int fd, const struct v4l2_shape *shape
 /* The rate stays 0 where the driver has none. */
 static void set_rate(int fd, struct v4l2_shape *shape, double hz)
 {
-	struct v4l2_streamparm told = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+	struct v4l2_streamparm reported = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
 
-	if (v4l2_ask(fd, VIDIOC_G_PARM, &told))
+	if (v4l2_ask(fd, VIDIOC_G_PARM, &reported))
 		return;
-	if (hz > 0 && told.parm.capture.capability & V4L2_CAP_TIMEPERFRAME) {
+	if (hz > 0 && reported.parm.capture.capability & V4L2_CAP_TIMEPERFRAME) {
 		struct v4l2_streamparm asked = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
 
 		asked.parm.capture.timeperframe = nearest_interval(fd, shape, hz);
 		v4l2_ask(fd, VIDIOC_S_PARM, &asked);
-		if (v4l2_ask(fd, VIDIOC_G_PARM, &told))
+		if (v4l2_ask(fd, VIDIOC_G_PARM, &reported))
 			return;
 	}
-	shape->rate_hz = rate_of(&told.parm.capture.timeperframe);
+	shape->rate_hz = rate_of(&reported.parm.capture.timeperframe);
 }
 
 /* Check the answer of the driver; NULL, or the reason why it is impossible. */
-static const char *wrong(const struct v4l2_pix_format *told, size_t kind,
+static const char *wrong(const struct v4l2_pix_format *reported, size_t kind,
 			 struct v4l2_shape *shape)
 {
 	size_t row;
 
-	if (told->pixelformat != known[kind].fourcc)
+	if (reported->pixelformat != known[kind].fourcc)
 		return "other pixels than were set";
-	if (told->field != V4L2_FIELD_NONE)
+	if (reported->field != V4L2_FIELD_NONE)
 		return "interlaced pictures, whose halves are of two times; set a "
 		       "progressive mode";
-	if (told->width - 1 >= V4L2_SIDE_MAX || told->height - 1 >= V4L2_SIDE_MAX)
+	if (reported->width - 1 >= V4L2_SIDE_MAX || reported->height - 1 >= V4L2_SIDE_MAX)
 		return "a size that cannot be";
-	if (!told->sizeimage || told->sizeimage > FRAME_MAX)
+	if (!reported->sizeimage || reported->sizeimage > FRAME_MAX)
 		return "a number of bytes that cannot be";
 	*shape = (struct v4l2_shape){
 		.pixels = known[kind].pixels,
-		.fourcc = told->pixelformat,
-		.width = (int)told->width,
-		.height = (int)told->height,
+		.fourcc = reported->pixelformat,
+		.width = (int)reported->width,
+		.height = (int)reported->height,
 	};
 	if (!known[kind].bytes)
 		return NULL;
-	row = (size_t)told->width * (size_t)known[kind].bytes;
+	row = (size_t)reported->width * (size_t)known[kind].bytes;
 	/* Old drivers leave it at 0 where rows have no padding. */
-	shape->stride = (int)(told->bytesperline ? told->bytesperline : row);
-	if (told->bytesperline > FRAME_MAX || (size_t)shape->stride < row)
+	shape->stride = (int)(reported->bytesperline ? reported->bytesperline : row);
+	if (reported->bytesperline > FRAME_MAX || (size_t)shape->stride < row)
 		return "rows that are too short";
-	if (shape->pixels == INCISE_PIXELS_YUYV && told->width % 2)
+	if (shape->pixels == INCISE_PIXELS_YUYV && reported->width % 2)
 		return "an odd number of pixels in a row of YUYV";
 	/* Padding behind the last row may be missing. */
-	shape->least = (size_t)shape->stride * (told->height - 1) + row;
-	return shape->least > told->sizeimage ? "fewer bytes than its rows have" : NULL;
+	shape->least = (size_t)shape->stride * (reported->height - 1) + row;
+	return shape->least > reported->sizeimage ? "fewer bytes than its rows have"
+						  : NULL;
 }
 
 static int check_setup(const struct incise_camera_setup *setup, const char *where,
@@ -250,7 +253,7 @@ int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char 
 		    struct v4l2_shape *shape, struct incise_error *err)
 {
 	struct v4l2_format set = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
-	struct v4l2_format told = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+	struct v4l2_format reported = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
 	size_t kind = find(fd, setup->pixels);
 	int width, height, rc;
 	const char *why;
@@ -283,7 +286,7 @@ int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char 
 	set.fmt.pix.bytesperline = set.fmt.pix.sizeimage = 0;
 	rc = v4l2_ask(fd, VIDIOC_S_FMT, &set);
 	if (!rc)
-		rc = v4l2_ask(fd, VIDIOC_G_FMT, &told);
+		rc = v4l2_ask(fd, VIDIOC_G_FMT, &reported);
 	if (rc)
 		return incise_error_set(err, -rc,
 					rc == -EBUSY ? "%s: another program uses the "
@@ -291,7 +294,7 @@ int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char 
 						     : "%s: the camera's format cannot "
 						       "be set: %s",
 					where, strerror(-rc));
-	why = wrong(&told.fmt.pix, kind, shape);
+	why = wrong(&reported.fmt.pix, kind, shape);
 	if (why)
 		return incise_error_set(err, EPROTO, "%s: the camera's driver gives %s",
 					where, why);

@@ -379,7 +379,7 @@ static int check_silence(const struct v4l2_stream *s, struct incise_error *err)
 /* Handle an answer of the driver without a frame. */
 static int no_frame(struct v4l2_stream *s, int rc, short events, struct incise_error *err)
 {
-	struct v4l2_capability told;
+	struct v4l2_capability reported;
 
 	if (rc == -ENODEV)
 		return gone(s, err);
@@ -395,7 +395,7 @@ static int no_frame(struct v4l2_stream *s, int rc, short events, struct incise_e
 		poll(NULL, 0, ERROR_MS);
 		return 0;
 	}
-	if (v4l2_ask(s->fd, VIDIOC_QUERYCAP, &told) == -ENODEV)
+	if (v4l2_ask(s->fd, VIDIOC_QUERYCAP, &reported) == -ENODEV)
 		return gone(s, err);
 	return incise_error_set(err, EIO,
 				"%s: the camera's driver gives no more pictures: %s; "

@@ -22,7 +22,7 @@
  * at its end. What is left between the curve and its branch's line then, and fades on the way,
  * is no lost travel but force: hysteresis_N, the loss of spring and sensor. Friction between
  * spring and sensor that is the same at rest and in motion looks like a backlash of
- * 2 friction/N_mm, and is part of it: no measurement at the sensor alone tells them apart.
+ * 2 friction/N_mm, and is part of it: no measurement at the sensor alone distinguishes them.
  */
 #ifndef INCISE_CALIBRATE_STEPPER_H
 #define INCISE_CALIBRATE_STEPPER_H

@@ -143,7 +143,7 @@ INCISE_API void incise_stepper_info(const struct incise_stepper *stepper,
 				    struct incise_stepper_info *info);
 
 /**
- * The cause of a fault in one line that says what to do: what the device itself tells of
+ * The cause of a fault in one line that says what to do: the device's own description of
  * it, such as a drive's emergency message, else incise_stepper_fault_text().
  *
  * @param text always a string; empty where there is no fault

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Delays of streams of one motion: truth within the stated intervals, with stiffness and
- * viscosity that are not known; each motion that cannot tell is refused with its reason. An
+ * viscosity that are not known; each motion that is not sufficient is refused with its reason. An
  * argument is the number of data sets, 200 or what is given.
  */
 #include <stdarg.h>

@@ -280,7 +280,7 @@ static void test_line_truth(void **state)
 	}
 }
 
-/* A camera that looks on askance bends the line: it is told with its uncertainty. */
+/* A camera that looks on askance bends the line: it is reported with its uncertainty. */
 static void test_bend(void **state)
 {
 	struct line_data d;

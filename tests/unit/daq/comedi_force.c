@@ -449,7 +449,7 @@ static void overflow(void **state)
 static void unplugged(void **state)
 {
 	static const struct {
-		int code, told;
+		int code, reported;
 	} cases[] = {{ENODEV, -ENODEV}, {ENXIO, -ENODEV}, {EIO, -EIO}, {EINVAL, -EIO}};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -461,7 +461,7 @@ static void unplugged(void **state)
 		send_codes(1, 3);
 		assert_int_equal(take(force, samples, 3), 3);
 		atomic_store(&fail, cases[i].code);
-		assert_int_equal(take(force, samples, 1), cases[i].told);
+		assert_int_equal(take(force, samples, 1), cases[i].reported);
 		force->ops->close(force);
 	}
 }
@@ -539,7 +539,7 @@ static void a_card_is_told_of(void **state)
 	assert_string_equal(found.device[0].device, "comedi:/dev/null:0");
 	assert_true(found.device[0].usable);
 	for (size_t i = 0; i < sizeof(properties) / sizeof(*properties); i++)
-		assert_string_equal(told(&found.device[0], properties[i][0]),
+		assert_string_equal(property_of(&found.device[0], properties[i][0]),
 				    properties[i][1]);
 }
 
@@ -552,7 +552,7 @@ static void what_cannot_be_used_is_told_as_such(void **state)
 	card.no_timer = true;
 	assert_int_equal(scan("/dev/null"), 0);
 	assert_false(found.device[0].usable);
-	assert_string_equal(told(&found.device[0], "rate_most_hz"), "");
+	assert_string_equal(property_of(&found.device[0], "rate_most_hz"), "");
 	scan_setup(NULL);
 	card.maxdata = 4000; /* codes of no whole number of bits */
 	assert_int_equal(scan("/dev/null"), 0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/daq/daq_feed.c: what is read, clipped, lost and told at the end; what is asked
+ * lib/device/daq/daq_feed.c: what is read, clipped, lost and reported at the end; what is asked
  * for and cannot be; the thread.
  */
 #include <stdarg.h>

@@ -24,8 +24,9 @@ static inline int keep(void *context, const struct incise_scan_device *device)
 	return found->answer;
 }
 
-/* "" where it is not told. */
-static inline const char *told(const struct incise_scan_device *device, const char *key)
+/* "" where there is none. */
+static inline const char *property_of(const struct incise_scan_device *device,
+				      const char *key)
 {
 	for (int i = 0; i < device->n; i++)
 		if (!strcmp(device->property[i].key, key))

@@ -80,7 +80,7 @@ static void gaps(void **state)
 	assert_int_equal(info.overflows, overflows);
 }
 
-/* Up to just below a period late: told apart from a loss by what follows. */
+/* Up to just below a period late: distinguished from a loss by what follows. */
 static void lateness_is_no_gap(void **state)
 {
 	for (int64_t n = 0; n < 20000; n++)
@@ -243,7 +243,7 @@ static void a_converter_is_told_of(void **state)
 	assert_string_equal(adc->device, "iio:adc");
 	assert_true(adc->usable);
 	for (size_t i = 0; i < sizeof(properties) / sizeof(*properties); i++)
-		assert_string_equal(told(adc, properties[i][0]), properties[i][1]);
+		assert_string_equal(property_of(adc, properties[i][0]), properties[i][1]);
 }
 
 static void two_of_a_name_go_by_number(void **state)
@@ -263,19 +263,19 @@ static void what_cannot_be_used_is_told_as_such(void **state)
 	adc->channels[1].format.bits = 32; /* of incise_force_sample.code 31 are */
 	assert_int_equal(scan(""), 0);
 	assert_false(found.device[0].usable);
-	assert_string_equal(told(&found.device[0], "range_V"), "");
+	assert_string_equal(property_of(&found.device[0], "range_V"), "");
 	scan_setup(NULL);
 	adc->channels[2].id = "voltage1";
 	assert_int_equal(scan(""), 0);
 	assert_false(found.device[0].usable);
-	assert_string_equal(told(&found.device[0], "channels"), "2");
-	assert_string_equal(told(&found.device[0], "time_stamps"), "none");
+	assert_string_equal(property_of(&found.device[0], "channels"), "2");
+	assert_string_equal(property_of(&found.device[0], "time_stamps"), "none");
 	/* Without a scale it is of use, once rig.conf says what the codes stand for. */
 	scan_setup(NULL);
 	adc->channels[1].attributes[0].key = "other";
 	assert_int_equal(scan(""), 0);
 	assert_true(found.device[0].usable);
-	assert_string_equal(told(&found.device[0], "range_V"), "");
+	assert_string_equal(property_of(&found.device[0], "range_V"), "");
 }
 
 static void by_name_and_without_any(void **state)

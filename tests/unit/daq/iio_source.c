@@ -661,7 +661,7 @@ static void put(const char *name, const char *text)
 	fclose(f);
 }
 
-/* Files keep what was behind a shorter write: the first character tells. */
+/* Files keep what was behind a shorter write: the first character decides. */
 static char first_of(const char *name)
 {
 	char path[200];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * A screw with switches behind three lines, and a clock that only goes when it is told to:
+ * A screw with switches behind three lines, and a clock that only moves when a test moves it:
  * the world of a pulser in tests. It counts what a motor would do, and holds every edge
  * against the shortest times.
  */

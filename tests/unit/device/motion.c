@@ -40,7 +40,7 @@ static void start(struct bench *b, unsigned int flags)
 	assert_int_equal(incise_motion_init(&b->motion, &config), 0);
 }
 
-/* As an owner does. Returns whether it was told to take power away at once. */
+/* As an owner does. Returns whether it had to take power away at once. */
 static bool go(struct bench *b, int64_t ms)
 {
 	struct incise_profile_slot slot;

@@ -210,7 +210,7 @@ static void every_case_on_a_made_clock(void **state)
 			incise_stepper_info(c.stepper, &c.info);
 			bench_advance(&b, 1000000);
 			conformance[i].run(&c);
-			/* The lines told the same as the status, and no time was short. */
+			/* The lines reported the same as the status, and no time was short. */
 			assert_int_equal(b.machine.too_short, 0);
 			assert_int_equal(b.machine.unpowered, 0);
 			assert_int_equal(b.machine.into_limit, 0);

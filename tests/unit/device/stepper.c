@@ -141,7 +141,7 @@ static void states_and_faults_have_words(void **state)
 	}
 }
 
-/* One that may tell more of its fault than that there is one, and counts two things. */
+/* A stepper that may describe its fault, and has two counts. */
 struct teller {
 	struct incise_stepper stepper;
 	unsigned int faults;
@@ -249,7 +249,7 @@ struct machine {
 	bool stuck_on, stuck_off, estop, deaf;
 	int polls, stop_at;
 	int stop;
-	const char *cause; /* what it tells of its fault; or NULL */
+	const char *cause; /* its description of the fault; or NULL */
 
 	double at_mm, v_mm_s, target_mm, count_mm; /* count: position less at_mm */
 	bool by_speed, homed, touched;

@@ -420,7 +420,7 @@ static void a_device_that_goes_away(void **state)
 	stepper->ops->close(stepper);
 }
 
-/* A status that is never finished is not waited for, and is told after a while. */
+/* A status that is never finished is not waited for, and is reported after a while. */
 static void a_page_that_makes_no_sense(void **state)
 {
 	struct incise_stepper_motor_status *slot =

@@ -159,7 +159,7 @@ static void test_answers(void **state)
 			assert_int_equal(setpoint.target, 123);
 			assert_int_equal(setpoint.t_ns, 456);
 		}
-		/* The same once more is nothing: garbage is told once. */
+		/* The same once more is nothing: garbage is reported once. */
 		assert_int_equal(stepper_page_take(&rows[i].slot, &setpoint),
 				 STEPPER_PAGE_NOTHING);
 	}

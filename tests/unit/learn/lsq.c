@@ -135,7 +135,7 @@ static void test_small_entries_count(void **state)
 	incise_lsq_free(lsq);
 }
 
-/* Squares that overflow or vanish are no obstacle; what is not finite is told. */
+/* Squares that overflow or vanish are no obstacle; what is not finite is reported. */
 static void test_extreme_sizes(void **state)
 {
 	static const double sizes[] = {1e-300, 1e-160, 1, 1e160, 1e300};

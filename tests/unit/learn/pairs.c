@@ -83,7 +83,7 @@ static void test_premises(void **state)
 	}
 }
 
-/* The same plane in both units; what overflows is told. */
+/* The same plane in both units; what overflows is reported. */
 static void test_consequents(void **state)
 {
 	struct incise_scaling scaling = {2, {-3, 5, 7}, {20, 0.5, 3}};

@@ -826,7 +826,7 @@ static void test_new_groups_are_covered(void **state)
 	assert_int_equal(incise_train(model, &train, NULL, &options, NULL, NULL), 0);
 	assert_non_null(uncertainty);
 	noise = incise_uncertainty_noise(uncertainty);
-	/* √(0.3² + 0.1²) = 0.316; 60 levels tell it to 10 %, taken twice. */
+	/* √(0.3² + 0.1²) = 0.316; 60 levels determine it to 10 %, taken twice. */
 	assert_true(noise > 0.25 && noise < 0.38);
 	for (int i = half; i < 2 * half; i++) {
 		double sd = incise_uncertainty_sd(uncertainty, model, rows + 2 * i);

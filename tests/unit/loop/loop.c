@@ -238,7 +238,7 @@ struct listener {
 	int ticks, end_at, end_by;
 };
 
-static int tell(void *context, const struct incise_tick *tick)
+static int ticked(void *context, const struct incise_tick *tick)
 {
 	struct listener *listener = context;
 
@@ -254,7 +254,7 @@ static void test_callback_ends_the_loop(void **state)
 	struct listener listener = {.end_at = 17, .end_by = -ENOSPC};
 	struct incise_loop_options options = {.rate_hz = 1000,
 					      .duration_ns = INCISE_NS_PER_S,
-					      .ticked = tell,
+					      .ticked = ticked,
 					      .context = &listener};
 	struct incise_error err = {0};
 	struct felt f;
@@ -277,7 +277,7 @@ static void test_paced_clock(void **state)
 	struct listener listener = {.begin_ns = 777, .stall_ns = 12000000};
 	struct incise_loop_options options = {.rate_hz = 1000,
 					      .duration_ns = 40000000,
-					      .ticked = tell,
+					      .ticked = ticked,
 					      .context = &listener};
 	struct incise_clock *clock = incise_clock_new_paced(777);
 	struct felt f;

@@ -101,7 +101,7 @@ struct busy {
 };
 
 /* Like a loop: some ticks, then a pause in which a reader succeeds. */
-static void *tell(void *arg)
+static void *publish(void *arg)
 {
 	struct busy *busy = arg;
 
@@ -140,7 +140,7 @@ static void test_beside_a_writer(void **state)
 	pthread_t thread;
 
 	incise_state_run(busy.made.writer, run, incise_run_name(run));
-	pthread_create(&thread, NULL, tell, &busy);
+	pthread_create(&thread, NULL, publish, &busy);
 	for (int good = 0; good < 2000;) {
 		int rc = incise_state_read(reader, &now), n;
 

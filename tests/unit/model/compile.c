@@ -101,7 +101,7 @@ static void test_extreme_consequents(void **state)
 		}
 }
 
-/* Functions so narrow that between them the nearest cannot be told by 128 widths. */
+/* Functions so narrow that between them the nearest cannot be determined by 128 widths. */
 static void test_narrow_functions(void **state)
 {
 	struct incise_fixed_options o = {.arithmetic = INCISE_FIXED_DIRECT};

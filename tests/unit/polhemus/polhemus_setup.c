@@ -211,7 +211,7 @@ static void slow_line(void **state)
 	} cases[] = {
 		{EMULATOR_FASTRAK, 1041667, 0, NULL},
 		{EMULATOR_LIBERTY, 1041667, 0, NULL},
-		/* who does not stop sending is told before */
+		/* a tracker that does not stop sending is reported before */
 		{EMULATOR_FASTRAK, 40000000, 0, "does not stop sending"},
 		{EMULATOR_FASTRAK, 80000000, 'O', "was not set up after 15 s"},
 	};

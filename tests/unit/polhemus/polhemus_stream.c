@@ -60,7 +60,7 @@ static void damage(void **state)
 		uint64_t missing;
 		unsigned int skipped;
 		int64_t late_ns;
-		uint64_t told;
+		uint64_t reported;
 	} cases[] = {
 		{0, 0, 0, 0},
 		{1, 34, 0, 1},
@@ -86,13 +86,13 @@ static void damage(void **state)
 		take_all(0, 200);
 		assert_true(take(200 + cases[i].missing, cases[i].late_ns,
 				 cases[i].skipped, &seq));
-		if (gaps.lost != cases[i].told || seq != 200 + cases[i].told)
+		if (gaps.lost != cases[i].reported || seq != 200 + cases[i].reported)
 			fail_msg("case %zu: %llu lost, seq %llu", i,
 				 (unsigned long long)gaps.lost, (unsigned long long)seq);
 	}
 }
 
-/* Stations tell up to a round; the round itself only time does, a window later. */
+/* Stations show up to a round; the round itself only time does, a window later. */
 static void order(void **state)
 {
 	for (int n = 1; n <= 4; n++)
@@ -435,7 +435,7 @@ static void loses_what_is_touched(void **state)
 	}
 }
 
-/* Records that vanish without a trace, which only time tells, to within a window. */
+/* Records that vanish without a trace, which only time shows, to within a window. */
 static void time_tells(void **state)
 {
 	for (int stations = 1; stations <= 4; stations++) {
@@ -514,7 +514,7 @@ static void bursts_and_new_bytes(void **state)
 		for (size_t j = 0; j < b.e.n_sent; j++)
 			touched += b.e.sent[j].touched;
 		assert_true(touched > 100);
-		/* Time tells some of it, a window later. */
+		/* Time shows some of it, a window later. */
 		compare(&b, S, POLHEMUS_GAPS_WINDOW);
 		assert_true(polhemus_stream_lost(&b.stream) <= touched);
 		bench_free(&b);

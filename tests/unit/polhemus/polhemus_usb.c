@@ -104,7 +104,7 @@ static void bad_names(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		/* Behind its end is nothing that may be read: a checker tells. */
+		/* Behind its end is nothing that may be read: a sanitizer reports it. */
 		char *text = strdup(cases[i]);
 		struct usb_name name;
 

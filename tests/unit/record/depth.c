@@ -167,7 +167,7 @@ static void records_across_a_gap_are_not_mixed(void **state)
 	for (int i = 0; i < 10; i++)
 		assert_true(fabs(rows[i].velocity_mm_s - 50) < 1e-7);
 
-	/* A record with no other near has no speed to tell. */
+	/* A record with no other near has no speed. */
 	n = trace(straight, 2, (int64_t[]){5000000000000LL, 5001000000000LL});
 	assert_int_equal(n, 2);
 	assert_true(rows[0].velocity_mm_s == 0 && rows[1].velocity_mm_s == 0);

@@ -369,7 +369,7 @@ static void interrupted_recording_knows_its_losses(void **state)
 		fail_msg("%s", err.text);
 	/* At least half of the 600000 and 7200. */
 	assert_true(info.force_lost > 300000 && info.tracker_lost > 3600);
-	/* The numbers tell the same. */
+	/* The numbers show the same. */
 	assert_int_equal(info.force_lost,
 			 (int)ask("a.rec.part/recording.db",
 				  "SELECT max(seq) + 1 - count(*) FROM force"));
@@ -406,11 +406,11 @@ static int faulty_tracker(struct incise_tracker *tracker,
 }
 
 /* The device's message about its end; empty: none. */
-static const char *force_tells;
+static const char *force_reason;
 
 static int force_cause(struct incise_force *force, char *text, size_t size)
 {
-	return snprintf(text, size, "%s", force_tells);
+	return snprintf(text, size, "%s", force_reason);
 }
 
 static struct incise_rig *faulty_rig(void)
@@ -425,7 +425,7 @@ static struct incise_rig *faulty_rig(void)
 	tracker_ops = *tracker_real;
 	force_ops.read = faulty_force;
 	force_ops.cause = force_cause;
-	force_tells = "";
+	force_reason = "";
 	tracker_ops.read = faulty_tracker;
 	force->ops = &force_ops;
 	tracker->ops = &tracker_ops;
@@ -530,7 +530,7 @@ static void failures_of_devices(void **state)
 	static const struct {
 		const char *what;
 		int (*force)(struct incise_force_sample *samples, int n);
-		const char *tells, *text;
+		const char *cause, *text;
 	} cases[] = {
 		{"unplugged", gone, "", "is gone; check its cable"},
 		{"it tells why", gone, "the channel: its clock stands still; wind it up",
@@ -547,7 +547,7 @@ static void failures_of_devices(void **state)
 		char sql[300];
 
 		force_fault = cases[i].force;
-		force_tells = cases[i].tells;
+		force_reason = cases[i].cause;
 		if (poll_for(rec, rig, 2000 * MS, &err))
 			fail_msg("%s: %s", cases[i].what, err.text);
 		incise_recorder_stats(rec, &stats);

@@ -274,8 +274,8 @@ static void grids_are_admitted(void **state)
 
 /*
  * A queue: who waits makes those behind wait. Where jitter is of several periods, hardly one
- * arrives unhindered, and the shape of the lower end tells so. (With 10000 Hz and jitter of
- * its own for each sample nobody could tell the queue from a longer delay.)
+ * arrives unhindered, and the shape of the lower end shows it. (With 10000 Hz and jitter of
+ * its own for each sample the queue could not be distinguished from a longer delay.)
  */
 static void queues_are_seen(void **state)
 {

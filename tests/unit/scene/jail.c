@@ -59,14 +59,14 @@ void __wrap_free(void *old)
 }
 
 /* The report of a child process. */
-struct told {
+struct reported {
 	long ticks, contacts, insertions, guarded, stale, free, allocations;
 	double force_N; /* largest */
 };
 
 /* Strokes through the top, with blade, handle and tube, and a stall of the tracker. */
 static void run(struct incise_plan *plan, const struct incise_touch *top,
-		struct told *told)
+		struct reported *reported)
 {
 	for (int i = 0; i < TICKS; i++) {
 		struct incise_tracker_sample s = {
@@ -89,15 +89,15 @@ static void run(struct incise_plan *plan, const struct incise_touch *top,
 			incise_plan_set_tool(plan, (enum incise_tool)(i / 500 % 4));
 		if (incise_plan_tick(plan, s.t_ns, &t))
 			return;
-		told->ticks++;
-		told->contacts += !!(t.flags & INCISE_TICK_CONTACT);
-		told->insertions += t.phase == INCISE_PHASE_INSERTION;
-		told->free += t.phase == INCISE_PHASE_FREE;
-		told->guarded += !!(t.flags & INCISE_TICK_GUARDED);
-		told->stale += !!(t.flags & INCISE_TICK_STALE);
+		reported->ticks++;
+		reported->contacts += !!(t.flags & INCISE_TICK_CONTACT);
+		reported->insertions += t.phase == INCISE_PHASE_INSERTION;
+		reported->free += t.phase == INCISE_PHASE_FREE;
+		reported->guarded += !!(t.flags & INCISE_TICK_GUARDED);
+		reported->stale += !!(t.flags & INCISE_TICK_STALE);
 		for (int k = 0; k < 3; k++)
 			force_N += t.command_N[k] * t.command_N[k];
-		told->force_N = fmax(told->force_N, sqrt(force_N));
+		reported->force_N = fmax(reported->force_N, sqrt(force_N));
 	}
 }
 
@@ -117,38 +117,39 @@ struct prepared {
 /* In the child; does not return. */
 static void jailed(struct prepared *prepared, int n, bool break_out, int out)
 {
-	struct told told = {0};
+	struct reported reported = {0};
 
 	if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT))
 		leave(77);
 	allocations = 0;
 	for (int i = 0; i < n; i++)
-		run(prepared[i].plan, &prepared[i].top, &told);
-	told.allocations = allocations;
+		run(prepared[i].plan, &prepared[i].top, &reported);
+	reported.allocations = allocations;
 	if (break_out)
 		syscall(SYS_getppid);
-	leave(write(out, &told, sizeof(told)) != sizeof(told));
+	leave(write(out, &reported, sizeof(reported)) != sizeof(reported));
 }
 
 /* Returns the child's status as of waitpid(2). */
-static int run_jailed(struct prepared *prepared, int n, bool break_out, struct told *told)
+static int run_jailed(struct prepared *prepared, int n, bool break_out,
+		      struct reported *reported)
 {
 	int ends[2], status;
 	ssize_t got;
 	pid_t child;
 
-	memset(told, 0, sizeof(*told));
+	memset(reported, 0, sizeof(*reported));
 	assert_int_equal(pipe(ends), 0);
 	child = fork();
 	assert_true(child >= 0);
 	if (!child)
 		jailed(prepared, n, break_out, ends[1]);
 	close(ends[1]);
-	got = read(ends[0], told, sizeof(*told));
+	got = read(ends[0], reported, sizeof(*reported));
 	close(ends[0]);
 	assert_int_equal(waitpid(child, &status, 0), child);
 	if (WIFEXITED(status) && WEXITSTATUS(status) == 0)
-		assert_int_equal(got, sizeof(*told));
+		assert_int_equal(got, sizeof(*reported));
 	return status;
 }
 
@@ -156,7 +157,7 @@ static void test_ticks_in_jail(void **state)
 {
 	static const char *const names[] = {"plane", "large mesh"};
 	struct prepared prepared[4];
-	struct told told, none;
+	struct reported reported, none;
 	int n, status, broken;
 	bool no_jail;
 
@@ -172,7 +173,7 @@ static void test_ticks_in_jail(void **state)
 	/* The counter counts: models, meshes and plans were made. */
 	assert_true(allocations > 20);
 
-	status = run_jailed(prepared, n, false, &told);
+	status = run_jailed(prepared, n, false, &reported);
 	broken = run_jailed(prepared, n, true, &none);
 	for (int i = 0; i < n; i++) {
 		incise_plan_free(prepared[i].plan);
@@ -188,13 +189,13 @@ static void test_ticks_in_jail(void **state)
 			 WTERMSIG(status));
 	assert_true(WIFEXITED(status));
 	assert_int_equal(WEXITSTATUS(status), 0);
-	assert_int_equal(told.ticks, n * TICKS);
-	assert_int_equal(told.allocations, 0);
+	assert_int_equal(reported.ticks, n * TICKS);
+	assert_int_equal(reported.allocations, 0);
 	/* They did all that ticks do. */
-	assert_true(told.contacts > TICKS && told.free > TICKS);
-	assert_true(told.insertions > TICKS / 10);
-	assert_true(told.stale > 100 && told.guarded > 100);
-	assert_true(told.force_N > 1 && told.force_N <= GROUND_FORCE_N);
+	assert_true(reported.contacts > TICKS && reported.free > TICKS);
+	assert_true(reported.insertions > TICKS / 10);
+	assert_true(reported.stale > 100 && reported.guarded > 100);
+	assert_true(reported.force_N > 1 && reported.force_N <= GROUND_FORCE_N);
 	/* And the jail is one: getppid(2), which does nothing, was the end. */
 	assert_true(WIFSIGNALED(broken));
 	assert_int_equal(WTERMSIG(broken), SIGKILL);

@@ -363,7 +363,7 @@ static void test_feed(void **state)
 	felt_end(&f);
 }
 
-/* The scalpel's attitude is told with each tick, whichever end of it is held. */
+/* The scalpel's attitude is reported with each tick, whichever end of it is held. */
 static void test_attitude(void **state)
 {
 	static const double turned[4] = {0.6, 0, 0.8, 0};

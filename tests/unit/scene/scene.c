@@ -283,7 +283,7 @@ static void test_other_types(void **state)
 	}
 }
 
-/* Keys that there are not; one in another unit is told the right one. */
+/* Keys that there are not; one in another unit gets the right one. */
 static void test_unknown_keys(void **state)
 {
 	static const struct {

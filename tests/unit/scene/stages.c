@@ -191,8 +191,8 @@ static void test_the_end_of_what_is_held(void **state)
 	incise_surface_free(surface);
 }
 
-/* An actuator that tells what it was asked, and says what it is told. */
-struct told {
+/* An actuator that keeps its requests, and reports the status that a test gives it. */
+struct reported {
 	struct incise_stepper stepper;
 	struct incise_stepper_status status;
 	int rc, set_rc, sets;
@@ -202,25 +202,25 @@ struct told {
 
 static int told_set(struct incise_stepper *stepper, double position_mm)
 {
-	struct told *told = (struct told *)stepper;
+	struct reported *reported = (struct reported *)stepper;
 
-	told->sets++;
-	told->target_mm = position_mm;
-	return told->set_rc;
+	reported->sets++;
+	reported->target_mm = position_mm;
+	return reported->set_rc;
 }
 
 static int told_status(struct incise_stepper *stepper,
 		       struct incise_stepper_status *status)
 {
-	struct told *told = (struct told *)stepper;
+	struct reported *reported = (struct reported *)stepper;
 
-	*status = told->status;
-	return told->rc;
+	*status = reported->status;
+	return reported->rc;
 }
 
 static int told_cause(struct incise_stepper *stepper, char *text, size_t size)
 {
-	const char *cause = ((struct told *)stepper)->cause;
+	const char *cause = ((struct reported *)stepper)->cause;
 
 	return cause ? snprintf(text, size, "%s", cause) : 0;
 }
@@ -229,11 +229,11 @@ static const struct incise_stepper_ops stepper_ops = {
 	.set = told_set, .status = told_status, .cause = told_cause};
 
 /* A spring of 2 N/mm and a travel of 20 mm, pushing along z. */
-static struct incise_plan plan_on(struct told *told)
+static struct incise_plan plan_on(struct reported *reported)
 {
-	*told = (struct told){.stepper = {.ops = &stepper_ops}};
+	*reported = (struct reported){.stepper = {.ops = &stepper_ops}};
 	return (struct incise_plan){
-		.stepper = &told->stepper,
+		.stepper = &reported->stepper,
 		.actuator = {.spring_N_mm = 2,
 			     .travel_mm = 20,
 			     .step_mm = 0.001,
@@ -263,18 +263,18 @@ static void test_the_nut_goes_where_its_spring_gives_the_force(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct told told;
-		struct incise_plan plan = plan_on(&told);
+		struct reported reported;
+		struct incise_plan plan = plan_on(&reported);
 		struct incise_tick tick = {0};
 
-		told.status.handle_mm = cases[i].handle_mm;
-		told.status.force_N = 0.25;
+		reported.status.handle_mm = cases[i].handle_mm;
+		reported.status.force_N = 0.25;
 		memcpy(plan.limit.last_N, cases[i].force_N, sizeof(plan.limit.last_N));
 		assert_int_equal(incise_stage_actuate(&plan, &tick), 0);
 		/* Sums and quotients of small decimals: some ulp of 20. */
-		if (!(fabs(told.target_mm - cases[i].target_mm) < 1e-14) ||
+		if (!(fabs(reported.target_mm - cases[i].target_mm) < 1e-14) ||
 		    !!(tick.flags & INCISE_TICK_TRAVEL) != cases[i].travel)
-			fail_msg("case %zu: %.17g mm, flags %#x", i, told.target_mm,
+			fail_msg("case %zu: %.17g mm, flags %#x", i, reported.target_mm,
 				 tick.flags);
 		assert_true(tick.actuated_N == cases[i].force_N[2]);
 		assert_true(tick.rendered_N == 0.25);
@@ -298,20 +298,20 @@ static void test_the_pose_says_where_the_handle_is(void **state)
 		{{0, 0, 18}, 4, INCISE_TICK_STALE, 5.5, -2},
 		{{0, 0, NAN}, 4, 0, 5.5, -2},
 	};
-	struct told told;
-	struct incise_plan plan = plan_on(&told);
+	struct reported reported;
+	struct incise_plan plan = plan_on(&reported);
 
 	plan.actuator.measures_handle = false;
 	plan.actuator.origin_mm = 10;
 	plan.limit.last_N[2] = 1;
-	told.status.handle_mm = told.status.force_N = NAN;
+	reported.status.handle_mm = reported.status.force_N = NAN;
 	for (size_t i = 0; i < sizeof(ticks) / sizeof(*ticks); i++) {
 		struct incise_tick tick = {.flags = ticks[i].flags};
 
 		memcpy(tick.tool_mm, ticks[i].tool_mm, sizeof(tick.tool_mm));
-		told.status.position_mm = ticks[i].nut_mm;
+		reported.status.position_mm = ticks[i].nut_mm;
 		assert_int_equal(incise_stage_actuate(&plan, &tick), 0);
-		assert_true(told.target_mm == ticks[i].target_mm);
+		assert_true(reported.target_mm == ticks[i].target_mm);
 		assert_true(tick.rendered_N == ticks[i].rendered_N);
 	}
 }
@@ -323,7 +323,7 @@ static void test_a_fault_of_the_actuator_is_named(void **state)
 		int status_rc, set_rc;
 		unsigned int faults;
 		enum incise_stepper_state state;
-		const char *says, *own; /* own: what the device tells of its fault */
+		const char *says, *own; /* own: the device's description of its fault */
 	} cases[] = {
 		{0, -EIO, INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_TRAVEL,
 		 INCISE_STEPPER_STATE_FAULT, "e-stop: release it", NULL},
@@ -339,8 +339,8 @@ static void test_a_fault_of_the_actuator_is_named(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct told told;
-		struct incise_plan plan = plan_on(&told);
+		struct reported reported;
+		struct incise_plan plan = plan_on(&reported);
 		struct incise_tick tick = {0};
 		const char *own = cases[i].faults ? cases[i].own : NULL;
 		char text[200] = "untouched";
@@ -349,11 +349,11 @@ static void test_a_fault_of_the_actuator_is_named(void **state)
 		assert_null(incise_plan_fault(&plan));
 		assert_int_equal(incise_plan_cause(&plan, text, sizeof(text)), 0);
 		assert_string_equal(text, "");
-		told.rc = cases[i].status_rc;
-		told.set_rc = cases[i].set_rc;
-		told.status.faults = cases[i].faults;
-		told.status.state = cases[i].state;
-		told.cause = cases[i].own;
+		reported.rc = cases[i].status_rc;
+		reported.set_rc = cases[i].set_rc;
+		reported.status.faults = cases[i].faults;
+		reported.status.state = cases[i].state;
+		reported.cause = cases[i].own;
 		plan.fault = incise_stage_actuate(&plan, &tick);
 		assert_int_equal(plan.fault, cases[i].status_rc + cases[i].set_rc);
 		if (!strstr(incise_plan_fault(&plan), cases[i].says))
@@ -366,20 +366,20 @@ static void test_a_fault_of_the_actuator_is_named(void **state)
 
 static void test_an_actuator_that_lies_or_fails(void **state)
 {
-	struct told told;
-	struct incise_plan plan = plan_on(&told);
+	struct reported reported;
+	struct incise_plan plan = plan_on(&reported);
 	struct incise_tick tick = {0};
 
 	/* Without a number the handle is where it was. */
 	plan.handle_mm = 7;
 	plan.limit.last_N[2] = 1;
-	told.status.handle_mm = NAN;
-	told.status.force_N = INFINITY;
+	reported.status.handle_mm = NAN;
+	reported.status.force_N = INFINITY;
 	assert_int_equal(incise_stage_actuate(&plan, &tick), 0);
-	assert_true(told.target_mm == 7.5 && tick.rendered_N == 0);
-	told.rc = -EIO;
+	assert_true(reported.target_mm == 7.5 && tick.rendered_N == 0);
+	reported.rc = -EIO;
 	assert_int_equal(incise_stage_actuate(&plan, &tick), -EIO);
-	assert_int_equal(told.sets, 1);
+	assert_int_equal(reported.sets, 1);
 }
 
 static void test_each_limit_is_an_event_of_its_own(void **state)

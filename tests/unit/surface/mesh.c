@@ -256,7 +256,7 @@ static void test_nearest_is_nearest(void **state)
 			/* from far away the distance itself is rounded */
 			assert_true(fabs(sqrt(v3_distance2(spot.point, p)) - truth) <=
 				    ROUNDING_MM * (1 + reach));
-			/* A shorter search tells less, and nothing wrong. */
+			/* A shorter search shows less, and nothing wrong. */
 			bound = mesh_nearest(surface->mesh, p, hint, 0.5, &spot);
 			assert_true(bound <= truth && bound >= truth * (0.5 - 1e-9));
 			assert_true(sqrt(v3_distance2(spot.point, p)) <= 2.001 * truth);

@@ -294,7 +294,7 @@ static void test_ways_from_and_to_the_surface(void **state)
 	}
 }
 
-/* From 1000 km away the ball is still hit where it is, as well as a double can tell. */
+/* From 1000 km away the ball is still hit where it is, as precisely as a double can be. */
 static void test_far_away(void **state)
 {
 	const struct capsule ball = {{0, 0, 0}, {0, 0, 0}, 3};

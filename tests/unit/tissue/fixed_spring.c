@@ -2,7 +2,7 @@
 /*
  * Springs from double, and the bound of their error: no error found is above it, and it
  * is not uselessly far above. The forces are measured against paper 2's formula in long
- * double, which knows nothing of formats.
+ * double, which has no formats.
  */
 #include <stdarg.h>
 #include <stddef.h>

@@ -156,7 +156,7 @@ static void test_sharp_times(void **state)
 		{0.9, 1, 1, 1, 0, 1},	     {2, 2, 2, 2, 0, 0}, /* it is the machine */
 		{2.2, 2, 2, 2, 1, 0},				 /* and the program */
 		{1.5, 1.05, 1.5, 1.3, 0, 0}, /* of a core that is shared */
-		{1.8, 1.05, 1.5, 1.3, 0, 0}, /* it cannot be told */
+		{1.8, 1.05, 1.5, 1.3, 0, 0}, /* it cannot be determined */
 		{3, 1.05, 1.5, 1.3, 1, 0},
 	};
 

@@ -2,7 +2,7 @@
 /*
  * A camera's driver that a test makes, by the kernel's documents of V4L2: the linker hands
  * open, ioctl, mmap, poll and the clock to functions here. It has formats, sizes, controls
- * and buffers, and may be told to lie. Frames come when a test shoots them, on a clock
+ * and buffers, and can be set to lie. Frames come when a test shoots them, on a clock
  * that goes when somebody polls. The real drivers are asked in tests/vm.
  */
 #ifndef INCISE_TEST_DRIVER_H
@@ -55,7 +55,7 @@ static struct driver {
 	struct v4l2_fract interval[8];
 	bool no_parm;
 	struct v4l2_pix_format is,
-		lie; /* lie: its fields other than 0 are told instead */
+		lie; /* lie: its fields other than 0 are reported instead */
 	struct v4l2_fract parm;
 	struct driver_control control[DRIVER_CONTROLS];
 	/* Buffers. */
@@ -216,26 +216,26 @@ static inline int driver_set_format(struct v4l2_pix_format *format)
 	return 0;
 }
 
-static inline int driver_query_control(struct v4l2_queryctrl *told)
+static inline int driver_query_control(struct v4l2_queryctrl *reported)
 {
-	const struct driver_control *control = driver_control(told->id);
+	const struct driver_control *control = driver_control(reported->id);
 
 	if (!control)
 		return EINVAL;
-	told->minimum = control->min;
-	told->maximum = control->max;
-	told->step = control->step;
-	told->flags = control->flags;
+	reported->minimum = control->min;
+	reported->maximum = control->max;
+	reported->step = control->step;
+	reported->flags = control->flags;
 	return 0;
 }
 
-static inline int driver_get_control(struct v4l2_control *told)
+static inline int driver_get_control(struct v4l2_control *reported)
 {
-	const struct driver_control *control = driver_control(told->id);
+	const struct driver_control *control = driver_control(reported->id);
 
 	if (!control || driver.g_ctrl_error)
 		return control ? driver.g_ctrl_error : EINVAL;
-	told->value = control->stuck ? control->held : control->value;
+	reported->value = control->stuck ? control->held : control->value;
 	return 0;
 }
 
@@ -251,33 +251,33 @@ static inline int driver_set_control(const struct v4l2_control *asked)
 	return 0;
 }
 
-static inline int driver_size(struct v4l2_frmsizeenum *told)
+static inline int driver_size(struct v4l2_frmsizeenum *reported)
 {
 	if (driver.stepwise) {
-		told->type = V4L2_FRMSIZE_TYPE_STEPWISE;
-		told->stepwise = (struct v4l2_frmsize_stepwise){16, 64, 8, 8, 32, 8};
-		return told->index ? EINVAL : 0;
+		reported->type = V4L2_FRMSIZE_TYPE_STEPWISE;
+		reported->stepwise = (struct v4l2_frmsize_stepwise){16, 64, 8, 8, 32, 8};
+		return reported->index ? EINVAL : 0;
 	}
-	if (told->index >= 8 || !driver.size[told->index][0])
+	if (reported->index >= 8 || !driver.size[reported->index][0])
 		return EINVAL;
-	told->type = V4L2_FRMSIZE_TYPE_DISCRETE;
-	told->discrete.width = driver.size[told->index][0];
-	told->discrete.height = driver.size[told->index][1];
+	reported->type = V4L2_FRMSIZE_TYPE_DISCRETE;
+	reported->discrete.width = driver.size[reported->index][0];
+	reported->discrete.height = driver.size[reported->index][1];
 	return 0;
 }
 
-static inline int driver_interval(struct v4l2_frmivalenum *told)
+static inline int driver_interval(struct v4l2_frmivalenum *reported)
 {
 	if (driver.stepwise) {
-		told->type = V4L2_FRMIVAL_TYPE_CONTINUOUS;
-		told->stepwise =
+		reported->type = V4L2_FRMIVAL_TYPE_CONTINUOUS;
+		reported->stepwise =
 			(struct v4l2_frmival_stepwise){{1, 100}, {1, 5}, {1, 1000}};
-		return told->index ? EINVAL : 0;
+		return reported->index ? EINVAL : 0;
 	}
-	if (told->index >= 8 || !driver.interval[told->index].denominator)
+	if (reported->index >= 8 || !driver.interval[reported->index].denominator)
 		return EINVAL;
-	told->type = V4L2_FRMIVAL_TYPE_DISCRETE;
-	told->discrete = driver.interval[told->index];
+	reported->type = V4L2_FRMIVAL_TYPE_DISCRETE;
+	reported->discrete = driver.interval[reported->index];
 	return 0;
 }
 

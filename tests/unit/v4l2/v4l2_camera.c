@@ -348,7 +348,7 @@ static void what_is_no_camera_is_passed_over(void **state)
 	assert_int_equal(driver.opened, 0);
 }
 
-static void who_may_not_look_is_told(void **state)
+static void who_may_not_look_is_reported(void **state)
 {
 	driver_reset();
 	driver.open_error = EACCES;
@@ -369,7 +369,7 @@ int main(void)
 		cmocka_unit_test(one_may_be_asked_for),
 		cmocka_unit_test(who_has_seen_enough_ends_it),
 		cmocka_unit_test(what_is_no_camera_is_passed_over),
-		cmocka_unit_test(who_may_not_look_is_told),
+		cmocka_unit_test(who_may_not_look_is_reported),
 	};
 
 	return cmocka_run_group_tests(tests, fill, empty);

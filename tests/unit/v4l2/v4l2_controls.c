@@ -111,7 +111,7 @@ static void the_iris_may_stay_automatic(void **state)
 	assert_int_equal(value(V4L2_CID_EXPOSURE_AUTO), V4L2_EXPOSURE_SHUTTER_PRIORITY);
 }
 
-/* Ways in which a camera does not do as it is told. */
+/* Ways in which a camera does not obey its settings. */
 static void gain_stuck(void)
 {
 	driver_control(V4L2_CID_GAIN)->stuck = true;

@@ -36,15 +36,15 @@ static void letters_are_printable(void **state)
 
 static void signals_are_outlived(void **state)
 {
-	struct v4l2_capability told;
+	struct v4l2_capability reported;
 
 	driver_reset();
 	driver.interrupted = 5;
 	assert_int_equal(v4l2_open("/dev/video0"), DRIVER_FD);
 	driver.interrupted = 5;
-	assert_int_equal(v4l2_ask(DRIVER_FD, VIDIOC_QUERYCAP, &told), 0);
+	assert_int_equal(v4l2_ask(DRIVER_FD, VIDIOC_QUERYCAP, &reported), 0);
 	driver.interrupted = 1 << 20;
-	assert_int_equal(v4l2_ask(DRIVER_FD, VIDIOC_QUERYCAP, &told), -EINTR);
+	assert_int_equal(v4l2_ask(DRIVER_FD, VIDIOC_QUERYCAP, &reported), -EINTR);
 	driver.interrupted = 1 << 20;
 	assert_int_equal(v4l2_open("/dev/video0"), -EINTR);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/device/v4l2/v4l2_format.c on a driver that the test plays: the nearest on offer is
- * taken, what is given is told, and what cannot be is refused.
+ * taken, what is given is reported, and what cannot be is refused.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -157,7 +157,7 @@ static void a_missing_format_names_those_there_are(void **state)
 	assert_non_null(strstr(err.text, "it has none"));
 }
 
-static void refusals_of_the_driver_are_told(void **state)
+static void refusals_of_the_driver_are_reported(void **state)
 {
 	struct incise_camera_setup setup = {.pixels = INCISE_PIXELS_YUYV};
 
@@ -208,7 +208,7 @@ int main(void)
 		cmocka_unit_test(rows_may_be_padded),
 		cmocka_unit_test(what_cannot_be_is_refused),
 		cmocka_unit_test(a_missing_format_names_those_there_are),
-		cmocka_unit_test(refusals_of_the_driver_are_told),
+		cmocka_unit_test(refusals_of_the_driver_are_reported),
 		cmocka_unit_test(a_rate_may_be_unknown),
 		cmocka_unit_test(signals_do_not_matter),
 	};

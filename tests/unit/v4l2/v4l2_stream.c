@@ -343,7 +343,7 @@ static void stamps_that_cannot_be_are_damage(void **state)
 	}
 }
 
-static void the_middle_of_the_exposure_is_told(void **state)
+static void the_middle_of_the_exposure_is_reported(void **state)
 {
 	static const struct {
 		uint32_t source;
@@ -676,7 +676,7 @@ int main(void)
 		cmocka_unit_test(all_that_is_lost_is_counted),
 		cmocka_unit_test(damage_that_a_driver_does_not_count),
 		cmocka_unit_test(stamps_that_cannot_be_are_damage),
-		cmocka_unit_test(the_middle_of_the_exposure_is_told),
+		cmocka_unit_test(the_middle_of_the_exposure_is_reported),
 		cmocka_unit_test(a_jpeg_is_whole_from_first_to_last_marker),
 		cmocka_unit_test(every_end_has_its_cause),
 		cmocka_unit_test(one_error_ends_nothing),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/device/v4l2 on a driver of a real kernel: vivid, a webcam that draws its frames, and
- * can be told to damage them, to lose them, to timestamp and count them wrongly and to fail. Its
+ * can be set to damage them, to lose them, to timestamp and count them wrongly and to fail. Its
  * timestamps are those of jiffies. Prints "ok …" and "not ok …".
  *
  *   camera_vivid /dev/video0
@@ -101,12 +101,12 @@ static int get_id(int fd, uint32_t id)
 /* One of vivid's own controls has no number in a header; 0, or a negative errno. */
 static int set_named(int fd, const char *name, int value)
 {
-	struct v4l2_queryctrl told = {.id = V4L2_CTRL_FLAG_NEXT_CTRL};
+	struct v4l2_queryctrl reported = {.id = V4L2_CTRL_FLAG_NEXT_CTRL};
 
-	while (!ioctl(fd, VIDIOC_QUERYCTRL, &told)) {
-		if (!strcmp((const char *)told.name, name))
-			return set_id(fd, told.id, value);
-		told.id |= V4L2_CTRL_FLAG_NEXT_CTRL;
+	while (!ioctl(fd, VIDIOC_QUERYCTRL, &reported)) {
+		if (!strcmp((const char *)reported.name, name))
+			return set_id(fd, reported.id, value);
+		reported.id |= V4L2_CTRL_FLAG_NEXT_CTRL;
 	}
 	return -ENOENT;
 }

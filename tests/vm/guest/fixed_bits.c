@@ -20,7 +20,7 @@
 
 #define DIR "/sys/kernel/debug/incise_stepper/fixed/"
 
-static void tell(bool good, const char *what, const char *of)
+static void report(bool good, const char *what, const char *of)
 {
 	printf("%sok %s%s\n", good ? "" : "not ", what, of);
 }
@@ -65,11 +65,11 @@ static void try_blob(const struct incise_fixed *fx, uint32_t n, uint64_t seed)
 	if (!outputs || !forces)
 		exit(1);
 	snprintf(run, sizeof(run), "%u %llu", n, (unsigned long long)seed);
-	tell(put(DIR "blob", fx->blob, fx->size) && put(DIR "run", run, strlen(run)),
-	     "the kernel takes a blob: ", name);
-	tell(get(DIR "outputs", outputs, n * sizeof(*outputs)) &&
-		     get(DIR "forces", forces, n * 4 * sizeof(*forces)),
-	     "and gives as many results: ", name);
+	report(put(DIR "blob", fx->blob, fx->size) && put(DIR "run", run, strlen(run)),
+	       "the kernel takes a blob: ", name);
+	report(get(DIR "outputs", outputs, n * sizeof(*outputs)) &&
+		       get(DIR "forces", forces, n * 4 * sizeof(*forces)),
+	       "and gives as many results: ", name);
 	for (uint32_t i = 0; i < n; i++) {
 		struct incise_fixed_spring spring;
 		int32_t x[INCISE_FIXED_INPUTS_MAX], p[3], force[4] = {0};
@@ -81,7 +81,7 @@ static void try_blob(const struct incise_fixed *fx, uint32_t n, uint64_t seed)
 		wrong += memcmp(force, &forces[4 * i], sizeof(force)) != 0;
 		held += force[3] == INT32_MAX || force[3] == -INT32_MAX;
 	}
-	tell(!wrong, "every bit is the same: ", name);
+	report(!wrong, "every bit is the same: ", name);
 	printf("# %u inputs, %u springs at the end of their range\n", n, held);
 	free(outputs);
 	free(forces);
@@ -104,7 +104,7 @@ static void try_damage(const struct incise_fixed *fx)
 		taken += put(DIR "run", "1 1", 3);
 		bytes[at] ^= 1 << i % 8;
 	}
-	tell(!taken, "a damaged blob is refused", "");
+	report(!taken, "a damaged blob is refused", "");
 	free(bytes);
 }
 
@@ -131,7 +131,7 @@ int main(int argc, char **argv)
 			try_damage(fx);
 		incise_fixed_free(fx);
 	}
-	tell(!err.text[0], "model and blobs ", err.text);
+	report(!err.text[0], "model and blobs ", err.text);
 	incise_model_free(model);
 	return 0;
 }

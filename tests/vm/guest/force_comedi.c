@@ -5,7 +5,7 @@
  *
  *   force_comedi sawtooth | clipped
  *
- * Channel 0 is a sawtooth of 0.1 s that follows CLOCK_MONOTONIC: a code tells when it was
+ * Channel 0 is a sawtooth of 0.1 s that follows CLOCK_MONOTONIC: a code shows when it was
  * converted, modulo 0.1 s.
  *
  *   code  ▲   ╱│  ╱│        from -A to A in 100 ms: at A = 1 V of ±10 V one code is 15 us

@@ -173,7 +173,7 @@ static void all_come(const char *trigger, const char *called, int seconds)
 
 /*
  * The program is held for two seconds: the kernel's buffer has room for half a second. What
- * it had none for must be what is told as lost, to the sample.
+ * it had none for must be what is reported as lost, to the sample.
  */
 static void overflow_is_counted(void)
 {

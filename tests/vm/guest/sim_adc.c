@@ -79,7 +79,7 @@ static bool find_device(void)
 	return false;
 }
 
-/* A ramp of all codes: a value tells its place, modulo 4096. */
+/* A ramp of all codes: a value shows its place, modulo 4096. */
 static int feed_ramp(unsigned int n)
 {
 	static uint16_t ramp[1 << 16];

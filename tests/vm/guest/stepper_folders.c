@@ -2,7 +2,7 @@
 /*
  * Two administrators at one controller's folder in configfs: one makes it live and takes it
  * down, the other makes and removes a motor of it. Whoever comes first wins, the other is
- * told; nothing is removed from below a live controller.
+ * reported; nothing is removed from below a live controller.
  *
  *   stepper_folders FOLDER ROUNDS
  */

@@ -34,7 +34,7 @@ struct bench {
 	const struct incise_stepper_motor_status *status;
 };
 
-static void tell(bool good, const char *what)
+static void report(bool good, const char *what)
 {
 	printf("%sok %s\n", good ? "" : "not ", what);
 }
@@ -195,8 +195,8 @@ static void try_edges(struct bench *bench, const struct incise_stepper_config *c
 	size_t n;
 
 	write_text(INCISE_SIM_DIR "/edges", "reset");
-	tell(go(bench, 1000) && look(bench).steps_up == 1000, "1000 steps up, exactly");
-	tell(go(bench, 0) && look(bench).steps_down == 1000, "and 1000 back");
+	report(go(bench, 1000) && look(bench).steps_up == 1000, "1000 steps up, exactly");
+	report(go(bench, 0) && look(bench).steps_down == 1000, "and 1000 back");
 	n = read_edges(edges, EDGES_MAX);
 	for (size_t i = 0; i < n; i++) {
 		int64_t t = edges[i].t_ns;
@@ -217,8 +217,8 @@ static void try_edges(struct bench *bench, const struct incise_stepper_config *c
 			trail = t;
 		}
 	}
-	tell(up == 1000 && down == 1000, "as many edges with the right direction");
-	tell(!shorts, "no time of an edge is below its limit");
+	report(up == 1000 && down == 1000, "as many edges with the right direction");
+	report(!shorts, "no time of an edge is below its limit");
 	if (shorts)
 		printf("# %lld of %zu edges\n", (long long)shorts, n);
 }
@@ -233,7 +233,7 @@ static void try_trace(struct bench *bench)
 	FILE *trace;
 
 	write_text(TRACE "trace", "\n");
-	tell(write_text(TRACE "events/incise_stepper/enable", "1"), "tracepoints");
+	report(write_text(TRACE "events/incise_stepper/enable", "1"), "tracepoints");
 	go(bench, 10);
 	write_text(TRACE "events/incise_stepper/enable", "0");
 	trace = fopen(TRACE "trace", "r");
@@ -255,27 +255,27 @@ static void try_trace(struct bench *bench)
 	}
 	if (trace)
 		fclose(trace);
-	tell(leads == 10 && trails == 10, "an event for each edge");
-	tell(!backwards, "no edge before it was due");
-	tell(go(bench, 0), "and back");
+	report(leads == 10 && trails == 10, "an event for each edge");
+	report(!backwards, "no edge before it was due");
+	report(go(bench, 0), "and back");
 }
 
 static void try_deadman(struct bench *bench)
 {
 	int64_t begin;
 
-	tell(run(bench, 2000), "it runs");
+	report(run(bench, 2000), "it runs");
 	begin = now_ns();
-	tell(until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false) &&
-		     look(bench).faults == INCISE_STEPPER_FAULT_DEADMAN,
-	     "deadman: it stops with that fault");
+	report(until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false) &&
+		       look(bench).faults == INCISE_STEPPER_FAULT_DEADMAN,
+	       "deadman: it stops with that fault");
 	printf("# %lld us after the last set-point\n",
 	       (long long)(now_ns() - begin) / 1000);
-	tell(command(bench, INCISE_STEPPER_ENABLE, 1) == -EPERM,
-	     "no power while a fault is latched");
-	tell(command(bench, INCISE_STEPPER_CLEAR, 1) == 0 &&
-		     look(bench).state == INCISE_STEPPER_STATE_DISABLED,
-	     "clear leaves it disabled");
+	report(command(bench, INCISE_STEPPER_ENABLE, 1) == -EPERM,
+	       "no power while a fault is latched");
+	report(command(bench, INCISE_STEPPER_CLEAR, 1) == 0 &&
+		       look(bench).state == INCISE_STEPPER_STATE_DISABLED,
+	       "clear leaves it disabled");
 }
 
 static void try_limit(struct bench *bench)
@@ -283,40 +283,40 @@ static void try_limit(struct bench *bench)
 	struct incise_stepper_motor_status status;
 	int64_t stop;
 
-	tell(fresh(bench) && run(bench, 2000), "it runs up");
+	report(fresh(bench) && run(bench, 2000), "it runs up");
 	drive("4 1");
 	nap(2000);
 	status = look(bench);
 	stop = status.position;
-	tell(status.state == INCISE_STEPPER_STATE_FAULT &&
-		     status.faults == INCISE_STEPPER_FAULT_LIMIT_MAX &&
-		     status.inputs == INCISE_STEPPER_LINE_LIMIT_MAX,
-	     "the upper limit stops it");
-	tell(!(status.flags & INCISE_STEPPER_FLAG_HOMED),
-	     "a stop at once is no longer homed");
+	report(status.state == INCISE_STEPPER_STATE_FAULT &&
+		       status.faults == INCISE_STEPPER_FAULT_LIMIT_MAX &&
+		       status.inputs == INCISE_STEPPER_LINE_LIMIT_MAX,
+	       "the upper limit stops it");
+	report(!(status.flags & INCISE_STEPPER_FLAG_HOMED),
+	       "a stop at once is no longer homed");
 	fresh(bench);
-	tell(!go(bench, stop + 10) && look(bench).position == stop,
-	     "no step towards a limit that is active");
-	tell(fresh(bench) && go(bench, stop - 10), "steps away from it");
+	report(!go(bench, stop + 10) && look(bench).position == stop,
+	       "no step towards a limit that is active");
+	report(fresh(bench) && go(bench, stop - 10), "steps away from it");
 	drive("4 0");
 	command(bench, INCISE_STEPPER_DISABLE, 1);
-	tell(until(bench, INCISE_STEPPER_STATE_DISABLED, 0, 0, false), "disable");
+	report(until(bench, INCISE_STEPPER_STATE_DISABLED, 0, 0, false), "disable");
 }
 
 static void try_estop(struct bench *bench)
 {
-	tell(fresh(bench) && run(bench, -2000), "it runs down");
+	report(fresh(bench) && run(bench, -2000), "it runs down");
 	drive("7 1");
 	nap(2000);
-	tell(look(bench).faults == INCISE_STEPPER_FAULT_ESTOP, "e-stop");
-	tell(command(bench, INCISE_STEPPER_CLEAR, 1) == -EBUSY,
-	     "no clear while it is pressed");
+	report(look(bench).faults == INCISE_STEPPER_FAULT_ESTOP, "e-stop");
+	report(command(bench, INCISE_STEPPER_CLEAR, 1) == -EBUSY,
+	       "no clear while it is pressed");
 	drive("7 0");
-	tell(command(bench, INCISE_STEPPER_CLEAR, 1) == 0, "clear after it");
+	report(command(bench, INCISE_STEPPER_CLEAR, 1) == 0, "clear after it");
 	drive("6 1");
 	nap(1000);
-	tell(command(bench, INCISE_STEPPER_ENABLE, 1) == -EBUSY,
-	     "no power while the power stage reports a fault");
+	report(command(bench, INCISE_STEPPER_ENABLE, 1) == -EBUSY,
+	       "no power while the power stage reports a fault");
 	drive("6 0");
 }
 
@@ -325,29 +325,29 @@ static void try_home(struct bench *bench)
 	struct incise_stepper_motor_status status;
 	struct incise_stepper_origin origin = {.homed = 1, .position = 100};
 
-	tell(fresh(bench) && run(bench, 1000), "it runs");
+	report(fresh(bench) && run(bench, 1000), "it runs");
 	drive("5 1");
 	until(bench, INCISE_STEPPER_STATE_READY, INCISE_STEPPER_MODE_VELOCITY, 0, true);
 	status = look(bench);
-	tell(status.flags & INCISE_STEPPER_FLAG_HOME_SEEN &&
-		     status.home_position < status.position,
-	     "the home edge has its position");
-	tell(!ioctl(bench->fd, INCISE_STEPPER_SET_POSITION, &origin) &&
-		     look(bench).position == 100 &&
-		     look(bench).flags & INCISE_STEPPER_FLAG_HOMED,
-	     "a new origin");
-	tell(go(bench, 0), "and it goes to 0 there");
+	report(status.flags & INCISE_STEPPER_FLAG_HOME_SEEN &&
+		       status.home_position < status.position,
+	       "the home edge has its position");
+	report(!ioctl(bench->fd, INCISE_STEPPER_SET_POSITION, &origin) &&
+		       look(bench).position == 100 &&
+		       look(bench).flags & INCISE_STEPPER_FLAG_HOMED,
+	       "a new origin");
+	report(go(bench, 0), "and it goes to 0 there");
 	drive("5 0");
 }
 
 static void try_garbage(struct bench *bench)
 {
-	tell(fresh(bench), "enable");
+	report(fresh(bench), "enable");
 	bench->slot->reserved[3] = 1;
 	want(bench, INCISE_STEPPER_MODE_POSITION, 10);
-	tell(until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false) &&
-		     look(bench).faults == INCISE_STEPPER_FAULT_SETPOINT,
-	     "garbage in the page is a fault");
+	report(until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false) &&
+		       look(bench).faults == INCISE_STEPPER_FAULT_SETPOINT,
+	       "garbage in the page is a fault");
 	bench->slot->reserved[3] = 0;
 }
 
@@ -357,27 +357,29 @@ static void try_abi(struct bench *bench, const char *path)
 	int watcher = open(path, O_RDONLY | O_CLOEXEC);
 	uint32_t mask = 1;
 
-	tell(open(path, O_RDWR) < 0 && errno == EBUSY, "a second owner is refused");
-	tell(ioctl(bench->fd, _IO(INCISE_STEPPER_IOC, 99)) < 0 && errno == ENOTTY,
-	     "an unknown ioctl");
-	tell(ioctl(bench->fd, INCISE_STEPPER_SET_CONFIG, &config) < 0 && errno == EINVAL,
-	     "a reserved field that is not zero");
-	tell(ioctl(watcher, INCISE_STEPPER_ENABLE, &mask) < 0 && errno == EPERM,
-	     "a watcher cannot enable");
-	tell(mmap(NULL, PAGE, PROT_READ, MAP_SHARED, watcher, 0) == MAP_FAILED &&
-		     errno == EPERM,
-	     "nor see the set-points");
-	tell(mmap(NULL, PAGE, PROT_READ, MAP_SHARED, watcher, PAGE) != MAP_FAILED,
-	     "it sees the status");
-	tell(mmap(NULL, PAGE, PROT_READ | PROT_WRITE, MAP_SHARED, bench->fd, PAGE) ==
-			     MAP_FAILED &&
-		     errno == EACCES,
-	     "the status page is read-only");
-	tell(mprotect((void *)bench->status, PAGE, PROT_READ | PROT_WRITE) < 0,
-	     "and stays so");
-	tell(mmap(NULL, 2 * PAGE, PROT_READ, MAP_SHARED, bench->fd, PAGE) == MAP_FAILED &&
-		     errno == EINVAL,
-	     "one page, no more");
+	report(open(path, O_RDWR) < 0 && errno == EBUSY, "a second owner is refused");
+	report(ioctl(bench->fd, _IO(INCISE_STEPPER_IOC, 99)) < 0 && errno == ENOTTY,
+	       "an unknown ioctl");
+	report(ioctl(bench->fd, INCISE_STEPPER_SET_CONFIG, &config) < 0 &&
+		       errno == EINVAL,
+	       "a reserved field that is not zero");
+	report(ioctl(watcher, INCISE_STEPPER_ENABLE, &mask) < 0 && errno == EPERM,
+	       "a watcher cannot enable");
+	report(mmap(NULL, PAGE, PROT_READ, MAP_SHARED, watcher, 0) == MAP_FAILED &&
+		       errno == EPERM,
+	       "nor see the set-points");
+	report(mmap(NULL, PAGE, PROT_READ, MAP_SHARED, watcher, PAGE) != MAP_FAILED,
+	       "it sees the status");
+	report(mmap(NULL, PAGE, PROT_READ | PROT_WRITE, MAP_SHARED, bench->fd, PAGE) ==
+			       MAP_FAILED &&
+		       errno == EACCES,
+	       "the status page is read-only");
+	report(mprotect((void *)bench->status, PAGE, PROT_READ | PROT_WRITE) < 0,
+	       "and stays so");
+	report(mmap(NULL, 2 * PAGE, PROT_READ, MAP_SHARED, bench->fd, PAGE) ==
+			       MAP_FAILED &&
+		       errno == EINVAL,
+	       "one page, no more");
 	close(watcher);
 }
 
@@ -390,7 +392,7 @@ static void try_events(struct bench *bench)
 	for (ssize_t i = 1; i < n / (ssize_t)sizeof(*event); i++)
 		order = order && event[i].seq == event[i - 1].seq + 1 &&
 			event[i].t_ns >= event[i - 1].t_ns;
-	tell(order, "events in order");
+	report(order, "events in order");
 	printf("# %zd events\n", n / (ssize_t)sizeof(*event));
 }
 
@@ -402,7 +404,7 @@ static void try_sync(struct bench *bench)
 	bool beat = true;
 	int seen = 0;
 
-	tell(!ioctl(bench->fd, INCISE_STEPPER_SET_SYNC, &sync), "SYNC at 1 kHz");
+	report(!ioctl(bench->fd, INCISE_STEPPER_SET_SYNC, &sync), "SYNC at 1 kHz");
 	while (seen < 100 && poll(&waiting, 1, 1000) == 1) {
 		ssize_t n = read(bench->fd, event, sizeof(event));
 
@@ -411,12 +413,12 @@ static void try_sync(struct bench *bench)
 				beat = beat && event[i].position == ++seen;
 	}
 	ioctl(bench->fd, INCISE_STEPPER_GET_SYNC, &sync);
-	tell(seen >= 100 && beat, "each pulse is an event with its number");
-	tell(sync.last_ns - sync.first_ns >=
-		     (int64_t)(sync.pulses + sync.missed - 1) * 1000000,
-	     "pulses keep their beat");
+	report(seen >= 100 && beat, "each pulse is an event with its number");
+	report(sync.last_ns - sync.first_ns >=
+		       (int64_t)(sync.pulses + sync.missed - 1) * 1000000,
+	       "pulses keep their beat");
 	sync = (struct incise_stepper_sync){0};
-	tell(!ioctl(bench->fd, INCISE_STEPPER_SET_SYNC, &sync), "SYNC off");
+	report(!ioctl(bench->fd, INCISE_STEPPER_SET_SYNC, &sync), "SYNC off");
 }
 
 /* The owner stops to speak: a homed motor goes to its safe place, then has no power. */
@@ -430,15 +432,15 @@ static void try_retract(struct bench *bench)
 	ioctl(bench->fd, INCISE_STEPPER_GET_CONFIG, &config);
 	config.flags |= INCISE_STEPPER_CONFIG_RETRACT;
 	config.safe_position = -20;
-	tell(!ioctl(bench->fd, INCISE_STEPPER_SET_CONFIG, &config) &&
-		     !ioctl(bench->fd, INCISE_STEPPER_SET_POSITION, &origin),
-	     "a safe position");
-	tell(fresh(bench) && go(bench, 100), "it goes elsewhere");
+	report(!ioctl(bench->fd, INCISE_STEPPER_SET_CONFIG, &config) &&
+		       !ioctl(bench->fd, INCISE_STEPPER_SET_POSITION, &origin),
+	       "a safe position");
+	report(fresh(bench) && go(bench, 100), "it goes elsewhere");
 	until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false);
 	status = look(bench);
-	tell(status.faults == INCISE_STEPPER_FAULT_DEADMAN && status.position == -20,
-	     "deadman: homed, it goes to the safe position");
-	tell(status.flags & INCISE_STEPPER_FLAG_HOMED, "and is homed still");
+	report(status.faults == INCISE_STEPPER_FAULT_DEADMAN && status.position == -20,
+	       "deadman: homed, it goes to the safe position");
+	report(status.flags & INCISE_STEPPER_FLAG_HOMED, "and is homed still");
 	config.flags &= ~INCISE_STEPPER_CONFIG_RETRACT;
 	ioctl(bench->fd, INCISE_STEPPER_SET_CONFIG, &config);
 }
@@ -459,10 +461,10 @@ static void try_kill(struct bench *bench, const char *path)
 	nap(200000);
 	kill(child, SIGKILL);
 	waitpid(child, NULL, 0);
-	tell(bench_open(bench, path), "the owner is killed; the next one opens");
-	tell(until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false) &&
-		     look(bench).faults & INCISE_STEPPER_FAULT_OWNER,
-	     "the motor has stopped with that fault");
+	report(bench_open(bench, path), "the owner is killed; the next one opens");
+	report(until(bench, INCISE_STEPPER_STATE_FAULT, 0, 0, false) &&
+		       look(bench).faults & INCISE_STEPPER_FAULT_OWNER,
+	       "the motor has stopped with that fault");
 }
 
 static void try_unbind(struct bench *bench, const char *driver, const char *device)
@@ -471,18 +473,18 @@ static void try_unbind(struct bench *bench, const char *driver, const char *devi
 	struct incise_stepper_controller info;
 	char path[256];
 
-	tell(fresh(bench) && run(bench, 2000), "it runs");
+	report(fresh(bench) && run(bench, 2000), "it runs");
 	snprintf(path, sizeof(path), "%s/unbind", driver);
-	tell(write_text(path, device), "unbound while it moves");
-	tell(ioctl(bench->fd, INCISE_STEPPER_GET_INFO, &info) < 0 && errno == ENODEV,
-	     "calls give ENODEV");
-	tell(poll(&hung, 1, 0) == 1 && hung.revents & POLLHUP, "poll tells HUP");
-	tell(look(bench).faults & INCISE_STEPPER_FAULT_GONE, "the status says why");
+	report(write_text(path, device), "unbound while it moves");
+	report(ioctl(bench->fd, INCISE_STEPPER_GET_INFO, &info) < 0 && errno == ENODEV,
+	       "calls give ENODEV");
+	report(poll(&hung, 1, 0) == 1 && hung.revents & POLLHUP, "poll tells HUP");
+	report(look(bench).faults & INCISE_STEPPER_FAULT_GONE, "the status says why");
 	bench->slot->target = 5;
-	tell(bench->slot->target == 5, "the pages stay memory");
+	report(bench->slot->target == 5, "the pages stay memory");
 	bench_close(bench);
 	snprintf(path, sizeof(path), "%s/bind", driver);
-	tell(write_text(path, device), "bound again");
+	report(write_text(path, device), "bound again");
 }
 
 int main(int argc, char **argv)
@@ -494,29 +496,29 @@ int main(int argc, char **argv)
 	if (argc != 4)
 		return 2;
 	setbuf(stdout, NULL);
-	tell(bench_open(&bench, argv[1]), "open and map");
-	tell(!ioctl(bench.fd, INCISE_STEPPER_GET_INFO, &info) && info.n_motors == 1 &&
-		     info.rate_max,
-	     "info");
+	report(bench_open(&bench, argv[1]), "open and map");
+	report(!ioctl(bench.fd, INCISE_STEPPER_GET_INFO, &info) && info.n_motors == 1 &&
+		       info.rate_max,
+	       "info");
 	printf("# rate_max %u /s, pulse %u ns, edge %u ns, lateness %u ns, %u at most\n",
 	       info.rate_max, info.pulse_ns, info.edge_ns, info.lateness_ns,
 	       info.lateness_max_ns);
-	tell(!ioctl(bench.fd, INCISE_STEPPER_GET_CONFIG, &config) &&
-		     !ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config),
-	     "the config of the bind is one that may be set");
+	report(!ioctl(bench.fd, INCISE_STEPPER_GET_CONFIG, &config) &&
+		       !ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config),
+	       "the config of the bind is one that may be set");
 	/* Slower machines make late edges, not errors: a row of a thousand is none of these. */
 	config.late_max = 1000;
 	/* Nor shall a host that stops for a while look like an owner that died. */
 	config.deadman_ns = 1000000000;
 	config.velocity = config.velocity > 5000 ? 5000 : config.velocity;
-	tell(!ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config), "another config");
+	report(!ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config), "another config");
 	config.velocity = info.rate_max + 1;
-	tell(ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config) < 0 && errno == ERANGE,
-	     "a rate beyond the machine's is refused");
+	report(ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config) < 0 && errno == ERANGE,
+	       "a rate beyond the machine's is refused");
 	ioctl(bench.fd, INCISE_STEPPER_GET_CONFIG, &config);
-	tell(command(&bench, INCISE_STEPPER_ENABLE, 1) == 0, "enable");
-	tell(ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config) < 0 && errno == EBUSY,
-	     "no config while it has power");
+	report(command(&bench, INCISE_STEPPER_ENABLE, 1) == 0, "enable");
+	report(ioctl(bench.fd, INCISE_STEPPER_SET_CONFIG, &config) < 0 && errno == EBUSY,
+	       "no config while it has power");
 
 	try_edges(&bench, &config);
 	try_trace(&bench);
@@ -529,10 +531,10 @@ int main(int argc, char **argv)
 	try_events(&bench);
 	try_sync(&bench);
 	try_retract(&bench);
-	tell(system("rmmod incise_stepper 2>/dev/null") != 0,
-	     "the module cannot go while it is open");
+	report(system("rmmod incise_stepper 2>/dev/null") != 0,
+	       "the module cannot go while it is open");
 	fflush(stdout);
-	tell(!system("tests/vm/timer_figures"), "the timers' figures can be read");
+	report(!system("tests/vm/timer_figures"), "the timers' figures can be read");
 	try_kill(&bench, argv[1]);
 	try_unbind(&bench, argv[2], argv[3]);
 	return 0;

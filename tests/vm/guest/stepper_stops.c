@@ -318,20 +318,20 @@ static void owners(int rounds)
 	check(right, "and the motor goes on");
 }
 
-/* The child is the owner, moves, and is killed when it has told that it does. */
+/* The child is the owner, moves, and is killed when it has reported that it does. */
 static void owner_is_killed(int rounds)
 {
 	struct incise_stepper_config config;
 	bool right = true;
 
 	for (int i = 0; i < rounds && right; i++) {
-		int told[2], wait_status;
+		int ready[2], wait_status;
 		int64_t before;
 		pid_t child;
 		char byte;
 
 		bench_close(&bench);
-		if (pipe(told))
+		if (pipe(ready))
 			return;
 		child = fork();
 		if (!child) {
@@ -340,7 +340,7 @@ static void owner_is_killed(int rounds)
 			if (bench_open(&bench) || !fresh("", &config) ||
 			    !speed_up(&config, any_velocity(&config), &silent_ns))
 				_exit(1);
-			if (write(told[1], "m", 1) != 1)
+			if (write(ready[1], "m", 1) != 1)
 				_exit(1);
 			for (;;) {
 				bench_want(&bench, 0, INCISE_STEPPER_MODE_VELOCITY,
@@ -348,9 +348,9 @@ static void owner_is_killed(int rounds)
 				bench_nap(1000000);
 			}
 		}
-		close(told[1]);
-		right = read(told[0], &byte, 1) == 1;
-		close(told[0]);
+		close(ready[1]);
+		right = read(ready[0], &byte, 1) == 1;
+		close(ready[0]);
 		kill(child, SIGKILL);
 		waitpid(child, &wait_status, 0);
 		/* It died by the signal while it moved, not by itself. */

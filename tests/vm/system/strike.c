@@ -154,7 +154,7 @@ static int strike(struct count *c, char **word, int64_t beyond, int64_t for_ns)
 
 int main(int argc, char **argv)
 {
-	/* That it has no power the next edges would tell. */
+	/* That it has no power the next edges would show. */
 	struct count c = {
 		.input = -1, .powered = true, .last_ns = NEVER, .off_ns = NEVER};
 	int64_t beyond = NEVER, for_ns = 0;
