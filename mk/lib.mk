@@ -36,10 +36,10 @@ $(O)/lib/lib$1.so.$(version): $$(call objects,$1) lib/lib$1.map \
 		$$(addprefix -l,$$(needs_$1)) $$(pc_libs_$1) $$(libs_$1)
 
 $(O)/lib/lib$1.so.$(soversion): $(O)/lib/lib$1.so.$(version)
-	ln -sf $$(<F) $$@
+	$$(Q)ln -sf $$(<F) $$@
 
 $(O)/lib/lib$1.so: $(O)/lib/lib$1.so.$(soversion)
-	ln -sf $$(<F) $$@
+	$$(Q)ln -sf $$(<F) $$@
 
 libs: $(O)/lib/lib$1.so
 endef

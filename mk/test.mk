@@ -55,7 +55,7 @@ $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 times := $(O)/times
 check-parts:
 	+@$(MAKE) --no-print-directory $(addprefix timed-,check-style check-layers cli-needs)
-	+@$(MAKE) --no-print-directory $(addprefix timed-,$(parts) cli-tests check-fuzz check-rtsan \
+	+@$(MAKE) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-fuzz check-rtsan \
 		check-deb check-module check-vm)
 timed-%:
 	+@tests/timed $(times) $* $(MAKE) --no-print-directory $*
@@ -83,7 +83,7 @@ check-all: ## the same with all tests in all builds, on all kernels: an hour
 locale := $(O)/locale/de_DE.UTF-8
 $(locale):
 	@mkdir -p $(@D)
-	localedef -i de_DE -f UTF-8 $@
+	$(Q)localedef -i de_DE -f UTF-8 $@
 
 check-unit: $(unit_programs) $(locale) ## unit tests
 	@LOCPATH=$(abspath $(O)/locale) LSAN_OPTIONS=suppressions=$(abspath tests/unit/lsan.supp):print_suppressions=0 \
@@ -136,7 +136,7 @@ check-cli: cli-needs ## command-line tests of the real programs
 # Without building first; `check` starts with these.
 cli-tests:
 	@$(if $(cli_filter),echo "left out: slow tests of benches; make check-cli runs them; bench_all.bats runs each word once")
-	LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure $(cli_filter) tests/cli tests/attack
+	$(Q)LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure $(cli_filter) tests/cli tests/attack
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
 sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all

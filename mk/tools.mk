@@ -61,7 +61,7 @@ peer += $(O)/lib/incise/peer_scikit_learn.py
 
 $(O)/lib/incise/peer_%.py: tools/bench/references/%.py
 	@mkdir -p $(@D)
-	cp $< $@
+	$(Q)cp $< $@
 
 # Properties of the library under extreme inputs: incise bench extremes tries all cases, unit tests
 # some. They build without what only tests need.
@@ -91,7 +91,7 @@ $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(librar
 # Scenes by name, as after installation.
 $(O)/share/incise/scenes:
 	@mkdir -p $(@D)
-	ln -s $(abspath scenes) $@
+	$(Q)ln -s $(abspath scenes) $@
 
 tools: $(programs) $(peer) | $(O)/share/incise/scenes
 

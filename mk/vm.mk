@@ -12,7 +12,8 @@ guest_programs := $(patsubst tests/vm/guest/%.c,$(O)/tests/vm/%,\
 $(O)/tests/vm/%: tests/vm/guest/%.c $(guest_shared) $(guest_headers) \
 		$(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
-	$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) $(CFLAGS) \
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) $(CFLAGS) \
 		$(LDFLAGS) -o $@ $< $(guest_shared) $(O)/lib/libincise-tests.a \
 		$(test_libs)
 
@@ -31,7 +32,8 @@ system_programs := $(patsubst tests/vm/system/%.c,$(O)/tests/vm/%,$(wildcard tes
 $(system_programs): $(O)/tests/vm/%: tests/vm/system/%.c tests/vm/simulator.c \
 		tests/vm/simulator.h driver/sim/incise_sim.h
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< tests/vm/simulator.c
+	$(call step,LD)
+	$(Q)$(CC) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< tests/vm/simulator.c
 
 check-vm: all $(guest_programs) $(guest_model) $(system_programs) $(O)/tests/polhemus/fastrak ## tests of the kernel modules, on Debian's kernels in QEMU
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed $(vm_boots)

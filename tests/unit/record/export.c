@@ -130,7 +130,7 @@ static char *export(const char *const *paths, int n,
 		    const struct incise_export_options *how,
 		    struct incise_export_report *report, struct incise_error *err)
 {
-	struct incise_recording *recordings[4];
+	struct incise_recording *recordings[4] = {0};
 	int rc;
 
 	for (int i = 0; i < n; i++) {

@@ -266,7 +266,7 @@ static int fill(void **state)
 	if (!mkdtemp(dev))
 		return -1;
 	for (int i = 0; i < 3; i++) {
-		char name[16];
+		char name[20];
 
 		snprintf(name, sizeof(name), "video%d", i);
 		if (mknod(in_dev(name), S_IFREG | 0600, 0))
