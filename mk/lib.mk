@@ -155,10 +155,10 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c)) \
 	$(if $(has_vision),$(filter-out %/vision_opencv.o,$(objects_vision_opencv))) \
 	$(if $(has_frames),$(objects_frames_mkv) $(objects_film_mkv)) \
 	$(O)/obj/tests/vision/scalpel_picture.o
+# q, not r: device/vision.c and vision/vision.cc are both vision.o.
 $(O)/lib/libincise-tests.a: $(foreach lib,$(libraries),$(call objects,$(lib))) $(test_objects)
 	@mkdir -p $(@D)
 	@rm -f $@
-	# q, not r: device/vision.c and vision/vision.cc are both vision.o
 	$(call step,AR)
 	$(Q)$(AR) qcs $@ $^
 
