@@ -34,7 +34,8 @@
 /* Farther from the source nothing is measured: the long-range one reaches 4.6 m. */
 #define POLHEMUS_ROOM_MM 6000
 
-/* Largest deviation of a quaternion's norm from 1: ASCII has four digits, and the device calibrates its own. */
+/* Largest deviation of a quaternion's norm from 1: ASCII has four digits, and the device
+ * calibrates its own. */
 #define POLHEMUS_UNIT 0.01
 
 struct polhemus_layout {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Tests of lib/record/time/timeline.c: the envelope against a search through all lines, and against theory.
+ * Tests of lib/record/time/timeline.c: the envelope against a search through all lines, and
+ * against theory.
  */
 #include <float.h>
 #include <math.h>
