@@ -21,6 +21,13 @@ struct number {
 	size_t offset; /* into struct incise_scene */
 };
 
+/* The keys of a group: both lists end with an empty item. */
+#define FITS_KEYS(numbers, more)                                             \
+	_Static_assert(sizeof(numbers) / sizeof(*(numbers)) +                \
+				       sizeof(more) / sizeof(*(more)) - 2 <= \
+			       KEYS_MAX,                                     \
+		       "raise KEYS_MAX")
+
 #define NUMBER(group, name, min, max)                                      \
 	{                                                                  \
 #name, min, max, offsetof(struct incise_scene, group.name) \
@@ -48,7 +55,7 @@ static const struct number limits[] = {
 	NUMBER(limits, start_N, 0, 100),
 	{0},
 };
-_Static_assert(sizeof(limits) / sizeof(*limits) <= KEYS_MAX, "raise KEYS_MAX");
+_Static_assert(sizeof(limits) / sizeof(*limits) - 1 <= KEYS_MAX, "raise KEYS_MAX");
 
 /*
  * Read the numbers of a group, if it is there. Its keys are these and the ones of @more, a
@@ -429,6 +436,8 @@ static int read_switches(struct incise_scene *scene, const config_setting_t *roo
 	static const char *const effects_keys[] = {"average_ticks", "guard", NULL};
 	static const char *const tool_keys[] = {"side", "axis", NULL};
 	static const char *const device_keys[] = {"delay_ticks", NULL};
+	FITS_KEYS(tool, tool_keys);
+	FITS_KEYS(device, device_keys);
 	const char *path = scene->path;
 	const config_setting_t *group;
 	int rc = read_group(scene, root, "effects", NULL, effects_keys, &group, err);
