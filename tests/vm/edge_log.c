@@ -207,7 +207,8 @@ static void edge_log_accelerate(struct edge_log *log)
 	}
 }
 
-uint64_t edge_log_rest(struct edge_log *log, int64_t t_ns)
+/* The motor has stood since its last step, until @t_ns. */
+static uint64_t edge_log_rest(struct edge_log *log, int64_t t_ns)
 {
 	if (log->motor.lateness_ns >= 0 && log->steps)
 		edge_log_stopped(log, 0, (t_ns - edge_log_back_ns(log, 0)) * 1e-9);

@@ -110,9 +110,6 @@ void edge_log_limits(struct edge_log *log, const struct edge_log_motor *motor);
 uint64_t edge_log_take(struct edge_log *log, const struct incise_sim_edge *edge,
 		       size_t n);
 
-/* The motor has stood since its last step, until @t_ns. */
-uint64_t edge_log_rest(struct edge_log *log, int64_t t_ns);
-
 const char *edge_log_name(enum edge_log_fault fault);
 
 #endif

@@ -165,11 +165,3 @@ int lines_set(int fd, uint64_t mask, uint64_t levels)
 
 	return ioctl(fd, GPIO_V2_LINE_SET_VALUES_IOCTL, &values) ? -errno : 0;
 }
-
-int64_t lines_get(int fd, uint64_t mask)
-{
-	struct gpio_v2_line_values values = {.mask = mask};
-
-	return ioctl(fd, GPIO_V2_LINE_GET_VALUES_IOCTL, &values) ? -errno
-								 : (int64_t)values.bits;
-}

@@ -37,6 +37,5 @@ long simulator_edges(struct incise_sim_edge *edge, size_t max);
  */
 int lines_request(const unsigned int *lines, unsigned int n, uint64_t flags);
 int lines_set(int fd, uint64_t mask, uint64_t levels);
-int64_t lines_get(int fd, uint64_t mask);
 
 #endif

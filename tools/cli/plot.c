@@ -139,19 +139,3 @@ void plot_draw_or_fail(FILE *script, const char *folder, const char *name)
 	if (!plot_draw(script, folder, name))
 		cli_fail("gnuplot could not draw %s/%s", folder, name);
 }
-
-struct plot_part plot_part(const char *folder, const char *name, const char *part)
-{
-	return (struct plot_part){.folder = folder,
-				  .name = cli_text("%s-%s", name, part),
-				  .data = cli_text("%s-%s.dat", name, part)};
-}
-
-void plot_part_draw(FILE *script, struct plot_part *part)
-{
-	if (!plot_draw(script, part->folder, part->name))
-		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", part->folder,
-			 part->name);
-	free(part->name);
-	free(part->data);
-}

@@ -40,15 +40,4 @@ bool plot_draw(FILE *script, const char *folder, const char *name);
 /* The same; fails the program if they were not. */
 void plot_draw_or_fail(FILE *script, const char *folder, const char *name);
 
-/* One of several plots of a name: "NAME-part", and "NAME-part.dat" for its data. */
-struct plot_part {
-	const char *folder;
-	char *name, *data;
-};
-
-struct plot_part plot_part(const char *folder, const char *name, const char *part);
-
-/* Close its script, draw or fail the program, and free the part. */
-void plot_part_draw(FILE *script, struct plot_part *part);
-
 #endif

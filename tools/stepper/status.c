@@ -51,7 +51,8 @@ json_t *stepper_counters_json(struct incise_stepper *stepper)
 	return object;
 }
 
-void stepper_counters_text(struct incise_stepper *stepper)
+/* A line for each counter. */
+static void stepper_counters_text(struct incise_stepper *stepper)
 {
 	struct incise_stepper_counter counter;
 

@@ -35,9 +35,6 @@ json_t *stepper_status_json(struct incise_stepper *stepper,
 /* Counters since the backend was opened, for example late SYNCs: an object of their keys. */
 json_t *stepper_counters_json(struct incise_stepper *stepper);
 
-/* A line for each. */
-void stepper_counters_text(struct incise_stepper *stepper);
-
 /* One line of those that count trouble; none if there was none. */
 void stepper_counters_line(struct incise_stepper *stepper);
 
