@@ -276,7 +276,7 @@ static double line_u(const struct stream *stream)
 	return isnan(delay) ? all : sqrt(fmax(0, all * all - delay * delay));
 }
 
-/* How much later a stream is than the reference, and its budget. */
+/* The delay of a stream after the reference, and its budget. */
 struct lateness {
 	double ms, fits_u, lines_u;
 };

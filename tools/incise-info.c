@@ -231,7 +231,7 @@ static void compiled_json(const struct incise_fixed *fx)
 			     incise_fixed_bound(fx)));
 }
 
-/* What the two formats of an arithmetic are of; see lib/fixed/layout.h. */
+/* Print the values that the two formats of an arithmetic hold; see lib/fixed/layout.h. */
 static void put_formats(const struct incise_fixed *fx)
 {
 	static const char *const of[][2] = {

@@ -29,7 +29,7 @@ _incise_options()
 		}'
 }
 
-# What a verb can do, where its usage line lists words: "bench precision [FILE] | …", or the
+# The choices of a command, where its usage line lists words: "bench precision [FILE] | …", or the
 # beginning of one, "can:IFACE"; and FILE, in capitals, where it lists others than words.
 _incise_words()
 {
@@ -51,7 +51,7 @@ _incise_files()
 	mapfile -t COMPREPLY < <(compgen -f -- "$1")
 }
 
-# What may follow "can:", which bash takes for two words: interfaces of CAN (280 in
+# Words that may follow "can:", which bash takes for two words: interfaces of CAN (280 in
 # linux/if_arp.h); and "slcan:": serial adapters.
 _incise_buses()
 {

@@ -16,7 +16,7 @@
 #include <incise/error.h>
 #include <incise/export.h>
 
-/* How cli_parse() stores the argument of an option; see the macros below. */
+/* The way cli_parse() stores the argument of an option; see the macros below. */
 enum cli_kind {
 	CLI_KIND_NONE,
 	CLI_KIND_FLAG,

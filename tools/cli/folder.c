@@ -24,6 +24,22 @@ void folder_make(char *path, size_t size, const char *purpose)
 			 strerror(errno));
 }
 
+void folder_make_all(const char *path)
+{
+	char *folder = cli_text("%s", path);
+
+	for (char *slash = folder; slash; *slash = '/') {
+		slash = strchr(slash + 1, '/');
+		if (slash)
+			*slash = 0;
+		if (mkdir(folder, 0777) && errno != EEXIST)
+			cli_fail("%s: %s", folder, strerror(errno));
+		if (!slash)
+			break;
+	}
+	free(folder);
+}
+
 static int remove_one(const char *path, const struct stat *about, int kind,
 		      struct FTW *place)
 {

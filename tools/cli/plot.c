@@ -5,8 +5,8 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include "cli.h"
+#include "folder.h"
 #include "plot.h"
 
 #define NAME_CHARACTERS \
@@ -15,19 +15,6 @@
 static char *plot_path(const char *folder, const char *name, const char *suffix)
 {
 	return cli_text("%s/plot/%s%s", folder, name, suffix);
-}
-
-static void make_folders(char *path)
-{
-	for (char *slash = path; slash; *slash = '/') {
-		slash = strchr(slash + 1, '/');
-		if (slash)
-			*slash = 0;
-		if (mkdir(path, 0777) && errno != EEXIST)
-			cli_fail("%s: %s", path, strerror(errno));
-		if (!slash)
-			break;
-	}
 }
 
 void plot_place(const char *option, const char *path, const char **folder,
@@ -57,7 +44,7 @@ void plot_folder(const char *folder)
 	if (!plot_possible())
 		cli_fail("gnuplot is not installed, it draws the pictures: apt-get "
 			 "install gnuplot-nox");
-	make_folders(plot);
+	folder_make_all(plot);
 	free(plot);
 }
 

@@ -3,27 +3,25 @@
  * Times of runs; see stopwatch.h.
  */
 #include <stdlib.h>
-#include <time.h>
+#include "../../lib/base/ascending.h"
 #include "stopwatch.h"
 
-double stopwatch_ns(void)
+double stopwatch_of(clockid_t clock)
 {
 	struct timespec t;
 
-	clock_gettime(CLOCK_MONOTONIC, &t);
+	clock_gettime(clock, &t);
 	return t.tv_sec * 1e9 + t.tv_nsec;
 }
 
-static int by_value(const void *a, const void *b)
+double stopwatch_ns(void)
 {
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
+	return stopwatch_of(CLOCK_MONOTONIC);
 }
 
 void stopwatch_sort(double *times, int n)
 {
-	qsort(times, n, sizeof(*times), by_value);
+	qsort(times, n, sizeof(*times), ascending);
 }
 
 double stopwatch_own_ns(void)

@@ -6,10 +6,13 @@
 #ifndef INCISE_STOPWATCH_H
 #define INCISE_STOPWATCH_H
 
-/* CLOCK_MONOTONIC, ns. */
-double stopwatch_ns(void);
+#include <time.h>
 
-/* What reading it twice adds to a time, ns: measured now. */
+/* CLOCK_MONOTONIC, ns; and any clock of clock_gettime(2). */
+double stopwatch_ns(void);
+double stopwatch_of(clockid_t clock);
+
+/* The time that reading it twice adds, ns: measured now. */
 double stopwatch_own_ns(void);
 
 void stopwatch_sort(double *times, int n);

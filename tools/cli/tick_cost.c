@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * What a tick costs; see tick_cost.h.
+ * The cost of a tick; see tick_cost.h.
  */
 #include <math.h>
 #include <stdlib.h>

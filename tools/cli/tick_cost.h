@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What a tick of a plan costs: a stroke of the scalpel over the top of the surface is fed
+ * The cost of a tick of a plan: a stroke of the scalpel over the top of the surface is fed
  * to a plan without a rig, and every tick in contact is timed; with the blade, and where
  * the scene has insertion with a tube as well. The costlier of the two counts.
  *

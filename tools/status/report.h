@@ -23,7 +23,7 @@ struct state_look {
 void state_look_since(struct state_look *look, const struct incise_state_now *before,
 		      double gap_s);
 
-/* How long a loop may not tick: 0.2 s, more for a slow loop, 3 s at most. */
+/* The longest time without a tick of a loop that still runs: 0.2 s, more for a slow loop, 3 s at most. */
 double state_patience_s(const struct incise_state_now *now);
 
 /* "running"; "dead" if its process ended and left another state. */
