@@ -12,18 +12,16 @@
  */
 #include <dirent.h>
 #include <errno.h>
-#include <getopt.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 #include <incise/outfile.h>
 #include <incise/version.h>
-#include "bench/compare.h"
+#include "bench/metrics.h"
 #include "bench/machine.h"
 #include "bench/report.h"
 #include "cli/child.h"
@@ -34,22 +32,39 @@
 #include "cli/plot.h"
 #include "cli/stopwatch.h"
 
-enum { OPT_REPORT = CLI_LONG, OPT_FROM, OPT_AGAINST, OPT_ONLY, OPT_QUICK, OPT_JSON };
+#define WORDS 32
+
+struct job {
+	const char *folder, *from, *against;
+	char *only[WORDS];
+	int n_only;
+	bool quick, json;
+};
+
+static void parse_only(void *options, char *text)
+{
+	struct job *job = options;
+
+	job->n_only = cli_list("only", text, job->only, WORDS);
+}
 
 static const struct cli_option options[] = {
-	{OPT_REPORT, "report", "DIR",
-	 "folder to leave everything in; a report that is there\nis replaced"},
-	{OPT_FROM, "from", "DIR",
-	 "measure nothing: write report.html and report.md of\nDIR/report.json again"},
-	{OPT_AGAINST, "against", "OLD.json",
-	 "say what changed beyond noise since that report.json"},
-	{OPT_ONLY, "only", "WORD,...", "these words only"},
-	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
-	{OPT_JSON, "json", NULL, "print report.json, too"},
+	{0, "report", "DIR",
+	 "folder to leave everything in; a report that is there\nis replaced",
+	 CLI_TEXT(struct job, folder)},
+	{0, "from", "DIR",
+	 "measure nothing: write report.html and report.md of\nDIR/report.json again",
+	 CLI_TEXT(struct job, from)},
+	{0, "against", "OLD.json", "say what changed beyond noise since that report.json",
+	 CLI_TEXT(struct job, against)},
+	{0, "only", "WORD,...", "these words only", CLI_PARSED_BY(parse_only)},
+	{0, "quick", NULL, "fewer points and repeats: a look, not a measurement",
+	 CLI_FLAG(struct job, quick)},
+	{0, "json", NULL, "print report.json, too", CLI_FLAG(struct job, json)},
 	{0},
 };
 
-static const struct cli_command verb = {
+static const struct cli_command command = {
 	.name = "bench all",
 	.synopsis = "--report DIR [OPTIONS]",
 	.summary =
@@ -61,31 +76,7 @@ static const struct cli_command verb = {
 		"which and why; 2 bad usage. See incise-bench-all(1).",
 };
 
-#define WORDS 32
-
-struct job {
-	const char *folder, *from, *against;
-	char *only[WORDS];
-	int n_only;
-	bool quick, json;
-};
-
-/* "FOLDER/PARTNAMESUFFIX" */
-static char *path_of(const char *folder, const char *part, const char *name,
-		     const char *suffix)
-{
-	char *path;
-
-	if (asprintf(&path, "%s/%s%s%s", folder, part, name, suffix) < 0)
-		cli_fail("no memory");
-	return path;
-}
-
 /* --- the folder --- */
-
-static const char *const parts[] = {"data", "pictures", "report.json", "report.html",
-				    "report.md"};
-#define PARTS (int)(sizeof(parts) / sizeof(*parts))
 
 struct folder {
 	const char *path;
@@ -101,23 +92,13 @@ static void remove_all(const char *path)
 		cli_fail("%s: cannot be removed: %s", path, strerror(-rc));
 }
 
-/* Returns whether it was not there. */
-static bool make(const char *path)
-{
-	if (!mkdir(path, 0777))
-		return true;
-	if (errno != EEXIST)
-		cli_fail("%s: %s", path, strerror(errno));
-	return false;
-}
-
 /* A report, or one that was never finished; or nothing at all. */
 static bool may_be_replaced(const char *path)
 {
 	DIR *folder = opendir(path);
 	struct dirent *entry;
 	bool empty = true;
-	char *file = path_of(path, "", "report.json", "");
+	char *file = cli_text("%s/report.json", path);
 	json_t *report = json_read(file, NULL);
 	bool is_report = json_is_object(json_object_get(report, "words"));
 
@@ -135,39 +116,32 @@ static bool may_be_replaced(const char *path)
 /* Prepare a new report; fails the program when there is something else at that path. */
 static struct folder folder_begin(const char *path)
 {
-	struct folder folder = {path, path_of(path, "", ".unfinished", ""), false};
-	char *above = strdup(path);
+	struct folder folder = {path, cli_text("%s/.unfinished", path), false};
+	char *data = cli_text("%s/data", folder.unfinished),
+	     *pictures = cli_text("%s/pictures", folder.unfinished);
 
-	if (!above)
-		cli_fail("no memory");
-	for (char *slash = strchr(above + 1, '/'); slash;
-	     slash = strchr(slash + 1, '/')) {
-		*slash = 0;
-		make(above);
-		*slash = '/';
-	}
-	free(above);
-	folder.made = make(path);
+	folder.made = access(path, F_OK);
+	folder_make_all(path);
 	if (!folder.made && !may_be_replaced(path))
 		cli_fail("%s: is there, and is no report; give another --report DIR",
 			 path);
 	remove_all(folder.unfinished);
-	make(folder.unfinished);
-	for (int i = 0; i < 2; i++) {
-		char *part = path_of(folder.unfinished, "", parts[i], "");
-
-		make(part);
-		free(part);
-	}
+	folder_make_all(data);
+	folder_make_all(pictures);
+	free(data);
+	free(pictures);
 	return folder;
 }
 
 /* Put the new report in the old one's place. */
 static void folder_finish(const struct folder *folder)
 {
-	for (int i = 0; i < PARTS; i++) {
-		char *from = path_of(folder->unfinished, "", parts[i], ""),
-		     *to = path_of(folder->path, "", parts[i], "");
+	static const char *const parts[] = {"data", "pictures", "report.json",
+					    "report.html", "report.md"};
+
+	for (size_t i = 0; i < sizeof(parts) / sizeof(*parts); i++) {
+		char *from = cli_text("%s/%s", folder->unfinished, parts[i]),
+		     *to = cli_text("%s/%s", folder->path, parts[i]);
 
 		remove_all(to);
 		if (rename(from, to) && errno != ENOENT)
@@ -186,14 +160,12 @@ static void folder_abandon(const struct folder *folder)
 }
 
 /* report.json; fails the program where there is none. */
-static json_t *load(const char *path)
+static json_t *load_report(const char *path)
 {
-	char *file = path_of(path, "", "report.json", "");
+	char *file = cli_text("%s/report.json", path);
 	struct incise_error err = {0};
-	json_t *report = json_read(file, &err);
+	json_t *report = cli_require(json_read(file, &err), &err);
 
-	if (!report)
-		cli_fail_with(&err);
 	if (!json_is_object(json_object_get(report, "words")))
 		cli_fail("%s: is no report of 'incise bench all'", file);
 	free(file);
@@ -203,7 +175,7 @@ static json_t *load(const char *path)
 static struct incise_outfile *open_part(const char *path, const char *name,
 					struct incise_error *err)
 {
-	char *file = path_of(path, "", name, "");
+	char *file = cli_text("%s/%s", path, name);
 	struct incise_outfile *part = incise_outfile_open(file, err);
 
 	free(file);
@@ -344,7 +316,7 @@ static int write_report(const char *path, const json_t *report, struct incise_er
 	rc = incise_outfile_commit(file, err);
 	if (rc)
 		return rc;
-	read = load(path);
+	read = load_report(path);
 	out = open_memstream(&markdown, &size);
 	if (!out)
 		cli_fail("no memory");
@@ -379,12 +351,7 @@ static int wait_for(pid_t pid, const char *word, int number, int of)
 	while (!child_ended(pid, &status)) {
 		if (cli_stop) {
 			kill(-pid, SIGTERM);
-			for (double s = 0; s < ASKED_S; s += POLL_US * 1e-6) {
-				if (child_ended(pid, &status))
-					return status;
-				usleep(POLL_US);
-			}
-			return child_end(pid, 0);
+			return child_end(pid, ASKED_S);
 		}
 		cli_progress("%s (%d of %d): %.0f s", word, number, of,
 			     (stopwatch_ns() - begin_ns) * 1e-9);
@@ -394,10 +361,8 @@ static int wait_for(pid_t pid, const char *word, int number, int of)
 	return status;
 }
 
-/*
- * Lines of its standard error: warnings, but for the last line of one that failed, which goes to
- * @why. "incise bench: " is clear from where a line stands.
- */
+/* Lines of its standard error: warnings, but for the last line of one that failed, which goes to
+ * @why. "incise bench: " is clear from where a line stands. */
 static json_t *read_warnings(FILE *said, bool failed, char *why, size_t size)
 {
 	json_t *lines = json_array();
@@ -461,7 +426,7 @@ static void add_report(json_t *report, const char *word, json_t *json)
 static int run(const struct report_section *s, const char *program, const char *folder,
 	       const char *data, bool quick, FILE *said, int number, int of)
 {
-	char *plot = path_of(folder, "pictures/", s->word, "");
+	char *plot = cli_text("%s/pictures/%s", folder, s->word);
 	const char *argv[8] = {program};
 	int n = 1, status;
 	FILE *out = fopen(data, "we");
@@ -489,8 +454,8 @@ static int run(const struct report_section *s, const char *program, const char *
 static void measure_word(const struct report_section *s, const char *folder, bool quick,
 			 json_t *report, int number, int of)
 {
-	char *program = path_of(cli_folder(), "", s->program, ""),
-	     *data = path_of(folder, "data/", s->word, ".json");
+	char *program = cli_text("%s/%s", cli_folder(), s->program),
+	     *data = cli_text("%s/data/%s.json", folder, s->word);
 	struct memory_file said = memory_file_begin("said");
 	double begin_ns = stopwatch_ns();
 	struct incise_error err = {0};
@@ -538,7 +503,7 @@ static bool wanted(const struct job *job, const char *word)
 }
 
 /* The command that gives the same; the folder is another on another machine. */
-static json_t *command(const struct job *job)
+static json_t *command_of(const struct job *job)
 {
 	char line[600];
 	int n = snprintf(line, sizeof(line), "incise bench all --report DIR%s",
@@ -552,19 +517,16 @@ static json_t *command(const struct job *job)
 
 static json_t *begin_report(const struct job *job)
 {
-	struct machine machine;
 	time_t now = time(NULL);
 	struct tm utc;
 	char date[40];
 
-	machine_init(&machine);
 	gmtime_r(&now, &utc);
 	strftime(date, sizeof(date), "%Y-%m-%d %H:%M UTC", &utc);
 	return json_pack("{ss ss so sb so so so so so}", "version", incise_version(),
-			 "date", date, "command", command(job), "quick", job->quick,
-			 "machine", machine_json(&machine), "runs", json_object(),
-			 "failed", json_array(), "words", json_object(), "figures",
-			 json_array());
+			 "date", date, "command", command_of(job), "quick", job->quick,
+			 "machine", machine_json(), "runs", json_object(), "failed",
+			 json_array(), "words", json_object(), "figures", json_array());
 }
 
 /* Of a report of all benchmarks; that of one is itself. */
@@ -635,30 +597,8 @@ static void check_words(const struct job *job)
 
 static void parse(struct job *job, int argc, char **argv)
 {
-	int opt;
-
 	*job = (struct job){0};
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
-		switch (opt) {
-		case OPT_REPORT:
-			job->folder = optarg;
-			break;
-		case OPT_FROM:
-			job->from = optarg;
-			break;
-		case OPT_AGAINST:
-			job->against = optarg;
-			break;
-		case OPT_ONLY:
-			job->n_only = cli_list("only", optarg, job->only, WORDS);
-			break;
-		case OPT_QUICK:
-			job->quick = true;
-			break;
-		case OPT_JSON:
-			job->json = true;
-			break;
-		}
+	cli_parse(&command, argc, argv, job);
 	if (optind < argc)
 		cli_usage("'%s': bench all takes options only", argv[optind]);
 	if (!job->folder == !job->from)
@@ -701,7 +641,7 @@ int main(int argc, char **argv)
 	parse(&job, argc, argv);
 	cli_catch_signals();
 	if (job.from) {
-		report = load(job.from);
+		report = load_report(job.from);
 		if (write_report(job.from, report, &err))
 			cli_fail_with(&err);
 	} else {

@@ -1,29 +1,844 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench view [SCENE], see bench/bench_view.c. It is a program of its own, as it maps libraries
- * that draw, which other benchmarks do not.
+ * incise bench view [SCENE]: the time of a frame, by sizes of the texture and of the frame; how far what a
+ * screen shows is from the frame of that very moment; whether the view gets all cuts of a fast
+ * loop; and whether the loop is later for it. It is a program of its own, as it maps libraries that
+ * draw, which other benchmarks do not.
  */
-#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+#include <incise/loop.h>
 #include <incise/realtime.h>
-#include "bench/bench.h"
-#include "bench/compare.h"
-#include "cli/cli.h"
+#include <incise/sim.h>
+#include "cli/file.h"
+#include "cli/json.h"
 #include "cli/scene_argument.h"
+#include "cli/stopwatch.h"
+#include "view/live.h"
+#include "view/procedure.h"
+#include "bench/bench.h"
+#include "bench/wakeup.h"
 
-enum { OPT_JSON = CLI_LONG, OPT_PLOT, OPT_QUICK, OPT_DURATION, OPT_AGAINST };
+#define UNTIL_S 14.0 /* of the procedure: cut, bleeding, enlarging */
+#define QUICK_UNTIL_S 1.5
+#define ERROR_UNTIL_S 8.0
+#define QUICK_ERROR_UNTIL_S 2.5
+#define LIVE_S 4.0
+#define QUICK_LIVE_S 0.5
+
+/* The script bleeds from its first second to its end. */
+#define FRAMES_FROM_S 1.0
+
+/* --- the time of a frame ---
+ *
+ * Frames come at 60 a second of the ticks' time, as fast as they can, and are finished before the
+ * next one starts; so many in a row from time to time, and the one before them is not timed.
+ *
+ *   procedure  ├────────────────────────────────────────┤
+ *   frames     ·||||||      ·||||||      ·||||||
+ */
+
+#define FPS 60
+#define IN_A_ROW 18
+#define EVERY_S 1.3
+#define PARTS 12
+
+/* Of the frames of a run, ms. */
+struct frame_times {
+	double median, p99, max;
+};
+
+struct frame_row {
+	int texture_px, width, height, triangles, samples, frames;
+	char size[40];
+	struct frame_times ticks; /* wound and blood */
+	struct frame_times texture, draw, whole;
+	struct harness_time time; /* of a whole frame */
+	double hz;		  /* of whole frames one after the other */
+	double texels;		  /* sent to the graphics, of a frame */
+	double tick_us;		  /* of the first, per tick */
+	const char *failed;	  /* NULL: failures end the program */
+};
+
+/* Texture, width, height. */
+static const int sizes[][3] = {{2048, 1280, 720}, {512, 1280, 720}, {1024, 1280, 720},
+			       {4096, 1280, 720}, {2048, 640, 360}, {2048, 1920, 1080}},
+		 quick_sizes[][3] = {
+			 {1024, 1280, 720}, {512, 1280, 720}, {1024, 640, 360}};
+
+struct frame_rows {
+	struct frame_row row[N(sizes)];
+	int n;
+	char renderer[128];
+};
+
+/* Each of all frames, ms. */
+struct samples {
+	double *ticks, *texture, *draw, *whole;
+	double texels; /* of all */
+	int n;
+};
+
+static struct frame_times times_of(double *ms, int n)
+{
+	stopwatch_sort(ms, n);
+	return (struct frame_times){.median = stopwatch_quantile(ms, n, 0.5),
+				    .p99 = stopwatch_quantile(ms, n, 0.99),
+				    .max = ms[n - 1]};
+}
+
+static void sample(struct fed_view *fed, double t_s, struct samples *to)
+{
+	struct incise_view_report before, after;
+	double begin;
+
+	incise_view_report(fed->view, &before);
+	begin = stopwatch_ns();
+	fed_view_until(fed, t_s);
+	fed_view_frame(fed);
+	to->whole[to->n] = (stopwatch_ns() - begin) * 1e-6;
+	incise_view_report(fed->view, &after);
+	to->ticks[to->n] = (after.ticks_s - before.ticks_s) * 1e3;
+	to->texture[to->n] = (after.texture_s - before.texture_s) * 1e3;
+	to->draw[to->n] = (after.draw_s - before.draw_s) * 1e3;
+	to->texels += (double)(after.uploaded_texels - before.uploaded_texels);
+	to->n++;
+}
+
+/* The procedure goes on from frame to frame: each part has some of all of it. */
+static void time_of(const double *whole_ms, int n, struct harness_time *time)
+{
+	double medians[PARTS], *part = cli_alloc(n / PARTS + 1, sizeof(*part));
+
+	for (int k = 0; k < PARTS; k++) {
+		int taken = 0;
+
+		for (int i = k; i < n; i += PARTS)
+			part[taken++] = whole_ms[i] * 1e6;
+		stopwatch_sort(part, taken);
+		medians[k] = stopwatch_quantile(part, taken, 0.5);
+	}
+	free(part);
+	harness_time_of(medians, PARTS, time);
+}
+
+static void draw_frames(struct fed_view *fed, int bursts, struct samples *got)
+{
+	/* What is made at the first frame, and compiled at the second, is not of a frame. */
+	for (int i = 0; i < 5; i++) {
+		fed_view_until(fed, (FRAMES_FROM_S - 1.0 / FPS) * i / 5);
+		fed_view_frame(fed);
+	}
+	for (int b = 0; b < bursts; b++) {
+		double t_s = FRAMES_FROM_S + b * EVERY_S;
+
+		fed_view_until(fed, t_s - 1.0 / FPS);
+		fed_view_frame(fed);
+		for (int i = 0; i < IN_A_ROW && !cli_stop; i++)
+			sample(fed, t_s + (double)i / FPS, got);
+	}
+}
+
+static void measure_size(const struct view_script *script, double until_s,
+			 struct frame_row *row, struct frame_rows *rows)
+{
+	int bursts = (int)fmax((until_s - FRAMES_FROM_S) / EVERY_S, 1);
+	int n = bursts * IN_A_ROW;
+	double *all = cli_alloc(4 * (size_t)n, sizeof(*all)), sum = 0;
+	struct samples got = {all, all + n, all + 2 * n, all + 3 * n, 0, 0};
+	struct incise_view_report report;
+	struct fed_view fed;
+
+	fed_view_open(&fed, script, row->texture_px, row->width, row->height);
+	draw_frames(&fed, bursts, &got);
+	incise_view_report(fed.view, &report);
+	if (cli_stop)
+		cli_fail("interrupted");
+	for (int i = 0; i < n; i++)
+		sum += got.whole[i];
+	row->frames = n;
+	row->hz = n / (sum * 1e-3);
+	row->triangles = report.triangles;
+	row->samples = report.samples;
+	row->texels = got.texels / n;
+	row->tick_us = report.ticks_s * 1e6 / (double)report.ticks;
+	time_of(got.whole, n, &row->time);
+	row->ticks = times_of(got.ticks, n);
+	row->texture = times_of(got.texture, n);
+	row->draw = times_of(got.draw, n);
+	row->whole = times_of(got.whole, n);
+	snprintf(rows->renderer, sizeof(rows->renderer), "%s", report.renderer);
+	fed_view_close(&fed);
+	free(all);
+}
+
+static void measure_frames(const struct view_script *script, bool quick,
+			   struct frame_rows *rows)
+{
+	rows->n = quick ? N(quick_sizes) : N(sizes);
+	for (int i = 0; i < rows->n; i++) {
+		const int *size = quick ? quick_sizes[i] : sizes[i];
+		struct frame_row *row = &rows->row[i];
+
+		row->texture_px = size[0];
+		row->width = size[1];
+		row->height = size[2];
+		snprintf(row->size, sizeof(row->size), "%5d %4dx%-4d", size[0], size[1],
+			 size[2]);
+		cli_progress("frames of %d x %d, texture of %d", row->width, row->height,
+			     row->texture_px);
+		measure_size(script, quick ? QUICK_UNTIL_S : UNTIL_S, row, rows);
+	}
+	cli_progress_end();
+}
+
+/* The median of a whole frame at the usual size; NaN where it was not measured. */
+static double frame_ms(const struct frame_rows *rows, int texture_px)
+{
+	for (int i = 0; i < rows->n; i++)
+		if (rows->row[i].texture_px == texture_px &&
+		    rows->row[i].width == sizes[0][1])
+			return rows->row[i].whole.median;
+	return NAN;
+}
+
+#define TIMES(part, member)                                                       \
+	COLUMN(frame_row, part "_ms.median", member.median, "%6.2f", "median"),   \
+		COLUMN(frame_row, part "_ms.p99", member.p99, "%6.2f", "99 %"),   \
+		COLUMN(frame_row, part "_ms.max", member.max, "%6.1f", "   max"), \
+		COLUMN(frame_row, part "_median_ms", member.median)
+
+static const struct bench_table frame_table = {
+	.key = "frames",
+	.row_bytes = sizeof(struct frame_row),
+	.columns =
+		{
+			COLUMN(frame_row, NULL, size, "%s", "texture picture"),
+			COLUMN(frame_row, "texture_px", texture_px),
+			COLUMN(frame_row, "width", width),
+			COLUMN(frame_row, "height", height),
+			COLUMN(frame_row, "triangles", triangles),
+			COLUMN(frame_row, "samples", samples),
+			COLUMN(frame_row, "frames", frames),
+			TIMES("effects", ticks),
+			TIMES("texture", texture),
+			TIMES("draw", draw),
+			TIMES("whole", whole),
+			COLUMN(frame_row, "whole_p99_ms", whole.p99),
+			COLUMN(frame_row, "whole_max_ms", whole.max),
+			COLUMN(frame_row, "frames_hz", hz, "%6.1f", ""),
+			COLUMN(frame_row, "texels", texels, "%9.0f", ""),
+			COLUMN(frame_row, "effects_us_tick", tick_us),
+			COLUMN(frame_row, "failed", failed),
+		},
+	.metrics = {METRIC(TIME, frame_row, time, "ms",
+			   "frame {width}x{height}, texture {texture_px}")},
+};
+
+static void report_frames(struct bench_run *run, const struct frame_rows *rows)
+{
+	bench_value(run, "renderer", json_string(rows->renderer));
+	bench_text(run,
+		   "ms a frame, %s, %d triangles, %d frames each\n%-15s %-20s %-20s "
+		   "%-20s %-20s %6s %9s\n",
+		   rows->renderer, rows->row[0].triangles, rows->row[0].frames, "",
+		   " wound, blood", " texture", " drawing", " whole", "fps", "texels");
+	bench_table(run, &frame_table, rows->row, rows->n);
+}
+
+/* --- the error of what is shown ---
+ *
+ *     exact   ─●──●──●──●──●──●──●──●──●─▶   finest texture, any moment
+ *     shown    ■━━━━━━━━━━━■━━━━━━━━━━━■━    the last frame that was drawn
+ *                    ↑ error at a moment
+ *
+ * Moments are steps of 1/240 s, each 65th of them: these meet all places between two frames of 15,
+ * 30 and 60 a second alike. The frames that are shown at a moment are never older than the moment
+ * before, so one view per texture draws all of them in order.
+ */
+
+#define SIDE 8
+
+struct similarity {
+	double rms;  /* of sRGB values, 0 … 255 */
+	double ssim; /* 1: the same */
+};
+
+static double rms_of(const uint8_t *a, const uint8_t *b, size_t n)
+{
+	uint64_t sum = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		int d = a[i] - b[i];
+
+		sum += (uint64_t)(d * d);
+	}
+	return sqrt((double)sum / (double)n);
+}
+
+/* Rec. 601, in 256ths. */
+static int luma(const uint8_t *p)
+{
+	return 77 * p[0] + 150 * p[1] + 29 * p[2];
+}
+
+static double window(const uint8_t *a, const uint8_t *b, size_t row)
+{
+	const double n = SIDE * SIDE, c1 = 0.01 * 255 * 0.01 * 255,
+		     c2 = 0.03 * 255 * 0.03 * 255;
+	int64_t sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
+	double ma, mb, va, vb, cov;
+
+	for (int y = 0; y < SIDE; y++)
+		for (int x = 0; x < SIDE; x++) {
+			int64_t p = luma(a + y * row + 3 * x),
+				q = luma(b + y * row + 3 * x);
+
+			sa += p;
+			sb += q;
+			saa += p * p;
+			sbb += q * q;
+			sab += p * q;
+		}
+	ma = sa / n;
+	mb = sb / n;
+	va = (saa / n - ma * ma) / 65536;
+	vb = (sbb / n - mb * mb) / 65536;
+	cov = (sab / n - ma * mb) / 65536;
+	ma /= 256;
+	mb /= 256;
+	return (2 * ma * mb + c1) * (2 * cov + c2) /
+	       ((ma * ma + mb * mb + c1) * (va + vb + c2));
+}
+
+/* Compare frames with pixels of 3 bytes. The structural similarity is that of Wang, Bovik, Sheikh
+ * and Simoncelli, "Image quality assessment: from error visibility to structural similarity",
+ * 2004, eq. 13, of luma, with its constants; the mean over windows of 8 × 8 pixels side by side,
+ * each pixel with the same weight. */
+static struct similarity similarity_of(const uint8_t *a, const uint8_t *b, int width,
+				       int height)
+{
+	size_t row = 3 * (size_t)width;
+	double sum = 0;
+	int n = 0;
+
+	for (int y = 0; y + SIDE <= height; y += SIDE)
+		for (int x = 0; x + SIDE <= width; x += SIDE, n++)
+			sum += window(a + y * row + 3 * (size_t)x,
+				      b + y * row + 3 * (size_t)x, row);
+	return (struct similarity){.rms = rms_of(a, b, row * (size_t)height),
+				   .ssim = sum / n};
+}
+
+#define WIDTH 1280
+#define HEIGHT 720
+#define STEP_HZ 240
+#define STRIDE 65
+#define QUICK_STRIDE 119
+
+/* The finest takes seconds to make; --quick ends at 1024. */
+static const int textures_px[] = {512, 1024, 2048, 4096};
+#define QUICK_TEXTURES 2
+static const int rates[] = {15, 30, 60, 0}; /* frames a second; 0: at the moment itself */
+#define TEXTURES N(textures_px)
+#define RATES N(rates)
+
+struct compared {
+	struct fed_view exact, shown[TEXTURES];
+	int textures;
+	uint8_t *rgb, *exact_rgb;
+	double square[TEXTURES * RATES], max[TEXTURES * RATES], ssim[TEXTURES * RATES];
+};
+
+static void draw(struct fed_view *fed, double t_s, uint8_t *rgb)
+{
+	fed_view_until(fed, t_s);
+	fed_view_frame(fed);
+	if (incise_view_pixels(fed->view, rgb))
+		cli_fail("the picture cannot be read");
+}
+
+/* When the frame that is shown was drawn, in steps. @fps: 0 is at the moment itself. */
+static int drawn_at(int step, int fps)
+{
+	int steps = fps ? STEP_HZ / fps : 1;
+
+	return step / steps * steps;
+}
+
+static void compare(struct compared *c, int step)
+{
+	draw(&c->exact, (double)step / STEP_HZ, c->exact_rgb);
+	for (int i = 0; i < c->textures; i++)
+		for (int k = 0; k < RATES; k++) {
+			int row = i * RATES + k, at = drawn_at(step, rates[k]);
+			struct similarity is;
+
+			draw(&c->shown[i], (double)at / STEP_HZ, c->rgb);
+			is = similarity_of(c->rgb, c->exact_rgb, WIDTH, HEIGHT);
+			c->square[row] += is.rms * is.rms;
+			c->max[row] = fmax(c->max[row], is.rms);
+			c->ssim[row] += is.ssim;
+		}
+}
+
+static void open_views(struct compared *c, const struct view_script *script, int textures)
+{
+	*c = (struct compared){.textures = textures,
+			       .rgb = cli_alloc(WIDTH * HEIGHT, 3),
+			       .exact_rgb = cli_alloc(WIDTH * HEIGHT, 3)};
+	fed_view_open(&c->exact, script, textures_px[textures - 1], WIDTH, HEIGHT);
+	incise_view_panel(c->exact.view, false, false);
+	for (int i = 0; i < textures; i++) {
+		fed_view_open(&c->shown[i], script, textures_px[i], WIDTH, HEIGHT);
+		incise_view_panel(c->shown[i].view, false, false);
+	}
+}
+
+static void close_views(struct compared *c)
+{
+	fed_view_close(&c->exact);
+	for (int i = 0; i < c->textures; i++)
+		fed_view_close(&c->shown[i]);
+	free(c->rgb);
+	free(c->exact_rgb);
+}
+
+struct shown_row {
+	int texture_px, fps;
+	char rate[12], shown[20]; /* "60", "60 fps"; or "exact" */
+	double rms, rms_max, ssim, unlike;
+	double ms;   /* of a frame */
+	double ms_s; /* of run time for a second that is shown; NaN at the moment itself */
+	const char *failed; /* NULL */
+};
+
+struct shown_rows {
+	struct shown_row row[TEXTURES * RATES];
+	int n, moments;
+	int exact_px; /* of the texture of what they are compared with */
+};
+
+static void add_shown(struct shown_rows *rows, const struct compared *c, int i,
+		      const struct frame_rows *frames)
+{
+	struct shown_row *row = &rows->row[rows->n];
+
+	*row = (struct shown_row){
+		.texture_px = textures_px[i / RATES],
+		.fps = rates[i % RATES],
+		.rate = "exact",
+		.shown = "exact",
+		.rms = sqrt(c->square[i] / rows->moments),
+		.rms_max = c->max[i],
+		.ssim = c->ssim[i] / rows->moments,
+		.ms_s = NAN,
+	};
+	/* That is the exact one. */
+	if (row->texture_px == rows->exact_px && !row->fps)
+		return;
+	row->unlike = 1 - row->ssim;
+	row->ms = frame_ms(frames, row->texture_px);
+	if (row->fps) {
+		row->ms_s = row->ms * row->fps;
+		snprintf(row->rate, sizeof(row->rate), "%d", row->fps);
+		snprintf(row->shown, sizeof(row->shown), "%d fps", row->fps);
+	}
+	rows->n++;
+}
+
+static void measure_shown(const struct view_script *script, bool quick,
+			  const struct frame_rows *frames, struct shown_rows *rows)
+{
+	double until_s = quick ? QUICK_ERROR_UNTIL_S : ERROR_UNTIL_S;
+	struct compared c;
+
+	cli_progress("pictures beside finer ones");
+	open_views(&c, script, quick ? QUICK_TEXTURES : TEXTURES);
+	for (int step = (int)(FRAMES_FROM_S * STEP_HZ); step < until_s * STEP_HZ;
+	     step += quick ? QUICK_STRIDE : STRIDE) {
+		if (cli_stop)
+			cli_fail("interrupted");
+		compare(&c, step);
+		rows->moments++;
+		cli_progress("pictures beside finer ones: %.1f of %.1f s",
+			     (double)step / STEP_HZ, until_s);
+	}
+	close_views(&c);
+	rows->exact_px = textures_px[c.textures - 1];
+	for (int i = 0; i < c.textures * RATES; i++)
+		add_shown(rows, &c, i, frames);
+	cli_progress_end();
+}
+
+static const struct bench_table shown_table = {
+	.key = "shown.rows",
+	.row_bytes = sizeof(struct shown_row),
+	.columns =
+		{
+			COLUMN(shown_row, "texture_px", texture_px, "%7.0f", "texture"),
+			COLUMN(shown_row, NULL, rate, "%6s", "fps"),
+			COLUMN(shown_row, "fps", fps, .optional = true),
+			COLUMN(shown_row, "shown", shown, .data = true),
+			COLUMN(shown_row, "rms", rms, "%8.3f", "rms"),
+			COLUMN(shown_row, "rms_max", rms_max, "%8.3f", "largest"),
+			COLUMN(shown_row, "ssim", ssim, "%8.5f", "SSIM"),
+			COLUMN(shown_row, "frame_ms", ms, "%9.2f", "ms/frame"),
+			COLUMN(shown_row, "ms_per_s", ms_s, "%9.0f", "ms/s",
+			       .blank = true),
+			COLUMN(shown_row, "failed", failed),
+		},
+	.metrics =
+		{
+			METRIC(EXACT, shown_row, rms, "1",
+			       "texture {texture_px}, {shown} rms", "shown=60 fps|exact"),
+			METRIC(EXACT, shown_row, rms_max, "1",
+			       "texture {texture_px}, {shown} largest rms",
+			       "shown=60 fps|exact"),
+			METRIC(EXACT, shown_row, unlike, "1",
+			       "texture {texture_px}, {shown} dissimilarity",
+			       "shown=60 fps|exact"),
+		},
+};
+
+static void report_shown(struct bench_run *run, const struct shown_rows *rows)
+{
+	bench_values(run, "{s{si si}}", "shown", "moments", rows->moments,
+		     "exact_texture_px", rows->exact_px);
+	bench_text(run,
+		   "\nwhat is shown, against texture %d at that very moment; %d "
+		   "moments\n",
+		   rows->exact_px, rows->moments);
+	bench_table(run, &shown_table, rows->row, rows->n);
+}
+
+/* --- cuts at 5 kHz: whether the view gets all of them --- */
+
+#define CUTS_HZ 5000
+#define DEEP_MM 3.0
+
+/* A loop in a thread, in real time where that is granted, and a view of it. */
+struct cutting {
+	struct incise_scene *scene;
+	struct incise_rig *rig;
+	struct incise_plan *plan;
+	struct incise_view *view;
+	struct view_live *live;
+	struct incise_touch top;
+	struct incise_realtime *realtime; /* or NULL */
+};
+
+/* To and fro, some 40 mm/s, each time next to the last; where the surface bends down the cut is
+ * shallower. */
+static void sweep(const struct cutting *c, double t_s)
+{
+	static const double upright[4] = {1, 0, 0, 0};
+	double along = 2 * t_s, across = 0.3 * t_s;
+	double tip[3] = {c->top.point_mm[0] + 15 * sin(along),
+			 c->top.point_mm[1] + 5 * sin(across),
+			 c->top.point_mm[2] - DEEP_MM};
+	double velocity[3] = {30 * cos(along), 1.5 * cos(across), 0};
+
+	incise_sim_hold(incise_rig_sim(c->rig), tip, velocity, upright);
+}
+
+static void open_cutting(struct cutting *c, const char *path)
+{
+	const struct incise_view_setup setup = {.width = 1280, .height = 720};
+	struct incise_error err = {0};
+
+	c->scene = cli_require(incise_scene_load(path, NULL, &err), &err);
+	c->rig =
+		cli_require(incise_rig_open("sim:mouse", INCISE_RIG_TRACKER, &err), &err);
+	c->plan = cli_require(incise_plan_new(c->scene, c->rig, &err), &err);
+	incise_plan_top(c->plan, &c->top);
+	sweep(c, 0);
+	c->view = cli_require(incise_view_new(c->scene, c->plan, &setup, &err), &err);
+	c->realtime = wakeup_realtime(harness_cpu());
+	c->live = cli_require(
+		view_live_begin(c->plan, c->rig, CUTS_HZ, c->realtime, &err), &err);
+}
+
+static void close_cutting(struct cutting *c)
+{
+	view_live_close(c->live);
+	incise_realtime_free(c->realtime);
+	incise_view_free(c->view);
+	incise_plan_free(c->plan);
+	incise_rig_close(c->rig);
+	incise_scene_free(c->scene);
+}
+
+struct absorbed {
+	struct incise_view_report view;
+	double seconds;
+	int frames;
+	uint64_t lost; /* ticks */
+	bool realtime;
+};
+
+static void measure_absorbed(const char *scene, double seconds, struct absorbed *a)
+{
+	struct incise_view_status status = {0};
+	struct incise_error err = {0};
+	struct cutting c = {0};
+	double begin;
+
+	cli_progress("cuts at %d Hz, %.3g s", CUTS_HZ, seconds);
+	open_cutting(&c, scene);
+	begin = stopwatch_ns();
+	while (a->seconds < seconds && !cli_stop) {
+		double due_us;
+
+		sweep(&c, a->seconds);
+		if (view_live_take(c.live, c.view, &status, &err) < 0 ||
+		    incise_view_frame(c.view, &status, &err))
+			cli_fail_with(&err);
+		a->frames++;
+		due_us = (double)a->frames / FPS * 1e6 - (stopwatch_ns() - begin) * 1e-3;
+		if (due_us > 0)
+			usleep((useconds_t)due_us);
+		a->seconds = (stopwatch_ns() - begin) * 1e-9;
+	}
+	incise_view_report(c.view, &a->view);
+	a->lost = status.lost;
+	a->realtime = c.realtime;
+	close_cutting(&c);
+	cli_progress_end();
+	if (cli_stop)
+		cli_fail("interrupted");
+}
+
+static void report_absorbed(struct bench_run *run, const struct absorbed *a)
+{
+	const struct incise_view_report *view = &a->view;
+	double ticks = (double)view->ticks, tick_us = view->ticks_s * 1e6 / ticks;
+
+	bench_values(run, "{s{so ss sI sI sI so so so so}}", "absorbed", "seconds",
+		     json_number(a->seconds), "policy", wakeups_policy(a->realtime),
+		     "ticks", (json_int_t)view->ticks, "lost", (json_int_t)a->lost,
+		     "stamps", (json_int_t)view->stamps, "ticks_hz",
+		     json_number(ticks / a->seconds), "cut_mm", json_number(view->cut_mm),
+		     "effects_us_tick", json_number(tick_us), "frames_hz",
+		     json_number(a->frames / a->seconds));
+	/* However busy the machine is, none may be lost. */
+	metrics_add(run->metrics, METRIC_EXACT, &(double){(double)a->lost}, "1",
+		    "cuts lost");
+	bench_text(run,
+		   "\ncutting all the time at %d Hz (%s): %llu ticks in %.1f s (%.0f a "
+		   "second), %llu lost; %.0f mm cut,\n%llu stamps; %.2f us a tick for "
+		   "wound and blood, %.1f frames a second\n",
+		   CUTS_HZ, a->realtime ? "SCHED_FIFO" : "SCHED_OTHER",
+		   (unsigned long long)view->ticks, a->seconds, ticks / a->seconds,
+		   (unsigned long long)a->lost, view->cut_mm,
+		   (unsigned long long)view->stamps, tick_us, a->frames / a->seconds);
+}
+
+/* --- a loop, without and with the view: A B B A --- */
+
+#define BESIDE_MAX 4
+
+struct beside {
+	struct wakeup run[BESIDE_MAX];
+	int n;
+	double seconds; /* of each */
+	bool realtime;
+	/* Of all runs of a kind: without, with. */
+	double p999_us[2], cyclictest_us[2];
+};
+
+static bool has_view(const struct wakeup *run)
+{
+	return run->load == load_names[LOAD_VIEW];
+}
+
+/* Of the lateness of all runs of a kind together. */
+static double pooled(const struct beside *beside, bool view, bool cyclictest)
+{
+	uint64_t *bins = cli_alloc(INCISE_LOOP_BINS, sizeof(*bins));
+	double p999;
+
+	for (int i = 0; i < beside->n; i++) {
+		const struct wakeup *run = &beside->run[i];
+		const struct lateness *l = cyclictest ? &run->cyclictest : &run->loop;
+
+		if (has_view(run) == view && l->bins)
+			for (int k = 0; k < INCISE_LOOP_BINS; k++)
+				bins[k] += l->bins[k];
+	}
+	p999 = incise_loop_quantile(bins, 0.999);
+	free(bins);
+	return p999 > 0 ? p999 : NAN;
+}
+
+static void measure_beside(const char *scene, double seconds, bool quick,
+			   struct beside *beside)
+{
+	static const enum load_kind order[BESIDE_MAX] = {LOAD_IDLE, LOAD_VIEW, LOAD_VIEW,
+							 LOAD_IDLE};
+
+	*beside = (struct beside){.n = quick ? 2 : BESIDE_MAX, .seconds = seconds};
+	for (int i = 0; i < beside->n; i++) {
+		static struct wakeups wakeups;
+
+		wakeups_measure(scene, NULL, order[i], false, seconds, &wakeups);
+		beside->run[i] = wakeups.row[0];
+		beside->realtime = wakeups.realtime;
+		if (wakeups.row[0].no_load)
+			cli_fail("the picture beside a loop: %s", wakeups.row[0].no_load);
+	}
+	for (int view = 0; view < 2; view++) {
+		beside->p999_us[view] = pooled(beside, view, false);
+		beside->cyclictest_us[view] = pooled(beside, view, true);
+	}
+}
+
+static const struct bench_table beside_table = {
+	.key = "beside.runs",
+	.row_bytes = sizeof(struct wakeup),
+	.columns =
+		{
+			COLUMN(wakeup, "load", load, "%-6s", "load"),
+			COLUMN(wakeup, "lateness_us", loop.json),
+			COLUMN(wakeup, NULL, loop.median, "%7.0f", "median"),
+			COLUMN(wakeup, NULL, loop.p99, "%7.0f", "99 %"),
+			COLUMN(wakeup, NULL, loop.p999, "%7.0f", "99.9 %"),
+			COLUMN(wakeup, NULL, loop.p9999, "%7.0f", "99.99 %"),
+			COLUMN(wakeup, NULL, loop.max, "%8.0f", "max"),
+			COLUMN(wakeup, NULL, frames_hz, "%8.1f", "fps", .optional = true,
+			       .blank = true),
+			COLUMN(wakeup, NULL, cyclictest.p999, "%12.0f", "cyclictest",
+			       .blank = true),
+			COLUMN(wakeup, "cyclictest_us", cyclictest.json),
+			COLUMN(wakeup, "frames_hz", frames_hz),
+			COLUMN(wakeup, "skipped", skipped),
+		},
+};
+
+static void print_beside(struct bench_run *run, const struct beside *beside, double ratio,
+			 double cyclictest_ratio)
+{
+	bench_text(run,
+		   "\nthe loop without and with the picture, us late; %.3g s each, %s\n",
+		   beside->seconds,
+		   beside->realtime ? "SCHED_FIFO"
+				    : "SCHED_OTHER, as real time is not granted");
+	bench_table(run, &beside_table, beside->run, beside->n);
+	bench_text(run, "99.9 %% of all: %.0f without, %.0f with: %.2f times",
+		   beside->p999_us[0], beside->p999_us[1], ratio);
+	if (beside->cyclictest_us[0] > 0)
+		bench_text(run, "; cyclictest %.0f and %.0f: %.2f times",
+			   beside->cyclictest_us[0], beside->cyclictest_us[1],
+			   cyclictest_ratio);
+	bench_text(run, "\n");
+}
+
+static void report_beside(struct bench_run *run, const struct beside *beside)
+{
+	const double *p999 = beside->p999_us, *cyclictest = beside->cyclictest_us;
+	double ratio = p999[1] / p999[0],
+	       cyclictest_ratio = cyclictest[1] / cyclictest[0];
+
+	bench_values(run, "{s{sf ss so so so so so so}}", "beside", "seconds",
+		     beside->seconds, "policy", wakeups_policy(beside->realtime),
+		     "p999_us", json_number(p999[0]), "p999_view_us",
+		     json_number(p999[1]), "ratio_p999", json_number(ratio),
+		     "cyclictest_p999_us", json_number(cyclictest[0]),
+		     "cyclictest_p999_view_us", json_number(cyclictest[1]),
+		     "cyclictest_ratio_p999", json_number(cyclictest_ratio));
+	for (int view = 0; view < 2; view++) {
+		double median[BESIDE_MAX];
+		struct harness_spread spread;
+		int n = 0;
+
+		for (int i = 0; i < beside->n; i++)
+			if (has_view(&beside->run[i]) == view)
+				median[n++] = beside->run[i].loop.median;
+		harness_spread(median, n, &spread);
+		metrics_add(run->metrics, METRIC_MEASURED, &spread, "us",
+			    "loop late %s the picture, median",
+			    view ? "with" : "without");
+	}
+	print_beside(run, beside, ratio, cyclictest_ratio);
+}
+
+/* --- the benchmark --- */
+
+static const char neck[] =
+	"rate_hz = 1000.0;\n"
+	"surface = { kind = \"capsule\"; from_mm = [-60.0, 0.0, -55.0];\n"
+	"  to_mm = [160.0, 0.0, -55.0]; radius_mm = 55.0; };\n"
+	"tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; damping_N_s_mm = 0.0005;\n"
+	"  insertion_N_mm = 0.28; aligned = 0.2; spread_N_mm = 0.22; };\n"
+	"effects = { average_ticks = 8; guard = true; };\n"
+	"tool = { handle_mm = 120.0; };\n"
+	"limits = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };\n"
+	"picture = { wound = true; bleeding = true; skin = \"neck\"; larynx = true;\n"
+	"  blood_ul_s_mm2 = 0.3; gravity = [0.0, -0.5, -0.9]; };\n";
+
+static void run_view(struct bench_run *run)
+{
+	double seconds = run->seconds > 0 ? run->seconds
+			 : run->quick	  ? QUICK_LIVE_S
+					  : LIVE_S;
+	static struct frame_rows frames;
+	static struct shown_rows shown;
+	static struct absorbed absorbed;
+	static struct beside beside;
+	const char *scene = run->operands[0];
+	struct view_script script;
+
+	if (!scene) {
+		static struct memory_file own;
+
+		own = memory_file_begin("neck");
+		fputs(neck, own.file);
+		memory_file_written(&own);
+		scene = own.path;
+	}
+	cli_catch_signals();
+	/* First: this one locks what memory there is. */
+	measure_beside(scene, seconds, run->quick, &beside);
+	view_script_begin(&script, scene, run->quick ? QUICK_ERROR_UNTIL_S : UNTIL_S);
+	measure_frames(&script, run->quick, &frames);
+	measure_shown(&script, run->quick, &frames, &shown);
+	view_script_end(&script);
+	measure_absorbed(scene, seconds, &absorbed);
+	bench_text(run, "%s, %s\n\n", bench_machine(run, "cpu"),
+		   bench_machine(run, "kernel"));
+	report_frames(run, &frames);
+	report_shown(run, &shown);
+	report_absorbed(run, &absorbed);
+	report_beside(run, &beside);
+}
+
+static const struct bench bench_view = {
+	.name = "view",
+	.run = run_view,
+	.plots = {{.script = text_view_gp,
+		   .width = 1320,
+		   .height = 620,
+		   .data = {&shown_table, "texture_px", "shown!=exact"}}}};
+
+/* --- the command --- */
 
 static const struct cli_option options[] = {
-	{OPT_JSON, "json", NULL, "report as JSON"},
-	{OPT_AGAINST, "against", "OLD.json",
-	 "compare with an older report of --json: what changed\nbeyond noise"},
-	{OPT_PLOT, "plot", "NAME", "draw error over run time as NAME.png and NAME.svg"},
-	{OPT_DURATION, "duration", "TIME",
-	 "of each run beside a loop, and of that of cuts,\nsuch as 10min (default: 4s)"},
-	{OPT_QUICK, "quick", NULL, "fewer frames and runs: a look, not a measurement"},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct bench_run, json)},
+	{0, "against", "OLD.json",
+	 "compare with an older report of --json: what changed\nbeyond noise",
+	 CLI_TEXT(struct bench_run, against)},
+	{0, "plot", "NAME", "draw error over run time as NAME.png and NAME.svg",
+	 CLI_TEXT(struct bench_run, plot)},
+	{0, "duration", "TIME",
+	 "of each run beside a loop, and of that of cuts,\nsuch as 10min (default: 4s)",
+	 CLI_DURATION(struct bench_run, seconds, 0.5, 86400)},
+	{0, "quick", NULL, "fewer frames and runs: a look, not a measurement",
+	 CLI_FLAG(struct bench_run, quick)},
 	{0},
 };
 
-static const struct cli_command verb = {
+static const struct cli_command command = {
 	.name = "bench view",
 	.synopsis = "[SCENE] [OPTIONS]",
 	.summary =
@@ -36,50 +851,19 @@ static const struct cli_command verb = {
 		 "See incise-bench-view(1).",
 };
 
-static void parse(struct bench_run *run, int argc, char **argv)
-{
-	static struct scene_argument argument;
-	static char *scene[1];
-	int opt;
-
-	while ((opt = cli_next(&verb, argc, argv)) != CLI_END)
-		switch (opt) {
-		case OPT_JSON:
-			run->json = true;
-			break;
-		case OPT_PLOT:
-			run->plot = optarg;
-			break;
-		case OPT_DURATION:
-			run->seconds = cli_duration("duration", optarg, 0.5, 86400);
-			break;
-		case OPT_QUICK:
-			run->quick = true;
-			break;
-		case OPT_AGAINST:
-			run->against = optarg;
-			break;
-		}
-	if (argc - optind > 1)
-		cli_usage("expected at most one scene");
-	run->n_operands = argc - optind;
-	if (run->n_operands)
-		scene_argument_operand(&argument, argc, argv, optind);
-	scene[0] = (char *)argument.path;
-	run->operands = scene;
-}
-
 int main(int argc, char **argv)
 {
 	static struct bench_run run = {.bench = &bench_view};
+	static struct scene_argument argument;
 
-	parse(&run, argc, argv);
-	if (run.against) {
-		compare_against(run.against, run.json);
-		run.json = true;
-	}
+	cli_parse(&command, argc, argv, &run);
+	run.n_operands = argc - optind;
+	if (run.n_operands > 1)
+		cli_usage("expected at most one scene");
+	if (run.n_operands)
+		scene_argument_operand(&argument, argc, argv, optind);
+	run.operands = (char *[]){(char *)argument.path};
 	incise_realtime_prepare();
-	cli_catch_signals();
 	bench_measure(&run);
 	return 0;
 }

@@ -2,43 +2,48 @@
 /*
  * incise bench NAME: the benchmarks of bench/bench.h by their names.
  */
-#include <getopt.h>
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>
 #include "bench/bench.h"
-#include "bench/compare.h"
-#include "cli/cli.h"
 #include "cli/json.h"
 
-enum {
-	OPT_JSON = CLI_LONG,
-	OPT_PLOT,
-	OPT_QUICK,
-	OPT_DURATION,
-	OPT_LOAD,
-	OPT_PROFILE,
-	OPT_SEED,
-	OPT_AGAINST,
-};
+static void parse_profile(void *profile, char *text)
+{
+	if (strcmp(text, "needed") && strcmp(text, "full"))
+		cli_usage("--profile: '%s' is neither needed nor full", text);
+	*(const char **)profile = text;
+}
+
+static void parse_seed(void *seed, char *text)
+{
+	*(long *)seed = cli_integer("seed", text, 1, LONG_MAX);
+}
 
 static const struct cli_option options[] = {
-	{OPT_JSON, "json", NULL, "report as JSON"},
-	{OPT_AGAINST, "against", "OLD.json",
-	 "compare with an older report of --json: what changed\nbeyond noise"},
-	{OPT_PLOT, "plot", "NAME",
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct bench_run, json)},
+	{0, "against", "OLD.json",
+	 "compare with an older report of --json: what changed\nbeyond noise",
+	 CLI_TEXT(struct bench_run, against)},
+	{0, "plot", "NAME",
 	 "draw error over time as NAME.png and NAME.svg;\n"
 	 "stability: NAME-map, NAME-guard, NAME-integrators;\n"
 	 "loop: NAME-wakeups, NAME-rates;\n"
-	 "pose: NAME, NAME-rates; timeline: NAME, NAME-windows"},
-	{OPT_DURATION, "duration", "TIME",
-	 "of each run of capture, and each of loop's wake-ups,\nsuch as 10min (default: 7s and 5s)"},
-	{OPT_LOAD, "load", "NAME",
-	 "loop: wake-ups under one load only: idle, cpu,\nmemory, disk or view"},
-	{OPT_PROFILE, "profile", "WHICH",
-	 "scenes: only run some ticks of one, with the stages\nthat it needs or with all: needed or full; for perf\nstat or callgrind"},
-	{OPT_SEED, "seed", "N", "extremes: another set of cases (default: 1)"},
-	{OPT_QUICK, "quick", NULL, "fewer points and repeats: a look, not a measurement"},
+	 "pose: NAME, NAME-rates; timeline: NAME, NAME-windows",
+	 CLI_TEXT(struct bench_run, plot)},
+	{0, "duration", "TIME",
+	 "of each run of capture, and each of loop's wake-ups,\nsuch as 10min (default: 7s and 5s)",
+	 CLI_DURATION(struct bench_run, seconds, 1, 86400)},
+	{0, "load", "NAME",
+	 "loop: wake-ups under one load only: idle, cpu,\nmemory, disk or view",
+	 CLI_TEXT(struct bench_run, load)},
+	{0, "profile", "WHICH",
+	 "scenes: only run some ticks of one, with the stages\nthat it needs or with all: needed or full; for perf\nstat or callgrind",
+	 CLI_PARSED(struct bench_run, profile, parse_profile)},
+	{0, "seed", "N", "extremes: another set of cases (default: 1)",
+	 CLI_PARSED(struct bench_run, seed, parse_seed)},
+	{0, "quick", NULL, "fewer points and repeats: a look, not a measurement",
+	 CLI_FLAG(struct bench_run, quick)},
 	{0},
 };
 
@@ -47,7 +52,6 @@ static const struct bench *const benches[] = {
 	&bench_pose,	  &bench_timeline, &bench_vision,    &bench_capture,
 	&bench_scenes,	  &bench_extremes,
 };
-#define BENCHES (int)(sizeof(benches) / sizeof(*benches))
 
 /* --- help --- */
 
@@ -81,7 +85,7 @@ static const struct cli_command *help(void)
 
 	strcpy(summary,
 	       "Measure error against run time, and what is stable; tables, JSON, pictures.\n");
-	for (int i = 0; i < BENCHES; i++) {
+	for (int i = 0; i < N(benches); i++) {
 		const char *operands = benches[i]->operands ? benches[i]->operands : "";
 
 		sprintf(synopsis + strlen(synopsis), "%s%s%s | ", benches[i]->name,
@@ -103,21 +107,17 @@ static const struct cli_command *help(void)
 static _Noreturn void compare(const struct bench_run *run, int argc, char **argv)
 {
 	struct incise_error err = {0};
-	json_t *reports[2], *comparison = NULL;
+	json_t *reports[2], *comparison;
 
 	if (argc != 3)
 		cli_usage("expected 'compare' and two reports");
 	if (run->plot || run->load || run->profile || run->against || run->quick ||
 	    run->seed || run->seconds > 0)
 		cli_usage("'compare' takes no option but --json");
-	for (int i = 0; i < 2; i++) {
-		reports[i] = json_read(argv[1 + i], &err);
-		if (!reports[i])
-			cli_fail_with(&err);
-	}
-	comparison = compare_reports(reports[0], argv[1], reports[1], argv[2], &err);
-	if (!comparison)
-		cli_fail_with(&err);
+	for (int i = 0; i < 2; i++)
+		reports[i] = cli_require(json_read(argv[1 + i], &err), &err);
+	comparison = cli_require(
+		compare_reports(reports[0], argv[1], reports[1], argv[2], &err), &err);
 	json_decref(reports[0]);
 	json_decref(reports[1]);
 	compare_finish(comparison, run->json);
@@ -135,7 +135,7 @@ static const struct bench *bench_of(int argc, char **argv)
 {
 	if (argc < 1)
 		cli_usage("expected what to measure, such as 'precision'");
-	for (int i = 0; i < BENCHES; i++) {
+	for (int i = 0; i < N(benches); i++) {
 		const struct bench *bench = benches[i];
 
 		if (strcmp(argv[0], bench->name))
@@ -154,65 +154,24 @@ static const struct bench *bench_of(int argc, char **argv)
 	cli_usage("'%s' is nothing that can be measured", argv[0]);
 }
 
-static void parse(struct bench_run *run, int argc, char **argv)
-{
-	const struct cli_command *command = help();
-	int opt;
-
-	while ((opt = cli_next(command, argc, argv)) != CLI_END)
-		switch (opt) {
-		case OPT_JSON:
-			run->json = true;
-			break;
-		case OPT_PLOT:
-			run->plot = optarg;
-			break;
-		case OPT_DURATION:
-			run->seconds = cli_duration("duration", optarg, 1, 86400);
-			break;
-		case OPT_LOAD:
-			run->load = optarg;
-			break;
-		case OPT_PROFILE:
-			run->profile = optarg;
-			if (strcmp(optarg, "needed") && strcmp(optarg, "full"))
-				cli_usage("--profile: '%s' is neither needed nor full",
-					  optarg);
-			break;
-		case OPT_SEED:
-			run->seed = cli_integer("seed", optarg, 1, LONG_MAX);
-			break;
-		case OPT_QUICK:
-			run->quick = true;
-			break;
-		case OPT_AGAINST:
-			run->against = optarg;
-			break;
-		}
-}
-
 int main(int argc, char **argv)
 {
 	static struct bench_run run;
 	const struct bench *bench;
 
-	parse(&run, argc, argv);
+	cli_parse(help(), argc, argv, &run);
 	argc -= optind;
 	argv += optind;
 	if (argc && !strcmp(argv[0], "compare"))
 		compare(&run, argc, argv);
 	run.bench = bench = bench_of(argc, argv);
-	allow(bench, run.plot, bench->plots, "plot");
+	allow(bench, run.plot, bench->plots->script, "plot");
 	allow(bench, run.seconds > 0, bench->takes_duration, "duration");
 	allow(bench, run.load, bench->takes_load, "load");
 	allow(bench, run.profile, bench->takes_profile, "profile");
 	allow(bench, run.seed, bench->takes_seed, "seed");
 	run.operands = argv + 1;
 	run.n_operands = argc - 1;
-	if (run.against) {
-		compare_against(run.against, run.json);
-		run.json = true;
-	}
 	bench_measure(&run);
 	return 0;
 }

@@ -10,11 +10,9 @@
 #include <string.h>
 #include "../../lib/scene/forces.h"
 
-/*
- * Write "tissue = { KEY = VALUE; … @more };" with @times the constants of skin. The force
+/* Write "tissue = { KEY = VALUE; … @more };" with @times the constants of skin. The force
  * called @without is left out, or none where that is NULL. Returns the length, or -1 where
- * @size is too small.
- */
+ * @size is too small. */
 static inline int all_forces(char *text, size_t size, double times, const char *without,
 			     const char *more)
 {

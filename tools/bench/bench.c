@@ -2,27 +2,16 @@
 /*
  * Reports of benchmarks from their declarations; see bench.h.
  */
-#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "bench.h"
-#include "../cli/cli.h"
 #include "../cli/json.h"
 #include "machine.h"
 #include "../cli/plot.h"
 
 #define TEXT_BYTES 600
-
-void *bench_alloc(size_t n, size_t size)
-{
-	void *memory = calloc(n ? n : 1, size);
-
-	if (!memory)
-		cli_fail("no memory");
-	return memory;
-}
 
 /* --- members of a row --- */
 
@@ -201,14 +190,20 @@ static void print_headings(const struct bench_column *columns)
 static void print_line(const struct bench_table *table, const void *row)
 {
 	const char *failed = table->failed_after ? failed_of(table, row) : NULL;
-	int n = 0;
+	int n = 0, blank = 0;
 
 	for (const struct bench_column *c = table->columns; c->key || c->heading; c++) {
 		if (!c->heading)
 			continue;
 		if (failed && n == table->failed_after)
 			break;
-		fputs(n++ ? " " : "", stdout);
+		blank += n++ > 0;
+		if (c->blank && !text_of(c, row) && isnan(number_of(c, row))) {
+			blank += abs(width_of(c->format));
+			continue;
+		}
+		printf("%*s", blank, "");
+		blank = 0;
 		print_cell(c, row);
 	}
 	printf(failed ? " %s\n" : "\n", failed);
@@ -374,17 +369,11 @@ static void add_metric(json_t *metrics, const struct bench_table *table,
 		       const struct bench_metric *metric, const void *row)
 {
 	const void *member = (const char *)row + metric->offset;
-	char name[METRIC_NAME_BYTES];
+	char name[TEXT_BYTES];
 	json_t *added;
 
 	expand(table, row, metric->name, name, sizeof(name));
-	if (metric->kind == METRIC_TIME)
-		added = metrics_time(metrics, member, metric->unit, "%s", name);
-	else if (metric->kind == METRIC_MEASURED)
-		added = metrics_measured(metrics, member, metric->unit, "%s", name);
-	else
-		added = metrics_exact(metrics, *(const double *)member, metric->unit,
-				      "%s", name);
+	added = metrics_add(metrics, metric->kind, member, metric->unit, "%s", name);
 	if (metric->more_is_better)
 		metrics_more_is_better(added);
 }
@@ -428,23 +417,6 @@ const struct bench_table bench_points = {
 		    COLUMN(bench_point, "y", y), COLUMN(bench_point, "z", z)},
 };
 
-/* Words in the order of their first coming. */
-struct words {
-	char (*word)[TEXT_BYTES];
-	int n;
-};
-
-static void add_word(struct words *words, const char *word)
-{
-	for (int i = 0; i < words->n; i++)
-		if (!strcmp(words->word[i], word))
-			return;
-	words->word = realloc(words->word, (size_t)(words->n + 1) * sizeof(*words->word));
-	if (!words->word)
-		cli_fail("no memory");
-	snprintf(words->word[words->n++], TEXT_BYTES, "%s", word);
-}
-
 /* The value of each key of "motion,name", with spaces between them; of @only that alone. */
 static void block_of(const struct bench_data *data, const char *only, const void *row,
 		     char block[TEXT_BYTES])
@@ -475,11 +447,11 @@ static const struct bench_rows *rows_of(const struct bench_run *run,
 	return NULL;
 }
 
-/* Blocks, or with a key its values. */
-static struct words words_of(const struct bench_data *data, const char *key,
-			     const struct bench_rows *rows)
+/* Blocks, or with a key its values, as keys of an object in the order of their first coming. */
+static json_t *words_of(const struct bench_data *data, const char *key,
+			const struct bench_rows *rows)
 {
-	struct words words = {0};
+	json_t *words = json_object();
 	char word[TEXT_BYTES];
 
 	for (int i = 0; i < rows->n; i++) {
@@ -488,7 +460,7 @@ static struct words words_of(const struct bench_data *data, const char *key,
 		if (!matches(data->table, data->where, row))
 			continue;
 		block_of(data, key, row, word);
-		add_word(&words, word);
+		json_object_set_new_nocheck(words, word, json_true());
 	}
 	return words;
 }
@@ -510,12 +482,14 @@ static void write_line(FILE *out, const struct bench_table *table, const void *r
 static void write_data(const struct bench_run *run, const char *file,
 		       const struct bench_data *data, const struct bench_rows *rows)
 {
-	struct words blocks = words_of(data, NULL, rows);
+	json_t *blocks = words_of(data, NULL, rows), *present;
 	FILE *out = plot_data(run->folder, file);
 	char block[TEXT_BYTES];
+	const char *name;
 
-	for (int k = 0; k < blocks.n; k++) {
-		fprintf(out, "# %s\n", blocks.word[k]);
+	json_object_foreach(blocks, name, present)
+	{
+		fprintf(out, "# %s\n", name);
 		write_line(out, data->table, NULL);
 		for (int i = 0; i < rows->n; i++) {
 			const void *row = row_at(data->table, rows->rows, i);
@@ -523,23 +497,28 @@ static void write_data(const struct bench_run *run, const char *file,
 			if (!matches(data->table, data->where, row))
 				continue;
 			block_of(data, NULL, row, block);
-			if (!strcmp(block, blocks.word[k]))
+			if (!strcmp(block, name))
 				write_line(out, data->table, row);
 		}
 		fputs("\n\n", out);
 	}
 	plot_data_end(out, run->folder);
-	free(blocks.word);
+	json_decref(blocks);
 }
 
-static void write_words(FILE *script, const char *name, const char *key,
-			struct words words)
+static void write_words(FILE *script, const char *name, const char *key, json_t *words)
 {
+	const char *word, *space = "";
+	json_t *present;
+
 	fprintf(script, "%s_%s = \"", name, key);
-	for (int i = 0; i < words.n; i++)
-		fprintf(script, "%s'%s'", i ? " " : "", words.word[i]);
+	json_object_foreach(words, word, present)
+	{
+		fprintf(script, "%s'%s'", space, word);
+		space = " ";
+	}
 	fputs("\"\n", script);
-	free(words.word);
+	json_decref(words);
 }
 
 /* The file and the lists of blocks as variables of a script. */
@@ -576,31 +555,28 @@ static void write_scalars(FILE *script, const json_t *object)
 static int values_of(const struct bench_plot *plot, const char *key,
 		     const struct bench_rows *rows)
 {
-	struct words words = {.n = 1};
+	json_t *words = key ? words_of(&plot->data, key, rows) : NULL;
+	int n = key ? (int)json_object_size(words) : 1;
 
-	if (key)
-		words = words_of(&plot->data, key, rows);
-	free(words.word);
-	return words.n;
+	json_decref(words);
+	return n;
 }
 
 static void draw(const struct bench_run *run, const struct bench_plot *plot)
 {
 	const struct bench_rows *rows = rows_of(run, plot->data.table),
 				*more = rows_of(run, plot->more.table);
-	char name[TEXT_BYTES], file[2][TEXT_BYTES + 16];
+	char *name = cli_text("%s%s%s", run->name, plot->suffix ? "-" : "",
+			      plot->suffix ? plot->suffix : "");
+	char *file = cli_text("%s.dat", name), *more_file = cli_text("%s-more.dat", name);
 	FILE *script;
 	int width;
 
 	if (!rows)
 		return;
-	snprintf(name, sizeof(name), "%s%s%s", run->name, plot->suffix ? "-" : "",
-		 plot->suffix ? plot->suffix : "");
-	snprintf(file[0], sizeof(file[0]), "%s.dat", name);
-	snprintf(file[1], sizeof(file[1]), "%s-more.dat", name);
-	write_data(run, file[0], &plot->data, rows);
+	write_data(run, file, &plot->data, rows);
 	if (more)
-		write_data(run, file[1], &plot->more, more);
+		write_data(run, more_file, &plot->more, more);
 	width = plot->width * values_of(plot, plot->across, rows);
 	script = plot_begin(run->folder, name, width > WIDTH_LEAST ? width : WIDTH_LEAST,
 			    plot->height * values_of(plot, plot->down, rows) +
@@ -610,9 +586,9 @@ static void draw(const struct bench_run *run, const struct bench_plot *plot)
 	write_scalars(script, run->machine);
 	write_scalars(script, run->report);
 	write_scalars(script, run->scalars);
-	write_variables(script, "data", file[0], &plot->data, rows);
+	write_variables(script, "data", file, &plot->data, rows);
 	if (more)
-		write_variables(script, "more", file[1], &plot->more, more);
+		write_variables(script, "more", more_file, &plot->more, more);
 	fputs(plot->script, script);
 	if (!plot_draw(script, run->folder, name))
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", run->folder, name);
@@ -644,13 +620,14 @@ void bench_fail(struct bench_run *run, const char *fmt, ...)
 
 void bench_measure(struct bench_run *run)
 {
-	struct machine machine;
-
-	/* A name that cannot be is said before the work, not after. */
+	if (run->against) {
+		compare_against(run->against, run->json);
+		run->json = true;
+	}
+	/* A wrong name fails before the work, not after. */
 	if (run->plot)
 		plot_place("plot", run->plot, &run->folder, &run->name);
-	machine_init(&machine);
-	run->machine = machine_json(&machine);
+	run->machine = machine_json();
 	run->metrics = json_array();
 	run->scalars = json_object();
 	run->report = json_pack("{sO sb}", "machine", run->machine, "quick", run->quick);
@@ -660,8 +637,7 @@ void bench_measure(struct bench_run *run)
 	if (run->json)
 		json_print(json_incref(run->report));
 	cli_finish();
-	for (const struct bench_plot *p = run->bench->plots; run->plot && p && p->script;
-	     p++)
+	for (const struct bench_plot *p = run->bench->plots; run->plot && p->script; p++)
 		draw(run, p);
 	if (*run->failed)
 		cli_fail("%s", run->failed);

@@ -13,10 +13,13 @@
 #define INCISE_BENCH_H
 
 #include <jansson.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
-#include <stdint.h>
+#include "../cli/cli.h"
 #include "metrics.h"
+
+#define N(array) (int)(sizeof(array) / sizeof(*(array)))
 
 /* --- declaration --- */
 
@@ -40,6 +43,7 @@ struct bench_column {
 	double scale;	     /* of the number; 0: 1 */
 	double text_scale;   /* in the text on top of that; 0: 1 */
 	bool optional;	     /* 0 is none */
+	bool blank;	     /* none is nothing in the text; else "-" */
 	bool whole;	     /* in the JSON a whole number is an integer */
 	bool data; /* neither in the text nor in the JSON: for plots and metrics */
 };
@@ -80,13 +84,10 @@ struct bench_metric {
 #define BENCH_COLUMNS 32
 #define BENCH_METRICS 8
 
-/*
- * A column "failed" has the reason why a row failed; with @failed_after a line of the text
- * ends with it behind so many columns.
- */
+/* A column "failed" has the reason why a row failed; with @failed_after a line of the text
+ * ends with it behind so many columns. */
 struct bench_table {
-	const char *
-		key; /* of the list in the JSON, "a.b" leads inwards; NULL: it has none */
+	const char *key; /* of the list in the JSON, "a.b" leads inwards; NULL: none */
 	size_t row_bytes;
 	int failed_after;
 	struct bench_column columns[BENCH_COLUMNS];
@@ -115,7 +116,7 @@ struct bench_plot {
 	const char *suffix; /* the plot is NAME-suffix; NULL: NAME */
 	const char *script;
 	int width,
-		height; /* pixels; with across and down of a panel of a value of that key */
+		height; /* px; with across and down of a panel of a value of that key */
 	int margin;	/* added to the height */
 	const char *across, *down;
 	struct bench_data data, more;
@@ -134,12 +135,12 @@ struct bench {
 	int n_operands;		     /* at most */
 	bool takes_duration, takes_load, takes_profile, takes_seed;
 	void (*run)(struct bench_run *run);
-	const struct bench_plot *plots; /* ends with {0}; NULL: --plot is bad usage */
+	struct bench_plot plots[4]; /* end with {0}; none: --plot is bad usage */
 };
 
 extern const struct bench bench_capture, bench_extremes, bench_loop, bench_pose,
 	bench_precision, bench_scenes, bench_stability, bench_timeline, bench_training,
-	bench_view, bench_vision;
+	bench_vision;
 
 /* --- a run --- */
 
@@ -165,11 +166,8 @@ struct bench_run {
 	int n_rows;
 };
 
-/* Memory of zeros; fails the program without. */
-void *bench_alloc(size_t n, size_t size);
-
-/* As of the options: begins with the machine's state. Run the benchmark, print and draw its
- * report, and fail the program with what bench_fail() was told. */
+/* Run the benchmark, print, compare and draw its report, and fail the program with the line that
+ * bench_fail() was given. */
 void bench_measure(struct bench_run *run);
 
 /* Of machine and build: "cpu", "kernel", "compiler", "vectors"; "cpu; kernel; compiler" for NULL. */
@@ -187,10 +185,8 @@ void bench_value(struct bench_run *run, const char *key, json_t *value);
 /* printf() of the text; nothing with --json. */
 void bench_text(const struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3);
 
-/*
- * Report rows: as JSON and metrics, for plots, and as a text table. The rows, and what they
- * point to, live until the end of the run.
- */
+/* Report rows: as JSON and metrics, for plots, and as a text table. The rows, and what they
+ * point to, live until the end of the run. */
 void bench_table(struct bench_run *run, const struct bench_table *table, const void *rows,
 		 int n);
 

@@ -10,11 +10,9 @@
  */
 #include <errno.h>
 #include <limits.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 #include <incise/backend.h>
 #include <incise/calibration.h>
@@ -22,8 +20,8 @@
 #include <incise/rig.h>
 #include <incise/vision.h>
 #include "bench.h"
-#include "../cli/cli.h"
 #include "../cli/folder.h"
+#include "../cli/stopwatch.h"
 #ifdef HAVE_JPEG
 #include <jpeglib.h>
 #endif
@@ -48,7 +46,6 @@
 
 /* The one of this program: ops have no context. */
 static struct {
-	struct incise_camera_ops ops;
 	const struct incise_camera_ops *before;
 	struct incise_clock *clock;
 	int width, height;
@@ -61,7 +58,7 @@ static struct {
 } camera;
 
 #ifdef HAVE_JPEG
-static int code(const struct incise_camera_frame *frame, int k)
+static void code(const struct incise_camera_frame *frame, int k)
 {
 	struct jpeg_compress_struct jpeg;
 	struct jpeg_error_mgr error;
@@ -84,14 +81,13 @@ static int code(const struct incise_camera_frame *frame, int k)
 	}
 	jpeg_finish_compress(&jpeg);
 	jpeg_destroy_compress(&jpeg);
-	return 0;
 }
 #else
-static int code(const struct incise_camera_frame *frame, int k)
+static void code(const struct incise_camera_frame *frame, int k)
 {
-	(void)frame;
-	(void)k;
-	return -EOPNOTSUPP;
+	(void)frame, (void)k;
+	cli_fail("this incise was built without libjpeg, which makes the pictures; "
+		 "build it where libjpeg-dev is");
 }
 #endif
 
@@ -99,14 +95,11 @@ static int code(const struct incise_camera_frame *frame, int k)
 static void code_all(void)
 {
 	struct incise_error err = {0};
-	struct incise_rig *rig =
-		incise_rig_open("sim:clock=simulated", INCISE_RIG_CAMERA, &err);
-	struct incise_clock *clock;
+	struct incise_rig *rig = cli_require(
+		incise_rig_open("sim:clock=simulated", INCISE_RIG_CAMERA, &err), &err);
+	struct incise_clock *clock = incise_rig_clock(rig);
 	struct incise_camera_frame frame;
 
-	if (!rig)
-		cli_fail_with(&err);
-	clock = incise_rig_clock(rig);
 	incise_clock_wait_until(clock, incise_clock_now(clock) + FIRST_NS);
 	incise_camera_newest(incise_rig_camera(rig), &frame);
 	for (int n = 0; n < FRAMES;) {
@@ -115,9 +108,7 @@ static void code_all(void)
 			continue;
 		camera.width = frame.width;
 		camera.height = frame.height;
-		if (code(&frame, n++))
-			cli_fail("this incise was built without libjpeg, which makes "
-				 "the pictures; build it where libjpeg-dev is");
+		code(&frame, n++);
 	}
 	incise_rig_close(rig);
 }
@@ -175,20 +166,17 @@ static void camera_close(struct incise_camera *of_rig)
 	of_rig->ops->close(of_rig);
 }
 
+static const struct incise_camera_ops camera_ops = {camera_read, camera_info, camera_lost,
+						    camera_close};
+
 /* Have a rig's camera give the coded frames from now on, until it is closed. */
 static void camera_take_over(struct incise_camera *of_rig, struct incise_clock *clock)
 {
-	camera.ops = (struct incise_camera_ops){
-		.read = camera_read,
-		.info = camera_info,
-		.lost = camera_lost,
-		.close = camera_close,
-	};
 	camera.before = of_rig->ops;
 	camera.clock = clock;
 	camera.start_ns = incise_clock_now(clock);
 	camera.next = camera.lost = 0;
-	of_rig->ops = &camera.ops;
+	of_rig->ops = &camera_ops;
 }
 
 /* --- runs --- */
@@ -205,7 +193,6 @@ static const struct part {
 	{"virtual_rig", RIG, true, false, false, 4},
 	{"virtual_100_kHz", RIG ",force_hz=100000", true, false, false, 5},
 };
-#define RUNS (int)(sizeof(parts) / sizeof(*parts))
 
 struct row {
 	const char *name, *failed;
@@ -219,19 +206,11 @@ struct row {
 	double held_up; /* share of the time that wakes were late, by a period or more */
 	double rss_MB[2]; /* memory at a quarter of the time, and at its end */
 	bool done;
-	uint64_t force, tracker, frames, force_lost, tracker_lost, frames_lost, unlooked;
+	struct incise_recorder_stats stats; /* without a recorder only counts */
 	struct incise_tracker_info tracker_info;
 	struct incise_force_info force_info;
 	struct incise_camera_info camera_info;
 };
-
-static double cpu_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-	return t.tv_sec * 1e9 + t.tv_nsec;
-}
 
 /* Read all samples and keep none. */
 static int drop_samples(struct row *row)
@@ -246,16 +225,16 @@ static int drop_samples(struct row *row)
 		n = incise_force_read(force, samples, BATCH);
 		if (n < 0)
 			return n;
-		row->force += n;
+		row->stats.force += n;
 	} while (n == BATCH);
 	do {
 		n = incise_tracker_read(tracker, records, BATCH);
 		if (n < 0)
 			return n;
-		row->tracker += n;
+		row->stats.tracker += n;
 	} while (n == BATCH);
-	row->force_lost = incise_force_lost(force);
-	row->tracker_lost = incise_tracker_lost(tracker);
+	row->stats.force_lost = incise_force_lost(force);
+	row->stats.tracker_lost = incise_tracker_lost(tracker);
 	return 0;
 }
 
@@ -267,8 +246,8 @@ static int drop_frame(struct row *row)
 
 	if (rc <= 0)
 		return rc;
-	row->frames++;
-	row->frames_lost = incise_camera_lost(of_rig);
+	row->stats.frames++;
+	row->stats.frames_lost = incise_camera_lost(of_rig);
 	return 0;
 }
 
@@ -303,7 +282,7 @@ static double memory_MB(void)
 /* Processor time of each part of the run. */
 static void end_part(struct row *row, int64_t now, int64_t *part_begin, double *part_cpu)
 {
-	double cpu = cpu_ns();
+	double cpu = stopwatch_of(CLOCK_PROCESS_CPUTIME_ID);
 
 	if (row->parts < PARTS && now > *part_begin)
 		row->part_percent[row->parts++] =
@@ -321,7 +300,7 @@ static int capture(struct row *row, double seconds, struct incise_error *err)
 	int rc = 0;
 
 	start = now = next = part = incise_clock_now(clock);
-	cpu = part_cpu = cpu_ns();
+	cpu = part_cpu = stopwatch_of(CLOCK_PROCESS_CPUTIME_ID);
 	while (!rc && !cli_stop && now - start < length_ns) {
 		next = now > next + POLL_NS ? now : next + POLL_NS;
 		incise_clock_wait_until(clock, next);
@@ -336,7 +315,8 @@ static int capture(struct row *row, double seconds, struct incise_error *err)
 			row->rss_MB[0] = memory_MB();
 	}
 	row->rss_MB[1] = memory_MB();
-	row->cpu_percent = 100 * (cpu_ns() - cpu) / (double)(now - start);
+	row->cpu_percent = 100 * (stopwatch_of(CLOCK_PROCESS_CPUTIME_ID) - cpu) /
+			   (double)(now - start);
 	row->held_up = held_up_ns / (double)(now - start);
 	return rc;
 }
@@ -376,18 +356,10 @@ static int open_run(struct row *row, const struct part *part, const char *folder
 
 static int end_recorder(struct row *row, struct incise_error *err)
 {
-	struct incise_recorder_stats stats;
 	struct incise_error ignored = {0};
 	int rc = incise_recorder_end(row->recorder, err), closed;
 
-	incise_recorder_stats(row->recorder, &stats);
-	row->force = stats.force;
-	row->tracker = stats.tracker;
-	row->frames = stats.frames;
-	row->force_lost = stats.force_lost;
-	row->tracker_lost = stats.tracker_lost;
-	row->frames_lost = stats.frames_lost;
-	row->unlooked = stats.frames_unlooked;
+	incise_recorder_stats(row->recorder, &row->stats);
 	closed = incise_recorder_close(row->recorder, rc ? &ignored : err);
 	return rc ? rc : closed;
 }
@@ -417,7 +389,7 @@ static void run_all(struct row *rows, const char *only, double seconds)
 	int rc = 0;
 
 	folder_make(folder, sizeof(folder), "for the recording");
-	for (int i = 0; i < RUNS && !rc && !cli_stop; i++) {
+	for (int i = 0; i < N(parts) && !rc && !cli_stop; i++) {
 		if (only && strcmp(only, parts[i].name))
 			continue;
 		cli_progress("%s, %.2g s", parts[i].name, seconds);
@@ -439,12 +411,12 @@ static const struct bench_table rows_table = {
 	.columns = {COLUMN(row, "name", name, "%-15s", "run"),
 		    COLUMN(row, "cpu_percent", cpu_percent, "%6.2f", "CPU %"),
 		    COLUMN(row, "net_percent", net_percent, "%6.2f", "net %"),
-		    COLUMN(row, "force", force, "%9.0f", "force"),
-		    COLUMN(row, "force_lost", force_lost, "%5.0f", "lost"),
-		    COLUMN(row, "tracker", tracker, "%8.0f", "tracker"),
-		    COLUMN(row, "tracker_lost", tracker_lost, "%5.0f", "lost"),
-		    COLUMN(row, "frames", frames, "%7.0f", "frames"),
-		    COLUMN(row, "frames_lost", frames_lost, "%5.0f", "lost"),
+		    COLUMN(row, "force", stats.force, "%9.0f", "force"),
+		    COLUMN(row, "force_lost", stats.force_lost, "%5.0f", "lost"),
+		    COLUMN(row, "tracker", stats.tracker, "%8.0f", "tracker"),
+		    COLUMN(row, "tracker_lost", stats.tracker_lost, "%5.0f", "lost"),
+		    COLUMN(row, "frames", stats.frames, "%7.0f", "frames"),
+		    COLUMN(row, "frames_lost", stats.frames_lost, "%5.0f", "lost"),
 		    COLUMN(row, "late_ms", late_ms, "%8.1f", "late ms"),
 		    COLUMN(row, "quarter_MB", rss_MB[0], "%7.1f", "MB 1/4"),
 		    COLUMN(row, "end_MB", rss_MB[1], "%7.1f", "MB end"),
@@ -458,7 +430,7 @@ static int set_rows(struct row *rows, struct row *done)
 {
 	int n = 0;
 
-	for (int i = 0; i < RUNS; i++) {
+	for (int i = 0; i < N(parts); i++) {
 		const struct row *base = &rows[parts[i].base];
 		struct row *row = &done[n];
 
@@ -489,32 +461,31 @@ static void report(struct bench_run *run, const struct row *rows, int n, double 
 	bench_values(run, "{sf sf sf sf si si sI}", "seconds", seconds, "force_hz",
 		     rows->force_info.rate_hz, "tracker_hz", rows->tracker_info.rate_hz,
 		     "camera_hz", info->rate_hz, "width", info->width, "height",
-		     info->height, "unlooked", (json_int_t)rows->unlooked);
-	bench_text(
-		run,
-		"%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz, JPEG of %.0f "
-		"kB; %.2g s each, in real time\n",
-		bench_machine(run, "cpu"), rows->force_info.rate_hz,
-		rows->tracker_info.rate_hz, info->width, info->height, info->rate_hz,
-		bytes / FRAMES / 1e3, seconds);
+		     info->height, "unlooked", (json_int_t)rows->stats.frames_unlooked);
+	bench_text(run,
+		   "%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz, JPEG "
+		   "of %.0f kB; %.2g s each, in real time\n",
+		   bench_machine(run, "cpu"), rows->force_info.rate_hz,
+		   rows->tracker_info.rate_hz, info->width, info->height, info->rate_hz,
+		   bytes / FRAMES / 1e3, seconds);
 	bench_table(run, &rows_table, rows, n);
-	bench_text(
-		run,
-		"net: without what the virtual rig itself takes in the runs virtual_*\n"
-		"pictures that vision had no time for: %llu\n",
-		(unsigned long long)rows->unlooked);
+	bench_text(run,
+		   "net: without what the virtual rig itself takes in the runs "
+		   "virtual_*\n"
+		   "pictures that vision had no time for: %llu\n",
+		   (unsigned long long)rows->stats.frames_unlooked);
 }
 
 static void run(struct bench_run *run)
 {
-	static struct row rows[RUNS], done[RUNS]; /* large */
+	static struct row rows[N(parts)], done[N(parts)]; /* large */
 	const char *only = run->n_operands ? run->operands[0] : NULL;
 	double seconds = run->quick ? QUICK_SECONDS : SECONDS;
 	int n = 0;
 
-	while (only && n < RUNS && strcmp(only, parts[n].name))
+	while (only && n < N(parts) && strcmp(only, parts[n].name))
 		n++;
-	if (n == RUNS)
+	if (n == N(parts))
 		cli_usage("'%s' is no run of capture; see incise-bench(1)", only);
 	if (run->seconds > 0)
 		seconds = run->seconds;
@@ -528,10 +499,9 @@ static void run(struct bench_run *run)
 		free(camera.frame[i].bytes);
 	for (int i = 0; i < n; i++)
 		if (done[i].held_up > HELD_UP)
-			cli_warn(
-				"%s: the machine held it up for %.0f %% of the time; close other "
-				"programs and measure again",
-				done[i].name, 100 * done[i].held_up);
+			cli_warn("%s: the machine held it up for %.0f %% of the time; "
+				 "close other programs and measure again",
+				 done[i].name, 100 * done[i].held_up);
 }
 
 const struct bench bench_capture = {

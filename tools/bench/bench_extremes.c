@@ -9,7 +9,6 @@
  * A wall is tried in two ways: by a whole plan, fed by a tracker of 120 Hz that is 4.2 ms late;
  * and alone, with the position of the tick, as by an encoder.
  */
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <incise/plan.h>
@@ -17,11 +16,9 @@
 #include "../../lib/control/plant.h"
 #include "../../lib/control/stability.h"
 #include "../../tests/extremes/extremes.h"
-#include "../cli/cli.h"
 #include "../cli/file.h"
 #include "../cli/scene_argument.h"
-#include "bench.h"
-#include "bench_device.h"
+#include "stability.h"
 
 /* --- properties --- */
 
@@ -51,7 +48,7 @@ static int try_all(const struct extremes_setup *setup, struct extremes_row *rows
 		wall_properties,    device_properties, file_properties};
 	int n = 0;
 
-	for (size_t i = 0; i < sizeof(tables) / sizeof(*tables); i++)
+	for (int i = 0; i < N(tables); i++)
 		for (const struct property *p = tables[i]; p->name; p++) {
 			if (p->for_tests_only)
 				continue;
@@ -84,34 +81,27 @@ static void print_what(const struct bench_run *run, const char *what)
 static void report_properties(struct bench_run *run, const struct extremes_row *rows,
 			      int n)
 {
+	const char *first = NULL;
+	long wrong = 0;
+
 	bench_rows(run, &properties, rows, n);
 	bench_text(run, "%-20s %10s %10s %10s %8s\n", "cases", "tried", "held", "refused",
 		   "wrong");
 	for (int i = 0; i < n; i++) {
 		const struct extremes_row *r = &rows[i];
 
-		metrics_exact(run->metrics, (double)r->wrong, "cases", "%s wrong",
-			      r->name);
+		metrics_add(run->metrics, METRIC_EXACT, &(double){(double)r->wrong},
+			    "cases", "%s wrong", r->name);
 		bench_text(run, "%-20s %10ld %10ld %10ld %8ld\n", r->name, r->tried,
 			   r->held, r->refused, r->wrong);
 		print_what(run, r->what);
 		if (*r->failed)
 			bench_text(run, "    WRONG: %s\n", r->failed);
+		wrong += r->wrong;
+		if (r->wrong && !first)
+			first = r->name;
 	}
 	bench_text(run, "\n");
-}
-
-static void judge_properties(struct bench_run *run, const struct extremes_row *rows,
-			     int n)
-{
-	const char *first = NULL;
-	long wrong = 0;
-
-	for (int i = 0; i < n; i++) {
-		wrong += rows[i].wrong;
-		if (rows[i].wrong && !first)
-			first = rows[i].name;
-	}
 	if (wrong)
 		bench_fail(run,
 			   "%ld cases came out wrong, the first in %s: a fault of "
@@ -163,16 +153,22 @@ struct run {
 	int k;
 };
 
-static void begin(struct run *run, struct wall *wall)
+static struct run start_run(struct wall *wall)
 {
-	*run = (struct run){.wall = wall,
-			    .plant = {.mass_kg = DEVICE_KG,
-				      .damping_N_s_mm = DAMPING_N_s_mm,
-				      .position_mm = BEGIN_mm}};
-	for (int q = 0; q < 4; q++) {
-		run->low[q] = INFINITY;
-		run->high[q] = -INFINITY;
-	}
+	return (struct run){
+		.wall = wall,
+		.plant = {.mass_kg = DEVICE_KG,
+			  .damping_N_s_mm = DAMPING_N_s_mm,
+			  .position_mm = BEGIN_mm},
+		.low = {INFINITY, INFINITY, INFINITY, INFINITY},
+		.high = {-INFINITY, -INFINITY, -INFINITY, -INFINITY},
+	};
+}
+
+/* Whether the next tick is to come. */
+static bool goes_on(const struct run *run)
+{
+	return run->k < TICKS && fabs(run->plant.position_mm) < GONE_mm;
 }
 
 static void note(struct run *run, double force_N)
@@ -213,17 +209,16 @@ static void press_wall(struct wall *wall)
 	const struct incise_haptic_device device = {.mass_kg = DEVICE_KG,
 						    .damping_N_s_mm = DAMPING_N_s_mm,
 						    .period_s = PERIOD_S};
+	struct run run = start_run(wall);
 	struct incise_guard guard;
 	double was = BEGIN_mm;
-	struct run run;
 
 	wall->limit_N_mm = incise_stability_limit(&device, 0);
 	wall->accepted = wall->K_N_mm <= wall->limit_N_mm;
 	/* As plans do: the credit is what the tissue can have stored. */
 	incise_guard_init(&guard, DEVICE_KG, PERIOD_S,
 			  wall->guarded ? LIMIT_N * LIMIT_N / wall->K_N_mm / 2 : 0);
-	begin(&run, wall);
-	for (; run.k < TICKS && fabs(run.plant.position_mm) < GONE_mm; run.k++) {
+	for (; goes_on(&run); run.k++) {
 		double x = run.plant.position_mm, at[3] = {x},
 		       v[3] = {(x - was) / PERIOD_S};
 		double force[3] = {x < 0 ? -wall->K_N_mm * x : 0};
@@ -268,10 +263,8 @@ static double plan_limit(void)
 	struct incise_plan_stability stability;
 	struct incise_error err = {0};
 	struct incise_scene *scene;
-	struct incise_plan *plan = make_plan(&soft, "", &scene, &err);
+	struct incise_plan *plan = cli_require(make_plan(&soft, "", &scene, &err), &err);
 
-	if (!plan)
-		cli_fail_with(&err);
 	incise_plan_stability(plan, &stability);
 	incise_plan_free(plan);
 	incise_scene_free(scene);
@@ -309,9 +302,9 @@ static void press_plan(struct wall *wall)
 	struct incise_error err = {0}, forced = {0};
 	struct incise_scene *scene;
 	struct incise_plan *plan = make_plan(wall, "", &scene, &err);
+	struct run run = start_run(wall);
 	double taken[2] = {0}, force_N = 0;
 	int poses = 0, fed = 0;
-	struct run run;
 
 	wall->limit_N_mm = plan_limit();
 	wall->accepted = plan;
@@ -328,8 +321,7 @@ static void press_plan(struct wall *wall)
 		incise_scene_free(scene);
 		return;
 	}
-	begin(&run, wall);
-	for (; run.k < TICKS && fabs(run.plant.position_mm) < GONE_mm; run.k++) {
+	for (; goes_on(&run); run.k++) {
 		struct incise_tick tick;
 
 		advance(&run, plan, &poses, &fed, taken, force_N - PRESS_N);
@@ -395,17 +387,18 @@ static const struct bench_table stiff = {
 			   "largest_mm!=nan")},
 };
 
+#define PRESSED_TEXT " %-9s %8s %9s %9s"
+
 /* Each stiffness is a line, without and with the guard. */
 static void print_path(const struct bench_run *run, const char *title,
 		       const struct wall *walls, int n)
 {
 	bench_text(run, "%s\n%10s %-9s", title, "K_N_m", "");
-	for (int guard = 0; guard < 2; guard++)
-		bench_text(run, " %-9s %8s %9s %9s", guard ? "guard on" : "guard off",
-			   "largest", "largest", "at last");
+	bench_text(run, PRESSED_TEXT, "guard off", "largest", "largest", "at last");
+	bench_text(run, PRESSED_TEXT, "guard on", "largest", "largest", "at last");
 	bench_text(run, "\n%10s %-9s", "", "");
-	for (int guard = 0; guard < 2; guard++)
-		bench_text(run, " %-9s %8s %9s %9s", "", "N", "mm", "mm");
+	bench_text(run, PRESSED_TEXT PRESSED_TEXT, "", "N", "mm", "mm", "", "N", "mm",
+		   "mm");
 	for (int k = 0; k < n; k++) {
 		bench_text(run, "\n%10.4g %-9s", walls[k].K_N_mm * 1e3,
 			   walls[k].accepted ? "accepted" : "refused");
@@ -415,8 +408,7 @@ static void print_path(const struct bench_run *run, const char *title,
 					   w->bounded ? "bounded" : "GROWS", w->largest_N,
 					   w->largest_mm, w->late_mm);
 			else
-				bench_text(run, " %-9s %8s %9s %9s", "not run", "-", "-",
-					   "-");
+				bench_text(run, PRESSED_TEXT, "not run", "-", "-", "-");
 	}
 	bench_text(run, "\n");
 	for (int k = 0; k < n; k++)
@@ -452,8 +444,8 @@ static void report_walls(struct bench_run *run, struct wall *walls, int each)
 
 static void run_extremes(struct bench_run *run)
 {
-	struct extremes_row *rows = bench_alloc(ROWS_MAX, sizeof(*rows));
-	struct wall *walls = bench_alloc(WALLS_MAX, sizeof(*walls));
+	struct extremes_row *rows = cli_alloc(ROWS_MAX, sizeof(*rows));
+	struct wall *walls = cli_alloc(WALLS_MAX, sizeof(*walls));
 	const struct extremes_setup setup = {.seed = run->seed ? (uint64_t)run->seed : 1,
 					     .part = run->quick ? QUICK_PART : 1,
 					     .scenes = scene_argument_shipped()};
@@ -464,17 +456,8 @@ static void run_extremes(struct bench_run *run)
 	bench_value(run, "seed", json_integer((json_int_t)setup.seed));
 	bench_text(run, "seed %llu\n", (unsigned long long)setup.seed);
 	report_properties(run, rows, n);
-	judge_properties(run, rows, n);
 	report_walls(run, walls, each);
 }
-
-static const struct bench_plot plots[] = {
-	{.script = text_extremes_gp,
-	 .width = 1100,
-	 .height = 1300,
-	 .data = {&stiff, "path,guard"}},
-	{0},
-};
 
 const struct bench bench_extremes = {
 	.name = "extremes",
@@ -482,5 +465,8 @@ const struct bench bench_extremes = {
 		   "the library; walls of 10 N/m to 1 GN/m",
 	.takes_seed = true,
 	.run = run_extremes,
-	.plots = plots,
+	.plots = {{.script = text_extremes_gp,
+		   .width = 1100,
+		   .height = 1300,
+		   .data = {&stiff, "path,guard"}}},
 };

@@ -3,23 +3,18 @@
  * incise bench loop: what a tick of the haptic loop costs, how late the machine wakes it
  * (wakeup.h), and how the error of the force depends on its rate.
  */
-#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <incise/backend.h>
 #include <incise/loop.h>
 #include <incise/plan.h>
 #include "bench.h"
 #include "../../lib/sim/sim.h"
-#include "../cli/cli.h"
 #include "../cli/file.h"
 #include "../cli/stopwatch.h"
 #include "../cli/tick_cost.h"
 #include "sheet.h"
 #include "wakeup.h"
-
-#define N(array) (int)(sizeof(array) / sizeof(*(array)))
 
 /* --- the cost of a tick: scenes with every force, guard and limits, or the user's --- */
 
@@ -60,19 +55,15 @@ struct tick_row {
 	struct tick_stroke *timed;
 };
 
-static void load(const char *path, struct tick_row *row)
+static void load_scene(const char *path, struct tick_row *row)
 {
 	struct incise_error err = {0};
 	struct incise_plan *plan;
 	double begin = stopwatch_ns();
 
-	row->scene = incise_scene_load(path, NULL, &err);
-	if (!row->scene)
-		cli_fail_with(&err);
+	row->scene = cli_require(incise_scene_load(path, NULL, &err), &err);
 	row->load_s = (stopwatch_ns() - begin) * 1e-9;
-	plan = incise_plan_new(row->scene, NULL, &err);
-	if (!plan)
-		cli_fail_with(&err);
+	plan = cli_require(incise_plan_new(row->scene, NULL, &err), &err);
 	row->memory = incise_plan_memory(plan);
 	incise_plan_free(plan);
 }
@@ -91,7 +82,6 @@ static double turn_ns(void *context)
 static void time_ticks(struct tick_row *rows, int n, bool quick)
 {
 	struct harness_variant variants[N(own)];
-	struct harness_time times[N(own)];
 
 	for (int i = 0; i < n; i++) {
 		cli_progress("%s", rows[i].name);
@@ -102,12 +92,11 @@ static void time_ticks(struct tick_row *rows, int n, bool quick)
 				"%s: a stroke over its top met no tissue: nothing to time",
 				rows[i].name);
 		rows[i].timed = tick_stroke_new(rows[i].scene, NULL, rows[i].cost.tool);
-		variants[i] =
-			(struct harness_variant){.ns = turn_ns, .context = &rows[i]};
+		variants[i] = (struct harness_variant){
+			.ns = turn_ns, .context = &rows[i], .time = &rows[i].time};
 	}
-	harness_times(variants, n, quick ? QUICK_TURNS : TURNS, times);
+	harness_times(variants, n, quick ? QUICK_TURNS : TURNS);
 	for (int i = 0; i < n; i++) {
-		rows[i].time = times[i];
 		tick_stroke_free(rows[i].timed);
 		incise_scene_free(rows[i].scene);
 	}
@@ -140,7 +129,7 @@ static void load_own(const struct own *own, struct tick_row *row)
 	scene = write_scene(own, sheet.path, 1000);
 	row->name = own->name;
 	row->triangles = 2 * (size_t)own->cells * own->cells;
-	load(scene.path, row);
+	load_scene(scene.path, row);
 	fclose(scene.file);
 	if (sheet.file)
 		fclose(sheet.file);
@@ -190,11 +179,11 @@ static const struct bench_table tick_table = {
 
 static const int rates_hz[] = {250, 500, 1000, 2000, 4000, 8000};
 
-static const struct series {
+static const struct cut_series {
 	const char *wall, *poses;
 	double stiffness_N_mm, depth_mm; /* some 3 N */
 	bool exact;			 /* a pose at each tick, without noise, at once */
-} series[] = {
+} cut_series[] = {
 	{"wall", "tracker", 0.33, 10, false},
 	{"wall", "exact", 0.33, 10, true},
 	{"stiff", "exact", 1.5, 2, true},
@@ -355,14 +344,12 @@ static struct incise_scene *plain_wall(const struct rate_row *row)
 		"rate_hz = %.1f;\narithmetic = \"double\";\ntissue = { reaction_N_mm = %g; };\n",
 		row->rate_hz, row->stiffness_N_mm);
 	memory_file_written(&file);
-	scene = incise_scene_load(file.path, NULL, &err);
-	if (!scene)
-		cli_fail_with(&err);
+	scene = cli_require(incise_scene_load(file.path, NULL, &err), &err);
 	fclose(file.file);
 	return scene;
 }
 
-static void measure_rate(const struct series *s, bool quick, struct rate_row *row)
+static void measure_rate(const struct cut_series *s, bool quick, struct rate_row *row)
 {
 	struct exact_tracker tracker = {.rate_hz = row->rate_hz};
 	struct incise_error err = {0};
@@ -374,9 +361,9 @@ static void measure_rate(const struct series *s, bool quick, struct rate_row *ro
 
 	snprintf(spec, sizeof(spec), "sim:clock=simulated,depth_mm=%g,times=1",
 		 s->depth_mm);
-	rig = incise_rig_open(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, &err);
-	if (!rig)
-		cli_fail_with(&err);
+	rig = cli_require(incise_rig_open(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER,
+					  &err),
+			  &err);
 	if (s->exact) {
 		tracker.before = incise_rig_tracker(rig)->ops;
 		tracker.ops = *tracker.before;
@@ -401,12 +388,12 @@ static void measure_rate(const struct series *s, bool quick, struct rate_row *ro
 	incise_scene_free(scene);
 }
 
-static struct rate_row rates[N(series) * N(rates_hz)];
+static struct rate_row rates[N(cut_series) * N(rates_hz)];
 
 static void measure_rates(bool quick)
 {
 	for (int i = 0; i < N(rates); i++) {
-		const struct series *s = &series[i / N(rates_hz)];
+		const struct cut_series *s = &cut_series[i / N(rates_hz)];
 
 		rates[i] = (struct rate_row){.wall = s->wall,
 					     .poses = s->poses,
@@ -494,8 +481,7 @@ static const struct bench_table wakeup_table = {
 
 /* A line of text: of the loop, or of cyclictest below it. */
 struct line {
-	char rate[16];
-	const char *load, *program, *failed;
+	const char *rate, *load, *program, *failed;
 	struct lateness late;
 	double skipped, machine, ratio;
 };
@@ -523,42 +509,32 @@ static void print_wakeups(struct bench_run *run, const struct wakeups *wakeups)
 	struct line lines[2 * WAKEUPS_MAX];
 	const char *no_cyclictest = NULL;
 	double frames_hz = NAN;
-	char priority[12] = "";
 	int n = 0;
 
 	for (int i = 0; i < wakeups->n; i++) {
 		const struct wakeup *row = &wakeups->row[i];
 
-		lines[n] = (struct line){
-			.load = row->load,
-			.program = "loop",
-			.failed = row->no_load,
-			.late = row->loop,
-			.skipped = (double)row->skipped,
-			.machine = row->machine,
-			.ratio = row->ratio,
-		};
-		snprintf(lines[n].rate, sizeof(lines[n].rate), "%g", row->rate_hz);
-		n++;
+		lines[n++] = (struct line){cli_text("%g", row->rate_hz),
+					   row->load,
+					   "loop",
+					   row->no_load,
+					   row->loop,
+					   (double)row->skipped,
+					   row->machine,
+					   row->ratio};
 		if (row->cyclictest.bins)
-			lines[n++] = (struct line){.rate = " ",
-						   .load = " ",
-						   .program = "cyclictest",
-						   .late = row->cyclictest,
-						   .skipped = NAN,
-						   .machine = NAN,
-						   .ratio = NAN};
+			lines[n++] = (struct line){
+				" ", " ", "cyclictest", NULL, row->cyclictest,
+				NAN, NAN, NAN};
 		frames_hz = fmax(frames_hz, row->frames_hz);
 		if (!row->no_load && row->no_cyclictest)
 			no_cyclictest = row->no_cyclictest;
 	}
-	if (wakeups->realtime)
-		snprintf(priority, sizeof(priority), " %d", INCISE_REALTIME_PRIORITY);
-	bench_text(run, "\nwake-ups, us late; %.3g s each; %s%s, CPU %d\n",
+	bench_text(run, "\nwake-ups, us late; %.3g s each; %s, CPU %d\n",
 		   wakeups->seconds,
-		   wakeups->realtime ? "SCHED_FIFO"
+		   wakeups->realtime ? cli_text("SCHED_FIFO %d", INCISE_REALTIME_PRIORITY)
 				     : "SCHED_OTHER, as real time is not granted",
-		   priority, wakeups->cpu);
+		   wakeups->cpu);
 	bench_lines(run, &line_table, lines, n);
 	if (frames_hz > 0)
 		bench_text(run, "view: %.1f pictures a second\n", frames_hz);
@@ -623,18 +599,6 @@ static void report_wakeups(struct bench_run *run, const struct wakeups *wakeups)
 
 /* --- the bench --- */
 
-static enum load load_named(const char *name)
-{
-	int load = 0;
-
-	while (name && load < LOADS && strcmp(name, load_names[load]))
-		load++;
-	if (name && load == LOADS)
-		cli_usage("--load: '%s' is none of idle, cpu, memory, disk and view",
-			  name);
-	return name ? (enum load)load : LOADS;
-}
-
 /* Members of the first rows, where scripts look for them. */
 static void report_first(struct bench_run *run, const struct tick_row *tick,
 			 const struct wakeup *row)
@@ -653,13 +617,16 @@ static void run(struct bench_run *run)
 {
 	static struct tick_row ticks[N(own)];
 	static struct wakeups wakeups;
-	enum load only = load_named(run->load);
+	enum load_kind only =
+		run->load ? (enum load_kind)cli_choice("load", run->load, load_names,
+						       "idle, cpu, memory, disk and view")
+			  : LOADS;
 	const char *scene = run->n_operands ? run->operands[0] : NULL;
 	int n = scene ? 1 : N(own);
 
 	if (scene) {
 		ticks[0].name = scene;
-		load(scene, &ticks[0]);
+		load_scene(scene, &ticks[0]);
 	}
 	for (int i = 0; i < n && !scene; i++)
 		load_own(&own[i], &ticks[i]);
@@ -680,23 +647,6 @@ static void run(struct bench_run *run)
 	bench_table(run, &rates_table, rates, N(rates));
 }
 
-static const struct bench_plot plots[] = {
-	{.suffix = "wakeups",
-	 .script = text_loop_wakeups_gp,
-	 .width = 350,
-	 .height = 360,
-	 .across = "load",
-	 .down = "rate_hz",
-	 .data = {&wakeup_table, "rate_hz,load,title", "failed="},
-	 .more = {&bench_points, "block"}},
-	{.suffix = "rates",
-	 .script = text_loop_rates_gp,
-	 .width = 1320,
-	 .height = 620,
-	 .data = {&rates_table, "stiffness_N_mm,poses", "failed="}},
-	{0},
-};
-
 const struct bench bench_loop = {
 	.name = "loop",
 	.operands = "[SCENE]",
@@ -706,5 +656,17 @@ const struct bench bench_loop = {
 	.takes_duration = true,
 	.takes_load = true,
 	.run = run,
-	.plots = plots,
+	.plots = {{.suffix = "wakeups",
+		   .script = text_loop_wakeups_gp,
+		   .width = 350,
+		   .height = 360,
+		   .across = "load",
+		   .down = "rate_hz",
+		   .data = {&wakeup_table, "rate_hz,load,title", "failed="},
+		   .more = {&bench_points, "block"}},
+		  {.suffix = "rates",
+		   .script = text_loop_rates_gp,
+		   .width = 1320,
+		   .height = 620,
+		   .data = {&rates_table, "stiffness_N_mm,poses", "failed="}}},
 };

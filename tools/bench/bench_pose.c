@@ -9,7 +9,6 @@
  *   ticks     | | | | | | | | | | | | | | | | | | |
  *                       '─ age of the last pose: 4 ms … a period more
  */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,11 +18,8 @@
 #include "../../lib/base/vector.h"
 #include "../../lib/control/predict.h"
 #include "bench.h"
-#include "../cli/cli.h"
 #include "../cli/stopwatch.h"
 #include "noise.h"
-
-#define N(array) (int)(sizeof(array) / sizeof(*(array)))
 
 #define TICKS 16000
 #define QUICK_TICKS 3500
@@ -157,9 +153,7 @@ static void surgeon_states(const int64_t *t_ns, int n, struct state *states)
 	config.depth_mm[0] = 5;
 	config.depth_mm[1] = 20;
 	config.times[0] = config.times[1] = 1;
-	sim = clock ? incise_sim_new(&config, clock, &err) : NULL;
-	if (!sim)
-		cli_fail_with(&err);
+	sim = cli_require(clock ? incise_sim_new(&config, clock, &err) : NULL, &err);
 	for (int k = 0; k < n; k++) {
 		struct incise_sim_truth truth[3];
 
@@ -245,7 +239,7 @@ static void times_quaternion(double q[4], const double by[4])
 	q[3] = a[0] * by[3] + a[1] * by[2] - a[2] * by[1] + a[3] * by[0];
 }
 
-static void disturb(const struct state *state, struct noise *noise,
+static void disturb(const struct state *state, uint64_t *noise,
 		    struct incise_tracker_sample *sample)
 {
 	double shake[4] = {1}, length = 1;
@@ -277,11 +271,11 @@ static void take_poses(struct track *track, int64_t *taken_ns)
 	const struct condition *c = &track->condition;
 	double period_ns = INCISE_NS_PER_S / (c->tracker_hz * (1 + DRIFT_PPM * 1e-6));
 	int all = (int)((double)c->ticks * TICK_NS / period_ns);
-	struct state *states = bench_alloc(all, sizeof(*states));
-	struct noise noise = {SEED};
+	struct state *states = cli_alloc(all, sizeof(*states));
+	uint64_t noise = SEED;
 	int64_t before_ns = 0;
 
-	track->samples = bench_alloc(all + 1, sizeof(*track->samples));
+	track->samples = cli_alloc(all + 1, sizeof(*track->samples));
 	for (int k = 0; k < all; k++)
 		taken_ns[k] = BEGIN_NS + llround(k * period_ns);
 	states_at(c->motion, taken_ns, all, states);
@@ -311,13 +305,13 @@ static void set_ticks(struct track *track, const int64_t *taken_ns)
 {
 	const struct condition *c = &track->condition;
 	int64_t delay_ns = llround(c->delay_ms * 1e6),
-		*before_ns = bench_alloc(c->ticks, sizeof(*before_ns));
+		*before_ns = cli_alloc(c->ticks, sizeof(*before_ns));
 
-	track->t_ns = bench_alloc(c->ticks, sizeof(*track->t_ns));
-	track->truth = bench_alloc(c->ticks, sizeof(*track->truth));
-	track->late = bench_alloc(c->ticks, sizeof(*track->late));
-	track->age_s = bench_alloc(c->ticks, sizeof(*track->age_s));
-	track->counts = bench_alloc(c->ticks, sizeof(*track->counts));
+	track->t_ns = cli_alloc(c->ticks, sizeof(*track->t_ns));
+	track->truth = cli_alloc(c->ticks, sizeof(*track->truth));
+	track->late = cli_alloc(c->ticks, sizeof(*track->late));
+	track->age_s = cli_alloc(c->ticks, sizeof(*track->age_s));
+	track->counts = cli_alloc(c->ticks, sizeof(*track->counts));
 	for (int k = 0, come = 0; k < c->ticks; k++) {
 		int64_t t_ns = BEGIN_NS + (int64_t)k * TICK_NS;
 
@@ -338,7 +332,7 @@ static void set_ticks(struct track *track, const int64_t *taken_ns)
 
 static struct track track_begin(const struct condition *c)
 {
-	int64_t *taken_ns = bench_alloc((size_t)c->ticks * 2, sizeof(*taken_ns));
+	int64_t *taken_ns = cli_alloc((size_t)c->ticks * 2, sizeof(*taken_ns));
 	struct track track = {
 		.condition = *c,
 		.info = {.name = "bench",
@@ -367,21 +361,19 @@ static void track_end(struct track *track)
 
 struct method {
 	const char *name;
-	void *(*begin)(const struct method *method,
+	/* Returns a state that free(3) releases. */
+	void *(*start)(const struct method *method,
 		       const struct incise_tracker_info *info);
 	void (*add)(void *state, const struct incise_tracker_sample *sample);
 	void (*at)(const void *state, int64_t t_ns, struct state *shown);
-	void (*end)(void *state);
 	double noise_mm; /* given to the library; 0: it is not */
 	bool punctual;	 /* it assumes that the tracker is not late */
 };
 
 #define LAST 6
 
-/*
- * Position over time since the last pose, of each axis: x + v t + a t². The time between
- * poses is that of their numbers: arrivals of two are a jitter apart.
- */
+/* Position over time since the last pose, of each axis: x + v t + a t². The time between
+ * poses is that of their numbers: arrivals of two are a jitter apart. */
 struct last {
 	double rate_hz;
 	int64_t latency_ns, t_ns; /* acquisition of the last */
@@ -392,10 +384,10 @@ struct last {
 	double x[3], v[3], a[3];
 };
 
-static void *last_begin(const struct method *method,
+static void *last_start(const struct method *method,
 			const struct incise_tracker_info *info)
 {
-	struct last *last = bench_alloc(1, sizeof(*last));
+	struct last *last = cli_alloc(1, sizeof(*last));
 
 	(void)method;
 	last->rate_hz = info->rate_hz;
@@ -496,11 +488,11 @@ static void last_at(const void *state, int64_t t_ns, struct state *shown)
 	memcpy(shown->quaternion, last->quaternion, sizeof(last->quaternion));
 }
 
-static void *library_begin(const struct method *method,
+static void *library_start(const struct method *method,
 			   const struct incise_tracker_info *info)
 {
 	struct incise_tracker_info assumed = *info;
-	struct incise_predict *predict = bench_alloc(1, sizeof(*predict));
+	struct incise_predict *predict = cli_alloc(1, sizeof(*predict));
 
 	if (method->punctual)
 		assumed.latency_ns = 0;
@@ -519,17 +511,15 @@ static void library_at(const void *state, int64_t t_ns, struct state *shown)
 			  shown->quaternion);
 }
 
-#define LIBRARY library_begin, library_add, library_at, free
-
 #define METHODS 7
 static const struct method methods[METHODS + 1] = {
-	{"held", last_begin, held_add, held_at, free, 0, false},
-	{"line", last_begin, line_add, last_at, free, 0, false},
-	{"parabola", last_begin, fit_add, last_at, free, 0, false},
-	{"library", LIBRARY, 0, false},
-	{"library_5um", LIBRARY, 0.005, false},
-	{"library_100um", LIBRARY, 0.1, false},
-	{"library_punctual", LIBRARY, 0, true},
+	{"held", last_start, held_add, held_at, 0, false},
+	{"line", last_start, line_add, last_at, 0, false},
+	{"parabola", last_start, fit_add, last_at, 0, false},
+	{"library", library_start, library_add, library_at, 0, false},
+	{"library_5um", library_start, library_add, library_at, 0.005, false},
+	{"library_100um", library_start, library_add, library_at, 0.1, false},
+	{"library_punctual", library_start, library_add, library_at, 0, true},
 	{.name = "exact_delayed"}, /* the true pose of the delay before */
 };
 
@@ -537,7 +527,7 @@ static const struct method methods[METHODS + 1] = {
 static void show(const struct track *track, const struct method *method,
 		 struct state *shown, bool all)
 {
-	void *state = method->begin(method, &track->info);
+	void *state = method->start(method, &track->info);
 	int come = 0;
 
 	for (int k = 0; k < track->condition.ticks; k++) {
@@ -545,7 +535,7 @@ static void show(const struct track *track, const struct method *method,
 			method->add(state, &track->samples[come++]);
 		method->at(state, track->t_ns[k], &shown[all ? k : 0]);
 	}
-	method->end(state);
+	free(state);
 }
 
 /* --- error --- */
@@ -646,12 +636,12 @@ static void measure_row(const struct track *track, const struct method *method,
 			struct row *row)
 {
 	int ticks = track->condition.ticks, n = 0;
-	struct state *own = bench_alloc(ticks, sizeof(*own)),
-		     *shown = method->begin ? own : track->late;
-	double *place = bench_alloc(3 * (size_t)ticks, sizeof(*place)),
+	struct state *own = cli_alloc(ticks, sizeof(*own)),
+		     *shown = method->start ? own : track->late;
+	double *place = cli_alloc(3 * (size_t)ticks, sizeof(*place)),
 	       *speed = place + ticks, *turn = speed + ticks;
 
-	if (method->begin)
+	if (method->start)
 		show(track, method, shown, true);
 	for (int k = 0; k < ticks; k++) {
 		const struct state *is = &track->truth[k];
@@ -734,9 +724,13 @@ static void measure_times(int repeats)
 	for (int i = 0; i < N(variants); i++) {
 		timed[i] = (struct timed){&tracks[i / METHODS], &methods[i % METHODS]};
 		variants[i] = (struct harness_variant){
-			.run = run_timed, .context = &timed[i], .units = TIMED_TICKS};
+			.run = run_timed,
+			.context = &timed[i],
+			.units = TIMED_TICKS,
+			.time = &times[i / METHODS][i % METHODS],
+		};
 	}
-	harness_times(variants, N(variants), repeats, times[0]);
+	harness_times(variants, N(variants), repeats);
 	for (int r = 0; r < N(rates_hz); r++)
 		track_end(&tracks[r]);
 }
@@ -805,12 +799,11 @@ static void report(struct bench_run *run, int repeats, int ticks)
 	static struct bench_table losses_table;
 	const int per_block = N(rates_hz) * ROWS;
 
-	bench_text(
-		run,
-		"poses with %g mm of noise, %g ms of jitter, %g %% lost; %g s at 1000 ticks a "
-		"second; times of %d runs in turn\n%s\n",
-		NOISE_MM, JITTER_MS, LOST * 100, ticks * 1e-3, repeats,
-		bench_machine(run, NULL));
+	bench_text(run,
+		   "poses with %g mm of noise, %g ms of jitter, %g %% lost; %g s at 1000 "
+		   "ticks a second; times of %d runs in turn\n%s\n",
+		   NOISE_MM, JITTER_MS, LOST * 100, ticks * 1e-3, repeats,
+		   bench_machine(run, NULL));
 	for (const struct row *block = rows; block < rows + N(rows); block += per_block) {
 		bench_text(run, "\n%s; %g ms late\n", block->panel, block->delay_ms);
 		bench_block(run, &rows_block, sizeof(*rows), block, ROWS, N(rates_hz),
@@ -864,22 +857,17 @@ static void run(struct bench_run *run)
 	report(run, repeats, c.ticks);
 }
 
-static const struct bench_plot plots[] = {
-	{.script = text_pose_gp,
-	 .width = 1320,
-	 .height = 860,
-	 .data = {&rows_table, "panel,name", "delay_ms=4"}},
-	{.suffix = "rates",
-	 .script = text_pose_gp,
-	 .width = 1320,
-	 .height = 860,
-	 .data = {&rows_table, "panel,name", "delay_ms=4"}},
-	{0},
-};
-
 const struct bench bench_pose = {
 	.name = "pose",
 	.summary = "error of the pose over the tracker's rate, delay and cost",
 	.run = run,
-	.plots = plots,
+	.plots = {{.script = text_pose_gp,
+		   .width = 1320,
+		   .height = 860,
+		   .data = {&rows_table, "panel,name", "delay_ms=4"}},
+		  {.suffix = "rates",
+		   .script = text_pose_gp,
+		   .width = 1320,
+		   .height = 860,
+		   .data = {&rows_table, "panel,name", "delay_ms=4"}}},
 };

@@ -4,8 +4,6 @@
  * and another project's among them, over the same points.
  */
 #include <dlfcn.h>
-#include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +11,6 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include "bench.h"
-#include "../cli/cli.h"
 #include "../cli/json.h"
 #include "noise.h"
 #include "reference.h"
@@ -31,7 +28,7 @@
 struct points {
 	size_t n;
 	int n_inputs;
-	double *x, *y;
+	double *x_double, *y_double;
 	float *x_float, *y_float;
 	int32_t *x_fixed, *y_fixed;
 	double *truth; /* eq. (3) in long double */
@@ -81,7 +78,7 @@ struct plain {
 static struct plain *plain_new(const struct incise_model *model)
 {
 	const struct incise_model_info *info = incise_model_info(model);
-	struct plain *m = bench_alloc(1, sizeof(*m));
+	struct plain *m = cli_alloc(1, sizeof(*m));
 
 	m->n_inputs = info->n_inputs;
 	m->n_rules = info->n_rules;
@@ -144,34 +141,33 @@ static double true_output(const struct plain *m, const double *x)
 	return (double)(sum / weights);
 }
 
-static void points_init(struct points *p, const struct incise_model *model, size_t n)
+static void points_init(struct points *p, const struct incise_model *model,
+			const struct plain *m, size_t n)
 {
-	struct plain *m = plain_new(model);
 	size_t values = n * m->n_inputs;
 	uint64_t seed = 1;
 
 	*p = (struct points){
 		.n = n,
 		.n_inputs = m->n_inputs,
-		.x = bench_alloc(values, sizeof(double)),
-		.y = bench_alloc(n, sizeof(double)),
-		.x_float = bench_alloc(values, sizeof(float)),
-		.y_float = bench_alloc(n, sizeof(float)),
-		.x_fixed = bench_alloc(values, sizeof(int32_t)),
-		.y_fixed = bench_alloc(n, sizeof(int32_t)),
-		.truth = bench_alloc(n, sizeof(double)),
+		.x_double = cli_alloc(values, sizeof(double)),
+		.y_double = cli_alloc(n, sizeof(double)),
+		.x_float = cli_alloc(values, sizeof(float)),
+		.y_float = cli_alloc(n, sizeof(float)),
+		.x_fixed = cli_alloc(values, sizeof(int32_t)),
+		.y_fixed = cli_alloc(n, sizeof(int32_t)),
+		.truth = cli_alloc(n, sizeof(double)),
 	};
 	for (size_t k = 0; k < values; k++) {
 		const struct incise_variable *v =
 			&incise_model_info(model)->input[(int)(k % m->n_inputs)];
 
-		p->x[k] = v->min + (v->max - v->min) * lcg_uniform(&seed);
-		p->x_float[k] = (float)p->x[k];
-		p->x_fixed[k] = (int32_t)lrint(p->x[k] * INCISE_FIXED_ONE);
+		p->x_double[k] = v->min + (v->max - v->min) * lcg_uniform(&seed);
+		p->x_float[k] = (float)p->x_double[k];
+		p->x_fixed[k] = (int32_t)lrint(p->x_double[k] * INCISE_FIXED_ONE);
 	}
 	for (size_t k = 0; k < n; k++)
-		p->truth[k] = true_output(m, p->x + k * m->n_inputs);
-	free(m);
+		p->truth[k] = true_output(m, p->x_double + k * m->n_inputs);
 }
 
 /* --- evaluators --- */
@@ -182,7 +178,7 @@ static void run_libm(const struct row *row, const struct points *p)
 	const struct plain *m = row->context;
 
 	for (size_t k = 0; k < p->n; k++) {
-		const double *x = p->x + k * m->n_inputs;
+		const double *x = p->x_double + k * m->n_inputs;
 		double sum = 0, weights = 0;
 
 		for (int r = 0; r < m->n_rules; r++) {
@@ -198,21 +194,8 @@ static void run_libm(const struct row *row, const struct points *p)
 			sum += w * y;
 			weights += w;
 		}
-		p->y[k] = sum / weights;
+		p->y_double[k] = sum / weights;
 	}
-}
-
-static void run_double(const struct row *row, const struct points *p)
-{
-	for (size_t k = 0; k < p->n; k++)
-		p->y[k] = separable_eval_double(row->context, p->x + k * p->n_inputs);
-}
-
-static void run_float(const struct row *row, const struct points *p)
-{
-	for (size_t k = 0; k < p->n; k++)
-		p->y_float[k] =
-			separable_eval_float(row->context, p->x_float + k * p->n_inputs);
 }
 
 /* The library's: any kind and shape of model, any input, and its flags. */
@@ -221,7 +204,8 @@ static void run_library(const struct row *row, const struct points *p)
 	unsigned int flags;
 
 	for (size_t k = 0; k < p->n; k++)
-		p->y[k] = incise_model_eval(row->context, p->x + k * p->n_inputs, &flags);
+		p->y_double[k] = incise_model_eval(row->context,
+						   p->x_double + k * p->n_inputs, &flags);
 }
 
 static void run_fixed(const struct row *row, const struct points *p)
@@ -248,27 +232,21 @@ static void run_reference(const struct row *row, const struct points *p)
 {
 	const struct opened *opened = row->context;
 
-	opened->reference->run(opened->handle, p->x, p->y, p->n);
+	opened->reference->run(opened->handle, p->x_double, p->y_double, p->n);
 }
 
 /* --- the list of them --- */
 
 static struct row *add(struct evaluators *all, const char *kind,
 		       void (*run)(const struct row *, const struct points *),
-		       const void *context, const char *fmt, ...) INCISE_PRINTF(5, 6);
-static struct row *add(struct evaluators *all, const char *kind,
-		       void (*run)(const struct row *, const struct points *),
-		       const void *context, const char *fmt, ...)
+		       const void *context, const char *name)
 {
 	struct row *row = &all->row[all->n++];
-	va_list args;
 
 	if (all->n > ROWS_MAX)
 		abort();
 	*row = (struct row){.kind = kind, .run = run, .context = context};
-	va_start(args, fmt);
-	vsnprintf(row->name, sizeof(row->name), fmt, args);
-	va_end(args);
+	snprintf(row->name, sizeof(row->name), "%s", name);
 	return row;
 }
 
@@ -278,7 +256,7 @@ static struct row *add_compiled(struct evaluators *all, const char *kind,
 				const char *why)
 {
 	struct row *row =
-		add(all, kind, kind == batch ? run_batch : run_fixed, fixed, "%s", name);
+		add(all, kind, kind == batch ? run_batch : run_fixed, fixed, name);
 
 	row->fixed = fixed;
 	if (fixed)
@@ -312,11 +290,9 @@ static const struct incise_fixed *add_fixed(struct evaluators *all,
 static const struct reference *load_reference(const char **why)
 {
 	const struct reference *found = NULL;
+	char *path = cli_text("%s/../lib/incise/peer_fuzzylite.so", cli_folder());
 	void *object;
-	char *path;
 
-	if (asprintf(&path, "%s/../lib/incise/peer_fuzzylite.so", cli_folder()) < 0)
-		cli_fail("no memory");
 	*why = "not built in: libfuzzylite-dev was absent";
 	if (!access(path, F_OK)) {
 		object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
@@ -343,7 +319,8 @@ static void add_reference(struct evaluators *all, const struct incise_model *mod
 	opened.handle = opened.reference->open(model, row->failed, sizeof(row->failed));
 }
 
-static void add_all(struct evaluators *all, const struct incise_model *model)
+static void add_all(struct evaluators *all, const struct incise_model *model,
+		    const struct plain *plain)
 {
 	static const int table_cells[] = {64, 128, 256, 512, 1024};
 	static const int force_cells[] = {32, 64, 128, 256, 512, 1024, 2048, 4096};
@@ -351,27 +328,23 @@ static void add_all(struct evaluators *all, const struct incise_model *model)
 	struct incise_fixed_options any = {.arithmetic = -1};
 	struct incise_error err = {0};
 	struct incise_fixed *fixed;
-	struct plain *plain;
 
 	/* Without a budget only the model's kind or shape can stand against it. */
-	fixed = incise_fixed_compile(model, &any, &err);
-	if (!fixed)
-		cli_fail_with(&err);
+	fixed = cli_require(incise_fixed_compile(model, &any, &err), &err);
 	incise_fixed_free(fixed);
-	plain = plain_new(model);
 	add(all, floating, run_libm, plain, "double_libm");
 	add(all, floating, run_double, separable_new_double(plain), "double_separable");
 	add(all, floating, run_library, model, "double_library");
 	add(all, floating, run_float, separable_new_float(plain), "float");
 	add_fixed(all, model, INCISE_FIXED_DIRECT, 0, 0, "fixed_direct");
-	for (size_t i = 0; i < sizeof(table_cells) / sizeof(*table_cells); i++)
+	for (int i = 0; i < N(table_cells); i++)
 		add_fixed(all, model, INCISE_FIXED_TABLE, table_cells[i], 0,
 			  "fixed_table");
 	incise_fixed_options_init(&any);
 	fixed_table =
 		add_fixed(all, model, INCISE_FIXED_TABLE, 0, any.budget, "fixed_table");
 	/* Up to the first that does not fit; that one is listed as well. */
-	for (size_t i = 0; i < sizeof(force_cells) / sizeof(*force_cells); i++) {
+	for (int i = 0; i < N(force_cells); i++) {
 		finer = add_fixed(all, model, INCISE_FIXED_FORCE, force_cells[i], 0,
 				  "force_table");
 		if (!finer)
@@ -391,7 +364,7 @@ static double answer(const struct row *row, const struct points *p, size_t k)
 {
 	if (row->fixed)
 		return p->y_fixed[k] / (double)INCISE_FIXED_ONE;
-	return row->run == run_float ? p->y_float[k] : p->y[k];
+	return row->run == run_float ? p->y_float[k] : p->y_double[k];
 }
 
 static void measure_error(struct row *row, const struct points *p)
@@ -434,7 +407,6 @@ static void measure_times(struct evaluators *all, const struct points *points,
 			  int repeats)
 {
 	struct harness_variant variants[ROWS_MAX] = {{0}};
-	struct harness_time times[ROWS_MAX];
 	struct points timed = *points;
 
 	timed.n = TIMED_POINTS;
@@ -444,15 +416,14 @@ static void measure_times(struct evaluators *all, const struct points *points,
 			.run = run_timed,
 			.context = &all->row[i],
 			.units = isnan(all->row[i].max_error) ? 0 : TIMED_POINTS,
+			.time = &all->row[i].time,
 		};
 	}
-	harness_times(variants, all->n, repeats, times);
-	for (int i = 0; i < all->n; i++) {
-		/* The reference is the last one. */
-		all->row[i].time = times[i];
-		all->row[i].times_reference =
-			times[all->n - 1].ns.median / times[i].ns.median;
-	}
+	harness_times(variants, all->n, repeats);
+	/* The reference is the last one. */
+	for (struct row *row = all->row; row < all->row + all->n; row++)
+		row->times_reference =
+			all->row[all->n - 1].time.ns.median / row->time.ns.median;
 }
 
 /* Paper 1's shape with a force surface of its kind. */
@@ -500,18 +471,18 @@ static const struct bench_table rows_table = {
 
 static void run(struct bench_run *run)
 {
-	struct evaluators *all = bench_alloc(1, sizeof(*all));
+	struct evaluators *all = cli_alloc(1, sizeof(*all));
 	struct incise_error err = {0};
-	struct incise_model *model = run->n_operands
-					     ? incise_model_load(run->operands[0], &err)
-					     : own_model(&err);
+	struct incise_model *model =
+		cli_require(run->n_operands ? incise_model_load(run->operands[0], &err)
+					    : own_model(&err),
+			    &err);
 	int repeats = run->quick ? QUICK_REPEATS : REPEATS;
+	struct plain *plain = plain_new(model);
 	struct points points;
 
-	if (!model)
-		cli_fail_with(&err);
-	add_all(all, model);
-	points_init(&points, model, run->quick ? TIMED_POINTS : POINTS);
+	add_all(all, model, plain);
+	points_init(&points, model, plain, run->quick ? TIMED_POINTS : POINTS);
 	for (int i = 0; i < all->n; i++)
 		measure_error(&all->row[i], &points);
 	measure_times(all, &points, repeats);
@@ -534,19 +505,14 @@ static void run(struct bench_run *run)
 	bench_failures(run, &rows_table, all->row, all->n, "{name}");
 }
 
-static const struct bench_plot plots[] = {
-	{.script = text_precision_gp,
-	 .width = 1100,
-	 .height = 800,
-	 .data = {&rows_table, "kind", "failed="}},
-	{0},
-};
-
 const struct bench bench_precision = {
 	.name = "precision",
 	.operands = "[MODEL.fis]",
 	.summary = "arithmetics of a model, without MODEL of the paper's size",
 	.n_operands = 1,
 	.run = run,
-	.plots = plots,
+	.plots = {{.script = text_precision_gp,
+		   .width = 1100,
+		   .height = 800,
+		   .data = {&rows_table, "kind", "failed="}}},
 };

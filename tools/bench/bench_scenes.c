@@ -6,14 +6,13 @@
  * the same to the bit.
  */
 #include <glob.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/plan.h>
 #include "../../lib/base/vector.h"
 #include "../cli/child.h"
-#include "../cli/cli.h"
 #include "../cli/json.h"
 #include "../cli/mapped_libraries.h"
 #include "../cli/scene_argument.h"
@@ -26,8 +25,7 @@
 
 #define SCENES_MAX 64
 
-/*
- * --- trajectory: the same work for several plans of a scene ---
+/* --- trajectory: the same work for several plans of a scene ---
  *
  * Strokes over its surface (stroke.h), one after the other, with blade, handle and tube in turn,
  * and the poses of them all made before.
@@ -91,10 +89,8 @@ static void vary(struct incise_tracker_sample *sample, const struct stroke *stro
 	sample->quaternion[1 + number / 3 % 3] = sin(half);
 }
 
-/*
- * Plain strokes are 1 mm deep; varied ones are up to 30 mm deeper, the scalpel turns about, and at
- * times no poses come. With @inserts the plan has handle and tube; else it is always the blade.
- */
+/* Plain strokes are 1 mm deep; varied ones are up to 30 mm deeper, the scalpel turns about, and at
+ * times no poses come. With @inserts the plan has handle and tube; else it is always the blade. */
 static void make_trajectory(struct trajectory *trajectory,
 			    const struct incise_scene *scene,
 			    const struct incise_plan *plan, int strokes, bool inserts,
@@ -114,8 +110,7 @@ static void make_trajectory(struct trajectory *trajectory,
 	trajectory->ticks =
 		(int)(trajectory->stroke_ns / trajectory->period_ns) * strokes;
 	each = (int)(STROKE_S * trajectory->tracker.rate_hz);
-	trajectory->poses =
-		bench_alloc((size_t)each * strokes, sizeof(*trajectory->poses));
+	trajectory->poses = cli_alloc((size_t)each * strokes, sizeof(*trajectory->poses));
 	incise_scene_scalpel(scene, &scalpel);
 	stroke_begin(&stroke, plan, &trajectory->tracker);
 	for (int i = 0; i < each * strokes; i++) {
@@ -214,7 +209,7 @@ struct scene {
 	int libraries_mapped; /* 0: not seen */
 	/* Of the report; texts with ", " between names, or NULL. */
 	json_t *stages, *left_out, *libraries, *not_mapped, *devices, *files;
-	json_t *difference, *identical, *failure;
+	json_t *difference, *identical;
 	const char *forces; /* "same" */
 	char failed[520];   /* or "" */
 };
@@ -229,10 +224,8 @@ static struct scene *add(struct scenes *s, const char *name, size_t length,
 			 const char *path)
 {
 	struct scene *scene = &s->scene[s->n++];
-	char *copy = strndup(name, length);
+	char *copy = cli_text("%.*s", (int)length, name);
 
-	if (!copy)
-		cli_fail("no memory");
 	/* A file's name may be anyone's: it breaks no line. */
 	for (char *c = copy; *c; c++)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
@@ -290,8 +283,8 @@ static const struct {
 /* As files in memory, which stay. */
 static void add_made(struct scenes *s)
 {
-	for (size_t i = 0; i < sizeof(made) / sizeof(*made); i++) {
-		struct memory_file *file = bench_alloc(2, sizeof(*file));
+	for (int i = 0; i < N(made); i++) {
+		struct memory_file *file = cli_alloc(2, sizeof(*file));
 		char tissue[1000] = "";
 
 		file[0] = memory_file_begin(made[i].name);
@@ -317,14 +310,15 @@ static void add_made(struct scenes *s)
 #define COMPARED_TICKS 120000
 #define COMPARED_STROKES_MAX 1000 /* of a scene with few ticks a second */
 
-static bool has_stage(const struct incise_plan *plan, const char *stage)
+/* Number of a stage of a plan; -1: it has none of that name. */
+static int stage_of(const struct incise_plan *plan, const char *stage)
 {
 	const char *name;
 
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
 		if (!strcmp(name, stage))
-			return true;
-	return false;
+			return i;
+	return -1;
 }
 
 static bool open_variant(struct variant *v, const char *path, bool full,
@@ -343,7 +337,7 @@ static bool open_variant(struct variant *v, const char *path, bool full,
 /* Kept, the stage of the tool changes nothing: there is only the blade. */
 static bool inserts(const struct scene *s)
 {
-	return !s->kept && has_stage(s->few.plan, "tool");
+	return !s->kept && stage_of(s->few.plan, "tool") >= 0;
 }
 
 /* Make both plans, at the start of the trajectory that is timed and counted. */
@@ -430,7 +424,7 @@ static void watch_processes(struct scenes *s)
 static void time_single(struct variant *v, int runs)
 {
 	const size_t n = (size_t)runs * v->walk.trajectory->ticks;
-	double *times = bench_alloc(n * (INCISE_PLAN_STAGES_MAX + 1), sizeof(*times));
+	double *times = cli_alloc(n * (INCISE_PLAN_STAGES_MAX + 1), sizeof(*times));
 	double own = stopwatch_own_ns();
 	struct incise_tick tick;
 
@@ -462,23 +456,22 @@ static void time_single(struct variant *v, int runs)
 static void time_all(struct scenes *s, bool quick)
 {
 	struct harness_variant variants[2 * SCENES_MAX];
-	struct harness_time times[2 * SCENES_MAX];
 
-	for (int i = 0; i < s->n; i++) {
-		struct scene *scene = &s->scene[i];
+	for (int i = 0; i < 2 * s->n; i++) {
+		struct scene *scene = &s->scene[i / 2];
+		struct variant *variant = i % 2 ? &scene->full : &scene->few;
 
-		variants[2 * i] = variants[2 * i + 1] = (struct harness_variant){
+		variants[i] = (struct harness_variant){
 			.run = run_trajectory,
-			.context = &scene->few.walk,
-			.units = scene->measured ? scene->trajectory.ticks : 0};
-		variants[2 * i + 1].context = &scene->full.walk;
+			.context = &variant->walk,
+			.units = scene->measured ? scene->trajectory.ticks : 0,
+			.time = &variant->time,
+		};
 	}
-	harness_times(variants, 2 * s->n, quick ? QUICK_TURNS : TURNS, times);
+	harness_times(variants, 2 * s->n, quick ? QUICK_TURNS : TURNS);
 	for (int i = 0; i < s->n; i++) {
 		struct scene *scene = &s->scene[i];
 
-		scene->few.time = times[2 * i];
-		scene->full.time = times[2 * i + 1];
 		scene->times_cheaper =
 			scene->full.time.ns.median / scene->few.time.ns.median;
 		if (!scene->measured)
@@ -494,20 +487,24 @@ static void time_all(struct scenes *s, bool quick)
 
 static bool count(struct variant *v)
 {
-	const struct trajectory *trajectory = v->walk.trajectory;
-	struct instruction_counter counter;
+	const int ticks = v->walk.trajectory->ticks;
+	int counter = instructions_open();
+	uint64_t empty, sum = 0;
 	struct incise_tick tick;
 
-	if (!instructions_open(&counter))
+	if (counter < 0)
 		return false;
-	for (int i = 0; i < trajectory->ticks; i++) {
+	empty = instructions_now(counter);
+	empty = instructions_now(counter) - empty;
+	for (int i = 0; i < ticks; i++) {
 		int64_t t_ns = feed(&v->walk);
+		uint64_t before = instructions_now(counter);
 
-		instructions_begin(&counter);
 		incise_plan_tick(v->plan, t_ns, &tick);
-		instructions_end(&counter);
+		sum += instructions_now(counter) - before - empty;
 	}
-	v->instructions = instructions_close(&counter) / trajectory->ticks;
+	close(counter);
+	v->instructions = (double)sum / ticks;
 	return true;
 }
 
@@ -518,21 +515,21 @@ static void count_by_callgrind(struct scene *s)
 	struct callgrind callgrind[2];
 
 	for (int i = 0; i < 2; i++) {
-		char program[4096];
-		char *argv[] = {program,
+		char *argv[] = {cli_text("%s/incise-bench", cli_folder()),
 				"scenes",
 				(char *)s->path,
 				"--profile",
 				i || s->kept ? "full" : "needed",
 				NULL};
 
-		snprintf(program, sizeof(program), "%s/incise-bench", cli_folder());
 		callgrind_start(&callgrind[i], "incise_plan_tick", argv);
 	}
 	for (int i = 0; i < 2; i++)
 		variants[i]->instructions =
 			callgrind_end(&callgrind[i]) / s->trajectory.ticks;
 }
+
+#define NO_COUNTER "the kernel gives no counter of them (perf_event_open(2)), and "
 
 /* @return "counter" or "callgrind", or NULL with the reason @why there are none */
 static const char *count_all(struct scenes *s, bool quick, const char **why)
@@ -549,11 +546,8 @@ static const char *count_all(struct scenes *s, bool quick, const char **why)
 		if (by_counter)
 			continue;
 		if (quick || !child_possible("valgrind")) {
-			*why = quick ? "the kernel gives no counter of them "
-				       "(perf_event_open(2)), and callgrind takes too long "
-				       "for --quick"
-				     : "the kernel gives no counter of them "
-				       "(perf_event_open(2)), and valgrind is not installed";
+			*why = quick ? NO_COUNTER "callgrind takes too long for --quick"
+				     : NO_COUNTER "valgrind is not installed";
 			return NULL;
 		}
 		count_by_callgrind(scene);
@@ -616,7 +610,7 @@ static const struct bench_table table = {
 			COLUMN(scene, "ticks_in_contact", ticks_in_contact),
 			COLUMN(scene, "first_difference", difference),
 			COLUMN(scene, "identical", identical),
-			COLUMN(scene, "failed", failure),
+			COLUMN(scene, "failed", failed),
 			COLUMN(scene, "measured", measured, .data = true),
 		},
 	.metrics =
@@ -648,34 +642,24 @@ static const struct bench_table left_table = {
 		},
 };
 
-static void append(char *text, size_t size, const char *name)
-{
-	size_t n = strlen(text);
-
-	snprintf(text + n, size - n, "%s%s", n ? ", " : "", name);
-}
-
 /* Names with ", " between them; NULL of no list. Takes the list. */
 static json_t *joined(json_t *list)
 {
 	char text[8000] = "";
+	const json_t *name;
+	size_t i;
 
 	if (!list)
 		return NULL;
-	for (size_t i = 0; i < json_array_size(list); i++)
-		append(text, sizeof(text), json_string_value(json_array_get(list, i)));
+	json_array_foreach(list, i, name)
+	{
+		size_t n = strlen(text);
+
+		snprintf(text + n, sizeof(text) - n, "%s%s", n ? ", " : "",
+			 json_string_value(name));
+	}
 	json_decref(list);
 	return json_string(text);
-}
-
-static double neutral_ns(const struct variant *full, const char *stage)
-{
-	const char *name;
-
-	for (int i = 0; (name = incise_plan_stage(full->plan, i)); i++)
-		if (!strcmp(name, stage))
-			return full->stage_ns[i];
-	return NAN;
 }
 
 /* Name the stages, and add to those that are left out. */
@@ -684,7 +668,7 @@ static int name_stages(struct scene *s, struct left_out *left)
 	json_t *stages = json_array(), *left_out = json_array();
 	const struct incise_plan *plan = s->few.plan;
 	const char *name;
-	int n = 0;
+	int n = 0, full;
 
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
 		json_array_append_new(stages, json_string(name));
@@ -692,7 +676,8 @@ static int name_stages(struct scene *s, struct left_out *left)
 		json_array_append_new(left_out, json_string(name));
 		left[n].scene = s->name;
 		left[n].stage = name;
-		left[n].ns = neutral_ns(&s->full, name);
+		full = stage_of(s->full.plan, name);
+		left[n].ns = full < 0 ? NAN : s->full.stage_ns[full];
 	}
 	s->stages = joined(stages);
 	s->left_out = joined(left_out);
@@ -715,7 +700,6 @@ static int complete(struct scene *s, struct left_out *left)
 	s->libraries = joined(process->libraries);
 	s->devices = joined(process->devices);
 	s->files = joined(process->files);
-	s->failure = *s->failed ? json_text(s->failed) : NULL;
 	s->forces = "-";
 	if (!s->measured)
 		return 0;
@@ -770,22 +754,17 @@ static void print_notes(const struct bench_run *run, const struct scenes *all)
 			bench_text(run, "%s: %s\n", s->name, s->failed);
 		else if (s->measured && s->full.time.ns.low <= s->few.time.ns.high)
 			/* The 95 % intervals of the medians meet. */
-			bench_text(
-				run,
-				"%s: the full pipeline costs no more that could be told\n",
-				s->name);
+			bench_text(run,
+				   "%s: the full pipeline costs no more that could be "
+				   "told\n",
+				   s->name);
 	}
-}
-
-static json_t *text_json(const char *text)
-{
-	return text ? json_string(text) : json_null();
 }
 
 static void report(struct bench_run *run, struct scenes *all)
 {
 	struct left_out *left =
-		bench_alloc((size_t)all->n * INCISE_PLAN_STAGES_MAX + 1, sizeof(*left));
+		cli_alloc((size_t)all->n * INCISE_PLAN_STAGES_MAX + 1, sizeof(*left));
 	int n = 0, of[SCENES_MAX];
 
 	for (int i = 0; i < all->n; i++) {
@@ -794,13 +773,11 @@ static void report(struct bench_run *run, struct scenes *all)
 	}
 	bench_text(run,
 		   "a tick of each scene, and of the full pipeline: the same with every "
-		   "stage kept\n%s; %s; %s\n\n",
-		   bench_machine(run, "cpu"), bench_machine(run, "kernel"),
-		   bench_machine(run, "compiler"));
-	bench_value(run, "instructions_by", text_json(all->counted_by));
-	bench_value(run, "instructions_failed", text_json(all->not_counted));
-	bench_rows(run, &table, all->scene, all->n);
-	bench_lines(run, &table, all->scene, all->n);
+		   "stage kept\n%s\n\n",
+		   bench_machine(run, NULL));
+	bench_values(run, "{ss? ss?}", "instructions_by", all->counted_by,
+		     "instructions_failed", all->not_counted);
+	bench_table(run, &table, all->scene, all->n);
 	bench_rows(run, &left_table, left, n);
 	print_notes(run, all);
 	for (int i = 0; i < all->n; left += of[i++])
@@ -812,11 +789,11 @@ static void judge(struct bench_run *run, const struct scenes *all)
 {
 	for (int i = 0; i < all->n; i++)
 		if (all->scene[i].first_difference >= 0)
-			bench_fail(
-				run,
-				"%s: leaving out changes the force, first in tick %ld: "
-				"a fault of incise, please report it with the scene",
-				all->scene[i].name, all->scene[i].first_difference);
+			bench_fail(run,
+				   "%s: leaving out changes the force, first in tick "
+				   "%ld: a fault of incise, please report it with the "
+				   "scene",
+				   all->scene[i].name, all->scene[i].first_difference);
 	for (int i = 0; i < all->n && run->n_operands; i++)
 		if (*all->scene[i].failed)
 			bench_fail(run, "%s: not measured: %s", all->scene[i].name,
@@ -825,7 +802,7 @@ static void judge(struct bench_run *run, const struct scenes *all)
 
 static void run_scenes(struct bench_run *run)
 {
-	struct scenes *all = bench_alloc(1, sizeof(*all));
+	struct scenes *all = cli_alloc(1, sizeof(*all));
 
 	for (int i = 0; i < run->n_operands; i++)
 		add_given(all, run->operands[i]);
@@ -861,16 +838,6 @@ static void run_or_profile(struct bench_run *run)
 	exit(0);
 }
 
-static const struct bench_plot plots[] = {
-	{.script = text_scenes_gp,
-	 .width = 1150,
-	 .height = 46,
-	 .down = "name",
-	 .margin = 160,
-	 .data = {&table, "", "measured=1"}},
-	{0},
-};
-
 const struct bench bench_scenes = {
 	.name = "scenes",
 	.operands = "[SCENE...]",
@@ -878,5 +845,10 @@ const struct bench bench_scenes = {
 	.n_operands = SCENES_MAX,
 	.takes_profile = true,
 	.run = run_or_profile,
-	.plots = plots,
+	.plots = {{.script = text_scenes_gp,
+		   .width = 1150,
+		   .height = 46,
+		   .down = "name",
+		   .margin = 160,
+		   .data = {&table, "", "measured=1"}}},
 };

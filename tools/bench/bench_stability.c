@@ -4,12 +4,10 @@
  * theory says; the guard of passivity; integrators of a stiff spring. The device is light, in
  * a loop of 1 kHz.
  */
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "../../lib/control/plant.h"
 #include "../../lib/control/stability.h"
-#include "../cli/cli.h"
 #include "stability.h"
 
 /* --- a row of a simulation next to theory --- */
@@ -74,9 +72,8 @@ static double threshold(grows_fn grows, const void *context, double low, double 
 #define WALL_DELAY_MAX 64
 
 struct sampled_wall {
-	struct incise_plant
-		plant;	       /* device and what it is tied to; no Coulomb friction */
-	double damping_N_s_mm; /* of the wall, B */
+	struct incise_plant plant; /* the device, tied; no Coulomb friction */
+	double damping_N_s_mm;	   /* of the wall, B */
 	int delay;
 };
 
@@ -610,24 +607,22 @@ static void judge_ratios(struct bench_run *run, const struct ratios *ratios)
 			   e->key, missed, ratios->n, 100 * e->tolerance, params);
 }
 
-/* How far the worst ratio is off, and how many were tried. */
-struct summary {
-	const char *key;
-	double worst, n;
-};
+/* The deviation of the worst ratio, and the number of tries. */
+static void add_metrics(json_t *metrics, const struct ratios *ratios)
+{
+	const char *key = ratios->table.key;
+	double worst = 0, n = ratios->n;
 
-static const struct bench_table summary_table = {
-	.row_bytes = sizeof(struct summary),
-	.columns = {COLUMN(summary, "key", key)},
-	.metrics = {METRIC(EXACT, summary, worst, "1", "{key} worst ratio off"),
-		    METRIC(EXACT, summary, n, "1", "{key} tried",
-			   .more_is_better = true)},
-};
+	for (const struct ratio *r = ratios->row; r < ratios->row + ratios->n; r++)
+		/* Where theory is a lower bound more is not wrong. */
+		worst = fmax(worst, r->at_least ? 1 - r->ratio : fabs(r->ratio - 1));
+	metrics_add(metrics, METRIC_EXACT, &worst, "1", "%s worst ratio off", key);
+	metrics_more_is_better(
+		metrics_add(metrics, METRIC_EXACT, &n, "1", "%s tried", key));
+}
 
 static void report_ratios(struct bench_run *run)
 {
-	static struct summary summary[N(experiments)];
-
 	for (int i = 0; i < N(experiments); i++) {
 		struct ratios *r = &results[i];
 		const char *note = experiments[i].note;
@@ -636,17 +631,9 @@ static void report_ratios(struct bench_run *run)
 		bench_text(run, "%s\n", experiments[i].title);
 		bench_table(run, &r->table, r->row, r->n);
 		bench_text(run, "%s%s\n", note ? note : "", note ? "\n" : "");
-		summary[i] = (struct summary){.key = r->table.key, .n = r->n};
-		for (int k = 0; k < r->n; k++) {
-			double off = r->row[k].ratio - 1;
-
-			/* Where theory is a lower bound more is not wrong. */
-			summary[i].worst = fmax(summary[i].worst,
-						r->row[k].at_least ? -off : fabs(off));
-		}
+		add_metrics(run->metrics, r);
 		judge_ratios(run, r);
 	}
-	bench_rows(run, &summary_table, summary, N(experiments));
 }
 
 /* Curves of theory for the map, for unit mass and period. */
@@ -695,34 +682,29 @@ static void run(struct bench_run *run)
 	stability_integrators(run);
 }
 
-static const struct bench_plot plots[] = {
-	{.suffix = "map",
-	 .script = text_stability_map_gp,
-	 .width = 440,
-	 .height = 520,
-	 .across = "BT_m",
-	 .data = {&results[0].table, "BT_m,delay"},
-	 .more = {&bench_points, "block"}},
-	{.suffix = "guard",
-	 .script = text_stability_guard_gp,
-	 .width = 1320,
-	 .height = 540,
-	 .data = {&stability_guard_table, "delay",
-		  "guard=on,late=wall,clamp_N=nan,swept=1"},
-	 .more = {&stability_cap_table, "verdict"}},
-	{.suffix = "integrators",
-	 .script = text_stability_integrators_gp,
-	 .width = 1500,
-	 .height = 560,
-	 .data = {&stability_integrator_table, "integrator,K_N_m"},
-	 .more = {&stability_integrator_table, "integrator", "step_s=0.001"}},
-	{0},
-};
-
 const struct bench bench_stability = {
 	.name = "stability",
 	.summary = "how stiff a virtual wall may be, simulated and computed;\n"
 		   "the guard of passivity; integrators of a stiff spring",
 	.run = run,
-	.plots = plots,
+	.plots = {{.suffix = "map",
+		   .script = text_stability_map_gp,
+		   .width = 440,
+		   .height = 520,
+		   .across = "BT_m",
+		   .data = {&results[0].table, "BT_m,delay"},
+		   .more = {&bench_points, "block"}},
+		  {.suffix = "guard",
+		   .script = text_stability_guard_gp,
+		   .width = 1320,
+		   .height = 540,
+		   .data = {&stability_guard_table, "delay",
+			    "guard=on,late=wall,clamp_N=nan,swept=1"},
+		   .more = {&stability_cap_table, "verdict"}},
+		  {.suffix = "integrators",
+		   .script = text_stability_integrators_gp,
+		   .width = 1500,
+		   .height = 560,
+		   .data = {&stability_integrator_table, "integrator,K_N_m"},
+		   .more = {&stability_integrator_table, "integrator", "step_s=0.001"}}},
 };

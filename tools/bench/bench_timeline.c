@@ -7,16 +7,12 @@
  *   live                               ├──────────┤ times given at arrival: the last quarter
  *   final     ├───────────────────────────────────┤ times given afterwards: all of it
  */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include "../../lib/record/time/timeline.h"
 #include "bench.h"
-#include "../cli/cli.h"
 #include "../cli/stopwatch.h"
 #include "noise.h"
-
-#define N(array) (int)(sizeof(array) / sizeof(*(array)))
 
 static const double windows_s[] = {1, 2, 5, 10, 30, 60, 120};
 static const double drifts_ppm[] = {-200, 0, 200};
@@ -61,9 +57,11 @@ enum lateness {
 static const char *const lateness_names[] = {"uniform", "exponential", "bursts"};
 
 struct stream {
-	uint64_t *seq;
-	int64_t *arrival_ns;
-	double *taken_ns; /* the truth */
+	struct sample {
+		uint64_t seq;
+		int64_t arrival_ns;
+		double taken_ns; /* the truth */
+	} * sample;
 	int n;
 	double mean_late_ns; /* of arrivals later than the delay */
 	int64_t grain_ns;    /* arrivals come on a grid; 0: on none */
@@ -71,7 +69,7 @@ struct stream {
 
 /* Arrival of a sample that could come at @quickest_ns; @phase_ns: of the bursts. */
 static double arrival_ns(enum lateness lateness, double quickest_ns, double phase_ns,
-			 struct noise *noise)
+			 uint64_t *noise)
 {
 	if (lateness == UNIFORM)
 		return quickest_ns + LATE_NS * noise_uniform(noise);
@@ -85,15 +83,13 @@ static double arrival_ns(enum lateness lateness, double quickest_ns, double phas
 static struct stream stream_begin(enum lateness lateness, double drift_ppm,
 				  double seconds, uint64_t seed)
 {
-	struct noise noise = {seed};
+	uint64_t noise = seed;
 	double period_ns = PERIOD_NS / (1 + drift_ppm * 1e-6);
 	double begin_ns = 5e9 + 1e9 * noise_uniform(&noise);
 	double phase_ns = LATE_NS * noise_uniform(&noise), before_ns = 0;
 	int all = (int)(seconds * RATE_HZ);
 	struct stream s = {
-		.seq = bench_alloc(all, sizeof(*s.seq)),
-		.arrival_ns = bench_alloc(all, sizeof(*s.arrival_ns)),
-		.taken_ns = bench_alloc(all, sizeof(*s.taken_ns)),
+		.sample = cli_alloc(all, sizeof(*s.sample)),
 		.grain_ns = lateness == BURSTS ? (int64_t)LATE_NS : 0,
 	};
 
@@ -106,20 +102,12 @@ static struct stream stream_begin(enum lateness lateness, double drift_ppm,
 				 before_ns);
 		if (noise_uniform(&noise) < LOST && k)
 			continue;
-		s.seq[s.n] = FIRST + (uint64_t)k;
-		s.taken_ns[s.n] = taken_ns;
-		s.arrival_ns[s.n++] = llround(before_ns);
+		s.sample[s.n++] = (struct sample){FIRST + (uint64_t)k, llround(before_ns),
+						  taken_ns};
 		s.mean_late_ns += before_ns - quickest_ns;
 	}
 	s.mean_late_ns /= s.n;
 	return s;
-}
-
-static void stream_end(struct stream *stream)
-{
-	free(stream->seq);
-	free(stream->arrival_ns);
-	free(stream->taken_ns);
 }
 
 /* --- methods: the time of acquisition from arrivals ---
@@ -133,10 +121,12 @@ static void stream_end(struct stream *stream)
 
 struct method {
 	const char *name;
-	/* Has the stream's grain and, as no real program, its mean lateness. To be freed. */
-	void *(*begin)(const struct stream *stream);
+	size_t bytes; /* of its state, of zeros at first */
+	/* Prepare the state with the stream's grain and, as no real program could, its mean
+	 * lateness; or NULL. */
+	void (*start)(void *state, const struct stream *stream);
 	/* The time of a sample when it arrives, ns. */
-	double (*take)(void *state, uint64_t seq, int64_t arrival_ns);
+	double (*take)(void *state, const struct sample *sample);
 	/* The best time of one of them afterwards; NULL: that of take() is final. */
 	double (*afterwards)(const void *state, uint64_t seq);
 	/* To be called once between them, or NULL. */
@@ -145,41 +135,28 @@ struct method {
 	double (*sd_ns)(const void *state, uint64_t seq);
 };
 
-static void *nothing_begin(const struct stream *stream)
-{
-	(void)stream;
-	return NULL;
-}
-
-static double arrival_take(void *state, uint64_t seq, int64_t arrival_ns)
+static double arrival_take(void *state, const struct sample *sample)
 {
 	(void)state;
-	(void)seq;
-	return (double)(arrival_ns - DELAY_NS);
+	return (double)(sample->arrival_ns - DELAY_NS);
 }
 
 struct lowest {
-	bool begun;
-	uint64_t seq;
-	int64_t arrival_ns; /* of the lowest */
+	bool started;
+	struct sample sample; /* the lowest */
 };
 
-static void *lowest_begin(const struct stream *stream)
-{
-	(void)stream;
-	return bench_alloc(1, sizeof(struct lowest));
-}
-
-static double lowest_take(void *state, uint64_t seq, int64_t arrival_ns)
+static double lowest_take(void *state, const struct sample *sample)
 {
 	struct lowest *lowest = state;
-	double x_ns = (double)(seq - lowest->seq) * PERIOD_NS;
+	double x_ns = (double)(sample->seq - lowest->sample.seq) * PERIOD_NS;
+	int64_t later_ns = sample->arrival_ns - lowest->sample.arrival_ns;
 
-	if (!lowest->begun || (double)(arrival_ns - lowest->arrival_ns) < x_ns) {
-		*lowest = (struct lowest){true, seq, arrival_ns};
+	if (!lowest->started || (double)later_ns < x_ns) {
+		*lowest = (struct lowest){true, *sample};
 		x_ns = 0;
 	}
-	return (double)(lowest->arrival_ns - DELAY_NS) + x_ns;
+	return (double)(lowest->sample.arrival_ns - DELAY_NS) + x_ns;
 }
 
 /* Means and sums about them, which grow without losing digits: Welford's. */
@@ -190,18 +167,9 @@ struct squares {
 	double late_ns;
 };
 
-static void *squares_begin(const struct stream *stream)
+static void squares_start(void *state, const struct stream *stream)
 {
-	(void)stream;
-	return bench_alloc(1, sizeof(struct squares));
-}
-
-static void *squares_known_begin(const struct stream *stream)
-{
-	struct squares *s = squares_begin(stream);
-
-	s->late_ns = stream->mean_late_ns;
-	return s;
+	((struct squares *)state)->late_ns = stream->mean_late_ns;
 }
 
 static double squares_at(const void *state, uint64_t seq)
@@ -214,17 +182,17 @@ static double squares_at(const void *state, uint64_t seq)
 	       s->late_ns;
 }
 
-static double squares_take(void *state, uint64_t seq, int64_t arrival_ns)
+static double squares_take(void *state, const struct sample *sample)
 {
 	struct squares *s = state;
 	double x_ns, y_ns, dx, dy;
 
 	if (!s->n) {
-		s->first = seq;
-		s->first_ns = arrival_ns;
+		s->first = sample->seq;
+		s->first_ns = sample->arrival_ns;
 	}
-	x_ns = (double)(seq - s->first) * PERIOD_NS;
-	y_ns = (double)(arrival_ns - s->first_ns) - x_ns;
+	x_ns = (double)(sample->seq - s->first) * PERIOD_NS;
+	y_ns = (double)(sample->arrival_ns - s->first_ns) - x_ns;
 	s->n++;
 	dx = x_ns - s->x;
 	dy = y_ns - s->y;
@@ -232,7 +200,7 @@ static double squares_take(void *state, uint64_t seq, int64_t arrival_ns)
 	s->y += dy / s->n;
 	s->xx += dx * (x_ns - s->x);
 	s->xy += dx * (y_ns - s->y);
-	return squares_at(s, seq);
+	return squares_at(s, sample->seq);
 }
 
 struct line {
@@ -241,33 +209,31 @@ struct line {
 	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS_MAX];
 };
 
-static void *line_of_grain(int64_t grain_ns)
+static void start_with_grain(struct line *line, int64_t grain_ns)
 {
-	struct line *line = bench_alloc(1, sizeof(*line));
-
 	incise_timeline_init(&line->timeline,
 			     &(struct incise_timeline_setup){.rate_hz = RATE_HZ,
 							     .delay_ns = DELAY_NS,
 							     .grain_ns = grain_ns});
-	return line;
 }
 
-static void *line_begin(const struct stream *stream)
+static void line_start(void *state, const struct stream *stream)
 {
-	return line_of_grain(stream->grain_ns);
+	start_with_grain(state, stream->grain_ns);
 }
 
-static void *untold_begin(const struct stream *stream)
+static void untold_start(void *state, const struct stream *stream)
 {
 	(void)stream;
-	return line_of_grain(0);
+	start_with_grain(state, 0);
 }
 
-static double line_take(void *state, uint64_t seq, int64_t arrival_ns)
+static double line_take(void *state, const struct sample *sample)
 {
 	struct line *line = state;
 
-	return (double)incise_timeline_sample(&line->timeline, seq, arrival_ns);
+	return (double)incise_timeline_sample(&line->timeline, sample->seq,
+					      sample->arrival_ns);
 }
 
 static double line_live_sd(const void *state, uint64_t seq)
@@ -301,17 +267,28 @@ static double line_final_sd(const void *state, uint64_t seq)
 	return line->n ? incise_timeline_sd(line->knots, line->n, seq) : NAN;
 }
 
+#define SQUARES sizeof(struct squares)
+#define LINE sizeof(struct line)
 #define METHODS 8
 static const struct method methods[METHODS] = {
-	{"arrival", nothing_begin, arrival_take, NULL, NULL, NULL},
-	{"lowest", lowest_begin, lowest_take, NULL, NULL, NULL},
-	{"squares", squares_begin, squares_take, NULL, NULL, NULL},
-	{"squares_known", squares_known_begin, squares_take, NULL, NULL, NULL},
-	{"squares_final", squares_known_begin, squares_take, squares_at, NULL, NULL},
-	{"line_live", line_begin, line_take, NULL, NULL, line_live_sd},
-	{"line_untold", untold_begin, line_take, NULL, NULL, line_live_sd},
-	{"line_final", line_begin, line_take, line_at, line_finish, line_final_sd},
+	{"arrival", 0, NULL, arrival_take, NULL, NULL, NULL},
+	{"lowest", sizeof(struct lowest), NULL, lowest_take, NULL, NULL, NULL},
+	{"squares", SQUARES, NULL, squares_take, NULL, NULL, NULL},
+	{"squares_known", SQUARES, squares_start, squares_take, NULL, NULL, NULL},
+	{"squares_final", SQUARES, squares_start, squares_take, squares_at, NULL, NULL},
+	{"line_live", LINE, line_start, line_take, NULL, NULL, line_live_sd},
+	{"line_untold", LINE, untold_start, line_take, NULL, NULL, line_live_sd},
+	{"line_final", LINE, line_start, line_take, line_at, line_finish, line_final_sd},
 };
+
+static void *state_of(const struct method *method, const struct stream *stream)
+{
+	void *state = cli_alloc(1, method->bytes);
+
+	if (method->start)
+		method->start(state, stream);
+	return state;
+}
 
 /* --- measurement --- */
 
@@ -320,8 +297,7 @@ struct row {
 	const char *name, *late;
 	double drift_ppm, window_s;
 	double rms_us, p99_us, max_us, mean_us;
-	double stated_us,
-		within; /* uncertainty, and the share of truth within twice it */
+	double stated_us, within; /* uncertainty, share of truth within twice it */
 	struct harness_time time; /* of a sample */
 	char failed[160];
 };
@@ -347,14 +323,14 @@ struct errors {
 static void add_error(struct errors *e, const struct method *method, const void *state,
 		      const struct stream *stream, int k, double t_ns)
 {
-	double error = t_ns - stream->taken_ns[k], sd;
+	double error = t_ns - stream->sample[k].taken_ns, sd;
 
 	e->error[e->n++] = fabs(error);
 	e->sum += error;
 	e->sum2 += error * error;
 	if (!method->sd_ns || k % ASK_EVERY)
 		return;
-	sd = method->sd_ns(state, stream->seq[k]);
+	sd = method->sd_ns(state, stream->sample[k].seq);
 	e->asked++;
 	e->within += fabs(error) <= 2 * sd;
 	e->stated2 += sd * sd;
@@ -363,10 +339,10 @@ static void add_error(struct errors *e, const struct method *method, const void 
 static void follow(const struct method *method, const struct stream *stream,
 		   struct errors *e)
 {
-	void *state = method->begin(stream);
+	void *state = state_of(method, stream);
 
 	for (int k = 0; k < stream->n; k++) {
-		double t_ns = method->take(state, stream->seq[k], stream->arrival_ns[k]);
+		double t_ns = method->take(state, &stream->sample[k]);
 
 		if (!method->afterwards && k >= stream->n - stream->n / 4)
 			add_error(e, method, state, stream, k, t_ns);
@@ -375,7 +351,7 @@ static void follow(const struct method *method, const struct stream *stream,
 		method->finish(state);
 	for (int k = 0; method->afterwards && k < stream->n; k++)
 		add_error(e, method, state, stream, k,
-			  method->afterwards(state, stream->seq[k]));
+			  method->afterwards(state, stream->sample[k].seq));
 	free(state);
 }
 
@@ -391,10 +367,8 @@ static void set_errors(struct row *row, struct errors *e)
 	free(e->error);
 }
 
-/*
- * Samples of a stream are off together: chance is that of so many streams, and three of its
- * deviations are allowed.
- */
+/* Samples of a stream are off together: chance is that of so many streams, and three of its
+ * deviations are allowed. */
 static void judge(struct row *row, double arrival_us, int streams)
 {
 	double least = WITHIN - 3 * sqrt(WITHIN * (1 - WITHIN) / streams);
@@ -402,11 +376,10 @@ static void judge(struct row *row, double arrival_us, int streams)
 	if (!isfinite(row->rms_us))
 		snprintf(row->failed, sizeof(row->failed), "a time is not a number");
 	else if (row->rms_us > arrival_us)
-		snprintf(
-			row->failed, sizeof(row->failed),
-			"worse than arrivals as they are: off by %.3g us, where these are "
-			"by %.3g us",
-			row->rms_us, arrival_us);
+		snprintf(row->failed, sizeof(row->failed),
+			 "worse than arrivals as they are: off by %.3g us, where "
+			 "these are by %.3g us",
+			 row->rms_us, arrival_us);
 	else if (row->within < least)
 		snprintf(row->failed, sizeof(row->failed),
 			 "surer than it may be: %.1f %% of the truth is within twice the "
@@ -425,14 +398,14 @@ static void measure(bool quick, enum lateness lateness, double drift_ppm, int wi
 	struct errors errors[METHODS] = {{0}};
 
 	for (int i = 0; i < METHODS; i++)
-		errors[i].error = bench_alloc(most, sizeof(*errors[i].error));
+		errors[i].error = cli_alloc(most, sizeof(*errors[i].error));
 	for (int k = 0; k < streams; k++) {
 		struct stream stream =
 			stream_begin(lateness, drift_ppm, window_s, seed + (uint64_t)k);
 
 		for (int i = 0; i < METHODS; i++)
 			follow(&methods[i], &stream, &errors[i]);
-		stream_end(&stream);
+		free(stream.sample);
 	}
 	for (int i = 0; i < METHODS; i++) {
 		row[i] = (struct row){.name = methods[i].name,
@@ -456,14 +429,14 @@ static void run_timed(void *context)
 	struct timed *timed = context;
 	const struct stream *stream = timed->stream;
 	const struct method *method = timed->method;
-	void *state = method->begin(stream);
+	void *state = state_of(method, stream);
 
 	for (int k = 0; k < stream->n; k++)
-		timed->sum += method->take(state, stream->seq[k], stream->arrival_ns[k]);
+		timed->sum += method->take(state, &stream->sample[k]);
 	if (method->finish)
 		method->finish(state);
 	for (int k = 0; method->afterwards && k < stream->n; k++)
-		timed->sum += method->afterwards(state, stream->seq[k]);
+		timed->sum += method->afterwards(state, stream->sample[k].seq);
 	free(state);
 }
 
@@ -480,11 +453,15 @@ static void measure_times(int repeats)
 
 		timed[i] = (struct timed){&methods[i % METHODS], stream, 0};
 		variants[i] = (struct harness_variant){
-			.run = run_timed, .context = &timed[i], .units = stream->n};
+			.run = run_timed,
+			.context = &timed[i],
+			.units = stream->n,
+			.time = &times[i / METHODS][i % METHODS],
+		};
 	}
-	harness_times(variants, N(variants), repeats, times[0]);
+	harness_times(variants, N(variants), repeats);
 	for (int w = 0; w < N(windows_s); w++)
-		stream_end(&streams[w]);
+		free(streams[w].sample);
 }
 
 /* --- report --- */
@@ -543,12 +520,11 @@ static void run(struct bench_run *run)
 		     streams_of(run->quick, 120), "repeats", repeats);
 	bench_scalars(run, "{sf si}", "drift_ppm", drifts_ppm[N(drifts_ppm) - 1],
 		      "late_ms", LATE_MS);
-	bench_text(
-		run,
-		"%d Hz, up to %d ms late, %g %% lost; %d streams or more of each; times of %d "
-		"runs in turn\n%s\n",
-		RATE_HZ, LATE_MS, LOST * 100, streams_of(run->quick, 120), repeats,
-		bench_machine(run, NULL));
+	bench_text(run,
+		   "%d Hz, up to %d ms late, %g %% lost; %d streams or more of each; "
+		   "times of %d runs in turn\n%s\n",
+		   RATE_HZ, LATE_MS, LOST * 100, streams_of(run->quick, 120), repeats,
+		   bench_machine(run, NULL));
 	for (const struct row *r = rows; r < rows + N(rows); r += per_block) {
 		bench_text(run, "\n%s lateness, %+g ppm\n", r->late, r->drift_ppm);
 		bench_block(run, &block, sizeof(*rows), r, METHODS, N(windows_s),
@@ -560,23 +536,18 @@ static void run(struct bench_run *run)
 		       "* {name}, {late}, {drift_ppm:%+g} ppm, {window_s} s");
 }
 
-static const struct bench_plot plots[] = {
-	{.script = text_timeline_gp,
-	 .width = 1320,
-	 .height = 620,
-	 .data = {&rows_table, "late,name", "drift_ppm=200"}},
-	{.suffix = "windows",
-	 .script = text_timeline_gp,
-	 .width = 1320,
-	 .height = 620,
-	 .data = {&rows_table, "late,name", "drift_ppm=200"}},
-	{0},
-};
-
 const struct bench bench_timeline = {
 	.name = "timeline",
 	.summary = "error of times of samples that come late, by a clock that\n"
 		   "drifts, over how much was seen and the cost",
 	.run = run,
-	.plots = plots,
+	.plots = {{.script = text_timeline_gp,
+		   .width = 1320,
+		   .height = 620,
+		   .data = {&rows_table, "late,name", "drift_ppm=200"}},
+		  {.suffix = "windows",
+		   .script = text_timeline_gp,
+		   .width = 1320,
+		   .height = 620,
+		   .data = {&rows_table, "late,name", "drift_ppm=200"}}},
 };

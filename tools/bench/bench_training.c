@@ -7,16 +7,13 @@
  *
  *   F(d, v) = (0.045 d + 0.0028 d²) (1 + 0.35 v/(v + 15)) N, d in mm, v in mm/s
  */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <incise/train.h>
 #include "bench.h"
 #include "../cli/child.h"
-#include "../cli/cli.h"
 #include "../cli/file.h"
 #include "../../lib/learn/tune.h"
 #include "../cli/json.h"
@@ -112,7 +109,7 @@ struct row {
 	const struct data *timed;
 
 	double norm[NORMS][SEEDS];
-	struct harness_spread rmse, max, mean; /* of these over the data sets */
+	struct harness_spread spread[NORMS]; /* of these over the data sets */
 	struct harness_time time;
 	char failed[200];
 };
@@ -155,11 +152,11 @@ static void add_all(struct training *t, bool quick)
 	add(t, (struct row){.name = "mean", .kind = baselines, .fit = FIT_MEAN});
 	add(t, (struct row){.name = "linear", .kind = baselines, .fit = FIT_LINEAR});
 	add(t, (struct row){.name = "knn", .kind = baselines, .fit = FIT_KNN});
-	for (size_t i = 0; i < sizeof(epochs) / sizeof(*epochs); i++) {
+	for (int i = 0; i < N(epochs); i++) {
 		snprintf(suffix, sizeof(suffix), "_%d", epochs[i]);
 		add_grid(t, classic, epochs[i], 5, 4, suffix);
 	}
-	for (size_t i = 0; i < (quick ? 1 : sizeof(grids) / sizeof(*grids)); i++) {
+	for (int i = 0; i < (quick ? 1 : N(grids)); i++) {
 		snprintf(suffix, sizeof(suffix), "_%dx%d", grids[i][0], grids[i][1]);
 		add_grid(t, classic, EPOCHS, grids[i][0], grids[i][1], suffix);
 		add_grid(t, ours, EPOCHS, grids[i][0], grids[i][1], suffix);
@@ -190,8 +187,9 @@ static struct incise_model *train(const struct row *row, const struct data *data
 	if (row->fit == FIT_CHOSEN &&
 	    incise_choose_grid(&pairs, in, INCISE_MF_GAUSS, &options, mfs, &err))
 		cli_fail_with(&err);
-	model = incise_model_new_grid(2, in, mfs, INCISE_MF_GAUSS, &out, &err);
-	if (!model || incise_train(model, &pairs, NULL, &options, NULL, &err))
+	model = cli_require(
+		incise_model_new_grid(2, in, mfs, INCISE_MF_GAUSS, &out, &err), &err);
+	if (incise_train(model, &pairs, NULL, &options, NULL, &err))
 		cli_fail_with(&err);
 	return model;
 }
@@ -321,7 +319,6 @@ static void run_timed(void *context)
 static void measure(struct training *t)
 {
 	struct harness_variant variants[ROWS_MAX];
-	struct harness_time times[ROWS_MAX];
 
 	for (int i = 0; i < t->n; i++) {
 		cli_progress("training: %s", t->row[i].name);
@@ -329,11 +326,13 @@ static void measure(struct training *t)
 			measure_error(t, &t->row[i], s);
 		t->row[i].timed = &t->data[0];
 		variants[i] = (struct harness_variant){
-			.run = run_timed, .context = &t->row[i], .units = 1};
+			.run = run_timed,
+			.context = &t->row[i],
+			.units = 1,
+			.time = &t->row[i].time,
+		};
 	}
-	harness_times(variants, t->n, t->repeats, times);
-	for (int i = 0; i < t->n; i++)
-		t->row[i].time = times[i];
+	harness_times(variants, t->n, t->repeats);
 }
 
 /* --- scikit-learn on the same data, in a process of its own; it is not installed --- */
@@ -387,18 +386,16 @@ static json_t *ask_all(const struct training *t, char *why, size_t size)
 	static const char *const pythons[] = {"python3", "/usr/bin/python3"};
 	struct memory_file question = memory_file_begin("question");
 	json_t *all = json_object(), *sets = json_array(), *answer = NULL;
-	char *script;
+	char *script = cli_text("%s/../lib/incise/peer_scikit_learn.py", cli_folder());
 
 	for (int s = 0; s < t->seeds; s++)
 		json_array_append_new(sets, rows_json(t->data[s].row, PAIRS));
 	json_object_set_new(all, "train", sets);
 	json_object_set_new(all, "unseen", rows_json(t->unseen, UNSEEN));
-	if (asprintf(&script, "%s/../lib/incise/peer_scikit_learn.py", cli_folder()) <
-		    0 ||
-	    json_dumpf(all, question.file, 0))
+	if (json_dumpf(all, question.file, 0))
 		cli_fail("no memory");
 	memory_file_written(&question);
-	for (size_t i = 0; i < sizeof(pythons) / sizeof(*pythons) && !answer; i++)
+	for (int i = 0; i < N(pythons) && !answer; i++)
 		answer = ask(pythons[i], script, question.path, why, size);
 	json_decref(all);
 	free(script);
@@ -414,7 +411,7 @@ static void add_references(struct training *t)
 	char why[sizeof(t->row->failed)] = "";
 	json_t *answer = ask_all(t, why, sizeof(why));
 
-	for (size_t i = 0; i < sizeof(names) / sizeof(*names); i++) {
+	for (int i = 0; i < N(names); i++) {
 		struct row *row =
 			add(t, (struct row){.kind = scikit_learn, .is_reference = true});
 		double ns[SEEDS];
@@ -451,22 +448,26 @@ static const struct bench_table rows_table = {
 		    COLUMN(row, "ms_min", time.ns.p5, "%9.3g", "5 %", 1e-6),
 		    COLUMN(row, "ms_max", time.ns.p95, "%9.3g", "95 %", 1e-6),
 		    COLUMN(row, "seconds", time.ns.median, .scale = 1e-9),
-		    COLUMN(row, "rmse_unseen_N", rmse.median, "%10.4f", "rmse / N"),
-		    COLUMN(row, "rmse_unseen_N_p5", rmse.p5, "  (%6.4f", ""),
-		    COLUMN(row, "rmse_unseen_N_p95", rmse.p95, "to %6.4f)", ""),
-		    COLUMN(row, "max_unseen_N", max.median, "%10.4f", "largest/N"),
-		    COLUMN(row, "max_unseen_N_p95", max.p95),
-		    COLUMN(row, "mean_abs_unseen_N", mean.median, "%10.4f", "mean |.|/N"),
+		    COLUMN(row, "rmse_unseen_N", spread[NORM_RMSE].median, "%10.4f",
+			   "rmse / N"),
+		    COLUMN(row, "rmse_unseen_N_p5", spread[NORM_RMSE].p5, "  (%6.4f", ""),
+		    COLUMN(row, "rmse_unseen_N_p95", spread[NORM_RMSE].p95, "to %6.4f)",
+			   ""),
+		    COLUMN(row, "max_unseen_N", spread[NORM_MAX].median, "%10.4f",
+			   "largest/N"),
+		    COLUMN(row, "max_unseen_N_p95", spread[NORM_MAX].p95),
+		    COLUMN(row, "mean_abs_unseen_N", spread[NORM_MEAN].median, "%10.4f",
+			   "mean |.|/N"),
 		    COLUMN(row, "peer", is_reference), COLUMN(row, "failed", failed),
 		    COLUMN(row, "kind", kind, .data = true)},
 	.metrics = {METRIC(TIME, row, time, "ms", "{name}", "peer=0"),
-		    METRIC(EXACT, row, rmse.median, "N", "{name} error on unseen cuts",
-			   "peer=0")},
+		    METRIC(EXACT, row, spread[NORM_RMSE].median, "N",
+			   "{name} error on unseen cuts", "peer=0")},
 };
 
 static void run(struct bench_run *run)
 {
-	struct training *t = bench_alloc(1, sizeof(*t));
+	struct training *t = cli_alloc(1, sizeof(*t));
 
 	t->seeds = run->quick ? QUICK_SEEDS : SEEDS;
 	t->repeats = run->quick ? QUICK_REPEATS : REPEATS;
@@ -480,33 +481,25 @@ static void run(struct bench_run *run)
 		struct row *row = &t->row[i];
 		int n = *row->failed ? 0 : t->seeds;
 
-		harness_spread(row->norm[NORM_RMSE], n, &row->rmse);
-		harness_spread(row->norm[NORM_MAX], n, &row->max);
-		harness_spread(row->norm[NORM_MEAN], n, &row->mean);
+		for (int k = 0; k < NORMS; k++)
+			harness_spread(row->norm[k], n, &row->spread[k]);
 	}
-	bench_value(run, "pairs", json_integer(PAIRS));
-	bench_value(run, "epochs", json_integer(EPOCHS));
-	bench_value(run, "repeats", json_integer(t->repeats));
-	bench_value(run, "seeds", json_integer(t->seeds));
-	bench_text(
-		run,
-		"%s\n%d pairs of 12 cuts, 20 unseen cuts whose force is exact; errors: median "
-		"of %d data sets (5 to 95 %%), times: of %d runs in turn\n",
-		bench_machine(run, "cpu"), PAIRS, t->seeds, t->repeats);
+	bench_values(run, "{si si si si}", "pairs", PAIRS, "epochs", EPOCHS, "repeats",
+		     t->repeats, "seeds", t->seeds);
+	bench_text(run,
+		   "%s\n%d pairs of 12 cuts, 20 unseen cuts whose force is exact; "
+		   "errors: median of %d data sets (5 to 95 %%), times: of %d runs in "
+		   "turn\n",
+		   bench_machine(run, "cpu"), PAIRS, t->seeds, t->repeats);
 	bench_table(run, &rows_table, t->row, t->n);
 }
-
-static const struct bench_plot plots[] = {
-	{.script = text_training_gp,
-	 .width = 1100,
-	 .height = 800,
-	 .data = {&rows_table, "kind", "failed="}},
-	{0},
-};
 
 const struct bench bench_training = {
 	.name = "training",
 	.summary = "error on unseen cuts over the seconds that training takes",
 	.run = run,
-	.plots = plots,
+	.plots = {{.script = text_training_gp,
+		   .width = 1100,
+		   .height = 800,
+		   .data = {&rows_table, "kind", "failed="}}},
 };

@@ -4,13 +4,10 @@
  * truth is known, of VGA's size and others, are measured one after the other on one core;
  * with a region of interest that follows, and with each frame searched as a whole.
  */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 #include <incise/vision.h>
 #include "bench.h"
-#include "../cli/cli.h"
 #include "../cli/stopwatch.h"
 #include "../../tests/vision/scalpel_picture.h"
 
@@ -37,7 +34,6 @@ static const struct kind {
 	{"rgb_320", INCISE_PIXELS_RGB, 60, 2, 0.7, 0, 0, 0, 0.5},
 	{"rgb_1280", INCISE_PIXELS_RGB, 60, 2, 0.7, 0, 0, 0, 2},
 };
-#define KINDS (int)(sizeof(kinds) / sizeof(*kinds))
 
 enum region { FOLLOWS, WHOLE, REGIONS };
 static const char *const regions[REGIONS] = {"follows", "whole"};
@@ -57,19 +53,13 @@ struct row {
 };
 
 /* Measurements of a region, in rounds that take turns. */
-struct series {
+struct measurements {
 	struct incise_vision *vision;
 	double ns[FRAMES * ROUNDS], sum, square, stated, max;
 	int n, found;
 };
 
-static struct row rows[KINDS * REGIONS];
-
-static void draw(const struct scalpel_picture *picture, struct incise_camera_frame *frame)
-{
-	if (scalpel_picture_draw(picture, frame))
-		cli_fail("out of memory");
-}
+static struct row rows[N(kinds) * REGIONS];
 
 /* A hand that moves by some pixels from frame to frame, and leans. */
 static void draw_all(struct frames *f, int k, int n)
@@ -101,10 +91,12 @@ static void draw_all(struct frames *f, int k, int n)
 		s.light = 1 + kind->light * (2 * scalpel_picture_random(&random) - 1);
 		s.seed = 1000 * k + i;
 		f->length_px[i] = s.length_px;
-		draw(&s, &f->frame[i]);
+		if (scalpel_picture_draw(&s, &f->frame[i]))
+			cli_fail("out of memory");
 	}
 	s.length_px = 0;
-	draw(&s, &f->empty);
+	if (scalpel_picture_draw(&s, &f->empty))
+		cli_fail("out of memory");
 }
 
 static void free_all(struct frames *f)
@@ -112,15 +104,6 @@ static void free_all(struct frames *f)
 	for (int i = 0; i < f->n; i++)
 		free((void *)f->frame[i].data);
 	free((void *)f->empty.data);
-}
-
-/* Of this thread: a moment in which others have the core is not the frame's. */
-static double cpu_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-	return t.tv_sec * 1e9 + t.tv_nsec;
 }
 
 static struct incise_vision_result look(struct incise_vision *vision,
@@ -138,15 +121,13 @@ static struct incise_vision *vision_of(const struct kind *kind)
 	struct incise_vision_setup setup = {
 		.hue = {0, 179}, .saturation = {0, 255}, .value = {0, kind->value}};
 	struct incise_error err = {0};
-	struct incise_vision *vision = incise_vision_new(&setup, &err);
 
-	if (!vision)
-		cli_fail_with(&err);
-	return vision;
+	return cli_require(incise_vision_new(&setup, &err), &err);
 }
 
 /* All frames once. */
-static void look_at_all(const struct frames *f, enum region region, struct series *s)
+static void look_at_all(const struct frames *f, enum region region,
+			struct measurements *s)
 {
 	for (int i = 0; i < f->n; i++) {
 		bool first = s->n < f->n;
@@ -155,9 +136,10 @@ static void look_at_all(const struct frames *f, enum region region, struct serie
 
 		if (region == WHOLE) /* it forgets where the handle was */
 			look(s->vision, &f->empty);
-		t = cpu_ns();
+		/* Of this thread: a moment in which others have the core is not the frame's. */
+		t = stopwatch_of(CLOCK_THREAD_CPUTIME_ID);
 		result = look(s->vision, &f->frame[i]);
-		s->ns[s->n++] = cpu_ns() - t;
+		s->ns[s->n++] = stopwatch_of(CLOCK_THREAD_CPUTIME_ID) - t;
 		if (!first || !result.found)
 			continue;
 		error = result.length_px - f->length_px[i];
@@ -169,7 +151,7 @@ static void look_at_all(const struct frames *f, enum region region, struct serie
 	}
 }
 
-static void set_row(struct row *row, struct series *s)
+static void set_row(struct row *row, struct measurements *s)
 {
 	double n = s->found ? s->found : NAN;
 
@@ -192,23 +174,23 @@ static void set_row(struct row *row, struct series *s)
 static void measure(const struct kind *kind, const struct frames *f, int rounds,
 		    struct row *row)
 {
-	static struct series series[REGIONS];
+	static struct measurements each[REGIONS];
 
 	for (int region = 0; region < REGIONS; region++) {
-		series[region] = (struct series){.vision = vision_of(kind)};
-		look(series[region].vision, &f->frame[f->n - 1]); /* warms up */
+		each[region] = (struct measurements){.vision = vision_of(kind)};
+		look(each[region].vision, &f->frame[f->n - 1]); /* warms up */
 	}
 	for (int r = 0; r < rounds; r++)
 		for (int region = REGIONS - 1; region >= 0; region--)
-			look_at_all(f, (enum region)region, &series[region]);
+			look_at_all(f, (enum region)region, &each[region]);
 	for (int region = 0; region < REGIONS; region++, row++) {
 		*row = (struct row){.name = kind->name,
 				    .region = regions[region],
 				    .width = f->frame[0].width,
 				    .height = f->frame[0].height,
 				    .frames = f->n};
-		set_row(row, &series[region]);
-		incise_vision_free(series[region].vision);
+		set_row(row, &each[region]);
+		incise_vision_free(each[region].vision);
 	}
 }
 
@@ -246,7 +228,7 @@ static void run(struct bench_run *run)
 	int rounds = run->quick ? QUICK_ROUNDS : ROUNDS;
 
 	incise_vision_free(vision_of(&kinds[0])); /* fails before anything is drawn */
-	for (int k = 0; k < KINDS; k++) {
+	for (int k = 0; k < N(kinds); k++) {
 		cli_progress("vision: %s", kinds[k].name);
 		draw_all(&frames, k, run->quick ? QUICK_FRAMES : FRAMES);
 		measure(&kinds[k], &frames, rounds, &rows[k * REGIONS]);
@@ -255,20 +237,15 @@ static void run(struct bench_run *run)
 	cli_progress_end();
 	bench_values(run, "{si si si}", "width", 640, "height", 480, "rounds", rounds);
 	bench_text(run, "%s\none thread; %d rounds\n", bench_machine(run, "cpu"), rounds);
-	bench_table(run, &rows_table, rows, KINDS * REGIONS);
+	bench_table(run, &rows_table, rows, N(kinds) * REGIONS);
 }
-
-static const struct bench_plot plots[] = {
-	{.script = text_vision_gp,
-	 .width = 1100,
-	 .height = 800,
-	 .data = {&rows_table, "region", "failed="}},
-	{0},
-};
 
 const struct bench bench_vision = {
 	.name = "vision",
 	.summary = "error of the exposed length over the time per picture",
 	.run = run,
-	.plots = plots,
+	.plots = {{.script = text_vision_gp,
+		   .width = 1100,
+		   .height = 800,
+		   .data = {&rows_table, "region", "failed="}}},
 };

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "../../lib/base/ascending.h"
 #include "../cli/cli.h"
 #include "harness.h"
 #include "../cli/stopwatch.h"
@@ -120,26 +121,18 @@ static int rank_of(int n)
 	return k;
 }
 
-/* Of few: the upper one of two would lean to one side. */
-static double median_of(const double *sorted, int n)
-{
-	return (sorted[(n - 1) / 2] + sorted[n / 2]) / 2;
-}
-
 static void interval_of_stretches(const double *values, int n,
 				  struct harness_spread *spread)
 {
-	double medians[STRETCHES], *part = malloc(n * sizeof(*part));
+	double medians[STRETCHES], *part = cli_alloc(n, sizeof(*part));
 
-	if (!part)
-		cli_fail("no memory");
 	for (int i = 0; i < STRETCHES; i++) {
 		int from = (long long)n * i / STRETCHES,
 		    to = (long long)n * (i + 1) / STRETCHES;
 
 		memcpy(part, values + from, (to - from) * sizeof(*part));
-		stopwatch_sort(part, to - from);
-		medians[i] = median_of(part, to - from);
+		/* Of few: a quantile, the upper one of two, would lean to one side. */
+		medians[i] = median(part, to - from);
 	}
 	free(part);
 	stopwatch_sort(medians, STRETCHES);
@@ -154,9 +147,7 @@ void harness_spread(const double *values, int n, struct harness_spread *spread)
 	*spread = (struct harness_spread){NAN, NAN, NAN, NAN, NAN};
 	if (n < 1)
 		return;
-	sorted = malloc(n * sizeof(*sorted));
-	if (!sorted)
-		cli_fail("no memory");
+	sorted = cli_alloc(n, sizeof(*sorted));
 	memcpy(sorted, values, n * sizeof(*sorted));
 	stopwatch_sort(sorted, n);
 	spread->median = stopwatch_quantile(sorted, n, 0.5);
@@ -185,10 +176,8 @@ static void spread_of_ratios(const double *ns, const double *units, int n, doubl
 
 void harness_time_of(const double *ns, int n, struct harness_time *time)
 {
-	double runs[WORKLOAD_RUNS], *units = calloc(2 * (size_t)n + 1, sizeof(*units));
+	double runs[WORKLOAD_RUNS], *units = cli_alloc(2 * (size_t)n + 1, sizeof(*units));
 
-	if (!units)
-		cli_fail("no memory");
 	harness_spread(ns, n, &time->ns);
 	for (int w = 0; w < WORKLOADS; w++) {
 		for (int i = 0; i < WORKLOAD_RUNS; i++)
@@ -231,19 +220,15 @@ static bool is_timed(const struct harness_variant *variant)
 	return variant->ns || variant->units > 0;
 }
 
-void harness_times(const struct harness_variant *variants, int n, int turns,
-		   struct harness_time *times)
+void harness_times(const struct harness_variant *variants, int n, int turns)
 {
 	/* For each variant its turns, for each workload its turns, and a buffer. */
-	double *ns = calloc((size_t)(n + WORKLOADS + 1) * turns + 1, sizeof(*ns)), *units;
+	double *ns = cli_alloc((size_t)(n + WORKLOADS + 1) * turns + 1, sizeof(*ns)),
+	       *units = ns + (size_t)n * turns;
 	cpu_set_t before;
-	bool pinned;
+	bool pinned = pin(&before);
 	int turn;
 
-	if (!ns)
-		cli_fail("no memory");
-	units = ns + (size_t)n * turns;
-	pinned = pin(&before);
 	for (turn = 0; turn < turns && !cli_stop; turn++) {
 		cli_progress("turn %d of %d", turn + 1, turns);
 		for (int w = 0; w < WORKLOADS; w++)
@@ -259,10 +244,11 @@ void harness_times(const struct harness_variant *variants, int n, int turns,
 		const double *own = ns + (size_t)i * turns;
 		int taken = is_timed(&variants[i]) ? turn : 0;
 
-		harness_spread(own, taken, &times[i].ns);
+		harness_spread(own, taken, &variants[i].time->ns);
 		for (int w = 0; w < WORKLOADS; w++)
 			spread_of_ratios(own, units + w * turns, taken,
-					 units + WORKLOADS * turns, &times[i].by[w]);
+					 units + WORKLOADS * turns,
+					 &variants[i].time->by[w]);
 	}
 	free(ns);
 }

@@ -13,15 +13,13 @@
 #define INCISE_HARNESS_H
 
 /*
- * Fixed work. Three of them, as no machine is slower evenly: where two processors share a
- * core, work that fills the core takes half as long again while the other one is busy, and
- * work that waits for its own results takes as long as before.
+ * Three kinds of fixed work, as no machine is slower evenly: beside a busy processor of the same
+ * core, wide work takes half as long again, a chain as long as before. A change of them makes
+ * older reports incomparable.
  *
  *   chain   each step waits for the one before: bound by latency
  *   wide    steps are independent: bound by how many the core does at once
  *   memory  a random walk through half a MiB: bound by the second cache
- *
- * A change of them makes older reports incomparable.
  */
 enum workload { WORKLOAD_CHAIN, WORKLOAD_WIDE, WORKLOAD_MEMORY, WORKLOADS };
 
@@ -31,6 +29,7 @@ struct harness_variant {
 	double units; /* done by a run: times are of one; 0 leaves the variant out */
 	/* Instead of run(): warms up and times itself, returns ns of a unit. */
 	double (*ns)(void *context);
+	struct harness_time *time; /* the result */
 };
 
 /* Of measured values in the order in which they came. */
@@ -40,31 +39,21 @@ struct harness_spread {
 };
 
 struct harness_time {
-	struct harness_spread ns; /* of one unit */
-	struct harness_spread
-		by[WORKLOADS]; /* as multiples of the reference workloads' */
+	struct harness_spread ns;	     /* of one unit */
+	struct harness_spread by[WORKLOADS]; /* as multiples of the workloads' */
 };
 
-/*
- * Time n variants for so many turns. Variants that are left out get NaN. The process is back
- * on the processors that it had before when it returns; fails the program without memory. On
- * SIGINT it ends after a turn and uses the turns so far.
- */
-void harness_times(const struct harness_variant *variants, int n, int turns,
-		   struct harness_time *times);
+/* Time n variants for so many turns, on one processor. Variants that are left out get NaN. On
+ * SIGINT it ends after a turn and uses the turns so far. */
+void harness_times(const struct harness_variant *variants, int n, int turns);
 
-/*
- * The same for times in ns that were taken elsewhere, in threads or other programs: the
- * reference workloads are timed now. NaN of none.
- */
+/* The same for times in ns that were taken elsewhere, in threads or other programs: the
+ * reference workloads are timed now. NaN of none. */
 void harness_time_of(const double *ns, int n, struct harness_time *time);
 
-/*
- * Of n values in the order in which they came; NaN of none. The interval is by ranks, and
- * assumes no distribution. From 24 values on it is one of the medians of 12 stretches of
- * them, so that a slow minute, which makes neighbours alike, does not make it narrow. Below
- * 6 values it is all that there is: the smallest and the largest.
- */
+/* Of n values in the order in which they came; NaN of none. The interval is by ranks. From 24
+ * values on it is that of the medians of 12 stretches of them, so that a slow minute, which makes
+ * neighbours alike, does not make it narrow. Below 6 values it is the smallest and the largest. */
 void harness_spread(const double *values, int n, struct harness_spread *spread);
 
 /* The processor that variants are timed on: the last one, as interrupts are more often the

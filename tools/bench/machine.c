@@ -2,6 +2,7 @@
 /*
  * The machine that a bench ran on; see machine.h.
  */
+#include <math.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,37 +18,20 @@
 #include <cpuid.h>
 #endif
 
-/* As the kernel names the first processor; other than x86 has no such line. */
-static void read_cpu(char *cpu, size_t size)
-{
-	FILE *in = fopen("/proc/cpuinfo", "re");
-	char line[256];
-
-	while (in && fgets(line, sizeof(line), in)) {
-		char *at = strchr(line, ':');
-
-		if (strncmp(line, "model name", 10) || !at)
-			continue;
-		at += 1 + strspn(at + 1, " \t");
-		at[strcspn(at, "\n")] = 0;
-		snprintf(cpu, size, "%s", at);
-		break;
-	}
-	if (in)
-		fclose(in);
-}
-
-/* The first line of a small file; empty without it. */
-static void read_line(const char *path, char *line, int size)
+/* The first line of a small file that begins with @key, without it; as it was if there is none. */
+static void read_line(const char *path, const char *key, char *line, int size)
 {
 	FILE *in = fopen(path, "re");
+	char text[256];
 
-	*line = 0;
-	if (!in)
-		return;
-	if (fgets(line, size, in))
-		line[strcspn(line, "\n")] = 0;
-	fclose(in);
+	while (in && fgets(text, sizeof(text), in))
+		if (!strncmp(text, key, strlen(key))) {
+			text[strcspn(text, "\n")] = 0;
+			snprintf(line, (size_t)size, "%s", text + strlen(key));
+			break;
+		}
+	if (in)
+		fclose(in);
 }
 
 static void read_hypervisor(char *name, size_t size)
@@ -62,83 +46,86 @@ static void read_hypervisor(char *name, size_t size)
 		snprintf(name, size, "%s", *(char *)word ? (char *)word : "unnamed");
 	}
 #else
-	read_line("/sys/hypervisor/type", name, (int)size);
+	read_line("/sys/hypervisor/type", "", name, (int)size);
 #endif
 }
 
-static void read_kernel(struct machine *m)
+/* Also whether it has PREEMPT_RT; and the kind of processor, where /proc/cpuinfo has no name. */
+static void set_kernel(json_t *machine)
 {
-	struct utsname name;
-	char realtime[8];
+	char cpu[128] = "", kernel[200] = "", realtime[8] = "";
+	struct utsname name = {0};
 
-	if (uname(&name))
-		return;
-	snprintf(m->kernel, sizeof(m->kernel), "%s %s %s", name.sysname, name.release,
-		 name.machine);
-	snprintf(m->cpu, sizeof(m->cpu), "%s", name.machine);
-	read_line("/sys/kernel/realtime", realtime, sizeof(realtime));
-	m->realtime = *realtime == '1' || strstr(name.version, "PREEMPT_RT");
+	if (!uname(&name)) {
+		snprintf(kernel, sizeof(kernel), "%s %s %s", name.sysname, name.release,
+			 name.machine);
+		snprintf(cpu, sizeof(cpu), "%s", name.machine);
+		read_line("/sys/kernel/realtime", "", realtime, sizeof(realtime));
+	}
+	/* Other than x86 has no such line. */
+	read_line("/proc/cpuinfo", "model name\t: ", cpu, sizeof(cpu));
+	json_object_set_new(machine, "cpu", json_text(cpu));
+	json_object_set_new(machine, "kernel", json_string(kernel));
+	json_object_set_new(machine, "preempt_rt",
+			    json_boolean(*realtime == '1' ||
+					 strstr(name.version, "PREEMPT_RT")));
 }
 
-static void read_processors(struct machine *m)
+/* Those that are granted to this process, and the governor of the one that is timed on. */
+static void set_processors(json_t *machine)
 {
+	int cpu = harness_cpu(), n = (int)sysconf(_SC_NPROCESSORS_ONLN);
+	char path[80], governor[32] = "";
 	cpu_set_t cpus;
-	char path[80];
 
-	m->processors = (int)sysconf(_SC_NPROCESSORS_ONLN);
 	if (!sched_getaffinity(0, sizeof(cpus), &cpus))
-		m->processors = CPU_COUNT(&cpus);
-	m->timed_on = harness_cpu();
+		n = CPU_COUNT(&cpus);
 	snprintf(path, sizeof(path),
-		 "/sys/devices/system/cpu/cpu%d/cpufreq/scaling_governor", m->timed_on);
-	read_line(path, m->governor, sizeof(m->governor));
+		 "/sys/devices/system/cpu/cpu%d/cpufreq/scaling_governor", cpu);
+	read_line(path, "", governor, sizeof(governor));
+	if (*governor)
+		json_object_set_new(machine, "governor", json_text(governor));
+	json_set_integer(machine, "processors", n);
+	json_set_integer(machine, "timed_on", cpu);
 }
 
-void machine_init(struct machine *m)
+static const char *vectors(void)
 {
-	time_t now = time(NULL);
-	struct tm utc;
-
-	memset(m, 0, sizeof(*m));
-	snprintf(m->version, sizeof(m->version), "%s", INCISE_VERSION);
-	snprintf(m->flags, sizeof(m->flags), "%s", BUILD_FLAGS);
-#if defined(__clang__)
-	snprintf(m->compiler, sizeof(m->compiler), "%s", __VERSION__);
-#else
-	snprintf(m->compiler, sizeof(m->compiler), "gcc %s", __VERSION__);
-#endif
-	read_kernel(m);
-	read_cpu(m->cpu, sizeof(m->cpu));
-	snprintf(m->vectors, sizeof(m->vectors), "none");
 #if defined(__x86_64__)
 	if (__builtin_cpu_supports("avx2"))
-		snprintf(m->vectors, sizeof(m->vectors), "AVX2");
+		return "AVX2";
 #endif
-	read_hypervisor(m->hypervisor, sizeof(m->hypervisor));
-	read_processors(m);
-	m->memory_MB =
-		(double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE) / 1e6;
-	if (getloadavg(&m->load_average, 1) < 1)
-		m->load_average = -1;
+	return "none";
+}
+
+json_t *machine_json(void)
+{
+#if defined(__clang__)
+	static const char compiler[] = __VERSION__;
+#else
+	static const char compiler[] = "gcc " __VERSION__;
+#endif
+	double load = NAN, pages = (double)sysconf(_SC_PHYS_PAGES);
+	char hypervisor[32] = "", date[32] = "";
+	time_t now = time(NULL);
+	json_t *machine;
+	struct tm utc;
+
+	if (getloadavg(&load, 1) < 1)
+		load = NAN;
 	if (gmtime_r(&now, &utc))
-		strftime(m->date, sizeof(m->date), "%Y-%m-%dT%H:%M:%SZ", &utc);
-}
-
-static json_t *text_or_null(const char *text)
-{
-	return *text ? json_text(text) : json_null();
-}
-
-json_t *machine_json(const struct machine *m)
-{
-	json_t *load = m->load_average < 0 ? json_null() : json_number(m->load_average);
-
-	return json_pack("{ss so so so ss ss sb so so si si so so ss}", "version",
-			 m->version, "cpu", json_text(m->cpu), "compiler",
-			 json_text(m->compiler), "flags", json_text(m->flags), "kernel",
-			 m->kernel, "vectors", m->vectors, "preempt_rt", m->realtime,
-			 "hypervisor", text_or_null(m->hypervisor), "governor",
-			 text_or_null(m->governor), "processors", m->processors,
-			 "timed_on", m->timed_on, "memory_MB", json_number(m->memory_MB),
-			 "load_average", load, "date", m->date);
+		strftime(date, sizeof(date), "%Y-%m-%dT%H:%M:%SZ", &utc);
+	read_hypervisor(hypervisor, sizeof(hypervisor));
+	/* In the order of incise-bench(1); those that are null here are set below. */
+	machine = json_pack("{ss sn so so sn ss sn so? sn sn sn so so ss}", "version",
+			    INCISE_VERSION, "cpu", "compiler", json_text(compiler),
+			    "flags", json_text(BUILD_FLAGS), "kernel", "vectors",
+			    vectors(), "preempt_rt", "hypervisor",
+			    *hypervisor ? json_text(hypervisor) : NULL, "governor",
+			    "processors", "timed_on", "memory_MB",
+			    json_number(pages * (double)sysconf(_SC_PAGESIZE) / 1e6),
+			    "load_average", json_number(load), "date", date);
+	set_kernel(machine);
+	set_processors(machine);
+	return machine;
 }

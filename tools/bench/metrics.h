@@ -21,62 +21,46 @@
 
 enum metric_kind { METRIC_TIME, METRIC_MEASURED, METRIC_EXACT, METRIC_KINDS };
 
-/* "time", "measured", "exact" */
-extern const char *const metric_kind_names[METRIC_KINDS];
+/* Append to an array a struct harness_time, a struct harness_spread or a double, as of its kind,
+ * and return it; a value that is not finite is left out: NULL. The unit of a time, which is given
+ * in ns, is "ns", "us", "ms" or "s"; the name is printf's. */
+json_t *metrics_add(json_t *metrics, enum metric_kind kind, const void *value,
+		    const char *unit, const char *fmt, ...) INCISE_PRINTF(5, 6);
 
-/*
- * These append to an array and return what they appended; a value that is not finite is left
- * out: NULL. The unit of a time, which is given in ns, is "ns", "us", "ms" or "s"; the name is
- * printf's.
- */
-json_t *metrics_time(json_t *metrics, const struct harness_time *time, const char *unit,
-		     const char *fmt, ...) INCISE_PRINTF(4, 5);
-json_t *metrics_measured(json_t *metrics, const struct harness_spread *spread,
-			 const char *unit, const char *fmt, ...) INCISE_PRINTF(4, 5);
-json_t *metrics_exact(json_t *metrics, double value, const char *unit, const char *fmt,
-		      ...) INCISE_PRINTF(4, 5);
-
-/* Less is better unless this is said. */
+/* Less is better unless this is called. */
 void metrics_more_is_better(json_t *metric);
 
-/* --- read again --- */
-
-/* The longest name of a benchmark or a metric. */
-#define METRIC_NAME_BYTES 300
-
-struct metric {
-	const char *bench; /* NULL in a report of one benchmark */
-	const char *name, *unit;
-	enum metric_kind kind;
-	double value;
-	/* Compared is a time by each workload, else the value. */
-	struct interval {
-		double middle, low, high;
-	} by[WORKLOADS];
-	int scales;
-	bool more_is_better;
-};
-
-struct metrics {
-	const char *report; /* as messages name it */
-	struct metric *metric;
-	int n;
-	json_t *index; /* place by benchmark and name; of a benchmark alone it is there, too */
-};
-
-/*
- * Those of a report, in which they live. A file may have been written by anyone: each type is
- * checked, and names are fit for a terminal. 0 or a negative errno, and the reason; free them
- * in either case.
+/* --- comparison ---
+ *
+ * Two reports of incise bench compared with each other, metric by metric: which
+ * changed beyond noise, are gone, or new. A report is that of one benchmark, an object with
+ * `figures`, or of several, an object whose members are such objects.
+ *
+ *   time      by each reference workload, by more than these disagree, and
+ *   measured  in its unit: the intervals are apart by more than two runs of one build are
+ *               ├──old──┤  noise  ├──new──┤
+ *   exact     by more than the digits of a report
  */
-int metrics_read(const json_t *report, const char *name, struct metrics *all,
-		 struct incise_error *err);
-void metrics_free(struct metrics *all);
 
-/* The one of that benchmark, name, kind and unit, or NULL. */
-const struct metric *metrics_find(const struct metrics *all, const struct metric *like);
+/* Compare; messages call the reports by these names. Returns an object as in incise-bench(1),
+ * which the caller releases; NULL and the reason where one is no report, where they have no
+ * metric in common, or where one is of --quick and the other is not. */
+json_t *compare_reports(const json_t *old_report, const char *old_name,
+			const json_t *new_report, const char *new_name,
+			struct incise_error *err);
 
-/* Whether any is of that benchmark. */
-bool metrics_have(const struct metrics *all, const char *bench);
+/* A report of a file that can be compared; fails the program where there is none. */
+json_t *compare_load(const char *path);
+
+/* The number of metrics that got worse or are gone. */
+int compare_worse(const json_t *comparison);
+
+/* Print a comparison as text, or as JSON. Fails the program when something got worse. */
+void compare_finish(json_t *comparison, bool json);
+
+/* --against: call it before anything is measured, and report as JSON thereafter. It returns
+ * in a process that measures; the first one compares that one's report, prints the comparison,
+ * or with @json the report with `against` in it, and does not return. */
+void compare_against(const char *path, bool json);
 
 #endif

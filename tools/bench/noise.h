@@ -9,34 +9,24 @@
 #include <stdint.h>
 #include "../../lib/base/random.h"
 
-struct noise {
-	uint64_t state; /* set it to a seed */
-};
-
-/* 64 random bits. */
-static inline uint64_t splitmix64(uint64_t *state)
-{
-	return incise_random_mix(*state += 0x9e3779b97f4a7c15);
-}
-
 /* 0 … 1, without 1. */
-static inline double noise_uniform(struct noise *noise)
+static inline double noise_uniform(uint64_t *state)
 {
-	return (double)(splitmix64(&noise->state) >> 11) * 0x1p-53;
+	return (double)(incise_random_next(state) >> 11) * 0x1p-53;
 }
 
 /* Of mean 0 and sd 1; of Box and Muller's two one. */
-static inline double noise_normal(struct noise *noise)
+static inline double noise_normal(uint64_t *state)
 {
-	double size = sqrt(-2 * log(1 - noise_uniform(noise)));
+	double size = sqrt(-2 * log(1 - noise_uniform(state)));
 
-	return size * cos(2 * M_PI * noise_uniform(noise));
+	return size * cos(2 * M_PI * noise_uniform(state));
 }
 
 /* Of mean 1. */
-static inline double noise_exponential(struct noise *noise)
+static inline double noise_exponential(uint64_t *state)
 {
-	return -log(1 - noise_uniform(noise));
+	return -log(1 - noise_uniform(state));
 }
 
 /* 0 … 1, without 1, by Knuth's linear congruential generator. */

@@ -29,12 +29,11 @@
 
 void loop_process_start(struct loop_process *process, const char *scene)
 {
-	char program[4096];
+	char *program = cli_text("%s/incise-haptic", cli_folder());
 	char *argv[] = {program, (char *)scene, "--rig", "sim:",   "--no-rt", "--state",
 			"none",	 "--duration",	RUN,	 "--json", NULL};
 
 	*process = (struct loop_process){.report = memory_file_begin("report")};
-	snprintf(program, sizeof(program), "%s/incise-haptic", cli_folder());
 	process->pid = child_start(argv, fileno(process->report.file), -1);
 }
 
@@ -55,37 +54,35 @@ static long number(pid_t pid, const char *file, const char *word)
 	return sum;
 }
 
-static bool same_in_ours(const char *name, const char *target)
+#define TARGET_BYTES 4096
+
+/* Where a descriptor of a process leads; "" if it is none. */
+static void read_descriptor(pid_t pid, const char *name, char target[TARGET_BYTES])
 {
-	char path[64], ours[4096];
+	char path[320];
 	ssize_t length;
 
-	snprintf(path, sizeof(path), "/proc/self/fd/%d", atoi(name));
-	length = readlink(path, ours, sizeof(ours) - 1);
-	if (length < 0)
-		return false;
-	ours[length] = 0;
-	return !strcmp(ours, target);
+	snprintf(path, sizeof(path), "/proc/%d/fd/%s", (int)pid, name);
+	length = readlink(path, target, TARGET_BYTES - 1);
+	target[length > 0 ? length : 0] = 0;
 }
 
 /* Beyond standard input and output, and what it was started with, which we have too. */
 static json_t *open_files(pid_t pid)
 {
 	json_t *list = json_array();
-	char path[320], target[4096];
+	char path[64], target[TARGET_BYTES], ours[TARGET_BYTES];
 	struct dirent *entry;
-	ssize_t length;
 	DIR *folder;
 
 	snprintf(path, sizeof(path), "/proc/%d/fd", (int)pid);
 	folder = opendir(path);
 	while (folder && (entry = readdir(folder))) {
-		snprintf(path, sizeof(path), "/proc/%d/fd/%s", (int)pid, entry->d_name);
-		length = readlink(path, target, sizeof(target) - 1);
-		if (length < 0 || atoi(entry->d_name) < 3)
+		if (atoi(entry->d_name) < 3)
 			continue;
-		target[length] = 0;
-		if (!same_in_ours(entry->d_name, target))
+		read_descriptor(pid, entry->d_name, target);
+		read_descriptor(getpid(), entry->d_name, ours);
+		if (*target && strcmp(ours, target))
 			json_array_append_new(list, json_text(target));
 	}
 	if (folder)
@@ -93,13 +90,7 @@ static json_t *open_files(pid_t pid)
 	return list;
 }
 
-static void keep_last(json_t **kept, json_t *seen)
-{
-	json_decref(*kept);
-	*kept = seen;
-}
-
-/* What was seen of a process that is still there; libraries and files are gone before it. */
+/* Look at a process while it is there; its libraries and files are gone before it. */
 static void look(struct loop_process *process)
 {
 	json_t *libraries = mapped_libraries(process->pid);
@@ -111,39 +102,33 @@ static void look(struct loop_process *process)
 		json_decref(libraries);
 		return;
 	}
-	keep_last(&process->libraries, libraries);
-	keep_last(&process->files, open_files(process->pid));
+	json_decref(process->libraries);
+	json_decref(process->files);
+	process->libraries = libraries;
+	process->files = open_files(process->pid);
 	process->peak_KiB = peak_KiB;
 	process->own_KiB = number(process->pid, "smaps_rollup", "Private_");
 }
 
-static bool in(const json_t *list, const char *word)
-{
-	for (size_t i = 0; i < json_array_size(list); i++) {
-		const char *text = json_string_value(json_array_get(list, i));
-
-		if (text && !strcmp(text, word))
-			return true;
-	}
-	return false;
-}
-
-/* What its report says of its stages. */
+/* Read from its report which devices its stages use. */
 static void take_report(struct loop_process *process)
 {
-	json_t *report, *stages;
+	json_t *report, *stages, *stage;
+	size_t i;
 
 	rewind(process->report.file);
 	report = json_loadf(process->report.file, 0, NULL);
 	stages = json_object_get(report, "stages");
-	if (!stages) {
+	if (stages)
+		process->devices = json_array();
+	else
 		snprintf(process->failed, sizeof(process->failed),
 			 "its loop gave no report");
-	} else {
-		process->devices = json_array();
-		if (in(stages, "pose"))
+	json_array_foreach(stages, i, stage)
+	{
+		if (!strcmp(json_string_value(stage), "pose"))
 			json_array_append_new(process->devices, json_string("tracker"));
-		if (in(stages, "actuate"))
+		else if (!strcmp(json_string_value(stage), "actuate"))
 			json_array_append_new(process->devices, json_string("stepper"));
 	}
 	json_decref(report);
@@ -199,7 +184,7 @@ void loop_processes_watch(struct loop_process *const *processes, int n)
 
 #define WAIT_S 120 /* callgrind takes some fifty times as long as the program */
 
-bool instructions_open(struct instruction_counter *counter)
+int instructions_open(void)
 {
 	struct perf_event_attr attr = {
 		.type = PERF_TYPE_HARDWARE,
@@ -209,55 +194,29 @@ bool instructions_open(struct instruction_counter *counter)
 		.exclude_hv = 1,
 	};
 
-	*counter = (struct instruction_counter){0};
-	counter->fd =
-		(int)syscall(SYS_perf_event_open, &attr, 0, -1, -1, PERF_FLAG_FD_CLOEXEC);
-	if (counter->fd < 0)
-		return false;
-	instructions_begin(counter);
-	instructions_end(counter);
-	counter->empty = counter->sum;
-	counter->sum = 0;
-	return true;
+	return (int)syscall(SYS_perf_event_open, &attr, 0, -1, -1, PERF_FLAG_FD_CLOEXEC);
 }
 
-static uint64_t now(const struct instruction_counter *counter)
+uint64_t instructions_now(int counter)
 {
 	uint64_t value = 0;
 
-	return read(counter->fd, &value, sizeof(value)) == sizeof(value) ? value : 0;
-}
-
-void instructions_begin(struct instruction_counter *counter)
-{
-	counter->begun = now(counter);
-}
-
-void instructions_end(struct instruction_counter *counter)
-{
-	counter->sum += now(counter) - counter->begun - counter->empty;
-}
-
-double instructions_close(struct instruction_counter *counter)
-{
-	close(counter->fd);
-	return (double)counter->sum;
+	return read(counter, &value, sizeof(value)) == sizeof(value) ? value : 0;
 }
 
 void callgrind_start(struct callgrind *callgrind, const char *function,
 		     char *const argv[])
 {
-	char toggle[100], out[100];
 	/* Without vgdb there are no files of it in TMPDIR, which stay where it is killed. */
-	char *all[ARGUMENTS_MOST] = {
-		"valgrind", "-q", "--tool=callgrind", "--vgdb=no", FROM, toggle, out};
-	int n = 7;
+	char *all[ARGUMENTS_MOST] = {"valgrind", "-q", "--tool=callgrind", "--vgdb=no",
+				     FROM};
+	int n = 5;
 
 	callgrind->report = memory_file_begin("callgrind");
-	snprintf(toggle, sizeof(toggle), "--toggle-collect=%s", function);
+	all[n++] = cli_text("--toggle-collect=%s", function);
 	/* Of this process: valgrind makes its files out of the program's sight. */
-	snprintf(out, sizeof(out), "--callgrind-out-file=/proc/%d/fd/%d", (int)getpid(),
-		 fileno(callgrind->report.file));
+	all[n++] = cli_text("--callgrind-out-file=/proc/%d/fd/%d", (int)getpid(),
+			    fileno(callgrind->report.file));
 	for (int i = 0; argv[i] && n < ARGUMENTS_MOST - 1; i++)
 		all[n++] = argv[i];
 	callgrind->pid = child_start(all, -1, -1);

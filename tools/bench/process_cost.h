@@ -8,7 +8,6 @@
 #define INCISE_PROCESS_COST_H
 
 #include <jansson.h>
-#include <stdbool.h>
 #include <stdint.h>
 #include <sys/types.h>
 #include "../cli/file.h"
@@ -31,21 +30,12 @@ void loop_process_start(struct loop_process *process, const char *scene);
 /* Watch all of them until each has ended. */
 void loop_processes_watch(struct loop_process *const *processes, int n);
 
-/* By the processor's counter (perf_event_open(2)), in this thread. */
-struct instruction_counter {
-	int fd;
-	uint64_t empty, begun, sum;
-};
+/* Open the processor's counter of this thread (perf_event_open(2)); -1 where the kernel has none
+ * for us. Close it with close(2). */
+int instructions_open(void);
 
-/* @return false where the kernel has none for us, with errno */
-bool instructions_open(struct instruction_counter *counter);
-
-/* Around what is counted. */
-void instructions_begin(struct instruction_counter *counter);
-void instructions_end(struct instruction_counter *counter);
-
-/* @return how many so far, without those of begin and end. Closes the counter. */
-double instructions_close(struct instruction_counter *counter);
+/* Its value now. */
+uint64_t instructions_now(int counter);
 
 /* By valgrind's callgrind, in another process. */
 struct callgrind {
@@ -53,10 +43,8 @@ struct callgrind {
 	struct memory_file report;
 };
 
-/*
- * Start a program without output, and count the instructions of all calls of a function, from
- * callgrind_here() on.
- */
+/* Start a program without output, and count the instructions of all calls of a function, from
+ * callgrind_here() on. */
 void callgrind_start(struct callgrind *callgrind, const char *function,
 		     char *const argv[]);
 

@@ -20,13 +20,11 @@
  * column without a value is left out, as is a row of a table without {each}.
  */
 #include <ctype.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include "../../lib/base/ascending.h"
 #include "bench.h"
-#include "../cli/cli.h"
 #include "report.h"
 
 /* Longer tables are for programs: the JSON has them. */
@@ -134,7 +132,7 @@ void report_anchor(const char *title, char *anchor, size_t size)
 }
 
 /* An empty line in front of a block, but not between list items. */
-static void begin_block(struct report *r, bool item)
+static void start_block(struct report *r, bool item)
 {
 	if (!item || !r->item)
 		fputc('\n', r->out);
@@ -310,10 +308,8 @@ static void add_row(struct rows *rows, const char *name, const json_t *object,
 
 	if (!matches(&row, where))
 		return;
-	rows->row = realloc(rows->row, n * sizeof(*rows->row));
-	rows->group = realloc(rows->group, n * sizeof(*rows->group));
-	if (!rows->row || !rows->group)
-		cli_fail("no memory");
+	rows->row = cli_resize(rows->row, n, sizeof(*rows->row));
+	rows->group = cli_resize(rows->group, n, sizeof(*rows->group));
 	rows->group[rows->n] = 0;
 	rows->row[rows->n++] = row;
 }
@@ -398,7 +394,7 @@ static int make_groups(struct rows *rows, const struct value *columns, int n)
 static double summed_up(const struct rows *rows, int group, const struct value *v,
 			enum part part)
 {
-	double *values = bench_alloc((size_t)rows->n, sizeof(*values)), value = 0;
+	double *values = cli_alloc((size_t)rows->n, sizeof(*values)), value = 0;
 	int n = 0;
 
 	for (int i = 0; i < rows->n; i++) {
@@ -551,7 +547,7 @@ static struct block template_lines(void)
 	char *text = all.n ? "" : strdup(text_report_md);
 
 	if (!all.n)
-		all.line = bench_alloc(strlen(text_report_md), sizeof(*all.line));
+		all.line = cli_alloc(strlen(text_report_md), sizeof(*all.line));
 	while (*text) {
 		all.line[all.n++] = text;
 		text += strcspn(text, "\n");
@@ -602,7 +598,7 @@ static void put_paragraph(struct report *r, struct block block, const struct row
 		if (i && !item)
 			fputc(' ', r->out);
 		else
-			begin_block(r, item);
+			start_block(r, item);
 		put_line(r, row, line, put_text);
 		if (i + 1 == block.n || !strncmp(block.line[i + 1], "- ", 2))
 			fputc('\n', r->out);
@@ -611,7 +607,7 @@ static void put_paragraph(struct report *r, struct block block, const struct row
 
 static void put_fence(struct report *r, struct block block)
 {
-	begin_block(r, false);
+	start_block(r, false);
 	for (int i = 0; i < block.n; i++) {
 		put_line(r, NULL, block.line[i], put_command);
 		fputc('\n', r->out);
@@ -622,10 +618,8 @@ static void put_fence(struct report *r, struct block block)
 static void put_plot(struct report *r, struct block block)
 {
 	const char *file = strstr(*block.line, "](") + 2;
-	char *path;
+	char *path = cli_text("%s/%.*s", r->folder, (int)strcspn(file, ")"), file);
 
-	if (asprintf(&path, "%s/%.*s", r->folder, (int)strcspn(file, ")"), file) < 0)
-		cli_fail("no memory");
 	if (!access(path, R_OK)) {
 		put_paragraph(r, (struct block){block.line, 1}, NULL);
 		put_paragraph(r, rest(block), NULL);
@@ -734,7 +728,7 @@ static void put_reason(struct report *r, const struct table *t, const struct row
 	if (!why)
 		return;
 	snprintf(line + strlen(line), sizeof(line) - strlen(line), ". Why: %s", why);
-	begin_block(r, false);
+	start_block(r, false);
 	put_text(r->out, line);
 	fputc('\n', r->out);
 }
@@ -853,7 +847,7 @@ static void end_section(struct report *r)
 			r->word, r->word);
 }
 
-static void begin_section(struct report *r, const char *title, char *path)
+static void start_section(struct report *r, const char *title, char *path)
 {
 	end_section(r);
 	cut(path, " by ");
@@ -895,7 +889,7 @@ void report_markdown(const json_t *report, const char *folder, FILE *out)
 	while (lines.n) {
 		block = next_block(&lines);
 		if (directive(block, "section", path)) {
-			begin_section(&r, *block.line, path);
+			start_section(&r, *block.line, path);
 			memcpy(section, path, sizeof(section));
 			r.word = *r.word ? section + 6 : "";
 		} else if (block.n && json_is_object(r.object)) {

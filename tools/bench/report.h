@@ -28,10 +28,8 @@ void report_markdown(const json_t *report, const char *folder, FILE *out);
 /* A number for people: 0.0123, 45678, 1.3×10⁻¹⁵; "–" where there is none. */
 void report_number(double value, int digits, char *text, size_t size);
 
-/*
- * Markdown as one file of HTML, with the plots of the folder in it. Returns 0 or a negative
- * errno, with err; -EOPNOTSUPP in a build without libcmark-gfm.
- */
+/* Markdown as one file of HTML, with the plots of the folder in it. Returns 0 or a negative
+ * errno, with err; -EOPNOTSUPP in a build without libcmark-gfm. */
 int report_html(const char *markdown, const char *folder, FILE *out,
 		struct incise_error *err);
 

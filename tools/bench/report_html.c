@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include "../cli/cli.h"
 #include "report.h"
 
 #ifdef HAVE_CMARK
@@ -63,15 +64,12 @@ static char *text_of(cmark_node *node)
 /* In an element or an attribute. */
 static void put_text(FILE *out, const char *text)
 {
+	static const char *const escaped[128] = {
+		['&'] = "&amp;", ['<'] = "&lt;", ['>'] = "&gt;", ['"'] = "&quot;"};
+
 	for (; *text; text++)
-		if (*text == '&')
-			fputs("&amp;", out);
-		else if (*text == '<')
-			fputs("&lt;", out);
-		else if (*text == '>')
-			fputs("&gt;", out);
-		else if (*text == '"')
-			fputs("&quot;", out);
+		if (*(const unsigned char *)text < 128 && escaped[(int)*text])
+			fputs(escaped[(int)*text], out);
 		else
 			fputc(*text, out);
 }
@@ -152,15 +150,12 @@ static FILE *fopen_regular(const char *path)
 /* As data of an <img>: in the page itself the names within one would meet those of others. */
 static int put_data(const struct page *page, const char *name)
 {
+	char *path = cli_text("%s/%s", page->folder, name);
+	FILE *file = fopen_regular(path);
 	unsigned char bytes[3 * 4096];
-	char *path;
-	FILE *file;
 	size_t n;
 	int rc = 0;
 
-	if (asprintf(&path, "%s/%s", page->folder, name) < 0)
-		return incise_error_set(page->err, ENOMEM, "no memory");
-	file = fopen_regular(path);
 	if (!file) {
 		rc = incise_error_set(page->err, errno, "%s: %s", path, strerror(errno));
 		free(path);
@@ -211,6 +206,8 @@ static cmark_node *put_block(const struct page *page, cmark_node *node, bool *se
 			     int *rc)
 {
 	cmark_node *next = cmark_node_next(node), *inner = cmark_node_first_child(node);
+	bool is_plot = inner && next && cmark_node_get_type(inner) == CMARK_NODE_IMAGE,
+	     is_table = next && !strcmp(cmark_node_get_type_string(next), "table");
 	char *caption;
 
 	if (cmark_node_get_heading_level(node) == 2) {
@@ -218,17 +215,14 @@ static cmark_node *put_block(const struct page *page, cmark_node *node, bool *se
 		*section = true;
 		return next;
 	}
-	if (inner && next && cmark_node_get_type(inner) == CMARK_NODE_IMAGE) {
-		caption = text_of(next);
-		*rc = put_plot(page, inner, caption);
+	if (is_plot || is_table) {
+		caption = text_of(is_plot ? next : node);
+		if (is_plot)
+			*rc = put_plot(page, inner, caption);
+		else
+			put_table(page, next, caption);
 		free(caption);
 		return *rc ? NULL : cmark_node_next(next);
-	}
-	if (next && !strcmp(cmark_node_get_type_string(next), "table")) {
-		caption = text_of(node);
-		put_table(page, next, caption);
-		free(caption);
-		return cmark_node_next(next);
 	}
 	put_node(page, node);
 	if (cmark_node_get_heading_level(node) == 1)

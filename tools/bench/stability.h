@@ -6,9 +6,12 @@
 #define INCISE_STABILITY_PARTS_H
 
 #include "bench.h"
-#include "bench_device.h"
 
-#define N(array) (int)(sizeof(array) / sizeof(*(array)))
+/* The device: light, in a loop of 1 kHz. */
+#define DEVICE_KG 0.05
+#define N_S2_PER_MM_KG 1e-3		    /* 1 kg = 1 N s²/m */
+#define DEVICE (DEVICE_KG * N_S2_PER_MM_KG) /* N s²/mm */
+#define PERIOD_S 1e-3
 
 void stability_guard(struct bench_run *run);
 void stability_integrators(struct bench_run *run);

@@ -7,12 +7,10 @@
  *                      ▲                                                             │
  *                      └────────── held for T ◀── [late actuator] ◀──────────────────┘
  */
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "../../lib/control/guard.h"
 #include "../../lib/control/plant.h"
-#include "../cli/cli.h"
 #include "stability.h"
 
 #define GUARD_ROWS_MAX 768
@@ -113,11 +111,10 @@ static void press(struct guard_row *row)
 
 /* Settings that hold walls, of those that answer late. */
 struct held {
-	const char *guard;
 	double held, grow, n;
 };
 
-/* How many stiffnesses are bounded with another cap. */
+/* The number of stiffnesses that are bounded with another cap. */
 struct cap {
 	double share;
 	int delay;
@@ -127,7 +124,7 @@ struct cap {
 };
 
 static struct guard_row guard_rows[GUARD_ROWS_MAX];
-static int n_guard_rows, n_late_walls; /* behind these are other caps */
+static int n_guard_rows;
 
 const struct bench_table stability_guard_table = {
 	.key = "guard",
@@ -141,13 +138,6 @@ const struct bench_table stability_guard_table = {
 		    COLUMN(guard_row, "late_mm", late_mm),
 		    COLUMN(guard_row, "largest_N", largest_N),
 		    COLUMN(guard_row, "swept", swept, .data = true)},
-};
-
-static const struct bench_table held_table = {
-	.row_bytes = sizeof(struct held),
-	.columns = {COLUMN(held, "guard", guard)},
-	.metrics = {METRIC(EXACT, held, held, "1", "guard {guard} walls held",
-			   .more_is_better = true)},
 };
 
 const struct bench_table stability_cap_table = {
@@ -194,30 +184,22 @@ static struct guard_row *add_guard_row(double K_N_mm, int delay, enum setting se
 static const double stiffness[] = {1, 2, 5, 10, 20, 50, 90, 140, 200};
 static const int delays[] = {0, 1, 2, 5, 10, 15};
 
-/* Late walls of a setting, with a clamp or without, as a block of text. */
+/* Late walls of a setting, with a clamp or without, as a block of text; in the rows these two take
+ * turns. */
 static void print_walls(struct bench_run *run, enum setting setting, bool clamped)
 {
-	struct guard_row rows[N(stiffness) * N(delays)];
-	int n = 0, n_delays = 0;
+	int n_delays = run->quick ? 2 : N(delays), n = run->quick ? 3 : N(stiffness);
+	const struct guard_row *rows = &guard_rows[2 * setting * n_delays * n + clamped];
 
-	for (int i = 0; i < n_late_walls; i++) {
-		const struct guard_row *r = &guard_rows[i];
-
-		if (r->setting != setting || (r->clamp_N > 0) != clamped)
-			continue;
-		n_delays += !n || r->delay != rows[n - 1].delay;
-		rows[n++] = *r;
-	}
 	bench_text(run, "guard %s%s%s\n", setting_names[setting],
 		   setting == GUARD_CONTACT ? " only" : "", clamped ? ", clamp" : "");
-	bench_block(run, &walls_block, sizeof(*rows), rows, n / n_delays, n_delays, 0);
+	bench_block(run, &walls_block, 2 * sizeof(*rows), rows, n, n_delays, 0);
 }
 
 /* Every setting. Quick: three stiffnesses, two delays. */
 static void measure_late_walls(bool quick, struct held *held)
 {
 	for (int s = 0; s < SETTINGS; s++) {
-		held[s].guard = setting_names[s];
 		for (int d = 0; d < N(delays); d += quick ? 5 : 1)
 			for (int i = 0; i < N(stiffness); i += quick ? 4 : 1)
 				for (int clamp = 0; clamp < 2; clamp++) {
@@ -231,7 +213,6 @@ static void measure_late_walls(bool quick, struct held *held)
 					held[s].grow += !clamp && !r->bounded;
 				}
 	}
-	n_late_walls = n_guard_rows;
 	for (int i = 0; i < n_guard_rows; i++)
 		guard_rows[i].swept = true;
 }
@@ -277,12 +258,11 @@ void stability_guard(struct bench_run *run)
 	measure_late_walls(run->quick, held);
 	for (int i = 0; i < 2; i++)
 		n_caps = measure_caps(run->quick, late[i], caps[i], &n_delays);
-	bench_text(
-		run,
-		"guard of passivity: %g kg, pressed by %g N, meets a wall that answers late, at "
-		"%g mm/s; cap %g m/T; farthest and hardest in %g s\n",
-		DEVICE_KG, (double)PRESS_N, (double)SPEED_mm_s, INCISE_GUARD_SHARE,
-		GUARD_TICKS * PERIOD_S);
+	bench_text(run,
+		   "guard of passivity: %g kg, pressed by %g N, meets a wall that "
+		   "answers late, at %g mm/s; cap %g m/T; farthest and hardest in %g s\n",
+		   DEVICE_KG, (double)PRESS_N, (double)SPEED_mm_s, INCISE_GUARD_SHARE,
+		   GUARD_TICKS * PERIOD_S);
 	for (int clamped = 0; clamped < 2; clamped++)
 		for (int s = 0; s < SETTINGS; s++)
 			print_walls(run, (enum setting)s, clamped);
@@ -293,7 +273,10 @@ void stability_guard(struct bench_run *run)
 	}
 	bench_text(run, "\n");
 	bench_rows(run, &stability_guard_table, guard_rows, n_guard_rows);
-	bench_rows(run, &held_table, held, SETTINGS);
+	for (int i = 0; i < SETTINGS; i++)
+		metrics_more_is_better(
+			metrics_add(run->metrics, METRIC_EXACT, &held[i].held, "1",
+				    "guard %s walls held", setting_names[i]));
 	bench_rows(run, &stability_cap_table, caps[1], n_caps * n_delays);
 	snprintf(title, sizeof(title),
 		 "%g of %g without a guard, %g of %g with it, %g of %g without its cap, "

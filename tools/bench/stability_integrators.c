@@ -7,11 +7,8 @@
  *          1 N  ┌───────┘             each for a second, at 1 kHz
  *            0 ─┘
  */
-#include <math.h>
-#include <stdio.h>
 #include <string.h>
 #include "../../lib/control/plant.h"
-#include "../cli/cli.h"
 #include "stability.h"
 
 #define MM_PER_M 1000
@@ -134,7 +131,7 @@ static struct row rows[ROWS_MAX];
 static int n_rows, n_whole_ticks; /* behind these are smaller steps */
 
 /* At rest. */
-static struct integration begin(const struct row *row)
+static struct integration start_integration(const struct row *row)
 {
 	double omega2 = row->K_N_m / DEVICE_KG;
 	struct integration in = {
@@ -199,7 +196,7 @@ static int substeps_of(const struct row *row)
 
 static void integrate(const struct row *row, int ticks, double *places)
 {
-	struct integration in = begin(row);
+	struct integration in = start_integration(row);
 	int substeps = substeps_of(row);
 
 	for (int k = 0; k < ticks; k++) {
@@ -251,19 +248,15 @@ static void run_timed(void *context)
 static void measure_times(int repeats)
 {
 	static struct harness_variant variants[ROWS_MAX];
-	static struct harness_time times[ROWS_MAX];
 
 	for (int i = 0; i < n_rows; i++)
 		variants[i] = (struct harness_variant){.run = run_timed,
 						       .context = &rows[i],
-						       .units = timed_ticks(&rows[i])};
-	harness_times(variants, n_rows, repeats, times);
-	for (int i = 0; i < n_rows; i++) {
-		struct row *row = &rows[i];
-
-		row->time = times[i];
-		row->ns_per_step = times[i].ns.median * row->step_s / TICK_S;
-	}
+						       .units = timed_ticks(&rows[i]),
+						       .time = &rows[i].time};
+	harness_times(variants, n_rows, repeats);
+	for (struct row *row = rows; row < rows + n_rows; row++)
+		row->ns_per_step = row->time.ns.median * row->step_s / TICK_S;
 }
 
 static void add(const struct integrator *integrator, double K, int substeps,
@@ -371,11 +364,10 @@ void stability_integrators(struct bench_run *run)
 	int missed = 0;
 
 	measure(run->quick);
-	bench_text(
-		run,
-		"integrators of a spring: %g kg, ratio of damping %g, steps of 1 ms; largest "
-		"error as part of the largest place\n",
-		DEVICE_KG, DAMPING_RATIO);
+	bench_text(run,
+		   "integrators of a spring: %g kg, ratio of damping %g, steps of 1 ms; "
+		   "largest error as part of the largest place\n",
+		   DEVICE_KG, DAMPING_RATIO);
 	/* Steps are of the second stiffness: nothing overflows there. */
 	bench_block(run, &places_block, sizeof(*rows), rows, N(integrators),
 		    n_whole_ticks / N(integrators), 1);
@@ -391,8 +383,8 @@ void stability_integrators(struct bench_run *run)
 	for (int i = 0; i < n_rows; i++)
 		missed += rows[i].integrator->exact && !(rows[i].max_error <= EXACT);
 	if (missed)
-		bench_fail(
-			run,
-			"integrators: %d runs of the exact ones were not: please report it",
-			missed);
+		bench_fail(run,
+			   "integrators: %d runs of the exact ones were not: please "
+			   "report it",
+			   missed);
 }

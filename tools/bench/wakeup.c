@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * How late the loop wakes; see wakeup.h.
+ * The lateness of the loop's wake-ups; see wakeup.h.
  *
  * The loop runs a scene on the virtual rig in a thread of its own, and cyclictest runs next to
  * it, on the same processor, with the same policy and interval, half a period apart:
@@ -10,35 +10,29 @@
  *   of a second |               |               |               |
  *               0  T/4     3T/4
  *
- * So both meet the same host, interrupts and load, in the same minute; neither is ever ready
- * while the other has work to do, as long as a tick costs less than T/2. One after the other
- * they would meet different minutes, which on a shared machine differ by more than the
- * programs do. That each finds the processor a little less deeply asleep than alone is the
- * same for both. Neither wakes at full milliseconds, where the kernel has its own tick to do.
+ * So both meet the same host, interrupts and load, in the same minute: on a shared machine
+ * minutes differ by more than the programs do. As long as a tick costs less than T/2 neither is
+ * ready while the other works. Neither wakes at full milliseconds, where the kernel has its own
+ * tick to do.
  *
- * The cause of an overrun: cyclictest's priority is one above the loop's, so that no tick,
- * however long, holds it up. Where cyclictest was waiting in vain for half of the time that
- * the loop was late, or longer, the machine stood still: the host of a virtual one, mostly.
- * Every other overrun counts as the program's.
+ * The cause of an overrun: cyclictest's priority is one above the loop's, so no tick holds it up.
+ * Where cyclictest waited in vain for half of the time that the loop was late, or longer, the
+ * machine stood still: the host of a virtual one, mostly. Any other overrun is the program's.
  *
  *   loop        |█      |█      :       :       :    |█     left out: 3
  *   cyclictest      |       |........................|      late: the machine's
  */
-#include <errno.h>
 #include <limits.h>
-#include <math.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 #include <incise/loop.h>
 #include <incise/scene.h>
 #include "bench.h"
 #include "../cli/child.h"
-#include "../cli/cli.h"
 #include "../cli/folder.h"
 #include "../cli/json.h"
 #include "wakeup.h"
@@ -49,7 +43,7 @@
 #define BLEEDING_S 4
 #define LONGER_S 30 /* than it is needed: the end of one whose bench was killed */
 
-const char *const load_names[LOADS] = {"idle", "cpu", "memory", "disk", "view"};
+const char *const load_names[LOADS + 1] = {"idle", "cpu", "memory", "disk", "view"};
 
 /* Arguments of stress-ng: one worker per processor, and one at the disk. */
 static const char *const stress[LOADS][4] = {
@@ -64,16 +58,14 @@ struct load_run {
 	struct memory_file said;
 };
 
-static const char *begin_stress(enum load load, double seconds, struct load_run *run)
+static const char *begin_stress(enum load_kind load, double seconds, struct load_run *run)
 {
-	const char *argv[16] = {"stress-ng", "--quiet", "--timeout"};
-	char time[24];
-	int n = 3;
+	const char *argv[16] = {"stress-ng", "--quiet", "--timeout",
+				cli_text("%.0f", seconds + LONGER_S)};
+	int n = 4;
 
 	if (!child_possible("stress-ng"))
 		return "stress-ng is not installed: apt-get install stress-ng";
-	snprintf(time, sizeof(time), "%.0f", seconds + LONGER_S);
-	argv[n++] = time;
 	for (int i = 0; i < 4 && stress[load][i]; i++)
 		argv[n++] = stress[load][i];
 	/* It makes a folder there for any of its workers. */
@@ -86,14 +78,16 @@ static const char *begin_stress(enum load load, double seconds, struct load_run 
 
 static const char *begin_view(const char *scene, double seconds, struct load_run *run)
 {
-	char path[PATH_MAX + 20], time[24];
-	const char *argv[] = {path,	    scene, "--procedure", "--no-output",
-			      "--duration", time,  NULL};
+	const char *argv[] = {cli_text("%s/incise-view", cli_folder()),
+			      scene,
+			      "--procedure",
+			      "--no-output",
+			      "--duration",
+			      cli_text("%.0f", seconds + LONGER_S),
+			      NULL};
 
-	snprintf(path, sizeof(path), "%s/incise-view", cli_folder());
-	if (access(path, X_OK))
+	if (access(argv[0], X_OK))
 		return "incise-view is not there";
-	snprintf(time, sizeof(time), "%.0f", seconds + LONGER_S);
 	run->said = memory_file_begin("view");
 	run->pid = child_start((char *const *)argv, fileno(run->said.file), -1);
 	/* Until the skin is painted and the cut bleeds. */
@@ -121,7 +115,7 @@ static double load_end(struct load_run *run)
 
 /* Begin, for @seconds at most, and wait until it is under way. Returns NULL, or why there is
  * no such load here. */
-static const char *load_begin(enum load load, const char *scene, double seconds,
+static const char *load_begin(enum load_kind load, const char *scene, double seconds,
 			      struct load_run *run)
 {
 	const char *why;
@@ -178,41 +172,33 @@ static const char *cyclictest_possible(bool realtime)
 	return NULL;
 }
 
-/*
- * With one thread of SCHED_FIFO, for so many wake-ups, each a quarter of a period after where
+/* With one thread of SCHED_FIFO, for so many wake-ups, each a quarter of a period after where
  * one would be that counts from a full second of CLOCK_MONOTONIC. It begins with the next
- * second, when that is not to come within half a second.
- */
+ * second, when that is not to come within half a second. */
 static void cyclictest_begin(struct cyclictest *c, double rate_hz, int cpu,
 			     uint64_t cycles)
 {
-	char text[7][48];
-	/* The buffer for spikes is allocated only behind the option that asks for them. */
-	const char *argv[] = {"cyclictest",
-			      "--quiet",
-			      "--mlockall",
-			      "--policy=fifo",
-			      "--threads=1",
-			      text[0],
-			      text[1],
-			      text[2],
-			      text[3],
-			      text[4],
-			      text[5],
-			      text[6],
-			      "--spike-nodes=" SPIKES_TEXT,
-			      "--histogram=" TRACKED_US,
-			      NULL};
-
 	c->report = memory_file_begin("cyclictest");
 	c->out = memory_file_begin("cyclictest's lines");
-	snprintf(text[0], sizeof(*text), "--priority=%d", INCISE_REALTIME_PRIORITY + 1);
-	snprintf(text[1], sizeof(*text), "--affinity=%d", cpu);
-	snprintf(text[2], sizeof(*text), "--interval=%.0f", 1e6 / rate_hz);
-	snprintf(text[3], sizeof(*text), "--loops=%llu", (unsigned long long)cycles);
-	snprintf(text[4], sizeof(*text), "--spike=%.0f", 0.25e6 / rate_hz);
-	snprintf(text[5], sizeof(*text), "--json=%s", c->report.path);
-	snprintf(text[6], sizeof(*text), "--secaligned=%.0f", 0.25e6 / rate_hz);
+	/* The buffer for spikes is allocated only behind the option that asks for them. */
+	const char *argv[] = {
+		"cyclictest",
+		"--quiet",
+		"--mlockall",
+		"--policy=fifo",
+		"--threads=1",
+		cli_text("--priority=%d", INCISE_REALTIME_PRIORITY + 1),
+		cli_text("--affinity=%d", cpu),
+		cli_text("--interval=%.0f", 1e6 / rate_hz),
+		cli_text("--loops=%llu", (unsigned long long)cycles),
+		cli_text("--spike=%.0f", 0.25e6 / rate_hz),
+		cli_text("--json=%s", c->report.path),
+		cli_text("--secaligned=%.0f", 0.25e6 / rate_hz),
+		"--spike-nodes=" SPIKES_TEXT,
+		"--histogram=" TRACKED_US,
+		NULL,
+	};
+
 	c->pid = child_start((char *const *)argv, fileno(c->out.file), -1);
 }
 
@@ -296,6 +282,7 @@ struct run {
 	bool with_cyclictest;
 	struct incise_scene *scene;
 	struct incise_rig *rig;
+	struct incise_clock *clock; /* the rig's: CLOCK_MONOTONIC */
 	struct incise_plan *plan;
 	int64_t period_ns, due_ns; /* of the first tick */
 	struct incise_loop_stats stats;
@@ -308,22 +295,6 @@ struct run {
 	uint64_t found; /* ticks skipped in all of these */
 	struct cyclictest cyclictest;
 };
-
-static int64_t now_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return t.tv_sec * INCISE_NS_PER_S + t.tv_nsec;
-}
-
-static void sleep_until(int64_t t_ns)
-{
-	struct timespec t = {t_ns / INCISE_NS_PER_S, t_ns % INCISE_NS_PER_S};
-
-	while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR)
-		;
-}
 
 static void add_stall(struct run *run, int64_t to_ns, uint64_t skipped)
 {
@@ -345,25 +316,26 @@ static int ticked(void *context, const struct incise_tick *tick)
 	return 0;
 }
 
-/*
- * Three quarters of a period after a full second, half a period after cyclictest. Not much
- * later, or the two would be ready together.
- */
+static int64_t next_second(struct incise_clock *clock)
+{
+	return (incise_clock_now(clock) / INCISE_NS_PER_S + 1) * INCISE_NS_PER_S;
+}
+
+/* Wait until three quarters of a period after a full second, half a period after cyclictest. Not much
+ * later, or the two would be ready together. */
 static void wait_for_phase(const struct run *run)
 {
-	int64_t begin = (now_ns() / INCISE_NS_PER_S + 1) * INCISE_NS_PER_S +
-			run->period_ns / 4 * 3;
+	int64_t start_ns = next_second(run->clock) + run->period_ns / 4 * 3;
 
-	for (int i = 0; i < 1000; i++, begin += run->period_ns) {
-		sleep_until(begin);
-		if (now_ns() - begin < run->period_ns / 8)
+	for (int i = 0; i < 1000; i++, start_ns += run->period_ns) {
+		incise_clock_wait_until(run->clock, start_ns);
+		if (incise_clock_now(run->clock) - start_ns < run->period_ns / 8)
 			return;
 	}
 }
 
 static void run_loop(struct run *run)
 {
-	struct incise_clock *clock = incise_rig_clock(run->rig);
 	struct incise_loop_options options = {
 		.rate_hz = run->rate_hz,
 		.duration_ns = (int64_t)(run->wakeups->seconds * 1e9),
@@ -374,13 +346,15 @@ static void run_loop(struct run *run)
 
 	if (run->with_cyclictest)
 		wait_for_phase(run);
-	run->due_ns = incise_clock_now(clock) + run->period_ns;
+	run->due_ns = incise_clock_now(run->clock) + run->period_ns;
 	run->t_ns = run->due_ns - run->period_ns;
 	run->index = -1;
-	run->rc = incise_loop_run(run->plan, clock, &options, &run->stats, &run->err);
+	run->rc =
+		incise_loop_run(run->plan, run->clock, &options, &run->stats, &run->err);
 	/* No tick comes after a gap over the end. */
 	if (run->stats.skipped > run->found)
-		add_stall(run, incise_clock_now(clock), run->stats.skipped - run->found);
+		add_stall(run, incise_clock_now(run->clock),
+			  run->stats.skipped - run->found);
 }
 
 static void *loop_thread(void *context)
@@ -412,15 +386,14 @@ static void run_thread(struct run *run)
 
 static void open_run(struct run *run, const char *scene)
 {
+	unsigned int devices = INCISE_RIG_TRACKER | INCISE_RIG_STEPPER;
+
 	run->period_ns = llrint(INCISE_NS_PER_S / run->rate_hz);
-	run->scene = incise_scene_load(scene, NULL, &run->err);
-	if (run->scene)
-		run->rig = incise_rig_open(
-			"sim:", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, &run->err);
-	if (run->rig)
-		run->plan = incise_plan_new(run->scene, run->rig, &run->err);
-	if (!run->plan)
-		cli_fail_with(&run->err);
+	run->scene = cli_require(incise_scene_load(scene, NULL, &run->err), &run->err);
+	run->rig = cli_require(incise_rig_open("sim:", devices, &run->err), &run->err);
+	run->clock = incise_rig_clock(run->rig);
+	run->plan =
+		cli_require(incise_plan_new(run->scene, run->rig, &run->err), &run->err);
 }
 
 static void close_run(struct run *run)
@@ -441,7 +414,7 @@ static struct lateness lateness_of(const uint64_t *bins, double max_us)
 		.p999 = incise_loop_quantile(bins, 0.999),
 		.p9999 = incise_loop_quantile(bins, 0.9999),
 		.max = max_us,
-		.bins = bench_alloc(INCISE_LOOP_BINS, sizeof(*bins)),
+		.bins = cli_alloc(INCISE_LOOP_BINS, sizeof(*bins)),
 	};
 
 	memcpy(l.bins, bins, INCISE_LOOP_BINS * sizeof(*bins));
@@ -483,7 +456,7 @@ static bool held_up(const struct cyclictest *c, const struct stall *stall,
 	return both_ns >= (gap_ns - period_ns) / 2;
 }
 
-/* How many of the skipped ticks were the machine's. */
+/* Returns how many of the skipped ticks were the machine's. */
 static double blame(const struct run *run)
 {
 	uint64_t machine = 0;
@@ -503,8 +476,8 @@ static void run_both(struct run *run, const char *scene, struct wakeup *row)
 	open_run(run, scene);
 	if (run->with_cyclictest) {
 		/* Early in a second: both begin with the next one. */
-		if (now_ns() % INCISE_NS_PER_S > INCISE_NS_PER_S / 4)
-			sleep_until((now_ns() / INCISE_NS_PER_S + 1) * INCISE_NS_PER_S);
+		if (incise_clock_now(run->clock) % INCISE_NS_PER_S > INCISE_NS_PER_S / 4)
+			incise_clock_wait_until(run->clock, next_second(run->clock));
 		cyclictest_begin(c, run->rate_hz, run->wakeups->cpu,
 				 (uint64_t)llrint(cycles));
 	}
@@ -530,10 +503,10 @@ static void run_both(struct run *run, const char *scene, struct wakeup *row)
 	}
 }
 
-static void measure(const char *scene, enum load load, const struct wakeups *wakeups,
+static void measure(const char *scene, enum load_kind load, const struct wakeups *wakeups,
 		    const struct incise_realtime *realtime, struct wakeup *row)
 {
-	struct run *run = bench_alloc(1, sizeof(*run));
+	struct run *run = cli_alloc(1, sizeof(*run));
 	struct load_run beside = {0};
 
 	row->no_cyclictest = cyclictest_possible(realtime);
@@ -554,12 +527,10 @@ static void measure(const char *scene, enum load load, const struct wakeups *wak
 static double scene_rate(const char *path)
 {
 	struct incise_error err = {0};
-	struct incise_scene *scene = incise_scene_load(path, NULL, &err);
-	double rate_hz;
+	struct incise_scene *scene =
+		cli_require(incise_scene_load(path, NULL, &err), &err);
+	double rate_hz = incise_scene_rate_hz(scene);
 
-	if (!scene)
-		cli_fail_with(&err);
-	rate_hz = incise_scene_rate_hz(scene);
 	incise_scene_free(scene);
 	return rate_hz;
 }
@@ -583,7 +554,7 @@ const char *wakeups_policy(bool realtime)
 }
 
 /* A load takes seconds to begin and to end. */
-static bool wanted(enum load load, enum load only, bool quick, int rate)
+static bool wanted(enum load_kind load, enum load_kind only, bool quick, int rate)
 {
 	if (only != LOADS)
 		return load == only;
@@ -591,7 +562,8 @@ static bool wanted(enum load load, enum load only, bool quick, int rate)
 }
 
 void wakeups_measure(const char *scene, struct memory_file (*own)(double rate_hz),
-		     enum load only, bool quick, double seconds, struct wakeups *wakeups)
+		     enum load_kind only, bool quick, double seconds,
+		     struct wakeups *wakeups)
 {
 	static const struct lateness none = {NAN, NAN, NAN, NAN, NAN, NAN, 0, NULL, NULL};
 	const double rates_hz[] = {scene ? scene_rate(scene) : 1000, 4000};
@@ -610,7 +582,7 @@ void wakeups_measure(const char *scene, struct memory_file (*own)(double rate_hz
 		for (int load = 0; load < LOADS && !cli_stop; load++) {
 			struct wakeup *row = &wakeups->row[wakeups->n];
 
-			if (!wanted((enum load)load, only, quick, i))
+			if (!wanted((enum load_kind)load, only, quick, i))
 				continue;
 			*row = (struct wakeup){
 				.load = load_names[load],
@@ -624,7 +596,7 @@ void wakeups_measure(const char *scene, struct memory_file (*own)(double rate_hz
 				.tick_max_us = NAN,
 				.frames_hz = NAN,
 			};
-			measure(scene ? scene : file.path, (enum load)load, wakeups,
+			measure(scene ? scene : file.path, (enum load_kind)load, wakeups,
 				realtime, row);
 			wakeups->n++;
 		}

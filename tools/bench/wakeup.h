@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * How late the machine wakes the haptic loop, idle and under loads, and cyclictest of rt-tests
- * at the same time on the same processor: a program that only sleeps and looks at the clock.
+ * The lateness with which the machine wakes the haptic loop, idle and under loads, and cyclictest
+ * of rt-tests at the same time on the same processor: a program that only sleeps and looks at the clock.
  */
 #ifndef INCISE_WAKEUP_H
 #define INCISE_WAKEUP_H
@@ -14,16 +14,15 @@
 #include "metrics.h"
 
 /* Nothing, stress-ng on processors, memory or disk, or `incise view` at 60 frames a second. */
-enum load { LOAD_IDLE, LOAD_CPU, LOAD_MEMORY, LOAD_DISK, LOAD_VIEW, LOADS };
-extern const char *const load_names[LOADS];
+enum load_kind { LOAD_IDLE, LOAD_CPU, LOAD_MEMORY, LOAD_DISK, LOAD_VIEW, LOADS };
+extern const char *const load_names[LOADS + 1]; /* end with NULL */
 
 /* Of the wake-ups of one program, us; NaN: not measured. Quantiles are upper edges of bins. */
 struct lateness {
 	double min, median, p99, p999, p9999, max;
 	uint64_t ticks;
-	uint64_t *
-		bins; /* INCISE_LOOP_BINS of 1 us, the last one all above; NULL: not measured */
-	json_t *json; /* {"min", "median", …, "ticks"}, or null */
+	uint64_t *bins; /* INCISE_LOOP_BINS of 1 us, the last one all above; or NULL */
+	json_t *json;	/* {"min", "median", …, "ticks"}, or null */
 };
 
 /* Its memory is never freed. */
@@ -52,12 +51,11 @@ struct wakeups {
 	int cpu;	/* of both programs */
 };
 
-/*
- * Measure a scene's file at its rate; with NULL those of @own, which makes one, at 1 and
- * 4 kHz. @only: a load, or LOADS for all, which with @quick are few.
- */
+/* Measure a scene's file at its rate; with NULL those of @own, which makes one, at 1 and
+ * 4 kHz. @only: a load, or LOADS for all, which with @quick are few. */
 void wakeups_measure(const char *scene, struct memory_file (*own)(double rate_hz),
-		     enum load only, bool quick, double seconds, struct wakeups *wakeups);
+		     enum load_kind only, bool quick, double seconds,
+		     struct wakeups *wakeups);
 
 /* "fifo" or "other". */
 const char *wakeups_policy(bool realtime);

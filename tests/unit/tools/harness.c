@@ -107,12 +107,14 @@ static double say(void *context)
 
 static void test_variants_take_turns(void **state)
 {
-	const struct harness_variant variants[] = {
-		{.ns = say, .context = "a"}, {0}, {.ns = say, .context = "b"}};
 	struct harness_time times[3];
+	const struct harness_variant variants[] = {
+		{.ns = say, .context = "a", .time = &times[0]},
+		{.time = &times[1]},
+		{.ns = say, .context = "b", .time = &times[2]}};
 
 	*order = 0;
-	harness_times(variants, 3, 4, times);
+	harness_times(variants, 3, 4);
 	assert_string_equal(order, "abababab");
 	/* 1001, 1003, 1005, 1007: nearest rank, the upper one of two */
 	assert_true(times[0].ns.median == 1005);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# How late the loop is woken, and cyclictest: a row of histograms for each rate.
+# Lateness of the loop and of cyclictest: a row of histograms for each rate.
 set multiplot layout words(data_rate_hz),words(data_load) title sprintf("How late the loop's \
 thread wakes, and cyclictest beside it%s%s, %.3g s each", words(data_load) > 1 ? ": " : "\n", \
 	policy, seconds) font ',13'

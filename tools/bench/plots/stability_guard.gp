@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# How far and how hard with the guard; which caps are bounded behind a late actuator.
+# Distance and force with the guard; the caps that are bounded behind a late actuator.
 set multiplot layout 1,3 title "50 g pressed on a wall that answers late. Not bounded: ".\
 	unbounded font ',12'
 set logscale xy

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * tools/bench/compare.c, on reports that are made: how often it calls two runs of one distribution
+ * tools/bench/metrics.c, on reports that are made: how often it calls two runs of one distribution
  * different, and what it finds.
  */
 #include <stdarg.h>
@@ -9,7 +9,6 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <math.h>
-#include "../../../tools/bench/compare.h"
 #include "../../../tools/bench/metrics.h"
 
 #define TURNS 101
@@ -60,9 +59,9 @@ static json_t *made_report(const struct made *made, uint64_t *random)
 			by[i] = ns[i] / (1e4 * unit[w]);
 		harness_spread(by, TURNS, &time.by[w]);
 	}
-	metrics_time(metrics, &time, "ns", "time");
-	metrics_measured(metrics, &time.ns, "ns", "measured");
-	metrics_exact(metrics, 1.0 / 3, "N", "exact");
+	metrics_add(metrics, METRIC_TIME, &time, "ns", "time");
+	metrics_add(metrics, METRIC_MEASURED, &time.ns, "ns", "measured");
+	metrics_add(metrics, METRIC_EXACT, &(double){1.0 / 3}, "N", "exact");
 	return report_of(metrics);
 }
 
@@ -141,7 +140,7 @@ static json_t *sharp(double value, double chain, double wide, double memory)
 
 		time.by[w] = (struct harness_spread){by, by, by, 0.99 * by, 1.01 * by};
 	}
-	metrics_time(metrics, &time, "us", "time");
+	metrics_add(metrics, METRIC_TIME, &time, "us", "time");
 	return report_of(metrics);
 }
 
@@ -177,8 +176,8 @@ static json_t *exact(double a, double b, bool more)
 {
 	json_t *metrics = json_array(), *metric;
 
-	metrics_exact(metrics, a, "N", "a");
-	metric = metrics_exact(metrics, b, "N", "b");
+	metrics_add(metrics, METRIC_EXACT, &a, "N", "a");
+	metric = metrics_add(metrics, METRIC_EXACT, &b, "N", "b");
 	if (more)
 		metrics_more_is_better(metric);
 	return report_of(metrics);
@@ -224,11 +223,12 @@ static void test_exact_ones(void **state)
 static void test_another_unit_is_another_metric(void **state)
 {
 	json_t *was = json_array(), *is = json_array(), *c;
+	double one = 1;
 
-	metrics_exact(was, 1, "N", "a");
-	metrics_exact(is, 1, "mN", "a");
-	metrics_exact(was, 1, "N", "b");
-	metrics_exact(is, 1, "N", "b");
+	metrics_add(was, METRIC_EXACT, &one, "N", "a");
+	metrics_add(is, METRIC_EXACT, &one, "mN", "a");
+	metrics_add(was, METRIC_EXACT, &one, "N", "b");
+	metrics_add(is, METRIC_EXACT, &one, "N", "b");
 	c = compared(report_of(was), report_of(is));
 	assert_int_equal(count(c, "gone"), 1);
 	assert_int_equal(count(c, "new"), 1);
