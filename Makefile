@@ -36,7 +36,7 @@ INSTALL ?= install
 
 version := $(shell sed -n 's/^\#define INCISE_VERSION "\(.*\)"/\1/p' lib/include/incise/version.h)
 # Changes when the binary interface does.
-soversion := 1
+soversion := 2
 
 cppflags := -D_GNU_SOURCE -Ilib/include
 CCACHE := $(CCACHE)

@@ -57,7 +57,7 @@ setup() {
 	cmp "$root/tools/incise.bash" "$dest/usr/share/bash-completion/completions/incise"
 	for lib in incise incise-learn incise-record; do
 		[ -f "$dest/usr/lib/lib$lib.so" ]
-		[ "$(readlink "$dest/usr/lib/lib$lib.so")" = lib$lib.so.1 ]
+		[ "$(readlink "$dest/usr/lib/lib$lib.so")" = lib$lib.so.2 ]
 	done
 	for module in "$INCISE_BUILD"/lib/incise/[!p]*.so; do
 		cmp "$module" "$dest/usr/lib/incise/${module##*/}"

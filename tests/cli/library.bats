@@ -61,7 +61,7 @@ declared_by() {
 	for part in $parts; do
 		soname=$(readelf -d "$INCISE_BUILD/lib/$part.so" |
 			sed -n 's/.*(SONAME).*\[\(.*\)\]/\1/p')
-		[ "$soname" = $part.so.1 ]
+		[ "$soname" = $part.so.2 ]
 		[ "$(readlink "$INCISE_BUILD/lib/$part.so")" = $soname ]
 		[ -e "$INCISE_BUILD/lib/$soname" ]
 	done
