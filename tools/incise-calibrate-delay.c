@@ -38,9 +38,7 @@ struct options {
 
 static const struct cli_option option_table[] = {
 	{CLI_RIG_OPTION(struct options, common.rig)},
-	{'c', "calibration", "FILE",
-	 "read as found, and written (default: calibration.conf)",
-	 CLI_TEXT(struct options, common.calibration)},
+	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "time", "TIME", "record so long (default: 15s)",
 	 CLI_DURATION(struct options, time_s, 8, 600)},
 	{0, "reference", "STREAM",

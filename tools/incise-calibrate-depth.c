@@ -53,9 +53,7 @@ static void parse_board(void *whole, char *text)
 static const struct cli_option option_table[] = {
 	{'r', "rig", "RIG", "rig.conf, or sim:KEY=VALUE,… (default: ./rig.conf)",
 	 CLI_TEXT(struct options, common.rig)},
-	{'c', "calibration", "FILE",
-	 "read as found, and written (default: calibration.conf)",
-	 CLI_TEXT(struct options, common.calibration)},
+	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "from", "FILE",
 	 "pictures (more may follow), FILE.csv or NAME.rec instead of the\nrig's camera",
 	 CLI_TEXT(struct options, common.from)},

@@ -70,9 +70,7 @@ static const struct cli_option option_table[] = {
 	{'r', "rig", "RIG",
 	 "rig.conf, or sim:KEY=VALUE,... (default: ./rig.conf, then /etc/incise)",
 	 CLI_TEXT(struct options, common.rig)},
-	{'c', "calibration", "FILE",
-	 "read as found, and written (default: calibration.conf)",
-	 CLI_TEXT(struct options, common.calibration)},
+	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "from", "FILE",
 	 "pairs instead of a rig: CSV with mass_g or force_N, reading_mV,\n"
 	 "and perhaps series and direction (up, down)",

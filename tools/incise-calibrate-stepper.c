@@ -41,9 +41,7 @@ static void parse_range(void *whole, char *text)
 
 static const struct cli_option option_table[] = {
 	{CLI_RIG_OPTION(struct options, common.rig)},
-	{'c', "calibration", "FILE",
-	 "read as found, and written (default: calibration.conf)",
-	 CLI_TEXT(struct options, common.calibration)},
+	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "from", "FILE",
 	 "CSV with position_mm or steps, and force_N, instead of devices",
 	 CLI_TEXT(struct options, common.from)},

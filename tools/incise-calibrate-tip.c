@@ -34,9 +34,7 @@ struct options {
 
 static const struct cli_option option_table[] = {
 	{CLI_RIG_OPTION(struct options, common.rig)},
-	{'c', "calibration", "FILE",
-	 "read as found, and written (default: calibration.conf)",
-	 CLI_TEXT(struct options, common.calibration)},
+	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "time", "TIME",
 	 "turn it for so long at most (default: 20s); it ends earlier\n"
 	 "when the tip is known well enough",

@@ -5,7 +5,7 @@
  * (incise_scene_set_full()) the stages that are not needed are neutral.
  */
 #include <stddef.h>
-#include "stages.h"
+#include "plan.h"
 
 /* A stage can be done in several ways. */
 static incise_stage_fn *pose(const struct incise_plan *plan)

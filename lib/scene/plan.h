@@ -105,6 +105,24 @@ struct incise_plan {
 	bool actuator_off;	 /* it has no power */
 };
 
+/* --- stages, but for the forces, which are in forces.h --- */
+
+/* From poses to the tool on the surface. */
+incise_stage_fn incise_stage_pose;
+incise_stage_fn incise_stage_fed;
+incise_stage_fn incise_stage_predict;
+incise_stage_fn incise_stage_tool;
+incise_stage_fn incise_stage_contact;
+incise_stage_fn incise_stage_normal;
+
+/* From the tissue's force to the hand. */
+incise_stage_fn incise_stage_guard;
+incise_stage_fn incise_stage_start;
+incise_stage_fn incise_stage_limit;
+incise_stage_fn incise_stage_actuate;
+
+/* --- plan --- */
+
 /* Fill in the stages that the scene and the rig need, and why the others are left out. */
 void incise_plan_choose(struct incise_plan *plan);
 

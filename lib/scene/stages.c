@@ -5,7 +5,7 @@
 #include <errno.h>
 #include <string.h>
 #include "../base/vector.h"
-#include "stages.h"
+#include "plan.h"
 
 /*
  * Below this depth the direction from tool to proxy is rounding: the surface's own normal

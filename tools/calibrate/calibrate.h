@@ -20,6 +20,12 @@ struct calibrate_options {
 	struct incise_calibration found; /* in force before */
 };
 
+/* The option -c of a command, whose options begin with these as `common`. */
+#define CALIBRATE_FILE_OPTION(type)                                       \
+	'c', "calibration", "FILE",                                       \
+		"read as found, and written (default: calibration.conf)", \
+		CLI_TEXT(type, common.calibration)
+
 /* Read the calibration in force; a missing file is the nominal one. */
 void calibrate_find(struct calibrate_options *options);
 

@@ -13,7 +13,7 @@
 #include <string.h>
 #include <incise/backend.h>
 #include "../../../lib/base/vector.h"
-#include "../../../lib/scene/stages.h"
+#include "../../../lib/scene/plan.h"
 
 static const struct incise_tracker_info info = {.rate_hz = 100, .latency_ns = 5000000};
 
