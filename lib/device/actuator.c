@@ -13,7 +13,7 @@
 #define MS 1000000.0 /* ns */
 #define SECOND_NS 1e9
 #define NS_PER_US 1000
-#define N(array) (sizeof(array) / sizeof(*(array)))
+#define COUNT(array) (sizeof(array) / sizeof(*(array)))
 
 /* A key for a number of the struct, which may have another unit. */
 struct number {
@@ -333,7 +333,7 @@ int incise_actuator_can_read(struct incise_actuator_can *can, double travel_mm,
 		rc = incise_conf_number(own, path, "following_mm", 0.001, travel_mm,
 					&can->following_mm, err);
 	if (!rc)
-		rc = read_numbers(can, can_numbers, N(can_numbers), own, path, err);
+		rc = read_numbers(can, can_numbers, COUNT(can_numbers), own, path, err);
 	if (!rc)
 		rc = incise_conf_integer(own, path, "homing_method", -128, 127,
 					 &can->homing_method, err);
@@ -465,7 +465,7 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 	for (size_t i = 0; i < sizeof(needed) / sizeof(*needed) && !rc; i++)
 		rc = incise_conf_need(group, path, needed[i], err);
 	if (!rc)
-		rc = read_numbers(actuator, numbers, N(numbers), group, path, err);
+		rc = read_numbers(actuator, numbers, COUNT(numbers), group, path, err);
 	if (!rc)
 		rc = incise_conf_integer(group, path, "steps_per_turn", 1, 100000,
 					 &actuator->steps_per_turn, err);
