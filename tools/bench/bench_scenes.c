@@ -408,10 +408,10 @@ static void watch_processes(struct scenes *s)
 			loop_process_start(started[n++], s->scene[i].path);
 		}
 	loop_processes_watch(started, n);
-	for (int i = 0; i < s->n; i++)
-		if (*s->scene[i].process.failed)
-			snprintf(s->scene[i].failed, sizeof(s->scene[i].failed), "%s",
-				 s->scene[i].process.failed);
+	for (struct scene *scene = s->scene; scene < s->scene + s->n; scene++)
+		if (*scene->process.failed)
+			snprintf(scene->failed, sizeof(scene->failed), "%s",
+				 scene->process.failed);
 }
 
 /* --- times --- */

@@ -114,6 +114,7 @@ struct metrics {
 	const char *report; /* as messages name it */
 	struct metric *metric;
 	int n;
+	size_t capacity; /* of metric */
 	json_t *index; /* place by benchmark and name; of a benchmark alone it is there, too */
 };
 
@@ -286,12 +287,16 @@ static int add_all(struct metrics *all, const char *bench, const json_t *list,
 	if (all->n + n > METRICS_MAX)
 		return incise_error_set(err, E2BIG, "%s: more than %d figures",
 					all->report, METRICS_MAX);
-	grown = realloc(all->metric, (all->n + n + 1) * sizeof(*grown));
-	if (grown)
+	if (all->n + n > all->capacity) {
+		all->capacity = 2 * (all->n + n);
+		grown = realloc(all->metric, all->capacity * sizeof(*grown));
+		if (!grown)
+			return incise_error_set(err, ENOMEM, "%s: no memory",
+						all->report);
 		all->metric = grown;
-	if (!grown || (bench && n &&
-		       json_object_set_new(all->index, key_of(bench, "", key),
-					   json_integer(all->n))))
+	}
+	if (bench && n &&
+	    json_object_set_new(all->index, key_of(bench, "", key), json_integer(all->n)))
 		return incise_error_set(err, ENOMEM, "%s: no memory", all->report);
 	for (size_t i = 0; i < n && !rc; i++)
 		rc = add(all, bench, json_array_get(list, i), i, err);

@@ -12,12 +12,7 @@
 #include "../../../tools/bench/metrics.h"
 
 #define TURNS 101
-/* AddressSanitizer maps memory anew for each. */
-#ifdef __SANITIZE_ADDRESS__
-#define PAIRS 60
-#else
 #define PAIRS 500
-#endif
 #define BENCH_NS 100
 
 static double uniform(uint64_t *state)
