@@ -51,11 +51,12 @@ $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 		$(filter %.c,$^) -lm -pthread
 
 # What `check` is made of: each part is a target, timed. Those of the first line build what the
-# others use; of the others two run side by side with -j2.
+# others use; of the others as many run side by side as there are processors, or as -j says.
 times := $(O)/times
+jobs = $(if $(findstring --jobserver,$(MAKEFLAGS)),,-j$(shell nproc))
 check-parts:
-	+@$(MAKE) --no-print-directory $(addprefix timed-,check-style check-layers cli-needs)
-	+@$(MAKE) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-fuzz check-rtsan \
+	+@$(MAKE) $(jobs) --no-print-directory $(addprefix timed-,check-style check-layers cli-needs)
+	+@$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-fuzz check-rtsan \
 		check-deb check-module check-vm)
 timed-%:
 	+@tests/timed $(times) $* $(MAKE) --no-print-directory $*
@@ -71,10 +72,10 @@ in_parts = +@set -e; $(check_deps); mkdir -p $(O); rm -f $(times); status=0; \
 
 check: ## install what is missing, build, and test
 	@echo "left out, and run by make check-all: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests" \
-		"of benches, most unit tests again without sanitizers, most cases of the slowest with them," \
-		"ThreadSanitizer, full attacks on recordings, the second kernel's boot"
+		"of benches, most unit tests again without sanitizers, most cases of the slowest properties," \
+		"ThreadSanitizer, full attacks on recordings, the boots of the second kernel and of two processors"
 	$(call in_parts,parts=check-unit-once cli_filter="--filter-tags '!slow'" \
-		vm_boots="main:deterministic main:service main:smp")
+		vm_boots="main:deterministic main:service")
 
 check-all: ## the same with all tests in all builds, on all kernels: an hour
 	$(call in_parts,parts="check-sanitize check-unit check-tsan" ATTACK=full)

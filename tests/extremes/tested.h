@@ -20,8 +20,8 @@ static struct extremes_setup tested_few = {.seed = 1, .part = 20, .scenes = "sce
 			     tested_all = {.seed = 1, .part = 1, .scenes = "scenes"};
 
 /*
- * Of properties whose cases are all tried, try one of @part instead, as AddressSanitizer makes
- * them several times slower; with ATTACK=full in the environment all of them.
+ * Of properties whose cases are all tried, try one of @part instead, as some take long; with
+ * ATTACK=full in the environment, as in make check-all, try all of them.
  */
 static inline void tested_reduce(int part)
 {

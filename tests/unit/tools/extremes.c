@@ -21,8 +21,6 @@ int main(void)
 		control_properties, motion_properties, wall_properties,
 		device_properties,  file_properties,   NULL};
 
-#ifdef __SANITIZE_ADDRESS__
 	tested_reduce(4);
-#endif
 	return test_properties(tables);
 }
