@@ -51,9 +51,10 @@ $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 		$(filter %.c,$^) -lm -pthread
 
 # What `check` is made of: each part is a target, timed. Those of the first line build what the
-# others use; of the others as many run side by side as there are processors, or as -j says.
+# others use; of the others one more runs than there are processors, as some wait for devices, or as
+# many as -j says.
 times := $(O)/times
-jobs = $(if $(findstring --jobserver,$(MAKEFLAGS)),,-j$(shell nproc))
+jobs = $(if $(findstring --jobserver,$(MAKEFLAGS)),,-j$(shell expr $$(nproc) + 1))
 check-parts:
 	+@$(MAKE) $(jobs) --no-print-directory $(addprefix timed-,check-style check-layers cli-needs)
 	+@$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-fuzz check-rtsan \

@@ -96,11 +96,14 @@ set_clock 3600
 wait $capture
 code=$?
 what_was | sed 's/^/# /'
-# In real time an emulated machine may lose some: it says so, and how many.
+# In real time an emulated machine may lose some: it says so, and how many. In virtual time it
+# may, too, at the end, where the programs that look at the recording are read from the host.
 lost=$(ask "SELECT sum(lost) FROM streams")
 if [ "$INCISE_VM_PROFILE" = deterministic ]; then
-	check "nothing is lost while the clock is set" [ "$code:$lost" = 0:0 ]
+	incise verify a.rec 2>&1 | grep -E '^a\.rec: .* missing[ ,]' | grep -v ' missing at the end' >gaps
+	check "nothing is lost while the clock is set" [ ! -s gaps ]
 fi
+check "it ends with what it lost" [ "$code" = $((lost > 0)) ]
 check "verify says the same" verified $((lost > 0))
 check "it began when it began" holds "abs(strftime('%s', (SELECT value FROM meta WHERE
 	key = 'started')) - $began) <= 20"
