@@ -98,7 +98,7 @@ static int read_tracker_setup(struct incise_tracker_setup *setup,
 			      const config_setting_t *root, const char *path,
 			      struct incise_error *err)
 {
-	static const char *const keys[] = {"stations", "hemisphere", "sync", "tip_mm",
+	static const char *const keys[] = {"stations", "hemisphere", "sync", "offset_mm",
 					   NULL};
 	static const char *const syncs[] = {"internal", "external", "video", NULL};
 	const config_setting_t *group;
@@ -116,7 +116,8 @@ static int read_tracker_setup(struct incise_tracker_setup *setup,
 	if (!rc)
 		rc = read_word(group, path, "sync", syncs, &sync, err);
 	setup->sync = (enum incise_tracker_sync)sync;
-	return rc ? rc : incise_conf_vector(group, path, "tip_mm", setup->tip_mm, err);
+	return rc ? rc
+		  : incise_conf_vector(group, path, "offset_mm", setup->offset_mm, err);
 }
 
 static int read_force_setup(struct incise_force_setup *setup,

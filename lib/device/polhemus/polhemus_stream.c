@@ -331,11 +331,11 @@ static void put_sample(struct polhemus_stream *stream,
 		.button = record->button,
 		.restarted = stream->restarted,
 	};
-	double tip[3];
+	double offset[3];
 
 	memcpy(sample.quaternion, record->quaternion, sizeof(sample.quaternion));
-	v3_rotate(tip, sample.quaternion, stream->setup.tip_mm);
-	v3_add(sample.position_mm, record->position_mm, 1, tip);
+	v3_rotate(offset, sample.quaternion, stream->setup.offset_mm);
+	v3_add(sample.position_mm, record->position_mm, 1, offset);
 	/* Where the ring is full, the next sample has the mark. */
 	if (incise_ring_put(&stream->ring, &sample))
 		stream->restarted = false;

@@ -2,7 +2,7 @@
 /*
  * From bytes of the device to samples in a ring:
  *
- *   bytes -> polhemus_records -> gaps: seq and losses -> tip, mm -> ring -> reader
+ *   bytes -> polhemus_records -> gaps: seq and losses -> offset, mm -> ring -> reader
  *
  * No thread, no clock, no system call, so that tests have their own time, in ns.
  */

@@ -188,12 +188,12 @@ static const struct incise_tracker_ops ops = {
 static int check(const struct incise_tracker_setup *setup, const char *where,
 		 struct incise_error *err)
 {
-	const double *h = setup->hemisphere, *tip = setup->tip_mm;
+	const double *h = setup->hemisphere, *offset = setup->offset_mm;
 	bool good = setup->n_stations >= 1 && setup->n_stations <= POLHEMUS_STATIONS &&
 		    setup->sync >= INCISE_TRACKER_INTERNAL &&
 		    setup->sync <= INCISE_TRACKER_VIDEO &&
 		    fabs(h[0] * h[0] + h[1] * h[1] + h[2] * h[2] - 1) <= 1e-3 &&
-		    isfinite(tip[0] + tip[1] + tip[2]);
+		    isfinite(offset[0] + offset[1] + offset[2]);
 
 	for (int i = 0; good && i < setup->n_stations; i++)
 		good = setup->stations[i] >= 1 &&

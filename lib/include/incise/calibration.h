@@ -23,7 +23,7 @@ struct incise_calibration {
 	double force_delay_ms, force_delay_sd_ms;
 	double tracker_delay_ms, tracker_delay_sd_ms;
 	double camera_delay_ms, camera_delay_sd_ms;
-	/** Tip of the blade in the frame of what rig.conf's tip_mm leads to; default 0 0 0. */
+	/** Tip of the blade from the tracked point, in the sensor's frame; default 0 0 0. */
 	double tip_mm[3];
 	/* The actuator, as the force channel has seen it; NAN: not known. */
 	double stepper_N_step;	     /**< force per microstep, with its sign */

@@ -17,7 +17,7 @@ INCISE_BEGIN_DECLS
 struct incise_tracker_sample {
 	int64_t t_ns; /**< arrival at the host; acquisition is latency_ns earlier */
 	uint64_t seq; /**< counts from 0; a gap is a lost record */
-	double position_mm[3]; /**< tip of the blade, in the tracker's frame */
+	double position_mm[3]; /**< the tracked point, in the tracker's frame */
 	double quaternion[4];  /**< unit, w first; rotates the scalpel's frame into it */
 	char status;	       /**< the device's error character; ' ': none */
 	uint8_t station; /**< number of the sensor, from 1; the virtual rig's is 1 */
@@ -38,7 +38,7 @@ struct incise_tracker_setup {
 	uint8_t stations[4];  /**< 1 … 4, ascending; default {1} */
 	double hemisphere[3]; /**< unit vector towards the sensor; default +x */
 	enum incise_tracker_sync sync;
-	double tip_mm[3]; /**< of the blade, in the sensor's frame; default 0 */
+	double offset_mm[3]; /**< the tracked point in the sensor's frame; default 0 */
 };
 
 /** Properties of a tracker. */

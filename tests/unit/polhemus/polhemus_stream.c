@@ -549,9 +549,9 @@ static void the_tip(void **state)
 	struct bench b;
 
 	bench_init(&b, EMULATOR_FASTRAK, 1);
-	b.stream.setup.tip_mm[0] = 3;
-	b.stream.setup.tip_mm[1] = -20;
-	b.stream.setup.tip_mm[2] = 100;
+	b.stream.setup.offset_mm[0] = 3;
+	b.stream.setup.offset_mm[1] = -20;
+	b.stream.setup.offset_mm[2] = 100;
 	bench_run(&b, 10);
 	assert_true(b.n > 1000);
 	for (size_t k = 0; k < b.n; k++) {

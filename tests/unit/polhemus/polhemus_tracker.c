@@ -266,7 +266,7 @@ static void refuses(void **state)
 		{.n_stations = 1,
 		 .stations = {1},
 		 .hemisphere = {1, 0, 0},
-		 .tip_mm = {0, 1 / 0.0, 0}},
+		 .offset_mm = {0, 1 / 0.0, 0}},
 	};
 	struct incise_error err;
 
