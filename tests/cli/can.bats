@@ -85,7 +85,8 @@ begin() {
 	complain "the drive was not enabled: $(cat out err)"
 }
 
-# ended TEXT…: what was begun ends within 10 s with 1 and one line that holds these; the drive
+# ended TEXT…: what was begun ends within 10 s with 1 and one line that holds these (a newline
+# in a text separates alternatives); the drive
 # is stopped then.
 ended() {
 	local code=0
@@ -218,7 +219,8 @@ under() {
 		"heartbeat off|heartbeat"
 		"tpdo off|TPDO1"
 		"reboot|began anew"
-		"block|8611h" # the drive's own window is no larger than ours
+		# The drive's own window is no larger than ours: whichever notices first.
+		$'block|8611h\noff its target'
 		"disable|switch-on disabled"
 		"inputs 0x2|limit switch"
 		"hang 600|no "
