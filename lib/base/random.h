@@ -60,11 +60,16 @@ static inline double incise_random_normal(uint64_t key, uint64_t n)
 	return sqrt(-2 * log(radius)) * cos(2 * M_PI * angle);
 }
 
-/* One of 0 … n-1 from a state, by Knuth's MMIX; its high bits are the good ones. */
+/* The next state of Knuth's MMIX generator; its high bits are the good ones. */
+static inline uint64_t incise_random_step(uint64_t *state)
+{
+	return *state = *state * 6364136223846793005ULL + 1442695040888963407ULL;
+}
+
+/* One of 0 … n-1 from such a state. */
 static inline uint32_t incise_random_draw(uint64_t *state, uint32_t n)
 {
-	*state = *state * 6364136223846793005ULL + 1442695040888963407ULL;
-	return (uint32_t)(*state >> 33) % n;
+	return (uint32_t)(incise_random_step(state) >> 33) % n;
 }
 
 /* The next 64 bits of splitmix64 with a state. */

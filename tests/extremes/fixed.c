@@ -191,7 +191,7 @@ static void damage(uint8_t *blob, uint32_t size, bool nastily)
 	}
 }
 
-/* Whoever can compute a checksum can sign anything. */
+/* A damaged blob with a right checksum: the checks behind it must refuse it. */
 static void sign(uint8_t *blob, uint32_t size)
 {
 	uint32_t sum = incise_fx_le32(

@@ -177,7 +177,7 @@ static struct incise_profile_limits any_limits(void)
 	return l;
 }
 
-/* Whatever the targets are, each tick holds what incise/profile.h says. */
+/* Each tick holds the limits of lib/fixed/profile.h, with any targets. */
 static void try_profile(struct extremes_row *row, const struct property *property)
 {
 	struct incise_profile_limits l = any_limits();

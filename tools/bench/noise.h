@@ -32,7 +32,7 @@ static inline double noise_exponential(uint64_t *state)
 /* 0 … 1, without 1, by Knuth's linear congruential generator. */
 static inline double lcg_uniform(uint64_t *state)
 {
-	*state = *state * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(state);
 	return (double)(*state >> 11) * 0x1p-53;
 }
 

@@ -19,8 +19,9 @@ struct polhemus_line_ops {
 	/* 0: all was written within a second; -ENODEV (gone), -EIO. */
 	int (*write)(struct polhemus_line *line, const void *bytes, size_t n);
 	/*
-	 * How many bytes came, and the time of the last (CLOCK_MONOTONIC). 0: none within
-	 * @timeout_ms; -ENODEV: gone, which reopen() may mend; -EIO.
+	 * Returns the number of bytes that came, and the time of the last one
+	 * (CLOCK_MONOTONIC). 0: none within @timeout_ms; -ENODEV: gone, which reopen() may
+	 * mend; -EIO.
 	 */
 	ssize_t (*read)(struct polhemus_line *line, void *bytes, size_t size,
 			int64_t *t_ns, int timeout_ms);

@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/calibrate_depth.h>
+#include "../../../lib/base/random.h"
 
 #define RIGS 200
 #define VIEWS 7
@@ -25,7 +26,7 @@ static uint64_t seed;
 
 static double uniform(void)
 {
-	seed = seed * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(&seed);
 	return ((seed >> 11) + 0.5) * 0x1p-53;
 }
 

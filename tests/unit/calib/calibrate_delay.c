@@ -35,7 +35,7 @@ static const int camera_runs = 200;
 
 static double uniform(void)
 {
-	seed = seed * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(&seed);
 	return ((seed >> 11) + 0.5) * 0x1p-53;
 }
 

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/calibrate_depth.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/calib/calibrate_depth.c"
 
 #define RIGS 2000
@@ -22,7 +23,7 @@ static uint64_t seed;
 
 static double uniform(void)
 {
-	seed = seed * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(&seed);
 	return ((seed >> 11) + 0.5) * 0x1p-53;
 }
 
@@ -417,7 +418,7 @@ static void test_correlated(void **state)
 	int effective;
 
 	for (int i = 0; i < 200; i++) {
-		seed = seed * 6364136223846793005u + 1442695040888963407u;
+		incise_random_step(&seed);
 		apart[i] = (seed >> 11) * 0x1p-52 - 1;
 		for (int k = 0; k < 5; k++)
 			alike[5 * i + k] = apart[i];

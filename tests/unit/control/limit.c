@@ -10,6 +10,7 @@
 #include <float.h>
 #include <math.h>
 #include <string.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/control/limit.h"
 
@@ -130,7 +131,7 @@ static double any(uint64_t *seed)
 	uint64_t bits;
 	double value;
 
-	*seed = *seed * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(seed);
 	bits = *seed ^ *seed >> 29;
 	memcpy(&value, &bits, sizeof(value));
 	if (*seed >> 60 == 0)

@@ -11,6 +11,7 @@
 #include <math.h>
 #include <string.h>
 #include <incise/clock.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/control/predict.h"
 
@@ -157,7 +158,7 @@ static double bare(const struct incise_predict *p, int64_t t_ns)
 
 static double uniform(uint64_t *seed)
 {
-	*seed = *seed * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(seed);
 	return (double)(*seed >> 11) * 0x1p-52 - 1;
 }
 

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include <string.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/control/start.h"
 
 /* 0.1 N; full after 0.5 s, gone after 0.05 s. */
@@ -104,7 +105,7 @@ static void test_any_bits(void **state)
 		double bits[3], gain;
 
 		for (int k = 0; k < 3; k++) {
-			seed = seed * 6364136223846793005u + 1442695040888963407u;
+			incise_random_step(&seed);
 			memcpy(&bits[k], &seed, sizeof(seed));
 		}
 		if (i % 1000 == 999)

@@ -223,7 +223,7 @@ static int scan(const char *arguments)
 	struct incise_error err = {0};
 	int rc = incise_force_iio.scan(arguments, keep, &found, &err);
 
-	/* Whatever it found, it leaves nothing open. */
+	/* The source leaves nothing open, with any result. */
 	assert_int_equal(world.made, 0);
 	return rc;
 }

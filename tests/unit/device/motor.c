@@ -9,6 +9,7 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/device/motor.h"
 #include "../../../lib/sim/sim.h"
 #include "conformance.h"
@@ -33,7 +34,7 @@ static void failed(const char *text)
 
 static int64_t lateness(struct bench *b)
 {
-	b->random = b->random * 6364136223846793005ULL + 1442695040888963407ULL;
+	incise_random_step(&b->random);
 	return b->late_ns ? (int64_t)((b->random >> 33) % (uint64_t)b->late_ns) : 0;
 }
 

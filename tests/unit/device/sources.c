@@ -200,7 +200,7 @@ static void the_newest_is_the_last_that_waits(void **state)
 		/* The end comes behind the last picture, as of one read by one. */
 		{0, -EIO, -EIO, -EIO, 77},
 		{3, -ENODEV, 1, -ENODEV, 2},
-		/* Who is slower than the camera comes to an end. */
+		/* A reader slower than the camera comes to an end. */
 		{UINT64_MAX, 0, 1, 1, 63},
 	};
 

@@ -11,6 +11,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/fixed/layout.h"
 #include "compiled.h"
 
@@ -110,7 +111,7 @@ static void same_in_batches(const struct incise_fixed *fx, uint64_t *seed)
 	for (int i = 0; i < 64 * fx->n_inputs; i++) {
 		const struct incise_fixed_input *in = &fx->input[i % fx->n_inputs];
 
-		*seed = *seed * 6364136223846793005u + 1442695040888963407u;
+		incise_random_step(seed);
 		x[i] = i / 2 % 3 == 0	? in->min
 		       : i / 2 % 3 == 1 ? in->max
 					: (int32_t)(*seed >> 32);

@@ -11,11 +11,12 @@
 #include <cmocka.h>
 #include <math.h>
 #include <stdlib.h>
+#include "../../../lib/base/random.h"
 #include "compiled.h"
 
 static int32_t uniform32(uint64_t *seed)
 {
-	*seed = *seed * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(seed);
 	return (int32_t)(*seed >> 32);
 }
 

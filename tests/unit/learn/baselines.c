@@ -10,6 +10,7 @@
 #include <errno.h>
 #include <math.h>
 #include <incise/train.h>
+#include "../../../lib/base/random.h"
 
 static double rows[400 * 3];
 
@@ -75,7 +76,7 @@ static void test_no_peeking(void **state)
 
 	fill(plane);
 	for (int i = 0; i < 400; i++) {
-		seed = seed * 6364136223846793005u + 1442695040888963407u;
+		incise_random_step(&seed);
 		rows[3 * i + 2] = (seed >> 11) * 0x1p-53;
 	}
 	assert_int_equal(incise_baselines(&pairs, NULL, &pairs, &b, NULL), 0);

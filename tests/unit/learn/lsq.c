@@ -11,13 +11,14 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/learn/lsq.c"
 
 static uint64_t seed;
 
 static double uniform(void)
 {
-	seed = seed * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(&seed);
 	return (seed >> 11) * 0x1p-52 - 1;
 }
 

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 #include <errno.h>
 #include <math.h>
+#include "../../../lib/base/random.h"
 #include "state_made.h"
 
 static struct incise_state_histogram histogram;
@@ -53,7 +54,7 @@ static void test_quantiles(void **state)
 
 	memset(&histogram, 0, sizeof(histogram));
 	for (int i = 0; i < N; i++) {
-		seed = seed * 6364136223846793005u + 1442695040888963407u;
+		incise_random_step(&seed);
 		/* Over 9 decades, each as likely. */
 		ns[i] = (int64_t)pow(10, (double)(seed >> 11) * 0x1p-53 * 9.5);
 		histogram.count[incise_state_bucket(ns[i])]++;

@@ -15,6 +15,7 @@
 #include <sched.h>
 #include <stdatomic.h>
 #include <sys/stat.h>
+#include "../../../lib/base/random.h"
 #include "state_made.h"
 
 static struct incise_state_now now;
@@ -398,7 +399,7 @@ static void test_garbage(void **state)
 
 		memcpy(&page, &good, reach);
 		for (int i = round % 40; i >= 0; i--) {
-			seed = seed * 6364136223846793005u + 1442695040888963407u;
+			incise_random_step(&seed);
 			/* Half of the bytes are in the head and the run part. */
 			((unsigned char *)&page)[(seed >> 33) % (i % 2 ? reach : 2000)] =
 				(unsigned char)(seed >> 20);

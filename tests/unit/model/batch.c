@@ -11,6 +11,7 @@
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/fixed/layout.h"
 #include "paper_model.h"
 
@@ -44,7 +45,7 @@ static struct incise_fixed *compiled(int n_inputs, int n_a, int n_b, int arithme
 
 static uint32_t random_bits(uint64_t *seed)
 {
-	*seed = *seed * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(seed);
 	return *seed >> 32;
 }
 

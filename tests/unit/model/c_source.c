@@ -16,6 +16,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/fixed.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/model/model.h"
 #include "paper_model.h"
 
@@ -66,7 +67,7 @@ static int32_t random_input(const struct incise_fixed_input *in, uint64_t *seed)
 {
 	uint32_t bits;
 
-	*seed = *seed * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(seed);
 	bits = *seed >> 32;
 	if (*seed >> 31 & 1)
 		return (int32_t)bits;

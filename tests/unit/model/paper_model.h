@@ -7,11 +7,12 @@
 #define INCISE_TEST_PAPER_MODEL_H
 
 #include <incise/model.h>
+#include "../../../lib/base/random.h"
 
 /* Uniform in -1 … 1. */
 static inline double paper_random(uint64_t *seed)
 {
-	*seed = *seed * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(seed);
 	return (*seed >> 11) * 0x1p-52 - 1;
 }
 

@@ -139,7 +139,7 @@ static void places(void **state)
 
 		write_path(path, cases[i].bus, cases[i].ports, cases[i].n);
 		assert_string_equal(path, cases[i].path);
-		/* What a place is called can be said in rig.conf; a root hub is no tracker. */
+		/* rig.conf can name each place; a root hub is no tracker. */
 		if (cases[i].n < 1)
 			continue;
 		assert_int_equal(read_name(strcat(text, path), &name), 0);
@@ -304,7 +304,7 @@ static void a_scan(void **state)
 		{BUS(unready), "",
 		 "! usb:0f44:0001@3-2 FASTRAK without firmware: load the maker's .hex "
 		 "file with fxload\n"},
-		/* Who may not ask for the number names the place. */
+		/* Without the right to read the serial number, the place is the name. */
 		{BUS(locked), "",
 		 "usb:0f44:0002@1-1 FASTRAK\nusb:0f44:0002@1-2 FASTRAK\n"},
 	};

@@ -11,6 +11,7 @@
 #include <errno.h>
 #include <math.h>
 #include <incise/fixed.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/fixed/spring.h"
 #include <time.h>
 #include "fed.h"
@@ -153,7 +154,7 @@ static int lying_tracker(struct incise_tracker *tracker,
 			} u;
 
 			/* Any bit pattern, or a jump of some metres. */
-			noise = noise * 6364136223846793005u + 1442695040888963407u;
+			incise_random_step(&noise);
 			u.bits = noise;
 			samples[i].position_mm[k] =
 				noise >> 63 ? u.value
@@ -701,7 +702,7 @@ static double any_number(void)
 		double value;
 	} u;
 
-	noise = noise * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(&noise);
 	u.bits = noise;
 	return noise >> 20 & 31 ? (double)(noise >> 44) / 52429 - 10 : u.value;
 }

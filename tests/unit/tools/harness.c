@@ -10,6 +10,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include <string.h>
+#include "../../../lib/base/random.h"
 #include "../../../tools/bench/harness.h"
 
 #define TRIALS 4000
@@ -17,7 +18,7 @@
 
 static double uniform(uint64_t *state)
 {
-	*state = *state * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(state);
 	return ((*state >> 11) + 0.5) * 0x1p-53;
 }
 

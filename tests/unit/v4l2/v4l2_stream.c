@@ -13,6 +13,7 @@
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/device/v4l2/v4l2_stream.h"
 #include "driver.h"
 
@@ -596,7 +597,7 @@ static uint32_t draw(uint32_t below)
 {
 	static uint64_t state = 7;
 
-	state = state * 6364136223846793005u + 1442695040888963407u;
+	incise_random_step(&state);
 	return (uint32_t)(state >> 33) % below;
 }
 

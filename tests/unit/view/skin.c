@@ -10,6 +10,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../../../lib/base/ascending.h"
 #include "../../../lib/view/skin.h"
 
 #define SIZE 512
@@ -165,13 +166,6 @@ static double step(const struct picture *picture, size_t at, bool across)
 	return sum / SIZE;
 }
 
-static int by_value(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
 /* No line between two columns or rows stands out, at any possible tile border. */
 static void test_no_seam(void **state)
 {
@@ -183,7 +177,7 @@ static void test_no_seam(void **state)
 
 			for (size_t i = 0; i < SIZE - 1; i++)
 				steps[i] = step(picture, i, across);
-			qsort(steps, SIZE - 1, sizeof(*steps), by_value);
+			qsort(steps, SIZE - 1, sizeof(*steps), ascending);
 			/* The largest is a crease along a column. */
 			assert_true(steps[SIZE - 2] < 1.6 * steps[SIZE / 2]);
 			/* Nor is one smeared. */

@@ -9,6 +9,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 #include <errno.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/uv_map.h"
 #include "../surface/solid.h"
@@ -112,7 +113,7 @@ static struct uv_map *map_of(const struct incise_surface *surface, bool larynx)
 /* From 0 to 1 (MMIX's generator, Knuth). */
 static double random_next(uint64_t *state)
 {
-	*state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+	incise_random_step(state);
 	return (double)(*state >> 11) * 0x1p-53;
 }
 

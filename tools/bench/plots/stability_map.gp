@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Largest stable stiffness: a panel for each damping of the wall, a curve for each delay.
 least = 1e-4
-set multiplot layout 1,words(data_BT_m) title "Largest stable stiffness of a sampled wall: \
+set multiplot layout 1,words(data_BT_m) title "Largest stable stiffness of a sampled wall\n\
 lines computed, points simulated in time; stable below; triangle: none is" font ',13'
 set logscale xy
 set xrange [5e-4:20]
