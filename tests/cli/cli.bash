@@ -10,7 +10,7 @@ PATH=$INCISE_BUILD/bin:$PATH
 
 # A folder to work in that is empty; bats keeps files of its own beside it.
 work_folder() {
-	rm -rf "$BATS_TEST_TMPDIR/work" # of a try before, where a test may retry
+	rm -rf "${BATS_TEST_TMPDIR:?is not set in setup_file}/work" # of a try before, where a test may retry
 	mkdir "$BATS_TEST_TMPDIR/work"
 	cd "$BATS_TEST_TMPDIR/work"
 }
