@@ -57,8 +57,8 @@ has_fuzzer = $(if $(CLANG),$(shell echo 'int LLVMFuzzerTestOneInput(void) { retu
 
 check-fuzz: ## fuzz targets, a bounded number of runs each
 	+@if [ -n "$(has_fuzzer)" ]; then \
-		$(MAKE) --no-print-directory fuzz-programs && \
-		tests/fuzz/run $(FUZZ_RUNS) $(fuzz_programs); \
+		status=0; $(MAKE) -k --no-print-directory fuzz-programs || status=$$?; \
+		tests/fuzz/run $(FUZZ_RUNS) $(fuzz_programs) || status=$$?; exit $$status; \
 	else \
 		echo "skipped: fuzz, which needs clang and libclang-rt-dev (here: $(or $(CLANG),none))"; \
 	fi

@@ -67,14 +67,19 @@ $(O)/tests/rtsan/%: tests/rtsan/%.c $(O)/lib/libincise-rtsan.a $(emulator)
 # clang's own symbolizer is in a package that is not needed for anything else.
 rtsan_options := RTSAN_OPTIONS=external_symbolizer_path=$(shell command -v addr2line)
 
-run-rtsan: $(rtsan_programs) $(rtsan_unit_programs)
-	@if $(CC) $(cppflags) -std=gnu11 $(rtsan_warnings) -fsyntax-only tests/rtsan/refused/waits.c \
+run-rtsan:
+	+@status=0; $(MAKE) -k --no-print-directory rtsan-programs || status=$$?; \
+	if $(CC) $(cppflags) -std=gnu11 $(rtsan_warnings) -fsyntax-only tests/rtsan/refused/waits.c \
 			2>&1 | grep -q 'error: .*Wfunction-effects'; then \
 		echo "ok    rtsan: the compiler refuses a tick that could wait"; \
 	else \
-		echo "FAIL  rtsan: the compiler takes tests/rtsan/refused/waits.c"; exit 1; \
-	fi
-	@for program in $(rtsan_programs); do $(rtsan_options) $$program || exit 1; done
-	@$(rtsan_options) tests/unit/run $(rtsan_unit_programs)
+		echo "FAIL  rtsan: the compiler takes tests/rtsan/refused/waits.c"; status=1; \
+	fi; \
+	for program in $(rtsan_programs); do \
+		$(rtsan_options) $$program || { echo "FAIL  rtsan: $$program"; status=1; }; \
+	done; \
+	$(rtsan_options) tests/unit/run $(rtsan_unit_programs) || status=1; exit $$status
 
-.PHONY: check-rtsan run-rtsan
+rtsan-programs: $(rtsan_programs) $(rtsan_unit_programs)
+
+.PHONY: check-rtsan run-rtsan rtsan-programs

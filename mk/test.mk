@@ -51,23 +51,26 @@ $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 		$(filter %.c,$^) -lm -pthread
 
 # What `check` is made of: each part is a target, timed. Those of the first line build what the
-# others use; of the others one more runs than there are processors, as some wait for devices, or as
-# many as -j says.
+# others use, in one make: two would write the same objects. Of the others one more runs than there
+# are processors, as some wait for devices, or as many as -j says. A part that fails keeps none from
+# running but those that use what it builds.
 times := $(O)/times
 jobs = $(if $(findstring --jobserver,$(MAKEFLAGS)),,-j$(shell expr $$(nproc) + 1))
 check-parts:
-	+@$(MAKE) $(jobs) --no-print-directory $(addprefix timed-,check-style check-layers cli-needs)
-	+@$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-fuzz check-rtsan \
-		check-deb check-module check-vm)
+	+@status=0; \
+	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,check-style cli-needs) || status=$$?; \
+	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-layers check-fuzz \
+		check-rtsan check-deb check-module check-vm) || status=$$?; \
+	exit $$status
 timed-%:
-	+@tests/timed $(times) $* $(MAKE) --no-print-directory $*
+	+@$(if $(filter $*,cli-tests check-layers check-vm),NEEDS=cli-needs) tests/timed $(times) $* $(MAKE) -k --no-print-directory $*
 
 check_deps = mk/deps build check demo; \
 	mk/deps vm || echo "going on without what the test bed needs"; \
 	mk/deps module || echo "going on without what checking the module needs"; \
 	mk/deps rtsan || echo "going on without RealtimeSanitizer"; \
 	mk/deps deb debian || echo "going on without what building packages needs"
-in_parts = +@set -e; $(check_deps); mkdir -p $(O); rm -f $(times); status=0; \
+in_parts = +@set -e; $(check_deps); mkdir -p $(O); rm -rf $(times) $(times).d; status=0; \
 	tests/timed $(times) whole $(MAKE) --no-print-directory check-parts $1 || status=$$?; \
 	tests/timed $(times); exit $$status
 
@@ -87,9 +90,13 @@ $(locale):
 	@mkdir -p $(@D)
 	$(Q)localedef -i de_DE -f UTF-8 $@
 
-check-unit: $(unit_programs) $(locale) ## unit tests
-	@LOCPATH=$(abspath $(O)/locale) LSAN_OPTIONS=suppressions=$(abspath tests/unit/lsan.supp):print_suppressions=0 \
-		tests/unit/run $(unit_programs)
+# Programs that cannot be built are failures of their own; the others run.
+check-unit: $(locale) ## unit tests
+	+@status=0; $(MAKE) -k --no-print-directory unit-programs || status=$$?; \
+		LOCPATH=$(abspath $(O)/locale) LSAN_OPTIONS=suppressions=$(abspath tests/unit/lsan.supp):print_suppressions=0 \
+		tests/unit/run $(unit_programs) || status=$$?; exit $$status
+
+unit-programs: $(unit_programs)
 
 # The CAN drive that tests talk to is on python-canopen, in a folder of its own.
 can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/README.md
@@ -153,7 +160,11 @@ check-sanitize: ## unit tests under AddressSanitizer and UBSan
 plain_programs = $(sort $(filter $(O)/tests/unit/fixed/% $(O)/tests/unit/model/% \
 	$(patsubst tests/%.c,$(O)/tests/%,$(shell grep -l __SANITIZE_ADDRESS__ $(unit_sources))) \
 	$(addprefix $(O)/tests/unit/,$(shell cat $(skipped_there))),$(unit_programs)))
-check-unit-once: check-sanitize ## check-sanitize, and of check-unit what differs plainly
+check-unit-once: ## check-sanitize, and of check-unit what differs plainly
+	+@status=0; $(MAKE) --no-print-directory check-sanitize || status=$$?; \
+		$(MAKE) --no-print-directory check-unit-plain || status=$$?; exit $$status
+
+check-unit-plain:
 	@echo "unit tests: all ran under the sanitizers; plainly run $(words $(plain_programs)) that skip" \
 		"or do less there, or are about bits; make check-unit runs all"
 	+@$(MAKE) --no-print-directory check-unit unit_programs="$(plain_programs)"
@@ -186,7 +197,7 @@ doc: ## reference of the public headers in build/doc/html; fails where a comment
 
 check-doc: doc
 
-.PHONY: doc check-doc check check-all check-parts check-style check-layers check-unit check-unit-once check-cli cli-needs cli-tests check-attack check-sanitize check-tsan can-drive mcap-reader
+.PHONY: doc check-doc check check-all check-parts check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-tsan can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

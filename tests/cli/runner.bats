@@ -37,3 +37,82 @@ good='[       OK ] test_a
 @test "no test at all is a failure" {
 	run -1 "$root/tests/unit/run"
 }
+
+@test "a skipped test is named with its reason, and a program that was not built is a failure" {
+	program a 'skipped: no screen
+[  SKIPPED ] test_b
+'"$good" 0
+	program b "[  SKIPPED ] test_c
+$good" 0
+	run -1 "$root/tests/unit/run" ./a ./b ./none
+	grep -qx "skipped: ./a: no screen" <<<"$output"
+	grep -qx "skipped: ./b: test_c" <<<"$output"
+	grep -qx "FAIL  ./none: it was not built" <<<"$output"
+	[ "${lines[-1]}" = "2 passed, 1 failed, 2 skipped" ]
+}
+
+@test "a unit test that cannot be built keeps the others from nothing" {
+	mkdir -p tests/unit/x
+	program tests/unit/x/good "$good" 0
+	run make --no-print-directory -C "$root" O="$INCISE_BUILD" DEPS=no check-unit \
+		unit_programs="$PWD/tests/unit/x/none $PWD/tests/unit/x/good"
+	[ "$status" -ne 0 ]
+	[[ "$output" == *"FAIL  x/none: it was not built"* ]]
+	[[ "$output" == *"ok    x/good"* ]]
+}
+
+@test "a check ends with one summary: what took how long, failed, and was skipped with the reason" {
+	run -0 "$root/tests/timed" times first printf '%s\n' "ok    base/crc32c" \
+		"skipped: view/draw: no screen" "3 passed, 0 failed, 1 skipped"
+	run -3 "$root/tests/timed" times second sh -c 'echo "ok 1 this"; echo "not ok 2 that"
+		echo "ok 3 other # skip no adapter"; echo "ok 4 another # skip no adapter"
+		echo "FAIL  base/ring" >&2; exit 3'
+	[[ "$output" == *"FAIL  base/ring"* ]]
+	NEEDS=second run -1 "$root/tests/timed" times third touch there
+	[ ! -e there ]
+	NEEDS=first run -0 "$root/tests/timed" times fourth true
+	run -0 "$root/tests/timed" times
+	[ "$(grep -c FAILED <<<"$output")" = 2 ]
+	diff - <(sed -n '/^failed:/,$p' <<<"$output") <<-END
+		failed:
+		  second: that
+		  second: base/ring
+		  third: not run: third, which needs second
+		skipped:
+		  first: view/draw: no screen
+		  second: no adapter (2 tests)
+		all that was printed: times.d/PART
+		4 passed, 3 failed, 3 skipped
+	END
+}
+
+@test "a program that is left running holds no part up" {
+	run -0 "$root/tests/timed" times left sh -c 'sleep 100 & echo $!'
+	kill "$output"
+	[ "$(cat times.d/left)" = "$output" ]
+}
+
+# In a library of that name, as the driver of OpenGL is; made by the compiler of the tests.
+@test "leaks of OpenGL's driver are suppressed by its name, and no others" {
+	cat >driver.c <<-'C'
+		#include <stdlib.h>
+		void *volatile kept;
+		void open_driver(void) { kept = malloc(2352); kept = NULL; }
+	C
+	cat >program.c <<-'C'
+		void open_driver(void);
+		int main(void) { open_driver(); return 0; }
+	C
+	leaks() {
+		# The frames of the library have to be in the report.
+		env LSAN_OPTIONS="suppressions=$root/tests/unit/lsan.supp:print_suppressions=0" "./$1"
+	}
+	for name in gallium-25.0.7 other; do
+		${CC:-cc} -g -fsanitize=address -fPIC -shared -o "lib$name.so" driver.c
+		${CC:-cc} -g -fsanitize=address -o "$name" program.c "./lib$name.so" || skip "no AddressSanitizer"
+	done
+	run leaks other
+	[ "$status" -ne 0 ]
+	[[ "$output" == *LeakSanitizer* ]] || skip "LeakSanitizer cannot run here"
+	run -0 leaks gallium-25.0.7
+}
