@@ -47,7 +47,7 @@ int incise_motion_power_on(struct incise_motion *m, int64_t now_ns)
 	m->powered = true;
 	incise_motion_halt(m, false);
 	m->seq = __atomic_load_n(&m->setpoint->seq, __ATOMIC_ACQUIRE);
-	m->seen_ns = now_ns;
+	m->seen_ns = m->ran_ns = now_ns;
 	m->status.state = INCISE_STEPPER_STATE_READY;
 	m->status.flags &= ~(INCISE_STEPPER_FLAG_HOME_SEEN | INCISE_STEPPER_FLAG_HELD);
 	return 1;
@@ -109,6 +109,17 @@ static void obey(struct incise_motion *m)
 		m->status.flags |= INCISE_STEPPER_FLAG_HELD;
 	m->status.setpoint_t_ns = m->latest.t_ns;
 	m->status.setpoint_seq = m->seq;
+}
+
+uint32_t incise_motion_awake(struct incise_motion *m, int64_t now_ns)
+{
+	/* A tick is the usual time. */
+	int64_t still_ns = now_ns - m->ran_ns - m->config.tick_ns;
+
+	m->ran_ns = now_ns;
+	return m->powered && still_ns > (int64_t)m->config.deadman_ns
+		       ? INCISE_STEPPER_FAULT_DEADMAN
+		       : 0;
 }
 
 uint32_t incise_motion_listen(struct incise_motion *m, int64_t now_ns)

@@ -38,6 +38,7 @@ struct incise_motion {
 	/* private */
 	struct incise_stepper_setpoint latest;
 	int64_t seen_ns; /* time of the last set-point */
+	int64_t ran_ns;	 /* when its owner last ran it */
 	uint32_t seq;	 /* of the last set-point */
 };
 
@@ -72,6 +73,13 @@ void incise_motion_brake(struct incise_motion *motion, uint32_t fault);
  * INCISE_MOTION_AT_ONCE, and the owner switches power off now.
  */
 bool incise_motion_fault(struct incise_motion *motion, uint32_t fault);
+
+/*
+ * Each time its owner runs it, before anything else. 0, or the deadman's fault if with power
+ * the owner itself stood still for longer than that, as a program that is stopped: the motor
+ * has left the profile, and a set-point that comes now comes too late.
+ */
+uint32_t incise_motion_awake(struct incise_motion *motion, int64_t now_ns);
 
 /* Read a new set-point. 0, or the fault of an invalid or a missing one. */
 uint32_t incise_motion_listen(struct incise_motion *motion, int64_t now_ns);

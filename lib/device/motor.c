@@ -14,7 +14,8 @@
 #define LEAST_PULSE_NS 5000 /* default: enough for most power stages */
 #define UNREAD_MAX 100	    /* failed reads until -EIO */
 #define POLL_NS INCISE_NS_PER_S / 1000
-#define LATE_MAX 20 /* edges in a row */
+#define LATE_MAX 20	  /* edges in a row */
+#define TICK_MOST_S 0.002 /* between writes of a status with power */
 
 double incise_actuator_step_mm(const struct incise_actuator *actuator)
 {
@@ -78,6 +79,20 @@ static double to_mm(const struct incise_motor *motor, int64_t steps)
 }
 
 /*
+ * Whether a status with power is older than the deadman: its writer was stopped with this
+ * program, and stops the motor as soon as it runs again. Found here, so that nothing depends
+ * on which of the two threads runs first.
+ */
+static bool stood_still(struct incise_motor *motor)
+{
+	return motor->in_process && !motor->watches &&
+	       motor->last.state != INCISE_STEPPER_STATE_DISABLED &&
+	       motor->last.state != INCISE_STEPPER_STATE_FAULT &&
+	       (double)(motor->ops->now(motor) - motor->last.t_ns) >
+		       (motor->actuator.deadman_s + TICK_MOST_S) * INCISE_NS_PER_S;
+}
+
+/*
  * Read the status. While a writer is interrupted the last one stays valid, but not for
  * more than UNREAD_MAX reads.
  */
@@ -87,6 +102,10 @@ static int look(struct incise_motor *motor)
 
 	if (rc != -EAGAIN) {
 		motor->unread = 0;
+		if (!rc && stood_still(motor)) {
+			motor->last.faults |= INCISE_STEPPER_FAULT_DEADMAN;
+			motor->last.state = INCISE_STEPPER_STATE_STOPPING;
+		}
 		return rc;
 	}
 	if (motor->unread >= UNREAD_MAX)

@@ -60,6 +60,7 @@ struct incise_motor {
 	double rate_max_hz;
 	unsigned int lines; /* INCISE_STEPPER_LINE_… bits it has */
 	bool watches;	    /* opened to watch, not to drive */
+	bool in_process; /* a thread of this program writes the status, and stops with it */
 	struct incise_stepper_setpoint *setpoint; /* NULL where it watches */
 	const struct incise_stepper_motor_status *slot;
 

@@ -202,10 +202,24 @@ static void tick(struct incise_pulser *p, int64_t now, int64_t due)
 	incise_motion_publish(m, now);
 }
 
+/* The motor has stood since then: no step of the profile before follows. */
+static void stood_still(struct incise_pulser *p, uint32_t fault, int64_t now)
+{
+	incise_motion_halt(&p->motion, p->given < p->steps.n || !p->motion.resting);
+	p->steps.n = p->given = 0;
+	fault_at(p, fault, now);
+	incise_motion_publish(&p->motion, now);
+}
+
 int64_t incise_pulser_run(struct incise_pulser *p)
 {
 	int64_t due, want, now = p->ops->now(p->world);
-	enum next next = plan(p, &due, &want);
+	uint32_t fault = incise_motion_awake(&p->motion, now);
+	enum next next;
+
+	if (fault)
+		stood_still(p, fault, now);
+	next = plan(p, &due, &want);
 
 	if (due > now)
 		return due;
@@ -262,7 +276,7 @@ int incise_pulser_enable(struct incise_pulser *p)
 	p->late_row = 0;
 	p->steps.n = p->given = 0;
 	now = write_line(p, INCISE_PULSER_ENABLE, true);
-	m->seen_ns = p->base_ns = now;
+	m->seen_ns = m->ran_ns = p->base_ns = now;
 	p->powered_ns = now + (int64_t)m->config.enable_ns;
 	incise_motion_publish(m, now);
 	return m->powered ? 0 : -EIO;

@@ -363,6 +363,7 @@ static void *gpio_open(const struct incise_backend_request *request,
 	}
 	memset(g, 0, sizeof(*g));
 	g->motor.ops = &ops;
+	g->motor.in_process = true;
 	g->motor.actuator = *request->actuator;
 	g->motor.setpoint = &g->setpoint;
 	g->motor.slot = &g->status;

@@ -249,6 +249,40 @@ static void whatever_comes_gives_no_power(void **state)
 	}
 }
 
+/* No cycle for longer than the deadman, and the drive goes on: while it runs and homes. */
+static void cycles_that_stop_for_too_long_end_in_a_quick_stop(void **state)
+{
+	for (int homing = 0; homing < 2; homing++) {
+		struct bench b;
+
+		start(&b);
+		b.led.drive.tripped = false;
+		assert_int_equal(can_axis_power(&b.axis, b.led.drive.now_ns,
+						homing ? 60000 * MS : 0),
+				 1);
+		for (int i = 0; i < 100 && b.axis.phase == CAN_AXIS_STARTING; i++)
+			cycles(&b, 1, -1);
+		assert_int_equal(b.axis.phase,
+				 homing ? CAN_AXIS_HOMING : CAN_AXIS_RUNNING);
+		/* A cycle behind the deadman is no fault: that is how long the last one lasts. */
+		b.led.drive.watching = b.led.drive.deadline_runs = false;
+		drive_advance(&b.led.drive, 100 * MS);
+		cycles(&b, 1, 0);
+		assert_int_equal(b.slot.faults, 0);
+		b.led.drive.watching = b.led.drive.deadline_runs = false;
+		drive_advance(&b.led.drive, 101 * MS);
+		assert_true(cia402_powered(b.led.drive.state));
+		cycles(&b, 1, 5000);
+		assert_int_equal(b.slot.faults, INCISE_STEPPER_FAULT_DEADMAN);
+		assert_int_equal(b.axis.cause, CAN_AXIS_STOOD_STILL);
+		assert_int_equal(b.axis.phase, CAN_AXIS_QUICK_STOP);
+		cycles(&b, 300, 5000);
+		assert_int_equal(b.slot.state, INCISE_STEPPER_STATE_FAULT);
+		assert_false(cia402_powered(b.led.drive.state));
+		assert_int_equal(b.led.drive.enabled_unasked, 0);
+	}
+}
+
 static void a_flood_is_taken_in_parts(void **state)
 {
 	const struct can_frame noise = {.can_id = 0x590, .can_dlc = 8};
@@ -286,6 +320,7 @@ static void each_reason_has_its_own_line(void **state)
 		{CAN_AXIS_NO_HOME, 0, 0, "its homing failed"},
 		{CAN_AXIS_HOME_TIME, 0, 0, "not done in time"},
 		{CAN_AXIS_OUTSIDE, -100, 0, "to -0.750 mm"},
+		{CAN_AXIS_STOOD_STILL, 3000, 0, "stood still for 3000 ms"},
 		{CAN_AXIS_NO_STOP, CIA402_ENABLED, 0, "operation enabled: switch"},
 	};
 	struct can_axis axis = {.setup.step_mm = 0.0075};
@@ -319,6 +354,7 @@ int main(void)
 		cmocka_unit_test(a_few_set_points_may_wait_for_the_queue),
 		cmocka_unit_test(what_is_late_is_counted),
 		cmocka_unit_test(whatever_comes_gives_no_power),
+		cmocka_unit_test(cycles_that_stop_for_too_long_end_in_a_quick_stop),
 		cmocka_unit_test(a_flood_is_taken_in_parts),
 		cmocka_unit_test(each_reason_has_its_own_line),
 	};

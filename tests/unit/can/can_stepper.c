@@ -249,6 +249,46 @@ static void a_program_that_hangs_is_stopped_by_the_drive(void **state)
 	can_rig_close(&rig);
 }
 
+/*
+ * A program that stood still before a drive that ignores a lost master and holds its place:
+ * what it is given afterwards moves nothing.
+ */
+static void a_program_that_stood_still_does_not_go_on(void **state)
+{
+	struct incise_stepper_status s;
+	char cause[300];
+	double at;
+
+	can_rig_init(&rig);
+	can_rig_open_or_fail(&rig);
+	can_rig_enable_or_fail(&rig);
+	can_rig_hold(&rig, 15, 300 * MS);
+	assert_true(rig.drive.velocity > 5 * COUNTS_PER_MM);
+	rig.drive.watching = rig.drive.deadline_runs = false;
+	at = rig.drive.position;
+	drive_advance(&rig.drive, 3000 * MS);
+	assert_true(drive_powered(&rig.drive));
+	rig.drive.velocity = 0;
+	rig.drive.position = rig.drive.demand = at;
+	/* Whoever reads the status need not wait for the thread. */
+	s = can_rig_look(&rig);
+	assert_true(s.faults & INCISE_STEPPER_FAULT_DEADMAN);
+	assert_int_equal(incise_stepper_set(rig.stepper, 15), -EIO);
+	can_rig_hold(&rig, 15, 2000 * MS);
+	s = can_rig_look(&rig);
+	incise_stepper_cause(rig.stepper, cause, sizeof(cause));
+	if (s.state != INCISE_STEPPER_STATE_FAULT ||
+	    !(s.faults & INCISE_STEPPER_FAULT_DEADMAN) ||
+	    !strstr(cause, "this program stood still for 300"))
+		fail_msg("%s, faults %#x, \"%s\"", incise_stepper_state_name(s.state),
+			 s.faults, cause);
+	assert_false(drive_powered(&rig.drive));
+	/* Its quick stop, and nothing else. */
+	assert_true(fabs(rig.drive.position - at) < 0.2 * COUNTS_PER_MM);
+	assert_int_equal(rig.drive.enabled_unasked, 0);
+	can_rig_close(&rig);
+}
+
 static uint64_t counter(const char *key)
 {
 	struct incise_stepper_counter c;
@@ -637,6 +677,7 @@ int main(void)
 		cmocka_unit_test(every_case_of_a_stepper),
 		cmocka_unit_test(each_fault_stops_the_drive_and_is_named),
 		cmocka_unit_test(a_program_that_hangs_is_stopped_by_the_drive),
+		cmocka_unit_test(a_program_that_stood_still_does_not_go_on),
 		cmocka_unit_test(no_set_point_is_lost),
 		cmocka_unit_test(velocities_and_torques_go_there_too),
 		cmocka_unit_test(silence_of_the_drive_moves_nothing),

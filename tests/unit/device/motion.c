@@ -110,6 +110,26 @@ static void without_targets_it_ends(void **state)
 	}
 }
 
+/* Its owner stood still, with or without a set-point behind it. */
+static void an_owner_that_stood_still_is_noticed(void **state)
+{
+	struct bench b;
+
+	start(&b, 0);
+	b.now_ns += 3000 * MS;
+	/* Without power it need not run. */
+	assert_int_equal(incise_motion_awake(&b.motion, b.now_ns), 0);
+	b.now_ns += 3000 * MS;
+	assert_int_equal(incise_motion_power_on(&b.motion, b.now_ns), 1);
+	b.now_ns += 50 * MS + TICK;
+	assert_int_equal(incise_motion_awake(&b.motion, b.now_ns), 0);
+	b.now_ns += 50 * MS + TICK + 1;
+	want(&b, INCISE_STEPPER_MODE_POSITION, 4000);
+	assert_int_equal(incise_motion_awake(&b.motion, b.now_ns),
+			 INCISE_STEPPER_FAULT_DEADMAN);
+	assert_int_equal(incise_motion_awake(&b.motion, b.now_ns), 0);
+}
+
 static void a_fault_ends_it_at_once_or_within_its_limits(void **state)
 {
 	for (unsigned int bit = 0; bit < 19; bit++) {
@@ -175,6 +195,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(without_targets_it_ends),
+		cmocka_unit_test(an_owner_that_stood_still_is_noticed),
 		cmocka_unit_test(a_fault_ends_it_at_once_or_within_its_limits),
 		cmocka_unit_test(what_forbids_power_is_told),
 		cmocka_unit_test(a_set_point_that_nobody_should_write_is_a_fault),

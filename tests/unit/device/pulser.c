@@ -298,6 +298,53 @@ static void a_stall_shifts_the_motion(void **state)
 	assert_int_equal(b.status.faults, 0);
 }
 
+/*
+ * A stop of the whole program for 3 s, in motion or at rest, a new target or none behind it:
+ * no step follows but those back to the safe position, and those only from rest.
+ */
+static void a_stop_beyond_the_deadman_ends_the_motion(void **state)
+{
+	/* flags, at rest, a target is written before the thread runs again */
+	static const struct {
+		unsigned int flags;
+		bool rests, asked;
+	} cases[] = {
+		{0, false, true},
+		{0, false, false},
+		{0, true, true},
+		{INCISE_STEPPER_CONFIG_RETRACT, false, true},
+		{INCISE_STEPPER_CONFIG_RETRACT, true, true},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		bool rests = cases[i].rests, back = rests && cases[i].flags;
+		struct bench b;
+		int64_t at;
+
+		start(&b, cases[i].flags);
+		assert_int_equal(incise_pulser_origin(&b.pulser, 0, true), 0);
+		assert_int_equal(incise_pulser_enable(&b.pulser), 0);
+		for (int k = 0; k < 10; k++) {
+			want(&b, INCISE_STEPPER_MODE_POSITION, rests ? 300 : 15000);
+			go(&b, 40 * MS, 0);
+		}
+		assert_int_equal(b.status.state, rests ? INCISE_STEPPER_STATE_READY
+						       : INCISE_STEPPER_STATE_MOVING);
+		at = b.machine.at;
+		b.machine.now_ns += 3000 * MS;
+		for (int k = 0; k < 20; k++) {
+			if (cases[i].asked)
+				want(&b, INCISE_STEPPER_MODE_POSITION, 15000);
+			go(&b, 40 * MS, 0);
+		}
+		over(&b);
+		assert_int_equal(b.status.faults, INCISE_STEPPER_FAULT_DEADMAN);
+		assert_int_equal(b.machine.at, back ? 0 : at);
+		/* The rotor stopped at once: in motion it may have lost steps. */
+		assert_int_equal(!!(b.status.flags & INCISE_STEPPER_FLAG_HOMED), rests);
+	}
+}
+
 static void a_count_is_named_only_at_rest(void **state)
 {
 	struct bench b;
@@ -327,6 +374,7 @@ int main(void)
 		cmocka_unit_test(
 			shortest_times_hold_where_the_profile_would_not_keep_them),
 		cmocka_unit_test(a_stall_shifts_the_motion),
+		cmocka_unit_test(a_stop_beyond_the_deadman_ends_the_motion),
 		cmocka_unit_test(a_count_is_named_only_at_rest),
 	};
 

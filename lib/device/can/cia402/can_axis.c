@@ -137,11 +137,12 @@ static void set_fault(struct can_axis *axis, uint32_t bits, enum can_axis_cause 
 		return;
 	}
 	/*
-	 * A quick stop where there is no profile to brake by, and amid the set-points of
-	 * another master.
+	 * A quick stop where there is no profile to brake by, amid the set-points of
+	 * another master, and where the drive has left the profile.
 	 */
 	if (incise_motion_fault(m, bits) || cause == CAN_AXIS_FOREIGN ||
-	    axis->phase == CAN_AXIS_STARTING || axis->phase == CAN_AXIS_HOMING) {
+	    cause == CAN_AXIS_STOOD_STILL || axis->phase == CAN_AXIS_STARTING ||
+	    axis->phase == CAN_AXIS_HOMING) {
 		m->ending = true;
 		m->status.state = INCISE_STEPPER_STATE_STOPPING;
 		enter_phase(axis, CAN_AXIS_QUICK_STOP);
@@ -561,13 +562,27 @@ static bool may_send_heartbeat(const struct can_axis *axis, bool powered)
 	return !powered || axis->setpoint_sent;
 }
 
+/*
+ * A quick stop leaves it to the drive's own ramp, whatever it did while no cycle came. While
+ * it starts and ends it is given no target.
+ */
+static void check_awake(struct can_axis *axis, int64_t still_ns)
+{
+	uint32_t fault = incise_motion_awake(&axis->motion, axis->now_ns);
+
+	if (fault && (axis->phase == CAN_AXIS_RUNNING || axis->phase == CAN_AXIS_HOMING))
+		set_fault(axis, fault, CAN_AXIS_STOOD_STILL, still_ns / MS, 0);
+}
+
 void can_axis_cycle(struct can_axis *axis, int64_t now_ns, int64_t late_ns,
 		    uint32_t left_out)
 {
 	struct incise_motion *m = &axis->motion;
+	int64_t still_ns = now_ns - axis->now_ns;
 	bool powered = m->powered;
 
 	axis->now_ns = now_ns;
+	check_awake(axis, still_ns);
 	axis->setpoint_sent = axis->status_received = false;
 	receive(axis);
 	axis->answers += axis->status_received;
@@ -775,6 +790,13 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 			"it gave way while it got power, to %.3f mm, outside of its "
 			"travel: see its brake, and home it",
 			(double)a * axis->setup.step_mm);
+	case CAN_AXIS_STOOD_STILL:
+		return snprintf(
+			text, size,
+			"this program stood still for %lld ms, longer than "
+			"deadman_ms: see who stopped it, or what kept the machine "
+			"busy, then clear",
+			a);
 	case CAN_AXIS_NO_STOP:
 		return snprintf(text, size,
 				"it did not say that it stopped, and was last in %s: "

@@ -51,7 +51,8 @@ enum can_axis_cause {
 	CAN_AXIS_NO_START,   /* a: enum cia402_state */
 	CAN_AXIS_NO_HOME,    /* the drive reports that homing failed */
 	CAN_AXIS_HOME_TIME,
-	CAN_AXIS_OUTSIDE, /* a: steps; it gave way while getting power */
+	CAN_AXIS_OUTSIDE,     /* a: steps; it gave way while getting power */
+	CAN_AXIS_STOOD_STILL, /* a: ms; this program, not the drive */
 	CAN_AXIS_NO_STOP, /* a: enum cia402_state; it did not report to have no power */
 };
 

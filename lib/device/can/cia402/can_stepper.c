@@ -554,6 +554,7 @@ void *can_stepper_open(const struct can_transport *transport,
 	memset(c, 0, sizeof(*c));
 	c->sleep_until = transport->sleep_until;
 	c->motor.ops = &ops;
+	c->motor.in_process = true;
 	c->motor.watches = request->watch;
 	c->motor.setpoint = &c->setpoint;
 	c->motor.slot = &c->status;
