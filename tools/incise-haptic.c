@@ -363,15 +363,19 @@ static int take_hold(struct incise_rig *rig, bool home, bool recover,
 	return rc ? rc : incise_stepper_enable(stepper, err);
 }
 
-/* Move to where there is no force, then power off. Failures are warnings. */
-static void let_go(struct incise_rig *rig)
+/*
+ * Move to where there is no force, then power off. Returns 0; -EIO if it stopped by itself
+ * meanwhile, or a negative errno if its power cannot be taken away.
+ */
+static int let_go(struct incise_rig *rig, struct incise_error *err)
 {
 	struct incise_stepper *stepper = incise_rig_stepper(rig);
 	struct incise_clock *clock = incise_rig_clock(rig);
 	struct incise_stepper_status status;
 	struct incise_stepper_info info;
-	struct incise_error err = {0};
 	int64_t now = incise_clock_now(clock), end;
+	char cause[300];
+	int rc;
 
 	incise_stepper_info(stepper, &info);
 	/* The virtual one goes there by itself. */
@@ -386,8 +390,12 @@ static void let_go(struct incise_rig *rig)
 		incise_clock_wait_until(clock, now + 2000000);
 		now = incise_clock_now(clock);
 	}
-	if (incise_stepper_disable(stepper, &err))
-		cli_warn("%s", err.text);
+	rc = incise_stepper_disable(stepper, err);
+	if (rc || incise_stepper_status(stepper, &status) ||
+	    !(status.faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL))
+		return rc;
+	incise_stepper_cause(stepper, cause, sizeof(cause));
+	return incise_error_set(err, EIO, "the actuator stopped by itself: %s", cause);
 }
 
 /* --- log and report -------------------------------------------------------------------- */
@@ -557,10 +565,10 @@ int main(int argc, char **argv)
 {
 	static struct incise_loop_stats stats;
 	struct incise_outfile *file = NULL;
-	struct incise_error err = {0};
+	struct incise_error err = {0}, left = {0};
 	struct haptic *haptic;
 	struct job job = {0};
-	int rc;
+	int rc, released;
 
 	/* Before there is another thread. */
 	incise_realtime_prepare();
@@ -587,7 +595,14 @@ int main(int argc, char **argv)
 		     haptic->loop.rate_hz);
 	rc = haptic_supervise(haptic, &err);
 	cli_progress_end();
-	let_go(haptic->rig);
+	released = let_go(haptic->rig, &left);
+	/* Behind a failure of the loop, a fault of the actuator is the same one. */
+	if (!rc && released) {
+		rc = released;
+		err = left;
+	} else if (released && released != -EIO) {
+		cli_warn("%s", left.text);
+	}
 	incise_state_run(haptic->state, rc ? INCISE_RUN_FAULT : INCISE_RUN_STOPPED,
 			 rc	    ? err.text
 			 : cli_stop ? strsignal(cli_stop)

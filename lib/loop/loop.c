@@ -220,7 +220,7 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 {
 	struct run run = {
 		.plan = plan, .clock = clock, .options = options, .stats = stats};
-	int rc, ended = 0;
+	int rc, released, ended = 0;
 
 	memset(stats, 0, sizeof(*stats));
 	if (options->duration_ns < 0)
@@ -233,7 +233,9 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 	run.due_ns = incise_clock_now(clock) + run.period_ns;
 	run.end_ns = options->duration_ns ? run.due_ns + options->duration_ns : INT64_MAX;
 	rc = run_ticks(&run, &ended);
-	incise_plan_release(run.plan);
+	released = incise_plan_release(run.plan);
+	if (!rc && !ended)
+		rc = released;
 	return rc ? explain(&run, rc, err) : ended;
 }
 

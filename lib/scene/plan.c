@@ -382,11 +382,18 @@ int64_t incise_plan_fade_ns(const struct incise_plan *plan)
 	return (int64_t)((plan->start.fade_s + slew_s) * INCISE_NS_PER_S);
 }
 
-void incise_plan_release(struct incise_plan *plan)
+int incise_plan_release(struct incise_plan *plan)
 {
-	/* If this fails, the actuator's own deadman does it. */
-	if (plan->stepper)
-		incise_stepper_set(plan->stepper, 0);
+	struct incise_stepper_status status = {0};
+	int rc = plan->stepper ? incise_stepper_set(plan->stepper, 0) : 0;
+
+	/* What ended the ticks stays the cause. */
+	if (!rc || plan->fault)
+		return rc;
+	incise_stepper_status(plan->stepper, &status);
+	incise_stage_refused(plan, &status, rc);
+	plan->fault = rc;
+	return rc;
 }
 
 const char *incise_plan_fault(const struct incise_plan *plan)

@@ -121,6 +121,10 @@ incise_stage_fn incise_stage_start;
 incise_stage_fn incise_stage_limit;
 incise_stage_fn incise_stage_actuate;
 
+/* An actuator that does not move any more: keep why. Returns @rc. */
+int incise_stage_refused(struct incise_plan *plan,
+			 const struct incise_stepper_status *status, int rc);
+
 /* --- plan --- */
 
 /* Fill in the stages that the scene and the rig need, and why the others are left out. */

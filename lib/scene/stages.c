@@ -216,9 +216,8 @@ int incise_stage_limit(struct incise_plan *plan, struct incise_tick *tick)
 	return 0;
 }
 
-/* An actuator that does not move any more: keep why. */
-static int refused(struct incise_plan *plan, const struct incise_stepper_status *status,
-		   int rc)
+int incise_stage_refused(struct incise_plan *plan,
+			 const struct incise_stepper_status *status, int rc)
 {
 	plan->actuator_faults =
 		status->faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL;
@@ -271,7 +270,7 @@ int incise_stage_actuate(struct incise_plan *plan, struct incise_tick *tick)
 	int rc = incise_stepper_status(plan->stepper, &status);
 
 	if (rc)
-		return refused(plan, &status, rc);
+		return incise_stage_refused(plan, &status, rc);
 	tick->actuated_N = along_N;
 	find_handle(plan, tick, &status);
 	tick->rendered_N = rendered(plan, &status);
@@ -283,5 +282,5 @@ int incise_stage_actuate(struct incise_plan *plan, struct incise_tick *tick)
 	rc = incise_stepper_set(plan->stepper, held_mm);
 	if (rc)
 		incise_stepper_status(plan->stepper, &status);
-	return rc ? refused(plan, &status, rc) : 0;
+	return rc ? incise_stage_refused(plan, &status, rc) : 0;
 }

@@ -119,6 +119,10 @@ class Control:
         """off|on: its own"""
         self.drive.heartbeat_on = on(words)
 
+    def watch(self, words):
+        """off|on: off, a lost master is ignored"""
+        self.drive.ignores_master = not on(words)
+
     def tpdo(self, words):
         """off|on"""
         self.drive.tpdo_on = on(words)

@@ -128,6 +128,7 @@ class Drive:
         self.muted = set()  # objects whose SDOs are not answered
         self.sdo_reads, self.sdo_writes = {}, {}  # in the order they first came
         self.tpdo_on = self.heartbeat_on = True
+        self.ignores_master = False
         self.booted = False
         self.register = 0
         self.node = Node(args.node, dictionary(args.node, args.set, args.without), self)
@@ -230,6 +231,8 @@ class Drive:
 
     def watch(self):
         """The master's heartbeat; and set-points, where 1400:5 asks for that."""
+        if self.ignores_master:
+            return
         if self.heartbeat_at is not None and not self.lost and self.watch_s:
             if self.now - self.heartbeat_at > self.watch_s:
                 self.lost = True

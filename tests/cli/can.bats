@@ -431,6 +431,46 @@ stopped_itself() {
 	ended "drive 0x10"
 }
 
+# frozen VERB…: a run that is stopped for longer than the deadman, and goes on; then ended.
+frozen() {
+	begin "$@" || return
+	sleep 0.3
+	kill -STOP "$pid"
+	until [[ "$(ps -o stat= -p "$pid")" == T* ]]; do sleep 0.02; done
+	# What it had sent is done by now.
+	sleep 0.3
+	drive_tell state
+	before=$(drive_value shaft)
+	sleep "${freeze_s:-0.3}"
+	kill -CONT "$pid"
+}
+
+@test "kill -STOP: a drive that ignores a lost master is not moved on either" {
+	local verb
+	for verb in "jog 5" "enable --for 800ms" "enable"; do
+		rig --homed
+		drive_tell watch off
+		# shellcheck disable=SC2086 # words
+		frozen stepper $verb --rig rig.conf
+		ended "this program stood still for" "longer than deadman_ms"
+		drive_is "switch-on disabled"
+		# A quick stop, and nothing else.
+		holds "$(drive_value shaft) - $before < 12800 && $before - $(drive_value shaft) < 12800"
+		drive_end
+	done
+}
+
+@test "kill -STOP of haptic beyond its --duration: exit 1 with the reason" {
+	local watch freeze_s=2
+	for watch in on off; do
+		rig --homed
+		drive_tell watch $watch
+		frozen haptic "$root/scenes/liver.scene" --no-rt --rig rig.conf --duration 1500ms
+		ended "this program stood still for"
+		drive_end
+	done
+}
+
 @test "incise haptic renders through it; a fault ends that, kill -9 too" {
 	rig
 	run --separate-stderr incise haptic "$root/scenes/liver.scene" --no-rt --rig rig.conf --duration 1s

@@ -96,27 +96,9 @@ static void pass(struct stepper_drive *drive, int64_t ns)
 	stepper_drive_look(drive);
 }
 
-void stepper_drive_rest(struct stepper_drive *drive)
+static unsigned int stopping_faults(const struct stepper_drive *drive)
 {
-	struct incise_error err = {0};
-	int rc = incise_stepper_disable(drive->stepper, &err);
-
-	drive->powered = false;
-	if (rc && rc != -ENODEV)
-		stepper_drive_fail(drive, "%s", err.text);
-	stepper_drive_look(drive);
-	/* The virtual one goes back to 0. */
-	while (drive->status.state == INCISE_STEPPER_STATE_MOVING)
-		pass(drive, drive->period_ns);
-}
-
-void stepper_drive_end(struct stepper_drive *drive)
-{
-	cli_progress_end();
-	if (drive->powered)
-		stepper_drive_rest(drive);
-	incise_rig_close(drive->rig);
-	drive->rig = NULL;
+	return drive->status.faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL;
 }
 
 /* It stopped, or is stopping, by itself: print where, why and what to do. */
@@ -129,12 +111,39 @@ static _Noreturn void fail_with_fault(struct stepper_drive *drive)
 			     ns < STOPPING_NS && incise_clock_is_real(drive->clock);
 	     ns += drive->period_ns)
 		pass(drive, drive->period_ns);
-	faults = drive->status.faults & ~INCISE_STEPPER_FAULT_TRAVEL;
+	faults = stopping_faults(drive);
 	stepper_drive_fail(drive, "%s stopped at %.4f mm: %s", drive->info.name,
 			   drive->status.position_mm,
 			   faults ? stepper_why(drive->stepper, faults, text,
 						sizeof(text))
 				  : "power was taken away; try again");
+}
+
+void stepper_drive_rest(struct stepper_drive *drive)
+{
+	struct incise_error err = {0};
+	int rc = incise_stepper_disable(drive->stepper, &err);
+
+	drive->powered = false;
+	if (rc && rc != -ENODEV)
+		stepper_drive_fail(drive, "%s", err.text);
+	stepper_drive_look(drive);
+	/* The virtual one goes back to 0. */
+	while (drive->status.state == INCISE_STEPPER_STATE_MOVING)
+		pass(drive, drive->period_ns);
+	/* On its way to rest it may have met a fault, as a deadman of a program that stood
+	 * still. */
+	if (drive->drove && !rc && stopping_faults(drive))
+		fail_with_fault(drive);
+}
+
+void stepper_drive_end(struct stepper_drive *drive)
+{
+	cli_progress_end();
+	if (drive->powered)
+		stepper_drive_rest(drive);
+	incise_rig_close(drive->rig);
+	drive->rig = NULL;
 }
 
 /* After a target was given. */
@@ -152,7 +161,7 @@ static void follow(struct stepper_drive *drive, int rc)
 		stepper_drive_look(drive);
 	else
 		pass(drive, drive->period_ns);
-	if (rc || drive->status.faults & ~INCISE_STEPPER_FAULT_TRAVEL ||
+	if (rc || stopping_faults(drive) ||
 	    (drive->status.state != INCISE_STEPPER_STATE_READY &&
 	     drive->status.state != INCISE_STEPPER_STATE_MOVING))
 		fail_with_fault(drive);

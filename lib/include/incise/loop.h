@@ -76,8 +76,9 @@ struct incise_loop_stats {
  *
  * @param stats caller's memory, some 300 KiB; zeroed here
  * @return 0 at the end of the time or when stopped; -EINVAL (options), -ETIME (too many
- *         overruns in a row), or the errno of the device that failed; the result of
- *         options->ticked, which sets @err itself.
+ *         overruns in a row), or the errno of the device that failed, also of an actuator
+ *         that cannot be released any more; the result of options->ticked, which sets @err
+ *         itself.
  */
 INCISE_API int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 			       const struct incise_loop_options *options,

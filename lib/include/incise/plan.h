@@ -191,8 +191,12 @@ enum incise_tick_flag {
 /**
  * Let go: the actuator's nut is sent to 0, where nut and handle are at rest, as fast as
  * it can go. To be called when no more ticks follow.
+ *
+ * @return 0, or the negative errno of an actuator that takes no target any more, as after a
+ *         fault that no tick met: incise_plan_cause() says which. Its own deadman brings it
+ *         to rest.
  */
-INCISE_API void incise_plan_release(struct incise_plan *plan);
+INCISE_API int incise_plan_release(struct incise_plan *plan);
 
 /**
  * The reason why a plan's ticks fail, in one line: the actuator's latched fault and the way

@@ -127,6 +127,58 @@ static void test_overrun_over_the_end(void **state)
 	felt_end(&f);
 }
 
+static const struct incise_stepper_ops *felt_ops;
+static bool dropped;
+
+/* The tenth tick is followed by a stall that is longer than the actuator's deadman. */
+static int stall(void *context, const struct incise_tick *tick)
+{
+	dropped = ++calls == 10;
+	if (dropped)
+		incise_clock_wait_until(stalled, incise_clock_now(stalled) + 3400000);
+	return 0;
+}
+
+static int dropping_set(struct incise_stepper *stepper, double position_mm)
+{
+	return dropped ? -EIO : felt_ops->set(stepper, position_mm);
+}
+
+static int dropping_status(struct incise_stepper *stepper,
+			   struct incise_stepper_status *status)
+{
+	int rc = felt_ops->status(stepper, status);
+
+	if (dropped)
+		status->faults |= INCISE_STEPPER_FAULT_DEADMAN;
+	return rc;
+}
+
+/* No tick finds it any more, as the loop is over: letting go does. */
+static void test_overrun_over_the_end_drops_the_actuator(void **state)
+{
+	struct incise_loop_options options = {
+		.rate_hz = 1000, .duration_ns = 12000000, .ticked = stall};
+	struct incise_stepper_ops stepper_ops;
+	struct incise_error err = {0};
+	struct felt f;
+
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER);
+	felt_ops = f.stepper_ops;
+	stepper_ops = *felt_ops;
+	stepper_ops.set = dropping_set;
+	stepper_ops.status = dropping_status;
+	incise_rig_stepper(f.rig)->ops = &stepper_ops;
+	stalled = incise_rig_clock(f.rig);
+	calls = 0;
+	dropped = false;
+	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, &err), -EIO);
+	assert_int_equal(stats.ticks, 10);
+	if (!strstr(err.text, "tick 10: deadman"))
+		fail_msg("%s", err.text);
+	felt_end(&f);
+}
+
 static volatile sig_atomic_t stop;
 
 static int stopping_tracker(struct incise_tracker *tracker,
@@ -552,6 +604,7 @@ int main(void)
 		cmocka_unit_test(test_log_and_times),
 		cmocka_unit_test(test_overrun_skips_and_counts),
 		cmocka_unit_test(test_overrun_over_the_end),
+		cmocka_unit_test(test_overrun_over_the_end_drops_the_actuator),
 		cmocka_unit_test(test_stop_flag),
 		cmocka_unit_test(test_end_lets_go),
 		cmocka_unit_test(test_device_failure_ends_the_loop),
