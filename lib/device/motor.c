@@ -14,8 +14,9 @@
 #define LEAST_PULSE_NS 5000 /* default: enough for most power stages */
 #define UNREAD_MAX 100	    /* failed reads until -EIO */
 #define POLL_NS INCISE_NS_PER_S / 1000
-#define LATE_MAX 20	  /* edges in a row */
-#define TICK_MOST_S 0.002 /* between writes of a status with power */
+#define DISABLE_NS (2 * INCISE_NS_PER_S) /* more than a drive is given to stop */
+#define LATE_MAX 20			 /* edges in a row */
+#define TICK_MOST_S 0.002		 /* between writes of a status with power */
 
 double incise_actuator_step_mm(const struct incise_actuator *actuator)
 {
@@ -264,7 +265,8 @@ static int motor_disable(struct incise_stepper *stepper, struct incise_error *er
 	int64_t left_ns;
 
 	incise_actuator_limits(&motor->actuator, &limits);
-	left_ns = INCISE_NS_PER_S +
+	/* A drive that is off the bus may use up its deadman first. */
+	left_ns = DISABLE_NS + (int64_t)(motor->actuator.deadman_s * INCISE_NS_PER_S) +
 		  (int64_t)incise_profile_stopping_ns(&limits, UINT32_MAX);
 	/* A retract may take the whole travel. */
 	if (motor->actuator.retract)

@@ -289,6 +289,24 @@ static void a_program_that_stood_still_does_not_go_on(void **state)
 	can_rig_close(&rig);
 }
 
+/* Off the bus, it uses up all the time that a stop has: disabling waits for that. */
+static void disabling_waits_for_the_end_of_a_stop(void **state)
+{
+	struct incise_error err = {0};
+
+	can_rig_init(&rig);
+	rig.actuator.deadman_s = 0.2;
+	can_rig_open_or_fail(&rig);
+	can_rig_enable_or_fail(&rig);
+	can_rig_hold(&rig, 15, 300 * MS);
+	pre_operational(&rig.drive, true);
+	rig.drive.no_tpdo = true;
+	if (incise_stepper_disable(rig.stepper, &err))
+		fail_msg("%s", err.text);
+	assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_STATE_FAULT);
+	can_rig_close(&rig);
+}
+
 static uint64_t counter(const char *key)
 {
 	struct incise_stepper_counter c;
@@ -678,6 +696,7 @@ int main(void)
 		cmocka_unit_test(each_fault_stops_the_drive_and_is_named),
 		cmocka_unit_test(a_program_that_hangs_is_stopped_by_the_drive),
 		cmocka_unit_test(a_program_that_stood_still_does_not_go_on),
+		cmocka_unit_test(disabling_waits_for_the_end_of_a_stop),
 		cmocka_unit_test(no_set_point_is_lost),
 		cmocka_unit_test(velocities_and_torques_go_there_too),
 		cmocka_unit_test(silence_of_the_drive_moves_nothing),
