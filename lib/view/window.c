@@ -27,19 +27,31 @@ static void set_hints(void)
 	SDL_SetHint(SDL_HINT_MOUSE_TOUCH_EVENTS, "0");
 }
 
+/*
+ * Without a screen SDL draws into memory by itself, and nobody sees it or ends it. Who names
+ * that driver wants it.
+ */
+static bool is_seen(const char *driver)
+{
+	const char *asked = getenv("SDL_VIDEODRIVER");
+
+	return (strcmp(driver, "offscreen") && strcmp(driver, "dummy")) ||
+	       (asked && strstr(asked, driver));
+}
+
 static int open_window(struct incise_window *window, const char *title, int width,
 		       int height, struct incise_error *err)
 {
 	const Uint32 flags =
 		SDL_WINDOW_OPENGL | SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI;
 
-	if (SDL_InitSubSystem(SDL_INIT_VIDEO))
+	window->video = !SDL_InitSubSystem(SDL_INIT_VIDEO);
+	if (!window->video || !is_seen(SDL_GetCurrentVideoDriver()))
 		return incise_error_set(
 			err, ENODEV,
 			"picture: no screen for a window (%s): set DISPLAY "
 			"or WAYLAND_DISPLAY, or draw without a window",
-			SDL_GetError());
-	window->video = true;
+			window->video ? "SDL finds none" : SDL_GetError());
 	SDL_GL_SetAttribute(SDL_GL_CONTEXT_MAJOR_VERSION, 3);
 	SDL_GL_SetAttribute(SDL_GL_CONTEXT_MINOR_VERSION, 3);
 	SDL_GL_SetAttribute(SDL_GL_CONTEXT_PROFILE_MASK, SDL_GL_CONTEXT_PROFILE_CORE);

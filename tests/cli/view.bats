@@ -177,3 +177,18 @@ teardown() {
 	run --separate-stderr env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=x11 incise view neck --procedure
 	failed_with "without a screen give --frames"
 }
+
+# SDL has a driver that draws where nobody sees it, and takes it by itself.
+@test "view: a window without a screen is refused, not drawn for ever" {
+	local source
+	! compgen -G "/dev/dri/card*" >/dev/null || skip "this machine may have a screen of its own"
+	for source in "--rig sim:mouse" "--procedure"; do
+		# shellcheck disable=SC2086
+		run --separate-stderr timeout 60 env -u DISPLAY -u WAYLAND_DISPLAY -u SDL_VIDEODRIVER \
+			XDG_RUNTIME_DIR="$PWD" incise view neck.scene $source $small
+		failed_with "no screen for a window" "without a screen give --frames" || complain "$source"
+	done
+	# Who names that driver has asked for it.
+	run -0 --separate-stderr timeout 60 env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=offscreen \
+		incise view neck.scene --procedure --duration 100ms $small
+}
