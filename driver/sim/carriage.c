@@ -180,8 +180,9 @@ static void sim_carriage_place(struct sim *sim, unsigned int number,
 	raw_spin_unlock_irqrestore(&sim->lock, flags);
 }
 
-static int sim_carriage_parse(struct sim *sim, char *text)
+static int sim_carriage_parse(void *of, char *text)
 {
+	struct sim *sim = of;
 	const struct sim_carriage none = {};
 	struct sim_carriage carriage = {
 		.used = true,
@@ -279,16 +280,9 @@ static int sim_carriage_open(struct inode *inode, struct file *file)
 static ssize_t sim_carriage_write(struct file *file, const char __user *from, size_t size,
 				  loff_t *unused)
 {
-	struct sim *sim = ((struct seq_file *)file->private_data)->private;
-	char *text;
-	int ret;
+	struct seq_file *seq = file->private_data;
 
-	text = sim_text_read(from, size);
-	if (IS_ERR(text))
-		return PTR_ERR(text);
-	ret = sim_carriage_parse(sim, text);
-	kfree(text);
-	return ret ? ret : size;
+	return sim_text_write(from, size, sim_carriage_parse, seq->private);
 }
 
 static const struct file_operations sim_carriage_fops = {

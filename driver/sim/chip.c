@@ -50,8 +50,10 @@ COMPAT_GPIO_SET(sim_set)
 
 static int sim_get(struct gpio_chip *chip, unsigned int line)
 {
+	struct sim *sim = gpiochip_get_data(chip);
+
 	/* One word is read at a time: no need for the lock. */
-	return sim_level_locked(gpiochip_get_data(chip), line);
+	return test_bit(line, sim->unreadable) ? -EIO : sim_level_locked(sim, line);
 }
 
 static int sim_get_direction(struct gpio_chip *chip, unsigned int line)
@@ -103,6 +105,7 @@ static int sim_direction_output(struct gpio_chip *chip, unsigned int line, int v
 int sim_chip_add(struct sim *sim, struct device *parent)
 {
 	struct gpio_chip *chip = &sim->chip;
+	int ret;
 
 	/* After an unbind it starts as new, but for the ring: a log outlives it. */
 	bitmap_zero(sim->output, INCISE_SIM_LINES_MAX);
@@ -121,7 +124,10 @@ int sim_chip_add(struct sim *sim, struct device *parent)
 	chip->get = sim_get;
 	chip->set = compat_gpio_set(sim_set);
 	sim_interrupt_init(sim);
-	return gpiochip_add_data(chip, sim);
+	ret = gpiochip_add_data(chip, sim);
+	if (!ret)
+		sim_faults_chip(sim);
+	return ret;
 }
 
 void sim_chip_remove(struct sim *sim)

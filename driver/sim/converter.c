@@ -191,21 +191,19 @@ static int sim_control_apply(struct sim_adc *adc, const char *word)
 	return ret;
 }
 
+static int sim_control_parse(void *of, char *text)
+{
+	char *word = sim_text_word(&text);
+
+	if (!word || sim_text_word(&text))
+		return -EINVAL;
+	return sim_control_apply(of, word);
+}
+
 static ssize_t sim_control_write(struct file *file, const char __user *from, size_t size,
 				 loff_t *unused)
 {
-	char *text, *rest, *word;
-	int ret = -EINVAL;
-
-	text = sim_text_read(from, size);
-	if (IS_ERR(text))
-		return PTR_ERR(text);
-	rest = text;
-	word = sim_text_word(&rest);
-	if (word && !sim_text_word(&rest))
-		ret = sim_control_apply(file->private_data, word);
-	kfree(text);
-	return ret ? ret : size;
+	return sim_text_write(from, size, sim_control_parse, file->private_data);
 }
 
 static const struct file_operations sim_control_fops = {

@@ -107,33 +107,30 @@ static ssize_t sim_edges_read(struct file *file, char __user *to, size_t size,
 	return done ? done : ret;
 }
 
+static int sim_edges_parse(void *of, char *text)
+{
+	struct sim *sim = of;
+	struct sim_ring *ring = &sim->ring;
+	char *word = sim_text_word(&text);
+	unsigned long flags;
+
+	if (!word || strcmp(word, "reset") || sim_text_word(&text))
+		return -EINVAL;
+	mutex_lock(&ring->reader);
+	raw_spin_lock_irqsave(&sim->lock, flags);
+	ring->tail = ring->head;
+	ring->sequence = 0;
+	ring->lost = 0;
+	ring->repeats = 0;
+	raw_spin_unlock_irqrestore(&sim->lock, flags);
+	mutex_unlock(&ring->reader);
+	return 0;
+}
+
 static ssize_t sim_edges_write(struct file *file, const char __user *from, size_t size,
 			       loff_t *unused)
 {
-	struct sim *sim = file->private_data;
-	struct sim_ring *ring = &sim->ring;
-	char *text, *rest, *word;
-	unsigned long flags;
-	int ret = -EINVAL;
-
-	text = sim_text_read(from, size);
-	if (IS_ERR(text))
-		return PTR_ERR(text);
-	rest = text;
-	word = sim_text_word(&rest);
-	if (word && !strcmp(word, "reset") && !sim_text_word(&rest)) {
-		mutex_lock(&ring->reader);
-		raw_spin_lock_irqsave(&sim->lock, flags);
-		ring->tail = ring->head;
-		ring->sequence = 0;
-		ring->lost = 0;
-		ring->repeats = 0;
-		raw_spin_unlock_irqrestore(&sim->lock, flags);
-		mutex_unlock(&ring->reader);
-		ret = 0;
-	}
-	kfree(text);
-	return ret ? ret : size;
+	return sim_text_write(from, size, sim_edges_parse, file->private_data);
 }
 
 static const struct file_operations sim_edges_fops = {

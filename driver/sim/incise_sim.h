@@ -26,6 +26,16 @@
  *                    "edge=rising" or "edge=falling" only these are counted.
  *                    "clear" removes all.
  *            read    one line per script, with left= and fired_ns=
+ *  faults    write   what is wrong with the chip, in one word:
+ *                    "interrupts=held"    they stay pending …
+ *                    "interrupts=come"    … until then; has come on return
+ *                    "interrupts=none"    a line has none: ENXIO
+ *                    "interrupts=refused" asking for one gives EIO
+ *                    "unreadable=LINE"    reading its level gives EIO
+ *                    "none"               nothing is
+ *  sleep     write   "suspend=DEVICE", "resume=DEVICE": calls that function
+ *                    of the driver of a platform device, as a suspend of the
+ *                    machine does, and gives its error
  *
  * status: lines, edges (all that ever were, since reset), held (in the ring),
  * lost (the ring was full: the newest are lost), ring (its size), repeats

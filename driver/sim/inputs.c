@@ -126,8 +126,9 @@ static int sim_script_place_locked(struct sim *sim, const struct sim_script *scr
 	return 0;
 }
 
-static int sim_script_parse(struct sim *sim, char *text)
+static int sim_script_parse(void *of, char *text)
 {
+	struct sim *sim = of;
 	struct sim_script script = {
 		.used = true,
 		.rising = true,
@@ -189,16 +190,9 @@ static int sim_script_open(struct inode *inode, struct file *file)
 static ssize_t sim_script_write(struct file *file, const char __user *from, size_t size,
 				loff_t *unused)
 {
-	struct sim *sim = ((struct seq_file *)file->private_data)->private;
-	char *text;
-	int ret;
+	struct seq_file *seq = file->private_data;
 
-	text = sim_text_read(from, size);
-	if (IS_ERR(text))
-		return PTR_ERR(text);
-	ret = sim_script_parse(sim, text);
-	kfree(text);
-	return ret ? ret : size;
+	return sim_text_write(from, size, sim_script_parse, seq->private);
 }
 
 static const struct file_operations sim_script_fops = {
@@ -228,9 +222,13 @@ static int sim_inputs_open(struct inode *inode, struct file *file)
 }
 
 /* All pairs are understood before the first one is applied. */
-static int sim_inputs_parse(const struct sim *sim, char *text, unsigned long *mask,
-			    unsigned long *bits)
+static int sim_inputs_parse(void *of, char *text)
 {
+	struct sim *sim = of;
+	DECLARE_BITMAP(mask, INCISE_SIM_LINES_MAX) = {};
+	DECLARE_BITMAP(bits, INCISE_SIM_LINES_MAX) = {};
+	unsigned long flags;
+	unsigned int each;
 	char *word;
 
 	while ((word = sim_text_word(&text))) {
@@ -244,34 +242,23 @@ static int sim_inputs_parse(const struct sim *sim, char *text, unsigned long *ma
 		__set_bit(line, mask);
 		__assign_bit(line, bits, value);
 	}
-	return bitmap_empty(mask, INCISE_SIM_LINES_MAX) ? -EINVAL : 0;
+	if (bitmap_empty(mask, INCISE_SIM_LINES_MAX))
+		return -EINVAL;
+
+	raw_spin_lock_irqsave(&sim->lock, flags);
+	for_each_set_bit(each, mask, sim->lines)
+		sim_drive_locked(sim, each, test_bit(each, bits));
+	sim_settle_locked(sim);
+	raw_spin_unlock_irqrestore(&sim->lock, flags);
+	return 0;
 }
 
 static ssize_t sim_inputs_write(struct file *file, const char __user *from, size_t size,
 				loff_t *unused)
 {
-	struct sim *sim = ((struct seq_file *)file->private_data)->private;
-	DECLARE_BITMAP(mask, INCISE_SIM_LINES_MAX) = {};
-	DECLARE_BITMAP(bits, INCISE_SIM_LINES_MAX) = {};
-	unsigned long flags;
-	unsigned int line;
-	char *text;
-	int ret;
+	struct seq_file *seq = file->private_data;
 
-	text = sim_text_read(from, size);
-	if (IS_ERR(text))
-		return PTR_ERR(text);
-	ret = sim_inputs_parse(sim, text, mask, bits);
-	kfree(text);
-	if (ret)
-		return ret;
-
-	raw_spin_lock_irqsave(&sim->lock, flags);
-	for_each_set_bit(line, mask, sim->lines)
-		sim_drive_locked(sim, line, test_bit(line, bits));
-	sim_settle_locked(sim);
-	raw_spin_unlock_irqrestore(&sim->lock, flags);
-	return size;
+	return sim_text_write(from, size, sim_inputs_parse, seq->private);
 }
 
 static const struct file_operations sim_inputs_fops = {

@@ -20,7 +20,7 @@ void sim_interrupt_edge_locked(struct sim *sim, unsigned int line, bool value)
 	if (!test_bit(line, value ? sim->rising : sim->falling))
 		return;
 	__set_bit(line, sim->pending);
-	if (test_bit(line, sim->unmasked))
+	if (test_bit(line, sim->unmasked) && !sim->held)
 		irq_work_queue(&sim->work);
 }
 
@@ -32,13 +32,28 @@ static void sim_interrupt_deliver(struct irq_work *work)
 	unsigned int line;
 
 	raw_spin_lock_irqsave(&sim->lock, flags);
-	bitmap_and(due, sim->pending, sim->unmasked, INCISE_SIM_LINES_MAX);
+	bitmap_zero(due, INCISE_SIM_LINES_MAX);
+	if (!sim->held)
+		bitmap_and(due, sim->pending, sim->unmasked, INCISE_SIM_LINES_MAX);
 	bitmap_andnot(sim->pending, sim->pending, due, INCISE_SIM_LINES_MAX);
 	sim->interrupts += bitmap_weight(due, INCISE_SIM_LINES_MAX);
 	raw_spin_unlock_irqrestore(&sim->lock, flags);
 
 	for_each_set_bit(line, due, sim->lines)
 		generic_handle_domain_irq(sim->chip.irq.domain, line);
+}
+
+/* Keep all interrupts pending, or deliver what was kept; has come when it returns. */
+void sim_interrupt_hold(struct sim *sim, bool hold)
+{
+	unsigned long flags;
+
+	raw_spin_lock_irqsave(&sim->lock, flags);
+	sim->held = hold;
+	if (!hold)
+		irq_work_queue(&sim->work);
+	raw_spin_unlock_irqrestore(&sim->lock, flags);
+	irq_work_sync(&sim->work);
 }
 
 static void sim_interrupt_ack(struct irq_data *data)
@@ -69,7 +84,7 @@ static void sim_interrupt_unmask(struct irq_data *data)
 	gpiochip_enable_irq(chip, line);
 	raw_spin_lock_irqsave(&sim->lock, flags);
 	__set_bit(line, sim->unmasked);
-	if (test_bit(line, sim->pending))
+	if (test_bit(line, sim->pending) && !sim->held)
 		irq_work_queue(&sim->work);
 	raw_spin_unlock_irqrestore(&sim->lock, flags);
 }
@@ -110,6 +125,7 @@ void sim_interrupt_init(struct sim *sim)
 	bitmap_zero(sim->unmasked, INCISE_SIM_LINES_MAX);
 	bitmap_zero(sim->rising, INCISE_SIM_LINES_MAX);
 	bitmap_zero(sim->falling, INCISE_SIM_LINES_MAX);
+	sim->held = false;
 	sim->work = IRQ_WORK_INIT_HARD(sim_interrupt_deliver);
 	gpio_irq_chip_set_chip(irq, &sim_irq_chip);
 	irq->default_type = IRQ_TYPE_NONE;

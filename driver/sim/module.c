@@ -43,6 +43,7 @@ static int sim_probe(struct platform_device *device)
 	sim_edges_files(sim);
 	sim_carriage_files(sim);
 	sim_inputs_files(sim);
+	sim_faults_files(sim);
 	sim_adc_files(&sim_adc_instance, sim->dir);
 	return 0;
 }

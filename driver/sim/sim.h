@@ -127,6 +127,10 @@ struct sim_script {
  * @rising:	lines that interrupt when they rise
  * @falling:	lines that interrupt when they fall
  * @interrupts:	interrupts delivered
+ * @held:	interrupts stay pending
+ * @to_irq:	gpiolib's own
+ * @no_irq:	what to_irq() answers instead, a negative errno; 0: as it should
+ * @unreadable:	lines whose level cannot be read
  * @ring:	edges
  * @carriage:	mechanics
  * @steps_of:	which carriages step by a line, one bit each
@@ -149,6 +153,11 @@ struct sim {
 	DECLARE_BITMAP(rising, INCISE_SIM_LINES_MAX);
 	DECLARE_BITMAP(falling, INCISE_SIM_LINES_MAX);
 	u64 interrupts;
+	bool held;
+
+	int (*to_irq)(struct gpio_chip *chip, unsigned int line);
+	int no_irq;
+	DECLARE_BITMAP(unreadable, INCISE_SIM_LINES_MAX);
 
 	struct sim_ring ring;
 	struct sim_carriage carriage[INCISE_SIM_CARRIAGES];
@@ -168,6 +177,11 @@ void sim_chip_remove(struct sim *sim);
 /* interrupt.c */
 void sim_interrupt_init(struct sim *sim);
 void sim_interrupt_edge_locked(struct sim *sim, unsigned int line, bool value);
+void sim_interrupt_hold(struct sim *sim, bool hold);
+
+/* faults.c */
+void sim_faults_chip(struct sim *sim);
+void sim_faults_files(struct sim *sim);
 
 /* edges.c */
 int sim_edges_init(struct sim *sim, unsigned int size);
@@ -188,7 +202,8 @@ void sim_settle_locked(struct sim *sim);
 void sim_inputs_files(struct sim *sim);
 
 /* text.c: what people write into debugfs */
-char *sim_text_read(const char __user *from, size_t size);
+ssize_t sim_text_write(const char __user *from, size_t size,
+		       int (*parse)(void *of, char *text), void *of);
 char *sim_text_word(char **text);
 bool sim_text_key(char *word, const char *key, char **value);
 int sim_text_line(const struct sim *sim, const char *text, int *line);

@@ -13,15 +13,8 @@
 /* More than any sensible command. */
 #define SIM_TEXT_MAX 4096
 
-/**
- * sim_text_read() - the text of a write, with a terminating zero
- * @from:	text in user space
- * @size:	its length
- *
- * Return: text that the caller frees with kfree(), or an error pointer;
- * EINVAL for a text that is empty, too long or holds a zero byte.
- */
-char *sim_text_read(const char __user *from, size_t size)
+/* With a terminating zero; EINVAL if it is empty, too long or holds a zero byte. */
+static char *sim_text_read(const char __user *from, size_t size)
 {
 	char *text;
 
@@ -33,6 +26,29 @@ char *sim_text_read(const char __user *from, size_t size)
 		return ERR_PTR(-EINVAL);
 	}
 	return text;
+}
+
+/**
+ * sim_text_write() - hand the text of a write to a parser
+ * @from:	text in user space
+ * @size:	its length
+ * @parse:	0 or a negative errno; may change the text
+ * @of:		for @parse
+ *
+ * Return: @size, or the error: a file's write function returns it as it is.
+ */
+ssize_t sim_text_write(const char __user *from, size_t size,
+		       int (*parse)(void *of, char *text), void *of)
+{
+	char *text;
+	int ret;
+
+	text = sim_text_read(from, size);
+	if (IS_ERR(text))
+		return PTR_ERR(text);
+	ret = parse(of, text);
+	kfree(text);
+	return ret ? ret : (ssize_t)size;
 }
 
 /* The next word, or NULL at the end. */
