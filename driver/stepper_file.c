@@ -78,9 +78,10 @@ static int stepper_file_release(struct inode *inode, struct file *file)
 	return 0;
 }
 
-/* All or none: every motor is asked first. */
+/* All or none: every motor is asked first. One that had power before keeps it. */
 static int stepper_file_enable(struct stepper *stepper, u32 mask)
 {
+	unsigned long given = 0;
 	unsigned int i;
 	int ret;
 
@@ -97,14 +98,15 @@ static int stepper_file_enable(struct stepper *stepper, u32 mask)
 		if (!(mask & BIT(i)))
 			continue;
 		ret = stepper_setup_enable(&stepper->motor[i]);
-		if (ret)
+		if (ret < 0)
 			goto back;
+		if (ret)
+			given |= BIT(i);
 	}
 	return 0;
 back:
-	while (i--)
-		if (mask & BIT(i))
-			stepper_setup_disable(&stepper->motor[i]);
+	for_each_set_bit(i, &given, stepper->n_motors)
+		stepper_setup_disable(&stepper->motor[i]);
 	return ret;
 }
 

@@ -8,7 +8,8 @@
  *   limit            it halts if it moves towards it; away from there it may move
  *   home             the position at its leading edge is kept
  *
- * All under motor->lock.
+ * All under motor->lock. A line that cannot be read counts as active, but home, which
+ * stays what it was.
  */
 #include <linux/gpio/consumer.h>
 
@@ -74,8 +75,9 @@ static void stepper_inputs_changed(struct stepper_motor *motor, enum stepper_inp
  * @now:	ktime
  * @edge:	an interrupt says that it changed
  *
- * An interrupt that finds the line as it was has missed a pulse: shorter than the
- * way to here, but for a stop long enough.
+ * An interrupt that finds the line inactive as before came too late for a pulse, or a tick
+ * was faster than it: one cannot tell. For a stop a pulse is assumed, as it is long enough to
+ * be meant. A limit and home would be reported where they are not.
  */
 void stepper_inputs_one(struct stepper_motor *motor, enum stepper_input input, s64 now,
 			bool edge)
@@ -89,9 +91,10 @@ void stepper_inputs_one(struct stepper_motor *motor, enum stepper_input input, s
 	value = gpiod_get_value(line);
 	if (value < 0) {
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_LINE, now);
-		return;
+		value = input == STEPPER_HOME ? was : 1;
 	}
-	if (edge && !value && !was) {
+	if (edge && !value && !was &&
+	    (input == STEPPER_ESTOP || input == STEPPER_DRIVER)) {
 		stepper_inputs_changed(motor, input, true, now);
 		stepper_inputs_act(motor, input, now);
 		stepper_inputs_changed(motor, input, false, now);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * The GPIO lines of a controller and their interrupts. A line is looked for at the
- * motor's firmware node (device tree, or software nodes of configfs), and if there is
- * none in the lookup table of the controller, where it goes by motorN-NAME:
+ * motor's firmware node (device tree, ACPI), and if there is none in the lookup table of
+ * the controller, that of configfs say, where it goes by motorN-NAME:
  *
  *   motor@0 { step-gpios = <…>; };      or      GPIO_LOOKUP(chip, 4, "motor0-step", 0)
  *
@@ -17,19 +17,40 @@
 
 #include "compat.h"
 #include "stepper.h"
+#include "stepper_wires.h"
 
 static const char *const stepper_input_names[STEPPER_INPUTS] = {
 	"limit-min", "limit-max", "home", "estop", "fault",
 };
 
-/* Whether gpiolib finds lines by this kind of node. */
-static bool stepper_lines_found_by(const struct fwnode_handle *node)
+#define STEPPER_KEY_SIZE 32
+
+/* A line's name in the lookup table, and in messages. */
+static void stepper_lines_key(char *key, int motor, const char *name)
 {
-#ifdef HAVE_GPIO_SOFTWARE_NODES
-	return true;
-#else
-	return !is_software_node(node);
-#endif
+	if (motor < 0)
+		snprintf(key, STEPPER_KEY_SIZE, "%s", name);
+	else
+		snprintf(key, STEPPER_KEY_SIZE, "motor%d-%s", motor, name);
+}
+
+/*
+ * Report an error of a line and return it. A device of configfs is not probed again when
+ * a chip appears, so that a deferral, which dev_err_probe() keeps to itself, is an error.
+ */
+static int stepper_lines_fail(struct device *dev, int ret, const char *key,
+			      const char *why)
+{
+	const char *label = stepper_nodes_label(dev, key);
+
+	if (!label)
+		return dev_err_probe(dev, ret, "line %s: %s\n", key, why);
+	if (ret == -EPROBE_DEFER) {
+		dev_err(dev, "line %s: there is no chip labelled %s\n", key, label);
+		return -ENODEV;
+	}
+	dev_err(dev, "line %s of %s: %s: %pe\n", key, label, why, ERR_PTR(ret));
+	return ret;
 }
 
 /* A line, NULL where it is optional and there is none, or an error that was reported. */
@@ -38,26 +59,22 @@ static struct gpio_desc *stepper_lines_one(struct device *dev, struct fwnode_han
 					   enum gpiod_flags flags, bool needed)
 {
 	struct gpio_desc *line = ERR_PTR(-ENOENT);
-	char key[32];
+	char key[STEPPER_KEY_SIZE];
 
-	if (motor < 0)
-		snprintf(key, sizeof(key), "%s", name);
-	else
-		snprintf(key, sizeof(key), "motor%d-%s", motor, name);
-	if (node && stepper_lines_found_by(node))
+	stepper_lines_key(key, motor, name);
+	if (node && !is_software_node(node))
 		line = devm_fwnode_gpiod_get(dev, node, name, flags, key);
 	if (PTR_ERR_OR_ZERO(line) == -ENOENT)
 		line = devm_gpiod_get(dev, key, flags);
 	if (PTR_ERR_OR_ZERO(line) == -ENOENT && !needed)
 		return NULL;
-	if (IS_ERR(line)) {
-		dev_err_probe(dev, PTR_ERR(line), "line %s\n", key);
-		return line;
-	}
+	if (IS_ERR(line))
+		return ERR_PTR(
+			stepper_lines_fail(dev, PTR_ERR(line), key, "it cannot be had"));
 	if (gpiod_cansleep(line))
-		return ERR_PTR(dev_err_probe(
-			dev, -EOPNOTSUPP,
-			"line %s: its chip may sleep, an interrupt may not\n", key));
+		return ERR_PTR(
+			stepper_lines_fail(dev, -EOPNOTSUPP, key,
+					   "its chip may sleep, an interrupt may not"));
 	return line;
 }
 
@@ -147,18 +164,36 @@ static irqreturn_t stepper_lines_interrupt(int irq, void *data)
 	return IRQ_HANDLED;
 }
 
-/* A chip without interrupts is served by the looks at each tick and step. */
+/* Its chip has no interrupts: the looks at each tick and step serve it, and info says so. */
+static void stepper_lines_poll(struct stepper *stepper, int motor,
+			       enum stepper_input input, const char *key)
+{
+	unsigned int i;
+
+	for (i = 0; i < stepper->n_motors; i++)
+		if (motor < 0 || motor == (int)i)
+			stepper->info.polled[i] |= 1U << input;
+	dev_notice(stepper->parent, "line %s: no interrupt, read at each tick\n", key);
+}
+
 static int stepper_lines_request(struct stepper *stepper, struct stepper_irq *irq,
 				 struct gpio_desc *line, int motor,
 				 enum stepper_input input)
 {
+	char key[STEPPER_KEY_SIZE];
 	int number, ret;
 
 	if (!line)
 		return 0;
+	stepper_lines_key(key, motor, stepper_input_names[input]);
 	number = gpiod_to_irq(line);
-	if (number <= 0)
+	if (!number || number == -ENXIO) {
+		stepper_lines_poll(stepper, motor, input, key);
 		return 0;
+	}
+	if (number < 0)
+		return stepper_lines_fail(stepper->parent, number, key,
+					  "its chip gives no interrupt");
 	irq->stepper = stepper;
 	irq->motor = motor;
 	irq->input = input;
@@ -167,8 +202,8 @@ static int stepper_lines_request(struct stepper *stepper, struct stepper_irq *ir
 			  IRQF_TRIGGER_RISING | IRQF_TRIGGER_FALLING | IRQF_NO_THREAD,
 			  dev_name(&stepper->dev), irq);
 	if (ret)
-		return dev_err_probe(stepper->parent, ret, "interrupt of input %s\n",
-				     stepper_input_names[input]);
+		return stepper_lines_fail(stepper->parent, ret, key,
+					  "its interrupt cannot be had");
 	irq->irq = number;
 	return 0;
 }

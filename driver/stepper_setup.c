@@ -71,7 +71,10 @@ int stepper_setup_ready(struct stepper_motor *motor)
 	return ret;
 }
 
-/* Power, and the deadman from now on. One that has power already goes on as it is. */
+/*
+ * Power, and the deadman from now on: 1. One that has power already goes on as it is: 0.
+ * Else a negative errno.
+ */
 int stepper_setup_enable(struct stepper_motor *motor)
 {
 	struct incise_profile_limits limits;
@@ -117,7 +120,7 @@ int stepper_setup_enable(struct stepper_motor *motor)
 	stepper_status_state(motor, INCISE_STEPPER_STATE_READY, now);
 	stepper_status_publish(motor, now);
 	stepper_motor_start(motor);
-	ret = 0;
+	ret = 1;
 unlock:
 	raw_spin_unlock_irqrestore(&motor->lock, flags);
 	return ret;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-only */
 /*
  * The lines of chips that signals are wired to: stepper_configfs.c fills them in,
- * stepper_nodes.c makes a device of them.
+ * stepper_nodes.c makes a device of them. They go into a lookup table.
  */
 #ifndef INCISE_DRIVER_STEPPER_WIRES_H
 #define INCISE_DRIVER_STEPPER_WIRES_H
@@ -32,7 +32,7 @@ enum {
 	STEPPER_MOTOR_WIRES
 };
 
-/* As firmware nodes name them, less "-gpios". */
+/* As firmware nodes name them, less "-gpios"; in the lookup table behind "motorN-". */
 extern const char *const stepper_wire_names[STEPPER_WIRES];
 extern const char *const stepper_motor_wire_names[STEPPER_MOTOR_WIRES];
 
@@ -46,5 +46,6 @@ struct stepper_wires {
 struct stepper_nodes *stepper_nodes_make(const struct stepper_wires *wires);
 void stepper_nodes_free(struct stepper_nodes *nodes);
 struct device *stepper_nodes_device(struct stepper_nodes *nodes);
+const char *stepper_nodes_label(struct device *dev, const char *key);
 
 #endif

@@ -150,7 +150,10 @@ struct incise_stepper_event {
  * @resolution_ns: of the timer
  * @lines: per motor, the optional lines it has
  * @pulse_ns: self-test: shortest config.high_ns and low_ns
- * @reserved0: zero
+ * @tick_min_ns: self-test: shortest config.tick_ns, so that the ticks of all motors take at
+ *               most a quarter of a processor
+ * @polled: per motor, the inputs whose chip gives no interrupt: they are looked at when power
+ *          is asked for, at each tick, and e-stop and the limit ahead before each step
  * @reserved: zero
  */
 struct incise_stepper_controller {
@@ -164,8 +167,9 @@ struct incise_stepper_controller {
 	__u32 resolution_ns;
 	__u32 lines[INCISE_STEPPER_MOTORS_MAX];
 	__u32 pulse_ns;
-	__u32 reserved0;
-	__u64 reserved[19];
+	__u32 tick_min_ns;
+	__u32 polled[INCISE_STEPPER_MOTORS_MAX];
+	__u64 reserved[15];
 };
 
 /* incise_stepper_config.flags */

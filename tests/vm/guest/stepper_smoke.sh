@@ -33,6 +33,12 @@ refused()
 check "wires are named" wire bench motor0 step=0 dir=1 enable=2 limit_min=3 limit_max=4 home=5 fault=6
 check "e-stop and SYNC too" sh -c "echo incise-sim:7 >$config/bench/estop && echo incise-sim:8 >$config/bench/sync"
 check "what is no line is refused" refused sh -c "echo incise-sim >$config/bench/estop"
+# A label that no chip has: the write fails, and the log says which line and label.
+echo incise-sin:1 >$config/bench/motor0/dir
+check "a chip that is not there is refused" refused live 1
+check "the log names the line and the label" \
+	sh -c 'dmesg | grep -q "line motor0-dir: there is no chip labelled incise-sin"'
+echo incise-sim:1 >$config/bench/motor0/dir
 check "it goes live" live 1 || { dmesg | tail -n 20 | sed 's/^/# /'; exit 0; }
 cdev=$(cat $config/bench/cdev)
 check "/dev/$cdev is there" [ -c "/dev/$cdev" ]
