@@ -23,8 +23,10 @@
 #include <linux/irq_work.h>
 #include <linux/mutex.h>
 #include <linux/notifier.h>
+#include <linux/pm_qos.h>
 #include <linux/spinlock.h>
 #include <linux/wait.h>
+#include <linux/workqueue.h>
 
 #include "../lib/fixed/profile.h"
 
@@ -175,6 +177,9 @@ struct stepper {
 	struct stepper_events events;
 	wait_queue_head_t wait;
 	struct irq_work wake;
+	struct pm_qos_request latency; /* no idle states: stepper.mutex */
+	struct work_struct look;       /* whether these may come back */
+	bool awake;
 
 	struct notifier_block reboot, panic;
 	struct dentry *debugfs;
@@ -201,7 +206,7 @@ void stepper_setup_get_config(struct stepper_motor *motor,
 int stepper_setup_position(struct stepper_motor *motor,
 			   const struct incise_stepper_origin *origin);
 void stepper_setup_fault(struct stepper_motor *motor, u32 fault);
-bool stepper_setup_powered(struct stepper_motor *motor);
+bool stepper_setup_any_powered(struct stepper *stepper);
 void stepper_setup_halt(struct stepper_motor *motor);
 
 /* stepper_stop.c: motor->lock held */
@@ -240,6 +245,14 @@ void stepper_sync_init(struct stepper *stepper);
 int stepper_sync_set(struct stepper *stepper, const struct incise_stepper_sync *sync);
 void stepper_sync_get(struct stepper *stepper, struct incise_stepper_sync *sync);
 void stepper_sync_off(struct stepper *stepper);
+void stepper_sync_resume(struct stepper *stepper);
+
+/* stepper_latency.c */
+void stepper_latency_init(struct stepper *stepper);
+void stepper_latency_hold(struct stepper *stepper);
+void stepper_latency_release(struct stepper *stepper);
+void stepper_latency_event(struct stepper *stepper);
+void stepper_latency_end(struct stepper *stepper);
 
 /* stepper_ability.c */
 int stepper_ability_measure(struct stepper *stepper);

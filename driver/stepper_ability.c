@@ -18,7 +18,13 @@
  *
  * First: high and low last p each, and an edge may be late by L. Second: a step is two
  * firings, each of which costs the processor a shot and the way into the interrupt; n
- * motors share one processor, and shall leave half of it to others.
+ * motors share one processor, and their steps shall take half of it at most.
+ *
+ * Motors that stand cost ticks. With T the median cost of a shot and of what a tick
+ * computes, and W the least lateness, the way into the interrupt and about that out of it, the
+ * ticks of n motors shall take a quarter of the processor at most:
+ *
+ *   tick = 4n(T + 2W)
  *
  * A machine that was not quiet in one round gets another: what else ran just then, the
  * loading of modules say, is not what it will run later.
@@ -47,7 +53,10 @@ struct stepper_trial {
 	int n; /* shots so far */
 	u32 late_ns[SHOTS];
 	u32 edge_ns[SHOTS];
+	u32 tick_ns[SHOTS];
 	u32 seen; /* inputs: their reading is not left out */
+	struct incise_profile_slot slot;
+	struct stepper_setpoint setpoint;
 };
 
 static void stepper_ability_shot(struct stepper_trial *trial,
@@ -61,23 +70,40 @@ static void stepper_ability_shot(struct stepper_trial *trial,
 	compat_gpiod_set_value(lines->step, 0);
 }
 
+/* What a tick computes for a motor that moves. No step of it is given out. */
+static void stepper_ability_tick(struct stepper_trial *trial, struct stepper_motor *motor)
+{
+	unsigned long flags;
+
+	raw_spin_lock_irqsave(&motor->lock, flags);
+	trial->setpoint.seq = U32_MAX; /* every slot is new */
+	stepper_page_take(&motor->stepper->setpoints[motor->index], &trial->setpoint);
+	incise_profile_tick(&motor->profile, &trial->slot);
+	stepper_status_publish(motor, ktime_get_ns());
+	raw_spin_unlock_irqrestore(&motor->lock, flags);
+}
+
 static enum hrtimer_restart stepper_ability_fire(struct hrtimer *timer)
 {
 	struct stepper_trial *trial = container_of(timer, struct stepper_trial, timer);
 	struct stepper *stepper = trial->stepper;
 	s64 due = ktime_to_ns(hrtimer_get_expires(timer));
-	s64 fired = ktime_get_ns(), written;
+	struct stepper_motor *motor = &stepper->motor[trial->n % stepper->n_motors];
+	s64 fired = ktime_get_ns(), written, ticked;
 
-	stepper_ability_shot(trial, &stepper->motor[trial->n % stepper->n_motors].lines);
+	stepper_ability_shot(trial, &motor->lines);
 	written = ktime_get_ns();
+	stepper_ability_tick(trial, motor);
+	ticked = ktime_get_ns();
 	trial->late_ns[trial->n] = min(fired - due, (s64)U32_MAX);
 	trial->edge_ns[trial->n] = min(written - fired, (s64)U32_MAX);
+	trial->tick_ns[trial->n] = min(ticked - fired, (s64)U32_MAX);
 	/* Read by the one who waits for the last. */
 	smp_store_release(&trial->n, trial->n + 1);
 	if (trial->n == SHOTS)
 		return HRTIMER_NORESTART;
 	/* From now: a shot that was very late must not make the next ones late too. */
-	hrtimer_forward(timer, ns_to_ktime(written), ns_to_ktime(SHOT_NS));
+	hrtimer_forward(timer, ns_to_ktime(ticked), ns_to_ktime(SHOT_NS));
 	return HRTIMER_RESTART;
 }
 
@@ -100,20 +126,40 @@ static void stepper_ability_round(struct stepper_trial *trial)
 	hrtimer_cancel(&trial->timer);
 	sort(trial->late_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
 	sort(trial->edge_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
+	sort(trial->tick_ns, SHOTS, sizeof(u32), stepper_ability_compare, NULL);
 }
 
 /* Fill in what the self-test says in info. Sleeps. */
 int stepper_ability_measure(struct stepper *stepper)
 {
+	const struct incise_profile_limits limits = {
+		.tick_ns = INCISE_PROFILE_TICK_MAX_NS,
+		.velocity = 1,
+		.acceleration = 1,
+		.position_max = INCISE_PROFILE_POSITION_MAX,
+		.jerk = 0,
+	};
 	struct incise_stepper_controller *info = &stepper->info;
-	u64 pulse = U32_MAX, late = U32_MAX, period;
+	u64 pulse = U32_MAX, tick = U32_MAX, late = U32_MAX, period;
 	struct stepper_trial *trial;
-	int round;
+	int round, ret = 0;
+	unsigned int i;
 
 	trial = kzalloc(sizeof(*trial), GFP_KERNEL);
 	if (!trial)
 		return -ENOMEM;
 	trial->stepper = stepper;
+	for (i = 0; i < stepper->n_motors && !ret; i++) {
+		ret = incise_profile_init(&stepper->motor[i].profile, &limits, 0);
+		/* Too far to arrive while it is measured. */
+		incise_profile_target(&stepper->motor[i].profile, INCISE_PROFILE_POSITION,
+				      INCISE_PROFILE_POSITION_MAX);
+	}
+	if (ret) {
+		kfree(trial);
+		return ret;
+	}
+	stepper_latency_hold(stepper);
 	hrtimer_setup(&trial->timer, stepper_ability_fire, CLOCK_MONOTONIC,
 		      HRTIMER_MODE_ABS_PINNED_HARD);
 	for (round = 0; round < ROUNDS && late > QUIET_NS; round++) {
@@ -126,7 +172,9 @@ int stepper_ability_measure(struct stepper *stepper)
 		late = trial->late_ns[SHOTS * 99 / 100];
 		info->edge_ns = trial->edge_ns[SHOTS / 2];
 		pulse = (u64)info->edge_ns + trial->late_ns[SHOTS / 2];
+		tick = (u64)trial->tick_ns[SHOTS / 2] + 2ULL * trial->late_ns[0];
 	}
+	stepper_latency_release(stepper);
 	kfree(trial);
 
 	period = max(2 * pulse + late, 4 * stepper->n_motors * pulse);
@@ -136,5 +184,8 @@ int stepper_ability_measure(struct stepper *stepper)
 	info->lateness_ns = late;
 	/* What a config can say at all. */
 	info->pulse_ns = clamp(pulse, 500ULL, 1000000ULL);
+	info->tick_min_ns =
+		clamp(4 * stepper->n_motors * tick, (u64)INCISE_PROFILE_TICK_MIN_NS,
+		      (u64)INCISE_PROFILE_TICK_MAX_NS);
 	return 0;
 }

@@ -70,6 +70,12 @@ static void stepper_defaults_fit(struct stepper_motor *motor,
 	const struct incise_stepper_controller *info = &motor->stepper->info;
 	u32 velocity;
 
+	if (c->tick_ns < info->tick_min_ns) {
+		dev_warn(dev,
+			 "motor %u: a tick of %u ns is too short for this machine: %u\n",
+			 motor->index, c->tick_ns, info->tick_min_ns);
+		c->tick_ns = info->tick_min_ns;
+	}
 	c->high_ns = max(c->high_ns, info->pulse_ns);
 	c->low_ns = max(c->low_ns, info->pulse_ns);
 	velocity = min_t(u64, info->rate_max,

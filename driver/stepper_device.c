@@ -51,7 +51,7 @@ static void stepper_device_release(struct device *dev)
 {
 	struct stepper *stepper = to_stepper(dev);
 
-	/* Pages that are still mapped live on by the count of their mappings. */
+	/* No mapping is left: each holds a file. */
 	free_page((unsigned long)stepper->setpoints);
 	free_page((unsigned long)stepper->status);
 	ida_free(&stepper_ids, stepper->id);
@@ -95,6 +95,7 @@ struct stepper *stepper_device_new(struct device *parent, unsigned int n_motors)
 	mutex_init(&stepper->mutex);
 	stepper_event_init(stepper);
 	stepper_sync_init(stepper);
+	stepper_latency_init(stepper);
 	for (i = 0; i < n_motors; i++) {
 		stepper->motor[i].stepper = stepper;
 		stepper->motor[i].index = i;

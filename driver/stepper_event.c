@@ -17,6 +17,7 @@ static void stepper_event_wake(struct irq_work *work)
 	struct stepper *stepper = container_of(work, struct stepper, wake);
 
 	wake_up_interruptible_all(&stepper->wait);
+	stepper_latency_event(stepper);
 }
 
 void stepper_event_init(struct stepper *stepper)

@@ -8,6 +8,7 @@
  * for a mapping that waits for the mutex.
  */
 #include <linux/fs.h>
+#include <linux/io.h>
 #include <linux/mm.h>
 #include <linux/poll.h>
 #include <linux/slab.h>
@@ -94,6 +95,8 @@ static int stepper_file_enable(struct stepper *stepper, u32 mask)
 		if (ret)
 			return ret;
 	}
+	/* Given back by the events of motors that lose power, or never got it. */
+	stepper_latency_hold(stepper);
 	for (i = 0; i < stepper->n_motors; i++) {
 		if (!(mask & BIT(i)))
 			continue;
@@ -107,6 +110,7 @@ static int stepper_file_enable(struct stepper *stepper, u32 mask)
 back:
 	for_each_set_bit(i, &given, stepper->n_motors)
 		stepper_setup_disable(&stepper->motor[i]);
+	irq_work_queue(&stepper->wake);
 	return ret;
 }
 
@@ -279,9 +283,13 @@ static int stepper_file_mmap(struct file *file, struct vm_area_struct *vma)
 		return -EINVAL;
 	}
 	vm_flags_clear(vma, VM_MAYEXEC);
-	vm_flags_set(vma, VM_DONTEXPAND | VM_DONTDUMP);
-	/* Counts the page: it stays until it is unmapped, whatever becomes of the device. */
-	return vm_insert_page(vma, vma->vm_start, virt_to_page(page));
+	/*
+	 * By its frame, which nobody can pin to write on when another owner has come. The
+	 * mapping holds the file and the file holds the memory, whatever becomes of the
+	 * device.
+	 */
+	return remap_pfn_range(vma, vma->vm_start, virt_to_phys(page) >> PAGE_SHIFT,
+			       PAGE_SIZE, vma->vm_page_prot);
 }
 
 static bool stepper_file_has(struct stepper *stepper, const struct stepper_file *opened)

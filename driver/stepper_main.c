@@ -3,11 +3,17 @@
  * incise_stepper.ko: the platform driver, and every way in which a machine stops:
  *
  *   unbind    no new file, brake, power off, no interrupts, ENODEV to who is left
- *   suspend   brake, power off, fault SUSPEND; nothing moves after resume by itself
+ *   suspend   brake, power off, fault SUSPEND; nothing moves after resume by itself. SYNC
+ *             stops, as its chip may sleep already, and goes on in its beat
  *   reboot    the same, before anything else is taken down
  *   panic     power off, at once, without a lock that somebody may hold
+ *
+ * With a crash kernel loaded (kdump) panic() starts that one before it calls anybody: no
+ * step follows, but power stays on until the lines are reset. crash_kexec_post_notifiers on
+ * the kernel's command line lets power go first. Binding warns of it.
  */
 #include <linux/delay.h>
+#include <linux/kexec.h>
 #include <linux/mod_devicetable.h>
 #include <linux/module.h>
 #include <linux/panic_notifier.h>
@@ -22,16 +28,6 @@
 /* Longest wait for motors to brake; then they halt where they are. */
 #define BRAKE_MS 2000
 
-static bool stepper_main_powered(struct stepper *stepper)
-{
-	unsigned int i;
-
-	for (i = 0; i < stepper->n_motors; i++)
-		if (stepper_setup_powered(&stepper->motor[i]))
-			return true;
-	return false;
-}
-
 /* All motors without power and their timers done. Sleeps; stepper.mutex held. */
 static void stepper_main_rest(struct stepper *stepper, u32 fault)
 {
@@ -39,7 +35,8 @@ static void stepper_main_rest(struct stepper *stepper, u32 fault)
 
 	for (i = 0; i < stepper->n_motors; i++)
 		stepper_setup_fault(&stepper->motor[i], fault);
-	for (waited = 0; waited < BRAKE_MS && stepper_main_powered(stepper); waited += 2)
+	for (waited = 0; waited < BRAKE_MS && stepper_setup_any_powered(stepper);
+	     waited += 2)
 		usleep_range(2000, 3000);
 	for (i = 0; i < stepper->n_motors; i++) {
 		stepper_setup_halt(&stepper->motor[i]);
@@ -137,6 +134,10 @@ static int stepper_main_probe(struct platform_device *pdev)
 		goto ignore;
 	stepper_debugfs_add(stepper);
 	platform_set_drvdata(pdev, stepper);
+	if (kexec_crash_loaded())
+		dev_warn(
+			dev,
+			"a crash kernel is loaded: motors keep power in a panic without crash_kexec_post_notifiers\n");
 	dev_info(dev,
 		 "%s: %u motors, at most %u steps/s; timers late by %u ns, %u at most\n",
 		 dev_name(&stepper->dev), stepper->n_motors, stepper->info.rate_max,
@@ -149,6 +150,7 @@ ignore_lines:
 	stepper_lines_ignore(stepper);
 put:
 	irq_work_sync(&stepper->wake);
+	stepper_latency_end(stepper);
 	put_device(&stepper->dev);
 	return ret;
 }
@@ -170,6 +172,7 @@ static void stepper_main_remove(struct platform_device *pdev)
 	stepper_lines_ignore(stepper);
 	wake_up_all(&stepper->wait);
 	irq_work_sync(&stepper->wake);
+	stepper_latency_end(stepper);
 	put_device(&stepper->dev);
 }
 
@@ -188,12 +191,25 @@ static int stepper_main_suspend(struct device *dev)
 
 	mutex_lock(&stepper->mutex);
 	stepper_main_rest(stepper, INCISE_STEPPER_FAULT_SUSPEND);
+	stepper_sync_off(stepper);
 	mutex_unlock(&stepper->mutex);
 	return 0;
 }
 
-/* SYNC goes on in its beat, whose clock stood still. Motors stay off. */
-static DEFINE_SIMPLE_DEV_PM_OPS(stepper_main_pm, stepper_main_suspend, NULL);
+/* Motors stay off. */
+static int stepper_main_resume(struct device *dev)
+{
+	struct stepper *stepper = dev_get_drvdata(dev);
+
+	mutex_lock(&stepper->mutex);
+	if (!stepper->closing)
+		stepper_sync_resume(stepper);
+	mutex_unlock(&stepper->mutex);
+	return 0;
+}
+
+static DEFINE_SIMPLE_DEV_PM_OPS(stepper_main_pm, stepper_main_suspend,
+				stepper_main_resume);
 
 static const struct of_device_id stepper_main_of[] = {
 	{.compatible = "incise,stepper-gpio"}, {}};
@@ -250,4 +266,5 @@ static void __exit stepper_main_exit(void)
 module_exit(stepper_main_exit);
 
 MODULE_DESCRIPTION("Step and direction pulses from a hard timer, for incise");
+MODULE_AUTHOR("The incise authors");
 MODULE_LICENSE("GPL");

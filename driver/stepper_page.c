@@ -133,7 +133,8 @@ int stepper_page_config(const struct incise_stepper_config *config,
 	    config->safe_position > config->position_max)
 		return -EINVAL;
 	if (config->velocity > info->rate_max ||
-	    config->velocity > INCISE_PROFILE_VELOCITY_MAX)
+	    config->velocity > INCISE_PROFILE_VELOCITY_MAX ||
+	    config->tick_ns < info->tick_min_ns)
 		return -ERANGE;
 	if (config->high_ns < info->pulse_ns || config->low_ns < info->pulse_ns ||
 	    (__u64)config->high_ns + config->low_ns >

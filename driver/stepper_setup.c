@@ -252,14 +252,17 @@ void stepper_setup_fault(struct stepper_motor *motor, u32 fault)
 	raw_spin_unlock_irqrestore(&motor->lock, flags);
 }
 
-bool stepper_setup_powered(struct stepper_motor *motor)
+bool stepper_setup_any_powered(struct stepper *stepper)
 {
+	bool powered = false;
 	unsigned long flags;
-	bool powered;
+	unsigned int i;
 
-	raw_spin_lock_irqsave(&motor->lock, flags);
-	powered = motor->powered;
-	raw_spin_unlock_irqrestore(&motor->lock, flags);
+	for (i = 0; i < stepper->n_motors && !powered; i++) {
+		raw_spin_lock_irqsave(&stepper->motor[i].lock, flags);
+		powered = stepper->motor[i].powered;
+		raw_spin_unlock_irqrestore(&stepper->motor[i].lock, flags);
+	}
 	return powered;
 }
 

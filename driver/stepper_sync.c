@@ -100,8 +100,22 @@ void stepper_sync_off(struct stepper *stepper)
 	raw_spin_unlock_irqrestore(&line->lock, flags);
 	hrtimer_cancel(&line->timer);
 	if (line->high)
-		compat_gpiod_set_value(line->line, 0);
-	line->high = false;
+		stepper_sync_trail(stepper, ktime_get_ns());
+}
+
+/* Goes on in its beat after stepper_sync_off(); pulses of meanwhile are missed. */
+void stepper_sync_resume(struct stepper *stepper)
+{
+	struct stepper_sync_line *line = &stepper->sync;
+	unsigned long flags;
+
+	raw_spin_lock_irqsave(&line->lock, flags);
+	if (line->sync.period_ns && !line->running) {
+		line->running = true;
+		hrtimer_start(&line->timer, ns_to_ktime(line->due_ns),
+			      HRTIMER_MODE_ABS_PINNED_HARD);
+	}
+	raw_spin_unlock_irqrestore(&line->lock, flags);
 }
 
 /**

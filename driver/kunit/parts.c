@@ -109,4 +109,5 @@ static struct kunit_suite parts_suite = {
 kunit_test_suite(parts_suite);
 
 MODULE_DESCRIPTION("KUnit tests of incise_stepper");
+MODULE_AUTHOR("The incise authors");
 MODULE_LICENSE("GPL");

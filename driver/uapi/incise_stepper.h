@@ -73,7 +73,8 @@ struct incise_stepper_setpoint {
  * @state: INCISE_STEPPER_STATE_…
  * @faults: INCISE_STEPPER_FAULT_… bits, latched
  * @inputs: INCISE_STEPPER_LINE_… bits that are active now; while disabled, and on a chip
- *          without interrupts: at the last ENABLE or CLEAR
+ *          without interrupts: at the last ENABLE or CLEAR. One that cannot be read counts as
+ *          active, but home, which stays what it was
  * @t_ns: when this was written; a tick at most before now while enabled
  * @position: steps given out, up less down, from the origin SET_POSITION gave
  * @velocity: of the profile, 2^-16 steps/s
@@ -134,7 +135,7 @@ struct incise_stepper_event {
 
 /* incise_stepper_controller.capabilities */
 #define INCISE_STEPPER_CAP_SYNC (1ULL << 0)  /* has a SYNC line */
-#define INCISE_STEPPER_CAP_FIXED (1ULL << 1) /* the integer force model is built in */
+#define INCISE_STEPPER_CAP_FIXED (1ULL << 1) /* evaluates force models; none does yet */
 
 /**
  * struct incise_stepper_controller - what the controller is, 256 bytes
@@ -181,7 +182,7 @@ struct incise_stepper_controller {
  * struct incise_stepper_config - a motor's limits and times, 128 bytes
  * @motor: 0 …; of GET_CONFIG too
  * @flags: INCISE_STEPPER_CONFIG_… bits
- * @tick_ns: how often the set-point is read, 50000 … 2000000
+ * @tick_ns: how often the set-point is read, 50000 … 2000000; ERANGE below info.tick_min_ns
  * @velocity: largest, steps/s, 1 …; ERANGE beyond info.rate_max
  * @acceleration: largest, steps/s², 1 …
  * @jerk: largest, steps/s³; 0: not limited
@@ -199,7 +200,7 @@ struct incise_stepper_controller {
  *
  * SET_CONFIG gives EBUSY while the motor is enabled, EINVAL for a value out of its range
  * and ERANGE for what this machine or a step cannot hold: velocity beyond info.rate_max,
- * high_ns or low_ns below info.pulse_ns, high_ns + low_ns longer than a step at velocity,
+ * tick_ns below info.tick_min_ns, high_ns or low_ns below info.pulse_ns, high_ns + low_ns longer than a step at velocity,
  * and a jerk so low that the profile would take more than 256 ticks for it.
  */
 struct incise_stepper_config {
@@ -248,7 +249,8 @@ struct incise_stepper_origin {
  * @reserved: zero
  *
  * It has no deadman, as nothing moves by it: it goes on when its owner closes the file, until
- * period_ns is set to 0, the machine reboots or the device is unbound.
+ * period_ns is set to 0, the machine reboots or the device is unbound. While the machine
+ * sleeps there are no pulses; it goes on in its beat then, and those of meanwhile are missed.
  */
 struct incise_stepper_sync {
 	__u64 period_ns;
@@ -262,7 +264,7 @@ struct incise_stepper_sync {
 };
 
 /* Watchers may call the ones that only read; the others need the owner (EPERM). */
-#define INCISE_STEPPER_IOC 0xB6
+#define INCISE_STEPPER_IOC 0xE8
 #define INCISE_STEPPER_GET_INFO \
 	_IOR(INCISE_STEPPER_IOC, 0, struct incise_stepper_controller)
 #define INCISE_STEPPER_GET_CONFIG \
@@ -270,8 +272,8 @@ struct incise_stepper_sync {
 #define INCISE_STEPPER_SET_CONFIG \
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
 /*
- * A mask of motors, not 0. EPERM: a fault is latched; EBUSY: an input forbids it, e-stop
- * say, or it is still coming to rest; ERANGE: it stands outside of its position limits;
+ * A mask of motors, not 0: all get power or none does, and those that had it keep it. EPERM:
+ * a fault is latched; EBUSY: an input forbids it, e-stop say, or it is still coming to rest; ERANGE: it stands outside of its position limits;
  * ESHUTDOWN: the machine goes down.
  */
 #define INCISE_STEPPER_ENABLE _IOW(INCISE_STEPPER_IOC, 3, __u32)

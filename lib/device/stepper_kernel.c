@@ -217,6 +217,13 @@ static int configure(struct kernel_stepper *k,
 	if (rc)
 		return rc;
 	incise_motor_config(&k->motor.actuator, k->index, &config);
+	if (config.tick_ns < info->tick_min_ns)
+		return incise_error_set(
+			err, ERANGE,
+			"%s: tick_us is %g, but this machine holds no less than %g with %u "
+			"motors (by its self-test); correct it in rig.conf",
+			asked->where, config.tick_ns / 1e3, info->tick_min_ns / 1e3,
+			info->n_motors);
 	rc = request(k, INCISE_STEPPER_SET_CONFIG, &config);
 	/* A motor that the last owner left in motion is still coming to rest. */
 	for (int i = 0; rc == -EBUSY && i < REST_POLLS; i++) {

@@ -40,7 +40,7 @@ struct incise_stepper_config draw_config(const struct bench *bench, unsigned int
 	struct incise_stepper_config config = {
 		.motor = motor,
 		.flags = draw_between(0, 1) ? INCISE_STEPPER_CONFIG_INVERT : 0,
-		.tick_ns = draw_scattered(50000, 1000000),
+		.tick_ns = draw_scattered(bench->info.tick_min_ns, 1000000),
 		.late_max = 1000,
 		.deadman_ns = 10000000000,
 		.high_ns = pulse_ns + draw_between(0, 5000),

@@ -314,6 +314,8 @@ static void put_motor(const struct controller *controller, uint32_t i)
 	       velocity_steps_s(motor),
 	       s->flags & INCISE_STEPPER_FLAG_HOMED ? "homed" : "not homed");
 	put_bits("lines", controller->info.lines[i], lines, LINES);
+	if (controller->info.polled[i])
+		put_bits("polled", controller->info.polled[i], lines, LINES);
 	put_bits("active", s->inputs, lines, LINES);
 	put_bits("faults", s->faults, faults, FAULTS);
 	put_config(&motor->config);
@@ -347,14 +349,12 @@ static void put_text(const struct controller *controller)
 	printf("%s: %.*s, %u motor%s\n", controller->path, (int)sizeof(info->name),
 	       info->name, info->n_motors, info->n_motors == 1 ? "" : "s");
 	printf("self-test  99 %% of timers at most %.3f us late, the latest %.3f us; an edge "
-	       "takes %.3f us\n           so at most %.1f kHz, pulses of at least %.3f us; timers "
-	       "of %u ns\n",
+	       "takes %.3f us\n           so at most %.1f kHz, pulses of at least %.3f us, ticks of "
+	       "at least %g us; timers of %u ns\n",
 	       info->lateness_ns * US, info->lateness_max_ns * US, info->edge_ns * US,
-	       info->rate_max * KHZ, info->pulse_ns * US, info->resolution_ns);
+	       info->rate_max * KHZ, info->pulse_ns * US, info->tick_min_ns * US,
+	       info->resolution_ns);
 	put_sync(controller);
-	printf("force      %s\n", info->capabilities & INCISE_STEPPER_CAP_FIXED
-					  ? "the integer model is built in"
-					  : "no integer model");
 	for (uint32_t i = 0; i < info->n_motors; i++)
 		put_motor(controller, i);
 	if (!controller->has_debugfs)
@@ -403,12 +403,13 @@ static json_t *motor_json(const struct controller *controller, uint32_t i)
 	const struct motor *motor = &controller->motor[i];
 	const struct incise_stepper_motor_status *s = &motor->status;
 
-	return json_pack("{ss sI sI sf sb so so so so sI sI sI sI so so so}", "state",
+	return json_pack("{ss sI sI sf sb so so so so so sI sI sI sI so so so}", "state",
 			 state_name(s->state), "position_steps", (json_int_t)s->position,
 			 "target_steps", (json_int_t)s->target, "velocity_steps_s",
 			 velocity_steps_s(motor), "homed",
 			 (int)!!(s->flags & INCISE_STEPPER_FLAG_HOMED), "lines",
-			 json_bits(controller->info.lines[i], lines, LINES), "inputs",
+			 json_bits(controller->info.lines[i], lines, LINES), "polled",
+			 json_bits(controller->info.polled[i], lines, LINES), "inputs",
 			 json_bits(s->inputs, lines, LINES), "faults",
 			 json_bits(s->faults, faults, FAULTS), "config",
 			 config_json(&motor->config), "steps_up", (json_int_t)s->steps_up,
@@ -443,10 +444,11 @@ static json_t *module_json(const struct controller *controller)
 	memcpy(name, info->name, sizeof(info->name));
 	for (uint32_t i = 0; i < info->n_motors; i++)
 		json_array_append_new(motors, motor_json(controller, i));
-	return json_pack("{so so s{sI sI sI sI sI sI} so sb so so}", "device",
+	return json_pack("{so so s{sI sI sI sI sI sI sI} so sb so so}", "device",
 			 json_text(controller->path), "name", json_text(name),
 			 "self_test", "rate_max_steps_s", (json_int_t)info->rate_max,
-			 "pulse_min_ns", (json_int_t)info->pulse_ns, "edge_ns",
+			 "pulse_min_ns", (json_int_t)info->pulse_ns, "tick_min_ns",
+			 (json_int_t)info->tick_min_ns, "edge_ns",
 			 (json_int_t)info->edge_ns, "lateness_p99_ns",
 			 (json_int_t)info->lateness_ns, "lateness_max_ns",
 			 (json_int_t)info->lateness_max_ns, "resolution_ns",

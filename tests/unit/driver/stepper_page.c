@@ -191,6 +191,7 @@ static const struct incise_stepper_controller machine = {
 	.n_motors = 2,
 	.rate_max = 100000,
 	.pulse_ns = 600,
+	.tick_min_ns = 60000,
 };
 
 static const struct incise_stepper_config good = {
@@ -220,7 +221,9 @@ static void test_config(void **state)
 		{FIELD(motor), 2, -EINVAL},
 		{FIELD(flags), 3, 0},
 		{FIELD(flags), 4, -EINVAL},
-		{FIELD(tick_ns), 50000, 0},
+		{FIELD(tick_ns), 60000, 0}, /* what the self-test found */
+		{FIELD(tick_ns), 59999, -ERANGE},
+		{FIELD(tick_ns), 50000, -ERANGE},
 		{FIELD(tick_ns), 49999, -EINVAL},
 		{FIELD(tick_ns), 2000000, 0},
 		{FIELD(tick_ns), 2000001, -EINVAL},
