@@ -172,7 +172,7 @@ check-unit-plain:
 # Threads that share memory without a lock, under ThreadSanitizer; what is not of the page
 # comes from the library as it is.
 tsan_programs := $(O)/tests/tsan/loop/state_reader
-$(tsan_programs): tests/unit/loop/state_reader.c $(wildcard lib/loop/state_*.c) $(O)/lib/libincise.so
+$(tsan_programs): tests/unit/loop/state_reader.c $(wildcard lib/loop/state_*.c) lib/device/thread.c $(O)/lib/libincise.so
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) -Wno-missing-prototypes \

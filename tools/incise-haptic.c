@@ -159,11 +159,6 @@ static void open_state(struct job *job, bool real)
 	if (!haptic->state)
 		fail(job, &err);
 	haptic->loop.state = haptic->state;
-	if (!incise_state_in_memory(haptic->state))
-		cli_warn(
-			"%s is on a disk, which may hold up the loop: /run or /dev/shm are "
-			"better places",
-			path);
 	free(path);
 	incise_state_scene(haptic->state, haptic->argument.path, haptic->plan);
 }

@@ -9,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "state_file.h"
@@ -127,20 +126,9 @@ static int fill(struct incise_state_file *file, size_t size)
 	/* Anybody may read it, whatever the umask. */
 	if (fchmod(file->fd, 0644) || fcntl(file->fd, F_OFD_SETLK, &lock))
 		return -errno;
-	/* A full disk would otherwise end the loop by SIGBUS. */
+	/* A full disk is an error now rather than a page that is not written later. */
 	rc = posix_fallocate(file->fd, 0, (off_t)size);
-	if (rc)
-		return -rc;
-	file->page = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE,
-			  file->fd, 0);
-	if (file->page == MAP_FAILED) {
-		file->page = NULL;
-		return -errno;
-	}
-	file->size = size;
-	/* Written once here, pages cost the loop no fault. */
-	memset(file->page, 0, size);
-	return 0;
+	return -rc;
 }
 
 int incise_state_file_new(struct incise_state_file *file, const char *path, size_t size,
@@ -242,12 +230,36 @@ failed:
 				file->path, strerror(-rc));
 }
 
+int incise_state_file_write(const struct incise_state_file *file, size_t offset,
+			    const void *from, size_t size)
+{
+	const char *bytes = from;
+
+	while (size) {
+		ssize_t n = pwrite(file->fd, bytes, size, (off_t)offset);
+
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n <= 0)
+			return n ? -errno : -EIO;
+		bytes += n;
+		offset += (size_t)n;
+		size -= (size_t)n;
+	}
+	return 0;
+}
+
+bool incise_state_file_short(int fd, size_t size)
+{
+	struct stat st;
+
+	return !fstat(fd, &st) && st.st_size < (off_t)size;
+}
+
 void incise_state_file_close(struct incise_state_file *file)
 {
 	if (file->hidden)
 		unlink(file->hidden);
-	if (file->page)
-		munmap(file->page, file->size);
 	if (file->fd >= 0)
 		close(file->fd);
 	free(file->hidden);

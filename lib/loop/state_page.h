@@ -17,6 +17,9 @@
  *     │ slots        │ number + 1, tick
  *     └──────────────┘
  *
+ * It is there twice: in memory of the writer's own, where the loop writes it, and in the file,
+ * to which a thread of the writer copies it.
+ *
  * The head has the place and size of each part. Parts only grow within a major version;
  * readers use the beginning that they know.
  *
@@ -137,6 +140,12 @@ int incise_state_unpack(struct incise_tick *to, const struct state_tick *from);
 void incise_state_tick(struct incise_state_writer *writer, const struct incise_tick *tick,
 		       int64_t lateness_ns, int64_t cost_ns,
 		       uint64_t skipped) INCISE_REALTIME;
+
+/*
+ * Copy to the file, now, what the loop has published; the writer's own thread does so every few
+ * milliseconds. For the normal thread.
+ */
+void incise_state_mirror(struct incise_state_writer *writer);
 
 /* The bucket of a time; times below 0 are in the first. */
 int incise_state_bucket(int64_t ns) INCISE_REALTIME;

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 #include <incise/state.h>
 #include "state_file.h"
@@ -20,6 +21,7 @@
 
 /* A write takes some 30 ns: after so many tries the writer must have stopped in the middle. */
 #define TRIES 100
+#define OPENS 50	/* 1 ms apart: a page that was cut off is whole again after 5 */
 #define CHUNK 64	/* slots at a time */
 #define ENTRY_MAX 65536 /* bytes of any part or slot: far more than needed */
 #define COUNT_MAX (1 << 24)
@@ -39,7 +41,21 @@ const char *incise_run_name(enum incise_run run)
 	return (unsigned int)run < INCISE_RUNS ? names[run] : "unknown";
 }
 
-/* All of it, or -EIO: the file was cut off. */
+/* -EIO: the file was cut off; -EAGAIN: its writer lives, and writes it anew. */
+static int cut_off(const struct incise_state *state)
+{
+	return incise_state_file_held(state->fd) == 1 ? -EAGAIN : -EIO;
+}
+
+/* The copies before this are of a whole file, or its writer has ended. Returns 0 or -EAGAIN. */
+static int check_whole(const struct incise_state *state)
+{
+	if (!incise_state_file_short(state->fd, state->head.size))
+		return 0;
+	return cut_off(state) == -EAGAIN ? -EAGAIN : 0;
+}
+
+/* Returns 0, or as cut_off(). */
 static int copy(const struct incise_state *state, void *to, size_t size, uint64_t offset)
 {
 	ssize_t n;
@@ -47,7 +63,7 @@ static int copy(const struct incise_state *state, void *to, size_t size, uint64_
 	do
 		n = pread(state->fd, to, size, (off_t)offset);
 	while (n < 0 && errno == EINTR);
-	return n == (ssize_t)size ? 0 : -EIO;
+	return n == (ssize_t)size ? 0 : cut_off(state);
 }
 
 static bool sound_part(const struct state_part *part, uint64_t size, uint64_t count,
@@ -109,7 +125,9 @@ static int read_head(struct incise_state *state, const char *path,
 
 struct incise_state *incise_state_open(const char *path, struct incise_error *err)
 {
+	const struct timespec pause = {.tv_nsec = 1000000};
 	struct incise_state *state = calloc(1, sizeof(*state));
+	int rc;
 
 	if (!state)
 		goto no_memory;
@@ -120,7 +138,12 @@ struct incise_state *incise_state_open(const char *path, struct incise_error *er
 		free(state);
 		return NULL;
 	}
-	if (read_head(state, path, err))
+	rc = read_head(state, path, err);
+	for (int i = 0; i < OPENS && rc && incise_state_file_held(state->fd) == 1; i++) {
+		nanosleep(&pause, NULL);
+		rc = read_head(state, path, err);
+	}
+	if (rc)
 		goto failed;
 	state->slots = malloc(CHUNK * state->head.ring.size);
 	if (state->slots)
@@ -160,14 +183,16 @@ static int try_part(const struct incise_state *state, uint64_t offset, void *to,
 {
 	uint64_t before, after;
 
-	if (copy(state, &before, sizeof(before), offset))
-		return -EIO;
+	int rc = copy(state, &before, sizeof(before), offset);
+
 	__atomic_thread_fence(__ATOMIC_ACQUIRE);
-	if (copy(state, to, size, offset))
-		return -EIO;
+	if (!rc)
+		rc = copy(state, to, size, offset);
 	__atomic_thread_fence(__ATOMIC_ACQUIRE);
-	if (copy(state, &after, sizeof(after), offset))
-		return -EIO;
+	if (!rc)
+		rc = copy(state, &after, sizeof(after), offset);
+	if (rc)
+		return rc;
 	return before == after && !(before & 1) ? 0 : -EAGAIN;
 }
 
@@ -281,10 +306,12 @@ int incise_state_read(struct incise_state *state, struct incise_state_now *now)
 	if (!rc)
 		rc = copy(state, &now->lateness, sizeof(now->lateness),
 			  head->lateness.offset);
-	return rc ? rc : copy(state, &now->cost, sizeof(now->cost), head->cost.offset);
+	if (!rc)
+		rc = copy(state, &now->cost, sizeof(now->cost), head->cost.offset);
+	return rc ? rc : check_whole(state);
 }
 
-/* Ticks first … first + n, in adjacent slots; returns the number of valid ones, or -EIO. */
+/* Ticks first … first + n, in adjacent slots; returns the number of valid ones, or as copy(). */
 static int take_slots(struct incise_state *state, uint64_t first, uint64_t n,
 		      struct incise_tick *ticks)
 {
@@ -292,13 +319,16 @@ static int take_slots(struct incise_state *state, uint64_t first, uint64_t n,
 	const uint64_t slots = ring->offset + sizeof(uint64_t);
 	uint64_t written;
 	int good = 0;
+	int rc = copy(state, state->slots, n * ring->size,
+		      slots + first % ring->count * ring->size);
 
-	if (copy(state, state->slots, n * ring->size,
-		 slots + first % ring->count * ring->size))
-		return -EIO;
 	__atomic_thread_fence(__ATOMIC_ACQUIRE);
-	if (copy(state, &written, sizeof(written), ring->offset))
-		return -EIO;
+	if (!rc)
+		rc = copy(state, &written, sizeof(written), ring->offset);
+	if (!rc)
+		rc = check_whole(state);
+	if (rc)
+		return rc;
 	for (uint64_t i = 0; i < n; i++) {
 		struct state_slot slot;
 
@@ -322,9 +352,12 @@ int incise_state_ticks(struct incise_state *state, uint64_t *cursor,
 	const struct state_part *ring = &state->head.ring;
 	uint64_t written, first = *cursor, gone = 0;
 	int got = 0, good;
+	int rc = copy(state, &written, sizeof(written), ring->offset);
 
-	if (copy(state, &written, sizeof(written), ring->offset))
-		return -EIO;
+	if (!rc)
+		rc = check_whole(state);
+	if (rc)
+		return rc;
 	__atomic_thread_fence(__ATOMIC_ACQUIRE);
 	if (first > written)
 		first = written;

@@ -1,19 +1,26 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The writer of a state page; see incise/state.h. It keeps a copy of each part, so that foreign
- * writes into the file do not mislead the loop.
+ * The writer of a state page; see incise/state.h.
+ *
+ *     loop ─── tick ───▶ page in own memory ─── mirror: a thread, each 5 ms ───▶ file
+ *     normal thread ─ run ─▶ ┘                  (and the normal thread at each change)
+ *
+ * The loop writes memory that nobody else can reach: it depends neither on the disk that the file
+ * is on, nor on others who change the file or cut it off.
  */
 #include <errno.h>
-#include <linux/magic.h>
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/vfs.h>
+#include <time.h>
 #include <unistd.h>
 #include <incise/clock.h>
 #include <incise/state.h>
 #include "../base/monotonic.h"
 #include "../base/vector.h"
+#include "../device/thread.h"
 #include "state_file.h"
 #include "state_page.h"
 
@@ -103,12 +110,23 @@ static void add_work(struct work *work, const struct incise_tick *tick)
 	work->known = known;
 }
 
-struct incise_state_writer {
+/* The file, which the mirror alone writes. */
+struct mirror {
 	struct incise_state_file file;
+	pthread_mutex_t lock; /* of all this; the loop never takes it */
+	pthread_t thread;
+	bool has_thread;
+	atomic_bool stop;
+	uint64_t run_seq, live_seq; /* of the parts that the file has */
+	uint64_t ticks;		    /* in its ring, and before */
+};
+
+struct incise_state_writer {
 	struct state_page *page;
 	struct state_run run; /* the normal thread's */
 	bool has_scene;
 	int64_t running_ns; /* when it started to run */
+	struct mirror mirror;
 	/* The loop's, on cache lines of its own. */
 	_Alignas(64) struct state_live live;
 	struct work work;
@@ -179,9 +197,205 @@ static void put_head(struct state_head *head, const struct incise_state_setup *s
 	memcpy(head->magic, STATE_MAGIC, sizeof(head->magic));
 }
 
+/* --- the mirror --------------------------------------------------------------------- */
+
+#define MIRROR_NS 5000000
+/* The loop writes a part in some 30 ns, once a tick: more tries are of no use. */
+#define TRIES 100
+
+static void mirror_put(struct mirror *m, size_t offset, const void *from, size_t size)
+{
+	/* A full disk, say: what is missing is written once there is room. */
+	incise_state_file_write(&m->file, offset, from, size);
+}
+
+static void state_take(void *to, const void *from, size_t size)
+{
+	const uint64_t *words = from;
+
+	for (size_t i = 0; i < size / sizeof(*words); i++) {
+		uint64_t word = __atomic_load_n(words + i, __ATOMIC_RELAXED);
+
+		memcpy((char *)to + i * sizeof(word), &word, sizeof(word));
+	}
+}
+
+/* A whole copy of a part, whose first word is seq. False: the loop is in the middle of it. */
+static bool take_part(void *to, const void *part, size_t size)
+{
+	const uint64_t *seq = part;
+
+	for (int i = 0; i < TRIES; i++) {
+		uint64_t before = __atomic_load_n(seq, __ATOMIC_ACQUIRE);
+
+		state_take(to, part, size);
+		__atomic_thread_fence(__ATOMIC_ACQUIRE);
+		if (!(before & 1) && __atomic_load_n(seq, __ATOMIC_RELAXED) == before) {
+			memcpy(to, &before, sizeof(before));
+			return true;
+		}
+	}
+	return false;
+}
+
+/* Copy a part that is newer than @last. Returns whether it was. */
+static bool mirror_part(struct mirror *m, size_t offset, void *copy, const void *part,
+			size_t size, uint64_t *last)
+{
+	uint64_t seq, odd;
+
+	if (!take_part(copy, part, size))
+		return false;
+	memcpy(&seq, copy, sizeof(seq));
+	if (seq == *last)
+		return false;
+	odd = seq - 1;
+	mirror_put(m, offset, &odd, sizeof(odd));
+	mirror_put(m, offset + sizeof(odd), (char *)copy + sizeof(odd),
+		   size - sizeof(odd));
+	mirror_put(m, offset, &seq, sizeof(seq));
+	*last = seq;
+	return true;
+}
+
+static void mirror_times(struct mirror *m, size_t offset, const uint64_t *counts)
+{
+	uint64_t copy[INCISE_STATE_BUCKETS];
+
+	state_take(copy, counts, sizeof(copy));
+	mirror_put(m, offset, copy, sizeof(copy));
+}
+
+/* A slot with the tick of that number, or with none: it has been overwritten. */
+static bool take_slot(const struct state_page *page, uint64_t tick,
+		      struct state_slot *copy)
+{
+	const struct state_slot *slot = &page->slot[tick % INCISE_STATE_TICKS];
+
+	state_take(copy, slot, sizeof(*copy));
+	__atomic_thread_fence(__ATOMIC_ACQUIRE);
+	if (copy->number == tick + 1 &&
+	    __atomic_load_n(&page->written, __ATOMIC_RELAXED) - tick < INCISE_STATE_TICKS)
+		return true;
+	*copy = (struct state_slot){0};
+	return false;
+}
+
+/*
+ * The ticks since the last time, one by one: as the loop does it, the number of ticks is raised
+ * before a slot is used again.
+ */
+static void mirror_ticks(struct incise_state_writer *w)
+{
+	struct mirror *m = &w->mirror;
+	uint64_t written = __atomic_load_n(&w->page->written, __ATOMIC_ACQUIRE), next;
+	const size_t offset = offsetof(struct state_page, written);
+
+	if (written - m->ticks > INCISE_STATE_TICKS)
+		m->ticks = written - INCISE_STATE_TICKS;
+	for (; m->ticks < written; m->ticks = next) {
+		struct state_slot slot;
+
+		next = m->ticks + 1;
+		if (take_slot(w->page, m->ticks, &slot))
+			mirror_put(m,
+				   offsetof(struct state_page,
+					    slot[m->ticks % INCISE_STATE_TICKS]),
+				   &slot, sizeof(slot));
+		mirror_put(m, offset, &next, sizeof(next));
+	}
+}
+
+/*
+ * The page ends with bytes of no use. They are written last: no other write of the mirror makes a
+ * file that was cut off as long as a whole one.
+ */
+_Static_assert(sizeof(struct state_page) > offsetof(struct state_page, slot) +
+						   sizeof(((struct state_page *)0)->slot),
+	       "bytes behind the slots");
+
+/* The ring from its beginning to its end, in which readers miss what is not yet there. */
+static void mirror_ring(struct incise_state_writer *w)
+{
+	struct mirror *m = &w->mirror;
+	uint64_t written = __atomic_load_n(&w->page->written, __ATOMIC_ACQUIRE);
+
+	mirror_put(m, offsetof(struct state_page, written), &written, sizeof(written));
+	for (uint64_t i = 0; i < INCISE_STATE_TICKS; i++) {
+		/* The last tick before @written in that slot. */
+		uint64_t back = (written - i - 1) % INCISE_STATE_TICKS + 1;
+		struct state_slot slot = {0};
+
+		if (back <= written)
+			take_slot(w->page, written - back, &slot);
+		mirror_put(m, offsetof(struct state_page, slot[i]), &slot, sizeof(slot));
+	}
+	mirror_put(m, sizeof(*w->page) - 1, "", 1);
+	m->ticks = written;
+}
+
+void incise_state_mirror(struct incise_state_writer *w)
+{
+	struct mirror *m = &w->mirror;
+	struct state_run run;
+	struct state_live live;
+	bool all;
+
+	pthread_mutex_lock(&m->lock);
+	/* In the order of the file, so that its size says how much of it is whole. */
+	all = incise_state_file_short(m->file.fd, sizeof(*w->page));
+	if (all) {
+		m->run_seq = m->live_seq = 0;
+		mirror_put(m, 0, &w->page->head, sizeof(w->page->head));
+	}
+	mirror_part(m, offsetof(struct state_page, run), &run, &w->page->run, sizeof(run),
+		    &m->run_seq);
+	if (mirror_part(m, offsetof(struct state_page, live), &live, &w->page->live,
+			sizeof(live), &m->live_seq) ||
+	    all) {
+		mirror_times(m, offsetof(struct state_page, lateness), w->page->lateness);
+		mirror_times(m, offsetof(struct state_page, cost), w->page->cost);
+	}
+	if (all)
+		mirror_ring(w);
+	mirror_ticks(w);
+	pthread_mutex_unlock(&m->lock);
+}
+
+static void *run_mirror(void *argument)
+{
+	const struct timespec period = {.tv_nsec = MIRROR_NS};
+	struct incise_state_writer *w = argument;
+
+	while (!atomic_load(&w->mirror.stop)) {
+		incise_state_mirror(w);
+		nanosleep(&period, NULL);
+	}
+	return NULL;
+}
+
+/* --- the page ------------------------------------------------------------------------- */
+
 static void publish_run(struct incise_state_writer *w)
 {
 	state_publish(&w->page->run, &w->run, sizeof(w->run));
+	incise_state_mirror(w);
+}
+
+static void free_writer(struct incise_state_writer *w)
+{
+	struct mirror *m;
+
+	if (!w)
+		return;
+	m = &w->mirror;
+	atomic_store(&m->stop, true);
+	if (m->has_thread)
+		pthread_join(m->thread, NULL);
+	incise_state_file_close(&m->file);
+	pthread_mutex_destroy(&m->lock);
+	free(w->page);
+	free(w);
 }
 
 struct incise_state_writer *incise_state_new(const char *path,
@@ -189,6 +403,8 @@ struct incise_state_writer *incise_state_new(const char *path,
 					     struct incise_error *err)
 {
 	struct incise_state_writer *w;
+	struct mirror *m;
+	int rc;
 
 	if (!(setup->rate_hz > 0) || !isfinite(setup->rate_hz)) {
 		incise_error_set(err, EINVAL,
@@ -197,32 +413,37 @@ struct incise_state_writer *incise_state_new(const char *path,
 		return NULL;
 	}
 	w = aligned_alloc(64, sizeof(*w));
-	if (!w) {
-		incise_error_set(err, ENOMEM, "%s: no memory for the loop's state", path);
-		return NULL;
-	}
+	if (!w)
+		goto no_memory;
 	memset(w, 0, sizeof(*w));
-	if (incise_state_file_new(&w->file, path, sizeof(*w->page), err))
+	m = &w->mirror;
+	m->file.fd = -1;
+	pthread_mutex_init(&m->lock, NULL);
+	w->page = aligned_alloc(64, sizeof(*w->page));
+	if (!w->page)
+		goto no_memory;
+	/* Written once here, pages cost the loop no fault. */
+	memset(w->page, 0, sizeof(*w->page));
+	if (incise_state_file_new(&m->file, path, sizeof(*w->page), err))
 		goto failed;
-	w->page = w->file.page;
 	put_head(&w->page->head, setup);
+	mirror_put(m, 0, &w->page->head, sizeof(w->page->head));
 	incise_state_run(w, INCISE_RUN_STARTING, NULL);
-	if (incise_state_file_publish(&w->file, err))
-		goto failed_file;
-	return w;
-failed_file:
-	incise_state_file_close(&w->file);
+	if (incise_state_file_publish(&m->file, err))
+		goto failed;
+	rc = incise_thread_start(&m->thread, run_mirror, w, NULL);
+	m->has_thread = !rc;
+	if (!rc)
+		return w;
+	incise_error_set(err, -rc, "%s: no thread to write it: %s", path, strerror(-rc));
+	goto failed;
+no_memory:
+	incise_error_set(err, ENOMEM, "%s: no memory for the loop's state", path);
 failed:
-	free(w);
+	rc = errno;
+	free_writer(w);
+	errno = rc;
 	return NULL;
-}
-
-bool incise_state_in_memory(const struct incise_state_writer *w)
-{
-	struct statfs fs;
-
-	return w && !fstatfs(w->file.fd, &fs) &&
-	       (fs.f_type == TMPFS_MAGIC || fs.f_type == RAMFS_MAGIC);
 }
 
 /*
@@ -356,6 +577,6 @@ void incise_state_free(struct incise_state_writer *w)
 {
 	if (!w)
 		return;
-	incise_state_file_close(&w->file);
-	free(w);
+	incise_state_mirror(w);
+	free_writer(w);
 }

@@ -115,6 +115,32 @@ until_ticks() {
 	[[ "${lines[0]}" == "wall: stopped since "* ]]
 }
 
+@test "a page that is cut off ends neither its loop nor who reads it" {
+	incise haptic "$root/scenes/wall.scene" --rig sim: --no-rt --duration 60s \
+		--state incise/wall.state >/dev/null 2>&1 3>&- &
+	played=$!
+	for ((i = 0; i < 100; i++)); do
+		[ ! -e incise/wall.state ] || break
+		sleep 0.1
+	done
+	until_ticks wall
+	incise status wall --follow --json >followed 2>&1 3>&- &
+	follower=$!
+	for size in 0 1 600 1000000; do
+		truncate -s $size incise/wall.state
+		run -0 --separate-stderr incise status wall
+		[ -z "$stderr" ]
+		[[ "${lines[0]}" == "wall: running since "*", process $played" ]]
+		[ "$(stat -c %s incise/wall.state)" -gt 1000000 ]
+	done
+	kill -TERM "$played"
+	wait "$played"
+	wait "$follower"
+	[ "$(tail -n 1 followed >report.json && key report.json state)" = stopped ]
+	run -0 incise status wall
+	[[ "${lines[0]}" == "wall: stopped since "* ]]
+}
+
 @test "a loop without ticks yet is well" {
 	play neck start
 	run -0 incise status neck

@@ -172,7 +172,8 @@ int state_pages_try(const struct state_page_file *page, struct incise_state_now 
 	if (rc == -EAGAIN)
 		return incise_error_set(
 			err, EAGAIN,
-			"%s: its loop stands still in the middle of telling its state",
+			"%s: is not whole: its loop stands still in the middle of "
+			"writing it, or its disk is full",
 			page->path);
 	if (rc)
 		return incise_error_set(

@@ -160,6 +160,9 @@ int view_live_take(struct view_live *live, struct incise_view *view,
 	while (n == BATCH) {
 		n = incise_state_ticks(live->state, &live->cursor, live->ticks, BATCH,
 				       &live->lost);
+		/* Cut off by others, and written anew just now. */
+		if (n == -EAGAIN)
+			break;
 		if (n < 0)
 			return incise_error_set(err, -n,
 						"the loop's page cannot be read: %s",

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The state of a loop in a page of shared memory: the loop writes it, anybody reads it, and
- * neither waits for the other.
+ * The state of a loop in a page that anybody reads, and for which the loop never waits.
  *
  *     loop's thread ── tick ──────────▶ live part, histograms, ring ──╮
- *     normal thread ── run, scene … ──▶ run part ─────────────────────┤ FILE
- *                                                                     ╰──▶ any reader
+ *     normal thread ── run, scene … ──▶ run part ─────────────────────┤ page
+ *                                       the writer's thread, each 5 ms ╰─▶ FILE ──▶ any reader
  *
- * The page is a file, best on a tmpfs: /run/incise/NAME.state. Its writer locks it for life, so
- * that readers detect a dead writer, and leaves it in place at the end. The next writer replaces
- * it. incise-state(5) documents the bytes.
+ * The loop writes memory that nobody else can reach, and a thread of the writer copies it to a
+ * file, /run/incise/NAME.state: others may change that file or cut it off, and the loop goes
+ * on. A file that was cut off is whole again 5 ms later. Its writer locks it for life, so that
+ * readers detect a dead writer, and leaves it in place at the end. The next writer replaces it.
+ * incise-state(5) documents the bytes.
  */
 #ifndef INCISE_STATE_H
 #define INCISE_STATE_H
@@ -50,27 +51,22 @@ struct incise_state_setup {
 };
 
 /**
- * Create a page at a path, in state STARTING. Its memory is resident when this returns; the
- * caller locks it with mlockall(2).
+ * Create a page at a path, in state STARTING, and start the thread that copies it there. Its
+ * memory is resident when this returns; the caller locks it with mlockall(2).
  *
  * @param path a file in a writable folder; a file that is there must be a page, or empty
  * @return writer, to be freed with incise_state_free(); NULL with errno EBUSY (the writer
  *         of the page that is there lives; @err names its pid), EEXIST (another file is
- *         there), EINVAL (rate not above 0), ENOSPC, ENOMEM, errno of open(2), rename(2).
+ *         there), EINVAL (rate not above 0), ENOSPC, ENOMEM, errno of open(2), rename(2),
+ *         pthread_create(3).
  */
 INCISE_API struct incise_state_writer *incise_state_new(
 	const char *path, const struct incise_state_setup *setup,
 	struct incise_error *err);
 
 /**
- * Whether the page is in memory only (tmpfs, ramfs). On a disk, the kernel may delay the loop
- * while it writes the page out: not for real time.
- */
-INCISE_API bool incise_state_in_memory(const struct incise_state_writer *writer);
-
-/**
- * Publish a change of state. This and the functions below are for the normal thread; a writer
- * that is NULL does nothing.
+ * Publish a change of state; it is in the file when this returns. This and the functions below
+ * are for the normal thread; a writer that is NULL does nothing.
  *
  * @param reason one line, cut at 299 bytes; NULL or "" for none
  */
@@ -94,7 +90,7 @@ INCISE_API void incise_state_refused(struct incise_state_writer *writer,
 INCISE_API void incise_state_counts(struct incise_state_writer *writer,
 				    const struct incise_realtime_counts *counts);
 
-/** Close the page; the file stays, with the last state. */
+/** Copy the last state to the file and close it; the file stays. */
 INCISE_API void incise_state_free(struct incise_state_writer *writer);
 
 /**
@@ -169,7 +165,8 @@ struct incise_state_now {
 
 /**
  * Open a page. Its contents are not trusted: a malformed page leads to an errno and nothing
- * worse. The file is read, not mapped: truncation gives -EIO, and no signal.
+ * worse. The file is read, not mapped: truncation gives an errno, and no signal. A page that is
+ * malformed although its writer lives is looked at again, for up to 50 ms: it was just cut off.
  *
  * @return state, to be closed with incise_state_close(); NULL with errno of open(2), EINVAL
  *         (no page), EPROTO (another version of the format), ENOMEM.
@@ -180,8 +177,9 @@ INCISE_API struct incise_state *incise_state_open(const char *path,
 /**
  * Copy the contents of a page.
  *
- * @return 0; -EAGAIN (each copy was torn: try again), -EIO (truncated or malformed). Some 6
- *         system calls, never waits.
+ * @return 0; -EAGAIN (each copy was torn, or the file was truncated and its living writer
+ *         writes it anew: try again), -EIO (truncated or malformed). Some 6 system calls,
+ *         never waits.
  */
 INCISE_API int incise_state_read(struct incise_state *state,
 				 struct incise_state_now *now);
@@ -195,7 +193,7 @@ INCISE_API int incise_state_read(struct incise_state *state,
  * @param cursor 0: from the oldest in the ring; INCISE_STATE_NEWEST: from now on. Is advanced
  * @param n      capacity of @ticks
  * @param lost   ticks that were overwritten before they were read are added; or NULL
- * @return how many ticks; -EIO as above. Never waits.
+ * @return how many ticks; -EAGAIN, -EIO as above. Never waits.
  */
 INCISE_API int incise_state_ticks(struct incise_state *state, uint64_t *cursor,
 				  struct incise_tick *ticks, int n, uint64_t *lost);

@@ -10,9 +10,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
-#include <linux/magic.h>
 #include <sys/stat.h>
-#include <sys/vfs.h>
 #include <sys/wait.h>
 #include "../../../lib/loop/state_file.h"
 #include "state_made.h"
@@ -166,8 +164,8 @@ static void test_two_at_once(void **state)
 			incise_state_free(incise_state_new(made.path, &made_setup, NULL));
 		assert_int_equal(incise_state_file_new(&a, made.path, 4096, NULL), 0);
 		assert_int_equal(incise_state_file_new(&b, made.path, 4096, NULL), 0);
-		memcpy(a.page, "INCSTATE", 8);
-		memcpy(b.page, "INCSTATE", 8);
+		incise_state_file_write(&a, 0, "INCSTATE", 8);
+		incise_state_file_write(&b, 0, "INCSTATE", 8);
 		assert_int_equal(incise_state_file_publish(&a, &err), 0);
 		first = inode(made.path);
 		assert_int_equal(incise_state_file_publish(&b, &err), -EBUSY);
@@ -191,27 +189,6 @@ static void test_anybody_may_look(void **state)
 	/* No holes: a full disk is found out at the start. */
 	assert_true(st.st_blocks * 512 >= st.st_size);
 	made_free(&made);
-}
-
-static void test_in_memory(void **state)
-{
-	const char *shm = "/dev/shm/incise-test-state-XXXXXX";
-	char path[60];
-	struct incise_state_writer *writer;
-	struct statfs fs;
-	int fd;
-
-	assert_false(incise_state_in_memory(NULL));
-	strcpy(path, shm);
-	fd = mkstemp(path);
-	if (fd < 0 || fstatfs(fd, &fs) || fs.f_type != TMPFS_MAGIC)
-		skip();
-	close(fd);
-	writer = incise_state_new(path, &made_setup, NULL);
-	assert_non_null(writer);
-	assert_true(incise_state_in_memory(writer));
-	incise_state_free(writer);
-	unlink(path);
 }
 
 static void test_places_that_are_none(void **state)
@@ -242,7 +219,6 @@ int main(void)
 		cmocka_unit_test(test_what_is_no_page_is_kept),
 		cmocka_unit_test(test_two_at_once),
 		cmocka_unit_test(test_anybody_may_look),
-		cmocka_unit_test(test_in_memory),
 		cmocka_unit_test(test_places_that_are_none),
 	};
 

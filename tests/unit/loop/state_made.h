@@ -96,6 +96,7 @@ static inline void made_ticks(struct incise_state_writer *writer, int64_t from,
 
 		incise_state_tick(writer, &tick, n, 2 * n, 0);
 	}
+	incise_state_mirror(writer);
 }
 
 #endif

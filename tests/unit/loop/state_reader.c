@@ -192,6 +192,7 @@ static void test_half_written(void **state)
 		uint64_t odd = 77;
 
 		made_ticks(made.writer, 0, 3);
+		/* All is in the file: the writer writes no part of it again. */
 		assert_int_equal(pwrite(fd, &odd, sizeof(odd), (off_t)parts[i]), 8);
 		assert_int_equal(incise_state_read(reader, &now), -EAGAIN);
 		incise_state_free(made.writer);

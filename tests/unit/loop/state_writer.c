@@ -15,11 +15,15 @@
 #include "state_made.h"
 
 static struct incise_state_now now;
+static struct incise_tick ticks[INCISE_STATE_TICKS];
 
 static void look(const struct made *made)
 {
-	struct incise_state *state = incise_state_open(made->path, NULL);
+	struct incise_state *state;
 
+	if (made->writer)
+		incise_state_mirror(made->writer);
+	state = incise_state_open(made->path, NULL);
 	assert_non_null(state);
 	assert_int_equal(incise_state_read(state, &now), 0);
 	incise_state_close(state);
@@ -230,6 +234,41 @@ static void test_what_is_too_long(void **state)
 	made_free(&made);
 }
 
+/* The file may be cut off by anybody who may write it: the loop goes on, and the page is mended. */
+static void test_cut_off(void **state)
+{
+	static const off_t sizes[] = {0,    1,	     sizeof(struct state_head),
+				      4096, 1000000, sizeof(struct state_page) - 1};
+	const int64_t n = INCISE_STATE_TICKS + 100;
+	struct made made = made_page();
+	struct incise_state *reader = incise_state_open(made.path, NULL);
+
+	incise_state_run(made.writer, INCISE_RUN_RUNNING, "as asked");
+	made_ticks(made.writer, 0, n);
+	for (size_t i = 0; i < sizeof(sizes) / sizeof(*sizes); i++) {
+		int64_t all = n + 10 * ((int64_t)i + 1);
+		struct incise_tick last = made_tick(all - 1);
+		uint64_t cursor = 0, lost = 0;
+		int got;
+
+		assert_int_equal(truncate(made.path, sizes[i]), 0);
+		made_ticks(made.writer, all - 10, all);
+		look(&made);
+		assert_int_equal(now.run, INCISE_RUN_RUNNING);
+		assert_string_equal(now.reason, "as asked");
+		assert_int_equal(now.ticks, all);
+		assert_int_equal(incise_state_total(&now.lateness), all);
+		assert_true(made_same(&now.tick, &last));
+		got = incise_state_ticks(reader, &cursor, ticks, INCISE_STATE_TICKS,
+					 &lost);
+		assert_int_equal(cursor, all);
+		assert_int_equal(got, INCISE_STATE_TICKS - 1);
+		assert_true(made_same(&ticks[got - 1], &last));
+	}
+	incise_state_close(reader);
+	made_free(&made);
+}
+
 /* A loop without a page makes the same calls with NULL. */
 static void test_without_a_page(void **state)
 {
@@ -385,6 +424,7 @@ int main(void)
 		cmocka_unit_test(test_scene),
 		cmocka_unit_test(test_counts),
 		cmocka_unit_test(test_what_is_too_long),
+		cmocka_unit_test(test_cut_off),
 		cmocka_unit_test(test_without_a_page),
 		cmocka_unit_test(test_names),
 		cmocka_unit_test(test_work_of_a_spring),
