@@ -15,6 +15,7 @@
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/loop_report.h"
+#include "cli/state_folder.h"
 #include "haptic/haptic.h"
 #include "stepper/status.h"
 
@@ -60,7 +61,7 @@ static const struct cli_option options[] = {
 	 CLI_INTEGER(struct job, haptic.loop.overruns_most, 0, 1000000)},
 	{0, "state", "FILE",
 	 "page that others read, none for no page (default: NAME.state of the\n"
-	 "scene's name, in /run/incise or $XDG_RUNTIME_DIR/incise)",
+	 "scene's name in /run/incise, $XDG_RUNTIME_DIR/incise or /tmp/incise-UID)",
 	 CLI_TEXT(struct job, state)},
 	{0, "log", "FILE", "write every tick as CSV at the end; needs --duration",
 	 CLI_TEXT(struct job, log)},
@@ -109,29 +110,27 @@ static _Noreturn void fail(struct job *job, const struct incise_error *err)
 
 /* --- the state page -------------------------------------------------------------------- */
 
-static bool is_folder(const char *path)
-{
-	struct stat status;
-
-	return !stat(path, &status) && S_ISDIR(status.st_mode) && !access(path, W_OK);
-}
-
 /* Default path of the page: free(3); NULL: there is no folder for it. */
 static char *state_path(const char *scene)
 {
-	const char *own = getenv("XDG_RUNTIME_DIR");
-	char folder[3000] = "/run/incise", *name, *path;
+	char *list[STATE_FOLDERS], *name = scene_argument_name(scene), *path = NULL;
+	int i;
 
-	if (!is_folder(folder)) {
-		if (!own || *own != '/')
-			return NULL;
-		snprintf(folder, sizeof(folder), "%s/incise", own);
-		mkdir(folder, 0700);
-		if (!is_folder(folder))
-			return NULL;
-	}
-	name = scene_argument_name(scene);
-	path = cli_text("%s/%s.state", folder, name);
+	state_folders(list);
+	i = state_folder_choose(list);
+	if (i >= 0)
+		path = cli_text("%s/%s.state", list[i], name);
+	if (i == STATE_FOLDER_TEMPORARY)
+		cli_warn(
+			"there is no %s and no XDG_RUNTIME_DIR: the state page is %s, which "
+			"`incise status` of this user finds",
+			list[STATE_FOLDER_SYSTEM], path);
+	else if (i < 0)
+		cli_warn(
+			"there is no state page: %s is another user's, or others may write "
+			"there; give --state FILE, or --state none",
+			list[STATE_FOLDER_TEMPORARY]);
+	state_folders_free(list);
 	free(name);
 	return path;
 }

@@ -132,7 +132,8 @@ static void screen(bool own)
 static bool state_follow(const struct state_page_file *page, bool json)
 {
 	static struct incise_state_now looks[2];
-	struct state_look look = {.name = page->name, .path = page->path};
+	struct state_look look = {
+		.name = page->name, .path = page->path, .user = page->user};
 	bool view = !json && isatty(STDOUT_FILENO);
 	struct incise_error err = {0};
 	int i = 0;
@@ -199,6 +200,7 @@ static bool show_all(const struct state_pages *pages, bool json)
 	for (int i = 0; i < pages->n; i++) {
 		struct state_look look = {.name = pages->page[i].name,
 					  .path = pages->page[i].path,
+					  .user = pages->page[i].user,
 					  .now = &now[i]};
 
 		state_pages_look(&pages->page[i], &now[i]);

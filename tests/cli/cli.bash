@@ -8,11 +8,18 @@ bats_require_minimum_version 1.5.0
 root=$(cd "$BATS_TEST_DIRNAME/../.." && pwd)
 PATH=$INCISE_BUILD/bin:$PATH
 
+# Loops put their state pages into a folder of the test's own.
+run_folder() {
+	export XDG_RUNTIME_DIR=$BATS_TEST_TMPDIR/run
+	mkdir -p "$XDG_RUNTIME_DIR"
+}
+
 # A folder to work in that is empty; bats keeps files of its own beside it.
 work_folder() {
 	rm -rf "${BATS_TEST_TMPDIR:?is not set in setup_file}/work" # of a try before, where a test may retry
 	mkdir "$BATS_TEST_TMPDIR/work"
 	cd "$BATS_TEST_TMPDIR/work"
+	run_folder
 }
 
 # The same in memory, where there is room: a disk that others keep busy can stand still for
@@ -24,6 +31,7 @@ memory_folder() {
 	if [ "${free:-0}" -gt 1000000 ] && [ -w /dev/shm ]; then
 		in_memory=$(mktemp -d /dev/shm/incise-XXXXXX)
 		cd "$in_memory"
+		run_folder
 	else
 		work_folder
 	fi

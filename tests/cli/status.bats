@@ -6,7 +6,7 @@ load cli
 
 setup() {
 	work_folder
-	export XDG_RUNTIME_DIR=$PWD
+	export XDG_RUNTIME_DIR=$PWD TMPDIR=$PWD
 	export TZ=UTC
 	mkdir incise
 	loop=$INCISE_BUILD/tests/state/loop
@@ -139,6 +139,43 @@ until_ticks() {
 	[ "$(tail -n 1 followed >report.json && key report.json state)" = stopped ]
 	run -0 incise status wall
 	[[ "${lines[0]}" == "wall: stopped since "* ]]
+}
+
+@test "where there is no folder for pages, a loop says where it puts its own, and status finds it" {
+	[ ! -d /run/incise ] || skip "this machine has the system's folder"
+	unset XDG_RUNTIME_DIR
+	mkdir temporary
+	export TMPDIR=$PWD/temporary
+	place=$TMPDIR/incise-$(id -u)
+	incise haptic "$root/scenes/wall.scene" --rig sim: --no-rt --duration 60s \
+		>/dev/null 2>err 3>&- &
+	played=$!
+	for ((i = 0; i < 100; i++)); do
+		[ ! -e "$place/wall.state" ] || break
+		sleep 0.1
+	done
+	run -0 --separate-stderr incise status wall
+	[ -z "$stderr" ]
+	[[ "${lines[1]}" == "page       $place/wall.state, of user $(id -un)" ]]
+	[ "$(stat -c %a "$place")" = 700 ]
+	grep -qF "the state page is $place/wall.state" err
+	incise status --json >report.json
+	[ "$(key report.json 'loops[0].user')" = "$(id -un)" ]
+	kill -TERM "$played"
+	wait "$played"
+	# A folder where others may write could be anybody's.
+	chmod 777 "$place"
+	run --separate-stderr incise status wall
+	failed_with "no loop of that name"
+	run -0 --separate-stderr incise haptic "$root/scenes/wall.scene" --rig sim: --no-rt \
+		--duration 100ms
+	[[ "$stderr" == *"there is no state page: $place is another user's, or others may write there"* ]]
+	# Nor a link to one.
+	mv "$place" real
+	chmod 700 real
+	ln -s "$PWD/real" "$place"
+	run --separate-stderr incise status wall
+	failed_with "no loop of that name"
 }
 
 @test "a loop without ticks yet is well" {

@@ -8,8 +8,10 @@ load document
 setup() {
 	work_folder
 	page=$root/doc/tutorial.md
-	export XDG_RUNTIME_DIR=$PWD/runtime
-	mkdir runtime
+	# As in a container, or after su: no session has made a folder.
+	unset XDG_RUNTIME_DIR
+	export TMPDIR=$PWD/temporary
+	mkdir temporary
 }
 
 @test "every block of the tutorial that is said to run on the virtual rig is run here" {

@@ -4,25 +4,18 @@
  */
 #include <dirent.h>
 #include <errno.h>
+#include <pwd.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include "../cli/cli.h"
 #include "../cli/scene_argument.h"
+#include "../cli/state_folder.h"
 #include "pages.h"
 
 #define SUFFIX ".state"
-#define FOLDERS 2
 #define LOOKS 50 /* 1 ms apart: the writer may be preempted */
-
-/* The folders of pages; NULL: not set. */
-static void folders(char *list[FOLDERS])
-{
-	const char *own = getenv("XDG_RUNTIME_DIR");
-
-	list[0] = cli_text("/run/incise");
-	list[1] = own && *own ? cli_text("%s/incise", own) : NULL;
-}
 
 /* Length of NAME in "NAME.state"; 0: another file. */
 static size_t name_length(const char *file)
@@ -30,6 +23,19 @@ static size_t name_length(const char *file)
 	size_t n = strlen(file), end = strlen(SUFFIX);
 
 	return n > end && *file != '.' && !strcmp(file + n - end, SUFFIX) ? n - end : 0;
+}
+
+/* The user whose loop it is: free(3). */
+static char *user_of(const char *path)
+{
+	const struct passwd *user;
+	struct stat st;
+
+	if (stat(path, &st))
+		return cli_text("?");
+	user = getpwuid(st.st_uid);
+	return user ? cli_text("%s", user->pw_name)
+		    : cli_text("%u", (unsigned int)st.st_uid);
 }
 
 static void add(struct state_pages *pages, const char *path, struct incise_state *state)
@@ -43,6 +49,7 @@ static void add(struct state_pages *pages, const char *path, struct incise_state
 	*page = (struct state_page_file){
 		.name = cli_text("%.*s", n ? (int)n : (int)strlen(file), file),
 		.path = cli_text("%s", path),
+		.user = user_of(path),
 		.state = state,
 	};
 	/* Others may name files there: no control characters. */
@@ -86,12 +93,12 @@ static int add_folder(struct state_pages *pages, const char *folder)
 	return bad;
 }
 
-static void open_all(struct state_pages *pages, char *list[FOLDERS])
+static void open_all(struct state_pages *pages, char *list[STATE_FOLDERS])
 {
 	int bad = 0;
 
-	for (int i = 0; i < FOLDERS; i++)
-		if (list[i])
+	for (int i = 0; i < STATE_FOLDERS; i++)
+		if (state_folder_trusted(list, i))
 			bad += add_folder(pages, list[i]);
 	if (!pages->n && bad)
 		cli_fail("no state of a loop can be read here");
@@ -101,13 +108,16 @@ static void open_all(struct state_pages *pages, char *list[FOLDERS])
 	qsort(pages->page, (size_t)pages->n, sizeof(*pages->page), by_name);
 }
 
-static void open_name(struct state_pages *pages, const char *name, char *list[FOLDERS])
+static void open_name(struct state_pages *pages, const char *name,
+		      char *list[STATE_FOLDERS])
 {
 	struct incise_error err = {0};
 	bool found = false;
 
-	for (int i = 0; i < FOLDERS; i++) {
-		char *path = list[i] ? cli_text("%s/%s" SUFFIX, list[i], name) : NULL;
+	for (int i = 0; i < STATE_FOLDERS; i++) {
+		char *path = state_folder_trusted(list, i)
+				     ? cli_text("%s/%s" SUFFIX, list[i], name)
+				     : NULL;
 		struct incise_state *state = path ? incise_state_open(path, &err) : NULL;
 
 		if (state && pages->n && incise_state_alive(state) != 1) {
@@ -134,7 +144,7 @@ void state_pages_open(struct state_pages *pages, const char *asked)
 {
 	struct incise_error err = {0};
 	struct incise_state *state;
-	char *list[FOLDERS];
+	char *list[STATE_FOLDERS];
 	bool scene = asked && cli_ends_with(asked, ".scene");
 
 	*pages = (struct state_pages){0};
@@ -145,7 +155,7 @@ void state_pages_open(struct state_pages *pages, const char *asked)
 		add(pages, asked, state);
 		return;
 	}
-	folders(list);
+	state_folders(list);
 	if (asked) {
 		char *name = scene_argument_name(asked);
 
@@ -154,8 +164,7 @@ void state_pages_open(struct state_pages *pages, const char *asked)
 	} else {
 		open_all(pages, list);
 	}
-	for (int i = 0; i < FOLDERS; i++)
-		free(list[i]);
+	state_folders_free(list);
 }
 
 int state_pages_try(const struct state_page_file *page, struct incise_state_now *now,
@@ -196,6 +205,7 @@ void state_pages_close(struct state_pages *pages)
 		incise_state_close(pages->page[i].state);
 		free(pages->page[i].name);
 		free(pages->page[i].path);
+		free(pages->page[i].user);
 	}
 	free(pages->page);
 	*pages = (struct state_pages){0};

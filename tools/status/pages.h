@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The state pages of this machine's loops: /run/incise/NAME.state and
- * $XDG_RUNTIME_DIR/incise/NAME.state.
+ * The state pages of this machine's loops, in the folders of cli/state_folder.h.
  */
 #ifndef INCISE_STATUS_PAGES_H
 #define INCISE_STATUS_PAGES_H
@@ -11,6 +10,7 @@
 struct state_page_file {
 	char *name; /* "neck" */
 	char *path;
+	char *user; /* its owner: whose loop it is */
 	struct incise_state *state;
 };
 

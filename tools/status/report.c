@@ -132,6 +132,15 @@ static void headline(FILE *out, const struct state_look *look)
 		      out);
 }
 
+/* Others may name files: no control characters. */
+static void put_page(FILE *out, const struct state_look *look)
+{
+	fputs("page       ", out);
+	for (const char *c = look->path; *c; c++)
+		fputc((unsigned char)*c < ' ' || *c == 0x7f ? '?' : *c, out);
+	fprintf(out, ", of user %s\n", look->user);
+}
+
 static void setup(FILE *out, const struct incise_state_now *now)
 {
 	if (*now->scene)
@@ -208,6 +217,7 @@ void state_report_text(FILE *out, const struct state_look *look)
 	const struct incise_state_now *now = look->now;
 
 	headline(out, look);
+	put_page(out, look);
 	setup(out, now);
 	ticks(out, look);
 	fprintf(out,
@@ -308,6 +318,7 @@ json_t *state_report_json(const struct state_look *look)
 
 	json_object_set_new(report, "name", json_text(look->name));
 	json_object_set_new(report, "file", json_text(look->path));
+	json_object_set_new(report, "user", json_text(look->user));
 	json_object_set_new(report, "state", json_string(state_word(now)));
 	json_object_set_new(report, "reason", json_text(now->reason));
 	json_object_set_new(report, "alive", json_boolean(now->alive));

@@ -13,6 +13,7 @@
 /* A reading of a loop's page, with changes since the one before. */
 struct state_look {
 	const char *name, *path;
+	const char *user; /* whose loop it is */
 	const struct incise_state_now *now;
 	double measured_hz; /* between the readings; NAN: not known */
 	double still_s;	    /* without a tick, over all readings */
