@@ -95,7 +95,7 @@ static void add_pose(struct list *list, const struct incise_tracker_sample *samp
 {
 	struct incise_tip_pose *pose;
 
-	if (sample->status != ' ') {
+	if (!incise_pose_usable(sample->status)) {
 		list->doubtful++;
 		return;
 	}

@@ -124,6 +124,8 @@ struct run {
 	int64_t held_ns;	  /* recorded before the trigger */
 	bool armed;
 	int markers;
+	int64_t judged_ns; /* when the poses were last looked at */
+	bool warned;	   /* of flagged poses */
 	struct result result;
 };
 
@@ -185,6 +187,36 @@ static void start(struct run *run, int64_t now_ns)
 		run->view.planned_s = (run->end_ns - now_ns) / (double)INCISE_NS_PER_S;
 }
 
+#define JUDGE_NS INCISE_NS_PER_S
+#define POSES_LEAST 100 /* of fewer, one is too many */
+
+/* Whether more than 1 % of the poses are flagged, usable or not. */
+static bool poses_are_doubtful(const struct incise_pose_counts *poses)
+{
+	uint64_t flagged = 0;
+
+	for (int i = 0; i < 128; i++)
+		flagged += poses->flagged[i];
+	return flagged * 100 > poses->poses;
+}
+
+/* Warn once, when it can still be mended. */
+static void judge_poses(struct run *run, int64_t now_ns)
+{
+	struct incise_recorder_stats stats;
+	char text[1000];
+
+	if (run->warned || now_ns - run->judged_ns < JUDGE_NS)
+		return;
+	run->judged_ns = now_ns;
+	incise_recorder_stats(run->recorder, &stats);
+	if (stats.poses.poses < POSES_LEAST || !poses_are_doubtful(&stats.poses))
+		return;
+	incise_pose_counts_text(&stats.poses, text, sizeof(text));
+	cli_warn("%s", text);
+	run->warned = true;
+}
+
 /* Record until the end, a signal or a failure. */
 static void record(struct run *run)
 {
@@ -222,6 +254,7 @@ static void record(struct run *run)
 						       : INCISE_NS_PER_S;
 			}
 		}
+		judge_poses(run, now);
 		handle_keys(run);
 		if (keyboard_resumed())
 			cli_progress_forget();
@@ -311,10 +344,11 @@ static void report(const struct options *options, const struct result *result)
 	const int n = stats->n_streams;
 	uint64_t lost = stats->force_lost + stats->tracker_lost + stats->frames_lost;
 	const char *path = options->output;
+	char text[1000];
 
 	if (options->json) {
 		json_print(json_pack(
-			"{so so sI sI sI sI sI sI sI sI sI so so}", "path",
+			"{so so sI sI sI sI sI sI sI sI sI so so so}", "path",
 			json_text(path), "seconds", json_number(result->seconds), "force",
 			(json_int_t)stats->force, "tracker", (json_int_t)stats->tracker,
 			"depth", (json_int_t)stats->depth, "frames",
@@ -323,7 +357,8 @@ static void report(const struct options *options, const struct result *result)
 			(json_int_t)stats->tracker_lost, "frames_lost",
 			(json_int_t)stats->frames_lost, "clipped",
 			(json_int_t)stats->force_clipped, "zero_mV",
-			json_number(stats->zero_mV), "streams", stream_json(streams, n)));
+			json_number(stats->zero_mV), "poses", pose_json(&stats->poses),
+			"streams", stream_json(streams, n)));
 		return;
 	}
 	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker records, ",
@@ -337,6 +372,8 @@ static void report(const struct options *options, const struct result *result)
 	if (!isnan(stats->zero_mV))
 		printf(", zero %.1f mV", stats->zero_mV);
 	putchar('\n');
+	if (incise_pose_counts_text(&stats->poses, text, sizeof(text)))
+		puts(text);
 	stream_table(streams, n);
 	cli_finish();
 }
@@ -370,6 +407,7 @@ static void judge(const char *path, const struct result *result)
 	const struct incise_recorder_stats *stats = &result->stats;
 	const struct incise_stream *streams = stats->streams;
 	const int n = stats->n_streams;
+	char text[1000];
 
 	if (result->early.code)
 		cli_fail_with(&result->early);
@@ -381,8 +419,18 @@ static void judge(const char *path, const struct result *result)
 		cli_fail("%s: the %s gave nothing in %.1f s; check its cable and power",
 			 path, stats->force ? "tracker" : "force channel",
 			 result->seconds);
+	incise_pose_counts_text(&stats->poses, text, sizeof(text));
+	if (poses_are_doubtful(&stats->poses))
+		cli_warn("%s: %s", path, text);
+	else if (!stats->depth)
+		cli_warn("%s: no depth came of %llu poses", path,
+			 (unsigned long long)stats->tracker);
 	if (stats->force_lost || stats->tracker_lost || stats->frames_lost)
 		fail_of_losses(path, stats);
+	if (stats->poses.unusable && stats->poses.unusable == stats->poses.poses)
+		cli_fail("%s: no depth: the tracker flagged every pose; see "
+			 "Tracker flags in rig.conf(5)",
+			 path);
 	if (n > 2 && !stats->frames)
 		cli_fail("%s: the camera gave nothing in %.1f s; check its cable", path,
 			 result->seconds);

@@ -16,6 +16,7 @@
 #include "cli/json.h"
 #include "cli/loop_report.h"
 #include "cli/state_folder.h"
+#include "cli/stream_report.h"
 #include "haptic/haptic.h"
 #include "stepper/status.h"
 
@@ -492,7 +493,7 @@ static void report_json(const struct haptic *haptic)
 		json_array_append_new(stages,
 				      json_string(incise_plan_stage(haptic->plan, i)));
 	json_print(json_pack(
-		"{sI sI sI sf so so sI sI sI sI so sf so so ss so so so}", "ticks",
+		"{sI sI sI sf so so sI sI sI sI so so sf so so ss so so so}", "ticks",
 		(json_int_t)s->ticks, "skipped", (json_int_t)s->skipped, "overruns",
 		(json_int_t)s->overruns, "rate_hz", haptic->loop.rate_hz, "lateness_us",
 		real ? loop_lateness_json(s) : json_null(), "tick_ns",
@@ -500,9 +501,9 @@ static void report_json(const struct haptic *haptic)
 		(json_int_t)ticks_with(s, INCISE_TICK_CONTACT), "extrapolated",
 		(json_int_t)ticks_with(s, INCISE_TICK_EXTRAPOLATED), "stale",
 		(json_int_t)ticks_with(s, INCISE_TICK_STALE), "limited",
-		(json_int_t)s->limited, "flags", loop_flags_json(s->flagged),
-		"force_max_N", s->force_max_N, "rendered_rms_error_N",
-		json_number(render_error(haptic)), "actuator",
+		(json_int_t)s->limited, "flags", loop_flags_json(s->flagged), "poses",
+		pose_json(&s->poses), "force_max_N", s->force_max_N,
+		"rendered_rms_error_N", json_number(render_error(haptic)), "actuator",
 		stepper ? stepper_counters_json(stepper) : json_null(), "scheduling",
 		haptic->scheduling, "thread", counts_json(&haptic->counts), "stages",
 		stages, "stopped_by",
@@ -514,7 +515,7 @@ static void report_text(const struct haptic *haptic)
 	struct incise_stepper *stepper = incise_rig_stepper(haptic->rig);
 	const struct incise_loop_stats *s = haptic->stats;
 	double rms_N = render_error(haptic);
-	char a[32], b[32];
+	char a[32], b[32], flags[1000];
 
 	printf("%llu ticks at %g Hz, %llu skipped in %llu overruns (%s)\nstages    ",
 	       (unsigned long long)s->ticks, haptic->loop.rate_hz,
@@ -544,6 +545,8 @@ static void report_text(const struct haptic *haptic)
 	       (unsigned long long)ticks_with(s, INCISE_TICK_EXTRAPOLATED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STALE),
 	       (unsigned long long)s->limited);
+	if (incise_pose_counts_text(&s->poses, flags, sizeof(flags)))
+		printf("poses      %s\n", flags);
 	printf("held       %llu at the largest force, %llu at the largest slew, %llu at the end "
 	       "of the travel, %llu by the guard, %llu starting or fading\n",
 	       (unsigned long long)ticks_with(s, INCISE_TICK_CLAMPED),

@@ -27,6 +27,7 @@ struct run {
 	uint64_t skipped;    /* before this tick */
 	unsigned int in_row; /* consecutive overruns */
 	unsigned int flags;  /* of the last tick */
+	char pose_flag;	     /* of poses, as last reported */
 	int64_t stale_ns;    /* time of the first tick without a fresh pose */
 };
 
@@ -68,6 +69,7 @@ static void send_event(const struct run *run, enum incise_loop_event_kind kind,
 static void report_changes(struct run *run, const struct incise_tick *tick)
 {
 	unsigned int begun = tick->flags & ~run->flags, ended = run->flags & ~tick->flags;
+	char flag = incise_plan_pose_flag(run->plan);
 
 	if (begun & INCISE_TICK_STALE) {
 		run->stale_ns = tick->t_ns;
@@ -79,6 +81,10 @@ static void report_changes(struct run *run, const struct incise_tick *tick)
 			   (double)(tick->t_ns - run->stale_ns) * 1e-6);
 	if (begun & INCISE_TICK_NOT_FINITE)
 		send_event(run, INCISE_LOOP_NOT_FINITE, tick->t_ns, 0);
+	if (flag && flag != ' ' && flag != run->pose_flag) {
+		send_event(run, INCISE_LOOP_FLAGGED, tick->t_ns, flag);
+		run->pose_flag = flag;
+	}
 	run->flags = tick->flags;
 }
 
@@ -144,15 +150,20 @@ static INCISE_REALTIME void change_plan(struct run *run, int64_t now_ns)
 {
 	bool waits = !run->fading && run->options->control &&
 		     incise_loop_control_waiting(run->options->control);
-	struct incise_plan *next = NULL;
+	struct incise_pose_counts poses;
+	struct incise_plan *next;
 
 	if (run->fading)
 		return;
 	incise_plan_fade(run->plan, waits);
-	if (waits && incise_plan_faded(run->plan))
-		next = incise_loop_control_swap(run->options->control, run->plan);
+	if (!waits || !incise_plan_faded(run->plan))
+		return;
+	/* Once it is retired, others may free it. */
+	incise_plan_poses(run->plan, &poses);
+	next = incise_loop_control_swap(run->options->control, run->plan);
 	if (!next)
 		return;
+	incise_pose_counts_add(&run->stats->poses, &poses);
 	run->plan = next;
 	send_event(run, INCISE_LOOP_PLAN, now_ns, 0);
 }
@@ -218,6 +229,7 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		    const struct incise_loop_options *options,
 		    struct incise_loop_stats *stats, struct incise_error *err)
 {
+	struct incise_pose_counts poses;
 	struct run run = {
 		.plan = plan, .clock = clock, .options = options, .stats = stats};
 	int rc, released, ended = 0;
@@ -233,6 +245,8 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 	run.due_ns = incise_clock_now(clock) + run.period_ns;
 	run.end_ns = options->duration_ns ? run.due_ns + options->duration_ns : INT64_MAX;
 	rc = run_ticks(&run, &ended);
+	incise_plan_poses(run.plan, &poses);
+	incise_pose_counts_add(&stats->poses, &poses);
 	released = incise_plan_release(run.plan);
 	if (!rc && !ended)
 		rc = released;

@@ -410,11 +410,38 @@ const char *incise_plan_fault(const struct incise_plan *plan)
 	return strerror(-plan->fault);
 }
 
+void incise_plan_poses(const struct incise_plan *plan, struct incise_pose_counts *counts)
+{
+	*counts = plan->poses;
+}
+
+char incise_plan_pose_flag(const struct incise_plan *plan)
+{
+	return plan->pose_flag;
+}
+
+/* The tracker works, but what it measures is no pose. */
+static int blind_cause(const struct incise_plan *plan, char *text, size_t size)
+{
+	struct incise_tracker_info info;
+
+	incise_tracker_info(plan->tracker, &info);
+	return snprintf(
+		text, size,
+		"%s gave no usable pose for %.0f s, the last with the flag '%c' (%s); "
+		"see Tracker flags in rig.conf(5)",
+		info.name, (double)INCISE_PLAN_BLIND_NS / INCISE_NS_PER_S,
+		plan->pose_flag > ' ' && plan->pose_flag <= '~' ? plan->pose_flag : '?',
+		incise_pose_flag(plan->pose_flag));
+}
+
 int incise_plan_cause(const struct incise_plan *plan, char *text, size_t size)
 {
 	const char *fault = incise_plan_fault(plan);
 	int length = 0;
 
+	if (plan->fault && plan->blind)
+		return blind_cause(plan, text, size);
 	/* Only of an actuator that has one: else a tracker's failure would go under. */
 	if (plan->fault && plan->actuator_faults)
 		length = incise_stepper_cause(plan->stepper, text, size);

@@ -40,6 +40,9 @@ struct incise_stage {
 _Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES_MAX <= INCISE_PLAN_STAGES_MAX,
 	       "raise INCISE_PLAN_STAGES_MAX");
 
+/* A tracker that gives only unusable poses for so long has failed, as one that is unplugged. */
+#define INCISE_PLAN_BLIND_NS (10 * INCISE_NS_PER_S)
+
 struct incise_plan {
 	const struct incise_scene *scene;
 	struct incise_stage stage[INCISE_PLAN_STAGES_MAX];
@@ -58,6 +61,11 @@ struct incise_plan {
 	struct incise_predict predict;
 	unsigned int discontinuities; /* of the predictor, as the guard last saw them */
 	int64_t pose_age_ns;
+	struct incise_pose_counts poses;
+	char pose_flag;		 /* of the newest pose; ' ' or 0: none */
+	bool unusable;		 /* the newest pose is */
+	int64_t unusable_ns;	 /* tick of the first of them since a usable one */
+	bool blind;		 /* they lasted for INCISE_PLAN_BLIND_NS */
 	double velocity_mm_s[3]; /* of what is held: of the tip, or the handle's end */
 	double attitude[4];
 	double tip_mm[3]; /* of the blade in the frame of the tracker's poses */
@@ -135,6 +143,9 @@ void incise_plan_fade(struct incise_plan *plan, bool fading) INCISE_REALTIME;
 
 /* Whether a force that fades has reached zero. Real-time safe. */
 bool incise_plan_faded(const struct incise_plan *plan) INCISE_REALTIME;
+
+/* The flag of the newest pose; ' ' or 0: none. Real-time safe. */
+char incise_plan_pose_flag(const struct incise_plan *plan) INCISE_REALTIME;
 
 /* The reason of a fault in a few words, without what the device says; NULL: no fault. */
 const char *incise_plan_fault(const struct incise_plan *plan);

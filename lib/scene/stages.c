@@ -28,12 +28,30 @@ static void take_handle(struct incise_plan *plan, struct incise_tracker_sample s
 	incise_predict_add(plan->handle, &sample);
 }
 
-static void take(struct incise_plan *plan, struct incise_tracker_sample *samples, int n,
-		 int64_t now_ns)
+/*
+ * Whether a pose is used, by its flag. One that is not is left out as if it had not come, so
+ * that the last one ages.
+ */
+static bool is_usable(struct incise_plan *plan, char status, int64_t now_ns)
 {
+	bool usable = incise_pose_count(&plan->poses, status);
+
+	plan->pose_flag = status;
+	if (!usable && !plan->unusable)
+		plan->unusable_ns = now_ns;
+	plan->unusable = !usable;
+	return usable;
+}
+
+static void take(struct incise_plan *plan, struct incise_tracker_sample *samples, int n,
+		 struct incise_tick *tick)
+{
+	int64_t now_ns = tick->t_ns;
 	double arm_mm[3];
 
 	for (int i = 0; i < n; i++) {
+		if (!is_usable(plan, samples[i].status, now_ns))
+			continue;
 		/* A timestamp from the future would keep all later poses out. */
 		if (samples[i].t_ns > now_ns)
 			samples[i].t_ns = now_ns;
@@ -43,6 +61,8 @@ static void take(struct incise_plan *plan, struct incise_tracker_sample *samples
 		if (plan->inserts)
 			take_handle(plan, samples[i]);
 	}
+	if (plan->unusable)
+		tick->flags |= INCISE_TICK_UNUSABLE;
 }
 
 int incise_stage_pose(struct incise_plan *plan, struct incise_tick *tick)
@@ -50,13 +70,17 @@ int incise_stage_pose(struct incise_plan *plan, struct incise_tick *tick)
 	struct incise_tracker_sample samples[INCISE_PLAN_POSES];
 	int n = incise_tracker_read(plan->tracker, samples, INCISE_PLAN_POSES);
 
-	take(plan, samples, n, tick->t_ns);
+	take(plan, samples, n, tick);
+	plan->blind = n > 0 && plan->unusable &&
+		      tick->t_ns - plan->unusable_ns >= INCISE_PLAN_BLIND_NS;
+	if (plan->blind)
+		return -ENODEV;
 	return n < 0 ? n : 0;
 }
 
 int incise_stage_fed(struct incise_plan *plan, struct incise_tick *tick)
 {
-	take(plan, plan->fed, plan->n_fed, tick->t_ns);
+	take(plan, plan->fed, plan->n_fed, tick);
 	plan->n_fed = 0;
 	return 0;
 }

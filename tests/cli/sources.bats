@@ -173,3 +173,48 @@ ask() {
 	run --separate-stderr incise capture -o b.rec --duration 600ms
 	failed_with "rig.conf" "force_setup.rate_hz"
 }
+
+# A scene in which the emulator's sensor is always in the tissue, on a virtual actuator.
+in_the_tissue() {
+	printf 'tissue = { plane_N_mm = 0.1; };\nlimits = { start_N = 10.0; };\n' >a.scene
+	sed 's/-500.0/0.0/; s/force = /stepper = "sim:"; force = /' rig.conf >felt.conf
+}
+
+# The emulator takes what it is told before what a program sends to it later.
+
+@test "poses that the tracker flags render no force, and give no depth" {
+	plug_in
+	in_the_tissue
+	echo "flag x" >&9
+	run -0 --separate-stderr incise haptic a.scene --rig felt.conf --no-rt --duration 1s --json
+	echo "$output" >report.json
+	[[ "$stderr" == *"the tracker flags poses 'x': the sensor is outside of its motion box; they are not used"* ]]
+	holds "$(key report.json poses.taken) > 0"
+	[ "$(key report.json poses.unusable)" = "$(key report.json poses.taken)" ]
+	[ "$(key report.json poses.flags.x)" = "$(key report.json poses.taken)" ]
+	[ "$(key report.json stale)" = "$(key report.json ticks)" ]
+	holds "$(key report.json force_max_N) == 0"
+	incise haptic a.scene --rig felt.conf --no-rt --duration 500ms >text
+	grep -Eq "^poses +([0-9]+) of \1 poses were not used: \1 'x' \(" text
+	run -1 --separate-stderr incise capture -o a.rec --duration 2s
+	[[ "$stderr" == *"poses were not used: "*" 'x' (the sensor is outside of its motion box)"* ]]
+	[[ "$stderr" == *"a.rec: no depth: the tracker flagged every pose; see Tracker flags in rig.conf(5)" ]]
+	[ "$(ask a.rec "SELECT count(*) > 100 AND min(status) = 'x' AND max(status) = 'x'
+		FROM tracker")" = 1 ]
+	[ "$(ask a.rec "SELECT count(*) FROM depth")" = 0 ]
+}
+
+@test "a flag that only warns: poses are used, with a warning" {
+	plug_in
+	in_the_tissue
+	echo "flag u" >&9
+	run -0 --separate-stderr incise haptic a.scene --rig felt.conf --no-rt --duration 1s --json
+	echo "$output" >report.json
+	[[ "$stderr" == *"the tracker flags poses 'u': "*"; they are used"* ]]
+	[ "$(key report.json poses.unusable)" = 0 ]
+	holds "$(key report.json poses.flags.u) > 0"
+	holds "$(key report.json contact) > 0"
+	run -0 --separate-stderr incise capture -o a.rec --duration 2s
+	[[ "$stderr" == *"a.rec: "*" poses are doubtful: "*" 'u' (outside of its map of the distortion by metal)"* ]]
+	[ "$(ask a.rec "SELECT count(*) > 100 FROM depth")" = 1 ]
+}

@@ -56,7 +56,7 @@ void emulator_free(struct emulator *e)
 
 struct emulator_pose emulator_pose(uint64_t slot, int station)
 {
-	struct emulator_pose pose = {.error = slot % 97 == 5 ? 'x' : ' '};
+	struct emulator_pose pose = {.error = slot % 397 == 5 ? 'x' : ' '};
 	double t = (double)slot / 120, turn = 0.3 * t + station,
 	       tilt = 0.4 + 0.2 * sin(t);
 	static const unsigned char header[4] = {'0', '1', ' ', 'A'}; /* 10.012 */
@@ -171,10 +171,13 @@ static size_t item(const struct emulator *e, int what, const struct emulator_pos
 static size_t record(const struct emulator *e, uint64_t slot, int station, char command,
 		     unsigned char *to)
 {
-	struct emulator_pose pose = emulator_pose(slot, station);
+	struct emulator_pose pose =
+		emulator_pose(e->frozen ? e->frozen_slot : slot, station);
 	uint32_t frame = (uint32_t)slot, pressed = pose.button;
 	size_t n = 0;
 
+	if (e->flag)
+		pose.error = e->flag;
 	if (e->kind == EMULATOR_FASTRAK) {
 		to[n++] = '0';
 		to[n++] = (unsigned char)('0' + station);

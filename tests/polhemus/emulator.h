@@ -58,6 +58,9 @@ struct emulator {
 	uint64_t random;
 	bool deaf;	   /* answers nothing */
 	const char *stuck; /* commands that it takes and forgets: "Hu" */
+	char flag;	   /* error character of each record; 0: as of its pose */
+	bool frozen;	   /* records repeat the pose of @frozen_slot */
+	uint64_t frozen_slot;
 
 	/* What the host set. */
 	bool binary, cm, continuous, mouse;

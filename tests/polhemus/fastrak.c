@@ -9,7 +9,9 @@
  * when that is given), or as a device of USB in a mounted FunctionFS. N are parts of a
  * million, of bytes and of records. On standard input: "unplug", "plug", "lost" (prints how
  * many records it did not send whole), "sent" (prints how many it was to send, and writes
- * to the EEPROM), "late N" (its periods end N µs later from now on).
+ * to the EEPROM), "late N" (its periods end N µs later from now on), "flag x" (each record has
+ * this error character from now on; "flag" alone: as before), "freeze" and "thaw" (records
+ * repeat one pose).
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -84,6 +86,11 @@ static bool command(void)
 		plug();
 	} else if (!strncmp(line, "late ", 5)) {
 		e.start_ns += atoi(line + 5) * INT64_C(1000);
+	} else if (!strncmp(line, "flag", 4)) {
+		e.flag = line[4] == ' ' ? line[5] : '\0';
+	} else if (!strcmp(line, "freeze\n") || !strcmp(line, "thaw\n")) {
+		e.frozen = *line == 'f';
+		e.frozen_slot = e.slot;
 	} else if (!strcmp(line, "lost\n")) {
 		snprintf(text, sizeof(text), "lost %zu", touched);
 		say(text);

@@ -8,13 +8,13 @@
 #include "loop_report.h"
 
 const char *const loop_flag_names[INCISE_TICK_FLAGS] = {
-	"contact", "extrapolated", "stale",   "clamped",  "fault",
-	"slewed",  "travel",	   "guarded", "starting", "not_finite",
+	"contact", "extrapolated", "stale",    "clamped",    "fault",	 "slewed",
+	"travel",  "guarded",	   "starting", "not_finite", "unusable",
 };
 
 const char *loop_flags_text(unsigned int flags, char *text)
 {
-	static const char letters[] = "cesofvtgrn";
+	static const char letters[] = "cesofvtgrnu";
 
 	_Static_assert(sizeof(letters) == INCISE_TICK_FLAGS + 1, "a letter for each");
 	for (int i = 0; letters[i]; i++)

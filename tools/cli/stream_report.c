@@ -105,3 +105,15 @@ json_t *stream_json(const struct incise_stream *streams, int n)
 	}
 	return array;
 }
+
+json_t *pose_json(const struct incise_pose_counts *poses)
+{
+	json_t *flags = json_object();
+
+	for (int i = 0; i < 128; i++)
+		if (poses->flagged[i])
+			json_object_set_new(flags, (char[]){(char)i, 0},
+					    json_integer((json_int_t)poses->flagged[i]));
+	return json_pack("{sI sI so}", "taken", (json_int_t)poses->poses, "unusable",
+			 (json_int_t)poses->unusable, "flags", flags);
+}

@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <jansson.h>
 #include <incise/recording.h>
+#include <incise/tracker.h>
 
 /* The heading of lines, and a line of one stream, both without a newline. */
 extern const char stream_heading[];
@@ -18,5 +19,8 @@ void stream_table(const struct incise_stream *streams, int n);
 
 /* An array of objects; NULL: no memory. */
 json_t *stream_json(const struct incise_stream *streams, int n);
+
+/* Poses taken and unusable, and counts by flag. */
+json_t *pose_json(const struct incise_pose_counts *poses);
 
 #endif

@@ -127,7 +127,8 @@ struct supervisor {
 	uint64_t overruns, skipped; /* since the last line of the log */
 	uint64_t overruns_all, skipped_all;
 	bool stale;
-	char refused[530]; /* reason of the last refused reload, or "" */
+	bool flags_reported[256]; /* of poses */
+	char refused[530];	  /* reason of the last refused reload, or "" */
 	int64_t report_ns, feed_ns, watchdog_ns;
 };
 
@@ -289,6 +290,20 @@ static void end_reload(struct supervisor *s)
 
 /* --- log and status --------------------------------------------------------------------- */
 
+/* Once for each flag: a tracker may set one and take it back many times a second. */
+static void report_flag(struct supervisor *s, char flag)
+{
+	bool *reported = &s->flags_reported[(unsigned char)flag];
+
+	if (!*reported)
+		cli_warn("the tracker flags poses '%c': %s; %s",
+			 flag > ' ' && flag <= '~' ? flag : '?', incise_pose_flag(flag),
+			 incise_pose_usable(flag)
+				 ? "they are used"
+				 : "they are not used, and the force fades");
+	*reported = true;
+}
+
 static void handle_events(struct supervisor *s)
 {
 	struct incise_loop_event events[32];
@@ -315,6 +330,9 @@ static void handle_events(struct supervisor *s)
 				break;
 			case INCISE_LOOP_NOT_FINITE:
 				cli_warn("the force was no number: none was asked for");
+				break;
+			case INCISE_LOOP_FLAGGED:
+				report_flag(s, (char)events[i].value);
 				break;
 			case INCISE_LOOP_PLAN:
 				break;

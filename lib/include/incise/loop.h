@@ -68,6 +68,7 @@ struct incise_loop_stats {
 	double force_max_N;		       /**< largest commanded */
 	double actuated_N;		       /**< of that along the actuator's axis */
 	double rendered_off2; /**< Σ (rendered - actuated a tick before)², N² */
+	struct incise_pose_counts poses; /**< at the end of the run */
 };
 
 /**

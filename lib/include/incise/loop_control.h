@@ -59,6 +59,7 @@ enum incise_loop_event_kind {
 	INCISE_LOOP_FRESH,	/**< fresh poses again, after value ms */
 	INCISE_LOOP_NOT_FINITE, /**< forces from here on were not finite, and are set to 0 */
 	INCISE_LOOP_PLAN,	/**< the offered plan is in force */
+	INCISE_LOOP_FLAGGED, /**< the tracker flags poses: value is another character */
 };
 
 /** An event for the log. */

@@ -185,8 +185,14 @@ enum incise_tick_flag {
 	INCISE_TICK_GUARDED = 128,    /**< the passivity guard added damping */
 	INCISE_TICK_STARTING = 256,   /**< waiting for a small force, ramping or fading */
 	INCISE_TICK_NOT_FINITE = 512, /**< the force was no number: none was asked for */
+	/** the tracker flags the newest pose: not used, by incise_pose_usable() */
+	INCISE_TICK_UNUSABLE = 1024,
 };
-#define INCISE_TICK_FLAGS 10 /**< how many there are */
+#define INCISE_TICK_FLAGS 11 /**< how many there are */
+
+/** Poses that the plan was given so far. Real-time safe; in the thread that ticks. */
+INCISE_API void incise_plan_poses(const struct incise_plan *plan,
+				  struct incise_pose_counts *counts) INCISE_REALTIME;
 
 /**
  * Let go: the actuator's nut is sent to 0, where nut and handle are at rest, as fast as

@@ -40,6 +40,7 @@ struct incise_recorder_setup {
 /** The state of a recorder: rows, losses, the last samples, the streams. */
 struct incise_recorder_stats {
 	uint64_t force, tracker, depth, frames; /**< rows */
+	struct incise_pose_counts poses; /**< of the tracker's rows; unusable: no depth */
 	uint64_t force_lost, tracker_lost, frames_lost;
 	uint64_t frames_unlooked; /**< vision had no time for them */
 	uint64_t force_clipped;	  /**< codes at either end of the range */

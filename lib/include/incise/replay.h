@@ -83,7 +83,8 @@ struct incise_replay_report {
 /**
  * Run the loop of a scene on a recording. A scene without a surface gets the plane of the rig
  * that was recorded; poses are of the recorded tracker. Records with an error status are fed
- * too, as live. Memory does not grow with the recording's length.
+ * too; as live, those that are no poses (incise_pose_usable()) are not used. Memory does not
+ * grow with the recording's length.
  *
  * @param stats as of incise_loop_run(), lateness only in real time; unchanged if the loop does
  *        not start

@@ -19,7 +19,7 @@ struct incise_tracker_sample {
 	uint64_t seq; /**< counts from 0; a gap is a lost record */
 	double position_mm[3]; /**< the tracked point, in the tracker's frame */
 	double quaternion[4];  /**< unit, w first; rotates the scalpel's frame into it */
-	char status;	       /**< the device's error character; ' ': none */
+	char status;	       /**< its flag, see incise_pose_usable(); ' ' or 0: none */
 	uint8_t station; /**< number of the sensor, from 1; the virtual rig's is 1 */
 	bool button;	 /**< of the stylus, pressed; false where there is none */
 	bool restarted; /**< first record after an interruption: periods have a new phase */
@@ -49,6 +49,44 @@ struct incise_tracker_info {
 	int stations;	    /**< sensors that send records; seq counts all of them */
 	int64_t grain_ns;   /**< grid of arrival times: 1000000 for USB; 0: none */
 };
+
+/** Poses, and their flags. */
+struct incise_pose_counts {
+	uint64_t poses;	       /**< all, with those that follow */
+	uint64_t unusable;     /**< see incise_pose_usable() */
+	uint64_t flagged[128]; /**< by their flag, usable or not; at '?' all others */
+};
+
+/**
+ * Whether a pose with this flag is a pose. This is the rule for all that use poses: one that is
+ * not usable is kept and counted, but moves nothing and gives no depth.
+ *
+ * Usable are ' ' and 0, no flag; and the flags of a FASTRAK or LIBERTY that concern something
+ * else than this measurement: m and w (its memory), t and u (its correction for metal does not
+ * cover this place), v (no video sync). rig.conf(5) lists all of them.
+ */
+INCISE_API bool incise_pose_usable(char status) INCISE_REALTIME;
+
+/** The meaning of a flag in a few words, for people; always a string. */
+INCISE_API const char *incise_pose_flag(char status);
+
+/** Count a pose. @return incise_pose_usable() */
+INCISE_API bool incise_pose_count(struct incise_pose_counts *counts,
+				  char status) INCISE_REALTIME;
+
+/** Add counts to others. */
+INCISE_API void incise_pose_counts_add(struct incise_pose_counts *counts,
+				       const struct incise_pose_counts *more)
+	INCISE_REALTIME;
+
+/**
+ * The flagged poses in one line: "3 of 361 poses were not used: 3 'x' (…)".
+ *
+ * @param text empty if no pose was flagged
+ * @return length of the line, as snprintf(3). Not real-time safe.
+ */
+INCISE_API int incise_pose_counts_text(const struct incise_pose_counts *counts,
+				       char *text, size_t size);
 
 struct incise_tracker;
 

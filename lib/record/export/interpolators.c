@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/tracker.h>
 #include "../../base/vector.h"
 #include "../schema.h"
 #include "interpolators.h"
@@ -558,7 +559,7 @@ static int more_pose(struct incise_blade_pose *blade, struct incise_error *err)
 		pose->q[i] = norm > 0 ? pose->q[i] / norm : NAN;
 	go_to_tip(blade, pose->q, pose->position_mm);
 	status = (const char *)sqlite3_column_text(stmt, 9);
-	pose->error = status[strspn(status, " ")] != 0;
+	pose->error = !incise_pose_usable(*status);
 	pose->station = sqlite3_column_int(stmt, 10);
 	pose->button = sqlite3_column_int(stmt, 11) != 0;
 	if (blade->pose[0].t_ns != INCISE_TIME_NONE)

@@ -380,8 +380,8 @@ static int write_tracker(struct incise_recorder *rec, const struct tracker_row *
 		return incise_recorder_fail(rec, err);
 	incise_ledger_row_tracker(&entry, row->t_ns, sample);
 	rc = enter(rec, &rec->streams[INCISE_LEDGER_TRACKER], &entry, err);
-	/* A record with an error status is kept, but gives no depth. */
-	if (!rc && sample->status == ' ' &&
+	/* A record that is no pose is kept, but gives no depth. */
+	if (!rc && incise_pose_count(&rec->stats.poses, sample->status) &&
 	    incise_depth_push(&rec->depth, sample->seq, row->t_ns, tip_mm, &depth))
 		rc = write_depth(rec, &depth, err);
 	return rc;
@@ -539,7 +539,7 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 					     (unsigned long long)sample->seq),
 			err);
 	}
-	if (sample->status == ' ') {
+	if (incise_pose_usable(sample->status)) {
 		tip_of(rec, sample, tip_mm);
 		rec->stats.depth_mm = incise_depth_of(&rec->depth, tip_mm);
 		zero_depth(rec, row.t_ns, rec->stats.depth_mm);

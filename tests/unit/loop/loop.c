@@ -363,6 +363,7 @@ static void test_quantile(void **state)
 /* Poses of a scalpel held still at a depth; or no more poses. */
 static double held_mm;
 static bool silent;
+static char held_status; /* the flag of each pose */
 static struct incise_clock *held_clock;
 static uint64_t held_seq;
 
@@ -374,7 +375,7 @@ static int held_tracker(struct incise_tracker *tracker,
 		.seq = held_seq++,
 		.position_mm = {0, 0, -held_mm},
 		.quaternion = {1, 0, 0, 0},
-		.status = ' ',
+		.status = held_status,
 		.station = 1,
 	};
 	return !silent;
@@ -386,7 +387,8 @@ struct seen {
 	struct incise_loop_control *control;
 	struct incise_plan *next;
 	volatile sig_atomic_t stop;
-	int n, stop_at, offer_at, silent_at, back_at;
+	int n, stop_at, offer_at, silent_at, back_at, flag_at;
+	char flag; /* of the poses from flag_at to back_at */
 	double slew_N, last_N, most_change_N, at_stop_N, last_but_stop_N;
 	double after_N; /* largest force after the change of plans */
 	bool changed;
@@ -406,8 +408,12 @@ static int look(void *context, const struct incise_tick *tick)
 	held_mm = fmin(10, 0.02 * seen->n);
 	if (seen->n == seen->silent_at)
 		silent = true;
-	if (seen->n == seen->back_at)
+	if (seen->n == seen->flag_at)
+		held_status = seen->flag;
+	if (seen->n == seen->back_at) {
 		silent = false;
+		held_status = ' ';
+	}
 	if (seen->n == seen->stop_at) {
 		seen->at_stop_N = force_N;
 		seen->stop = 1;
@@ -435,6 +441,7 @@ static void held_start(struct felt *f, struct incise_tracker_ops *ops, struct se
 	held_seq = 0;
 	held_mm = 0;
 	silent = false;
+	held_status = ' ';
 	seen->f = f;
 
 	seen->slew_N = FELT_SLEW_N_S / 1000;
@@ -567,6 +574,66 @@ static void test_events(void **state)
 	felt_end(&f);
 }
 
+/* A pose that its tracker flags ages as a missing one does, and the force fades. */
+static void test_flagged_poses_are_no_poses(void **state)
+{
+	static const struct {
+		char flag;
+		bool usable;
+	} cases[] = {{'x', false}, {'j', false}, {'?', false}, {'=', false},
+		     {'u', true},  {'t', true},	 {0, true}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		/* The force is noted at stop_at; options.stop is not set. */
+		struct seen seen = {.flag_at = 600,
+				    .flag = cases[i].flag,
+				    .stop_at = 1490,
+				    .back_at = 1500};
+		struct incise_loop_options options = {.rate_hz = 1000,
+						      .duration_ns = 2 * INCISE_NS_PER_S,
+						      .ticked = look,
+						      .context = &seen};
+		struct incise_tracker_ops ops;
+		struct felt f;
+
+		held_start(&f, &ops, &seen);
+		assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig),
+						 &options, &stats, NULL),
+				 0);
+		if (cases[i].usable ? !(seen.at_stop_N > 0.5) : seen.at_stop_N != 0)
+			fail_msg("flag '%c': %g N", cases[i].flag, seen.at_stop_N);
+		assert_true(seen.most_change_N <= seen.slew_N * (1 + 1e-9));
+		/* Stale 50 ms after the pose before tick 600, until that of tick 1501. */
+		if (!cases[i].usable)
+			assert_in_range(stats.flagged[2], 850, 860);
+		assert_true(seen.last_N > 0.5);
+		felt_end(&f);
+	}
+}
+
+/* A tracker that flags all its poses is given up as one that is lost: after 10 s. */
+static void test_a_stream_of_flagged_poses_ends(void **state)
+{
+	struct seen seen = {.flag_at = 600, .flag = 'x'};
+	struct incise_loop_options options = {.rate_hz = 1000,
+					      .duration_ns = 30 * INCISE_NS_PER_S,
+					      .ticked = look,
+					      .context = &seen};
+	struct incise_tracker_ops ops;
+	struct incise_error err = {0};
+	struct felt f;
+
+	held_start(&f, &ops, &seen);
+	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
+					 &stats, &err),
+			 -ENODEV);
+	assert_in_range(stats.ticks, 10600, 10602);
+	assert_non_null(strstr(err.text, "'x'"));
+	assert_non_null(strstr(err.text, "for 10 s"));
+	assert_true(seen.last_N == 0);
+	felt_end(&f);
+}
+
 /* Takes two and a half periods at each tick from the tenth on. */
 static int always_slow(struct incise_tracker *tracker,
 		       struct incise_tracker_sample *samples, int n)
@@ -618,6 +685,8 @@ int main(void)
 		cmocka_unit_test(test_a_plan_withdrawn),
 		cmocka_unit_test(test_events),
 		cmocka_unit_test(test_too_many_overruns),
+		cmocka_unit_test(test_flagged_poses_are_no_poses),
+		cmocka_unit_test(test_a_stream_of_flagged_poses_ends),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
