@@ -98,15 +98,17 @@ static int read_tracker_setup(struct incise_tracker_setup *setup,
 			      const config_setting_t *root, const char *path,
 			      struct incise_error *err)
 {
-	static const char *const keys[] = {"stations", "hemisphere", "sync", "offset_mm",
-					   NULL};
+	static const char *const keys[] = {"stations",	"hemisphere", "sync",
+					   "offset_mm", "repeat_ms",  NULL};
 	static const char *const syncs[] = {"internal", "external", "video", NULL};
 	const config_setting_t *group;
 	int sync = INCISE_TRACKER_INTERNAL;
 	int rc = group_of(root, "tracker_setup", path, keys, &group, err);
 
-	*setup = (struct incise_tracker_setup){
-		.n_stations = 1, .stations = {1}, .hemisphere = {1, 0, 0}};
+	*setup = (struct incise_tracker_setup){.n_stations = 1,
+					       .stations = {1},
+					       .hemisphere = {1, 0, 0},
+					       .repeat_ms = 100};
 	if (rc || !group)
 		return rc;
 	rc = read_stations(setup, group, path, err);
@@ -116,8 +118,11 @@ static int read_tracker_setup(struct incise_tracker_setup *setup,
 	if (!rc)
 		rc = read_word(group, path, "sync", syncs, &sync, err);
 	setup->sync = (enum incise_tracker_sync)sync;
+	if (!rc)
+		rc = incise_conf_vector(group, path, "offset_mm", setup->offset_mm, err);
 	return rc ? rc
-		  : incise_conf_vector(group, path, "offset_mm", setup->offset_mm, err);
+		  : incise_conf_number(group, path, "repeat_ms", 0, 60000,
+				       &setup->repeat_ms, err);
 }
 
 static int read_force_setup(struct incise_force_setup *setup,

@@ -204,6 +204,23 @@ in_the_tissue() {
 	[ "$(ask a.rec "SELECT count(*) FROM depth")" = 0 ]
 }
 
+@test "a tracker that sends one pose again and again renders no force, unless it may" {
+	plug_in
+	in_the_tissue
+	echo freeze >&9
+	run -0 --separate-stderr incise haptic a.scene --rig felt.conf --no-rt --duration 2s --json
+	echo "$output" >report.json
+	[[ "$stderr" == *"the tracker flags poses '=': the same pose again and again"*"they are not used"* ]]
+	[ "$(key report.json 'poses.flags."="')" = "$(key report.json poses.unusable)" ]
+	run -0 --separate-stderr incise capture -o a.rec --duration 2s
+	[[ "$stderr" == *"a.rec: "*" poses were not used: "*" '=' (the same pose again and again"* ]]
+	echo 'tracker_setup = { repeat_ms = 0; };' >>felt.conf
+	run -0 --separate-stderr incise haptic a.scene --rig felt.conf --no-rt --duration 1s --json
+	echo "$output" >report.json
+	[ -z "$stderr" ]
+	[ "$(key report.json poses.unusable)" = 0 ]
+}
+
 @test "a flag that only warns: poses are used, with a warning" {
 	plug_in
 	in_the_tissue

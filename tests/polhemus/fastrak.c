@@ -90,7 +90,7 @@ static bool command(void)
 		e.flag = line[4] == ' ' ? line[5] : '\0';
 	} else if (!strcmp(line, "freeze\n") || !strcmp(line, "thaw\n")) {
 		e.frozen = *line == 'f';
-		e.frozen_slot = e.slot;
+		e.frozen_slot = 1; /* one without a flag */
 	} else if (!strcmp(line, "lost\n")) {
 		snprintf(text, sizeof(text), "lost %zu", touched);
 		say(text);

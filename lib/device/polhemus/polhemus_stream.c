@@ -310,6 +310,7 @@ void polhemus_stream_broken(struct polhemus_stream *stream,
 	polhemus_records_init(&stream->records, layout);
 	stream->gaps.length = (unsigned int)polhemus_layout_length(layout);
 	polhemus_gaps_broken(&stream->gaps);
+	memset(stream->repeat, 0, sizeof(stream->repeat));
 }
 
 void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns)
@@ -320,13 +321,37 @@ void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns)
 			      memory_order_relaxed);
 }
 
+/*
+ * The record's flag, or '=' where its station sends the same pose for too long. Records are
+ * singles, which resolve 1e-5 mm: a thousandth of the noise.
+ */
+static char flag_of(struct polhemus_stream *stream, const struct polhemus_record *record)
+{
+	struct polhemus_repeat *repeat =
+		&stream->repeat[(record->station - 1) % POLHEMUS_STATIONS];
+	double pose[7], most_ns = stream->setup.repeat_ms * 1e6;
+
+	memcpy(pose, record->position_mm, sizeof(record->position_mm));
+	memcpy(pose + 3, record->quaternion, sizeof(record->quaternion));
+	if (!repeat->started || memcmp(pose, repeat->pose, sizeof(pose))) {
+		memcpy(repeat->pose, pose, sizeof(pose));
+		repeat->since_ns = record->t_ns;
+		repeat->started = true;
+	}
+	/* The device's own flag says more, unless it leaves the pose usable. */
+	return most_ns > 0 && (double)(record->t_ns - repeat->since_ns) > most_ns &&
+			       incise_pose_usable(record->status)
+		       ? '='
+		       : record->status;
+}
+
 static void put_sample(struct polhemus_stream *stream,
 		       const struct polhemus_record *record, uint64_t seq)
 {
 	struct incise_tracker_sample sample = {
 		.t_ns = record->t_ns,
 		.seq = seq,
-		.status = record->status,
+		.status = flag_of(stream, record),
 		.station = record->station,
 		.button = record->button,
 		.restarted = stream->restarted,

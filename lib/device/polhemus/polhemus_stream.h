@@ -2,7 +2,7 @@
 /*
  * From bytes of the device to samples in a ring:
  *
- *   bytes -> polhemus_records -> gaps: seq and losses -> offset, mm -> ring -> reader
+ *   bytes -> polhemus_records -> gaps: seq and losses -> flag, offset, mm -> ring -> reader
  *
  * No thread, no clock, no system call, so that tests have their own time, in ns.
  */
@@ -85,13 +85,21 @@ bool polhemus_gaps_add(struct polhemus_gaps *gaps, const struct polhemus_record 
 
 #define POLHEMUS_RING_S 4 /* capacity for samples at 240 Hz of four stations */
 
+/* A pose as it came, and since when the same one comes. */
+struct polhemus_repeat {
+	double pose[7]; /* position and quaternion */
+	int64_t since_ns;
+	bool started;
+};
+
 struct polhemus_stream {
 	struct incise_tracker_setup setup;
 	struct polhemus_records records;
 	struct polhemus_gaps gaps;
 	struct incise_ring ring; /* of struct incise_tracker_sample */
-	uint64_t overflowed;	 /* samples lost because the ring was full */
-	bool restarted;		 /* the next sample is marked so */
+	struct polhemus_repeat repeat[POLHEMUS_STATIONS];
+	uint64_t overflowed; /* samples lost because the ring was full */
+	bool restarted;	     /* the next sample is marked so */
 	_Atomic uint64_t lost;
 };
 

@@ -193,7 +193,7 @@ static int check(const struct incise_tracker_setup *setup, const char *where,
 		    setup->sync >= INCISE_TRACKER_INTERNAL &&
 		    setup->sync <= INCISE_TRACKER_VIDEO &&
 		    fabs(h[0] * h[0] + h[1] * h[1] + h[2] * h[2] - 1) <= 1e-3 &&
-		    isfinite(offset[0] + offset[1] + offset[2]);
+		    isfinite(offset[0] + offset[1] + offset[2]) && setup->repeat_ms >= 0;
 
 	for (int i = 0; good && i < setup->n_stations; i++)
 		good = setup->stations[i] >= 1 &&

@@ -230,7 +230,7 @@ struct incise_actuator {
 };
 
 /** Changes when a struct or value that backends use does. */
-#define INCISE_BACKEND_ABI 5
+#define INCISE_BACKEND_ABI 6
 
 /** Settings of rig.conf for a backend. */
 struct incise_backend_request {

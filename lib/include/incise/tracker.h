@@ -39,6 +39,12 @@ struct incise_tracker_setup {
 	double hemisphere[3]; /**< unit vector towards the sensor; default +x */
 	enum incise_tracker_sync sync;
 	double offset_mm[3]; /**< the tracked point in the sensor's frame; default 0 */
+	/**
+	 * A tracker that sends one and the same pose for longer, to the last digit, measures
+	 * nothing: its noise is larger than that. Its poses get the flag '=' then, which is
+	 * unusable. 0: never; default 100.
+	 */
+	double repeat_ms;
 };
 
 /** Properties of a tracker. */

@@ -304,6 +304,7 @@ static void without_groups_all_is_by_default(void **state)
 	assert_int_equal(all.tracker.n_stations, 1);
 	assert_int_equal(all.tracker.stations[0], 1);
 	assert_true(all.tracker.hemisphere[0] == 1 && all.tracker.offset_mm[2] == 0);
+	assert_true(all.tracker.repeat_ms == 100);
 	assert_int_equal(all.tracker.sync, INCISE_TRACKER_INTERNAL);
 	assert_true(all.force.rate_hz == 10000 && all.force.full_scale_V == 0);
 	assert_string_equal(all.force.trigger, "");
@@ -331,21 +332,23 @@ static void all_keys_are_read(void **state)
 	struct incise_error err = {0};
 	struct incise_rig_plan all;
 
-	if (read_all("tracker_setup = { stations = [2, 4]; hemisphere = [0.0, 0.0, -2.0];"
-		     " sync = \"external\"; offset_mm = [1.0, 2.0, 3.5]; };"
-		     "force_setup = { rate_hz = 5000; channel = 3; full_scale_V = 5.0;"
-		     " trigger = \"my trigger\"; };"
-		     "camera_setup = { width = 640; height = 480; rate_hz = 59.94;"
-		     " format = \"grey\"; exposure_ms = 4.5; gain = 10;"
-		     " white_balance_K = 5000; focus = 7; };"
-		     "vision = { hue = [170, 10]; saturation = [80, 255]; value = [9, 9];"
-		     " full_px = 400.5; roi = [8192, 0, 16, 8192]; };",
-		     &all, &err))
+	if (read_all(
+		    "tracker_setup = { stations = [2, 4]; hemisphere = [0.0, 0.0, -2.0];"
+		    " sync = \"external\"; offset_mm = [1.0, 2.0, 3.5]; repeat_ms = 0; };"
+		    "force_setup = { rate_hz = 5000; channel = 3; full_scale_V = 5.0;"
+		    " trigger = \"my trigger\"; };"
+		    "camera_setup = { width = 640; height = 480; rate_hz = 59.94;"
+		    " format = \"grey\"; exposure_ms = 4.5; gain = 10;"
+		    " white_balance_K = 5000; focus = 7; };"
+		    "vision = { hue = [170, 10]; saturation = [80, 255]; value = [9, 9];"
+		    " full_px = 400.5; roi = [8192, 0, 16, 8192]; };",
+		    &all, &err))
 		fail_msg("%s", err.text);
 	assert_int_equal(all.tracker.n_stations, 2);
 	assert_int_equal(all.tracker.stations[1], 4);
 	assert_true(all.tracker.hemisphere[2] == -1 && all.tracker.offset_mm[2] == 3.5);
 	assert_int_equal(all.tracker.sync, INCISE_TRACKER_EXTERNAL);
+	assert_true(all.tracker.repeat_ms == 0);
 	assert_true(all.force.rate_hz == 5000 && all.force.channel == 3 &&
 		    all.force.full_scale_V == 5);
 	assert_string_equal(all.force.trigger, "my trigger");
@@ -382,6 +385,7 @@ static void what_is_wrong_is_said(void **state)
 		{"tracker_setup = { sync = \"slow\"; };",
 		 "expected one of internal, external, video, found \"slow\""},
 		{"tracker_setup = { offset_mm = [1.0, 2.0]; };", "offset_mm"},
+		{"tracker_setup = { repeat_ms = -1; };", "repeat_ms"},
 		{"\nforce_setup = { rate_hz = 0.5; };", "rig.conf:2: "},
 		{"force_setup = { rate_hz = 100001; };", "rate_hz"},
 		{"force_setup = { channel = -1; };", "channel"},

@@ -631,6 +631,56 @@ static void pulled_out(void **state)
 	}
 }
 
+/* A pose that stays the same to its last digit is flagged, from repeat_ms on; others are not. */
+static void one_pose_again_and_again(void **state)
+{
+	static const struct {
+		enum emulator_kind kind;
+		int stations;
+		double repeat_ms;
+	} cases[] = {
+		{EMULATOR_FASTRAK, 1, 100}, {EMULATOR_FASTRAK, 4, 100},
+		{EMULATOR_LIBERTY, 2, 100}, {EMULATOR_PATRIOT, 1, 250},
+		{EMULATOR_FASTRAK, 1, 0},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		int64_t repeat_ns = (int64_t)(cases[i].repeat_ms * 1e6), from_ns, to_ns;
+		int64_t since_ns[EMULATOR_STATIONS] = {0};
+		size_t flagged = 0;
+		struct bench b;
+
+		bench_init(&b, cases[i].kind, cases[i].stations);
+		b.stream.setup.repeat_ms = cases[i].repeat_ms;
+		bench_run(&b, 2);
+		from_ns = b.line.now_ns;
+		b.e.frozen = true;
+		b.e.frozen_slot = b.e.slot;
+		bench_run(&b, 1);
+		to_ns = b.line.now_ns;
+		b.e.frozen = false;
+		bench_run(&b, 2);
+		for (size_t k = 0; k < b.n; k++) {
+			const struct incise_tracker_sample *s = &b.samples[k];
+			int64_t *since = &since_ns[s->station - 1];
+			bool same = s->t_ns > from_ns && s->t_ns <= to_ns;
+
+			if (same && !*since)
+				*since = s->t_ns;
+			same = same && repeat_ns && s->t_ns - *since > repeat_ns;
+			if ((s->status == '=') != same)
+				fail_msg("case %zu: sample %zu, at %.4f s, has '%c'", i,
+					 k, (double)(s->t_ns - from_ns) * 1e-9,
+					 s->status);
+			flagged += same;
+		}
+		/* So it was tried. */
+		assert_int_equal(flagged > 0, repeat_ns > 0);
+		assert_int_equal(polhemus_stream_lost(&b.stream), 0);
+		bench_free(&b);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -651,6 +701,7 @@ int main(void)
 		cmocka_unit_test(the_tip),
 		cmocka_unit_test(no_room),
 		cmocka_unit_test(pulled_out),
+		cmocka_unit_test(one_pose_again_and_again),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
