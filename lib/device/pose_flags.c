@@ -2,10 +2,10 @@
 /*
  * The flags of poses: which of them make a pose unusable, and their meaning.
  *
- * Letters are the maker's: FASTRAK user manual, rev. G (2012), command T; error codes of the
- * LIBERTY, rev. H, and PATRIOT, rev. J. Where models differ in the meaning of a letter, its
- * text holds for each. A letter that is not in the table is of a self-test that failed, or
- * unknown: its pose is not used.
+ * Letters are the maker's: of a FASTRAK by its user manual, rev. G (2012), page 71; of LIBERTY
+ * and PATRIOT as public drivers list them, after the maker's "Error Code Summary". Where models
+ * differ in the meaning of a letter, its text holds for each. A letter that is not in the table
+ * is of a self-test that failed, or unknown: its pose is not used.
  */
 #include <stdio.h>
 #include <incise/tracker.h>
