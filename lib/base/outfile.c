@@ -70,10 +70,28 @@ static int open_temp(struct incise_outfile *file)
 	return fd;
 }
 
+/*
+ * Give the new file the mode, owner and group of the one that it replaces, before it has any
+ * content. Only root may keep another's owner. Where the group cannot be kept either, the
+ * writer's own group gets no more than all users have.
+ */
+static int keep_access(int fd, const struct stat *old)
+{
+	mode_t mode = old->st_mode & 0777;
+	struct stat st;
+
+	if (fchown(fd, old->st_uid, old->st_gid) && fchown(fd, -1, old->st_gid))
+		mode &= ~(mode_t)070 | (mode & 07) << 3;
+	if (fstat(fd, &st))
+		return -1;
+	return (st.st_mode & 07777) == mode ? 0 : fchmod(fd, mode);
+}
+
 struct incise_outfile *incise_outfile_open(const char *path, struct incise_error *err)
 {
 	struct incise_outfile *file = calloc(1, sizeof(*file));
 	struct stat st;
+	bool exists;
 	int fd;
 
 	if (!file)
@@ -91,11 +109,12 @@ struct incise_outfile *incise_outfile_open(const char *path, struct incise_error
 		file->stream = stdout;
 		return file;
 	}
-	if (!*path || (!stat(path, &st) && S_ISDIR(st.st_mode))) {
+	exists = !stat(path, &st);
+	if (!*path || (exists && S_ISDIR(st.st_mode))) {
 		errno = *path ? EISDIR : ENOENT;
 		goto fail;
 	}
-	if (!stat(path, &st) && !S_ISREG(st.st_mode)) {
+	if (exists && !S_ISREG(st.st_mode)) {
 		fd = open(path, O_WRONLY | O_CLOEXEC);
 	} else {
 		file->temp = temp_name(file->target);
@@ -103,9 +122,14 @@ struct incise_outfile *incise_outfile_open(const char *path, struct incise_error
 	}
 	if (fd < 0)
 		goto fail;
-	file->stream = fdopen(fd, "w");
-	if (!file->stream) {
+	if ((file->temp && exists && keep_access(fd, &st)) ||
+	    !(file->stream = fdopen(fd, "w"))) {
+		int code = errno;
+
 		close(fd);
+		if (file->linked)
+			unlink(file->temp);
+		errno = code;
 		goto fail;
 	}
 	return file;

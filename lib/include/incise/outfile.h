@@ -18,10 +18,11 @@ struct incise_outfile;
 
 /**
  * Open a file for writing. "-" is standard output; a path that exists and is not a
- * regular file (a pipe, /dev/null) is written directly; a symbolic link is followed.
+ * regular file (a pipe, /dev/null) is written directly; a symbolic link is followed. A file
+ * that is replaced keeps its mode, and its owner and group as far as this process may.
  *
  * @return file, to be ended with incise_outfile_commit() or incise_outfile_abort(); NULL
- *         with errno of open(2), ENOMEM, EISDIR.
+ *         with errno of open(2), fchmod(2), ENOMEM, EISDIR.
  */
 INCISE_API struct incise_outfile *incise_outfile_open(const char *path,
 						      struct incise_error *err);

@@ -9,6 +9,8 @@
 #include <cmocka.h>
 #include <dirent.h>
 #include <errno.h>
+#include <grp.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -180,6 +182,71 @@ static void test_link_is_written_through(void **state)
 	assert_string_equal(content(), "new");
 }
 
+/* A file that is replaced keeps its mode, owner and group, through a link too. */
+static void test_mode_and_owner_stay(void **state)
+{
+	static const mode_t modes[] = {0640, 0600, 0664, 0444};
+	const bool root = !geteuid();
+	struct incise_outfile *file = incise_outfile_open(path, NULL);
+	char link[80];
+	struct stat st;
+
+	fputs("old", incise_outfile_stream(file));
+	assert_int_equal(incise_outfile_commit(file, NULL), 0);
+	snprintf(link, sizeof(link), "%s/link", folder);
+	assert_int_equal(symlink("file", link), 0);
+	for (size_t i = 0; i < sizeof(modes) / sizeof(*modes); i++) {
+		/* Others than this process has: only root may give files away. */
+		assert_int_equal(
+			chown(path, root ? 1234 : geteuid(), root ? 5678 : getegid()), 0);
+		assert_int_equal(chmod(path, modes[i]), 0);
+		file = incise_outfile_open(i % 2 ? link : path, NULL);
+		assert_non_null(file);
+		fputs("new", incise_outfile_stream(file));
+		assert_int_equal(incise_outfile_commit(file, NULL), 0);
+		assert_int_equal(stat(path, &st), 0);
+		assert_int_equal(st.st_mode & 07777, modes[i]);
+		assert_int_equal(st.st_uid, root ? 1234 : geteuid());
+		assert_int_equal(st.st_gid, root ? 5678 : getegid());
+	}
+	assert_int_equal(lstat(link, &st), 0);
+	assert_true(S_ISLNK(st.st_mode));
+}
+
+/*
+ * Who may not keep the group, as the folder is theirs but the file is not, gives the new group
+ * no more than everyone has.
+ */
+static void test_another_group_gets_no_more(void **state)
+{
+	struct incise_outfile *file;
+	struct stat st;
+	int status;
+	pid_t child;
+	FILE *old;
+
+	if (geteuid())
+		skip(); /* only root makes a file of others */
+	assert_int_equal(chown(folder, 1234, 1234), 0);
+	old = fopen(path, "w");
+	assert_non_null(old);
+	fclose(old);
+	assert_int_equal(chmod(path, 0664), 0);
+	child = fork();
+	if (!child) {
+		if (setgroups(0, NULL) || setgid(1234) || setuid(1234))
+			_exit(2);
+		file = incise_outfile_open(path, NULL);
+		_exit(!file || incise_outfile_commit(file, NULL));
+	}
+	assert_int_equal(waitpid(child, &status, 0), child);
+	assert_int_equal(status, 0);
+	assert_int_equal(stat(path, &st), 0);
+	assert_int_equal(st.st_uid, 1234);
+	assert_int_equal(st.st_gid, 1234);
+	assert_int_equal(st.st_mode & 07777, 0644);
+}
+
 /* Devices and pipes are written in place: there is nothing to rename. */
 static void test_special_files(void **state)
 {
@@ -206,6 +273,10 @@ int main(void)
 		cmocka_unit_test_setup_teardown(test_killed_writer, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(test_failed_write, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(test_link_is_written_through, set_up,
+						tear_down),
+		cmocka_unit_test_setup_teardown(test_mode_and_owner_stay, set_up,
+						tear_down),
+		cmocka_unit_test_setup_teardown(test_another_group_gets_no_more, set_up,
 						tear_down),
 		cmocka_unit_test(test_refusals),
 		cmocka_unit_test(test_special_files),
