@@ -397,11 +397,10 @@ static int let_go(struct incise_rig *rig, struct incise_error *err)
 
 static const char *const phases[] = {"free", "cutting", "insertion"};
 
-/* Write them as CSV, under the file's final name. */
-static void write_log(struct incise_outfile *file, const struct incise_tick *ticks,
-		      size_t n)
+/* Write them as CSV, under the file's final name; 0 or a negative errno. */
+static int write_log(struct incise_outfile *file, const struct incise_tick *ticks,
+		     size_t n, struct incise_error *err)
 {
-	struct incise_error err = {0};
 	char flags[INCISE_TICK_FLAGS + 1];
 	FILE *out;
 
@@ -423,8 +422,7 @@ static void write_log(struct incise_outfile *file, const struct incise_tick *tic
 			t->rendered_N, loop_flags_text(t->flags, flags), phases[t->phase],
 			t->command_N[0], t->command_N[1], t->command_N[2]);
 	}
-	if (incise_outfile_commit(file, &err))
-		cli_fail_with(&err);
+	return incise_outfile_commit(file, err);
 }
 
 /* Memory for all ticks of a run; at most half of the machine's. */
@@ -562,7 +560,7 @@ int main(int argc, char **argv)
 {
 	static struct incise_loop_stats stats;
 	struct incise_outfile *file = NULL;
-	struct incise_error err = {0}, left = {0};
+	struct incise_error err = {0}, left = {0}, log_err = {0};
 	struct haptic *haptic;
 	struct job job = {0};
 	int rc, released;
@@ -606,14 +604,19 @@ int main(int argc, char **argv)
 				    : "");
 	incise_state_free(haptic->state);
 	if (job.log)
-		write_log(file, haptic->loop.log, stats.logged);
+		write_log(file, haptic->loop.log, stats.logged, &log_err);
 	if (job.json)
 		report_json(haptic);
 	else if (!job.log || strcmp(job.log, "-"))
 		report_text(haptic);
 	cli_finish();
 	finish(&job);
+	/* The run cannot be repeated: its summary comes first, with or without its log. */
+	if (rc && log_err.code)
+		cli_warn("%s", log_err.text);
 	if (rc)
 		cli_fail("%s: %s", haptic->argument.path, err.text);
+	if (log_err.code)
+		cli_fail_with(&log_err);
 	return 0;
 }

@@ -324,6 +324,16 @@ refuses() {
 	[ "$(cat l.csv)" = old ]
 }
 
+@test "haptic: a full disk loses the log, not the summary of the run" {
+	run --separate-stderr incise haptic liver.scene --rig $quick --duration 1s --log /dev/full
+	failed_with /dev/full "No space left"
+	[[ "$output" == *"1000 ticks at 1000 Hz"* && "$output" == *"force      largest"* ]] ||
+		complain "$output"
+	run --separate-stderr incise haptic liver.scene --rig $quick --duration 1s --log /dev/full --json
+	failed_with /dev/full "No space left"
+	[ "$(jq .ticks <<<"$output")" = 1000 ]
+}
+
 @test "the log to standard output is all that is there" {
 	incise haptic liver.scene --rig $quick --duration 200ms --log - >out
 	incise haptic liver.scene --rig $quick --duration 200ms --log l.csv >report
