@@ -3,6 +3,7 @@
 # a pty; see tests/can/README.md. tests/vm/guest/can_drive.sh has it on a CAN interface.
 
 load cli
+load document
 # shellcheck source=tests/can/peer.sh
 . "${BATS_TEST_DIRNAME}/../can/peer.sh"
 
@@ -168,6 +169,34 @@ ended() {
 	[ "$(drive_value position)" -eq 25600 ]
 	run -0 --separate-stderr incise stepper enable --for 300ms --rig rig.conf
 	drive_is "switch-on disabled"
+}
+
+# The first steps of a new rig, as they are typed: on a drive that was never homed.
+@test "every motor command of tutorial, README and manual page works on a drive" {
+	local document command failed= n=0 try code deadman_ms=1000
+	local -a words
+	for document in doc/tutorial.md README.md man/incise-stepper.1; do
+		rig
+		while read -r command; do
+			# What ends at Ctrl-C is given an end, and ten times take long.
+			command=${command/--repeat 10/--repeat 2}
+			case $command in
+			*" enable" | *" --follow") command+=" --for 300ms" ;;
+			esac
+			read -ra words <<<"$command"
+			# As in begin(): a drive that the machine held up is another matter.
+			for try in 1 2 3; do
+				code=0
+				"${words[@]}" >out 2>err </dev/null 3>&- 7>&- || code=$?
+				grep -q "nobody answers at node" err || break
+			done
+			[ "$code" -eq 0 ] || failed+="$document: $command: $code $(cat err);"
+			n=$((n + 1))
+		done < <(typed_in "$root/$document" | grep '^incise stepper ')
+		drive_end
+	done
+	[ "$n" -ge 12 ] || complain "only $n are found"
+	[ -z "$failed" ] || complain "$failed"
 }
 
 # fault VERB… -- COMMAND…: what the drive is told while that runs; then ended TEXT.

@@ -83,3 +83,32 @@ setup() {
 		done
 	done <lines
 }
+
+# Parsed by the programs themselves, in a folder without a rig that opens: what is more than
+# bad usage (2) fails for want of devices or files, or runs until it is killed.
+@test "every command that a document, a manual page or a help text gives is one" {
+	local document command n=0 code
+	local -a words
+	export -n DISPLAY WAYLAND_DISPLAY
+	echo 'no rig' >rig.conf
+	mkdir help
+	for document in "$INCISE_BUILD"/bin/incise*; do
+		"$document" --help >"help/${document##*/}.help"
+	done
+	for document in "$root"/{README,CONTRIBUTING,doc/tutorial,doc/device-backend,tests/can/README}.md \
+		"$root"/man/*.[158] help/*.help; do
+		typed_in "$document" | sed "s|^|${document##*/}\t|"
+	done | grep -v '[…$]' | sort -u -t $'\t' -k 2 >typed
+	[ "$(wc -l <typed)" -ge 120 ] || complain "only $(wc -l <typed) are found"
+	: >wrong
+	while IFS=$'\t' read -r document command; do
+		mapfile -t words < <(xargs printf '%s\n' <<<"$command")
+		code=0
+		timeout -k 1 1 "${words[@]}" >/dev/null 2>err </dev/null || code=$?
+		# Who asks for weights needs somebody who answers.
+		[ "$code" -ne 2 ] || grep -q "no terminal to ask" err || echo "$document: $command: $(head -n 1 err)" >>wrong
+		n=$((n + 1))
+	done <typed
+	[ "$n" -eq "$(wc -l <typed)" ]
+	[ ! -s wrong ] || complain "$(cat wrong)"
+}

@@ -131,7 +131,8 @@ bool depth_is_recording(const char *path)
 {
 	struct stat st;
 
-	return !stat(path, &st) && S_ISDIR(st.st_mode);
+	/* One that is not there fails by its name. */
+	return cli_ends_with(path, ".rec") || (!stat(path, &st) && S_ISDIR(st.st_mode));
 }
 
 bool depth_is_csv(const char *path)
