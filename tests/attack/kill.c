@@ -62,6 +62,11 @@ static void attack(struct round *round, int count)
 			nap(MS / 2);
 		if (stat("a.rec.part", &st))
 			fail(round, "does not begin: %s", text_of("err"));
+		/* Every other one is killed after its first rows came to the disk. */
+		for (int i = 0;
+		     round->number % 2 && round->page->seq[WATCH_FORCE] < 0 && i < 40000;
+		     i++)
+			nap(MS / 2);
 		canary.late_ns = 0;
 		nap(delay_ns);
 		took_ns = round->page->took_ns;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Loaded into incise capture by LD_PRELOAD: a disk that now and then does not answer. Who asks
- * it to write through meanwhile, of any thread, waits until the end of that time.
+ * it to write through meanwhile, of any thread, waits until the end of that time, which is counted
+ * from the first who asks.
  *
  *     first sync           first_ms      + stall_ms           + every_ms
  *     of the recording ────────┬─────────────┬────────────────────┬──────
@@ -10,7 +11,7 @@
  * STALL_FIRST_MS, STALL_EVERY_MS (0: just once), STALL_MS.
  */
 #include <dlfcn.h>
-#include <stdatomic.h>
+#include <pthread.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <time.h>
@@ -36,19 +37,24 @@ static int64_t number(const char *name)
 
 static void answer(void)
 {
-	static _Atomic int64_t started_ms;
-	int64_t none = 0, first_ms = number("STALL_FIRST_MS");
-	int64_t every_ms = number("STALL_EVERY_MS"), stall_ms = number("STALL_MS"), at_ms;
+	static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+	static int64_t due_ms = -1, until_ms;
+	int64_t rest_ms, every_ms = number("STALL_EVERY_MS");
 	struct timespec rest;
 
-	atomic_compare_exchange_strong(&started_ms, &none, now_ms());
-	at_ms = now_ms() - started_ms - first_ms;
-	if (every_ms > 0 && at_ms > 0)
-		at_ms %= every_ms;
-	if (at_ms < 0 || at_ms >= stall_ms)
+	pthread_mutex_lock(&mutex);
+	if (due_ms < 0)
+		due_ms = now_ms() + number("STALL_FIRST_MS");
+	if (now_ms() >= due_ms) {
+		until_ms = now_ms() + number("STALL_MS");
+		due_ms = every_ms > 0 ? now_ms() + every_ms : INT64_MAX;
+	}
+	rest_ms = until_ms - now_ms();
+	pthread_mutex_unlock(&mutex);
+	if (rest_ms <= 0)
 		return;
-	rest.tv_sec = (stall_ms - at_ms) / 1000;
-	rest.tv_nsec = (stall_ms - at_ms) % 1000 * 1000000L;
+	rest.tv_sec = rest_ms / 1000;
+	rest.tv_nsec = rest_ms % 1000 * 1000000L;
 	nanosleep(&rest, NULL);
 }
 

@@ -7,11 +7,8 @@
 load ../cli/cli
 load ../cli/fastrak
 
-# A host that itself stood still meanwhile loses samples, which is not tested here: a test may
-# be repeated twice.
-BATS_TEST_RETRIES=2
-
 setup() {
+	watch_machine
 	memory_folder
 	export INCISE_MODULE_PATH=$INCISE_BUILD/lib/incise
 	cat >rig.conf <<-END
@@ -26,7 +23,9 @@ setup() {
 	END
 }
 
+# Buffers hold a second more than the stalls here.
 teardown() {
+	machine_watched 500
 	pull_away
 	left_memory
 }
@@ -107,8 +106,9 @@ agreed() {
 	agreed
 	[ "$(key report.json tracker_lost)" = 0 ]
 	straight 120
-	# 10 kHz, and room for 2.5 s of them; numbers tell what is between
-	holds "$(key report.json force_lost) > 14000 && $(key report.json force_lost) < 25000"
+	# 10 kHz, and room for 2.5 s of them; a machine that is late adds to it. Numbers show what is
+	# between.
+	holds "$(key report.json force_lost) > 14000"
 	[ "$(ask a.rec 'SELECT max(seq) - min(seq) + 1 - count(*) FROM force')" = \
 		"$(key report.json force_lost)" ]
 	! pictures_can_be_recorded || holds "$(key report.json frames_lost) > 20"

@@ -29,10 +29,13 @@ setup_file() {
 setup() {
 	[ -x "$INCISE_BUILD/tests/can/drive" ] ||
 		skip "python-canopen is not there; see tests/can/venv"
+	watch_machine
 	work_folder
 }
 
+# A drive is lost after 200 ms, and four programs take part in an answer.
 teardown() {
+	machine_watched 50
 	[ -z "${pid:-}" ] || kill -9 "$pid" 2>/dev/null || :
 	drive_end
 }

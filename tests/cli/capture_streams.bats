@@ -5,14 +5,14 @@ load cli
 
 quick=sim:clock=simulated
 
-# Two of the tests are in real time, and a host that stands still for seconds loses samples.
-BATS_TEST_RETRIES=2
-
 setup() {
+	watch_machine
 	memory_folder
 }
 
+# Two of the tests are in real time; buffers hold 2 s.
 teardown() {
+	machine_watched 500
 	left_memory
 }
 

@@ -42,6 +42,42 @@ left_memory() {
 	[ -z "$in_memory" ] || rm -rf "$in_memory"
 }
 
+# For tests in real time, in which programs have to answer each other within so many ms:
+# watch_machine in setup(), machine_watched MS in teardown(). A witness wants to run every 5 ms. A
+# test that fails is repeated where the machine let the witness wait for MS or more meanwhile, and
+# nowhere else; after three such tries it is skipped with that reason.
+watch_machine() {
+	late=$BATS_FILE_TMPDIR/late.$BATS_TEST_NUMBER
+	[ "${BATS_TEST_TRY_NUMBER:-1}" -le 3 ] ||
+		skip "failed three times on a machine that stood still for up to $(cat "$late") ms each time"
+	rm -f "$late"
+	python3 - "$late" 3>&- <<-'END' &
+		import os, sys, time
+		most = -1
+		next = time.monotonic()
+		while os.getppid() > 1:
+		    now = time.monotonic()
+		    if int(1000 * (now - next)) > most:
+		        most = int(1000 * (now - next))
+		        with open(sys.argv[1] + '.new', 'w') as file:
+		            file.write(str(most))
+		        os.rename(sys.argv[1] + '.new', sys.argv[1])
+		    next = max(next, now) + 0.005
+		    time.sleep(max(0, next - time.monotonic()))
+	END
+	witness=$!
+	until [ -s "$late" ] || ! kill -0 $witness; do sleep 0.02; done
+}
+
+machine_watched() {
+	[ -n "${witness:-}" ] || return 0
+	sleep 0.02 # it counts a wait that just ended
+	kill $witness 2>/dev/null || :
+	wait $witness 2>/dev/null || :
+	BATS_TEST_RETRIES=0
+	[ "$(cat "$late")" -lt "$1" ] || BATS_TEST_RETRIES=3
+}
+
 complain() {
 	echo "$*"
 	return 1

@@ -51,7 +51,7 @@ $good" 0
 	[ "${lines[-1]}" = "2 passed, 1 failed, 2 skipped" ]
 }
 
-@test "a unit test that cannot be built keeps the others from nothing" {
+@test "where a unit test cannot be built, the others run" {
 	mkdir -p tests/unit/x
 	program tests/unit/x/good "$good" 0
 	run make --no-print-directory -C "$root" O="$INCISE_BUILD" DEPS=no check-unit \
@@ -84,6 +84,32 @@ $good" 0
 		all that was printed: times.d/PART
 		4 passed, 3 failed, 3 skipped
 	END
+}
+
+@test "a test in real time is repeated where the machine stood still, and nowhere else" {
+	# Lines that begin with @test would be tests of this file.
+	sed 's/^ */@test /' >late.bats <<-'END'
+		"fails in time" { false; }
+		"fails late" { stands_still; false; }
+		"fails late once" { stands_still; [ "$(wc -l <"$counts/3")" = 2 ]; }
+		"passes" { stands_still; }
+	END
+	cat >>late.bats <<-'END'
+		load "$tree/tests/cli/cli"
+		setup() { watch_machine; echo >>"$counts/$BATS_TEST_NUMBER"; }
+		teardown() { machine_watched 100; }
+		stands_still() { kill -STOP $witness; sleep 0.2; kill -CONT $witness; }
+	END
+	mkdir counts
+	run env -i PATH="$(tr : '\n' <<<"$PATH" | grep -v bats-core | paste -sd :)" HOME="$PWD" \
+		INCISE_BUILD="$INCISE_BUILD" tree="$root" counts="$PWD/counts" bats late.bats
+	echo "$output"
+	# A machine that is late by itself repeats more.
+	grep -qE "^(not ok 1 |ok 1 .* # skip )" <<<"$output"
+	grep -q "^ok 2 fails late # skip failed three times on a machine that stood still for up to" <<<"$output"
+	grep -qx "ok 3 fails late once" <<<"$output"
+	grep -qx "ok 4 passes" <<<"$output"
+	[ "$(wc -l <counts/2) $(wc -l <counts/4)" = "3 1" ]
 }
 
 @test "a program that is left running holds no part up" {

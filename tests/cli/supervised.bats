@@ -5,16 +5,16 @@
 load cli
 load stepper_module
 
-# A host that stands still for seconds takes the time that a watchdog gives.
-BATS_TEST_RETRIES=2
-
 setup() {
+	watch_machine
 	memory_folder
 	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" "$root/scenes/wall.scene" .
 	module_folder
 }
 
+# The shortest watchdog is one of 400 ms.
 teardown() {
+	machine_watched 200
 	[ -z "${pid:-}" ] || kill -9 "$pid" 2>/dev/null || :
 	[ -z "${listener:-}" ] || kill "$listener" 2>/dev/null || :
 	left_memory
