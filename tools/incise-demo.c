@@ -5,9 +5,12 @@
  *
  *   capture ─▶ export ─▶ train ─▶ haptic     each printed as "$ incise …"
  *                 └────────┴────────┴───────┴──▶ plots, summary
+ *
+ * Until it is complete the folder holds a file .unfinished: the next run replaces it.
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <spawn.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -75,6 +78,29 @@ static void make_folder(const char *folder, bool may_exist)
 			 errno == EEXIST ? "; give another -o DIR, or --force" : "");
 }
 
+/* Make the folder of a demo, or take one that a demo has not completed. */
+static void begin_folder(const char *folder, bool may_exist)
+{
+	char *mark = cli_text("%s/.unfinished", folder);
+	int fd;
+
+	make_folder(folder, may_exist || !access(mark, F_OK));
+	fd = open(mark, O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+	if (fd < 0)
+		cli_fail("%s: %s", mark, strerror(errno));
+	close(fd);
+	free(mark);
+}
+
+static void end_folder(const char *folder)
+{
+	char *mark = cli_text("%s/.unfinished", folder);
+
+	if (unlink(mark))
+		cli_fail("%s: %s", mark, strerror(errno));
+	free(mark);
+}
+
 static void print_step(const struct demo *demo, const char *what)
 {
 	static int number;
@@ -114,42 +140,85 @@ static pid_t start(char *const *argv, int out)
 	return pid;
 }
 
-static int wait_for(pid_t pid, char *const *argv, struct incise_error *err)
+/* A signal to this process alone is handed on; by Ctrl-C all have got it. */
+static void stop_with(pid_t pid)
+{
+	static pid_t stopped;
+
+	if (!cli_stop || stopped == pid)
+		return;
+	stopped = pid;
+	kill(pid, SIGTERM);
+}
+
+static int wait_for(pid_t pid, char *const *argv, const char *folder,
+		    struct incise_error *err)
 {
 	int status;
 
 	while (waitpid(pid, &status, 0) < 0 && errno == EINTR)
-		;
+		stop_with(pid);
+	/* However it ended. */
+	if (cli_stop)
+		demo_interrupted(folder);
 	if (!status)
 		return 0;
-	return incise_error_set(err, ECANCELED, "'incise %s' failed, see the line above",
-				argv[0]);
+	return incise_error_set(
+		err, ECANCELED,
+		"'incise %s' failed, see the line above; the folder %s holds "
+		"what was done until then",
+		argv[0], folder);
+}
+
+/* Read the output of a command to its end, which comes after its last signal. */
+static char *read_output(int fd, pid_t pid)
+{
+	size_t size = 0, n = 0;
+	char *text = NULL;
+	ssize_t got;
+
+	do {
+		if (n + 1 >= size) {
+			size = size ? 2 * size : 65536;
+			text = realloc(text, size);
+			if (!text)
+				cli_fail("no memory");
+		}
+		got = read(fd, text + n, size - 1 - n);
+		if (got < 0 && errno == EINTR)
+			stop_with(pid);
+		else if (got > 0)
+			n += (size_t)got;
+	} while (got > 0 || (got < 0 && errno == EINTR));
+	text[n] = 0;
+	return text;
 }
 
 /* Run a command to its end, and read the JSON that it prints; NULL with the error. */
-static json_t *read_report(char *const *argv, struct incise_error *err)
+static json_t *read_report(char *const *argv, const char *folder,
+			   struct incise_error *err)
 {
 	json_error_t why = {.text = "no memory"};
 	json_t *report;
 	int pipe_fd[2];
+	char *text;
 	pid_t pid;
-	FILE *in;
 
 	if (pipe2(pipe_fd, O_CLOEXEC))
 		cli_fail("pipe: %s", strerror(errno));
 	pid = start(argv, pipe_fd[1]);
 	close(pipe_fd[1]);
-	in = fdopen(pipe_fd[0], "r");
-	report = in ? json_loadf(in, 0, &why) : NULL;
-	if (in)
-		fclose(in);
-	if (wait_for(pid, argv, err)) {
-		json_decref(report);
+	text = read_output(pipe_fd[0], pid);
+	close(pipe_fd[0]);
+	if (wait_for(pid, argv, folder, err)) {
+		free(text);
 		return NULL;
 	}
+	report = json_loads(text, 0, &why);
 	if (!report)
 		incise_error_set(err, EINVAL, "'incise %s' printed no report: %s",
 				 argv[0], why.text);
+	free(text);
 	return report;
 }
 
@@ -165,10 +234,9 @@ static json_t *run_command(const struct demo *demo, char *const *argv)
 
 	if (!demo->quiet)
 		print_command(argv);
-	report = read_report(argv, &err);
+	report = read_report(argv, demo->folder, &err);
 	if (!report)
-		cli_fail("%s; the folder %s holds what was done until then", err.text,
-			 demo->folder);
+		cli_fail_with(&err);
 	return report;
 }
 
@@ -261,12 +329,12 @@ static void walk(struct demo *demo, const char *loop_time)
 /* Near the cut, from the side and above. */
 #define NEAR "18,40,150"
 
-static void run_view(char *const *argv)
+static void run_view(char *const *argv, const char *folder)
 {
 	struct incise_error err = {0};
 
 	print_command(argv);
-	if (wait_for(start(argv, -1), argv, &err))
+	if (wait_for(start(argv, -1), argv, folder, &err))
 		cli_fail_with(&err);
 }
 
@@ -277,12 +345,15 @@ static void film_scene(const char *scene, const char *folder, bool force)
 	char *film = cli_text("%s/%s.mkv", folder, name);
 	char *strip = cli_text("%s/%s.png", folder, name);
 
-	make_folder(folder, force);
+	begin_folder(folder, force);
 	run_view((char *const[]){"view", (char *)scene, "--procedure", "--video", film,
-				 "--fps", "30", NULL});
+				 "--fps", "30", NULL},
+		 folder);
 	run_view((char *const[]){"view", (char *)scene, "--procedure", "--strip", strip,
 				 "--at", MOMENTS, "--size", "640x480", "--no-panel",
-				 "--camera", NEAR, "--fps", "10", NULL});
+				 "--camera", NEAR, "--fps", "10", NULL},
+		 folder);
+	end_folder(folder);
 	printf("\n%s\n%s\n", film, strip);
 	cli_finish();
 	free(name), free(film), free(strip);
@@ -303,6 +374,7 @@ int main(int argc, char **argv)
 		cli_usage("'%s': demo takes options only", argv[optind]);
 	if (options.scene && demo->quiet)
 		cli_usage("--scene makes pictures, and has nothing to say as JSON");
+	cli_catch_signals();
 	if (options.scene) {
 		film_scene(options.scene, demo->folder, options.force);
 		return 0;
@@ -312,7 +384,7 @@ int main(int argc, char **argv)
 			"gnuplot is not installed, it draws the pictures: apt-get install "
 			"gnuplot-nox, or run 'make demo'");
 	clock_gettime(CLOCK_MONOTONIC, &begin);
-	make_folder(demo->folder, options.force);
+	begin_folder(demo->folder, options.force);
 	plot = demo_path(demo, "plot");
 	make_folder(plot, true);
 	free(plot);
@@ -328,6 +400,7 @@ int main(int argc, char **argv)
 	seconds = end.tv_sec - begin.tv_sec + (end.tv_nsec - begin.tv_nsec) * 1e-9;
 	json_set_number(demo->summary, "seconds", seconds);
 	demo_summary_save(demo, seconds);
+	end_folder(demo->folder);
 	if (demo->quiet) {
 		json_print(json_incref(demo->summary));
 	} else {

@@ -99,6 +99,41 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 	[ "$(sha256sum <"$demo/summary.json")" = "$before" ]
 }
 
+# interrupted_in COMMAND: the group gets SIGINT, as by Ctrl-C at a terminal, once that command of the
+# demo catches it.
+interrupted_in() {
+	local group pid mask
+	env --default-signal=INT setsid incise demo -o part --loop 1h >out 2>err 3>&- &
+	group=$!
+	for ((i = 0; i < 6000; i++)); do
+		pid=$(awk -v group=$group -v name="(incise-$1)" '$5 == group && $2 == name { print $1 }' \
+			/proc/[0-9]*/stat 2>/dev/null | head -n 1)
+		mask=$(sed -n 's/^SigCgt:\t*//p' "/proc/${pid:-none}/status" 2>/dev/null) || :
+		! ((0x${mask:-0} & 2)) || break
+		kill -0 $group || break
+		sleep 0.02
+	done
+	kill -INT -- -$group
+	status=0
+	wait $group || status=$?
+	[ "$status" -eq 1 ] || complain "exit $status: $(cat err)" || return
+	[[ "$(tail -n 1 err)" == "incise demo: interrupted"*" part "*"run it again"* ]] || complain "$(cat err)" ||
+		return
+	! grep -E "full|see the line" err
+}
+
+@test "demo that is interrupted says so, and its next run replaces what it left" {
+	interrupted_in haptic
+	[ ! -e part/summary.json ]
+	[ -s part/liver.fis ]
+	interrupted_in capture
+	# A folder of something else is none of its own, and one that is whole is no part.
+	mkdir other
+	run --separate-stderr incise demo -o other
+	failed_with other "File exists"
+	[ ! -e "$demo/.unfinished" ]
+}
+
 @test "demo without gnuplot says what to install, and leaves nothing" {
 	mkdir empty
 	run --separate-stderr env PATH="$PWD/empty" "$INCISE_BUILD/bin/incise" demo -o x

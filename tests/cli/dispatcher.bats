@@ -112,3 +112,21 @@ setup() {
 		[ "${#stderr_lines[@]}" -eq 1 ]
 	done
 }
+
+@test "an output whose reader has gone is no full disk" {
+	(
+		trap '' PIPE
+		{
+			until [ -e gone ]; do sleep 0.02; done
+			code=0
+			# more than stdio holds, so that an earlier write has failed
+			incise info "$root/scenes/liver.fis" --json 2>err || code=$?
+			echo $code >code
+		} | {
+			exec <&-
+			touch gone
+		}
+	)
+	[ "$(cat code)" = 1 ]
+	[ ! -s err ] || complain "$(cat err)"
+}

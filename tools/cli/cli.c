@@ -8,6 +8,7 @@
 #include <libgen.h>
 #include <limits.h>
 #include <math.h>
+#include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -555,13 +556,17 @@ void cli_catch_signals(void)
 
 void cli_finish(void)
 {
+	struct pollfd reader = {.fd = STDOUT_FILENO};
+
 	cli_progress_end();
 	errno = 0;
 	if (!ferror(stdout) && !fflush(stdout))
 		return;
 	if (errno == EPIPE)
 		exit(1);
-	/* The failed write was an earlier one. */
+	/* The failed write was an earlier one: of a pipe it is the reader that has gone. */
+	if (!errno && poll(&reader, 1, 0) == 1 && reader.revents & POLLERR)
+		exit(1);
 	if (!errno)
 		cli_fail("standard output: writing failed; is the disk full?");
 	cli_fail("standard output: %s", strerror(errno));

@@ -3,8 +3,10 @@
  * Plots by gnuplot; see plot.h.
  */
 #include <errno.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
 #include "cli.h"
 #include "folder.h"
 #include "plot.h"
@@ -110,6 +112,9 @@ static bool draw(const char *folder, const char *name, const char *ext)
 		ext, name);
 	status = system(command);
 	free(command);
+	/* system(3) ignores the Ctrl-C that has ended it. */
+	if (WIFSIGNALED(status) || (WIFEXITED(status) && WEXITSTATUS(status) > 128))
+		cli_stop = SIGINT;
 	return status == 0;
 }
 

@@ -20,6 +20,9 @@ struct demo {
 /* The path of a file in the folder: free(3). */
 char *demo_path(const struct demo *demo, const char *name);
 
+/* Fails the program, after a signal. */
+_Noreturn void demo_interrupted(const char *folder);
+
 /* Read a model of the folder; fails the program. */
 struct incise_model *demo_model(const struct demo *demo, const char *name);
 

@@ -127,11 +127,22 @@ void demo_worth(struct demo *demo, const struct incise_model *model)
 	json_set_number(demo->summary, "truth_rmse_N", truth_error(demo, model));
 }
 
+void demo_interrupted(const char *folder)
+{
+	cli_fail(
+		"interrupted; the folder %s is not complete: run it again, and it is replaced",
+		folder);
+}
+
 /* --- plots --------------------------------------------------------------------------- */
 
 static void draw(const struct demo *demo, FILE *script, const char *name)
 {
-	if (!plot_draw(script, demo->folder, name))
+	bool drawn = plot_draw(script, demo->folder, name);
+
+	if (cli_stop)
+		demo_interrupted(demo->folder);
+	if (!drawn)
 		cli_fail("%s/plot/%s.gp: gnuplot failed, see above", demo->folder, name);
 	json_array_append_new(demo->pictures, json_string(name));
 }
