@@ -200,7 +200,7 @@ static int64_t force(const struct incise_fixed *fx, const uint32_t *from_min)
 
 int32_t incise_fixed_eval(const struct incise_fixed *fx, const int32_t *x)
 {
-	uint32_t from_min[INCISE_FIXED_INPUTS_MAX];
+	uint32_t from_min[INCISE_FIXED_INPUTS_MAX] = {0};
 	int64_t y = 0;
 
 	for (int i = 0; i < fx->n_inputs; i++) {

@@ -41,14 +41,18 @@ void incise_verify_found(struct incise_verification *verify,
 	for (char *c = line; *c; c++)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '?';
-	finding->text = line;
 	verify->report->findings++;
 	verify->report->unverified |= finding->kind == INCISE_VERIFY_UNVERIFIED;
 	verify->altered |= finding->kind != INCISE_VERIFY_LOST &&
 			   finding->kind != INCISE_VERIFY_INTERRUPTED &&
 			   finding->kind != INCISE_VERIFY_ENDED;
-	if (verify->watch && verify->watch->found)
-		verify->watch->found(verify->watch->user, finding);
+	if (verify->watch && verify->watch->found) {
+		/* The line is valid during the call: the caller's finding does not keep it. */
+		struct incise_verify_finding reported = *finding;
+
+		reported.text = line;
+		verify->watch->found(verify->watch->user, &reported);
+	}
 }
 
 void incise_verify_unreadable(struct incise_verification *verify, const char *stream,
