@@ -34,6 +34,31 @@ CCACHE ?= $(shell command -v ccache 2>/dev/null)
 PKG_CONFIG ?= pkg-config
 INSTALL ?= install
 
+# Where it is missing, nothing is found by it, without a line for each question; a make that this one
+# calls looks again.
+there = $(shell command -v $(firstword $1) 2>/dev/null)
+missing :=
+ifeq ($(call there,$(PKG_CONFIG)),)
+missing := $(firstword $(PKG_CONFIG))
+override PKG_CONFIG := false
+unexport PKG_CONFIG
+endif
+
+# Goals that need no compiler, or install it first.
+unbuilt_goals := help clean deps check check-all check-debian12 check-debian13 check-module-newest demo bench \
+	deb check-deb doc check-doc dist uninstall module_uninstall dkms_install dkms_uninstall readme-figures
+ifneq ($(filter-out $(unbuilt_goals),$(or $(MAKECMDGOALS),all)),)
+missing := $(foreach tool,$(firstword $(CC)) $(firstword $(AR)),$(if $(call there,$(tool)),,$(tool))) $(missing)
+ifeq ($(strip $(missing)),)
+needed := libconfig sqlite3 zlib jansson lapacke lapack blas
+missing := $(if $(shell $(PKG_CONFIG) --exists $(needed) || echo some),$(foreach lib,$(needed),\
+	$(shell $(PKG_CONFIG) --exists $(lib) || echo $(lib))))
+endif
+ifneq ($(strip $(missing)),)
+$(error not installed: $(strip $(missing)): run 'make deps', which installs with apt what is needed)
+endif
+endif
+
 version := $(shell sed -n 's/^\#define INCISE_VERSION "\(.*\)"/\1/p' lib/include/incise/version.h)
 # Changes when the binary interface does.
 soversion := 2

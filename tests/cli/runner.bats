@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# The runner of the unit tests must not overlook a failure.
+# The runner of the unit tests must not overlook a failure, nor a check the rest behind one; make on
+# a machine that has nothing names the command that installs what is needed.
 
 load cli
 
@@ -15,6 +16,23 @@ program() {
 
 good='[       OK ] test_a
 [  PASSED  ] 1 test(s).'
+
+@test "make without compiler and pkg-config is one line that says what installs them" {
+	mkdir bin
+	for name in sh make sed awk sort find nproc expr grep uname mkdir rm ln env cat dirname; do
+		ln -s "$(command -v $name)" bin
+	done
+	run -2 env -u MAKEFLAGS -u MAKELEVEL PATH="$PWD/bin" make -C "$root" --no-print-directory O="$PWD/build"
+	[ "${#lines[@]}" = 1 ] || complain "$output"
+	[[ "$output" == *"not installed: cc ar pkg-config: run 'make deps'"* ]]
+	run -2 env -u MAKEFLAGS -u MAKELEVEL PKG_CONFIG_LIBDIR="$PWD" PKG_CONFIG_PATH= make -C "$root" \
+		--no-print-directory O="$PWD/build"
+	[[ "$output" == *"not installed: libconfig "*"run 'make deps'"* ]]
+	# Goals that need none of it are not held up.
+	run -0 env -u MAKEFLAGS -u MAKELEVEL PATH="$PWD/bin" make -C "$root" --no-print-directory help
+	[[ "${lines[0]}" == bench* ]]
+	[[ "$output" != *"not found"* ]]
+}
 
 @test "a passing program passes" {
 	program a "$good" 0
