@@ -109,8 +109,8 @@ with_camera() {
 	mounted=$PWD/disk
 	incise capture -o disk/a.rec --rig sim:clock=real --duration 60s >out 2>err 3>&- &
 	pid=$!
-	until [ "$(sqlite3 -readonly disk/a.rec.part/recording.db \
-		'SELECT count(*) FROM force' 2>/dev/null)" -gt 1000 ] 2>/dev/null; do
+	until incise info disk/a.rec.part --json >rows.json 2>/dev/null &&
+		[ "$(key rows.json rows.force)" -gt 1000 ]; do
 		kill -0 $pid || complain "$(cat err)"
 		sleep 0.1
 	done

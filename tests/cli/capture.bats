@@ -36,8 +36,8 @@ failed_with() {
 # Wait until a capture in the background has written something.
 until_it_runs() {
 	for _ in $(seq 100); do
-		[ "$(sqlite3 -readonly "$1/recording.db" 'SELECT count(*) FROM force' 2>&1)" -gt \
-			"${2:-0}" ] 2>/dev/null && return
+		incise info "$1" --json >rows.json 2>/dev/null &&
+			[ "$(key rows.json rows.force)" -gt "${2:-0}" ] && return
 		sleep 0.1
 	done
 	echo "$1: no rows after 10 s; capture said: $(cat err)"
@@ -139,6 +139,23 @@ until_it_runs() {
 	incise capture -o a.rec --rig $quick --duration 1s --force
 	[ -d a.rec ]
 	[ ! -e a.rec.part ]
+}
+
+@test "a log that is cut off while it is written ends the capture with one line" {
+	for what in "truncate -s 0" rm; do
+		incise capture -o a.rec --rig sim:clock=real --duration 60s >out 2>err 3>&- &
+		pid=$!
+		until_it_runs a.rec.part 6000
+		[ ! -e a.rec.part/recording.db-shm ]
+		$what a.rec.part/recording.db-wal
+		status=0
+		wait $pid || status=$?
+		[ "$status" -eq 1 ]
+		[ "$(wc -l <err)" -eq 1 ]
+		grep -q "a.rec.part/recording.db-wal: was \(cut off\|removed\) by another program" err
+		[ ! -e a.rec ]
+		rm -r a.rec.part
+	done
 }
 
 @test "capture --force keeps its hands off a recording under way" {

@@ -173,8 +173,8 @@ setup() {
 	# rows are committed every 100 ms
 	for ((i = 0; i < 100; i++)); do
 		sleep 0.1
-		rows=$(sqlite3 -readonly b.rec.part/recording.db "SELECT count(*) FROM force" \
-			2>/dev/null) || continue
+		incise info b.rec --json >r.json 2>/dev/null || continue
+		rows=$(key r.json rows.force)
 		[ "$rows" -eq 0 ] || break
 	done
 	kill -9 $pid

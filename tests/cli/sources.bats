@@ -24,8 +24,8 @@ teardown() {
 # Until the capture in the background has more records of the tracker than that.
 until_records() {
 	for _ in $(seq 100); do
-		[ "$(sqlite3 -readonly a.rec.part/recording.db \
-			'SELECT count(*) FROM tracker' 2>/dev/null)" -gt "$1" ] 2>/dev/null && return
+		incise info a.rec.part --json >rows.json 2>/dev/null &&
+			[ "$(key rows.json rows.tracker)" -gt "$1" ] && return
 		sleep 0.1
 	done
 	complain "no $1 records after 10 s; capture said: $(cat err)"

@@ -4,11 +4,14 @@
  * altered or forged.
  */
 #include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 #include "recording.h"
 #include "../schema.h"
@@ -342,7 +345,7 @@ static void roll_back(const char *file)
 	sqlite3_close(db);
 }
 
-static int open_read_only(const char *file, sqlite3 **db)
+static int open_read_only(const char *file, sqlite3 **db, int busy_ms)
 {
 	int rc = sqlite3_open_v2(file, db, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX,
 				 NULL);
@@ -351,12 +354,161 @@ static int open_read_only(const char *file, sqlite3 **db)
 		/* No code of the file's schema is run. */
 		sqlite3_db_config(*db, SQLITE_DBCONFIG_DEFENSIVE, 1, NULL);
 		sqlite3_db_config(*db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, NULL);
-		sqlite3_busy_timeout(*db, 1000);
+		sqlite3_busy_timeout(*db, busy_ms);
 		sqlite3_extended_result_codes(*db, 1);
 		rc = read_something(*db);
 		sqlite3_extended_result_codes(*db, 0);
 	}
 	return rc;
+}
+
+/* --- a copy of a recording that is being written ------------------------------------- */
+
+#define COPIES 20
+#define LOG_HEAD 32 /* bytes; they change when the log starts over */
+
+/* Returns 0 or -errno. */
+static int copy_bytes(int from, int to)
+{
+	char bytes[65536];
+	ssize_t n;
+
+	while ((n = read(from, bytes, sizeof(bytes))) != 0) {
+		if (n < 0 && errno != EINTR)
+			return -errno;
+		for (ssize_t done = 0, put; done < n; done += put) {
+			put = write(to, bytes + done, (size_t)(n - done));
+			if (put < 0 && errno != EINTR)
+				return -errno;
+			if (put < 0)
+				put = 0;
+		}
+	}
+	return 0;
+}
+
+/* A missing log is an empty one. Returns 0 or -errno. */
+static int copy_file(const char *from, const char *to)
+{
+	int in = open(from, O_RDONLY | O_CLOEXEC), out, rc;
+
+	if (in < 0)
+		return -errno;
+	out = open(to, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+	rc = out < 0 ? -errno : copy_bytes(in, out);
+	if (out >= 0 && close(out) && !rc)
+		rc = -errno;
+	close(in);
+	return rc;
+}
+
+static void read_log_head(const char *log, char head[LOG_HEAD])
+{
+	int fd = open(log, O_RDONLY | O_CLOEXEC);
+
+	memset(head, 0, LOG_HEAD);
+	if (fd < 0)
+		return;
+	if (pread(fd, head, LOG_HEAD, 0) != LOG_HEAD)
+		memset(head, 0, LOG_HEAD);
+	close(fd);
+}
+
+/*
+ * The database, and then its log. While the log has not started over, it has all pages that are
+ * written to the database meanwhile. Returns 0, -EAGAIN (it did start over), -errno.
+ */
+static int try_copy(const char *const from[2], const char *const to[2])
+{
+	char before[LOG_HEAD], after[LOG_HEAD];
+	int rc;
+
+	read_log_head(from[1], before);
+	rc = copy_file(from[0], to[0]);
+	if (!rc)
+		rc = copy_file(from[1], to[1]);
+	read_log_head(from[1], after);
+	/* No log: the recording is just being closed, or does not have one yet. */
+	if (rc == -ENOENT || (!rc && memcmp(before, after, LOG_HEAD)))
+		return -EAGAIN;
+	return rc;
+}
+
+/*
+ * A recorder keeps its database locked. The copy has no name once it is open. Returns an SQLite
+ * code; SQLITE_BUSY with a negative errno in @rc: it cannot be copied.
+ */
+static int open_copy(const char *file, sqlite3 **db, int *rc)
+{
+	const char *temporary = getenv("TMPDIR");
+	char folder[PATH_MAX], log[PATH_MAX], copy[PATH_MAX + 20],
+		copied_log[PATH_MAX + 20];
+	const char *const from[2] = {file, log}, *const to[2] = {copy, copied_log};
+	const struct timespec pause = {.tv_nsec = 10000000};
+	int code = SQLITE_BUSY;
+
+	snprintf(log, sizeof(log), "%s-wal", file);
+	snprintf(folder, sizeof(folder), "%s/incise-read-XXXXXX",
+		 temporary && *temporary ? temporary : "/tmp");
+	if (!mkdtemp(folder)) {
+		*rc = -errno;
+		return code;
+	}
+	snprintf(copy, sizeof(copy), "%s/copy.db", folder);
+	snprintf(copied_log, sizeof(copied_log), "%s/copy.db-wal", folder);
+	*rc = -EAGAIN;
+	for (int i = 0; i < COPIES && *rc == -EAGAIN; i++) {
+		if (i)
+			nanosleep(&pause, NULL);
+		*rc = try_copy(from, to);
+	}
+	if (!*rc) {
+		code = open_read_only(copy, db, 0);
+		snprintf(copied_log, sizeof(copied_log), "%s/copy.db-shm", folder);
+		unlink(copied_log);
+		snprintf(copied_log, sizeof(copied_log), "%s/copy.db-wal", folder);
+	}
+	unlink(copied_log);
+	unlink(copy);
+	rmdir(folder);
+	return code;
+}
+
+/* Open it, or a copy where a recorder keeps it locked. Returns 0 or -errno. */
+static int open_or_copy(struct incise_recording *rec, const char *file,
+			struct incise_error *err)
+{
+	int rc = open_read_only(file, &rec->db, 0), why = 0;
+
+	if ((rc & 0xff) == SQLITE_BUSY) {
+		sqlite3_close(rec->db);
+		rec->db = NULL;
+		rc = open_copy(file, &rec->db, &why);
+		if (why && why != -EAGAIN)
+			return incise_error_set(
+				err, -why,
+				"%s: is being written, and no copy of it can be made to "
+				"read: %s; set TMPDIR to a folder with room",
+				rec->path, strerror(-why));
+	}
+	/* Held for a moment only, or just closed. */
+	if (!rec->db || (rc & 0xff) == SQLITE_BUSY) {
+		sqlite3_close(rec->db);
+		rec->db = NULL;
+		rc = open_read_only(file, &rec->db, 1000);
+	}
+	if (rc == SQLITE_READONLY_ROLLBACK) {
+		sqlite3_close(rec->db);
+		rec->db = NULL;
+		roll_back(file);
+		rc = open_read_only(file, &rec->db, 1000);
+	}
+	if ((rc & 0xff) == SQLITE_BUSY && why == -EAGAIN)
+		return incise_error_set(err, EBUSY,
+					"%s: is being written, faster than a copy of it "
+					"can be made to read: wait for its end",
+					rec->path);
+	return rc == SQLITE_OK ? 0 : incise_schema_fail(rec->db, rec->path, err);
 }
 
 static int open_database(struct incise_recording *rec, struct incise_error *err)
@@ -380,15 +532,7 @@ static int open_database(struct incise_recording *rec, struct incise_error *err)
 	} else if (access(file, R_OK)) {
 		rc = incise_error_set(err, errno, "%s: %s", file, strerror(errno));
 	} else {
-		rc = open_read_only(file, &rec->db);
-		if (rc == SQLITE_READONLY_ROLLBACK) {
-			sqlite3_close(rec->db);
-			rec->db = NULL;
-			roll_back(file);
-			rc = open_read_only(file, &rec->db);
-		}
-		if (rc != SQLITE_OK)
-			rc = incise_schema_fail(rec->db, rec->path, err);
+		rc = open_or_copy(rec, file, err);
 	}
 	free(file);
 	if (rc)

@@ -246,19 +246,39 @@ static int write_counts(struct incise_recorder *rec)
 	return bad;
 }
 
+/*
+ * COMMIT, if the files have all that was committed before: written on from there, a log that was
+ * cut off would look whole. Returns 0 or -errno.
+ */
+static int commit_files(struct incise_recorder *rec, struct incise_error *err)
+{
+	int rc = incise_recorder_check_files(rec, err);
+
+	if (rc)
+		return rc;
+	if (sqlite3_exec(rec->db, "COMMIT", NULL, NULL, NULL) != SQLITE_OK)
+		return incise_recorder_fail(rec, err);
+	incise_recorder_see_files(rec);
+	return 0;
+}
+
 /* Commit the rows so far, with their counts and their ledger. Returns 0 or -errno. */
 static int commit(struct incise_recorder *rec, int64_t now_ns, bool last,
 		  struct incise_error *err)
 {
 	bool knots = last || rec->commits++ % KNOTS_EVERY == 0;
+	int rc;
 
 	if (write_counts(rec) != SQLITE_OK ||
 	    incise_recorder_write_streams(rec, knots) != SQLITE_OK ||
-	    incise_recorder_write_ledger(rec) != SQLITE_OK ||
-	    sqlite3_exec(rec->db, "COMMIT; BEGIN", NULL, NULL, NULL) != SQLITE_OK)
+	    incise_recorder_write_ledger(rec) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
+	rc = commit_files(rec, err);
+	if (rc)
+		return rc;
 	rec->commit_ns = now_ns;
-	return 0;
+	return incise_recorder_check(
+		rec, sqlite3_exec(rec->db, "BEGIN", NULL, NULL, NULL), err);
 }
 
 /* --- beginning ------------------------------------------------------------------- */
@@ -547,6 +567,36 @@ int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
 	return rc;
 }
 
+/*
+ * Whether the database has the rows that were written. What happened to its files in the midst of
+ * a commit is found here.
+ */
+static int check_rows(struct incise_recorder *rec, struct incise_error *err)
+{
+	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++) {
+		const char *table = incise_ledger_forms[i].table;
+		sqlite3_stmt *stmt = NULL;
+		uint64_t rows = 0;
+		char text[60];
+
+		snprintf(text, sizeof(text), "SELECT count(*) FROM %s", table);
+		if (sqlite3_prepare_v2(rec->db, text, -1, &stmt, NULL) == SQLITE_OK &&
+		    sqlite3_step(stmt) == SQLITE_ROW)
+			rows = (uint64_t)sqlite3_column_int64(stmt, 0);
+		if (sqlite3_finalize(stmt) != SQLITE_OK)
+			return incise_recorder_fail(rec, err);
+		if (rows != rec->streams[i].rows)
+			return incise_error_set(
+				err, EIO,
+				"%s: its files were changed by another program while "
+				"they were written: table %s has %llu rows of %llu; "
+				"`incise verify %s` says what is left",
+				rec->part, table, (unsigned long long)rows,
+				(unsigned long long)rec->streams[i].rows, rec->part);
+	}
+	return 0;
+}
+
 /* Write the last rows, the end of the ledger and the seals. */
 static int complete(struct incise_recorder *rec, struct incise_error *err)
 {
@@ -559,21 +609,19 @@ static int complete(struct incise_recorder *rec, struct incise_error *err)
 		rc = commit(rec, rec->commit_ns, true, err);
 	/* The seals are over all rows, those of this commit included. */
 	if (!rc && (incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK ||
-		    incise_recorder_seal(rec) != SQLITE_OK ||
-		    sqlite3_exec(rec->db, "COMMIT", NULL, NULL, NULL) != SQLITE_OK))
+		    incise_recorder_seal(rec) != SQLITE_OK))
 		rc = incise_recorder_fail(rec, err);
+	if (!rc)
+		rc = commit_files(rec, err);
+	if (!rc)
+		rc = incise_recorder_check_files(rec, err);
 	if (rc)
 		return rc;
-	/*
-	 * Make it a single file. If a reader keeps SQLite from folding the log in, the log stays
-	 * next to the file, which is valid too.
-	 */
+	/* Make it a single file: fold the log in. */
 	if (sqlite3_exec(rec->db, "PRAGMA synchronous=FULL; PRAGMA journal_mode=DELETE",
-			 NULL, NULL, NULL) != SQLITE_OK &&
-	    sqlite3_errcode(rec->db) != SQLITE_BUSY &&
-	    sqlite3_errcode(rec->db) != SQLITE_LOCKED)
+			 NULL, NULL, NULL) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
-	return 0;
+	return check_rows(rec, err);
 }
 
 int incise_recorder_close(struct incise_recorder *rec, struct incise_error *err)

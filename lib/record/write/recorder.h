@@ -12,6 +12,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <sys/types.h>
 #include <sqlite3.h>
 #include <incise/recorder.h>
 #include "../../base/ring.h"
@@ -88,6 +89,9 @@ struct incise_recorder_disk {
 	double free_bytes;
 };
 
+/* The files of a recording that grow: database, its log, camera.mkv. */
+#define INCISE_RECORDER_GROWING 3
+
 struct incise_recorder {
 	char *path;	    /* as given, without trailing slashes */
 	char *part;	    /* path.part */
@@ -110,7 +114,12 @@ struct incise_recorder {
 	struct incise_recorder_camera camera;
 	struct incise_recorder_disk disk;
 	struct incise_recorder_stats stats;
-	int64_t commit_ns; /* last commit */
+	struct {
+		bool is;
+		ino_t inode;
+		off_t size;
+	} seen[INCISE_RECORDER_GROWING]; /* after the last commit */
+	int64_t commit_ns;		 /* last commit */
 	int commits;
 	bool ended;	     /* reads no more samples */
 	bool cuts;	     /* write events for their starts and ends */
@@ -230,6 +239,16 @@ int incise_recorder_rename_folder(struct incise_recorder *rec, struct incise_err
 /* Check the free space for @planned_s (0: not known). Returns 0, -ENOSPC or -errno. */
 int incise_recorder_check_space(struct incise_recorder *rec, double planned_s,
 				struct incise_error *err);
+
+/*
+ * Whether the files have what was written: since the last commit none was cut off, removed or
+ * replaced by another program. Returns 0 or -EIO.
+ */
+int incise_recorder_check_files(const struct incise_recorder *rec,
+				struct incise_error *err);
+
+/* Remember them, after a commit. */
+void incise_recorder_see_files(struct incise_recorder *rec);
 
 /* Look at the free space once a second. True: the recording must end now. */
 bool incise_recorder_disk_full(struct incise_recorder *rec);

@@ -37,7 +37,10 @@ int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err)
 {
 	int code = incise_schema_errno(rec->db);
 	const char *text = sqlite3_errmsg(rec->db);
+	int rc = incise_recorder_check_files(rec, err);
 
+	if (rc)
+		return rc;
 	if (code == ENOSPC)
 		return incise_error_set(
 			err, code,
@@ -252,18 +255,25 @@ int incise_recorder_open_database(struct incise_recorder *rec,
 		file, &rec->db,
 		SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL);
 	free(file);
-	/*
-	 * A reader of the growing recording can block the writer for a moment: until the file
-	 * has its log, and while the log is folded in. Samples wait in the devices' rings.
-	 */
+	/* A reader can hold up the writer until it has locked the file. */
 	if (rc == SQLITE_OK)
 		rc = sqlite3_busy_timeout(rec->db, BUSY_MS);
+	/*
+	 * The lock is held to the end, so that the index of the log is in memory of its own: as
+	 * a mapped file, others could end this program by cutting it off. Readers take copies.
+	 * The log is written by commits only, which check the files.
+	 */
 	if (rc == SQLITE_OK)
 		rc = sqlite3_exec(
 			rec->db,
-			real ? "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL"
-			     : "PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL",
+			"PRAGMA locking_mode=EXCLUSIVE; PRAGMA journal_mode=WAL; "
+			"PRAGMA cache_spill=OFF",
 			NULL, NULL, NULL);
+	if (rc == SQLITE_OK)
+		rc = sqlite3_exec(rec->db,
+				  real ? "PRAGMA synchronous=FULL"
+				       : "PRAGMA synchronous=NORMAL",
+				  NULL, NULL, NULL);
 	if (rc == SQLITE_OK)
 		rc = sqlite3_exec(rec->db, "BEGIN", NULL, NULL, NULL);
 	if (rc == SQLITE_OK)

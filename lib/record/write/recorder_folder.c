@@ -35,7 +35,7 @@
 static const char *const files[] = {INCISE_SCHEMA_DB, INCISE_SCHEMA_DB "-wal",
 				    INCISE_FRAMES_FILE, INCISE_SCHEMA_DB "-shm",
 				    INCISE_SCHEMA_DB "-journal"};
-#define FILES_GROWING 3 /* the first of them */
+/* The first INCISE_RECORDER_GROWING of them grow, and only that. */
 
 /* --- folder -------------------------------------------------------------------------- */
 
@@ -203,13 +203,63 @@ int incise_recorder_check_space(struct incise_recorder *rec, double planned_s,
 		usable / bytes_s);
 }
 
+/* --- what others do to the files ------------------------------------------------------- */
+
+int incise_recorder_check_files(const struct incise_recorder *rec,
+				struct incise_error *err)
+{
+	const char *part = rec->part + (rec->name - rec->path);
+	struct stat st;
+
+	for (int i = 0; i < INCISE_RECORDER_GROWING; i++) {
+		const char *what = NULL;
+
+		if (!rec->seen[i].is)
+			continue;
+		if (fstatat(rec->folder, files[i], &st, AT_SYMLINK_NOFOLLOW))
+			what = "removed";
+		else if (st.st_ino != rec->seen[i].inode)
+			what = "replaced";
+		else if (st.st_size < rec->seen[i].size)
+			what = "cut off";
+		if (!what)
+			continue;
+		if (fstatat(rec->parent, part, &st, AT_SYMLINK_NOFOLLOW))
+			return incise_error_set(err, EIO,
+						"%s: was removed by another program "
+						"while it was written: nothing is left "
+						"of the recording",
+						rec->part);
+		return incise_error_set(
+			err, EIO,
+			"%s/%s: was %s by another program while it was written: rows "
+			"that were in it are lost; `incise verify %s` says what is left",
+			rec->part, files[i], what, rec->part);
+	}
+	return 0;
+}
+
+void incise_recorder_see_files(struct incise_recorder *rec)
+{
+	struct stat st;
+
+	for (int i = 0; i < INCISE_RECORDER_GROWING; i++) {
+		rec->seen[i].is =
+			!fstatat(rec->folder, files[i], &st, AT_SYMLINK_NOFOLLOW);
+		if (!rec->seen[i].is)
+			continue;
+		rec->seen[i].inode = st.st_ino;
+		rec->seen[i].size = st.st_size;
+	}
+}
+
 /* Bytes of the files of this recording. */
 static double written(const struct incise_recorder *rec)
 {
 	double bytes = 0;
 	struct stat st;
 
-	for (int i = 0; i < FILES_GROWING; i++)
+	for (int i = 0; i < INCISE_RECORDER_GROWING; i++)
 		if (!fstatat(rec->folder, files[i], &st, AT_SYMLINK_NOFOLLOW))
 			bytes += (double)st.st_size;
 	return bytes;

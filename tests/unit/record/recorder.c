@@ -3,6 +3,7 @@
  * Tests of lib/record/write/recorder.c: on the virtual rig, whose devices are made to fail by
  * putting other functions before theirs.
  */
+#include <incise/verify.h>
 #include "recorded.h"
 #include <signal.h>
 #include <sys/prctl.h>
@@ -369,11 +370,12 @@ static void interrupted_recording_knows_its_losses(void **state)
 		fail_msg("%s", err.text);
 	/* At least half of the 600000 and 7200. */
 	assert_true(info.force_lost > 300000 && info.tracker_lost > 3600);
-	/* The numbers show the same. */
+	/* The numbers show the same; the recorder has locked its own. */
+	assert_int_equal(system("cp -r a.rec.part b.rec.part"), 0);
 	assert_int_equal(info.force_lost,
-			 (int)ask("a.rec.part/recording.db",
+			 (int)ask("b.rec.part/recording.db",
 				  "SELECT max(seq) + 1 - count(*) FROM force"));
-	assert_int_equal((int)ask("a.rec.part/recording.db",
+	assert_int_equal((int)ask("b.rec.part/recording.db",
 				  "SELECT count(*) FROM events WHERE kind = 'lost'"),
 			 2);
 	incise_recording_close(recording);
@@ -731,6 +733,60 @@ static void full_disk_at_the_end(void **state)
 	incise_rig_close(rig);
 }
 
+/* What others do to a file of a recording that is written is noticed at the next commit. */
+static void files_that_others_change(void **state)
+{
+	static const struct {
+		const char *command, *text;
+	} cases[] = {
+		{"truncate -s 0 a.rec.part/recording.db-wal",
+		 "a.rec.part/recording.db-wal: was cut off"},
+		{"truncate -s 50000 a.rec.part/recording.db-wal", "was cut off"},
+		{"rm a.rec.part/recording.db-wal", "recording.db-wal: was removed"},
+		{"truncate -s 4096 a.rec.part/recording.db", "recording.db: was cut off"},
+		{"cd a.rec.part && cp recording.db b && mv b recording.db",
+		 "recording.db: was replaced"},
+		{"rm -r a.rec.part", "was removed"},
+	};
+
+	for (size_t i = 0; i < 2 * sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_rig *rig = open_rig(SIM);
+		struct incise_recorder *rec = start_recorder("a.rec", rig);
+		struct incise_error err = {0}, second = {0};
+		bool at_the_end = i % 2;
+
+		/* Longer than SQLite's log before it is folded in: both files have rows. */
+		assert_int_equal(poll_for(rec, rig, 20000 * MS, &err), 0);
+		assert_int_equal(system(cases[i / 2].command), 0);
+		if (!at_the_end)
+			assert_int_equal(poll_for(rec, rig, 300 * MS, &err), -EIO);
+		assert_int_equal(incise_recorder_close(rec, at_the_end ? &err : &second),
+				 -EIO);
+		if (!strstr(err.text, cases[i / 2].text))
+			fail_msg("%s: %s", cases[i / 2].command, err.text);
+		assert_int_equal(access("a.rec", F_OK), -1);
+		incise_rig_close(rig);
+		system("rm -rf a.rec.part");
+	}
+}
+
+/* SQLite's index of the log is no file, in which a cut would be a SIGBUS. */
+static void nothing_of_it_is_mapped(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
+	struct incise_error err = {0};
+
+	assert_int_equal(poll_for(rec, rig, 500 * MS, &err), 0);
+	if (!truncate("a.rec.part/recording.db-shm", 0)) {
+		assert_int_equal(poll_for(rec, rig, 500 * MS, &err), 0);
+		fail_msg("there is an index");
+	}
+	assert_int_not_equal(system("grep -q a.rec.part /proc/$PPID/maps"), 0);
+	assert_int_equal(incise_recorder_close(rec, &err), 0);
+	incise_rig_close(rig);
+}
+
 static void reader_does_not_stop_the_end(void **state)
 {
 	struct incise_rig *rig = open_rig(SIM);
@@ -795,6 +851,47 @@ static void reader_does_not_stop_the_start(void **state)
 	}
 	kill(reader, SIGKILL);
 	assert_int_equal(waitpid(reader, NULL, 0), reader);
+}
+
+/* Verify a.rec again and again while it is written: each copy is whole. Returns the exit code. */
+static int verify_on(void)
+{
+	for (int i = 0; i < 10; i++) {
+		struct incise_verify_report report;
+		struct incise_error err = {0};
+		int rc = incise_verify("a.rec", NULL, &report, &err);
+
+		if (rc || !report.interrupted || !report.intact) {
+			print_error("verify %d: %d %s\n", i, rc, err.text);
+			return 1;
+		}
+	}
+	return 0;
+}
+
+static void copies_of_it_are_whole(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
+	struct incise_error err = {0};
+	pid_t reader;
+	int status;
+
+	assert_int_equal(poll_for(rec, rig, 200 * MS, &err), 0);
+	reader = fork();
+	assert_true(reader >= 0);
+	if (!reader)
+		_exit(prctl(PR_SET_PDEATHSIG, SIGKILL) ? 2 : verify_on());
+	while (!waitpid(reader, &status, WNOHANG)) {
+		if (poll_for(rec, rig, 100 * MS, &err))
+			fail_msg("%s", err.text);
+		/* Much faster than any rig, but no faster than it can be copied. */
+		usleep(20000);
+	}
+	assert_int_equal(status, 0);
+	if (incise_recorder_close(rec, &err))
+		fail_msg("%s", err.text);
+	incise_rig_close(rig);
 }
 
 static void closing_nothing(void **state)
@@ -878,8 +975,11 @@ int main(void)
 		IN_FOLDER(losses_are_counted_and_doubts_kept),
 		IN_FOLDER(full_disk_keeps_what_was_committed),
 		IN_FOLDER(full_disk_at_the_end),
+		IN_FOLDER(files_that_others_change),
+		IN_FOLDER(nothing_of_it_is_mapped),
 		IN_FOLDER(reader_does_not_stop_the_start),
 		IN_FOLDER(reader_does_not_stop_the_end),
+		IN_FOLDER(copies_of_it_are_whole),
 		cmocka_unit_test(closing_nothing),
 		IN_FOLDER(expects_what_it_takes),
 		IN_FOLDER(refuses_what_no_disk_holds),

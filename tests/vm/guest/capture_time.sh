@@ -46,9 +46,10 @@ holds()
 until_rows()
 {
 	i=0
-	until [ "$(sqlite3 -readonly a.rec.part/recording.db "SELECT count(*) FROM $1" \
-		2>/dev/null || echo 0)" -gt "$2" ] || [ $i = 60 ]; do
-		# starting sqlite3 is most of the work in here
+	until { incise info a.rec.part --json >rows.json 2>/dev/null &&
+		[ "$(sqlite3 :memory: "SELECT json_extract(readfile('rows.json'), '\$.rows.$1')")" \
+			-gt "$2" ]; } || [ $i = 60 ]; do
+		# starting programs is most of the work in here
 		sleep 0.5
 		i=$((i + 1))
 	done
