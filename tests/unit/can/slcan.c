@@ -92,15 +92,15 @@ static int adapter_open(struct adapter *a, uint32_t bitrate, struct incise_error
 	return open_device(a, a->path, bitrate, err);
 }
 
-/* Returns the bytes that the adapter received; CR is shown as a dot. */
-static const char *received(struct adapter *a)
+/* Returns the bytes that the adapter received, @least of them; CR is shown as a dot. */
+static const char *received(struct adapter *a, size_t least)
 {
 	static char text[4096];
 	struct pollfd poll_fd = {.fd = a->fd, .events = POLLIN};
 	size_t n = 0;
 
-	/* A kernel worker passes the bytes of a pty on: wait for the first ones. */
-	while (n < sizeof(text) - 1 && poll(&poll_fd, 1, n ? 20 : 1000) == 1) {
+	/* A kernel worker passes the bytes of a pty on: wait for those that are expected. */
+	while (n < sizeof(text) - 1 && poll(&poll_fd, 1, n < least ? 10000 : 20) == 1) {
 		ssize_t got = read(a->fd, text + n, sizeof(text) - 1 - n);
 
 		if (got <= 0)
@@ -115,10 +115,10 @@ static const char *received(struct adapter *a)
 }
 
 /* Likewise without queries, which follow a frame after 100 ms of any machine's stall. */
-static const char *frames_received(struct adapter *a)
+static const char *frames_received(struct adapter *a, size_t least)
 {
 	static char frames[4096];
-	const char *text = received(a);
+	const char *text = received(a, least);
 	size_t n = 0;
 
 	for (; *text; text++)
@@ -163,7 +163,7 @@ static int setup(void **state)
 	adapter_new(&a);
 	if (adapter_open(&a, 500000, &err))
 		fail_msg("%s", err.text);
-	assert_string_equal(received(&a), ".C.S6.O.");
+	assert_string_equal(received(&a, strlen(".C.S6.O.")), ".C.S6.O.");
 	*state = &a;
 	return 0;
 }
@@ -200,7 +200,7 @@ static void the_adapter_goes_on_the_bus_and_off(void **state)
 
 		adapter_new(&a);
 		assert_int_equal(adapter_open(&a, cases[i].bitrate, &err), 0);
-		assert_string_equal(received(&a), cases[i].said);
+		assert_string_equal(received(&a, strlen(cases[i].said)), cases[i].said);
 		assert_int_equal(a.bus->bitrate, cases[i].is);
 		assert_string_equal(a.bus->name, a.path);
 		assert_int_equal(a.bus->ops->state(a.bus), -EOPNOTSUPP);
@@ -209,7 +209,7 @@ static void the_adapter_goes_on_the_bus_and_off(void **state)
 		assert_int_equal(t.c_iflag & (IXON | IXOFF | ICRNL), 0);
 		assert_int_equal(t.c_oflag & OPOST, 0);
 		a.bus->ops->close(a.bus);
-		assert_string_equal(received(&a), "C.");
+		assert_string_equal(received(&a, strlen("C.")), "C.");
 		close(a.fd);
 	}
 }
@@ -264,7 +264,8 @@ static void the_rate_may_follow_the_tty(void **state)
 		if (rc != cases[i].rc || (rc && !strstr(err.text, cases[i].said)))
 			fail_msg("case %zu: %d: %s", i, rc, err.text);
 		if (!rc) {
-			assert_string_equal(received(&a), cases[i].said);
+			assert_string_equal(received(&a, strlen(cases[i].said)),
+					    cases[i].said);
 			assert_int_equal(a.bus->bitrate, atoi(cases[i].behind + 1));
 			assert_string_equal(a.bus->name, a.path);
 			a.bus->ops->close(a.bus);
@@ -331,7 +332,8 @@ static void frames_go_both_ways(void **state)
 			 in;
 
 	assert_int_equal(a->bus->ops->send(a->bus, &out), 0);
-	assert_string_equal(frames_received(a), "t21060F00FFEEDDCC.");
+	assert_string_equal(frames_received(a, strlen("t21060F00FFEEDDCC.")),
+			    "t21060F00FFEEDDCC.");
 	out.can_dlc = 9;
 	assert_int_equal(a->bus->ops->send(a->bus, &out), -EINVAL);
 	/* This side ignores C, S and O, which python-can sends. */
@@ -411,13 +413,13 @@ static void until_queried(struct adapter *a)
 	nanosleep(&(struct timespec){.tv_nsec = 101 * MS}, NULL);
 	query_ns = a->bus->ops->now(a->bus);
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	assert_string_equal(received(a), "t0800.F.");
+	assert_string_equal(received(a, strlen("t0800.F.")), "t0800.F.");
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
 	/* No further query, unless the machine stalled. */
 	if (a->bus->ops->now(a->bus) - query_ns < 100 * MS)
-		assert_string_equal(received(a), "t0800.");
+		assert_string_equal(received(a, strlen("t0800.")), "t0800.");
 	else
-		assert_string_equal(frames_received(a), "t0800.");
+		assert_string_equal(frames_received(a, strlen("t0800.")), "t0800.");
 }
 
 static void status_becomes_error_frames(void **state)
@@ -494,7 +496,7 @@ static void an_adapter_without_the_query_is_left_alone(void **state)
 	}
 	nanosleep(&(struct timespec){.tv_nsec = 101 * MS}, NULL);
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	assert_string_equal(received(a), "t0800.");
+	assert_string_equal(received(a, strlen("t0800.")), "t0800.");
 	assert_int_equal(a->bus->counts.errors, 0);
 }
 
@@ -556,16 +558,16 @@ static void a_torn_line_is_finished_first(void **state)
 	write_interrupts = 5;
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
 	assert_int_equal(a->bus->ops->send(a->bus, &other), 0);
-	assert_string_equal(frames_received(a), "t0800.t1230.");
+	assert_string_equal(frames_received(a, strlen("t0800.t1230.")), "t0800.t1230.");
 	/* Two bytes went out, and then none do: the rest is kept, ahead of later frames. */
 	write_left = 2;
 	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
 	assert_int_equal(a->bus->ops->send(a->bus, &other), -ENOBUFS);
 	assert_int_equal(a->bus->ops->wait(a->bus, 0), 0);
-	assert_string_equal(frames_received(a), "t0");
+	assert_string_equal(frames_received(a, strlen("t0")), "t0");
 	write_all();
 	assert_int_equal(a->bus->ops->send(a->bus, &other), 0);
-	assert_string_equal(frames_received(a), "800.t1230.");
+	assert_string_equal(frames_received(a, strlen("800.t1230.")), "800.t1230.");
 	assert_int_equal(a->bus->counts.full, 2);
 	assert_int_equal(a->bus->counts.sent, 4);
 }
@@ -698,7 +700,7 @@ static void the_last_frames_arrive(void **state)
 	a->bus->ops->close(a->bus);
 	a->bus = NULL;
 	do {
-		text = frames_received(a);
+		text = frames_received(a, 1);
 		for (const char *at = strchr(text, 't'); at; at = strchr(at + 1, 't'))
 			frames++;
 		if (strlen(text) >= 12 &&
