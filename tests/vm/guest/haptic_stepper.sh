@@ -56,6 +56,22 @@ farthest() { sed -n 's/.* highest=\([-0-9]*\).*/\1/p' $sim/carriage; }
 moved() { [ "$(farthest)" -gt 1600 ]; }
 check "the nut went with the hand, by centimetres" moved
 
+# Stopped beyond its end: the module takes the power, and no tick comes that would see it.
+frozen() {
+	"$INCISE_BUILD/bin/incise" haptic /tmp/liver.scene --rig /tmp/rig.conf --duration 2s >/tmp/out 2>/tmp/err &
+	pid=$!
+	n=0; while unpowered >/dev/null && [ $n -lt 200 ]; do sleep 0.1; n=$((n + 1)); done
+	kill -STOP $pid
+	n=0; until unpowered >/dev/null || [ $n -ge 200 ]; do sleep 0.1; n=$((n + 1)); done
+	sleep 3
+	kill -CONT $pid
+	! wait $pid && said "deadman: targets stopped coming" </tmp/err
+}
+check "stopped beyond its --duration it fails with the deadman" frozen
+sed 's/^/# /' /tmp/err
+check "which is cleared" "$INCISE_BUILD/bin/incise" stepper clear --rig /tmp/rig.conf
+check "and its 0 is still known" haptic --duration 1s
+
 estop() {
 	(n=0; while unpowered >/dev/null && [ $n -lt 200 ]; do sleep 0.1; n=$((n + 1)); done; sleep 1; echo "7 1" >$sim/inputs) &
 	! haptic --duration 20s && wait && said "e-stop: release it, then clear" </tmp/err
