@@ -37,8 +37,8 @@ ask() {
 # Until the capture in the background has more records of the tracker than that.
 until_records() {
 	for _ in $(seq 100); do
-		[ "$(ask a.rec.part 'SELECT count(*) FROM tracker' 2>/dev/null)" -gt "$1" ] \
-			2>/dev/null && return
+		incise info a.rec.part --json >rows.json 2>/dev/null &&
+			[ "$(key rows.json rows.tracker)" -gt "$1" ] && return
 		sleep 0.1
 	done
 	complain "no $1 records after 10 s; capture said: $(cat err)"
@@ -213,14 +213,18 @@ reads() {
 @test "a capture that others read all the time loses nothing" {
 	incise capture -o a.rec --rig sim:clock=real --duration 10s --json >report.json 2>err 3>&- &
 	capture=$!
+	readers=()
 	until_records 60
 	reads info 0 incise info a.rec.part 3>&- &
+	readers+=($!)
 	reads export 0 incise export a.rec.part --resample --rate 100 -o part.csv 3>&- &
+	readers+=($!)
 	# which is not complete
 	reads verify 1 incise verify a.rec.part 3>&- &
+	readers+=($!)
 	wait $capture || complain "$(cat err)"
 	touch end
-	wait
+	wait "${readers[@]}"
 	[ "$(key report.json lost)" = 0 ]
 	agreed
 	# and they have read
