@@ -49,14 +49,13 @@ static void parse_only(void *options, char *text)
 }
 
 static const struct cli_option options[] = {
-	{0, "report", "DIR",
-	 "folder to leave everything in; a report that is there\nis replaced",
-	 CLI_TEXT(struct job, folder)},
+	{0, "report", "DIR", "folder to leave everything in",
+	 CLI_OUTPUTS(struct job, folder)},
 	{0, "from", "DIR",
 	 "measure nothing: write report.html and report.md of\nDIR/report.json again",
 	 CLI_TEXT(struct job, from)},
 	{0, "against", "OLD.json", "say what changed beyond noise since that report.json",
-	 CLI_TEXT(struct job, against)},
+	 CLI_INPUT(struct job, against)},
 	{0, "only", "WORD,...", "these words only", CLI_PARSED_BY(parse_only)},
 	{0, "quick", NULL, "fewer points and repeats: a look, not a measurement",
 	 CLI_FLAG(struct job, quick)},
@@ -113,6 +112,19 @@ static bool may_be_replaced(const char *path)
 	return empty || is_report;
 }
 
+/* Files of a report that is there are replaced with --overwrite only. */
+static void reserve_files(const char *folder, bool texts)
+{
+	static const char *const names[] = {"report.html", "report.md", "report.json"};
+
+	for (int i = 0; i < (texts ? 2 : 3); i++) {
+		char *path = cli_text("%s/%s", folder, names[i]);
+
+		cli_output(path);
+		free(path);
+	}
+}
+
 /* Prepare a new report; fails the program when there is something else at that path. */
 static struct folder folder_begin(const char *path)
 {
@@ -125,6 +137,7 @@ static struct folder folder_begin(const char *path)
 	if (!folder.made && !may_be_replaced(path))
 		cli_fail("%s: is there, and is no report; give another --report DIR",
 			 path);
+	reserve_files(path, false);
 	remove_all(folder.unfinished);
 	folder_make_all(data);
 	folder_make_all(pictures);
@@ -297,25 +310,28 @@ static int write_html(const char *path, const char *markdown, struct incise_erro
 	return 0;
 }
 
-/* report.json, and report.md and report.html of it, each of them whole or not at all. They are
- * of what a reader of report.json gets, rounded as it is. */
-static int write_report(const char *path, const json_t *report, struct incise_error *err)
+static int write_json(const char *path, const json_t *report, struct incise_error *err)
 {
 	struct incise_outfile *file = open_part(path, "report.json", err);
-	char *markdown = NULL;
-	size_t size;
-	json_t *read;
-	FILE *out;
-	int rc;
 
 	if (!file)
 		return -errno;
 	json_dumpf(report, incise_outfile_stream(file),
 		   JSON_INDENT(1) | JSON_REAL_PRECISION(12));
 	fputc('\n', incise_outfile_stream(file));
-	rc = incise_outfile_commit(file, err);
-	if (rc)
-		return rc;
+	return incise_outfile_commit(file, err);
+}
+
+/* report.html and report.md of report.json. */
+static int write_texts(const char *path, struct incise_error *err)
+{
+	struct incise_outfile *file;
+	char *markdown = NULL;
+	size_t size;
+	json_t *read;
+	FILE *out;
+	int rc;
+
 	read = load_report(path);
 	out = open_memstream(&markdown, &size);
 	if (!out)
@@ -334,6 +350,17 @@ static int write_report(const char *path, const json_t *report, struct incise_er
 	}
 	free(markdown);
 	return rc;
+}
+
+/*
+ * report.json, and report.md and report.html of it, each of them whole or not at all. They are
+ * of what a reader of report.json gets, rounded as it is.
+ */
+static int write_report(const char *path, const json_t *report, struct incise_error *err)
+{
+	int rc = write_json(path, report, err);
+
+	return rc ? rc : write_texts(path, err);
 }
 
 /* --- measurement --- */
@@ -642,7 +669,8 @@ int main(int argc, char **argv)
 	cli_catch_signals();
 	if (job.from) {
 		report = load_report(job.from);
-		if (write_report(job.from, report, &err))
+		reserve_files(job.from, true);
+		if (write_texts(job.from, &err))
 			cli_fail_with(&err);
 	} else {
 		report = measure(&job);

@@ -24,13 +24,13 @@ static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct bench_run, json)},
 	{0, "against", "OLD.json",
 	 "compare with an older report of --json: what changed\nbeyond noise",
-	 CLI_TEXT(struct bench_run, against)},
+	 CLI_INPUT(struct bench_run, against)},
 	{0, "plot", "NAME",
 	 "draw error over time as NAME.png and NAME.svg;\n"
 	 "stability: NAME-map, NAME-guard, NAME-integrators;\n"
 	 "loop: NAME-wakeups, NAME-rates;\n"
 	 "pose: NAME, NAME-rates; timeline: NAME, NAME-windows",
-	 CLI_TEXT(struct bench_run, plot)},
+	 CLI_OUTPUTS(struct bench_run, plot)},
 	{0, "duration", "TIME",
 	 "of each run of capture, and each of loop's wake-ups,\nsuch as 10min (default: 7s and 5s)",
 	 CLI_DURATION(struct bench_run, seconds, 1, 86400)},

@@ -64,7 +64,7 @@ static const struct cli_option option_table[] = {
 	 CLI_PARSED_BY(parse_only)},
 	{0, "recording", "NAME.rec",
 	 "see whether its tracker and camera agree about the depth",
-	 CLI_TEXT(struct options, recording)},
+	 CLI_INPUT(struct options, recording)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, json)},
 	{0}};
 

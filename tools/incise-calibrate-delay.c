@@ -50,11 +50,11 @@ static const struct cli_option option_table[] = {
 	{0, "camera", NULL, "of the virtual rig, record its camera too",
 	 CLI_FLAG(struct options, camera)},
 	{0, "from", "NAME.rec", "take a recording that is there, not a rig",
-	 CLI_TEXT(struct options, common.from)},
+	 CLI_INPUT(struct options, common.from)},
 	{0, "keep", "NAME.rec", "keep the recording, for --from",
-	 CLI_TEXT(struct options, common.keep)},
+	 CLI_OUTPUTS(struct options, common.keep)},
 	{0, "report", "DIR", "report.txt, report.json and pictures",
-	 CLI_TEXT(struct options, common.report)},
+	 CLI_OUTPUTS(struct options, common.report)},
 	{0, "dry-run", NULL, "do all but write calibration.conf",
 	 CLI_FLAG(struct options, common.dry_run)},
 	{0, "json", NULL, "tell the result as one JSON object",
@@ -100,6 +100,8 @@ static void parse(struct options *options, int argc, char **argv)
 	if (common->keep &&
 	    (strlen(common->keep) < 5 || !cli_ends_with(common->keep, ".rec")))
 		cli_usage("--keep: '%s' is not a name that ends in .rec", common->keep);
+	if (common->keep)
+		cli_output(common->keep);
 	calibrate_begin(common);
 }
 
@@ -219,8 +221,11 @@ static void record_now(const struct options *options, struct stream *streams)
 			;
 	}
 	if (keep) {
-		if (record(options, time_s, keep, &err))
+		path = recording_target(keep);
+		if (record(options, time_s, path, &err))
 			cli_fail_with(&err);
+		recording_replace(path, keep);
+		free(path);
 		read_streams(streams, keep);
 		return;
 	}

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <incise/calibration.h>
 #include <incise/recorder.h>
@@ -27,7 +28,7 @@ struct options {
 	double trigger_force_N;
 	bool trigger_button;
 	double duration_s; /* 0: not given */
-	bool cuts, force, json;
+	bool cuts, json;
 };
 
 static const char *const cameras[] = {"auto", "off", "pictures", "depth", NULL};
@@ -45,12 +46,15 @@ static void parse_trigger(void *whole, char *text)
 }
 
 static const struct cli_option option_table[] = {
-	{'o', "output", "NAME.rec", "folder to record into; it must not exist",
-	 CLI_TEXT(struct options, output)},
+	{'o', "output", "NAME.rec",
+	 "folder to record into; --overwrite replaces one once the new\n"
+	 "one is complete, and drops what an interrupted recording\n"
+	 "left as NAME.rec.part",
+	 CLI_OUTPUTS(struct options, output)},
 	{CLI_RIG_OPTION(struct options, rig)},
 	{'c', "calibration", "FILE",
 	 "calibration.conf (default: the figures of the paper)",
-	 CLI_TEXT(struct options, calibration)},
+	 CLI_INPUT(struct options, calibration)},
 	{0, "duration", "TIME",
 	 "end after 10s, 500ms, 2min, 1h (default: at Ctrl-C;\n"
 	 "on the virtual rig at the end of its cuts)",
@@ -66,10 +70,6 @@ static const struct cli_option option_table[] = {
 	 CLI_PARSED_BY(parse_trigger)},
 	{0, "cuts", NULL, "mark beginning and end of each cut in the table events",
 	 CLI_FLAG(struct options, cuts)},
-	{0, "force", NULL,
-	 "replace NAME.rec once the new one is complete; drop what\n"
-	 "an interrupted recording left as NAME.rec.part",
-	 CLI_FLAG(struct options, force)},
 	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct options, json)},
 	{0},
 };
@@ -104,6 +104,7 @@ static void parse(struct options *options, int argc, char **argv)
 		cli_usage("-o: '%s' is not a name that ends in .rec", output);
 	if (length > PATH_MAX - 16)
 		cli_usage("-o: the path is too long");
+	cli_output(output);
 	options->output = output;
 }
 
@@ -269,7 +270,7 @@ static void record(struct run *run)
 }
 
 /*
- * Remove a recording that was never triggered; and with --force one without a sample, so that
+ * Remove a recording that was never triggered; and with --overwrite one without a sample, so that
  * it does not replace a recording with samples.
  */
 static void keep_old(const struct run *run, const char *new)
@@ -277,14 +278,14 @@ static void keep_old(const struct run *run, const char *new)
 	const struct incise_recorder_stats *stats = &run->result.stats;
 
 	if (stats->force || stats->tracker || stats->frames ||
-	    (!stats->armed && !run->options->force))
+	    (!stats->armed && !cli_overwrite()))
 		return;
 	recording_remove(new);
 	if (run->result.early.code)
 		cli_fail_with(&run->result.early);
 	cli_fail("%s: %s; nothing was recorded%s", run->options->output,
 		 stats->armed ? "was never triggered" : "no device gave a sample",
-		 run->options->force ? ", and nothing is replaced" : "");
+		 cli_overwrite() ? ", and nothing is replaced" : "");
 }
 
 static struct incise_rig *open_rig(const struct options *options)
@@ -311,19 +312,6 @@ static bool use_vision(const struct options *options, struct incise_rig *rig,
 			"handle looks like; see rig.conf(5)",
 			incise_rig_spec(rig));
 	return has && options->camera != CAMERA_PICTURES;
-}
-
-/* With --force the new recording is written next to the old one. */
-static void clear(const struct options *options, const char *target)
-{
-	char part[PATH_MAX + 8];
-
-	recording_check(options->output);
-	snprintf(part, sizeof(part), "%s.part", options->output);
-	recording_remove(part);
-	snprintf(part, sizeof(part), "%s.part", target);
-	recording_remove(part);
-	recording_remove(target);
 }
 
 static double planned_s(const struct options *options, struct incise_rig *rig)
@@ -445,7 +433,7 @@ int main(int argc, char **argv)
 	struct incise_error err = {0};
 	struct options options = {0};
 	struct run run = {.options = &options};
-	char target[PATH_MAX];
+	char *target;
 
 	parse(&options, argc, argv);
 	incise_calibration_nominal(&calibration);
@@ -464,10 +452,7 @@ int main(int argc, char **argv)
 	run.view.full_scale_N = force.full_scale_V * 1e3 / calibration.force_mV_N;
 	run.view.depth = setup.vision;
 
-	snprintf(target, sizeof(target), "%s%s", options.output,
-		 options.force ? ".new" : "");
-	if (options.force)
-		clear(&options, target);
+	target = recording_target(options.output);
 	cli_catch_signals();
 	run.recorder =
 		cli_require(incise_recorder_new(target, run.rig, &setup, &err), &err);
@@ -484,8 +469,8 @@ int main(int argc, char **argv)
 	capture_view_end();
 	incise_rig_close(run.rig);
 	keep_old(&run, target);
-	if (options.force)
-		recording_replace(target, options.output);
+	recording_replace(target, options.output);
+	free(target);
 	report(&options, &run.result);
 	judge(options.output, &run.result);
 	return 0;

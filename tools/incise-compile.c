@@ -64,16 +64,16 @@ static char *symbol_of(const char *path)
 	return symbol;
 }
 
-static void parse_c_source(void *c_source, char *path)
+static void check_c_source(void *c_source, char *path)
 {
+	(void)c_source;
 	free(symbol_of(path));
-	*(const char **)c_source = path;
 }
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
 	 "write the compiled model there (.fx); '-' is standard output",
-	 CLI_TEXT(struct job, output)},
+	 CLI_OUTPUT(struct job, output)},
 	{0, "budget", "ERROR",
 	 "largest error that may be certified, e.g. 0.1mN, 50uN or\n"
 	 "1e-4 in the output's unit (default: 0.1mN)",
@@ -87,7 +87,7 @@ static const struct cli_option options[] = {
 	{0, "c-source", "FILE.c",
 	 "write it as C for a microcontroller, too; FILE_eval() is the\n"
 	 "function",
-	 CLI_PARSED(struct job, c_source, parse_c_source)},
+	 CLI_OUTPUT(struct job, c_source), .parse = check_c_source},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
 };

@@ -33,7 +33,6 @@
 struct options {
 	struct demo demo;
 	const char *loop_time, *scene;
-	bool force;
 };
 
 /* Checked here, and handed on to incise haptic as it is. */
@@ -45,7 +44,7 @@ static void parse_loop(void *loop_time, char *text)
 
 static const struct cli_option option_table[] = {
 	{'o', "output", "DIR", "folder to leave everything in (default: demo.out)",
-	 CLI_TEXT(struct options, demo.folder)},
+	 CLI_OUTPUTS(struct options, demo.folder)},
 	{0, "seed", "N", "of the virtual rig (default: 1)",
 	 CLI_INTEGER(struct options, demo.seed, 0, SEED_MAX)},
 	{0, "loop", "TIME", "length of the haptic loop (default: 10s)",
@@ -53,8 +52,6 @@ static const struct cli_option option_table[] = {
 	{0, "scene", "SCENE",
 	 "paper 2 instead: a film and a strip of a procedure on this scene, as neck",
 	 CLI_TEXT(struct options, scene)},
-	{0, "force", NULL, "write into a folder that exists",
-	 CLI_FLAG(struct options, force)},
 	{0, "json", NULL, "print the summary as JSON, and nothing else",
 	 CLI_FLAG(struct options, demo.quiet)},
 	{0},
@@ -75,16 +72,18 @@ static void make_folder(const char *folder, bool may_exist)
 {
 	if (mkdir(folder, 0777) && (errno != EEXIST || !may_exist))
 		cli_fail("%s: %s%s", folder, strerror(errno),
-			 errno == EEXIST ? "; give another -o DIR, or --force" : "");
+			 errno == EEXIST ? "; give another -o DIR, or --overwrite" : "");
 }
 
 /* Make the folder of a demo, or take one that a demo has not completed. */
-static void begin_folder(const char *folder, bool may_exist)
+static void begin_folder(const char *folder)
 {
 	char *mark = cli_text("%s/.unfinished", folder);
 	int fd;
 
-	make_folder(folder, may_exist || !access(mark, F_OK));
+	if (!access(mark, F_OK))
+		cli_allow_overwrite();
+	make_folder(folder, cli_overwrite());
 	fd = open(mark, O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
 	if (fd < 0)
 		cli_fail("%s: %s", mark, strerror(errno));
@@ -110,6 +109,21 @@ static void print_step(const struct demo *demo, const char *what)
 }
 
 /* --- commands ------------------------------------------------------------------------ */
+
+/* The command, with --overwrite if this one has it; lives as long as the program. */
+static char *const *handed_on(char *const *argv)
+{
+	size_t n = 0;
+	char **more;
+
+	while (argv[n])
+		n++;
+	more = cli_alloc(n + 2, sizeof(*more));
+	memcpy(more, argv, n * sizeof(*more));
+	if (cli_overwrite())
+		more[n] = "--overwrite";
+	return more;
+}
 
 static void print_command(char *const *argv)
 {
@@ -232,6 +246,7 @@ static json_t *run_command(const struct demo *demo, char *const *argv)
 	struct incise_error err = {0};
 	json_t *report;
 
+	argv = handed_on(argv);
 	if (!demo->quiet)
 		print_command(argv);
 	report = read_report(argv, demo->folder, &err);
@@ -283,8 +298,7 @@ static void walk(struct demo *demo, const char *loop_time)
 	print_step(demo,
 		   "Cut the virtual liver: 3, 4, 4 and 3 times at 5, 10, 15 and 20 mm");
 	json_object_set_new(demo->summary, "capture",
-			    RUN(demo, "capture", "-o", rec, "--rig", sim, "--force",
-				"--json"));
+			    RUN(demo, "capture", "-o", rec, "--rig", sim, "--json"));
 	print_step(demo,
 		   "Make datasets of the recording: raw, averaged, averaged cut by cut");
 	json_object_set_new(demo->summary, "export_raw",
@@ -308,7 +322,7 @@ static void walk(struct demo *demo, const char *loop_time)
 	print_step(demo, "Cut another liver once, 5 mm deep, to compare with");
 	json_object_set_new(demo->summary, "capture_new_cut",
 			    RUN(demo, "capture", "-o", new_rec, "--rig", new_sim,
-				"--force", "--json"));
+				"--json"));
 	json_object_set_new(demo->summary, "export_new_cut",
 			    RUN(demo, "export", new_rec, "-o", new_csv, "--rate", "1000",
 				"--json"));
@@ -333,19 +347,20 @@ static void run_view(char *const *argv, const char *folder)
 {
 	struct incise_error err = {0};
 
+	argv = handed_on(argv);
 	print_command(argv);
 	if (wait_for(start(argv, -1), argv, folder, &err))
 		cli_fail_with(&err);
 }
 
 /* Leave NAME.mkv and NAME.png in the folder, by incise view. */
-static void film_scene(const char *scene, const char *folder, bool force)
+static void film_scene(const char *scene, const char *folder)
 {
 	char *name = scene_argument_name(scene);
 	char *film = cli_text("%s/%s.mkv", folder, name);
 	char *strip = cli_text("%s/%s.png", folder, name);
 
-	begin_folder(folder, force);
+	begin_folder(folder);
 	run_view((char *const[]){"view", (char *)scene, "--procedure", "--video", film,
 				 "--fps", "30", NULL},
 		 folder);
@@ -376,7 +391,7 @@ int main(int argc, char **argv)
 		cli_usage("--scene makes pictures, and has nothing to say as JSON");
 	cli_catch_signals();
 	if (options.scene) {
-		film_scene(options.scene, demo->folder, options.force);
+		film_scene(options.scene, demo->folder);
 		return 0;
 	}
 	if (!plot_possible())
@@ -384,7 +399,7 @@ int main(int argc, char **argv)
 			"gnuplot is not installed, it draws the pictures: apt-get install "
 			"gnuplot-nox, or run 'make demo'");
 	clock_gettime(CLOCK_MONOTONIC, &begin);
-	begin_folder(demo->folder, options.force);
+	begin_folder(demo->folder);
 	plot = demo_path(demo, "plot");
 	make_folder(plot, true);
 	free(plot);

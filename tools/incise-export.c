@@ -42,6 +42,7 @@ static void load_calibration(void *options, char *path)
 	struct job *job = options;
 	struct incise_error err = {0};
 
+	cli_input(path);
 	if (incise_calibration_load(path, &job->calibration, &err))
 		cli_fail_with(&err);
 	job->how.calibration = &job->calibration;
@@ -50,7 +51,7 @@ static void load_calibration(void *options, char *path)
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
 	 "dataset to write: FILE.csv, or FILE.h5 for HDF5; - is CSV on\nstandard output (default)",
-	 CLI_TEXT(struct job, output)},
+	 CLI_OUTPUT(struct job, output)},
 	{'r', "rate", "HZ",
 	 "rows per second, each the mean of its samples (default: all\nsamples)",
 	 CLI_NUMBER(struct job, how.rate_hz, 1e-3, 1e9)},

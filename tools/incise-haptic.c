@@ -36,7 +36,7 @@ static const struct cli_option options[] = {
 	{'c', "calibration", "FILE",
 	 "calibration.conf, for where the tip is (default: where the\n"
 	 "tracker takes it to be)",
-	 CLI_TEXT(struct job, calibration)},
+	 CLI_INPUT(struct job, calibration)},
 	SCENE_ARGUMENT_OPTIONS(struct job, haptic.argument),
 	{0, "tool", "KIND",
 	 "what the hand holds: auto (blade or handle, by the scalpel's turn), blade,\n"
@@ -65,7 +65,7 @@ static const struct cli_option options[] = {
 	 "scene's name in /run/incise, $XDG_RUNTIME_DIR/incise or /tmp/incise-UID)",
 	 CLI_TEXT(struct job, state)},
 	{0, "log", "FILE", "write every tick as CSV at the end; needs --duration",
-	 CLI_TEXT(struct job, log)},
+	 CLI_OUTPUT(struct job, log)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{'v', "verbose", NULL, "say on stderr what happens meanwhile",
 	 CLI_FLAG(struct job, verbose)},

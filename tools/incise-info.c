@@ -32,7 +32,7 @@ static const struct cli_option options[] = {
 	{0, "plot", "NAME",
 	 "of a .fis: draw the membership functions and the force\n"
 	 "surface as NAME.png and NAME.svg",
-	 CLI_TEXT(struct job, plot)},
+	 CLI_OUTPUTS(struct job, plot)},
 	{0},
 };
 

@@ -30,7 +30,7 @@ static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
 	 "file rig.conf, or sim:KEY=VALUE,…: its stepper and its tracker's delay count\n"
 	 "(default: no rig; a tracker of 120 Hz, 4.2 ms late)",
-	 CLI_TEXT(struct job, rig)},
+	 CLI_INPUT(struct job, rig)},
 	SCENE_ARGUMENT_OPTIONS(struct job, scene),
 	{0, "full", NULL, "keep every stage, needed or not: what leaving out saves",
 	 CLI_FLAG(struct job, full)},

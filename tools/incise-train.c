@@ -66,7 +66,7 @@ static void parse_type(void *type, char *text)
 static const struct cli_option option_table[] = {
 	{'o', "output-model", "FILE",
 	 "write the model there (.fis); '-' is standard output",
-	 CLI_TEXT(struct options, model)},
+	 CLI_OUTPUT(struct options, model)},
 	{0, "inputs", "A,B", "input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},
 	{0, "output", "Y", "output column (default: force_N)",
@@ -96,9 +96,9 @@ static const struct cli_option option_table[] = {
 	 "the check data choose the epoch",
 	 CLI_FLAG(struct options, train.classic)},
 	{0, "initial", "FILE", "also write the model as it was before training",
-	 CLI_TEXT(struct options, initial)},
+	 CLI_OUTPUT(struct options, initial)},
 	{0, "history", "FILE", "write RMSE by epoch as CSV",
-	 CLI_TEXT(struct options, history)},
+	 CLI_OUTPUT(struct options, history)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, json)},
 	{0},
 };
@@ -113,8 +113,20 @@ static const struct cli_command command = {
 		"Exit: 0 trained, 1 failed, 2 bad usage. See incise-train(1).",
 };
 
+/* MODEL.fis.sd, if the model is a regular file or will be one: free(3); else NULL. */
+static char *uncertainty_path(const char *model)
+{
+	struct stat st;
+
+	if (!strcmp(model, "-") || (!stat(model, &st) && !S_ISREG(st.st_mode)))
+		return NULL;
+	return cli_text("%s.sd", model);
+}
+
 static void parse(struct options *options, int argc, char **argv)
 {
+	char *sd;
+
 	*options = (struct options){
 		.inputs = {"depth_mm", "velocity_mm_s"},
 		.n_inputs = 2,
@@ -127,6 +139,10 @@ static void parse(struct options *options, int argc, char **argv)
 		cli_usage("where should the model go? Give -o MODEL.fis");
 	if (options->json && !strcmp(options->model, "-"))
 		cli_usage("--json and -o - would both write to standard output");
+	sd = uncertainty_path(options->model);
+	if (sd)
+		cli_output_once(sd);
+	free(sd);
 	if (options->n_mfs && options->n_mfs != options->n_inputs)
 		cli_usage("--mf names %d counts for %d inputs", options->n_mfs,
 			  options->n_inputs);
@@ -172,22 +188,14 @@ static void on_epoch(void *user, int epoch, double train_rmse, double check_rmse
 	fputc('\n', history->csv);
 }
 
-/*
- * Fail before the training, not after it, if the output cannot be written or is the data
- * file.
- */
-static void check_writable(const struct options *options, const char *path)
+/* Fail before the training, not after it, if the output cannot be written. */
+static void check_writable(const char *path)
 {
 	struct incise_outfile *file;
-	struct stat data, out;
+	struct stat out;
 
 	if (!path)
 		return;
-	if (!stat(options->data, &data) && !stat(path, &out) &&
-	    data.st_dev == out.st_dev && data.st_ino == out.st_ino &&
-	    S_ISREG(out.st_mode))
-		cli_fail("%s: is the data to train from; give another file to write",
-			 path);
 	/* Not a pipe: its reader would see an end of file. */
 	if (!stat(path, &out) && !S_ISREG(out.st_mode) && !S_ISDIR(out.st_mode))
 		return;
@@ -213,16 +221,13 @@ static void judge_interval(struct interval *interval, const struct incise_model 
 		interval->coverage = (double)inside / check->pairs.n;
 }
 
-/* Write MODEL.fis.sd, if the model is a regular file. */
 static void save_uncertainty(const struct interval *interval, const char *model)
 {
 	struct incise_error err = {0};
-	struct stat st;
-	char *path;
+	char *path = uncertainty_path(model);
 
-	if (!strcmp(model, "-") || stat(model, &st) || !S_ISREG(st.st_mode))
+	if (!path)
 		return;
-	path = cli_text("%s.sd", model);
 	if (incise_uncertainty_save(interval->uncertainty, path, &err))
 		cli_fail_with(&err);
 	free(path);
@@ -472,9 +477,9 @@ int main(int argc, char **argv)
 	for (int i = 0; i < options.n_inputs; i++)
 		columns[i] = options.inputs[i];
 	columns[options.n_inputs] = options.output;
-	check_writable(&options, options.model);
-	check_writable(&options, options.initial);
-	check_writable(&options, options.history);
+	check_writable(options.model);
+	check_writable(options.initial);
+	check_writable(options.history);
 	data = cli_require(incise_dataset_read(options.data, columns,
 					       options.n_inputs + 1, options.group, &err),
 			   &err);

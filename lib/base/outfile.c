@@ -97,10 +97,16 @@ struct incise_outfile *incise_outfile_open(const char *path, struct incise_error
 	if (!file)
 		goto fail;
 	file->path = strdup(path);
-	/* A link is written through, not replaced; one that leads nowhere is refused. */
+	/*
+	 * A link is written through, not replaced; one that leads nowhere is refused. That of
+	 * /dev/stdout to a pipe has no path, but is there.
+	 */
+	exists = !stat(path, &st);
 	file->target = realpath(path, NULL);
-	if (!file->target && !lstat(path, &st) && S_ISLNK(st.st_mode))
+	if (!file->target && !exists && !lstat(path, &st) && S_ISLNK(st.st_mode)) {
+		errno = ENOENT;
 		goto fail;
+	}
 	if (!file->target)
 		file->target = strdup(path);
 	if (!file->path || !file->target)
@@ -109,7 +115,6 @@ struct incise_outfile *incise_outfile_open(const char *path, struct incise_error
 		file->stream = stdout;
 		return file;
 	}
-	exists = !stat(path, &st);
 	if (!*path || (exists && S_ISDIR(st.st_mode))) {
 		errno = *path ? EISDIR : ENOENT;
 		goto fail;

@@ -201,7 +201,6 @@ static int read_surface(struct incise_scene *scene, const config_setting_t *root
 	struct incise_error why = {0};
 	const char *name = "plane";
 	const struct kind *kind;
-	char *file = NULL;
 	int rc;
 
 	if (!group)
@@ -228,14 +227,13 @@ static int read_surface(struct incise_scene *scene, const config_setting_t *root
 	if (rc)
 		return rc;
 	if (named.file) {
-		file = beside(scene, named.file);
-		if (!file)
+		scene->surface_path = beside(scene, named.file);
+		if (!scene->surface_path)
 			return incise_error_set(err, ENOMEM, "%s: no memory",
 						scene->path);
-		named.file = file;
+		named.file = scene->surface_path;
 	}
 	scene->surface = kind->make(&named, &why);
-	free(file);
 	if (!scene->surface)
 		return incise_error_set(err, why.code, "%s:%d: its surface: %s",
 					scene->path, config_setting_source_line(group),
@@ -361,14 +359,13 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 
 	if (rc || (!name && !override))
 		return rc;
-	path = override ? strdup(override) : beside(scene, name);
+	path = scene->model_path = override ? strdup(override) : beside(scene, name);
 	if (!path)
 		return incise_error_set(err, ENOMEM, "%s: no memory", scene->path);
 	if (ends_with(path, ".fx"))
 		scene->compiled = incise_fixed_load(path, &why);
 	else
 		scene->model = incise_model_load(path, &why);
-	free(path);
 	if (!scene->model && !scene->compiled)
 		return incise_error_set(err, why.code, "%s: its model %s", scene->path,
 					why.text);
@@ -574,7 +571,20 @@ void incise_scene_free(struct incise_scene *scene)
 	incise_fixed_free(scene->compiled);
 	incise_surface_free(scene->surface);
 	free(scene->path);
+	free(scene->model_path);
+	free(scene->surface_path);
 	free(scene);
+}
+
+const char *incise_scene_file(const struct incise_scene *scene, int i)
+{
+	const char *files[] = {scene->path, scene->model_path, scene->surface_path};
+	const int n = sizeof(files) / sizeof(*files);
+
+	for (int k = 0; k < n; k++)
+		if (files[k] && !i--)
+			return files[k];
+	return NULL;
 }
 
 double incise_scene_handle_mm(const struct incise_scene *scene)

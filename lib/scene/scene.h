@@ -14,6 +14,7 @@
 
 struct incise_scene {
 	char *path;
+	char *model_path, *surface_path; /* or NULL */
 	double rate_hz;
 	bool fixed;
 	bool full;		    /* see incise_scene_set_full() */

@@ -3,9 +3,11 @@
  * A film: its module, and the name of its file; see incise/film.h.
  */
 #include <errno.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include "../device/module.h"
 #include "film.h"
@@ -15,7 +17,9 @@
 struct incise_film {
 	const struct incise_film_module *module;
 	struct incise_film_coder *coder;
-	char *path, *part;
+	char *path;  /* where it leads, if it is a link */
+	char *part;  /* of its name until it ends; the same as path if that is direct */
+	bool direct; /* a pipe or a device: written in place */
 	uint64_t frames;
 	int failed;
 };
@@ -46,6 +50,23 @@ static void forget(struct incise_film *film)
 	free(film);
 }
 
+static int name_files(struct incise_film *film, const char *path)
+{
+	struct stat st;
+
+	film->direct = !stat(path, &st) && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode);
+	film->path = realpath(path, NULL);
+	if (!film->path || film->direct) {
+		free(film->path);
+		film->path = strdup(path);
+	}
+	if (film->path && film->direct)
+		film->part = strdup(film->path);
+	else if (film->path && asprintf(&film->part, "%s.part", film->path) < 0)
+		film->part = NULL;
+	return film->part ? 0 : -ENOMEM;
+}
+
 struct incise_film *incise_film_new(const char *path, int width, int height, int rate_hz,
 				    struct incise_error *err)
 {
@@ -64,11 +85,8 @@ struct incise_film *incise_film_new(const char *path, int width, int height, int
 	film = calloc(1, sizeof(*film));
 	if (!film)
 		goto no_memory;
-	film->path = strdup(path);
-	if (!film->path || asprintf(&film->part, "%s.part", path) < 0) {
-		film->part = NULL;
+	if (name_files(film, path))
 		goto no_memory;
-	}
 	film->module = load(err);
 	if (film->module)
 		film->coder = film->module->open(film->part, width, height, rate_hz, err);
@@ -104,9 +122,9 @@ int incise_film_close(struct incise_film *film, struct incise_error *err)
 	if (!rc && film->failed)
 		rc = incise_error_set(err, -film->failed,
 				      "%s: the film has ended with an error", film->path);
-	if (!rc && film->frames && rename(film->part, film->path))
+	if (!rc && !film->direct && film->frames && rename(film->part, film->path))
 		rc = incise_error_set(err, errno, "%s: %s", film->path, strerror(errno));
-	if (rc || !film->frames)
+	if (!film->direct && (rc || !film->frames))
 		unlink(film->part);
 	forget(film);
 	return rc;
@@ -117,6 +135,7 @@ void incise_film_drop(struct incise_film *film)
 	if (!film)
 		return;
 	film->module->close(film->coder, NULL);
-	unlink(film->part);
+	if (!film->direct)
+		unlink(film->part);
 	forget(film);
 }

@@ -105,6 +105,9 @@ report_of() {
 	cp -r "$r" again
 	rm again/report.html again/report.md
 	run -0 --separate-stderr incise bench all --from again
+	run --separate-stderr incise bench all --from again
+	failed_with again/report.html exists --overwrite
+	run -0 --separate-stderr incise bench all --from again --overwrite
 	[ -z "$stderr" ]
 	for file in report.html report.md report.json; do
 		cmp "$r/$file" "again/$file"
@@ -124,7 +127,9 @@ report_of() {
 	run ! grep "^## Vision" r/report.md
 	# it is replaced by the next one
 	unset INCISE_MODULE_PATH
-	incise bench all --quick --report r --only training --json >r.json
+	run --separate-stderr incise bench all --quick --report r --only training
+	failed_with r/report.html exists --overwrite
+	incise bench all --quick --report r --overwrite --only training --json >r.json
 	cmp <(sqlite3 :memory: "SELECT json(readfile('r.json'))") \
 		<(sqlite3 :memory: "SELECT json(readfile('r/report.json'))")
 	[ "$(ls r)" = "$(printf '%s\n' data pictures report.html report.json report.md)" ]
@@ -134,20 +139,24 @@ report_of() {
 @test "what changed since another report stands in it" {
 	# figures that are exact, of the same program
 	incise bench all --quick --report r --only timeline
-	run --separate-stderr incise bench all --quick --report r --only timeline,training \
+	run --separate-stderr incise bench all --quick --report r --overwrite --only timeline \
 		--against r/report.json
+	failed_with r/report.json "is an input"
+	cp r/report.json first.json
+	run --separate-stderr incise bench all --quick --report r --overwrite --only timeline,training \
+		--against first.json
 	grep -q "^## What changed" r/report.md
 	holds "$(key r/report.json against.same) > 50"
-	[ "$(key r/report.json against.file)" = r/report.json ]
+	[ "$(key r/report.json against.file)" = first.json ]
 	n=$(sqlite3 :memory: "SELECT json_array_length(readfile('r/report.json'), '\$.against.gone')
 		+ json_extract(readfile('r/report.json'), '\$.against.worse')")
-	[ "$n" = 0 ] && [ "$status" = 0 ] || failed_with "$n figure" "against r/report.json"
+	[ "$n" = 0 ] && [ "$status" = 0 ] || failed_with "$n figure" "against first.json"
 	# of an older one that was better, and had more
 	sqlite3 :memory: "SELECT json_set(readfile('r/report.json'),
 		'\$.words.timeline.figures[0].value', 1e-9,
 		'\$.words.timeline.figures[#]', json('{\"name\": \"other\", \"kind\": \"exact\",
 		\"unit\": \"mm\", \"value\": 1}'))" >old.json
-	run --separate-stderr incise bench all --quick --report r --only timeline --against old.json
+	run --separate-stderr incise bench all --quick --report r --overwrite --only timeline --against old.json
 	failed_with "worse or gone against old.json; r/report.md says which"
 	grep -qF -- "- Gone: timeline: other" r/report.md
 	grep -qE "^\| timeline \| .* \| 1.000×10⁻⁹ \| .* \| yes \|$" r/report.md
@@ -218,7 +227,7 @@ report_of() {
 	cp -r "$r" old
 	cp old/report.json was.json
 	for folder in old "new/one"; do
-		incise bench all --report "$folder" --only stability 2>err &
+		incise bench all --report "$folder" --overwrite --only stability 2>err &
 		pid=$!
 		until [ -e "$folder/.unfinished/data/stability.json" ]; do sleep 0.05; done
 		child=$(ps -o pid= --ppid "$pid" | tr -d ' ')

@@ -14,7 +14,7 @@ setup() {
 	for latency in 4.2 11; do
 		echo 'tracker_delay_ms = 1.5;' >calibration.conf
 		incise calibrate delay --rig $rig,tracker_latency_ms=$latency --time 15s \
-			--report rep --json >r.json </dev/null
+			--report rep --overwrite --json >r.json </dev/null
 		left=$(key r.json 'values[0].left')
 		u=$(key r.json 'values[0].u')
 		[ "$(key r.json 'values[0].key')" = tracker_delay_ms ]

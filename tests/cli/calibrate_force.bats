@@ -68,7 +68,7 @@ made_weights() {
 	[[ "$output" == *"pair 9 "*"outlier"*"pair 20 "*"outlier"* ]]
 	cp calibration.conf before
 	made_weights "if (i % 7 == 3) r += 400 + 50 * s" >w.csv
-	run --separate-stderr incise calibrate force --from w.csv --report r
+	run --separate-stderr incise calibrate force --from w.csv --report r --overwrite
 	failed_with "refused" "of 28 pairs lie far from the line" "calibration.conf stays as it was"
 	cmp calibration.conf before
 	grep -q "^refused: " r/report.txt

@@ -46,7 +46,7 @@ until_it_runs() {
 
 @test "capture --help lists the options" {
 	run -0 --separate-stderr incise capture --help
-	for option in --output --rig --calibration --duration --force --json; do
+	for option in --output --rig --calibration --duration --overwrite --json; do
 		[[ "$output" == *"$option"* ]]
 	done
 	[ -z "$stderr" ]
@@ -132,11 +132,11 @@ until_it_runs() {
 	[ "$(ask a.rec.part "SELECT value FROM meta WHERE key='force_rows'")" = \
 		"$(ask a.rec.part 'SELECT count(*) FROM force')" ]
 
-	# It is not lost by the next capture of that name, only by --force.
+	# It is not lost by the next capture of that name, only by --overwrite.
 	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s
 	failed_with "a.rec.part: left by an interrupted recording"
 	[ -d a.rec.part ]
-	incise capture -o a.rec --rig $quick --duration 1s --force
+	incise capture -o a.rec --rig $quick --duration 1s --overwrite
 	[ -d a.rec ]
 	[ ! -e a.rec.part ]
 }
@@ -158,11 +158,11 @@ until_it_runs() {
 	done
 }
 
-@test "capture --force keeps its hands off a recording under way" {
+@test "capture --overwrite keeps its hands off a recording under way" {
 	incise capture -o a.rec --rig sim:clock=real >out 2>err 3>&- &
 	pid=$!
 	until_it_runs a.rec.part
-	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s --force
+	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s --overwrite
 	failed_with "another incise capture is writing it"
 	kill -INT $pid
 	wait $pid
@@ -182,41 +182,41 @@ until_it_runs() {
 	[ -d a.rec ]
 }
 
-@test "capture refuses an existing recording, --force replaces it" {
+@test "capture refuses an existing recording, --overwrite replaces it" {
 	incise capture -o a.rec --rig $quick --duration 1s
 	before=$(sha256sum <a.rec/recording.db)
 	run --separate-stderr incise capture -o a.rec --rig $quick --duration 2s
 	failed_with "a.rec: exists already"
 	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
-	incise capture -o a.rec --rig $quick --duration 2s --force
+	incise capture -o a.rec --rig $quick --duration 2s --overwrite
 	[ "$(ask a.rec 'SELECT count(*) FROM force')" -ge 20000 ]
 	[ "$(ls)" = a.rec ]
 }
 
-@test "capture --force that fails leaves the old recording" {
+@test "capture --overwrite that fails leaves the old recording" {
 	incise capture -o a.rec --rig $quick --duration 1s
 	before=$(sha256sum <a.rec/recording.db)
-	run --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1,pause_s=0.1 --force
+	run --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1,pause_s=0.1 --overwrite
 	failed_with "deep while the zero"
 	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
 }
 
-@test "capture --force of what is never triggered leaves the old recording" {
+@test "capture --overwrite of what is never triggered leaves the old recording" {
 	incise capture -o a.rec --rig $quick --duration 1s
 	before=$(sha256sum <a.rec/recording.db)
-	run --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1 --trigger 100N --force
+	run --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1 --trigger 100N --overwrite
 	failed_with "was never triggered; nothing was recorded, and nothing is replaced"
 	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
 	[ "$(ls)" = a.rec ]
 }
 
-@test "capture --force replaces nothing but recordings" {
+@test "capture --overwrite replaces nothing but recordings" {
 	mkdir a.rec && touch a.rec/thesis.txt
 	touch b.rec
-	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s --force
+	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s --overwrite
 	failed_with "is no recording"
 	[ -e a.rec/thesis.txt ]
-	run --separate-stderr incise capture -o b.rec --rig $quick --duration 1s --force
+	run --separate-stderr incise capture -o b.rec --rig $quick --duration 1s --overwrite
 	failed_with "is no recording"
 	[ -f b.rec ]
 }

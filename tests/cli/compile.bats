@@ -12,7 +12,7 @@ setup() {
 	run -0 --separate-stderr incise compile m.fis -o m.fx
 	[[ "${lines[0]}" == "m.fis: "*"certified to "*" mN" ]]
 	[ "$(head -c 8 m.fx)" = INCISEFX ]
-	incise compile m.fis -o m.fx --json >r.json
+	incise compile m.fis -o m.fx --overwrite --json >r.json
 	# 0.1 mN, in N
 	holds "$(key r.json bound_N) <= 1e-4"
 	[ "$(key r.json size_bytes)" = "$(stat -c %s m.fx)" ]
@@ -20,7 +20,7 @@ setup() {
 
 @test "a compiled model is within its bound of double" {
 	for kind in direct table force; do
-		incise compile m.fis -o m.fx --arith $kind --budget 1mN --json >r.json
+		incise compile m.fis -o m.fx --overwrite --arith $kind --budget 1mN --json >r.json
 		[ "$(key r.json arithmetic)" = $kind ]
 		incise eval m.fis --grid 97x89 >double
 		awk 'NF { print $1, $2 }' double >points
@@ -38,7 +38,7 @@ setup() {
 	holds "$(key b.json bound_N) <= 20e-6"
 	holds "$(key b.json size_bytes) > $(key a.json size_bytes)"
 	cp b.fx before.fx
-	run --separate-stderr incise compile m.fis -o b.fx --budget 1uN
+	run --separate-stderr incise compile m.fis -o b.fx --overwrite --budget 1uN
 	failed_with "m.fis: " "is certain to"
 	cmp b.fx before.fx
 }
@@ -98,7 +98,7 @@ setup() {
 	./main <q >c
 	awk '{ printf "%.17g %.17g\n", $1 / 65536, $2 / 65536 }' q | incise eval m.fx >fx 2>/dev/null
 	cmp c fx
-	run -2 --separate-stderr incise compile m.fis -o m.fx --c-source 7.c
+	run -2 --separate-stderr incise compile m.fis -o m.fx --overwrite --c-source 7.c
 }
 
 @test "compile: bad usage" {

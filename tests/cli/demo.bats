@@ -94,7 +94,7 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 @test "demo does not write into a folder that exists" {
 	before=$(sha256sum <"$demo/summary.json")
 	run --separate-stderr incise demo -o "$demo" --loop 1s
-	failed_with "my demo's" "File exists" --force
+	failed_with "my demo's" "File exists" --overwrite
 	[ -z "$output" ]
 	[ "$(sha256sum <"$demo/summary.json")" = "$before" ]
 }
@@ -147,7 +147,7 @@ interrupted_in() {
 	touch file
 	run --separate-stderr incise demo -o file
 	failed_with file
-	run --separate-stderr incise demo -o file --force
+	run --separate-stderr incise demo -o file --overwrite
 	failed_with file
 }
 

@@ -131,10 +131,10 @@ well_formed() {
 
 @test "export replaces an old dataset, and leaves it where it fails" {
 	echo old >a.csv
-	run --separate-stderr incise export none.rec -o a.csv
+	run --separate-stderr incise export none.rec -o a.csv --overwrite
 	failed_with "none.rec: there is no such recording"
 	[ "$(cat a.csv)" = old ]
-	incise export liver.rec -a 3x3 -o a.csv
+	incise export liver.rec -a 3x3 -o a.csv --overwrite
 	[ "$(wc -l <a.csv)" -gt 3 ]
 }
 
@@ -349,8 +349,8 @@ read_mcap() {
 		seq > 0, seq, t_ns + 100000000, 1e5, seq = 0 FROM tracker
 		WHERE seq IN (0, (SELECT max(seq) FROM tracker))"
 	for how in "" --resample; do
-		incise export even.rec $how -o a.csv
-		incise export line.rec $how -o b.csv
+		incise export even.rec $how -o a.csv --overwrite
+		incise export line.rec $how -o b.csv --overwrite
 		python3 - <<-'END'
 			import csv
 			def depth(path):

@@ -144,7 +144,7 @@ teardown() {
 
 @test "a signal ends it, and leaves an older file as it was" {
 	echo old >t.csv
-	incise replay liver.rec liver.scene --real-time --csv t.csv >out 2>err &
+	incise replay liver.rec liver.scene --real-time --csv t.csv --overwrite >out 2>err &
 	pid=$!
 	# before it is the replay it is a shell
 	for ((i = 0; i < 100; i++)); do

@@ -177,7 +177,7 @@ median_of() {
 # nearest neighbours (median), and on no split worse than the mean by more than 2 %.
 holds_on_unseen_cuts() {
 	for seed in 1 2 3 4 5; do
-		incise train "$@" --group cut --check 0.3 --seed $seed -o m.fis --json \
+		incise train "$@" --group cut --check 0.3 --seed $seed -o m.fis --overwrite --json \
 			>r$seed.json 2>/dev/null
 		holds "$(key r$seed.json check.rmse_N) <= 1.02 * $(key r$seed.json baselines.mean.rmse_N)" || return
 	done
@@ -403,7 +403,7 @@ holds_on_unseen_cuts() {
 @test "train: a full disk leaves the old model and nothing else" {
 	echo old >m.fis
 	run --separate-stderr bash -c "trap '' XFSZ; ulimit -f 1
-		incise train pairs.csv -o m.fis"
+		incise train pairs.csv -o m.fis --overwrite"
 	[ "$status" -eq 1 ]
 	[[ "${stderr_lines[-1]}" == "incise train: m.fis: not written: "* ]]
 	[ "$(cat m.fis)" = old ]
@@ -413,7 +413,7 @@ holds_on_unseen_cuts() {
 @test "train: bad data leave the old model" {
 	echo old >m.fis
 	sed '9s/,[^,]*$/,nan/' pairs.csv >bad.csv
-	run --separate-stderr incise train bad.csv -o m.fis
+	run --separate-stderr incise train bad.csv -o m.fis --overwrite
 	failed_with "bad.csv:9: column 4"
 	[ "$(cat m.fis)" = old ]
 }

@@ -48,11 +48,11 @@ teardown() {
 	gone=$(key r.json blood_off_ul)
 	holds "($(key r.json blood_ul) - ($seen) - $gone)^2 < 1e-12 * $(key r.json blood_ul)^2"
 	sed -i 's/bleeding = true/bleeding = false/' neck.scene
-	incise view neck --procedure --frames f --fps 2 --duration 4s --json $small >r.json
+	incise view neck --procedure --frames f --overwrite --fps 2 --duration 4s --json $small >r.json
 	holds "$(key r.json cut_mm) > 25"
 	[ "$(key r.json blood_ul)" = 0.0 ]
 	sed -i 's/wound = true/wound = false/' neck.scene
-	incise view neck --procedure --frames f --fps 2 --duration 4s --json $small >r.json
+	incise view neck --procedure --frames f --overwrite --fps 2 --duration 4s --json $small >r.json
 	[ "$(key r.json stamps)" = 0 ]
 	[ "$(key r.json texels_uploaded)" = 0 ]
 }
@@ -70,7 +70,7 @@ teardown() {
 	failed_with /dev/full
 	run --separate-stderr incise view neck --procedure --frames wall.scene --duration 1s $small
 	failed_with wall.scene
-	run --separate-stderr incise view neck --procedure --strip n.png --at 1s,9s --fps 10 --duration 2s $small
+	run --separate-stderr incise view neck --procedure --strip n.png --overwrite --at 1s,9s --fps 10 --duration 2s $small
 	[ "$status" -eq 0 ]
 	[[ "$stderr" == *"ends before its picture 2, at 9 s"* ]]
 }
@@ -83,7 +83,7 @@ teardown() {
 	[ "$(head -c 4 out/wall.mkv | od -An -tx1 | tr -d ' \n')" = 1a45dfa3 ]
 	[ "$(head -c 24 out/wall.png | tail -c 8 | od -An -tu1 | tr -s ' \n' ' ')" = " 0 0 10 0 0 0 1 224 " ]
 	run --separate-stderr incise demo --scene wall -o out
-	failed_with out --force
+	failed_with out --overwrite
 }
 
 @test "a loop that runs is seen, and not held up" {
@@ -103,7 +103,7 @@ teardown() {
 	wait $pid
 	pid=
 	holds "$(key h.json ticks) > 500"
-	run --separate-stderr incise view liver --frames f --duration 1s $small
+	run --separate-stderr incise view liver --frames f --overwrite --duration 1s $small
 	failed_with liver "incise haptic"
 }
 
@@ -113,7 +113,7 @@ teardown() {
 	incise view liver.scene --from r.rec --frames f --fps 2 --json $small >r.json
 	# the skin of a plane is 120 mm wide, and the cut begins at its middle
 	holds "$(key r.json cut_mm) > 20 && $(key r.json cut_mm) < 60"
-	run --separate-stderr incise view liver.scene --from none.rec --frames f $small
+	run --separate-stderr incise view liver.scene --from none.rec --frames f --overwrite $small
 	failed_with none.rec
 }
 

@@ -562,12 +562,26 @@ static int values_of(const struct bench_plot *plot, const char *key,
 	return n;
 }
 
+static char *plot_name(const struct bench_run *run, const struct bench_plot *plot)
+{
+	return cli_text("%s%s%s", run->name, plot->suffix ? "-" : "",
+			plot->suffix ? plot->suffix : "");
+}
+
+/* Fail before the measurement if the plot may not be drawn. */
+static void reserve(const struct bench_run *run, const struct bench_plot *plot)
+{
+	char *name = plot_name(run, plot);
+
+	plot_reserve(run->folder, name);
+	free(name);
+}
+
 static void draw(const struct bench_run *run, const struct bench_plot *plot)
 {
 	const struct bench_rows *rows = rows_of(run, plot->data.table),
 				*more = rows_of(run, plot->more.table);
-	char *name = cli_text("%s%s%s", run->name, plot->suffix ? "-" : "",
-			      plot->suffix ? plot->suffix : "");
+	char *name = plot_name(run, plot);
 	char *file = cli_text("%s.dat", name), *more_file = cli_text("%s-more.dat", name);
 	FILE *script;
 	int width;
@@ -627,6 +641,8 @@ void bench_measure(struct bench_run *run)
 	/* A wrong name fails before the work, not after. */
 	if (run->plot)
 		plot_place("plot", run->plot, &run->folder, &run->name);
+	for (const struct bench_plot *p = run->bench->plots; run->plot && p->script; p++)
+		reserve(run, p);
 	run->machine = machine_json();
 	run->metrics = json_array();
 	run->scalars = json_object();

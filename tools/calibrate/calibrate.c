@@ -7,9 +7,25 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 #include "../cli/json.h"
 #include "../cli/plot.h"
 #include "calibrate.h"
+
+/* Note the files of --report before anything is measured. */
+static void reserve_report(const char *folder)
+{
+	static const char *const files[] = {"report.txt", "report.json"};
+
+	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++) {
+		char *path = cli_text("%s/%s", folder, files[i]);
+
+		cli_output(path);
+		free(path);
+	}
+	plot_reserve(folder, "fit");
+	plot_reserve(folder, "residuals");
+}
 
 void calibrate_find(struct calibrate_options *options)
 {
@@ -18,6 +34,13 @@ void calibrate_find(struct calibrate_options *options)
 
 	if (!options->calibration)
 		options->calibration = "calibration.conf";
+	/* It is written again if it is there, and else made. */
+	if (!access(options->calibration, F_OK))
+		cli_input(options->calibration);
+	else if (!options->dry_run)
+		cli_output(options->calibration);
+	if (options->report)
+		reserve_report(options->report);
 	rc = incise_calibration_load(options->calibration, &options->found, &err);
 	if (rc == -ENOENT)
 		incise_calibration_nominal(&options->found);

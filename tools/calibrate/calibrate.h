@@ -24,7 +24,7 @@ struct calibrate_options {
 #define CALIBRATE_FILE_OPTION(type)                                       \
 	'c', "calibration", "FILE",                                       \
 		"read as found, and written (default: calibration.conf)", \
-		CLI_TEXT(type, common.calibration)
+		CLI_INPUT(type, common.calibration)
 
 /* Read the calibration in force; a missing file is the nominal one. */
 void calibrate_find(struct calibrate_options *options);

@@ -22,12 +22,21 @@
 #include "cli.h"
 
 #define OPTIONS_MAX 40
+#define OVERWRITE 1 /* of getopt, no letter */
 
 static const struct cli_command *current;
 static bool status_line, verbose;
 static int status_above; /* lines above its last one */
 
 volatile sig_atomic_t cli_stop;
+
+static bool has_outputs(const struct cli_command *command)
+{
+	for (const struct cli_option *opt = command->options; opt->name; opt++)
+		if (opt->kind == CLI_KIND_OUTPUT || opt->kind == CLI_KIND_OUTPUTS)
+			return true;
+	return false;
+}
 
 static void print_help(const struct cli_command *command)
 {
@@ -48,6 +57,8 @@ static void print_help(const struct cli_command *command)
 			*c == '\n' ? printf("\n%-30s", "") : putchar(*c);
 		putchar('\n');
 	}
+	if (has_outputs(command))
+		printf("      --overwrite             replace what is there already\n");
 	printf("  -h, --help                  show this\n"
 	       "  -V, --version               show the version\n");
 	if (command->notes)
@@ -73,7 +84,7 @@ static void fill_streams(void)
 static const struct cli_option *next(const struct cli_command *command, int argc,
 				     char **argv)
 {
-	struct option longs[OPTIONS_MAX + 3] = {0};
+	struct option longs[OPTIONS_MAX + 4] = {0};
 	char shorts[3 * OPTIONS_MAX + 8] = ":hV";
 	char *s = shorts + strlen(shorts);
 	const struct cli_option *options = command->options;
@@ -97,6 +108,8 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 				*s++ = ':';
 		}
 	}
+	if (has_outputs(command))
+		longs[n++] = (struct option){"overwrite", no_argument, NULL, OVERWRITE};
 	longs[n++] = (struct option){"help", no_argument, NULL, 'h'};
 	longs[n++] = (struct option){"version", no_argument, NULL, 'V'};
 	opterr = 0;
@@ -104,6 +117,9 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 	switch (id) {
 	case CLI_END:
 		return NULL;
+	case OVERWRITE:
+		cli_allow_overwrite();
+		return next(command, argc, argv);
 	case 'h':
 		print_help(command);
 		cli_finish();
@@ -156,6 +172,11 @@ static void store(const struct cli_option *opt, void *member)
 		*(bool *)member = true;
 		break;
 	case CLI_KIND_TEXT:
+	case CLI_KIND_INPUT:
+	case CLI_KIND_OUTPUT:
+	case CLI_KIND_OUTPUTS:
+		if (opt->parse)
+			opt->parse(member, optarg);
 		*(const char **)member = optarg;
 		break;
 	case CLI_KIND_INTEGER:
@@ -181,12 +202,31 @@ static void store(const struct cli_option *opt, void *member)
 	}
 }
 
+static void note_paths(const struct cli_command *command, enum cli_kind kind,
+		       const void *options, void (*note)(const char *path))
+{
+	for (const struct cli_option *opt = command->options; opt->name; opt++) {
+		const char *path = NULL;
+
+		if (opt->kind == kind)
+			path = *(const char *const *)((const char *)options +
+						      opt->offset);
+		if (path)
+			note(path);
+	}
+}
+
 void cli_parse(const struct cli_command *command, int argc, char **argv, void *options)
 {
 	const struct cli_option *opt;
 
 	while ((opt = next(command, argc, argv)))
 		store(opt, (char *)options + opt->offset);
+	cli_input("-");
+	for (int i = optind; i < argc; i++)
+		cli_input(argv[i]);
+	note_paths(command, CLI_KIND_INPUT, options, cli_input);
+	note_paths(command, CLI_KIND_OUTPUT, options, cli_output_once);
 }
 
 char *cli_operand(int argc, char **argv, const char *what)
@@ -406,8 +446,10 @@ const char *cli_rig(const char *given)
 	if (given)
 		return given;
 	for (size_t i = 0; i < sizeof(places) / sizeof(*places); i++)
-		if (!access(places[i], F_OK))
+		if (!access(places[i], F_OK)) {
+			cli_input(places[i]);
 			return places[i];
+		}
 	cli_fail(
 		"there is neither ./rig.conf nor /etc/incise/rig.conf; name the rig with "
 		"--rig FILE, or try the virtual one: --rig sim:");

@@ -21,6 +21,9 @@ enum cli_kind {
 	CLI_KIND_NONE,
 	CLI_KIND_FLAG,
 	CLI_KIND_TEXT,
+	CLI_KIND_INPUT,
+	CLI_KIND_OUTPUT,
+	CLI_KIND_OUTPUTS,
 	CLI_KIND_INTEGER,
 	CLI_KIND_NUMBER,
 	CLI_KIND_DURATION,
@@ -61,6 +64,18 @@ struct cli_option {
 #define CLI_TEXT(type, member) \
 	.kind = CLI_KIND_TEXT, CLI_MEMBER(type, member, const char *)
 
+/*
+ * const char *: the path of a file or recording that is read; of a file that is written; the
+ * name of several files, or of a folder, for which the command calls cli_output(). A command
+ * with outputs has the option --overwrite. A .parse behind it checks the argument.
+ */
+#define CLI_INPUT(type, member) \
+	.kind = CLI_KIND_INPUT, CLI_MEMBER(type, member, const char *)
+#define CLI_OUTPUT(type, member) \
+	.kind = CLI_KIND_OUTPUT, CLI_MEMBER(type, member, const char *)
+#define CLI_OUTPUTS(type, member) \
+	.kind = CLI_KIND_OUTPUTS, CLI_MEMBER(type, member, const char *)
+
 /* Any integer type of 4 or 8 bytes, as of cli_integer(). */
 #define CLI_INTEGER(type, member, low, high)                                    \
 	.kind = CLI_KIND_INTEGER, CLI_MEMBER(type, member, void), .min = (low), \
@@ -95,7 +110,7 @@ struct cli_option {
 	'r', "rig", "RIG",                                                  \
 		"file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n" \
 		"(default: ./rig.conf, else /etc/incise/rig.conf)",         \
-		CLI_TEXT(type, member)
+		CLI_INPUT(type, member)
 
 struct cli_command {
 	const char *name;     /* "train" */
@@ -107,12 +122,33 @@ struct cli_command {
 
 /*
  * Store all options in the command's struct *options, and leave optind at the first operand.
- * Handles --help and --version; a wrong option ends the program with 2.
+ * Handles --help, --version and --overwrite; a wrong option ends the program with 2. Operands
+ * that are files, and paths of CLI_INPUT, are inputs; those of CLI_OUTPUT are outputs.
  */
 void cli_parse(const struct cli_command *command, int argc, char **argv, void *options);
 
 /* The same by hand: the next option's id, with its argument in optarg, or CLI_END. */
 int cli_next(const struct cli_command *command, int argc, char **argv);
+
+/*
+ * A file or recording that is read. If an output is it, or would lie in it, the program fails,
+ * whichever is noted first. Files that do not exist are ignored.
+ */
+void cli_input(const char *path);
+
+/*
+ * A file that will be written, before anything is. Fails the program if it is an input, by
+ * device and inode, or lies in a recording that is read; or if it exists, without --overwrite.
+ * "-", pipes and devices may always be written. The same path may be noted again.
+ */
+void cli_output(const char *path);
+
+/* The same for one that is no other output either. */
+void cli_output_once(const char *path);
+
+/* Whether --overwrite was given; and the same as if it was. */
+bool cli_overwrite(void);
+void cli_allow_overwrite(void);
 
 /* The only operand; another number of them is bad usage: "expected one WHAT, got N". */
 char *cli_operand(int argc, char **argv, const char *what);

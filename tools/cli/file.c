@@ -12,6 +12,7 @@ FILE *whole_file_begin(const char *path, struct incise_outfile **file)
 {
 	struct incise_error err = {0};
 
+	cli_output(path);
 	*file = incise_outfile_open(path, &err);
 	if (!*file)
 		cli_fail_with(&err);

@@ -9,7 +9,10 @@
 #include <stdio.h>
 #include <incise/outfile.h>
 
-/* Open a file for writing; it gets its name at whole_file_end(). "-" is standard output. */
+/*
+ * Open a file for writing, as cli_output() allows it; it gets its name at whole_file_end(). "-"
+ * is standard output.
+ */
 FILE *whole_file_begin(const char *path, struct incise_outfile **file);
 
 /* @file NULL: does nothing. */

@@ -36,7 +36,20 @@ void plot_place(const char *option, const char *path, const char **folder,
 	*name = cli_text("%.*s", (int)n, last);
 	*folder = slash ? cli_text("%.*s", (int)(slash > path ? slash - path : 1), path)
 			: ".";
+	plot_reserve(*folder, *name);
 	plot_folder(*folder);
+}
+
+void plot_reserve(const char *folder, const char *name)
+{
+	static const char *const files[] = {"%s/%s.png", "%s/%s.svg", "%s/plot/%s.gp"};
+
+	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++) {
+		char *path = cli_text(files[i], folder, name);
+
+		cli_output(path);
+		free(path);
+	}
 }
 
 void plot_folder(const char *folder)
@@ -58,8 +71,10 @@ bool plot_possible(void)
 static FILE *open_plot(const char *folder, const char *name, const char *suffix)
 {
 	char *path = plot_path(folder, name, suffix);
-	FILE *file = fopen(path, "we");
+	FILE *file;
 
+	cli_output(path);
+	file = fopen(path, "we");
 	if (!file)
 		cli_fail("%s: %s", path, strerror(errno));
 	free(path);
@@ -83,8 +98,10 @@ void plot_data_end(FILE *data, const char *folder)
 
 FILE *plot_begin(const char *folder, const char *name, int width, int height)
 {
-	FILE *script = open_plot(folder, name, ".gp");
+	FILE *script;
 
+	plot_reserve(folder, name);
+	script = open_plot(folder, name, ".gp");
 	fprintf(script,
 		"# gnuplot -e \"ext='png'\" %s.gp\n"
 		"if (ext eq 'png') { set terminal pngcairo size %d,%d font 'DejaVu Sans,11' } \\\n"

@@ -19,6 +19,9 @@
 void plot_place(const char *option, const char *path, const char **folder,
 		const char **name);
 
+/* Note the plot's files with cli_output(), before the work whose result it shows. */
+void plot_reserve(const char *folder, const char *name);
+
 /* Make FOLDER/plot and missing folders; fails the program without gnuplot. */
 void plot_folder(const char *folder);
 

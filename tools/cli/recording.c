@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <limits.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
@@ -45,7 +46,8 @@ void recording_remove(const char *path)
 		cli_fail("%s: cannot be removed: %s", path, strerror(errno));
 }
 
-void recording_check(const char *path)
+/* Fail if recording_replace() could not replace what is at @path. */
+static void check(const char *path)
 {
 	char file[PATH_MAX];
 	struct stat st;
@@ -58,13 +60,31 @@ void recording_check(const char *path)
 	snprintf(file, sizeof(file), "%s/recording.db", path);
 	if (!S_ISDIR(st.st_mode) || (access(file, F_OK) && rmdir(path)))
 		cli_fail(
-			"%s: is no recording, so --force does not replace it; take another "
+			"%s: is no recording, so --overwrite does not replace it; take another "
 			"name",
 			path);
 }
 
+char *recording_target(const char *path)
+{
+	char *target = cli_text("%s%s", path, cli_overwrite() ? ".new" : "");
+	char *part = cli_text("%s.part", path), *rest = cli_text("%s.part", target);
+
+	if (cli_overwrite()) {
+		check(path);
+		recording_remove(part);
+		recording_remove(rest);
+		recording_remove(target);
+	}
+	free(part);
+	free(rest);
+	return target;
+}
+
 void recording_replace(const char *new, const char *path)
 {
+	if (!strcmp(new, path))
+		return;
 	if (access(path, F_OK)) {
 		if (rename(new, path))
 			cli_fail("%s: %s; the recording is in %s", path, strerror(errno),

@@ -14,10 +14,17 @@ struct incise_recording *recording_open(const char *path);
 /* Remove a recording; a folder with anything else in it stays. */
 void recording_remove(const char *path);
 
-/* Fail if recording_replace() could not replace what is at @path. */
-void recording_check(const char *path);
+/*
+ * The path to record into, for recording_replace(): @path itself, or with --overwrite one next
+ * to it: free(3). What is at @path must be a recording then, and what interrupted ones left
+ * there is removed.
+ */
+char *recording_target(const char *path);
 
-/* Put the new recording in the place of the old one in one step, then remove that. */
-void recording_replace(const char *new, const char *path);
+/*
+ * Put the complete recording @target under its @path. With --overwrite it takes the place of
+ * an older one in one step, which is then removed.
+ */
+void recording_replace(const char *target, const char *path);
 
 #endif

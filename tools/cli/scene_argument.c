@@ -42,6 +42,7 @@ bool scene_argument_find(struct scene_argument *argument, const char *operand)
 			continue;
 		/* Lives as long as the program. */
 		argument->path = cli_text("%s", !i ? path + 2 : path);
+		cli_input(argument->path);
 		return true;
 	}
 	return false;
@@ -86,6 +87,10 @@ struct incise_scene *scene_argument_read(const struct scene_argument *argument,
 struct incise_scene *scene_argument_load(const struct scene_argument *argument)
 {
 	struct incise_error err = {0};
+	struct incise_scene *scene =
+		cli_require(scene_argument_read(argument, &err), &err);
 
-	return cli_require(scene_argument_read(argument, &err), &err);
+	for (int i = 0; incise_scene_file(scene, i); i++)
+		cli_input(incise_scene_file(scene, i));
+	return scene;
 }

@@ -18,7 +18,7 @@ struct scene_argument {
 /* Rows of the table of options for --model and --arith, without the outer braces. */
 #define SCENE_ARGUMENT_OPTIONS(type, member)                                   \
 	{0, "model", "FILE", "use this model instead of the scene's",          \
-	 CLI_TEXT(type, member.model)},                                        \
+	 CLI_INPUT(type, member.model)},                                       \
 	{                                                                      \
 		0, "arith", "KIND", "fixed or double, instead of the scene's", \
 			CLI_PARSED(type, member.arith, scene_argument_arith)   \

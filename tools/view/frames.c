@@ -3,6 +3,7 @@
  * Frames of incise view, in a window with its events or into files; see view.h.
  */
 #include <errno.h>
+#include <glob.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,6 +23,30 @@ bool view_output_wanted(const struct view_output *output)
 	return output->folder || output->film_path || output->strip_path;
 }
 
+/* Frames and films that are there already are replaced with --overwrite only. */
+static void reserve_files(const struct view_output *output)
+{
+	char *part = cli_text("%s.part", output->film_path ? output->film_path : "");
+	char *frames = cli_text("%s/frame-*.png", output->folder ? output->folder : "");
+	glob_t found;
+
+	if (output->film_path)
+		cli_output(part);
+	if (output->folder) {
+		char *first = cli_text("%s/frame-000000.png", output->folder);
+
+		cli_output(first);
+		free(first);
+	}
+	if (output->folder && !glob(frames, 0, NULL, &found)) {
+		for (size_t i = 0; i < found.gl_pathc; i++)
+			cli_output(found.gl_pathv[i]);
+		globfree(&found);
+	}
+	free(part);
+	free(frames);
+}
+
 void view_output_begin(struct view_output *output)
 {
 	size_t size = (size_t)output->width * output->height * 3;
@@ -29,6 +54,7 @@ void view_output_begin(struct view_output *output)
 
 	if (!view_output_wanted(output))
 		return;
+	reserve_files(output);
 	output->rgb = cli_alloc(1, size);
 	if (output->strip_path)
 		output->strip = cli_alloc(output->n_strip, size);

@@ -60,6 +60,12 @@ INCISE_API void incise_scene_set_full(struct incise_scene *scene, bool full);
 /** NULL is accepted. */
 INCISE_API void incise_scene_free(struct incise_scene *scene);
 
+/**
+ * A file that the scene was read from, by its number from 0 on: the scene's own, its model,
+ * the mesh or heights of its surface. @return path, valid as long as the scene; NULL: no more.
+ */
+INCISE_API const char *incise_scene_file(const struct incise_scene *scene, int i);
+
 /** Ticks per second that it asks for. */
 INCISE_API double incise_scene_rate_hz(const struct incise_scene *scene);
 

@@ -75,7 +75,7 @@ int incise_recorder_make_folder(struct incise_recorder *rec, struct incise_error
 		return incise_error_set(
 			err, EEXIST,
 			"%s: exists already; record under another name, or "
-			"replace it with `incise capture --force`",
+			"replace it with `incise capture --overwrite`",
 			rec->path);
 	if (mkdirat(rec->parent, part, 0777)) {
 		if (errno == EEXIST)
@@ -83,7 +83,7 @@ int incise_recorder_make_folder(struct incise_recorder *rec, struct incise_error
 				err, EEXIST,
 				"%s: left by an interrupted recording, or being written; `incise "
 				"info` reads it; rename it, or drop it with `incise capture "
-				"--force`",
+				"--overwrite`",
 				rec->part);
 		return incise_error_set(err, errno, "%s: cannot be made: %s", rec->part,
 					strerror(errno));

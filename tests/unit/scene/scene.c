@@ -415,6 +415,34 @@ static void test_other_model(void **state)
 	incise_scene_free(scene);
 }
 
+/* Each file that was read, so that no output takes its place. */
+static void test_files(void **state)
+{
+	static const char text[] = "model = \"m.fis\";\n"
+				   "surface = { kind = \"mesh\"; file = \"a.obj\"; };\n";
+	struct incise_scene *scene;
+	char mesh[80];
+	FILE *out;
+
+	snprintf(mesh, sizeof(mesh), "%s/a.obj", dir);
+	out = fopen(mesh, "w");
+	fputs("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", out);
+	fclose(out);
+	scene = load(text, NULL, NULL);
+	assert_non_null(scene);
+	assert_string_equal(incise_scene_file(scene, 0), path);
+	assert_string_equal(incise_scene_file(scene, 1), model_path);
+	assert_string_equal(incise_scene_file(scene, 2), mesh);
+	assert_null(incise_scene_file(scene, 3));
+	incise_scene_free(scene);
+	unlink(mesh);
+	scene = load("tissue = { reaction_N_mm = 0.1; };\n", NULL, NULL);
+	assert_non_null(scene);
+	assert_string_equal(incise_scene_file(scene, 0), path);
+	assert_null(incise_scene_file(scene, 1));
+	incise_scene_free(scene);
+}
+
 static void test_refusals(void **state)
 {
 	static const struct {
@@ -486,6 +514,7 @@ int main(void)
 		cmocka_unit_test(test_forces),
 		cmocka_unit_test(test_set_arithmetic),
 		cmocka_unit_test(test_other_model),
+		cmocka_unit_test(test_files),
 		cmocka_unit_test(test_refusals),
 		cmocka_unit_test(test_model_of_other_shape),
 	};

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# An output of any command is never an input, nor inside one, and an existing file is replaced
+# only with --overwrite.
+
+load cli
+
+quick=sim:clock=simulated,depth_mm=10,times=1,pause_s=0.1,cut_s=4
+
+setup_file() {
+	cd "${BATS_FILE_TMPDIR:?}"
+	made_pairs >pairs.csv
+	incise capture -o d.rec --rig $quick --duration 1s >/dev/null
+	cp "$root/scenes/liver.fis" m.fis
+	printf '#incise-sd\n' >m.fis.sd
+	printf '%s\n' 'rate_hz = 1000.0; model = "m.fis";' \
+		'surface = { kind = "mesh"; file = "s.obj"; };' >m.scene
+	printf '%s\n' 'v -50 -50 0' 'v 50 -50 0' 'v 50 50 0' 'v -50 50 0' 'f 1 2 3' 'f 1 3 4' >s.obj
+	incise calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
+		--series 3 --time 200ms -c calibration.conf --keep forces.csv >/dev/null
+	cat >rig.conf <<-END
+		tracker = "sim"; force = "sim"; camera = "sim"; stepper = "sim";
+	END
+}
+
+setup() {
+	work_folder
+	cp -r "${BATS_FILE_TMPDIR:?}"/{pairs.csv,d.rec,m.fis,m.fis.sd,m.scene,s.obj,forces.csv,calibration.conf} .
+}
+
+# Every byte, name and mode in this folder.
+content() {
+	find . -type f ! -name err ! -name out -exec sha256sum {} + | sort -k 2
+	find . -printf '%p %m %l\n' | sort
+}
+
+# The command fails and changes nothing, with --overwrite too, which says what is an input.
+# Without it an input that is found later only exists.
+spares_inputs() {
+	local before try
+	before=$(content)
+	for try in "" --overwrite; do
+		run --separate-stderr timeout 60 incise "$@" $try </dev/null
+		[[ "$stderr" == *exists* && ! "$try" ]] || failed_with input || complain "incise $* $try" || return
+		[ "$(content)" = "$before" ] || complain "incise $* $try: changed a file" || return
+	done
+}
+
+@test "an output is never an input, by any name" {
+	ln -s m.fis link.fis
+	ln m.fis hard.fis
+	mkdir folder
+	for path in m.fis ./m.fis link.fis hard.fis folder/../m.fis "$PWD/m.fis" m.fis.sd; do
+		spares_inputs compile m.fis -o $path
+		spares_inputs compile m.fis -o m.fx --c-source $path
+	done
+	spares_inputs compile link.fis -o m.fis
+	for option in -o --initial --history; do
+		spares_inputs train pairs.csv -o new.fis $option pairs.csv
+	done
+	spares_inputs export d.rec -o d.rec/recording.db
+	spares_inputs export d.rec -o calibration.conf -c calibration.conf
+	for path in d.rec/recording.db m.scene m.fis s.obj calibration.conf; do
+		spares_inputs replay d.rec m.scene -c calibration.conf --csv $path
+	done
+	for path in m.scene m.fis s.obj calibration.conf; do
+		spares_inputs haptic m.scene --rig $quick --duration 100ms -c calibration.conf --log $path
+	done
+	spares_inputs haptic m.scene --rig $quick --duration 100ms --model link.fis --log m.fis
+	mkdir report
+	ln -s ../forces.csv report/fit.png
+	spares_inputs calibrate force --from forces.csv -c calibration.conf --report report
+}
+
+@test "an output is never inside a recording that is read" {
+	ln -s d.rec link.rec
+	mkdir -p d.rec/plot
+	for path in d.rec/new.csv link.rec/new.csv d.rec/../d.rec/new.csv d.rec/plot/new.csv; do
+		spares_inputs export d.rec -o $path
+		spares_inputs export link.rec -o $path
+		spares_inputs replay d.rec m.scene --csv $path
+	done
+	ln -s d.rec/recording.db into.csv
+	spares_inputs export d.rec -o into.csv
+	spares_inputs calibrate tip --from d.rec --report d.rec/new
+	spares_inputs calibrate tip --from d.rec -c d.rec/calibration.conf
+	if command -v gnuplot >/dev/null; then
+		spares_inputs replay d.rec m.scene --plot d.rec/picture
+		spares_inputs replay d.rec m.scene --plot d.rec/new/picture
+	fi
+	if [ -x "$INCISE_BUILD/bin/incise-view" ]; then
+		spares_inputs view m.scene --from d.rec --frames d.rec/new --duration 1s
+		spares_inputs view m.scene --from d.rec --video d.rec/new.mkv --duration 1s
+	fi
+}
+
+@test "rig.conf that is found, and scenes by name, are inputs too" {
+	cp "${BATS_FILE_TMPDIR:?}/rig.conf" .
+	for path in rig.conf m.scene; do
+		run --separate-stderr incise haptic m --duration 100ms --log $path --overwrite
+		failed_with "$path" "is an input"
+	done
+	cmp rig.conf "$BATS_FILE_TMPDIR/rig.conf"
+}
+
+@test "standard input that is a file is an input" {
+	before=$(cat pairs.csv)
+	run --separate-stderr incise train - -o pairs.csv --overwrite <pairs.csv
+	failed_with "is an input"
+	[ "$(cat pairs.csv)" = "$before" ]
+}
+
+@test "two outputs are two files" {
+	for more in a.fis ./a.fis "$PWD/a.fis"; do
+		run --separate-stderr incise train pairs.csv -o a.fis --initial $more --overwrite
+		failed_with a.fis "written twice"
+	done
+	run --separate-stderr incise train pairs.csv -o a.fis --history a.fis.sd
+	failed_with a.fis.sd "written twice"
+	[ ! -e a.fis ]
+}
+
+# The command makes what it names; then it refuses and changes nothing; with --overwrite it
+# replaces it. First argument: an output that is a file.
+replaces_when_told() {
+	local output=$1 before
+	shift
+	incise "$@" >out 2>err </dev/null || complain "incise $*: $(cat err)" || return
+	[ -f "$output" ] || complain "incise $*: there is no $output" || return
+	echo precious >"$output"
+	before=$(content)
+	run --separate-stderr incise "$@" </dev/null
+	failed_with "$output" "exists" "--overwrite" || complain "incise $*" || return
+	[ "$(content)" = "$before" ] || complain "incise $*: changed a file" || return
+	incise "$@" --overwrite >out 2>err </dev/null ||
+		complain "incise $* --overwrite: $(cat err)" || return
+	[ "$(head -c 8 "$output")" != precious ] || complain "incise $*: $output is the old one"
+}
+
+@test "an existing file is replaced with --overwrite only, in each command" {
+	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" .
+	replaces_when_told a.fx compile m.fis -o a.fx
+	replaces_when_told b.c compile m.fis -o b.fx --c-source b.c
+	replaces_when_told a.csv export d.rec -o a.csv
+	replaces_when_told a.fis train pairs.csv -o a.fis --epochs 2
+	replaces_when_told b.fis.sd train pairs.csv -o b.fis --epochs 2
+	replaces_when_told c.initial train pairs.csv -o c.fis --epochs 2 --initial c.initial
+	replaces_when_told d.history train pairs.csv -o d.fis --epochs 2 --history d.history
+	replaces_when_told r.csv replay d.rec liver.scene --csv r.csv
+	replaces_when_told l.csv haptic liver.scene --rig $quick --duration 100ms --log l.csv
+	replaces_when_told k.csv calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
+		--series 3 --time 200ms -c k.conf --keep k.csv
+	replaces_when_told report/report.txt calibrate force --from forces.csv -c k.conf --report report
+	replaces_when_told report2/report.json calibrate force --from forces.csv -c k.conf --report report2
+}
+
+@test "pictures are replaced with --overwrite only" {
+	command -v gnuplot >/dev/null || skip "gnuplot is not installed"
+	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" .
+	for suffix in .png .svg; do
+		replaces_when_told i$suffix info m.fis --plot i
+		rm -f i.png i.svg plot/*
+	done
+	replaces_when_told plot/i.gp info m.fis --plot i
+	replaces_when_told r.png replay d.rec liver.scene --plot r
+	replaces_when_told r3/fit.png calibrate force --from forces.csv -c k.conf --report r3
+}
+
+@test "frames, films and strips are replaced with --overwrite only" {
+	[ -x "$INCISE_BUILD/bin/incise-view" ] ||
+		skip "incise view was not built: SDL2, epoxy, cairo or EGL were absent"
+	export XDG_RUNTIME_DIR="$PWD"
+	cp "$root"/scenes/wall.scene .
+	small="--size 160x120 --no-panel --duration 0.2s --fps 10"
+	incise view wall --procedure --strip probe.png --at 0s --duration 0.05s $small 2>why ||
+		skip "no OpenGL here: $(cat why)"
+	replaces_when_told strip.png view wall --procedure --strip strip.png --at 0s $small
+	replaces_when_told f/frame-000000.png view wall --procedure --frames f $small
+	rm f/frame-000000.png
+	run --separate-stderr incise view wall --procedure --frames f $small
+	failed_with f/frame-000001.png exists
+	incise view wall --procedure --video a.mkv $small 2>why || skip "no film here: $(cat why)"
+	replaces_when_told b.mkv view wall --procedure --video b.mkv $small
+	# A link stays one, and a pipe a pipe.
+	ln -s b.mkv link.mkv
+	incise view wall --procedure --video link.mkv --overwrite $small
+	[ -L link.mkv ]
+	mkfifo pipe
+	cat pipe >piped.mkv 3>&- &
+	incise view wall --procedure --video pipe $small
+	wait $!
+	[ -p pipe ]
+	[ "$(head -c 4 piped.mkv | od -An -tx1)" = " 1a 45 df a3" ]
+}
+
+@test "standard output, pipes and devices are written without --overwrite" {
+	incise compile m.fis -o plain.fx >/dev/null
+	incise compile m.fis -o - | cmp - plain.fx
+	incise compile m.fis -o /dev/stdout | cmp -n "$(stat -c %s plain.fx)" - plain.fx
+	for i in 1 2; do
+		incise compile m.fis -o /dev/null
+		incise export d.rec -o /dev/null
+		incise train pairs.csv -o /dev/null --epochs 2 --initial /dev/null --history /dev/null
+		incise haptic m.scene --rig $quick --duration 100ms --log /dev/null
+	done
+	[ -c /dev/null ]
+	mkfifo pipe
+	cat pipe >piped.fx 3>&- &
+	incise compile m.fis -o pipe
+	wait $!
+	cmp piped.fx plain.fx
+	[ -p pipe ]
+}
+
+@test "--overwrite is there where something is written, and there is no --force" {
+	for command in "capture" "export" "train" "compile" "replay" "haptic" "info" "demo" "bench" "bench all" \
+		"calibrate force" "calibrate depth" "calibrate tip" "calibrate delay" "calibrate stepper"; do
+		incise $command --help | grep -q '^ *--overwrite  ' || complain "$command"
+		run ! grep -q -- --force <(incise $command --help)
+	done
+	for command in plan eval verify status stepper "calibrate check"; do
+		run ! grep -q -- --overwrite <(incise $command --help)
+		run --separate-stderr incise $command --overwrite
+		bad_usage overwrite
+	done
+}
