@@ -2,6 +2,8 @@
 /*
  * From bytes of a tracker to samples; see polhemus_stream.h.
  */
+#include <errno.h>
+#include <stdlib.h>
 #include <string.h>
 #include "../../base/vector.h"
 #include "polhemus_stream.h"
@@ -188,27 +190,34 @@ static bool add_counted(struct polhemus_gaps *gaps, const struct polhemus_record
 	return true;
 }
 
+/*
+ * Steps to a record by order and by its skipped bytes: as many as these make, to the nearest,
+ * and fit into the time: a late host must not turn one into two.
+ */
+static uint64_t by_bytes(const struct polhemus_gaps *gaps,
+			 const struct polhemus_record *record, int where)
+{
+	uint64_t steps = in_order(gaps, where), most, more;
+
+	if (!record->skipped)
+		return steps;
+	most = (record->skipped + gaps->length / 2) / gaps->length;
+	more = rounds(gaps, lateness(gaps, record->t_ns, gaps->seq + steps)) *
+	       (uint64_t)gaps->n;
+	while (more && steps - 1 + more > most + (uint64_t)gaps->n - 1)
+		more -= (uint64_t)gaps->n;
+	return steps + more;
+}
+
 static bool add_timed(struct polhemus_gaps *gaps, const struct polhemus_record *record,
 		      int where)
 {
-	uint64_t steps = in_order(gaps, where), most, more;
-	int64_t late = lateness(gaps, record->t_ns, gaps->seq + steps);
+	int64_t late = lateness(gaps, record->t_ns, gaps->seq + in_order(gaps, where));
 
 	/* Its station is damaged, or it is there twice. */
 	if (is_too_early(gaps, late))
 		return false;
-	if (record->skipped) {
-		/*
-		 * As many as the skipped bytes make, to the nearest, and fit into the
-		 * time: a late host must not turn one into two.
-		 */
-		most = (record->skipped + gaps->length / 2) / gaps->length;
-		more = rounds(gaps, late) * (uint64_t)gaps->n;
-		while (more && steps - 1 + more > most + (uint64_t)gaps->n - 1)
-			more -= (uint64_t)gaps->n;
-		steps += more;
-	}
-	step(gaps, steps);
+	step(gaps, by_bytes(gaps, record, where));
 	look_back(gaps, lateness(gaps, record->t_ns, gaps->seq));
 	return true;
 }
@@ -278,6 +287,7 @@ bool polhemus_gaps_add(struct polhemus_gaps *gaps, const struct polhemus_record 
 
 /* --- samples --- */
 
+#define WAIT_NS INT64_C(250000000) /* for records that come by and by */
 #define CAPACITY ((size_t)POLHEMUS_RING_S * 240 * POLHEMUS_STATIONS)
 
 int polhemus_stream_init(struct polhemus_stream *stream,
@@ -285,6 +295,7 @@ int polhemus_stream_init(struct polhemus_stream *stream,
 			 const struct polhemus_layout *layout)
 {
 	double hz = polhemus_family_hz(layout->family, setup->n_stations);
+	int rc;
 
 	/* Pulses from outside have no known rate; the others have no such input. */
 	if (layout->family == POLHEMUS_FASTRAK && setup->sync != INCISE_TRACKER_INTERNAL)
@@ -295,30 +306,23 @@ int polhemus_stream_init(struct polhemus_stream *stream,
 	polhemus_gaps_init(&stream->gaps, setup->stations, setup->n_stations,
 			   layout->family != POLHEMUS_FASTRAK, hz,
 			   (unsigned int)polhemus_layout_length(layout));
-	return incise_ring_init(&stream->ring, sizeof(struct incise_tracker_sample),
-				CAPACITY);
+	stream->wait.records = calloc(CAPACITY, sizeof(*stream->wait.records));
+	if (!stream->wait.records)
+		return -ENOMEM;
+	rc = incise_ring_init(&stream->ring, sizeof(struct incise_tracker_sample),
+			      CAPACITY);
+	if (rc) {
+		free(stream->wait.records);
+		stream->wait.records = NULL;
+	}
+	return rc;
 }
 
 void polhemus_stream_free(struct polhemus_stream *stream)
 {
 	incise_ring_free(&stream->ring);
-}
-
-void polhemus_stream_broken(struct polhemus_stream *stream,
-			    const struct polhemus_layout *layout)
-{
-	polhemus_records_init(&stream->records, layout);
-	stream->gaps.length = (unsigned int)polhemus_layout_length(layout);
-	polhemus_gaps_broken(&stream->gaps);
-	memset(stream->repeat, 0, sizeof(stream->repeat));
-}
-
-void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns)
-{
-	atomic_store_explicit(&stream->lost,
-			      stream->gaps.lost + stream->overflowed +
-				      polhemus_gaps_silent(&stream->gaps, t_ns),
-			      memory_order_relaxed);
+	free(stream->wait.records);
+	stream->wait.records = NULL;
 }
 
 /*
@@ -368,11 +372,149 @@ static void put_sample(struct polhemus_stream *stream,
 		stream->overflowed++;
 }
 
+static void number(struct polhemus_stream *stream, const struct polhemus_record *record)
+{
+	uint64_t seq;
+
+	if (polhemus_gaps_add(&stream->gaps, record, &seq)) {
+		stream->restarted |= stream->gaps.restarted;
+		put_sample(stream, record, seq);
+	}
+}
+
+/* Lateness of one more record, if none is missing before those that wait and it. */
+static int64_t late_if_held_up(const struct polhemus_stream *stream,
+			       const struct polhemus_record *record, uint64_t *seq)
+{
+	struct polhemus_gaps gaps = stream->gaps;
+
+	if (stream->wait.n) {
+		gaps.seq = stream->wait.seq;
+		gaps.last = stream->wait.last;
+	}
+	*seq = gaps.seq + by_bytes(&gaps, record, place(&gaps, record->station));
+	return lateness(&gaps, record->t_ns, *seq);
+}
+
+/* Number the records that wait, the first of them behind @missing. */
+static void release(struct polhemus_stream *stream, uint64_t missing)
+{
+	size_t n = stream->wait.n;
+
+	stream->wait.n = 0;
+	stream->gaps.seq += missing;
+	stream->gaps.lost += missing;
+	for (size_t i = 0; i < n; i++)
+		number(stream, &stream->wait.records[i]);
+}
+
+static int64_t round_of(const struct polhemus_gaps *gaps)
+{
+	return gaps->n * gaps->period_ns;
+}
+
+/*
+ * By the least late one, as between them others may be missing. Lateness is never negative: a
+ * part of a round is not yet one.
+ */
+static uint64_t missing_before(const struct polhemus_stream *stream)
+{
+	const struct polhemus_gaps *gaps = &stream->gaps;
+	int64_t round_ns = round_of(gaps), late_ns = stream->wait.late_ns;
+
+	if (late_ns > stream->wait.first_late_ns)
+		late_ns = stream->wait.first_late_ns;
+	return (uint64_t)((late_ns + round_ns / 4) / round_ns) * (uint64_t)gaps->n;
+}
+
+/* The end of the wait, if the record that came last shows it. */
+static void decide(struct polhemus_stream *stream)
+{
+	const struct polhemus_wait *wait = &stream->wait;
+	int64_t round_ns = round_of(&stream->gaps);
+	int64_t waited_ns = wait->records[wait->n - 1].t_ns - wait->records[0].t_ns;
+
+	if (wait->late_ns < round_ns)
+		release(stream, 0);
+	else if (waited_ns >= round_ns / 2 &&
+		 wait->late_ns >= wait->first_late_ns - round_ns / 2)
+		release(stream, missing_before(stream));
+	/* They come by and by, as of a slow line. */
+	else if (waited_ns > WAIT_NS + round_ns || wait->n == CAPACITY)
+		release(stream, 0);
+}
+
+static void take_record(struct polhemus_stream *stream,
+			const struct polhemus_record *record)
+{
+	struct polhemus_gaps *gaps = &stream->gaps;
+	struct polhemus_wait *wait = &stream->wait;
+	int64_t late_ns;
+	uint64_t seq;
+
+	if (!gaps->begun || gaps->broken || gaps->counts || !gaps->period_ns) {
+		number(stream, record);
+		return;
+	}
+	late_ns = late_if_held_up(stream, record, &seq);
+	if (!wait->n && late_ns < round_of(gaps) * 3 / 2) {
+		number(stream, record);
+		return;
+	}
+	if (!wait->n)
+		wait->first_late_ns = late_ns;
+	wait->late_ns = late_ns;
+	wait->seq = seq;
+	wait->last = place(gaps, record->station);
+	wait->records[wait->n++] = *record;
+	decide(stream);
+}
+
+static void count(struct polhemus_stream *stream, uint64_t silent)
+{
+	atomic_store_explicit(&stream->lost,
+			      stream->gaps.lost + stream->overflowed + silent,
+			      memory_order_relaxed);
+}
+
+int64_t polhemus_stream_due_ns(const struct polhemus_stream *stream)
+{
+	const struct polhemus_wait *wait = &stream->wait;
+
+	return wait->n ? wait->records[wait->n - 1].t_ns + round_of(&stream->gaps) / 2
+		       : INT64_MAX;
+}
+
+void polhemus_stream_quiet(struct polhemus_stream *stream, int64_t t_ns)
+{
+	if (!stream->wait.n || t_ns < polhemus_stream_due_ns(stream))
+		return;
+	release(stream, stream->wait.late_ns >= round_of(&stream->gaps) * 3 / 2
+				? missing_before(stream)
+				: 0);
+	count(stream, 0);
+}
+
+void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns)
+{
+	polhemus_stream_quiet(stream, t_ns);
+	count(stream, polhemus_gaps_silent(&stream->gaps, t_ns));
+}
+
+void polhemus_stream_broken(struct polhemus_stream *stream,
+			    const struct polhemus_layout *layout)
+{
+	polhemus_stream_quiet(stream, INT64_MAX);
+	polhemus_records_init(&stream->records, layout);
+	stream->gaps.length = (unsigned int)polhemus_layout_length(layout);
+	polhemus_gaps_broken(&stream->gaps);
+	memset(stream->repeat, 0, sizeof(stream->repeat));
+}
+
 int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *bytes,
 			size_t n, int64_t t_ns)
 {
 	struct polhemus_record record;
-	uint64_t seq;
 	int found = 0;
 
 	while (n) {
@@ -382,13 +524,9 @@ int polhemus_stream_put(struct polhemus_stream *stream, const unsigned char *byt
 		bytes += taken;
 		n -= taken;
 		for (; polhemus_records_next(&stream->records, &record); found++)
-			if (polhemus_gaps_add(&stream->gaps, &record, &seq)) {
-				stream->restarted |= stream->gaps.restarted;
-				put_sample(stream, &record, seq);
-			}
+			take_record(stream, &record);
 	}
-	atomic_store_explicit(&stream->lost, stream->gaps.lost + stream->overflowed,
-			      memory_order_relaxed);
+	count(stream, 0);
 	return found;
 }
 

@@ -30,10 +30,12 @@
  *            '---------------------------------------------------> records
  *
  * A loss is reported at once where stations are out of order, or half a record or more
- * was damaged; where only time shows it, after the lateness has stayed for
- * POLHEMUS_GAPS_WINDOW records (0.5 s): then the number is right, but its place in seq is
- * that much late. A drift between the two clocks is followed. With sync from outside
- * there is no period; only order and damage show a loss.
+ * was damaged. Where only time shows it, records behind a gap of 1.5 rounds or more are held
+ * back, see struct polhemus_stream, for half a round: if they were held up, the others come
+ * at once. Of a shorter gap the lateness must stay for POLHEMUS_GAPS_WINDOW records (0.5 s):
+ * then the number is right, but its place in seq is that much late, which a reader of the
+ * recording mends by the arrivals. A drift between the two clocks is followed. With sync
+ * from outside there is no period; only order and damage show a loss.
  */
 #define POLHEMUS_GAPS_WINDOW 60
 
@@ -92,10 +94,27 @@ struct polhemus_repeat {
 	bool started;
 };
 
+/*
+ * Behind a long gap, records wait here until it is known how many are missing before them:
+ *
+ *     lost      ──o──o──o────────────────────o──┊·····   quiet for half a round, or the next one
+ *     held up   ──o──o──o────────────────────ooooooo     comes as late: lost, else held up
+ *
+ * They are late by half a round then, once.
+ */
+struct polhemus_wait {
+	struct polhemus_record *records; /* capacity of the ring */
+	size_t n;
+	uint64_t seq; /* of the last one, if none is missing before them */
+	int last;     /* its place in the order */
+	int64_t first_late_ns, late_ns;
+};
+
 struct polhemus_stream {
 	struct incise_tracker_setup setup;
 	struct polhemus_records records;
 	struct polhemus_gaps gaps;
+	struct polhemus_wait wait;
 	struct incise_ring ring; /* of struct incise_tracker_sample */
 	struct polhemus_repeat repeat[POLHEMUS_STATIONS];
 	uint64_t overflowed; /* samples lost because the ring was full */
@@ -112,6 +131,12 @@ void polhemus_stream_free(struct polhemus_stream *stream);
 /* The link was gone, and the device was set up again, with records of @layout. */
 void polhemus_stream_broken(struct polhemus_stream *stream,
 			    const struct polhemus_layout *layout);
+
+/* When polhemus_stream_quiet() is to be called if nothing comes; INT64_MAX: never. */
+int64_t polhemus_stream_due_ns(const struct polhemus_stream *stream);
+
+/* Nothing came up to @t_ns: records that wait are not followed by others. */
+void polhemus_stream_quiet(struct polhemus_stream *stream, int64_t t_ns);
 
 /* Nothing came up to @t_ns: missing records count as lost until one comes. */
 void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns);

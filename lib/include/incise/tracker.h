@@ -53,6 +53,8 @@ struct incise_tracker_info {
 	double rate_hz;	    /**< nominal */
 	int64_t latency_ns; /**< nominal, acquisition to arrival */
 	int stations;	    /**< sensors that send records; seq counts all of them */
+	bool external_sync; /**< measures by pulses from outside: rate_hz is its highest
+				 rate, and the records have no period */
 	int64_t grain_ns;   /**< grid of arrival times: 1000000 for USB; 0: none */
 };
 

@@ -309,11 +309,16 @@ static void bench_run(struct bench *b, double seconds)
 	while (b->line.now_ns < end_ns) {
 		unsigned char bytes[512];
 		int64_t t_ns;
-		ssize_t n = b->line.line.ops->read(&b->line.line, bytes, sizeof(bytes),
-						   &t_ns, 10);
+		/* As the thread of polhemus_tracker.c does. */
+		int64_t left_ns = polhemus_stream_due_ns(&b->stream) - b->line.now_ns;
+		ssize_t n = b->line.line.ops->read(
+			&b->line.line, bytes, sizeof(bytes), &t_ns,
+			left_ns < 10 * MS ? (int)(left_ns / MS) + 1 : 10);
 
 		assert_true(n >= 0);
 		polhemus_stream_put(&b->stream, bytes, (size_t)n, t_ns);
+		if (!n)
+			polhemus_stream_quiet(&b->stream, b->line.now_ns);
 		bench_take(b);
 	}
 }
@@ -455,6 +460,72 @@ static void time_tells(void **state)
 		assert_int_equal(polhemus_stream_lost(&b.stream), missing);
 		bench_free(&b);
 	}
+}
+
+/* A longer gap is placed where it was, and counted before another round is over. */
+static void long_gaps_have_their_place(void **state)
+{
+	static const unsigned int missing[] = {2, 3, 7, 20, 84, 114};
+
+	for (int stations = 1; stations <= 4; stations++)
+		for (size_t i = 0; i < 6; i++) {
+			unsigned int rounds = missing[i] * (unsigned int)stations;
+			struct bench b;
+
+			bench_init(&b, EMULATOR_FASTRAK, stations);
+			bench_run(&b, 2);
+			b.e.damage = (struct emulator_damage){.from = b.e.slot,
+							      .to = b.e.slot + rounds,
+							      .lose = 1000000};
+			bench_run(&b, (rounds + 2.0 * stations) / 120);
+			assert_int_equal(polhemus_stream_lost(&b.stream), rounds);
+			bench_run(&b, 2);
+			assert_int_equal(polhemus_stream_lost(&b.stream), rounds);
+			compare(&b, 0, 0);
+			bench_free(&b);
+		}
+}
+
+/* Poses that come after a gap wait no longer than for half a round. */
+static void what_waits_is_released(void **state)
+{
+	struct bench b;
+	unsigned char bytes[512];
+	size_t n;
+
+	bench_init(&b, EMULATOR_FASTRAK, 1);
+	bench_run(&b, 2);
+	assert_true(polhemus_stream_due_ns(&b.stream) == INT64_MAX);
+	b.e.damage = (struct emulator_damage){
+		.from = b.e.slot, .to = b.e.slot + 30, .lose = 1000000};
+	b.line.now_ns = emulator_next_ns(&b.e) + 30 * PERIOD_NS + MS;
+	emulator_advance(&b.e, b.line.now_ns);
+	n = emulator_take(&b.e, bytes, sizeof(bytes));
+	assert_true(n > 0);
+	polhemus_stream_put(&b.stream, bytes, n, b.line.now_ns);
+	assert_true(polhemus_stream_due_ns(&b.stream) <= b.line.now_ns + PERIOD_NS);
+	n = b.n;
+	bench_take(&b);
+	assert_int_equal(b.n, n);
+	/* Not yet, and then. */
+	polhemus_stream_quiet(&b.stream, b.line.now_ns + MS);
+	bench_take(&b);
+	assert_int_equal(b.n, n);
+	polhemus_stream_quiet(&b.stream, polhemus_stream_due_ns(&b.stream));
+	bench_take(&b);
+	assert_int_equal(b.n, n + 1);
+	assert_int_equal(polhemus_stream_lost(&b.stream), 30);
+	assert_true(polhemus_stream_due_ns(&b.stream) == INT64_MAX);
+	/* The link goes while some wait: these are there. */
+	b.line.now_ns = emulator_next_ns(&b.e) + 3 * PERIOD_NS + MS;
+	emulator_advance(&b.e, b.line.now_ns);
+	n = emulator_take(&b.e, bytes, sizeof(bytes));
+	polhemus_stream_put(&b.stream, bytes + n - 34, 34, b.line.now_ns);
+	polhemus_stream_broken(&b.stream, &b.identity.layout);
+	n = b.n;
+	bench_take(&b);
+	assert_int_equal(b.n, n + 1);
+	bench_free(&b);
 }
 
 /* A host that looks rarely, and then gets many at once, lost nothing. */
@@ -695,6 +766,8 @@ int main(void)
 		cmocka_unit_test(ten_minutes),
 		cmocka_unit_test(loses_what_is_touched),
 		cmocka_unit_test(time_tells),
+		cmocka_unit_test(long_gaps_have_their_place),
+		cmocka_unit_test(what_waits_is_released),
 		cmocka_unit_test(bursts_are_no_loss),
 		cmocka_unit_test(bursts_and_new_bytes),
 		cmocka_unit_test(drift_is_no_loss),
