@@ -414,8 +414,8 @@ static int64_t round_of(const struct polhemus_gaps *gaps)
 }
 
 /*
- * By the least late one, as between them others may be missing. Lateness is never negative: a
- * part of a round is not yet one.
+ * By the least late one, as between them others may be missing. Lateness is never negative but
+ * for a drift of 500 ppm: with one too many, a record would be there before its time.
  */
 static uint64_t missing_before(const struct polhemus_stream *stream)
 {
@@ -424,7 +424,8 @@ static uint64_t missing_before(const struct polhemus_stream *stream)
 
 	if (late_ns > stream->wait.first_late_ns)
 		late_ns = stream->wait.first_late_ns;
-	return (uint64_t)((late_ns + round_ns / 4) / round_ns) * (uint64_t)gaps->n;
+	late_ns += late_ns / 2000 + round_ns / 256;
+	return (uint64_t)(late_ns / round_ns) * (uint64_t)gaps->n;
 }
 
 /* The end of the wait, if the record that came last shows it. */
@@ -442,32 +443,6 @@ static void decide(struct polhemus_stream *stream)
 	/* They come by and by, as of a slow line. */
 	else if (waited_ns > WAIT_NS + round_ns || wait->n == CAPACITY)
 		release(stream, 0);
-}
-
-static void take_record(struct polhemus_stream *stream,
-			const struct polhemus_record *record)
-{
-	struct polhemus_gaps *gaps = &stream->gaps;
-	struct polhemus_wait *wait = &stream->wait;
-	int64_t late_ns;
-	uint64_t seq;
-
-	if (!gaps->begun || gaps->broken || gaps->counts || !gaps->period_ns) {
-		number(stream, record);
-		return;
-	}
-	late_ns = late_if_held_up(stream, record, &seq);
-	if (!wait->n && late_ns < round_of(gaps) * 3 / 2) {
-		number(stream, record);
-		return;
-	}
-	if (!wait->n)
-		wait->first_late_ns = late_ns;
-	wait->late_ns = late_ns;
-	wait->seq = seq;
-	wait->last = place(gaps, record->station);
-	wait->records[wait->n++] = *record;
-	decide(stream);
 }
 
 static void count(struct polhemus_stream *stream, uint64_t silent)
@@ -493,6 +468,34 @@ void polhemus_stream_quiet(struct polhemus_stream *stream, int64_t t_ns)
 				? missing_before(stream)
 				: 0);
 	count(stream, 0);
+}
+
+static void take_record(struct polhemus_stream *stream,
+			const struct polhemus_record *record)
+{
+	struct polhemus_gaps *gaps = &stream->gaps;
+	struct polhemus_wait *wait = &stream->wait;
+	int64_t late_ns;
+	uint64_t seq;
+
+	if (!gaps->begun || gaps->broken || gaps->counts || !gaps->period_ns) {
+		number(stream, record);
+		return;
+	}
+	/* Nobody may have looked in between. */
+	polhemus_stream_quiet(stream, record->t_ns);
+	late_ns = late_if_held_up(stream, record, &seq);
+	if (!wait->n && late_ns < round_of(gaps) * 3 / 2) {
+		number(stream, record);
+		return;
+	}
+	if (!wait->n)
+		wait->first_late_ns = late_ns;
+	wait->late_ns = late_ns;
+	wait->seq = seq;
+	wait->last = place(gaps, record->station);
+	wait->records[wait->n++] = *record;
+	decide(stream);
 }
 
 void polhemus_stream_silent(struct polhemus_stream *stream, int64_t t_ns)

@@ -21,6 +21,10 @@
 #define TIP_MAX_MM 1e6
 /* 146 years: times and their differences stay below 2^63. */
 #define TIME_MAX (INT64_MAX / 2)
+/* Of a tracker, as of incise_timeline_setup; and an hour. */
+#define RATE_MIN 1e-3
+#define RATE_MAX 1e7
+#define DELAY_MAX_MS 3.6e6
 
 /* --- values of a row ---------------------------------------------------------------- */
 
@@ -579,6 +583,7 @@ void incise_recording_close(struct incise_recording *rec)
 	if (!rec)
 		return;
 	sqlite3_close(rec->db);
+	free(rec->fit);
 	free(rec->path);
 	free(rec->name);
 	free(rec);
@@ -656,6 +661,103 @@ static bool take_knot(sqlite3_stmt *stmt, const struct incise_timeline_knot *las
 	       (!last || (knot->seq > last->seq && knot->t_ns > last->t_ns));
 }
 
+/*
+ * Numbers and arrivals of the tracker, up to a row that cannot be: its reader reports that.
+ * *@rows is to be freed. Returns 0 or -ENOMEM.
+ */
+static int read_arrivals(sqlite3_stmt *stmt, struct incise_fit_row **rows, size_t *n)
+{
+	size_t capacity = 0;
+
+	while (sqlite3_step(stmt) == SQLITE_ROW) {
+		int64_t seq = sqlite3_column_int64(stmt, 0);
+		int64_t arrival_ns = sqlite3_column_int64(stmt, 1);
+
+		if (seq < 0 || arrival_ns < 0 || arrival_ns > TIME_MAX ||
+		    (*n && arrival_ns < (*rows)[*n - 1].arrival_ns))
+			return 0;
+		if (*n == capacity) {
+			struct incise_fit_row *more;
+
+			capacity = capacity ? 2 * capacity : 4096;
+			more = realloc(*rows, capacity * sizeof(**rows));
+			if (!more)
+				return -ENOMEM;
+			*rows = more;
+		}
+		(*rows)[(*n)++] = (struct incise_fit_row){(uint64_t)seq, arrival_ns};
+	}
+	return 0;
+}
+
+/* Of the tracker's arrivals; 0: none, or not known. */
+static double read_grain(struct incise_recording *rec)
+{
+	sqlite3_stmt *stmt = NULL;
+	double grain_ns = 0;
+
+	if (sqlite3_prepare_v2(rec->db,
+			       "SELECT grain_ns FROM streams WHERE name = 'tracker'", -1,
+			       &stmt, NULL) == SQLITE_OK &&
+	    sqlite3_step(stmt) == SQLITE_ROW)
+		grain_ns = sqlite3_column_double(stmt, 0);
+	sqlite3_finalize(stmt);
+	return grain_ns > 0 && grain_ns < DELAY_MAX_MS * 1e6 ? grain_ns : 0;
+}
+
+static int fit(struct incise_recording *rec, const struct incise_recording_line *line,
+	       const struct incise_stream *stream, double period_ns, double grain_ns,
+	       struct incise_error *err)
+{
+	const struct incise_fit_setup setup = {
+		.knots = line->knots,
+		.n_knots = line->n,
+		.period_ns = period_ns,
+		.delay_ns = llrint(stream->delay_ms * 1e6),
+		.delay_sd_ns = isnan(stream->delay_sd_ms) ? 0 : stream->delay_sd_ms * 1e6,
+		.grain_ns = grain_ns,
+	};
+	struct incise_fit_row *rows = NULL;
+	sqlite3_stmt *stmt;
+	int64_t found;
+	size_t n = 0;
+
+	if (sqlite3_prepare_v2(rec->db,
+			       "SELECT seq, arrival_ns FROM tracker ORDER BY seq", -1,
+			       &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(rec->db, rec->path, err);
+	found = read_arrivals(stmt, &rows, &n);
+	sqlite3_finalize(stmt);
+	if (!found)
+		found = incise_fit(&setup, rows, n, &rec->fit);
+	free(rows);
+	if (found < 0)
+		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+	rec->n_fit = (size_t)found;
+	return 0;
+}
+
+/* The rows of the tracker that are not on the line. */
+static int find_others(struct incise_recording *rec, struct incise_recording_line *line,
+		       struct incise_error *err)
+{
+	struct incise_stream streams[INCISE_STREAMS_MAX];
+	int n = incise_recording_streams(rec, streams, err), rc = 0;
+	double hz = NAN;
+
+	if (n > 0 && !rec->fitted)
+		rc = incise_recording_number(rec, "tracker_hz", &hz, err);
+	for (int i = 0; i < n && !rc && hz >= RATE_MIN && hz <= RATE_MAX; i++)
+		if (!strcmp(streams[i].name, "tracker") && !streams[i].timestamped &&
+		    fabs(streams[i].delay_ms) < DELAY_MAX_MS &&
+		    (line->n || !(streams[i].nominal_hz > 0)))
+			rc = fit(rec, line, &streams[i], 1e9 / hz, read_grain(rec), err);
+	rec->fitted = rc == 0;
+	line->others = rec->fit;
+	line->n_others = rec->n_fit;
+	return n < 0 ? n : rc;
+}
+
 int incise_recording_line(struct incise_recording *rec, const char *stream,
 			  struct incise_recording_line *line, struct incise_error *err)
 {
@@ -663,6 +765,8 @@ int incise_recording_line(struct incise_recording *rec, const char *stream,
 	int rc;
 
 	line->n = 0;
+	line->others = NULL;
+	line->n_others = 0;
 	if (rec->form < 2)
 		return 0;
 	if (sqlite3_prepare_v2(rec->db,
@@ -690,16 +794,42 @@ int incise_recording_line(struct incise_recording *rec, const char *stream,
 	sqlite3_finalize(stmt);
 	if (line->n < 2)
 		line->n = 0;
-	return 0;
+	return strcmp(stream, "tracker") ? 0 : find_others(rec, line, err);
+}
+
+/* The row among the others, or NULL. */
+static const struct incise_fit_time *find_other(const struct incise_recording_line *line,
+						uint64_t seq)
+{
+	size_t low = 0, high = line->n_others;
+
+	while (low < high) {
+		size_t middle = low + (high - low) / 2;
+
+		if (line->others[middle].seq < seq)
+			low = middle + 1;
+		else
+			high = middle;
+	}
+	return low < line->n_others && line->others[low].seq == seq ? &line->others[low]
+								    : NULL;
 }
 
 int64_t incise_recording_time(const struct incise_recording_line *line, uint64_t seq,
 			      int64_t t_ns)
 {
+	const struct incise_fit_time *other = find_other(line, seq);
+
+	if (other)
+		return line->n ? other->t_ns : t_ns - llrint(other->held_ns);
 	return line->n ? incise_timeline_at(line->knots, line->n, seq) : t_ns;
 }
 
 double incise_recording_time_sd(const struct incise_recording_line *line, uint64_t seq)
 {
+	const struct incise_fit_time *other = find_other(line, seq);
+
+	if (other)
+		return other->sd_ns;
 	return line->n ? incise_timeline_sd(line->knots, line->n, seq) : NAN;
 }

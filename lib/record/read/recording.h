@@ -7,6 +7,7 @@
 
 #include <sqlite3.h>
 #include <incise/recording.h>
+#include "../time/fit.h"
 #include "../time/timeline.h"
 
 struct incise_recording {
@@ -15,6 +16,10 @@ struct incise_recording {
 	char *name;  /* "liver" of dir/liver.rec and of dir/liver.rec.part */
 	int form;    /* of its tables, see schema.h */
 	struct incise_recording_info meta; /* the part that is in table meta */
+	/* Rows of the tracker that are not on its line, found at the first need. */
+	bool fitted;
+	struct incise_fit_time *fit;
+	size_t n_fit;
 };
 
 /*
@@ -40,9 +45,12 @@ int incise_recording_need_zero(const struct incise_recording *recording,
 			       const struct incise_recording_force *force,
 			       struct incise_error *err);
 
-/* The line of a stream's times; n 0: the times of the rows are the best. */
+/* The line of a stream's times; n 0: the times of the rows are the best, but for the others. */
 struct incise_recording_line {
 	int n;
+	/* Rows that are timed otherwise; of the recording. */
+	const struct incise_fit_time *others;
+	size_t n_others;
 	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS_MAX];
 };
 
@@ -59,7 +67,7 @@ int incise_recording_line(struct incise_recording *recording, const char *stream
 int64_t incise_recording_time(const struct incise_recording_line *line, uint64_t seq,
 			      int64_t t_ns);
 
-/* Its standard uncertainty, ns; NAN without a line. */
+/* Its standard uncertainty, ns; NAN: not known. */
 double incise_recording_time_sd(const struct incise_recording_line *line, uint64_t seq);
 
 #endif

@@ -111,8 +111,9 @@ bool incise_row_times_next(struct incise_row_times *times, int64_t seq, int64_t 
 
 double incise_row_times_sd(const struct incise_row_times *times, int64_t seq)
 {
-	double sd_ns = times->line.n ? incise_recording_time_sd(&times->line, seq)
-				     : known(times->offset_sd_ns, 0);
+	double on_line_ns = incise_recording_time_sd(&times->line, seq);
+	double sd_ns = times->line.n ? on_line_ns
+				     : known(times->offset_sd_ns, known(on_line_ns, 0));
 	double variance = sd_ns * sd_ns + times->variance_ns2;
 
 	return variance > 0 ? sqrt(variance) * 1e-9 : 0;

@@ -80,7 +80,10 @@ void incise_recorder_start_streams(struct incise_recorder *rec)
 	start_stream(rec, INCISE_LEDGER_TRACKER, "tracker", rec->tracker_info.name,
 		     calibration->tracker_delay_sd_ms,
 		     &(struct incise_timeline_setup){
-			     .rate_hz = rec->tracker_info.rate_hz,
+			     /* Pulses from outside have no period: no line is drawn. */
+			     .rate_hz = rec->tracker_info.external_sync
+						? 0
+						: rec->tracker_info.rate_hz,
 			     .delay_ns = delay_ns(calibration->tracker_delay_ms,
 						  rec->tracker_info.latency_ns),
 			     .grain_ns = rec->tracker_info.grain_ns,

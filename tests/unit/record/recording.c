@@ -364,9 +364,10 @@ static void line_is_read_and_used(void **state)
 	struct incise_error err = {0};
 
 	record("a.rec", "sim:clock=simulated", 700 * MS);
-	change(DB, "DELETE FROM knots; INSERT INTO knots VALUES('tracker', 0, 10, 1000, "
-		   "5.0, 1), ('tracker', 1, 20, 3000, 7.0, 0), ('tracker', 2, 30, 6000, "
-		   "6.0, 0)");
+	/* The arrivals of its rows would show that this is not their line. */
+	change(DB, "DELETE FROM tracker; DELETE FROM knots; "
+		   "INSERT INTO knots VALUES('tracker', 0, 10, 1000, 5.0, 1), "
+		   "('tracker', 1, 20, 3000, 7.0, 0), ('tracker', 2, 30, 6000, 6.0, 0)");
 	recording = incise_recording_open("a.rec", &err);
 	assert_non_null(recording);
 	assert_int_equal(incise_recording_line(recording, "tracker", &line, &err), 0);

@@ -1,0 +1,486 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Times of a recorded FASTRAK compared with the truth, from its bytes to the rows of the
+ * recording, for records that are lost, held up by the host, paced from outside, or too many.
+ * Everything is drawn from a seed, on a simulated clock.
+ *
+ *     measured ── 8 ms ──► at the host ── up to some ms, or while the host stalls ──► read
+ *
+ * The invariant: the time of a row differs from the truth by no more than K times its stated
+ * standard uncertainty. K is 4: the largest error of an even distribution is √12 = 3.5
+ * standard deviations, and of a normal one 4 are exceeded once in 16000.
+ */
+#include "recorded.h"
+#include <incise/backend.h>
+#include <incise/verify.h>
+#include "../../../lib/device/polhemus/polhemus_stream.h"
+#include "../../../lib/record/read/rows.h"
+
+#define K 4
+#define S 1000000000LL
+#define LATENCY_NS (8 * MS)
+#define RECORDS_MAX 8000
+#define SPANS_MAX 8
+#define SEEDS 200
+
+struct span {
+	int64_t from_ns, to_ns; /* after the first record */
+};
+
+/* Random in all that is not set. */
+struct scenario {
+	double hz;		       /* of the device; 120 is expected of it */
+	bool external;		       /* paced by pulses from outside */
+	double to_hz;		       /* from the middle on; 0: the same */
+	double ppm;		       /* by which its clock is fast */
+	double jitter_ms;	       /* mean of the exponential lateness of the host */
+	double grid_ms;		       /* arrivals are on a grid; 0: are not */
+	double wobble;		       /* of the pulses from outside, in periods */
+	struct span mutes[SPANS_MAX];  /* records in them are lost, without a trace */
+	struct span stalls[SPANS_MAX]; /* the host reads nothing */
+	struct span pauses[SPANS_MAX]; /* no pulses come: nothing is measured */
+	double seconds;
+};
+
+static struct {
+	int64_t truth_ns[RECORDS_MAX], read_ns[RECORDS_MAX];
+	bool lost[RECORDS_MAX];
+	int n, next;
+	bool external;
+	int64_t grid_ns;
+	const struct span *stalls;
+	int64_t start_ns;
+	struct polhemus_stream stream;
+	const struct incise_tracker_ops *real;
+	uint64_t random;
+} device;
+
+/* Of 0 to 1; splitmix64. */
+static double draw(void)
+{
+	uint64_t z = device.random += 0x9e3779b97f4a7c15;
+
+	z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
+	z = (z ^ z >> 27) * 0x94d049bb133111eb;
+	return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
+}
+
+static const struct span *within(const struct span *spans, int64_t t_ns)
+{
+	for (int i = 0; i < SPANS_MAX; i++)
+		if (t_ns >= spans[i].from_ns && t_ns < spans[i].to_ns)
+			return &spans[i];
+	return NULL;
+}
+
+/* All records of the scenario: when they are measured, and when the host reads them. */
+static void plan(const struct scenario *s, int64_t start_ns)
+{
+	double t_ns = 0, end_ns = s->seconds * 1e9;
+	int64_t last_ns = 0;
+
+	device.n = device.next = 0;
+	device.external = s->external;
+	device.grid_ns = (int64_t)(s->grid_ms * 1e6);
+	device.stalls = s->stalls;
+	device.start_ns = start_ns;
+	while (t_ns < end_ns && device.n < RECORDS_MAX) {
+		double hz = s->to_hz > 0 && t_ns > end_ns / 2 ? s->to_hz : s->hz;
+		int64_t own_ns = (int64_t)(t_ns + s->wobble * draw() * 1e9 / hz), at_ns;
+		const struct span *stall;
+		int i = device.n;
+
+		t_ns += 1e9 / hz / (1 + s->ppm * 1e-6);
+		if (within(s->pauses, own_ns))
+			continue;
+		device.n++;
+		device.truth_ns[i] = start_ns + own_ns;
+		device.lost[i] = within(s->mutes, own_ns) != NULL;
+		at_ns = own_ns + LATENCY_NS;
+		if (s->grid_ms > 0)
+			at_ns = (int64_t)(ceil((double)at_ns / (s->grid_ms * 1e6)) *
+					  s->grid_ms * 1e6);
+		at_ns += (int64_t)(-log(1 - draw()) * s->jitter_ms * 1e6);
+		stall = within(s->stalls, at_ns);
+		if (stall)
+			at_ns = stall->to_ns;
+		if (at_ns < last_ns)
+			at_ns = last_ns;
+		last_ns = at_ns;
+		device.read_ns[i] = start_ns + at_ns;
+	}
+}
+
+/* Its number is in its position, in steps of 0.125 cm, which a float holds. */
+static size_t record_of(int i, unsigned char *bytes)
+{
+	const float values[7] = {
+		(float)(i % 1000) * 0.125F, (float)(i / 1000) * 0.125F, 0, 1, 0, 0, 0};
+
+	memcpy(bytes, "01 ", 3);
+	memcpy(bytes + 3, values, sizeof(values));
+	memcpy(bytes + 31, " \r\n", 3);
+	bytes[31] = '0';
+	return 34;
+}
+
+static int number_of(const double position_mm[3])
+{
+	return (int)lround(position_mm[0] / 1.25) +
+	       1000 * (int)lround(position_mm[1] / 1.25);
+}
+
+/* The host looks at @t_ns, if it does not stall: nothing is there. */
+static void look(int64_t t_ns)
+{
+	if (!within(device.stalls, t_ns - device.start_ns))
+		polhemus_stream_quiet(&device.stream, t_ns);
+}
+
+/* The host's reads up to @now_ns. */
+static void advance(int64_t now_ns)
+{
+	int64_t due_ns;
+
+	while (device.next < device.n && device.read_ns[device.next] <= now_ns) {
+		unsigned char bytes[34 * 200];
+		int64_t t_ns = device.read_ns[device.next];
+		size_t n = 0;
+
+		due_ns = polhemus_stream_due_ns(&device.stream);
+		if (due_ns < t_ns)
+			look(due_ns);
+
+		for (; device.next < device.n && device.read_ns[device.next] == t_ns &&
+		       n + 34 <= sizeof(bytes);
+		     device.next++)
+			if (!device.lost[device.next])
+				n += record_of(device.next, bytes + n);
+		if (n)
+			polhemus_stream_put(&device.stream, bytes, n, t_ns);
+	}
+	due_ns = polhemus_stream_due_ns(&device.stream);
+	if (due_ns <= now_ns)
+		look(due_ns);
+}
+
+static struct incise_clock *the_clock;
+
+static int read_device(struct incise_tracker *tracker,
+		       struct incise_tracker_sample *samples, int n)
+{
+	advance(incise_clock_now(the_clock));
+	return incise_ring_take(&device.stream.ring, samples, n);
+}
+
+static void info_of_device(const struct incise_tracker *tracker,
+			   struct incise_tracker_info *info)
+{
+	*info = (struct incise_tracker_info){
+		.name = "FASTRAK",
+		.rate_hz = 120,
+		.latency_ns = LATENCY_NS,
+		.stations = 1,
+		.external_sync = device.external,
+		.grain_ns = device.grid_ns,
+	};
+}
+
+static uint64_t lost_by_device(const struct incise_tracker *tracker)
+{
+	return polhemus_stream_lost(&device.stream);
+}
+
+static void close_device(struct incise_tracker *tracker)
+{
+	tracker->ops = device.real;
+	tracker->ops->close(tracker);
+}
+
+static const struct incise_tracker_ops device_ops = {
+	.read = read_device,
+	.info = info_of_device,
+	.lost = lost_by_device,
+	.close = close_device,
+};
+
+/* Record the scenario as a.rec. */
+static void capture(const struct scenario *s)
+{
+	struct incise_rig *rig = open_rig("sim:clock=simulated,force_hz=100");
+	struct incise_tracker *tracker = incise_rig_tracker(rig);
+	const struct polhemus_layout layout = {
+		.family = POLHEMUS_FASTRAK, .stations = 1, .switch_bytes = 1};
+	const struct incise_tracker_setup setup = {
+		.n_stations = 1,
+		.stations = {1},
+		.hemisphere = {1, 0, 0},
+		.sync = s->external ? INCISE_TRACKER_EXTERNAL : INCISE_TRACKER_INTERNAL,
+	};
+	struct incise_recorder *recorder;
+	struct incise_error err = {0};
+
+	the_clock = incise_rig_clock(rig);
+	plan(s, incise_clock_now(the_clock) + 100 * MS);
+	assert_int_equal(polhemus_stream_init(&device.stream, &setup, &layout), 0);
+	polhemus_gaps_start(&device.stream.gaps, incise_clock_now(the_clock));
+	device.real = tracker->ops;
+	tracker->ops = &device_ops;
+	recorder = start_recorder("a.rec", rig);
+	if (poll_for(recorder, rig, (int64_t)((s->seconds + 0.3) * 1e9), &err) ||
+	    incise_recorder_close(recorder, &err))
+		fail_msg("%s", err.text);
+	incise_rig_close(rig);
+	polhemus_stream_free(&device.stream);
+}
+
+struct errors {
+	int rows, beyond; /* rows beyond K times their uncertainty */
+	double worst_ms;
+	double worst_ratio; /* error by uncertainty */
+	int worst_at;
+	double trusted; /* share of rows with an uncertainty below 5 ms */
+};
+
+static void measure(struct errors *out)
+{
+	struct incise_error err = {0};
+	struct incise_recording *recording = incise_recording_open("a.rec", &err);
+	struct incise_rows rows;
+	int rc;
+
+	*out = (struct errors){0};
+	if (!recording ||
+	    incise_rows_open(&rows, recording, "tracker", "seq, t_ns, x_mm, y_mm", "iirr",
+			     recording->meta.tracker, &err))
+		fail_msg("%s", err.text);
+	while ((rc = incise_rows_next(&rows, &err)) > 0) {
+		double position_mm[3] = {sqlite3_column_double(rows.stmt, 2),
+					 sqlite3_column_double(rows.stmt, 3)};
+		int i = number_of(position_mm);
+		double error_ms = fabs((double)(rows.t_ns - device.truth_ns[i])) * 1e-6;
+		double sd_ms =
+			1e3 * incise_row_times_sd(&rows.times,
+						  sqlite3_column_int64(rows.stmt, 0));
+
+		assert_true(i >= 0 && i < device.n && !device.lost[i]);
+		out->rows++;
+		/* Times are whole ns. */
+		out->beyond += error_ms > K * sd_ms + 2e-6;
+		out->trusted += sd_ms < 5;
+		out->worst_ms = fmax(out->worst_ms, error_ms);
+		if (sd_ms > 0 && error_ms / sd_ms > out->worst_ratio) {
+			out->worst_ratio = error_ms / sd_ms;
+			out->worst_at = i;
+		}
+	}
+	if (rc)
+		fail_msg("%s", err.text);
+	out->trusted /= out->rows;
+	incise_rows_close(&rows);
+	incise_recording_close(recording);
+}
+
+static void run(const struct scenario *s, struct errors *out)
+{
+	capture(s);
+	measure(out);
+}
+
+/* --- what was found --------------------------------------------------------------------- */
+
+/* 60 Hz where the device can do 120: t_ns was up to 3.27 s wrong. */
+static void pulses_from_outside(void **state)
+{
+	struct errors errors;
+
+	run(
+		&(struct scenario){
+			.hz = 60, .external = true, .jitter_ms = 0.3, .seconds = 6},
+		&errors);
+	if (errors.worst_ms > 5 || errors.beyond)
+		fail_msg("%.1f ms wrong, %d rows beyond %d times what they state",
+			 errors.worst_ms, errors.beyond, K);
+}
+
+/* Everything after the pause was 1.2 s wrong. */
+static void pulses_that_pause(void **state)
+{
+	struct errors errors;
+
+	run(&(struct scenario){.hz = 100,
+			       .external = true,
+			       .jitter_ms = 0.3,
+			       .pauses = {{2 * S, 3200 * MS}},
+			       .seconds = 6},
+	    &errors);
+	if (errors.worst_ms > 5 || errors.beyond)
+		fail_msg("%.1f ms wrong, %d rows beyond %d times what they state",
+			 errors.worst_ms, errors.beyond, K);
+}
+
+/* What a scenario must come to: the invariant, and no error beyond @worst_ms. */
+static void hold(const struct scenario *s, double worst_ms, const char *name)
+{
+	struct errors errors;
+
+	run(s, &errors);
+	print_message("%s: %d rows, %.2f ms wrong at most, %.2f times what is stated (at "
+		      "%d), %.4f known to 5 ms\n",
+		      name, errors.rows, errors.worst_ms, errors.worst_ratio,
+		      errors.worst_at, errors.trusted);
+	if (errors.worst_ms > worst_ms || errors.beyond)
+		fail_msg(
+			"%s: %.1f ms wrong, %d of %d rows beyond %d times what they state",
+			name, errors.worst_ms, errors.beyond, errors.rows, K);
+	assert_int_equal(system("rm -r a.rec"), 0);
+}
+
+/* 0.5 s of poses were as early as the loss was long. */
+static void losses_that_time_shows(void **state)
+{
+	static const int64_t lengths_ms[] = {8, 17, 25, 42, 100, 300, 700, 950};
+	char name[40];
+
+	for (size_t i = 0; i < 8; i++) {
+		struct scenario s = {
+			.hz = 120,
+			.ppm = 40,
+			.jitter_ms = 0.2,
+			.mutes = {{2 * S, 2 * S + lengths_ms[i] * MS}},
+			.seconds = 5,
+		};
+
+		snprintf(name, sizeof(name), "mute for %d ms", (int)lengths_ms[i]);
+		hold(&s, 3, name);
+		/* Nothing counts it before the end. */
+		s.seconds = (double)s.mutes[0].to_ns * 1e-9 + 0.4;
+		snprintf(name, sizeof(name), "mute for %d ms, and the end",
+			 (int)lengths_ms[i]);
+		/* So few rows may as well be late. */
+		hold(&s, lengths_ms[i] < 42 ? 17 : 3, name);
+	}
+}
+
+static void stalls_of_the_host(void **state)
+{
+	static const int64_t lengths_ms[] = {5, 12, 30, 200, 1200};
+	char name[40];
+
+	for (size_t i = 0; i < 5; i++)
+		for (int external = 0; external < 2; external++) {
+			struct scenario s = {
+				.hz = external ? 60 : 120,
+				.external = external,
+				.ppm = -30,
+				.jitter_ms = 0.2,
+				.stalls = {{2 * S, 2 * S + lengths_ms[i] * MS}},
+				.seconds = 5,
+			};
+
+			snprintf(name, sizeof(name), "stall of %d ms%s",
+				 (int)lengths_ms[i], external ? ", external" : "");
+			hold(&s, external ? 30 : 3, name);
+		}
+}
+
+static void another_rate(void **state)
+{
+	hold(&(struct scenario){.hz = 240, .jitter_ms = 0.2, .seconds = 5}, 5, "240 Hz");
+	hold(&(struct scenario){.hz = 60, .jitter_ms = 0.2, .seconds = 5}, 5, "60 Hz");
+	hold(&(struct scenario){.hz = 120, .to_hz = 240, .jitter_ms = 0.2, .seconds = 8},
+	     5, "120 to 240 Hz");
+	hold(&(struct scenario){.hz = 120, .to_hz = 60, .jitter_ms = 0.2, .seconds = 8},
+	     5, "120 to 60 Hz");
+}
+
+/* --- any of it ---------------------------------------------------------------------------- */
+
+static double between(double a, double b)
+{
+	return a + (b - a) * draw();
+}
+
+/* Up to @most spans of up to @longest_s, mostly short ones. */
+static void draw_spans(struct span *spans, int most, double longest_s, double seconds)
+{
+	int n = (int)between(0, most + 1);
+
+	for (int i = 0; i < n; i++) {
+		double length_s = longest_s * pow(draw(), 3);
+
+		spans[i].from_ns = (int64_t)(between(0.2, seconds) * 1e9);
+		spans[i].to_ns = spans[i].from_ns + (int64_t)(length_s * 1e9);
+	}
+}
+
+static void draw_scenario(struct scenario *s)
+{
+	static const double rates_hz[] = {240, 180, 100, 60, 30};
+
+	*s = (struct scenario){
+		.hz = 120,
+		.seconds = between(1.5, 8),
+		.external = draw() < 0.3,
+		.ppm = between(-300, 300),
+		.jitter_ms = 0.5 * pow(draw(), 2),
+		.grid_ms = draw() < 0.5 ? 1 : 0,
+	};
+	if (s->external) {
+		s->hz = between(15, 119);
+		s->wobble = draw() < 0.5 ? 0 : between(0, 0.3);
+		draw_spans(s->pauses, 3, 1.5, s->seconds);
+	} else if (draw() < 0.2) {
+		s->hz = rates_hz[(int)between(0, 5)];
+	} else if (draw() < 0.2) {
+		s->to_hz = rates_hz[(int)between(0, 5)];
+	}
+	draw_spans(s->mutes, 5, 1.2, s->seconds);
+	draw_spans(s->stalls, 4, 0.9, s->seconds);
+}
+
+/* The invariant, over whatever is drawn; and most rows of a good stream are well known. */
+static void no_time_is_worse_than_it_states(void **state)
+{
+	const char *only = getenv("SEED");
+	int first = only ? atoi(only) : 1, last = only ? first : SEEDS, bad = 0;
+	long rows = 0, beyond = 0;
+
+	for (int seed = first; seed <= last; seed++) {
+		struct scenario s;
+		struct errors errors;
+
+		device.random = (uint64_t)seed * 1000003;
+		draw_scenario(&s);
+		run(&s, &errors);
+		assert_int_equal(system("rm -r a.rec"), 0);
+		rows += errors.rows;
+		beyond += errors.beyond;
+		if (!errors.beyond && !only)
+			continue;
+		bad++;
+		print_message(
+			"seed %d: %.0f to %.0f Hz%s, %.1f s, jitter %.2f ms: %d of %d "
+			"rows, %.1f ms wrong, %.1f times what is stated, at %d\n",
+			seed, s.hz, s.to_hz, s.external ? ", external" : "", s.seconds,
+			s.jitter_ms, errors.beyond, errors.rows, errors.worst_ms,
+			errors.worst_ratio, errors.worst_at);
+	}
+	print_message("%ld of %ld rows of %d scenarios beyond %d times what they state\n",
+		      beyond, rows, last - first + 1, K);
+	assert_int_equal(beyond, 0);
+	assert_true(only || !bad);
+}
+
+#define TEST(name) IN_FOLDER(name)
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		TEST(pulses_from_outside),    TEST(pulses_that_pause),
+		TEST(losses_that_time_shows), TEST(stalls_of_the_host),
+		TEST(another_rate),	      TEST(no_time_is_worse_than_it_states),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
