@@ -123,6 +123,16 @@ static int fastrak_put(struct polhemus_dialogue *d, const char *command,
 	return width == 2 && m != n ? polhemus_not_taken(d, what, reply) : 0;
 }
 
+/* A station that is to be on and is not. */
+static int no_sensor(struct polhemus_dialogue *d, int station)
+{
+	return incise_error_set(
+		d->err, EIO,
+		"%s: station %d of the tracker at %s does not switch on: plug its sensor "
+		"in and set its switch, or leave it out of tracker_setup",
+		d->where, station, d->line->name);
+}
+
 /* Switch on first: the last active station cannot be switched off. */
 static int fastrak_stations(struct polhemus_dialogue *d, uint8_t mask)
 {
@@ -142,18 +152,13 @@ static int fastrak_stations(struct polhemus_dialogue *d, uint8_t mask)
 	if (polhemus_reply_fields(reply, 1, fields, POLHEMUS_STATIONS) !=
 	    POLHEMUS_STATIONS)
 		return polhemus_not_taken(d, "its stations", reply);
-	for (int i = 0; i < POLHEMUS_STATIONS; i++) {
-		if (fields[i] == (mask >> i & 1))
-			continue;
-		if (fields[i])
+	/* Where none of these is on, another one stays on. */
+	for (int i = 0; i < POLHEMUS_STATIONS; i++)
+		if (mask >> i & 1 && !fields[i])
+			return no_sensor(d, i + 1);
+	for (int i = 0; i < POLHEMUS_STATIONS; i++)
+		if (fields[i] && !(mask >> i & 1))
 			return polhemus_not_taken(d, "its stations", reply);
-		return incise_error_set(
-			d->err, EIO,
-			"%s: station %d of the tracker at %s does not "
-			"switch on: plug its sensor in and set its switch, or "
-			"leave it out of tracker_setup",
-			d->where, i + 1, d->line->name);
-	}
 	return 0;
 }
 
@@ -328,13 +333,13 @@ static int liberty_stations(struct polhemus_dialogue *d, uint8_t mask)
 		return polhemus_not_taken(d, "its stations", "a short answer");
 	active = frame.n >= 8 ? polhemus_word(frame.payload + 4)
 			      : polhemus_word(frame.payload) >> 16;
+	for (int i = 0; i < POLHEMUS_STATIONS; i++)
+		if (mask & ~active & 1u << i)
+			return no_sensor(d, i + 1);
 	if ((active & 0xf) == mask)
 		return 0;
-	return incise_error_set(
-		d->err, EIO,
-		"%s: the tracker at %s has stations %#x active, not %#x: plug "
-		"its sensors in, or change tracker_setup",
-		d->where, d->line->name, (unsigned int)active, mask);
+	snprintf(command, sizeof(command), "%#x", (unsigned int)active & 0xf);
+	return polhemus_not_taken(d, "its stations", command);
 }
 
 static int liberty_setup(struct polhemus_dialogue *d,
@@ -391,13 +396,21 @@ static int liberty_setup(struct polhemus_dialogue *d,
 
 #define STOPS 10
 
+/* USB has no baud rate, and its cable one way to be plugged in. */
+static bool is_serial(const struct polhemus_dialogue *d)
+{
+	return d->line->ns_per_byte > 0;
+}
+
 static int no_answer(struct polhemus_dialogue *d)
 {
 	return incise_error_set(
-		d->err, ETIMEDOUT,
-		"%s: no tracker answers at %s: is it on, is the baud rate what "
-		"its switches say, and the cable a null modem?",
-		d->where, d->line->name);
+		d->err, ETIMEDOUT, "%s: no tracker answers at %s: %s", d->where,
+		d->line->name,
+		is_serial(d) ? "switch it on, set the baud rate that its switches "
+			       "say, and use a null modem cable"
+			     : "switch it off and on, wait for 20 s until it has "
+			       "started, and plug its USB cable in again");
 }
 
 /*
@@ -419,10 +432,13 @@ static int quiet(struct polhemus_dialogue *d)
 			rc = polhemus_drain(d);
 	}
 	if (rc == -EBUSY)
-		incise_error_set(d->err, EBUSY,
-				 "%s: the device at %s does not stop sending: is it a "
-				 "Polhemus tracker, and the baud rate its own?",
-				 d->where, d->line->name);
+		incise_error_set(
+			d->err, EBUSY, "%s: the device at %s does not stop sending: %s",
+			d->where, d->line->name,
+			is_serial(d)
+				? "name the line of a Polhemus tracker, and its baud "
+				  "rate"
+				: "name a Polhemus tracker, or switch it off and on");
 	return rc;
 }
 

@@ -173,12 +173,18 @@ static void what_cannot_be(void **state)
 	begin(EMULATOR_FASTRAK, -1);
 	assert_int_equal(set_up(&two), -EIO);
 	assert_non_null(strstr(err.text, "station 2"));
-	/* Nobody. */
-	begin(EMULATOR_FASTRAK, -1);
-	emulator_write(&e, "c", 1);
-	e.deaf = true;
-	assert_int_equal(set_up(&first), -ETIMEDOUT);
-	assert_non_null(strstr(err.text, "baud"));
+	/* Nobody: on a serial line it may be the line. */
+	for (int serial = 0; serial <= 1; serial++) {
+		begin(EMULATOR_FASTRAK, -1);
+		emulator_write(&e, "c", 1);
+		line.line.ns_per_byte = serial * 86806;
+		e.deaf = true;
+		assert_int_equal(set_up(&first), -ETIMEDOUT);
+		assert_int_equal(strstr(err.text, "baud") != NULL, serial);
+		assert_int_equal(strstr(err.text, "null modem") != NULL, serial);
+		assert_int_equal(strstr(err.text, "USB cable") != NULL, !serial);
+		assert_null(strchr(err.text, '?'));
+	}
 	/* One that does not stop; its button would. */
 	begin(EMULATOR_FASTRAK, -1);
 	e.deaf = e.mouse = true;
@@ -188,6 +194,34 @@ static void what_cannot_be(void **state)
 	line.gone = -ENODEV;
 	assert_int_equal(set_up(&first), -ENODEV);
 	assert_non_null(strstr(err.text, "went away"));
+}
+
+/*
+ * A sensor that is not plugged in is named, whichever others there are: the last active station
+ * stays on, also one that is not wanted.
+ */
+static void station_without_a_sensor(void **state)
+{
+	static const struct incise_tracker_setup wanted[] = {
+		{.n_stations = 1, .stations = {2}, .hemisphere = {1, 0, 0}},
+		{.n_stations = 1, .stations = {4}, .hemisphere = {1, 0, 0}},
+		{.n_stations = 2, .stations = {1, 2}, .hemisphere = {1, 0, 0}},
+		{.n_stations = 2, .stations = {3, 4}, .hemisphere = {1, 0, 0}},
+	};
+	static const enum emulator_kind kinds[] = {EMULATOR_FASTRAK, EMULATOR_LIBERTY};
+	char name[20];
+
+	for (size_t k = 0; k < 2; k++)
+		for (size_t i = 0; i < sizeof(wanted) / sizeof(*wanted); i++) {
+			begin(kinds[k], (int)kinds[k]);
+			assert_int_equal(set_up(&wanted[i]), -EIO);
+			snprintf(name, sizeof(name), "station %d",
+				 wanted[i].stations[0] == 1 ? 2 : wanted[i].stations[0]);
+			if (!strstr(err.text, name) ||
+			    !strstr(err.text, "plug its sensor in") ||
+			    strstr(err.text, "off and on"))
+				fail_msg("%zu %zu: %s", k, i, err.text);
+		}
 }
 
 static void who_is_there(void **state)
@@ -239,6 +273,7 @@ int main(void)
 		cmocka_unit_test_teardown(sync_from_outside, end),
 		cmocka_unit_test_teardown(what_is_not_taken, end),
 		cmocka_unit_test_teardown(what_cannot_be, end),
+		cmocka_unit_test_teardown(station_without_a_sensor, end),
 		cmocka_unit_test_teardown(who_is_there, end),
 		cmocka_unit_test_teardown(slow_line, end),
 	};
