@@ -479,8 +479,10 @@ frozen() {
 
 @test "kill -STOP: a drive that ignores a lost master is not moved on either" {
 	local verb
-	for verb in "jog 5" "enable --for 800ms" "enable"; do
+	for verb in "move 25" "jog 2" "enable --for 800ms" "enable"; do
 		rig --homed
+		# It shall not be there before it is stopped.
+		sed -i 's/velocity_mm_s = 30.0/velocity_mm_s = 3.0/; s/home_mm_s = 20.0/home_mm_s = 2.0/' rig.conf
 		drive_tell watch off
 		# shellcheck disable=SC2086 # words
 		frozen stepper $verb --rig rig.conf
