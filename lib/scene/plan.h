@@ -131,7 +131,8 @@ incise_stage_fn incise_stage_actuate;
 
 /* An actuator that does not move any more: keep why. Returns @rc. */
 int incise_stage_refused(struct incise_plan *plan,
-			 const struct incise_stepper_status *status, int rc);
+			 const struct incise_stepper_status *status,
+			 int rc) INCISE_REALTIME;
 
 /* --- plan --- */
 
