@@ -227,6 +227,7 @@ void stepper_status_publish(struct stepper_motor *motor, s64 now);
 /* stepper_node.c */
 struct fwnode_handle *stepper_node_motor(struct device *dev, unsigned int motor);
 int stepper_node_count(struct device *dev);
+bool stepper_node_push_pull(const struct fwnode_handle *node, const char *name);
 
 /* stepper_lines.c */
 int stepper_lines_get(struct stepper *stepper, struct device *dev);

@@ -71,6 +71,10 @@ static struct gpio_desc *stepper_lines_one(struct device *dev, struct fwnode_han
 	if (IS_ERR(line))
 		return ERR_PTR(
 			stepper_lines_fail(dev, PTR_ERR(line), key, "it cannot be had"));
+	if (flags != GPIOD_IN && node && !stepper_node_push_pull(node, name))
+		return ERR_PTR(stepper_lines_fail(
+			dev, -EOPNOTSUPP, key,
+			"an open-drain output may sleep, an interrupt may not"));
 	if (gpiod_cansleep(line))
 		return ERR_PTR(
 			stepper_lines_fail(dev, -EOPNOTSUPP, key,

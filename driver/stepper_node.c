@@ -5,6 +5,7 @@
  *   controller ─┬─ motor@0 { reg = <0>; }
  *               └─ motor@1 { reg = <1>; }
  */
+#include <dt-bindings/gpio/gpio.h>
 #include <linux/device.h>
 #include <linux/property.h>
 
@@ -20,6 +21,31 @@ struct fwnode_handle *stepper_node_motor(struct device *dev, unsigned int motor)
 		node = device_get_next_child_node(dev, node);
 	} while (node && (fwnode_property_read_u32(node, "reg", &reg) || reg != motor));
 	return node;
+}
+
+/**
+ * stepper_node_push_pull() - whether a line's flags say that it is driven both ways
+ * @node:	its node
+ * @name:	of the line, less "-gpios"
+ *
+ * gpiolib writes a line that is driven one way only by changing its direction, for which
+ * pin controllers take a mutex. The flags are the last of at least two cells.
+ */
+bool stepper_node_push_pull(const struct fwnode_handle *node, const char *name)
+{
+	struct fwnode_reference_args args;
+	char property[32];
+
+	snprintf(property, sizeof(property), "%s-gpios", name);
+	if (fwnode_property_get_reference_args(node, property, "#gpio-cells", 0, 0,
+					       &args)) {
+		snprintf(property, sizeof(property), "%s-gpio", name);
+		if (fwnode_property_get_reference_args(node, property, "#gpio-cells", 0,
+						       0, &args))
+			return true;
+	}
+	fwnode_handle_put(args.fwnode);
+	return args.nargs < 2 || !(args.args[args.nargs - 1] & GPIO_SINGLE_ENDED);
 }
 
 /* The number of motors, 0 … N-1 without a gap, or a negative errno. */
