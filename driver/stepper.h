@@ -273,10 +273,6 @@ void stepper_debugfs_exit(void);
 void stepper_debugfs_add(struct stepper *stepper);
 void stepper_debugfs_remove(struct stepper *stepper);
 
-/* stepper_fixed.c */
-void stepper_fixed_init(struct dentry *root);
-void stepper_fixed_exit(void);
-
 /* stepper_device.c */
 struct stepper *stepper_device_new(struct device *parent, unsigned int n_motors);
 int stepper_device_add(struct stepper *stepper);

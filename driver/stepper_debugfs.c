@@ -144,11 +144,9 @@ void stepper_debugfs_remove(struct stepper *stepper)
 void stepper_debugfs_init(void)
 {
 	stepper_debugfs_root = debugfs_create_dir("incise_stepper", NULL);
-	stepper_fixed_init(stepper_debugfs_root);
 }
 
 void stepper_debugfs_exit(void)
 {
 	debugfs_remove_recursive(stepper_debugfs_root);
-	stepper_fixed_exit();
 }

@@ -112,7 +112,6 @@ static int stepper_main_probe(struct platform_device *pdev)
 	if (device_property_read_string(dev, "label", &label))
 		label = dev_name(dev);
 	strscpy(stepper->info.name, label, sizeof(stepper->info.name));
-	stepper->info.capabilities = INCISE_STEPPER_CAP_FIXED;
 
 	ret = stepper_lines_get(stepper, dev);
 	if (ret)

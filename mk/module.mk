@@ -48,7 +48,7 @@ srcdir ?= $(prefix)/src
 dkms_dir = $(srcdir)/incise-$(version)
 dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe) \
 	$(filter-out %.mod.c,$(wildcard $(addprefix driver/,*.[ch] uapi/*.h compat/*.c))) \
-	$(wildcard lib/fixed/*.[ch]) $(shell grep -l __KERNEL__ lib/include/incise/*.h) \
+	$(wildcard $(addprefix lib/fixed/,profile.[ch] ramp.[ch] integers.h)) $(shell grep -l __KERNEL__ lib/include/incise/*.h) \
 	$(addprefix lib/include/incise/,export.h stepper_state.h)
 
 dkms_install: ## install the module's sources for dkms in $(DESTDIR)$(srcdir)

@@ -10,6 +10,14 @@
 #define BAD (-22)	  /* -EINVAL */
 #define UNSUPPORTED (-95) /* -ENOTSUP */
 
+#ifdef __KERNEL__
+#include <linux/crc32c.h>
+
+uint32_t incise_fx_crc(const uint8_t *bytes, uint32_t n)
+{
+	return ~crc32c(~0u, bytes, n);
+}
+#else
 uint32_t incise_fx_crc(const uint8_t *bytes, uint32_t n)
 {
 	uint32_t crc = ~0u;
@@ -21,6 +29,7 @@ uint32_t incise_fx_crc(const uint8_t *bytes, uint32_t n)
 	}
 	return ~crc;
 }
+#endif
 
 static uint64_t magnitude(int64_t v)
 {

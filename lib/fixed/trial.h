@@ -13,7 +13,8 @@
 
 #include "spring.h"
 
-#define INCISE_FX_TRIAL_MAX 1000000
+/* CRC-32C of 10 000 results of seed 1 without an evaluator: 0, force, stretch; 5 int32. */
+#define INCISE_FX_TRIAL_SPRINGS 0x35716354u
 
 /* xorshift64 (G. Marsaglia, 'Xorshift RNGs', 2003); never 0. */
 static inline uint64_t incise_fx_trial_next(uint64_t *state)

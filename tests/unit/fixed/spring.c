@@ -7,7 +7,9 @@
 #include <stdint.h>
 #include <setjmp.h>
 #include <cmocka.h>
-#include "../../../lib/fixed/spring.h"
+#include <stdlib.h>
+#include "../../../lib/fixed/layout.h"
+#include "../../../lib/fixed/trial.h"
 
 #define MM (1 << 16)
 #define N_MM (1 << 16)
@@ -50,10 +52,32 @@ static void test_pulls_and_pushes(void **state)
 	}
 }
 
+/* The known answer of any compiler, a kernel's too: driver/kunit/fixed.c. */
+static void test_known_answer(void **state)
+{
+	const uint32_t n = 10000;
+	int32_t(*result)[5] = calloc(n, sizeof(*result));
+	uint64_t seed = 1;
+
+	assert_non_null(result);
+	for (uint32_t i = 0; i < n; i++) {
+		struct incise_fixed_spring spring;
+		int32_t p[3];
+
+		incise_fx_trial_spring(&seed, &spring, p);
+		result[i][4] = incise_fixed_spring_pull(&spring, p, &result[i][1]);
+	}
+	assert_int_equal(incise_fx_crc((const uint8_t *)result,
+				       n * (uint32_t)sizeof(*result)),
+			 INCISE_FX_TRIAL_SPRINGS);
+	free(result);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_pulls_and_pushes),
+		cmocka_unit_test(test_known_answer),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

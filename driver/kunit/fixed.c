@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: GPL-2.0-only
+/*
+ * The integer force model, as the kernel's compiler makes it: the same bits as in a
+ * program. Random inputs of lib/fixed/trial.h go in, a CRC-32C of all results comes out; a
+ * program (tests/vm/guest/fixed_bits.c) computes the same and hands over what it has found:
+ *
+ *   insmod incise_kunit.ko blob=MODEL.fx count=N seed=S digest=CRC
+ *
+ * Of each input: the evaluator's output, the force of the plane constraint, its stretch; 5 s32.
+ */
+#include <linux/crc32c.h>
+#include <linux/kernel_read_file.h>
+#include <linux/moduleparam.h>
+#include <linux/sched.h>
+#include <linux/vmalloc.h>
+
+#include "../../lib/fixed/trial.h"
+#include "fixed.h"
+
+static char *blob;
+module_param(blob, charp, 0);
+MODULE_PARM_DESC(blob, "Path of a compiled model");
+
+static unsigned int count;
+module_param(count, uint, 0);
+MODULE_PARM_DESC(count, "Random inputs");
+
+static unsigned long long seed;
+module_param(seed, ullong, 0);
+MODULE_PARM_DESC(seed, "Of the random inputs");
+
+static unsigned int digest;
+module_param(digest, uint, 0);
+MODULE_PARM_DESC(digest, "CRC-32C of all results, by a program");
+
+/* Without a model: n springs. */
+static u32 fixed_digest(const struct incise_fixed *fx, u32 n, u64 state)
+{
+	struct incise_fixed_spring spring;
+	s32 p[3], x[INCISE_FIXED_INPUTS_MAX];
+	u32 crc = ~0U, i;
+
+	for (i = 0; i < n; i++) {
+		s32 result[5] = {};
+
+		if (fx) {
+			incise_fx_trial_inputs(&state, fx, x);
+			result[0] = incise_fixed_eval(fx, x);
+		}
+		incise_fx_trial_spring(&state, &spring, p);
+		result[4] = incise_fixed_spring_pull(&spring, p, &result[1]);
+		crc = crc32c(crc, result, sizeof(result));
+		cond_resched();
+	}
+	return ~crc;
+}
+
+/* A known answer, which tests/unit/fixed/trial.c has too. */
+void fixed_springs(struct kunit *test)
+{
+	KUNIT_EXPECT_EQ(test, fixed_digest(NULL, 10000, 1), INCISE_FX_TRIAL_SPRINGS);
+}
+
+/* Its bytes, to be vfree()d; NULL: none were given, or a failure that was reported. */
+static u8 *fixed_blob(struct kunit *test, u32 *size)
+{
+	void *bytes = NULL;
+	ssize_t n;
+
+	if (!blob) {
+		kunit_mark_skipped(test, "no blob was given");
+		return NULL;
+	}
+	n = kernel_read_file_from_path(blob, 0, &bytes, INCISE_FIXED_SIZE_MAX, NULL,
+				       READING_FIRMWARE);
+	if (n < 0) {
+		KUNIT_FAIL(test, "the blob cannot be read");
+		return NULL;
+	}
+	*size = n;
+	return bytes;
+}
+
+void fixed_bits(struct kunit *test)
+{
+	struct incise_fixed fx;
+	u32 size;
+	u8 *bytes = fixed_blob(test, &size);
+
+	if (!bytes)
+		return;
+	if (incise_fixed_open(&fx, bytes, size))
+		KUNIT_FAIL(test, "the blob is refused");
+	else
+		KUNIT_EXPECT_EQ(test, fixed_digest(&fx, count, seed), digest);
+	vfree(bytes);
+}
+
+/* A blob with one bit changed anywhere is no blob. */
+void fixed_damage(struct kunit *test)
+{
+	struct incise_fixed fx;
+	unsigned int i, taken = 0;
+	u32 size, at;
+	u8 *bytes = fixed_blob(test, &size);
+
+	if (!bytes)
+		return;
+	for (i = 0; i < 200; i++) {
+		at = (u64)size * i / 200;
+		bytes[at] ^= 1 << i % 8;
+		taken += !incise_fixed_open(&fx, bytes, size);
+		bytes[at] ^= 1 << i % 8;
+	}
+	KUNIT_EXPECT_EQ(test, taken, 0U);
+	vfree(bytes);
+}
