@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * The config that a motor has from bind on: properties of its firmware node, see
- * Documentation/devicetree/bindings/misc/incise,stepper-gpio.yaml, and defaults for the
- * rest. A property that is there but cannot be read fails the bind. What this machine cannot hold is
- * brought to what it can, and said so: such a motor can be set up, but moves at no other
- * limits than the ones that GET_CONFIG shows.
+ * bindings/misc/incise,stepper-gpio.yaml, and defaults for the rest. A property that is
+ * there but cannot be read fails the bind. What this machine cannot hold is brought to what
+ * it can, and said so: such a motor can be set up, but moves at no other limits than the
+ * ones that GET_CONFIG shows.
  */
 #include <linux/device.h>
 #include <linux/kernel.h>
