@@ -364,7 +364,7 @@ read_mcap() {
 			assert max(off) < 1.5e-4, max(off)
 		END
 	done
-	incise export even.rec --resample --rate 100 -o a.csv
+	incise export even.rec --resample --rate 100 -o a.csv --overwrite
 	# by another delay, 100 ms longer, they are as they were
 	delay=$(sqlite3 line.rec/recording.db "SELECT delay_ns FROM streams WHERE name = 'tracker'")
 	echo "tracker_delay_ms = $(awk "BEGIN { print 100 + $delay / 1e6 }");" >back.conf

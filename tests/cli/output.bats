@@ -153,6 +153,28 @@ replaces_when_told() {
 	replaces_when_told report2/report.json calibrate force --from forces.csv -c k.conf --report report2
 }
 
+@test "a kept recording is replaced with --overwrite only, and by a whole one" {
+	delay="calibrate delay --rig sim:clock=simulated,motion=2 -c k.conf --keep k.rec"
+	incise $delay --time 12s >/dev/null </dev/null
+	before=$(content)
+	run --separate-stderr incise $delay --time 12s </dev/null
+	failed_with k.rec "exists already" "--overwrite"
+	run --separate-stderr incise $delay --rig none.conf --time 12s --overwrite </dev/null
+	failed_with none.conf
+	incise verify k.rec >/dev/null
+	[ "$(content)" = "$before" ] || complain "$(content)"
+	incise $delay --time 13s --overwrite >/dev/null </dev/null
+	[ "$(content)" != "$before" ]
+	incise verify k.rec >/dev/null
+	# nothing is left beside it, and what is no recording stays
+	[ "$(echo k.rec*)" = k.rec ]
+	mkdir other.rec
+	echo mine >other.rec/notes
+	run --separate-stderr incise capture -o other.rec --rig $quick --duration 1s --overwrite
+	failed_with other.rec "is no recording"
+	[ "$(cat other.rec/notes)" = mine ]
+}
+
 @test "pictures are replaced with --overwrite only" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed"
 	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" .

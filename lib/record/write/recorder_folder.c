@@ -75,15 +75,15 @@ int incise_recorder_make_folder(struct incise_recorder *rec, struct incise_error
 		return incise_error_set(
 			err, EEXIST,
 			"%s: exists already; record under another name, or "
-			"replace it with `incise capture --overwrite`",
+			"replace it with --overwrite",
 			rec->path);
 	if (mkdirat(rec->parent, part, 0777)) {
 		if (errno == EEXIST)
 			return incise_error_set(
 				err, EEXIST,
 				"%s: left by an interrupted recording, or being written; `incise "
-				"info` reads it; rename it, or drop it with `incise capture "
-				"--overwrite`",
+				"info` reads it; rename it, or drop it with "
+				"--overwrite",
 				rec->part);
 		return incise_error_set(err, errno, "%s: cannot be made: %s", rec->part,
 					strerror(errno));
