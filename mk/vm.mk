@@ -21,7 +21,7 @@ $(O)/tests/vm/%: tests/vm/guest/%.c $(guest_shared) $(guest_headers) \
 guest_model := $(O)/tests/vm/liver.fx
 $(guest_model): scenes/liver.fis $(O)/bin/incise $(O)/bin/incise-compile
 	@mkdir -p $(@D)
-	$(O)/bin/incise compile $< -o $@ >/dev/null
+	$(O)/bin/incise compile $< -o $@ --overwrite >/dev/null
 
 # Virtual time for whatever asserts on time, two processors for races.
 vm_boots := main:deterministic second:deterministic main:service main:smp
