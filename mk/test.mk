@@ -70,7 +70,7 @@ check_deps = mk/deps build check demo; \
 	mk/deps module || echo "going on without what checking the module needs"; \
 	mk/deps rtsan || echo "going on without RealtimeSanitizer"; \
 	mk/deps deb debian || echo "going on without what building packages needs"
-in_parts = +@set -e; $(check_deps); mkdir -p $(O); rm -rf $(times) $(times).d; status=0; \
+in_parts = +@set -e; $(check_deps); mkdir -p $(O); rm -rf $(times) $(times).logs; status=0; \
 	tests/timed $(times) whole $(MAKE) --no-print-directory check-parts $1 || status=$$?; \
 	tests/timed $(times); exit $$status
 

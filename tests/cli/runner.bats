@@ -99,7 +99,7 @@ $good" 0
 		skipped:
 		  first: view/draw: no screen
 		  second: no adapter (2 tests)
-		all that was printed: times.d/PART
+		all that was printed: times.logs/PART
 		4 passed, 3 failed, 3 skipped
 	END
 }
@@ -133,7 +133,7 @@ $good" 0
 @test "a program that is left running holds no part up" {
 	run -0 "$root/tests/timed" times left sh -c 'sleep 100 & echo $!'
 	kill "$output"
-	[ "$(cat times.d/left)" = "$output" ]
+	[ "$(cat times.logs/left)" = "$output" ]
 }
 
 # In a library of that name, as the driver of OpenGL is; made by the compiler of the tests.
