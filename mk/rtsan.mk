@@ -52,7 +52,7 @@ $(O)/obj/again/%.o: tests/unit/%.c
 	$(Q)$(rtsan_cc) -c $(test_cflags) -o $@ $<
 
 $(O)/again/tests/unit/scene/extreme: $(patsubst %,$(O)/obj/tests/extremes/%.o,\
-	extremes fed_run ground numbers plan) $(O)/obj/tools/cli/cli.o $(O)/obj/tools/cli/file.o
+	extremes fed_run ground numbers plan) $(addprefix $(O)/obj/tools/cli/,cli.o file.o output.o)
 $(O)/again/tests/unit/%: $(O)/obj/again/%.o $(O)/lib/libincise-rtsan.a
 	@mkdir -p $(@D)
 	$(call step,LD)
