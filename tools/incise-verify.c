@@ -36,6 +36,7 @@ struct sink {
 	json_t *list; /* NULL: lines */
 	const char *path;
 	uint64_t left_out;
+	uint64_t times; /* rows whose times are not to be trusted */
 };
 
 static json_t *known(int64_t value, bool is)
@@ -56,6 +57,7 @@ static json_t *as_json(const struct incise_verify_finding *finding)
 		[INCISE_VERIFY_UNVERIFIED] = "unverified",
 		[INCISE_VERIFY_DAMAGED] = "damaged",
 		[INCISE_VERIFY_ENDED] = "ended",
+		[INCISE_VERIFY_TIMES] = "times",
 	};
 	bool numbers = finding->last_seq >= finding->first_seq;
 	bool blocks = finding->first_block >= 0;
@@ -76,6 +78,8 @@ static void found(void *user, const struct incise_verify_finding *finding)
 {
 	struct sink *sink = user;
 
+	if (finding->kind == INCISE_VERIFY_TIMES)
+		sink->times += finding->count;
 	if (!sink->list) {
 		cli_progress_end();
 		printf("%s: %s\n", sink->path, finding->text);
@@ -203,6 +207,10 @@ int main(int argc, char **argv)
 			"%s: interrupted: its end is missing; what was committed is there "
 			"as it was written, %llu samples were lost",
 			sink.path, lost);
+	if (sink.times && !lost)
+		cli_fail("%s: %llu rows of the tracker have a time that is not to be "
+			 "trusted; what was committed is there as it was written",
+			 sink.path, (unsigned long long)sink.times);
 	if (!lost)
 		cli_fail(
 			"%s: a device was gone before it ended; what was committed is there "

@@ -28,6 +28,8 @@ enum incise_verify_kind {
 	INCISE_VERIFY_UNVERIFIED, /**< not checked, because a module is missing */
 	INCISE_VERIFY_DAMAGED,	  /**< SQLite cannot read it, or its pages do not agree */
 	INCISE_VERIFY_ENDED,	  /**< a device was gone before the recording ended */
+	INCISE_VERIFY_TIMES, /**< rows of the tracker whose t_ns is not to be trusted, by
+				  their arrivals; readers time them by these */
 };
 
 /** One finding and its place. */
@@ -91,7 +93,7 @@ struct incise_verify_watch {
 
 /**
  * Verify a recording, or what is left of an interrupted one, up to its last commit. Its
- * memory does not grow with the recording; a recording that is being written may be
+ * memory grows with the tracker's rows alone, 80 bytes each; a recording that is being written may be
  * verified too.
  *
  * @param path  as of incise_recording_open()

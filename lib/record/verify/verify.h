@@ -5,6 +5,7 @@
  *     verify.c          the recording as a whole: seals, pages, counts, the report
  *     verify_stream.c   one stream: its rows compared with its ledger
  *     verify_camera.c   the camera's file compared with its rows
+ *     verify_times.c    the tracker's times compared with its arrivals
  *     verify_finding.c  findings and progress
  */
 #ifndef INCISE_VERIFY_PRIVATE_H
@@ -39,6 +40,9 @@ int incise_verify_stream(struct incise_verification *verify,
 
 /* Verify the frames; fills report->frames. Returns as incise_verify_stream(). */
 int incise_verify_camera(struct incise_verification *verify);
+
+/* Report rows of the tracker whose times are not to be trusted. */
+void incise_verify_times(struct incise_verification *verify);
 
 /* An empty finding of a kind. */
 struct incise_verify_finding incise_verify_finding(enum incise_verify_kind kind);

@@ -45,7 +45,8 @@ void incise_verify_found(struct incise_verification *verify,
 	verify->report->unverified |= finding->kind == INCISE_VERIFY_UNVERIFIED;
 	verify->altered |= finding->kind != INCISE_VERIFY_LOST &&
 			   finding->kind != INCISE_VERIFY_INTERRUPTED &&
-			   finding->kind != INCISE_VERIFY_ENDED;
+			   finding->kind != INCISE_VERIFY_ENDED &&
+			   finding->kind != INCISE_VERIFY_TIMES;
 	if (verify->watch && verify->watch->found) {
 		/* The line is valid during the call: the caller's finding does not keep it. */
 		struct incise_verify_finding reported = *finding;

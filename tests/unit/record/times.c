@@ -347,7 +347,7 @@ static void losses_that_time_shows(void **state)
 			.hz = 120,
 			.ppm = 40,
 			.jitter_ms = 0.2,
-			.mutes = {{2 * S, 2 * S + lengths_ms[i] * MS}},
+			.mutes = {{1996 * MS, (1996 + lengths_ms[i]) * MS}},
 			.seconds = 5,
 		};
 
@@ -382,6 +382,72 @@ static void stalls_of_the_host(void **state)
 				 (int)lengths_ms[i], external ? ", external" : "");
 			hold(&s, external ? 30 : 3, name);
 		}
+}
+
+/* What verify finds about times: rows of which it says so. */
+static void count_times(void *user, const struct incise_verify_finding *finding)
+{
+	if (finding->kind == INCISE_VERIFY_TIMES) {
+		assert_true(finding->last_seq >= finding->first_seq);
+		*(uint64_t *)user += finding->count;
+	}
+}
+
+/* A recording of a rate that was not configured is none that is complete; all others are. */
+static void verify_says_so(void **state)
+{
+	static const struct {
+		struct scenario s;
+		bool complete;
+		int least, most; /* rows */
+	} cases[] = {
+		{{.hz = 120, .jitter_ms = 0.2, .seconds = 4}, true, 0, 0},
+		{{.hz = 60, .external = true, .jitter_ms = 0.2, .seconds = 4},
+		 true,
+		 0,
+		 0},
+		{{.hz = 120,
+		  .jitter_ms = 0.2,
+		  .stalls = {{2 * S, 2300 * MS}},
+		  .seconds = 4},
+		 true,
+		 0,
+		 0},
+		/* counted at once */
+		{{.hz = 120,
+		  .jitter_ms = 0.2,
+		  .mutes = {{2 * S, 2700 * MS}},
+		  .seconds = 4},
+		 false,
+		 0,
+		 0},
+		/* one, which is counted 0.5 s to 1 s later */
+		{{.hz = 120, .mutes = {{1996 * MS, 2004 * MS}}, .seconds = 4},
+		 false,
+		 60,
+		 120},
+		{{.hz = 240, .jitter_ms = 0.2, .seconds = 4}, false, 900, 970},
+		{{.hz = 120, .to_hz = 240, .jitter_ms = 0.2, .seconds = 4},
+		 false,
+		 450,
+		 720},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_verify_report report;
+		struct incise_error err = {0};
+		uint64_t rows = 0;
+		struct incise_verify_watch watch = {.found = count_times, .user = &rows};
+
+		capture(&cases[i].s);
+		if (incise_verify("a.rec", &watch, &report, &err))
+			fail_msg("%s", err.text);
+		if (report.complete != cases[i].complete || !report.intact ||
+		    (int)rows < cases[i].least || (int)rows > cases[i].most)
+			fail_msg("case %zu: %d rows, complete %d", i, (int)rows,
+				 report.complete);
+		assert_int_equal(system("rm -r a.rec"), 0);
+	}
 }
 
 static void another_rate(void **state)
@@ -477,9 +543,13 @@ static void no_time_is_worse_than_it_states(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		TEST(pulses_from_outside),    TEST(pulses_that_pause),
-		TEST(losses_that_time_shows), TEST(stalls_of_the_host),
-		TEST(another_rate),	      TEST(no_time_is_worse_than_it_states),
+		TEST(pulses_from_outside),
+		TEST(pulses_that_pause),
+		TEST(losses_that_time_shows),
+		TEST(stalls_of_the_host),
+		TEST(another_rate),
+		TEST(verify_says_so),
+		TEST(no_time_is_worse_than_it_states),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
