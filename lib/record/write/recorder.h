@@ -56,6 +56,17 @@ struct incise_recorder_stream {
 	char ended[200];	/* cause of the end; empty: it has not ended */
 };
 
+/* Windows of the tracker's records, by which its rate is compared with what it says. */
+struct incise_recorder_pace {
+	int64_t from_ns; /* arrival of the last record of the window before */
+	int64_t last_ns;
+	int n, together, close; /* in this window */
+	int odd;		/* windows in a row of another rate; */
+	double odd_ns;		/* of that, time of all */
+	bool even;		/* there was a window of the right rate */
+	bool noted;		/* there is an event for the present one */
+};
+
 /* Codes of the force channel while the tool is free. */
 struct incise_recorder_zero {
 	int64_t n, sum, sum2;
@@ -110,6 +121,7 @@ struct incise_recorder {
 	struct incise_depth depth;
 	struct incise_cut cut;
 	struct incise_recorder_zero zero;
+	struct incise_recorder_pace pace;
 	struct incise_recorder_pretrigger pretrigger;
 	struct incise_recorder_camera camera;
 	struct incise_recorder_disk disk;

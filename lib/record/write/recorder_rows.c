@@ -468,6 +468,93 @@ int incise_recorder_release(struct incise_recorder *rec, struct incise_error *er
 	return rc;
 }
 
+/*
+ * --- rate of the tracker -------------------------------------------------------------------
+ *
+ * A window of records is of a higher rate if it is shorter than it can be, and not because some
+ * were held up, as these arrive together; of a lower one if hardly any two are a period apart. One
+ * may be so by chance, and after a backlog of a slow line; PACE_ODD in a row are not.
+ */
+#define PACE 60
+#define PACE_ODD 4
+
+/* 1: the window ended, and is of another rate; 0: of the right one; -1: it is not over. */
+static int count_pace(struct incise_recorder_pace *pace, int64_t t_ns, double period_ns)
+{
+	double periods = (double)(t_ns - pace->last_ns) / period_ns, span_ns;
+	int odd;
+
+	if (!pace->last_ns)
+		pace->from_ns = t_ns;
+	else
+		pace->n++;
+	pace->together += pace->last_ns && periods < 0.25;
+	pace->close += periods >= 0.25 && periods < 1.1;
+	pace->last_ns = t_ns;
+	if (pace->n < PACE)
+		return -1;
+	span_ns = (double)(t_ns - pace->from_ns);
+	odd = pace->together <= PACE / 20 &&
+	      (span_ns < 0.9 * PACE * period_ns || pace->close <= PACE / 10);
+	pace->odd_ns = odd ? pace->odd_ns + span_ns : 0;
+	pace->odd = odd ? pace->odd + 1 : 0;
+	pace->from_ns = t_ns;
+	pace->n = pace->together = pace->close = 0;
+	return odd;
+}
+
+/*
+ * A rate that the tracker does not say it has: the end of its stream when it starts so, later an
+ * event, as what was recorded before is good. 0; -EIO: @why has the cause; or a disk error.
+ */
+static int check_pace(struct incise_recorder *rec, int64_t t_ns, struct incise_error *why,
+		      struct incise_error *err)
+{
+	const struct incise_tracker_info *info = &rec->tracker_info;
+	struct incise_recorder_pace *pace = &rec->pace;
+	double hz;
+	int odd;
+
+	if (info->external_sync || !(info->rate_hz > 0))
+		return 0;
+	odd = count_pace(pace, t_ns, 1e9 / info->rate_hz);
+	if (odd < 0)
+		return 0;
+	if (!odd) {
+		pace->even = true;
+		if (!pace->noted)
+			return 0;
+		pace->noted = false;
+		return incise_recorder_check(
+			rec,
+			incise_recorder_note(rec, "rate",
+					     "tracker: records arrive at %g Hz again",
+					     info->rate_hz),
+			err);
+	}
+	if (pace->odd < PACE_ODD || pace->noted)
+		return 0;
+	hz = pace->odd * PACE / pace->odd_ns * 1e9;
+	if (!pace->even) {
+		incise_error_set(
+			why, EIO,
+			"%s: sends %.0f records a second, and %g are expected; set "
+			"its rate and sync, or tracker_setup in rig.conf, and "
+			"begin again",
+			info->name, hz, info->rate_hz);
+		return -EIO;
+	}
+	pace->noted = true;
+	return incise_recorder_check(
+		rec,
+		incise_recorder_note(
+			rec, "rate",
+			"tracker: %.0f records arrive a second, and %g are "
+			"expected: do not trust their t_ns from %.1f s before",
+			hz, info->rate_hz, pace->odd_ns * 1e-9),
+		err);
+}
+
 /* --- samples of the devices ---------------------------------------------------------- */
 
 int incise_recorder_put_force(struct incise_recorder *rec,
@@ -529,7 +616,11 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 	/* One line through both parts would be wrong for either. */
 	if (sample->restarted)
 		incise_timeline_replug(&stream->timeline);
-	if (take_number(stream, sample->seq, sample->t_ns, &row.t_ns, &why))
+	rc = check_pace(rec, sample->t_ns, &why, err);
+	if (rc && !why.code)
+		return rc;
+	rc = 0;
+	if (why.code || take_number(stream, sample->seq, sample->t_ns, &row.t_ns, &why))
 		return incise_recorder_end_stream(rec, INCISE_LEDGER_TRACKER, why.text,
 						  err);
 	rec->zero.tracker_ns = row.t_ns;
