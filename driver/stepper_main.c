@@ -136,7 +136,7 @@ static int stepper_main_probe(struct platform_device *pdev)
 	if (kexec_crash_loaded())
 		dev_warn(
 			dev,
-			"a crash kernel is loaded: motors keep power in a panic without crash_kexec_post_notifiers\n");
+			"a panic leaves power on: crash kernel, no crash_kexec_post_notifiers\n");
 	dev_info(dev,
 		 "%s: %u motors, at most %u steps/s; timers late by %u ns, %u at most\n",
 		 dev_name(&stepper->dev), stepper->n_motors, stepper->info.rate_max,

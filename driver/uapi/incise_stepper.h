@@ -200,8 +200,9 @@ struct incise_stepper_controller {
  *
  * SET_CONFIG gives EBUSY while the motor is enabled, EINVAL for a value out of its range
  * and ERANGE for what this machine or a step cannot hold: velocity beyond info.rate_max,
- * tick_ns below info.tick_min_ns, high_ns or low_ns below info.pulse_ns, high_ns + low_ns longer than a step at velocity,
- * and a jerk so low that the profile would take more than 256 ticks for it.
+ * tick_ns below info.tick_min_ns, high_ns or low_ns below info.pulse_ns, high_ns + low_ns
+ * longer than a step at velocity, and a jerk so low that the profile would take more than 256
+ * ticks for it.
  */
 struct incise_stepper_config {
 	__u32 motor;
@@ -273,8 +274,8 @@ struct incise_stepper_sync {
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
 /*
  * A mask of motors, not 0: all get power or none does, and those that had it keep it. EPERM:
- * a fault is latched; EBUSY: an input forbids it, e-stop say, or it is still coming to rest; ERANGE: it stands outside of its position limits;
- * ESHUTDOWN: the machine goes down.
+ * a fault is latched; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
+ * ERANGE: it stands outside of its position limits; ESHUTDOWN: the machine goes down.
  */
 #define INCISE_STEPPER_ENABLE _IOW(INCISE_STEPPER_IOC, 3, __u32)
 /* Brings them to rest within the limits, then takes power away. Returns at once. */
