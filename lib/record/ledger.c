@@ -328,7 +328,7 @@ int incise_ledger_seal(sqlite3 *db, const char *table, struct incise_ledger_bloc
 	return sqlite3_finalize(stmt); /* reports a failed step too */
 }
 
-int incise_ledger_seal_head(int fd, struct incise_ledger_block *block)
+int incise_ledger_seal_file(int fd, int64_t length, struct incise_ledger_block *block)
 {
 	static const uint8_t cluster[] = {0x1f, 0x43, 0xb6,
 					  0x75}; /* its ID in Matroska */
@@ -349,6 +349,7 @@ int incise_ledger_seal_head(int fd, struct incise_ledger_block *block)
 	if (found)
 		n = found - head;
 	*block = (struct incise_ledger_block){
+		.last_seq = length,
 		.count = n,
 		.crc = incise_crc32c(0, head, n),
 	};

@@ -104,12 +104,12 @@ bool incise_ledger_same(const struct incise_ledger_block *a,
 /* --- seals ------------------------------------------------------------------------- */
 
 /*
- * Tables without blocks (they are rewritten while a recording goes on) and the head of
- * camera.mkv are sealed once, in the transaction that marks the recording complete, and sealed
+ * Tables without blocks (they are rewritten while a recording goes on) and the head and length
+ * of camera.mkv are sealed once, in the transaction that marks the recording complete, and sealed
  * again to verify it.
  */
 #define INCISE_LEDGER_TABLE "table:" /* and the name, as stream */
-#define INCISE_LEDGER_HEAD "file:camera.mkv"
+#define INCISE_LEDGER_FILE "file:camera.mkv"
 
 /* Names of the sealed tables; ends with NULL. */
 extern const char *const incise_ledger_sealed[];
@@ -125,9 +125,10 @@ extern const char *const incise_ledger_sealed[];
 int incise_ledger_seal(sqlite3 *db, const char *table, struct incise_ledger_block *block);
 
 /*
- * The entry of the head of camera.mkv, the bytes before its first frame, which a decoder
- * needs: count is bytes. The offset of @fd is not used. Returns 0 or a negative errno.
+ * The entry of camera.mkv: count is the bytes of its head, those before the first frame, which
+ * a decoder needs; last_seq is the length of the file, which is @length, 0 where it is not known.
+ * The offset of @fd is not used. Returns 0 or a negative errno.
  */
-int incise_ledger_seal_head(int fd, struct incise_ledger_block *block);
+int incise_ledger_seal_file(int fd, int64_t length, struct incise_ledger_block *block);
 
 #endif

@@ -113,10 +113,36 @@ tampered() {
 	failed_with "d.rec: not what was recorded"
 	[[ "$output" == *" missing in camera.mkv, numbers "* ]]
 
+	# its length is known: nothing behind its end, nothing less
+	for change in "printf x" "head -c 5000000 /dev/zero" "cat c.rec/camera.mkv"; do
+		cp c.rec/camera.mkv d.rec/camera.mkv
+		$change >>d.rec/camera.mkv
+		run --separate-stderr incise verify d.rec
+		failed_with "d.rec: not what was recorded"
+		[[ "$output" == *"d.rec: camera.mkv has $(stat -c %s d.rec/camera.mkv) bytes of $size"* ]] ||
+			complain "$change: $output"
+	done
+	cp c.rec/camera.mkv d.rec/camera.mkv
+	truncate -s -1 d.rec/camera.mkv
+	run --separate-stderr incise verify d.rec
+	failed_with "d.rec: not what was recorded"
+	[[ "$output" == *"d.rec: camera.mkv has $((size - 1)) bytes of $size"* ]]
+
 	rm d.rec/camera.mkv
 	run --separate-stderr incise verify d.rec
 	failed_with "d.rec: not what was recorded"
 	[[ "$output" == *"camera.mkv is missing, and $n pictures with it"* ]]
+}
+
+@test "verify takes nothing behind the last page of the database" {
+	for n in 1 4096 1000000; do
+		cp -r "$BATS_FILE_TMPDIR/good.rec" b.rec
+		head -c $n /dev/zero >>b.rec/recording.db
+		run --separate-stderr incise verify b.rec
+		[ "$status" -eq 1 ] || complain "$n bytes: $output"
+		[[ "$output$stderr" == *"recording.db"* ]]
+		rm -r b.rec
+	done
 }
 
 @test "verify without the module says that pictures are not verified" {

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include "../frames.h"
 #include "../schema.h"
@@ -66,6 +67,24 @@ static int check_pages(struct incise_verification *verify)
 	}
 	sqlite3_finalize(stmt);
 	return rc == SQLITE_INTERRUPT ? -ECANCELED : 0;
+}
+
+/* SQLite leaves alone what lies behind the pages that its header counts. */
+static void check_length(struct incise_verification *verify)
+{
+	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_DAMAGED);
+	int64_t bytes =
+		ask(verify, "PRAGMA page_size", 0) * ask(verify, "PRAGMA page_count", 0);
+	struct stat st;
+
+	/* With a log, pages may be in it alone; a copy of a locked one has no name. */
+	if (verify->report->interrupted ||
+	    stat(sqlite3_db_filename(verify->recording->db, "main"), &st))
+		return;
+	if (st.st_size > bytes)
+		incise_verify_found(verify, &found, "%s has %lld bytes of %lld",
+				    INCISE_SCHEMA_DB, (long long)st.st_size,
+				    (long long)bytes);
 }
 
 /* Table depth of an interrupted recording; a closed one has a seal of it. */
@@ -206,12 +225,13 @@ static void compare(struct incise_verification *verify, const char *stream,
 				    what, units);
 }
 
-static void check_head(struct incise_verification *verify)
+static void check_file(struct incise_verification *verify)
 {
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_DAMAGED);
 	struct incise_ledger_block made, entry;
+	struct stat st;
 	char *path;
-	int fd, rc;
+	int fd, rc, n;
 
 	if (asprintf(&path, "%s/" INCISE_FRAMES_FILE, verify->recording->path) < 0)
 		return;
@@ -219,20 +239,29 @@ static void check_head(struct incise_verification *verify)
 	free(path);
 	if (fd < 0) {
 		/* With frames, verify_camera.c reports that it is missing. */
-		if (read_entry(verify, INCISE_LEDGER_HEAD, &entry) && !verify->frames)
+		if (read_entry(verify, INCISE_LEDGER_FILE, &entry) && !verify->frames)
 			incise_verify_found(verify, &found,
 					    "camera: " INCISE_FRAMES_FILE " is missing");
 		return;
 	}
-	rc = incise_ledger_seal_head(fd, &made);
+	n = read_entry(verify, INCISE_LEDGER_FILE, &entry);
+	rc = fstat(fd, &st) ? -errno : 0;
+	if (!rc)
+		rc = incise_ledger_seal_file(fd, n == 1 ? entry.last_seq : 0, &made);
 	close(fd);
-	if (rc)
+	if (rc) {
 		incise_verify_found(verify, &found,
 				    INCISE_FRAMES_FILE " cannot be read: %s",
 				    strerror(-rc));
-	else
-		compare(verify, INCISE_LEDGER_HEAD, "the head of " INCISE_FRAMES_FILE,
-			"bytes", &made);
+		return;
+	}
+	compare(verify, INCISE_LEDGER_FILE, "the head of " INCISE_FRAMES_FILE, "bytes",
+		&made);
+	/* 0: made before the length was noted, or on a disk that hung. */
+	if (n == 1 && entry.last_seq && entry.last_seq != st.st_size)
+		incise_verify_found(verify, &found,
+				    INCISE_FRAMES_FILE " has %lld bytes of %lld",
+				    (long long)st.st_size, (long long)entry.last_seq);
 }
 
 /* Compare all seals of a closed recording. Returns 0 or -ECANCELED. */
@@ -254,7 +283,7 @@ static int check_seals(struct incise_verification *verify)
 		rc = incise_verify_progress(verify, false);
 	}
 	if (!rc && verify->camera)
-		check_head(verify);
+		check_file(verify);
 	return rc;
 }
 
@@ -341,6 +370,7 @@ int incise_verify(const char *path, const struct incise_verify_watch *watch,
 	}
 	if (!rc)
 		rc = check_pages(&verify);
+	check_length(&verify);
 	if (rc) {
 		rc = incise_error_set(err, ECANCELED, "%s: stopped; not verified", path);
 		goto out;

@@ -171,7 +171,8 @@ static int end_camera(struct incise_recorder *rec, struct incise_error *err)
 	rc = put_records(rec, err);
 	count(rec, &stats);
 	/* Frames that hang on a disk that does not answer are never reported: they have no row. */
-	if (stopped == -ETIMEDOUT)
+	rec->camera.given_up = stopped == -ETIMEDOUT;
+	if (rec->camera.given_up)
 		stream->device_lost = stats.lost + stats.read - stream->rows;
 	if (!rc && stopped && !*stream->ended)
 		rc = incise_recorder_end_stream(rec, INCISE_LEDGER_CAMERA, why.text, err);

@@ -92,6 +92,7 @@ struct incise_recorder_camera {
 	int64_t looked_ns; /* time of that check */
 	int64_t silent_ns; /* time without a new frame, counted between checks */
 	bool silent;	   /* there is an event for it */
+	bool given_up;	   /* its file is not closed: the disk hangs */
 };
 
 struct incise_recorder_disk {

@@ -15,6 +15,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include "../../base/vector.h"
 #include "../frames.h"
@@ -801,23 +802,28 @@ int incise_recorder_end_ledger(struct incise_recorder *rec)
 	return rc;
 }
 
-/* Seal the head of camera.mkv, if there is one. */
-static int seal_head(struct incise_recorder *rec)
+/* Seal camera.mkv, if there is one. */
+static int seal_file(struct incise_recorder *rec)
 {
 	struct incise_ledger_block block;
 	int fd = openat(rec->folder, INCISE_FRAMES_FILE, O_RDONLY | O_CLOEXEC);
+	struct stat st;
 	int rc;
 
 	if (fd < 0)
 		return errno == ENOENT ? SQLITE_OK : SQLITE_IOERR;
-	rc = incise_ledger_seal_head(fd, &block);
+	rc = fstat(fd, &st) ? -errno : 0;
+	/* A disk that hangs may yet write what its writer was left with. */
+	if (!rc)
+		rc = incise_ledger_seal_file(fd, rec->camera.given_up ? 0 : st.st_size,
+					     &block);
 	close(fd);
-	return rc ? SQLITE_IOERR : put_block(rec, INCISE_LEDGER_HEAD, &block);
+	return rc ? SQLITE_IOERR : put_block(rec, INCISE_LEDGER_FILE, &block);
 }
 
 int incise_recorder_seal(struct incise_recorder *rec)
 {
-	int rc = seal_head(rec);
+	int rc = seal_file(rec);
 
 	for (int i = 0; incise_ledger_sealed[i] && rc == SQLITE_OK; i++) {
 		struct incise_ledger_block block;

@@ -372,23 +372,23 @@ static void head_of_a_file(void **state)
 	int fd = open("file", O_RDWR | O_CREAT, 0600);
 
 	assert_true(fd >= 0);
-	assert_int_equal(incise_ledger_seal_head(fd, &block), 0); /* empty */
+	assert_int_equal(incise_ledger_seal_file(fd, 0, &block), 0); /* empty */
 	assert_true(!block.count && block.crc == with_fields(0, 0));
 	assert_int_equal(write(fd, file, sizeof(file)), sizeof(file));
-	assert_int_equal(incise_ledger_seal_head(fd, &block), 0);
+	assert_int_equal(incise_ledger_seal_file(fd, 0, &block), 0);
 	assert_true(block.count == 4);
 	assert_int_equal(block.crc, with_fields(incise_crc32c(0, "head", 4), 4));
 	assert_int_equal(pwrite(fd, "A", 1, 12), 1); /* in the cluster */
-	assert_int_equal(incise_ledger_seal_head(fd, &other), 0);
+	assert_int_equal(incise_ledger_seal_file(fd, 0, &other), 0);
 	assert_true(incise_ledger_same(&block, &other));
 	assert_int_equal(pwrite(fd, "H", 1, 0), 1);
-	assert_int_equal(incise_ledger_seal_head(fd, &other), 0);
+	assert_int_equal(incise_ledger_seal_file(fd, 0, &other), 0);
 	assert_false(incise_ledger_same(&block, &other));
 	assert_int_equal(ftruncate(fd, 3), 0); /* no cluster: all there is */
-	assert_int_equal(incise_ledger_seal_head(fd, &other), 0);
+	assert_int_equal(incise_ledger_seal_file(fd, 0, &other), 0);
 	assert_int_equal(other.count, 3);
 	close(fd);
-	assert_int_equal(incise_ledger_seal_head(fd, &other), -EBADF);
+	assert_int_equal(incise_ledger_seal_file(fd, 0, &other), -EBADF);
 }
 
 int main(void)

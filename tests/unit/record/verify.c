@@ -526,11 +526,11 @@ static void seal(bool whole)
 	change(DB, whole ? "UPDATE meta SET value = 1 WHERE key = 'complete'"
 			 : "UPDATE meta SET value = 0 WHERE key = 'complete'");
 	assert_true(fd >= 0);
-	assert_int_equal(incise_ledger_seal_head(fd, &block), 0);
+	assert_int_equal(incise_ledger_seal_file(fd, 0, &block), 0);
 	close(fd);
 	if (!whole)
 		return;
-	put_block(INCISE_LEDGER_HEAD, &block);
+	put_block(INCISE_LEDGER_FILE, &block);
 	for (int i = 0; incise_ledger_sealed[i]; i++) {
 		char stream[40];
 		sqlite3 *db;
