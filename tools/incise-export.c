@@ -15,7 +15,7 @@
 
 struct job {
 	const char *output;
-	bool json;
+	bool json, damaged;
 	int min_count; /* 0: not given */
 	int percent;   /* of the bar */
 	struct incise_calibration calibration;
@@ -75,6 +75,7 @@ static const struct cli_option options[] = {
 	 CLI_PARSED_BY(load_calibration)},
 	{0, "lineage", NULL, "begin a CSV with comments that tell where it is from",
 	 CLI_FLAG(struct job, how.provenance)},
+	RECORDING_DAMAGED(struct job, damaged),
 	{0, "json", NULL, "report as one JSON object; needs -o FILE",
 	 CLI_FLAG(struct job, json)},
 	{0},
@@ -114,8 +115,12 @@ static void export(char **paths, int n, const struct job *job,
 	struct incise_recording **recordings = cli_alloc(n, sizeof(*recordings));
 	struct incise_error err = {0};
 
-	for (int i = 0; i < n; i++)
+	for (int i = 0; i < n; i++) {
 		recordings[i] = recording_open(paths[i]);
+		recording_intact(paths[i], job->damaged, &err);
+		if (err.code)
+			cli_fail_with(&err);
+	}
 	if (incise_export(recordings, n, &job->how, job->output, report, &err))
 		cli_fail_with(&err);
 	cli_progress_end();

@@ -23,12 +23,13 @@
 #include "stepper/module.h"
 
 struct job {
-	bool json;
+	bool json, damaged;
 	const char *plot;
 };
 
 static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	RECORDING_DAMAGED(struct job, damaged),
 	{0, "plot", "NAME",
 	 "of a .fis: draw the membership functions and the force\n"
 	 "surface as NAME.png and NAME.svg",
@@ -283,12 +284,12 @@ static void show_compiled(const char *path, bool json)
 
 /* --- recordings ---------------------------------------------------------------------- */
 
-static void recording_json(const struct incise_recording_info *info)
+static void recording_json(const struct incise_recording_info *info, bool intact)
 {
 	json_print(json_pack(
-		"{so ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf} s{sf so sf} si sf sf}",
-		"streams", stream_json(info->streams, info->n_streams), "kind",
-		"recording", "complete", info->complete, "seconds",
+		"{sb so ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf} s{sf so sf} si sf sf}",
+		"intact", intact, "streams", stream_json(info->streams, info->n_streams),
+		"kind", "recording", "complete", info->complete, "seconds",
 		(info->end_ns - info->start_ns) * 1e-9, "started",
 		json_text(info->started), "rig", json_text(info->rig), "rows", "force",
 		(json_int_t)info->force, "tracker", (json_int_t)info->tracker, "depth",
@@ -324,19 +325,23 @@ static void recording_text(const char *path, const struct incise_recording_info 
 	stream_table(info->streams, info->n_streams);
 }
 
-static void show_recording(const char *path, bool json)
+static void show_recording(const char *path, bool json, bool damaged)
 {
 	struct incise_recording_info info;
 	struct incise_error err = {0};
 	struct incise_recording *recording = recording_open(path);
+	bool intact;
 
 	if (incise_recording_info(recording, &info, &err))
 		cli_fail_with(&err);
+	intact = recording_intact(path, damaged, &err);
 	if (json)
-		recording_json(&info);
+		recording_json(&info, intact);
 	else
 		recording_text(path, &info);
 	incise_recording_close(recording);
+	if (err.code)
+		cli_fail_with(&err);
 }
 
 /* --- devices on a bus ---------------------------------------------------------------- */
@@ -563,7 +568,7 @@ int main(int argc, char **argv)
 	} else if (is_bus(path)) {
 		show_bus(path, job.json);
 	} else if (is_recording(path)) {
-		show_recording(path, job.json);
+		show_recording(path, job.json, job.damaged);
 	} else {
 		check_exists(path);
 		if (compiled)

@@ -36,6 +36,24 @@ well_formed() {
 		END { exit bad || NR < 2 }' "$1"
 }
 
+@test "export of what is not as it was recorded needs --damaged, and says what is wrong" {
+	cp -r liver.rec/ altered.rec
+	sqlite3 altered.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 12345"
+	run --separate-stderr incise export liver.rec altered.rec -o a.csv
+	failed_with "altered.rec: is not what was recorded: force: "
+	[[ "$stderr" == *"; \`incise verify altered.rec\` says all; --damaged takes it as it is" ]]
+	[ ! -e a.csv ]
+	run -0 --separate-stderr incise export liver.rec altered.rec -o a.csv --damaged
+	[[ "$stderr" == "incise export: warning: altered.rec: is not what was recorded: force: "* ]]
+	[ -s a.csv ]
+	# what no block holds, and what is sealed
+	sqlite3 altered.rec/recording.db "UPDATE force SET code = code - 1 WHERE seq = 12345;
+		UPDATE depth SET depth_mm = 1 WHERE seq = 7"
+	run --separate-stderr incise export altered.rec -o b.csv
+	failed_with "altered.rec: is not what was recorded: table depth is altered"
+	[ ! -e b.csv ]
+}
+
 @test "export --help lists the options" {
 	run -0 --separate-stderr incise export --help
 	for option in --output --rate --average --by-cut --depth-max --velocity-max \
@@ -277,8 +295,8 @@ read_mcap() {
 		'\"quoted\" \\ ' || char(10) || ' é ' || CAST(x'ff' AS TEXT))"
 	# the line puts no record before the first force sample
 	sqlite3 short.rec/recording.db "UPDATE knots SET t_ns = t_ns + 1000000"
-	run -0 --separate-stderr incise export short.rec -o short.mcap
-	[ -z "$stderr" ]
+	run -0 --separate-stderr incise export short.rec -o short.mcap --damaged
+	[ "${#stderr_lines[@]}" -eq 1 ]
 	[[ "$output" == "short.mcap: "*" messages" ]]
 	read_mcap short.mcap >found.json
 	for table in force tracker depth events; do
@@ -326,14 +344,14 @@ read_mcap() {
 	cp -r liver.rec/ seen.rec
 	sqlite3 seen.rec/recording.db "DELETE FROM knots;
 		INSERT INTO frames SELECT seq, t_ns, t_ns, 0, 1, 0, 100.0, 0.5, depth_mm, 0.9 FROM depth"
-	incise export seen.rec liver.rec --resample --rate 50 -o a.csv
+	incise export seen.rec liver.rec --resample --rate 50 -o a.csv --damaged
 	[[ "$(head -n 1 a.csv)" == *,tracker_error,camera_depth_mm,camera_depth_sd_mm,camera_depth_u_mm,quality,low_quality ]]
 	# by the pictures as by the tracker; and none of what has no pictures
 	awk -F, 'NR > 1 && $1 == "seen" && $14 != "nan" { n++; if ($14 != $22 || $26) bad = 1 }
 		NR > 1 && $1 == "liver" && ($22 != "nan" || !$26) { bad = 1 }
 		END { exit bad || n < 2100 }' a.csv
 	echo 'depth_mm_px = 0.2375;' >twice.conf
-	incise export seen.rec --resample --rate 50 -c twice.conf --lineage -o b.csv
+	incise export seen.rec --resample --rate 50 -c twice.conf --lineage -o b.csv --damaged
 	awk -F, 'FNR > 1 && /^seen/ && $14 != "nan" { n++; d = $22 - 2 * $14; if (d > 2e-4 || d < -2e-4) bad = 1 }
 		END { exit bad || n < 2100 }' b.csv
 	grep -qx '# depth_mm_px: 0.2375' b.csv
@@ -349,8 +367,8 @@ read_mcap() {
 		seq > 0, seq, t_ns + 100000000, 1e5, seq = 0 FROM tracker
 		WHERE seq IN (0, (SELECT max(seq) FROM tracker))"
 	for how in "" --resample; do
-		incise export even.rec $how -o a.csv --overwrite
-		incise export line.rec $how -o b.csv --overwrite
+		incise export even.rec $how -o a.csv --overwrite --damaged
+		incise export line.rec $how -o b.csv --overwrite --damaged
 		python3 - <<-'END'
 			import csv
 			def depth(path):
@@ -364,11 +382,11 @@ read_mcap() {
 			assert max(off) < 1.5e-4, max(off)
 		END
 	done
-	incise export even.rec --resample --rate 100 -o a.csv --overwrite
+	incise export even.rec --resample --rate 100 -o a.csv --overwrite --damaged
 	# by another delay, 100 ms longer, they are as they were
 	delay=$(sqlite3 line.rec/recording.db "SELECT delay_ns FROM streams WHERE name = 'tracker'")
 	echo "tracker_delay_ms = $(awk "BEGIN { print 100 + $delay / 1e6 }");" >back.conf
-	incise export line.rec --resample --rate 100 -c back.conf -o c.csv
+	incise export line.rec --resample --rate 100 -c back.conf -o c.csv --damaged
 	paste -d, a.csv c.csv | awk -F, 'NR > 20 && $14 != "nan" && $35 != "nan" {
 		n++; d = $14 - $35; if (d > 1.5e-4 || d < -1.5e-4) bad = 1 } END { exit bad || n < 4000 }'
 }

@@ -11,6 +11,7 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <incise/verify.h>
 #include "cli.h"
 #include "recording.h"
 
@@ -19,6 +20,56 @@ struct incise_recording *recording_open(const char *path)
 	struct incise_error err = {0};
 
 	return cli_require(incise_recording_open(path, &err), &err);
+}
+
+struct first {
+	bool found;
+	char text[300];
+};
+
+/* Keep the first finding that is no loss, which was counted when it was recorded. */
+static void find_first(void *user, const struct incise_verify_finding *finding)
+{
+	struct first *first = user;
+
+	switch (finding->kind) {
+	case INCISE_VERIFY_ALTERED:
+	case INCISE_VERIFY_LEDGER:
+	case INCISE_VERIFY_EXTRA:
+	case INCISE_VERIFY_COUNT:
+	case INCISE_VERIFY_DAMAGED:
+		if (!first->found)
+			snprintf(first->text, sizeof(first->text), "%s", finding->text);
+		first->found = true;
+		break;
+	default:
+		break;
+	}
+}
+
+bool recording_intact(const char *path, bool damaged, struct incise_error *err)
+{
+	struct first first = {0};
+	const struct incise_verify_watch watch = {.found = find_first, .user = &first};
+	struct incise_verify_report report;
+	int rc = incise_verify_rows(path, &watch, &report, err);
+
+	if (rc == -ENODATA) {
+		*err = (struct incise_error){0};
+		return true;
+	}
+	if (rc)
+		return false;
+	if (!first.found)
+		return true;
+	if (damaged)
+		cli_warn("%s: is not what was recorded: %s", path, first.text);
+	else
+		incise_error_set(err, EINVAL,
+				 "%s: is not what was recorded: %s; `incise verify %s` "
+				 "says all; --damaged takes it as it is",
+				 path, first.text, path);
+	return false;
 }
 
 void recording_remove(const char *path)

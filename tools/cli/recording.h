@@ -6,10 +6,26 @@
 #ifndef INCISE_TOOLS_RECORDING_H
 #define INCISE_TOOLS_RECORDING_H
 
+#include <stdbool.h>
 #include <incise/recording.h>
 
 /* Open one. */
 struct incise_recording *recording_open(const char *path);
+
+/* Row of the table of options for --damaged, a bool. */
+#define RECORDING_DAMAGED(type, member)                                             \
+	{                                                                           \
+		0, "damaged", NULL,                                                 \
+			"take a recording that is not what was recorded, as it is", \
+			CLI_FLAG(type, member)                                      \
+	}
+
+/*
+ * Whether the rows of a recording are those that were recorded, by its ledger. If not, says what
+ * is wrong first: as a warning with @damaged, else as an error in @err, for a caller that fails
+ * the program with it. A recording from before there was a ledger is taken as it is.
+ */
+bool recording_intact(const char *path, bool damaged, struct incise_error *err);
 
 /* Remove a recording; a folder with anything else in it stays. */
 void recording_remove(const char *path);

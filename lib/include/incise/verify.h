@@ -106,5 +106,14 @@ INCISE_API int incise_verify(const char *path, const struct incise_verify_watch 
 			     struct incise_verify_report *report,
 			     struct incise_error *err);
 
+/**
+ * The same for what a program is about to read: the rows, their ledger and the seals of the
+ * tables, but neither camera.mkv nor SQLite's own check of every page. report->frames is 0.
+ */
+INCISE_API int incise_verify_rows(const char *path,
+				  const struct incise_verify_watch *watch,
+				  struct incise_verify_report *report,
+				  struct incise_error *err);
+
 INCISE_END_DECLS
 #endif
