@@ -126,7 +126,6 @@ static void free_series(struct stepper_series *series)
 
 struct reader {
 	const char *path;
-	FILE *in;
 	int line, columns, position, steps, force, time; /* -1: no such column */
 	double mm, counted; /* largest travel in both columns */
 	double first_mm, first_steps;
@@ -162,7 +161,7 @@ static double number(const struct reader *r, char **columns, int i, const char *
 
 	if (i < 0)
 		return NAN;
-	value = strtod(columns[i], &end);
+	value = incise_decimal(columns[i], &end);
 	if (!*columns[i] || *end || !isfinite(value))
 		cli_fail("%s:%d: %s is '%.20s' and not a number", r->path, r->line, name,
 			 columns[i]);
@@ -204,15 +203,13 @@ static void read_point(struct reader *r, char **columns, struct stepper_series *
 
 static void read_series(struct stepper_series *series, const char *path, double step_mm)
 {
-	struct reader r = {.path = path, .in = fopen(path, "re")};
-	char *line = NULL, *columns[COLUMNS];
+	struct reader r = {.path = path};
+	char *line, *columns[COLUMNS];
+	struct incise_infile *in = calibrate_open(path);
 	bool header = true;
-	size_t size = 0;
 
 	*series = (struct stepper_series){0};
-	if (!r.in)
-		cli_fail("%s: %s", path, strerror(errno));
-	while (getline(&line, &size, r.in) >= 0) {
+	while (calibrate_line(in, &line)) {
 		int n;
 
 		r.line++;
@@ -230,10 +227,7 @@ static void read_series(struct stepper_series *series, const char *path, double 
 				 r.line, n, r.columns);
 		read_point(&r, columns, series);
 	}
-	if (ferror(r.in))
-		cli_fail("%s: %s", path, strerror(errno));
-	fclose(r.in);
-	free(line);
+	incise_infile_close(in);
 	if (!series->n)
 		cli_fail("%s: no points in it", path);
 	if (r.counted > 0 && r.position >= 0)

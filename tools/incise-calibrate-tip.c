@@ -138,15 +138,12 @@ static void find_columns(const char *path, char **fields, int n, int at[COLUMNS]
 
 static void read_csv(struct list *list, const char *path)
 {
-	FILE *file = fopen(path, "re");
-	char *line = NULL, *fields[CSV_MAX];
+	struct incise_infile *in = calibrate_open(path);
+	char *line, *fields[CSV_MAX];
 	int at[COLUMNS], number = 0;
 	bool header = false;
-	size_t size = 0;
 
-	if (!file)
-		cli_fail("%s: %s", path, strerror(errno));
-	while (getline(&line, &size, file) >= 0) {
+	while (calibrate_line(in, &line)) {
 		int n;
 
 		number++;
@@ -168,7 +165,7 @@ static void read_csv(struct list *list, const char *path)
 			if (at[c] >= n)
 				cli_fail("%s: line %d: '%s' is missing", path, number,
 					 names[c]);
-			values[c] = strtod(fields[at[c]], &end);
+			values[c] = incise_decimal(fields[at[c]], &end);
 			if (end == fields[at[c]] || end[strspn(end, " \t")] ||
 			    !isfinite(values[c]) || (!c && fabs(values[c]) > 1e9))
 				cli_fail("%s: line %d: %s: '%s' is no number", path,
@@ -180,10 +177,7 @@ static void read_csv(struct list *list, const char *path)
 		memcpy(pose->position_mm, values + 1, sizeof(pose->position_mm));
 		memcpy(pose->quaternion, values + 4, sizeof(pose->quaternion));
 	}
-	if (ferror(file))
-		cli_fail("%s: %s", path, strerror(errno));
-	free(line);
-	fclose(file);
+	incise_infile_close(in);
 }
 
 static void read_poses(struct list *list, const char *path)

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/fixed.h>
+#include <incise/infile.h>
 #include <incise/model.h>
 #include "cli/cli.h"
 #include "cli/json.h"
@@ -25,7 +26,7 @@ static void parse_budget(void *budget, char *text)
 		double scale;
 	} units[] = {{"", 1}, {"N", 1}, {"mN", 1e-3}, {"uN", 1e-6}, {"µN", 1e-6}};
 	char *end;
-	double value = strtod(text, &end);
+	double value = incise_decimal(text, &end);
 
 	for (size_t i = 0; i < sizeof(units) / sizeof(*units) && end != text; i++) {
 		if (strcmp(end, units[i].unit))

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/fixed.h>
+#include <incise/infile.h>
 #include <incise/model.h>
 #include <incise/uncertainty.h>
 #include "cli/cli.h"
@@ -117,7 +118,7 @@ static void parse_line(const struct evaluator *e, const char *path, unsigned lon
 		char *end;
 
 		at += strspn(at, " \t,;");
-		x[i] = strtod(at, &end);
+		x[i] = incise_decimal(at, &end);
 		if (end == at)
 			cli_fail(
 				"%s:%lu: column %d (%s): '%.20s' is not a number; a line needs "
@@ -131,31 +132,6 @@ static void parse_line(const struct evaluator *e, const char *path, unsigned lon
 	if (at[strspn(at, " \t,;")])
 		cli_fail("%s:%lu: column %d: '%.20s': a line needs just %d numbers", path,
 			 line, n + 1, at + strspn(at, " \t,;"), n);
-}
-
-static void eval_stream(struct evaluator *e, FILE *in, const char *path)
-{
-	double x[INCISE_MODEL_INPUTS_MAX];
-	unsigned long line = 0;
-	char *text = NULL;
-	size_t size = 0;
-	ssize_t n;
-
-	while ((n = getline(&text, &size, in)) >= 0) {
-		line++;
-		if (memchr(text, 0, n))
-			cli_fail("%s:%lu: a NUL byte: not a text file", path, line);
-		while (n > 0 && strchr("\r\n", text[n - 1]))
-			text[--n] = 0;
-		if (!text[strspn(text, " \t")] || *text == '#')
-			continue;
-		parse_line(e, path, line, text, x);
-		evaluate(e, x, false);
-	}
-	/* getline(3) fails without memory, too. */
-	if (!feof(in))
-		cli_fail("%s: %s", path, strerror(errno));
-	free(text);
 }
 
 static void load_uncertainty(struct evaluator *e, const char *model)
@@ -244,15 +220,32 @@ static void open_model(struct evaluator *e, const char *path, const char *arith,
 
 static void eval_file(struct evaluator *e, const char *path)
 {
-	bool named = strcmp(path, "-");
-	FILE *in = named ? fopen(path, "re") : stdin;
+	/* Of any size: no line is kept. */
+	static const struct incise_infile_kind points = {
+		.name = "a file of points",
+		.advice = "give a file of lines 'depth velocity'",
+	};
+	const char *name = strcmp(path, "-") ? path : "standard input";
+	double x[INCISE_MODEL_INPUTS_MAX];
+	struct incise_error err = {0};
+	struct incise_infile *in;
+	unsigned long line = 0;
+	char *text;
+	int rc;
 
-	if (!in)
-		cli_fail("%s: %s; give a file of lines 'depth velocity'", path,
-			 strerror(errno));
-	eval_stream(e, in, named ? path : "standard input");
-	if (named)
-		fclose(in);
+	in = cli_require(incise_infile_open(path, &points, &err), &err);
+	while ((rc = incise_infile_line(in, &text, &err)) > 0) {
+		line++;
+		for (size_t n = strlen(text); n && text[n - 1] == '\r';)
+			text[--n] = 0;
+		if (!text[strspn(text, " \t")] || *text == '#')
+			continue;
+		parse_line(e, name, line, text, x);
+		evaluate(e, x, false);
+	}
+	if (rc)
+		cli_fail_with(&err);
+	incise_infile_close(in);
 }
 
 static void parse(struct job *job, int argc, char **argv)

@@ -15,6 +15,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <libconfig.h>
 #include <incise/calibration.h>
@@ -608,12 +609,19 @@ int incise_calibration_raw(struct incise_calibration_record *record, const char 
 			   struct incise_error *err)
 {
 	const char *name = strrchr(path, '/');
-	FILE *in = fopen(path, "re");
 	char bytes[4096];
 	uint32_t crc = 0;
+	struct stat st;
+	FILE *in;
 	size_t n;
 	int rc = 0;
 
+	/* A pipe has been read, and does not return its bytes again. */
+	if (!stat(path, &st) && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode)) {
+		*record->raw = '\0';
+		return 0;
+	}
+	in = fopen(path, "re");
 	if (!in)
 		return incise_error_set(err, errno, "%.200s: cannot be read: %s", path,
 					strerror(errno));

@@ -9,11 +9,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
+#include <incise/infile.h>
 #include "conf.h"
 #include "vector.h"
-
-#define FILE_MAX (4 << 20)
 
 /* "sim.seed": the setting's name with those of the groups around it. */
 static void setting_name(const config_setting_t *setting, const char *key, char *name,
@@ -141,53 +139,21 @@ static int parse(config_t *config, const char *path, FILE *stream,
 	return rc;
 }
 
-static int unreadable(const char *path, int code, const char *why,
-		      struct incise_error *err)
-{
-	return incise_error_set(err, code,
-				"%.200s: cannot be read: %s; give the path of a "
-				"configuration file",
-				path, why);
-}
-
-/* The content of a file, to be freed. */
-static int read_all(const char *path, char **text, size_t *size, struct incise_error *err)
-{
-	FILE *file = fopen(path, "re");
-	int code = 0;
-
-	if (!file)
-		return unreadable(path, errno, strerror(errno), err);
-	*text = malloc(FILE_MAX + 1);
-	*size = *text ? fread(*text, 1, FILE_MAX + 1, file) : 0;
-	if (!*text || ferror(file))
-		code = errno;
-	else if (*size > FILE_MAX)
-		code = EFBIG;
-	fclose(file);
-	if (!code)
-		return 0;
-	free(*text);
-	return unreadable(path, code, strerror(code), err);
-}
-
 int incise_conf_read(config_t *config, const char *path, struct incise_error *err)
 {
-	struct stat st;
+	static const struct incise_infile_kind kind = {
+		.name = "a configuration file",
+		.advice = "give the path of a configuration file",
+		.size_max = 4 << 20,
+		.regular = true,
+	};
+	size_t size;
+	char *text = incise_infile_read(path, &kind, &size, err);
 	FILE *stream;
-	char *text = NULL;
-	size_t size = 0;
-	int rc, line;
+	int rc = 0, line;
 
-	/* On a pipe reading would wait. */
-	if (!stat(path, &st) && !S_ISREG(st.st_mode))
-		return unreadable(path, S_ISDIR(st.st_mode) ? EISDIR : EINVAL,
-				  S_ISDIR(st.st_mode) ? strerror(EISDIR)
-						      : "not a regular file",
-				  err);
-	rc = read_all(path, &text, &size, err);
-	if (rc)
-		return rc;
+	if (!text)
+		return -errno;
 	/* The parser ends the process where a disk fails to read; memory does not fail. */
 	stream = fmemopen(text, size, "r");
 	line = stream ? include_line(stream) : 0;
@@ -197,7 +163,7 @@ int incise_conf_read(config_t *config, const char *path, struct incise_error *er
 				      "all in one file",
 				      path, line);
 	else if (!stream || fseek(stream, 0, SEEK_SET))
-		rc = unreadable(path, ENOMEM, strerror(ENOMEM), err);
+		rc = incise_error_set(err, ENOMEM, "%.200s: no memory to read it", path);
 	else
 		rc = parse(config, path, stream, err);
 	if (stream)

@@ -8,54 +8,23 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
+#include <incise/infile.h>
 #include "c_locale.h"
 #include "text.h"
 
 int text_open(struct text *text, const char *path, struct incise_error *err)
 {
-	size_t capacity = 1 << 16, size = 0, got;
-	struct stat st;
-	FILE *stream;
-	int rc = 0;
+	static const struct incise_infile_kind mesh = {
+		.name = "a mesh or height grid",
+		.size_max = (uint64_t)1 << 31,
+		.regular = true,
+	};
+	size_t size;
 
 	*text = (struct text){.path = path, .line = 1};
-	/* A pipe or a device may never end. */
-	if (!stat(path, &st) && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode))
-		return incise_error_set(err, EINVAL, "%s: not a regular file", path);
-	stream = fopen(path, "re");
-	if (!stream)
-		return incise_error_set(err, errno, "%s: %s", path, strerror(errno));
-	text->data = malloc(capacity + 1);
-	while (text->data &&
-	       (got = fread(text->data + size, 1, capacity - size, stream))) {
-		char *more;
-
-		size += got;
-		if (size < capacity)
-			continue;
-		if (size > TEXT_SIZE_MAX) {
-			rc = incise_error_set(err, EFBIG, "%s: larger than %zu MB", path,
-					      TEXT_SIZE_MAX >> 20);
-			break;
-		}
-		capacity *= 2;
-		more = realloc(text->data, capacity + 1);
-		if (!more)
-			free(text->data);
-		text->data = more;
-	}
-	if (!rc && !text->data)
-		rc = incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
-	else if (!rc && ferror(stream))
-		rc = incise_error_set(err, errno ? errno : EIO, "%s: %s", path,
-				      strerror(errno ? errno : EIO));
-	fclose(stream);
-	if (rc) {
-		text_close(text);
-		return rc;
-	}
-	text->data[size] = '\0';
+	text->data = incise_infile_read(path, &mesh, &size, err);
+	if (!text->data)
+		return -errno;
 	text->at = text->data;
 	text->end = text->data + size;
 	return 0;

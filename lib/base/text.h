@@ -10,8 +10,6 @@
 #include <stddef.h>
 #include <incise/error.h>
 
-#define TEXT_SIZE_MAX ((size_t)1 << 31) /* bytes of a file */
-
 struct text {
 	const char *path;
 	char *data; /* with a NUL behind its end */
@@ -19,7 +17,7 @@ struct text {
 	int line; /* of @at, from 1 */
 };
 
-/* 0; errno of fopen(3) and read(2), EFBIG, ENOMEM. @path must outlive the text. */
+/* 0; a negative errno of incise_infile_read(). @path must outlive the text. */
 int text_open(struct text *text, const char *path, struct incise_error *err);
 void text_close(struct text *text);
 

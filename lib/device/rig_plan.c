@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/infile.h>
 #include <incise/rig.h>
 #include "../base/c_locale.h"
 #include "../base/conf.h"
@@ -572,7 +573,7 @@ static int plan_word(struct incise_rig_plan *plan, char *word, struct incise_err
 	if (!strcmp(word, "clock"))
 		return plan_clock(plan, where, value, err);
 	locale = incise_c_locale_begin();
-	number = strtod(value, &end);
+	number = incise_decimal(value, &end);
 	incise_c_locale_end(locale);
 	if (*end)
 		return incise_error_set(

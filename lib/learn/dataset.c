@@ -113,7 +113,7 @@ static int number(struct reader *in, int field, const char *column, double *valu
 	const char *text = in->field[field];
 	char *end;
 
-	*value = strtod(text, &end);
+	*value = incise_decimal(text, &end);
 	if (end == text || end[strspn(end, " \t")])
 		return incise_lines_error(&in->lines, EINVAL,
 					  "column %d (%s): '%.40s' is not a number",
@@ -224,6 +224,11 @@ struct incise_dataset *incise_dataset_read(const char *path, const char *const *
 					   int n, const char *group,
 					   struct incise_error *err)
 {
+	/* Of any size: only the columns that are asked for are kept. */
+	static const struct incise_infile_kind csv = {
+		.name = "a CSV file",
+		.advice = "give a CSV file with a header row",
+	};
 	struct incise_dataset *data = calloc(1, sizeof(*data));
 	struct reader in;
 	int rc;
@@ -235,8 +240,7 @@ struct incise_dataset *incise_dataset_read(const char *path, const char *const *
 		return NULL;
 	}
 	data->columns = n;
-	rc = incise_lines_open(&in.lines, path, "a CSV file",
-			       "give a CSV file with a header row", err);
+	rc = incise_lines_open(&in.lines, path, &csv, err);
 	if (!rc) {
 		rc = read_rows(&in, columns, group, data);
 		incise_lines_close(&in.lines);

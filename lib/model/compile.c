@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/fixed.h>
+#include <incise/infile.h>
 #include <incise/outfile.h>
 #include "../fixed/layout.h"
 #include "model_grid.h"
@@ -649,41 +650,35 @@ out:
 
 struct incise_fixed *incise_fixed_load(const char *path, struct incise_error *err)
 {
-	FILE *file = strcmp(path, "-") ? fopen(path, "re") : stdin;
-	struct compiled *owned = NULL;
-	size_t size = 0;
+	static const struct incise_infile_kind kind = {
+		.name = "a .fx file",
+		.advice = "give a .fx file of incise compile",
+		.size_max = INCISE_FIXED_SIZE_MAX,
+	};
+	struct compiled *owned;
+	size_t size;
+	char *bytes = incise_infile_read(path, &kind, &size, err);
 	int rc = -ENOMEM;
 
-	if (!file) {
-		incise_error_set(err, errno, "%s: %s; give a .fx file of incise compile",
-				 path, strerror(errno));
+	if (!bytes)
 		return NULL;
-	}
-	/* One byte more than the largest: then it is too large. */
-	owned = malloc(sizeof(*owned) + INCISE_FIXED_SIZE_MAX + 8);
+	owned = malloc(sizeof(*owned) + size);
 	if (owned) {
-		size = fread(owned->blob, 1, INCISE_FIXED_SIZE_MAX + 1, file);
-		rc = ferror(file)
-			     ? -errno
-			     : incise_fixed_open(&owned->fx, owned->blob, (uint32_t)size);
+		memcpy(owned->blob, bytes, size);
+		rc = incise_fixed_open(&owned->fx, owned->blob, (uint32_t)size);
 	}
-	if (file != stdin)
-		fclose(file);
-	if (rc) {
-		free(owned);
-		incise_error_set(
-			err, -rc,
-			rc == -EINVAL ? "%s: not a .fx file, or a damaged one; "
-					"compile the model again"
-			: rc == -ENOTSUP
-				? "%s: a .fx file of another version; compile "
-				  "the model again"
-				: "%s: cannot be read; give a .fx file of incise "
-				  "compile",
-			path);
-		return NULL;
-	}
-	return &owned->fx;
+	free(bytes);
+	if (!rc)
+		return &owned->fx;
+	free(owned);
+	incise_error_set(err, -rc,
+			 rc == -EINVAL	  ? "%s: not a .fx file, or a damaged one; "
+					    "compile the model again"
+			 : rc == -ENOTSUP ? "%s: a .fx file of another version; compile "
+					    "the model again"
+					  : "%s: no memory to read it",
+			 path);
+	return NULL;
 }
 
 int incise_fixed_save(const struct incise_fixed *fx, const char *path,

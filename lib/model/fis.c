@@ -81,7 +81,7 @@ static int read_numbers(struct reader *in, const char *text, double *values, int
 	for (int i = 0; i < n; i++) {
 		char *end;
 
-		values[i] = strtod(text, &end);
+		values[i] = incise_decimal(text, &end);
 		if (end == text)
 			return fail(
 				in, EINVAL,
@@ -340,7 +340,7 @@ static int read_rule(struct reader *in)
 	if (*text++ != '(')
 		return fail(in, EINVAL, "rule %d: expected a weight in parentheses",
 			    model->info.n_rules + 1);
-	rule->weight = strtod(text, &end);
+	rule->weight = incise_decimal(text, &end);
 	if (end == text || *end != ')' || !(rule->weight >= 0 && rule->weight <= 1))
 		return fail(in, EINVAL, "rule %d: expected a weight from 0 to 1",
 			    model->info.n_rules + 1);
@@ -439,6 +439,12 @@ static int read_file(struct reader *in)
 
 struct incise_model *incise_model_load(const char *path, struct incise_error *err)
 {
+	/* 256 rules and 512 functions are less than 100 kB; comments may be longer. */
+	static const struct incise_infile_kind fis = {
+		.name = "a .fis file",
+		.advice = "give a .fis file",
+		.size_max = 16 << 20,
+	};
 	struct reader *in = calloc(1, sizeof(*in));
 	struct incise_model *model = calloc(1, sizeof(*model));
 	int rc;
@@ -449,7 +455,7 @@ struct incise_model *incise_model_load(const char *path, struct incise_error *er
 	}
 	in->model = model;
 	model->clamp = true;
-	rc = incise_lines_open(&in->lines, path, "a .fis file", "give a .fis file", err);
+	rc = incise_lines_open(&in->lines, path, &fis, err);
 	if (rc)
 		goto out;
 	rc = read_file(in);

@@ -227,7 +227,7 @@ static int number(struct incise_lines *in, char **at, double *value)
 {
 	char *end;
 
-	*value = strtod(*at, &end);
+	*value = incise_decimal(*at, &end);
 	if (end == *at || (*end && *end != ' '))
 		return fail(in, EINVAL, "'%.30s' is not a number", *at);
 	if (!isfinite(*value))
@@ -314,6 +314,12 @@ struct incise_uncertainty *incise_uncertainty_load(const char *path,
 						   const struct incise_model *model,
 						   struct incise_error *err)
 {
+	/* 2304 unknowns, half of a matrix in 25 bytes a number, are 66 MB. */
+	static const struct incise_infile_kind sd = {
+		.name = "a .sd file",
+		.advice = "it lies beside a model that 'incise train' wrote",
+		.size_max = 128 << 20,
+	};
 	struct incise_uncertainty *u = make(model);
 	struct incise_lines in;
 	int rc;
@@ -322,10 +328,8 @@ struct incise_uncertainty *incise_uncertainty_load(const char *path,
 		incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
 		return NULL;
 	}
-	rc = incise_lines_open(&in, path, "a .sd file",
-			       "it lies beside a model that 'incise train' wrote", err);
+	rc = incise_lines_open(&in, path, &sd, err);
 	if (!rc) {
-		in.hint = NULL;
 		rc = read_file(&in, u);
 		incise_lines_close(&in);
 	}

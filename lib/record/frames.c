@@ -5,6 +5,7 @@
  * The module is not unloaded: libavcodec leaves destructors in the threads that used it.
  */
 #include <errno.h>
+#include <sys/stat.h>
 #include "../device/module.h"
 #include "frames.h"
 
@@ -51,7 +52,13 @@ struct incise_frames_reader *incise_frames_reader_new(const char *path,
 						      struct incise_error *err)
 {
 	const struct incise_frames_module *module = load(err);
+	struct stat st;
 
+	/* libavformat would wait for a pipe. */
+	if (!stat(path, &st) && !S_ISREG(st.st_mode)) {
+		incise_error_set(err, EINVAL, "%.300s: not a regular file", path);
+		return NULL;
+	}
 	return module ? module->open(path, err) : NULL;
 }
 

@@ -96,7 +96,7 @@ struct incise_surface *incise_surface_new_capsule(const double a_mm[3],
  *
  * @param path   file
  * @param at_mm  added to all its coordinates
- * @return surface, to be freed with incise_surface_free(); NULL with errno of fopen(3),
+ * @return surface, to be freed with incise_surface_free(); NULL with errno of incise_infile_open(),
  *         EINVAL (malformed, no triangle, a triangle less than 1e-9 mm high, an edge with
  *         more than two triangles or with two that turn opposite ways), E2BIG, EFBIG (2 GB
  *         and more), ENOMEM.

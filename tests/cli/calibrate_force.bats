@@ -130,7 +130,7 @@ made_weights() {
 		|no pairs in it
 	END
 	run --separate-stderr incise calibrate force --from none.csv
-	failed_with "none.csv: cannot be read"
+	failed_with "none.csv: No such file or directory"
 	echo 'force_mV_N = "x";' >calibration.conf
 	made_weights "" >w.csv
 	run --separate-stderr incise calibrate force --from w.csv

@@ -163,6 +163,28 @@ void calibrate_end(const struct calibrate_options *options,
 	cli_finish();
 }
 
+struct incise_infile *calibrate_open(const char *path)
+{
+	static const struct incise_infile_kind csv = {
+		.name = "a CSV file of a calibration",
+		.advice = "give a CSV file",
+		.size_max = 1 << 30,
+	};
+	struct incise_error err = {0};
+
+	return cli_require(incise_infile_open(path, &csv, &err), &err);
+}
+
+bool calibrate_line(struct incise_infile *file, char **line)
+{
+	struct incise_error err = {0};
+	int rc = incise_infile_line(file, line, &err);
+
+	if (rc < 0)
+		cli_fail_with(&err);
+	return rc;
+}
+
 int calibrate_cut(char *line, char **fields, int max, const char *before,
 		  const char *after)
 {

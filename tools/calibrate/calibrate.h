@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <jansson.h>
 #include <incise/calibration.h>
+#include <incise/infile.h>
 #include "../cli/cli.h"
 #include "../cli/file.h"
 
@@ -51,6 +52,12 @@ bool calibrate_can_plot(const char *folder);
  */
 void calibrate_end(const struct calibrate_options *options,
 		   const struct incise_calibration_record *record, json_t *details);
+
+/* A CSV file of the data of a calibration; ends the program where it cannot be read. */
+struct incise_infile *calibrate_open(const char *path);
+
+/* Read its next line; false at its end. Ends the program on an error. */
+bool calibrate_line(struct incise_infile *file, char **line);
 
 /*
  * Cut a line of CSV at its commas, in place, and strip the characters of @before and @after

@@ -25,7 +25,6 @@ static const char *const names[COLUMNS] = {"mass_g", "force_N", "reading_mV", "s
 
 struct table {
 	const char *path;
-	FILE *in;
 	int line;
 	int column[COLUMNS]; /* index of each; -1: none */
 };
@@ -63,7 +62,7 @@ static double number_of(const struct table *table, int column, char **fields, in
 	const int i = table->column[column];
 	const char *text = i < n ? fields[i] : "";
 	char *end;
-	double value = strtod(text, &end);
+	double value = incise_decimal(text, &end);
 
 	if (end == text || *end || !isfinite(value))
 		cli_fail("%s:%d: %s: expected a number, found '%s'; correct it",
@@ -109,15 +108,13 @@ static struct incise_calibrate_force_pair read_pair(const struct table *table,
 
 void pairs_read(struct pairs *pairs, const char *path)
 {
-	struct table table = {.path = path, .in = fopen(path, "re")};
-	char *line = NULL, *fields[COLUMNS_MAX];
+	struct table table = {.path = path};
+	char *line, *fields[COLUMNS_MAX];
+	struct incise_infile *in = calibrate_open(path);
 	bool header = false;
-	size_t size = 0;
 
 	*pairs = (struct pairs){0};
-	if (!table.in)
-		cli_fail("%s: cannot be read: %s", path, strerror(errno));
-	while (getline(&line, &size, table.in) >= 0) {
+	while (calibrate_line(in, &line)) {
 		struct incise_calibrate_force_pair pair;
 		int n;
 
@@ -133,14 +130,11 @@ void pairs_read(struct pairs *pairs, const char *path)
 		pair = read_pair(&table, fields, n);
 		add_pair(pairs, &pair);
 	}
-	if (ferror(table.in))
-		cli_fail("%s: cannot be read: %s", path, strerror(errno));
+	incise_infile_close(in);
 	if (!pairs->n)
 		cli_fail(
 			"%s: no pairs in it: expected a line of names and lines of numbers",
 			path);
-	free(line);
-	fclose(table.in);
 }
 
 void pairs_write(const struct pairs *pairs, const char *path)

@@ -17,6 +17,7 @@
 #include <sys/stat.h>
 #include <syslog.h>
 #include <unistd.h>
+#include <incise/infile.h>
 #include <incise/rig.h>
 #include <incise/version.h>
 #include "cli.h"
@@ -333,7 +334,7 @@ void cli_be_verbose(void)
 double cli_number(const char *option, const char *text, double min, double max)
 {
 	char *end;
-	double value = strtod(text, &end);
+	double value = incise_decimal(text, &end);
 
 	if (end == text || *end || !isfinite(value))
 		cli_usage("--%s: '%s' is not a number", option, text);
@@ -361,7 +362,7 @@ static bool in_units(const char *text, const struct cli_unit *units, double *val
 {
 	char *end;
 
-	*value = strtod(text, &end);
+	*value = incise_decimal(text, &end);
 	if (end == text)
 		return false;
 	for (const struct cli_unit *unit = units; unit->name; unit++)

@@ -10,30 +10,12 @@
 #ifdef HAVE_PNG
 #include <png.h>
 #endif
+#include <incise/infile.h>
 #include <incise/outfile.h>
 #include "cli.h"
 #include "image.h"
 
-#define FILE_MAX (64 << 20)
 #define SIDE_MAX 8192 /* incise/vision.h */
-
-static uint8_t *read_all(const char *path, size_t *size)
-{
-	FILE *file = fopen(path, "rb");
-	uint8_t *data = malloc(FILE_MAX);
-
-	if (!file)
-		cli_fail("%s: %s", path, strerror(errno));
-	if (!data)
-		cli_fail("no memory");
-	*size = fread(data, 1, FILE_MAX, file);
-	if (ferror(file))
-		cli_fail("%s: %s", path, strerror(errno));
-	if (*size == FILE_MAX)
-		cli_fail("%s: more than %d MiB is no picture", path, FILE_MAX >> 20);
-	fclose(file);
-	return data;
-}
 
 static void check_sides(const char *path, unsigned long width, unsigned long height)
 {
@@ -168,11 +150,16 @@ int image_write_png(const char *path, const uint8_t *rgb, int width, int height,
 
 void image_read(const char *path, struct incise_camera_frame *frame)
 {
+	static const struct incise_infile_kind image = {
+		.name = "a PNG, JPEG, PGM or PPM image",
+		.size_max = 64 << 20,
+	};
 	static const uint8_t png[4] = {0x89, 'P', 'N', 'G'};
+	struct incise_error err = {0};
 	uint8_t *data;
 
 	*frame = (struct incise_camera_frame){0};
-	data = read_all(path, &frame->size);
+	data = cli_require(incise_infile_read(path, &image, &frame->size, &err), &err);
 	frame->data = data;
 	if (frame->size > 10 && !memcmp(data, png, sizeof(png)))
 		read_png(path, frame);

@@ -7,10 +7,16 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/infile.h>
 #include "cli.h"
 #include "json.h"
 
 #define READ_MOST (16 << 20) /* a report of all benches has less than 1 */
+
+static const struct incise_infile_kind report_kind = {
+	.name = "a report of incise bench",
+	.size_max = READ_MOST,
+};
 
 json_t *json_number(double value)
 {
@@ -75,10 +81,28 @@ void json_print(json_t *object)
 	cli_finish();
 }
 
+static json_t *parse(const char *text, size_t n, const char *path,
+		     struct incise_error *err)
+{
+	json_error_t wrong;
+	json_t *report = json_loadb(text, n, JSON_REJECT_DUPLICATES, &wrong);
+
+	if (report)
+		return report;
+	if (!*wrong.text) {
+		incise_error_set(err, ENOMEM, "%s: no memory", path);
+		return NULL;
+	}
+	for (char *c = wrong.text; *c; c++)
+		if ((unsigned char)*c < ' ' || (unsigned char)*c >= 0x7f)
+			*c = '?';
+	incise_error_set(err, EINVAL, "%s:%d: no JSON: %s", path, wrong.line, wrong.text);
+	return NULL;
+}
+
 json_t *json_read_from(FILE *file, const char *path, struct incise_error *err)
 {
 	char *text = malloc(READ_MOST + 1);
-	json_error_t wrong;
 	json_t *report = NULL;
 	size_t n;
 
@@ -87,39 +111,23 @@ json_t *json_read_from(FILE *file, const char *path, struct incise_error *err)
 		return NULL;
 	}
 	n = fread(text, 1, READ_MOST + 1, file);
-	if (ferror(file)) {
+	if (ferror(file))
 		incise_error_set(err, errno, "%s: %s", path, strerror(errno));
-	} else if (n > READ_MOST) {
-		incise_error_set(
-			err, EFBIG,
-			"%s: more than %d MiB; no report of incise bench is so large",
-			path, READ_MOST >> 20);
-	} else {
-		report = json_loadb(text, n, JSON_REJECT_DUPLICATES, &wrong);
-		if (!report && !*wrong.text) {
-			incise_error_set(err, ENOMEM, "%s: no memory", path);
-		} else if (!report) {
-			for (char *c = wrong.text; *c; c++)
-				if ((unsigned char)*c < ' ' || (unsigned char)*c >= 0x7f)
-					*c = '?';
-			incise_error_set(err, EINVAL, "%s:%d: no JSON: %s", path,
-					 wrong.line, wrong.text);
-		}
-	}
+	else if (n > READ_MOST)
+		incise_error_set(err, EFBIG, "%s: larger than %d MiB, the limit of %s",
+				 path, READ_MOST >> 20, report_kind.name);
+	else
+		report = parse(text, n, path, err);
 	free(text);
 	return report;
 }
 
 json_t *json_read(const char *path, struct incise_error *err)
 {
-	FILE *file = fopen(path, "re");
-	json_t *report;
+	size_t n;
+	char *text = incise_infile_read(path, &report_kind, &n, err);
+	json_t *report = text ? parse(text, n, path, err) : NULL;
 
-	if (!file) {
-		incise_error_set(err, errno, "%s: %s", path, strerror(errno));
-		return NULL;
-	}
-	report = json_read_from(file, path, err);
-	fclose(file);
+	free(text);
 	return report;
 }

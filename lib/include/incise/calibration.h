@@ -40,8 +40,8 @@ INCISE_API void incise_calibration_nominal(struct incise_calibration *calibratio
  * Read calibration.conf; keys that are absent keep their nominal value. Its history is
  * checked too, see incise_calibration_history().
  *
- * @return 0; negative errno of fopen(3), -EINVAL (syntax, unknown key, a value out of
- *         range: file and line are named).
+ * @return 0; negative errno of incise_infile_open(), -EINVAL (syntax, unknown key, a
+ *         value out of range: file and line are named).
  */
 INCISE_API int incise_calibration_load(const char *path,
 				       struct incise_calibration *calibration,

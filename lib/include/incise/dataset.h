@@ -23,8 +23,8 @@ struct incise_dataset;
  * @param columns n names; "" matches nothing
  * @param group   name of the column whose text names the cut that a row belongs to, or NULL
  * @return dataset with the n columns in the order asked for, to be freed with
- *         incise_dataset_free(); NULL with errno of fopen(3), EINVAL (a field that is no
- *         finite number, a row with too few fields: line and column are named; a column
+ *         incise_dataset_free(); NULL with errno of incise_infile_open() or
+ *         incise_infile_line(), EINVAL (a field that is no finite number, a row with too few fields: line and column are named; a column
  *         that does not exist: the ones that do are listed), E2BIG (too many columns),
  *         ENODATA (no rows), ENOMEM.
  */

@@ -125,7 +125,8 @@ INCISE_API struct incise_fixed *incise_fixed_compile(
 /**
  * Read and validate a MODEL.fx.
  *
- * @return as incise_fixed_compile(); NULL with errno of fopen(3), EINVAL, ENOTSUP, ENOMEM.
+ * @return as incise_fixed_compile(); NULL with errno of incise_infile_read(), EINVAL,
+ *         ENOTSUP, ENOMEM.
  */
 INCISE_API struct incise_fixed *incise_fixed_load(const char *path,
 						  struct incise_error *err);

@@ -127,8 +127,8 @@ INCISE_API struct incise_model *incise_model_new_grid(
  * The content is not trusted: every number is checked, and an error names file and line.
  *
  * @param path file, or "-" for standard input
- * @return model; NULL with errno of fopen(3), EINVAL (malformed), ENOTSUP (Mamdani, an
- *         unknown membership function or method, 'or' and 'not' in a rule), E2BIG, ENOMEM.
+ * @return model; NULL with errno of incise_infile_open() or incise_infile_line(), EINVAL
+ *         (malformed), ENOTSUP (Mamdani, an unknown membership function or method, 'or' and 'not' in a rule), E2BIG, ENOMEM.
  */
 INCISE_API struct incise_model *incise_model_load(const char *path,
 						  struct incise_error *err);

@@ -47,8 +47,8 @@ enum incise_rig_device {
  * @param spec    path of a rig.conf, or "sim:KEY=VALUE,…" for a virtual rig with the
  *                scalar keys of the `sim` group and `clock`; "sim:" for its defaults
  * @param devices incise_rig_device bits to open
- * @return rig, to be closed with incise_rig_close(); NULL with errno of fopen(3), EINVAL
- *         (syntax, unknown key, value out of range; the message has file and line), ENODEV
+ * @return rig, to be closed with incise_rig_close(); NULL with errno of incise_infile_open(),
+ *         EINVAL (syntax, unknown key, value out of range; the message has file and line), ENODEV
  *         (a device that the file does not name, or an unknown backend), ENOEXEC (a broken
  *         module), ENOMEM; of a real device also ENOENT, EACCES, EBUSY (another program
  *         drives it), ERANGE (this machine is too slow for its steps; no such range or

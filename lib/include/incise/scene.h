@@ -31,7 +31,7 @@ struct incise_scene;
  *
  * @param path  .scene file
  * @param model path of a model that takes the place of the scene's, or NULL
- * @return scene, to be freed with incise_scene_free(); NULL with errno of fopen(3),
+ * @return scene, to be freed with incise_scene_free(); NULL with errno of incise_infile_open(),
  *         EINVAL (syntax, unknown key, value out of range: file, line and accepted range
  *         are named), or of incise_model_load(), incise_fixed_load(),
  *         incise_surface_load_mesh().

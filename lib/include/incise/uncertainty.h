@@ -47,8 +47,8 @@ INCISE_API struct incise_uncertainty *incise_uncertainty_new(
  *
  * @param path  file, or "-" for standard input
  * @param model the model it must belong to, to the bit
- * @return uncertainty; NULL with errno of fopen(3), EINVAL (malformed), ESTALE (made for
- *         other parameters), ENOMEM.
+ * @return uncertainty; NULL with errno of incise_infile_open() or incise_infile_line(), EINVAL
+ *         (malformed), ESTALE (made for other parameters), ENOMEM.
  */
 INCISE_API struct incise_uncertainty *incise_uncertainty_load(
 	const char *path, const struct incise_model *model, struct incise_error *err);

@@ -235,7 +235,7 @@ static void check_file(struct incise_verification *verify)
 
 	if (asprintf(&path, "%s/" INCISE_FRAMES_FILE, verify->recording->path) < 0)
 		return;
-	fd = open(path, O_RDONLY | O_CLOEXEC);
+	fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
 	free(path);
 	if (fd < 0) {
 		/* With frames, verify_camera.c reports that it is missing. */

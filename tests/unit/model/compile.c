@@ -141,7 +141,7 @@ static void test_files(void **state)
 	/* Larger than any blob: read no further than that. */
 	assert_int_equal(truncate(file.path, 100 << 20), 0);
 	assert_null(incise_fixed_load(file.path, &err));
-	assert_int_equal(err.code, EINVAL);
+	assert_int_equal(err.code, EFBIG);
 	temp_file_free(&file);
 	assert_null(incise_fixed_load(file.path, &err));
 	assert_int_equal(err.code, ENOENT);
