@@ -14,13 +14,21 @@
 #include "cli/json.h"
 #include "cli/recording.h"
 
-/* Kinds of calibration, and the nominal values. */
+/* Kinds of calibration, the nominal values, and their keys. */
 static const struct {
-	const char *name, *nominal;
+	const char *name, *nominal, *keys[7];
 } kinds[] = {
-	{"force", "1240 mV/N"},	  {"depth", "0.11875 mm/px"},
-	{"tip", "0 0 0 mm"},	  {"delay", "what the devices say"},
-	{"stepper", "not known"},
+	{"force", "1240 mV/N", {"force_mV_N", "force_zero_mV"}},
+	{"depth", "0.11875 mm/px", {"depth_mm_px"}},
+	{"tip", "0 0 0 mm", {"tip_x_mm", "tip_y_mm", "tip_z_mm"}},
+	{"delay",
+	 "what the devices say",
+	 {"force_delay_ms", "force_delay_sd_ms", "tracker_delay_ms",
+	  "tracker_delay_sd_ms", "camera_delay_ms", "camera_delay_sd_ms"}},
+	{"stepper",
+	 "not known",
+	 {"stepper_N_step", "stepper_backlash_mm", "stepper_hysteresis_N",
+	  "stepper_stiction_N", "stepper_steps_s"}},
 };
 
 enum { KINDS = sizeof(kinds) / sizeof(*kinds) };
@@ -85,7 +93,7 @@ struct status {
 	const struct incise_calibration_record *last, *passed;
 	double age_s;	  /* of the one that passed; NAN: none */
 	bool due, failed; /* failed: the last one did not pass */
-	char why[160];
+	char why[400];
 };
 
 struct comparison {
@@ -103,15 +111,38 @@ static double age_of(const char *date)
 	return difftime(time(NULL), timegm(&utc));
 }
 
-/* The first key whose value was changed after the calibration, or NULL. */
-static const char *altered(const struct incise_calibration *c,
-			   const struct incise_calibration_record *record)
+/* A key's value by the last calibration that passed and has it, or the nominal one. */
+static double calibrated(const char *key, const struct incise_calibration_record *records,
+			 int n)
 {
-	for (int i = 0; i < record->n; i++)
-		if (incise_calibration_get(c, record->values[i].key) !=
-		    record->values[i].left)
-			return record->values[i].key;
-	return NULL;
+	struct incise_calibration nominal;
+
+	while (n--)
+		for (int i = 0; records[n].pass && i < records[n].n; i++)
+			if (!strcmp(records[n].values[i].key, key))
+				return records[n].values[i].left;
+	incise_calibration_nominal(&nominal);
+	return incise_calibration_get(&nominal, key);
+}
+
+/* "KEY = VALUE, …" of a kind's keys that a person has written; "" if there are none. */
+static void by_hand(const struct incise_calibration *c, int kind,
+		    const struct incise_calibration_record *records, int n, char *text,
+		    size_t size)
+{
+	size_t used = 0;
+
+	*text = '\0';
+	for (const char *const *key = kinds[kind].keys; *key; key++) {
+		const double now = incise_calibration_get(c, *key);
+		const double was = calibrated(*key, records, n);
+
+		/* Both are NAN where nothing is known. */
+		if (now == was || (isnan(now) && isnan(was)) || used >= size)
+			continue;
+		used += (size_t)snprintf(text + used, size - used, "%s%s = %.8g",
+					 used ? ", " : "", *key, now);
+	}
 }
 
 static void judge(const struct options *options, int kind,
@@ -119,7 +150,7 @@ static void judge(const struct options *options, int kind,
 		  const struct incise_calibration_record *records, int n,
 		  struct status *s)
 {
-	const char *key;
+	char hand[300], in_force[360];
 
 	*s = (struct status){.age_s = NAN};
 	for (int i = 0; i < n; i++)
@@ -132,17 +163,20 @@ static void judge(const struct options *options, int kind,
 	if (s->passed)
 		s->age_s = age_of(s->passed->date);
 	s->due = true;
-	if (!s->passed && !s->last)
-		snprintf(s->why, sizeof(s->why), "never calibrated: nominal, %s",
+	by_hand(calibration, kind, records, n, hand, sizeof(hand));
+	if (*hand)
+		snprintf(in_force, sizeof(in_force), "%s by hand, nominal is %s", hand,
 			 kinds[kind].nominal);
-	else if (!s->passed)
-		snprintf(s->why, sizeof(s->why), "none has passed: nominal, %s",
-			 kinds[kind].nominal);
+	else
+		snprintf(in_force, sizeof(in_force), "nominal, %s", kinds[kind].nominal);
+	if (!s->passed)
+		snprintf(s->why, sizeof(s->why), "%s: %s",
+			 s->last ? "none has passed" : "never calibrated", in_force);
 	else if (s->failed)
 		snprintf(s->why, sizeof(s->why), "the last one, of %.10s, failed",
 			 s->last->date);
-	else if ((key = altered(calibration, s->passed)))
-		snprintf(s->why, sizeof(s->why), "%s was changed by hand since", key);
+	else if (*hand)
+		snprintf(s->why, sizeof(s->why), "changed by hand since: %s", hand);
 	else if (s->age_s < -60)
 		snprintf(s->why, sizeof(s->why),
 			 "its date is in the future: look at the clock");
@@ -184,8 +218,11 @@ static json_t *json_status(const struct incise_calibration *calibration, int kin
 			   const struct status *s)
 {
 	const struct incise_calibration_record *r = s->passed;
-	json_t *values = json_array();
+	json_t *values = json_array(), *in_force = json_object();
 
+	for (const char *const *key = kinds[kind].keys; *key; key++)
+		json_set_number(in_force, *key,
+				incise_calibration_get(calibration, *key));
 	for (int i = 0; r && i < r->n; i++) {
 		const struct incise_calibration_value *v = &r->values[i];
 
@@ -198,14 +235,15 @@ static json_t *json_status(const struct incise_calibration *calibration, int kin
 				"found", json_number(v->found), "left",
 				json_number(v->left), "U", json_number(2 * v->u)));
 	}
-	return json_pack("{s:s, s:b, s:b, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o}",
+	return json_pack("{s:s, s:b, s:b, s:s, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}",
 			 "kind", kinds[kind].name, "due", s->due, "failed", s->failed,
 			 "why", s->why, "date", r ? json_text(r->date) : json_null(),
 			 "age_days", json_number(s->age_s / 86400), "low",
 			 json_number(r ? r->low : NAN), "high",
 			 json_number(r ? r->high : NAN), "range_unit",
 			 json_text(r ? r->range_unit : ""), "verdict",
-			 json_text(s->last ? s->last->verdict : ""), "values", values);
+			 json_text(s->last ? s->last->verdict : ""), "values", values,
+			 "in_force", in_force);
 }
 
 static void compare(const char *path, struct comparison *c)
@@ -280,21 +318,24 @@ static json_t *json_comparison(const struct comparison *c)
 
 int main(int argc, char **argv)
 {
-	struct options options = {.calibration = "calibration.conf",
-				  .due_s = 365 * 86400.0};
+	struct options options = {.due_s = 365 * 86400.0};
 	struct incise_calibration_record *records;
 	struct incise_calibration calibration;
 	struct comparison comparison = {0};
 	struct status status[KINDS];
 	struct incise_error err = {0};
 	int n, rc, bad = 0;
+	bool named;
 
 	memset(options.only, 1, sizeof(options.only));
 	cli_parse(&command, argc, argv, &options);
 	cli_no_operands(argc, argv, "a recording goes with --recording");
+	named = options.calibration;
+	if (!named)
+		options.calibration = "calibration.conf";
 	n = incise_calibration_history(options.calibration, &records, &err);
 	rc = n < 0 ? n : incise_calibration_load(options.calibration, &calibration, &err);
-	if (rc == -ENOENT) { /* nothing was ever calibrated here */
+	if (rc == -ENOENT && !named) { /* nothing was ever calibrated here */
 		n = 0;
 		incise_calibration_nominal(&calibration);
 	} else if (rc) {

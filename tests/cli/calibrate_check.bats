@@ -35,10 +35,51 @@ today=$(date -u +%Y-%m-%dT00:00:00Z)
 	[ "$(key c.json kinds[1].kind)" = depth ]
 }
 
+@test "no value that a person has written is called nominal" {
+	local kind text
+	while IFS='|' read -r kind text said; do
+		echo "$text" >calibration.conf
+		run -1 incise calibrate check
+		[[ "$output" == *$'\n'"$kind "*": never calibrated: $said by hand, nominal is "* ]] ||
+			complain "$output" || return
+		[ "$(grep -c 'never calibrated: nominal' <<<"$output")" = 4 ]
+		run -1 incise calibrate check --json --only "$kind"
+		echo "$output" >c.json
+		[[ "$(key c.json 'kinds[0].why')" == "never calibrated: $said by hand, nominal is "* ]]
+		holds "$(key c.json "kinds[0].in_force.${said%% *}") == ${said##* }"
+	done <<-'END'
+		force|force_mV_N = 1500.0;|force_mV_N = 1500
+		force|force_zero_mV = 20.0;|force_zero_mV = 20
+		depth|depth_mm_px = 0.2;|depth_mm_px = 0.2
+		tip|tip_mm = [0.0, 2.5, 0.0];|tip_y_mm = 2.5
+		delay|camera_delay_ms = 12.0;|camera_delay_ms = 12
+		stepper|stepper_backlash_mm = 0.05;|stepper_backlash_mm = 0.05
+	END
+	# none has passed; or another key of the kind was calibrated, and this one is by hand
+	echo "force_mV_N = 1500.0; history = ( $(entry force force_mV_N 1300.0 "$today" false) );" >calibration.conf
+	run -1 incise calibrate check
+	[[ "$output" == *"none has passed: force_mV_N = 1500 by hand, nominal is 1240 mV/N"* ]]
+	echo "force_mV_N = 1300.0; force_zero_mV = 20.0;
+		history = ( $(entry force force_mV_N 1300.0 "$today" true) );" >calibration.conf
+	run -1 incise calibrate check
+	[[ "$output" == *"changed by hand since: force_zero_mV = 20"* ]]
+	# of two calibrations each has set one key
+	echo "force_delay_ms = 3.0; camera_delay_ms = 9.0;
+		history = ( $(entry delay camera_delay_ms 9.0 "$today" true),
+			$(entry delay force_delay_ms 3.0 "$today" true) );" >calibration.conf
+	run -0 incise calibrate check --only delay
+}
+
+@test "a file that is named has to exist" {
+	run --separate-stderr incise calibrate check -c typo.conf
+	failed_with "typo.conf: No such file or directory"
+	[ -z "$output" ]
+}
+
 @test "what is in force, old, failed, changed by hand or of the future" {
 	cat >calibration.conf <<-END
 		force_mV_N = 1250.0; depth_mm_px = 0.12; force_delay_ms = 3.0;
-		stepper_N_step = 0.001; tip_mm = [1.0, 2.0, 3.0];
+		stepper_N_step = 0.001; tip_mm = [1.0, 0.0, 0.0];
 		history = ( $(entry force force_mV_N 1250.0 "$today" true),
 			$(entry depth depth_mm_px 0.12 2020-01-01T00:00:00Z true),
 			$(entry delay force_delay_ms 3.0 "$today" true),
@@ -52,7 +93,7 @@ today=$(date -u +%Y-%m-%dT00:00:00Z)
 	grep -q 'force_mV_N  *1250 x, U = 1 (k = 2)' <<<"$output"
 	grep -q "^depth    due, 2020-01-01, .*: older than 365 days" <<<"$output"
 	grep -q "^delay    FAILED, .*: the last one, of ${today%T*}, failed" <<<"$output"
-	grep -q "^stepper  due, .*: stepper_N_step was changed by hand since" <<<"$output"
+	grep -q "^stepper  due, .*: changed by hand since: stepper_N_step = 0.001" <<<"$output"
 	grep -q "in force: 0.001" <<<"$output"
 	grep -q "^tip      due, .*: its date is in the future" <<<"$output"
 	run -0 incise calibrate check --only force
