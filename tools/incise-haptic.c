@@ -99,6 +99,9 @@ static void parse(struct job *job, int argc, char **argv)
 		cli_usage("--log keeps all ticks in memory: it needs --duration");
 	if (job->json && job->log && !strcmp(job->log, "-"))
 		cli_usage("--json and --log - would both write to standard output");
+	if (job->no_rt && job->realtime.cpu != INCISE_REALTIME_ANY_CPU)
+		cli_usage("--no-rt: the loop's thread gets no CPU of its own; leave out "
+			  "--cpu, or --no-rt");
 }
 
 /* Leave the reason in the state page, too. */

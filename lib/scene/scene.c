@@ -3,6 +3,7 @@
  * Reading a scene file; see incise/scene.h for its form.
  */
 #include <errno.h>
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,6 +12,7 @@
 #include "../base/vector.h"
 #include "scene.h"
 
+#define PARALLEL_COS 0.985 /* cos 10 degrees */
 /* Of the largest group, tissue: gain, leave_mm and the numbers of all forces. */
 #define KEYS_MAX (2 + INCISE_FORCES_MAX * INCISE_FORCE_NUMBERS)
 
@@ -427,6 +429,22 @@ static int check_forces(const struct incise_scene *scene, struct incise_error *e
 		scene->path);
 }
 
+/* The blade lies along the axis: the normal of its side is across. */
+static int check_tool(const struct incise_scene *scene, const config_setting_t *tool,
+		      struct incise_error *err)
+{
+	const char *key = config_setting_get_member(tool, "axis") ? "axis" : "side";
+	const config_setting_t *setting = config_setting_get_member(tool, key);
+
+	if (!setting || fabs(v3_dot(scene->tool.axis, scene->tool.side)) < PARALLEL_COS)
+		return 0;
+	return incise_error_set(
+		err, EINVAL,
+		"%.200s:%d: tool.%s: axis and side are within 10 degrees of one line; "
+		"side is the normal of the blade, across axis; correct it",
+		scene->path, config_setting_source_line(setting), key);
+}
+
 static int read_switches(struct incise_scene *scene, const config_setting_t *root,
 			 struct incise_error *err)
 {
@@ -450,6 +468,8 @@ static int read_switches(struct incise_scene *scene, const config_setting_t *roo
 		rc = incise_conf_direction(group, path, "side", scene->tool.side, err);
 	if (!rc && group)
 		rc = incise_conf_direction(group, path, "axis", scene->tool.axis, err);
+	if (!rc && group)
+		rc = check_tool(scene, group, err);
 	if (!rc)
 		rc = read_group(scene, root, "device", device, device_keys, &group, err);
 	if (!rc && group)

@@ -351,3 +351,47 @@ small_disk() {
 	[[ "$stderr" == *"standard output"* ]]
 	[ -d a.rec ] # the recording itself is whole
 }
+
+@test "capture without descriptors names the reason and leaves no empty folder" {
+	local n status seen=0
+	for n in {3..12}; do
+		status=0
+		(exec 3>&- 4>&-
+		exec timeout 20 prlimit --nofile="$n" "$INCISE_BUILD/bin/incise-capture" -o "$n.rec" \
+			--rig sim: --duration 500ms </dev/null >/dev/null 2>err) || status=$?
+		# too few for the program's libraries; or enough
+		[ $status -eq 1 ] || continue
+		seen=1
+		grep -q "Too many open files" err || { echo "$n: $(cat err)"; false; }
+		if grep -q "what was committed" err; then
+			incise info "$n.rec" >/dev/null
+		else
+			[ ! -e "$n.rec.part" ]
+		fi
+	done
+	[ $seen = 1 ]
+}
+
+@test "capture whose folder is removed or moved says what is left of it" {
+	local pid i how
+	for how in rm mv; do
+		incise capture -o $how.rec --rig sim: --duration 60s </dev/null 2>err 3>&- &
+		pid=$!
+		for ((i = 0; i < 3000; i++)); do
+			[ ! -s $how.rec.part/recording.db-wal ] || break
+			sleep 0.02
+		done
+		# in one step for the program
+		kill -STOP $pid
+		mv $how.rec.part $how-away
+		[ $how = mv ] || rm -r $how-away
+		kill -CONT $pid
+		wait $pid && false
+		cat err
+		case $how in
+		rm) grep -q "rm.rec.part: was removed by another program .*nothing is left" err ;;
+		mv) grep -q "mv.rec.part: was moved by another program" err
+			incise info mv-away >/dev/null ;;
+		esac
+	done
+}

@@ -218,6 +218,8 @@ as_nobody() {
 		run --separate-stderr incise haptic liver.scene --rig sim: $wrong
 		bad_usage "${wrong% *}"
 	done
+	run --separate-stderr incise haptic liver.scene --rig sim: --cpu 0 --no-rt --duration 0.1s
+	bad_usage "--no-rt: the loop's thread gets no CPU of its own"
 	run --separate-stderr incise haptic liver.scene --rig sim: --cpu 1000 --duration 0.1s
 	[ "$status" -eq 1 ]
 }

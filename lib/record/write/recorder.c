@@ -343,6 +343,7 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 {
 	int rc = incise_recorder_check_space(rec, setup->planned_s, err);
 
+	rec->worthless = true;
 	if (!rc)
 		rc = incise_recorder_open_database(rec, setup->calibration_path, err);
 	if (!rc)
@@ -356,6 +357,7 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 		rc = start_camera(rec, err);
 	if (!rc)
 		start_counts(rec);
+	rec->worthless = rc;
 	if (rc) {
 		close_camera(rec);
 		incise_recorder_close_database(rec);

@@ -35,23 +35,34 @@ static const char *const sql[STATEMENTS] = {
 
 int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err)
 {
-	int code = incise_schema_errno(rec->db);
-	const char *text = sqlite3_errmsg(rec->db);
+	/* SQLite forgets the cause where it fails outside of a statement: "not an error". */
+	const int cause = errno, system = sqlite3_system_errno(rec->db);
+	const bool forgot = !sqlite3_errcode(rec->db);
+	int code = forgot && cause ? cause : incise_schema_errno(rec->db);
+	const char *text = forgot	    ? strerror(cause ? cause : EIO)
+			   : code == system ? strerror(system)
+					    : sqlite3_errmsg(rec->db);
 	int rc = incise_recorder_check_files(rec, err);
+	char kept[400];
 
 	if (rc)
 		return rc;
+	if (rec->worthless) {
+		snprintf(kept, sizeof(kept), "nothing was kept");
+	} else {
+		snprintf(kept, sizeof(kept),
+			 "what was committed is in %.300s: `incise info` reads it",
+			 rec->part);
+	}
 	if (code == ENOSPC)
 		return incise_error_set(
 			err, code,
-			"%s: disk full (or a quota or limit on files); make room "
-			"and record again; what was committed is in %s: `incise "
-			"info` reads it",
-			rec->path, rec->part);
+			"%.200s: disk full (or a quota or limit on files); make room "
+			"and record again; %s",
+			rec->path, kept);
 	return incise_error_set(err, code == EINVAL ? EIO : code,
-				"%s: cannot be written: %s; what was committed is in %s: "
-				"`incise info` reads it",
-				rec->path, text, rec->part);
+				"%.200s: cannot be written: %s; %s", rec->path, text,
+				kept);
 }
 
 int incise_recorder_check(struct incise_recorder *rec, int code, struct incise_error *err)

@@ -89,8 +89,12 @@ int incise_recorder_make_folder(struct incise_recorder *rec, struct incise_error
 					strerror(errno));
 	}
 	rec->folder = openat(rec->parent, part, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-	if (rec->folder < 0)
-		return incise_error_set(err, errno, "%s: %s", rec->part, strerror(errno));
+	if (rec->folder < 0) {
+		int code = errno;
+
+		unlinkat(rec->parent, part, AT_REMOVEDIR); /* it is empty */
+		return incise_error_set(err, code, "%s: %s", rec->part, strerror(code));
+	}
 	flock(rec->folder, LOCK_EX | LOCK_NB); /* some file systems have no locks */
 	return 0;
 }
@@ -211,6 +215,13 @@ int incise_recorder_check_files(const struct incise_recorder *rec,
 	const char *part = rec->part + (rec->name - rec->path);
 	struct stat st;
 
+	/* A folder that is removed has no links, one that is moved still has. */
+	if (fstatat(rec->parent, part, &st, AT_SYMLINK_NOFOLLOW) && errno == ENOENT &&
+	    !fstat(rec->folder, &st) && st.st_nlink)
+		return incise_error_set(err, EIO,
+					"%s: was moved by another program while it was "
+					"written: what was committed is where it is now",
+					rec->part);
 	for (int i = 0; i < INCISE_RECORDER_GROWING; i++) {
 		const char *what = NULL;
 
