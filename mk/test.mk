@@ -84,6 +84,17 @@ check: ## install what is missing, build, and test
 check-all: ## the same with all tests in all builds, on all kernels: an hour
 	$(call in_parts,parts="check-sanitize check-unit check-tsan" ATTACK=full)
 
+# For tests whose outcome may be left to chance; the load is whatever the machine has else to do.
+N ?= 20
+check-repeat: ## PART=check-fuzz N=20: a part of check so many times, with what failed
+	@mkdir -p $(O)/repeat
+	+@failed=0; for i in $$(seq $(N)); do \
+		log=$(O)/repeat/$(PART).$$i; \
+		if $(MAKE) --no-print-directory $(PART) >$$log 2>&1; then echo "$$i of $(N): passed"; \
+		else failed=$$((failed + 1)); echo "$$i of $(N): FAILED, see $$log"; \
+			grep -E '^(not ok|FAIL)' $$log; fi; \
+	done; echo "$(PART): $(N) times, $$failed failed"; [ $$failed = 0 ]
+
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8
 $(locale):
@@ -197,7 +208,7 @@ doc: ## reference of the public headers in build/doc/html; fails where a comment
 
 check-doc: doc
 
-.PHONY: doc check-doc check check-all check-parts check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-tsan can-drive mcap-reader
+.PHONY: doc check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-tsan can-drive mcap-reader
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

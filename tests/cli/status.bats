@@ -128,6 +128,11 @@ until_ticks() {
 	follower=$!
 	for size in 0 1 600 1000000; do
 		truncate -s $size incise/wall.state
+		# the loop's other thread makes it whole again, when it runs
+		for ((i = 0; i < 3000; i++)); do
+			[ "$(stat -c %s incise/wall.state)" -le 1000000 ] || break
+			sleep 0.02
+		done
 		run -0 --separate-stderr incise status wall
 		[ -z "$stderr" ]
 		[[ "${lines[0]}" == "wall: running since "*", process $played" ]]
