@@ -110,7 +110,7 @@ $good" 0
 		"fails in time" { false; }
 		"fails late" { stands_still; false; }
 		"fails late once" { stands_still; [ "$(wc -l <"$counts/3")" = 2 ]; }
-		"passes" { stands_still; }
+		"passes" { stands_still; wait; }
 	END
 	cat >>late.bats <<-'END'
 		load "$tree/tests/cli/cli"
