@@ -89,13 +89,20 @@ $good" 0
 	NEEDS=second run -1 "$root/tests/timed" times third touch there
 	[ ! -e there ]
 	NEEDS=first run -0 "$root/tests/timed" times fourth true
+	run -2 "$root/tests/timed" times fifth sh -c 'echo "make[2]: *** [mk/lib.mk:11: build/x.o] Error 1"
+		echo "make[1]: *** [mk/test.mk:60: fifth] Error 2"; exit 2'
+	run -1 "$root/tests/timed" times sixth false
+	# what it prints is that of its parts
+	run -1 "$root/tests/timed" times whole sh -c 'echo "not ok 2 that"; false'
 	run -0 "$root/tests/timed" times
-	[ "$(grep -c FAILED <<<"$output")" = 2 ]
+	[ "$(grep -c FAILED <<<"$output")" = 5 ]
 	diff - <(sed -n '/^failed:/,$p' <<<"$output") <<-END
 		failed:
+		  fifth: build/x.o: Error 1
 		  second: that
 		  second: base/ring
 		  third: not run: third, which needs second
+		  sixth: see times.logs/sixth
 		skipped:
 		  first: view/draw: no screen
 		  second: no adapter (2 tests)
