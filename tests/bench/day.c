@@ -331,6 +331,8 @@ static int run(const char *path, double hours)
 		fprintf(stderr, "day: %s\n", err.text);
 	else
 		report(due, &late);
+	/* The file of the page follows the loop in real time; a change of the run writes all of it. */
+	incise_state_run(options.state, INCISE_RUN_STOPPED, "");
 	if (!rc)
 		report_page(page, due);
 	incise_state_free(options.state);
