@@ -362,8 +362,9 @@ read_mcap() {
 	sqlite3 even.rec/recording.db "UPDATE tracker SET t_ns = seq * 8333333;
 		UPDATE depth SET t_ns = seq * 8333333; DELETE FROM knots"
 	cp -r even.rec line.rec
-	# each record of the tracker 100 ms later than its row says
-	sqlite3 line.rec/recording.db "DELETE FROM knots; INSERT INTO knots SELECT 'tracker',
+	# each record of the tracker 100 ms later than its row says, and so did all arrive
+	sqlite3 line.rec/recording.db "UPDATE tracker SET arrival_ns = t_ns + 105000000;
+		DELETE FROM knots; INSERT INTO knots SELECT 'tracker',
 		seq > 0, seq, t_ns + 100000000, 1e5, seq = 0 FROM tracker
 		WHERE seq IN (0, (SELECT max(seq) FROM tracker))"
 	for how in "" --resample; do
