@@ -35,8 +35,8 @@ fuzz_libs_vision_frame := $(libs_vision_opencv)
 fuzz_slcan_line := lib/device/can/bus/slcan_protocol.c
 fuzz_can_frames := lib/base/error.c $(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/cia402*.c)
 
-fuzz_polhemus_records := lib/base/ring.c $(addprefix lib/device/polhemus/polhemus_,model.c records.c \
-	stream.c)
+fuzz_polhemus_records := lib/base/ring.c lib/device/pose_flags.c $(addprefix lib/device/polhemus/polhemus_,\
+	model.c records.c stream.c)
 fuzz_polhemus_status := lib/base/error.c lib/device/polhemus/polhemus_dialogue.c
 
 fuzz_state_page := lib/base/error.c $(addprefix lib/loop/state_,file.c page.c reader.c)
