@@ -2,8 +2,8 @@
 /*
  * Writing a recording; see incise/recorder.h, and recorder.h for the other files.
  *
- *     force ────►┐                         ┌─► tables, ledger ─► one transaction per 100 ms
- *     tracker ──►┼─► poll ─► times ─► rows ┤                     of the rig's clock
+ *     force ────►┐                         ┌─► tables, ledger ─► a transaction, which ends
+ *     tracker ──►┼─► poll ─► times ─► rows ┤                     within 100 ms of the rig's clock
  *     camera ─► pump (threads of its own) ─┴─► camera.mkv
  *
  * On a real clock each commit is synced, so a power cut costs no more than a kill: the
@@ -17,7 +17,9 @@
 #include <unistd.h>
 #include "recorder.h"
 
+/* What a kill may cost, and the shortest time between commits, whatever they take. */
 #define COMMIT_NS 100000000LL
+#define COMMIT_LEAST_NS (COMMIT_NS / 2)
 /* The knots of a line are many and change little in a second: not with each commit. */
 #define KNOTS_EVERY 10
 #define BATCH_FORCE 1024
@@ -259,15 +261,22 @@ static int commit_files(struct incise_recorder *rec, struct incise_error *err)
 		return rc;
 	if (sqlite3_exec(rec->db, "COMMIT", NULL, NULL, NULL) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
-	incise_recorder_see_files(rec);
-	return 0;
+	/* A disk may take long for it. */
+	rc = incise_recorder_check_files(rec, err);
+	if (!rc)
+		incise_recorder_see_files(rec);
+	return rc;
 }
 
-/* Commit the rows so far, with their counts and their ledger. Returns 0 or -errno. */
+/*
+ * Commit the rows so far, those read at @now_ns, with their counts and their ledger. Returns 0
+ * or -errno.
+ */
 static int commit(struct incise_recorder *rec, int64_t now_ns, bool last,
 		  struct incise_error *err)
 {
 	bool knots = last || rec->commits++ % KNOTS_EVERY == 0;
+	int64_t took_ns;
 	int rc;
 
 	if (write_counts(rec) != SQLITE_OK ||
@@ -278,6 +287,11 @@ static int commit(struct incise_recorder *rec, int64_t now_ns, bool last,
 	if (rc)
 		return rc;
 	rec->commit_ns = now_ns;
+	/* A disk that was slow once may be so again: that is forgotten in some 3 s. */
+	took_ns = incise_clock_now(incise_rig_clock(rec->rig)) - now_ns;
+	rec->takes_ns -= rec->takes_ns / 16;
+	if (took_ns > rec->takes_ns)
+		rec->takes_ns = took_ns;
 	return incise_recorder_check(
 		rec, sqlite3_exec(rec->db, "BEGIN", NULL, NULL, NULL), err);
 }
@@ -513,6 +527,20 @@ static int release(struct incise_recorder *rec, struct incise_error *err)
 	return rc ? rc : start_camera(rec, err);
 }
 
+/*
+ * Whether the commit must be now, as one at the next poll would end too late:
+ *
+ *     commit_ns      polled_ns     now     next poll   it ends
+ *     |◄───────────────── COMMIT_NS at most ─────────────────►|
+ */
+static bool is_due(const struct incise_recorder *rec, int64_t now)
+{
+	int64_t since_ns = now - rec->commit_ns, apart_ns = now - rec->polled_ns;
+
+	return since_ns >= COMMIT_NS || (since_ns >= COMMIT_LEAST_NS &&
+					 since_ns + apart_ns + rec->takes_ns > COMMIT_NS);
+}
+
 int incise_recorder_poll(struct incise_recorder *rec, struct incise_error *err)
 {
 	int64_t now = incise_clock_now(incise_rig_clock(rec->rig));
@@ -530,8 +558,9 @@ int incise_recorder_poll(struct incise_recorder *rec, struct incise_error *err)
 		rc = incise_recorder_settle_zero(rec, err);
 	if (!rc && rec->stats.armed && rec->pretrigger.triggered)
 		rc = release(rec, err);
-	if (!rc && now - rec->commit_ns >= COMMIT_NS)
+	if (!rc && is_due(rec, now))
 		rc = commit(rec, now, false, err);
+	rec->polled_ns = now;
 	rec->failed = rc;
 	return rc ? rc : check_end(rec, err);
 }

@@ -103,6 +103,7 @@ struct incise_recorder_disk {
 
 /* The files of a recording that grow: database, its log, camera.mkv. */
 #define INCISE_RECORDER_GROWING 3
+#define INCISE_RECORDER_LOG 1 /* the second of them */
 
 struct incise_recorder {
 	char *path;	    /* as given, without trailing slashes */
@@ -132,7 +133,9 @@ struct incise_recorder {
 		ino_t inode;
 		off_t size;
 	} seen[INCISE_RECORDER_GROWING]; /* after the last commit */
-	int64_t commit_ns;		 /* last commit */
+	int64_t commit_ns;		 /* all that was read until then is committed */
+	int64_t polled_ns;		 /* last poll */
+	int64_t takes_ns;		 /* a commit, lately at most */
 	int commits;
 	bool ended;	     /* reads no more samples */
 	bool cuts;	     /* write events for their starts and ends */

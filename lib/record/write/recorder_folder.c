@@ -209,6 +209,19 @@ int incise_recorder_check_space(struct incise_recorder *rec, double planned_s,
 
 /* --- what others do to the files ------------------------------------------------------- */
 
+/* Written on where it was cut off, a file is as long as before, with a hole. */
+static bool has_hole(const struct incise_recorder *rec, const char *file)
+{
+	int fd = openat(rec->folder, file, O_RDONLY | O_CLOEXEC);
+	off_t hole = fd < 0 ? -1 : lseek(fd, 0, SEEK_HOLE);
+	struct stat st;
+	bool has = hole >= 0 && !fstat(fd, &st) && hole < st.st_size;
+
+	if (fd >= 0)
+		close(fd);
+	return has;
+}
+
 int incise_recorder_check_files(const struct incise_recorder *rec,
 				struct incise_error *err)
 {
@@ -231,7 +244,8 @@ int incise_recorder_check_files(const struct incise_recorder *rec,
 			what = "removed";
 		else if (st.st_ino != rec->seen[i].inode)
 			what = "replaced";
-		else if (st.st_size < rec->seen[i].size)
+		else if (st.st_size < rec->seen[i].size ||
+			 (i == INCISE_RECORDER_LOG && has_hole(rec, files[i])))
 			what = "cut off";
 		if (!what)
 			continue;

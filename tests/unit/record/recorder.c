@@ -733,6 +733,92 @@ static void full_disk_at_the_end(void **state)
 	incise_rig_close(rig);
 }
 
+/* --- what a kill costs --------------------------------------------------------------- */
+
+int __real_sqlite3_exec(sqlite3 *db, const char *text,
+			int (*row)(void *, int, char **, char **), void *user,
+			char **error);
+int __wrap_sqlite3_exec(sqlite3 *db, const char *text,
+			int (*row)(void *, int, char **, char **), void *user,
+			char **error);
+
+/* A disk that takes time for each commit, by the rig's clock. */
+static struct {
+	struct incise_clock *clock;
+	int64_t takes_ns;
+	int64_t polled_ns; /* when what it commits was read */
+	int64_t whole_ns;  /* all that was read until then is committed */
+	int64_t worst_ns;
+	const char *spoiled; /* command */
+} disk;
+
+int __wrap_sqlite3_exec(sqlite3 *db, const char *text,
+			int (*row)(void *, int, char **, char **), void *user,
+			char **error)
+{
+	int rc;
+
+	/* Between the check of the files and what SQLite writes. */
+	if (disk.spoiled && !strncmp(text, "COMMIT", 6)) {
+		system(disk.spoiled);
+		disk.spoiled = NULL;
+	}
+	if (!disk.clock || strncmp(text, "COMMIT", 6))
+		return __real_sqlite3_exec(db, text, row, user, error);
+	incise_clock_wait_until(disk.clock, incise_clock_now(disk.clock) + disk.takes_ns);
+	/* Killed now, it would lose all since the commit before. */
+	if (incise_clock_now(disk.clock) - disk.whole_ns > disk.worst_ns)
+		disk.worst_ns = incise_clock_now(disk.clock) - disk.whole_ns;
+	rc = __real_sqlite3_exec(db, text, row, user, error);
+	disk.whole_ns = disk.polled_ns;
+	return rc;
+}
+
+/* Commits that take this long, polls that far apart: the bound of incise-recording(5) holds. */
+static void kill_costs_100_ms(void **state)
+{
+	static const struct {
+		int64_t takes_ns, apart_ns;
+	} cases[] = {{0, 10 * MS},	{2 * MS, 10 * MS}, {12 * MS, 10 * MS},
+		     {25 * MS, 7 * MS}, {1 * MS, 30 * MS}, {20 * MS, 20 * MS}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_rig *rig = open_rig(SIM);
+		struct incise_clock *clock = incise_rig_clock(rig);
+		struct incise_recorder *rec = start_recorder("a.rec", rig);
+		struct incise_error err = {0};
+		int64_t next = incise_clock_now(clock);
+
+		memset(&disk, 0, sizeof(disk));
+		disk.takes_ns = cases[i].takes_ns;
+		for (int k = 0; k < 400; k++) {
+			/* As `incise capture` does it. */
+			next += cases[i].apart_ns;
+			if (next < incise_clock_now(clock))
+				next = incise_clock_now(clock);
+			incise_clock_wait_until(clock, next);
+			/* The first commits show how long they take. */
+			if (k == 50)
+				disk.worst_ns = 0;
+			disk.polled_ns = incise_clock_now(clock);
+			if (!disk.clock)
+				disk.whole_ns = disk.polled_ns;
+			disk.clock = clock;
+			if (incise_recorder_poll(rec, &err))
+				fail_msg("%s", err.text);
+		}
+		disk.clock = NULL;
+		assert_int_equal(incise_recorder_close(rec, &err), 0);
+		if (disk.worst_ns > 100 * MS || disk.worst_ns < 50 * MS)
+			fail_msg(
+				"commits of %.0f ms, polls each %.0f ms: %.1f ms are lost",
+				disk.takes_ns * 1e-6, cases[i].apart_ns * 1e-6,
+				disk.worst_ns * 1e-6);
+		incise_rig_close(rig);
+		assert_int_equal(system("rm -r a.rec"), 0);
+	}
+}
+
 /* What others do to a file of a recording that is written is noticed at the next commit. */
 static void files_that_others_change(void **state)
 {
@@ -764,6 +850,30 @@ static void files_that_others_change(void **state)
 				 -EIO);
 		if (!strstr(err.text, cases[i / 2].text))
 			fail_msg("%s: %s", cases[i / 2].command, err.text);
+		assert_int_equal(access("a.rec", F_OK), -1);
+		incise_rig_close(rig);
+		system("rm -rf a.rec.part");
+	}
+}
+
+static void files_that_others_change_in_a_commit(void **state)
+{
+	static const char *const commands[] = {
+		"truncate -s 0 a.rec.part/recording.db-wal",
+		"truncate -s 50000 a.rec.part/recording.db-wal",
+	};
+
+	for (size_t i = 0; i < sizeof(commands) / sizeof(*commands); i++) {
+		struct incise_rig *rig = open_rig(SIM);
+		struct incise_recorder *rec = start_recorder("a.rec", rig);
+		struct incise_error err = {0}, second = {0};
+
+		assert_int_equal(poll_for(rec, rig, 2000 * MS, &err), 0);
+		disk.spoiled = commands[i];
+		assert_int_equal(poll_for(rec, rig, 300 * MS, &err), -EIO);
+		if (!strstr(err.text, "recording.db-wal: was cut off"))
+			fail_msg("%s: %s", commands[i], err.text);
+		assert_int_equal(incise_recorder_close(rec, &second), -EIO);
 		assert_int_equal(access("a.rec", F_OK), -1);
 		incise_rig_close(rig);
 		system("rm -rf a.rec.part");
@@ -975,7 +1085,9 @@ int main(void)
 		IN_FOLDER(losses_are_counted_and_doubts_kept),
 		IN_FOLDER(full_disk_keeps_what_was_committed),
 		IN_FOLDER(full_disk_at_the_end),
+		IN_FOLDER(kill_costs_100_ms),
 		IN_FOLDER(files_that_others_change),
+		IN_FOLDER(files_that_others_change_in_a_commit),
 		IN_FOLDER(nothing_of_it_is_mapped),
 		IN_FOLDER(reader_does_not_stop_the_start),
 		IN_FOLDER(reader_does_not_stop_the_end),
