@@ -123,7 +123,11 @@ until_ticks() {
 		[ ! -e incise/wall.state ] || break
 		sleep 0.1
 	done
-	until_ticks wall
+	# its first ticks come before it says that it runs
+	for ((i = 0; i < 600; i++)); do
+		! incise status wall | grep -q '^wall: running' || break
+		sleep 0.1
+	done
 	incise status wall --follow --json >followed 2>&1 3>&- &
 	follower=$!
 	for size in 0 1 600 1000000; do
