@@ -21,7 +21,7 @@
 
 /* A write takes some 30 ns: after so many tries the writer must have stopped in the middle. */
 #define TRIES 100
-#define OPENS 50	/* 1 ms apart: a page that was cut off is whole again after 5 */
+#define OPENS 1000	/* 1 ms apart: a page that was cut off is whole again after 5 */
 #define CHUNK 64	/* slots at a time */
 #define ENTRY_MAX 65536 /* bytes of any part or slot: far more than needed */
 #define COUNT_MAX (1 << 24)

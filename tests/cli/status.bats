@@ -144,7 +144,7 @@ until_ticks() {
 	done
 	kill -TERM "$played"
 	wait "$played"
-	wait "$follower"
+	wait "$follower" || complain "$(cat followed)"
 	[ "$(tail -n 1 followed >report.json && key report.json state)" = stopped ]
 	run -0 incise status wall
 	[[ "${lines[0]}" == "wall: stopped since "* ]]

@@ -15,7 +15,7 @@
 #include "pages.h"
 
 #define SUFFIX ".state"
-#define LOOKS 50 /* 1 ms apart: the writer may be preempted */
+#define LOOKS 1000 /* 1 ms apart: the writer may be preempted */
 
 /* Length of NAME in "NAME.state"; 0: another file. */
 static size_t name_length(const char *file)

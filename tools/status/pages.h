@@ -25,7 +25,7 @@ struct state_pages {
  */
 void state_pages_open(struct state_pages *pages, const char *asked);
 
-/* Read the page. 0 or -errno for a damaged page. Waits up to 50 ms for the writer. */
+/* Read the page. 0 or -errno for a damaged page. Waits up to 1 s for the writer. */
 int state_pages_try(const struct state_page_file *page, struct incise_state_now *now,
 		    struct incise_error *err);
 

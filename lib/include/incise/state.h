@@ -166,7 +166,7 @@ struct incise_state_now {
 /**
  * Open a page. Its contents are not trusted: a malformed page leads to an errno and nothing
  * worse. The file is read, not mapped: truncation gives an errno, and no signal. A page that is
- * malformed although its writer lives is looked at again, for up to 50 ms: it was just cut off.
+ * malformed although its writer lives is looked at again, for up to 1 s: it was just cut off.
  *
  * @return state, to be closed with incise_state_close(); NULL with errno of open(2), EINVAL
  *         (no page), EPROTO (another version of the format), ENOMEM.
