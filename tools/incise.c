@@ -5,6 +5,7 @@
  * incise-COMMAND-SUBCOMMAND next to this one, incise COMMAND SUBCOMMAND … runs that.
  */
 #include <dirent.h>
+#include <dlfcn.h>
 #include <errno.h>
 #include <limits.h>
 #include <stdbool.h>
@@ -12,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <incise/error.h>
 #include <incise/version.h>
 #include "cli/cli.h"
 
@@ -111,6 +113,24 @@ static int finish(void)
 	return 1;
 }
 
+/*
+ * A program whose libraries are only recommended may lack one, which ld.so reports without the
+ * package. Load them here first, and say which.
+ */
+static bool has_libraries(const char *program)
+{
+	const char *name = strrchr(program, '/');
+	struct incise_error err = {0};
+
+	name = name ? name + 1 : program;
+	if ((strcmp(name, "incise-view") && strcmp(name, "incise-bench-view")) ||
+	    dlopen(VIEW_LIBRARY, RTLD_LAZY | RTLD_LOCAL))
+		return true;
+	incise_error_library(&err, name + strlen("incise-"), dlerror());
+	fprintf(stderr, "incise %s\n", err.text);
+	return false;
+}
+
 int main(int argc, char **argv)
 {
 	const char *command = argv[1];
@@ -144,10 +164,15 @@ int main(int argc, char **argv)
 	if (argc > 2 && argv[2][strspn(argv[2], LETTERS)] == 0 && *argv[2]) {
 		snprintf(program, sizeof(program), "%s/incise-%s-%.64s", folder, command,
 			 argv[2]);
-		if (!access(program, X_OK))
+		if (!access(program, X_OK)) {
+			if (!has_libraries(program))
+				return 1;
 			execv(program, argv + 2);
+		}
 	}
 	snprintf(program, sizeof(program), "%s/incise-%s", folder, command);
+	if (!access(program, X_OK) && !has_libraries(program))
+		return 1;
 	execv(program, argv + 1);
 	snprintf(program, sizeof(program), "incise-%s", command);
 	if (errno == ENOENT)

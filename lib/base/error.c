@@ -4,7 +4,9 @@
  */
 #include <errno.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
+#include <string.h>
 #include <incise/error.h>
 #include <incise/version.h>
 
@@ -23,6 +25,69 @@ int incise_error_set(struct incise_error *err, int code, const char *fmt, ...)
 	}
 	errno = code;
 	return -code;
+}
+
+static bool is_digit(char c)
+{
+	return c >= '0' && c <= '9';
+}
+
+/*
+ * The Debian package of a shared object: by the rule of Debian Policy 8.1, libX2.so.3 is in
+ * libx2-3 and libx.so.3 in libx3, apart from a few. False for a name that is no such object's.
+ */
+static bool package_of(const char *soname, size_t length, char *package, size_t size)
+{
+	static const struct {
+		const char *soname, *package;
+	} exceptions[] = {
+		{"libhdf5_serial.so.103", "libhdf5-103-1"},
+		{"libhdf5_serial.so.310", "libhdf5-310"},
+		{"libjpeg.so.62", "libjpeg62-turbo"},
+		{"liblapacke.so.3", "liblapacke"},
+		{"libgcc_s.so.1", "libgcc-s1"},
+		{"libz.so.1", "zlib1g"},
+		{"libincise.so.2", "libincise2"},
+		{"libincise-learn.so.2", "libincise2"},
+		{"libincise-record.so.2", "libincise2"},
+		{"libincise-view.so.2", "libincise2"},
+	};
+	const char *so = memmem(soname, length, ".so.", 4);
+	size_t n = 0;
+
+	for (size_t i = 0; i < sizeof(exceptions) / sizeof(*exceptions); i++)
+		if (strlen(exceptions[i].soname) == length &&
+		    !strncmp(exceptions[i].soname, soname, length)) {
+			snprintf(package, size, "%s", exceptions[i].package);
+			return true;
+		}
+	if (!so || so == soname || length >= size - 1 || strncmp(soname, "lib", 3))
+		return false;
+	for (const char *c = soname; c < so; c++)
+		package[n++] = *c == '_' ? '-' : *c >= 'A' && *c <= 'Z' ? *c + 32 : *c;
+	if (is_digit(so[-1]))
+		package[n++] = '-';
+	for (const char *c = so + 4; c < soname + length; c++)
+		package[n++] = *c;
+	package[n] = '\0';
+	return package[strspn(package, "abcdefghijklmnopqrstuvwxyz0123456789+-.")] ==
+	       '\0';
+}
+
+int incise_error_library(struct incise_error *err, const char *where, const char *said)
+{
+	const size_t length = strcspn(said, ":");
+	char package[80];
+
+	/* "libmnl.so.0: cannot open shared object file: No such file or directory" */
+	if (!strncmp(said + length, ": cannot open shared object", 27) &&
+	    package_of(said, length, package, sizeof(package)))
+		return incise_error_set(err, ENOEXEC,
+					"%.200s: %.*s is missing; install what it needs: "
+					"sudo apt-get install %s",
+					where, (int)length, said, package);
+	return incise_error_set(err, ENOEXEC, "%.200s: %.250s; install what it needs",
+				where, said);
 }
 
 const char *incise_version(void)

@@ -34,12 +34,13 @@ int incise_module_open(struct incise_module *module, const char *path, const cha
 		       const char *where, struct incise_error *err)
 {
 	module->handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-	if (!module->handle)
-		return incise_error_set(
-			err, ENOEXEC,
-			"%s: the module cannot be loaded: %.300s; install "
-			"what it needs",
-			where, dlerror());
+	if (!module->handle) {
+		char what[200];
+
+		snprintf(what, sizeof(what), "%.150s: the module cannot be loaded",
+			 where);
+		return incise_error_library(err, what, dlerror());
+	}
 	module->symbol = dlsym(module->handle, symbol);
 	if (module->symbol)
 		return 0;

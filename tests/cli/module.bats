@@ -94,3 +94,33 @@ setup() {
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
 	failed_with "rig.conf:2: stepper: gpio chip no-such-chip: there is no such chip" gpiodetect
 }
+
+# A copy of a file that needs another version of a library, which there is not.
+without_library() {
+	grep -q "$3" "$1" || complain "$1 does not need $3" || return
+	sed "s/${3//./\\.}/$4/g" "$1" >"$2"
+}
+
+@test "a library that a module needs and is missing is named with its package" {
+	[ -e "$INCISE_BUILD/lib/incise/tracker_usb.so" ] || skip "libusb is not installed"
+	mkdir -p modules
+	export INCISE_MODULE_PATH=$PWD/modules
+	without_library "$INCISE_BUILD/lib/incise/tracker_usb.so" modules/tracker_usb.so \
+		libusb-1.0.so.0 libusb-1.0.so.9
+	echo 'tracker = "usb:"; force = "sim:";' >usb.conf
+	run --separate-stderr incise capture -o a.rec --duration 1s --rig usb.conf </dev/null
+	failed_with "libusb-1.0.so.9 is missing" "apt-get install libusb-1.0-9"
+}
+
+@test "a library that incise view needs and is missing is named with its package" {
+	mkdir bin lib
+	cp "$INCISE_BUILD"/bin/incise "$INCISE_BUILD"/bin/incise-view bin
+	cp "$INCISE_BUILD"/lib/libincise*.so.2 lib
+	without_library "$INCISE_BUILD/lib/libincise-view.so.2" lib/libincise-view.so.2 \
+		libSDL2-2.0.so.0 libSDL2-2.0.so.9
+	run --separate-stderr bin/incise view --help
+	failed_with "incise view: libSDL2-2.0.so.9 is missing" "apt-get install libsdl2-2.0-9"
+	[ -z "$output" ]
+	cp "$INCISE_BUILD/lib/libincise-view.so.2" lib
+	run -0 bin/incise view --help
+}

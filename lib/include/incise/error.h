@@ -29,5 +29,16 @@ struct incise_error {
 INCISE_API int incise_error_set(struct incise_error *err, int code, const char *fmt, ...)
 	INCISE_PRINTF(3, 4);
 
+/**
+ * Fill in the error of a shared library or module that cannot be loaded, with the Debian
+ * package of the library that is missing.
+ *
+ * @param where the object in front of the line
+ * @param said  what dlerror(3) returned
+ * @return -ENOEXEC
+ */
+INCISE_API int incise_error_library(struct incise_error *err, const char *where,
+				    const char *said);
+
 INCISE_END_DECLS
 #endif

@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <setjmp.h>
 #include <cmocka.h>
+#include <stdio.h>
 #include <errno.h>
 #include <string.h>
 #include <incise/error.h>
@@ -50,9 +51,58 @@ static void test_version(void **state)
 	assert_string_equal(incise_version(), INCISE_VERSION);
 }
 
+/* Packages of Debian 12 and 13, as `dpkg -S` names them. */
+static void test_a_missing_library_is_named_with_its_package(void **state)
+{
+	static const char *const cases[][2] = {
+		{"libSDL2-2.0.so.0", "libsdl2-2.0-0"},
+		{"libepoxy.so.0", "libepoxy0"},
+		{"libcairo.so.2", "libcairo2"},
+		{"libEGL.so.1", "libegl1"},
+		{"libmnl.so.0", "libmnl0"},
+		{"libiio.so.0", "libiio0"},
+		{"libcomedi.so.0", "libcomedi0"},
+		{"libgpiod.so.2", "libgpiod2"},
+		{"libgpiod.so.3", "libgpiod3"},
+		{"libusb-1.0.so.0", "libusb-1.0-0"},
+		{"libavformat.so.59", "libavformat59"},
+		{"libopencv_core.so.406", "libopencv-core406"},
+		{"libopencv_calib3d.so.410", "libopencv-calib3d410"},
+		{"libhdf5_serial.so.103", "libhdf5-103-1"},
+		{"libhdf5_serial.so.310", "libhdf5-310"},
+		{"libjpeg.so.62", "libjpeg62-turbo"},
+		{"libpng16.so.16", "libpng16-16"},
+		{"libstdc++.so.6", "libstdc++6"},
+		{"libsqlite3.so.0", "libsqlite3-0"},
+		{"libincise-view.so.2", "libincise2"},
+	};
+	struct incise_error err = {0};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		char said[200], want[200];
+
+		snprintf(said, sizeof(said),
+			 "%s: cannot open shared object file: No such file or directory",
+			 cases[i][0]);
+		snprintf(want, sizeof(want),
+			 "a: %s is missing; install what it needs: sudo apt-get install "
+			 "%s",
+			 cases[i][0], cases[i][1]);
+		assert_int_equal(incise_error_library(&err, "a", said), -ENOEXEC);
+		assert_string_equal(err.text, want);
+	}
+	incise_error_library(&err, "a", "x.so: file too short");
+	assert_string_equal(err.text, "a: x.so: file too short; install what it needs");
+	/* A name that is no library's is no package either. */
+	incise_error_library(&err, "a",
+			     "lib;rm.so.1: cannot open shared object file: No such file");
+	assert_null(strstr(err.text, "apt-get"));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_a_missing_library_is_named_with_its_package),
 		cmocka_unit_test(test_code_line_and_errno),
 		cmocka_unit_test(test_without_a_place_to_leave_it),
 		cmocka_unit_test(test_hostile_text),
