@@ -7,6 +7,7 @@ load cli
 load fastrak
 
 setup() {
+	watch_machine
 	work_folder
 	cat >rig.conf <<-END
 		clock = "real";
@@ -17,7 +18,9 @@ setup() {
 	END
 }
 
+# A terminal's buffer holds the records of half a second.
 teardown() {
+	machine_watched 100
 	pull_away
 }
 
