@@ -57,8 +57,15 @@ void view_running(struct view_job *job)
 	struct incise_error err = {0};
 	struct state_pages pages;
 	struct view_live *live;
+	const char *name;
 
 	state_pages_open(&pages, job->argument.path);
+	name = pages.page[0].name;
+	if (incise_state_alive(pages.page[0].state) != 1)
+		cli_fail(
+			"%s: its loop has ended, as 'incise status %s' says: start one "
+			"with 'incise haptic %s', or let the picture run its own by --rig",
+			name, name, name);
 	make_plan(job);
 	live = cli_require(view_live_open(pages.page[0].path, &err), &err);
 	state_pages_close(&pages);
