@@ -23,9 +23,10 @@ setup() {
 	END
 }
 
-# Buffers hold a second more than the stalls here.
+# Buffers hold a second more than the stalls here; a machine that lets others wait for this long has
+# no time to compress what they hold.
 teardown() {
-	machine_watched 500
+	machine_watched 100
 	pull_away
 	left_memory
 }
@@ -142,9 +143,10 @@ agreed() {
 	holds "$(key report.json tracker_lost) > 100"
 	[ "$(ask a.rec 'SELECT max(seq) - min(seq) + 1 - count(*) FROM tracker')" = \
 		"$(key report.json tracker_lost)" ]
-	# 240 of them a second, there or lost: 8 ms of jitter at either end
+	# 240 of them a second, there or lost; at either end an arrival is late by less than what the
+	# witness of the machine allows. straight() finds a number that is wrong by one.
 	holds "$(ask a.rec 'SELECT abs((max(arrival_ns) - min(arrival_ns)) * 240e-9 -
-		max(seq) + min(seq)) FROM tracker') < 3"
+		max(seq) + min(seq)) FROM tracker') < 24"
 	straight 240
 }
 
