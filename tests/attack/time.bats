@@ -164,7 +164,8 @@ agreed() {
 	[ "$code" = 1 ]
 	agreed
 	# where the line begins anew is where records are missing
-	[ "$(ask a.rec 'SELECT count(*) FROM knots WHERE begins')" = 2 ]
+	[ "$(ask a.rec 'SELECT count(*) FROM knots WHERE begins')" = 2 ] ||
+		complain "$(ask a.rec "SELECT * FROM knots WHERE begins; SELECT * FROM events")"
 	first=$(ask a.rec 'SELECT max(seq) FROM knots WHERE begins')
 	[ "$(ask a.rec "SELECT $first - max(seq) - 1 FROM tracker WHERE seq < $first")" = \
 		"$(key report.json tracker_lost)" ]

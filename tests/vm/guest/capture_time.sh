@@ -42,13 +42,19 @@ holds()
 	}
 }
 
-# Until it has written more than so many rows of a table.
+# rows_of STREAM: how many it has written
+rows_of()
+{
+	incise info a.rec.part --json >rows.json 2>/dev/null && sqlite3 :memory: "SELECT
+		json_extract(value, '\$.rows') FROM json_each(readfile('rows.json'), '\$.streams')
+		WHERE json_extract(value, '\$.name') = '$1'"
+}
+
+# until_rows STREAM N: until it has written more than that
 until_rows()
 {
 	i=0
-	until { incise info a.rec.part --json >rows.json 2>/dev/null &&
-		[ "$(sqlite3 :memory: "SELECT json_extract(readfile('rows.json'), '\$.rows.$1')")" \
-			-gt "$2" ]; } || [ $i = 60 ]; do
+	until rows=$(rows_of "$1") && [ "${rows:-0}" -gt "$2" ] || [ $i = 60 ]; do
 		# starting programs is most of the work in here
 		sleep 0.5
 		i=$((i + 1))
@@ -125,7 +131,7 @@ check "their stamps are by the clock that is not set" holds "count(*) > 10 AND
 rm -r a.rec
 incise capture -o a.rec --duration 5s --json >report.json 2>err &
 capture=$!
-until_rows frames 10
+until_rows camera 10
 check "the camera is taken away" sh -c 'echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind'
 wait $capture
 code=$?
@@ -166,7 +172,7 @@ paused()
 	rm -rf a.rec
 	incise capture -o a.rec --duration 9s --json >report.json 2>err &
 	capture=$!
-	until_rows frames 10
+	until_rows camera 10
 	kill -STOP $feeder
 	sleep 3
 	kill -CONT $feeder
