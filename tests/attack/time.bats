@@ -153,13 +153,16 @@ agreed() {
 @test "a tracker that comes back with another phase: its times are right at once" {
 	local code=0
 	plug_in
-	incise capture -o a.rec --camera off --duration 7s --json >report.json 2>err 3>&- 9>&- &
+	incise capture -o a.rec --camera off --duration 60s --json >report.json 2>err 3>&- 9>&- &
 	until_records 240
 	echo unplug >&9
 	sleep 0.5
 	# what is most, less than half a period, that rounding would move it by
 	echo late 3000 >&9
 	echo plug >&9
+	# where the line begins anew, and two seconds from there, however long that takes
+	until_records "$(($(key rows.json rows.tracker) + 480))"
+	kill -INT $!
 	wait $! || code=$?
 	[ "$code" = 1 ]
 	agreed
