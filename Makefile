@@ -140,6 +140,7 @@ help:
 clean: ## remove what was built
 	rm -rf $(O)
 
--include $(shell find $(O) -name '*.d' 2>/dev/null)
+# Not of the packages' own build, nor folders of that name, which come and go beside this make.
+-include $(shell find $(O) -path $(O)/deb -prune -o -name '*.d' -type f -print 2>/dev/null)
 
 .PHONY: all help clean

@@ -167,3 +167,9 @@ $good" 0
 	[[ "$output" == *LeakSanitizer* ]] || skip "LeakSanitizer cannot run here"
 	run -0 leaks gallium-25.0.7
 }
+
+# Packages are built in there beside other makes, with folders as /usr/lib/udev/rules.d.
+@test "a folder whose name ends in .d is no file of dependencies" {
+	mkdir -p o/deb/src/rules.d o/obj/rules.d
+	run -0 make --no-print-directory -C "$root" O="$PWD/o" DEPS=no help
+}
