@@ -74,18 +74,25 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 {
 	const struct incise_haptic_device *d = &s->device;
 
-	return json_pack("{so so so so so so so so sb sb s{sf sf sf sf sf si}}",
-			 "stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
-			 json_number(s->limit_N_mm), "margin", json_number(margin(s)),
-			 "damping_N_s_mm", json_number(s->damping_N_s_mm),
-			 "speed_slope_N_s_mm", json_number(s->speed_slope_N_s_mm),
-			 "passive_N_mm", json_number(passive_N_mm(s)), "encoder_N_mm",
-			 json_number(encoder_N_mm(s)), "guard_N_s_mm",
-			 json_number(s->guard_N_s_mm), "certified", s->certified,
-			 "own_delay", s->own_delay, "device", "mass_kg", d->mass_kg,
-			 "damping_N_s_mm", d->damping_N_s_mm, "coulomb_N", d->coulomb_N,
-			 "encoder_mm", d->encoder_mm, "period_s", d->period_s,
-			 "delay_ticks", d->delay_ticks);
+	return json_pack(
+		"{so so so so so so so so sf sf sf sf si s{sf sf sf sf sf} sf sf "
+		"si sb sb s{sf sf sf sf sf si}}",
+		"stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
+		json_number(s->limit_N_mm), "margin", json_number(margin(s)),
+		"damping_N_s_mm", json_number(s->damping_N_s_mm), "speed_slope_N_s_mm",
+		json_number(s->speed_slope_N_s_mm), "passive_N_mm",
+		json_number(passive_N_mm(s)), "encoder_N_mm",
+		json_number(encoder_N_mm(s)), "guard_N_s_mm",
+		json_number(s->guard_N_s_mm), "slope_N_mm", s->slope_N_mm,
+		"unloading_N_mm", s->unloading_N_mm, "support_mm", s->support_mm,
+		"beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "worst", "lean_N",
+		s->worst.lean_N, "along_mm_s", s->worst.along_mm_s, "depth_mm",
+		s->worst.depth_mm, "swing_mm", s->worst.swing_mm, "settle_s",
+		s->worst.settle_s, "noise_mm", s->noise_mm, "noise_N", s->noise_N,
+		"late_ticks", s->late_ticks, "certified", s->certified, "own_delay",
+		s->own_delay, "device", "mass_kg", d->mass_kg, "damping_N_s_mm",
+		d->damping_N_s_mm, "coulomb_N", d->coulomb_N, "encoder_mm", d->encoder_mm,
+		"period_s", d->period_s, "delay_ticks", d->delay_ticks);
 }
 
 static void report_json(const struct job *job, const struct incise_plan *plan,
@@ -135,6 +142,29 @@ static bool guarded(const struct incise_plan *plan)
 	return false;
 }
 
+/* The tissue of a model, and what the search for swings found. */
+static void print_model(const struct incise_plan_stability *s)
+{
+	printf("            the model: up to %.3g N/mm and %.3g N s/mm, to a depth of "
+	       "%.3g mm, then on with %.3g N/mm\n",
+	       s->slope_N_mm, s->speed_slope_N_s_mm, s->support_mm, s->beyond_N_mm);
+	if (s->unloading_N_mm > 0)
+		printf("            withdrawal: unloads with %.3g N/mm, %.3g mm for each N, "
+		       "then friction\n",
+		       s->unloading_N_mm, 1 / s->unloading_N_mm);
+	else
+		printf("            withdrawal: the model's force in both directions\n");
+	printf("            comes to rest: %d leans up to the limit; the slowest takes "
+	       "%.2g s, of %.2f N at %.1f mm",
+	       s->runs, s->worst.settle_s, s->worst.lean_N, s->worst.depth_mm);
+	if (s->worst.along_mm_s > 0)
+		printf(", while it goes along the skin with %g mm/s",
+		       s->worst.along_mm_s);
+	printf("\n            a tracker's noise of 0.02 mm moves it within %.2g mm and "
+	       "%.2g N\n",
+	       s->noise_mm, s->noise_N);
+}
+
 static void print_stability(const struct incise_plan *plan)
 {
 	struct incise_plan_stability s;
@@ -150,7 +180,9 @@ static void print_stability(const struct incise_plan *plan)
 	if (s.own_delay)
 		printf("forces %d ticks late\n", s.device.delay_ticks);
 	else
-		printf("poses up to %d ticks old, extrapolated\n", s.device.delay_ticks);
+		printf("poses up to %d ticks old, extrapolated, and an actuator %d ticks "
+		       "late\n            the same in hands of 0.14 to 0.55 kg\n",
+		       s.device.delay_ticks, s.late_ticks);
 	if (isfinite(passive_N_mm(&s)))
 		printf("            passive in any hand up to %.4g N/mm\n",
 		       passive_N_mm(&s));
@@ -161,10 +193,8 @@ static void print_stability(const struct incise_plan *plan)
 		printf("            its guard adds up to %.3g N s/mm, which the loop can "
 		       "spare%s\n",
 		       s.guard_N_s_mm, s.guard_N_s_mm > 0 ? "" : ": it can do nothing");
-	if (s.speed_slope_N_s_mm > 0)
-		printf("            not counted: the model's force changes by up to %.3g N per "
-		       "mm/s, either way\n",
-		       s.speed_slope_N_s_mm);
+	if (s.support_mm > 0)
+		print_model(&s);
 }
 
 static void report_text(const struct job *job, const struct incise_plan *plan,

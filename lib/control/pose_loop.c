@@ -22,7 +22,7 @@
 /* On their way are those of the latency, and those that wait for their tick. */
 #define WAITING_MOST (LATE_MOST + POSES_MOST)
 #define OWN_STATES 7 /* of device and predictor */
-#define STATES (OWN_STATES + WAITING_MOST)
+#define STATES (OWN_STATES + WAITING_MOST + INCISE_POSE_LOOP_LATE_MAX)
 
 /* Part of a tick that a pose waits before it is taken in: the mean. */
 #define LEAD 0.5
@@ -42,6 +42,7 @@ struct loop {
 	double tick_s, pose_s, latency_s;
 	int ticks, poses; /* in a period */
 	int waiting;	  /* poses on their way when a period starts */
+	int late;	  /* ticks until a force acts */
 	int states;
 	double K, B;
 };
@@ -53,6 +54,8 @@ struct run {
 	double pose_mm[WAITING_MOST + POSES_MOST][3]; /* the oldest first */
 	int n;
 	double force_N[3];
+	double late_N[INCISE_POSE_LOOP_LATE_MAX + 1]
+		     [3]; /* on their way, the oldest first */
 	double t_s;
 };
 
@@ -61,8 +64,8 @@ static int64_t to_ns(double t_s)
 	return BEGIN_NS + llround(t_s * INCISE_NS_PER_S);
 }
 
-/* Each state's place in a run, in mm, mm/s, mm/s². */
-static double *place(struct run *run, int state, int axis)
+/* Each state's place in a run, in mm, mm/s, mm/s², N. */
+static double *place(const struct loop *loop, struct run *run, int state, int axis)
 {
 	double *const own[OWN_STATES] = {
 		&run->plant[axis].position_mm, &run->plant[axis].velocity_mm_s,
@@ -71,7 +74,11 @@ static double *place(struct run *run, int state, int axis)
 		&run->predict.v_shown[axis],
 	};
 
-	return state < OWN_STATES ? own[state] : &run->pose_mm[state - OWN_STATES][axis];
+	if (state < OWN_STATES)
+		return own[state];
+	state -= OWN_STATES;
+	return state < loop->waiting ? &run->pose_mm[state][axis]
+				     : &run->late_N[state - loop->waiting][axis];
 }
 
 static void go_to(struct run *run, double t_s)
@@ -101,7 +108,10 @@ static void set_force(const struct loop *loop, struct run *run)
 
 	incise_predict_at(&run->predict, to_ns(run->t_s), x, v, attitude);
 	for (int i = 0; i < 3; i++)
-		run->force_N[i] = -loop->K * x[i] - loop->B * v[i];
+		run->late_N[loop->late][i] = -loop->K * x[i] - loop->B * v[i];
+	memcpy(run->force_N, run->late_N[0], sizeof(run->force_N));
+	memmove(run->late_N[0], run->late_N[1],
+		(size_t)loop->late * sizeof(run->late_N[0]));
 }
 
 /* Round a period: the last poses are taken in before the tick that starts the next one. */
@@ -140,11 +150,12 @@ static void measure(const struct loop *loop, double matrix[STATES][STATES])
 		};
 
 		for (int i = 0; i < 3 && column + i < loop->states; i++)
-			*place(&run, column + i, i) = SIZE_MM;
+			*place(loop, &run, column + i, i) = SIZE_MM;
 		run_period(loop, &run);
 		for (int row = 0; row < loop->states; row++)
 			for (int i = 0; i < 3 && column + i < loop->states; i++)
-				matrix[row][column + i] = *place(&run, row, i) / SIZE_MM;
+				matrix[row][column + i] =
+					*place(loop, &run, row, i) / SIZE_MM;
 	}
 }
 
@@ -181,18 +192,22 @@ static bool decays(double matrix[STATES][STATES], int n)
 	double log_norm = 0;
 
 	for (int n_squared = 0; n_squared < SQUARINGS; n_squared++) {
-		double square[STATES][STATES] = {{0}}, norm = normalise(matrix, n);
+		double square[STATES][STATES], norm = normalise(matrix, n);
 
 		if (!(norm > 0))
 			return false;
 		log_norm = 2 * log_norm + log(norm);
 		if (log_norm < 0)
 			return true;
-		for (int i = 0; i < n; i++)
+		/* Only the states that there are: most of the array is not used. */
+		for (int i = 0; i < n; i++) {
+			memset(square[i], 0, (size_t)n * sizeof(**square));
 			for (int k = 0; k < n; k++)
 				for (int j = 0; j < n; j++)
 					square[i][j] += matrix[i][k] * matrix[k][j];
-		memcpy(matrix, square, sizeof(square));
+		}
+		for (int i = 0; i < n; i++)
+			memcpy(matrix[i], square[i], (size_t)n * sizeof(**square));
 	}
 	return log_norm < STAYS;
 }
@@ -219,7 +234,7 @@ static void set_times(struct loop *loop, double tick_s)
 	loop->tick_s = loop->pose_s * loop->poses / loop->ticks;
 	loop->waiting =
 		(int)((loop->latency_s + LEAD * loop->tick_s) / loop->pose_s + 1e-9);
-	loop->states = OWN_STATES + loop->waiting;
+	loop->states = OWN_STATES + loop->waiting + loop->late;
 }
 
 /* The predictor as it is at the begin of a period, with all that it knows 0. */
@@ -236,11 +251,46 @@ static void set_predict(struct loop *loop)
 		p->x[i] = p->v[i] = p->a[i] = p->x_shown[i] = p->v_shown[i] = 0;
 }
 
-static bool valid(const struct incise_haptic_device *d, double damping_N_s_mm)
+static bool valid(const struct incise_pose_loop *of)
 {
+	const struct incise_haptic_device *d = of->device;
+
 	return d->mass_kg > 0 && isfinite(d->mass_kg) && d->damping_N_s_mm >= 0 &&
 	       isfinite(d->damping_N_s_mm) && d->period_s > 0 && isfinite(d->period_s) &&
-	       isfinite(damping_N_s_mm);
+	       isfinite(of->damping_N_s_mm) && of->late_ticks >= 0 &&
+	       of->late_ticks <= INCISE_POSE_LOOP_LATE_MAX;
+}
+
+static void loop_init(struct loop *loop, const struct incise_pose_loop *of)
+{
+	const struct incise_haptic_device *device = of->device;
+	const struct incise_hand_impedance *hand = of->hand;
+
+	*loop = (struct loop){
+		.plant = {.mass_kg = device->mass_kg,
+			  .damping_N_s_mm = device->damping_N_s_mm},
+		.predict = *of->predict,
+		.late = of->late_ticks,
+		.B = of->damping_N_s_mm,
+	};
+	if (hand) {
+		loop->plant.mass_kg += hand->mass_kg;
+		loop->plant.damping_N_s_mm += hand->damping_N_s_mm;
+		loop->plant.wall_N_mm = hand->stiffness_N_mm;
+		loop->plant.tied = true;
+	}
+	set_times(loop, device->period_s);
+	set_predict(loop);
+}
+
+bool incise_pose_loop_holds(const struct incise_pose_loop *of, double stiffness_N_mm)
+{
+	struct loop loop;
+
+	if (!valid(of) || !isfinite(stiffness_N_mm))
+		return false;
+	loop_init(&loop, of);
+	return stable(&loop, stiffness_N_mm);
 }
 
 /* The scan: softest wall, as a part of what a delay holds; factor; how many. */
@@ -249,25 +299,18 @@ static bool valid(const struct incise_haptic_device *d, double damping_N_s_mm)
 #define STEPS 400
 #define HALVINGS 40
 
-double incise_pose_loop_limit(const struct incise_haptic_device *device,
-			      const struct incise_predict *predict, double damping_N_s_mm)
+double incise_pose_loop_limit(const struct incise_pose_loop *of)
 {
 	double late_s, low = 0, high;
-	struct loop loop = {
-		.plant = {.mass_kg = device->mass_kg,
-			  .damping_N_s_mm = device->damping_N_s_mm},
-		.predict = *predict,
-		.B = damping_N_s_mm,
-	};
+	struct loop loop;
 
-	if (!valid(device, damping_N_s_mm))
+	if (!valid(of))
 		return 0;
-	set_times(&loop, device->period_s);
-	set_predict(&loop);
-	late_s = loop.latency_s + loop.pose_s;
-	high = device->mass_kg * N_S2_PER_MM_KG / late_s;
-	if (device->damping_N_s_mm > 0)
-		high = fmin(high, device->damping_N_s_mm);
+	loop_init(&loop, of);
+	late_s = loop.latency_s + loop.pose_s + loop.late * loop.tick_s;
+	high = loop.plant.mass_kg * N_S2_PER_MM_KG / late_s;
+	if (loop.plant.damping_N_s_mm > 0)
+		high = fmin(high, loop.plant.damping_N_s_mm);
 	high *= SOFTEST / late_s;
 	/* Upwards, for a wall may be stable again beyond one that is not. */
 	for (int i = 0; i < STEPS && stable(&loop, high); i++) {

@@ -20,31 +20,47 @@
  * what device (incise/plant.h) and predictor (predict.h) make of each unit state in one P.
  * So it is that of the real predictor, whatever that becomes.
  *
- *   state: device x v | predictor x v a, shown x v | poses on their way
+ *   state: device x v | predictor x v a, shown x v | poses on their way | forces on theirs
  *
  * N, mm, s.
  */
 #ifndef INCISE_POSE_LOOP_H
 #define INCISE_POSE_LOOP_H
 
+#include <stdbool.h>
 #include <incise/stability.h>
 #include "predict.h"
 
+#define INCISE_POSE_LOOP_LATE_MAX 16 /* ticks */
+
+/* A hand that holds the device: passive, added to its mass and damping, and tied to a place. */
+struct incise_hand_impedance {
+	double mass_kg, damping_N_s_mm, stiffness_N_mm;
+};
+
+struct incise_pose_loop {
+	/* Coulomb friction, encoder and delay_ticks are left out; so is noise. */
+	const struct incise_haptic_device *device;
+	/* As initialised for the tracker: its gains, period and latency count. */
+	const struct incise_predict *predict;
+	double damping_N_s_mm; /* of the wall, B, by the predictor's velocity */
+	int late_ticks;	       /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX */
+	const struct incise_hand_impedance *hand; /* or NULL: none */
+};
+
+/* Whether a wall of this stiffness is stable in the loop. Some 0.1 ms; no allocation. */
+bool incise_pose_loop_holds(const struct incise_pose_loop *loop, double stiffness_N_mm);
+
 /*
- * Stiffness up to which the wall is stable in this loop. Coulomb friction, encoder and
- * delay_ticks are left out; so is noise.
+ * Stiffness up to which the wall is stable in the loop.
  *
  * Times that are no multiples of each other are made so by the longer tick, or by the
  * slower tracker when that is the faster of the two. Beyond 64 ticks in a P, or 16 P in a
  * tick or 32 in the latency, tick or P are made longer too.
  *
- * @predict: as initialised for the tracker: its gains, period and latency count
- * @damping_N_s_mm: of the wall, B, by the predictor's velocity
  * Returns N/mm; 0 when even the softest wall is unstable, or of a device that cannot be.
  * Takes some milliseconds, more with many P in the latency; no allocation.
  */
-double incise_pose_loop_limit(const struct incise_haptic_device *device,
-			      const struct incise_predict *predict,
-			      double damping_N_s_mm);
+double incise_pose_loop_limit(const struct incise_pose_loop *loop);
 
 #endif

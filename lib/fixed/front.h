@@ -3,7 +3,7 @@
  * The front of a cut in integers: what incise_front_force() does in double, see
  * lib/tissue/front.h for the law and its figure.
  *
- *   lengths Q16.16 mm    forces Q16.16 N    stiffness Q16.16 N/mm    work Q32.32 N mm
+ *   lengths Q16.16 mm    forces Q16.16 N    stiffness Q16.16 N/mm    work Q31.32 N mm
  *
  * 64-bit integers only: builds in a kernel, for 32 bits too.
  */
@@ -17,7 +17,7 @@
 struct incise_fixed_front {
 	int32_t depth, force; /* of the last call */
 	int32_t rest, cut;
-	int64_t work, most; /* work: held to ±2^62; the most so far */
+	int64_t work2, most2; /* twice the work put in, held to ±2^62; the most so far */
 };
 
 /*

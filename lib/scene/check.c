@@ -2,7 +2,8 @@
 /*
  * Whether a scene is stable on its device, before its first tick: the largest stiffness
  * of the scene against the limit of the loop with the tracker's poses, or, where the scene
- * says how late its device answers, against the exact limit of a wall so late.
+ * says how late its device answers, against the exact limit of a wall so late. A scene with a
+ * model is then searched for swings that do not end; see rest.h.
  */
 #include <errno.h>
 #include <limits.h>
@@ -10,7 +11,42 @@
 #include <stdio.h>
 #include "../model/slope.h"
 #include "../control/pose_loop.h"
-#include "plan.h"
+#include "rest.h"
+
+/*
+ * The unloading is steeper than any slope of the model, so that the force can follow it: by as
+ * much that the force may rise with the speed on the work that a cut has taken.
+ */
+#define STEEPER 1.5
+
+static double model_N(const struct incise_plan *plan, double depth_mm)
+{
+	const double x[] = {depth_mm, 0};
+
+	if (plan->fixed)
+		return incise_fixed_eval_double(plan->fixed, x);
+	return incise_model_eval(plan->model, x, NULL);
+}
+
+/* Part of the support over which the slope at its end is taken; least stiffness. */
+#define EDGE 0.05
+#define LEAST_N_mm 1e-3
+
+/* The model's support, its slope there, and the stiffness with which its tissue unloads. */
+static void set_tissue(struct incise_plan *plan, double steepest_N_mm)
+{
+	double support_mm = plan->fixed ? plan->fixed->input[0].max / INCISE_FIXED_ONE
+					: incise_model_info(plan->model)->input[0].max;
+	double edge_mm = EDGE * support_mm, slope;
+	double own = plan->scene->tissue.force[0][INCISE_REACTION_UNLOADING];
+
+	slope = (model_N(plan, support_mm) - model_N(plan, support_mm - edge_mm)) /
+		edge_mm;
+	plan->support_mm = support_mm;
+	plan->beyond_N_mm = fmin(fmax(plan->gain * slope, 0), steepest_N_mm);
+	plan->dissipates = plan->scene->tissue.dissipates;
+	plan->unloading_N_mm = fmax(own > 0 ? own : STEEPER * steepest_N_mm, LEAST_N_mm);
+}
 
 /* The largest slopes of the model, by depth and by speed. */
 static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
@@ -25,7 +61,12 @@ static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 	s->certified = slope[0].certified && slope[1].certified;
 	s->speed_slope_N_s_mm =
 		plan->gain * fmax(fabs(slope[1].lowest), fabs(slope[1].highest));
-	*stiffness_N_mm = plan->gain * fmax(slope[0].highest, 0);
+	s->slope_N_mm = plan->gain * fmax(slope[0].highest, 0);
+	set_tissue(plan, s->slope_N_mm);
+	s->support_mm = plan->support_mm;
+	s->beyond_N_mm = plan->beyond_N_mm;
+	s->unloading_N_mm = plan->dissipates ? plan->unloading_N_mm : 0;
+	*stiffness_N_mm = plan->dissipates ? plan->unloading_N_mm : s->slope_N_mm;
 	return 0;
 }
 
@@ -45,13 +86,27 @@ static void set_delay(struct incise_plan *plan, const struct incise_tracker_info
 							: (int)fmin(ticks, INT_MAX);
 }
 
+static struct incise_pose_loop pose_loop(const struct incise_plan *plan,
+					 double damping_N_s_mm,
+					 const struct incise_hand_impedance *hand)
+{
+	return (struct incise_pose_loop){
+		.device = &plan->stability.device,
+		.predict = &plan->predict,
+		.damping_N_s_mm = damping_N_s_mm,
+		.late_ticks = plan->scene->device.late_ticks,
+		.hand = hand,
+	};
+}
+
+/* Of the bare device, which is the worst. */
 static double limit_N_mm(const struct incise_plan *plan, double damping_N_s_mm)
 {
-	struct incise_haptic_device device = plan->stability.device;
+	const struct incise_pose_loop loop = pose_loop(plan, damping_N_s_mm, NULL);
 
 	if (plan->stability.own_delay)
-		return incise_stability_limit(&device, damping_N_s_mm);
-	return incise_pose_loop_limit(&device, &plan->predict, damping_N_s_mm);
+		return incise_stability_limit(loop.device, damping_N_s_mm);
+	return incise_pose_loop_limit(&loop);
 }
 
 static bool holds(const struct incise_plan *plan, double stiffness_N_mm,
@@ -65,11 +120,27 @@ static bool holds(const struct incise_plan *plan, double stiffness_N_mm,
 	return stiffness_N_mm <= most;
 }
 
+/* In each hand that may hold the device, which is no part of a delay that the scene gives. */
+static bool hands_hold(const struct incise_plan *plan, double share)
+{
+	const struct incise_plan_stability *s = &plan->stability;
+
+	for (int i = 0; i < INCISE_HANDS && !s->own_delay; i++) {
+		const struct incise_pose_loop loop =
+			pose_loop(plan, share * s->damping_N_s_mm, &incise_hands[i]);
+
+		if (!incise_pose_loop_holds(&loop, share * s->stiffness_N_mm))
+			return false;
+	}
+	return true;
+}
+
 static bool stable(const struct incise_plan *plan, double share)
 {
 	const struct incise_plan_stability *s = &plan->stability;
 
-	return holds(plan, share * s->stiffness_N_mm, share * s->damping_N_s_mm);
+	return holds(plan, share * s->stiffness_N_mm, share * s->damping_N_s_mm) &&
+	       hands_hold(plan, share);
 }
 
 double incise_plan_spare_damping(const struct incise_plan *plan, double most_N_s_mm)
@@ -95,7 +166,7 @@ static double largest_gain(const struct incise_plan *plan)
 {
 	double low = 0, high = 1;
 
-	if (!(plan->stability.damping_N_s_mm > 0))
+	if (!(plan->stability.damping_N_s_mm > 0) && hands_hold(plan, 1))
 		return plan->gain * plan->stability.limit_N_mm /
 		       plan->stability.stiffness_N_mm;
 	while (high - low > 1e-4) {
@@ -171,6 +242,7 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 		.period_s = 1 / scene->rate_hz,
 	};
 	set_delay(plan, tracker);
+	s->late_ticks = scene->device.late_ticks;
 	s->certified = true;
 	if ((plan->model || plan->fixed) && survey_model(plan, &model_N_mm))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
@@ -191,4 +263,107 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 		"%g kg and %g N s/mm %s holds %.4g N/mm; %s, or describe the device",
 		scene->path, s->stiffness_N_mm, s->damping_N_s_mm, s->device.mass_kg,
 		s->device.damping_N_s_mm, delay, s->limit_N_mm, advice);
+}
+
+/*
+ * Halvings of what ends a swing, a gain or a damping, which are tried in the way that swung;
+ * then all ways are, and it is made safer by SAFER until they rest.
+ */
+#define HALVINGS 5
+#define SAFER 1.1
+#define SAFER_MOST 3
+#define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
+
+static bool rests(const struct incise_plan *plan,
+		  const struct incise_tracker_info *tracker, double gain,
+		  double damping_N_s_mm, int way)
+{
+	const struct incise_rest_trial trial = {gain, damping_N_s_mm, way};
+	struct incise_rest rest;
+
+	return !incise_plan_rest(plan, tracker, &trial, &rest) && rest.rests;
+}
+
+/* The largest gain that rests, times the plan's; 0: none was found. */
+static double resting_gain(const struct incise_plan *plan,
+			   const struct incise_tracker_info *tracker, int way)
+{
+	double low = 0, high = 1, damping = plan->stability.device.damping_N_s_mm;
+
+	for (int i = 0; i < HALVINGS; i++) {
+		double middle = (low + high) / 2;
+
+		*(rests(plan, tracker, middle, damping, way) ? &low : &high) = middle;
+	}
+	for (int i = 0; i < SAFER_MOST; i++, low /= SAFER)
+		if (rests(plan, tracker, low, damping, -1))
+			return low;
+	return 0;
+}
+
+/* The smallest damping of the device that rests; 0: none was found. */
+static double resting_damping(const struct incise_plan *plan,
+			      const struct incise_tracker_info *tracker, int way)
+{
+	double low = plan->stability.device.damping_N_s_mm;
+	double high = DAMPING_MOST * fmax(low, 1e-3);
+
+	if (!rests(plan, tracker, 1, high, way))
+		return 0;
+	low = fmax(low, high / DAMPING_MOST);
+	for (int i = 0; i < HALVINGS; i++) {
+		double middle = sqrt(low * high);
+
+		*(rests(plan, tracker, 1, middle, way) ? &high : &low) = middle;
+	}
+	for (int i = 0; i < SAFER_MOST; i++, high *= SAFER)
+		if (rests(plan, tracker, 1, high, -1))
+			return high;
+	return 0;
+}
+
+int incise_plan_check_rest(struct incise_plan *plan,
+			   const struct incise_tracker_info *tracker,
+			   struct incise_error *err)
+{
+	struct incise_plan_stability *s = &plan->stability;
+	const struct incise_rest_trial as_is = {1, s->device.damping_N_s_mm, -1};
+	char advice[160] = "no smaller gain and no damping of the device ends it";
+	struct incise_rest rest;
+	double gain, damping;
+
+	if (!plan->model && !plan->fixed)
+		return 0;
+	if (incise_plan_rest(plan, tracker, &as_is, &rest))
+		return incise_error_set(err, ENOMEM, "no memory for a plan");
+	s->runs = rest.runs;
+	s->worst.lean_N = rest.lean_N;
+	s->worst.along_mm_s = rest.along_mm_s;
+	s->worst.depth_mm = rest.depth_mm;
+	s->worst.swing_mm = rest.swing_mm;
+	s->worst.settle_s = rest.settle_s;
+	s->noise_mm = rest.noise_mm;
+	s->noise_N = rest.noise_N;
+	if (rest.rests)
+		return 0;
+	gain = three_digits_down(resting_gain(plan, tracker, rest.way) * plan->gain);
+	damping = resting_damping(plan, tracker, rest.way);
+	if (gain > 0 && damping > 0)
+		snprintf(advice, sizeof(advice),
+			 "set tissue.gain to at most %.3g, or use a device with "
+			 "device.damping_N_s_mm of at least %.3g",
+			 gain, damping);
+	else if (gain > 0)
+		snprintf(advice, sizeof(advice), "set tissue.gain to at most %.3g", gain);
+	else if (damping > 0)
+		snprintf(advice, sizeof(advice),
+			 "use a device with device.damping_N_s_mm of at least %.3g",
+			 damping);
+	return incise_error_set(
+		err, EDOM,
+		"%s: does not come to rest: a hand that leans on it with %.2f N%s at %.1f mm "
+		"depth swings by %.3f mm and %.2f N; %s",
+		plan->scene->path, rest.lean_N,
+		rest.along_mm_s > 0 ? " while it goes along the skin" : "", rest.depth_mm,
+		rest.swing_mm, rest.swing_N, advice);
 }

@@ -83,9 +83,9 @@ static incise_force_fn *way(const struct incise_plan *plan,
 			    const struct incise_tissue_force *force)
 {
 	if (force->model && plan->fixed)
-		return force->model_fixed;
+		return plan->dissipates ? force->front_fixed : force->model_fixed;
 	if (force->model && plan->model)
-		return force->model;
+		return plan->dissipates ? force->front : force->model;
 	return plan->scene->fixed && force->fixed ? force->fixed : force->run;
 }
 

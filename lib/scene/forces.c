@@ -4,6 +4,8 @@
  * where the contact began, n the outward normal (the paper's Sn, or Snavg), d the depth.
  *
  *   cutting     reaction    F += Kn d n                      §2.2, Fn
+ *               with a model F += F(d, |v|) n                paper 1, eq. (3), by the front
+ *                                                            of ../tissue/front.h
  *               plane       F -= Kx ((P-P0)·s) s             §2.2, Fx
  *   insertion   insertion   F += Ky d n Fort                 §2.3, Fy
  *               spread      F -= Kxz (I - n nᵀ)(P-P0)        §2.3, Fxz
@@ -51,7 +53,8 @@ static void add_fixed(double force[3], const struct incise_fixed_spring *spring,
 }
 
 static incise_force_fn reaction, reaction_fixed, reaction_model, reaction_model_fixed,
-	plane, plane_fixed, damping, insertion, spread;
+	reaction_front, reaction_front_fixed, plane, plane_fixed, damping, insertion,
+	spread;
 
 static void reaction(struct incise_plan *plan, struct incise_tick *tick,
 		     struct incise_acting_force *own)
@@ -74,43 +77,113 @@ static void reaction_fixed(struct incise_plan *plan, struct incise_tick *tick,
 		add_fixed(plan->force_N, &spring, below, origin, true);
 }
 
-/* Paper 1, eq. (3), as the size of paper 2's Fn; tissue does not pull. */
-static void add_model(struct incise_plan *plan, struct incise_tick *tick, double size_N,
-		      bool outside)
+/*
+ * Paper 1, eq. (3), as the size of paper 2's Fn; tissue does not pull. Beyond the depths that
+ * the model knows the force goes on with the slope that it has there.
+ */
+static double cutting_N(struct incise_plan *plan, struct incise_tick *tick, double size_N,
+			bool outside)
 {
+	double beyond_mm = fmax(plan->depth_mm - plan->support_mm, 0);
+
 	/* With no gain the model is asked only to keep the stage, not for a force. */
 	if (outside && plan->gain > 0)
 		tick->flags |= INCISE_TICK_EXTRAPOLATED;
-	v3_add(plan->force_N, plan->force_N, fmax(plan->gain * size_N, 0), plan->normal);
+	return fmax(plan->gain * size_N, 0) + plan->beyond_N_mm * beyond_mm;
+}
+
+static double cutting_double(struct incise_plan *plan, struct incise_tick *tick)
+{
+	double x[] = {plan->depth_mm, tick->velocity_mm_s};
+	unsigned int flags = 0;
+	double size_N = incise_model_eval(plan->model, x, &flags);
+
+	return cutting_N(plan, tick, size_N, flags);
+}
+
+static double cutting_fixed(struct incise_plan *plan, struct incise_tick *tick)
+{
+	double x[] = {plan->depth_mm, tick->velocity_mm_s};
+	bool outside = false;
+
+	for (int i = 0; i < 2; i++)
+		outside |= x[i] * INCISE_FIXED_ONE < plan->fixed->input[i].min ||
+			   x[i] * INCISE_FIXED_ONE > plan->fixed->input[i].max;
+	return cutting_N(plan, tick, incise_fixed_eval_double(plan->fixed, x), outside);
+}
+
+static void push(struct incise_plan *plan, double force_N)
+{
+	v3_add(plan->force_N, plan->force_N, force_N, plan->normal);
 }
 
 static void reaction_model(struct incise_plan *plan, struct incise_tick *tick,
 			   struct incise_acting_force *own)
 {
-	double x[] = {plan->depth_mm, tick->velocity_mm_s};
-	unsigned int flags = 0;
-	double size_N;
-
 	(void)own;
-	if (!(plan->depth_mm > 0))
-		return;
-	size_N = incise_model_eval(plan->model, x, &flags);
-	add_model(plan, tick, size_N, flags);
+	if (plan->depth_mm > 0)
+		push(plan, cutting_double(plan, tick));
 }
 
 static void reaction_model_fixed(struct incise_plan *plan, struct incise_tick *tick,
 				 struct incise_acting_force *own)
 {
-	double x[] = {plan->depth_mm, tick->velocity_mm_s};
-	bool outside = false;
-
 	(void)own;
-	if (!(plan->depth_mm > 0))
-		return;
-	for (int i = 0; i < 2; i++)
-		outside |= x[i] * INCISE_FIXED_ONE < plan->fixed->input[i].min ||
-			   x[i] * INCISE_FIXED_ONE > plan->fixed->input[i].max;
-	add_model(plan, tick, incise_fixed_eval_double(plan->fixed, x), outside);
+	if (plan->depth_mm > 0)
+		push(plan, cutting_fixed(plan, tick));
+}
+
+/* New tissue that the blade meets at this tick, mm. */
+static double advance_mm(struct incise_plan *plan, struct incise_acting_force *own,
+			 bool *fresh)
+{
+	struct incise_front *cut = &own->state.front.cut;
+	const double *side = plan->incision.side;
+
+	*fresh =
+		plan->proxy.began && incise_front_enter(cut, plan->p0_mm, plan->sn, side);
+	return incise_front_advance(cut, plan->proxy.touch.point_mm, plan->sn, side);
+}
+
+static void reaction_front(struct incise_plan *plan, struct incise_tick *tick,
+			   struct incise_acting_force *own)
+{
+	bool fresh;
+	double way_mm = advance_mm(plan, own, &fresh);
+	double most_N = plan->depth_mm > 0 ? cutting_double(plan, tick) : 0;
+
+	push(plan, incise_front_force(&own->state.front.cut, plan->unloading_N_mm,
+				      own->number[INCISE_REACTION_FRICTION],
+				      plan->depth_mm, way_mm, most_N));
+}
+
+/* Beyond 10 m of new tissue in one cut nothing is added: the integers would not hold it. */
+#define CUT_MOST_MM 1e4
+
+static void reaction_front_fixed(struct incise_plan *plan, struct incise_tick *tick,
+				 struct incise_acting_force *own)
+{
+	struct incise_fixed_front *fixed = &own->state.front.fixed;
+	int32_t before = own->state.front.advance;
+	bool fresh;
+	double way_mm = advance_mm(plan, own, &fresh);
+	double most_N = plan->depth_mm > 0 ? cutting_fixed(plan, tick) : 0;
+
+	if (plan->proxy.began)
+		fixed->depth = fixed->force = fixed->rest = 0;
+	if (fresh) {
+		*fixed = (struct incise_fixed_front){0};
+		own->state.front.advance_mm = before = 0;
+	}
+	own->state.front.advance_mm =
+		fmin(own->state.front.advance_mm + way_mm, CUT_MOST_MM);
+	own->state.front.advance = to_fixed(own->state.front.advance_mm);
+	push(plan, (double)incise_fixed_front_force(
+			   fixed, to_fixed(plan->unloading_N_mm),
+			   to_fixed(own->number[INCISE_REACTION_FRICTION]),
+			   to_fixed(plan->depth_mm), own->state.front.advance - before,
+			   to_fixed(most_N)) /
+			   INCISE_FIXED_ONE);
 }
 
 /* The blade stays in the plane of its cut: s is Sx(0), its side when the cut began. */
@@ -190,12 +263,16 @@ const struct incise_tissue_force incise_tissue_forces[] = {
 		.name = "reaction",
 		.phases = CUTTING,
 		.kind = INCISE_SPRING_NORMAL,
-		.number = {{"reaction_N_mm", 1000, 0, 0.14}},
+		.number = {{"reaction_N_mm", 1000, 0, 0.14},
+			   {"unloading_N_mm", 1000, 0, 0},
+			   {"friction", 1, 0.1, 0.1}},
 		.zero = "no model, and tissue.reaction_N_mm is 0",
 		.run = reaction,
 		.fixed = reaction_fixed,
 		.model = reaction_model,
 		.model_fixed = reaction_model_fixed,
+		.front = reaction_front,
+		.front_fixed = reaction_front_fixed,
 	},
 	{
 		.name = "plane",

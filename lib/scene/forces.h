@@ -10,11 +10,13 @@
 
 #include <stdbool.h>
 #include <incise/export.h>
+#include "../fixed/front.h"
 #include "../fixed/spring.h"
+#include "../tissue/front.h"
 
 /* A plan keeps at most INCISE_PLAN_STAGES_MAX stages, forces among them. */
 #define INCISE_FORCES_MAX 7
-#define INCISE_FORCE_NUMBERS 2
+#define INCISE_FORCE_NUMBERS 3
 
 struct incise_plan;
 struct incise_tick;
@@ -28,6 +30,10 @@ enum incise_force_kind {
 	INCISE_FRICTION,    /* N against the motion */
 };
 
+/* Numbers of the reaction, the first row, besides its stiffness: with a model. */
+#define INCISE_REACTION_UNLOADING 1
+#define INCISE_REACTION_FRICTION 2
+
 /* A number of the group `tissue` of a scene: 0 … max. */
 struct incise_force_number {
 	const char *key;
@@ -40,6 +46,12 @@ union incise_force_state {
 	struct incise_fixed_spring
 		spring;	  /* plane in fixed point, set when contact starts */
 	bool in_incision; /* insertion: the instrument went in where the blade had cut */
+	struct {
+		struct incise_front cut; /* reaction; in fixed point its place only */
+		struct incise_fixed_front fixed; /* the forces then */
+		double advance_mm; /* in the cut, so that no rounding adds up */
+		int32_t advance;   /* of that, what the integers have had */
+	} front;
 };
 
 /* A force as a plan runs it. */
@@ -64,6 +76,8 @@ struct incise_tissue_force {
 	incise_force_fn *fixed; /* with arithmetic = "fixed"; NULL: as @run */
 	/* A model takes the place of the first number; NULL: it does not. */
 	incise_force_fn *model, *model_fixed;
+	/* The same with a tissue that dissipates: tissue.withdrawal. */
+	incise_force_fn *front, *front_fixed;
 };
 
 /* In the order in which they run. */

@@ -272,6 +272,8 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 		incise_plan_choose(plan);
 		rc = equip(plan, &tracker, err);
 	}
+	if (!rc)
+		rc = incise_plan_check_rest(plan, &tracker, err);
 	if (rc) {
 		incise_plan_free(plan);
 		errno = -rc;
@@ -560,6 +562,13 @@ void incise_plan_stability(const struct incise_plan *plan,
 double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
 {
 	double bound_N = plan->fixed ? plan->gain * incise_fixed_bound(plan->fixed) : 0;
+
+	/* The force is below the unloading from the surface on. */
+	if (plan->fixed && plan->dissipates)
+		bound_N = incise_fixed_front_bound(
+			plan->unloading_N_mm,
+			plan->acting[0].number[INCISE_REACTION_FRICTION],
+			plan->unloading_N_mm * reach_mm, bound_N + 1 / INCISE_FIXED_ONE);
 
 	for (int i = 0; plan->scene->fixed && i < incise_n_tissue_forces; i++) {
 		const struct incise_acting_force *own = &plan->acting[i];

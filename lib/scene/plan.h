@@ -90,6 +90,10 @@ struct incise_plan {
 	/* forces */
 	double force_N[3]; /* of this tick, before guard and limits */
 	double gain;
+	bool dissipates;       /* a model's force unloads when the blade draws back … */
+	double unloading_N_mm; /* … with this stiffness */
+	double support_mm;     /* the model's largest depth; beyond it the force … */
+	double beyond_N_mm;    /* … goes on with this slope, ≥ 0 */
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;
 	struct incise_fixed *own_fixed; /* compiled here */
@@ -158,6 +162,14 @@ const char *incise_plan_fault(const struct incise_plan *plan);
  */
 int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,
 		      struct incise_error *err);
+
+/*
+ * Of a plan that is ready to run: whether a scene with a model comes to rest, by a search.
+ * Returns 0; -EDOM (it swings: the message says what ends that), -ENOMEM.
+ */
+int incise_plan_check_rest(struct incise_plan *plan,
+			   const struct incise_tracker_info *tracker,
+			   struct incise_error *err);
 
 /*
  * After incise_plan_check(): how much damping may be added to the scene's own, up to

@@ -10,11 +10,12 @@
 #include <string.h>
 #include "../base/conf.h"
 #include "../base/vector.h"
+#include "../control/pose_loop.h"
 #include "scene.h"
 
 #define PARALLEL_COS 0.985 /* cos 10 degrees */
-/* Of the largest group, tissue: gain, leave_mm and the numbers of all forces. */
-#define KEYS_MAX (2 + INCISE_FORCES_MAX * INCISE_FORCE_NUMBERS)
+/* Of the largest group, tissue: gain, leave_mm, withdrawal and the numbers of all forces. */
+#define KEYS_MAX (3 + INCISE_FORCES_MAX * INCISE_FORCE_NUMBERS)
 
 /* A number of a group. */
 struct number {
@@ -382,12 +383,33 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	return 0;
 }
 
+static int read_withdrawal(struct incise_scene *scene, const config_setting_t *group,
+			   struct incise_error *err)
+{
+	const char *name = NULL;
+	int rc = incise_conf_string(group, scene->path, "withdrawal", &name, err);
+
+	if (rc || !name)
+		return rc;
+	scene->tissue.dissipates = !strcmp(name, "dissipative");
+	if (scene->tissue.dissipates || !strcmp(name, "paper"))
+		return 0;
+	return incise_error_set(err, EINVAL,
+				"%s:%u: tissue.withdrawal: expected \"dissipative\" or "
+				"\"paper\", found \"%.40s\"; correct it",
+				scene->path,
+				config_setting_source_line(
+					config_setting_get_member(group, "withdrawal")),
+				name);
+}
+
 static int read_tissue(struct incise_scene *scene, const config_setting_t *root,
 		       struct incise_error *err)
 {
+	static const char *const tissue_keys[] = {"withdrawal", NULL};
 	struct number numbers[KEYS_MAX + 1] = {NUMBER(tissue, gain, 0, 10)};
 	const config_setting_t *group;
-	int n = 1;
+	int n = 1, rc;
 
 	for (int i = 0; i < incise_n_tissue_forces; i++)
 		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++) {
@@ -401,7 +423,8 @@ static int read_tissue(struct incise_scene *scene, const config_setting_t *root,
 					(size_t)((char *)to - (char *)scene)};
 		}
 	numbers[n] = (struct number)NUMBER(tissue, leave_mm, 0, 5);
-	return read_group(scene, root, "tissue", numbers, NULL, &group, err);
+	rc = read_group(scene, root, "tissue", numbers, tissue_keys, &group, err);
+	return rc || !group ? rc : read_withdrawal(scene, group, err);
 }
 
 /* One reaction, and any force at all. */
@@ -450,7 +473,7 @@ static int read_switches(struct incise_scene *scene, const config_setting_t *roo
 {
 	static const char *const effects_keys[] = {"average_ticks", "guard", NULL};
 	static const char *const tool_keys[] = {"side", "axis", NULL};
-	static const char *const device_keys[] = {"delay_ticks", NULL};
+	static const char *const device_keys[] = {"delay_ticks", "late_ticks", NULL};
 	FITS_KEYS(tool, tool_keys);
 	FITS_KEYS(device, device_keys);
 	const char *path = scene->path;
@@ -475,6 +498,10 @@ static int read_switches(struct incise_scene *scene, const config_setting_t *roo
 	if (!rc && group)
 		rc = incise_conf_integer(group, path, "delay_ticks", 0, 64,
 					 &scene->device.delay_ticks, err);
+	if (!rc && group)
+		rc = incise_conf_integer(group, path, "late_ticks", 0,
+					 INCISE_POSE_LOOP_LATE_MAX,
+					 &scene->device.late_ticks, err);
 	return rc ? rc : read_picture(scene, root, err);
 }
 
@@ -515,6 +542,7 @@ static void set_defaults(struct incise_scene *scene)
 	scene->rate_hz = 1000;
 	scene->fixed = true;
 	scene->tissue.gain = 1;
+	scene->tissue.dissipates = true;
 	for (int i = 0; i < incise_n_tissue_forces; i++)
 		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++)
 			scene->tissue.force[i][k] =

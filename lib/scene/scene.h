@@ -23,6 +23,7 @@ struct incise_scene {
 	struct incise_surface *surface; /* or NULL: the rig's plane */
 	struct {
 		double gain, leave_mm;
+		bool dissipates; /* withdrawal = "dissipative"; else "paper" */
 		double force[INCISE_FORCES_MAX][INCISE_FORCE_NUMBERS];
 	} tissue;
 	struct {
@@ -34,7 +35,8 @@ struct incise_scene {
 	} tool;
 	struct {
 		double mass_kg, damping_N_s_mm, coulomb_N, encoder_mm;
-		int delay_ticks; /* or -1: the tracker's */
+		int delay_ticks; /* of the whole loop; or -1: the tracker's */
+		int late_ticks;	 /* of the actuator, after a tracker's loop */
 	} device;
 	struct incise_scene_limits limits;
 	struct incise_scene_picture picture;

@@ -11,7 +11,7 @@
 #define BESIDE_MM 1.0
 
 /* Share of the most work put in that no new tissue gives back. */
-#define KEPT 0.25
+#define KEPT 0.0625
 
 static void begin(struct incise_front *front, const double at_mm[3],
 		  const double normal[3], const double side[3])
@@ -20,12 +20,15 @@ static void begin(struct incise_front *front, const double at_mm[3],
 	incise_incision_begin(&front->incision, at_mm, normal, side);
 }
 
-void incise_front_enter(struct incise_front *front, const double at_mm[3],
+bool incise_front_enter(struct incise_front *front, const double at_mm[3],
 			const double normal[3], const double side[3])
 {
-	if (!incise_incision_holds(&front->incision, at_mm, BESIDE_MM))
+	bool fresh = !incise_incision_holds(&front->incision, at_mm, BESIDE_MM);
+
+	if (fresh)
 		begin(front, at_mm, normal, side);
 	front->depth_mm = front->force_N = front->rest_mm = 0;
+	return fresh;
 }
 
 double incise_front_advance(struct incise_front *front, const double at_mm[3],
@@ -47,22 +50,24 @@ double incise_front_force(struct incise_front *front, double unloading_N_mm,
 			  double cutting_N)
 {
 	double K = unloading_N_mm, friction_N = friction * cutting_N, upper_N;
-	double elastic_N = K * (depth_mm - front->rest_mm), force_N = elastic_N;
+	double elastic_N = K * (depth_mm - front->rest_mm), trial_N, force_N;
 	double half_way_mm = (depth_mm - front->depth_mm) / 2;
 
 	front->cut_mm = fmax(front->cut_mm - advance_mm, 0);
+	front->rest_mm -= advance_mm;
+	trial_N = force_N = K * (depth_mm - front->rest_mm);
 	if (advance_mm > 0) {
 		double work =
 			front->work_N_mm + (front->force_N + elastic_N) * half_way_mm;
 		/* Elastic energy is F²/2K. */
 		double paid_N = sqrt(2 * K * fmax(work - KEPT * front->most_N_mm, 0));
 
-		force_N = fmax(elastic_N, fmin(elastic_N + K * advance_mm, paid_N));
+		force_N = fmax(elastic_N, fmin(trial_N, paid_N));
 	}
 	upper_N = fmax(friction_N, K * (depth_mm - front->cut_mm));
 	force_N = fmax(-friction_N, fmin(force_N, fmin(upper_N, cutting_N)));
 	/* Else it stays to the bit, and no rounding adds up. */
-	if (force_N < elastic_N || force_N > elastic_N)
+	if (force_N < trial_N || force_N > trial_N)
 		front->rest_mm = depth_mm - force_N / K;
 	/* The blade cuts where all of the model's force acts. */
 	if (force_N >= cutting_N)

@@ -23,7 +23,7 @@
  *
  * A blade that moves along the skin meets new tissue at each mm, which the front has not
  * reached: front and rest come up by as much, as long as the elastic energy stays below the work
- * that was put in since the cut began, a quarter of which is never given back. Back within its own cut it meets nothing new.
+ * that was put in since the cut began, a sixteenth of which is never given back. Back within its own cut it meets nothing new.
  *
  * N, mm. All functions are real-time safe.
  */
@@ -47,8 +47,9 @@ struct incise_front {
  * The blade meets the skin: in the cut that it left, which stays, or in a new one.
  *
  * @param at_mm  on the surface; @param normal, side: as incise_incision_begin()
+ * @return whether the cut is new
  */
-void incise_front_enter(struct incise_front *front, const double at_mm[3],
+bool incise_front_enter(struct incise_front *front, const double at_mm[3],
 			const double normal[3], const double side[3]) INCISE_REALTIME;
 
 /* Length of new tissue since the last call, mm: the way of the blade beyond its own cut. */

@@ -105,8 +105,26 @@ struct incise_plan_stability {
 	 * that of the loop with the tracker's rate and latency, and with the predictor.
 	 */
 	double limit_N_mm;
+	int late_ticks; /**< of the actuator, on top of the tracker's loop */
 	/** Largest slope of the model's force by the speed, either way; 0 without one. */
 	double speed_slope_N_s_mm;
+	double slope_N_mm; /**< largest by the depth; 0 without a model */
+	/** Stiffness with which the tissue of a model unloads; 0: it does not dissipate */
+	double unloading_N_mm;
+	double support_mm;  /**< largest depth that the model knows; 0 without one */
+	double beyond_N_mm; /**< slope with which the force goes on beyond it */
+	/**
+	 * With a model: closed loops that were tried, each with a hand that leans with a
+	 * constant force up to the scene's limit, and the one that took longest to rest.
+	 */
+	int runs;
+	struct {
+		double lean_N, along_mm_s; /**< the hand's force; its speed along the skin */
+		double depth_mm, swing_mm, settle_s;
+	} worst;
+	/** Range at rest by the noise of a tracker, sd 0.02 mm, in a hand that leans with half
+	 * of the scene's limit. */
+	double noise_mm, noise_N;
 	bool certified; /**< the model's slopes are bounds, not estimates */
 	/** Most damping that the guard may add: what the loop can spare; 0 without one. */
 	double guard_N_s_mm;

@@ -35,6 +35,16 @@ static struct incise_haptic_device device_of(double mass_kg, double bT_m)
 	};
 }
 
+static double limit_of(const struct incise_haptic_device *device,
+		       const struct incise_predict *predict, double damping_N_s_mm)
+{
+	return incise_pose_loop_limit(&(struct incise_pose_loop){
+		.device = device,
+		.predict = predict,
+		.damping_N_s_mm = damping_N_s_mm,
+	});
+}
+
 struct wall {
 	struct incise_haptic_device device;
 	double rate_hz, latency_s, K, B;
@@ -129,7 +139,7 @@ static void test_against_time(void **state)
 
 		wall.B = row->B_b * wall.device.damping_N_s_mm;
 		set_predict(&predict, row->rate_hz, row->latency_s);
-		limit = incise_pose_loop_limit(&wall.device, &predict, wall.B);
+		limit = limit_of(&wall.device, &predict, wall.B);
 		/* By bisection the two are within 0.4 %; 2 % is what shows in some seconds. */
 		wall.K = 0.98 * limit;
 		assert_false(grows(&wall, row->seconds));
@@ -171,7 +181,7 @@ static void test_interpolation_is_a_delay(void **state)
 		predict.beta = predict.gamma = 0;
 		device.delay_ticks = 12;
 		want = incise_stability_limit(&device, 0);
-		assert_true(fabs(incise_pose_loop_limit(&device, &predict, 0) - want) <
+		assert_true(fabs(limit_of(&device, &predict, 0) - want) <
 			    cases[i].within * want);
 	}
 }
@@ -183,8 +193,8 @@ static void test_units(void **state)
 	struct incise_predict predict;
 
 	set_predict(&predict, 120, 4.2e-3);
-	assert_true(fabs(incise_pose_loop_limit(&b, &predict, 0) /
-				 incise_pose_loop_limit(&a, &predict, 0) -
+	assert_true(fabs(limit_of(&b, &predict, 0) /
+				 limit_of(&a, &predict, 0) -
 			 100) < 1e-4);
 }
 
@@ -195,16 +205,16 @@ static void test_nothing_holds(void **state)
 
 	set_predict(&predict, 120, 4.2e-3);
 	/* Its own damper makes it unstable: more than the device's, late. */
-	assert_true(incise_pose_loop_limit(&device, &predict, 0.02) == 0);
-	assert_true(incise_pose_loop_limit(&device, &predict, NAN) == 0);
+	assert_true(limit_of(&device, &predict, 0.02) == 0);
+	assert_true(limit_of(&device, &predict, NAN) == 0);
 	bad = device, bad.mass_kg = 0;
-	assert_true(incise_pose_loop_limit(&bad, &predict, 0) == 0);
+	assert_true(limit_of(&bad, &predict, 0) == 0);
 	bad = device, bad.mass_kg = INFINITY;
-	assert_true(incise_pose_loop_limit(&bad, &predict, 0) == 0);
+	assert_true(limit_of(&bad, &predict, 0) == 0);
 	bad = device, bad.damping_N_s_mm = -1;
-	assert_true(incise_pose_loop_limit(&bad, &predict, 0) == 0);
+	assert_true(limit_of(&bad, &predict, 0) == 0);
 	bad = device, bad.period_s = NAN;
-	assert_true(incise_pose_loop_limit(&bad, &predict, 0) == 0);
+	assert_true(limit_of(&bad, &predict, 0) == 0);
 }
 
 /* Whatever a tracker says of itself, there is an answer, and one that is a number. */
@@ -221,7 +231,7 @@ static void test_strange_trackers(void **state)
 
 			device.period_s = ticks_s[k];
 			set_predict(&predict, rates_hz[i], 7e-3);
-			limit = incise_pose_loop_limit(&device, &predict, 0);
+			limit = limit_of(&device, &predict, 0);
 			/* Less than by the latency alone, with as much again for lead. */
 			assert_true(limit >= 0 && limit < 2 * 0.01 / 7e-3);
 		}

@@ -34,6 +34,7 @@
 #define POSE_AGE_MS 50
 #define REPEAT_MS 100
 #define MS INT64_C(1000000)
+#define FRICTION_N 0.01	     /* of the handle: sim.handle_friction_N */
 #define SETTLE_NS (300 * MS) /* the nut's way back, and the handle with it */
 
 enum spell { GOOD, FLAGGED, REPEATED, JUMPED, SILENT, HELD_UP, SPELLS };
@@ -160,6 +161,7 @@ static int read_sent(struct incise_tracker *tracker,
 struct seen {
 	int64_t most_ns; /* a force lasts so long behind the last good pose */
 	double step_N;	 /* of the actuator: its force is off by so much */
+	double rest_N;	 /* and by dry friction, which holds the handle where it stops */
 	double last_N[3], actuated_max_N, rendered_max_N;
 	uint64_t felt, faded,
 		without; /* ticks with a force; fades; ticks that had to be 0 */
@@ -191,8 +193,9 @@ static int look(void *context, const struct incise_tick *tick)
 		fail_msg("record %llu, spell %d: %g N, %.1f ms after the last good pose",
 			 (unsigned long long)sender.k, sender.spell, force_N,
 			 (double)since_ns * 1e-6);
-	if (!(fabs(tick->rendered_N) <=
-	      (since_ns > seen->most_ns + SETTLE_NS ? seen->step_N : FORCE_N)))
+	if (!(fabs(tick->rendered_N) <= (since_ns > seen->most_ns + SETTLE_NS
+						 ? seen->rest_N
+						 : FORCE_N + seen->step_N)))
 		fail_msg(
 			"record %llu: the actuator pushes with %g N, %.1f ms after the last "
 			"good pose",
@@ -295,6 +298,7 @@ static void run(enum polhemus_family family, uint64_t poses)
 	/* A tick finds the age too large, and the next one is the first of the fade. */
 	incise_stepper_info(incise_rig_stepper(rig), &stepper);
 	seen.step_N = stepper.spring_N_mm * stepper.step_mm;
+	seen.rest_N = seen.step_N + FRICTION_N;
 	seen.most_ns = POSE_AGE_MS * MS + incise_plan_fade_ns(plan) + 2 * MS;
 	if (incise_loop_run(plan, sender.clock, &options, &stats, &err))
 		fail_msg("%s", err.text);
