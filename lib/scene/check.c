@@ -17,7 +17,7 @@
  * The unloading is steeper than any slope of the model, so that the force can follow it: by as
  * much that the force may rise with the speed on the work that a cut has taken.
  */
-#define STEEPER 1.5
+#define STEEPER 1.25
 
 static double model_N(const struct incise_plan *plan, double depth_mm)
 {

@@ -193,9 +193,8 @@ static void test_units(void **state)
 	struct incise_predict predict;
 
 	set_predict(&predict, 120, 4.2e-3);
-	assert_true(fabs(limit_of(&b, &predict, 0) /
-				 limit_of(&a, &predict, 0) -
-			 100) < 1e-4);
+	assert_true(fabs(limit_of(&b, &predict, 0) / limit_of(&a, &predict, 0) - 100) <
+		    1e-4);
 }
 
 static void test_nothing_holds(void **state)
