@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * A plan that is accepted comes to rest, and its message is right where it is not: the real plan
- * in a closed loop of this test's own, integrated in steps of 50 µs, which shares no code with
- * the search for swings.
+ * A plan that is accepted comes to rest, and its message is right where it is not: in a closed
+ * loop that shares no line with the search for swings.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,29 +16,12 @@
 #include <unistd.h>
 #include <incise/model.h>
 #include <incise/plan.h>
-
-#define STEP_S 50e-6
-#define STEPS_PER_TICK 20
-#define AIR_S 0.4
-#define WAY 64
+#include "../../extremes/closed_loop.h"
 
 struct loop {
 	const char *tissue; /* of the scene, beside the model */
-	double mass_kg, damping_N_s_mm, tracker_hz, latency_s;
-	int late_ticks;
-	double lean_N, along_mm_s, run_s;
+	struct closed_loop is;
 };
-
-static const struct incise_tracker_info *tracker_of(const struct loop *loop)
-{
-	static struct incise_tracker_info tracker;
-
-	tracker = (struct incise_tracker_info){
-		.rate_hz = loop->tracker_hz,
-		.latency_ns = llround(loop->latency_s * 1e9),
-	};
-	return &tracker;
-}
 
 /* The shipped model in a scene of this loop's device. */
 static struct incise_scene *scene_of(const struct loop *loop)
@@ -57,8 +39,8 @@ static struct incise_scene *scene_of(const struct loop *loop)
 	fprintf(file,
 		"model = \"%s\"; tissue = { %s };\n"
 		"device = { mass_kg = %.6f; damping_N_s_mm = %.6f; late_ticks = %d; };\n",
-		model, loop->tissue, loop->mass_kg, loop->damping_N_s_mm,
-		loop->late_ticks);
+		model, loop->tissue, loop->is.mass_kg, loop->is.damping_N_s_mm,
+		loop->is.late_ticks);
 	assert_int_equal(fclose(file), 0);
 	scene = incise_scene_load(path, NULL, &err);
 	unlink(path);
@@ -71,94 +53,50 @@ static struct incise_scene *scene_of(const struct loop *loop)
 static struct incise_plan *plan_of(const struct loop *loop, struct incise_scene **scene,
 				   struct incise_error *err)
 {
+	struct incise_tracker_info tracker = closed_loop_tracker(&loop->is);
 	struct incise_plan *plan;
 
 	*scene = scene_of(loop);
-	plan = incise_plan_new_fed(*scene, tracker_of(loop), err);
+	plan = incise_plan_new_fed(*scene, &tracker, err);
 	if (!plan)
 		assert_int_equal(err->code, EDOM);
 	return plan;
 }
 
-static int64_t to_ns(double t_s)
+static struct closed_loop_end end_of(struct incise_plan *plan, const struct loop *loop,
+				     int run)
 {
-	return 2000000000 + llround(t_s * 1e9);
-}
+	struct closed_loop_end end;
 
-/*
- * Range of the device's position over the last quarter, mm; the force through *force_N. A plan
- * goes on from run to run: each has its own time, and its own place on the skin.
- */
-static double swing(struct incise_plan *plan, const struct loop *loop, int run,
-		    double *force_N)
-{
-	double x = 0.5, v = 0, y = 200 * run, t_s, next_s = 0, force = 0;
-	double held[17] = {0}, begin_s = 100 * run;
-	double m = loop->mass_kg * 1e-3, low = INFINITY, high = -INFINITY;
-	double way[WAY][3];
-	unsigned int first = 0, last = 0;
-	struct incise_tick tick;
-
-	for (long i = 0; i < (long)(loop->run_s / STEP_S); i++) {
-		t_s = i * STEP_S;
-		if (t_s >= next_s) {
-			way[last % WAY][0] = t_s + loop->latency_s;
-			way[last % WAY][1] = y;
-			way[last++ % WAY][2] = x;
-			next_s += 1 / loop->tracker_hz;
-		}
-		if (i % STEPS_PER_TICK == 0) {
-			for (; first != last && way[first % WAY][0] <= t_s; first++) {
-				const double *pose = way[first % WAY];
-				struct incise_tracker_sample sample = {
-					.t_ns = to_ns(begin_s + pose[0]),
-					.status = ' ',
-					.position_mm = {pose[1], 0, pose[2]},
-					.quaternion = {1},
-				};
-
-				assert_int_equal(incise_plan_feed(plan, &sample, 1), 1);
-			}
-			assert_int_equal(
-				incise_plan_tick(plan, to_ns(begin_s + t_s), &tick), 0);
-			held[loop->late_ticks] = tick.command_N[2];
-			force = held[0];
-			memmove(held, held + 1, (size_t)loop->late_ticks * sizeof(*held));
-		}
-		/* In the air until the force may start, then the hand leans. */
-		if (t_s > AIR_S) {
-			v += STEP_S * (force - loop->lean_N - loop->damping_N_s_mm * v) /
-			     m;
-			x += STEP_S * v;
-			y += STEP_S * loop->along_mm_s;
-		}
-		if (t_s > 0.75 * loop->run_s) {
-			low = fmin(low, x);
-			high = fmax(high, x);
-		}
-	}
-	*force_N = force;
-	return high - low;
+	assert_true(closed_loop_run(plan, &loop->is, run, &end));
+	return end;
 }
 
 /* The liver, as it is shipped but for the tissue. */
 static struct loop liver(const char *tissue)
 {
-	return (struct loop){tissue, 0.05, 0.01, 120, 4.2e-3, 0, 0, 0, 8};
+	return (struct loop){tissue,
+			     {.mass_kg = 0.05,
+			      .damping_N_s_mm = 0.01,
+			      .tracker_hz = 120,
+			      .latency_s = 4.2e-3,
+			      .run_s = 8}};
 }
 
-/* 0.01 mm: what counts as rest; a static force is the lean's to the last roundings. */
+/* A static force is the lean's to the last roundings. */
 static void rests(struct incise_plan *plan, const struct loop *loop, int run)
 {
-	double force_N, swing_mm = swing(plan, loop, run, &force_N);
+	const struct closed_loop *is = &loop->is;
+	struct closed_loop_end end = end_of(plan, loop, run);
 
-	if (!(swing_mm <= 0.01) || !(fabs(force_N - loop->lean_N) < 0.01))
+	if (!(end.swing_mm <= CLOSED_LOOP_SWING_MM) ||
+	    !(fabs(end.force_N - is->lean_N) < 0.01))
 		fail_msg(
 			"%s, %g kg, %g N s/mm, %g Hz, %d ticks late, %g N at %g mm/s: swings "
 			"by %g mm, pushes with %g N",
-			loop->tissue, loop->mass_kg, loop->damping_N_s_mm,
-			loop->tracker_hz, loop->late_ticks, loop->lean_N,
-			loop->along_mm_s, swing_mm, force_N);
+			loop->tissue, is->mass_kg, is->damping_N_s_mm, is->tracker_hz,
+			is->late_ticks, is->lean_N, is->along_mm_s, end.swing_mm,
+			end.force_N);
 }
 
 static void lean_on(const struct loop *as, const double *leans, int n)
@@ -172,7 +110,7 @@ static void lean_on(const struct loop *as, const double *leans, int n)
 	if (!plan)
 		fail_msg("%s", err.text);
 	for (int i = 0; i < n; i++) {
-		loop.lean_N = leans[i];
+		loop.is.lean_N = leans[i];
 		rests(plan, &loop, i);
 	}
 	incise_plan_free(plan);
@@ -188,7 +126,7 @@ static void test_liver_rests(void **state)
 	struct loop loop = liver("");
 
 	lean_on(&loop, all_leans, N(all_leans));
-	loop.along_mm_s = 15;
+	loop.is.along_mm_s = 15;
 	lean_on(&loop, (const double[]){0.5, 2.1}, 2);
 }
 
@@ -213,19 +151,17 @@ static void test_accepted_rests(void **state)
 	int accepted = 0;
 
 	for (int k = 0; k < N(cases); k++) {
-		struct loop loop = {cases[k].tissue,
-				    cases[k].mass_kg,
-				    cases[k].damping_N_s_mm,
-				    cases[k].tracker_hz,
-				    4.2e-3,
-				    cases[k].late_ticks,
-				    0,
-				    0,
-				    6};
+		struct loop loop = liver(cases[k].tissue);
 		struct incise_error err = {0};
 		struct incise_scene *scene;
-		struct incise_plan *plan = plan_of(&loop, &scene, &err);
+		struct incise_plan *plan;
 
+		loop.is.mass_kg = cases[k].mass_kg;
+		loop.is.damping_N_s_mm = cases[k].damping_N_s_mm;
+		loop.is.tracker_hz = cases[k].tracker_hz;
+		loop.is.late_ticks = cases[k].late_ticks;
+		loop.is.run_s = 6;
+		plan = plan_of(&loop, &scene, &err);
 		accepted += !!plan;
 		incise_plan_free(plan);
 		incise_scene_free(scene);
@@ -256,8 +192,8 @@ static void test_refused_with_a_way_out(void **state)
 	incise_scene_free(scene);
 	/* Softer leans rest: an independent loop found swings from 1.9 N on. */
 	assert_true(after(err.text, "leans on it with ") > 1.8);
-	loop.damping_N_s_mm = after(err.text, "device.damping_N_s_mm of at least ");
-	assert_true(loop.damping_N_s_mm > 0.01 && loop.damping_N_s_mm < 0.03);
+	loop.is.damping_N_s_mm = after(err.text, "device.damping_N_s_mm of at least ");
+	assert_true(loop.is.damping_N_s_mm > 0.01 && loop.is.damping_N_s_mm < 0.03);
 	lean_on(&loop, all_leans, 9);
 	snprintf(gain, sizeof(gain), "withdrawal = \"paper\"; gain = %.6f;",
 		 after(err.text, "tissue.gain to at most "));
@@ -276,13 +212,14 @@ static void test_above_the_limit(void **state)
 	struct incise_error err = {0};
 	struct incise_scene *scene;
 	struct incise_plan *plan = plan_of(&loop, &scene, &err);
-	double force_N;
+	struct closed_loop_end end;
 
-	loop.lean_N = 4.5; /* of at most 4 */
-	loop.run_s = 4;
+	loop.is.lean_N = 4.5; /* of at most 4 */
+	loop.is.run_s = 4;
 	/* It goes on by 0.5 N / 0.01 N s/mm = 50 mm/s for the last second. */
-	assert_true(fabs(swing(plan, &loop, 0, &force_N) - 50) < 1);
-	assert_true(fabs(force_N - 4) < 1e-6);
+	end = end_of(plan, &loop, 0);
+	assert_true(fabs(end.swing_mm - 50) < 1);
+	assert_true(fabs(end.force_N - 4) < 1e-6);
 	incise_plan_free(plan);
 	incise_scene_free(scene);
 }
