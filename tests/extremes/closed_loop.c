@@ -12,9 +12,10 @@
 #define STEP_S (TICK_S / STEPS)
 #define AIR_S 0.4 /* above the skin until the force may start */
 #define AIR_MM 0.5
-#define LATE_MOST 16	/* ticks */
-#define UNDERWAY 64	/* poses on their way at most */
-#define RUN_APART_S 100 /* and mm */
+#define LATE_MOST 16	  /* ticks */
+#define NOISE_SHARE 0.375 /* of a run; the rest of it is for coming to rest */
+#define UNDERWAY 64	  /* poses on their way at most */
+#define RUN_APART_S 100	  /* and mm */
 
 struct pose {
 	double arrival_s, along_mm, height_mm;
@@ -47,7 +48,7 @@ struct incise_tracker_info closed_loop_tracker(const struct closed_loop *loop)
 
 static void measure(struct running *r, double t_s)
 {
-	double noise_mm = t_s < r->loop->run_s / 2 ? r->loop->noise_mm : 0;
+	double noise_mm = t_s < NOISE_SHARE * r->loop->run_s ? r->loop->noise_mm : 0;
 
 	r->pose[r->last % UNDERWAY] =
 		(struct pose){t_s + r->loop->latency_s, r->y,
@@ -81,14 +82,17 @@ static double tick(struct running *r, double t_s)
 	return out.command_N[2];
 }
 
+/* Travel to either side: from the lowest up, and from the highest down. */
 struct range {
-	double low, high;
+	double low, high, up, down;
 };
 
 static void see(struct range *range, double value)
 {
 	range->low = fmin(range->low, value);
 	range->high = fmax(range->high, value);
+	range->up = fmax(range->up, value - range->low);
+	range->down = fmax(range->down, range->high - value);
 }
 
 bool closed_loop_run(struct incise_plan *plan, const struct closed_loop *loop, int run,
@@ -96,7 +100,7 @@ bool closed_loop_run(struct incise_plan *plan, const struct closed_loop *loop, i
 {
 	const double m = loop->mass_kg * 1e-3; /* N s²/mm */
 	const long steps = lround(loop->run_s / STEP_S);
-	struct range last = {INFINITY, -INFINITY}, last_N = last, shaken = last;
+	struct range last = {INFINITY, -INFINITY, 0, 0}, last_N = last, shaken = last;
 	struct running r = {
 		.loop = loop,
 		.plan = plan,
@@ -124,12 +128,13 @@ bool closed_loop_run(struct incise_plan *plan, const struct closed_loop *loop, i
 		if (4 * i > 3 * steps) {
 			see(&last, r.x);
 			see(&last_N, force_N);
-		} else if (4 * i > steps && 2 * i < steps) {
+		} else if (8 * i > steps && i < NOISE_SHARE * steps) {
 			see(&shaken, r.x);
 		}
 	}
 	*end = (struct closed_loop_end){
-		.swing_mm = last.high - last.low,
+		.swing_mm = fmin(last.up, last.down),
+		.moved_mm = last.high - last.low,
 		.swing_N = last_N.high - last_N.low,
 		.shaken_mm = shaken.high - shaken.low,
 		.depth_mm = -r.x,

@@ -16,21 +16,23 @@
 #include <stdbool.h>
 #include <incise/plan.h>
 
-/* Range of the device's position over the last quarter of a run that counts as a swing. */
+/* Way of the device to and fro over the last quarter of a run that counts as a swing. */
 #define CLOSED_LOOP_SWING_MM 0.01
 
 struct closed_loop {
 	double mass_kg, damping_N_s_mm; /* of the device, which has no dry friction */
 	double tracker_hz, latency_s;
-	double noise_mm; /* sd of a pose's height, in the first half of a run; then none */
+	double noise_mm; /* sd of a pose's height, for the first 3/8 of a run; then none */
 	int late_ticks;	 /* of the actuator, 0 … 16 */
 	double lean_N, along_mm_s;
 	double run_s;
 };
 
 struct closed_loop_end {
-	double swing_mm, swing_N; /* ranges over the last quarter */
-	double shaken_mm;	  /* range in the quarter before the noise ends */
+	/* Over the last quarter: the way to and fro, which is none of a device that only sinks
+	 * or creeps, the range of places and that of forces. */
+	double swing_mm, moved_mm, swing_N;
+	double shaken_mm;	  /* range in the last quarter before the noise ends */
 	double depth_mm, force_N; /* at the end */
 };
 

@@ -678,12 +678,15 @@ static void run(struct bench_run *run)
 	cli_progress_end();
 	report_ratios(run);
 	add_curves(run);
+	stability_rest(run);
 	stability_guard(run);
 	stability_integrators(run);
 }
 
 const struct bench bench_stability = {
 	.name = "stability",
+	.operands = "[MODEL.fis]",
+	.n_operands = 1,
 	.summary = "how stiff a virtual wall may be, simulated and computed;\n"
 		   "the guard of passivity; integrators of a stiff spring",
 	.run = run,

@@ -13,10 +13,11 @@
 #define DEVICE (DEVICE_KG * N_S2_PER_MM_KG) /* N s²/mm */
 #define PERIOD_S 1e-3
 
+void stability_rest(struct bench_run *run);
 void stability_guard(struct bench_run *run);
 void stability_integrators(struct bench_run *run);
 
-extern const struct bench_table stability_guard_table, stability_cap_table,
-	stability_integrator_table;
+extern const struct bench_table stability_rest_table, stability_guard_table,
+	stability_cap_table, stability_integrator_table;
 
 #endif
