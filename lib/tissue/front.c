@@ -28,6 +28,8 @@ bool incise_front_enter(struct incise_front *front, const double at_mm[3],
 	if (fresh)
 		begin(front, at_mm, normal, side);
 	front->depth_mm = front->force_N = front->rest_mm = 0;
+	/* What an earlier visit put in pays for nothing now. */
+	front->work_N_mm = front->most_N_mm = 0;
 	return fresh;
 }
 

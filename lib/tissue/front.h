@@ -23,7 +23,8 @@
  *
  * A blade that moves along the skin meets new tissue at each mm, which the front has not
  * reached: front and rest come up by as much, as long as the elastic energy stays below the work
- * that was put in since the cut began, a sixteenth of which is never given back. Back within its own cut it meets nothing new.
+ * that was put in since the blade entered, a sixteenth of which is never given back. Back within
+ * its own cut it meets nothing new.
  *
  * N, mm. All functions are real-time safe.
  */
@@ -38,8 +39,8 @@ struct incise_front {
 	double depth_mm, force_N; /* of the last call */
 	double rest_mm;		  /* the elastic force is 0 here */
 	double cut_mm;		  /* depth of the unloaded cut; ≥ 0 */
-	double work_N_mm;	  /* put in since the cut began, less what came back */
-	double most_N_mm;	  /* of that, so far */
+	double work_N_mm; /* put in since the blade entered, less what came back */
+	double most_N_mm; /* of that, so far */
 	struct incise_incision incision;
 };
 

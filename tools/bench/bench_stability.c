@@ -679,6 +679,7 @@ static void run(struct bench_run *run)
 	report_ratios(run);
 	add_curves(run);
 	stability_rest(run);
+	stability_work(run);
 	stability_guard(run);
 	stability_integrators(run);
 }

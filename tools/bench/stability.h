@@ -14,6 +14,7 @@
 #define PERIOD_S 1e-3
 
 void stability_rest(struct bench_run *run);
+void stability_work(struct bench_run *run);
 void stability_guard(struct bench_run *run);
 void stability_integrators(struct bench_run *run);
 
