@@ -680,6 +680,7 @@ static void run(struct bench_run *run)
 	add_curves(run);
 	stability_rest(run);
 	stability_work(run);
+	stability_error(run);
 	stability_guard(run);
 	stability_integrators(run);
 }
