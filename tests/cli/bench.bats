@@ -496,6 +496,40 @@ rate() {
 	[ "$(of guard 'min(bounded)' "late = 'actuator' AND delay = 5 AND share <= 0.1")" = 1 ]
 }
 
+@test "bench stability: what the plan accepts comes to rest, and no closed motion gives work back" {
+	quick_report stability
+	holds "$(of rest 'count(*)') >= 16"
+	[ "$(of rest 'min(rests)' "verdict = 'accepted'")" = 1 ]
+	holds "$(of rest 'max(swing_mm)' "verdict = 'accepted'") <= 0.01"
+	# with noise it moves, and rests when that ends
+	holds "$(of rest 'min(shaken_mm)' "verdict = 'accepted' AND noise_mm > 0") > 0.01"
+	# the paper's law both ways is refused, with a reason, and does swing then
+	holds "$(of rest 'count(*)' "verdict = 'refused' AND withdrawal = 'paper'") > 0"
+	[[ "$(of rest 'min(why)' "verdict = 'refused'")" == *"does not come to rest"* ]]
+	holds "$(of rest 'max(swing_mm)' "verdict = 'refused'") > 0.1"
+	[ "$(of rest_sums 'sum(cases)')" = "$(of rest 'count(*)')" ]
+	[ "$(of work 'sum(returned)')" = 0 ]
+	for scene in liver neck wall; do
+		holds "$(of work in_contact "scene = '$scene' AND tool = 'blade'") > 100"
+	done
+	# the liver takes work, a wall gives back what it took
+	holds "$(of work median_N_mm "scene = 'liver'") > 0.1"
+	holds "$(of work 'abs(median_N_mm)' "scene = 'wall'") < 1e-3"
+	[ "$(of work 'count(*)' "scene = 'neck'")" = 3 ]
+}
+
+@test "bench stability: paper 2's forces, their error and time" {
+	quick_report stability
+	# a few roundings; the integers' unit is 15 uN; finer meshes are closer
+	holds "$(of forces largest_N "name = 'sphere, double'") < 1e-13"
+	holds "$(of forces largest_N "name = 'sphere, fixed'") < 1e-4"
+	holds "$(of forces 'count(*)' "name = 'mesh'") >= 3"
+	holds "$(of forces rms_N 'triangles = 528') > 2 * $(of forces rms_N 'triangles = 2208')"
+	holds "$(of forces rms_N 'triangles = 2208') > 2 * $(of forces rms_N 'triangles = 9024')"
+	holds "$(of forces 'min(contact)') > 1000"
+	holds "$(of forces 'min(ns)') > 0"
+}
+
 @test "bench stability lists integrators that diverge, and the exact ones are exact" {
 	quick_report stability
 	ms="step_s = 0.001 AND K_N_m"
@@ -539,8 +573,10 @@ rate() {
 }
 
 @test "bench stability: bad usage" {
-	run --separate-stderr incise bench stability a
+	run --separate-stderr incise bench stability a b
 	bad_usage "'stability'"
+	run --separate-stderr incise bench stability a
+	failed_with "a: No such file"
 	run --separate-stderr incise bench stability --plot a/
 	bad_usage "--plot"
 }

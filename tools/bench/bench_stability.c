@@ -564,7 +564,7 @@ static void make_table(struct ratios *ratios)
 	const struct bench_column rest[] = {
 		COLUMN(ratio, e->simulated, simulated, "%15.6g", e->simulated),
 		COLUMN(ratio, e->theory, theory, "%15.6g", e->theory),
-		COLUMN(ratio, "ratio", ratio, "%8.4f", "ratio"),
+		COLUMN(ratio, "ratio", ratio, "%10.6f", "ratio"),
 		COLUMN(ratio, "at_least", at_least),
 		COLUMN(ratio, "ok", ok),
 		COLUMN(ratio, NULL, verdict, " %s", ""),

@@ -152,6 +152,9 @@ void report_number(double value, int digits, char *text, size_t size)
 		return;
 	}
 	snprintf(plain, sizeof(plain), "%.*e", digits - 1, value);
+	/* No rounding hides that a ratio is not 1, to as many digits as a reader can use. */
+	while (value != 1 && atof(plain) == 1 && digits < 9)
+		snprintf(plain, sizeof(plain), "%.*e", digits++, value);
 	e = strchr(plain, 'e');
 	if (value == 0 || (atoi(e + 1) >= -4 && atoi(e + 1) < 7)) {
 		/* As it is, but for digits that it lacks. */

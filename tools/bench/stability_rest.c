@@ -17,6 +17,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
+#include <incise/model.h>
 #include <incise/plan.h>
 #include "../../tests/extremes/closed_loop.h"
 #include "../cli/child.h"
@@ -111,6 +112,12 @@ static void write_model(void)
 
 static void make_models(const struct bench_run *run)
 {
+	struct incise_error err = {0};
+
+	/* Before any work. */
+	if (run->n_operands)
+		incise_model_free(
+			cli_require(incise_model_load(run->operands[0], &err), &err));
 	folder_make(folder, sizeof(folder), "for models");
 	add_model("shipped", cli_text("%s/liver.fis", scene_argument_shipped()));
 	if (run->n_operands)
