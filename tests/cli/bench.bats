@@ -564,7 +564,7 @@ rate() {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
 	run -0 --separate-stderr incise bench stability --quick --json --plot "a folder/w"
 	[ -z "$stderr" ]
-	for part in map guard integrators; do
+	for part in map rest guard integrators; do
 		[ "$(head -c 8 "a folder/w-$part.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 		grep -q '<svg' "a folder/w-$part.svg"
 	done

@@ -128,7 +128,7 @@ bool closed_loop_run(struct incise_plan *plan, const struct closed_loop *loop, i
 		if (4 * i > 3 * steps) {
 			see(&last, r.x);
 			see(&last_N, force_N);
-		} else if (8 * i > steps && i < NOISE_SHARE * steps) {
+		} else if (4 * i > steps && i < NOISE_SHARE * steps) {
 			see(&shaken, r.x);
 		}
 	}
@@ -136,7 +136,7 @@ bool closed_loop_run(struct incise_plan *plan, const struct closed_loop *loop, i
 		.swing_mm = fmin(last.up, last.down),
 		.moved_mm = last.high - last.low,
 		.swing_N = last_N.high - last_N.low,
-		.shaken_mm = shaken.high - shaken.low,
+		.shaken_mm = fmin(shaken.up, shaken.down),
 		.depth_mm = -r.x,
 		.force_N = force_N,
 	};

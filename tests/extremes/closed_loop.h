@@ -32,7 +32,7 @@ struct closed_loop_end {
 	/* Over the last quarter: the way to and fro, which is none of a device that only sinks
 	 * or creeps, the range of places and that of forces. */
 	double swing_mm, moved_mm, swing_N;
-	double shaken_mm;	  /* range in the last quarter before the noise ends */
+	double shaken_mm; /* to and fro in the last eighth before the noise ends */
 	double depth_mm, force_N; /* at the end */
 };
 

@@ -124,8 +124,9 @@ struct bench_plot {
 
 extern const char text_extremes_gp[], text_loop_rates_gp[], text_loop_wakeups_gp[],
 	text_pose_gp[], text_precision_gp[], text_scenes_gp[], text_stability_guard_gp[],
-	text_stability_integrators_gp[], text_stability_map_gp[], text_timeline_gp[],
-	text_training_gp[], text_view_gp[], text_vision_gp[];
+	text_stability_integrators_gp[], text_stability_map_gp[],
+	text_stability_rest_gp[], text_timeline_gp[], text_training_gp[], text_view_gp[],
+	text_vision_gp[];
 
 struct bench_run;
 
@@ -135,7 +136,7 @@ struct bench {
 	int n_operands;		     /* at most */
 	bool takes_duration, takes_load, takes_profile, takes_seed;
 	void (*run)(struct bench_run *run);
-	struct bench_plot plots[4]; /* end with {0}; none: --plot is bad usage */
+	struct bench_plot plots[5]; /* end with {0}; none: --plot is bad usage */
 };
 
 extern const struct bench bench_capture, bench_extremes, bench_loop, bench_pose,

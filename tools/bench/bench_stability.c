@@ -689,8 +689,9 @@ const struct bench bench_stability = {
 	.name = "stability",
 	.operands = "[MODEL.fis]",
 	.n_operands = 1,
-	.summary = "how stiff a virtual wall may be, simulated and computed;\n"
-		   "the guard of passivity; integrators of a stiff spring",
+	.summary =
+		"how stiff a virtual wall may be, simulated and computed;\n"
+		"whether learned models rest; the guard of passivity; integrators of a stiff spring",
 	.run = run,
 	.plots = {{.suffix = "map",
 		   .script = text_stability_map_gp,
@@ -699,6 +700,11 @@ const struct bench bench_stability = {
 		   .across = "BT_m",
 		   .data = {&results[0].table, "BT_m,delay"},
 		   .more = {&bench_points, "block"}},
+		  {.suffix = "rest",
+		   .script = text_stability_rest_gp,
+		   .width = 900,
+		   .height = 560,
+		   .data = {&stability_rest_table, "verdict"}},
 		  {.suffix = "guard",
 		   .script = text_stability_guard_gp,
 		   .width = 1320,
