@@ -379,6 +379,16 @@ static int plan_sim_key(struct incise_sim_config *config, const char *where,
 	return incise_error_set(err, EINVAL, "%s: %s", where, cause.text);
 }
 
+static int plan_sim_word(struct incise_sim_config *config, const char *where,
+			 const char *key, const char *word, struct incise_error *err)
+{
+	struct incise_error cause = {0};
+
+	if (!incise_sim_config_set_word(config, key, word, &cause))
+		return 0;
+	return incise_error_set(err, EINVAL, "%s: %s", where, cause.text);
+}
+
 static int plan_sim_setting(struct incise_sim_config *config, const char *path,
 			    const config_setting_t *setting, struct incise_error *err)
 {
@@ -390,6 +400,13 @@ static int plan_sim_setting(struct incise_sim_config *config, const char *path,
 
 	snprintf(where, sizeof(where), "%.200s:%d", path,
 		 config_setting_source_line(setting));
+	if (incise_sim_config_has_words(name)) {
+		const char *word = NULL;
+		int rc = incise_conf_string(config_setting_parent(setting), path, name,
+					    &word, err);
+
+		return rc ? rc : plan_sim_word(config, where, name, word, err);
+	}
 	if (config_setting_is_group(setting) ||
 	    config_setting_is_aggregate(setting) != protocol ||
 	    length > INCISE_SIM_DEPTHS_MAX)
@@ -572,6 +589,8 @@ static int plan_word(struct incise_rig_plan *plan, char *word, struct incise_err
 	*value++ = '\0';
 	if (!strcmp(word, "clock"))
 		return plan_clock(plan, where, value, err);
+	if (incise_sim_config_has_words(word))
+		return plan_sim_word(&plan->config, where, word, value, err);
 	locale = incise_c_locale_begin();
 	number = incise_decimal(value, &end);
 	incise_c_locale_end(locale);

@@ -19,18 +19,21 @@ struct key {
 	size_t offset;
 	int length; /* of an array; 0 for a single number */
 	double init, min, max;
+	const char *const *words; /* two, for 0 and 1; NULL: it takes numbers */
 };
 
 #define KEY(type, field, init, min, max)                                               \
 	{                                                                              \
 #field, type, offsetof(struct incise_sim_config, field), 0, init, min, \
-			max                                                            \
+			max, NULL                                                      \
 	}
 #define ARRAY(type, field, min, max)                                     \
 	{                                                                \
 #field, type, offsetof(struct incise_sim_config, field), \
-			INCISE_SIM_DEPTHS_MAX, NAN, min, max             \
+			INCISE_SIM_DEPTHS_MAX, NAN, min, max, NULL       \
 	}
+
+static const char *const withdrawals[] = {"dissipative", "paper"};
 
 static const struct key keys[] = {
 	/* libconfig reads no larger integers without a suffix. */
@@ -50,6 +53,10 @@ static const struct key keys[] = {
 	KEY(KEY_DOUBLE, tooth, 0.2, 0, 0.9),
 	KEY(KEY_DOUBLE, tooth_mm, 1.5, 0.01, 1000),
 	KEY(KEY_DOUBLE, boundary, 0.1, 0, 0.3),
+	KEY(KEY_DOUBLE, unloading_N_mm, 0.25, 0.01, 1000),
+	KEY(KEY_DOUBLE, friction, 0.1, 0, 1),
+	{"withdrawal", KEY_INT, offsetof(struct incise_sim_config, withdrawal), 0, 0, 0,
+	 1, withdrawals},
 	KEY(KEY_DOUBLE, tracker_hz, 120, 1, 1000),
 	KEY(KEY_DOUBLE, tracker_noise_mm, 0.02, 0, 10),
 	KEY(KEY_DOUBLE, tracker_latency_ms, 4.2, 0, 1000),
@@ -145,19 +152,46 @@ void incise_sim_config_init(struct incise_sim_config *config)
 			key_put(config, &keys[i], 0, keys[i].init);
 }
 
+static const struct key *key_find(const char *name, size_t length)
+{
+	for (size_t i = 0; i < N_KEYS; i++)
+		if (strlen(keys[i].name) == length &&
+		    !strncmp(name, keys[i].name, length))
+			return &keys[i];
+	return NULL;
+}
+
+bool incise_sim_config_has_words(const char *name)
+{
+	const struct key *key = key_find(name, strlen(name));
+
+	return key && key->words;
+}
+
+int incise_sim_config_set_word(struct incise_sim_config *config, const char *name,
+			       const char *word, struct incise_error *err)
+{
+	const struct key *key = key_find(name, strlen(name));
+
+	for (int i = 0; i < 2; i++)
+		if (!strcmp(word, key->words[i])) {
+			key_put(config, key, 0, i);
+			return 0;
+		}
+	return incise_error_set(err, EINVAL,
+				"sim.%s: expected %s or %s, found %.40s; correct it",
+				name, key->words[0], key->words[1], word);
+}
+
 int incise_sim_config_set(struct incise_sim_config *config, const char *name,
 			  double value, struct incise_error *err)
 {
 	size_t length = strcspn(name, "[");
-	const struct key *key = NULL;
+	const struct key *key = key_find(name, length);
 	int index = 0;
 	char *end;
 	int rc;
 
-	for (size_t i = 0; i < N_KEYS && !key; i++)
-		if (strlen(keys[i].name) == length &&
-		    !strncmp(name, keys[i].name, length))
-			key = &keys[i];
 	if (key && name[length]) {
 		long number = strtol(name + length + 1, &end, 10);
 

@@ -47,6 +47,13 @@ struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim);
 int incise_sim_config_set(struct incise_sim_config *config, const char *key, double value,
 			  struct incise_error *err);
 
+/* Whether a key takes a word, as withdrawal does, and no number. */
+bool incise_sim_config_has_words(const char *key);
+
+/* Set such a key. Returns 0 or -EINVAL (err says which words). */
+int incise_sim_config_set_word(struct incise_sim_config *config, const char *key,
+			       const char *word, struct incise_error *err);
+
 /* Whether every value is within its range. Returns 0 or -EINVAL. */
 int incise_sim_config_check(const struct incise_sim_config *config,
 			    struct incise_error *err);

@@ -8,8 +8,8 @@
  *      0     ------\--------------------------------------------/-------- surface
  *   -depth           `-.________________________~~~~~~~~~~~~~~~'
  *
- * Each nominal depth is cut all its times before the next. The blade follows a path in the x-z
- * plane, with progress p from 0 to 1 along it. The hand's speed along the path swings about its
+ * Each nominal depth is cut all its times before the next. The blade follows a path in a plane of
+ * x and z, beside that of the cut before, with progress p from 0 to 1 along it. The hand's speed along the path swings about its
  * mean, so that every depth occurs at every velocity; where the path is steep the blade moves
  * less in x, so that its speed remains the hand's. Tremor is across the cut and along z only:
  * along x it would hide the slow phases.
@@ -22,6 +22,7 @@
 #define NS 1e-9
 
 #define START_MM 5.0	 /* x of a cut's start */
+#define APART_MM 3.0	 /* between cuts along y: each is in new tissue */
 #define CLEARANCE_MM 1.0 /* above the surface at a cut's start and end */
 #define AIR_MM 5.0	 /* above the surface during a pause */
 #define DESCENT 0.45	 /* shares of the path */
@@ -167,6 +168,12 @@ static double cut_depth(const struct incise_sim_config *config, int cut)
 	return config->depth_mm[config->n_depths - 1];
 }
 
+/* With withdrawal = paper tissue does not know where it was cut. */
+static double cut_y(const struct incise_surgeon *surgeon, int cut)
+{
+	return surgeon->config->withdrawal == INCISE_TISSUE_PAPER ? 0 : APART_MM * cut;
+}
+
 static void blade_cutting(const struct incise_surgeon *surgeon, int cut, double t,
 			  struct incise_blade *blade)
 {
@@ -185,6 +192,7 @@ static void blade_cutting(const struct incise_surgeon *surgeon, int cut, double 
 	blade->slab = p;
 	blade->position_mm[0] = x.at;
 	blade->velocity_mm_s[0] = x.slope * rate;
+	blade->position_mm[1] = cut_y(surgeon, cut);
 	blade->position_mm[2] = -depth.at;
 	blade->velocity_mm_s[2] = -depth.slope * rate;
 }
@@ -206,6 +214,8 @@ static void blade_pausing(const struct incise_surgeon *surgeon, int cut, double 
 	double u = fmin(t / pause, 1);
 	double from = cut ? cut_end(surgeon, cut - 1) : START_MM;
 	double to = cut < surgeon->cuts ? START_MM : from;
+	double aside = cut_y(surgeon, cut ? cut - 1 : 0);
+	double aside_to = cut < surgeon->cuts ? cut_y(surgeon, cut) : aside;
 	struct curve along = ease(u);
 	struct curve lift;
 
@@ -219,6 +229,8 @@ static void blade_pausing(const struct incise_surgeon *surgeon, int cut, double 
 	blade->slab = cut < surgeon->cuts ? 0 : 1;
 	blade->position_mm[0] = from + (to - from) * along.at;
 	blade->velocity_mm_s[0] = (to - from) * along.slope / pause;
+	blade->position_mm[1] = aside + (aside_to - aside) * along.at;
+	blade->velocity_mm_s[1] = (aside_to - aside) * along.slope / pause;
 	blade->position_mm[2] = CLEARANCE_MM + (AIR_MM - CLEARANCE_MM) * lift.at;
 	blade->velocity_mm_s[2] = (AIR_MM - CLEARANCE_MM) * lift.slope / pause;
 }
@@ -295,6 +307,7 @@ void incise_hand_look(const struct incise_hand *hand, double position_mm[3],
 
 static void blade_held(const struct incise_surgeon *surgeon, struct incise_blade *blade)
 {
+	static const double across[3] = {0, 1, 0};
 	double attitude[4];
 
 	*blade = (struct incise_blade){.cut = -1};
@@ -302,6 +315,7 @@ static void blade_held(const struct incise_surgeon *surgeon, struct incise_blade
 			 attitude);
 	blade->speed_mm_s = v3_length(blade->velocity_mm_s);
 	blade->depth_mm = fmax(0, -blade->position_mm[2]);
+	v3_rotate(blade->side, attitude, across);
 }
 
 void incise_surgeon_init(struct incise_surgeon *surgeon,
@@ -353,6 +367,8 @@ void incise_surgeon_blade(const struct incise_surgeon *surgeon, int64_t t_ns,
 	within = t_ns - cut * period;
 	blade->position_mm[1] = 0;
 	blade->velocity_mm_s[1] = 0;
+	blade->side[0] = blade->side[2] = 0;
+	blade->side[1] = 1;
 	if (within < surgeon->pause_ns || cut == surgeon->cuts)
 		blade_pausing(surgeon, (int)cut, within * NS, blade);
 	else

@@ -17,6 +17,9 @@ enum incise_surgeon_motion {
 	INCISE_SURGEON_HAND,
 };
 
+/* Values of the key `withdrawal`. */
+enum incise_tissue_withdrawal { INCISE_TISSUE_DISSIPATIVE, INCISE_TISSUE_PAPER };
+
 /*
  * A hand that holds the scalpel where a program puts it, a mouse for example. Another thread
  * reads the newest pose, always a whole one, and neither waits.
@@ -56,6 +59,7 @@ struct incise_blade {
 	double velocity_mm_s[3];
 	double speed_mm_s;
 	double depth_mm; /* below the surface, else 0 */
+	double side[3];	 /* of the blade's flat side, across the cut */
 };
 
 /* @config must outlive @surgeon. */

@@ -17,16 +17,28 @@
 #include <stddef.h>
 #include <incise/sim.h>
 #include <incise/stepper.h>
+#include "../tissue/front.h"
 #include "surgeon.h"
 
 /* --- the liver: the force on a blade that moves through it --------------------------- */
 
+/*
+ * Its state moves on once a tick. A force within the tick is that of a copy, so that it does not
+ * depend on which forces were asked for before.
+ */
 struct incise_tissue {
 	const struct incise_sim_config *config;
 	uint64_t tooth_key, boundary_key;
-	double path_mm;	    /* cut so far */
-	double fracture_mm; /* path at the last fracture */
-	double tooth_mm;    /* path from there to the next */
+	struct incise_front front; /* of the cut; see tissue.c */
+	bool inside;		   /* the blade was in the tissue */
+	int cut;		   /* of the script, that the front is of */
+	double factor;		   /* tooth and bound, where the blade cut last */
+	double force_N;		   /* of the last advance */
+	double work_N_mm;	   /* put into the cut, less what came back */
+	double most_N_mm;	   /* of that, so far */
+	double path_mm;		   /* cut so far */
+	double fracture_mm;	   /* path at the last fracture */
+	double tooth_mm;	   /* path from there to the next */
 	uint64_t teeth;
 };
 
@@ -34,7 +46,7 @@ struct incise_tissue {
 void incise_tissue_init(struct incise_tissue *tissue,
 			const struct incise_sim_config *config);
 
-/* Let the blade move on at its speed for a short time. */
+/* Bring the tissue to the blade, then let that move on at its speed for a short time. */
 void incise_tissue_advance(struct incise_tissue *tissue, const struct incise_blade *blade,
 			   double dt_s) INCISE_REALTIME;
 

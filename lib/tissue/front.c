@@ -7,12 +7,6 @@
 #include "../fixed/front.h"
 #include "front.h"
 
-/* A blade so far beside the line of its cut is in new tissue: half the width of a blade. */
-#define BESIDE_MM 1.0
-
-/* Share of the most work put in that no new tissue gives back. */
-#define KEPT 0.0625
-
 static void begin(struct incise_front *front, const double at_mm[3],
 		  const double normal[3], const double side[3])
 {
@@ -23,7 +17,8 @@ static void begin(struct incise_front *front, const double at_mm[3],
 bool incise_front_enter(struct incise_front *front, const double at_mm[3],
 			const double normal[3], const double side[3])
 {
-	bool fresh = !incise_incision_holds(&front->incision, at_mm, BESIDE_MM);
+	bool fresh =
+		!incise_incision_holds(&front->incision, at_mm, INCISE_FRONT_BESIDE_MM);
 
 	if (fresh)
 		begin(front, at_mm, normal, side);
@@ -40,11 +35,11 @@ double incise_front_advance(struct incise_front *front, const double at_mm[3],
 	double length_mm = incision->to_mm - incision->from_mm;
 
 	incise_incision_extend(incision, at_mm);
-	if (incise_incision_holds(incision, at_mm, BESIDE_MM))
+	if (incise_incision_holds(incision, at_mm, INCISE_FRONT_BESIDE_MM))
 		return incision->to_mm - incision->from_mm - length_mm;
 	/* It left the line sideways; a curved skin does that too. The cut goes on from here. */
 	incise_incision_begin(incision, at_mm, normal, side);
-	return BESIDE_MM;
+	return INCISE_FRONT_BESIDE_MM;
 }
 
 double incise_front_force(struct incise_front *front, double unloading_N_mm,
@@ -62,7 +57,8 @@ double incise_front_force(struct incise_front *front, double unloading_N_mm,
 		double work =
 			front->work_N_mm + (front->force_N + elastic_N) * half_way_mm;
 		/* Elastic energy is F²/2K. */
-		double paid_N = sqrt(2 * K * fmax(work - KEPT * front->most_N_mm, 0));
+		double paid_N = sqrt(
+			2 * K * fmax(work - INCISE_FRONT_KEPT * front->most_N_mm, 0));
 
 		force_N = fmax(elastic_N, fmin(trial_N, paid_N));
 	}

@@ -34,6 +34,12 @@
 #include <incise/export.h>
 #include "incision.h"
 
+/* A blade so far beside the line of its cut is in new tissue: half the width of a blade. */
+#define INCISE_FRONT_BESIDE_MM 1.0
+
+/* Share of the most work put in that no new tissue gives back. */
+#define INCISE_FRONT_KEPT 0.0625
+
 /* Begins with {0}. */
 struct incise_front {
 	double depth_mm, force_N; /* of the last call */

@@ -45,7 +45,10 @@ struct incise_sim_config {
 	double speed_mm_s;  /**< 25; mean speed along the cut */
 	double speed_swing; /**< 0.9; relative amplitude of its variation, 0 … 0.95 */
 
-	/* The tissue: F(d, v) = (e1 d + e2 d²) (1 + c v/(v + v0)), times tooth and bound. */
+	/*
+	 * The tissue: F(d, v) = (e1 d + e2 d²) (1 + c v/(v + v0)), times tooth and bound, where
+	 * the blade cuts. When it draws back, the tissue unloads, and then there is friction.
+	 */
 	double elastic1_N_mm;  /**< 0.045; e1 */
 	double elastic2_N_mm2; /**< 0.0028; e2 */
 	double viscous;	       /**< 0.35; c */
@@ -54,6 +57,10 @@ struct incise_sim_config {
 	double tooth_mm;       /**< 1.5; mean path between fractures */
 	double boundary;       /**< 0.1; sd of the factor between cuts; its drift along
 				       the slab has the same size */
+
+	double unloading_N_mm; /**< 0.25; stiffness of the way back, above the law's slope */
+	double friction;       /**< 0.1; share of F in the open cut, against the motion */
+	int withdrawal;	       /**< 0 dissipative; 1 paper: F in both directions */
 
 	/* Tracker. */
 	double tracker_hz;	   /**< 120 */

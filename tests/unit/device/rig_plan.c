@@ -26,7 +26,8 @@
 static void shorthand_sets_keys(void **state)
 {
 	struct incise_rig *rig = incise_rig_open(
-		"sim:seed=7,cut_s=2.5,depth_mm=5,times=3,clock=simulated", ALL, NULL);
+		"sim:seed=7,cut_s=2.5,depth_mm=5,times=3,withdrawal=paper,clock=simulated",
+		ALL, NULL);
 	const struct incise_sim_config *config;
 	double point[3], normal[3];
 
@@ -36,6 +37,7 @@ static void shorthand_sets_keys(void **state)
 	assert_true(config->cut_s == 2.5 && config->depth_mm[0] == 5);
 	assert_int_equal(config->n_depths, 1);
 	assert_int_equal(config->times[0], 3);
+	assert_int_equal(config->withdrawal, 1);
 	/* Three cuts of 2.5 s, four pauses of 1 s. */
 	assert_int_equal(incise_sim_duration(incise_rig_sim(rig)), 11500000000LL);
 	assert_false(incise_clock_is_real(incise_rig_clock(rig)));
@@ -81,6 +83,9 @@ static void shorthand_refuses(void **state)
 		{"sim:seed=1,tooth=1",
 		 "sim:tooth=1: sim.tooth: expected a number from 0 to "
 		 "0.9, found 1; correct it"},
+		{"sim:withdrawal=1",
+		 "sim:withdrawal=1: sim.withdrawal: expected dissipative or paper, found 1; "
+		 "correct it"},
 		{"sim:tooth=nan",
 		 "sim:tooth=nan: sim.tooth: expected a number from 0 to 0.9, "
 		 "found nan; correct it"},
@@ -180,6 +185,10 @@ static void file_refuses(void **state)
 		 ":1: sim.seed: expected a number; correct it"},
 		{"sim = { seed = {}; };", EINVAL,
 		 ":1: sim.seed: expected a number; correct it"},
+		{"sim = { withdrawal = 1; };", EINVAL,
+		 ":1: sim.withdrawal: expected text in quotes, found 1; correct it"},
+		{"sim = {\nwithdrawal = \"both\"; };", EINVAL,
+		 ":2: sim.withdrawal: expected dissipative or paper, found both; correct it"},
 		{"sim = { depth_mm = [5]; };", EINVAL,
 		 ":1: sim: expected depth_mm and times with as many values each, 1 to 8; "
 		 "correct them"},

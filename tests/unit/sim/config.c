@@ -27,6 +27,7 @@ static void defaults_are_those_of_the_header(void **state)
 	assert_true(c.elastic2_N_mm2 == 0.0028 && c.viscous == 0.35 &&
 		    c.viscous_mm_s == 15);
 	assert_true(c.tooth == 0.2 && c.tooth_mm == 1.5 && c.boundary == 0.1);
+	assert_true(c.unloading_N_mm == 0.25 && c.friction == 0.1 && c.withdrawal == 0);
 	assert_true(c.tracker_hz == 120 && c.tracker_noise_mm == 0.02);
 	assert_true(c.tracker_latency_ms == 4.2 && c.tracker_jitter_ms == 0.2);
 	assert_true(c.tracker_drift_ppm == 50 && c.force_hz == 10000 &&
@@ -107,6 +108,29 @@ static void set_refuses(void **state)
 	}
 }
 
+static void words(void **state)
+{
+	struct incise_error err = {0};
+	struct incise_sim_config c;
+
+	incise_sim_config_init(&c);
+	assert_true(incise_sim_config_has_words("withdrawal"));
+	assert_false(incise_sim_config_has_words("seed"));
+	assert_false(incise_sim_config_has_words("withdrawals"));
+	assert_int_equal(c.withdrawal, 0);
+	assert_int_equal(incise_sim_config_set_word(&c, "withdrawal", "paper", NULL), 0);
+	assert_int_equal(c.withdrawal, 1);
+	assert_int_equal(incise_sim_config_set_word(&c, "withdrawal", "pap", &err),
+			 -EINVAL);
+	assert_string_equal(err.text, "sim.withdrawal: expected dissipative or paper, "
+				      "found pap; correct it");
+	assert_int_equal(c.withdrawal, 1);
+	assert_int_equal(incise_sim_config_set_word(&c, "withdrawal", "", NULL), -EINVAL);
+	assert_int_equal(
+		incise_sim_config_set_word(&c, "withdrawal", "dissipative", NULL), 0);
+	assert_int_equal(c.withdrawal, 0);
+}
+
 static void check_finds_what_was_put_past_set(void **state)
 {
 	struct incise_error err = {0};
@@ -135,6 +159,7 @@ int main(void)
 		cmocka_unit_test(defaults_are_those_of_the_header),
 		cmocka_unit_test(set_reaches_its_field),
 		cmocka_unit_test(set_refuses),
+		cmocka_unit_test(words),
 		cmocka_unit_test(check_finds_what_was_put_past_set),
 	};
 

@@ -16,6 +16,7 @@
 #include <incise/rig.h>
 #include "../../../lib/sim/sim.h"
 #include "../../../lib/sim/surgeon.h"
+#include "../../../lib/tissue/front.h"
 
 #define TREMOR_MM 0.035 /* a little over the amplitude in y and z */
 
@@ -288,6 +289,36 @@ static void held_poses_are_whole(void **state)
 	assert_int_equal(backwards, 0);
 }
 
+static void cuts_lie_side_by_side(void **state)
+{
+	for (int paper = 0; paper < 2; paper++) {
+		struct incise_sim_config config;
+		struct incise_surgeon surgeon;
+		struct incise_blade blade;
+		double y_mm[14] = {0};
+		int64_t period;
+
+		incise_sim_config_init(&config);
+		config.withdrawal = paper;
+		incise_surgeon_init(&surgeon, &config);
+		period = surgeon.pause_ns + surgeon.cut_ns;
+		for (int cut = 0; cut < surgeon.cuts; cut++) {
+			incise_surgeon_blade(&surgeon,
+					     cut * period + surgeon.pause_ns +
+						     surgeon.cut_ns / 2,
+					     &blade);
+			assert_int_equal(blade.cut, cut);
+			y_mm[cut] = blade.position_mm[1];
+			/* beyond where a blade is in its own cut, and the tremor of two */
+			if (cut && !paper)
+				assert_true(y_mm[cut] - y_mm[cut - 1] >
+					    INCISE_FRONT_BESIDE_MM + 0.2);
+			if (paper)
+				assert_true(fabs(y_mm[cut]) < 0.1);
+		}
+	}
+}
+
 int main(void)
 {
 	static int cuts = INCISE_SURGEON_CUTS, turns = INCISE_SURGEON_TURNS,
@@ -304,6 +335,7 @@ int main(void)
 		cmocka_unit_test(a_held_pose_reaches_the_tracker),
 		cmocka_unit_test(bad_poses_are_refused),
 		cmocka_unit_test(held_poses_are_whole),
+		cmocka_unit_test(cuts_lie_side_by_side),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

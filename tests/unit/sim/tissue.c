@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/sim/tissue.c: the stated law, a saw-tooth about 1, a boundary of the stated size.
+ * lib/sim/tissue.c: the stated law, a saw-tooth about 1, a boundary of the stated size; the way
+ * back out of a cut, and closed motions, which take work.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -8,6 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <math.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/sim/world.h"
 
 static const struct incise_blade air = {.cut = 0, .speed_mm_s = 25, .slab = 0.5};
@@ -141,6 +143,184 @@ static void boundary_has_its_size(void **state)
 	assert_true(fabs(sqrt(squares) - 0.0988) < 5 * 0.1 / sqrt(2 * n));
 }
 
+/* A hand's blade goes straight to a depth in small steps; the force there. */
+static double go(struct incise_tissue *tissue, struct incise_blade *blade,
+		 double depth_mm)
+{
+	double from = blade->depth_mm, way = depth_mm - from;
+
+	for (int i = 1; i <= 1000; i++) {
+		blade->depth_mm = from + way * i / 1000;
+		incise_tissue_advance(tissue, blade, 1e-4);
+	}
+	return incise_tissue_force(tissue, blade, 0);
+}
+
+static void begin_by_hand(struct incise_sim_config *config, struct incise_tissue *tissue,
+			  struct incise_blade *blade)
+{
+	incise_sim_config_init(config);
+	config->motion = INCISE_SURGEON_HAND;
+	config->boundary = 0;
+	incise_tissue_init(tissue, config);
+	*blade = (struct incise_blade){.cut = -1, .slab = 0.5, .side = {0, 1, 0}};
+}
+
+/* 1e-9: a thousand roundings of numbers of some mm and N. */
+static void near(double is, double should)
+{
+	if (!(fabs(is - should) < 1e-9))
+		fail_msg("%.12g, expected %.12g", is, should);
+}
+
+static void drawing_back_unloads_and_then_rubs(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_tissue tissue;
+	struct incise_blade blade;
+	double c, back_mm;
+
+	begin_by_hand(&config, &tissue, &blade);
+	c = incise_sim_mean_force(&config, 15, 0);
+	back_mm = c / config.unloading_N_mm;
+	near(go(&tissue, &blade, 15), c);
+	near(go(&tissue, &blade, 15 - back_mm / 2), c / 2);
+	near(go(&tissue, &blade, 15 - back_mm), 0);
+	near(go(&tissue, &blade, 4),
+	     -config.friction * incise_sim_mean_force(&config, 4, 0));
+	/* Out of the tissue and in again at the same place: the cut is open up to its front. */
+	assert_true(go(&tissue, &blade, 0) == 0);
+	near(go(&tissue, &blade, 4),
+	     config.friction * incise_sim_mean_force(&config, 4, 0));
+	near(go(&tissue, &blade, 16), incise_sim_mean_force(&config, 16, 0));
+	/* Elsewhere it is new tissue. */
+	go(&tissue, &blade, 0);
+	blade.position_mm[1] = 3;
+	near(go(&tissue, &blade, 4), incise_sim_mean_force(&config, 4, 0));
+}
+
+static void each_cut_of_the_script_is_new(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_tissue tissue;
+	struct incise_blade blade;
+
+	begin_by_hand(&config, &tissue, &blade);
+	config.motion = INCISE_SURGEON_CUTS;
+	config.tooth = 0;
+	for (blade.cut = 0; blade.cut < 2; blade.cut++) {
+		near(go(&tissue, &blade, 10), incise_sim_mean_force(&config, 10, 0));
+		go(&tissue, &blade, 0);
+	}
+	blade.cut--; /* the blade touched the surface on its way: the same cut */
+	near(go(&tissue, &blade, 3),
+	     config.friction * incise_sim_mean_force(&config, 3, 0));
+}
+
+static void paper_is_the_law_both_ways(void **state)
+{
+	static const int motions[] = {INCISE_SURGEON_CUTS, INCISE_SURGEON_PRESSES,
+				      INCISE_SURGEON_HAND};
+
+	for (size_t i = 0; i < sizeof(motions) / sizeof(*motions); i++) {
+		struct incise_sim_config config;
+		struct incise_tissue tissue;
+		struct incise_blade blade;
+
+		begin_by_hand(&config, &tissue, &blade);
+		config.withdrawal = INCISE_TISSUE_PAPER;
+		config.motion = motions[i];
+		config.tooth = 0;
+		blade.speed_mm_s = 20;
+		for (int step = 0; step < 100; step++) {
+			blade.velocity_mm_s[2] = step < 50 ? -20 : 20;
+			blade.depth_mm = step < 50 ? 0.2 * step : 0.2 * (100 - step);
+			incise_tissue_advance(&tissue, &blade, 1e-4);
+			assert_true(incise_tissue_force(&tissue, &blade, 0) ==
+				    incise_sim_mean_force(&config, blade.depth_mm, 20));
+		}
+	}
+}
+
+static void asking_changes_nothing(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_tissue tissue;
+	struct incise_blade blade;
+	double force_N;
+
+	begin_by_hand(&config, &tissue, &blade);
+	go(&tissue, &blade, 10);
+	blade.depth_mm = 9;
+	force_N = incise_tissue_force(&tissue, &blade, 0);
+	blade.depth_mm = 12;
+	incise_tissue_force(&tissue, &blade, 5e-5);
+	blade.depth_mm = 9;
+	assert_true(incise_tissue_force(&tissue, &blade, 0) == force_N);
+}
+
+/* A law that is steeper than the tissue unloads: the force rises no faster. */
+static void unloading_limits_the_force(void **state)
+{
+	struct incise_sim_config config;
+	struct incise_tissue tissue;
+	struct incise_blade blade;
+
+	begin_by_hand(&config, &tissue, &blade);
+	config.unloading_N_mm = 0.02;
+	near(go(&tissue, &blade, 10), 0.02 * 10);
+}
+
+/*
+ * Random motions from the air back to it, in depth and along the skin, at any speed, with teeth
+ * where the surgeon cuts: more work goes in than comes back, by the trapezium rule, and by hand,
+ * where nothing tears, as held forces too.
+ */
+static void closed_motions_take_work(void **state)
+{
+	static const int motions[] = {INCISE_SURGEON_CUTS, INCISE_SURGEON_PRESSES,
+				      INCISE_SURGEON_HAND};
+	const uint64_t key = incise_random_key(4, 99);
+	const int steps = 4000;
+
+	for (uint64_t n = 0; n < 900; n++) {
+		struct incise_sim_config config;
+		struct incise_tissue tissue;
+		struct incise_blade blade;
+		double work = 0, held = 0, force = 0, u[6];
+		double dt = 1e-3 * (0.1 + incise_random_uniform(key + 1, n));
+
+		begin_by_hand(&config, &tissue, &blade);
+		config.motion = motions[n % 3];
+		config.boundary = 0.1;
+		for (int k = 0; k < 6; k++)
+			u[k] = incise_random_uniform(key, 6 * n + (uint64_t)k);
+		for (int i = 1; i <= steps; i++) {
+			double t = 2 * M_PI * i / steps, before = blade.depth_mm, d, dx;
+
+			d = (3 + 17 * u[0]) * pow(sin(t / 2), 2) *
+			    (1 + 0.5 * u[1] * sin((1 + floor(8 * u[2])) * t));
+			dx = config.motion == INCISE_SURGEON_PRESSES
+				     ? 0
+				     : 0.02 * u[3] *
+					       (1 +
+						sin((1 + floor(20 * u[4])) * t + u[5]));
+			blade.depth_mm = i == steps ? 0 : fmax(d, 0);
+			blade.position_mm[0] += dx;
+			blade.velocity_mm_s[2] = (before - blade.depth_mm) / dt;
+			blade.speed_mm_s = hypot(blade.velocity_mm_s[2], dx / dt);
+			held += force * (blade.depth_mm - before);
+			work += force / 2 * (blade.depth_mm - before);
+			incise_tissue_advance(&tissue, &blade, dt);
+			force = incise_tissue_force(&tissue, &blade, 0);
+			work += force / 2 * (blade.depth_mm - before);
+		}
+		if (!(work > 0 && (held > 0 || config.motion != INCISE_SURGEON_HAND)))
+			fail_msg("motion %d, number %d: %g and %g N mm", config.motion,
+				 (int)n, work, held);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -149,6 +329,12 @@ int main(void)
 		cmocka_unit_test(saw_tooth_builds_up_and_drops),
 		cmocka_unit_test(ahead_continues_the_tooth),
 		cmocka_unit_test(boundary_has_its_size),
+		cmocka_unit_test(drawing_back_unloads_and_then_rubs),
+		cmocka_unit_test(each_cut_of_the_script_is_new),
+		cmocka_unit_test(paper_is_the_law_both_ways),
+		cmocka_unit_test(asking_changes_nothing),
+		cmocka_unit_test(unloading_limits_the_force),
+		cmocka_unit_test(closed_motions_take_work),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
