@@ -25,7 +25,7 @@ struct options {
 	int n_mfs;
 	bool auto_mfs;
 	enum incise_mf_type type;
-	bool json;
+	bool all_rows, json;
 	struct incise_train_options train;
 };
 
@@ -73,6 +73,9 @@ static const struct cli_option option_table[] = {
 	 CLI_TEXT(struct options, output)},
 	{0, "group", "COLUMN", "column naming the cut; data are split by whole cuts",
 	 CLI_TEXT(struct options, group)},
+	{0, "all-rows", NULL,
+	 "also take rows where the blade did not advance: advancing is 0",
+	 CLI_FLAG(struct options, all_rows)},
 	{0, "check", "SHARE", "keep this share back as unseen data, e.g. 0.3",
 	 CLI_NUMBER(struct options, check, 0.01, 0.99)},
 	{0, "seed", "N", "of every random choice (default: 1)",
@@ -165,6 +168,7 @@ struct result {
 	struct incise_train_report report;
 	struct incise_baselines baselines;
 	struct interval interval;
+	size_t left_out; /* rows */
 };
 
 /* --- training ------------------------------------------------------------------------ */
@@ -365,6 +369,7 @@ static void report_json(const struct result *result, json_t *warned)
 	char key[80];
 
 	json_set_integer(object, "pairs", fit->pairs.n + (check ? check->pairs.n : 0));
+	json_set_integer(object, "left_out", result->left_out);
 	json_object_set_new(object, "train",
 			    error_object(options, report->train_rmse, report->train_r2,
 					 fit->pairs.n));
@@ -434,6 +439,10 @@ static void report_text(const struct result *result)
 		printf(", %zu to check", check->pairs.n);
 	if (check && options->group)
 		printf(" (%d cuts)", check->n_groups);
+	if (result->left_out)
+		printf("\nleft out %zu of %zu rows: the blade did not advance",
+		       result->left_out,
+		       result->left_out + fit->pairs.n + (check ? check->pairs.n : 0));
 	printf("\n%d rules, %d parameters, %d epochs (kept %d), ridge %g, condition %.2g\n",
 	       incise_model_info(model)->n_rules, report->parameters, report->epochs,
 	       report->best_epoch, report->ridge, report->condition);
@@ -480,8 +489,10 @@ int main(int argc, char **argv)
 	check_writable(options.model);
 	check_writable(options.initial);
 	check_writable(options.history);
-	data = cli_require(incise_dataset_read(options.data, columns,
-					       options.n_inputs + 1, options.group, &err),
+	data = cli_require(incise_dataset_read_where(
+				   options.data, columns, options.n_inputs + 1,
+				   options.group, options.all_rows ? NULL : "advancing",
+				   &result.left_out, &err),
 			   &err);
 	if (incise_train_split(data, options.check, options.train.seed, &fit, &check,
 			       &err))

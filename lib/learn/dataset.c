@@ -92,14 +92,23 @@ static int next_row(struct reader *in)
 	return rc;
 }
 
+/* -1: there is none. */
+static int look_for_column(const struct reader *in, const char *name)
+{
+	for (int i = 0; name && i < in->n_fields; i++)
+		if (!strcmp(in->field[i], name))
+			return i;
+	return -1;
+}
+
 static int find_column(struct reader *in, const char *name)
 {
 	char list[300] = "";
 	size_t used = 0;
+	int at = look_for_column(in, name);
 
-	for (int i = 0; i < in->n_fields; i++)
-		if (!strcmp(in->field[i], name))
-			return i;
+	if (at >= 0)
+		return at;
 	for (int i = 0; i < in->n_fields && used < sizeof(list); i++)
 		used += snprintf(list + used, sizeof(list) - used, "%s%s", i ? ", " : "",
 				 in->field[i]);
@@ -168,9 +177,9 @@ static int grow(struct incise_dataset *data, bool groups)
 }
 
 static int read_rows(struct reader *in, const char *const *columns, const char *group,
-		     struct incise_dataset *data)
+		     const char *where, struct incise_dataset *data, size_t *left_out)
 {
-	int at[FIELDS_MAX], group_at = -1, rc;
+	int at[FIELDS_MAX], group_at = -1, where_at, rc;
 
 	rc = next_row(in);
 	if (rc < 0)
@@ -189,14 +198,24 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 		if (group_at < 0)
 			return group_at;
 	}
+	where_at = look_for_column(in, where);
 	rc = in->n_fields;
-	for (int header = rc; (rc = next_row(in)) > 0; data->rows++) {
+	for (int header = rc; (rc = next_row(in)) > 0;) {
+		double wanted = 1;
+
 		if (in->n_fields != header)
 			return incise_lines_error(
 				&in->lines, EINVAL,
 				"column %d: the row has %d fields, the header has %d",
 				in->n_fields < header ? in->n_fields + 1 : header + 1,
 				in->n_fields, header);
+		rc = where_at >= 0 ? number(in, where_at, where, &wanted) : 0;
+		if (rc)
+			return rc;
+		if (wanted == 0) {
+			++*left_out;
+			continue;
+		}
 		if (data->rows == data->capacity && grow(data, group))
 			return incise_lines_error(&in->lines, ENOMEM,
 						  "no memory for more rows");
@@ -206,23 +225,30 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 			if (rc)
 				return rc;
 		}
-		if (!group)
-			continue;
-		rc = find_group(data, in->field[group_at]);
-		if (rc < 0)
-			return incise_lines_error(&in->lines, ENOMEM,
-						  "no memory for more groups");
-		data->group[data->rows] = rc;
+		if (group) {
+			rc = find_group(data, in->field[group_at]);
+			if (rc < 0)
+				return incise_lines_error(&in->lines, ENOMEM,
+							  "no memory for more groups");
+			data->group[data->rows] = rc;
+		}
+		data->rows++;
 	}
-	if (!rc && !data->rows)
+	if (!rc && !data->rows && *left_out)
+		rc = incise_lines_error(&in->lines, ENODATA,
+					"all %zu rows have 0 in the column '%s'",
+					*left_out, where);
+	else if (!rc && !data->rows)
 		rc = incise_lines_error(&in->lines, ENODATA,
 					"there are no rows below the header");
 	return rc;
 }
 
-struct incise_dataset *incise_dataset_read(const char *path, const char *const *columns,
-					   int n, const char *group,
-					   struct incise_error *err)
+struct incise_dataset *incise_dataset_read_where(const char *path,
+						 const char *const *columns, int n,
+						 const char *group, const char *where,
+						 size_t *left_out,
+						 struct incise_error *err)
 {
 	/* Of any size: only the columns that are asked for are kept. */
 	static const struct incise_infile_kind csv = {
@@ -240,9 +266,10 @@ struct incise_dataset *incise_dataset_read(const char *path, const char *const *
 		return NULL;
 	}
 	data->columns = n;
+	*left_out = 0;
 	rc = incise_lines_open(&in.lines, path, &csv, err);
 	if (!rc) {
-		rc = read_rows(&in, columns, group, data);
+		rc = read_rows(&in, columns, group, where, data, left_out);
 		incise_lines_close(&in.lines);
 	}
 	if (rc < 0) {
@@ -251,6 +278,15 @@ struct incise_dataset *incise_dataset_read(const char *path, const char *const *
 		return NULL;
 	}
 	return data;
+}
+
+struct incise_dataset *incise_dataset_read(const char *path, const char *const *columns,
+					   int n, const char *group,
+					   struct incise_error *err)
+{
+	size_t left_out;
+
+	return incise_dataset_read_where(path, columns, n, group, NULL, &left_out, err);
 }
 
 void incise_dataset_free(struct incise_dataset *data)

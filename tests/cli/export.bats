@@ -65,10 +65,10 @@ well_formed() {
 @test "export raw at a rate, to standard output" {
 	run -0 --separate-stderr incise export liver.rec --rate 100
 	[ -z "$stderr" ]
-	[ "${lines[0]}" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped ]
+	[ "${lines[0]}" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing ]
 	[[ "${lines[1]}" == liver-01,* ]]
 	printf '%s\n' "${lines[@]}" >out.csv
-	well_formed out.csv 6 2
+	well_formed out.csv 7 2
 	[ "$(cut -d, -f1 out.csv | sort -u | grep -c liver-)" -eq 14 ]
 	# 14 cuts of not quite 2 s at 100 rows a second
 	[ "${#lines[@]}" -gt 1400 ]
@@ -77,7 +77,7 @@ well_formed() {
 
 @test "export of all samples" {
 	incise export liver.rec -o all.csv
-	well_formed all.csv 6 2
+	well_formed all.csv 7 2
 	# as many as lie in the tissue, nearly: depth is interpolated between the table's rows
 	awk -F, 'NR > 1 && $3 <= 0 { bad = 1 } END { exit bad }' all.csv
 	[ "$(wc -l <all.csv)" -gt 140000 ]
@@ -86,18 +86,21 @@ well_formed() {
 @test "export averaged" {
 	run -0 --separate-stderr incise export liver.rec --average 12x10 -o a.csv
 	[[ "$output" == "a.csv: "*" rows from 14 cuts" ]]
-	[ "$(head -n 1 a.csv)" = depth_mm,velocity_mm_s,force_N,sd_N,count,cuts ]
-	well_formed a.csv 6 1
-	[ "$(wc -l <a.csv)" -le 121 ]
+	[ "$(head -n 1 a.csv)" = depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing ]
+	well_formed a.csv 7 1
+	for advancing in 0 1; do
+		[ "$(grep -c ",$advancing\$" a.csv)" -le 120 ]
+	done
 	# the force rises with depth: rows are in order of depth
-	awk -F, 'NR == 2 { first = $3 } { last = $3 } END { exit !(last > 5 * first) }' a.csv
+	awk -F, '!$7 || NR == 1 { next } !first { first = $3 } { last = $3 }
+		END { exit !(last > 5 * first) }' a.csv
 	awk -F, 'NR > 1 && ($5 < 50 || $6 < 1 || $6 > 14) { bad = 1 } END { exit bad }' a.csv
 }
 
 @test "export averaged by cut" {
 	incise export liver.rec -a 12x10 --by-cut -o a.csv
-	[ "$(head -n 1 a.csv)" = cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts ]
-	well_formed a.csv 7 2
+	[ "$(head -n 1 a.csv)" = cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing ]
+	well_formed a.csv 8 2
 	[ "$(tail -n +2 a.csv | cut -d, -f1 | uniq | wc -l)" -eq 14 ]
 }
 
@@ -144,7 +147,7 @@ well_formed() {
 	incise capture -o cut.rec --rig sim:clock=simulated --duration 6s >/dev/null
 	mv cut.rec cut.rec.part
 	incise export cut.rec -a 3x3 -o a.csv
-	well_formed a.csv 6 1
+	well_formed a.csv 7 1
 }
 
 @test "export replaces an old dataset, and leaves it where it fails" {
@@ -210,7 +213,7 @@ well_formed() {
 
 @test "export killed by a closed pipe is quiet" {
 	bash -c "set -o pipefail; incise export liver.rec 2>err | head -n 1" >out || true
-	[ "$(cat out)" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped ]
+	[ "$(cat out)" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing ]
 	[ ! -s err ]
 }
 
@@ -254,12 +257,30 @@ well_formed() {
 	[ ! -e small.h5 ]
 }
 
+@test "export tells where the blade advances, raw, averaged and resampled" {
+	# hardly any way along the skin: the surgeon goes in, trembles at the bottom, and comes out
+	incise capture -o deep.rec --rig sim:clock=simulated,cut_s=4,speed_mm_s=1,depth_mm=10,times=2
+	incise export deep.rec --rate 100 -o raw.csv
+	awk -F, 'NR > 1 { if ($1 != cut) { cut = $1; deepest = 0; out = 0 }
+			if ($3 > deepest) deepest = $3; out = out || $3 < deepest - 1
+			part = out ? "out" : deepest < 8 ? "in" : "bottom"; n[part]++; advancing[part] += $7 }
+		END { exit !(n["in"] > 150 && n["out"] > 50 && advancing["in"] > 0.8 * n["in"] &&
+			advancing["out"] < 0.05 * n["out"]) }' raw.csv
+	incise export deep.rec --rate 100 --resample -o all.csv
+	awk -F, 'NR > 1 && $14 == "nan" && $22 { bad = 1 } { n += $22 } END { exit bad || n < 200 }' all.csv
+	# the same depths again on the way out, with less force
+	incise export deep.rec --average 5x1 --velocity-max 100 -o bins.csv
+	awk -F, 'NR > 1 { force[int($1 / 2.1), $7] = $3 }
+		END { for (bin = 0; bin < 4; bin++) if (!((bin, 0) in force) || !((bin, 1) in force) ||
+				force[bin, 0] >= force[bin, 1]) exit 1 }' bins.csv
+}
+
 @test "export by another calibration" {
 	echo 'force_mV_N = 2480;' >half.conf
 	incise export liver.rec -a 3x3 -o a.csv
 	incise export liver.rec -a 3x3 -c half.conf -o b.csv
 	paste -d, a.csv b.csv | awk -F, '
-		NR > 1 { d = $3 - 2 * $9; if (d > 1e-7 || d < -1e-7) bad = 1 } END { exit bad || NR < 2 }'
+		NR > 1 { d = $3 - 2 * $10; if (d > 1e-7 || d < -1e-7) bad = 1 } END { exit bad || NR < 2 }'
 	echo 'force_mV_N = 0;' >bad.conf
 	run --separate-stderr incise export liver.rec -c bad.conf -o c.csv
 	failed_with "bad.conf"
@@ -327,7 +348,7 @@ read_mcap() {
 
 @test "export resampled" {
 	incise export liver.rec --resample --rate 100 -o a.csv
-	well_formed <(sed 's/nan/0/g' a.csv) 21 2
+	well_formed <(sed 's/nan/0/g' a.csv) 22 2
 	[[ "$(head -n 1 a.csv)" != *camera* ]]
 	# 43 s of it, in cuts or not
 	[ "$(wc -l <a.csv)" -eq 4301 ]
@@ -345,14 +366,14 @@ read_mcap() {
 	sqlite3 seen.rec/recording.db "DELETE FROM knots;
 		INSERT INTO frames SELECT seq, t_ns, t_ns, 0, 1, 0, 100.0, 0.5, depth_mm, 0.9 FROM depth"
 	incise export seen.rec liver.rec --resample --rate 50 -o a.csv --damaged
-	[[ "$(head -n 1 a.csv)" == *,tracker_error,camera_depth_mm,camera_depth_sd_mm,camera_depth_u_mm,quality,low_quality ]]
+	[[ "$(head -n 1 a.csv)" == *,tracker_error,advancing,camera_depth_mm,camera_depth_sd_mm,camera_depth_u_mm,quality,low_quality ]]
 	# by the pictures as by the tracker; and none of what has no pictures
-	awk -F, 'NR > 1 && $1 == "seen" && $14 != "nan" { n++; if ($14 != $22 || $26) bad = 1 }
-		NR > 1 && $1 == "liver" && ($22 != "nan" || !$26) { bad = 1 }
+	awk -F, 'NR > 1 && $1 == "seen" && $14 != "nan" { n++; if ($14 != $23 || $27) bad = 1 }
+		NR > 1 && $1 == "liver" && ($23 != "nan" || !$27) { bad = 1 }
 		END { exit bad || n < 2100 }' a.csv
 	echo 'depth_mm_px = 0.2375;' >twice.conf
 	incise export seen.rec --resample --rate 50 -c twice.conf --lineage -o b.csv --damaged
-	awk -F, 'FNR > 1 && /^seen/ && $14 != "nan" { n++; d = $22 - 2 * $14; if (d > 2e-4 || d < -2e-4) bad = 1 }
+	awk -F, 'FNR > 1 && /^seen/ && $14 != "nan" { n++; d = $23 - 2 * $14; if (d > 2e-4 || d < -2e-4) bad = 1 }
 		END { exit bad || n < 2100 }' b.csv
 	grep -qx '# depth_mm_px: 0.2375' b.csv
 }
@@ -388,8 +409,8 @@ read_mcap() {
 	delay=$(sqlite3 line.rec/recording.db "SELECT delay_ns FROM streams WHERE name = 'tracker'")
 	echo "tracker_delay_ms = $(awk "BEGIN { print 100 + $delay / 1e6 }");" >back.conf
 	incise export line.rec --resample --rate 100 -c back.conf -o c.csv --damaged
-	paste -d, a.csv c.csv | awk -F, 'NR > 20 && $14 != "nan" && $35 != "nan" {
-		n++; d = $14 - $35; if (d > 1.5e-4 || d < -1.5e-4) bad = 1 } END { exit bad || n < 4000 }'
+	paste -d, a.csv c.csv | awk -F, 'NR > 20 && $14 != "nan" && $36 != "nan" {
+		n++; d = $14 - $36; if (d > 1.5e-4 || d < -1.5e-4) bad = 1 } END { exit bad || n < 4000 }'
 }
 
 @test "export as HDF5 is what h5py reads" {

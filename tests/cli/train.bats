@@ -58,6 +58,35 @@ refuses() {
 		-eq "$(grep -c '^incise train: warning: ' warned)" ]
 }
 
+@test "train leaves out where the blade did not advance, and says how many" {
+	# a third of the rows more, from the way out
+	awk -F, 'BEGIN { OFS = "," } NR == 1 { print $0, "advancing"; next } { print $0, 1 }
+		NR % 3 == 0 { print $1, $2, $3, "nan", 0 }' pairs.csv >all.csv
+	run -0 --separate-stderr incise train all.csv --group cut --check 0.3 -o m.fis
+	[ "${lines[0]}" = "all.csv: 192 pairs to train (4 cuts), 96 to check (2 cuts)" ]
+	[ "${lines[1]}" = "left out 96 of 384 rows: the blade did not advance" ]
+	# the model is that of the others alone
+	incise train pairs.csv --group cut --check 0.3 -o other.fis >out
+	cmp <(grep -v ^Name m.fis) <(grep -v ^Name other.fis)
+	run ! grep -q "left out" out
+	incise train all.csv -o m.fis --overwrite --json >r.json
+	[ "$(key r.json pairs)" = 288 ]
+	[ "$(key r.json left_out)" = 96 ]
+	incise train pairs.csv -o m.fis --overwrite --json >r.json
+	[ "$(key r.json left_out)" = 0 ]
+	# what is left out may hold anything
+	run --separate-stderr incise train all.csv -o n.fis --all-rows
+	failed_with all.csv "not finite"
+	sed -i 's/nan/0.0/' all.csv
+	incise train all.csv -o m.fis --overwrite --all-rows --json >r.json
+	[ "$(key r.json pairs)" = 384 ]
+	[ "$(key r.json left_out)" = 0 ]
+	sed -i 's/,1$/,0/' all.csv
+	run --separate-stderr incise train all.csv -o n.fis
+	failed_with all.csv "all 384 rows" advancing
+	[ ! -e n.fis ]
+}
+
 @test "the reported check error is the model's on the pairs kept back" {
 	# no group: the pairs kept back are those of a split we do not know, so keep one
 	# cut's worth by group of two: the model's error on one of them is the one reported

@@ -24,14 +24,21 @@ char *demo_path(const struct demo *demo, const char *name)
 	return cli_text("%s/%s", demo->folder, name);
 }
 
+/* Of pairs those that the models learned. */
+#define ADVANCING "advancing"
+
+/* Without the rows whose number in the column @where is 0, if it is not NULL. */
 static struct incise_dataset *read_dataset(const struct demo *demo, const char *name,
 					   const char *const *columns, int n,
-					   const char *group)
+					   const char *group, const char *where)
 {
 	struct incise_error err = {0};
 	char *path = demo_path(demo, name);
+	size_t left_out;
 	struct incise_dataset *data =
-		cli_require(incise_dataset_read(path, columns, n, group, &err), &err);
+		cli_require(incise_dataset_read_where(path, columns, n, group, where,
+						      &left_out, &err),
+			    &err);
 
 	free(path);
 	return data;
@@ -99,7 +106,8 @@ static double fixed_difference(const struct incise_model *model, double *bound)
 static double truth_error(const struct demo *demo, const struct incise_model *model)
 {
 	static const char *const columns[] = {"depth_mm", "velocity_mm_s", "force_N"};
-	struct incise_dataset *pairs = read_dataset(demo, "pairs.csv", columns, 3, NULL);
+	struct incise_dataset *pairs =
+		read_dataset(demo, "pairs.csv", columns, 3, NULL, ADVANCING);
 	size_t n = incise_dataset_rows(pairs);
 	struct incise_sim_config config;
 	double sum = 0;
@@ -171,7 +179,8 @@ static int nearest_nominal(double depth_mm)
 
 static void figure_force(const struct demo *demo)
 {
-	struct incise_dataset *raw = read_dataset(demo, "raw.csv", raw_columns, 4, "cut");
+	struct incise_dataset *raw =
+		read_dataset(demo, "raw.csv", raw_columns, 4, "cut", NULL);
 	static double sum[N_NOMINAL][SLOTS];
 	static int count[N_NOMINAL][SLOTS];
 	size_t rows = incise_dataset_rows(raw), first = 0;
@@ -273,7 +282,8 @@ static void figure_surface(const struct demo *demo, const struct incise_model *m
 static void write_pairs(const struct demo *demo)
 {
 	static const char *const columns[] = {"depth_mm", "velocity_mm_s", "force_N"};
-	struct incise_dataset *pairs = read_dataset(demo, "pairs.csv", columns, 3, NULL);
+	struct incise_dataset *pairs =
+		read_dataset(demo, "pairs.csv", columns, 3, NULL, ADVANCING);
 	FILE *data = plot_data(demo->folder, "pairs.dat");
 
 	for (size_t i = 0; i < incise_dataset_rows(pairs); i++) {
@@ -287,25 +297,24 @@ static void write_pairs(const struct demo *demo)
 
 /* ---- Figure 5: predicted, rendered and measured force of a cut never seen ---- */
 
-/* RMSE of the model over a cut that no training saw. */
-static double figure_prediction(const struct demo *demo, const struct incise_model *model)
+static void figure_prediction(const struct demo *demo)
 {
 	static const char *const ticks[] = {"t_s", "depth_mm", "command_N", "rendered_N"};
+	static const char *const columns[] = {"t_s", "measured_N", "predicted_N"};
+	/* Of the ticks of a replay those in its cut. */
 	struct incise_dataset *cut =
-		read_dataset(demo, "new-cut.csv", raw_columns, 4, "cut");
-	struct incise_dataset *log = read_dataset(demo, "haptic.csv", ticks, 4, NULL);
-	size_t n = incise_dataset_rows(cut);
+		read_dataset(demo, "new-cut-replay.csv", columns, 3, NULL, "cut");
+	struct incise_dataset *log =
+		read_dataset(demo, "haptic.csv", ticks, 4, NULL, NULL);
 	FILE *data = plot_data(demo->folder, "prediction.dat");
-	double sum = 0, contact = -1;
+	double contact = -1;
 	FILE *script;
 
-	for (size_t i = 0; i < n; i++) {
+	for (size_t i = 0; i < incise_dataset_rows(cut); i++) {
 		const double *row = incise_dataset_row(cut, i);
-		double x[] = {row[1], row[2]}, y = incise_model_eval(model, x, NULL);
 
-		sum += (y - row[3]) * (y - row[3]) / n;
 		fprintf(data, "%.4f %.5f %.5f\n", row[0] - incise_dataset_row(cut, 0)[0],
-			row[3], y);
+			row[1], row[2]);
 	}
 	plot_data_end(data, demo->folder);
 	/* Both begin where the blade meets the tissue. */
@@ -339,7 +348,6 @@ static double figure_prediction(const struct demo *demo, const struct incise_mod
 	draw(demo, script, "fig5-prediction");
 	incise_dataset_free(cut);
 	incise_dataset_free(log);
-	return sqrt(sum);
 }
 
 static void figure_lateness(const struct demo *demo, const json_t *haptic)
@@ -409,16 +417,17 @@ static void figure_camera(const struct demo *demo)
 
 void demo_figures(struct demo *demo, const struct incise_model *model)
 {
-	double new_cut;
+	const json_t *replay = json_object_get(demo->summary, "replay_new_cut");
 
 	write_pairs(demo);
 	figure_force(demo);
 	figure_membership(demo, model);
 	figure_surface(demo, model);
-	new_cut = figure_prediction(demo, model);
+	figure_prediction(demo);
 	figure_lateness(demo, json_object_get(demo->summary, "haptic"));
 	figure_camera(demo);
-	json_set_number(demo->summary, "new_cut_rmse_N", new_cut);
+	json_set_number(demo->summary, "new_cut_rmse_N",
+			number_of(replay, "rms_N", NULL));
 }
 
 /* --- the summary ---------------------------------------------------------------------- */
@@ -464,7 +473,7 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 		"  linear regression               %10.4f\n"
 		"  nearest neighbours              %10.4f\n\n"
 		"model against the tissue's true mean force   %.4f N rms at the pairs\n"
-		"model against a new cut at 5 mm              %.4f N rms\n"
+		"model against a new cut at 5 mm, replayed    %.4f N rms\n"
 		"fixed point against double                   %.4f mN largest of %d points, "
 		"certified to %.4f mN\n\n"
 		"haptic loop        %.0f ticks at %g Hz, %.0f skipped (%s)\n"

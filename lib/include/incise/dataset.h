@@ -33,6 +33,18 @@ INCISE_API struct incise_dataset *incise_dataset_read(const char *path,
 						      const char *group,
 						      struct incise_error *err);
 
+/**
+ * The same without the rows whose number in one column is 0; what else they hold does not
+ * matter. A file without that column is read whole.
+ *
+ * @param where    name of the column, or NULL for incise_dataset_read()
+ * @param left_out how many rows were left out
+ * @return as incise_dataset_read(); ENODATA if all rows were left out
+ */
+INCISE_API struct incise_dataset *incise_dataset_read_where(
+	const char *path, const char *const *columns, int n, const char *group,
+	const char *where, size_t *left_out, struct incise_error *err);
+
 /** NULL is accepted. */
 INCISE_API void incise_dataset_free(struct incise_dataset *data);
 

@@ -143,7 +143,8 @@ struct incise_export_options {
 			     samples; 0: every force sample */
 	int depth_bins; /**< 0: raw; else averaged over depth_bins × velocity_bins */
 	int velocity_bins;
-	double depth_max_mm; /**< upper end of the bins; 0: the largest in the data */
+	double depth_max_mm; /**< upper end of the bins; 0: the largest where the blade
+				advances */
 	double velocity_max_mm_s;
 	bool by_cut;   /**< average each cut by itself, giving a cut column */
 	int min_count; /**< bins with fewer force samples are left out; default 50 */
@@ -177,8 +178,9 @@ struct incise_export_report {
  * Export to a file whose name has the format: .h5 and .hdf5 are HDF5, .mcap is MCAP, any
  * other is CSV. The file appears under its name when it is complete.
  *
- * CSV has the cuts of some recordings. Raw: cut,t_s,depth_mm,velocity_mm_s,force_N,clipped.
- * Averaged: [cut,]depth_mm,velocity_mm_s,force_N,sd_N,count,cuts. Depth and velocity are
+ * CSV has the cuts of some recordings. Raw: cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,
+ * advancing. Averaged: [cut,]depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing, each
+ * bin once for where the blade advances and once for where not. Depth and velocity are
  * interpolated at the times of the force samples.
  *
  * HDF5 has a dataset of one dimension per column, named like it, with the attributes

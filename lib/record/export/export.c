@@ -3,7 +3,8 @@
  * Export of recordings; see incise/recording.h.
  *
  *     recordings ──► cuts ──► raw rows, or means over 1/rate            ──► table
- *                        └──► bins of depth × velocity (paper 1, §4.1)  ──► table
+ *                        └──► bins of depth × velocity (paper 1, §4.1), ──► table
+ *                             of where the blade advances, and of where not
  *     recordings ──► rows at the force's times, or on a grid            ──► table
  *     recording  ──► messages                                           ──► MCAP
  */
@@ -14,6 +15,7 @@
 #include <incise/outfile.h>
 #include "../read/cut.h"
 #include "../read/recording.h"
+#include "interpolators.h"
 #include "writers.h"
 #include "provenance.h"
 #include "table_writer.h"
@@ -31,6 +33,7 @@ struct bin {
 	int cuts;  /* that have samples here */
 	int last;  /* the cut counted last */
 	bool clipped;
+	bool advancing; /* all of them */
 };
 
 /* A pass over the cuts of some recordings, which are streamed, into the rows of a table. */
@@ -44,6 +47,7 @@ struct pass {
 	uint64_t samples, samples_all; /* of force, read and to be read */
 	int cut;		       /* the present one of all recordings, from 1 */
 	int number;		       /* of the same cut in its recording */
+	bool advancing;		       /* the blade, at the present sample */
 	double depth_deepest_mm;       /* of any row, for the error without a cut */
 	void *state;		       /* of the visitor */
 };
@@ -90,9 +94,10 @@ static int cut_name(struct pass *pass)
 }
 
 /* Welford's way: one pass, no cancellation. */
-static void bin_add(struct bin *bin, const struct incise_cut_sample *sample, double t_s,
-		    int cut)
+static void bin_add(struct bin *bin, const struct pass *pass,
+		    const struct incise_cut_sample *sample, double t_s)
 {
+	int cut = pass->cut;
 	double share = 1.0 / ++bin->n;
 	double delta = sample->force_N - bin->force_N;
 
@@ -102,6 +107,7 @@ static void bin_add(struct bin *bin, const struct incise_cut_sample *sample, dou
 	bin->force_N += share * delta;
 	bin->m2 += delta * (sample->force_N - bin->force_N);
 	bin->clipped |= sample->clipped;
+	bin->advancing = pass->advancing && (bin->n == 1 || bin->advancing);
 	if (bin->last != cut) {
 		bin->last = cut;
 		bin->cuts++;
@@ -128,12 +134,44 @@ static int end_cut(struct pass *pass, const struct visitor *visitor)
 	return pass->number && visitor->end_cut ? visitor->end_cut(pass) : 0;
 }
 
-/* Pass over the cuts of one recording. */
+/* Pass over the cuts of one recording; the blade is that of the same one. */
+static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
+			   struct incise_blade_pose *blade, const struct visitor *visitor)
+{
+	struct incise_cut_sample sample;
+	struct incise_blade_pose_value pose;
+	int rc;
+
+	pass->number = 0;
+	while ((rc = incise_cuts_next(cuts, &sample, pass->err)) > 0) {
+		rc = incise_blade_pose_at(blade, sample.t_ns, 0, &pose, pass->err);
+		if (rc)
+			return rc;
+		if (sample.cut != pass->number) {
+			rc = end_cut(pass, visitor);
+			if (rc)
+				return rc;
+			pass->number = sample.cut;
+			pass->cut++;
+		}
+		pass->advancing = pose.advancing;
+		rc = visitor->sample(pass, &sample,
+				     (sample.t_ns - cuts->first_ns) * 1e-9);
+		if (!rc && (cuts->force_rows & 0xfff) == 0)
+			rc = incise_export_progress(
+				pass->options, (double)(pass->samples + cuts->force_rows),
+				(double)pass->samples_all, pass->err);
+		if (rc)
+			return rc;
+	}
+	return rc ? rc : end_cut(pass, visitor);
+}
+
 static int each_sample(struct pass *pass, struct incise_recording *recording,
 		       const struct visitor *visitor)
 {
 	const struct incise_calibration *calibration = pass->options->calibration;
-	struct incise_cut_sample sample;
+	struct incise_blade_pose blade;
 	struct incise_cuts cuts;
 	int rc;
 
@@ -143,29 +181,12 @@ static int each_sample(struct pass *pass, struct incise_recording *recording,
 	if (calibration)
 		incise_cuts_calibrate(&cuts, calibration);
 	rc = incise_recording_need_zero(recording, &cuts.scale, pass->err);
-	if (rc) {
-		incise_cuts_close(&cuts);
-		return rc;
+	if (!rc) {
+		rc = incise_blade_pose_open(&blade, recording, calibration, pass->err);
+		if (!rc)
+			rc = each_cut_sample(pass, &cuts, &blade, visitor);
+		incise_blade_pose_close(&blade);
 	}
-	pass->number = 0;
-	while ((rc = incise_cuts_next(&cuts, &sample, pass->err)) > 0) {
-		if (sample.cut != pass->number) {
-			rc = end_cut(pass, visitor);
-			if (rc)
-				break;
-			pass->number = sample.cut;
-			pass->cut++;
-		}
-		rc = visitor->sample(pass, &sample, (sample.t_ns - cuts.first_ns) * 1e-9);
-		if (!rc && (cuts.force_rows & 0xfff) == 0)
-			rc = incise_export_progress(
-				pass->options, (double)(pass->samples + cuts.force_rows),
-				(double)pass->samples_all, pass->err);
-		if (rc)
-			break;
-	}
-	if (!rc)
-		rc = end_cut(pass, visitor);
 	pass->samples += cuts.force_rows;
 	pass->depth_deepest_mm = fmax(pass->depth_deepest_mm, cuts.depth_max_mm);
 	incise_cuts_close(&cuts);
@@ -202,6 +223,7 @@ static const struct incise_column raw_columns[] = {
 	{"velocity_mm_s", "mm/s", "speed of the tip", INCISE_COLUMN_SINGLE, 3},
 	{"force_N", "N", "on the blade", INCISE_COLUMN_SINGLE, 5},
 	{"clipped", "1", "1: the converter was at an end", INCISE_COLUMN_FLAG, 0},
+	INCISE_ADVANCING_COLUMN,
 };
 
 struct raw {
@@ -228,6 +250,7 @@ static int put_row(struct pass *pass)
 				      {.real = row->velocity_mm_s},
 				      {.real = row->force_N},
 				      {.integer = row->clipped},
+				      {.integer = row->advancing},
 			      },
 			      pass->err);
 	pass->report.rows++;
@@ -249,7 +272,7 @@ static int add_to_row(struct pass *pass, const struct incise_cut_sample *sample,
 	rc = slot != raw->slot ? put_row(pass) : 0;
 
 	raw->slot = slot;
-	bin_add(&raw->row, sample, t_s, pass->cut);
+	bin_add(&raw->row, pass, sample, t_s);
 	return rc;
 }
 
@@ -272,6 +295,7 @@ static const struct incise_column bin_columns[] = {
 	{"sd_N", "N", "standard deviation of single samples", INCISE_COLUMN_REAL, -1},
 	{"count", "1", "samples", INCISE_COLUMN_INTEGER, 0},
 	{"cuts", "1", "different cuts that they are from", INCISE_COLUMN_INTEGER, 0},
+	INCISE_ADVANCING_COLUMN,
 };
 
 /* Bin of a value; the upper end belongs to the last one. -1: above it. */
@@ -299,7 +323,8 @@ static int add_to_bin(struct pass *pass, const struct incise_cut_sample *sample,
 		   o->velocity_bins);
 
 	if (i >= 0 && k >= 0)
-		bin_add(&bins[i * o->velocity_bins + k], sample, 0, pass->cut);
+		bin_add(&bins[2 * (i * o->velocity_bins + k) + pass->advancing], pass,
+			sample, 0);
 	return 0;
 }
 
@@ -308,7 +333,7 @@ static int put_bins(struct pass *pass)
 {
 	struct bin *bins = pass->state;
 	const struct incise_export_options *o = pass->options;
-	size_t n = (size_t)o->depth_bins * o->velocity_bins;
+	size_t n = (size_t)2 * o->depth_bins * o->velocity_bins;
 	uint64_t enough = o->min_count > 1 ? o->min_count : 1;
 	int rc = 0;
 
@@ -322,6 +347,7 @@ static int put_bins(struct pass *pass)
 			{.real = bin->n > 1 ? sqrt(bin->m2 / (bin->n - 1)) : 0.0},
 			{.integer = (int64_t)bin->n},
 			{.integer = bin->cuts},
+			{.integer = bin->advancing},
 		};
 
 		if (bin->n >= enough && !rc) {
@@ -343,27 +369,48 @@ static int find_extent(struct pass *pass, const struct incise_cut_sample *sample
 		       double t_s)
 {
 	(void)t_s;
+	if (pass->advancing)
+		extend(pass, sample);
+	return 0;
+}
+
+static int find_any_extent(struct pass *pass, const struct incise_cut_sample *sample,
+			   double t_s)
+{
+	(void)t_s;
 	extend(pass, sample);
 	return 0;
+}
+
+/* The bins' upper ends: those of where the blade advances, else of all. */
+static int find_ends(struct pass *pass, struct incise_recording *const *recordings, int n)
+{
+	const struct visitor advancing = {find_extent, NULL};
+	const struct visitor any = {find_any_extent, NULL};
+	const struct incise_export_report *report = &pass->report;
+	int rc = each_cut(pass, recordings, n, &advancing);
+
+	if (!rc && !(report->depth_max_mm > 0 && report->velocity_max_mm_s > 0))
+		rc = each_cut(pass, recordings, n, &any);
+	return rc;
 }
 
 static int write_bins(struct pass *pass, struct incise_recording *const *recordings,
 		      int n)
 {
 	const struct incise_export_options *o = pass->options;
-	struct visitor ends = {find_extent, NULL};
 	struct visitor rows = {add_to_bin, o->by_cut ? put_bins : NULL};
 	uint64_t all = pass->samples_all;
 	int rc = 0;
 
 	pass->state =
-		calloc((size_t)o->depth_bins * o->velocity_bins, sizeof(struct bin));
+		calloc((size_t)2 * o->depth_bins * o->velocity_bins, sizeof(struct bin));
 	if (!pass->state)
 		return incise_error_set(pass->err, ENOMEM, "%d × %d bins: out of memory",
 					o->depth_bins, o->velocity_bins);
 	if (!(o->depth_max_mm > 0 && o->velocity_max_mm_s > 0)) {
 		pass->samples_all += all; /* each is read twice */
-		rc = each_cut(pass, recordings, n, &ends);
+		rc = find_ends(pass, recordings, n);
 	}
 	if (!rc)
 		rc = each_cut(pass, recordings, n, &rows);

@@ -7,7 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/tracker.h>
+#include <incise/uncertainty.h>
 #include "../../base/vector.h"
+#include "../../tissue/front.h"
 #include "../schema.h"
 #include "interpolators.h"
 
@@ -76,6 +78,22 @@ static size_t fading(const struct incise_predict *p)
 	return lag;
 }
 
+/* Noise of the velocity for white noise of 1 of positions, per period: the mean square of v/x. */
+static double noise_per_period(const struct incise_predict *p)
+{
+	const int steps = 1000;
+	double s = sqrt(1 - p->alpha), index = 2 * pow(1 - s, 3) / (s * (1 + s)), sum = 0;
+
+	for (int i = 0; i < steps; i++) {
+		double half = M_PI / 2 * (i + 0.5) / steps;
+		double gain = 2 * tan(half) /
+			      (1 + pow(2 * sin(half), 6) / pow(index * cos(half), 2));
+
+		sum += gain * gain;
+	}
+	return sqrt(sum / steps);
+}
+
 int incise_smooth_init(struct incise_smooth *smooth, double rate_hz)
 {
 	struct incise_predict *p = &smooth->fresh;
@@ -95,6 +113,7 @@ int incise_smooth_init(struct incise_smooth *smooth, double rate_hz)
 	smooth->pull[0] = b;
 	smooth->pull[1] = (8 * a * b + g * (b - 2 * a - 4)) / (8 * (1 - a));
 	smooth->pull[2] = b * (2 * b - g) / (4 * (1 - a));
+	smooth->noise_1_s = noise_per_period(p) / p->period_s;
 	smooth->lag = fading(p);
 	smooth->capacity = 2 * smooth->lag + AHEAD + 2 * AROUND;
 	smooth->records = calloc(smooth->capacity, sizeof(*smooth->records));
@@ -298,6 +317,83 @@ const struct incise_smooth_record *incise_smooth_take(struct incise_smooth *smoo
 {
 	return smooth->taken < smooth->finished ? &smooth->records[smooth->taken++]
 						: NULL;
+}
+
+/* --- progress of a cut --------------------------------------------------------------- */
+
+static void start_line(struct incise_progress *p, const double at_mm[3])
+{
+	v3_copy(p->at_mm, at_mm);
+	p->has_line = false;
+	p->from_mm = p->to_mm = 0;
+}
+
+/*
+ * Bring the line to the blade: how far that is into new tissue, and the speed of it, where the
+ * blade is at an end of the line within @noise_mm.
+ */
+static double lengthen(struct incise_progress *p, const double at_mm[3],
+		       const double velocity_mm_s[3], double noise_mm, double *speed_mm_s)
+{
+	double off[3], across[3], radius, s, before = p->to_mm - p->from_mm;
+
+	*speed_mm_s = 0;
+	v3_sub(off, at_mm, p->at_mm);
+	radius = v3_length(off);
+	s = v3_dot(off, p->along);
+	v3_add(across, off, -s, p->along);
+	/* The farther the blade gets, the better its direction is known. */
+	if (radius > fmax(p->to_mm, -p->from_mm) &&
+	    (!p->has_line || v3_length(across) <= INCISE_FRONT_BESIDE_MM)) {
+		double sign = p->has_line && s < 0 ? -1 : 1;
+
+		v3_add(p->along, (double[3]){0}, sign / radius, off);
+		p->has_line = radius > INCISE_FRONT_BESIDE_MM;
+		s = sign * radius;
+		v3_add(across, off, -s, p->along);
+	}
+	if (v3_length(across) > INCISE_FRONT_BESIDE_MM) {
+		start_line(p, at_mm);
+		*speed_mm_s = v3_length(velocity_mm_s);
+		return INCISE_FRONT_BESIDE_MM;
+	}
+	if (s >= p->to_mm - noise_mm)
+		*speed_mm_s = fmax(v3_dot(velocity_mm_s, p->along), 0);
+	if (p->has_line && s <= p->from_mm + noise_mm)
+		*speed_mm_s = fmax(*speed_mm_s, -v3_dot(velocity_mm_s, p->along));
+	p->from_mm = fmin(p->from_mm, s);
+	p->to_mm = fmax(p->to_mm, s);
+	return p->to_mm - p->from_mm - before;
+}
+
+bool incise_progress_add(struct incise_progress *p,
+			 const struct incise_smooth_record *record, double noise_1_s)
+{
+	const double two = INCISE_INTERVAL95 * M_SQRT2; /* of a difference */
+	double depth_noise_mm =
+		isnan(record->depth_noise_mm) ? 0 : record->depth_noise_mm;
+	double noise_mm = isnan(record->noise_mm) ? 0 : record->noise_mm;
+	double at_mm[3], skin_mm_s[3], in_mm_s, along_mm_s, reached_mm;
+
+	v3_add(at_mm, record->position_mm, record->depth_mm, p->normal);
+	in_mm_s = -v3_dot(record->velocity_mm_s, p->normal);
+	v3_add(skin_mm_s, record->velocity_mm_s, in_mm_s, p->normal);
+	if (!p->inside || record->depth_mm < INCISE_CUT_END_MM) {
+		start_line(p, at_mm);
+		p->way_mm = 0;
+		p->highest_mm = p->deepest_mm = record->depth_mm;
+		p->inside = true;
+	}
+	p->way_mm += lengthen(p, at_mm, skin_mm_s, two * noise_mm, &along_mm_s);
+	reached_mm = record->depth_mm + p->way_mm;
+	p->highest_mm = fmax(p->highest_mm, reached_mm);
+	p->deepest_mm = fmax(p->deepest_mm, record->depth_mm);
+	if (!(along_mm_s > 0))
+		noise_mm = 0;
+	return reached_mm >= p->highest_mm - two * depth_noise_mm &&
+	       record->depth_mm >= cbrt(INCISE_FRONT_KEPT) * p->deepest_mm &&
+	       in_mm_s + along_mm_s >
+		       INCISE_INTERVAL95 * noise_1_s * hypot(depth_noise_mm, noise_mm);
 }
 
 /* --- force --------------------------------------------------------------------------- */
@@ -622,6 +718,7 @@ static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)
 		record->noise_mm,
 		record->depth_noise_mm,
 		record->t_sd_s,
+		incise_progress_add(&blade->progress, record, blade->smooth.noise_1_s),
 	};
 	if (deep[0].t_ns != INCISE_TIME_NONE)
 		blade->rate_mm_s = (deep[1].depth_mm - deep[0].depth_mm) /
@@ -639,6 +736,7 @@ int incise_blade_pose_open(struct incise_blade_pose *blade,
 
 	*blade = (struct incise_blade_pose){0};
 	memcpy(blade->tip_mm, recording->meta.tip_mm, sizeof(blade->tip_mm));
+	v3_unit(blade->progress.normal, recording->meta.surface_normal, 0);
 	for (int i = 0; i < 2; i++)
 		blade->pose[i].t_ns = blade->deep[i].t_ns = INCISE_TIME_NONE;
 	if (rc)
@@ -748,6 +846,7 @@ int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t
 			     : 0;
 	value->station = isnan(s) ? 0 : a->station;
 	value->button = !isnan(s) && a->button;
+	value->advancing = !isnan(e) && c->advancing && d->advancing;
 	value->interpolated = isnan(s) || b->seq - a->seq != 1;
 	value->error = !isnan(s) && (a->error || b->error);
 	return 0;

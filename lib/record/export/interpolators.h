@@ -37,6 +37,7 @@ struct incise_smooth_record {
 struct incise_smooth {
 	struct incise_predict fresh, predict;
 	double period_s, pull[3]; /* of λ on velocity, for a noise of 1 */
+	double noise_1_s;	  /* of the velocity, for a noise of 1 mm of positions */
 	size_t lag, capacity;
 	struct incise_smooth_record *records;
 	size_t n, forward, finished,
@@ -57,6 +58,46 @@ void incise_smooth_end(struct incise_smooth *smooth);
 
 /* The next finished record, valid until the next push; NULL: none now. */
 const struct incise_smooth_record *incise_smooth_take(struct incise_smooth *smooth);
+
+/* --- progress of a cut --------------------------------------------------------------- */
+
+/*
+ * Whether the blade advances: it goes deeper than ever before in its cut, or along the skin into
+ * new tissue; see ../../tissue/front.h. Its progress is the depth and the length of the cut in
+ * the skin,
+ *
+ *     progress      ,-----.      ,----
+ *              ,---'       `.  ,'         highest so far, less the noise of a difference
+ *     ________/              `'           of two depths
+ *     advances ▔▔▔▔▔▔▔▔         ▔▔▔▔▔
+ *
+ * and it advances where that rises, and is at its highest. Both at 95 %: noise alone passes for
+ * a rise in one record of 40. The line of the cut leads to its farthest point; 1 mm beside it
+ * tissue is new.
+ *
+ * A blade that comes out on a slant meets new tissue too, but the work that was put in is given
+ * back and ends before the surface. Of a force that grows by no more than the square of the
+ * depth, all but INCISE_FRONT_KEPT is back at the cube root of that share of the deepest
+ * depth: 0.4 of it. Nothing that is less deep counts as advancing.
+ *
+ * Starts with {0} and the surface's normal.
+ */
+struct incise_progress {
+	double normal[3]; /* unit, out of the tissue */
+	bool inside, has_line;
+	double at_mm[3], along[3]; /* on the surface: start, and then the direction */
+	double from_mm,
+		to_mm; /* of the line; of one without direction, 0 and its radius */
+	double way_mm; /* of new tissue */
+	double highest_mm, deepest_mm; /* progress and depth so far */
+};
+
+/*
+ * Add a finished record of the smoother; @noise_1_s is the smoother's. Returns whether the blade
+ * advances there. Without a known noise there is none.
+ */
+bool incise_progress_add(struct incise_progress *progress,
+			 const struct incise_smooth_record *record, double noise_1_s);
 
 /* --- force --------------------------------------------------------------------------- */
 
@@ -131,6 +172,7 @@ struct incise_blade_depth {
 	int64_t t_ns;
 	double depth_mm, velocity_mm_s;
 	double noise_mm, depth_noise_mm, t_sd_s;
+	bool advancing;
 };
 
 struct incise_blade_pose {
@@ -144,6 +186,7 @@ struct incise_blade_pose {
 	double angle, sine, sign;     /* between the two poses */
 	double speed_mm_s, rate_mm_s; /* of position and of depth between the two */
 	struct incise_cut cut;
+	struct incise_progress progress;
 };
 
 /* NAN: not known. */
@@ -152,6 +195,7 @@ struct incise_blade_pose_value {
 	double depth_mm, depth_u_mm, velocity_mm_s;
 	int station, cut; /* 0: not known; outside cuts */
 	bool button, interpolated, error;
+	bool advancing; /* at both records around; false where depth is not known */
 };
 
 /* Returns 0 or -errno. */

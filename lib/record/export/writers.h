@@ -24,6 +24,13 @@ static inline int incise_export_progress(const struct incise_export_options *opt
 	return 0;
 }
 
+/* The column by which incise train takes the part of a cut that a model describes. */
+#define INCISE_ADVANCING_COLUMN                                        \
+	{                                                              \
+		"advancing", "1", "1: the blade went into new tissue", \
+			INCISE_COLUMN_FLAG, 0                          \
+	}
+
 /* --- resample.c -------------------------------------------------------------------- */
 
 /*
@@ -31,13 +38,13 @@ static inline int incise_export_progress(const struct incise_export_options *opt
  * the blade, depth and speed, depth by the camera, each with its uncertainty and flags. The last
  * columns are of the camera.
  */
-#define INCISE_RESAMPLE_COLUMNS 21
+#define INCISE_RESAMPLE_COLUMNS 22
 #define INCISE_RESAMPLE_CAMERA_COLUMNS 5
 
 extern const struct incise_column
 	incise_resample_columns[INCISE_RESAMPLE_COLUMNS + INCISE_RESAMPLE_CAMERA_COLUMNS];
 
-/* Number of columns for these recordings: 21 or 26, or -errno. */
+/* Number of columns for these recordings: 22 or 27, or -errno. */
 int incise_resample_width(struct incise_recording *const *recordings, int n,
 			  struct incise_error *err);
 

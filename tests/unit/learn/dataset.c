@@ -137,6 +137,64 @@ static void test_errors_say_where(void **state)
 	}
 }
 
+static void test_where(void **state)
+{
+	static const struct {
+		const char *text, *where;
+		size_t rows, left_out;
+	} cases[] = {
+		/* what is left out may hold anything */
+		{"a,depth_mm,force_N,cut\n1,1,2,p\n0,nan,x,q\n0.0,3,4,r\n2,5,6,s\n", "a",
+		 2, 2},
+		{"depth_mm,force_N,cut\n1,2,p\n3,4,q\n", "a", 2, 0},
+		{"a,depth_mm,force_N,cut\n0,1,2,p\n", NULL, 1, 0},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct temp_file file = temp_file_new("d.csv", cases[i].text);
+		size_t left_out = 99;
+		struct incise_dataset *data = incise_dataset_read_where(
+			file.path, columns, 2, "cut", cases[i].where, &left_out, NULL);
+
+		assert_non_null(data);
+		assert_int_equal(incise_dataset_rows(data), cases[i].rows);
+		assert_int_equal(left_out, cases[i].left_out);
+		/* no group of rows that are not there */
+		assert_int_equal(data->n_groups, cases[i].rows);
+		if (!i)
+			assert_true(incise_dataset_row(data, 1)[1] == 5);
+		incise_dataset_free(data);
+		temp_file_free(&file);
+	}
+}
+
+static void test_where_refuses(void **state)
+{
+	static const struct {
+		const char *text;
+		int code;
+		const char *says;
+	} cases[] = {
+		{"a,depth_mm,force_N\n0,1,2\n0,3,4\n", ENODATA,
+		 "all 2 rows have 0 in the column 'a'"},
+		{"a,depth_mm,force_N\nnan,1,2\n", EINVAL,
+		 "column 1 (a): nan is not finite"},
+		{"a,depth_mm,force_N\n", ENODATA, "no rows below the header"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct temp_file file = temp_file_new("d.csv", cases[i].text);
+		struct incise_error err = {0};
+		size_t left_out;
+
+		assert_null(incise_dataset_read_where(file.path, columns, 2, NULL, "a",
+						      &left_out, &err));
+		assert_int_equal(err.code, cases[i].code);
+		assert_non_null(strstr(err.text, cases[i].says));
+		temp_file_free(&file);
+	}
+}
+
 static void test_missing_and_binary_files(void **state)
 {
 	struct incise_error err = {0};
@@ -198,6 +256,8 @@ int main(void)
 		cmocka_unit_test(test_many_rows),
 		cmocka_unit_test(test_errors_say_where),
 		cmocka_unit_test(test_missing_and_binary_files),
+		cmocka_unit_test(test_where),
+		cmocka_unit_test(test_where_refuses),
 		cmocka_unit_test(test_split),
 	};
 
