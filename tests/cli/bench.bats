@@ -479,21 +479,24 @@ rate() {
 	[ -n "$(key r.json machine.cpu)" ]
 }
 
-@test "bench stability: the guard holds what is not held without it" {
+@test "bench stability: guards in the real plan, and whether one wins" {
 	quick_report stability
-	late="late = 'wall' AND clamp_N IS NULL"
-	holds "$(of guard 'count(*)' "$late AND guard = 'on' AND share = 0.5") >= 6"
-	[ "$(of guard 'min(bounded)' "late = 'wall' AND guard = 'on' AND share = 0.5")" = 1 ]
-	[ "$(of guard 'max(bounded)' "$late AND guard = 'off'")" = 0 ]
-	# nor is it held by a guard without cap, or one that looks away out of contact
-	[ "$(of guard 'max(bounded)' "$late AND guard = 'uncapped'")" = 0 ]
-	[ "$(of guard 'max(bounded)' "$late AND guard = 'contact' AND K_N_mm = 200")" = 0 ]
-	# it is no limit of force: that is the clamp's part
-	holds "$(of guard 'max(largest_N)' "$late AND guard = 'on'") > 100"
-	holds "$(of guard 'max(largest_N)' "clamp_N = 10 AND guard = 'on'") <= 10"
-	# damping that acts five ticks late must be below 0.28 m/T
-	[ "$(of guard 'max(bounded)' "late = 'actuator' AND delay = 5 AND share >= 0.5")" = 0 ]
-	[ "$(of guard 'min(bounded)' "late = 'actuator' AND delay = 5 AND share <= 0.1")" = 1 ]
+	for guard in none passivity delayed energy_bounding coupling; do
+		[ "$(of guards 'count(*)' "guard = '$guard'")" = 5 ]
+		[ "$(of guards_stiffest 'count(*)' "guard = '$guard'")" = 4 ]
+		holds "$(of guards_ns ns "guard = '$guard'") > 0"
+	done
+	# scenes rest at their own gain without a guard, and not at twice the largest
+	holds "$(of guards rest_share "guard = 'none' AND own") == 1"
+	holds "$(of guards rest_share "guard = 'none' AND gain = 2") < 0.5"
+	# a coupling makes that rest by another force; below its limit it does nothing
+	holds "$(of guards rests "guard = 'coupling' AND gain = 2") > $(of guards rests "guard = 'none' AND gain = 2")"
+	holds "$(of guards error_share "guard = 'coupling' AND gain = 2") > 0.07"
+	holds "$(of guards error_N "guard = 'coupling' AND gain = 1") == 0"
+	# damping that comes late takes rest away
+	holds "$(of guards rests "guard = 'delayed' AND own") < $(of guards rests "guard = 'none' AND own")"
+	[ "$(key r.json guards_winner)" = none ]
+	[[ "$(key r.json guards_verdict)" == "none wins: "* ]]
 }
 
 @test "bench stability: what the plan accepts comes to rest, and no closed motion gives work back" {
@@ -555,7 +558,7 @@ rate() {
 	run -0 --separate-stderr incise bench stability --quick
 	[ -z "$stderr" ]
 	[[ "$output" == *"quick: a part of the grids"* ]]
-	[[ "$output" == *"guard uncapped"* ]]
+	[[ "$output" == *"none wins: "* ]]
 	[[ "$output" == *"diverged"* ]]
 	[ "$(grep -c '  ok$' <<<"$output")" -ge 30 ]
 	[[ "$output" != *MISSED* ]]

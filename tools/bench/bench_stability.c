@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench stability: how stiff a virtual wall may be, simulated in time next to what
- * theory says; the guard of passivity; integrators of a stiff spring. The device is light, in
+ * theory says; guards in the real plan; integrators of a stiff spring. The device is light, in
  * a loop of 1 kHz.
  */
 #include <stdio.h>
@@ -691,7 +691,7 @@ const struct bench bench_stability = {
 	.n_operands = 1,
 	.summary =
 		"how stiff a virtual wall may be, simulated and computed;\n"
-		"whether learned models rest; the guard of passivity; integrators of a stiff spring",
+		"whether learned models rest; what guards would add; integrators of a stiff spring",
 	.run = run,
 	.plots = {{.suffix = "map",
 		   .script = text_stability_map_gp,
@@ -707,11 +707,9 @@ const struct bench bench_stability = {
 		   .data = {&stability_rest_table, "verdict"}},
 		  {.suffix = "guard",
 		   .script = text_stability_guard_gp,
-		   .width = 1320,
-		   .height = 540,
-		   .data = {&stability_guard_table, "delay",
-			    "guard=on,late=wall,clamp_N=nan,swept=1"},
-		   .more = {&stability_cap_table, "verdict"}},
+		   .width = 960,
+		   .height = 480,
+		   .data = {&stability_guard_table, "guard"}},
 		  {.suffix = "integrators",
 		   .script = text_stability_integrators_gp,
 		   .width = 1500,

@@ -20,6 +20,6 @@ void stability_guard(struct bench_run *run);
 void stability_integrators(struct bench_run *run);
 
 extern const struct bench_table stability_rest_table, stability_error_table,
-	stability_guard_table, stability_cap_table, stability_integrator_table;
+	stability_guard_table, stability_integrator_table;
 
 #endif

@@ -1,297 +1,741 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench stability: a hand presses a light device on walls that are far too stiff and
- * answer late, with the library's guard of passivity and without it.
+ * incise bench stability: what a guard behind the tissue's forces would add. The stages of the
+ * real plan in a closed loop with a late tracker and a late actuator, at gains that plans accept
+ * and above, with each guard and with none.
  *
- *   hand's press ──▶ device ──▶ x_k ──▶ wall ──▶ [late answer] ──▶ guard ──▶ clamp ──┐
- *                      ▲                                                             │
- *                      └────────── held for T ◀── [late actuator] ◀──────────────────┘
+ *   hand leans ─▶ device ─▶ tracker ─▶ predict ─▶ [coupling] ─▶ forces ─▶ [guard] ─┐
+ *                   ▲                                                              │
+ *                   └────── held for a tick ◀── late ticks ◀── start, limit ◀──────┘
+ *
+ *   passivity        observer and controller of Hannaford and Ryu (2002), by the energy of the
+ *                    force that is held; no more damping than half of what the loop can spare
+ *   delayed          time-domain passivity with the delay counted, after Ryu, Artigas and
+ *                    Preusche (2010): what came out until now against what went in as far as
+ *                    the poses tell; no more damping than is stable so late
+ *   energy_bounding  after Kim and Ryu (2010): the force changes by what the device's damping
+ *                    can take over the delay
+ *   coupling         a spring between tool and tissue that makes what is stiffer than the plan
+ *                    accepts as soft as that
+ *
+ * Up along the normal of the surface's top; N, mm, s.
  */
 #include <stdio.h>
 #include <string.h>
-#include "../../lib/control/guard.h"
+#include "../../lib/base/random.h"
+#include "../../lib/base/vector.h"
 #include "../../lib/control/plant.h"
+#include "../../lib/control/pose_loop.h"
+#include "../../lib/scene/rest.h"
+#include "../cli/scene_argument.h"
 #include "stability.h"
 
-#define GUARD_ROWS_MAX 768
-/* Hardly any friction of the device's own: the guard has to do it. */
-#define DAMPING_N_s_mm 1e-5
-#define CAP_UNIT_N_s_mm (DEVICE / PERIOD_S) /* m/T */
-/* A hand that leans on it: no passive hand is worse than a weight. */
-#define PRESS_N 1
-#define BEGIN_mm 1
-#define SPEED_mm_s 50
-/* Energy that a tissue can have stored: 4 N at 1 mm. */
-#define RESERVE_N_mm 2
-#define CLAMP_N 10
-#define GUARD_DELAY_MAX 15
-#define GUARD_TICKS 12000
-/* 10 m: no device goes there, and nobody waits for it to come back. */
-#define GONE_mm 1e4
+enum guard { NONE, PASSIVITY, DELAYED, ENERGY_BOUNDING, COUPLING, GUARDS };
+static const char *const guard_names[GUARDS] = {"none", "passivity", "delayed",
+						"energy_bounding", "coupling"};
 
-/* On in every tick, without its cap, or asked in contact only. */
-enum setting { GUARD_OFF, GUARD_ON, GUARD_UNCAPPED, GUARD_CONTACT, SETTINGS };
-static const char *const setting_names[SETTINGS] = {"off", "on", "uncapped", "contact"};
+/* --- the guards --- */
 
-struct guard_row {
-	double K_N_mm;
-	int delay; /* ticks */
-	enum setting setting;
-	const char *guard, *late; /* names of the setting, and of the late part */
-	double share;		  /* of m/T: the cap; NaN: none */
-	double clamp_N;		  /* NaN: none */
-	bool bounded;
-	double largest_mm, largest_N; /* over the whole run */
-	double late_mm;		      /* over its last quarter */
-	bool swept; /* at every stiffness, delay and setting; else of other caps */
-	char text[40];
+#define FORCES 64 /* that are remembered, ticks */
+
+struct guarded {
+	enum guard kind;
+	double period_s, reserve_N_mm, cap_N_s_mm; /* settings */
+	double bound_N_mm; /* energy bounding: a spring that the delay leaves passive */
+	double coupling_N_mm; /* infinite: none */
+	double tissue_N_mm;
+	int late; /* ticks */
+
+	bool placed;
+	double energy_N_mm, at_mm; /* passivity, energy bounding */
+	double in_N_mm, out_N_mm, pose_mm,
+		force_N[FORCES]; /* delayed: by poses, and sent */
+	long tick, pose_tick;
+	double tool_mm, tissue_N; /* coupling: of the tick before */
 };
 
-static const char wall_is_late[] = "wall", actuator_is_late[] = "actuator";
-
-static void press(struct guard_row *row)
+/* Mean of the forces that acted from the last pose up to a tick. */
+static double acted_N(const struct guarded *g, long until)
 {
-	struct incise_plant plant = {.mass_kg = DEVICE_KG,
-				     .damping_N_s_mm = DAMPING_N_s_mm,
-				     .position_mm = BEGIN_mm,
-				     .velocity_mm_s = -SPEED_mm_s};
-	const int size = GUARD_DELAY_MAX + 1;
-	double seen[GUARD_DELAY_MAX + 1], sent[GUARD_DELAY_MAX + 1] = {0},
-								 quarter[4] = {0};
-	double was = BEGIN_mm + SPEED_mm_s * PERIOD_S;
-	bool actuator = row->late == actuator_is_late;
-	struct incise_guard guard;
-	int k;
+	long from = g->pose_tick < until ? g->pose_tick : until - 1;
+	double sum = 0;
 
-	incise_guard_init(&guard, DEVICE_KG, PERIOD_S,
-			  row->setting == GUARD_OFF ? 0 : RESERVE_N_mm);
-	if (row->setting == GUARD_ON || row->setting == GUARD_CONTACT)
-		guard.cap_N_s_mm = row->share * CAP_UNIT_N_s_mm;
-	else if (row->setting == GUARD_UNCAPPED)
-		guard.cap_N_s_mm = 1e30;
-	for (k = 0; k < size; k++)
-		seen[k] = BEGIN_mm;
-	for (k = 0; k < GUARD_TICKS && fabs(plant.position_mm) < GONE_mm; k++) {
-		double x = plant.position_mm, wall_mm;
-		/* A loop's velocity is that of the last period. */
-		double at[3] = {x}, velocity[3] = {(x - was) / PERIOD_S}, force[3] = {0};
-
-		seen[k % size] = x;
-		wall_mm = seen[(k + size - (actuator ? 0 : row->delay)) % size];
-		force[0] = wall_mm < 0 ? -row->K_N_mm * wall_mm : 0;
-		/* Debt is never forgiven here: the harder case. Out of contact the guard goes
-		 * on until it is paid, but for the setting that shows why. */
-		if (row->setting != GUARD_CONTACT || force[0] != 0)
-			incise_guard_apply(&guard, at, velocity, force);
-		if (row->clamp_N > 0)
-			force[0] = fmax(-row->clamp_N, fmin(row->clamp_N, force[0]));
-		sent[k % size] = force[0];
-		if (actuator)
-			force[0] = sent[(k + size - row->delay) % size];
-		incise_guard_sent(&guard, force);
-		incise_plant_step(&plant, force[0] - PRESS_N, PERIOD_S);
-		was = x;
-		quarter[4 * k / GUARD_TICKS] =
-			fmax(quarter[4 * k / GUARD_TICKS], fabs(x));
-		row->largest_N = fmax(row->largest_N, fabs(force[0]));
-	}
-	row->late_mm = k < GUARD_TICKS ? INFINITY : quarter[3];
-	for (int q = 0; q < 4; q++)
-		row->largest_mm = fmax(row->largest_mm, quarter[q]);
-	/* It may bounce for ever, but not higher and higher: a motion that grows at all doubles
-	 * in far less than half of the run. */
-	row->bounded = k == GUARD_TICKS &&
-		       (quarter[3] < 1.25 * quarter[1] || quarter[3] < BEGIN_mm);
-	if (row->bounded)
-		snprintf(row->text, sizeof(row->text), "%.3g mm %.3g N", row->largest_mm,
-			 row->largest_N);
-	else
-		strcpy(row->text, "grows");
+	for (long k = from; k < until; k++)
+		sum += k > g->late ? g->force_N[(k - g->late) % FORCES] : 0;
+	return sum / (double)(until - from);
 }
 
-/* Settings that hold walls, of those that answer late. */
-struct held {
-	double held, grow, n;
+/* A pose arrives: what the force that was held has done on the way to it. */
+static void guard_pose(struct guarded *g, double at_mm, double taken_s)
+{
+	long taken = lround(taken_s / g->period_s);
+	double work_N_mm = acted_N(g, taken) * (at_mm - g->pose_mm);
+
+	*(work_N_mm > 0 ? &g->out_N_mm : &g->in_N_mm) += fabs(work_N_mm);
+	g->pose_mm = at_mm;
+	g->pose_tick = taken;
+}
+
+/* Damping that pays a debt of energy within a tick, against the speed. */
+static double damped(const struct guarded *g, double debt_N_mm, double speed_mm_s,
+		     double force_N)
+{
+	double power = speed_mm_s * speed_mm_s * g->period_s;
+
+	if (!(debt_N_mm > 0) || !(power > 0))
+		return force_N;
+	return force_N - fmin(g->cap_N_s_mm, debt_N_mm / power) * speed_mm_s;
+}
+
+/* Held forces lag by some ticks. What they make by it is less than the device's damping takes if
+ * the force changes by no more than so much along the way; and no more comes out than went in. */
+static double bounded(struct guarded *g, double force_N, double sent_N, double way_mm,
+		      double deeper_mm)
+{
+	double most = g->bound_N_mm * way_mm;
+
+	force_N = fmax(sent_N - most, fmin(sent_N + most, force_N));
+	if (deeper_mm < 0)
+		force_N = fmin(force_N, fmax(0, g->energy_N_mm) / -deeper_mm);
+	g->energy_N_mm += force_N * deeper_mm;
+	return force_N;
+}
+
+static double guard_apply(struct guarded *g, double at_mm, double speed_mm_s,
+			  double way_mm, double sent_N, double force_N, bool contact,
+			  bool began)
+{
+	double now_N_mm;
+
+	g->force_N[(++g->tick - 2 + FORCES) % FORCES] = sent_N; /* of the tick before */
+	if (began) {
+		g->energy_N_mm = g->in_N_mm = g->out_N_mm = 0;
+		g->placed = false;
+	}
+	switch (g->kind) {
+	case PASSIVITY:
+		if (g->placed)
+			g->energy_N_mm =
+				fmin(g->reserve_N_mm,
+				     g->energy_N_mm - sent_N * (at_mm - g->at_mm));
+		force_N = damped(g, -g->energy_N_mm, speed_mm_s, force_N);
+		break;
+	case DELAYED:
+		now_N_mm = acted_N(g, g->tick - 1) * (at_mm - g->pose_mm);
+		force_N = damped(g, g->out_N_mm + fmax(0, now_N_mm) - g->in_N_mm,
+				 speed_mm_s, force_N);
+		break;
+	case ENERGY_BOUNDING:
+		if (contact && g->placed)
+			force_N = bounded(g, force_N, sent_N, way_mm, g->at_mm - at_mm);
+		break;
+	case COUPLING:
+		g->tissue_N = force_N;
+		if (contact && isfinite(g->coupling_N_mm))
+			force_N = fmax(0, g->coupling_N_mm * (g->tool_mm - at_mm));
+		break;
+	case NONE:
+	case GUARDS:
+		break;
+	}
+	g->at_mm = at_mm;
+	g->placed = true;
+	return force_N;
+}
+
+/* --- the plan in a loop --- */
+
+#define LATENCY_S 4.2e-3
+#define START_S 0.4 /* in the air, until the force may be whole */
+#define RUN_S 6.0
+#define STILL_S 0.2 /* twice: it rests */
+#define STILL_MM 1e-4
+#define POSES 64 /* on their way */
+
+struct loop {
+	struct incise_plan plan; /* first: its stages find the rest by it */
+	struct incise_tracker_sample fed[INCISE_PLAN_POSES];
+	struct incise_touch top;
+	struct incise_surface *plane; /* in place of the surface: it has no end */
+	double along[3], along_mm_s, path_mm;
+	struct guarded guard;
+	double tool_mm;		 /* as predicted, before a coupling */
+	double at_mm[3], way_mm; /* at the last tick, and from there */
+	struct incise_plant device;
+	double t_s, next_s, pose_s, noise_mm;
+	double way[POSES][3]; /* arrival, height, path */
+	unsigned int first, last;
+	double late_N[INCISE_POSE_LOOP_LATE_MAX + 1], sent_N;
 };
 
-/* The number of stiffnesses that are bounded with another cap. */
-struct cap {
-	double share;
-	int delay;
-	const char *late, *verdict;
-	int bounded, n;
-	char text[20];
+/* The tool that meets the tissue hangs on a spring: where both forces are equal. */
+static int stage_coupling(struct incise_plan *plan, struct incise_tick *tick)
+{
+	struct loop *l = (struct loop *)plan;
+	struct guarded *g = &l->guard;
+	double stiffness = g->coupling_N_mm + g->tissue_N_mm, way[3];
+
+	v3_sub(way, tick->tool_mm, l->at_mm);
+	v3_copy(l->at_mm, tick->tool_mm);
+	l->way_mm = v3_length(way);
+	l->tool_mm = v3_dot(tick->tool_mm, l->top.normal) -
+		     v3_dot(l->top.point_mm, l->top.normal);
+	if (g->kind != COUPLING || !isfinite(stiffness))
+		return 0;
+	g->tool_mm +=
+		(g->coupling_N_mm * (l->tool_mm - g->tool_mm) + g->tissue_N) / stiffness;
+	v3_add(tick->tool_mm, tick->tool_mm, g->tool_mm - l->tool_mm, l->top.normal);
+	return 0;
+}
+
+static int stage_guard(struct incise_plan *plan, struct incise_tick *tick)
+{
+	struct loop *l = (struct loop *)plan;
+	double force_N = v3_dot(plan->force_N, l->top.normal);
+	double guarded_N =
+		guard_apply(&l->guard, l->tool_mm,
+			    v3_dot(plan->velocity_mm_s, l->top.normal), l->way_mm,
+			    v3_dot(plan->limit.last_N, l->top.normal), force_N,
+			    tick->flags & INCISE_TICK_CONTACT, plan->proxy.began);
+
+	v3_add(plan->force_N, plan->force_N, guarded_N - force_N, l->top.normal);
+	return 0;
+}
+
+/* A copy with more gain, and with a guard's stages. They share the predictor of the handle's end,
+ * which is not held. */
+static void copy_plan(struct loop *l, const struct incise_plan *plan, double gain,
+		      bool stages)
+{
+	struct incise_plan *own = &l->plan;
+
+	*own = *plan;
+	own->fed = l->fed;
+	own->n_stages = 0;
+	for (int i = 0; i < plan->n_stages; i++) {
+		struct incise_stage stage = plan->stage[i];
+
+		if (stage.own)
+			stage.own = &own->acting[stage.own - plan->acting];
+		if (stages && stage.run == incise_stage_contact)
+			own->stage[own->n_stages++] = (struct incise_stage){
+				.name = "coupling", .run = stage_coupling};
+		if (stages && stage.run == incise_stage_start)
+			own->stage[own->n_stages++] = (struct incise_stage){
+				.name = "guard", .run = stage_guard};
+		own->stage[own->n_stages++] = stage;
+	}
+	own->gain *= gain;
+	own->unloading_N_mm *= gain;
+	own->beyond_N_mm *= gain;
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		own->acting[i].number[0] *= gain;
+}
+
+static int64_t to_ns(double t_s)
+{
+	return 2000000000 + llround(t_s * 1e9);
+}
+
+static void feed(struct loop *l)
+{
+	const double *pose = l->way[l->first++ % POSES];
+	struct incise_tracker_sample sample = {
+		.t_ns = to_ns(pose[0]), .status = ' ', .quaternion = {1}};
+
+	v3_add(sample.position_mm, l->top.point_mm, pose[1], l->top.normal);
+	v3_add(sample.position_mm, sample.position_mm, pose[2], l->along);
+	guard_pose(&l->guard, pose[1], pose[0] - LATENCY_S);
+	incise_plan_feed(&l->plan, &sample, 1);
+}
+
+/* To a time: leaning with a force, or led at a speed. */
+static void go_to(struct loop *l, double t_s, double lean_N, double led_mm_s)
+{
+	double time_s = fmax(t_s - l->t_s, 0);
+
+	if (lean_N > 0)
+		incise_plant_step(&l->device, l->sent_N - lean_N, time_s);
+	else
+		l->device.position_mm += led_mm_s * time_s;
+	l->path_mm += l->along_mm_s * time_s;
+	l->t_s = t_s;
+}
+
+/* Returns the force that is commanded now. */
+static double step(struct loop *l, double lean_N, double led_mm_s)
+{
+	int late = l->guard.late;
+	double next_s = l->t_s + l->guard.period_s, command_N;
+	struct incise_tick tick;
+
+	while (l->first != l->last && l->way[l->first % POSES][0] <= l->t_s)
+		feed(l);
+	incise_plan_tick(&l->plan, to_ns(l->t_s), &tick);
+	command_N = l->late_N[late] = v3_dot(tick.command_N, l->top.normal);
+	l->sent_N = l->late_N[0];
+	memmove(l->late_N, l->late_N + 1, (size_t)late * sizeof(*l->late_N));
+	for (; l->next_s < next_s; l->next_s += l->pose_s) {
+		go_to(l, l->next_s, lean_N, led_mm_s);
+		l->way[l->last % POSES][0] = l->t_s + LATENCY_S;
+		l->way[l->last % POSES][1] =
+			l->device.position_mm +
+			l->noise_mm * incise_random_normal(1, l->last);
+		l->way[l->last++ % POSES][2] = l->path_mm;
+	}
+	go_to(l, next_s, lean_N, led_mm_s);
+	return command_N;
+}
+
+/* --- what is tried --- */
+
+static const char *const scenes[] = {"liver", "liver paper", "neck", "wall"};
+static const double trackers_hz[] = {120, 60, 240};
+static const int lates[] = {5, 0, 2}; /* ticks */
+static const struct {
+	double mass_kg, damping_N_s_mm;
+} devices[] = {{0.05, 0.01}, {0.03, 0.02}};
+/* Of the largest gain that the plan accepts; 0: the scene's own, where that is accepted. */
+static const double gains[] = {0, 1, 1.25, 1.5, 2};
+static const struct {
+	double lean_N, from_mm, along_mm_s;
+} leans[] = {{1, 0.1, 0},   {2.5, 0.1, 10}, {0.3, 0.1, 0},
+	     {1.9, 0.1, 0}, {3, 3, 0},	    {3.5, 0.1, 60}};
+
+/*
+ * What a hand notices: a force that is off by more than 7 % (Pang, Tan and Durlach, Perception &
+ * Psychophysics 49, 1991), a stiffness by more than 23 % (Jones and Hunter, Experimental Brain
+ * Research 79, 1990).
+ */
+#define FORCE_NOTICED 0.07
+#define STIFFNESS_NOTICED 0.23
+
+/* A guard at a gain, over all setups; a guard in a scene, at all gains. */
+struct row {
+	const char *guard;
+	double gain; /* NaN: the scene's own */
+	bool own;
+	int cases, rests;
+	double rest_share, swing_mm; /* the largest */
+	double force_N, error_N; /* rms in a slow cut: without a guard, and from that */
+	double error_share;
+	int cuts;
 };
 
-static struct guard_row guard_rows[GUARD_ROWS_MAX];
-static int n_guard_rows;
+struct stiffest {
+	const char *guard, *scene;
+	int setups, stiffer, softer; /* than without a guard */
+	double felt_N_mm;	     /* mean of the stiffest that rests */
+	double of_none;
+};
+
+struct cost {
+	const char *guard;
+	struct harness_time time; /* of a tick */
+};
+
+static struct row rows[GUARDS * N(gains)];
+static struct stiffest stiffests[GUARDS * N(scenes)];
+static struct cost costs[GUARDS];
+
+static const struct bench_table cost_table = {
+	.key = "guards_ns",
+	.row_bytes = sizeof(struct cost),
+	.columns = {COLUMN(cost, "guard", guard, "%-16s", "guard"),
+		    COLUMN(cost, "ns", time.ns.median, "%8.1f", "ns a tick")},
+	.metrics = {METRIC(TIME, cost, time, "ns", "tick with guard {guard}")},
+};
 
 const struct bench_table stability_guard_table = {
-	.key = "guard",
-	.row_bytes = sizeof(struct guard_row),
-	.columns = {COLUMN(guard_row, "K_N_mm", K_N_mm),
-		    COLUMN(guard_row, "delay", delay), COLUMN(guard_row, "late", late),
-		    COLUMN(guard_row, "guard", guard), COLUMN(guard_row, "share", share),
-		    COLUMN(guard_row, "clamp_N", clamp_N),
-		    COLUMN(guard_row, "bounded", bounded),
-		    COLUMN(guard_row, "largest_mm", largest_mm),
-		    COLUMN(guard_row, "late_mm", late_mm),
-		    COLUMN(guard_row, "largest_N", largest_N),
-		    COLUMN(guard_row, "swept", swept, .data = true)},
+	.key = "guards",
+	.row_bytes = sizeof(struct row),
+	.columns = {COLUMN(row, "guard", guard, "%-16s", "guard"),
+		    COLUMN(row, "gain", gain, "%6.2f", "gain"), COLUMN(row, "own", own),
+		    COLUMN(row, "cases", cases, "%7.0f", "cases"),
+		    COLUMN(row, "rests", rests, "%7.0f", "rest"),
+		    COLUMN(row, "rest_share", rest_share, "%7.3f", "share"),
+		    COLUMN(row, "swing_mm", swing_mm, "%10.3g", "swing, mm"),
+		    COLUMN(row, "force_N", force_N, "%9.4f", "force, N"),
+		    COLUMN(row, "error_N", error_N, "%9.4f", "error, N"),
+		    COLUMN(row, "error_share", error_share, "%7.3f", "of it")},
 };
 
-const struct bench_table stability_cap_table = {
-	.row_bytes = sizeof(struct cap),
-	.columns = {COLUMN(cap, "share", share), COLUMN(cap, "delay", delay),
-		    COLUMN(cap, "verdict", verdict)},
+static const struct bench_table stiffest_table = {
+	.key = "guards_stiffest",
+	.row_bytes = sizeof(struct stiffest),
+	.columns = {COLUMN(stiffest, "guard", guard, "%-16s", "guard"),
+		    COLUMN(stiffest, "scene", scene, " %-12s", " scene"),
+		    COLUMN(stiffest, "setups", setups, "%7.0f", "setups"),
+		    COLUMN(stiffest, "felt_N_mm", felt_N_mm, "%8.4f", "N/mm"),
+		    COLUMN(stiffest, "of_none", of_none, "%8.3f", "of none"),
+		    COLUMN(stiffest, "stiffer", stiffer, "%8.0f", "stiffer"),
+		    COLUMN(stiffest, "softer", softer, "%8.0f", "softer")},
 };
 
-static const struct bench_block walls_block = {
-	.corner = "K_N_mm",
-	.line = COLUMN(guard_row, NULL, K_N_mm, "%10g"),
-	.across = COLUMN(guard_row, NULL, delay, "  delay %-9.0f"),
-	.cell = COLUMN(guard_row, NULL, text, "  %-15s"),
+/* A scene on a device, with a tracker and an actuator. */
+struct setup {
+	struct incise_scene *scene;
+	struct incise_plan *plan; /* with the largest gain accepted */
+	double tracker_hz;
+	double own;		  /* gain of the scene as part of that; 0: not accepted */
+	double felt_N_mm[GUARDS]; /* the stiffest that rests and whose force is right */
 };
 
-static const struct bench_block caps_block = {
-	.corner = "of m/T",
-	.line = COLUMN(cap, NULL, share, "%10g"),
-	.across = COLUMN(cap, NULL, delay, "  delay %-9.0f"),
-	.cell = COLUMN(cap, NULL, text, "  %-15s"),
-};
-
-static struct guard_row *add_guard_row(double K_N_mm, int delay, enum setting setting,
-				       const char *late, double share, double clamp_N)
+static void set_guard(struct loop *l, const struct setup *s, enum guard kind, double gain)
 {
-	struct guard_row *row = &guard_rows[n_guard_rows++];
+	const struct incise_plan_stability *st = &s->plan->stability;
+	double period_s = st->device.period_s, stiffness = gain * st->stiffness_N_mm;
+	double unit = st->device.mass_kg * N_S2_PER_MM_KG / period_s, low = 0;
+	double force_N = s->scene->limits.force_N;
+	double reaction = gain * s->plan->acting[0].number[0];
+	int late = s->scene->device.late_ticks, age = st->device.delay_ticks + late;
+	/* Damping that acts so late is itself stable below this. */
+	double cap = 0.5 * unit * fmin(1, 2 * sin(M_PI / (4.0 * age + 2)));
+	const struct incise_pose_loop loop = {
+		.device = &st->device, .predict = &s->plan->predict, .late_ticks = late};
 
-	if (n_guard_rows > GUARD_ROWS_MAX)
-		cli_fail("guard: more than %d rows", GUARD_ROWS_MAX);
-	*row = (struct guard_row){.K_N_mm = K_N_mm,
-				  .delay = delay,
-				  .setting = setting,
-				  .guard = setting_names[setting],
-				  .late = late,
-				  .share = share,
-				  .clamp_N = clamp_N};
-	cli_progress("guard: %d", n_guard_rows);
-	press(row);
-	if (setting != GUARD_ON && setting != GUARD_CONTACT)
-		row->share = NAN;
-	return row;
-}
+	for (double high = 2 * cap; kind == PASSIVITY && high - low > cap / 64;) {
+		struct incise_pose_loop more = loop;
+		double middle = (low + high) / 2;
 
-static const double stiffness[] = {1, 2, 5, 10, 20, 50, 90, 140, 200};
-static const int delays[] = {0, 1, 2, 5, 10, 15};
-
-/* Late walls of a setting, with a clamp or without, as a block of text; in the rows these two take
- * turns. */
-static void print_walls(struct bench_run *run, enum setting setting, bool clamped)
-{
-	int n_delays = run->quick ? 2 : N(delays), n = run->quick ? 3 : N(stiffness);
-	const struct guard_row *rows = &guard_rows[2 * setting * n_delays * n + clamped];
-
-	bench_text(run, "guard %s%s%s\n", setting_names[setting],
-		   setting == GUARD_CONTACT ? " only" : "", clamped ? ", clamp" : "");
-	bench_block(run, &walls_block, 2 * sizeof(*rows), rows, n, n_delays, 0);
-}
-
-/* Every setting. Quick: three stiffnesses, two delays. */
-static void measure_late_walls(bool quick, struct held *held)
-{
-	for (int s = 0; s < SETTINGS; s++) {
-		for (int d = 0; d < N(delays); d += quick ? 5 : 1)
-			for (int i = 0; i < N(stiffness); i += quick ? 4 : 1)
-				for (int clamp = 0; clamp < 2; clamp++) {
-					const struct guard_row *r = add_guard_row(
-						stiffness[i], delays[d], (enum setting)s,
-						wall_is_late, INCISE_GUARD_SHARE,
-						clamp ? CLAMP_N : NAN);
-
-					held[s].held += r->bounded;
-					held[s].n += !clamp;
-					held[s].grow += !clamp && !r->bounded;
-				}
+		more.damping_N_s_mm = gain * st->damping_N_s_mm + middle;
+		*(incise_pose_loop_holds(&more, stiffness) ? &low : &high) = middle;
 	}
-	for (int i = 0; i < n_guard_rows; i++)
-		guard_rows[i].swept = true;
+	l->guard = (struct guarded){
+		.kind = kind,
+		.period_s = period_s,
+		.reserve_N_mm = reaction > 0 ? force_N * force_N / 2 / reaction
+					     : force_N * st->support_mm,
+		.cap_N_s_mm = kind == PASSIVITY ? low / 2 : cap,
+		.bound_N_mm = fmin(st->stiffness_N_mm,
+				   st->device.damping_N_s_mm / period_s / (age + 1)),
+		.coupling_N_mm = gain > 1 ? stiffness / (gain - 1) : INFINITY,
+		.tissue_N_mm = stiffness,
+		.late = late,
+	};
 }
 
-#define CAPS_MAX 64
-
-static const double shares[] = {0.05, 0.1, 0.25, 0.5, 0.75, 1, 1.5, 2};
-
-/* Other caps, delay by delay; rows are cap by cap. Returns how many caps there are. */
-static int measure_caps(bool quick, const char *late, struct cap caps[CAPS_MAX],
-			int *n_delays)
+static struct loop *new_loop(const struct setup *s, enum guard kind, double gain,
+			     double from_mm)
 {
-	int step = quick ? 3 : 1, n = (N(shares) + step - 1) / step;
+	struct loop *l = cli_alloc(1, sizeof(*l));
 
-	*n_delays = quick ? 2 : 4;
-	for (int c = 0; c < n; c++)
-		for (int d = 0; d < *n_delays; d++) {
-			struct cap *cap = &caps[d * n + c];
+	copy_plan(l, s->plan, gain, kind != NONE);
+	incise_surface_top(s->plan->surface, &l->top);
+	l->plane = incise_surface_new_plane(l->top.point_mm, l->top.normal, NULL);
+	if (!l->plane)
+		cli_fail("guards: no memory");
+	l->plan.surface = l->plane;
+	incise_proxy_init(&l->plan.proxy, l->plane, s->plan->proxy.leave_mm);
+	/* Across the normal; a surface's top has none along y. */
+	v3_cross(l->along, (double[3]){0, 1, 0}, l->top.normal);
+	set_guard(l, s, kind, gain);
+	l->pose_s = 1 / s->tracker_hz;
+	l->device = (struct incise_plant){
+		.mass_kg = s->scene->device.mass_kg,
+		.damping_N_s_mm = s->scene->device.damping_N_s_mm,
+		.position_mm = from_mm,
+	};
+	l->guard.pose_mm = l->guard.at_mm = l->guard.tool_mm = from_mm;
+	return l;
+}
 
-			*cap = (struct cap){.share = shares[c * step],
-					    .delay = delays[d * step],
-					    .late = late};
-			for (int i = 0; i < N(stiffness); i += quick ? 8 : 4, cap->n++)
-				cap->bounded +=
-					add_guard_row(stiffness[i], cap->delay, GUARD_ON,
-						      late, cap->share, NAN)
-						->bounded;
-			snprintf(cap->text, sizeof(cap->text), "%d of %d", cap->bounded,
-				 cap->n);
-			cap->verdict = cap->bounded == cap->n ? "bounded" : "grows";
+static void free_loop(struct loop *l)
+{
+	incise_surface_free(l->plane);
+	free(l);
+}
+
+/* Lean on it until nothing moves, or to the end. Returns whether it rests. */
+static bool lean(const struct setup *s, enum guard kind, double gain, int which,
+		 double *swing_mm)
+{
+	struct loop *l = new_loop(s, kind, gain, leans[which].from_mm);
+	double low = INFINITY, high = -INFINITY;
+	int window = (int)(STILL_S / l->guard.period_s), still = 0;
+	int ticks = (int)(RUN_S / l->guard.period_s), quarter = ticks - ticks / 4;
+
+	while (l->t_s < START_S)
+		step(l, 0, 0);
+	l->along_mm_s = leans[which].along_mm_s;
+	*swing_mm = 0;
+	for (int k = 1; k <= ticks && still < 2; k++) {
+		step(l, leans[which].lean_N, 0);
+		low = fmin(low, l->device.position_mm);
+		high = fmax(high, l->device.position_mm);
+		/* How far it comes out again; one that sinks does not swing. */
+		*swing_mm = fmax(*swing_mm, l->device.position_mm - low);
+		if (k % window || k > quarter)
+			continue;
+		still = high - low < STILL_MM ? still + 1 : 0;
+		if (still == 2)
+			break;
+		low = INFINITY;
+		high = -INFINITY;
+		*swing_mm = 0;
+	}
+	free_loop(l);
+	return *swing_mm <= INCISE_REST_SWING_MM;
+}
+
+/* In, along and out, slowly led, with a tracker's noise. Returns the number of forces. */
+#define CUT_MM_S 10
+#define CUT_S 0.5 /* each of them */
+
+static int cut(const struct setup *s, enum guard kind, double gain, double *force_N,
+	       int most, double *felt_N_mm)
+{
+	struct loop *l = new_loop(s, kind, gain, 0.5);
+	double period_s = l->guard.period_s;
+	int n = (int)(3 * CUT_S / period_s);
+
+	l->noise_mm = INCISE_REST_NOISE_MM;
+	while (l->t_s < START_S)
+		step(l, 0, 0);
+	*felt_N_mm = 0;
+	for (int k = 0; k < n && k < most; k++) {
+		int part = (int)(k * period_s / CUT_S);
+
+		l->along_mm_s = part == 1 ? CUT_MM_S : 0;
+		force_N[k] = step(l, 0, (part - 1) * CUT_MM_S);
+		if (part == 1)
+			*felt_N_mm -=
+				force_N[k] / l->device.position_mm * period_s / CUT_S;
+	}
+	free_loop(l);
+	return n < most ? n : most;
+}
+
+/* The plan with the largest gain that is known to be accepted: the scene's own, or what the refusal
+ * of the largest one of all says. */
+static void accept(struct setup *s)
+{
+	static const char advice[] = "tissue.gain to at most ";
+	const struct incise_tracker_info tracker = {
+		.rate_hz = s->tracker_hz, .latency_ns = llround(LATENCY_S * 1e9)};
+	struct incise_plan *own = incise_plan_new_fed(s->scene, &tracker, NULL);
+	double gain = s->scene->tissue.gain;
+	struct incise_error err = {0};
+	const char *at = advice;
+
+	for (s->scene->tissue.gain = 10;
+	     at && !(s->plan = incise_plan_new_fed(s->scene, &tracker, &err));) {
+		at = strstr(err.text, advice);
+		if (at)
+			s->scene->tissue.gain = atof(at + strlen(advice));
+	}
+	if (own && (!s->plan || gain > s->plan->gain)) {
+		incise_plan_free(s->plan);
+		s->plan = own;
+	}
+	s->own = own ? gain / s->plan->gain : 0;
+	if (s->plan != own)
+		incise_plan_free(own);
+}
+
+static void try(struct setup *s, int g, bool quick)
+{
+	enum { MOST = 4000 };
+	static double unguarded_N[MOST], force_N[MOST];
+	double gain = gains[g] > 0 ? gains[g] : s->own;
+
+	for (enum guard kind = NONE; gain > 0 && kind < GUARDS; kind++) {
+		struct row *row = &rows[kind * N(gains) + g];
+		double felt, swing_mm, force2 = 0, error2 = 0;
+		bool all = true;
+		int n = cut(s, kind, gain, kind == NONE ? unguarded_N : force_N, MOST,
+			    &felt);
+
+		for (int i = 0; i < n; i++) {
+			double error_N = kind == NONE ? 0 : force_N[i] - unguarded_N[i];
+
+			force2 += unguarded_N[i] * unguarded_N[i] / n;
+			error2 += error_N * error_N / n;
 		}
-	return n;
+		for (int i = 0; i < (quick ? 2 : N(leans)); i++) {
+			bool rests = lean(s, kind, gain, i, &swing_mm);
+
+			all &= rests;
+			row->cases++;
+			row->rests += rests;
+			row->swing_mm = fmax(row->swing_mm, swing_mm);
+		}
+		if (all && error2 <= FORCE_NOTICED * FORCE_NOTICED * force2)
+			s->felt_N_mm[kind] = fmax(s->felt_N_mm[kind], felt);
+		row->force_N += force2; /* squared until all are in */
+		row->error_N += error2;
+		row->cuts++;
+	}
+}
+
+static struct setup new_setup(int scene, double tracker_hz, int late, int device)
+{
+	struct setup s = {.tracker_hz = tracker_hz};
+	struct scene_argument argument = {0};
+
+	if (!scene_argument_find(&argument,
+				 cli_text("%.*s", (int)strcspn(scenes[scene], " "),
+					  scenes[scene])))
+		cli_fail("guards: there is no scene %s", argument.path);
+	s.scene = scene_argument_load(&argument);
+	s.scene->tissue.dissipates &= !strchr(scenes[scene], ' ');
+	s.scene->effects.average_ticks = 1; /* of a plane */
+	s.scene->effects.guard = false;
+	s.scene->device.mass_kg = devices[device].mass_kg;
+	s.scene->device.damping_N_s_mm = devices[device].damping_N_s_mm;
+	s.scene->device.late_ticks = late;
+	accept(&s);
+	if (!s.plan)
+		cli_fail("guards: no gain of %s is accepted", scenes[scene]);
+	return s;
+}
+
+static void free_setup(struct setup *s)
+{
+	incise_plan_free(s->plan);
+	incise_scene_free(s->scene);
+}
+
+static void add_setup(int scene, double tracker_hz, int late, int device, bool quick)
+{
+	struct setup s = new_setup(scene, tracker_hz, late, device);
+
+	cli_progress("guards: %s, %g Hz, %d ticks late", scenes[scene], tracker_hz, late);
+	for (int g = 0; g < N(gains); g++)
+		try(&s, g, quick);
+	for (enum guard kind = NONE; kind < GUARDS; kind++) {
+		struct stiffest *stiffest = &stiffests[kind * N(scenes) + scene];
+
+		stiffest->setups++;
+		stiffest->felt_N_mm += s.felt_N_mm[kind];
+		stiffest->stiffer += s.felt_N_mm[kind] > 1.01 * s.felt_N_mm[NONE];
+		stiffest->softer += s.felt_N_mm[kind] < 0.99 * s.felt_N_mm[NONE];
+	}
+	free_setup(&s);
+}
+
+#define TIMED_TICKS 2000
+
+static void timed(void *context)
+{
+	for (int i = 0; i < TIMED_TICKS; i++)
+		step(context, 0, 0);
+}
+
+/* Held in the tissue, above the gain that is accepted. */
+static void measure_costs(bool quick)
+{
+	struct setup s = new_setup(0, trackers_hz[0], lates[0], 0);
+	struct harness_variant variants[GUARDS];
+	struct loop *loops[GUARDS];
+
+	for (enum guard kind = NONE; kind < GUARDS; kind++) {
+		costs[kind].guard = guard_names[kind];
+		loops[kind] = new_loop(&s, kind, 1.25, -3);
+		loops[kind]->noise_mm = INCISE_REST_NOISE_MM;
+		variants[kind] = (struct harness_variant){.run = timed,
+							  .context = loops[kind],
+							  .units = TIMED_TICKS,
+							  .time = &costs[kind].time};
+	}
+	harness_times(variants, GUARDS, quick ? 7 : 49);
+	for (enum guard kind = NONE; kind < GUARDS; kind++)
+		free_loop(loops[kind]);
+	free_setup(&s);
+}
+
+/* Means of all that was added. Returns the number of accepted cases that rest without a guard
+ * and not with one. */
+static void finish(int lost[GUARDS])
+{
+	for (int i = 0; i < N(rows); i++) {
+		struct row *r = &rows[i];
+		const struct row *none = &rows[i % N(gains)];
+
+		r->guard = guard_names[i / N(gains)];
+		r->gain = gains[i % N(gains)] > 0 ? gains[i % N(gains)] : NAN;
+		r->own = isnan(r->gain);
+		r->rest_share = (double)r->rests / r->cases;
+		r->force_N = sqrt(r->force_N / r->cuts);
+		r->error_N = sqrt(r->error_N / r->cuts);
+		r->error_share = r->error_N / r->force_N;
+		if (gains[i % N(gains)] <= 1)
+			lost[i / N(gains)] += none->rests - r->rests;
+	}
+	for (int i = 0; i < N(stiffests); i++) {
+		struct stiffest *b = &stiffests[i];
+
+		b->guard = guard_names[i / N(scenes)];
+		b->scene = scenes[i % N(scenes)];
+		b->felt_N_mm /= b->setups;
+		b->of_none = b->felt_N_mm / stiffests[i % N(scenes)].felt_N_mm;
+	}
+}
+
+/* A guard wins if no accepted case is lost by it, and scenes can be noticeably stiffer with it. */
+static void judge(struct bench_run *run)
+{
+	const char *best = guard_names[NONE];
+	double most = 1, wins = 1 + STIFFNESS_NOTICED;
+	int lost[GUARDS] = {0};
+	char verdict[300];
+
+	finish(lost);
+	for (enum guard kind = PASSIVITY; kind < GUARDS; kind++) {
+		double mean = 0;
+
+		for (int i = 0; i < N(scenes); i++)
+			mean += stiffests[kind * N(scenes) + i].of_none / N(scenes);
+		if (lost[kind] <= 0 && mean > most) {
+			most = mean;
+			best = guard_names[kind];
+		}
+	}
+	if (most > wins)
+		snprintf(verdict, sizeof(verdict), "%s wins: %.2f times as stiff as none",
+			 best, most);
+	else
+		snprintf(
+			verdict, sizeof(verdict),
+			"none wins: at most %.2f times as stiff at rest (%s), of %.2f that a "
+			"hand notices; %d of %d cases rest without one at the scenes' own gains",
+			most, best, wins, rows[0].rests, rows[0].cases);
+	bench_value(run, "guards_verdict", json_string(verdict));
+	bench_value(run, "guards_winner",
+		    json_string(most > wins ? best : guard_names[NONE]));
+	bench_text(
+		run,
+		"guards in the real plan, behind a late tracker and a late actuator; gain of "
+		"the largest that is accepted, - is the scene's own\n");
+	bench_table(run, &stability_guard_table, rows, N(rows));
+	bench_text(
+		run,
+		"the stiffest that rests under every lean, with a force within %g %%\n",
+		100 * FORCE_NOTICED);
+	bench_table(run, &stiffest_table, stiffests, N(stiffests));
+	bench_table(run, &cost_table, costs, GUARDS);
+	bench_text(run, "%s\n\n", verdict);
+	for (enum guard kind = NONE; kind < GUARDS; kind++) {
+		double rests = 0;
+
+		for (int g = 0; g < N(gains); g++)
+			rests += rows[kind * N(gains) + g].rests;
+		metrics_more_is_better(metrics_add(run->metrics, METRIC_EXACT, &rests,
+						   "1", "guard %s cases that rest",
+						   guard_names[kind]));
+	}
 }
 
 void stability_guard(struct bench_run *run)
 {
-	static const char *const late[] = {wall_is_late, actuator_is_late};
-	static struct held held[SETTINGS];
-	static struct cap caps[2][CAPS_MAX];
-	char title[200];
-	int n_caps = 0, n_delays = 0, missed = 0;
+	bool quick = run->quick;
 
-	measure_late_walls(run->quick, held);
-	for (int i = 0; i < 2; i++)
-		n_caps = measure_caps(run->quick, late[i], caps[i], &n_delays);
-	bench_text(run,
-		   "guard of passivity: %g kg, pressed by %g N, meets a wall that "
-		   "answers late, at %g mm/s; cap %g m/T; farthest and hardest in %g s\n",
-		   DEVICE_KG, (double)PRESS_N, (double)SPEED_mm_s, INCISE_GUARD_SHARE,
-		   GUARD_TICKS * PERIOD_S);
-	for (int clamped = 0; clamped < 2; clamped++)
-		for (int s = 0; s < SETTINGS; s++)
-			print_walls(run, (enum setting)s, clamped);
-	for (int i = 0; i < 2; i++) {
-		bench_text(run, "bounded for other caps, %s late\n", late[i]);
-		bench_block(run, &caps_block, sizeof(**caps), caps[i], n_caps, n_delays,
-			    0);
-	}
-	bench_text(run, "\n");
-	bench_rows(run, &stability_guard_table, guard_rows, n_guard_rows);
-	for (int i = 0; i < SETTINGS; i++)
-		metrics_more_is_better(
-			metrics_add(run->metrics, METRIC_EXACT, &held[i].held, "1",
-				    "guard %s walls held", setting_names[i]));
-	bench_rows(run, &stability_cap_table, caps[1], n_caps * n_delays);
-	snprintf(title, sizeof(title),
-		 "%g of %g without a guard, %g of %g with it, %g of %g without its cap, "
-		 "%g of %g in contact only",
-		 held[0].grow, held[0].n, held[1].grow, held[1].n, held[2].grow,
-		 held[2].n, held[3].grow, held[3].n);
-	bench_scalars(run, "{ss sf}", "unbounded", title, "share", INCISE_GUARD_SHARE);
-	for (int i = 0; i < n_guard_rows; i++) {
-		const struct guard_row *r = &guard_rows[i];
-
-		missed += r->setting == GUARD_ON && r->late == wall_is_late &&
-			  r->share == INCISE_GUARD_SHARE && !r->bounded;
-	}
-	if (missed)
-		bench_fail(run,
-			   "guard: %d walls were not bounded with it: please report it",
-			   missed);
+	for (int i = 0; i < N(scenes); i++)
+		for (int t = 0; t < (quick ? 1 : N(trackers_hz)); t++)
+			for (int a = 0; a < (quick ? 1 : N(lates)); a++)
+				for (int d = 0; d < (quick ? 1 : N(devices)); d++)
+					add_setup(i, trackers_hz[t], lates[a], d, quick);
+	measure_costs(quick);
+	cli_progress_end();
+	judge(run);
 }
