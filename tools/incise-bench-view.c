@@ -771,7 +771,7 @@ static const char neck[] =
 	"  to_mm = [160.0, 0.0, -55.0]; radius_mm = 55.0; };\n"
 	"tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; damping_N_s_mm = 0.0005;\n"
 	"  insertion_N_mm = 0.28; aligned = 0.2; spread_N_mm = 0.22; };\n"
-	"effects = { average_ticks = 8; guard = true; };\n"
+	"effects = { average_ticks = 8; };\n"
 	"tool = { handle_mm = 120.0; };\n"
 	"limits = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };\n"
 	"picture = { wound = true; bleeding = true; skin = \"neck\"; larynx = true;\n"

@@ -549,11 +549,10 @@ static void report_text(const struct haptic *haptic)
 	if (incise_pose_counts_text(&s->poses, flags, sizeof(flags)))
 		printf("poses      %s\n", flags);
 	printf("held       %llu at the largest force, %llu at the largest slew, %llu at the end "
-	       "of the travel, %llu by the guard, %llu starting or fading\n",
+	       "of the travel, %llu starting or fading\n",
 	       (unsigned long long)ticks_with(s, INCISE_TICK_CLAMPED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
-	       (unsigned long long)ticks_with(s, INCISE_TICK_GUARDED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
 	if (stepper)
 		stepper_counters_line(stepper);

@@ -74,25 +74,24 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 {
 	const struct incise_haptic_device *d = &s->device;
 
-	return json_pack(
-		"{so so so so so so so so sf sf sf sf si s{sf sf sf sf sf} sf sf "
-		"si sb sb s{sf sf sf sf sf si}}",
-		"stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
-		json_number(s->limit_N_mm), "margin", json_number(margin(s)),
-		"damping_N_s_mm", json_number(s->damping_N_s_mm), "speed_slope_N_s_mm",
-		json_number(s->speed_slope_N_s_mm), "passive_N_mm",
-		json_number(passive_N_mm(s)), "encoder_N_mm",
-		json_number(encoder_N_mm(s)), "guard_N_s_mm",
-		json_number(s->guard_N_s_mm), "slope_N_mm", s->slope_N_mm,
-		"unloading_N_mm", s->unloading_N_mm, "support_mm", s->support_mm,
-		"beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "worst", "lean_N",
-		s->worst.lean_N, "along_mm_s", s->worst.along_mm_s, "depth_mm",
-		s->worst.depth_mm, "swing_mm", s->worst.swing_mm, "settle_s",
-		s->worst.settle_s, "noise_mm", s->noise_mm, "noise_N", s->noise_N,
-		"late_ticks", s->late_ticks, "certified", s->certified, "own_delay",
-		s->own_delay, "device", "mass_kg", d->mass_kg, "damping_N_s_mm",
-		d->damping_N_s_mm, "coulomb_N", d->coulomb_N, "encoder_mm", d->encoder_mm,
-		"period_s", d->period_s, "delay_ticks", d->delay_ticks);
+	return json_pack("{so so so so so so so sf sf sf sf si s{sf sf sf sf sf} sf sf "
+			 "si sb sb s{sf sf sf sf sf si}}",
+			 "stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
+			 json_number(s->limit_N_mm), "margin", json_number(margin(s)),
+			 "damping_N_s_mm", json_number(s->damping_N_s_mm),
+			 "speed_slope_N_s_mm", json_number(s->speed_slope_N_s_mm),
+			 "passive_N_mm", json_number(passive_N_mm(s)), "encoder_N_mm",
+			 json_number(encoder_N_mm(s)), "slope_N_mm", s->slope_N_mm,
+			 "unloading_N_mm", s->unloading_N_mm, "support_mm", s->support_mm,
+			 "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "worst",
+			 "lean_N", s->worst.lean_N, "along_mm_s", s->worst.along_mm_s,
+			 "depth_mm", s->worst.depth_mm, "swing_mm", s->worst.swing_mm,
+			 "settle_s", s->worst.settle_s, "noise_mm", s->noise_mm,
+			 "noise_N", s->noise_N, "late_ticks", s->late_ticks, "certified",
+			 s->certified, "own_delay", s->own_delay, "device", "mass_kg",
+			 d->mass_kg, "damping_N_s_mm", d->damping_N_s_mm, "coulomb_N",
+			 d->coulomb_N, "encoder_mm", d->encoder_mm, "period_s",
+			 d->period_s, "delay_ticks", d->delay_ticks);
 }
 
 static void report_json(const struct job *job, const struct incise_plan *plan,
@@ -130,16 +129,6 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 		"libraries", mapped, "unmapped_libraries", unmapped_libraries(mapped));
 	json_object_update_new(object, stability_json(&stability));
 	json_print(object);
-}
-
-static bool guarded(const struct incise_plan *plan)
-{
-	const char *name;
-
-	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
-		if (!strcmp(name, "guard"))
-			return true;
-	return false;
 }
 
 /* The tissue of a model, and what the search for swings found. */
@@ -189,10 +178,6 @@ static void print_stability(const struct incise_plan *plan)
 	if (isfinite(encoder_N_mm(&s)))
 		printf("            the steps of its encoder die out up to %.4g N/mm\n",
 		       encoder_N_mm(&s));
-	if (guarded(plan))
-		printf("            its guard adds up to %.3g N s/mm, which the loop can "
-		       "spare%s\n",
-		       s.guard_N_s_mm, s.guard_N_s_mm > 0 ? "" : ": it can do nothing");
 	if (s.support_mm > 0)
 		print_model(&s);
 }

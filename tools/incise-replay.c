@@ -201,7 +201,6 @@ static void held_line(const struct incise_loop_stats *stats,
 		{INCISE_TICK_STARTING, "starting or fading"},
 		{INCISE_TICK_CLAMPED, "the largest force"},
 		{INCISE_TICK_SLEWED, "the largest slew"},
-		{INCISE_TICK_GUARDED, "the guard"},
 		{INCISE_TICK_NOT_FINITE, "a force that was no number"},
 	};
 	const char *between = "held       ";

@@ -72,7 +72,7 @@ static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 
 /*
  * Set the delay of a force behind a pose: that of the scene, or the tracker's: its latency
- * and the period for which a pose is used. The second is what the guard goes by.
+ * and the period for which a pose is used.
  */
 static void set_delay(struct incise_plan *plan, const struct incise_tracker_info *tracker)
 {
@@ -141,24 +141,6 @@ static bool stable(const struct incise_plan *plan, double share)
 
 	return holds(plan, share * s->stiffness_N_mm, share * s->damping_N_s_mm) &&
 	       hands_hold(plan, share);
-}
-
-double incise_plan_spare_damping(const struct incise_plan *plan, double most_N_s_mm)
-{
-	const struct incise_plan_stability *s = &plan->stability;
-	double low = 0, high = most_N_s_mm;
-
-	if (holds(plan, s->stiffness_N_mm, s->damping_N_s_mm + most_N_s_mm))
-		return most_N_s_mm;
-	/* To a hundredth of @most. */
-	for (int i = 0; i < 7; i++) {
-		double middle = (low + high) / 2;
-
-		*(holds(plan, s->stiffness_N_mm, s->damping_N_s_mm + middle) ? &low
-									     : &high) =
-			middle;
-	}
-	return low;
 }
 
 /* The largest gain that is stable; damping goes with it, so that the limit moves. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * The choice of stages that a scene needs, in the order in which they run, with a reason for
- * each that is left out. The forces of forces.c come before the guard. With everything kept
+ * each that is left out. The forces of forces.c come before the start. With everything kept
  * (incise_scene_set_full()) the stages that are not needed are neutral.
  */
 #include <stddef.h>
@@ -35,11 +35,6 @@ static const char *no_normal(const struct incise_plan *plan)
 		       : "effects.average_ticks is 1";
 }
 
-static const char *no_guard(const struct incise_plan *plan)
-{
-	return plan->scene->effects.guard ? NULL : "effects.guard is false";
-}
-
 static const char *no_force(const struct incise_plan *plan,
 			    const struct incise_acting_force *own)
 {
@@ -61,8 +56,7 @@ static const struct {
 	{"tool", true, incise_stage_tool, NULL, no_tool, false},
 	{"contact", false, incise_stage_contact, NULL, NULL, false},
 	{"normal", false, incise_stage_normal, NULL, no_normal, false},
-	{"guard", false, incise_stage_guard, NULL, no_guard, true},
-	{"start", true, incise_stage_start, NULL, NULL, false},
+	{"start", true, incise_stage_start, NULL, NULL, true},
 	{"limit", true, incise_stage_limit, NULL, NULL, false},
 };
 _Static_assert(sizeof(all) / sizeof(*all) + 1 == INCISE_PLAN_OTHER_STAGES,

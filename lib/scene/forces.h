@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * The forces of a scene's tissue, a row each. Reading a scene, choosing and running stages,
- * the gain, the stability check, the guard's reserve and the fixed-point bound walk these
+ * the gain, the stability check, and the fixed-point bound walk these
  * rows, so a new force is a row and its function in forces.c, its test, and its text in
  * incise-scene(5) and incise-haptic(1), which a test compares with the rows.
  */

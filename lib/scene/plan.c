@@ -95,47 +95,6 @@ static void take_tissue(struct incise_plan *plan)
 	}
 }
 
-/*
- * The most energy that the tissue can have stored, N mm: of a spring at the largest force
- * F²/(2K), of a model that force over all of its support.
- */
-static double reserve(const struct incise_plan *plan)
-{
-	double force_N = plan->scene->limits.force_N, most = 0;
-
-	for (int i = 0; i < incise_n_tissue_forces; i++) {
-		const struct incise_acting_force *own = &plan->acting[i];
-
-		if (own->force->kind <= INCISE_SPRING_SIDE && own->number[0] > 0)
-			most = fmax(most, force_N * force_N / (2 * own->number[0]));
-	}
-	if (plan->fixed)
-		most = fmax(most, force_N * plan->fixed->input[0].max / INCISE_FIXED_ONE);
-	else if (plan->model)
-		most = fmax(most, force_N * incise_model_info(plan->model)->input[0].max);
-	return fmax(most, 0);
-}
-
-static void set_guard(struct incise_plan *plan)
-{
-	const struct incise_haptic_device *device = &plan->stability.device;
-	/* Damping that acts d ticks late is itself stable below this, in m/T. */
-	double late = 2 * sin(M_PI / (4.0 * device->delay_ticks + 2));
-
-	incise_guard_init(plan->guard, device->mass_kg, device->period_s,
-			  plan->scene->effects.guard ? reserve(plan) : 0);
-	if (!plan->scene->effects.guard)
-		return;
-	plan->guard->cap_N_s_mm *= fmin(1, late);
-	/*
-	 * What the guard adds must not make a wall hum that did not; half of what is spare,
-	 * as the guard's own share is half of what is stable.
-	 */
-	plan->guard->cap_N_s_mm =
-		incise_plan_spare_damping(plan, 2 * plan->guard->cap_N_s_mm) / 2;
-	plan->stability.guard_N_s_mm = plan->guard->cap_N_s_mm;
-}
-
 static void set_limits(struct incise_plan *plan)
 {
 	const struct incise_scene *scene = plan->scene;
@@ -204,8 +163,7 @@ static bool keeps(const struct incise_plan *plan, const char *stage)
 static int equip(struct incise_plan *plan, const struct incise_tracker_info *tracker,
 		 struct incise_error *err)
 {
-	bool handle = keeps(plan, "tool"), average = keeps(plan, "normal"),
-	     guard = keeps(plan, "guard");
+	bool handle = keeps(plan, "tool"), average = keeps(plan, "normal");
 
 	if (!plan->tracker)
 		plan->fed = calloc(INCISE_PLAN_POSES, sizeof(*plan->fed));
@@ -213,17 +171,13 @@ static int equip(struct incise_plan *plan, const struct incise_tracker_info *tra
 		plan->handle = calloc(1, sizeof(*plan->handle));
 	if (average)
 		plan->average = calloc(1, sizeof(*plan->average));
-	if (guard)
-		plan->guard = calloc(1, sizeof(*plan->guard));
 	if ((!plan->tracker && !plan->fed) || (handle && !plan->handle) ||
-	    (average && !plan->average) || (guard && !plan->guard))
+	    (average && !plan->average))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	if (handle)
 		incise_predict_init(plan->handle, tracker, 0);
 	if (average)
 		incise_average_init(plan->average, plan->average_ticks);
-	if (guard)
-		set_guard(plan);
 	return 0;
 }
 
@@ -332,7 +286,6 @@ void incise_plan_free(struct incise_plan *plan)
 	free(plan->fed);
 	free(plan->handle);
 	free(plan->average);
-	free(plan->guard);
 	free(plan);
 }
 
@@ -535,7 +488,6 @@ size_t incise_plan_memory(const struct incise_plan *plan)
 	size += plan->fed ? INCISE_PLAN_POSES * sizeof(*plan->fed) : 0;
 	size += plan->handle ? sizeof(*plan->handle) : 0;
 	size += plan->average ? sizeof(*plan->average) : 0;
-	size += plan->guard ? sizeof(*plan->guard) : 0;
 	if (plan->fixed)
 		size += sizeof(*plan->fixed) + plan->fixed->size;
 	if (plan->scene->model)

@@ -8,7 +8,6 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/plan.h>
-#include "../control/guard.h"
 #include "../control/limit.h"
 #include "../control/predict.h"
 #include "../control/start.h"
@@ -35,7 +34,7 @@ struct incise_stage {
 };
 
 /* Stages besides forces; those that no loop has are always left out. */
-#define INCISE_PLAN_OTHER_STAGES 9
+#define INCISE_PLAN_OTHER_STAGES 8
 #define INCISE_PLAN_NO_STAGES 2
 _Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES_MAX <= INCISE_PLAN_STAGES_MAX,
 	       "raise INCISE_PLAN_STAGES_MAX");
@@ -59,7 +58,6 @@ struct incise_plan {
 	struct incise_tracker_sample *fed; /* INCISE_PLAN_POSES, then */
 	int n_fed;
 	struct incise_predict predict;
-	unsigned int discontinuities; /* of the predictor, as the guard last saw them */
 	int64_t pose_age_ns;
 	struct incise_pose_counts poses;
 	char pose_flag;		 /* of the newest pose; ' ' or 0: none */
@@ -88,7 +86,7 @@ struct incise_plan {
 	struct incise_average *average; /* with stage normal */
 
 	/* forces */
-	double force_N[3]; /* of this tick, before guard and limits */
+	double force_N[3]; /* of this tick, before limits */
 	double gain;
 	bool dissipates;       /* a model's force unloads when the blade draws back … */
 	double unloading_N_mm; /* … with this stiffness */
@@ -99,8 +97,7 @@ struct incise_plan {
 	struct incise_fixed *own_fixed; /* compiled here */
 	struct incise_acting_force acting[INCISE_FORCES_MAX];
 
-	/* guard, start, limit */
-	struct incise_guard *guard; /* with stage guard */
+	/* start, limit */
 	struct incise_start start;
 	bool fading; /* asked to let go of the force */
 	struct incise_limit limit;
@@ -128,7 +125,6 @@ incise_stage_fn incise_stage_contact;
 incise_stage_fn incise_stage_normal;
 
 /* From the tissue's force to the hand. */
-incise_stage_fn incise_stage_guard;
 incise_stage_fn incise_stage_start;
 incise_stage_fn incise_stage_limit;
 incise_stage_fn incise_stage_actuate;
@@ -170,12 +166,5 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 int incise_plan_check_rest(struct incise_plan *plan,
 			   const struct incise_tracker_info *tracker,
 			   struct incise_error *err);
-
-/*
- * After incise_plan_check(): how much damping may be added to the scene's own, up to
- * @most, before its stiffness is too much. Through a tracker damping is late, and is no
- * help.
- */
-double incise_plan_spare_damping(const struct incise_plan *plan, double most_N_s_mm);
 
 #endif

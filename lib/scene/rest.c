@@ -54,7 +54,6 @@ static const struct {
 struct parts {
 	struct incise_predict handle;
 	struct incise_average average;
-	struct incise_guard guard;
 };
 
 struct search {
@@ -105,11 +104,8 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 		s->parts.handle = *plan->handle;
 	if (plan->average)
 		s->parts.average = *plan->average;
-	if (plan->guard)
-		s->parts.guard = *plan->guard;
 	own->handle = plan->handle ? &s->parts.handle : NULL;
 	own->average = plan->average ? &s->parts.average : NULL;
-	own->guard = plan->guard ? &s->parts.guard : NULL;
 	own->n_stages = 0;
 	for (int i = 0; i < plan->n_stages; i++) {
 		struct incise_stage stage = plan->stage[i];

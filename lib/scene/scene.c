@@ -468,23 +468,41 @@ static int check_tool(const struct incise_scene *scene, const config_setting_t *
 		scene->path, config_setting_source_line(setting), key);
 }
 
+/* A stage that older scenes have. */
+static int refuse_guard(const char *path, const config_setting_t *root,
+			struct incise_error *err)
+{
+	const config_setting_t *effects = config_setting_get_member(root, "effects");
+	const config_setting_t *guard =
+		effects ? config_setting_get_member(effects, "guard") : NULL;
+
+	if (!guard)
+		return 0;
+	return incise_error_set(
+		err, EINVAL,
+		"%.200s:%d: effects.guard is gone: the same scenes come to rest without "
+		"it, see incise bench stability; remove the key",
+		path, config_setting_source_line(guard));
+}
+
 static int read_switches(struct incise_scene *scene, const config_setting_t *root,
 			 struct incise_error *err)
 {
-	static const char *const effects_keys[] = {"average_ticks", "guard", NULL};
+	static const char *const effects_keys[] = {"average_ticks", NULL};
 	static const char *const tool_keys[] = {"side", "axis", NULL};
 	static const char *const device_keys[] = {"delay_ticks", "late_ticks", NULL};
 	FITS_KEYS(tool, tool_keys);
 	FITS_KEYS(device, device_keys);
 	const char *path = scene->path;
 	const config_setting_t *group;
-	int rc = read_group(scene, root, "effects", NULL, effects_keys, &group, err);
+	int rc = refuse_guard(path, root, err);
+
+	if (!rc)
+		rc = read_group(scene, root, "effects", NULL, effects_keys, &group, err);
 
 	if (!rc && group)
 		rc = incise_conf_integer(group, path, "average_ticks", 1, 64,
 					 &scene->effects.average_ticks, err);
-	if (!rc && group)
-		rc = incise_conf_bool(group, path, "guard", &scene->effects.guard, err);
 	if (!rc)
 		rc = read_group(scene, root, "tool", tool, tool_keys, &group, err);
 	if (!rc && group)

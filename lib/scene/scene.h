@@ -28,7 +28,6 @@ struct incise_scene {
 	} tissue;
 	struct {
 		int average_ticks;
-		bool guard;
 	} effects;
 	struct {
 		double side[3], axis[3], handle_mm;

@@ -102,15 +102,9 @@ int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
 	bool other = incise_instrument_choose(&plan->instrument, plan->attitude, plan->up,
 					      plan->proxy.touching);
 
-	/*
-	 * The way from the end of one to that of the other is no motion, and no work of
-	 * a force that is still on its way down.
-	 */
-	if (other) {
+	/* The way from the end of one to that of the other is no motion. */
+	if (other)
 		incise_proxy_init(&plan->proxy, plan->surface, plan->proxy.leave_mm);
-		if (plan->guard)
-			incise_guard_discontinuity(plan->guard);
-	}
 	tick->tool = plan->instrument.held;
 	if (plan->instrument.held == INCISE_TOOL_HANDLE)
 		incise_predict_at(plan->handle, tick->t_ns, tick->tool_mm,
@@ -132,8 +126,6 @@ static void contact_begins(struct incise_plan *plan)
 	}
 	if (plan->average)
 		incise_average_reset(plan->average);
-	if (plan->guard)
-		incise_guard_reset(plan->guard);
 }
 
 /*
@@ -188,23 +180,6 @@ int incise_stage_normal(struct incise_plan *plan, struct incise_tick *tick)
 	return 0;
 }
 
-/* In free air too: a debt of energy is paid there as well. */
-int incise_stage_guard(struct incise_plan *plan, struct incise_tick *tick)
-{
-	const struct incise_predict *held = plan->instrument.held == INCISE_TOOL_HANDLE
-						    ? plan->handle
-						    : &plan->predict;
-
-	/* A force did no work on a way that nobody went. */
-	if (plan->discontinuities != held->discontinuities)
-		incise_guard_discontinuity(plan->guard);
-	plan->discontinuities = held->discontinuities;
-	if (incise_guard_apply(plan->guard, tick->tool_mm, plan->velocity_mm_s,
-			       plan->force_N))
-		tick->flags |= INCISE_TICK_GUARDED;
-	return 0;
-}
-
 /* Without a fresh pose the last force stays, and fades. */
 int incise_stage_start(struct incise_plan *plan, struct incise_tick *tick)
 {
@@ -235,8 +210,6 @@ int incise_stage_limit(struct incise_plan *plan, struct incise_tick *tick)
 		tick->flags |= INCISE_TICK_SLEWED;
 	if (held & INCISE_LIMIT_NOT_FINITE)
 		tick->flags |= INCISE_TICK_NOT_FINITE;
-	if (plan->guard)
-		incise_guard_sent(plan->guard, tick->command_N);
 	return 0;
 }
 

@@ -17,7 +17,7 @@ setup() {
 	[ "$(of rows 'count(*)' 'tried != held + refused OR tried < 90')" = 0 ]
 	holds "$(of rows 'sum(tried)') > 1e6"
 	for row in model_double fixed_direct fixed_table force_table fixed_batch fixed_blob plane \
-		sphere capsule mesh heights guard plant stability_limit spring profile pose_nan \
+		sphere capsule mesh heights plant stability_limit spring profile pose_nan \
 		pose_huge time_back time_1ns time_1h rates wall scenes device_fault \
 		device_nonsense scene_bytes fis_bytes fx_bytes mesh_bytes rig_bytes \
 		calibration_bytes recording_bytes; do

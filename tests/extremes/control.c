@@ -1,71 +1,17 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The guard of passivity, the plant and the limits of stability: any device, any hand.
+ * The plant and the limits of stability: any device, any hand.
  */
 #include <string.h>
 #include "../../lib/base/vector.h"
-#include "../../lib/control/guard.h"
 #include "../../lib/control/plant.h"
 #include "../../lib/control/stability.h"
 #include "extremes.h"
 #include "numbers.h"
 
-#define CALLS 100
 /* One of so many numbers is special. */
 #define SOME 8
 #define ALL 1
-
-/* One call of the guard, checked by what its header says. */
-static void guard_call(struct extremes_row *row, struct incise_guard *guard,
-		       uint32_t odds, const double x[3], const double v[3])
-{
-	struct incise_guard was = *guard;
-	double force[3], sent[3];
-	bool held, damped;
-
-	for (int i = 0; i < 3; i++)
-		sent[i] = force[i] = any_number(odds, -10, 10);
-	damped = incise_guard_apply(guard, x, v, force);
-	held = guard->energy_N_mm >= -DBL_MAX &&
-	       guard->energy_N_mm <= guard->reserve_N_mm && guard->damping_N_s_mm >= 0 &&
-	       guard->damping_N_s_mm <= guard->cap_N_s_mm;
-	if (!damped || !v3_finite(sent) || guard->reserve_N_mm == 0)
-		held = held && !memcmp(sent, force, sizeof(sent)); /* left as it is */
-	/* Damping is finite, and never along the velocity. */
-	for (int i = 0; i < 3 && damped; i++)
-		held = held && isfinite(force[i]) && (force[i] - sent[i]) * v[i] <= 0;
-	extremes_check(row, held,
-		       "at " V3 ", v " V3 ", force " V3 " to " V3 ", energy %a to %a, "
-		       "damping %a of %a",
-		       V3_OF(x), V3_OF(v), V3_OF(sent), V3_OF(force), was.energy_N_mm,
-		       guard->energy_N_mm, guard->damping_N_s_mm, guard->cap_N_s_mm);
-	incise_guard_sent(guard, below(4) ? force : x);
-}
-
-static void try_guard(struct extremes_row *row, const struct property *property)
-{
-	uint32_t odds = (uint32_t)property->kind;
-	struct incise_guard guard;
-	double x[3] = {0};
-
-	incise_guard_init(&guard, below(4) ? exp(between(-9, 3)) : any_number(6, -1, 1),
-			  below(4) ? exp(between(-12, 0)) : any_number(6, -1, 1),
-			  below(4) ? exp(between(-9, 9)) : any_number(6, -10, 10));
-	for (int i = 0; i < CALLS; i++) {
-		double v[3];
-
-		for (int a = 0; a < 3; a++) {
-			x[a] = odds > 1 && below(3) ? x[a] + between(-1, 1)
-						    : any_number(odds, -100, 100);
-			v[a] = any_number(odds, -1000, 1000);
-		}
-		if (!below(20))
-			incise_guard_reset(&guard);
-		if (!below(20))
-			incise_guard_discontinuity(&guard);
-		guard_call(row, &guard, odds, x, v);
-	}
-}
 
 /* A number of many sizes; one of @odds is special. */
 static double positive(uint32_t odds, double low, double high)
@@ -157,13 +103,6 @@ static void try_stability(struct extremes_row *row, const struct property *prope
 }
 
 const struct property control_properties[] = {
-	{"guard",
-	 "the guard of passivity, any device, any place, velocity and force: its credit "
-	 "within the reserve, its damping within the cap, and what is no number left "
-	 "as it is",
-	 4000, .each = try_guard, .kind = 6},
-	{"guard_special", "the same with special numbers only", 1000, .each = try_guard,
-	 .kind = ALL, .for_tests_only = true},
 	{"plant",
 	 "a mass with friction at a wall of up to 1e9 N/mm under forces of up to 1e6 N, "
 	 "for 1 ns to 1 h, or 16 swings: finite; with settings that cannot be: no number",

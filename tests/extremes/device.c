@@ -198,7 +198,7 @@ static void try_devices(struct extremes_row *row, const struct property *propert
 	struct incise_scene *scene;
 
 	fputs("tissue = { reaction_N_mm = 0.3; plane_N_mm = 0.05; };\n"
-	      "effects = { guard = true; };\ndevice = { delay_ticks = 12; };\n"
+	      "device = { delay_ticks = 12; };\n"
 	      "limits = { ramp_ms = 10.0; };\n",
 	      file.file);
 	memory_file_written(&file);

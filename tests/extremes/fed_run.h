@@ -20,7 +20,7 @@ struct fed_run {
 	struct incise_touch top;
 	int64_t t_ns;
 	struct incise_tick tick; /* the last one */
-	bool waved;		 /* it moves in free air: there is no force but damping */
+	bool waved;		 /* it moves in free air: there is no force */
 	long contacts;		 /* ticks in contact */
 };
 

@@ -163,7 +163,7 @@ static void write_scene(FILE *out)
 	      "tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; damping_N_s_mm = 0.0005;\n"
 	      "  insertion_N_mm = 0.28; aligned = 0.2; spread_N_mm = 0.22; leave_mm = 0.3; "
 	      "};\n"
-	      "effects = { average_ticks = 8; guard = true; };\ntool = { handle_mm = 120.0; };\n"
+	      "effects = { average_ticks = 8; };\ntool = { handle_mm = 120.0; };\n"
 	      "device = { mass_kg = 0.05; coulomb_N = 0.1; delay_ticks = 3; };\n"
 	      "limits = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };\n",
 	      out);
@@ -467,7 +467,7 @@ static const struct {
 	{NULL,
 	 "surface = { kind = \"heights\"; file = \"s.asc\"; at_mm = [0.0, 0.0, 0.0]; };\n"
 	 "tissue = { gain = 0.5; reaction_N_mm = 0.2; leave_mm = 0.3; };\n"
-	 "effects = { average_ticks = 64; guard = false; };\n"},
+	 "effects = { average_ticks = 64; };\nlimits = { fade_ms = 30.0; };\n"},
 	{NULL,
 	 "surface = { kind = \"sphere\"; centre_mm = [0.0, 0.0, -9.0]; radius_mm = 9.0; "
 	 "};\n"

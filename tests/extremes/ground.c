@@ -128,7 +128,7 @@ struct incise_scene *ground_scene(const struct ground *ground, bool fixed, bool 
 	all_forces(tissue, sizeof(tissue), 2, model ? "reaction" : NULL, more);
 	fputs(tissue, scene.file);
 	fprintf(scene.file,
-		"effects = { average_ticks = 8; guard = true; };\n"
+		"effects = { average_ticks = 8; };\n"
 		"tool = { handle_mm = %.1f; };\n"
 		"device = { damping_N_s_mm = 0.03; delay_ticks = 12; };\n"
 		"limits = { force_N = %.1f; slew_N_s = %.1f; pose_age_ms = 50.0;\n"

@@ -266,7 +266,6 @@ enum met {
 	MET_CLAMPED,
 	MET_SLEWED,
 	MET_STALE,
-	MET_GUARDED,
 	MET_EXTRAPOLATED,
 	MET_STARTING,
 	MET_ON_SURFACE, /* a depth of 0 in contact, to the bit */
@@ -281,9 +280,9 @@ enum met {
 };
 
 static const char *const met_names[METS] = {
-	"contact",	"insertion", "clamped",	   "slewed",	"stale",  "guarded",
-	"extrapolated", "starting",  "on surface", "on proxy",	"at age", "no time",
-	"years",	"handle",    "tube",	   "recovered",
+	"contact",	"insertion", "clamped",	   "slewed",   "stale",
+	"extrapolated", "starting",  "on surface", "on proxy", "at age",
+	"no time",	"years",     "handle",	   "tube",     "recovered",
 };
 
 struct chaos {
@@ -303,7 +302,6 @@ static void count(struct chaos *run, int64_t was_ns)
 		[MET_CLAMPED] = t->flags & INCISE_TICK_CLAMPED,
 		[MET_SLEWED] = t->flags & INCISE_TICK_SLEWED,
 		[MET_STALE] = t->flags & INCISE_TICK_STALE,
-		[MET_GUARDED] = t->flags & INCISE_TICK_GUARDED,
 		[MET_EXTRAPOLATED] = t->flags & INCISE_TICK_EXTRAPOLATED,
 		[MET_STARTING] = t->flags & INCISE_TICK_STARTING,
 		[MET_ON_SURFACE] = contact && run->fed.plan->proxy.touch.depth_mm == 0,
@@ -504,27 +502,19 @@ static void check_free(struct chaos *run)
 
 	extremes_check(run->fed.row,
 		       t->phase == INCISE_PHASE_FREE && v3_length(t->command_N) == 0,
-		       "%s: in free air phase %d, %a N, flags %#x, debt of %a N mm",
-		       run->fed.ground->name, t->phase, v3_length(t->command_N), t->flags,
-		       -run->fed.plan->guard->energy_N_mm);
+		       "%s: in free air phase %d, %a N, flags %#x", run->fed.ground->name,
+		       t->phase, v3_length(t->command_N), t->flags);
 }
 
-/*
- * In free air the guard pays its debt by damping: force against speed, and no other force.
- */
+/* In free air there is no force, however the hand moves. */
 static void wave(struct chaos *run, const double attitude[4])
 {
-	const struct incise_guard *guard = run->fed.plan->guard;
-	double before_N_mm = guard->energy_N_mm, away_mm = run->fed.ground->away_mm;
+	double away_mm = run->fed.ground->away_mm;
 
 	run->fed.waved = true;
 	fed_run_move(&run->fed, away_mm, away_mm - 20, 200, 80, attitude);
 	fed_run_move(&run->fed, away_mm - 20, away_mm, 200, 80, attitude);
 	run->fed.waved = false;
-	extremes_check(run->fed.row,
-		       !(before_N_mm < 0) || guard->energy_N_mm > before_N_mm,
-		       "%s: a debt of %a N mm became one of %a", run->fed.ground->name,
-		       -before_N_mm, -guard->energy_N_mm);
 }
 
 /* Out, and in again: nothing of what was before is left. */

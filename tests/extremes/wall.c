@@ -85,16 +85,16 @@ static void try_wall(struct extremes_row *row, const struct property *property)
 	snprintf(text, sizeof(text),
 		 "rate_hz = %.17e; arithmetic = \"%s\"; tissue = { gain = %.17e; "
 		 "reaction_N_mm = %.17e; plane_N_mm = %.17e; damping_N_s_mm = %.17e; }; "
-		 "effects = { guard = %s; average_ticks = %d; }; "
+		 "effects = { average_ticks = %d; }; "
 		 "device = { mass_kg = %.17e; damping_N_s_mm = %.17e; "
 		 "delay_ticks = %d; }; "
 		 "limits = { force_N = %.17e; slew_N_s = %.17e; start_N = 100.0; "
 		 "ramp_ms = 1.0; };",
 		 decade(0, 4.8), below(2) ? "fixed" : "double", gain,
 		 decade(-3, below(2) ? 9 : 3), below(2) ? 0.0 : decade(-3, 9),
-		 below(2) ? 0.0 : decade(-9, 0), below(2) ? "true" : "false",
-		 1 + (int)below(64), decade(-3, 1), decade(-6, 0),
-		 below(4) ? (int)below(3) : (int)below(70), decade(-2, 2), decade(0, 5));
+		 below(2) ? 0.0 : decade(-9, 0), 1 + (int)below(64), decade(-3, 1),
+		 decade(-6, 0), below(4) ? (int)below(3) : (int)below(70), decade(-2, 2),
+		 decade(0, 5));
 	fputs(text, file.file);
 	memory_file_written(&file);
 	try_scene(row, file.path, text, TICKS);

@@ -2,9 +2,9 @@
 /*
  * incise bench extremes: properties of the library under any input (tests/extremes), and walls of
  * 10 N/m to 1 GN/m: whether a scene with one is accepted, and what a device makes of it all the
- * same, with the guard of passivity off and on, behind the limit of force.
+ * same, behind the limit of force.
  *
- *   pressed by a weight ──▶ ○ device ──▶ │ wall ──▶ [guard] ──▶ limit ──▶ device
+ *   pressed by a weight ──▶ ○ device ──▶ │ wall ──▶ limit ──▶ device
  *
  * A wall is tried in two ways: by a whole plan, fed by a tracker of 120 Hz that is 4.2 ms late;
  * and alone, with the position of the tick, as by an encoder.
@@ -12,7 +12,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <incise/plan.h>
-#include "../../lib/control/guard.h"
 #include "../../lib/control/plant.h"
 #include "../../lib/control/stability.h"
 #include "../../tests/extremes/extremes.h"
@@ -111,13 +110,12 @@ static void report_properties(struct bench_run *run, const struct extremes_row *
 
 /* --- stiff walls --- */
 
-#define WALLS_MAX 100 /* by path, guard and stiffness */
+#define WALLS_MAX 50 /* by path and stiffness */
 
 enum path { PATH_PLAN, PATH_WALL, PATHS };
 
 struct wall {
-	const char *path, *guard; /* "on" or "off" */
-	bool guarded;
+	const char *path;
 	double K_N_mm;
 	double limit_N_mm;	      /* by theory */
 	bool accepted;		      /* as it is; else it was forced */
@@ -210,25 +208,15 @@ static void press_wall(struct wall *wall)
 						    .damping_N_s_mm = DAMPING_N_s_mm,
 						    .period_s = PERIOD_S};
 	struct run run = start_run(wall);
-	struct incise_guard guard;
-	double was = BEGIN_mm;
 
 	wall->limit_N_mm = incise_stability_limit(&device, 0);
 	wall->accepted = wall->K_N_mm <= wall->limit_N_mm;
-	/* As plans do: the credit is what the tissue can have stored. */
-	incise_guard_init(&guard, DEVICE_KG, PERIOD_S,
-			  wall->guarded ? LIMIT_N * LIMIT_N / wall->K_N_mm / 2 : 0);
 	for (; goes_on(&run); run.k++) {
-		double x = run.plant.position_mm, at[3] = {x},
-		       v[3] = {(x - was) / PERIOD_S};
-		double force[3] = {x < 0 ? -wall->K_N_mm * x : 0};
+		double x = run.plant.position_mm;
+		double force_N = x < 0 ? fmin(LIMIT_N, -wall->K_N_mm * x) : 0;
 
-		incise_guard_apply(&guard, at, v, force);
-		force[0] = fmax(-LIMIT_N, fmin(LIMIT_N, force[0]));
-		incise_guard_sent(&guard, force);
-		was = x;
-		note(&run, force[0]);
-		incise_plant_step(&run.plant, force[0] - PRESS_N, PERIOD_S);
+		note(&run, force_N);
+		incise_plant_step(&run.plant, force_N - PRESS_N, PERIOD_S);
 	}
 	judge(&run);
 }
@@ -243,11 +231,10 @@ static struct incise_plan *make_plan(const struct wall *wall, const char *device
 
 	fprintf(file.file,
 		"arithmetic = \"double\";\ntissue = { gain = %.1f; reaction_N_mm = %.17e; "
-		"leave_mm = 0.0; };\neffects = { guard = %s; };\ndevice = { %s };\n"
+		"leave_mm = 0.0; };\ndevice = { %s };\n"
 		"limits = { force_N = %.17e; slew_N_s = %.17e; start_N = 100.0; "
 		"ramp_ms = 1.0; };\n",
-		gain, wall->K_N_mm / gain, wall->guarded ? "true" : "false", device,
-		LIMIT_N, SLEW_N_s);
+		gain, wall->K_N_mm / gain, device, LIMIT_N, SLEW_N_s);
 	memory_file_written(&file);
 	*scene = incise_scene_load(file.path, NULL, err);
 	if (*scene)
@@ -341,28 +328,25 @@ static void press_plan(struct wall *wall)
 	incise_scene_free(scene);
 }
 
-/* From 10 N/m to 1e9, and so in N/mm. @return their number of each path and guard */
+/* From 10 N/m to 1e9, and so in N/mm. @return their number of each path */
 static int press_all(struct wall *walls, bool quick)
 {
 	static const char *const paths[PATHS] = {"plan", "wall"};
 	int n = 0;
 
 	for (int path = 0; path < PATHS; path++)
-		for (int guard = 0; guard < 2; guard++)
-			for (int k = 0; k <= 24 && !cli_stop; k += quick ? 6 : 1) {
-				struct wall *wall = &walls[n++];
+		for (int k = 0; k <= 24 && !cli_stop; k += quick ? 6 : 1) {
+			struct wall *wall = &walls[n++];
 
-				*wall = (struct wall){.path = paths[path],
-						      .guard = guard ? "on" : "off",
-						      .guarded = guard,
-						      .K_N_mm = pow(10, -2 + k / 3.0),
-						      .largest_N = NAN,
-						      .largest_mm = NAN,
-						      .late_mm = NAN};
-				cli_progress("stiff: %g N/m", wall->K_N_mm * 1e3);
-				(path == PATH_PLAN ? press_plan : press_wall)(wall);
-			}
-	return n / PATHS / 2;
+			*wall = (struct wall){.path = paths[path],
+					      .K_N_mm = pow(10, -2 + k / 3.0),
+					      .largest_N = NAN,
+					      .largest_mm = NAN,
+					      .late_mm = NAN};
+			cli_progress("stiff: %g N/m", wall->K_N_mm * 1e3);
+			(path == PATH_PLAN ? press_plan : press_wall)(wall);
+		}
+	return n / PATHS;
 }
 
 static const struct bench_table stiff = {
@@ -374,7 +358,6 @@ static const struct bench_table stiff = {
 			COLUMN(wall, "K_N_m", K_N_mm, .scale = 1e3),
 			COLUMN(wall, "theory_limit_N_m", limit_N_mm, .scale = 1e3),
 			COLUMN(wall, "accepted", accepted),
-			COLUMN(wall, "guard", guard),
 			COLUMN(wall, "largest_N", largest_N),
 			COLUMN(wall, "largest_mm", largest_mm),
 			COLUMN(wall, "late_mm", late_mm),
@@ -383,32 +366,28 @@ static const struct bench_table stiff = {
 			COLUMN(wall, "failed", failed),
 		},
 	.metrics = {METRIC(EXACT, wall, largest_mm, "mm",
-			   "{path}, {K_N_m:%.4g} N/m, guard {guard}, largest",
-			   "largest_mm!=nan")},
+			   "{path}, {K_N_m:%.4g} N/m, largest", "largest_mm!=nan")},
 };
 
 #define PRESSED_TEXT " %-9s %8s %9s %9s"
 
-/* Each stiffness is a line, without and with the guard. */
+/* Each stiffness is a line. */
 static void print_path(const struct bench_run *run, const char *title,
 		       const struct wall *walls, int n)
 {
 	bench_text(run, "%s\n%10s %-9s", title, "K_N_m", "");
-	bench_text(run, PRESSED_TEXT, "guard off", "largest", "largest", "at last");
-	bench_text(run, PRESSED_TEXT, "guard on", "largest", "largest", "at last");
+	bench_text(run, PRESSED_TEXT, "", "largest", "largest", "at last");
 	bench_text(run, "\n%10s %-9s", "", "");
-	bench_text(run, PRESSED_TEXT PRESSED_TEXT, "", "N", "mm", "mm", "", "N", "mm",
-		   "mm");
-	for (int k = 0; k < n; k++) {
-		bench_text(run, "\n%10.4g %-9s", walls[k].K_N_mm * 1e3,
-			   walls[k].accepted ? "accepted" : "refused");
-		for (const struct wall *w = &walls[k]; w < walls + 2 * n; w += n)
-			if (!isnan(w->largest_mm))
-				bench_text(run, " %-9s %8.3g %9.3g %9.2g",
-					   w->bounded ? "bounded" : "GROWS", w->largest_N,
-					   w->largest_mm, w->late_mm);
-			else
-				bench_text(run, PRESSED_TEXT, "not run", "-", "-", "-");
+	bench_text(run, PRESSED_TEXT, "", "N", "mm", "mm");
+	for (const struct wall *w = walls; w < walls + n; w++) {
+		bench_text(run, "\n%10.4g %-9s", w->K_N_mm * 1e3,
+			   w->accepted ? "accepted" : "refused");
+		if (!isnan(w->largest_mm))
+			bench_text(run, " %-9s %8.3g %9.3g %9.2g",
+				   w->bounded ? "bounded" : "GROWS", w->largest_N,
+				   w->largest_mm, w->late_mm);
+		else
+			bench_text(run, PRESSED_TEXT, "not run", "-", "-", "-");
 	}
 	bench_text(run, "\n");
 	for (int k = 0; k < n; k++)
@@ -468,5 +447,5 @@ const struct bench bench_extremes = {
 	.plots = {{.script = text_extremes_gp,
 		   .width = 1100,
 		   .height = 1300,
-		   .data = {&stiff, "path,guard"}}},
+		   .data = {&stiff, "path"}}},
 };

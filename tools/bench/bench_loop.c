@@ -16,7 +16,7 @@
 #include "sheet.h"
 #include "wakeup.h"
 
-/* --- the cost of a tick: scenes with every force, guard and limits, or the user's --- */
+/* --- the cost of a tick: scenes with every force and limits, or the user's --- */
 
 /* Of the stroke's time, which goes by faster. */
 #define MEASURED_S 60
@@ -30,7 +30,7 @@ static const char all_forces[] =
 	"surface = { %s };\n"
 	"tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; damping_N_s_mm = 0.0005;\n"
 	"  insertion_N_mm = 0.28; spread_N_mm = 0.22; };\n"
-	"effects = { average_ticks = 8; guard = true; };\n";
+	"effects = { average_ticks = 8; };\n";
 
 static const struct own {
 	const char *name, *arithmetic, *surface;

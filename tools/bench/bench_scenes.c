@@ -295,8 +295,7 @@ static void add_made(struct scenes *s)
 		fprintf(file[0].file, made[i].text, file[1].path);
 		fputs(tissue, file[0].file);
 		if (made[i].all)
-			fputs("effects = { average_ticks = 8; guard = true; };\n",
-			      file[0].file);
+			fputs("effects = { average_ticks = 8; };\n", file[0].file);
 		memory_file_written(&file[0]);
 		add(s, made[i].name, strlen(made[i].name), file[0].path)->kept =
 			made[i].kept;

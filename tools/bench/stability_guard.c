@@ -580,7 +580,6 @@ static struct setup new_setup(int scene, double tracker_hz, int late, int device
 	s.scene = scene_argument_load(&argument);
 	s.scene->tissue.dissipates &= !strchr(scenes[scene], ' ');
 	s.scene->effects.average_ticks = 1; /* of a plane */
-	s.scene->effects.guard = false;
 	s.scene->device.mass_kg = devices[device].mass_kg;
 	s.scene->device.damping_N_s_mm = devices[device].damping_N_s_mm;
 	s.scene->device.late_ticks = late;

@@ -9,12 +9,12 @@
 
 const char *const loop_flag_names[INCISE_TICK_FLAGS] = {
 	"contact", "extrapolated", "stale",    "clamped",    "fault",	 "slewed",
-	"travel",  "guarded",	   "starting", "not_finite", "unusable",
+	"travel",  NULL,	   "starting", "not_finite", "unusable",
 };
 
 const char *loop_flags_text(unsigned int flags, char *text)
 {
-	static const char letters[] = "cesofvtgrnu";
+	static const char letters[] = "cesofvt-rnu";
 
 	_Static_assert(sizeof(letters) == INCISE_TICK_FLAGS + 1, "a letter for each");
 	for (int i = 0; letters[i]; i++)
@@ -28,8 +28,9 @@ json_t *loop_flags_json(const uint64_t counts[INCISE_TICK_FLAGS])
 	json_t *flags = json_object();
 
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
-		json_object_set_new(flags, loop_flag_names[i],
-				    json_integer((json_int_t)counts[i]));
+		if (loop_flag_names[i])
+			json_object_set_new(flags, loop_flag_names[i],
+					    json_integer((json_int_t)counts[i]));
 	return flags;
 }
 

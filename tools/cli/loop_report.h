@@ -9,7 +9,7 @@
 #include "json.h"
 
 /* As JSON names them, from the lowest bit on. */
-extern const char *const loop_flag_names[INCISE_TICK_FLAGS];
+extern const char *const loop_flag_names[INCISE_TICK_FLAGS]; /* NULL: never set */
 
 /*
  * A letter for each flag, from the lowest bit on, or '-'; incise-haptic(1) explains them.

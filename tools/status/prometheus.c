@@ -100,7 +100,9 @@ static void put_start(FILE *out, loop *l, const char *metric)
 static void put_flagged(FILE *out, loop *l, const char *metric)
 {
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
-		put_count(out, l, metric, "flag", loop_flag_names[i], l->now->flagged[i]);
+		if (loop_flag_names[i])
+			put_count(out, l, metric, "flag", loop_flag_names[i],
+				  l->now->flagged[i]);
 }
 
 static void put_faults(FILE *out, loop *l, const char *metric)

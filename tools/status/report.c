@@ -181,7 +181,7 @@ static void flags(FILE *out, const struct incise_state_now *now)
 
 	fputs("flags     ", out);
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
-		if (now->flagged[i])
+		if (now->flagged[i] && loop_flag_names[i])
 			fprintf(out, "%s %s %" PRIu64, shown++ ? "," : "",
 				loop_flag_names[i], now->flagged[i]);
 	fputs(shown ? "\n" : " none\n", out);

@@ -4,7 +4,7 @@
  * runs at each tick.
  *
  *     pose ─▶ predict ─▶ [tool] ─▶ contact ─▶ [normal] ─▶ [reaction] ─▶ [plane] ─▶
- *     [damping] ─▶ [insertion] ─▶ [spread] ─▶ [guard] ─▶ start ─▶ limit ─▶ [actuate]
+ *     [damping] ─▶ [insertion] ─▶ [spread] ─▶ start ─▶ limit ─▶ [actuate]
  *
  * Those in brackets are there when the scene or the rig asks for them. A plan belongs to
  * one thread at a time.
@@ -127,8 +127,6 @@ struct incise_plan_stability {
 	 * of the scene's limit. */
 	double noise_mm, noise_N;
 	bool certified; /**< the model's slopes are bounds, not estimates */
-	/** Most damping that the guard may add: what the loop can spare; 0 without one. */
-	double guard_N_s_mm;
 };
 
 /** Stiffness and damping of the plan, and what its device holds. */
@@ -201,7 +199,7 @@ enum incise_tick_flag {
 	INCISE_TICK_FAULT = 16,	 /**< a device failed: no force from here on */
 	INCISE_TICK_SLEWED = 32, /**< the change of force was held at slew_N_s */
 	INCISE_TICK_TRAVEL = 64, /**< the actuator's target was held within its travel */
-	INCISE_TICK_GUARDED = 128,    /**< the passivity guard added damping */
+	/* 128 was a guard's, and is never set: pages and logs keep their bits */
 	INCISE_TICK_STARTING = 256,   /**< waiting for a small force, ramping or fading */
 	INCISE_TICK_NOT_FINITE = 512, /**< the force was no number: none was asked for */
 	/** the tracker flags the newest pose: not used, by incise_pose_usable() */

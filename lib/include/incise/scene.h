@@ -11,7 +11,7 @@
  *     surface = { kind = "capsule"; from_mm = [0.0, 0.0, -55.0];
  *                 to_mm = [120.0, 0.0, -55.0]; radius_mm = 55.0; };   # or the rig's plane
  *     tissue  = { plane_N_mm = 0.1; damping_N_s_mm = 0.0005; };       # paper 2's constants
- *     effects = { average_ticks = 8; guard = true; };
+ *     effects = { average_ticks = 8; };
  *     device  = { mass_kg = 0.05; damping_N_s_mm = 0.01; };
  *     limits  = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };
  */

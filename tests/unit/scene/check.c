@@ -44,7 +44,6 @@ static int tear_down(void **state)
 struct wall {
 	double K, B, gain, mass_kg, b;
 	int delay_ticks; /* or -1: the tracker's */
-	bool guard;
 };
 
 static struct incise_scene *scene_of(const struct wall *wall)
@@ -56,10 +55,9 @@ static struct incise_scene *scene_of(const struct wall *wall)
 	fprintf(out,
 		"surface = { kind = \"plane\"; point_mm = [0.0, 0.0, 0.0]; };\n"
 		"tissue = { reaction_N_mm = %.9f; damping_N_s_mm = %.9f; gain = %.9f; };\n"
-		"effects = { guard = %s; };\n"
 		"device = { mass_kg = %.9f; damping_N_s_mm = %.9f;",
-		wall->K, wall->B, wall->gain > 0 ? wall->gain : 1,
-		wall->guard ? "true" : "false", wall->mass_kg, wall->b);
+		wall->K, wall->B, wall->gain > 0 ? wall->gain : 1, wall->mass_kg,
+		wall->b);
 	if (wall->delay_ticks >= 0)
 		fprintf(out, " delay_ticks = %d;", wall->delay_ticks);
 	fprintf(out, " };\nlimits = { force_N = 100.0; slew_N_s = 100000.0; "
@@ -135,7 +133,7 @@ static struct swing press(const struct wall *wall, double seconds)
 		most = &most_mm[3 * (k - rest - 1) / ticks];
 		*most = fmax(*most, fabs(plant.position_mm + HAND_N / wall->K));
 		/* It left the wall by as much as it was pressed in, and comes back: enough. */
-		if (!wall->guard && !(plant.position_mm < HAND_N / wall->K)) {
+		if (!(plant.position_mm < HAND_N / wall->K)) {
 			most_mm[2] = INFINITY;
 			break;
 		}
@@ -237,11 +235,8 @@ static void test_own_delay(void **state)
 	assert_true(limit_of(&wall) == incise_stability_limit(&device, 0));
 }
 
-/*
- * The guard's damping comes as late as all else. It must leave at rest what was at rest:
- * with a cap for the delay alone, 0.0029 N s/mm, the first wall swings by 1.4 mm for ever.
- */
-static void test_guard_lets_rest(void **state)
+/* A kick dies out at nine tenths of the limit. */
+static void test_rests_below_the_limit(void **state)
 {
 	static const struct wall walls[] = {
 		{.mass_kg = 0.05, .b = 0.01},
@@ -254,29 +249,9 @@ static void test_guard_lets_rest(void **state)
 
 		wall.delay_ticks = -1;
 		wall.K = 0.9 * limit_of(&wall);
-		wall.guard = true;
 		/* The kick is 0.03 mm or more; what stays is the fixed point's step, 15 µN. */
 		assert_true(press(&wall, 6).last_mm < 1e-3);
 	}
-}
-
-/*
- * It does not hold a wall that hums: without and with it the hum grows
- * until the device leaves the wall at each swing, and stays so. 1.90 and 1.93 mm here.
- */
-static void test_guard_beyond_the_limit(void **state)
-{
-	struct wall wall = {.mass_kg = 0.05, .b = 0.01, .delay_ticks = -1};
-	struct swing without, with;
-
-	wall.K = 1.5 * limit_of(&wall);
-	wall.delay_ticks = 13;
-	without = press(&wall, 6);
-	assert_true(without.last_mm > 1);
-	wall.guard = true;
-	with = press(&wall, 6);
-	assert_true(with.last_mm < 1.1 * without.last_mm);
-	assert_true(with.last_mm < 1.01 * with.middle_mm);
 }
 
 static void test_shipped_scenes(void **state)
@@ -307,8 +282,7 @@ int main(void)
 		cmocka_unit_test(test_limit_is_that_of_the_loop),
 		cmocka_unit_test(test_refusal_names_a_gain),
 		cmocka_unit_test(test_own_delay),
-		cmocka_unit_test(test_guard_lets_rest),
-		cmocka_unit_test(test_guard_beyond_the_limit),
+		cmocka_unit_test(test_rests_below_the_limit),
 		cmocka_unit_test(test_shipped_scenes),
 	};
 

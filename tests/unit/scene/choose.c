@@ -32,7 +32,7 @@ static const struct surface {
 #define PLANE (&surfaces[0])
 #define CAPSULE (&surfaces[1])
 
-/* All stages that there are, in order; the forces come before the guard. */
+/* All stages that there are, in order; the forces come before the start. */
 static const char *all[INCISE_PLAN_STAGES_MAX + 2];
 static size_t n_all;
 
@@ -40,8 +40,8 @@ static void list_stages(void)
 {
 	static const char *const before[] = {"pose", "predict", "tool", "contact",
 					     "normal"};
-	static const char *const after[] = {"guard",   "start", "limit",
-					    "actuate", "wound", "bleeding"};
+	static const char *const after[] = {"start", "limit", "actuate", "wound",
+					    "bleeding"};
 
 	for (size_t i = 0; i < sizeof(before) / sizeof(*before); i++)
 		all[n_all++] = before[i];
@@ -55,7 +55,7 @@ static void list_stages(void)
 struct lacking {
 	const char *force; /* the name of one, or "insertion forces", or "all forces" */
 	bool model;	   /* in the place of the reaction */
-	bool no_gain, no_average, no_guard;
+	bool no_gain, no_average;
 };
 
 static bool has(const struct lacking *w, const struct incise_tissue_force *force)
@@ -89,12 +89,11 @@ static struct incise_scene *scene_of(const struct lacking *w,
 	snprintf(text, sizeof(text),
 		 "%s arithmetic = \"%s\"; surface = %s;\n"
 		 "tissue = { gain = %.1f;\n%s };\n"
-		 "effects = { average_ticks = %d; guard = %s; };\n"
+		 "effects = { average_ticks = %d; };\n"
 		 "device = { delay_ticks = 0; };\n"
 		 "limits = { force_N = 1.2; slew_N_s = 200.0; ramp_ms = 50.0; };\n",
 		 w->model ? "model = \"m.fis\";" : "", arithmetic, surface->text,
-		 w->no_gain ? 0.0 : 1.0, tissue, w->no_average ? 1 : 8,
-		 w->no_guard ? "false" : "true");
+		 w->no_gain ? 0.0 : 1.0, tissue, w->no_average ? 1 : 8);
 	scene = fed_scene(&folder, text, &err);
 	if (!scene)
 		fail_msg("%s", err.text);
@@ -245,11 +244,10 @@ static const struct lack lacks[] = {
 	{"tool", "nothing is inserted", {.force = "insertion forces"}, NULL},
 	{"normal", "average_ticks is 1", {.no_average = true}, NULL},
 	{"plane", "plane_N_mm is 0", {.force = "plane", .model = true}, NULL},
-	{"guard", "guard is false", {.no_guard = true}, NULL},
 	/* One that lacks nearly all: paper 1's. */
-	{"guard",
-	 "guard is false",
-	 {.force = "all forces", .model = true, .no_average = true, .no_guard = true},
+	{"normal",
+	 "average_ticks is 1",
+	 {.force = "all forces", .model = true, .no_average = true},
 	 NULL},
 	/* Nothing is felt, whatever the constants are. */
 	{"reaction", "gain is 0", {.model = true, .no_gain = true}, "plane"},
@@ -280,8 +278,7 @@ static void test_lean_is_full_to_the_bit(const struct surface *surface,
 	struct seen seen = {0};
 	const unsigned int met = INCISE_TICK_CONTACT | INCISE_TICK_STALE |
 				 INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED |
-				 INCISE_TICK_STARTING | INCISE_TICK_GUARDED |
-				 INCISE_TICK_EXTRAPOLATED;
+				 INCISE_TICK_STARTING | INCISE_TICK_EXTRAPOLATED;
 
 	for (int i = 0; i < LACKS; i++) {
 		const struct lack one = lack_of(i), *lack = &one;
@@ -298,8 +295,7 @@ static void test_lean_is_full_to_the_bit(const struct surface *surface,
 		assert_true(stages(lean) < stages(full));
 		/* What only a stage that is left out needs is not there. */
 		assert_true(incise_plan_memory(lean) <= incise_plan_memory(full));
-		if (!strcmp(lack->stage, "tool") || !strcmp(lack->stage, "normal") ||
-		    !strcmp(lack->stage, "guard"))
+		if (!strcmp(lack->stage, "tool") || !strcmp(lack->stage, "normal"))
 			assert_true(incise_plan_memory(lean) < incise_plan_memory(full));
 		assert_false(keeps(lean, lack->stage));
 		if (!why_not(lean, lack->stage) ||
@@ -435,15 +431,9 @@ static void test_one_effect(void **state)
 		"tissue = { reaction_N_mm = 0.3; }; effects = { average_ticks = 16; };",
 		"tissue = { reaction_N_mm = 0.3; }; effects = { average_ticks = 1; };",
 		tissue};
-	static const char *const guard[] = {
-		"tissue = { reaction_N_mm = 0.3; }; effects = { guard = true; };",
-		"tissue = { reaction_N_mm = 0.3; }; effects = { guard = false; };",
-		tissue};
 
-	for (int way = 0; way < 4; way++) {
+	for (int way = 0; way < 4; way++)
 		one_effect("normal", average, way);
-		one_effect("guard", guard, way);
-	}
 }
 
 static int set_up(void **state)

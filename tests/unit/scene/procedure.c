@@ -32,7 +32,7 @@
 /*
  * Of a hand that has rested for 0.7 s. The filter's memory of the way there is some
  * 10 poses, 0.08 s: e^-8 of 10 mm at the most, 3e-3 mm, times 1.5 N/mm at the most of all
- * springs together, comes to 5 mN; what damping and guard make of its speed is less. The
+ * springs together, comes to 5 mN; what damping makes of its speed is less. The
  * fixed-point bound, below 1 mN, is added where it is used.
  */
 #define AT_REST_N 5e-3
@@ -344,7 +344,7 @@ static void test_no_change_in_the_tissue(void **state)
 /*
  * A word in the tissue counts once it is out, one tick after a force of the tissue that is
  * still on its way down. The way from one end of the scalpel to the other, 120 mm, is no
- * work of that force, and no debt for the guard to damp.
+ * work of that force.
  */
 static void test_change_is_no_work(void **state)
 {

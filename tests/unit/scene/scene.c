@@ -75,7 +75,7 @@ static void test_defaults(void **state)
 	assert_true(number(scene, "insertion_N_mm") == 0 &&
 		    number(scene, "spread_N_mm") == 0);
 	assert_true(scene->tissue.leave_mm == 0.2);
-	assert_true(scene->effects.average_ticks == 1 && !scene->effects.guard);
+	assert_true(scene->effects.average_ticks == 1);
 	assert_true(scene->tool.side[1] == 1 && scene->tool.axis[2] == 1);
 	assert_true(scene->tool.handle_mm == 120);
 	assert_true(scene->device.mass_kg == 0.05 &&
@@ -115,7 +115,7 @@ static void test_every_new_key(void **state)
 		"tissue = { gain = 0.5; reaction_N_mm = 0.11; plane_N_mm = 0.12;\n"
 		"  damping_N_s_mm = 0.013; insertion_N_mm = 0.14; aligned = 0.15;\n"
 		"  spread_N_mm = 0.16; leave_mm = 0.17; };\n"
-		"effects = { average_ticks = 9; guard = true; };\n"
+		"effects = { average_ticks = 9; };\n"
 		"tool = { side = [2, 0, 0]; axis = [0.0, 0.0, -3.0]; handle_mm = 90; };\n"
 		"device = { mass_kg = 0.2; damping_N_s_mm = 0.021; coulomb_N = 0.22;\n"
 		"  encoder_mm = 0.023; delay_ticks = 3; };\n"
@@ -132,7 +132,7 @@ static void test_every_new_key(void **state)
 	assert_true(number(scene, "aligned") == 0.15 &&
 		    number(scene, "spread_N_mm") == 0.16);
 	assert_true(scene->tissue.leave_mm == 0.17);
-	assert_true(scene->effects.average_ticks == 9 && scene->effects.guard);
+	assert_true(scene->effects.average_ticks == 9);
 	assert_true(scene->tool.side[0] == 1 && scene->tool.side[1] == 0);
 	assert_true(scene->tool.axis[2] == -1 && scene->tool.handle_mm == 90);
 	assert_true(scene->device.mass_kg == 0.2);
@@ -238,10 +238,6 @@ static void test_other_types(void **state)
 		 "delay_ticks",
 		 {"2", "3.0"},
 		 {"2.5", "64.5", "[2]", "false", "\"2\""}},
-		{"effects",
-		 "guard",
-		 {"true", "false"},
-		 {"1", "0", "\"true\"", "1.0", "[true]"}},
 		{"picture",
 		 "wound",
 		 {"true", "false"},
@@ -298,7 +294,8 @@ static void test_unknown_keys(void **state)
 		{"tissue", "stiffness", "expected one of gain, reaction_N_mm"},
 		{"tissue", "Kn", "expected one of gain"},
 		{"effects", "average_ms", "expected average_ticks, in that unit"},
-		{"effects", "guarded", "expected one of average_ticks, guard"},
+		{"effects", "guarded", "expected one of average_ticks"},
+		{"effects", "guard", "is gone: the same scenes come to rest without it"},
 		{"tool", "handle_cm", "expected handle_mm, in that unit"},
 		{"tool", "blade", "expected one of handle_mm, side, axis"},
 		{"device", "mass_g", "expected mass_kg, in that unit"},
@@ -364,7 +361,7 @@ static void test_forces(void **state)
 		{"tissue = { gain = 1.0; reaction_N_mm = 0.0; };", false,
 		 "no other force"},
 		{"tissue = { aligned = 0.5; leave_mm = 0.3; };", false, "no other force"},
-		{"effects = { guard = true; };", false, "no other force"},
+		{"effects = { average_ticks = 2; };", false, "no other force"},
 		{"# nothing\n", true, NULL},
 		{"tissue = { reaction_N_mm = 0.1; };", false, NULL},
 		{"tissue = { plane_N_mm = 0.1; };", false, NULL},

@@ -395,17 +395,12 @@ static void test_each_limit_is_an_event_of_its_own(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_guard guard = {0};
-		struct incise_plan plan = {.guard = &guard,
-					   .limit = {.force_N = 3, .slew_N = 1}};
+		struct incise_plan plan = {.limit = {.force_N = 3, .slew_N = 1}};
 		struct incise_tick tick = {0};
 
 		memcpy(tick.command_N, cases[i].asked_N, sizeof(tick.command_N));
 		assert_int_equal(incise_stage_limit(&plan, &tick), 0);
 		assert_int_equal(tick.flags, cases[i].flags);
-		/* The guard counts what is sent, not what was asked for. */
-		assert_true(guard.watching);
-		assert_memory_equal(guard.force_N, tick.command_N, sizeof(guard.force_N));
 	}
 }
 
@@ -437,30 +432,6 @@ static void test_without_poses_the_last_force_fades(void **state)
 	assert_true(last == 0);
 }
 
-static void test_a_discontinuity_is_no_work(void **state)
-{
-	for (int discontinuities = 0; discontinuities < 2; discontinuities++) {
-		struct incise_guard guard;
-		struct incise_plan plan = {
-			.guard = &guard,
-			.instrument = {.held = INCISE_TOOL_BLADE},
-			.predict = {.discontinuities = discontinuities},
-		};
-		const double force_N[3] = {0, 0, 1};
-		struct incise_tick tick = {0};
-
-		incise_guard_init(&guard, 0.05, 0.001, 10);
-		/* The first place, at 0, and a force held from there on. */
-		incise_guard_apply(&guard, tick.tool_mm, plan.velocity_mm_s,
-				   plan.force_N);
-		incise_guard_sent(&guard, force_N);
-		tick.tool_mm[2] = 5;
-		assert_int_equal(incise_stage_guard(&plan, &tick), 0);
-		/* 1 N along 5 mm came out, unless nobody went that way. */
-		assert_true(guard.energy_N_mm == (discontinuities ? 0 : -5));
-	}
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -475,7 +446,6 @@ int main(void)
 		cmocka_unit_test(test_an_actuator_that_lies_or_fails),
 		cmocka_unit_test(test_each_limit_is_an_event_of_its_own),
 		cmocka_unit_test(test_without_poses_the_last_force_fades),
-		cmocka_unit_test(test_a_discontinuity_is_no_work),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

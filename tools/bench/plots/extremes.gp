@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# Stiff walls: displacement, motion at the end and force over the stiffness, by path and guard.
+# Stiff walls: displacement, motion at the end and force over the stiffness, by path.
 do for [path in data_path] {
-	stats data index sprintf("%s off", path) using "theory_limit_N_m" nooutput
+	stats data index path using "theory_limit_N_m" nooutput
 	n = path eq "plan" ? 1 : 2
 	set arrow n from STATS_max, graph 0 to STATS_max, graph 1 nohead dt 2 lc 2 * n
 	set label n sprintf("limit of the %s", path) at STATS_max, graph 0.06 left \
@@ -25,9 +25,8 @@ do for [k=1:3] {
 	set yrange [low[k]:high[k]]
 	set format y k == 2 ? '%.0e' : '%g'
 	if (k > 1) { set key off }
-	plot for [i=1:4] data index word(data_blocks, i) \
+	plot for [i=1:2] data index word(data_blocks, i) \
 		using "K_N_m":(least(column(word(columns, k)))) with linespoints \
-		lc (i < 3 ? 2 : 4) dt int(word("3 1", 2 - i % 2)) pt 7 - i % 2 ps 0.8 \
-		title sprintf("%s, guard %s", word(word(data_blocks, i), 1), word(word(data_blocks, i), 2))
+		lc 2 * i pt 7 ps 0.8 title word(data_blocks, i)
 }
 unset multiplot
