@@ -3,10 +3,13 @@
 # process. Call pull_away in teardown.
 # shellcheck shell=bash
 
-# A FASTRAK at $PWD/tracker that takes commands on 9; with options of its own.
+# A FASTRAK at $PWD/tracker that takes commands on 9; with options of its own. It plays a device,
+# which sends in time however busy this machine is: ahead of other programs where that is permitted.
 plug_in() {
+	local ahead=(chrt --fifo 1)
+	"${ahead[@]}" true 2>/dev/null || ahead=()
 	mkfifo to
-	"$INCISE_BUILD/tests/polhemus/fastrak" --link "$PWD/tracker" "$@" <to >from 2>&1 3>&- &
+	"${ahead[@]}" "$INCISE_BUILD/tests/polhemus/fastrak" --link "$PWD/tracker" "$@" <to >from 2>&1 3>&- &
 	fastrak=$!
 	exec 9>to
 	for _ in $(seq 100); do
