@@ -3,12 +3,16 @@
 # form, and can be read. Times are not judged here: the machine is shared.
 
 load cli
+load report
 
-# One report for all that only look at it. What fails here is in it, with the reason.
+# One report for all that only look at it. What fails here is in it, with the reason. What each
+# word says of itself is looked at in tests of their own.
 setup_file() {
 	cd "$BATS_FILE_TMPDIR"
 	PATH=$INCISE_BUILD/bin:$PATH
-	incise bench all --quick --report r >out 2>err && echo 0 >status || echo $? >status
+	mkdir -p t "$shared_reports"
+	TMPDIR=$PWD/t incise bench all --quick --report r >out 2>err && echo 0 >status || echo $? >status
+	cp r/data/*.json "$shared_reports"
 }
 
 setup() {
@@ -29,6 +33,7 @@ report_of() {
 		[ -s "$r/$file" ]
 	done
 	[ ! -e "$r/.unfinished" ]
+	[ -z "$(ls -A "$BATS_FILE_TMPDIR/t")" ]
 	[ -n "$(key "$r/report.json" machine.cpu)" ]
 	[ -n "$(key "$r/report.json" date)" ]
 	[ "$(key "$r/report.json" quick)" = 1 ]

@@ -23,10 +23,15 @@ of() {
 		FROM json_each(readfile('r.json'), '\$.$1') e) WHERE ${3:-1}"
 }
 
-# The report of a bench as r.json: one that the tests of a file share.
-quick_report() {
-	local report=$BATS_FILE_TMPDIR/$1.json
+# Of each bench one quick report is made in a run of bats, which the tests of all files share:
+# measured once, or by incise bench all, whose tests put its reports here.
+shared_reports=$BATS_RUN_TMPDIR/reports
 
+# The report of a bench as r.json.
+quick_report() {
+	local report=$shared_reports/$1.json
+
+	mkdir -p "$shared_reports"
 	if [ ! -e "$report" ]; then
 		incise bench "$1" --quick --json >"$report.part" || return
 		mv "$report.part" "$report"
