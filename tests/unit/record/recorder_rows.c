@@ -238,7 +238,7 @@ static int why(struct incise_camera *camera, char *text, size_t size)
 	return snprintf(text, size, "the camera was pulled out; plug it in");
 }
 
-static struct incise_rig *open_camera(void)
+static struct incise_rig *open_camera(const char *spec)
 {
 	struct incise_error err = {0};
 	struct incise_rig *rig;
@@ -249,7 +249,7 @@ static struct incise_rig *open_camera(void)
 			"frames_mkv.so was not built: libavformat-dev is missing\n");
 		skip();
 	}
-	rig = incise_rig_open("sim:clock=simulated", BOTH | INCISE_RIG_CAMERA, &err);
+	rig = incise_rig_open(spec, BOTH | INCISE_RIG_CAMERA, &err);
 
 	if (!rig)
 		fail_msg("%s", err.text);
@@ -311,7 +311,7 @@ static void verified(bool complete)
 
 static void frames_are_rows(void **state)
 {
-	struct incise_rig *rig = open_camera();
+	struct incise_rig *rig = open_camera(SIM);
 	struct incise_recorder *recorder = start(rig, false);
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 
@@ -331,7 +331,7 @@ static void frames_are_rows(void **state)
 /* The other streams continue; all earlier frames are there. */
 static void camera_that_dies(void **state)
 {
-	struct incise_rig *rig = open_camera();
+	struct incise_rig *rig = open_camera(SIM);
 	struct incise_recorder *recorder = start(rig, false);
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 
@@ -350,7 +350,7 @@ static void camera_that_dies(void **state)
 	verified(false);
 }
 
-/* A silent camera shoots nothing, so its numbers have no gap. 50 Hz; silence is 2 s. */
+/* A silent camera shoots nothing, so its numbers have no gap. 10 Hz; silence is 2 s. */
 static void silent_camera(void **state)
 {
 	static const struct {
@@ -358,13 +358,13 @@ static void silent_camera(void **state)
 		int events;
 		bool ended;
 	} cases[] = {
-		{50, 140, 0, false},	     {50, 160, 2, false},
-		{50, UINT64_MAX, 1, true},   {0, UINT64_MAX, 1, true},
-		{200, UINT64_MAX, 0, false}, /* 1 s before the end */
+		{10, 28, 0, false},	    {10, 32, 2, false},
+		{10, UINT64_MAX, 1, true},  {0, UINT64_MAX, 1, true},
+		{40, UINT64_MAX, 0, false}, /* 1 s before the end */
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_rig *rig = open_camera();
+		struct incise_rig *rig = open_camera(SIM ",camera_hz=10");
 		struct incise_recorder *recorder = start(rig, false);
 		struct incise_stream streams[INCISE_STREAMS_MAX];
 
@@ -383,7 +383,7 @@ static void silent_camera(void **state)
 
 static void lost_frame_is_counted(void **state)
 {
-	struct incise_rig *rig = open_camera();
+	struct incise_rig *rig = open_camera(SIM);
 	struct incise_recorder *recorder = start(rig, false);
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 
@@ -397,7 +397,7 @@ static void lost_frame_is_counted(void **state)
 
 static void armed_camera_begins_with_the_trigger(void **state)
 {
-	struct incise_rig *rig = open_camera();
+	struct incise_rig *rig = open_camera(SIM);
 	struct incise_recorder *recorder = start(rig, true);
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 
@@ -412,7 +412,7 @@ static void armed_camera_begins_with_the_trigger(void **state)
 
 static void never_triggered_is_empty_and_whole(void **state)
 {
-	struct incise_rig *rig = open_camera();
+	struct incise_rig *rig = open_camera(SIM);
 	struct incise_recorder *recorder = start(rig, true);
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 
