@@ -77,9 +77,10 @@ in_parts = +@set -e; $(check_deps); mkdir -p $(O); rm -rf $(times) $(times).logs
 check: ## install what is missing, build, and test
 	@echo "left out, and run by make check-all: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests" \
 		"of benches, most unit tests again without sanitizers, most cases of the slowest properties," \
-		"ThreadSanitizer, full attacks on recordings, the boots of the second kernel and of two processors"
+		"ThreadSanitizer, three of four fuzz runs, full attacks on recordings, the test bed's own tests," \
+		"the boots of the second kernel and of two processors"
 	$(call in_parts,parts=check-unit-once cli_filter="--filter-tags '!slow'" \
-		vm_boots="main:deterministic main:service")
+		FUZZ_RUNS=10000 vm_boots="main:deterministic main:service" vm_bed=)
 
 check-all: ## the same with all tests in all builds, on all kernels: an hour
 	$(call in_parts,parts="check-sanitize check-unit check-tsan" ATTACK=full)
