@@ -230,11 +230,14 @@ int incise_recorder_check_files(const struct incise_recorder *rec,
 
 	/* A folder that is removed has no links, one that is moved still has. */
 	if (fstatat(rec->parent, part, &st, AT_SYMLINK_NOFOLLOW) && errno == ENOENT &&
-	    !fstat(rec->folder, &st) && st.st_nlink)
-		return incise_error_set(err, EIO,
-					"%s: was moved by another program while it was "
-					"written: what was committed is where it is now",
-					rec->part);
+	    !fstat(rec->folder, &st))
+		return incise_error_set(
+			err, EIO,
+			st.st_nlink ? "%s: was moved by another program while it was "
+				      "written: what was committed is where it is now"
+				    : "%s: was removed by another program while it was "
+				      "written: nothing is left of the recording",
+			rec->part);
 	for (int i = 0; i < INCISE_RECORDER_GROWING; i++) {
 		const char *what = NULL;
 
@@ -249,12 +252,6 @@ int incise_recorder_check_files(const struct incise_recorder *rec,
 			what = "cut off";
 		if (!what)
 			continue;
-		if (fstatat(rec->parent, part, &st, AT_SYMLINK_NOFOLLOW))
-			return incise_error_set(err, EIO,
-						"%s: was removed by another program "
-						"while it was written: nothing is left "
-						"of the recording",
-						rec->part);
 		return incise_error_set(
 			err, EIO,
 			"%s/%s: was %s by another program while it was written: rows "
