@@ -373,14 +373,12 @@ small_disk() {
 }
 
 @test "capture whose folder is removed or moved says what is left of it" {
-	local pid i how
+	local pid how
 	for how in rm mv; do
 		incise capture -o $how.rec --rig sim: --duration 60s </dev/null 2>err 3>&- &
 		pid=$!
-		for ((i = 0; i < 3000; i++)); do
-			[ ! -s $how.rec.part/recording.db-wal ] || break
-			sleep 0.02
-		done
+		# before rows are committed nothing is kept
+		until_it_runs $how.rec.part
 		# in one step for the program
 		kill -STOP $pid
 		mv $how.rec.part $how-away

@@ -233,11 +233,11 @@ int incise_recorder_check_files(const struct incise_recorder *rec,
 	    !fstat(rec->folder, &st))
 		return incise_error_set(
 			err, EIO,
-			st.st_nlink ? "%s: was moved by another program while it was "
-				      "written: what was committed is where it is now"
-				    : "%s: was removed by another program while it was "
-				      "written: nothing is left of the recording",
-			rec->part);
+			"%s: was %s by another program while it was written: %s",
+			rec->part, st.st_nlink ? "moved" : "removed",
+			!st.st_nlink	 ? "nothing is left of the recording"
+			: rec->worthless ? "nothing was kept"
+					 : "what was committed is where it is now");
 	for (int i = 0; i < INCISE_RECORDER_GROWING; i++) {
 		const char *what = NULL;
 
