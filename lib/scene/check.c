@@ -45,7 +45,9 @@ static void set_tissue(struct incise_plan *plan, double steepest_N_mm)
 	plan->support_mm = support_mm;
 	plan->beyond_N_mm = fmin(fmax(plan->gain * slope, 0), steepest_N_mm);
 	plan->dissipates = plan->scene->tissue.dissipates;
-	plan->unloading_N_mm = fmax(own > 0 ? own : STEEPER * steepest_N_mm, LEAST_N_mm);
+	/* Softer than the model, it could not follow it. */
+	plan->unloading_N_mm = fmax(
+		own > 0 ? fmax(own, steepest_N_mm) : STEEPER * steepest_N_mm, LEAST_N_mm);
 }
 
 /* The largest slopes of the model, by depth and by speed. */
@@ -109,6 +111,12 @@ static double limit_N_mm(const struct incise_plan *plan, double damping_N_s_mm)
 	return incise_pose_loop_limit(&loop);
 }
 
+/*
+ * At the limit itself a wall swings for ever; so much below it a swing of a bare device fades to a
+ * hundredth within some seconds.
+ */
+#define RESERVE 0.05
+
 static bool holds(const struct incise_plan *plan, double stiffness_N_mm,
 		  double damping_N_s_mm)
 {
@@ -117,7 +125,7 @@ static bool holds(const struct incise_plan *plan, double stiffness_N_mm,
 	/* A limit of 0 is that of a loop which its damper alone makes unstable. */
 	if (!(most > 0) && damping_N_s_mm > 0)
 		return false;
-	return stiffness_N_mm <= most;
+	return (1 + RESERVE) * stiffness_N_mm <= most;
 }
 
 /* In each hand that may hold the device, which is no part of a delay that the scene gives. */
@@ -129,7 +137,8 @@ static bool hands_hold(const struct incise_plan *plan, double share)
 		const struct incise_pose_loop loop =
 			pose_loop(plan, share * s->damping_N_s_mm, &incise_hands[i]);
 
-		if (!incise_pose_loop_holds(&loop, share * s->stiffness_N_mm))
+		if (!incise_pose_loop_holds(&loop,
+					    share * (1 + RESERVE) * s->stiffness_N_mm))
 			return false;
 	}
 	return true;
@@ -149,7 +158,7 @@ static double largest_gain(const struct incise_plan *plan)
 	double low = 0, high = 1;
 
 	if (!(plan->stability.damping_N_s_mm > 0) && hands_hold(plan, 1))
-		return plan->gain * plan->stability.limit_N_mm /
+		return plan->gain * plan->stability.limit_N_mm / (1 + RESERVE) /
 		       plan->stability.stiffness_N_mm;
 	while (high - low > 1e-4) {
 		double middle = (low + high) / 2;
@@ -242,7 +251,8 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	return incise_error_set(
 		err, EDOM,
 		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm, a device of "
-		"%g kg and %g N s/mm %s holds %.4g N/mm; %s, or describe the device",
+		"%g kg and %g N s/mm %s holds %.4g N/mm, of which 5 %% are kept in reserve; %s, or describe the "
+		"device",
 		scene->path, s->stiffness_N_mm, s->damping_N_s_mm, s->device.mass_kg,
 		s->device.damping_N_s_mm, delay, s->limit_N_mm, advice);
 }

@@ -42,7 +42,7 @@ setup() {
 
 @test "bench extremes: stiff walls are accepted up to the limit of theory, and bounded beyond" {
 	quick_report extremes
-	[ "$(of stiff 'count(*)')" = 20 ]
+	[ "$(of stiff 'count(*)')" = 10 ]
 	[ "$(of stiff 'count(*)' 'accepted != (K_N_m <= theory_limit_N_m)')" = 0 ]
 	[ "$(of stiff 'min(bounded)')" = 1 ]
 	[ "$(of stiff 'sum(not_finite)')" = 0 ]

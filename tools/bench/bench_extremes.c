@@ -403,18 +403,18 @@ static void report_walls(struct bench_run *run, struct wall *walls, int each)
 		"the wall alone, its position that of the tick"};
 	int missed = 0;
 
-	for (int i = 0; i < 4 * each; i++) {
+	for (int i = 0; i < PATHS * each; i++) {
 		missed += walls[i].missed;
 		if (!isnan(walls[i].largest_mm))
 			walls[i].bounded_json = json_boolean(walls[i].bounded);
 	}
-	bench_rows(run, &stiff, walls, 4 * each);
+	bench_rows(run, &stiff, walls, PATHS * each);
 	bench_text(run,
 		   "stiff walls: 50 g and 0.01 N s/mm, pressed by 1 N, fall 1 mm onto a "
 		   "wall at 1 kHz; force limited to 4 N; 12 s\n");
 	for (int path = 0; path < PATHS; path++)
-		print_path(run, titles[path], walls + 2 * path * each, each);
-	for (int i = 0; i < 4 * each; i += 2 * each)
+		print_path(run, titles[path], walls + path * each, each);
+	for (int i = 0; i < PATHS * each; i += each)
 		bench_text(run, "limit by theory, %s: %.4g N/m\n", walls[i].path,
 			   walls[i].limit_N_mm * 1e3);
 	if (missed)
