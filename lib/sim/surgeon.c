@@ -305,9 +305,10 @@ void incise_hand_look(const struct incise_hand *hand, double position_mm[3],
 	}
 }
 
-static void blade_held(const struct incise_surgeon *surgeon, struct incise_blade *blade)
+static INCISE_REALTIME void blade_held(const struct incise_surgeon *surgeon,
+				       struct incise_blade *blade)
 {
-	static const double across[3] = {0, 1, 0};
+	const double across[3] = {0, 1, 0};
 	double attitude[4];
 
 	*blade = (struct incise_blade){.cut = -1};

@@ -92,10 +92,10 @@ static double factor(const struct incise_tissue *tissue, const struct incise_bla
 }
 
 /* Move the front on to the blade; whether that cuts. The force without tooth and bound. */
-static double front_force(struct incise_tissue *tissue, const struct incise_blade *blade,
-			  bool *cuts)
+static INCISE_REALTIME double front_force(struct incise_tissue *tissue,
+					  const struct incise_blade *blade, bool *cuts)
 {
-	static const double up[3] = {0, 0, 1};
+	const double up[3] = {0, 0, 1};
 	const struct incise_sim_config *config = tissue->config;
 	const double at_mm[3] = {blade->position_mm[0], blade->position_mm[1], 0};
 	double mean_N = incise_sim_mean_force(config, blade->depth_mm, blade->speed_mm_s);
@@ -124,8 +124,9 @@ static double front_force(struct incise_tissue *tissue, const struct incise_blad
  * The force on a blade that has moved on for @ahead_s since the last advance; whether it cuts.
  * The tissue comes with it.
  */
-static double force_at(struct incise_tissue *tissue, const struct incise_blade *blade,
-		       double ahead_s, bool *cuts)
+static INCISE_REALTIME double force_at(struct incise_tissue *tissue,
+				       const struct incise_blade *blade, double ahead_s,
+				       bool *cuts)
 {
 	const struct incise_sim_config *config = tissue->config;
 	double path_mm = tissue->path_mm + blade->speed_mm_s * ahead_s;
