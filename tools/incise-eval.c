@@ -260,6 +260,20 @@ static void parse(struct job *job, int argc, char **argv)
 		cli_usage("--grid evaluates its own points: it takes no file of inputs");
 }
 
+static void warn_outside(const struct evaluator *e, bool no_clamp)
+{
+	char support[1000] = ""; /* of at most 8 inputs */
+	int n = 0;
+
+	for (int i = 0; i < e->n_inputs; i++)
+		n += snprintf(support + n, sizeof(support) - (size_t)n,
+			      "%s%.40s %.4g to %.4g", i ? ", " : "", e->input[i],
+			      e->min[i], e->max[i]);
+	cli_warn("%lu inputs lay outside the model's support (%s) and were %s",
+		 e->outside, support,
+		 no_clamp ? "extrapolated" : "taken as its nearest end");
+}
+
 int main(int argc, char **argv)
 {
 	struct evaluator e = {0};
@@ -278,9 +292,7 @@ int main(int argc, char **argv)
 		json_print(json_pack("{so}", "rows", e.rows));
 	cli_finish();
 	if (e.outside)
-		cli_warn("%lu inputs lay outside the model's support and were %s",
-			 e.outside,
-			 job.no_clamp ? "extrapolated" : "taken as its nearest end");
+		warn_outside(&e, job.no_clamp);
 	if (e.unfired)
 		cli_warn(
 			"%lu inputs lay where no rule of the model fires; the nearest rule "

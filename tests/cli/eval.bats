@@ -187,7 +187,7 @@ degree_model() {
 @test "eval outside the support takes its nearest end and says so" {
 	run -0 --separate-stderr incise eval m.fis <<<$'-3 20\n25 20\n5 60\n5 20'
 	[ "${#stderr_lines[@]}" -eq 1 ]
-	[[ "$stderr" == "incise eval: warning: 3 inputs lay outside"* ]]
+	[[ "$stderr" == "incise eval: warning: 3 inputs lay outside the model's support (depth_mm 0 to 20, velocity_mm_s 0 to 50) and were taken as its nearest end" ]]
 	[ "${lines[0]}" = "$(echo '0 20' | incise eval m.fis)" ]
 	[ "${lines[1]}" = "$(echo '20 20' | incise eval m.fis)" ]
 	[ "${lines[2]}" = "$(echo '5 50' | incise eval m.fis)" ]
