@@ -190,8 +190,10 @@ static void measure(struct hand *hand, struct work_row *row)
 		bool contact = false;
 		int ticks = (int)(m.length_s * RATE_HZ);
 
-		/* It is taken there through the air. */
-		hand->known = false;
+		/* It is taken there through the air, where the predictor forgets the way. */
+		for (int k = 0; k < AIR_S * RATE_HZ; k++)
+			go(hand, m.at_mm, 0, ABOVE_MM, &ignored[0], &ignored[1],
+			   &ignored[2]);
 		for (int k = 0; k <= ticks; k++) {
 			double share = (double)k / ticks;
 
