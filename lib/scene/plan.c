@@ -277,6 +277,21 @@ struct incise_plan *incise_plan_new_fed_on(const struct incise_scene *scene,
 	return new_plan(scene, NULL, *tracker, &place, err);
 }
 
+void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
+		      double gain)
+{
+	*copy = *plan;
+	for (int i = 0; i < copy->n_stages; i++)
+		if (copy->stage[i].own)
+			copy->stage[i].own =
+				&copy->acting[plan->stage[i].own - plan->acting];
+	copy->gain *= gain;
+	copy->unloading_N_mm *= gain;
+	copy->beyond_N_mm *= gain;
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		copy->acting[i].number[0] *= gain;
+}
+
 void incise_plan_free(struct incise_plan *plan)
 {
 	if (!plan)

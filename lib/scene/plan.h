@@ -136,6 +136,13 @@ int incise_stage_refused(struct incise_plan *plan,
 
 /* --- plan --- */
 
+/*
+ * A copy that can tick beside the plan, with all forces so many times as strong. It shares what the
+ * plan has allocated, and keeps the plan's stability.
+ */
+void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
+		      double gain);
+
 /* Fill in the stages that the scene and the rig need, and why the others are left out. */
 void incise_plan_choose(struct incise_plan *plan);
 

@@ -91,9 +91,9 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 		      const struct incise_rest_trial *trial)
 {
 	struct incise_plan *own = &s->plan;
-	double gain = trial->gain * (1 + RESERVE);
+	int n = 0;
 
-	*own = *plan;
+	incise_plan_copy(own, plan, trial->gain * (1 + RESERVE));
 	own->surface = s->plane;
 	incise_proxy_init(&own->proxy, s->plane, plan->proxy.leave_mm);
 	own->tracker = NULL;
@@ -106,23 +106,15 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 		s->parts.average = *plan->average;
 	own->handle = plan->handle ? &s->parts.handle : NULL;
 	own->average = plan->average ? &s->parts.average : NULL;
-	own->n_stages = 0;
-	for (int i = 0; i < plan->n_stages; i++) {
-		struct incise_stage stage = plan->stage[i];
-
-		if (stage.run == incise_stage_actuate)
+	for (int i = 0; i < own->n_stages; i++) {
+		if (own->stage[i].run == incise_stage_actuate)
 			continue;
-		if (stage.run == incise_stage_pose)
-			stage.run = incise_stage_fed;
-		if (stage.own)
-			stage.own = &own->acting[stage.own - plan->acting];
-		own->stage[own->n_stages++] = stage;
+		own->stage[n] = own->stage[i];
+		if (own->stage[n].run == incise_stage_pose)
+			own->stage[n].run = incise_stage_fed;
+		n++;
 	}
-	own->gain *= gain;
-	own->unloading_N_mm *= gain;
-	own->beyond_N_mm *= gain;
-	for (int i = 0; i < incise_n_tissue_forces; i++)
-		own->acting[i].number[0] *= gain;
+	own->n_stages = n;
 	s->rested = s->plan;
 	s->rested_parts = s->parts;
 }

@@ -208,28 +208,24 @@ static void copy_plan(struct loop *l, const struct incise_plan *plan, double gai
 		      bool stages)
 {
 	struct incise_plan *own = &l->plan;
+	struct incise_stage stage[INCISE_PLAN_STAGES_MAX];
+	int n = plan->n_stages;
 
-	*own = *plan;
+	incise_plan_copy(own, plan, gain);
 	own->fed = l->fed;
+	if (!stages)
+		return;
+	memcpy(stage, own->stage, sizeof(stage));
 	own->n_stages = 0;
-	for (int i = 0; i < plan->n_stages; i++) {
-		struct incise_stage stage = plan->stage[i];
-
-		if (stage.own)
-			stage.own = &own->acting[stage.own - plan->acting];
-		if (stages && stage.run == incise_stage_contact)
+	for (int i = 0; i < n; i++) {
+		if (stage[i].run == incise_stage_contact)
 			own->stage[own->n_stages++] = (struct incise_stage){
 				.name = "coupling", .run = stage_coupling};
-		if (stages && stage.run == incise_stage_start)
+		if (stage[i].run == incise_stage_start)
 			own->stage[own->n_stages++] = (struct incise_stage){
 				.name = "guard", .run = stage_guard};
-		own->stage[own->n_stages++] = stage;
+		own->stage[own->n_stages++] = stage[i];
 	}
-	own->gain *= gain;
-	own->unloading_N_mm *= gain;
-	own->beyond_N_mm *= gain;
-	for (int i = 0; i < incise_n_tissue_forces; i++)
-		own->acting[i].number[0] *= gain;
 }
 
 static int64_t to_ns(double t_s)
