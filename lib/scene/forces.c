@@ -138,7 +138,7 @@ static double advance_mm(struct incise_plan *plan, struct incise_acting_force *o
 			 bool *fresh)
 {
 	struct incise_front *cut = &own->state.front.cut;
-	const double *side = plan->incision.side;
+	const double *side = plan->line.side;
 
 	*fresh =
 		plan->proxy.began && incise_front_enter(cut, plan->p0_mm, plan->sn, side);
@@ -196,7 +196,7 @@ static void plane(struct incise_plan *plan, struct incise_tick *tick,
 
 	v3_sub(off, tick->tool_mm, plan->p0_mm);
 	v3_add(plan->force_N, plan->force_N,
-	       -own->number[0] * v3_dot(off, plan->incision.side), plan->incision.side);
+	       -own->number[0] * v3_dot(off, plan->line.side), plan->line.side);
 }
 
 static void plane_fixed(struct incise_plan *plan, struct incise_tick *tick,
@@ -206,7 +206,7 @@ static void plane_fixed(struct incise_plan *plan, struct incise_tick *tick,
 
 	if (plan->proxy.began)
 		incise_fixed_spring_set(&own->state.spring, own->number[0], origin,
-					plan->incision.side);
+					plan->line.side);
 	add_fixed(plan->force_N, &own->state.spring, tick->tool_mm, plan->p0_mm, false);
 }
 
@@ -226,7 +226,7 @@ static double orientation(const struct incise_plan *plan, double aligned)
 	double flat[3], across;
 
 	v3_rotate(flat, plan->attitude, plan->instrument.side);
-	across = fmin(fabs(v3_dot(flat, plan->incision.along)), 1);
+	across = fmin(fabs(v3_dot(flat, plan->line.along)), 1);
 	return aligned + (1 - aligned) * across;
 }
 
@@ -237,8 +237,8 @@ static void insertion(struct incise_plan *plan, struct incise_tick *tick,
 	double aligned = own->number[1], factor = 1;
 
 	if (plan->proxy.began)
-		own->state.in_incision = incise_incision_holds(
-			&plan->incision, plan->proxy.first.point_mm, REACH_MM);
+		own->state.in_incision = incise_line_holds(
+			&plan->line, plan->proxy.first.point_mm, REACH_MM);
 	if (own->state.in_incision)
 		factor = tick->tool == INCISE_TOOL_TUBE ? aligned
 							: orientation(plan, aligned);

@@ -13,7 +13,7 @@
 #include "../control/start.h"
 #include "../surface/average.h"
 #include "../surface/surface.h"
-#include "../tissue/incision.h"
+#include "../tissue/line.h"
 #include "../tissue/instrument.h"
 #include "scene.h"
 
@@ -81,7 +81,7 @@ struct incise_plan {
 	double normal[3]; /* the one that forces go along: Sn, or its average */
 	double depth_mm;  /* ≥ 0 */
 	double p0_mm[3];  /* where the contact began */
-	struct incise_incision incision;
+	struct incise_line line;
 	int average_ticks;
 	struct incise_average *average; /* with stage normal */
 

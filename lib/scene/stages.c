@@ -121,8 +121,7 @@ static void contact_begins(struct incise_plan *plan)
 	v3_copy(plan->sn, first->normal);
 	if (plan->instrument.held == INCISE_TOOL_BLADE) {
 		v3_rotate(side, plan->attitude, plan->instrument.side);
-		incise_incision_begin(&plan->incision, first->point_mm, first->normal,
-				      side);
+		incise_line_begin(&plan->line, first->point_mm, first->normal, side);
 	}
 	if (plan->average)
 		incise_average_reset(plan->average);
@@ -160,7 +159,7 @@ int incise_stage_contact(struct incise_plan *plan, struct incise_tick *tick)
 	find_normal(plan, tick->tool_mm);
 	plan->depth_mm = fmax(proxy->touch.depth_mm, 0);
 	if (plan->instrument.held == INCISE_TOOL_BLADE)
-		incise_incision_extend(&plan->incision, proxy->touch.point_mm);
+		incise_line_extend(&plan->line, proxy->touch.point_mm);
 	tick->flags |= INCISE_TICK_CONTACT;
 	tick->phase = plan->instrument.held == INCISE_TOOL_BLADE ? INCISE_PHASE_CUTTING
 								 : INCISE_PHASE_INSERTION;

@@ -11,14 +11,13 @@ static void begin(struct incise_front *front, const double at_mm[3],
 		  const double normal[3], const double side[3])
 {
 	*front = (struct incise_front){0};
-	incise_incision_begin(&front->incision, at_mm, normal, side);
+	incise_line_begin(&front->line, at_mm, normal, side);
 }
 
 bool incise_front_enter(struct incise_front *front, const double at_mm[3],
 			const double normal[3], const double side[3])
 {
-	bool fresh =
-		!incise_incision_holds(&front->incision, at_mm, INCISE_FRONT_BESIDE_MM);
+	bool fresh = !incise_line_holds(&front->line, at_mm, INCISE_FRONT_BESIDE_MM);
 
 	if (fresh)
 		begin(front, at_mm, normal, side);
@@ -31,14 +30,14 @@ bool incise_front_enter(struct incise_front *front, const double at_mm[3],
 double incise_front_advance(struct incise_front *front, const double at_mm[3],
 			    const double normal[3], const double side[3])
 {
-	struct incise_incision *incision = &front->incision;
-	double length_mm = incision->to_mm - incision->from_mm;
+	struct incise_line *line = &front->line;
+	double length_mm = line->to_mm - line->from_mm;
 
-	incise_incision_extend(incision, at_mm);
-	if (incise_incision_holds(incision, at_mm, INCISE_FRONT_BESIDE_MM))
-		return incision->to_mm - incision->from_mm - length_mm;
+	incise_line_extend(line, at_mm);
+	if (incise_line_holds(line, at_mm, INCISE_FRONT_BESIDE_MM))
+		return line->to_mm - line->from_mm - length_mm;
 	/* It left the line sideways; a curved skin does that too. The cut goes on from here. */
-	incise_incision_begin(incision, at_mm, normal, side);
+	incise_line_begin(line, at_mm, normal, side);
 	return INCISE_FRONT_BESIDE_MM;
 }
 

@@ -32,7 +32,7 @@
 #define INCISE_FRONT_H
 
 #include <incise/export.h>
-#include "incision.h"
+#include "line.h"
 
 /* A blade so far beside the line of its cut is in new tissue: half the width of a blade. */
 #define INCISE_FRONT_BESIDE_MM 1.0
@@ -47,13 +47,13 @@ struct incise_front {
 	double cut_mm;		  /* depth of the unloaded cut; ≥ 0 */
 	double work_N_mm; /* put in since the blade entered, less what came back */
 	double most_N_mm; /* of that, so far */
-	struct incise_incision incision;
+	struct incise_line line;
 };
 
 /*
  * The blade meets the skin: in the cut that it left, which stays, or in a new one.
  *
- * @param at_mm  on the surface; @param normal, side: as incise_incision_begin()
+ * @param at_mm  on the surface; @param normal, side: as incise_line_begin()
  * @return whether the cut is new
  */
 bool incise_front_enter(struct incise_front *front, const double at_mm[3],

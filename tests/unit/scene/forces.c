@@ -87,7 +87,7 @@ static void plane(double force[3], double k_N_mm, const double p[3], const doubl
 	struct incise_plan plan = plan_with_forces();
 
 	v3_copy(plan.p0_mm, p0);
-	v3_copy(plan.incision.side, side);
+	v3_copy(plan.line.side, side);
 	effect(force, &plan, p, "plane", k_N_mm);
 }
 
@@ -118,7 +118,7 @@ static double orientation(const double flat[3], const double along[3], double al
 	plan.depth_mm = 1;
 	plan.normal[2] = 1;
 	v3_copy(plan.instrument.side, flat);
-	v3_copy(plan.incision.along, along);
+	v3_copy(plan.line.along, along);
 	acting(&plan, "insertion")->state.in_incision = true;
 	acting(&plan, "insertion")->number[1] = aligned;
 	effect(force, &plan, NULL, "insertion", 1);
@@ -412,8 +412,8 @@ static struct incise_plan plan_in_tissue(void)
 	plan.normal[2] = 1;
 	plan.depth_mm = 2;
 	plan.velocity_mm_s[0] = 10;
-	plan.instrument.side[1] = plan.incision.side[1] = plan.incision.along[0] = 1;
-	plan.incision.there = plan.proxy.began = true;
+	plan.instrument.side[1] = plan.line.side[1] = plan.line.along[0] = 1;
+	plan.line.there = plan.proxy.began = true;
 	give(&plan, "reaction", 0.5);
 	give(&plan, "plane", 0.25);
 	give(&plan, "damping", 0.01);
@@ -539,7 +539,7 @@ static void test_fixed_is_within_its_bound(void **state)
 
 		if (!v3_unit(plan.normal, n, 0.1))
 			continue;
-		v3_unit(plan.incision.side, n, 0.1);
+		v3_unit(plan.line.side, n, 0.1);
 		for (int k = 0; k < 3; k++) {
 			/* Far away, too: only the difference has to fit. */
 			plan.p0_mm[k] = some(&seed, 1e5);

@@ -131,9 +131,9 @@ static void test_a_cut_from_its_begin_to_its_end(void **state)
 	assert_true(v3_length(plan.p0_mm) < 1e-15);
 	/* A quarter turn about z: the blade's side lies along -x, its cut along y, and
 	 * the way along x does not make it longer. */
-	assert_true(fabs(plan.incision.side[0] + 1) < 1e-15);
-	assert_true(fabs(fabs(plan.incision.along[1]) - 1) < 1e-15);
-	assert_true(fabs(plan.incision.to_mm - plan.incision.from_mm) < 1e-14);
+	assert_true(fabs(plan.line.side[0] + 1) < 1e-15);
+	assert_true(fabs(fabs(plan.line.along[1]) - 1) < 1e-15);
+	assert_true(fabs(plan.line.to_mm - plan.line.from_mm) < 1e-14);
 	incise_surface_free(surface);
 }
 
@@ -147,7 +147,7 @@ static void test_an_instrument_leaves_no_cut(void **state)
 	assert_int_equal(incise_stage_contact(&plan, &tick), 0);
 	assert_int_equal(tick.phase, INCISE_PHASE_INSERTION);
 	assert_int_equal(tick.tool, INCISE_TOOL_TUBE);
-	assert_false(plan.incision.there);
+	assert_false(plan.line.there);
 	incise_surface_free(surface);
 }
 

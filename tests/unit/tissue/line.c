@@ -8,7 +8,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 #include <math.h>
-#include "../../../lib/tissue/incision.h"
+#include "../../../lib/tissue/line.h"
 
 static double dot(const double a[3], const double b[3])
 {
@@ -51,10 +51,10 @@ static void test_direction(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_incision cut = {.to_mm = 99, .from_mm = -99};
+		struct incise_line cut = {.to_mm = 99, .from_mm = -99};
 		const double *want = cases[i].along;
 
-		incise_incision_begin(&cut, at, cases[i].normal, cases[i].side);
+		incise_line_begin(&cut, at, cases[i].normal, cases[i].side);
 		assert_true(cut.there && cut.from_mm == 0 && cut.to_mm == 0);
 		/* In the surface and of length 1, whatever the blade: some roundings. */
 		assert_true(fabs(dot(cut.along, cut.along) - 1) < 1e-14);
@@ -75,17 +75,17 @@ static void test_extent(void **state)
 		{{5, 0, 0}, 0, 5},    {{3, 0, 0}, 0, 5},     {{-2, 0, 0}, -2, 5},
 		{{20, 4, 0}, -2, 20}, {{20, 0, -6}, -2, 20}, {{NAN, 0, 0}, -2, 20},
 	};
-	struct incise_incision cut;
+	struct incise_line cut;
 
-	incise_incision_begin(&cut, (double[]){0, 0, 0}, (double[]){0, 0, 1},
-			      (double[]){0, 1, 0});
+	incise_line_begin(&cut, (double[]){0, 0, 0}, (double[]){0, 0, 1},
+			  (double[]){0, 1, 0});
 	for (size_t i = 0; i < sizeof(steps) / sizeof(*steps); i++) {
-		incise_incision_extend(&cut, steps[i].at);
+		incise_line_extend(&cut, steps[i].at);
 		assert_true(cut.from_mm == steps[i].from && cut.to_mm == steps[i].to);
 	}
 	/* The next cut takes its place. */
-	incise_incision_begin(&cut, (double[]){100, 0, 0}, (double[]){0, 0, 1},
-			      (double[]){0, 1, 0});
+	incise_line_begin(&cut, (double[]){100, 0, 0}, (double[]){0, 0, 1},
+			  (double[]){0, 1, 0});
 	assert_true(cut.from_mm == 0 && cut.to_mm == 0 && cut.at_mm[0] == 100);
 }
 
@@ -105,19 +105,19 @@ static void test_reach(void **state)
 		{{23.01, 4, 0}, false},	 {{40, 0, 0}, false},
 		{{NAN, 0, 0}, false},	 {{10, NAN, 0}, false},
 	};
-	struct incise_incision cut = {0};
+	struct incise_line cut = {0};
 
 	/* Before the first cut there is none. */
-	assert_false(incise_incision_holds(&cut, (double[]){0, 0, 0}, 1e9));
-	incise_incision_begin(&cut, (double[]){0, 0, 0}, (double[]){0, 0, 1},
-			      (double[]){0, 1, 0});
-	incise_incision_extend(&cut, (double[]){20, 0, 0});
-	incise_incision_extend(&cut, (double[]){-2, 0, 0});
+	assert_false(incise_line_holds(&cut, (double[]){0, 0, 0}, 1e9));
+	incise_line_begin(&cut, (double[]){0, 0, 0}, (double[]){0, 0, 1},
+			  (double[]){0, 1, 0});
+	incise_line_extend(&cut, (double[]){20, 0, 0});
+	incise_line_extend(&cut, (double[]){-2, 0, 0});
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
-		if (incise_incision_holds(&cut, cases[i].at, 5) != cases[i].holds)
+		if (incise_line_holds(&cut, cases[i].at, 5) != cases[i].holds)
 			fail_msg("case %zu", i);
 	/* Its very points are in reach of 0. */
-	assert_true(incise_incision_holds(&cut, (double[]){20, 0, 0}, 0));
+	assert_true(incise_line_holds(&cut, (double[]){20, 0, 0}, 0));
 }
 
 int main(void)
