@@ -190,6 +190,15 @@ static void name_delay(const struct incise_plan_stability *s,
 			 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
 }
 
+static double membrane_N_mm(const struct incise_plan *plan)
+{
+	const struct incise_scene_membrane *membrane = &plan->scene->membrane;
+
+	return membrane->thickness_mm > 0
+		       ? plan->gain * membrane->puncture_N / membrane->thickness_mm
+		       : 0;
+}
+
 /*
  * The largest stiffness in any phase, and the largest damping. Springs along the normal and
  * across it act along different lines, one to a side along a line that may be either.
@@ -209,6 +218,10 @@ static void add_up(struct incise_plan *plan, double model_N_mm)
 				sum[own->force->kind] +=
 					model ? model_N_mm : own->number[0];
 		}
+		/* In front of the membrane the tissue's force stays as it is. */
+		if (phase != INCISE_PHASE_FREE)
+			sum[INCISE_SPRING_NORMAL] =
+				fmax(sum[INCISE_SPRING_NORMAL], membrane_N_mm(plan));
 		s->stiffness_N_mm =
 			fmax(s->stiffness_N_mm,
 			     fmax(sum[INCISE_SPRING_NORMAL], sum[INCISE_SPRING_ACROSS]) +

@@ -43,6 +43,12 @@ static const char *no_force(const struct incise_plan *plan,
 	return own->number[0] > 0 ? NULL : zero(plan, own->force->zero);
 }
 
+static const char *no_membrane(const struct incise_plan *plan)
+{
+	return plan->scene->membrane.thickness_mm > 0 ? NULL
+						      : "the scene has no membrane";
+}
+
 static const struct {
 	const char *name;
 	bool always;
@@ -56,6 +62,8 @@ static const struct {
 	{"tool", true, incise_stage_tool, NULL, no_tool, false},
 	{"contact", false, incise_stage_contact, NULL, NULL, false},
 	{"normal", false, incise_stage_normal, NULL, no_normal, false},
+	{"incision", true, incise_stage_incision, NULL, no_tool, false},
+	{"membrane", false, incise_stage_membrane, NULL, no_membrane, false},
 	{"start", true, incise_stage_start, NULL, NULL, true},
 	{"limit", true, incise_stage_limit, NULL, NULL, false},
 };

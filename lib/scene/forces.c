@@ -28,9 +28,6 @@
 #include "forces.h"
 #include "plan.h"
 
-/* Distance from a cut within which an instrument goes in: half a handle's width. */
-#define REACH_MM 5.0
-
 static int32_t to_fixed(double x)
 {
 	return (int32_t)lrint(fmax(-32767, fmin(32767, x)) * INCISE_FIXED_ONE);
@@ -142,6 +139,9 @@ static double advance_mm(struct incise_plan *plan, struct incise_acting_force *o
 
 	*fresh =
 		plan->proxy.began && incise_front_enter(cut, plan->p0_mm, plan->sn, side);
+	/* Through a membrane it meets none. */
+	if (plan->membrane.hit)
+		return 0;
 	return incise_front_advance(cut, plan->proxy.touch.point_mm, plan->sn, side);
 }
 
@@ -218,32 +218,51 @@ static void damping(struct incise_plan *plan, struct incise_tick *tick,
 }
 
 /*
- * Fort, aligned … 1: a flat instrument goes in easily, but not freely, when its flat lies
- * along the cut. Its flat's normal across the cut direction then gives 0; 1 is a quarter turn.
+ * How far a handle is turned out of the cut, 0 … 1: a flat instrument goes in easily when its flat
+ * lies along the cut. The flat's normal across the cut's direction then gives 0.
  */
-static double orientation(const struct incise_plan *plan, double aligned)
+static double turned_across(const struct incise_plan *plan)
 {
-	double flat[3], across;
+	double flat[3];
 
 	v3_rotate(flat, plan->attitude, plan->instrument.side);
-	across = fmin(fabs(v3_dot(flat, plan->line.along)), 1);
-	return aligned + (1 - aligned) * across;
+	return fmin(fabs(v3_dot(flat, plan->opening.along)), 1);
 }
 
-/* A tube is round: it goes into a cut in any turn. Next to the cut skin holds up either. */
+/* Fort, aligned … 1: easily, but not freely. A tube is round, it has no turn. */
+static double eased(const struct incise_plan *plan, enum incise_tool tool, double aligned)
+{
+	double across = tool == INCISE_TOOL_TUBE ? 1 : turned_across(plan);
+
+	return aligned + (1 - aligned) * across * plan->tightness;
+}
+
+/*
+ * Fort as paper 2 prints it, the scalar product of the directions of handle and cut: its flat
+ * side, which lies along the cut, resists most.
+ */
+static double printed(const struct incise_plan *plan)
+{
+	double flat[3], lies[3];
+
+	v3_cross(flat, plan->instrument.side, plan->instrument.axis);
+	v3_rotate(lies, plan->attitude, flat);
+	return fmin(fabs(v3_dot(lies, plan->opening.along)), 1);
+}
+
+/* Below the cut, and outside of it, tissue holds up like skin. */
 static void insertion(struct incise_plan *plan, struct incise_tick *tick,
 		      struct incise_acting_force *own)
 {
-	double aligned = own->number[1], factor = 1;
+	const struct incise_opening *opening = &plan->opening;
+	double cut_mm = opening->in ? fmin(plan->depth_mm, opening->depth_mm) : 0;
+	double size_mm = plan->depth_mm - cut_mm;
 
-	if (plan->proxy.began)
-		own->state.in_incision = incise_line_holds(
-			&plan->line, plan->proxy.first.point_mm, REACH_MM);
-	if (own->state.in_incision)
-		factor = tick->tool == INCISE_TOOL_TUBE ? aligned
-							: orientation(plan, aligned);
-	v3_add(plan->force_N, plan->force_N, own->number[0] * plan->depth_mm * factor,
-	       plan->normal);
+	if (opening->in && plan->printed_orientation)
+		size_mm = plan->depth_mm * printed(plan);
+	else if (opening->in)
+		size_mm += cut_mm * eased(plan, tick->tool, own->number[1]);
+	v3_add(plan->force_N, plan->force_N, own->number[0] * size_mm, plan->normal);
 }
 
 /* The tissue around an instrument gives way to a limited extent. */

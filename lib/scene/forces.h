@@ -15,7 +15,7 @@
 #include "../tissue/front.h"
 
 /* A plan keeps at most INCISE_PLAN_STAGES_MAX stages, forces among them. */
-#define INCISE_FORCES_MAX 7
+#define INCISE_FORCES_MAX 6
 #define INCISE_FORCE_NUMBERS 3
 
 struct incise_plan;
@@ -44,8 +44,7 @@ struct incise_force_number {
 /* State of a force from tick to tick, in one plan. Zeroed with the plan. */
 union incise_force_state {
 	struct incise_fixed_spring
-		spring;	  /* plane in fixed point, set when contact starts */
-	bool in_incision; /* insertion: the instrument went in where the blade had cut */
+		spring; /* plane in fixed point, set when contact starts */
 	struct {
 		struct incise_front cut; /* reaction; in fixed point its place only */
 		struct incise_fixed_front fixed; /* the forces then */

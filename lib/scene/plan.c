@@ -87,6 +87,7 @@ static void take_tissue(struct incise_plan *plan)
 	const struct incise_scene *scene = plan->scene;
 
 	plan->gain = scene->tissue.gain;
+	plan->printed_orientation = scene->tissue.printed_orientation;
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
 		plan->acting[i].force = &incise_tissue_forces[i];
 		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++)
@@ -151,6 +152,24 @@ static void set_tool(struct incise_plan *plan)
 				      : plan->scene->effects.average_ticks;
 }
 
+static int check_membrane(const struct incise_plan *plan, struct incise_error *err)
+{
+	const struct incise_scene_membrane *membrane = &plan->scene->membrane;
+	struct incise_proxy proxy;
+
+	if (!(membrane->thickness_mm > 0))
+		return 0;
+	incise_proxy_init(&proxy, plan->surface, 0);
+	incise_proxy_move(&proxy, membrane->point_mm);
+	if (proxy.touching)
+		return 0;
+	return incise_error_set(
+		err, EINVAL,
+		"%s: membrane.point_mm lies outside of the tissue; place it "
+		"below the surface",
+		plan->scene->path);
+}
+
 static bool keeps(const struct incise_plan *plan, const char *stage)
 {
 	for (int i = 0; i < plan->n_stages; i++)
@@ -164,6 +183,7 @@ static int equip(struct incise_plan *plan, const struct incise_tracker_info *tra
 		 struct incise_error *err)
 {
 	bool handle = keeps(plan, "tool"), average = keeps(plan, "normal");
+	bool cuts = keeps(plan, "incision");
 
 	if (!plan->tracker)
 		plan->fed = calloc(INCISE_PLAN_POSES, sizeof(*plan->fed));
@@ -171,8 +191,10 @@ static int equip(struct incise_plan *plan, const struct incise_tracker_info *tra
 		plan->handle = calloc(1, sizeof(*plan->handle));
 	if (average)
 		plan->average = calloc(1, sizeof(*plan->average));
+	if (cuts)
+		plan->incision = incise_incision_new(plan->scene, NULL);
 	if ((!plan->tracker && !plan->fed) || (handle && !plan->handle) ||
-	    (average && !plan->average))
+	    (average && !plan->average) || (cuts && !plan->incision))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	if (handle)
 		incise_predict_init(plan->handle, tracker, 0);
@@ -213,6 +235,8 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 	rc = take_rig(plan, rig, &tracker, *place, err);
 	if (!rc)
 		rc = check_age(plan, &tracker, err);
+	if (!rc)
+		rc = check_membrane(plan, err);
 	if (!rc)
 		rc = take_model(plan, err);
 	if (!rc) {
@@ -301,6 +325,7 @@ void incise_plan_free(struct incise_plan *plan)
 	free(plan->fed);
 	free(plan->handle);
 	free(plan->average);
+	incise_incision_free(plan->incision);
 	free(plan);
 }
 
@@ -503,6 +528,7 @@ size_t incise_plan_memory(const struct incise_plan *plan)
 	size += plan->fed ? INCISE_PLAN_POSES * sizeof(*plan->fed) : 0;
 	size += plan->handle ? sizeof(*plan->handle) : 0;
 	size += plan->average ? sizeof(*plan->average) : 0;
+	size += plan->incision ? incise_incision_memory(plan->incision) : 0;
 	if (plan->fixed)
 		size += sizeof(*plan->fixed) + plan->fixed->size;
 	if (plan->scene->model)

@@ -13,8 +13,9 @@
 #include "../control/start.h"
 #include "../surface/average.h"
 #include "../surface/surface.h"
-#include "../tissue/line.h"
+#include "../tissue/incision.h"
 #include "../tissue/instrument.h"
+#include "../tissue/line.h"
 #include "scene.h"
 
 /* Poses taken at one tick; more than a tracker sends in a period, even after a stall. */
@@ -34,7 +35,7 @@ struct incise_stage {
 };
 
 /* Stages besides forces; those that no loop has are always left out. */
-#define INCISE_PLAN_OTHER_STAGES 8
+#define INCISE_PLAN_OTHER_STAGES 10
 #define INCISE_PLAN_NO_STAGES 2
 _Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES_MAX <= INCISE_PLAN_STAGES_MAX,
 	       "raise INCISE_PLAN_STAGES_MAX");
@@ -77,11 +78,21 @@ struct incise_plan {
 	struct incise_surface *own_surface; /* the rig's plane, when it is that */
 	double up[3];			    /* normal of the surface's top */
 	struct incise_proxy proxy;
-	double sn[3];	  /* the paper's Sn of this tick */
-	double normal[3]; /* the one that forces go along: Sn, or its average */
-	double depth_mm;  /* ≥ 0 */
-	double p0_mm[3];  /* where the contact began */
-	struct incise_line line;
+	double sn[3];		 /* the paper's Sn of this tick */
+	double normal[3];	 /* the one that forces go along: Sn, or its average */
+	double depth_mm;	 /* ≥ 0; of the tissue in front of a membrane */
+	double p0_mm[3];	 /* where the contact began */
+	struct incise_line line; /* of the blade, from there on */
+	struct incise_incision *incision; /* with its stage */
+	struct incise_opening opening;	  /* that handle or tube went into … */
+	double tightness; /* … and how tight it was; incise_incision_tightness() */
+	bool printed_orientation; /* the scene's orientation = "paper" */
+	struct {
+		bool met;	 /* the tool is beyond the plane of the membrane … */
+		bool hit;	 /* … and came there through it */
+		double depth_mm; /* of the plane, below the skin */
+		bool punctured;
+	} membrane;
 	int average_ticks;
 	struct incise_average *average; /* with stage normal */
 
@@ -99,7 +110,8 @@ struct incise_plan {
 
 	/* start, limit */
 	struct incise_start start;
-	bool fading; /* asked to let go of the force */
+	bool fading;   /* asked to let go of the force */
+	bool changing; /* the same, for another tool */
 	struct incise_limit limit;
 	int64_t last_ns; /* of the last tick; 0: none */
 
@@ -123,6 +135,8 @@ incise_stage_fn incise_stage_predict;
 incise_stage_fn incise_stage_tool;
 incise_stage_fn incise_stage_contact;
 incise_stage_fn incise_stage_normal;
+incise_stage_fn incise_stage_incision;
+incise_stage_fn incise_stage_membrane;
 
 /* From the tissue's force to the hand. */
 incise_stage_fn incise_stage_start;

@@ -107,7 +107,9 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 	own->handle = plan->handle ? &s->parts.handle : NULL;
 	own->average = plan->average ? &s->parts.average : NULL;
 	for (int i = 0; i < own->n_stages; i++) {
-		if (own->stage[i].run == incise_stage_actuate)
+		/* Only handle and tube ask for the cuts. */
+		if (own->stage[i].run == incise_stage_actuate ||
+		    own->stage[i].run == incise_stage_incision)
 			continue;
 		own->stage[n] = own->stage[i];
 		if (own->stage[n].run == incise_stage_pose)

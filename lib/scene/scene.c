@@ -11,11 +11,12 @@
 #include "../base/conf.h"
 #include "../base/vector.h"
 #include "../control/pose_loop.h"
+#include "../tissue/incision.h"
 #include "scene.h"
 
 #define PARALLEL_COS 0.985 /* cos 10 degrees */
-/* Of the largest group, tissue: gain, leave_mm, withdrawal and the numbers of all forces. */
-#define KEYS_MAX (3 + INCISE_FORCES_MAX * INCISE_FORCE_NUMBERS)
+/* Of the largest group, tissue: seven keys and the numbers of all forces. */
+#define KEYS_MAX (7 + INCISE_FORCES_MAX * INCISE_FORCE_NUMBERS)
 
 /* A number of a group. */
 struct number {
@@ -38,6 +39,9 @@ struct number {
 
 static const struct number tool[] = {
 	NUMBER(tool, handle_mm, 1, 1000),
+	NUMBER(tool, handle_width_mm, 1, 100),
+	NUMBER(tool, handle_thickness_mm, 0.1, 100),
+	NUMBER(tool, tube_mm, 0.5, 100),
 	{0},
 };
 
@@ -46,6 +50,14 @@ static const struct number device[] = {
 	NUMBER(device, damping_N_s_mm, 0, 1),
 	NUMBER(device, coulomb_N, 0, 10),
 	NUMBER(device, encoder_mm, 0, 1),
+	{0},
+};
+
+static const struct number membrane[] = {
+	NUMBER(membrane, radius_mm, 0.1, 1000),
+	NUMBER(membrane, thickness_mm, 0.1, 100),
+	NUMBER(membrane, puncture_N, 0, 100),
+	NUMBER(membrane, back_wall_mm, 0.1, 1000),
 	{0},
 };
 
@@ -383,30 +395,79 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	return 0;
 }
 
-static int read_withdrawal(struct incise_scene *scene, const config_setting_t *group,
-			   struct incise_error *err)
+/* A key of tissue that is "paper", for the paper's own way, or @other. */
+static int read_way(const struct incise_scene *scene, const config_setting_t *group,
+		    const char *key, const char *other, bool *paper,
+		    struct incise_error *err)
 {
 	const char *name = NULL;
-	int rc = incise_conf_string(group, scene->path, "withdrawal", &name, err);
+	int rc = incise_conf_string(group, scene->path, key, &name, err);
 
 	if (rc || !name)
 		return rc;
-	scene->tissue.dissipates = !strcmp(name, "dissipative");
-	if (scene->tissue.dissipates || !strcmp(name, "paper"))
+	*paper = !strcmp(name, "paper");
+	if (*paper || !strcmp(name, other))
 		return 0;
-	return incise_error_set(err, EINVAL,
-				"%s:%u: tissue.withdrawal: expected \"dissipative\" or "
-				"\"paper\", found \"%.40s\"; correct it",
-				scene->path,
-				config_setting_source_line(
-					config_setting_get_member(group, "withdrawal")),
-				name);
+	return incise_error_set(
+		err, EINVAL,
+		"%s:%u: tissue.%s: expected \"%s\" or \"paper\", found "
+		"\"%.40s\"; correct it",
+		scene->path,
+		config_setting_source_line(config_setting_get_member(group, key)), key,
+		other, name);
+}
+
+static int read_tissue_rest(struct incise_scene *scene, const config_setting_t *group,
+			    struct incise_error *err)
+{
+	bool paper = !scene->tissue.dissipates;
+	int rc = read_way(scene, group, "withdrawal", "dissipative", &paper, err);
+
+	scene->tissue.dissipates = !paper;
+	if (!rc)
+		rc = read_way(scene, group, "orientation", "eased",
+			      &scene->tissue.printed_orientation, err);
+	if (!rc)
+		rc = incise_conf_integer(group, scene->path, "cuts_most", 1, 1024,
+					 &scene->tissue.cuts_most, err);
+	return rc;
+}
+
+static int read_membrane(struct incise_scene *scene, const config_setting_t *root,
+			 struct incise_error *err)
+{
+	static const char *const more[] = {"point_mm", "normal", NULL};
+	const config_setting_t *group;
+	int rc = read_group(scene, root, "membrane", membrane, more, &group, err);
+
+	if (rc || !group)
+		return rc;
+	scene->membrane.normal[2] = 1;
+	for (const struct number *number = membrane; number->key && !rc; number++)
+		rc = incise_conf_need(group, scene->path, number->key, err);
+	if (!rc)
+		rc = incise_conf_need(group, scene->path, "point_mm", err);
+	if (!rc)
+		rc = incise_conf_vector(group, scene->path, "point_mm",
+					scene->membrane.point_mm, err);
+	if (!rc)
+		rc = incise_conf_direction(group, scene->path, "normal",
+					   scene->membrane.normal, err);
+	if (rc || scene->membrane.back_wall_mm > scene->membrane.thickness_mm)
+		return rc;
+	return incise_error_set(
+		err, EINVAL,
+		"%s:%u: membrane.back_wall_mm: the wall behind the airway is not behind the "
+		"membrane, which yields after thickness_mm, %g; expected more",
+		scene->path, config_setting_source_line(group),
+		scene->membrane.thickness_mm);
 }
 
 static int read_tissue(struct incise_scene *scene, const config_setting_t *root,
 		       struct incise_error *err)
 {
-	static const char *const tissue_keys[] = {"withdrawal", NULL};
+	static const char *const tissue_keys[] = {"withdrawal", "orientation",
+						  "cuts_most", NULL};
 	struct number numbers[KEYS_MAX + 1] = {NUMBER(tissue, gain, 0, 10)};
 	const config_setting_t *group;
 	int n = 1, rc;
@@ -422,9 +483,11 @@ static int read_tissue(struct incise_scene *scene, const config_setting_t *root,
 					from->key, 0, from->max,
 					(size_t)((char *)to - (char *)scene)};
 		}
-	numbers[n] = (struct number)NUMBER(tissue, leave_mm, 0, 5);
+	numbers[n++] = (struct number)NUMBER(tissue, leave_mm, 0, 5);
+	numbers[n++] = (struct number)NUMBER(tissue, cut_from_mm, 0, 50);
+	numbers[n] = (struct number)NUMBER(tissue, stretch_mm, 0, 50);
 	rc = read_group(scene, root, "tissue", numbers, tissue_keys, &group, err);
-	return rc || !group ? rc : read_withdrawal(scene, group, err);
+	return rc || !group ? rc : read_tissue_rest(scene, group, err);
 }
 
 /* One reaction, and any force at all. */
@@ -528,7 +591,7 @@ static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 {
 	static const char *const keys[] = {"rate_hz", "model",	 "arithmetic", "surface",
 					   "tissue",  "effects", "tool",       "device",
-					   "limits",  "picture", NULL};
+					   "limits",  "picture", "membrane",   NULL};
 	const config_setting_t *group;
 	const char *arithmetic = NULL;
 	int rc = incise_conf_known(root, scene->path, keys, err);
@@ -545,6 +608,8 @@ static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 		rc = read_tissue(scene, root, err);
 	if (!rc)
 		rc = read_group(scene, root, "limits", limits, NULL, &group, err);
+	if (!rc)
+		rc = read_membrane(scene, root, err);
 	if (!rc)
 		rc = read_switches(scene, root, err);
 	if (!rc)
@@ -567,10 +632,17 @@ static void set_defaults(struct incise_scene *scene)
 				incise_tissue_forces[i].number[k].initial;
 	/* Of a tracker with ±0.05 mm of noise the poses shown have ±0.16 mm. */
 	scene->tissue.leave_mm = 0.2;
+	/* More than that: a blade that rests on the skin cuts nothing. */
+	scene->tissue.cut_from_mm = 0.5;
+	scene->tissue.stretch_mm = 2;
+	scene->tissue.cuts_most = 64;
 	scene->effects.average_ticks = 1;
 	scene->tool.side[1] = 1;
 	scene->tool.axis[2] = 1;
 	scene->tool.handle_mm = 120;
+	scene->tool.handle_width_mm = 10;
+	scene->tool.handle_thickness_mm = 3;
+	scene->tool.tube_mm = 7;
 	scene->device.mass_kg = 0.05;
 	scene->device.damping_N_s_mm = 0.01;
 	scene->device.coulomb_N = 0.01;
@@ -670,6 +742,32 @@ void incise_scene_scalpel(const struct incise_scene *scene,
 	v3_copy(scalpel->axis, scene->tool.axis);
 	v3_copy(scalpel->side, scene->tool.side);
 	scalpel->handle_mm = scene->tool.handle_mm;
+	scalpel->handle_width_mm = scene->tool.handle_width_mm;
+	scalpel->handle_thickness_mm = scene->tool.handle_thickness_mm;
+	scalpel->tube_mm = scene->tool.tube_mm;
+}
+
+bool incise_scene_membrane(const struct incise_scene *scene,
+			   struct incise_scene_membrane *membrane)
+{
+	*membrane = scene->membrane;
+	return membrane->thickness_mm > 0;
+}
+
+struct incise_incision *incise_incision_new(const struct incise_scene *scene,
+					    struct incise_error *err)
+{
+	struct incise_incision_setup setup = {
+		.cut_from_mm = scene->tissue.cut_from_mm,
+		.stretch_mm = scene->tissue.stretch_mm,
+		.cuts_most = scene->tissue.cuts_most,
+		.handle_width_mm = scene->tool.handle_width_mm,
+		.handle_thickness_mm = scene->tool.handle_thickness_mm,
+		.tube_mm = scene->tool.tube_mm,
+	};
+
+	v3_copy(setup.side, scene->tool.side);
+	return incise_incision_make(&setup, err);
 }
 
 double incise_scene_rate_hz(const struct incise_scene *scene)

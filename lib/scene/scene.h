@@ -23,14 +23,19 @@ struct incise_scene {
 	struct incise_surface *surface; /* or NULL: the rig's plane */
 	struct {
 		double gain, leave_mm;
-		bool dissipates; /* withdrawal = "dissipative"; else "paper" */
+		bool dissipates;	  /* withdrawal = "dissipative"; else "paper" */
+		bool printed_orientation; /* orientation = "paper"; else "eased" */
+		double cut_from_mm, stretch_mm;
+		int cuts_most;
 		double force[INCISE_FORCES_MAX][INCISE_FORCE_NUMBERS];
 	} tissue;
+	struct incise_scene_membrane membrane;
 	struct {
 		int average_ticks;
 	} effects;
 	struct {
 		double side[3], axis[3], handle_mm;
+		double handle_width_mm, handle_thickness_mm, tube_mm;
 	} tool;
 	struct {
 		double mass_kg, damping_N_s_mm, coulomb_N, encoder_mm;

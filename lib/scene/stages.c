@@ -97,14 +97,27 @@ int incise_stage_predict(struct incise_plan *plan, struct incise_tick *tick)
 	return 0;
 }
 
+/* Whether the tool that is held stays: in the tissue it does until the force has faded. */
+static bool keeps_tool(struct incise_plan *plan)
+{
+	bool faded = !(plan->start.gain > 0) && v3_length(plan->limit.last_N) == 0;
+
+	plan->changing =
+		plan->proxy.touching && incise_instrument_waits(&plan->instrument);
+	return plan->proxy.touching && !(plan->changing && faded);
+}
+
 int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
 {
-	bool other = incise_instrument_choose(&plan->instrument, plan->attitude, plan->up,
-					      plan->proxy.touching);
+	bool keeps = keeps_tool(plan);
 
 	/* The way from the end of one to that of the other is no motion. */
-	if (other)
+	if (incise_instrument_choose(&plan->instrument, plan->attitude, plan->up,
+				     keeps)) {
 		incise_proxy_init(&plan->proxy, plan->surface, plan->proxy.leave_mm);
+		plan->start.gain = 0;
+		plan->changing = false;
+	}
 	tick->tool = plan->instrument.held;
 	if (plan->instrument.held == INCISE_TOOL_HANDLE)
 		incise_predict_at(plan->handle, tick->t_ns, tick->tool_mm,
@@ -179,6 +192,91 @@ int incise_stage_normal(struct incise_plan *plan, struct incise_tick *tick)
 	return 0;
 }
 
+static void meet_opening(struct incise_plan *plan, const struct incise_tick *tick)
+{
+	incise_incision_opening(plan->incision, tick->tool, tick->proxy_mm,
+				&plan->opening);
+	plan->tightness =
+		incise_incision_tightness(plan->incision, &plan->opening, tick->tool);
+}
+
+/*
+ * The cuts that this tick makes or widens. An instrument meets the opening as it was when it went
+ * in: it makes the way easier for the next one.
+ */
+int incise_stage_incision(struct incise_plan *plan, struct incise_tick *tick)
+{
+	bool inserts = tick->phase == INCISE_PHASE_INSERTION;
+
+	if (inserts && (plan->proxy.began || !plan->opening.in))
+		meet_opening(plan, tick);
+	else if (!inserts && !(tick->flags & INCISE_TICK_STALE))
+		plan->opening.in = false;
+	if (inserts && plan->opening.in)
+		tick->flags |= INCISE_TICK_IN_CUT;
+	if (!incise_incision_tick(plan->incision, tick))
+		tick->flags |= INCISE_TICK_FULL;
+	return 0;
+}
+
+/* Whether a tool meets the membrane here, and not uncut skin above it or tissue beside it. */
+static bool hits_membrane(const struct incise_plan *plan, const struct incise_tick *tick,
+			  const double off_mm[3], double beyond_mm)
+{
+	const struct incise_scene_membrane *membrane = &plan->scene->membrane;
+	double across_mm[3];
+
+	v3_add(across_mm, off_mm, beyond_mm, membrane->normal);
+	return v3_length(across_mm) <= membrane->radius_mm &&
+	       (tick->phase == INCISE_PHASE_CUTTING || plan->opening.in);
+}
+
+/* N against a tool so far beyond the plane of the membrane. */
+static double membrane_N(struct incise_plan *plan, struct incise_tick *tick,
+			 double beyond_mm)
+{
+	const struct incise_scene_membrane *membrane = &plan->scene->membrane;
+	double K = plan->gain * membrane->puncture_N / membrane->thickness_mm;
+
+	plan->membrane.punctured |= beyond_mm >= membrane->thickness_mm;
+	tick->flags |=
+		plan->membrane.punctured ? INCISE_TICK_LUMEN : INCISE_TICK_MEMBRANE;
+	if (!plan->membrane.punctured)
+		return K * beyond_mm;
+	if (!(beyond_mm > membrane->back_wall_mm))
+		return 0;
+	tick->flags |= INCISE_TICK_BACK_WALL;
+	return K * (beyond_mm - membrane->back_wall_mm);
+}
+
+/*
+ * A membrane over an airway. Tissue in front of it holds the tool up to the membrane's depth and
+ * no more beyond it; the membrane yields, and is open from then on.
+ */
+int incise_stage_membrane(struct incise_plan *plan, struct incise_tick *tick)
+{
+	const struct incise_scene_membrane *membrane = &plan->scene->membrane;
+	double off_mm[3], beyond_mm;
+
+	v3_sub(off_mm, tick->tool_mm, membrane->point_mm);
+	beyond_mm = -v3_dot(off_mm, membrane->normal);
+	if (tick->phase == INCISE_PHASE_FREE || !(beyond_mm > 0)) {
+		plan->membrane.met = plan->membrane.hit = false;
+		return 0;
+	}
+	if (!plan->membrane.met) {
+		plan->membrane.met = true;
+		plan->membrane.hit = hits_membrane(plan, tick, off_mm, beyond_mm);
+		plan->membrane.depth_mm = fmax(plan->depth_mm - beyond_mm, 0);
+	}
+	if (!plan->membrane.hit)
+		return 0;
+	plan->depth_mm = fmin(plan->depth_mm, plan->membrane.depth_mm);
+	v3_add(plan->force_N, plan->force_N, membrane_N(plan, tick, beyond_mm),
+	       membrane->normal);
+	return 0;
+}
+
 /* Without a fresh pose the last force stays, and fades. */
 int incise_stage_start(struct incise_plan *plan, struct incise_tick *tick)
 {
@@ -187,7 +285,8 @@ int incise_stage_start(struct incise_plan *plan, struct incise_tick *tick)
 	double dt_s = plan->last_ns && tick->t_ns > plan->last_ns
 			      ? (double)gone_ns / INCISE_NS_PER_S
 			      : 0;
-	bool fresh = !(tick->flags & INCISE_TICK_STALE) && !plan->fading;
+	bool fresh =
+		!(tick->flags & INCISE_TICK_STALE) && !plan->fading && !plan->changing;
 	double gain =
 		incise_start_gain(&plan->start, v3_length(plan->force_N), fresh, dt_s);
 

@@ -40,6 +40,13 @@ bool incise_instrument_choose(struct incise_instrument *instrument,
 	return instrument->held != before;
 }
 
+bool incise_instrument_waits(const struct incise_instrument *instrument)
+{
+	if (instrument->wanted == INCISE_TOOL_AUTO)
+		return instrument->held == INCISE_TOOL_TUBE;
+	return instrument->wanted != instrument->held;
+}
+
 void incise_instrument_end(const struct incise_instrument *instrument,
 			   const double tip_mm[3], const double attitude[4],
 			   double end_mm[3])

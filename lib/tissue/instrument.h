@@ -35,6 +35,9 @@ bool incise_instrument_choose(struct incise_instrument *instrument,
 			      const double attitude[4], const double normal[3],
 			      bool touching) INCISE_REALTIME;
 
+/* Whether another one is wanted than the held one, without a look at its turn. */
+bool incise_instrument_waits(const struct incise_instrument *instrument) INCISE_REALTIME;
+
 /* Where the end of the held one is, mm. */
 void incise_instrument_end(const struct incise_instrument *instrument,
 			   const double tip_mm[3], const double attitude[4],

@@ -71,8 +71,9 @@ static const char *fault_of(const struct fed_run *run, const struct incise_tick 
 		return "beyond its limits";
 	if (!known || t->phase != phase)
 		return "wrong phase or tool";
-	if (was->flags & INCISE_TICK_CONTACT && t->tool != was->tool)
-		return "another tool in the tissue";
+	if (v3_length(was->command_N) > 0 && was->flags & INCISE_TICK_CONTACT &&
+	    t->tool != was->tool)
+		return "another tool in the tissue before the force had faded";
 	if (contact && t->flags & INCISE_TICK_STALE)
 		return "contact by an old pose";
 	if (contact && !(fabs(v3_length(t->normal) - 1) < 1e-12))

@@ -8,13 +8,14 @@
 #include "loop_report.h"
 
 const char *const loop_flag_names[INCISE_TICK_FLAGS] = {
-	"contact", "extrapolated", "stale",    "clamped",    "fault",	 "slewed",
-	"travel",  NULL,	   "starting", "not_finite", "unusable",
+	"contact",  "extrapolated", "stale",	 "clamped",    "fault",	   "slewed",
+	"travel",   NULL,	    "starting",	 "not_finite", "unusable", "in_cut",
+	"membrane", "lumen",	    "back_wall", "full",
 };
 
 const char *loop_flags_text(unsigned int flags, char *text)
 {
-	static const char letters[] = "cesofvt-rnu";
+	static const char letters[] = "cesofvt-rnuimlbx";
 
 	_Static_assert(sizeof(letters) == INCISE_TICK_FLAGS + 1, "a letter for each");
 	for (int i = 0; letters[i]; i++)

@@ -3,8 +3,9 @@
  * The plan of a scene: the ordered list of just the stages that it needs, which a loop
  * runs at each tick.
  *
- *     pose ─▶ predict ─▶ [tool] ─▶ contact ─▶ [normal] ─▶ [reaction] ─▶ [plane] ─▶
- *     [damping] ─▶ [insertion] ─▶ [spread] ─▶ start ─▶ limit ─▶ [actuate]
+ *     pose ─▶ predict ─▶ [tool] ─▶ contact ─▶ [normal] ─▶ [incision] ─▶ [membrane] ─▶
+ *     [reaction] ─▶ [plane] ─▶ [damping] ─▶ [insertion] ─▶ [spread] ─▶ start ─▶ limit ─▶
+ *     [actuate]
  *
  * Those in brackets are there when the scene or the rig asks for them. A plan belongs to
  * one thread at a time.
@@ -204,8 +205,14 @@ enum incise_tick_flag {
 	INCISE_TICK_NOT_FINITE = 512, /**< the force was no number: none was asked for */
 	/** the tracker flags the newest pose: not used, by incise_pose_usable() */
 	INCISE_TICK_UNUSABLE = 1024,
+	INCISE_TICK_IN_CUT = 2048,     /**< handle or tube is in a cut */
+	INCISE_TICK_MEMBRANE = 4096,   /**< the tool is on the membrane, which holds */
+	INCISE_TICK_LUMEN = 8192,      /**< it is through the membrane */
+	INCISE_TICK_BACK_WALL = 16384, /**< it presses on the wall behind */
+	/** the blade leaves no cut: tissue.cuts_most are there */
+	INCISE_TICK_FULL = 32768,
 };
-#define INCISE_TICK_FLAGS 11 /**< how many there are */
+#define INCISE_TICK_FLAGS 16 /**< how many there are */
 
 /** Poses that the plan was given so far. Real-time safe; in the thread that ticks. */
 INCISE_API void incise_plan_poses(const struct incise_plan *plan,

@@ -111,11 +111,27 @@ struct incise_scene_scalpel {
 	double axis[3];	  /**< unit, from the tip to the handle's end */
 	double side[3];	  /**< unit, normal of the flat side of blade and handle */
 	double handle_mm; /**< the handle's end from the tip */
+	double handle_width_mm, handle_thickness_mm; /**< of its flat end */
+	double tube_mm;				     /**< diameter of the tube */
 };
 
 /** Get the group `tool` of the scene, with defaults filled in. */
 INCISE_API void incise_scene_scalpel(const struct incise_scene *scene,
 				     struct incise_scene_scalpel *scalpel);
+
+/** The scene's group `membrane`: over an airway, and the target of a tube. */
+struct incise_scene_membrane {
+	double point_mm[3]; /**< its middle */
+	double normal[3];   /**< unit, out of the tissue */
+	double radius_mm;
+	double thickness_mm; /**< it yields after so much; 0: the scene has none … */
+	double puncture_N;   /**< … with this force, to which it rises evenly */
+	double back_wall_mm; /**< the airway's other side, from the membrane */
+};
+
+/** Get the group `membrane` of the scene. @return whether it has one */
+INCISE_API bool incise_scene_membrane(const struct incise_scene *scene,
+				      struct incise_scene_membrane *membrane);
 
 /** Get the group `limits` of the scene, with defaults filled in. */
 INCISE_API void incise_scene_limits(const struct incise_scene *scene,

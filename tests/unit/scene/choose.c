@@ -38,8 +38,8 @@ static size_t n_all;
 
 static void list_stages(void)
 {
-	static const char *const before[] = {"pose", "predict", "tool", "contact",
-					     "normal"};
+	static const char *const before[] = {"pose",   "predict",  "tool",    "contact",
+					     "normal", "incision", "membrane"};
 	static const char *const after[] = {"start", "limit", "actuate", "wound",
 					    "bleeding"};
 
@@ -55,7 +55,7 @@ static void list_stages(void)
 struct lacking {
 	const char *force; /* the name of one, or "insertion forces", or "all forces" */
 	bool model;	   /* in the place of the reaction */
-	bool no_gain, no_average;
+	bool no_gain, no_average, no_membrane;
 };
 
 static bool has(const struct lacking *w, const struct incise_tissue_force *force)
@@ -91,9 +91,14 @@ static struct incise_scene *scene_of(const struct lacking *w,
 		 "tissue = { gain = %.1f;\n%s };\n"
 		 "effects = { average_ticks = %d; };\n"
 		 "device = { delay_ticks = 0; };\n"
-		 "limits = { force_N = 1.2; slew_N_s = 200.0; ramp_ms = 50.0; };\n",
+		 "limits = { force_N = 1.2; slew_N_s = 200.0; ramp_ms = 50.0; };\n%s",
 		 w->model ? "model = \"m.fis\";" : "", arithmetic, surface->text,
-		 w->no_gain ? 0.0 : 1.0, tissue, w->no_average ? 1 : 8);
+		 w->no_gain ? 0.0 : 1.0, tissue, w->no_average ? 1 : 8,
+		 w->no_membrane ? ""
+				: "membrane = { point_mm = [0.0, 0.0, -2.5]; "
+				  "normal = [0.0, 0.1, 1.0]; radius_mm = 6.0; "
+				  "thickness_mm = 1.0; puncture_N = 0.3; "
+				  "back_wall_mm = 1.2; };\n");
 	scene = fed_scene(&folder, text, &err);
 	if (!scene)
 		fail_msg("%s", err.text);
@@ -243,6 +248,7 @@ struct lack {
 static const struct lack lacks[] = {
 	{"tool", "nothing is inserted", {.force = "insertion forces"}, NULL},
 	{"normal", "average_ticks is 1", {.no_average = true}, NULL},
+	{"membrane", "no membrane", {.no_membrane = true}, NULL},
 	{"plane", "plane_N_mm is 0", {.force = "plane", .model = true}, NULL},
 	/* One that lacks nearly all: paper 1's. */
 	{"normal",
@@ -278,7 +284,9 @@ static void test_lean_is_full_to_the_bit(const struct surface *surface,
 	struct seen seen = {0};
 	const unsigned int met = INCISE_TICK_CONTACT | INCISE_TICK_STALE |
 				 INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED |
-				 INCISE_TICK_STARTING | INCISE_TICK_EXTRAPOLATED;
+				 INCISE_TICK_STARTING | INCISE_TICK_EXTRAPOLATED |
+				 INCISE_TICK_IN_CUT | INCISE_TICK_MEMBRANE |
+				 INCISE_TICK_LUMEN | INCISE_TICK_BACK_WALL;
 
 	for (int i = 0; i < LACKS; i++) {
 		const struct lack one = lack_of(i), *lack = &one;

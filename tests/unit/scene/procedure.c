@@ -26,8 +26,12 @@
 #define KY 0.28
 #define KXZ 0.22
 #define ALIGNED 0.2
+#define TUBE_MM 7.0
+#define STRETCH_MM 2.0
 #define HANDLE_MM 120.0
-#define REACH_MM 50.0 /* of all that is done here */
+#define SLEW_N 0.4	 /* in a tick */
+#define ROUNDING_N 1e-14 /* of some sums of 4 N */
+#define REACH_MM 50.0	 /* of all that is done here */
 
 /*
  * Of a hand that has rested for 0.7 s. The filter's memory of the way there is some
@@ -83,6 +87,13 @@ static void hand(void *own, double t_s, struct incise_tracker_sample *pose)
 		pose->position_mm[i] = h.end[i] - (h.by_handle ? HANDLE_MM * axis[i] : 0);
 }
 
+static double force_N(const struct incise_tick *tick)
+{
+	return sqrt(tick->command_N[0] * tick->command_N[0] +
+		    tick->command_N[1] * tick->command_N[1] +
+		    tick->command_N[2] * tick->command_N[2]);
+}
+
 /* Conditions that hold at every tick. */
 static void one_tick(struct theatre *th)
 {
@@ -90,7 +101,8 @@ static void one_tick(struct theatre *th)
 
 	assert_int_equal(fed_tick(th->plan, th->t_ns, hand, th, &th->tick), 0);
 	th->t_ns += 1000000;
-	if (th->tick.phase != was.phase) {
+	assert_true(fabs(force_N(&th->tick) - force_N(&was)) <= SLEW_N + ROUNDING_N);
+	if (th->tick.phase != was.phase && th->tick.tool == was.tool) {
 		th->begins += was.phase == INCISE_PHASE_FREE;
 		th->ends += th->tick.phase == INCISE_PHASE_FREE;
 		/* Never from one into the other without being out. */
@@ -99,7 +111,9 @@ static void one_tick(struct theatre *th)
 	}
 	if (th->tick.tool != was.tool) {
 		th->changes++;
-		assert_int_equal(was.phase, INCISE_PHASE_FREE);
+		/* Out of the tissue, or after the force has faded. */
+		assert_true(was.phase == INCISE_PHASE_FREE || force_N(&was) == 0);
+		assert_true(force_N(&th->tick) <= SLEW_N);
 	}
 	if (th->tick.phase != INCISE_PHASE_FREE)
 		assert_int_equal(th->tick.phase, th->tick.tool == INCISE_TOOL_BLADE
@@ -303,9 +317,15 @@ static void test_procedure(void **state)
 	go(&th, 20, 0, 30, 1);
 	assert_int_equal(th.tick.tool, INCISE_TOOL_TUBE);
 	assert_free(&th);
-	/* Being round it goes in easily in any turn: here it is across the cut. */
+	/*
+	 * Being round it goes in as easily in any turn: here it is across the cut. That was opened
+	 * 3 mm by the handle's width, of which some was elastic, so that 1 mm stays.
+	 */
 	go(&th, 20, 0, -3, 0.7);
-	assert_inserted(&th, 20, ALIGNED);
+	assert_inserted(&th, 20,
+			ALIGNED + (1 - ALIGNED) *
+					  (TUBE_MM - STRETCH_MM - (3 - STRETCH_MM)) /
+					  TUBE_MM);
 	go(&th, 20, 0, 10, 0.6);
 	assert_free(&th);
 	assert_int_equal(th.begins, 4);
@@ -321,8 +341,8 @@ static void test_procedure(void **state)
 	end(&th);
 }
 
-/* In the tissue nothing changes what is held: neither its turn nor a word. */
-static void test_no_change_in_the_tissue(void **state)
+/* In the tissue a turn does not change the tool. A word does, when the force has faded. */
+static void test_change_in_the_tissue(void **state)
 {
 	struct theatre th;
 	struct held to;
@@ -331,19 +351,23 @@ static void test_no_change_in_the_tissue(void **state)
 	go(&th, 10, 0, -2, 0.4);
 	to = th.to;
 	to.about_x = 2.5;
-	assert_int_equal(incise_plan_set_tool(th.plan, INCISE_TOOL_TUBE), 0);
 	move(&th, &to, 0.6, true);
 	assert_int_equal(th.tick.tool, INCISE_TOOL_BLADE);
 	assert_int_equal(th.tick.phase, INCISE_PHASE_CUTTING);
-	go(&th, 10, 0, 5, 0.4);
+	assert_int_equal(incise_plan_set_tool(th.plan, INCISE_TOOL_TUBE), 0);
+	/* Its force comes back by the ramp of 0.2 s; fresh, it is a cut of no length. */
+	move(&th, &to, 0.6, true);
 	assert_int_equal(th.tick.tool, INCISE_TOOL_TUBE);
+	assert_inserted(&th, 10, 1);
+	assert_int_equal(incise_plan_set_tool(th.plan, INCISE_TOOL_AUTO), 0);
+	move(&th, &to, 0.6, true);
+	assert_int_equal(th.tick.tool, INCISE_TOOL_HANDLE);
 	assert_free(&th);
 	end(&th);
 }
 
 /*
- * A word in the tissue counts once it is out, one tick after a force of the tissue that is
- * still on its way down. The way from one end of the scalpel to the other, 120 mm, is no
+ * The tool changes out of the tissue while a force of the tissue is still on its way down. The way from one end of the scalpel to the other, 120 mm, is no
  * work of that force.
  */
 static void test_change_is_no_work(void **state)
@@ -359,7 +383,6 @@ static void test_change_is_no_work(void **state)
 	/* 5 mm aside, so that it comes out with some N across, and fast. */
 	go(&th, 20, 5, -0.45, 0.3);
 	assert_true(fabs(th.tick.command_N[1]) > 0.75 * 5 * KXZ);
-	assert_int_equal(incise_plan_set_tool(th.plan, INCISE_TOOL_TUBE), 0);
 	to = th.to;
 	to.end[2] = 30;
 	th.from = th.to;
@@ -370,6 +393,8 @@ static void test_change_is_no_work(void **state)
 		enum incise_tool was = th.tick.tool;
 
 		one_tick(&th);
+		if (th.tick.phase == INCISE_PHASE_FREE)
+			incise_plan_set_tool(th.plan, INCISE_TOOL_TUBE);
 		if (th.tick.tool != was) {
 			changed++;
 			/* The force is still there when it happens: the case is met. */
@@ -599,7 +624,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_procedure),
-		cmocka_unit_test(test_no_change_in_the_tissue),
+		cmocka_unit_test(test_change_in_the_tissue),
 		cmocka_unit_test(test_change_is_no_work),
 		cmocka_unit_test(test_leaning_the_handle),
 		cmocka_unit_test(test_averaged_normal),

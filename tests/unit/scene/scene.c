@@ -182,8 +182,13 @@ static void test_ranges(void **state)
 		{"tissue", "aligned", "-0.001", "0", "1", "1.001"},
 		{"tissue", "spread_N_mm", "-0.001", "0", "1000", "1000.1"},
 		{"tissue", "leave_mm", "-0.001", "0", "5", "5.001"},
+		{"tissue", "cut_from_mm", "-0.001", "0", "50", "50.1"},
+		{"tissue", "stretch_mm", "-0.001", "0", "50", "50.1"},
 		{"effects", "average_ticks", "0", "1", "64", "65"},
 		{"tool", "handle_mm", "0.999", "1", "1000", "1000.1"},
+		{"tool", "handle_width_mm", "0.999", "1", "100", "100.1"},
+		{"tool", "handle_thickness_mm", "0.09", "0.1", "100", "100.1"},
+		{"tool", "tube_mm", "0.49", "0.5", "100", "100.1"},
 		{"device", "mass_kg", "0.0009", "0.001", "10", "10.01"},
 		{"device", "damping_N_s_mm", "-1e-9", "0", "1", "1.001"},
 		{"device", "coulomb_N", "-1e-9", "0", "10", "10.01"},
@@ -297,7 +302,7 @@ static void test_unknown_keys(void **state)
 		{"effects", "guarded", "expected one of average_ticks"},
 		{"effects", "guard", "is gone: the same scenes come to rest without it"},
 		{"tool", "handle_cm", "expected handle_mm, in that unit"},
-		{"tool", "blade", "expected one of handle_mm, side, axis"},
+		{"tool", "blade", "expected one of handle_mm, handle_width_mm"},
 		{"device", "mass_g", "expected mass_kg, in that unit"},
 		{"device", "coulomb_mN", "expected coulomb_N, in that unit"},
 		{"device", "encoder_um", "expected encoder_mm, in that unit"},
@@ -343,6 +348,47 @@ static void test_groups(void **state)
 		/* With nothing in them they are as if they were not there. */
 		assert_true(takes("", groups[i], "{ }", NULL));
 	}
+}
+
+#define MEMBRANE(point, thickness, wall)                                       \
+	"tissue = { insertion_N_mm = 0.1; };\nmembrane = { " point             \
+	"normal = [0.0, 0.0, 2.0]; radius_mm = 5.0; thickness_mm = " thickness \
+	"; puncture_N = 0.5; back_wall_mm = " wall "; };\n"
+#define POINT "point_mm = [1.0, 2.0, -8.0]; "
+
+static void test_membrane(void **state)
+{
+	static const struct {
+		const char *text, *says;
+	} cases[] = {
+		{MEMBRANE(POINT, "4.0", "14.0"), NULL},
+		{MEMBRANE("", "4.0", "14.0"), "point_mm"},
+		{MEMBRANE(POINT, "14.0", "14.0"), "expected more"},
+		{MEMBRANE(POINT, "0.0", "14.0"), "thickness_mm"},
+		{MEMBRANE("point_mm = [1.0, 2.0]; ", "4.0", "14.0"), "point_mm"},
+	};
+	struct incise_scene_membrane membrane;
+	struct incise_scene *scene;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		scene = load(cases[i].text, NULL, &err);
+		if (!scene != !!cases[i].says ||
+		    (!scene && (err.code != EINVAL || !strstr(err.text, "a.scene:2") ||
+				!strstr(err.text, cases[i].says))))
+			fail_msg("case %zu: %s", i, err.text);
+		incise_scene_free(scene);
+	}
+	scene = load(MEMBRANE(POINT, "4.0", "14.0"), NULL, NULL);
+	assert_true(incise_scene_membrane(scene, &membrane));
+	assert_true(membrane.point_mm[2] == -8 && membrane.normal[2] == 1);
+	assert_true(membrane.radius_mm == 5 && membrane.thickness_mm == 4);
+	assert_true(membrane.puncture_N == 0.5 && membrane.back_wall_mm == 14);
+	incise_scene_free(scene);
+	scene = load("tissue = { insertion_N_mm = 0.1; };\n", NULL, NULL);
+	assert_false(incise_scene_membrane(scene, &membrane));
+	incise_scene_free(scene);
 }
 
 /* One reaction, of the model or of a constant, and any force at all. */
@@ -507,6 +553,7 @@ int main(void)
 		cmocka_unit_test(test_other_types),
 		cmocka_unit_test(test_unknown_keys),
 		cmocka_unit_test(test_groups),
+		cmocka_unit_test(test_membrane),
 		cmocka_unit_test(test_forces),
 		cmocka_unit_test(test_set_arithmetic),
 		cmocka_unit_test(test_other_model),

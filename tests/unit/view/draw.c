@@ -106,7 +106,7 @@ static struct incise_draw *draw_new(const struct incise_canvas *canvas, int samp
 				      .canvas = canvas,
 				      .normal_rgb = normals,
 				      .look = INCISE_SKIN_NECK,
-				      .scalpel = {{0, 0, 1}, {0, 1, 0}, 120},
+				      .scalpel = {{0, 0, 1}, {0, 1, 0}, 120, 10, 3, 7},
 				      .samples = samples};
 	struct incise_error err = {0};
 	struct incise_draw *draw = incise_draw_new(&s, &err);
@@ -233,7 +233,8 @@ static int darker(int x, int y)
 
 static void test_instrument_is_where_its_pose_says(void **state)
 {
-	static const struct incise_scene_scalpel scalpel = {{0, 0, 1}, {0, 1, 0}, 120};
+	static const struct incise_scene_scalpel scalpel = {{0, 0, 1}, {0, 1, 0}, 120,
+							    10,	       3,	  7};
 	struct incise_tick tick = held(INCISE_TOOL_BLADE);
 	struct instrument_place place;
 	struct instrument_mesh mesh;

@@ -12,7 +12,7 @@
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/instrument_shape.h"
 
-static const struct incise_scene_scalpel scalpel = {{0, 0, 1}, {0, 1, 0}, 120};
+static const struct incise_scene_scalpel scalpel = {{0, 0, 1}, {0, 1, 0}, 120, 10, 3, 7};
 
 static double signed_volume(const struct instrument_mesh *mesh)
 {
@@ -134,7 +134,8 @@ static void test_place(void **state)
 
 static void test_nowhere(void **state)
 {
-	static const struct incise_scene_scalpel odd = {{0, 0, 1}, {0, 0, 1}, 120};
+	static const struct incise_scene_scalpel odd = {{0, 0, 1}, {0, 0, 1}, 120,
+							10,	   3,	      7};
 	const struct incise_tick good = {.quaternion = {1, 0, 0, 0},
 					 .tool = INCISE_TOOL_BLADE};
 	struct instrument_place place;
