@@ -197,6 +197,17 @@ static struct closed_loop loop_of(const struct rest_row *row)
 	};
 }
 
+/* The path of a file in memory differs from run to run: an error's text goes on without it. */
+static void drop_path(struct incise_error *err, const char *path)
+{
+	size_t n = strlen(path);
+
+	if (strncmp(err->text, path, n) || strncmp(err->text + n, ": ", 2))
+		return;
+	n += strlen(": ");
+	memmove(err->text, err->text + n, strlen(err->text + n) + 1);
+}
+
 /* The plan of a case, with its forces times @gain, on a device of that damping. */
 static struct incise_plan *plan_of(const struct rest_row *row, double gain,
 				   double damping_N_s_mm, struct incise_scene **scene,
@@ -216,6 +227,8 @@ static struct incise_plan *plan_of(const struct rest_row *row, double gain,
 	*scene = incise_scene_load(file.path, NULL, err);
 	if (*scene)
 		plan = incise_plan_new_fed(*scene, &tracker, err);
+	if (!plan)
+		drop_path(err, file.path);
 	fclose(file.file);
 	return plan;
 }
