@@ -264,10 +264,10 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	return incise_error_set(
 		err, EDOM,
 		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm, a device of "
-		"%g kg and %g N s/mm %s holds %.4g N/mm, of which 5 %% are kept in reserve; %s, or describe the "
-		"device",
+		"%g kg and %g N s/mm %s holds %.4g N/mm, of which %g %% are kept in "
+		"reserve; %s, or describe the device",
 		scene->path, s->stiffness_N_mm, s->damping_N_s_mm, s->device.mass_kg,
-		s->device.damping_N_s_mm, delay, s->limit_N_mm, advice);
+		s->device.damping_N_s_mm, delay, s->limit_N_mm, 100 * RESERVE, advice);
 }
 
 /*
