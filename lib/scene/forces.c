@@ -169,14 +169,10 @@ static void reaction_front_fixed(struct incise_plan *plan, struct incise_tick *t
 	double way_mm = advance_mm(plan, own, &fresh);
 	double most_N = plan->depth_mm > 0 ? cutting_fixed(plan, tick) : 0;
 
-	if (plan->proxy.began) {
-		fixed->depth = fixed->force = fixed->rest = 0;
-		fixed->work2 = fixed->most2 = 0;
-	}
-	if (fresh) {
-		*fixed = (struct incise_fixed_front){0};
+	if (plan->proxy.began)
+		*fixed = (struct incise_fixed_front){.cut = fresh ? 0 : fixed->cut};
+	if (fresh)
 		own->state.front.advance_mm = before = 0;
-	}
 	own->state.front.advance_mm =
 		fmin(own->state.front.advance_mm + way_mm, CUT_MOST_MM);
 	own->state.front.advance = to_fixed(own->state.front.advance_mm);

@@ -7,23 +7,16 @@
 #include "../fixed/front.h"
 #include "front.h"
 
-static void begin(struct incise_front *front, const double at_mm[3],
-		  const double normal[3], const double side[3])
-{
-	*front = (struct incise_front){0};
-	incise_line_begin(&front->line, at_mm, normal, side);
-}
-
 bool incise_front_enter(struct incise_front *front, const double at_mm[3],
 			const double normal[3], const double side[3])
 {
 	bool fresh = !incise_line_holds(&front->line, at_mm, INCISE_FRONT_BESIDE_MM);
 
+	/* The work of an earlier visit pays for nothing now. */
+	*front = (struct incise_front){.cut_mm = fresh ? 0 : front->cut_mm,
+				       .line = front->line};
 	if (fresh)
-		begin(front, at_mm, normal, side);
-	front->depth_mm = front->force_N = front->rest_mm = 0;
-	/* What an earlier visit put in pays for nothing now. */
-	front->work_N_mm = front->most_N_mm = 0;
+		incise_line_begin(&front->line, at_mm, normal, side);
 	return fresh;
 }
 
