@@ -144,8 +144,10 @@ static INCISE_REALTIME double force_at(struct incise_tissue *tissue,
 	if (*cuts)
 		tissue->factor = factor(tissue, blade, path_mm);
 	force_N = front_N * tissue->factor;
-	/* The front's account has no tooth and bound: once all is given back, only an elastic force
-	   is left. */
+	/*
+	 * The front's account has no tooth and bound: once all is given back, only an elastic
+	 * force is left.
+	 */
 	work_N_mm = tissue->work_N_mm + (tissue->force_N + force_N) * half_way_mm;
 	if (work_N_mm < INCISE_FRONT_KEPT * tissue->most_N_mm) {
 		double most_N = half_way_mm > 0

@@ -120,8 +120,8 @@ struct incise_plan_stability {
 	 */
 	int runs;
 	struct {
-		double lean_N,
-			along_mm_s; /**< the hand's force; its speed along the skin */
+		double lean_N;	   /**< the hand's force */
+		double along_mm_s; /**< its speed along the skin */
 		double depth_mm, swing_mm, settle_s;
 	} worst;
 	/** Range at rest by the noise of a tracker, sd 0.02 mm, in a hand that leans with half
