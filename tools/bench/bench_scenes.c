@@ -5,7 +5,6 @@
  * (incise_scene_set_full()): time, instructions and memory of both, and whether their forces are
  * the same to the bit.
  */
-#include <glob.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -244,13 +243,9 @@ static void add_given(struct scenes *s, const char *operand)
 
 static void add_shipped(struct scenes *s)
 {
-	char pattern[4200];
 	glob_t found;
 
-	snprintf(pattern, sizeof(pattern), "%s/*.scene", scene_argument_shipped());
-	if (glob(pattern, 0, NULL, &found))
-		cli_fail("%s: no scenes are there, though they come with the program",
-			 scene_argument_shipped());
+	scene_argument_list_shipped(&found);
 	for (size_t i = 0; i < found.gl_pathc && s->n < SCENES_MAX / 2; i++) {
 		const char *name = strrchr(found.gl_pathv[i], '/') + 1;
 

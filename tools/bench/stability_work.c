@@ -10,7 +10,6 @@
  *
  * The tool does not turn: no torque is rendered, so that only ways do work.
  */
-#include <glob.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -257,12 +256,9 @@ static void add(const char *path, const struct tool *tool, bool quick)
 void stability_work(struct bench_run *run)
 {
 	double returned = 0;
-	char pattern[4200];
 	glob_t found;
 
-	snprintf(pattern, sizeof(pattern), "%s/*.scene", scene_argument_shipped());
-	if (glob(pattern, 0, NULL, &found))
-		cli_fail("%s: no scenes are there", scene_argument_shipped());
+	scene_argument_list_shipped(&found);
 	for (size_t i = 0; i < found.gl_pathc && n_rows < N(rows); i++)
 		for (int t = 0; t < N(tools); t++)
 			add(found.gl_pathv[i], &tools[t], run->quick);

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include "scene_argument.h"
@@ -24,6 +25,16 @@ const char *scene_argument_shipped(void)
 
 	snprintf(folder, sizeof(folder), "%s/../share/incise/scenes", cli_folder());
 	return folder;
+}
+
+void scene_argument_list_shipped(glob_t *found)
+{
+	char *pattern = cli_text("%s/*.scene", scene_argument_shipped());
+
+	if (glob(pattern, 0, NULL, found))
+		cli_fail("%s: no scenes are there, though they come with the program",
+			 scene_argument_shipped());
+	free(pattern);
 }
 
 bool scene_argument_find(struct scene_argument *argument, const char *operand)

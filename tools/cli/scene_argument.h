@@ -5,6 +5,7 @@
 #ifndef INCISE_SCENE_ARGUMENT_H
 #define INCISE_SCENE_ARGUMENT_H
 
+#include <glob.h>
 #include <stdbool.h>
 #include <incise/scene.h>
 #include "cli.h"
@@ -43,6 +44,9 @@ char *scene_argument_name(const char *path);
 
 /* The folder of the installed scenes; lives as long as the program. */
 const char *scene_argument_shipped(void);
+
+/* The paths of all installed scenes, by name: globfree(3). Fails the program if there are none. */
+void scene_argument_list_shipped(glob_t *found);
 
 /* Read it; NULL with errno and @err on failure. incise_scene_free(). */
 struct incise_scene *scene_argument_read(const struct scene_argument *argument,
