@@ -249,7 +249,7 @@ static void see(struct window *window, const struct run *run)
 
 	window->low_mm = fmin(window->low_mm, at);
 	window->high_mm = fmax(window->high_mm, at);
-	/* How far it came out again; one that sinks does not swing. */
+	/* Outward travel only: a hand that sinks does not swing. */
 	window->travel_mm = fmax(window->travel_mm, at - window->low_mm);
 	window->low_N = fmin(window->low_N, run->sent_N);
 	window->high_N = fmax(window->high_N, run->sent_N);

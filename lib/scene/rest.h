@@ -25,7 +25,7 @@
 /* Sd per axis of a magnetic tracker near its source, as predict.h assumes. */
 #define INCISE_REST_NOISE_MM 0.02
 
-/* What is changed of the plan in a search. */
+/* Changes to the plan in a search. */
 struct incise_rest_trial {
 	double gain;	       /* of all forces, times the plan's; 1: as it is */
 	double damping_N_s_mm; /* of the device */

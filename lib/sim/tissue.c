@@ -19,8 +19,8 @@
  * only while the blade cuts. Closed motions take work; with teeth, which are no part of the front's
  * account, all but one in some hundreds of wild ones do.
  *
- * Who presses does not cut: there is no front, the tissue springs back, less a force that grows
- * with speed against the motion.
+ * A press does not cut: there is no front. The tissue springs back, and a force that grows with
+ * speed acts against the motion.
  *
  * With withdrawal = paper all of that is mean, in both directions.
  */
@@ -51,8 +51,8 @@ void incise_tissue_init(struct incise_tissue *tissue,
 #define PRESSED_MM_S 70.0
 
 /*
- * What is not cut springs back. The law's share of speed acts against the motion, and in
- * proportion to it, as that of foam: friction of any other kind would look like a delay.
+ * Tissue that is only pressed springs back. The law's share of speed acts against the motion, and
+ * in proportion to it, as that of foam: friction of any other kind would look like a delay.
  */
 static double pressing_force(const struct incise_sim_config *config,
 			     const struct incise_blade *blade)

@@ -299,7 +299,7 @@ static const struct {
 	     {1.9, 0.1, 0}, {3, 3, 0},	    {3.5, 0.1, 60}};
 
 /*
- * What a hand notices: a force that is off by more than 7 % (Pang, Tan and Durlach, Perception &
+ * A hand notices a force that is off by more than 7 % (Pang, Tan and Durlach, Perception &
  * Psychophysics 49, 1991), a stiffness by more than 23 % (Jones and Hunter, Experimental Brain
  * Research 79, 1990).
  */
@@ -459,7 +459,7 @@ static bool lean(const struct setup *s, enum guard kind, double gain, int which,
 		step(l, leans[which].lean_N, 0);
 		low = fmin(low, l->device.position_mm);
 		high = fmax(high, l->device.position_mm);
-		/* How far it comes out again; one that sinks does not swing. */
+		/* Outward travel only: a hand that sinks does not swing. */
 		*swing_mm = fmax(*swing_mm, l->device.position_mm - low);
 		if (k % window || k > quarter)
 			continue;

@@ -9,8 +9,8 @@
  *              └─ refused ───▶ the same, as it is and twice as strong
  *                                                        asked: few would rest then
  *
- * What is refused runs on a plan made for a device that is damped well enough: a plan's ticks know
- * no device.
+ * A refused case runs on a plan made for a device that is damped well enough: a plan's ticks do not
+ * depend on the device.
  */
 #include <pthread.h>
 #include <stdatomic.h>
