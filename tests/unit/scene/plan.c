@@ -537,7 +537,7 @@ static void test_getters(void **state)
 	assert_true(incise_plan_bound(exact.plan, 20) == 0);
 
 	incise_plan_stability(fixed.plan, &s);
-	assert_true(s.stiffness_N_mm == 0.14 + 0.17 && s.certified);
+	assert_true(s.stiffness_N_mm == 0.8 / 5 + 0.17 && s.certified);
 	assert_true(s.damping_N_s_mm == 0.0005 && s.speed_slope_N_s_mm == 0);
 	assert_true(s.limit_N_mm >= s.stiffness_N_mm && !s.own_delay);
 	/* 4.2 ms and a period of 8.33. */

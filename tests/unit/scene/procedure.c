@@ -410,6 +410,177 @@ static void test_change_is_no_work(void **state)
 	end(&th);
 }
 
+/* The membrane of the scene: over the airway at x = 50. */
+#define MEMBRANE_MM 8.0
+#define PUNCTURE_N 0.8
+#define YIELDS_MM 5.0
+#define BACK_WALL_MM 14.0
+
+/* Cut 30 mm along x around there, so deep. */
+static void cut_at(struct theatre *th, double x, double depth_mm)
+{
+	start_at(th, 15);
+	go(th, x - 15, 0, 5, 1);
+	go(th, x - 15, 0, -depth_mm, 0.8);
+	go(th, x + 15, 0, -depth_mm, 2);
+	go(th, x + 15, 0, 15, 0.6);
+}
+
+/* Turned round the handle goes 10 mm in, across the cut, and comes out. */
+static void enlarge_at(struct theatre *th, double x)
+{
+	turn_round(th);
+	turn_to(th, M_PI / 2);
+	go(th, x, 0, -10, 1.5);
+	go(th, x, 0, 15, 1);
+}
+
+/* The tube, with its end above the place. */
+static void take_tube(struct theatre *th, double x)
+{
+	assert_int_equal(incise_plan_set_tool(th->plan, INCISE_TOOL_TUBE), 0);
+	if (th->to.by_handle) {
+		th->to.by_handle = false;
+		th->to.end[2] += HANDLE_MM;
+	}
+	go(th, x, 0, 15, 1.5);
+	assert_int_equal(th->tick.tool, INCISE_TOOL_TUBE);
+	assert_free(th);
+}
+
+/* Held up so by the tissue in front of the membrane, and by the membrane behind it. */
+static double tube_N(double share, double cut_mm, double depth_mm, double membrane_N)
+{
+	return KY * (share * cut_mm + depth_mm - cut_mm) + membrane_N;
+}
+
+/*
+ * A tube 12 mm below the skin of a neck, whose stiffness is 0.28 N/mm: the wider the cut, the
+ * easier; the hardest where there is none. Beside the airway the tissue below the cut holds up like
+ * skin.
+ */
+static void test_tube_where_and_after_what(void **state)
+{
+	const double tight = ALIGNED + (1 - ALIGNED) * (TUBE_MM - STRETCH_MM) / TUBE_MM;
+	const double on_N = PUNCTURE_N / YIELDS_MM * (12 - MEMBRANE_MM);
+	const struct {
+		const char *after;
+		double x, cut_mm, want_N;
+		bool enlarged, hits;
+	} cases[] = {
+		{"cut and enlarged", 50, 6, tube_N(ALIGNED, 6, MEMBRANE_MM, on_N), true,
+		 true},
+		{"cut and enlarged 60 mm off the membrane", 110, 6,
+		 tube_N(ALIGNED, 6, 12, 0), true, false},
+		{"cut", 50, 6, tube_N(tight, 6, MEMBRANE_MM, on_N), false, true},
+		{"scratch", 50, 0.02, tube_N(1, 0, 12, 0), false, false},
+	};
+	double before_N = 0;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct theatre th;
+
+		cut_at(&th, cases[i].x, cases[i].cut_mm);
+		if (cases[i].enlarged)
+			enlarge_at(&th, cases[i].x);
+		take_tube(&th, cases[i].x);
+		go(&th, cases[i].x, 0, -12, 1.5);
+		print_message("tube 12 mm deep after %s: %.3f N\n", cases[i].after,
+			      th.tick.command_N[2]);
+		assert_force(&th, (double[]){0, 0, cases[i].want_N});
+		assert_int_equal(!!(th.tick.flags & INCISE_TICK_MEMBRANE), cases[i].hits);
+		/* More than is felt as different: 10 % (Weber's share of forces). */
+		assert_true(th.tick.command_N[2] > 1.1 * before_N);
+		before_N = th.tick.command_N[2];
+		end(&th);
+	}
+}
+
+/* Through the membrane, which yields at 0.8 N and stays open; in the airway; on its back wall. */
+static void test_through_the_membrane(void **state)
+{
+	const double skin_N = tube_N(ALIGNED, 6, MEMBRANE_MM, 0);
+	struct theatre th;
+
+	cut_at(&th, 50, 6);
+	enlarge_at(&th, 50);
+	take_tube(&th, 50);
+	go(&th, 50, 0, -12.9, 1.5);
+	assert_true(th.tick.flags & INCISE_TICK_MEMBRANE);
+	assert_force(&th, (double[]){0, 0, skin_N + PUNCTURE_N / YIELDS_MM * 4.9});
+	go(&th, 50, 0, -13.5, 0.3);
+	assert_true(th.tick.flags & INCISE_TICK_LUMEN);
+	assert_false(th.tick.flags & INCISE_TICK_MEMBRANE);
+	assert_force(&th, (double[]){0, 0, skin_N});
+	go(&th, 50, 0, -21, 1);
+	assert_force(&th, (double[]){0, 0, skin_N});
+	assert_false(th.tick.flags & INCISE_TICK_BACK_WALL);
+	go(&th, 50, 0, -(MEMBRANE_MM + BACK_WALL_MM + 2), 0.5);
+	assert_true(th.tick.flags & INCISE_TICK_BACK_WALL);
+	assert_force(&th, (double[]){0, 0, skin_N + PUNCTURE_N / YIELDS_MM * 2});
+	go(&th, 50, 0, 15, 2);
+	assert_free(&th);
+	/* It stays open. */
+	go(&th, 50, 0, -11, 1.5);
+	assert_true(th.tick.flags & INCISE_TICK_LUMEN);
+	assert_force(&th, (double[]){0, 0, skin_N});
+	end(&th);
+}
+
+/* A cut too short for the tube, or none, stops it like skin; so does a shallow one below its floor. */
+static void test_stopped_like_skin(void **state)
+{
+	static const struct {
+		double half_mm, cut_mm, cut_felt_mm;
+	} cases[] = {{2, 6, 0}, {15, 2, 2}};
+	const double tight = ALIGNED + (1 - ALIGNED) * (TUBE_MM - STRETCH_MM) / TUBE_MM;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct theatre th;
+
+		start_at(&th, 15);
+		go(&th, 20 - cases[i].half_mm, 0, -cases[i].cut_mm, 1);
+		go(&th, 20 + cases[i].half_mm, 0, -cases[i].cut_mm, 1);
+		go(&th, 20 + cases[i].half_mm, 0, 15, 0.6);
+		take_tube(&th, 20);
+		go(&th, 20, 0, -7, 1);
+		assert_force(&th,
+			     (double[]){0, 0, tube_N(tight, cases[i].cut_felt_mm, 7, 0)});
+		end(&th);
+	}
+}
+
+/*
+ * A blade that touches the skin elsewhere, or cuts there, changes nothing for a tube in the first
+ * cut, to the bit. No poses come for 0.1 s after it, so that the
+ * filter starts again and has no memory of where the hand was.
+ */
+static void test_touch_elsewhere(void **state)
+{
+	double force_N[3][3];
+
+	for (int other = 0; other < 3; other++) {
+		struct theatre th;
+
+		cut_at(&th, 50, 6);
+		go(&th, 20, 0, 15, 1);
+		go(&th, 20, 0, other == 0 ? 15 : other == 1 ? -0.05 : -3, 1);
+		go(&th, 20, other == 2 ? -15 : 0, other == 0 ? 15 : 5, 1);
+		go(&th, 20, 0, 15, 1);
+		take_tube(&th, 50);
+		for (int i = 0; i < 100; i++, th.t_ns += 1000000)
+			fed_tick(th.plan, th.t_ns, NULL, NULL, &th.tick);
+		assert_true(th.tick.flags & INCISE_TICK_STALE);
+		go(&th, 50, 0, 15, 0.3);
+		go(&th, 50, 0, -12, 1.5);
+		for (int i = 0; i < 3; i++)
+			force_N[other][i] = th.tick.command_N[i];
+		end(&th);
+	}
+	assert_memory_equal(force_N[0], force_N[1], sizeof(force_N[0]));
+	assert_memory_equal(force_N[0], force_N[2], sizeof(force_N[0]));
+}
+
 /* Say where to go from now on. */
 static void set_out(struct theatre *th, const struct held *to, double time_s)
 {
@@ -626,6 +797,10 @@ int main(void)
 		cmocka_unit_test(test_procedure),
 		cmocka_unit_test(test_change_in_the_tissue),
 		cmocka_unit_test(test_change_is_no_work),
+		cmocka_unit_test(test_tube_where_and_after_what),
+		cmocka_unit_test(test_through_the_membrane),
+		cmocka_unit_test(test_stopped_like_skin),
+		cmocka_unit_test(test_touch_elsewhere),
 		cmocka_unit_test(test_leaning_the_handle),
 		cmocka_unit_test(test_averaged_normal),
 		cmocka_unit_test(test_damping_on_the_way),
