@@ -94,7 +94,7 @@ struct incise_scene_picture {
 	bool wound;    /**< cuts are drawn */
 	bool bleeding; /**< they bleed */
 	enum incise_skin skin;
-	bool larynx;	   /**< it shows through: seen, not felt */
+	bool larynx;	   /**< it shows through; felt is the group membrane */
 	int texture_px;	   /**< side of the texture: 256, 512 … 4096 */
 	double gravity[3]; /**< unit vector: where blood runs, in the tracker's frame */
 	double blood_ul_s_mm2;	/**< for each mm of length and of depth of a fresh cut */
