@@ -40,9 +40,6 @@ struct work_row {
 	double returned;		/* motions */
 };
 
-static struct work_row rows[SCENES_MAX * 3];
-static int n_rows;
-
 static const struct bench_table work_table = {
 	.key = "work",
 	.row_bytes = sizeof(struct work_row),
@@ -112,6 +109,7 @@ static struct motion draw_motion(uint64_t key, uint64_t *n)
 	return m;
 }
 
+/* The last one is a session: another of them for each motion, in the cuts of all before. */
 static const struct tool {
 	const char *name;
 	enum incise_tool held;
@@ -119,13 +117,18 @@ static const struct tool {
 	const char *stage;  /* that a plan must have, or NULL */
 } tools[] = {{"blade", INCISE_TOOL_BLADE, {1}, NULL},
 	     {"handle", INCISE_TOOL_HANDLE, {0, 1}, "insertion"},
-	     {"tube", INCISE_TOOL_TUBE, {1}, "insertion"}};
+	     {"tube", INCISE_TOOL_TUBE, {1}, "insertion"},
+	     {"any", INCISE_TOOL_AUTO, {1}, "insertion"}};
+#define SINGLE_TOOLS 3
+
+static struct work_row rows[SCENES_MAX * (SINGLE_TOOLS + 1)];
+static int n_rows;
 
 struct hand {
 	struct incise_plan *plan;
 	const struct tool *tool;
 	struct incise_touch top;
-	double end_mm[3]; /* of the tool, from the tip */
+	double end_mm[SINGLE_TOOLS][3]; /* of each tool, from the tip */
 	double along[3], across[3];
 	double t_s;
 	struct incise_tick tick;
@@ -141,7 +144,7 @@ static void go(struct hand *hand, double along_mm, double across_mm, double out_
 	double way[3], mean[3], change[3];
 
 	memcpy(sample.quaternion, hand->tool->attitude, sizeof(sample.quaternion));
-	v3_sub(sample.position_mm, hand->top.point_mm, hand->end_mm);
+	v3_sub(sample.position_mm, hand->top.point_mm, hand->end_mm[hand->tool - tools]);
 	v3_add(sample.position_mm, sample.position_mm, along_mm, hand->along);
 	v3_add(sample.position_mm, sample.position_mm, across_mm, hand->across);
 	v3_add(sample.position_mm, sample.position_mm, out_mm, hand->top.normal);
@@ -171,24 +174,42 @@ static int by_size(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-static void measure(struct hand *hand, struct work_row *row)
+static void take(struct hand *hand, const struct tool *tool)
+{
+	hand->tool = tool;
+	incise_plan_set_tool(hand->plan, tool->held);
+}
+
+/* High up the end of each tool is found, relative to the tip. */
+static void find_ends(struct hand *hand)
+{
+	double ignored[3] = {0};
+
+	for (int i = 0; i < SINGLE_TOOLS; i++) {
+		take(hand, &tools[i]);
+		for (int k = 0; k < AIR_S * RATE_HZ; k++)
+			go(hand, 0, 0, FAR_MM, &ignored[0], &ignored[1], &ignored[2]);
+		v3_sub(hand->end_mm[i], hand->tick.tool_mm, hand->tick.position_mm);
+	}
+}
+
+static void measure(struct hand *hand, const struct tool *tool, struct work_row *row)
 {
 	static double all[MOTIONS];
 	uint64_t key = incise_random_key(1, INCISE_RANDOM_TOOTH), n = 0;
 	double ignored[3] = {0};
 
 	row->least_N_mm = row->least_beyond_N_mm = row->least_held_N_mm = INFINITY;
-	for (int k = 0; k < AIR_S * RATE_HZ; k++)
-		go(hand, 0, 0, FAR_MM, &ignored[0], &ignored[1], &ignored[2]);
-	/* Where the tip was then, the tool's end was there. */
-	v3_copy(hand->end_mm, hand->tick.tool_mm);
-	v3_add(hand->end_mm, hand->end_mm, -1, hand->tick.position_mm);
+	find_ends(hand);
+	take(hand, tool);
 	for (int i = 0; i < row->motions; i++) {
 		struct motion m = draw_motion(key, &n);
 		double taken = 0, held = 0, rounding = 0;
 		bool contact = false;
 		int ticks = (int)(m.length_s * RATE_HZ);
 
+		if (tool->held == INCISE_TOOL_AUTO)
+			take(hand, &tools[(int)draw(key, &n, 0, SINGLE_TOOLS)]);
 		/* It is taken there through the air, where the predictor forgets the way. */
 		for (int k = 0; k < AIR_S * RATE_HZ; k++)
 			go(hand, m.at_mm, 0, ABOVE_MM, &ignored[0], &ignored[1],
@@ -242,12 +263,10 @@ static void add(const char *path, const struct tool *tool, bool quick)
 	row->motions = quick ? QUICK_MOTIONS : MOTIONS;
 	if (!tool->stage || has(hand.plan, tool->stage)) {
 		n_rows++;
-		incise_plan_set_tool(hand.plan, tool->held);
 		incise_plan_top(hand.plan, &hand.top);
 		/* The top of the shipped scenes faces up, and the neck lies along x. */
 		hand.along[0] = hand.across[1] = 1;
-		hand.tool = tool;
-		measure(&hand, row);
+		measure(&hand, tool, row);
 	}
 	incise_plan_free(hand.plan);
 	incise_scene_free(scene);
