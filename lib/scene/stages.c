@@ -192,14 +192,6 @@ int incise_stage_normal(struct incise_plan *plan, struct incise_tick *tick)
 	return 0;
 }
 
-static void meet_opening(struct incise_plan *plan, const struct incise_tick *tick)
-{
-	incise_incision_opening(plan->incision, tick->tool, tick->proxy_mm,
-				&plan->opening);
-	plan->tightness =
-		incise_incision_tightness(plan->incision, &plan->opening, tick->tool);
-}
-
 /*
  * The cuts that this tick makes or widens. An instrument meets the opening as it was when it went
  * in: it makes the way easier for the next one.
@@ -208,14 +200,17 @@ int incise_stage_incision(struct incise_plan *plan, struct incise_tick *tick)
 {
 	bool inserts = tick->phase == INCISE_PHASE_INSERTION;
 
-	if (inserts && (plan->proxy.began || !plan->opening.in))
-		meet_opening(plan, tick);
-	else if (!inserts && !(tick->flags & INCISE_TICK_STALE))
-		plan->opening.in = false;
-	if (inserts && plan->opening.in)
-		tick->flags |= INCISE_TICK_IN_CUT;
 	if (!incise_incision_tick(plan->incision, tick))
 		tick->flags |= INCISE_TICK_FULL;
+	if (inserts && (plan->proxy.began || !plan->opening.in)) {
+		plan->opening = *incise_incision_met(plan->incision);
+		plan->tightness = incise_incision_tightness(plan->incision,
+							    &plan->opening, tick->tool);
+	} else if (!inserts && !(tick->flags & INCISE_TICK_STALE)) {
+		plan->opening.in = false;
+	}
+	if (inserts && plan->opening.in)
+		tick->flags |= INCISE_TICK_IN_CUT;
 	return 0;
 }
 

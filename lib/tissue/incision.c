@@ -35,6 +35,7 @@ struct incise_incision {
 	int current;
 	double at_mm[3], depth_mm; /* of the last tick */
 	double checked_mm[3];	   /* up to here, for other cuts that it meets */
+	struct incise_opening met; /* of handle or tube at this tick */
 	int n;
 	struct incise_cut cut[]; /* setup.cuts_most */
 };
@@ -105,6 +106,13 @@ static struct local localize(const struct incise_cut *cut, const double at_mm[3]
 	v3_sub(off, at_mm, cut->at_mm);
 	return (struct local){v3_dot(off, cut->along), v3_dot(off, cut->side),
 			      v3_dot(off, cut->normal)};
+}
+
+static double across(const struct incise_cut *cut, const double at_mm[3])
+{
+	return (at_mm[0] - cut->at_mm[0]) * cut->side[0] +
+	       (at_mm[1] - cut->at_mm[1]) * cut->side[1] +
+	       (at_mm[2] - cut->at_mm[2]) * cut->side[2];
 }
 
 /* Whether a place is within @reach_mm of the cut, as seen along its normal. */
@@ -325,22 +333,23 @@ static bool cut_to(struct incise_incision *incision, const struct incise_tick *t
 
 /* --- handle and tube ------------------------------------------------------------------- */
 
-double incise_incision_extent_mm(const struct incise_incision *incision,
-				 enum incise_tool tool, double across)
+/* Extent across a line, mm. @turned: 1 where the handle's flat side lies across it. */
+static double extent_across_mm(const struct incise_incision *incision,
+			       enum incise_tool tool, double turned)
 {
 	const struct incise_incision_setup *setup = &incision->setup;
 
 	if (tool == INCISE_TOOL_TUBE)
 		return setup->tube_mm;
 	return setup->handle_thickness_mm +
-	       across * (setup->handle_width_mm - setup->handle_thickness_mm);
+	       turned * (setup->handle_width_mm - setup->handle_thickness_mm);
 }
 
 double incise_incision_tightness(const struct incise_incision *incision,
 				 const struct incise_opening *opening,
 				 enum incise_tool tool)
 {
-	double size_mm = incise_incision_extent_mm(incision, tool, 1);
+	double size_mm = extent_across_mm(incision, tool, 1);
 	double to_open_mm = size_mm - incision->setup.stretch_mm;
 	double left_mm = fmax(to_open_mm - opening->open_mm, 0);
 
@@ -376,12 +385,16 @@ void incise_incision_opening(const struct incise_incision *incision,
 
 	*opening = (struct incise_opening){0};
 	for (int i = 0; i < incision->n; i++) {
+		double across_mm = fabs(across(&incision->cut[i], at_mm));
+
+		/* Most are far aside: the rest is not looked at. */
+		if (across_mm > reach_mm || across_mm >= best_mm)
+			continue;
 		at = localize(&incision->cut[i], at_mm);
-		if (reaches(&incision->cut[i], &at, reach_mm) &&
-		    fabs(at.across_mm) < best_mm) {
+		if (reaches(&incision->cut[i], &at, reach_mm)) {
 			nearest = i;
 			best = at;
-			best_mm = fabs(at.across_mm);
+			best_mm = across_mm;
 		}
 	}
 	if (nearest < 0)
@@ -404,25 +417,25 @@ void incise_incision_opening(const struct incise_incision *incision,
 static void widen(struct incise_incision *incision, const struct incise_tick *tick)
 {
 	const struct incise_incision_setup *setup = &incision->setup;
-	double flat[3], across, extent_mm, along_mm, made_mm;
-	struct incise_opening opening;
+	const struct incise_opening *met = &incision->met;
+	double flat[3], turned, extent_mm, along_mm, made_mm;
 	struct incise_cut *cut;
 
-	incise_incision_opening(incision, tick->tool, tick->proxy_mm, &opening);
-	if (!opening.in)
+	incise_incision_opening(incision, tick->tool, tick->proxy_mm, &incision->met);
+	if (!met->in)
 		return;
-	cut = &incision->cut[opening.cut];
+	cut = &incision->cut[met->cut];
 	v3_rotate(flat, tick->quaternion, setup->side);
-	across = fmin(fabs(v3_dot(flat, cut->along)), 1);
-	extent_mm = incise_incision_extent_mm(incision, tick->tool, across);
-	along_mm = incise_incision_extent_mm(incision, tick->tool, 1 - across);
+	turned = fmin(fabs(v3_dot(flat, cut->along)), 1);
+	extent_mm = extent_across_mm(incision, tick->tool, turned);
+	along_mm = extent_across_mm(incision, tick->tool, 1 - turned);
 	made_mm = fmin(tick->depth_mm, extent_mm) - setup->stretch_mm;
-	if (!(made_mm > cut->place[incise_cut_place(opening.at_mm)].open_mm))
+	if (!(made_mm > met->open_mm))
 		return;
 	for (int i = incise_cut_place(cut->from_mm); i <= incise_cut_place(cut->to_mm);
 	     i++) {
 		double middle = (i + 0.5) * INCISE_CUT_SPACING_MM - HALF_MM;
-		double beyond = fabs(middle - opening.at_mm) - along_mm / 2;
+		double beyond = fabs(middle - met->at_mm) - along_mm / 2;
 		double open_mm = made_mm - TAPER * fmax(beyond, 0);
 
 		cut->place[i].open_mm = fmaxf(cut->place[i].open_mm, (float)open_mm);
@@ -445,12 +458,18 @@ static bool counts(const struct incise_tick *tick)
 	       tick->depth_mm >= 0 && tick->depth_mm <= DEPTH_MOST_MM;
 }
 
+const struct incise_opening *incise_incision_met(const struct incise_incision *incision)
+{
+	return &incision->met;
+}
+
 bool incise_incision_tick(struct incise_incision *incision,
 			  const struct incise_tick *tick)
 {
 	bool cuts = tick->phase == INCISE_PHASE_CUTTING && counts(tick) &&
 		    tick->depth_mm > incision->setup.cut_from_mm;
 
+	incision->met.in = false;
 	if (!cuts)
 		incision->cutting = false;
 	if (cuts)

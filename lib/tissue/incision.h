@@ -23,13 +23,9 @@ struct incise_incision *incise_incision_make(const struct incise_incision_setup 
 /* Memory that it holds, bytes. */
 size_t incise_incision_memory(const struct incise_incision *incision);
 
-/*
- * Extent of a tool across a line, mm.
- *
- * @across |h·c|, 0 … 1: 1 where the handle's flat side lies across the cut; of a tube not used
- */
-double incise_incision_extent_mm(const struct incise_incision *incision,
-				 enum incise_tool tool, double across) INCISE_REALTIME;
+/* The opening that a handle or tube met at the last tick, before that widened it. */
+const struct incise_opening *incise_incision_met(const struct incise_incision *incision)
+	INCISE_REALTIME;
 
 /*
  * The share of a handle's width or a tube's diameter that an opening must still give, 0 … 1: of a

@@ -322,13 +322,14 @@ in_order() {
 # bats test_tags=slow
 @test "bench loop times ticks over a plane and meshes, and wake-ups beside cyclictest" {
 	incise bench loop --quick --load idle --json >r.json
-	for i in 0 1 2 3 4; do
+	for i in 0 1 2 3 4 5; do
 		holds "$(key r.json "rows[$i].tick_ns.median") > 0"
 		holds "$(key r.json "rows[$i].tick_ns.median") <= $(key r.json "rows[$i].tick_ns.p999")"
 		holds "$(key r.json "rows[$i].ticks") > 3000" # of 4000, the stroke's in contact
 	done
 	[ "$(key r.json "rows[3].triangles")" = 20000 ]
 	[ "$(key r.json "rows[4].triangles")" = 500000 ]
+	[ "$(key r.json "rows[5].triangles") $(key r.json "rows[5].cuts")" = "500000 32" ]
 	holds "$(key r.json "rows[4].memory_bytes") > 10 * $(key r.json "rows[3].memory_bytes")"
 	[ "$(key r.json tick_ns)" = "$(key r.json "rows[0].tick_ns")" ]
 	for name in ns_p5 ns ns_p95; do

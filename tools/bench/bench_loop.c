@@ -35,18 +35,21 @@ static const char all_forces[] =
 static const struct own {
 	const char *name, *arithmetic, *surface;
 	int cells; /* along each side of a sheet; two triangles each */
+	int cuts;  /* in the tissue before */
 } own[] = {
-	{"plane", "double", "kind = \"plane\";", 0},
-	{"plane_fixed", "fixed", "kind = \"plane\";", 0},
+	{"plane", "double", "kind = \"plane\";", 0, 0},
+	{"plane_fixed", "fixed", "kind = \"plane\";", 0, 0},
 	{"sphere", "double",
-	 "kind = \"sphere\"; centre_mm = [0.0, 0.0, -50.0]; radius_mm = 50.0;", 0},
-	{"mesh_20000", "double", "kind = \"mesh\"; file = \"%s\";", 100},
-	{"mesh_500000", "double", "kind = \"mesh\"; file = \"%s\";", 500},
+	 "kind = \"sphere\"; centre_mm = [0.0, 0.0, -50.0]; radius_mm = 50.0;", 0, 0},
+	{"mesh_20000", "double", "kind = \"mesh\"; file = \"%s\";", 100, 0},
+	{"mesh_500000", "double", "kind = \"mesh\"; file = \"%s\";", 500, 0},
+	{"mesh_500000_cuts", "double", "kind = \"mesh\"; file = \"%s\";", 500, 32},
 };
 
 struct tick_row {
 	const char *name, *failed;
 	size_t memory, triangles;
+	int cuts;
 	double load_s;
 	struct tick_cost cost;
 	struct harness_time time; /* of a tick, in turn with the others */
@@ -85,13 +88,14 @@ static void time_ticks(struct tick_row *rows, int n, bool quick)
 
 	for (int i = 0; i < n; i++) {
 		cli_progress("%s", rows[i].name);
-		tick_cost(rows[i].scene, NULL, quick ? QUICK_MEASURED_S : MEASURED_S,
-			  &rows[i].cost);
+		tick_cost(rows[i].scene, NULL, rows[i].cuts,
+			  quick ? QUICK_MEASURED_S : MEASURED_S, &rows[i].cost);
 		if (!rows[i].cost.ticks)
 			cli_fail(
 				"%s: a stroke over its top met no tissue: nothing to time",
 				rows[i].name);
-		rows[i].timed = tick_stroke_new(rows[i].scene, NULL, rows[i].cost.tool);
+		rows[i].timed = tick_stroke_new(rows[i].scene, NULL, rows[i].cost.tool,
+						rows[i].cuts);
 		variants[i] = (struct harness_variant){
 			.ns = turn_ns, .context = &rows[i], .time = &rows[i].time};
 	}
@@ -129,6 +133,7 @@ static void load_own(const struct own *own, struct tick_row *row)
 	scene = write_scene(own, sheet.path, 1000);
 	row->name = own->name;
 	row->triangles = 2 * (size_t)own->cells * own->cells;
+	row->cuts = own->cuts;
 	load_scene(scene.path, row);
 	fclose(scene.file);
 	if (sheet.file)
@@ -138,9 +143,9 @@ static void load_own(const struct own *own, struct tick_row *row)
 static const struct bench_table tick_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct tick_row),
-	.columns = {COLUMN(tick_row, "name", name, "%-12s", "ns a tick"),
+	.columns = {COLUMN(tick_row, "name", name, "%-16s", "ns a tick"),
 		    COLUMN(tick_row, "triangles", triangles),
-		    COLUMN(tick_row, "ticks", cost.ticks),
+		    COLUMN(tick_row, "cuts", cuts), COLUMN(tick_row, "ticks", cost.ticks),
 		    COLUMN(tick_row, "tick_ns.median", cost.median, "%9.0f", "median"),
 		    COLUMN(tick_row, "tick_ns.p99", cost.p99, "%9.0f", "99 %"),
 		    COLUMN(tick_row, "tick_ns.p999", cost.p999, "%9.0f", "99.9 %"),
@@ -378,7 +383,7 @@ static void measure_rate(const struct cut_series *s, bool quick, struct rate_row
 	if (*row->failed) {
 		row->command = row->rendered = (struct rate_error){NAN, NAN, NAN};
 	} else {
-		tick_cost(scene, &info, quick ? QUICK_COST_S : COST_S, &cost);
+		tick_cost(scene, &info, 0, quick ? QUICK_COST_S : COST_S, &cost);
 		row->tick_ns = cost.median;
 		row->ns_per_s = cost.median * row->rate_hz;
 	}

@@ -23,17 +23,18 @@ struct tick_cost {
 /*
  * Measure over some seconds of the stroke's time, which go by as fast as they can. Where
  * the stroke does not meet the tissue, as over a sheet that is too small, ticks is 0 and all
- * times are NaN. Poses come as of the tracker, or
- * with NULL of one of 120 Hz that is 4.2 ms late.
+ * times are NaN. Poses come as of the tracker, or with NULL of one of 120 Hz that is 4.2 ms late.
+ *
+ * @cuts that the blade makes before, 10 mm long and next to each other; 0: none
  */
 void tick_cost(const struct incise_scene *scene,
-	       const struct incise_tracker_info *tracker, double seconds,
+	       const struct incise_tracker_info *tracker, int cuts, double seconds,
 	       struct tick_cost *cost);
 
 /* The stroke by parts, for times that take turns with others. Fails the program. */
 struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 				    const struct incise_tracker_info *tracker,
-				    enum incise_tool tool);
+				    enum incise_tool tool, int cuts);
 
 /* Mean of the middle half of so many ticks more, ns, times in @ns, an array of @ticks; NaN without contact. */
 double tick_stroke_ns(struct tick_stroke *timed, int ticks, double *ns);
