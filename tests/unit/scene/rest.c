@@ -84,7 +84,8 @@ static struct loop liver(const char *tissue)
 }
 
 /* A static force is the lean's to the last roundings. */
-static void rests(struct incise_plan *plan, const struct loop *loop, int run)
+static struct closed_loop_end rests(struct incise_plan *plan, const struct loop *loop,
+				    int run)
 {
 	const struct closed_loop *is = &loop->is;
 	struct closed_loop_end end = end_of(plan, loop, run);
@@ -97,6 +98,7 @@ static void rests(struct incise_plan *plan, const struct loop *loop, int run)
 			loop->tissue, is->mass_kg, is->damping_N_s_mm, is->tracker_hz,
 			is->late_ticks, is->lean_N, is->along_mm_s, end.moved_mm,
 			end.force_N);
+	return end;
 }
 
 static void lean_on(const struct loop *as, const double *leans, int n)
@@ -225,6 +227,52 @@ static void test_above_the_limit(void **state)
 	incise_scene_free(scene);
 }
 
+/*
+ * A wall of 0.14 N/mm with a membrane 2 mm below, which yields at 0.8 N more, and a back wall: a
+ * blade rests in front of it, on it, and behind the airway; also at the step where it yields.
+ */
+static void test_membrane(void **state)
+{
+	static const double leans_N[] = {0.1, 0.27, 0.29, 0.6, 1.05, 1.1, 1.5, 2, 3};
+	const double front_N = 2 * 0.14, slope_N_mm = 0.8 / 5;
+	struct loop loop = liver("");
+	struct incise_tracker_info tracker = closed_loop_tracker(&loop.is);
+	char path[] = "/tmp/incise-rest-XXXXXX";
+	struct incise_error err = {0};
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+	int fd = mkstemp(path);
+
+	assert_true(fd >= 0);
+	dprintf(fd, "tissue = { reaction_N_mm = 0.14; };\n"
+		    "membrane = { point_mm = [0.0, 0.0, -2.0]; radius_mm = 1000.0;\n"
+		    "thickness_mm = 5.0; puncture_N = 0.8; back_wall_mm = 14.0; };\n");
+	close(fd);
+	scene = incise_scene_load(path, NULL, &err);
+	unlink(path);
+	if (!scene)
+		fail_msg("%s", err.text);
+	plan = incise_plan_new_fed(scene, &tracker, &err);
+	if (!plan)
+		fail_msg("%s", err.text);
+	for (int i = 0; i < N(leans_N); i++) {
+		double over_N = leans_N[i] - front_N, want_mm;
+		struct closed_loop_end end;
+
+		loop.is.lean_N = leans_N[i];
+		end = rests(plan, &loop, i);
+		/* The first that it yields to opens it for all that follow. */
+		want_mm = over_N < 0	 ? leans_N[i] / 0.14
+			  : over_N < 0.8 ? 2 + over_N / slope_N_mm
+					 : 2 + 14 + over_N / slope_N_mm;
+		if (!(fabs(end.depth_mm - want_mm) < CLOSED_LOOP_SWING_MM))
+			fail_msg("%g N: rests at %g mm and not at %g", leans_N[i],
+				 end.depth_mm, want_mm);
+	}
+	incise_plan_free(plan);
+	incise_scene_free(scene);
+}
+
 static void test_wrong_words(void **state)
 {
 	static const char *const wrong[] = {"withdrawal = \"Paper\";", "withdrawal = 1;",
@@ -252,6 +300,7 @@ int main(void)
 		cmocka_unit_test(test_accepted_rests),
 		cmocka_unit_test(test_refused_with_a_way_out),
 		cmocka_unit_test(test_above_the_limit),
+		cmocka_unit_test(test_membrane),
 		cmocka_unit_test(test_wrong_words),
 	};
 
