@@ -81,20 +81,25 @@ static void write_waves(FILE *out)
 }
 
 const struct ground grounds[GROUNDS] = {
-	{"plane", "kind = \"plane\";", 80, NULL},
-	{"turned plane", "kind = \"plane\"; normal = [0.0, 0.0, -1.0];", 80, NULL},
+	{"plane", "kind = \"plane\";", 80, NULL,
+	 "[0.0, 0.0, -3.0]; normal = [0.0, 0.0, 1.0]"},
+	{"turned plane", "kind = \"plane\"; normal = [0.0, 0.0, -1.0];", 80, NULL,
+	 "[0.0, 0.0, 3.0]; normal = [0.0, 0.0, -1.0]"},
 	{"sphere", "kind = \"sphere\"; centre_mm = [0.0, 0.0, -40.0]; radius_mm = 40.0;",
-	 80, NULL},
+	 80, NULL, "[0.0, 0.0, -3.0]; normal = [0.0, 0.0, 1.0]"},
 	{"capsule",
 	 "kind = \"capsule\"; from_mm = [-60.0, 0.0, -55.0]; to_mm = [160.0, 0.0, "
 	 "-55.0]; radius_mm = 55.0;",
-	 80, NULL},
-	{"heights", "kind = \"heights\"; file = \"%s\";", 80, write_waves},
+	 80, NULL, "[0.0, 0.0, -3.0]; normal = [0.0, 0.0, 1.0]"},
+	{"heights", "kind = \"heights\"; file = \"%s\";", 80, write_waves,
+	 "[0.0, 0.0, -3.0]; normal = [0.0, 0.0, 1.0]"},
 	{"mesh", "kind = \"mesh\"; file = \"%s\"; at_mm = [0.0, 0.0, -40.0];", 80,
-	 write_solid},
+	 write_solid, "[0.0, 0.0, -3.0]; normal = [0.0, 0.0, 1.0]"},
 	/* A mesh with all its normals reversed: tissue around a cavity. */
-	{"cavity", "kind = \"mesh\"; file = \"%s\";", 50, write_cavity},
-	{"large mesh", "kind = \"mesh\"; file = \"%s\";", 80, write_large},
+	{"cavity", "kind = \"mesh\"; file = \"%s\";", 50, write_cavity,
+	 "[0.0, 0.0, -63.0]; normal = [0.0, 0.0, 1.0]"},
+	{"large mesh", "kind = \"mesh\"; file = \"%s\";", 80, write_large,
+	 "[0.0, 0.0, 37.0]; normal = [0.0, 0.0, 1.0]"},
 };
 
 const struct ground *ground_of(const char *name)
@@ -127,6 +132,10 @@ struct incise_scene *ground_scene(const struct ground *ground, bool fixed, bool 
 		fputs(" };\n", scene.file);
 	all_forces(tissue, sizeof(tissue), 2, model ? "reaction" : NULL, more);
 	fputs(tissue, scene.file);
+	fprintf(scene.file,
+		"membrane = { point_mm = %s; radius_mm = 20.0; thickness_mm = 4.0;\n"
+		"  puncture_N = 0.8; back_wall_mm = 10.0; };\n",
+		ground->membrane);
 	fprintf(scene.file,
 		"effects = { average_ticks = 8; };\n"
 		"tool = { handle_mm = %.1f; };\n"

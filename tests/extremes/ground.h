@@ -26,6 +26,7 @@ struct ground {
 	const char *name, *surface; /* as the scene has it; %s: its file */
 	double away_mm;
 	void (*write)(FILE *out); /* its file, or NULL */
+	const char *membrane;	  /* its point and normal */
 };
 
 #define GROUNDS 8
