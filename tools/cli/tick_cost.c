@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../../lib/base/vector.h"
 #include "cli.h"
 #include "stopwatch.h"
 #include "stroke.h"
@@ -36,18 +35,22 @@ struct tick_stroke {
 static void cut_pose(const struct stroke *stroke, int cut, int cuts, double t_s,
 		     double position_mm[3])
 {
-	double phase = 4 * t_s / CUT_S, across[3], out_mm, along_mm, aside_mm;
+	const double *n = stroke->top.normal, *along = stroke->along;
+	double phase = 4 * t_s / CUT_S, out_mm, along_mm, aside_mm;
 
-	v3_cross(across, stroke->top.normal, stroke->along);
 	out_mm = phase < 1   ? CUT_ABOVE_MM
 		 : phase < 2 ? CUT_ABOVE_MM - (phase - 1) * (CUT_ABOVE_MM + CUT_DEPTH_MM)
 		 : phase < 3 ? -CUT_DEPTH_MM
 			     : (phase - 3) * (CUT_ABOVE_MM + CUT_DEPTH_MM) - CUT_DEPTH_MM;
 	along_mm = (fmin(fmax(phase - 2, 0), 1) - 0.5) * CUT_MM;
 	aside_mm = (cut - (cuts - 1) / 2.0) * CUT_APART_MM;
-	v3_add(position_mm, stroke->top.point_mm, out_mm, stroke->top.normal);
-	v3_add(position_mm, position_mm, along_mm, stroke->along);
-	v3_add(position_mm, position_mm, aside_mm, across);
+	for (int i = 0; i < 3; i++) {
+		int j = (i + 1) % 3, k = (i + 2) % 3;
+
+		position_mm[i] = stroke->top.point_mm[i] + out_mm * n[i] +
+				 along_mm * along[i] +
+				 aside_mm * (n[j] * along[k] - n[k] * along[j]);
+	}
 }
 
 /* The blade makes cuts next to each other. */
