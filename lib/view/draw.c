@@ -454,8 +454,10 @@ static unsigned texture_image(unsigned image, const uint8_t *bgra, int w, int h)
 
 #define DRAW_SLOTS 4
 
-/* Towards the lamp: high on the left, so that shadow and shine are visible from the front. */
-static const double draw_key_way[3] = {-0.62, 0.12, 0.78};
+/* Diameter of the tube. */
+#define DRAW_TUBE_MM 7.0
+
+static const double draw_key_way[3] = UV_MAP_LAMP;
 
 struct incise_draw {
 	struct solid surface, scalpel, tube;
@@ -498,7 +500,7 @@ static int put_instruments(struct incise_draw *draw, struct incise_error *err)
 	if (!rc) {
 		solid_instrument(&draw->scalpel, &mesh);
 		instrument_free(&mesh);
-		rc = instrument_tube(&mesh);
+		rc = instrument_tube(DRAW_TUBE_MM, &mesh);
 	}
 	if (rc)
 		return incise_error_set(err, -rc, "picture: no memory");
@@ -683,11 +685,13 @@ static void set_casters(const struct incise_draw *draw,
 			const struct instrument_place *place)
 {
 	double h = draw->tool.handle_mm;
-	/* Along x and z, and radius: blade, handle; a straight tube, its bend. */
+	/* Along x and z, and radius: blade, handle; a tube, its flange, its connector. */
 	const double scalpel[][3] = {
 		{0, 0, 0.3}, {0.2, fmin(28, h / 4), 2.2}, {0, h, 3.2}};
-	static const double tube[][3] = {
-		{0, 0, 4}, {0, 27, 4}, {-18, 66, 4}, {-32, 77, 6}};
+	static const double tube[][3] = {{0, 0, DRAW_TUBE_MM / 2},
+					 {0, INSTRUMENT_FLANGE_MM - 1, DRAW_TUBE_MM / 2},
+					 {0, INSTRUMENT_FLANGE_MM + 1, 12},
+					 {0, INSTRUMENT_FLANGE_MM + 24, 7.5}};
 	const double(*line)[3] = place && place->tube ? tube : scalpel;
 	int n = !place ? 0 : place->tube ? 3 : 2;
 	float from[SHADERS_CASTERS][4], to[SHADERS_CASTERS][4];
@@ -703,12 +707,47 @@ static void set_casters(const struct incise_draw *draw,
 	}
 }
 
+/*
+ * The dent under an instrument that presses: skin gives way more to what is blunt.
+ *
+ *      ───╮  ║  ╭───
+ *          ╲ ║ ╱   depth most_mm (1 - exp(-depth / soft_mm)), reach radius_mm
+ *           ╰╨╯
+ */
+static void set_dent(const struct incise_draw *draw, const struct incise_tick *pose)
+{
+	static const struct {
+		double most_mm, soft_mm, radius_mm;
+	} dents[] = {
+		[INCISE_TOOL_BLADE] = {0.8, 2, 3.5},
+		[INCISE_TOOL_HANDLE] = {2.2, 4, 8},
+		[INCISE_TOOL_TUBE] = {2.0, 5, 7.5},
+	};
+	double depth_mm = 0;
+	int tool = INCISE_TOOL_BLADE;
+	float at[4] = {0, 0, 0, 1};
+
+	if (pose && (pose->flags & INCISE_TICK_CONTACT) && pose->depth_mm > 0 &&
+	    pose->tool >= INCISE_TOOL_BLADE && pose->tool <= INCISE_TOOL_TUBE) {
+		tool = (int)pose->tool;
+		depth_mm = dents[tool].most_mm *
+			   (1 - exp(-pose->depth_mm / dents[tool].soft_mm));
+		for (int k = 0; k < 3; k++)
+			at[k] = (float)pose->proxy_mm[k];
+		at[3] = (float)dents[tool].radius_mm;
+	}
+	glUniform4fv(uniform(draw, SHADER_SURFACE, "dent"), 1, at);
+	glUniform1f(uniform(draw, SHADER_SURFACE, "dent_mm"), (float)depth_mm);
+}
+
 static void draw_surface(struct incise_draw *draw,
 			 const struct view_projection *projection,
-			 const struct instrument_place *place)
+			 const struct instrument_place *place,
+			 const struct incise_tick *pose)
 {
 	use_program(draw, SHADER_SURFACE, projection);
 	set_casters(draw, place);
+	set_dent(draw, pose);
 	glUniform1f(uniform(draw, SHADER_SURFACE, "texel"),
 		    1.0f / (float)draw->texture->size);
 	/* In parts of the texture's side; -1: no drape. */
@@ -776,7 +815,7 @@ int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera 
 	glClear(GL_DEPTH_BUFFER_BIT);
 	if (placed)
 		draw_instrument(draw, &projection, &place);
-	draw_surface(draw, &projection, placed ? &place : NULL);
+	draw_surface(draw, &projection, placed ? &place : NULL, placed ? pose : NULL);
 	/* The background last, where nothing else is. */
 	glUseProgram(draw->program[SHADER_GROUND]);
 	glBindVertexArray(draw->nothing);

@@ -6,7 +6,8 @@
  *      ring 2  ○───○───○      side, its squareness, its taper to an edge
  *      ring 1  ○───○───○
  *
- * Faces that meet at less than 40° are smooth, others have an edge between them.
+ * Faces that meet at less than 40° are smooth, others have an edge between them. A mesh may have
+ * several such parts.
  */
 #include <errno.h>
 #include <stdlib.h>
@@ -14,7 +15,7 @@
 #include "../base/vector.h"
 #include "instrument_shape.h"
 
-#define AROUND 16
+#define AROUND 20
 #define RINGS_MAX 32
 
 struct ring {
@@ -23,6 +24,7 @@ struct ring {
 	double round;		   /* 1 an ellipse … 0 a box */
 	double edge;		   /* 1: no thickness at the right end */
 	float rgb[3], metal;
+	bool starts; /* a part: there are no faces between it and the ring before */
 };
 
 static double power(double x, double e)
@@ -54,8 +56,8 @@ static void face_normal(double (*points)[AROUND][3], int r, int i, double normal
 }
 
 /* The normal at a corner of a face: the sum of those around it that are close to its own. */
-static void corner_normal(double (*points)[AROUND][3], int rings, int r, int i,
-			  int corner, float to[3])
+static void corner_normal(const struct ring *all, double (*points)[AROUND][3], int rings,
+			  int r, int i, int corner, float to[3])
 {
 	int ring = r + (corner > 1), point = i + (corner == 1 || corner == 2);
 	double own[3], own_unit[3] = {0}, sum[3] = {0}, unit[3] = {0, 0, 1};
@@ -66,7 +68,7 @@ static void corner_normal(double (*points)[AROUND][3], int rings, int r, int i,
 		int fr = ring - (k & 1), fi = (point - (k >> 1) + AROUND) % AROUND;
 		double other[3], other_unit[3];
 
-		if (fr < 0 || fr >= rings - 1)
+		if (fr < 0 || fr >= rings - 1 || all[fr + 1].starts)
 			continue;
 		face_normal(points, fr, fi, other);
 		if (v3_unit(other_unit, other, 1e-12) &&
@@ -117,7 +119,7 @@ static int skin(const struct ring *ring, int rings, struct instrument_mesh *mesh
 		for (int i = 0; i < AROUND; i++)
 			ring_point(&ring[r], i, points[r][i]);
 	for (int r = 0; r < rings - 1; r++)
-		for (int i = 0; i < AROUND; i++) {
+		for (int i = 0; i < AROUND && !ring[r + 1].starts; i++) {
 			for (int k = 0; k < 6; k++)
 				mesh->indices[mesh->n_indices++] =
 					(uint32_t)(mesh->n_vertices + order[k]);
@@ -126,7 +128,7 @@ static int skin(const struct ring *ring, int rings, struct instrument_mesh *mesh
 				    ii = (i + (k == 1 || k == 2)) % AROUND;
 				float normal[3];
 
-				corner_normal(points, rings, r, i, k, normal);
+				corner_normal(ring, points, rings, r, i, k, normal);
 				put(mesh, &ring[rr], points[rr][ii], normal);
 			}
 		}
@@ -136,7 +138,9 @@ static int skin(const struct ring *ring, int rings, struct instrument_mesh *mesh
 static const float steel[3] = {0.86f, 0.88f, 0.90f};
 static const float handle[3] = {0.86f, 0.87f, 0.83f};
 static const float plastic[3] = {0.88f, 0.90f, 0.86f};
-static const float blue[3] = {0.20f, 0.45f, 0.75f};
+static const float clear[3] = {0.80f, 0.84f, 0.82f};
+static const float blue[3] = {0.34f, 0.60f, 0.80f};
+static const float bore[3] = {0.16f, 0.18f, 0.19f};
 
 static void paint(struct ring *ring, const float rgb[3], float metal)
 {
@@ -182,48 +186,57 @@ int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh)
 	return skin(ring, RINGS, mesh);
 }
 
-int instrument_tube(struct instrument_mesh *mesh)
+/* The flange: a plate along y that is bent down to the neck, from one end to the other. */
+static void flange(struct ring *ring, int rings)
 {
-	enum { STRAIGHT = 4, CURVED = 10, TOP = 5, INNER = 2 };
-	enum { RINGS = INNER + STRAIGHT + CURVED + TOP };
-	struct ring ring[RINGS] = {0};
-	double bend_mm = 55, bend = 65 * M_PI / 180;
-	int n = 0;
+	const double half_mm = 30, bend_mm = 60;
 
-	for (int i = 0; i < RINGS; i++) {
-		ring[i].round = 1;
-		ring[i].over[1] = 1;
+	for (int i = 0; i < rings; i++) {
+		double y = half_mm * fmax(fmin(2.0 * (i - 1) / (rings - 3) - 1, 1), -1);
+		double wide = 10 - 0.0055 * y * y, flat = hypot(1, y / bend_mm);
+		/* Both ends are closed. */
+		double there = i == 0 || i == rings - 1 ? 0.02 : 1;
+
+		ring[i].centre[1] = y;
+		ring[i].centre[2] = INSTRUMENT_FLANGE_MM + 0.9 - y * y / (2 * bend_mm);
 		ring[i].across[0] = 1;
+		ring[i].over[1] = -y / bend_mm / flat;
+		ring[i].over[2] = -1 / flat;
+		ring[i].left = ring[i].right = wide * there;
+		ring[i].thick = 0.9 * there;
+		ring[i].round = 0.45;
+		ring[i].starts = i == 0;
 		paint(&ring[i], plastic, 0);
 	}
-	/* From the inside round the lip and up the outside; 8 mm, bore 6 mm. */
-	ring[n].centre[2] = 14;
-	ring[n].left = 2.9;
-	paint(&ring[n++], steel, 0);
-	ring[n].centre[2] = 0.4;
-	ring[n++].left = 3.1;
-	for (int i = 0; i < STRAIGHT; i++, n++) {
-		ring[n].centre[2] = (double[]){0, 0.8, 24, 26}[i];
-		ring[n].left = i ? 4.0 : 3.5;
-		if (i > 1)
-			paint(&ring[n], blue, 0);
-	}
-	for (int i = 0; i < CURVED + TOP; i++, n++) {
-		double a = bend * fmin(i, CURVED - 1) / (CURVED - 1);
-		static const double out[TOP] = {0, 0, 12, 12, 12};
-		static const double wide[TOP] = {4, 7, 7.5, 6, 0.01};
-		double more = i < CURVED ? 0 : out[i - CURVED];
+}
 
-		ring[n].centre[0] = -bend_mm * (1 - cos(a)) - more * sin(a);
-		ring[n].centre[2] = 27 + bend_mm * sin(a) + more * cos(a);
-		ring[n].across[0] = cos(a);
-		ring[n].across[2] = sin(a);
-		ring[n].left = i < CURVED ? 4 : wide[i - CURVED];
-		if (i >= CURVED)
-			paint(&ring[n], blue, 0);
+int instrument_tube(double tube_mm, struct instrument_mesh *mesh)
+{
+	/* Rings of the tube: height, from the flange where it is above 0, and radius. */
+	const double r = fmax(fmin(tube_mm / 2, 7), 1), up = INSTRUMENT_FLANGE_MM;
+	const double shape[][2] = {
+		{14, r * 0.72}, {0.4, r * 0.76}, {0, r * 0.88},	  {0.7, r},
+		{up, r},	{up + 1.8, r},	 {up + 1.8, 7.2}, {up + 4, 6.6},
+		{up + 8, 6.2},	{up + 8, 7.5},	 {up + 23, 7.7},  {up + 23, 6.1},
+		{up + 14, 5.6}, {up + 14, 0.01},
+	};
+	enum { TUBE = sizeof(shape) / sizeof(shape[0]), FLANGE = 11 };
+	enum { RINGS = TUBE + FLANGE };
+	struct ring ring[RINGS] = {0};
+
+	for (int i = 0; i < TUBE; i++) {
+		ring[i].centre[2] = shape[i][0];
+		ring[i].across[0] = ring[i].over[1] = 1;
+		ring[i].left = ring[i].right = ring[i].thick = shape[i][1];
+		ring[i].round = 1;
+		paint(&ring[i],
+		      i < 2 || i > 11 ? bore
+		      : i < 6	      ? clear
+		      : i < 9	      ? plastic
+				      : blue,
+		      0);
 	}
-	for (int i = 0; i < RINGS; i++)
-		ring[i].right = ring[i].thick = ring[i].left;
+	flange(ring + TUBE, FLANGE);
 	return skin(ring, RINGS, mesh);
 }
 

@@ -2,10 +2,10 @@
 /*
  * Meshes of the instruments: scalpel, with its handle, and tube. In mm, in a frame of their own:
  *
- *      z ▲ ▓ end of the handle, z = handle_mm      z ▲ ╱╱ tube, open, curved in the
- *        │ ▓                                         │┃┃  plane of x and z above
- *        │ ▓ flat side to ±y                         │┃┃  inserted part
- *        │ ▌╲ edge of the blade to +x                │┃┃
+ *      z ▲ ▓ end of the handle, z = handle_mm      z ▲  █ connector
+ *        │ ▓                                         │ ▄█▄▄▄▄▄▄ flange, wide along ±y,
+ *        │ ▓ flat side to ±y                         │  ┃       bent down to the neck
+ *        │ ▌╲ edge of the blade to +x                │  ┃ inserted part
  *        ○───▶ x, tip at 0                           ○───▶ x, end at 0
  */
 #ifndef INCISE_VIEW_INSTRUMENT_SHAPE_H
@@ -27,9 +27,14 @@ struct instrument_mesh {
 	uint32_t *indices; /* triangles, counter-clockwise from outside */
 };
 
+/* The lower side of a tube's flange from its end. */
+#define INSTRUMENT_FLANGE_MM 20.0
+
 /* A few hundred triangles; to be freed. 0, -ENOMEM with an empty mesh. */
 int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh);
-int instrument_tube(struct instrument_mesh *mesh);
+
+/* tube_mm: diameter of the inserted part, up to that of the connector, 15 mm. */
+int instrument_tube(double tube_mm, struct instrument_mesh *mesh);
 void instrument_free(struct instrument_mesh *mesh);
 
 /* The frame of an instrument: columns x, y, z, origin. */

@@ -25,6 +25,8 @@ static const char surface_vs[] = HEAD
 	"uniform float texel;\n"
 	"uniform int casters;\n"
 	"uniform vec4 from[4], to[4];\n" /* mm; w: radius */
+	"uniform vec4 dent;\n"		  /* where the instrument presses, mm; w: radius */
+	"uniform float dent_mm;\n"	  /* depth there */
 	"out vec2 uv;\n"
 	"out vec4 light;\n" /* w: not in the shadow */
 	"out vec3 half_way, up;\n"
@@ -41,16 +43,21 @@ static const char surface_vs[] = HEAD
 	"}\n"
 	"void main()\n"
 	"{\n"
-	"	vec3 n = in_1, t = in_2.xyz, b = in_2.w * cross(n, t);\n"
-	"	vec3 h = normalize(normalize(camera - in_0) + key);\n"
+	"	vec3 n = in_1, t = in_2.xyz, p = in_0, off = (p - dent.xyz) / dent.w;\n"
+	"	float fall = 1.0 / (1.0 + dot(off, off));\n"
+	"	p -= n * (dent_mm * fall * fall);\n"
+	"	n = normalize(n - (4.0 * dent_mm / dent.w * fall * fall * fall) * off);\n"
+	"	t = normalize(t - dot(t, n) * n);\n"
+	"	vec3 b = in_2.w * cross(n, t);\n"
+	"	vec3 h = normalize(normalize(camera - p) + key);\n"
 	"	float dark = 0.0;\n"
 	"	for (int i = 0; i < casters; i++)\n"
-	"		dark = max(dark, shade(in_0, from[i], to[i]));\n"
+	"		dark = max(dark, shade(p, from[i], to[i]));\n"
 	"	light = vec4(dot(t, key), dot(b, key), dot(n, key), 1.0 - 0.8 * dark);\n"
 	"	half_way = vec3(dot(t, h), dot(b, h), dot(n, h));\n"
 	"	up = vec3(dot(t, sky), dot(b, sky), dot(n, sky));\n"
 	"	uv = in_3 * texel;\n"
-	"	gl_Position = clip * vec4(in_0, 1);\n"
+	"	gl_Position = clip * vec4(p, 1);\n"
 	"}\n";
 
 /*
@@ -59,7 +66,8 @@ static const char surface_vs[] = HEAD
  *
  * Only wet surfaces are deep red. The texture's alpha is the slope towards the lamp, see draw.c.
  *
- * A surgical drape lies round a neck and hides the border of its texture.
+ * A surgical drape lies round a neck and hides the border of its texture. Blood runs below it, and
+ * soaks its edge: the stain is the texture, blurred by its smaller levels.
  */
 static const char surface_fs[] = HEAD
 	"in vec2 uv;\n"
@@ -71,16 +79,18 @@ static const char surface_fs[] = HEAD
 	"out vec4 colour;\n"
 	"void main()\n"
 	"{\n"
-	"	vec4 c = texture(base, uv);\n"
+	"	vec2 in_from = min(uv, 1.0 - uv);\n"
+	"	float edge = min(in_from.x, in_from.y) - cloth;\n"
+	"	float skin = clamp(edge * 400.0, 0.0, 1.0);\n"
+	"	vec4 c = texture(base, uv, edge < 0.0 ? 4.0 : 0.0);\n"
 	"	float wet = clamp(3.0 * c.r - 7.0 * c.g, 0.0, 1.0);\n"
 	"	float s = c.a * (255.0 / 127.0) - 128.0 / 127.0;\n"
 	"	vec3 n = vec3(way * s, 1.0 - 0.5 * s * s);\n"
-	"	vec2 in_from = min(uv, 1.0 - uv);\n"
-	"	float edge = min(in_from.x, in_from.y) - cloth;\n"
-	"	float skin = clamp(edge * 160.0, 0.0, 1.0);\n"
 	"	n.xy *= skin;\n"
-	"	float below = clamp(edge * 25.0 + 0.35, 0.35, 1.0);\n"
-	"	vec3 albedo = mix(vec3(0.045, 0.17, 0.18), c.rgb * c.rgb * below, skin);\n"
+	"	float below = clamp(edge * 60.0 + 0.55, 0.55, 1.0);\n"
+	"	float soaked = clamp(1.9 - 2.6 * c.g / c.r, 0.0, 1.0) * clamp(1.0 + edge * 30.0, 0.0, 1.0);\n"
+	"	vec3 cloth_rgb = mix(vec3(0.045, 0.17, 0.18), vec3(0.075, 0.012, 0.014), soaked);\n"
+	"	vec3 albedo = mix(cloth_rgb, c.rgb * c.rgb * below, skin);\n"
 	"	wet = max(wet, moist) * skin;\n"
 	"	const vec3 wrap = vec3(0.32, 0.16, 0.10);\n"
 	"	float nl = dot(n, light.xyz);\n"
@@ -88,10 +98,10 @@ static const char surface_fs[] = HEAD
 	"	float nu = 0.5 + 0.5 * dot(n, up);\n"
 	"	vec3 around = mix(vec3(0.13, 0.08, 0.07), vec3(0.30, 0.32, 0.36), nu);\n"
 	"	around *= 0.5 + 0.5 * light.w;\n"
-	"	float a2 = mix(0.22, 0.025, wet);\n"
+	"	float a2 = mix(0.22, 0.010, wet);\n"
 	"	float nh = max(dot(n, half_way), 0.0);\n"
 	"	float d = nh * nh * (a2 - 1.0) + 1.0;\n"
-	"	float shine = a2 / (d * d) * mix(0.016 * skin, 0.015, wet);\n"
+	"	float shine = a2 / (d * d) * mix(0.016 * skin, 0.006, wet) * min(4.0 * c.r, 1.0);\n"
 	"	shine = min(shine, 0.8) * clamp(3.0 * nl, 0.0, 1.0) * light.w;\n"
 	"	vec3 lit = albedo * (key * vec3(1.10, 1.02, 0.92) + around) + shine;\n"
 	"	colour = vec4(sqrt(lit), 1.0);\n"

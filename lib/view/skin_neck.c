@@ -2,7 +2,7 @@
 /*
  * The skin of a neck. Its colour is bare tissue minus the absorption of melanin and blood, each with
  * its own blotches, and of two veins below. Its surface is the net of fine furrows of human skin,
- * about 1 mm wide and elongated around the neck, with pores, wrinkles and a few creases.
+ * well below 1 mm wide and elongated around the neck, with pores, wrinkles and a few creases.
  *
  *   x along the neck ──►     creases and wrinkles run in y, veins in x
  */
@@ -112,12 +112,12 @@ static void furrows(const struct skin_work *work, int y)
 	SKIN_SUM(work, y, UY, WARP_Y, 0.25F);
 	cells_row(work->cells[FURROW], y, work->row[UX], work->row[UY], near, far);
 	for (int x = 0; x < work->size; x++)
-		edge[x] = 1 - fade * skin_bump(far[x] / 0.32F);
+		edge[x] = 1 - fade * skin_bump(far[x] / 0.42F);
 	SKIN_SUM(work, y, VX, WARP_FINE_X, 0.2F);
 	SKIN_SUM(work, y, VY, WARP_FINE_Y, 0.2F);
 	cells_row(work->cells[FURROW_FINE], y, work->row[VX], work->row[VY], near, far);
 	for (int x = 0; x < work->size; x++)
-		fine[x] = 1 - fine_fade * skin_bump(far[x] / 0.4F);
+		fine[x] = 1 - fine_fade * skin_bump(far[x] / 0.55F);
 }
 
 static void pores(const struct skin_work *work, int y)
@@ -201,20 +201,21 @@ static void mix(const struct skin_work *work, int y, float *const colour[3],
 	folds(work, y, height_mm);
 	veins(work, y);
 	/* Coarseness varies from place to place. */
-	share = SKIN_SUM(work, y, TEMP, RELIEF_SHARE, 0.22F);
+	share = SKIN_SUM(work, y, TEMP, RELIEF_SHARE, 0.3F);
 	for (int x = 0; x < work->size; x++) {
-		float coarse = skin_clamp(0.8F + share[x], 0.3F, 1.3F);
-		float low = 1 - row[EDGE][x] + 0.4F * (1 - row[FINE_EDGE][x]);
+		/* A net that is as deep everywhere looks like leather. */
+		float coarse = skin_clamp(0.5F + share[x], 0.05F, 1);
+		float low = 0.45F * (1 - row[EDGE][x]) + 0.4F * (1 - row[FINE_EDGE][x]);
 		float melanin = row[MELANIN][x] + 2.6F * row[SPOT][x];
-		float blood = row[BLOOD][x] + 0.16F * coarse * low + 0.5F * row[HOLE][x] +
+		float blood = row[BLOOD][x] + 0.10F * coarse * low + 0.3F * row[HOLE][x] +
 			      0.7F * row[FOLD][x];
-		float dark = 1 - 0.022F * coarse * low - 0.055F * row[HOLE][x] -
-			     0.05F * row[FOLD][x] + 0.014F * row[SPECK][x];
+		float dark = 1 - 0.012F * coarse * low - 0.03F * row[HOLE][x] -
+			     0.05F * row[FOLD][x] + 0.016F * row[SPECK][x];
 		float vein = row[VEIN][x];
 
-		height_mm[x] -= 0.026F * coarse * (1 - row[EDGE][x]) +
-				0.012F * coarse * (1 - row[FINE_EDGE][x]) +
-				0.035F * row[HOLE][x];
+		height_mm[x] -= 0.009F * coarse * (1 - row[EDGE][x]) +
+				0.008F * coarse * (1 - row[FINE_EDGE][x]) +
+				0.016F * row[HOLE][x];
 		for (int c = 0; c < 3; c++)
 			colour[c][x] = dark * (base[c] - melanin * of_melanin[c] -
 					       blood * of_blood[c] - vein * of_vein[c]);
@@ -241,8 +242,8 @@ const struct skin_look skin_neck = {
 		},
 	.cells =
 		{
-			[FURROW] = {0.85, 1.15},
-			[FURROW_FINE] = {0.43, 0.5},
+			[FURROW] = {0.62, 0.85},
+			[FURROW_FINE] = {0.31, 0.38},
 			[PORE] = {1.5, 1.6},
 			[MOLE] = {12, 13},
 		},

@@ -85,6 +85,12 @@ bool uv_map_point(const struct uv_map *map, const double px[2], double point_mm[
 void uv_map_metric(const struct uv_map *map, const double px[2], double right_mm[3],
 		   double down_mm[3]);
 
+/* Towards the lamp, in the tracker's frame: high on the left, to show shadow and shine. */
+#define UV_MAP_LAMP               \
+	{                         \
+		-0.62, 0.12, 0.78 \
+	}
+
 /*
  * The height of the surface as drawn above that as felt, along the normal: 0 to
  * UV_MAP_RELIEF_MAX_MM, 0 without a larynx. The head is towards -px[0], the membrane that a

@@ -240,6 +240,7 @@ static void lift(const struct incise_view *view, struct incise_tick *tick)
 
 	v3_add(tick->position_mm, tick->position_mm, mm, normal);
 	v3_add(tick->tool_mm, tick->tool_mm, mm, normal);
+	v3_add(tick->proxy_mm, tick->proxy_mm, mm, normal);
 }
 
 static void send(struct incise_view *view)

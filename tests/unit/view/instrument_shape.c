@@ -87,12 +87,21 @@ static void test_tube(void **state)
 	struct instrument_mesh mesh;
 	double low[3], high[3];
 
-	assert_int_equal(instrument_tube(&mesh), 0);
+	assert_int_equal(instrument_tube(7, &mesh), 0);
 	check(&mesh, low, high);
 	assert_true(fabs(low[2]) < 1e-5);
-	/* 8 mm thick at its end, 15 mm at the top, and bent to -x. */
-	assert_true(fabs(high[1] - 7.5) < 1e-3 && fabs(low[1] + 7.5) < 1e-3);
-	assert_true(high[0] < 8 && low[0] < -25);
+	assert_true(signed_volume(&mesh) > 0);
+	/* The flange is wider than the neck's larynx, across it; the connector is above. */
+	assert_true(high[1] > 25 && fabs(high[1] + low[1]) < 1e-3);
+	assert_true(high[0] > 8 && high[0] < 12 && fabs(high[0] + low[0]) < 1e-3);
+	assert_true(high[2] > INSTRUMENT_FLANGE_MM + 15);
+	/* What is inserted is as thick as it is said; floats. */
+	for (int i = 0; i < mesh.n_vertices; i++) {
+		const float *p = mesh.vertices[i].position_mm;
+
+		if (p[2] < INSTRUMENT_FLANGE_MM - 10 && fabs(p[1]) < 8)
+			assert_true(hypot(p[0], p[1]) < 3.5 + 1e-5);
+	}
 	instrument_free(&mesh);
 }
 
