@@ -170,6 +170,10 @@ static void blend(uint8_t *to, const uint8_t *over, int n)
 
 		if (clear == 255)
 			continue;
+		if (!clear) {
+			memcpy(to, over, 3);
+			continue;
+		}
 		for (int c = 0; c < 3; c++) {
 			unsigned int v = over[c] + times(to[c], clear);
 

@@ -12,9 +12,9 @@
 
 struct incise_injury {
 	struct incise_canvas *canvas;
-	struct wound *wound; /* or NULL */
-	struct blood *blood; /* or NULL */
-	int wound_layer, blood_layer;
+	struct wound *wound;			  /* or NULL */
+	struct blood *blood;			  /* or NULL */
+	int skin_layer, blood_layer, flesh_layer; /* from below */
 	bool began;
 	int64_t step_ns; /* time of the last step */
 	uint64_t steps_lost;
@@ -39,13 +39,13 @@ static int add(struct incise_injury *injury, const struct incise_scene_picture *
 	injury->wound = wound_new(map, err);
 	if (!injury->wound)
 		return -ENOMEM;
-	rc = add_layer(injury, &injury->wound_layer, err);
-	if (rc || !picture->bleeding)
-		return rc;
-	injury->blood = blood_new(map, picture, err);
-	if (!injury->blood)
-		return -ENOMEM;
-	return add_layer(injury, &injury->blood_layer, err);
+	rc = add_layer(injury, &injury->skin_layer, err);
+	if (!rc && picture->bleeding) {
+		injury->blood = blood_new(map, picture, err);
+		rc = injury->blood ? add_layer(injury, &injury->blood_layer, err)
+				   : -ENOMEM;
+	}
+	return rc ? rc : add_layer(injury, &injury->flesh_layer, err);
 }
 
 struct incise_injury *incise_injury_new(const struct incise_scene_picture *picture,
@@ -131,7 +131,8 @@ void incise_injury_tick(struct incise_injury *injury, const struct incise_tick *
 void incise_injury_paint(struct incise_injury *injury)
 {
 	if (injury->wound)
-		wound_paint(injury->wound, injury->canvas, injury->wound_layer);
+		wound_paint(injury->wound, injury->canvas, injury->skin_layer,
+			    injury->flesh_layer);
 	if (injury->blood)
 		blood_paint(injury->blood, injury->canvas, injury->blood_layer);
 }

@@ -7,6 +7,7 @@
 #define INCISE_VIEW_NOISE_H
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 
 /*
@@ -74,6 +75,31 @@ static inline float noise_smooth(uint32_t key, float x, float y)
 	a = noise_grid(key, ix, iy) * (1 - u) + noise_grid(key, ix + 1, iy) * u;
 	b = noise_grid(key, ix, iy + 1) * (1 - u) + noise_grid(key, ix + 1, iy + 1) * u;
 	return a * (1 - v) + b * v;
+}
+
+/* The same for n points of a row, x_step apart from the first on. */
+static inline void noise_smooth_row(uint32_t key, float x_step, int first, float y, int n,
+				    float *to)
+{
+	float fy = floorf(y), v = y - fy, left = 0, right = 0;
+	int iy = (int)fy, cell = 0;
+	bool any = false;
+
+	v = v * v * (3 - 2 * v);
+	for (int i = 0; i < n; i++) {
+		float x = (float)(first + i) * x_step, fx = floorf(x), u = x - fx;
+
+		if (!any || (int)fx != cell) {
+			cell = (int)fx;
+			any = true;
+			left = noise_grid(key, cell, iy) * (1 - v) +
+			       noise_grid(key, cell, iy + 1) * v;
+			right = noise_grid(key, cell + 1, iy) * (1 - v) +
+				noise_grid(key, cell + 1, iy + 1) * v;
+		}
+		u = u * u * (3 - 2 * u);
+		to[i] = left * (1 - u) + right * u;
+	}
 }
 
 #endif

@@ -23,9 +23,13 @@
 /* All 0: there is no wound. */
 struct field_texel {
 	uint16_t inside; /* (mm inside of the lips + BIAS) · STEPS; 0: far */
-	uint16_t depth;	 /* mm · STEPS */
+	uint16_t depth;	 /* of its floor, mm · STEPS */
 	uint16_t halo;	 /* 0 … 65535 */
+	uint8_t half;	 /* from its middle to its lips, mm · HALF_STEPS */
+	int8_t lean;	 /* of the wall towards the lamp: -127 … 127 */
 };
+
+#define HALF_STEPS_MM 30.0f
 
 /* An end of a stretch, as drawn. */
 struct field_end {
@@ -40,6 +44,8 @@ struct field_stretch {
 	float half_mm, half_more_mm; /* at this end; increase to the other */
 	float depth_mm, depth_more_mm;
 	float reach_mm;
+	float lamp[2];	   /* unit, towards it in the surface, mm */
+	float first, last; /* parts of the way beyond which other stretches count */
 	int from_px[2], to_px[2]; /* to_px is exclusive */
 };
 
@@ -51,10 +57,21 @@ static float field_inside_mm(const struct field_texel *texel)
 	return (float)texel->inside * (1 / FIELD_STEPS_MM) - FIELD_BIAS_MM;
 }
 
+/* fminf() and fmaxf() are calls. */
+static inline float least(float a, float b)
+{
+	return a < b ? a : b;
+}
+
+static inline float most(float a, float b)
+{
+	return a > b ? a : b;
+}
+
 /* Width of the reddened skin along a cut: mm, more along a deep one. */
 static float halo_mm(float depth_mm)
 {
-	return fminf(0.7f + 0.35f * depth_mm, 2.5f);
+	return least(0.7f + 0.35f * depth_mm, 2.5f);
 }
 
 /* The texels within a reach of others, clipped to the texture. */
@@ -72,12 +89,17 @@ static bool span(float low, float high, float reach, int size, int *from, int *t
 /* Returns false when it touches none of size × size texels. */
 static bool field_prepare(struct field_stretch *s, const struct field_end *a,
 			  const struct field_end *b, const struct ground_metric *m,
-			  int size)
+			  const float lamp[2], int size)
 {
 	float dx = b->px[0] - a->px[0], dy = b->px[1] - a->px[1], length2;
 	float half = fmaxf(a->half_mm, b->half_mm);
 
-	*s = (struct field_stretch){.metric = *m, .x = a->px[0], .y = a->px[1]};
+	*s = (struct field_stretch){.metric = *m,
+				    .x = a->px[0],
+				    .y = a->px[1],
+				    .lamp = {lamp[0], lamp[1]},
+				    .first = -INFINITY,
+				    .last = INFINITY};
 	s->along[0] = m->a * dx + m->b * dy;
 	s->along[1] = m->c * dy;
 	length2 = s->along[0] * s->along[0] + s->along[1] * s->along[1];
@@ -95,12 +117,14 @@ static bool field_prepare(struct field_stretch *s, const struct field_end *a,
 		    s->reach_mm / m->c, size, &s->from_px[1], &s->to_px[1]);
 }
 
-static void raise_to(uint16_t *field, float value)
+static bool raise_to(uint16_t *field, float value)
 {
 	uint16_t v = (uint16_t)(value + 0.5f);
 
-	if (v > *field)
-		*field = v;
+	if (v <= *field)
+		return false;
+	*field = v;
+	return true;
 }
 
 static void raise_texel(struct field_texel *texel, const struct field_stretch *s, float u,
@@ -109,7 +133,7 @@ static void raise_texel(struct field_texel *texel, const struct field_stretch *s
 	float t = (u * s->along[0] + v * s->along[1]) * s->inverse_mm2;
 	float half, depth, inside, out, off2;
 
-	t = fminf(fmaxf(t, 0), 1);
+	t = t > 0 ? t < 1 ? t : 1 : 0;
 	u -= t * s->along[0];
 	v -= t * s->along[1];
 	off2 = u * u + v * v;
@@ -118,19 +142,43 @@ static void raise_texel(struct field_texel *texel, const struct field_stretch *s
 	half = s->half_mm + t * s->half_more_mm;
 	depth = s->depth_mm + t * s->depth_more_mm;
 	inside = half - sqrtf(off2);
-	if (inside > FIELD_INSIDE_MIN_MM)
-		raise_to(&texel->inside,
-			 (fminf(inside, FIELD_INSIDE_MAX_MM) + FIELD_BIAS_MM) *
-				 FIELD_STEPS_MM);
+	if (inside > FIELD_INSIDE_MIN_MM &&
+	    raise_to(&texel->inside,
+		     (least(inside, FIELD_INSIDE_MAX_MM) + FIELD_BIAS_MM) *
+			     FIELD_STEPS_MM)) {
+		/* The wall faces the middle. */
+		float lit = u * s->lamp[0] + v * s->lamp[1];
+
+		texel->half = (uint8_t)(least(half, FIELD_INSIDE_MAX_MM) * HALF_STEPS_MM);
+		texel->lean = (int8_t)(-127 * lit / (sqrtf(off2) + 0.05f));
+	}
 	if (inside > 0) {
 		float off = 1 - inside / half; /* 0 in the middle, 1 at the lips */
 
-		raise_to(&texel->depth, fminf(depth, FIELD_DEPTH_MAX_MM) *
+		raise_to(&texel->depth, least(depth, FIELD_DEPTH_MAX_MM) *
 						(1 - off * off) * FIELD_STEPS_MM);
 	}
-	out = 1 + fminf(inside, 0) / halo_mm(depth);
+	out = 1 + least(inside, 0) / halo_mm(depth);
 	if (out > 0)
-		raise_to(&texel->halo, out * out * fminf(depth / 1.5f, 1) * 65535);
+		raise_to(&texel->halo, out * out * least(depth / 1.5f, 1) * 65535);
+}
+
+/* The texels of a row, at left … right, where low <= from + step * i <= high. */
+static void clip_row(float from, float step, float low, float high, int *left, int *right)
+{
+	float a, b;
+
+	if (fabsf(step) < 1e-9f) {
+		if (from < low || from > high)
+			*right = *left;
+		return;
+	}
+	a = ((step > 0 ? low : high) - from) / step;
+	b = ((step > 0 ? high : low) - from) / step;
+	if (a > (float)*left)
+		*left = a < (float)*right ? (int)ceilf(a) : *right;
+	if (b < (float)*right - 1)
+		*right = b >= (float)*left ? (int)floorf(b) + 1 : *left;
 }
 
 /* Raise the fields of the tile that starts at this texel, where the stretch is. */
@@ -144,13 +192,20 @@ static void field_raise(struct field_texel *tile, int x, int y,
 
 	for (int j = top; j < bottom; j++) {
 		struct field_texel *row = tile + (j - y) * CANVAS_TILE;
-		float dy = (float)j + 0.5f - s->y;
+		float dy = (float)j + 0.5f - s->y, v = s->metric.c * dy;
+		/* At texel 0. */
+		float u = s->metric.a * (0.5f - s->x) + s->metric.b * dy;
+		int from = left, to = right;
 
-		for (int i = left; i < right; i++) {
+		if (s->inverse_mm2 > 0)
+			clip_row((u * s->along[0] + v * s->along[1]) * s->inverse_mm2,
+				 s->metric.a * s->along[0] * s->inverse_mm2, s->first,
+				 s->last, &from, &to);
+		for (int i = from; i < to; i++) {
 			float dx = (float)i + 0.5f - s->x;
 
 			raise_texel(&row[i - x], s, s->metric.a * dx + s->metric.b * dy,
-				    s->metric.c * dy);
+				    v);
 		}
 	}
 }
@@ -166,7 +221,7 @@ static void over(float to[4], float r, float g, float b, float alpha)
 
 static float smooth(float from, float to, float x)
 {
-	x = fminf(fmaxf((x - from) / (to - from), 0), 1);
+	x = least(most((x - from) / (to - from), 0), 1);
 	return x * x * (3 - 2 * x);
 }
 
@@ -175,55 +230,147 @@ static float mix(float a, float b, float t)
 	return a + (b - a) * t;
 }
 
-static void colour_texel(const struct field_texel *texel, float x_mm, float y_mm,
-			 float texel_mm, uint8_t rgba[4])
+/* No colour may exceed its alpha, rounding included. */
+static void put_colour(uint8_t rgba[4], const float colour[4])
 {
-	float grain = noise_smooth(7, x_mm * 2.2f, y_mm * 2.2f);
-	float fine = noise_smooth(8, x_mm * 6.0f, y_mm * 6.0f);
-	float inside = field_inside_mm(texel) + 0.045f * grain + 0.02f * fine;
-	float halo = (float)texel->halo * (1 / 65535.0f);
-	float depth = (float)texel->depth * (1 / FIELD_STEPS_MM);
-	float soft = fmaxf(0.06f, texel_mm), colour[4] = {0}, lip, core, deep, wet;
-
-	over(colour, 0.68f, 0.15f, 0.12f, halo * (0.48f + 0.10f * grain));
-	/* The rim of the skin rises a little and is pale. */
-	lip = 1 - fabsf(inside + 0.17f) / 0.2f;
-	if (lip > 0)
-		over(colour, 0.93f, 0.66f, 0.58f, 0.6f * lip * halo);
-	core = smooth(-soft, soft, inside);
-	if (core > 0) {
-		deep = powf(fminf(depth / 4.5f, 1), 0.6f);
-		wet = 1 + 0.16f * fine * (1 - 0.6f * deep);
-		over(colour, mix(0.70f, 0.19f, deep) * wet,
-		     mix(0.20f, 0.012f, deep) * wet, mix(0.15f, 0.02f, deep) * wet,
-		     core * 0.97f);
-	}
-	/* No colour may exceed its alpha, rounding included. */
-	rgba[3] = (uint8_t)(fminf(colour[3], 1) * 255 + 0.5f);
+	rgba[3] = (uint8_t)(least(colour[3], 1) * 255 + 0.5f);
 	for (int i = 0; i < 3; i++)
-		rgba[i] = (uint8_t)(fminf(colour[i], colour[3]) * 255 + 0.5f);
+		rgba[i] = (uint8_t)(least(most(colour[i], 0), colour[3]) * 255 + 0.5f);
 }
 
-/* Colours of a tile; texel_mm: size of a texel, for the grain of the flesh. */
-static void field_colour(const struct field_texel *tile, int x, int y, float texel_mm,
-			 uint8_t *rgba, int stride)
+/* Skin along the cut: reddened, and its rim pale, risen, lit from one side. */
+static void colour_skin(const struct field_texel *texel, float inside, float grain,
+			uint8_t rgba[4])
 {
-	for (int j = 0; j < CANVAS_TILE; j++) {
-		uint8_t *to = rgba + (size_t)j * stride;
+	float halo = (float)texel->halo * (1 / 65535.0f), colour[4] = {0};
+	float lit = (float)texel->lean * (1 / 127.0f);
+	float lip = 1 - fabsf(inside + 0.2f) / 0.26f;
 
-		for (int i = 0; i < CANVAS_TILE; i++, to += 4, tile++)
-			if (tile->inside || tile->halo)
-				colour_texel(tile, (float)(x + i) * texel_mm,
-					     (float)(y + j) * texel_mm, texel_mm, to);
-			else
-				to[0] = to[1] = to[2] = to[3] = 0;
+	over(colour, 0.70f, 0.20f, 0.16f, halo * (0.40f + 0.10f * grain));
+	if (lip > 0) {
+		over(colour, 0.93f, 0.66f, 0.58f, 0.55f * lip * halo);
+		/* Outside of its ridge the rim falls away from the cut. */
+		lit = (inside < -0.2f ? -lit : lit) * lip * halo;
+		if (lit > 0)
+			over(colour, 1, 0.90f, 0.84f, 0.4f * lit);
+		else
+			over(colour, 0.25f, 0.05f, 0.04f, -0.4f * lit);
+	}
+	put_colour(rgba, colour);
+}
+
+/* Layers of tissue in the wall of an open cut, mm below the skin. */
+#define DERMIS_MM 1.0f
+#define FAT_MM 2.8f
+/* Steepness of a wall; a cut as wide as this shows its layers. */
+#define WALL_STEEP 2.2f
+#define OPEN_FROM_MM 0.9f
+#define OPEN_MM 1.8f
+/* Deeper, and so far inside, is the airway. */
+#define AIRWAY_MM 6.0f
+#define AIRWAY_INSIDE_MM 1.6f
+
+/*
+ * Flesh between the lips, as deep as it looks: walls in layers, one in the light and one in the
+ * shade, a floor that is the darker the deeper and narrower the cut is.
+ *
+ *     lip ▔╲             ╱▔ dermis, pale
+ *           ╲           ╱   fat, yellow
+ *            ╲         ╱    muscle, red
+ *             ╲▁▁███▁▁╱     airway, dark
+ */
+static void colour_flesh(const struct field_texel *texel, float inside, float core,
+			 float grain, float fine, uint8_t rgba[4])
+{
+	float floor = (float)texel->depth * (1 / FIELD_STEPS_MM), colour[4] = {0};
+	float half = most((float)texel->half * (1 / HALF_STEPS_MM), 0.05f);
+	float off = least(most(1 - inside / half, 0), 1);
+	float wall = least(WALL_STEEP * most(inside, 0) * (1 + 0.25f * grain), floor);
+	float open = smooth(OPEN_FROM_MM, OPEN_MM, half), narrow = 0.30f * floor / half;
+	float lit = (float)texel->lean * (1 / 127.0f) * smooth(0, 0.5f, off);
+	float fat = smooth(0.7f * DERMIS_MM, 1.2f * DERMIS_MM, wall);
+	float red = smooth(0.8f * FAT_MM, 1.15f * FAT_MM, wall + 0.3f * fine);
+	float rgb[3] = {0.50f, 0.085f, 0.075f}; /* muscle */
+	const float dermis_rgb[3] = {0.86f, 0.47f, 0.41f},
+		    fat_rgb[3] = {0.80f, 0.50f, 0.31f},
+		    raw_rgb[3] = {0.50f, 0.035f, 0.035f};
+	float light = (1 + 0.38f * lit) * (0.5f + 0.5f / (1 + narrow * narrow)) *
+		      (1 + 0.07f * grain + 0.08f * fine);
+	float hole = smooth(AIRWAY_MM, AIRWAY_MM + 1.2f, floor) *
+		     smooth(AIRWAY_INSIDE_MM, AIRWAY_INSIDE_MM + 0.9f, inside);
+
+	for (int i = 0; i < 3; i++) {
+		float layer = mix(dermis_rgb[i], fat_rgb[i], fat);
+
+		layer = mix(raw_rgb[i], mix(layer, rgb[i], red), open);
+		/* Blood colours all of it. */
+		layer = mix(layer, raw_rgb[i], 0.30f + 0.12f * grain);
+		rgb[i] = layer * light * (1 - 0.93f * hole);
+	}
+	over(colour, rgb[0], rgb[1], rgb[2], core * 0.98f);
+	put_colour(rgba, colour);
+}
+
+/* Cells of the grain of skin and flesh per mm. */
+#define GRAIN_PER_MM 1.6f
+#define FINE_PER_MM 5.0f
+
+/* The two colours of a texel: of skin, and of flesh, which is above blood on the skin. */
+static void colour_texel(const struct field_texel *texel, float grain, float fine,
+			 float soft, uint8_t skin[4], uint8_t flesh[4])
+{
+	float inside = field_inside_mm(texel) + 0.04f * grain + 0.015f * fine;
+	float core = smooth(-soft, soft, inside);
+
+	memset(flesh, 0, 4);
+	memset(skin, 0, 4);
+	if (core < 1)
+		colour_skin(texel, inside, grain, skin);
+	if (core > 0)
+		colour_flesh(texel, inside, core, grain, fine, flesh);
+}
+
+/* Colours of a row of a tile; texel_mm: size of a texel, for the grain. */
+static void colour_row(const struct field_texel *row, int x, int y, float texel_mm,
+		       uint8_t *skin, uint8_t *flesh)
+{
+	float grain[CANVAS_TILE], fine[CANVAS_TILE], soft = most(0.06f, texel_mm);
+
+	noise_smooth_row(7, GRAIN_PER_MM * texel_mm, x,
+			 GRAIN_PER_MM * texel_mm * (float)y, CANVAS_TILE, grain);
+	noise_smooth_row(8, FINE_PER_MM * texel_mm, x, FINE_PER_MM * texel_mm * (float)y,
+			 CANVAS_TILE, fine);
+	for (int i = 0; i < CANVAS_TILE; i++, skin += 4, flesh += 4)
+		if (row[i].inside || row[i].halo) {
+			colour_texel(&row[i], grain[i], fine[i], soft, skin, flesh);
+		} else {
+			memset(skin, 0, 4);
+			memset(flesh, 0, 4);
+		}
+}
+
+static void field_colour(const struct field_texel *tile, int x, int y, float texel_mm,
+			 uint8_t *skin, uint8_t *flesh, int stride)
+{
+	for (int j = 0; j < CANVAS_TILE; j++, tile += CANVAS_TILE) {
+		size_t at = (size_t)j * stride;
+		unsigned int any = 0;
+
+		for (int i = 0; i < CANVAS_TILE; i++)
+			any |= tile[i].inside | tile[i].halo;
+		if (any) {
+			colour_row(tile, x, y + j, texel_mm, skin + at, flesh + at);
+		} else {
+			memset(skin + at, 0, CANVAS_TILE * 4);
+			memset(flesh + at, 0, CANVAS_TILE * 4);
+		}
 	}
 }
 
 /* --- The line of its points --- */
 
 /* A cut tapers over this length at both ends, down to this part of its width. */
-#define LINE_TAPER_MM 1.6f
+#define LINE_TAPER_MM 3.0f
 #define TAPER_LEAST 0.12f
 
 /* A point of the line. */
@@ -233,6 +380,7 @@ struct wound_point {
 	float half_mm;	/* half-width at rest, if never opened */
 	float open_mm;	/* present opening */
 	float wider_mm; /* lasting widening */
+	float kept_mm;	/* opening that is in the fields */
 	float arc_mm;	/* from the cut's start */
 	bool joined;	/* to the point before it */
 	bool settled;	/* its width and depth are final, and in the fields */
@@ -243,6 +391,7 @@ struct wound {
 	const struct uv_map *map;
 	int size; /* texels */
 	float texel_mm;
+	float lamp[2];		   /* unit, towards it, mm along rows and across */
 	struct field_texel *field; /* tile after tile */
 	struct canvas_tiles tiles; /* to be painted */
 
@@ -257,7 +406,10 @@ struct wound {
 	int64_t tip_ns;
 
 	bool inserted, moving; /* moving: lips are not at rest */
-	double tool_px[2], tool_half_mm, tool_depth_mm;
+	bool loose;	       /* some are farther apart than in the fields */
+	double tool_px[2], tool_depth_mm;
+	/* Half-widths of the tool: along a unit vector of the surface, and across it. */
+	double tool_along[2], tool_wide_mm, tool_thick_mm;
 
 	double cut_mm;
 	uint64_t stamps;
@@ -273,7 +425,9 @@ static struct wound_point *line_point(const struct wound *wound, uint64_t number
 /* 0 … 1 over the end of a cut. */
 static float taper(float from_end_mm)
 {
-	return fminf(fmaxf(from_end_mm / LINE_TAPER_MM, TAPER_LEAST), 1);
+	float t = fminf(fmaxf(from_end_mm / LINE_TAPER_MM, 0), 1);
+
+	return fmaxf(t * (2 - t), TAPER_LEAST);
 }
 
 /* A point as drawn when the cut ends at this arc. */
@@ -316,7 +470,7 @@ static bool line_stretch(const struct wound *wound, const struct wound_point *be
 
 	if (p->joined && before)
 		a = line_end(before, end_mm);
-	return field_prepare(stretch, &a, &b, &p->metric, wound->size);
+	return field_prepare(stretch, &a, &b, &p->metric, wound->lamp, wound->size);
 }
 
 /* The point before, or NULL. */
@@ -349,10 +503,10 @@ static void line_settle(struct wound *wound, float end_mm, float until_mm)
 	}
 }
 
-/* The lips are farther apart than they will stay. */
-static bool line_open(const struct wound_point *p)
+/* The lips are farther apart than in the fields. */
+static bool line_loose(const struct wound_point *p)
 {
-	return p->open_mm > p->wider_mm;
+	return fmaxf(p->open_mm, p->wider_mm) > p->kept_mm;
 }
 
 /* --- Cutting --- */
@@ -371,17 +525,35 @@ static bool line_open(const struct wound_point *p)
 #define PRICK_MM 0.3
 
 /* Half-widths of a scalpel's handle and a tube. */
-#define HANDLE_HALF_MM 1.5
-#define TUBE_HALF_MM 2.0
+#define HANDLE_WIDE_MM 5.0
+#define HANDLE_THICK_MM 1.5
+#define TUBE_HALF_MM 3.5
+
+/* A vector of space in the surface, mm along the rows of the texture and across. */
+static void in_surface(const struct uv_map *map, const double px[2], const double v[3],
+		       double to[2])
+{
+	double right[3], down[3];
+
+	uv_map_metric(map, px, right, down);
+	to[0] = v3_unit(right, right, 0) ? v3_dot(v, right) : 0;
+	v3_add(down, down, -v3_dot(down, right), right);
+	to[1] = v3_unit(down, down, 0) ? v3_dot(v, down) : 0;
+}
 
 struct wound *wound_new(const struct uv_map *map, struct incise_error *err)
 {
-	double middle[2] = {map->size * 0.5, map->size * 0.5};
+	const double middle[2] = {map->size * 0.5, map->size * 0.5}, key[3] = UV_MAP_LAMP;
 	struct wound *wound = calloc(1, sizeof(*wound));
 	struct ground_metric metric;
+	double lamp[2], length;
 
 	if (!wound)
 		goto no_memory;
+	in_surface(map, middle, key, lamp);
+	length = fmax(hypot(lamp[0], lamp[1]), 1e-6);
+	for (int i = 0; i < 2; i++)
+		wound->lamp[i] = (float)(lamp[i] / length);
 	wound->map = map;
 	wound->size = map->size;
 	wound->texel_mm = 0.1f;
@@ -635,11 +807,25 @@ static bool read_blade(const struct wound *wound, const struct incise_tick *tick
 
 static void insert(struct wound *wound, const struct incise_tick *tick)
 {
+	bool tube = tick->tool == INCISE_TOOL_TUBE;
+	const double side[3] = {0, 1, 0};
+	double flat[3], across[2], length;
+
 	wound->inserted = v3_finite(tick->proxy_mm) && isfinite(tick->depth_mm) &&
 			  uv_map_px(wound->map, tick->proxy_mm, wound->tool_px);
-	wound->tool_half_mm =
-		tick->tool == INCISE_TOOL_TUBE ? TUBE_HALF_MM : HANDLE_HALF_MM;
+	if (!wound->inserted)
+		return;
+	wound->tool_wide_mm = tube ? TUBE_HALF_MM : HANDLE_WIDE_MM;
+	wound->tool_thick_mm = tube ? TUBE_HALF_MM : HANDLE_THICK_MM;
 	wound->tool_depth_mm = fmin(fmax(tick->depth_mm, 0), DEPTH_MAX_MM);
+	v3_rotate(flat, tick->quaternion, side);
+	in_surface(wound->map, wound->tool_px, flat, across);
+	length = hypot(across[0], across[1]);
+	/* A handle that lies on its flat side, or has no attitude, is as wide as it can be. */
+	if (!(length > 1e-6 && length < 4))
+		wound->tool_thick_mm = wound->tool_wide_mm;
+	wound->tool_along[0] = length > 1e-6 && length < 4 ? across[1] / length : 1;
+	wound->tool_along[1] = length > 1e-6 && length < 4 ? -across[0] / length : 0;
 }
 
 bool wound_tick(struct wound *wound, const struct incise_tick *tick,
@@ -660,110 +846,101 @@ bool wound_tick(struct wound *wound, const struct incise_tick *tick,
 
 /* --- Lips: they open around an instrument, and close --- */
 
-/* At this depth an instrument opens the cut by its full width. */
-#define INSERTED_MM 1.5
-/* Reach of the opening along the cut, in half-widths: stiffness of the lips. */
-#define SHOULDER_HALVES 4.5
-/* Lips stay wider by this part of their largest opening. */
-#define WIDER 0.12f
+/* A tool that is farther from the line is not in it. */
+#define BESIDE_MM 3.0
+/* Reach of the opening along the cut: half-widths, and mm more. */
+#define SHOULDER_HALVES 3.0
+#define SHOULDER_MM 2.0
+/* Length over which a slit opens from its corner. */
+#define CORNER_MM 9.0f
+/* Half of what is elastic of an opening: tissue.stretch_mm. */
+#define STRETCH_HALF_MM 1.0f
 /* Part of the way per step: opened in 60 ms, closed to 2 % in 1 s. */
 #define OPENING 0.15f
 #define CLOSING 0.036f
 #define AT_REST_MM 0.004f
 
-/* The half-width that the tool requires at a point. */
-static float required_mm(const struct wound *wound, const struct wound_point *p,
-			 float end_mm)
+/* The line's direction at a point, unit, mm along rows and across. */
+static void direction(const struct wound *wound, uint64_t number, double to[2])
 {
-	double off, ends, in;
+	const struct wound_point *p = line_point(wound, number), *a = p, *b = p;
+	double u, v, length;
+
+	if (p->joined && number > wound->first)
+		a = line_point(wound, number - 1);
+	if (number + 1 < wound->end && line_point(wound, number + 1)->joined)
+		b = line_point(wound, number + 1);
+	u = p->metric.a * (b->px[0] - a->px[0]) + p->metric.b * (b->px[1] - a->px[1]);
+	v = p->metric.c * (b->px[1] - a->px[1]);
+	length = hypot(u, v);
+	to[0] = length > 0 ? u / length : 1;
+	to[1] = length > 0 ? v / length : 0;
+}
+
+/* The half-width that the tool requires at a point. */
+static float required_mm(const struct wound *wound, uint64_t number, float end_mm)
+{
+	const struct wound_point *p = line_point(wound, number);
+	double dx = wound->tool_px[0] - p->px[0], dy = wound->tool_px[1] - p->px[1];
+	double u, v, along[2], half, off, corner, turned;
 
 	if (!wound->inserted)
 		return 0;
-	off = ground_length_mm(&p->metric, p->px[0] - wound->tool_px[0],
-			       p->px[1] - wound->tool_px[1]) /
-	      (wound->tool_half_mm * SHOULDER_HALVES);
-	if (!(off < 1))
+	u = p->metric.a * dx + p->metric.b * dy;
+	v = p->metric.c * dy;
+	if (!(u * u + v * v < 30 * 30))
 		return 0;
-	/* The corners of a slit stay closed. */
-	ends = fmin(fmax(fmin(p->arc_mm, end_mm - p->arc_mm) / (2 * LINE_TAPER_MM), 0),
-		    1);
-	in = fmin(wound->tool_depth_mm / INSERTED_MM, 1);
+	direction(wound, number, along);
+	if (fabs(u * along[1] - v * along[0]) > BESIDE_MM)
+		return 0;
+	turned = fabs(along[0] * wound->tool_along[1] - along[1] * wound->tool_along[0]);
+	half = fmin(turned * wound->tool_wide_mm +
+			    sqrt(fmax(1 - turned * turned, 0)) * wound->tool_thick_mm,
+		    0.5 * wound->tool_depth_mm);
+	off = (u * along[0] + v * along[1]) / (half * SHOULDER_HALVES + SHOULDER_MM);
+	if (!(fabs(off) < 1))
+		return 0;
+	corner = fmin(fmin(p->arc_mm, end_mm - p->arc_mm) /
+			      fmin(0.5f * end_mm + 0.01f, CORNER_MM),
+		      1);
 	off = 1 - off * off;
-	return (float)(wound->tool_half_mm * in * off * off * ends);
+	return (float)(half * off * fmax(corner * (2 - corner), 0));
 }
 
-/* The stretches on both sides of a point. */
-static void stretches_at(struct wound *wound, uint64_t number, bool at_rest)
+/* The stretches on both sides of a point are to be painted. */
+static void mark_point(struct wound *wound, uint64_t number)
 {
 	for (uint64_t i = number; i <= number + 1 && i < wound->settled; i++) {
 		struct field_stretch stretch;
 
 		if (i > number && !line_point(wound, i)->joined)
 			break;
-		if (!line_stretch(wound, line_before(wound, i), line_point(wound, i), 0,
-				  &stretch))
-			continue;
-		if (at_rest)
-			line_raise(wound, &stretch);
-		line_mark(wound, &stretch);
+		if (line_stretch(wound, line_before(wound, i), line_point(wound, i), 0,
+				 &stretch))
+			line_mark(wound, &stretch);
 	}
 }
 
 static void step_point(struct wound *wound, uint64_t number, float end_mm)
 {
 	struct wound_point *p = line_point(wound, number);
-	float to = fmaxf(required_mm(wound, p, end_mm) - p->half_mm, 0), was = p->open_mm;
-	bool was_open = line_open(p);
+	float to = fmaxf(required_mm(wound, number, end_mm) - p->half_mm, p->wider_mm);
+	float was = p->open_mm;
 
 	if (to == was)
 		return;
-	if (was_open)
-		stretches_at(wound, number, false);
+	mark_point(wound, number);
 	p->open_mm += (to - was) * (to > was ? OPENING : CLOSING);
 	if (fabsf(to - p->open_mm) < AT_REST_MM)
 		p->open_mm = to;
-	p->wider_mm = fmaxf(p->wider_mm, WIDER * p->open_mm);
-	if (was_open || line_open(p))
-		stretches_at(wound, number, !line_open(p));
+	p->wider_mm = fmaxf(p->wider_mm, p->open_mm - STRETCH_HALF_MM);
+	mark_point(wound, number);
 }
 
-void wound_step(struct wound *wound)
-{
-	float end_mm = 0;
-
-	if (!wound->inserted && !wound->moving)
-		return;
-	wound->moving = false;
-	for (uint64_t i = wound->settled; i-- > wound->first;) {
-		const struct wound_point *p = line_point(wound, i);
-
-		if (i + 1 == wound->settled || !line_point(wound, i + 1)->joined)
-			end_mm = p->arc_mm;
-		step_point(wound, i, end_mm);
-		wound->moving = wound->moving || p->open_mm > 0;
-	}
-}
-
-/* --- The layer --- */
-
-/* Maximum number of stretches that are drawn as one; maximum turn, tangent. */
-#define TOGETHER 3
+/* Longest stretch that is drawn as one, in parts of its opening and mm; largest turn, tangent. */
+#define TOGETHER 0.6f
+#define TOGETHER_MM 0.75f
 #define STRAIGHT 0.1f
-
-/* Paint a tile: its fields, and the stretches over them. */
-static void paint_tile(struct wound *wound, const struct field_stretch *over, int n,
-		       int tile, uint8_t *rgba)
-{
-	int x = tile % wound->tiles.side * CANVAS_TILE,
-	    y = tile / wound->tiles.side * CANVAS_TILE;
-	struct field_texel texels[FIELD_TEXELS];
-
-	memcpy(texels, wound->field + (size_t)tile * FIELD_TEXELS, sizeof(texels));
-	for (int i = 0; i < n; i++)
-		field_raise(texels, x, y, &over[i]);
-	field_colour(texels, x, y, wound->texel_mm,
-		     rgba + ((size_t)y * wound->size + x) * 4, wound->size * 4);
-}
 
 /* Whether the line is straight at a point. */
 static bool straight(const struct wound *wound, uint64_t number)
@@ -783,52 +960,162 @@ static bool straight(const struct wound *wound, uint64_t number)
  */
 static uint64_t together(const struct wound *wound, uint64_t from)
 {
+	const struct wound_point *before = line_before(wound, from);
 	uint64_t to = from;
 
-	if (from == wound->first)
+	if (!before || !line_point(wound, from)->joined)
 		return to;
-	while (to + 1 < wound->settled && to - from + 1 < TOGETHER &&
-	       line_point(wound, to + 1)->joined && line_open(line_point(wound, to)) &&
-	       line_open(line_point(wound, to + 1)) && straight(wound, to))
+	while (to + 1 < wound->settled && straight(wound, to)) {
+		const struct wound_point *p = line_point(wound, to), *next = p;
+		float open_mm = fmaxf(p->open_mm, p->wider_mm);
+
+		next = line_point(wound, to + 1);
+		if (!next->joined || !line_loose(p) || !line_loose(next) ||
+		    next->arc_mm - before->arc_mm >
+			    fmaxf(TOGETHER * open_mm, TOGETHER_MM))
+			break;
 		to++;
+	}
 	return to;
 }
 
-/* Stretches that move, and those behind the blade. Returns their number. */
+/* Clipped stretches overlap by so much, mm. */
+#define OVERLAP_MM 0.05f
+
+/*
+ * A stretch ends where the next loose one begins, which does its own beginning, round the joint as
+ * far as the line turns there: a wide cut is not painted over and over.
+ */
+static void clip_stretch(const struct wound *wound, uint64_t first, uint64_t last,
+			 struct field_stretch *s)
+{
+	const struct wound_point *p = line_point(wound, last), *before, *start;
+	float x, y, u, v, length, turn, along_mm;
+
+	if (last + 1 < wound->settled && line_point(wound, last + 1)->joined &&
+	    line_loose(p))
+		s->last = 1;
+	if (!(s->inverse_mm2 > 0) || first < wound->first + 2)
+		return;
+	start = line_point(wound, first - 1);
+	before = line_point(wound, first - 2);
+	/* Before it there is another one, that is drawn. */
+	if (!line_point(wound, first)->joined || !start->joined || !line_loose(start))
+		return;
+	x = start->px[0] - before->px[0];
+	y = start->px[1] - before->px[1];
+	u = s->metric.a * x + s->metric.b * y;
+	v = s->metric.c * y;
+	length = sqrtf(u * u + v * v);
+	along_mm = 1 / sqrtf(s->inverse_mm2);
+	if (!(u * s->along[0] + v * s->along[1] > 0.5f * length * along_mm))
+		return;
+	turn = fabsf(u * s->along[1] - v * s->along[0]) / (length * along_mm);
+	s->first = -(turn * s->reach_mm + OVERLAP_MM) / along_mm;
+}
+
+/* The next stretch of loose lips that ends at @number or later, below @wound->settled. */
+static bool loose_stretch(const struct wound *wound, uint64_t *number,
+			  struct field_stretch *stretch)
+{
+	for (; *number < wound->settled; ++*number) {
+		const struct wound_point *p = line_point(wound, *number);
+		const struct wound_point *before = line_before(wound, *number);
+		uint64_t first = *number;
+
+		if (!line_loose(p) && !(p->joined && before && line_loose(before)))
+			continue;
+		*number = together(wound, *number);
+		if (!line_stretch(wound, before, line_point(wound, *number), 0, stretch))
+			continue;
+		clip_stretch(wound, first, *number, stretch);
+		return true;
+	}
+	return false;
+}
+
+/* Lips that are at rest are put into the fields. */
+static void keep_open(struct wound *wound)
+{
+	struct field_stretch stretch;
+
+	for (uint64_t i = wound->first; loose_stretch(wound, &i, &stretch); i++)
+		line_raise(wound, &stretch);
+	for (uint64_t i = wound->first; i < wound->settled; i++) {
+		struct wound_point *p = line_point(wound, i);
+
+		p->kept_mm = fmaxf(fmaxf(p->open_mm, p->wider_mm), p->kept_mm);
+	}
+	wound->loose = false;
+}
+
+void wound_step(struct wound *wound)
+{
+	float end_mm = 0;
+
+	if (!wound->inserted && !wound->moving)
+		return;
+	wound->moving = wound->loose = false;
+	for (uint64_t i = wound->settled; i-- > wound->first;) {
+		const struct wound_point *p = line_point(wound, i);
+
+		if (i + 1 == wound->settled || !line_point(wound, i + 1)->joined)
+			end_mm = p->arc_mm;
+		step_point(wound, i, end_mm);
+		wound->moving = wound->moving || p->open_mm > p->wider_mm;
+		wound->loose = wound->loose || line_loose(p);
+	}
+	if (!wound->moving && wound->loose)
+		keep_open(wound);
+}
+
+/* --- The layer --- */
+
+/* Paint a tile: its fields, and the stretches over them. */
+static void paint_tile(struct wound *wound, const struct field_stretch *over, int n,
+		       int tile, uint8_t *skin, uint8_t *flesh)
+{
+	int x = tile % wound->tiles.side * CANVAS_TILE,
+	    y = tile / wound->tiles.side * CANVAS_TILE;
+	size_t at = ((size_t)y * wound->size + x) * 4;
+	struct field_texel texels[FIELD_TEXELS];
+
+	memcpy(texels, wound->field + (size_t)tile * FIELD_TEXELS, sizeof(texels));
+	for (int i = 0; i < n; i++)
+		field_raise(texels, x, y, &over[i]);
+	field_colour(texels, x, y, wound->texel_mm, skin + at, flesh + at,
+		     wound->size * 4);
+}
+
+/* Loose lips, and the stretches behind the blade. Returns their number. */
 static int laid_over(const struct wound *wound, struct field_stretch *over)
 {
 	int n = 0;
 
-	for (uint64_t i = wound->moving ? wound->first : wound->settled; i < wound->end;
-	     i++) {
-		const struct wound_point *p = line_point(wound, i);
-		const struct wound_point *last = line_before(wound, i);
-
-		if (i < wound->settled) {
-			if (!line_open(p) && !(p->joined && last && line_open(last)))
-				continue;
-			if (p->joined)
-				i = together(wound, i);
-			p = line_point(wound, i);
-		}
-		n += line_stretch(wound, last, p, wound->tip.arc_mm, &over[n]);
-	}
+	for (uint64_t i = wound->first;
+	     wound->loose && loose_stretch(wound, &i, &over[n]); i++)
+		n++;
+	for (uint64_t i = wound->settled; i < wound->end; i++)
+		n += line_stretch(wound, line_before(wound, i), line_point(wound, i),
+				  wound->tip.arc_mm, &over[n]);
 	if (wound->cutting)
 		n += line_stretch(wound, line_before(wound, wound->end), &wound->tip,
 				  wound->tip.arc_mm, &over[n]);
 	return n;
 }
 
-void wound_paint(struct wound *wound, struct incise_canvas *canvas, int layer)
+void wound_paint(struct wound *wound, struct incise_canvas *canvas, int skin_layer,
+		 int flesh_layer)
 {
-	uint8_t *rgba = incise_canvas_layer(canvas, layer);
+	uint8_t *skin = incise_canvas_layer(canvas, skin_layer);
+	uint8_t *flesh = incise_canvas_layer(canvas, flesh_layer);
 	int n;
 
-	if (!wound->tiles.n_dirty || !rgba)
+	if (!wound->tiles.n_dirty || !skin || !flesh)
 		return;
 	n = laid_over(wound, wound->over);
 	for (int tile = 0; (tile = canvas_tiles_next(&wound->tiles, tile)) >= 0;) {
-		paint_tile(wound, wound->over, n, tile, rgba);
+		paint_tile(wound, wound->over, n, tile, skin, flesh);
 		incise_canvas_dirty(canvas, canvas_tile_rect(&wound->tiles, tile));
 	}
 }

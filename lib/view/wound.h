@@ -12,14 +12,16 @@
  *
  * Each texel has three fields: distance inside of the lips, depth, redness. Each stretch of line
  * raises them to its own values where these are larger, so that joints, crossings and repeated
- * cuts are unions in any order. (Paper 2, §2.1, uses a stamp of 5 × 5, blurred so that neighbours
+ * cuts are unions in any order. The stretch that is nearest also gives the cut's half-width and
+ * the lean of its walls to the lamp. (Paper 2, §2.1, uses a stamp of 5 × 5, blurred so that neighbours
  * match at their edges.) Colour is a function of the fields.
  *
  * Handle and tube open the cut where they are inserted: points move apart by up to half the tool's
- * width, less with the distance along the cut; afterwards they close, except for a little. Moving
+ * extent across the cut, less with the distance along it; afterwards they close as far as tissue is
+ * elastic, and the rest stays. Moving
  * stretches, and the tapering end behind the blade, are drawn over the fields at each painting.
  *
- * Memory: the fields, 6 bytes a texel, only where there are wounds; and the newest WOUND_POINTS
+ * Memory: the fields, 8 bytes a texel, only where there are wounds; and the newest WOUND_POINTS
  * points, WOUND_SPACING_MM apart or more. Cuts of older points stay, but no longer open.
  *
  * Lengths in mm on the surface, times those of the ticks.
@@ -60,8 +62,12 @@ void wound_step(struct wound *wound);
 /* The place of a handle or tube in the tissue; false: there is none. */
 bool wound_inserted(const struct wound *wound, double px[2], double *depth_mm);
 
-/* Update the layer, and mark the changed parts of the canvas. */
-void wound_paint(struct wound *wound, struct incise_canvas *canvas, int layer);
+/*
+ * Update two layers, and mark the changed parts of the canvas: the skin along the cuts, and the
+ * flesh between their lips, which belongs above the blood on the skin.
+ */
+void wound_paint(struct wound *wound, struct incise_canvas *canvas, int skin_layer,
+		 int flesh_layer);
 
 /* Distance of a place inside of the lips, mm; below 0 outside. For tests. */
 double wound_inside_mm(const struct wound *wound, int x, int y);

@@ -164,7 +164,7 @@ static void test_only_what_is_asked_for(void **state)
 		bool wound, bleeding;
 		int layers;
 	} cases[] = {
-		{false, false, 0}, {false, true, 0}, {true, false, 1}, {true, true, 2}};
+		{false, false, 0}, {false, true, 0}, {true, false, 2}, {true, true, 3}};
 	size_t memory[4];
 	struct field field;
 
@@ -184,7 +184,7 @@ static void test_only_what_is_asked_for(void **state)
 		paint(&s);
 		incise_injury_report(s.injury, &report);
 		assert_true((report.cut_mm > 0) == cases[k].wound);
-		assert_true((report.blood_ul_emitted > 0) == (cases[k].layers == 2));
+		assert_true((report.blood_ul_emitted > 0) == (cases[k].layers == 3));
 		memory[k] = s.memory;
 		for (int layer = 0; layer < CANVAS_LAYERS_MAX; layer++)
 			assert_true(!incise_canvas_layer(s.canvas, layer) ==
@@ -197,7 +197,7 @@ static void test_only_what_is_asked_for(void **state)
 		scene_free(&s);
 	}
 	assert_true(memory[0] < 200 && memory[1] == memory[0]);
-	/* Fields of 6 bytes a texel, films of 5 more; layers of 4 each. */
+	/* Fields of 8 bytes a texel, films of 5 more; layers of 4 each. */
 	assert_true(memory[2] > (6 + 4) * SIDE * SIDE &&
 		    memory[3] > memory[2] + (5 + 4) * SIDE * SIDE);
 	field_free(&field);
